@@ -1,0 +1,3 @@
+//! Hand-derived differentiable kernels of hydrograd.
+
+pub mod lie;

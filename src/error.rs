@@ -1,0 +1,108 @@
+//! One error type: every variant names the place, the value and what would be right.
+
+use std::path::PathBuf;
+
+/// Result of every fallible call of this crate.
+pub type Result<T> = std::result::Result<T, Error>;
+
+/// What went wrong, where, with which number, and what to do about it.
+#[derive(Debug, thiserror::Error)]
+#[non_exhaustive]
+pub enum Error {
+    /// A value given by the user that can't be used. `place` names the body and the field
+    /// (`body "coin": mass`), `value` is what was given, `expected` what would be right.
+    #[error("{place}: got {value}; {expected}")]
+    Input {
+        /// Body and field, or file and line.
+        place: String,
+        /// The value as given.
+        value: String,
+        /// What would be right, or how to mend it.
+        expected: String,
+    },
+    /// A surface mesh that doesn't bound a volume, or bounds it badly.
+    #[error("mesh {name}: {problem} ({location}); {remedy}")]
+    Mesh {
+        /// File or shape name.
+        name: String,
+        /// What is wrong, with its count or number.
+        problem: String,
+        /// First offending face, edge or vertex, with coordinates in metres.
+        location: String,
+        /// How to mend it.
+        remedy: String,
+    },
+    /// A file that can't be read or written.
+    #[error("{path}: {action} failed: {source}", path = path.display())]
+    File {
+        /// The file.
+        path: PathBuf,
+        /// `read` or `write`.
+        action: &'static str,
+        /// The operating system's reason.
+        source: std::io::Error,
+    },
+    /// A file whose contents can't be understood.
+    #[error("{path}: {message}", path = path.display())]
+    Parse {
+        /// The file.
+        path: PathBuf,
+        /// Line, key and remedy.
+        message: String,
+    },
+    /// A linear or nonlinear solve that didn't reach its tolerance.
+    #[error(
+        "{what} stopped at residual {residual:.3e} after {iterations} iterations (tolerance {tolerance:.1e}); {remedy}"
+    )]
+    Solver {
+        /// Which solve, at which time or body.
+        what: String,
+        /// Iterations made.
+        iterations: usize,
+        /// Relative residual reached.
+        residual: f64,
+        /// Relative residual asked for.
+        tolerance: f64,
+        /// What to try.
+        remedy: String,
+    },
+    /// The physics left what the discretisation or the step resolves.
+    #[error("{place}: {quantity} = {value:.6e} (limit {limit:.6e}); {remedy}")]
+    Unresolved {
+        /// Body, pair or time.
+        place: String,
+        /// The quantity.
+        quantity: String,
+        /// Its value.
+        value: f64,
+        /// The limit that it passed.
+        limit: f64,
+        /// What to change.
+        remedy: String,
+    },
+    /// A combination of settings that has no meaning or isn't offered.
+    #[error("{what} is not available: {why}; {instead}")]
+    Unsupported {
+        /// What was asked.
+        what: String,
+        /// Why not.
+        why: String,
+        /// What to use instead.
+        instead: String,
+    },
+}
+
+impl Error {
+    /// An [`Error::Input`] from its three parts.
+    pub fn input(
+        place: impl Into<String>,
+        value: impl std::fmt::Display,
+        expected: impl Into<String>,
+    ) -> Self {
+        Self::Input {
+            place: place.into(),
+            value: value.to_string(),
+            expected: expected.into(),
+        }
+    }
+}

@@ -1,0 +1,7 @@
+//! hydrograd: a differentiable simulator of rigid bodies that feel each other through the water.
+
+pub mod error;
+pub mod scene;
+
+pub use error::{Error, Result};
+pub use hydrograd_adjoint as adjoint;

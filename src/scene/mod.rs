@@ -1,0 +1,339 @@
+//! Plain scene data: what a user writes, in Rust or in a TOML file. No numerics.
+//!
+//! SI units throughout. Frames: a body's pose in the world is
+//! `parent pose ∘ placement ∘ joint motion`; the body's origin is where its joint acts.
+
+use serde::{Deserialize, Serialize};
+
+/// Everything that a simulation starts from.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Scene {
+    /// Name, for reports.
+    #[serde(default)]
+    pub name: String,
+    /// The water.
+    pub fluid: Fluid,
+    /// Gravity, m/s², world frame.
+    #[serde(default)]
+    pub gravity: [f64; 3],
+    /// Time step, s.
+    pub time_step: f64,
+    /// Number of steps of a run.
+    pub steps: usize,
+    /// Settings that a run of this scene starts from, e.g. `preset = "paper"`.
+    #[serde(default)]
+    pub preset: Preset,
+    /// Plane rigid walls: one, or mutually perpendicular ones.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub walls: Vec<Wall>,
+    /// The bodies, parents before children.
+    pub bodies: Vec<Body>,
+    /// Where the scene starts.
+    #[serde(default)]
+    pub initial: Initial,
+    /// What drives the actuated joints.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub controller: Option<Controller>,
+}
+
+/// A family of choices.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "kebab-case")]
+pub enum Preset {
+    /// hydrograd's own defaults.
+    #[default]
+    Default,
+    /// The paper's: face sources, centre collocation, Eq. 20, semi-implicit Euler in velocity.
+    Paper,
+}
+
+/// The fluid around the bodies.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Fluid {
+    /// Density, kg/m³; zero is "no water".
+    pub density: f64,
+    /// Uniform steady current, m/s, world frame; must be parallel to the walls.
+    #[serde(default)]
+    pub current: [f64; 3],
+}
+
+/// A plane rigid wall.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Wall {
+    /// A point of the plane, m.
+    pub point: [f64; 3],
+    /// Normal into the fluid; need not be of unit length.
+    pub normal: [f64; 3],
+}
+
+/// A rigid placement: rotation first, then translation.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields, default)]
+pub struct Placement {
+    /// Translation, m.
+    pub position: [f64; 3],
+    /// Rotation vector (axis times angle), rad.
+    pub rotation: [f64; 3],
+}
+
+/// One rigid body with the joint that carries it.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Body {
+    /// Name, unique in the scene.
+    pub name: String,
+    /// Surface that the water sees. A body without one is dry unless `added_mass` is given.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub shape: Option<Shape>,
+    /// Pose of the shape in the body's frame.
+    #[serde(default)]
+    pub shape_at: Placement,
+    /// Mass, kg. Give this or `density`; a body fixed to the world needs neither.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub mass: Option<f64>,
+    /// Density, kg/m³, from which mass and inertia follow with the shape's volume.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub density: Option<f64>,
+    /// Centre of mass in the body's frame, m; default: the shape's centroid.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub center_of_mass: Option<[f64; 3]>,
+    /// Inertia about the centre of mass, body axes, kg m²: xx, yy, zz or xx, yy, zz, xy, xz, yz.
+    /// Default: that of the shape filled evenly with `mass`.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub inertia: Option<Vec<f64>>,
+    /// The body's own added mass at unit density of the fluid, about its origin, body axes, 6 × 6
+    /// rows (linear, then angular; m³, m⁴, m⁵): used by `isolated` instead of computing it.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub added_mass: Option<Vec<Vec<f64>>>,
+    /// Name of the parent body; default: the world.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub parent: Option<String>,
+    /// Pose of the joint's frame in the parent's frame.
+    #[serde(default)]
+    pub placement: Placement,
+    /// How the body moves against its parent.
+    #[serde(default)]
+    pub joint: Joint,
+    /// A given motion of the joint's coordinates, one per coordinate; the joint is then driven.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub motion: Option<Vec<Motion>>,
+    /// Holds the joint where it starts.
+    #[serde(default)]
+    pub locked: bool,
+    /// Whether the joint's generalised forces are controls.
+    #[serde(default)]
+    pub actuated: bool,
+    /// Whether a wrench on the body (world axes, about its origin) is a control.
+    #[serde(default)]
+    pub thruster: bool,
+    /// Drag on the body's surface.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub drag: Option<Drag>,
+}
+
+/// A closed surface, by formula or from a file.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(tag = "kind", rename_all = "kebab-case", deny_unknown_fields)]
+pub enum Shape {
+    /// Sphere, a subdivided icosahedron.
+    Sphere {
+        /// Radius, m.
+        radius: f64,
+        /// Target number of faces; the nearest that the subdivision allows is taken.
+        #[serde(default, skip_serializing_if = "Option::is_none")]
+        faces: Option<usize>,
+    },
+    /// Ellipsoid along the axes, a stretched subdivided icosahedron.
+    Ellipsoid {
+        /// Semi-axes, m.
+        semi_axes: [f64; 3],
+        /// Target number of faces.
+        #[serde(default, skip_serializing_if = "Option::is_none")]
+        faces: Option<usize>,
+    },
+    /// Box along the axes.
+    Box {
+        /// Edge lengths, m.
+        size: [f64; 3],
+        /// Target number of faces.
+        #[serde(default, skip_serializing_if = "Option::is_none")]
+        faces: Option<usize>,
+    },
+    /// Cylinder along z.
+    Cylinder {
+        /// Radius, m.
+        radius: f64,
+        /// Length along z, m.
+        length: f64,
+        /// Target number of faces.
+        #[serde(default, skip_serializing_if = "Option::is_none")]
+        faces: Option<usize>,
+    },
+    /// Capsule along z: a cylinder with hemispherical ends.
+    Capsule {
+        /// Radius, m.
+        radius: f64,
+        /// Length of the cylindrical part along z, m.
+        length: f64,
+        /// Target number of faces.
+        #[serde(default, skip_serializing_if = "Option::is_none")]
+        faces: Option<usize>,
+    },
+    /// A closed triangle mesh in a file (OBJ, STL, PLY).
+    Mesh {
+        /// The file; relative to the scene file.
+        path: std::path::PathBuf,
+        /// Factor from file units to metres.
+        #[serde(default = "one")]
+        scale: f64,
+    },
+}
+
+fn one() -> f64 {
+    1.0
+}
+
+/// How a body moves against its parent (coordinates q, generalised velocity v).
+#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
+#[serde(tag = "kind", rename_all = "kebab-case", deny_unknown_fields)]
+pub enum Joint {
+    /// Not at all.
+    Fixed,
+    /// Along an axis: q, v in m, m/s.
+    Prismatic {
+        /// Direction in the joint's frame; need not be of unit length.
+        axis: [f64; 3],
+    },
+    /// About an axis: q, v in rad, rad/s.
+    Revolute {
+        /// Direction in the joint's frame.
+        axis: [f64; 3],
+    },
+    /// In a plane of the joint's frame: two translations, then the rotation about its normal.
+    Planar {
+        /// The plane.
+        plane: Plane,
+    },
+    /// About a point: q a unit quaternion (w, x, y, z), v the angular velocity in the parent's frame.
+    Spherical,
+    /// Freely: q = position of the body's origin and unit quaternion (w, x, y, z), v = velocity
+    /// of the body's origin and angular velocity, all in the parent's (joint's) frame.
+    #[default]
+    Free,
+}
+
+/// A plane of a planar joint, by its two translations in order.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "kebab-case")]
+pub enum Plane {
+    /// y, z, rotation about x.
+    Yz,
+    /// z, x, rotation about y.
+    Zx,
+    /// x, y, rotation about z.
+    Xy,
+}
+
+/// A given motion of one joint coordinate, q(t).
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(tag = "kind", rename_all = "kebab-case", deny_unknown_fields)]
+pub enum Motion {
+    /// `offset + rate·t`.
+    Linear {
+        /// Value at t = 0, m or rad.
+        offset: f64,
+        /// Rate, m/s or rad/s.
+        rate: f64,
+    },
+    /// `offset + amplitude·sin(frequency·t + phase)`.
+    Sine {
+        /// Mean value, m or rad.
+        #[serde(default)]
+        offset: f64,
+        /// Amplitude, m or rad.
+        amplitude: f64,
+        /// Angular frequency, rad/s.
+        frequency: f64,
+        /// Phase at t = 0, rad.
+        #[serde(default)]
+        phase: f64,
+    },
+}
+
+/// Drag on a body's surface, summed over its faces (Eq. 22 and its companions). The coefficients
+/// are per area of the surface.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields, default)]
+pub struct Drag {
+    /// Which part of the local velocity drags in the linear law.
+    pub part: DragPart,
+    /// Linear coefficient, kg/(m² s): νρ of Eq. 22.
+    pub linear: f64,
+    /// Which part of the local velocity drags in the quadratic law.
+    pub quadratic_part: DragPart,
+    /// Quadratic coefficient c of `½ ρ c |w| w` per face area, with w the dragging part of the
+    /// velocity; dimensionless.
+    pub quadratic: f64,
+}
+
+/// Part of the surface velocity that drags.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "kebab-case")]
+pub enum DragPart {
+    /// Along the surface, Eq. 22.
+    #[default]
+    Tangential,
+    /// Across the surface.
+    Normal,
+    /// Both.
+    Total,
+}
+
+/// Where a scene starts; lengths must match the joints in the order of the bodies.
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields, default)]
+pub struct Initial {
+    /// Joint coordinates; empty: all at their origin.
+    #[serde(skip_serializing_if = "Vec::is_empty")]
+    pub q: Vec<f64>,
+    /// Generalised velocity; empty: at rest.
+    #[serde(skip_serializing_if = "Vec::is_empty")]
+    pub v: Vec<f64>,
+    /// Generalised momentum M(q)v, the water's part included, instead of `v`.
+    #[serde(skip_serializing_if = "Vec::is_empty")]
+    pub momentum: Vec<f64>,
+}
+
+/// What drives the actuated joints of a scene file.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(tag = "kind", rename_all = "kebab-case", deny_unknown_fields)]
+pub enum Controller {
+    /// The same generalised forces at every step.
+    Constant {
+        /// One per control, N or N m.
+        control: Vec<f64>,
+    },
+    /// Proportional–derivative control of each actuated joint coordinate.
+    Pd {
+        /// Target coordinates, one per control, m or rad.
+        target: Vec<f64>,
+        /// Stiffness, one per control, N/m or N m/rad.
+        stiffness: Vec<f64>,
+        /// Damping, one per control, N s/m or N m s/rad.
+        damping: Vec<f64>,
+    },
+    /// Pushes one joint with a constant force until its coordinate passes a value, then stops it
+    /// within one step and holds it (the paper's falling ball).
+    PushThenLock {
+        /// The body whose (one-coordinate) joint is pushed.
+        body: String,
+        /// Generalised force, N or N m.
+        force: f64,
+        /// The coordinate at which it is stopped, m or rad; approached from above if `force` is
+        /// negative, from below otherwise.
+        stop_at: f64,
+    },
+}

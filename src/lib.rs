@@ -1,6 +1,9 @@
 //! hydrograd: a differentiable simulator of rigid bodies that feel each other through the water.
 
+pub mod coupling;
+pub mod dynamics;
 pub mod error;
+pub mod multibody;
 pub mod scene;
 
 pub use error::{Error, Result};

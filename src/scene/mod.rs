@@ -3,6 +3,8 @@
 //! SI units throughout. Frames: a body's pose in the world is
 //! `parent pose ∘ placement ∘ joint motion`; the body's origin is where its joint acts.
 
+mod motion;
+
 use serde::{Deserialize, Serialize};
 
 /// Everything that a simulation starts from.

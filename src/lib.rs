@@ -1,5 +1,6 @@
 //! hydrograd: a differentiable simulator of rigid bodies that feel each other through the water.
 
+pub mod boundary;
 pub mod error;
 pub mod scene;
 

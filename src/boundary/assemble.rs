@@ -53,17 +53,3 @@ pub(crate) fn flux_matrix(
         });
     k
 }
-
-/// Pᵀ B̄ of a body's own sources and faces, sources × 6.
-pub(crate) fn readout(faces: &Faces, sources: &[Vec3], twist_flux: &[Vec6]) -> Vec<Vec6> {
-    sources
-        .par_iter()
-        .map(|s| {
-            let mut sum = Vec6::zeros();
-            for (centre, b) in faces.centres.iter().zip(twist_flux) {
-                sum += b / (centre - s).norm();
-            }
-            sum
-        })
-        .collect()
-}

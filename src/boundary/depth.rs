@@ -58,10 +58,7 @@ pub(crate) fn place(
     let sites = sites(surface, method);
     let mut warnings = Vec::new();
     let depths: Vec<f64> = match depth {
-        Depth::Auto => sites
-            .iter()
-            .map(|s| (1.2 * s.edge).min(s.thickness / 3.0))
-            .collect(),
+        Depth::Auto => sites.iter().map(|s| automatic(surface, s)).collect(),
         Depth::Fixed(d) => {
             check_fixed(surface.name, d, &sites, &mut warnings)?;
             vec![d; sites.len()]
@@ -73,6 +70,26 @@ pub(crate) fn place(
         .map(|(s, d)| s.point - s.normal * *d)
         .collect();
     Ok((sources, depths, warnings))
+}
+
+/// Depth in edge lengths where the body is thick.
+const EDGES: f64 = 1.2;
+/// Largest depth in radii of the inner tangent ball.
+const BALL: f64 = 0.75;
+
+/// Depth of one source, m.
+fn automatic(surface: &Surface, site: &Site) -> f64 {
+    let radius = surface.ball(&site.point, &site.normal, site.thickness);
+    let mut depth = (EDGES * site.edge).min(BALL * radius);
+    // A safeguard for what points can't see of a coarse surface.
+    for _ in 0..20 {
+        let winding = surface.winding(&(site.point - site.normal * depth));
+        if (winding - 1.0).abs() < 1e-6 {
+            break;
+        }
+        depth *= 0.5;
+    }
+    depth
 }
 
 /// A user's own depth against what the mesh allows.
@@ -114,8 +131,8 @@ fn check_fixed(name: &str, d: f64, sites: &[Site], warnings: &mut Vec<String>) -
 pub(crate) fn check_inside(surface: &Surface, sources: &[Vec3]) -> Result<()> {
     for (i, s) in sources.iter().enumerate() {
         let winding = surface.winding(s);
-        // NaN (a source on a vertex) fails too.
-        if !((winding - 1.0).abs() < 1e-6) {
+        // A source on a vertex gives NaN.
+        if winding.is_nan() || (winding - 1.0).abs() > 1e-6 {
             return Err(Error::Unresolved {
                 place: format!(
                     "body \"{}\": source {i} of {} at {:?}",

@@ -106,7 +106,7 @@ fn condition(r: MatRef<f64>) -> f64 {
     let mut scaled = r.to_owned();
     for j in 0..n {
         let norm = r.col(j).norm_l2();
-        if !(norm > 0.0) || r[(j, j)] == 0.0 {
+        if norm.is_nan() || norm <= 0.0 || r[(j, j)] == 0.0 {
             return f64::INFINITY;
         }
         for i in 0..=j {

@@ -16,6 +16,7 @@
 mod assemble;
 pub mod depth;
 mod factor;
+pub mod readout;
 mod settings;
 mod surface;
 
@@ -23,7 +24,7 @@ use crate::adjoint::lie::{Mat6, Vec3, Vec6};
 use crate::{Error, Result};
 use faer::{Mat, MatMut, MatRef};
 
-pub use settings::{Depth, Method, RowScaling, Settings};
+pub use settings::{Depth, Method, Readout, RowScaling, Settings};
 pub use surface::Faces;
 
 /// Condition number above which results lose digits that matter.
@@ -48,8 +49,11 @@ pub struct BodyBoundary {
     pub row_weights: Vec<f64>,
     /// F̄, faces × 6: the row that a unit twist asks for; `F_i(ν) = twist_rows[i] · ν`.
     pub twist_rows: Vec<Vec6>,
-    /// B̄, faces × 6: flux ∫ n·(u + ω × x) dA of a unit twist through each face, m³/s.
+    /// Flux ∫ n·(u + ω × x) dA of a unit twist through each face, faces × 6, m³/s.
     pub twist_flux: Vec<Vec6>,
+    /// B̄, faces × 6: flux that weighs the potential at each face's centre, m³/s. `twist_flux` plus the
+    /// body's own residual flux with [`Readout::Corrected`], `twist_flux` with [`Readout::Centre`].
+    pub readout_flux: Vec<Vec6>,
     /// K, row-major faces × sources: the row that a unit source makes. See
     /// [`BodyBoundary::flux_matrix`].
     pub flux_rows: Vec<f64>,
@@ -136,7 +140,6 @@ impl BodyBoundary {
         let twist_rows = assemble::twist_rows(&faces, method, &row_weights);
         let twist_flux: Vec<Vec6> = (0..faces.len()).map(|i| faces.twist_flux(i)).collect();
         let flux_rows = assemble::flux_matrix(&faces, &sources, method, &row_weights);
-        let readout = assemble::readout(&faces, &sources, &twist_flux);
 
         let k = MatRef::from_row_major_slice(&flux_rows, faces.len(), sources.len());
         let rhs = Mat::from_fn(faces.len(), 6, |i, j| twist_rows[i][j]);
@@ -157,6 +160,20 @@ impl BodyBoundary {
                 0.0
             }
         });
+        let readout_flux: Vec<Vec6> = match settings.readout {
+            Readout::Centre => twist_flux.clone(),
+            Readout::Corrected => (0..faces.len())
+                .map(|i| {
+                    let per_row = match method {
+                        Method::MfsVertex => 1.0 / row_weights[i],
+                        Method::MfsFace => faces.areas[i] / row_weights[i],
+                    };
+                    twist_flux[i] + Vec6::from_fn(|j, _| left[(i, j)] * per_row)
+                })
+                .collect(),
+        };
+        let points = readout::points(&faces, &sources, settings.readout);
+        let readout = readout::own(&points, &sources, &readout_flux);
         let mut raw = Mat6::zeros();
         for (p, a) in readout.iter().zip(&strengths) {
             raw += p * a.transpose();
@@ -186,6 +203,7 @@ impl BodyBoundary {
             row_weights,
             twist_rows,
             twist_flux,
+            readout_flux,
             flux_rows,
             readout,
             strengths,

@@ -12,6 +12,8 @@ pub struct Settings {
     pub depth: Depth,
     /// Norm in which the rows are fitted.
     pub rows: RowScaling,
+    /// How the energy is read from the strengths.
+    pub readout: Readout,
 }
 
 /// Where the sources are and what a row of the flux matrix says.
@@ -49,4 +51,16 @@ pub enum RowScaling {
     /// Plain least squares of the flux (vertex sources) or of the normal velocity (face sources).
     /// Ruins small bodies beside large ones; for comparison.
     Unscaled,
+}
+
+/// How the energy is read from the strengths.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "kebab-case")]
+pub enum Readout {
+    /// Second order in the residual, with three points on faces whose sources are near: see
+    /// [`super::readout`].
+    #[default]
+    Corrected,
+    /// The potential at each face's centre times the flux asked for (the paper's Eq. 19).
+    Centre,
 }

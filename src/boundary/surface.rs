@@ -53,6 +53,11 @@ pub(crate) fn solid_angle(x: &Vec3, [p, q, r]: &[Vec3; 3]) -> f64 {
     2.0 * numerator.atan2(denominator)
 }
 
+/// Edge of an equilateral triangle of this area.
+pub(crate) fn equilateral_edge(area: f64) -> f64 {
+    (4.0 * area / 3.0_f64.sqrt()).sqrt()
+}
+
 /// Checked mesh with what the depth rule needs.
 pub(crate) struct Surface<'a> {
     pub name: &'a str,
@@ -61,7 +66,8 @@ pub(crate) struct Surface<'a> {
     pub faces: Faces,
     /// Angle-weighted unit normals at the vertices.
     pub vertex_normals: Vec<Vec3>,
-    /// Mean length of the edges that meet at a vertex, m.
+    /// Mean size of the faces that meet at a vertex: the edge of an equilateral triangle of
+    /// their area, m.
     pub vertex_edge: Vec<f64>,
 }
 
@@ -112,7 +118,7 @@ impl<'a> Surface<'a> {
                 .map(|k| (c[(k + 1) % 3] - c[k]).norm())
                 .fold(0.0, f64::max);
             // Also refuses repeated vertices and a mesh of size zero.
-            if !(cross.norm() > 1e-12 * longest * longest && longest > 1e-12 * size) {
+            if cross.norm() <= 1e-12 * longest * longest || longest <= 1e-12 * size {
                 return Err(bad(
                     format!("a face of area {:.3e} m²", 0.5 * cross.norm()),
                     format!("face {i} at {:?}", c[0].as_slice()),
@@ -122,8 +128,8 @@ impl<'a> Surface<'a> {
             for k in 0..3 {
                 let (e, f) = (c[(k + 1) % 3] - c[k], c[(k + 2) % 3] - c[k]);
                 vertex_normals[t[k]] += cross.normalize() * e.angle(&f);
-                vertex_edge[t[k]].0 += e.norm() + f.norm();
-                vertex_edge[t[k]].1 += 2;
+                vertex_edge[t[k]].0 += equilateral_edge(0.5 * cross.norm());
+                vertex_edge[t[k]].1 += 1;
                 edges.push((t[k], t[(k + 1) % 3]));
             }
             corners.push(c);
@@ -167,7 +173,7 @@ impl<'a> Surface<'a> {
             areas,
         };
         let volume = faces.volume();
-        if !(volume > 1e-12 * size.powi(3)) {
+        if volume.is_nan() || volume <= 1e-12 * size.powi(3) {
             return Err(bad(
                 format!("volume {volume:.3e} m³"),
                 "whole mesh".into(),
@@ -188,6 +194,23 @@ impl<'a> Surface<'a> {
     pub fn winding(&self, x: &Vec3) -> f64 {
         let total: f64 = self.faces.corners.iter().map(|c| solid_angle(x, c)).sum();
         total / (4.0 * std::f64::consts::PI)
+    }
+
+    /// Radius of the largest ball inside the body that touches the surface at `x` with outward normal
+    /// `n`, m: min over the surface's points q of |x − q|² / 2n·(x − q), taken over vertices, face
+    /// centres and the point opposite, `thickness` away (Ma, Bae & Choi 2012, without iteration).
+    pub fn ball(&self, x: &Vec3, n: &Vec3, thickness: f64) -> f64 {
+        let points = self.vertices.iter().chain(&self.faces.centres);
+        points.fold(0.5 * thickness, |radius, q| {
+            let d = x - q;
+            let height = d.dot(n);
+            // The point itself, and points level with it up to round-off, bound nothing.
+            if height > 1e-12 * d.norm() {
+                radius.min(d.norm_squared() / (2.0 * height))
+            } else {
+                radius
+            }
+        })
     }
 
     /// Distance along `direction` from `x` to the first face that doesn't contain vertex `vertex`

@@ -1,9 +1,11 @@
 //! hydrograd: a differentiable simulator of rigid bodies that feel each other through the water.
 
+pub mod boundary;
 pub mod coupling;
 pub mod dynamics;
 pub mod error;
 pub mod multibody;
+pub mod solver;
 pub mod scene;
 
 pub use error::{Error, Result};

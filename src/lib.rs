@@ -5,8 +5,8 @@ pub mod coupling;
 pub mod dynamics;
 pub mod error;
 pub mod multibody;
-pub mod solver;
 pub mod scene;
+pub mod solver;
 
 pub use error::{Error, Result};
 pub use hydrograd_adjoint as adjoint;

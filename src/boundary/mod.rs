@@ -24,6 +24,7 @@ use crate::adjoint::lie::{Mat6, Vec3, Vec6};
 use crate::{Error, Result};
 use faer::{Mat, MatMut, MatRef};
 
+pub(crate) use factor::{solve_upper, solve_upper_transpose};
 pub use settings::{Depth, Method, Readout, RowScaling, Settings};
 pub use surface::Faces;
 

@@ -1,6 +1,6 @@
 //! Bodies that don't feel each other: each keeps its own constant added mass (Eq. 12).
 
-use super::{Coupling, Direction, Record, Report, Tangent};
+use super::{Coupling, Direction, Pullback, Record, Report, Tangent};
 use crate::Result;
 use crate::adjoint::lie::{Mat6, Pose, Vec6};
 use nalgebra::{DMatrix, DVector};
@@ -53,6 +53,21 @@ struct IsolatedRecord<'a> {
     report: Report,
 }
 
+impl IsolatedRecord<'_> {
+    fn impulse(&self, x: Direction) -> DVector<f64> {
+        match x {
+            Direction::Basis(c) => &self.momenta * c,
+            Direction::Twist(x) => {
+                let mut out = DVector::zeros(x.len());
+                for (b, m) in self.coupling.added_mass.iter().enumerate() {
+                    out.rows_mut(6 * b, 6).copy_from(&(m * x.rows(6 * b, 6)));
+                }
+                out
+            }
+        }
+    }
+}
+
 impl Record for IsolatedRecord<'_> {
     fn momenta(&self) -> &DMatrix<f64> {
         &self.momenta
@@ -66,21 +81,12 @@ impl Record for IsolatedRecord<'_> {
         DVector::zeros(y.len())
     }
 
-    fn momentum(&self, x: Direction) -> Result<DVector<f64>> {
-        Ok(match x {
-            Direction::Basis(c) => &self.momenta * c,
-            Direction::Twist(x) => {
-                let mut out = DVector::zeros(x.len());
-                for (b, m) in self.coupling.added_mass.iter().enumerate() {
-                    out.rows_mut(6 * b, 6).copy_from(&(m * x.rows(6 * b, 6)));
-                }
-                out
-            }
+    fn vjp(&self, x: Direction, y: Direction) -> Result<Pullback> {
+        Ok(Pullback {
+            momentum_x: self.impulse(x),
+            momentum_y: self.impulse(y),
+            wrench: vec![Vec6::zeros(); self.coupling.bodies()],
         })
-    }
-
-    fn vjp(&self, _x: Direction, _y: Direction) -> Result<Vec<Vec6>> {
-        Ok(vec![Vec6::zeros(); self.coupling.bodies()])
     }
 
     fn hvp(&self, _x: Direction, _y: Direction, z: &[Vec6]) -> Result<Tangent> {

@@ -15,6 +15,8 @@
 //! The ladder of E: value [`Record::momenta`], vjp [`Record::gradient`] (on the basis) and
 //! [`Record::vjp`] (any pair), jvp and hvp together in [`Record::hvp`].
 
+pub mod full;
+pub mod image;
 mod isolated;
 mod tensor;
 
@@ -67,6 +69,17 @@ pub enum Direction<'a> {
     Twist(&'a DVector<f64>),
 }
 
+/// First derivatives for a pair of directions.
+#[derive(Clone, Debug)]
+pub struct Pullback {
+    /// M̄_f x̄, body-frame impulses (6·bodies): ∂E/∂ȳ.
+    pub momentum_x: DVector<f64>,
+    /// M̄_f ȳ: ∂E/∂x̄.
+    pub momentum_y: DVector<f64>,
+    /// ∇_g E(x̄, ȳ): a spatial wrench on each body.
+    pub wrench: Vec<Vec6>,
+}
+
 /// Second derivatives along one displacement.
 #[derive(Clone, Debug)]
 pub struct Tangent {
@@ -91,17 +104,11 @@ pub trait Record: Send + Sync {
     /// D_g E(e_i, y)[Z] for every basis column e_i, without a further solve.
     fn gradient_along(&self, y: &DVector<f64>, z: &[Vec6]) -> DVector<f64>;
 
-    /// M̄_f x̄ for any direction: body-frame impulses (6·bodies).
+    /// Impulses of both directions and ∇_g E(x̄, ȳ), for any directions.
     ///
     /// # Errors
     /// A solve that misses its tolerance.
-    fn momentum(&self, x: Direction) -> Result<DVector<f64>>;
-
-    /// ∇_g E(x̄, ȳ) for any directions: a spatial wrench on each body.
-    ///
-    /// # Errors
-    /// A solve that misses its tolerance.
-    fn vjp(&self, x: Direction, y: Direction) -> Result<Vec<Vec6>>;
+    fn vjp(&self, x: Direction, y: Direction) -> Result<Pullback>;
 
     /// The tangent along the displacement Z (one spatial twist a body).
     ///

@@ -146,10 +146,10 @@ impl Evaluation<'_> {
             if wet.iter().all(|x| *x == 0.0) {
                 return Ok((zero.clone(), zero.clone()));
             }
-            let d = Direction::Twist(&wet);
+            let pullback = fluid.vjp(Direction::Twist(&wet), other)?;
             Ok((
-                self.wet_impulses(&fluid.momentum(d)?),
-                self.from_wet(&fluid.vjp(d, other)?),
+                self.wet_impulses(&pullback.momentum_x),
+                self.from_wet(&pullback.wrench),
             ))
         };
         let (momenta_carried, pair_carried) = respond(&carried, water)?;

@@ -240,9 +240,10 @@ impl Evaluation<'_> {
             let wet_carried = self.wet_twists(&carried);
             let (momenta_carried, pair) = if wet_carried.iter().any(|x| *x != 0.0) {
                 let carried = Direction::Twist(&wet_carried);
+                let pullback = fluid.vjp(carried, water)?;
                 (
-                    self.wet_impulses(&fluid.momentum(carried)?),
-                    self.from_wet(&fluid.vjp(carried, water)?),
+                    self.wet_impulses(&pullback.momentum_x),
+                    self.from_wet(&pullback.wrench),
                 )
             } else {
                 (vec![Vec6::zeros(); n], vec![Vec6::zeros(); n])

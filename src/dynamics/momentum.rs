@@ -4,7 +4,6 @@ use super::force::rigid_parameters_vjp;
 use super::{Evaluation, ForceCotangents};
 use crate::Result;
 use crate::adjoint::lie::{Vec6, cross_force};
-use crate::coupling::Direction;
 use crate::multibody::{Cotangents, Virtual};
 use nalgebra::DVector;
 
@@ -82,10 +81,7 @@ impl Evaluation<'_> {
                 self.fluid_momenta(&direction),
                 self.fluid_momenta(&virtual_direction),
             );
-            let pair = self.from_wet(&fluid.vjp(
-                Direction::Basis(&virtual_direction),
-                Direction::Basis(&direction),
-            )?);
+            let pair = self.from_wet(&fluid.gradient(&virtual_direction, &direction));
             for b in 0..self.system.len() {
                 if self.system.bodies[b].wet.is_none() {
                     continue;

@@ -38,6 +38,7 @@ pub mod normal;
 pub mod potential;
 mod registry;
 mod source;
+mod sum;
 mod target;
 
 pub use flux::{

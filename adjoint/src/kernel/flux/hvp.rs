@@ -1,9 +1,12 @@
 //! Flux: tangent of the gradient.
 
 use super::constant;
-use crate::kernel::lane::{Lane, V3, cross, dot, scale, scale_add, sub};
+use super::vjp::edge_weights;
+use crate::kernel::lane::{Lane, Lanes, V3, cross, dot, scale, scale_add, sub};
+use crate::kernel::sum::{Aligned, TILE, Terms, length, registers, splat, transposed};
 use crate::kernel::{Sources, Triangles};
 use crate::lie::Vec3;
+use pulp::Simd;
 
 /// Tangent of [`edge_gradient`](super::vjp::edge_gradient) as the source moves by `d`, with the
 /// tangents `dl` of the two lengths. With `c = 2 S/(P Q)`:
@@ -60,15 +63,54 @@ pub fn flux_hvp(
     columns: usize,
     out: &mut [f64],
 ) {
-    for i in 0..targets.len() {
-        let corners = targets.corners(i);
-        for j in 0..sources.len() {
-            let g = flux_hessian_product(&corners, targets.weight[i], &sources.point(j), &d[j]);
-            for k in 0..columns {
-                for c in 0..3 {
-                    out[(j * columns + k) * 3 + c] += bar[i * columns + k] * g[c];
-                }
-            }
+    let weight = edge_weights(targets, bar, columns);
+    transposed(
+        EdgeTangents(targets),
+        sources,
+        Some(d),
+        &weight,
+        columns,
+        out,
+    );
+}
+
+/// Tangents of the edge terms of a surface.
+#[derive(Clone, Copy)]
+struct EdgeTangents<'a>(&'a Triangles);
+
+impl Terms<3> for EdgeTangents<'_> {
+    fn len(self) -> usize {
+        self.0.sides.len()
+    }
+
+    #[inline(always)]
+    fn evaluate<S: Simd>(
+        self,
+        simd: S,
+        tile: usize,
+        s: V3<Lanes<S>>,
+        d: V3<Lanes<S>>,
+        out: &mut [[S::f64s; 3]; TILE],
+    ) {
+        let tile = &self.0.edges[tile];
+        // Length and its tangent, −r·d/l.
+        let mut lengths = Aligned([[simd.splat_f64s(0.0); 2]; 2 * TILE]);
+        for (l, vertex) in lengths.0.iter_mut().zip(&tile.vertices) {
+            let r = sub(splat(simd, vertex), s);
+            let length = length(r);
+            *l = [length.v, (-dot(r, d) / length).v];
+        }
+        for (out, edge) in out.iter_mut().zip(&tile.items) {
+            let [a, b] = edge.ends;
+            let (a, b) = (lengths.0[a as usize], lengths.0[b as usize]);
+            *out = registers(edge_gradient_tangent(
+                sub(splat(simd, &edge.start), s),
+                splat(simd, &edge.along),
+                Lanes::splat(simd, edge.squared),
+                [Lanes::new(simd, a[0]), Lanes::new(simd, b[0])],
+                d,
+                [Lanes::new(simd, a[1]), Lanes::new(simd, b[1])],
+            ));
         }
     }
 }

@@ -231,3 +231,22 @@ pub(super) fn scale_add<T: Lane>(c: T, a: V3<T>, b: V3<T>) -> V3<T> {
         c.mul_add(a[2], b[2]),
     ]
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn arctangent_is_right_to_round_off_in_all_quadrants() {
+        let simd = pulp::Scalar;
+        let mut worst: f64 = 0.0;
+        for i in 0..4000 {
+            let size = 10_f64.powf(-14.0 + 0.007 * f64::from(i));
+            for (y, x) in [(size, 1.0), (size, -1.0), (-size, 1.0), (-size, -1.0)] {
+                let lanes = Lanes::splat(simd, y).atan2(Lanes::splat(simd, x)).v;
+                worst = worst.max((lanes / y.atan2(x) - 1.0).abs());
+            }
+        }
+        assert!(worst < 5e-16, "{worst:e}");
+    }
+}

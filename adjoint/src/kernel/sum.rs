@@ -15,6 +15,22 @@ use pulp::{Arch, Simd, WithSimd};
 use rayon::prelude::*;
 use std::ops::Range;
 
+/// Runs `op` with the widest vectors of this processor.
+pub(super) fn dispatch(op: impl WithSimd<Output = ()>) {
+    #[cfg(test)]
+    match super::tests::VECTORS.load(std::sync::atomic::Ordering::Relaxed) {
+        1 => return Simd::vectorize(pulp::Scalar, op),
+        #[cfg(target_arch = "x86_64")]
+        4 => {
+            if let Some(simd) = pulp::x86::V3::try_new() {
+                return Simd::vectorize(simd, op);
+            }
+        }
+        _ => {}
+    }
+    Arch::new().dispatch(op);
+}
+
 /// Terms evaluated at once.
 pub(super) const TILE: usize = 128;
 /// Sources of one task of [`transposed`].
@@ -79,7 +95,7 @@ pub(super) fn transposed<const C: usize>(
     out.par_chunks_mut(CHUNK * columns * C)
         .enumerate()
         .for_each(|(chunk, out)| {
-            Arch::new().dispatch(Transposed {
+            dispatch(Transposed {
                 terms,
                 sources,
                 d: d.as_ref(),
@@ -215,7 +231,7 @@ pub(super) fn forward(
     out.par_chunks_mut(TILE * columns)
         .enumerate()
         .for_each(|(tile, out)| {
-            Arch::new().dispatch(Forward {
+            dispatch(Forward {
                 terms,
                 sources,
                 d: &d,
@@ -291,7 +307,7 @@ impl<T: Terms<3>> WithSimd for Forward<'_, T> {
     }
 }
 
-/// Writes a block of rows: `value(row, vector)` is the kernel.
+/// Writes a vector of entries, cut to the length of `out`.
 #[inline(always)]
 pub(super) fn put<S: Simd>(simd: S, add: bool, value: S::f64s, out: &mut [f64]) {
     if out.len() == S::F64_LANES {

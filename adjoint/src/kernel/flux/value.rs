@@ -2,11 +2,11 @@
 
 use super::constant;
 use crate::kernel::lane::{Lane, Lanes, V3, dot, sub};
-use crate::kernel::sum::{Aligned, fill, length, load, put, splat};
+use crate::kernel::sum::{Aligned, dispatch, fill, length, load, put, splat};
 use crate::kernel::target::{FACES, Face, Tile};
 use crate::kernel::{Sources, Triangles, Write};
 use crate::lie::Vec3;
-use pulp::{Arch, Simd, WithSimd};
+use pulp::{Simd, WithSimd};
 
 /// Solid angle Ω from `2A n`, the corner `r_0 = v_0 − s`, the lengths `l_c` and the halved squares
 /// of the edges 01, 12, 20.
@@ -25,7 +25,7 @@ pub(super) fn solid_angle<T: Lane>(double_area: V3<T>, r0: V3<T>, l: V3<T>, half
 }
 
 /// Ω of the triangle with these corners.
-pub(super) fn solid_angle_of<T: Lane>(corners: &[Vec3; 3], s: V3<T>) -> T {
+pub(in crate::kernel) fn solid_angle_of<T: Lane>(corners: &[Vec3; 3], s: V3<T>) -> T {
     let [a, b, c] = corners;
     let r = corners.map(|v| sub(constant(s[0], &v), s));
     let l = r.map(|r| dot(r, r).sqrt());
@@ -56,7 +56,7 @@ pub fn flux_fill(
         column,
         FACES,
         |tile, out| {
-            Arch::new().dispatch(Fill {
+            dispatch(Fill {
                 tile: &targets.faces[tile],
                 sources,
                 add: write == Write::Add,

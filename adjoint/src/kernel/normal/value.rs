@@ -1,14 +1,14 @@
 //! Normal velocity: value.
 
 use crate::kernel::lane::{Lane, V3, dot, sub};
-use crate::kernel::sum::{TILE, fill, load, put, splat};
+use crate::kernel::sum::{TILE, dispatch, fill, load, put, splat};
 use crate::kernel::{Points, Sources, Write};
 use crate::lie::Vec3;
-use pulp::{Arch, Simd, WithSimd};
+use pulp::{Simd, WithSimd};
 
 /// `n·r/|r|³`; `n` may carry the row weight.
 #[inline(always)]
-pub(super) fn velocity<T: Lane>(n: V3<T>, r: V3<T>) -> T {
+pub(in crate::kernel) fn velocity<T: Lane>(n: V3<T>, r: V3<T>) -> T {
     let r2 = dot(r, r);
     dot(n, r) / (r2 * r2.sqrt())
 }
@@ -35,7 +35,7 @@ pub fn normal_fill(
         column,
         TILE,
         |tile, out| {
-            Arch::new().dispatch(Fill {
+            dispatch(Fill {
                 targets,
                 first: tile * TILE,
                 sources,

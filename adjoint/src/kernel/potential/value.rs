@@ -8,7 +8,7 @@ use pulp::Simd;
 
 /// `1/|r|`.
 #[inline(always)]
-pub(super) fn inverse_distance<T: Lane>(r: V3<T>) -> T {
+pub(in crate::kernel) fn inverse_distance<T: Lane>(r: V3<T>) -> T {
     r[0].like(1.0) / length(r)
 }
 

@@ -32,7 +32,7 @@ pub(super) fn dispatch(op: impl WithSimd<Output = ()>) {
 }
 
 /// Terms evaluated at once.
-pub(super) const TILE: usize = 128;
+pub(super) const TILE: usize = 64;
 /// Sources of one task of [`transposed`].
 const CHUNK: usize = 4 * WIDTH;
 /// Vectors of sources whose terms [`forward`] keeps before it spends the columns on them.
@@ -41,6 +41,9 @@ const GROUP: usize = 2;
 /// Keeps the buffers on cache lines, so that no vector straddles two.
 #[repr(align(64))]
 pub(super) struct Aligned<T>(pub T);
+
+/// Room for the distances of a source vector from the vertices of a tile, and for their tangents.
+pub(super) type Scratch<S> = [[<S as Simd>::f64s; 2 * TILE]; 2];
 
 /// Terms of a sum with `C` components (a value or a gradient), functions of one source.
 pub(super) trait Terms<const C: usize>: Copy + Sync {
@@ -55,6 +58,7 @@ pub(super) trait Terms<const C: usize>: Copy + Sync {
         tile: usize,
         s: V3<Lanes<S>>,
         d: V3<Lanes<S>>,
+        scratch: &mut Scratch<S>,
         out: &mut [[S::f64s; C]; TILE],
     );
 }
@@ -128,6 +132,7 @@ impl<const C: usize, T: Terms<C>> WithSimd for Transposed<'_, C, T> {
         let count = self.out.len() / (k * C);
         let vectors = count.div_ceil(S::F64_LANES);
         let mut sums = vec![zero; vectors * k * C];
+        let mut scratch = Aligned([[zero; 2 * TILE]; 2]);
         let mut buffer = Aligned([[zero; C]; TILE]);
         let len = self.terms.len();
         for tile in 0..len.div_ceil(TILE) {
@@ -139,7 +144,8 @@ impl<const C: usize, T: Terms<C>> WithSimd for Transposed<'_, C, T> {
                     Some(d) => load(simd, d, first + v),
                     None => [Lanes::new(simd, zero); 3],
                 };
-                self.terms.evaluate(simd, tile, s, d, &mut buffer.0);
+                self.terms
+                    .evaluate(simd, tile, s, d, &mut scratch.0, &mut buffer.0);
                 spend(simd, &buffer.0[..range.len()], weight, k, sums);
             }
         }
@@ -265,6 +271,7 @@ impl<T: Terms<3>> WithSimd for Forward<'_, T> {
         let a = S::as_simd_f64s(self.a).0;
         // Lanes are added up only at the end.
         let mut sums = vec![zero; count * k];
+        let mut scratch = Aligned([[zero; 2 * TILE]; 2]);
         let mut buffer = Aligned([[zero; 3]; TILE]);
         let mut slopes = Aligned([[zero; TILE]; GROUP]);
         let mut first = 0;
@@ -273,7 +280,8 @@ impl<T: Terms<3>> WithSimd for Forward<'_, T> {
             for (v, slopes) in slopes.0[..group].iter_mut().enumerate() {
                 let s = load(simd, self.sources, first + v);
                 let d = load(simd, self.d, first + v);
-                self.terms.evaluate(simd, self.tile, s, d, &mut buffer.0);
+                self.terms
+                    .evaluate(simd, self.tile, s, d, &mut scratch.0, &mut buffer.0);
                 for (slope, g) in slopes.iter_mut().zip(&buffer.0[..count]) {
                     let g = [
                         Lanes::new(simd, g[0]),

@@ -3,7 +3,7 @@
 use super::constant;
 use super::vjp::edge_weights;
 use crate::kernel::lane::{Lane, Lanes, V3, cross, dot, scale, scale_add, sub};
-use crate::kernel::sum::{Aligned, TILE, Terms, length, registers, splat, transposed};
+use crate::kernel::sum::{Scratch, TILE, Terms, length, registers, splat, transposed};
 use crate::kernel::{Sources, Triangles};
 use crate::lie::Vec3;
 use pulp::Simd;
@@ -90,26 +90,29 @@ impl Terms<3> for EdgeTangents<'_> {
         tile: usize,
         s: V3<Lanes<S>>,
         d: V3<Lanes<S>>,
+        scratch: &mut Scratch<S>,
         out: &mut [[S::f64s; 3]; TILE],
     ) {
         let tile = &self.0.edges[tile];
-        // Length and its tangent, −r·d/l.
-        let mut lengths = Aligned([[simd.splat_f64s(0.0); 2]; 2 * TILE]);
-        for (l, vertex) in lengths.0.iter_mut().zip(&tile.vertices) {
+        let [lengths, tangents] = scratch;
+        let table = lengths.iter_mut().zip(tangents.iter_mut());
+        for ((l, dl), vertex) in table.zip(&tile.vertices) {
             let r = sub(splat(simd, vertex), s);
             let length = length(r);
-            *l = [length.v, (-dot(r, d) / length).v];
+            *l = length.v;
+            // δl = −r·d/l
+            *dl = (-dot(r, d) / length).v;
         }
         for (out, edge) in out.iter_mut().zip(&tile.items) {
             let [a, b] = edge.ends;
-            let (a, b) = (lengths.0[a as usize], lengths.0[b as usize]);
+            let (a, b) = (a as usize, b as usize);
             *out = registers(edge_gradient_tangent(
                 sub(splat(simd, &edge.start), s),
                 splat(simd, &edge.along),
                 Lanes::splat(simd, edge.squared),
-                [Lanes::new(simd, a[0]), Lanes::new(simd, b[0])],
+                [Lanes::new(simd, lengths[a]), Lanes::new(simd, lengths[b])],
                 d,
-                [Lanes::new(simd, a[1]), Lanes::new(simd, b[1])],
+                [Lanes::new(simd, tangents[a]), Lanes::new(simd, tangents[b])],
             ));
         }
     }

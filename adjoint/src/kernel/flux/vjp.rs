@@ -2,7 +2,7 @@
 
 use super::constant;
 use crate::kernel::lane::{Lane, Lanes, V3, cross, dot, scale, sub};
-use crate::kernel::sum::{Aligned, TILE, Terms, length, registers, splat, transposed};
+use crate::kernel::sum::{Scratch, TILE, Terms, length, registers, splat, transposed};
 use crate::kernel::target::NONE;
 use crate::kernel::{Sources, Triangles};
 use crate::lie::Vec3;
@@ -84,11 +84,12 @@ impl Terms<3> for EdgeGradients<'_> {
         tile: usize,
         s: V3<Lanes<S>>,
         _: V3<Lanes<S>>,
+        scratch: &mut Scratch<S>,
         out: &mut [[S::f64s; 3]; TILE],
     ) {
         let tile = &self.0.edges[tile];
-        let mut lengths = Aligned([simd.splat_f64s(0.0); 2 * TILE]);
-        for (l, vertex) in lengths.0.iter_mut().zip(&tile.vertices) {
+        let [lengths, _] = scratch;
+        for (l, vertex) in lengths.iter_mut().zip(&tile.vertices) {
             *l = length(sub(splat(simd, vertex), s)).v;
         }
         for (out, edge) in out.iter_mut().zip(&tile.items) {
@@ -97,8 +98,8 @@ impl Terms<3> for EdgeGradients<'_> {
                 sub(splat(simd, &edge.start), s),
                 splat(simd, &edge.along),
                 Lanes::splat(simd, edge.squared),
-                Lanes::new(simd, lengths.0[a as usize]),
-                Lanes::new(simd, lengths.0[b as usize]),
+                Lanes::new(simd, lengths[a as usize]),
+                Lanes::new(simd, lengths[b as usize]),
             ));
         }
     }

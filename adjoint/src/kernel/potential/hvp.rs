@@ -1,7 +1,7 @@
 //! Potential: tangent of the gradient.
 
 use crate::kernel::lane::{Lane, Lanes, V3, dot, scale, scale_add, sub};
-use crate::kernel::sum::{TILE, Terms, registers, splat, transposed};
+use crate::kernel::sum::{Scratch, TILE, Terms, registers, splat, transposed};
 use crate::kernel::{Points, Sources};
 use crate::lie::Vec3;
 use pulp::Simd;
@@ -52,6 +52,7 @@ impl Terms<3> for Tangents<'_> {
         tile: usize,
         s: V3<Lanes<S>>,
         d: V3<Lanes<S>>,
+        _: &mut Scratch<S>,
         out: &mut [[S::f64s; 3]; TILE],
     ) {
         let first = tile * TILE;

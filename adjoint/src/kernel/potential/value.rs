@@ -1,7 +1,7 @@
 //! Potential: value.
 
 use crate::kernel::lane::{Lane, Lanes, V3, sub};
-use crate::kernel::sum::{TILE, Terms, length, splat, transposed};
+use crate::kernel::sum::{Scratch, TILE, Terms, length, splat, transposed};
 use crate::kernel::{Points, Sources};
 use crate::lie::Vec3;
 use pulp::Simd;
@@ -44,6 +44,7 @@ impl Terms<1> for Values<'_> {
         tile: usize,
         s: V3<Lanes<S>>,
         _: V3<Lanes<S>>,
+        _: &mut Scratch<S>,
         out: &mut [[S::f64s; 1]; TILE],
     ) {
         let first = tile * TILE;

@@ -5,11 +5,11 @@
 //!
 //! | kernel | targets | `K_ij` |
 //! |---|---|---|
-//! | [`flux`](mod@flux) | [`Triangles`] | `w_i ∫ n·(x − s)/|x − s|³ dA = w_i Ω_i(s)`, the solid angle |
-//! | [`normal`](mod@normal) | [`Points`] | `w_i n_i·(x_i − s)/|x_i − s|³` |
-//! | [`potential`](mod@potential) | [`Points`] | `1/|x_i − s|` (no row weight) |
+//! | [`flux`](mod@flux) | [`Triangles`] | `w_i ∫ n·r/r³ dA = w_i Ω_i(s)`, the solid angle |
+//! | [`normal`](mod@normal) | [`Points`] | `w_i n_i·r/r³` |
+//! | [`potential`](mod@potential) | [`Points`] | `1/r` (no row weight) |
 //!
-//! Targets do not move in the frame of their body, and sources are given in that frame, so every
+//! with `r = x − s`. Targets do not move in the frame of their body, and sources are given in that frame, so every
 //! entry is a function of its source position alone, and the ladder is
 //!
 //! | rung | sum |
@@ -38,7 +38,10 @@ pub mod normal;
 pub mod potential;
 mod registry;
 mod source;
+mod sum;
 mod target;
+#[cfg(test)]
+mod tests;
 
 pub use flux::{
     flux, flux_fill, flux_gradient, flux_hessian_product, flux_hvp, flux_jvp, flux_vjp,

@@ -1,9 +1,12 @@
 //! Flux: tangent of the gradient.
 
 use super::constant;
-use crate::kernel::lane::{Lane, V3, cross, dot, scale, scale_add, sub};
+use super::vjp::edge_weights;
+use crate::kernel::lane::{Lane, Lanes, V3, cross, dot, scale, scale_add, sub};
+use crate::kernel::sum::{Scratch, TILE, Terms, length, registers, splat, transposed};
 use crate::kernel::{Sources, Triangles};
 use crate::lie::Vec3;
+use pulp::Simd;
 
 /// Tangent of [`edge_gradient`](super::vjp::edge_gradient) as the source moves by `d`, with the
 /// tangents `dl` of the two lengths. With `c = 2 S/(P Q)`:
@@ -60,15 +63,57 @@ pub fn flux_hvp(
     columns: usize,
     out: &mut [f64],
 ) {
-    for i in 0..targets.len() {
-        let corners = targets.corners(i);
-        for j in 0..sources.len() {
-            let g = flux_hessian_product(&corners, targets.weight[i], &sources.point(j), &d[j]);
-            for k in 0..columns {
-                for c in 0..3 {
-                    out[(j * columns + k) * 3 + c] += bar[i * columns + k] * g[c];
-                }
-            }
+    let weight = edge_weights(targets, bar, columns);
+    transposed(
+        EdgeTangents(targets),
+        sources,
+        Some(d),
+        &weight,
+        columns,
+        out,
+    );
+}
+
+/// Tangents of the edge terms of a surface.
+#[derive(Clone, Copy)]
+struct EdgeTangents<'a>(&'a Triangles);
+
+impl Terms<3> for EdgeTangents<'_> {
+    fn len(self) -> usize {
+        self.0.sides.len()
+    }
+
+    #[inline(always)]
+    fn evaluate<S: Simd>(
+        self,
+        simd: S,
+        tile: usize,
+        s: V3<Lanes<S>>,
+        d: V3<Lanes<S>>,
+        scratch: &mut Scratch<S>,
+        out: &mut [[S::f64s; 3]; TILE],
+    ) {
+        let tile = &self.0.edges[tile];
+        let [lengths, tangents] = scratch;
+        let table = lengths.iter_mut().zip(tangents.iter_mut());
+        for ((l, dl), vertex) in table.zip(&tile.vertices) {
+            let r = sub(splat(simd, vertex), s);
+            let length = length(r);
+            *l = length.v;
+            // δl = −r·d/l
+            *dl = (-dot(r, d) / length).v;
+        }
+        for (out, edge) in out.iter_mut().zip(&tile.items) {
+            let [a, b] = edge.ends;
+            let (a, b) = (a as usize, b as usize);
+            *out = registers(edge_gradient_tangent(
+                sub(splat(simd, &edge.start), s),
+                splat(simd, &edge.along),
+                Lanes::splat(simd, edge.squared),
+                [Lanes::new(simd, lengths[a]), Lanes::new(simd, lengths[b])],
+                d,
+                [Lanes::new(simd, tangents[a]), Lanes::new(simd, tangents[b])],
+            ));
         }
     }
 }

@@ -1,6 +1,8 @@
 //! Flux: tangent.
 
-use super::flux_gradient;
+use super::vjp::EdgeGradients;
+use crate::kernel::sum::forward;
+use crate::kernel::target::NONE;
 use crate::kernel::{Sources, Triangles};
 use crate::lie::Vec3;
 
@@ -13,12 +15,22 @@ pub fn flux_jvp(
     columns: usize,
     out: &mut [f64],
 ) {
-    for i in 0..targets.len() {
-        let corners = targets.corners(i);
-        for j in 0..sources.len() {
-            let g = flux_gradient(&corners, targets.weight[i], &sources.point(j)).dot(&d[j]);
-            for k in 0..columns {
-                out[i * columns + k] += a[j * columns + k] * g;
+    assert_eq!(out.len(), targets.len() * columns, "out: [target][k]");
+    // On the edges first; every face then collects its own.
+    let mut edges = vec![0.0; targets.sides.len() * columns];
+    forward(EdgeGradients(targets), sources, d, a, columns, &mut edges);
+    if columns == 0 {
+        return;
+    }
+    for (side, edge) in targets.sides.iter().zip(edges.chunks_exact(columns)) {
+        let left = side.left as usize;
+        for (out, e) in out[left * columns..].iter_mut().zip(edge) {
+            *out += targets.weights()[left] * e;
+        }
+        if side.right != NONE {
+            let right = side.right as usize;
+            for (out, e) in out[right * columns..].iter_mut().zip(edge) {
+                *out -= targets.weights()[right] * e;
             }
         }
     }

@@ -28,6 +28,8 @@ mod vjp;
 
 pub use hvp::{flux_hessian_product, flux_hvp};
 pub use jvp::flux_jvp;
+#[cfg(test)]
+pub(super) use value::solid_angle_of as value_of_corners;
 pub use value::{flux, flux_fill};
 pub use vjp::{flux_gradient, flux_vjp};
 

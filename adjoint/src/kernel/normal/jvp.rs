@@ -1,6 +1,7 @@
 //! Normal velocity: tangent.
 
-use super::normal_gradient;
+use super::vjp::Gradients;
+use crate::kernel::sum::forward;
 use crate::kernel::{Points, Sources};
 use crate::lie::Vec3;
 
@@ -13,13 +14,5 @@ pub fn normal_jvp(
     columns: usize,
     out: &mut [f64],
 ) {
-    for i in 0..targets.len() {
-        let (x, n) = (&targets.centre[i], &targets.normal[i]);
-        for j in 0..sources.len() {
-            let g = normal_gradient(x, n, targets.weight[i], &sources.point(j)).dot(&d[j]);
-            for k in 0..columns {
-                out[i * columns + k] += a[j * columns + k] * g;
-            }
-        }
-    }
+    forward(Gradients(targets), sources, d, a, columns, out);
 }

@@ -13,5 +13,7 @@ mod vjp;
 
 pub use hvp::{normal_hessian_product, normal_hvp};
 pub use jvp::normal_jvp;
+#[cfg(test)]
+pub(super) use value::velocity;
 pub use value::{normal, normal_fill};
 pub use vjp::{normal_gradient, normal_vjp};

@@ -1,12 +1,14 @@
 //! Normal velocity: value.
 
-use crate::kernel::lane::{Lane, V3, dot};
+use crate::kernel::lane::{Lane, V3, dot, sub};
+use crate::kernel::sum::{TILE, dispatch, fill, load, put, splat};
 use crate::kernel::{Points, Sources, Write};
 use crate::lie::Vec3;
+use pulp::{Simd, WithSimd};
 
 /// `n·r/|r|³`; `n` may carry the row weight.
 #[inline(always)]
-pub(super) fn velocity<T: Lane>(n: V3<T>, r: V3<T>) -> T {
+pub(in crate::kernel) fn velocity<T: Lane>(n: V3<T>, r: V3<T>) -> T {
     let r2 = dot(r, r);
     dot(n, r) / (r2 * r2.sqrt())
 }
@@ -25,16 +27,54 @@ pub fn normal_fill(
     stride: usize,
     column: usize,
 ) {
-    for i in 0..targets.len() {
-        let (x, n) = (&targets.centre[i], &targets.normal[i]);
-        for j in 0..sources.len() {
-            let value = normal(x, n, targets.weight[i], &sources.point(j));
-            let entry = &mut out[i * stride + column + j];
-            *entry = if write == Write::Set {
-                value
-            } else {
-                *entry + value
-            };
+    fill(
+        targets.len(),
+        sources,
+        out,
+        stride,
+        column,
+        TILE,
+        |tile, out| {
+            dispatch(Fill {
+                targets,
+                first: tile * TILE,
+                sources,
+                add: write == Write::Add,
+                out,
+                stride,
+                column,
+            });
+        },
+    );
+}
+
+/// Some rows.
+struct Fill<'a> {
+    targets: &'a Points,
+    first: usize,
+    sources: &'a Sources,
+    add: bool,
+    out: &'a mut [f64],
+    stride: usize,
+    column: usize,
+}
+
+impl WithSimd for Fill<'_> {
+    type Output = ();
+
+    #[inline(always)]
+    fn with_simd<S: Simd>(self, simd: S) {
+        let count = self.sources.len();
+        for (i, row) in self.out.chunks_mut(self.stride).enumerate() {
+            let centre = splat(simd, &self.targets.centre[self.first + i]);
+            let normal = splat(simd, &self.targets.weighted[self.first + i]);
+            for v in 0..count.div_ceil(S::F64_LANES) {
+                let value = velocity(normal, sub(centre, load(simd, self.sources, v)));
+                let j = v * S::F64_LANES;
+                let end = count.min(j + S::F64_LANES);
+                let out = &mut row[self.column + j..self.column + end];
+                put(simd, self.add, value.v, out);
+            }
         }
     }
 }

@@ -1,8 +1,10 @@
 //! Normal velocity: gradient.
 
-use crate::kernel::lane::{Lane, V3, dot, scale, scale_add};
+use crate::kernel::lane::{Lane, Lanes, V3, dot, scale, scale_add, sub};
+use crate::kernel::sum::{Scratch, TILE, Terms, registers, splat, transposed};
 use crate::kernel::{Points, Sources};
 use crate::lie::Vec3;
+use pulp::Simd;
 
 /// `(3 (n·r) r/r² − n)/r³`; `n` may carry the row weight.
 #[inline(always)]
@@ -27,15 +29,34 @@ pub fn normal_vjp(
     columns: usize,
     out: &mut [f64],
 ) {
-    for i in 0..targets.len() {
-        let (x, n) = (&targets.centre[i], &targets.normal[i]);
-        for j in 0..sources.len() {
-            let g = normal_gradient(x, n, targets.weight[i], &sources.point(j));
-            for k in 0..columns {
-                for c in 0..3 {
-                    out[(j * columns + k) * 3 + c] += bar[i * columns + k] * g[c];
-                }
-            }
+    transposed(Gradients(targets), sources, None, bar, columns, out);
+}
+
+/// Gradients at the points of a surface.
+#[derive(Clone, Copy)]
+pub(super) struct Gradients<'a>(pub(super) &'a Points);
+
+impl Terms<3> for Gradients<'_> {
+    fn len(self) -> usize {
+        self.0.len()
+    }
+
+    #[inline(always)]
+    fn evaluate<S: Simd>(
+        self,
+        simd: S,
+        tile: usize,
+        s: V3<Lanes<S>>,
+        _: V3<Lanes<S>>,
+        _: &mut Scratch<S>,
+        out: &mut [[S::f64s; 3]; TILE],
+    ) {
+        let first = tile * TILE;
+        let centres = &self.0.centre[first..];
+        let normals = &self.0.weighted[first..];
+        for ((out, centre), normal) in out.iter_mut().zip(centres).zip(normals) {
+            let r = sub(splat(simd, centre), s);
+            *out = registers(velocity_gradient(splat(simd, normal), r));
         }
     }
 }

@@ -10,5 +10,7 @@ mod value;
 mod vjp;
 
 pub use hvp::{potential_hessian_product, potential_hvp};
+#[cfg(test)]
+pub(super) use value::inverse_distance;
 pub use value::{potential, potential_sum};
 pub use vjp::{potential_gradient, potential_vjp};

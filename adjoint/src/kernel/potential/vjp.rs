@@ -1,8 +1,10 @@
 //! Potential: gradient.
 
-use crate::kernel::lane::{Lane, V3, dot, scale};
+use crate::kernel::lane::{Lane, Lanes, V3, dot, scale, sub};
+use crate::kernel::sum::{Scratch, TILE, Terms, registers, splat, transposed};
 use crate::kernel::{Points, Sources};
 use crate::lie::Vec3;
+use pulp::Simd;
 
 /// `r/|r|³`.
 #[inline(always)]
@@ -24,14 +26,33 @@ pub fn potential_vjp(
     columns: usize,
     out: &mut [f64],
 ) {
-    for i in 0..targets.len() {
-        for j in 0..sources.len() {
-            let g = potential_gradient(&targets.centre[i], &sources.point(j));
-            for k in 0..columns {
-                for c in 0..3 {
-                    out[(j * columns + k) * 3 + c] += bar[i * columns + k] * g[c];
-                }
-            }
+    transposed(Gradients(targets), sources, None, bar, columns, out);
+}
+
+/// Gradients at the points of a surface.
+#[derive(Clone, Copy)]
+struct Gradients<'a>(&'a Points);
+
+impl Terms<3> for Gradients<'_> {
+    fn len(self) -> usize {
+        self.0.len()
+    }
+
+    #[inline(always)]
+    fn evaluate<S: Simd>(
+        self,
+        simd: S,
+        tile: usize,
+        s: V3<Lanes<S>>,
+        _: V3<Lanes<S>>,
+        _: &mut Scratch<S>,
+        out: &mut [[S::f64s; 3]; TILE],
+    ) {
+        let first = tile * TILE;
+        let centres = &self.0.centre[first..];
+        for (out, centre) in out.iter_mut().zip(centres) {
+            let r = sub(splat(simd, centre), s);
+            *out = registers(inverse_distance_gradient(r));
         }
     }
 }

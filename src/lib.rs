@@ -2,6 +2,8 @@
 
 pub mod error;
 pub mod scene;
+pub mod shape;
 
 pub use error::{Error, Result};
+pub use shape::{MassProperties, MeshReport, TriMesh};
 pub use hydrograd_adjoint as adjoint;

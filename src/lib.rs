@@ -7,6 +7,8 @@ pub mod error;
 pub mod multibody;
 pub mod scene;
 pub mod solver;
+pub mod shape;
 
 pub use error::{Error, Result};
+pub use shape::{MassProperties, MeshReport, TriMesh};
 pub use hydrograd_adjoint as adjoint;

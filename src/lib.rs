@@ -6,9 +6,10 @@ pub mod dynamics;
 pub mod error;
 pub mod multibody;
 pub mod scene;
-pub mod solver;
 pub mod shape;
+pub mod solver;
 
 pub use error::{Error, Result};
-pub use shape::{MassProperties, MeshReport, TriMesh};
 pub use hydrograd_adjoint as adjoint;
+pub use scene::{Body, BodyId, Fluid, Joint, Scene, Shape};
+pub use shape::{MassProperties, MeshReport, TriMesh};

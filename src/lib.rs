@@ -5,5 +5,5 @@ pub mod scene;
 pub mod shape;
 
 pub use error::{Error, Result};
-pub use shape::{MassProperties, MeshReport, TriMesh};
 pub use hydrograd_adjoint as adjoint;
+pub use shape::{MassProperties, MeshReport, TriMesh};

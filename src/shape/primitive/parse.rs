@@ -9,7 +9,11 @@ const FORMS: [(&str, usize, &str); 5] = [
     ("ellipsoid", 3, "ellipsoid:A,B,C (semi-axes)"),
     ("box", 3, "box:A,B,C (edge lengths)"),
     ("cylinder", 2, "cylinder:RADIUS,LENGTH"),
-    ("capsule", 2, "capsule:RADIUS,LENGTH (of the cylindrical part)"),
+    (
+        "capsule",
+        2,
+        "capsule:RADIUS,LENGTH (of the cylindrical part)",
+    ),
 ];
 
 /// A shape from its short form, lengths in m: `sphere:R`, `ellipsoid:A,B,C` (semi-axes),
@@ -27,7 +31,7 @@ pub fn parse_shape(text: &str) -> Result<Shape> {
             .iter()
             .map(|(name, ..)| (strsim::damerau_levenshtein(name, &kind), name))
             .min()
-            .filter(|(distance, _)| *distance <= 3);
+            .filter(|(distance, name)| 2 * distance <= name.len().min(kind.len()));
         let hint = match near {
             Some((_, name)) => format!("did you mean {name}? Known are {forms}"),
             None => format!("known are {forms}"),

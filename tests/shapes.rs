@@ -195,11 +195,7 @@ fn volume_and_inertia_converge_with_order_two() {
                 errors[0], errors[5]
             );
             // Coarse round bodies have cells stretched along them, evened out later.
-            let allowed = if text.starts_with("cylinder") {
-                0.2
-            } else {
-                0.1
-            };
+            let allowed = if text.starts_with('c') { 0.2 } else { 0.02 };
             assert!(
                 (order - 2.0).abs() < allowed,
                 "{text}: order {order}, {errors:?}"

@@ -153,7 +153,11 @@ impl MeshReport {
         };
         Err(Error::Mesh {
             problem: format!("{}{more}", first.problem),
-            location: format!("first: {}", first.location()),
+            location: if first.count > 1 {
+                format!("first: {}", first.location())
+            } else {
+                first.location()
+            },
             remedy: first.remedy.clone(),
             name: self.name.clone(),
         })

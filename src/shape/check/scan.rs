@@ -49,7 +49,8 @@ pub fn check_parts(name: &str, vertices: &[Vec3], faces: &[[usize; 3]]) -> MeshR
         components,
         bounds: checker.bounds.map(Into::into),
         volume: usable.then(|| signed_volume(&all)),
-        area: all.iter().map(|t| area_vector(t).norm()).sum(),
+        // An empty sum is −0.
+        area: all.iter().map(|t| area_vector(t).norm()).sum::<f64>() + 0.0,
         worst_aspect: checker.worst_aspect,
         findings,
     }

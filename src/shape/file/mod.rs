@@ -126,6 +126,16 @@ struct Raw {
 /// What is wrong with the contents, and the remedy.
 type Parsed = std::result::Result<Raw, String>;
 
+/// A message or line of a file on one line, and not longer than a reader reads.
+fn brief(text: &str) -> String {
+    let mut line = text.split_whitespace().collect::<Vec<_>>().join(" ");
+    if let Some((end, _)) = line.char_indices().nth(200) {
+        line.truncate(end);
+        line.push('…');
+    }
+    line
+}
+
 fn parse_error(path: &Path, message: impl Into<String>) -> Error {
     Error::Parse {
         path: path.to_owned(),

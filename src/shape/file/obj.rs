@@ -1,7 +1,7 @@
 //! Wavefront OBJ: vertex positions and faces; groups, materials, normals and textures are
 //! passed over.
 
-use super::{Parsed, Raw, polygon};
+use super::{Parsed, Raw, brief, polygon};
 use crate::error::{Error, Result};
 use crate::shape::mesh::TriMesh;
 use hydrograd_adjoint::lie::Vec3;
@@ -13,6 +13,16 @@ pub(super) fn parse(bytes: &[u8]) -> Parsed {
     // Comments and names may be in any encoding.
     let text = String::from_utf8_lossy(bytes);
     let lines = statements(&text);
+    // The loader passes over faces with fewer than three corners, as points and lines.
+    for (number, line) in &lines {
+        let mut words = line.split_whitespace();
+        if words.next() == Some("f") && words.count() < 3 {
+            return Err(format!(
+                "line {number}: `{}`: a face has at least three corners; delete the others",
+                brief(line)
+            ));
+        }
+    }
     let model = load(lines.iter().map(|(_, l)| l.as_str())).map_err(|e| explain(e, &lines))?;
     let Some(model) = model else {
         return Ok(Raw::default());
@@ -120,7 +130,7 @@ fn explain(error: tobj::LoadError, lines: &[(usize, String)]) -> String {
     let place = bad
         .checked_sub(1)
         .and_then(|i| lines.get(i))
-        .map(|(number, line)| format!("line {number}: {line:?}: "))
+        .map(|(number, line)| format!("line {number}: `{}`: ", brief(line)))
         .unwrap_or_default();
     let remedy = match error {
         tobj::LoadError::FaceVertexOutOfBounds => {
@@ -129,7 +139,6 @@ fn explain(error: tobj::LoadError, lines: &[(usize, String)]) -> String {
         tobj::LoadError::FaceParseError => {
             "a face is `f` and vertex numbers, as in `f 1 2 3` or `f 1/1/1 2/2/2 3/3/3`"
         }
-        tobj::LoadError::InvalidPolygon => "a face has at least three corners",
         _ => "a vertex is `v` and three numbers",
     };
     format!("{place}{error}; {remedy}")

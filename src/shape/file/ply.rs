@@ -1,6 +1,6 @@
 //! PLY, text and binary: the elements `vertex` (x, y, z) and `face` (`vertex_indices`).
 
-use super::{Parsed, Raw, polygon};
+use super::{Parsed, Raw, brief, polygon};
 use hydrograd_adjoint::lie::Vec3;
 use ply_rs_bw::parser::{Parser, Reader};
 use ply_rs_bw::ply::{
@@ -69,11 +69,14 @@ pub(super) fn parse(bytes: &[u8]) -> Parsed {
     let parser = Parser::<Element>::new();
     let header = parser
         .read_header(&mut reader)
-        .map_err(|e| format!("header: {e}; export it again"))?;
+        .map_err(|e| format!("header: {}; export it again", brief(&e.to_string())))?;
     fits(&header, reader.get_ref().len())?;
-    let mut payload = parser
-        .read_payload(&mut reader, &header)
-        .map_err(|e| format!("{e}; the file may be cut off: export it again"))?;
+    let mut payload = parser.read_payload(&mut reader, &header).map_err(|e| {
+        format!(
+            "{}; the file may be cut off: export it again",
+            brief(&e.to_string())
+        )
+    })?;
 
     let mut take = |name: &str| payload.swap_remove(name).unwrap_or_default();
     let mut raw = Raw::default();

@@ -5,13 +5,13 @@ use hydrograd_adjoint::lie::Vec3;
 /// Most corners of a polygon: the search for ears grows with the cube.
 pub(super) const MAX_CORNERS: usize = 256;
 
-/// Cuts a polygon (corners in order, at least three) into triangles that turn as it does, by
+/// Cuts a polygon (corners in order; fewer than three give nothing) into triangles that turn as it does, by
 /// cutting off the ear with the widest smallest angle; right for notched polygons too.
 pub(super) fn triangles(corners: &[usize], vertices: &[Vec3]) -> Vec<[usize; 3]> {
     let mut left = corners.to_vec();
     let mut cut = Vec::with_capacity(corners.len().saturating_sub(2));
     // A corner that doesn't exist is for the check to report: any fan will do.
-    let known = corners.iter().all(|&v| v < vertices.len());
+    let known = !corners.is_empty() && corners.iter().all(|&v| v < vertices.len());
     let normal = if known {
         normal(corners, vertices)
     } else {

@@ -1,7 +1,7 @@
 //! STL, text and binary. Coordinates are in single precision, and each face has vertices of its
 //! own: they are merged afterwards.
 
-use super::{Parsed, Raw};
+use super::{Parsed, Raw, brief};
 use hydrograd_adjoint::lie::Vec3;
 use std::io::Cursor;
 
@@ -23,7 +23,10 @@ pub(super) fn parse(bytes: &[u8]) -> Parsed {
         && (start.contains("facet") || start.contains("endsolid"));
     let mesh = if is_text {
         stl_io::read_stl(&mut Cursor::new(one_solid(start)?)).map_err(|e| {
-            format!("{e}; the file may be cut off: export it again, or as binary STL")
+            format!(
+                "{}; the file may be cut off or not be text STL: export it again, as binary",
+                brief(&e.to_string())
+            )
         })?
     } else {
         match (declared, needed) {

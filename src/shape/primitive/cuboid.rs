@@ -51,14 +51,16 @@ fn choose_cells(size: [f64; 3], target: f64) -> [usize; 3] {
     let [a, b, c] = [a / longest, b / longest, c / longest];
     let ideal = (4.0 * (a * b + b * c + c * a) / target).sqrt();
     let mut best = (f64::INFINITY, [1; 3]);
-    for step in -60..=60 {
+    for step in -30..=30 {
         let cell = ideal * 1.01f64.powi(step);
         let exact = [a, b, c].map(|l| (l / cell).max(1e-9));
-        for choice in 0..8 {
+        // Each length rounded down, up, or down by one or two more.
+        for choice in 0..64usize {
             let cells = [0, 1, 2].map(|i| {
                 // The same length takes the same choice.
-                let bit = (0..=i).find(|&j| size[j] == size[i]).unwrap_or(i);
-                (exact[i] as usize + ((choice >> bit) & 1)).max(1)
+                let digit = (0..=i).find(|&j| size[j] == size[i]).unwrap_or(i);
+                let offset = (choice >> (2 * digit)) & 3;
+                (exact[i] as usize + offset).saturating_sub(2).max(1)
             });
             let stretch = [0, 1, 2].map(|i| {
                 // One cell is the fewest: a thin side can't do better.

@@ -152,6 +152,6 @@ fn check_faces(place: &str, faces: usize) -> Result<()> {
 /// How far a number of faces and the stretch of the cells are from what was asked: the pattern
 /// with the least is taken. The count weighs more; `stretch` are ratios, 1 for none.
 fn misfit(faces: f64, target: f64, stretch: &[f64]) -> f64 {
-    let count = (faces / target).ln() * 5.0;
+    let count = (faces / target).ln() * 10.0;
     count * count + stretch.iter().map(|s| s.ln() * s.ln()).sum::<f64>()
 }

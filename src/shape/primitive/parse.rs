@@ -31,7 +31,7 @@ pub fn parse_shape(text: &str) -> Result<Shape> {
             .iter()
             .map(|(name, ..)| (strsim::damerau_levenshtein(name, &kind), name))
             .min()
-            .filter(|(distance, _)| *distance <= 3);
+            .filter(|(distance, name)| 2 * distance <= name.len().min(kind.len()));
         let hint = match near {
             Some((_, name)) => format!("did you mean {name}? Known are {forms}"),
             None => format!("known are {forms}"),

@@ -31,8 +31,12 @@ pub(super) fn capsule(radius: f64, length: f64, target: usize) -> Parts {
     revolve(4, rings, bands, radius, length, end)
 }
 
+/// Loss of cross-section, as a part of it, that weighs as much as cells stretched e-fold.
+const LOSS: f64 = 0.02;
+
 /// Rings of an end and bands of the side. `arc` is the length of the end's generatrix over the
-/// radius.
+/// radius. A slender body gets cells stretched along it rather than a coarse polygon for its
+/// cross-section.
 fn choose(sectors: usize, radius: f64, length: f64, arc: f64, target: f64) -> (usize, usize) {
     let s = sectors as f64;
     let mut best = (f64::INFINITY, (1, 2));
@@ -43,18 +47,21 @@ fn choose(sectors: usize, radius: f64, length: f64, arc: f64, target: f64) -> (u
         let edge = TAU * radius / (s * m);
         let spacing = arc * radius / m;
         let height = (edge * 3f64.sqrt() / 2.0 * spacing).sqrt();
+        // Area of the circle less that of the polygon in it, to leading order.
+        let loss = (TAU / (s * m)).powi(2) / 6.0 / LOSS;
         let exact = (length / height / 2.0).max(1e-9);
         for half in [exact.floor(), exact.ceil()] {
-            // Also a few more or fewer bands, to meet the count on a long body.
-            for extra in -4..=4 {
-                let half = (half + f64::from(extra)).max(1.0);
+            // What meets the count, for the same reason.
+            let counted = (target / (2.0 * s * m) - m) / 2.0;
+            for half in [half, counted.floor(), counted.ceil()] {
+                let half = half.max(1.0);
                 let faces = 2.0 * s * m * (m + 2.0 * half);
                 let stretch = if half == 1.0 && exact < 1.0 {
                     1.0
                 } else {
                     half / exact
                 };
-                let cost = misfit(faces, target, &[stretch]);
+                let cost = misfit(faces, target, &[stretch]) + loss * loss;
                 // `as` saturates; a count that large has a hopeless cost.
                 if cost < best.0 {
                     best = (cost, (rings, 2 * half as usize));

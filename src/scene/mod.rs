@@ -3,6 +3,13 @@
 //! SI units throughout. Frames: a body's pose in the world is
 //! `parent pose ∘ placement ∘ joint motion`; the body's origin is where its joint acts.
 
+mod build;
+mod file;
+mod joint;
+mod validate;
+
+pub use build::BodyId;
+
 use serde::{Deserialize, Serialize};
 
 /// Everything that a simulation starts from.
@@ -10,19 +17,19 @@ use serde::{Deserialize, Serialize};
 #[serde(deny_unknown_fields)]
 pub struct Scene {
     /// Name, for reports.
-    #[serde(default)]
+    #[serde(default, skip_serializing_if = "is_default")]
     pub name: String,
     /// The water.
     pub fluid: Fluid,
     /// Gravity, m/s², world frame.
-    #[serde(default)]
+    #[serde(default, skip_serializing_if = "is_default")]
     pub gravity: [f64; 3],
     /// Time step, s.
     pub time_step: f64,
     /// Number of steps of a run.
     pub steps: usize,
     /// Settings that a run of this scene starts from, e.g. `preset = "paper"`.
-    #[serde(default)]
+    #[serde(default, skip_serializing_if = "is_default")]
     pub preset: Preset,
     /// Plane rigid walls: one, or mutually perpendicular ones.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
@@ -30,7 +37,7 @@ pub struct Scene {
     /// The bodies, parents before children.
     pub bodies: Vec<Body>,
     /// Where the scene starts.
-    #[serde(default)]
+    #[serde(default, skip_serializing_if = "is_default")]
     pub initial: Initial,
     /// What drives the actuated joints.
     #[serde(default, skip_serializing_if = "Option::is_none")]
@@ -55,7 +62,7 @@ pub struct Fluid {
     /// Density, kg/m³; zero is "no water".
     pub density: f64,
     /// Uniform steady current, m/s, world frame; must be parallel to the walls.
-    #[serde(default)]
+    #[serde(default, skip_serializing_if = "is_default")]
     pub current: [f64; 3],
 }
 
@@ -74,8 +81,10 @@ pub struct Wall {
 #[serde(deny_unknown_fields, default)]
 pub struct Placement {
     /// Translation, m.
+    #[serde(skip_serializing_if = "is_default")]
     pub position: [f64; 3],
     /// Rotation vector (axis times angle), rad.
+    #[serde(skip_serializing_if = "is_default")]
     pub rotation: [f64; 3],
 }
 
@@ -89,7 +98,7 @@ pub struct Body {
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub shape: Option<Shape>,
     /// Pose of the shape in the body's frame.
-    #[serde(default)]
+    #[serde(default, skip_serializing_if = "is_default")]
     pub shape_at: Placement,
     /// Mass, kg. Give this or `density`; a body fixed to the world needs neither.
     #[serde(default, skip_serializing_if = "Option::is_none")]
@@ -112,7 +121,7 @@ pub struct Body {
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub parent: Option<String>,
     /// Pose of the joint's frame in the parent's frame.
-    #[serde(default)]
+    #[serde(default, skip_serializing_if = "is_default")]
     pub placement: Placement,
     /// How the body moves against its parent.
     #[serde(default)]
@@ -121,13 +130,13 @@ pub struct Body {
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub motion: Option<Vec<Motion>>,
     /// Holds the joint where it starts.
-    #[serde(default)]
+    #[serde(default, skip_serializing_if = "is_default")]
     pub locked: bool,
     /// Whether the joint's generalised forces are controls.
-    #[serde(default)]
+    #[serde(default, skip_serializing_if = "is_default")]
     pub actuated: bool,
     /// Whether a wrench on the body (world axes, about its origin) is a control.
-    #[serde(default)]
+    #[serde(default, skip_serializing_if = "is_default")]
     pub thruster: bool,
     /// Drag on the body's surface.
     #[serde(default, skip_serializing_if = "Option::is_none")]
@@ -192,13 +201,17 @@ pub enum Shape {
     },
 }
 
+fn is_default<T: Default + PartialEq>(value: &T) -> bool {
+    *value == T::default()
+}
+
 fn one() -> f64 {
     1.0
 }
 
 /// How a body moves against its parent (coordinates q, generalised velocity v).
 #[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
-#[serde(tag = "kind", rename_all = "kebab-case", deny_unknown_fields)]
+#[serde(from = "joint::JointFile", into = "joint::JointFile")]
 pub enum Joint {
     /// Not at all.
     Fixed,
@@ -269,13 +282,17 @@ pub enum Motion {
 #[serde(deny_unknown_fields, default)]
 pub struct Drag {
     /// Which part of the local velocity drags in the linear law.
+    #[serde(skip_serializing_if = "is_default")]
     pub part: DragPart,
     /// Linear coefficient, kg/(m² s): νρ of Eq. 22.
+    #[serde(skip_serializing_if = "is_default")]
     pub linear: f64,
     /// Which part of the local velocity drags in the quadratic law.
+    #[serde(skip_serializing_if = "is_default")]
     pub quadratic_part: DragPart,
     /// Quadratic coefficient c of `½ ρ c |w| w` per face area, with w the dragging part of the
     /// velocity; dimensionless.
+    #[serde(skip_serializing_if = "is_default")]
     pub quadratic: f64,
 }
 

@@ -1,0 +1,364 @@
+//! One body: shape, mass, joint, drag.
+
+use nalgebra::{Matrix3, Matrix6};
+
+use super::{finite, list, norm, place};
+use crate::scene::{Body, Joint, Motion, Scene, Shape};
+use crate::{Error, Result};
+
+pub(super) fn check(scene: &Scene, index: usize) -> Result<()> {
+    let body = &scene.bodies[index];
+    for (field, placement) in [("shape_at", &body.shape_at), ("placement", &body.placement)] {
+        finite(
+            &place(body, &format!("{field}.position")),
+            &placement.position,
+        )?;
+        finite(
+            &place(body, &format!("{field}.rotation")),
+            &placement.rotation,
+        )?;
+    }
+    check_shape(body)?;
+    check_mass(body, scene.is_static(index))?;
+    if let Some(rows) = &body.added_mass {
+        check_added_mass(body, rows)?;
+    }
+    check_joint(body)?;
+    if body.thruster && scene.is_static(index) {
+        return Err(Error::input(
+            place(body, "thruster"),
+            true,
+            "the body can't move, so a thruster does nothing; give it a joint or take it away",
+        ));
+    }
+    check_drag(body)
+}
+
+fn check_shape(body: &Body) -> Result<()> {
+    let Some(shape) = &body.shape else {
+        return Ok(());
+    };
+    let lengths = |field: &str, values: &[f64]| {
+        let place = place(body, &format!("shape.{field}"));
+        finite(&place, values)?;
+        match values.iter().find(|x| **x <= 0.0) {
+            None => Ok(()),
+            Some(bad) => Err(Error::input(place, bad, "give lengths above zero, in m")),
+        }
+    };
+    let faces = match shape {
+        Shape::Sphere { radius, faces } => {
+            lengths("radius", &[*radius])?;
+            faces
+        }
+        Shape::Ellipsoid { semi_axes, faces } => {
+            lengths("semi_axes", semi_axes)?;
+            faces
+        }
+        Shape::Box { size, faces } => {
+            lengths("size", size)?;
+            faces
+        }
+        Shape::Cylinder {
+            radius,
+            length,
+            faces,
+        } => {
+            lengths("radius", &[*radius])?;
+            lengths("length", &[*length])?;
+            faces
+        }
+        Shape::Capsule {
+            radius,
+            length,
+            faces,
+        } => {
+            lengths("radius", &[*radius])?;
+            lengths("length", &[*length])?;
+            faces
+        }
+        Shape::Mesh { path, scale } => {
+            if path.as_os_str().is_empty() {
+                return Err(Error::input(
+                    place(body, "shape.path"),
+                    "nothing",
+                    "give the path of an OBJ, STL or PLY file",
+                ));
+            }
+            let place = place(body, "shape.scale");
+            finite(&place, &[*scale])?;
+            if *scale <= 0.0 {
+                let remedy = "give the factor from the file's units to metres, above zero \
+                              (millimetres: 0.001)";
+                return Err(Error::input(place, scale, remedy));
+            }
+            return Ok(());
+        }
+    };
+    match faces {
+        Some(0) => Err(Error::input(
+            place(body, "shape.faces"),
+            0,
+            "give a number of faces, e.g. 320 or 1280, or leave it out",
+        )),
+        _ => Ok(()),
+    }
+}
+
+fn check_mass(body: &Body, is_static: bool) -> Result<()> {
+    for (field, value) in [("mass", body.mass), ("density", body.density)] {
+        let Some(value) = value else { continue };
+        finite(&place(body, field), &[value])?;
+        if value < 0.0 {
+            return Err(Error::input(
+                place(body, field),
+                value,
+                "give zero (a massless link) or more",
+            ));
+        }
+    }
+    if let Some(center) = &body.center_of_mass {
+        finite(&place(body, "center_of_mass"), center)?;
+    }
+    if let Some(inertia) = &body.inertia {
+        check_inertia(body, inertia)?;
+    }
+    match (body.mass, body.density) {
+        (Some(mass), Some(density)) => Err(Error::input(
+            place(body, "mass"),
+            format!("{mass} beside density {density}"),
+            "give either the mass or the density, not both",
+        )),
+        (None, Some(density)) if body.shape.is_none() => Err(Error::input(
+            place(body, "density"),
+            density,
+            "there is no shape whose volume would make it a mass; add a shape, or give mass and \
+             inertia",
+        )),
+        (None, None) if !is_static => Err(Error::input(
+            place(body, "mass"),
+            "neither mass nor density",
+            "a body that moves needs one of them (mass = 0 is allowed for massless links)",
+        )),
+        (Some(mass), None) if mass > 0.0 && body.shape.is_none() && body.inertia.is_none() => {
+            Err(Error::input(
+                place(body, "inertia"),
+                "nothing",
+                "there is no shape to take it from: give xx, yy, zz in kg m² (three zeros for a \
+                 point mass)",
+            ))
+        }
+        _ => Ok(()),
+    }
+}
+
+/// Symmetric positive semi-definite, with principal moments that a mass distribution can have.
+fn check_inertia(body: &Body, inertia: &[f64]) -> Result<()> {
+    let place = place(body, "inertia");
+    finite(&place, inertia)?;
+    let (xy, xz, yz) = match inertia {
+        [_, _, _] => (0.0, 0.0, 0.0),
+        [_, _, _, xy, xz, yz] => (*xy, *xz, *yz),
+        _ => {
+            return Err(Error::input(
+                place,
+                format!("{} numbers", inertia.len()),
+                "give 3 (xx, yy, zz) or 6 (xx, yy, zz, xy, xz, yz), in kg m²",
+            ));
+        }
+    };
+    let (xx, yy, zz) = (inertia[0], inertia[1], inertia[2]);
+    let mut moments = Matrix3::new(xx, xy, xz, xy, yy, yz, xz, yz, zz).symmetric_eigenvalues();
+    moments.as_mut_slice().sort_by(f64::total_cmp);
+    let slack = 1e-9 * moments.amax();
+    let principal = format!("principal moments {:?} kg m²", moments.as_slice());
+    if moments[0] < -slack {
+        return Err(Error::input(
+            place,
+            list(inertia),
+            format!("an inertia has no negative principal moment; this one has the {principal}"),
+        ));
+    }
+    if moments[0] + moments[1] < moments[2] - slack {
+        return Err(Error::input(
+            place,
+            list(inertia),
+            format!(
+                "no distribution of mass has a principal moment above the sum of the other two; \
+                 this one has the {principal}. Moments are taken about the centre of mass"
+            ),
+        ));
+    }
+    Ok(())
+}
+
+fn check_added_mass(body: &Body, rows: &[Vec<f64>]) -> Result<()> {
+    let place = place(body, "added_mass");
+    if rows.len() != 6 || rows.iter().any(|row| row.len() != 6) {
+        let lengths: Vec<_> = rows.iter().map(Vec::len).collect();
+        return Err(Error::input(
+            place,
+            format!("rows of {lengths:?} numbers"),
+            "give 6 rows of 6 numbers: linear x y z, then angular x y z",
+        ));
+    }
+    for (i, row) in rows.iter().enumerate() {
+        finite(&format!("{place}[{i}]"), row)?;
+    }
+    let matrix = Matrix6::from_fn(|i, j| rows[i][j]);
+    for i in 0..6 {
+        if matrix[(i, i)] < 0.0 {
+            return Err(Error::input(
+                format!("{place}[{i}][{i}]"),
+                matrix[(i, i)],
+                "an added mass has no negative diagonal; mind the sign",
+            ));
+        }
+    }
+    // Entries have different units: everything is measured against its row's and column's diagonal.
+    let size = |i: usize, j: usize| (matrix[(i, i)] * matrix[(j, j)]).sqrt();
+    for i in 0..6 {
+        for j in 0..i {
+            let (a, b) = (matrix[(i, j)], matrix[(j, i)]);
+            if (a - b).abs() > 1e-6 * size(i, j).max(a.abs()).max(b.abs()) {
+                return Err(Error::input(
+                    format!("{place}[{i}][{j}]"),
+                    format!("{a}, and {b} across the diagonal"),
+                    "the matrix must be symmetric; write the mean of both at both places",
+                ));
+            }
+        }
+    }
+    let scaled = Matrix6::from_fn(|i, j| {
+        let mean = 0.5 * (matrix[(i, j)] + matrix[(j, i)]);
+        if mean == 0.0 { 0.0 } else { mean / size(i, j) }
+    });
+    let lowest = if scaled.iter().all(|x| x.is_finite()) {
+        scaled.symmetric_eigenvalues().min()
+    } else {
+        f64::NEG_INFINITY
+    };
+    if lowest < -1e-6 {
+        return Err(Error::input(
+            place,
+            format!("least eigenvalue {lowest:.3e} (diagonal scaled to one)"),
+            "the kinetic energy of the water can't be negative: the matrix must be positive \
+             semi-definite; mind the signs off the diagonal, and that all is about the body's \
+             origin",
+        ));
+    }
+    Ok(())
+}
+
+fn check_joint(body: &Body) -> Result<()> {
+    let joint = &body.joint;
+    if let Joint::Prismatic { axis } | Joint::Revolute { axis } = joint {
+        let place = place(body, "joint.axis");
+        finite(&place, axis)?;
+        if norm(*axis) == 0.0 {
+            return Err(Error::input(
+                place,
+                list(axis),
+                "give a direction, e.g. [0, 0, 1]; its length doesn't matter",
+            ));
+        }
+    }
+    if let Some(motion) = &body.motion {
+        check_motion(body, motion)?;
+    }
+    if body.actuated && matches!(joint, Joint::Fixed) {
+        return Err(Error::input(
+            place(body, "actuated"),
+            true,
+            "a fixed joint takes no force; take `actuated` away or give the body a joint",
+        ));
+    }
+    if body.actuated && body.is_prescribed() {
+        let how = if body.locked { "locked" } else { "driven" };
+        return Err(Error::input(
+            place(body, "actuated"),
+            true,
+            format!(
+                "the joint is {how}, so its force is a result and can't be a control; take \
+                 `actuated` or `{}` away",
+                if body.locked { "locked" } else { "motion" }
+            ),
+        ));
+    }
+    Ok(())
+}
+
+fn check_motion(body: &Body, motion: &[Motion]) -> Result<()> {
+    let joint = &body.joint;
+    if body.locked {
+        return Err(Error::input(
+            place(body, "locked"),
+            "true beside a motion",
+            "a joint is either held or driven: take `locked` or `motion` away",
+        ));
+    }
+    if joint.has_quaternion() || matches!(joint, Joint::Fixed) {
+        return Err(Error::input(
+            place(body, "motion"),
+            format!("a motion of a {} joint", joint.kind()),
+            "only prismatic, revolute and planar joints can be driven; build the motion from \
+             several of them",
+        ));
+    }
+    if motion.len() != joint.coordinates() {
+        return Err(Error::input(
+            place(body, "motion"),
+            format!("{} motions", motion.len()),
+            format!(
+                "a {} joint needs {}, one per coordinate",
+                joint.kind(),
+                joint.coordinates()
+            ),
+        ));
+    }
+    for (i, motion) in motion.iter().enumerate() {
+        let numbers: &[(&str, f64)] = match *motion {
+            Motion::Linear { offset, rate } => &[("offset", offset), ("rate", rate)],
+            Motion::Sine {
+                offset,
+                amplitude,
+                frequency,
+                phase,
+            } => &[
+                ("offset", offset),
+                ("amplitude", amplitude),
+                ("frequency", frequency),
+                ("phase", phase),
+            ],
+        };
+        for (field, value) in numbers {
+            finite(&place(body, &format!("motion[{i}].{field}")), &[*value])?;
+        }
+    }
+    Ok(())
+}
+
+fn check_drag(body: &Body) -> Result<()> {
+    let Some(drag) = &body.drag else {
+        return Ok(());
+    };
+    if body.shape.is_none() {
+        return Err(Error::input(
+            place(body, "drag"),
+            "drag without a shape",
+            "drag is summed over a surface: add a shape or take the drag away",
+        ));
+    }
+    for (field, value) in [("linear", drag.linear), ("quadratic", drag.quadratic)] {
+        let place = place(body, &format!("drag.{field}"));
+        finite(&place, &[value])?;
+        if value < 0.0 {
+            return Err(Error::input(
+                place,
+                value,
+                "give zero or more; a negative drag would push the body on",
+            ));
+        }
+    }
+    Ok(())
+}

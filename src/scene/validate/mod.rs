@@ -1,0 +1,336 @@
+//! Everything about a scene that can be checked without its meshes.
+//!
+//! Each error names the body and the field, the value found there and what to write instead. What
+//! needs meshes (whether a mesh is closed, whether bodies overlap, whether the whole mass matrix is
+//! positive definite) is checked where they are made.
+
+mod body;
+mod start;
+
+use std::collections::HashMap;
+
+use super::file::nearest;
+use super::{Body, Controller, Joint, Scene};
+use crate::{Error, Result};
+
+impl Scene {
+    /// Checks all that doesn't need the meshes: numbers, names, the tree of bodies, masses, joints,
+    /// walls, the start, and the controller.
+    pub fn validate(&self) -> Result<()> {
+        self.check_world()?;
+        self.check_names()?;
+        self.check_tree()?;
+        for index in 0..self.bodies.len() {
+            body::check(self, index)?;
+        }
+        start::check(self)?;
+        self.check_controller()
+    }
+
+    /// Whether this body can't move at all: fixed or locked joints all the way to the world.
+    /// The tree must have been checked.
+    pub(crate) fn is_static(&self, index: usize) -> bool {
+        let body = &self.bodies[index];
+        let held = matches!(body.joint, Joint::Fixed) || body.locked;
+        let parent = body.parent.as_ref().and_then(|name| self.body(name));
+        held && parent.is_none_or(|parent| self.is_static(parent.0))
+    }
+
+    fn check_world(&self) -> Result<()> {
+        let fluid = &self.fluid;
+        finite("fluid.density", &[fluid.density])?;
+        finite("fluid.current", &fluid.current)?;
+        finite("gravity", &self.gravity)?;
+        finite("time_step", &[self.time_step])?;
+        if fluid.density < 0.0 {
+            return Err(Error::input(
+                "fluid.density",
+                fluid.density,
+                "give a density in kg/m³, zero for no water or above (fresh water: 998)",
+            ));
+        }
+        if self.time_step <= 0.0 {
+            return Err(Error::input(
+                "time_step",
+                self.time_step,
+                "give a time step above zero, in s (most example scenes use 0.01)",
+            ));
+        }
+        if self.bodies.is_empty() {
+            return Err(Error::input(
+                "bodies",
+                "none",
+                "add a body: [[bodies]] in a scene file, scene.add(…) in Rust",
+            ));
+        }
+        for (i, wall) in self.walls.iter().enumerate() {
+            let place = |field| format!("walls[{i}].{field}");
+            finite(&place("point"), &wall.point)?;
+            finite(&place("normal"), &wall.normal)?;
+            if norm(wall.normal) == 0.0 {
+                return Err(Error::input(
+                    place("normal"),
+                    list(&wall.normal),
+                    "give the direction from the wall into the water; it can't be zero",
+                ));
+            }
+            let across = cosine(fluid.current, wall.normal);
+            if across.abs() > PARALLEL {
+                return Err(Error::input(
+                    "fluid.current",
+                    list(&fluid.current),
+                    format!(
+                        "water can't flow through walls[{i}], whose normal is {}: make the current \
+                         parallel to it",
+                        list(&wall.normal)
+                    ),
+                ));
+            }
+            for (j, other) in self.walls[..i].iter().enumerate() {
+                if cosine(wall.normal, other.normal).abs() > PARALLEL {
+                    return Err(Error::input(
+                        place("normal"),
+                        list(&wall.normal),
+                        format!(
+                            "walls must be perpendicular to each other, and walls[{j}] has the \
+                             normal {}: correct one, or make one of them a fixed box",
+                            list(&other.normal)
+                        ),
+                    ));
+                }
+            }
+        }
+        Ok(())
+    }
+
+    fn check_names(&self) -> Result<()> {
+        let mut seen = HashMap::new();
+        for (i, body) in self.bodies.iter().enumerate() {
+            if body.name.trim().is_empty() {
+                return Err(Error::input(
+                    format!("body number {}: name", i + 1),
+                    format!("{:?}", body.name),
+                    "give every body a name",
+                ));
+            }
+            if let Some(first) = seen.insert(body.name.as_str(), i) {
+                return Err(Error::input(
+                    format!("body number {}: name", i + 1),
+                    format!("{:?}", body.name),
+                    format!(
+                        "body number {} has that name already; give each its own",
+                        first + 1
+                    ),
+                ));
+            }
+        }
+        Ok(())
+    }
+
+    /// Parents exist, stand before their children, and no body carries itself.
+    fn check_tree(&self) -> Result<()> {
+        let mut parents = Vec::with_capacity(self.bodies.len());
+        for body in &self.bodies {
+            let Some(name) = &body.parent else {
+                parents.push(None);
+                continue;
+            };
+            let Some(parent) = self.body(name) else {
+                let names = || self.bodies.iter().map(|b| b.name.as_str());
+                let remedy = match nearest(name, names()) {
+                    Some(near) => format!("no body has that name; did you mean {near:?}?"),
+                    None => format!(
+                        "no body has that name; the bodies are {}",
+                        names().collect::<Vec<_>>().join(", ")
+                    ),
+                };
+                return Err(Error::input(
+                    place(body, "parent"),
+                    format!("{name:?}"),
+                    format!("{remedy} (leave `parent` out for the world)"),
+                ));
+            };
+            parents.push(Some(parent.0));
+        }
+        for (i, body) in self.bodies.iter().enumerate() {
+            let chain = chain(i, &parents);
+            if let Some(cycle) = chain {
+                let names: Vec<_> = cycle.iter().map(|&b| self.name(b)).collect();
+                return Err(Error::input(
+                    place(body, "parent"),
+                    self.name(parents[i].unwrap_or(i)),
+                    format!(
+                        "the parents go in a circle ({}); take `parent` away from one of them, \
+                         which then hangs on the world",
+                        names.join(" on ")
+                    ),
+                ));
+            }
+        }
+        let late = |&i: &usize| parents[i].is_some_and(|parent| parent > i);
+        if let Some(child) = (0..self.bodies.len()).find(late) {
+            let mut order: Vec<usize> = (0..self.bodies.len()).collect();
+            order.sort_by_key(|&i| depth(i, &parents));
+            let names: Vec<_> = order.iter().map(|&i| self.name(i)).collect();
+            return Err(Error::input(
+                place(&self.bodies[child], "parent"),
+                self.name(parents[child].unwrap_or(child)),
+                format!(
+                    "a parent must stand before its children; write the bodies in the order {}",
+                    names.join(", ")
+                ),
+            ));
+        }
+        Ok(())
+    }
+
+    fn name(&self, index: usize) -> String {
+        format!("{:?}", self.bodies[index].name)
+    }
+
+    fn check_controller(&self) -> Result<()> {
+        let controls = self.controls();
+        let count = |field: &str, values: &[f64]| {
+            finite(&format!("controller.{field}"), values)?;
+            if values.len() == controls {
+                return Ok(());
+            }
+            let parts = self.bodies.iter().filter(|b| b.controls() > 0);
+            let parts: Vec<_> = parts
+                .map(|b| format!("{:?} {}", b.name, b.controls()))
+                .collect();
+            Err(Error::input(
+                format!("controller.{field}"),
+                format!("{} numbers", values.len()),
+                format!(
+                    "give one per control, {controls} in all ({})",
+                    if parts.is_empty() {
+                        "no body is actuated or has a thruster".into()
+                    } else {
+                        parts.join(", ")
+                    }
+                ),
+            ))
+        };
+        match &self.controller {
+            None => Ok(()),
+            Some(Controller::Constant { control }) => count("control", control),
+            Some(Controller::Pd {
+                target,
+                stiffness,
+                damping,
+            }) => {
+                let unfit = |b: &&Body| b.thruster || (b.actuated && b.joint.has_quaternion());
+                if let Some(body) = self.bodies.iter().find(unfit) {
+                    return Err(Error::input(
+                        "controller.kind",
+                        "pd",
+                        format!(
+                            "it drives prismatic, revolute and planar joints only, and body {:?} \
+                             has {}: use kind = \"constant\" or a controller of your own in Rust",
+                            body.name,
+                            if body.thruster {
+                                "a thruster".into()
+                            } else {
+                                format!("an actuated {} joint", body.joint.kind())
+                            }
+                        ),
+                    ));
+                }
+                count("target", target)?;
+                count("stiffness", stiffness)?;
+                count("damping", damping)
+            }
+            Some(Controller::PushThenLock {
+                body: name,
+                force,
+                stop_at,
+            }) => {
+                finite("controller.force", &[*force])?;
+                finite("controller.stop_at", &[*stop_at])?;
+                let Some(id) = self.body(name) else {
+                    let names = self.bodies.iter().map(|b| b.name.as_str());
+                    let near = nearest(name, names).map(|n| format!("; did you mean {n:?}?"));
+                    return Err(Error::input(
+                        "controller.body",
+                        format!("{name:?}"),
+                        format!("no body has that name{}", near.unwrap_or_default()),
+                    ));
+                };
+                let body = &self.bodies[id.0];
+                if body.joint.velocities() != 1 || !body.actuated {
+                    return Err(Error::input(
+                        "controller.body",
+                        format!("{name:?}"),
+                        format!(
+                            "push-then-lock pushes an actuated prismatic or revolute joint, and \
+                             this body has a {} joint with actuated = {}: change the body or name \
+                             another",
+                            body.joint.kind(),
+                            body.actuated
+                        ),
+                    ));
+                }
+                Ok(())
+            }
+        }
+    }
+}
+
+/// Largest cosine that still counts as perpendicular.
+const PARALLEL: f64 = 1e-9;
+
+/// The circle of parents that goes through body `i`, if there is one.
+fn chain(i: usize, parents: &[Option<usize>]) -> Option<Vec<usize>> {
+    let mut path = vec![i];
+    let mut at = i;
+    while let Some(parent) = parents[at] {
+        path.push(parent);
+        if parent == i {
+            return Some(path);
+        }
+        if path.len() > parents.len() {
+            return None;
+        }
+        at = parent;
+    }
+    None
+}
+
+fn depth(i: usize, parents: &[Option<usize>]) -> usize {
+    std::iter::successors(parents[i], |&p| parents[p]).count()
+}
+
+fn place(body: &Body, field: &str) -> String {
+    format!("body {:?}: {field}", body.name)
+}
+
+/// Refuses NaN and infinities.
+fn finite(place: &str, values: &[f64]) -> Result<()> {
+    match values.iter().find(|x| !x.is_finite()) {
+        None => Ok(()),
+        Some(bad) if values.len() == 1 => Err(Error::input(place, bad, "give a finite number")),
+        Some(_) => Err(Error::input(place, list(values), "give finite numbers")),
+    }
+}
+
+fn list(values: &[f64]) -> String {
+    format!("{values:?}")
+}
+
+fn norm(a: [f64; 3]) -> f64 {
+    let largest = a.iter().fold(0.0_f64, |m, x| m.max(x.abs()));
+    if largest == 0.0 {
+        return 0.0;
+    }
+    largest * a.iter().map(|x| (x / largest).powi(2)).sum::<f64>().sqrt()
+}
+
+/// Cosine of the angle between two vectors; zero if one of them is zero.
+fn cosine(a: [f64; 3], b: [f64; 3]) -> f64 {
+    let (na, nb) = (norm(a), norm(b));
+    if na == 0.0 || nb == 0.0 {
+        return 0.0;
+    }
+    a.iter().zip(&b).map(|(x, y)| (x / na) * (y / nb)).sum()
+}

@@ -1,0 +1,159 @@
+//! Where the scene starts: lengths against the joints, unit quaternions, prescribed joints.
+
+use super::{finite, place};
+use crate::scene::{Body, Joint, Motion, Scene};
+use crate::{Error, Result};
+
+pub(super) fn check(scene: &Scene) -> Result<()> {
+    let initial = &scene.initial;
+    if !initial.v.is_empty() && !initial.momentum.is_empty() {
+        return Err(Error::input(
+            "initial.momentum",
+            "a momentum beside v",
+            "give either v or momentum; the other follows from it",
+        ));
+    }
+    check_length(scene, "q", &initial.q, Joint::coordinates)?;
+    check_length(scene, "v", &initial.v, Joint::velocities)?;
+    check_length(scene, "momentum", &initial.momentum, Joint::velocities)?;
+
+    let (mut nq, mut nv) = (0, 0);
+    for body in &scene.bodies {
+        let (dq, dv) = (body.joint.coordinates(), body.joint.velocities());
+        if !initial.q.is_empty() {
+            check_quaternion(body, nq, &initial.q[nq..nq + dq])?;
+            check_driven(body, nq, "q", &initial.q[nq..nq + dq], value_at_start)?;
+        }
+        if !initial.v.is_empty() {
+            check_driven(body, nv, "v", &initial.v[nv..nv + dv], rate_at_start)?;
+            check_locked(body, nv, "v", &initial.v[nv..nv + dv])?;
+        }
+        if !initial.momentum.is_empty() {
+            let given = &initial.momentum[nv..nv + dv];
+            check_driven(body, nv, "momentum", given, |_| 0.0)?;
+            check_locked(body, nv, "momentum", given)?;
+        }
+        nq += dq;
+        nv += dv;
+    }
+    Ok(())
+}
+
+fn check_length(
+    scene: &Scene,
+    field: &str,
+    values: &[f64],
+    size: impl Fn(&Joint) -> usize,
+) -> Result<()> {
+    let place = format!("initial.{field}");
+    finite(&place, values)?;
+    let expected: usize = scene.bodies.iter().map(|b| size(&b.joint)).sum();
+    if values.is_empty() || values.len() == expected {
+        return Ok(());
+    }
+    let parts = scene.bodies.iter().filter(|b| size(&b.joint) > 0);
+    let parts: Vec<_> = parts
+        .map(|b| format!("{:?} {} {}", b.name, b.joint.kind(), size(&b.joint)))
+        .collect();
+    Err(Error::input(
+        place,
+        format!("{} numbers", values.len()),
+        format!(
+            "give {expected} in the order of the bodies ({}), or leave it out for {}",
+            parts.join(", "),
+            if field == "q" {
+                "all joints at their origin"
+            } else {
+                "a start at rest"
+            }
+        ),
+    ))
+}
+
+fn check_quaternion(body: &Body, first: usize, q: &[f64]) -> Result<()> {
+    let Some(w) = body.joint.quaternion_at() else {
+        return Ok(());
+    };
+    let quaternion = &q[w..w + 4];
+    let norm = quaternion.iter().map(|x| x * x).sum::<f64>().sqrt();
+    if (norm - 1.0).abs() <= 1e-6 {
+        return Ok(());
+    }
+    let at = first + w;
+    let remedy = if norm == 0.0 {
+        "give a unit quaternion (w, x, y, z); no rotation is [1, 0, 0, 0]".into()
+    } else {
+        let unit: Vec<_> = quaternion.iter().map(|x| x / norm).collect();
+        format!("give a unit quaternion (w, x, y, z); of the same direction: {unit:?}")
+    };
+    Err(Error::input(
+        place(body, &format!("initial.q[{at}..{}]", at + 4)),
+        format!("{quaternion:?} of length {norm}"),
+        remedy,
+    ))
+}
+
+/// Entries of driven joints: zero, which leaves them to the motion, or what the motion says.
+fn check_driven(
+    body: &Body,
+    first: usize,
+    field: &str,
+    given: &[f64],
+    at_start: impl Fn(&Motion) -> f64,
+) -> Result<()> {
+    let motions = body.motion.iter().flatten();
+    for (i, (&value, motion)) in given.iter().zip(motions).enumerate() {
+        let right = at_start(motion);
+        if value != 0.0 && (value - right).abs() > 1e-6 * right.abs().max(value.abs()) {
+            let remedy = if field == "momentum" {
+                "the joint is driven, so its momentum follows from its motion; write 0".into()
+            } else {
+                format!("the joint is driven and starts at {right}; write that, or 0")
+            };
+            return Err(Error::input(
+                place(body, &format!("initial.{field}[{}]", first + i)),
+                value,
+                remedy,
+            ));
+        }
+    }
+    Ok(())
+}
+
+fn check_locked(body: &Body, first: usize, field: &str, given: &[f64]) -> Result<()> {
+    if !body.locked {
+        return Ok(());
+    }
+    match given.iter().position(|&x| x != 0.0) {
+        None => Ok(()),
+        Some(i) => Err(Error::input(
+            place(body, &format!("initial.{field}[{}]", first + i)),
+            given[i],
+            "the joint is locked and can't move; write 0 or take `locked` away",
+        )),
+    }
+}
+
+fn value_at_start(motion: &Motion) -> f64 {
+    match *motion {
+        Motion::Linear { offset, .. } => offset,
+        Motion::Sine {
+            offset,
+            amplitude,
+            phase,
+            ..
+        } => offset + amplitude * phase.sin(),
+    }
+}
+
+fn rate_at_start(motion: &Motion) -> f64 {
+    match *motion {
+        Motion::Linear { rate, .. } => rate,
+        Motion::Sine {
+            amplitude,
+            frequency,
+            phase,
+            ..
+        } => amplitude * frequency * phase.cos(),
+    }
+}

@@ -1,7 +1,11 @@
 //! hydrograd: a differentiable simulator of rigid bodies that feel each other through the water.
 
+#[cfg(feature = "cli")]
+#[doc(hidden)]
+pub mod cli;
 pub mod error;
 pub mod scene;
 
 pub use error::{Error, Result};
 pub use hydrograd_adjoint as adjoint;
+pub use scene::{Body, BodyId, Fluid, Joint, Scene, Shape};

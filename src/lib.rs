@@ -5,7 +5,9 @@
 pub mod cli;
 pub mod error;
 pub mod scene;
+pub mod shape;
 
 pub use error::{Error, Result};
+pub use shape::{MassProperties, MeshReport, TriMesh};
 pub use hydrograd_adjoint as adjoint;
 pub use scene::{Body, BodyId, Fluid, Joint, Scene, Shape};

@@ -8,6 +8,6 @@ pub mod scene;
 pub mod shape;
 
 pub use error::{Error, Result};
-pub use shape::{MassProperties, MeshReport, TriMesh};
 pub use hydrograd_adjoint as adjoint;
 pub use scene::{Body, BodyId, Fluid, Joint, Scene, Shape};
+pub use shape::{MassProperties, MeshReport, TriMesh};

@@ -2,6 +2,7 @@
 
 use std::fmt;
 use std::path::PathBuf;
+use std::process::ExitCode;
 
 use clap::Args;
 use serde::Serialize;
@@ -14,22 +15,26 @@ use crate::{Error, Result};
 
 #[derive(Debug, Args)]
 pub(super) struct Arguments {
-    /// A scene (.toml), at its start, or a mesh (.obj, .stl, .ply; metres).
-    #[arg(
-        value_name = "SCENE.toml|MESH",
-        required_unless_present = "shape",
-        conflicts_with = "shape"
-    )]
-    file: Option<PathBuf>,
-    /// A shape by formula, lengths in m: sphere:RADIUS, ellipsoid:A,B,C (semi-axes), box:A,B,C
-    /// (edges), cylinder:RADIUS,LENGTH, capsule:RADIUS,LENGTH (without its ends); both along z.
-    #[arg(long, value_name = "SHAPE", value_parser = crate::shape::parse_shape)]
-    shape: Option<Shape>,
+    #[command(flatten)]
+    source: Source,
     /// Density of the water in kg/m³ [default: the scene's own; 998 for a mesh or shape].
     #[arg(long, value_name = "RHO", allow_negative_numbers = true)]
     density: Option<f64>,
     #[command(flatten)]
     water: Water,
+}
+
+/// One of them must be given.
+#[derive(Debug, Args)]
+#[group(required = true, multiple = false)]
+struct Source {
+    /// A scene (.toml), at its start, or a mesh (.obj, .stl, .ply; metres).
+    #[arg(value_name = "SCENE.toml|MESH")]
+    file: Option<PathBuf>,
+    /// A shape by formula, lengths in m: sphere:RADIUS, ellipsoid:A,B,C (semi-axes), box:A,B,C
+    /// (edges), cylinder:RADIUS,LENGTH, capsule:RADIUS,LENGTH (without its ends); both along z.
+    #[arg(long, value_name = "SHAPE", value_parser = crate::shape::parse_shape)]
+    shape: Option<Shape>,
 }
 
 /// The added mass of all bodies. SI units.
@@ -59,15 +64,15 @@ pub(super) struct Report {
     pub warnings: Vec<String>,
 }
 
-pub(super) fn main(arguments: &Arguments, output: Output) -> Result<()> {
+pub(super) fn main(arguments: &Arguments, output: Output) -> Result<ExitCode> {
     let scene = input::scene_or_shape(
-        arguments.file.as_deref(),
-        arguments.shape.as_ref(),
+        arguments.source.file.as_deref(),
+        arguments.source.shape.as_ref(),
         arguments.density,
         &arguments.water,
     )?;
     output.result(&added_mass(&scene, arguments)?);
-    Ok(())
+    Ok(ExitCode::SUCCESS)
 }
 
 /// TO FILL IN: M_f of all bodies at the scene's start, with the settings of `arguments.water`.

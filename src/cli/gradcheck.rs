@@ -2,6 +2,7 @@
 
 use std::fmt;
 use std::path::PathBuf;
+use std::process::ExitCode;
 
 use clap::Args;
 use serde::Serialize;
@@ -55,13 +56,13 @@ pub(super) struct Report {
     pub warnings: Vec<String>,
 }
 
-pub(super) fn main(arguments: &Arguments, output: Output) -> Result<()> {
+pub(super) fn main(arguments: &Arguments, output: Output) -> Result<ExitCode> {
     let scene = input::scene(&arguments.scene, &arguments.water, &arguments.time)?;
     let progress = Progress::new("directions", 3 * arguments.directions);
     let report = check(&scene, arguments, &progress)?;
     drop(progress);
     output.result(&report);
-    Ok(())
+    Ok(ExitCode::SUCCESS)
 }
 
 /// TO FILL IN: adjoint against central differences along `arguments.directions` random directions

@@ -71,13 +71,10 @@ pub fn main() -> ExitCode {
         Command::Gradcheck(arguments) => gradcheck::main(&arguments, output),
         Command::CheckMesh(arguments) => check_mesh::main(&arguments, output),
     };
-    match done {
-        Ok(()) => ExitCode::SUCCESS,
-        Err(error) => {
-            output.error(&error);
-            ExitCode::FAILURE
-        }
-    }
+    done.unwrap_or_else(|error| {
+        output.error(&error);
+        ExitCode::FAILURE
+    })
 }
 
 #[cfg(test)]

@@ -2,15 +2,16 @@
 
 use std::fmt;
 use std::path::PathBuf;
+use std::process::ExitCode;
 
 use clap::Args;
 use serde::Serialize;
 
+use super::input;
 use super::options::{Time, Water};
 use super::output::{Output, or_dash, write_warnings};
 use super::progress::Progress;
 use super::trajectory::{self, Trajectory};
-use super::input;
 use crate::scene::Scene;
 use crate::{Error, Result};
 
@@ -63,7 +64,7 @@ pub(super) struct Report {
     pub files: Vec<PathBuf>,
 }
 
-pub(super) fn main(arguments: &Arguments, output: Output) -> Result<()> {
+pub(super) fn main(arguments: &Arguments, output: Output) -> Result<ExitCode> {
     let scene = input::scene(&arguments.scene, &arguments.water, &arguments.time)?;
     if let Some(folder) = &arguments.out {
         trajectory::prepare(folder)?;
@@ -75,7 +76,7 @@ pub(super) fn main(arguments: &Arguments, output: Output) -> Result<()> {
         report.files = trajectory.write(folder)?.into();
     }
     output.result(&report);
-    Ok(())
+    Ok(ExitCode::SUCCESS)
 }
 
 /// TO FILL IN: build the simulator with the settings of `arguments.water` and `arguments.time`,

@@ -62,7 +62,12 @@ impl Trajectory {
         let mut line = String::from("time");
         let q = self.coordinates.iter().map(String::as_str);
         let v = self.velocities.iter().map(String::as_str);
-        for name in q.chain(v).chain(["energy"]).chain(MOMENTA).chain(["min_gap"]) {
+        for name in q
+            .chain(v)
+            .chain(["energy"])
+            .chain(MOMENTA)
+            .chain(["min_gap"])
+        {
             line.push(',');
             line.push_str(&cell(name));
         }
@@ -96,13 +101,13 @@ pub(super) fn prepare(folder: &Path) -> Result<()> {
 }
 
 /// Writes beside the file and renames, so that the file is never seen half written.
-fn replace(
-    path: &Path,
-    write: impl FnOnce(&mut BufWriter<File>) -> io::Result<()>,
-) -> Result<()> {
+fn replace(path: &Path, write: impl FnOnce(&mut BufWriter<File>) -> io::Result<()>) -> Result<()> {
     let beside = temporary(path);
     let attempt = || {
-        let file = OpenOptions::new().write(true).create_new(true).open(&beside)?;
+        let file = OpenOptions::new()
+            .write(true)
+            .create_new(true)
+            .open(&beside)?;
         let mut file = BufWriter::new(file);
         write(&mut file)?;
         file.flush()?;
@@ -171,7 +176,11 @@ mod tests {
             let first: Vec<&str> = rows[1].split(',').collect();
             assert_eq!(first.len(), 11);
             assert_eq!(first[1].parse::<f64>().unwrap(), 1.0 / 3.0);
-            assert!(rows[1].ends_with(','), "no gap is an empty cell: {}", rows[1]);
+            assert!(
+                rows[1].ends_with(','),
+                "no gap is an empty cell: {}",
+                rows[1]
+            );
             assert!(rows[2].ends_with(",0.25"));
 
             let text = fs::read_to_string(json).unwrap();

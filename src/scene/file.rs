@@ -172,13 +172,19 @@ fn explain(text: &str, error: &toml::de::Error) -> String {
         );
     }
     if message.starts_with("unknown variant") {
-        let at = match table.and_then(|t| key_start(t, "kind")) {
-            Some(start) => {
-                path.push(Step::Key("kind".into()));
-                line(start)
+        let mut at = here;
+        if let Some(table) = table {
+            let kind = table.get("kind").and_then(|k| k.get_ref().as_str());
+            let key = if kind == Some(asked) {
+                Some("kind".to_owned())
+            } else {
+                culprit(&values, &path, table)
+            };
+            if let Some(key) = key {
+                at = key_start(table, &key).map_or(here, line);
+                path.push(Step::Key(key));
             }
-            None => here,
-        };
+        }
         return format!(
             "line {at}: {}: `{asked}` is not known; {}",
             place(&path, &values),
@@ -246,10 +252,8 @@ fn find_in_value(
     span: &std::ops::Range<usize>,
     path: &mut Vec<Step>,
 ) -> bool {
-    if value.span() == *span {
-        return true;
-    }
-    match value.get_ref() {
+    // Inside first: an array of tables has the span of its first header, as its first table has.
+    let inside = match value.get_ref() {
         DeValue::Table(table) => find_span(table, span, path),
         DeValue::Array(items) => items.iter().enumerate().any(|(i, item)| {
             path.push(Step::Index(i));
@@ -260,7 +264,8 @@ fn find_in_value(
             found
         }),
         _ => false,
-    }
+    };
+    inside || value.span() == *span
 }
 
 fn table_at<'a, 'i>(root: &'a DeTable<'i>, path: &[Step]) -> Option<&'a DeTable<'i>> {

@@ -47,8 +47,8 @@ impl MassProperties {
             let s = a + b + c;
             volume += det;
             first += det * s;
-            second +=
-                det * (a * a.transpose() + b * b.transpose() + c * c.transpose() + s * s.transpose());
+            second += det
+                * (a * a.transpose() + b * b.transpose() + c * c.transpose() + s * s.transpose());
         }
         volume /= 6.0;
         let offset = first / (24.0 * volume);

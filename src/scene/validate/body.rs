@@ -38,71 +38,16 @@ fn check_shape(body: &Body) -> Result<()> {
     let Some(shape) = &body.shape else {
         return Ok(());
     };
-    let lengths = |field: &str, values: &[f64]| {
-        let place = place(body, &format!("shape.{field}"));
-        finite(&place, values)?;
-        match values.iter().find(|x| **x <= 0.0) {
-            None => Ok(()),
-            Some(bad) => Err(Error::input(place, bad, "give lengths above zero, in m")),
-        }
-    };
-    let faces = match shape {
-        Shape::Sphere { radius, faces } => {
-            lengths("radius", &[*radius])?;
-            faces
-        }
-        Shape::Ellipsoid { semi_axes, faces } => {
-            lengths("semi_axes", semi_axes)?;
-            faces
-        }
-        Shape::Box { size, faces } => {
-            lengths("size", size)?;
-            faces
-        }
-        Shape::Cylinder {
-            radius,
-            length,
-            faces,
-        } => {
-            lengths("radius", &[*radius])?;
-            lengths("length", &[*length])?;
-            faces
-        }
-        Shape::Capsule {
-            radius,
-            length,
-            faces,
-        } => {
-            lengths("radius", &[*radius])?;
-            lengths("length", &[*length])?;
-            faces
-        }
-        Shape::Mesh { path, scale } => {
-            if path.as_os_str().is_empty() {
-                return Err(Error::input(
-                    place(body, "shape.path"),
-                    "nothing",
-                    "give the path of an OBJ, STL or PLY file",
-                ));
-            }
-            let place = place(body, "shape.scale");
-            finite(&place, &[*scale])?;
-            if *scale <= 0.0 {
-                let remedy = "give the factor from the file's units to metres, above zero \
-                              (millimetres: 0.001)";
-                return Err(Error::input(place, scale, remedy));
-            }
-            return Ok(());
-        }
-    };
-    match faces {
-        Some(0) => Err(Error::input(
-            place(body, "shape.faces"),
-            0,
-            "give a number of faces, e.g. 320 or 1280, or leave it out",
-        )),
-        _ => Ok(()),
+    if let Shape::Mesh { path, .. } = shape
+        && path.as_os_str().is_empty()
+    {
+        return Err(Error::input(
+            place(body, "shape.path"),
+            "nothing",
+            "give the path of an OBJ, STL or PLY file",
+        ));
     }
+    crate::shape::validate(shape, &place(body, "shape"))
 }
 
 fn check_mass(body: &Body, is_static: bool) -> Result<()> {

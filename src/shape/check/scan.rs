@@ -37,7 +37,11 @@ pub fn check_parts(name: &str, vertices: &[Vec3], faces: &[[usize; 3]]) -> MeshR
     let mut findings = checker.findings;
     findings.sort_by_key(|f| (f.severity == Severity::Warning, f.kind));
     let usable = findings.iter().all(|f| f.severity == Severity::Warning);
-    let all: Vec<_> = checker.finite.iter().map(|&f| corners(vertices, faces[f])).collect();
+    let all: Vec<_> = checker
+        .finite
+        .iter()
+        .map(|&f| corners(vertices, faces[f]))
+        .collect();
     MeshReport {
         name: name.to_owned(),
         vertices: vertices.len(),
@@ -131,13 +135,25 @@ impl<'a> Checker<'a> {
     fn report_faces(&mut self, kind: Kind, found: &[usize], problem: String, remedy: &str) {
         if let Some(&first) = found.first() {
             let place = self.centroid(first);
-            self.report(kind, Severity::Error, found.len(), Some(first), place, problem, remedy);
+            self.report(
+                kind,
+                Severity::Error,
+                found.len(),
+                Some(first),
+                place,
+                problem,
+                remedy,
+            );
         }
     }
 
     fn indices_and_numbers(&mut self) {
         if self.faces.is_empty() || self.vertices.is_empty() {
-            let what = if self.faces.is_empty() { "faces" } else { "vertices" };
+            let what = if self.faces.is_empty() {
+                "faces"
+            } else {
+                "vertices"
+            };
             self.report(
                 Kind::Empty,
                 Severity::Error,
@@ -240,10 +256,7 @@ impl<'a> Checker<'a> {
                 worst = (aspect, f);
             }
         }
-        let problem = format!(
-            "{} no area",
-            counted(flat.len(), "face has", "faces have")
-        );
+        let problem = format!("{} no area", counted(flat.len(), "face has", "faces have"));
         let remedy = "collapse the shortest edge of each, and merge vertices at the same place";
         self.report_faces(Kind::ZeroArea, &flat, problem, remedy);
         self.worst_aspect = worst.0;
@@ -283,7 +296,10 @@ impl<'a> Checker<'a> {
                 pieces.len(),
                 Some(f),
                 self.centroid(f),
-                format!("{} separate pieces that share no edge; the second begins here", pieces.len()),
+                format!(
+                    "{} separate pieces that share no edge; the second begins here",
+                    pieces.len()
+                ),
                 "give each piece a body of its own (joint = fixed holds them together), join the \
                  pieces into one surface, or delete what is inside; merge vertices if they touch",
             );
@@ -318,7 +334,15 @@ impl<'a> Checker<'a> {
                 "delete inner walls, and split surfaces that touch along an edge",
             )
         };
-        self.report(kind, Severity::Error, count, Some(edge.face), Some(middle), problem, remedy);
+        self.report(
+            kind,
+            Severity::Error,
+            count,
+            Some(edge.face),
+            Some(middle),
+            problem,
+            remedy,
+        );
     }
 
     fn turns(&mut self, pieces: &[Component]) {
@@ -357,7 +381,11 @@ impl<'a> Checker<'a> {
                 .iter()
                 .map(|&f| corners(self.vertices, self.faces[f]))
                 .collect();
-            if all.iter().flatten().any(|p| p.iter().any(|x| !x.is_finite())) {
+            if all
+                .iter()
+                .flatten()
+                .any(|p| p.iter().any(|x| !x.is_finite()))
+            {
                 continue;
             }
             let volume = signed_volume(&all);

@@ -124,9 +124,7 @@ fn fits(header: &Header, bytes: usize) -> Result<(), String> {
     let mut needed = 0u128;
     for (name, element) in &header.elements {
         if element.properties.is_empty() && element.count > 0 {
-            return Err(format!(
-                "element {name} has no properties; export it again"
-            ));
+            return Err(format!("element {name} has no properties; export it again"));
         }
         needed += least(element, header.encoding) * element.count as u128;
         if needed > bytes as u128 {

@@ -12,7 +12,11 @@ pub(super) fn triangles(corners: &[usize], vertices: &[Vec3]) -> Vec<[usize; 3]>
     let mut cut = Vec::with_capacity(corners.len().saturating_sub(2));
     // A corner that doesn't exist is for the check to report: any fan will do.
     let known = corners.iter().all(|&v| v < vertices.len());
-    let normal = if known { normal(corners, vertices) } else { Vec3::zeros() };
+    let normal = if known {
+        normal(corners, vertices)
+    } else {
+        Vec3::zeros()
+    };
     while left.len() > 3 {
         let n = left.len();
         let ear = |i: usize| [left[(i + n - 1) % n], left[i], left[(i + 1) % n]];
@@ -22,9 +26,9 @@ pub(super) fn triangles(corners: &[usize], vertices: &[Vec3]) -> Vec<[usize; 3]>
                 let t = ear(i).map(|v| vertices[v]);
                 let quality = quality(&t, &normal);
                 let free = quality > 0.0
-                    && left.iter().all(|v| {
-                        ear(i).contains(v) || !inside(&vertices[*v], &t, &normal)
-                    });
+                    && left
+                        .iter()
+                        .all(|v| ear(i).contains(v) || !inside(&vertices[*v], &t, &normal));
                 free.then_some((quality, i))
             })
             .max_by(|a, b| a.0.total_cmp(&b.0));
@@ -54,7 +58,10 @@ fn normal(corners: &[usize], vertices: &[Vec3]) -> Vec3 {
 /// Area over longest side squared, negative where the corner is a notch.
 fn quality([a, b, c]: &[Vec3; 3], normal: &Vec3) -> f64 {
     let area = (b - a).cross(&(c - a)).dot(normal) / normal.norm();
-    let longest = (b - a).norm_squared().max((c - b).norm_squared()).max((a - c).norm_squared());
+    let longest = (b - a)
+        .norm_squared()
+        .max((c - b).norm_squared())
+        .max((a - c).norm_squared());
     area / longest
 }
 
@@ -77,7 +84,9 @@ mod tests {
             let corners: Vec<usize> = (0..4).map(|i| (i + turn) % 4).collect();
             let mut total = 0.0;
             for [a, b, c] in triangles(&corners, &vertices) {
-                let z = (vertices[b] - vertices[a]).cross(&(vertices[c] - vertices[a])).z;
+                let z = (vertices[b] - vertices[a])
+                    .cross(&(vertices[c] - vertices[a]))
+                    .z;
                 assert!(z > 0.0);
                 total += z / 2.0;
             }

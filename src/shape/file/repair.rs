@@ -47,8 +47,7 @@ pub(super) fn mend(raw: Raw, always: bool) -> Raw {
     }
     let [low, high] = bounds(same.vertices.iter());
     let largest = low.amax().max(high.amax());
-    let tolerance =
-        (TOLERANCE * (high - low).norm()).max(4.0 * f64::from(f32::EPSILON) * largest);
+    let tolerance = (TOLERANCE * (high - low).norm()).max(4.0 * f64::from(f32::EPSILON) * largest);
     let (mut near, merged, collapsed) = merge(&same, tolerance);
     if open_edges(&near.faces) > 0 {
         return same;

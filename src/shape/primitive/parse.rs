@@ -9,7 +9,11 @@ const FORMS: [(&str, usize, &str); 5] = [
     ("ellipsoid", 3, "ellipsoid:A,B,C (semi-axes)"),
     ("box", 3, "box:A,B,C (edge lengths)"),
     ("cylinder", 2, "cylinder:RADIUS,LENGTH"),
-    ("capsule", 2, "capsule:RADIUS,LENGTH (of the cylindrical part)"),
+    (
+        "capsule",
+        2,
+        "capsule:RADIUS,LENGTH (of the cylindrical part)",
+    ),
 ];
 
 /// A shape from its short form, lengths in m: `sphere:R`, `ellipsoid:A,B,C` (semi-axes),

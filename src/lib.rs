@@ -1,11 +1,16 @@
 //! hydrograd: a differentiable simulator of rigid bodies that feel each other through the water.
 
+pub mod boundary;
 #[cfg(feature = "cli")]
 #[doc(hidden)]
 pub mod cli;
+pub mod coupling;
+pub mod dynamics;
 pub mod error;
+pub mod multibody;
 pub mod scene;
 pub mod shape;
+pub mod solver;
 
 pub use error::{Error, Result};
 pub use hydrograd_adjoint as adjoint;

@@ -6,6 +6,7 @@
 mod build;
 mod file;
 mod joint;
+mod motion;
 mod validate;
 
 pub use build::BodyId;

@@ -110,6 +110,28 @@ pub fn exp_jacobian_inverse(theta: &Vec3) -> Mat3 {
     Mat3::identity() - 0.5 * k + c * k * k
 }
 
+/// Cotangent of `θ` from the cotangent of `exp_jacobian_inverse(θ) ω`.
+pub fn exp_jacobian_inverse_vjp(theta: &Vec3, omega: &Vec3, rate_bar: &Vec3) -> Vec3 {
+    let s = theta.norm_squared();
+    let (a, b, _) = coefficients(s);
+    let (c, dc) = if s < SERIES {
+        (
+            (1.0 + s / 60.0 * (1.0 + s / 42.0 * (1.0 + s / 40.0))) / 12.0,
+            (1.0 + s / 21.0 * (1.0 + s * 3.0 / 80.0)) / 720.0,
+        )
+    } else {
+        let (da, db) = coefficient_slopes(s);
+        let c = (1.0 - a / (2.0 * b)) / s;
+        (c, ((a * db - da * b) / (2.0 * b * b) - c) / s)
+    };
+    let (t, w, r) = (theta, omega, rate_bar);
+    // −½ θ×ω, then c(s) θ×(θ×ω) with θ×(θ×ω) = θ(θ·ω) − ω s.
+    let twice = t * t.dot(w) - w * s;
+    -0.5 * w.cross(r)
+        + 2.0 * dc * twice.dot(r) * t
+        + c * (r * t.dot(w) + w * t.dot(r) - 2.0 * w.dot(r) * t)
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -123,6 +145,8 @@ mod tests {
             assert!((r * r.transpose() - Mat3::identity()).norm() < 1e-14);
             let product = exp_jacobian(&theta) * exp_jacobian_inverse(&theta);
             assert!((product - Mat3::identity()).norm() < 1e-13, "{scale}");
+            let (w, bar3) = (Vec3::new(0.4, 1.3, -0.7), Vec3::new(-0.9, 0.2, 0.6));
+            let rate_bar = exp_jacobian_inverse_vjp(&theta, &w, &bar3);
             let m = Mat3::new(0.3, -1.0, 0.5, 0.7, 0.2, -0.4, 1.1, 0.6, -0.9);
             let bar = exp_matrix_vjp(&theta, &m);
             for k in 0..3 {
@@ -132,6 +156,13 @@ mod tests {
                 let (p, n) = (exp_matrix(&(theta + e)), exp_matrix(&(theta - e)));
                 let difference = (p - n) / (2.0 * h);
                 assert!((difference.dot(&m) - bar[k]).abs() < 1e-9);
+                let rates = exp_jacobian_inverse(&(theta + e)) - exp_jacobian_inverse(&(theta - e));
+                let slope = (rates * w).dot(&bar3) / (2.0 * h);
+                assert!(
+                    (slope - rate_bar[k]).abs() < 1e-8,
+                    "{scale} {slope} {}",
+                    rate_bar[k]
+                );
                 let turn = unskew(&(difference * r.transpose())) / 2.0;
                 assert!((turn - exp_jacobian(&theta).column(k)).norm() < 1e-9);
             }

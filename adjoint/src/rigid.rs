@@ -1,0 +1,39 @@
+//! Spatial inertia of a rigid body in its own frame.
+
+use crate::lie::{Mat3, Mat6, Vec3, skew};
+
+/// Inertia matrix about the centre of mass from xx, yy, zz, xy, xz, yz (kg m²).
+pub fn inertia_matrix(i: &[f64; 6]) -> Mat3 {
+    Mat3::new(i[0], i[3], i[4], i[3], i[1], i[5], i[4], i[5], i[2])
+}
+
+/// 6 × 6 inertia about the body's origin, body axes, linear part first:
+/// `[m 1, −m [c]×; m [c]×, I − m [c]×²]` (Eq. 6 when the centre of mass c is the origin).
+pub fn spatial_inertia(mass: f64, center: &Vec3, inertia: &[f64; 6]) -> Mat6 {
+    let c = skew(center);
+    let mut out = Mat6::zeros();
+    out.fixed_view_mut::<3, 3>(0, 0)
+        .copy_from(&(Mat3::identity() * mass));
+    out.fixed_view_mut::<3, 3>(0, 3).copy_from(&(-mass * c));
+    out.fixed_view_mut::<3, 3>(3, 0).copy_from(&(mass * c));
+    out.fixed_view_mut::<3, 3>(3, 3)
+        .copy_from(&(inertia_matrix(inertia) - mass * c * c));
+    out
+}
+
+/// Cotangents of `(mass, inertia)` from the cotangent of [`spatial_inertia`], in which both are linear.
+pub fn spatial_inertia_vjp(center: &Vec3, bar: &Mat6) -> (f64, [f64; 6]) {
+    let unit = spatial_inertia(1.0, center, &[0.0; 6]);
+    let a = bar.fixed_view::<3, 3>(3, 3);
+    (
+        bar.dot(&unit),
+        [
+            a[(0, 0)],
+            a[(1, 1)],
+            a[(2, 2)],
+            a[(0, 1)] + a[(1, 0)],
+            a[(0, 2)] + a[(2, 0)],
+            a[(1, 2)] + a[(2, 1)],
+        ],
+    )
+}

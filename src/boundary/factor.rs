@@ -1,0 +1,142 @@
+//! Thin QR factorisation of one body's flux matrix, deterministic and sequential.
+
+use faer::dyn_stack::{MemBuffer, MemStack};
+use faer::linalg::qr::no_pivoting::{factor, solve};
+use faer::linalg::triangular_solve;
+use faer::{Mat, MatMut, MatRef, Par};
+
+/// Above this condition number the solution is regularised.
+const SINGULAR: f64 = 1e12;
+
+pub(crate) struct Factored {
+    /// Upper triangular, sources × sources.
+    pub r: Mat<f64>,
+    /// K⁺ right-hand side, sources × columns.
+    pub solution: Mat<f64>,
+    /// Condition number of R with columns scaled to unit length (estimated from below).
+    pub condition: f64,
+    /// Whether rows μI were added because K alone is singular to round-off.
+    pub regularised: bool,
+}
+
+/// Least-squares solution of `k x = rhs` by Householder QR.
+pub(crate) fn solve(k: MatRef<f64>, rhs: MatRef<f64>) -> Factored {
+    let plain = attempt(k, rhs);
+    if plain.condition < SINGULAR {
+        return plain;
+    }
+    let (m, n) = k.shape();
+    let norm = k.norm_l2() / (n as f64).sqrt();
+    let mu = 1e-10 * norm;
+    let tall = Mat::from_fn(m + n, n, |i, j| match i {
+        i if i < m => k[(i, j)],
+        i if i - m == j => mu,
+        _ => 0.0,
+    });
+    let rhs = Mat::from_fn(
+        m + n,
+        rhs.ncols(),
+        |i, j| if i < m { rhs[(i, j)] } else { 0.0 },
+    );
+    Factored {
+        condition: plain.condition,
+        regularised: true,
+        ..attempt(tall.as_ref(), rhs.as_ref())
+    }
+}
+
+fn attempt(k: MatRef<f64>, rhs: MatRef<f64>) -> Factored {
+    let (m, n) = k.shape();
+    let par = Par::Seq;
+    let block = factor::recommended_block_size::<f64>(m, n);
+    let mut qr = k.to_owned();
+    let mut coeff = Mat::zeros(block, n);
+    let mut memory = MemBuffer::new(factor::qr_in_place_scratch::<f64>(
+        m,
+        n,
+        block,
+        par,
+        Default::default(),
+    ));
+    factor::qr_in_place(
+        qr.as_mut(),
+        coeff.as_mut(),
+        par,
+        MemStack::new(&mut memory),
+        Default::default(),
+    );
+    let r = Mat::from_fn(n, n, |i, j| if i <= j { qr[(i, j)] } else { 0.0 });
+    let mut x = rhs.to_owned();
+    let mut memory = MemBuffer::new(solve::solve_lstsq_in_place_scratch::<f64>(
+        m,
+        n,
+        block,
+        rhs.ncols(),
+        par,
+    ));
+    solve::solve_lstsq_in_place(
+        qr.as_ref(),
+        coeff.as_ref(),
+        r.as_ref(),
+        x.as_mut(),
+        par,
+        MemStack::new(&mut memory),
+    );
+    Factored {
+        condition: condition(r.as_ref()),
+        solution: x.subrows(0, n).to_owned(),
+        r,
+        regularised: false,
+    }
+}
+
+/// x ← R⁻¹ x.
+pub(crate) fn solve_upper(r: MatRef<f64>, x: MatMut<f64>) {
+    triangular_solve::solve_upper_triangular_in_place(r, x, Par::Seq);
+}
+
+/// x ← R⁻ᵀ x.
+pub(crate) fn solve_upper_transpose(r: MatRef<f64>, x: MatMut<f64>) {
+    triangular_solve::solve_lower_triangular_in_place(r.transpose(), x, Par::Seq);
+}
+
+/// Condition number σmax/σmin of R D⁻¹, D its column norms, by power and inverse iteration.
+fn condition(r: MatRef<f64>) -> f64 {
+    let n = r.ncols();
+    let mut scaled = r.to_owned();
+    for j in 0..n {
+        let norm = r.col(j).norm_l2();
+        if norm.is_nan() || norm <= 0.0 || r[(j, j)] == 0.0 {
+            return f64::INFINITY;
+        }
+        for i in 0..=j {
+            scaled[(i, j)] /= norm;
+        }
+    }
+    // A start with every frequency in it, the same on each run.
+    let start = || Mat::from_fn(n, 1, |i, _| (1.0 + 7.0 * i as f64).sin() + 0.3);
+    let (mut x, mut y) = (start(), start());
+    let (mut largest, mut inverse) = (0.0, 0.0);
+    for _ in 0..8 {
+        normalise(&mut x);
+        x = scaled.transpose() * (&scaled * &x);
+        largest = x.norm_l2().sqrt();
+        normalise(&mut y);
+        solve_upper_transpose(scaled.as_ref(), y.as_mut());
+        solve_upper(scaled.as_ref(), y.as_mut());
+        inverse = y.norm_l2().sqrt();
+    }
+    let condition = largest * inverse;
+    if condition.is_finite() {
+        condition
+    } else {
+        f64::INFINITY
+    }
+}
+
+fn normalise(x: &mut Mat<f64>) {
+    let norm = x.norm_l2();
+    for i in 0..x.nrows() {
+        x[(i, 0)] /= norm;
+    }
+}

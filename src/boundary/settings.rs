@@ -1,0 +1,66 @@
+//! What a user may choose about the discretisation of one body.
+
+use serde::{Deserialize, Serialize};
+
+/// Discretisation of one body's surface.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
+#[serde(default, deny_unknown_fields, rename_all = "kebab-case")]
+pub struct Settings {
+    /// Where the sources are and what a row says.
+    pub method: Method,
+    /// How far inside the surface the sources are.
+    pub depth: Depth,
+    /// Norm in which the rows are fitted.
+    pub rows: RowScaling,
+    /// How the energy is read from the strengths.
+    pub readout: Readout,
+}
+
+/// Where the sources are and what a row of the flux matrix says.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "kebab-case")]
+pub enum Method {
+    /// One source under each vertex; a row is the flux through a face (its solid angle seen from the
+    /// source). About twice as many rows as columns, solved by least squares.
+    #[default]
+    MfsVertex,
+    /// One source under each face; a row is the normal velocity at the face's centre
+    /// (the paper's Eq. 17–18). Square.
+    MfsFace,
+}
+
+/// Distance of the sources from the surface.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
+#[serde(rename_all = "kebab-case")]
+pub enum Depth {
+    /// From the mesh, source by source: see [`super::depth`].
+    #[default]
+    Auto,
+    /// The same everywhere, m. Checked against edge length and thickness.
+    Fixed(f64),
+}
+
+/// Norm in which the rows are fitted.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "kebab-case")]
+pub enum RowScaling {
+    /// The L² norm of the normal velocity over the surface: small and large faces, and small
+    /// and large bodies, count alike.
+    #[default]
+    Scaled,
+    /// Plain least squares of the flux (vertex sources) or of the normal velocity (face sources).
+    /// Ruins small bodies beside large ones; for comparison.
+    Unscaled,
+}
+
+/// How the energy is read from the strengths.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "kebab-case")]
+pub enum Readout {
+    /// Second order in the residual, with three points on faces whose sources are near: see
+    /// [`super::readout`].
+    #[default]
+    Corrected,
+    /// The potential at each face's centre times the flux asked for (the paper's Eq. 19).
+    Centre,
+}

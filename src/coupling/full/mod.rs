@@ -1,0 +1,108 @@
+//! The paper's coupled system (Eq. 18–20) in least squares, with all derivatives.
+//!
+//! Rows of K are the faces of all bodies, columns their sources; with walls every source brings its
+//! images. Per body twist x̄ (body frames), in the notation of [`crate::boundary`],
+//!
+//! ```text
+//! K a ≈ F x̄,   r = F x̄ − K a,   λ = (KᵀK)⁻¹ Pᵀ B x̄,   μ = K λ
+//! E(x, y) = sym( B_xᵀ P a_y )
+//! M̄ x̄ = ½ { B₆ᵀ P a + F₆ᵀ μ }                             all six components of every body
+//! δE(x, y) = ½ [ B_xᵀ δP a_y − μ_xᵀ δK a_y + r_xᵀ δK λ_y ] + (x ↔ y)
+//! ```
+//!
+//! A body's own block doesn't change in its own frame; all other entries depend on a source's
+//! position in the target's frame alone, so a displacement enters through `d_j = Ẑ_c(s_j) − Z_b(s_j)`:
+//! with the right densities fixed, δE is the work of a force on each source of c and of the
+//! opposite wrench on b. The tangent (hvp) follows from
+//!
+//! ```text
+//! KᵀK δa = δKᵀ r − Kᵀ δK a              δr = −δK a − K δa
+//! KᵀK δλ = δPᵀ B x̄ − δKᵀ μ − Kᵀ δK λ      δμ = δK λ + K δλ
+//! ```
+//!
+//! which is Eq. 21 done once, transposed, with the least-squares residual terms that Eq. 21 drops.
+
+mod body;
+mod pairs;
+mod record;
+mod second;
+mod system;
+
+pub use body::WetBody;
+pub use system::{Preconditioner, SolveSettings, Solver};
+
+use super::image::Image;
+use super::{Coupling, Record};
+use crate::Result;
+use crate::adjoint::lie::Pose;
+use crate::scene::Wall;
+use nalgebra::DMatrix;
+use std::ops::Range;
+use std::sync::Arc;
+
+/// All bodies coupled through one boundary integral system.
+pub struct Full {
+    bodies: Vec<Arc<WetBody>>,
+    images: Vec<Image>,
+    settings: SolveSettings,
+    faces: Vec<Range<usize>>,
+    sources: Vec<Range<usize>>,
+}
+
+impl Full {
+    /// From the bodies, the walls (one, or mutually perpendicular ones) and the solver's settings.
+    ///
+    /// # Errors
+    /// Walls that don't close under reflection, or settings out of range.
+    pub fn new(bodies: Vec<Arc<WetBody>>, walls: &[Wall], settings: SolveSettings) -> Result<Self> {
+        settings.validate(&bodies)?;
+        let ranges = |size: &dyn Fn(&WetBody) -> usize| {
+            let mut at = 0;
+            bodies
+                .iter()
+                .map(|b| {
+                    let from = at;
+                    at += size(b);
+                    from..at
+                })
+                .collect::<Vec<_>>()
+        };
+        Ok(Self {
+            faces: ranges(&|b| b.faces()),
+            sources: ranges(&|b| b.sources()),
+            images: Image::of_walls(walls)?,
+            bodies,
+            settings,
+        })
+    }
+
+    /// Number of rows.
+    pub fn rows(&self) -> usize {
+        self.faces.last().map_or(0, |r| r.end)
+    }
+
+    fn columns(&self) -> usize {
+        self.sources.last().map_or(0, |r| r.end)
+    }
+}
+
+impl Coupling for Full {
+    fn bodies(&self) -> usize {
+        self.bodies.len()
+    }
+
+    fn unknowns(&self) -> usize {
+        self.columns()
+    }
+
+    fn evaluate(
+        &self,
+        poses: &[Pose],
+        basis: &DMatrix<f64>,
+        derivative: bool,
+    ) -> Result<Box<dyn Record + '_>> {
+        Ok(Box::new(record::FullRecord::new(
+            self, poses, basis, derivative,
+        )?))
+    }
+}

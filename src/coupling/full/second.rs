@@ -1,0 +1,183 @@
+//! Second derivatives along one displacement: the tangent of the first.
+
+use super::body::unit_twists;
+use super::record::{FullRecord, Response, gradient_at};
+use crate::Result;
+use crate::adjoint::lie::{Vec3, Vec6, six};
+use crate::coupling::{Direction, Tangent};
+use crate::solver::Columns;
+use nalgebra::DVector;
+
+/// First derivatives of one pair that the second pass uses again.
+struct PairFields {
+    displacement: Vec<Vec3>,
+    /// ∇ of Σ μ, r over the target's faces, `[j][μ.., r..][3]`.
+    fields: Vec<f64>,
+    /// ∇ of the readout of the directions, `[j][x][3]`.
+    readout: Vec<f64>,
+}
+
+/// Column `k` of every response, `[row][column]`.
+fn gather(responses: &[&Response], part: impl Fn(&Response) -> [&Vec<f64>; 2]) -> Columns {
+    let all: Vec<&[f64]> = (0..2)
+        .flat_map(|h| responses.iter().map(move |r| (h, r)))
+        .map(|(h, r)| part(r)[h].as_slice())
+        .collect();
+    Columns::from_columns(&all)
+}
+
+impl FullRecord<'_> {
+    pub(super) fn second(&self, x: Direction, y: Direction, z: &[Vec6]) -> Result<Tangent> {
+        let same = match (&x, &y) {
+            (Direction::Basis(a), Direction::Basis(b)) => a == b,
+            (Direction::Twist(a), Direction::Twist(b)) => a == b,
+            _ => false,
+        };
+        let mut owned = vec![self.respond(x)?];
+        if !same {
+            owned.push(self.respond(y)?);
+        }
+        let responses: Vec<&Response> = owned.iter().collect();
+        let n = responses.len();
+        let right = gather(&responses, |r| [&r.a, &r.lambda]);
+        let left = gather(&responses, |r| [&r.mu, &r.r]);
+        let bodies = self.full.bodies.len();
+
+        let mut dk = Columns::zeros(self.full.rows(), 2 * n);
+        let mut dkr = Columns::zeros(right.rows, n);
+        let mut dg = Columns::zeros(right.rows, n);
+        let mut impulse = vec![vec![Vec6::zeros(); n]; bodies];
+        let mut kept = Vec::with_capacity(self.pairs.len());
+        for pair in &self.pairs {
+            let body = &self.full.bodies[pair.target];
+            let faces = &self.full.faces[pair.target];
+            let sources = &self.full.sources[pair.source];
+            let d = pair.displacements(&self.poses[pair.target], z);
+            body.jvp(
+                &pair.points,
+                &d,
+                right.slice(sources.start, sources.end),
+                2 * n,
+                dk.slice_mut(faces.start, faces.end),
+            );
+            let fields = body.vjp(&pair.points, left.slice(faces.start, faces.end), 2 * n);
+            let mut readout = vec![0.0; 3 * n * d.len()];
+            let units = unit_twists();
+            let six_fields = match self.readout[pair.target] {
+                Some(_) => body.potential_vjp(&pair.points, &body.readout_rows(&units), 6),
+                None => Vec::new(),
+            };
+            for (j, dj) in d.iter().enumerate() {
+                let s = sources.start + j;
+                for (k, response) in responses.iter().enumerate() {
+                    dkr.data[s * n + k] += dj.dot(&gradient_at(&fields, 2 * n, j, n + k));
+                    dg.data[s * n + k] -= dj.dot(&gradient_at(&fields, 2 * n, j, k));
+                    if six_fields.is_empty() {
+                        continue;
+                    }
+                    let mut field = Vec3::zeros();
+                    for m in 0..6 {
+                        let g = gradient_at(&six_fields, 6, j, m);
+                        field += g * response.twists[pair.target][m];
+                        impulse[pair.target][k][m] += dj.dot(&g) * response.a[s];
+                    }
+                    dg.data[s * n + k] += dj.dot(&field);
+                    let at = 3 * (j * n + k);
+                    readout[at..at + 3].copy_from_slice(field.as_slice());
+                }
+            }
+            kept.push(PairFields {
+                displacement: d,
+                fields,
+                readout,
+            });
+        }
+        let dka = Columns::from_fn(dk.rows, n, |i, k| dk.at(i, k));
+        let dkl = Columns::from_fn(dk.rows, n, |i, k| dk.at(i, n + k));
+        let tangent = self.system.respond_jvp(&dka, &dkl, &dkr, &dg)?;
+
+        let momenta: Vec<DVector<f64>> = (0..n)
+            .map(|k| {
+                let mut h = self.impulse(&tangent.a.column(k), &tangent.mu.column(k));
+                for (b, parts) in impulse.iter().enumerate() {
+                    let mut rows = h.fixed_rows_mut::<6>(6 * b);
+                    rows += 0.5 * parts[k];
+                }
+                h
+            })
+            .collect();
+
+        let mut wrench = vec![Vec6::zeros(); bodies];
+        for (pair, first) in self.pairs.iter().zip(&kept) {
+            let (w, dw) = self.pair_tangent(pair, first, &responses, &left, &tangent);
+            pair.apply_jvp(
+                &self.poses[pair.target],
+                &w,
+                &dw,
+                &z[pair.target],
+                &mut wrench,
+            );
+        }
+        Ok(Tangent {
+            momentum_x: momenta[0].clone(),
+            momentum_y: momenta[n - 1].clone(),
+            wrench,
+        })
+    }
+
+    /// Wrench on the sources of a pair and its tangent, in the target's frame.
+    fn pair_tangent(
+        &self,
+        pair: &super::pairs::Pair,
+        first: &PairFields,
+        responses: &[&Response],
+        left: &Columns,
+        tangent: &super::system::Solved,
+    ) -> (Vec6, Vec6) {
+        let n = responses.len();
+        let body = &self.full.bodies[pair.target];
+        let faces = self.full.faces[pair.target].clone();
+        let d = &first.displacement;
+        let moved: Vec<f64> = faces
+            .clone()
+            .flat_map(|i| {
+                let (mu, r) = (tangent.mu.row(i), tangent.r.row(i));
+                mu.iter().chain(r).copied().collect::<Vec<_>>()
+            })
+            .collect();
+        let dfields = body.vjp(&pair.points, &moved, 2 * n);
+        let bent = body.hvp(&pair.points, d, left.slice(faces.start, faces.end), 2 * n);
+        let twists: Vec<Vec6> = responses.iter().map(|r| r.twists[pair.target]).collect();
+        let bent_readout = body.potential_hvp(&pair.points, d, &body.readout_rows(&twists), n);
+        let at = self.full.sources[pair.source].start;
+        // (x, y, weight) of the symmetrised form.
+        let terms: &[(usize, usize, f64)] = if n == 1 {
+            &[(0, 0, 1.0)]
+        } else {
+            &[(0, 1, 0.5), (1, 0, 0.5)]
+        };
+        let (mut w, mut dw) = (Vec6::zeros(), Vec6::zeros());
+        for (j, s) in pair.positions.iter().enumerate() {
+            let (mut f, mut df) = (Vec3::zeros(), Vec3::zeros());
+            let source = at + j;
+            for &(x, y, weight) in terms {
+                let charge =
+                    gradient_at(&first.readout, n, j, x) - gradient_at(&first.fields, 2 * n, j, x);
+                let residual = gradient_at(&first.fields, 2 * n, j, n + x);
+                let dcharge = gradient_at(&bent_readout, n, j, x)
+                    - gradient_at(&bent, 2 * n, j, x)
+                    - gradient_at(&dfields, 2 * n, j, x);
+                let dresidual =
+                    gradient_at(&bent, 2 * n, j, n + x) + gradient_at(&dfields, 2 * n, j, n + x);
+                let (a, lambda) = (responses[y].a[source], responses[y].lambda[source]);
+                let (da, dlambda) = (tangent.a.at(source, y), tangent.lambda.at(source, y));
+                f += weight * (charge * a + residual * lambda);
+                df +=
+                    weight * (dcharge * a + charge * da + dresidual * lambda + residual * dlambda);
+            }
+            w += six(&f, &s.cross(&f));
+            dw += six(&df, &(d[j].cross(&f) + s.cross(&df)));
+        }
+        (w, dw)
+    }
+}

@@ -1,0 +1,389 @@
+//! The assembled matrix at given poses, and its solves.
+
+use super::pairs::Pair;
+use super::{Full, WetBody};
+use crate::adjoint::kernel::Write;
+use crate::boundary::Method;
+use crate::solver::{Columns, Outcome, cgls, gmres, normal_product, product, transposed_product};
+use crate::{Error, Result};
+use faer::linalg::solvers::Qr;
+use faer::{Mat, MatMut, MatRef};
+use serde::{Deserialize, Serialize};
+use std::sync::Arc;
+
+/// How the coupled system is solved.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "kebab-case")]
+pub enum Solver {
+    /// Conjugate gradients on the normal equations (Eq. 20), preconditioned.
+    #[default]
+    Cgls,
+    /// Dense QR: the reference.
+    Qr,
+    /// GMRES on the square system of face sources (Eq. 18), and on its transpose.
+    Gmres,
+}
+
+/// Right preconditioner of the iterative solvers.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "kebab-case")]
+pub enum Preconditioner {
+    /// Each body's own QR factor, made once.
+    #[default]
+    Factors,
+    /// Column norms.
+    Jacobi,
+    /// None.
+    None,
+}
+
+/// Settings of the coupled solve.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields, default)]
+pub struct SolveSettings {
+    /// The solver.
+    pub solver: Solver,
+    /// Its preconditioner.
+    pub preconditioner: Preconditioner,
+    /// Relative residual at which it stops: ‖R⁻ᵀ(g − KᵀKx)‖ ≤ tolerance ‖R⁻ᵀg‖ for CGLS,
+    /// ‖b − Kx‖ ≤ tolerance ‖b‖ for GMRES.
+    pub tolerance: f64,
+    /// Iterations after which it gives up with an error.
+    pub max_iterations: usize,
+}
+
+impl Default for SolveSettings {
+    fn default() -> Self {
+        Self {
+            solver: Solver::default(),
+            preconditioner: Preconditioner::default(),
+            tolerance: 1e-8,
+            max_iterations: 2000,
+        }
+    }
+}
+
+impl SolveSettings {
+    pub(super) fn validate(&self, bodies: &[Arc<WetBody>]) -> Result<()> {
+        if !(self.tolerance > 0.0 && self.tolerance < 1.0) {
+            return Err(Error::input(
+                "settings: tolerance",
+                self.tolerance,
+                "must lie between 0 and 1, e.g. 1e-8",
+            ));
+        }
+        if self.max_iterations == 0 {
+            return Err(Error::input(
+                "settings: max_iterations",
+                0,
+                "must be at least 1",
+            ));
+        }
+        let square = |b: &Arc<WetBody>| b.boundary.settings.method == Method::MfsFace;
+        if self.solver == Solver::Gmres
+            && let Some(body) = bodies.iter().find(|b| !square(b))
+        {
+            return Err(Error::Unsupported {
+                what: format!("GMRES for body \"{}\"", body.boundary.name),
+                why: "its system isn't square (vertex sources, a row per face)".into(),
+                instead: "use --method mfs-face, or the solver cgls".into(),
+            });
+        }
+        Ok(())
+    }
+}
+
+/// K at given poses with what its solver needs.
+pub(super) struct System<'a> {
+    full: &'a Full,
+    matrix: Vec<f64>,
+    jacobi: Vec<f64>,
+    qr: Option<Qr<f64>>,
+}
+
+/// Solutions a and λ with r and μ.
+pub(super) struct Solved {
+    pub a: Columns,
+    pub lambda: Columns,
+    pub r: Columns,
+    pub mu: Columns,
+    pub iterations: usize,
+    pub residual: f64,
+}
+
+impl<'a> System<'a> {
+    /// Assembles K: own blocks from the bodies, all others from the pairs.
+    pub fn new(full: &'a Full, pairs: &[Pair]) -> Self {
+        let (rows, columns) = (full.rows(), full.columns());
+        let mut matrix = vec![0.0; rows * columns];
+        for (b, body) in full.bodies.iter().enumerate() {
+            let own = &body.boundary.flux_rows;
+            let width = body.sources();
+            for (i, row) in own.chunks_exact(width).enumerate() {
+                let at = (full.faces[b].start + i) * columns + full.sources[b].start;
+                matrix[at..at + width].copy_from_slice(row);
+            }
+        }
+        for pair in pairs {
+            let rows = &full.faces[pair.target];
+            let out = &mut matrix[rows.start * columns..rows.end * columns];
+            let write = if pair.image.is_identity() {
+                Write::Set
+            } else {
+                Write::Add
+            };
+            let column = full.sources[pair.source].start;
+            full.bodies[pair.target].fill(&pair.points, write, out, columns, column);
+        }
+        let mut out = Self {
+            full,
+            matrix,
+            jacobi: Vec::new(),
+            qr: None,
+        };
+        let settings = &full.settings;
+        if settings.solver == Solver::Qr {
+            out.qr = Some(out.dense().to_owned().qr());
+        } else if settings.preconditioner == Preconditioner::Jacobi {
+            let mut norms = vec![0.0; columns];
+            for row in out.matrix.chunks_exact(columns) {
+                for (n, x) in norms.iter_mut().zip(row) {
+                    *n += x * x;
+                }
+            }
+            out.jacobi = norms.iter().map(|n| 1.0 / n.sqrt()).collect();
+        }
+        out
+    }
+
+    fn dense(&self) -> MatRef<'_, f64> {
+        MatRef::from_row_major_slice(&self.matrix, self.full.rows(), self.full.columns())
+    }
+
+    /// K x.
+    pub fn apply(&self, x: &Columns) -> Columns {
+        product(&self.matrix, self.full.rows(), x)
+    }
+
+    /// Kᵀ y.
+    pub fn apply_transpose(&self, y: &Columns) -> Columns {
+        transposed_product(&self.matrix, self.full.columns(), y)
+    }
+
+    /// Applies a body's factor to its rows of `x`.
+    fn per_body(&self, x: &mut Columns, f: impl Fn(&WetBody, MatMut<'_, f64>)) {
+        let n = x.columns;
+        for (body, range) in self.full.bodies.iter().zip(&self.full.sources) {
+            let part = x.slice_mut(range.start, range.end);
+            let part = MatMut::from_row_major_slice_mut(part, range.len(), n);
+            f(body, part);
+        }
+    }
+
+    fn scale(&self, x: &mut Columns) {
+        let n = x.columns;
+        for (row, s) in x.data.chunks_exact_mut(n).zip(&self.jacobi) {
+            row.iter_mut().for_each(|v| *v *= s);
+        }
+    }
+
+    fn precondition(&self, x: &mut Columns) {
+        match self.full.settings.preconditioner {
+            Preconditioner::Factors => self.per_body(x, |b, x| b.boundary.solve_factor(x)),
+            Preconditioner::Jacobi => self.scale(x),
+            Preconditioner::None => {}
+        }
+    }
+
+    fn precondition_transpose(&self, x: &mut Columns) {
+        match self.full.settings.preconditioner {
+            Preconditioner::Factors => {
+                self.per_body(x, |b, x| b.boundary.solve_factor_transpose(x));
+            }
+            Preconditioner::Jacobi => self.scale(x),
+            Preconditioner::None => {}
+        }
+    }
+
+    /// `x ← K_bb⁻¹ x` per body, or its transpose, for square blocks: (R⁻¹R⁻ᵀ) Kᵀ and K (R⁻¹R⁻ᵀ).
+    fn square_precondition(&self, x: &mut Columns, transpose: bool) {
+        match self.full.settings.preconditioner {
+            Preconditioner::Factors => self.per_body(x, |b, mut x| {
+                let own = b.boundary.flux_matrix();
+                let normal = |m: &mut Mat<f64>| {
+                    b.boundary.solve_factor_transpose(m.as_mut());
+                    b.boundary.solve_factor(m.as_mut());
+                };
+                if transpose {
+                    let mut m = x.to_owned();
+                    normal(&mut m);
+                    x.copy_from(own * &m);
+                } else {
+                    let mut m = own.transpose() * x.as_ref();
+                    normal(&mut m);
+                    x.copy_from(&m);
+                }
+            }),
+            Preconditioner::Jacobi => self.scale(x),
+            Preconditioner::None => {}
+        }
+    }
+
+    /// Solves `KᵀK x = g`.
+    pub fn normal_solve(&self, g: &Columns, what: &str) -> Result<Outcome> {
+        let settings = &self.full.settings;
+        if let Some(qr) = &self.qr {
+            let mut x = g.as_mat().to_owned();
+            let r = qr.thin_R();
+            crate::boundary::solve_upper_transpose(r, x.as_mut());
+            crate::boundary::solve_upper(r, x.as_mut());
+            return Ok(Outcome {
+                x: Columns::from_fn(g.rows, g.columns, |i, k| x[(i, k)]),
+                iterations: 0,
+                residual: 0.0,
+            });
+        }
+        let outcome = cgls(
+            |x| normal_product(&self.matrix, self.full.rows(), x),
+            |x| self.precondition(x),
+            |x| self.precondition_transpose(x),
+            g,
+            settings.tolerance,
+            settings.max_iterations,
+        );
+        self.check(outcome, what)
+    }
+
+    fn check(&self, outcome: Outcome, what: &str) -> Result<Outcome> {
+        let settings = &self.full.settings;
+        // The recurrence's residual may stall a little above at round-off.
+        if outcome.residual <= settings.tolerance.max(1e-13) * 1.001 {
+            return Ok(outcome);
+        }
+        Err(Error::Solver {
+            what: format!(
+                "{what} ({} rows, {} unknowns)",
+                self.full.rows(),
+                self.full.columns()
+            ),
+            iterations: outcome.iterations,
+            residual: outcome.residual,
+            tolerance: settings.tolerance,
+            remedy: "raise the tolerance, refine the meshes where bodies are close, or use the \
+                     factors as preconditioner"
+                .into(),
+        })
+    }
+
+    fn square_solve(&self, b: &Columns, transpose: bool, what: &str) -> Result<Outcome> {
+        let settings = &self.full.settings;
+        let outcome = gmres(
+            |x| {
+                if transpose {
+                    self.apply_transpose(x)
+                } else {
+                    self.apply(x)
+                }
+            },
+            |x| self.square_precondition(x, transpose),
+            b,
+            settings.tolerance,
+            settings.max_iterations,
+            100,
+        );
+        self.check(outcome, what)
+    }
+
+    /// Solves for a and λ from `F x̄` and `Pᵀ B x̄`.
+    pub fn respond(&self, f: &Columns, g: &Columns) -> Result<Solved> {
+        if self.full.settings.solver == Solver::Gmres {
+            let a = self.square_solve(f, false, "coupled system (Eq. 18)")?;
+            let mu = self.square_solve(g, true, "transposed coupled system")?;
+            return Ok(Solved {
+                lambda: Columns::zeros(g.rows, g.columns),
+                r: Columns::zeros(f.rows, f.columns),
+                iterations: a.iterations.max(mu.iterations),
+                residual: a.residual.max(mu.residual),
+                a: a.x,
+                mu: mu.x,
+            });
+        }
+        let n = f.columns;
+        let kf = self.apply_transpose(f);
+        let both = join(&kf, g);
+        let solved = self.normal_solve(&both, "coupled system (Eq. 20)")?;
+        let (a, lambda) = split(&solved.x, n);
+        let image = self.apply(&solved.x);
+        let (ka, mu) = split(&image, n);
+        let mut r = f.clone();
+        r.add_scaled(&ka, &vec![-1.0; n]);
+        Ok(Solved {
+            a,
+            lambda,
+            r,
+            mu,
+            iterations: solved.iterations,
+            residual: solved.residual,
+        })
+    }
+
+    /// Tangents of (a, λ, r, μ) from δK a, δK λ (faces) and δKᵀ r, δPᵀB − δKᵀ μ (sources).
+    pub fn respond_jvp(
+        &self,
+        dka: &Columns,
+        dkl: &Columns,
+        dkr: &Columns,
+        dg: &Columns,
+    ) -> Result<Solved> {
+        let n = dka.columns;
+        let minus = vec![-1.0; n];
+        if self.full.settings.solver == Solver::Gmres {
+            let mut right = dka.clone();
+            right.data.iter_mut().for_each(|x| *x = -*x);
+            let a = self.square_solve(&right, false, "tangent of the coupled system (Eq. 21)")?;
+            let mu = self.square_solve(dg, true, "transposed tangent of the coupled system")?;
+            return Ok(Solved {
+                lambda: Columns::zeros(dg.rows, n),
+                r: Columns::zeros(dka.rows, n),
+                iterations: a.iterations.max(mu.iterations),
+                residual: a.residual.max(mu.residual),
+                a: a.x,
+                mu: mu.x,
+            });
+        }
+        let faces = join(dka, dkl);
+        let mut right = join(dkr, dg);
+        right.add_scaled(&self.apply_transpose(&faces), &vec![-1.0; 2 * n]);
+        let solved = self.normal_solve(&right, "tangent of the coupled system (Eq. 21)")?;
+        let image = self.apply(&solved.x);
+        let (kda, kdl) = split(&image, n);
+        let (a, lambda) = split(&solved.x, n);
+        let mut r = dka.clone();
+        r.data.iter_mut().for_each(|x| *x = -*x);
+        r.add_scaled(&kda, &minus);
+        let mut mu = dkl.clone();
+        mu.add_scaled(&kdl, &vec![1.0; n]);
+        Ok(Solved {
+            a,
+            lambda,
+            r,
+            mu,
+            iterations: solved.iterations,
+            residual: solved.residual,
+        })
+    }
+}
+
+fn join(a: &Columns, b: &Columns) -> Columns {
+    let n = a.columns;
+    Columns::from_fn(a.rows, n + b.columns, |i, k| {
+        if k < n { a.at(i, k) } else { b.at(i, k - n) }
+    })
+}
+
+fn split(x: &Columns, n: usize) -> (Columns, Columns) {
+    (
+        Columns::from_fn(x.rows, n, |i, k| x.at(i, k)),
+        Columns::from_fn(x.rows, x.columns - n, |i, k| x.at(i, n + k)),
+    )
+}

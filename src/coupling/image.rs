@@ -1,0 +1,106 @@
+//! Plane rigid walls as mirror images.
+//!
+//! In front of a rigid plane the flow is that of the bodies and their mirror images moving as mirrors
+//! do: every source has an image of the same sign. Mutually perpendicular planes close under
+//! reflection: two need three images, three need seven.
+
+use crate::adjoint::lie::{Mat3, Pose, Vec3, Vec6, angular, linear, six};
+use crate::scene::Wall;
+use crate::{Error, Result};
+
+/// A product of reflections, `x ↦ linear · x + shift`.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Image {
+    /// Symmetric orthogonal matrix.
+    pub linear: Mat3,
+    /// Shift, m.
+    pub shift: Vec3,
+    /// Determinant of `linear`, ±1.
+    pub parity: f64,
+}
+
+impl Image {
+    /// No reflection.
+    pub fn identity() -> Self {
+        Self {
+            linear: Mat3::identity(),
+            shift: Vec3::zeros(),
+            parity: 1.0,
+        }
+    }
+
+    /// All images that `walls` make, the identity first.
+    ///
+    /// # Errors
+    /// Walls that aren't mutually perpendicular.
+    pub fn of_walls(walls: &[Wall]) -> Result<Vec<Self>> {
+        let mut out = vec![Self::identity()];
+        let mut normals: Vec<Vec3> = Vec::new();
+        for (i, wall) in walls.iter().enumerate() {
+            let n = Vec3::from(wall.normal);
+            let length = n.norm();
+            if !(length > 0.0 && length.is_finite()) {
+                return Err(Error::input(
+                    format!("walls[{i}].normal"),
+                    format!("{:?}", wall.normal),
+                    "must be a direction, finite and not zero",
+                ));
+            }
+            let n = n / length;
+            if let Some(k) = normals.iter().position(|m| m.dot(&n).abs() > 1e-9) {
+                return Err(Error::input(
+                    format!("walls[{i}].normal"),
+                    format!("{:?}", wall.normal),
+                    format!(
+                        "must be perpendicular to that of walls[{k}]: images close only for \
+                         mutually perpendicular walls; model others as fixed bodies"
+                    ),
+                ));
+            }
+            normals.push(n);
+            let reflection = Mat3::identity() - 2.0 * n * n.transpose();
+            let shift = 2.0 * n.dot(&Vec3::from(wall.point)) * n;
+            let reflected: Vec<Image> = out
+                .iter()
+                .map(|image| Image {
+                    linear: reflection * image.linear,
+                    shift: reflection * image.shift + shift,
+                    parity: -image.parity,
+                })
+                .collect();
+            out.extend(reflected);
+        }
+        Ok(out)
+    }
+
+    /// Whether this is no reflection.
+    pub fn is_identity(&self) -> bool {
+        self.linear == Mat3::identity()
+    }
+
+    /// Rotation-like part and shift of the image of a body at `pose`: body points to image points.
+    pub fn placement(&self, pose: &Pose) -> (Mat3, Vec3) {
+        (
+            self.linear * pose.rotation,
+            self.linear * pose.translation + self.shift,
+        )
+    }
+
+    /// Spatial twist of the image of a body that moves with the spatial twist `z`.
+    pub fn twist(&self, z: &Vec6) -> Vec6 {
+        let turn = self.parity * (self.linear * angular(z));
+        six(&(self.linear * linear(z) - turn.cross(&self.shift)), &turn)
+    }
+
+    /// Transpose of [`Image::twist`]: the wrench on the body from that on its image.
+    pub fn twist_vjp(&self, wrench: &Vec6) -> Vec6 {
+        let force = linear(wrench);
+        six(
+            &(self.linear.tr_mul(&force)),
+            &(self.parity
+                * self
+                    .linear
+                    .tr_mul(&(angular(wrench) - self.shift.cross(&force)))),
+        )
+    }
+}

@@ -1,0 +1,104 @@
+//! Bodies that don't feel each other: each keeps its own constant added mass (Eq. 12).
+
+use super::{Coupling, Direction, Pullback, Record, Report, Tangent};
+use crate::Result;
+use crate::adjoint::lie::{Mat6, Pose, Vec6};
+use nalgebra::{DMatrix, DVector};
+
+/// The cheapest fidelity: no interaction, no walls.
+#[derive(Clone, Debug)]
+pub struct Isolated {
+    added_mass: Vec<Mat6>,
+}
+
+impl Isolated {
+    /// From each body's own added mass at unit density, body frame, about the body's origin.
+    pub fn new(added_mass: Vec<Mat6>) -> Self {
+        Self { added_mass }
+    }
+}
+
+impl Coupling for Isolated {
+    fn bodies(&self) -> usize {
+        self.added_mass.len()
+    }
+
+    fn unknowns(&self) -> usize {
+        0
+    }
+
+    fn evaluate(
+        &self,
+        _poses: &[Pose],
+        basis: &DMatrix<f64>,
+        _derivative: bool,
+    ) -> Result<Box<dyn Record + '_>> {
+        let mut momenta = DMatrix::zeros(basis.nrows(), basis.ncols());
+        for (b, m) in self.added_mass.iter().enumerate() {
+            momenta
+                .rows_mut(6 * b, 6)
+                .copy_from(&(m * basis.rows(6 * b, 6)));
+        }
+        Ok(Box::new(IsolatedRecord {
+            coupling: self,
+            momenta,
+            report: Report::default(),
+        }))
+    }
+}
+
+struct IsolatedRecord<'a> {
+    coupling: &'a Isolated,
+    momenta: DMatrix<f64>,
+    report: Report,
+}
+
+impl IsolatedRecord<'_> {
+    fn impulse(&self, x: Direction) -> DVector<f64> {
+        match x {
+            Direction::Basis(c) => &self.momenta * c,
+            Direction::Twist(x) => {
+                let mut out = DVector::zeros(x.len());
+                for (b, m) in self.coupling.added_mass.iter().enumerate() {
+                    out.rows_mut(6 * b, 6).copy_from(&(m * x.rows(6 * b, 6)));
+                }
+                out
+            }
+        }
+    }
+}
+
+impl Record for IsolatedRecord<'_> {
+    fn momenta(&self) -> &DMatrix<f64> {
+        &self.momenta
+    }
+
+    fn gradient(&self, _x: &DVector<f64>, _y: &DVector<f64>) -> Vec<Vec6> {
+        vec![Vec6::zeros(); self.coupling.bodies()]
+    }
+
+    fn gradient_along(&self, y: &DVector<f64>, _z: &[Vec6]) -> DVector<f64> {
+        DVector::zeros(y.len())
+    }
+
+    fn vjp(&self, x: Direction, y: Direction) -> Result<Pullback> {
+        Ok(Pullback {
+            momentum_x: self.impulse(x),
+            momentum_y: self.impulse(y),
+            wrench: vec![Vec6::zeros(); self.coupling.bodies()],
+        })
+    }
+
+    fn hvp(&self, _x: Direction, _y: Direction, z: &[Vec6]) -> Result<Tangent> {
+        let zero = DVector::zeros(6 * self.coupling.bodies());
+        Ok(Tangent {
+            momentum_x: zero.clone(),
+            momentum_y: zero,
+            wrench: vec![Vec6::zeros(); z.len()],
+        })
+    }
+
+    fn report(&self) -> &Report {
+        &self.report
+    }
+}

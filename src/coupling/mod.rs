@@ -1,0 +1,121 @@
+//! The fluid's kinetic energy over all bodies, as a function of their poses, with its derivatives.
+//!
+//! Everything is at unit density and in body-frame twists: for bodies with body-frame twists
+//! x̄, ȳ (6 a body, about the body's origin; m/s and rad/s),
+//!
+//! ```text
+//! E(g; x̄, ȳ) = x̄ᵀ M̄_f(g) ȳ          M̄_f symmetric, m³ / m⁴ / m⁵
+//! ```
+//!
+//! and only the bodies' relative placement (and that to the walls) enters g. Displacements of the
+//! poses are spatial twists Z (about the world origin), derivatives with respect to them spatial
+//! wrenches. Velocities come as combinations of a few *basis* columns, so that a solve is
+//! made once per column and every other quantity is a combination.
+//!
+//! The ladder of E: value [`Record::momenta`], vjp [`Record::gradient`] (on the basis) and
+//! [`Record::vjp`] (any pair), jvp and hvp together in [`Record::hvp`].
+
+pub mod full;
+pub mod image;
+mod isolated;
+mod tensor;
+
+pub use isolated::Isolated;
+pub use tensor::PairTensor;
+
+use crate::Result;
+use crate::adjoint::lie::{Pose, Vec6};
+use nalgebra::{DMatrix, DVector};
+use serde::Serialize;
+
+/// A fidelity: a way to get M̄_f and its derivatives from the bodies' poses.
+pub trait Coupling: Send + Sync {
+    /// Number of bodies in the water.
+    fn bodies(&self) -> usize;
+
+    /// Number of unknowns of one solve.
+    fn unknowns(&self) -> usize;
+
+    /// M̄_f applied to the columns of `basis` (6·bodies × k, body-frame twists) at the given
+    /// poses; with `derivative`, also what its derivatives need.
+    ///
+    /// # Errors
+    /// A solve that misses its tolerance, bodies that overlap, or a gap that isn't resolved.
+    fn evaluate(
+        &self,
+        poses: &[Pose],
+        basis: &DMatrix<f64>,
+        derivative: bool,
+    ) -> Result<Box<dyn Record + '_>>;
+}
+
+/// What one evaluation cost and how far to trust it.
+#[derive(Clone, Debug, Default, PartialEq, Serialize)]
+pub struct Report {
+    /// Iterations of the slowest column; 0 for direct solves.
+    pub iterations: usize,
+    /// Largest relative residual of the normal equations reached.
+    pub residual: f64,
+    /// max |M_ij − M_ji| / √(M_ii M_jj) over the basis, before symmetrising.
+    pub asymmetry: f64,
+}
+
+/// A combination of bodies' twists.
+#[derive(Clone, Copy, Debug)]
+pub enum Direction<'a> {
+    /// Coefficients on the basis columns (k).
+    Basis(&'a DVector<f64>),
+    /// Body-frame twists themselves (6·bodies).
+    Twist(&'a DVector<f64>),
+}
+
+/// First derivatives for a pair of directions.
+#[derive(Clone, Debug)]
+pub struct Pullback {
+    /// M̄_f x̄, body-frame impulses (6·bodies): ∂E/∂ȳ.
+    pub momentum_x: DVector<f64>,
+    /// M̄_f ȳ: ∂E/∂x̄.
+    pub momentum_y: DVector<f64>,
+    /// ∇_g E(x̄, ȳ): a spatial wrench on each body.
+    pub wrench: Vec<Vec6>,
+}
+
+/// Second derivatives along one displacement.
+#[derive(Clone, Debug)]
+pub struct Tangent {
+    /// D_g M̄_f[Z] x̄, body-frame impulses (6·bodies).
+    pub momentum_x: DVector<f64>,
+    /// D_g M̄_f[Z] ȳ.
+    pub momentum_y: DVector<f64>,
+    /// Rate of the spatial wrenches ∇_g E(x̄, ȳ) as the bodies are displaced by exp(εZ), at fixed
+    /// body-frame twists. For another displacement Y, D_Y(∇E·Z) = wrench·Y + ∇E·(Z × Y).
+    pub wrench: Vec<Vec6>,
+}
+
+/// One evaluation at given poses; the only key to the derivatives there.
+pub trait Record: Send + Sync {
+    /// M̄_f times the basis: body-frame impulses, 6·bodies × k.
+    fn momenta(&self) -> &DMatrix<f64>;
+
+    /// ∇_g E(x, y) for coefficients on the basis, without a further solve: a spatial wrench on each
+    /// body. Zeros if the evaluation was made without derivative.
+    fn gradient(&self, x: &DVector<f64>, y: &DVector<f64>) -> Vec<Vec6>;
+
+    /// D_g E(e_i, y)[Z] for every basis column e_i, without a further solve.
+    fn gradient_along(&self, y: &DVector<f64>, z: &[Vec6]) -> DVector<f64>;
+
+    /// Impulses of both directions and ∇_g E(x̄, ȳ), for any directions.
+    ///
+    /// # Errors
+    /// A solve that misses its tolerance.
+    fn vjp(&self, x: Direction, y: Direction) -> Result<Pullback>;
+
+    /// The tangent along the displacement Z (one spatial twist a body).
+    ///
+    /// # Errors
+    /// A solve that misses its tolerance.
+    fn hvp(&self, x: Direction, y: Direction, z: &[Vec6]) -> Result<Tangent>;
+
+    /// What it cost.
+    fn report(&self) -> &Report;
+}

@@ -1,0 +1,200 @@
+//! The velocity form of the equations of motion (Eq. 2–3) and its transpose.
+//!
+//! With v̇ = 0 the momentum of body b would change at the rate
+//! `V ×* h_r + M_r C` (rigid) and `V ×* h_f + D_g M_f[V] V' + M_f (C − U × V)` (fluid), where
+//! V' = V − U is the velocity through the water and C the bias of [`crate::multibody`]. What the
+//! balance ḣ = ½∂E/∂g + U ×* h_f + external leaves over accelerates:
+//!
+//! ```text
+//! M v̇ = Sᵀ { external + ρ(F + U ×* h_f) − V ×* h − ρ D_gM_f[V] V' − M_r C − ρ M_f (C − U×V) } + τ
+//! ```
+
+use super::force::rigid_parameters_vjp;
+use super::{Evaluation, ForceCotangents};
+use crate::Result;
+use crate::adjoint::lie::{Vec6, cross_force, cross_motion};
+use crate::coupling::Direction;
+use crate::multibody::{Cotangents, Fields, Virtual};
+use nalgebra::DVector;
+
+impl Evaluation<'_> {
+    /// M(q) v̇: the right-hand side of Eq. 3 with all forces, user coordinates.
+    pub fn inertial_force(&self, v: &DVector<f64>, control: &DVector<f64>) -> DVector<f64> {
+        let tree = &self.system.tree;
+        let rho = self.parameters.density;
+        let zero = DVector::zeros(v.len());
+        let fields = tree.fields(&self.kinematics, &self.q, v, Virtual::User(&zero));
+        let direction = self.through_water(v);
+        let fluid = self.fluid_momenta(&direction);
+        let pose_force = self.pose_force(&direction);
+        let fluid_bias = self.fluid_bias(&fields);
+        let mut out = DVector::zeros(v.len());
+        let mut wrenches = Vec::with_capacity(fluid.len());
+        for (b, twist) in fields.twist.iter().enumerate() {
+            let rigid = cross_force(twist, &self.rigid_momentum(b, twist))
+                + self.rigid_momentum(b, &fields.bias[b]);
+            let relative = self.relative(twist);
+            let water = pose_force[b] - cross_force(&relative, &fluid[b]);
+            wrenches.push(self.external(b, twist, control) - rigid + rho * water);
+            out -= rho * self.fluid_columns(b).tr_mul(&fluid_bias[b]);
+        }
+        if let Some(f) = &self.fluid {
+            let along = f.gradient_along(&direction, &self.wet_field(&fields.twist));
+            out -= rho * along.rows(0, v.len());
+        }
+        out + tree.project(&self.kinematics, wrenches) + self.system.joint_forces(control)
+    }
+
+    /// C − U × V of every wet body, zero for dry ones.
+    fn fluid_bias(&self, fields: &Fields) -> Vec<Vec6> {
+        let current = self.current_twist();
+        let of = |b: usize| fields.bias[b] - cross_motion(&current, &fields.twist[b]);
+        (0..self.system.len())
+            .map(|b| {
+                if self.system.bodies[b].wet.is_some() {
+                    of(b)
+                } else {
+                    Vec6::zeros()
+                }
+            })
+            .collect()
+    }
+
+    /// Transpose of [`Evaluation::inertial_force`]: the gradient of its product with `w`.
+    ///
+    /// # Errors
+    /// A solve of the coupling that misses its tolerance.
+    pub fn inertial_force_vjp(
+        &self,
+        v: &DVector<f64>,
+        control: &DVector<f64>,
+        w: &DVector<f64>,
+    ) -> Result<ForceCotangents> {
+        let tree = &self.system.tree;
+        let mut out = ForceCotangents::zeros(self);
+        let fields = tree.fields(&self.kinematics, &self.q, v, Virtual::User(w));
+        let mut bar = Cotangents::zeros(self.system.len());
+        for b in 0..self.system.len() {
+            let (twist, virt, bias) = (&fields.twist[b], &fields.virtual_twist[b], &fields.bias[b]);
+            // (V × W) · h_r − W · M_r C.
+            let carried = cross_motion(twist, virt);
+            let (h, h_carried) = (
+                self.rigid_momentum(b, twist),
+                self.rigid_momentum(b, &carried),
+            );
+            let (h_virt, h_bias) = (self.rigid_momentum(b, virt), self.rigid_momentum(b, bias));
+            bar.twist[b] += h_carried + cross_force(virt, &h);
+            bar.virtual_twist[b] -= cross_force(twist, &h) + h_bias;
+            bar.bias[b] -= h_virt;
+            bar.pose[b] -= cross_force(twist, &h_carried) + cross_force(&carried, &h);
+            bar.pose[b] += cross_force(bias, &h_virt) + cross_force(virt, &h_bias);
+            rigid_parameters_vjp(self, b, &carried, twist, &mut out.parameters);
+            rigid_parameters_vjp(self, b, &-virt, bias, &mut out.parameters);
+            // W · external.
+            bar.virtual_twist[b] += self.external(b, twist, control);
+            let e = self.external_vjp(
+                b,
+                twist,
+                control,
+                virt,
+                &mut out.control,
+                &mut out.parameters,
+            );
+            bar.pose[b] += e.pose;
+            bar.twist[b] += e.twist;
+        }
+        self.fluid_inertial_vjp(v, w, &fields, &mut bar, &mut out)?;
+        let (q_bar, v_bar) = tree.reverse(&self.kinematics, v, Virtual::User(w), &fields, bar);
+        out.q += q_bar;
+        out.v += v_bar;
+        self.system.joint_forces_vjp(w, &mut out.control);
+        Ok(out)
+    }
+
+    /// The fluid's part: gradient of
+    /// `ρ { E(V'×W, V') − E(W, C') + ½ D E(v,v)[W] − D E(w,v)[V] }`, C' = C − U × V.
+    fn fluid_inertial_vjp(
+        &self,
+        v: &DVector<f64>,
+        w: &DVector<f64>,
+        fields: &Fields,
+        bar: &mut Cotangents,
+        out: &mut ForceCotangents,
+    ) -> Result<()> {
+        let Some(fluid) = &self.fluid else {
+            return Ok(());
+        };
+        let rho = self.parameters.density;
+        let n = self.system.len();
+        let (direction, virtual_direction) = (self.through_water(v), self.virtual_direction(w));
+        let (water, virt) = (
+            Direction::Basis(&direction),
+            Direction::Basis(&virtual_direction),
+        );
+        let momenta = self.fluid_momenta(&direction);
+        let momenta_virtual = self.fluid_momenta(&virtual_direction);
+        let pose_force = self.pose_force(&direction);
+        let current = self.current_twist();
+        let relative: Vec<Vec6> = fields.twist.iter().map(|t| self.relative(t)).collect();
+        let carried: Vec<Vec6> = (0..n)
+            .map(|b| cross_motion(&relative[b], &fields.virtual_twist[b]))
+            .collect();
+        let bias = self.fluid_bias(fields);
+        let zero = vec![Vec6::zeros(); n];
+        let respond = |field: &[Vec6], other| -> Result<(Vec<Vec6>, Vec<Vec6>)> {
+            let wet = self.wet_twists(field);
+            if wet.iter().all(|x| *x == 0.0) {
+                return Ok((zero.clone(), zero.clone()));
+            }
+            let pullback = fluid.vjp(Direction::Twist(&wet), other)?;
+            Ok((
+                self.wet_impulses(&pullback.momentum_x),
+                self.from_wet(&pullback.wrench),
+            ))
+        };
+        let (momenta_carried, pair_carried) = respond(&carried, water)?;
+        let (momenta_bias, pair_bias) = respond(&bias, virt)?;
+        let along_virtual = fluid.hvp(water, water, &self.wet_field(&fields.virtual_twist))?;
+        let along_twist = fluid.hvp(virt, water, &self.wet_field(&fields.twist))?;
+        let impulse_virtual = self.wet_impulses(&along_virtual.momentum_x);
+        let wrench_virtual = self.from_wet(&along_virtual.wrench);
+        let impulse_w = self.wet_impulses(&along_twist.momentum_x);
+        let impulse_v = self.wet_impulses(&along_twist.momentum_y);
+        let wrench_twist = self.from_wet(&along_twist.wrench);
+        let pair = self.from_wet(&fluid.gradient(&virtual_direction, &direction));
+        for b in 0..n {
+            if self.system.bodies[b].wet.is_none() {
+                continue;
+            }
+            let (v_rel, w_b, twist) = (&relative[b], &fields.virtual_twist[b], &fields.twist[b]);
+            let h = &momenta[b];
+            out.parameters.density += carried[b].dot(h) - w_b.dot(&momenta_bias[b])
+                + w_b.dot(&pose_force[b])
+                - twist.dot(&pair[b]);
+            bar.twist[b] += rho
+                * (momenta_carried[b] + cross_force(w_b, h)
+                    - cross_force(&current, &momenta_virtual[b])
+                    + impulse_virtual[b]
+                    - impulse_w[b]
+                    - pair[b]);
+            bar.virtual_twist[b] +=
+                rho * (pose_force[b] - cross_force(v_rel, h) - momenta_bias[b] - impulse_v[b]);
+            bar.bias[b] -= rho * momenta_virtual[b];
+            bar.pose[b] += rho
+                * (pair_carried[b]
+                    - cross_force(v_rel, &momenta_carried[b])
+                    - cross_force(&carried[b], h)
+                    - pair_bias[b]
+                    + cross_force(&bias[b], &momenta_virtual[b])
+                    + cross_force(w_b, &momenta_bias[b])
+                    + 0.5 * wrench_virtual[b]
+                    - cross_force(w_b, &pose_force[b])
+                    - cross_force(v_rel, &impulse_virtual[b])
+                    - wrench_twist[b]
+                    + cross_force(twist, &pair[b])
+                    + cross_force(v_rel, &impulse_w[b])
+                    + cross_force(w_b, &impulse_v[b]));
+        }
+        Ok(())
+    }
+}

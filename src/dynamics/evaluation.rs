@@ -1,0 +1,248 @@
+//! Everything that depends on the configuration alone: kinematics, momenta per unit velocity, mass matrix.
+
+use super::{Parameters, System};
+use crate::adjoint::lie::{Mat6, Vec3, Vec6, six};
+use crate::adjoint::rigid;
+use crate::coupling::{Record, Report};
+use crate::multibody::Kinematics;
+use crate::{Error, Result};
+use nalgebra::{DMatrix, DVector};
+
+/// The system at one configuration.
+pub struct Evaluation<'a> {
+    /// The system.
+    pub system: &'a System,
+    /// Its parameters.
+    pub parameters: &'a Parameters,
+    /// The configuration.
+    pub q: DVector<f64>,
+    /// Poses and joint columns.
+    pub kinematics: Kinematics,
+    /// Rigid inertias, body frames.
+    pub rigid: Vec<Mat6>,
+    /// The fluid at unit density, if there is any.
+    pub fluid: Option<Box<dyn Record + 'a>>,
+    /// Spatial fluid momentum of each body at unit density per basis column (6 × k each).
+    fluid_momenta: Vec<DMatrix<f64>>,
+    /// M(q) = M_r + Jᵀ M_f J, user coordinates.
+    pub mass_matrix: DMatrix<f64>,
+    /// Generalised momentum at v = 0, from the current.
+    pub rest_momentum: DVector<f64>,
+}
+
+impl System {
+    /// Evaluates the system at `q`. With `reverse`, the fluid's record is made even at zero density, because the gradient with respect to density needs it.
+    ///
+    /// # Errors
+    /// Whatever the coupling reports, or a configuration that isn't finite.
+    pub fn evaluate<'a>(
+        &'a self,
+        parameters: &'a Parameters,
+        q: &DVector<f64>,
+        derivative: bool,
+        reverse: bool,
+    ) -> Result<Evaluation<'a>> {
+        if let Some(bad) = q.iter().position(|x| !x.is_finite()) {
+            return Err(Error::input(
+                format!("coordinate q[{bad}]"),
+                q[bad],
+                "coordinates must be finite: the step is too long or a force too large",
+            ));
+        }
+        let kinematics = self.tree.kinematics(q);
+        let rigid: Vec<Mat6> = (0..self.len())
+            .map(|b| {
+                rigid::spatial_inertia(
+                    parameters.mass[b],
+                    &self.bodies[b].center_of_mass,
+                    &parameters.inertia[b],
+                )
+            })
+            .collect();
+        let jacobian = self.tree.jacobian(&kinematics);
+        let nv = self.tree.velocities();
+        let columns = nv + usize::from(self.has_current());
+        let mut fluid = None;
+        let mut fluid_momenta = vec![DMatrix::zeros(6, columns); self.len()];
+        if (parameters.density > 0.0 || reverse) && self.coupling.bodies() > 0 {
+            let mut basis = DMatrix::zeros(6 * self.coupling.bodies(), columns);
+            let mut poses = Vec::with_capacity(self.coupling.bodies());
+            let rest = six(&-self.current, &Vec3::zeros());
+            for (b, body) in self.bodies.iter().enumerate() {
+                let Some(w) = body.wet else { continue };
+                let pose = &kinematics.poses[b];
+                poses.push(*pose);
+                for k in 0..columns {
+                    let world = if k < nv {
+                        jacobian.fixed_view::<6, 1>(6 * b, k).into_owned()
+                    } else {
+                        rest
+                    };
+                    basis
+                        .fixed_view_mut::<6, 1>(6 * w, k)
+                        .copy_from(&pose.twist_to_body(&world));
+                }
+            }
+            let record = self.coupling.evaluate(&poses, &basis, derivative)?;
+            for (b, body) in self.bodies.iter().enumerate() {
+                let Some(w) = body.wet else { continue };
+                for k in 0..columns {
+                    let h = record.momenta().fixed_view::<6, 1>(6 * w, k).into_owned();
+                    fluid_momenta[b].set_column(k, &kinematics.poses[b].wrench_to_world(&h));
+                }
+            }
+            fluid = Some(record);
+        }
+        let mut mass_matrix = DMatrix::zeros(nv, nv);
+        let mut rest_momentum = DVector::zeros(nv);
+        for b in 0..self.len() {
+            let j = jacobian.rows(6 * b, 6);
+            let mut momenta = parameters.density * fluid_momenta[b].columns(0, nv).into_owned();
+            let pose = &kinematics.poses[b];
+            for k in 0..nv {
+                let twist = pose.twist_to_body(&j.column(k).fixed_rows::<6>(0).into_owned());
+                if twist != Vec6::zeros() {
+                    let mut c = momenta.column_mut(k);
+                    c += pose.wrench_to_world(&(rigid[b] * twist));
+                }
+            }
+            mass_matrix += j.tr_mul(&momenta);
+            if columns > nv {
+                rest_momentum += parameters.density * j.tr_mul(&fluid_momenta[b].column(nv));
+            }
+        }
+        let mass_matrix = 0.5 * (&mass_matrix + mass_matrix.transpose());
+        Ok(Evaluation {
+            system: self,
+            parameters,
+            q: q.clone(),
+            kinematics,
+            rigid,
+            fluid,
+            fluid_momenta,
+            mass_matrix,
+            rest_momentum,
+        })
+    }
+}
+
+impl<'a> Evaluation<'a> {
+    /// Coefficients on the fluid's basis of the velocity `v` through the water.
+    pub fn through_water(&self, v: &DVector<f64>) -> DVector<f64> {
+        self.extended(v, 1.0)
+    }
+
+    /// Coefficients of a virtual velocity: the current doesn't take part.
+    pub fn virtual_direction(&self, z: &DVector<f64>) -> DVector<f64> {
+        self.extended(z, 0.0)
+    }
+
+    fn extended(&self, v: &DVector<f64>, last: f64) -> DVector<f64> {
+        if self.system.has_current() {
+            v.push(last)
+        } else {
+            v.clone()
+        }
+    }
+
+    /// Twist of body `b` through the water, from its twist in the world.
+    pub fn relative(&self, twist: &Vec6) -> Vec6 {
+        twist - six(&self.system.current, &Vec3::zeros())
+    }
+
+    /// Spatial fluid momenta of the bodies at unit density for coefficients on the basis.
+    pub fn fluid_momenta(&self, direction: &DVector<f64>) -> Vec<Vec6> {
+        self.fluid_momenta
+            .iter()
+            .map(|m| (m * direction).fixed_rows::<6>(0).into_owned())
+            .collect()
+    }
+
+    /// Spatial fluid momenta of body `b` at unit density per generalised velocity (6 × nv).
+    pub(super) fn fluid_columns(&self, b: usize) -> DMatrix<f64> {
+        let nv = self.system.tree.velocities();
+        self.fluid_momenta[b].columns(0, nv).into_owned()
+    }
+
+    /// Spatial rigid momentum of body `b` moving with the spatial twist `v`.
+    pub fn rigid_momentum(&self, b: usize, v: &Vec6) -> Vec6 {
+        let pose = &self.kinematics.poses[b];
+        pose.wrench_to_world(&(self.rigid[b] * pose.twist_to_body(v)))
+    }
+
+    /// Spatial six-vectors of the wet bodies, in each body's frame as twists, stacked.
+    pub fn wet_twists(&self, field: &[Vec6]) -> DVector<f64> {
+        let mut out = DVector::zeros(6 * self.system.coupling.bodies());
+        for (b, body) in self.system.bodies.iter().enumerate() {
+            if let Some(w) = body.wet {
+                out.fixed_rows_mut::<6>(6 * w)
+                    .copy_from(&self.kinematics.poses[b].twist_to_body(&field[b]));
+            }
+        }
+        out
+    }
+
+    /// A field of the wet bodies.
+    pub fn wet_field(&self, field: &[Vec6]) -> Vec<Vec6> {
+        let wet = self.system.bodies.iter().zip(field);
+        wet.filter_map(|(body, f)| body.wet.map(|_| *f)).collect()
+    }
+
+    /// The wet bodies' field on all bodies, zero elsewhere.
+    pub fn from_wet(&self, field: &[Vec6]) -> Vec<Vec6> {
+        let of = |w: Option<usize>| w.map_or(Vec6::zeros(), |w| field[w]);
+        self.system.bodies.iter().map(|b| of(b.wet)).collect()
+    }
+
+    /// Body-frame impulses of the wet bodies (stacked) as spatial momenta of all bodies.
+    pub fn wet_impulses(&self, impulses: &DVector<f64>) -> Vec<Vec6> {
+        let mut out = vec![Vec6::zeros(); self.system.len()];
+        for (b, body) in self.system.bodies.iter().enumerate() {
+            if let Some(w) = body.wet {
+                let h = impulses.fixed_rows::<6>(6 * w).into_owned();
+                out[b] = self.kinematics.poses[b].wrench_to_world(&h);
+            }
+        }
+        out
+    }
+
+    /// Total spatial momenta of the bodies, rigid and fluid, at velocity `v`.
+    pub fn momenta(&self, v: &DVector<f64>) -> Vec<Vec6> {
+        let twists = self.system.tree.twists(&self.kinematics, v);
+        let fluid = self.fluid_momenta(&self.through_water(v));
+        (0..self.system.len())
+            .map(|b| self.rigid_momentum(b, &twists[b]) + self.parameters.density * fluid[b])
+            .collect()
+    }
+
+    /// Kinetic energy of bodies and fluid, J; the fluid's in the frame that moves with the current.
+    pub fn kinetic_energy(&self, v: &DVector<f64>) -> f64 {
+        let twists = self.system.tree.twists(&self.kinematics, v);
+        let fluid = self.fluid_momenta(&self.through_water(v));
+        let mut twice = 0.0;
+        for (b, twist) in twists.iter().enumerate() {
+            twice += twist.dot(&self.rigid_momentum(b, twist));
+            twice += self.parameters.density * self.relative(twist).dot(&fluid[b]);
+        }
+        0.5 * twice
+    }
+
+    /// Potential energy of gravity on dry mass and buoyancy on displaced volume, J.
+    pub fn potential_energy(&self) -> f64 {
+        let mut out = 0.0;
+        for (b, body) in self.system.bodies.iter().enumerate() {
+            let pose = &self.kinematics.poses[b];
+            let mass = self.parameters.mass[b] * pose.apply(&body.center_of_mass);
+            let water = self.parameters.density * body.volume * pose.apply(&body.centroid);
+            out -= self.system.gravity.dot(&(mass - water));
+        }
+        out
+    }
+
+    /// What the coupling reports.
+    pub fn report(&self) -> Report {
+        self.fluid
+            .as_ref()
+            .map_or_else(Report::default, |f| f.report().clone())
+    }
+}

@@ -1,0 +1,298 @@
+//! The rate of the frame momenta, p̂˙ = f(q, v, u), with its tangent in v and its transpose.
+//!
+//! Per body, with spatial momentum h_b = h_r + h_f (rigid and fluid), current U and the fluid's pose
+//! force F_b = ½ ∂E(v, v)/∂g_b, the balance is ḣ_b = F_b + (U,0) ×* h_f + external; projected on
+//! the frame columns, which turn with their parent's twist,
+//!
+//! ```text
+//! f_i = Ŝ_iᵀ Ḣ_i + (V_parent × Ŝ_i)ᵀ H_i + (X⁻ᵀ τ)_i          H, Ḣ: sums over the subtree
+//! ẑᵀ f = Σ_b Z_b · ḣ_b + D_b · h_b + ẑᵀ X⁻ᵀ τ
+//! ```
+//!
+//! For a joint to the world the second term vanishes, and with no external force the sum of momenta is
+//! kept to round-off by any integrator that is linear in f.
+
+use super::{Evaluation, Parameters};
+use crate::Result;
+use crate::adjoint::lie::{Vec6, cross_force, cross_motion, six};
+use crate::adjoint::rigid;
+use crate::coupling::Direction;
+use crate::multibody::{Cotangents, Virtual};
+use nalgebra::{DMatrix, DVector, Matrix6};
+
+/// Cotangents of configuration, velocity, control and parameters.
+#[derive(Clone, Debug)]
+pub struct ForceCotangents {
+    /// Tangent cotangent of q.
+    pub q: DVector<f64>,
+    /// Cotangent of v.
+    pub v: DVector<f64>,
+    /// Cotangent of the controls.
+    pub control: DVector<f64>,
+    /// Cotangents of the parameters.
+    pub parameters: Parameters,
+}
+
+impl ForceCotangents {
+    /// All zero.
+    pub fn zeros(e: &Evaluation) -> Self {
+        let nv = e.system.tree.velocities();
+        Self {
+            q: DVector::zeros(nv),
+            v: DVector::zeros(nv),
+            control: DVector::zeros(e.system.controls),
+            parameters: Parameters::zeros(e.system.len()),
+        }
+    }
+
+    /// Adds `scale` times another set, except for v.
+    pub fn add_scaled(&mut self, scale: f64, other: &Self) {
+        self.q += scale * &other.q;
+        self.v += scale * &other.v;
+        self.control += scale * &other.control;
+        let values: Vec<f64> = other
+            .parameters
+            .to_vec()
+            .iter()
+            .map(|x| scale * x)
+            .collect();
+        if let Some(scaled) = other.parameters.with_values(&values) {
+            self.parameters.add(&scaled);
+        }
+    }
+}
+
+/// Adds the cotangent of mass and inertia of body `b` for a term `x̄ᵀ M̄_r ȳ` (body-frame twists).
+pub(super) fn rigid_parameters_vjp(
+    e: &Evaluation,
+    b: usize,
+    x: &Vec6,
+    y: &Vec6,
+    bar: &mut Parameters,
+) {
+    let pose = &e.kinematics.poses[b];
+    let outer: Matrix6<f64> = pose.twist_to_body(x) * pose.twist_to_body(y).transpose();
+    let (mass, inertia) = rigid::spatial_inertia_vjp(&e.system.bodies[b].center_of_mass, &outer);
+    bar.mass[b] += mass;
+    for (total, part) in bar.inertia[b].iter_mut().zip(inertia) {
+        *total += part;
+    }
+}
+
+impl Evaluation<'_> {
+    /// The current as a spatial twist.
+    pub(super) fn current_twist(&self) -> Vec6 {
+        six(&self.system.current, &nalgebra::Vector3::zeros())
+    }
+
+    /// Fluid pose forces `½ ∂E(v, v)/∂g` on all bodies at unit density.
+    pub(super) fn pose_force(&self, direction: &DVector<f64>) -> Vec<Vec6> {
+        match &self.fluid {
+            Some(fluid) => {
+                let g = fluid.gradient(direction, direction);
+                self.from_wet(&g.iter().map(|w| 0.5 * w).collect::<Vec<_>>())
+            }
+            None => vec![Vec6::zeros(); self.system.len()],
+        }
+    }
+
+    /// Joint forces in frame coordinates, X⁻ᵀ τ.
+    pub(super) fn frame_joint_forces(&self, control: &DVector<f64>) -> DVector<f64> {
+        let tau = self.system.joint_forces(control);
+        self.system
+            .tree
+            .per_joint(&self.q, &tau, |j, q, p| j.frame_momentum(q, p))
+    }
+
+    /// f(q, v, u).
+    pub fn force(&self, v: &DVector<f64>, control: &DVector<f64>) -> DVector<f64> {
+        let tree = &self.system.tree;
+        let rho = self.parameters.density;
+        let twists = tree.twists(&self.kinematics, v);
+        let direction = self.through_water(v);
+        let fluid = self.fluid_momenta(&direction);
+        let pose_force = self.pose_force(&direction);
+        let current = self.current_twist();
+        let mut momenta = Vec::with_capacity(twists.len());
+        let mut rates = Vec::with_capacity(twists.len());
+        for (b, twist) in twists.iter().enumerate() {
+            momenta.push(self.rigid_momentum(b, twist) + rho * fluid[b]);
+            rates.push(
+                self.external(b, twist, control)
+                    + rho * (pose_force[b] + cross_force(&current, &fluid[b])),
+            );
+        }
+        self.project_frame(&twists, momenta, rates) + self.frame_joint_forces(control)
+    }
+
+    /// Projects momenta and their rates on the turning frame columns.
+    fn project_frame(&self, twists: &[Vec6], momenta: Vec<Vec6>, rates: Vec<Vec6>) -> DVector<f64> {
+        let tree = &self.system.tree;
+        let (momenta, rates) = (tree.composite(momenta), tree.composite(rates));
+        let mut out = DVector::zeros(tree.velocities());
+        for (b, link) in tree.links().iter().enumerate() {
+            let carried = link
+                .parent
+                .map_or(Vec6::zeros(), |p| cross_force(&twists[p], &momenta[b]));
+            for k in link.v.clone() {
+                out[k] = self.kinematics.frame_columns[k].dot(&(rates[b] - carried));
+            }
+        }
+        out
+    }
+
+    /// Tangent of [`Evaluation::force`] along `dv` at fixed q and u.
+    pub fn force_jvp(&self, v: &DVector<f64>, dv: &DVector<f64>) -> DVector<f64> {
+        let tree = &self.system.tree;
+        let rho = self.parameters.density;
+        let twists = tree.twists(&self.kinematics, v);
+        let dtwists = tree.twists(&self.kinematics, dv);
+        let direction = self.through_water(v);
+        let ddirection = self.virtual_direction(dv);
+        let fluid = self.fluid_momenta(&direction);
+        let dfluid = self.fluid_momenta(&ddirection);
+        let dpose_force = match &self.fluid {
+            Some(f) => self.from_wet(&f.gradient(&direction, &ddirection)),
+            None => vec![Vec6::zeros(); self.system.len()],
+        };
+        let current = self.current_twist();
+        let (mut momenta, mut dmomenta, mut drates) = (vec![], vec![], vec![]);
+        for (b, dtwist) in dtwists.iter().enumerate() {
+            momenta.push(self.rigid_momentum(b, &twists[b]) + rho * fluid[b]);
+            dmomenta.push(self.rigid_momentum(b, dtwist) + rho * dfluid[b]);
+            drates.push(
+                self.external_jvp(b, &twists[b], dtwist)
+                    + rho * (dpose_force[b] + cross_force(&current, &dfluid[b])),
+            );
+        }
+        self.project_frame(&twists, dmomenta, drates)
+            + self.project_frame(&dtwists, momenta, vec![Vec6::zeros(); twists.len()])
+    }
+
+    /// ∂f/∂v, column by column.
+    pub fn force_velocity_jacobian(&self, v: &DVector<f64>) -> DMatrix<f64> {
+        let n = v.len();
+        let mut out = DMatrix::zeros(n, n);
+        for k in 0..n {
+            let mut unit = DVector::zeros(n);
+            unit[k] = 1.0;
+            out.set_column(k, &self.force_jvp(v, &unit));
+        }
+        out
+    }
+
+    /// Transpose of [`Evaluation::force`] in all its arguments: the gradient of `ẑᵀ f(q, v, u)`.
+    ///
+    /// # Errors
+    /// A solve of the coupling that misses its tolerance.
+    pub fn force_vjp(
+        &self,
+        v: &DVector<f64>,
+        control: &DVector<f64>,
+        z: &DVector<f64>,
+    ) -> Result<ForceCotangents> {
+        let tree = &self.system.tree;
+        let rho = self.parameters.density;
+        let mut out = ForceCotangents::zeros(self);
+        let fields = tree.fields(&self.kinematics, &self.q, v, Virtual::Frame(z));
+        let mut bar = Cotangents::zeros(self.system.len());
+
+        for b in 0..self.system.len() {
+            let (twist, virt, turning) = (
+                &fields.twist[b],
+                &fields.virtual_twist[b],
+                &fields.turning[b],
+            );
+            // D · h_r, with the rigid momentum h_r = I V constant in the body's frame.
+            let (h, h_turning) = (
+                self.rigid_momentum(b, twist),
+                self.rigid_momentum(b, turning),
+            );
+            bar.turning[b] += h;
+            bar.twist[b] += h_turning;
+            bar.pose[b] -= cross_force(twist, &h_turning) + cross_force(turning, &h);
+            rigid_parameters_vjp(self, b, turning, twist, &mut out.parameters);
+            // Z · external.
+            let external = self.external(b, twist, control);
+            bar.virtual_twist[b] += external;
+            let e = self.external_vjp(
+                b,
+                twist,
+                control,
+                virt,
+                &mut out.control,
+                &mut out.parameters,
+            );
+            bar.pose[b] += e.pose;
+            bar.twist[b] += e.twist;
+        }
+        if let Some(fluid) = &self.fluid {
+            let direction = self.through_water(v);
+            let water = Direction::Basis(&direction);
+            let momenta = self.fluid_momenta(&direction);
+            let pose_force = self.pose_force(&direction);
+            let current = self.current_twist();
+            let n = self.system.len();
+            // (D − U × Z) · h_f: one bilinear form with the direction D' = D − U × Z.
+            let carried: Vec<Vec6> = (0..n)
+                .map(|b| fields.turning[b] - cross_motion(&current, &fields.virtual_twist[b]))
+                .collect();
+            let wet_carried = self.wet_twists(&carried);
+            let (momenta_carried, pair) = if wet_carried.iter().any(|x| *x != 0.0) {
+                let carried = Direction::Twist(&wet_carried);
+                let pullback = fluid.vjp(carried, water)?;
+                (
+                    self.wet_impulses(&pullback.momentum_x),
+                    self.from_wet(&pullback.wrench),
+                )
+            } else {
+                (vec![Vec6::zeros(); n], vec![Vec6::zeros(); n])
+            };
+            // ½ D_g E(v, v)[Z].
+            let tangent = fluid.hvp(water, water, &self.wet_field(&fields.virtual_twist))?;
+            let impulse = self.wet_impulses(&tangent.momentum_x);
+            let wrench = self.from_wet(&tangent.wrench);
+            for b in 0..n {
+                if self.system.bodies[b].wet.is_none() {
+                    continue;
+                }
+                let relative = self.relative(&fields.twist[b]);
+                let virt = &fields.virtual_twist[b];
+                let rate = pose_force[b] + cross_force(&current, &momenta[b]);
+                out.parameters.density += fields.turning[b].dot(&momenta[b]) + virt.dot(&rate);
+                bar.turning[b] += rho * momenta[b];
+                bar.virtual_twist[b] += rho * rate;
+                bar.twist[b] += rho * (momenta_carried[b] + impulse[b]);
+                bar.pose[b] += rho
+                    * (pair[b] + 0.5 * wrench[b]
+                        - cross_force(&relative, &(momenta_carried[b] + impulse[b]))
+                        - cross_force(&carried[b], &momenta[b])
+                        - cross_force(virt, &pose_force[b]));
+            }
+        }
+        let (q_bar, v_bar) = tree.reverse(&self.kinematics, v, Virtual::Frame(z), &fields, bar);
+        out.q += q_bar;
+        out.v += v_bar;
+        // ẑᵀ X(q)⁻ᵀ τ.
+        let tau_frame = self.frame_joint_forces(control);
+        let tau_bar = tree.per_joint(&self.q, z, |j, q, z| j.frame_velocity_inverse(q, z));
+        self.system.joint_forces_vjp(&tau_bar, &mut out.control);
+        out.q -= self.frame_velocity_vjp(&tau_bar, &tau_frame);
+        Ok(out)
+    }
+
+    /// Gradient over q of `p̂ᵀ X(q) v`, joint by joint.
+    pub(super) fn frame_velocity_vjp(&self, v: &DVector<f64>, hat: &DVector<f64>) -> DVector<f64> {
+        let mut out = DVector::zeros(v.len());
+        for l in self.system.tree.links() {
+            let r = l.v.clone();
+            let part = l
+                .joint
+                .frame_velocity_vjp(&v.as_slice()[r.clone()], &hat.as_slice()[r.clone()]);
+            for (k, x) in r.zip(part) {
+                out[k] = x;
+            }
+        }
+        out
+    }
+}

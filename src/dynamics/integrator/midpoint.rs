@@ -1,0 +1,154 @@
+//! Implicit midpoint in (q, p̂): second order and symmetric in time.
+//!
+//! q_m = q ⊕ ½Δt v, M(q_m) v + p_rest = Xᵀ(q_m) (p̂ + ½Δt f(q_m, v, u)), q⁺ = q ⊕ Δt v,
+//! p̂⁺ = p̂ + Δt f. The velocity is found by Newton at fixed q_m (cheap) inside a fixed point in
+//! q_m (one evaluation each); the adjoint iterates the transpose of the same splitting.
+
+use super::euler::{adjoint_stage, advance, advance_vjp, next_state, solve_stage, stage_name};
+use super::{Input, Memo, Split, State, StateBar, StepBar, Stepped, Stepper, When};
+use crate::dynamics::Evaluation;
+use crate::{Error, Result};
+use nalgebra::DVector;
+
+/// Relative change of the velocity at which the fixed point in q_m ends.
+const TOLERANCE: f64 = 1e-14;
+const ITERATIONS: usize = 60;
+
+fn middle<'a>(
+    s: &'a Stepper,
+    state: &State,
+    v: &DVector<f64>,
+    reverse: bool,
+) -> Result<Evaluation<'a>> {
+    let mut q = s.system.tree.integrate(&state.q, &(0.5 * s.dt * v));
+    s.place_motions(&mut q, s.time(state) + 0.5 * s.dt);
+    s.system.evaluate(s.parameters, &q, true, reverse)
+}
+
+/// Relative change between two velocities, each joint coordinate weighed by its inertia.
+fn change(e: &Evaluation, a: &DVector<f64>, b: &DVector<f64>) -> f64 {
+    let weight = e.mass_matrix.diagonal().map(|m| m.max(0.0).sqrt());
+    let size = b.component_mul(&weight).norm();
+    let step = (a - b).component_mul(&weight).norm();
+    if step == 0.0 { 0.0 } else { step / size }
+}
+
+pub(super) fn step(
+    s: &Stepper,
+    e: &Evaluation,
+    state: &State,
+    v: &DVector<f64>,
+    input: &Input,
+) -> Result<Stepped> {
+    let split = s.split(&input.hold, When::Over(s.time(state), s.dt));
+    let p = s.released_momentum(e, state, v, &split);
+    let mut stage = &split.driven + split.put(&split.take(v));
+    let mut previous = f64::INFINITY;
+    for _ in 0..ITERATIONS {
+        let m = middle(s, state, &stage, false)?;
+        let next = solve_stage(&m, &split, &p, &input.control, 0.5 * s.dt, &stage, &|| {
+            stage_name(s, state)
+        })?;
+        let moved = change(&m, &next, &stage);
+        stage = next;
+        // Below 1e-11 the change may be rounding or solver noise: stop when it no longer halves.
+        if moved <= TOLERANCE || (moved <= 1e-11 && moved > 0.5 * previous) {
+            let y = &p + s.dt * m.force(&stage, &input.control);
+            let q = advance(s, state, &stage);
+            return Ok(Stepped {
+                state: next_state(state, &split, q, y, input),
+                memo: Some(stage),
+            });
+        }
+        previous = moved;
+    }
+    Err(Error::Solver {
+        what: stage_name(s, state),
+        iterations: ITERATIONS,
+        residual: previous,
+        tolerance: TOLERANCE,
+        remedy:
+            "the midpoint's fixed point doesn't contract: take a smaller time step, or tighten \
+                 the coupling's tolerance"
+                .into(),
+    })
+}
+
+/// Gradient over q_m of `−wᵀ{M v + p_rest − Xᵀ(p̂ + h f)} + zᵀ Δt f` and the rest of the cotangents; z_total = Δt z + h X w.
+fn configuration_vjp(
+    m: &Evaluation,
+    split: &Split,
+    stage: &DVector<f64>,
+    control: &DVector<f64>,
+    reached: &DVector<f64>,
+    w: &DVector<f64>,
+    z_total: &DVector<f64>,
+) -> Result<StepBar> {
+    let mut bar = StepBar::zeros(m);
+    bar.add(1.0, &m.force_vjp(stage, control, z_total)?);
+    bar.add(-1.0, &m.momentum_vjp(stage, w)?);
+    bar.state.q += m.frame_velocity_vjp(w, reached);
+    split.forget_moved(&mut bar.state.q);
+    Ok(bar)
+}
+
+pub(super) fn step_vjp(
+    s: &Stepper,
+    e: &Evaluation,
+    state: &State,
+    v: &DVector<f64>,
+    input: &Input,
+    memo: &Memo,
+    next_bar: &StateBar,
+) -> Result<StepBar> {
+    let split = s.split(&input.hold, When::Over(s.time(state), s.dt));
+    let p = s.released_momentum(e, state, v, &split);
+    let stage = match memo {
+        Some(stage) => stage.clone(),
+        None => step(s, e, state, v, input)?
+            .memo
+            .unwrap_or_else(|| v.clone()),
+    };
+    let m = middle(s, state, &stage, true)?;
+    let h = 0.5 * s.dt;
+    let reached = &p + h * m.force(&stage, &input.control);
+    let (q_bar, v_bar_next) = advance_vjp(s, &split, &stage, &next_bar.q);
+    let mut z = next_bar.y.clone();
+    split.forget_driven(&mut z);
+    let v_bar_force = s.dt * m.force_velocity_jacobian(&stage).tr_mul(&z);
+    let fixed = v_bar_next + v_bar_force;
+    // v̄ = fixed + (∂q_m/∂v)ᵀ q̄_m(w), w = J⁻ᵀ v̄.
+    let mut v_bar = fixed.clone();
+    let mut previous = f64::INFINITY;
+    for _ in 0..ITERATIONS {
+        let w = adjoint_stage(&m, &split, &stage, h, &v_bar)?;
+        let z_total = s.dt * &z + h * m.frame_velocity(&w);
+        let inner = configuration_vjp(&m, &split, &stage, &input.control, &reached, &w, &z_total)?;
+        let (q_start, xi) = s.system.tree.integrate_vjp(&(h * &stage), &inner.state.q);
+        let next = &fixed + h * xi;
+        let size = next.norm();
+        let moved = if size > 0.0 {
+            (&next - &v_bar).norm() / size
+        } else {
+            0.0
+        };
+        if moved <= 1e-13 || (moved <= 1e-10 && moved > 0.5 * previous) {
+            let mut bar = StepBar::zeros(e);
+            bar.state.q += q_bar + q_start;
+            bar.control += inner.control;
+            bar.parameters.add(&inner.parameters);
+            let p_bar = &z + m.frame_velocity(&w);
+            s.released_momentum_vjp(e, state, v, &split, &p_bar, &mut bar)?;
+            return Ok(bar);
+        }
+        previous = moved;
+        v_bar = next;
+    }
+    Err(Error::Solver {
+        what: format!("adjoint of the {}", stage_name(s, state)),
+        iterations: ITERATIONS,
+        residual: previous,
+        tolerance: 1e-13,
+        remedy: "take a smaller time step".into(),
+    })
+}

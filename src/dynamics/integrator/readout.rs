@@ -1,0 +1,140 @@
+//! The velocity at a state, v = M(q)⁻¹ (Xᵀ p̂ − p_rest), and its transpose.
+
+use super::{Split, State, StepBar, Stepper, When};
+use crate::dynamics::Evaluation;
+use crate::{Error, Result};
+use nalgebra::{Cholesky, DVector, Dyn};
+
+/// Cholesky factor of the free block of the mass matrix.
+pub(super) fn factor(e: &Evaluation, split: &Split) -> Result<Cholesky<f64, Dyn>> {
+    let block = split.block(&e.mass_matrix);
+    // Scaled to unit diagonal, so that the verdict doesn't depend on units or sizes.
+    let scale = block
+        .diagonal()
+        .map(|d| if d > 0.0 { 1.0 / d.sqrt() } else { 0.0 });
+    let scaled = nalgebra::DMatrix::from_fn(block.nrows(), block.ncols(), |i, j| {
+        scale[i] * block[(i, j)] * scale[j]
+    });
+    let smallest = if scaled.is_empty() {
+        1.0
+    } else if scaled.iter().all(|x| x.is_finite()) {
+        scaled.symmetric_eigenvalues().min()
+    } else {
+        f64::NAN
+    };
+    if smallest.is_nan() || smallest <= 1e-13 {
+        return Err(Error::Unresolved {
+            place: "mass matrix M(q)".into(),
+            quantity: "smallest eigenvalue, diagonal scaled to one".into(),
+            value: smallest,
+            limit: 1e-13,
+            remedy:
+                "M must be positive definite: give massless bodies mass, inertia or added mass, \
+                     or refine the meshes where a gap isn't resolved"
+                    .into(),
+        });
+    }
+    block.cholesky().ok_or_else(|| Error::Unresolved {
+        place: "mass matrix M(q)".into(),
+        quantity: "smallest eigenvalue, diagonal scaled to one".into(),
+        value: smallest,
+        limit: 1e-13,
+        remedy: "M must be positive definite".into(),
+    })
+}
+
+/// v with driven entries given and free ones from momentum p̂.
+pub(super) fn solve(e: &Evaluation, split: &Split, hat: &DVector<f64>) -> Result<DVector<f64>> {
+    let factor = factor(e, split)?;
+    let right = e.user_momentum(hat) - &e.rest_momentum - &e.mass_matrix * &split.driven;
+    Ok(&split.driven + split.put(&factor.solve(&split.take(&right))))
+}
+
+/// Transpose of [`solve`], added to `bar` (y is p̂ here).
+pub(super) fn solve_vjp(
+    e: &Evaluation,
+    split: &Split,
+    hat: &DVector<f64>,
+    v: &DVector<f64>,
+    v_bar: &DVector<f64>,
+    bar: &mut StepBar,
+) -> Result<()> {
+    let w = split.put(&factor(e, split)?.solve(&split.take(v_bar)));
+    bar.add(-1.0, &e.momentum_vjp(v, &w)?);
+    bar.state.q += e.frame_velocity_vjp(&w, hat);
+    bar.state.y += e.frame_velocity(&w);
+    Ok(())
+}
+
+impl Stepper<'_> {
+    /// Generalised velocity at a state.
+    ///
+    /// # Errors
+    /// A mass matrix that isn't positive definite.
+    pub fn velocity(&self, e: &Evaluation, state: &State) -> Result<DVector<f64>> {
+        let split = self.split(&state.held, When::At(self.time(state)));
+        if self.integrator.carries_velocity() {
+            return Ok(&split.driven + split.put(&split.take(&state.y)));
+        }
+        solve(e, &split, &state.y)
+    }
+
+    /// Transpose of [`Stepper::velocity`]: adds to the cotangents of the state and parameters.
+    ///
+    /// # Errors
+    /// As the value, or a solve of the coupling.
+    pub fn velocity_vjp(
+        &self,
+        e: &Evaluation,
+        state: &State,
+        v: &DVector<f64>,
+        v_bar: &DVector<f64>,
+        bar: &mut StepBar,
+    ) -> Result<()> {
+        let split = self.split(&state.held, When::At(self.time(state)));
+        if v_bar.iter().all(|x| *x == 0.0) {
+            return Ok(());
+        }
+        if self.integrator.carries_velocity() {
+            bar.state.y += split.put(&split.take(v_bar));
+            return Ok(());
+        }
+        solve_vjp(e, &split, &state.y, v, v_bar, bar)
+    }
+
+    /// The conserved variable y that belongs to velocity `v` at `e`.
+    pub fn conserved(&self, e: &Evaluation, v: &DVector<f64>) -> DVector<f64> {
+        if self.integrator.carries_velocity() {
+            v.clone()
+        } else {
+            e.frame_momentum(v)
+        }
+    }
+
+    /// Transpose of [`Stepper::conserved`]: cotangents of q (added to `bar.state.q`) and of v
+    /// (added to `bar.v`), and of the parameters.
+    ///
+    /// # Errors
+    /// A solve of the coupling.
+    pub fn conserved_vjp(
+        &self,
+        e: &Evaluation,
+        v: &DVector<f64>,
+        y_bar: &DVector<f64>,
+        bar: &mut StepBar,
+    ) -> Result<()> {
+        if self.integrator.carries_velocity() {
+            bar.v += y_bar;
+            return Ok(());
+        }
+        let w = e
+            .system
+            .tree
+            .per_joint(&e.q, y_bar, |j, q, z| j.frame_velocity_inverse(q, z));
+        let m = e.momentum_vjp(v, &w)?;
+        bar.v += &m.v;
+        bar.add(1.0, &m);
+        bar.state.q -= e.frame_velocity_vjp(&w, &e.frame_momentum(v));
+        Ok(())
+    }
+}

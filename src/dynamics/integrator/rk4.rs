@@ -1,0 +1,147 @@
+//! Classical Runge–Kutta in (chart of q, p̂): fourth order, explicit.
+//!
+//! Rotations are integrated in a rotation-vector chart around the start of the step, whose rate is
+//! the inverse left Jacobian times the angular velocity, so the order isn't lost on the group.
+
+use super::euler::next_state;
+use super::{Input, Split, State, StateBar, StepBar, Stepped, Stepper, When, readout};
+use crate::Result;
+use crate::dynamics::Evaluation;
+use nalgebra::DVector;
+
+/// Abscissae and weights.
+const NODES: [f64; 4] = [0.0, 0.5, 0.5, 1.0];
+const WEIGHTS: [f64; 4] = [1.0 / 6.0, 1.0 / 3.0, 1.0 / 3.0, 1.0 / 6.0];
+
+struct Stage<'a> {
+    evaluation: Evaluation<'a>,
+    split: Split,
+    xi: DVector<f64>,
+    p: DVector<f64>,
+    v: DVector<f64>,
+    chart_rate: DVector<f64>,
+    force: DVector<f64>,
+}
+
+/// The four stages; the first is evaluated at the state itself.
+fn stages<'a>(
+    s: &'a Stepper,
+    state: &State,
+    v: &DVector<f64>,
+    input: &Input,
+    start: &DVector<f64>,
+    reverse: bool,
+) -> Result<Vec<Stage<'a>>> {
+    let tree = &s.system.tree;
+    let nv = tree.velocities();
+    let mut out: Vec<Stage> = Vec::with_capacity(4);
+    for (i, node) in NODES.iter().enumerate() {
+        let t = s.time(state) + node * s.dt;
+        let split = s.split(&input.hold, When::At(t));
+        let (xi, p) = match out.last() {
+            Some(last) => (
+                node * s.dt * &last.chart_rate,
+                start + node * s.dt * &last.force,
+            ),
+            None => (DVector::zeros(nv), start.clone()),
+        };
+        let mut q = tree.integrate(&state.q, &xi);
+        s.place_motions(&mut q, t);
+        let evaluation = s.system.evaluate(s.parameters, &q, true, reverse)?;
+        let stage_v = if i == 0 && split.is_driven == s.split(&state.held, When::At(t)).is_driven {
+            v.clone()
+        } else {
+            readout::solve(&evaluation, &split, &p)?
+        };
+        let chart_rate = tree.chart_rate(&xi, &stage_v);
+        let force = evaluation.force(&stage_v, &input.control);
+        out.push(Stage {
+            evaluation,
+            split,
+            xi,
+            p,
+            v: stage_v,
+            chart_rate,
+            force,
+        });
+    }
+    Ok(out)
+}
+
+pub(super) fn step(
+    s: &Stepper,
+    e: &Evaluation,
+    state: &State,
+    v: &DVector<f64>,
+    input: &Input,
+) -> Result<Stepped> {
+    let first = s.split(&input.hold, When::At(s.time(state)));
+    let start = s.released_momentum(e, state, v, &first);
+    let stages = stages(s, state, v, input, &start, false)?;
+    let mut xi = DVector::zeros(v.len());
+    let mut y = start;
+    for (stage, weight) in stages.iter().zip(WEIGHTS) {
+        xi += weight * s.dt * &stage.chart_rate;
+        y += weight * s.dt * &stage.force;
+    }
+    let mut q = s.system.tree.integrate(&state.q, &xi);
+    s.place_motions(&mut q, (state.step + 1) as f64 * s.dt);
+    Ok(Stepped {
+        state: next_state(state, &first, q, y, input),
+        memo: None,
+    })
+}
+
+pub(super) fn step_vjp(
+    s: &Stepper,
+    e: &Evaluation,
+    state: &State,
+    v: &DVector<f64>,
+    input: &Input,
+    next_bar: &StateBar,
+) -> Result<StepBar> {
+    let tree = &s.system.tree;
+    let first = s.split(&input.hold, When::At(s.time(state)));
+    let start = s.released_momentum(e, state, v, &first);
+    let stages = stages(s, state, v, input, &start, true)?;
+    let mut xi = DVector::zeros(v.len());
+    for (stage, weight) in stages.iter().zip(WEIGHTS) {
+        xi += weight * s.dt * &stage.chart_rate;
+    }
+    let mut bar = StepBar::zeros(e);
+    let mut q_bar = next_bar.q.clone();
+    first.forget_moved(&mut q_bar);
+    let (q_direct, xi_bar) = tree.integrate_vjp(&xi, &q_bar);
+    bar.state.q += q_direct;
+    let mut y_bar = next_bar.y.clone();
+    first.forget_driven(&mut y_bar);
+    let mut start_bar = y_bar.clone();
+    let mut rate_bar: Vec<DVector<f64>> = WEIGHTS.iter().map(|w| *w * s.dt * &xi_bar).collect();
+    let mut force_bar: Vec<DVector<f64>> = WEIGHTS.iter().map(|w| *w * s.dt * &y_bar).collect();
+    for i in (0..4).rev() {
+        let stage = &stages[i];
+        let e = &stage.evaluation;
+        let mut own = StepBar::zeros(e);
+        let (mut stage_xi_bar, mut v_bar) = tree.chart_rate_vjp(&stage.xi, &stage.v, &rate_bar[i]);
+        let force = e.force_vjp(&stage.v, &input.control, &force_bar[i])?;
+        own.add(1.0, &force);
+        v_bar += &force.v;
+        // The first stage's velocity is the readout's unless a joint is newly driven or released.
+        readout::solve_vjp(e, &stage.split, &stage.p, &stage.v, &v_bar, &mut own)?;
+        stage.split.forget_moved(&mut own.state.q);
+        let (q_bar, xi_bar) = tree.integrate_vjp(&stage.xi, &own.state.q);
+        bar.state.q += q_bar;
+        stage_xi_bar += xi_bar;
+        bar.control += own.control;
+        bar.parameters.add(&own.parameters);
+        start_bar += &own.state.y;
+        if i > 0 {
+            let h = NODES[i] * s.dt;
+            rate_bar[i - 1] += h * stage_xi_bar;
+            force_bar[i - 1] += h * &own.state.y;
+        }
+    }
+    first.forget_driven(&mut start_bar);
+    s.released_momentum_vjp(e, state, v, &first, &start_bar, &mut bar)?;
+    Ok(bar)
+}

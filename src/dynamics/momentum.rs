@@ -1,0 +1,105 @@
+//! Generalised momentum p = M(q) v + p_rest(q) and its transpose.
+
+use super::force::rigid_parameters_vjp;
+use super::{Evaluation, ForceCotangents};
+use crate::Result;
+use crate::adjoint::lie::{Vec6, cross_force};
+use crate::multibody::{Cotangents, Virtual};
+use nalgebra::DVector;
+
+impl Evaluation<'_> {
+    /// Generalised momentum at velocity `v`, user coordinates (kg m/s, kg m²/s).
+    pub fn momentum(&self, v: &DVector<f64>) -> DVector<f64> {
+        &self.mass_matrix * v + &self.rest_momentum
+    }
+
+    /// The same in frame coordinates, X⁻ᵀ p.
+    pub fn frame_momentum(&self, v: &DVector<f64>) -> DVector<f64> {
+        let p = self.momentum(v);
+        self.system
+            .tree
+            .per_joint(&self.q, &p, |j, q, p| j.frame_momentum(q, p))
+    }
+
+    /// p = Xᵀ p̂.
+    pub fn user_momentum(&self, hat: &DVector<f64>) -> DVector<f64> {
+        self.system
+            .tree
+            .per_joint(&self.q, hat, |j, q, p| j.frame_momentum_transpose(q, p))
+    }
+
+    /// X w.
+    pub fn frame_velocity(&self, w: &DVector<f64>) -> DVector<f64> {
+        self.system
+            .tree
+            .per_joint(&self.q, w, |j, q, w| j.frame_velocity(q, w))
+    }
+
+    /// Gradient of `wᵀ (M(q) v + p_rest(q))` over q, v and the parameters.
+    ///
+    /// # Errors
+    /// A solve of the coupling that misses its tolerance.
+    pub fn momentum_vjp(&self, v: &DVector<f64>, w: &DVector<f64>) -> Result<ForceCotangents> {
+        self.bilinear_vjp(v, w, &self.current_twist())
+    }
+
+    /// Gradient of `wᵀ M(q) v`, without the current.
+    ///
+    /// # Errors
+    /// A solve of the coupling that misses its tolerance.
+    pub fn mass_vjp(&self, v: &DVector<f64>, w: &DVector<f64>) -> Result<ForceCotangents> {
+        self.bilinear_vjp(v, w, &Vec6::zeros())
+    }
+
+    fn bilinear_vjp(
+        &self,
+        v: &DVector<f64>,
+        w: &DVector<f64>,
+        current: &Vec6,
+    ) -> Result<ForceCotangents> {
+        let tree = &self.system.tree;
+        let rho = self.parameters.density;
+        let mut out = ForceCotangents::zeros(self);
+        let fields = tree.fields(&self.kinematics, &self.q, v, Virtual::User(w));
+        let mut bar = Cotangents::zeros(self.system.len());
+        for b in 0..self.system.len() {
+            let (twist, virt) = (&fields.twist[b], &fields.virtual_twist[b]);
+            let (h, h_virtual) = (self.rigid_momentum(b, twist), self.rigid_momentum(b, virt));
+            bar.virtual_twist[b] += h;
+            bar.twist[b] += h_virtual;
+            bar.pose[b] -= cross_force(twist, &h_virtual) + cross_force(virt, &h);
+            rigid_parameters_vjp(self, b, virt, twist, &mut out.parameters);
+        }
+        if let Some(fluid) = &self.fluid {
+            let direction = if *current == Vec6::zeros() {
+                self.virtual_direction(v)
+            } else {
+                self.through_water(v)
+            };
+            let virtual_direction = self.virtual_direction(w);
+            let (momenta, momenta_virtual) = (
+                self.fluid_momenta(&direction),
+                self.fluid_momenta(&virtual_direction),
+            );
+            let pair = self.from_wet(&fluid.gradient(&virtual_direction, &direction));
+            for b in 0..self.system.len() {
+                if self.system.bodies[b].wet.is_none() {
+                    continue;
+                }
+                let relative = fields.twist[b] - current;
+                let virt = &fields.virtual_twist[b];
+                out.parameters.density += virt.dot(&momenta[b]);
+                bar.virtual_twist[b] += rho * momenta[b];
+                bar.twist[b] += rho * momenta_virtual[b];
+                bar.pose[b] += rho
+                    * (pair[b]
+                        - cross_force(&relative, &momenta_virtual[b])
+                        - cross_force(virt, &momenta[b]));
+            }
+        }
+        let (q_bar, v_bar) = tree.reverse(&self.kinematics, v, Virtual::User(w), &fields, bar);
+        out.q += q_bar;
+        out.v += v_bar;
+        Ok(out)
+    }
+}

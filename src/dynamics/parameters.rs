@@ -1,0 +1,88 @@
+//! The physical parameters that a trajectory is differentiated with respect to.
+
+use serde::Serialize;
+
+/// Parameters of a system; the same structure holds their cotangents.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct Parameters {
+    /// Fluid density, kg/m³.
+    pub density: f64,
+    /// Mass of each body, kg.
+    pub mass: Vec<f64>,
+    /// Inertia of each body about its centre of mass, body axes: xx, yy, zz, xy, xz, yz, kg m².
+    pub inertia: Vec<[f64; 6]>,
+    /// Linear drag coefficient of each body, kg/(m² s): νρ of Eq. 22.
+    pub linear_drag: Vec<f64>,
+    /// Quadratic drag coefficient of each body, dimensionless.
+    pub quadratic_drag: Vec<f64>,
+}
+
+impl Parameters {
+    /// All zero, for `bodies` bodies.
+    pub fn zeros(bodies: usize) -> Self {
+        Self {
+            density: 0.0,
+            mass: vec![0.0; bodies],
+            inertia: vec![[0.0; 6]; bodies],
+            linear_drag: vec![0.0; bodies],
+            quadratic_drag: vec![0.0; bodies],
+        }
+    }
+
+    /// All values in one row: density, then per body mass, inertia (6), linear and quadratic drag.
+    pub fn to_vec(&self) -> Vec<f64> {
+        let mut out = vec![self.density];
+        for b in 0..self.mass.len() {
+            out.push(self.mass[b]);
+            out.extend(self.inertia[b]);
+            out.push(self.linear_drag[b]);
+            out.push(self.quadratic_drag[b]);
+        }
+        out
+    }
+
+    /// Inverse of [`Parameters::to_vec`] for the same number of bodies; `None` if the length is wrong.
+    pub fn with_values(&self, values: &[f64]) -> Option<Self> {
+        let bodies = self.mass.len();
+        if values.len() != 1 + 9 * bodies {
+            return None;
+        }
+        let mut out = Self::zeros(bodies);
+        out.density = values[0];
+        for b in 0..bodies {
+            let row = &values[1 + 9 * b..10 + 9 * b];
+            out.mass[b] = row[0];
+            out.inertia[b].copy_from_slice(&row[1..7]);
+            out.linear_drag[b] = row[7];
+            out.quadratic_drag[b] = row[8];
+        }
+        Some(out)
+    }
+
+    /// Names of [`Parameters::to_vec`]'s entries, with the given body names.
+    pub fn names(&self, bodies: &[String]) -> Vec<String> {
+        let mut out = vec!["fluid.density".to_string()];
+        for name in bodies {
+            out.push(format!("{name}.mass"));
+            for axis in ["xx", "yy", "zz", "xy", "xz", "yz"] {
+                out.push(format!("{name}.inertia.{axis}"));
+            }
+            out.push(format!("{name}.drag.linear"));
+            out.push(format!("{name}.drag.quadratic"));
+        }
+        out
+    }
+
+    /// Adds another set of values.
+    pub fn add(&mut self, other: &Self) {
+        self.density += other.density;
+        for b in 0..self.mass.len() {
+            self.mass[b] += other.mass[b];
+            for k in 0..6 {
+                self.inertia[b][k] += other.inertia[b][k];
+            }
+            self.linear_drag[b] += other.linear_drag[b];
+            self.quadratic_drag[b] += other.quadratic_drag[b];
+        }
+    }
+}

@@ -1,0 +1,103 @@
+//! A system: the tree, its bodies' constants, and the coupling through the water.
+
+use crate::adjoint::drag::{Element, Part};
+use crate::adjoint::lie::{Mat6, Vec3};
+use crate::coupling::Coupling;
+use crate::multibody::Tree;
+use crate::scene::Motion;
+use nalgebra::DVector;
+
+/// Constants of one body.
+#[derive(Clone, Debug)]
+pub struct BodyData {
+    /// Name, for messages.
+    pub name: String,
+    /// Centre of mass in the body's frame, m.
+    pub center_of_mass: Vec3,
+    /// Displaced volume, m³.
+    pub volume: f64,
+    /// Its centroid in the body's frame, m.
+    pub centroid: Vec3,
+    /// Linear drag at unit coefficient.
+    pub resistance: Mat6,
+    /// Surface and part of the quadratic drag; empty where it isn't used.
+    pub surface: Vec<Element>,
+    /// Part of the quadratic drag.
+    pub quadratic_part: Part,
+    /// Index among the bodies that the coupling knows.
+    pub wet: Option<usize>,
+    /// First control of the joint's generalised forces.
+    pub joint_control: Option<usize>,
+    /// First control of the wrench on the body.
+    pub thruster: Option<usize>,
+}
+
+/// What moves a joint.
+#[derive(Clone, Debug, PartialEq)]
+pub enum Drive {
+    /// Forces.
+    Free,
+    /// Nothing: it stays where it is.
+    Locked,
+    /// A given motion, one per coordinate.
+    Motion(Vec<Motion>),
+}
+
+/// A mechanical system in water.
+pub struct System {
+    /// Joints and bodies.
+    pub tree: Tree,
+    /// Constants of the bodies, in the tree's order.
+    pub bodies: Vec<BodyData>,
+    /// What moves each joint.
+    pub drives: Vec<Drive>,
+    /// Gravity, m/s².
+    pub gravity: Vec3,
+    /// Uniform current, m/s.
+    pub current: Vec3,
+    /// Number of controls.
+    pub controls: usize,
+    /// The coupling; its bodies are those with `wet` set, in order.
+    pub coupling: Box<dyn Coupling>,
+}
+
+impl System {
+    /// Number of bodies.
+    pub fn len(&self) -> usize {
+        self.bodies.len()
+    }
+
+    /// Whether there is no body.
+    pub fn is_empty(&self) -> bool {
+        self.bodies.is_empty()
+    }
+
+    /// Joint forces of a control vector, in the user's coordinates.
+    pub fn joint_forces(&self, control: &DVector<f64>) -> DVector<f64> {
+        let mut out = DVector::zeros(self.tree.velocities());
+        for (body, link) in self.bodies.iter().zip(self.tree.links()) {
+            if let Some(at) = body.joint_control {
+                for (k, i) in link.v.clone().enumerate() {
+                    out[i] = control[at + k];
+                }
+            }
+        }
+        out
+    }
+
+    /// Transpose of [`System::joint_forces`], added to `control_bar`.
+    pub fn joint_forces_vjp(&self, force_bar: &DVector<f64>, control_bar: &mut DVector<f64>) {
+        for (body, link) in self.bodies.iter().zip(self.tree.links()) {
+            if let Some(at) = body.joint_control {
+                for (k, i) in link.v.clone().enumerate() {
+                    control_bar[at + k] += force_bar[i];
+                }
+            }
+        }
+    }
+
+    /// Whether the water moves past bodies at rest.
+    pub fn has_current(&self) -> bool {
+        self.current != Vec3::zeros()
+    }
+}

@@ -1,0 +1,433 @@
+//! The kinematic tree and the reverse of its velocity fields.
+
+use super::Joint;
+use crate::adjoint::lie::{Pose, Vec6, cross_force, cross_motion};
+use nalgebra::{DMatrix, DVector};
+use std::ops::Range;
+
+/// One body with the joint that carries it.
+#[derive(Clone, Debug)]
+pub struct Link {
+    /// Index of the parent body; `None`: the world. Parents come before children.
+    pub parent: Option<usize>,
+    /// Pose of the joint's frame in the parent's frame.
+    pub placement: Pose,
+    /// The joint.
+    pub joint: Joint,
+    /// Place of the joint's coordinates in q.
+    pub q: Range<usize>,
+    /// Place of the joint's velocities in v.
+    pub v: Range<usize>,
+}
+
+/// A forest of bodies, parents before children.
+#[derive(Clone, Debug)]
+pub struct Tree {
+    links: Vec<Link>,
+    coordinates: usize,
+    velocities: usize,
+}
+
+/// Poses and joint columns at one configuration.
+#[derive(Clone, Debug)]
+pub struct Kinematics {
+    /// Poses of the bodies in the world.
+    pub poses: Vec<Pose>,
+    /// Frame columns Ŝ, one per velocity: spatial twists of the joint's constant basis.
+    pub frame_columns: Vec<Vec6>,
+    /// User columns S = Ŝ X, one per velocity.
+    pub columns: Vec<Vec6>,
+}
+
+/// How the virtual velocity of [`Tree::fields`] is given.
+#[derive(Clone, Copy, Debug)]
+pub enum Virtual<'a> {
+    /// In frame coordinates ẑ (dual to frame momenta).
+    Frame(&'a DVector<f64>),
+    /// In the user's coordinates, ẑ = X z (dual to p).
+    User(&'a DVector<f64>),
+}
+
+/// The four fields over the bodies, spatial twists.
+#[derive(Clone, Debug)]
+pub struct Fields {
+    /// Twists V.
+    pub twist: Vec<Vec6>,
+    /// Virtual twists Z.
+    pub virtual_twist: Vec<Vec6>,
+    /// Rate D of Z at constant ẑ.
+    pub turning: Vec<Vec6>,
+    /// Rate C of V at constant v.
+    pub bias: Vec<Vec6>,
+    /// v̂ and ẑ, kept for the reverse.
+    frame_velocity: Vec<f64>,
+    frame_virtual: Vec<f64>,
+    frame_bias: Vec<f64>,
+}
+
+/// Cotangents of [`Fields`] and of the poses (spatial wrenches).
+#[derive(Clone, Debug)]
+pub struct Cotangents {
+    /// Of the poses: work done on a spatial displacement of each body.
+    pub pose: Vec<Vec6>,
+    /// Of V.
+    pub twist: Vec<Vec6>,
+    /// Of Z.
+    pub virtual_twist: Vec<Vec6>,
+    /// Of D.
+    pub turning: Vec<Vec6>,
+    /// Of C.
+    pub bias: Vec<Vec6>,
+}
+
+impl Cotangents {
+    /// All zero, for `bodies` bodies.
+    pub fn zeros(bodies: usize) -> Self {
+        let zero = vec![Vec6::zeros(); bodies];
+        Self {
+            pose: zero.clone(),
+            twist: zero.clone(),
+            virtual_twist: zero.clone(),
+            turning: zero.clone(),
+            bias: zero,
+        }
+    }
+}
+
+impl Tree {
+    /// From parent, joint placement and joint of each body, parents before children.
+    ///
+    /// # Panics
+    /// If a parent doesn't come before its child; scenes are validated before they come here.
+    pub fn new(bodies: impl IntoIterator<Item = (Option<usize>, Pose, Joint)>) -> Self {
+        let (mut nq, mut nv) = (0, 0);
+        let mut links = Vec::new();
+        for (index, (parent, placement, joint)) in bodies.into_iter().enumerate() {
+            assert!(parent.is_none_or(|p| p < index), "parents come first");
+            let (q, v) = (nq..nq + joint.coordinates(), nv..nv + joint.velocities());
+            (nq, nv) = (q.end, v.end);
+            links.push(Link {
+                parent,
+                placement,
+                joint,
+                q,
+                v,
+            });
+        }
+        Self {
+            links,
+            coordinates: nq,
+            velocities: nv,
+        }
+    }
+
+    /// The bodies with their joints.
+    pub fn links(&self) -> &[Link] {
+        &self.links
+    }
+
+    /// Length of q.
+    pub fn coordinates(&self) -> usize {
+        self.coordinates
+    }
+
+    /// Length of v.
+    pub fn velocities(&self) -> usize {
+        self.velocities
+    }
+
+    /// Coordinates with every joint at its origin.
+    pub fn origin(&self) -> DVector<f64> {
+        DVector::from_vec(self.links.iter().flat_map(|l| l.joint.origin()).collect())
+    }
+
+    /// Whether body `b` moves when the joint of body `a` does.
+    pub fn carries(&self, a: usize, b: usize) -> bool {
+        let mut at = Some(b);
+        while let Some(x) = at {
+            if x == a {
+                return true;
+            }
+            at = self.links[x].parent;
+        }
+        false
+    }
+
+    /// Applies a per-joint map from slices of q and of a velocity-sized vector.
+    pub fn per_joint(
+        &self,
+        q: &DVector<f64>,
+        x: &DVector<f64>,
+        map: impl Fn(&Joint, &[f64], &[f64]) -> Vec<f64>,
+    ) -> DVector<f64> {
+        let mut out = Vec::with_capacity(self.velocities);
+        for l in &self.links {
+            let part = map(
+                &l.joint,
+                &q.as_slice()[l.q.clone()],
+                &x.as_slice()[l.v.clone()],
+            );
+            out.extend(part);
+        }
+        DVector::from_vec(out)
+    }
+
+    /// `q ⊕ xi` for all joints.
+    pub fn integrate(&self, q: &DVector<f64>, xi: &DVector<f64>) -> DVector<f64> {
+        self.per_joint(q, xi, |j, q, x| j.integrate(q, x))
+    }
+
+    /// Tangent cotangents of `(q, xi)` of [`Tree::integrate`].
+    pub fn integrate_vjp(
+        &self,
+        xi: &DVector<f64>,
+        bar: &DVector<f64>,
+    ) -> (DVector<f64>, DVector<f64>) {
+        self.pairwise(|l| {
+            let r = l.v.clone();
+            l.joint
+                .integrate_vjp(&xi.as_slice()[r.clone()], &bar.as_slice()[r])
+        })
+    }
+
+    /// Rates of the chart coordinates at generalised velocity `v`.
+    pub fn chart_rate(&self, xi: &DVector<f64>, v: &DVector<f64>) -> DVector<f64> {
+        let mut out = Vec::with_capacity(self.velocities);
+        for l in &self.links {
+            let r = l.v.clone();
+            out.extend(
+                l.joint
+                    .chart_rate(&xi.as_slice()[r.clone()], &v.as_slice()[r]),
+            );
+        }
+        DVector::from_vec(out)
+    }
+
+    /// Cotangents of `(xi, v)` of [`Tree::chart_rate`].
+    pub fn chart_rate_vjp(
+        &self,
+        xi: &DVector<f64>,
+        v: &DVector<f64>,
+        bar: &DVector<f64>,
+    ) -> (DVector<f64>, DVector<f64>) {
+        self.pairwise(|l| {
+            let r = l.v.clone();
+            l.joint.chart_rate_vjp(
+                &xi.as_slice()[r.clone()],
+                &v.as_slice()[r.clone()],
+                &bar.as_slice()[r],
+            )
+        })
+    }
+
+    fn pairwise(
+        &self,
+        map: impl Fn(&Link) -> (Vec<f64>, Vec<f64>),
+    ) -> (DVector<f64>, DVector<f64>) {
+        let (mut a, mut b) = (Vec::new(), Vec::new());
+        for l in &self.links {
+            let (x, y) = map(l);
+            a.extend(x);
+            b.extend(y);
+        }
+        (DVector::from_vec(a), DVector::from_vec(b))
+    }
+
+    /// Poses and columns at `q`.
+    pub fn kinematics(&self, q: &DVector<f64>) -> Kinematics {
+        let mut poses: Vec<Pose> = Vec::with_capacity(self.links.len());
+        let mut frame_columns = Vec::with_capacity(self.velocities);
+        let mut columns = Vec::with_capacity(self.velocities);
+        for l in &self.links {
+            let frame = match l.parent {
+                Some(p) => poses[p].compose(&l.placement),
+                None => l.placement,
+            };
+            let qj = &q.as_slice()[l.q.clone()];
+            let own: Vec<Vec6> = l
+                .joint
+                .basis()
+                .iter()
+                .map(|b| frame.twist_to_world(b))
+                .collect();
+            for k in 0..own.len() {
+                let mut unit = vec![0.0; own.len()];
+                unit[k] = 1.0;
+                let hat = l.joint.frame_velocity(qj, &unit);
+                columns.push(own.iter().zip(&hat).map(|(s, x)| s * *x).sum());
+            }
+            frame_columns.extend(own);
+            poses.push(frame.compose(&l.joint.pose(qj)));
+        }
+        Kinematics {
+            poses,
+            frame_columns,
+            columns,
+        }
+    }
+
+    /// Spatial twists of all bodies at generalised velocity `v`.
+    pub fn twists(&self, kinematics: &Kinematics, v: &DVector<f64>) -> Vec<Vec6> {
+        let mut out: Vec<Vec6> = Vec::with_capacity(self.links.len());
+        for l in &self.links {
+            let base = l.parent.map_or(Vec6::zeros(), |p| out[p]);
+            out.push(base + self.combine(&kinematics.columns, l, v.as_slice()));
+        }
+        out
+    }
+
+    /// Sum of a body's joint columns with the given coefficients.
+    fn combine(&self, columns: &[Vec6], link: &Link, x: &[f64]) -> Vec6 {
+        link.v.clone().map(|k| columns[k] * x[k]).sum()
+    }
+
+    /// Adds each body's six-vector to its parent's, leaves first: the composite over subtrees.
+    pub fn composite(&self, mut field: Vec<Vec6>) -> Vec<Vec6> {
+        for b in (0..self.links.len()).rev() {
+            if let Some(p) = self.links[b].parent {
+                let child = field[b];
+                field[p] += child;
+            }
+        }
+        field
+    }
+
+    /// Projects spatial wrenches on the user columns: `Sᵀ` composite.
+    pub fn project(&self, kinematics: &Kinematics, wrenches: Vec<Vec6>) -> DVector<f64> {
+        let composite = self.composite(wrenches);
+        let mut out = DVector::zeros(self.velocities);
+        for (l, f) in self.links.iter().zip(&composite) {
+            for k in l.v.clone() {
+                out[k] = kinematics.columns[k].dot(f);
+            }
+        }
+        out
+    }
+
+    /// Spatial twists of all bodies as columns of a 6B × nv matrix.
+    pub fn jacobian(&self, kinematics: &Kinematics) -> DMatrix<f64> {
+        let mut out = DMatrix::zeros(6 * self.links.len(), self.velocities);
+        for (a, l) in self.links.iter().enumerate() {
+            for b in a..self.links.len() {
+                if self.carries(a, b) {
+                    for k in l.v.clone() {
+                        out.fixed_view_mut::<6, 1>(6 * b, k)
+                            .copy_from(&kinematics.columns[k]);
+                    }
+                }
+            }
+        }
+        out
+    }
+
+    /// The four fields at velocity `v` and virtual velocity `z`.
+    pub fn fields(
+        &self,
+        kinematics: &Kinematics,
+        q: &DVector<f64>,
+        v: &DVector<f64>,
+        z: Virtual,
+    ) -> Fields {
+        let hat = |x: &DVector<f64>| self.per_joint(q, x, |j, q, x| j.frame_velocity(q, x));
+        let frame_velocity = hat(v);
+        let frame_virtual = match z {
+            Virtual::Frame(z) => z.clone(),
+            Virtual::User(z) => hat(z),
+        };
+        let frame_bias = self.per_joint(q, v, |j, _, v| j.frame_bias(v));
+        let n = self.links.len();
+        let mut f = Fields {
+            twist: Vec::with_capacity(n),
+            virtual_twist: Vec::with_capacity(n),
+            turning: Vec::with_capacity(n),
+            bias: Vec::with_capacity(n),
+            frame_velocity: frame_velocity.as_slice().to_vec(),
+            frame_virtual: frame_virtual.as_slice().to_vec(),
+            frame_bias: frame_bias.as_slice().to_vec(),
+        };
+        for l in &self.links {
+            let [sv, sz, sb] = self.own(kinematics, l, &f);
+            let zero = Vec6::zeros();
+            let (v, z, d, c) = l.parent.map_or((zero, zero, zero, zero), |p| {
+                (f.twist[p], f.virtual_twist[p], f.turning[p], f.bias[p])
+            });
+            f.turning.push(d + cross_motion(&v, &sz));
+            f.bias.push(c + cross_motion(&v, &sv) + sb);
+            f.twist.push(v + sv);
+            f.virtual_twist.push(z + sz);
+        }
+        f
+    }
+
+    /// The joint's own contributions `Ŝ v̂`, `Ŝ ẑ`, `Ŝ (Ẋ v)`.
+    fn own(&self, kinematics: &Kinematics, l: &Link, f: &Fields) -> [Vec6; 3] {
+        let columns = &kinematics.frame_columns;
+        [&f.frame_velocity, &f.frame_virtual, &f.frame_bias].map(|x| self.combine(columns, l, x))
+    }
+
+    /// Transpose of [`Tree::fields`]: tangent cotangents of `(q, v)` from cotangents of the fields
+    /// and the poses. With [`Virtual::User`] the dependence of ẑ = X z on q is included; the cotangent of the virtual velocity
+    /// itself is not needed by any caller and not returned.
+    pub fn reverse(
+        &self,
+        kinematics: &Kinematics,
+        v: &DVector<f64>,
+        z: Virtual,
+        fields: &Fields,
+        mut bar: Cotangents,
+    ) -> (DVector<f64>, DVector<f64>) {
+        let mut q_bar = DVector::zeros(self.velocities);
+        let mut v_bar = DVector::zeros(self.velocities);
+        for b in (0..self.links.len()).rev() {
+            let l = &self.links[b];
+            let [sv, sz, sb] = self.own(kinematics, l, fields);
+            let parent_twist = l.parent.map_or(Vec6::zeros(), |p| fields.twist[p]);
+            let (twist, virt, turning, bias) = (
+                bar.twist[b],
+                bar.virtual_twist[b],
+                bar.turning[b],
+                bar.bias[b],
+            );
+            let sv_bar = twist - cross_force(&parent_twist, &bias);
+            let sz_bar = virt - cross_force(&parent_twist, &turning);
+            // Joint's own coordinates.
+            let dot = |f: &Vec6| -> Vec<f64> {
+                l.v.clone()
+                    .map(|k| kinematics.frame_columns[k].dot(f))
+                    .collect()
+            };
+            let (hat_v, hat_z, hat_b) = (dot(&sv_bar), dot(&sz_bar), dot(&bias));
+            let vj = &v.as_slice()[l.v.clone()];
+            let mut own_q = vec![0.0; l.v.len()];
+            let mut own_v = vec![0.0; l.v.len()];
+            let add = |out: &mut Vec<f64>, x: Vec<f64>| {
+                for (o, x) in out.iter_mut().zip(x) {
+                    *o += x;
+                }
+            };
+            add(&mut own_q, l.joint.frame_velocity_vjp(vj, &hat_v));
+            if let Virtual::User(z) = z {
+                let zj = &z.as_slice()[l.v.clone()];
+                add(&mut own_q, l.joint.frame_velocity_vjp(zj, &hat_z));
+            }
+            add(&mut own_v, l.joint.frame_bias_vjp(vj, &hat_b));
+            // X is its own q's; S = Ŝ X already holds it.
+            for (k, i) in l.v.clone().enumerate() {
+                q_bar[i] = own_q[k] + kinematics.columns[i].dot(&bar.pose[b]);
+                v_bar[i] = own_v[k] + kinematics.columns[i].dot(&sv_bar);
+            }
+            if let Some(p) = l.parent {
+                bar.twist[p] += twist + cross_force(&sz, &turning) + cross_force(&sv, &bias);
+                bar.virtual_twist[p] += virt;
+                bar.turning[p] += turning;
+                bar.bias[p] += bias;
+                // The columns move with the parent.
+                let own =
+                    cross_force(&sv, &sv_bar) + cross_force(&sz, &sz_bar) + cross_force(&sb, &bias);
+                let child = bar.pose[b];
+                bar.pose[p] += child + own;
+            }
+        }
+        (q_bar, v_bar)
+    }
+}

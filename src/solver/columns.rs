@@ -1,0 +1,118 @@
+//! A few columns side by side.
+
+use faer::{MatMut, MatRef};
+
+/// Row-major `[row][column]` array with few columns.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Columns {
+    /// Number of rows.
+    pub rows: usize,
+    /// Number of columns.
+    pub columns: usize,
+    /// Entries, columns fastest.
+    pub data: Vec<f64>,
+}
+
+impl Columns {
+    /// All zero.
+    pub fn zeros(rows: usize, columns: usize) -> Self {
+        Self {
+            rows,
+            columns,
+            data: vec![0.0; rows * columns],
+        }
+    }
+
+    /// From a function of (row, column).
+    pub fn from_fn(rows: usize, columns: usize, f: impl Fn(usize, usize) -> f64) -> Self {
+        let mut out = Self::zeros(rows, columns);
+        for i in 0..rows {
+            for k in 0..columns {
+                out.data[i * columns + k] = f(i, k);
+            }
+        }
+        out
+    }
+
+    /// Entry.
+    #[inline]
+    pub fn at(&self, row: usize, column: usize) -> f64 {
+        self.data[row * self.columns + column]
+    }
+
+    /// One row.
+    #[inline]
+    pub fn row(&self, row: usize) -> &[f64] {
+        &self.data[row * self.columns..(row + 1) * self.columns]
+    }
+
+    /// As a matrix.
+    pub fn as_mat(&self) -> MatRef<'_, f64> {
+        MatRef::from_row_major_slice(&self.data, self.rows, self.columns)
+    }
+
+    /// As a matrix to be written.
+    pub fn as_mat_mut(&mut self) -> MatMut<'_, f64> {
+        MatMut::from_row_major_slice_mut(&mut self.data, self.rows, self.columns)
+    }
+
+    /// Rows `from..to`.
+    pub fn slice(&self, from: usize, to: usize) -> &[f64] {
+        &self.data[from * self.columns..to * self.columns]
+    }
+
+    /// Rows `from..to` to be written.
+    pub fn slice_mut(&mut self, from: usize, to: usize) -> &mut [f64] {
+        &mut self.data[from * self.columns..to * self.columns]
+    }
+
+    /// Combination of the columns.
+    pub fn combine(&self, coefficients: &[f64]) -> Vec<f64> {
+        debug_assert_eq!(coefficients.len(), self.columns);
+        (0..self.rows)
+            .map(|i| {
+                self.row(i)
+                    .iter()
+                    .zip(coefficients)
+                    .map(|(a, b)| a * b)
+                    .sum()
+            })
+            .collect()
+    }
+
+    /// One column.
+    pub fn column(&self, k: usize) -> Vec<f64> {
+        (0..self.rows).map(|i| self.at(i, k)).collect()
+    }
+
+    /// From columns of equal length.
+    pub fn from_columns(columns: &[&[f64]]) -> Self {
+        let rows = columns.first().map_or(0, |c| c.len());
+        Self::from_fn(rows, columns.len(), |i, k| columns[k][i])
+    }
+
+    /// Dot products of equal columns of two arrays.
+    pub fn dots(&self, other: &Self) -> Vec<f64> {
+        let mut out = vec![0.0; self.columns];
+        for i in 0..self.rows {
+            for (o, (a, b)) in out.iter_mut().zip(self.row(i).iter().zip(other.row(i))) {
+                *o += a * b;
+            }
+        }
+        out
+    }
+
+    /// `self += other · diag(scale)`.
+    pub fn add_scaled(&mut self, other: &Self, scale: &[f64]) {
+        let n = self.columns;
+        for (a, b) in self
+            .data
+            .chunks_exact_mut(n)
+            .zip(other.data.chunks_exact(n))
+        {
+            for k in 0..n {
+                a[k] += b[k] * scale[k];
+            }
+        }
+    }
+}

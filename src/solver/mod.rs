@@ -1,0 +1,15 @@
+//! Iterative solvers with several right-hand sides at once.
+//!
+//! Arrays are row-major `[row][column]`, columns fastest. Every column has its own coefficients and stops on its own, so
+//! that a column's answer doesn't depend on its neighbours; sums run over fixed chunks, so that it
+//! doesn't depend on the number of threads either.
+
+mod cgls;
+mod columns;
+mod gmres;
+mod product;
+
+pub use cgls::{Outcome, cgls};
+pub use columns::Columns;
+pub use gmres::gmres;
+pub use product::{normal_product, product, transposed_product};

@@ -299,3 +299,32 @@ fn files_that_are_no_scenes() {
     unread("quite/elsewhere.toml", &["elsewhere.toml", "no such file"]);
     unread("", &["read failed", "folder"]);
 }
+
+/// Example scenes cut short, with a line missing, or with a character changed: read or refused with
+/// a line number, never a panic.
+#[test]
+fn mangled_scenes_never_panic() {
+    let folder = std::path::Path::new(env!("CARGO_MANIFEST_DIR")).join("examples/scenes");
+    let judge = |text: &str| match Scene::from_toml(text, "") {
+        Ok(scene) => drop(scene.validate()),
+        Err(error) => has(&error.to_string(), &["line "]),
+    };
+    for name in ["falling_ball", "fish"] {
+        let text = std::fs::read_to_string(folder.join(format!("{name}.toml"))).unwrap();
+        let lines: Vec<&str> = text.lines().collect();
+        for k in 0..lines.len() {
+            let without = [&lines[..k], &lines[k + 1..]].concat().join("\n");
+            judge(&without);
+        }
+        for (at, c) in text.char_indices().step_by(3) {
+            judge(&text[..at]);
+            for other in ["", "x", "-", "\"", "[", "\n", "é"] {
+                judge(&format!(
+                    "{}{other}{}",
+                    &text[..at],
+                    &text[at + c.len_utf8()..]
+                ));
+            }
+        }
+    }
+}

@@ -1,6 +1,9 @@
 //! hydrograd: a differentiable simulator of rigid bodies that feel each other through the water.
 
 pub mod boundary;
+#[cfg(feature = "cli")]
+#[doc(hidden)]
+pub mod cli;
 pub mod coupling;
 pub mod dynamics;
 pub mod error;

@@ -1,2 +1,7 @@
-//! cli
-fn main() {}
+//! The command line of hydrograd; everything is in [`hydrograd::cli`].
+
+use std::process::ExitCode;
+
+fn main() -> ExitCode {
+    hydrograd::cli::main()
+}

@@ -22,10 +22,10 @@ pub(super) fn check(scene: &Scene) -> Result<()> {
         let (dq, dv) = (body.joint.coordinates(), body.joint.velocities());
         if !initial.q.is_empty() {
             check_quaternion(body, nq, &initial.q[nq..nq + dq])?;
-            check_driven(body, nq, "q", &initial.q[nq..nq + dq], value_at_start)?;
+            check_driven(body, nq, "q", &initial.q[nq..nq + dq], |m| m.value(0.0))?;
         }
         if !initial.v.is_empty() {
-            check_driven(body, nv, "v", &initial.v[nv..nv + dv], rate_at_start)?;
+            check_driven(body, nv, "v", &initial.v[nv..nv + dv], |m| m.rate(0.0))?;
             check_locked(body, nv, "v", &initial.v[nv..nv + dv])?;
         }
         if !initial.momentum.is_empty() {
@@ -131,29 +131,5 @@ fn check_locked(body: &Body, first: usize, field: &str, given: &[f64]) -> Result
             given[i],
             "the joint is locked and can't move; write 0 or take `locked` away",
         )),
-    }
-}
-
-fn value_at_start(motion: &Motion) -> f64 {
-    match *motion {
-        Motion::Linear { offset, .. } => offset,
-        Motion::Sine {
-            offset,
-            amplitude,
-            phase,
-            ..
-        } => offset + amplitude * phase.sin(),
-    }
-}
-
-fn rate_at_start(motion: &Motion) -> f64 {
-    match *motion {
-        Motion::Linear { rate, .. } => rate,
-        Motion::Sine {
-            amplitude,
-            frequency,
-            phase,
-            ..
-        } => amplitude * frequency * phase.cos(),
     }
 }

@@ -1,0 +1,102 @@
+//! `hydrograd check-mesh`: whether a mesh can be simulated.
+
+use std::path::PathBuf;
+use std::process::ExitCode;
+
+use clap::Args;
+
+use super::output::Output;
+use crate::Result;
+
+#[derive(Debug, Args)]
+pub(super) struct Arguments {
+    /// The mesh: .obj, .stl or .ply.
+    #[arg(value_name = "FILE")]
+    file: PathBuf,
+    /// Factor from the file's units to metres (0.001 for millimetres).
+    #[arg(
+        long,
+        value_name = "FACTOR",
+        default_value_t = 1.0,
+        allow_negative_numbers = true
+    )]
+    scale: f64,
+}
+
+/// Prints the report, good or bad; a bad mesh is a failure of the command as well.
+#[cfg(feature = "meshio")]
+pub(super) fn main(arguments: &Arguments, output: Output) -> Result<ExitCode> {
+    let mesh = crate::shape::file::read_unchecked(&arguments.file, arguments.scale)?;
+    let report = mesh.check();
+    let error = report.clone().into_result().err();
+    output.result(&report::Report {
+        ok: error.is_none(),
+        error: error.as_ref().map(ToString::to_string),
+        repairs: mesh.repairs,
+        mesh: report,
+    });
+    let Some(error) = error else {
+        return Ok(ExitCode::SUCCESS);
+    };
+    output.error_for_people(&error);
+    Ok(ExitCode::FAILURE)
+}
+
+#[cfg(not(feature = "meshio"))]
+pub(super) fn main(arguments: &Arguments, _output: Output) -> Result<ExitCode> {
+    Err(crate::Error::Unsupported {
+        what: format!("reading {}", arguments.file.display()),
+        why: "this build leaves out mesh files".into(),
+        instead: "build with the feature `meshio`".into(),
+    })
+}
+
+#[cfg(feature = "meshio")]
+mod report {
+    use std::fmt;
+
+    use serde::Serialize;
+
+    use crate::shape::MeshReport;
+    use crate::shape::file::Repairs;
+
+    /// What was found in a mesh file.
+    #[derive(Debug, Serialize)]
+    pub struct Report {
+        /// Whether it can be simulated.
+        pub ok: bool,
+        /// The first thing that keeps it from that.
+        #[serde(skip_serializing_if = "Option::is_none")]
+        pub error: Option<String>,
+        /// What reading it mended.
+        pub repairs: Repairs,
+        #[serde(flatten)]
+        pub mesh: MeshReport,
+    }
+
+    impl fmt::Display for Report {
+        fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+            write!(f, "{}", self.mesh)?;
+            for (count, what) in [
+                (self.repairs.polygons_split, "polygons split into triangles"),
+                (
+                    self.repairs.merged_same,
+                    "vertices merged with one at the same place",
+                ),
+                (
+                    self.repairs.merged_near,
+                    "vertices merged with one very near",
+                ),
+                (
+                    self.repairs.collapsed,
+                    "faces without area left out after merging",
+                ),
+            ] {
+                if count > 0 {
+                    write!(f, "\n  mended in reading: {count} {what}")?;
+                }
+            }
+            Ok(())
+        }
+    }
+}

@@ -1,0 +1,88 @@
+//! The command line: `hydrograd run | added-mass | gradcheck | check-mesh`.
+//!
+//! Results go to standard output, everything else (progress, warnings, errors) to standard error.
+//! With `--json` standard output holds one JSON object and nothing else: the result, or
+//! `{"error": …}`. Exit codes: 0 done, 1 failed, 2 wrong usage.
+
+mod added_mass;
+mod check_mesh;
+mod gradcheck;
+mod input;
+mod options;
+mod output;
+mod progress;
+mod run;
+mod trajectory;
+
+use std::process::ExitCode;
+
+use clap::{Parser, Subcommand};
+
+use output::Output;
+
+/// Rigid bodies that feel each other through the water: simulation and exact gradients.
+#[derive(Debug, Parser)]
+#[command(
+    name = "hydrograd",
+    version,
+    arg_required_else_help = true,
+    after_help = "Units are SI throughout. `hydrograd COMMAND --help` tells all about a command."
+)]
+struct Cli {
+    /// Print one JSON object on standard output and nothing else there.
+    #[arg(long, global = true)]
+    json: bool,
+    #[command(subcommand)]
+    command: Command,
+}
+
+#[derive(Debug, Subcommand)]
+enum Command {
+    /// Simulate a scene; write and summarise its trajectory.
+    Run(run::Arguments),
+    /// Compute the added mass of all bodies of a scene, of a mesh, or of a shape by formula.
+    AddedMass(added_mass::Arguments),
+    /// Hold the gradient of a scene's trajectory against finite differences.
+    Gradcheck(gradcheck::Arguments),
+    /// Say whether a mesh can be simulated: what is wrong, where, and how to mend it.
+    CheckMesh(check_mesh::Arguments),
+}
+
+/// Runs the command line of this process.
+pub fn main() -> ExitCode {
+    let cli = match Cli::try_parse() {
+        Ok(cli) => cli,
+        Err(error) => {
+            // Help and version come this way too; they belong on standard output.
+            let wrong = error.use_stderr();
+            if error.print().is_err() || !wrong {
+                return ExitCode::from(if wrong { 2 } else { 0 });
+            }
+            if std::env::args_os().any(|a| a == "--json") {
+                output::print_error_object(error.to_string().trim());
+            }
+            return ExitCode::from(2);
+        }
+    };
+    let output = Output { json: cli.json };
+    let done = match cli.command {
+        Command::Run(arguments) => run::main(&arguments, output),
+        Command::AddedMass(arguments) => added_mass::main(&arguments, output),
+        Command::Gradcheck(arguments) => gradcheck::main(&arguments, output),
+        Command::CheckMesh(arguments) => check_mesh::main(&arguments, output),
+    };
+    done.unwrap_or_else(|error| {
+        output.error(&error);
+        ExitCode::FAILURE
+    })
+}
+
+#[cfg(test)]
+mod tests {
+    use clap::CommandFactory;
+
+    #[test]
+    fn arguments_are_consistent() {
+        super::Cli::command().debug_assert();
+    }
+}

@@ -1,0 +1,36 @@
+//! A progress bar on standard error, if a person is there to see it.
+
+use std::io::IsTerminal;
+
+use indicatif::{ProgressBar, ProgressStyle};
+
+/// A bar over `steps` steps of some work; hidden unless standard error is a terminal.
+pub(super) struct Progress(ProgressBar);
+
+impl Progress {
+    pub fn new(what: &'static str, steps: usize) -> Self {
+        if !std::io::stderr().is_terminal() {
+            return Self(ProgressBar::hidden());
+        }
+        let bar = ProgressBar::new(steps as u64).with_message(what);
+        let style = ProgressStyle::with_template(
+            "{msg} {wide_bar} {pos}/{len}  {elapsed} passed, {eta} to go",
+        );
+        if let Ok(style) = style {
+            bar.set_style(style);
+        }
+        Self(bar)
+    }
+
+    /// So many steps are done.
+    #[expect(dead_code, reason = "for the functions that are to be filled in")]
+    pub fn set(&self, done: usize) {
+        self.0.set_position(done as u64);
+    }
+}
+
+impl Drop for Progress {
+    fn drop(&mut self) {
+        self.0.finish_and_clear();
+    }
+}

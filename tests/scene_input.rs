@@ -1,0 +1,330 @@
+//! Bad scene files: each gets an error that names the place and the remedy, and never a panic.
+
+use hydrograd::Scene;
+
+/// A scene file with one ball; `body` is added to the ball, `rest` after it.
+fn text(body: &str, rest: &str) -> String {
+    format!(
+        "time_step = 0.01\nsteps = 10\n\n[fluid]\ndensity = 998.0\n\n[[bodies]]\nname = \"ball\"\n\
+         {body}\n\n{rest}\n"
+    )
+}
+
+#[track_caller]
+fn has(message: &str, words: &[&str]) {
+    for word in words {
+        assert!(message.contains(word), "no {word:?} in: {message}");
+    }
+}
+
+#[track_caller]
+fn unread(text: &str, words: &[&str]) {
+    has(&Scene::from_toml(text, "").unwrap_err().to_string(), words);
+}
+
+#[test]
+fn unknown_keys_get_line_place_and_nearest_key() {
+    let sphere = "shape = { kind = \"sphere\", radius = 1.0 }";
+    let in_body = |line: &str| text(line, "");
+    let after = |lines: &str| text(sphere, lines);
+    for (text, words) in [
+        (
+            "time_step = 1\nstepss = 2\n".into(),
+            ["line 2", "the scene", "`stepss`", "`steps`"],
+        ),
+        (
+            in_body("masss = 1"),
+            [
+                "line 9",
+                "body \"ball\" has",
+                "`masss`",
+                "did you mean `mass`?",
+            ],
+        ),
+        (
+            in_body("shape = { kind = \"sphere\", raduis = 1 }"),
+            [
+                "line 9",
+                "body \"ball\": shape",
+                "`raduis`",
+                "did you mean `radius`?",
+            ],
+        ),
+        (
+            in_body("[bodies.shape]\nkind = \"box\"\nsize = [1, 1, 1]\nface = 9"),
+            [
+                "line 12",
+                "body \"ball\": shape",
+                "`face`",
+                "did you mean `faces`?",
+            ],
+        ),
+        (
+            in_body("[bodies.joint]\nkind = \"fixed\"\naxis = [1, 0, 0]"),
+            ["line 11", "body \"ball\": joint", "`axis`", "remove it"],
+        ),
+        (
+            in_body("joint = { kind = \"free\", plane = \"xy\" }"),
+            ["line 9", "body \"ball\": joint", "`plane`", "remove it"],
+        ),
+        (
+            in_body("joint = { kind = \"revolute\", axes = [1, 0, 0] }"),
+            [
+                "line 9",
+                "body \"ball\": joint",
+                "`axes`",
+                "did you mean `axis`?",
+            ],
+        ),
+        (
+            in_body("[[bodies.motion]]\nkind = \"linear\"\noffset = 1\nrate = 1\nphase = 2"),
+            [
+                "line 13",
+                "body \"ball\": motion[0]",
+                "`phase`",
+                "offset, rate",
+            ],
+        ),
+        (
+            in_body("placement = { positon = [1, 0, 0] }"),
+            [
+                "line 9",
+                "body \"ball\": placement",
+                "`positon`",
+                "did you mean `position`?",
+            ],
+        ),
+        (
+            in_body("drag = { lineare = 1 }"),
+            [
+                "line 9",
+                "body \"ball\": drag",
+                "`lineare`",
+                "did you mean `linear`?",
+            ],
+        ),
+        (
+            after("[[walls]]\npoint = [0, 0, 0]\nnormals = [0, 0, 1]"),
+            ["line 13", "walls[0]", "`normals`", "did you mean `normal`?"],
+        ),
+        (
+            after("[initial]\nqq = [1]"),
+            ["line 12", "initial", "`qq`", "q, v, momentum"],
+        ),
+        (
+            after("[controller]\nkind = \"constant\"\ncontrols = [1]"),
+            [
+                "line 13",
+                "controller",
+                "`controls`",
+                "did you mean `control`?",
+            ],
+        ),
+        (
+            in_body("").replace("density = 998.0", "density = 998.0\ncurent = [0, 0, 0]"),
+            ["line 6", "fluid", "`curent`", "did you mean `current`?"],
+        ),
+    ] {
+        unread(&text, &words);
+    }
+}
+
+#[test]
+fn wrong_kinds_get_the_nearest_and_all_choices() {
+    unread(
+        &text("shape = { kind = \"spere\", radius = 1 }", ""),
+        &[
+            "line 9",
+            "body \"ball\": shape.kind",
+            "`spere`",
+            "did you mean `sphere`?",
+            "capsule",
+        ],
+    );
+    unread(
+        &text("[bodies.joint]\nkind = \"planer\"\nplane = \"yz\"", ""),
+        &[
+            "line 10",
+            "body \"ball\": joint.kind",
+            "did you mean `planar`?",
+        ],
+    );
+    unread(
+        &text("[bodies.joint]\nkind = \"planar\"\nplane = \"zy\"", ""),
+        &["line 11", "body \"ball\": joint.plane", "`zy`", "yz"],
+    );
+    unread(
+        &text("drag = { part = \"tangent\" }", ""),
+        &[
+            "line 9",
+            "body \"ball\": drag.part",
+            "did you mean `tangential`?",
+        ],
+    );
+    unread(
+        "preset = \"papper\"\n",
+        &["line 1", "preset", "did you mean `paper`?"],
+    );
+}
+
+#[test]
+fn missing_keys_are_named() {
+    unread(
+        "steps = 1\n[fluid]\ndensity = 1\n",
+        &["the scene", "`time_step`", "add"],
+    );
+    unread(
+        "time_step = 1\nsteps = 1\nbodies = []\n[fluid]\ncurrent = [0, 0, 0]\n",
+        &["line 4", "fluid", "`density`"],
+    );
+    unread(
+        "time_step = 1\nsteps = 1\n[fluid]\ndensity = 1\n[[bodies]]\nmass = 1\n",
+        &["line 5", "body number 1 (unnamed)", "`name`"],
+    );
+    unread(
+        &text("[[bodies.motion]]\nkind = \"sine\"\namplitude = 1", ""),
+        &["line 9", "body \"ball\": motion[0]", "`frequency`"],
+    );
+    unread(
+        &text("shape = { radius = 1 }", ""),
+        &[
+            "line 9",
+            "body \"ball\": shape",
+            "`kind`",
+            "one of sphere, ellipsoid",
+        ],
+    );
+}
+
+#[test]
+fn wrong_types_name_key_and_line() {
+    let long = "shape = { kind = \"box\", faces = 12, size = [1, 2] }";
+    for (text, words) in [
+        (
+            text("mass = \"1 kg\"", ""),
+            ["line 9", "body \"ball\": mass", "expected a number"],
+        ),
+        (
+            text("locked = 1", ""),
+            ["line 9", "body \"ball\": locked", "expected true or false"],
+        ),
+        (
+            text(long, ""),
+            [
+                "line 9",
+                "body \"ball\": shape.size",
+                "expected a list of length 3",
+            ],
+        ),
+        (
+            text(
+                "[bodies.shape]\nkind = \"sphere\"\nfaces = 320\nradius = \"1\"",
+                "",
+            ),
+            [
+                "line 12",
+                "body \"ball\": shape.radius",
+                "expected a number",
+            ],
+        ),
+        (
+            text(
+                "[bodies.shape]\nkind = \"sphere\"\nfaces = -1\nradius = 1",
+                "",
+            ),
+            ["line 11", "body \"ball\": shape.faces", "whole number"],
+        ),
+        (
+            text("placement = { position = [1, 2] }", ""),
+            ["line 9", "body \"ball\": placement.position", "length 3"],
+        ),
+        (
+            text("", "").replace("= 10", "= 1.5"),
+            ["line 2", "steps", "whole number"],
+        ),
+        (
+            text("", "[initial]\nq = [1, \"2\"]"),
+            ["line 12", "initial.q[1]", "expected a number"],
+        ),
+        (
+            text("shape = \"sphere\"", ""),
+            ["line 9", "body \"ball\": shape", "sphere"],
+        ),
+    ] {
+        unread(&text, &words);
+    }
+    // Whole numbers do where numbers are expected.
+    let scene = Scene::from_toml(&text("mass = 1\ninertia = [1, 1, 1]", ""), "").unwrap();
+    scene.validate().unwrap();
+}
+
+#[test]
+fn broken_toml_gets_its_line() {
+    unread("time_step = 1\nsteps =\n", &["line 2", "TOML"]);
+    unread("time_step = 1\n[fluid\n", &["line 2", "TOML"]);
+    unread(
+        "time_step = 1\ntime_step = 2\n",
+        &["line 2", "duplicate key"],
+    );
+    unread(
+        "# only a comment\n\n",
+        &["nothing but blanks", "time_step", "[[bodies]]"],
+    );
+    unread("", &["line 1", "nothing but blanks"]);
+}
+
+#[test]
+fn files_that_are_no_scenes() {
+    let folder = tempfile::tempdir().unwrap();
+    let unread = |name: &str, words: &[&str]| {
+        has(
+            &Scene::load(folder.path().join(name))
+                .unwrap_err()
+                .to_string(),
+            words,
+        );
+    };
+    std::fs::write(
+        folder.path().join("latin.toml"),
+        b"steps = 1\nname = \"caf\xe9\"\n",
+    )
+    .unwrap();
+    std::fs::write(folder.path().join("empty.toml"), "").unwrap();
+    unread("latin.toml", &["latin.toml", "line 2", "UTF-8"]);
+    unread("empty.toml", &["empty.toml", "line 1", "time_step"]);
+    unread(
+        "emptyy.toml",
+        &["emptyy.toml", "read failed", "did you mean", "empty.toml?"],
+    );
+    unread("quite/elsewhere.toml", &["elsewhere.toml", "no such file"]);
+    unread("", &["read failed", "folder"]);
+}
+
+/// Example scenes cut short, with a line missing, or with a character changed: read or refused with
+/// a line number, never a panic.
+#[test]
+fn mangled_scenes_never_panic() {
+    let folder = std::path::Path::new(env!("CARGO_MANIFEST_DIR")).join("examples/scenes");
+    let judge = |text: &str| match Scene::from_toml(text, "") {
+        Ok(scene) => drop(scene.validate()),
+        Err(error) => has(&error.to_string(), &["line "]),
+    };
+    for name in ["falling_ball", "fish"] {
+        let text = std::fs::read_to_string(folder.join(format!("{name}.toml"))).unwrap();
+        let lines: Vec<&str> = text.lines().collect();
+        for k in 0..lines.len() {
+            let without = [&lines[..k], &lines[k + 1..]].concat().join("\n");
+            judge(&without);
+        }
+        for (at, c) in text.char_indices().step_by(3) {
+            judge(&text[..at]);
+            for other in ["", "x", "-", "\"", "[", "\n", "é"] {
+                judge(&format!(
+                    "{}{other}{}",
+                    &text[..at],
+                    &text[at + c.len_utf8()..]
+                ));
+            }
+        }
+    }
+}

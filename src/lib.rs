@@ -10,9 +10,11 @@ pub mod error;
 pub mod multibody;
 pub mod scene;
 pub mod shape;
+pub mod simulate;
 pub mod solver;
 
 pub use error::{Error, Result};
 pub use hydrograd_adjoint as adjoint;
 pub use scene::{Body, BodyId, Fluid, Joint, Scene, Shape};
 pub use shape::{MassProperties, MeshReport, TriMesh};
+pub use simulate::{Controls, Fidelity, Gradient, Rollout, Settings, Simulator, objective};

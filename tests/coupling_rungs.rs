@@ -35,13 +35,23 @@ fn full(method: Method, solver: Solver, walls: &[Wall]) -> Full {
 
 fn poses() -> Vec<Pose> {
     vec![
-        Pose::new(exp_matrix(&Vec3::new(0.2, -0.4, 0.3)), Vec3::new(0.1, -0.2, 1.0)),
-        Pose::new(exp_matrix(&Vec3::new(-0.7, 0.5, 0.9)), Vec3::new(0.5, 0.9, 0.9)),
+        Pose::new(
+            exp_matrix(&Vec3::new(0.2, -0.4, 0.3)),
+            Vec3::new(0.1, -0.2, 1.0),
+        ),
+        Pose::new(
+            exp_matrix(&Vec3::new(-0.7, 0.5, 0.9)),
+            Vec3::new(0.5, 0.9, 0.9),
+        ),
     ]
 }
 
 fn displaced(z: &[Vec6], h: f64) -> Vec<Pose> {
-    poses().iter().zip(z).map(|(p, z)| p.displace(&(h * z))).collect()
+    poses()
+        .iter()
+        .zip(z)
+        .map(|(p, z)| p.displace(&(h * z)))
+        .collect()
 }
 
 fn wavy(n: usize, phase: f64) -> Vec<f64> {
@@ -49,7 +59,10 @@ fn wavy(n: usize, phase: f64) -> Vec<f64> {
 }
 
 fn field(phase: f64) -> Vec<Vec6> {
-    wavy(12, phase).chunks(6).map(Vec6::from_row_slice).collect()
+    wavy(12, phase)
+        .chunks(6)
+        .map(Vec6::from_row_slice)
+        .collect()
 }
 
 fn dot(a: &[Vec6], b: &[Vec6]) -> f64 {
@@ -63,7 +76,10 @@ fn relative(a: f64, b: f64) -> f64 {
 fn check(coupling: &Full, tolerance: f64) {
     let basis = DMatrix::from_vec(12, 3, wavy(36, 0.4));
     let twist = DVector::from_vec(wavy(12, 2.2));
-    let (cx, cy) = (DVector::from_vec(wavy(3, 0.1)), DVector::from_vec(wavy(3, 1.1)));
+    let (cx, cy) = (
+        DVector::from_vec(wavy(3, 0.1)),
+        DVector::from_vec(wavy(3, 1.1)),
+    );
     let (z, y_field) = (field(0.7), field(1.9));
     let energy = |poses: &[Pose], x: &DVector<f64>, y: &DVector<f64>| {
         let b = DMatrix::from_columns(&[x.clone(), y.clone()]);
@@ -80,12 +96,20 @@ fn check(coupling: &Full, tolerance: f64) {
         (8.0 * d(h) - d(2.0 * h)) / (12.0 * h)
     };
     let gradient = dot(&record.gradient(&cx, &cy), &z);
-    assert!(relative(gradient, difference(&x, &y)) < tolerance, "gradient {gradient}");
+    assert!(
+        relative(gradient, difference(&x, &y)) < tolerance,
+        "gradient {gradient}"
+    );
     assert!(relative(record.gradient_along(&cy, &z).dot(&cx), gradient) < 1e-10);
     // vjp for a direction outside the basis, and the impulses.
-    let pull = record.vjp(Direction::Twist(&twist), Direction::Basis(&cy)).unwrap();
+    let pull = record
+        .vjp(Direction::Twist(&twist), Direction::Basis(&cy))
+        .unwrap();
     let value = dot(&pull.wrench, &z);
-    assert!(relative(value, difference(&twist, &y)) < tolerance, "vjp {value}");
+    assert!(
+        relative(value, difference(&twist, &y)) < tolerance,
+        "vjp {value}"
+    );
     assert!(relative(pull.momentum_x.dot(&y), energy(&poses(), &twist, &y)) < 1e-10);
     assert!(relative(pull.momentum_y.dot(&twist), energy(&poses(), &twist, &y)) < 1e-10);
     // hvp: tangents of impulses and wrenches.
@@ -94,23 +118,39 @@ fn check(coupling: &Full, tolerance: f64) {
     let weights = [8.0, -8.0, -1.0, 1.0].map(|w| w / (12.0 * h));
     let rate = |c: &DVector<f64>| {
         let terms = records.iter().zip(weights);
-        terms.fold(DVector::zeros(12), |sum, (r, w)| sum + w * (r.momenta() * c))
+        terms.fold(DVector::zeros(12), |sum, (r, w)| {
+            sum + w * (r.momenta() * c)
+        })
     };
     for (a, b) in [(&cx, &cy), (&cx, &cx)] {
-        let t = record.hvp(Direction::Basis(a), Direction::Basis(b), &z).unwrap();
+        let t = record
+            .hvp(Direction::Basis(a), Direction::Basis(b), &z)
+            .unwrap();
         let dm = rate(a);
-        assert!((&t.momentum_x - &dm).norm() < tolerance * dm.norm(), "momentum tangent");
+        assert!(
+            (&t.momentum_x - &dm).norm() < tolerance * dm.norm(),
+            "momentum tangent"
+        );
         let dm = rate(b);
-        assert!((&t.momentum_y - &dm).norm() < tolerance * dm.norm(), "momentum tangent y");
+        assert!(
+            (&t.momentum_y - &dm).norm() < tolerance * dm.norm(),
+            "momentum tangent y"
+        );
         let g = record.gradient(a, b);
         let size = dot(&g, &g).sqrt();
         for k in 0..2 {
             let terms = records.iter().zip(weights);
             let d = terms.fold(Vec6::zeros(), |sum, (r, w)| sum + w * r.gradient(a, b)[k]);
-            assert!((t.wrench[k] - d).norm() < tolerance * size, "{} vs {d}", t.wrench[k]);
+            assert!(
+                (t.wrench[k] - d).norm() < tolerance * size,
+                "{} vs {d}",
+                t.wrench[k]
+            );
         }
         // The order of two displacements matters by their bracket.
-        let other = record.hvp(Direction::Basis(a), Direction::Basis(b), &y_field).unwrap();
+        let other = record
+            .hvp(Direction::Basis(a), Direction::Basis(b), &y_field)
+            .unwrap();
         let bracket: f64 = (0..2)
             .map(|k| g[k].dot(&hydrograd::adjoint::lie::cross_motion(&z[k], &y_field[k])))
             .sum();
@@ -119,8 +159,14 @@ fn check(coupling: &Full, tolerance: f64) {
     }
 }
 
-const WALL: Wall = Wall { point: [0.0, 0.0, 0.1], normal: [0.1, 0.0, 1.0] };
-const SIDE: Wall = Wall { point: [-0.8, 0.0, 0.0], normal: [1.0, 0.0, -0.1] };
+const WALL: Wall = Wall {
+    point: [0.0, 0.0, 0.1],
+    normal: [0.1, 0.0, 1.0],
+};
+const SIDE: Wall = Wall {
+    point: [-0.8, 0.0, 0.0],
+    normal: [1.0, 0.0, -0.1],
+};
 
 #[test]
 fn vertex_sources_without_walls() {

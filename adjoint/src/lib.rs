@@ -5,3 +5,4 @@ pub mod drag;
 pub mod kernel;
 pub mod lie;
 pub mod rigid;
+pub mod step;

@@ -338,7 +338,8 @@ pub struct StepBar {
 }
 
 impl StepBar {
-    fn zeros(e: &Evaluation) -> Self {
+    /// All zero.
+    pub fn zeros(e: &Evaluation) -> Self {
         let nv = e.system.tree.velocities();
         Self {
             state: StateBar {

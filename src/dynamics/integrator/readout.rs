@@ -102,6 +102,18 @@ impl Stepper<'_> {
         solve_vjp(e, &split, &state.y, v, v_bar, bar)
     }
 
+    /// Velocity that belongs to the generalised momentum `p` (user coordinates) at `e`, at t = 0.
+    ///
+    /// # Errors
+    /// A mass matrix that isn't positive definite.
+    pub fn velocity_of_momentum(&self, e: &Evaluation, p: &DVector<f64>) -> Result<DVector<f64>> {
+        let hat = e
+            .system
+            .tree
+            .per_joint(&e.q, p, |j, q, p| j.frame_momentum(q, p));
+        solve(e, &self.split(&[], When::At(0.0)), &hat)
+    }
+
     /// The conserved variable y that belongs to velocity `v` at `e`.
     pub fn conserved(&self, e: &Evaluation, v: &DVector<f64>) -> DVector<f64> {
         if self.integrator.carries_velocity() {

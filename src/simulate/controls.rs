@@ -1,0 +1,54 @@
+//! Open-loop controls of a rollout.
+
+use super::Simulator;
+use crate::{Error, Result};
+use nalgebra::DMatrix;
+
+/// One row per control, one column per step: generalised forces of actuated joints (N, N m) and wrenches of
+/// thrusters (N, N m; world axes, about the body's origin), in the order of the bodies.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Controls(DMatrix<f64>);
+
+impl Controls {
+    /// No control for `steps` steps.
+    pub fn zeros(simulator: &Simulator, steps: usize) -> Self {
+        Self(DMatrix::zeros(simulator.system().controls, steps))
+    }
+
+    /// From a matrix, controls × steps.
+    ///
+    /// # Errors
+    /// A number of rows other than the simulator's, or a value that isn't finite.
+    pub fn from_matrix(simulator: &Simulator, matrix: DMatrix<f64>) -> Result<Self> {
+        let expected = simulator.system().controls;
+        if matrix.nrows() != expected {
+            return Err(Error::input(
+                "controls",
+                format!("{} × {}", matrix.nrows(), matrix.ncols()),
+                format!("must have {expected} rows, one per control, and a column per step"),
+            ));
+        }
+        if let Some(at) = matrix.iter().position(|x| !x.is_finite()) {
+            return Err(Error::input(
+                format!(
+                    "controls: row {}, step {}",
+                    at % matrix.nrows(),
+                    at / matrix.nrows()
+                ),
+                matrix[at],
+                "must be finite",
+            ));
+        }
+        Ok(Self(matrix))
+    }
+
+    /// Number of steps.
+    pub fn steps(&self) -> usize {
+        self.0.ncols()
+    }
+
+    /// As a matrix, controls × steps.
+    pub fn matrix(&self) -> &DMatrix<f64> {
+        &self.0
+    }
+}

@@ -1,0 +1,392 @@
+//! The adjoint of a whole rollout against central differences along random directions.
+
+use super::{Controls, Cotangents, Rollout, Sample, Simulator};
+use crate::adjoint::lie::Vec3;
+use crate::dynamics::{Drive, Parameters};
+use crate::{Error, Result};
+use nalgebra::{DMatrix, DVector};
+use serde::Serialize;
+use std::time::Instant;
+
+/// What to check.
+#[derive(Clone, Copy, Debug)]
+pub struct Settings {
+    /// Steps of the rollout.
+    pub steps: usize,
+    /// Random directions per group.
+    pub directions: usize,
+    /// Seed of the directions.
+    pub seed: u64,
+    /// Timed repetitions of forward and gradient after a warm-up; 0 for no timing.
+    pub timings: usize,
+}
+
+/// Error of one direction at each step size.
+#[derive(Clone, Debug, Serialize)]
+pub struct Direction {
+    /// `controls`, `initial`, `parameters` or `gains`.
+    pub group: &'static str,
+    /// Derivative by the adjoint.
+    pub adjoint: f64,
+    /// Central differences at each of [`Report::step_sizes`].
+    pub differences: Vec<f64>,
+    /// Relative error at each step size.
+    pub rel_errors: Vec<f64>,
+}
+
+/// Outcome of a check.
+#[derive(Clone, Debug, Serialize)]
+pub struct Report {
+    /// Step sizes, relative to the scale of each direction.
+    pub step_sizes: Vec<f64>,
+    /// Every direction.
+    pub directions: Vec<Direction>,
+    /// Largest over the directions of the smallest error over the step sizes.
+    pub max_rel_error: f64,
+    /// The same for the controls; none where there is no control.
+    pub rel_error_controls: Option<f64>,
+    /// The same for the initial state.
+    pub rel_error_initial: Option<f64>,
+    /// The same for physical parameters and gains.
+    pub rel_error_parameters: Option<f64>,
+    /// Median time of a rollout, s.
+    pub forward_seconds: f64,
+    /// Median time of a rollout and its gradient, s.
+    pub gradient_seconds: f64,
+    /// Their ratio.
+    pub ratio: f64,
+}
+
+/// Differences smaller than this against the group's largest derivative say nothing of the adjoint: they are rounding.
+const NEGLIGIBLE: f64 = 1e-9;
+
+/// Uniform numbers in (−1, 1) by the splitmix64 generator: the same on every machine.
+struct Random(u64);
+
+impl Random {
+    fn next(&mut self) -> f64 {
+        self.0 = self.0.wrapping_add(0x9E37_79B9_7F4A_7C15);
+        let mut z = self.0;
+        z = (z ^ (z >> 30)).wrapping_mul(0xBF58_476D_1CE4_E5B9);
+        z = (z ^ (z >> 27)).wrapping_mul(0x94D0_49BB_1331_11EB);
+        z ^= z >> 31;
+        (z >> 11) as f64 / (1u64 << 52) as f64 - 1.0
+    }
+}
+
+/// Sizes that make the check independent of units.
+struct Scales {
+    length: f64,
+    velocity: DVector<f64>,
+    displacement: DVector<f64>,
+    force: Vec<f64>,
+}
+
+/// A random functional of the trajectory: markers on the bodies and velocities, at the middle and the end.
+struct Probe {
+    weights: Vec<(usize, Vec<Vec3>, Vec<Vec3>, DVector<f64>)>,
+}
+
+impl Probe {
+    fn value(&self, samples: &[Sample]) -> f64 {
+        let mut out = 0.0;
+        for (n, arms, directions, velocity) in &self.weights {
+            let s = &samples[*n];
+            for (b, pose) in s.poses.iter().enumerate() {
+                out += directions[b].dot(&pose.apply(&arms[b]));
+            }
+            out += velocity.dot(&s.v);
+        }
+        out
+    }
+
+    fn cotangents(&self, rollout: &Rollout) -> Cotangents {
+        let mut out = rollout.zero_cotangents();
+        for (n, arms, directions, velocity) in &self.weights {
+            for (b, pose) in rollout.samples()[*n].poses.iter().enumerate() {
+                let turn = (pose.rotation * arms[b]).cross(&directions[b]);
+                for k in 0..3 {
+                    out.positions[(3 * b + k, *n)] += directions[b][k];
+                    out.rotations[(3 * b + k, *n)] += turn[k];
+                }
+            }
+            let mut column = out.v.column_mut(*n);
+            column += velocity;
+        }
+        out
+    }
+}
+
+fn scales(simulator: &Simulator, rollout: &Rollout, steps: usize) -> Result<Scales> {
+    let system = simulator.system();
+    let volume = system.bodies.iter().map(|b| b.volume).fold(0.0, f64::max);
+    let length = if volume > 0.0 { volume.cbrt() } else { 1.0 };
+    let duration = simulator.time_step() * steps as f64;
+    let nv = system.tree.velocities();
+    let mut displacement = DVector::from_element(nv, length);
+    for link in system.tree.links() {
+        for (k, basis) in link.v.clone().zip(link.joint.basis()) {
+            if basis.fixed_rows::<3>(3).norm() > 0.0 {
+                displacement[k] = 1.0;
+            }
+        }
+    }
+    let stepper = simulator.stepper();
+    let e = stepper.evaluate(simulator.start().0, false)?;
+    let mut velocity = &displacement / duration.max(1.0);
+    for s in rollout.samples() {
+        velocity = velocity.sup(&s.v.abs());
+    }
+    let mut force = Vec::new();
+    for (body, link) in system.bodies.iter().zip(system.tree.links()) {
+        if body.joint_control.is_some() {
+            for i in link.v.clone() {
+                force.push(e.mass_matrix[(i, i)] * velocity[i] / duration);
+            }
+        }
+        if body.thruster.is_some() {
+            let mass = link
+                .v
+                .clone()
+                .map(|i| e.mass_matrix[(i, i)])
+                .fold(0.0, f64::max);
+            force.extend([mass * length / duration; 6]);
+        }
+    }
+    Ok(Scales {
+        length,
+        velocity,
+        displacement,
+        force,
+    })
+}
+
+/// Runs the check. The simulator's solver tolerance decides how small an error can be seen: use 1e-12.
+///
+/// # Errors
+/// A rollout that fails.
+pub fn gradcheck(simulator: &mut Simulator, settings: &Settings) -> Result<Report> {
+    if settings.steps == 0 || settings.directions == 0 {
+        return Err(Error::input(
+            "gradcheck: steps and directions",
+            format!("{} and {}", settings.steps, settings.directions),
+            "must both be at least 1",
+        ));
+    }
+    let steps = settings.steps;
+    let zero = Controls::zeros(simulator, steps);
+    let rollout = simulator.rollout(&zero)?;
+    let scale = scales(simulator, &rollout, steps)?;
+    let mut random = Random(settings.seed);
+    let mut vector = |n: usize| DVector::from_fn(n, |_, _| random.next());
+    let bodies = simulator.system().len();
+    let nv = simulator.system().tree.velocities();
+    let points = |v: &DVector<f64>, f: f64| -> Vec<Vec3> {
+        (0..bodies)
+            .map(|b| f * Vec3::from(v.fixed_rows::<3>(3 * b)))
+            .collect()
+    };
+    let probe = Probe {
+        weights: [steps / 2, steps]
+            .into_iter()
+            .map(|n| {
+                (
+                    n,
+                    points(&vector(3 * bodies), scale.length),
+                    points(&vector(3 * bodies), 1.0 / scale.length),
+                    vector(nv).component_div(&scale.velocity),
+                )
+            })
+            .collect(),
+    };
+    let gradient = rollout.vjp(&probe.cotangents(&rollout))?;
+    drop(rollout);
+
+    let step_sizes = vec![1e-2, 1e-3, 1e-4, 1e-5];
+    let (q0, v0) = (simulator.start().0.clone(), simulator.start().1.clone());
+    let parameters = simulator.parameters().clone();
+    let gains = simulator.policy().gains();
+    let mut directions = Vec::new();
+    for _ in 0..settings.directions {
+        let controls = simulator.system().controls;
+        if controls > 0 {
+            let mut d = DMatrix::from_vec(
+                controls,
+                steps,
+                vector(controls * steps).as_slice().to_vec(),
+            );
+            for (mut row, f) in d.row_iter_mut().zip(&scale.force) {
+                row *= *f;
+            }
+            let adjoint = gradient.controls.dot(&d);
+            directions.push(measure("controls", adjoint, &step_sizes, |h| {
+                let c = Controls::from_matrix(simulator, h * &d)?;
+                Ok(probe.value(simulator.rollout(&c)?.samples()))
+            })?);
+        }
+        let (mut dq, mut dv) = (
+            vector(nv).component_mul(&scale.displacement) * 0.1,
+            vector(nv).component_mul(&scale.velocity) * 0.3,
+        );
+        for (drive, link) in simulator
+            .system()
+            .drives
+            .iter()
+            .zip(simulator.system().tree.links())
+        {
+            for i in link.v.clone() {
+                if *drive != Drive::Free {
+                    dv[i] = 0.0;
+                }
+                if matches!(drive, Drive::Motion(_)) {
+                    dq[i] = 0.0;
+                }
+            }
+        }
+        let adjoint = gradient.initial.q.dot(&dq) + gradient.initial.v.dot(&dv);
+        if nv > 0 {
+            directions.push(measure("initial", adjoint, &step_sizes, |h| {
+                let q = simulator.system().tree.integrate(&q0, &(h * &dq));
+                simulator.set_start(q, &v0 + h * &dv)?;
+                let value = probe.value(simulator.rollout(&zero)?.samples());
+                simulator.set_start(q0.clone(), v0.clone())?;
+                Ok(value)
+            })?);
+        }
+        let d = parameter_direction(&parameters, &vector(parameters.to_vec().len()), &scale);
+        let base = parameters.to_vec();
+        let adjoint = dot(&gradient.parameters.to_vec(), &d);
+        directions.push(measure("parameters", adjoint, &step_sizes, |h| {
+            let values: Vec<f64> = base.iter().zip(&d).map(|(x, d)| x + h * d).collect();
+            if let Some(p) = parameters.with_values(&values) {
+                simulator.replace_parameters(p);
+            }
+            let value = simulator.rollout(&zero).map(|r| probe.value(r.samples()));
+            simulator.replace_parameters(parameters.clone());
+            value
+        })?);
+        if gains.iter().any(|g| *g != 0.0) {
+            let d: Vec<f64> = vector(gains.len())
+                .iter()
+                .zip(&gains)
+                .map(|(r, g)| r * g)
+                .collect();
+            let adjoint = dot(&gradient.gains, &d);
+            directions.push(measure("gains", adjoint, &step_sizes, |h| {
+                let moved: Vec<f64> = gains.iter().zip(&d).map(|(g, d)| g + h * d).collect();
+                let policy = simulator.policy().with_gains(&moved)?;
+                simulator.set_policy(policy);
+                let value = simulator.rollout(&zero).map(|r| probe.value(r.samples()));
+                let policy = simulator.policy().with_gains(&gains)?;
+                simulator.set_policy(policy);
+                value
+            })?);
+        }
+    }
+    let (forward_seconds, gradient_seconds) = time(simulator, &zero, &probe, settings.timings)?;
+    let worst = |names: &[&str]| {
+        let group: Vec<&Direction> = directions
+            .iter()
+            .filter(|d| names.contains(&d.group))
+            .collect();
+        let largest = group.iter().map(|d| d.adjoint.abs()).fold(0.0, f64::max);
+        let errors = group
+            .iter()
+            .filter(|d| d.adjoint.abs() > NEGLIGIBLE * largest || largest == 0.0)
+            .map(|d| d.rel_errors.iter().copied().fold(f64::INFINITY, f64::min));
+        errors.reduce(f64::max)
+    };
+    Ok(Report {
+        max_rel_error: worst(&["controls", "initial", "parameters", "gains"]).unwrap_or(0.0),
+        rel_error_controls: worst(&["controls"]),
+        rel_error_initial: worst(&["initial"]),
+        rel_error_parameters: worst(&["parameters", "gains"]),
+        forward_seconds,
+        gradient_seconds,
+        ratio: if forward_seconds > 0.0 {
+            gradient_seconds / forward_seconds
+        } else {
+            0.0
+        },
+        step_sizes,
+        directions,
+    })
+}
+
+fn dot(a: &[f64], b: &[f64]) -> f64 {
+    a.iter().zip(b).map(|(a, b)| a * b).sum()
+}
+
+/// A direction in parameter space: a part of each value, or a size of its own where the value is zero.
+fn parameter_direction(p: &Parameters, random: &DVector<f64>, scale: &Scales) -> Vec<f64> {
+    let mut size = p.clone();
+    let speed = scale.velocity.max();
+    for b in 0..p.mass.len() {
+        let spin = p.inertia[b][0..3].iter().copied().fold(0.0, f64::max);
+        for k in 3..6 {
+            size.inertia[b][k] = 0.1 * spin;
+        }
+        size.linear_drag[b] = p.linear_drag[b].max(1e-3 * p.density * speed);
+    }
+    let values = size.to_vec();
+    values
+        .iter()
+        .zip(random.iter())
+        .map(|(v, r)| 0.3 * v * r)
+        .collect()
+}
+
+fn measure(
+    group: &'static str,
+    adjoint: f64,
+    step_sizes: &[f64],
+    mut value: impl FnMut(f64) -> Result<f64>,
+) -> Result<Direction> {
+    let mut differences = Vec::with_capacity(step_sizes.len());
+    for h in step_sizes {
+        // Fourth order: at 1e-3 its own error is far under rounding.
+        let mut pair = |h: f64| -> Result<f64> { Ok(value(h)? - value(-h)?) };
+        differences.push((8.0 * pair(*h)? - pair(2.0 * h)?) / (12.0 * h));
+    }
+    let error = |d: &f64| {
+        let size = d.abs().max(adjoint.abs());
+        if size == 0.0 {
+            0.0
+        } else {
+            (d - adjoint).abs() / size
+        }
+    };
+    Ok(Direction {
+        group,
+        adjoint,
+        rel_errors: differences.iter().map(error).collect(),
+        differences,
+    })
+}
+
+fn time(
+    simulator: &Simulator,
+    controls: &Controls,
+    probe: &Probe,
+    repetitions: usize,
+) -> Result<(f64, f64)> {
+    let (mut forward, mut gradient) = (Vec::new(), Vec::new());
+    for i in 0..=repetitions {
+        if repetitions == 0 {
+            return Ok((0.0, 0.0));
+        }
+        let start = Instant::now();
+        let rollout = simulator.rollout(controls)?;
+        let middle = start.elapsed().as_secs_f64();
+        rollout.vjp(&probe.cotangents(&rollout))?;
+        if i > 0 {
+            forward.push(middle);
+            gradient.push(start.elapsed().as_secs_f64());
+        }
+    }
+    let median = |x: &mut Vec<f64>| {
+        x.sort_by(f64::total_cmp);
+        x[x.len() / 2]
+    };
+    Ok((median(&mut forward), median(&mut gradient)))
+}

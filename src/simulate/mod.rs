@@ -1,0 +1,22 @@
+//! Simulations: settings, controllers, rollouts and their gradients.
+
+mod assemble;
+mod controls;
+pub mod gradcheck;
+mod gradient;
+pub mod objective;
+mod policy;
+mod rollout;
+mod settings;
+mod simulator;
+mod trajectory;
+
+pub use controls::Controls;
+pub use gradient::{Cotangents, Gradient, Initial};
+pub use objective::Objective;
+pub use policy::{
+    Action, ActionBar, Constant, Observation, OpenLoop, Pd, PdAxis, Policy, PushThenLock,
+};
+pub use rollout::{Rollout, Sample, Summary};
+pub use settings::{Fidelity, Settings};
+pub use simulator::{AddedMass, Simulator};

@@ -1,0 +1,193 @@
+//! Scalars of a trajectory and their derivatives with respect to what is observed.
+
+use super::{Cotangents, Rollout};
+use crate::scene::BodyId;
+use std::ops::Add;
+
+/// A scalar function of a rollout.
+pub trait Objective {
+    /// Its value.
+    fn value(&self, rollout: &Rollout) -> f64;
+
+    /// Its derivatives.
+    fn cotangents(&self, rollout: &Rollout) -> Cotangents;
+}
+
+/// A weighted sum of the terms of this module; add terms with `+`.
+#[derive(Clone, Debug, Default)]
+pub struct Sum(Vec<Term>);
+
+#[derive(Clone, Debug)]
+enum Term {
+    Position {
+        body: usize,
+        target: [f64; 3],
+        weight: f64,
+        last_only: bool,
+    },
+    Velocity {
+        index: usize,
+        target: f64,
+        weight: f64,
+    },
+    Coordinate {
+        index: usize,
+        target: f64,
+        weight: f64,
+    },
+    Effort(f64),
+}
+
+impl Add for Sum {
+    type Output = Sum;
+
+    fn add(mut self, other: Sum) -> Sum {
+        self.0.extend(other.0);
+        self
+    }
+}
+
+/// Squared distance (m²) of a body's origin from `target` (m, world) at the end.
+pub fn final_position(body: BodyId, target: [f64; 3]) -> Sum {
+    Sum(vec![Term::Position {
+        body: body.0,
+        target,
+        weight: 1.0,
+        last_only: true,
+    }])
+}
+
+/// Mean squared distance (m²) of a body's origin from `target` over all states.
+pub fn mean_position(body: BodyId, target: [f64; 3]) -> Sum {
+    Sum(vec![Term::Position {
+        body: body.0,
+        target,
+        weight: 1.0,
+        last_only: false,
+    }])
+}
+
+/// `weight · (q_i − target)²` at the end, for a coordinate of a prismatic, revolute or planar joint.
+pub fn final_coordinate(index: usize, target: f64, weight: f64) -> Sum {
+    Sum(vec![Term::Coordinate {
+        index,
+        target,
+        weight,
+    }])
+}
+
+/// `weight · (v_i − target)²` at the end.
+pub fn final_velocity(index: usize, target: f64, weight: f64) -> Sum {
+    Sum(vec![Term::Velocity {
+        index,
+        target,
+        weight,
+    }])
+}
+
+/// `weight` times the sum of squared open-loop controls.
+pub fn effort(weight: f64) -> Sum {
+    Sum(vec![Term::Effort(weight)])
+}
+
+impl Sum {
+    /// All terms times `factor`.
+    pub fn scaled(mut self, factor: f64) -> Self {
+        for term in &mut self.0 {
+            match term {
+                Term::Position { weight, .. }
+                | Term::Velocity { weight, .. }
+                | Term::Coordinate { weight, .. }
+                | Term::Effort(weight) => *weight *= factor,
+            }
+        }
+        self
+    }
+}
+
+/// Tangent index of coordinate `q[index]`, if its joint has plain coordinates.
+fn tangent_of(rollout: &Rollout, index: usize) -> Option<usize> {
+    let links = rollout.simulator().system().tree.links();
+    let link = links.iter().find(|l| l.q.contains(&index))?;
+    (link.q.len() == link.v.len()).then(|| link.v.start + index - link.q.start)
+}
+
+impl Objective for Sum {
+    fn value(&self, rollout: &Rollout) -> f64 {
+        let samples = rollout.samples();
+        let last = &samples[samples.len() - 1];
+        let of = |term: &Term| match *term {
+            Term::Position {
+                body,
+                target,
+                weight,
+                last_only,
+            } => {
+                let miss = |s: &super::Sample| {
+                    (s.poses[body].translation - nalgebra::Vector3::from(target)).norm_squared()
+                };
+                if last_only {
+                    weight * miss(last)
+                } else {
+                    weight * samples.iter().map(miss).sum::<f64>() / samples.len() as f64
+                }
+            }
+            Term::Velocity {
+                index,
+                target,
+                weight,
+            } => weight * (last.v[index] - target).powi(2),
+            Term::Coordinate {
+                index,
+                target,
+                weight,
+            } => weight * (last.q[index] - target).powi(2),
+            Term::Effort(weight) => weight * rollout.controls().norm_squared(),
+        };
+        self.0.iter().map(of).sum()
+    }
+
+    fn cotangents(&self, rollout: &Rollout) -> Cotangents {
+        let mut out = rollout.zero_cotangents();
+        let samples = rollout.samples();
+        let end = samples.len() - 1;
+        for term in &self.0 {
+            match *term {
+                Term::Position {
+                    body,
+                    target,
+                    weight,
+                    last_only,
+                } => {
+                    let (range, scale) = if last_only {
+                        (end..end + 1, weight)
+                    } else {
+                        (0..end + 1, weight / samples.len() as f64)
+                    };
+                    for n in range {
+                        for k in 0..3 {
+                            let miss = samples[n].poses[body].translation[k] - target[k];
+                            out.positions[(3 * body + k, n)] += 2.0 * scale * miss;
+                        }
+                    }
+                }
+                Term::Velocity {
+                    index,
+                    target,
+                    weight,
+                } => out.v[(index, end)] += 2.0 * weight * (samples[end].v[index] - target),
+                Term::Coordinate {
+                    index,
+                    target,
+                    weight,
+                } => {
+                    if let Some(i) = tangent_of(rollout, index) {
+                        out.q[(i, end)] += 2.0 * weight * (samples[end].q[index] - target);
+                    }
+                }
+                Term::Effort(weight) => out.controls += 2.0 * weight * rollout.controls(),
+            }
+        }
+        out
+    }
+}

@@ -1,0 +1,249 @@
+//! A trajectory, and its gradient.
+
+use super::trajectory::Seed;
+use super::{Cotangents, Gradient, Initial, Objective, Simulator};
+use crate::adjoint::lie::{Pose, Vec6};
+use crate::adjoint::step::{self, Path};
+use crate::coupling::Report;
+use crate::dynamics::{Memo, Parameters, State, StepBar};
+use crate::{Error, Result};
+use nalgebra::{DMatrix, DVector};
+use serde::Serialize;
+
+/// What is observed at one state.
+#[derive(Clone, Debug)]
+pub struct Sample {
+    /// Time, s.
+    pub time: f64,
+    /// Joint coordinates.
+    pub q: DVector<f64>,
+    /// Generalised velocity.
+    pub v: DVector<f64>,
+    /// Poses of the bodies.
+    pub poses: Vec<Pose>,
+    /// Kinetic energy of bodies and fluid, J.
+    pub kinetic_energy: f64,
+    /// Potential energy of weight and buoyancy, J.
+    pub potential_energy: f64,
+    /// Total momentum and angular momentum about the world origin, bodies and fluid.
+    pub momentum: Vec6,
+    /// Largest absolute entry of any single body's momentum.
+    pub largest_momentum: Vec6,
+    /// Total controls during the step that starts here; empty at the last state.
+    pub control: DVector<f64>,
+    /// Joints held during that step.
+    pub hold: Vec<bool>,
+    /// What the coupling reports.
+    pub report: Report,
+    pub(super) memo: Memo,
+}
+
+impl Sample {
+    /// Kinetic and potential energy, J.
+    pub fn energy(&self) -> f64 {
+        self.kinetic_energy + self.potential_energy
+    }
+}
+
+/// A trajectory: the forward pass, and the only key to its gradient.
+pub struct Rollout<'a> {
+    pub(super) simulator: &'a Simulator,
+    pub(super) controls: DMatrix<f64>,
+    pub(super) path: Path<State, Sample>,
+    pub(super) initial_velocity: DVector<f64>,
+}
+
+/// Figures of a whole trajectory.
+#[derive(Clone, Debug, Serialize)]
+pub struct Summary {
+    /// Steps made.
+    pub steps: usize,
+    /// Energy at the start, J.
+    pub energy_initial: f64,
+    /// Energy at the end, J.
+    pub energy_final: f64,
+    /// Largest change of the total momentum (linear or angular), relative to the largest momentum
+    /// of one body over the trajectory.
+    pub momentum_drift: f64,
+    /// Most iterations of a coupled solve.
+    pub iterations: usize,
+    /// Largest asymmetry of M_f before symmetrising.
+    pub asymmetry: f64,
+}
+
+impl<'a> Rollout<'a> {
+    /// Observations at states 0 … N.
+    pub fn samples(&self) -> &[Sample] {
+        self.path.kept()
+    }
+
+    /// States 0 … N.
+    pub fn states(&self) -> &[State] {
+        self.path.states()
+    }
+
+    /// Number of steps.
+    pub fn steps(&self) -> usize {
+        self.path.states().len() - 1
+    }
+
+    /// The simulator that made it.
+    pub fn simulator(&self) -> &'a Simulator {
+        self.simulator
+    }
+
+    /// Coordinates, nq × (N + 1).
+    pub fn q(&self) -> DMatrix<f64> {
+        let columns: Vec<_> = self.samples().iter().map(|s| s.q.clone()).collect();
+        DMatrix::from_columns(&columns)
+    }
+
+    /// Generalised velocities, nv × (N + 1).
+    pub fn v(&self) -> DMatrix<f64> {
+        let columns: Vec<_> = self.samples().iter().map(|s| s.v.clone()).collect();
+        DMatrix::from_columns(&columns)
+    }
+
+    /// The open-loop controls, controls × N.
+    pub fn controls(&self) -> &DMatrix<f64> {
+        &self.controls
+    }
+
+    /// Figures of the whole trajectory.
+    pub fn summary(&self) -> Summary {
+        let samples = self.samples();
+        let first = &samples[0];
+        let scale = samples
+            .iter()
+            .fold(Vec6::zeros(), |m, s| m.sup(&s.largest_momentum));
+        let (linear, angular) = (
+            scale.fixed_rows::<3>(0).max(),
+            scale.fixed_rows::<3>(3).max(),
+        );
+        let mut drift = 0.0_f64;
+        for s in samples {
+            let d = (s.momentum - first.momentum).abs();
+            let relative = |change: f64, scale: f64| if scale > 0.0 { change / scale } else { 0.0 };
+            drift = drift
+                .max(relative(d.fixed_rows::<3>(0).max(), linear))
+                .max(relative(d.fixed_rows::<3>(3).max(), angular));
+        }
+        Summary {
+            steps: self.steps(),
+            energy_initial: first.energy(),
+            energy_final: samples[samples.len() - 1].energy(),
+            momentum_drift: drift,
+            iterations: samples
+                .iter()
+                .map(|s| s.report.iterations)
+                .max()
+                .unwrap_or(0),
+            asymmetry: samples
+                .iter()
+                .map(|s| s.report.asymmetry)
+                .fold(0.0, f64::max),
+        }
+    }
+
+    /// Value of an objective.
+    pub fn value(&self, objective: &dyn Objective) -> f64 {
+        objective.value(self)
+    }
+
+    /// Gradient of an objective, in one reverse sweep.
+    ///
+    /// # Errors
+    /// As [`Rollout::vjp`].
+    pub fn gradient(&self, objective: &dyn Objective) -> Result<Gradient> {
+        self.vjp(&objective.cotangents(self))
+    }
+
+    /// Cotangents of the right sizes for this rollout, all zero.
+    pub fn zero_cotangents(&self) -> Cotangents {
+        let system = self.simulator.system();
+        Cotangents::zeros(
+            system.tree.velocities(),
+            system.len(),
+            system.controls,
+            self.steps(),
+        )
+    }
+
+    /// Transpose of the rollout: the gradient of Σ cotangent · observation.
+    ///
+    /// # Errors
+    /// Cotangents of other sizes than [`Rollout::zero_cotangents`] or not finite; a solve that misses its
+    /// tolerance.
+    pub fn vjp(&self, cotangents: &Cotangents) -> Result<Gradient> {
+        self.check(cotangents)?;
+        let simulator = self.simulator;
+        let trajectory = simulator.trajectory(&self.controls);
+        let seeds: Vec<Seed> = (0..=self.steps())
+            .map(|n| Seed {
+                q: cotangents.q.column(n).into_owned(),
+                v: cotangents.v.column(n).into_owned(),
+                positions: cotangents.positions.column(n).into_owned(),
+                rotations: cotangents.rotations.column(n).into_owned(),
+            })
+            .collect();
+        let (state_bar, locals) = step::reverse(&trajectory, &self.path, &seeds)?;
+        let mut controls = cotangents.controls.clone();
+        let mut parameters = Parameters::zeros(simulator.system().len());
+        let mut gains = vec![0.0; simulator.policy().gains().len()];
+        for (n, local) in locals.iter().enumerate() {
+            if n < self.steps() {
+                let mut column = controls.column_mut(n);
+                column += &local.control;
+            }
+            parameters.add(&local.parameters);
+            for (g, x) in gains.iter_mut().zip(&local.gains) {
+                *g += x;
+            }
+        }
+        // y₀ = y(q₀, v₀).
+        let e = trajectory.stepper.evaluate(&self.states()[0].q, true)?;
+        let mut bar = StepBar::zeros(&e);
+        bar.state.q = state_bar.q;
+        trajectory
+            .stepper
+            .conserved_vjp(&e, &self.initial_velocity, &state_bar.y, &mut bar)?;
+        parameters.add(&bar.parameters);
+        Ok(Gradient {
+            controls,
+            initial: Initial {
+                q: bar.state.q,
+                v: bar.v,
+            },
+            parameters,
+            gains,
+        })
+    }
+
+    fn check(&self, c: &Cotangents) -> Result<()> {
+        let z = self.zero_cotangents();
+        let parts = [
+            ("q", &c.q, &z.q),
+            ("v", &c.v, &z.v),
+            ("positions", &c.positions, &z.positions),
+            ("rotations", &c.rotations, &z.rotations),
+            ("controls", &c.controls, &z.controls),
+        ];
+        for (name, given, right) in parts {
+            if given.shape() != right.shape() {
+                return Err(Error::input(
+                    format!("cotangents.{name}"),
+                    format!("{:?}", given.shape()),
+                    format!("must have the shape {:?}", right.shape()),
+                ));
+            }
+            if let Some(bad) = given.iter().find(|x| !x.is_finite()) {
+                return Err(Error::input(
+                    format!("cotangents.{name}"),
+                    bad,
+                    "must be finite",
+                ));
+            }
+        }
+        Ok(())
+    }
+}

@@ -1,0 +1,275 @@
+//! The simulator: a scene made ready to run.
+
+use super::assemble::{self, Assembled};
+use super::trajectory::Trajectory;
+use super::{Controls, Policy, Rollout, Settings};
+use crate::adjoint::step;
+use crate::coupling::Report;
+use crate::dynamics::{Parameters, State, Stepper, System};
+use crate::scene::Scene;
+use crate::{Error, Result};
+use nalgebra::{DMatrix, DVector};
+
+/// A scene made ready: shapes discretised, bodies joined, coupling prepared.
+pub struct Simulator {
+    assembled: Assembled,
+    settings: Settings,
+    dt: f64,
+    steps: usize,
+}
+
+/// Added mass of all bodies in the water at one configuration.
+#[derive(Clone, Debug)]
+pub struct AddedMass {
+    /// Names of the bodies, in the order of the rows.
+    pub bodies: Vec<String>,
+    /// 6B × 6B, world frame, per body linear then angular about its origin: kg, kg m, kg m².
+    pub matrix: DMatrix<f64>,
+    /// What the coupling reports.
+    pub report: Report,
+}
+
+impl Simulator {
+    /// Prepares a scene.
+    ///
+    /// # Errors
+    /// A scene that doesn't validate, meshes that don't bound a volume, bodies that overlap, or an
+    /// inertia that leaves M(q) indefinite at the start.
+    pub fn new(scene: &Scene, settings: Settings) -> Result<Self> {
+        scene.validate()?;
+        let dt = settings.time_step.unwrap_or(scene.time_step);
+        if !(dt > 0.0 && dt.is_finite()) {
+            return Err(Error::input(
+                "settings: time_step",
+                dt,
+                "must be positive and finite, in s",
+            ));
+        }
+        let assembled = assemble::assemble(scene, &settings)?;
+        let out = Self {
+            assembled,
+            settings,
+            dt,
+            steps: scene.steps,
+        };
+        out.initial()?;
+        Ok(out)
+    }
+
+    /// The mechanical system.
+    pub fn system(&self) -> &System {
+        &self.assembled.system
+    }
+
+    /// The physical parameters.
+    pub fn parameters(&self) -> &Parameters {
+        &self.assembled.parameters
+    }
+
+    /// The controller.
+    pub fn policy(&self) -> &dyn Policy {
+        self.assembled.policy.as_ref()
+    }
+
+    /// The settings.
+    pub fn settings(&self) -> &Settings {
+        &self.settings
+    }
+
+    /// Time step, s.
+    pub fn time_step(&self) -> f64 {
+        self.dt
+    }
+
+    /// Steps that the scene asks for.
+    pub fn steps(&self) -> usize {
+        self.steps
+    }
+
+    /// Number of faces of all bodies in the water.
+    pub fn faces(&self) -> usize {
+        self.assembled.faces
+    }
+
+    /// Number of unknowns of the coupled solve; 0 for `isolated`.
+    pub fn unknowns(&self) -> usize {
+        self.system().coupling.unknowns()
+    }
+
+    /// What the user should know about the scene, with names and numbers.
+    pub fn warnings(&self) -> &[String] {
+        &self.assembled.warnings
+    }
+
+    /// The same with another controller.
+    pub fn set_policy(&mut self, policy: Box<dyn Policy>) {
+        self.assembled.policy = policy;
+    }
+
+    /// The same with other physical parameters.
+    ///
+    /// # Errors
+    /// Values that aren't finite, or negative density, mass or drag.
+    pub fn set_parameters(&mut self, parameters: Parameters) -> Result<()> {
+        let names = parameters.names(&self.names());
+        for (name, value) in names.iter().zip(parameters.to_vec()) {
+            let signed = name.contains(".inertia.");
+            if !value.is_finite() || (value < 0.0 && !signed) {
+                return Err(Error::input(
+                    format!("parameter {name}"),
+                    value,
+                    "must be finite and not negative",
+                ));
+            }
+        }
+        if parameters.mass.len() != self.system().len() {
+            return Err(Error::input(
+                "parameters",
+                format!("{} bodies", parameters.mass.len()),
+                format!("must be for {} bodies", self.system().len()),
+            ));
+        }
+        self.assembled.parameters = parameters;
+        Ok(())
+    }
+
+    /// Replaces the parameters unchecked: differences step across zero.
+    pub(super) fn replace_parameters(&mut self, parameters: Parameters) {
+        self.assembled.parameters = parameters;
+    }
+
+    /// Names of the bodies.
+    pub fn names(&self) -> Vec<String> {
+        self.system()
+            .bodies
+            .iter()
+            .map(|b| b.name.clone())
+            .collect()
+    }
+
+    /// Initial coordinates and velocity.
+    pub fn start(&self) -> (&DVector<f64>, &DVector<f64>) {
+        (&self.assembled.q, &self.assembled.v)
+    }
+
+    /// Replaces the initial coordinates and velocity.
+    ///
+    /// # Errors
+    /// Wrong lengths or values that aren't finite.
+    pub fn set_start(&mut self, q: DVector<f64>, v: DVector<f64>) -> Result<()> {
+        let tree = &self.system().tree;
+        for (name, x, n) in [("q", &q, tree.coordinates()), ("v", &v, tree.velocities())] {
+            if x.len() != n || x.iter().any(|x| !x.is_finite()) {
+                return Err(Error::input(
+                    format!("initial {name}"),
+                    format!("{:?}", x.as_slice()),
+                    format!("must be {n} finite numbers"),
+                ));
+            }
+        }
+        self.assembled.q = q;
+        self.assembled.v = v;
+        Ok(())
+    }
+
+    /// The integrator with this simulator's system.
+    pub fn stepper(&self) -> Stepper<'_> {
+        Stepper {
+            system: self.system(),
+            parameters: self.parameters(),
+            integrator: self.settings.integrator,
+            dt: self.dt,
+        }
+    }
+
+    pub(super) fn trajectory<'a>(&'a self, controls: &'a DMatrix<f64>) -> Trajectory<'a> {
+        Trajectory {
+            stepper: self.stepper(),
+            policy: self.policy(),
+            controls,
+        }
+    }
+
+    /// The initial state of the integrator.
+    ///
+    /// # Errors
+    /// An indefinite mass matrix, or whatever the coupling reports.
+    pub fn initial(&self) -> Result<State> {
+        let stepper = self.stepper();
+        let mut q = self.assembled.q.clone();
+        stepper.place_motions(&mut q, 0.0);
+        let e = stepper.evaluate(&q, false)?;
+        let state = State {
+            step: 0,
+            y: stepper.conserved(&e, &self.assembled.v),
+            q,
+            held: Vec::new(),
+        };
+        stepper.velocity(&e, &state)?;
+        Ok(state)
+    }
+
+    /// Runs the scene's own controller with additional open-loop controls.
+    ///
+    /// # Errors
+    /// The first step that fails, with its time.
+    pub fn rollout(&self, controls: &Controls) -> Result<Rollout<'_>> {
+        self.rollout_with(controls, |_| {})
+    }
+
+    /// As [`Simulator::rollout`]; `progress` hears the number of steps made.
+    ///
+    /// # Errors
+    /// The first step that fails, with its time.
+    pub fn rollout_with(
+        &self,
+        controls: &Controls,
+        progress: impl FnMut(usize),
+    ) -> Result<Rollout<'_>> {
+        let matrix = controls.matrix().clone();
+        if matrix.nrows() != self.system().controls {
+            return Err(Error::input(
+                "controls",
+                format!("{} rows", matrix.nrows()),
+                format!("must have {} rows, one per control", self.system().controls),
+            ));
+        }
+        let steps = matrix.ncols();
+        let path = step::forward(&self.trajectory(&matrix), self.initial()?, steps, progress)?;
+        Ok(Rollout {
+            simulator: self,
+            path,
+            initial_velocity: self.assembled.v.clone(),
+            controls: matrix,
+        })
+    }
+
+    /// Added mass of all bodies in the water at the start.
+    ///
+    /// # Errors
+    /// Whatever the coupling reports.
+    pub fn added_mass(&self) -> Result<AddedMass> {
+        let system = self.system();
+        let n = 6 * system.coupling.bodies();
+        let kinematics = system.tree.kinematics(&self.assembled.q);
+        let wet: Vec<usize> = (0..system.len())
+            .filter(|b| system.bodies[*b].wet.is_some())
+            .collect();
+        let poses: Vec<_> = wet.iter().map(|b| kinematics.poses[*b]).collect();
+        // World axes about each body's origin: turn, don't shift.
+        let mut turn = DMatrix::zeros(n, n);
+        for (w, pose) in poses.iter().enumerate() {
+            for half in 0..2 {
+                turn.fixed_view_mut::<3, 3>(6 * w + 3 * half, 6 * w + 3 * half)
+                    .copy_from(&pose.rotation.transpose());
+            }
+        }
+        let record = system.coupling.evaluate(&poses, &turn, false)?;
+        let m = turn.tr_mul(record.momenta()) * self.parameters().density;
+        Ok(AddedMass {
+            bodies: wet.iter().map(|b| system.bodies[*b].name.clone()).collect(),
+            matrix: 0.5 * (&m + m.transpose()),
+            report: record.report().clone(),
+        })
+    }
+}

@@ -1,0 +1,201 @@
+//! A rollout as steps with transposes: controller, integrator and observations together.
+
+use super::{Observation, Policy, Sample};
+use crate::adjoint::lie::{Vec3, Vec6, point_wrench};
+use crate::adjoint::step::Step;
+use crate::dynamics::{Evaluation, Input, Parameters, State, StateBar, StepBar, Stepper};
+use crate::{Error, Result};
+use nalgebra::{DMatrix, DVector};
+
+/// Everything that a rollout's steps need.
+pub(super) struct Trajectory<'a> {
+    pub stepper: Stepper<'a>,
+    pub policy: &'a dyn Policy,
+    pub controls: &'a DMatrix<f64>,
+}
+
+/// Seed at one time.
+pub(super) struct Seed {
+    pub q: DVector<f64>,
+    pub v: DVector<f64>,
+    pub positions: DVector<f64>,
+    pub rotations: DVector<f64>,
+}
+
+/// What one step yields.
+pub(super) struct Local {
+    pub control: DVector<f64>,
+    pub parameters: Parameters,
+    pub gains: Vec<f64>,
+}
+
+impl<'a> Trajectory<'a> {
+    fn observe(&self, e: &Evaluation, state: &State) -> Result<Sample> {
+        let v = self.stepper.velocity(e, state)?;
+        if let Some(bad) = v.iter().position(|x| !x.is_finite()) {
+            return Err(Error::Unresolved {
+                place: format!("t = {} s", self.stepper.time(state)),
+                quantity: format!("velocity v[{bad}]"),
+                value: v[bad],
+                limit: f64::MAX,
+                remedy: "the simulation left what floating point holds: take a smaller time step"
+                    .into(),
+            });
+        }
+        let momenta = e.momenta(&v);
+        Ok(Sample {
+            time: self.stepper.time(state),
+            q: state.q.clone(),
+            kinetic_energy: e.kinetic_energy(&v),
+            potential_energy: e.potential_energy(),
+            momentum: momenta.iter().sum(),
+            largest_momentum: momenta.iter().fold(Vec6::zeros(), |m, h| m.sup(&h.abs())),
+            poses: e.kinematics.poses.clone(),
+            report: e.report(),
+            control: DVector::zeros(0),
+            hold: Vec::new(),
+            memo: None,
+            v,
+        })
+    }
+
+    fn input(&self, index: usize, sample: &Sample) -> Result<Input> {
+        let action = self.policy.act(&Observation {
+            step: index,
+            time: sample.time,
+            q: &sample.q,
+            v: &sample.v,
+        });
+        let mut control = self.controls.column(index).into_owned();
+        if !action.control.is_empty() {
+            if action.control.len() != control.len() {
+                return Err(Error::input(
+                    "controller: control",
+                    format!("{} numbers", action.control.len()),
+                    format!("must be {} numbers, one per control", control.len()),
+                ));
+            }
+            control += DVector::from_vec(action.control);
+        }
+        if let Some(bad) = control.iter().position(|x| !x.is_finite()) {
+            return Err(Error::input(
+                format!("control {bad} at step {index}"),
+                control[bad],
+                "must be finite",
+            ));
+        }
+        Ok(Input {
+            control,
+            hold: action.hold,
+        })
+    }
+
+    /// Cotangents that enter at a state: readings of q, v and poses.
+    fn observe_vjp(
+        &self,
+        e: &Evaluation,
+        state: &State,
+        sample: &Sample,
+        seed: &Seed,
+        bar: &mut StepBar,
+    ) -> Result<()> {
+        let wrenches: Vec<Vec6> = (0..sample.poses.len())
+            .map(|b| {
+                let p = Vec3::from(seed.positions.fixed_rows::<3>(3 * b));
+                let mut w = point_wrench(&sample.poses[b].translation, &p);
+                let mut turn = w.fixed_rows_mut::<3>(3);
+                turn += seed.rotations.fixed_rows::<3>(3 * b);
+                w
+            })
+            .collect();
+        bar.state.q += &seed.q + self.stepper.system.tree.project(&e.kinematics, wrenches);
+        let v_bar = &bar.v + &seed.v;
+        self.stepper.velocity_vjp(e, state, &sample.v, &v_bar, bar)
+    }
+}
+
+impl Step for Trajectory<'_> {
+    type State = State;
+    type Kept = Sample;
+    type Bar = StateBar;
+    type Seed = Seed;
+    type Local = Local;
+    type Error = Error;
+
+    fn step(&self, index: usize, state: &State) -> Result<(State, Sample)> {
+        let e = self.stepper.evaluate(&state.q, false)?;
+        let mut sample = self.observe(&e, state)?;
+        let input = self.input(index, &sample)?;
+        let next = self.stepper.step(&e, state, &sample.v, &input)?;
+        sample.control = input.control;
+        sample.hold = input.hold;
+        sample.memo = next.memo;
+        Ok((next.state, sample))
+    }
+
+    fn last(&self, _index: usize, state: &State) -> Result<Sample> {
+        self.observe(&self.stepper.evaluate(&state.q, false)?, state)
+    }
+
+    fn step_vjp(
+        &self,
+        index: usize,
+        state: &State,
+        sample: &Sample,
+        next_bar: &StateBar,
+        seed: &Seed,
+    ) -> Result<(StateBar, Local)> {
+        let e = self.stepper.evaluate(&state.q, true)?;
+        let input = Input {
+            control: sample.control.clone(),
+            hold: sample.hold.clone(),
+        };
+        let mut bar =
+            self.stepper
+                .step_vjp(&e, state, &sample.v, &input, &sample.memo, next_bar)?;
+        let action = self.policy.act_vjp(
+            &Observation {
+                step: index,
+                time: sample.time,
+                q: &sample.q,
+                v: &sample.v,
+            },
+            &bar.control,
+        );
+        if !action.q.is_empty() {
+            bar.state.q += DVector::from_vec(action.q);
+        }
+        if !action.v.is_empty() {
+            bar.v += DVector::from_vec(action.v);
+        }
+        self.observe_vjp(&e, state, sample, seed, &mut bar)?;
+        Ok((
+            bar.state,
+            Local {
+                control: bar.control,
+                parameters: bar.parameters,
+                gains: action.gains,
+            },
+        ))
+    }
+
+    fn last_vjp(
+        &self,
+        _index: usize,
+        state: &State,
+        sample: &Sample,
+        seed: &Seed,
+    ) -> Result<(StateBar, Local)> {
+        let e = self.stepper.evaluate(&state.q, true)?;
+        let mut bar = StepBar::zeros(&e);
+        self.observe_vjp(&e, state, sample, seed, &mut bar)?;
+        Ok((
+            bar.state,
+            Local {
+                control: DVector::zeros(0),
+                parameters: bar.parameters,
+                gains: Vec::new(),
+            },
+        ))
+    }
+}

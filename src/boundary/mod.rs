@@ -5,10 +5,13 @@
 //! rad/s. With the rows of [`Method`],
 //!
 //! ```text
-//! K α ≈ F̄ ν      least squares        (the paper's Eq. 17, 20)
-//! T = ½ Σ_i φ(c_i) · flux_i            flux_i = B̄_i ν,  φ(c_i) = Σ_j P_ij α_j,  P_ij = 1/|c_i − s_j|
-//! M = sym(B̄ᵀ P K⁺ F̄)                  6 × 6 added mass (kg for density 1 kg/m³)
+//! [K; D] α ≈ [F̄; 0] ν     least squares, D a slight damping    (the paper's Eq. 17, 20)
+//! T = ½ Σ_i φ_i B̄_i ν      φ_i the potential's mean over face i, φ = P α
+//! M = sym(B̄ᵀ P [K; D]⁺ F̄)   6 × 6 added mass (kg for density 1 kg/m³)
 //! ```
+//!
+//! Between bodies φ_i is the potential at the face's centre, `P_ij = 1/|c_i − s_j|`; for a body's own
+//! sources see [`readout`]. [`depth`] says where the sources are.
 //!
 //! # References
 //! Fairweather & Karageorghis 1998 (MFS); Van Oosterom & Strackee 1983 (solid angle).
@@ -59,7 +62,7 @@ pub struct BodyBoundary {
     pub flux_rows: Vec<f64>,
     /// PᵀB̄ of the body's own faces and sources, sources × 6.
     pub readout: Vec<Vec6>,
-    /// K⁺F̄, sources × 6: strengths that answer a unit twist of the body alone.
+    /// [K; D]⁺F̄, sources × 6: strengths that answer a unit twist of the body alone.
     pub strengths: Vec<Vec6>,
     /// Added mass about the body's origin, symmetric, for density 1: kg, kg·m, kg·m².
     pub added_mass: Mat6,
@@ -67,11 +70,14 @@ pub struct BodyBoundary {
     pub asymmetry: f64,
     /// ‖F̄ν − Kα‖ / ‖F̄ν‖ for each unit twist; 0 where the twist moves no fluid.
     pub residual: Vec6,
-    /// Condition number of K with columns scaled to unit length (estimated from below).
+    /// Condition number of [K; D] with columns scaled to unit length (estimated from below).
     pub condition: f64,
     /// What the user should know, each with the body's name and its numbers.
     pub warnings: Vec<String>,
-    /// R of the thin QR of K, sources × sources.
+    /// Diagonal of the damping rows D, length sources; zeros without damping. Strengths solve
+    /// `min ‖Kα − F̄ν‖² + ‖Dα‖²`, so the normal equations are `(KᵀK + D²) α = KᵀF̄ν`.
+    pub damping: Vec<f64>,
+    /// R of the thin QR of [K; D], sources × sources.
     r: Mat<f64>,
 }
 
@@ -85,8 +91,8 @@ impl BodyBoundary {
         settings: &Settings,
     ) -> Result<Self> {
         let surface = surface::Surface::new(name, vertices, faces)?;
-        let (sources, depths, warnings) = depth::place(&surface, settings.method, settings.depth)?;
-        Self::build(&surface, sources, depths, warnings, settings)
+        let placement = depth::place(&surface, settings.method, settings.depth)?;
+        Self::build(&surface, placement, settings)
     }
 
     /// As [`BodyBoundary::new`], with the sources (m, body frame) given; `settings.depth` isn't used.
@@ -112,29 +118,35 @@ impl BodyBoundary {
                 d.fold(f64::INFINITY, f64::min)
             })
             .collect();
-        Self::build(&surface, sources.to_vec(), depths, Vec::new(), settings)
+        depth::check_inside(&surface, sources)?;
+        let placement = depth::Placement {
+            sources: sources.to_vec(),
+            depths,
+            warnings: Vec::new(),
+        };
+        Self::build(&surface, placement, settings)
     }
 
     fn build(
         surface: &surface::Surface,
-        sources: Vec<Vec3>,
-        depths: Vec<f64>,
-        mut warnings: Vec<String>,
+        placement: depth::Placement,
         settings: &Settings,
     ) -> Result<Self> {
+        let depth::Placement {
+            sources,
+            depths,
+            mut warnings,
+        } = placement;
         let name = surface.name;
-        let faces = surface.faces.clone();
-        if sources.len() > faces.len() {
-            return Err(Error::Mesh {
-                name: name.into(),
-                problem: format!("{} faces for {} sources", faces.len(), sources.len()),
-                location: "whole mesh".into(),
-                remedy:
-                    "a coarse mesh with vertex sources needs at least as many faces as vertices"
-                        .into(),
-            });
+        let damping = settings.damping;
+        if !(damping.is_finite() && damping >= 0.0) {
+            return Err(Error::input(
+                format!("body \"{name}\": damping"),
+                damping,
+                "0 for none, or a small positive number such as 0.003",
+            ));
         }
-        depth::check_inside(surface, &sources)?;
+        let faces = surface.faces.clone();
         let method = settings.method;
         let row_weights = assemble::row_weights(&faces, method, settings.rows);
         let twist_rows = assemble::twist_rows(&faces, method, &row_weights);
@@ -143,7 +155,7 @@ impl BodyBoundary {
 
         let k = MatRef::from_row_major_slice(&flux_rows, faces.len(), sources.len());
         let rhs = Mat::from_fn(faces.len(), 6, |i, j| twist_rows[i][j]);
-        let factored = factor::solve(k, rhs.as_ref());
+        let factored = factor::solve(k, rhs.as_ref(), damping);
         let alpha = &factored.solution;
         let strengths: Vec<Vec6> = (0..sources.len())
             .map(|i| Vec6::from_fn(|j, _| alpha[(i, j)]))
@@ -192,7 +204,7 @@ impl BodyBoundary {
                 "body \"{name}\": condition number {:.1e} of the flux matrix is above {ILL_CONDITIONED:.0e}{}; \
                  use a smaller or automatic source depth, or a more even mesh",
                 factored.condition,
-                if factored.regularised { " (solved with regularisation)" } else { "" }
+                if factored.singular { " (solved with damping 1e-10)" } else { "" }
             ));
         }
         Ok(Self {
@@ -212,6 +224,7 @@ impl BodyBoundary {
             residual,
             condition: factored.condition,
             warnings,
+            damping: factored.damping,
             r: factored.r,
             faces,
         })
@@ -222,7 +235,8 @@ impl BodyBoundary {
         MatRef::from_row_major_slice(&self.flux_rows, self.faces.len(), self.sources.len())
     }
 
-    /// R of the thin QR `K = Q R`, upper triangular, sources × sources (`Q = K R⁻¹`).
+    /// R of the thin QR `[K; D] = Q R`, D the diagonal [`BodyBoundary::damping`]: upper triangular,
+    /// sources × sources. `RᵀR = KᵀK + D²`; `[K; D] R⁻¹` has orthonormal columns.
     pub fn factor(&self) -> MatRef<'_, f64> {
         self.r.as_ref()
     }

@@ -190,10 +190,50 @@ impl<'a> Surface<'a> {
         })
     }
 
+    /// Faces around each vertex, grouped into the smooth patches that meet there: faces that share
+    /// an edge at the vertex and turn by less than `sharp` (rad) across it belong together.
+    pub fn patches(&self, sharp: f64) -> Vec<Vec<Vec<usize>>> {
+        let mut around = vec![Vec::new(); self.vertices.len()];
+        for (i, t) in self.triangles.iter().enumerate() {
+            for k in t {
+                around[*k].push(i);
+            }
+        }
+        let smooth = |v: usize, a: usize, b: usize| {
+            let shared = |k: &&usize| **k != v && self.triangles[b].contains(*k);
+            self.triangles[a].iter().any(|k| shared(&k))
+                && self.faces.normals[a].dot(&self.faces.normals[b]) > sharp.cos()
+        };
+        let group = |(v, fan): (usize, &Vec<usize>)| {
+            let mut left = fan.clone();
+            let mut groups = Vec::new();
+            while !left.is_empty() {
+                let mut group = vec![left.remove(0)];
+                let mut next = 0;
+                while next < group.len() {
+                    let from = group[next];
+                    let (more, rest) = left.iter().partition(|f| smooth(v, from, **f));
+                    let more: Vec<usize> = more;
+                    group.extend(more);
+                    left = rest;
+                    next += 1;
+                }
+                groups.push(group);
+            }
+            groups
+        };
+        around.iter().enumerate().map(group).collect()
+    }
+
     /// How often the surface winds around `x`: 1 inside, 0 outside.
     pub fn winding(&self, x: &Vec3) -> f64 {
         let total: f64 = self.faces.corners.iter().map(|c| solid_angle(x, c)).sum();
         total / (4.0 * std::f64::consts::PI)
+    }
+
+    /// Whether `x` is strictly inside. A point on an edge or vertex is not.
+    pub fn contains(&self, x: &Vec3) -> bool {
+        (self.winding(x) - 1.0).abs() < 1e-6
     }
 
     /// Radius of the largest ball inside the body that touches the surface at `x` with outward normal

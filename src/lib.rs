@@ -3,6 +3,8 @@
 pub mod boundary;
 pub mod error;
 pub mod scene;
+pub mod shape;
 
 pub use error::{Error, Result};
 pub use hydrograd_adjoint as adjoint;
+pub use shape::{MassProperties, MeshReport, TriMesh};

@@ -1,0 +1,455 @@
+//! The passes over a mesh that fill a report.
+
+use super::{Finding, Kind, MeshReport, Severity, counted, number};
+use crate::shape::mass::signed_volume;
+use crate::shape::mesh::{TriMesh, area_vector, bounds};
+use crate::shape::topology::{self, Component, Edges};
+use crate::shape::weld;
+use hydrograd_adjoint::lie::Vec3;
+use std::collections::HashMap;
+
+/// Twice area over longest edge squared (for slivers: height over base) at which a face has no
+/// area: its normal is then round-off.
+const FLAT_FACE: f64 = 1e-8;
+/// Longest edge of a face over diameter of the mesh at which the face is a point.
+const POINT_FACE: f64 = 1e-10;
+/// Distance over diameter within which two vertices are at the same place.
+const SAME_PLACE: f64 = 1e-10;
+/// Volume over area^1.5 at which a closed piece has no inside.
+const FLAT_PIECE: f64 = 1e-9;
+/// Aspect ratio from which a warning is given.
+const LONG_FACE: f64 = 30.0;
+
+/// Checks a mesh; see [`Kind`] for what is looked for.
+pub fn check(mesh: &TriMesh) -> MeshReport {
+    check_parts(mesh.name(), mesh.vertices(), mesh.faces())
+}
+
+/// Checks the parts of a mesh, which may be anything: `vertices` in m, `faces` counted from 0.
+pub fn check_parts(name: &str, vertices: &[Vec3], faces: &[[usize; 3]]) -> MeshReport {
+    let mut checker = Checker::new(vertices, faces);
+    checker.indices_and_numbers();
+    checker.duplicate_faces();
+    checker.shapes();
+    let components = checker.connections();
+    checker.vertices_alone();
+
+    let mut findings = checker.findings;
+    findings.sort_by_key(|f| (f.severity == Severity::Warning, f.kind));
+    let usable = findings.iter().all(|f| f.severity == Severity::Warning);
+    let all: Vec<_> = checker
+        .finite
+        .iter()
+        .map(|&f| corners(vertices, faces[f]))
+        .collect();
+    MeshReport {
+        name: name.to_owned(),
+        vertices: vertices.len(),
+        faces: faces.len(),
+        components,
+        bounds: checker.bounds.map(Into::into),
+        volume: usable.then(|| signed_volume(&all)),
+        // An empty sum is −0.
+        area: all.iter().map(|t| area_vector(t).norm()).sum::<f64>() + 0.0,
+        worst_aspect: checker.worst_aspect,
+        findings,
+    }
+}
+
+fn corners(vertices: &[Vec3], face: [usize; 3]) -> [Vec3; 3] {
+    face.map(|v| vertices[v])
+}
+
+struct Checker<'a> {
+    vertices: &'a [Vec3],
+    faces: &'a [[usize; 3]],
+    bounds: [Vec3; 2],
+    /// Faces whose indices exist.
+    indexed: Vec<usize>,
+    /// Those of them with finite corners.
+    finite: Vec<usize>,
+    /// Faces that take part in the topology: three different vertices, second copies left out.
+    connected: Vec<usize>,
+    worst_aspect: f64,
+    findings: Vec<Finding>,
+}
+
+impl<'a> Checker<'a> {
+    fn new(vertices: &'a [Vec3], faces: &'a [[usize; 3]]) -> Self {
+        let is_finite = |v: usize| vertices[v].iter().all(|x| x.is_finite());
+        let indexed: Vec<usize> = (0..faces.len())
+            .filter(|&f| faces[f].iter().all(|&v| v < vertices.len()))
+            .collect();
+        let finite: Vec<usize> = indexed
+            .iter()
+            .copied()
+            .filter(|&f| faces[f].iter().all(|&v| is_finite(v)))
+            .collect();
+        // The size of what the faces span: a stray vertex far away is not part of the body.
+        let bounds = bounds(finite.iter().flat_map(|&f| faces[f]).map(|v| &vertices[v]));
+        Self {
+            vertices,
+            faces,
+            bounds,
+            indexed,
+            finite,
+            connected: Vec::new(),
+            worst_aspect: 0.0,
+            findings: Vec::new(),
+        }
+    }
+
+    fn diameter(&self) -> f64 {
+        (self.bounds[1] - self.bounds[0]).norm()
+    }
+
+    fn centroid(&self, face: usize) -> Option<Vec3> {
+        let c = self.faces[face];
+        c.iter()
+            .all(|&v| v < self.vertices.len())
+            .then(|| c.iter().map(|&v| self.vertices[v] / 3.0).sum())
+    }
+
+    #[allow(clippy::too_many_arguments)]
+    fn report(
+        &mut self,
+        kind: Kind,
+        severity: Severity,
+        count: usize,
+        face: Option<usize>,
+        position: Option<Vec3>,
+        problem: String,
+        remedy: &str,
+    ) {
+        self.findings.push(Finding {
+            kind,
+            severity,
+            count,
+            face,
+            position: position.map(Into::into),
+            problem,
+            remedy: remedy.to_owned(),
+        });
+    }
+
+    /// An error of some faces, of which the first is shown.
+    fn report_faces(&mut self, kind: Kind, found: &[usize], problem: String, remedy: &str) {
+        if let Some(&first) = found.first() {
+            let place = self.centroid(first);
+            self.report(
+                kind,
+                Severity::Error,
+                found.len(),
+                Some(first),
+                place,
+                problem,
+                remedy,
+            );
+        }
+    }
+
+    fn indices_and_numbers(&mut self) {
+        if self.faces.is_empty() || self.vertices.is_empty() {
+            let what = if self.faces.is_empty() {
+                "faces"
+            } else {
+                "vertices"
+            };
+            self.report(
+                Kind::Empty,
+                Severity::Error,
+                1,
+                None,
+                None,
+                format!("the mesh has no {what}"),
+                "give a closed surface of triangles",
+            );
+        }
+        let count = self.vertices.len();
+        let wrong: Vec<usize> = (0..self.faces.len())
+            .filter(|&f| self.faces[f].iter().any(|&v| v >= count))
+            .collect();
+        if let Some(&first) = wrong.first() {
+            let problem = format!(
+                "{} a vertex that doesn't exist: vertex index out of range, {:?} with {}",
+                counted(wrong.len(), "face names", "faces name"),
+                self.faces[first],
+                counted(count, "vertex", "vertices"),
+            );
+            let remedy = "count vertices from 0, or add the missing vertices";
+            self.report_faces(Kind::IndexOutOfRange, &wrong, problem, remedy);
+        }
+        let bad: Vec<usize> = (0..count)
+            .filter(|&v| !self.vertices[v].iter().all(|x| x.is_finite()))
+            .collect();
+        if let Some(&first) = bad.first() {
+            let face = (0..self.faces.len()).find(|&f| self.faces[f].contains(&first));
+            self.report(
+                Kind::NotFinite,
+                Severity::Error,
+                bad.len(),
+                face,
+                Some(self.vertices[first]),
+                format!(
+                    "{} NaN or infinite coordinates, the first is vertex {first}",
+                    counted(bad.len(), "vertex has", "vertices have")
+                ),
+                "export the mesh again; coordinates must be finite numbers",
+            );
+        }
+    }
+
+    fn duplicate_faces(&mut self) {
+        let mut first: HashMap<[usize; 3], usize> = HashMap::with_capacity(self.indexed.len());
+        let mut copies = Vec::new();
+        let mut original = None;
+        for &f in &self.indexed {
+            let mut key = self.faces[f];
+            key.sort_unstable();
+            if key[0] == key[1] || key[1] == key[2] {
+                continue; // without area; has no part in the topology
+            }
+            match first.get(&key) {
+                Some(&other) => {
+                    original.get_or_insert(other);
+                    copies.push(f);
+                }
+                None => {
+                    first.insert(key, f);
+                    self.connected.push(f);
+                }
+            }
+        }
+        if let Some(original) = original {
+            let problem = format!(
+                "{} the corners of another face (face {original} for the first)",
+                counted(copies.len(), "face repeats", "faces repeat")
+            );
+            let remedy = "delete the copies; a thin plate needs two surfaces at a distance";
+            self.report_faces(Kind::DuplicateFace, &copies, problem, remedy);
+        }
+    }
+
+    /// Area and aspect ratio of each face.
+    fn shapes(&mut self) {
+        let diameter = self.diameter();
+        let mut flat = Vec::new();
+        let mut long = Vec::new();
+        let mut worst = (0.0, 0);
+        for &f in &self.finite {
+            let [a, b, c] = corners(self.vertices, self.faces[f]);
+            let sides = [(b - a).norm(), (c - b).norm(), (a - c).norm()];
+            let longest = sides.into_iter().fold(0.0, f64::max);
+            let area = area_vector(&[a, b, c]).norm();
+            // Written so that NaN from under- or overflow counts as flat.
+            let solid = 2.0 * area > FLAT_FACE * longest * longest
+                && longest > POINT_FACE * diameter
+                && area.is_finite();
+            if !solid {
+                flat.push(f);
+                continue;
+            }
+            let aspect = longest * sides.iter().sum::<f64>() / (4.0 * 3f64.sqrt() * area);
+            if aspect > LONG_FACE {
+                long.push(f);
+            }
+            if aspect > worst.0 {
+                worst = (aspect, f);
+            }
+        }
+        let problem = format!("{} no area", counted(flat.len(), "face has", "faces have"));
+        let remedy = "collapse the shortest edge of each, and merge vertices at the same place";
+        self.report_faces(Kind::ZeroArea, &flat, problem, remedy);
+        self.worst_aspect = worst.0;
+        if !long.is_empty() {
+            self.report(
+                Kind::Aspect,
+                Severity::Warning,
+                long.len(),
+                Some(worst.1),
+                self.centroid(worst.1),
+                format!(
+                    "{} an aspect ratio over {LONG_FACE}, the worst {:.3e}",
+                    counted(long.len(), "face has", "faces have"),
+                    worst.0
+                ),
+                "remesh with faces nearer to equilateral, or with more of them",
+            );
+        }
+    }
+
+    /// Edges, turns and pieces; returns the number of pieces.
+    fn connections(&mut self) -> usize {
+        let edges = topology::edges(self.connected.iter().map(|&f| (f, self.faces[f])));
+        let complete = self.indexed.len() == self.faces.len();
+        if complete {
+            self.edges_with(&edges, Kind::OpenEdge);
+        }
+        self.edges_with(&edges, Kind::NonManifoldEdge);
+        let pieces = topology::components(self.faces.len(), self.connected.iter().copied(), &edges);
+        self.turns(&pieces);
+        self.insides(&pieces);
+        if let [_, second, ..] = pieces.as_slice() {
+            let f = second.faces[0];
+            self.report(
+                Kind::Components,
+                Severity::Error,
+                pieces.len(),
+                Some(f),
+                self.centroid(f),
+                format!(
+                    "{} separate pieces that share no edge; the second begins here",
+                    pieces.len()
+                ),
+                "give each piece a body of its own (joint = fixed holds them together), join the \
+                 pieces into one surface, or delete what is inside; merge vertices if they touch",
+            );
+        }
+        pieces.len()
+    }
+
+    fn edges_with(&mut self, edges: &Edges, kind: Kind) {
+        let is_open = kind == Kind::OpenEdge;
+        let mut count = 0;
+        let mut first: Option<topology::EdgeUse> = None;
+        for uses in edges.groups() {
+            if (is_open && uses.len() == 1) || (!is_open && uses.len() > 2) {
+                count += 1;
+                if first.is_none_or(|u| uses[0].face < u.face) {
+                    first = Some(uses[0]);
+                }
+            }
+        }
+        let Some(edge) = first else { return };
+        let [a, b] = edge.directed();
+        let middle = self.vertices[a] * 0.5 + self.vertices[b] * 0.5;
+        let what = counted(count, "edge", "edges");
+        let (problem, remedy) = if is_open {
+            (
+                format!("{what} with one face only (a hole), the first from vertex {a} to {b}"),
+                "close the holes; if the surface looks closed, merge vertices at the same place",
+            )
+        } else {
+            (
+                format!("{what} with more than two faces, the first from vertex {a} to {b}"),
+                "delete inner walls, and split surfaces that touch along an edge",
+            )
+        };
+        self.report(
+            kind,
+            Severity::Error,
+            count,
+            Some(edge.face),
+            Some(middle),
+            problem,
+            remedy,
+        );
+    }
+
+    fn turns(&mut self, pieces: &[Component]) {
+        let mut flipped = Vec::new();
+        let mut one_sided = Vec::new();
+        for piece in pieces {
+            if piece.one_sided {
+                one_sided.push(piece.faces[0]);
+            } else {
+                flipped.extend_from_slice(&piece.flipped);
+            }
+        }
+        flipped.sort_unstable();
+        let problem = format!(
+            "{} against the neighbours",
+            counted(flipped.len(), "face is turned", "faces are turned")
+        );
+        let remedy = "reverse the order of their corners (recalculate normals outward)";
+        self.report_faces(Kind::Orientation, &flipped, problem, remedy);
+        let remedy = "it can't bound a volume; model the body as a solid";
+        let problem = "the surface has one side only (a Möbius strip)".to_owned();
+        self.report_faces(Kind::OneSided, &one_sided, problem, remedy);
+    }
+
+    /// Whether each closed piece has its inside inside.
+    fn insides(&mut self, pieces: &[Component]) {
+        let mut flat = Vec::new();
+        let mut inward = Vec::new();
+        let mut inverted = 0.0;
+        for piece in pieces {
+            if !piece.closed || piece.one_sided || !piece.flipped.is_empty() {
+                continue;
+            }
+            let all: Vec<_> = piece
+                .faces
+                .iter()
+                .map(|&f| corners(self.vertices, self.faces[f]))
+                .collect();
+            if all
+                .iter()
+                .flatten()
+                .any(|p| p.iter().any(|x| !x.is_finite()))
+            {
+                continue;
+            }
+            let volume = signed_volume(&all);
+            let area: f64 = all.iter().map(|t| area_vector(t).norm()).sum();
+            // The cube root first: the 1.5th power of a small area would underflow sooner.
+            if volume.abs().cbrt() <= FLAT_PIECE.cbrt() * area.sqrt() {
+                flat.push(piece.faces[0]);
+            } else if volume < 0.0 {
+                inward.push(piece.faces[0]);
+                inverted += volume;
+            }
+        }
+        let problem = "the surface is closed but encloses no volume".to_owned();
+        let remedy = "give the body a thickness";
+        self.report_faces(Kind::NoVolume, &flat, problem, remedy);
+        let problem = format!(
+            "{} with normals pointing inward (volume {} m³)",
+            counted(inward.len(), "closed piece", "closed pieces"),
+            number(inverted)
+        );
+        let remedy = "reverse the order of the corners of its faces (flip normals); delete it if \
+                      it is a cavity";
+        self.report_faces(Kind::Inward, &inward, problem, remedy);
+    }
+
+    fn vertices_alone(&mut self) {
+        let same = weld::representatives(self.vertices, SAME_PLACE * self.diameter());
+        let copies: Vec<usize> = (0..same.len()).filter(|&v| same[v] != v).collect();
+        if let Some(&v) = copies.first() {
+            self.report(
+                Kind::DuplicateVertex,
+                Severity::Warning,
+                copies.len(),
+                self.faces.iter().position(|f| f.contains(&v)),
+                Some(self.vertices[v]),
+                format!(
+                    "{} at the place of another, the first is vertex {v} (at vertex {})",
+                    counted(copies.len(), "vertex is", "vertices are"),
+                    same[v]
+                ),
+                "merge vertices at the same place",
+            );
+        }
+        let mut used = vec![false; self.vertices.len()];
+        for &f in &self.indexed {
+            for v in self.faces[f] {
+                used[v] = true;
+            }
+        }
+        let unused: Vec<usize> = (0..used.len()).filter(|&v| !used[v]).collect();
+        if let Some(&v) = unused.first() {
+            self.report(
+                Kind::UnreferencedVertex,
+                Severity::Warning,
+                unused.len(),
+                None,
+                Some(self.vertices[v]),
+                format!(
+                    "{} not used by any face, the first is vertex {v}",
+                    counted(unused.len(), "vertex is", "vertices are")
+                ),
+                "delete loose vertices; they have no effect",
+            );
+        }
+    }
+}

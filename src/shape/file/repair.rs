@@ -1,0 +1,101 @@
+//! Merging of vertices that a file holds several times.
+
+use super::Raw;
+use crate::shape::mesh::bounds;
+use crate::shape::{topology, weld};
+use serde::Serialize;
+
+/// Distance over diameter within which vertices are merged if that closes the surface: single
+/// precision of the coordinates, and a little for the exporter.
+const TOLERANCE: f64 = 1e-6;
+
+/// What was done to a file's contents.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize)]
+pub struct Repairs {
+    /// Polygons with more than three corners that were split into triangles.
+    pub polygons_split: usize,
+    /// Vertices merged with one of exactly the same coordinates.
+    pub merged_same: usize,
+    /// Vertices merged with one nearby (within 1e-6 of the diameter, or the coordinates' single
+    /// precision).
+    pub merged_near: usize,
+    /// Faces that had no area after the merge and were left out.
+    pub collapsed: usize,
+}
+
+/// Merges vertices where that closes the surface: first those with the same coordinates (`always`:
+/// for formats that have no other way to share vertices), then those nearby. A merge that leaves
+/// holes is taken back, so that a report speaks of the file as it is.
+pub(super) fn mend(raw: Raw, always: bool) -> Raw {
+    // Whatever else is wrong with indices is for the check to say.
+    if raw.faces.iter().flatten().any(|&v| v >= raw.vertices.len()) {
+        return raw;
+    }
+    let holes = open_edges(&raw.faces);
+    if holes == 0 && !always {
+        return raw;
+    }
+    let (mut same, merged, collapsed) = merge(&raw, 0.0);
+    let left = open_edges(&same.faces);
+    if !always && left >= holes {
+        return raw;
+    }
+    same.repairs.merged_same = merged;
+    same.repairs.collapsed = collapsed;
+    if left == 0 {
+        return same;
+    }
+    let [low, high] = bounds(same.vertices.iter());
+    let largest = low.amax().max(high.amax());
+    let tolerance = (TOLERANCE * (high - low).norm()).max(4.0 * f64::from(f32::EPSILON) * largest);
+    let (mut near, merged, collapsed) = merge(&same, tolerance);
+    if open_edges(&near.faces) > 0 {
+        return same;
+    }
+    near.repairs.merged_near = merged;
+    near.repairs.collapsed += collapsed;
+    near
+}
+
+fn open_edges(faces: &[[usize; 3]]) -> usize {
+    let proper = faces
+        .iter()
+        .copied()
+        .enumerate()
+        .filter(|(_, [a, b, c])| a != b && b != c && c != a);
+    topology::edges(proper)
+        .groups()
+        .filter(|uses| uses.len() == 1)
+        .count()
+}
+
+/// The mesh with vertices within `tolerance` merged and faces that collapsed left out; the
+/// numbers of both.
+fn merge(raw: &Raw, tolerance: f64) -> (Raw, usize, usize) {
+    let first = weld::representatives(&raw.vertices, tolerance);
+    let mut number = vec![0; first.len()];
+    let mut vertices = Vec::new();
+    for v in 0..first.len() {
+        number[v] = if first[v] == v {
+            vertices.push(raw.vertices[v]);
+            vertices.len() - 1
+        } else {
+            number[first[v]]
+        };
+    }
+    let faces: Vec<_> = raw
+        .faces
+        .iter()
+        .map(|face| face.map(|v| number[v]))
+        .filter(|[a, b, c]| a != b && b != c && c != a)
+        .collect();
+    let merged = raw.vertices.len() - vertices.len();
+    let collapsed = raw.faces.len() - faces.len();
+    let repairs = raw.repairs;
+    let raw = Raw {
+        vertices,
+        faces,
+        repairs,
+    };
+    (raw, merged, collapsed)
+}

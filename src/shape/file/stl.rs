@@ -1,0 +1,86 @@
+//! STL, text and binary. Coordinates are in single precision, and each face has vertices of its
+//! own: they are merged afterwards.
+
+use super::{Parsed, Raw, brief};
+use hydrograd_adjoint::lie::Vec3;
+use std::io::Cursor;
+
+/// Header, count; then so many bytes a face.
+const PREFIX: usize = 84;
+const FACE: usize = 50;
+
+/// Reads all faces, text or binary by what is inside: many binary files begin with "solid", as
+/// text does.
+pub(super) fn parse(bytes: &[u8]) -> Parsed {
+    let declared = bytes
+        .get(80..PREFIX)
+        .map(|b| u32::from_le_bytes([b[0], b[1], b[2], b[3]]) as usize);
+    let needed = declared.map(|n| PREFIX + FACE * n);
+    let text = String::from_utf8_lossy(bytes).to_ascii_lowercase();
+    let start = text.trim_start_matches(['\u{feff}', ' ', '\t', '\r', '\n']);
+    let is_text = needed != Some(bytes.len())
+        && start.starts_with("solid")
+        && (start.contains("facet") || start.contains("endsolid"));
+    let mesh = if is_text {
+        stl_io::read_stl(&mut Cursor::new(one_solid(start)?)).map_err(|e| {
+            format!(
+                "{}; the file may be cut off or not be text STL: export it again, as binary",
+                brief(&e.to_string())
+            )
+        })?
+    } else {
+        match (declared, needed) {
+            (Some(n), Some(needed)) if needed > bytes.len() => {
+                return Err(format!(
+                    "not a complete binary STL: it declares {n} faces, which take {needed} bytes, \
+                     and has {}; export it again",
+                    bytes.len()
+                ));
+            }
+            (None, _) => {
+                return Err(format!(
+                    "{} bytes are too few for an STL file; export it again",
+                    bytes.len()
+                ));
+            }
+            _ => {}
+        }
+        // A header that looks like text would be taken for it.
+        let mut binary = bytes.to_vec();
+        binary[..80].fill(b' ');
+        stl_io::read_stl(&mut Cursor::new(binary)).map_err(|e| format!("{e}; export it again"))?
+    };
+    Ok(Raw {
+        vertices: mesh
+            .vertices
+            .iter()
+            .map(|v| Vec3::from(v.0.map(f64::from)))
+            .collect(),
+        faces: mesh.faces.iter().map(|f| f.vertices).collect(),
+        ..Raw::default()
+    })
+}
+
+/// All solids of a (lower-case) text as one: the reader stops after the first.
+fn one_solid(text: &str) -> std::result::Result<String, String> {
+    let mut body = String::with_capacity(text.len() + 32);
+    body.push_str("solid all\n");
+    let (mut begun, mut ended) = (0, 0);
+    for line in text.lines() {
+        match line.split_whitespace().next() {
+            Some("solid") => begun += 1,
+            Some("endsolid") => ended += 1,
+            _ => {
+                body.push_str(line);
+                body.push('\n');
+            }
+        }
+    }
+    if begun != ended {
+        return Err(format!(
+            "{begun} `solid` and {ended} `endsolid`: the file is cut off; export it again"
+        ));
+    }
+    body.push_str("endsolid\n");
+    Ok(body)
+}

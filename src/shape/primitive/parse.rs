@@ -1,0 +1,98 @@
+//! Shapes in one word: `sphere:0.05`, `box:1,2,3`.
+
+use super::validate;
+use crate::error::{Error, Result};
+use crate::scene::Shape;
+
+const FORMS: [(&str, usize, &str); 5] = [
+    ("sphere", 1, "sphere:RADIUS"),
+    ("ellipsoid", 3, "ellipsoid:A,B,C (semi-axes)"),
+    ("box", 3, "box:A,B,C (edge lengths)"),
+    ("cylinder", 2, "cylinder:RADIUS,LENGTH"),
+    (
+        "capsule",
+        2,
+        "capsule:RADIUS,LENGTH (of the cylindrical part)",
+    ),
+];
+
+/// A shape from its short form, lengths in m: `sphere:R`, `ellipsoid:A,B,C` (semi-axes),
+/// `box:A,B,C` (edge lengths), `cylinder:R,L`, `capsule:R,L` (both along z; a capsule's L is
+/// without its ends).
+///
+/// # Errors
+/// [`Error::Input`] with the forms that are understood, or naming the number that can't be.
+pub fn parse_shape(text: &str) -> Result<Shape> {
+    let (kind, numbers) = text.split_once(':').unwrap_or((text, ""));
+    let kind = kind.trim().to_ascii_lowercase();
+    let Some((_, count, form)) = FORMS.iter().find(|(name, ..)| *name == kind) else {
+        let forms = FORMS.map(|(_, _, form)| form).join(", ");
+        let near = FORMS
+            .iter()
+            .map(|(name, ..)| (strsim::damerau_levenshtein(name, &kind), name))
+            .min()
+            .filter(|(distance, name)| 2 * distance <= name.len().min(kind.len()));
+        let hint = match near {
+            Some((_, name)) => format!("did you mean {name}? Known are {forms}"),
+            None => format!("known are {forms}"),
+        };
+        return Err(Error::input("shape", format!("{text:?}"), hint));
+    };
+    let values = numbers
+        .split(',')
+        .map(|n| n.trim().parse::<f64>())
+        .collect::<std::result::Result<Vec<_>, _>>()
+        .ok()
+        .filter(|v| v.len() == *count)
+        .ok_or_else(|| {
+            Error::input(
+                "shape",
+                format!("{text:?}"),
+                format!("write {form}, {count} number(s) in metres"),
+            )
+        })?;
+    let faces = None;
+    let shape = match kind.as_str() {
+        "sphere" => Shape::Sphere {
+            radius: values[0],
+            faces,
+        },
+        "ellipsoid" => Shape::Ellipsoid {
+            semi_axes: [values[0], values[1], values[2]],
+            faces,
+        },
+        "box" => Shape::Box {
+            size: [values[0], values[1], values[2]],
+            faces,
+        },
+        "cylinder" => Shape::Cylinder {
+            radius: values[0],
+            length: values[1],
+            faces,
+        },
+        _ => Shape::Capsule {
+            radius: values[0],
+            length: values[1],
+            faces,
+        },
+    };
+    validate(&shape, text)?;
+    Ok(shape)
+}
+
+/// The short form of a shape (m), or the path of a mesh file: the name of its mesh.
+pub fn shape_name(shape: &Shape) -> String {
+    match shape {
+        Shape::Sphere { radius, .. } => format!("sphere:{radius:?}"),
+        Shape::Ellipsoid {
+            semi_axes: [a, b, c],
+            ..
+        } => format!("ellipsoid:{a:?},{b:?},{c:?}"),
+        Shape::Box {
+            size: [a, b, c], ..
+        } => format!("box:{a:?},{b:?},{c:?}"),
+        Shape::Cylinder { radius, length, .. } => format!("cylinder:{radius:?},{length:?}"),
+        Shape::Capsule { radius, length, .. } => format!("capsule:{radius:?},{length:?}"),
+        Shape::Mesh { path, .. } => path.display().to_string(),
+    }
+}

@@ -1,0 +1,153 @@
+//! Cylinders and capsules: rings about z.
+//!
+//! Ends: ring k (from the pole) has s·k vertices, so triangles stay near-equilateral down to the
+//! pole and no fan of slivers appears; s = 6 suits a flat disc, s = 4 a hemisphere. Sides: an
+//! even number of bands between rings that are turned by half a step in turn.
+
+use super::misfit;
+use hydrograd_adjoint::lie::Vec3;
+use std::f64::consts::{FRAC_PI_2, TAU};
+
+type Parts = (Vec<Vec3>, Vec<[usize; 3]>);
+
+/// A cylinder about z, centred at the origin (m), with about `target` faces (at least 36).
+pub(super) fn cylinder(radius: f64, length: f64, target: usize) -> Parts {
+    let (rings, bands) = choose(6, radius, length, 1.0, target as f64);
+    let end = |k: usize| (radius * k as f64 / rings as f64, 0.0);
+    revolve(6, rings, bands, radius, length, end)
+}
+
+/// A capsule about z, centred at the origin, with `length` between the hemispheres (m), and
+/// about `target` faces (at least 24).
+pub(super) fn capsule(radius: f64, length: f64, target: usize) -> Parts {
+    let (rings, bands) = choose(4, radius, length, FRAC_PI_2, target as f64);
+    let end = |k: usize| {
+        if k == rings {
+            return (radius, 0.0);
+        }
+        let angle = FRAC_PI_2 * k as f64 / rings as f64;
+        (radius * angle.sin(), radius * angle.cos())
+    };
+    revolve(4, rings, bands, radius, length, end)
+}
+
+/// Loss of cross-section, as a part of it, that weighs as much as cells stretched e-fold.
+const LOSS: f64 = 0.02;
+
+/// Rings of an end and bands of the side. `arc` is the length of the end's generatrix over the
+/// radius. A slender body gets cells stretched along it rather than a coarse polygon for its
+/// cross-section.
+fn choose(sectors: usize, radius: f64, length: f64, arc: f64, target: f64) -> (usize, usize) {
+    let s = sectors as f64;
+    let mut best = (f64::INFINITY, (1, 2));
+    let most = (target / (2.0 * s)).sqrt() as usize + 2;
+    for rings in 1..=most {
+        let m = rings as f64;
+        // Height of equilateral triangles, a compromise with the end's spacing.
+        let edge = TAU * radius / (s * m);
+        let spacing = arc * radius / m;
+        let height = (edge * 3f64.sqrt() / 2.0 * spacing).sqrt();
+        // Area of the circle less that of the polygon in it, to leading order.
+        let loss = (TAU / (s * m)).powi(2) / 6.0 / LOSS;
+        let exact = (length / height / 2.0).max(1e-9);
+        for half in [exact.floor(), exact.ceil()] {
+            // What meets the count, for the same reason.
+            let counted = (target / (2.0 * s * m) - m) / 2.0;
+            for half in [half, counted.floor(), counted.ceil()] {
+                let half = half.max(1.0);
+                let faces = 2.0 * s * m * (m + 2.0 * half);
+                let stretch = if half == 1.0 && exact < 1.0 {
+                    1.0
+                } else {
+                    half / exact
+                };
+                let cost = misfit(faces, target, &[stretch]) + loss * loss;
+                // `as` saturates; a count that large has a hopeless cost.
+                if cost < best.0 {
+                    best = (cost, (rings, 2 * half as usize));
+                }
+            }
+        }
+    }
+    best.1
+}
+
+/// The closed surface. `end(k)` gives radius and height above the side's end of ring k.
+fn revolve(
+    sectors: usize,
+    rings: usize,
+    bands: usize,
+    radius: f64,
+    length: f64,
+    end: impl Fn(usize) -> (f64, f64),
+) -> Parts {
+    let mut vertices = Vec::new();
+    let mut faces = Vec::new();
+    let around = sectors * rings;
+    let direction = |turn: f64| {
+        let (sin, cos) = (TAU * turn).sin_cos();
+        Vec3::new(cos, sin, 0.0)
+    };
+
+    // Side, bottom to top; heights exactly odd about the middle.
+    for j in 0..=bands {
+        let z = length * (j as f64 - (bands / 2) as f64) / bands as f64;
+        let shift = if j % 2 == 0 { 0.0 } else { 0.5 };
+        for i in 0..around {
+            let turn = (i as f64 + shift) / around as f64;
+            vertices.push(radius * direction(turn) + Vec3::new(0.0, 0.0, z));
+        }
+    }
+    for j in 0..bands {
+        let [low, high] = [j * around, (j + 1) * around];
+        for i in 0..around {
+            let next = (i + 1) % around;
+            if j % 2 == 0 {
+                faces.push([low + i, low + next, high + i]);
+                faces.push([low + next, high + next, high + i]);
+            } else {
+                faces.push([low + i, low + next, high + next]);
+                faces.push([low + i, high + next, high + i]);
+            }
+        }
+    }
+
+    for top in [false, true] {
+        let up = if top { 1.0 } else { -1.0 };
+        let rim = if top { bands * around } else { 0 };
+        let mut push = |r: f64, h: f64, turn: f64| {
+            vertices.push(r * direction(turn) + Vec3::new(0.0, 0.0, up * (length / 2.0 + h)));
+            vertices.len() - 1
+        };
+        // First vertex of each ring; the last ring is the rim of the side.
+        let mut first = Vec::with_capacity(rings + 1);
+        for k in 0..rings {
+            let (r, h) = end(k);
+            let count = (sectors * k).max(1);
+            let mut start = None;
+            for i in 0..count {
+                let v = push(r, h, i as f64 / count as f64);
+                start.get_or_insert(v);
+            }
+            first.extend(start);
+        }
+        first.push(rim);
+        for k in 1..=rings {
+            let (inner, outer) = ((sectors * (k - 1)).max(1), sectors * k);
+            for sector in 0..sectors {
+                for i in 0..k {
+                    let out = |i: usize| first[k] + (sector * k + i) % outer;
+                    let inn = |i: usize| first[k - 1] + (sector * (k - 1) + i) % inner;
+                    let mut triangle = |[a, b, c]: [usize; 3]| {
+                        faces.push(if top { [a, b, c] } else { [a, c, b] });
+                    };
+                    triangle([inn(i), out(i), out(i + 1)]);
+                    if i + 1 < k {
+                        triangle([inn(i), out(i + 1), inn(i + 1)]);
+                    }
+                }
+            }
+        }
+    }
+    (vertices, faces)
+}

@@ -1,0 +1,209 @@
+//! The rungs of the kernels and their checks.
+
+use super::{
+    Points, Sources, Triangles, Write, flux_fill, flux_hvp, flux_jvp, flux_vjp, normal_fill,
+    normal_hvp, normal_jvp, normal_vjp, potential_hvp, potential_sum, potential_vjp,
+};
+use crate::check::{Outcome, Rung, outcome};
+use crate::lie::Vec3;
+
+/// Columns of the checks.
+const K: usize = 2;
+/// Sources of the checks.
+const N: usize = 11;
+/// Largest accepted relative error.
+const TOLERANCE: f64 = 1e-6;
+
+/// Every derivative rung of the kernels.
+pub fn rungs() -> Vec<Rung> {
+    macro_rules! rungs {
+        ($($name:literal => $check:expr),* $(,)?) => {
+            vec![$(Rung { name: $name, check: $check }),*]
+        };
+    }
+    rungs![
+        "kernel::flux::flux_jvp" => |c| forward(flux_matrix, |d, a, out| flux_jvp(&surface(), &sources(&start()), d, a, K, out), c),
+        "kernel::flux::flux_vjp" => |c| gradient(flux_matrix, |bar, out| flux_vjp(&surface(), &sources(&start()), bar, K, out), c),
+        "kernel::flux::flux_hvp" => |c| tangent(
+            |s, bar, out| flux_vjp(&surface(), s, bar, K, out),
+            |d, bar, out| flux_hvp(&surface(), &sources(&start()), d, bar, K, out), c),
+        "kernel::normal::normal_jvp" => |c| forward(normal_matrix, |d, a, out| normal_jvp(&points(), &sources(&start()), d, a, K, out), c),
+        "kernel::normal::normal_vjp" => |c| gradient(normal_matrix, |bar, out| normal_vjp(&points(), &sources(&start()), bar, K, out), c),
+        "kernel::normal::normal_hvp" => |c| tangent(
+            |s, bar, out| normal_vjp(&points(), s, bar, K, out),
+            |d, bar, out| normal_hvp(&points(), &sources(&start()), d, bar, K, out), c),
+        "kernel::potential::potential_vjp" => |c| gradient(potential_matrix, |bar, out| potential_vjp(&points(), &sources(&start()), bar, K, out), c),
+        "kernel::potential::potential_hvp" => |c| tangent(
+            |s, bar, out| potential_vjp(&points(), s, bar, K, out),
+            |d, bar, out| potential_hvp(&points(), &sources(&start()), d, bar, K, out), c),
+    ]
+}
+
+/// `K a` against `_jvp`, along the displacement of the sources.
+fn forward(
+    matrix: fn(&Sources) -> Vec<f64>,
+    jvp: fn(&[Vec3], &[f64], &mut [f64]),
+    corruption: f64,
+) -> Outcome {
+    let (x, dx, a) = (start(), numbers(3, 3 * N, 0.3), numbers(4, N * K, 1.0));
+    let value = |x: &[f64]| {
+        let matrix = matrix(&sources(x));
+        let mut out = vec![0.0; matrix.len() / N * K];
+        for (row, out) in matrix.chunks(N).zip(out.chunks_mut(K)) {
+            for (entry, a) in row.iter().zip(a.chunks(K)) {
+                for k in 0..K {
+                    out[k] += entry * a[k];
+                }
+            }
+        }
+        out
+    };
+    let mut out = vec![0.0; value(&x).len()];
+    jvp(&vectors(&dx), &a, &mut out);
+    out.iter_mut().for_each(|o| *o *= corruption);
+    outcome(value, &x, &dx, &out, TOLERANCE)
+}
+
+/// `barᵀ K a` against `_vjp` contracted with `a`.
+fn gradient(
+    matrix: fn(&Sources) -> Vec<f64>,
+    vjp: fn(&[f64], &mut [f64]),
+    corruption: f64,
+) -> Outcome {
+    let (x, dx, a) = (start(), numbers(3, 3 * N, 0.3), numbers(4, N * K, 1.0));
+    let bar = numbers(5, matrix(&sources(&x)).len() / N * K, 1.0);
+    let value = |x: &[f64]| {
+        let mut sum = 0.0;
+        for (row, bar) in matrix(&sources(x)).chunks(N).zip(bar.chunks(K)) {
+            for (entry, a) in row.iter().zip(a.chunks(K)) {
+                for k in 0..K {
+                    sum += bar[k] * entry * a[k];
+                }
+            }
+        }
+        vec![sum]
+    };
+    let mut out = vec![0.0; N * K * 3];
+    vjp(&bar, &mut out);
+    let mut slope = 0.0;
+    for (g, (j, a)) in out
+        .chunks(3)
+        .zip(a.iter().enumerate().map(|(n, a)| (n / K, a)))
+    {
+        slope += corruption * a * (0..3).map(|c| g[c] * dx[3 * j + c]).sum::<f64>();
+    }
+    outcome(value, &x, &dx, &[slope], TOLERANCE)
+}
+
+/// `_vjp` against `_hvp`.
+fn tangent(
+    vjp: fn(&Sources, &[f64], &mut [f64]),
+    hvp: fn(&[Vec3], &[f64], &mut [f64]),
+    corruption: f64,
+) -> Outcome {
+    let (x, dx) = (start(), numbers(3, 3 * N, 0.3));
+    let bar = numbers(5, points().len() * K, 1.0);
+    let value = |x: &[f64]| {
+        let mut out = vec![0.0; N * K * 3];
+        vjp(&sources(x), &bar, &mut out);
+        out
+    };
+    let mut out = vec![0.0; N * K * 3];
+    hvp(&vectors(&dx), &bar, &mut out);
+    out.iter_mut().for_each(|o| *o *= corruption);
+    outcome(value, &x, &dx, &out, TOLERANCE)
+}
+
+fn flux_matrix(s: &Sources) -> Vec<f64> {
+    let t = surface();
+    let mut out = vec![0.0; t.len() * s.len()];
+    flux_fill(&t, s, Write::Set, &mut out, s.len(), 0);
+    out
+}
+
+fn normal_matrix(s: &Sources) -> Vec<f64> {
+    let t = points();
+    let mut out = vec![0.0; t.len() * s.len()];
+    normal_fill(&t, s, Write::Set, &mut out, s.len(), 0);
+    out
+}
+
+/// Through `potential_sum`, one unit row at a time.
+fn potential_matrix(s: &Sources) -> Vec<f64> {
+    let t = points();
+    let n = t.len();
+    let mut identity = vec![0.0; n * n];
+    identity.iter_mut().step_by(n + 1).for_each(|x| *x = 1.0);
+    let mut transposed = vec![0.0; s.len() * n];
+    potential_sum(&t, s, &identity, n, &mut transposed);
+    (0..n * s.len())
+        .map(|m| transposed[(m % s.len()) * n + m / s.len()])
+        .collect()
+}
+
+/// Octahedron of unequal axes with row weights.
+fn surface() -> Triangles {
+    let vertices = [
+        Vec3::new(1.0, 0.1, 0.0),
+        Vec3::new(0.0, 1.3, 0.1),
+        Vec3::new(-1.1, 0.0, 0.0),
+        Vec3::new(0.1, -1.2, 0.0),
+        Vec3::new(0.0, 0.0, 0.9),
+        Vec3::new(0.1, 0.0, -1.0),
+    ];
+    let faces = [
+        [0, 1, 4],
+        [1, 2, 4],
+        [2, 3, 4],
+        [3, 0, 4],
+        [1, 0, 5],
+        [2, 1, 5],
+        [3, 2, 5],
+        [0, 3, 5],
+    ];
+    let weights = (0..8).map(|i| 0.8 + 0.1 * i as f64).collect();
+    Triangles::new(&vertices, &faces, weights)
+}
+
+/// Centroids of [`surface`].
+fn points() -> Points {
+    let t = surface();
+    let centres: Vec<Vec3> = (0..t.len()).map(|i| t.centroid(i)).collect();
+    let normals: Vec<Vec3> = (0..t.len()).map(|i| t.normal(i)).collect();
+    Points::new(&centres, &normals, t.weights().to_vec())
+}
+
+/// Coordinates of sources near the origin, `[source][3]`.
+fn start() -> Vec<f64> {
+    numbers(2, 3 * N, 0.2)
+}
+
+fn vectors(x: &[f64]) -> Vec<Vec3> {
+    x.chunks(3).map(Vec3::from_column_slice).collect()
+}
+
+fn sources(x: &[f64]) -> Sources {
+    Sources::new(&vectors(x))
+}
+
+/// Fixed numbers between −`size` and `size`.
+fn numbers(seed: usize, count: usize, size: f64) -> Vec<f64> {
+    (0..count)
+        .map(|i| size * (12.9898 * (i + 100 * seed) as f64).sin())
+        .collect()
+}
+
+#[cfg(test)]
+mod tests {
+    #[test]
+    fn every_rung_passes_and_fails_when_corrupted() {
+        for rung in super::rungs() {
+            let right = (rung.check)(1.0);
+            println!("{} {right:?}", rung.name);
+            assert!(right.passes(), "{} {right:?}", rung.name);
+            assert!((right.order - 2.0).abs() < 0.2, "{} {right:?}", rung.name);
+            let wrong = (rung.check)(1.01);
+            assert!(!wrong.passes(), "{} {wrong:?}", rung.name);
+        }
+    }
+}

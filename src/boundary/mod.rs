@@ -23,6 +23,7 @@ pub mod readout;
 mod settings;
 mod surface;
 
+use crate::adjoint::kernel::{Points, Triangles};
 use crate::adjoint::lie::{Mat6, Vec3, Vec6};
 use crate::{Error, Result};
 use faer::{Mat, MatMut, MatRef};
@@ -50,6 +51,10 @@ pub struct BodyBoundary {
     /// w_i: a row is w_i · flux ([`Method::MfsVertex`]) or w_i · normal velocity at the centre
     /// ([`Method::MfsFace`]).
     pub row_weights: Vec<f64>,
+    /// The faces as targets of the flux kernel, with their row weights.
+    pub triangles: Triangles,
+    /// The faces' centres as targets of the normal and potential kernels, with their row weights.
+    pub points: Points,
     /// F̄, faces × 6: the row that a unit twist asks for; `F_i(ν) = twist_rows[i] · ν`.
     pub twist_rows: Vec<Vec6>,
     /// Flux ∫ n·(u + ω × x) dA of a unit twist through each face, faces × 6, m³/s.
@@ -151,7 +156,9 @@ impl BodyBoundary {
         let row_weights = assemble::row_weights(&faces, method, settings.rows);
         let twist_rows = assemble::twist_rows(&faces, method, &row_weights);
         let twist_flux: Vec<Vec6> = (0..faces.len()).map(|i| faces.twist_flux(i)).collect();
-        let flux_rows = assemble::flux_matrix(&faces, &sources, method, &row_weights);
+        let triangles = Triangles::new(surface.vertices, surface.triangles, row_weights.clone());
+        let points = Points::new(&faces.centres, &faces.normals, row_weights.clone());
+        let flux_rows = assemble::flux_matrix(method, &triangles, &points, &sources);
 
         let k = MatRef::from_row_major_slice(&flux_rows, faces.len(), sources.len());
         let rhs = Mat::from_fn(faces.len(), 6, |i, j| twist_rows[i][j]);
@@ -184,8 +191,8 @@ impl BodyBoundary {
                 })
                 .collect(),
         };
-        let points = readout::points(&faces, &sources, settings.readout);
-        let readout = readout::own(&points, &sources, &readout_flux);
+        let rule = readout::points(&faces, &sources, settings.readout);
+        let readout = readout::own(&rule, &sources, &readout_flux);
         let mut raw = Mat6::zeros();
         for (p, a) in readout.iter().zip(&strengths) {
             raw += p * a.transpose();
@@ -213,6 +220,8 @@ impl BodyBoundary {
             sources,
             depths,
             row_weights,
+            triangles,
+            points,
             twist_rows,
             twist_flux,
             readout_flux,

@@ -1,5 +1,6 @@
 //! The closed triangle surface that a discretisation starts from.
 
+use crate::adjoint::kernel;
 use crate::adjoint::lie::{Vec3, Vec6, six};
 use crate::{Error, Result};
 
@@ -41,16 +42,6 @@ impl Faces {
             .map(|[a, b, c]| a.dot(&b.cross(c)) / 6.0)
             .sum()
     }
-}
-
-/// Van Oosterom & Strackee 1983, Eq. 8: signed solid angle of a triangle seen from `x`, sr.
-/// Positive when `x` sees the triangle's back (clockwise), that is, from inside the body.
-pub(crate) fn solid_angle(x: &Vec3, [p, q, r]: &[Vec3; 3]) -> f64 {
-    let (a, b, c) = (p - x, q - x, r - x);
-    let (la, lb, lc) = (a.norm(), b.norm(), c.norm());
-    let numerator = a.dot(&b.cross(&c));
-    let denominator = la * lb * lc + a.dot(&b) * lc + a.dot(&c) * lb + b.dot(&c) * la;
-    2.0 * numerator.atan2(denominator)
 }
 
 /// Edge of an equilateral triangle of this area.
@@ -227,7 +218,8 @@ impl<'a> Surface<'a> {
 
     /// How often the surface winds around `x`: 1 inside, 0 outside.
     pub fn winding(&self, x: &Vec3) -> f64 {
-        let total: f64 = self.faces.corners.iter().map(|c| solid_angle(x, c)).sum();
+        let solid_angle = |c: &[Vec3; 3]| kernel::flux(c, 1.0, x);
+        let total: f64 = self.faces.corners.iter().map(solid_angle).sum();
         total / (4.0 * std::f64::consts::PI)
     }
 

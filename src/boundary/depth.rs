@@ -34,7 +34,7 @@ const BALL: f64 = 0.7;
 const SHARP: f64 = 0.96;
 /// Where a side's source at a sharp edge is: this part of the way from the vertex to the middle of
 /// the side's faces around it.
-const SHIFT: f64 = 0.8;
+const SHIFT: f64 = 0.6;
 /// Median depth in edge lengths below which a mesh is coarse for its thickness.
 const COARSE: f64 = 0.32;
 

@@ -206,6 +206,17 @@ impl BodyBoundary {
                 remedy: "use a smaller or automatic source depth".into(),
             });
         }
+        let added_mass = 0.5 * (raw + raw.transpose());
+        let translation = added_mass.fixed_view::<3, 3>(0, 0).symmetric_eigenvalues();
+        if translation.min() <= 0.0 {
+            return Err(Error::Unresolved {
+                place: format!("body \"{name}\""),
+                quantity: "smallest added mass in translation, relative to the displaced".into(),
+                value: translation.min() / faces.volume(),
+                limit: 0.0,
+                remedy: format!("the mesh ({} faces) is too coarse for it", faces.len()),
+            });
+        }
         if factored.condition > ILL_CONDITIONED {
             warnings.push(format!(
                 "body \"{name}\": condition number {:.1e} of the flux matrix is above {ILL_CONDITIONED:.0e}{}; \
@@ -228,7 +239,7 @@ impl BodyBoundary {
             flux_rows,
             readout,
             strengths,
-            added_mass: 0.5 * (raw + raw.transpose()),
+            added_mass,
             asymmetry: asymmetry(&raw, &faces),
             residual,
             condition: factored.condition,

@@ -1,9 +1,9 @@
 //! Rows of one body: flux, twist, potential.
 
 use super::settings::{Method, RowScaling};
-use super::surface::{Faces, solid_angle};
+use super::surface::Faces;
+use crate::adjoint::kernel::{self, Points, Sources, Triangles, Write};
 use crate::adjoint::lie::{Vec3, Vec6};
-use rayon::prelude::*;
 
 /// Weight of each face's row. A row is `weight · flux` (vertex sources) or
 /// `weight · normal velocity` (face sources).
@@ -31,25 +31,17 @@ pub(crate) fn twist_rows(faces: &Faces, method: Method, weights: &[f64]) -> Vec<
 
 /// K: the rows that unit sources make, row-major faces × sources.
 pub(crate) fn flux_matrix(
-    faces: &Faces,
-    sources: &[Vec3],
     method: Method,
-    weights: &[f64],
+    triangles: &Triangles,
+    points: &Points,
+    sources: &[Vec3],
 ) -> Vec<f64> {
-    let mut k = vec![0.0; faces.len() * sources.len()];
-    k.par_chunks_mut(sources.len())
-        .enumerate()
-        .for_each(|(i, row)| {
-            let (w, centre, normal) = (weights[i], &faces.centres[i], &faces.normals[i]);
-            for (entry, s) in row.iter_mut().zip(sources) {
-                *entry = w * match method {
-                    Method::MfsVertex => solid_angle(s, &faces.corners[i]),
-                    Method::MfsFace => {
-                        let d = centre - s;
-                        normal.dot(&d) / d.norm().powi(3)
-                    }
-                };
-            }
-        });
+    let n = sources.len();
+    let mut k = vec![0.0; triangles.len() * n];
+    let sources = Sources::new(sources);
+    match method {
+        Method::MfsVertex => kernel::flux_fill(triangles, &sources, Write::Set, &mut k, n, 0),
+        Method::MfsFace => kernel::normal_fill(points, &sources, Write::Set, &mut k, n, 0),
+    }
     k
 }

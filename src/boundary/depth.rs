@@ -1,99 +1,189 @@
 //! Where the sources go.
+//!
+//! The field outside a body continues inwards as far as its medial axis and no farther, so a source's
+//! depth is bounded by the inner tangent ball: the largest ball inside the body that touches the
+//! surface at the source's point. Its radius ρ sees curvature, rims and the opposite side at
+//! once. With h the local edge length, the depth is
+//!
+//! ```text
+//! d = min(1.2 h, 0.7 ρ)
+//! ```
+//!
+//! 1.2 h is where one source per vertex resolves the flux through a face without the
+//! equations becoming ill-conditioned; 0.7 keeps sources of opposite sides apart.
+//!
+//! At an edge or corner (the surface turns by more than 55°) the flow on one side can't be made
+//! by sources that serve the other side as well, so a vertex gets one source per smooth
+//! side, below a point moved inwards on that side. A depth given by the user puts one source
+//! under each vertex and checks it against edge length and thickness.
+//!
+//! # References
+//! Ma, Bae & Choi 2012 (shrinking balls); the measurements are in `docs/accuracy.md`.
 
 use super::settings::{Depth, Method};
 use super::surface::Surface;
 use crate::adjoint::lie::Vec3;
 use crate::{Error, Result};
-
-/// Local scales at one source, m.
-pub(crate) struct Site {
-    /// Point of the surface above the source.
-    pub point: Vec3,
-    /// Unit normal there, into the fluid.
-    pub normal: Vec3,
-    /// Mean edge length.
-    pub edge: f64,
-    /// Distance along −normal to the opposite surface.
-    pub thickness: f64,
-}
-
-/// Points of the surface that get a source each, with their local scales.
-pub(crate) fn sites(surface: &Surface, method: Method) -> Vec<Site> {
-    let site = |point: Vec3, normal: Vec3, edge: f64, vertex: usize, face: usize| {
-        let thickness = surface.ray(&point, &-normal, vertex, face);
-        Site {
-            point,
-            normal,
-            edge,
-            thickness: thickness.unwrap_or(edge),
-        }
-    };
-    match method {
-        Method::MfsVertex => (0..surface.vertices.len())
-            .map(|i| {
-                let (x, n) = (surface.vertices[i], surface.vertex_normals[i]);
-                site(x, n, surface.vertex_edge[i], i, usize::MAX)
-            })
-            .collect(),
-        Method::MfsFace => (0..surface.faces.len())
-            .map(|i| {
-                let edge = surface.triangles[i]
-                    .iter()
-                    .map(|k| surface.vertex_edge[*k])
-                    .sum::<f64>()
-                    / 3.0;
-                let (x, n) = (surface.faces.centres[i], surface.faces.normals[i]);
-                site(x, n, edge, usize::MAX, i)
-            })
-            .collect(),
-    }
-}
-
-/// Sources, their depths (m), and warnings.
-pub(crate) fn place(
-    surface: &Surface,
-    method: Method,
-    depth: Depth,
-) -> Result<(Vec<Vec3>, Vec<f64>, Vec<String>)> {
-    let sites = sites(surface, method);
-    let mut warnings = Vec::new();
-    let depths: Vec<f64> = match depth {
-        Depth::Auto => sites.iter().map(|s| automatic(surface, s)).collect(),
-        Depth::Fixed(d) => {
-            check_fixed(surface.name, d, &sites, &mut warnings)?;
-            vec![d; sites.len()]
-        }
-    };
-    let sources = sites
-        .iter()
-        .zip(&depths)
-        .map(|(s, d)| s.point - s.normal * *d)
-        .collect();
-    Ok((sources, depths, warnings))
-}
+use rayon::prelude::*;
 
 /// Depth in edge lengths where the body is thick.
 const EDGES: f64 = 1.2;
 /// Largest depth in radii of the inner tangent ball.
-const BALL: f64 = 0.75;
+const BALL: f64 = 0.7;
+/// Turn of the surface, rad, from which an edge is sharp.
+const SHARP: f64 = 0.96;
+/// Where a side's source at a sharp edge is: this part of the way from the vertex to the middle of
+/// the side's faces around it.
+const SHIFT: f64 = 0.6;
+/// Median depth in edge lengths below which a mesh is coarse for its thickness.
+const COARSE: f64 = 0.32;
 
-/// Depth of one source, m.
-fn automatic(surface: &Surface, site: &Site) -> f64 {
-    let radius = surface.ball(&site.point, &site.normal, site.thickness);
-    let mut depth = (EDGES * site.edge).min(BALL * radius);
-    // A safeguard for what points can't see of a coarse surface.
-    for _ in 0..20 {
-        let winding = surface.winding(&(site.point - site.normal * depth));
-        if (winding - 1.0).abs() < 1e-6 {
-            break;
-        }
-        depth *= 0.5;
+/// Sources with their depths.
+pub(crate) struct Placement {
+    /// Source points, m.
+    pub sources: Vec<Vec3>,
+    /// Distance of each from its point of the surface, m.
+    pub depths: Vec<f64>,
+    /// What the user should know.
+    pub warnings: Vec<String>,
+}
+
+/// A point of the surface that gets a source, with its local scales in m.
+struct Site {
+    point: Vec3,
+    /// Unit normal, into the fluid.
+    normal: Vec3,
+    /// Local edge length.
+    edge: f64,
+    /// Vertex and face that a ray from here doesn't hit.
+    own: (usize, usize),
+}
+
+/// No vertex, or no face.
+const NONE: usize = usize::MAX;
+
+/// One site per vertex; with `split` one per smooth side at sharp edges.
+fn vertex_sites(surface: &Surface, split: bool) -> Vec<Site> {
+    let plain = |i: usize| Site {
+        point: surface.vertices[i],
+        normal: surface.vertex_normals[i],
+        edge: surface.vertex_edge[i],
+        own: (i, NONE),
+    };
+    let patches = surface.patches(SHARP);
+    let count: usize = patches.iter().map(Vec::len).sum();
+    // A very coarse mesh has too few rows for them.
+    if !split || 10 * count > 9 * surface.faces.len() {
+        return (0..surface.vertices.len()).map(plain).collect();
     }
-    depth
+    let side = |i: usize, side: &Vec<usize>| {
+        let (mut normal, mut middle) = (Vec3::zeros(), Vec3::zeros());
+        for f in side {
+            normal += surface.faces.normals[*f] * surface.faces.areas[*f];
+            middle += surface.faces.centres[*f] / side.len() as f64;
+        }
+        let (site, norm) = (plain(i), normal.norm());
+        Site {
+            point: site.point + (middle - site.point) * SHIFT,
+            // Faces of one side can't cancel, but a number should never be divided by 0.
+            normal: if norm > 0.0 {
+                normal / norm
+            } else {
+                site.normal
+            },
+            ..site
+        }
+    };
+    let sides = |(i, list): (usize, &Vec<Vec<usize>>)| match list.len() {
+        1 => vec![plain(i)],
+        _ => list.iter().map(|s| side(i, s)).collect(),
+    };
+    patches.iter().enumerate().flat_map(sides).collect()
+}
+
+/// One site per face.
+fn face_sites(surface: &Surface) -> Vec<Site> {
+    let edge = |i: usize| surface.triangles[i].map(|k| surface.vertex_edge[k]);
+    (0..surface.faces.len())
+        .map(|i| Site {
+            point: surface.faces.centres[i],
+            normal: surface.faces.normals[i],
+            edge: edge(i).iter().sum::<f64>() / 3.0,
+            own: (NONE, i),
+        })
+        .collect()
+}
+
+/// Places the sources. Those that an automatic depth left outside a coarse surface, where points
+/// don't show all of it, are moved towards it.
+pub(crate) fn place(surface: &Surface, method: Method, depth: Depth) -> Result<Placement> {
+    let sites = match method {
+        Method::MfsVertex => vertex_sites(surface, depth == Depth::Auto),
+        Method::MfsFace => face_sites(surface),
+    };
+    let thickness: Vec<f64> = sites
+        .par_iter()
+        .map(|s| {
+            let hit = surface.ray(&s.point, &-s.normal, s.own.0, s.own.1);
+            hit.unwrap_or(2.0 * s.edge)
+        })
+        .collect();
+    let mut warnings = Vec::new();
+    let depths: Vec<f64> = match depth {
+        Depth::Auto => sites
+            .par_iter()
+            .zip(&thickness)
+            .map(|(site, t)| {
+                let radius = surface.ball(&site.point, &site.normal, *t);
+                let mut d = (EDGES * site.edge).min(BALL * radius);
+                for _ in 0..30 {
+                    if surface.contains(&(site.point - site.normal * d)) {
+                        break;
+                    }
+                    d *= 0.5;
+                }
+                d
+            })
+            .collect(),
+        Depth::Fixed(d) => {
+            check_fixed(surface.name, d, &sites, &thickness, &mut warnings)?;
+            vec![d; sites.len()]
+        }
+    };
+    if depth == Depth::Auto {
+        let mut ratios: Vec<f64> = sites.iter().zip(&depths).map(|(s, d)| d / s.edge).collect();
+        ratios.sort_unstable_by(f64::total_cmp);
+        let median = ratios[ratios.len() / 2];
+        if median < COARSE {
+            warnings.push(format!(
+                "body \"{}\": half of the sources are less than {median:.2} edge lengths deep: the mesh \
+                 ({} faces) is coarse for a body this thin; errors of 5 % and more are likely",
+                surface.name,
+                surface.faces.len()
+            ));
+        }
+    }
+    let sources: Vec<Vec3> = sites
+        .iter()
+        .zip(&depths)
+        .map(|(s, d)| s.point - s.normal * *d)
+        .collect();
+    check_inside(surface, &sources)?;
+    Ok(Placement {
+        sources,
+        depths,
+        warnings,
+    })
 }
 
 /// A user's own depth against what the mesh allows.
-fn check_fixed(name: &str, d: f64, sites: &[Site], warnings: &mut Vec<String>) -> Result<()> {
+fn check_fixed(
+    name: &str,
+    d: f64,
+    sites: &[Site],
+    thickness: &[f64],
+    warnings: &mut Vec<String>,
+) -> Result<()> {
     if !(d.is_finite() && d > 0.0) {
         return Err(Error::input(
             format!("body \"{name}\": source depth"),
@@ -102,25 +192,25 @@ fn check_fixed(name: &str, d: f64, sites: &[Site], warnings: &mut Vec<String>) -
         ));
     }
     let edge = sites.iter().map(|s| s.edge).sum::<f64>() / sites.len() as f64;
-    let thin = sites.iter().map(|s| s.thickness).fold(f64::MAX, f64::min);
+    let thin = thickness.iter().copied().fold(f64::INFINITY, f64::min);
     if d < 0.5 * edge {
         warnings.push(format!(
-            "body \"{name}\": source depth {d:.3e} m is {:.2} of the mean edge length {edge:.3e} m; \
-             the added mass will be too small (use 1 to 1.5 edge lengths, or automatic)",
+            "body \"{name}\": source depth {d:.3e} m is {:.2} of the mean edge length {edge:.3e} m; the \
+             added mass will be too small (use 1 to 1.5 edge lengths, or automatic)",
             d / edge
         ));
     }
     if d > 3.0 * edge {
         warnings.push(format!(
-            "body \"{name}\": source depth {d:.3e} m is {:.1} mean edge lengths ({edge:.3e} m); \
-             the equations become ill-conditioned (use 1 to 1.5 edge lengths, or automatic)",
+            "body \"{name}\": source depth {d:.3e} m is {:.1} mean edge lengths ({edge:.3e} m); the \
+             equations become ill-conditioned (use 1 to 1.5 edge lengths, or automatic)",
             d / edge
         ));
     }
-    if d > 0.45 * thin {
+    if d > 0.4 * thin {
         warnings.push(format!(
             "body \"{name}\": source depth {d:.3e} m is {:.2} of the smallest thickness {thin:.3e} m; \
-             sources from opposite sides meet (use less than a third, or automatic)",
+             sources from opposite sides come close (use less than 0.4, or automatic)",
             d / thin
         ));
     }
@@ -129,25 +219,20 @@ fn check_fixed(name: &str, d: f64, sites: &[Site], warnings: &mut Vec<String>) -
 
 /// Every source must be strictly inside.
 pub(crate) fn check_inside(surface: &Surface, sources: &[Vec3]) -> Result<()> {
-    for (i, s) in sources.iter().enumerate() {
-        let winding = surface.winding(s);
-        // A source on a vertex gives NaN.
-        if winding.is_nan() || (winding - 1.0).abs() > 1e-6 {
-            return Err(Error::Unresolved {
-                place: format!(
-                    "body \"{}\": source {i} of {} at {:?}",
-                    surface.name,
-                    sources.len(),
-                    s.as_slice()
-                ),
-                quantity: "winding number of the surface around it".into(),
-                value: winding,
-                limit: 1.0,
-                remedy: "sources must be inside the body: use a smaller source depth, automatic \
-                         depth, or a finer mesh there"
-                    .into(),
-            });
-        }
-    }
-    Ok(())
+    let outside = sources.par_iter().position_first(|s| !surface.contains(s));
+    let Some(i) = outside else { return Ok(()) };
+    Err(Error::Unresolved {
+        place: format!(
+            "body \"{}\": source {i} of {} at {:?}",
+            surface.name,
+            sources.len(),
+            sources[i].as_slice()
+        ),
+        quantity: "winding number of the surface around it".into(),
+        value: surface.winding(&sources[i]),
+        limit: 1.0,
+        remedy: "sources must be inside the body: use a smaller or automatic source depth, or a \
+                 finer mesh there"
+            .into(),
+    })
 }

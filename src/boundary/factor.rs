@@ -5,43 +5,54 @@ use faer::linalg::qr::no_pivoting::{factor, solve};
 use faer::linalg::triangular_solve;
 use faer::{Mat, MatMut, MatRef, Par};
 
-/// Above this condition number the solution is regularised.
+/// Above this condition number an undamped solution means nothing.
 const SINGULAR: f64 = 1e12;
+/// Damping that makes it one.
+const LEAST: f64 = 1e-10;
 
 pub(crate) struct Factored {
     /// Upper triangular, sources × sources.
     pub r: Mat<f64>,
-    /// K⁺ right-hand side, sources × columns.
+    /// Solution, sources × columns.
     pub solution: Mat<f64>,
     /// Condition number of R with columns scaled to unit length (estimated from below).
     pub condition: f64,
-    /// Whether rows μI were added because K alone is singular to round-off.
-    pub regularised: bool,
+    /// Diagonal of the damping rows.
+    pub damping: Vec<f64>,
+    /// Whether damping was needed but not asked for.
+    pub singular: bool,
 }
 
-/// Least-squares solution of `k x = rhs` by Householder QR.
-pub(crate) fn solve(k: MatRef<f64>, rhs: MatRef<f64>) -> Factored {
+/// Least-squares solution of `[k; D] x = [rhs; 0]` by Householder QR, D = `damping` times the norms
+/// of k's columns.
+pub(crate) fn solve(k: MatRef<f64>, rhs: MatRef<f64>, damping: f64) -> Factored {
+    if damping > 0.0 {
+        return damped(k, rhs, damping);
+    }
     let plain = attempt(k, rhs);
     if plain.condition < SINGULAR {
         return plain;
     }
-    let (m, n) = k.shape();
-    let norm = k.norm_l2() / (n as f64).sqrt();
-    let mu = 1e-10 * norm;
-    let tall = Mat::from_fn(m + n, n, |i, j| match i {
-        i if i < m => k[(i, j)],
-        i if i - m == j => mu,
-        _ => 0.0,
-    });
-    let rhs = Mat::from_fn(
-        m + n,
-        rhs.ncols(),
-        |i, j| if i < m { rhs[(i, j)] } else { 0.0 },
-    );
     Factored {
+        singular: true,
         condition: plain.condition,
-        regularised: true,
-        ..attempt(tall.as_ref(), rhs.as_ref())
+        ..damped(k, rhs, LEAST)
+    }
+}
+
+fn damped(k: MatRef<f64>, rhs: MatRef<f64>, damping: f64) -> Factored {
+    let (m, n) = k.shape();
+    let diagonal: Vec<f64> = (0..n).map(|j| damping * k.col(j).norm_l2()).collect();
+    let mut tall = Mat::zeros(m + n, n);
+    tall.subrows_mut(0, m).copy_from(k);
+    for (j, d) in diagonal.iter().enumerate() {
+        tall[(m + j, j)] = *d;
+    }
+    let mut long = Mat::zeros(m + n, rhs.ncols());
+    long.subrows_mut(0, m).copy_from(rhs);
+    Factored {
+        damping: diagonal,
+        ..attempt(tall.as_ref(), long.as_ref())
     }
 }
 
@@ -86,7 +97,8 @@ fn attempt(k: MatRef<f64>, rhs: MatRef<f64>) -> Factored {
         condition: condition(r.as_ref()),
         solution: x.subrows(0, n).to_owned(),
         r,
-        regularised: false,
+        damping: vec![0.0; n],
+        singular: false,
     }
 }
 

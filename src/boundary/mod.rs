@@ -5,10 +5,13 @@
 //! rad/s. With the rows of [`Method`],
 //!
 //! ```text
-//! K α ≈ F̄ ν      least squares        (the paper's Eq. 17, 20)
-//! T = ½ Σ_i φ(c_i) · flux_i            flux_i = B̄_i ν,  φ(c_i) = Σ_j P_ij α_j,  P_ij = 1/|c_i − s_j|
-//! M = sym(B̄ᵀ P K⁺ F̄)                  6 × 6 added mass (kg for density 1 kg/m³)
+//! [K; D] α ≈ [F̄; 0] ν     least squares, D a slight damping    (the paper's Eq. 17, 20)
+//! T = ½ Σ_i φ_i B̄_i ν      φ_i the potential's mean over face i, φ = P α
+//! M = sym(B̄ᵀ P [K; D]⁺ F̄)   6 × 6 added mass (kg for density 1 kg/m³)
 //! ```
+//!
+//! Between bodies φ_i is the potential at the face's centre, `P_ij = 1/|c_i − s_j|`; for a body's own
+//! sources see [`readout`]. [`depth`] says where the sources are.
 //!
 //! # References
 //! Fairweather & Karageorghis 1998 (MFS); Van Oosterom & Strackee 1983 (solid angle).
@@ -20,6 +23,7 @@ pub mod readout;
 mod settings;
 mod surface;
 
+use crate::adjoint::kernel::{Points, Triangles};
 use crate::adjoint::lie::{Mat6, Vec3, Vec6};
 use crate::{Error, Result};
 use faer::{Mat, MatMut, MatRef};
@@ -48,6 +52,10 @@ pub struct BodyBoundary {
     /// w_i: a row is w_i · flux ([`Method::MfsVertex`]) or w_i · normal velocity at the centre
     /// ([`Method::MfsFace`]).
     pub row_weights: Vec<f64>,
+    /// The faces as targets of the flux kernel, with their row weights.
+    pub triangles: Triangles,
+    /// The faces' centres as targets of the normal and potential kernels, with their row weights.
+    pub points: Points,
     /// F̄, faces × 6: the row that a unit twist asks for; `F_i(ν) = twist_rows[i] · ν`.
     pub twist_rows: Vec<Vec6>,
     /// Flux ∫ n·(u + ω × x) dA of a unit twist through each face, faces × 6, m³/s.
@@ -60,7 +68,7 @@ pub struct BodyBoundary {
     pub flux_rows: Vec<f64>,
     /// PᵀB̄ of the body's own faces and sources, sources × 6.
     pub readout: Vec<Vec6>,
-    /// K⁺F̄, sources × 6: strengths that answer a unit twist of the body alone.
+    /// [K; D]⁺F̄, sources × 6: strengths that answer a unit twist of the body alone.
     pub strengths: Vec<Vec6>,
     /// Added mass about the body's origin, symmetric, for density 1: kg, kg·m, kg·m².
     pub added_mass: Mat6,
@@ -68,11 +76,14 @@ pub struct BodyBoundary {
     pub asymmetry: f64,
     /// ‖F̄ν − Kα‖ / ‖F̄ν‖ for each unit twist; 0 where the twist moves no fluid.
     pub residual: Vec6,
-    /// Condition number of K with columns scaled to unit length (estimated from below).
+    /// Condition number of [K; D] with columns scaled to unit length (estimated from below).
     pub condition: f64,
     /// What the user should know, each with the body's name and its numbers.
     pub warnings: Vec<String>,
-    /// R of the thin QR of K, sources × sources.
+    /// Diagonal of the damping rows D, length sources; zeros without damping. Strengths solve
+    /// `min ‖Kα − F̄ν‖² + ‖Dα‖²`, so the normal equations are `(KᵀK + D²) α = KᵀF̄ν`.
+    pub damping: Vec<f64>,
+    /// R of the thin QR of [K; D], sources × sources.
     r: Mat<f64>,
 }
 
@@ -86,8 +97,8 @@ impl BodyBoundary {
         settings: &Settings,
     ) -> Result<Self> {
         let surface = surface::Surface::new(name, vertices, faces)?;
-        let (sources, depths, warnings) = depth::place(&surface, settings.method, settings.depth)?;
-        Self::build(&surface, sources, depths, warnings, settings)
+        let placement = depth::place(&surface, settings.method, settings.depth)?;
+        Self::build(&surface, placement, settings)
     }
 
     /// As [`BodyBoundary::new`], with the sources (m, body frame) given; `settings.depth` isn't used.
@@ -113,38 +124,46 @@ impl BodyBoundary {
                 d.fold(f64::INFINITY, f64::min)
             })
             .collect();
-        Self::build(&surface, sources.to_vec(), depths, Vec::new(), settings)
+        depth::check_inside(&surface, sources)?;
+        let placement = depth::Placement {
+            sources: sources.to_vec(),
+            depths,
+            warnings: Vec::new(),
+        };
+        Self::build(&surface, placement, settings)
     }
 
     fn build(
         surface: &surface::Surface,
-        sources: Vec<Vec3>,
-        depths: Vec<f64>,
-        mut warnings: Vec<String>,
+        placement: depth::Placement,
         settings: &Settings,
     ) -> Result<Self> {
+        let depth::Placement {
+            sources,
+            depths,
+            mut warnings,
+        } = placement;
         let name = surface.name;
-        let faces = surface.faces.clone();
-        if sources.len() > faces.len() {
-            return Err(Error::Mesh {
-                name: name.into(),
-                problem: format!("{} faces for {} sources", faces.len(), sources.len()),
-                location: "whole mesh".into(),
-                remedy:
-                    "a coarse mesh with vertex sources needs at least as many faces as vertices"
-                        .into(),
-            });
+        let damping = settings.damping;
+        if !(damping.is_finite() && damping >= 0.0) {
+            return Err(Error::input(
+                format!("body \"{name}\": damping"),
+                damping,
+                "0 for none, or a small positive number such as 0.003",
+            ));
         }
-        depth::check_inside(surface, &sources)?;
+        let faces = surface.faces.clone();
         let method = settings.method;
         let row_weights = assemble::row_weights(&faces, method, settings.rows);
         let twist_rows = assemble::twist_rows(&faces, method, &row_weights);
         let twist_flux: Vec<Vec6> = (0..faces.len()).map(|i| faces.twist_flux(i)).collect();
-        let flux_rows = assemble::flux_matrix(&faces, &sources, method, &row_weights);
+        let triangles = Triangles::new(surface.vertices, surface.triangles, row_weights.clone());
+        let points = Points::new(&faces.centres, &faces.normals, row_weights.clone());
+        let flux_rows = assemble::flux_matrix(method, &triangles, &points, &sources);
 
         let k = MatRef::from_row_major_slice(&flux_rows, faces.len(), sources.len());
         let rhs = Mat::from_fn(faces.len(), 6, |i, j| twist_rows[i][j]);
-        let factored = factor::solve(k, rhs.as_ref());
+        let factored = factor::solve(k, rhs.as_ref(), damping);
         let alpha = &factored.solution;
         let strengths: Vec<Vec6> = (0..sources.len())
             .map(|i| Vec6::from_fn(|j, _| alpha[(i, j)]))
@@ -173,8 +192,8 @@ impl BodyBoundary {
                 })
                 .collect(),
         };
-        let points = readout::points(&faces, &sources, settings.readout);
-        let readout = readout::own(&points, &sources, &readout_flux);
+        let rule = readout::points(&faces, &sources, settings.readout);
+        let readout = readout::own(&rule, &sources, &readout_flux);
         let mut raw = Mat6::zeros();
         for (p, a) in readout.iter().zip(&strengths) {
             raw += p * a.transpose();
@@ -188,12 +207,23 @@ impl BodyBoundary {
                 remedy: "use a smaller or automatic source depth".into(),
             });
         }
+        let added_mass = 0.5 * (raw + raw.transpose());
+        let translation = added_mass.fixed_view::<3, 3>(0, 0).symmetric_eigenvalues();
+        if translation.min() <= 0.0 {
+            return Err(Error::Unresolved {
+                place: format!("body \"{name}\""),
+                quantity: "smallest added mass in translation, relative to the displaced".into(),
+                value: translation.min() / faces.volume(),
+                limit: 0.0,
+                remedy: format!("the mesh ({} faces) is too coarse for it", faces.len()),
+            });
+        }
         if factored.condition > ILL_CONDITIONED {
             warnings.push(format!(
                 "body \"{name}\": condition number {:.1e} of the flux matrix is above {ILL_CONDITIONED:.0e}{}; \
                  use a smaller or automatic source depth, or a more even mesh",
                 factored.condition,
-                if factored.regularised { " (solved with regularisation)" } else { "" }
+                if factored.singular { " (solved with damping 1e-10)" } else { "" }
             ));
         }
         Ok(Self {
@@ -202,17 +232,20 @@ impl BodyBoundary {
             sources,
             depths,
             row_weights,
+            triangles,
+            points,
             twist_rows,
             twist_flux,
             readout_flux,
             flux_rows,
             readout,
             strengths,
-            added_mass: 0.5 * (raw + raw.transpose()),
+            added_mass,
             asymmetry: asymmetry(&raw, &faces),
             residual,
             condition: factored.condition,
             warnings,
+            damping: factored.damping,
             r: factored.r,
             faces,
         })
@@ -223,7 +256,8 @@ impl BodyBoundary {
         MatRef::from_row_major_slice(&self.flux_rows, self.faces.len(), self.sources.len())
     }
 
-    /// R of the thin QR `K = Q R`, upper triangular, sources × sources (`Q = K R⁻¹`).
+    /// R of the thin QR `[K; D] = Q R`, D the diagonal [`BodyBoundary::damping`]: upper triangular,
+    /// sources × sources. `RᵀR = KᵀK + D²`; `[K; D] R⁻¹` has orthonormal columns.
     pub fn factor(&self) -> MatRef<'_, f64> {
         self.r.as_ref()
     }

@@ -12,6 +12,7 @@
 
 use super::settings::Readout;
 use super::surface::{Faces, equilateral_edge};
+use crate::adjoint::kernel::{self, Points, Sources};
 use crate::adjoint::lie::{Vec3, Vec6};
 use rayon::prelude::*;
 
@@ -59,15 +60,16 @@ fn distance(s: &Vec3, corners: &[Vec3; 3]) -> f64 {
 
 /// Pᵀ B̄ of a body's own sources and faces, sources × 6.
 pub(crate) fn own(points: &[Vec<(Vec3, f64)>], sources: &[Vec3], flux: &[Vec6]) -> Vec<Vec6> {
-    sources
-        .par_iter()
-        .map(|s| {
-            let mut sum = Vec6::zeros();
-            for (list, b) in points.iter().zip(flux) {
-                let p: f64 = list.iter().map(|(x, w)| w / (x - s).norm()).sum();
-                sum += b * p;
-            }
-            sum
-        })
-        .collect()
+    let flat: Vec<Vec3> = points.iter().flatten().map(|p| p.0).collect();
+    let weighted = |(list, b): (&Vec<(Vec3, f64)>, &Vec6)| -> Vec<f64> {
+        list.iter()
+            .flat_map(|(_, w)| (0..6).map(|k| w * b[k]).collect::<Vec<f64>>())
+            .collect()
+    };
+    let bar: Vec<f64> = points.iter().zip(flux).flat_map(weighted).collect();
+    // Normals and row weights don't enter the potential.
+    let targets = Points::new(&flat, &flat, vec![1.0; flat.len()]);
+    let mut out = vec![0.0; 6 * sources.len()];
+    kernel::potential_sum(&targets, &Sources::new(sources), &bar, 6, &mut out);
+    out.chunks_exact(6).map(Vec6::from_column_slice).collect()
 }

@@ -1,5 +1,6 @@
 //! The closed triangle surface that a discretisation starts from.
 
+use crate::adjoint::kernel;
 use crate::adjoint::lie::{Vec3, Vec6, six};
 use crate::{Error, Result};
 
@@ -41,16 +42,6 @@ impl Faces {
             .map(|[a, b, c]| a.dot(&b.cross(c)) / 6.0)
             .sum()
     }
-}
-
-/// Van Oosterom & Strackee 1983, Eq. 8: signed solid angle of a triangle seen from `x`, sr.
-/// Positive when `x` sees the triangle's back (clockwise), that is, from inside the body.
-pub(crate) fn solid_angle(x: &Vec3, [p, q, r]: &[Vec3; 3]) -> f64 {
-    let (a, b, c) = (p - x, q - x, r - x);
-    let (la, lb, lc) = (a.norm(), b.norm(), c.norm());
-    let numerator = a.dot(&b.cross(&c));
-    let denominator = la * lb * lc + a.dot(&b) * lc + a.dot(&c) * lb + b.dot(&c) * la;
-    2.0 * numerator.atan2(denominator)
 }
 
 /// Edge of an equilateral triangle of this area.
@@ -190,10 +181,51 @@ impl<'a> Surface<'a> {
         })
     }
 
+    /// Faces around each vertex, grouped into the smooth patches that meet there: faces that share
+    /// an edge at the vertex and turn by less than `sharp` (rad) across it belong together.
+    pub fn patches(&self, sharp: f64) -> Vec<Vec<Vec<usize>>> {
+        let mut around = vec![Vec::new(); self.vertices.len()];
+        for (i, t) in self.triangles.iter().enumerate() {
+            for k in t {
+                around[*k].push(i);
+            }
+        }
+        let smooth = |v: usize, a: usize, b: usize| {
+            let shared = |k: &&usize| **k != v && self.triangles[b].contains(*k);
+            self.triangles[a].iter().any(|k| shared(&k))
+                && self.faces.normals[a].dot(&self.faces.normals[b]) > sharp.cos()
+        };
+        let group = |(v, fan): (usize, &Vec<usize>)| {
+            let mut left = fan.clone();
+            let mut groups = Vec::new();
+            while !left.is_empty() {
+                let mut group = vec![left.remove(0)];
+                let mut next = 0;
+                while next < group.len() {
+                    let from = group[next];
+                    let (more, rest) = left.iter().partition(|f| smooth(v, from, **f));
+                    let more: Vec<usize> = more;
+                    group.extend(more);
+                    left = rest;
+                    next += 1;
+                }
+                groups.push(group);
+            }
+            groups
+        };
+        around.iter().enumerate().map(group).collect()
+    }
+
     /// How often the surface winds around `x`: 1 inside, 0 outside.
     pub fn winding(&self, x: &Vec3) -> f64 {
-        let total: f64 = self.faces.corners.iter().map(|c| solid_angle(x, c)).sum();
+        let solid_angle = |c: &[Vec3; 3]| kernel::flux(c, 1.0, x);
+        let total: f64 = self.faces.corners.iter().map(solid_angle).sum();
         total / (4.0 * std::f64::consts::PI)
+    }
+
+    /// Whether `x` is strictly inside. A point on an edge or vertex is not.
+    pub fn contains(&self, x: &Vec3) -> bool {
+        (self.winding(x) - 1.0).abs() < 1e-6
     }
 
     /// Radius of the largest ball inside the body that touches the surface at `x` with outward normal

@@ -10,10 +10,11 @@ use nalgebra::{DMatrix, DVector};
 use std::path::Path;
 use std::sync::Arc;
 
-fn body(shape: Shape, faces: usize, method: Method) -> Arc<WetBody> {
+fn body(shape: Shape, faces: usize, method: Method, damping: f64) -> Arc<WetBody> {
     let mesh = shape::build(&shape, Path::new("."), Some(faces)).unwrap();
     let settings = Settings {
         method,
+        damping,
         ..Settings::default()
     };
     let b = BodyBoundary::new("b", mesh.vertices(), mesh.faces(), &settings).unwrap();
@@ -21,9 +22,14 @@ fn body(shape: Shape, faces: usize, method: Method) -> Arc<WetBody> {
 }
 
 fn full(method: Method, solver: Solver, walls: &[Wall]) -> Full {
+    // GMRES takes the square system as it is.
+    let damping = match solver {
+        Solver::Gmres => 0.0,
+        _ => Settings::default().damping,
+    };
     let bodies = vec![
-        body(Shape::sphere(0.5), 80, method),
-        body(Shape::ellipsoid([0.6, 0.3, 0.4]), 80, method),
+        body(Shape::sphere(0.5), 80, method, damping),
+        body(Shape::ellipsoid([0.6, 0.3, 0.4]), 80, method, damping),
     ];
     let settings = SolveSettings {
         solver,

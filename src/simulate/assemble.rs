@@ -5,7 +5,7 @@ use super::{Fidelity, Policy, Settings};
 use crate::adjoint::drag::{self, Element, Part};
 use crate::adjoint::lie::{Mat3, Mat6, Pose, Vec3, exp_matrix};
 use crate::boundary::BodyBoundary;
-use crate::coupling::full::{Full, WetBody};
+use crate::coupling::full::{Full, Solver, WetBody};
 use crate::coupling::{Coupling, Isolated};
 use crate::dynamics::{BodyData, Drive, Parameters, Stepper, System};
 use crate::multibody::{self, Tree};
@@ -136,7 +136,12 @@ impl Library<'_> {
         }
         let (vertices, faces) = (mesh.vertices(), mesh.faces());
         let name = &scene.bodies[b].name;
-        let boundary = BodyBoundary::new(name, vertices, faces, &self.settings.boundary)?;
+        let mut settings = self.settings.boundary;
+        if self.settings.solve.solver == Solver::Gmres {
+            // GMRES solves the square system as it is; damping belongs to least squares.
+            settings.damping = 0.0;
+        }
+        let boundary = BodyBoundary::new(name, vertices, faces, &settings)?;
         let made = Arc::new(WetBody::new(vertices, faces, Arc::new(boundary))?);
         self.made.push((b, made.clone()));
         Ok(made)

@@ -40,7 +40,7 @@ fn uneven(faces: usize) -> Vec<Arc<WetBody>> {
     ]
 }
 
-/// Poses of the uneven pair: the gap is about 0.2.
+/// Poses of the uneven pair: the gap is 0.20.
 fn uneven_poses() -> Vec<Pose> {
     vec![
         Pose::new(
@@ -49,7 +49,7 @@ fn uneven_poses() -> Vec<Pose> {
         ),
         Pose::new(
             exp_matrix(&Vec3::new(-0.7, 0.5, 0.9)),
-            Vec3::new(0.9, 1.2, 1.2),
+            Vec3::new(0.85, 1.1, 1.2),
         ),
     ]
 }
@@ -118,17 +118,18 @@ fn number(value: &Value) -> f64 {
 
 /// Orientations of a sphere's mesh against the direction of its neighbour: a vertex, the middle of a
 /// face, and none in particular turned that way.
-fn orientations(towards: &Vec3) -> [(&'static str, Mat3); 3] {
-    // Along the axes the mesh has vertices, along (1, 1, 1) the middle of a face.
+fn orientations(towards: &Vec3) -> [Mat3; 3] {
+    // Along the axes the mesh has vertices, along (1, 1, 1) the middle of a face; −x is on it if x is.
     let turn = |from: Vec3| {
-        nalgebra::Rotation3::rotation_between(&from.normalize(), towards)
+        let from = from.normalize() * towards.sum().signum();
+        nalgebra::Rotation3::rotation_between(&from, towards)
             .unwrap()
             .into_inner()
     };
     [
-        ("vertex", turn(Vec3::z())),
-        ("face", turn(Vec3::new(1.0, 1.0, 1.0))),
-        ("generic", turn(Vec3::new(0.3, -0.8, 0.53))),
+        turn(Vec3::z()),
+        turn(Vec3::new(1.0, 1.0, 1.0)),
+        turn(Vec3::new(0.3, -0.8, 0.53)),
     ]
 }
 
@@ -190,27 +191,45 @@ fn two_spheres(longitudinal: [[f64; 2]; 2], transverse: [[f64; 2]; 2]) -> DMatri
     })
 }
 
-/// Scaled error of each orientation of both meshes.
-fn two_sphere_errors(bodies: &[Arc<WetBody>], d: f64, exact: &DMatrix<f64>) -> Vec<f64> {
+/// Translations of two spheres at the distance d along z, for three orientations of the meshes.
+fn two_sphere_matrices(bodies: &[Arc<WetBody>], d: f64) -> [DMatrix<f64>; 3] {
     let coupling = full(bodies, &[], SolveSettings::default());
-    let turns = orientations(&Vec3::z());
-    let back = orientations(&-Vec3::z());
-    turns
-        .iter()
-        .zip(&back)
-        .map(|((_, near), (_, far))| {
-            let poses = [
-                Pose::new(*near, Vec3::zeros()),
-                Pose::new(*far, Vec3::new(0.0, 0.0, d)),
-            ];
-            scaled_error(&translations(&coupling, &poses), exact)
-        })
-        .collect()
+    let (near, far) = (orientations(&Vec3::z()), orientations(&-Vec3::z()));
+    std::array::from_fn(|k| {
+        let poses = [
+            Pose::new(near[k], Vec3::zeros()),
+            Pose::new(far[k], Vec3::new(0.0, 0.0, d)),
+        ];
+        translations(&coupling, &poses)
+    })
 }
+
+/// Largest |ΔM_ij| / √(M_ii M_jj) in percent over the orientations: along, own and between; across, own and
+/// between; all.
+fn two_sphere_errors(matrices: &[DMatrix<f64>], exact: &DMatrix<f64>) -> [f64; 5] {
+    let mut out = [0.0_f64; 5];
+    for m in matrices {
+        for i in 0..6 {
+            for j in 0..6 {
+                let scale = (exact[(i, i)] * exact[(j, j)]).sqrt();
+                let e = 100.0 * (m[(i, j)] - exact[(i, j)]).abs() / scale;
+                out[4] = out[4].max(e);
+                if i % 3 == j % 3 {
+                    let k = 2 * usize::from(i % 3 != 2) + usize::from(i != j);
+                    out[k] = out[k].max(e);
+                }
+            }
+        }
+    }
+    out
+}
+
+const HEADING: &str =
+    "gap | error, %: along, own and between; across, own and between; all entries";
 
 #[test]
 fn two_equal_spheres() {
-    println!("gap | scaled error of M, %: vertices, faces, neither facing");
+    println!("{HEADING}");
     for row in rows(&data("two_spheres.json"), "equal") {
         let d = number(&row["d"]);
         let pair = |key: &str| {
@@ -218,18 +237,23 @@ fn two_equal_spheres() {
             [[own, other], [other, own]]
         };
         let exact = two_spheres(pair("longitudinal"), pair("transverse"));
-        let bodies = [SPHERE.clone(), SPHERE.clone()];
-        let errors = two_sphere_errors(&bodies, d, &exact);
-        let percent: Vec<f64> = errors.iter().map(|e| 100.0 * e).collect();
-        println!("{:.2} | {percent:.2?}", d - 2.0);
-        let limit = if d - 2.0 < 0.19 { 5.0 } else { 1.0 };
-        assert!(percent.iter().all(|e| *e < limit), "{d}: {percent:?}");
+        let matrices = two_sphere_matrices(&[SPHERE.clone(), SPHERE.clone()], d);
+        let errors = two_sphere_errors(&matrices, &exact);
+        println!("{:.2} | {errors:.3?}", d - 2.0);
+        let limit = match d - 2.0 {
+            g if g > 0.9 => 0.32,
+            g if g > 0.19 => 0.42,
+            _ => 0.6,
+        };
+        assert!(errors[4] < limit, "{d}: {errors:?}");
+        assert!((image_series(d, -1.0) / (exact[(2, 2)] + exact[(2, 5)]) - 1.0).abs() < 1e-10);
+        assert!((image_series(d, 1.0) / (exact[(2, 2)] - exact[(2, 5)]) - 1.0).abs() < 1e-10);
     }
 }
 
 #[test]
 fn two_unequal_spheres() {
-    println!("gap | scaled error of M, %: vertices, faces, neither facing");
+    println!("{HEADING}");
     let small = ellipsoid([0.5; 3], 1280);
     for row in rows(&data("two_spheres.json"), "unequal") {
         let pair = |key: &str| -> [[f64; 2]; 2] {
@@ -238,10 +262,47 @@ fn two_unequal_spheres() {
         assert_eq!((number(&row["a"]), number(&row["b"])), (1.0, 0.5));
         let d = number(&row["d"]);
         let exact = two_spheres(pair("longitudinal"), pair("transverse"));
-        let errors = two_sphere_errors(&[SPHERE.clone(), small.clone()], d, &exact);
-        let percent: Vec<f64> = errors.iter().map(|e| 100.0 * e).collect();
-        println!("{:.2} | {percent:.2?}", d - 1.5);
-        assert!(percent.iter().all(|e| *e < 1.0), "{d}: {percent:?}");
+        let matrices = two_sphere_matrices(&[SPHERE.clone(), small.clone()], d);
+        let errors = two_sphere_errors(&matrices, &exact);
+        println!("{:.2} | {errors:.3?}", d - 1.5);
+        let limit = if d < 1.7 { 0.6 } else { 0.35 };
+        assert!(errors[4] < limit, "{d}: {errors:?}");
+    }
+}
+
+/// Added mass of a unit sphere that moves along the line to an equal one, which moves as its mirror image
+/// (sign 1) or with it (−1): Lamb, Hydrodynamics, §98; a dipole in the centre and its images on the line, each
+/// of (a/s)³ times the strength of the last, s that one's distance from the centre in which it is
+/// mirrored.
+fn image_series(d: f64, sign: f64) -> f64 {
+    let (mut at, mut strength, mut sum) = (0.0, 1.0_f64, 0.0);
+    while strength.abs() > 1e-16 {
+        let s = d - at;
+        strength *= sign / (s * s * s);
+        at = 1.0 / s;
+        sum += strength;
+        if at > 0.999_999 && strength.abs() < 1e-13 {
+            break;
+        }
+    }
+    2.0 / 3.0 * std::f64::consts::PI * (1.0 + 3.0 * sum)
+}
+
+#[test]
+fn gaps_far_below_an_edge() {
+    // Edge 0.15; along the line of centres, exact by images.
+    println!("gap | error of approach and of moving along, % of the own term");
+    for (gap, limit) in [(0.02, 90.0), (0.01, 90.0), (0.005, 90.0), (0.002, 90.0)] {
+        let exact = [1.0, -1.0].map(|sign| image_series(2.0 + gap, sign));
+        let own = 0.5 * (exact[0] + exact[1]);
+        let mut worst = [0.0_f64; 2];
+        for m in two_sphere_matrices(&[SPHERE.clone(), SPHERE.clone()], 2.0 + gap) {
+            for (w, (sign, e)) in worst.iter_mut().zip([1.0, -1.0].iter().zip(exact)) {
+                *w = w.max(100.0 * (m[(2, 2)] - sign * m[(2, 5)] - e).abs() / own);
+            }
+        }
+        println!("{gap} | {worst:.2?}");
+        assert!(worst.iter().all(|w| *w < limit), "{gap}: {worst:?}");
     }
 }
 
@@ -254,25 +315,32 @@ fn a_sphere_near_a_wall() {
         normal: [0.0, 0.0, 2.0],
     };
     let coupling = full(&[SPHERE.clone()], &[floor], SolveSettings::default());
-    println!("gap | error across and along, %: vertex, face, neither facing");
+    println!("gap | error, %: across, along, all entries");
     for row in rows(&data("sphere_wall.json"), "rows") {
         let height = number(&row["h"]);
-        let exact = ["perpendicular", "parallel"].map(|key| number(&row[key]));
-        let mut worst = 0.0_f64;
-        let mut line = format!("{:.3} |", height - 1.0);
-        for (_, turn) in orientations(&-Vec3::z()) {
+        let exact = ["parallel", "parallel", "perpendicular"].map(|key| number(&row[key]));
+        let exact = DMatrix::from_diagonal(&DVector::from_row_slice(&exact));
+        let mut worst = [0.0_f64; 3];
+        for turn in orientations(&-Vec3::z()) {
             let pose = Pose::new(turn, Vec3::new(0.7, 0.1, height - 0.5));
             let m = translations(&coupling, &[pose]);
-            let across = 100.0 * (m[(2, 2)] / exact[0] - 1.0);
-            let along = [0, 1].map(|i| 100.0 * (m[(i, i)] / exact[1] - 1.0));
-            let reference =
-                DMatrix::from_diagonal(&DVector::from_row_slice(&[exact[1], exact[1], exact[0]]));
-            worst = worst.max(100.0 * scaled_error(&m, &reference));
-            line += &format!(" {across:.2} {:.2}", along[0].min(along[1]));
+            let error = |i: usize| 100.0 * (m[(i, i)] / exact[(i, i)] - 1.0).abs();
+            let all = 100.0 * scaled_error(&m, &exact);
+            for (w, e) in worst
+                .iter_mut()
+                .zip([error(2), error(0).max(error(1)), all])
+            {
+                *w = w.max(e);
+            }
         }
-        println!("{line} | scaled {worst:.2}");
-        let limit = if height - 1.0 < 0.09 { 5.0 } else { 1.0 };
-        assert!(worst < limit, "{height}: {worst}");
+        println!("{:.3} | {worst:.3?}", height - 1.0);
+        let limit = match height - 1.0 {
+            g if g > 0.9 => 0.36,
+            g if g > 0.2 => 0.52,
+            g if g > 0.09 => 0.65,
+            _ => 0.9,
+        };
+        assert!(worst[2] < limit, "{height}: {worst:?}");
     }
 }
 
@@ -404,11 +472,12 @@ fn solvers_of_the_square_system_agree() {
     }
 }
 
-/// Iterations for the sphere and the coin above it, flat side on, cold start.
-fn iterations(gap: f64, preconditioner: Preconditioner, tolerance: f64) -> (usize, usize) {
+/// Iterations for the unit sphere and the coin above it, flat side on, all twelve twists, cold start.
+fn iterations(gap: f64, preconditioner: Preconditioner, tolerance: f64) -> usize {
     let settings = SolveSettings {
         preconditioner,
         tolerance,
+        max_iterations: 50_000,
         ..SolveSettings::default()
     };
     let coupling = full(&[SPHERE.clone(), COIN.clone()], &[], settings);
@@ -416,32 +485,31 @@ fn iterations(gap: f64, preconditioner: Preconditioner, tolerance: f64) -> (usiz
         Pose::identity(),
         Pose::new(Mat3::identity(), Vec3::new(0.0, 1.2 + gap, 0.0)),
     ];
-    let count = |columns: &[usize]| {
-        let mut basis = DMatrix::zeros(12, columns.len());
-        for (k, c) in columns.iter().enumerate() {
-            basis[(*c, k)] = 1.0;
-        }
-        let record = coupling.evaluate(&poses, &basis, false).unwrap();
-        record.report().iterations
-    };
-    // Without and with the turns about axes of symmetry, which move next to no fluid.
-    (
-        count(&[0, 1, 2, 6, 7, 8, 9, 11]),
-        count(&(0..12).collect::<Vec<_>>()),
-    )
+    matrix(&coupling, &poses).1.iterations
 }
 
 #[test]
 fn few_iterations_with_the_bodies_factors() {
-    println!("gap | factors 1e-3, 1e-8 (all 12 twists) | Jacobi 1e-3, 1e-8");
-    for (gap, published) in [(1.0, 7), (0.2, 14), (0.1, 18), (0.02, 40)] {
-        let own = [1e-3, 1e-8].map(|t| iterations(gap, Preconditioner::Factors, t));
-        let jacobi = [1e-3, 1e-8].map(|t| iterations(gap, Preconditioner::Jacobi, t).0);
-        println!("{gap} | {own:?} | {jacobi:?}");
-        let limit = published * 13 / 10;
-        assert!(own[1].0 <= limit, "gap {gap}: {} iterations", own[1].0);
-        assert!(own[0].0 < own[1].0);
-        assert!(jacobi[1] > 3 * own[1].0, "gap {gap}: Jacobi {}", jacobi[1]);
+    println!("gap | factors 1e-3, 1e-8 | Jacobi 1e-3");
+    // Counts for unscaled, undamped rows.
+    for (gap, undamped) in [(1.0, 7), (0.2, 14), (0.1, 18), (0.02, 40)] {
+        let [loose, tight] = [1e-3, 1e-8].map(|t| iterations(gap, Preconditioner::Factors, t));
+        let jacobi = iterations(gap, Preconditioner::Jacobi, 1e-3);
+        println!("{gap} | {loose}, {tight} | {jacobi}");
+        assert!(tight <= undamped * 13 / 10, "gap {gap}: {tight}");
+        assert!(loose < tight, "gap {gap}: {loose}");
+        assert!(jacobi > 5 * tight, "gap {gap}: Jacobi {jacobi}");
+    }
+}
+
+#[test]
+#[ignore = "a table, in minutes"]
+fn many_iterations_without_them() {
+    println!("gap | Jacobi 1e-8");
+    for gap in [1.0, 0.2, 0.1, 0.02] {
+        let jacobi = iterations(gap, Preconditioner::Jacobi, 1e-8);
+        println!("{gap} | {jacobi}");
+        assert!(jacobi > 500, "gap {gap}: {jacobi}");
     }
 }
 
@@ -489,6 +557,26 @@ fn asymmetry_falls_with_the_faces() {
         last = report.asymmetry;
     }
     assert!(last > 0.0 && last < 1e-3, "{last:e}");
+}
+
+#[test]
+fn turns_that_move_no_water_do_not_count() {
+    // A sphere's turns, and the coin's about its axis, have no added inertia to scale an asymmetry with.
+    let poses = [
+        Pose::identity(),
+        Pose::new(Mat3::identity(), Vec3::new(0.0, 1.4, 0.0)),
+    ];
+    let coupling = full(
+        &[SPHERE.clone(), COIN.clone()],
+        &[],
+        SolveSettings::default(),
+    );
+    let (_, report) = matrix(&coupling, &poses);
+    println!(
+        "sphere and coin, gap 0.2: asymmetry {:.1e}",
+        report.asymmetry
+    );
+    assert!(report.asymmetry < 0.01, "{}", report.asymmetry);
 }
 
 /// World-frame matrix about the bodies' origins.
@@ -579,16 +667,18 @@ fn far_bodies_are_isolated_ones() {
             translations(&isolated, &poses),
         )
     };
-    // Leading terms of the distance: two dipoles, −2π/c³ along and π/c³ across.
+    // Two dipoles of moment p, the added mass and that of the displaced water: −p²/(2π c³) along,
+    // p²/(4π c³) across.
+    let moment = sphere.boundary.faces.volume() + own[(0, 0)];
+    let unit = moment * moment / (4.0 * std::f64::consts::PI);
     let mut last = None;
     for d in [25.5, 51.0, 102.0] {
         let (m, apart) = at(d);
         let error = scaled_error(&m, &apart);
-        let dipole = [2, 0].map(|i| m[(i, i + 3)] * d.powi(3) / std::f64::consts::PI);
-        println!("c = {d}: coupling {error:.3e}; times c³/π: {dipole:.4?}");
-        // The strength of a dipole is as accurate as one body's added mass: 1 % with 320 faces.
-        assert!((dipole[0] / -2.0 - 1.0).abs() < 0.02, "{dipole:?}");
-        assert!((dipole[1] - 1.0).abs() < 0.02, "{dipole:?}");
+        let dipole = [2, 0].map(|i| m[(i, i + 3)] * d.powi(3) / unit);
+        println!("c = {d}: coupling {error:.3e}; in dipoles {dipole:.5?}");
+        assert!((dipole[0] / -2.0 - 1.0).abs() < 0.005, "{dipole:?}");
+        assert!((dipole[1] - 1.0).abs() < 0.005, "{dipole:?}");
         let near = m.view((0, 0), (3, 3)).into_owned();
         let near = scaled_error(&near, &apart.view((0, 0), (3, 3)).into_owned());
         assert!(near < 10.0 * d.powi(-6) + 1e-11, "{near:e}");
@@ -685,7 +775,9 @@ fn a_static_body_is_boundary_only() {
     assert!(error < 1e-11, "{error:e}");
     // It's there, all the same.
     let own = coupling_of_first();
-    assert!(scaled_error(&own, &reference) > 0.01);
+    let effect = scaled_error(&own, &reference);
+    println!("static: {error:.1e}, without it {effect:.3}");
+    assert!(effect > 0.005, "{effect}");
     let x = DVector::from_fn(6, |i, _| (1.7 * i as f64).sin());
     let padded = x.clone().resize_vertically(12, 0.0);
     let (a, b) = (all.gradient(&padded, &padded), part.gradient(&x, &x));

@@ -4,7 +4,7 @@
 
 use hydrograd::Error;
 use hydrograd::adjoint::lie::{Mat3, Mat6, Pose, Vec3, Vec6, exp_matrix, skew};
-use hydrograd::boundary::{BodyBoundary, Method, Settings};
+use hydrograd::boundary::{BodyBoundary, Method, RowScaling, Settings};
 use hydrograd::coupling::full::{Full, Preconditioner, SolveSettings, Solver, WetBody};
 use hydrograd::coupling::{Coupling, Direction, Isolated, Report};
 use hydrograd::scene::{Shape, Wall};
@@ -292,7 +292,7 @@ fn image_series(d: f64, sign: f64) -> f64 {
 fn gaps_far_below_an_edge() {
     // Edge 0.15; along the line of centres, exact by images.
     println!("gap | error of approach and of moving along, % of the own term");
-    for (gap, limit) in [(0.02, 90.0), (0.01, 90.0), (0.005, 90.0), (0.002, 90.0)] {
+    for (gap, limit) in [(0.02, 1.4), (0.01, 1.7), (0.005, 2.1), (0.002, 2.5)] {
         let exact = [1.0, -1.0].map(|sign| image_series(2.0 + gap, sign));
         let own = 0.5 * (exact[0] + exact[1]);
         let mut worst = [0.0_f64; 2];
@@ -303,6 +303,51 @@ fn gaps_far_below_an_edge() {
         }
         println!("{gap} | {worst:.2?}");
         assert!(worst.iter().all(|w| *w < limit), "{gap}: {worst:?}");
+    }
+}
+
+#[test]
+fn forces_between_spheres_that_approach() {
+    println!("gap | force | error, %: the three orientations");
+    let coupling = full(
+        &[SPHERE.clone(), SPHERE.clone()],
+        &[],
+        SolveSettings::default(),
+    );
+    let (near, far) = (orientations(&Vec3::z()), orientations(&-Vec3::z()));
+    for (gap, limit) in [
+        (1.0, 1.5),
+        (0.5, 1.7),
+        (0.2, 2.2),
+        (0.1, 3.0),
+        (0.05, 4.4),
+        (0.02, 11.0),
+        (0.01, 23.0),
+    ] {
+        let d = 2.0 + gap;
+        // Of the energy of unit speeds towards each other, ½ · 2 · (M₁₁ − M₁₂).
+        let h = 1e-3 * gap;
+        let at = |k: f64| image_series(d + k * h, 1.0);
+        let exact = (8.0 * (at(1.0) - at(-1.0)) - (at(2.0) - at(-2.0))) / (12.0 * h);
+        let errors: Vec<f64> = (0..3)
+            .map(|k| {
+                let poses = [
+                    Pose::new(near[k], Vec3::zeros()),
+                    Pose::new(far[k], Vec3::new(0.0, 0.0, d)),
+                ];
+                let mut basis = DMatrix::zeros(12, 1);
+                for (b, sign) in [1.0, -1.0].iter().enumerate() {
+                    let speed = poses[b].rotation.transpose() * Vec3::z() * *sign;
+                    basis.view_mut((6 * b, 0), (3, 1)).copy_from(&speed);
+                }
+                let record = coupling.evaluate(&poses, &basis, true).unwrap();
+                let one = DVector::from_element(1, 1.0);
+                let force = 0.5 * record.gradient(&one, &one)[1][2];
+                100.0 * (force / exact - 1.0)
+            })
+            .collect();
+        println!("{gap} | {exact:.3} | {errors:.2?}");
+        assert!(errors.iter().all(|e| e.abs() < limit), "{gap}: {errors:?}");
     }
 }
 
@@ -474,18 +519,27 @@ fn solvers_of_the_square_system_agree() {
 
 /// Iterations for the unit sphere and the coin above it, flat side on, all twelve twists, cold start.
 fn iterations(gap: f64, preconditioner: Preconditioner, tolerance: f64) -> usize {
+    let bodies = [SPHERE.clone(), COIN.clone()];
+    iterations_of(&bodies, gap, preconditioner, tolerance)
+}
+
+fn iterations_of(
+    bodies: &[Arc<WetBody>],
+    gap: f64,
+    preconditioner: Preconditioner,
+    tolerance: f64,
+) -> usize {
     let settings = SolveSettings {
         preconditioner,
         tolerance,
         max_iterations: 50_000,
         ..SolveSettings::default()
     };
-    let coupling = full(&[SPHERE.clone(), COIN.clone()], &[], settings);
     let poses = [
         Pose::identity(),
         Pose::new(Mat3::identity(), Vec3::new(0.0, 1.2 + gap, 0.0)),
     ];
-    matrix(&coupling, &poses).1.iterations
+    matrix(&full(bodies, &[], settings), &poses).1.iterations
 }
 
 #[test]
@@ -505,10 +559,21 @@ fn few_iterations_with_the_bodies_factors() {
 #[test]
 #[ignore = "a table, in minutes"]
 fn many_iterations_without_them() {
-    println!("gap | Jacobi 1e-8");
+    let kinds = [RowScaling::Scaled, RowScaling::Unscaled].map(|rows| {
+        let settings = Settings {
+            rows,
+            damping: 0.0,
+            ..Settings::default()
+        };
+        [[1.0; 3], [1.0, 0.2, 1.0]].map(|axes| wet(axes, 1280, &settings))
+    });
+    println!("gap | factors without damping, 1e-3 and 1e-8: scaled rows, unscaled | Jacobi 1e-8");
     for gap in [1.0, 0.2, 0.1, 0.02] {
         let jacobi = iterations(gap, Preconditioner::Jacobi, 1e-8);
-        println!("{gap} | {jacobi}");
+        let undamped = kinds.each_ref().map(|bodies| {
+            [1e-3, 1e-8].map(|t| iterations_of(bodies, gap, Preconditioner::Factors, t))
+        });
+        println!("{gap} | {undamped:?} | {jacobi}");
         assert!(jacobi > 500, "gap {gap}: {jacobi}");
     }
 }

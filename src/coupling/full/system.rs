@@ -196,7 +196,7 @@ impl<'a> System<'a> {
     /// (KᵀK + D²) x.
     fn normal(&self, x: &Columns) -> Columns {
         let mut out = normal_product(&self.matrix, self.full.rows(), x);
-        let n = x.columns;
+        let n = x.columns.max(1);
         let rows = out.data.chunks_exact_mut(n).zip(x.data.chunks_exact(n));
         for ((o, x), d) in rows.zip(&self.damping) {
             for (o, x) in o.iter_mut().zip(x) {
@@ -227,7 +227,7 @@ impl<'a> System<'a> {
     }
 
     fn scale(&self, x: &mut Columns) {
-        let n = x.columns;
+        let n = x.columns.max(1);
         for (row, s) in x.data.chunks_exact_mut(n).zip(&self.jacobi) {
             row.iter_mut().for_each(|v| *v *= s);
         }

@@ -129,7 +129,7 @@ fn updates<S: Simd, const N: usize>(
     out: &mut [f64],
 ) {
     let count = rows.len() / stride;
-    let mut out: [&mut [f64]; N] = {
+    let out: [&mut [f64]; N] = {
         let mut parts = out.chunks_exact_mut(stride);
         std::array::from_fn(|_| parts.next().unwrap_or_default())
     };

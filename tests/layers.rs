@@ -33,13 +33,7 @@ const LAYERS: [(&str, &[&str]); 11] = [
     (
         "cli",
         &[
-            "adjoint",
-            "boundary",
-            "coupling",
-            "dynamics",
-            "scene",
-            "shape",
-            "simulate",
+            "adjoint", "boundary", "coupling", "dynamics", "scene", "shape", "simulate",
         ],
     ),
 ];
@@ -162,9 +156,16 @@ fn every_module_names_only_what_its_layer_may() {
             }
         }
     }
-    assert!(wrong.is_empty(), "against the layers:\n{}", wrong.join("\n"));
+    assert!(
+        wrong.is_empty(),
+        "against the layers:\n{}",
+        wrong.join("\n")
+    );
     for (module, _) in LAYERS {
-        assert!(seen.contains(module), "{module} is in the table but not in src");
+        assert!(
+            seen.contains(module),
+            "{module} is in the table but not in src"
+        );
     }
 }
 
@@ -174,12 +175,10 @@ fn layers_are_ordered() {
     let table: BTreeMap<_, _> = LAYERS.iter().copied().collect();
     let mut done: BTreeSet<&str> = BTreeSet::from(["adjoint"]);
     while done.len() <= table.len() {
-        let ready = table
-            .iter()
-            .find(|(m, may)| {
-                let ready = |u: &&str| done.contains(u) || (**m, *u) == ("shape", "scene");
-                !done.contains(*m) && may.iter().all(ready)
-            });
+        let ready = table.iter().find(|(m, may)| {
+            let ready = |u: &&str| done.contains(u) || (**m, *u) == ("shape", "scene");
+            !done.contains(*m) && may.iter().all(ready)
+        });
         let (module, _) = ready.expect("the layers have a cycle");
         done.insert(module);
     }

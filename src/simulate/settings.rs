@@ -42,10 +42,8 @@ impl Settings {
             Preset::Default => Self::default(),
             Preset::Paper => Self {
                 boundary: boundary::Settings {
-                    method: boundary::Method::MfsFace,
                     rows: boundary::RowScaling::Unscaled,
-                    readout: boundary::Readout::Centre,
-                    ..boundary::Settings::default()
+                    ..boundary::Settings::plain(boundary::Method::MfsFace, boundary::Depth::Auto)
                 },
                 solve: SolveSettings {
                     solver: Solver::Cgls,

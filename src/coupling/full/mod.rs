@@ -4,20 +4,20 @@
 //! images. Per body twist x̄ (body frames), in the notation of [`crate::boundary`],
 //!
 //! ```text
-//! K a ≈ F x̄,   r = F x̄ − K a,   λ = (KᵀK)⁻¹ Pᵀ B x̄,   μ = K λ
+//! K a ≈ F x̄,   r = F x̄ − K a,   λ = N⁻¹ Pᵀ B x̄,   μ = K λ,   N = KᵀK + D²
 //! E(x, y) = sym( B_xᵀ P a_y )
 //! M̄ x̄ = ½ { B₆ᵀ P a + F₆ᵀ μ }                             all six components of every body
 //! δE(x, y) = ½ [ B_xᵀ δP a_y − μ_xᵀ δK a_y + r_xᵀ δK λ_y ] + (x ↔ y)
 //! ```
 //!
-//! A body's own block doesn't change in its own frame; all other entries depend on a source's
+//! with D the constant damping of [`crate::boundary`]. A body's own block doesn't change in its own frame; all other entries depend on a source's
 //! position in the target's frame alone, so a displacement enters through `d_j = Ẑ_c(s_j) − Z_b(s_j)`:
 //! with the right densities fixed, δE is the work of a force on each source of c and of the
 //! opposite wrench on b. The tangent (hvp) follows from
 //!
 //! ```text
-//! KᵀK δa = δKᵀ r − Kᵀ δK a              δr = −δK a − K δa
-//! KᵀK δλ = δPᵀ B x̄ − δKᵀ μ − Kᵀ δK λ      δμ = δK λ + K δλ
+//! N δa = δKᵀ r − Kᵀ δK a              δr = −δK a − K δa
+//! N δλ = δPᵀ B x̄ − δKᵀ μ − Kᵀ δK λ      δμ = δK λ + K δλ
 //! ```
 //!
 //! which is Eq. 21 done once, transposed, with the least-squares residual terms that Eq. 21 drops.
@@ -38,7 +38,7 @@ use crate::adjoint::lie::Pose;
 use crate::scene::Wall;
 use nalgebra::DMatrix;
 use std::ops::Range;
-use std::sync::Arc;
+use std::sync::{Arc, Mutex};
 
 /// All bodies coupled through one boundary integral system.
 pub struct Full {
@@ -47,6 +47,8 @@ pub struct Full {
     settings: SolveSettings,
     faces: Vec<Range<usize>>,
     sources: Vec<Range<usize>>,
+    /// Matrices to be used again: fresh memory costs as much as filling it.
+    spare: Mutex<Vec<Vec<f64>>>,
 }
 
 impl Full {
@@ -73,6 +75,7 @@ impl Full {
             images: Image::of_walls(walls)?,
             bodies,
             settings,
+            spare: Mutex::new(Vec::new()),
         })
     }
 

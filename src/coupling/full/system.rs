@@ -7,7 +7,7 @@ use crate::boundary::Method;
 use crate::solver::{Columns, Outcome, cgls, gmres, normal_product, product, transposed_product};
 use crate::{Error, Result};
 use faer::linalg::solvers::Qr;
-use faer::{Mat, MatMut, MatRef};
+use faer::{Mat, MatMut};
 use serde::{Deserialize, Serialize};
 use std::sync::Arc;
 
@@ -89,6 +89,16 @@ impl SolveSettings {
                 instead: "use --method mfs-face, or the solver cgls".into(),
             });
         }
+        let damped = |b: &Arc<WetBody>| b.boundary.settings.damping != 0.0;
+        if self.solver == Solver::Gmres
+            && let Some(body) = bodies.iter().find(|b| damped(b))
+        {
+            return Err(Error::input(
+                format!("body \"{}\": damping", body.boundary.name),
+                body.boundary.settings.damping,
+                "must be 0 for GMRES, which solves the square system as it is",
+            ));
+        }
         Ok(())
     }
 }
@@ -98,7 +108,17 @@ pub(super) struct System<'a> {
     full: &'a Full,
     matrix: Vec<f64>,
     jacobi: Vec<f64>,
+    /// D² of the bodies' damping, per source.
+    damping: Vec<f64>,
     qr: Option<Qr<f64>>,
+}
+
+impl Drop for System<'_> {
+    fn drop(&mut self) {
+        if let Ok(mut spare) = self.full.spare.lock() {
+            spare.push(std::mem::take(&mut self.matrix));
+        }
+    }
 }
 
 /// Solutions a and λ with r and μ.
@@ -115,7 +135,9 @@ impl<'a> System<'a> {
     /// Assembles K: own blocks from the bodies, all others from the pairs.
     pub fn new(full: &'a Full, pairs: &[Pair]) -> Self {
         let (rows, columns) = (full.rows(), full.columns());
-        let mut matrix = vec![0.0; rows * columns];
+        // Every entry is written below, so that what a used matrix held doesn't matter.
+        let spare = full.spare.lock().ok().and_then(|mut s| s.pop());
+        let mut matrix = spare.unwrap_or_else(|| vec![0.0; rows * columns]);
         for (b, body) in full.bodies.iter().enumerate() {
             let own = &body.boundary.flux_rows;
             let width = body.sources();
@@ -139,13 +161,28 @@ impl<'a> System<'a> {
             full,
             matrix,
             jacobi: Vec::new(),
+            damping: full
+                .bodies
+                .iter()
+                .flat_map(|b| b.boundary.damping.iter().map(|d| d * d))
+                .collect(),
             qr: None,
         };
         let settings = &full.settings;
         if settings.solver == Solver::Qr {
-            out.qr = Some(out.dense().to_owned().qr());
+            // [K; D], so that KᵀK + D² = RᵀR.
+            let stacked = Mat::from_fn(rows + columns, columns, |i, j| {
+                if i < rows {
+                    out.matrix[i * columns + j]
+                } else if i - rows == j {
+                    out.damping[j].sqrt()
+                } else {
+                    0.0
+                }
+            });
+            out.qr = Some(stacked.qr());
         } else if settings.preconditioner == Preconditioner::Jacobi {
-            let mut norms = vec![0.0; columns];
+            let mut norms = out.damping.clone();
             for row in out.matrix.chunks_exact(columns) {
                 for (n, x) in norms.iter_mut().zip(row) {
                     *n += x * x;
@@ -156,8 +193,17 @@ impl<'a> System<'a> {
         out
     }
 
-    fn dense(&self) -> MatRef<'_, f64> {
-        MatRef::from_row_major_slice(&self.matrix, self.full.rows(), self.full.columns())
+    /// (KᵀK + D²) x.
+    fn normal(&self, x: &Columns) -> Columns {
+        let mut out = normal_product(&self.matrix, self.full.rows(), x);
+        let n = x.columns.max(1);
+        let rows = out.data.chunks_exact_mut(n).zip(x.data.chunks_exact(n));
+        for ((o, x), d) in rows.zip(&self.damping) {
+            for (o, x) in o.iter_mut().zip(x) {
+                *o += d * x;
+            }
+        }
+        out
     }
 
     /// K x.
@@ -181,7 +227,7 @@ impl<'a> System<'a> {
     }
 
     fn scale(&self, x: &mut Columns) {
-        let n = x.columns;
+        let n = x.columns.max(1);
         for (row, s) in x.data.chunks_exact_mut(n).zip(&self.jacobi) {
             row.iter_mut().for_each(|v| *v *= s);
         }
@@ -229,7 +275,7 @@ impl<'a> System<'a> {
         }
     }
 
-    /// Solves `KᵀK x = g`.
+    /// Solves `(KᵀK + D²) x = g`.
     pub fn normal_solve(&self, g: &Columns, what: &str) -> Result<Outcome> {
         let settings = &self.full.settings;
         if let Some(qr) = &self.qr {
@@ -244,7 +290,7 @@ impl<'a> System<'a> {
             });
         }
         let outcome = cgls(
-            |x| normal_product(&self.matrix, self.full.rows(), x),
+            |x| self.normal(x),
             |x| self.precondition(x),
             |x| self.precondition_transpose(x),
             g,

@@ -4,7 +4,7 @@
 //! p̂⁺ = p̂ + Δt f. The velocity is found by Newton at fixed q_m (cheap) inside a fixed point in
 //! q_m (one evaluation each); the adjoint iterates the transpose of the same splitting.
 
-use super::euler::{adjoint_stage, advance, advance_vjp, next_state, solve_stage, stage_name};
+use super::euler::{AdjointStage, advance, advance_vjp, next_state, solve_stage, stage_name};
 use super::{Input, Memo, Split, State, StateBar, StepBar, Stepped, Stepper, When};
 use crate::dynamics::Evaluation;
 use crate::{Error, Result};
@@ -49,11 +49,11 @@ pub(super) fn step(
         let next = solve_stage(&m, &split, &p, &input.control, 0.5 * s.dt, &stage, &|| {
             stage_name(s, state)
         })?;
-        let moved = change(&m, &next, &stage);
-        stage = next;
+        let moved = change(&m, &next.v, &stage);
+        stage = next.v;
         // Below 1e-11 the change may be rounding or solver noise: stop when it no longer halves.
         if moved <= TOLERANCE || (moved <= 1e-11 && moved > 0.5 * previous) {
-            let y = &p + s.dt * m.force(&stage, &input.control);
+            let y = &p + s.dt * next.force;
             let q = advance(s, state, &stage);
             return Ok(Stepped {
                 state: next_state(state, &split, q, y, input),
@@ -115,13 +115,14 @@ pub(super) fn step_vjp(
     let (q_bar, v_bar_next) = advance_vjp(s, &split, &stage, &next_bar.q);
     let mut z = next_bar.y.clone();
     split.forget_driven(&mut z);
-    let v_bar_force = s.dt * m.force_velocity_jacobian(&stage).tr_mul(&z);
+    let adjoint = AdjointStage::new(&m, &split, &stage, h);
+    let v_bar_force = s.dt * adjoint.rates.tr_mul(&z);
     let fixed = v_bar_next + v_bar_force;
     // v̄ = fixed + (∂q_m/∂v)ᵀ q̄_m(w), w = J⁻ᵀ v̄.
     let mut v_bar = fixed.clone();
     let mut previous = f64::INFINITY;
     for _ in 0..ITERATIONS {
-        let w = adjoint_stage(&m, &split, &stage, h, &v_bar)?;
+        let w = adjoint.solve(&split, &v_bar)?;
         let z_total = s.dt * &z + h * m.frame_velocity(&w);
         let inner = configuration_vjp(&m, &split, &stage, &input.control, &reached, &w, &z_total)?;
         let (q_start, xi) = s.system.tree.integrate_vjp(&(h * &stage), &inner.state.q);

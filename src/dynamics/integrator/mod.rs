@@ -250,7 +250,7 @@ impl Stepper<'_> {
         next_bar: &StateBar,
     ) -> Result<StepBar> {
         match self.integrator {
-            Integrator::MomentumEuler => euler::step_vjp(self, e, state, v, input, next_bar),
+            Integrator::MomentumEuler => euler::step_vjp(self, e, state, v, input, memo, next_bar),
             Integrator::Midpoint => midpoint::step_vjp(self, e, state, v, input, memo, next_bar),
             Integrator::Rk4 => rk4::step_vjp(self, e, state, v, input, next_bar),
             Integrator::VelocityEuler => {

@@ -14,18 +14,28 @@ const NODES: [f64; 4] = [0.0, 0.5, 0.5, 1.0];
 const WEIGHTS: [f64; 4] = [1.0 / 6.0, 1.0 / 3.0, 1.0 / 3.0, 1.0 / 6.0];
 
 struct Stage<'a> {
-    evaluation: Evaluation<'a>,
+    /// The first stage has none: it is the step's own.
+    evaluation: Option<Evaluation<'a>>,
     split: Split,
     xi: DVector<f64>,
     p: DVector<f64>,
     v: DVector<f64>,
+    /// Whether v is the velocity read out at the state.
+    read_out: bool,
     chart_rate: DVector<f64>,
     force: DVector<f64>,
 }
 
-/// The four stages; the first is evaluated at the state itself.
+impl<'a> Stage<'a> {
+    fn at<'e>(&'e self, e: &'e Evaluation<'a>) -> &'e Evaluation<'a> {
+        self.evaluation.as_ref().unwrap_or(e)
+    }
+}
+
+/// The four stages.
 fn stages<'a>(
     s: &'a Stepper,
+    e: &Evaluation,
     state: &State,
     v: &DVector<f64>,
     input: &Input,
@@ -45,22 +55,30 @@ fn stages<'a>(
             ),
             None => (DVector::zeros(nv), start.clone()),
         };
-        let mut q = tree.integrate(&state.q, &xi);
-        s.place_motions(&mut q, t);
-        let evaluation = s.system.evaluate(s.parameters, &q, true, reverse)?;
-        let stage_v = if i == 0 && split.is_driven == s.split(&state.held, When::At(t)).is_driven {
+        let evaluation = if i == 0 {
+            None
+        } else {
+            let mut q = tree.integrate(&state.q, &xi);
+            s.place_motions(&mut q, t);
+            Some(s.system.evaluate(s.parameters, &q, true, reverse)?)
+        };
+        let at = evaluation.as_ref().unwrap_or(e);
+        // The readout's, unless a joint is newly held or released.
+        let read_out = i == 0 && split.is_driven == s.split(&state.held, When::At(t)).is_driven;
+        let stage_v = if read_out {
             v.clone()
         } else {
-            readout::solve(&evaluation, &split, &p)?
+            readout::solve(at, &split, &p)?
         };
         let chart_rate = tree.chart_rate(&xi, &stage_v);
-        let force = evaluation.force(&stage_v, &input.control);
+        let force = at.force(&stage_v, &input.control);
         out.push(Stage {
             evaluation,
             split,
             xi,
             p,
             v: stage_v,
+            read_out,
             chart_rate,
             force,
         });
@@ -77,7 +95,7 @@ pub(super) fn step(
 ) -> Result<Stepped> {
     let first = s.split(&input.hold, When::At(s.time(state)));
     let start = s.released_momentum(e, state, v, &first);
-    let stages = stages(s, state, v, input, &start, false)?;
+    let stages = stages(s, e, state, v, input, &start, false)?;
     let mut xi = DVector::zeros(v.len());
     let mut y = start;
     for (stage, weight) in stages.iter().zip(WEIGHTS) {
@@ -103,7 +121,7 @@ pub(super) fn step_vjp(
     let tree = &s.system.tree;
     let first = s.split(&input.hold, When::At(s.time(state)));
     let start = s.released_momentum(e, state, v, &first);
-    let stages = stages(s, state, v, input, &start, true)?;
+    let stages = stages(s, e, state, v, input, &start, true)?;
     let mut xi = DVector::zeros(v.len());
     for (stage, weight) in stages.iter().zip(WEIGHTS) {
         xi += weight * s.dt * &stage.chart_rate;
@@ -120,14 +138,17 @@ pub(super) fn step_vjp(
     let mut force_bar: Vec<DVector<f64>> = WEIGHTS.iter().map(|w| *w * s.dt * &y_bar).collect();
     for i in (0..4).rev() {
         let stage = &stages[i];
-        let e = &stage.evaluation;
+        let e = stage.at(e);
         let mut own = StepBar::zeros(e);
         let (mut stage_xi_bar, mut v_bar) = tree.chart_rate_vjp(&stage.xi, &stage.v, &rate_bar[i]);
         let force = e.force_vjp(&stage.v, &input.control, &force_bar[i])?;
         own.add(1.0, &force);
         v_bar += &force.v;
-        // The first stage's velocity is the readout's unless a joint is newly driven or released.
-        readout::solve_vjp(e, &stage.split, &stage.p, &stage.v, &v_bar, &mut own)?;
+        if stage.read_out {
+            bar.v += &v_bar;
+        } else {
+            readout::solve_vjp(e, &stage.split, &stage.p, &stage.v, &v_bar, &mut own)?;
+        }
         stage.split.forget_moved(&mut own.state.q);
         let (q_bar, xi_bar) = tree.integrate_vjp(&stage.xi, &own.state.q);
         bar.state.q += q_bar;

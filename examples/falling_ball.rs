@@ -83,7 +83,11 @@ fn options() -> Result<Options, String> {
             "--steps" => out.steps = Some(number(value()?)?),
             "--out" => out.out = value()?.into(),
             "--json" => out.json = true,
-            _ => return Err(format!("{name}: expected --faces, --steps, --out or --json")),
+            _ => {
+                return Err(format!(
+                    "{name}: expected --faces, --steps, --out or --json"
+                ));
+            }
         }
     }
     Ok(out)
@@ -128,7 +132,9 @@ fn plot(file: &Path, curves: &[Curve]) -> Result<(), Box<dyn Error>> {
     let area = SVGBackend::new(file, (640, 480)).into_drawing_area();
     area.fill(&WHITE)?;
     let (top, bottom) = area.split_vertically(240);
-    panel(&top, "angle of the coin, degrees", curves, |c| &c.coin_angle)?;
+    panel(&top, "angle of the coin, degrees", curves, |c| {
+        &c.coin_angle
+    })?;
     panel(&bottom, "height of the coin, m", curves, |c| &c.coin_height)?;
     area.present()?;
     Ok(())
@@ -141,7 +147,9 @@ fn panel(
     values: impl Fn(&Curve) -> &Vec<f64>,
 ) -> Result<(), Box<dyn Error>> {
     let all: Vec<f64> = curves.iter().flat_map(|c| values(c).clone()).collect();
-    let (low, high) = all.iter().fold((f64::MAX, f64::MIN), |(l, h), x| (l.min(*x), h.max(*x)));
+    let (low, high) = all
+        .iter()
+        .fold((f64::MAX, f64::MIN), |(l, h), x| (l.min(*x), h.max(*x)));
     let margin = 0.08 * (high - low).max(1e-6);
     let end = curves[0].time[curves[0].time.len() - 1];
     let mut chart = ChartBuilder::on(area)
@@ -156,7 +164,11 @@ fn panel(
         .light_line_style(TRANSPARENT)
         .draw()?;
     for (curve, color) in curves.iter().zip([BLUE, RED]) {
-        let points = curve.time.iter().copied().zip(values(curve).iter().copied());
+        let points = curve
+            .time
+            .iter()
+            .copied()
+            .zip(values(curve).iter().copied());
         chart
             .draw_series(LineSeries::new(points, color.stroke_width(2)))?
             .label(curve.fidelity)

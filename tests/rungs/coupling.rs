@@ -204,10 +204,7 @@ fn hvp(s: &Full, c: f64) -> Outcome {
         let flat = |w: &[Vec6], c: f64| -> Vec<f64> {
             w.iter().flat_map(|w| (c * w).as_slice().to_vec()).collect()
         };
-        let wrench = vector_along(
-            |h| flat(&at(h).gradient(x, y), 1.0),
-            &flat(&t.wrench, c),
-        );
+        let wrench = vector_along(|h| flat(&at(h).gradient(x, y), 1.0), &flat(&t.wrench, c));
         [impulse(x, &t.momentum_x), impulse(y, &t.momentum_y), wrench]
     }))
 }
@@ -278,7 +275,10 @@ fn second_derivatives_commute_up_to_the_bracket() {
             let brackets: Vec<Vec6> = (0..2).map(|b| cross_motion(&k.z[b], &other[b])).collect();
             let bracket = dot(&g, &brackets);
             let size = yz.abs().max(zy.abs()).max(bracket.abs());
-            assert!((yz - zy - bracket).abs() < 1e-9 * size, "{yz} {zy} {bracket}");
+            assert!(
+                (yz - zy - bracket).abs() < 1e-9 * size,
+                "{yz} {zy} {bracket}"
+            );
         }
         // The two ways to the same first derivative.
         let g = dot(&record.gradient(&k.x, &k.y), &k.z);

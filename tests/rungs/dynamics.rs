@@ -5,7 +5,7 @@ use super::multibody::tree_displacement;
 use super::tools::{Group, all, along, groups, vector_along, wavy};
 use hydrograd::adjoint::check::{Outcome, Rung};
 use hydrograd::dynamics::{
-    Evaluation, Input, Integrator, Parameters, State, StateBar, StepBar, Stepper, System,
+    Drive, Evaluation, Input, Integrator, Parameters, State, StateBar, StepBar, Stepper, System,
 };
 use hydrograd::scene::{Body, Drag, DragPart, Fluid, Joint, Motion, Plane, Scene, Shape};
 use hydrograd::{Settings, Simulator};
@@ -202,13 +202,7 @@ fn parameter_groups(bodies: usize) -> Vec<(&'static str, DVector<f64>)> {
 
 /// A scalar of a point against its cotangents, group by group; with `fine`, every joint and every
 /// kind of parameter is a group, so that none hides behind another.
-fn check(
-    fine: bool,
-    value: &dyn Fn(&Point) -> f64,
-    at: &Point,
-    bar: &Bar,
-    c: f64,
-) -> Outcome {
+fn check(fine: bool, value: &dyn Fn(&Point) -> f64, at: &Point, bar: &Bar, c: f64) -> Outcome {
     let tree = &system().tree;
     let n = tree.velocities();
     let (dq, dv) = (wavy(n, 2.1, 0.05), wavy(n, 3.1, 0.2));
@@ -237,14 +231,17 @@ fn check(
             }),
         },
     ];
-    let ranges: Vec<_> = if fine {
-        tree.links().iter().map(|l| l.v.clone()).collect()
+    let links: Vec<Vec<usize>> = if fine {
+        tree.links().iter().map(|l| l.v.clone().collect()).collect()
     } else {
-        std::iter::once(0..n).collect()
+        // A step takes the coordinates of driven joints from their motions.
+        let free = tree.links().iter().zip(&system().drives);
+        let free = free.filter(|(_, drive)| !matches!(drive, Drive::Motion(_)));
+        vec![free.flat_map(|(l, _)| l.v.clone()).collect()]
     };
-    for range in ranges {
+    for link in links {
         let mut d = DVector::zeros(n);
-        for i in range {
+        for i in link {
             d[i] = dq[i];
         }
         list.push(Group {
@@ -281,11 +278,17 @@ fn check(
 
 fn joint_forces(c: f64) -> Outcome {
     let s = system();
-    let (bar, d) = (wavy(s.tree.velocities(), 0.3, 1.0), wavy(s.controls, 1.3, 0.3));
+    let (bar, d) = (
+        wavy(s.tree.velocities(), 0.3, 1.0),
+        wavy(s.controls, 1.3, 0.3),
+    );
     let mut u_bar = DVector::zeros(s.controls);
     s.joint_forces_vjp(&bar, &mut u_bar);
     let at = wavy(s.controls, 2.3, 1.0);
-    along(|h| bar.dot(&s.joint_forces(&(&at + h * &d))), c * u_bar.dot(&d))
+    along(
+        |h| bar.dot(&s.joint_forces(&(&at + h * &d))),
+        c * u_bar.dot(&d),
+    )
 }
 
 fn force_jvp(c: f64) -> Outcome {
@@ -317,7 +320,9 @@ fn force_vjp(c: f64) -> Outcome {
 fn momentum(c: f64) -> Outcome {
     let p = point();
     let w = wavy(p.v.len(), 5.1, 1.0);
-    let b = evaluate(&p.parameters, &p.q).momentum_vjp(&p.v, &w).unwrap();
+    let b = evaluate(&p.parameters, &p.q)
+        .momentum_vjp(&p.v, &w)
+        .unwrap();
     let value = |p: &Point| w.dot(&evaluate(&p.parameters, &p.q).momentum(&p.v));
     let bar = Bar {
         q: b.q,
@@ -382,20 +387,28 @@ fn state_point(integrator: Integrator) -> Point {
 /// Of a momentum, and of a velocity, with a held joint.
 fn velocity(c: f64) -> Outcome {
     let held = hold(&["arm"]);
-    all([Integrator::MomentumEuler, Integrator::VelocityEuler].map(|integrator| {
-        let p = state_point(integrator);
-        let z = wavy(p.v.len(), 5.1, 1.0);
-        let value = |p: &Point| {
-            let s = stepper(&p.parameters, integrator);
-            z.dot(&s.velocity(&evaluate(&p.parameters, &p.q), &state(p, &held)).unwrap())
-        };
-        let (s, e) = (stepper(&p.parameters, integrator), evaluate(&p.parameters, &p.q));
-        let at = state(&p, &held);
-        let v = s.velocity(&e, &at).unwrap();
-        let mut b = StepBar::zeros(&e);
-        s.velocity_vjp(&e, &at, &v, &z, &mut b).unwrap();
-        check(true, &value, &p, &bar_of(b), c)
-    }))
+    all(
+        [Integrator::MomentumEuler, Integrator::VelocityEuler].map(|integrator| {
+            let p = state_point(integrator);
+            let z = wavy(p.v.len(), 5.1, 1.0);
+            let value = |p: &Point| {
+                let s = stepper(&p.parameters, integrator);
+                z.dot(
+                    &s.velocity(&evaluate(&p.parameters, &p.q), &state(p, &held))
+                        .unwrap(),
+                )
+            };
+            let (s, e) = (
+                stepper(&p.parameters, integrator),
+                evaluate(&p.parameters, &p.q),
+            );
+            let at = state(&p, &held);
+            let v = s.velocity(&e, &at).unwrap();
+            let mut b = StepBar::zeros(&e);
+            s.velocity_vjp(&e, &at, &v, &z, &mut b).unwrap();
+            check(true, &value, &p, &bar_of(b), c)
+        }),
+    )
 }
 
 /// Cotangents of a state point; those of v have been pulled back to the state.
@@ -409,24 +422,29 @@ fn bar_of(b: StepBar) -> Bar {
 }
 
 fn conserved(c: f64) -> Outcome {
-    all([Integrator::MomentumEuler, Integrator::VelocityEuler].map(|integrator| {
-        let p = point();
-        let z = wavy(p.v.len(), 5.1, 1.0);
-        let value = |p: &Point| {
-            let s = stepper(&p.parameters, integrator);
-            z.dot(&s.conserved(&evaluate(&p.parameters, &p.q), &p.v))
-        };
-        let (s, e) = (stepper(&p.parameters, integrator), evaluate(&p.parameters, &p.q));
-        let mut b = StepBar::zeros(&e);
-        s.conserved_vjp(&e, &p.v, &z, &mut b).unwrap();
-        let bar = Bar {
-            q: b.state.q,
-            v: b.v,
-            u: b.control,
-            parameters: b.parameters,
-        };
-        check(true, &value, &p, &bar, c)
-    }))
+    all(
+        [Integrator::MomentumEuler, Integrator::VelocityEuler].map(|integrator| {
+            let p = point();
+            let z = wavy(p.v.len(), 5.1, 1.0);
+            let value = |p: &Point| {
+                let s = stepper(&p.parameters, integrator);
+                z.dot(&s.conserved(&evaluate(&p.parameters, &p.q), &p.v))
+            };
+            let (s, e) = (
+                stepper(&p.parameters, integrator),
+                evaluate(&p.parameters, &p.q),
+            );
+            let mut b = StepBar::zeros(&e);
+            s.conserved_vjp(&e, &p.v, &z, &mut b).unwrap();
+            let bar = Bar {
+                q: b.state.q,
+                v: b.v,
+                u: b.control,
+                parameters: b.parameters,
+            };
+            check(true, &value, &p, &bar, c)
+        }),
+    )
 }
 
 /// One step with its readout, from a state whose joints `before` were held, holding `now`.
@@ -474,12 +492,7 @@ fn step_with(integrator: Integrator, before: &[&str], now: &[&str], c: f64) -> O
 
 /// Free throughout, and with one joint held anew while another stays held.
 fn step(integrator: Integrator, c: f64) -> Outcome {
-    step_with(integrator, &[], &[], c).worst(step_with(
-        integrator,
-        &["arm"],
-        &["arm", "tail"],
-        c,
-    ))
+    step_with(integrator, &[], &[], c).worst(step_with(integrator, &["arm"], &["arm", "tail"], c))
 }
 
 /// Joints that come free take their momentum from the velocity.

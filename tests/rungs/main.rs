@@ -98,10 +98,7 @@ const THROUGH: &[(&str, &str)] = &[
         "simulate::trajectory::Trajectory::last_vjp",
         "simulate::rollout::Rollout::vjp",
     ),
-    (
-        "adjoint::step::reverse",
-        "simulate::rollout::Rollout::vjp",
-    ),
+    ("adjoint::step::reverse", "simulate::rollout::Rollout::vjp"),
     (
         "simulate::rollout::Rollout::gradient",
         "simulate::rollout::Rollout::vjp",
@@ -129,9 +126,15 @@ fn every_rung_in_the_source_is_registered() {
         .chain(helpers.iter().copied())
         .filter(|name| !found.contains(*name))
         .collect();
-    assert!(stale.is_empty(), "registered, but not in the source: {stale:#?}");
+    assert!(
+        stale.is_empty(),
+        "registered, but not in the source: {stale:#?}"
+    );
     for (helper, rung) in THROUGH {
-        assert!(registered.contains(*rung), "{helper} is checked through {rung}, which isn't");
+        assert!(
+            registered.contains(*rung),
+            "{helper} is checked through {rung}, which isn't"
+        );
     }
 }
 

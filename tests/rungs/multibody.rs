@@ -36,7 +36,10 @@ fn joints() -> Vec<Joint> {
 
 /// A generic configuration of a joint.
 fn generic(joint: &Joint) -> Vec<f64> {
-    joint.integrate(&joint.origin(), wavy(joint.velocities(), 0.3, 0.8).as_slice())
+    joint.integrate(
+        &joint.origin(),
+        wavy(joint.velocities(), 0.3, 0.8).as_slice(),
+    )
 }
 
 /// Tangent displacement from `base` to `q`, a chart whose derivative at `base` is the identity.
@@ -116,9 +119,15 @@ fn joint_chart_rate(c: f64) -> Outcome {
         let slope = dot(&xi_bar, d.as_slice());
         assert!(turns || slope == 0.0);
         let by_xi = turns.then(|| {
-            along(|h| scalar(&moved(xi.as_slice(), h, &d), v.as_slice()), c * slope)
+            along(
+                |h| scalar(&moved(xi.as_slice(), h, &d), v.as_slice()),
+                c * slope,
+            )
         });
-        [Some(by_v), by_xi].into_iter().flatten().collect::<Vec<_>>()
+        [Some(by_v), by_xi]
+            .into_iter()
+            .flatten()
+            .collect::<Vec<_>>()
     }))
 }
 

@@ -63,7 +63,11 @@ fn act(policy: &dyn Policy, c: f64) -> Outcome {
     let back = policy.act_vjp(&observed, &bar);
     let dot = |bar: &[f64], d: &DVector<f64>| bar.iter().zip(d.iter()).map(|(b, d)| b * d).sum();
     let moved = |h: f64| -> Vec<f64> {
-        gains.iter().zip(dgains.iter()).map(|(g, d)| g + h * d).collect()
+        gains
+            .iter()
+            .zip(dgains.iter())
+            .map(|(g, d)| g + h * d)
+            .collect()
     };
     groups(
         vec![
@@ -157,15 +161,20 @@ fn rollout(c: f64) -> Outcome {
     let simulator = Simulator::new(&scene, settings).unwrap();
     all([1, 7].map(|steps| {
         let controls = |h: f64| {
-            let u = wavy(steps, 0.2, 1.0) + h * wavy(steps, 1.2, 3.0);
+            let u = wavy(steps, 0.2, 1.0) + h * wavy(steps, 1.2, 30.0);
             let u = DMatrix::from_row_slice(1, steps, u.as_slice());
             Controls::from_matrix(&simulator, u).unwrap()
         };
         let base = simulator.rollout(&controls(0.0)).unwrap();
         let mut bar = base.zero_cotangents();
-        for (k, m) in [&mut bar.q, &mut bar.v, &mut bar.positions, &mut bar.rotations]
-            .into_iter()
-            .enumerate()
+        for (k, m) in [
+            &mut bar.q,
+            &mut bar.v,
+            &mut bar.positions,
+            &mut bar.rotations,
+        ]
+        .into_iter()
+        .enumerate()
         {
             m.copy_from_slice(wavy(m.len(), k as f64, 1.0).as_slice());
         }
@@ -187,7 +196,7 @@ fn rollout(c: f64) -> Outcome {
             sum
         };
         let gradient = base.vjp(&bar).unwrap().controls;
-        let direction = DMatrix::from_row_slice(1, steps, wavy(steps, 1.2, 3.0).as_slice());
+        let direction = DMatrix::from_row_slice(1, steps, wavy(steps, 1.2, 30.0).as_slice());
         super::tools::along(scalar, c * gradient.dot(&direction))
     }))
 }

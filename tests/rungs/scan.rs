@@ -81,9 +81,10 @@ pub fn functions(text: &str) -> Vec<String> {
         // A function's own line: nothing but qualifiers before `fn`.
         let before = code[..start].trim();
         let qualifier = |w: &str| w.starts_with("pub") || ["const", "unsafe", "in"].contains(&w);
-        if !before.split([' ', '(', ')']).all(|w| {
-            w.is_empty() || qualifier(w) || ["super", "crate", "self"].contains(&w)
-        }) {
+        if !before
+            .split([' ', '(', ')'])
+            .all(|w| w.is_empty() || qualifier(w) || ["super", "crate", "self"].contains(&w))
+        {
             continue;
         }
         let name = word(&code[start + 3..]);
@@ -128,6 +129,12 @@ mod tests {
 ";
     assert_eq!(
         functions(text),
-        ["a_vjp", "b_jvp", "Pd::act_vjp", "Policy::hvp", "Tree::reverse"]
+        [
+            "a_vjp",
+            "b_jvp",
+            "Pd::act_vjp",
+            "Policy::hvp",
+            "Tree::reverse"
+        ]
     );
 }

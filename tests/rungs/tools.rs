@@ -48,14 +48,15 @@ pub fn groups(list: Vec<Group>, corruption: f64) -> Outcome {
     for g in list {
         let difference = ((g.value)(1e-3) - (g.value)(-1e-3)) / 2e-3;
         let start = (g.value)(0.0).abs();
-        if g.slope.abs() <= 1e-12 * largest
-            && difference.abs() <= 1e-9 * largest + 1e-10 * start
-        {
+        if g.slope.abs() <= 1e-12 * largest && difference.abs() <= 1e-9 * largest + 1e-10 * start {
             continue;
         }
         let one = along(&g.value, corruption * g.slope);
         if corruption == 1.0 && !one.passes() {
-            println!("group {}: slope {} difference {difference} {one:?}", g.name, g.slope);
+            println!(
+                "group {}: slope {} difference {difference} {one:?}",
+                g.name, g.slope
+            );
         }
         // One group that fails is enough for a corrupted rung.
         if corruption != 1.0 && !one.passes() {

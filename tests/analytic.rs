@@ -477,7 +477,7 @@ fn iterative_solvers_agree_with_dense_factorisation() {
             "{preconditioner:?} 1e-8 | {error:.1e} | {}",
             report.iterations
         );
-        assert!(error < 1e-6, "{preconditioner:?}: {error:e}");
+        assert!(error < 3e-8, "{preconditioner:?}: {error:e}");
     }
 }
 
@@ -503,9 +503,9 @@ fn solvers_of_the_square_system_agree() {
     };
     let (reference, _) = solve(Solver::Qr, Preconditioner::Factors, 1e-8);
     for (solver, preconditioner, limit) in [
-        (Solver::Gmres, Preconditioner::Factors, 1e-8),
+        (Solver::Gmres, Preconditioner::Factors, 3e-10),
         (Solver::Gmres, Preconditioner::Jacobi, 1e-8),
-        (Solver::Cgls, Preconditioner::Factors, 1e-8),
+        (Solver::Cgls, Preconditioner::Factors, 3e-10),
     ] {
         let (m, report) = solve(solver, preconditioner, 1e-10);
         let error = scaled_error(&m, &reference);
@@ -545,14 +545,13 @@ fn iterations_of(
 #[test]
 fn few_iterations_with_the_bodies_factors() {
     println!("gap | factors 1e-3, 1e-8 | Jacobi 1e-3");
-    // Counts for unscaled, undamped rows.
-    for (gap, undamped) in [(1.0, 7), (0.2, 14), (0.1, 18), (0.02, 40)] {
+    for (gap, limit) in [(1.0, 8), (0.2, 12), (0.1, 16), (0.02, 28)] {
         let [loose, tight] = [1e-3, 1e-8].map(|t| iterations(gap, Preconditioner::Factors, t));
         let jacobi = iterations(gap, Preconditioner::Jacobi, 1e-3);
         println!("{gap} | {loose}, {tight} | {jacobi}");
-        assert!(tight <= undamped * 13 / 10, "gap {gap}: {tight}");
-        assert!(loose < tight, "gap {gap}: {loose}");
-        assert!(jacobi > 5 * tight, "gap {gap}: Jacobi {jacobi}");
+        assert!(tight <= limit, "gap {gap}: {tight}");
+        assert!(loose <= limit * 2 / 3, "gap {gap}: {loose}");
+        assert!(jacobi > 15 * tight, "gap {gap}: Jacobi {jacobi}");
     }
 }
 
@@ -621,7 +620,7 @@ fn asymmetry_falls_with_the_faces() {
         );
         last = report.asymmetry;
     }
-    assert!(last > 0.0 && last < 1e-3, "{last:e}");
+    assert!(last > 0.0 && last < 4e-4, "{last:e}");
 }
 
 #[test]
@@ -641,7 +640,7 @@ fn turns_that_move_no_water_do_not_count() {
         "sphere and coin, gap 0.2: asymmetry {:.1e}",
         report.asymmetry
     );
-    assert!(report.asymmetry < 0.01, "{}", report.asymmetry);
+    assert!(report.asymmetry < 3e-3, "{}", report.asymmetry);
 }
 
 /// World-frame matrix about the bodies' origins.

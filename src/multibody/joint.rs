@@ -240,6 +240,56 @@ impl Joint {
         }
     }
 
+    /// Place of the angular velocity among the velocities, where the joint turns by a rotation vector.
+    fn turning(&self) -> Option<usize> {
+        match self {
+            Joint::Spherical => Some(0),
+            Joint::Free => Some(3),
+            _ => None,
+        }
+    }
+
+    /// Applies a 3 × 3 matrix of the rotation vector in `xi` to the angular part of `x`.
+    fn turn(&self, xi: &[f64], x: &mut [f64], map: impl Fn(&Vec3) -> Mat3) {
+        if let Some(at) = self.turning() {
+            let y = map(&vec3(&xi[at..at + 3])) * vec3(&x[at..at + 3]);
+            x[at..at + 3].copy_from_slice(y.as_slice());
+        }
+    }
+
+    /// Momentum conjugate to the chart coordinates `xi` at `q ⊕ xi`: `J(xi)ᵀ X(q ⊕ xi)ᵀ p̂`, with `v = J ẋi`.
+    pub fn chart_momentum(&self, q: &[f64], xi: &[f64], hat: &[f64]) -> Vec<f64> {
+        let mut p = self.frame_momentum_transpose(&self.integrate(q, xi), hat);
+        self.turn(xi, &mut p, |theta| lie::exp_jacobian(theta).transpose());
+        p
+    }
+
+    /// Cotangents of `(q, xi, p̂)` of [`Joint::chart_momentum`] for the cotangent `z`.
+    pub fn chart_momentum_vjp(
+        &self,
+        q: &[f64],
+        xi: &[f64],
+        hat: &[f64],
+        z: &[f64],
+    ) -> [Vec<f64>; 3] {
+        let next = self.integrate(q, xi);
+        let mut turned = z.to_vec();
+        self.turn(xi, &mut turned, lie::exp_jacobian);
+        // X depends on translations only, which add.
+        let q_bar = self.frame_velocity_vjp(&turned, hat);
+        let mut xi_bar = q_bar.clone();
+        if let Some(at) = self.turning() {
+            // dJ = −J d(J⁻¹) J.
+            let conjugate = self.chart_momentum(q, xi, hat);
+            let part = |x: &[f64]| vec3(&x[at..at + 3]);
+            let bar = -lie::exp_jacobian_inverse_vjp(&part(xi), &part(&turned), &part(&conjugate));
+            for k in 0..3 {
+                xi_bar[at + k] += bar[k];
+            }
+        }
+        [q_bar, xi_bar, self.frame_velocity(&next, &turned)]
+    }
+
     /// Tangent cotangent of `q` from `v̂̄` of [`Joint::frame_velocity`]: the gradient of
     /// `v̂̄ · X(q) v`. The gradient of `v̂ᵀ X⁻ᵀ p` (see [`Joint::frame_momentum`]) is its negative with
     /// `X⁻¹ v̂` as velocity and `X⁻ᵀ p` as cotangent.

@@ -220,6 +220,49 @@ impl Tree {
         })
     }
 
+    /// Momentum conjugate to the chart coordinates `xi` around `q`, from frame momentum.
+    pub fn chart_momentum(
+        &self,
+        q: &DVector<f64>,
+        xi: &DVector<f64>,
+        hat: &DVector<f64>,
+    ) -> DVector<f64> {
+        let mut out = Vec::with_capacity(self.velocities);
+        for l in &self.links {
+            let r = l.v.clone();
+            out.extend(l.joint.chart_momentum(
+                &q.as_slice()[l.q.clone()],
+                &xi.as_slice()[r.clone()],
+                &hat.as_slice()[r],
+            ));
+        }
+        DVector::from_vec(out)
+    }
+
+    /// Cotangents of `(q, xi, p̂)` of [`Tree::chart_momentum`].
+    pub fn chart_momentum_vjp(
+        &self,
+        q: &DVector<f64>,
+        xi: &DVector<f64>,
+        hat: &DVector<f64>,
+        z: &DVector<f64>,
+    ) -> [DVector<f64>; 3] {
+        let mut out = [Vec::new(), Vec::new(), Vec::new()];
+        for l in &self.links {
+            let r = l.v.clone();
+            let parts = l.joint.chart_momentum_vjp(
+                &q.as_slice()[l.q.clone()],
+                &xi.as_slice()[r.clone()],
+                &hat.as_slice()[r.clone()],
+                &z.as_slice()[r],
+            );
+            for (out, part) in out.iter_mut().zip(parts) {
+                out.extend(part);
+            }
+        }
+        out.map(DVector::from_vec)
+    }
+
     fn pairwise(
         &self,
         map: impl Fn(&Link) -> (Vec<f64>, Vec<f64>),

@@ -104,7 +104,15 @@ struct Scales {
 
 /// A random functional of the trajectory: markers on the bodies and velocities, at the middle and the end.
 struct Probe {
-    weights: Vec<(usize, Vec<Vec3>, Vec<Vec3>, DVector<f64>)>,
+    readings: Vec<Reading>,
+}
+
+/// What is read at one state: a marker on each body along a direction, and velocities.
+struct Reading {
+    state: usize,
+    arms: Vec<Vec3>,
+    directions: Vec<Vec3>,
+    velocity: DVector<f64>,
 }
 
 impl Probe {
@@ -121,43 +129,41 @@ impl Probe {
                 .map(|b| f * Vec3::from(v.fixed_rows::<3>(3 * b)))
                 .collect()
         };
-        let weights = [steps / 2, steps].into_iter().map(|n| {
-            (
-                n,
-                points(&vector(3 * bodies), scale.length),
-                points(&vector(3 * bodies), 1.0 / scale.length),
-                vector(velocities).component_div(&scale.velocity),
-            )
+        let readings = [steps / 2, steps].map(|state| Reading {
+            state,
+            arms: points(&vector(3 * bodies), scale.length),
+            directions: points(&vector(3 * bodies), 1.0 / scale.length),
+            velocity: vector(velocities).component_div(&scale.velocity),
         });
         Self {
-            weights: weights.collect(),
+            readings: readings.into(),
         }
     }
 
     fn value(&self, samples: &[Sample]) -> f64 {
         let mut out = 0.0;
-        for (n, arms, directions, velocity) in &self.weights {
-            let s = &samples[*n];
+        for r in &self.readings {
+            let s = &samples[r.state];
             for (b, pose) in s.poses.iter().enumerate() {
-                out += directions[b].dot(&pose.apply(&arms[b]));
+                out += r.directions[b].dot(&pose.apply(&r.arms[b]));
             }
-            out += velocity.dot(&s.v);
+            out += r.velocity.dot(&s.v);
         }
         out
     }
 
     fn cotangents(&self, rollout: &Rollout) -> Cotangents {
         let mut out = rollout.zero_cotangents();
-        for (n, arms, directions, velocity) in &self.weights {
-            for (b, pose) in rollout.samples()[*n].poses.iter().enumerate() {
-                let turn = (pose.rotation * arms[b]).cross(&directions[b]);
+        for r in &self.readings {
+            for (b, pose) in rollout.samples()[r.state].poses.iter().enumerate() {
+                let turn = (pose.rotation * r.arms[b]).cross(&r.directions[b]);
                 for k in 0..3 {
-                    out.positions[(3 * b + k, *n)] += directions[b][k];
-                    out.rotations[(3 * b + k, *n)] += turn[k];
+                    out.positions[(3 * b + k, r.state)] += r.directions[b][k];
+                    out.rotations[(3 * b + k, r.state)] += turn[k];
                 }
             }
-            let mut column = out.v.column_mut(*n);
-            column += velocity;
+            let mut column = out.v.column_mut(r.state);
+            column += &r.velocity;
         }
         out
     }

@@ -1,7 +1,14 @@
-//! Momentum Euler, implicit in p at fixed q:
-//! p̂⁺ = p̂ + Δt f(q, v, u), M(q) v + p_rest = Xᵀ p̂⁺, q⁺ = q ⊕ Δt v.
+//! Momentum Euler, implicit in p at fixed q: symplectic.
 //!
-//! The stage is solved by Newton's method with the exact ∂f/∂v; its adjoint is the implicit function theorem at
+//! ```text
+//! p̂⁺ = p̂ + Δt f(q, v, u)      M(q) v + p_rest = J(Δt v)ᵀ X(q⁺)ᵀ p̂⁺      q⁺ = q ⊕ Δt v
+//! ```
+//!
+//! These are the discrete Euler–Lagrange equations of Δt L(q, v): M v is the momentum conjugate to the chart
+//! coordinates ξ = Δt v around q, and JᵀXᵀ (the derivative of spatial displacements at q⁺ with respect to ξ) carries p̂⁺
+//! there. With Xᵀ at q instead, a free body's momenta would stay and its pose be stepped by explicit Euler.
+//!
+//! The stage is solved by Newton's method with exact derivatives; its adjoint is the implicit function theorem at
 //! the converged stage, with the transpose of the same matrix.
 
 use super::{Input, Memo, Split, State, StateBar, StepBar, Stepped, Stepper, When};
@@ -20,42 +27,70 @@ pub(super) struct Stage {
     pub force: DVector<f64>,
 }
 
-/// Matrix of the stage, (M − h Xᵀ ∂f/∂v)_ff, from ∂f/∂v.
-fn stage_matrix(e: &Evaluation, split: &Split, rates: &DMatrix<f64>, h: f64) -> DMatrix<f64> {
+/// An implicit stage: `M v + p_rest = J(ξ)ᵀ X(q ⊕ ξ)ᵀ (p̂ + h f(q, v, u))` with ξ = reach v.
+#[derive(Clone, Copy)]
+pub(super) struct Rule {
+    /// Time over which the force acts, s.
+    pub h: f64,
+    /// Time over which the chart reaches out, s: the step's for Euler; zero where q is the stage's own.
+    pub reach: f64,
+}
+
+/// Matrix of the stage on the free rows, from ∂f/∂v and the momentum p̂ + h f.
+fn stage_matrix(
+    e: &Evaluation,
+    split: &Split,
+    v: &DVector<f64>,
+    rates: &DMatrix<f64>,
+    reached: &DVector<f64>,
+    rule: Rule,
+) -> DMatrix<f64> {
+    let tree = &e.system.tree;
+    let xi = rule.reach * v;
     let mut m = e.mass_matrix.clone();
-    for k in 0..rates.ncols() {
-        let column = e.user_momentum(&rates.column(k).into_owned());
+    for k in 0..v.len() {
+        let column = tree.chart_momentum(&e.q, &xi, &rates.column(k).into_owned());
         let mut target = m.column_mut(k);
-        target -= h * column;
+        target -= rule.h * column;
+        if rule.reach != 0.0 {
+            let mut unit = DVector::zeros(v.len());
+            unit[k] = 1.0;
+            let [_, along, _] = tree.chart_momentum_vjp(&e.q, &xi, reached, &unit);
+            let mut target = m.row_mut(k);
+            target -= rule.reach * along.transpose();
+        }
     }
     split.block(&m)
 }
 
-/// Solves `M v + p_rest = Xᵀ (p̂ + h f(q, v, u))` on the free rows, from the guess `v`.
+/// Solves a stage on the free rows, from the guess `v`.
 pub(super) fn solve_stage(
     e: &Evaluation,
     split: &Split,
     hat: &DVector<f64>,
     control: &DVector<f64>,
-    h: f64,
+    rule: Rule,
     guess: &DVector<f64>,
     what: &dyn Fn() -> String,
 ) -> Result<Stage> {
+    let tree = &e.system.tree;
     let mut v = &split.driven + split.put(&split.take(guess));
     let scale = split
         .block(&e.mass_matrix)
         .diagonal()
         .map(|d| 1.0 / d.max(f64::MIN_POSITIVE).sqrt());
     let sized = |p: &DVector<f64>| split.take(p).component_mul(&scale).norm();
-    let start = sized(&e.user_momentum(hat));
+    // Against the sum of what M v adds up, so that a total momentum of zero is no target for relative errors.
+    let summands = e.mass_matrix.abs();
+    let start = sized(&e.user_momentum(hat)).max(sized(&e.rest_momentum));
     let mut previous = f64::INFINITY;
     let mut residual = f64::INFINITY;
     for iteration in 0..ITERATIONS {
         let force = e.force(&v, control);
-        let target = e.user_momentum(&(hat + h * &force));
-        let momentum = e.momentum(&v);
-        let defect = &momentum - &target;
-        let size = sized(&momentum).max(sized(&target)).max(start);
+        let reached = hat + rule.h * &force;
+        let target = tree.chart_momentum(&e.q, &(rule.reach * &v), &reached);
+        let defect = e.momentum(&v) - &target;
+        let size = sized(&(&summands * v.abs())).max(sized(&target)).max(start);
         residual = if size > 0.0 {
             sized(&defect) / size
         } else {
@@ -71,7 +106,8 @@ pub(super) fn solve_stage(
             break;
         }
         previous = residual;
-        let matrix = stage_matrix(e, split, &e.force_velocity_jacobian(&v), h);
+        let rates = e.force_velocity_jacobian(&v);
+        let matrix = stage_matrix(e, split, &v, &rates, &reached, rule);
         let Some(step) = matrix.lu().solve(&split.take(&defect)) else {
             break;
         };
@@ -121,6 +157,13 @@ pub(super) fn stage_name(s: &Stepper, state: &State) -> String {
     )
 }
 
+fn rule(s: &Stepper) -> Rule {
+    Rule {
+        h: s.dt,
+        reach: s.dt,
+    }
+}
+
 pub(super) fn step(
     s: &Stepper,
     e: &Evaluation,
@@ -130,7 +173,7 @@ pub(super) fn step(
 ) -> Result<Stepped> {
     let split = s.split(&input.hold, When::Over(s.time(state), s.dt));
     let p = s.released_momentum(e, state, v, &split);
-    let stage = solve_stage(e, &split, &p, &input.control, s.dt, v, &|| {
+    let stage = solve_stage(e, &split, &p, &input.control, rule(s), v, &|| {
         stage_name(s, state)
     })?;
     let y = &p + s.dt * &stage.force;
@@ -170,11 +213,12 @@ pub(super) fn step_vjp(
             v: v.clone(),
             force: e.force(v, &input.control),
         },
-        None => solve_stage(e, &split, &p, &input.control, s.dt, v, &|| {
+        None => solve_stage(e, &split, &p, &input.control, rule(s), v, &|| {
             stage_name(s, state)
         })?,
     };
-    let adjoint = AdjointStage::new(e, &split, &stage.v, s.dt);
+    let reached = &p + s.dt * &stage.force;
+    let adjoint = AdjointStage::new(e, &split, &stage.v, &reached, rule(s));
     let mut bar = StepBar::zeros(e);
     let (q_bar, mut v_bar) = advance_vjp(s, &split, &stage.v, &next_bar.q);
     bar.state.q += q_bar;
@@ -183,11 +227,12 @@ pub(super) fn step_vjp(
     // v̄ of p̂⁺ through f; only the transpose of ∂f/∂v is needed here.
     v_bar += s.dt * adjoint.rates.tr_mul(&z);
     let w = adjoint.solve(&split, &v_bar)?;
-    let z_total = &z + e.frame_velocity(&w);
-    let reached = &p + s.dt * &stage.force;
+    let tree = &e.system.tree;
+    let [q_bar, _, hat_bar] = tree.chart_momentum_vjp(&e.q, &(s.dt * &stage.v), &reached, &w);
+    bar.state.q += q_bar;
+    let z_total = z + hat_bar;
     bar.add(s.dt, &e.force_vjp(&stage.v, &input.control, &z_total)?);
     bar.add(-1.0, &e.momentum_vjp(&stage.v, &w)?);
-    bar.state.q += e.frame_velocity_vjp(&w, &reached);
     s.released_momentum_vjp(e, state, v, &split, &z_total, &mut bar)?;
     Ok(bar)
 }
@@ -201,13 +246,21 @@ pub(super) struct AdjointStage {
 }
 
 impl AdjointStage {
-    pub fn new(e: &Evaluation, split: &Split, v: &DVector<f64>, h: f64) -> Self {
+    /// At velocity v and momentum p̂ + h f.
+    pub fn new(
+        e: &Evaluation,
+        split: &Split,
+        v: &DVector<f64>,
+        reached: &DVector<f64>,
+        rule: Rule,
+    ) -> Self {
         let rates = e.force_velocity_jacobian(v);
-        let factor = stage_matrix(e, split, &rates, h).transpose().lu();
+        let matrix = stage_matrix(e, split, v, &rates, reached, rule);
+        let factor = matrix.transpose().lu();
         Self { rates, factor }
     }
 
-    /// w with (M − h Xᵀ ∂f/∂v)ᵀ_ff w_f = v̄_f, zero on driven entries.
+    /// w_f with (stage matrix)ᵀ w_f = v̄_f, zero on driven entries.
     pub fn solve(&self, split: &Split, v_bar: &DVector<f64>) -> Result<DVector<f64>> {
         if split.free.is_empty() {
             return Ok(DVector::zeros(v_bar.len()));

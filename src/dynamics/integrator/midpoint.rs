@@ -4,7 +4,7 @@
 //! p̂⁺ = p̂ + Δt f. The velocity is found by Newton at fixed q_m (cheap) inside a fixed point in
 //! q_m (one evaluation each); the adjoint iterates the transpose of the same splitting.
 
-use super::euler::{AdjointStage, advance, advance_vjp, next_state, solve_stage, stage_name};
+use super::euler::{AdjointStage, Rule, advance, advance_vjp, next_state, solve_stage, stage_name};
 use super::{Input, Memo, Split, State, StateBar, StepBar, Stepped, Stepper, When};
 use crate::dynamics::Evaluation;
 use crate::{Error, Result};
@@ -13,6 +13,14 @@ use nalgebra::DVector;
 /// Relative change of the velocity at which the fixed point in q_m ends.
 const TOLERANCE: f64 = 1e-14;
 const ITERATIONS: usize = 60;
+
+/// Half the force, at a configuration that is the stage's own.
+fn rule(s: &Stepper) -> Rule {
+    Rule {
+        h: 0.5 * s.dt,
+        reach: 0.0,
+    }
+}
 
 fn middle<'a>(
     s: &'a Stepper,
@@ -46,7 +54,7 @@ pub(super) fn step(
     let mut previous = f64::INFINITY;
     for _ in 0..ITERATIONS {
         let m = middle(s, state, &stage, false)?;
-        let next = solve_stage(&m, &split, &p, &input.control, 0.5 * s.dt, &stage, &|| {
+        let next = solve_stage(&m, &split, &p, &input.control, rule(s), &stage, &|| {
             stage_name(s, state)
         })?;
         let moved = change(&m, &next.v, &stage);
@@ -115,7 +123,7 @@ pub(super) fn step_vjp(
     let (q_bar, v_bar_next) = advance_vjp(s, &split, &stage, &next_bar.q);
     let mut z = next_bar.y.clone();
     split.forget_driven(&mut z);
-    let adjoint = AdjointStage::new(&m, &split, &stage, h);
+    let adjoint = AdjointStage::new(&m, &split, &stage, &reached, rule(s));
     let v_bar_force = s.dt * adjoint.rates.tr_mul(&z);
     let fixed = v_bar_next + v_bar_force;
     // v̄ = fixed + (∂q_m/∂v)ᵀ q̄_m(w), w = J⁻ᵀ v̄.

@@ -42,20 +42,23 @@ const SIDE: Wall = Wall {
     normal: [1.0, 0.0, -0.1],
 };
 
-fn body(shape: Shape, method: Method) -> Arc<WetBody> {
+fn body(shape: Shape, method: Method, solver: Solver) -> Arc<WetBody> {
     let mesh = shape::build(&shape, Path::new("."), Some(80)).unwrap();
-    let settings = Settings {
+    let mut settings = Settings {
         method,
         ..Settings::default()
     };
+    if solver == Solver::Gmres {
+        settings.damping = 0.0;
+    }
     let b = BodyBoundary::new("b", mesh.vertices(), mesh.faces(), &settings).unwrap();
     Arc::new(WetBody::new(mesh.vertices(), mesh.faces(), Arc::new(b)).unwrap())
 }
 
 fn full(method: Method, solver: Solver, walls: &[Wall]) -> Full {
     let bodies = vec![
-        body(Shape::sphere(0.5), method),
-        body(Shape::ellipsoid([0.6, 0.3, 0.4]), method),
+        body(Shape::sphere(0.5), method, solver),
+        body(Shape::ellipsoid([0.6, 0.3, 0.4]), method, solver),
     ];
     let settings = SolveSettings {
         solver,

@@ -359,7 +359,11 @@ fn a_sphere_near_a_wall() {
         point: [0.3, -0.2, -0.5],
         normal: [0.0, 0.0, 2.0],
     };
-    let coupling = full(&[SPHERE.clone()], &[floor], SolveSettings::default());
+    let coupling = full(
+        std::slice::from_ref(&SPHERE),
+        &[floor],
+        SolveSettings::default(),
+    );
     println!("gap | error, %: across, along, all entries");
     for row in rows(&data("sphere_wall.json"), "rows") {
         let height = number(&row["h"]);
@@ -429,9 +433,9 @@ fn walls_are_mirror_images() {
     let all: Vec<[f64; 3]> = (0..8)
         .map(|k| std::array::from_fn(|i| if k >> i & 1 == 1 { -1.0 } else { 1.0 }))
         .collect();
-    let alone = matrix(&full(&[body.clone()], &[], tight()), &[pose]).0;
+    let alone = matrix(&full(std::slice::from_ref(&body), &[], tight()), &[pose]).0;
     for count in 1..=3 {
-        let coupling = full(&[body.clone()], &walls[..count], tight());
+        let coupling = full(std::slice::from_ref(&body), &walls[..count], tight());
         let m = matrix(&coupling, &[pose]).0;
         let explicit = explicit_images(&body, &pose, &all[..1 << count]);
         let (error, effect) = (scaled_error(&m, &explicit), scaled_error(&alone, &explicit));

@@ -105,16 +105,16 @@ pub(super) fn warning(time: f64, gap: &Gap, fidelity: Fidelity, system: &System)
     match fidelity {
         Fidelity::Full => (gap.distance < RESOLVED * gap.edge).then(|| {
             format!(
-                "{place}: the smallest gap, {:.3e} m at t = {time:.6} s, is narrower than half \
-                 the edges there ({:.3e} m): the flow through it isn't resolved; use more faces, \
-                 or end the run before",
+                "{place}: the smallest gap, {:.3e} m at t = {time} s, is narrower than half \
+                 the edges there ({:.3e} m): forces across it may be off by several percent and \
+                 more; use more faces, or end the run before",
                 gap.distance.max(0.0),
                 gap.edge
             )
         }),
         Fidelity::Isolated => overlaps(gap).then(|| {
             format!(
-                "{place} overlap, most at t = {time:.6} s by {:.3e} m; the fidelity isolated \
+                "{place} overlap, most at t = {time} s by {:.3e} m; the fidelity isolated \
                  doesn't keep them apart",
                 -gap.distance
             )

@@ -133,12 +133,9 @@ fn updates<S: Simd, const N: usize>(
         let mut parts = out.chunks_exact_mut(stride);
         std::array::from_fn(|_| parts.next().unwrap_or_default())
     };
-    let vectors = S::as_simd_f64s(&rows[..stride]).0.len();
-    let lanes = if vectors > 0 {
-        (stride - S::as_simd_f64s(&rows[..stride]).1.len()) / vectors
-    } else {
-        1
-    };
+    let (whole, rest) = S::as_simd_f64s(&rows[..stride]);
+    let vectors = whole.len();
+    let lanes = (stride - rest.len()).checked_div(vectors).unwrap_or(1);
     for j in 0..vectors {
         let at = j * lanes;
         let mut sum: [S::f64s; N] =

@@ -1,6 +1,6 @@
 //! Rungs of joints and of the tree.
 
-use super::tools::{all, along, wavy};
+use super::tools::{Group, all, along, groups, wavy};
 use hydrograd::adjoint::check::{Outcome, Rung};
 use hydrograd::adjoint::lie::{Mat3, Pose, Vec3, Vec6, exp_matrix};
 use hydrograd::multibody::{Cotangents, Joint, Tree, Virtual};
@@ -19,6 +19,8 @@ pub fn rungs() -> Vec<Rung> {
         "multibody::joint::Joint::frame_bias_vjp" => joint_frame_bias,
         "multibody::tree::Tree::integrate_vjp" => tree_integrate,
         "multibody::tree::Tree::chart_rate_vjp" => tree_chart_rate,
+        "multibody::joint::Joint::chart_momentum_vjp" => |c| all(joints().iter().map(|j| chart_momentum(&Tree::new([(None, Pose::identity(), *j)]), c))),
+        "multibody::tree::Tree::chart_momentum_vjp" => |c| chart_momentum(&tree(), c),
         "multibody::tree::Tree::reverse" => tree_reverse,
     ]
 }
@@ -231,6 +233,39 @@ fn tree_chart_rate(c: f64) -> Outcome {
         |h| bar.dot(&tree.chart_rate(&xi, &(&v + h * &d))),
         c * v_bar.dot(&d),
     ))
+}
+
+/// Coordinates, chart coordinates and momenta, each on its own.
+fn chart_momentum(tree: &Tree, c: f64) -> Outcome {
+    let n = tree.velocities();
+    let (q, xi, hat) = (start(tree), wavy(n, 1.1, 0.7), wavy(n, 0.4, 1.0));
+    let (bar, d) = (wavy(n, 2.0, 1.0), wavy(n, 3.3, 0.3));
+    let bars = tree.chart_momentum_vjp(&q, &xi, &hat, &bar);
+    let value = |q: &DVector<f64>, xi: &DVector<f64>, hat: &DVector<f64>| {
+        bar.dot(&tree.chart_momentum(q, xi, hat))
+    };
+    let [q_slope, xi_slope, hat_slope] = bars.map(|b| b.dot(&d));
+    let group = |name, slope, value| Group { name, slope, value };
+    groups(
+        vec![
+            group(
+                "q",
+                q_slope,
+                Box::new(|h: f64| value(&tree.integrate(&q, &(h * &d)), &xi, &hat)),
+            ),
+            group(
+                "xi",
+                xi_slope,
+                Box::new(|h: f64| value(&q, &(&xi + h * &d), &hat)),
+            ),
+            group(
+                "momentum",
+                hat_slope,
+                Box::new(|h: f64| value(&q, &xi, &(&hat + h * &d))),
+            ),
+        ],
+        c,
+    )
 }
 
 /// All four fields and the poses at once, with either kind of virtual velocity.

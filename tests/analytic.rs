@@ -21,7 +21,7 @@ fn wet(semi_axes: [f64; 3], faces: usize, settings: &Settings) -> Arc<WetBody> {
     };
     let mesh = shape::build(&shape, Path::new("."), Some(faces)).unwrap();
     let b = BodyBoundary::new("body", mesh.vertices(), mesh.faces(), settings).unwrap();
-    Arc::new(WetBody::new(mesh.vertices(), mesh.faces(), Arc::new(b)).unwrap())
+    Arc::new(WetBody::new(Arc::new(b)))
 }
 
 fn ellipsoid(semi_axes: [f64; 3], faces: usize) -> Arc<WetBody> {
@@ -777,7 +777,7 @@ fn bodies_in_another_order_or_frame_give_the_same() {
     let mesh = shape::build(&shape, Path::new("."), Some(320)).unwrap();
     let vertices: Vec<Vec3> = mesh.vertices().iter().map(|v| v + shift).collect();
     let b = BodyBoundary::new("b", &vertices, mesh.faces(), &Settings::default()).unwrap();
-    let shifted = Arc::new(WetBody::new(&vertices, mesh.faces(), Arc::new(b)).unwrap());
+    let shifted = Arc::new(WetBody::new(Arc::new(b)));
     let mut placed = poses.clone();
     placed[1].translation = poses[1].apply(&-shift);
     let other = matrix(&full(&[bodies[0].clone(), shifted], &[], tight()), &placed).0;

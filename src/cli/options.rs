@@ -28,6 +28,16 @@ pub(super) enum Method {
     MfsFace,
 }
 
+/// Norm in which the rows of the boundary condition are fitted.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum, Serialize)]
+#[serde(rename_all = "kebab-case")]
+pub(super) enum Rows {
+    /// The L² norm of the normal velocity: small and large bodies count alike.
+    Scaled,
+    /// Plain least squares; ruins small bodies beside large ones.
+    Unscaled,
+}
+
 /// How a step is taken.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
 pub(super) enum Integrator {
@@ -82,6 +92,13 @@ pub(super) struct Water {
     /// Where a body's sources lie [default: mfs-vertex; mfs-face with the preset paper].
     #[arg(long, value_enum)]
     pub method: Option<Method>,
+    /// Depth of the sources under the surface in m; checked against edge length and thickness
+    /// [default: from the mesh, source by source].
+    #[arg(long, value_name = "DEPTH", value_parser = length, allow_negative_numbers = true)]
+    pub depth: Option<f64>,
+    /// Norm in which the rows are fitted [default: scaled; unscaled with the preset paper].
+    #[arg(long, value_enum)]
+    pub rows: Option<Rows>,
     /// Faces per body, for shapes by formula; the nearest number that the shape allows is taken
     /// [default: the scene's own, else 1280].
     #[arg(long, value_name = "N", value_parser = positive, allow_negative_numbers = true)]
@@ -140,6 +157,15 @@ impl Water {
                 Method::MfsFace => boundary::Method::MfsFace,
             };
         }
+        if let Some(depth) = self.depth {
+            settings.boundary.depth = boundary::Depth::Fixed(depth);
+        }
+        if let Some(rows) = self.rows {
+            settings.boundary.rows = match rows {
+                Rows::Scaled => boundary::RowScaling::Scaled,
+                Rows::Unscaled => boundary::RowScaling::Unscaled,
+            };
+        }
         if let Some(tolerance) = self.tolerance {
             settings.solve.tolerance = tolerance;
         }
@@ -189,6 +215,13 @@ pub(super) fn positive(text: &str) -> Result<usize, String> {
     match text.parse() {
         Ok(0) | Err(_) => Err("give a whole number above zero".into()),
         Ok(n) => Ok(n),
+    }
+}
+
+fn length(text: &str) -> Result<f64, String> {
+    match text.parse() {
+        Ok(x) if x > 0.0 && f64::is_finite(x) => Ok(x),
+        _ => Err("give a length above zero, in m".into()),
     }
 }
 

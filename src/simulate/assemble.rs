@@ -145,7 +145,7 @@ impl Library<'_> {
             settings.damping = 0.0;
         }
         let boundary = BodyBoundary::new(name, vertices, faces, &settings)?;
-        let made = Arc::new(WetBody::new(vertices, faces, Arc::new(boundary))?);
+        let made = Arc::new(WetBody::new(Arc::new(boundary)));
         self.made.push((b, made.clone()));
         Ok(made)
     }

@@ -63,7 +63,7 @@ impl<'a> Trajectory<'a> {
             q: state.q.clone(),
             kinetic_energy: e.kinetic_energy(&v),
             potential_energy: e.potential_energy(),
-            momentum: momenta.iter().sum(),
+            momentum: e.total_momentum(&v, &momenta),
             largest_momentum: momenta.iter().fold(Vec6::zeros(), |m, h| m.sup(&h.abs())),
             poses: e.kinematics.poses.clone(),
             report: e.report(),

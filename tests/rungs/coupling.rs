@@ -52,7 +52,7 @@ fn body(shape: Shape, method: Method, solver: Solver) -> Arc<WetBody> {
         settings.damping = 0.0;
     }
     let b = BodyBoundary::new("b", mesh.vertices(), mesh.faces(), &settings).unwrap();
-    Arc::new(WetBody::new(mesh.vertices(), mesh.faces(), Arc::new(b)).unwrap())
+    Arc::new(WetBody::new(Arc::new(b)))
 }
 
 fn full(method: Method, solver: Solver, walls: &[Wall]) -> Full {

@@ -77,10 +77,10 @@ impl FullRecord<'_> {
                     }
                     let mut field = Vec3::zeros();
                     let twist = &response.twists[pair.target];
-                    for (m, total) in impulse[pair.target][k].iter_mut().enumerate() {
+                    for (m, part) in impulse[pair.target][k].iter_mut().enumerate() {
                         let g = gradient_at(&six_fields, 6, j, m);
                         field += g * twist[m];
-                        *total += dj.dot(&g) * response.a[s];
+                        *part += dj.dot(&g) * response.a[s];
                     }
                     dg.data[s * n + k] += dj.dot(&field);
                     let at = 3 * (j * n + k);

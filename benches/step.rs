@@ -85,7 +85,7 @@ fn main() {
         if !chosen.is_empty() && !chosen.iter().any(|c| *c == name) {
             continue;
         }
-        let scene = Scene::load(&folder.join(format!("{name}.toml"))).expect("an example scene");
+        let scene = Scene::load(folder.join(format!("{name}.toml"))).expect("an example scene");
         let base = Settings::for_scene(&scene);
         let with = |solver, preconditioner| {
             let mut s = base;

@@ -39,7 +39,7 @@ impl Part {
     }
 }
 
-/// Resistance at unit coefficient, Σ ΔA Gᵀ Π G with G = [1, −[x]×]: constant in the body's frame,
+/// Resistance at unit coefficient, Σ ΔA Gᵀ Π G with `G = [1, −[x]×]`: constant in the body's frame,
 /// symmetric positive semi-definite; the wrench is `−coefficient · resistance · ν` (m², m³, m⁴).
 pub fn resistance(surface: &[Element], part: Part) -> Mat6 {
     let mut out = Mat6::zeros();

@@ -92,6 +92,11 @@ pub enum Error {
     },
 }
 
+/// A time without the rounding of its last digits, which says nothing to a reader.
+pub(crate) fn readable(time: f64) -> f64 {
+    format!("{time:.9e}").parse().unwrap_or(time)
+}
+
 impl Error {
     /// An [`Error::Input`] from its three parts.
     pub fn input(
@@ -104,5 +109,23 @@ impl Error {
             value: value.to_string(),
             expected: expected.into(),
         }
+    }
+
+    /// The same, saying at which time of a trajectory (s) it happened.
+    pub(crate) fn at_time(mut self, time: f64) -> Self {
+        match &mut self {
+            Self::Input { place: said, .. }
+            | Self::Mesh { location: said, .. }
+            | Self::Parse { message: said, .. }
+            | Self::Solver { what: said, .. }
+            | Self::Unresolved { place: said, .. }
+            | Self::Unsupported { what: said, .. } => {
+                if !said.contains("t = ") {
+                    said.push_str(&format!(" at t = {} s", readable(time)));
+                }
+            }
+            Self::File { .. } => {}
+        }
+        self
     }
 }

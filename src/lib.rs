@@ -1,4 +1,4 @@
-//! hydrograd: a differentiable simulator of rigid bodies that feel each other through the water.
+#![doc = include_str!("../README.md")]
 
 pub mod boundary;
 #[cfg(feature = "cli")]
@@ -8,6 +8,7 @@ pub mod coupling;
 pub mod dynamics;
 pub mod error;
 pub mod multibody;
+pub mod notation;
 pub mod scene;
 pub mod shape;
 pub mod simulate;

@@ -210,3 +210,340 @@ fn bad_mesh_fails_the_check_and_keeps_its_report() {
     assert!(!value["findings"].as_array().unwrap().is_empty());
     fails(&["check-mesh", "nowhere.stl"], 1, &["nowhere.stl"]);
 }
+
+/// The one JSON object of a command that succeeds.
+fn json(arguments: &[&str]) -> serde_json::Value {
+    let done = hydrograd(&[arguments, &["--json"]].concat());
+    assert!(
+        done.status.success(),
+        "{arguments:?}: {}",
+        text(&done.stderr)
+    );
+    serde_json::from_slice(&done.stdout).unwrap()
+}
+
+/// All these keys hold finite numbers.
+fn numbers(value: &serde_json::Value, keys: &[&str]) {
+    for key in keys {
+        let number = value[key].as_f64();
+        assert!(
+            number.is_some_and(f64::is_finite),
+            "{key} is {}",
+            value[key]
+        );
+    }
+}
+
+fn list(value: &serde_json::Value) -> Vec<f64> {
+    let items = value.as_array().unwrap().iter();
+    items.map(|x| x.as_f64().unwrap()).collect()
+}
+
+#[test]
+fn run_summarises_and_writes_the_trajectory() {
+    let folder = tempfile::tempdir().unwrap();
+    let out = folder.path().join("out").display().to_string();
+    let ball = scene("falling_ball.toml");
+    for fidelity in ["full", "isolated"] {
+        let arguments = [
+            "run",
+            &ball,
+            "--faces",
+            "80",
+            "--steps",
+            "6",
+            "--fidelity",
+            fidelity,
+            "--out",
+            &out,
+        ];
+        let first = json(&arguments);
+        numbers(
+            &first,
+            &[
+                "steps",
+                "dt",
+                "seconds",
+                "setup_seconds",
+                "seconds_per_step",
+                "energy_initial",
+                "energy_final",
+                "momentum_drift",
+                "min_gap",
+            ],
+        );
+        assert_eq!(first["fidelity"], fidelity);
+        assert_eq!(
+            (first["steps"].as_u64(), first["dt"].as_f64()),
+            (Some(6), Some(0.01))
+        );
+        assert_eq!(list(&first["final_q"]).len(), 4);
+        assert_eq!(list(&first["final_v"]).len(), 4);
+        assert!(first["warnings"].is_array() && first.get("peak_memory_mb").is_some());
+
+        let file = Path::new(&out).join("trajectory.json");
+        let trajectory = std::fs::read_to_string(file).unwrap();
+        let trajectory: serde_json::Value = serde_json::from_str(&trajectory).unwrap();
+        for key in ["time", "q", "v", "energy", "momentum", "min_gap"] {
+            assert_eq!(trajectory[key].as_array().unwrap().len(), 7, "{key}");
+        }
+        assert_eq!(trajectory["coordinates"][3], "coin.angle");
+        assert_eq!(list(&trajectory["q"][6]), list(&first["final_q"]));
+        assert_eq!(list(&trajectory["momentum"][6]).len(), 6);
+        let csv = std::fs::read_to_string(Path::new(&out).join("trajectory.csv")).unwrap();
+        let rows: Vec<Vec<&str>> = csv.lines().map(|l| l.split(',').collect()).collect();
+        assert_eq!(rows.len(), 8);
+        assert!(rows.iter().all(|r| r.len() == 1 + 4 + 4 + 1 + 6 + 1));
+        assert!(
+            rows[1..]
+                .iter()
+                .flatten()
+                .all(|x| x.parse::<f64>().is_ok_and(f64::is_finite))
+        );
+
+        let second = json(&arguments);
+        assert_eq!(
+            first["final_q"].to_string(),
+            second["final_q"].to_string(),
+            "equal runs, equal bits"
+        );
+    }
+    let plain = hydrograd(&["run", &ball, "--faces", "80", "--steps", "1"]);
+    assert!(text(&plain.stdout).contains("smallest gap"));
+}
+
+#[test]
+fn settings_reach_the_simulator() {
+    let ball = scene("falling_ball.toml");
+    let base = ["run", &ball, "--faces", "80", "--steps", "2"];
+    let paper = json(&[&base[..], &["--preset", "paper"]].concat());
+    assert_eq!(
+        (&paper["method"], &paper["integrator"]),
+        (&"mfs-face".into(), &"velocity-euler".into())
+    );
+    let mixed = json(&[&base[..], &["--preset", "paper", "--integrator", "rk4"]].concat());
+    assert_eq!(
+        (&mixed["method"], &mixed["integrator"]),
+        (&"mfs-face".into(), &"rk4".into())
+    );
+    let plain = json(&base);
+    assert_eq!(
+        (&plain["method"], &plain["integrator"]),
+        (&"mfs-vertex".into(), &"momentum-euler".into())
+    );
+    let direct = json(&[&base[..], &["--solver", "qr"]].concat());
+    for (a, b) in list(&plain["final_q"]).iter().zip(list(&direct["final_q"])) {
+        assert!((a - b).abs() <= 1e-8, "{a} {b}");
+    }
+    fails(
+        &[&base[..], &["--solver", "gmres"]].concat(),
+        1,
+        &["GMRES", "mfs-face"],
+    );
+}
+
+#[test]
+fn added_mass_of_a_sphere() {
+    let report = json(&["added-mass", "--shape", "sphere:1", "--density", "1000"]);
+    numbers(
+        &report,
+        &[
+            "asymmetry",
+            "volume",
+            "faces",
+            "unknowns",
+            "iterations",
+            "seconds",
+        ],
+    );
+    assert_eq!(report["bodies"], serde_json::json!(["sphere"]));
+    assert_eq!(report["faces"], 1280);
+    let rows: Vec<_> = report["added_mass"]
+        .as_array()
+        .unwrap()
+        .iter()
+        .map(list)
+        .collect();
+    assert!(rows.len() == 6 && rows.iter().all(|r| r.len() == 6));
+    let exact = 2.0 / 3.0 * std::f64::consts::PI * 1000.0;
+    for (i, row) in rows.iter().enumerate() {
+        for (j, x) in row.iter().enumerate() {
+            let expected = if i == j && i < 3 { exact } else { 0.0 };
+            assert!((x - expected).abs() <= 0.01 * exact, "{i} {j}: {x}");
+        }
+    }
+    let fresh = json(&["added-mass", "--shape", "sphere:1", "--faces", "80"]);
+    assert_eq!(fresh["density"], 998.0);
+}
+
+#[test]
+fn added_mass_of_scenes_and_meshes() {
+    // Bodies that nothing moves belong to the coupled matrix.
+    let floor = scene("falling_ball_box.toml");
+    let report = json(&["added-mass", &floor, "--faces", "80"]);
+    let rows: Vec<_> = report["added_mass"]
+        .as_array()
+        .unwrap()
+        .iter()
+        .map(list)
+        .collect();
+    assert_eq!(report["bodies"].as_array().unwrap().len(), 3);
+    assert_eq!((rows.len(), rows[0].len()), (18, 18));
+    for (i, row) in rows.iter().enumerate() {
+        assert!((0..18).all(|j| row[j] == rows[j][i]));
+    }
+    assert!((0..3).chain(12..18).all(|i| rows[i][i] > 0.0));
+    let alone = json(&[
+        "added-mass",
+        &floor,
+        "--faces",
+        "80",
+        "--fidelity",
+        "isolated",
+    ]);
+    assert_eq!(alone["bodies"], serde_json::json!(["sphere", "coin"]));
+    assert!(alone["warnings"].to_string().contains("floor"));
+
+    let folder = tempfile::tempdir().unwrap();
+    let good = file(&folder, "corner.obj", TETRAHEDRON);
+    let report = json(&["added-mass", &good]);
+    assert_eq!(report["bodies"], serde_json::json!(["corner"]));
+    assert!((report["volume"].as_f64().unwrap() - 1.0 / 6.0).abs() < 1e-12);
+    // Every face's corners in the other order: inside out.
+    let inverted: String = TETRAHEDRON
+        .lines()
+        .map(|l| match l.split(' ').collect::<Vec<_>>()[..] {
+            ["f", a, b, c] => format!("f {a} {c} {b}\n"),
+            _ => format!("{l}\n"),
+        })
+        .collect();
+    let inverted = file(&folder, "inverted.obj", &inverted);
+    fails(&["added-mass", &inverted], 1, &["inverted.obj", "inward"]);
+}
+
+#[test]
+fn gradcheck_passes_and_tells_its_cost() {
+    let ellipsoid = scene("kirchhoff_ellipsoid.toml");
+    let base = ["gradcheck", &ellipsoid, "--faces", "80", "--steps", "4"];
+    for fidelity in ["full", "isolated"] {
+        let report = json(&[&base[..], &["--fidelity", fidelity]].concat());
+        numbers(
+            &report,
+            &[
+                "max_rel_error",
+                "rel_error_initial",
+                "rel_error_parameters",
+                "forward_seconds",
+                "gradient_seconds",
+                "ratio",
+            ],
+        );
+        assert!(report["rel_error_controls"].is_null());
+        assert!(report["max_rel_error"].as_f64().unwrap() <= 1e-6);
+        assert_eq!(report["ok"], true);
+        assert_eq!(report["tolerance"], 1e-12);
+    }
+    let plain = hydrograd(&base);
+    assert!(text(&plain.stdout).contains("pass"));
+    // A solve to one digit can't agree with its own differences.
+    let ball = scene("falling_ball.toml");
+    let loose = hydrograd(&[
+        "gradcheck",
+        &ball,
+        "--faces",
+        "80",
+        "--steps",
+        "2",
+        "--tolerance",
+        "0.1",
+        "--json",
+    ]);
+    let report: serde_json::Value = serde_json::from_slice(&loose.stdout).unwrap();
+    assert_eq!(report["ok"], false, "{report}");
+    assert_eq!(loose.status.code(), Some(1));
+}
+
+const TWO_SPHERES: &str = r#"
+time_step = 0.05
+steps = 20
+[fluid]
+density = 998.0
+[[bodies]]
+name = "mover"
+shape = { kind = "sphere", radius = 0.1, faces = 80 }
+density = 998.0
+[[bodies]]
+name = "target"
+shape = { kind = "sphere", radius = 0.1, faces = 80 }
+density = 998.0
+placement = { position = [0.3, 0.0, 0.0] }
+[initial]
+v = [1.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0]
+"#;
+
+#[test]
+fn bodies_in_one_another_are_refused() {
+    let folder = tempfile::tempdir().unwrap();
+    let apart = file(&folder, "apart.toml", TWO_SPHERES);
+    fails(
+        &["run", &apart],
+        1,
+        &["mover", "target", "at t = 0.", "contact is not modelled"],
+    );
+    let report = json(&["run", &apart, "--fidelity", "isolated"]);
+    assert!(report["warnings"].to_string().contains("overlap"));
+    assert!(report["min_gap"].as_f64().unwrap() < 0.0);
+    let near = TWO_SPHERES
+        .replace("v = [1.0", "v = [0.0")
+        .replace("[0.3,", "[0.202,");
+    let near = file(&folder, "near.toml", &near);
+    let report = json(&["run", &near, "--steps", "1"]);
+    assert!(report["warnings"].to_string().contains("smallest gap"));
+
+    let inside = file(
+        &folder,
+        "inside.toml",
+        &TWO_SPHERES.replace("[0.3,", "[0.15,"),
+    );
+    let wall = "[[walls]]\npoint = [0.0, 0.0, -0.09]\nnormal = [0.0, 0.0, 1.0]\n[[bodies]]";
+    let sunk = file(
+        &folder,
+        "sunk.toml",
+        &TWO_SPHERES.replacen("[[bodies]]", wall, 1),
+    );
+    let rigid = TWO_SPHERES.replace("[0.3,", "[0.15,").replace(
+        "placement",
+        "joint = { kind = \"fixed\" }\nparent = \"mover\"\nplacement",
+    );
+    let rigid = rigid.replace("0.0, 0.0, 0.0, 0.0, 0.0, 0.0]\n", "]\n");
+    let rigid = file(&folder, "rigid.toml", &rigid);
+    for command in ["run", "added-mass", "gradcheck"] {
+        fails(&[command, &inside], 1, &["mover", "target", "overlap"]);
+        fails(&[command, &sunk], 1, &["mover", "wall 0"]);
+        fails(&[command, &rigid], 1, &["mover", "target", "overlap"]);
+    }
+}
+
+#[test]
+fn bad_starts_are_refused() {
+    let folder = tempfile::tempdir().unwrap();
+    let short = format!("{TWO_SPHERES}q = [0.0, 0.0, 0.0]\n");
+    let short = file(&folder, "short.toml", &short);
+    for command in ["run", "gradcheck"] {
+        fails(&[command, &short], 1, &["initial", "q", "14"]);
+        let still = TWO_SPHERES.replace("time_step = 0.05", "time_step = 0.0");
+        let still = file(&folder, "still.toml", &still);
+        fails(&[command, &still], 1, &["time_step", "above zero"]);
+    }
+    let good = file(&folder, "good.toml", TWO_SPHERES);
+    fails(
+        &["gradcheck", &good, "--steps", "0"],
+        1,
+        &["steps", "at least 1"],
+    );
+    fails(
+        &["gradcheck", &good, "--directions", "0"],
+        2,
+        &["above zero"],
+    );
+}

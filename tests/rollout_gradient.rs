@@ -45,7 +45,7 @@ fn check(scene: &Scene, fidelity: Fidelity, integrator: Integrator, steps: usize
 
 fn scene(name: &str) -> Scene {
     let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("examples/scenes");
-    Scene::load(&folder.join(format!("{name}.toml"))).unwrap()
+    Scene::load(folder.join(format!("{name}.toml"))).unwrap()
 }
 
 #[test]

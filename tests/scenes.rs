@@ -2,6 +2,8 @@
 
 use std::path::{Path, PathBuf};
 
+use hydrograd::{Controls, Fidelity, Settings, Simulator};
+
 use hydrograd::scene::{
     Body, Controller, Drag, DragPart, Fluid, Joint, Motion, Placement, Plane, Preset, Scene, Shape,
 };
@@ -261,4 +263,91 @@ fn mesh_paths_are_relative_to_the_scene_file() {
     let scene = Scene::load(&path).unwrap();
     let hull = Shape::mesh(folder.path().join("parts/hull.obj"));
     assert_eq!(scene.bodies[0].shape, Some(hull));
+}
+
+#[test]
+fn every_example_scene_runs_at_both_fidelities() {
+    for entry in std::fs::read_dir(folder()).unwrap() {
+        let path = entry.unwrap().path();
+        let scene = Scene::load(&path).unwrap();
+        // The fish's links touch at their hinges and have their added mass given.
+        let fidelities = match scene.name.as_str() {
+            name if name.contains("fish") => vec![Fidelity::Isolated],
+            _ => vec![Fidelity::Isolated, Fidelity::Full],
+        };
+        for fidelity in fidelities {
+            let settings = Settings::for_scene(&scene).fidelity(fidelity).faces(80);
+            let simulator = Simulator::new(&scene, settings)
+                .unwrap_or_else(|e| panic!("{} {fidelity:?}: {e}", path.display()));
+            let rollout = simulator
+                .rollout(&Controls::zeros(&simulator, 5))
+                .unwrap_or_else(|e| panic!("{} {fidelity:?}: {e}", path.display()));
+            assert_eq!(rollout.steps(), 5);
+            assert!(rollout.samples()[5].energy().is_finite());
+        }
+    }
+}
+
+/// The coin is turned by the flow of the approaching sphere before anything touches, and isn't where
+/// bodies don't feel each other.
+#[test]
+fn falling_ball_turns_the_coin_through_the_water_alone() {
+    let scene = example("falling_ball");
+    let stop = match scene.controller {
+        Some(Controller::PushThenLock { stop_at, .. }) => stop_at,
+        _ => panic!("push-then-lock expected"),
+    };
+    let run = |fidelity| {
+        let settings = Settings::for_scene(&scene).fidelity(fidelity).faces(80);
+        let simulator = Simulator::new(&scene, settings).unwrap();
+        let rollout = simulator
+            .rollout(&Controls::zeros(&simulator, 200))
+            .unwrap();
+        let mut history = Vec::new();
+        for s in rollout.samples() {
+            // Between the nearest points: sphere to coin (bounded by its largest semi-axis, so a
+            // lower bound), coin to floor.
+            let (sphere, coin) = (s.poses[0].translation, s.poses[1].translation);
+            let axis = s.poses[1].rotation.column(1).into_owned();
+            let reach = |d: nalgebra::Vector3<f64>| {
+                let across = axis.dot(&d);
+                (0.03_f64.powi(2) * across.powi(2)
+                    + 0.2_f64.powi(2) * (d.norm_squared() - across.powi(2)))
+                .sqrt()
+            };
+            let apart = coin - sphere;
+            // Support of the coin towards the sphere's centre: separated if the gap is positive.
+            let pair = apart.norm() - 0.6 - reach(apart / apart.norm());
+            let floor = coin.z + 0.98 - reach(nalgebra::Vector3::z());
+            history.push((s.q[0], s.q[3] - scene.initial.q[3], pair.min(floor)));
+        }
+        history
+    };
+    let full = run(Fidelity::Full);
+    let isolated = run(Fidelity::Isolated);
+    assert!(
+        full.iter().any(|x| x.0 < stop),
+        "the sphere isn't stopped within 2 s"
+    );
+    for (n, x) in full.iter().enumerate().step_by(20) {
+        println!(
+            "{:.2} s: sphere {:.3} angle {:.3e} gap {:.3}",
+            0.01 * n as f64,
+            x.0,
+            x.1,
+            x.2
+        );
+    }
+    let turned = full
+        .iter()
+        .take_while(|x| x.2 > 0.0)
+        .map(|x| x.1.abs())
+        .fold(0.0, f64::max);
+    let alone = isolated.iter().map(|x| x.1.abs()).fold(0.0, f64::max);
+    println!("turned {turned} rad before contact, {alone} alone");
+    assert!(
+        turned > 0.01,
+        "turned only {turned} rad before anything touches"
+    );
+    assert_eq!(alone, 0.0, "turned by itself");
 }

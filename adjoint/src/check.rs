@@ -32,6 +32,19 @@ impl Outcome {
     pub fn passes(&self) -> bool {
         self.rel_error <= self.tolerance && self.order > 1.8
     }
+
+    /// The larger error, the larger tolerance and the lower order of two checks of one rung.
+    pub fn worst(self, other: Self) -> Self {
+        Self {
+            rel_error: self.rel_error.max(other.rel_error),
+            order: if self.order.is_nan() || self.order < other.order {
+                self.order
+            } else {
+                other.order
+            },
+            tolerance: self.tolerance.max(other.tolerance),
+        }
+    }
 }
 
 /// Euclidean norm.
@@ -79,7 +92,7 @@ pub fn central_difference(
 /// small to `f`. Infinite if no two remainders stand clear (`f` is linear).
 pub fn taylor_order(f: impl Fn(&[f64]) -> Vec<f64>, x: &[f64], dx: &[f64], jvp: &[f64]) -> f64 {
     let start = f(x);
-    let round_off = 1e-11 * norm(&start).max(f64::MIN_POSITIVE);
+    let round_off = 1e-11 * norm(&start).max(norm(jvp)).max(f64::MIN_POSITIVE);
     let mut previous: Option<f64> = None;
     let mut order = f64::INFINITY;
     for i in 6..20 {

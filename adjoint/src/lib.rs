@@ -1,8 +1,11 @@
-//! Hand-derived differentiable kernels of hydrograd.
+#![doc = include_str!("../README.md")]
 
 pub mod check;
 pub mod drag;
 pub mod kernel;
 pub mod lie;
+mod registry;
 pub mod rigid;
 pub mod step;
+
+pub use registry::rungs;

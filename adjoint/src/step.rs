@@ -100,6 +100,9 @@ pub fn forward<S: Step>(
     Ok(Path { states, kept })
 }
 
+/// Cotangent of the initial state, and what every step yields.
+pub type Swept<S> = (<S as Step>::Bar, Vec<<S as Step>::Local>);
+
 /// Cotangent of the initial state, and what every step yields, in the order of time, from one seed per state.
 ///
 /// # Errors
@@ -111,7 +114,7 @@ pub fn reverse<S: Step>(
     step: &S,
     path: &Path<S::State, S::Kept>,
     seeds: &[S::Seed],
-) -> Result<(S::Bar, Vec<S::Local>), S::Error> {
+) -> Result<Swept<S>, S::Error> {
     assert_eq!(seeds.len(), path.states.len(), "one seed per state");
     let last = path.states.len() - 1;
     let (mut bar, local) =

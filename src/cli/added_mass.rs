@@ -3,21 +3,24 @@
 use std::fmt;
 use std::path::PathBuf;
 use std::process::ExitCode;
+use std::time::Instant;
 
 use clap::Args;
 use serde::Serialize;
 
 use super::input;
-use super::options::Water;
+use super::options::{Water, name};
 use super::output::{Output, write_warnings};
+use crate::Result;
 use crate::scene::{Scene, Shape};
-use crate::{Error, Result};
+use crate::simulate::Simulator;
 
 #[derive(Debug, Args)]
 pub(super) struct Arguments {
     #[command(flatten)]
     source: Source,
-    /// Density of the water in kg/m³ [default: the scene's own; 998 for a mesh or shape].
+    /// Density of the water in kg/m³ [default: the scene's own; 998, fresh water at 20 °C, for a
+    /// mesh or shape].
     #[arg(long, value_name = "RHO", allow_negative_numbers = true)]
     density: Option<f64>,
     #[command(flatten)]
@@ -75,12 +78,41 @@ pub(super) fn main(arguments: &Arguments, output: Output) -> Result<ExitCode> {
     Ok(ExitCode::SUCCESS)
 }
 
-/// TO FILL IN: M_f of all bodies at the scene's start, with the settings of `arguments.water`.
-fn added_mass(_scene: &Scene, _arguments: &Arguments) -> Result<Report> {
-    Err(Error::Unsupported {
-        what: "added-mass".into(),
-        why: "the simulator isn't connected to the command line".into(),
-        instead: "use the Rust interface".into(),
+/// M_f of all bodies at the scene's start.
+fn added_mass(scene: &Scene, arguments: &Arguments) -> Result<Report> {
+    let start = Instant::now();
+    let settings = arguments.water.settings(scene);
+    let simulator = Simulator::new(scene, settings)?;
+    let found = simulator.added_mass()?;
+    let seconds = start.elapsed().as_secs_f64();
+    let bodies = &simulator.system().bodies;
+    let in_water = bodies.iter().filter(|b| b.wet.is_some());
+    let mut warnings = simulator.warnings().to_vec();
+    let left_out: Vec<&str> = bodies
+        .iter()
+        .filter(|b| b.wet.is_none() && b.volume > 0.0)
+        .map(|b| b.name.as_str())
+        .collect();
+    if !left_out.is_empty() {
+        warnings.push(format!(
+            "with the fidelity isolated bodies that nothing moves are left out: {}",
+            left_out.join(", ")
+        ));
+    }
+    let rows = found.matrix.row_iter();
+    Ok(Report {
+        added_mass: rows.map(|r| r.iter().copied().collect()).collect(),
+        bodies: found.bodies,
+        asymmetry: found.report.asymmetry,
+        volume: in_water.map(|b| b.volume).sum(),
+        faces: simulator.faces(),
+        unknowns: simulator.unknowns(),
+        iterations: found.report.iterations,
+        seconds,
+        fidelity: name(settings.fidelity),
+        method: name(settings.boundary.method),
+        density: simulator.parameters().density,
+        warnings,
     })
 }
 

@@ -8,13 +8,27 @@ use clap::Args;
 use serde::Serialize;
 
 use super::input;
-use super::options::{Time, Water, positive};
+use super::options::{Time, Water, name, positive};
 use super::output::{Output, write_warnings};
 use super::progress::Progress;
+use crate::Result;
 use crate::scene::Scene;
-use crate::{Error, Result};
+use crate::simulate::Simulator;
+use crate::simulate::gradcheck::{self, gradcheck_with};
+
+/// Largest relative error that passes.
+const LIMIT: f64 = 1e-6;
+/// Tolerance of the coupled solve in the check, unless one is given: differences show its errors.
+const TOLERANCE: f64 = 1e-12;
+/// Repetitions of which the times are medians.
+const TIMINGS: usize = 5;
 
 #[derive(Debug, Args)]
+#[command(
+    after_help = "Each direction's error is the least over the step sizes. The check solves to \
+                  1e-12 unless --tolerance is given; the times are taken at 1e-8 or what is given. \
+                  Exit code 1 if an error is above 1e-6."
+)]
 pub(super) struct Arguments {
     /// The scene file.
     #[arg(value_name = "SCENE.toml")]
@@ -39,14 +53,20 @@ pub(super) struct Report {
     pub method: String,
     pub integrator: String,
     pub steps: usize,
+    /// Whether `max_rel_error` is at most [`LIMIT`].
+    pub ok: bool,
+    /// Tolerance of the coupled solve in the check; the times are taken at the usual one.
+    pub tolerance: f64,
     /// Steps of the central differences; the errors below are the least over them.
     pub step_sizes: Vec<f64>,
-    /// The largest of the three below.
+    /// The largest of the three below: relative error of the worst direction at its best step.
     pub max_rel_error: f64,
     /// Null where the scene has no controls.
     pub rel_error_controls: Option<f64>,
-    pub rel_error_initial: f64,
-    pub rel_error_parameters: f64,
+    /// Null where nothing can move.
+    pub rel_error_initial: Option<f64>,
+    /// Physical parameters and gains of the controller.
+    pub rel_error_parameters: Option<f64>,
     /// Median wall time of a trajectory, s.
     pub forward_seconds: f64,
     /// Median wall time of a trajectory and its gradient, s.
@@ -62,17 +82,52 @@ pub(super) fn main(arguments: &Arguments, output: Output) -> Result<ExitCode> {
     let report = check(&scene, arguments, &progress)?;
     drop(progress);
     output.result(&report);
-    Ok(ExitCode::SUCCESS)
+    Ok(if report.ok {
+        ExitCode::SUCCESS
+    } else {
+        ExitCode::FAILURE
+    })
 }
 
-/// TO FILL IN: adjoint against central differences along `arguments.directions` random directions
-/// (`arguments.seed`) in controls, initial state and parameters, at several step sizes; times as
-/// medians of at least 5 after a warm-up. `progress.set(done)` after each direction.
-fn check(_scene: &Scene, _arguments: &Arguments, _progress: &Progress) -> Result<Report> {
-    Err(Error::Unsupported {
-        what: "gradcheck".into(),
-        why: "the simulator isn't connected to the command line".into(),
-        instead: "use the Rust interface".into(),
+/// The check at a tight tolerance, then the times at the usual one.
+fn check(scene: &Scene, arguments: &Arguments, progress: &Progress) -> Result<Report> {
+    let usual = arguments.time.choose(arguments.water.settings(scene));
+    let tight = match arguments.water.tolerance {
+        Some(_) => usual,
+        None => usual.tolerance(TOLERANCE),
+    };
+    let steps = scene.steps;
+    let mut simulator = Simulator::new(scene, tight)?;
+    let found = gradcheck_with(
+        &mut simulator,
+        &gradcheck::Settings {
+            steps,
+            directions: arguments.directions,
+            seed: arguments.seed,
+            timings: 0,
+        },
+        |done, all| progress.set_of(done, all),
+    )?;
+    let warnings = simulator.warnings().to_vec();
+    drop(simulator);
+    let times = gradcheck::timings(&Simulator::new(scene, usual)?, steps, TIMINGS)?;
+    Ok(Report {
+        scene: scene.name.clone(),
+        fidelity: name(usual.fidelity),
+        method: name(usual.boundary.method),
+        integrator: name(usual.integrator),
+        steps,
+        ok: found.max_rel_error <= LIMIT,
+        tolerance: tight.solve.tolerance,
+        step_sizes: found.step_sizes,
+        max_rel_error: found.max_rel_error,
+        rel_error_controls: found.rel_error_controls,
+        rel_error_initial: found.rel_error_initial,
+        rel_error_parameters: found.rel_error_parameters,
+        forward_seconds: times.forward,
+        gradient_seconds: times.gradient,
+        ratio: times.ratio(),
+        warnings,
     })
 }
 
@@ -87,8 +142,21 @@ impl fmt::Display for Report {
             Some(error) => writeln!(f, "  controls      {error:.2e}")?,
             None => writeln!(f, "  controls      none in this scene")?,
         }
-        writeln!(f, "  initial state {:.2e}", self.rel_error_initial)?;
-        writeln!(f, "  parameters    {:.2e}", self.rel_error_parameters)?;
+        match self.rel_error_initial {
+            Some(error) => writeln!(f, "  initial state {error:.2e}")?,
+            None => writeln!(f, "  initial state can't be varied in this scene")?,
+        }
+        match self.rel_error_parameters {
+            Some(error) => writeln!(f, "  parameters    {error:.2e}")?,
+            None => writeln!(f, "  parameters    none in this scene")?,
+        }
+        writeln!(
+            f,
+            "  {}: the largest is {:.2e}, the limit {LIMIT:.0e}; solved to {:.0e}",
+            if self.ok { "pass" } else { "FAIL" },
+            self.max_rel_error,
+            self.tolerance
+        )?;
         write!(
             f,
             "  trajectory {:.4} s, with its gradient {:.4} s: {:.2} times",

@@ -3,11 +3,14 @@
 use clap::{Args, ValueEnum};
 use serde::Serialize;
 
+use crate::boundary;
+use crate::coupling::full;
+use crate::dynamics;
 use crate::scene::{Preset, Scene};
+use crate::simulate::{self, Settings};
 
 /// How much of the water's coupling is solved.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, ValueEnum, Serialize)]
-#[serde(rename_all = "kebab-case")]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, ValueEnum)]
 pub(super) enum Fidelity {
     /// Each body as if it were alone in the water.
     Isolated,
@@ -17,8 +20,7 @@ pub(super) enum Fidelity {
 }
 
 /// Where a body's sources lie and how its boundary condition is met.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum, Serialize)]
-#[serde(rename_all = "kebab-case")]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
 pub(super) enum Method {
     /// A source under each vertex, exact flux through each face, least squares.
     MfsVertex,
@@ -26,9 +28,18 @@ pub(super) enum Method {
     MfsFace,
 }
 
-/// How a step is taken.
+/// Norm in which the rows of the boundary condition are fitted.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum, Serialize)]
 #[serde(rename_all = "kebab-case")]
+pub(super) enum Rows {
+    /// The L² norm of the normal velocity: small and large bodies count alike.
+    Scaled,
+    /// Plain least squares; ruins small bodies beside large ones.
+    Unscaled,
+}
+
+/// How a step is taken.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
 pub(super) enum Integrator {
     /// Symplectic Euler in momentum, implicit in p at fixed q: first order.
     MomentumEuler,
@@ -41,8 +52,7 @@ pub(super) enum Integrator {
 }
 
 /// Solver of the coupled system.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum, Serialize)]
-#[serde(rename_all = "kebab-case")]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
 pub(super) enum Solver {
     /// Conjugate gradients on the least-squares problem.
     Cgls,
@@ -53,8 +63,7 @@ pub(super) enum Solver {
 }
 
 /// Preconditioner of the coupled system.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum, Serialize)]
-#[serde(rename_all = "kebab-case")]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
 pub(super) enum Preconditioner {
     /// Each body's own factorisation, made once.
     Factors,
@@ -65,12 +74,12 @@ pub(super) enum Preconditioner {
 }
 
 /// A family of choices.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum, Serialize)]
-#[serde(rename_all = "kebab-case")]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
 pub(super) enum PresetName {
     /// hydrograd's own.
     Default,
-    /// The paper's: face sources, its square system, semi-implicit Euler in velocity.
+    /// The paper's: face sources, rows not scaled, potential read at face centres, semi-implicit
+    /// Euler in velocity.
     Paper,
 }
 
@@ -83,6 +92,13 @@ pub(super) struct Water {
     /// Where a body's sources lie [default: mfs-vertex; mfs-face with the preset paper].
     #[arg(long, value_enum)]
     pub method: Option<Method>,
+    /// Depth of the sources under the surface in m; checked against edge length and thickness
+    /// [default: from the mesh, source by source].
+    #[arg(long, value_name = "DEPTH", value_parser = length, allow_negative_numbers = true)]
+    pub depth: Option<f64>,
+    /// Norm in which the rows are fitted [default: scaled; unscaled with the preset paper].
+    #[arg(long, value_enum)]
+    pub rows: Option<Rows>,
     /// Faces per body, for shapes by formula; the nearest number that the shape allows is taken
     /// [default: the scene's own, else 1280].
     #[arg(long, value_name = "N", value_parser = positive, allow_negative_numbers = true)]
@@ -90,7 +106,7 @@ pub(super) struct Water {
     /// Choices to start from [default: the scene's own, else default].
     #[arg(long, value_enum)]
     pub preset: Option<PresetName>,
-    /// Relative residual at which the coupled solve stops [default: 1e-8].
+    /// Relative residual at which the coupled solve stops [default: 1e-8; 1e-12 for gradcheck].
     #[arg(long, value_name = "TOL", value_parser = tolerance, allow_negative_numbers = true)]
     pub tolerance: Option<f64>,
     /// Solver of the coupled system [default: cgls].
@@ -110,7 +126,7 @@ pub(super) struct Time {
     /// Time step in s [default: the scene's own].
     #[arg(long, value_name = "DT", allow_negative_numbers = true)]
     pub time_step: Option<f64>,
-    /// How a step is taken [default: hydrograd's own choice; velocity-euler with the preset paper].
+    /// How a step is taken [default: momentum-euler; velocity-euler with the preset paper].
     #[arg(long, value_enum)]
     pub integrator: Option<Integrator>,
 }
@@ -127,6 +143,48 @@ impl Water {
             scene.set_faces(faces);
         }
     }
+
+    /// The settings of a scene that has been through [`Water::apply`]: its preset, then what was
+    /// given.
+    pub fn settings(&self, scene: &Scene) -> Settings {
+        let mut settings = Settings::for_scene(scene).fidelity(match self.fidelity {
+            Fidelity::Isolated => simulate::Fidelity::Isolated,
+            Fidelity::Full => simulate::Fidelity::Full,
+        });
+        if let Some(method) = self.method {
+            settings.boundary.method = match method {
+                Method::MfsVertex => boundary::Method::MfsVertex,
+                Method::MfsFace => boundary::Method::MfsFace,
+            };
+        }
+        if let Some(depth) = self.depth {
+            settings.boundary.depth = boundary::Depth::Fixed(depth);
+        }
+        if let Some(rows) = self.rows {
+            settings.boundary.rows = match rows {
+                Rows::Scaled => boundary::RowScaling::Scaled,
+                Rows::Unscaled => boundary::RowScaling::Unscaled,
+            };
+        }
+        if let Some(tolerance) = self.tolerance {
+            settings.solve.tolerance = tolerance;
+        }
+        if let Some(solver) = self.solver {
+            settings.solve.solver = match solver {
+                Solver::Cgls => full::Solver::Cgls,
+                Solver::Qr => full::Solver::Qr,
+                Solver::Gmres => full::Solver::Gmres,
+            };
+        }
+        if let Some(preconditioner) = self.preconditioner {
+            settings.solve.preconditioner = match preconditioner {
+                Preconditioner::Factors => full::Preconditioner::Factors,
+                Preconditioner::Jacobi => full::Preconditioner::Jacobi,
+                Preconditioner::None => full::Preconditioner::None,
+            };
+        }
+        settings
+    }
 }
 
 impl Time {
@@ -134,6 +192,21 @@ impl Time {
     pub fn apply(&self, scene: &mut Scene) {
         scene.steps = self.steps.unwrap_or(scene.steps);
         scene.time_step = self.time_step.unwrap_or(scene.time_step);
+    }
+
+    /// Puts the integrator into the settings, if one was given.
+    pub fn choose(&self, settings: Settings) -> Settings {
+        match self.integrator {
+            None => settings,
+            Some(Integrator::MomentumEuler) => {
+                settings.integrator(dynamics::Integrator::MomentumEuler)
+            }
+            Some(Integrator::Midpoint) => settings.integrator(dynamics::Integrator::Midpoint),
+            Some(Integrator::Rk4) => settings.integrator(dynamics::Integrator::Rk4),
+            Some(Integrator::VelocityEuler) => {
+                settings.integrator(dynamics::Integrator::VelocityEuler)
+            }
+        }
     }
 }
 
@@ -145,6 +218,13 @@ pub(super) fn positive(text: &str) -> Result<usize, String> {
     }
 }
 
+fn length(text: &str) -> Result<f64, String> {
+    match text.parse() {
+        Ok(x) if x > 0.0 && f64::is_finite(x) => Ok(x),
+        _ => Err("give a length above zero, in m".into()),
+    }
+}
+
 fn tolerance(text: &str) -> Result<f64, String> {
     match text.parse() {
         Ok(x) if x > 0.0 && x < 1.0 => Ok(x),
@@ -153,8 +233,9 @@ fn tolerance(text: &str) -> Result<f64, String> {
 }
 
 /// The name of a choice as it stands on the command line.
-#[expect(dead_code, reason = "for the functions that are to be filled in")]
-pub(super) fn name(choice: impl ValueEnum) -> String {
-    let value = choice.to_possible_value();
-    value.map_or_else(String::new, |v| v.get_name().to_owned())
+pub(super) fn name(choice: impl Serialize) -> String {
+    match serde_json::to_value(choice) {
+        Ok(serde_json::Value::String(name)) => name,
+        _ => String::new(),
+    }
 }

@@ -54,7 +54,6 @@ fn print_line(text: &str) {
 }
 
 /// Largest memory this process has held, MB (10⁶ bytes); `None` where the system doesn't tell.
-#[expect(dead_code, reason = "for the functions that are to be filled in")]
 pub(super) fn peak_memory_mb() -> Option<f64> {
     let status = std::fs::read_to_string("/proc/self/status").ok()?;
     let line = status.lines().find_map(|l| l.strip_prefix("VmHWM:"))?;

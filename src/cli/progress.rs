@@ -23,8 +23,13 @@ impl Progress {
     }
 
     /// So many steps are done.
-    #[expect(dead_code, reason = "for the functions that are to be filled in")]
     pub fn set(&self, done: usize) {
+        self.0.set_position(done as u64);
+    }
+
+    /// So many steps are done of so many.
+    pub fn set_of(&self, done: usize, all: usize) {
+        self.0.set_length(all as u64);
         self.0.set_position(done as u64);
     }
 }

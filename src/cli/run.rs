@@ -3,17 +3,19 @@
 use std::fmt;
 use std::path::PathBuf;
 use std::process::ExitCode;
+use std::time::Instant;
 
 use clap::Args;
 use serde::Serialize;
 
 use super::input;
-use super::options::{Time, Water};
-use super::output::{Output, or_dash, write_warnings};
+use super::options::{Time, Water, name};
+use super::output::{Output, or_dash, peak_memory_mb, write_warnings};
 use super::progress::Progress;
 use super::trajectory::{self, Trajectory};
-use crate::scene::Scene;
-use crate::{Error, Result};
+use crate::Result;
+use crate::scene::{Joint, Plane, Scene};
+use crate::simulate::{Controls, Rollout, Simulator};
 
 #[derive(Debug, Args)]
 pub(super) struct Arguments {
@@ -79,18 +81,103 @@ pub(super) fn main(arguments: &Arguments, output: Output) -> Result<ExitCode> {
     Ok(ExitCode::SUCCESS)
 }
 
-/// TO FILL IN: build the simulator with the settings of `arguments.water` and `arguments.time`,
-/// run `scene.steps` steps (`progress.set(done)` after each), and gather report and trajectory.
+/// Makes the scene ready, runs `scene.steps` steps, and gathers report and trajectory.
 fn simulate(
-    _scene: &Scene,
-    _arguments: &Arguments,
-    _progress: &Progress,
+    scene: &Scene,
+    arguments: &Arguments,
+    progress: &Progress,
 ) -> Result<(Report, Trajectory)> {
-    Err(Error::Unsupported {
-        what: "run".into(),
-        why: "the simulator isn't connected to the command line".into(),
-        instead: "use the Rust interface".into(),
-    })
+    let start = Instant::now();
+    let settings = arguments.time.choose(arguments.water.settings(scene));
+    let simulator = Simulator::new(scene, settings)?;
+    let setup_seconds = start.elapsed().as_secs_f64();
+    let controls = Controls::zeros(&simulator, scene.steps);
+    let rollout = simulator.rollout_with(&controls, |done| progress.set(done))?;
+    let seconds = start.elapsed().as_secs_f64();
+    let summary = rollout.summary();
+    let last = &rollout.samples()[rollout.steps()];
+    let report = Report {
+        scene: scene.name.clone(),
+        fidelity: name(settings.fidelity),
+        method: name(settings.boundary.method),
+        integrator: name(settings.integrator),
+        bodies: scene.bodies.len(),
+        faces: simulator.faces(),
+        unknowns: simulator.unknowns(),
+        steps: summary.steps,
+        dt: simulator.time_step(),
+        seconds,
+        setup_seconds,
+        seconds_per_step: (seconds - setup_seconds) / scene.steps.max(1) as f64,
+        peak_memory_mb: peak_memory_mb(),
+        energy_initial: summary.energy_initial,
+        energy_final: summary.energy_final,
+        momentum_drift: summary.momentum_drift,
+        min_gap: summary.min_gap,
+        final_q: last.q.as_slice().to_vec(),
+        final_v: last.v.as_slice().to_vec(),
+        warnings: [simulator.warnings(), &rollout.warnings()].concat(),
+        files: Vec::new(),
+    };
+    Ok((report, trajectory(scene, &rollout)))
+}
+
+/// Every state of a rollout, for the files.
+fn trajectory(scene: &Scene, rollout: &Rollout) -> Trajectory {
+    let samples = rollout.samples();
+    let of_joints = |names: fn(&Joint) -> &'static [&'static str]| {
+        let bodies = scene.bodies.iter();
+        let all = bodies.flat_map(|b| names(&b.joint).iter().map(|n| format!("{}.{n}", b.name)));
+        all.collect::<Vec<_>>()
+    };
+    Trajectory {
+        scene: scene.name.clone(),
+        dt: rollout.simulator().time_step(),
+        coordinates: of_joints(coordinates),
+        velocities: of_joints(velocities),
+        time: samples.iter().map(|s| s.time).collect(),
+        q: samples.iter().map(|s| s.q.as_slice().to_vec()).collect(),
+        v: samples.iter().map(|s| s.v.as_slice().to_vec()).collect(),
+        energy: samples.iter().map(|s| s.energy()).collect(),
+        momentum: samples.iter().map(|s| s.momentum.into()).collect(),
+        min_gap: rollout
+            .gaps()
+            .iter()
+            .map(|g| g.map(|g| g.distance))
+            .collect(),
+    }
+}
+
+/// Names of a joint's coordinates.
+fn coordinates(joint: &Joint) -> &'static [&'static str] {
+    match joint {
+        Joint::Fixed => &[],
+        Joint::Prismatic { .. } => &["position"],
+        Joint::Revolute { .. } => &["angle"],
+        Joint::Planar { plane } => match plane {
+            Plane::Yz => &["y", "z", "angle"],
+            Plane::Zx => &["z", "x", "angle"],
+            Plane::Xy => &["x", "y", "angle"],
+        },
+        Joint::Spherical => &["qw", "qx", "qy", "qz"],
+        Joint::Free => &["x", "y", "z", "qw", "qx", "qy", "qz"],
+    }
+}
+
+/// Names of a joint's velocities.
+fn velocities(joint: &Joint) -> &'static [&'static str] {
+    match joint {
+        Joint::Fixed => &[],
+        Joint::Prismatic { .. } => &["velocity"],
+        Joint::Revolute { .. } => &["rate"],
+        Joint::Planar { plane } => match plane {
+            Plane::Yz => &["vy", "vz", "rate"],
+            Plane::Zx => &["vz", "vx", "rate"],
+            Plane::Xy => &["vx", "vy", "rate"],
+        },
+        Joint::Spherical => &["wx", "wy", "wz"],
+        Joint::Free => &["vx", "vy", "vz", "wx", "wy", "wz"],
+    }
 }
 
 impl fmt::Display for Report {

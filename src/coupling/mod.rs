@@ -83,9 +83,9 @@ pub struct Pullback {
 /// Second derivatives along one displacement.
 #[derive(Clone, Debug)]
 pub struct Tangent {
-    /// D_g M̄_f[Z] x̄, body-frame impulses (6·bodies).
+    /// `D_g M̄_f[Z] x̄`, body-frame impulses (6·bodies).
     pub momentum_x: DVector<f64>,
-    /// D_g M̄_f[Z] ȳ.
+    /// `D_g M̄_f[Z] ȳ`.
     pub momentum_y: DVector<f64>,
     /// Rate of the spatial wrenches ∇_g E(x̄, ȳ) as the bodies are displaced by exp(εZ), at fixed
     /// body-frame twists. For another displacement Y, D_Y(∇E·Z) = wrench·Y + ∇E·(Z × Y).
@@ -101,7 +101,7 @@ pub trait Record: Send + Sync {
     /// body. Zeros if the evaluation was made without derivative.
     fn gradient(&self, x: &DVector<f64>, y: &DVector<f64>) -> Vec<Vec6>;
 
-    /// D_g E(e_i, y)[Z] for every basis column e_i, without a further solve.
+    /// `D_g E(e_i, y)[Z]` for every basis column e_i, without a further solve.
     fn gradient_along(&self, y: &DVector<f64>, z: &[Vec6]) -> DVector<f64>;
 
     /// Impulses of both directions and ∇_g E(x̄, ȳ), for any directions.

@@ -43,7 +43,7 @@ impl PairTensor {
             .collect()
     }
 
-    /// D_g E(e_i, y)[Z] for every basis column e_i.
+    /// `D_g E(e_i, y)[Z]` for every basis column e_i.
     pub fn along(&self, y: &DVector<f64>, z: &[Vec6]) -> DVector<f64> {
         let k = self.columns;
         let mut out = DVector::zeros(k);

@@ -4,7 +4,7 @@ use super::{Parameters, System};
 use crate::adjoint::lie::{Mat6, Vec3, Vec6, six};
 use crate::adjoint::rigid;
 use crate::coupling::{Record, Report};
-use crate::multibody::Kinematics;
+use crate::multibody::{Joint, Kinematics};
 use crate::{Error, Result};
 use nalgebra::{DMatrix, DVector};
 
@@ -213,6 +213,27 @@ impl<'a> Evaluation<'a> {
         (0..self.system.len())
             .map(|b| self.rigid_momentum(b, &twists[b]) + self.parameters.density * fluid[b])
             .collect()
+    }
+
+    /// Total momentum and angular momentum about the world origin of bodies and fluid at velocity `v`,
+    /// given the bodies' momenta there. A tree on a free joint counts with its frame momentum, which M(q) v yields to
+    /// round-off; the sum of the bodies' is as exact as the coupling's solve.
+    pub fn total_momentum(&self, v: &DVector<f64>, momenta: &[Vec6]) -> Vec6 {
+        let tree = &self.system.tree;
+        let composite = tree.composite(momenta.to_vec());
+        let hat = self.frame_momentum(v);
+        let mut total = Vec6::zeros();
+        for (b, link) in tree.links().iter().enumerate() {
+            total += match (link.parent, link.joint) {
+                (Some(_), _) => Vec6::zeros(),
+                (None, Joint::Free) => {
+                    let own = hat.fixed_rows::<6>(link.v.start).into_owned();
+                    link.placement.wrench_to_world(&own)
+                }
+                (None, _) => composite[b],
+            };
+        }
+        total
     }
 
     /// Kinetic energy of bodies and fluid, J; the fluid's in the frame that moves with the current.

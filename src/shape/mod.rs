@@ -8,6 +8,7 @@
 pub mod check;
 #[cfg(feature = "meshio")]
 pub mod file;
+pub mod gap;
 mod mass;
 mod mesh;
 pub mod primitive;
@@ -15,6 +16,7 @@ mod topology;
 mod weld;
 
 pub use check::{Finding, Kind, MeshReport, Severity, check, check_parts};
+pub use gap::{Gap, Gaps, Other};
 pub use mass::MassProperties;
 pub use mesh::{Edge, TriMesh};
 pub use primitive::{DEFAULT_FACES, MAX_FACES, build, parse_shape, shape_name, validate};

@@ -1,5 +1,6 @@
 //! From a scene to a system: meshes, masses, joints, coupling, controller.
 
+use super::clearance::{self, Clearance};
 use super::policy::{Constant, OpenLoop, Pd, PdAxis, PushThenLock};
 use super::{Fidelity, Policy, Settings};
 use crate::adjoint::drag::{self, Element, Part};
@@ -10,7 +11,7 @@ use crate::coupling::{Coupling, Isolated};
 use crate::dynamics::{BodyData, Drive, Parameters, Stepper, System};
 use crate::multibody::{self, Tree};
 use crate::scene::{self, Body, Controller, DragPart, Placement, Scene};
-use crate::shape::{self, MassProperties, TriMesh};
+use crate::shape::{self, Gaps, MassProperties, TriMesh};
 use crate::{Error, Result};
 use nalgebra::DVector;
 use std::path::Path;
@@ -24,6 +25,8 @@ pub(super) struct Assembled {
     pub q: DVector<f64>,
     pub v: DVector<f64>,
     pub faces: usize,
+    pub sources: usize,
+    pub gaps: Gaps,
     pub warnings: Vec<String>,
 }
 
@@ -142,7 +145,7 @@ impl Library<'_> {
             settings.damping = 0.0;
         }
         let boundary = BodyBoundary::new(name, vertices, faces, &settings)?;
-        let made = Arc::new(WetBody::new(vertices, faces, Arc::new(boundary))?);
+        let made = Arc::new(WetBody::new(Arc::new(boundary)));
         self.made.push((b, made.clone()));
         Ok(made)
     }
@@ -177,7 +180,7 @@ pub(super) fn assemble(scene: &Scene, settings: &Settings) -> Result<Assembled> 
     let mut isolated: Vec<Mat6> = Vec::new();
     let mut full: Vec<Arc<WetBody>> = Vec::new();
     let mut bodies = Vec::with_capacity(scene.bodies.len());
-    let (mut controls, mut wet_count, mut faces) = (0, 0, 0);
+    let (mut controls, mut wet_count, mut faces, mut sources) = (0, 0, 0, 0);
     for (b, body) in scene.bodies.iter().enumerate() {
         let surface = surfaces[b].as_ref();
         let (mass, center, inertia) = inertia(body, surface);
@@ -217,6 +220,7 @@ pub(super) fn assemble(scene: &Scene, settings: &Settings) -> Result<Assembled> 
                 (_, _, Some(s)) => {
                     let made = library.body(scene, b, &s.mesh)?;
                     faces += made.faces();
+                    sources += made.sources();
                     isolated.push(made.boundary.added_mass);
                     full.push(made);
                 }
@@ -255,7 +259,7 @@ pub(super) fn assemble(scene: &Scene, settings: &Settings) -> Result<Assembled> 
         }
         Fidelity::Full => Box::new(Full::new(full, &scene.walls, settings.solve)?),
     };
-    let drives = scene
+    let drives: Vec<Drive> = scene
         .bodies
         .iter()
         .map(|b| match &b.motion {
@@ -264,6 +268,11 @@ pub(super) fn assemble(scene: &Scene, settings: &Settings) -> Result<Assembled> 
             None => Drive::Free,
         })
         .collect();
+    let meshes: Vec<_> = surfaces
+        .iter()
+        .map(|s| s.as_ref().map(|s| &s.mesh))
+        .collect();
+    let clearance = Clearance::new(&meshes, &scene.walls, &tree, &drives)?;
     let system = System {
         bodies,
         drives,
@@ -273,7 +282,7 @@ pub(super) fn assemble(scene: &Scene, settings: &Settings) -> Result<Assembled> 
         coupling,
         tree,
     };
-    let (q, v) = start(scene, settings, &system, &parameters)?;
+    let (q, v) = start(scene, settings, &system, &parameters, &clearance)?;
     Ok(Assembled {
         policy: policy(scene, &system)?,
         system,
@@ -281,6 +290,8 @@ pub(super) fn assemble(scene: &Scene, settings: &Settings) -> Result<Assembled> 
         q,
         v,
         faces,
+        sources,
+        gaps: clearance.moving,
         warnings,
     })
 }
@@ -291,6 +302,7 @@ fn start(
     settings: &Settings,
     system: &System,
     parameters: &Parameters,
+    clearance: &Clearance,
 ) -> Result<(DVector<f64>, DVector<f64>)> {
     let stepper = Stepper {
         system,
@@ -304,6 +316,9 @@ fn start(
         DVector::from_vec(scene.initial.q.clone())
     };
     stepper.place_motions(&mut q, 0.0);
+    if settings.fidelity == Fidelity::Full {
+        clearance::refuse_start(clearance, &q, system)?;
+    }
     let mut v = if scene.initial.v.is_empty() {
         DVector::zeros(system.tree.velocities())
     } else {

@@ -57,6 +57,26 @@ pub struct Report {
     pub ratio: f64,
 }
 
+/// What a gradient costs.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize)]
+pub struct Times {
+    /// Median time of a rollout, s.
+    pub forward: f64,
+    /// Median time of a rollout and its gradient, s.
+    pub gradient: f64,
+}
+
+impl Times {
+    /// Gradient, its forward pass included, over forward alone; 0 where nothing was timed.
+    pub fn ratio(&self) -> f64 {
+        if self.forward > 0.0 {
+            self.gradient / self.forward
+        } else {
+            0.0
+        }
+    }
+}
+
 /// Differences smaller than this against the group's largest derivative say nothing of the adjoint: they are rounding.
 const NEGLIGIBLE: f64 = 1e-9;
 
@@ -84,34 +104,66 @@ struct Scales {
 
 /// A random functional of the trajectory: markers on the bodies and velocities, at the middle and the end.
 struct Probe {
-    weights: Vec<(usize, Vec<Vec3>, Vec<Vec3>, DVector<f64>)>,
+    readings: Vec<Reading>,
+}
+
+/// What is read at one state: a marker on each body along a direction, and velocities.
+struct Reading {
+    state: usize,
+    arms: Vec<Vec3>,
+    directions: Vec<Vec3>,
+    velocity: DVector<f64>,
 }
 
 impl Probe {
+    fn new(
+        simulator: &Simulator,
+        scale: &Scales,
+        steps: usize,
+        mut vector: impl FnMut(usize) -> DVector<f64>,
+    ) -> Self {
+        let bodies = simulator.system().len();
+        let velocities = simulator.system().tree.velocities();
+        let points = |v: &DVector<f64>, f: f64| -> Vec<Vec3> {
+            (0..bodies)
+                .map(|b| f * Vec3::from(v.fixed_rows::<3>(3 * b)))
+                .collect()
+        };
+        let readings = [steps / 2, steps].map(|state| Reading {
+            state,
+            arms: points(&vector(3 * bodies), scale.length),
+            directions: points(&vector(3 * bodies), 1.0 / scale.length),
+            velocity: vector(velocities).component_div(&scale.velocity),
+        });
+        Self {
+            readings: readings.into(),
+        }
+    }
+
     fn value(&self, samples: &[Sample]) -> f64 {
         let mut out = 0.0;
-        for (n, arms, directions, velocity) in &self.weights {
-            let s = &samples[*n];
+        for r in &self.readings {
+            let s = &samples[r.state];
             for (b, pose) in s.poses.iter().enumerate() {
-                out += directions[b].dot(&pose.apply(&arms[b]));
+                out += r.directions[b].dot(&pose.apply(&r.arms[b]));
             }
-            out += velocity.dot(&s.v);
+            out += r.velocity.dot(&s.v);
         }
         out
     }
 
     fn cotangents(&self, rollout: &Rollout) -> Cotangents {
         let mut out = rollout.zero_cotangents();
-        for (n, arms, directions, velocity) in &self.weights {
-            for (b, pose) in rollout.samples()[*n].poses.iter().enumerate() {
-                let turn = (pose.rotation * arms[b]).cross(&directions[b]);
+        for r in &self.readings {
+            for (b, pose) in rollout.samples()[r.state].poses.iter().enumerate() {
+                let turn = (pose.rotation * r.arms[b]).cross(&r.directions[b]);
                 for k in 0..3 {
-                    out.positions[(3 * b + k, *n)] += directions[b][k];
-                    out.rotations[(3 * b + k, *n)] += turn[k];
+                    out.positions[(3 * b + k, r.state)] += r.directions[b][k];
+                    out.rotations[(3 * b + k, r.state)] += turn[k];
                 }
             }
-            let mut column = out.v.column_mut(*n);
-            column += velocity;
+            let mut column = out.v.column_mut(r.state);
+            column += &r.velocity;
         }
         out
     }
@@ -161,11 +213,44 @@ fn scales(simulator: &Simulator, rollout: &Rollout, steps: usize) -> Result<Scal
     })
 }
 
+/// Wall times of a rollout and of a rollout with its gradient: medians of `repetitions` after a
+/// warm-up.
+///
+/// # Errors
+/// A rollout that fails, or no repetitions.
+pub fn timings(simulator: &Simulator, steps: usize, repetitions: usize) -> Result<Times> {
+    if repetitions == 0 || steps == 0 {
+        return Err(Error::input(
+            "timings: steps and repetitions",
+            format!("{steps} and {repetitions}"),
+            "must both be at least 1",
+        ));
+    }
+    let zero = Controls::zeros(simulator, steps);
+    let scale = scales(simulator, &simulator.rollout(&zero)?, steps)?;
+    let mut random = Random(1);
+    let vector = |n: usize| DVector::from_fn(n, |_, _| random.next());
+    let probe = Probe::new(simulator, &scale, steps, vector);
+    time(simulator, &zero, &probe, repetitions)
+}
+
 /// Runs the check. The simulator's solver tolerance decides how small an error can be seen: use 1e-12.
 ///
 /// # Errors
 /// A rollout that fails.
 pub fn gradcheck(simulator: &mut Simulator, settings: &Settings) -> Result<Report> {
+    gradcheck_with(simulator, settings, |_, _| {})
+}
+
+/// As [`gradcheck`]; `progress` hears how many directions are done, and of how many.
+///
+/// # Errors
+/// A rollout that fails.
+pub fn gradcheck_with(
+    simulator: &mut Simulator,
+    settings: &Settings,
+    mut progress: impl FnMut(usize, usize),
+) -> Result<Report> {
     if settings.steps == 0 || settings.directions == 0 {
         return Err(Error::input(
             "gradcheck: steps and directions",
@@ -179,26 +264,8 @@ pub fn gradcheck(simulator: &mut Simulator, settings: &Settings) -> Result<Repor
     let scale = scales(simulator, &rollout, steps)?;
     let mut random = Random(settings.seed);
     let mut vector = |n: usize| DVector::from_fn(n, |_, _| random.next());
-    let bodies = simulator.system().len();
     let nv = simulator.system().tree.velocities();
-    let points = |v: &DVector<f64>, f: f64| -> Vec<Vec3> {
-        (0..bodies)
-            .map(|b| f * Vec3::from(v.fixed_rows::<3>(3 * b)))
-            .collect()
-    };
-    let probe = Probe {
-        weights: [steps / 2, steps]
-            .into_iter()
-            .map(|n| {
-                (
-                    n,
-                    points(&vector(3 * bodies), scale.length),
-                    points(&vector(3 * bodies), 1.0 / scale.length),
-                    vector(nv).component_div(&scale.velocity),
-                )
-            })
-            .collect(),
-    };
+    let probe = Probe::new(simulator, &scale, steps, &mut vector);
     let gradient = rollout.vjp(&probe.cotangents(&rollout))?;
     drop(rollout);
 
@@ -206,6 +273,13 @@ pub fn gradcheck(simulator: &mut Simulator, settings: &Settings) -> Result<Repor
     let (q0, v0) = (simulator.start().0.clone(), simulator.start().1.clone());
     let parameters = simulator.parameters().clone();
     let gains = simulator.policy().gains();
+    let groups = [
+        simulator.system().controls > 0,
+        nv > 0,
+        true,
+        gains.iter().any(|g| *g != 0.0),
+    ];
+    let all = settings.directions * groups.iter().filter(|g| **g).count();
     let mut directions = Vec::new();
     for _ in 0..settings.directions {
         let controls = simulator.system().controls;
@@ -223,6 +297,7 @@ pub fn gradcheck(simulator: &mut Simulator, settings: &Settings) -> Result<Repor
                 let c = Controls::from_matrix(simulator, h * &d)?;
                 Ok(probe.value(simulator.rollout(&c)?.samples()))
             })?);
+            progress(directions.len(), all);
         }
         let (mut dq, mut dv) = (
             vector(nv).component_mul(&scale.displacement) * 0.1,
@@ -252,6 +327,7 @@ pub fn gradcheck(simulator: &mut Simulator, settings: &Settings) -> Result<Repor
                 simulator.set_start(q0.clone(), v0.clone())?;
                 Ok(value)
             })?);
+            progress(directions.len(), all);
         }
         let d = parameter_direction(&parameters, &vector(parameters.to_vec().len()), &scale);
         let base = parameters.to_vec();
@@ -265,6 +341,7 @@ pub fn gradcheck(simulator: &mut Simulator, settings: &Settings) -> Result<Repor
             simulator.replace_parameters(parameters.clone());
             value
         })?);
+        progress(directions.len(), all);
         if gains.iter().any(|g| *g != 0.0) {
             let d: Vec<f64> = vector(gains.len())
                 .iter()
@@ -281,9 +358,13 @@ pub fn gradcheck(simulator: &mut Simulator, settings: &Settings) -> Result<Repor
                 simulator.set_policy(policy);
                 value
             })?);
+            progress(directions.len(), all);
         }
     }
-    let (forward_seconds, gradient_seconds) = time(simulator, &zero, &probe, settings.timings)?;
+    let times = match settings.timings {
+        0 => Times::default(),
+        n => time(simulator, &zero, &probe, n)?,
+    };
     let worst = |names: &[&str]| {
         let group: Vec<&Direction> = directions
             .iter()
@@ -292,7 +373,7 @@ pub fn gradcheck(simulator: &mut Simulator, settings: &Settings) -> Result<Repor
         let largest = group.iter().map(|d| d.adjoint.abs()).fold(0.0, f64::max);
         let errors = group
             .iter()
-            .filter(|d| d.adjoint.abs() > NEGLIGIBLE * largest || largest == 0.0)
+            .filter(|d| !negligible(d, largest))
             .map(|d| d.rel_errors.iter().copied().fold(f64::INFINITY, f64::min));
         errors.reduce(f64::max)
     };
@@ -301,16 +382,23 @@ pub fn gradcheck(simulator: &mut Simulator, settings: &Settings) -> Result<Repor
         rel_error_controls: worst(&["controls"]),
         rel_error_initial: worst(&["initial"]),
         rel_error_parameters: worst(&["parameters", "gains"]),
-        forward_seconds,
-        gradient_seconds,
-        ratio: if forward_seconds > 0.0 {
-            gradient_seconds / forward_seconds
-        } else {
-            0.0
-        },
+        forward_seconds: times.forward,
+        gradient_seconds: times.gradient,
+        ratio: times.ratio(),
         step_sizes,
         directions,
     })
+}
+
+/// Whether adjoint and differences are both rounding beside the group's largest derivative. What
+/// isn't a number is not.
+fn negligible(d: &Direction, largest: f64) -> bool {
+    let limit = NEGLIGIBLE * largest;
+    let smallest = d
+        .differences
+        .iter()
+        .fold(f64::INFINITY, |m, x| m.min(x.abs()));
+    largest > 0.0 && d.adjoint.abs() <= limit && smallest <= limit
 }
 
 fn dot(a: &[f64], b: &[f64]) -> f64 {
@@ -369,12 +457,9 @@ fn time(
     controls: &Controls,
     probe: &Probe,
     repetitions: usize,
-) -> Result<(f64, f64)> {
+) -> Result<Times> {
     let (mut forward, mut gradient) = (Vec::new(), Vec::new());
     for i in 0..=repetitions {
-        if repetitions == 0 {
-            return Ok((0.0, 0.0));
-        }
         let start = Instant::now();
         let rollout = simulator.rollout(controls)?;
         let middle = start.elapsed().as_secs_f64();
@@ -388,5 +473,8 @@ fn time(
         x.sort_by(f64::total_cmp);
         x[x.len() / 2]
     };
-    Ok((median(&mut forward), median(&mut gradient)))
+    Ok(Times {
+        forward: median(&mut forward),
+        gradient: median(&mut gradient),
+    })
 }

@@ -13,7 +13,7 @@ pub struct Cotangents {
     pub v: DMatrix<f64>,
     /// Of the bodies' positions (origins, world), 3·bodies × (N + 1).
     pub positions: DMatrix<f64>,
-    /// Of the bodies' rotations (δR = [δθ]× R, world), 3·bodies × (N + 1).
+    /// Of the bodies' rotations (δR = δθ × R, world), 3·bodies × (N + 1).
     pub rotations: DMatrix<f64>,
     /// Direct dependence on the open-loop controls, controls × N.
     pub controls: DMatrix<f64>,

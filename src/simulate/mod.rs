@@ -1,6 +1,7 @@
 //! Simulations: settings, controllers, rollouts and their gradients.
 
 mod assemble;
+mod clearance;
 mod controls;
 pub mod gradcheck;
 mod gradient;

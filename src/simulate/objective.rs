@@ -165,8 +165,8 @@ impl Objective for Sum {
                         (0..end + 1, weight / samples.len() as f64)
                     };
                     for n in range {
-                        for k in 0..3 {
-                            let miss = samples[n].poses[body].translation[k] - target[k];
+                        for (k, goal) in target.iter().enumerate() {
+                            let miss = samples[n].poses[body].translation[k] - goal;
                             out.positions[(3 * body + k, n)] += 2.0 * scale * miss;
                         }
                     }

@@ -1,14 +1,17 @@
 //! A trajectory, and its gradient.
 
+use super::clearance;
 use super::trajectory::Seed;
-use super::{Cotangents, Gradient, Initial, Objective, Simulator};
+use super::{Cotangents, Fidelity, Gradient, Initial, Objective, Simulator};
 use crate::adjoint::lie::{Pose, Vec6};
 use crate::adjoint::step::{self, Path};
 use crate::coupling::Report;
 use crate::dynamics::{Memo, Parameters, State, StepBar};
+use crate::shape::Gap;
 use crate::{Error, Result};
 use nalgebra::{DMatrix, DVector};
 use serde::Serialize;
+use std::sync::OnceLock;
 
 /// What is observed at one state.
 #[derive(Clone, Debug)]
@@ -35,6 +38,8 @@ pub struct Sample {
     pub hold: Vec<bool>,
     /// What the coupling reports.
     pub report: Report,
+    /// Smallest gap; for [`Rollout::gaps`].
+    pub(super) gap: Option<Gap>,
     pub(super) memo: Memo,
 }
 
@@ -51,6 +56,7 @@ pub struct Rollout<'a> {
     pub(super) controls: DMatrix<f64>,
     pub(super) path: Path<State, Sample>,
     pub(super) initial_velocity: DVector<f64>,
+    pub(super) gaps: OnceLock<Vec<Option<Gap>>>,
 }
 
 /// Figures of a whole trajectory.
@@ -69,6 +75,8 @@ pub struct Summary {
     pub iterations: usize,
     /// Largest asymmetry of M_f before symmetrising.
     pub asymmetry: f64,
+    /// Smallest gap between bodies or to a wall, m; none where there is nothing to meet.
+    pub min_gap: Option<f64>,
 }
 
 impl<'a> Rollout<'a> {
@@ -142,7 +150,41 @@ impl<'a> Rollout<'a> {
                 .iter()
                 .map(|s| s.report.asymmetry)
                 .fold(0.0, f64::max),
+            min_gap: self.nearest().map(|(_, gap)| gap.distance),
         }
+    }
+
+    /// Smallest gap between bodies or to a wall at states 0 … N; none where there is nothing to
+    /// meet. Pairs that never move relative to one another don't count. With the fidelity
+    /// `isolated`, where gaps have no effect, they are measured at the first call.
+    pub fn gaps(&self) -> &[Option<Gap>] {
+        self.gaps.get_or_init(|| {
+            let samples = self.samples().iter();
+            match self.simulator.settings().fidelity {
+                Fidelity::Full => samples.map(|s| s.gap).collect(),
+                Fidelity::Isolated => samples
+                    .map(|s| self.simulator.gaps().smallest(&s.poses))
+                    .collect(),
+            }
+        })
+    }
+
+    /// Time and size of the smallest gap of the whole trajectory.
+    fn nearest(&self) -> Option<(f64, Gap)> {
+        let times = self.samples().iter().map(|s| s.time);
+        let gaps = times.zip(self.gaps()).filter_map(|(t, g)| Some((t, (*g)?)));
+        gaps.min_by(|(_, a), (_, b)| a.distance.total_cmp(&b.distance))
+    }
+
+    /// What the user should know about this trajectory, with names and numbers: gaps that the
+    /// meshes don't resolve, and bodies in one another with the fidelity `isolated`.
+    pub fn warnings(&self) -> Vec<String> {
+        let fidelity = self.simulator.settings().fidelity;
+        let nearest = self.nearest();
+        let warning = nearest.and_then(|(time, gap)| {
+            clearance::warning(time, &gap, fidelity, self.simulator.system())
+        });
+        warning.into_iter().collect()
     }
 
     /// Value of an objective.

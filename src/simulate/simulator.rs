@@ -7,6 +7,7 @@ use crate::adjoint::step;
 use crate::coupling::Report;
 use crate::dynamics::{Parameters, State, Stepper, System};
 use crate::scene::Scene;
+use crate::shape::Gaps;
 use crate::{Error, Result};
 use nalgebra::{DMatrix, DVector};
 
@@ -33,8 +34,8 @@ impl Simulator {
     /// Prepares a scene.
     ///
     /// # Errors
-    /// A scene that doesn't validate, meshes that don't bound a volume, bodies that overlap, or an
-    /// inertia that leaves M(q) indefinite at the start.
+    /// A scene that doesn't validate, meshes that don't bound a volume, bodies that overlap (with
+    /// the fidelity `full`), or an inertia that leaves M(q) indefinite at the start.
     pub fn new(scene: &Scene, settings: Settings) -> Result<Self> {
         scene.validate()?;
         let dt = settings.time_step.unwrap_or(scene.time_step);
@@ -91,9 +92,15 @@ impl Simulator {
         self.assembled.faces
     }
 
-    /// Number of unknowns of the coupled solve; 0 for `isolated`.
+    /// Number of sources of all bodies in the water: the unknowns of the coupled solve.
     pub fn unknowns(&self) -> usize {
-        self.system().coupling.unknowns()
+        self.assembled.sources
+    }
+
+    /// Distances between the bodies' surfaces, and to the walls; without the pairs that never move
+    /// relative to one another.
+    pub fn gaps(&self) -> &Gaps {
+        &self.assembled.gaps
     }
 
     /// What the user should know about the scene, with names and numbers.
@@ -186,6 +193,8 @@ impl Simulator {
         Trajectory {
             stepper: self.stepper(),
             policy: self.policy(),
+            gaps: self.gaps(),
+            fidelity: self.settings.fidelity,
             controls,
         }
     }
@@ -240,6 +249,7 @@ impl Simulator {
             simulator: self,
             path,
             initial_velocity: self.assembled.v.clone(),
+            gaps: Default::default(),
             controls: matrix,
         })
     }

@@ -1,9 +1,11 @@
 //! A rollout as steps with transposes: controller, integrator and observations together.
 
-use super::{Observation, Policy, Sample};
+use super::clearance;
+use super::{Fidelity, Observation, Policy, Sample};
 use crate::adjoint::lie::{Vec3, Vec6, point_wrench};
 use crate::adjoint::step::Step;
 use crate::dynamics::{Evaluation, Input, Parameters, State, StateBar, StepBar, Stepper};
+use crate::shape::{Gap, Gaps};
 use crate::{Error, Result};
 use nalgebra::{DMatrix, DVector};
 
@@ -11,6 +13,8 @@ use nalgebra::{DMatrix, DVector};
 pub(super) struct Trajectory<'a> {
     pub stepper: Stepper<'a>,
     pub policy: &'a dyn Policy,
+    pub gaps: &'a Gaps,
+    pub fidelity: Fidelity,
     pub controls: &'a DMatrix<f64>,
 }
 
@@ -30,11 +34,22 @@ pub(super) struct Local {
 }
 
 impl<'a> Trajectory<'a> {
-    fn observe(&self, e: &Evaluation, state: &State) -> Result<Sample> {
+    /// Evaluates a state whose bodies keep apart; with the smallest gap.
+    fn evaluate(&self, state: &State) -> Result<(Evaluation<'_>, Option<Gap>)> {
+        let system = self.stepper.system;
+        let mut gap = None;
+        if self.fidelity == Fidelity::Full {
+            gap = self.gaps.smallest(&system.tree.kinematics(&state.q).poses);
+            clearance::refuse(gap.as_ref(), system)?;
+        }
+        Ok((self.stepper.evaluate(&state.q, false)?, gap))
+    }
+
+    fn observe(&self, e: &Evaluation, state: &State, gap: Option<Gap>) -> Result<Sample> {
         let v = self.stepper.velocity(e, state)?;
         if let Some(bad) = v.iter().position(|x| !x.is_finite()) {
             return Err(Error::Unresolved {
-                place: format!("t = {} s", self.stepper.time(state)),
+                place: "simulation".into(),
                 quantity: format!("velocity v[{bad}]"),
                 value: v[bad],
                 limit: f64::MAX,
@@ -48,10 +63,11 @@ impl<'a> Trajectory<'a> {
             q: state.q.clone(),
             kinetic_energy: e.kinetic_energy(&v),
             potential_energy: e.potential_energy(),
-            momentum: momenta.iter().sum(),
+            momentum: e.total_momentum(&v, &momenta),
             largest_momentum: momenta.iter().fold(Vec6::zeros(), |m, h| m.sup(&h.abs())),
             poses: e.kinematics.poses.clone(),
             report: e.report(),
+            gap,
             control: DVector::zeros(0),
             hold: Vec::new(),
             memo: None,
@@ -112,32 +128,8 @@ impl<'a> Trajectory<'a> {
         let v_bar = &bar.v + &seed.v;
         self.stepper.velocity_vjp(e, state, &sample.v, &v_bar, bar)
     }
-}
 
-impl Step for Trajectory<'_> {
-    type State = State;
-    type Kept = Sample;
-    type Bar = StateBar;
-    type Seed = Seed;
-    type Local = Local;
-    type Error = Error;
-
-    fn step(&self, index: usize, state: &State) -> Result<(State, Sample)> {
-        let e = self.stepper.evaluate(&state.q, false)?;
-        let mut sample = self.observe(&e, state)?;
-        let input = self.input(index, &sample)?;
-        let next = self.stepper.step(&e, state, &sample.v, &input)?;
-        sample.control = input.control;
-        sample.hold = input.hold;
-        sample.memo = next.memo;
-        Ok((next.state, sample))
-    }
-
-    fn last(&self, _index: usize, state: &State) -> Result<Sample> {
-        self.observe(&self.stepper.evaluate(&state.q, false)?, state)
-    }
-
-    fn step_vjp(
+    fn reverse_step(
         &self,
         index: usize,
         state: &State,
@@ -179,9 +171,8 @@ impl Step for Trajectory<'_> {
         ))
     }
 
-    fn last_vjp(
+    fn reverse_last(
         &self,
-        _index: usize,
         state: &State,
         sample: &Sample,
         seed: &Seed,
@@ -197,5 +188,59 @@ impl Step for Trajectory<'_> {
                 gains: Vec::new(),
             },
         ))
+    }
+}
+
+impl Step for Trajectory<'_> {
+    type State = State;
+    type Kept = Sample;
+    type Bar = StateBar;
+    type Seed = Seed;
+    type Local = Local;
+    type Error = Error;
+
+    fn step(&self, index: usize, state: &State) -> Result<(State, Sample)> {
+        let run = || {
+            let (e, gap) = self.evaluate(state)?;
+            let mut sample = self.observe(&e, state, gap)?;
+            let input = self.input(index, &sample)?;
+            let next = self.stepper.step(&e, state, &sample.v, &input)?;
+            sample.control = input.control;
+            sample.hold = input.hold;
+            sample.memo = next.memo;
+            Ok((next.state, sample))
+        };
+        run().map_err(|e: Error| e.at_time(self.stepper.time(state)))
+    }
+
+    fn last(&self, _index: usize, state: &State) -> Result<Sample> {
+        let run = || {
+            let (e, gap) = self.evaluate(state)?;
+            self.observe(&e, state, gap)
+        };
+        run().map_err(|e: Error| e.at_time(self.stepper.time(state)))
+    }
+
+    fn step_vjp(
+        &self,
+        index: usize,
+        state: &State,
+        sample: &Sample,
+        next_bar: &StateBar,
+        seed: &Seed,
+    ) -> Result<(StateBar, Local)> {
+        self.reverse_step(index, state, sample, next_bar, seed)
+            .map_err(|e| e.at_time(sample.time))
+    }
+
+    fn last_vjp(
+        &self,
+        _index: usize,
+        state: &State,
+        sample: &Sample,
+        seed: &Seed,
+    ) -> Result<(StateBar, Local)> {
+        self.reverse_last(state, sample, seed)
+            .map_err(|e| e.at_time(sample.time))
     }
 }

@@ -82,11 +82,12 @@ pub fn cgls(
         }
     }
     let relative = |k: usize| {
-        if start[k] > 0.0 {
-            (gamma[k] / start[k]).sqrt()
-        } else {
-            0.0
+        if start[k] == 0.0 {
+            return 0.0;
         }
+        // Infinite where a right-hand side or an iterate isn't finite.
+        let ratio = (gamma[k] / start[k]).sqrt();
+        if ratio.is_nan() { f64::INFINITY } else { ratio }
     };
     Outcome {
         x,

@@ -105,6 +105,9 @@ impl Columns {
     /// `self += other · diag(scale)`.
     pub fn add_scaled(&mut self, other: &Self, scale: &[f64]) {
         let n = self.columns;
+        if n == 0 {
+            return;
+        }
         for (a, b) in self
             .data
             .chunks_exact_mut(n)

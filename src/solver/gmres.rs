@@ -59,6 +59,9 @@ fn single(
     if size == 0.0 {
         return (x, 0, 0.0);
     }
+    if !size.is_finite() {
+        return (x, 0, f64::INFINITY);
+    }
     let mut iterations = 0;
     loop {
         let mut r = b.clone();

@@ -1,52 +1,24 @@
 //! One body as the coupled system sees it: constant geometry, its own block, its factor.
 
-use crate::Result;
 use crate::adjoint::kernel::{
-    Points, Sources, Triangles, Write, flux_fill, flux_hvp, flux_jvp, flux_vjp, normal_fill,
-    normal_hvp, normal_jvp, normal_vjp, potential_hvp, potential_sum, potential_vjp,
+    Sources, Write, flux_fill, flux_hvp, flux_jvp, flux_vjp, normal_fill, normal_hvp, normal_jvp,
+    normal_vjp, potential_hvp, potential_sum, potential_vjp,
 };
 use crate::adjoint::lie::{Vec3, Vec6};
 use crate::boundary::{BodyBoundary, Method};
 use std::sync::Arc;
-
-/// Rows of a body: what a source makes on its surface.
-#[derive(Clone, Debug)]
-enum Rows {
-    Flux(Triangles),
-    Normal(Points),
-}
 
 /// A body of the coupled system, in its own frame; bodies of equal shape share one.
 #[derive(Clone, Debug)]
 pub struct WetBody {
     /// The body alone.
     pub boundary: Arc<BodyBoundary>,
-    rows: Rows,
-    readout: Points,
 }
 
 impl WetBody {
-    /// From the surface (m, body frame) and its discretisation.
-    ///
-    /// # Errors
-    /// None at present; the surface was checked when `boundary` was made.
-    pub fn new(
-        vertices: &[Vec3],
-        faces: &[[usize; 3]],
-        boundary: Arc<BodyBoundary>,
-    ) -> Result<Self> {
-        let weights = boundary.row_weights.clone();
-        let (centres, normals) = (&boundary.faces.centres, &boundary.faces.normals);
-        let rows = match boundary.settings.method {
-            Method::MfsVertex => Rows::Flux(Triangles::new(vertices, faces, weights)),
-            Method::MfsFace => Rows::Normal(Points::new(centres, normals, weights)),
-        };
-        let readout = Points::new(centres, normals, vec![1.0; centres.len()]);
-        Ok(Self {
-            rows,
-            readout,
-            boundary,
-        })
+    /// From the body's discretisation.
+    pub fn new(boundary: Arc<BodyBoundary>) -> Self {
+        Self { boundary }
     }
 
     /// Number of rows.
@@ -61,17 +33,17 @@ impl WetBody {
 
     /// Entries of K for other sources in this body's frame.
     pub fn fill(&self, s: &Sources, write: Write, out: &mut [f64], stride: usize, column: usize) {
-        match &self.rows {
-            Rows::Flux(t) => flux_fill(t, s, write, out, stride, column),
-            Rows::Normal(p) => normal_fill(p, s, write, out, stride, column),
+        match self.boundary.settings.method {
+            Method::MfsVertex => flux_fill(&self.boundary.triangles, s, write, out, stride, column),
+            Method::MfsFace => normal_fill(&self.boundary.points, s, write, out, stride, column),
         }
     }
 
     /// `out[i][k] += Σ_j (∇K_ij · d_j) a[j][k]`.
     pub fn jvp(&self, s: &Sources, d: &[Vec3], a: &[f64], columns: usize, out: &mut [f64]) {
-        match &self.rows {
-            Rows::Flux(t) => flux_jvp(t, s, d, a, columns, out),
-            Rows::Normal(p) => normal_jvp(p, s, d, a, columns, out),
+        match self.boundary.settings.method {
+            Method::MfsVertex => flux_jvp(&self.boundary.triangles, s, d, a, columns, out),
+            Method::MfsFace => normal_jvp(&self.boundary.points, s, d, a, columns, out),
         }
     }
 
@@ -79,9 +51,9 @@ impl WetBody {
     pub fn vjp(&self, s: &Sources, bar: &[f64], columns: usize) -> Vec<f64> {
         let mut out = vec![0.0; 3 * columns * s.len()];
         if columns > 0 {
-            match &self.rows {
-                Rows::Flux(t) => flux_vjp(t, s, bar, columns, &mut out),
-                Rows::Normal(p) => normal_vjp(p, s, bar, columns, &mut out),
+            match self.boundary.settings.method {
+                Method::MfsVertex => flux_vjp(&self.boundary.triangles, s, bar, columns, &mut out),
+                Method::MfsFace => normal_vjp(&self.boundary.points, s, bar, columns, &mut out),
             }
         }
         out
@@ -91,9 +63,11 @@ impl WetBody {
     pub fn hvp(&self, s: &Sources, d: &[Vec3], bar: &[f64], columns: usize) -> Vec<f64> {
         let mut out = vec![0.0; 3 * columns * s.len()];
         if columns > 0 {
-            match &self.rows {
-                Rows::Flux(t) => flux_hvp(t, s, d, bar, columns, &mut out),
-                Rows::Normal(p) => normal_hvp(p, s, d, bar, columns, &mut out),
+            match self.boundary.settings.method {
+                Method::MfsVertex => {
+                    flux_hvp(&self.boundary.triangles, s, d, bar, columns, &mut out)
+                }
+                Method::MfsFace => normal_hvp(&self.boundary.points, s, d, bar, columns, &mut out),
             }
         }
         out
@@ -103,7 +77,7 @@ impl WetBody {
     pub fn potential(&self, s: &Sources, bar: &[f64], columns: usize) -> Vec<f64> {
         let mut out = vec![0.0; columns * s.len()];
         if columns > 0 {
-            potential_sum(&self.readout, s, bar, columns, &mut out);
+            potential_sum(&self.boundary.points, s, bar, columns, &mut out);
         }
         out
     }
@@ -112,7 +86,7 @@ impl WetBody {
     pub fn potential_vjp(&self, s: &Sources, bar: &[f64], columns: usize) -> Vec<f64> {
         let mut out = vec![0.0; 3 * columns * s.len()];
         if columns > 0 {
-            potential_vjp(&self.readout, s, bar, columns, &mut out);
+            potential_vjp(&self.boundary.points, s, bar, columns, &mut out);
         }
         out
     }
@@ -121,7 +95,7 @@ impl WetBody {
     pub fn potential_hvp(&self, s: &Sources, d: &[Vec3], bar: &[f64], columns: usize) -> Vec<f64> {
         let mut out = vec![0.0; 3 * columns * s.len()];
         if columns > 0 {
-            potential_hvp(&self.readout, s, d, bar, columns, &mut out);
+            potential_hvp(&self.boundary.points, s, d, bar, columns, &mut out);
         }
         out
     }

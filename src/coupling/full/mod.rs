@@ -38,7 +38,7 @@ use crate::adjoint::lie::Pose;
 use crate::scene::Wall;
 use nalgebra::DMatrix;
 use std::ops::Range;
-use std::sync::Arc;
+use std::sync::{Arc, Mutex};
 
 /// All bodies coupled through one boundary integral system.
 pub struct Full {
@@ -47,6 +47,8 @@ pub struct Full {
     settings: SolveSettings,
     faces: Vec<Range<usize>>,
     sources: Vec<Range<usize>>,
+    /// Matrices to be used again: fresh memory costs as much as filling it.
+    spare: Mutex<Vec<Vec<f64>>>,
 }
 
 impl Full {
@@ -73,6 +75,7 @@ impl Full {
             images: Image::of_walls(walls)?,
             bodies,
             settings,
+            spare: Mutex::new(Vec::new()),
         })
     }
 

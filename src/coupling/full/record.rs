@@ -120,7 +120,7 @@ impl<'a> FullRecord<'a> {
             let h = out.impulse(&out.a.column(column), &out.mu.column(column));
             out.momenta.set_column(column, &h);
         }
-        if derivative {
+        if derivative && k > 0 {
             out.gradient = out.tensor();
         }
         Ok(out)

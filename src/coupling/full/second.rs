@@ -76,10 +76,11 @@ impl FullRecord<'_> {
                         continue;
                     }
                     let mut field = Vec3::zeros();
-                    for m in 0..6 {
+                    let twist = &response.twists[pair.target];
+                    for (m, part) in impulse[pair.target][k].iter_mut().enumerate() {
                         let g = gradient_at(&six_fields, 6, j, m);
-                        field += g * response.twists[pair.target][m];
-                        impulse[pair.target][k][m] += dj.dot(&g) * response.a[s];
+                        field += g * twist[m];
+                        *part += dj.dot(&g) * response.a[s];
                     }
                     dg.data[s * n + k] += dj.dot(&field);
                     let at = 3 * (j * n + k);

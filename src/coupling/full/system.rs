@@ -113,6 +113,14 @@ pub(super) struct System<'a> {
     qr: Option<Qr<f64>>,
 }
 
+impl Drop for System<'_> {
+    fn drop(&mut self) {
+        if let Ok(mut spare) = self.full.spare.lock() {
+            spare.push(std::mem::take(&mut self.matrix));
+        }
+    }
+}
+
 /// Solutions a and λ with r and μ.
 pub(super) struct Solved {
     pub a: Columns,
@@ -127,7 +135,9 @@ impl<'a> System<'a> {
     /// Assembles K: own blocks from the bodies, all others from the pairs.
     pub fn new(full: &'a Full, pairs: &[Pair]) -> Self {
         let (rows, columns) = (full.rows(), full.columns());
-        let mut matrix = vec![0.0; rows * columns];
+        // Every entry is written below, so that what a used matrix held doesn't matter.
+        let spare = full.spare.lock().ok().and_then(|mut s| s.pop());
+        let mut matrix = spare.unwrap_or_else(|| vec![0.0; rows * columns]);
         for (b, body) in full.bodies.iter().enumerate() {
             let own = &body.boundary.flux_rows;
             let width = body.sources();
@@ -186,7 +196,7 @@ impl<'a> System<'a> {
     /// (KᵀK + D²) x.
     fn normal(&self, x: &Columns) -> Columns {
         let mut out = normal_product(&self.matrix, self.full.rows(), x);
-        let n = x.columns;
+        let n = x.columns.max(1);
         let rows = out.data.chunks_exact_mut(n).zip(x.data.chunks_exact(n));
         for ((o, x), d) in rows.zip(&self.damping) {
             for (o, x) in o.iter_mut().zip(x) {
@@ -217,7 +227,7 @@ impl<'a> System<'a> {
     }
 
     fn scale(&self, x: &mut Columns) {
-        let n = x.columns;
+        let n = x.columns.max(1);
         for (row, s) in x.data.chunks_exact_mut(n).zip(&self.jacobi) {
             row.iter_mut().for_each(|v| *v *= s);
         }

@@ -1,0 +1,208 @@
+//! What may import what: the crate's layers, held against its `use` lines and paths.
+
+use std::collections::{BTreeMap, BTreeSet};
+use std::path::{Path, PathBuf};
+
+/// Modules that each module may name. `error` is free for all, and so is the crate's root for
+/// `Error` and `Result` alone.
+///
+/// `adjoint::lie` gives vectors and poses to everyone; the modules marked `adjoint` use the ladder too.
+const LAYERS: [(&str, &[&str]); 11] = [
+    ("error", &[]),
+    ("scene", &["shape"]),
+    ("shape", &["adjoint", "scene"]),
+    ("solver", &[]),
+    ("boundary", &["adjoint", "solver"]),
+    ("coupling", &["adjoint", "boundary", "scene", "solver"]),
+    ("multibody", &["adjoint", "scene"]),
+    ("dynamics", &["adjoint", "coupling", "multibody", "scene"]),
+    (
+        "simulate",
+        &[
+            "adjoint",
+            "boundary",
+            "coupling",
+            "dynamics",
+            "multibody",
+            "scene",
+            "shape",
+        ],
+    ),
+    // The facade names what it shows; the command line stands on the facade.
+    ("lib", &["adjoint", "scene", "shape", "simulate"]),
+    (
+        "cli",
+        &[
+            "adjoint", "boundary", "coupling", "dynamics", "scene", "shape", "simulate",
+        ],
+    ),
+];
+
+/// Modules of which only the named parts may be used.
+const ONLY: [(&str, &str, &[&str]); 3] = [
+    ("shape", "adjoint", &["lie"]),
+    // Descriptions of shapes and walls are scene data, and a scene asks the shapes whether they are
+    // right: the one pair that knows each other.
+    ("shape", "scene", &["Shape", "Wall"]),
+    ("multibody", "adjoint", &["lie"]),
+];
+
+fn sources(folder: &Path) -> Vec<PathBuf> {
+    let mut out = Vec::new();
+    let mut folders = vec![folder.to_path_buf()];
+    while let Some(at) = folders.pop() {
+        for entry in std::fs::read_dir(&at).unwrap() {
+            let path = entry.unwrap().path();
+            if path.is_dir() {
+                folders.push(path);
+            } else if path.extension().is_some_and(|e| e == "rs") {
+                out.push(path);
+            }
+        }
+    }
+    out.sort();
+    out
+}
+
+/// Code without comments.
+fn code(path: &Path) -> String {
+    let text = std::fs::read_to_string(path).unwrap();
+    let lines = text.lines().map(|l| l.split("//").next().unwrap_or(""));
+    lines.collect::<Vec<_>>().join("\n")
+}
+
+/// Paths `from::a::b` in the text, as the segments after `from`; a group `from::{a::c, b}` gives one
+/// for each member.
+fn paths(text: &str, from: &str) -> Vec<Vec<String>> {
+    let start = format!("{from}::");
+    let word = |c: char| c.is_alphanumeric() || c == '_';
+    let mut out = Vec::new();
+    for (at, _) in text.match_indices(&start) {
+        if text[..at].chars().next_back().is_some_and(word) {
+            continue;
+        }
+        let rest = &text[at + start.len()..];
+        let members: Vec<&str> = match rest.strip_prefix('{') {
+            Some(group) => split_group(group),
+            None => vec![rest],
+        };
+        for member in members {
+            let end = member.find(|c: char| !word(c) && c != ':');
+            let path = member[..end.unwrap_or(member.len())].trim_end_matches(':');
+            let segments = path.split("::").map(str::to_string);
+            out.push(segments.collect());
+        }
+    }
+    out
+}
+
+/// Members of a brace group at its outer level.
+fn split_group(text: &str) -> Vec<&str> {
+    let (mut depth, mut from, mut out) = (0, 0, Vec::new());
+    for (i, c) in text.char_indices() {
+        match c {
+            '{' => depth += 1,
+            '}' if depth > 0 => depth -= 1,
+            ',' | '}' if depth == 0 => {
+                out.push(text[from..i].trim());
+                from = i + 1;
+                if c == '}' {
+                    break;
+                }
+            }
+            _ => {}
+        }
+    }
+    out.retain(|m| !m.is_empty());
+    out
+}
+
+fn root() -> &'static Path {
+    Path::new(env!("CARGO_MANIFEST_DIR"))
+}
+
+#[test]
+fn every_module_names_only_what_its_layer_may() {
+    let allowed: BTreeMap<_, _> = LAYERS.iter().copied().collect();
+    let mut wrong = Vec::new();
+    let mut seen = BTreeSet::new();
+    for path in sources(&root().join("src")) {
+        let inside = path.strip_prefix(root().join("src")).unwrap();
+        let first = inside.iter().next().unwrap().to_str().unwrap();
+        let module = first.trim_end_matches(".rs");
+        if module == "bin" || module == "notation" {
+            continue;
+        }
+        seen.insert(module.to_string());
+        let Some(may) = allowed.get(module) else {
+            wrong.push(format!("{}: layer not in the table", inside.display()));
+            continue;
+        };
+        let text = code(&path);
+        let own = paths(&text, "crate").into_iter();
+        let lower = paths(&text, "hydrograd_adjoint").into_iter().map(|mut p| {
+            p.insert(0, "adjoint".into());
+            p
+        });
+        for used in own.chain(lower) {
+            let name = used[0].as_str();
+            if name == module || ["error", "Error", "Result"].contains(&name) {
+                continue;
+            }
+            let partly = ONLY.iter().find(|(m, u, _)| (*m, *u) == (module, name));
+            let narrow = partly.is_none_or(|(_, _, parts)| {
+                used.get(1).is_some_and(|u| parts.contains(&u.as_str()))
+            });
+            if !may.contains(&name) || !narrow {
+                wrong.push(format!("{}: {}", inside.display(), used.join("::")));
+            }
+        }
+    }
+    assert!(
+        wrong.is_empty(),
+        "against the layers:\n{}",
+        wrong.join("\n")
+    );
+    for (module, _) in LAYERS {
+        assert!(
+            seen.contains(module),
+            "{module} is in the table but not in src"
+        );
+    }
+}
+
+/// A table with a cycle would forbid nothing.
+#[test]
+fn layers_are_ordered() {
+    let table: BTreeMap<_, _> = LAYERS.iter().copied().collect();
+    let mut done: BTreeSet<&str> = BTreeSet::from(["adjoint"]);
+    while done.len() <= table.len() {
+        let ready = table.iter().find(|(m, may)| {
+            let ready = |u: &&str| done.contains(u) || (**m, *u) == ("shape", "scene");
+            !done.contains(*m) && may.iter().all(ready)
+        });
+        let (module, _) = ready.expect("the layers have a cycle");
+        done.insert(module);
+    }
+}
+
+#[test]
+fn kernels_know_nothing_of_the_simulator() {
+    for path in sources(&root().join("adjoint/src")) {
+        let found = paths(&code(&path), "hydrograd");
+        assert!(found.is_empty(), "{}: {found:?}", path.display());
+    }
+    let manifest = std::fs::read_to_string(root().join("adjoint/Cargo.toml")).unwrap();
+    let depends = manifest.lines().any(|l| l.starts_with("hydrograd "));
+    assert!(!depends, "hydrograd-adjoint depends on hydrograd");
+}
+
+#[test]
+fn paths_are_found_in_lines_and_groups() {
+    let found = paths(
+        "use crate::{Error, shape::{self, a}, b::c}; my_crate::d; crate::e::f::<G>();",
+        "crate",
+    );
+    let joined: Vec<String> = found.iter().map(|p| p.join("::")).collect();
+    assert_eq!(joined, ["Error", "shape", "b::c", "e::f"]);
+}

@@ -1,0 +1,291 @@
+//! Rungs of the fluid's energy: isolated bodies, and the coupled system with every method and
+//! solver, with walls and without.
+
+use super::tools::{all, along, vector_along, wavy};
+use hydrograd::adjoint::check::{Outcome, Rung};
+use hydrograd::adjoint::lie::{Mat6, Pose, Vec3, Vec6, cross_motion, exp_matrix};
+use hydrograd::boundary::{BodyBoundary, Method, Settings};
+use hydrograd::coupling::full::{Full, SolveSettings, Solver, WetBody};
+use hydrograd::coupling::image::Image;
+use hydrograd::coupling::{Coupling, Direction, Isolated};
+use hydrograd::scene::{Shape, Wall};
+use hydrograd::shape;
+use nalgebra::{DMatrix, DVector};
+use std::path::Path;
+use std::sync::Arc;
+
+pub fn rungs() -> Vec<Rung> {
+    macro_rules! rungs {
+        ($($name:literal => $check:expr),* $(,)?) => {
+            vec![$(Rung { name: $name, check: $check }),*]
+        };
+    }
+    rungs![
+        "coupling::image::Image::twist_vjp" => image_twist,
+        "coupling::isolated::IsolatedRecord::gradient" => |c| zero_gradient(c, false),
+        "coupling::isolated::IsolatedRecord::gradient_along" => |c| zero_gradient(c, true),
+        "coupling::isolated::IsolatedRecord::vjp" => |c| vjp(&isolated(), c),
+        "coupling::isolated::IsolatedRecord::hvp" => isolated_hvp,
+        "coupling::full::record::FullRecord::gradient" => |c| all(systems().iter().map(|s| gradient(s, c))),
+        "coupling::full::record::FullRecord::gradient_along" => |c| all(systems().iter().map(|s| gradient_along(s, c))),
+        "coupling::full::record::FullRecord::vjp" => |c| all(systems().iter().map(|s| vjp(s, c))),
+        "coupling::full::record::FullRecord::hvp" => |c| all(systems().iter().map(|s| hvp(s, c))),
+    ]
+}
+
+const WALL: Wall = Wall {
+    point: [0.0, 0.0, 0.1],
+    normal: [0.1, 0.0, 1.0],
+};
+const SIDE: Wall = Wall {
+    point: [-0.8, 0.0, 0.0],
+    normal: [1.0, 0.0, -0.1],
+};
+
+fn body(shape: Shape, method: Method, solver: Solver) -> Arc<WetBody> {
+    let mesh = shape::build(&shape, Path::new("."), Some(80)).unwrap();
+    let mut settings = Settings {
+        method,
+        ..Settings::default()
+    };
+    if solver == Solver::Gmres {
+        settings.damping = 0.0;
+    }
+    let b = BodyBoundary::new("b", mesh.vertices(), mesh.faces(), &settings).unwrap();
+    Arc::new(WetBody::new(Arc::new(b)))
+}
+
+fn full(method: Method, solver: Solver, walls: &[Wall]) -> Full {
+    let bodies = vec![
+        body(Shape::sphere(0.5), method, solver),
+        body(Shape::ellipsoid([0.6, 0.3, 0.4]), method, solver),
+    ];
+    let settings = SolveSettings {
+        solver,
+        tolerance: 1e-13,
+        ..SolveSettings::default()
+    };
+    Full::new(bodies, walls, settings).unwrap()
+}
+
+/// Every method with every solver that it has, without walls, with one and with two.
+fn systems() -> Vec<Full> {
+    vec![
+        full(Method::MfsVertex, Solver::Cgls, &[]),
+        full(Method::MfsVertex, Solver::Qr, &[WALL, SIDE]),
+        full(Method::MfsFace, Solver::Cgls, &[WALL]),
+        full(Method::MfsFace, Solver::Gmres, &[]),
+    ]
+}
+
+fn isolated() -> Isolated {
+    let of = |phase: f64| {
+        let a = Mat6::from_column_slice(wavy(36, phase, 1.0).as_slice());
+        a * a.transpose()
+    };
+    Isolated::new(vec![of(0.2), of(1.4)])
+}
+
+fn poses() -> [Pose; 2] {
+    [
+        Pose::new(
+            exp_matrix(&Vec3::new(0.2, -0.4, 0.3)),
+            Vec3::new(0.1, -0.2, 1.0),
+        ),
+        Pose::new(
+            exp_matrix(&Vec3::new(-0.7, 0.5, 0.9)),
+            Vec3::new(0.5, 0.9, 0.9),
+        ),
+    ]
+}
+
+/// Displaces the poses by `exp(h z)`.
+fn displaced(z: &[Vec6], h: f64) -> Vec<Pose> {
+    let pairs = poses().into_iter().zip(z);
+    pairs.map(|(p, z)| p.displace(&(h * z))).collect()
+}
+
+/// Spatial displacements small enough for the step sizes of the checks.
+fn field(phase: f64) -> Vec<Vec6> {
+    let x = wavy(12, phase, 0.3);
+    x.as_slice().chunks(6).map(Vec6::from_row_slice).collect()
+}
+
+/// What the rungs are asked for: basis, two directions on it, a twist outside it, a displacement.
+struct Case {
+    basis: DMatrix<f64>,
+    x: DVector<f64>,
+    y: DVector<f64>,
+    twist: DVector<f64>,
+    z: Vec<Vec6>,
+}
+
+fn case() -> Case {
+    Case {
+        basis: DMatrix::from_vec(12, 3, wavy(36, 0.4, 1.0).as_slice().to_vec()),
+        x: wavy(3, 0.1, 1.0),
+        y: wavy(3, 1.1, 1.0),
+        twist: wavy(12, 2.2, 1.0),
+        z: field(0.7),
+    }
+}
+
+fn dot(a: &[Vec6], b: &[Vec6]) -> f64 {
+    a.iter().zip(b).map(|(a, b)| a.dot(b)).sum()
+}
+
+/// E(g; x, y) for body twists x, y with the poses displaced by `h z`.
+fn energy(s: &dyn Coupling, z: &[Vec6], h: f64, x: &DVector<f64>, y: &DVector<f64>) -> f64 {
+    let b = DMatrix::from_columns(&[x.clone(), y.clone()]);
+    let r = s.evaluate(&displaced(z, h), &b, false).unwrap();
+    let m = b.tr_mul(r.momenta());
+    0.5 * (m[(0, 1)] + m[(1, 0)])
+}
+
+fn gradient(s: &Full, c: f64) -> Outcome {
+    let k = case();
+    let record = s.evaluate(&poses(), &k.basis, true).unwrap();
+    let slope = c * dot(&record.gradient(&k.x, &k.y), &k.z);
+    let (x, y) = (&k.basis * &k.x, &k.basis * &k.y);
+    along(|h| energy(s, &k.z, h, &x, &y), slope)
+}
+
+fn gradient_along(s: &Full, c: f64) -> Outcome {
+    let k = case();
+    let record = s.evaluate(&poses(), &k.basis, true).unwrap();
+    let tangent = c * record.gradient_along(&k.y, &k.z);
+    let y = &k.basis * &k.y;
+    let value = |h: f64| -> Vec<f64> {
+        let of = |i: usize| energy(s, &k.z, h, &k.basis.column(i).into_owned(), &y);
+        (0..k.basis.ncols()).map(of).collect()
+    };
+    vector_along(value, tangent.as_slice())
+}
+
+/// All three parts, for a direction outside the basis and one on it.
+fn vjp(s: &dyn Coupling, c: f64) -> Outcome {
+    let k = case();
+    let record = s.evaluate(&poses(), &k.basis, true).unwrap();
+    let pull = record
+        .vjp(Direction::Twist(&k.twist), Direction::Basis(&k.y))
+        .unwrap();
+    let y = &k.basis * &k.y;
+    let d = wavy(12, 5.0, 0.3);
+    let by_y = along(
+        |h| energy(s, &k.z, 0.0, &k.twist, &(&y + h * &d)),
+        c * pull.momentum_x.dot(&d),
+    );
+    let by_x = along(
+        |h| energy(s, &k.z, 0.0, &(&k.twist + h * &d), &y),
+        c * pull.momentum_y.dot(&d),
+    );
+    let slope = c * dot(&pull.wrench, &k.z);
+    if s.unknowns() == 0 {
+        // Bodies that don't feel each other: no wrench at all.
+        assert_eq!(slope, 0.0);
+        return by_x.worst(by_y);
+    }
+    let by_pose = along(|h| energy(s, &k.z, h, &k.twist, &y), slope);
+    all([by_x, by_y, by_pose])
+}
+
+/// Tangents of impulses and wrenches, for two directions and for one taken twice.
+fn hvp(s: &Full, c: f64) -> Outcome {
+    let k = case();
+    let record = s.evaluate(&poses(), &k.basis, true).unwrap();
+    let at = |h: f64| s.evaluate(&displaced(&k.z, h), &k.basis, true).unwrap();
+    all([(&k.x, &k.y), (&k.x, &k.x)].into_iter().flat_map(|(x, y)| {
+        let t = record
+            .hvp(Direction::Basis(x), Direction::Basis(y), &k.z)
+            .unwrap();
+        let impulse = |a: &DVector<f64>, tangent: &DVector<f64>| {
+            vector_along(
+                |h| (at(h).momenta() * a).as_slice().to_vec(),
+                (c * tangent).as_slice(),
+            )
+        };
+        let flat = |w: &[Vec6], c: f64| -> Vec<f64> {
+            w.iter().flat_map(|w| (c * w).as_slice().to_vec()).collect()
+        };
+        let wrench = vector_along(|h| flat(&at(h).gradient(x, y), 1.0), &flat(&t.wrench, c));
+        [impulse(x, &t.momentum_x), impulse(y, &t.momentum_y), wrench]
+    }))
+}
+
+/// The gradient of isolated bodies' energy is zero exactly; corrupted means not zero here.
+fn zero_gradient(c: f64, along: bool) -> Outcome {
+    let (k, s) = (case(), isolated());
+    let record = s.evaluate(&poses(), &k.basis, true).unwrap();
+    let y = &k.basis * &k.y;
+    let x = &k.basis * &k.x;
+    assert_eq!(energy(&s, &k.z, 0.3, &x, &y), energy(&s, &k.z, 0.0, &x, &y));
+    let size = if along {
+        record.gradient_along(&k.y, &k.z).norm()
+    } else {
+        dot(&record.gradient(&k.x, &k.y), &k.z).abs()
+    };
+    Outcome {
+        rel_error: size + (c - 1.0),
+        order: f64::INFINITY,
+        tolerance: super::tools::TOLERANCE,
+    }
+}
+
+fn isolated_hvp(c: f64) -> Outcome {
+    let (k, s) = (case(), isolated());
+    let record = s.evaluate(&poses(), &k.basis, true).unwrap();
+    let t = record
+        .hvp(Direction::Basis(&k.x), Direction::Basis(&k.y), &k.z)
+        .unwrap();
+    let size = t.momentum_x.norm() + t.momentum_y.norm() + dot(&t.wrench, &t.wrench);
+    Outcome {
+        rel_error: size + (c - 1.0),
+        order: f64::INFINITY,
+        tolerance: super::tools::TOLERANCE,
+    }
+}
+
+/// Images of two walls: the transpose of a linear map, which is also the motion of the image.
+fn image_twist(c: f64) -> Outcome {
+    let images = Image::of_walls(&[WALL, SIDE]).unwrap();
+    let z = field(0.7)[0];
+    let bar = field(1.9)[1];
+    all(images.iter().map(|image| {
+        let slope = c * image.twist_vjp(&bar).dot(&z);
+        along(|h| bar.dot(&image.twist(&(h * z))), slope)
+    }))
+}
+
+/// What the tangents say beyond differences: impulses are the energy's derivative, and the order of
+/// two displacements matters by their bracket.
+#[test]
+fn second_derivatives_commute_up_to_the_bracket() {
+    for s in systems() {
+        let k = case();
+        let other = field(1.9);
+        let record = s.evaluate(&poses(), &k.basis, true).unwrap();
+        for (x, y) in [(&k.x, &k.y), (&k.x, &k.x)] {
+            let along = |z: &[Vec6]| {
+                record
+                    .hvp(Direction::Basis(x), Direction::Basis(y), z)
+                    .unwrap()
+            };
+            let (yz, zy) = (
+                dot(&along(&other).wrench, &k.z),
+                dot(&along(&k.z).wrench, &other),
+            );
+            let g = record.gradient(x, y);
+            let brackets: Vec<Vec6> = (0..2).map(|b| cross_motion(&k.z[b], &other[b])).collect();
+            let bracket = dot(&g, &brackets);
+            let size = yz.abs().max(zy.abs()).max(bracket.abs());
+            assert!(
+                (yz - zy - bracket).abs() < 1e-9 * size,
+                "{yz} {zy} {bracket}"
+            );
+        }
+        // The two ways to the same first derivative.
+        let g = dot(&record.gradient(&k.x, &k.y), &k.z);
+        let along = record.gradient_along(&k.y, &k.z).dot(&k.x);
+        assert!((along - g).abs() < 1e-10 * g.abs(), "{along} {g}");
+    }
+}

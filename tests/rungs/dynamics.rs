@@ -1,0 +1,507 @@
+//! Rungs of the equations of motion and of every integrator, on a scene with every kind of joint, a
+//! wall, a current, weight, both drags, thrusters, and driven, held and released joints.
+
+use super::multibody::tree_displacement;
+use super::tools::{Group, all, along, groups, vector_along, wavy};
+use hydrograd::adjoint::check::{Outcome, Rung};
+use hydrograd::dynamics::{
+    Drive, Evaluation, Input, Integrator, Parameters, State, StateBar, StepBar, Stepper, System,
+};
+use hydrograd::scene::{Body, Drag, DragPart, Fluid, Joint, Motion, Plane, Scene, Shape};
+use hydrograd::{Settings, Simulator};
+use nalgebra::DVector;
+use std::sync::OnceLock;
+
+pub fn rungs() -> Vec<Rung> {
+    macro_rules! rungs {
+        ($($name:literal => $check:expr),* $(,)?) => {
+            vec![$(Rung { name: $name, check: $check }),*]
+        };
+    }
+    rungs![
+        "dynamics::system::System::joint_forces_vjp" => joint_forces,
+        "dynamics::force::Evaluation::force_jvp" => force_jvp,
+        "dynamics::force::Evaluation::force_vjp" => force_vjp,
+        "dynamics::momentum::Evaluation::momentum_vjp" => momentum,
+        "dynamics::momentum::Evaluation::mass_vjp" => mass,
+        "dynamics::acceleration::Evaluation::inertial_force_vjp" => inertial_force,
+        "dynamics::integrator::readout::Stepper::velocity_vjp" => velocity,
+        "dynamics::integrator::readout::Stepper::conserved_vjp" => conserved,
+        "dynamics::integrator::Stepper::released_momentum_vjp" => released,
+        "dynamics::integrator::euler::step_vjp" => |c| step(Integrator::MomentumEuler, c),
+        "dynamics::integrator::midpoint::step_vjp" => |c| step(Integrator::Midpoint, c),
+        "dynamics::integrator::rk4::step_vjp" => |c| step(Integrator::Rk4, c),
+        "dynamics::integrator::velocity_euler::step_vjp" => |c| step(Integrator::VelocityEuler, c),
+    ]
+}
+
+/// A scene of every kind.
+fn scene() -> Scene {
+    let mut scene = Scene::new(Fluid {
+        density: 998.0,
+        current: [0.2, -0.1, 0.0],
+    });
+    scene.gravity = [0.3, 0.1, -2.0];
+    scene.add_wall([0.0, 0.0, -0.6], [0.0, 0.0, 1.0]);
+    // Derivatives are exact at any resolution: the coarsest keeps the many evaluations cheap.
+    let oval = |x, y, z| Shape::ellipsoid([x, y, z]).faces(20);
+    let drag = |part, quadratic_part| Drag {
+        part,
+        linear: 15.0,
+        quadratic_part,
+        quadratic: 0.4,
+    };
+    let axis = [0.3, 0.8, -0.2];
+    scene.add(
+        Body::new(oval(0.3, 0.2, 0.15))
+            .named("hull")
+            .density(1100.0)
+            .center_of_mass([0.02, -0.01, -0.03])
+            .rotated([0.2, -0.3, 0.4])
+            .thruster()
+            .actuated()
+            .drag(drag(DragPart::Tangential, DragPart::Normal)),
+    );
+    scene.add(
+        Body::new(oval(0.15, 0.06, 0.1))
+            .named("arm")
+            .child_of("hull")
+            .density(1300.0)
+            .at([0.55, 0.0, 0.05])
+            .joint(Joint::Revolute { axis })
+            .actuated()
+            .drag(drag(DragPart::Total, DragPart::Total)),
+    );
+    scene.add(
+        Body::new(oval(0.1, 0.07, 0.08))
+            .named("tail")
+            .child_of("hull")
+            .density(900.0)
+            .at([-0.6, 0.1, 0.0])
+            .shape_at([-0.05, 0.02, 0.0], [0.1, 0.2, 0.0])
+            .joint(Joint::Spherical)
+            .thruster(),
+    );
+    scene.add(
+        Body::new(oval(0.12, 0.12, 0.05))
+            .named("coin")
+            .density(2000.0)
+            .at([0.1, 0.9, 0.1])
+            .joint(Joint::Planar { plane: Plane::Zx })
+            .actuated(),
+    );
+    scene.add(
+        Body::dry()
+            .named("weight")
+            .child_of("coin")
+            .mass(0.7)
+            .inertia([0.01, 0.02, 0.015])
+            .center_of_mass([0.0, 0.05, 0.0])
+            .joint(Joint::Prismatic { axis }),
+    );
+    scene.add(
+        Body::new(oval(0.1, 0.05, 0.1))
+            .named("fin")
+            .child_of("coin")
+            .density(1000.0)
+            .at([0.3, 0.0, 0.0])
+            .joint(Joint::Revolute { axis })
+            .driven([Motion::Sine {
+                offset: 0.2,
+                amplitude: 0.4,
+                frequency: 3.0,
+                phase: 0.5,
+            }]),
+    );
+    scene
+}
+
+fn simulator() -> &'static Simulator {
+    static MADE: OnceLock<Simulator> = OnceLock::new();
+    MADE.get_or_init(|| {
+        Simulator::new(&scene(), Settings::default().tolerance(1e-13)).expect("the scene is right")
+    })
+}
+
+/// Everything that the rungs are functions of.
+#[derive(Clone)]
+struct Point {
+    q: DVector<f64>,
+    /// Velocity, or the state's conserved variable.
+    v: DVector<f64>,
+    u: DVector<f64>,
+    parameters: Parameters,
+}
+
+/// Cotangents of a point.
+struct Bar {
+    q: DVector<f64>,
+    v: DVector<f64>,
+    u: DVector<f64>,
+    parameters: Parameters,
+}
+
+fn system() -> &'static System {
+    simulator().system()
+}
+
+fn point() -> Point {
+    let (s, tree) = (system(), &system().tree);
+    let n = tree.velocities();
+    let mut q = tree.integrate(simulator().start().0, &wavy(n, 0.3, 0.05));
+    stepper(&simulator().parameters().clone(), Integrator::default()).place_motions(&mut q, TIME);
+    Point {
+        q,
+        v: wavy(n, 0.8, 0.5),
+        u: wavy(s.controls, 1.8, 3.0),
+        parameters: simulator().parameters().clone(),
+    }
+}
+
+/// Length and number of the step in the checks.
+const DT: f64 = 0.02;
+const STEP: usize = 3;
+const TIME: f64 = DT * STEP as f64;
+
+fn stepper(parameters: &Parameters, integrator: Integrator) -> Stepper<'_> {
+    Stepper {
+        system: system(),
+        parameters,
+        integrator,
+        dt: DT,
+    }
+}
+
+fn evaluate<'a>(parameters: &'a Parameters, q: &DVector<f64>) -> Evaluation<'a> {
+    system().evaluate(parameters, q, true, true).unwrap()
+}
+
+/// The parameters in groups of like units: first entry, stride, name, scale of a step.
+fn parameter_groups(bodies: usize) -> Vec<(&'static str, DVector<f64>)> {
+    let all = simulator().parameters().to_vec();
+    let pick = |wanted: &dyn Fn(usize) -> bool, floor: f64, phase: f64| {
+        let w = wavy(all.len(), phase, 1.0);
+        DVector::from_fn(all.len(), |i, _| {
+            if wanted(i) {
+                0.1 * w[i] * all[i].abs().max(floor)
+            } else {
+                0.0
+            }
+        })
+    };
+    assert_eq!(all.len(), 1 + 9 * bodies);
+    let column = |i: usize| if i == 0 { 9 } else { (i - 1) % 9 };
+    vec![
+        ("density", pick(&|i| i == 0, 0.0, 0.7)),
+        ("mass", pick(&|i| column(i) == 0, 0.1, 1.7)),
+        ("inertia", pick(&|i| (1..7).contains(&column(i)), 1e-3, 2.7)),
+        ("linear drag", pick(&|i| column(i) == 7, 1.0, 3.7)),
+        ("quadratic drag", pick(&|i| column(i) == 8, 0.1, 4.7)),
+    ]
+}
+
+/// A scalar of a point against its cotangents, group by group; with `fine`, every joint and every
+/// kind of parameter is a group, so that none hides behind another.
+fn check(fine: bool, value: &dyn Fn(&Point) -> f64, at: &Point, bar: &Bar, c: f64) -> Outcome {
+    let tree = &system().tree;
+    let n = tree.velocities();
+    let (dq, dv) = (wavy(n, 2.1, 0.05), wavy(n, 3.1, 0.2));
+    let du = wavy(at.u.len(), 4.1, 1.0);
+    let mut list = vec![
+        Group {
+            name: "v",
+            slope: bar.v.dot(&dv),
+            value: Box::new({
+                let dv = dv.clone();
+                move |h| {
+                    let v = &at.v + h * &dv;
+                    value(&Point { v, ..at.clone() })
+                }
+            }),
+        },
+        Group {
+            name: "u",
+            slope: bar.u.dot(&du),
+            value: Box::new({
+                let du = du.clone();
+                move |h| {
+                    let u = &at.u + h * &du;
+                    value(&Point { u, ..at.clone() })
+                }
+            }),
+        },
+    ];
+    let links: Vec<Vec<usize>> = if fine {
+        tree.links().iter().map(|l| l.v.clone().collect()).collect()
+    } else {
+        // A step takes the coordinates of driven joints from their motions.
+        let free = tree.links().iter().zip(&system().drives);
+        let free = free.filter(|(_, drive)| !matches!(drive, Drive::Motion(_)));
+        vec![free.flat_map(|(l, _)| l.v.clone()).collect()]
+    };
+    for link in links {
+        let mut d = DVector::zeros(n);
+        for i in link {
+            d[i] = dq[i];
+        }
+        list.push(Group {
+            name: "q",
+            slope: bar.q.dot(&d),
+            value: Box::new(move |h| {
+                let q = tree.integrate(&at.q, &(h * &d));
+                value(&Point { q, ..at.clone() })
+            }),
+        });
+    }
+    let mut parameters = parameter_groups(system().len());
+    if !fine {
+        let sum = parameters.iter().map(|(_, d)| d).sum();
+        parameters = vec![("parameters", sum)];
+    }
+    for (name, d) in parameters {
+        let bars = DVector::from_vec(bar.parameters.to_vec());
+        list.push(Group {
+            name,
+            slope: bars.dot(&d),
+            value: Box::new(move |h| {
+                let values = DVector::from_vec(at.parameters.to_vec()) + h * &d;
+                let parameters = at.parameters.with_values(values.as_slice()).unwrap();
+                value(&Point {
+                    parameters,
+                    ..at.clone()
+                })
+            }),
+        });
+    }
+    groups(list, c)
+}
+
+fn joint_forces(c: f64) -> Outcome {
+    let s = system();
+    let (bar, d) = (
+        wavy(s.tree.velocities(), 0.3, 1.0),
+        wavy(s.controls, 1.3, 0.3),
+    );
+    let mut u_bar = DVector::zeros(s.controls);
+    s.joint_forces_vjp(&bar, &mut u_bar);
+    let at = wavy(s.controls, 2.3, 1.0);
+    along(
+        |h| bar.dot(&s.joint_forces(&(&at + h * &d))),
+        c * u_bar.dot(&d),
+    )
+}
+
+fn force_jvp(c: f64) -> Outcome {
+    let p = point();
+    let e = evaluate(&p.parameters, &p.q);
+    let dv = wavy(p.v.len(), 3.1, 0.2);
+    let tangent = c * e.force_jvp(&p.v, &dv);
+    vector_along(
+        |h| e.force(&(&p.v + h * &dv), &p.u).as_slice().to_vec(),
+        tangent.as_slice(),
+    )
+}
+
+fn force_vjp(c: f64) -> Outcome {
+    let p = point();
+    let z = wavy(p.v.len(), 5.1, 1.0);
+    let e = evaluate(&p.parameters, &p.q);
+    let b = e.force_vjp(&p.v, &p.u, &z).unwrap();
+    let value = |p: &Point| z.dot(&evaluate(&p.parameters, &p.q).force(&p.v, &p.u));
+    let bar = Bar {
+        q: b.q,
+        v: b.v,
+        u: b.control,
+        parameters: b.parameters,
+    };
+    check(true, &value, &p, &bar, c)
+}
+
+fn momentum(c: f64) -> Outcome {
+    let p = point();
+    let w = wavy(p.v.len(), 5.1, 1.0);
+    let b = evaluate(&p.parameters, &p.q)
+        .momentum_vjp(&p.v, &w)
+        .unwrap();
+    let value = |p: &Point| w.dot(&evaluate(&p.parameters, &p.q).momentum(&p.v));
+    let bar = Bar {
+        q: b.q,
+        v: b.v,
+        u: b.control,
+        parameters: b.parameters,
+    };
+    check(true, &value, &p, &bar, c)
+}
+
+fn mass(c: f64) -> Outcome {
+    let p = point();
+    let w = wavy(p.v.len(), 5.1, 1.0);
+    let b = evaluate(&p.parameters, &p.q).mass_vjp(&p.v, &w).unwrap();
+    let value = |p: &Point| w.dot(&(&evaluate(&p.parameters, &p.q).mass_matrix * &p.v));
+    let bar = Bar {
+        q: b.q,
+        v: b.v,
+        u: b.control,
+        parameters: b.parameters,
+    };
+    check(true, &value, &p, &bar, c)
+}
+
+fn inertial_force(c: f64) -> Outcome {
+    let p = point();
+    let w = wavy(p.v.len(), 5.1, 1.0);
+    let e = evaluate(&p.parameters, &p.q);
+    let b = e.inertial_force_vjp(&p.v, &p.u, &w).unwrap();
+    let value = |p: &Point| w.dot(&evaluate(&p.parameters, &p.q).inertial_force(&p.v, &p.u));
+    let bar = Bar {
+        q: b.q,
+        v: b.v,
+        u: b.control,
+        parameters: b.parameters,
+    };
+    check(true, &value, &p, &bar, c)
+}
+
+fn hold(names: &[&str]) -> Vec<bool> {
+    let bodies = system().bodies.iter();
+    bodies.map(|b| names.contains(&b.name.as_str())).collect()
+}
+
+fn state(p: &Point, held: &[bool]) -> State {
+    State {
+        step: STEP,
+        q: p.q.clone(),
+        y: p.v.clone(),
+        held: held.to_vec(),
+    }
+}
+
+/// A point whose `v` is the conserved variable that belongs to the usual velocity.
+fn state_point(integrator: Integrator) -> Point {
+    let p = point();
+    let s = stepper(&p.parameters, integrator);
+    let y = s.conserved(&evaluate(&p.parameters, &p.q), &p.v);
+    Point { v: y, ..p.clone() }
+}
+
+/// Of a momentum, and of a velocity, with a held joint.
+fn velocity(c: f64) -> Outcome {
+    let held = hold(&["arm"]);
+    all(
+        [Integrator::MomentumEuler, Integrator::VelocityEuler].map(|integrator| {
+            let p = state_point(integrator);
+            let z = wavy(p.v.len(), 5.1, 1.0);
+            let value = |p: &Point| {
+                let s = stepper(&p.parameters, integrator);
+                z.dot(
+                    &s.velocity(&evaluate(&p.parameters, &p.q), &state(p, &held))
+                        .unwrap(),
+                )
+            };
+            let (s, e) = (
+                stepper(&p.parameters, integrator),
+                evaluate(&p.parameters, &p.q),
+            );
+            let at = state(&p, &held);
+            let v = s.velocity(&e, &at).unwrap();
+            let mut b = StepBar::zeros(&e);
+            s.velocity_vjp(&e, &at, &v, &z, &mut b).unwrap();
+            check(true, &value, &p, &bar_of(b), c)
+        }),
+    )
+}
+
+/// Cotangents of a state point; those of v have been pulled back to the state.
+fn bar_of(b: StepBar) -> Bar {
+    Bar {
+        q: b.state.q,
+        v: b.state.y,
+        u: b.control,
+        parameters: b.parameters,
+    }
+}
+
+fn conserved(c: f64) -> Outcome {
+    all(
+        [Integrator::MomentumEuler, Integrator::VelocityEuler].map(|integrator| {
+            let p = point();
+            let z = wavy(p.v.len(), 5.1, 1.0);
+            let value = |p: &Point| {
+                let s = stepper(&p.parameters, integrator);
+                z.dot(&s.conserved(&evaluate(&p.parameters, &p.q), &p.v))
+            };
+            let (s, e) = (
+                stepper(&p.parameters, integrator),
+                evaluate(&p.parameters, &p.q),
+            );
+            let mut b = StepBar::zeros(&e);
+            s.conserved_vjp(&e, &p.v, &z, &mut b).unwrap();
+            let bar = Bar {
+                q: b.state.q,
+                v: b.v,
+                u: b.control,
+                parameters: b.parameters,
+            };
+            check(true, &value, &p, &bar, c)
+        }),
+    )
+}
+
+/// One step with its readout, from a state whose joints `before` were held, holding `now`.
+fn step_with(integrator: Integrator, before: &[&str], now: &[&str], c: f64) -> Outcome {
+    let (before, now) = (hold(before), hold(now));
+    let p = state_point(integrator);
+    let n = p.v.len();
+    let (q_bar, y_bar) = (wavy(n, 5.1, 1.0), wavy(n, 6.1, 1.0));
+    let make = |p: &Point| {
+        let s = stepper(&p.parameters, integrator);
+        let e = evaluate(&p.parameters, &p.q);
+        let at = state(p, &before);
+        let v = s.velocity(&e, &at).unwrap();
+        let input = Input {
+            control: p.u.clone(),
+            hold: now.clone(),
+        };
+        s.step(&e, &at, &v, &input).unwrap()
+    };
+    let base = make(&p);
+    let tree = &system().tree;
+    let value = |p: &Point| {
+        let next = make(p).state;
+        q_bar.dot(&tree_displacement(tree, &base.state.q, &next.q)) + y_bar.dot(&next.y)
+    };
+    let s = stepper(&p.parameters, integrator);
+    let e = evaluate(&p.parameters, &p.q);
+    let at = state(&p, &before);
+    let v = s.velocity(&e, &at).unwrap();
+    let input = Input {
+        control: p.u.clone(),
+        hold: now.clone(),
+    };
+    let next_bar = StateBar {
+        q: q_bar.clone(),
+        y: y_bar.clone(),
+    };
+    let mut b = s
+        .step_vjp(&e, &at, &v, &input, &base.memo, &next_bar)
+        .unwrap();
+    let v_bar = b.v.clone();
+    s.velocity_vjp(&e, &at, &v, &v_bar, &mut b).unwrap();
+    check(false, &value, &p, &bar_of(b), c)
+}
+
+/// Free throughout, and with one joint held anew while another stays held.
+fn step(integrator: Integrator, c: f64) -> Outcome {
+    step_with(integrator, &[], &[], c).worst(step_with(integrator, &["arm"], &["arm", "tail"], c))
+}
+
+/// Joints that come free take their momentum from the velocity.
+fn released(c: f64) -> Outcome {
+    all([
+        Integrator::MomentumEuler,
+        Integrator::Midpoint,
+        Integrator::Rk4,
+        Integrator::VelocityEuler,
+    ]
+    .map(|integrator| step_with(integrator, &["arm", "coin"], &["tail"], c)))
+}

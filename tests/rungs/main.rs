@@ -1,0 +1,156 @@
+//! Every derivative rung of both crates: found in the source, registered, right, and refused when
+//! its output is 1 % wrong.
+//!
+//! A rung is a function named `*_jvp`, `*_vjp`, `*_hvp` (or one of these words alone), or one of
+//! the few in [`scan::OTHERS`]. One that isn't in [`registered`] fails the suite. Private helpers
+//! are listed with the registered rung whose check runs through them.
+
+mod coupling;
+mod dynamics;
+mod multibody;
+mod policy;
+mod scan;
+mod tools;
+
+use hydrograd::adjoint;
+use hydrograd::adjoint::check::Rung;
+use std::collections::BTreeSet;
+
+/// Every checked rung, named by its path; those of the kernels' crate begin with `adjoint`.
+fn registered() -> Vec<(String, Rung)> {
+    let mut out = Vec::new();
+    for rung in adjoint::rungs() {
+        out.push((format!("adjoint::{}", rung.name), rung));
+    }
+    for part in [
+        multibody::rungs(),
+        coupling::rungs(),
+        dynamics::rungs(),
+        policy::rungs(),
+    ] {
+        out.extend(part.into_iter().map(|r| (r.name.to_string(), r)));
+    }
+    out
+}
+
+/// Helpers and declarations that are checked through a registered rung: (helper, rung).
+const THROUGH: &[(&str, &str)] = &[
+    // Kernels behind a body's rows, and the pieces of the coupled record.
+    ("coupling::full::body::WetBody::jvp", FULL_HVP),
+    ("coupling::full::body::WetBody::vjp", FULL_VJP),
+    ("coupling::full::body::WetBody::hvp", FULL_HVP),
+    ("coupling::full::body::WetBody::potential_vjp", FULL_VJP),
+    ("coupling::full::body::WetBody::potential_hvp", FULL_HVP),
+    ("coupling::full::pairs::Pair::apply_jvp", FULL_HVP),
+    ("coupling::full::system::System::respond_jvp", FULL_HVP),
+    // Pieces of the equations of motion.
+    (
+        "dynamics::external::Evaluation::external_jvp",
+        "dynamics::force::Evaluation::force_jvp",
+    ),
+    (
+        "dynamics::external::Evaluation::external_vjp",
+        "dynamics::force::Evaluation::force_vjp",
+    ),
+    (
+        "dynamics::force::rigid_parameters_vjp",
+        "dynamics::momentum::Evaluation::momentum_vjp",
+    ),
+    (
+        "dynamics::force::Evaluation::frame_velocity_vjp",
+        "dynamics::integrator::readout::Stepper::conserved_vjp",
+    ),
+    (
+        "dynamics::momentum::Evaluation::bilinear_vjp",
+        "dynamics::momentum::Evaluation::momentum_vjp",
+    ),
+    (
+        "dynamics::acceleration::Evaluation::fluid_inertial_vjp",
+        "dynamics::acceleration::Evaluation::inertial_force_vjp",
+    ),
+    // Pieces of the integrators.
+    (
+        "dynamics::integrator::readout::solve_vjp",
+        "dynamics::integrator::readout::Stepper::velocity_vjp",
+    ),
+    (
+        "dynamics::integrator::euler::advance_vjp",
+        "dynamics::integrator::euler::step_vjp",
+    ),
+    (
+        "dynamics::integrator::midpoint::configuration_vjp",
+        "dynamics::integrator::midpoint::step_vjp",
+    ),
+    (
+        "dynamics::integrator::Stepper::step_vjp",
+        "dynamics::integrator::euler::step_vjp",
+    ),
+    // Whole rollouts: every integrator, both fidelities, in tests/rollout_gradient.rs as well.
+    (
+        "simulate::trajectory::Trajectory::observe_vjp",
+        "simulate::rollout::Rollout::vjp",
+    ),
+    (
+        "simulate::trajectory::Trajectory::step_vjp",
+        "simulate::rollout::Rollout::vjp",
+    ),
+    (
+        "simulate::trajectory::Trajectory::last_vjp",
+        "simulate::rollout::Rollout::vjp",
+    ),
+    ("adjoint::step::reverse", "simulate::rollout::Rollout::vjp"),
+    (
+        "simulate::rollout::Rollout::gradient",
+        "simulate::rollout::Rollout::vjp",
+    ),
+];
+
+const FULL_VJP: &str = "coupling::full::record::FullRecord::vjp";
+const FULL_HVP: &str = "coupling::full::record::FullRecord::hvp";
+
+#[test]
+fn every_rung_in_the_source_is_registered() {
+    let mut found = scan::rungs("adjoint/src", "adjoint::");
+    found.extend(scan::rungs("src", ""));
+    assert!(found.len() > 50, "only {} rungs found", found.len());
+    let registered: BTreeSet<String> = registered().into_iter().map(|(name, _)| name).collect();
+    let helpers: BTreeSet<&str> = THROUGH.iter().map(|(helper, _)| *helper).collect();
+    let missing: Vec<_> = found
+        .iter()
+        .filter(|name| !registered.contains(*name) && !helpers.contains(name.as_str()))
+        .collect();
+    assert!(missing.is_empty(), "rungs without a check: {missing:#?}");
+    let stale: Vec<_> = registered
+        .iter()
+        .map(String::as_str)
+        .chain(helpers.iter().copied())
+        .filter(|name| !found.contains(*name))
+        .collect();
+    assert!(
+        stale.is_empty(),
+        "registered, but not in the source: {stale:#?}"
+    );
+    for (helper, rung) in THROUGH {
+        assert!(
+            registered.contains(*rung),
+            "{helper} is checked through {rung}, which isn't"
+        );
+    }
+}
+
+#[test]
+fn every_rung_is_right_and_fails_when_corrupted() {
+    let mut wrong = Vec::new();
+    for (name, rung) in registered() {
+        let right = (rung.check)(1.0);
+        println!("{:.1e} {:5.2} {name}", right.rel_error, right.order);
+        if !right.passes() || right.tolerance > 1e-6 {
+            wrong.push(format!("{name}: {right:?}"));
+        }
+        let corrupted = (rung.check)(1.01);
+        if corrupted.passes() {
+            wrong.push(format!("{name} passes 1 % wrong: {corrupted:?}"));
+        }
+    }
+    assert!(wrong.is_empty(), "{wrong:#?}");
+}

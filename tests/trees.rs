@@ -334,7 +334,7 @@ fn check(simulator: &mut Simulator, name: &str, steps: usize) {
     );
     assert!(report.rel_error_controls.is_some() && report.rel_error_parameters.is_some());
     assert!(
-        report.max_rel_error <= 1e-6,
+        report.max_rel_error <= 1e-7,
         "{name} {fidelity:?} {integrator:?}: {:#?}",
         report.directions
     );

@@ -126,7 +126,7 @@ pub(super) struct Time {
     /// Time step in s [default: the scene's own].
     #[arg(long, value_name = "DT", allow_negative_numbers = true)]
     pub time_step: Option<f64>,
-    /// How a step is taken [default: momentum-euler; velocity-euler with the preset paper].
+    /// How a step is taken [default: rk4; velocity-euler with the preset paper].
     #[arg(long, value_enum)]
     pub integrator: Option<Integrator>,
 }

@@ -3,7 +3,7 @@
 //! | integrator | conserved variable y | order | cost per step |
 //! |---|---|---|---|
 //! | [`Integrator::MomentumEuler`] | frame momentum p̂ | 1, symplectic | 1 evaluation |
-//! | [`Integrator::Midpoint`] | frame momentum p̂ | 2, symmetric | about 6 |
+//! | [`Integrator::Midpoint`] | frame momentum p̂ | 2, symmetric | about 4 to 8 |
 //! | [`Integrator::Rk4`] | frame momentum p̂ | 4 | 4 |
 //! | [`Integrator::VelocityEuler`] | velocity v | 1 | 1 |
 //!
@@ -21,16 +21,17 @@ use crate::Result;
 use nalgebra::{DMatrix, DVector};
 use serde::{Deserialize, Serialize};
 
-/// How time is stepped.
+/// How time is stepped. The default is the cheapest that keeps the energy error of every example scene under 1 %
+/// (`docs/integrators.md`).
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum Integrator {
     /// Euler in momentum, implicit in p at fixed q: symplectic, one evaluation a step.
-    #[default]
     MomentumEuler,
     /// Implicit midpoint in momentum: second order, symmetric.
     Midpoint,
     /// Classical Runge–Kutta in momentum: fourth order, explicit.
+    #[default]
     Rk4,
     /// The paper's semi-implicit Euler in velocity (Eq. 3–4).
     VelocityEuler,

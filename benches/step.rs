@@ -1,8 +1,9 @@
 //! A step of the simulation and its gradient at the paper's sizes: time, ratio, memory.
 //!
-//! `cargo bench --bench step [-- SCENE] [--steps N] [--json]`. Prints one row per scene and configuration: seconds per forward step (all
+//! `cargo bench --bench step [-- SCENE] [--quick]`. Prints one row per scene and configuration: seconds per forward step (all
 //! derivatives that a step needs included), gradient of the rollout as a ratio to its forward pass, peak
-//! memory, iterations, and the ratio of the forward step to that of the dense QR reference.
+//! memory of the process so far, and iterations; beside the default the other integrators, a looser tolerance, the
+//! paper's choices, a dense QR, Jacobi preconditioning and `isolated`.
 
 use hydrograd::coupling::full::{Preconditioner, Solver};
 use hydrograd::dynamics::Integrator;
@@ -36,20 +37,24 @@ fn peak_memory() -> f64 {
     kb.unwrap_or(0.0) / 1000.0
 }
 
-fn measure(scene: &Scene, name: &str, settings: Settings, steps: usize, repeat: usize) -> Row {
+fn measure(
+    scene: &Scene,
+    name: &str,
+    settings: Settings,
+    steps: usize,
+    repeat: usize,
+) -> hydrograd::Result<Row> {
     let start = Instant::now();
-    let simulator = Simulator::new(scene, settings).expect("the example scenes are valid");
+    let simulator = Simulator::new(scene, settings)?;
     let setup = start.elapsed().as_secs_f64();
     let controls = Controls::zeros(&simulator, steps);
     let goal = objective::final_velocity(0, 0.0, 1.0);
     let (mut forward, mut whole, mut iterations) = (vec![], vec![], 0);
     for i in 0..=repeat {
         let start = Instant::now();
-        let rollout = simulator
-            .rollout(&controls)
-            .expect("the example scenes run");
+        let rollout = simulator.rollout(&controls)?;
         let middle = start.elapsed().as_secs_f64();
-        rollout.gradient(&goal).expect("and have gradients");
+        rollout.gradient(&goal)?;
         if i > 0 {
             forward.push(middle / steps as f64);
             whole.push(start.elapsed().as_secs_f64() / steps as f64);
@@ -57,7 +62,7 @@ fn measure(scene: &Scene, name: &str, settings: Settings, steps: usize, repeat: 
         iterations = rollout.summary().iterations;
     }
     let forward = median(forward);
-    Row {
+    Ok(Row {
         scene: scene.name.clone(),
         configuration: name.into(),
         faces: simulator.faces(),
@@ -67,7 +72,7 @@ fn measure(scene: &Scene, name: &str, settings: Settings, steps: usize, repeat: 
         ratio: median(whole) / forward,
         iterations,
         memory: peak_memory(),
-    }
+    })
 }
 
 fn main() {
@@ -93,23 +98,44 @@ fn main() {
             s.solve.preconditioner = preconditioner;
             s
         };
+        let mut jacobi = with(Solver::Cgls, Preconditioner::Jacobi);
+        jacobi.solve.max_iterations = 50_000;
+        let one_evaluation = |s: Settings| s.integrator(Integrator::MomentumEuler);
         let rows = [
             ("default", base, 5, 5),
-            ("tolerance 1e-6", base.tolerance(1e-6), 5, 3),
+            ("momentum Euler", one_evaluation(base), 5, 5),
+            (
+                "momentum Euler, tolerance 1e-6",
+                one_evaluation(base.tolerance(1e-6)),
+                5,
+                5,
+            ),
             ("midpoint", base.integrator(Integrator::Midpoint), 2, 1),
-            ("paper preset", Settings::preset(Preset::Paper), 2, 1),
-            ("jacobi", with(Solver::Cgls, Preconditioner::Jacobi), 2, 1),
-            ("dense QR", with(Solver::Qr, Preconditioner::None), 1, 1),
-            ("isolated", base.fidelity(Fidelity::Isolated), 20, 5),
+            ("RK4", base.integrator(Integrator::Rk4), 2, 1),
+            ("preset paper", Settings::preset(Preset::Paper), 2, 1),
+            (
+                "momentum Euler, dense QR",
+                one_evaluation(with(Solver::Qr, Preconditioner::None)),
+                1,
+                1,
+            ),
+            ("momentum Euler, Jacobi", one_evaluation(jacobi), 1, 1),
+            ("isolated", base.fidelity(Fidelity::Isolated), 200, 5),
         ];
         for (configuration, settings, steps, repeat) in rows {
             let quick = arguments.iter().any(|a| a == "--quick");
             if quick && configuration != "default" {
                 continue;
             }
-            let r = measure(&scene, configuration, settings, steps, repeat);
+            let r = match measure(&scene, configuration, settings, steps, repeat) {
+                Ok(r) => r,
+                Err(e) => {
+                    println!("| {} | {configuration} | {e} |||||||", scene.name);
+                    continue;
+                }
+            };
             println!(
-                "| {} | {} | {} | {} | {:.3} | {:.4} | {:.2} | {} | {:.0} |",
+                "| {} | {} | {} | {} | {:.3} | {:.2e} | {:.2} | {} | {:.0} |",
                 r.scene,
                 r.configuration,
                 r.faces,

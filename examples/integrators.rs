@@ -9,9 +9,10 @@ use hydrograd::{Controls, Fidelity, Result, Rollout, Settings, Simulator};
 use std::path::Path;
 use std::time::Instant;
 
-const INTEGRATORS: [(Integrator, &str); 4] = [
+const INTEGRATORS: [(Integrator, &str); 5] = [
     (Integrator::MomentumEuler, "momentum Euler"),
     (Integrator::Midpoint, "midpoint"),
+    (Integrator::Rk2, "RK2"),
     (Integrator::Rk4, "RK4"),
     (Integrator::VelocityEuler, "velocity Euler"),
 ];

@@ -329,7 +329,7 @@ fn settings_reach_the_simulator() {
     let plain = json(&base);
     assert_eq!(
         (&plain["method"], &plain["integrator"]),
-        (&"mfs-vertex".into(), &"rk4".into())
+        (&"mfs-vertex".into(), &"rk2".into())
     );
     let direct = json(&[&base[..], &["--solver", "qr"]].concat());
     for (a, b) in list(&plain["final_q"]).iter().zip(list(&direct["final_q"])) {

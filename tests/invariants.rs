@@ -8,14 +8,16 @@ use hydrograd::{Controls, Fidelity, Settings, Simulator};
 use nalgebra::DVector;
 use std::path::Path;
 
-const MOMENTUM_FORMS: [Integrator; 3] = [
+const MOMENTUM_FORMS: [Integrator; 4] = [
     Integrator::MomentumEuler,
     Integrator::Midpoint,
+    Integrator::Rk2,
     Integrator::Rk4,
 ];
-const INTEGRATORS: [Integrator; 4] = [
+const INTEGRATORS: [Integrator; 5] = [
     Integrator::MomentumEuler,
     Integrator::Midpoint,
+    Integrator::Rk2,
     Integrator::Rk4,
     Integrator::VelocityEuler,
 ];
@@ -183,6 +185,7 @@ fn integrators_converge_at_their_orders() {
         (Integrator::VelocityEuler, 1.0),
         (Integrator::MomentumEuler, 1.0),
         (Integrator::Midpoint, 2.0),
+        (Integrator::Rk2, 2.0),
         (Integrator::Rk4, 4.0),
     ] {
         let errors = [10, 20, 40].map(|steps| {

@@ -7,9 +7,10 @@ use hydrograd::simulate::gradcheck::{self, gradcheck};
 use hydrograd::{Fidelity, Settings, Simulator};
 use std::path::Path;
 
-const INTEGRATORS: [Integrator; 4] = [
+const INTEGRATORS: [Integrator; 5] = [
     Integrator::MomentumEuler,
     Integrator::Midpoint,
+    Integrator::Rk2,
     Integrator::Rk4,
     Integrator::VelocityEuler,
 ];

@@ -10,9 +10,10 @@ use hydrograd::simulate::{Action, ActionBar, Observation, Policy};
 use hydrograd::{Controls, Fidelity, Settings, Simulator};
 use nalgebra::DVector;
 
-const INTEGRATORS: [Integrator; 4] = [
+const INTEGRATORS: [Integrator; 5] = [
     Integrator::MomentumEuler,
     Integrator::Midpoint,
+    Integrator::Rk2,
     Integrator::Rk4,
     Integrator::VelocityEuler,
 ];

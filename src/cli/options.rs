@@ -45,7 +45,9 @@ pub(super) enum Integrator {
     MomentumEuler,
     /// Implicit midpoint in momentum: second order, energy bounded.
     Midpoint,
-    /// Runge–Kutta in momentum: fourth order.
+    /// Explicit midpoint rule in momentum: second order, two evaluations.
+    Rk2,
+    /// Runge–Kutta in momentum: fourth order, four evaluations.
     Rk4,
     /// Semi-implicit Euler in velocity (the paper's Eq. 3–4): first order.
     VelocityEuler,
@@ -126,7 +128,7 @@ pub(super) struct Time {
     /// Time step in s [default: the scene's own].
     #[arg(long, value_name = "DT", allow_negative_numbers = true)]
     pub time_step: Option<f64>,
-    /// How a step is taken [default: rk4; velocity-euler with the preset paper].
+    /// How a step is taken [default: rk2; velocity-euler with the preset paper].
     #[arg(long, value_enum)]
     pub integrator: Option<Integrator>,
 }
@@ -202,6 +204,7 @@ impl Time {
                 settings.integrator(dynamics::Integrator::MomentumEuler)
             }
             Some(Integrator::Midpoint) => settings.integrator(dynamics::Integrator::Midpoint),
+            Some(Integrator::Rk2) => settings.integrator(dynamics::Integrator::Rk2),
             Some(Integrator::Rk4) => settings.integrator(dynamics::Integrator::Rk4),
             Some(Integrator::VelocityEuler) => {
                 settings.integrator(dynamics::Integrator::VelocityEuler)

@@ -316,7 +316,7 @@ fn start(
         DVector::from_vec(scene.initial.q.clone())
     };
     stepper.place_motions(&mut q, 0.0);
-    if settings.fidelity == Fidelity::Full {
+    if settings.fidelity == Fidelity::Full && scene.fluid.density > 0.0 {
         clearance::refuse_start(clearance, &q, system)?;
     }
     let mut v = if scene.initial.v.is_empty() {

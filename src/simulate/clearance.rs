@@ -114,8 +114,8 @@ pub(super) fn warning(time: f64, gap: &Gap, fidelity: Fidelity, system: &System)
         }),
         Fidelity::Isolated => overlaps(gap).then(|| {
             format!(
-                "{place} overlap, most at t = {time} s by {:.3e} m; the fidelity isolated \
-                 doesn't keep them apart",
+                "{place} overlap, most at t = {time} s by {:.3e} m; nothing keeps them apart \
+                 without the coupled water",
                 -gap.distance
             )
         }),

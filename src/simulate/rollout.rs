@@ -160,7 +160,7 @@ impl<'a> Rollout<'a> {
     pub fn gaps(&self) -> &[Option<Gap>] {
         self.gaps.get_or_init(|| {
             let samples = self.samples().iter();
-            match self.simulator.settings().fidelity {
+            match self.simulator.felt() {
                 Fidelity::Full => samples.map(|s| s.gap).collect(),
                 Fidelity::Isolated => samples
                     .map(|s| self.simulator.gaps().smallest(&s.poses))
@@ -179,7 +179,7 @@ impl<'a> Rollout<'a> {
     /// What the user should know about this trajectory, with names and numbers: gaps that the
     /// meshes don't resolve, and bodies in one another with the fidelity `isolated`.
     pub fn warnings(&self) -> Vec<String> {
-        let fidelity = self.simulator.settings().fidelity;
+        let fidelity = self.simulator.felt();
         let nearest = self.nearest();
         let warning = nearest.and_then(|(time, gap)| {
             clearance::warning(time, &gap, fidelity, self.simulator.system())

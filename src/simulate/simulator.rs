@@ -2,7 +2,7 @@
 
 use super::assemble::{self, Assembled};
 use super::trajectory::Trajectory;
-use super::{Controls, Policy, Rollout, Settings};
+use super::{Controls, Fidelity, Policy, Rollout, Settings};
 use crate::adjoint::step;
 use crate::coupling::Report;
 use crate::dynamics::{Parameters, State, Stepper, System};
@@ -189,12 +189,21 @@ impl Simulator {
         }
     }
 
+    /// The fidelity that matters: without water bodies don't feel each other.
+    pub(super) fn felt(&self) -> Fidelity {
+        if self.parameters().density > 0.0 {
+            self.settings.fidelity
+        } else {
+            Fidelity::Isolated
+        }
+    }
+
     pub(super) fn trajectory<'a>(&'a self, controls: &'a DMatrix<f64>) -> Trajectory<'a> {
         Trajectory {
             stepper: self.stepper(),
             policy: self.policy(),
             gaps: self.gaps(),
-            fidelity: self.settings.fidelity,
+            fidelity: self.felt(),
             controls,
         }
     }

@@ -30,7 +30,8 @@ pub fn rungs() -> Vec<Rung> {
         "dynamics::integrator::Stepper::released_momentum_vjp" => released,
         "dynamics::integrator::euler::step_vjp" => |c| step(Integrator::MomentumEuler, c),
         "dynamics::integrator::midpoint::step_vjp" => |c| step(Integrator::Midpoint, c),
-        "dynamics::integrator::rk4::step_vjp" => |c| step(Integrator::Rk4, c),
+        "dynamics::integrator::runge_kutta::step_vjp" =>
+            |c| step(Integrator::Rk4, c).worst(step(Integrator::Rk2, c)),
         "dynamics::integrator::velocity_euler::step_vjp" => |c| step(Integrator::VelocityEuler, c),
     ]
 }
@@ -500,6 +501,7 @@ fn released(c: f64) -> Outcome {
     all([
         Integrator::MomentumEuler,
         Integrator::Midpoint,
+        Integrator::Rk2,
         Integrator::Rk4,
         Integrator::VelocityEuler,
     ]

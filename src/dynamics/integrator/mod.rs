@@ -4,6 +4,7 @@
 //! |---|---|---|---|
 //! | [`Integrator::MomentumEuler`] | frame momentum p̂ | 1, symplectic | 1 evaluation |
 //! | [`Integrator::Midpoint`] | frame momentum p̂ | 2, symmetric | about 4 to 8 |
+//! | [`Integrator::Rk2`] | frame momentum p̂ | 2 | 2 |
 //! | [`Integrator::Rk4`] | frame momentum p̂ | 4 | 4 |
 //! | [`Integrator::VelocityEuler`] | velocity v | 1 | 1 |
 //!
@@ -13,7 +14,7 @@
 mod euler;
 mod midpoint;
 mod readout;
-mod rk4;
+mod runge_kutta;
 mod velocity_euler;
 
 use super::{Drive, Evaluation, ForceCotangents, Parameters, System};
@@ -30,8 +31,10 @@ pub enum Integrator {
     MomentumEuler,
     /// Implicit midpoint in momentum: second order, symmetric.
     Midpoint,
-    /// Classical Runge–Kutta in momentum: fourth order, explicit.
+    /// Explicit midpoint rule in momentum: second order.
     #[default]
+    Rk2,
+    /// Classical Runge–Kutta in momentum: fourth order, explicit.
     Rk4,
     /// The paper's semi-implicit Euler in velocity (Eq. 3–4).
     VelocityEuler,
@@ -231,7 +234,8 @@ impl Stepper<'_> {
         match self.integrator {
             Integrator::MomentumEuler => euler::step(self, e, state, v, input),
             Integrator::Midpoint => midpoint::step(self, e, state, v, input),
-            Integrator::Rk4 => rk4::step(self, e, state, v, input),
+            Integrator::Rk2 => runge_kutta::step(&runge_kutta::SECOND, self, e, state, v, input),
+            Integrator::Rk4 => runge_kutta::step(&runge_kutta::FOURTH, self, e, state, v, input),
             Integrator::VelocityEuler => velocity_euler::step(self, e, state, v, input),
         }
     }
@@ -253,7 +257,12 @@ impl Stepper<'_> {
         match self.integrator {
             Integrator::MomentumEuler => euler::step_vjp(self, e, state, v, input, memo, next_bar),
             Integrator::Midpoint => midpoint::step_vjp(self, e, state, v, input, memo, next_bar),
-            Integrator::Rk4 => rk4::step_vjp(self, e, state, v, input, next_bar),
+            Integrator::Rk2 => {
+                runge_kutta::step_vjp(&runge_kutta::SECOND, self, e, state, v, input, next_bar)
+            }
+            Integrator::Rk4 => {
+                runge_kutta::step_vjp(&runge_kutta::FOURTH, self, e, state, v, input, next_bar)
+            }
             Integrator::VelocityEuler => {
                 velocity_euler::step_vjp(self, e, state, v, input, next_bar)
             }

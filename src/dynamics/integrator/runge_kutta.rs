@@ -1,4 +1,5 @@
-//! Classical Runge–Kutta in (chart of q, p̂): fourth order, explicit.
+//! Explicit Runge–Kutta methods in (chart of q, p̂) whose stages each lean on the one before: the midpoint rule
+//! (second order) and the classical method (fourth order).
 //!
 //! Rotations are integrated in a rotation-vector chart around the start of the step, whose rate is
 //! the inverse left Jacobian times the angular velocity, so the order isn't lost on the group.
@@ -9,9 +10,23 @@ use crate::Result;
 use crate::dynamics::Evaluation;
 use nalgebra::DVector;
 
-/// Abscissae and weights.
-const NODES: [f64; 4] = [0.0, 0.5, 0.5, 1.0];
-const WEIGHTS: [f64; 4] = [1.0 / 6.0, 1.0 / 3.0, 1.0 / 3.0, 1.0 / 6.0];
+/// Nodes and weights of a method; stage i starts from stage i − 1 over `nodes[i]` of the step.
+pub(super) struct Tableau {
+    nodes: &'static [f64],
+    weights: &'static [f64],
+}
+
+/// The explicit midpoint rule.
+pub(super) const SECOND: Tableau = Tableau {
+    nodes: &[0.0, 0.5],
+    weights: &[0.0, 1.0],
+};
+
+/// The classical method.
+pub(super) const FOURTH: Tableau = Tableau {
+    nodes: &[0.0, 0.5, 0.5, 1.0],
+    weights: &[1.0 / 6.0, 1.0 / 3.0, 1.0 / 3.0, 1.0 / 6.0],
+};
 
 struct Stage<'a> {
     /// The first stage has none: it is the step's own.
@@ -32,8 +47,9 @@ impl<'a> Stage<'a> {
     }
 }
 
-/// The four stages.
+/// The stages.
 fn stages<'a>(
+    tableau: &Tableau,
     s: &'a Stepper,
     e: &Evaluation,
     state: &State,
@@ -44,8 +60,8 @@ fn stages<'a>(
 ) -> Result<Vec<Stage<'a>>> {
     let tree = &s.system.tree;
     let nv = tree.velocities();
-    let mut out: Vec<Stage> = Vec::with_capacity(4);
-    for (i, node) in NODES.iter().enumerate() {
+    let mut out: Vec<Stage> = Vec::with_capacity(tableau.nodes.len());
+    for (i, node) in tableau.nodes.iter().enumerate() {
         let t = s.time(state) + node * s.dt;
         let split = s.split(&input.hold, When::At(t));
         let (xi, p) = match out.last() {
@@ -87,6 +103,7 @@ fn stages<'a>(
 }
 
 pub(super) fn step(
+    tableau: &Tableau,
     s: &Stepper,
     e: &Evaluation,
     state: &State,
@@ -95,12 +112,12 @@ pub(super) fn step(
 ) -> Result<Stepped> {
     let first = s.split(&input.hold, When::At(s.time(state)));
     let start = s.released_momentum(e, state, v, &first);
-    let stages = stages(s, e, state, v, input, &start, false)?;
+    let stages = stages(tableau, s, e, state, v, input, &start, false)?;
     let mut xi = DVector::zeros(v.len());
     let mut y = start;
-    for (stage, weight) in stages.iter().zip(WEIGHTS) {
-        xi += weight * s.dt * &stage.chart_rate;
-        y += weight * s.dt * &stage.force;
+    for (stage, weight) in stages.iter().zip(tableau.weights) {
+        xi += *weight * s.dt * &stage.chart_rate;
+        y += *weight * s.dt * &stage.force;
     }
     let mut q = s.system.tree.integrate(&state.q, &xi);
     s.place_motions(&mut q, (state.step + 1) as f64 * s.dt);
@@ -111,6 +128,7 @@ pub(super) fn step(
 }
 
 pub(super) fn step_vjp(
+    tableau: &Tableau,
     s: &Stepper,
     e: &Evaluation,
     state: &State,
@@ -121,10 +139,10 @@ pub(super) fn step_vjp(
     let tree = &s.system.tree;
     let first = s.split(&input.hold, When::At(s.time(state)));
     let start = s.released_momentum(e, state, v, &first);
-    let stages = stages(s, e, state, v, input, &start, true)?;
+    let stages = stages(tableau, s, e, state, v, input, &start, true)?;
     let mut xi = DVector::zeros(v.len());
-    for (stage, weight) in stages.iter().zip(WEIGHTS) {
-        xi += weight * s.dt * &stage.chart_rate;
+    for (stage, weight) in stages.iter().zip(tableau.weights) {
+        xi += *weight * s.dt * &stage.chart_rate;
     }
     let mut bar = StepBar::zeros(e);
     let mut q_bar = next_bar.q.clone();
@@ -134,9 +152,11 @@ pub(super) fn step_vjp(
     let mut y_bar = next_bar.y.clone();
     first.forget_driven(&mut y_bar);
     let mut start_bar = y_bar.clone();
-    let mut rate_bar: Vec<DVector<f64>> = WEIGHTS.iter().map(|w| *w * s.dt * &xi_bar).collect();
-    let mut force_bar: Vec<DVector<f64>> = WEIGHTS.iter().map(|w| *w * s.dt * &y_bar).collect();
-    for i in (0..4).rev() {
+    let spread = |bar: &DVector<f64>| -> Vec<DVector<f64>> {
+        tableau.weights.iter().map(|w| *w * s.dt * bar).collect()
+    };
+    let (mut rate_bar, mut force_bar) = (spread(&xi_bar), spread(&y_bar));
+    for i in (0..stages.len()).rev() {
         let stage = &stages[i];
         let e = stage.at(e);
         let mut own = StepBar::zeros(e);
@@ -157,7 +177,7 @@ pub(super) fn step_vjp(
         bar.parameters.add(&own.parameters);
         start_bar += &own.state.y;
         if i > 0 {
-            let h = NODES[i] * s.dt;
+            let h = tableau.nodes[i] * s.dt;
             rate_bar[i - 1] += h * stage_xi_bar;
             force_bar[i - 1] += h * &own.state.y;
         }

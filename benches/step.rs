@@ -99,7 +99,7 @@ fn main() {
             s
         };
         let mut jacobi = with(Solver::Cgls, Preconditioner::Jacobi);
-        jacobi.solve.max_iterations = 50_000;
+        jacobi.solve.max_iterations = 5_000;
         let one_evaluation = |s: Settings| s.integrator(Integrator::MomentumEuler);
         let rows = [
             ("default", base, 5, 5),

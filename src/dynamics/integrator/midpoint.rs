@@ -33,6 +33,11 @@ fn middle<'a>(
     s.system.evaluate(s.parameters, &q, true, reverse)
 }
 
+/// Relative change of the velocity that says nothing: rounding, or what the coupled solve leaves open.
+fn noise(e: &Evaluation) -> f64 {
+    (10.0 * e.report().residual).max(1e-11)
+}
+
 /// Relative change between two velocities, each joint coordinate weighed by its inertia.
 fn change(e: &Evaluation, a: &DVector<f64>, b: &DVector<f64>) -> f64 {
     let weight = e.mass_matrix.diagonal().map(|m| m.max(0.0).sqrt());
@@ -59,8 +64,8 @@ pub(super) fn step(
         })?;
         let moved = change(&m, &next.v, &stage);
         stage = next.v;
-        // Below 1e-11 the change may be rounding or solver noise: stop when it no longer halves.
-        if moved <= TOLERANCE || (moved <= 1e-11 && moved > 0.5 * previous) {
+        // Down at rounding, or at the coupled solve's own tolerance, changes are noise: stop when they no longer halve.
+        if moved <= TOLERANCE || (moved <= noise(&m) && moved > 0.5 * previous) {
             let y = &p + s.dt * next.force;
             let q = advance(s, state, &stage);
             return Ok(Stepped {
@@ -141,7 +146,7 @@ pub(super) fn step_vjp(
         } else {
             0.0
         };
-        if moved <= 1e-13 || (moved <= 1e-10 && moved > 0.5 * previous) {
+        if moved <= 1e-13 || (moved <= 10.0 * noise(&m) && moved > 0.5 * previous) {
             let mut bar = StepBar::zeros(e);
             bar.state.q += q_bar + q_start;
             bar.control += inner.control;

@@ -16,6 +16,8 @@ const INTEGRATORS: [Integrator; 5] = [
 ];
 
 fn check(scene: &Scene, fidelity: Fidelity, integrator: Integrator, steps: usize, faces: usize) {
+    // Long rollouts along one direction of each group, short ones along two.
+    let directions = if steps > 50 { 1 } else { 2 };
     let settings = Settings::for_scene(scene)
         .fidelity(fidelity)
         .integrator(integrator)
@@ -26,7 +28,7 @@ fn check(scene: &Scene, fidelity: Fidelity, integrator: Integrator, steps: usize
         &mut simulator,
         &gradcheck::Settings {
             steps,
-            directions: 2,
+            directions,
             seed: 7,
             timings: 0,
         },
@@ -72,6 +74,15 @@ fn falling_ball() {
     for integrator in INTEGRATORS {
         for fidelity in [Fidelity::Isolated, Fidelity::Full] {
             check(&scene("falling_ball"), fidelity, integrator, 20, 80);
+        }
+    }
+}
+
+#[test]
+fn falling_ball_for_a_hundred_steps() {
+    for integrator in INTEGRATORS {
+        for fidelity in [Fidelity::Isolated, Fidelity::Full] {
+            check(&scene("falling_ball"), fidelity, integrator, 100, 20);
         }
     }
 }

@@ -2,9 +2,10 @@
 //! every kind of joint.
 
 use hydrograd::dynamics::Integrator;
-use hydrograd::scene::Scene;
+use hydrograd::scene::{BodyId, Scene};
 use hydrograd::simulate::gradcheck::{self, gradcheck};
-use hydrograd::{Fidelity, Settings, Simulator};
+use hydrograd::{Controls, Fidelity, Settings, Simulator, objective};
+use nalgebra::DVector;
 use std::path::Path;
 
 const INTEGRATORS: [Integrator; 5] = [
@@ -84,5 +85,47 @@ fn falling_ball_for_a_hundred_steps() {
         for fidelity in [Fidelity::Isolated, Fidelity::Full] {
             check(&scene("falling_ball"), fidelity, integrator, 100, 20);
         }
+    }
+}
+
+/// Objectives that don't fit the scene are refused by name, and those that do agree with differences.
+#[test]
+fn objectives_are_checked_and_differentiated() {
+    let settings = Settings::default().faces(80).tolerance(1e-13);
+    let mut simulator = Simulator::new(&scene("coins"), settings).unwrap();
+    let controls = Controls::zeros(&simulator, 5);
+    let body = BodyId(1);
+    let goal = objective::final_position(body, [0.1, 0.0, 0.2])
+        + objective::mean_position(body, [0.0, 0.1, 0.0])
+        + objective::final_coordinate(2, 0.3, 1e-3)
+        + objective::final_velocity(5, 0.1, 1e-3);
+    let gradient = simulator
+        .rollout(&controls)
+        .unwrap()
+        .gradient(&goal)
+        .unwrap();
+    let (q, v) = (simulator.start().0.clone(), simulator.start().1.clone());
+    let d = DVector::from_fn(6, |i, _| (i as f64 + 1.0).sin() * 1e-2);
+    let mut at = |h: f64| {
+        simulator.set_start(&q + h * &d, v.clone()).unwrap();
+        simulator.rollout(&controls).unwrap().value(&goal).unwrap()
+    };
+    let difference = (8.0 * (at(0.1) - at(-0.1)) - (at(0.2) - at(-0.2))) / 1.2;
+    let adjoint = gradient.initial.q.dot(&d);
+    assert!(
+        (difference - adjoint).abs() < 1e-7 * adjoint.abs(),
+        "{difference} {adjoint}"
+    );
+    let rollout = simulator.rollout(&controls).unwrap();
+    let wrong = [
+        (objective::final_position(BodyId(7), [0.0; 3]), "body"),
+        (objective::final_velocity(6, 0.0, 1.0), "velocity"),
+        (objective::final_coordinate(9, 0.0, 1.0), "coordinate"),
+        (objective::effort(f64::NAN), "finite"),
+    ];
+    for (objective, word) in wrong {
+        let message = rollout.gradient(&objective).unwrap_err().to_string();
+        assert!(message.contains(word), "{message}");
+        assert!(rollout.value(&objective).is_err());
     }
 }

@@ -2,10 +2,19 @@
 
 use super::{Cotangents, Rollout};
 use crate::scene::BodyId;
+use crate::{Error, Result};
 use std::ops::Add;
 
 /// A scalar function of a rollout.
 pub trait Objective {
+    /// Whether it fits the rollout's scene; asked before value and derivatives.
+    ///
+    /// # Errors
+    /// What doesn't fit, and what would.
+    fn check(&self, _rollout: &Rollout) -> Result<()> {
+        Ok(())
+    }
+
     /// Its value.
     fn value(&self, rollout: &Rollout) -> f64;
 
@@ -113,6 +122,66 @@ fn tangent_of(rollout: &Rollout, index: usize) -> Option<usize> {
 }
 
 impl Objective for Sum {
+    fn check(&self, rollout: &Rollout) -> Result<()> {
+        let system = rollout.simulator().system();
+        let below = |what: &str, index: usize, limit: usize| {
+            if index < limit {
+                return Ok(());
+            }
+            Err(Error::input(
+                format!("objective: {what}"),
+                index,
+                format!("must be under {limit}, the scene's number of them"),
+            ))
+        };
+        for term in &self.0 {
+            let numbers = match *term {
+                Term::Position {
+                    body,
+                    target,
+                    weight,
+                    ..
+                } => {
+                    below("body", body, system.len())?;
+                    [target[0], target[1], target[2], weight]
+                }
+                Term::Velocity {
+                    index,
+                    target,
+                    weight,
+                } => {
+                    below("velocity", index, system.tree.velocities())?;
+                    [target, weight, 0.0, 0.0]
+                }
+                Term::Coordinate {
+                    index,
+                    target,
+                    weight,
+                } => {
+                    below("coordinate", index, system.tree.coordinates())?;
+                    if tangent_of(rollout, index).is_none() {
+                        return Err(Error::input(
+                            "objective: coordinate",
+                            index,
+                            "must belong to a prismatic, revolute or planar joint; quaternions \
+                             have no targets of their own: use a body's position",
+                        ));
+                    }
+                    [target, weight, 0.0, 0.0]
+                }
+                Term::Effort(weight) => [weight, 0.0, 0.0, 0.0],
+            };
+            if let Some(bad) = numbers.iter().find(|x| !x.is_finite()) {
+                return Err(Error::input(
+                    "objective: target or weight",
+                    bad,
+                    "must be finite",
+                ));
+            }
+        }
+        Ok(())
+    }
+
     fn value(&self, rollout: &Rollout) -> f64 {
         let samples = rollout.samples();
         let last = &samples[samples.len() - 1];

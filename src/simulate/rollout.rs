@@ -188,15 +188,20 @@ impl<'a> Rollout<'a> {
     }
 
     /// Value of an objective.
-    pub fn value(&self, objective: &dyn Objective) -> f64 {
-        objective.value(self)
+    ///
+    /// # Errors
+    /// An objective that doesn't fit the scene.
+    pub fn value(&self, objective: &dyn Objective) -> Result<f64> {
+        objective.check(self)?;
+        Ok(objective.value(self))
     }
 
     /// Gradient of an objective, in one reverse sweep.
     ///
     /// # Errors
-    /// As [`Rollout::vjp`].
+    /// An objective that doesn't fit the scene, or as [`Rollout::vjp`].
     pub fn gradient(&self, objective: &dyn Objective) -> Result<Gradient> {
+        objective.check(self)?;
         self.vjp(&objective.cotangents(self))
     }
 

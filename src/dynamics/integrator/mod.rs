@@ -234,8 +234,7 @@ impl Stepper<'_> {
         match self.integrator {
             Integrator::MomentumEuler => euler::step(self, e, state, v, input),
             Integrator::Midpoint => midpoint::step(self, e, state, v, input),
-            Integrator::Rk2 => runge_kutta::step(&runge_kutta::SECOND, self, e, state, v, input),
-            Integrator::Rk4 => runge_kutta::step(&runge_kutta::FOURTH, self, e, state, v, input),
+            Integrator::Rk2 | Integrator::Rk4 => runge_kutta::step(self, e, state, v, input),
             Integrator::VelocityEuler => velocity_euler::step(self, e, state, v, input),
         }
     }
@@ -257,11 +256,8 @@ impl Stepper<'_> {
         match self.integrator {
             Integrator::MomentumEuler => euler::step_vjp(self, e, state, v, input, memo, next_bar),
             Integrator::Midpoint => midpoint::step_vjp(self, e, state, v, input, memo, next_bar),
-            Integrator::Rk2 => {
-                runge_kutta::step_vjp(&runge_kutta::SECOND, self, e, state, v, input, next_bar)
-            }
-            Integrator::Rk4 => {
-                runge_kutta::step_vjp(&runge_kutta::FOURTH, self, e, state, v, input, next_bar)
+            Integrator::Rk2 | Integrator::Rk4 => {
+                runge_kutta::step_vjp(self, e, state, v, input, next_bar)
             }
             Integrator::VelocityEuler => {
                 velocity_euler::step_vjp(self, e, state, v, input, next_bar)

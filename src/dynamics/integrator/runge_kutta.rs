@@ -5,28 +5,36 @@
 //! the inverse left Jacobian times the angular velocity, so the order isn't lost on the group.
 
 use super::euler::next_state;
-use super::{Input, Split, State, StateBar, StepBar, Stepped, Stepper, When, readout};
+use super::{Input, Integrator, Split, State, StateBar, StepBar, Stepped, Stepper, When, readout};
 use crate::Result;
 use crate::dynamics::Evaluation;
 use nalgebra::DVector;
 
 /// Nodes and weights of a method; stage i starts from stage i − 1 over `nodes[i]` of the step.
-pub(super) struct Tableau {
+struct Tableau {
     nodes: &'static [f64],
     weights: &'static [f64],
 }
 
 /// The explicit midpoint rule.
-pub(super) const SECOND: Tableau = Tableau {
+const SECOND: Tableau = Tableau {
     nodes: &[0.0, 0.5],
     weights: &[0.0, 1.0],
 };
 
 /// The classical method.
-pub(super) const FOURTH: Tableau = Tableau {
+const FOURTH: Tableau = Tableau {
     nodes: &[0.0, 0.5, 0.5, 1.0],
     weights: &[1.0 / 6.0, 1.0 / 3.0, 1.0 / 3.0, 1.0 / 6.0],
 };
+
+/// The stepper's method.
+fn tableau(s: &Stepper) -> &'static Tableau {
+    match s.integrator {
+        Integrator::Rk2 => &SECOND,
+        _ => &FOURTH,
+    }
+}
 
 struct Stage<'a> {
     /// The first stage has none: it is the step's own.
@@ -49,7 +57,6 @@ impl<'a> Stage<'a> {
 
 /// The stages.
 fn stages<'a>(
-    tableau: &Tableau,
     s: &'a Stepper,
     e: &Evaluation,
     state: &State,
@@ -60,8 +67,8 @@ fn stages<'a>(
 ) -> Result<Vec<Stage<'a>>> {
     let tree = &s.system.tree;
     let nv = tree.velocities();
-    let mut out: Vec<Stage> = Vec::with_capacity(tableau.nodes.len());
-    for (i, node) in tableau.nodes.iter().enumerate() {
+    let mut out: Vec<Stage> = Vec::with_capacity(tableau(s).nodes.len());
+    for (i, node) in tableau(s).nodes.iter().enumerate() {
         let t = s.time(state) + node * s.dt;
         let split = s.split(&input.hold, When::At(t));
         let (xi, p) = match out.last() {
@@ -103,7 +110,6 @@ fn stages<'a>(
 }
 
 pub(super) fn step(
-    tableau: &Tableau,
     s: &Stepper,
     e: &Evaluation,
     state: &State,
@@ -112,10 +118,10 @@ pub(super) fn step(
 ) -> Result<Stepped> {
     let first = s.split(&input.hold, When::At(s.time(state)));
     let start = s.released_momentum(e, state, v, &first);
-    let stages = stages(tableau, s, e, state, v, input, &start, false)?;
+    let stages = stages(s, e, state, v, input, &start, false)?;
     let mut xi = DVector::zeros(v.len());
     let mut y = start;
-    for (stage, weight) in stages.iter().zip(tableau.weights) {
+    for (stage, weight) in stages.iter().zip(tableau(s).weights) {
         xi += *weight * s.dt * &stage.chart_rate;
         y += *weight * s.dt * &stage.force;
     }
@@ -128,7 +134,6 @@ pub(super) fn step(
 }
 
 pub(super) fn step_vjp(
-    tableau: &Tableau,
     s: &Stepper,
     e: &Evaluation,
     state: &State,
@@ -139,9 +144,9 @@ pub(super) fn step_vjp(
     let tree = &s.system.tree;
     let first = s.split(&input.hold, When::At(s.time(state)));
     let start = s.released_momentum(e, state, v, &first);
-    let stages = stages(tableau, s, e, state, v, input, &start, true)?;
+    let stages = stages(s, e, state, v, input, &start, true)?;
     let mut xi = DVector::zeros(v.len());
-    for (stage, weight) in stages.iter().zip(tableau.weights) {
+    for (stage, weight) in stages.iter().zip(tableau(s).weights) {
         xi += *weight * s.dt * &stage.chart_rate;
     }
     let mut bar = StepBar::zeros(e);
@@ -153,7 +158,7 @@ pub(super) fn step_vjp(
     first.forget_driven(&mut y_bar);
     let mut start_bar = y_bar.clone();
     let spread = |bar: &DVector<f64>| -> Vec<DVector<f64>> {
-        tableau.weights.iter().map(|w| *w * s.dt * bar).collect()
+        tableau(s).weights.iter().map(|w| *w * s.dt * bar).collect()
     };
     let (mut rate_bar, mut force_bar) = (spread(&xi_bar), spread(&y_bar));
     for i in (0..stages.len()).rev() {
@@ -177,7 +182,7 @@ pub(super) fn step_vjp(
         bar.parameters.add(&own.parameters);
         start_bar += &own.state.y;
         if i > 0 {
-            let h = tableau.nodes[i] * s.dt;
+            let h = tableau(s).nodes[i] * s.dt;
             rate_bar[i - 1] += h * stage_xi_bar;
             force_bar[i - 1] += h * &own.state.y;
         }

@@ -89,7 +89,7 @@ pub fn forward<S: Step>(
     mut progress: impl FnMut(usize),
 ) -> Result<Path<S::State, S::Kept>, S::Error> {
     let mut states = vec![initial];
-    let mut kept = Vec::with_capacity(steps + 1);
+    let mut kept = Vec::new();
     for n in 0..steps {
         let (next, observed) = step.step(n, &states[n])?;
         states.push(next);

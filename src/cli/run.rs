@@ -205,7 +205,11 @@ impl fmt::Display for Report {
             "  energy  {:.6e} J at the start, {:.6e} J at the end",
             self.energy_initial, self.energy_final
         )?;
-        writeln!(f, "  momentum drift {:.2e}", self.momentum_drift)?;
+        writeln!(
+            f,
+            "  momentum changes by {:.2e} of the largest (by round-off where nothing outside acts)",
+            self.momentum_drift
+        )?;
         writeln!(f, "  smallest gap   {}", or_dash(self.min_gap, "m"))?;
         writeln!(f, "  final q {:?}", self.final_q)?;
         write!(f, "  final v {:?}", self.final_v)?;

@@ -13,7 +13,8 @@ pub struct Parameters {
     pub inertia: Vec<[f64; 6]>,
     /// Linear drag coefficient of each body, kg/(m² s): νρ of Eq. 22.
     pub linear_drag: Vec<f64>,
-    /// Quadratic drag coefficient of each body, dimensionless.
+    /// Quadratic drag coefficient of each body, dimensionless. Zero, with zero derivative, for a body whose scene gives no
+    /// drag at all: its surface isn't kept.
     pub quadratic_drag: Vec<f64>,
 }
 

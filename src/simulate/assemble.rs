@@ -198,12 +198,14 @@ pub(super) fn assemble(scene: &Scene, settings: &Settings) -> Result<Assembled> 
             joint_control: None,
             thruster: None,
         };
-        if let (Some(d), Some(s)) = (&body.drag, surface) {
+        if let Some(s) = surface {
+            // Also at zero coefficient: the derivative with respect to it isn't zero.
             let pieces = elements(&s.mesh);
+            let d = body.drag.unwrap_or_default();
             data.resistance = drag::resistance(&pieces, part(d.part));
             parameters.linear_drag[b] = d.linear;
             parameters.quadratic_drag[b] = d.quadratic;
-            if d.quadratic != 0.0 {
+            if body.drag.is_some() {
                 data.quadratic_part = part(d.quadratic_part);
                 data.surface = pieces;
             }

@@ -365,16 +365,23 @@ pub fn gradcheck_with(
         0 => Times::default(),
         n => time(simulator, &zero, &probe, n)?,
     };
+    // Directions are scaled alike, so the largest derivative of all tells what is rounding.
+    let largest = directions
+        .iter()
+        .map(|d| d.adjoint.abs())
+        .fold(0.0, f64::max);
     let worst = |names: &[&str]| {
         let group: Vec<&Direction> = directions
             .iter()
             .filter(|d| names.contains(&d.group))
             .collect();
-        let largest = group.iter().map(|d| d.adjoint.abs()).fold(0.0, f64::max);
-        let errors = group
-            .iter()
-            .filter(|d| !negligible(d, largest))
-            .map(|d| d.rel_errors.iter().copied().fold(f64::INFINITY, f64::min));
+        let errors = group.iter().map(|d| {
+            if negligible(d, largest) {
+                0.0
+            } else {
+                d.rel_errors.iter().copied().fold(f64::INFINITY, f64::min)
+            }
+        });
         errors.reduce(f64::max)
     };
     Ok(Report {
@@ -390,7 +397,7 @@ pub fn gradcheck_with(
     })
 }
 
-/// Whether adjoint and differences are both rounding beside the group's largest derivative. What
+/// Whether adjoint and differences are both rounding beside the largest derivative of all. What
 /// isn't a number is not.
 fn negligible(d: &Direction, largest: f64) -> bool {
     let limit = NEGLIGIBLE * largest;

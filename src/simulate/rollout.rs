@@ -6,7 +6,7 @@ use super::{Cotangents, Fidelity, Gradient, Initial, Objective, Simulator};
 use crate::adjoint::lie::{Pose, Vec6};
 use crate::adjoint::step::{self, Path};
 use crate::coupling::Report;
-use crate::dynamics::{Memo, Parameters, State, StepBar};
+use crate::dynamics::{Drive, Memo, Parameters, State, StepBar};
 use crate::shape::Gap;
 use crate::{Error, Result};
 use nalgebra::{DMatrix, DVector};
@@ -49,6 +49,10 @@ impl Sample {
         self.kinetic_energy + self.potential_energy
     }
 }
+
+/// Share of the largest kinetic energy that may come from nowhere before a run warns. With constraints on the step
+/// kept, every integrator but the paper's stays under 1.2 % on the example scenes.
+const GAIN: f64 = 0.02;
 
 /// A trajectory: the forward pass, and the only key to its gradient.
 pub struct Rollout<'a> {
@@ -184,7 +188,35 @@ impl<'a> Rollout<'a> {
         let warning = nearest.and_then(|(time, gap)| {
             clearance::warning(time, &gap, fidelity, self.simulator.system())
         });
-        warning.into_iter().collect()
+        warning.into_iter().chain(self.energy_warning()).collect()
+    }
+
+    /// Energy that grows though nothing does work: the step is too long.
+    fn energy_warning(&self) -> Option<String> {
+        let system = self.simulator.system();
+        let samples = self.samples();
+        let worked = system.has_current()
+            || system.drives.iter().any(|d| matches!(d, Drive::Motion(_)))
+            || samples.iter().any(|s| s.control.iter().any(|u| *u != 0.0));
+        if worked {
+            return None;
+        }
+        let first = samples[0].energy();
+        let kinetic = samples.iter().map(|s| s.kinetic_energy).fold(0.0, f64::max);
+        let worst = samples
+            .iter()
+            .max_by(|a, b| a.energy().total_cmp(&b.energy()))?;
+        let gained = worst.energy() - first;
+        (gained > GAIN * kinetic.max(f64::MIN_POSITIVE)).then(|| {
+            format!(
+                "the energy grows by {gained:.3e} J, {:.1} % of the largest kinetic energy, by \
+                 t = {} s, though nothing does work: the time step of {} s is too long for these velocities or \
+                 this drag; take a smaller one, or the integrator midpoint",
+                100.0 * gained / kinetic,
+                worst.time,
+                self.simulator.time_step()
+            )
+        })
     }
 
     /// Value of an objective.

@@ -11,6 +11,9 @@ use crate::shape::Gaps;
 use crate::{Error, Result};
 use nalgebra::{DMatrix, DVector};
 
+/// Most steps of one rollout: some kilobytes are kept for each.
+const MOST_STEPS: usize = 5_000_000;
+
 /// A scene made ready: shapes discretised, bodies joined, coupling prepared.
 pub struct Simulator {
     assembled: Assembled,
@@ -31,7 +34,8 @@ pub struct AddedMass {
 }
 
 impl Simulator {
-    /// Prepares a scene.
+    /// Prepares a scene. The settings are taken as they are: a scene file's `preset` counts only through
+    /// [`Settings::for_scene`].
     ///
     /// # Errors
     /// A scene that doesn't validate, meshes that don't bound a volume, bodies that overlap (with
@@ -118,9 +122,33 @@ impl Simulator {
     /// # Errors
     /// Values that aren't finite, or negative density, mass or drag.
     pub fn set_parameters(&mut self, parameters: Parameters) -> Result<()> {
+        let n = self.system().len();
+        let sizes = [
+            parameters.mass.len(),
+            parameters.inertia.len(),
+            parameters.linear_drag.len(),
+            parameters.quadratic_drag.len(),
+        ];
+        if sizes != [n; 4] {
+            return Err(Error::input(
+                "parameters: numbers of masses, inertias, linear and quadratic drags",
+                format!("{sizes:?}"),
+                format!("must each be {n}, the number of bodies"),
+            ));
+        }
+        for (body, quadratic) in self.system().bodies.iter().zip(&parameters.quadratic_drag) {
+            if *quadratic != 0.0 && body.surface.is_empty() {
+                return Err(Error::input(
+                    format!("parameter {}.drag.quadratic", body.name),
+                    quadratic,
+                    "must be 0 for a body whose scene gives no drag; give it `drag` there, zero if need be",
+                ));
+            }
+        }
         let names = parameters.names(&self.names());
         for (name, value) in names.iter().zip(parameters.to_vec()) {
-            let signed = name.contains(".inertia.");
+            let products = [".inertia.xy", ".inertia.xz", ".inertia.yz"];
+            let signed = products.iter().any(|p| name.ends_with(p));
             if !value.is_finite() || (value < 0.0 && !signed) {
                 return Err(Error::input(
                     format!("parameter {name}"),
@@ -128,13 +156,6 @@ impl Simulator {
                     "must be finite and not negative",
                 ));
             }
-        }
-        if parameters.mass.len() != self.system().len() {
-            return Err(Error::input(
-                "parameters",
-                format!("{} bodies", parameters.mass.len()),
-                format!("must be for {} bodies", self.system().len()),
-            ));
         }
         self.assembled.parameters = parameters;
         Ok(())
@@ -171,6 +192,25 @@ impl Simulator {
                     format!("initial {name}"),
                     format!("{:?}", x.as_slice()),
                     format!("must be {n} finite numbers"),
+                ));
+            }
+        }
+        for (body, link) in self.system().bodies.iter().zip(tree.links()) {
+            let from = link.q.end.saturating_sub(4);
+            let turn = link.q.len() >= 4;
+            let norm = q.as_slice()[from..link.q.end]
+                .iter()
+                .map(|x| x * x)
+                .sum::<f64>()
+                .sqrt();
+            if turn && (norm - 1.0).abs() > 1e-6 {
+                return Err(Error::input(
+                    format!(
+                        "initial q of body \"{}\": quaternion (w, x, y, z)",
+                        body.name
+                    ),
+                    format!("length {norm}"),
+                    "must have length 1",
                 ));
             }
         }
@@ -253,6 +293,13 @@ impl Simulator {
             ));
         }
         let steps = matrix.ncols();
+        if steps > MOST_STEPS {
+            return Err(Error::input(
+                "steps",
+                steps,
+                format!("must be at most {MOST_STEPS}: every state is kept; run in parts"),
+            ));
+        }
         let path = step::forward(&self.trajectory(&matrix), self.initial()?, steps, progress)?;
         Ok(Rollout {
             simulator: self,

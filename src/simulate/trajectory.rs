@@ -82,6 +82,7 @@ impl<'a> Trajectory<'a> {
             q: &sample.q,
             v: &sample.v,
         });
+        expect_length("hold", action.hold.len(), self.stepper.system.len(), "body")?;
         let mut control = self.controls.column(index).into_owned();
         if !action.control.is_empty() {
             if action.control.len() != control.len() {
@@ -154,6 +155,11 @@ impl<'a> Trajectory<'a> {
             },
             &bar.control,
         );
+        let velocities = self.stepper.system.tree.velocities();
+        expect_length("cotangent of q", action.q.len(), velocities, "velocity")?;
+        expect_length("cotangent of v", action.v.len(), velocities, "velocity")?;
+        let gains = self.policy.gains().len();
+        expect_length("cotangent of the gains", action.gains.len(), gains, "gain")?;
         if !action.q.is_empty() {
             bar.state.q += DVector::from_vec(action.q);
         }
@@ -189,6 +195,18 @@ impl<'a> Trajectory<'a> {
             },
         ))
     }
+}
+
+/// A controller's list is empty or has one entry per item.
+fn expect_length(what: &str, given: usize, expected: usize, item: &str) -> Result<()> {
+    if given == 0 || given == expected {
+        return Ok(());
+    }
+    Err(Error::input(
+        format!("controller: {what}"),
+        format!("{given} entries"),
+        format!("must be empty or have {expected}, one per {item}"),
+    ))
 }
 
 impl Step for Trajectory<'_> {

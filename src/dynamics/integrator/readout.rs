@@ -29,8 +29,9 @@ pub(super) fn factor(e: &Evaluation, split: &Split) -> Result<Cholesky<f64, Dyn>
             value: smallest,
             limit: 1e-13,
             remedy:
-                "M must be positive definite: give massless bodies mass, inertia or added mass, \
-                     or refine the meshes where a gap isn't resolved"
+                "M must be positive definite. At the start: give massless bodies mass, inertia or \
+                     added mass, or refine the meshes where a gap isn't resolved. Later: the run \
+                     may have blown up, take a smaller time step or the integrator midpoint"
                     .into(),
         });
     }

@@ -1,0 +1,214 @@
+//! What a program hands to the simulator is checked: parameters, starts, controllers, steps.
+
+use hydrograd::dynamics::Integrator;
+use hydrograd::scene::Scene;
+use hydrograd::simulate::{Action, ActionBar, Observation, Policy};
+use hydrograd::{Controls, Fidelity, Result, Settings, Simulator, objective};
+use nalgebra::DVector;
+use std::path::Path;
+
+fn scene(name: &str) -> Scene {
+    let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("examples/scenes");
+    Scene::load(folder.join(format!("{name}.toml"))).unwrap()
+}
+
+fn simulator(name: &str) -> Simulator {
+    let settings = Settings::default().faces(80).fidelity(Fidelity::Isolated);
+    Simulator::new(&scene(name), settings).unwrap()
+}
+
+/// A controller whose lists have the lengths that it is told.
+#[derive(Clone)]
+struct Lengths {
+    control: usize,
+    hold: usize,
+    q: usize,
+    gains: usize,
+}
+
+impl Policy for Lengths {
+    fn act(&self, _: &Observation) -> Action {
+        Action {
+            control: vec![0.0; self.control],
+            hold: vec![false; self.hold],
+        }
+    }
+
+    fn act_vjp(&self, _: &Observation, _: &DVector<f64>) -> ActionBar {
+        ActionBar {
+            q: vec![0.0; self.q],
+            v: Vec::new(),
+            gains: vec![0.0; self.gains],
+        }
+    }
+
+    fn gains(&self) -> Vec<f64> {
+        vec![1.0; 2]
+    }
+
+    fn with_gains(&self, _: &[f64]) -> Result<Box<dyn Policy>> {
+        Ok(Box::new(self.clone()))
+    }
+}
+
+#[test]
+fn controllers_with_lists_of_wrong_length_are_refused() {
+    let mut s = simulator("falling_ball");
+    let right = Lengths {
+        control: 1,
+        hold: 2,
+        q: 4,
+        gains: 2,
+    };
+    let cases = [
+        (right.clone(), None),
+        (
+            Lengths {
+                control: 3,
+                ..right.clone()
+            },
+            Some("control"),
+        ),
+        (
+            Lengths {
+                hold: 9,
+                ..right.clone()
+            },
+            Some("hold"),
+        ),
+        (
+            Lengths {
+                q: 3,
+                ..right.clone()
+            },
+            Some("cotangent of q"),
+        ),
+        (Lengths { gains: 1, ..right }, Some("gains")),
+    ];
+    for (policy, word) in cases {
+        s.set_policy(Box::new(policy));
+        let controls = Controls::zeros(&s, 3);
+        let outcome = s
+            .rollout(&controls)
+            .and_then(|r| r.gradient(&objective::final_velocity(0, 1.0, 1.0)));
+        match word {
+            None => assert!(outcome.is_ok()),
+            Some(word) => {
+                let message = outcome.unwrap_err().to_string();
+                assert!(message.contains(word), "{message}");
+            }
+        }
+    }
+}
+
+#[test]
+fn parameters_and_starts_that_can_not_be_are_refused() {
+    let mut s = simulator("kirchhoff_ellipsoid");
+    let good = s.parameters().clone();
+    let mut short = good.clone();
+    short.linear_drag.clear();
+    assert!(
+        s.set_parameters(short)
+            .unwrap_err()
+            .to_string()
+            .contains("linear")
+    );
+    let mut negative = good.clone();
+    negative.inertia[0][0] = -1.0;
+    assert!(
+        s.set_parameters(negative)
+            .unwrap_err()
+            .to_string()
+            .contains("inertia.xx")
+    );
+    let mut quadratic = good.clone();
+    quadratic.quadratic_drag[0] = 1.0;
+    assert!(
+        s.set_parameters(quadratic)
+            .unwrap_err()
+            .to_string()
+            .contains("quadratic")
+    );
+    s.set_parameters(good).unwrap();
+    let v = s.start().1.clone();
+    for q in [[0.0; 7], [0.0, 0.0, 0.0, 2.0, 0.0, 0.0, 0.0]] {
+        let message = s
+            .set_start(DVector::from_row_slice(&q), v.clone())
+            .unwrap_err()
+            .to_string();
+        assert!(message.contains("quaternion"), "{message}");
+    }
+}
+
+/// A coefficient of zero has a derivative, and a coefficient set later drags.
+#[test]
+fn drag_works_where_the_scene_gives_none() {
+    let mut s = simulator("kirchhoff_ellipsoid");
+    let controls = Controls::zeros(&s, 20);
+    let goal = objective::final_velocity(0, 0.0, 1.0);
+    let (slope, free) = {
+        let r = s.rollout(&controls).unwrap();
+        let slope = r.gradient(&goal).unwrap().parameters.linear_drag[0];
+        (slope, r.value(&goal).unwrap())
+    };
+    assert!(slope < 0.0, "{slope}");
+    let mut p = s.parameters().clone();
+    p.linear_drag[0] = 1e-3;
+    s.set_parameters(p).unwrap();
+    let dragged = s.rollout(&controls).unwrap().value(&goal).unwrap();
+    let difference = (dragged - free) / 1e-3;
+    assert!(
+        (difference / slope - 1.0).abs() < 1e-2,
+        "{difference} {slope}"
+    );
+}
+
+/// Explicit steps of stiff drag blow up: the run says so, with the numbers.
+#[test]
+fn energy_from_nowhere_is_told() {
+    let mut stiff = scene("kirchhoff_ellipsoid");
+    let settings = Settings::default().faces(80).fidelity(Fidelity::Isolated);
+    let calm = Simulator::new(&stiff, settings).unwrap();
+    let controls = Controls::zeros(&calm, 20);
+    assert!(calm.rollout(&controls).unwrap().warnings().is_empty());
+    // Past the stability limit: a warning, and where nothing can be computed any more, an error.
+    let mut told = [0, 0];
+    for linear in [1e4, 3e4, 1e5, 1e6] {
+        stiff.bodies[0].drag = Some(hydrograd::scene::Drag {
+            linear,
+            ..Default::default()
+        });
+        let explicit = Simulator::new(&stiff, settings.integrator(Integrator::Rk2)).unwrap();
+        match explicit.rollout(&controls) {
+            Ok(r) => {
+                let stable = r.samples()[20].energy() < r.samples()[0].energy();
+                let warned = r.warnings().iter().any(|w| w.contains("time step"));
+                println!("{linear}: stable {stable}, warned {warned}");
+                assert!(stable || warned, "{linear}");
+                told[0] += usize::from(warned);
+            }
+            Err(e) => {
+                println!("{linear}: {e}");
+                assert!(e.to_string().contains("time step"), "{e}");
+                told[1] += 1;
+            }
+        }
+    }
+    assert!(told[0] > 0 && told[1] > 0, "{told:?}");
+    let implicit = Simulator::new(&stiff, settings.integrator(Integrator::MomentumEuler)).unwrap();
+    assert!(implicit.rollout(&controls).unwrap().warnings().is_empty());
+}
+
+#[test]
+fn runs_too_long_to_be_kept_are_refused() {
+    let mut long = scene("kirchhoff_ellipsoid");
+    long.steps = 1_000_000_000;
+    let settings = Settings::default().faces(80).fidelity(Fidelity::Isolated);
+    let s = Simulator::new(&long, settings).unwrap();
+    let message = s
+        .rollout(&Controls::zeros(&s, s.steps()))
+        .map(|_| ())
+        .unwrap_err()
+        .to_string();
+    assert!(message.contains("steps"), "{message}");
+}

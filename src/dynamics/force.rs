@@ -44,22 +44,6 @@ impl ForceCotangents {
             parameters: Parameters::zeros(e.system.len()),
         }
     }
-
-    /// Adds `scale` times another set, except for v.
-    pub fn add_scaled(&mut self, scale: f64, other: &Self) {
-        self.q += scale * &other.q;
-        self.v += scale * &other.v;
-        self.control += scale * &other.control;
-        let values: Vec<f64> = other
-            .parameters
-            .to_vec()
-            .iter()
-            .map(|x| scale * x)
-            .collect();
-        if let Some(scaled) = other.parameters.with_values(&values) {
-            self.parameters.add(&scaled);
-        }
-    }
 }
 
 /// Adds the cotangent of mass and inertia of body `b` for a term `x̄ᵀ M̄_r ȳ` (body-frame twists).

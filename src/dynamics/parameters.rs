@@ -76,14 +76,19 @@ impl Parameters {
 
     /// Adds another set of values.
     pub fn add(&mut self, other: &Self) {
-        self.density += other.density;
+        self.add_scaled(1.0, other);
+    }
+
+    /// Adds `scale` times another set of values.
+    pub fn add_scaled(&mut self, scale: f64, other: &Self) {
+        self.density += scale * other.density;
         for b in 0..self.mass.len() {
-            self.mass[b] += other.mass[b];
+            self.mass[b] += scale * other.mass[b];
             for k in 0..6 {
-                self.inertia[b][k] += other.inertia[b][k];
+                self.inertia[b][k] += scale * other.inertia[b][k];
             }
-            self.linear_drag[b] += other.linear_drag[b];
-            self.quadratic_drag[b] += other.quadratic_drag[b];
+            self.linear_drag[b] += scale * other.linear_drag[b];
+            self.quadratic_drag[b] += scale * other.quadratic_drag[b];
         }
     }
 }

@@ -79,6 +79,9 @@ impl Times {
 
 /// Differences smaller than this against the group's largest derivative say nothing of the adjoint: they are rounding.
 const NEGLIGIBLE: f64 = 1e-9;
+/// Rounding of a derivative against the sum of the absolute values that its functional adds up: where nothing in a group
+/// matters, adjoint and differences are both under it.
+const ROUNDING: f64 = 1e-11;
 
 /// Uniform numbers in (−1, 1) by the splitmix64 generator: the same on every machine.
 struct Random(u64);
@@ -148,6 +151,19 @@ impl Probe {
                 out += r.directions[b].dot(&pose.apply(&r.arms[b]));
             }
             out += r.velocity.dot(&s.v);
+        }
+        out
+    }
+
+    /// Sum of the absolute values of the terms of [`Probe::value`].
+    fn size(&self, samples: &[Sample]) -> f64 {
+        let mut out = 0.0;
+        for r in &self.readings {
+            let s = &samples[r.state];
+            for (b, pose) in s.poses.iter().enumerate() {
+                out += r.directions[b].abs().dot(&pose.apply(&r.arms[b]).abs());
+            }
+            out += r.velocity.abs().dot(&s.v.abs());
         }
         out
     }
@@ -267,6 +283,7 @@ pub fn gradcheck_with(
     let nv = simulator.system().tree.velocities();
     let probe = Probe::new(simulator, &scale, steps, &mut vector);
     let gradient = rollout.vjp(&probe.cotangents(&rollout))?;
+    let size = probe.size(rollout.samples());
     drop(rollout);
 
     let step_sizes = vec![1e-2, 1e-3, 1e-4, 1e-5];
@@ -365,18 +382,15 @@ pub fn gradcheck_with(
         0 => Times::default(),
         n => time(simulator, &zero, &probe, n)?,
     };
-    // Directions are scaled alike, so the largest derivative of all tells what is rounding.
-    let largest = directions
-        .iter()
-        .map(|d| d.adjoint.abs())
-        .fold(0.0, f64::max);
     let worst = |names: &[&str]| {
         let group: Vec<&Direction> = directions
             .iter()
             .filter(|d| names.contains(&d.group))
             .collect();
+        let largest = group.iter().map(|d| d.adjoint.abs()).fold(0.0, f64::max);
+        let limit = (NEGLIGIBLE * largest).max(ROUNDING * size);
         let errors = group.iter().map(|d| {
-            if negligible(d, largest) {
+            if negligible(d, limit) {
                 0.0
             } else {
                 d.rel_errors.iter().copied().fold(f64::INFINITY, f64::min)
@@ -397,15 +411,14 @@ pub fn gradcheck_with(
     })
 }
 
-/// Whether adjoint and differences are both rounding beside the largest derivative of all. What
-/// isn't a number is not.
-fn negligible(d: &Direction, largest: f64) -> bool {
-    let limit = NEGLIGIBLE * largest;
+/// Whether adjoint and differences are both under the limit of what is rounding. What isn't a
+/// number is not.
+fn negligible(d: &Direction, limit: f64) -> bool {
     let smallest = d
         .differences
         .iter()
         .fold(f64::INFINITY, |m, x| m.min(x.abs()));
-    largest > 0.0 && d.adjoint.abs() <= limit && smallest <= limit
+    d.adjoint.abs() <= limit && smallest <= limit
 }
 
 fn dot(a: &[f64], b: &[f64]) -> f64 {

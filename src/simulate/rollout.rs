@@ -50,8 +50,8 @@ impl Sample {
     }
 }
 
-/// Share of the largest kinetic energy that may come from nowhere before a run warns. With constraints on the step
-/// kept, every integrator but the paper's stays under 1.2 % on the example scenes.
+/// Share of the largest kinetic energy that may come from nowhere before a run warns. Every integrator but the paper's
+/// stays under 1.2 % on the example scenes.
 const GAIN: f64 = 0.02;
 
 /// A trajectory: the forward pass, and the only key to its gradient.

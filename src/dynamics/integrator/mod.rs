@@ -362,9 +362,6 @@ impl StepBar {
     fn add(&mut self, scale: f64, f: &ForceCotangents) {
         self.state.q += scale * &f.q;
         self.control += scale * &f.control;
-        let values: Vec<f64> = f.parameters.to_vec().iter().map(|x| scale * x).collect();
-        if let Some(p) = f.parameters.with_values(&values) {
-            self.parameters.add(&p);
-        }
+        self.parameters.add_scaled(scale, &f.parameters);
     }
 }

@@ -1,7 +1,7 @@
 //! The closed triangle surface that a discretisation starts from.
 
 use crate::adjoint::kernel;
-use crate::adjoint::lie::{Vec3, Vec6, six};
+use crate::adjoint::lie::{Mat6, Vec3, Vec6, six};
 use crate::{Error, Result};
 
 /// Flat faces of a closed surface, body frame.
@@ -273,4 +273,29 @@ impl<'a> Surface<'a> {
         }
         nearest
     }
+}
+
+/// max |M − Mᵀ|_ij / √(M_ii M_jj). A diagonal entry under a hundredth of the displaced fluid's own
+/// inertia (a sphere's rotation) counts as that hundredth.
+pub(crate) fn asymmetry(m: &Mat6, faces: &Faces) -> f64 {
+    let area: f64 = faces.areas.iter().sum();
+    let pairs = || faces.centres.iter().zip(&faces.areas);
+    let middle = pairs().map(|(c, a)| c * *a).sum::<Vec3>() / area;
+    let spread = pairs()
+        .map(|(c, a)| (c - middle).norm_squared() * a)
+        .sum::<f64>()
+        / area;
+    let volume = faces.volume();
+    let diagonal = |i: usize| {
+        let displaced = if i < 3 { volume } else { volume * spread };
+        m[(i, i)].max(0.01 * displaced)
+    };
+    let mut worst = 0.0_f64;
+    for i in 0..6 {
+        for j in 0..i {
+            let scale = (diagonal(i) * diagonal(j)).sqrt();
+            worst = worst.max((m[(i, j)] - m[(j, i)]).abs() / scale);
+        }
+    }
+    worst
 }

@@ -21,8 +21,8 @@
 //! Ma, Bae & Choi 2012 (shrinking balls); the measurements are in `docs/accuracy.md`.
 
 use super::settings::{Depth, Method};
-use super::surface::Surface;
 use crate::adjoint::lie::Vec3;
+use crate::boundary::surface::Surface;
 use crate::{Error, Result};
 use rayon::prelude::*;
 

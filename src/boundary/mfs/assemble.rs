@@ -1,9 +1,9 @@
 //! Rows of one body: flux, twist, potential.
 
 use super::settings::{Method, RowScaling};
-use super::surface::Faces;
 use crate::adjoint::kernel::{self, Points, Sources, Triangles, Write};
 use crate::adjoint::lie::{Vec3, Vec6};
+use crate::boundary::surface::Faces;
 
 /// Weight of each face's row. A row is `weight · flux` (vertex sources) or
 /// `weight · normal velocity` (face sources).

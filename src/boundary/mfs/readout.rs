@@ -11,9 +11,9 @@
 //! proportion. Between bodies sources are farther, and the centre does.
 
 use super::settings::Readout;
-use super::surface::{Faces, equilateral_edge};
 use crate::adjoint::kernel::{self, Points, Sources};
 use crate::adjoint::lie::{Vec3, Vec6};
+use crate::boundary::surface::{Faces, equilateral_edge};
 use rayon::prelude::*;
 
 /// Distance to the nearest source, in edges, from which one point does, and below which three

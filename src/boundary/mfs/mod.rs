@@ -1,0 +1,270 @@
+//! One body in unbounded fluid by the method of fundamental solutions.
+//!
+//! Potential `φ(x) = Σ_j α_j / |x − s_j|`, fluid velocity `−∇φ`, density 1. Everything is in the body
+//! frame and constant there. A body twist `ν = (u, ω)` is taken about the body's origin, m/s and
+//! rad/s. With the rows of [`Method`],
+//!
+//! ```text
+//! [K; D] α ≈ [F̄; 0] ν     least squares, D a slight damping    (the paper's Eq. 17, 20)
+//! T = ½ Σ_i φ_i B̄_i ν      φ_i the potential's mean over face i, φ = P α
+//! M = sym(B̄ᵀ P [K; D]⁺ F̄)   6 × 6 added mass (kg for density 1 kg/m³)
+//! ```
+//!
+//! Between bodies φ_i is the potential at the face's centre, `P_ij = 1/|c_i − s_j|`; for a body's own
+//! sources see [`readout`]. [`depth`] says where the sources are.
+//!
+//! # References
+//! Fairweather & Karageorghis 1998 (MFS); Van Oosterom & Strackee 1983 (solid angle).
+
+mod assemble;
+pub mod depth;
+mod factor;
+pub mod readout;
+mod response;
+mod settings;
+
+use super::surface::{Faces, Surface, asymmetry};
+use crate::adjoint::kernel::{Points, Triangles};
+use crate::adjoint::lie::{Mat6, Vec3, Vec6};
+use crate::{Error, Result};
+use faer::{Mat, MatMut, MatRef};
+
+pub(crate) use factor::{solve_upper, solve_upper_transpose};
+pub use settings::{Depth, Method, Readout, RowScaling, Settings};
+
+/// Condition number above which results lose digits that matter.
+const ILL_CONDITIONED: f64 = 1e8;
+
+/// One body's discretisation: constant in the body frame, for density 1, immutable. Equal shapes may
+/// share one (`Arc`).
+#[derive(Clone, Debug)]
+pub struct BodyBoundary {
+    /// Name, for messages.
+    pub name: String,
+    /// What it was made with.
+    pub settings: Settings,
+    /// Geometry of the faces.
+    pub faces: Faces,
+    /// Source points s_j, m, body frame.
+    pub sources: Vec<Vec3>,
+    /// Distance of each source from its point of the surface, m.
+    pub depths: Vec<f64>,
+    /// w_i: a row is w_i · flux ([`Method::MfsVertex`]) or w_i · normal velocity at the centre
+    /// ([`Method::MfsFace`]).
+    pub row_weights: Vec<f64>,
+    /// The faces as targets of the flux kernel, with their row weights.
+    pub triangles: Triangles,
+    /// The faces' centres as targets of the normal and potential kernels, with their row weights.
+    pub points: Points,
+    /// F̄, faces × 6: the row that a unit twist asks for; `F_i(ν) = twist_rows[i] · ν`.
+    pub twist_rows: Vec<Vec6>,
+    /// Flux ∫ n·(u + ω × x) dA of a unit twist through each face, faces × 6, m³/s.
+    pub twist_flux: Vec<Vec6>,
+    /// B̄, faces × 6: flux that weighs the potential at each face's centre, m³/s. `twist_flux` plus the
+    /// body's own residual flux with [`Readout::Corrected`], `twist_flux` with [`Readout::Centre`].
+    pub readout_flux: Vec<Vec6>,
+    /// K, row-major faces × sources: the row that a unit source makes. See
+    /// [`BodyBoundary::flux_matrix`].
+    pub flux_rows: Vec<f64>,
+    /// PᵀB̄ of the body's own faces and sources, sources × 6.
+    pub readout: Vec<Vec6>,
+    /// [K; D]⁺F̄, sources × 6: strengths that answer a unit twist of the body alone.
+    pub strengths: Vec<Vec6>,
+    /// Added mass about the body's origin, symmetric, for density 1: kg, kg·m, kg·m².
+    pub added_mass: Mat6,
+    /// max |M − Mᵀ|_ij / √(M_ii M_jj) before symmetrising: a free estimate of the error.
+    pub asymmetry: f64,
+    /// ‖F̄ν − Kα‖ / ‖F̄ν‖ for each unit twist; 0 where the twist moves no fluid.
+    pub residual: Vec6,
+    /// Condition number of [K; D] with columns scaled to unit length (estimated from below).
+    pub condition: f64,
+    /// What the user should know, each with the body's name and its numbers.
+    pub warnings: Vec<String>,
+    /// Diagonal of the damping rows D, length sources; zeros without damping. Strengths solve
+    /// `min ‖Kα − F̄ν‖² + ‖Dα‖²`, so the normal equations are `(KᵀK + D²) α = KᵀF̄ν`.
+    pub damping: Vec<f64>,
+    /// R of the thin QR of [K; D], sources × sources.
+    r: Mat<f64>,
+}
+
+impl BodyBoundary {
+    /// Discretises the closed surface of `vertices` (m, body frame) and `faces` (counter-clockwise
+    /// seen from the fluid).
+    pub fn new(
+        name: &str,
+        vertices: &[Vec3],
+        faces: &[[usize; 3]],
+        settings: &Settings,
+    ) -> Result<Self> {
+        let surface = Surface::new(name, vertices, faces)?;
+        let placement = depth::place(&surface, settings.method, settings.depth)?;
+        Self::build(&surface, placement, settings)
+    }
+
+    /// As [`BodyBoundary::new`], with the sources (m, body frame) given; `settings.depth` isn't used.
+    pub fn with_sources(
+        name: &str,
+        vertices: &[Vec3],
+        faces: &[[usize; 3]],
+        sources: &[Vec3],
+        settings: &Settings,
+    ) -> Result<Self> {
+        let surface = Surface::new(name, vertices, faces)?;
+        if sources.is_empty() || sources.len() > faces.len() {
+            return Err(Error::input(
+                format!("body \"{name}\": number of sources"),
+                sources.len(),
+                format!("from 1 to the number of faces, {}", faces.len()),
+            ));
+        }
+        let depths = sources
+            .iter()
+            .map(|s| {
+                let d = vertices.iter().map(|v| (v - s).norm());
+                d.fold(f64::INFINITY, f64::min)
+            })
+            .collect();
+        depth::check_inside(&surface, sources)?;
+        let placement = depth::Placement {
+            sources: sources.to_vec(),
+            depths,
+            warnings: Vec::new(),
+        };
+        Self::build(&surface, placement, settings)
+    }
+
+    fn build(surface: &Surface, placement: depth::Placement, settings: &Settings) -> Result<Self> {
+        let depth::Placement {
+            sources,
+            depths,
+            mut warnings,
+        } = placement;
+        let name = surface.name;
+        let damping = settings.damping;
+        if !(damping.is_finite() && damping >= 0.0) {
+            return Err(Error::input(
+                format!("body \"{name}\": damping"),
+                damping,
+                "0 for none, or a small positive number such as 0.003",
+            ));
+        }
+        let faces = surface.faces.clone();
+        let method = settings.method;
+        let row_weights = assemble::row_weights(&faces, method, settings.rows);
+        let twist_rows = assemble::twist_rows(&faces, method, &row_weights);
+        let twist_flux: Vec<Vec6> = (0..faces.len()).map(|i| faces.twist_flux(i)).collect();
+        let triangles = Triangles::new(surface.vertices, surface.triangles, row_weights.clone());
+        let points = Points::new(&faces.centres, &faces.normals, row_weights.clone());
+        let flux_rows = assemble::flux_matrix(method, &triangles, &points, &sources);
+
+        let k = MatRef::from_row_major_slice(&flux_rows, faces.len(), sources.len());
+        let rhs = Mat::from_fn(faces.len(), 6, |i, j| twist_rows[i][j]);
+        let factored = factor::solve(k, rhs.as_ref(), damping);
+        let alpha = &factored.solution;
+        let strengths: Vec<Vec6> = (0..sources.len())
+            .map(|i| Vec6::from_fn(|j, _| alpha[(i, j)]))
+            .collect();
+
+        let left = &rhs - k * alpha;
+        let largest = (0..6).map(|j| rhs.col(j).norm_l2()).fold(0.0, f64::max);
+        let residual = Vec6::from_fn(|j, _| {
+            let asked = rhs.col(j).norm_l2();
+            // A twist that moves no fluid asks for round-off only.
+            if asked > 1e-12 * largest {
+                left.col(j).norm_l2() / asked
+            } else {
+                0.0
+            }
+        });
+        let readout_flux: Vec<Vec6> = match settings.readout {
+            Readout::Centre => twist_flux.clone(),
+            Readout::Corrected => (0..faces.len())
+                .map(|i| {
+                    let per_row = match method {
+                        Method::MfsVertex => 1.0 / row_weights[i],
+                        Method::MfsFace => faces.areas[i] / row_weights[i],
+                    };
+                    twist_flux[i] + Vec6::from_fn(|j, _| left[(i, j)] * per_row)
+                })
+                .collect(),
+        };
+        let rule = readout::points(&faces, &sources, settings.readout);
+        let readout = readout::own(&rule, &sources, &readout_flux);
+        let mut raw = Mat6::zeros();
+        for (p, a) in readout.iter().zip(&strengths) {
+            raw += p * a.transpose();
+        }
+        if !raw.iter().all(|x| x.is_finite()) {
+            return Err(Error::Unresolved {
+                place: format!("body \"{name}\""),
+                quantity: "condition number of the flux matrix".into(),
+                value: factored.condition,
+                limit: ILL_CONDITIONED,
+                remedy: "use a smaller or automatic source depth".into(),
+            });
+        }
+        let added_mass = 0.5 * (raw + raw.transpose());
+        let translation = added_mass.fixed_view::<3, 3>(0, 0).symmetric_eigenvalues();
+        if translation.min() <= 0.0 {
+            return Err(Error::Unresolved {
+                place: format!("body \"{name}\""),
+                quantity: "smallest added mass in translation, relative to the displaced".into(),
+                value: translation.min() / faces.volume(),
+                limit: 0.0,
+                remedy: format!("the mesh ({} faces) is too coarse for it", faces.len()),
+            });
+        }
+        if factored.condition > ILL_CONDITIONED {
+            warnings.push(format!(
+                "body \"{name}\": condition number {:.1e} of the flux matrix is above {ILL_CONDITIONED:.0e}{}; \
+                 use a smaller or automatic source depth, or a more even mesh",
+                factored.condition,
+                if factored.singular { " (solved with damping 1e-10)" } else { "" }
+            ));
+        }
+        Ok(Self {
+            name: name.to_string(),
+            settings: *settings,
+            sources,
+            depths,
+            row_weights,
+            triangles,
+            points,
+            twist_rows,
+            twist_flux,
+            readout_flux,
+            flux_rows,
+            readout,
+            strengths,
+            added_mass,
+            asymmetry: asymmetry(&raw, &faces),
+            residual,
+            condition: factored.condition,
+            warnings,
+            damping: factored.damping,
+            r: factored.r,
+            faces,
+        })
+    }
+
+    /// K, faces × sources.
+    pub fn flux_matrix(&self) -> MatRef<'_, f64> {
+        MatRef::from_row_major_slice(&self.flux_rows, self.faces.len(), self.sources.len())
+    }
+
+    /// R of the thin QR `[K; D] = Q R`, D the diagonal [`BodyBoundary::damping`]: upper triangular,
+    /// sources × sources. `RᵀR = KᵀK + D²`; `[K; D] R⁻¹` has orthonormal columns.
+    pub fn factor(&self) -> MatRef<'_, f64> {
+        self.r.as_ref()
+    }
+
+    /// `x ← R⁻¹ x`, x sources × columns.
+    pub fn solve_factor(&self, x: MatMut<'_, f64>) {
+        factor::solve_upper(self.r.as_ref(), x);
+    }
+
+    /// `x ← R⁻ᵀ x`, x sources × columns.
+    pub fn solve_factor_transpose(&self, x: MatMut<'_, f64>) {
+        factor::solve_upper_transpose(self.r.as_ref(), x);
+    }
+}

@@ -12,3 +12,4 @@ pub use mfs::{BodyBoundary, Depth, Method, Readout, RowScaling, Settings, depth,
 pub(crate) use mfs::{solve_upper, solve_upper_transpose};
 pub use response::Response;
 pub use surface::Faces;
+pub(crate) use surface::Surface;

@@ -18,6 +18,8 @@
 pub mod full;
 pub mod image;
 mod isolated;
+mod pair;
+pub mod reduced;
 mod tensor;
 
 pub use isolated::Isolated;
@@ -58,6 +60,8 @@ pub struct Report {
     pub residual: f64,
     /// max |M_ij − M_ji| / √(M_ii M_jj) over the basis, before symmetrising.
     pub asymmetry: f64,
+    /// Condition number of the dense system (estimated from below); 0 for iterative solves.
+    pub condition: f64,
 }
 
 /// A combination of bodies' twists.

@@ -8,7 +8,7 @@ use hydrograd::boundary::{BodyBoundary, Method, Settings};
 use hydrograd::coupling::full::{Full, SolveSettings, Solver, WetBody};
 use hydrograd::coupling::image::Image;
 use hydrograd::coupling::{Coupling, Direction, Isolated};
-use hydrograd::scene::{Shape, Wall};
+use hydrograd::scene::{Shape, Wall, WallSurface};
 use hydrograd::shape;
 use nalgebra::{DMatrix, DVector};
 use std::path::Path;
@@ -34,10 +34,12 @@ pub fn rungs() -> Vec<Rung> {
 }
 
 const WALL: Wall = Wall {
+    surface: WallSurface::Rigid,
     point: [0.0, 0.0, 0.1],
     normal: [0.1, 0.0, 1.0],
 };
 const SIDE: Wall = Wall {
+    surface: WallSurface::Rigid,
     point: [-0.8, 0.0, 0.0],
     normal: [1.0, 0.0, -0.1],
 };

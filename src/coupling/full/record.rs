@@ -2,7 +2,7 @@
 
 use super::Full;
 use super::body::unit_twists;
-use super::pairs::{Pair, wrench};
+use crate::coupling::pair::{Pair, wrench};
 use super::system::System;
 use crate::Result;
 use crate::adjoint::lie::{Pose, Vec3, Vec6};
@@ -114,6 +114,7 @@ impl<'a> FullRecord<'a> {
             iterations: solved.iterations,
             residual: solved.residual,
             asymmetry,
+            condition: 0.0,
         };
         let mut out = Self {
             full,

@@ -1,6 +1,6 @@
 //! The assembled matrix at given poses, and its solves.
 
-use super::pairs::Pair;
+use crate::coupling::pair::Pair;
 use super::{Full, WetBody};
 use crate::adjoint::kernel::Write;
 use crate::boundary::Method;

@@ -1,0 +1,280 @@
+//! Compression of one body, offline and once per shape.
+//!
+//! Around the body lie *proxies*, points at the distances d, 2d, 4d … from its surface, d the smallest
+//! gap to be resolved. Any flow that comes from there on outwards is one of sources at proxies, and what
+//! the body adds to it is known once it is known at proxies. Inside lie candidates for the body's
+//! points; with W the distance of each proxy from the surface and E the potentials of candidates at
+//! proxies,
+//!
+//! ```text
+//! W E Π = Q R             column-pivoted: the points x̄ are the first columns
+//! Ū = R⁻¹ Qᵀ W Φ_own      Φ_own the potentials of the body's own motion at the proxies
+//! T = Qᵀ W Φ W Q          Φ the potentials at proxies scattered from unit sources at proxies
+//! T = V Λ Vᵀ,  L = R⁻¹ V √Λ
+//! ```
+//!
+//! Φ is symmetric (reciprocity) and T positive definite, for a rigid body answers every flow; what the
+//! one-body method and the fit leave of asymmetry and of negative modes is reported.
+
+mod pivot;
+mod samples;
+
+use super::{Fit, Parts, ReducedBody};
+use crate::adjoint::lie::Vec3;
+use crate::boundary::{Response, Surface};
+use crate::{Error, Result};
+use faer::linalg::triangular_solve::solve_upper_triangular_in_place;
+use faer::{Mat, Par, Side};
+use nalgebra::DMatrix;
+use serde::{Deserialize, Serialize};
+
+/// Proxies are this many times their distance from the surface apart.
+const SPACING: f64 = 0.75;
+/// Most proxies at the smallest distance; a smaller gap isn't resolved on so large a body.
+const MOST_PROXIES: f64 = 1200.0;
+/// Depths of the candidates, relative to the distances of the proxies.
+const DEPTH: f64 = 0.6;
+/// Candidates are this many times their depth apart.
+const CANDIDATES: f64 = 0.9;
+/// Candidates stay inside this part of the inner tangent ball.
+const TANGENT: f64 = 0.7;
+/// One proxy in this many is kept from the fit to check it.
+const CHECK: usize = 6;
+
+/// How a body is compressed.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(default, deny_unknown_fields)]
+pub struct Settings {
+    /// Most points; by default as many as `tolerance` needs.
+    pub rank: Option<usize>,
+    /// Part of the flow around the body, relative to the largest, below which points and modes are
+    /// left out.
+    pub tolerance: f64,
+    /// Smallest gap to other bodies and walls that is resolved, m; by default a tenth of the body's
+    /// radius.
+    pub resolved_gap: Option<f64>,
+}
+
+impl Default for Settings {
+    fn default() -> Self {
+        Self {
+            rank: None,
+            tolerance: 1e-3,
+            resolved_gap: None,
+        }
+    }
+}
+
+impl Settings {
+    /// Checks the values.
+    ///
+    /// # Errors
+    /// A rank of zero, a tolerance outside 0 to 1, a gap that isn't a positive length.
+    pub fn validate(&self) -> Result<()> {
+        if self.rank == Some(0) {
+            return Err(Error::input(
+                "settings: rank",
+                0,
+                "a whole number of points a body, such as 80, or none",
+            ));
+        }
+        if !(self.tolerance > 0.0 && self.tolerance < 1.0) {
+            return Err(Error::input(
+                "settings: tolerance of the compression",
+                self.tolerance,
+                "a number between 0 and 1, such as 1e-3",
+            ));
+        }
+        match self.resolved_gap {
+            Some(gap) if !(gap > 0.0 && gap.is_finite()) => Err(Error::input(
+                "settings: resolved_gap",
+                gap,
+                "a positive length in m, or none",
+            )),
+            _ => Ok(()),
+        }
+    }
+}
+
+/// Proxies with their distances from the surface.
+struct Proxies {
+    points: Vec<Vec3>,
+    distances: Vec<f64>,
+}
+
+/// Compresses the body whose closed surface is `vertices` (m, body frame) and `faces`, and whose flow
+/// `response` knows.
+///
+/// # Errors
+/// Settings out of range, a surface that doesn't bound a volume, and what the one-body method
+/// doesn't resolve.
+pub fn compress(
+    name: &str,
+    vertices: &[Vec3],
+    faces: &[[usize; 3]],
+    response: &dyn Response,
+    settings: &Settings,
+) -> Result<ReducedBody> {
+    settings.validate()?;
+    let surface = Surface::new(name, vertices, faces)?;
+    let (centre, radius) = ball(vertices);
+    let area: f64 = surface.faces.areas.iter().sum();
+    let mut warnings = response.warnings().to_vec();
+    let asked = settings.resolved_gap.unwrap_or(0.1 * radius);
+    let least = (area / MOST_PROXIES).sqrt() / SPACING;
+    let gap = asked.max(least);
+    if settings.resolved_gap.is_some() && gap > asked {
+        warnings.push(format!(
+            "body {name:?}: gaps under {gap:.3e} m aren't resolved by its compressed sources, for all \
+             that {asked:.3e} m were asked for: its surface of {area:.3e} m² is too large; use a plane \
+             wall for a floor, or the fidelity full"
+        ));
+    }
+    let (fitted, checked) = proxies(&surface, gap, radius);
+    let (q, chosen) = skeleton(&surface, &fitted, gap, radius, settings);
+    let r = chosen.len();
+    if r == 0 {
+        return Err(Error::Unresolved {
+            place: format!("body {name:?}"),
+            quantity: "points inside for its compressed sources".into(),
+            value: 0.0,
+            limit: 1.0,
+            remedy: format!("the mesh ({} faces) is too coarse", faces.len()),
+        });
+    }
+    let weighted = |m: Mat<f64>, rows: &Proxies, columns: Option<&Proxies>| -> Mat<f64> {
+        Mat::from_fn(m.nrows(), m.ncols(), |i, j| {
+            m[(i, j)] * rows.distances[i] * columns.map_or(1.0, |c| c.distances[j])
+        })
+    };
+    let back = |mut x: Mat<f64>| -> Mat<f64> {
+        solve_upper_triangular_in_place(q.1.as_ref(), x.as_mut(), Par::Seq);
+        x
+    };
+    let own = weighted(response.radiated(&fitted.points)?, &fitted, None);
+    let strengths = back(q.0.transpose() * &own);
+    let scattered = response.scattered(&fitted.points, &fitted.points)?;
+    let scattered = weighted(scattered, &fitted, Some(&fitted));
+    let largest = scattered.norm_max();
+    let asymmetry = (&scattered - scattered.transpose()).norm_max() / largest;
+    let projected = q.0.transpose() * (&scattered * &q.0);
+    drop(scattered);
+    let symmetric = Mat::from_fn(r, r, |i, j| 0.5 * (projected[(i, j)] + projected[(j, i)]));
+    let eigen = symmetric.self_adjoint_eigen(Side::Lower).map_err(|_| Error::Unresolved {
+        place: format!("body {name:?}"),
+        quantity: "modes of its answer to the water that were found".into(),
+        value: 0.0,
+        limit: r as f64,
+        remedy: "use a more even mesh".into(),
+    })?;
+    let values: Vec<f64> = (0..r).map(|k| eigen.S()[k]).collect();
+    let top = values.iter().copied().fold(0.0, f64::max);
+    let cut = settings.tolerance * settings.tolerance * top;
+    let kept: Vec<usize> = (0..r).rev().filter(|k| values[*k] > cut).collect();
+    let modes = back(Mat::from_fn(r, kept.len(), |i, k| {
+        eigen.U()[(i, kept[k])] * values[kept[k]].sqrt()
+    }));
+    let wrong_sign = values.iter().copied().fold(0.0, f64::min).abs() / top;
+
+    // What the compressed body says at points that it was not fitted to.
+    let there = weighted(potentials(&checked.points, &chosen), &checked, None);
+    let own = weighted(response.radiated(&checked.points)?, &checked, None);
+    let radiated = relative(&(&there * &strengths), &own);
+    let scattered = response.scattered(&checked.points, &checked.points)?;
+    let scattered = weighted(scattered, &checked, Some(&checked));
+    let answer = &there * &modes;
+    let scattered = relative(&(&answer * answer.transpose()), &scattered);
+    let dense = |m: &Mat<f64>| DMatrix::from_fn(m.nrows(), m.ncols(), |i, j| m[(i, j)]);
+    ReducedBody::new(Parts {
+        name: name.to_string(),
+        modes: dense(&modes),
+        strengths: dense(&strengths),
+        added_mass: response.added_mass(),
+        centre,
+        radius,
+        volume: surface.faces.volume(),
+        fit: Fit {
+            resolved_gap: gap,
+            proxies: fitted.points.len(),
+            asymmetry,
+            radiated,
+            scattered,
+            wrong_sign,
+            body_asymmetry: response.asymmetry(),
+            warnings,
+        },
+        points: chosen,
+    })
+}
+
+/// Largest difference of two matrices, relative to the largest entry of the second.
+fn relative(a: &Mat<f64>, b: &Mat<f64>) -> f64 {
+    (a - b).norm_max() / b.norm_max()
+}
+
+/// Middle of the bounding box, and the largest distance of a vertex from it.
+fn ball(vertices: &[Vec3]) -> (Vec3, f64) {
+    let low = vertices.iter().fold(vertices[0], |m, v| m.inf(v));
+    let high = vertices.iter().fold(vertices[0], |m, v| m.sup(v));
+    let centre = 0.5 * (low + high);
+    let far = |r: f64, v: &Vec3| r.max((v - centre).norm());
+    (centre, vertices.iter().fold(0.0, far))
+}
+
+/// Proxies to fit to and others to check at.
+fn proxies(surface: &Surface, gap: f64, radius: f64) -> (Proxies, Proxies) {
+    let empty = || Proxies {
+        points: Vec::new(),
+        distances: Vec::new(),
+    };
+    let (mut fitted, mut checked) = (empty(), empty());
+    let mut offset = gap;
+    loop {
+        for (i, p) in samples::around(surface, offset, SPACING * offset).into_iter().enumerate() {
+            let to = if i % CHECK == CHECK - 1 {
+                &mut checked
+            } else {
+                &mut fitted
+            };
+            to.points.push(p);
+            to.distances.push(offset);
+        }
+        if offset > 2.0 * radius {
+            return (fitted, checked);
+        }
+        offset *= 2.0;
+    }
+}
+
+fn potentials(points: &[Vec3], sources: &[Vec3]) -> Mat<f64> {
+    Mat::from_fn(points.len(), sources.len(), |i, j| {
+        1.0 / (points[i] - sources[j]).norm()
+    })
+}
+
+/// The points chosen, with Q and R.
+fn skeleton(
+    surface: &Surface,
+    fitted: &Proxies,
+    gap: f64,
+    radius: f64,
+    settings: &Settings,
+) -> ((Mat<f64>, Mat<f64>), Vec<Vec3>) {
+    let mut candidates = Vec::new();
+    let mut depth = DEPTH * gap;
+    while depth < radius {
+        candidates.extend(samples::inside(surface, depth, CANDIDATES, TANGENT));
+        depth *= 2.0;
+    }
+    let candidates = samples::thin(candidates, 1e-3 * gap);
+    let mut field = potentials(&fitted.points, &candidates);
+    for j in 0..field.ncols() {
+        for i in 0..field.nrows() {
+            field[(i, j)] *= fitted.distances[i];
+        }
+    }
+    let most = settings.rank.unwrap_or(usize::MAX);
+    let chosen = pivot::pivoted_qr(&field, settings.tolerance, most);
+    let points = chosen.columns.iter().map(|j| candidates[*j]).collect();
+    ((chosen.q, chosen.r), points)
+}

@@ -2,7 +2,8 @@
 
 use super::{
     Points, Sources, Triangles, Write, flux_fill, flux_hvp, flux_jvp, flux_vjp, normal_fill,
-    normal_hvp, normal_jvp, normal_vjp, potential_fill, potential_hvp, potential_jvp, potential_vjp,
+    normal_hvp, normal_jvp, normal_vjp, potential_fill, potential_hvp, potential_jvp,
+    potential_vjp,
 };
 use crate::check::{Outcome, Rung, outcome};
 use crate::lie::Vec3;

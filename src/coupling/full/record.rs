@@ -2,10 +2,10 @@
 
 use super::Full;
 use super::body::unit_twists;
-use crate::coupling::pair::{Pair, wrench};
 use super::system::System;
 use crate::Result;
 use crate::adjoint::lie::{Pose, Vec3, Vec6};
+use crate::coupling::pair::{Pair, wrench};
 use crate::coupling::{Direction, PairTensor, Pullback, Record, Report, Tangent};
 use crate::solver::{Columns, transposed_product};
 use nalgebra::{DMatrix, DVector};

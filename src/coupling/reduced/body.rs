@@ -79,7 +79,11 @@ impl ReducedBody {
         let r = parts.points.len();
         let sizes = [parts.modes.nrows(), parts.strengths.nrows()];
         let bad = |what: &str, value: String, right: &str| {
-            Error::input(format!("compressed body {:?}: {what}", parts.name), value, right)
+            Error::input(
+                format!("compressed body {:?}: {what}", parts.name),
+                value,
+                right,
+            )
         };
         if r == 0 || sizes != [r, r] || parts.strengths.ncols() != 6 {
             return Err(bad(
@@ -140,7 +144,9 @@ impl ReducedBody {
         debug_assert_eq!(a.len(), m);
         for (column, c) in self.basis.column_iter().zip(coefficients) {
             if *c != 0.0 {
-                out.iter_mut().zip(column.iter()).for_each(|(o, x)| *o += c * x);
+                out.iter_mut()
+                    .zip(column.iter())
+                    .for_each(|(o, x)| *o += c * x);
             }
         }
     }

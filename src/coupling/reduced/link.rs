@@ -69,7 +69,12 @@ impl Link {
         };
         (weight[0] > 0.0).then(|| Placed {
             link: self,
-            pair: Pair::new((t, &poses[t]), (s, &poses[s]), &self.image, &parts(s).points),
+            pair: Pair::new(
+                (t, &poses[t]),
+                (s, &poses[s]),
+                &self.image,
+                &parts(s).points,
+            ),
             between,
             centre,
             weight,

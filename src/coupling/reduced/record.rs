@@ -100,9 +100,14 @@ impl<'a> ReducedRecord<'a> {
             scatter(reduced, link.target, link.source, factor, block.as_ref(), {
                 (&mut system, &mut answer, &mut direct)
             });
-            scatter(reduced, link.source, link.target, factor, block.transpose(), {
-                (&mut system, &mut answer, &mut direct)
-            });
+            scatter(
+                reduced,
+                link.source,
+                link.target,
+                factor,
+                block.transpose(),
+                { (&mut system, &mut answer, &mut direct) },
+            );
         }
         let factor = factorise(reduced, &system, poses)?;
         let mut out = Self {
@@ -127,7 +132,12 @@ impl<'a> ReducedRecord<'a> {
         out.momenta = out.impulses(basis, &out.a);
         check_energy(reduced, &out.basis, &out.momenta)?;
         if out.report.condition > ILL_CONDITIONED {
-            return Err(closest(reduced, poses, "condition number", out.report.condition));
+            return Err(closest(
+                reduced,
+                poses,
+                "condition number",
+                out.report.condition,
+            ));
         }
         Ok(out)
     }
@@ -187,7 +197,7 @@ impl<'a> ReducedRecord<'a> {
 
     /// From a potential ψ at all points (one column each): δa = (I − LᵀGL)⁻¹ Lᵀψ, the charges L δa, and
     /// the impulses 4π (Ūᵀψ + ŪᵀGL δa).
-    pub fn answer_jvp(&self, psi: &DMatrix<f64>) -> (DMatrix<f64>, DMatrix<f64>) {
+    pub fn tangent_answer(&self, psi: &DMatrix<f64>) -> (DMatrix<f64>, DMatrix<f64>) {
         let k = psi.ncols();
         let mut a = DMatrix::zeros(self.reduced.mode_count(), k);
         let mut direct = DMatrix::zeros(6 * self.reduced.bodies.len(), k);
@@ -247,13 +257,7 @@ impl<'a> ReducedRecord<'a> {
     pub fn sums(&self, placed: &Placed, bar: &[f64], columns: usize) -> Vec<f64> {
         let mut out = vec![0.0; columns * placed.pair.points.len()];
         let targets = self.reduced.bodies[placed.link.target].targets();
-        crate::adjoint::kernel::potential_sum(
-            targets,
-            &placed.pair.points,
-            bar,
-            columns,
-            &mut out,
-        );
+        crate::adjoint::kernel::potential_sum(targets, &placed.pair.points, bar, columns, &mut out);
         out
     }
 }
@@ -271,11 +275,32 @@ fn block(reduced: &Reduced, placed: &Placed) -> Mat<f64> {
     if target.points() * n <= source.points() * m {
         let mut half = Mat::zeros(target.points(), n);
         matmul(half.as_mut(), Accum::Replace, p, right, 1.0, Par::Seq);
-        matmul(out.as_mut(), Accum::Replace, left.transpose(), half.as_ref(), 1.0, Par::Seq);
+        matmul(
+            out.as_mut(),
+            Accum::Replace,
+            left.transpose(),
+            half.as_ref(),
+            1.0,
+            Par::Seq,
+        );
     } else {
         let mut half = Mat::zeros(m, source.points());
-        matmul(half.as_mut(), Accum::Replace, left.transpose(), p, 1.0, Par::Seq);
-        matmul(out.as_mut(), Accum::Replace, half.as_ref(), right, 1.0, Par::Seq);
+        matmul(
+            half.as_mut(),
+            Accum::Replace,
+            left.transpose(),
+            p,
+            1.0,
+            Par::Seq,
+        );
+        matmul(
+            out.as_mut(),
+            Accum::Replace,
+            half.as_ref(),
+            right,
+            1.0,
+            Par::Seq,
+        );
     }
     out
 }
@@ -307,7 +332,12 @@ fn scatter(
 
 fn factorise(reduced: &Reduced, system: &Mat<f64>, poses: &[Pose]) -> Result<Llt<f64>> {
     system.llt(Side::Lower).map_err(|_| {
-        closest(reduced, poses, "smallest eigenvalue of I − LᵀGL, at most", 0.0)
+        closest(
+            reduced,
+            poses,
+            "smallest eigenvalue of I − LᵀGL, at most",
+            0.0,
+        )
     })
 }
 
@@ -319,7 +349,11 @@ fn condition(factor: &Llt<f64>) -> f64 {
         low = low.min(l[(i, i)]);
         high = high.max(l[(i, i)]);
     }
-    if high > 0.0 { (high / low).powi(2) } else { 1.0 }
+    if high > 0.0 {
+        (high / low).powi(2)
+    } else {
+        1.0
+    }
 }
 
 /// What the pair of bodies that come closest doesn't resolve.
@@ -333,7 +367,10 @@ fn closest(reduced: &Reduced, poses: &[Pose], quantity: &str, value: f64) -> Err
         let points: Vec<Vec3> = s.points.iter().map(seen).collect();
         let distance = |p: &Vec3| {
             let p = world(link.target, p);
-            points.iter().map(|q| (p - q).norm()).fold(f64::INFINITY, f64::min)
+            points
+                .iter()
+                .map(|q| (p - q).norm())
+                .fold(f64::INFINITY, f64::min)
         };
         let d = t.points.iter().map(distance).fold(f64::INFINITY, f64::min);
         if d < worst.0 {
@@ -394,7 +431,11 @@ fn check_energy(reduced: &Reduced, basis: &DMatrix<f64>, momenta: &DMatrix<f64>)
         symmetric[(i, j)] / (own[i].max(f64::MIN_POSITIVE) * own[j].max(f64::MIN_POSITIVE)).sqrt()
     });
     let lowest = scaled.symmetric_eigenvalues().min();
-    let names: Vec<&str> = reduced.bodies.iter().map(|b| b.parts().name.as_str()).collect();
+    let names: Vec<&str> = reduced
+        .bodies
+        .iter()
+        .map(|b| b.parts().name.as_str())
+        .collect();
     Err(Error::Unresolved {
         place: format!("bodies {}", names.join(", ")),
         quantity: "smallest eigenvalue of their added mass, scaled by the water displaced".into(),
@@ -424,7 +465,7 @@ impl Record for ReducedRecord<'_> {
             return DVector::zeros(y.len());
         }
         let y = &self.alpha * y;
-        let psi = self.potential_jvp(&[y.as_slice()], z);
+        let psi = self.tangent_potentials(&[y.as_slice()], z);
         FLUX * self.alpha.tr_mul(&psi.column(0))
     }
 

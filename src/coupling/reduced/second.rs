@@ -38,7 +38,7 @@ impl ReducedRecord<'_> {
     }
 
     /// `DG[Z] α` at all points, a column for each of `alpha`.
-    pub(super) fn potential_jvp(&self, alpha: &[&[f64]], z: &[Vec6]) -> DMatrix<f64> {
+    pub(super) fn tangent_potentials(&self, alpha: &[&[f64]], z: &[Vec6]) -> DMatrix<f64> {
         let k = alpha.len();
         let one = |placed: &Placed| -> (Vec<f64>, Vec<f64>) {
             let link = placed.link;
@@ -52,7 +52,14 @@ impl ReducedRecord<'_> {
             let body = &self.reduced.bodies[link.target];
             let points = &placed.pair.points;
             let mut on_target = vec![0.0; k * t.len()];
-            potential_jvp(body.targets(), points, &moved.points, &at_source, k, &mut on_target);
+            potential_jvp(
+                body.targets(),
+                points,
+                &moved.points,
+                &at_source,
+                k,
+                &mut on_target,
+            );
             let mut field = vec![0.0; 3 * k * s.len()];
             potential_vjp(body.targets(), points, &at_target, k, &mut field);
             let mut on_source: Vec<f64> = (0..s.len())
@@ -61,7 +68,10 @@ impl ReducedRecord<'_> {
                 .collect();
             let [w, dw, _] = placed.weight;
             let (w, dw) = (link.factor * w, link.factor * dw * moved.rate);
-            on_target.iter_mut().chain(&mut on_source).for_each(|x| *x *= w);
+            on_target
+                .iter_mut()
+                .chain(&mut on_source)
+                .for_each(|x| *x *= w);
             if placed.fading() {
                 let p = placed.potentials(self.reduced);
                 for (i, row) in p.chunks_exact(s.len()).enumerate() {
@@ -104,8 +114,8 @@ impl ReducedRecord<'_> {
         }
         let n = responses.len();
         let alpha: Vec<&[f64]> = responses.iter().map(|r| r.alpha.as_slice()).collect();
-        let psi = self.potential_jvp(&alpha, z);
-        let (dalpha, dmomenta) = self.answer_jvp(&psi);
+        let psi = self.tangent_potentials(&alpha, z);
+        let (dalpha, dmomenta) = self.tangent_answer(&psi);
         let one = |placed: &Placed| self.link_tangent(placed, &responses, &dalpha, z);
         let parts: Vec<(Vec6, Vec6)> = self.placed.par_iter().map(one).collect();
         let mut wrench = vec![Vec6::zeros(); self.reduced.bodies.len()];
@@ -180,7 +190,10 @@ impl ReducedRecord<'_> {
             denergy += f.dot(&moved.points[j]);
             let (force, dforce) = (weight * f, weight * df + slope * moved.rate * f);
             w += six(&force, &at.cross(&force));
-            dw += six(&dforce, &(moved.points[j].cross(&force) + at.cross(&dforce)));
+            dw += six(
+                &dforce,
+                &(moved.points[j].cross(&force) + at.cross(&dforce)),
+            );
         }
         if placed.fading() {
             let distance = placed.between.norm();

@@ -44,7 +44,11 @@ pub(super) fn surface_points(surface: &Surface, spacing: f64) -> Vec<Sample> {
         let point = surface.vertices[v];
         let face = surface.triangles.iter().position(|t| t.contains(&v));
         if let Some(face) = face {
-            out.push(Sample { point, normal: *normal, face });
+            out.push(Sample {
+                point,
+                normal: *normal,
+                face,
+            });
         }
     }
     for (a, b, face, normal) in ridges {
@@ -52,7 +56,11 @@ pub(super) fn surface_points(surface: &Surface, spacing: f64) -> Vec<Sample> {
         let n = ((b - a).norm() / spacing).ceil() as usize;
         for i in 1..n {
             let point = a + (b - a) * (i as f64 / n as f64);
-            out.push(Sample { point, normal, face });
+            out.push(Sample {
+                point,
+                normal,
+                face,
+            });
         }
     }
     for (face, t) in surface.triangles.iter().enumerate() {
@@ -128,7 +136,10 @@ pub(super) fn around(surface: &Surface, offset: f64, spacing: f64) -> Vec<Vec3> 
 /// Points inside the surface, `depth` deep or as deep as the body allows there, `spacing` apart
 /// relative to their depth.
 pub(super) fn inside(surface: &Surface, depth: f64, spacing: f64, tangent: f64) -> Vec<Vec3> {
-    let samples = thin_samples(surface_points(surface, 0.7 * spacing * depth), spacing * depth);
+    let samples = thin_samples(
+        surface_points(surface, 0.7 * spacing * depth),
+        spacing * depth,
+    );
     let moved: Vec<Option<(Vec3, f64)>> = samples
         .par_iter()
         .map(|s| {

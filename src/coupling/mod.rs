@@ -18,9 +18,12 @@
 pub mod full;
 pub mod image;
 mod isolated;
+pub mod panel;
+mod settings;
 mod tensor;
 
 pub use isolated::Isolated;
+pub use panel::PanelCoupled;
 pub use tensor::PairTensor;
 
 use crate::Result;

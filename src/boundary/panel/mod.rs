@@ -28,7 +28,7 @@ use crate::adjoint::lie::{Mat6, Vec3, Vec6};
 use crate::solver::Lu;
 use crate::{Error, Result};
 use faer::Mat;
-use layers::Panels;
+pub(crate) use layers::Panels;
 
 /// Most faces of one system: its matrix takes 8·faces² bytes, 3.2 GB here.
 pub const MOST_FACES: usize = 20_000;
@@ -128,6 +128,16 @@ impl PanelBoundary {
             potential,
             faces,
         })
+    }
+
+    /// The panels as layers, body frame.
+    pub(crate) fn panels(&self) -> &Panels {
+        &self.panels
+    }
+
+    /// Factors of ½I + Ω/4π.
+    pub(crate) fn lu(&self) -> &Lu {
+        &self.lu
     }
 }
 

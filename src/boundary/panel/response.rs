@@ -2,11 +2,9 @@
 
 use super::PanelBoundary;
 use crate::Result;
-use crate::adjoint::kernel::Write;
 use crate::adjoint::lie::{Mat6, Vec3};
 use crate::boundary::Response;
 use faer::{Mat, MatRef};
-use std::f64::consts::PI;
 
 impl Response for PanelBoundary {
     fn added_mass(&self) -> Mat6 {
@@ -19,20 +17,16 @@ impl Response for PanelBoundary {
         Ok(MatRef::from_row_major_slice(&out, points.len(), 6).to_owned())
     }
 
+    /// The total potential is solved for: with no normal velocity on the body it answers
+    /// `(½I + Ω/4π) φ_t = φ_inc`, and the incoming flow, harmonic inside, drops out of Green's
+    /// identity for the rest, `φ_s(x) = −Σ Ω_j(x)/4π φ_t,j`. No single layer is needed, and the
+    /// error is smaller than with `(½I + Ω/4π) φ_s = S ∂φ_inc/∂n`.
     fn scattered(&self, sources: &[Vec3], points: &[Vec3]) -> Result<Mat<f64>> {
         let (n, columns) = (self.faces.len(), sources.len());
-        // The wall condition: q = +∂φ_inc/∂n, whose mean over a panel is −Ω/A.
-        let mut q = vec![0.0; n * columns];
-        self.panels
-            .double_layer(sources, Write::Set, &mut q, columns, 0);
-        for (q, area) in q.chunks_exact_mut(columns.max(1)).zip(&self.faces.areas) {
-            q.iter_mut().for_each(|q| *q *= -4.0 * PI / area);
-        }
-        let q = MatRef::from_row_major_slice(&q, n, columns);
-        let right = self.panels.potential(&self.faces.centres, Some(q), None);
-        let mut phi = MatRef::from_row_major_slice(&right, n, columns).to_owned();
-        self.lu.solve(phi.as_mut());
-        let out = self.panels.potential(points, Some(q), Some(phi.as_ref()));
+        let centres = &self.faces.centres;
+        let mut total = Mat::from_fn(n, columns, |i, j| 1.0 / (centres[i] - sources[j]).norm());
+        self.lu.solve(total.as_mut());
+        let out = self.panels.potential(points, None, Some(total.as_ref()));
         Ok(MatRef::from_row_major_slice(&out, points.len(), columns).to_owned())
     }
 

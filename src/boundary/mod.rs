@@ -1,15 +1,18 @@
 //! One body in unbounded fluid, offline and once per shape, by one of several methods.
 //!
 //! All speak of the same flow: velocity −∇φ, density 1, body frame, body twists `ν = (u, ω)` about the
-//! body's origin. [`mfs`] is what the coupled system of all bodies is built from; [`Response`] is what
-//! any method must answer for a body to be compressed.
+//! body's origin. [`mfs`] is what the coupled system of all bodies is built from; [`panel`] needs no
+//! sources inside and is the more accurate on thin bodies and sharp edges; [`Response`] is what any
+//! method must answer for a body to be compressed.
 
 pub mod mfs;
+pub mod panel;
 mod response;
 mod surface;
 
 pub use mfs::{BodyBoundary, Depth, Method, Readout, RowScaling, Settings, depth, readout};
 pub(crate) use mfs::{solve_upper, solve_upper_transpose};
+pub use panel::PanelBoundary;
 pub use response::Response;
 pub use surface::Faces;
 pub(crate) use surface::Surface;

@@ -275,9 +275,14 @@ impl<'a> Surface<'a> {
     }
 }
 
-/// max |M − Mᵀ|_ij / √(M_ii M_jj). A diagonal entry under a hundredth of the displaced fluid's own
-/// inertia (a sphere's rotation) counts as that hundredth.
+/// max |M − Mᵀ|_ij / √(M_ii M_jj), by [`scaled`].
 pub(crate) fn asymmetry(m: &Mat6, faces: &Faces) -> f64 {
+    scaled(&(m - m.transpose()), m, faces)
+}
+
+/// max |D_ij| / √(M_ii M_jj). A diagonal entry under a hundredth of the displaced fluid's own
+/// inertia (a sphere's rotation) counts as that hundredth.
+pub(crate) fn scaled(difference: &Mat6, m: &Mat6, faces: &Faces) -> f64 {
     let area: f64 = faces.areas.iter().sum();
     let pairs = || faces.centres.iter().zip(&faces.areas);
     let middle = pairs().map(|(c, a)| c * *a).sum::<Vec3>() / area;
@@ -292,9 +297,9 @@ pub(crate) fn asymmetry(m: &Mat6, faces: &Faces) -> f64 {
     };
     let mut worst = 0.0_f64;
     for i in 0..6 {
-        for j in 0..i {
+        for j in 0..6 {
             let scale = (diagonal(i) * diagonal(j)).sqrt();
-            worst = worst.max((m[(i, j)] - m[(j, i)]).abs() / scale);
+            worst = worst.max(difference[(i, j)].abs() / scale);
         }
     }
     worst

@@ -19,10 +19,13 @@ pub mod full;
 pub mod image;
 mod isolated;
 mod pair;
+pub mod panel;
 pub mod reduced;
+mod settings;
 mod tensor;
 
 pub use isolated::Isolated;
+pub use panel::PanelCoupled;
 pub use tensor::PairTensor;
 
 use crate::Result;

@@ -1,11 +1,13 @@
-//! GMRES with a right preconditioner, for the paper's square system.
+//! GMRES with a right preconditioner, for square systems.
 
 use super::{Columns, Outcome};
 
-/// Solves `A x = b` column by column: full Arnoldi with modified Gram–Schmidt and Givens rotations, restarted every
-/// `restart` iterations, until `‖b − A x‖ ≤ tolerance · ‖b‖`.
+/// Solves `A x = b` for several columns at once, each with its own Krylov space: full Arnoldi with
+/// modified Gram–Schmidt and Givens rotations, restarted every `restart` iterations, until
+/// `‖b − A x‖ ≤ tolerance · ‖b‖`.
 ///
-/// `apply` is A, `precondition` the right preconditioner (x = M⁻¹ y).
+/// `apply` is A, `precondition` the right preconditioner (x = M⁻¹ y). A column of zeros answers zero
+/// at no iteration.
 ///
 /// # References
 /// Saad and Schultz, SIAM J. Sci. Stat. Comput. 7 (1986) 856.
@@ -17,131 +19,273 @@ pub fn gmres(
     max_iterations: usize,
     restart: usize,
 ) -> Outcome {
-    let mut x = Columns::zeros(b.rows, b.columns);
-    let (mut most, mut worst) = (0, 0.0_f64);
-    for k in 0..b.columns {
-        let right = Columns::from_columns(&[&b.column(k)]);
-        let (column, iterations, residual) = single(
-            &apply,
-            &precondition,
-            &right,
-            tolerance,
-            max_iterations,
-            restart,
-        );
-        for (i, value) in column.data.iter().enumerate() {
-            x.data[i * b.columns + k] = *value;
+    let n = b.columns;
+    let mut x = Columns::zeros(b.rows, n);
+    let size = norms(b);
+    let mut residual: Vec<f64> = size
+        .iter()
+        .map(|s| match s {
+            0.0 => 0.0,
+            s if s.is_finite() => 1.0,
+            _ => f64::INFINITY,
+        })
+        .collect();
+    let mut iterations = vec![0; n];
+    // A column goes on while there is something to gain.
+    let wanted = |k: &usize| residual[*k] > tolerance && residual[*k].is_finite();
+    let mut active: Vec<usize> = (0..n).filter(wanted).collect();
+    let mut r = select(b, &active);
+    while !active.is_empty() {
+        let limit = |k: usize| restart.min(max_iterations - iterations[k]);
+        let mut spaces: Vec<Space> = active
+            .iter()
+            .zip(norms(&r))
+            .map(|(k, beta)| Space::new(beta, 0.5 * tolerance * size[*k], limit(*k)))
+            .collect();
+        let mut step = arnoldi(&apply, &precondition, r, &mut spaces);
+        precondition(&mut step);
+        for (c, k) in active.iter().enumerate() {
+            iterations[*k] += spaces[c].columns.len();
+            for i in 0..b.rows {
+                x.data[i * n + k] += step.at(i, c);
+            }
         }
-        most = most.max(iterations);
-        worst = worst.max(residual);
+        r = select(b, &active);
+        let ones = vec![-1.0; active.len()];
+        r.add_scaled(&apply(&select(&x, &active)), &ones);
+        let mut left = Vec::new();
+        for (c, after) in norms(&r).into_iter().enumerate() {
+            let (k, space) = (active[c], &spaces[c]);
+            residual[k] = after / size[k];
+            if residual[k].is_nan() {
+                residual[k] = f64::INFINITY;
+            }
+            // Where rounding ended the progress, what was reached is reported.
+            let stalled = after > 0.9 * space.beta && space.columns.len() < restart;
+            let more = residual[k] > tolerance && residual[k].is_finite() && !stalled;
+            if more && iterations[k] < max_iterations {
+                left.push(c);
+            }
+        }
+        r = select(&r, &left);
+        active = left.iter().map(|c| active[*c]).collect();
     }
     Outcome {
         x,
-        iterations: most,
-        residual: worst,
+        iterations: iterations.into_iter().max().unwrap_or(0),
+        residual: residual.into_iter().fold(0.0, f64::max),
     }
 }
 
-fn norm(x: &Columns) -> f64 {
-    x.dots(x)[0].sqrt()
+/// One column's small problem: the Hessenberg matrix, rotated to a triangle.
+struct Space {
+    /// Norm of the residual that it began with.
+    beta: f64,
+    /// Residual at which it ends.
+    goal: f64,
+    limit: usize,
+    columns: Vec<Vec<f64>>,
+    rotations: Vec<(f64, f64)>,
+    right: Vec<f64>,
+    done: bool,
 }
 
-fn single(
-    apply: &impl Fn(&Columns) -> Columns,
-    precondition: &impl Fn(&mut Columns),
-    b: &Columns,
-    tolerance: f64,
-    max_iterations: usize,
-    restart: usize,
-) -> (Columns, usize, f64) {
-    let size = norm(b);
-    let mut x = Columns::zeros(b.rows, 1);
-    if size == 0.0 {
-        return (x, 0, 0.0);
-    }
-    if !size.is_finite() {
-        return (x, 0, f64::INFINITY);
-    }
-    let mut iterations = 0;
-    loop {
-        let mut r = b.clone();
-        r.add_scaled(&apply(&x), &[-1.0]);
-        let beta = norm(&r);
-        if beta <= tolerance * size || iterations >= max_iterations {
-            return (x, iterations, beta / size);
+impl Space {
+    fn new(beta: f64, goal: f64, limit: usize) -> Self {
+        Self {
+            beta,
+            goal,
+            limit,
+            columns: Vec::new(),
+            rotations: Vec::new(),
+            right: vec![beta],
+            done: false,
         }
-        let before = beta;
-        let mut basis = vec![scaled(&r, 1.0 / beta)];
-        let mut h: Vec<Vec<f64>> = Vec::new();
-        let mut rotations: Vec<(f64, f64)> = Vec::new();
-        let mut g = vec![beta];
-        for j in 0..restart {
-            iterations += 1;
-            let mut z = basis[j].clone();
-            precondition(&mut z);
-            let mut w = apply(&z);
-            let mut column = Vec::with_capacity(j + 2);
-            for v in &basis {
-                let c = w.dots(v)[0];
-                w.add_scaled(v, &[-c]);
-                column.push(c);
-            }
-            let last = norm(&w);
-            for (i, (c, s)) in rotations.iter().enumerate() {
-                let (a, b) = (column[i], column[i + 1]);
-                column[i] = c * a + s * b;
-                column[i + 1] = c * b - s * a;
-            }
-            let radius = column[j].hypot(last);
-            let (c, s) = if radius > 0.0 {
-                (column[j] / radius, last / radius)
-            } else {
-                (1.0, 0.0)
-            };
-            column[j] = radius;
-            rotations.push((c, s));
-            let top = g[j];
-            g[j] = c * top;
-            g.push(-s * top);
-            h.push(column);
-            let done = g[j + 1].abs() <= 0.5 * tolerance * size
-                || last <= f64::EPSILON * radius
-                || iterations >= max_iterations;
-            if done || j + 1 == restart {
-                break;
-            }
-            basis.push(scaled(&w, 1.0 / last));
+    }
+
+    /// Takes the next column: products with the basis so far, and the norm of what is left.
+    fn push(&mut self, mut column: Vec<f64>, last: f64) {
+        let j = self.columns.len();
+        for (i, (c, s)) in self.rotations.iter().enumerate() {
+            let (a, b) = (column[i], column[i + 1]);
+            column[i] = c * a + s * b;
+            column[i + 1] = c * b - s * a;
         }
-        let m = h.len();
+        let radius = column[j].hypot(last);
+        let (c, s) = if radius > 0.0 {
+            (column[j] / radius, last / radius)
+        } else {
+            (1.0, 0.0)
+        };
+        column[j] = radius;
+        self.rotations.push((c, s));
+        let top = self.right[j];
+        self.right[j] = c * top;
+        self.right.push(-s * top);
+        self.columns.push(column);
+        self.done = self.right[j + 1].abs() <= self.goal
+            || last <= f64::EPSILON * radius
+            || j + 1 >= self.limit;
+    }
+
+    /// Coefficients of the basis.
+    fn coefficients(&self) -> Vec<f64> {
+        let m = self.columns.len();
         let mut y = vec![0.0; m];
         for i in (0..m).rev() {
-            let sum: f64 = (i + 1..m).map(|k| h[k][i] * y[k]).sum();
-            y[i] = if h[i][i] != 0.0 {
-                (g[i] - sum) / h[i][i]
-            } else {
-                0.0
+            let sum: f64 = (i + 1..m).map(|k| self.columns[k][i] * y[k]).sum();
+            y[i] = match self.columns[i][i] {
+                0.0 => 0.0,
+                h => (self.right[i] - sum) / h,
             };
         }
-        let mut step = Columns::zeros(b.rows, 1);
-        for (v, c) in basis.iter().zip(&y) {
-            step.add_scaled(v, &[*c]);
-        }
-        precondition(&mut step);
-        x.add_scaled(&step, &[1.0]);
-        let mut r = b.clone();
-        r.add_scaled(&apply(&x), &[-1.0]);
-        let after = norm(&r);
-        if after > 0.9 * before && m < restart {
-            // Rounding ended the progress: report what was reached.
-            return (x, iterations, after / size);
-        }
+        y
     }
 }
 
-fn scaled(x: &Columns, factor: f64) -> Columns {
-    Columns {
-        data: x.data.iter().map(|v| v * factor).collect(),
-        rows: x.rows,
-        columns: x.columns,
+/// Builds every column's basis from its residual until all are done; the columns' best combinations,
+/// still to be preconditioned.
+fn arnoldi(
+    apply: &impl Fn(&Columns) -> Columns,
+    precondition: &impl Fn(&mut Columns),
+    mut v: Columns,
+    spaces: &mut [Space],
+) -> Columns {
+    let all = v.columns;
+    for (c, space) in spaces.iter().enumerate() {
+        scale(&mut v, c, 1.0 / space.beta);
+    }
+    // Vectors of each step, and which columns they belong to.
+    let mut basis = vec![(v, (0..all).collect::<Vec<usize>>())];
+    loop {
+        let (v, owners) = &basis[basis.len() - 1];
+        let mut w = v.clone();
+        precondition(&mut w);
+        w = apply(&w);
+        let mut products = vec![Vec::with_capacity(basis.len() + 1); owners.len()];
+        for (v, of) in &basis {
+            let v = match of == owners {
+                true => v,
+                false => &select(v, &places(of, owners)),
+            };
+            let dots = w.dots(v);
+            w.add_scaled(v, &dots.iter().map(|d| -d).collect::<Vec<_>>());
+            for (p, d) in products.iter_mut().zip(dots) {
+                p.push(d);
+            }
+        }
+        let mut left = Vec::new();
+        for (c, (column, last)) in products.into_iter().zip(norms(&w)).enumerate() {
+            let space = &mut spaces[owners[c]];
+            space.push(column, last);
+            if !space.done {
+                scale(&mut w, c, 1.0 / last);
+                left.push(c);
+            }
+        }
+        if left.is_empty() {
+            break;
+        }
+        let owners = left.iter().map(|c| owners[*c]).collect();
+        basis.push((select(&w, &left), owners));
+    }
+    let mut out = Columns::zeros(basis[0].0.rows, all);
+    let coefficients: Vec<Vec<f64>> = spaces.iter().map(Space::coefficients).collect();
+    for (j, (v, owners)) in basis.iter().enumerate() {
+        for i in 0..v.rows {
+            for (x, k) in v.row(i).iter().zip(owners) {
+                out.data[i * all + k] += x * coefficients[*k][j];
+            }
+        }
+    }
+    out
+}
+
+/// Where each of `owners` is in `of`.
+fn places(of: &[usize], owners: &[usize]) -> Vec<usize> {
+    let place = |k: &usize| of.iter().position(|o| o == k);
+    owners.iter().filter_map(place).collect()
+}
+
+fn norms(x: &Columns) -> Vec<f64> {
+    x.dots(x).into_iter().map(f64::sqrt).collect()
+}
+
+fn select(x: &Columns, columns: &[usize]) -> Columns {
+    Columns::from_fn(x.rows, columns.len(), |i, c| x.at(i, columns[c]))
+}
+
+fn scale(x: &mut Columns, column: usize, factor: f64) {
+    let n = x.columns;
+    x.data[column..]
+        .iter_mut()
+        .step_by(n)
+        .for_each(|v| *v *= factor);
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::solver::product;
+
+    /// Well conditioned, not symmetric.
+    fn matrix(n: usize) -> Vec<f64> {
+        let entry = |i: usize, j: usize| {
+            let noise = (1.3 * i as f64 + 2.9 * (j * j) as f64).sin() / n as f64;
+            noise + if i == j { 1.0 + 0.02 * i as f64 } else { 0.0 }
+        };
+        (0..n * n).map(|k| entry(k / n, k % n)).collect()
+    }
+
+    #[test]
+    fn columns_together_answer_as_alone() {
+        let n = 60;
+        let a = matrix(n);
+        let apply = |x: &Columns| product(&a, n, x);
+        let jacobi = |x: &mut Columns| {
+            for i in 0..n {
+                let d = a[i * n + i];
+                x.slice_mut(i, i + 1).iter_mut().for_each(|v| *v /= d);
+            }
+        };
+        // Zero, an eigenvector-like easy one, hard ones.
+        let b = Columns::from_fn(n, 4, |i, k| match k {
+            0 => 0.0,
+            1 => f64::from(i == 0),
+            k => (0.4 * (i * k) as f64).cos(),
+        });
+        for restart in [3, 10, 60] {
+            let together = gmres(apply, jacobi, &b, 1e-11, 500, restart);
+            assert!(together.residual <= 1e-11, "{}", together.residual);
+            let mut most = 0;
+            for k in 0..4 {
+                let one = Columns::from_columns(&[&b.column(k)]);
+                let alone = gmres(apply, jacobi, &one, 1e-11, 500, restart);
+                most = most.max(alone.iterations);
+                assert_eq!(together.x.column(k), alone.x.data, "{restart} {k}");
+            }
+            assert_eq!(together.iterations, most);
+            assert!(most > 3, "{most}");
+        }
+    }
+
+    #[test]
+    fn gives_up_and_says_so() {
+        let n = 60;
+        let a = matrix(n);
+        let apply = |x: &Columns| product(&a, n, x);
+        let b = Columns::from_fn(n, 2, |i, k| (0.4 * (i * (k + 1)) as f64).cos());
+        let short = gmres(apply, |_| (), &b, 1e-11, 4, 100);
+        assert_eq!(short.iterations, 4);
+        assert!(short.residual > 1e-11 && short.residual < 1.0);
+        // A singular matrix can't reach its right-hand side.
+        let nothing = |x: &Columns| Columns::zeros(x.rows, x.columns);
+        let none = gmres(nothing, |_| (), &b, 1e-11, 50, 100);
+        assert_eq!(none.residual, 1.0);
+        let wild = Columns::from_fn(n, 1, |_, _| f64::NAN);
+        assert_eq!(
+            gmres(apply, |_| (), &wild, 1e-11, 9, 9).residual,
+            f64::INFINITY
+        );
     }
 }

@@ -7,9 +7,11 @@
 mod cgls;
 mod columns;
 mod gmres;
+mod lu;
 mod product;
 
 pub use cgls::{Outcome, cgls};
 pub use columns::Columns;
 pub use gmres::gmres;
+pub use lu::Lu;
 pub use product::{normal_product, product, transposed_product};

@@ -6,6 +6,7 @@ use super::system::System;
 use crate::Result;
 use crate::adjoint::lie::{Pose, Vec3, Vec6};
 use crate::coupling::pair::{Pair, wrench};
+use crate::coupling::settings::asymmetry;
 use crate::coupling::{Direction, PairTensor, Pullback, Record, Report, Tangent};
 use crate::solver::{Columns, transposed_product};
 use nalgebra::{DMatrix, DVector};
@@ -87,29 +88,8 @@ impl<'a> FullRecord<'a> {
                 .map(|s| g.at(s, i) * solved.a.at(s, j))
                 .sum::<f64>()
         });
-        // A column that hardly moves water (a round body's spin) counts as a hundredth of the water displaced.
-        let displaced = |i: usize| -> f64 {
-            let bodies = full.bodies.iter().enumerate();
-            let inertia = bodies.map(|(b, body)| {
-                let volume = body.boundary.faces.volume();
-                let twist = basis.fixed_view::<6, 1>(6 * b, i);
-                let (u, w) = (twist.fixed_rows::<3>(0), twist.fixed_rows::<3>(3));
-                volume * (u.norm_squared() + volume.cbrt().powi(2) * w.norm_squared())
-            });
-            inertia.sum()
-        };
-        let diagonal: Vec<f64> = (0..k)
-            .map(|i| raw[(i, i)].abs().max(0.01 * displaced(i)))
-            .collect();
-        let mut asymmetry = 0.0_f64;
-        for i in 0..k {
-            for j in 0..i {
-                let scale = (diagonal[i] * diagonal[j]).sqrt();
-                if scale > 0.0 {
-                    asymmetry = asymmetry.max((raw[(i, j)] - raw[(j, i)]).abs() / scale);
-                }
-            }
-        }
+        let volume = |b: usize| full.bodies[b].boundary.faces.volume();
+        let asymmetry = asymmetry(&raw, basis, volume);
         let report = Report {
             iterations: solved.iterations,
             residual: solved.residual,

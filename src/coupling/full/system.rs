@@ -4,6 +4,7 @@ use super::{Full, WetBody};
 use crate::adjoint::kernel::Write;
 use crate::boundary::Method;
 use crate::coupling::pair::Pair;
+use crate::coupling::settings::check_limits;
 use crate::solver::{Columns, Outcome, cgls, gmres, normal_product, product, transposed_product};
 use crate::{Error, Result};
 use faer::linalg::solvers::Qr;
@@ -65,20 +66,7 @@ impl Default for SolveSettings {
 
 impl SolveSettings {
     pub(super) fn validate(&self, bodies: &[Arc<WetBody>]) -> Result<()> {
-        if !(self.tolerance > 0.0 && self.tolerance < 1.0) {
-            return Err(Error::input(
-                "settings: tolerance",
-                self.tolerance,
-                "must lie between 0 and 1, e.g. 1e-8",
-            ));
-        }
-        if self.max_iterations == 0 {
-            return Err(Error::input(
-                "settings: max_iterations",
-                0,
-                "must be at least 1",
-            ));
-        }
+        check_limits(self.tolerance, self.max_iterations)?;
         let square = |b: &Arc<WetBody>| b.boundary.settings.method == Method::MfsFace;
         if self.solver == Solver::Gmres
             && let Some(body) = bodies.iter().find(|b| !square(b))

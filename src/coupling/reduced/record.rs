@@ -106,7 +106,7 @@ impl<'a> ReducedRecord<'a> {
                 link.target,
                 factor,
                 block.transpose(),
-                { (&mut system, &mut answer, &mut direct) },
+                (&mut system, &mut answer, &mut direct),
             );
         }
         let factor = factorise(reduced, &system, poses)?;

@@ -1,0 +1,159 @@
+//! One body in unbounded fluid by a direct boundary element method with constant panels.
+//!
+//! Green's third identity for the flow outside, velocity −∇φ, q = −∂φ/∂n the normal velocity into
+//! the fluid, collocated at the panels' centroids:
+//!
+//! ```text
+//! φ(x) = Σ_j S_j(x) q_j − Ω_j(x)/4π φ_j                      x in the fluid
+//! (½ I + Ω/4π) φ = S q                                     on the body
+//! S_j(x) = 1/4π ∫_j 1/|x − y| dA,  Ω_j(x) = ∫_j n·(y − x)/|y − x|³ dA,  Ω_ii = 0
+//! M = sym(Σ_i A_i q_i φ_iᵀ)                                for the six unit twists
+//! ```
+//!
+//! There is no depth to choose, the condition number stays small (a constant potential answers
+//! itself, since the solid angles of a closed surface add up to 2π on it), and the error is of the second
+//! order in the edge length, so that two meshes give a better value and an estimate: see
+//! [`richardson`](fn@richardson).
+//!
+//! # References
+//! J. L. Hess, A. M. O. Smith, Prog. Aerosp. Sci. 8 (1967) 1–138 (panels); L. Morino, C.-C. Kuo, AIAA
+//! J. 12 (1974) 191–197 (the direct form).
+
+mod layers;
+mod response;
+
+use super::surface::{Faces, Surface, asymmetry};
+use crate::adjoint::kernel::Write;
+use crate::adjoint::lie::{Mat6, Vec3, Vec6};
+use crate::solver::Lu;
+use crate::{Error, Result};
+use faer::Mat;
+pub(crate) use layers::Panels;
+
+/// Most faces of one system: its matrix takes 8·faces² bytes, 3.2 GB here.
+pub const MOST_FACES: usize = 20_000;
+/// Condition number above which results lose digits that matter.
+const ILL_CONDITIONED: f64 = 1e6;
+
+/// One body's panels: constant in the body frame, for density 1, immutable. Equal shapes may share
+/// one (`Arc`).
+#[derive(Clone, Debug)]
+pub struct PanelBoundary {
+    /// Name, for messages.
+    pub name: String,
+    /// Geometry of the panels.
+    pub faces: Faces,
+    /// Added mass about the body's origin, symmetric, for density 1: kg, kg·m, kg·m².
+    pub added_mass: Mat6,
+    /// max |M − Mᵀ|_ij / √(M_ii M_jj) before symmetrising: a free estimate of the error.
+    pub asymmetry: f64,
+    /// Condition number of ½I + Ω/4π (estimated from below).
+    pub condition: f64,
+    /// What the user should know, each with the body's name and its numbers.
+    pub warnings: Vec<String>,
+    panels: Panels,
+    lu: Lu,
+    /// q, normal velocity of each panel per unit twist, panels × 6.
+    normal_velocity: Mat<f64>,
+    /// φ, potential of each panel per unit twist, panels × 6.
+    potential: Mat<f64>,
+}
+
+impl PanelBoundary {
+    /// Solves for the closed surface of `vertices` (m, body frame) and `faces` (counter-clockwise
+    /// seen from the fluid).
+    ///
+    /// # Errors
+    /// A surface that isn't closed or is turned inside out, more than [`MOST_FACES`] faces, and
+    /// a mesh too coarse to resolve the body.
+    pub fn new(name: &str, vertices: &[Vec3], faces: &[[usize; 3]]) -> Result<Self> {
+        check_size(&format!("body \"{name}\""), faces.len())?;
+        let surface = Surface::new(name, vertices, faces)?;
+        let panels = Panels::new(&surface);
+        let faces = surface.faces;
+        let n = faces.len();
+        let mut matrix = vec![0.0; n * n];
+        panels.double_layer(&faces.centres, Write::Set, &mut matrix, n, 0);
+        for i in 0..n {
+            matrix[i * n + i] = 0.5;
+        }
+        let lu = Lu::new(matrix, n);
+        let normal_velocity = Mat::from_fn(n, 6, |i, k| faces.twist_flux(i)[k] / faces.areas[i]);
+        let right = panels.potential(&faces.centres, Some(normal_velocity.as_ref()), None);
+        let mut potential = Mat::from_fn(n, 6, |i, k| right[6 * i + k]);
+        lu.solve(potential.as_mut());
+        let mut raw = Mat6::zeros();
+        for i in 0..n {
+            let phi = Vec6::from_fn(|k, _| potential[(i, k)]);
+            raw += faces.twist_flux(i) * phi.transpose();
+        }
+        let condition = lu.condition();
+        let unresolved = |quantity: &str, value: f64, limit: f64| Error::Unresolved {
+            place: format!("body \"{name}\""),
+            quantity: quantity.into(),
+            value,
+            limit,
+            remedy: format!("the mesh ({n} faces) is too coarse for it; use more faces"),
+        };
+        if !(condition.is_finite() && raw.iter().all(|x| x.is_finite())) {
+            let quantity = "condition number of the panel matrix";
+            return Err(unresolved(quantity, condition, ILL_CONDITIONED));
+        }
+        let added_mass = 0.5 * (raw + raw.transpose());
+        let translation = added_mass.fixed_view::<3, 3>(0, 0).symmetric_eigenvalues();
+        if translation.min() <= 0.0 {
+            let quantity = "smallest added mass in translation, relative to the displaced";
+            return Err(unresolved(
+                quantity,
+                translation.min() / faces.volume(),
+                0.0,
+            ));
+        }
+        let mut warnings = Vec::new();
+        if condition > ILL_CONDITIONED {
+            warnings.push(format!(
+                "body \"{name}\": condition number {condition:.1e} of the panel matrix is above \
+                 {ILL_CONDITIONED:.0e}; use more, and more even, faces"
+            ));
+        }
+        Ok(Self {
+            name: name.to_string(),
+            asymmetry: asymmetry(&raw, &faces),
+            added_mass,
+            condition,
+            warnings,
+            panels,
+            lu,
+            normal_velocity,
+            potential,
+            faces,
+        })
+    }
+
+    /// The panels as layers, body frame.
+    pub(crate) fn panels(&self) -> &Panels {
+        &self.panels
+    }
+
+    /// Factors of ½I + Ω/4π.
+    pub(crate) fn lu(&self) -> &Lu {
+        &self.lu
+    }
+}
+
+/// Refuses systems whose matrix would not fit.
+pub(crate) fn check_size(what: &str, faces: usize) -> Result<()> {
+    if faces <= MOST_FACES {
+        return Ok(());
+    }
+    let gigabytes = 8e-9 * (faces as f64).powi(2);
+    Err(Error::Unsupported {
+        what: format!("the panel method for {what} with {faces} faces"),
+        why: format!(
+            "its matrix would take {gigabytes:.1} GB; at most {MOST_FACES} faces (3.2 GB) are solved"
+        ),
+        instead:
+            "use coarser meshes: a few thousand faces are accurate to a few tenths of a percent"
+                .into(),
+    })
+}

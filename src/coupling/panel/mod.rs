@@ -1,0 +1,154 @@
+//! All bodies in one panel system: the reference that the other fidelities are measured against.
+//!
+//! The unknowns are the potentials of all panels ([`crate::boundary::panel`]). Walls mirror the flow,
+//! so an image body has the potentials and normal velocities of the body itself, and its layers at x
+//! are those of the body at the mirrored point. Over the bodies' images, with q = F x̄ the normal
+//! velocities and D the panels' areas,
+//!
+//! ```text
+//! A φ = S q,   A = ½ I + Σ_images Ω/4π,   S = Σ_images S_image
+//! E(x, y) = sym( (D F x)ᵀ A⁻¹ S F y )
+//! M̄ x̄ = ½ { Fᵀ D φ + Fᵀ Sᵀ μ },   Aᵀ μ = D F x̄
+//! ```
+//!
+//! A body's own block of A doesn't change: its factors, made once, precondition the iteration. Values
+//! alone are offered: no derivatives. Bodies and images that come closer than about half an edge
+//! length lose accuracy.
+
+mod record;
+mod system;
+
+use super::image::Image;
+use super::settings::check_limits;
+use super::{Coupling, Record};
+use crate::adjoint::lie::{Pose, Vec3};
+use crate::boundary::PanelBoundary;
+use crate::boundary::panel::check_size;
+use crate::scene::Wall;
+use crate::{Error, Result};
+use nalgebra::DMatrix;
+use serde::{Deserialize, Serialize};
+use std::ops::Range;
+use std::sync::Arc;
+
+/// How the coupled panel system is solved.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "kebab-case")]
+pub enum Solver {
+    /// GMRES, preconditioned by each body's own factors. Stores the blocks between different bodies
+    /// (and those with images), 8 bytes an entry.
+    #[default]
+    Gmres,
+    /// Dense LU of the whole matrix: 8·faces² bytes, and faces³ operations.
+    Lu,
+}
+
+/// Settings of the coupled panel solve.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields, default)]
+pub struct SolveSettings {
+    /// The solver.
+    pub solver: Solver,
+    /// Relative residual ‖b − A x‖ ≤ tolerance ‖b‖ at which GMRES stops.
+    pub tolerance: f64,
+    /// Iterations after which it gives up with an error.
+    pub max_iterations: usize,
+}
+
+impl Default for SolveSettings {
+    fn default() -> Self {
+        Self {
+            solver: Solver::default(),
+            tolerance: 1e-8,
+            max_iterations: 500,
+        }
+    }
+}
+
+/// All bodies coupled through one panel system, and plane walls by images.
+pub struct PanelCoupled {
+    bodies: Vec<Arc<PanelBoundary>>,
+    images: Vec<Image>,
+    /// A point and the unit normal into the fluid of each wall.
+    walls: Vec<(Vec3, Vec3)>,
+    settings: SolveSettings,
+    faces: Vec<Range<usize>>,
+}
+
+impl PanelCoupled {
+    /// From the bodies, the walls (one, or mutually perpendicular ones) and the solver's settings.
+    ///
+    /// # Errors
+    /// Walls that don't close under reflection, settings out of range, and more than
+    /// [`MOST_FACES`](crate::boundary::panel::MOST_FACES) faces in all.
+    pub fn new(
+        bodies: Vec<Arc<PanelBoundary>>,
+        walls: &[Wall],
+        settings: SolveSettings,
+    ) -> Result<Self> {
+        check_limits(settings.tolerance, settings.max_iterations)?;
+        let mut at = 0;
+        let faces: Vec<Range<usize>> = bodies
+            .iter()
+            .map(|b| {
+                let from = at;
+                at += b.faces.len();
+                from..at
+            })
+            .collect();
+        check_size(&format!("{} bodies", bodies.len()), at)?;
+        Ok(Self {
+            images: Image::of_walls(walls)?,
+            walls: walls
+                .iter()
+                .map(|w| (Vec3::from(w.point), Vec3::from(w.normal).normalize()))
+                .collect(),
+            bodies,
+            settings,
+            faces,
+        })
+    }
+
+    /// Number of panels of all bodies.
+    fn rows(&self) -> usize {
+        self.faces.last().map_or(0, |r| r.end)
+    }
+}
+
+impl Coupling for PanelCoupled {
+    fn bodies(&self) -> usize {
+        self.bodies.len()
+    }
+
+    fn unknowns(&self) -> usize {
+        self.rows()
+    }
+
+    /// # Errors
+    /// Derivatives asked for ([`Error::Unsupported`]), a solve that misses its tolerance, bodies
+    /// that overlap or reach through a wall. Overlap is noticed where a panel's centroid is inside
+    /// another body.
+    fn evaluate(
+        &self,
+        poses: &[Pose],
+        basis: &DMatrix<f64>,
+        derivative: bool,
+    ) -> Result<Box<dyn Record + '_>> {
+        if derivative {
+            return Err(no_derivative("the pose gradient"));
+        }
+        Ok(Box::new(record::PanelRecord::new(self, poses, basis)?))
+    }
+}
+
+/// The panel method answers values only.
+fn no_derivative(what: &str) -> Error {
+    Error::Unsupported {
+        what: format!("{what} of the coupled panel method"),
+        why: "it has values only, as a reference".into(),
+        instead:
+            "use the coupled system of fundamental solutions (fidelity `full`), which has all \
+                  derivatives"
+                .into(),
+    }
+}

@@ -1,0 +1,314 @@
+//! The matrix between panels at given poses, and its solves.
+
+use super::{PanelCoupled, Solver};
+use crate::adjoint::kernel::Write;
+use crate::adjoint::lie::{Pose, Vec3};
+use crate::coupling::image::Image;
+use crate::solver::{Columns, Lu, gmres, product, transposed_product};
+use crate::{Error, Result};
+use faer::MatMut;
+use rayon::prelude::*;
+
+/// GMRES iterations before a restart.
+const RESTART: usize = 100;
+/// Share of the full solid angle that a body may fill, seen from a panel of another: 0 outside, ½ on
+/// its surface, 1 inside.
+const INSIDE: f64 = 0.25;
+
+/// Layers of one body at the panels of another, or of its images at its own.
+struct Block {
+    source: usize,
+    target: usize,
+    /// Ω/4π, `[panel of source][panel of target]`.
+    data: Vec<f64>,
+}
+
+/// A = ½I + Ω/4π at given poses.
+pub(super) struct System<'a> {
+    coupled: &'a PanelCoupled,
+    matrix: Matrix,
+}
+
+enum Matrix {
+    /// All but each body's own block, which is known by its factors.
+    Blocks(Vec<Block>),
+    Factored(Lu),
+}
+
+/// Solution, iterations of the slowest column, and largest relative residual.
+pub(super) struct Solved {
+    pub x: Columns,
+    pub iterations: usize,
+    pub residual: f64,
+}
+
+/// Centroids of body `target` in the frame of body `source`, mirrored.
+pub(super) fn seen_from(
+    coupled: &PanelCoupled,
+    poses: &[Pose],
+    image: &Image,
+    source: usize,
+    target: usize,
+) -> Vec<Vec3> {
+    let (turn, shift) = image.placement(&poses[source]);
+    let centres = coupled.bodies[target].faces.centres.iter();
+    centres
+        .map(|c| turn.tr_mul(&(poses[target].apply(c) - shift)))
+        .collect()
+}
+
+impl<'a> System<'a> {
+    /// Assembles A, and factors it where the solver is [`Solver::Lu`].
+    ///
+    /// # Errors
+    /// Bodies inside each other, or behind a wall.
+    pub fn new(coupled: &'a PanelCoupled, poses: &[Pose]) -> Result<Self> {
+        check_walls(coupled, poses)?;
+        let matrix = match coupled.settings.solver {
+            Solver::Gmres => Matrix::Blocks(blocks(coupled, poses)?),
+            Solver::Lu => Matrix::Factored(dense(coupled, poses)?),
+        };
+        Ok(Self { coupled, matrix })
+    }
+
+    /// Solves `A x = b`, or `Aᵀ x = b`.
+    ///
+    /// # Errors
+    /// A solve that misses its tolerance.
+    pub fn solve(&self, b: &Columns, transpose: bool) -> Result<Solved> {
+        let settings = &self.coupled.settings;
+        let blocks = match &self.matrix {
+            Matrix::Factored(lu) => {
+                let mut x = b.clone();
+                if transpose {
+                    lu.solve_transpose(x.as_mat_mut());
+                } else {
+                    lu.solve(x.as_mat_mut());
+                }
+                return Ok(Solved {
+                    x,
+                    iterations: 0,
+                    residual: 0.0,
+                });
+            }
+            Matrix::Blocks(blocks) => blocks,
+        };
+        // With A = D + O, D the bodies' own blocks: (I + O D⁻¹) y = b, x = D⁻¹ y.
+        let outcome = gmres(
+            |y| {
+                let mut out = y.clone();
+                let mut x = y.clone();
+                self.own_solve(&mut x, transpose);
+                self.add_blocks(blocks, &x, transpose, &mut out);
+                out
+            },
+            |_| (),
+            b,
+            settings.tolerance,
+            settings.max_iterations,
+            RESTART,
+        );
+        if outcome.residual.is_nan() || outcome.residual > 1.001 * settings.tolerance.max(1e-13) {
+            return Err(Error::Solver {
+                what: format!("the coupled panel system ({} panels)", self.coupled.rows()),
+                iterations: outcome.iterations,
+                residual: outcome.residual,
+                tolerance: settings.tolerance,
+                remedy:
+                    "raise the tolerance, refine the meshes where bodies are close, or use the \
+                         solver lu"
+                        .into(),
+            });
+        }
+        let mut x = outcome.x;
+        self.own_solve(&mut x, transpose);
+        Ok(Solved {
+            x,
+            iterations: outcome.iterations,
+            residual: outcome.residual,
+        })
+    }
+
+    /// `x ← D⁻¹ x`, or its transpose.
+    fn own_solve(&self, x: &mut Columns, transpose: bool) {
+        let columns = x.columns;
+        let mut parts = Vec::new();
+        let mut rest = &mut x.data[..];
+        for (body, range) in self.coupled.bodies.iter().zip(&self.coupled.faces) {
+            let (part, other) = rest.split_at_mut(range.len() * columns);
+            let part = MatMut::from_row_major_slice_mut(part, range.len(), columns);
+            parts.push((body, part));
+            rest = other;
+        }
+        parts.into_par_iter().for_each(|(body, part)| {
+            if transpose {
+                body.lu().solve_transpose(part);
+            } else {
+                body.lu().solve(part);
+            }
+        });
+    }
+
+    /// `out += O x`, or its transpose.
+    fn add_blocks(&self, blocks: &[Block], x: &Columns, transpose: bool, out: &mut Columns) {
+        let faces = &self.coupled.faces;
+        for block in blocks {
+            let (panels, points) = (&faces[block.source], &faces[block.target]);
+            let (from, to) = match transpose {
+                false => (panels, points),
+                true => (points, panels),
+            };
+            let part = Columns {
+                rows: from.len(),
+                columns: x.columns,
+                data: x.slice(from.start, from.end).to_vec(),
+            };
+            let part = match transpose {
+                false => transposed_product(&block.data, points.len(), &part),
+                true => product(&block.data, panels.len(), &part),
+            };
+            let out = out.slice_mut(to.start, to.end);
+            out.iter_mut().zip(&part.data).for_each(|(o, p)| *o += p);
+        }
+    }
+}
+
+/// Blocks of A between different bodies, and those that images make.
+fn blocks(coupled: &PanelCoupled, poses: &[Pose]) -> Result<Vec<Block>> {
+    let count = coupled.bodies.len();
+    let mut out = Vec::new();
+    for source in 0..count {
+        for target in 0..count {
+            if source == target && coupled.images.len() == 1 {
+                continue;
+            }
+            let columns = coupled.faces[target].len();
+            let mut data = vec![0.0; coupled.faces[source].len() * columns];
+            fill(coupled, poses, source, target, &mut data, columns, 0)?;
+            out.push(Block {
+                source,
+                target,
+                data,
+            });
+        }
+    }
+    Ok(out)
+}
+
+/// All of A, factored.
+fn dense(coupled: &PanelCoupled, poses: &[Pose]) -> Result<Lu> {
+    let n = coupled.rows();
+    // By panels and points: A by columns.
+    let mut matrix = vec![0.0; n * n];
+    for (source, panels) in coupled.faces.iter().enumerate() {
+        let out = &mut matrix[panels.start * n..panels.end * n];
+        for (target, points) in coupled.faces.iter().enumerate() {
+            fill(coupled, poses, source, target, out, n, points.start)?;
+        }
+        // Together with the blocks of images, so added to what is there.
+        let body = &coupled.bodies[source];
+        let centres = &body.faces.centres;
+        let layers = body.panels();
+        let image_diagonal: Vec<f64> = (0..panels.len())
+            .map(|i| out[i * n + panels.start + i])
+            .collect();
+        layers.double_layer(centres, Write::Add, out, n, panels.start);
+        for (i, d) in image_diagonal.iter().enumerate() {
+            out[i * n + panels.start + i] = 0.5 + d;
+        }
+    }
+    Ok(Lu::new(matrix, n))
+}
+
+/// Adds Ω/4π of a body's panels and of their images at the panels of another (only of the images at
+/// its own), into `out[panel · stride + column + point]`.
+fn fill(
+    coupled: &PanelCoupled,
+    poses: &[Pose],
+    source: usize,
+    target: usize,
+    out: &mut [f64],
+    stride: usize,
+    column: usize,
+) -> Result<()> {
+    let layers = coupled.bodies[source].panels();
+    let points = coupled.faces[target].len();
+    for image in &coupled.images {
+        if source == target && image.is_identity() {
+            continue;
+        }
+        let seen = seen_from(coupled, poses, image, source, target);
+        layers.double_layer(&seen, Write::Add, out, stride, column);
+    }
+    let mut filled = vec![0.0; points];
+    for row in out.chunks(stride) {
+        for (f, x) in filled.iter_mut().zip(&row[column..column + points]) {
+            *f += x;
+        }
+    }
+    // Also where it isn't a number.
+    match filled.iter().position(|f| !(f.abs() < INSIDE)) {
+        None => Ok(()),
+        Some(i) => Err(overlap(coupled, poses, source, target, i, filled[i])),
+    }
+}
+
+fn overlap(
+    coupled: &PanelCoupled,
+    poses: &[Pose],
+    source: usize,
+    target: usize,
+    face: usize,
+    filled: f64,
+) -> Error {
+    let (a, b) = (&coupled.bodies[target], &coupled.bodies[source]);
+    let x = poses[target].apply(&a.faces.centres[face]);
+    let (place, quantity, remedy) = if source == target {
+        (
+            format!("body \"{}\" and its mirror image", a.name),
+            "its image",
+            "it reaches through a wall: move it into the fluid",
+        )
+    } else {
+        (
+            format!("body \"{}\" and body \"{}\"", a.name, b.name),
+            "the second",
+            "they overlap: move them apart",
+        )
+    };
+    Error::Unresolved {
+        place,
+        quantity: format!(
+            "share of the solid angle that {quantity} fills, seen from face {face} of the first at \
+             {:?}",
+            x.as_slice()
+        ),
+        value: filled,
+        limit: INSIDE,
+        remedy: remedy.into(),
+    }
+}
+
+/// Every body must be on the fluid's side of every wall.
+fn check_walls(coupled: &PanelCoupled, poses: &[Pose]) -> Result<()> {
+    for (body, pose) in coupled.bodies.iter().zip(poses) {
+        for (w, (point, normal)) in coupled.walls.iter().enumerate() {
+            let corners = body.faces.corners.iter().flatten();
+            let height = |c: &Vec3| normal.dot(&(pose.apply(c) - point));
+            let lowest = corners.map(height).fold(f64::INFINITY, f64::min);
+            if lowest < 0.0 {
+                return Err(Error::Unresolved {
+                    place: format!("body \"{}\" and wall {w}", body.name),
+                    quantity: "gap in m".into(),
+                    value: lowest,
+                    limit: 0.0,
+                    remedy: format!(
+                        "it reaches through the wall: move it into the fluid by at least {:.6e} m",
+                        -lowest
+                    ),
+                });
+            }
+        }
+    }
+    Ok(())
+}

@@ -1,0 +1,55 @@
+//! What the coupled systems share: limits of their solvers, and the measure of their symmetry.
+
+use crate::{Error, Result};
+use nalgebra::DMatrix;
+
+/// Whether an iterative solver can work with these.
+pub(super) fn check_limits(tolerance: f64, max_iterations: usize) -> Result<()> {
+    if !(tolerance > 0.0 && tolerance < 1.0) {
+        return Err(Error::input(
+            "settings: tolerance",
+            tolerance,
+            "must lie between 0 and 1, e.g. 1e-8",
+        ));
+    }
+    if max_iterations == 0 {
+        return Err(Error::input(
+            "settings: max_iterations",
+            0,
+            "must be at least 1",
+        ));
+    }
+    Ok(())
+}
+
+/// max |M_ij − M_ji| / √(M_ii M_jj) of `raw`, M over the columns of `basis`. A column that hardly
+/// moves water (a round body's spin) counts as a hundredth of the water displaced; `volume` of each
+/// body in m³.
+pub(super) fn asymmetry(
+    raw: &DMatrix<f64>,
+    basis: &DMatrix<f64>,
+    volume: impl Fn(usize) -> f64,
+) -> f64 {
+    let displaced = |i: usize| -> f64 {
+        let inertia = (0..basis.nrows() / 6).map(|b| {
+            let volume = volume(b);
+            let twist = basis.fixed_view::<6, 1>(6 * b, i);
+            let (u, w) = (twist.fixed_rows::<3>(0), twist.fixed_rows::<3>(3));
+            volume * (u.norm_squared() + volume.cbrt().powi(2) * w.norm_squared())
+        });
+        inertia.sum()
+    };
+    let diagonal: Vec<f64> = (0..basis.ncols())
+        .map(|i| raw[(i, i)].abs().max(0.01 * displaced(i)))
+        .collect();
+    let mut worst = 0.0_f64;
+    for i in 0..basis.ncols() {
+        for j in 0..i {
+            let scale = (diagonal[i] * diagonal[j]).sqrt();
+            if scale > 0.0 {
+                worst = worst.max((raw[(i, j)] - raw[(j, i)]).abs() / scale);
+            }
+        }
+    }
+    worst
+}

@@ -1,13 +1,16 @@
 //! One body in unbounded fluid, offline and once per shape, by one of several methods.
 //!
 //! All speak of the same flow: velocity −∇φ, density 1, body frame, body twists `ν = (u, ω)` about the
-//! body's origin. [`mfs`] is what the coupled system of all bodies is built from; [`Response`] is what
-//! any method must answer for a body to be compressed.
+//! body's origin. [`mfs`] is what the coupled system of all bodies is built from; [`exact`] answers for
+//! spheres and ellipsoids by formula; [`Response`] is what any method must answer for a body to be
+//! compressed.
 
+pub mod exact;
 pub mod mfs;
 mod response;
 mod surface;
 
+pub use exact::ExactBoundary;
 pub use mfs::{BodyBoundary, Depth, Method, Readout, RowScaling, Settings, depth, readout};
 pub(crate) use mfs::{solve_upper, solve_upper_transpose};
 pub use response::Response;

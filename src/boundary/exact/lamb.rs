@@ -65,6 +65,9 @@ pub(super) struct Lamb {
     semi_axes: [f64; 3],
     /// α of each axis.
     alpha: [f64; 3],
+    /// b² − c² about each axis, from the axes as given: dividing them first would lose digits of small
+    /// differences.
+    difference: [f64; 3],
     /// g about each axis.
     g: [f64; 3],
     /// 2 − (b² + c²) g about each axis.
@@ -88,6 +91,10 @@ impl Lamb {
             let (j, k) = about[i];
             product * r_d(squares[j], squares[k], squares[i])
         });
+        let difference = [0, 1, 2].map(|i| {
+            let (j, k) = about[i];
+            (semi_axes[j] - semi_axes[k]) / scale * (axes[j] + axes[k])
+        });
         let g = [0, 1, 2].map(|i| {
             let (j, k) = about[i];
             product * r_d_difference(squares[i], squares[j], squares[k])
@@ -108,6 +115,7 @@ impl Lamb {
             scale,
             semi_axes: axes,
             alpha,
+            difference,
             g,
             denominator,
         }
@@ -123,17 +131,11 @@ impl Lamb {
             let (j, k) = others(i);
             let left = self.alpha[j] + self.alpha[k];
             diagonal[i] = cube * volume * self.alpha[i] / left;
-            let difference = self.difference(j, k);
+            let difference = self.difference[i];
             diagonal[3 + i] = cube * self.scale * self.scale * volume / 5.0
                 * (difference * difference * self.g[i] / self.denominator[i]);
         }
         Mat6::from_diagonal(&diagonal)
-    }
-
-    /// a_j² − a_k².
-    fn difference(&self, j: usize, k: usize) -> f64 {
-        let (p, q) = (self.semi_axes[j], self.semi_axes[k]);
-        (p - q) * (p + q)
     }
 
     /// Potentials of the six unit twists (about the centre, along the axes) at a point x (m) of the
@@ -152,7 +154,7 @@ impl Lamb {
             let (j, k) = others(i);
             let left = self.alpha[j] + self.alpha[k];
             out[i] = self.scale * product / left * x[i] * r_d(squares[j], squares[k], squares[i]);
-            let difference = self.difference(j, k);
+            let difference = self.difference[i];
             if difference != 0.0 {
                 out[3 + i] = self.scale * self.scale * product * difference / self.denominator[i]
                     * x[j]

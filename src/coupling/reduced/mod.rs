@@ -17,6 +17,7 @@
 //! factorisation that fails tells of a gap that the sources don't resolve.
 
 mod body;
+pub mod cache;
 pub mod compress;
 mod cutoff;
 mod link;
@@ -39,6 +40,8 @@ use std::sync::Arc;
 /// All bodies coupled through a few sources each.
 pub struct Reduced {
     bodies: Vec<Arc<ReducedBody>>,
+    /// For messages: bodies of equal shape share what they are compressed to.
+    names: Vec<String>,
     links: Vec<Link>,
     points: Vec<Range<usize>>,
     modes: Vec<Range<usize>>,
@@ -71,8 +74,16 @@ impl Reduced {
             points,
             modes,
             links,
+            names: bodies.iter().map(|b| b.parts().name.clone()).collect(),
             bodies,
         })
+    }
+
+    /// The same with names of the bodies, for messages; those beyond the bodies are dropped.
+    pub fn named(mut self, names: impl IntoIterator<Item = String>) -> Self {
+        let given = self.names.iter_mut().zip(names);
+        given.for_each(|(own, name)| *own = name);
+        self
     }
 
     /// The bodies.

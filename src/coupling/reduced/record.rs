@@ -375,10 +375,11 @@ fn closest(reduced: &Reduced, poses: &[Pose], quantity: &str, value: f64) -> Err
         let d = t.points.iter().map(distance).fold(f64::INFINITY, f64::min);
         if d < worst.0 {
             let of = |name: &str| format!("body {name:?}");
+            let (one, other) = (&reduced.names[link.target], &reduced.names[link.source]);
             let place = match (link.target == link.source, link.image.is_identity()) {
-                (true, _) => format!("{} and a wall", of(&t.name)),
-                (false, true) => format!("{} and {}", of(&t.name), of(&s.name)),
-                (false, false) => format!("{} and {} by a wall", of(&t.name), of(&s.name)),
+                (true, _) => format!("{} and a wall", of(one)),
+                (false, true) => format!("{} and {}", of(one), of(other)),
+                (false, false) => format!("{} and {} by a wall", of(one), of(other)),
             };
             worst = (d, place, t.fit.resolved_gap.max(s.fit.resolved_gap));
         }
@@ -431,13 +432,8 @@ fn check_energy(reduced: &Reduced, basis: &DMatrix<f64>, momenta: &DMatrix<f64>)
         symmetric[(i, j)] / (own[i].max(f64::MIN_POSITIVE) * own[j].max(f64::MIN_POSITIVE)).sqrt()
     });
     let lowest = scaled.symmetric_eigenvalues().min();
-    let names: Vec<&str> = reduced
-        .bodies
-        .iter()
-        .map(|b| b.parts().name.as_str())
-        .collect();
     Err(Error::Unresolved {
-        place: format!("bodies {}", names.join(", ")),
+        place: format!("bodies {}", reduced.names.join(", ")),
         quantity: "smallest eigenvalue of their added mass, scaled by the water displaced".into(),
         value: lowest,
         limit: 0.0,

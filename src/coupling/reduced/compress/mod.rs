@@ -63,8 +63,8 @@ pub struct Settings {
     /// Aimed at error of M̄_f between bodies at the resolved gap, relative to √(M_ii M_jj), that the
     /// compression adds to that of the one-body method.
     pub tolerance: f64,
-    /// Smallest gap to other bodies and walls that is resolved, m; by default a tenth of the body's
-    /// radius.
+    /// Smallest gap to other bodies (and half of that to walls) that is resolved, m; by default
+    /// [`default_gap`].
     pub resolved_gap: Option<f64>,
 }
 
@@ -145,10 +145,12 @@ pub fn compress(
     let (centre, radius) = ball(vertices);
     let area: f64 = surface.faces.areas.iter().sum();
     let mut warnings = response.warnings().to_vec();
-    let asked = settings.resolved_gap.unwrap_or(0.1 * radius);
-    let least = (area / MOST_PROXIES).sqrt() / SPACING;
-    let gap = asked.max(least);
-    if settings.resolved_gap.is_some() && gap > asked {
+    let finest = finest_gap(area);
+    let asked = settings.resolved_gap;
+    let gap = asked
+        .unwrap_or_else(|| default_gap(surface.faces.volume(), area))
+        .max(finest);
+    if let Some(asked) = asked.filter(|a| *a < finest) {
         warnings.push(format!(
             "body {name:?}: gaps under {gap:.3e} m aren't resolved by its compressed sources, for all \
              that {asked:.3e} m were asked for: its surface of {area:.3e} m² is too large; use a plane \
@@ -252,6 +254,17 @@ pub fn compress(
         },
         points: chosen,
     })
+}
+
+/// The smallest gap (m) that a compressed body with the surface `area` (m²) can resolve.
+pub fn finest_gap(area: f64) -> f64 {
+    (area / MOST_PROXIES).sqrt() / SPACING
+}
+
+/// The gap (m) that a body of `volume` (m³) and surface `area` (m²) resolves where nothing is asked for:
+/// a quarter of the radius of the ball with this ratio of volume to area.
+pub fn default_gap(volume: f64, area: f64) -> f64 {
+    (0.75 * volume / area).max(finest_gap(area))
 }
 
 /// Largest difference of two matrices, relative to the largest entry of the second.

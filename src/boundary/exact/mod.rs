@@ -1,19 +1,27 @@
 //! Spheres and ellipsoids by formula: no mesh.
 //!
 //! The added mass and the flow of the moving body are Lamb's ([`lamb`]). What the body adds to the flow
-//! of a source is an image in closed form for a sphere ([`sphere`]).
+//! of a source is an image in closed form for a sphere (`sphere`), a sum of ellipsoidal harmonics for
+//! others (`harmonic`): a scattering matrix that is diagonal, so nothing is solved.
 
 mod confocal;
+mod harmonic;
 pub mod lamb;
 mod sphere;
 
 use crate::adjoint::lie::{Mat6, Pose, Vec3, skew};
 use crate::boundary::Response;
 use crate::{Error, Result};
-use confocal::Confocal;
+use confocal::{Confocal, Place};
 use faer::Mat;
+use harmonic::Harmonics;
 use lamb::Lamb;
 use rayon::prelude::*;
+
+/// Residual above which a warning is given.
+const WANTED: f64 = 1e-4;
+/// Differences of squared semi-axes, relative, below which an ellipsoid is a sphere.
+const ROUND: f64 = 1e-9;
 
 /// A sphere or an ellipsoid in unbounded water.
 #[derive(Clone, Debug)]
@@ -33,6 +41,8 @@ pub struct ExactBoundary {
     added_mass: Mat6,
     lamb: Lamb,
     confocal: Confocal,
+    /// None for a sphere.
+    harmonics: Option<Harmonics>,
     warnings: Vec<String>,
 }
 
@@ -54,6 +64,22 @@ impl ExactBoundary {
         }
         check_pose(name, pose)?;
         let lamb = Lamb::new(semi_axes);
+        let confocal = Confocal::new(semi_axes);
+        let (harmonics, residual) = if confocal.offsets[0] <= ROUND * semi_axes[0] * semi_axes[0] {
+            (None, 0.0)
+        } else {
+            let harmonics = Harmonics::new(name, &confocal, resolved_gap)?;
+            let residual = harmonics.residual(name)?;
+            (Some(harmonics), residual)
+        };
+        let mut warnings = Vec::new();
+        if residual > WANTED {
+            warnings.push(format!(
+                "body \"{name}\": sources at the resolved gap {resolved_gap:.3e} m leave {residual:.1e} of their \
+                 normal velocity (more than {WANTED:.0e}) on the surface of the ellipsoid with semi-axes \
+                 {semi_axes:?} m; ask for a gap that is a larger part of the longest semi-axis"
+            ));
+        }
         let move_in = twist_in_shape(pose);
         let added_mass = move_in.transpose() * lamb.added_mass() * move_in;
         Ok(Self {
@@ -61,16 +87,18 @@ impl ExactBoundary {
             semi_axes,
             pose: *pose,
             resolved_gap,
-            residual: 0.0,
+            residual,
             added_mass: 0.5 * (added_mass + added_mass.transpose()),
             lamb,
-            confocal: Confocal::new(semi_axes),
-            warnings: Vec::new(),
+            confocal,
+            harmonics,
+            warnings,
         })
     }
 
-    fn is_sphere(&self) -> bool {
-        self.confocal.offsets[0] == 0.0
+    /// Number of harmonics that are kept, and their highest degree; zeros for a sphere.
+    pub fn harmonics(&self) -> (usize, usize) {
+        self.harmonics.as_ref().map_or((0, 0), Harmonics::size)
     }
 
     /// Body-frame points in the shape's frame.
@@ -138,15 +166,14 @@ impl Response for ExactBoundary {
 
     fn scattered(&self, sources: &[Vec3], points: &[Vec3]) -> Result<Mat<f64>> {
         let (sources, points) = (self.inside_shape(sources), self.inside_shape(points));
-        for x in sources.iter().chain(&points) {
-            self.confocal.locate(&self.name, x)?;
-        }
-        if !self.is_sphere() {
-            return Err(Error::Unsupported {
-                what: format!("body \"{}\": an ellipsoid in the flow of others", self.name),
-                why: "not written yet".into(),
-                instead: "use a mesh".into(),
-            });
+        let places = |list: &[Vec3]| -> Result<Vec<Place>> {
+            list.par_iter()
+                .map(|x| self.confocal.locate(&self.name, x))
+                .collect()
+        };
+        let (from, to) = (places(&sources)?, places(&points)?);
+        if let Some(harmonics) = &self.harmonics {
+            return harmonics.scattered(&self.name, &from, &to);
         }
         let radius = self.semi_axes[0];
         Ok(Mat::from_fn(points.len(), sources.len(), |i, j| {

@@ -85,8 +85,8 @@ pub(super) fn plan(
             ));
             out.fidelity = Fidelity::Full;
         }
-        // A ball of the body's own size around it is coarse enough for all that is far away.
-        let coarsest = properties.volume.cbrt().max(finest);
+        // Bodies that start apart may come near: no coarser than without a plan.
+        let coarsest = compress::default_gap(properties.volume, area(mesh));
         let gap = (ROOM * smallest).clamp(finest, coarsest);
         out.plan.compress.push(compress::Settings {
             rank: None,

@@ -31,6 +31,8 @@ pub(super) struct Assembled {
     /// Smallest gap that each body's discretisation resolves, m; zero where it isn't limited but by
     /// its mesh.
     pub resolved: Vec<f64>,
+    /// What `Auto` chose for each body and pair.
+    pub plan: Plan,
     /// What `Auto` chose, and why.
     pub reasons: Vec<String>,
     pub gaps: Gaps,
@@ -74,15 +76,47 @@ struct Surface {
     properties: MassProperties,
 }
 
-fn surface(body: &Body, faces: Option<usize>) -> Result<Option<Surface>> {
+/// A body's mesh in its own frame.
+pub(super) fn mesh(body: &Body, faces: Option<usize>) -> Result<Option<TriMesh>> {
     let Some(shape) = &body.shape else {
         return Ok(None);
     };
-    let mesh = shape::build(shape, Path::new(""), faces)?.transformed(&pose(&body.shape_at));
-    Ok(Some(Surface {
+    let mesh = shape::build(shape, Path::new(""), faces)?;
+    Ok(Some(mesh.transformed(&pose(&body.shape_at))))
+}
+
+fn surface(body: &Body, faces: Option<usize>) -> Result<Option<Surface>> {
+    Ok(mesh(body, faces)?.map(|mesh| Surface {
         properties: mesh.mass_properties(),
         mesh,
     }))
+}
+
+/// The bodies that the water sees with a fidelity, with their numbers in the scene. Bodies that
+/// can't move matter only as boundaries of the coupled flow.
+pub(super) fn in_water<'a>(
+    scene: &'a Scene,
+    meshes: &[Option<&'a TriMesh>],
+    tree: &Tree,
+    fidelity: Fidelity,
+) -> (Vec<usize>, Vec<Wet<'a>>) {
+    let alone = fidelity == Fidelity::Isolated;
+    let seen = |b: &usize| !alone || moves(scene, tree, *b);
+    let wet = |b: usize| {
+        let (body, mesh) = (&scene.bodies[b], meshes[b]);
+        let given = body.added_mass.as_ref();
+        (mesh.is_some() || given.is_some()).then(|| Wet {
+            name: &body.name,
+            mesh,
+            ellipsoid: (body.shape.as_ref().and_then(wet::semi_axes))
+                .map(|axes| (axes, pose(&body.shape_at))),
+            added_mass: given
+                .filter(|_| alone)
+                .map(|rows| Mat6::from_fn(|i, j| rows[i][j])),
+        })
+    };
+    let numbers = (0..scene.bodies.len()).filter(seen);
+    numbers.filter_map(|b| Some((b, wet(b)?))).unzip()
 }
 
 /// Mass, centre of mass and inertia of a body.
@@ -153,8 +187,11 @@ pub(super) fn assemble(
         surfaces.push(surface(body, settings.faces)?);
     }
 
-    let mut wet: Vec<Wet> = Vec::new();
-    let mut of_wet = Vec::new();
+    let meshes: Vec<_> = surfaces
+        .iter()
+        .map(|s| s.as_ref().map(|s| &s.mesh))
+        .collect();
+    let (of_wet, wet) = in_water(scene, &meshes, &tree, settings.fidelity);
     let mut bodies = Vec::with_capacity(scene.bodies.len());
     let mut controls = 0;
     for (b, body) in scene.bodies.iter().enumerate() {
@@ -186,21 +223,7 @@ pub(super) fn assemble(
                 data.surface = pieces;
             }
         }
-        // Bodies that can't move matter only as boundaries of the coupled flow.
-        let seen = settings.fidelity != Fidelity::Isolated || moves(scene, &tree, b);
-        if seen && (surface.is_some() || body.added_mass.is_some()) {
-            data.wet = Some(wet.len());
-            of_wet.push(b);
-            wet.push(Wet {
-                name: &body.name,
-                mesh: surface.map(|s| &s.mesh),
-                ellipsoid: (body.shape.as_ref().and_then(wet::semi_axes))
-                    .map(|axes| (axes, pose(&body.shape_at))),
-                added_mass: (body.added_mass.as_ref())
-                    .filter(|_| settings.fidelity == Fidelity::Isolated)
-                    .map(|rows| Mat6::from_fn(|i, j| rows[i][j])),
-            });
-        }
+        data.wet = of_wet.iter().position(|w| *w == b);
         if body.actuated {
             data.joint_control = Some(controls);
             controls += tree.links()[b].v.len();
@@ -219,10 +242,6 @@ pub(super) fn assemble(
             None if b.locked => Drive::Locked,
             None => Drive::Free,
         })
-        .collect();
-    let meshes: Vec<_> = surfaces
-        .iter()
-        .map(|s| s.as_ref().map(|s| &s.mesh))
         .collect();
     let clearance = Clearance::new(&meshes, &scene.walls, &tree, &drives)?;
     let mut system = System {
@@ -258,6 +277,7 @@ pub(super) fn assemble(
         fidelity,
         discretisation: made.bodies,
         resolved,
+        plan,
         reasons,
         gaps: clearance.moving,
         warnings,

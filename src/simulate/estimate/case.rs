@@ -1,0 +1,210 @@
+//! A simulator at its start, and the same on other meshes.
+
+use crate::adjoint::lie::Pose;
+use crate::boundary::{OneBody, Response};
+use crate::coupling::{Coupling, Report};
+use crate::scene::WallSurface;
+use crate::shape::TriMesh;
+use crate::simulate::simulator::world_axes;
+use crate::simulate::wet::{self, Wet};
+use crate::simulate::{Fidelity, Settings, Simulator, assemble};
+use crate::{Error, Result};
+use nalgebra::DMatrix;
+use std::sync::Arc;
+
+/// A direction that hardly moves water (a round body's spin) counts as this part of the water
+/// displaced.
+const LEAST: f64 = 0.01;
+/// Faces a body on which the coupling that `Isolated` leaves out is computed.
+const COUPLING_FACES: usize = 320;
+/// Most faces in all for that.
+const COUPLING_MOST: usize = 6000;
+
+/// What the estimate is of.
+pub(super) struct Case<'a> {
+    pub simulator: &'a Simulator,
+    pub fidelity: Fidelity,
+    /// The bodies of the matrix, by their numbers in the scene.
+    bodies: Vec<usize>,
+    poses: Vec<Pose>,
+    turn: DMatrix<f64>,
+    /// Unit density, world axes.
+    matrix: DMatrix<f64>,
+    diagonal: Vec<f64>,
+    /// Of all bodies of the scene.
+    pub meshes: Vec<Option<TriMesh>>,
+    pub report: Report,
+}
+
+fn symmetric(m: &DMatrix<f64>) -> DMatrix<f64> {
+    0.5 * (m + m.transpose())
+}
+
+/// M̄ along world axes.
+fn evaluate(
+    coupling: &dyn Coupling,
+    poses: &[Pose],
+    turn: &DMatrix<f64>,
+) -> Result<(DMatrix<f64>, Report)> {
+    let record = coupling.evaluate(poses, turn, false)?;
+    let m = symmetric(&turn.tr_mul(record.momenta()));
+    Ok((m, record.report().clone()))
+}
+
+impl<'a> Case<'a> {
+    pub fn new(simulator: &'a Simulator) -> Result<Self> {
+        let (bodies, poses) = simulator.in_water();
+        let turn = world_axes(&poses);
+        let system = simulator.system();
+        let (matrix, report) = evaluate(system.coupling.as_ref(), &poses, &turn)?;
+        let diagonal = (0..matrix.nrows())
+            .map(|i| {
+                let volume = system.bodies[bodies[i / 6]].volume;
+                let squared = if i % 6 < 3 {
+                    1.0
+                } else {
+                    volume.cbrt().powi(2)
+                };
+                matrix[(i, i)].max(LEAST * volume * squared)
+            })
+            .collect();
+        let faces = simulator.settings().faces;
+        let meshes = simulator.scene.bodies.iter();
+        Ok(Self {
+            simulator,
+            fidelity: simulator.fidelity(),
+            bodies,
+            poses,
+            turn,
+            matrix,
+            diagonal,
+            meshes: meshes
+                .map(|b| assemble::mesh(b, faces))
+                .collect::<Result<_>>()?,
+            report,
+        })
+    }
+
+    /// max |D_ij| / √(M_ii M_jj).
+    pub fn size(&self, difference: &DMatrix<f64>) -> f64 {
+        let mut worst = 0.0_f64;
+        for i in 0..difference.nrows() {
+            for j in 0..difference.ncols() {
+                let scale = (self.diagonal[i] * self.diagonal[j]).sqrt();
+                if scale > 0.0 {
+                    worst = worst.max(difference[(i, j)].abs() / scale);
+                }
+            }
+        }
+        worst
+    }
+
+    /// The bodies in the water with these meshes.
+    pub fn wet<'b>(&'b self, meshes: &'b [Option<TriMesh>]) -> Vec<Wet<'b>> {
+        let meshes: Vec<_> = meshes.iter().map(Option::as_ref).collect();
+        let tree = &self.simulator.system().tree;
+        let asked = self.simulator.settings().fidelity;
+        assemble::in_water(&self.simulator.scene, &meshes, tree, asked).1
+    }
+
+    /// By how much the added mass differs with these meshes.
+    pub fn difference(&self, meshes: &[Option<TriMesh>]) -> Result<DMatrix<f64>> {
+        let wet = self.wet(meshes);
+        if self.compressed() {
+            return Ok(self.correction(&wet)? - self.correction(&self.wet(&self.meshes))?);
+        }
+        let (scene, settings) = (&self.simulator.scene, self.simulator.settings());
+        let plan = &self.simulator.assembled.plan;
+        let made = wet::couple(&wet, &scene.walls, settings, self.fidelity, plan, None)?;
+        let (m, _) = evaluate(made.coupling.as_ref(), &self.poses, &self.turn)?;
+        Ok(m - &self.matrix)
+    }
+
+    fn compressed(&self) -> bool {
+        matches!(self.fidelity, Fidelity::Reduced | Fidelity::Auto)
+    }
+
+    /// What the compressed bodies' added mass is off if they answer as `bodies` do.
+    fn correction(&self, bodies: &[Wet]) -> Result<DMatrix<f64>> {
+        let (scene, settings) = (&self.simulator.scene, self.simulator.settings());
+        let plan = &self.simulator.assembled.plan;
+        let folder = self.simulator.folder.as_deref();
+        let own = self.wet(&self.meshes);
+        let coupling = wet::compressed_all(&own, &scene.walls, settings, plan, folder)?;
+        let made = coupling.reduced_bodies().iter();
+        let gaps: Vec<f64> = made.map(|b| b.parts().fit.resolved_gap).collect();
+        let answers: Vec<Arc<dyn Response>> = wet::answers(bodies, settings, &gaps)?;
+        coupling.correction(&self.poses, &self.turn, &answers)
+    }
+
+    /// What is left at check points.
+    pub fn residual(&self) -> Result<Option<f64>> {
+        let found = if self.compressed() {
+            Some(self.correction(&self.wet(&self.meshes))?)
+        } else {
+            let coupling = &self.simulator.system().coupling;
+            coupling.residual(&self.poses, &self.turn)?
+        };
+        Ok(found.map(|d| self.size(&d)))
+    }
+
+    /// The coupling that the fidelity `Isolated` leaves out.
+    pub fn missing_coupling(&self, missing: &mut Vec<String>) -> Option<f64> {
+        match self.left_out() {
+            Ok(d) => Some(self.size(&d)),
+            Err(error) => {
+                missing.push(format!("the coupling that isolated leaves out: {error}"));
+                None
+            }
+        }
+    }
+
+    fn left_out(&self) -> Result<DMatrix<f64>> {
+        let (scene, system) = (&self.simulator.scene, self.simulator.system());
+        let mut meshes = Vec::with_capacity(scene.bodies.len());
+        for (body, mesh) in scene.bodies.iter().zip(&self.meshes) {
+            let coarse = mesh
+                .as_ref()
+                .is_some_and(|m| m.faces().len() > COUPLING_FACES);
+            meshes.push(match coarse {
+                true => assemble::mesh(body, Some(COUPLING_FACES))?,
+                false => mesh.clone(),
+            });
+        }
+        let refs: Vec<_> = meshes.iter().map(Option::as_ref).collect();
+        let (numbers, wet) = assemble::in_water(scene, &refs, &system.tree, Fidelity::Full);
+        let faces: usize = wet.iter().filter_map(|w| Some(w.mesh?.faces().len())).sum();
+        if faces > COUPLING_MOST {
+            return Err(Error::Unsupported {
+                what: format!("an estimate of it with {faces} faces"),
+                why: format!("at most {COUPLING_MOST} are solved"),
+                instead: "give coarser meshes, or use the fidelity reduced".into(),
+            });
+        }
+        let all = system.tree.kinematics(self.simulator.start().0).poses;
+        let poses: Vec<Pose> = numbers.iter().map(|b| all[*b]).collect();
+        let turn = world_axes(&poses);
+        let panel = Settings::default().one_body(OneBody::Panel);
+        let free = scene.walls.iter().any(|w| w.surface == WallSurface::Free);
+        let fidelity = if free {
+            Fidelity::Reduced
+        } else {
+            Fidelity::Full
+        };
+        let solve = |fidelity: Fidelity| -> Result<DMatrix<f64>> {
+            let plan = Default::default();
+            let made = wet::couple(&wet, &scene.walls, &panel, fidelity, &plan, None)?;
+            Ok(evaluate(made.coupling.as_ref(), &poses, &turn)?.0)
+        };
+        let difference = solve(fidelity)? - solve(Fidelity::Isolated)?;
+        let at = |i: usize| {
+            let of = numbers.iter().position(|b| *b == self.bodies[i / 6]);
+            of.map(|b| 6 * b + i % 6)
+        };
+        let n = 6 * self.bodies.len();
+        Ok(DMatrix::from_fn(n, n, |i, j| match (at(i), at(j)) {
+            (Some(i), Some(j)) => difference[(i, j)],
+            _ => 0.0,
+        }))
+    }
+}

@@ -98,7 +98,7 @@ impl PanelCoupled {
             .collect();
         check_size(&format!("{} bodies", bodies.len()), at)?;
         Ok(Self {
-            images: Image::of_walls(walls)?,
+            images: Image::of_rigid_walls(walls, "the coupled panel method")?,
             walls: walls
                 .iter()
                 .map(|w| (Vec3::from(w.point), Vec3::from(w.normal).normalize()))

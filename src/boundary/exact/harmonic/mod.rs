@@ -42,7 +42,9 @@ use std::f64::consts::PI;
 use top::Top;
 
 /// Highest degree.
-const MOST: usize = 300;
+const MOST: usize = 256;
+/// Smallest gap over the longest semi-axis: degrees go like its inverse.
+const NEAREST: f64 = 0.02;
 /// A degree that is less of a source's flux on the surface than this is the last.
 const LAST: f64 = 1e-5;
 /// Harmonics that are less of it than this are left out.
@@ -114,6 +116,17 @@ impl Harmonics {
     /// For sources at `gap` (m) and beyond; `name` of the body for messages.
     pub fn new(name: &str, confocal: &Confocal, gap: f64) -> Result<Self> {
         let scale = confocal.semi_axes[0];
+        if gap < NEAREST * scale {
+            return Err(Error::Unresolved {
+                place: format!("body \"{name}\""),
+                quantity: format!(
+                    "resolved gap {gap:.6e} m over the longest semi-axis {scale:.6e} m"
+                ),
+                value: gap / scale,
+                limit: NEAREST,
+                remedy: "ask for a larger gap".into(),
+            });
+        }
         let semi_axes = Vec3::from(confocal.semi_axes) / scale;
         let [a, b, _] = confocal.offsets.map(|o| o / (scale * scale));
         let b = if b < ROUND { 0.0 } else { b };

@@ -283,6 +283,9 @@ mod tests {
         let none = gmres(nothing, |_| (), &b, 1e-11, 50, 100);
         assert_eq!(none.residual, 1.0);
         let wild = Columns::from_fn(n, 1, |_, _| f64::NAN);
-        assert_eq!(gmres(apply, |_| (), &wild, 1e-11, 9, 9).residual, f64::INFINITY);
+        assert_eq!(
+            gmres(apply, |_| (), &wild, 1e-11, 9, 9).residual,
+            f64::INFINITY
+        );
     }
 }

@@ -146,8 +146,9 @@ fn no_derivative(what: &str) -> Error {
     Error::Unsupported {
         what: format!("{what} of the coupled panel method"),
         why: "it has values only, as a reference".into(),
-        instead: "use the coupled system of fundamental solutions (fidelity `full`), which has all \
+        instead:
+            "use the coupled system of fundamental solutions (fidelity `full`), which has all \
                   derivatives"
-            .into(),
+                .into(),
     }
 }

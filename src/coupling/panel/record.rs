@@ -53,9 +53,7 @@ impl PanelRecord {
         let (right, back) = single_layers(coupled, poses, &q, &mu.x);
         let phi = system.solve(&right, false)?;
         let raw = DMatrix::from_fn(k, k, |i, j| {
-            (0..n)
-                .map(|s| flux.at(s, i) * phi.x.at(s, j))
-                .sum::<f64>()
+            (0..n).map(|s| flux.at(s, i) * phi.x.at(s, j)).sum::<f64>()
         });
         out.report = Report {
             iterations: phi.iterations.max(mu.iterations),

@@ -114,9 +114,10 @@ impl<'a> System<'a> {
                 iterations: outcome.iterations,
                 residual: outcome.residual,
                 tolerance: settings.tolerance,
-                remedy: "raise the tolerance, refine the meshes where bodies are close, or use the \
+                remedy:
+                    "raise the tolerance, refine the meshes where bodies are close, or use the \
                          solver lu"
-                    .into(),
+                        .into(),
             });
         }
         let mut x = outcome.x;

@@ -13,6 +13,7 @@ pub mod scene;
 pub mod shape;
 pub mod simulate;
 pub mod solver;
+mod special;
 
 pub use error::{Error, Result};
 pub use hydrograd_adjoint as adjoint;

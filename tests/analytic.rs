@@ -356,6 +356,7 @@ fn forces_between_spheres_that_approach() {
 #[test]
 fn a_sphere_near_a_wall() {
     let floor = Wall {
+        surface: Default::default(),
         point: [0.3, -0.2, -0.5],
         normal: [0.0, 0.0, 2.0],
     };
@@ -427,6 +428,7 @@ fn walls_are_mirror_images() {
         Vec3::new(0.65, 0.7, 0.75),
     );
     let walls: [Wall; 3] = std::array::from_fn(|k| Wall {
+        surface: Default::default(),
         point: [0.0; 3],
         normal: std::array::from_fn(|i| if i == k { 1.0 } else { 0.0 }),
     });
@@ -586,6 +588,7 @@ fn many_iterations_without_them() {
 #[test]
 fn the_matrix_is_symmetric_and_positive_definite() {
     let floor = Wall {
+        surface: Default::default(),
         point: [0.0; 3],
         normal: [0.0, 0.1, 1.0],
     };
@@ -660,6 +663,7 @@ fn world(m: &DMatrix<f64>, poses: &[Pose]) -> DMatrix<f64> {
 #[test]
 fn moving_the_whole_scene_turns_the_matrix() {
     let floor = Wall {
+        surface: Default::default(),
         point: [0.2, 0.0, 0.0],
         normal: [0.0, 0.1, 1.0],
     };
@@ -669,6 +673,7 @@ fn moving_the_whole_scene_turns_the_matrix() {
         Vec3::new(30.0, -20.0, 7.0),
     );
     let moved_floor = Wall {
+        surface: Default::default(),
         point: motion.apply(&Vec3::from(floor.point)).into(),
         normal: (motion.rotation * Vec3::from(floor.normal)).into(),
     };
@@ -697,6 +702,7 @@ fn millimetres_and_kilometres_agree() {
             .map(|axes| ellipsoid(axes.map(|a| a * scale), 320))
             .collect();
         let floor = Wall {
+            surface: Default::default(),
             point: [0.0; 3],
             normal: [0.0, 0.1, 1.0],
         };
@@ -795,6 +801,7 @@ fn bodies_in_another_order_or_frame_give_the_same() {
 #[test]
 fn threads_do_not_change_a_bit() {
     let floor = Wall {
+        surface: Default::default(),
         point: [0.0; 3],
         normal: [0.0, 0.1, 1.0],
     };
@@ -922,6 +929,7 @@ fn settings_without_meaning_are_refused() {
     let bodies = uneven(80);
     let refused = |walls: &[Wall], settings| Full::new(bodies.clone(), walls, settings).err();
     let wall = |normal| Wall {
+        surface: Default::default(),
         point: [0.0; 3],
         normal,
     };

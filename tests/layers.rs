@@ -7,12 +7,13 @@ use std::path::{Path, PathBuf};
 /// `Error` and `Result` alone.
 ///
 /// `adjoint::lie` gives vectors and poses to everyone; the modules marked `adjoint` use the ladder too.
-const LAYERS: [(&str, &[&str]); 11] = [
+const LAYERS: [(&str, &[&str]); 12] = [
     ("error", &[]),
     ("scene", &["shape"]),
-    ("shape", &["adjoint", "scene"]),
+    ("special", &[]),
+    ("shape", &["adjoint", "scene", "special"]),
     ("solver", &[]),
-    ("boundary", &["adjoint", "solver"]),
+    ("boundary", &["adjoint", "solver", "special"]),
     ("coupling", &["adjoint", "boundary", "scene", "solver"]),
     ("multibody", &["adjoint", "scene"]),
     ("dynamics", &["adjoint", "coupling", "multibody", "scene"]),

@@ -54,6 +54,7 @@ fn world_is_checked() {
     refused(|s| s.gravity[1] = f64::NAN, &["gravity", "NaN", "finite"]);
     refused(|s| s.bodies.clear(), &["bodies", "none", "add a body"]);
     let wall = |normal| Wall {
+        surface: Default::default(),
         point: [0.0; 3],
         normal,
     };

@@ -2,16 +2,37 @@
 //!
 //! All speak of the same flow: velocity −∇φ, density 1, body frame, body twists `ν = (u, ω)` about the
 //! body's origin. [`mfs`] is what the coupled system of all bodies is built from; [`panel`] needs no
-//! sources inside and is the more accurate on thin bodies and sharp edges; [`Response`] is what any
-//! method must answer for a body to be compressed.
+//! sources inside and is the more accurate on thin bodies and sharp edges; [`exact`] answers for
+//! spheres and ellipsoids by formula; [`Response`] is what any method must answer for a body to be
+//! compressed.
 
+pub mod exact;
 pub mod mfs;
 pub mod panel;
 mod response;
 mod surface;
 
+pub use exact::ExactBoundary;
 pub use mfs::{BodyBoundary, Depth, Method, Readout, RowScaling, Settings, depth, readout};
 pub(crate) use mfs::{solve_upper, solve_upper_transpose};
 pub use panel::PanelBoundary;
 pub use response::Response;
 pub use surface::Faces;
+pub(crate) use surface::Surface;
+
+/// The method by which a body's own answer to the water is computed, where the fidelity leaves a
+/// choice.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, serde::Serialize, serde::Deserialize)]
+#[serde(rename_all = "kebab-case")]
+pub enum OneBody {
+    /// The most accurate that costs nothing at run time: [`exact`] for spheres and ellipsoids by
+    /// formula, [`panel`] for other bodies; [`mfs`] where all bodies are solved together.
+    #[default]
+    Auto,
+    /// Closed forms; for spheres and ellipsoids by formula only.
+    Exact,
+    /// Direct boundary elements.
+    Panel,
+    /// Fundamental solutions, as [`Settings`] say.
+    Mfs,
+}

@@ -13,7 +13,6 @@ use super::options::{Water, name};
 use super::output::{Output, write_warnings};
 use crate::Result;
 use crate::scene::{Scene, Shape};
-use crate::simulate::Simulator;
 
 #[derive(Debug, Args)]
 pub(super) struct Arguments {
@@ -82,7 +81,7 @@ pub(super) fn main(arguments: &Arguments, output: Output) -> Result<ExitCode> {
 fn added_mass(scene: &Scene, arguments: &Arguments) -> Result<Report> {
     let start = Instant::now();
     let settings = arguments.water.settings(scene);
-    let simulator = Simulator::new(scene, settings)?;
+    let simulator = arguments.water.simulator(scene, settings)?;
     let found = simulator.added_mass()?;
     let seconds = start.elapsed().as_secs_f64();
     let bodies = &simulator.system().bodies;
@@ -110,7 +109,7 @@ fn added_mass(scene: &Scene, arguments: &Arguments) -> Result<Report> {
         iterations: found.report.iterations,
         seconds,
         fidelity: name(settings.fidelity),
-        method: name(settings.boundary.method),
+        method: settings.method_name().into(),
         density: simulator.parameters().density,
         warnings,
     })

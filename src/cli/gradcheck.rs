@@ -13,7 +13,6 @@ use super::output::{Output, write_warnings};
 use super::progress::Progress;
 use crate::Result;
 use crate::scene::Scene;
-use crate::simulate::Simulator;
 use crate::simulate::gradcheck::{self, gradcheck_with};
 
 /// Largest relative error that passes.
@@ -97,7 +96,7 @@ fn check(scene: &Scene, arguments: &Arguments, progress: &Progress) -> Result<Re
         None => usual.tolerance(TOLERANCE),
     };
     let steps = scene.steps;
-    let mut simulator = Simulator::new(scene, tight)?;
+    let mut simulator = arguments.water.simulator(scene, tight)?;
     let found = gradcheck_with(
         &mut simulator,
         &gradcheck::Settings {
@@ -110,11 +109,11 @@ fn check(scene: &Scene, arguments: &Arguments, progress: &Progress) -> Result<Re
     )?;
     let warnings = simulator.warnings().to_vec();
     drop(simulator);
-    let times = gradcheck::timings(&Simulator::new(scene, usual)?, steps, TIMINGS)?;
+    let times = gradcheck::timings(&arguments.water.simulator(scene, usual)?, steps, TIMINGS)?;
     Ok(Report {
         scene: scene.name.clone(),
         fidelity: name(usual.fidelity),
-        method: name(usual.boundary.method),
+        method: usual.method_name().into(),
         integrator: name(usual.integrator),
         steps,
         ok: found.max_rel_error <= LIMIT,

@@ -2,26 +2,40 @@
 
 use clap::{Args, ValueEnum};
 use serde::Serialize;
+use std::path::PathBuf;
 
-use crate::boundary;
-use crate::coupling::full;
+use crate::Result;
+use crate::boundary::{self, OneBody};
+use crate::coupling::{full, panel};
 use crate::dynamics;
 use crate::scene::{Preset, Scene};
-use crate::simulate::{self, Settings};
+use crate::simulate::{self, Settings, Simulator};
 
 /// How much of the water's coupling is solved.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, ValueEnum)]
 pub(super) enum Fidelity {
     /// Each body as if it were alone in the water.
     Isolated,
+    /// All bodies coupled, each compressed to a few sources.
+    Reduced,
+    /// `reduced`, with what each body and pair needs chosen for the scene; `full` where that can't
+    /// resolve it.
+    Auto,
     /// All bodies coupled, at the resolution of their meshes.
     #[default]
     Full,
 }
 
-/// Where a body's sources lie and how its boundary condition is met.
+/// How a body alone is solved.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
 pub(super) enum Method {
+    /// The most accurate that costs nothing at run time: `exact` where there is a formula, else
+    /// `panel`; `mfs-vertex` with the fidelity `full`.
+    Auto,
+    /// Closed forms, for spheres and ellipsoids by formula.
+    Exact,
+    /// Direct boundary elements: no sources inside. With the fidelity `full` values only, no motion.
+    Panel,
     /// A source under each vertex, exact flux through each face, least squares.
     MfsVertex,
     /// A source under each face, velocity at face centres (the paper's Eq. 17–18).
@@ -58,9 +72,9 @@ pub(super) enum Integrator {
 pub(super) enum Solver {
     /// Conjugate gradients on the least-squares problem.
     Cgls,
-    /// A dense factorisation, as a reference.
+    /// A dense factorisation, as a reference: QR, or LU with the method panel.
     Qr,
-    /// GMRES; for the square system of `mfs-face` only.
+    /// GMRES; for the square systems of `mfs-face` and `panel` only.
     Gmres,
 }
 
@@ -91,9 +105,22 @@ pub(super) struct Water {
     /// How much of the water's coupling is solved.
     #[arg(long, value_enum, default_value_t = Fidelity::Full)]
     pub fidelity: Fidelity,
-    /// Where a body's sources lie [default: mfs-vertex; mfs-face with the preset paper].
+    /// How a body alone is solved [default: auto; mfs-face with the preset paper].
     #[arg(long, value_enum)]
     pub method: Option<Method>,
+    /// Error of the added mass that the fidelities `reduced` and `auto` aim at, relative
+    /// [default: 0.003 for reduced, which adds to that of the bodies themselves; 0.01 for auto].
+    #[arg(long, value_name = "ERROR", value_parser = tolerance, allow_negative_numbers = true)]
+    pub accuracy: Option<f64>,
+    /// Points of each compressed body [default: as many as the accuracy needs].
+    #[arg(long, value_name = "N", value_parser = positive, allow_negative_numbers = true)]
+    pub rank: Option<usize>,
+    /// Smallest gap in m that compressed bodies resolve [default: from each body's size].
+    #[arg(long, value_name = "GAP", value_parser = length, allow_negative_numbers = true)]
+    pub resolved_gap: Option<f64>,
+    /// Folder that keeps compressed bodies for the next time.
+    #[arg(long, value_name = "FOLDER")]
+    pub cache: Option<PathBuf>,
     /// Depth of the sources under the surface in m; checked against edge length and thickness
     /// [default: from the mesh, source by source].
     #[arg(long, value_name = "DEPTH", value_parser = length, allow_negative_numbers = true)]
@@ -151,14 +178,24 @@ impl Water {
     pub fn settings(&self, scene: &Scene) -> Settings {
         let mut settings = Settings::for_scene(scene).fidelity(match self.fidelity {
             Fidelity::Isolated => simulate::Fidelity::Isolated,
+            Fidelity::Reduced => simulate::Fidelity::Reduced,
+            Fidelity::Auto => simulate::Fidelity::Auto,
             Fidelity::Full => simulate::Fidelity::Full,
         });
         if let Some(method) = self.method {
-            settings.boundary.method = match method {
-                Method::MfsVertex => boundary::Method::MfsVertex,
-                Method::MfsFace => boundary::Method::MfsFace,
+            settings = match method {
+                Method::Auto => settings.one_body(OneBody::Auto),
+                Method::Exact => settings.one_body(OneBody::Exact),
+                Method::Panel => settings.one_body(OneBody::Panel),
+                Method::MfsVertex => settings.method(boundary::Method::MfsVertex),
+                Method::MfsFace => settings.method(boundary::Method::MfsFace),
             };
         }
+        if let Some(accuracy) = self.accuracy {
+            settings = settings.accuracy(accuracy);
+        }
+        settings.compress.rank = self.rank;
+        settings.compress.resolved_gap = self.resolved_gap;
         if let Some(depth) = self.depth {
             settings.boundary.depth = boundary::Depth::Fixed(depth);
         }
@@ -172,6 +209,10 @@ impl Water {
             settings.solve.tolerance = tolerance;
         }
         if let Some(solver) = self.solver {
+            settings.panel = match solver {
+                Solver::Qr => panel::Solver::Lu,
+                _ => panel::Solver::Gmres,
+            };
             settings.solve.solver = match solver {
                 Solver::Cgls => full::Solver::Cgls,
                 Solver::Qr => full::Solver::Qr,
@@ -186,6 +227,16 @@ impl Water {
             };
         }
         settings
+    }
+}
+
+impl Water {
+    /// A simulator of the scene, with the cache that was asked for.
+    pub fn simulator(&self, scene: &Scene, settings: Settings) -> Result<Simulator> {
+        match &self.cache {
+            Some(folder) => Simulator::cached(scene, settings, folder),
+            None => Simulator::new(scene, settings),
+        }
     }
 }
 
@@ -214,21 +265,21 @@ impl Time {
 }
 
 /// A whole number above zero.
-pub(super) fn positive(text: &str) -> Result<usize, String> {
+pub(super) fn positive(text: &str) -> std::result::Result<usize, String> {
     match text.parse() {
         Ok(0) | Err(_) => Err("give a whole number above zero".into()),
         Ok(n) => Ok(n),
     }
 }
 
-fn length(text: &str) -> Result<f64, String> {
+fn length(text: &str) -> std::result::Result<f64, String> {
     match text.parse() {
         Ok(x) if x > 0.0 && f64::is_finite(x) => Ok(x),
         _ => Err("give a length above zero, in m".into()),
     }
 }
 
-fn tolerance(text: &str) -> Result<f64, String> {
+fn tolerance(text: &str) -> std::result::Result<f64, String> {
     match text.parse() {
         Ok(x) if x > 0.0 && x < 1.0 => Ok(x),
         _ => Err("give a number between 0 and 1, e.g. 1e-8".into()),

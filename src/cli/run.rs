@@ -15,7 +15,7 @@ use super::progress::Progress;
 use super::trajectory::{self, Trajectory};
 use crate::Result;
 use crate::scene::{Joint, Plane, Scene};
-use crate::simulate::{Controls, Rollout, Simulator};
+use crate::simulate::{Controls, Rollout};
 
 #[derive(Debug, Args)]
 pub(super) struct Arguments {
@@ -89,7 +89,7 @@ fn simulate(
 ) -> Result<(Report, Trajectory)> {
     let start = Instant::now();
     let settings = arguments.time.choose(arguments.water.settings(scene));
-    let simulator = Simulator::new(scene, settings)?;
+    let simulator = arguments.water.simulator(scene, settings)?;
     let setup_seconds = start.elapsed().as_secs_f64();
     let controls = Controls::zeros(&simulator, scene.steps);
     let rollout = simulator.rollout_with(&controls, |done| progress.set(done))?;
@@ -99,7 +99,7 @@ fn simulate(
     let report = Report {
         scene: scene.name.clone(),
         fidelity: name(settings.fidelity),
-        method: name(settings.boundary.method),
+        method: settings.method_name().into(),
         integrator: name(settings.integrator),
         bodies: scene.bodies.len(),
         faces: simulator.faces(),

@@ -1,11 +1,12 @@
-//! Plane rigid walls as mirror images.
+//! Plane walls as mirror images.
 //!
 //! In front of a rigid plane the flow is that of the bodies and their mirror images moving as mirrors
-//! do: every source has an image of the same sign. Mutually perpendicular planes close under
+//! do: every source has an image of the same sign. At a free surface (zero potential, the limit of
+//! high frequency) it has the opposite sign. Mutually perpendicular planes close under
 //! reflection: two need three images, three need seven.
 
 use crate::adjoint::lie::{Mat3, Pose, Vec3, Vec6, angular, linear, six};
-use crate::scene::Wall;
+use crate::scene::{Wall, WallSurface};
 use crate::{Error, Result};
 
 /// A product of reflections, `x ↦ linear · x + shift`.
@@ -17,6 +18,8 @@ pub struct Image {
     pub shift: Vec3,
     /// Determinant of `linear`, ±1.
     pub parity: f64,
+    /// Sign of the image sources: −1 for an odd number of reflections in free surfaces.
+    pub sign: f64,
 }
 
 impl Image {
@@ -26,6 +29,7 @@ impl Image {
             linear: Mat3::identity(),
             shift: Vec3::zeros(),
             parity: 1.0,
+            sign: 1.0,
         }
     }
 
@@ -59,6 +63,10 @@ impl Image {
             }
             normals.push(n);
             let reflection = Mat3::identity() - 2.0 * n * n.transpose();
+            let sign = match wall.surface {
+                WallSurface::Rigid => 1.0,
+                WallSurface::Free => -1.0,
+            };
             let shift = 2.0 * n.dot(&Vec3::from(wall.point)) * n;
             let reflected: Vec<Image> = out
                 .iter()
@@ -66,6 +74,7 @@ impl Image {
                     linear: reflection * image.linear,
                     shift: reflection * image.shift + shift,
                     parity: -image.parity,
+                    sign: sign * image.sign,
                 })
                 .collect();
             out.extend(reflected);

@@ -18,7 +18,9 @@
 pub mod full;
 pub mod image;
 mod isolated;
+mod pair;
 pub mod panel;
+pub mod reduced;
 mod settings;
 mod tensor;
 
@@ -61,6 +63,8 @@ pub struct Report {
     pub residual: f64,
     /// max |M_ij − M_ji| / √(M_ii M_jj) over the basis, before symmetrising.
     pub asymmetry: f64,
+    /// Condition number of the dense system (estimated from below); 0 for iterative solves.
+    pub condition: f64,
 }
 
 /// A combination of bodies' twists.

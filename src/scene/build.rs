@@ -58,7 +58,7 @@ impl Scene {
 
     /// Adds a plane rigid wall through `point`, m, with `normal` into the fluid.
     pub fn add_wall(&mut self, point: [f64; 3], normal: [f64; 3]) {
-        self.walls.push(Wall { point, normal });
+        self.walls.push(Wall::rigid(point, normal));
     }
 
     /// Sets the target number of faces of every shape given by formula; meshes stay as they are.

@@ -67,7 +67,7 @@ pub struct Fluid {
     pub current: [f64; 3],
 }
 
-/// A plane rigid wall.
+/// A plane that bounds the water.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Wall {
@@ -75,6 +75,32 @@ pub struct Wall {
     pub point: [f64; 3],
     /// Normal into the fluid; need not be of unit length.
     pub normal: [f64; 3],
+    /// What the plane is.
+    #[serde(default, skip_serializing_if = "is_default")]
+    pub surface: WallSurface,
+}
+
+impl Wall {
+    /// A rigid wall through `point` (m) with the normal into the fluid.
+    pub const fn rigid(point: [f64; 3], normal: [f64; 3]) -> Self {
+        Self {
+            point,
+            normal,
+            surface: WallSurface::Rigid,
+        }
+    }
+}
+
+/// What a plane does to the flow.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "kebab-case")]
+pub enum WallSurface {
+    /// No flow through it: images of the same sign.
+    #[default]
+    Rigid,
+    /// Potential zero: a flat free surface in the limit of fast motion, without waves; images of the
+    /// opposite sign. With the fidelity `reduced` only.
+    Free,
 }
 
 /// A rigid placement: rotation first, then translation.

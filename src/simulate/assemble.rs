@@ -1,21 +1,20 @@
 //! From a scene to a system: meshes, masses, joints, coupling, controller.
 
 use super::clearance::{self, Clearance};
+use super::plan::{Planned, plan};
 use super::policy::{Constant, OpenLoop, Pd, PdAxis, PushThenLock};
+use super::wet::{self, Discretisation, Plan, Wet};
 use super::{Fidelity, Policy, Settings};
 use crate::adjoint::drag::{self, Element, Part};
 use crate::adjoint::lie::{Mat3, Mat6, Pose, Vec3, exp_matrix};
-use crate::boundary::BodyBoundary;
-use crate::coupling::full::{Full, Solver, WetBody};
-use crate::coupling::{Coupling, Isolated};
+use crate::coupling::Isolated;
 use crate::dynamics::{BodyData, Drive, Parameters, Stepper, System};
 use crate::multibody::{self, Tree};
 use crate::scene::{self, Body, Controller, DragPart, Placement, Scene};
-use crate::shape::{self, Gaps, MassProperties, TriMesh};
+use crate::shape::{self, Gap, Gaps, MassProperties, Other, TriMesh};
 use crate::{Error, Result};
 use nalgebra::DVector;
 use std::path::Path;
-use std::sync::Arc;
 
 /// A scene made ready.
 pub(super) struct Assembled {
@@ -25,7 +24,15 @@ pub(super) struct Assembled {
     pub q: DVector<f64>,
     pub v: DVector<f64>,
     pub faces: usize,
-    pub sources: usize,
+    /// The fidelity in use: not `Auto`.
+    pub fidelity: Fidelity,
+    /// What each body in the water became.
+    pub discretisation: Vec<Discretisation>,
+    /// Smallest gap that each body's discretisation resolves, m; zero where it isn't limited but by
+    /// its mesh.
+    pub resolved: Vec<f64>,
+    /// What `Auto` chose, and why.
+    pub reasons: Vec<String>,
     pub gaps: Gaps,
     pub warnings: Vec<String>,
 }
@@ -120,43 +127,16 @@ fn elements(mesh: &TriMesh) -> Vec<Element> {
         .collect()
 }
 
-/// One-body discretisations, made once per shape and settings.
-struct Library<'a> {
-    settings: &'a Settings,
-    made: Vec<(usize, Arc<WetBody>)>,
-}
-
-impl Library<'_> {
-    /// The discretisation of body `b`; bodies with equal shapes share one.
-    fn body(&mut self, scene: &Scene, b: usize, mesh: &TriMesh) -> Result<Arc<WetBody>> {
-        let same = |a: &Body, c: &Body| a.shape == c.shape && a.shape_at == c.shape_at;
-        if let Some((_, made)) = self
-            .made
-            .iter()
-            .find(|(a, _)| same(&scene.bodies[*a], &scene.bodies[b]))
-        {
-            return Ok(made.clone());
-        }
-        let (vertices, faces) = (mesh.vertices(), mesh.faces());
-        let name = &scene.bodies[b].name;
-        let mut settings = self.settings.boundary;
-        if self.settings.solve.solver == Solver::Gmres {
-            // GMRES solves the square system as it is; damping belongs to least squares.
-            settings.damping = 0.0;
-        }
-        let boundary = BodyBoundary::new(name, vertices, faces, &settings)?;
-        let made = Arc::new(WetBody::new(Arc::new(boundary)));
-        self.made.push((b, made.clone()));
-        Ok(made)
-    }
-}
-
 /// Whether anything moves body `b`.
 fn moves(scene: &Scene, tree: &Tree, b: usize) -> bool {
     (0..scene.bodies.len()).any(|a| tree.carries(a, b) && !tree.links()[a].v.is_empty())
 }
 
-pub(super) fn assemble(scene: &Scene, settings: &Settings) -> Result<Assembled> {
+pub(super) fn assemble(
+    scene: &Scene,
+    settings: &Settings,
+    folder: Option<&Path>,
+) -> Result<Assembled> {
     let index = |name: &String| scene.bodies.iter().position(|b| b.name == *name);
     let tree = Tree::new(scene.bodies.iter().map(|b| {
         (
@@ -173,14 +153,10 @@ pub(super) fn assemble(scene: &Scene, settings: &Settings) -> Result<Assembled> 
         surfaces.push(surface(body, settings.faces)?);
     }
 
-    let mut library = Library {
-        settings,
-        made: Vec::new(),
-    };
-    let mut isolated: Vec<Mat6> = Vec::new();
-    let mut full: Vec<Arc<WetBody>> = Vec::new();
+    let mut wet: Vec<Wet> = Vec::new();
+    let mut of_wet = Vec::new();
     let mut bodies = Vec::with_capacity(scene.bodies.len());
-    let (mut controls, mut wet_count, mut faces, mut sources) = (0, 0, 0, 0);
+    let mut controls = 0;
     for (b, body) in scene.bodies.iter().enumerate() {
         let surface = surfaces[b].as_ref();
         let (mass, center, inertia) = inertia(body, surface);
@@ -211,30 +187,19 @@ pub(super) fn assemble(scene: &Scene, settings: &Settings) -> Result<Assembled> 
             }
         }
         // Bodies that can't move matter only as boundaries of the coupled flow.
-        let seen = settings.fidelity == Fidelity::Full || moves(scene, &tree, b);
+        let seen = settings.fidelity != Fidelity::Isolated || moves(scene, &tree, b);
         if seen && (surface.is_some() || body.added_mass.is_some()) {
-            data.wet = Some(wet_count);
-            wet_count += 1;
-            match (settings.fidelity, &body.added_mass, surface) {
-                (Fidelity::Isolated, Some(rows), _) => {
-                    isolated.push(Mat6::from_fn(|i, j| rows[i][j]));
-                }
-                (_, _, Some(s)) => {
-                    let made = library.body(scene, b, &s.mesh)?;
-                    faces += made.faces();
-                    sources += made.sources();
-                    isolated.push(made.boundary.added_mass);
-                    full.push(made);
-                }
-                (Fidelity::Full, Some(_), None) => {
-                    return Err(Error::Unsupported {
-                        what: format!("coupling of body \"{}\"", body.name),
-                        why: "it has a given added mass but no shape".into(),
-                        instead: "give it a shape, or use the fidelity isolated".into(),
-                    });
-                }
-                (_, None, None) => {}
-            }
+            data.wet = Some(wet.len());
+            of_wet.push(b);
+            wet.push(Wet {
+                name: &body.name,
+                mesh: surface.map(|s| &s.mesh),
+                ellipsoid: (body.shape.as_ref().and_then(wet::semi_axes))
+                    .map(|axes| (axes, pose(&body.shape_at))),
+                added_mass: (body.added_mass.as_ref())
+                    .filter(|_| settings.fidelity == Fidelity::Isolated)
+                    .map(|rows| Mat6::from_fn(|i, j| rows[i][j])),
+            });
         }
         if body.actuated {
             data.joint_control = Some(controls);
@@ -246,21 +211,6 @@ pub(super) fn assemble(scene: &Scene, settings: &Settings) -> Result<Assembled> 
         }
         bodies.push(data);
     }
-    for (_, made) in &library.made {
-        warnings.extend(made.boundary.warnings.iter().cloned());
-    }
-    let coupling: Box<dyn Coupling> = match settings.fidelity {
-        Fidelity::Isolated => {
-            if !scene.walls.is_empty() {
-                warnings.push(format!(
-                    "{} wall(s) have no effect with the fidelity isolated; use full to feel them",
-                    scene.walls.len()
-                ));
-            }
-            Box::new(Isolated::new(isolated))
-        }
-        Fidelity::Full => Box::new(Full::new(full, &scene.walls, settings.solve)?),
-    };
     let drives: Vec<Drive> = scene
         .bodies
         .iter()
@@ -275,52 +225,127 @@ pub(super) fn assemble(scene: &Scene, settings: &Settings) -> Result<Assembled> 
         .map(|s| s.as_ref().map(|s| &s.mesh))
         .collect();
     let clearance = Clearance::new(&meshes, &scene.walls, &tree, &drives)?;
-    let system = System {
+    let mut system = System {
         bodies,
         drives,
         gravity: Vec3::from(scene.gravity),
         current: Vec3::from(scene.fluid.current),
         controls,
-        coupling,
+        coupling: Box::new(Isolated::new(Vec::new())),
         tree,
     };
-    let (q, v) = start(scene, settings, &system, &parameters, &clearance)?;
+    let q = start_coordinates(scene, settings, &system, &parameters, &clearance)?;
+    let Planned {
+        fidelity,
+        plan,
+        reasons,
+    } = choose(scene, settings, &system, &q, &clearance, &wet, &of_wet)?;
+    let made = wet::couple(&wet, &scene.walls, settings, fidelity, &plan, folder)?;
+    system.coupling = made.coupling;
+    warnings.extend(made.warnings);
+    let mut resolved = vec![0.0; scene.bodies.len()];
+    for (b, d) in of_wet.iter().zip(&made.bodies) {
+        resolved[*b] = d.resolved_gap.unwrap_or(0.0);
+    }
+    let v = start_velocity(scene, settings, &system, &parameters, &q)?;
     Ok(Assembled {
         policy: policy(scene, &system)?,
         system,
         parameters,
         q,
         v,
-        faces,
-        sources,
+        faces: made.faces,
+        fidelity,
+        discretisation: made.bodies,
+        resolved,
+        reasons,
         gaps: clearance.moving,
         warnings,
     })
 }
 
-/// Initial coordinates and velocity; a given momentum is turned into velocity.
-fn start(
+/// The fidelity to use, and what `Auto` makes of the scene.
+fn choose(
+    scene: &Scene,
+    settings: &Settings,
+    system: &System,
+    q: &DVector<f64>,
+    clearance: &Clearance,
+    wet: &[Wet],
+    of_wet: &[usize],
+) -> Result<Planned> {
+    if settings.fidelity != Fidelity::Auto || scene.fluid.density <= 0.0 {
+        return Ok(Planned {
+            fidelity: settings.fidelity,
+            plan: Plan::default(),
+            reasons: Vec::new(),
+        });
+    }
+    let all = system.tree.kinematics(q).poses;
+    let poses: Vec<Pose> = of_wet.iter().map(|b| all[*b]).collect();
+    let number = |b: usize| of_wet.iter().position(|w| *w == b);
+    let mut gaps = Vec::new();
+    for gap in [&clearance.moving, &clearance.rigid]
+        .into_iter()
+        .flat_map(|g| g.all(&all))
+    {
+        let second = match gap.second {
+            Other::Body(b) => number(b).map(Other::Body),
+            wall => Some(wall),
+        };
+        if let (Some(first), Some(second)) = (number(gap.first), second) {
+            gaps.push(Gap {
+                first,
+                second,
+                ..gap
+            });
+        }
+    }
+    plan(wet, &poses, &gaps, &scene.walls, settings.accuracy.0)
+}
+
+/// Initial coordinates.
+fn start_coordinates(
     scene: &Scene,
     settings: &Settings,
     system: &System,
     parameters: &Parameters,
     clearance: &Clearance,
-) -> Result<(DVector<f64>, DVector<f64>)> {
-    let stepper = Stepper {
-        system,
-        parameters,
-        integrator: Default::default(),
-        dt: settings.time_step.unwrap_or(scene.time_step),
-    };
+) -> Result<DVector<f64>> {
     let mut q = if scene.initial.q.is_empty() {
         system.tree.origin()
     } else {
         DVector::from_vec(scene.initial.q.clone())
     };
-    stepper.place_motions(&mut q, 0.0);
-    if settings.fidelity == Fidelity::Full && scene.fluid.density > 0.0 {
+    stepper(scene, settings, system, parameters).place_motions(&mut q, 0.0);
+    if settings.fidelity != Fidelity::Isolated && scene.fluid.density > 0.0 {
         clearance::refuse_start(clearance, &q, system)?;
     }
+    Ok(q)
+}
+
+fn stepper<'a>(
+    scene: &Scene,
+    settings: &Settings,
+    system: &'a System,
+    parameters: &'a Parameters,
+) -> Stepper<'a> {
+    Stepper {
+        system,
+        parameters,
+        integrator: Default::default(),
+        dt: settings.time_step.unwrap_or(scene.time_step),
+    }
+}
+
+/// Initial velocity; a given momentum is turned into velocity.
+fn start_velocity(
+    scene: &Scene,
+    settings: &Settings,
+    system: &System,
+    parameters: &Parameters,
+    q: &DVector<f64>,
+) -> Result<DVector<f64>> {
     let mut v = if scene.initial.v.is_empty() {
         DVector::zeros(system.tree.velocities())
     } else {
@@ -334,11 +359,12 @@ fn start(
         }
     }
     if !scene.initial.momentum.is_empty() {
-        let e = stepper.evaluate(&q, false)?;
+        let stepper = stepper(scene, settings, system, parameters);
+        let e = stepper.evaluate(q, false)?;
         let p = DVector::from_vec(scene.initial.momentum.clone());
         v = stepper.velocity_of_momentum(&e, &p)?;
     }
-    Ok((q, v))
+    Ok(v)
 }
 
 /// The scene's controller.

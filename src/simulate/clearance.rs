@@ -1,6 +1,7 @@
 //! How near the bodies are to one another and to the walls, and what that means for the flow.
 
 use super::Fidelity;
+use crate::adjoint::lie::Pose;
 use crate::dynamics::{Drive, System};
 use crate::error::readable;
 use crate::multibody::Tree;
@@ -103,7 +104,7 @@ pub(super) fn warning(time: f64, gap: &Gap, fidelity: Fidelity, system: &System)
     let time = readable(time);
     let place = place(gap, system);
     match fidelity {
-        Fidelity::Full => (gap.distance < RESOLVED * gap.edge).then(|| {
+        Fidelity::Full | Fidelity::Auto => (gap.distance < RESOLVED * gap.edge).then(|| {
             format!(
                 "{place}: the smallest gap, {:.3e} m at t = {time} s, is narrower than half \
                  the edges there ({:.3e} m): forces across it may be off by several percent and \
@@ -112,6 +113,8 @@ pub(super) fn warning(time: f64, gap: &Gap, fidelity: Fidelity, system: &System)
                 gap.edge
             )
         }),
+        // Said pair by pair: what is resolved differs between bodies.
+        Fidelity::Reduced => None,
         Fidelity::Isolated => overlaps(gap).then(|| {
             format!(
                 "{place} overlap, most at t = {time} s by {:.3e} m; nothing keeps them apart \
@@ -120,4 +123,46 @@ pub(super) fn warning(time: f64, gap: &Gap, fidelity: Fidelity, system: &System)
             )
         }),
     }
+}
+
+/// The gap that is smallest against what compressed bodies resolve, if it isn't resolved. `states`
+/// are times, poses and smallest gaps; `resolved` the smallest gap (m) of each body.
+pub(super) fn unresolved<'a>(
+    states: impl Iterator<Item = (f64, &'a [Pose], Gap)>,
+    gaps: &Gaps,
+    resolved: &[f64],
+    system: &System,
+) -> Option<String> {
+    let coarsest = resolved.iter().copied().fold(0.0, f64::max);
+    // Of a gap to a wall, the image is twice as far away.
+    let judge = |gap: &Gap| match gap.second {
+        Other::Body(b) => (gap.distance, resolved[gap.first].max(resolved[b])),
+        Other::Wall(_) => (2.0 * gap.distance, resolved[gap.first]),
+    };
+    let mut worst: Option<(f64, f64, Gap, f64)> = None;
+    for (time, poses, smallest) in states {
+        if smallest.distance >= coarsest {
+            continue;
+        }
+        for gap in gaps.all(poses) {
+            let (seen, limit) = judge(&gap);
+            let ratio = seen / limit;
+            if limit > 0.0 && ratio < 1.0 && worst.is_none_or(|w| ratio < w.0) {
+                worst = Some((ratio, time, gap, limit));
+            }
+        }
+    }
+    let (ratio, time, gap, limit) = worst?;
+    let limit = match gap.second {
+        Other::Body(_) => limit,
+        Other::Wall(_) => 0.5 * limit,
+    };
+    Some(format!(
+        "{}: the smallest gap, {:.3e} m at t = {} s, is {ratio:.2} of what their compressed sources \
+         resolve ({limit:.3e} m): forces across it may be off by several percent and more; use a \
+         smaller resolved gap, or the fidelity full with more faces, or end the run before",
+        place(&gap, system),
+        gap.distance.max(0.0),
+        readable(time)
+    ))
 }

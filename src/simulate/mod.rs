@@ -6,11 +6,13 @@ mod controls;
 pub mod gradcheck;
 mod gradient;
 pub mod objective;
+mod plan;
 mod policy;
 mod rollout;
 mod settings;
 mod simulator;
 mod trajectory;
+mod wet;
 
 pub use controls::Controls;
 pub use gradient::{Cotangents, Gradient, Initial};
@@ -19,5 +21,6 @@ pub use policy::{
     Action, ActionBar, Constant, Observation, OpenLoop, Pd, PdAxis, Policy, PushThenLock,
 };
 pub use rollout::{Rollout, Sample, Summary};
-pub use settings::{Fidelity, Settings};
+pub use settings::{Accuracy, Fidelity, Settings};
 pub use simulator::{AddedMass, Simulator};
+pub use wet::Discretisation;

@@ -165,10 +165,10 @@ impl<'a> Rollout<'a> {
         self.gaps.get_or_init(|| {
             let samples = self.samples().iter();
             match self.simulator.felt() {
-                Fidelity::Full => samples.map(|s| s.gap).collect(),
                 Fidelity::Isolated => samples
                     .map(|s| self.simulator.gaps().smallest(&s.poses))
                     .collect(),
+                _ => samples.map(|s| s.gap).collect(),
             }
         })
     }
@@ -188,7 +188,20 @@ impl<'a> Rollout<'a> {
         let warning = nearest.and_then(|(time, gap)| {
             clearance::warning(time, &gap, fidelity, self.simulator.system())
         });
+        let warning = warning.or_else(|| self.unresolved_gap(fidelity));
         warning.into_iter().chain(self.energy_warning()).collect()
+    }
+
+    /// A gap that compressed bodies don't resolve.
+    fn unresolved_gap(&self, fidelity: Fidelity) -> Option<String> {
+        if fidelity != Fidelity::Reduced {
+            return None;
+        }
+        let samples = self.samples().iter();
+        let states = samples.filter_map(|s| Some((s.time, s.poses.as_slice(), s.gap?)));
+        let simulator = self.simulator;
+        let (gaps, system) = (simulator.gaps(), simulator.system());
+        clearance::unresolved(states, gaps, simulator.resolved(), system)
     }
 
     /// Energy that grows though nothing does work: the step is too long.

@@ -2,7 +2,7 @@
 
 use super::assemble::{self, Assembled};
 use super::trajectory::Trajectory;
-use super::{Controls, Fidelity, Policy, Rollout, Settings};
+use super::{Controls, Discretisation, Fidelity, Policy, Rollout, Settings};
 use crate::adjoint::step;
 use crate::coupling::Report;
 use crate::dynamics::{Parameters, State, Stepper, System};
@@ -10,6 +10,7 @@ use crate::scene::Scene;
 use crate::shape::Gaps;
 use crate::{Error, Result};
 use nalgebra::{DMatrix, DVector};
+use std::path::Path;
 
 /// Most steps of one rollout: some kilobytes are kept for each.
 const MOST_STEPS: usize = 5_000_000;
@@ -41,6 +42,19 @@ impl Simulator {
     /// A scene that doesn't validate, meshes that don't bound a volume, bodies that overlap (with
     /// the fidelity `full`), or an inertia that leaves M(q) indefinite at the start.
     pub fn new(scene: &Scene, settings: Settings) -> Result<Self> {
+        Self::prepare(scene, settings, None)
+    }
+
+    /// As [`Simulator::new`], with a folder where compressed bodies (fidelities `Reduced` and `Auto`)
+    /// are kept from one program to the next; it is made if it isn't there.
+    ///
+    /// # Errors
+    /// As [`Simulator::new`], and a folder that can't be written.
+    pub fn cached(scene: &Scene, settings: Settings, folder: &Path) -> Result<Self> {
+        Self::prepare(scene, settings, Some(folder))
+    }
+
+    fn prepare(scene: &Scene, settings: Settings, folder: Option<&Path>) -> Result<Self> {
         scene.validate()?;
         let dt = settings.time_step.unwrap_or(scene.time_step);
         if !(dt > 0.0 && dt.is_finite()) {
@@ -50,7 +64,7 @@ impl Simulator {
                 "must be positive and finite, in s",
             ));
         }
-        let assembled = assemble::assemble(scene, &settings)?;
+        let assembled = assemble::assemble(scene, &settings, folder)?;
         let out = Self {
             assembled,
             settings,
@@ -96,9 +110,29 @@ impl Simulator {
         self.assembled.faces
     }
 
-    /// Number of sources of all bodies in the water: the unknowns of the coupled solve.
+    /// Number of unknowns of the coupled solve.
     pub fn unknowns(&self) -> usize {
-        self.assembled.sources
+        self.system().coupling.unknowns()
+    }
+
+    /// What each body in the water became.
+    pub fn discretisation(&self) -> &[Discretisation] {
+        &self.assembled.discretisation
+    }
+
+    /// The fidelity in use: what was asked for, or what `Auto` chose.
+    pub fn fidelity(&self) -> Fidelity {
+        self.assembled.fidelity
+    }
+
+    /// What the fidelity `Auto` chose, and why; empty with others.
+    pub fn reasons(&self) -> &[String] {
+        &self.assembled.reasons
+    }
+
+    /// Smallest gap (m) that each body's compression resolves; zero where there is none.
+    pub(super) fn resolved(&self) -> &[f64] {
+        &self.assembled.resolved
     }
 
     /// Distances between the bodies' surfaces, and to the walls; without the pairs that never move
@@ -232,7 +266,7 @@ impl Simulator {
     /// The fidelity that matters: without water bodies don't feel each other.
     pub(super) fn felt(&self) -> Fidelity {
         if self.parameters().density > 0.0 {
-            self.settings.fidelity
+            self.assembled.fidelity
         } else {
             Fidelity::Isolated
         }

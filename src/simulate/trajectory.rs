@@ -38,7 +38,7 @@ impl<'a> Trajectory<'a> {
     fn evaluate(&self, state: &State) -> Result<(Evaluation<'_>, Option<Gap>)> {
         let system = self.stepper.system;
         let mut gap = None;
-        if self.fidelity == Fidelity::Full {
+        if self.fidelity != Fidelity::Isolated {
             gap = self.gaps.smallest(&system.tree.kinematics(&state.q).poses);
             clearance::refuse(gap.as_ref(), system)?;
         }

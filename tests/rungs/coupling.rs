@@ -7,8 +7,9 @@ use hydrograd::adjoint::lie::{Mat6, Pose, Vec3, Vec6, cross_motion, exp_matrix};
 use hydrograd::boundary::{BodyBoundary, Method, Settings};
 use hydrograd::coupling::full::{Full, SolveSettings, Solver, WetBody};
 use hydrograd::coupling::image::Image;
+use hydrograd::coupling::reduced::{Cutoff, Reduced, compress};
 use hydrograd::coupling::{Coupling, Direction, Isolated};
-use hydrograd::scene::{Shape, Wall};
+use hydrograd::scene::{Shape, Wall, WallSurface};
 use hydrograd::shape;
 use nalgebra::{DMatrix, DVector};
 use std::path::Path;
@@ -30,14 +31,20 @@ pub fn rungs() -> Vec<Rung> {
         "coupling::full::record::FullRecord::gradient_along" => |c| all(systems().iter().map(|s| gradient_along(s, c))),
         "coupling::full::record::FullRecord::vjp" => |c| all(systems().iter().map(|s| vjp(s, c))),
         "coupling::full::record::FullRecord::hvp" => |c| all(systems().iter().map(|s| hvp(s, c))),
+        "coupling::reduced::record::ReducedRecord::gradient" => |c| all(reduced_systems().iter().map(|s| gradient(s, c))),
+        "coupling::reduced::record::ReducedRecord::gradient_along" => |c| all(reduced_systems().iter().map(|s| gradient_along(s, c))),
+        "coupling::reduced::record::ReducedRecord::vjp" => |c| all(reduced_systems().iter().map(|s| vjp(s, c))),
+        "coupling::reduced::record::ReducedRecord::hvp" => |c| all(reduced_systems().iter().map(|s| hvp(s, c))),
     ]
 }
 
 const WALL: Wall = Wall {
+    surface: WallSurface::Rigid,
     point: [0.0, 0.0, 0.1],
     normal: [0.1, 0.0, 1.0],
 };
 const SIDE: Wall = Wall {
+    surface: WallSurface::Rigid,
     point: [-0.8, 0.0, 0.0],
     normal: [1.0, 0.0, -0.1],
 };
@@ -75,6 +82,40 @@ fn systems() -> Vec<Full> {
         full(Method::MfsVertex, Solver::Qr, &[WALL, SIDE]),
         full(Method::MfsFace, Solver::Cgls, &[WALL]),
         full(Method::MfsFace, Solver::Gmres, &[]),
+    ]
+}
+
+/// Compressed bodies without walls, with rigid ones and a free surface, and fading out: between the
+/// bodies, and between each and its image.
+fn reduced_systems() -> Vec<Reduced> {
+    let compressed = |shape: Shape| {
+        let mesh = shape::build(&shape, Path::new("."), Some(320)).unwrap();
+        let (v, f) = (mesh.vertices(), mesh.faces());
+        let b = BodyBoundary::new("b", v, f, &Settings::default()).unwrap();
+        let settings = compress::Settings {
+            rank: Some(20),
+            ..compress::Settings::default()
+        };
+        Arc::new(compress::compress("b", v, f, &b, &settings).unwrap())
+    };
+    let bodies = [
+        compressed(Shape::sphere(0.4)),
+        compressed(Shape::ellipsoid([0.5, 0.3, 0.4])),
+    ];
+    let of = |walls: &[Wall], cutoff: Option<Cutoff>| {
+        Reduced::new(bodies.to_vec(), walls, |_, _| cutoff).unwrap()
+    };
+    let free = Wall {
+        surface: WallSurface::Free,
+        ..SIDE
+    };
+    let fading = |near: f64, far: f64| Some(Cutoff { near, far });
+    vec![
+        of(&[], None),
+        of(&[WALL, SIDE], None),
+        of(&[WALL, free], None),
+        of(&[], fading(0.9, 1.6)),
+        of(&[WALL], fading(0.8, 2.9)),
     ]
 }
 
@@ -142,7 +183,7 @@ fn energy(s: &dyn Coupling, z: &[Vec6], h: f64, x: &DVector<f64>, y: &DVector<f6
     0.5 * (m[(0, 1)] + m[(1, 0)])
 }
 
-fn gradient(s: &Full, c: f64) -> Outcome {
+fn gradient(s: &dyn Coupling, c: f64) -> Outcome {
     let k = case();
     let record = s.evaluate(&poses(), &k.basis, true).unwrap();
     let slope = c * dot(&record.gradient(&k.x, &k.y), &k.z);
@@ -150,7 +191,7 @@ fn gradient(s: &Full, c: f64) -> Outcome {
     along(|h| energy(s, &k.z, h, &x, &y), slope)
 }
 
-fn gradient_along(s: &Full, c: f64) -> Outcome {
+fn gradient_along(s: &dyn Coupling, c: f64) -> Outcome {
     let k = case();
     let record = s.evaluate(&poses(), &k.basis, true).unwrap();
     let tangent = c * record.gradient_along(&k.y, &k.z);
@@ -190,7 +231,7 @@ fn vjp(s: &dyn Coupling, c: f64) -> Outcome {
 }
 
 /// Tangents of impulses and wrenches, for two directions and for one taken twice.
-fn hvp(s: &Full, c: f64) -> Outcome {
+fn hvp(s: &dyn Coupling, c: f64) -> Outcome {
     let k = case();
     let record = s.evaluate(&poses(), &k.basis, true).unwrap();
     let at = |h: f64| s.evaluate(&displaced(&k.z, h), &k.basis, true).unwrap();
@@ -260,7 +301,13 @@ fn image_twist(c: f64) -> Outcome {
 /// two displacements matters by their bracket.
 #[test]
 fn second_derivatives_commute_up_to_the_bracket() {
-    for s in systems() {
+    let full = systems()
+        .into_iter()
+        .map(|s| Box::new(s) as Box<dyn Coupling>);
+    let reduced = reduced_systems()
+        .into_iter()
+        .map(|s| Box::new(s) as Box<dyn Coupling>);
+    for s in full.chain(reduced) {
         let k = case();
         let other = field(1.9);
         let record = s.evaluate(&poses(), &k.basis, true).unwrap();

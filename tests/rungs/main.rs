@@ -41,7 +41,7 @@ const THROUGH: &[(&str, &str)] = &[
     ("coupling::full::body::WetBody::hvp", FULL_HVP),
     ("coupling::full::body::WetBody::potential_vjp", FULL_VJP),
     ("coupling::full::body::WetBody::potential_hvp", FULL_HVP),
-    ("coupling::full::pairs::Pair::apply_jvp", FULL_HVP),
+    ("coupling::pair::Pair::apply_jvp", FULL_HVP),
     ("coupling::full::system::System::respond_jvp", FULL_HVP),
     // Pieces of the equations of motion.
     (

@@ -51,8 +51,8 @@ pub use normal::{
     normal_vjp,
 };
 pub use potential::{
-    potential, potential_gradient, potential_hessian_product, potential_hvp, potential_sum,
-    potential_vjp,
+    potential, potential_fill, potential_gradient, potential_hessian_product, potential_hvp,
+    potential_jvp, potential_sum, potential_vjp,
 };
 pub use registry::rungs;
 pub use source::Sources;

@@ -2,7 +2,8 @@
 
 use super::{
     Points, Sources, Triangles, Write, flux_fill, flux_hvp, flux_jvp, flux_vjp, normal_fill,
-    normal_hvp, normal_jvp, normal_vjp, potential_hvp, potential_sum, potential_vjp,
+    normal_hvp, normal_jvp, normal_vjp, potential_fill, potential_hvp, potential_jvp,
+    potential_vjp,
 };
 use crate::check::{Outcome, Rung, outcome};
 use crate::lie::Vec3;
@@ -32,6 +33,7 @@ pub fn rungs() -> Vec<Rung> {
         "kernel::normal::normal_hvp" => |c| tangent(
             |s, bar, out| normal_vjp(&points(), s, bar, K, out),
             |d, bar, out| normal_hvp(&points(), &sources(&start()), d, bar, K, out), c),
+        "kernel::potential::potential_jvp" => |c| forward(potential_matrix, |d, a, out| potential_jvp(&points(), &sources(&start()), d, a, K, out), c),
         "kernel::potential::potential_vjp" => |c| gradient(potential_matrix, |bar, out| potential_vjp(&points(), &sources(&start()), bar, K, out), c),
         "kernel::potential::potential_hvp" => |c| tangent(
             |s, bar, out| potential_vjp(&points(), s, bar, K, out),
@@ -128,17 +130,11 @@ fn normal_matrix(s: &Sources) -> Vec<f64> {
     out
 }
 
-/// Through `potential_sum`, one unit row at a time.
 fn potential_matrix(s: &Sources) -> Vec<f64> {
     let t = points();
-    let n = t.len();
-    let mut identity = vec![0.0; n * n];
-    identity.iter_mut().step_by(n + 1).for_each(|x| *x = 1.0);
-    let mut transposed = vec![0.0; s.len() * n];
-    potential_sum(&t, s, &identity, n, &mut transposed);
-    (0..n * s.len())
-        .map(|m| transposed[(m % s.len()) * n + m / s.len()])
-        .collect()
+    let mut out = vec![0.0; t.len() * s.len()];
+    potential_fill(&t, s, Write::Set, &mut out, s.len(), 0);
+    out
 }
 
 /// Octahedron of unequal axes with row weights.

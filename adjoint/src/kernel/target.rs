@@ -27,6 +27,15 @@ impl Points {
         }
     }
 
+    /// Points of no surface (m), as targets of the potential kernel alone: normals and weights zero.
+    pub fn bare(points: &[Vec3]) -> Self {
+        Self::new(
+            points,
+            &vec![Vec3::zeros(); points.len()],
+            vec![0.0; points.len()],
+        )
+    }
+
     /// Number of points.
     pub fn len(&self) -> usize {
         self.centre.len()

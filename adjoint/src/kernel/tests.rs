@@ -370,6 +370,10 @@ fn everything() -> Vec<f64> {
     add(vectors, &|o| flux_hvp(&t, &s, &d, &bar, k, o));
     add(vectors, &|o| normal_hvp(&p, &s, &d, &bar, k, o));
     add(vectors, &|o| potential_hvp(&p, &s, &d, &bar, k, o));
+    add(rows, &|o| potential_jvp(&p, &s, &d, &a, k, o));
+    add(p.len() * count, &|o| {
+        potential_fill(&p, &s, Write::Add, o, count, 0)
+    });
     add(count * k, &|o| potential_sum(&p, &s, &bar, k, o));
     all
 }

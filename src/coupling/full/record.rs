@@ -2,10 +2,10 @@
 
 use super::Full;
 use super::body::unit_twists;
-use super::pairs::{Pair, wrench};
 use super::system::System;
 use crate::Result;
 use crate::adjoint::lie::{Pose, Vec3, Vec6};
+use crate::coupling::pair::{Pair, wrench};
 use crate::coupling::settings::asymmetry;
 use crate::coupling::{Direction, PairTensor, Pullback, Record, Report, Tangent};
 use crate::solver::{Columns, transposed_product};
@@ -94,6 +94,7 @@ impl<'a> FullRecord<'a> {
             iterations: solved.iterations,
             residual: solved.residual,
             asymmetry,
+            condition: 0.0,
         };
         let mut out = Self {
             full,

@@ -129,7 +129,7 @@ impl FullRecord<'_> {
     /// Wrench on the sources of a pair and its tangent, in the target's frame.
     fn pair_tangent(
         &self,
-        pair: &super::pairs::Pair,
+        pair: &crate::coupling::pair::Pair,
         first: &PairFields,
         responses: &[&Response],
         left: &Columns,

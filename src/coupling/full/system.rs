@@ -1,9 +1,9 @@
 //! The assembled matrix at given poses, and its solves.
 
-use super::pairs::Pair;
 use super::{Full, WetBody};
 use crate::adjoint::kernel::Write;
 use crate::boundary::Method;
+use crate::coupling::pair::Pair;
 use crate::coupling::settings::check_limits;
 use crate::solver::{Columns, Outcome, cgls, gmres, normal_product, product, transposed_product};
 use crate::{Error, Result};

@@ -59,6 +59,7 @@ impl PanelRecord {
             iterations: phi.iterations.max(mu.iterations),
             residual: phi.residual.max(mu.residual),
             asymmetry: asymmetry(&raw, basis, |b| coupled.bodies[b].faces.volume()),
+            ..Report::default()
         };
         for (b, body) in coupled.bodies.iter().enumerate() {
             for c in 0..k {

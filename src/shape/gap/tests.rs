@@ -303,10 +303,12 @@ fn pieces_inside_are_found() {
 fn walls() {
     let ball = sphere(0.5, 1280);
     let wall = Wall {
+        surface: Default::default(),
         point: [0.0, 0.0, -1.0],
         normal: [0.0, 0.0, 3.0],
     };
     let slanted = Wall {
+        surface: Default::default(),
         point: [-2.0, 0.0, 0.0],
         normal: [1e-200, 0.0, 1e-200],
     };
@@ -343,6 +345,7 @@ fn the_smallest_of_many_is_that_of_all() {
         .map(|i| if i == 4 { None } else { meshes.get(i % 3) })
         .collect();
     let wall = Wall {
+        surface: Default::default(),
         point: [0.0, 0.0, -2.5],
         normal: [0.0, 0.0, 1.0],
     };
@@ -442,6 +445,7 @@ fn edges_are_those_near_the_closest_points() {
 fn nothing_panics() {
     let ball = sphere(1.0, 80);
     let wall = Wall {
+        surface: Default::default(),
         point: [0.0; 3],
         normal: [0.0, 0.0, 1.0],
     };
@@ -489,6 +493,7 @@ fn what_can_not_be_is_refused() {
     let ball = sphere(1.0, 80);
     for normal in [[0.0; 3], [f64::NAN, 0.0, 1.0], [f64::INFINITY, 0.0, 0.0]] {
         let wall = Wall {
+            surface: Default::default(),
             point: [0.0; 3],
             normal,
         };

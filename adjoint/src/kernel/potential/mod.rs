@@ -6,11 +6,13 @@
 //! ```
 
 mod hvp;
+mod jvp;
 mod value;
 mod vjp;
 
 pub use hvp::{potential_hessian_product, potential_hvp};
+pub use jvp::potential_jvp;
 #[cfg(test)]
 pub(super) use value::inverse_distance;
-pub use value::{potential, potential_sum};
+pub use value::{potential, potential_fill, potential_sum};
 pub use vjp::{potential_gradient, potential_vjp};

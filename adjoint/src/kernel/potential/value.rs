@@ -1,10 +1,12 @@
 //! Potential: value.
 
 use crate::kernel::lane::{Lane, Lanes, V3, sub};
-use crate::kernel::sum::{Scratch, TILE, Terms, length, splat, transposed};
-use crate::kernel::{Points, Sources};
+use crate::kernel::sum::{
+    Scratch, TILE, Terms, dispatch, fill, length, load, put, splat, transposed,
+};
+use crate::kernel::{Points, Sources, Write};
 use crate::lie::Vec3;
-use pulp::Simd;
+use pulp::{Simd, WithSimd};
 
 /// `1/|r|`.
 #[inline(always)]
@@ -52,6 +54,66 @@ impl Terms<1> for Values<'_> {
         for (out, centre) in out.iter_mut().zip(centres) {
             let r = sub(splat(simd, centre), s);
             *out = [inverse_distance(r).v];
+        }
+    }
+}
+
+/// `P_ij` into `out[i · stride + column + j]`, targets × sources.
+pub fn potential_fill(
+    targets: &Points,
+    sources: &Sources,
+    write: Write,
+    out: &mut [f64],
+    stride: usize,
+    column: usize,
+) {
+    fill(
+        targets.len(),
+        sources,
+        out,
+        stride,
+        column,
+        TILE,
+        |tile, out| {
+            dispatch(Fill {
+                targets,
+                first: tile * TILE,
+                sources,
+                add: write == Write::Add,
+                out,
+                stride,
+                column,
+            });
+        },
+    );
+}
+
+/// Some rows.
+struct Fill<'a> {
+    targets: &'a Points,
+    first: usize,
+    sources: &'a Sources,
+    add: bool,
+    out: &'a mut [f64],
+    stride: usize,
+    column: usize,
+}
+
+impl WithSimd for Fill<'_> {
+    type Output = ();
+
+    #[inline(always)]
+    fn with_simd<S: Simd>(self, simd: S) {
+        let count = self.sources.len();
+        for (i, row) in self.out.chunks_mut(self.stride).enumerate() {
+            let centre = splat(simd, &self.targets.centre[self.first + i]);
+            for v in 0..count.div_ceil(S::F64_LANES) {
+                let value = inverse_distance(sub(centre, load(simd, self.sources, v)));
+                let j = v * S::F64_LANES;
+                let end = count.min(j + S::F64_LANES);
+                let out = &mut row[self.column + j..self.column + end];
+                put(simd, self.add, value.v, out);
+            }
         }
     }
 }

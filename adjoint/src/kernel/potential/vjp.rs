@@ -31,7 +31,7 @@ pub fn potential_vjp(
 
 /// Gradients at the points of a surface.
 #[derive(Clone, Copy)]
-struct Gradients<'a>(&'a Points);
+pub(super) struct Gradients<'a>(pub(super) &'a Points);
 
 impl Terms<3> for Gradients<'_> {
     fn len(self) -> usize {

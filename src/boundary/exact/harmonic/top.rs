@@ -1,0 +1,142 @@
+//! The angular parts of ellipsoidal harmonics: eigenfunctions of `T = A L₁² + B L₂²` (axes in falling order
+//! of length) among the spherical harmonics of one degree n.
+//!
+//! T is the Hamiltonian of an asymmetric top. Quantised about an axis u with the others v, w,
+//!
+//! ```text
+//! T = t_u L_u² + s (L² − L_u²) + d (L_v² − L_w²),   s = (t_v + t_w)/2,  d = (t_v − t_w)/2,  t = (A, B, 0)
+//! ```
+//!
+//! and L_v² − L_w² = ½(L₊² + L₋²) couples orders m and m ± 2 of the cosines among themselves and of the sines:
+//! four symmetric tridiagonal matrices a degree. u is the axis about which the body is nearest to round;
+//! where it is round, d = 0 and the matrices are diagonal.
+//!
+//! # References
+//! S. C. Wang, "On the asymmetrical top in quantum mechanics", Phys. Rev. 34 (1929) 243–252;
+//! R. D. Spence, "Angular momentum in sphero-conal coordinates", Am. J. Phys. 27 (1959) 329–335.
+
+use crate::adjoint::lie::Vec3;
+use crate::{Error, Result};
+use faer::{Mat, Side};
+
+/// The axes and coefficients of T for one ellipsoid.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Top {
+    /// u, v, w among the axes in falling order of length.
+    axes: [usize; 3],
+    /// t_u.
+    along: f64,
+    /// s.
+    mean: f64,
+    /// d.
+    difference: f64,
+}
+
+/// Functions that mix: cosines or sines of m φ with m even or odd.
+#[derive(Clone, Debug)]
+pub(super) struct Class {
+    pub sine: bool,
+    /// The orders m.
+    pub orders: Vec<usize>,
+    /// Whether the functions are odd along the shortest axis.
+    pub odd: bool,
+    /// Eigenvalues of T.
+    pub values: Vec<f64>,
+    /// Eigenvectors, orders × values; none where each function is its own.
+    pub vectors: Option<Mat<f64>>,
+}
+
+impl Top {
+    /// From A ≥ B ≥ 0.
+    pub fn new(a: f64, b: f64) -> Self {
+        if a - b <= b {
+            Self {
+                axes: [2, 0, 1],
+                along: 0.0,
+                mean: 0.5 * (a + b),
+                difference: 0.5 * (a - b),
+            }
+        } else {
+            Self {
+                axes: [0, 1, 2],
+                along: a,
+                mean: 0.5 * b,
+                difference: 0.5 * b,
+            }
+        }
+    }
+
+    /// Components (u, v, w) of a direction.
+    pub fn components(&self, x: &Vec3) -> [f64; 3] {
+        self.axes.map(|i| x[i])
+    }
+
+    /// The four classes of degree n (fewer for n < 2).
+    pub fn classes(&self, n: usize) -> Result<Vec<Class>> {
+        let mut out = Vec::with_capacity(4);
+        for sine in [false, true] {
+            for first in [0, 1] {
+                let first = if sine && first == 0 { 2 } else { first };
+                let orders: Vec<usize> = (first..=n).step_by(2).collect();
+                if !orders.is_empty() {
+                    out.push(self.class(n, sine, orders)?);
+                }
+            }
+        }
+        Ok(out)
+    }
+
+    fn class(&self, n: usize, sine: bool, orders: Vec<usize>) -> Result<Class> {
+        let l = n as f64;
+        let total = l * (l + 1.0);
+        let diagonal: Vec<f64> = orders
+            .iter()
+            .map(|&m| {
+                let square = (m * m) as f64;
+                let own = self.along * square + self.mean * (total - square);
+                // L₊² takes −1 to 1.
+                let fold = if m == 1 { 0.5 * total } else { 0.0 };
+                own + self.difference * if sine { fold } else { -fold }
+            })
+            .collect();
+        let odd = if self.axes[0] == 2 {
+            (n - orders[0]) % 2 == 1
+        } else {
+            sine
+        };
+        let (values, vectors) = if self.difference == 0.0 {
+            (diagonal, None)
+        } else {
+            let size = orders.len();
+            let mut matrix = Mat::<f64>::zeros(size, size);
+            for (i, &m) in orders.iter().enumerate() {
+                matrix[(i, i)] = diagonal[i];
+                if i + 1 < size {
+                    let m = m as f64;
+                    let up = (l - m) * (l + m + 1.0) * (l - m - 1.0) * (l + m + 2.0);
+                    let fold = if m == 0.0 { 2.0 } else { 1.0 };
+                    matrix[(i + 1, i)] = 0.5 * self.difference * (fold * up).sqrt();
+                }
+            }
+            let eigen = matrix
+                .self_adjoint_eigen(Side::Lower)
+                .map_err(|_| Error::Unresolved {
+                    place: "ellipsoid".into(),
+                    quantity: "degree of a harmonic whose eigenfunctions were sought".into(),
+                    value: l,
+                    limit: l,
+                    remedy: "use a mesh".into(),
+                })?;
+            let values = (0..size).map(|i| eigen.S()[i]).collect();
+            (values, Some(eigen.U().to_owned()))
+        };
+        Ok(Class {
+            sine,
+            orders,
+            odd,
+            // Not negative but for rounding.
+            values: values.into_iter().map(|v: f64| v.max(0.0)).collect(),
+            vectors,
+        })
+    }
+}

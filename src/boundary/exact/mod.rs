@@ -1,0 +1,195 @@
+//! Spheres and ellipsoids by formula: no mesh.
+//!
+//! The added mass and the flow of the moving body are Lamb's ([`lamb`]). What the body adds to the flow
+//! of a source is an image in closed form for a sphere (`sphere`), a sum of ellipsoidal harmonics for
+//! others (`harmonic`): a scattering matrix that is diagonal, so nothing is solved.
+
+mod confocal;
+mod harmonic;
+pub mod lamb;
+mod sphere;
+
+use crate::adjoint::lie::{Mat6, Pose, Vec3, skew};
+use crate::boundary::Response;
+use crate::{Error, Result};
+use confocal::{Confocal, Place};
+use faer::Mat;
+use harmonic::Harmonics;
+use lamb::Lamb;
+use rayon::prelude::*;
+
+/// Residual above which a warning is given.
+const WANTED: f64 = 1e-4;
+/// Differences of squared semi-axes, relative, below which an ellipsoid is a sphere.
+const ROUND: f64 = 1e-9;
+
+/// A sphere or an ellipsoid in unbounded water.
+#[derive(Clone, Debug)]
+pub struct ExactBoundary {
+    /// Name, for messages.
+    pub name: String,
+    /// Semi-axes along the shape's x, y, z, m.
+    pub semi_axes: [f64; 3],
+    /// The shape's frame in the body's frame.
+    pub pose: Pose,
+    /// Distance from the surface, m, from which sources are answered to the accuracy
+    /// [`ExactBoundary::residual`].
+    pub resolved_gap: f64,
+    /// Relative error of the normal velocity on the surface, in the worst case of unit sources at the
+    /// distance `resolved_gap`; 0 for a sphere.
+    pub residual: f64,
+    added_mass: Mat6,
+    lamb: Lamb,
+    confocal: Confocal,
+    /// None for a sphere.
+    harmonics: Option<Harmonics>,
+    warnings: Vec<String>,
+}
+
+impl ExactBoundary {
+    /// The ellipsoid of `semi_axes` (m) whose frame is at `pose` in the body's frame. Sources at the
+    /// distance `resolved_gap` (m) from the surface and beyond are resolved.
+    ///
+    /// # Errors
+    /// [`Error::Input`] for semi-axes or a gap that aren't finite and positive, and for a pose that is
+    /// none.
+    pub fn new(name: &str, semi_axes: [f64; 3], pose: &Pose, resolved_gap: f64) -> Result<Self> {
+        lamb::check(&format!("body \"{name}\""), semi_axes)?;
+        if !(resolved_gap.is_finite() && resolved_gap > 0.0) {
+            return Err(Error::input(
+                format!("body \"{name}\": resolved gap"),
+                resolved_gap,
+                "give a finite, positive distance in metres",
+            ));
+        }
+        check_pose(name, pose)?;
+        let lamb = Lamb::new(semi_axes);
+        let confocal = Confocal::new(semi_axes);
+        let (harmonics, residual) = if confocal.offsets[0] <= ROUND * semi_axes[0] * semi_axes[0] {
+            (None, 0.0)
+        } else {
+            let harmonics = Harmonics::new(name, &confocal, resolved_gap)?;
+            let residual = harmonics.residual(name)?;
+            (Some(harmonics), residual)
+        };
+        let mut warnings = Vec::new();
+        if residual > WANTED {
+            warnings.push(format!(
+                "body \"{name}\": sources at the resolved gap {resolved_gap:.3e} m leave {residual:.1e} of their \
+                 normal velocity (more than {WANTED:.0e}) on the surface of the ellipsoid with semi-axes \
+                 {semi_axes:?} m; ask for a gap that is a larger part of the longest semi-axis"
+            ));
+        }
+        let move_in = twist_in_shape(pose);
+        let added_mass = move_in.transpose() * lamb.added_mass() * move_in;
+        Ok(Self {
+            name: name.to_string(),
+            semi_axes,
+            pose: *pose,
+            resolved_gap,
+            residual,
+            added_mass: 0.5 * (added_mass + added_mass.transpose()),
+            lamb,
+            confocal,
+            harmonics,
+            warnings,
+        })
+    }
+
+    /// Number of harmonics that are kept, and their highest degree; zeros for a sphere.
+    pub fn harmonics(&self) -> (usize, usize) {
+        self.harmonics.as_ref().map_or((0, 0), Harmonics::size)
+    }
+
+    /// Body-frame points in the shape's frame.
+    fn inside_shape(&self, points: &[Vec3]) -> Vec<Vec3> {
+        points.iter().map(|x| self.pose.apply_inverse(x)).collect()
+    }
+}
+
+/// Twist about the shape's origin, in its frame, of a twist about the body's origin, in its frame.
+fn twist_in_shape(pose: &Pose) -> Mat6 {
+    let turn = pose.rotation.transpose();
+    let mut out = Mat6::zeros();
+    out.fixed_view_mut::<3, 3>(0, 0).copy_from(&turn);
+    out.fixed_view_mut::<3, 3>(3, 3).copy_from(&turn);
+    // u + ω × t
+    let lever = -turn * skew(&pose.translation);
+    out.fixed_view_mut::<3, 3>(0, 3).copy_from(&lever);
+    out
+}
+
+fn check_pose(name: &str, pose: &Pose) -> Result<()> {
+    let t = &pose.translation;
+    if !t.iter().all(|x| x.is_finite()) {
+        return Err(Error::input(
+            format!("body \"{name}\": position of the shape"),
+            format!("({}, {}, {})", t.x, t.y, t.z),
+            "give finite coordinates in metres",
+        ));
+    }
+    let r = &pose.rotation;
+    let off = (r.transpose() * r - crate::adjoint::lie::Mat3::identity())
+        .abs()
+        .max();
+    if off.is_nan() || off > 1e-9 || r.determinant() < 0.0 {
+        return Err(Error::input(
+            format!("body \"{name}\": rotation of the shape"),
+            format!(
+                "a matrix {off:.3e} from orthogonal, determinant {:.6}",
+                r.determinant()
+            ),
+            "give a rotation matrix",
+        ));
+    }
+    Ok(())
+}
+
+impl Response for ExactBoundary {
+    fn added_mass(&self) -> Mat6 {
+        self.added_mass
+    }
+
+    fn radiated(&self, points: &[Vec3]) -> Result<Mat<f64>> {
+        let move_in = twist_in_shape(&self.pose);
+        let rows = self
+            .inside_shape(points)
+            .par_iter()
+            .map(|x| {
+                let place = self.confocal.locate(&self.name, x)?;
+                let own = self.lamb.potentials(&self.confocal, x, place.level);
+                Ok(move_in.tr_mul(&own))
+            })
+            .collect::<Result<Vec<_>>>()?;
+        Ok(Mat::from_fn(points.len(), 6, |i, j| rows[i][j]))
+    }
+
+    fn scattered(&self, sources: &[Vec3], points: &[Vec3]) -> Result<Mat<f64>> {
+        let (sources, points) = (self.inside_shape(sources), self.inside_shape(points));
+        let places = |list: &[Vec3]| -> Result<Vec<Place>> {
+            list.par_iter()
+                .map(|x| self.confocal.locate(&self.name, x))
+                .collect()
+        };
+        let (from, to) = (places(&sources)?, places(&points)?);
+        if let Some(harmonics) = &self.harmonics {
+            return harmonics.scattered(&self.name, &from, &to);
+        }
+        let radius = self.semi_axes[0];
+        Ok(Mat::from_fn(points.len(), sources.len(), |i, j| {
+            sphere::image(radius, &sources[j], &points[i])
+        }))
+    }
+
+    fn asymmetry(&self) -> f64 {
+        0.0
+    }
+
+    fn condition(&self) -> f64 {
+        1.0
+    }
+
+    fn warnings(&self) -> &[String] {
+        &self.warnings
+    }
+}

@@ -1,0 +1,81 @@
+//! A body and the points of another body's image, whose relative placement changes.
+
+use super::image::Image;
+use crate::adjoint::kernel::Sources;
+use crate::adjoint::lie::{Pose, Vec3, Vec6, angular, cross_force, linear, six};
+
+/// One pair at given poses.
+pub(super) struct Pair {
+    /// Body whose faces see the sources.
+    pub target: usize,
+    /// Body whose sources, or their images, are seen.
+    pub source: usize,
+    /// The image.
+    pub image: Image,
+    /// Source positions in the target's frame.
+    pub points: Sources,
+    /// The same as vectors.
+    pub positions: Vec<Vec3>,
+}
+
+impl Pair {
+    /// From both bodies' poses and the source body's points in its own frame.
+    pub fn new(
+        (target, at): (usize, &Pose),
+        (source, from): (usize, &Pose),
+        image: &Image,
+        points: &[Vec3],
+    ) -> Self {
+        let (rotation, shift) = image.placement(from);
+        let rotation = at.rotation.tr_mul(&rotation);
+        let shift = at.rotation.tr_mul(&(shift - at.translation));
+        let positions: Vec<Vec3> = points.iter().map(|s| rotation * s + shift).collect();
+        Self {
+            target,
+            source,
+            image: *image,
+            points: Sources::new(&positions),
+            positions,
+        }
+    }
+
+    /// Displacement of each source in the target's frame, relative to the target.
+    pub fn displacements(&self, pose: &Pose, z: &[Vec6]) -> Vec<Vec3> {
+        let relative = self.image.twist(&z[self.source]) - z[self.target];
+        let local = pose.twist_to_body(&relative);
+        let (u, w) = (linear(&local), angular(&local));
+        self.positions.iter().map(|s| u + w.cross(s)).collect()
+    }
+
+    /// Adds a wrench on the sources (given in the target's frame) to both bodies, as spatial wrenches.
+    pub fn apply(&self, pose: &Pose, wrench: &Vec6, out: &mut [Vec6]) {
+        let world = pose.wrench_to_world(wrench);
+        out[self.source] += self.image.twist_vjp(&world);
+        out[self.target] -= world;
+    }
+
+    /// Tangent of [`Pair::apply`] when the target moves with `z`.
+    pub fn apply_jvp(
+        &self,
+        pose: &Pose,
+        wrench: &Vec6,
+        dwrench: &Vec6,
+        z: &Vec6,
+        out: &mut [Vec6],
+    ) {
+        let world = cross_force(z, &pose.wrench_to_world(wrench)) + pose.wrench_to_world(dwrench);
+        out[self.source] += self.image.twist_vjp(&world);
+        out[self.target] -= world;
+    }
+}
+
+/// Wrench about the origin of forces at points: Σ (f, s × f).
+pub(super) fn wrench(positions: &[Vec3], force: impl Fn(usize) -> Vec3) -> Vec6 {
+    let (mut total, mut moment) = (Vec3::zeros(), Vec3::zeros());
+    for (j, s) in positions.iter().enumerate() {
+        let f = force(j);
+        total += f;
+        moment += s.cross(&f);
+    }
+    six(&total, &moment)
+}

@@ -1,0 +1,167 @@
+//! One body as the reduced coupling sees it.
+
+use crate::adjoint::kernel::Points;
+use crate::adjoint::lie::{Mat6, Vec3, Vec6};
+use crate::{Error, Result};
+use nalgebra::DMatrix;
+use serde::{Deserialize, Serialize};
+
+/// A body compressed to a few sources, in its own frame, for density 1, immutable. Bodies of equal
+/// shape share one (`Arc`).
+///
+/// Held fixed in a flow with potential ψ, the body answers with the strengths `L Lᵀ ψ(x̄)` at its
+/// points x̄; moved with the twist ν it answers with `Ū ν`; α makes the potential `Σ α_j/|x − x̄_j|`.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(try_from = "Parts", into = "Parts")]
+pub struct ReducedBody {
+    parts: Parts,
+    /// [L, Ū], points × (modes + 6).
+    basis: DMatrix<f64>,
+    /// The points as targets of the potential kernel.
+    targets: Points,
+}
+
+/// What a compressed body consists of.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Parts {
+    /// Name, for messages.
+    pub name: String,
+    /// x̄, m.
+    pub points: Vec<Vec3>,
+    /// L, points × modes, √m: answer to the potential at the points, S̄ = L Lᵀ (m).
+    pub modes: DMatrix<f64>,
+    /// Ū, points × 6: strengths (m³/s) that answer a unit twist of the body about its origin.
+    pub strengths: DMatrix<f64>,
+    /// M̄₀: the body's own added mass about its origin; m³, m⁴, m⁵.
+    pub added_mass: Mat6,
+    /// Centre of the surface, m.
+    pub centre: Vec3,
+    /// Largest distance of the surface from the centre, m.
+    pub radius: f64,
+    /// Displaced volume, m³.
+    pub volume: f64,
+    /// How well it was fitted.
+    pub fit: Fit,
+}
+
+/// How well a compressed body stands for the body.
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Fit {
+    /// Smallest distance from the surface at which its answers were fitted, m.
+    pub resolved_gap: f64,
+    /// Points on the surfaces around the body at which it was fitted.
+    pub proxies: usize,
+    /// max |Φ_ij − Φ_ji| / max |Φ| of the scattered potentials at the proxies, before symmetrising.
+    pub asymmetry: f64,
+    /// Largest error of the body's own flow at check points not used in the fit, relative to its
+    /// largest potential there.
+    pub radiated: f64,
+    /// Largest error of the scattered flow between check points not used in the fit, each scaled by
+    /// its distance from the surface, relative to the largest.
+    pub scattered: f64,
+    /// Largest mode left out for being of the wrong sign (the answer of a rigid body is positive
+    /// definite), relative to the largest mode.
+    pub wrong_sign: f64,
+    /// Asymmetry of the body's own added mass before symmetrising.
+    pub body_asymmetry: f64,
+    /// What the user should know, each with the body's name and its numbers.
+    pub warnings: Vec<String>,
+}
+
+impl ReducedBody {
+    /// From its parts.
+    ///
+    /// # Errors
+    /// Sizes that don't fit together, numbers that aren't finite.
+    pub fn new(parts: Parts) -> Result<Self> {
+        let r = parts.points.len();
+        let sizes = [parts.modes.nrows(), parts.strengths.nrows()];
+        let bad = |what: &str, value: String, right: &str| {
+            Error::input(
+                format!("compressed body {:?}: {what}", parts.name),
+                value,
+                right,
+            )
+        };
+        if r == 0 || sizes != [r, r] || parts.strengths.ncols() != 6 {
+            return Err(bad(
+                "points, rows of modes and of strengths",
+                format!("{r}, {}, {}", sizes[0], sizes[1]),
+                "must be equal and not zero",
+            ));
+        }
+        let numbers = (parts.points.iter().flat_map(|p| p.iter()))
+            .chain(parts.modes.iter())
+            .chain(parts.strengths.iter())
+            .chain(parts.added_mass.iter())
+            .chain(parts.centre.iter())
+            .chain([&parts.radius, &parts.volume, &parts.fit.resolved_gap]);
+        if let Some(x) = numbers.into_iter().find(|x| !x.is_finite()) {
+            return Err(bad("a number", x.to_string(), "must be finite"));
+        }
+        let m = parts.modes.ncols();
+        let mut basis = DMatrix::zeros(r, m + 6);
+        basis.columns_mut(0, m).copy_from(&parts.modes);
+        basis.columns_mut(m, 6).copy_from(&parts.strengths);
+        Ok(Self {
+            targets: Points::bare(&parts.points),
+            basis,
+            parts,
+        })
+    }
+
+    /// What it consists of.
+    pub fn parts(&self) -> &Parts {
+        &self.parts
+    }
+
+    /// Number of points r.
+    pub fn points(&self) -> usize {
+        self.parts.points.len()
+    }
+
+    /// Number of modes m: this body's unknowns in the coupled system.
+    pub fn modes(&self) -> usize {
+        self.parts.modes.ncols()
+    }
+
+    /// [L, Ū], points × (modes + 6).
+    pub(super) fn basis(&self) -> &DMatrix<f64> {
+        &self.basis
+    }
+
+    pub(super) fn targets(&self) -> &Points {
+        &self.targets
+    }
+
+    /// Ū ν + L a.
+    pub(super) fn charges(&self, twist: &Vec6, a: &[f64], out: &mut [f64]) {
+        out.fill(0.0);
+        let m = self.modes();
+        let coefficients = a.iter().chain(twist.iter());
+        debug_assert_eq!(a.len(), m);
+        for (column, c) in self.basis.column_iter().zip(coefficients) {
+            if *c != 0.0 {
+                out.iter_mut()
+                    .zip(column.iter())
+                    .for_each(|(o, x)| *o += c * x);
+            }
+        }
+    }
+}
+
+impl TryFrom<Parts> for ReducedBody {
+    type Error = Error;
+
+    fn try_from(parts: Parts) -> Result<Self> {
+        Self::new(parts)
+    }
+}
+
+impl From<ReducedBody> for Parts {
+    fn from(body: ReducedBody) -> Self {
+        body.parts
+    }
+}

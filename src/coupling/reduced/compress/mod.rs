@@ -1,0 +1,328 @@
+//! Compression of one body, offline and once per shape.
+//!
+//! Around the body lie *proxies*, points at the distances d, 2d, 4d … from its surface, d the smallest
+//! gap to be resolved. Any flow that comes from there on outwards is one of sources at proxies, and what
+//! the body adds to it is known once it is known at proxies. Inside lie candidates for the body's
+//! points. With W the distance of each proxy from the surface and E the potentials of candidates at
+//! proxies,
+//!
+//! ```text
+//! W E Π = Q R             column-pivoted: all that sources inside can make at the proxies
+//! T = Qᵀ W Φ W Q          Φ the potentials at proxies scattered from unit sources at proxies
+//! T = V Λ Vᵀ              the answer's modes, the largest of which are kept
+//! W E_x̄ L ≈ Q V √Λ        least squares, x̄ the few candidates that explain modes and
+//! W E_x̄ Ū ≈ W Φ_own       the body's own flow best
+//! ```
+//!
+//! Φ is symmetric (reciprocity) and T positive definite, for a rigid body answers every flow; what the
+//! one-body method and the fit leave of asymmetry and of negative modes is reported.
+//!
+//! How tight the fit must be for an error `tolerance` of M̄_f was measured on pairs of spheres, thin
+//! ellipsoids and boxes at the resolved gap: the error goes with the square of the rests.
+
+mod pivot;
+mod samples;
+
+use super::{Fit, Parts, ReducedBody};
+use crate::adjoint::lie::Vec3;
+use crate::boundary::{Response, Surface};
+use crate::{Error, Result};
+use faer::linalg::triangular_solve::solve_upper_triangular_in_place;
+use faer::{Mat, Par, Side};
+use nalgebra::DMatrix;
+use serde::{Deserialize, Serialize};
+
+/// Proxies are this many times their distance from the surface apart.
+const SPACING: f64 = 0.75;
+/// Most proxies at the smallest distance; a smaller gap isn't resolved on so large a body.
+const MOST_PROXIES: f64 = 1200.0;
+/// Depths of the candidates, relative to the distances of the proxies.
+const DEPTH: f64 = 0.6;
+/// Candidates are this many times their depth apart.
+const CANDIDATES: f64 = 0.9;
+/// Candidates stay inside this part of the inner tangent ball.
+const TANGENT: f64 = 0.7;
+/// Modes below this times the root of the tolerance, relative to the largest, are left out.
+const MODES: f64 = 0.3;
+/// Points are added until every mode and flow is met to this times the root of the tolerance.
+const REST: f64 = 2.0;
+/// Weight of the body's own flow beside its largest mode: it acts to first order, modes to second.
+const OWN: f64 = 3.0;
+/// Part of a candidate's field, relative to the largest, below which it adds nothing to the others.
+const WIDE: f64 = 3e-3;
+/// One proxy in this many is kept from the fit to check it.
+const CHECK: usize = 6;
+
+/// How a body is compressed.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(default, deny_unknown_fields)]
+pub struct Settings {
+    /// Number of points, as far as the body has room for them; by default as many as `tolerance`
+    /// needs.
+    pub rank: Option<usize>,
+    /// Aimed at error of M̄_f between bodies at the resolved gap, relative to √(M_ii M_jj), that the
+    /// compression adds to that of the one-body method.
+    pub tolerance: f64,
+    /// Smallest gap to other bodies (and half of that to walls) that is resolved, m; by default
+    /// [`default_gap`].
+    pub resolved_gap: Option<f64>,
+}
+
+impl Default for Settings {
+    fn default() -> Self {
+        Self {
+            rank: None,
+            tolerance: 3e-3,
+            resolved_gap: None,
+        }
+    }
+}
+
+impl Settings {
+    /// Checks the values.
+    ///
+    /// # Errors
+    /// A rank of zero, a tolerance outside 0 to 1, a gap that isn't a positive length.
+    pub fn validate(&self) -> Result<()> {
+        if self.rank == Some(0) {
+            return Err(Error::input(
+                "settings: rank",
+                0,
+                "a whole number of points a body, such as 80, or none",
+            ));
+        }
+        if !(self.tolerance > 0.0 && self.tolerance < 1.0) {
+            return Err(Error::input(
+                "settings: tolerance of the compression",
+                self.tolerance,
+                "a number between 0 and 1, such as 1e-3",
+            ));
+        }
+        match self.resolved_gap {
+            Some(gap) if !(gap > 0.0 && gap.is_finite()) => Err(Error::input(
+                "settings: resolved_gap",
+                gap,
+                "a positive length in m, or none",
+            )),
+            _ => Ok(()),
+        }
+    }
+}
+
+/// Proxies with their distances from the surface.
+struct Proxies {
+    points: Vec<Vec3>,
+    distances: Vec<f64>,
+}
+
+impl Proxies {
+    /// W Φ W.
+    fn both(&self, mut potentials: Mat<f64>) -> Mat<f64> {
+        for (j, right) in self.distances.iter().enumerate() {
+            for (i, left) in self.distances.iter().enumerate() {
+                potentials[(i, j)] *= left * right;
+            }
+        }
+        potentials
+    }
+}
+
+/// Compresses the body whose closed surface is `vertices` (m, body frame) and `faces`, and whose flow
+/// `response` knows.
+///
+/// # Errors
+/// Settings out of range, a surface that doesn't bound a volume, and what the one-body method
+/// doesn't resolve.
+pub fn compress(
+    name: &str,
+    vertices: &[Vec3],
+    faces: &[[usize; 3]],
+    response: &dyn Response,
+    settings: &Settings,
+) -> Result<ReducedBody> {
+    settings.validate()?;
+    let surface = Surface::new(name, vertices, faces)?;
+    let (centre, radius) = ball(vertices);
+    let area: f64 = surface.faces.areas.iter().sum();
+    let mut warnings = response.warnings().to_vec();
+    let finest = finest_gap(area);
+    let asked = settings.resolved_gap;
+    let gap = asked
+        .unwrap_or_else(|| default_gap(surface.faces.volume(), area))
+        .max(finest);
+    if let Some(asked) = asked.filter(|a| *a < finest) {
+        warnings.push(format!(
+            "body {name:?}: gaps under {gap:.3e} m aren't resolved by its compressed sources, for all \
+             that {asked:.3e} m were asked for: its surface of {area:.3e} m² is too large; use a plane \
+             wall for a floor, or the fidelity full"
+        ));
+    }
+    let (fitted, checked) = proxies(&surface, gap, radius);
+    let candidates = candidates(&surface, gap, radius);
+    let field = potentials_weighted(&fitted, &candidates);
+    let wide = pivot::pivoted_qr(&field, WIDE, usize::MAX);
+    let r = wide.columns.len();
+    if r == 0 {
+        return Err(Error::Unresolved {
+            place: format!("body {name:?}"),
+            quantity: "points inside for its compressed sources".into(),
+            value: 0.0,
+            limit: 1.0,
+            remedy: format!("the mesh ({} faces) is too coarse", faces.len()),
+        });
+    }
+    let own = response.radiated(&fitted.points)?;
+    let own = Mat::from_fn(own.nrows(), 6, |i, j| own[(i, j)] * fitted.distances[i]);
+    let scattered = response.scattered(&fitted.points, &fitted.points)?;
+    let scattered = fitted.both(scattered);
+    let largest = scattered.norm_max();
+    let asymmetry = (&scattered - scattered.transpose()).norm_max() / largest;
+    let projected = wide.q.transpose() * (&scattered * &wide.q);
+    drop(scattered);
+    let symmetric = Mat::from_fn(r, r, |i, j| 0.5 * (projected[(i, j)] + projected[(j, i)]));
+    let eigen = symmetric
+        .self_adjoint_eigen(Side::Lower)
+        .map_err(|_| Error::Unresolved {
+            place: format!("body {name:?}"),
+            quantity: "modes of its answer to the water that were found".into(),
+            value: 0.0,
+            limit: r as f64,
+            remedy: "use a more even mesh".into(),
+        })?;
+    let values: Vec<f64> = (0..r).map(|k| eigen.S()[k]).collect();
+    let top = values.iter().copied().fold(0.0, f64::max);
+    let cut = MODES * settings.tolerance.sqrt() * top;
+    let kept: Vec<usize> = (0..r).rev().filter(|k| values[*k] > cut).collect();
+    let wrong_sign = values.iter().copied().fold(0.0, f64::min).abs() / top;
+    let m = kept.len();
+    let modes = &wide.q
+        * Mat::from_fn(r, m, |i, k| {
+            eigen.U()[(i, kept[k])] * values[kept[k]].sqrt()
+        });
+    let sizes: Vec<f64> = (0..6).map(|k| own.col(k).norm_l2()).collect();
+    let linear = sizes[..3].iter().copied().fold(0.0, f64::max);
+    let angular = sizes[3..]
+        .iter()
+        .copied()
+        .fold(1e-3 * linear * radius, f64::max);
+    let targets = Mat::from_fn(own.nrows(), m + 6, |i, k| match k.checked_sub(m) {
+        None => modes[(i, k)] / top.sqrt(),
+        Some(k) => OWN * own[(i, k)] / if k < 3 { linear } else { angular },
+    });
+    let (rest, most) = match settings.rank {
+        Some(rank) => (0.0, rank),
+        None => (REST * settings.tolerance.sqrt(), usize::MAX),
+    };
+    let skeleton = pivot::pursuit(&field, &targets, rest, most);
+    let chosen: Vec<Vec3> = skeleton.columns.iter().map(|j| candidates[*j]).collect();
+    let fit = |x: &Mat<f64>| -> Mat<f64> {
+        let mut x = skeleton.q.transpose() * x;
+        solve_upper_triangular_in_place(skeleton.r.as_ref(), x.as_mut(), Par::Seq);
+        x
+    };
+    // No more modes than points.
+    let modes = modes.get(.., ..m.min(chosen.len())).to_owned();
+    let (modes, strengths) = (fit(&modes), fit(&own));
+
+    // What the compressed body says at points that it was not fitted to.
+    let there = potentials_weighted(&checked, &chosen);
+    let own = response.radiated(&checked.points)?;
+    let own = Mat::from_fn(own.nrows(), 6, |i, j| own[(i, j)] * checked.distances[i]);
+    let radiated = relative(&(&there * &strengths), &own);
+    let scattered = response.scattered(&checked.points, &checked.points)?;
+    let scattered = checked.both(scattered);
+    let answer = &there * &modes;
+    let scattered = relative(&(&answer * answer.transpose()), &scattered);
+    let dense = |m: &Mat<f64>| DMatrix::from_fn(m.nrows(), m.ncols(), |i, j| m[(i, j)]);
+    ReducedBody::new(Parts {
+        name: name.to_string(),
+        modes: dense(&modes),
+        strengths: dense(&strengths),
+        added_mass: response.added_mass(),
+        centre,
+        radius,
+        volume: surface.faces.volume(),
+        fit: Fit {
+            resolved_gap: gap,
+            proxies: fitted.points.len(),
+            asymmetry,
+            radiated,
+            scattered,
+            wrong_sign,
+            body_asymmetry: response.asymmetry(),
+            warnings,
+        },
+        points: chosen,
+    })
+}
+
+/// The smallest gap (m) that a compressed body with the surface `area` (m²) can resolve.
+pub fn finest_gap(area: f64) -> f64 {
+    (area / MOST_PROXIES).sqrt() / SPACING
+}
+
+/// The gap (m) that a body of `volume` (m³) and surface `area` (m²) resolves where nothing is asked for:
+/// a quarter of the radius of the ball with this ratio of volume to area.
+pub fn default_gap(volume: f64, area: f64) -> f64 {
+    (0.75 * volume / area).max(finest_gap(area))
+}
+
+/// Largest difference of two matrices, relative to the largest entry of the second.
+fn relative(a: &Mat<f64>, b: &Mat<f64>) -> f64 {
+    (a - b).norm_max() / b.norm_max()
+}
+
+/// Middle of the bounding box, and the largest distance of a vertex from it.
+fn ball(vertices: &[Vec3]) -> (Vec3, f64) {
+    let low = vertices.iter().fold(vertices[0], |m, v| m.inf(v));
+    let high = vertices.iter().fold(vertices[0], |m, v| m.sup(v));
+    let centre = 0.5 * (low + high);
+    let far = |r: f64, v: &Vec3| r.max((v - centre).norm());
+    (centre, vertices.iter().fold(0.0, far))
+}
+
+/// Proxies to fit to and others to check at.
+fn proxies(surface: &Surface, gap: f64, radius: f64) -> (Proxies, Proxies) {
+    let empty = || Proxies {
+        points: Vec::new(),
+        distances: Vec::new(),
+    };
+    let (mut fitted, mut checked) = (empty(), empty());
+    let mut offset = gap;
+    loop {
+        for (i, p) in samples::around(surface, offset, SPACING * offset)
+            .into_iter()
+            .enumerate()
+        {
+            let to = if i % CHECK == CHECK - 1 {
+                &mut checked
+            } else {
+                &mut fitted
+            };
+            to.points.push(p);
+            to.distances.push(offset);
+        }
+        if offset > 2.0 * radius {
+            return (fitted, checked);
+        }
+        offset *= 2.0;
+    }
+}
+
+/// W E.
+fn potentials_weighted(proxies: &Proxies, sources: &[Vec3]) -> Mat<f64> {
+    Mat::from_fn(proxies.points.len(), sources.len(), |i, j| {
+        proxies.distances[i] / (proxies.points[i] - sources[j]).norm()
+    })
+}
+
+/// Points inside, at several depths.
+fn candidates(surface: &Surface, gap: f64, radius: f64) -> Vec<Vec3> {
+    let mut out = Vec::new();
+    let mut depth = DEPTH * gap;
+    while depth < radius {
+        out.extend(samples::inside(surface, depth, CANDIDATES, TANGENT));
+        depth *= 2.0;
+    }
+    samples::thin(out, 1e-3 * gap)
+}

@@ -1,0 +1,166 @@
+//! Points around a body, at given distances from its surface, and inside it.
+
+use crate::adjoint::lie::Vec3;
+use crate::boundary::Surface;
+use rayon::prelude::*;
+use std::collections::HashMap;
+
+/// Turn of the surface, rad, from which an edge is sharp.
+const SHARP: f64 = 0.6;
+
+/// A point of the surface with a direction into the fluid.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Sample {
+    pub point: Vec3,
+    pub normal: Vec3,
+    /// A face that it lies on.
+    face: usize,
+}
+
+/// Points of the surface no farther apart than about `spacing`; at sharp edges and corners with
+/// directions between the faces' normals.
+pub(super) fn surface_points(surface: &Surface, spacing: f64) -> Vec<Sample> {
+    let mut out = Vec::new();
+    let normals = &surface.faces.normals;
+    let smooth = |v: usize, f: usize| {
+        let n = &surface.vertex_normals[v];
+        (n.dot(&normals[f]) > SHARP.cos()).then_some(*n)
+    };
+    let mut edges: HashMap<(usize, usize), usize> = HashMap::new();
+    let mut ridges = Vec::new();
+    for (f, t) in surface.triangles.iter().enumerate() {
+        for k in 0..3 {
+            let (a, b) = (t[k], t[(k + 1) % 3]);
+            if let Some(g) = edges.remove(&(a.min(b), a.max(b))) {
+                if normals[f].dot(&normals[g]) < SHARP.cos() {
+                    ridges.push((a, b, f, (normals[f] + normals[g]).normalize()));
+                }
+            } else {
+                edges.insert((a.min(b), a.max(b)), f);
+            }
+        }
+    }
+    for (v, normal) in surface.vertex_normals.iter().enumerate() {
+        let point = surface.vertices[v];
+        let face = surface.triangles.iter().position(|t| t.contains(&v));
+        if let Some(face) = face {
+            out.push(Sample {
+                point,
+                normal: *normal,
+                face,
+            });
+        }
+    }
+    for (a, b, face, normal) in ridges {
+        let (a, b) = (surface.vertices[a], surface.vertices[b]);
+        let n = ((b - a).norm() / spacing).ceil() as usize;
+        for i in 1..n {
+            let point = a + (b - a) * (i as f64 / n as f64);
+            out.push(Sample {
+                point,
+                normal,
+                face,
+            });
+        }
+    }
+    for (face, t) in surface.triangles.iter().enumerate() {
+        let c = &surface.faces.corners[face];
+        let longest = (0..3).map(|k| (c[(k + 1) % 3] - c[k]).norm());
+        let n = (longest.fold(0.0, f64::max) / spacing).ceil().max(1.0) as usize;
+        let at = t.map(|v| smooth(v, face).unwrap_or(normals[face]));
+        for i in 0..n {
+            for j in 0..n - i {
+                // Centroids of the upright and of the inverted small triangles.
+                for shift in [1.0 / 3.0, 2.0 / 3.0] {
+                    if shift > 0.5 && j + i + 1 == n {
+                        continue;
+                    }
+                    let (u, v) = ((i as f64 + shift) / n as f64, (j as f64 + shift) / n as f64);
+                    let w = 1.0 - u - v;
+                    out.push(Sample {
+                        point: c[0] * w + c[1] * u + c[2] * v,
+                        normal: (at[0] * w + at[1] * u + at[2] * v).normalize(),
+                        face,
+                    });
+                }
+            }
+        }
+    }
+    out
+}
+
+/// Keeps points that are at least `spacing` apart, first come first kept.
+pub(super) fn thin(points: impl IntoIterator<Item = Vec3>, spacing: f64) -> Vec<Vec3> {
+    let cell = |p: &Vec3| [0, 1, 2].map(|k| (p[k] / spacing).floor() as i64);
+    let mut grid: HashMap<[i64; 3], Vec<Vec3>> = HashMap::new();
+    let mut out = Vec::new();
+    for p in points {
+        let at = cell(&p);
+        let mut free = true;
+        'near: for i in -1..=1 {
+            for j in -1..=1 {
+                for k in -1..=1 {
+                    let near = grid.get(&[at[0] + i, at[1] + j, at[2] + k]);
+                    if near.is_some_and(|n| n.iter().any(|q| (p - q).norm() < spacing)) {
+                        free = false;
+                        break 'near;
+                    }
+                }
+            }
+        }
+        if free {
+            grid.entry(at).or_default().push(p);
+            out.push(p);
+        }
+    }
+    out
+}
+
+/// Points at `offset` from the surface, about `spacing` apart.
+pub(super) fn around(surface: &Surface, offset: f64, spacing: f64) -> Vec<Vec3> {
+    let samples = surface_points(surface, 0.5 * spacing);
+    let moved = samples.iter().map(|s| s.point + s.normal * offset);
+    let points = thin(moved, spacing);
+    // Where the surface is hollow, a point along the normal can come near another part of it.
+    let keep: Vec<bool> = points
+        .par_iter()
+        .map(|p| {
+            let near = |s: &Sample| (p - s.point).norm_squared() < (0.8 * offset).powi(2);
+            !samples.iter().any(near) && surface.winding(p) < 0.5
+        })
+        .collect();
+    let kept = points.into_iter().zip(keep).filter(|(_, k)| *k);
+    kept.map(|(p, _)| p).collect()
+}
+
+/// Points inside the surface, `depth` deep or as deep as the body allows there, `spacing` apart
+/// relative to their depth.
+pub(super) fn inside(surface: &Surface, depth: f64, spacing: f64, tangent: f64) -> Vec<Vec3> {
+    let samples = thin_samples(
+        surface_points(surface, 0.7 * spacing * depth),
+        spacing * depth,
+    );
+    let moved: Vec<Option<(Vec3, f64)>> = samples
+        .par_iter()
+        .map(|s| {
+            let start = s.point - s.normal * (1e-9 * depth);
+            let thickness = surface.ray(&start, &-s.normal, usize::MAX, s.face)?;
+            let ball = surface.ball(&s.point, &s.normal, thickness);
+            let d = depth.min(tangent * ball);
+            let p = s.point - s.normal * d;
+            surface.contains(&p).then_some((p, d))
+        })
+        .collect();
+    // The shallowest of them where the body is thin lie closer together.
+    let mut points: Vec<(Vec3, f64)> = moved.into_iter().flatten().collect();
+    points.sort_by(|a, b| b.1.total_cmp(&a.1));
+    points.into_iter().map(|(p, _)| p).collect()
+}
+
+fn thin_samples(samples: Vec<Sample>, spacing: f64) -> Vec<Sample> {
+    let kept = thin(samples.iter().map(|s| s.point), spacing);
+    let mut kept = kept.into_iter().peekable();
+    let mut out = samples;
+    out.retain(|s| kept.next_if(|p| *p == s.point).is_some());
+    out
+}

@@ -1,0 +1,99 @@
+//! The blocks of G: a body and the image of another, or of itself.
+
+use super::{Cutoff, Reduced};
+use crate::adjoint::kernel::{Write, potential_fill};
+use crate::adjoint::lie::{Pose, Vec3};
+use crate::coupling::image::Image;
+use crate::coupling::pair::Pair;
+
+/// A block of G that depends on the poses. G is symmetric and the images of perpendicular walls are
+/// their own inverses, so a pair of bodies needs one block per image.
+pub(super) struct Link {
+    pub target: usize,
+    pub source: usize,
+    pub image: Image,
+    pub cutoff: Option<Cutoff>,
+    /// How often the block counts in `α_xᵀGα_y`, written `Σ_ij P_ij (x_i y_j + y_i x_j)`: 1 between
+    /// different bodies, ½ within one; negative for images of opposite sign.
+    pub factor: f64,
+}
+
+/// A link at given poses.
+pub(super) struct Placed<'a> {
+    pub link: &'a Link,
+    pub pair: Pair,
+    /// The source body's centre in the target's frame, less the target's.
+    pub between: Vec3,
+    pub centre: Vec3,
+    /// Weight at the present distance, with two derivatives.
+    pub weight: [f64; 3],
+}
+
+impl Link {
+    pub fn all(
+        bodies: usize,
+        images: &[Image],
+        cutoff: impl Fn(usize, usize) -> Option<Cutoff>,
+    ) -> Vec<Self> {
+        let mut out = Vec::new();
+        for target in 0..bodies {
+            for source in target..bodies {
+                for image in images {
+                    let same = target == source;
+                    if same && image.is_identity() {
+                        continue;
+                    }
+                    out.push(Self {
+                        target,
+                        source,
+                        image: *image,
+                        cutoff: cutoff(target, source),
+                        factor: image.sign * if same { 0.5 } else { 1.0 },
+                    });
+                }
+            }
+        }
+        out
+    }
+
+    /// The link at the poses, unless it has faded out.
+    pub fn place(&self, reduced: &Reduced, poses: &[Pose]) -> Option<Placed<'_>> {
+        let parts = |b: usize| reduced.bodies[b].parts();
+        let (t, s) = (self.target, self.source);
+        let (rotation, shift) = self.image.placement(&poses[s]);
+        let centre = poses[t].apply_inverse(&(rotation * parts(s).centre + shift));
+        let between = centre - parts(t).centre;
+        let weight = match &self.cutoff {
+            Some(cutoff) => cutoff.weight(between.norm()),
+            None => [1.0, 0.0, 0.0],
+        };
+        (weight[0] > 0.0).then(|| Placed {
+            link: self,
+            pair: Pair::new(
+                (t, &poses[t]),
+                (s, &poses[s]),
+                &self.image,
+                &parts(s).points,
+            ),
+            between,
+            centre,
+            weight,
+        })
+    }
+}
+
+impl Placed<'_> {
+    /// P, target points × source points, row-major.
+    pub fn potentials(&self, reduced: &Reduced) -> Vec<f64> {
+        let targets = reduced.bodies[self.link.target].targets();
+        let stride = self.pair.points.len();
+        let mut out = vec![0.0; targets.len() * stride];
+        potential_fill(targets, &self.pair.points, Write::Set, &mut out, stride, 0);
+        out
+    }
+
+    /// Whether the weight changes at this distance.
+    pub fn fading(&self) -> bool {
+        self.weight[1] != 0.0 || self.weight[2] != 0.0
+    }
+}

@@ -1,0 +1,122 @@
+//! Multiple scattering between a few sources a body: the answer of each body to the water is computed
+//! once per shape ([`compress`]); what remains at run time are Coulomb sums and a small dense system.
+//!
+//! With all points x of all bodies, `G_ij = 1/|x_i − x_j|` between points of different bodies (with
+//! walls also the images of all points, of the same body too), body-frame twists x̄, and per body
+//! `S̄ = L Lᵀ`, all at unit density:
+//!
+//! ```text
+//! α = Ū x̄ + L a,        (I − LᵀG L) a = LᵀG Ū x̄        (α = (I − S̄G)⁻¹ Ū x̄)
+//! M̄ x̄ = M̄₀ x̄ + 4π Ūᵀ G α                               symmetric by construction
+//! δE(x, y) = 4π α_xᵀ δG α_y                             a Coulomb energy: no adjoint solve
+//! δα = L δa,            (I − LᵀG L) δa = Lᵀ δG α
+//! δ²E(x, y) = 4π [ α_xᵀ δδG α_y + δα_xᵀ δG α_y + α_xᵀ δG δα_y ]
+//! ```
+//!
+//! `I − LᵀGL` is symmetric, and positive definite while the bodies are apart: a Cholesky
+//! factorisation that fails tells of a gap that the sources don't resolve.
+
+mod body;
+pub mod cache;
+pub mod compress;
+mod cutoff;
+mod link;
+mod record;
+mod second;
+
+pub use body::{Fit, Parts, ReducedBody};
+pub use cutoff::Cutoff;
+
+use super::image::Image;
+use super::{Coupling, Record};
+use crate::Result;
+use crate::adjoint::lie::Pose;
+use crate::scene::Wall;
+use link::Link;
+use nalgebra::DMatrix;
+use std::ops::Range;
+use std::sync::Arc;
+
+/// All bodies coupled through a few sources each.
+pub struct Reduced {
+    bodies: Vec<Arc<ReducedBody>>,
+    /// For messages: bodies of equal shape share what they are compressed to.
+    names: Vec<String>,
+    links: Vec<Link>,
+    points: Vec<Range<usize>>,
+    modes: Vec<Range<usize>>,
+}
+
+impl Reduced {
+    /// From the bodies and the walls (one, or mutually perpendicular ones). `cutoff` gives the
+    /// distances between which a pair of bodies fades out (equal indices: a body and its image),
+    /// `None` for a pair that is always coupled.
+    ///
+    /// # Errors
+    /// Walls that don't close under reflection.
+    pub fn new(
+        bodies: Vec<Arc<ReducedBody>>,
+        walls: &[Wall],
+        cutoff: impl Fn(usize, usize) -> Option<Cutoff>,
+    ) -> Result<Self> {
+        let ranges = |size: &dyn Fn(&ReducedBody) -> usize| {
+            let mut at = 0;
+            let range = |b: &Arc<ReducedBody>| {
+                let from = at;
+                at += size(b);
+                from..at
+            };
+            bodies.iter().map(range).collect::<Vec<_>>()
+        };
+        let (points, modes) = (ranges(&|b| b.points()), ranges(&|b| b.modes()));
+        let links = Link::all(bodies.len(), &Image::of_walls(walls)?, cutoff);
+        Ok(Self {
+            points,
+            modes,
+            links,
+            names: bodies.iter().map(|b| b.parts().name.clone()).collect(),
+            bodies,
+        })
+    }
+
+    /// The same with names of the bodies, for messages; those beyond the bodies are dropped.
+    pub fn named(mut self, names: impl IntoIterator<Item = String>) -> Self {
+        let given = self.names.iter_mut().zip(names);
+        given.for_each(|(own, name)| *own = name);
+        self
+    }
+
+    /// The bodies.
+    pub fn reduced_bodies(&self) -> &[Arc<ReducedBody>] {
+        &self.bodies
+    }
+
+    fn point_count(&self) -> usize {
+        self.points.last().map_or(0, |r| r.end)
+    }
+
+    fn mode_count(&self) -> usize {
+        self.modes.last().map_or(0, |r| r.end)
+    }
+}
+
+impl Coupling for Reduced {
+    fn bodies(&self) -> usize {
+        self.bodies.len()
+    }
+
+    fn unknowns(&self) -> usize {
+        self.mode_count()
+    }
+
+    fn evaluate(
+        &self,
+        poses: &[Pose],
+        basis: &DMatrix<f64>,
+        derivative: bool,
+    ) -> Result<Box<dyn Record + '_>> {
+        Ok(Box::new(record::ReducedRecord::new(
+            self, poses, basis, derivative,
+        )?))
+    }
+}

@@ -1,0 +1,484 @@
+//! One evaluation of the reduced coupling: value and first derivative.
+
+use super::Reduced;
+use super::link::Placed;
+use crate::adjoint::kernel::potential_vjp;
+use crate::adjoint::lie::{Pose, Vec3, Vec6, six};
+use crate::coupling::pair::wrench;
+use crate::coupling::{Direction, Pullback, Record, Report, Tangent};
+use crate::{Error, Result};
+use faer::linalg::matmul::matmul;
+use faer::linalg::solvers::{Llt, Solve};
+use faer::{Accum, Mat, MatMut, MatRef, Par, Side};
+use nalgebra::{DMatrix, DVector};
+use rayon::prelude::*;
+use std::f64::consts::PI;
+
+/// 4π: a source of strength α makes the flux 4πα.
+const FLUX: f64 = 4.0 * PI;
+/// Condition number of I − LᵀGL above which the answers of the bodies to one another lose their
+/// meaning: at one digit lost the gap is far below what was fitted.
+const ILL_CONDITIONED: f64 = 1e4;
+
+/// Record of [`Reduced`].
+pub(super) struct ReducedRecord<'a> {
+    pub reduced: &'a Reduced,
+    pub poses: Vec<Pose>,
+    pub placed: Vec<Placed<'a>>,
+    derivative: bool,
+    /// I − LᵀGL.
+    factor: Llt<f64>,
+    /// LᵀGŪ, modes × 6 bodies.
+    answer: DMatrix<f64>,
+    /// ŪᵀGŪ, 6 bodies × 6 bodies.
+    direct: DMatrix<f64>,
+    basis: DMatrix<f64>,
+    /// a of the basis columns.
+    a: DMatrix<f64>,
+    /// α of the basis columns.
+    alpha: DMatrix<f64>,
+    momenta: DMatrix<f64>,
+    report: Report,
+}
+
+/// Answer to one combination of twists.
+pub(super) struct Response {
+    twists: DVector<f64>,
+    a: DVector<f64>,
+    /// α, all points.
+    pub alpha: DVector<f64>,
+}
+
+/// A nalgebra matrix as faer sees it.
+fn view(m: &DMatrix<f64>) -> MatRef<'_, f64> {
+    MatRef::from_column_major_slice(m.as_slice(), m.nrows(), m.ncols())
+}
+
+fn view_mut(m: &mut DMatrix<f64>) -> MatMut<'_, f64> {
+    let (r, c) = m.shape();
+    MatMut::from_column_major_slice_mut(m.as_mut_slice(), r, c)
+}
+
+/// Columns `k` and `k'` of two vectors beside each other, `[row][column]`.
+pub(super) fn interleave(columns: &[&[f64]]) -> Vec<f64> {
+    let rows = columns.first().map_or(0, |c| c.len());
+    (0..rows)
+        .flat_map(|i| columns.iter().map(move |c| c[i]))
+        .collect()
+}
+
+/// Three-vector `k` of row `j` in a `[j][columns][3]` array.
+#[inline]
+pub(super) fn vector(g: &[f64], columns: usize, j: usize, k: usize) -> Vec3 {
+    let at = 3 * (j * columns + k);
+    Vec3::new(g[at], g[at + 1], g[at + 2])
+}
+
+impl<'a> ReducedRecord<'a> {
+    pub fn new(
+        reduced: &'a Reduced,
+        poses: &[Pose],
+        basis: &DMatrix<f64>,
+        derivative: bool,
+    ) -> Result<Self> {
+        let (placed, blocks): (Vec<_>, Vec<_>) = reduced
+            .links
+            .par_iter()
+            .filter_map(|link| {
+                let placed = link.place(reduced, poses)?;
+                let block = block(reduced, &placed);
+                Some((placed, block))
+            })
+            .unzip();
+        let (n, w) = (reduced.mode_count(), 6 * reduced.bodies.len());
+        let mut system = Mat::<f64>::identity(n, n);
+        let mut answer = DMatrix::zeros(n, w);
+        let mut direct = DMatrix::zeros(w, w);
+        for (placed, block) in placed.iter().zip(&blocks) {
+            let link = placed.link;
+            let factor = link.factor * placed.weight[0];
+            scatter(reduced, link.target, link.source, factor, block.as_ref(), {
+                (&mut system, &mut answer, &mut direct)
+            });
+            scatter(
+                reduced,
+                link.source,
+                link.target,
+                factor,
+                block.transpose(),
+                (&mut system, &mut answer, &mut direct),
+            );
+        }
+        let factor = factorise(reduced, &system, poses)?;
+        let mut out = Self {
+            report: Report {
+                condition: condition(&factor),
+                ..Report::default()
+            },
+            reduced,
+            poses: poses.to_vec(),
+            placed,
+            derivative,
+            factor,
+            a: &answer * basis,
+            answer,
+            direct,
+            basis: basis.clone(),
+            alpha: DMatrix::zeros(0, 0),
+            momenta: DMatrix::zeros(0, 0),
+        };
+        out.factor.solve_in_place(view_mut(&mut out.a));
+        out.alpha = out.charges(basis, &out.a);
+        out.momenta = out.impulses(basis, &out.a);
+        check_energy(reduced, &out.basis, &out.momenta)?;
+        if out.report.condition > ILL_CONDITIONED {
+            return Err(closest(
+                reduced,
+                poses,
+                "condition number",
+                out.report.condition,
+            ));
+        }
+        Ok(out)
+    }
+
+    /// α = Ū x̄ + L a, column by column.
+    fn charges(&self, twists: &DMatrix<f64>, a: &DMatrix<f64>) -> DMatrix<f64> {
+        let mut out = DMatrix::zeros(self.reduced.point_count(), twists.ncols());
+        for (b, body) in self.reduced.bodies.iter().enumerate() {
+            let (points, modes) = (&self.reduced.points[b], self.reduced.modes[b].clone());
+            for k in 0..twists.ncols() {
+                let twist = twists.fixed_view::<6, 1>(6 * b, k).into_owned();
+                let a = a.column(k);
+                let mut column = out.column_mut(k);
+                let charges = &mut column.as_mut_slice()[points.clone()];
+                body.charges(&twist, &a.as_slice()[modes.clone()], charges);
+            }
+        }
+        out
+    }
+
+    /// M̄₀ x̄ + 4π (ŪᵀGŪ x̄ + ŪᵀGL a).
+    fn impulses(&self, twists: &DMatrix<f64>, a: &DMatrix<f64>) -> DMatrix<f64> {
+        let mut out = FLUX * (&self.direct * twists + self.answer.tr_mul(a));
+        for (b, body) in self.reduced.bodies.iter().enumerate() {
+            let mut rows = out.rows_mut(6 * b, 6);
+            rows += body.parts().added_mass * twists.rows(6 * b, 6);
+        }
+        out
+    }
+
+    /// Answer to a direction: a combination of what is there, or one more back-substitution.
+    pub fn respond(&self, x: Direction) -> Response {
+        match x {
+            Direction::Basis(c) => Response {
+                twists: &self.basis * c,
+                a: &self.a * c,
+                alpha: &self.alpha * c,
+            },
+            Direction::Twist(x) => {
+                let twists = DMatrix::from_column_slice(x.len(), 1, x.as_slice());
+                let mut a = &self.answer * &twists;
+                self.factor.solve_in_place(view_mut(&mut a));
+                Response {
+                    alpha: self.charges(&twists, &a).column(0).into_owned(),
+                    a: a.column(0).into_owned(),
+                    twists: x.clone(),
+                }
+            }
+        }
+    }
+
+    pub fn impulse(&self, x: &Response) -> DVector<f64> {
+        let column = |v: &DVector<f64>| DMatrix::from_column_slice(v.len(), 1, v.as_slice());
+        let out = self.impulses(&column(&x.twists), &column(&x.a));
+        out.column(0).into_owned()
+    }
+
+    /// From a potential ψ at all points (one column each): δa = (I − LᵀGL)⁻¹ Lᵀψ, the charges L δa, and
+    /// the impulses 4π (Ūᵀψ + ŪᵀGL δa).
+    pub fn tangent_answer(&self, psi: &DMatrix<f64>) -> (DMatrix<f64>, DMatrix<f64>) {
+        let k = psi.ncols();
+        let mut a = DMatrix::zeros(self.reduced.mode_count(), k);
+        let mut direct = DMatrix::zeros(6 * self.reduced.bodies.len(), k);
+        for (b, body) in self.reduced.bodies.iter().enumerate() {
+            let range = &self.reduced.points[b];
+            let projected = body.basis().tr_mul(&psi.rows(range.start, range.len()));
+            let m = body.modes();
+            let at = self.reduced.modes[b].start;
+            a.rows_mut(at, m).copy_from(&projected.rows(0, m));
+            direct.rows_mut(6 * b, 6).copy_from(&projected.rows(m, 6));
+        }
+        self.factor.solve_in_place(view_mut(&mut a));
+        let still = DMatrix::zeros(6 * self.reduced.bodies.len(), k);
+        let alpha = self.charges(&still, &a);
+        (alpha, FLUX * (direct + self.answer.tr_mul(&a)))
+    }
+
+    /// 4π α_xᵀ δG α_y: the Coulomb forces among the charges, as a wrench on each body.
+    fn pull_back(&self, x: &[f64], y: &[f64]) -> Vec<Vec6> {
+        let one = |placed: &Placed| -> Vec6 {
+            let link = placed.link;
+            let (t, s) = (self.range(link.target), self.range(link.source));
+            let bar = interleave(&[&x[t.clone()], &y[t.clone()]]);
+            let n = s.len();
+            let (x, y) = (&x[s.clone()], &y[s]);
+            let mut field = vec![0.0; 6 * n];
+            let targets = self.reduced.bodies[link.target].targets();
+            potential_vjp(targets, &placed.pair.points, &bar, 2, &mut field);
+            let strength = FLUX * link.factor;
+            let mut total = wrench(&placed.pair.positions, |j| {
+                let force = vector(&field, 2, j, 0) * y[j] + vector(&field, 2, j, 1) * x[j];
+                strength * placed.weight[0] * force
+            });
+            if placed.fading() {
+                let p = self.sums(placed, &bar, 2);
+                let energy: f64 = (0..n).map(|j| p[2 * j] * y[j] + p[2 * j + 1] * x[j]).sum();
+                let force = placed.between.normalize() * (strength * placed.weight[1] * energy);
+                total += six(&force, &placed.centre.cross(&force));
+            }
+            total
+        };
+        let wrenches: Vec<Vec6> = self.placed.par_iter().map(one).collect();
+        let mut out = vec![Vec6::zeros(); self.reduced.bodies.len()];
+        for (placed, wrench) in self.placed.iter().zip(&wrenches) {
+            let pose = &self.poses[placed.link.target];
+            placed.pair.apply(pose, wrench, &mut out);
+        }
+        out
+    }
+
+    /// Points of body `b`.
+    pub fn range(&self, b: usize) -> std::ops::Range<usize> {
+        self.reduced.points[b].clone()
+    }
+
+    /// `[j][k]: Σ_i bar[i][k] P_ij`.
+    pub fn sums(&self, placed: &Placed, bar: &[f64], columns: usize) -> Vec<f64> {
+        let mut out = vec![0.0; columns * placed.pair.points.len()];
+        let targets = self.reduced.bodies[placed.link.target].targets();
+        crate::adjoint::kernel::potential_sum(targets, &placed.pair.points, bar, columns, &mut out);
+        out
+    }
+}
+
+/// [L, Ū]ᵀ P [L, Ū] of a link: (modes + 6) × (modes + 6).
+fn block(reduced: &Reduced, placed: &Placed) -> Mat<f64> {
+    let link = placed.link;
+    let (target, source) = (&reduced.bodies[link.target], &reduced.bodies[link.source]);
+    let p = placed.potentials(reduced);
+    let p = MatRef::from_row_major_slice(&p, target.points(), source.points());
+    let (left, right) = (view(target.basis()), view(source.basis()));
+    let (m, n) = (left.ncols(), right.ncols());
+    let mut out = Mat::zeros(m, n);
+    // The cheaper order of the two products.
+    if target.points() * n <= source.points() * m {
+        let mut half = Mat::zeros(target.points(), n);
+        matmul(half.as_mut(), Accum::Replace, p, right, 1.0, Par::Seq);
+        matmul(
+            out.as_mut(),
+            Accum::Replace,
+            left.transpose(),
+            half.as_ref(),
+            1.0,
+            Par::Seq,
+        );
+    } else {
+        let mut half = Mat::zeros(m, source.points());
+        matmul(
+            half.as_mut(),
+            Accum::Replace,
+            left.transpose(),
+            p,
+            1.0,
+            Par::Seq,
+        );
+        matmul(
+            out.as_mut(),
+            Accum::Replace,
+            half.as_ref(),
+            right,
+            1.0,
+            Par::Seq,
+        );
+    }
+    out
+}
+
+/// Adds a block into I − LᵀGL, LᵀGŪ and ŪᵀGŪ.
+fn scatter(
+    reduced: &Reduced,
+    target: usize,
+    source: usize,
+    factor: f64,
+    block: MatRef<f64>,
+    (system, answer, direct): (&mut Mat<f64>, &mut DMatrix<f64>, &mut DMatrix<f64>),
+) {
+    let (t, s) = (reduced.modes[target].clone(), reduced.modes[source].clone());
+    for j in 0..s.len() {
+        for i in 0..t.len() {
+            system[(t.start + i, s.start + j)] -= factor * block[(i, j)];
+        }
+    }
+    for k in 0..6 {
+        for i in 0..t.len() {
+            answer[(t.start + i, 6 * source + k)] += factor * block[(i, s.len() + k)];
+        }
+        for i in 0..6 {
+            direct[(6 * target + i, 6 * source + k)] += factor * block[(t.len() + i, s.len() + k)];
+        }
+    }
+}
+
+fn factorise(reduced: &Reduced, system: &Mat<f64>, poses: &[Pose]) -> Result<Llt<f64>> {
+    system.llt(Side::Lower).map_err(|_| {
+        closest(
+            reduced,
+            poses,
+            "smallest eigenvalue of I − LᵀGL, at most",
+            0.0,
+        )
+    })
+}
+
+/// (largest / smallest pivot)² of the Cholesky factor: the condition number, from below.
+fn condition(factor: &Llt<f64>) -> f64 {
+    let l = factor.L();
+    let (mut low, mut high) = (f64::INFINITY, 0.0_f64);
+    for i in 0..l.nrows() {
+        low = low.min(l[(i, i)]);
+        high = high.max(l[(i, i)]);
+    }
+    if high > 0.0 {
+        (high / low).powi(2)
+    } else {
+        1.0
+    }
+}
+
+/// What the pair of bodies that come closest doesn't resolve.
+fn closest(reduced: &Reduced, poses: &[Pose], quantity: &str, value: f64) -> Error {
+    let parts = |b: usize| reduced.bodies[b].parts();
+    let world = |b: usize, p: &Vec3| poses[b].apply(p);
+    let mut worst = (f64::INFINITY, String::from("all bodies"), 0.0);
+    for link in &reduced.links {
+        let (t, s) = (parts(link.target), parts(link.source));
+        let seen = |p: &Vec3| link.image.linear * world(link.source, p) + link.image.shift;
+        let points: Vec<Vec3> = s.points.iter().map(seen).collect();
+        let distance = |p: &Vec3| {
+            let p = world(link.target, p);
+            points
+                .iter()
+                .map(|q| (p - q).norm())
+                .fold(f64::INFINITY, f64::min)
+        };
+        let d = t.points.iter().map(distance).fold(f64::INFINITY, f64::min);
+        if d < worst.0 {
+            let of = |name: &str| format!("body {name:?}");
+            let (one, other) = (&reduced.names[link.target], &reduced.names[link.source]);
+            let place = match (link.target == link.source, link.image.is_identity()) {
+                (true, _) => format!("{} and a wall", of(one)),
+                (false, true) => format!("{} and {}", of(one), of(other)),
+                (false, false) => format!("{} and {} by a wall", of(one), of(other)),
+            };
+            worst = (d, place, t.fit.resolved_gap.max(s.fit.resolved_gap));
+        }
+    }
+    let (distance, place, resolved) = worst;
+    Error::Unresolved {
+        place,
+        quantity: format!(
+            "coupling of their compressed sources, {distance:.3e} m apart, fitted for surfaces at \
+             least {resolved:.3e} m apart: {quantity}"
+        ),
+        value,
+        limit: if value > 0.0 { ILL_CONDITIONED } else { 0.0 },
+        remedy: "the bodies overlap or their gap isn't resolved: use a smaller resolved gap, a \
+                 higher rank, or the fidelity full"
+            .into(),
+    }
+}
+
+/// The energy of the basis must not be negative beyond rounding.
+fn check_energy(reduced: &Reduced, basis: &DMatrix<f64>, momenta: &DMatrix<f64>) -> Result<()> {
+    let mut energy = basis.tr_mul(momenta);
+    let k = energy.nrows();
+    // Twists that hardly move water (a round body's spin) have no energy: shift by rounding.
+    let own: Vec<f64> = (0..k)
+        .map(|i| {
+            let bodies = reduced.bodies.iter().enumerate();
+            let inertia = bodies.map(|(b, body)| {
+                let p = body.parts();
+                let twist = basis.fixed_view::<6, 1>(6 * b, i);
+                let (u, w) = (twist.fixed_rows::<3>(0), twist.fixed_rows::<3>(3));
+                let scale = u.norm() + (p.radius + p.centre.norm()) * w.norm();
+                p.volume.max(p.added_mass.fixed_view::<3, 3>(0, 0).trace()) * scale * scale
+            });
+            inertia.sum::<f64>()
+        })
+        .collect();
+    for i in 0..k {
+        if own[i] > 0.0 {
+            energy[(i, i)] += 1e-9 * own[i];
+        } else {
+            energy[(i, i)] = 1.0;
+        }
+    }
+    if energy.iter().all(|x| x.is_finite()) && energy.clone().cholesky().is_some() {
+        return Ok(());
+    }
+    let symmetric = 0.5 * (&energy + energy.transpose());
+    let scaled = DMatrix::from_fn(k, k, |i, j| {
+        symmetric[(i, j)] / (own[i].max(f64::MIN_POSITIVE) * own[j].max(f64::MIN_POSITIVE)).sqrt()
+    });
+    let lowest = scaled.symmetric_eigenvalues().min();
+    Err(Error::Unresolved {
+        place: format!("bodies {}", reduced.names.join(", ")),
+        quantity: "smallest eigenvalue of their added mass, scaled by the water displaced".into(),
+        value: lowest,
+        limit: 0.0,
+        remedy: "a gap isn't resolved: use a smaller resolved gap, a higher rank, or the fidelity \
+                 full"
+            .into(),
+    })
+}
+
+impl Record for ReducedRecord<'_> {
+    fn momenta(&self) -> &DMatrix<f64> {
+        &self.momenta
+    }
+
+    fn gradient(&self, x: &DVector<f64>, y: &DVector<f64>) -> Vec<Vec6> {
+        if !self.derivative {
+            return vec![Vec6::zeros(); self.reduced.bodies.len()];
+        }
+        let (x, y) = (&self.alpha * x, &self.alpha * y);
+        self.pull_back(x.as_slice(), y.as_slice())
+    }
+
+    fn gradient_along(&self, y: &DVector<f64>, z: &[Vec6]) -> DVector<f64> {
+        if !self.derivative {
+            return DVector::zeros(y.len());
+        }
+        let y = &self.alpha * y;
+        let psi = self.tangent_potentials(&[y.as_slice()], z);
+        FLUX * self.alpha.tr_mul(&psi.column(0))
+    }
+
+    fn vjp(&self, x: Direction, y: Direction) -> Result<Pullback> {
+        let (x, y) = (self.respond(x), self.respond(y));
+        Ok(Pullback {
+            momentum_x: self.impulse(&x),
+            momentum_y: self.impulse(&y),
+            wrench: self.pull_back(x.alpha.as_slice(), y.alpha.as_slice()),
+        })
+    }
+
+    fn hvp(&self, x: Direction, y: Direction, z: &[Vec6]) -> Result<Tangent> {
+        Ok(self.second(x, y, z))
+    }
+
+    fn report(&self) -> &Report {
+        &self.report
+    }
+}

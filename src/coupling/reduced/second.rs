@@ -1,0 +1,212 @@
+//! Second derivatives along one displacement: the tangent of the first.
+
+use super::link::Placed;
+use super::record::{ReducedRecord, Response, interleave, vector};
+use crate::adjoint::kernel::{potential_hvp, potential_jvp, potential_vjp};
+use crate::adjoint::lie::{Vec3, Vec6, angular, linear, six};
+use crate::coupling::{Direction, Tangent};
+use nalgebra::{DMatrix, DVector};
+use rayon::prelude::*;
+use std::f64::consts::PI;
+
+/// A link along a displacement.
+struct Moved {
+    /// Of each source point, in the target's frame relative to the target, m.
+    points: Vec<Vec3>,
+    /// Of the source body's centre.
+    centre: Vec3,
+    /// Rate of the distance of the centres.
+    rate: f64,
+}
+
+impl ReducedRecord<'_> {
+    fn moved(&self, placed: &Placed, z: &[Vec6]) -> Moved {
+        let pose = &self.poses[placed.link.target];
+        let relative = placed.pair.image.twist(&z[placed.link.source]) - z[placed.link.target];
+        let local = pose.twist_to_body(&relative);
+        let centre = linear(&local) + angular(&local).cross(&placed.centre);
+        let rate = if placed.fading() {
+            placed.between.normalize().dot(&centre)
+        } else {
+            0.0
+        };
+        Moved {
+            points: placed.pair.displacements(pose, z),
+            centre,
+            rate,
+        }
+    }
+
+    /// `DG[Z] α` at all points, a column for each of `alpha`.
+    pub(super) fn tangent_potentials(&self, alpha: &[&[f64]], z: &[Vec6]) -> DMatrix<f64> {
+        let k = alpha.len();
+        let one = |placed: &Placed| -> (Vec<f64>, Vec<f64>) {
+            let link = placed.link;
+            let (t, s) = (self.range(link.target), self.range(link.source));
+            let moved = self.moved(placed, z);
+            let part = |range: &std::ops::Range<usize>| {
+                let columns: Vec<&[f64]> = alpha.iter().map(|a| &a[range.clone()]).collect();
+                interleave(&columns)
+            };
+            let (at_target, at_source) = (part(&t), part(&s));
+            let body = &self.reduced.bodies[link.target];
+            let points = &placed.pair.points;
+            let mut on_target = vec![0.0; k * t.len()];
+            potential_jvp(
+                body.targets(),
+                points,
+                &moved.points,
+                &at_source,
+                k,
+                &mut on_target,
+            );
+            let mut field = vec![0.0; 3 * k * s.len()];
+            potential_vjp(body.targets(), points, &at_target, k, &mut field);
+            let mut on_source: Vec<f64> = (0..s.len())
+                .flat_map(|j| (0..k).map(move |c| (j, c)))
+                .map(|(j, c)| moved.points[j].dot(&vector(&field, k, j, c)))
+                .collect();
+            let [w, dw, _] = placed.weight;
+            let (w, dw) = (link.factor * w, link.factor * dw * moved.rate);
+            on_target
+                .iter_mut()
+                .chain(&mut on_source)
+                .for_each(|x| *x *= w);
+            if placed.fading() {
+                let p = placed.potentials(self.reduced);
+                for (i, row) in p.chunks_exact(s.len()).enumerate() {
+                    for (j, p) in row.iter().enumerate() {
+                        for c in 0..k {
+                            on_target[i * k + c] += dw * p * at_source[j * k + c];
+                            on_source[j * k + c] += dw * p * at_target[i * k + c];
+                        }
+                    }
+                }
+            }
+            (on_target, on_source)
+        };
+        let parts: Vec<_> = self.placed.par_iter().map(one).collect();
+        let mut out = DMatrix::zeros(alpha.first().map_or(0, |a| a.len()), k);
+        let mut add = |b: usize, values: &[f64]| {
+            let from = self.range(b).start;
+            for (i, row) in values.chunks_exact(k).enumerate() {
+                for (c, x) in row.iter().enumerate() {
+                    out[(from + i, c)] += x;
+                }
+            }
+        };
+        for (placed, (on_target, on_source)) in self.placed.iter().zip(&parts) {
+            add(placed.link.target, on_target);
+            add(placed.link.source, on_source);
+        }
+        out
+    }
+
+    pub(super) fn second(&self, x: Direction, y: Direction, z: &[Vec6]) -> Tangent {
+        let same = match (&x, &y) {
+            (Direction::Basis(a), Direction::Basis(b)) => a == b,
+            (Direction::Twist(a), Direction::Twist(b)) => a == b,
+            _ => false,
+        };
+        let mut responses = vec![self.respond(x)];
+        if !same {
+            responses.push(self.respond(y));
+        }
+        let n = responses.len();
+        let alpha: Vec<&[f64]> = responses.iter().map(|r| r.alpha.as_slice()).collect();
+        let psi = self.tangent_potentials(&alpha, z);
+        let (dalpha, dmomenta) = self.tangent_answer(&psi);
+        let one = |placed: &Placed| self.link_tangent(placed, &responses, &dalpha, z);
+        let parts: Vec<(Vec6, Vec6)> = self.placed.par_iter().map(one).collect();
+        let mut wrench = vec![Vec6::zeros(); self.reduced.bodies.len()];
+        for (placed, (w, dw)) in self.placed.iter().zip(&parts) {
+            let t = placed.link.target;
+            let pose = &self.poses[t];
+            placed.pair.apply_jvp(pose, w, dw, &z[t], &mut wrench);
+        }
+        let momentum = |k: usize| -> DVector<f64> { dmomenta.column(k).into_owned() };
+        Tangent {
+            momentum_x: momentum(0),
+            momentum_y: momentum(n - 1),
+            wrench,
+        }
+    }
+
+    /// Wrench on the sources of a link and its tangent, in the target's frame.
+    fn link_tangent(
+        &self,
+        placed: &Placed,
+        responses: &[Response],
+        dalpha: &DMatrix<f64>,
+        z: &[Vec6],
+    ) -> (Vec6, Vec6) {
+        let (n, last) = (responses.len(), responses.len() - 1);
+        let link = placed.link;
+        let (t, s) = (self.range(link.target), self.range(link.source));
+        let moved = self.moved(placed, z);
+        let column = |k: usize, range: &std::ops::Range<usize>| -> (Vec<f64>, Vec<f64>) {
+            let tangent = dalpha.column(k).rows(range.start, range.len()).into_owned();
+            (
+                responses[k].alpha.as_slice()[range.clone()].to_vec(),
+                tangent.as_slice().to_vec(),
+            )
+        };
+        let at_target: Vec<_> = (0..n).map(|k| column(k, &t)).collect();
+        let at_source: Vec<_> = (0..n).map(|k| column(k, &s)).collect();
+        let values: Vec<&[f64]> = at_target.iter().map(|c| c.0.as_slice()).collect();
+        let both: Vec<&[f64]> = (values.iter().copied())
+            .chain(at_target.iter().map(|c| c.1.as_slice()))
+            .collect();
+        let (values, both) = (interleave(&values), interleave(&both));
+        let targets = self.reduced.bodies[link.target].targets();
+        let points = &placed.pair.points;
+        // ∇ of the potentials of x.. and δx.., `[j][x.., δx..]`, and the tangent of the first.
+        let mut field = vec![0.0; 6 * n * s.len()];
+        potential_vjp(targets, points, &both, 2 * n, &mut field);
+        let mut bent = vec![0.0; 3 * n * s.len()];
+        potential_hvp(targets, points, &moved.points, &values, n, &mut bent);
+        let sums = if placed.fading() {
+            self.sums(placed, &both, 2 * n)
+        } else {
+            Vec::new()
+        };
+        let strength = 4.0 * PI * link.factor;
+        let [weight, slope, bend] = placed.weight.map(|w| strength * w);
+        let (mut w, mut dw) = (Vec6::zeros(), Vec6::zeros());
+        let (mut energy, mut denergy) = (0.0, 0.0);
+        for (j, at) in placed.pair.positions.iter().enumerate() {
+            let (mut f, mut df) = (Vec3::zeros(), Vec3::zeros());
+            for (x, y) in [(0, last), (last, 0)] {
+                let (a, da) = (at_source[y].0[j], at_source[y].1[j]);
+                let e = vector(&field, 2 * n, j, x);
+                f += e * a;
+                df += (vector(&bent, n, j, x) + vector(&field, 2 * n, j, n + x)) * a + e * da;
+                if !sums.is_empty() {
+                    let p = &sums[2 * n * j..2 * n * (j + 1)];
+                    energy += p[x] * a;
+                    denergy += p[n + x] * a + p[x] * da;
+                }
+            }
+            denergy += f.dot(&moved.points[j]);
+            let (force, dforce) = (weight * f, weight * df + slope * moved.rate * f);
+            w += six(&force, &at.cross(&force));
+            dw += six(
+                &dforce,
+                &(moved.points[j].cross(&force) + at.cross(&dforce)),
+            );
+        }
+        if placed.fading() {
+            let distance = placed.between.norm();
+            let e = placed.between / distance;
+            let de = (moved.centre - e * moved.rate) / distance;
+            let force = slope * energy * e;
+            let dforce = (bend * moved.rate * energy + slope * denergy) * e + slope * energy * de;
+            w += six(&force, &placed.centre.cross(&force));
+            dw += six(
+                &dforce,
+                &(moved.centre.cross(&force) + placed.centre.cross(&dforce)),
+            );
+        }
+        (w, dw)
+    }
+}

@@ -1,0 +1,143 @@
+//! What the fidelity `Auto` chooses for a scene.
+//!
+//! Two bodies a distance c apart feel each other as dipoles: relative to their own added mass the
+//! coupling is at most `2 D₁ D₂ / 4πc³` with `D = (V + M)/√M` per unit velocity, V the displaced
+//! volume and M the own added mass at unit density (3(a/c)³ for equal spheres of radius a). A pair whose
+//! coupling is below the aim fades out. What a body must resolve follows from the smallest gap that it
+//! starts with.
+
+use super::Fidelity;
+use super::wet::{Plan, Wet, area, centre};
+use crate::adjoint::lie::{Pose, Vec3};
+use crate::boundary::exact::lamb;
+use crate::coupling::reduced::{Cutoff, compress};
+use crate::scene::Wall;
+use crate::shape::{Gap, MassProperties, Other};
+use crate::{Error, Result};
+use std::f64::consts::PI;
+
+/// Of the aim, what compression may add to the error of the bodies themselves, and what each pair
+/// left out may.
+const SHARE: f64 = 1.0 / 3.0;
+/// What the coupling of real bodies may be above that of their equivalent ellipsoids' dipoles.
+const SAFETY: f64 = 1.5;
+/// Where a pair begins to fade, of the distance where it is gone.
+const NEAR: f64 = 0.8;
+/// What is resolved, of the smallest gap at the start: bodies may come nearer.
+const ROOM: f64 = 0.6;
+/// Gaps under this part of the finest that compression resolves are left to the fidelity `Full`.
+const HOPELESS: f64 = 0.5;
+
+/// The fidelity to use, what each body and pair gets, and why.
+pub(super) struct Planned {
+    pub fidelity: Fidelity,
+    pub plan: Plan,
+    pub reasons: Vec<String>,
+}
+
+/// Chooses for `bodies` at `poses` with the `gaps` (of wet bodies, by their numbers among `bodies`).
+pub(super) fn plan(
+    bodies: &[Wet],
+    poses: &[Pose],
+    gaps: &[Gap],
+    walls: &[Wall],
+    aim: f64,
+) -> Result<Planned> {
+    if !(aim > 0.0 && aim < 1.0) {
+        return Err(Error::input(
+            "settings: accuracy",
+            aim,
+            "a number between 0 and 1, such as 0.01",
+        ));
+    }
+    let mut out = Planned {
+        fidelity: Fidelity::Reduced,
+        plan: Plan::default(),
+        reasons: Vec::new(),
+    };
+    let mut strengths = Vec::with_capacity(bodies.len());
+    for (b, body) in bodies.iter().enumerate() {
+        let Some(mesh) = body.mesh else {
+            return Err(Error::Unsupported {
+                what: format!("coupling of body {:?}", body.name),
+                why: "it has a given added mass but no shape".into(),
+                instead: "give it a shape, or use the fidelity isolated".into(),
+            });
+        };
+        let properties = mesh.mass_properties();
+        strengths.push((strength(&properties)?, poses[b].apply(&centre(mesh))));
+        let near = |g: &&Gap| g.first == b || g.second == Other::Body(b);
+        let seen = |g: &Gap| match g.second {
+            Other::Body(_) => g.distance,
+            Other::Wall(_) => 2.0 * g.distance,
+        };
+        let smallest = gaps
+            .iter()
+            .filter(near)
+            .map(seen)
+            .fold(f64::INFINITY, f64::min);
+        let finest = compress::finest_gap(area(mesh));
+        if smallest < HOPELESS * finest {
+            out.reasons.push(format!(
+                "body {:?} starts with a gap of {smallest:.3e} m, and its compressed sources resolve \
+                 {finest:.3e} m at best: all bodies are solved together (full)",
+                body.name
+            ));
+            out.fidelity = Fidelity::Full;
+        }
+        // Bodies that start apart may come near: no coarser than without a plan.
+        let coarsest = compress::default_gap(properties.volume, area(mesh));
+        let gap = (ROOM * smallest).clamp(finest, coarsest);
+        out.plan.compress.push(compress::Settings {
+            rank: None,
+            tolerance: SHARE * aim,
+            resolved_gap: Some(gap),
+        });
+    }
+    if out.fidelity == Fidelity::Full {
+        out.plan = Plan::default();
+        return Ok(out);
+    }
+    for (b, body) in bodies.iter().enumerate() {
+        let gap = out.plan.compress[b].resolved_gap.unwrap_or_default();
+        out.reasons.push(format!(
+            "body {:?} resolves gaps from {gap:.3e} m on",
+            body.name
+        ));
+        for (a, other) in bodies.iter().enumerate().take(b + 1) {
+            if a == b && walls.is_empty() {
+                continue;
+            }
+            let far =
+                (SAFETY * 2.0 * strengths[a].0 * strengths[b].0 / (4.0 * PI * SHARE * aim)).cbrt();
+            let cutoff = Cutoff {
+                near: NEAR * far,
+                far,
+            };
+            out.plan.cutoffs.push(((a, b), cutoff));
+            let c = (strengths[a].1 - strengths[b].1).norm();
+            if a != b && c > cutoff.near {
+                out.reasons.push(format!(
+                    "bodies {:?} and {:?} start {c:.3e} m apart: coupled in full up to {:.3e} m, not \
+                     at all from {far:.3e} m on",
+                    other.name, body.name, cutoff.near
+                ));
+            }
+        }
+    }
+    Ok(out)
+}
+
+/// Largest `(V + M)/√M` over the axes of the ellipsoid with the same volume and inertia.
+fn strength(p: &MassProperties) -> Result<f64> {
+    let moments: Vec3 = p.inertia.symmetric_eigenvalues();
+    let trace: f64 = moments.sum();
+    // I_i = V (a_j² + a_k²)/5
+    let axes: [f64; 3] = std::array::from_fn(|i| {
+        let square = 2.5 * (trace - 2.0 * moments[i]) / p.volume;
+        square.max(1e-6 * trace / p.volume).sqrt()
+    });
+    let m = lamb::added_mass(axes)?;
+    let of = |i: usize| (p.volume + m[(i, i)]) / m[(i, i)].sqrt();
+    Ok((0..3).map(of).fold(0.0, f64::max))
+}

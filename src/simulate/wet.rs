@@ -1,0 +1,434 @@
+//! The bodies in the water: discretised as the settings ask, and coupled.
+
+use super::{Fidelity, Settings};
+use crate::adjoint::lie::{Mat6, Pose, Vec3};
+use crate::boundary::exact::ExactBoundary;
+use crate::boundary::{BodyBoundary, OneBody, PanelBoundary, Response};
+use crate::coupling::full::{Full, Solver, WetBody};
+use crate::coupling::panel::{self, PanelCoupled};
+use crate::coupling::reduced::{Cutoff, Reduced, ReducedBody, cache, compress};
+use crate::coupling::{Coupling, Isolated};
+use crate::scene::{Shape, Wall};
+use crate::shape::TriMesh;
+use crate::{Error, Result};
+use serde::Serialize;
+use std::path::Path;
+use std::sync::Arc;
+
+/// A body that the water sees.
+pub(super) struct Wet<'a> {
+    pub name: &'a str,
+    /// Surface in the body's frame.
+    pub mesh: Option<&'a TriMesh>,
+    /// The shape by formula and its pose in the body's frame, if it is an ellipsoid.
+    pub ellipsoid: Option<([f64; 3], Pose)>,
+    /// Given added mass at unit density.
+    pub added_mass: Option<Mat6>,
+}
+
+/// What was made of the bodies.
+pub(super) struct Made {
+    pub coupling: Box<dyn Coupling>,
+    /// Faces of all surfaces that were discretised.
+    pub faces: usize,
+    /// What each body became.
+    pub bodies: Vec<Discretisation>,
+    pub warnings: Vec<String>,
+}
+
+/// How a body is seen by the coupling, and how well.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct Discretisation {
+    /// Name of the body.
+    pub body: String,
+    /// One-body method: `exact`, `panel`, `mfs`, or `given`.
+    pub method: &'static str,
+    /// Faces of its mesh; 0 where none is used.
+    pub faces: usize,
+    /// Unknowns in the coupled system.
+    pub unknowns: usize,
+    /// Points of the compressed body; 0 if it isn't compressed.
+    pub points: usize,
+    /// Smallest gap that its compression resolves, m.
+    pub resolved_gap: Option<f64>,
+    /// Asymmetry of its own added mass before symmetrising.
+    pub asymmetry: f64,
+    /// Error of the compressed flow of the body itself at points not fitted to, relative.
+    pub radiated_error: f64,
+    /// Error of the compressed flow scattered between such points, relative.
+    pub scattered_error: f64,
+}
+
+/// The semi-axes of a shape by formula that closed forms are known for.
+pub(super) fn semi_axes(shape: &Shape) -> Option<[f64; 3]> {
+    match shape {
+        Shape::Sphere { radius, .. } => Some([*radius; 3]),
+        Shape::Ellipsoid { semi_axes, .. } => Some(*semi_axes),
+        _ => None,
+    }
+}
+
+/// Whether a body with an ellipsoid's shape is solved by formula.
+pub(super) fn by_formula(settings: &Settings, fidelity: Fidelity) -> bool {
+    fidelity != Fidelity::Full && matches!(settings.one_body, OneBody::Auto | OneBody::Exact)
+}
+
+impl Wet<'_> {
+    /// The method for this body.
+    fn method(&self, settings: &Settings) -> Result<OneBody> {
+        match (settings.one_body, self.ellipsoid) {
+            (OneBody::Auto, Some(_)) => Ok(OneBody::Exact),
+            (OneBody::Auto, None) => Ok(OneBody::Panel),
+            (OneBody::Exact, None) => Err(Error::Unsupported {
+                what: format!("the method exact for body {:?}", self.name),
+                why: "closed forms are known for spheres and ellipsoids by formula".into(),
+                instead: "use the method auto, which takes panels for other bodies, or panel"
+                    .into(),
+            }),
+            (method, _) => Ok(method),
+        }
+    }
+
+    fn surface(&self, fidelity: &str) -> Result<&TriMesh> {
+        self.mesh.ok_or_else(|| Error::Unsupported {
+            what: format!("coupling of body {:?}", self.name),
+            why: format!("it has a given added mass but no shape, and {fidelity} needs one"),
+            instead: "give it a shape, or use the fidelity isolated".into(),
+        })
+    }
+
+    /// The body alone, as the compression asks for it.
+    fn response(
+        &self,
+        method: OneBody,
+        settings: &Settings,
+        gap: f64,
+    ) -> Result<Box<dyn Response>> {
+        let mesh = self.surface("reduced")?;
+        let (vertices, faces) = (mesh.vertices(), mesh.faces());
+        Ok(match (method, &self.ellipsoid) {
+            (OneBody::Exact, Some((axes, pose))) => {
+                Box::new(ExactBoundary::new(self.name, *axes, pose, gap)?)
+            }
+            (OneBody::Mfs, _) => {
+                let b = &settings.boundary;
+                Box::new(BodyBoundary::new(self.name, vertices, faces, b)?)
+            }
+            _ => Box::new(PanelBoundary::new(self.name, vertices, faces)?),
+        })
+    }
+}
+
+fn name_of(method: OneBody) -> &'static str {
+    match method {
+        OneBody::Exact => "exact",
+        OneBody::Mfs => "mfs",
+        OneBody::Panel | OneBody::Auto => "panel",
+    }
+}
+
+/// The coupling of `bodies`, with a fidelity that isn't `Auto`.
+pub(super) fn couple(
+    bodies: &[Wet],
+    walls: &[Wall],
+    settings: &Settings,
+    fidelity: Fidelity,
+    plan: &Plan,
+    folder: Option<&Path>,
+) -> Result<Made> {
+    match fidelity {
+        Fidelity::Isolated => isolated(bodies, walls, settings),
+        Fidelity::Full if settings.one_body == OneBody::Panel => panels(bodies, walls, settings),
+        Fidelity::Full => full(bodies, walls, settings),
+        Fidelity::Reduced | Fidelity::Auto => reduced(bodies, walls, settings, plan, folder),
+    }
+}
+
+/// What `Auto` chose for each body and pair; empty: what the settings say.
+#[derive(Clone, Debug, Default)]
+pub(super) struct Plan {
+    /// Per body.
+    pub compress: Vec<compress::Settings>,
+    /// Per pair of bodies, equal for a body and its images.
+    pub cutoffs: Vec<((usize, usize), Cutoff)>,
+}
+
+fn isolated(bodies: &[Wet], walls: &[Wall], settings: &Settings) -> Result<Made> {
+    let mut warnings = Vec::new();
+    if !walls.is_empty() {
+        warnings.push(format!(
+            "{} wall(s) have no effect with the fidelity isolated; use reduced or full to feel them",
+            walls.len()
+        ));
+    }
+    let mut made: Vec<Own> = Vec::with_capacity(bodies.len());
+    for (b, body) in bodies.iter().enumerate() {
+        let same = (0..b).find(|a| equal(&bodies[*a], body));
+        made.push(match same {
+            Some(a) => Own {
+                warnings: Vec::new(),
+                ..made[a].clone()
+            },
+            None => own(body, settings)?,
+        });
+    }
+    warnings.extend(made.iter().flat_map(|m| m.warnings.iter().cloned()));
+    Ok(Made {
+        faces: made.iter().map(|m| m.faces).sum(),
+        bodies: made
+            .iter()
+            .zip(bodies)
+            .map(|(own, body)| Discretisation {
+                body: body.name.to_string(),
+                method: own.method,
+                faces: own.faces,
+                asymmetry: own.asymmetry,
+                ..Discretisation::empty()
+            })
+            .collect(),
+        coupling: Box::new(Isolated::new(
+            made.into_iter().map(|m| m.added_mass).collect(),
+        )),
+        warnings,
+    })
+}
+
+/// A body's own added mass.
+#[derive(Clone)]
+struct Own {
+    added_mass: Mat6,
+    method: &'static str,
+    faces: usize,
+    asymmetry: f64,
+    warnings: Vec<String>,
+}
+
+/// Whether two bodies have the same surface in their own frames.
+fn equal(a: &Wet, b: &Wet) -> bool {
+    let same = |a: &TriMesh, b: &TriMesh| a.vertices() == b.vertices() && a.faces() == b.faces();
+    a.added_mass == b.added_mass
+        && a.ellipsoid == b.ellipsoid
+        && match (a.mesh, b.mesh) {
+            (Some(a), Some(b)) => same(a, b),
+            (None, None) => true,
+            _ => false,
+        }
+}
+
+fn own(body: &Wet, settings: &Settings) -> Result<Own> {
+    if let Some(added_mass) = body.added_mass {
+        return Ok(Own {
+            added_mass,
+            method: "given",
+            faces: 0,
+            asymmetry: 0.0,
+            warnings: Vec::new(),
+        });
+    }
+    let method = body.method(settings)?;
+    let faces = match method {
+        OneBody::Exact => 0,
+        _ => body.surface("isolated")?.faces().len(),
+    };
+    let response = body.response(method, settings, f64::MAX)?;
+    Ok(Own {
+        added_mass: response.added_mass(),
+        method: name_of(method),
+        faces,
+        asymmetry: response.asymmetry(),
+        warnings: response.warnings().to_vec(),
+    })
+}
+
+impl Discretisation {
+    fn empty() -> Self {
+        Self {
+            body: String::new(),
+            method: "",
+            faces: 0,
+            unknowns: 0,
+            points: 0,
+            resolved_gap: None,
+            asymmetry: 0.0,
+            radiated_error: 0.0,
+            scattered_error: 0.0,
+        }
+    }
+}
+
+/// One value per body; bodies with equal surfaces share one.
+fn shared<T>(bodies: &[Wet], make: impl Fn(&Wet, &TriMesh) -> Result<T>) -> Result<Vec<Arc<T>>> {
+    let mut out: Vec<Arc<T>> = Vec::with_capacity(bodies.len());
+    for (b, body) in bodies.iter().enumerate() {
+        let mesh = body.surface("full")?;
+        out.push(match (0..b).find(|a| equal(&bodies[*a], body)) {
+            Some(a) => out[a].clone(),
+            None => Arc::new(make(body, mesh)?),
+        });
+    }
+    Ok(out)
+}
+
+/// What `of` says of each, once for those that are shared.
+fn once<T>(made: &[Arc<T>], of: impl Fn(&T) -> &[String]) -> Vec<String> {
+    let first = |i: &usize| !made[..*i].iter().any(|m| Arc::ptr_eq(m, &made[*i]));
+    let distinct = (0..made.len()).filter(first);
+    distinct.flat_map(|i| of(&made[i]).to_vec()).collect()
+}
+
+fn full(bodies: &[Wet], walls: &[Wall], settings: &Settings) -> Result<Made> {
+    if settings.one_body == OneBody::Exact {
+        return Err(Error::Unsupported {
+            what: "the method exact with the fidelity full".into(),
+            why: "closed forms are of single bodies".into(),
+            instead: "use the fidelity reduced, which couples them, or the method mfs-vertex"
+                .into(),
+        });
+    }
+    let mut boundary = settings.boundary;
+    if settings.solve.solver == Solver::Gmres {
+        // GMRES solves the square system as it is; damping belongs to least squares.
+        boundary.damping = 0.0;
+    }
+    let made = shared(bodies, |body, mesh| {
+        let (vertices, faces) = (mesh.vertices(), mesh.faces());
+        let b = BodyBoundary::new(body.name, vertices, faces, &boundary)?;
+        Ok(WetBody::new(Arc::new(b)))
+    })?;
+    Ok(Made {
+        faces: made.iter().map(|m| m.faces()).sum(),
+        warnings: once(&made, |m| &m.boundary.warnings),
+        bodies: made
+            .iter()
+            .zip(bodies)
+            .map(|(m, body)| Discretisation {
+                body: body.name.to_string(),
+                method: "mfs",
+                faces: m.faces(),
+                unknowns: m.sources(),
+                asymmetry: m.boundary.asymmetry,
+                ..Discretisation::empty()
+            })
+            .collect(),
+        coupling: Box::new(Full::new(made, walls, settings.solve)?),
+    })
+}
+
+fn panels(bodies: &[Wet], walls: &[Wall], settings: &Settings) -> Result<Made> {
+    let made = shared(bodies, |body, mesh| {
+        PanelBoundary::new(body.name, mesh.vertices(), mesh.faces())
+    })?;
+    let solve = panel::SolveSettings {
+        solver: settings.panel,
+        tolerance: settings.solve.tolerance,
+        ..panel::SolveSettings::default()
+    };
+    Ok(Made {
+        faces: made.iter().map(|m| m.faces.len()).sum(),
+        warnings: once(&made, |m| &m.warnings),
+        bodies: made
+            .iter()
+            .zip(bodies)
+            .map(|(m, body)| Discretisation {
+                body: body.name.to_string(),
+                method: "panel",
+                faces: m.faces.len(),
+                unknowns: m.faces.len(),
+                asymmetry: m.asymmetry,
+                ..Discretisation::empty()
+            })
+            .collect(),
+        coupling: Box::new(PanelCoupled::new(made, walls, solve)?),
+    })
+}
+
+fn reduced(
+    bodies: &[Wet],
+    walls: &[Wall],
+    settings: &Settings,
+    plan: &Plan,
+    folder: Option<&Path>,
+) -> Result<Made> {
+    let mut made: Vec<Arc<ReducedBody>> = Vec::with_capacity(bodies.len());
+    let mut methods = Vec::with_capacity(bodies.len());
+    for (b, body) in bodies.iter().enumerate() {
+        let method = body.method(settings)?;
+        let chosen = plan.compress.get(b).copied().unwrap_or(settings.compress);
+        made.push(compressed(body, method, settings, &chosen, folder)?);
+        methods.push(name_of(method));
+    }
+    let cutoff = |a: usize, b: usize| {
+        let pair = (a.min(b), a.max(b));
+        let found = plan.cutoffs.iter().find(|(p, _)| *p == pair);
+        found.map(|(_, cutoff)| *cutoff)
+    };
+    let names = bodies.iter().map(|b| b.name.to_string());
+    Ok(Made {
+        faces: bodies
+            .iter()
+            .filter_map(|b| Some(b.mesh?.faces().len()))
+            .sum(),
+        warnings: once(&made, |m| &m.parts().fit.warnings),
+        bodies: made
+            .iter()
+            .zip(bodies)
+            .zip(&methods)
+            .map(|((m, body), method)| {
+                let fit = &m.parts().fit;
+                Discretisation {
+                    body: body.name.to_string(),
+                    method,
+                    faces: body.mesh.map_or(0, |m| m.faces().len()),
+                    unknowns: m.modes(),
+                    points: m.points(),
+                    resolved_gap: Some(fit.resolved_gap),
+                    asymmetry: fit.body_asymmetry,
+                    radiated_error: fit.radiated,
+                    scattered_error: fit.scattered,
+                }
+            })
+            .collect(),
+        coupling: Box::new(Reduced::new(made, walls, cutoff)?.named(names)),
+    })
+}
+
+/// The body compressed, from the cache if it is there.
+fn compressed(
+    body: &Wet,
+    method: OneBody,
+    settings: &Settings,
+    chosen: &compress::Settings,
+    folder: Option<&Path>,
+) -> Result<Arc<ReducedBody>> {
+    let mesh = body.surface("reduced")?;
+    let (vertices, faces) = (mesh.vertices(), mesh.faces());
+    let formula = body.ellipsoid.as_ref().filter(|_| method == OneBody::Exact);
+    let formula = formula.map(|(axes, pose)| {
+        let turn: Vec<f64> = pose.rotation.iter().copied().collect();
+        (*axes, turn, <[f64; 3]>::from(pose.translation))
+    });
+    let fundamental = (method == OneBody::Mfs).then_some(settings.boundary);
+    let key = cache::Key::new(vertices, faces, &(method, formula, fundamental), chosen);
+    cache::fetch(key, folder, || {
+        let gap = chosen.resolved_gap.unwrap_or_else(|| {
+            let p = mesh.mass_properties();
+            compress::default_gap(p.volume, area(mesh))
+        });
+        let response =
+            body.response(method, settings, gap.max(compress::finest_gap(area(mesh))))?;
+        compress::compress(body.name, vertices, faces, response.as_ref(), chosen)
+    })
+}
+
+/// Surface of a mesh, m².
+pub(super) fn area(mesh: &TriMesh) -> f64 {
+    (0..mesh.faces().len()).map(|f| mesh.area(f)).sum()
+}
+
+/// Middle of the bounding box of a mesh.
+pub(super) fn centre(mesh: &TriMesh) -> Vec3 {
+    let v = mesh.vertices();
+    let low = v.iter().fold(v[0], |m, v| m.inf(v));
+    let high = v.iter().fold(v[0], |m, v| m.sup(v));
+    0.5 * (low + high)
+}

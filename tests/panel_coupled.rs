@@ -263,7 +263,7 @@ fn alone_or_moved_together_nothing_changes() {
         exp_matrix(&Vec3::new(0.4, 0.1, -0.3)),
         Vec3::new(0.7, 0.2, 0.6),
     );
-    let alone = momenta(&[coin.clone()], &[], Solver::Gmres, &[pose]);
+    let alone = momenta(std::slice::from_ref(&coin), &[], Solver::Gmres, &[pose]);
     // No iteration is needed for one body; its own value comes back.
     let settings = SolveSettings::default();
     let c = PanelCoupled::new(vec![coin.clone()], &[], settings).unwrap();
@@ -346,7 +346,7 @@ fn overlaps_and_impossible_settings_are_errors() {
         // Through the wall, and behind it.
         for x in [0.9, -5.0] {
             let floor = [wall(0.0, WallSurface::Rigid)];
-            let error = momenta(&[ball.clone()], &floor, solver, &[at(x)]).unwrap_err();
+            let error = momenta(std::slice::from_ref(&ball), &floor, solver, &[at(x)]).unwrap_err();
             let text = error.to_string();
             assert!(
                 text.contains("\"ball\"") && text.contains("wall 0"),

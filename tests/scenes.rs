@@ -266,14 +266,19 @@ fn mesh_paths_are_relative_to_the_scene_file() {
 }
 
 #[test]
-fn every_example_scene_runs_at_both_fidelities() {
+fn every_example_scene_runs_at_every_fidelity() {
     for entry in std::fs::read_dir(folder()).unwrap() {
         let path = entry.unwrap().path();
         let scene = Scene::load(&path).unwrap();
         // The fish's links touch at their hinges and have their added mass given.
         let fidelities = match scene.name.as_str() {
             name if name.contains("fish") => vec![Fidelity::Isolated],
-            _ => vec![Fidelity::Isolated, Fidelity::Full],
+            _ => vec![
+                Fidelity::Isolated,
+                Fidelity::Reduced,
+                Fidelity::Auto,
+                Fidelity::Full,
+            ],
         };
         for fidelity in fidelities {
             let settings = Settings::for_scene(&scene).fidelity(fidelity).faces(80);

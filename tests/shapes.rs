@@ -73,6 +73,47 @@ fn exact(shape: &Shape) -> (f64, Vec3) {
     }
 }
 
+/// Volume, area and inertia of finer and finer meshes tend to the formula's, with the square of the edge.
+#[test]
+fn meshes_tend_to_the_formula() {
+    for text in SHAPES {
+        let shape = parse_shape(text).unwrap();
+        let formula = MassProperties::by_formula(&shape).unwrap().unwrap();
+        let (volume, inertia) = exact(&shape);
+        assert!((formula.volume / volume - 1.0).abs() < 1e-14, "{text}");
+        let off = (formula.inertia.diagonal() - inertia).amax() / inertia.amax();
+        assert!(off < 1e-14, "{text}: {off:e}");
+        let errors = |faces: usize| {
+            let m = mesh(text, faces).mass_properties();
+            [
+                m.volume / formula.volume - 1.0,
+                m.area / formula.area - 1.0,
+                (m.inertia - formula.inertia).amax() / formula.inertia.amax(),
+                (m.centroid - formula.centroid).norm(),
+            ]
+            .map(f64::abs)
+        };
+        let (coarse, fine) = (errors(2000), errors(32_000));
+        for (c, f) in coarse.iter().zip(&fine) {
+            assert!(
+                *f < 1e-12 || (*f < 0.2 * c && *f < 4e-3),
+                "{text}: {c:e} {f:e}"
+            );
+        }
+    }
+    let file = Shape::Mesh {
+        path: "some.stl".into(),
+        scale: 1.0,
+    };
+    assert_eq!(MassProperties::by_formula(&file).unwrap(), None);
+    let flat = Shape::Box {
+        size: [1.0, 0.0, 1.0],
+        faces: None,
+    };
+    let text = MassProperties::by_formula(&flat).unwrap_err().to_string();
+    assert!(text.contains("size[1]: got 0"), "{text}");
+}
+
 #[test]
 fn primitives_are_closed_and_outward_at_any_resolution() {
     for text in SHAPES {

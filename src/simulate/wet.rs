@@ -68,15 +68,10 @@ pub(super) fn semi_axes(shape: &Shape) -> Option<[f64; 3]> {
     }
 }
 
-/// Whether a body with an ellipsoid's shape is solved by formula.
-pub(super) fn by_formula(settings: &Settings, fidelity: Fidelity) -> bool {
-    fidelity != Fidelity::Full && matches!(settings.one_body, OneBody::Auto | OneBody::Exact)
-}
-
 impl Wet<'_> {
     /// Whether its answer depends on a mesh.
     pub fn meshed(&self, settings: &Settings, fidelity: Fidelity) -> bool {
-        let formula = by_formula(settings, fidelity) && self.ellipsoid.is_some();
+        let formula = fidelity != Fidelity::Full && matches!(self.method(settings), Ok(OneBody::Exact));
         self.mesh.is_some() && self.added_mass.is_none() && !formula
     }
 
@@ -364,7 +359,7 @@ fn reduced(
             .iter()
             .filter_map(|b| Some(b.mesh?.faces().len()))
             .sum(),
-        warnings: once(made, |m| &m.parts().fit.warnings),
+        warnings: compression_warnings(bodies, made, settings, plan),
         bodies: made
             .iter()
             .zip(bodies)
@@ -432,7 +427,52 @@ pub(super) fn answers(
     Ok(out)
 }
 
+/// What the user should know of compressed bodies.
+fn compression_warnings(
+    bodies: &[Wet],
+    made: &[Arc<ReducedBody>],
+    settings: &Settings,
+    plan: &Plan,
+) -> Vec<String> {
+    let mut out = Vec::new();
+    for (b, (body, made)) in bodies.iter().zip(made).enumerate() {
+        if bodies[..b].iter().any(|a| equal(a, body)) {
+            continue;
+        }
+        let parts = made.parts();
+        let size = parts.radius;
+        out.extend(
+            parts
+                .fit
+                .warnings
+                .iter()
+                .map(|w| format!("{w} (lengths of this message in units of {size:.3e} m)")),
+        );
+        let asked = plan
+            .compress
+            .get(b)
+            .unwrap_or(&settings.compress)
+            .resolved_gap;
+        let got = parts.fit.resolved_gap;
+        if let Some(asked) = asked.filter(|a| *a < (1.0 - 1e-6) * got) {
+            out.push(format!(
+                "body {:?}: gaps under {got:.3e} m aren't resolved by its compressed sources, for all \
+                 that {asked:.3e} m were asked for: its surface is too large; use a plane wall for a \
+                 floor, or the fidelity full",
+                body.name
+            ));
+        }
+    }
+    out
+}
+
+/// Steps of the grid, relative to the body's size, on which lengths are compared.
+const GRID: f64 = (1u64 << 30) as f64;
+
 /// The body compressed, from the cache if it is there.
+///
+/// It is computed in units of its own size, with lengths rounded to [`GRID`]: bodies of the same
+/// shape share it whatever their size, to the last bit.
 fn compressed(
     body: &Wet,
     method: OneBody,
@@ -440,24 +480,56 @@ fn compressed(
     chosen: &compress::Settings,
     folder: Option<&Path>,
 ) -> Result<Arc<ReducedBody>> {
+    chosen.validate()?;
     let mesh = body.surface("reduced")?;
-    let (vertices, faces) = (mesh.vertices(), mesh.faces());
-    let formula = body.ellipsoid.as_ref().filter(|_| method == OneBody::Exact);
-    let formula = formula.map(|(axes, pose)| {
+    let middle = centre(mesh);
+    let far = |r: f64, v: &Vec3| r.max((v - middle).norm());
+    let size = mesh.vertices().iter().fold(0.0, far);
+    let round = |x: f64| (x / size * GRID).round() / GRID;
+    let vertices: Vec<Vec3> = mesh.vertices().iter().map(|v| v.map(round)).collect();
+    let unit = TriMesh::new(mesh.name(), vertices, mesh.faces().to_vec())?;
+    let ellipsoid = body.ellipsoid.filter(|_| method == OneBody::Exact);
+    let ellipsoid = ellipsoid.map(|(axes, pose)| {
+        let at = Pose::new(pose.rotation, pose.translation.map(round));
+        (axes.map(round), at)
+    });
+    let gap = chosen.resolved_gap.map(round);
+    let chosen =
+        compress::Settings {
+            resolved_gap: Some(gap.unwrap_or_else(|| {
+                compress::default_gap(unit.mass_properties().volume, area(&unit))
+            })),
+            ..*chosen
+        };
+    let formula = ellipsoid.map(|(axes, pose)| {
         let turn: Vec<f64> = pose.rotation.iter().copied().collect();
-        (*axes, turn, <[f64; 3]>::from(pose.translation))
+        (axes, turn, <[f64; 3]>::from(pose.translation))
     });
     let fundamental = (method == OneBody::Mfs).then_some(settings.boundary);
-    let key = cache::Key::new(vertices, faces, &(method, formula, fundamental), chosen);
-    cache::fetch(key, folder, || {
-        let gap = chosen.resolved_gap.unwrap_or_else(|| {
-            let p = mesh.mass_properties();
-            compress::default_gap(p.volume, area(mesh))
-        });
-        let response =
-            body.response(method, settings, gap.max(compress::finest_gap(area(mesh))))?;
-        compress::compress(body.name, vertices, faces, response.as_ref(), chosen)
-    })
+    let made_from = (method, formula, fundamental);
+    let key = cache::Key::new(unit.vertices(), unit.faces(), &made_from, &chosen);
+    let found = cache::fetch(key, folder, || {
+        let own = Wet {
+            name: body.name,
+            mesh: Some(&unit),
+            ellipsoid,
+            added_mass: None,
+        };
+        let gap = chosen
+            .resolved_gap
+            .unwrap_or(0.0)
+            .max(compress::finest_gap(area(&unit)));
+        let response = own.response(method, settings, gap)?;
+        compress::compress(
+            body.name,
+            unit.vertices(),
+            unit.faces(),
+            response.as_ref(),
+            &chosen,
+        )
+    });
+    let found = found.map_err(|e| e.in_units_of(size))?;
+    Ok(Arc::new(found.scaled(size)?))
 }
 
 /// Surface of a mesh, m².

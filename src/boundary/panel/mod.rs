@@ -21,6 +21,7 @@
 
 mod layers;
 mod response;
+pub mod richardson;
 
 use super::surface::{Faces, Surface, asymmetry};
 use crate::adjoint::kernel::Write;
@@ -29,9 +30,12 @@ use crate::solver::Lu;
 use crate::{Error, Result};
 use faer::Mat;
 pub(crate) use layers::Panels;
+pub use richardson::{Richardson, richardson};
 
 /// Most faces of one system: its matrix takes 8·faces² bytes, 3.2 GB here.
 pub const MOST_FACES: usize = 20_000;
+/// Turn of the surface, rad, from which an edge is sharp.
+const SHARP: f64 = 0.96;
 /// Condition number above which results lose digits that matter.
 const ILL_CONDITIONED: f64 = 1e6;
 
@@ -51,6 +55,8 @@ pub struct PanelBoundary {
     pub condition: f64,
     /// What the user should know, each with the body's name and its numbers.
     pub warnings: Vec<String>,
+    /// Length of the edges at which the surface turns by more than 55°, m.
+    sharp_edges: f64,
     panels: Panels,
     lu: Lu,
     /// q, normal velocity of each panel per unit twist, panels × 6.
@@ -70,7 +76,7 @@ impl PanelBoundary {
         check_size(&format!("body \"{name}\""), faces.len())?;
         let surface = Surface::new(name, vertices, faces)?;
         let panels = Panels::new(&surface);
-        let faces = surface.faces;
+        let faces = surface.faces.clone();
         let n = faces.len();
         let mut matrix = vec![0.0; n * n];
         panels.double_layer(&faces.centres, Write::Set, &mut matrix, n, 0);
@@ -122,6 +128,7 @@ impl PanelBoundary {
             added_mass,
             condition,
             warnings,
+            sharp_edges: surface.sharp_edges(SHARP),
             panels,
             lu,
             normal_velocity,

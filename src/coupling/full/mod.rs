@@ -73,7 +73,7 @@ impl Full {
         Ok(Self {
             faces: ranges(&|b| b.faces()),
             sources: ranges(&|b| b.sources()),
-            images: Image::of_walls(walls)?,
+            images: Image::of_rigid_walls(walls, "the fidelity full")?,
             bodies,
             settings,
             spare: Mutex::new(Vec::new()),

@@ -1,12 +1,12 @@
 //! All bodies in one panel system: the reference that the other fidelities are measured against.
 //!
 //! The unknowns are the potentials of all panels ([`crate::boundary::panel`]). Walls mirror the flow,
-//! so an image body has the potentials and normal velocities of the body itself, and its layers at x
-//! are those of the body at the mirrored point. Over the bodies' images, with q = F x̄ the normal
-//! velocities and D the panels' areas,
+//! so an image body has the potentials and normal velocities of the body itself (of opposite
+//! sign in a free surface), and its layers at x are those of the body at the mirrored point. Over the bodies'
+//! images, s their signs, with q = F x̄ the normal velocities and D the panels' areas,
 //!
 //! ```text
-//! A φ = S q,   A = ½ I + Σ_images Ω/4π,   S = Σ_images S_image
+//! A φ = S q,   A = ½ I + Σ_images s Ω/4π,   S = Σ_images s S_image
 //! E(x, y) = sym( (D F x)ᵀ A⁻¹ S F y )
 //! M̄ x̄ = ½ { Fᵀ D φ + Fᵀ Sᵀ μ },   Aᵀ μ = D F x̄
 //! ```
@@ -98,7 +98,7 @@ impl PanelCoupled {
             .collect();
         check_size(&format!("{} bodies", bodies.len()), at)?;
         Ok(Self {
-            images: Image::of_walls(walls)?,
+            images: Image::of_rigid_walls(walls, "the coupled panel method")?,
             walls: walls
                 .iter()
                 .map(|w| (Vec3::from(w.point), Vec3::from(w.normal).normalize()))

@@ -7,39 +7,38 @@
 //! proxies,
 //!
 //! ```text
-//! W E Π = Q R             column-pivoted: all that sources inside can make at the proxies
-//! T = Qᵀ W Φ W Q          Φ the potentials at proxies scattered from unit sources at proxies
-//! T = V Λ Vᵀ              the answer's modes, the largest of which are kept
-//! W E_x̄ L ≈ Q V √Λ        least squares, x̄ the few candidates that explain modes and
+//! W Φ W = V Λ Vᵀ          Φ the potentials at proxies scattered from unit sources at proxies;
+//!                         the largest modes of the answer are kept
+//! W E_x̄ L ≈ V √Λ          least squares, x̄ the few candidates that explain modes and
 //! W E_x̄ Ū ≈ W Φ_own       the body's own flow best
 //! ```
 //!
-//! Φ is symmetric (reciprocity) and T positive definite, for a rigid body answers every flow; what the
+//! Φ is symmetric (reciprocity) and positive definite, for a rigid body answers every flow; what the
 //! one-body method and the fit leave of asymmetry and of negative modes is reported.
 //!
 //! How tight the fit must be for an error `tolerance` of M̄_f was measured on pairs of spheres, thin
 //! ellipsoids and boxes at the resolved gap: the error goes with the square of the rests.
 
-mod pivot;
+mod modes;
+mod pursuit;
 mod samples;
 
 use super::{Fit, Parts, ReducedBody};
 use crate::adjoint::lie::Vec3;
 use crate::boundary::{Response, Surface};
 use crate::{Error, Result};
-use faer::linalg::triangular_solve::solve_upper_triangular_in_place;
-use faer::{Mat, Par, Side};
+use faer::Mat;
 use nalgebra::DMatrix;
 use serde::{Deserialize, Serialize};
 
 /// Proxies are this many times their distance from the surface apart.
 const SPACING: f64 = 0.75;
 /// Most proxies at the smallest distance; a smaller gap isn't resolved on so large a body.
-const MOST_PROXIES: f64 = 1200.0;
+const MOST_PROXIES: f64 = 900.0;
 /// Depths of the candidates, relative to the distances of the proxies.
 const DEPTH: f64 = 0.6;
 /// Candidates are this many times their depth apart.
-const CANDIDATES: f64 = 0.9;
+const CANDIDATES: f64 = 1.0;
 /// Candidates stay inside this part of the inner tangent ball.
 const TANGENT: f64 = 0.7;
 /// Modes below this times the root of the tolerance, relative to the largest, are left out.
@@ -48,8 +47,8 @@ const MODES: f64 = 0.3;
 const REST: f64 = 2.0;
 /// Weight of the body's own flow beside its largest mode: it acts to first order, modes to second.
 const OWN: f64 = 3.0;
-/// Part of a candidate's field, relative to the largest, below which it adds nothing to the others.
-const WIDE: f64 = 3e-3;
+/// At least this many proxies are fitted for each point, or the fit says nothing between proxies.
+const FITTED: usize = 3;
 /// One proxy in this many is kept from the fit to check it.
 const CHECK: usize = 6;
 
@@ -130,6 +129,8 @@ impl Proxies {
 /// Compresses the body whose closed surface is `vertices` (m, body frame) and `faces`, and whose flow
 /// `response` knows.
 ///
+/// A resolved gap below [`finest_gap`] is raised to it: see [`Fit::resolved_gap`].
+///
 /// # Errors
 /// Settings out of range, a surface that doesn't bound a volume, and what the one-body method
 /// doesn't resolve.
@@ -144,25 +145,21 @@ pub fn compress(
     let surface = Surface::new(name, vertices, faces)?;
     let (centre, radius) = ball(vertices);
     let area: f64 = surface.faces.areas.iter().sum();
-    let mut warnings = response.warnings().to_vec();
+    let warnings = response.warnings().to_vec();
     let finest = finest_gap(area);
     let asked = settings.resolved_gap;
     let gap = asked
         .unwrap_or_else(|| default_gap(surface.faces.volume(), area))
         .max(finest);
-    if let Some(asked) = asked.filter(|a| *a < finest) {
-        warnings.push(format!(
-            "body {name:?}: gaps under {gap:.3e} m aren't resolved by its compressed sources, for all \
-             that {asked:.3e} m were asked for: its surface of {area:.3e} m² is too large; use a plane \
-             wall for a floor, or the fidelity full"
-        ));
+    let (mut fitted, mut checked) = proxies(&surface, gap, radius, SPACING);
+    let needed = FITTED * settings.rank.unwrap_or(0);
+    if fitted.points.len() < needed {
+        let closer = (fitted.points.len() as f64 / needed as f64).sqrt();
+        (fitted, checked) = proxies(&surface, gap, radius, 0.9 * closer * SPACING);
     }
-    let (fitted, checked) = proxies(&surface, gap, radius);
     let candidates = candidates(&surface, gap, radius);
     let field = potentials_weighted(&fitted, &candidates);
-    let wide = pivot::pivoted_qr(&field, WIDE, usize::MAX);
-    let r = wide.columns.len();
-    if r == 0 {
+    if candidates.is_empty() {
         return Err(Error::Unresolved {
             place: format!("body {name:?}"),
             quantity: "points inside for its compressed sources".into(),
@@ -173,32 +170,23 @@ pub fn compress(
     }
     let own = response.radiated(&fitted.points)?;
     let own = Mat::from_fn(own.nrows(), 6, |i, j| own[(i, j)] * fitted.distances[i]);
-    let scattered = response.scattered(&fitted.points, &fitted.points)?;
-    let scattered = fitted.both(scattered);
-    let largest = scattered.norm_max();
-    let asymmetry = (&scattered - scattered.transpose()).norm_max() / largest;
-    let projected = wide.q.transpose() * (&scattered * &wide.q);
+    let mut scattered = fitted.both(response.scattered(&fitted.points, &fitted.points)?);
+    let asymmetry = symmetrise(&mut scattered);
+    let cut = MODES * settings.tolerance.sqrt();
+    let found = modes::largest(&scattered, cut).ok_or_else(|| Error::Unresolved {
+        place: format!("body {name:?}"),
+        quantity: "modes of its answer to the water that were found".into(),
+        value: 0.0,
+        limit: 1.0,
+        remedy: "use a more even mesh".into(),
+    })?;
     drop(scattered);
-    let symmetric = Mat::from_fn(r, r, |i, j| 0.5 * (projected[(i, j)] + projected[(j, i)]));
-    let eigen = symmetric
-        .self_adjoint_eigen(Side::Lower)
-        .map_err(|_| Error::Unresolved {
-            place: format!("body {name:?}"),
-            quantity: "modes of its answer to the water that were found".into(),
-            value: 0.0,
-            limit: r as f64,
-            remedy: "use a more even mesh".into(),
-        })?;
-    let values: Vec<f64> = (0..r).map(|k| eigen.S()[k]).collect();
-    let top = values.iter().copied().fold(0.0, f64::max);
-    let cut = MODES * settings.tolerance.sqrt() * top;
-    let kept: Vec<usize> = (0..r).rev().filter(|k| values[*k] > cut).collect();
-    let wrong_sign = values.iter().copied().fold(0.0, f64::min).abs() / top;
-    let m = kept.len();
-    let modes = &wide.q
-        * Mat::from_fn(r, m, |i, k| {
-            eigen.U()[(i, kept[k])] * values[kept[k]].sqrt()
-        });
+    let top = found.values.first().copied().unwrap_or(0.0);
+    let wrong_sign = found.lowest.abs() / top;
+    let m = found.values.len();
+    let modes = Mat::from_fn(own.nrows(), m, |i, k| {
+        found.vectors[(i, k)] * found.values[k].sqrt()
+    });
     let sizes: Vec<f64> = (0..6).map(|k| own.col(k).norm_l2()).collect();
     let linear = sizes[..3].iter().copied().fold(0.0, f64::max);
     let angular = sizes[3..]
@@ -213,16 +201,14 @@ pub fn compress(
         Some(rank) => (0.0, rank),
         None => (REST * settings.tolerance.sqrt(), usize::MAX),
     };
-    let skeleton = pivot::pursuit(&field, &targets, rest, most);
-    let chosen: Vec<Vec3> = skeleton.columns.iter().map(|j| candidates[*j]).collect();
-    let fit = |x: &Mat<f64>| -> Mat<f64> {
-        let mut x = skeleton.q.transpose() * x;
-        solve_upper_triangular_in_place(skeleton.r.as_ref(), x.as_mut(), Par::Seq);
-        x
-    };
+    let most = most.min(fitted.points.len() / FITTED);
+    let columns = pursuit::pursuit(&field, &targets, rest, most);
+    let chosen: Vec<Vec3> = columns.iter().map(|j| candidates[*j]).collect();
+    let field = Mat::from_fn(field.nrows(), columns.len(), |i, k| field[(i, columns[k])]);
     // No more modes than points.
     let modes = modes.get(.., ..m.min(chosen.len())).to_owned();
-    let (modes, strengths) = (fit(&modes), fit(&own));
+    let modes = pursuit::least_squares(&field, &modes);
+    let strengths = pursuit::least_squares(&field, &own);
 
     // What the compressed body says at points that it was not fitted to.
     let there = potentials_weighted(&checked, &chosen);
@@ -267,6 +253,22 @@ pub fn default_gap(volume: f64, area: f64) -> f64 {
     (0.75 * volume / area).max(finest_gap(area))
 }
 
+/// Replaces the matrix by its symmetric part; the largest difference from its transpose, relative to
+/// the largest entry.
+fn symmetrise(a: &mut Mat<f64>) -> f64 {
+    let (mut worst, mut largest) = (0.0_f64, 0.0_f64);
+    for j in 0..a.ncols() {
+        for i in 0..=j {
+            let (x, y) = (a[(i, j)], a[(j, i)]);
+            worst = worst.max((x - y).abs());
+            largest = largest.max(x.abs()).max(y.abs());
+            a[(i, j)] = 0.5 * (x + y);
+            a[(j, i)] = 0.5 * (x + y);
+        }
+    }
+    worst / largest
+}
+
 /// Largest difference of two matrices, relative to the largest entry of the second.
 fn relative(a: &Mat<f64>, b: &Mat<f64>) -> f64 {
     (a - b).norm_max() / b.norm_max()
@@ -281,8 +283,8 @@ fn ball(vertices: &[Vec3]) -> (Vec3, f64) {
     (centre, vertices.iter().fold(0.0, far))
 }
 
-/// Proxies to fit to and others to check at.
-fn proxies(surface: &Surface, gap: f64, radius: f64) -> (Proxies, Proxies) {
+/// Proxies to fit to and others to check at, `spacing` times their distance from the surface apart.
+fn proxies(surface: &Surface, gap: f64, radius: f64, spacing: f64) -> (Proxies, Proxies) {
     let empty = || Proxies {
         points: Vec::new(),
         distances: Vec::new(),
@@ -290,7 +292,7 @@ fn proxies(surface: &Surface, gap: f64, radius: f64) -> (Proxies, Proxies) {
     let (mut fitted, mut checked) = (empty(), empty());
     let mut offset = gap;
     loop {
-        for (i, p) in samples::around(surface, offset, SPACING * offset)
+        for (i, p) in samples::around(surface, offset, spacing * offset)
             .into_iter()
             .enumerate()
         {

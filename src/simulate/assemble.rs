@@ -74,15 +74,19 @@ struct Surface {
     properties: MassProperties,
 }
 
-fn surface(body: &Body, faces: Option<usize>) -> Result<Option<Surface>> {
+fn surface(body: &Body, settings: &Settings) -> Result<Option<Surface>> {
     let Some(shape) = &body.shape else {
         return Ok(None);
     };
-    let mesh = shape::build(shape, Path::new(""), faces)?.transformed(&pose(&body.shape_at));
-    Ok(Some(Surface {
-        properties: mesh.mass_properties(),
-        mesh,
-    }))
+    let at = pose(&body.shape_at);
+    let mesh = shape::build(shape, Path::new(""), settings.faces)?.transformed(&at);
+    // Where the water sees the shape itself, so do gravity and buoyancy.
+    let formula = match wet::semi_axes(shape) {
+        Some(_) if settings.by_formula() => MassProperties::by_formula(shape)?,
+        _ => None,
+    };
+    let properties = formula.map_or_else(|| mesh.mass_properties(), |p| p.transformed(&at));
+    Ok(Some(Surface { properties, mesh }))
 }
 
 /// Mass, centre of mass and inertia of a body.
@@ -150,7 +154,7 @@ pub(super) fn assemble(
     parameters.density = scene.fluid.density;
     let mut surfaces = Vec::with_capacity(scene.bodies.len());
     for body in &scene.bodies {
-        surfaces.push(surface(body, settings.faces)?);
+        surfaces.push(surface(body, settings)?);
     }
 
     let mut wet: Vec<Wet> = Vec::new();

@@ -16,7 +16,7 @@ use super::primitive::{shape_name, validate};
 use crate::error::Result;
 use crate::scene::Shape;
 use crate::special::r_d;
-use hydrograd_adjoint::lie::{Mat3, Vec3};
+use hydrograd_adjoint::lie::{Mat3, Pose, Vec3};
 use std::f64::consts::PI;
 
 /// What a body filled evenly at unit density has.
@@ -69,6 +69,15 @@ impl MassProperties {
 }
 
 impl MassProperties {
+    /// The same of the body placed at `pose`.
+    pub fn transformed(&self, pose: &Pose) -> Self {
+        Self {
+            centroid: pose.apply(&self.centroid),
+            inertia: pose.rotation * self.inertia * pose.rotation.transpose(),
+            ..*self
+        }
+    }
+
     /// Of a shape by formula, m, in the shape's frame: what finer and finer meshes of it tend to. None
     /// for a mesh.
     ///

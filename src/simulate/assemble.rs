@@ -85,11 +85,18 @@ pub(super) fn mesh(body: &Body, faces: Option<usize>) -> Result<Option<TriMesh>>
     Ok(Some(mesh.transformed(&pose(&body.shape_at))))
 }
 
-fn surface(body: &Body, faces: Option<usize>) -> Result<Option<Surface>> {
-    Ok(mesh(body, faces)?.map(|mesh| Surface {
-        properties: mesh.mass_properties(),
-        mesh,
-    }))
+fn surface(body: &Body, settings: &Settings) -> Result<Option<Surface>> {
+    let (Some(shape), Some(mesh)) = (&body.shape, mesh(body, settings.faces)?) else {
+        return Ok(None);
+    };
+    // Where the water sees the shape itself, so do gravity and buoyancy.
+    let formula = match wet::semi_axes(shape) {
+        Some(_) if settings.by_formula() => MassProperties::by_formula(shape)?,
+        _ => None,
+    };
+    let at = pose(&body.shape_at);
+    let properties = formula.map_or_else(|| mesh.mass_properties(), |p| p.transformed(&at));
+    Ok(Some(Surface { properties, mesh }))
 }
 
 /// The bodies that the water sees with a fidelity, with their numbers in the scene. Bodies that
@@ -184,7 +191,7 @@ pub(super) fn assemble(
     parameters.density = scene.fluid.density;
     let mut surfaces = Vec::with_capacity(scene.bodies.len());
     for body in &scene.bodies {
-        surfaces.push(surface(body, settings.faces)?);
+        surfaces.push(surface(body, settings)?);
     }
 
     let meshes: Vec<_> = surfaces

@@ -9,9 +9,10 @@ use crate::coupling::panel::{self, PanelCoupled};
 use crate::coupling::reduced::{Cutoff, Reduced, ReducedBody, cache, compress};
 use crate::coupling::{Coupling, Isolated};
 use crate::scene::{Shape, Wall};
-use crate::shape::TriMesh;
+use crate::shape::{self, TriMesh};
 use crate::{Error, Result};
 use serde::Serialize;
+use std::borrow::Cow;
 use std::path::Path;
 use std::sync::Arc;
 
@@ -68,7 +69,7 @@ pub(super) fn semi_axes(shape: &Shape) -> Option<[f64; 3]> {
     }
 }
 
-impl Wet<'_> {
+impl<'a> Wet<'a> {
     /// Whether its answer depends on a mesh.
     pub fn meshed(&self, settings: &Settings, fidelity: Fidelity) -> bool {
         let formula = fidelity != Fidelity::Full && matches!(self.method(settings), Ok(OneBody::Exact));
@@ -90,7 +91,7 @@ impl Wet<'_> {
         }
     }
 
-    fn surface(&self, fidelity: &str) -> Result<&TriMesh> {
+    fn surface(&self, fidelity: &str) -> Result<&'a TriMesh> {
         self.mesh.ok_or_else(|| Error::Unsupported {
             what: format!("coupling of body {:?}", self.name),
             why: format!("it has a given added mass but no shape, and {fidelity} needs one"),
@@ -231,7 +232,9 @@ fn own(body: &Wet, settings: &Settings) -> Result<Own> {
         OneBody::Exact => 0,
         _ => body.surface("isolated")?.faces().len(),
     };
-    let response = body.response(method, settings, f64::MAX)?;
+    // Nothing is near: the flow around it isn't asked for.
+    let far = body.mesh.map_or(1.0, |m| area(m).sqrt());
+    let response = body.response(method, settings, far)?;
     Ok(Own {
         added_mass: response.added_mass(),
         method: name_of(method),
@@ -466,6 +469,24 @@ fn compression_warnings(
     out
 }
 
+/// Faces of the mesh around a body by formula, from which the points of its compression are laid out:
+/// what they are fitted to doesn't depend on it.
+const LAYOUT_FACES: usize = 2000;
+
+/// The surface that a body is compressed around, in the body's frame.
+fn layout<'a>(body: &Wet<'a>, method: OneBody) -> Result<Cow<'a, TriMesh>> {
+    let mesh = body.surface("reduced")?;
+    match (method, body.ellipsoid) {
+        (OneBody::Exact, Some((semi_axes, pose))) => {
+            let shape = Shape::ellipsoid(semi_axes).faces(LAYOUT_FACES);
+            Ok(Cow::Owned(
+                shape::build(&shape, Path::new(""), None)?.transformed(&pose),
+            ))
+        }
+        _ => Ok(Cow::Borrowed(mesh)),
+    }
+}
+
 /// Steps of the grid, relative to the body's size, on which lengths are compared.
 const GRID: f64 = (1u64 << 30) as f64;
 
@@ -481,8 +502,8 @@ fn compressed(
     folder: Option<&Path>,
 ) -> Result<Arc<ReducedBody>> {
     chosen.validate()?;
-    let mesh = body.surface("reduced")?;
-    let middle = centre(mesh);
+    let mesh = layout(body, method)?;
+    let middle = centre(&mesh);
     let far = |r: f64, v: &Vec3| r.max((v - middle).norm());
     let size = mesh.vertices().iter().fold(0.0, far);
     let round = |x: f64| (x / size * GRID).round() / GRID;

@@ -5,7 +5,6 @@ use super::mass::MassProperties;
 use super::topology;
 use crate::error::{Error, Result};
 use hydrograd_adjoint::lie::{Pose, Vec3};
-use std::collections::HashMap;
 
 /// A triangle mesh: vertices (m, frame of the shape) and faces as triples of vertex numbers,
 /// counted from 0, counter-clockwise seen from outside.
@@ -75,6 +74,15 @@ impl TriMesh {
             vertices,
             faces,
         })
+    }
+
+    /// Parts that are known to be a surface.
+    pub(super) fn with_parts(name: &str, vertices: Vec<Vec3>, faces: Vec<[usize; 3]>) -> Self {
+        Self {
+            name: name.into(),
+            vertices,
+            faces,
+        }
     }
 
     /// File or shape name, for messages.
@@ -166,28 +174,6 @@ impl TriMesh {
             name: self.name.clone(),
             vertices: self.vertices.iter().map(|x| pose.apply(x)).collect(),
             faces: self.faces.clone(),
-        }
-    }
-
-    /// The same polyhedron with every face split into four at the middles of its edges.
-    pub fn split(&self) -> Self {
-        let mut vertices = self.vertices.clone();
-        let mut known: HashMap<[usize; 2], usize> = HashMap::new();
-        let mut middle = |a: usize, b: usize| {
-            *known.entry([a.min(b), a.max(b)]).or_insert_with(|| {
-                vertices.push(self.vertices[a] + (self.vertices[b] - self.vertices[a]) * 0.5);
-                vertices.len() - 1
-            })
-        };
-        let mut faces = Vec::with_capacity(4 * self.faces.len());
-        for &[a, b, c] in &self.faces {
-            let [d, e, f] = [middle(a, b), middle(b, c), middle(c, a)];
-            faces.extend([[a, d, f], [d, b, e], [f, e, c], [d, e, f]]);
-        }
-        Self {
-            name: self.name.clone(),
-            vertices,
-            faces,
         }
     }
 

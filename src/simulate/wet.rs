@@ -72,7 +72,8 @@ pub(super) fn semi_axes(shape: &Shape) -> Option<[f64; 3]> {
 impl<'a> Wet<'a> {
     /// Whether its answer depends on a mesh.
     pub fn meshed(&self, settings: &Settings, fidelity: Fidelity) -> bool {
-        let formula = fidelity != Fidelity::Full && matches!(self.method(settings), Ok(OneBody::Exact));
+        let formula =
+            fidelity != Fidelity::Full && matches!(self.method(settings), Ok(OneBody::Exact));
         self.mesh.is_some() && self.added_mass.is_none() && !formula
     }
 

@@ -1,14 +1,14 @@
 //! A simulator at its start, and the same on other meshes.
 
+use crate::Result;
 use crate::adjoint::lie::Pose;
 use crate::boundary::{OneBody, Response};
 use crate::coupling::{Coupling, Report};
-use crate::scene::WallSurface;
+use crate::scene::{Scene, Shape, WallSurface};
 use crate::shape::TriMesh;
 use crate::simulate::simulator::world_axes;
 use crate::simulate::wet::{self, Wet};
 use crate::simulate::{Fidelity, Settings, Simulator, assemble};
-use crate::{Error, Result};
 use nalgebra::DMatrix;
 use std::sync::Arc;
 
@@ -17,8 +17,6 @@ use std::sync::Arc;
 const LEAST: f64 = 0.01;
 /// Faces a body on which the coupling that `Isolated` leaves out is computed.
 const COUPLING_FACES: usize = 320;
-/// Most faces in all for that.
-const COUPLING_MOST: usize = 6000;
 
 /// What the estimate is of.
 pub(super) struct Case<'a> {
@@ -85,6 +83,27 @@ impl<'a> Case<'a> {
         })
     }
 
+    pub fn scene(&self) -> &'a Scene {
+        &self.simulator.scene
+    }
+
+    /// The bodies whose answers come from their meshes, by their numbers in the scene.
+    pub fn meshed(&self) -> Vec<usize> {
+        let settings = self.simulator.settings();
+        let wet = self.wet(&self.meshes);
+        let pairs = self.bodies.iter().zip(&wet);
+        let used = pairs.filter(|(_, w)| w.meshed(settings, self.fidelity));
+        used.map(|(b, _)| *b).collect()
+    }
+
+    /// What no estimate is made of.
+    pub fn unknown(&self) -> Vec<String> {
+        let own = self.simulator.discretisation().iter();
+        let given = own.filter(|d| d.method == "given");
+        let name = |body: &str| format!("the error of the added mass given for body {body:?}");
+        given.map(|d| name(&d.body)).collect()
+    }
+
     /// max |D_ij| / √(M_ii M_jj).
     pub fn size(&self, difference: &DMatrix<f64>) -> f64 {
         let mut worst = 0.0_f64;
@@ -113,7 +132,7 @@ impl<'a> Case<'a> {
         if self.compressed() {
             return Ok(self.correction(&wet)? - self.correction(&self.wet(&self.meshes))?);
         }
-        let (scene, settings) = (&self.simulator.scene, self.simulator.settings());
+        let (scene, settings) = (self.scene(), self.simulator.settings());
         let plan = &self.simulator.assembled.plan;
         let made = wet::couple(&wet, &scene.walls, settings, self.fidelity, plan, None)?;
         let (m, _) = evaluate(made.coupling.as_ref(), &self.poses, &self.turn)?;
@@ -126,7 +145,7 @@ impl<'a> Case<'a> {
 
     /// What the compressed bodies' added mass is off if they answer as `bodies` do.
     fn correction(&self, bodies: &[Wet]) -> Result<DMatrix<f64>> {
-        let (scene, settings) = (&self.simulator.scene, self.simulator.settings());
+        let (scene, settings) = (self.scene(), self.simulator.settings());
         let plan = &self.simulator.assembled.plan;
         let folder = self.simulator.folder.as_deref();
         let own = self.wet(&self.meshes);
@@ -160,26 +179,20 @@ impl<'a> Case<'a> {
     }
 
     fn left_out(&self) -> Result<DMatrix<f64>> {
-        let (scene, system) = (&self.simulator.scene, self.simulator.system());
+        let (scene, system) = (self.scene(), self.simulator.system());
         let mut meshes = Vec::with_capacity(scene.bodies.len());
-        for (body, mesh) in scene.bodies.iter().zip(&self.meshes) {
-            let coarse = mesh
-                .as_ref()
-                .is_some_and(|m| m.faces().len() > COUPLING_FACES);
-            meshes.push(match coarse {
-                true => assemble::mesh(body, Some(COUPLING_FACES))?,
-                false => mesh.clone(),
+        for (body, own) in scene.bodies.iter().zip(&self.meshes) {
+            meshes.push(match (own, &body.shape) {
+                (Some(own), _) if own.faces().len() <= COUPLING_FACES => Some(own.clone()),
+                (Some(own), Some(Shape::Mesh { .. })) => Some(own.coarsened(COUPLING_FACES)?),
+                _ => assemble::mesh(body, Some(COUPLING_FACES))?,
             });
         }
         let refs: Vec<_> = meshes.iter().map(Option::as_ref).collect();
         let (numbers, wet) = assemble::in_water(scene, &refs, &system.tree, Fidelity::Full);
-        let faces: usize = wet.iter().filter_map(|w| Some(w.mesh?.faces().len())).sum();
-        if faces > COUPLING_MOST {
-            return Err(Error::Unsupported {
-                what: format!("an estimate of it with {faces} faces"),
-                why: format!("at most {COUPLING_MOST} are solved"),
-                instead: "give coarser meshes, or use the fidelity reduced".into(),
-            });
+        let n = 6 * self.bodies.len();
+        if wet.len() <= 1 && scene.walls.is_empty() {
+            return Ok(DMatrix::zeros(n, n));
         }
         let all = system.tree.kinematics(self.simulator.start().0).poses;
         let poses: Vec<Pose> = numbers.iter().map(|b| all[*b]).collect();
@@ -201,7 +214,6 @@ impl<'a> Case<'a> {
             let of = numbers.iter().position(|b| *b == self.bodies[i / 6]);
             of.map(|b| 6 * b + i % 6)
         };
-        let n = 6 * self.bodies.len();
         Ok(DMatrix::from_fn(n, n, |i, j| match (at(i), at(j)) {
             (Some(i), Some(j)) => difference[(i, j)],
             _ => 0.0,

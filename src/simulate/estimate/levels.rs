@@ -1,4 +1,8 @@
-//! The same scene on coarser or finer meshes.
+//! The same bodies on coarser or finer meshes.
+//!
+//! Bodies with enough faces are coarsened, the others refined; the errors of both groups add up. Shapes by
+//! formula are meshed anew; a mesh from a file is coarsened by collapsing edges, or refined by
+//! splitting every face into four, so that the polyhedron is the shape.
 
 use super::case::Case;
 use crate::scene::Shape;
@@ -7,105 +11,125 @@ use crate::simulate::assemble;
 use crate::{Error, Result};
 use serde::Serialize;
 
-/// Coarser meshes have at least this many faces a body.
-const FEWEST: usize = 60;
-/// Most faces in all of a finer mesh.
-const MOST: usize = 10_000;
-/// Orders of the error in 1/faces: smooth bodies, and bodies with sharp edges.
+/// A mesh with at least so many faces is coarsened.
+const ENOUGH: usize = 240;
+/// Most faces in all of refined meshes.
+const MOST: usize = 6000;
+/// Orders of the error in 1/faces: of smooth bodies, and with sharp edges. There the leading part goes
+/// like the power ⅔, but faces are seldom small enough for it to be all.
 const SMOOTH: f64 = 1.0;
-const SHARP: f64 = 2.0 / 3.0;
+const SHARP: f64 = 0.5;
+/// Turn of the surface (rad) from which an edge is sharp, and the length of sharp edges, in square roots
+/// of the area, from which a mesh from a file is.
+const TURN: f64 = 0.96;
+const LENGTH: f64 = 0.1;
 /// Ratio of faces from which on two meshes differ enough.
 const DIFFERENT: f64 = 1.2;
 
-/// The same scene on other meshes.
+/// The same bodies on other meshes.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct Level {
-    /// Faces of all bodies.
+    /// Faces of all bodies whose meshes matter.
     pub faces: usize,
-    /// Difference of the added mass to that on the scene's own meshes.
+    /// Size of the difference to the added mass on the scene's own meshes.
     pub difference: f64,
     /// The error of the latter that follows from it.
     pub error: f64,
 }
 
-pub(super) fn levels(case: &Case, missing: &mut Vec<String>) -> Vec<Level> {
-    let settings = case.simulator.settings();
-    let scene = &case.simulator.scene;
-    let wet = case.wet(&case.meshes);
-    let used: Vec<usize> = (0..scene.bodies.len())
-        .filter(|b| {
-            let name = &scene.bodies[*b].name;
-            let found = wet.iter().find(|w| w.name == name);
-            found.is_some_and(|w| w.meshed(settings, case.fidelity))
-        })
-        .collect();
-    if used.is_empty() {
-        return Vec::new();
-    }
-    let faces = |b: &usize| case.meshes[*b].as_ref().map_or(0, |m| m.faces().len());
-    let file = |b: &usize| matches!(scene.bodies[*b].shape, Some(Shape::Mesh { .. }));
-    let fewest = used.iter().map(faces).min().unwrap_or(0);
-    let factors: &[f64] = if used.iter().any(file) {
-        &[4.0]
-    } else if fewest >= 4 * FEWEST {
-        &[0.25, 0.5]
-    } else {
-        &[2.0, 4.0]
-    };
-    let mut out = Vec::new();
-    for factor in factors {
-        match level(case, &used, *factor) {
-            Ok(level) => out.push(level),
-            Err(error) => missing.push(format!("extrapolation from {factor} × the faces: {error}")),
+/// The levels, and the error that follows; `None` if some body has no level.
+pub(super) fn extrapolate(case: &Case, missing: &mut Vec<String>) -> (Vec<Level>, Option<f64>) {
+    let bodies = case.meshed();
+    let enough = |b: &usize| faces(case, *b) >= ENOUGH;
+    let (many, few): (Vec<usize>, Vec<usize>) = bodies.into_iter().partition(enough);
+    let (mut levels, mut error) = (Vec::new(), Some(0.0));
+    for (group, factors) in [(many, [0.25, 0.5]), (few, [4.0, 2.0])] {
+        if group.is_empty() {
+            continue;
         }
+        let (mut worst, mut reasons) = (None, Vec::new());
+        for factor in factors {
+            match level(case, &group, factor) {
+                Ok(Some(level)) => {
+                    worst = Some(level.error.max(worst.unwrap_or(0.0)));
+                    levels.push(level);
+                }
+                Ok(None) => {}
+                Err(error) => reasons.push(format!(
+                    "extrapolation from {factor} times the faces: {error}"
+                )),
+            }
+        }
+        missing.extend(reasons);
+        error = error.zip(worst).map(|(a, b)| a + b);
     }
-    out
+    (levels, error)
 }
 
-fn level(case: &Case, used: &[usize], factor: f64) -> Result<Level> {
-    let scene = &case.simulator.scene;
-    let (mut least, mut order, mut total) = (f64::INFINITY, SMOOTH, 0);
+fn faces(case: &Case, body: usize) -> usize {
+    case.meshes[body].as_ref().map_or(0, |m| m.faces().len())
+}
+
+/// The added mass with `factor` times the faces for `bodies`; `None` where their meshes can't have
+/// that.
+fn level(case: &Case, bodies: &[usize], factor: f64) -> Result<Option<Level>> {
+    let (mut ratio, mut order, mut total) = (f64::INFINITY, SMOOTH, 0);
     let mut meshes: Vec<Option<TriMesh>> = case.meshes.clone();
-    for b in used {
+    for b in bodies {
         let Some(own) = &case.meshes[*b] else {
             continue;
         };
-        let n = own.faces().len() as f64;
-        let mesh = match &scene.bodies[*b].shape {
-            Some(Shape::Mesh { .. }) => own.split(),
-            _ => {
-                let target = (n * factor).round() as usize;
-                assemble::mesh(&scene.bodies[*b], Some(target))?.unwrap_or_else(|| own.clone())
-            }
+        let Some(mesh) = other(case, *b, own, factor)? else {
+            return Ok(None);
         };
-        let smooth = matches!(
-            scene.bodies[*b].shape,
-            Some(Shape::Sphere { .. } | Shape::Ellipsoid { .. } | Shape::Capsule { .. })
-        );
-        if !smooth {
+        if sharp(case, *b, own) {
             order = SHARP;
         }
-        let ratio = mesh.faces().len() as f64 / n;
-        least = least.min(if factor < 1.0 { 1.0 / ratio } else { ratio });
+        let more = mesh.faces().len() as f64 / own.faces().len() as f64;
+        ratio = ratio.min(if factor < 1.0 { 1.0 / more } else { more });
         total += mesh.faces().len();
         meshes[*b] = Some(mesh);
     }
-    if least < DIFFERENT || (factor > 1.0 && total > MOST) {
+    if ratio < DIFFERENT {
+        return Ok(None);
+    }
+    if factor > 1.0 && total > MOST {
         return Err(Error::Unsupported {
-            what: format!("a mesh with {factor} times the faces"),
-            why: format!("{total} faces, {least:.2} times as many or few"),
-            instead: "give other numbers of faces".into(),
+            what: format!("a refined mesh with {total} faces"),
+            why: format!("it would take long; at most {MOST} are solved"),
+            instead: format!("give every body at least {ENOUGH} faces"),
         });
     }
     let difference = case.size(&case.difference(&meshes)?);
-    let error = if factor < 1.0 {
-        difference / (least.powf(order) - 1.0)
-    } else {
-        difference / (1.0 - least.powf(-order))
+    let error = match factor < 1.0 {
+        true => difference / (ratio.powf(order) - 1.0),
+        false => difference / (1.0 - ratio.powf(-order)),
     };
-    Ok(Level {
+    Ok(Some(Level {
         faces: total,
         difference,
         error,
-    })
+    }))
+}
+
+/// The mesh of a body with `factor` times the faces.
+fn other(case: &Case, body: usize, own: &TriMesh, factor: f64) -> Result<Option<TriMesh>> {
+    let target = (own.faces().len() as f64 * factor).round() as usize;
+    match &case.scene().bodies[body].shape {
+        Some(Shape::Mesh { .. }) if factor < 1.0 => Ok(Some(own.coarsened(target)?)),
+        Some(Shape::Mesh { .. }) if factor == 4.0 => Ok(Some(own.split())),
+        Some(Shape::Mesh { .. }) => Ok(None),
+        _ => assemble::mesh(&case.scene().bodies[body], Some(target)),
+    }
+}
+
+/// Whether the body has sharp edges.
+fn sharp(case: &Case, body: usize, own: &TriMesh) -> bool {
+    match &case.scene().bodies[body].shape {
+        Some(Shape::Sphere { .. } | Shape::Ellipsoid { .. } | Shape::Capsule { .. }) => false,
+        Some(Shape::Mesh { .. }) => {
+            own.sharp_edges(TURN) > LENGTH * own.mass_properties().area.sqrt()
+        }
+        _ => true,
+    }
 }

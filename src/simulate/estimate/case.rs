@@ -5,7 +5,7 @@ use crate::adjoint::lie::Pose;
 use crate::boundary::{OneBody, Response};
 use crate::coupling::{Coupling, Report};
 use crate::scene::{Scene, Shape, WallSurface};
-use crate::shape::TriMesh;
+use crate::shape::{Gap, Gaps, Other, TriMesh};
 use crate::simulate::simulator::world_axes;
 use crate::simulate::wet::{self, Wet};
 use crate::simulate::{Fidelity, Settings, Simulator, assemble};
@@ -17,6 +17,9 @@ use std::sync::Arc;
 const LEAST: f64 = 0.01;
 /// Faces a body on which the coupling that `Isolated` leaves out is computed.
 const COUPLING_FACES: usize = 320;
+
+/// Most that a gap which isn't resolved may weigh.
+const NARROWEST: f64 = 10.0;
 
 /// What the estimate is of.
 pub(super) struct Case<'a> {
@@ -158,13 +161,29 @@ impl<'a> Case<'a> {
 
     /// What is left at check points.
     pub fn residual(&self) -> Result<Option<f64>> {
-        let found = if self.compressed() {
-            Some(self.correction(&self.wet(&self.meshes))?)
-        } else {
-            let coupling = &self.simulator.system().coupling;
-            coupling.residual(&self.poses, &self.turn)?
-        };
+        if self.compressed() {
+            let found = self.correction(&self.wet(&self.meshes))?;
+            return Ok(Some(self.size(&found) * self.narrowness()?));
+        }
+        let coupling = &self.simulator.system().coupling;
+        let found = coupling.residual(&self.poses, &self.turn)?;
         Ok(found.map(|d| self.size(&d)))
+    }
+
+    /// Where a gap is narrower than its compressed bodies resolve, their charges aren't what the first
+    /// order takes them for: the root of what the gap lacks.
+    fn narrowness(&self) -> Result<f64> {
+        let (scene, system) = (self.scene(), self.simulator.system());
+        let meshes: Vec<_> = self.meshes.iter().map(Option::as_ref).collect();
+        let poses = system.tree.kinematics(self.simulator.start().0).poses;
+        let resolved = self.simulator.resolved();
+        let lacks = |gap: Gap| match gap.second {
+            Other::Body(b) => resolved[gap.first].max(resolved[b]) / gap.distance,
+            Other::Wall(_) => resolved[gap.first] / (2.0 * gap.distance),
+        };
+        let gaps = Gaps::new(&meshes, &scene.walls, &[])?.all(&poses);
+        let worst = gaps.into_iter().map(lacks).fold(1.0, f64::max);
+        Ok(worst.sqrt().min(NARROWEST))
     }
 
     /// The coupling that the fidelity `Isolated` leaves out.

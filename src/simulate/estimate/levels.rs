@@ -15,9 +15,11 @@ use serde::Serialize;
 const ENOUGH: usize = 240;
 /// Most faces in all of refined meshes.
 const MOST: usize = 6000;
-/// Orders of the error in 1/faces: of smooth bodies, and with sharp edges. There the leading part goes
-/// like the power ⅔, but faces are seldom small enough for it to be all.
+/// Orders of the error in 1/faces: of smooth bodies, of polyhedra that stand for them, and with sharp
+/// edges. There the leading part goes like the power ⅔ too, but faces are seldom small enough for it to
+/// be all.
 const SMOOTH: f64 = 1.0;
+const FACETED: f64 = 2.0 / 3.0;
 const SHARP: f64 = 0.5;
 /// Turn of the surface (rad) from which an edge is sharp, and the length of sharp edges, in square roots
 /// of the area, from which a mesh from a file is.
@@ -82,9 +84,7 @@ fn level(case: &Case, bodies: &[usize], factor: f64) -> Result<Option<Level>> {
         let Some(mesh) = other(case, *b, own, factor)? else {
             return Ok(None);
         };
-        if sharp(case, *b, own) {
-            order = SHARP;
-        }
+        order = order.min(order_of(case, *b, own));
         let more = mesh.faces().len() as f64 / own.faces().len() as f64;
         ratio = ratio.min(if factor < 1.0 { 1.0 / more } else { more });
         total += mesh.faces().len();
@@ -123,13 +123,15 @@ fn other(case: &Case, body: usize, own: &TriMesh, factor: f64) -> Result<Option<
     }
 }
 
-/// Whether the body has sharp edges.
-fn sharp(case: &Case, body: usize, own: &TriMesh) -> bool {
+/// The order of a body's error.
+fn order_of(case: &Case, body: usize, own: &TriMesh) -> f64 {
     match &case.scene().bodies[body].shape {
-        Some(Shape::Sphere { .. } | Shape::Ellipsoid { .. } | Shape::Capsule { .. }) => false,
-        Some(Shape::Mesh { .. }) => {
-            own.sharp_edges(TURN) > LENGTH * own.mass_properties().area.sqrt()
+        Some(Shape::Sphere { .. } | Shape::Ellipsoid { .. } | Shape::Capsule { .. }) => SMOOTH,
+        Some(Shape::Mesh { .. })
+            if own.sharp_edges(TURN) <= LENGTH * own.mass_properties().area.sqrt() =>
+        {
+            FACETED
         }
-        _ => true,
+        _ => SHARP,
     }
 }

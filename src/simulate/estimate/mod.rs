@@ -2,7 +2,8 @@
 //!
 //! Errors of M_f are `max |ΔM_ij| / √(M_ii M_jj)`, along world axes about each body's origin; a direction that
 //! hardly moves water (a round body's spin) counts as a hundredth of the water displaced. With the order
-//! p of the error in 1/faces, 1 on smooth bodies and ½ with sharp edges, the estimate is
+//! p of the error in 1/faces (1 on smooth bodies, ½ with sharp edges, ⅔ for smooth meshes from files,
+//! whose facets are the shape), the estimate is
 //!
 //! ```text
 //! total = 1.5 · [ max(extrapolation, asymmetry, residual/4) ]              fidelity full
@@ -44,8 +45,9 @@ pub struct ErrorEstimate {
     /// What is left at check points that weren't used in the fit. Fidelity `Full`: what the normal
     /// velocities left between the collocation points change in the energy, at four points a face.
     /// `Reduced`: what the bodies' own methods, asked for their answers to one another at this
-    /// configuration, change in M_f to first order; pairs that fade out included. `None` for the
-    /// coupled panel method and for `Isolated`.
+    /// configuration, change in M_f to first order, pairs that fade out included; where a gap is narrower
+    /// than they resolve, times the root of resolved over actual gap. `None` for the coupled panel method
+    /// and for `Isolated`.
     pub residual: Option<f64>,
     /// What other meshes of the same bodies change, extrapolated to infinitely fine ones. 0 where every
     /// body is solved by formula; `None` where it couldn't be had.

@@ -160,8 +160,8 @@ impl fmt::Display for Report {
 
 fn write_estimate(f: &mut fmt::Formatter<'_>, estimate: &ErrorEstimate) -> fmt::Result {
     match estimate.total {
-        Some(total) => write!(f, "\nestimated error {total:.1e} of √(M_ii M_jj): ",)?,
-        None => write!(f, "\nno estimate of the error, only parts of it: ")?,
+        Some(total) => write!(f, "\nestimated error {total:.1e} of √(M_ii M_jj)")?,
+        None => write!(f, "\nno estimate of the error, only parts of it")?,
     }
     let parts = [
         ("other meshes", estimate.extrapolation),
@@ -169,10 +169,11 @@ fn write_estimate(f: &mut fmt::Formatter<'_>, estimate: &ErrorEstimate) -> fmt::
         ("missing coupling", estimate.coupling),
         ("asymmetry", Some(estimate.asymmetry)),
     ];
-    let known: Vec<String> = (parts.iter())
-        .filter_map(|(name, part)| Some(format!("{name} {:.1e}", (*part)?)))
-        .collect();
-    write!(f, "{}", known.join(", "))?;
-    let lines = estimate.missing.iter();
-    lines.map(|m| write!(f, "\nnot estimated: {m}")).collect()
+    for (name, part) in parts {
+        if let Some(part) = part.filter(|p| *p > 0.0) {
+            write!(f, "; {name} {part:.1e}")?;
+        }
+    }
+    let mut missing = estimate.missing.iter();
+    missing.try_for_each(|m| write!(f, "\nnot estimated: {m}"))
 }

@@ -49,7 +49,7 @@ pub(super) fn extrapolate(case: &Case, missing: &mut Vec<String>) -> (Vec<Level>
         if group.is_empty() {
             continue;
         }
-        let (mut worst, mut reasons) = (None, Vec::new());
+        let (mut worst, mut reasons) = (None, vec![]);
         for factor in factors {
             match level(case, &group, factor) {
                 Ok(Some(level)) => {
@@ -62,7 +62,12 @@ pub(super) fn extrapolate(case: &Case, missing: &mut Vec<String>) -> (Vec<Level>
                 )),
             }
         }
-        missing.extend(reasons);
+        if worst.is_none() && reasons.is_empty() {
+            reasons.push("extrapolation: no mesh with fewer or more faces".into());
+        }
+        if worst.is_none() {
+            missing.extend(reasons);
+        }
         error = error.zip(worst).map(|(a, b)| a + b);
     }
     (levels, error)

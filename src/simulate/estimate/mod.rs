@@ -6,7 +6,7 @@
 //! whose facets are the shape), the estimate is
 //!
 //! ```text
-//! total = 1.5 · [ max(extrapolation, asymmetry, residual/4) ]              fidelity full
+//! total = 1.5 · [ max(extrapolation, asymmetry, min(residual/4, 1)) ]      fidelity full
 //!         1.5 · [ max(extrapolation, asymmetry) + residual ]               reduced
 //!         1.5 · [ max(extrapolation, asymmetry) + coupling ]               isolated
 //! extrapolation = max over meshes n' of |M(n') − M(n)| / |(n/n')ᵖ − 1|
@@ -28,8 +28,8 @@ pub use levels::Level;
 
 /// On all parts together.
 const SAFETY: f64 = 1.5;
-/// What the residual of the fidelity `Full` is worth: it is of the first order where the error is
-/// of the second.
+/// What the residual of the fidelity `Full` is worth: near a source it is large, and of the first
+/// order where the error is of the second.
 const RESIDUAL: f64 = 0.25;
 
 /// An estimate of the error of [`Simulator::added_mass`]: `max |ΔM_ij| / √(M_ii M_jj)`, all numbers
@@ -67,9 +67,9 @@ impl Simulator {
     /// Estimates the error of [`Simulator::added_mass`] at the start, from the asymmetry, from what is
     /// left at check points, and from other meshes of the same bodies.
     ///
-    /// It costs one to three times what preparing the scene and one added mass cost; up to fifty
-    /// times for bodies with fewer than 240 faces, whose meshes are refined instead of coarsened. With
-    /// the fidelity `Isolated` the coupling is computed on at most 320 faces a body.
+    /// It costs about as much again as preparing the scene and one added mass; several times as much
+    /// for bodies with fewer than 240 faces, whose meshes are refined instead of coarsened. With the
+    /// fidelity `Isolated` the coupling is computed on up to 320 faces a body, some tenths of a second.
     ///
     /// # Errors
     /// Whatever the coupling reports on the scene's own meshes.
@@ -89,7 +89,7 @@ impl Simulator {
             let bodies = extrapolation.max(asymmetry);
             let together = match self.fidelity() {
                 Fidelity::Isolated => bodies + coupling?,
-                Fidelity::Full => bodies.max(RESIDUAL * residual.unwrap_or(0.0)),
+                Fidelity::Full => bodies.max((RESIDUAL * residual.unwrap_or(0.0)).min(1.0)),
                 Fidelity::Reduced | Fidelity::Auto => bodies + residual?,
             };
             Some(SAFETY * together + case.report.residual)

@@ -50,7 +50,7 @@ const LAST: f64 = 1e-5;
 /// Harmonics that are less of it than this are left out.
 const LEAST: f64 = 1e-7;
 /// A degree that is less of the answer than this is the last to be summed.
-const SUMMED: f64 = 1e-11;
+const SUMMED: f64 = 1e-9;
 /// Largest relative error of an answer, estimated from the last degree, that is let pass.
 const TRUNCATED: f64 = 1e-3;
 /// Sources that are tried to choose the harmonics.
@@ -427,10 +427,8 @@ impl Degree {
         for r in self.classes.iter().flat_map(|c| &c.radials) {
             used[*r] = Some(0);
         }
-        let mut next = 0;
-        for slot in used.iter_mut().flatten() {
+        for (next, slot) in used.iter_mut().flatten().enumerate() {
             *slot = next;
-            next += 1;
         }
         let mut index = used.iter();
         self.radials

@@ -270,6 +270,15 @@ impl Shape {
         }
     }
 
+    /// A prism along x, centred at x = 0: corners (y, z) of its convex profile and its length, m.
+    pub fn prism(profile: impl Into<Vec<[f64; 2]>>, length: f64) -> Self {
+        Self::Prism {
+            profile: profile.into(),
+            length,
+            faces: None,
+        }
+    }
+
     /// A closed triangle mesh in an OBJ, STL or PLY file, in metres.
     pub fn mesh(path: impl Into<PathBuf>) -> Self {
         Self::Mesh {
@@ -292,6 +301,7 @@ impl Shape {
             Self::Box { .. } => "box",
             Self::Cylinder { .. } => "cylinder",
             Self::Capsule { .. } => "capsule",
+            Self::Prism { .. } => "prism",
             Self::Mesh { .. } => "mesh",
         }
     }
@@ -302,7 +312,8 @@ impl Shape {
             | Self::Ellipsoid { faces, .. }
             | Self::Box { faces, .. }
             | Self::Cylinder { faces, .. }
-            | Self::Capsule { faces, .. } => *faces = Some(target),
+            | Self::Capsule { faces, .. }
+            | Self::Prism { faces, .. } => *faces = Some(target),
             Self::Mesh { .. } => {}
         }
     }

@@ -192,6 +192,16 @@ pub enum Shape {
         #[serde(default, skip_serializing_if = "Option::is_none")]
         faces: Option<usize>,
     },
+    /// Prism along x: a convex profile in the y-z plane, extruded.
+    Prism {
+        /// Corners of the profile, (y, z), m, in either order around it; must be convex.
+        profile: Vec<[f64; 2]>,
+        /// Length along x, m; the prism reaches from −length/2 to length/2.
+        length: f64,
+        /// Target number of faces.
+        #[serde(default, skip_serializing_if = "Option::is_none")]
+        faces: Option<usize>,
+    },
     /// A closed triangle mesh in a file (OBJ, STL, PLY).
     Mesh {
         /// The file; relative to the scene file.

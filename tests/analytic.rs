@@ -55,7 +55,7 @@ fn uneven_poses() -> Vec<Pose> {
 }
 
 fn full(bodies: &[Arc<WetBody>], walls: &[Wall], settings: SolveSettings) -> Full {
-    Full::new(bodies.to_vec(), walls, settings).unwrap()
+    Full::new(bodies.to_vec(), walls, Exclusions::none(), settings).unwrap()
 }
 
 fn tight() -> SolveSettings {
@@ -920,7 +920,7 @@ fn a_solve_that_misses_its_tolerance_says_so() {
 #[test]
 fn settings_without_meaning_are_refused() {
     let bodies = uneven(80);
-    let refused = |walls: &[Wall], settings| Full::new(bodies.clone(), walls, settings).err();
+    let refused = |walls: &[Wall], settings| Full::new(bodies.clone(), walls, Exclusions::none(), settings).err();
     let wall = |normal| Wall {
         point: [0.0; 3],
         normal,

@@ -15,11 +15,13 @@
 //! The ladder of E: value [`Record::momenta`], vjp [`Record::gradient`] (on the basis) and
 //! [`Record::vjp`] (any pair), jvp and hvp together in [`Record::hvp`].
 
+mod exclude;
 pub mod full;
 pub mod image;
 mod isolated;
 mod tensor;
 
+pub use exclude::Exclusions;
 pub use isolated::Isolated;
 pub use tensor::PairTensor;
 

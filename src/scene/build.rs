@@ -117,6 +117,7 @@ impl Body {
             inertia: None,
             added_mass: None,
             parent: None,
+            overlaps_parent: false,
             placement: Placement::default(),
             joint: Joint::Free,
             motion: None,
@@ -196,6 +197,13 @@ impl Body {
     /// Name of the body that carries this one; add that one first.
     pub fn child_of(mut self, parent: impl Into<String>) -> Self {
         self.parent = Some(parent.into());
+        self
+    }
+
+    /// Lets the surface touch or overlap that of the body that carries it; the two then don't feel
+    /// each other through the water.
+    pub fn overlaps_parent(mut self) -> Self {
+        self.overlaps_parent = true;
         self
     }
 

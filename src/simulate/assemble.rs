@@ -1,17 +1,17 @@
 //! From a scene to a system: meshes, masses, joints, coupling, controller.
 
-use super::clearance::{self, Clearance};
+use super::clearance::Clearance;
 use super::policy::{Constant, OpenLoop, Pd, PdAxis, PushThenLock};
 use super::{Fidelity, Policy, Settings};
 use crate::adjoint::drag::{self, Element, Part};
 use crate::adjoint::lie::{Mat3, Mat6, Pose, Vec3, exp_matrix};
 use crate::boundary::BodyBoundary;
 use crate::coupling::full::{Full, Solver, WetBody};
-use crate::coupling::{Coupling, Isolated};
+use crate::coupling::{Coupling, Exclusions, Isolated};
 use crate::dynamics::{BodyData, Drive, Parameters, Stepper, System};
 use crate::multibody::{self, Tree};
 use crate::scene::{self, Body, Controller, DragPart, Placement, Scene};
-use crate::shape::{self, Gaps, MassProperties, TriMesh};
+use crate::shape::{self, MassProperties, TriMesh};
 use crate::{Error, Result};
 use nalgebra::DVector;
 use std::path::Path;
@@ -26,7 +26,7 @@ pub(super) struct Assembled {
     pub v: DVector<f64>,
     pub faces: usize,
     pub sources: usize,
-    pub gaps: Gaps,
+    pub clearance: Clearance,
     pub warnings: Vec<String>,
 }
 
@@ -62,9 +62,9 @@ fn part(p: DragPart) -> Part {
 }
 
 /// A body's surface in its own frame, with its mass properties.
-struct Surface {
-    mesh: TriMesh,
-    properties: MassProperties,
+pub(super) struct Surface {
+    pub mesh: TriMesh,
+    pub properties: MassProperties,
 }
 
 fn surface(body: &Body, faces: Option<usize>) -> Result<Option<Surface>> {
@@ -259,7 +259,12 @@ pub(super) fn assemble(scene: &Scene, settings: &Settings) -> Result<Assembled> 
             }
             Box::new(Isolated::new(isolated))
         }
-        Fidelity::Full => Box::new(Full::new(full, &scene.walls, settings.solve)?),
+        Fidelity::Full => {
+            let pairs = scene.overlapping().into_iter();
+            let wet = pairs.filter_map(|(a, b)| Some((bodies[a].wet?, bodies[b].wet?)));
+            let excluded = Exclusions::new(wet);
+            Box::new(Full::new(full, &scene.walls, excluded, settings.solve)?)
+        }
     };
     let drives: Vec<Drive> = scene
         .bodies
@@ -270,11 +275,7 @@ pub(super) fn assemble(scene: &Scene, settings: &Settings) -> Result<Assembled> 
             None => Drive::Free,
         })
         .collect();
-    let meshes: Vec<_> = surfaces
-        .iter()
-        .map(|s| s.as_ref().map(|s| &s.mesh))
-        .collect();
-    let clearance = Clearance::new(&meshes, &scene.walls, &tree, &drives)?;
+    let clearance = Clearance::new(scene, &surfaces, &tree, &drives)?;
     let system = System {
         bodies,
         drives,
@@ -293,7 +294,7 @@ pub(super) fn assemble(scene: &Scene, settings: &Settings) -> Result<Assembled> 
         v,
         faces,
         sources,
-        gaps: clearance.moving,
+        clearance,
         warnings,
     })
 }
@@ -319,7 +320,7 @@ fn start(
     };
     stepper.place_motions(&mut q, 0.0);
     if settings.fidelity == Fidelity::Full && scene.fluid.density > 0.0 {
-        clearance::refuse_start(clearance, &q, system)?;
+        clearance.refuse_start(&q, system)?;
     }
     let mut v = if scene.initial.v.is_empty() {
         DVector::zeros(system.tree.velocities())

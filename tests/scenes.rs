@@ -194,6 +194,7 @@ fn everything_survives_a_round_trip() {
         Joint::Planar { plane: Plane::Yz },
         Joint::Spherical,
         Joint::Free,
+        Joint::Fixed,
     ];
     let shapes = [
         Shape::sphere(0.1).faces(7),
@@ -202,6 +203,7 @@ fn everything_survives_a_round_trip() {
         Shape::cylinder(0.1, 0.2),
         Shape::capsule(0.1, 0.2).faces(9),
         Shape::mesh("hull.obj"),
+        Shape::prism([[0.0, 0.0], [0.1, 1e-9], [0.0, 1.0 / 3.0]], 0.7).faces(11),
     ];
     for (joint, shape) in joints.into_iter().zip(shapes) {
         let mut identity = [[0.0; 6]; 6];

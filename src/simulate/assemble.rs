@@ -1,17 +1,17 @@
 //! From a scene to a system: meshes, masses, joints, coupling, controller.
 
-use super::clearance::{self, Clearance};
+use super::clearance::Clearance;
 use super::plan::{Planned, plan};
 use super::policy::{Constant, OpenLoop, Pd, PdAxis, PushThenLock};
-use super::wet::{self, Discretisation, Plan, Wet};
+use super::wet::{self, Discretisation, Plan, Water, Wet};
 use super::{Fidelity, Policy, Settings};
 use crate::adjoint::drag::{self, Element, Part};
 use crate::adjoint::lie::{Mat3, Mat6, Pose, Vec3, exp_matrix};
-use crate::coupling::Isolated;
+use crate::coupling::{Exclusions, Isolated};
 use crate::dynamics::{BodyData, Drive, Parameters, Stepper, System};
 use crate::multibody::{self, Tree};
 use crate::scene::{self, Body, Controller, DragPart, Placement, Scene};
-use crate::shape::{self, Gap, Gaps, MassProperties, Other, TriMesh};
+use crate::shape::{self, Gap, MassProperties, Other, TriMesh};
 use crate::{Error, Result};
 use nalgebra::DVector;
 use std::path::Path;
@@ -33,7 +33,7 @@ pub(super) struct Assembled {
     pub resolved: Vec<f64>,
     /// What `Auto` chose, and why.
     pub reasons: Vec<String>,
-    pub gaps: Gaps,
+    pub clearance: Clearance,
     pub warnings: Vec<String>,
 }
 
@@ -69,9 +69,9 @@ fn part(p: DragPart) -> Part {
 }
 
 /// A body's surface in its own frame, with its mass properties.
-struct Surface {
-    mesh: TriMesh,
-    properties: MassProperties,
+pub(super) struct Surface {
+    pub mesh: TriMesh,
+    pub properties: MassProperties,
 }
 
 fn surface(body: &Body, settings: &Settings) -> Result<Option<Surface>> {
@@ -224,11 +224,7 @@ pub(super) fn assemble(
             None => Drive::Free,
         })
         .collect();
-    let meshes: Vec<_> = surfaces
-        .iter()
-        .map(|s| s.as_ref().map(|s| &s.mesh))
-        .collect();
-    let clearance = Clearance::new(&meshes, &scene.walls, &tree, &drives)?;
+    let clearance = Clearance::new(scene, &surfaces, &tree, &drives)?;
     let mut system = System {
         bodies,
         drives,
@@ -244,7 +240,15 @@ pub(super) fn assemble(
         plan,
         reasons,
     } = choose(scene, settings, &system, &q, &clearance, &wet, &of_wet)?;
-    let made = wet::couple(&wet, &scene.walls, settings, fidelity, &plan, folder)?;
+    let number = |b: usize| of_wet.iter().position(|w| *w == b);
+    let declared = scene.overlapping().into_iter();
+    let excluded = Exclusions::new(declared.filter_map(|(a, b)| Some((number(a)?, number(b)?))));
+    let water = Water {
+        walls: &scene.walls,
+        excluded,
+        folder,
+    };
+    let made = wet::couple(&wet, &water, settings, fidelity, &plan)?;
     system.coupling = made.coupling;
     warnings.extend(made.warnings);
     let mut resolved = vec![0.0; scene.bodies.len()];
@@ -263,7 +267,7 @@ pub(super) fn assemble(
         discretisation: made.bodies,
         resolved,
         reasons,
-        gaps: clearance.moving,
+        clearance,
         warnings,
     })
 }
@@ -323,7 +327,7 @@ fn start_coordinates(
     };
     stepper(scene, settings, system, parameters).place_motions(&mut q, 0.0);
     if settings.fidelity != Fidelity::Isolated && scene.fluid.density > 0.0 {
-        clearance::refuse_start(clearance, &q, system)?;
+        clearance.refuse_start(&q, system)?;
     }
     Ok(q)
 }

@@ -7,7 +7,7 @@ use crate::boundary::{BodyBoundary, OneBody, PanelBoundary, Response};
 use crate::coupling::full::{Full, Solver, WetBody};
 use crate::coupling::panel::{self, PanelCoupled};
 use crate::coupling::reduced::{Cutoff, Reduced, ReducedBody, cache, compress};
-use crate::coupling::{Coupling, Isolated};
+use crate::coupling::{Coupling, Exclusions, Isolated};
 use crate::scene::{Shape, Wall};
 use crate::shape::{self, TriMesh};
 use crate::{Error, Result};
@@ -123,20 +123,28 @@ fn name_of(method: OneBody) -> &'static str {
     }
 }
 
+/// What is around the bodies.
+pub(super) struct Water<'a> {
+    pub walls: &'a [Wall],
+    /// Pairs that don't feel each other, by their numbers among the bodies in the water.
+    pub excluded: Exclusions,
+    /// Where compressed bodies are kept.
+    pub folder: Option<&'a Path>,
+}
+
 /// The coupling of `bodies`, with a fidelity that isn't `Auto`.
 pub(super) fn couple(
     bodies: &[Wet],
-    walls: &[Wall],
+    water: &Water,
     settings: &Settings,
     fidelity: Fidelity,
     plan: &Plan,
-    folder: Option<&Path>,
 ) -> Result<Made> {
     match fidelity {
-        Fidelity::Isolated => isolated(bodies, walls, settings),
-        Fidelity::Full if settings.one_body == OneBody::Panel => panels(bodies, walls, settings),
-        Fidelity::Full => full(bodies, walls, settings),
-        Fidelity::Reduced | Fidelity::Auto => reduced(bodies, walls, settings, plan, folder),
+        Fidelity::Isolated => isolated(bodies, water.walls, settings),
+        Fidelity::Full if settings.one_body == OneBody::Panel => panels(bodies, water, settings),
+        Fidelity::Full => full(bodies, water, settings),
+        Fidelity::Reduced | Fidelity::Auto => reduced(bodies, water, settings, plan),
     }
 }
 
@@ -274,7 +282,7 @@ fn once<T>(made: &[Arc<T>], of: impl Fn(&T) -> &[String]) -> Vec<String> {
     distinct.flat_map(|i| of(&made[i]).to_vec()).collect()
 }
 
-fn full(bodies: &[Wet], walls: &[Wall], settings: &Settings) -> Result<Made> {
+fn full(bodies: &[Wet], water: &Water, settings: &Settings) -> Result<Made> {
     if settings.one_body == OneBody::Exact {
         return Err(Error::Unsupported {
             what: "the method exact with the fidelity full".into(),
@@ -308,11 +316,16 @@ fn full(bodies: &[Wet], walls: &[Wall], settings: &Settings) -> Result<Made> {
                 ..Discretisation::empty()
             })
             .collect(),
-        coupling: Box::new(Full::new(made, walls, settings.solve)?),
+        coupling: Box::new(Full::new(
+            made,
+            water.walls,
+            water.excluded.clone(),
+            settings.solve,
+        )?),
     })
 }
 
-fn panels(bodies: &[Wet], walls: &[Wall], settings: &Settings) -> Result<Made> {
+fn panels(bodies: &[Wet], water: &Water, settings: &Settings) -> Result<Made> {
     let made = shared(bodies, |body, mesh| {
         PanelBoundary::new(body.name, mesh.vertices(), mesh.faces())
     })?;
@@ -336,23 +349,19 @@ fn panels(bodies: &[Wet], walls: &[Wall], settings: &Settings) -> Result<Made> {
                 ..Discretisation::empty()
             })
             .collect(),
-        coupling: Box::new(PanelCoupled::new(made, walls, solve)?),
+        coupling: Box::new(
+            PanelCoupled::new(made, water.walls, solve)?.excluding(water.excluded.clone())?,
+        ),
     })
 }
 
-fn reduced(
-    bodies: &[Wet],
-    walls: &[Wall],
-    settings: &Settings,
-    plan: &Plan,
-    folder: Option<&Path>,
-) -> Result<Made> {
+fn reduced(bodies: &[Wet], water: &Water, settings: &Settings, plan: &Plan) -> Result<Made> {
     let mut made: Vec<Arc<ReducedBody>> = Vec::with_capacity(bodies.len());
     let mut methods = Vec::with_capacity(bodies.len());
     for (b, body) in bodies.iter().enumerate() {
         let method = body.method(settings)?;
         let chosen = plan.compress.get(b).copied().unwrap_or(settings.compress);
-        made.push(compressed(body, method, settings, &chosen, folder)?);
+        made.push(compressed(body, method, settings, &chosen, water.folder)?);
         methods.push(name_of(method));
     }
     let cutoff = |a: usize, b: usize| {
@@ -386,7 +395,11 @@ fn reduced(
                 }
             })
             .collect(),
-        coupling: Box::new(Reduced::new(made, walls, cutoff)?.named(names)),
+        coupling: Box::new(
+            Reduced::new(made, water.walls, cutoff)?
+                .excluding(&water.excluded)?
+                .named(names),
+        ),
     })
 }
 

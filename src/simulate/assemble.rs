@@ -7,10 +7,11 @@ use super::wet::{self, Discretisation, Plan, Water, Wet};
 use super::{Fidelity, Policy, Settings};
 use crate::adjoint::drag::{self, Element, Part};
 use crate::adjoint::lie::{Mat3, Mat6, Pose, Vec3, exp_matrix};
+use crate::boundary::OneBody;
 use crate::coupling::{Exclusions, Isolated};
 use crate::dynamics::{BodyData, Drive, Parameters, Stepper, System};
 use crate::multibody::{self, Tree};
-use crate::scene::{self, Body, Controller, DragPart, Placement, Scene};
+use crate::scene::{self, Body, Controller, DragPart, Placement, Scene, Shape};
 use crate::shape::{self, Gap, MassProperties, Other, TriMesh};
 use crate::{Error, Result};
 use nalgebra::DVector;
@@ -71,6 +72,8 @@ fn part(p: DragPart) -> Part {
 /// A body's surface in its own frame, with its mass properties.
 pub(super) struct Surface {
     pub mesh: TriMesh,
+    /// A mesh of about a quarter of the faces, of a shape by formula with flat parts or edges.
+    coarse: Option<TriMesh>,
     pub properties: MassProperties,
 }
 
@@ -80,13 +83,32 @@ fn surface(body: &Body, settings: &Settings) -> Result<Option<Surface>> {
     };
     let at = pose(&body.shape_at);
     let mesh = shape::build(shape, Path::new(""), settings.faces)?.transformed(&at);
-    // Where the water sees the shape itself, so do gravity and buoyancy.
-    let formula = match wet::semi_axes(shape) {
-        Some(_) if settings.by_formula() => MassProperties::by_formula(shape)?,
-        _ => None,
+    let closed = settings.by_formula() && wet::semi_axes(shape).is_some();
+    let panels = settings.fidelity != Fidelity::Full
+        && matches!(settings.one_body, OneBody::Auto | OneBody::Panel);
+    let coarse = if panels && !closed && !matches!(shape, Shape::Mesh { .. }) {
+        let quarter = (mesh.faces().len() / 4).max(12);
+        let coarse = shape::build(shape, Path::new(""), Some(quarter))?.transformed(&at);
+        // Patterns allow only certain numbers.
+        Some(coarse).filter(|c| 2 * c.faces().len() <= mesh.faces().len())
+    } else {
+        None
     };
-    let properties = formula.map_or_else(|| mesh.mass_properties(), |p| p.transformed(&at));
-    Ok(Some(Surface { properties, mesh }))
+    // Where the water sees the shape itself and not a mesh of it, so do gravity and buoyancy.
+    let formula = if closed || coarse.is_some() {
+        MassProperties::by_formula(shape)?
+    } else {
+        None
+    };
+    let properties = match &formula {
+        Some(p) => p.transformed(&at),
+        None => mesh.mass_properties(),
+    };
+    Ok(Some(Surface {
+        properties,
+        mesh,
+        coarse,
+    }))
 }
 
 /// Mass, centre of mass and inertia of a body.
@@ -200,6 +222,7 @@ pub(super) fn assemble(
                 mesh: surface.map(|s| &s.mesh),
                 ellipsoid: (body.shape.as_ref().and_then(wet::semi_axes))
                     .map(|axes| (axes, pose(&body.shape_at))),
+                coarse: surface.and_then(|s| s.coarse.as_ref()),
                 added_mass: (body.added_mass.as_ref())
                     .filter(|_| settings.fidelity == Fidelity::Isolated)
                     .map(|rows| Mat6::from_fn(|i, j| rows[i][j])),

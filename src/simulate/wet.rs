@@ -3,6 +3,7 @@
 use super::{Fidelity, Settings};
 use crate::adjoint::lie::{Mat6, Pose, Vec3};
 use crate::boundary::exact::ExactBoundary;
+use crate::boundary::panel::Extrapolated;
 use crate::boundary::{BodyBoundary, OneBody, PanelBoundary, Response};
 use crate::coupling::full::{Full, Solver, WetBody};
 use crate::coupling::panel::{self, PanelCoupled};
@@ -23,6 +24,8 @@ pub(super) struct Wet<'a> {
     pub mesh: Option<&'a TriMesh>,
     /// The shape by formula and its pose in the body's frame, if it is an ellipsoid.
     pub ellipsoid: Option<([f64; 3], Pose)>,
+    /// A coarser mesh of the shape, where it is one by formula.
+    pub coarse: Option<&'a TriMesh>,
     /// Given added mass at unit density.
     pub added_mass: Option<Mat6>,
 }
@@ -54,6 +57,8 @@ pub struct Discretisation {
     pub resolved_gap: Option<f64>,
     /// Asymmetry of its own added mass before symmetrising.
     pub asymmetry: f64,
+    /// Estimated error of its own added mass, where two meshes tell one.
+    pub added_mass_error: Option<f64>,
     /// Error of the compressed flow of the body itself at points not fitted to, relative.
     pub radiated_error: f64,
     /// Error of the compressed flow scattered between such points, relative.
@@ -110,7 +115,17 @@ impl<'a> Wet<'a> {
                 let b = &settings.boundary;
                 Box::new(BodyBoundary::new(self.name, vertices, faces, b)?)
             }
-            _ => Box::new(PanelBoundary::new(self.name, vertices, faces)?),
+            _ => {
+                let fine = PanelBoundary::new(self.name, vertices, faces)?;
+                match self.coarse {
+                    Some(mesh) => {
+                        let (vertices, faces) = (mesh.vertices(), mesh.faces());
+                        let coarse = PanelBoundary::new(self.name, vertices, faces)?;
+                        Box::new(Extrapolated::new(fine, coarse)?)
+                    }
+                    None => Box::new(fine),
+                }
+            }
         })
     }
 }
@@ -187,6 +202,7 @@ fn isolated(bodies: &[Wet], walls: &[Wall], settings: &Settings) -> Result<Made>
                 method: own.method,
                 faces: own.faces,
                 asymmetry: own.asymmetry,
+                added_mass_error: own.error,
                 ..Discretisation::empty()
             })
             .collect(),
@@ -204,6 +220,7 @@ struct Own {
     method: &'static str,
     faces: usize,
     asymmetry: f64,
+    error: Option<f64>,
     warnings: Vec<String>,
 }
 
@@ -226,6 +243,7 @@ fn own(body: &Wet, settings: &Settings) -> Result<Own> {
             method: "given",
             faces: 0,
             asymmetry: 0.0,
+            error: None,
             warnings: Vec::new(),
         });
     }
@@ -242,6 +260,7 @@ fn own(body: &Wet, settings: &Settings) -> Result<Own> {
         method: name_of(method),
         faces,
         asymmetry: response.asymmetry(),
+        error: response.error(),
         warnings: response.warnings().to_vec(),
     })
 }
@@ -256,6 +275,7 @@ impl Discretisation {
             points: 0,
             resolved_gap: None,
             asymmetry: 0.0,
+            added_mass_error: None,
             radiated_error: 0.0,
             scattered_error: 0.0,
         }
@@ -390,6 +410,7 @@ fn reduced(bodies: &[Wet], water: &Water, settings: &Settings, plan: &Plan) -> R
                     points: m.points(),
                     resolved_gap: Some(fit.resolved_gap),
                     asymmetry: fit.body_asymmetry,
+                    added_mass_error: fit.body_error,
                     radiated_error: fit.radiated,
                     scattered_error: fit.scattered,
                 }
@@ -482,6 +503,11 @@ fn compressed(
     let round = |x: f64| (x / size * GRID).round() / GRID;
     let vertices: Vec<Vec3> = mesh.vertices().iter().map(|v| v.map(round)).collect();
     let unit = TriMesh::new(mesh.name(), vertices, mesh.faces().to_vec())?;
+    let coarse = body.coarse.filter(|_| method == OneBody::Panel).map(|m| {
+        let vertices = m.vertices().iter().map(|v| v.map(round)).collect();
+        TriMesh::new(m.name(), vertices, m.faces().to_vec())
+    });
+    let coarse = coarse.transpose()?;
     let ellipsoid = body.ellipsoid.filter(|_| method == OneBody::Exact);
     let ellipsoid = ellipsoid.map(|(axes, pose)| {
         let at = Pose::new(pose.rotation, pose.translation.map(round));
@@ -500,13 +526,19 @@ fn compressed(
         (axes, turn, <[f64; 3]>::from(pose.translation))
     });
     let fundamental = (method == OneBody::Mfs).then_some(settings.boundary);
-    let made_from = (method, formula, fundamental);
+    let made_from = (
+        method,
+        formula,
+        fundamental,
+        coarse.as_ref().map(|m| m.faces().len()),
+    );
     let key = cache::Key::new(unit.vertices(), unit.faces(), &made_from, &chosen);
     let found = cache::fetch(key, folder, || {
         let own = Wet {
             name: body.name,
             mesh: Some(&unit),
             ellipsoid,
+            coarse: coarse.as_ref(),
             added_mass: None,
         };
         let gap = chosen

@@ -19,6 +19,7 @@
 //! J. L. Hess, A. M. O. Smith, Prog. Aerosp. Sci. 8 (1967) 1–138 (panels); L. Morino, C.-C. Kuo, AIAA
 //! J. 12 (1974) 191–197 (the direct form).
 
+mod extrapolated;
 mod layers;
 mod response;
 pub mod richardson;
@@ -28,6 +29,7 @@ use crate::adjoint::kernel::Write;
 use crate::adjoint::lie::{Mat6, Vec3, Vec6};
 use crate::solver::Lu;
 use crate::{Error, Result};
+pub use extrapolated::Extrapolated;
 use faer::Mat;
 pub(crate) use layers::Panels;
 pub use richardson::{Richardson, richardson};

@@ -63,7 +63,7 @@ fn exact_prism(shape: &Shape) -> (f64, Vec3, nalgebra::Matrix3<f64>) {
 #[test]
 fn prisms_are_closed_and_symmetric_at_any_resolution() {
     for text in PRISMS {
-        for target in [1, 4, 13, 20, 100, 321, 1280, 5000, 60_000] {
+        for target in [1, 4, 13, 20, 100, 321, 1280, 5000, 20_000] {
             let mesh = mesh(text, target);
             let report = check(&mesh);
             assert!(report.is_ok(), "{report}");
@@ -117,7 +117,7 @@ fn prisms_have_even_faces_and_nearly_as_many_as_asked() {
                 uneven = [uneven[0].min(least / mean), uneven[1].max(most / mean)];
             }
             (worst, off) = (worst.max(aspect), off.max(miss));
-            target *= 1.13;
+            target *= 1.21;
         }
         println!(
             "{text}: aspect up to {worst:.2}, {:.1} % off the target, areas {uneven:.2?} of the mean",

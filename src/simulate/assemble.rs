@@ -360,7 +360,7 @@ fn start_velocity(
     }
     if !scene.initial.momentum.is_empty() {
         let stepper = stepper(scene, settings, system, parameters);
-        let e = stepper.evaluate(q, false)?;
+        let e = system.evaluate(parameters, q, false, false)?;
         let p = DVector::from_vec(scene.initial.momentum.clone());
         v = stepper.velocity_of_momentum(&e, &p)?;
     }

@@ -290,7 +290,9 @@ impl Simulator {
         let stepper = self.stepper();
         let mut q = self.assembled.q.clone();
         stepper.place_motions(&mut q, 0.0);
-        let e = self.system().evaluate(self.parameters(), &q, false, false)?;
+        let e = self
+            .system()
+            .evaluate(self.parameters(), &q, false, false)?;
         let state = State {
             step: 0,
             y: stepper.conserved(&e, &self.assembled.v),

@@ -98,6 +98,19 @@ pub(crate) fn readable(time: f64) -> f64 {
 }
 
 impl Error {
+    /// The same, for lengths that were given in units of `size` m.
+    pub(crate) fn in_units_of(mut self, size: f64) -> Self {
+        match &mut self {
+            Self::Input { expected: said, .. }
+            | Self::Mesh { remedy: said, .. }
+            | Self::Unresolved { remedy: said, .. } => {
+                said.push_str(&format!(" (lengths here in units of {size:.3e} m)"));
+            }
+            _ => {}
+        }
+        self
+    }
+
     /// An [`Error::Input`] from its three parts.
     pub fn input(
         place: impl Into<String>,

@@ -56,8 +56,10 @@ fn ellipsoids() -> Scene {
 #[test]
 fn momentum_is_kept_to_rounding() {
     let scene = ellipsoids();
-    for integrator in MOMENTUM_FORMS {
-        let simulator = simulator(&scene, Fidelity::Full, integrator);
+    let full = MOMENTUM_FORMS.map(|i| (Fidelity::Full, i));
+    let reduced = MOMENTUM_FORMS.map(|i| (Fidelity::Reduced, i));
+    for (fidelity, integrator) in full.into_iter().chain(reduced) {
+        let simulator = simulator(&scene, fidelity, integrator);
         let rollout = simulator
             .rollout(&Controls::zeros(&simulator, 1000))
             .unwrap();
@@ -80,9 +82,19 @@ fn momentum_is_kept_to_rounding() {
         // The bodies do exchange momentum meanwhile, and turn.
         let (first, last) = (&rollout.samples()[0], &rollout.samples()[1000]);
         let turned = (first.poses[0].rotation - last.poses[0].rotation).norm();
-        println!("{integrator:?}: momentum drift {drift:.1e}, turned {turned:.2}");
+        println!("{fidelity:?} {integrator:?}: momentum drift {drift:.1e}, turned {turned:.2}");
         assert!(turned > 0.5);
         assert!(drift <= 1e-12, "{integrator:?}: {drift:e}");
+    }
+}
+
+#[test]
+fn energy_of_two_tumbling_ellipsoids_is_kept_by_rk4() {
+    for fidelity in [Fidelity::Reduced, Fidelity::Auto] {
+        let simulator = simulator(&ellipsoids(), fidelity, Integrator::Rk4);
+        let [first, last] = energy_errors(&simulator, 200);
+        println!("{fidelity:?}: {first:.1e} {last:.1e}");
+        assert!(first.max(last) <= 1e-7, "{fidelity:?}: {first:e} {last:e}");
     }
 }
 
@@ -171,12 +183,19 @@ fn linked() -> Scene {
 #[test]
 fn integrators_converge_at_their_orders() {
     let scene = linked();
+    for fidelity in [Fidelity::Full, Fidelity::Reduced] {
+        orders(&scene, fidelity);
+    }
+}
+
+fn orders(scene: &Scene, fidelity: Fidelity) {
     let end = |integrator, steps: usize| {
         let settings = Settings::default()
+            .fidelity(fidelity)
             .integrator(integrator)
             .tolerance(1e-13)
             .time_step(0.1 / steps as f64);
-        let simulator = Simulator::new(&scene, settings).unwrap();
+        let simulator = Simulator::new(scene, settings).unwrap();
         let last = samples(&simulator, steps).pop().unwrap();
         (last.q, last.v)
     };
@@ -222,7 +241,7 @@ fn neutrally_buoyant_bodies_at_rest_have_no_acceleration() {
     scene.bodies[1].density = Some(998.0);
     scene.bodies[0].placement.rotation = [0.3, -0.5, 0.2];
     scene.initial.v.clear();
-    for fidelity in [Fidelity::Isolated, Fidelity::Full] {
+    for fidelity in [Fidelity::Isolated, Fidelity::Reduced, Fidelity::Full] {
         let simulator = simulator(&scene, fidelity, Integrator::default());
         let (q, v) = simulator.start();
         let stepper = simulator.stepper();
@@ -244,6 +263,7 @@ fn bodies_at_rest_stay_at_rest() {
     scene.controller = None;
     // Quaternions are normalised again in every step.
     stays(&scene, Fidelity::Isolated, 1e-15);
+    stays(&scene, Fidelity::Reduced, 1e-15);
     stays(&scene, Fidelity::Full, 1e-15);
     // In a current that the bodies go with, the water is at rest around them.
     let mut scene = ellipsoids();
@@ -302,7 +322,7 @@ fn a_ball_in_vacuum_falls_as_galilei_says() {
     scene.add(Body::new(Shape::sphere(0.1).faces(80)).mass(2.0));
     scene.initial.v = vec![0.5, 0.0, 1.0, 1.0, 2.0, 3.0];
     let t = 1.0_f64;
-    for fidelity in [Fidelity::Isolated, Fidelity::Full] {
+    for fidelity in [Fidelity::Isolated, Fidelity::Reduced, Fidelity::Full] {
         for integrator in INTEGRATORS {
             let simulator = simulator(&scene, fidelity, integrator);
             let s = samples(&simulator, 100);
@@ -337,7 +357,7 @@ fn joints_work_without_water() {
         body.density = None;
     }
     scene.controller = None;
-    for fidelity in [Fidelity::Isolated, Fidelity::Full] {
+    for fidelity in [Fidelity::Isolated, Fidelity::Reduced, Fidelity::Full] {
         let s = samples(&simulator(&scene, fidelity, Integrator::Rk4), 30);
         let change = s[30].momentum - s[0].momentum;
         let energy = (s[30].energy() / s[0].energy() - 1.0).abs();

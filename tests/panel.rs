@@ -1,10 +1,15 @@
-//! The panel method against exact values.
+//! One body by the panel method, against exact values.
+//! `cargo test --release --test panel -- --ignored --nocapture` prints the table of `docs/accuracy.md`.
 
+use faer::Mat;
+use hydrograd::Error;
 use hydrograd::adjoint::lie::{Mat6, Vec3};
+use hydrograd::boundary::panel::{MOST_FACES, richardson};
 use hydrograd::boundary::{PanelBoundary, Response};
 use hydrograd::scene::Shape;
+use std::collections::HashMap;
+use std::f64::consts::PI;
 use std::path::Path;
-use std::time::Instant;
 
 type Mesh = (Vec<Vec3>, Vec<[usize; 3]>);
 
@@ -25,46 +30,437 @@ fn build(mesh: &Mesh) -> PanelBoundary {
     PanelBoundary::new("body", &mesh.0, &mesh.1).unwrap()
 }
 
+/// Carlson's R_D by duplication: ³⁄₂ ∫ dt / (√(t+x) √(t+y) (t+z)^{3/2}).
+fn carlson(mut x: f64, mut y: f64, mut z: f64) -> f64 {
+    let (mut sum, mut power) = (0.0, 1.0);
+    for _ in 0..60 {
+        let (a, b, c) = (x.sqrt(), y.sqrt(), z.sqrt());
+        let lambda = a * b + b * c + c * a;
+        sum += 3.0 * power / (c * (z + lambda));
+        power *= 0.25;
+        (x, y, z) = ((x + lambda) / 4.0, (y + lambda) / 4.0, (z + lambda) / 4.0);
+    }
+    sum + power / (z * z.sqrt())
+}
+
+/// Added mass of an ellipsoid, translation along and rotation about its axes, density 1 (Lamb 1932, §114, §115).
+fn lamb(s: [f64; 3]) -> [f64; 6] {
+    let q = s.map(|a| a * a);
+    let volume = 4.0 / 3.0 * PI * s[0] * s[1] * s[2];
+    let of =
+        |i: usize, j: usize, k: usize| 2.0 / 3.0 * s[0] * s[1] * s[2] * carlson(q[j], q[k], q[i]);
+    let alpha = [of(0, 1, 2), of(1, 2, 0), of(2, 0, 1)];
+    std::array::from_fn(|i| {
+        if i < 3 {
+            return volume * alpha[i] / (2.0 - alpha[i]);
+        }
+        let (j, k) = ((i + 1) % 3, (i + 2) % 3);
+        let (difference, alphas) = (q[j] - q[k], alpha[k] - alpha[j]);
+        if difference == 0.0 {
+            return 0.0;
+        }
+        let below = 2.0 * difference - (q[j] + q[k]) * alphas;
+        volume / 5.0 * difference * difference * alphas / below
+    })
+}
+
+/// Largest relative error of the diagonal, where the exact value isn't 0.
+fn worst(m: &Mat6, exact: &[f64; 6]) -> f64 {
+    (0..6)
+        .filter(|i| exact[*i] > 0.0)
+        .map(|i| (m[(i, i)] / exact[i] - 1.0).abs())
+        .fold(0.0, f64::max)
+}
+
+/// Directions spread over the sphere.
+fn directions(n: usize) -> Vec<Vec3> {
+    let at = |i: usize| {
+        let z = 1.0 - (2 * i + 1) as f64 / n as f64;
+        let (angle, r) = (2.399_963_229_728_653 * i as f64, (1.0 - z * z).sqrt());
+        Vec3::new(r * angle.cos(), r * angle.sin(), z)
+    };
+    (0..n).map(at).collect()
+}
+
+fn relative(a: &Mat<f64>, b: &Mat<f64>) -> f64 {
+    (a - b).norm_l2() / b.norm_l2()
+}
+
 #[test]
-fn probe() {
-    for (s, n) in [
-        ([1.0; 3], 320),
-        ([1.0; 3], 1280),
-        ([1.0; 3], 5120),
-        ([1.0, 0.2, 1.0], 1280),
-        ([1.0, 1.0, 0.1], 1280),
-        ([1.0, 1.0, 0.03], 1280),
+fn lamb_by_carlson() {
+    let known = [0.0313338533441, 0.0313338533441, 2.5904017967];
+    let found = lamb([1.0, 1.0, 0.1]);
+    assert!((0..3).all(|i| (found[i] / known[i] - 1.0).abs() < 1e-10));
+    assert!((found[3] / 0.340341498576 - 1.0).abs() < 1e-10);
+    assert!((lamb([1.0; 3])[0] / 2.09439510239 - 1.0).abs() < 1e-10);
+}
+
+#[test]
+fn sphere_and_ellipsoids() {
+    let ball = build(&ellipsoid([1.0; 3], 1280));
+    let error = ball.added_mass[(0, 0)] / (2.0 * PI / 3.0) - 1.0;
+    assert!((error + 0.0051).abs() < 1e-4, "{error}");
+    assert!(ball.condition < 2.1, "{}", ball.condition);
+    for (s, translation, rotation, condition) in [
+        ([1.0, 0.5, 1.0], 0.006, 0.013, 2.2),
+        ([1.0, 0.2, 1.0], 0.006, 0.012, 4.1),
+        ([1.0, 1.0, 0.1], 0.007, 0.009, 7.4),
+        ([1.0, 1.0, 0.03], 0.022, 0.010, 23.0),
+        ([3.0, 2.0, 1.0], 0.006, 0.014, 2.5),
+        ([5.0, 1.0, 1.0], 0.006, 0.014, 4.0),
     ] {
-        let t = Instant::now();
-        let m = ellipsoid(s, n);
-        let b = build(&m);
-        println!(
-            "{s:?} {n} {:?} diag {:?} asym {:.2e} cond {:.2}",
-            t.elapsed(),
-            b.added_mass.diagonal().as_slice(),
-            b.asymmetry,
-            b.condition
+        let b = build(&ellipsoid(s, 1280));
+        let exact = lamb(s);
+        let [x, y, z, ..] = exact;
+        let moved = worst(&b.added_mass, &[x, y, z, 0.0, 0.0, 0.0]);
+        let turned = worst(
+            &b.added_mass,
+            &[0.0, 0.0, 0.0, exact[3], exact[4], exact[5]],
         );
-        if s == [1.0; 3] {
-            println!(
-                "   error {:.4}%",
-                100.0 * (b.added_mass[(0, 0)] / 2.0943951023931957 - 1.0)
-            );
+        assert!(moved < translation, "{s:?}: {moved}");
+        assert!(turned < rotation, "{s:?}: {turned}");
+        assert!(b.condition < condition, "{s:?}: {}", b.condition);
+        assert!(b.asymmetry < 1e-9, "{s:?}: {:e}", b.asymmetry);
+        assert!(b.warnings.is_empty(), "{:?}", b.warnings);
+    }
+}
+
+#[test]
+fn second_order_and_extrapolation() {
+    let exact = lamb([1.0; 3]);
+    let meshes = [320, 1280, 5120].map(|n| build(&ellipsoid([1.0; 3], n)));
+    let errors = meshes.each_ref().map(|b| worst(&b.added_mass, &exact));
+    for pair in errors.windows(2) {
+        let fall = pair[0] / pair[1];
+        assert!(fall > 3.8 && fall < 4.2, "{errors:?}");
+    }
+    for (i, left) in [(1, 1e-4), (2, 2e-5)] {
+        let r = richardson(&meshes[i], &meshes[i - 1]).unwrap();
+        assert_eq!(r.order, 2.0);
+        assert!((r.ratio - 2.0).abs() < 0.02, "{}", r.ratio);
+        // The fine mesh's error is told to a tenth, that of the extrapolated value from above.
+        assert!((r.fine_error / errors[i] - 1.0).abs() < 0.1, "{r:?}");
+        let error = worst(&r.added_mass, &exact);
+        assert!(error < left && error < r.error, "{error:e} {r:?}");
+    }
+    // Meshes alike say nothing.
+    let error = richardson(&meshes[1], &meshes[1]).unwrap_err();
+    assert!(matches!(error, Error::Input { .. }), "{error}");
+    assert!(error.to_string().contains("1280"), "{error}");
+}
+
+#[test]
+fn extrapolation_of_thin_and_sharp_bodies() {
+    for s in [[1.0, 0.2, 1.0], [1.0, 1.0, 0.1], [3.0, 2.0, 1.0]] {
+        let (fine, coarse) = (build(&ellipsoid(s, 1280)), build(&ellipsoid(s, 320)));
+        let r = richardson(&fine, &coarse).unwrap();
+        let (exact, order) = (lamb(s), r.order);
+        assert_eq!(order, 2.0, "{s:?}");
+        let (before, after) = (
+            worst(&fine.added_mass, &exact),
+            worst(&r.added_mass, &exact),
+        );
+        assert!(before < 1.2 * r.fine_error, "{s:?} {before} {r:?}");
+        assert!(
+            after < r.error && after < 0.15 * before,
+            "{s:?} {after} {r:?}"
+        );
+    }
+    // Boxes: graded meshes of up to 6400 faces, extrapolated.
+    for (size, exact, left) in [
+        (
+            [1.0; 3],
+            [0.6384, 0.6384, 0.6384, 0.0393, 0.0393, 0.0393],
+            0.012,
+        ),
+        (
+            [1.0, 0.4, 0.7],
+            [0.09596, 0.3460, 0.1497, 0.00616, 0.00828, 0.01549],
+            0.012,
+        ),
+    ] {
+        let shape = Shape::Box { size, faces: None };
+        let of = |faces: usize| build(&mesh(&shape, faces));
+        let (fine, coarse) = (of(1280), of(320));
+        let r = richardson(&fine, &coarse).unwrap();
+        assert_eq!(r.order, 4.0 / 3.0);
+        let (before, after) = (
+            worst(&fine.added_mass, &exact),
+            worst(&r.added_mass, &exact),
+        );
+        assert!(before < r.fine_error && before < 0.05, "{before} {r:?}");
+        assert!(after < r.error && after < left, "{after} {r:?}");
+    }
+}
+
+#[test]
+fn boxes_and_cylinders() {
+    for (shape, faces) in [
+        (
+            Shape::Box {
+                size: [1.0, 0.1, 0.6],
+                faces: None,
+            },
+            600,
+        ),
+        (
+            Shape::Cylinder {
+                radius: 0.06,
+                length: 1.8,
+                faces: None,
+            },
+            600,
+        ),
+        (
+            Shape::Capsule {
+                radius: 0.3,
+                length: 0.4,
+                faces: None,
+            },
+            300,
+        ),
+        (
+            Shape::Box {
+                size: [1.0; 3],
+                faces: None,
+            },
+            12,
+        ),
+    ] {
+        // About another origin, so that nothing vanishes by symmetry.
+        let (v, f) = mesh(&shape, faces);
+        let b = build(&(v.iter().map(|x| x + Vec3::new(0.2, -0.3, 0.1)).collect(), f));
+        assert!(b.added_mass.iter().all(|x| x.is_finite()));
+        assert_eq!(b.added_mass, b.added_mass.transpose());
+        let least = b.added_mass.symmetric_eigenvalues().min();
+        assert!(least > -1e-3 * b.added_mass.diagonal().max(), "{least}");
+        assert!(
+            b.asymmetry.is_finite() && b.asymmetry < 0.02,
+            "{}",
+            b.asymmetry
+        );
+        assert!(b.condition < 20.0, "{}", b.condition);
+    }
+    // Sheared, without any symmetry.
+    let (v, f) = ellipsoid([0.5, 0.3, 0.2], 320);
+    let sheared = |x: &Vec3| Vec3::new(x.x + 0.4 * x.y, x.y + 0.2 * x.z * x.x, x.z);
+    let b = build(&(v.iter().map(sheared).collect(), f));
+    assert!(b.asymmetry > 1e-6 && b.asymmetry < 0.01, "{}", b.asymmetry);
+}
+
+#[test]
+fn any_length_and_any_thread_count() {
+    let (v, f) = mesh(
+        &Shape::Box {
+            size: [1.0, 0.4, 0.7],
+            faces: None,
+        },
+        300,
+    );
+    let unit = build(&(v.clone(), f.clone()));
+    for scale in [1e-3, 1e3] {
+        let b = build(&(v.iter().map(|x| x * scale).collect(), f.clone()));
+        for i in 0..6 {
+            let power = if i < 3 { 3 } else { 5 };
+            let same = b.added_mass[(i, i)] / scale.powi(power) / unit.added_mass[(i, i)];
+            assert!((same - 1.0).abs() < 1e-12, "{scale}: {same}");
         }
-        if n > 2000 {
-            continue;
+    }
+    let points: Vec<Vec3> = directions(70).iter().map(|d| d * 1.3).collect();
+    let answers = |threads: usize| {
+        let pool = rayon::ThreadPoolBuilder::new().num_threads(threads);
+        pool.build().unwrap().install(|| {
+            let b = build(&(v.clone(), f.clone()));
+            let radiated = b.radiated(&points).unwrap();
+            let scattered = b.scattered(&points, &points).unwrap();
+            (b.added_mass, b.condition.to_bits(), radiated, scattered)
+        })
+    };
+    let (one, two) = (answers(1), answers(2));
+    assert!(one == two);
+}
+
+#[test]
+fn a_moving_sphere_is_a_dipole() {
+    let b = build(&ellipsoid([1.0; 3], 1280));
+    for (distance, limit) in [(1.05, 0.02), (1.2, 0.009), (2.0, 0.008), (100.0, 0.008)] {
+        let points: Vec<Vec3> = directions(40).iter().map(|d| d * distance).collect();
+        let found = b.radiated(&points).unwrap();
+        // φ = u·x / 2r³, and nothing from turning.
+        let exact = Mat::from_fn(40, 6, |i, k| match k < 3 {
+            true => 0.5 * points[i][k] / distance.powi(3),
+            false => 0.0,
+        });
+        let error = relative(&found, &exact);
+        assert!(error < limit, "{distance}: {error}");
+    }
+}
+
+/// Potential that a rigid unit sphere at the origin adds to that of a unit source at y, seen at x.
+fn sphere_series(x: &Vec3, y: &Vec3) -> f64 {
+    let r = x.norm() * y.norm();
+    let c = x.dot(y) / r;
+    let (mut before, mut legendre) = (1.0, c);
+    let (mut power, mut sum) = (1.0 / r, 0.0);
+    for l in 1..400 {
+        let l = f64::from(l);
+        power /= r;
+        sum += l / (l + 1.0) * power * legendre;
+        (before, legendre) = (
+            legendre,
+            ((2.0 * l + 1.0) * c * legendre - l * before) / (l + 1.0),
+        );
+    }
+    sum
+}
+
+#[test]
+fn a_sphere_in_the_flow_of_a_source() {
+    let b = build(&ellipsoid([1.0; 3], 1280));
+    for (gap, limit, reciprocity) in [(0.2, 0.022, 6e-4), (0.5, 0.009, 1e-4), (1.0, 0.0075, 1e-5)] {
+        let points: Vec<Vec3> = directions(50).iter().map(|d| d * (1.0 + gap)).collect();
+        let found = b.scattered(&points, &points).unwrap();
+        let exact = Mat::from_fn(50, 50, |i, j| sphere_series(&points[i], &points[j]));
+        let error = relative(&found, &exact);
+        assert!(error < limit, "{gap}: {error}");
+        let asymmetry = relative(&found, &found.transpose().to_owned());
+        assert!(asymmetry < reciprocity, "{gap}: {asymmetry:e}");
+    }
+    // Fewer points than sources, and none.
+    let points: Vec<Vec3> = directions(5).iter().map(|d| d * 1.7).collect();
+    let found = b.scattered(&points, &points[..2]).unwrap();
+    assert_eq!((found.nrows(), found.ncols()), (2, 5));
+    let none = b.scattered(&[], &points).unwrap();
+    assert_eq!((none.nrows(), none.ncols()), (5, 0));
+    assert_eq!(b.radiated(&[]).unwrap().nrows(), 0);
+}
+
+#[test]
+fn bad_surfaces_are_errors() {
+    let (v, f) = ellipsoid([1.0; 3], 80);
+    let refused = |v: &[Vec3], f: &[[usize; 3]]| {
+        let error = PanelBoundary::new("bad", v, f).unwrap_err();
+        assert!(matches!(error, Error::Mesh { .. }), "{error}");
+        assert!(error.to_string().contains("bad"), "{error}");
+    };
+    refused(&[], &[]);
+    refused(&v, &f[1..]);
+    let inward: Vec<_> = f.iter().map(|t| [t[0], t[2], t[1]]).collect();
+    refused(&v, &inward);
+    let mut broken = v.clone();
+    broken[3].x = f64::NAN;
+    refused(&broken, &f);
+    let mut one = f.clone();
+    one[0].swap(0, 1);
+    refused(&v, &one);
+    let many = vec![[0, 1, 2]; MOST_FACES + 2];
+    let error = PanelBoundary::new("large", &v, &many).unwrap_err();
+    assert!(matches!(error, Error::Unsupported { .. }), "{error}");
+    let text = error.to_string();
+    assert!(
+        text.contains("large") && text.contains("20002") && text.contains("GB"),
+        "{text}"
+    );
+}
+
+/// A box whose cells shrink towards the edges with the square of the distance, `cells` along each
+/// axis; diagonals mirror each other.
+fn graded(size: [f64; 3], cells: [usize; 3]) -> Mesh {
+    let place = |axis: usize, i: usize| {
+        let t = 2.0 * i as f64 / cells[axis] as f64 - 1.0;
+        0.5 * size[axis] * t.signum() * (1.0 - (1.0 - t.abs()).powi(2))
+    };
+    let (mut vertices, mut faces) = (Vec::new(), Vec::new());
+    let mut known = HashMap::new();
+    for a in 0..3 {
+        let (b, c) = ((a + 1) % 3, (a + 2) % 3);
+        for side in [0, cells[a]] {
+            for (i, j) in (0..cells[b]).flat_map(|i| (0..cells[c]).map(move |j| (i, j))) {
+                let q = [(i, j), (i + 1, j), (i + 1, j + 1), (i, j + 1)].map(|(i, j)| {
+                    let mut at = [side; 3];
+                    (at[b], at[c]) = (i, j);
+                    *known.entry(at).or_insert_with(|| {
+                        vertices.push(Vec3::from(std::array::from_fn(|k| place(k, at[k]))));
+                        vertices.len() - 1
+                    })
+                });
+                let k = usize::from((2 * i < cells[b]) != (2 * j < cells[c]));
+                for t in [[k, k + 1, k + 2], [k, k + 2, (k + 3) % 4]] {
+                    let [x, y, z] = t.map(|i| q[i]);
+                    faces.push(if side == 0 { [x, z, y] } else { [x, y, z] });
+                }
+            }
         }
-        let p = [
-            Vec3::new(0.3, -1.8, 1.5),
-            Vec3::new(1.7, 0.4, 0.9),
-            Vec3::new(0.2, 1.4, 0.6),
-        ];
-        let r = b.radiated(&p).unwrap();
-        for i in 0..3 {
-            let d = p[i][0] / (2.0 * p[i].norm().powi(3));
-            println!("   radiated {} dipole {}", r[(i, 0)], d);
+    }
+    (vertices, faces)
+}
+
+#[test]
+fn edges_want_small_faces() {
+    let exact = [0.6384, 0.6384, 0.6384, 0.0393, 0.0393, 0.0393];
+    let cube = Shape::Box {
+        size: [1.0; 3],
+        faces: None,
+    };
+    let even = build(&mesh(&cube, 768));
+    let fine = build(&graded([1.0; 3], [8; 3]));
+    let (even, fine) = (
+        worst(&even.added_mass, &exact),
+        worst(&fine.added_mass, &exact),
+    );
+    assert!(fine < 0.02 && fine < 0.4 * even, "{fine} {even}");
+}
+
+/// Prints the tables of `docs/accuracy.md`.
+#[test]
+#[ignore = "minutes; prints tables"]
+fn tables() {
+    let cells = |m: &Mat6, exact: &[f64; 6]| -> String {
+        let cell = |i: usize| match exact[i] {
+            0.0 => "–".to_string(),
+            e => format!("{:.2}", 100.0 * (m[(i, i)] / e - 1.0)),
+        };
+        (0..6).map(cell).collect::<Vec<_>>().join(" | ")
+    };
+    for s in [
+        [1.0; 3],
+        [1.0, 0.5, 1.0],
+        [1.0, 0.2, 1.0],
+        [1.0, 0.1, 1.0],
+        [1.0, 0.03, 1.0],
+        [4.0, 2.0, 0.5],
+        [5.0, 1.0, 1.0],
+        [3.0, 2.0, 1.0],
+    ] {
+        let (exact, mut last) = (lamb(s), None);
+        for faces in [320, 1280, 5120] {
+            let b = build(&ellipsoid(s, faces));
+            let row = cells(&b.added_mass, &exact);
+            println!("| {s:?} | {faces} | {row} | {:.1} |", b.condition);
+            if let Some(coarse) = &last {
+                let r = richardson(&b, coarse).unwrap();
+                let (before, after) = (100.0 * r.fine_error, 100.0 * r.error);
+                let row = cells(&r.added_mass, &exact);
+                println!("| {s:?} | extrapolated | {row} | estimates {before:.2}, {after:.2} |");
+            }
+            last = Some(b);
         }
-        let s = b.scattered(&p, &p).unwrap();
-        println!("   scattered {s:?}");
+    }
+    for (size, base) in [
+        ([1.0; 3], [4; 3]),
+        ([1.0, 0.1, 1.0], [6, 2, 6]),
+        ([1.0, 0.4, 0.7], [6, 4, 4]),
+    ] {
+        let mut last: Option<Mat6> = None;
+        for k in [3, 4, 5] {
+            let m = build(&graded(size, base.map(|n| n * k))).added_mass;
+            println!("{size:?} graded {k}: {:.6?}", m.diagonal().as_slice());
+            if let Some(coarse) = last {
+                let ratio = k as f64 / (k - 1) as f64;
+                let better = m + (m - coarse) / (ratio * ratio - 1.0);
+                println!("extrapolated: {:.6?}", better.diagonal().as_slice());
+            }
+            last = Some(m);
+        }
     }
 }

@@ -1,8 +1,9 @@
-//! Gradients of whole rollouts against central differences: every integrator, both fidelities,
+//! Gradients of whole rollouts against central differences: every integrator, every fidelity,
 //! every kind of joint.
 
 use hydrograd::dynamics::Integrator;
-use hydrograd::scene::{BodyId, Scene};
+use hydrograd::scene::{Body, BodyId, Fluid, Joint, Plane, Scene, Shape};
+use hydrograd::simulate::Sample;
 use hydrograd::simulate::gradcheck::{self, gradcheck};
 use hydrograd::{Controls, Fidelity, Settings, Simulator, objective};
 use nalgebra::DVector;
@@ -14,6 +15,13 @@ const INTEGRATORS: [Integrator; 5] = [
     Integrator::Rk2,
     Integrator::Rk4,
     Integrator::VelocityEuler,
+];
+
+const FIDELITIES: [Fidelity; 4] = [
+    Fidelity::Isolated,
+    Fidelity::Reduced,
+    Fidelity::Auto,
+    Fidelity::Full,
 ];
 
 fn check(scene: &Scene, fidelity: Fidelity, integrator: Integrator, steps: usize, faces: usize) {
@@ -55,7 +63,7 @@ fn scene(name: &str) -> Scene {
 #[test]
 fn kirchhoff_ellipsoid() {
     for integrator in INTEGRATORS {
-        for fidelity in [Fidelity::Isolated, Fidelity::Full] {
+        for fidelity in FIDELITIES {
             check(&scene("kirchhoff_ellipsoid"), fidelity, integrator, 10, 80);
         }
     }
@@ -64,7 +72,7 @@ fn kirchhoff_ellipsoid() {
 #[test]
 fn coins() {
     for integrator in INTEGRATORS {
-        for fidelity in [Fidelity::Isolated, Fidelity::Full] {
+        for fidelity in FIDELITIES {
             check(&scene("coins"), fidelity, integrator, 8, 80);
         }
     }
@@ -73,7 +81,7 @@ fn coins() {
 #[test]
 fn falling_ball() {
     for integrator in INTEGRATORS {
-        for fidelity in [Fidelity::Isolated, Fidelity::Full] {
+        for fidelity in FIDELITIES {
             check(&scene("falling_ball"), fidelity, integrator, 20, 80);
         }
     }
@@ -82,9 +90,53 @@ fn falling_ball() {
 #[test]
 fn falling_ball_for_a_hundred_steps() {
     for integrator in INTEGRATORS {
-        for fidelity in [Fidelity::Isolated, Fidelity::Full] {
+        for fidelity in FIDELITIES {
             check(&scene("falling_ball"), fidelity, integrator, 100, 20);
         }
+    }
+}
+
+/// A pair that comes into the range where it is coupled and leaves it again: state, energy and
+/// gradient go on smoothly.
+#[test]
+fn a_pair_that_comes_and_goes() {
+    let mut scene = Scene::new(Fluid::fresh_water());
+    let ball = |x: f64, y: f64| {
+        Body::new(Shape::sphere(0.1))
+            .density(1200.0)
+            .at([x, y, 0.0])
+            .joint(Joint::Planar { plane: Plane::Xy })
+    };
+    scene.add(ball(0.0, 0.0).named("near"));
+    scene.add(ball(1.3, 0.28).named("far"));
+    scene.initial.v = vec![1.0, 0.0, 0.0, -1.0, 0.0, 0.0];
+    scene.time_step = 0.01;
+    let settings = Settings::default()
+        .fidelity(Fidelity::Auto)
+        .integrator(Integrator::Rk4)
+        .accuracy(0.03);
+    let simulator = Simulator::new(&scene, settings).unwrap();
+    let reasons = simulator.reasons().join("; ");
+    assert!(reasons.contains("not at all from"), "{reasons}");
+    let steps = 130;
+    let rollout = simulator
+        .rollout(&Controls::zeros(&simulator, steps))
+        .unwrap();
+    let energies: Vec<f64> = rollout.samples().iter().map(|s| s.energy()).collect();
+    let distance = |s: &Sample| (s.poses[0].translation - s.poses[1].translation).norm();
+    let distances: Vec<f64> = rollout.samples().iter().map(distance).collect();
+    let (first, last) = (distances[0], distances[steps]);
+    let nearest = distances.iter().copied().fold(f64::INFINITY, f64::min);
+    println!("{reasons}\n{first} {nearest} {last}");
+    // Through the whole fading range, both ways.
+    assert!(first > 0.9 && nearest < 0.4 && last > 0.9);
+    for (n, e) in energies.iter().enumerate() {
+        let error = (e / energies[0] - 1.0).abs();
+        assert!(error < 1e-7, "step {n}: energy off by {error:e}");
+    }
+    check(&scene, Fidelity::Auto, Integrator::Rk2, steps, 320);
+    for integrator in INTEGRATORS {
+        check(&scene, Fidelity::Auto, integrator, 40, 320);
     }
 }
 

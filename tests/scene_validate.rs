@@ -238,6 +238,19 @@ fn shapes_and_drag_are_checked() {
         |s| s.bodies[0].shape = Some(Shape::sphere(1.0).faces(0)),
         &["body \"ball\": shape", "faces", "got 0"],
     );
+    let dented = [[0.0, 0.0], [1.0, 0.0], [0.5, 0.2], [0.0, 1.0]];
+    refused(
+        |s| s.bodies[0].shape = Some(Shape::prism([[0.0, 0.0], [1.0, 0.0], [1.0, 1.0]], 0.0)),
+        &["body \"ball\": shape", "length", "positive"],
+    );
+    refused(
+        |s| s.bodies[0].shape = Some(Shape::prism(dented, 1.0)),
+        &["body \"ball\": shape", "profile[2]", "[0.5, 0.2]", "convex"],
+    );
+    refused(
+        |s| s.bodies[0].shape = Some(Shape::prism(&dented[..2], 1.0)),
+        &["body \"ball\": shape", "profile", "2 corners", "three"],
+    );
     refused(
         |s| s.bodies[0].shape = Some(Shape::mesh("")),
         &["body \"ball\": shape.path"],

@@ -194,6 +194,7 @@ fn everything_survives_a_round_trip() {
         Joint::Planar { plane: Plane::Yz },
         Joint::Spherical,
         Joint::Free,
+        Joint::Fixed,
     ];
     let shapes = [
         Shape::sphere(0.1).faces(7),
@@ -202,6 +203,7 @@ fn everything_survives_a_round_trip() {
         Shape::cylinder(0.1, 0.2),
         Shape::capsule(0.1, 0.2).faces(9),
         Shape::mesh("hull.obj"),
+        Shape::prism([[0.0, 0.0], [0.1, 1e-9], [0.0, 1.0 / 3.0]], 0.7).faces(11),
     ];
     for (joint, shape) in joints.into_iter().zip(shapes) {
         let mut identity = [[0.0; 6]; 6];
@@ -266,14 +268,19 @@ fn mesh_paths_are_relative_to_the_scene_file() {
 }
 
 #[test]
-fn every_example_scene_runs_at_both_fidelities() {
+fn every_example_scene_runs_at_every_fidelity() {
     for entry in std::fs::read_dir(folder()).unwrap() {
         let path = entry.unwrap().path();
         let scene = Scene::load(&path).unwrap();
         // The fish's links touch at their hinges and have their added mass given.
         let fidelities = match scene.name.as_str() {
             name if name.contains("fish") => vec![Fidelity::Isolated],
-            _ => vec![Fidelity::Isolated, Fidelity::Full],
+            _ => vec![
+                Fidelity::Isolated,
+                Fidelity::Reduced,
+                Fidelity::Auto,
+                Fidelity::Full,
+            ],
         };
         for fidelity in fidelities {
             let settings = Settings::for_scene(&scene).fidelity(fidelity).faces(80);

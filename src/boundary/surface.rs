@@ -3,6 +3,7 @@
 use crate::adjoint::kernel;
 use crate::adjoint::lie::{Mat6, Vec3, Vec6, six};
 use crate::{Error, Result};
+use std::collections::HashMap;
 
 /// Flat faces of a closed surface, body frame.
 #[derive(Clone, Debug)]
@@ -214,6 +215,29 @@ impl<'a> Surface<'a> {
             groups
         };
         around.iter().enumerate().map(group).collect()
+    }
+
+    /// Length of the edges across which the surface turns by more than `sharp` (rad), m.
+    pub fn sharp_edges(&self, sharp: f64) -> f64 {
+        let mut sides = HashMap::with_capacity(3 * self.triangles.len());
+        for (i, t) in self.triangles.iter().enumerate() {
+            for k in 0..3 {
+                sides.insert([t[k], t[(k + 1) % 3]], i);
+            }
+        }
+        let normals = &self.faces.normals;
+        let length = |[a, b]: [usize; 2], face: usize| {
+            let other = sides.get(&[b, a]).copied().unwrap_or(face);
+            match normals[face].dot(&normals[other]) < sharp.cos() {
+                true => (self.vertices[a] - self.vertices[b]).norm(),
+                false => 0.0,
+            }
+        };
+        // In the order of the faces, so that the sum is always the same; each edge from both sides.
+        let around = |(i, t): (usize, &[usize; 3])| -> f64 {
+            (0..3).map(|k| length([t[k], t[(k + 1) % 3]], i)).sum()
+        };
+        0.5 * self.triangles.iter().enumerate().map(around).sum::<f64>()
     }
 
     /// How often the surface winds around `x`: 1 inside, 0 outside.

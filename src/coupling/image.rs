@@ -82,6 +82,22 @@ impl Image {
         Ok(out)
     }
 
+    /// As [`Image::of_walls`], for a fidelity that knows no free surface.
+    ///
+    /// # Errors
+    /// As there, and a free surface.
+    pub fn of_rigid_walls(walls: &[Wall], fidelity: &str) -> Result<Vec<Self>> {
+        if let Some(w) = walls.iter().position(|w| w.surface == WallSurface::Free) {
+            return Err(Error::Unsupported {
+                what: format!("the free surface walls[{w}] with {fidelity}"),
+                why: "its images have the opposite sign, which only the fidelity reduced has"
+                    .into(),
+                instead: "use the fidelity reduced or auto, or a rigid wall".into(),
+            });
+        }
+        Self::of_walls(walls)
+    }
+
     /// Whether this is no reflection.
     pub fn is_identity(&self) -> bool {
         self.linear == Mat3::identity()

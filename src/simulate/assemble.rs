@@ -1,17 +1,18 @@
 //! From a scene to a system: meshes, masses, joints, coupling, controller.
 
-use super::clearance::{self, Clearance};
+use super::clearance::Clearance;
 use super::plan::{Planned, plan};
 use super::policy::{Constant, OpenLoop, Pd, PdAxis, PushThenLock};
-use super::wet::{self, Discretisation, Plan, Wet};
+use super::wet::{self, Discretisation, Plan, Water, Wet};
 use super::{Fidelity, Policy, Settings};
 use crate::adjoint::drag::{self, Element, Part};
 use crate::adjoint::lie::{Mat3, Mat6, Pose, Vec3, exp_matrix};
-use crate::coupling::Isolated;
+use crate::boundary::OneBody;
+use crate::coupling::{Exclusions, Isolated};
 use crate::dynamics::{BodyData, Drive, Parameters, Stepper, System};
 use crate::multibody::{self, Tree};
-use crate::scene::{self, Body, Controller, DragPart, Placement, Scene};
-use crate::shape::{self, Gap, Gaps, MassProperties, Other, TriMesh};
+use crate::scene::{self, Body, Controller, DragPart, Placement, Scene, Shape};
+use crate::shape::{self, Gap, MassProperties, Other, TriMesh};
 use crate::{Error, Result};
 use nalgebra::DVector;
 use std::path::Path;
@@ -33,7 +34,7 @@ pub(super) struct Assembled {
     pub resolved: Vec<f64>,
     /// What `Auto` chose, and why.
     pub reasons: Vec<String>,
-    pub gaps: Gaps,
+    pub clearance: Clearance,
     pub warnings: Vec<String>,
 }
 
@@ -69,19 +70,44 @@ fn part(p: DragPart) -> Part {
 }
 
 /// A body's surface in its own frame, with its mass properties.
-struct Surface {
-    mesh: TriMesh,
-    properties: MassProperties,
+pub(super) struct Surface {
+    pub mesh: TriMesh,
+    /// A mesh of about a quarter of the faces, of a shape by formula with flat parts or edges.
+    coarse: Option<TriMesh>,
+    pub properties: MassProperties,
 }
 
-fn surface(body: &Body, faces: Option<usize>) -> Result<Option<Surface>> {
+fn surface(body: &Body, settings: &Settings) -> Result<Option<Surface>> {
     let Some(shape) = &body.shape else {
         return Ok(None);
     };
-    let mesh = shape::build(shape, Path::new(""), faces)?.transformed(&pose(&body.shape_at));
+    let at = pose(&body.shape_at);
+    let mesh = shape::build(shape, Path::new(""), settings.faces)?.transformed(&at);
+    let closed = settings.by_formula() && wet::semi_axes(shape).is_some();
+    let panels = settings.fidelity != Fidelity::Full
+        && matches!(settings.one_body, OneBody::Auto | OneBody::Panel);
+    let coarse = if panels && !closed && !matches!(shape, Shape::Mesh { .. }) {
+        let quarter = (mesh.faces().len() / 4).max(12);
+        let coarse = shape::build(shape, Path::new(""), Some(quarter))?.transformed(&at);
+        // Patterns allow only certain numbers.
+        Some(coarse).filter(|c| 2 * c.faces().len() <= mesh.faces().len())
+    } else {
+        None
+    };
+    // Where the water sees the shape itself and not a mesh of it, so do gravity and buoyancy.
+    let formula = if closed || coarse.is_some() {
+        MassProperties::by_formula(shape)?
+    } else {
+        None
+    };
+    let properties = match &formula {
+        Some(p) => p.transformed(&at),
+        None => mesh.mass_properties(),
+    };
     Ok(Some(Surface {
-        properties: mesh.mass_properties(),
+        properties,
         mesh,
+        coarse,
     }))
 }
 
@@ -150,7 +176,7 @@ pub(super) fn assemble(
     parameters.density = scene.fluid.density;
     let mut surfaces = Vec::with_capacity(scene.bodies.len());
     for body in &scene.bodies {
-        surfaces.push(surface(body, settings.faces)?);
+        surfaces.push(surface(body, settings)?);
     }
 
     let mut wet: Vec<Wet> = Vec::new();
@@ -196,6 +222,7 @@ pub(super) fn assemble(
                 mesh: surface.map(|s| &s.mesh),
                 ellipsoid: (body.shape.as_ref().and_then(wet::semi_axes))
                     .map(|axes| (axes, pose(&body.shape_at))),
+                coarse: surface.and_then(|s| s.coarse.as_ref()),
                 added_mass: (body.added_mass.as_ref())
                     .filter(|_| settings.fidelity == Fidelity::Isolated)
                     .map(|rows| Mat6::from_fn(|i, j| rows[i][j])),
@@ -220,11 +247,7 @@ pub(super) fn assemble(
             None => Drive::Free,
         })
         .collect();
-    let meshes: Vec<_> = surfaces
-        .iter()
-        .map(|s| s.as_ref().map(|s| &s.mesh))
-        .collect();
-    let clearance = Clearance::new(&meshes, &scene.walls, &tree, &drives)?;
+    let clearance = Clearance::new(scene, &surfaces, &tree, &drives)?;
     let mut system = System {
         bodies,
         drives,
@@ -240,7 +263,15 @@ pub(super) fn assemble(
         plan,
         reasons,
     } = choose(scene, settings, &system, &q, &clearance, &wet, &of_wet)?;
-    let made = wet::couple(&wet, &scene.walls, settings, fidelity, &plan, folder)?;
+    let number = |b: usize| of_wet.iter().position(|w| *w == b);
+    let declared = scene.overlapping().into_iter();
+    let excluded = Exclusions::new(declared.filter_map(|(a, b)| Some((number(a)?, number(b)?))));
+    let water = Water {
+        walls: &scene.walls,
+        excluded,
+        folder,
+    };
+    let made = wet::couple(&wet, &water, settings, fidelity, &plan)?;
     system.coupling = made.coupling;
     warnings.extend(made.warnings);
     let mut resolved = vec![0.0; scene.bodies.len()];
@@ -259,7 +290,7 @@ pub(super) fn assemble(
         discretisation: made.bodies,
         resolved,
         reasons,
-        gaps: clearance.moving,
+        clearance,
         warnings,
     })
 }
@@ -319,7 +350,7 @@ fn start_coordinates(
     };
     stepper(scene, settings, system, parameters).place_motions(&mut q, 0.0);
     if settings.fidelity != Fidelity::Isolated && scene.fluid.density > 0.0 {
-        clearance::refuse_start(clearance, &q, system)?;
+        clearance.refuse_start(&q, system)?;
     }
     Ok(q)
 }

@@ -11,7 +11,7 @@ use super::wet::{Plan, Wet, area, centre};
 use crate::adjoint::lie::{Pose, Vec3};
 use crate::boundary::exact::lamb;
 use crate::coupling::reduced::{Cutoff, compress};
-use crate::scene::Wall;
+use crate::scene::{Wall, WallSurface};
 use crate::shape::{Gap, MassProperties, Other};
 use crate::{Error, Result};
 use std::f64::consts::PI;
@@ -77,7 +77,8 @@ pub(super) fn plan(
             .map(seen)
             .fold(f64::INFINITY, f64::min);
         let finest = compress::finest_gap(area(mesh));
-        if smallest < HOPELESS * finest {
+        let rigid = walls.iter().all(|w| w.surface == WallSurface::Rigid);
+        if smallest < HOPELESS * finest && rigid {
             out.reasons.push(format!(
                 "body {:?} starts with a gap of {smallest:.3e} m, and its compressed sources resolve \
                  {finest:.3e} m at best: all bodies are solved together (full)",

@@ -144,6 +144,11 @@ impl Settings {
         self
     }
 
+    /// Whether ellipsoids are solved by formula.
+    pub(super) fn by_formula(&self) -> bool {
+        self.fidelity != Fidelity::Full && matches!(self.one_body, OneBody::Auto | OneBody::Exact)
+    }
+
     /// Name of the one-body method, as on the command line.
     pub fn method_name(&self) -> &'static str {
         match (self.one_body, self.boundary.method) {

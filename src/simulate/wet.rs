@@ -3,15 +3,17 @@
 use super::{Fidelity, Settings};
 use crate::adjoint::lie::{Mat6, Pose, Vec3};
 use crate::boundary::exact::ExactBoundary;
+use crate::boundary::panel::Extrapolated;
 use crate::boundary::{BodyBoundary, OneBody, PanelBoundary, Response};
 use crate::coupling::full::{Full, Solver, WetBody};
 use crate::coupling::panel::{self, PanelCoupled};
 use crate::coupling::reduced::{Cutoff, Reduced, ReducedBody, cache, compress};
-use crate::coupling::{Coupling, Isolated};
+use crate::coupling::{Coupling, Exclusions, Isolated};
 use crate::scene::{Shape, Wall};
-use crate::shape::TriMesh;
+use crate::shape::{self, TriMesh};
 use crate::{Error, Result};
 use serde::Serialize;
+use std::borrow::Cow;
 use std::path::Path;
 use std::sync::Arc;
 
@@ -22,6 +24,8 @@ pub(super) struct Wet<'a> {
     pub mesh: Option<&'a TriMesh>,
     /// The shape by formula and its pose in the body's frame, if it is an ellipsoid.
     pub ellipsoid: Option<([f64; 3], Pose)>,
+    /// A coarser mesh of the shape, where it is one by formula.
+    pub coarse: Option<&'a TriMesh>,
     /// Given added mass at unit density.
     pub added_mass: Option<Mat6>,
 }
@@ -53,6 +57,8 @@ pub struct Discretisation {
     pub resolved_gap: Option<f64>,
     /// Asymmetry of its own added mass before symmetrising.
     pub asymmetry: f64,
+    /// Estimated error of its own added mass, where two meshes tell one.
+    pub added_mass_error: Option<f64>,
     /// Error of the compressed flow of the body itself at points not fitted to, relative.
     pub radiated_error: f64,
     /// Error of the compressed flow scattered between such points, relative.
@@ -68,12 +74,7 @@ pub(super) fn semi_axes(shape: &Shape) -> Option<[f64; 3]> {
     }
 }
 
-/// Whether a body with an ellipsoid's shape is solved by formula.
-pub(super) fn by_formula(settings: &Settings, fidelity: Fidelity) -> bool {
-    fidelity != Fidelity::Full && matches!(settings.one_body, OneBody::Auto | OneBody::Exact)
-}
-
-impl Wet<'_> {
+impl<'a> Wet<'a> {
     /// The method for this body.
     fn method(&self, settings: &Settings) -> Result<OneBody> {
         match (settings.one_body, self.ellipsoid) {
@@ -89,7 +90,7 @@ impl Wet<'_> {
         }
     }
 
-    fn surface(&self, fidelity: &str) -> Result<&TriMesh> {
+    fn surface(&self, fidelity: &str) -> Result<&'a TriMesh> {
         self.mesh.ok_or_else(|| Error::Unsupported {
             what: format!("coupling of body {:?}", self.name),
             why: format!("it has a given added mass but no shape, and {fidelity} needs one"),
@@ -114,7 +115,17 @@ impl Wet<'_> {
                 let b = &settings.boundary;
                 Box::new(BodyBoundary::new(self.name, vertices, faces, b)?)
             }
-            _ => Box::new(PanelBoundary::new(self.name, vertices, faces)?),
+            _ => {
+                let fine = PanelBoundary::new(self.name, vertices, faces)?;
+                match self.coarse {
+                    Some(mesh) => {
+                        let (vertices, faces) = (mesh.vertices(), mesh.faces());
+                        let coarse = PanelBoundary::new(self.name, vertices, faces)?;
+                        Box::new(Extrapolated::new(fine, coarse)?)
+                    }
+                    None => Box::new(fine),
+                }
+            }
         })
     }
 }
@@ -127,20 +138,28 @@ fn name_of(method: OneBody) -> &'static str {
     }
 }
 
+/// What is around the bodies.
+pub(super) struct Water<'a> {
+    pub walls: &'a [Wall],
+    /// Pairs that don't feel each other, by their numbers among the bodies in the water.
+    pub excluded: Exclusions,
+    /// Where compressed bodies are kept.
+    pub folder: Option<&'a Path>,
+}
+
 /// The coupling of `bodies`, with a fidelity that isn't `Auto`.
 pub(super) fn couple(
     bodies: &[Wet],
-    walls: &[Wall],
+    water: &Water,
     settings: &Settings,
     fidelity: Fidelity,
     plan: &Plan,
-    folder: Option<&Path>,
 ) -> Result<Made> {
     match fidelity {
-        Fidelity::Isolated => isolated(bodies, walls, settings),
-        Fidelity::Full if settings.one_body == OneBody::Panel => panels(bodies, walls, settings),
-        Fidelity::Full => full(bodies, walls, settings),
-        Fidelity::Reduced | Fidelity::Auto => reduced(bodies, walls, settings, plan, folder),
+        Fidelity::Isolated => isolated(bodies, water.walls, settings),
+        Fidelity::Full if settings.one_body == OneBody::Panel => panels(bodies, water, settings),
+        Fidelity::Full => full(bodies, water, settings),
+        Fidelity::Reduced | Fidelity::Auto => reduced(bodies, water, settings, plan),
     }
 }
 
@@ -183,6 +202,7 @@ fn isolated(bodies: &[Wet], walls: &[Wall], settings: &Settings) -> Result<Made>
                 method: own.method,
                 faces: own.faces,
                 asymmetry: own.asymmetry,
+                added_mass_error: own.error,
                 ..Discretisation::empty()
             })
             .collect(),
@@ -200,6 +220,7 @@ struct Own {
     method: &'static str,
     faces: usize,
     asymmetry: f64,
+    error: Option<f64>,
     warnings: Vec<String>,
 }
 
@@ -222,6 +243,7 @@ fn own(body: &Wet, settings: &Settings) -> Result<Own> {
             method: "given",
             faces: 0,
             asymmetry: 0.0,
+            error: None,
             warnings: Vec::new(),
         });
     }
@@ -230,12 +252,15 @@ fn own(body: &Wet, settings: &Settings) -> Result<Own> {
         OneBody::Exact => 0,
         _ => body.surface("isolated")?.faces().len(),
     };
-    let response = body.response(method, settings, f64::MAX)?;
+    // Nothing is near: the flow around it isn't asked for.
+    let far = body.mesh.map_or(1.0, |m| area(m).sqrt());
+    let response = body.response(method, settings, far)?;
     Ok(Own {
         added_mass: response.added_mass(),
         method: name_of(method),
         faces,
         asymmetry: response.asymmetry(),
+        error: response.error(),
         warnings: response.warnings().to_vec(),
     })
 }
@@ -250,6 +275,7 @@ impl Discretisation {
             points: 0,
             resolved_gap: None,
             asymmetry: 0.0,
+            added_mass_error: None,
             radiated_error: 0.0,
             scattered_error: 0.0,
         }
@@ -276,7 +302,7 @@ fn once<T>(made: &[Arc<T>], of: impl Fn(&T) -> &[String]) -> Vec<String> {
     distinct.flat_map(|i| of(&made[i]).to_vec()).collect()
 }
 
-fn full(bodies: &[Wet], walls: &[Wall], settings: &Settings) -> Result<Made> {
+fn full(bodies: &[Wet], water: &Water, settings: &Settings) -> Result<Made> {
     if settings.one_body == OneBody::Exact {
         return Err(Error::Unsupported {
             what: "the method exact with the fidelity full".into(),
@@ -310,11 +336,16 @@ fn full(bodies: &[Wet], walls: &[Wall], settings: &Settings) -> Result<Made> {
                 ..Discretisation::empty()
             })
             .collect(),
-        coupling: Box::new(Full::new(made, walls, settings.solve)?),
+        coupling: Box::new(Full::new(
+            made,
+            water.walls,
+            water.excluded.clone(),
+            settings.solve,
+        )?),
     })
 }
 
-fn panels(bodies: &[Wet], walls: &[Wall], settings: &Settings) -> Result<Made> {
+fn panels(bodies: &[Wet], water: &Water, settings: &Settings) -> Result<Made> {
     let made = shared(bodies, |body, mesh| {
         PanelBoundary::new(body.name, mesh.vertices(), mesh.faces())
     })?;
@@ -338,23 +369,19 @@ fn panels(bodies: &[Wet], walls: &[Wall], settings: &Settings) -> Result<Made> {
                 ..Discretisation::empty()
             })
             .collect(),
-        coupling: Box::new(PanelCoupled::new(made, walls, solve)?),
+        coupling: Box::new(
+            PanelCoupled::new(made, water.walls, solve)?.excluding(water.excluded.clone())?,
+        ),
     })
 }
 
-fn reduced(
-    bodies: &[Wet],
-    walls: &[Wall],
-    settings: &Settings,
-    plan: &Plan,
-    folder: Option<&Path>,
-) -> Result<Made> {
+fn reduced(bodies: &[Wet], water: &Water, settings: &Settings, plan: &Plan) -> Result<Made> {
     let mut made: Vec<Arc<ReducedBody>> = Vec::with_capacity(bodies.len());
     let mut methods = Vec::with_capacity(bodies.len());
     for (b, body) in bodies.iter().enumerate() {
         let method = body.method(settings)?;
         let chosen = plan.compress.get(b).copied().unwrap_or(settings.compress);
-        made.push(compressed(body, method, settings, &chosen, folder)?);
+        made.push(compressed(body, method, settings, &chosen, water.folder)?);
         methods.push(name_of(method));
     }
     let cutoff = |a: usize, b: usize| {
@@ -368,7 +395,7 @@ fn reduced(
             .iter()
             .filter_map(|b| Some(b.mesh?.faces().len()))
             .sum(),
-        warnings: once(&made, |m| &m.parts().fit.warnings),
+        warnings: compression_warnings(bodies, &made, settings, plan),
         bodies: made
             .iter()
             .zip(bodies)
@@ -383,16 +410,84 @@ fn reduced(
                     points: m.points(),
                     resolved_gap: Some(fit.resolved_gap),
                     asymmetry: fit.body_asymmetry,
+                    added_mass_error: fit.body_error,
                     radiated_error: fit.radiated,
                     scattered_error: fit.scattered,
                 }
             })
             .collect(),
-        coupling: Box::new(Reduced::new(made, walls, cutoff)?.named(names)),
+        coupling: Box::new(
+            Reduced::new(made, water.walls, cutoff)?
+                .excluding(&water.excluded)?
+                .named(names),
+        ),
     })
 }
 
+/// What the user should know of compressed bodies.
+fn compression_warnings(
+    bodies: &[Wet],
+    made: &[Arc<ReducedBody>],
+    settings: &Settings,
+    plan: &Plan,
+) -> Vec<String> {
+    let mut out = Vec::new();
+    for (b, (body, made)) in bodies.iter().zip(made).enumerate() {
+        if bodies[..b].iter().any(|a| equal(a, body)) {
+            continue;
+        }
+        let parts = made.parts();
+        let size = parts.radius;
+        out.extend(
+            parts
+                .fit
+                .warnings
+                .iter()
+                .map(|w| format!("{w} (lengths of this message in units of {size:.3e} m)")),
+        );
+        let asked = plan
+            .compress
+            .get(b)
+            .unwrap_or(&settings.compress)
+            .resolved_gap;
+        let got = parts.fit.resolved_gap;
+        if let Some(asked) = asked.filter(|a| *a < (1.0 - 1e-6) * got) {
+            out.push(format!(
+                "body {:?}: gaps under {got:.3e} m aren't resolved by its compressed sources, for all \
+                 that {asked:.3e} m were asked for: its surface is too large; use a plane wall for a \
+                 floor, or the fidelity full",
+                body.name
+            ));
+        }
+    }
+    out
+}
+
+/// Faces of the mesh around a body by formula, from which the points of its compression are laid out:
+/// what they are fitted to doesn't depend on it.
+const LAYOUT_FACES: usize = 2000;
+
+/// The surface that a body is compressed around, in the body's frame.
+fn layout<'a>(body: &Wet<'a>, method: OneBody) -> Result<Cow<'a, TriMesh>> {
+    let mesh = body.surface("reduced")?;
+    match (method, body.ellipsoid) {
+        (OneBody::Exact, Some((semi_axes, pose))) => {
+            let shape = Shape::ellipsoid(semi_axes).faces(LAYOUT_FACES);
+            Ok(Cow::Owned(
+                shape::build(&shape, Path::new(""), None)?.transformed(&pose),
+            ))
+        }
+        _ => Ok(Cow::Borrowed(mesh)),
+    }
+}
+
+/// Steps of the grid, relative to the body's size, on which lengths are compared.
+const GRID: f64 = (1u64 << 30) as f64;
+
 /// The body compressed, from the cache if it is there.
+///
+/// It is computed in units of its own size, with lengths rounded to [`GRID`]: bodies of the same
+/// shape share it whatever their size, to the last bit.
 fn compressed(
     body: &Wet,
     method: OneBody,
@@ -400,24 +495,67 @@ fn compressed(
     chosen: &compress::Settings,
     folder: Option<&Path>,
 ) -> Result<Arc<ReducedBody>> {
-    let mesh = body.surface("reduced")?;
-    let (vertices, faces) = (mesh.vertices(), mesh.faces());
-    let formula = body.ellipsoid.as_ref().filter(|_| method == OneBody::Exact);
-    let formula = formula.map(|(axes, pose)| {
+    chosen.validate()?;
+    let mesh = layout(body, method)?;
+    let middle = centre(&mesh);
+    let far = |r: f64, v: &Vec3| r.max((v - middle).norm());
+    let size = mesh.vertices().iter().fold(0.0, far);
+    let round = |x: f64| (x / size * GRID).round() / GRID;
+    let vertices: Vec<Vec3> = mesh.vertices().iter().map(|v| v.map(round)).collect();
+    let unit = TriMesh::new(mesh.name(), vertices, mesh.faces().to_vec())?;
+    let coarse = body.coarse.filter(|_| method == OneBody::Panel).map(|m| {
+        let vertices = m.vertices().iter().map(|v| v.map(round)).collect();
+        TriMesh::new(m.name(), vertices, m.faces().to_vec())
+    });
+    let coarse = coarse.transpose()?;
+    let ellipsoid = body.ellipsoid.filter(|_| method == OneBody::Exact);
+    let ellipsoid = ellipsoid.map(|(axes, pose)| {
+        let at = Pose::new(pose.rotation, pose.translation.map(round));
+        (axes.map(round), at)
+    });
+    let gap = chosen.resolved_gap.map(round);
+    let chosen =
+        compress::Settings {
+            resolved_gap: Some(gap.unwrap_or_else(|| {
+                compress::default_gap(unit.mass_properties().volume, area(&unit))
+            })),
+            ..*chosen
+        };
+    let formula = ellipsoid.map(|(axes, pose)| {
         let turn: Vec<f64> = pose.rotation.iter().copied().collect();
-        (*axes, turn, <[f64; 3]>::from(pose.translation))
+        (axes, turn, <[f64; 3]>::from(pose.translation))
     });
     let fundamental = (method == OneBody::Mfs).then_some(settings.boundary);
-    let key = cache::Key::new(vertices, faces, &(method, formula, fundamental), chosen);
-    cache::fetch(key, folder, || {
-        let gap = chosen.resolved_gap.unwrap_or_else(|| {
-            let p = mesh.mass_properties();
-            compress::default_gap(p.volume, area(mesh))
-        });
-        let response =
-            body.response(method, settings, gap.max(compress::finest_gap(area(mesh))))?;
-        compress::compress(body.name, vertices, faces, response.as_ref(), chosen)
-    })
+    let made_from = (
+        method,
+        formula,
+        fundamental,
+        coarse.as_ref().map(|m| m.faces().len()),
+    );
+    let key = cache::Key::new(unit.vertices(), unit.faces(), &made_from, &chosen);
+    let found = cache::fetch(key, folder, || {
+        let own = Wet {
+            name: body.name,
+            mesh: Some(&unit),
+            ellipsoid,
+            coarse: coarse.as_ref(),
+            added_mass: None,
+        };
+        let gap = chosen
+            .resolved_gap
+            .unwrap_or(0.0)
+            .max(compress::finest_gap(area(&unit)));
+        let response = own.response(method, settings, gap)?;
+        compress::compress(
+            body.name,
+            unit.vertices(),
+            unit.faces(),
+            response.as_ref(),
+            &chosen,
+        )
+    });
+    let found = found.map_err(|e| e.in_units_of(size))?;
+    Ok(Arc::new(found.scaled(size)?))
 }
 
 /// Surface of a mesh, m².

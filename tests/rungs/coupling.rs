@@ -8,7 +8,7 @@ use hydrograd::boundary::{BodyBoundary, Method, Settings};
 use hydrograd::coupling::full::{Full, SolveSettings, Solver, WetBody};
 use hydrograd::coupling::image::Image;
 use hydrograd::coupling::reduced::{Cutoff, Reduced, compress};
-use hydrograd::coupling::{Coupling, Direction, Isolated};
+use hydrograd::coupling::{Coupling, Direction, Exclusions, Isolated};
 use hydrograd::scene::{Shape, Wall, WallSurface};
 use hydrograd::shape;
 use nalgebra::{DMatrix, DVector};
@@ -72,7 +72,7 @@ fn full(method: Method, solver: Solver, walls: &[Wall]) -> Full {
         tolerance: 1e-13,
         ..SolveSettings::default()
     };
-    Full::new(bodies, walls, settings).unwrap()
+    Full::new(bodies, walls, Exclusions::none(), settings).unwrap()
 }
 
 /// Every method with every solver that it has, without walls, with one and with two.

@@ -68,7 +68,7 @@ impl Confocal {
                 "give a point in the water",
             ));
         }
-        let level = self.level(&sorted).max(self.surface());
+        let level = self.level(&sorted);
         let direction = Vec3::from_fn(|i, _| sorted[i] / (level + self.offsets[i]).sqrt());
         Ok(Place {
             level,
@@ -76,17 +76,14 @@ impl Confocal {
         })
     }
 
-    /// Largest ℓ with Σ x²/(ℓ + offset) = 1, by Newton's method. The sum is convex and falls, so from a
-    /// start below the root every iterate stays below it; where the largest single term is 1 the sum is
-    /// between 1 and 3, and a few steps do.
+    /// Largest ℓ with Σ x²/(ℓ + offset) = 1, or the surface's if that is larger, by Newton's method. The sum
+    /// is convex and falls, so from a start below the root every iterate stays below it; where no term is
+    /// above 1 the sum is at most 3, and a few steps do.
     fn level(&self, x: &[f64; 3]) -> f64 {
         let squares = x.map(|v| v * v);
-        let mut level = 0.0f64;
+        let mut level = self.surface();
         for (s, o) in squares.iter().zip(&self.offsets) {
             level = level.max(s - o);
-        }
-        if level <= 0.0 {
-            return 0.0;
         }
         for _ in 0..60 {
             let (mut value, mut slope) = (-1.0, 0.0);
@@ -96,7 +93,7 @@ impl Confocal {
                 slope += term / (level + o);
             }
             let step = value / slope;
-            level += step;
+            level += step.max(0.0);
             if step <= f64::EPSILON * level {
                 break;
             }

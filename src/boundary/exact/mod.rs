@@ -52,7 +52,7 @@ impl ExactBoundary {
     ///
     /// # Errors
     /// [`Error::Input`] for semi-axes or a gap that aren't finite and positive, and for a pose that is
-    /// none.
+    /// none; [`Error::Unresolved`] for a gap below a fiftieth of an ellipsoid's longest semi-axis.
     pub fn new(name: &str, semi_axes: [f64; 3], pose: &Pose, resolved_gap: f64) -> Result<Self> {
         lamb::check(&format!("body \"{name}\""), semi_axes)?;
         if !(resolved_gap.is_finite() && resolved_gap > 0.0) {

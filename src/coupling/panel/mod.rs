@@ -1,12 +1,12 @@
 //! All bodies in one panel system: the reference that the other fidelities are measured against.
 //!
 //! The unknowns are the potentials of all panels ([`crate::boundary::panel`]). Walls mirror the flow,
-//! so an image body has the potentials and normal velocities of the body itself, and its layers at x
-//! are those of the body at the mirrored point. Over the bodies' images, with q = F x̄ the normal
-//! velocities and D the panels' areas,
+//! so an image body has the potentials and normal velocities of the body itself (of opposite
+//! sign in a free surface), and its layers at x are those of the body at the mirrored point. Over the bodies'
+//! images, s their signs, with q = F x̄ the normal velocities and D the panels' areas,
 //!
 //! ```text
-//! A φ = S q,   A = ½ I + Σ_images Ω/4π,   S = Σ_images S_image
+//! A φ = S q,   A = ½ I + Σ_images s Ω/4π,   S = Σ_images s S_image
 //! E(x, y) = sym( (D F x)ᵀ A⁻¹ S F y )
 //! M̄ x̄ = ½ { Fᵀ D φ + Fᵀ Sᵀ μ },   Aᵀ μ = D F x̄
 //! ```
@@ -18,6 +18,7 @@
 mod record;
 mod system;
 
+use super::Exclusions;
 use super::image::Image;
 use super::settings::check_limits;
 use super::{Coupling, Record};
@@ -73,6 +74,7 @@ pub struct PanelCoupled {
     walls: Vec<(Vec3, Vec3)>,
     settings: SolveSettings,
     faces: Vec<Range<usize>>,
+    excluded: Exclusions,
 }
 
 impl PanelCoupled {
@@ -106,7 +108,18 @@ impl PanelCoupled {
             bodies,
             settings,
             faces,
+            excluded: Exclusions::none(),
         })
+    }
+
+    /// The same, without the flow between these pairs of bodies.
+    ///
+    /// # Errors
+    /// A pair that names a body that doesn't exist.
+    pub fn excluding(mut self, pairs: Exclusions) -> Result<Self> {
+        pairs.check(self.bodies.len())?;
+        self.excluded = pairs;
+        Ok(self)
     }
 
     /// Number of panels of all bodies.

@@ -59,7 +59,7 @@ impl PanelRecord {
             iterations: phi.iterations.max(mu.iterations),
             residual: phi.residual.max(mu.residual),
             asymmetry: asymmetry(&raw, basis, |b| coupled.bodies[b].faces.volume()),
-            ..Report::default()
+            condition: system.condition(),
         };
         for (b, body) in coupled.bodies.iter().enumerate() {
             for c in 0..k {
@@ -94,8 +94,8 @@ fn single_layers(
     let k = q.columns;
     let mut there = Columns::zeros(q.rows, k);
     let mut back = Columns::zeros(q.rows, k);
-    let add = |out: &mut [f64], part: &[f64]| {
-        out.iter_mut().zip(part).for_each(|(o, p)| *o += p);
+    let add = |out: &mut [f64], part: &[f64], sign: f64| {
+        out.iter_mut().zip(part).for_each(|(o, p)| *o += sign * p);
     };
     for (source, panels) in coupled.faces.iter().enumerate() {
         let q = q.slice(panels.start, panels.end);
@@ -104,11 +104,14 @@ fn single_layers(
             let mu = mu.slice(points.start, points.end);
             let mu = MatRef::from_row_major_slice(mu, points.len(), k);
             for image in &coupled.images {
+                if image.is_identity() && coupled.excluded.contains(source, target) {
+                    continue;
+                }
                 let seen = seen_from(coupled, poses, image, source, target);
                 let layers = coupled.bodies[source].panels();
                 let (s_q, s_mu) = layers.single_layer_both(&seen, q, mu);
-                add(there.slice_mut(points.start, points.end), &s_q);
-                add(back.slice_mut(panels.start, panels.end), &s_mu);
+                add(there.slice_mut(points.start, points.end), &s_q, image.sign);
+                add(back.slice_mut(panels.start, panels.end), &s_mu, image.sign);
             }
         }
     }

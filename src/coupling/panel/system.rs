@@ -71,6 +71,14 @@ impl<'a> System<'a> {
         Ok(Self { coupled, matrix })
     }
 
+    /// Condition number of a dense matrix; 0 for blocks.
+    pub fn condition(&self) -> f64 {
+        match &self.matrix {
+            Matrix::Blocks(_) => 0.0,
+            Matrix::Factored(lu) => lu.condition(),
+        }
+    }
+
     /// Solves `A x = b`, or `Aᵀ x = b`.
     ///
     /// # Errors
@@ -234,11 +242,25 @@ fn fill(
     let layers = coupled.bodies[source].panels();
     let points = coupled.faces[target].len();
     for image in &coupled.images {
-        if source == target && image.is_identity() {
+        let apart = source != target && !coupled.excluded.contains(source, target);
+        if image.is_identity() && !apart {
             continue;
         }
         let seen = seen_from(coupled, poses, image, source, target);
+        // Images in free surfaces have the opposite sign, and the kernel only adds.
+        let negate = |out: &mut [f64]| {
+            for row in out.chunks_mut(stride) {
+                let row = &mut row[column..column + points];
+                row.iter_mut().for_each(|x| *x = -*x);
+            }
+        };
+        if image.sign < 0.0 {
+            negate(out);
+        }
         layers.double_layer(&seen, Write::Add, out, stride, column);
+        if image.sign < 0.0 {
+            negate(out);
+        }
     }
     let mut filled = vec![0.0; points];
     for row in out.chunks(stride) {
@@ -247,7 +269,7 @@ fn fill(
         }
     }
     // Also where it isn't a number.
-    match filled.iter().position(|f| !(f.abs() < INSIDE)) {
+    match filled.iter().position(|f| f.is_nan() || f.abs() >= INSIDE) {
         None => Ok(()),
         Some(i) => Err(overlap(coupled, poses, source, target, i, filled[i])),
     }

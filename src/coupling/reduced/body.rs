@@ -66,6 +66,8 @@ pub struct Fit {
     pub wrong_sign: f64,
     /// Asymmetry of the body's own added mass before symmetrising.
     pub body_asymmetry: f64,
+    /// Estimated relative error of the body's own added mass, where two resolutions tell one.
+    pub body_error: Option<f64>,
     /// What the user should know, each with the body's name and its numbers.
     pub warnings: Vec<String>,
 }
@@ -110,6 +112,35 @@ impl ReducedBody {
             basis,
             parts,
         })
+    }
+
+    /// The same body, larger by `factor` in all lengths.
+    ///
+    /// # Errors
+    /// A factor that isn't finite and positive, or takes numbers out of range.
+    pub fn scaled(&self, factor: f64) -> Result<Self> {
+        let mut parts = self.parts.clone();
+        if !(factor > 0.0 && factor.is_finite()) {
+            return Err(Error::input(
+                format!("compressed body {:?}: scale", parts.name),
+                factor,
+                "must be finite and positive",
+            ));
+        }
+        parts.points.iter_mut().for_each(|p| *p *= factor);
+        parts.modes *= factor.sqrt();
+        let power = |i: usize, n: i32| factor.powi(n + i32::from(i >= 3));
+        for k in 0..6 {
+            parts.strengths.column_mut(k).scale_mut(power(k, 2));
+            for i in 0..6 {
+                parts.added_mass[(i, k)] *= power(i, 1) * power(k, 2);
+            }
+        }
+        parts.centre *= factor;
+        parts.radius *= factor;
+        parts.volume *= factor.powi(3);
+        parts.fit.resolved_gap *= factor;
+        Self::new(parts)
     }
 
     /// What it consists of.

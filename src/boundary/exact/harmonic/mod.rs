@@ -33,6 +33,7 @@ use super::confocal::{Confocal, Place};
 use crate::adjoint::lie::Vec3;
 use crate::{Error, Result};
 use faer::linalg::matmul::matmul;
+use faer::reborrow::ReborrowMut;
 use faer::{Accum, Mat, MatMut, MatRef, Par};
 use legendre::Legendre;
 use radial::{Grid, Radial, Spot};
@@ -41,19 +42,23 @@ use std::f64::consts::PI;
 use top::Top;
 
 /// Highest degree.
-const MOST: usize = 300;
+const MOST: usize = 256;
+/// Smallest gap over the longest semi-axis: degrees go like its inverse.
+const NEAREST: f64 = 0.02;
 /// A degree that is less of a source's flux on the surface than this is the last.
 const LAST: f64 = 1e-5;
 /// Harmonics that are less of it than this are left out.
 const LEAST: f64 = 1e-7;
 /// A degree that is less of the answer than this is the last to be summed.
-const SUMMED: f64 = 1e-11;
+const SUMMED: f64 = 1e-9;
 /// Largest relative error of an answer, estimated from the last degree, that is let pass.
 const TRUNCATED: f64 = 1e-3;
 /// Sources that are tried to choose the harmonics.
 const SAMPLES: usize = 60;
 /// Harmonics in a block of the product.
 const BLOCK: usize = 768;
+/// Points in a block of the evaluation.
+const POINTS: usize = 32;
 /// A smaller B than this, in squares of the longest semi-axis, is none.
 const ROUND: f64 = 1e-9;
 
@@ -111,6 +116,17 @@ impl Harmonics {
     /// For sources at `gap` (m) and beyond; `name` of the body for messages.
     pub fn new(name: &str, confocal: &Confocal, gap: f64) -> Result<Self> {
         let scale = confocal.semi_axes[0];
+        if gap < NEAREST * scale {
+            return Err(Error::Unresolved {
+                place: format!("body \"{name}\""),
+                quantity: format!(
+                    "resolved gap {gap:.6e} m over the longest semi-axis {scale:.6e} m"
+                ),
+                value: gap / scale,
+                limit: NEAREST,
+                remedy: "ask for a larger gap".into(),
+            });
+        }
         let semi_axes = Vec3::from(confocal.semi_axes) / scale;
         let [a, b, _] = confocal.offsets.map(|o| o / (scale * scale));
         let b = if b < ROUND { 0.0 } else { b };
@@ -124,7 +140,7 @@ impl Harmonics {
         };
         let mut samples: Vec<Probe> = residual::octant(SAMPLES)
             .iter()
-            .map(|d| out.probe(&out.offset(name, d, gap / scale)?.1))
+            .map(|d| Ok(out.probe(&out.offset(name, d, gap / scale)?.1, MOST)))
             .collect::<Result<_>>()?;
         let mut totals = vec![0.0; samples.len()];
         let mut small = 0;
@@ -136,20 +152,21 @@ impl Harmonics {
         Ok(out)
     }
 
-    /// The surface's point in direction X and the place at a distance (longest semi-axes) off it.
-    fn offset(&self, name: &str, direction: &Vec3, gap: f64) -> Result<(Vec3, (Vec3, Place))> {
+    /// The point at a distance (longest semi-axes) off the surface's point in direction X.
+    fn offset(&self, name: &str, direction: &Vec3, gap: f64) -> Result<(Vec3, Place)> {
         let foot = direction.component_mul(&self.semi_axes);
         let normal = direction.component_div(&self.semi_axes).normalize();
         let point = foot + gap * normal;
         let unit = Confocal::new(self.semi_axes.into());
-        Ok((foot, (point, unit.locate(name, &point)?)))
+        Ok((point, unit.locate(name, &point)?))
     }
 
-    fn probe(&self, place: &(Vec3, Place)) -> Result<Probe> {
-        Ok(Probe {
-            legendre: Legendre::new(self.top.components(&place.1.direction), MOST),
-            spot: self.grid.spot(place.1.level),
-        })
+    /// A point at the start, for degrees up to `most`.
+    fn probe(&self, place: &Place, most: usize) -> Probe {
+        Probe {
+            legendre: Legendre::new(self.top.components(&place.direction), most),
+            spot: self.grid.spot(place.level),
+        }
     }
 
     /// The next degree, and its largest part in a sample's flux.
@@ -188,16 +205,16 @@ impl Harmonics {
             size: classes.iter().map(|c| c.radials.len()).sum(),
             classes,
         };
-        let mut column = vec![0.0; degree.size];
+        let mut values = Mat::zeros(degree.size, samples.len());
+        self.fill(&degree, samples, Weight::Flux, values.as_mut());
         let mut most = vec![0.0f64; degree.size];
         let mut largest = 0.0f64;
-        for (sample, total) in samples.iter_mut().zip(totals) {
-            self.fill(&degree, sample, Weight::Flux, &mut column);
-            let own: f64 = column.iter().map(|x| x * x).sum();
+        for (column, total) in values.col_iter().zip(totals) {
+            let own = column.squared_norm_l2();
             *total += own;
             let part = |x: f64| if *total > 0.0 { x / total.sqrt() } else { 0.0 };
             largest = largest.max(part(own.sqrt()));
-            for (m, x) in most.iter_mut().zip(&column) {
+            for (m, x) in most.iter_mut().zip(column.iter()) {
                 *m = m.max(part(x.abs()));
             }
         }
@@ -205,41 +222,54 @@ impl Harmonics {
         Ok((degree, largest))
     }
 
-    /// Goes on to a degree and writes a point's values of its functions.
-    fn fill(&self, degree: &Degree, probe: &mut Probe, weight: Weight, out: &mut [f64]) {
-        let legendre = &mut probe.legendre;
-        legendre.advance(&degree.recursion);
+    /// Goes on to a degree and writes the values of its functions at some points: functions × points.
+    fn fill(&self, degree: &Degree, probes: &mut [Probe], weight: Weight, mut out: MatMut<f64>) {
         let rate = self.grid.rate();
-        let factors: Vec<f64> = degree
+        let weights: Vec<f64> = degree
             .radials
             .iter()
             .map(|r| {
                 let share = r.inside / (r.inside + r.outside);
-                let weight = match weight {
+                match weight {
                     Weight::One => 1.0,
                     Weight::Flux => 4.0 * PI * share,
                     Weight::Answer => (4.0 * PI * share * rate / r.outside).sqrt(),
-                };
-                weight * self.grid.value(r, &probe.spot)
+                }
             })
             .collect();
-        let mut out = out.iter_mut();
-        let mut basis = Vec::new();
+        for probe in probes.iter_mut() {
+            probe.legendre.advance(&degree.recursion);
+        }
+        let mut from = 0;
         for class in &degree.classes {
-            basis.clear();
-            basis.extend(class.orders.iter().map(|&m| legendre.value(m, class.sine)));
-            for (j, (&r, out)) in class.radials.iter().zip(&mut out).enumerate() {
-                let own = match &class.vectors {
-                    None => basis[j],
-                    Some(v) => basis.iter().zip(v.col(j).iter()).map(|(y, v)| y * v).sum(),
-                };
-                *out = factors[r] * own;
+            let size = class.radials.len();
+            let mut own = out.rb_mut().subrows_mut(from, size);
+            from += size;
+            let basis = Mat::from_fn(class.orders.len(), probes.len(), |i, j| {
+                probes[j].legendre.value(class.orders[i], class.sine)
+            });
+            match &class.vectors {
+                None => own.copy_from(&basis),
+                Some(v) => {
+                    let (add, v) = (Accum::Replace, v.transpose());
+                    matmul(own.rb_mut(), add, v, basis.as_ref(), 1.0, Par::Seq);
+                }
+            }
+        }
+        let mut factors = vec![0.0; degree.radials.len()];
+        for (probe, column) in probes.iter().zip(out.col_iter_mut()) {
+            for ((f, r), w) in factors.iter_mut().zip(&degree.radials).zip(&weights) {
+                *f = w * self.grid.value(r, &probe.spot);
+            }
+            let radials = degree.classes.iter().flat_map(|c| &c.radials);
+            for (x, r) in column.iter_mut().zip(radials) {
+                *x *= factors[*r];
             }
         }
     }
 
-    /// Values of the functions of some degrees at all points: column-major functions × points, and the
-    /// largest norm of each degree.
+    /// Values of the functions of some degrees at all points, functions × points, and the largest norm
+    /// of each degree.
     fn values(
         &self,
         degrees: &[Degree],
@@ -247,18 +277,19 @@ impl Harmonics {
         weight: Weight,
     ) -> (Mat<f64>, Vec<f64>) {
         let size: usize = degrees.iter().map(|d| d.size).sum();
-        let mut out = vec![0.0; size * probes.len()];
-        let norms = out
-            .par_chunks_mut(size.max(1))
-            .zip(probes.par_iter_mut())
-            .map(|(column, probe)| {
-                let mut rest = column;
+        let mut out = Mat::zeros(size, probes.len());
+        let blocks = blocks(out.as_mut());
+        let norms = blocks
+            .into_par_iter()
+            .zip(probes.par_chunks_mut(POINTS))
+            .map(|(mut block, probes)| {
+                let mut from = 0;
                 let mut norms = Vec::with_capacity(degrees.len());
                 for degree in degrees {
-                    let (own, after) = rest.split_at_mut(degree.size);
-                    self.fill(degree, probe, weight, own);
-                    norms.push(own.iter().map(|x| x * x).sum::<f64>().sqrt());
-                    rest = after;
+                    let mut own = block.rb_mut().subrows_mut(from, degree.size);
+                    self.fill(degree, probes, weight, own.rb_mut());
+                    from += degree.size;
+                    norms.push(own.col_iter().map(|c| c.norm_l2()).fold(0.0, f64::max));
                 }
                 norms
             })
@@ -266,7 +297,6 @@ impl Harmonics {
                 || vec![0.0; degrees.len()],
                 |a, b| a.iter().zip(&b).map(|(a, b)| f64::max(*a, *b)).collect(),
             );
-        let out = MatRef::from_column_major_slice(&out, size, probes.len()).to_owned();
         (out, norms)
     }
 
@@ -284,15 +314,14 @@ impl Harmonics {
         let same = sources == points;
         let unit = |p: &Place| {
             let level = p.level / (self.scale * self.scale);
-            self.probe(&(Vec3::zeros(), Place { level, ..*p }))
+            self.probe(&Place { level, ..*p }, self.degrees.len())
         };
-        let mut at_sources: Vec<Probe> = sources.iter().map(unit).collect::<Result<_>>()?;
-        let mut at_points: Vec<Probe> = if same {
-            Vec::new()
-        } else {
-            points.iter().map(unit).collect::<Result<_>>()?
+        let mut at_sources: Vec<Probe> = sources.iter().map(unit).collect();
+        let mut at_points: Vec<Probe> = match same {
+            true => Vec::new(),
+            false => points.iter().map(unit).collect(),
         };
-        let mut out = vec![0.0; points.len() * sources.len()];
+        let mut out = Mat::zeros(points.len(), sources.len());
         let mut bounds: Vec<f64> = Vec::new();
         let mut from = 0;
         while from < self.degrees.len() && !ended(&bounds) {
@@ -332,7 +361,7 @@ impl Harmonics {
                 });
             }
         }
-        Ok(MatRef::from_column_major_slice(&out, points.len(), sources.len()).to_owned())
+        Ok(out)
     }
 }
 
@@ -356,17 +385,25 @@ fn remainder(bounds: &[f64]) -> f64 {
     }
 }
 
-/// `out += scale · leftᵀ right`, column-major, columns in parallel.
-fn add_product(out: &mut [f64], left: MatRef<f64>, right: MatRef<f64>, scale: f64) {
-    let rows = left.ncols();
-    out.par_chunks_mut(64 * rows.max(1))
-        .enumerate()
-        .for_each(|(i, chunk)| {
-            let columns = chunk.len() / rows;
-            let right = right.subcols(64 * i, columns);
-            let chunk = MatMut::from_column_major_slice_mut(chunk, rows, columns);
-            matmul(chunk, Accum::Add, left.transpose(), right, scale, Par::Seq);
-        });
+/// `out += scale · leftᵀ right`, columns in parallel.
+fn add_product(out: &mut Mat<f64>, left: MatRef<f64>, right: MatRef<f64>, scale: f64) {
+    let blocks = blocks(out.as_mut());
+    blocks.into_par_iter().enumerate().for_each(|(i, block)| {
+        let right = right.subcols(POINTS * i, block.ncols());
+        matmul(block, Accum::Add, left.transpose(), right, scale, Par::Seq);
+    });
+}
+
+/// Columns in blocks of [`POINTS`].
+fn blocks(mut whole: MatMut<'_, f64>) -> Vec<MatMut<'_, f64>> {
+    let mut out = Vec::with_capacity(whole.ncols().div_ceil(POINTS));
+    while whole.ncols() > POINTS {
+        let (block, rest) = whole.split_at_col_mut(POINTS);
+        out.push(block);
+        whole = rest;
+    }
+    out.push(whole);
+    out
 }
 
 impl Degree {
@@ -390,10 +427,8 @@ impl Degree {
         for r in self.classes.iter().flat_map(|c| &c.radials) {
             used[*r] = Some(0);
         }
-        let mut next = 0;
-        for slot in used.iter_mut().flatten() {
+        for (next, slot) in used.iter_mut().flatten().enumerate() {
             *slot = next;
-            next += 1;
         }
         let mut index = used.iter();
         self.radials

@@ -18,12 +18,14 @@
 
 use crate::adjoint::lie::{Mat3, Vec3};
 
-/// Step in v.
-const STEP: f64 = 1.0 / 32.0;
+/// Step in v: leaves errors of 1e-9 in F.
+const STEP: f64 = 1.0 / 16.0;
 /// Steps between nodes that are kept.
 const KEPT: usize = 2;
-/// −ln F beyond which F counts as 0.
-const NOTHING: f64 = 60.0;
+/// −ln of F over a dipole's fall, beyond which F counts as 0.
+const NOTHING: f64 = 37.0;
+/// The same from which the start of an integration is forgotten.
+const FORGOTTEN: f64 = 12.0;
 /// Where D = n + 1 to rounding, as ℓ over the square of the longest semi-axis.
 const FAR: f64 = 1e12;
 /// Where the inside begins, as ℓ over the smallest square.
@@ -119,8 +121,8 @@ impl Grid {
         };
         let mut fall = 0.0;
         let mut last = 0;
-        while last < self.outside.len() && fall < NOTHING + 40.0 {
-            fall += STEP * root(&self.nodes[last]);
+        while last < self.outside.len() && fall < NOTHING + FORGOTTEN {
+            fall += STEP * (root(&self.nodes[last]) - 2.0);
             last += 1;
         }
         let mut d = root(&self.nodes[last]);
@@ -146,7 +148,9 @@ impl Grid {
         for entry in &mut table {
             entry[0] = sum - entry[0];
         }
-        let end = table.iter().position(|e| e[0] > NOTHING);
+        let spacing = STEP * KEPT as f64;
+        let nothing = |k: usize| table[k][0] - 2.0 * spacing * k as f64 > NOTHING;
+        let end = (0..table.len()).find(|&k| nothing(k));
         if let Some(end) = end {
             table.truncate(end + 1);
         }
@@ -160,15 +164,28 @@ impl Grid {
 
     /// D of E at the surface.
     fn inside(&self, p: &impl Fn(&Coefficients) -> f64, odd: bool) -> f64 {
-        let first = p(&self.start);
-        let mut d = match (self.b > 0.0, odd) {
-            (true, true) => 1.0,
-            (true, false) => first,
-            // A focal segment: E goes like e^{mv}, P → m².
-            (false, _) if first > 0.5 => first.sqrt(),
-            (false, _) => 0.5 * first,
-        };
-        for cell in &self.inside {
+        // The start is where E grows so much on the way that it is forgotten, or the focal ellipse.
+        let mut from = self.inside.len();
+        let (mut growth, mut d) = (0.0, 0.0);
+        while from > 0 && growth < FORGOTTEN {
+            from -= 1;
+            let c = &self.inside[from][0];
+            let half = 0.5 * c.kappa;
+            let rate = (half * half + p(c)).sqrt();
+            growth += self.stride * rate;
+            d = half + rate;
+        }
+        if growth < FORGOTTEN {
+            let first = p(&self.start);
+            d = match (self.b > 0.0, odd) {
+                (true, true) => 1.0,
+                (true, false) => first,
+                // A focal segment: E goes like e^{mv}, P → m².
+                (false, _) if first > 0.5 => first.sqrt(),
+                (false, _) => 0.5 * first,
+            };
+        }
+        for cell in &self.inside[from..] {
             d = radau(d, &cell.map(|c| (p(&c), c.kappa)), self.stride)[2];
         }
         d

@@ -4,6 +4,7 @@
 use super::{Harmonics, Probe, Weight};
 use crate::Result;
 use crate::adjoint::lie::Vec3;
+use faer::Mat;
 use rayon::prelude::*;
 use std::f64::consts::{FRAC_PI_2, PI, TAU};
 
@@ -55,30 +56,27 @@ impl Harmonics {
     }
 
     fn residual_of(&self, name: &str, direction: &Vec3, gap: f64) -> Result<f64> {
-        let (_, source) = self.offset(name, direction, gap)?;
-        let mut at_source = [self.probe(&source)?];
+        let most = self.degrees.len();
+        let (source, place) = self.offset(name, direction, gap)?;
+        let mut at_source = [self.probe(&place, most)];
         let checks = around(direction, gap);
         let mut probes: Vec<Probe> = checks
             .iter()
-            .map(|(d, _)| self.probe(&self.offset(name, d, 0.0)?.1))
+            .map(|(d, _)| Ok(self.probe(&self.offset(name, d, 0.0)?.1, most)))
             .collect::<Result<_>>()?;
         // ∂φ/∂τ = −∂φ/∂n dA/dΩ at each check point.
-        let mut answers = vec![0.0; checks.len()];
+        let mut answers = Mat::zeros(checks.len(), 1);
         for degree in self.degrees.chunks(8) {
             let (own, _) = self.values(degree, &mut at_source, Weight::Flux);
             let (left, _) = self.values(degree, &mut probes, Weight::One);
-            for (i, answer) in answers.iter_mut().enumerate() {
-                *answer += (0..own.nrows())
-                    .map(|k| own[(k, 0)] * left[(k, i)])
-                    .sum::<f64>();
-            }
+            answers += left.transpose() * own;
         }
         let (mut left, mut all) = (0.0, 0.0);
-        for ((d, solid_angle), answer) in checks.iter().zip(&answers) {
+        for ((d, solid_angle), answer) in checks.iter().zip(answers.col(0).iter()) {
             let n = d.component_div(&self.semi_axes);
             // dA/dΩ
             let stretch = self.semi_axes.product() * n.norm();
-            let away = d.component_mul(&self.semi_axes) - source.0;
+            let away = d.component_mul(&self.semi_axes) - source;
             let asked = n.normalize().dot(&away) / away.norm().powi(3);
             let area = solid_angle * stretch;
             left += area * (asked + answer / stretch).powi(2);

@@ -129,6 +129,8 @@ impl Proxies {
 /// Compresses the body whose closed surface is `vertices` (m, body frame) and `faces`, and whose flow
 /// `response` knows.
 ///
+/// A resolved gap below [`finest_gap`] is raised to it: see [`Fit::resolved_gap`].
+///
 /// # Errors
 /// Settings out of range, a surface that doesn't bound a volume, and what the one-body method
 /// doesn't resolve.
@@ -143,19 +145,12 @@ pub fn compress(
     let surface = Surface::new(name, vertices, faces)?;
     let (centre, radius) = ball(vertices);
     let area: f64 = surface.faces.areas.iter().sum();
-    let mut warnings = response.warnings().to_vec();
+    let warnings = response.warnings().to_vec();
     let finest = finest_gap(area);
     let asked = settings.resolved_gap;
     let gap = asked
         .unwrap_or_else(|| default_gap(surface.faces.volume(), area))
         .max(finest);
-    if let Some(asked) = asked.filter(|a| *a < finest) {
-        warnings.push(format!(
-            "body {name:?}: gaps under {gap:.3e} m aren't resolved by its compressed sources, for all \
-             that {asked:.3e} m were asked for: its surface of {area:.3e} m² is too large; use a plane \
-             wall for a floor, or the fidelity full"
-        ));
-    }
     let (mut fitted, mut checked) = proxies(&surface, gap, radius, SPACING);
     let needed = FITTED * settings.rank.unwrap_or(0);
     if fitted.points.len() < needed {
@@ -241,6 +236,7 @@ pub fn compress(
             scattered,
             wrong_sign,
             body_asymmetry: response.asymmetry(),
+            body_error: response.error(),
             warnings,
         },
         points: chosen,

@@ -1,0 +1,402 @@
+//! Bodies and walls in one panel system, against exact values and against itself.
+
+use hydrograd::adjoint::lie::{Mat3, Pose, Vec3, exp_matrix};
+use hydrograd::boundary::PanelBoundary;
+use hydrograd::boundary::panel::MOST_FACES;
+use hydrograd::coupling::panel::{SolveSettings, Solver};
+use hydrograd::coupling::{Coupling, Direction, PanelCoupled};
+use hydrograd::scene::{Shape, Wall, WallSurface};
+use hydrograd::{Error, Result};
+use nalgebra::{DMatrix, DVector};
+use std::path::Path;
+use std::sync::Arc;
+
+type Mesh = (Vec<Vec3>, Vec<[usize; 3]>);
+
+fn ellipsoid(semi_axes: [f64; 3], faces: usize) -> Mesh {
+    let shape = Shape::Ellipsoid {
+        semi_axes,
+        faces: None,
+    };
+    let m = hydrograd::shape::build(&shape, Path::new("."), Some(faces)).unwrap();
+    (m.vertices().to_vec(), m.faces().to_vec())
+}
+
+fn named(name: &str, mesh: &Mesh) -> Arc<PanelBoundary> {
+    Arc::new(PanelBoundary::new(name, &mesh.0, &mesh.1).unwrap())
+}
+
+/// Plane z = height, fluid above.
+fn wall(height: f64, surface: WallSurface) -> Wall {
+    Wall {
+        surface,
+        point: [0.3, -0.2, height],
+        normal: [0.0, 0.0, 2.0],
+    }
+}
+
+fn at(z: f64) -> Pose {
+    Pose::new(Mat3::identity(), Vec3::new(0.0, 0.0, z))
+}
+
+fn momenta(
+    bodies: &[Arc<PanelBoundary>],
+    walls: &[Wall],
+    solver: Solver,
+    poses: &[Pose],
+) -> Result<DMatrix<f64>> {
+    let settings = SolveSettings {
+        solver,
+        tolerance: 1e-10,
+        ..SolveSettings::default()
+    };
+    let c = PanelCoupled::new(bodies.to_vec(), walls, settings)?;
+    let n = 6 * bodies.len();
+    let record = c.evaluate(poses, &DMatrix::identity(n, n), false)?;
+    assert_eq!(record.report().iterations == 0, solver == Solver::Lu);
+    assert!(record.report().asymmetry < 5e-3, "{:?}", record.report());
+    let m = record.momenta().clone();
+    assert!((&m - m.transpose()).abs().max() < 1e-7 * m.max());
+    Ok(m)
+}
+
+#[test]
+fn two_spheres() {
+    // Centre distance; along the line of centres own and mutual; the same across (exact).
+    let equal = [
+        (
+            2.05,
+            [
+                2.32202493143995,
+                -0.8142853669628686,
+                2.1589776041169393,
+                0.3814265072810595,
+            ],
+            0.009,
+        ),
+        (
+            2.2,
+            [
+                2.212295759450387,
+                -0.6176388786372325,
+                2.1287968395728725,
+                0.3003675369424352,
+            ],
+            0.007,
+        ),
+        (
+            3.0,
+            [
+                2.106704831524129,
+                -0.23339113417708315,
+                2.0978073973851967,
+                0.11646306884048746,
+            ],
+            0.0055,
+        ),
+    ];
+    let ball = named("ball", &ellipsoid([1.0; 3], 1280));
+    let pair = [ball.clone(), ball.clone()];
+    let worst = |m: &DMatrix<f64>, exact: &[f64; 4]| {
+        let found = [m[(2, 2)], m[(2, 8)], m[(0, 0)], m[(0, 6)]];
+        let own = exact[0].max(exact[2]);
+        let errors = found.iter().zip(exact).map(|(f, e)| (f - e).abs() / own);
+        errors.fold(0.0, f64::max)
+    };
+    for (d, exact, limit) in equal {
+        let poses = [at(0.0), at(d)];
+        let iterative = momenta(&pair, &[], Solver::Gmres, &poses).unwrap();
+        let error = worst(&iterative, &exact);
+        assert!(error < limit, "{d}: {error}");
+        if d == 2.2 {
+            let direct = momenta(&pair, &[], Solver::Lu, &poses).unwrap();
+            let apart = (&iterative - &direct).abs().max() / direct.max();
+            assert!(apart < 1e-8, "{apart:e}");
+        }
+    }
+    // Radii 1 and ½, and both meshes extrapolated: an order better.
+    let small = |n| named("small", &ellipsoid([0.5; 3], n));
+    let at_faces =
+        |ball, n| momenta(&[ball, small(n)], &[], Solver::Gmres, &[at(0.0), at(1.6)]).unwrap();
+    let fine = at_faces(ball, 1280);
+    let coarse = at_faces(named("ball", &ellipsoid([1.0; 3], 320)), 320);
+    let better = &fine + (&fine - coarse) / (1.985 * 1.985 - 1.0);
+    // Along the line of centres and across: large, mutual, small.
+    for (i, exact) in [
+        (
+            2,
+            [2.163176112461505, -0.20346286079767356, 0.2900123148869534],
+        ),
+        (
+            0,
+            [2.112504291132812, 0.09821453193767603, 0.2711781848554391],
+        ),
+    ] {
+        let scale = [exact[0], f64::sqrt(exact[0] * exact[2]), exact[2]];
+        for (k, (row, column)) in [(i, i), (i, i + 6), (i + 6, i + 6)].into_iter().enumerate() {
+            let error = |m: &DMatrix<f64>| (m[(row, column)] - exact[k]).abs() / scale[k];
+            assert!(error(&fine) < 0.009, "{i} {k}: {}", error(&fine));
+            assert!(error(&better) < 5e-4, "{i} {k}: {}", error(&better));
+        }
+    }
+}
+
+#[test]
+fn a_sphere_by_a_wall() {
+    let ball = [named("ball", &ellipsoid([1.0; 3], 1280))];
+    // Height of the centre; across and along the wall (exact).
+    for (h, across, along, limit) in [
+        (1.025, 3.1363102984028184, 2.540404111397999, 0.011),
+        (1.1, 2.82993463808762, 2.4291643765153075, 0.009),
+        (1.5, 2.340095965701212, 2.2142704662256842, 0.0065),
+        (2.0, 2.1944680370725975, 2.1439821448998875, 0.006),
+    ] {
+        let rigid = [wall(-0.7, WallSurface::Rigid)];
+        let m = momenta(&ball, &rigid, Solver::Gmres, &[at(h - 0.7)]).unwrap();
+        for (found, exact) in [(m[(2, 2)], across), (m[(0, 0)], along)] {
+            assert!((found / exact - 1.0).abs() < limit, "{h}: {found} {exact}");
+        }
+        let direct = momenta(&ball, &rigid, Solver::Lu, &[at(h - 0.7)]).unwrap();
+        assert!((m - direct).abs().max() < 1e-8);
+    }
+    // A free surface: the image moves along, two spheres 2.2 apart in step.
+    let free = [wall(-0.7, WallSurface::Free)];
+    let m = momenta(&ball, &free, Solver::Gmres, &[at(0.4)]).unwrap();
+    let across = 2.212295759450387 - 0.6176388786372325;
+    let along = 2.1287968395728725 - 0.3003675369424352;
+    assert!((m[(2, 2)] / across - 1.0).abs() < 0.006, "{}", m[(2, 2)]);
+    assert!((m[(0, 0)] / along - 1.0).abs() < 0.006, "{}", m[(0, 0)]);
+}
+
+/// Walls against the same images as bodies of their own, mirrored meshes.
+#[test]
+fn walls_are_mirrored_bodies() {
+    let (ball, coin) = (ellipsoid([0.4; 3], 80), ellipsoid([0.5, 0.2, 0.3], 80));
+    let poses = [
+        Pose::new(
+            exp_matrix(&Vec3::new(0.4, 0.1, -0.3)),
+            Vec3::new(0.7, 0.2, 0.6),
+        ),
+        Pose::new(
+            exp_matrix(&Vec3::new(-0.2, 0.7, 0.5)),
+            Vec3::new(1.6, -0.1, 0.9),
+        ),
+    ];
+    let bodies = [named("ball", &ball), named("coin", &coin)];
+    let side = Wall {
+        surface: WallSurface::Rigid,
+        point: [0.05, 0.0, 0.0],
+        normal: [1.0, 0.0, 0.0],
+    };
+    let walls = [wall(-0.05, WallSurface::Rigid), side];
+    let with_walls = momenta(&bodies, &walls, Solver::Gmres, &poses).unwrap();
+    // In the world's frame: mirrored meshes are turned inside out.
+    let mirror = |mesh: &Mesh, pose: &Pose, flip: [bool; 2]| -> Mesh {
+        let place = |x: &Vec3| {
+            let mut y = pose.apply(x);
+            if flip[0] {
+                y.z = -0.1 - y.z;
+            }
+            if flip[1] {
+                y.x = 0.1 - y.x;
+            }
+            y
+        };
+        let turn = |t: &[usize; 3]| {
+            if flip[0] != flip[1] {
+                [t[0], t[2], t[1]]
+            } else {
+                *t
+            }
+        };
+        (
+            mesh.0.iter().map(place).collect(),
+            mesh.1.iter().map(turn).collect(),
+        )
+    };
+    let flips = [[false, false], [true, false], [false, true], [true, true]];
+    let all: Vec<_> = [(&ball, &poses[0]), (&coin, &poses[1])]
+        .iter()
+        .flat_map(|(mesh, pose)| flips.map(|f| named("image", &mirror(mesh, pose, f))))
+        .collect();
+    let together = momenta(&all, &[], Solver::Lu, &[Pose::identity(); 8]).unwrap();
+    // Spatial twists of the images: velocities mirrored, turns mirrored and reversed.
+    let image = |x: &[f64], flip: [bool; 2]| -> [f64; 6] {
+        let mut out: [f64; 6] = x.try_into().unwrap();
+        for (axis, offset) in [(2, -0.1), (0, 0.1)] {
+            if flip[usize::from(axis == 0)] {
+                // y = x with one coordinate c ↦ offset − c.
+                let mut turn = [-out[3], -out[4], -out[5]];
+                turn[axis] = -turn[axis];
+                let mut u = [out[0], out[1], out[2]];
+                u[axis] = -u[axis];
+                let shift = Vec3::ith(axis, offset);
+                let u = Vec3::from(u) - Vec3::from(turn).cross(&shift);
+                out = [u.x, u.y, u.z, turn[0], turn[1], turn[2]];
+            }
+        }
+        out
+    };
+    let mut embed = DMatrix::zeros(48, 12);
+    for b in 0..2 {
+        for k in 0..6 {
+            let mut twist = nalgebra::Vector6::zeros();
+            twist[k] = 1.0;
+            let spatial = poses[b].twist_to_world(&twist);
+            for (i, f) in flips.iter().enumerate() {
+                let x = image(spatial.as_slice(), *f);
+                for (c, x) in x.iter().enumerate() {
+                    embed[(24 * b + 6 * i + c, 6 * b + k)] = *x;
+                }
+            }
+        }
+    }
+    let expected = embed.transpose() * together * embed / 4.0;
+    let error = (with_walls - &expected).abs().max() / expected.max();
+    assert!(error < 1e-9, "{error:e}");
+}
+
+#[test]
+fn alone_or_moved_together_nothing_changes() {
+    let coin = named("coin", &ellipsoid([0.5, 0.2, 0.3], 320));
+    let pose = Pose::new(
+        exp_matrix(&Vec3::new(0.4, 0.1, -0.3)),
+        Vec3::new(0.7, 0.2, 0.6),
+    );
+    let alone = momenta(std::slice::from_ref(&coin), &[], Solver::Gmres, &[pose]);
+    // No iteration is needed for one body; its own value comes back.
+    let settings = SolveSettings::default();
+    let c = PanelCoupled::new(vec![coin.clone()], &[], settings).unwrap();
+    let m = c
+        .evaluate(&[pose], &DMatrix::identity(6, 6), false)
+        .unwrap();
+    let own = DMatrix::from_column_slice(6, 6, coin.added_mass.as_slice());
+    assert!((m.momenta() - &own).abs().max() < 1e-12);
+    assert!((alone.unwrap() - own).abs().max() < 1e-12);
+    // A few columns of the basis, and a body that no column moves.
+    let pair = vec![coin.clone(), coin];
+    let c = PanelCoupled::new(pair.clone(), &[], settings).unwrap();
+    let poses = [pose, pose.compose(&at(0.9))];
+    let full = c
+        .evaluate(&poses, &DMatrix::identity(12, 12), false)
+        .unwrap();
+    let basis = DMatrix::from_fn(12, 2, |i, k| {
+        if i < 6 {
+            (1.0 + (i + 7 * k) as f64).sin()
+        } else {
+            0.0
+        }
+    });
+    let few = c.evaluate(&poses, &basis, false).unwrap();
+    let error = (few.momenta() - full.momenta() * &basis).abs().max();
+    assert!(error < 1e-8, "{error:e}");
+    let turn = Pose::new(
+        exp_matrix(&Vec3::new(1.0, -2.0, 0.5)),
+        Vec3::new(30.0, 1.0, -7.0),
+    );
+    let moved = poses.map(|p| turn.compose(&p));
+    let there = c.evaluate(&moved, &basis, false).unwrap();
+    assert!((there.momenta() - few.momenta()).abs().max() < 1e-9);
+    let nothing = c.evaluate(&poses, &DMatrix::zeros(12, 0), false).unwrap();
+    assert_eq!(nothing.momenta().shape(), (12, 0));
+}
+
+#[test]
+fn values_only() {
+    let ball = named("ball", &ellipsoid([1.0; 3], 80));
+    let c = PanelCoupled::new(vec![ball; 2], &[], SolveSettings::default()).unwrap();
+    let poses = [at(0.0), at(2.5)];
+    let basis = DMatrix::identity(12, 12);
+    let refused = |error: Error| {
+        assert!(matches!(error, Error::Unsupported { .. }), "{error}");
+        assert!(error.to_string().contains("full"), "{error}");
+    };
+    refused(c.evaluate(&poses, &basis, true).err().unwrap());
+    let r = c.evaluate(&poses, &basis, false).unwrap();
+    let x = DVector::from_element(12, 1.0);
+    refused(
+        r.vjp(Direction::Basis(&x), Direction::Twist(&x))
+            .unwrap_err(),
+    );
+    let z = vec![nalgebra::Vector6::zeros(); 2];
+    refused(
+        r.hvp(Direction::Basis(&x), Direction::Basis(&x), &z)
+            .unwrap_err(),
+    );
+    assert!(r.gradient(&x, &x).iter().all(|w| w.norm() == 0.0));
+    assert_eq!(r.gradient_along(&x, &z), DVector::zeros(12));
+}
+
+#[test]
+fn overlaps_and_impossible_settings_are_errors() {
+    let ball = named("ball", &ellipsoid([1.0; 3], 320));
+    let coin = named("coin", &ellipsoid([0.3, 0.1, 0.3], 80));
+    for solver in [Solver::Gmres, Solver::Lu] {
+        let pair = [ball.clone(), coin.clone()];
+        // Crossing, wholly inside, nowhere.
+        for x in [1.05, 0.0, f64::NAN] {
+            let error = momenta(&pair, &[], solver, &[at(0.0), at(x)]).unwrap_err();
+            assert!(matches!(error, Error::Unresolved { .. }), "{error}");
+            let text = error.to_string();
+            assert!(
+                text.contains("\"ball\"") && text.contains("\"coin\""),
+                "{text}"
+            );
+        }
+        // Through the wall, and behind it.
+        for x in [0.9, -5.0] {
+            let floor = [wall(0.0, WallSurface::Rigid)];
+            let error = momenta(std::slice::from_ref(&ball), &floor, solver, &[at(x)]).unwrap_err();
+            let text = error.to_string();
+            assert!(
+                text.contains("\"ball\"") && text.contains("wall 0"),
+                "{text}"
+            );
+        }
+    }
+    let new = |settings| PanelCoupled::new(vec![ball.clone()], &[], settings);
+    for tolerance in [0.0, -1.0, 1.0, f64::NAN] {
+        let settings = SolveSettings {
+            tolerance,
+            ..SolveSettings::default()
+        };
+        assert!(matches!(new(settings), Err(Error::Input { .. })));
+    }
+    let settings = SolveSettings {
+        max_iterations: 0,
+        ..SolveSettings::default()
+    };
+    assert!(matches!(new(settings), Err(Error::Input { .. })));
+    let many = vec![ball.clone(); MOST_FACES / ball.faces.len() + 1];
+    let error = PanelCoupled::new(many, &[], SolveSettings::default())
+        .err()
+        .unwrap();
+    assert!(matches!(error, Error::Unsupported { .. }), "{error}");
+    // A solve that can't finish says where it stopped.
+    let settings = SolveSettings {
+        max_iterations: 1,
+        tolerance: 1e-12,
+        ..SolveSettings::default()
+    };
+    let c = PanelCoupled::new(vec![ball; 2], &[], settings).unwrap();
+    let error = c.evaluate(&[at(0.0), at(2.1)], &DMatrix::identity(12, 12), false);
+    assert!(matches!(error, Err(Error::Solver { iterations: 1, .. })));
+    // Poses for fewer bodies.
+    let error = c.evaluate(&[at(0.0)], &DMatrix::identity(12, 12), false);
+    assert!(matches!(error, Err(Error::Input { .. })));
+}
+
+#[test]
+fn any_thread_count() {
+    let answers = |threads: usize| {
+        let pool = rayon::ThreadPoolBuilder::new().num_threads(threads);
+        pool.build().unwrap().install(|| {
+            let b = named("coin", &ellipsoid([0.5, 0.2, 0.3], 500));
+            let walls = [wall(-0.6, WallSurface::Rigid)];
+            let poses = [at(0.0), at(0.7)];
+            [Solver::Gmres, Solver::Lu]
+                .map(|s| momenta(&[b.clone(), b.clone()], &walls, s, &poses).unwrap())
+        })
+    };
+    assert!(answers(1) == answers(2));
+}

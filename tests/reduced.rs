@@ -1,0 +1,370 @@
+//! The reduced coupling against exact solutions, its symmetry, its cache, and what it refuses.
+
+use hydrograd::adjoint::lie::{Mat3, Pose, Vec3};
+use hydrograd::boundary::{ExactBoundary, OneBody, PanelBoundary};
+use hydrograd::coupling::reduced::{Reduced, ReducedBody, cache, compress};
+use hydrograd::coupling::{Coupling, Direction};
+use hydrograd::scene::{Body, Fluid, Scene, Shape, Wall, WallSurface};
+use hydrograd::shape;
+use hydrograd::{Controls, Fidelity, Settings, Simulator};
+use nalgebra::{DMatrix, DVector};
+use std::path::Path;
+use std::sync::Arc;
+
+/// Two equal spheres of radius 1 at unit density, centres d apart: along the line of centres M11 and
+/// M12, across it M11 and M12 (multipoles against images, agreeing to 1e-16).
+const TWO_SPHERES: [(f64, [f64; 4]); 6] = [
+    (
+        2.05,
+        [
+            2.32202493143995,
+            -0.8142853669628686,
+            2.1589776041169393,
+            0.3814265072810595,
+        ],
+    ),
+    (
+        2.2,
+        [
+            2.212295759450387,
+            -0.6176388786372325,
+            2.1287968395728725,
+            0.3003675369424352,
+        ],
+    ),
+    (
+        2.5,
+        [
+            2.1384756378903385,
+            -0.40744442892392174,
+            2.1070601149394723,
+            0.2020009329363651,
+        ],
+    ),
+    (
+        3.0,
+        [
+            2.106704831524129,
+            -0.23339113417708315,
+            2.0978073973851967,
+            0.11646306884048746,
+        ],
+    ),
+    (
+        4.0,
+        [
+            2.096257475425208,
+            -0.09821056164738921,
+            2.094889664936694,
+            0.049092479963193415,
+        ],
+    ),
+    (
+        6.0,
+        [
+            2.0945416527273335,
+            -0.029089560983682573,
+            2.094432756981481,
+            0.01454450833192825,
+        ],
+    ),
+];
+
+fn sphere(rank: Option<usize>, tolerance: f64, gap: f64) -> Arc<ReducedBody> {
+    let mesh = shape::build(&Shape::sphere(1.0), Path::new(""), Some(1280)).unwrap();
+    let response = ExactBoundary::new("sphere", [1.0; 3], &Pose::identity(), gap).unwrap();
+    let settings = compress::Settings {
+        rank,
+        tolerance,
+        resolved_gap: Some(gap),
+    };
+    let (v, f) = (mesh.vertices(), mesh.faces());
+    Arc::new(compress::compress("sphere", v, f, &response, &settings).unwrap())
+}
+
+fn at(x: f64, y: f64, z: f64) -> Pose {
+    Pose::new(Mat3::identity(), Vec3::new(x, y, z))
+}
+
+fn matrix(coupling: &dyn Coupling, poses: &[Pose]) -> DMatrix<f64> {
+    let n = 6 * poses.len();
+    let basis = DMatrix::identity(n, n);
+    let record = coupling.evaluate(poses, &basis, false).unwrap();
+    record.momenta().clone()
+}
+
+/// Largest error of the two spheres' coefficients relative to M11.
+fn two_spheres_error(body: &Arc<ReducedBody>, d: f64, exact: &[f64; 4]) -> f64 {
+    let pair = Reduced::new(vec![body.clone(); 2], &[], |_, _| None).unwrap();
+    let m = matrix(&pair, &[at(0.0, 0.0, 0.0), at(0.0, 0.0, d)]);
+    let found = [m[(2, 2)], m[(2, 8)], m[(0, 0)], m[(0, 6)]];
+    let errors = found.iter().zip(exact).map(|(a, b)| (a - b).abs());
+    errors.fold(0.0, f64::max) / exact[0]
+}
+
+#[test]
+fn two_spheres_meet_the_exact_table() {
+    for (rank, gap, limits) in [
+        (80, 0.5, [2e-2, 5e-3, 1e-3, 5e-4, 1e-4, 5e-5]),
+        (160, 0.5, [2e-2, 5e-3, 5e-4, 1e-4, 1e-5, 1e-6]),
+        (160, 0.2, [2e-3, 1e-3, 5e-4, 1e-4, 1e-4, 1e-4]),
+    ] {
+        let body = sphere(Some(rank), 1e-4, gap);
+        assert!(body.points() <= rank);
+        for ((d, exact), limit) in TWO_SPHERES.iter().zip(limits) {
+            let error = two_spheres_error(&body, *d, exact);
+            println!(
+                "rank {rank}, resolved gap {gap}, gap {:.2}: {error:.1e}",
+                d - 2.0
+            );
+            assert!(error <= limit, "rank {rank} gap {}: {error:e}", d - 2.0);
+        }
+    }
+}
+
+#[test]
+fn a_tighter_tolerance_gives_more_points_and_smaller_errors() {
+    let mut last = (0, f64::INFINITY);
+    for tolerance in [3e-2, 3e-3, 3e-4] {
+        let body = sphere(None, tolerance, 0.2);
+        let (d, exact) = &TWO_SPHERES[1];
+        let error = two_spheres_error(&body, *d, exact);
+        println!(
+            "tolerance {tolerance:.0e}: {} points, error {error:.1e}",
+            body.points()
+        );
+        assert!(error <= tolerance);
+        assert!(body.points() > last.0 && error < last.1);
+        last = (body.points(), error);
+    }
+}
+
+/// A rigid wall is the mirror sphere, a free surface the mirror sphere of opposite sign.
+#[test]
+fn a_sphere_by_a_wall_and_under_a_free_surface() {
+    let body = sphere(None, 1e-4, 0.4);
+    for (d, [along, along12, across, across12]) in &TWO_SPHERES[2..5] {
+        let wall = |surface| Wall {
+            point: [0.0, 0.0, 0.0],
+            normal: [0.0, 0.0, -1.0],
+            surface,
+        };
+        for (surface, sign) in [(WallSurface::Rigid, 1.0), (WallSurface::Free, -1.0)] {
+            let one = Reduced::new(vec![body.clone()], &[wall(surface)], |_, _| None).unwrap();
+            let m = matrix(&one, &[at(0.3, -0.2, -0.5 * d)]);
+            let errors = [
+                m[(2, 2)] - (along - sign * along12),
+                m[(0, 0)] - (across + sign * across12),
+                m[(1, 1)] - (across + sign * across12),
+            ];
+            let worst = errors.iter().fold(0.0_f64, |w, e| w.max(e.abs())) / along;
+            println!("{surface:?} at {:.2}: {worst:.1e}", 0.5 * d - 1.0);
+            assert!(worst < 3e-4, "{surface:?} {d}: {worst:e}");
+        }
+    }
+}
+
+#[test]
+fn the_matrix_is_symmetric_to_rounding() {
+    let panel = |shape: Shape| {
+        let mesh = shape::build(&shape, Path::new(""), Some(320)).unwrap();
+        let (v, f) = (mesh.vertices(), mesh.faces());
+        let response = PanelBoundary::new("box", v, f).unwrap();
+        let settings = compress::Settings::default();
+        Arc::new(compress::compress("box", v, f, &response, &settings).unwrap())
+    };
+    let wall = Wall::rigid([0.0, 0.0, -2.0], [0.0, 0.2, 1.0]);
+    let bodies = vec![
+        panel(Shape::cuboid([1.0, 0.6, 0.4])),
+        sphere(None, 1e-2, 0.3),
+    ];
+    let coupled = Reduced::new(bodies, &[wall], |_, _| None).unwrap();
+    let m = matrix(&coupled, &[at(0.0, 0.0, -1.0), at(0.3, 1.6, -0.4)]);
+    let size = m.diagonal().map(|x| x.abs().max(1e-3).sqrt());
+    for i in 0..12 {
+        for j in 0..12 {
+            let gap = (m[(i, j)] - m[(j, i)]).abs() / (size[i] * size[j]);
+            assert!(gap < 1e-12, "{i} {j}: {gap:e}");
+        }
+    }
+    assert!(m.clone().cholesky().is_some() || m.symmetric_eigenvalues().min() > -1e-12);
+}
+
+#[test]
+fn gaps_far_below_what_is_resolved_are_errors_with_numbers() {
+    let body = sphere(Some(40), 1e-2, 0.5);
+    let pair = Reduced::new(vec![body; 2], &[], |_, _| None)
+        .unwrap()
+        .named(["left".to_string(), "right".to_string()]);
+    let basis = DMatrix::identity(12, 12);
+    let poses = [at(0.0, 0.0, 0.0), at(0.0, 0.0, 1.2)];
+    let error = match pair.evaluate(&poses, &basis, true) {
+        Ok(_) => panic!("spheres in one another"),
+        Err(e) => e.to_string(),
+    };
+    println!("{error}");
+    for word in ["left", "right", "5.000e-1", "full"] {
+        assert!(error.contains(word), "{error}");
+    }
+}
+
+/// Two ellipsoids of different shape and a box, by a wall.
+fn scene() -> Scene {
+    let mut scene = Scene::new(Fluid::fresh_water());
+    scene.add(Body::new(Shape::ellipsoid([0.1, 0.06, 0.04])).density(998.0));
+    scene.add(
+        Body::new(Shape::cuboid([0.1, 0.1, 0.06]))
+            .density(1300.0)
+            .at([0.25, 0.05, 0.0]),
+    );
+    scene.add_wall([0.0, 0.0, -0.2], [0.0, 0.0, 1.0]);
+    scene.initial.v = vec![
+        0.02, 0.03, -0.01, 0.5, -1.0, 0.8, -0.01, -0.02, 0.02, 1.0, 0.6, -0.7,
+    ];
+    scene
+}
+
+fn reduced() -> Settings {
+    Settings::default().fidelity(Fidelity::Reduced).faces(320)
+}
+
+fn end(simulator: &Simulator, steps: usize) -> Vec<u64> {
+    let rollout = simulator
+        .rollout(&Controls::zeros(simulator, steps))
+        .unwrap();
+    let last = &rollout.samples()[steps];
+    let numbers = last.q.iter().chain(last.v.iter());
+    numbers.map(|x| x.to_bits()).collect()
+}
+
+#[test]
+fn threads_do_not_change_a_bit() {
+    let run = |threads| {
+        let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build();
+        pool.unwrap().install(|| {
+            cache::forget();
+            end(&Simulator::new(&scene(), reduced()).unwrap(), 5)
+        })
+    };
+    assert_eq!(run(1), run(3));
+}
+
+#[test]
+fn the_cache_gives_the_same_bits_and_survives_damage() {
+    let folder = tempfile::tempdir().unwrap();
+    let settings = reduced().one_body(OneBody::Panel).accuracy(7e-3);
+    let run = || {
+        end(
+            &Simulator::cached(&scene(), settings, folder.path()).unwrap(),
+            5,
+        )
+    };
+    let files = || -> Vec<_> {
+        let all = std::fs::read_dir(folder.path()).unwrap();
+        let mut all: Vec<_> = all.map(|f| f.unwrap().path()).collect();
+        all.sort();
+        all
+    };
+    cache::forget();
+    let first = run();
+    assert_eq!(files().len(), 2);
+    let kept: Vec<Vec<u8>> = files().iter().map(|f| std::fs::read(f).unwrap()).collect();
+    // From memory, from disk, without either.
+    assert_eq!(run(), first);
+    cache::forget();
+    assert_eq!(run(), first);
+    cache::forget();
+    assert_eq!(end(&Simulator::new(&scene(), settings).unwrap(), 5), first);
+    // Cut short at many places, changed, empty, of another version.
+    let mut damaged: Vec<Vec<u8>> = [0, 1, 50, 120, 1000, kept[0].len() - 1]
+        .iter()
+        .map(|n| kept[0][..*n].to_vec())
+        .collect();
+    let mut changed = kept[0].clone();
+    let middle = changed.len() / 2;
+    changed[middle] ^= 1;
+    damaged.push(changed);
+    let text = String::from_utf8(kept[0].clone()).unwrap();
+    damaged.push(
+        text.replacen(
+            "hydrograd-compressed-body ",
+            "hydrograd-compressed-body 9",
+            1,
+        )
+        .into(),
+    );
+    for bytes in damaged {
+        std::fs::write(&files()[0], bytes).unwrap();
+        cache::forget();
+        assert_eq!(run(), first);
+        assert_eq!(std::fs::read(&files()[0]).unwrap(), kept[0]);
+    }
+    // What a killed writer leaves is not read.
+    std::fs::write(folder.path().join(".tmpAbCdEf"), b"half").unwrap();
+    cache::forget();
+    assert_eq!(run(), first);
+    // A folder that can't be made is an error that names it.
+    let file = folder.path().join("file");
+    std::fs::write(&file, b"").unwrap();
+    let error = Simulator::cached(&scene(), settings, &file.join("inside"));
+    assert!(error.err().unwrap().to_string().contains("inside"));
+}
+
+#[test]
+fn settings_out_of_range_are_refused_by_name() {
+    let try_with = |settings: Settings| match Simulator::new(&scene(), settings) {
+        Ok(_) => String::new(),
+        Err(e) => e.to_string(),
+    };
+    for (settings, word) in [
+        (reduced().rank(0), "rank"),
+        (reduced().accuracy(0.0), "tolerance"),
+        (reduced().accuracy(f64::NAN), "tolerance"),
+        (reduced().resolved_gap(-1.0), "resolved_gap"),
+        (reduced().resolved_gap(f64::INFINITY), "resolved_gap"),
+        (reduced().one_body(OneBody::Exact), "exact"),
+        (reduced().fidelity(Fidelity::Auto).accuracy(2.0), "accuracy"),
+    ] {
+        let said = try_with(settings);
+        assert!(said.contains(word), "{word}: {said:?}");
+    }
+    let mut free = scene();
+    free.walls[0].surface = WallSurface::Free;
+    let said = Simulator::new(&free, Settings::default())
+        .err()
+        .unwrap()
+        .to_string();
+    assert!(
+        said.contains("walls[0]") && said.contains("reduced"),
+        "{said}"
+    );
+    assert!(Simulator::new(&free, reduced()).is_ok());
+}
+
+/// Without derivative the record says nothing about it, as documented.
+#[test]
+fn directions_outside_the_basis_agree_with_those_on_it() {
+    let bodies = vec![sphere(Some(40), 1e-2, 0.5); 2];
+    let pair = Reduced::new(bodies, &[], |_, _| None).unwrap();
+    let poses = [at(0.0, 0.1, 0.0), at(0.3, 0.0, 2.9)];
+    let basis = DMatrix::<f64>::identity(12, 12);
+    let record = pair.evaluate(&poses, &basis, true).unwrap();
+    let x = DVector::from_fn(12, |i, _| (1.3 * i as f64).sin());
+    let y = DVector::from_fn(12, |i, _| (0.7 * i as f64).cos());
+    let on = record
+        .vjp(Direction::Basis(&x), Direction::Basis(&y))
+        .unwrap();
+    let off = record
+        .vjp(Direction::Twist(&x), Direction::Twist(&y))
+        .unwrap();
+    assert!((on.momentum_x - off.momentum_x).norm() < 1e-12);
+    for (a, b) in on.wrench.iter().zip(&off.wrench) {
+        assert!((a - b).norm() < 1e-12);
+    }
+    let other = record.gradient(&x, &y);
+    for (a, b) in on.wrench.iter().zip(&other) {
+        assert!((a - b).norm() < 1e-12);
+    }
+    let value = pair.evaluate(&poses, &basis, false).unwrap();
+    assert!(value.gradient(&x, &y).iter().all(|w| w.norm() == 0.0));
+}

@@ -42,24 +42,24 @@ pub(super) struct Lists {
     #[arg(long, value_enum, value_delimiter = ',', value_name = "LIST")]
     methods: Vec<Method>,
     /// Faces per body, for shapes by formula [default: the scene's own, and 80,320,1280].
-    #[arg(long, value_parser = positive, value_delimiter = ',', value_name = "LIST")]
+    #[arg(long, value_parser = positive, value_delimiter = ',', value_name = "LIST", allow_negative_numbers = true)]
     faces_list: Vec<usize>,
     /// Points of each compressed body, with the fidelity reduced [default: 20,40,80,160,320].
-    #[arg(long, value_parser = positive, value_delimiter = ',', value_name = "LIST")]
+    #[arg(long, value_parser = positive, value_delimiter = ',', value_name = "LIST", allow_negative_numbers = true)]
     ranks: Vec<usize>,
     /// Errors that reduced and auto aim at [default: their own, and 3e-2 to 1e-4].
-    #[arg(long, value_parser = tolerance, value_delimiter = ',', value_name = "LIST")]
+    #[arg(long, value_parser = tolerance, value_delimiter = ',', value_name = "LIST", allow_negative_numbers = true)]
     accuracies: Vec<f64>,
     /// Relative residuals of the coupled solve, with the fidelity full [default: its own, and 1e-3
     /// to 1e-10].
-    #[arg(long, value_parser = tolerance, value_delimiter = ',', value_name = "LIST")]
+    #[arg(long, value_parser = tolerance, value_delimiter = ',', value_name = "LIST", allow_negative_numbers = true)]
     tolerances: Vec<f64>,
     /// Integrators, with one fidelity: reduced if it is among them [default: the scene's own, and
     /// all others].
     #[arg(long, value_enum, value_delimiter = ',', value_name = "LIST")]
     integrators: Vec<options::Integrator>,
     /// Time steps in s, with the same fidelity [default: the scene's own, and 4 times to a quarter of it].
-    #[arg(long, value_parser = seconds, value_delimiter = ',', value_name = "LIST")]
+    #[arg(long, value_parser = seconds, value_delimiter = ',', value_name = "LIST", allow_negative_numbers = true)]
     time_steps: Vec<f64>,
     /// Every combination of what is varied, in place of one after the other.
     #[arg(long)]
@@ -429,7 +429,8 @@ impl<'a> Plan<'a> {
             | Shape::Ellipsoid { faces, .. }
             | Shape::Box { faces, .. }
             | Shape::Cylinder { faces, .. }
-            | Shape::Capsule { faces, .. } => Some(faces.unwrap_or(DEFAULT_FACES)),
+            | Shape::Capsule { faces, .. }
+            | Shape::Prism { faces, .. } => Some(faces.unwrap_or(DEFAULT_FACES)),
             Shape::Mesh { .. } => None,
         };
         let shapes = self.scene.bodies.iter().filter_map(|b| b.shape.as_ref());

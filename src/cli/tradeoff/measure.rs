@@ -197,7 +197,7 @@ fn fill(
     } else if step * steps as f64 > left() {
         let needed = step * steps as f64;
         row.say(format!(
-            "no end state: about {needed:.1} s more than the budget has for this row"
+            "no end state: its {needed:.1} s are too long for the budget"
         ));
     } else {
         let all = Instant::now();
@@ -254,7 +254,7 @@ fn time(
     let Some((steps, least)) = fits.or((cost(1, 1) <= 2.0 * allowance).then_some((1, 1))) else {
         let needed = cost(1, 1);
         row.say(format!(
-            "no gradient: about {needed:.1} s more than the budget has for this row"
+            "no gradient: its {needed:.1} s are too long for the budget"
         ));
         row.ms_per_step.get_or_insert(1e3 * step);
         return Ok(());

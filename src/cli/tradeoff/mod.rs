@@ -130,6 +130,13 @@ fn compare(scene: &Scene, arguments: &Arguments) -> Result<Report> {
         .filter(|(_, row)| row.is_none());
     let left_out = missing.map(|(c, _)| c.label()).collect();
     let mut rows: Vec<Row> = rows.into_iter().flatten().collect();
+    let fidelities: Vec<Fidelity> = configurations.iter().map(|c| c.settings.fidelity).collect();
+    let place = |r: &Row| {
+        fidelities
+            .iter()
+            .position(|f| *f == r.configuration.settings.fidelity)
+    };
+    rows.sort_by_key(place);
     conclude(&mut rows, &reference.said);
     Ok(Report {
         scene: scene.name.clone(),
@@ -162,11 +169,9 @@ fn order(configurations: &[Configuration]) -> Vec<usize> {
     out.sort_by_key(|i| {
         let c = &configurations[*i];
         let dear = c.settings.fidelity == Fidelity::Full;
-        (
-            c.family != Family::Base,
-            dear,
-            c.settings.faces.filter(|_| dear),
-        )
+        // Faces left to the scene are usually the most.
+        let faces = c.settings.faces.unwrap_or(usize::MAX);
+        (c.family != Family::Base, if dear { faces } else { 0 })
     });
     out
 }

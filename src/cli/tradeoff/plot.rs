@@ -17,6 +17,10 @@ const LEGEND: u32 = 200;
 /// Errors are drawn no lower than this: less is rounding.
 const FLOOR: f64 = 1e-12;
 
+/// Decades left free beside the outermost points, and shown at least.
+const MARGIN: f64 = 0.25;
+const LEAST: f64 = 1.6;
+
 type Panel<'a> = DrawingArea<SVGBackend<'a>, Shift>;
 
 /// A failure of the drawing itself, in words.
@@ -119,17 +123,18 @@ fn draw(text: &mut String, report: &Report) -> Drawn {
     Ok(())
 }
 
-/// Whole decades around the values.
-fn decades(values: impl Iterator<Item = f64>) -> std::ops::Range<f64> {
+/// From a little below to a little above the values; more than a decade, so that there is something
+/// to read.
+fn around(values: impl Iterator<Item = f64>) -> std::ops::Range<f64> {
     let (mut low, mut high) = (f64::INFINITY, f64::NEG_INFINITY);
     for x in values.filter(|x| *x > 0.0 && x.is_finite()).map(f64::log10) {
         (low, high) = (low.min(x), high.max(x));
     }
     if low > high {
-        return 0.1..10.0;
+        (low, high) = (0.0, 0.0);
     }
-    let (low, high) = ((low - 0.05).floor(), (high + 0.05).ceil());
-    10f64.powf(low)..10f64.powf(high)
+    let widen = (0.5 * (LEAST - (high - low))).max(MARGIN);
+    10f64.powf(low - widen)..10f64.powf(high + widen)
 }
 
 /// A power of ten as people write it.
@@ -145,8 +150,8 @@ fn tick(x: f64) -> String {
 impl Chart<'_> {
     fn draw(&self, panel: &Panel) -> Drawn {
         let (panel, legend) = panel.split_horizontally(WIDTH - LEGEND);
-        let x = decades(self.points.iter().map(|p| p.1.0));
-        let y = decades(self.points.iter().map(|p| p.1.1).chain(self.estimate));
+        let x = around(self.points.iter().map(|p| p.1.0));
+        let y = around(self.points.iter().map(|p| p.1.1).chain(self.estimate));
         let (left, right) = (x.start, x.end);
         let mut chart = ChartBuilder::on(&panel)
             .margin(12)
@@ -195,7 +200,7 @@ impl Chart<'_> {
         for (i, (sign, text)) in entries.into_iter().enumerate() {
             let at = (14, 52 + 20 * i as i32);
             sign.draw(&legend, at)?;
-            legend.draw(&Text::new(text, (at.0 + 18, at.1 - 7), ("sans-serif", 13)))?;
+            legend.draw(&Text::new(text, (at.0 + 18, at.1 - 4), ("sans-serif", 13)))?;
         }
         Ok(())
     }
@@ -302,11 +307,18 @@ mod tests {
     use super::*;
 
     #[test]
-    fn ranges_are_whole_decades() {
-        assert_eq!(decades([0.02, 3.0, 0.0, f64::NAN].into_iter()), 0.01..10.0);
-        assert_eq!(decades([0.5].into_iter()), 0.1..1.0);
-        assert_eq!(decades([1.0].into_iter()), 0.1..10.0);
-        assert_eq!(decades(std::iter::empty()), 0.1..10.0);
+    fn ranges_hold_the_values_and_a_tick() {
+        for values in [
+            vec![0.02, 3.0, 0.0, f64::NAN],
+            vec![0.5],
+            vec![1.0, 1.1],
+            vec![],
+        ] {
+            let range = around(values.iter().copied());
+            assert!(range.start > 0.0 && range.end > 10.0 * range.start);
+            let known = values.iter().filter(|x| **x > 0.0);
+            known.for_each(|x| assert!(range.start < *x && *x < range.end));
+        }
     }
 
     #[test]

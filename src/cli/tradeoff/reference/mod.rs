@@ -1,22 +1,14 @@
 //! What errors are measured against, and how far that is to be trusted itself.
 //!
 //! M_f comes from coupled panels ([`panels`]), accelerations and trajectories from compressed bodies
-//! ([`moving`]), for panels have no derivatives. What depends on meshes has an error that goes with
-//! h², that is with one over the number of faces N, so two resolutions give
-//!
-//! ```text
-//! X = X₂ + (X₂ − X₁)/(N₂/N₁ − 1)
-//! ```
-//!
-//! and three give two such values, whose difference is the estimate of the error.
+//! ([`moving`]), for panels have no derivatives.
 
 mod moving;
 mod panels;
 
 use std::time::{Duration, Instant};
 
-use nalgebra::allocator::Allocator;
-use nalgebra::{DMatrix, DVector, DefaultAllocator, Dim, Dyn, OMatrix};
+use nalgebra::{DMatrix, DVector};
 
 use super::compare::{Excursion, Weights, end_error, felt, matrix_error, norm, vector_error};
 use super::measure::{Path, Start, free};
@@ -302,19 +294,6 @@ fn climb<L, T>(
     Ok(out)
 }
 
-/// Extrapolation of a value whose error goes with one over the number of faces, `ratio` times as many
-/// for `fine`.
-fn extrapolated<C: Dim>(
-    coarse: &OMatrix<f64, Dyn, C>,
-    fine: &OMatrix<f64, Dyn, C>,
-    ratio: f64,
-) -> OMatrix<f64, Dyn, C>
-where
-    DefaultAllocator: Allocator<Dyn, C>,
-{
-    fine.zip_map(coarse, |f, c| f + (f - c) / (ratio - 1.0))
-}
-
 fn shapes(scene: &Scene) -> impl Iterator<Item = &Shape> {
     scene.bodies.iter().filter_map(|b| b.shape.as_ref())
 }
@@ -343,13 +322,6 @@ fn pseudo_random_force(mass: &DMatrix<f64>) -> DVector<f64> {
 #[cfg(test)]
 mod tests {
     use super::*;
-
-    #[test]
-    fn second_order_is_extrapolated_away() {
-        let value = |n: f64| DMatrix::from_element(1, 2, 3.0 + 5.0 / n);
-        let found = extrapolated(&value(100.0), &value(250.0), 2.5);
-        assert!((found[(0, 1)] - 3.0).abs() < 1e-12);
-    }
 
     #[test]
     fn climbs_stop_at_the_time_and_at_errors() {

@@ -3,7 +3,7 @@
 
 use std::time::{Duration, Instant};
 
-use super::{Limits, climb, extrapolated, refinable, shapes};
+use super::{Limits, climb, refinable, shapes};
 use crate::boundary::OneBody;
 use crate::cli::tradeoff::measure::{Path, Start};
 use crate::dynamics::Integrator;
@@ -13,12 +13,12 @@ use crate::simulate::{Fidelity, Settings, Simulator};
 use crate::{Error, Result};
 
 /// Accuracy of the compression, and steps for each of the scene's.
-const LEVELS: [(f64, usize); 4] = [(1e-2, 1), (1e-3, 2), (3e-4, 2), (1e-4, 4)];
+const LEVELS: [(f64, usize); 4] = [(1e-2, 1), (1e-3, 2), (1e-4, 2), (1e-5, 4)];
 /// The same where nothing is compressed.
 const FULL_LEVELS: [(f64, usize); 3] = [(0.0, 1), (0.0, 2), (0.0, 4)];
 /// How the time grows with each of them.
 const GROWTH: f64 = 3.0;
-/// Faces per body at these levels, and at the last of them on finer meshes.
+/// Faces per body at these levels, then at the last of them on finer meshes.
 const FACES: [usize; 4] = [500, 980, 2000, 3920];
 /// How the time grows with each of them: the larger part is often that of the steps, which are the same.
 const MESH_GROWTH: f64 = 4.0;
@@ -147,40 +147,34 @@ impl Probes {
             pairs: coarse.map(|c| (c, fine.clone())).into_iter().collect(),
             best: fine,
         };
-        if shapes(scene).any(refinable) {
+        if out.best.level.meshed(scene) {
             out.refine(limits, until, run)?;
         }
         Ok(out)
     }
 
-    /// On finer meshes, extrapolated.
+    /// On finer meshes.
     fn refine(
         &mut self,
         limits: &Limits,
         until: Instant,
         mut run: impl FnMut(Level) -> Result<Probe>,
     ) -> Result<()> {
-        let most = limits.faces.unwrap_or(usize::MAX).max(FACES[2]);
+        let most = limits.faces.unwrap_or(usize::MAX).max(FACES[1]);
         let finer = FACES[1..].iter().filter(|n| **n <= most);
         let levels = finer.map(|faces| Level {
             faces: *faces,
             ..self.best.level
         });
         let mut found = vec![self.best.clone()];
-        found.extend(climb(levels, 2, MESH_GROWTH, until, &mut run)?);
+        found.extend(climb(levels, 1, MESH_GROWTH, until, &mut run)?);
+        // Patterns allow only certain numbers.
         found.dedup_by(|b, a| b.faces <= a.faces);
-        let (best, other) = match found.as_slice() {
-            [.., a, b, c] => (b.extrapolated(c), a.extrapolated(b)),
-            [b, c] => (b.extrapolated(c), c.clone()),
-            _ => return Ok(()),
-        };
-        let [.., coarse, fine] = found.as_slice() else {
-            return Ok(());
-        };
-        let (coarse, fine) = (coarse.level.faces, fine.level.faces);
-        self.said += &format!(", meshes extrapolated from {coarse} and {fine} faces a body");
-        self.pairs.push((other, best.clone()));
-        self.best = best;
+        if let [.., coarse, fine] = found.as_slice() {
+            self.said += &format!(", {} faces a body", fine.level.faces);
+            self.pairs.push((coarse.clone(), fine.clone()));
+            self.best = fine.clone();
+        }
         Ok(())
     }
 
@@ -194,6 +188,14 @@ impl Probes {
 }
 
 impl Level {
+    /// Whether anything depends on the number of faces.
+    fn meshed(&self, scene: &Scene) -> bool {
+        let formula = |s: &Shape| matches!(s, Shape::Sphere { .. } | Shape::Ellipsoid { .. });
+        let exact = self.way == Way::Reduced(OneBody::Auto) && shapes(scene).all(formula);
+        let drag = scene.bodies.iter().any(|b| b.drag.is_some());
+        shapes(scene).any(refinable) && (!exact || drag)
+    }
+
     fn say(&self, scene: &Scene) -> String {
         let formula = |s: &Shape| matches!(s, Shape::Sphere { .. } | Shape::Ellipsoid { .. });
         let accuracy = self.accuracy;
@@ -236,30 +238,6 @@ impl Probe {
             start,
             path,
         })
-    }
-
-    /// Of everything in the number of faces.
-    fn extrapolated(&self, fine: &Self) -> Self {
-        let ratio = fine.faces as f64 / self.faces as f64;
-        let all = |a: &[_], b: &[_]| {
-            let pairs = a.iter().zip(b);
-            pairs.map(|(a, b)| extrapolated(a, b, ratio)).collect()
-        };
-        let (a, b) = (&self.start, &fine.start);
-        Self {
-            start: Start {
-                added_mass: extrapolated(&a.added_mass, &b.added_mass, ratio),
-                mass: extrapolated(&a.mass, &b.mass, ratio),
-                force: extrapolated(&a.force, &b.force, ratio),
-            },
-            path: Path {
-                time_step: fine.path.time_step,
-                q: all(&self.path.q, &fine.path.q),
-                v: all(&self.path.v, &fine.path.v),
-            },
-            gaps: fine.gaps.clone(),
-            ..*fine
-        }
     }
 
     /// What the bodies must be compressed to resolve, if that is less than they do by default.

@@ -128,6 +128,35 @@ fn names_and_parents_are_checked() {
 }
 
 #[test]
+fn overlaps_parent_needs_a_parent_and_two_shapes() {
+    let coin = ["body \"coin\": overlaps_parent", "true"];
+    let mut scene = good();
+    scene.bodies[1].overlaps_parent = true;
+    scene.validate().unwrap();
+    refused(
+        |s| {
+            s.bodies[1].overlaps_parent = true;
+            s.bodies[1].parent = None;
+        },
+        &[coin[0], coin[1], "no parent"],
+    );
+    refused(
+        |s| {
+            s.bodies[1].overlaps_parent = true;
+            s.bodies[1].shape = None;
+        },
+        &[coin[0], coin[1], "no shape that could overlap"],
+    );
+    refused(
+        |s| {
+            s.bodies[1].overlaps_parent = true;
+            s.bodies[0] = Body::dry().named("ball").mass(1.0).inertia([1.0; 3]);
+        },
+        &[coin[0], coin[1], "none of the bodies that carry this one"],
+    );
+}
+
+#[test]
 fn masses_are_checked() {
     let coin = "body \"coin\": ";
     refused(

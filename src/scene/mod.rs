@@ -148,8 +148,8 @@ pub struct Body {
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub parent: Option<String>,
     /// Whether the body's surface touches or overlaps that of the nearest body with a shape that
-    /// carries it. The two then don't feel each other through the water, and may overlap up to half
-    /// the cube root of the smaller one's volume.
+    /// carries it. The two then don't feel each other through the water, and may share up to half of
+    /// the smaller one's volume.
     #[serde(default, skip_serializing_if = "is_default")]
     pub overlaps_parent: bool,
     /// Pose of the joint's frame in the parent's frame.

@@ -7,7 +7,7 @@ use crate::dynamics::{Drive, System};
 use crate::error::readable;
 use crate::multibody::Tree;
 use crate::scene::Scene;
-use crate::shape::gap::overlap_error;
+use crate::shape::gap::{Share, overlap_error};
 use crate::shape::{Gap, Gaps, Other};
 use crate::{Error, Result};
 use nalgebra::DVector;
@@ -19,9 +19,8 @@ const RESOLVED: f64 = 0.5;
 /// Depth in edges up to which surfaces count as touching: rounding.
 const TOUCHING: f64 = 1e-9;
 
-/// How deep bodies may overlap that are declared to, in cube roots of the smaller one's volume: links
-/// that share the round end at their joint may, one link inside the other may not.
-const DEEPEST: f64 = 0.5;
+/// Largest part of a body's volume that may lie inside a larger one that it is declared to overlap.
+const MOST_SHARED: f64 = 0.5;
 
 /// The gaps of a scene's bodies, from their surfaces in body frames.
 pub(super) struct Clearance {
@@ -30,12 +29,10 @@ pub(super) struct Clearance {
     pub moving: Gaps,
     /// Between pairs that don't move relative to one another and aren't declared to overlap.
     pub rigid: Gaps,
-    /// Between pairs declared to overlap.
-    declared: Gaps,
+    /// How much pairs declared to overlap do so.
+    declared: Vec<Share>,
     /// The nearest body with a shape that carries each.
     parents: Vec<Option<usize>>,
-    /// Cube root of each body's volume, m.
-    sizes: Vec<f64>,
 }
 
 impl Clearance {
@@ -58,12 +55,12 @@ impl Clearance {
         };
         let of: Vec<Vec<usize>> = (0..bodies).map(movers).collect();
         let declared = scene.overlapping();
-        let (mut moving, mut rigid, mut linked) = (Vec::new(), Vec::new(), Vec::new());
+        let (mut moving, mut rigid, mut shares) = (Vec::new(), Vec::new(), Vec::new());
         for a in 0..bodies {
             for b in a + 1..bodies {
                 let pair = (a, b);
                 if declared.contains(&pair) {
-                    linked.push(pair);
+                    shares.extend(Share::new(&meshes, pair)?);
                 } else if of[a] == of[b] {
                     rigid.push(pair);
                 } else {
@@ -71,16 +68,12 @@ impl Clearance {
                 }
             }
         }
-        let without = |p: &[(usize, usize)], q: &[(usize, usize)]| [p, q].concat();
+        let but = |others: &[(usize, usize)]| [others, &declared].concat();
         Ok(Self {
-            declared: Gaps::new(&meshes, &[], &without(&moving, &rigid))?,
-            rigid: Gaps::new(&meshes, &[], &without(&moving, &linked))?,
-            moving: Gaps::new(&meshes, &scene.walls, &without(&rigid, &linked))?,
+            rigid: Gaps::new(&meshes, &[], &but(&moving))?,
+            moving: Gaps::new(&meshes, &scene.walls, &but(&rigid))?,
+            declared: shares,
             parents: (0..bodies).map(|b| scene.wet_parent(b)).collect(),
-            sizes: surfaces
-                .iter()
-                .map(|s| s.as_ref().map_or(0.0, |s| s.properties.volume.cbrt()))
-                .collect(),
         })
     }
 
@@ -122,21 +115,20 @@ impl Clearance {
         Ok(smallest)
     }
 
-    /// Refuses bodies that are deeper in one another than they may be.
+    /// Refuses bodies that lie too far inside one another though they may overlap.
     fn refuse_depth(&self, poses: &[Pose], system: &System) -> Result<()> {
-        for gap in self.declared.all(poses) {
-            let Other::Body(second) = gap.second else {
-                continue;
-            };
-            let limit = DEEPEST * self.sizes[gap.first].min(self.sizes[second]);
-            if -gap.distance > limit {
+        for share in &self.declared {
+            let value = share.at(poses);
+            if value > MOST_SHARED {
+                let (inner, outer) = share.bodies();
+                let name = |b: usize| format!("body {:?}", system.bodies[b].name);
                 return Err(Error::Unresolved {
-                    place: place(&gap, system),
-                    quantity: "depth of the overlap in m".into(),
-                    value: -gap.distance,
-                    limit,
-                    remedy: "bodies with `overlaps_parent` may overlap by half the cube root of \
-                             the smaller one's volume: move them apart, or make one body of them"
+                    place: format!("{} inside {}", name(inner), name(outer)),
+                    quantity: "part of its volume".into(),
+                    value,
+                    limit: MOST_SHARED,
+                    remedy: "links with `overlaps_parent` may share up to half of the smaller \
+                             one's volume: move them apart, or make one body of them"
                         .into(),
                 });
             }

@@ -165,3 +165,38 @@ fn wrong_input_is_refused_with_its_numbers() {
         }
     }
 }
+
+/// The thinnest, the smallest, the largest that are taken: finite answers or errors.
+#[test]
+fn extremes_give_numbers() {
+    for axes in [
+        [1e-30, 1e30, 1.0],
+        [1e30, 1e30, 1e-30],
+        [1e30, 1e-30, 1e-30],
+        [1e-30; 3],
+        [1e30; 3],
+        [1.0, 1e-12, 1.0],
+        [1.0, 1.0 + 1e-15, 1.0],
+        [1.0, 1.0 - 1e-10, 1e-3],
+    ] {
+        for gap in [1e-2, 0.3, 1e6] {
+            let gap = gap * longest(axes);
+            let body = match ExactBoundary::new("body", axes, &Pose::identity(), gap) {
+                Ok(body) => body,
+                Err(error) => {
+                    assert!(matches!(error, Error::Unresolved { .. }), "{error}");
+                    continue;
+                }
+            };
+            assert!(body.residual < 1e-4, "{axes:?} {gap}: {:e}", body.residual);
+            assert!(body.added_mass().iter().all(|x| x.is_finite()), "{axes:?}");
+            let points = off_surface(axes, gap, 9);
+            for field in [
+                body.radiated(&points).unwrap(),
+                body.scattered(&points, &points).unwrap(),
+            ] {
+                assert!(field.is_all_finite(), "{axes:?} {gap}");
+            }
+        }
+    }
+}

@@ -155,6 +155,25 @@ fn nearly_a_sphere_scatters_like_one() {
     }
 }
 
+/// Axes that are made more and more equal: the answer tends to the round body's with the difference.
+#[test]
+fn nearly_equal_axes_are_no_exception() {
+    let points = [Vec3::new(0.6, 1.1, 0.5), Vec3::new(0.5, 0.8, -0.9)];
+    let answer = |b: f64, c: f64| {
+        let body = exact("body", [1.0, b, c], 0.3);
+        body.scattered(&points[..1], &points[1..]).unwrap()[(0, 0)]
+    };
+    for (b, c) in [(0.3, 0.3), (1.0, 0.3), (1e-3, 1e-3)] {
+        let round = answer(b, c);
+        let slope = |d: f64| (answer(b - d * b, c) - round) / (d * round);
+        let limit = slope(1e-4);
+        for d in [1e-5, 1e-6, 1e-7, 1e-8] {
+            let off = slope(d) / limit - 1.0;
+            assert!(off.abs() < 2e-3, "{b} {c} {d}: {off:e}");
+        }
+    }
+}
+
 /// Axes in any order, in any unit, and sources and points exchanged.
 #[test]
 fn scattering_is_symmetric_and_knows_no_unit() {

@@ -63,6 +63,10 @@ fn body(shape: Shape, method: Method, solver: Solver) -> Arc<WetBody> {
 }
 
 fn full(method: Method, solver: Solver, walls: &[Wall]) -> Full {
+    without(Exclusions::none(), method, solver, walls)
+}
+
+fn without(excluded: Exclusions, method: Method, solver: Solver, walls: &[Wall]) -> Full {
     let bodies = vec![
         body(Shape::sphere(0.5), method, solver),
         body(Shape::ellipsoid([0.6, 0.3, 0.4]), method, solver),
@@ -72,16 +76,23 @@ fn full(method: Method, solver: Solver, walls: &[Wall]) -> Full {
         tolerance: 1e-13,
         ..SolveSettings::default()
     };
-    Full::new(bodies, walls, Exclusions::none(), settings).unwrap()
+    Full::new(bodies, walls, excluded, settings).unwrap()
 }
 
-/// Every method with every solver that it has, without walls, with one and with two.
+/// Every method with every solver that it has, without walls, with one and with two; and two bodies
+/// that feel each other's images alone.
 fn systems() -> Vec<Full> {
     vec![
         full(Method::MfsVertex, Solver::Cgls, &[]),
         full(Method::MfsVertex, Solver::Qr, &[WALL, SIDE]),
         full(Method::MfsFace, Solver::Cgls, &[WALL]),
         full(Method::MfsFace, Solver::Gmres, &[]),
+        without(
+            Exclusions::new([(0, 1)]),
+            Method::MfsVertex,
+            Solver::Cgls,
+            &[WALL],
+        ),
     ]
 }
 

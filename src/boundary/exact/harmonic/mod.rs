@@ -28,6 +28,7 @@ mod legendre;
 mod radial;
 mod residual;
 mod top;
+mod tridiagonal;
 
 use super::confocal::{Confocal, Place};
 use crate::adjoint::lie::Vec3;
@@ -59,7 +60,7 @@ const SAMPLES: usize = 60;
 const BLOCK: usize = 768;
 /// Points in a block of the evaluation.
 const POINTS: usize = 32;
-/// A smaller B than this, in squares of the longest semi-axis, is none.
+/// A smaller B than this, in squares of the shortest semi-axis, is none.
 const ROUND: f64 = 1e-9;
 
 /// The harmonics of one ellipsoid. Lengths in longest semi-axes.
@@ -129,7 +130,11 @@ impl Harmonics {
         }
         let semi_axes = Vec3::from(confocal.semi_axes) / scale;
         let [a, b, _] = confocal.offsets.map(|o| o / (scale * scale));
-        let b = if b < ROUND { 0.0 } else { b };
+        let b = if b < ROUND * semi_axes.z * semi_axes.z {
+            0.0
+        } else {
+            b
+        };
         let mut out = Self {
             scale,
             semi_axes,

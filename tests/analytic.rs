@@ -6,7 +6,7 @@ use hydrograd::Error;
 use hydrograd::adjoint::lie::{Mat3, Mat6, Pose, Vec3, Vec6, exp_matrix, skew};
 use hydrograd::boundary::{BodyBoundary, Method, RowScaling, Settings};
 use hydrograd::coupling::full::{Full, Preconditioner, SolveSettings, Solver, WetBody};
-use hydrograd::coupling::{Coupling, Direction, Isolated, Report};
+use hydrograd::coupling::{Coupling, Direction, Exclusions, Isolated, Report};
 use hydrograd::scene::{Shape, Wall};
 use hydrograd::shape;
 use nalgebra::{DMatrix, DVector};
@@ -55,7 +55,7 @@ fn uneven_poses() -> Vec<Pose> {
 }
 
 fn full(bodies: &[Arc<WetBody>], walls: &[Wall], settings: SolveSettings) -> Full {
-    Full::new(bodies.to_vec(), walls, settings).unwrap()
+    Full::new(bodies.to_vec(), walls, Exclusions::none(), settings).unwrap()
 }
 
 fn tight() -> SolveSettings {
@@ -927,7 +927,9 @@ fn a_solve_that_misses_its_tolerance_says_so() {
 #[test]
 fn settings_without_meaning_are_refused() {
     let bodies = uneven(80);
-    let refused = |walls: &[Wall], settings| Full::new(bodies.clone(), walls, settings).err();
+    let refused = |walls: &[Wall], settings| {
+        Full::new(bodies.clone(), walls, Exclusions::none(), settings).err()
+    };
     let wall = |normal| Wall {
         surface: Default::default(),
         point: [0.0; 3],

@@ -218,6 +218,17 @@ fn wrong_types_name_key_and_line() {
         ),
         (
             text(
+                "shape = { kind = \"prism\", length = 1, profile = [[0, 0], [1, 0, 2], [0, 1]] }",
+                "",
+            ),
+            [
+                "line 9",
+                "body \"ball\": shape.profile",
+                "expected 2 elements",
+            ],
+        ),
+        (
+            text(
                 "[bodies.shape]\nkind = \"sphere\"\nfaces = 320\nradius = \"1\"",
                 "",
             ),

@@ -128,6 +128,35 @@ fn names_and_parents_are_checked() {
 }
 
 #[test]
+fn overlaps_parent_needs_a_parent_and_two_shapes() {
+    let coin = ["body \"coin\": overlaps_parent", "true"];
+    let mut scene = good();
+    scene.bodies[1].overlaps_parent = true;
+    scene.validate().unwrap();
+    refused(
+        |s| {
+            s.bodies[1].overlaps_parent = true;
+            s.bodies[1].parent = None;
+        },
+        &[coin[0], coin[1], "no parent"],
+    );
+    refused(
+        |s| {
+            s.bodies[1].overlaps_parent = true;
+            s.bodies[1].shape = None;
+        },
+        &[coin[0], coin[1], "no shape that could overlap"],
+    );
+    refused(
+        |s| {
+            s.bodies[1].overlaps_parent = true;
+            s.bodies[0] = Body::dry().named("ball").mass(1.0).inertia([1.0; 3]);
+        },
+        &[coin[0], coin[1], "none of the bodies that carry this one"],
+    );
+}
+
+#[test]
 fn masses_are_checked() {
     let coin = "body \"coin\": ";
     refused(
@@ -237,6 +266,19 @@ fn shapes_and_drag_are_checked() {
     refused(
         |s| s.bodies[0].shape = Some(Shape::sphere(1.0).faces(0)),
         &["body \"ball\": shape", "faces", "got 0"],
+    );
+    let dented = [[0.0, 0.0], [1.0, 0.0], [0.5, 0.2], [0.0, 1.0]];
+    refused(
+        |s| s.bodies[0].shape = Some(Shape::prism([[0.0, 0.0], [1.0, 0.0], [1.0, 1.0]], 0.0)),
+        &["body \"ball\": shape", "length", "positive"],
+    );
+    refused(
+        |s| s.bodies[0].shape = Some(Shape::prism(dented, 1.0)),
+        &["body \"ball\": shape", "profile[2]", "[0.5, 0.2]", "convex"],
+    );
+    refused(
+        |s| s.bodies[0].shape = Some(Shape::prism(&dented[..2], 1.0)),
+        &["body \"ball\": shape", "profile", "2 corners", "three"],
     );
     refused(
         |s| s.bodies[0].shape = Some(Shape::mesh("")),

@@ -33,11 +33,14 @@ fn every_example_scene_loads_validates_and_survives_a_round_trip() {
         found.push(path.file_stem().unwrap().to_str().unwrap().to_owned());
     }
     for name in [
+        "clown_fish",
         "coins",
         "cube",
         "falling_ball",
         "falling_ball_box",
         "fish",
+        "fish_near_tail",
+        "grasp_open",
         "kirchhoff_ellipsoid",
         "two_spheres",
     ] {
@@ -65,16 +68,43 @@ fn falling_ball_has_the_papers_figures() {
     let top = boxed.bodies[floor.0].placement.position[2] + 0.5;
     assert!((top - scene.walls[0].point[2]).abs() < 1e-12);
     // Within 1 % of the paper's 3582 faces.
-    let faces: usize = boxed
-        .bodies
-        .iter()
-        .map(|body| {
-            let shape = body.shape.as_ref().unwrap();
-            let mesh = hydrograd::shape::build(shape, Path::new(""), None).unwrap();
-            mesh.faces().len()
-        })
-        .sum();
+    let faces = faces(&boxed).iter().sum::<usize>();
     assert!(faces.abs_diff(3582) <= 35, "{faces} faces");
+}
+
+/// Numbers of faces of the bodies.
+fn faces(scene: &Scene) -> Vec<usize> {
+    let shapes = scene.bodies.iter().map(|body| body.shape.as_ref().unwrap());
+    let count = |shape| {
+        let mesh = hydrograd::shape::build(shape, Path::new(""), None).unwrap();
+        mesh.faces().len()
+    };
+    shapes.map(count).collect()
+}
+
+/// Bodies, degrees of freedom (driven joints among them) and faces of the published table; the faces
+/// to 1 %.
+#[test]
+fn scenes_have_the_papers_figures() {
+    for (name, bodies, freedom, published) in [
+        ("grasp_open", 4, 6, 3768),
+        ("fish_near_tail", 4, 6, 5144),
+        ("clown_fish", 4, 8, 4646),
+    ] {
+        let scene = example(name);
+        let faces = faces(&scene);
+        let sum: usize = faces.iter().sum();
+        println!("{name}: {faces:?}, {sum} faces for {published}");
+        assert_eq!((scene.bodies.len(), scene.velocities()), (bodies, freedom));
+        assert!(sum.abs_diff(published) * 100 <= published, "{name}: {sum}");
+        assert_eq!(
+            (scene.gravity, scene.time_step, scene.steps),
+            ([0.0; 3], 0.01, 250)
+        );
+        // The file says how many there are.
+        let text = std::fs::read_to_string(folder().join(format!("{name}.toml"))).unwrap();
+        assert!(text.contains(&format!("= {sum} faces)")), "{name}: {sum}");
+    }
 }
 
 /// Lamb's coefficients of the fish's links, carried from the link's centre to its hinge.
@@ -194,6 +224,7 @@ fn everything_survives_a_round_trip() {
         Joint::Planar { plane: Plane::Yz },
         Joint::Spherical,
         Joint::Free,
+        Joint::Fixed,
     ];
     let shapes = [
         Shape::sphere(0.1).faces(7),
@@ -202,6 +233,7 @@ fn everything_survives_a_round_trip() {
         Shape::cylinder(0.1, 0.2),
         Shape::capsule(0.1, 0.2).faces(9),
         Shape::mesh("hull.obj"),
+        Shape::prism([[0.0, 0.0], [0.1, 1e-9], [0.0, 1.0 / 3.0]], 0.7).faces(11),
     ];
     for (joint, shape) in joints.into_iter().zip(shapes) {
         let mut identity = [[0.0; 6]; 6];
@@ -216,6 +248,7 @@ fn everything_survives_a_round_trip() {
             .rotated([0.1, 0.2, 0.3])
             .shape_at([0.1, 0.0, 0.0], [0.0, 0.0, 1.0])
             .drag(drag)
+            .overlaps_parent()
             .driven([
                 Motion::Linear {
                     offset: 0.0,
@@ -270,17 +303,12 @@ fn every_example_scene_runs_at_every_fidelity() {
     for entry in std::fs::read_dir(folder()).unwrap() {
         let path = entry.unwrap().path();
         let scene = Scene::load(&path).unwrap();
-        // The fish's links touch at their hinges and have their added mass given.
-        let fidelities = match scene.name.as_str() {
-            name if name.contains("fish") => vec![Fidelity::Isolated],
-            _ => vec![
-                Fidelity::Isolated,
-                Fidelity::Reduced,
-                Fidelity::Auto,
-                Fidelity::Full,
-            ],
-        };
-        for fidelity in fidelities {
+        for fidelity in [
+            Fidelity::Isolated,
+            Fidelity::Reduced,
+            Fidelity::Auto,
+            Fidelity::Full,
+        ] {
             let settings = Settings::for_scene(&scene).fidelity(fidelity).faces(80);
             let simulator = Simulator::new(&scene, settings)
                 .unwrap_or_else(|e| panic!("{} {fidelity:?}: {e}", path.display()));
@@ -355,4 +383,108 @@ fn falling_ball_turns_the_coin_through_the_water_alone() {
         "turned only {turned} rad before anything touches"
     );
     assert_eq!(alone, 0.0, "turned by itself");
+}
+
+/// The fingers stop before they meet the coin, which the water moves out and turns.
+#[test]
+fn grasp_is_held_open() {
+    let scene = example("grasp_open");
+    assert_eq!(scene.initial.q, [0.0, -0.4, 0.4, 1.4, 0.0, 0.4]);
+    // The fingers are each other's mirror images, of 0.483 m³ and with 0.8 m between.
+    let fingers: Vec<_> = scene.bodies[1..3]
+        .iter()
+        .map(|body| {
+            let shape = body.shape.as_ref().unwrap();
+            let mesh = hydrograd::shape::build(shape, Path::new(""), None).unwrap();
+            (mesh.mass_properties(), mesh.bounds())
+        })
+        .collect();
+    for (mass, _) in &fingers {
+        assert!((mass.volume - 0.4832).abs() < 1e-12);
+        // As dense as the other bodies.
+        assert!((626.9 / mass.volume - 1297.0).abs() < 1.0);
+    }
+    assert!((fingers[0].0.centroid.z + fingers[1].0.centroid.z).abs() < 1e-12);
+    assert_eq!((fingers[0].1[1].z, fingers[1].1[0].z), (0.0, 0.0));
+
+    let run = |fidelity| {
+        let settings = Settings::for_scene(&scene).fidelity(fidelity).faces(150);
+        let simulator = Simulator::new(&scene, settings).unwrap();
+        let rollout = simulator
+            .rollout(&Controls::zeros(&simulator, 250))
+            .unwrap();
+        let gap = rollout.summary().min_gap.unwrap();
+        let worked: f64 = rollout
+            .samples()
+            .windows(2)
+            .map(|s| s[0].control.dot(&(s[1].q.rows(0, 3) - s[0].q.rows(0, 3))))
+            .sum();
+        let samples = rollout.samples();
+        let most = samples.iter().map(|s| s.energy()).fold(0.0, f64::max);
+        let missing = (samples[250].energy() - samples[0].energy() - worked).abs() / most;
+        (samples[250].q.clone(), gap, missing)
+    };
+    let (q, gap, missing) = run(Fidelity::Full);
+    println!(
+        "grasp: q {:.4?}, gap {gap:.3}, energy {missing:.1e}",
+        q.as_slice()
+    );
+    assert!((q[1] + 0.25).abs() < 0.01 && (q[2] - 0.25).abs() < 0.01);
+    assert!(gap > 0.06 && gap < 0.1, "{gap}");
+    assert!(q[3] - 1.4 > 0.03 && q[5] - 0.4 > 0.05, "{q}");
+    // What the fingers' forces put in is what bodies and water hold.
+    assert!(missing < 1e-5, "{missing}");
+    let (q, ..) = run(Fidelity::Isolated);
+    assert_eq!((q[3], q[4], q[5]), (1.4, 0.0, 0.4));
+}
+
+/// Turns a scene's meshes coarse, runs it, and gives the middle link's and the last body's motion.
+fn swim(scene: &Scene, fidelity: Fidelity) -> (Vec<f64>, f64, f64) {
+    let settings = Settings::for_scene(scene).fidelity(fidelity).faces(80);
+    let simulator = Simulator::new(scene, settings).unwrap();
+    let rollout = simulator
+        .rollout(&Controls::zeros(&simulator, scene.steps))
+        .unwrap();
+    let summary = rollout.summary();
+    let q = rollout.samples()[scene.steps].q.as_slice().to_vec();
+    (q, summary.min_gap.unwrap(), summary.momentum_drift)
+}
+
+/// The tail's strokes push the swimmer out of its straight way.
+#[test]
+fn a_fish_near_a_tail_drifts_aside() {
+    let scene = example("fish_near_tail");
+    let (q, gap, _) = swim(&scene, Fidelity::Full);
+    println!("near the tail: {:.3?}, gap {gap:.4}", &q[..3]);
+    assert!(gap >= 0.02, "{gap}");
+    let mut alone = scene.clone();
+    alone.bodies.truncate(3);
+    alone.initial.momentum.truncate(5);
+    let (free, gap, drift) = swim(&alone, Fidelity::Full);
+    println!(
+        "alone: {:.3?}, gap {gap:.4}, momentum {drift:.1e}",
+        &free[..3]
+    );
+    // Four cycles, ends where it faces ahead again.
+    assert!(free[0] > 0.3 && free[1].abs() < 0.01 && free[2].abs() < 0.01);
+    assert!(gap >= 0.02 && drift < 1e-6, "{gap} {drift}");
+    assert!((q[1] - free[1]).abs() > 0.08 && (q[2] - free[2]).abs() > 0.3);
+}
+
+/// A passive fish is moved by the swimmer's water alone, and nothing touches.
+#[test]
+fn a_passive_fish_is_pushed_aside() {
+    let scene = example("clown_fish");
+    let (q, gap, drift) = swim(&scene, Fidelity::Full);
+    let start = &scene.initial.q[5..];
+    let moved = (q[5] - start[0]).hypot(q[6] - start[1]);
+    println!(
+        "small fish: moved {moved:.4}, turned {:.3}; gap {gap:.4}, momentum {drift:.1e}",
+        q[7]
+    );
+    assert!(gap >= 0.02, "{gap}");
+    assert!(drift < 1e-6, "{drift}");
+    assert!(moved > 0.02 && q[7].abs() > 0.05, "{moved} {}", q[7]);
+    let (alone, ..) = swim(&scene, Fidelity::Isolated);
+    assert!((alone[5] - start[0]).abs() < 1e-12 && alone[7].abs() < 1e-12);
 }

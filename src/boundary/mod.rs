@@ -2,7 +2,7 @@
 //!
 //! All speak of the same flow: velocity −∇φ, density 1, body frame, body twists `ν = (u, ω)` about the
 //! body's origin. [`mfs`] is what the coupled system of all bodies is built from; [`panel`] needs no
-//! sources inside and is the more accurate on thin bodies and sharp edges; [`exact`] answers for
+//! sources inside and converges evenly, so that two meshes tell its error; [`exact`] answers for
 //! spheres and ellipsoids by formula; [`Response`] is what any method must answer for a body to be
 //! compressed.
 

@@ -31,6 +31,11 @@ pub trait Response: Send + Sync {
     /// Condition number of the system that was solved.
     fn condition(&self) -> f64;
 
+    /// Estimated relative error of the added mass, where two resolutions tell one.
+    fn error(&self) -> Option<f64> {
+        None
+    }
+
     /// What the user should know, each with the body's name and its numbers.
     fn warnings(&self) -> &[String];
 }

@@ -39,7 +39,8 @@ struct Source {
     #[arg(value_name = "SCENE.toml|MESH")]
     file: Option<PathBuf>,
     /// A shape by formula, lengths in m: sphere:RADIUS, ellipsoid:A,B,C (semi-axes), box:A,B,C
-    /// (edges), cylinder:RADIUS,LENGTH, capsule:RADIUS,LENGTH (without its ends); both along z.
+    /// (edges), cylinder:RADIUS,LENGTH, capsule:RADIUS,LENGTH (without its ends), both along z,
+    /// prism:LENGTH,Y1,Z1,Y2,Z2,Y3,Z3,… (length along x, corners of the convex profile).
     #[arg(long, value_name = "SHAPE", value_parser = crate::shape::parse_shape)]
     shape: Option<Shape>,
 }

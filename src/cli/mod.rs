@@ -1,4 +1,4 @@
-//! The command line: `hydrograd run | added-mass | gradcheck | check-mesh`.
+//! The command line: `hydrograd run | added-mass | gradcheck | tradeoff | check-mesh`.
 //!
 //! Results go to standard output, everything else (progress, warnings, errors) to standard error.
 //! With `--json` standard output holds one JSON object and nothing else: the result, or
@@ -12,6 +12,7 @@ mod options;
 mod output;
 mod progress;
 mod run;
+mod tradeoff;
 mod trajectory;
 
 use std::process::ExitCode;
@@ -44,6 +45,8 @@ enum Command {
     AddedMass(added_mass::Arguments),
     /// Hold the gradient of a scene's trajectory against finite differences.
     Gradcheck(gradcheck::Arguments),
+    /// Measure time against error over fidelities, methods, resolutions, integrators and time steps.
+    Tradeoff(tradeoff::Arguments),
     /// Say whether a mesh can be simulated: what is wrong, where, and how to mend it.
     CheckMesh(check_mesh::Arguments),
 }
@@ -69,6 +72,7 @@ pub fn main() -> ExitCode {
         Command::Run(arguments) => run::main(&arguments, output),
         Command::AddedMass(arguments) => added_mass::main(&arguments, output),
         Command::Gradcheck(arguments) => gradcheck::main(&arguments, output),
+        Command::Tradeoff(arguments) => tradeoff::main(&arguments, output),
         Command::CheckMesh(arguments) => check_mesh::main(&arguments, output),
     };
     done.unwrap_or_else(|error| {

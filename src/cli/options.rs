@@ -160,6 +160,42 @@ pub(super) struct Time {
     pub integrator: Option<Integrator>,
 }
 
+impl From<Fidelity> for simulate::Fidelity {
+    fn from(fidelity: Fidelity) -> Self {
+        match fidelity {
+            Fidelity::Isolated => Self::Isolated,
+            Fidelity::Reduced => Self::Reduced,
+            Fidelity::Auto => Self::Auto,
+            Fidelity::Full => Self::Full,
+        }
+    }
+}
+
+impl From<Integrator> for dynamics::Integrator {
+    fn from(integrator: Integrator) -> Self {
+        match integrator {
+            Integrator::MomentumEuler => Self::MomentumEuler,
+            Integrator::Midpoint => Self::Midpoint,
+            Integrator::Rk2 => Self::Rk2,
+            Integrator::Rk4 => Self::Rk4,
+            Integrator::VelocityEuler => Self::VelocityEuler,
+        }
+    }
+}
+
+impl Method {
+    /// Puts the method into the settings.
+    pub fn choose(self, settings: Settings) -> Settings {
+        match self {
+            Method::Auto => settings.one_body(OneBody::Auto),
+            Method::Exact => settings.one_body(OneBody::Exact),
+            Method::Panel => settings.one_body(OneBody::Panel),
+            Method::MfsVertex => settings.method(boundary::Method::MfsVertex),
+            Method::MfsFace => settings.method(boundary::Method::MfsFace),
+        }
+    }
+}
+
 impl Water {
     /// Puts preset and number of faces into the scene.
     pub fn apply(&self, scene: &mut Scene) {
@@ -176,20 +212,9 @@ impl Water {
     /// The settings of a scene that has been through [`Water::apply`]: its preset, then what was
     /// given.
     pub fn settings(&self, scene: &Scene) -> Settings {
-        let mut settings = Settings::for_scene(scene).fidelity(match self.fidelity {
-            Fidelity::Isolated => simulate::Fidelity::Isolated,
-            Fidelity::Reduced => simulate::Fidelity::Reduced,
-            Fidelity::Auto => simulate::Fidelity::Auto,
-            Fidelity::Full => simulate::Fidelity::Full,
-        });
+        let mut settings = Settings::for_scene(scene).fidelity(self.fidelity.into());
         if let Some(method) = self.method {
-            settings = match method {
-                Method::Auto => settings.one_body(OneBody::Auto),
-                Method::Exact => settings.one_body(OneBody::Exact),
-                Method::Panel => settings.one_body(OneBody::Panel),
-                Method::MfsVertex => settings.method(boundary::Method::MfsVertex),
-                Method::MfsFace => settings.method(boundary::Method::MfsFace),
-            };
+            settings = method.choose(settings);
         }
         if let Some(accuracy) = self.accuracy {
             settings = settings.accuracy(accuracy);
@@ -251,15 +276,7 @@ impl Time {
     pub fn choose(&self, settings: Settings) -> Settings {
         match self.integrator {
             None => settings,
-            Some(Integrator::MomentumEuler) => {
-                settings.integrator(dynamics::Integrator::MomentumEuler)
-            }
-            Some(Integrator::Midpoint) => settings.integrator(dynamics::Integrator::Midpoint),
-            Some(Integrator::Rk2) => settings.integrator(dynamics::Integrator::Rk2),
-            Some(Integrator::Rk4) => settings.integrator(dynamics::Integrator::Rk4),
-            Some(Integrator::VelocityEuler) => {
-                settings.integrator(dynamics::Integrator::VelocityEuler)
-            }
+            Some(integrator) => settings.integrator(integrator.into()),
         }
     }
 }
@@ -279,7 +296,7 @@ fn length(text: &str) -> std::result::Result<f64, String> {
     }
 }
 
-fn tolerance(text: &str) -> std::result::Result<f64, String> {
+pub(super) fn tolerance(text: &str) -> std::result::Result<f64, String> {
     match text.parse() {
         Ok(x) if x > 0.0 && x < 1.0 => Ok(x),
         _ => Err("give a number between 0 and 1, e.g. 1e-8".into()),

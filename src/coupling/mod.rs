@@ -15,6 +15,7 @@
 //! The ladder of E: value [`Record::momenta`], vjp [`Record::gradient`] (on the basis) and
 //! [`Record::vjp`] (any pair), jvp and hvp together in [`Record::hvp`].
 
+mod exclude;
 pub mod full;
 pub mod image;
 mod isolated;
@@ -24,6 +25,7 @@ pub mod reduced;
 mod settings;
 mod tensor;
 
+pub use exclude::Exclusions;
 pub use isolated::Isolated;
 pub use panel::PanelCoupled;
 pub use tensor::PairTensor;

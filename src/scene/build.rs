@@ -117,6 +117,7 @@ impl Body {
             inertia: None,
             added_mass: None,
             parent: None,
+            overlaps_parent: false,
             placement: Placement::default(),
             joint: Joint::Free,
             motion: None,
@@ -199,6 +200,13 @@ impl Body {
         self
     }
 
+    /// Lets the surface touch or overlap that of the body that carries it; the two then don't feel
+    /// each other through the water.
+    pub fn overlaps_parent(mut self) -> Self {
+        self.overlaps_parent = true;
+        self
+    }
+
     /// Drives the joint by a given motion, one per coordinate.
     pub fn driven(mut self, motion: impl Into<Vec<Motion>>) -> Self {
         self.motion = Some(motion.into());
@@ -270,6 +278,15 @@ impl Shape {
         }
     }
 
+    /// A prism along x, centred at x = 0: corners (y, z) of its convex profile and its length, m.
+    pub fn prism(profile: impl Into<Vec<[f64; 2]>>, length: f64) -> Self {
+        Self::Prism {
+            profile: profile.into(),
+            length,
+            faces: None,
+        }
+    }
+
     /// A closed triangle mesh in an OBJ, STL or PLY file, in metres.
     pub fn mesh(path: impl Into<PathBuf>) -> Self {
         Self::Mesh {
@@ -292,6 +309,7 @@ impl Shape {
             Self::Box { .. } => "box",
             Self::Cylinder { .. } => "cylinder",
             Self::Capsule { .. } => "capsule",
+            Self::Prism { .. } => "prism",
             Self::Mesh { .. } => "mesh",
         }
     }
@@ -302,7 +320,8 @@ impl Shape {
             | Self::Ellipsoid { faces, .. }
             | Self::Box { faces, .. }
             | Self::Cylinder { faces, .. }
-            | Self::Capsule { faces, .. } => *faces = Some(target),
+            | Self::Capsule { faces, .. }
+            | Self::Prism { faces, .. } => *faces = Some(target),
             Self::Mesh { .. } => {}
         }
     }

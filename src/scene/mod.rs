@@ -147,6 +147,11 @@ pub struct Body {
     /// Name of the parent body; default: the world.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub parent: Option<String>,
+    /// Whether the body's surface touches or overlaps that of the nearest body with a shape that
+    /// carries it. The two then don't feel each other through the water, and may share up to half of
+    /// the smaller one's volume.
+    #[serde(default, skip_serializing_if = "is_default")]
+    pub overlaps_parent: bool,
     /// Pose of the joint's frame in the parent's frame.
     #[serde(default, skip_serializing_if = "is_default")]
     pub placement: Placement,
@@ -213,6 +218,16 @@ pub enum Shape {
         /// Radius, m.
         radius: f64,
         /// Length of the cylindrical part along z, m.
+        length: f64,
+        /// Target number of faces.
+        #[serde(default, skip_serializing_if = "Option::is_none")]
+        faces: Option<usize>,
+    },
+    /// Prism along x: a convex profile in the y-z plane, extruded.
+    Prism {
+        /// Corners of the profile, (y, z), m, in either order around it; must be convex.
+        profile: Vec<[f64; 2]>,
+        /// Length along x, m; the prism reaches from −length/2 to length/2.
         length: f64,
         /// Target number of faces.
         #[serde(default, skip_serializing_if = "Option::is_none")]

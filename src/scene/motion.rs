@@ -28,4 +28,17 @@ impl Motion {
             } => amplitude * frequency * (frequency * t + phase).cos(),
         }
     }
+
+    /// Rate of the rate at time `t`, m/s² or rad/s².
+    pub fn acceleration(&self, t: f64) -> f64 {
+        match *self {
+            Motion::Linear { .. } => 0.0,
+            Motion::Sine {
+                amplitude,
+                frequency,
+                phase,
+                ..
+            } => -amplitude * frequency.powi(2) * (frequency * t + phase).sin(),
+        }
+    }
 }

@@ -12,12 +12,13 @@
 //! vertex coordinates", J. Math. Stat. 1 (2005) 8–11.
 
 use super::mesh::{TriMesh, area_vector, bounds};
-use super::primitive::{shape_name, validate};
+use super::primitive::{build, shape_name, validate};
 use crate::error::Result;
 use crate::scene::Shape;
 use crate::special::r_d;
 use hydrograd_adjoint::lie::{Mat3, Pose, Vec3};
 use std::f64::consts::PI;
+use std::path::Path;
 
 /// What a body filled evenly at unit density has.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -120,6 +121,8 @@ impl MassProperties {
                 let area = 2.0 * PI * r * (2.0 * r + l);
                 (side + ends, area, [across, across, along])
             }
+            // Flat faces: any mesh of it is exact.
+            Shape::Prism { .. } => return Ok(Some(Self::of(&build(shape, Path::new(""), None)?))),
             Shape::Mesh { .. } => return Ok(None),
         };
         let moments = Mat3::from_diagonal(&Vec3::from(second));

@@ -1,17 +1,18 @@
 //! From a scene to a system: meshes, masses, joints, coupling, controller.
 
-use super::clearance::{self, Clearance};
+use super::clearance::Clearance;
 use super::plan::{Planned, plan};
 use super::policy::{Constant, OpenLoop, Pd, PdAxis, PushThenLock};
-use super::wet::{self, Discretisation, Plan, Wet};
+use super::wet::{self, Discretisation, Plan, Water, Wet};
 use super::{Fidelity, Policy, Settings};
 use crate::adjoint::drag::{self, Element, Part};
 use crate::adjoint::lie::{Mat3, Mat6, Pose, Vec3, exp_matrix};
-use crate::coupling::Isolated;
+use crate::boundary::OneBody;
+use crate::coupling::{Exclusions, Isolated};
 use crate::dynamics::{BodyData, Drive, Parameters, Stepper, System};
 use crate::multibody::{self, Tree};
-use crate::scene::{self, Body, Controller, DragPart, Placement, Scene};
-use crate::shape::{self, Gap, Gaps, MassProperties, Other, TriMesh};
+use crate::scene::{self, Body, Controller, DragPart, Placement, Scene, Shape};
+use crate::shape::{self, Gap, MassProperties, Other, TriMesh};
 use crate::{Error, Result};
 use nalgebra::DVector;
 use std::path::Path;
@@ -35,7 +36,7 @@ pub(super) struct Assembled {
     pub plan: Plan,
     /// What `Auto` chose, and why.
     pub reasons: Vec<String>,
-    pub gaps: Gaps,
+    pub clearance: Clearance,
     pub warnings: Vec<String>,
 }
 
@@ -71,52 +72,83 @@ fn part(p: DragPart) -> Part {
 }
 
 /// A body's surface in its own frame, with its mass properties.
-struct Surface {
-    mesh: TriMesh,
-    properties: MassProperties,
+#[derive(Clone)]
+pub(super) struct Surface {
+    pub mesh: TriMesh,
+    /// A mesh of about a quarter of the faces, of a shape by formula with flat parts or edges.
+    coarse: Option<TriMesh>,
+    pub properties: MassProperties,
 }
 
-/// A body's mesh in its own frame.
-pub(super) fn mesh(body: &Body, faces: Option<usize>) -> Result<Option<TriMesh>> {
+impl Surface {
+    /// Of a mesh alone.
+    pub fn of_mesh(mesh: TriMesh) -> Self {
+        Self {
+            properties: mesh.mass_properties(),
+            coarse: None,
+            mesh,
+        }
+    }
+}
+
+/// A body's surface, with about `faces` faces if it is a shape by formula.
+pub(super) fn surface(
+    body: &Body,
+    settings: &Settings,
+    faces: Option<usize>,
+) -> Result<Option<Surface>> {
     let Some(shape) = &body.shape else {
         return Ok(None);
     };
-    let mesh = shape::build(shape, Path::new(""), faces)?;
-    Ok(Some(mesh.transformed(&pose(&body.shape_at))))
-}
-
-fn surface(body: &Body, settings: &Settings) -> Result<Option<Surface>> {
-    let (Some(shape), Some(mesh)) = (&body.shape, mesh(body, settings.faces)?) else {
-        return Ok(None);
-    };
-    // Where the water sees the shape itself, so do gravity and buoyancy.
-    let formula = match wet::semi_axes(shape) {
-        Some(_) if settings.by_formula() => MassProperties::by_formula(shape)?,
-        _ => None,
-    };
     let at = pose(&body.shape_at);
-    let properties = formula.map_or_else(|| mesh.mass_properties(), |p| p.transformed(&at));
-    Ok(Some(Surface { properties, mesh }))
+    let mesh = shape::build(shape, Path::new(""), faces)?.transformed(&at);
+    let closed = settings.by_formula() && wet::semi_axes(shape).is_some();
+    let panels = settings.fidelity != Fidelity::Full
+        && matches!(settings.one_body, OneBody::Auto | OneBody::Panel);
+    let coarse = if panels && !closed && !matches!(shape, Shape::Mesh { .. }) {
+        let quarter = (mesh.faces().len() / 4).max(12);
+        let coarse = shape::build(shape, Path::new(""), Some(quarter))?.transformed(&at);
+        // Patterns allow only certain numbers.
+        Some(coarse).filter(|c| 2 * c.faces().len() <= mesh.faces().len())
+    } else {
+        None
+    };
+    // Where the water sees the shape itself and not a mesh of it, so do gravity and buoyancy.
+    let formula = if closed || coarse.is_some() {
+        MassProperties::by_formula(shape)?
+    } else {
+        None
+    };
+    let properties = match &formula {
+        Some(p) => p.transformed(&at),
+        None => mesh.mass_properties(),
+    };
+    Ok(Some(Surface {
+        properties,
+        mesh,
+        coarse,
+    }))
 }
 
 /// The bodies that the water sees with a fidelity, with their numbers in the scene. Bodies that
 /// can't move matter only as boundaries of the coupled flow.
 pub(super) fn in_water<'a>(
     scene: &'a Scene,
-    meshes: &[Option<&'a TriMesh>],
+    surfaces: &'a [Option<Surface>],
     tree: &Tree,
     fidelity: Fidelity,
 ) -> (Vec<usize>, Vec<Wet<'a>>) {
     let alone = fidelity == Fidelity::Isolated;
     let seen = |b: &usize| !alone || moves(scene, tree, *b);
     let wet = |b: usize| {
-        let (body, mesh) = (&scene.bodies[b], meshes[b]);
+        let (body, surface) = (&scene.bodies[b], surfaces[b].as_ref());
         let given = body.added_mass.as_ref();
-        (mesh.is_some() || given.is_some()).then(|| Wet {
+        (surface.is_some() || given.is_some()).then(|| Wet {
             name: &body.name,
-            mesh,
+            mesh: surface.map(|s| &s.mesh),
             ellipsoid: (body.shape.as_ref().and_then(wet::semi_axes))
                 .map(|axes| (axes, pose(&body.shape_at))),
+            coarse: surface.and_then(|s| s.coarse.as_ref()),
             added_mass: given
                 .filter(|_| alone)
                 .map(|rows| Mat6::from_fn(|i, j| rows[i][j])),
@@ -191,14 +223,10 @@ pub(super) fn assemble(
     parameters.density = scene.fluid.density;
     let mut surfaces = Vec::with_capacity(scene.bodies.len());
     for body in &scene.bodies {
-        surfaces.push(surface(body, settings)?);
+        surfaces.push(surface(body, settings, settings.faces)?);
     }
 
-    let meshes: Vec<_> = surfaces
-        .iter()
-        .map(|s| s.as_ref().map(|s| &s.mesh))
-        .collect();
-    let (of_wet, wet) = in_water(scene, &meshes, &tree, settings.fidelity);
+    let (of_wet, wet) = in_water(scene, &surfaces, &tree, settings.fidelity);
     let mut bodies = Vec::with_capacity(scene.bodies.len());
     let mut controls = 0;
     for (b, body) in scene.bodies.iter().enumerate() {
@@ -250,7 +278,7 @@ pub(super) fn assemble(
             None => Drive::Free,
         })
         .collect();
-    let clearance = Clearance::new(&meshes, &scene.walls, &tree, &drives)?;
+    let clearance = Clearance::new(scene, &surfaces, &tree, &drives)?;
     let mut system = System {
         bodies,
         drives,
@@ -266,7 +294,8 @@ pub(super) fn assemble(
         plan,
         reasons,
     } = choose(scene, settings, &system, &q, &clearance, &wet, &of_wet)?;
-    let made = wet::couple(&wet, &scene.walls, settings, fidelity, &plan, folder)?;
+    let water = water(scene, &of_wet, folder);
+    let made = wet::couple(&wet, &water, settings, fidelity, &plan)?;
     system.coupling = made.coupling;
     warnings.extend(made.warnings);
     let mut resolved = vec![0.0; scene.bodies.len()];
@@ -286,9 +315,21 @@ pub(super) fn assemble(
         resolved,
         plan,
         reasons,
-        gaps: clearance.moving,
+        clearance,
         warnings,
     })
+}
+
+/// What is around the bodies in the water, `of_wet` being their numbers in the scene.
+pub(super) fn water<'a>(scene: &'a Scene, of_wet: &[usize], folder: Option<&'a Path>) -> Water<'a> {
+    let number = |b: usize| of_wet.iter().position(|w| *w == b);
+    let declared = scene.overlapping().into_iter();
+    let pairs = declared.filter_map(|(a, b)| Some((number(a)?, number(b)?)));
+    Water {
+        walls: &scene.walls,
+        excluded: Exclusions::new(pairs),
+        folder,
+    }
 }
 
 /// The fidelity to use, and what `Auto` makes of the scene.
@@ -346,7 +387,7 @@ fn start_coordinates(
     };
     stepper(scene, settings, system, parameters).place_motions(&mut q, 0.0);
     if settings.fidelity != Fidelity::Isolated && scene.fluid.density > 0.0 {
-        clearance::refuse_start(clearance, &q, system)?;
+        clearance.refuse_start(&q, system)?;
     }
     Ok(q)
 }

@@ -1,13 +1,14 @@
 //! How near the bodies are to one another and to the walls, and what that means for the flow.
 
 use super::Fidelity;
+use super::assemble::Surface;
 use crate::adjoint::lie::Pose;
 use crate::dynamics::{Drive, System};
 use crate::error::readable;
 use crate::multibody::Tree;
-use crate::scene::Wall;
-use crate::shape::gap::overlap_error;
-use crate::shape::{Gap, Gaps, Other, TriMesh};
+use crate::scene::Scene;
+use crate::shape::gap::{Share, overlap_error};
+use crate::shape::{Gap, Gaps, Other};
 use crate::{Error, Result};
 use nalgebra::DVector;
 
@@ -18,22 +19,34 @@ const RESOLVED: f64 = 0.5;
 /// Depth in edges up to which surfaces count as touching: rounding.
 const TOUCHING: f64 = 1e-9;
 
+/// Largest part of a body's volume that may lie inside a larger one that it is declared to overlap.
+const MOST_SHARED: f64 = 0.5;
+
 /// The gaps of a scene's bodies, from their surfaces in body frames.
 pub(super) struct Clearance {
-    /// Between pairs that move relative to one another, and to the walls.
+    /// Between pairs that move relative to one another and aren't declared to overlap, and to the
+    /// walls.
     pub moving: Gaps,
-    /// Between the other pairs.
+    /// Between pairs that don't move relative to one another and aren't declared to overlap.
     pub rigid: Gaps,
+    /// How much pairs declared to overlap do so.
+    declared: Vec<Share>,
+    /// The nearest body with a shape that carries each.
+    parents: Vec<Option<usize>>,
 }
 
 impl Clearance {
     pub fn new(
-        meshes: &[Option<&TriMesh>],
-        walls: &[Wall],
+        scene: &Scene,
+        surfaces: &[Option<Surface>],
         tree: &Tree,
         drives: &[Drive],
     ) -> Result<Self> {
         let bodies = drives.len();
+        let meshes: Vec<_> = surfaces
+            .iter()
+            .map(|s| s.as_ref().map(|s| &s.mesh))
+            .collect();
         let movers = |b: usize| -> Vec<usize> {
             let carry = |a: &usize| {
                 tree.carries(*a, b) && !tree.links()[*a].v.is_empty() && drives[*a] != Drive::Locked
@@ -41,12 +54,135 @@ impl Clearance {
             (0..bodies).filter(carry).collect()
         };
         let of: Vec<Vec<usize>> = (0..bodies).map(movers).collect();
-        let pairs = (0..bodies).flat_map(|a| (a + 1..bodies).map(move |b| (a, b)));
-        let (rigid, moving): (Vec<_>, Vec<_>) = pairs.partition(|(a, b)| of[*a] == of[*b]);
+        let declared = scene.overlapping();
+        let (mut moving, mut rigid, mut shares) = (Vec::new(), Vec::new(), Vec::new());
+        for a in 0..bodies {
+            for b in a + 1..bodies {
+                let pair = (a, b);
+                if declared.contains(&pair) {
+                    shares.extend(Share::new(&meshes, pair)?);
+                } else if of[a] == of[b] {
+                    rigid.push(pair);
+                } else {
+                    moving.push(pair);
+                }
+            }
+        }
+        let but = |others: &[(usize, usize)]| [others, &declared].concat();
         Ok(Self {
-            moving: Gaps::new(meshes, walls, &rigid)?,
-            rigid: Gaps::new(meshes, &[], &moving)?,
+            rigid: Gaps::new(&meshes, &[], &but(&moving))?,
+            moving: Gaps::new(&meshes, &scene.walls, &but(&rigid))?,
+            declared: shares,
+            parents: (0..bodies).map(|b| scene.wet_parent(b)).collect(),
         })
+    }
+
+    /// Refuses a start with bodies in one another or in a wall: the coupled flow has no meaning there.
+    pub fn refuse_start(&self, q: &DVector<f64>, system: &System) -> Result<()> {
+        let poses = system.tree.kinematics(q).poses;
+        for gaps in [&self.moving, &self.rigid] {
+            if let Some(gap) = gaps.smallest(&poses)
+                && overlaps(&gap)
+            {
+                let mut error = overlap_error(&gap, &names(system));
+                if let Error::Unresolved { remedy, .. } = &mut error {
+                    remedy.push_str(&self.hint(&gap, system));
+                }
+                return Err(error);
+            }
+        }
+        self.refuse_depth(&poses, system)
+    }
+
+    /// The smallest gap at these poses; stops a run when bodies get into one another or into a wall.
+    pub fn keep_apart(&self, poses: &[Pose], system: &System) -> Result<Option<Gap>> {
+        let smallest = self.moving.smallest(poses);
+        if let Some(gap) = smallest.as_ref().filter(|gap| overlaps(gap)) {
+            return Err(Error::Unresolved {
+                place: place(gap, system),
+                quantity: "gap in m".into(),
+                value: gap.distance,
+                limit: 0.0,
+                remedy: format!(
+                    "they overlap by {:.3e} m, and contact is not modelled: end the run earlier, \
+                     keep them apart by the controls, or use the fidelity isolated{}",
+                    -gap.distance,
+                    self.hint(gap, system)
+                ),
+            });
+        }
+        self.refuse_depth(poses, system)?;
+        Ok(smallest)
+    }
+
+    /// Refuses bodies that lie too far inside one another though they may overlap.
+    fn refuse_depth(&self, poses: &[Pose], system: &System) -> Result<()> {
+        for share in &self.declared {
+            let value = share.at(poses);
+            if value > MOST_SHARED {
+                let (inner, outer) = share.bodies();
+                let name = |b: usize| format!("body {:?}", system.bodies[b].name);
+                return Err(Error::Unresolved {
+                    place: format!("{} inside {}", name(inner), name(outer)),
+                    quantity: "part of its volume".into(),
+                    value,
+                    limit: MOST_SHARED,
+                    remedy: "links with `overlaps_parent` may share up to half of the smaller \
+                             one's volume: move them apart, or make one body of them"
+                        .into(),
+                });
+            }
+        }
+        Ok(())
+    }
+
+    /// What the smallest gap of a run means.
+    pub fn warning(
+        &self,
+        time: f64,
+        gap: &Gap,
+        fidelity: Fidelity,
+        system: &System,
+    ) -> Option<String> {
+        let time = readable(time);
+        let place = place(gap, system);
+        let hint = self.hint(gap, system);
+        match fidelity {
+            Fidelity::Full | Fidelity::Auto => (gap.distance < RESOLVED * gap.edge).then(|| {
+                format!(
+                    "{place}: the smallest gap, {:.3e} m at t = {time} s, is narrower than half \
+                     the edges there ({:.3e} m): forces across it may be off by several percent \
+                     and more; use more faces, or end the run before{hint}",
+                    gap.distance.max(0.0),
+                    gap.edge
+                )
+            }),
+            // Said pair by pair: what is resolved differs between bodies.
+            Fidelity::Reduced => None,
+            Fidelity::Isolated => overlaps(gap).then(|| {
+                format!(
+                    "{place} overlap, most at t = {time} s by {:.3e} m; nothing keeps them apart \
+                     without the coupled water{hint}",
+                    -gap.distance
+                )
+            }),
+        }
+    }
+
+    /// How bodies of which one carries the other may be declared to overlap.
+    fn hint(&self, gap: &Gap, system: &System) -> String {
+        let Other::Body(second) = gap.second else {
+            return String::new();
+        };
+        let (a, b) = (gap.first.min(second), gap.first.max(second));
+        if self.parents[b] != Some(a) {
+            return String::new();
+        }
+        format!(
+            ". If they are links that belong together, write `overlaps_parent = true` for body {:?}: \
+             the two then don't feel each other through the water",
+            system.bodies[b].name
+        )
     }
 }
 
@@ -65,63 +201,6 @@ fn place(gap: &Gap, system: &System) -> String {
     match gap.second {
         Other::Body(b) => format!("{} and {}", name(gap.first), name(b)),
         Other::Wall(w) => format!("{} and wall {w}", name(gap.first)),
-    }
-}
-
-/// Refuses a start with bodies in one another or in a wall: the coupled flow has no meaning there.
-pub(super) fn refuse_start(clearance: &Clearance, q: &DVector<f64>, system: &System) -> Result<()> {
-    let poses = system.tree.kinematics(q).poses;
-    for gaps in [&clearance.moving, &clearance.rigid] {
-        if let Some(gap) = gaps.smallest(&poses)
-            && overlaps(&gap)
-        {
-            return Err(overlap_error(&gap, &names(system)));
-        }
-    }
-    Ok(())
-}
-
-/// Stops a run when bodies get into one another or into a wall.
-pub(super) fn refuse(gap: Option<&Gap>, system: &System) -> Result<()> {
-    match gap {
-        Some(gap) if overlaps(gap) => Err(Error::Unresolved {
-            place: place(gap, system),
-            quantity: "gap in m".into(),
-            value: gap.distance,
-            limit: 0.0,
-            remedy: format!(
-                "they overlap by {:.3e} m, and contact is not modelled: end the run earlier, keep \
-                 them apart by the controls, or use the fidelity isolated",
-                -gap.distance
-            ),
-        }),
-        _ => Ok(()),
-    }
-}
-
-/// What the smallest gap of a run means.
-pub(super) fn warning(time: f64, gap: &Gap, fidelity: Fidelity, system: &System) -> Option<String> {
-    let time = readable(time);
-    let place = place(gap, system);
-    match fidelity {
-        Fidelity::Full | Fidelity::Auto => (gap.distance < RESOLVED * gap.edge).then(|| {
-            format!(
-                "{place}: the smallest gap, {:.3e} m at t = {time} s, is narrower than half \
-                 the edges there ({:.3e} m): forces across it may be off by several percent and \
-                 more; use more faces, or end the run before",
-                gap.distance.max(0.0),
-                gap.edge
-            )
-        }),
-        // Said pair by pair: what is resolved differs between bodies.
-        Fidelity::Reduced => None,
-        Fidelity::Isolated => overlaps(gap).then(|| {
-            format!(
-                "{place} overlap, most at t = {time} s by {:.3e} m; nothing keeps them apart \
-                 without the coupled water",
-                -gap.distance
-            )
-        }),
     }
 }
 

@@ -1,6 +1,5 @@
 //! A trajectory, and its gradient.
 
-use super::clearance;
 use super::trajectory::Seed;
 use super::{Cotangents, Fidelity, Gradient, Initial, Objective, Simulator};
 use crate::adjoint::lie::{Pose, Vec6};
@@ -159,8 +158,9 @@ impl<'a> Rollout<'a> {
     }
 
     /// Smallest gap between bodies or to a wall at states 0 … N; none where there is nothing to
-    /// meet. Pairs that never move relative to one another don't count. With the fidelity
-    /// `isolated`, where gaps have no effect, they are measured at the first call.
+    /// meet. Pairs that never move relative to one another, and those declared to overlap, don't
+    /// count. With the fidelity `isolated`, where gaps have no effect, they are measured at the
+    /// first call.
     pub fn gaps(&self) -> &[Option<Gap>] {
         self.gaps.get_or_init(|| {
             let samples = self.samples().iter();
@@ -186,7 +186,8 @@ impl<'a> Rollout<'a> {
         let fidelity = self.simulator.felt();
         let nearest = self.nearest();
         let warning = nearest.and_then(|(time, gap)| {
-            clearance::warning(time, &gap, fidelity, self.simulator.system())
+            let clearance = self.simulator.clearance();
+            clearance.warning(time, &gap, fidelity, self.simulator.system())
         });
         let warning = warning.or_else(|| self.unresolved_gap(fidelity));
         warning.into_iter().chain(self.energy_warning()).collect()
@@ -201,7 +202,7 @@ impl<'a> Rollout<'a> {
         let states = samples.filter_map(|s| Some((s.time, s.poses.as_slice(), s.gap?)));
         let simulator = self.simulator;
         let (gaps, system) = (simulator.gaps(), simulator.system());
-        clearance::unresolved(states, gaps, simulator.resolved(), system)
+        super::clearance::unresolved(states, gaps, simulator.resolved(), system)
     }
 
     /// Energy that grows though nothing does work: the step is too long.

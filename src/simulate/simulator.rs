@@ -1,6 +1,7 @@
 //! The simulator: a scene made ready to run.
 
 use super::assemble::{self, Assembled};
+use super::clearance::Clearance;
 use super::trajectory::Trajectory;
 use super::{Controls, Discretisation, Fidelity, Policy, Rollout, Settings};
 use crate::adjoint::lie::Pose;
@@ -142,9 +143,13 @@ impl Simulator {
     }
 
     /// Distances between the bodies' surfaces, and to the walls; without the pairs that never move
-    /// relative to one another.
+    /// relative to one another and those declared to overlap.
     pub fn gaps(&self) -> &Gaps {
-        &self.assembled.gaps
+        &self.assembled.clearance.moving
+    }
+
+    pub(super) fn clearance(&self) -> &Clearance {
+        &self.assembled.clearance
     }
 
     /// What the user should know about the scene, with names and numbers.
@@ -282,7 +287,7 @@ impl Simulator {
         Trajectory {
             stepper: self.stepper(),
             policy: self.policy(),
-            gaps: self.gaps(),
+            clearance: self.clearance(),
             fidelity: self.felt(),
             controls,
         }

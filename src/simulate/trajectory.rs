@@ -1,11 +1,11 @@
 //! A rollout as steps with transposes: controller, integrator and observations together.
 
-use super::clearance;
+use super::clearance::Clearance;
 use super::{Fidelity, Observation, Policy, Sample};
 use crate::adjoint::lie::{Vec3, Vec6, point_wrench};
 use crate::adjoint::step::Step;
 use crate::dynamics::{Evaluation, Input, Parameters, State, StateBar, StepBar, Stepper};
-use crate::shape::{Gap, Gaps};
+use crate::shape::Gap;
 use crate::{Error, Result};
 use nalgebra::{DMatrix, DVector};
 
@@ -13,7 +13,7 @@ use nalgebra::{DMatrix, DVector};
 pub(super) struct Trajectory<'a> {
     pub stepper: Stepper<'a>,
     pub policy: &'a dyn Policy,
-    pub gaps: &'a Gaps,
+    pub clearance: &'a Clearance,
     pub fidelity: Fidelity,
     pub controls: &'a DMatrix<f64>,
 }
@@ -39,8 +39,8 @@ impl<'a> Trajectory<'a> {
         let system = self.stepper.system;
         let mut gap = None;
         if self.fidelity != Fidelity::Isolated {
-            gap = self.gaps.smallest(&system.tree.kinematics(&state.q).poses);
-            clearance::refuse(gap.as_ref(), system)?;
+            let poses = system.tree.kinematics(&state.q).poses;
+            gap = self.clearance.keep_apart(&poses, system)?;
         }
         Ok((self.stepper.evaluate(&state.q, false)?, gap))
     }

@@ -3,11 +3,12 @@
 use super::{Fidelity, Settings};
 use crate::adjoint::lie::{Mat6, Pose, Vec3};
 use crate::boundary::exact::ExactBoundary;
+use crate::boundary::panel::Extrapolated;
 use crate::boundary::{BodyBoundary, OneBody, PanelBoundary, Response};
 use crate::coupling::full::{Full, Solver, WetBody};
 use crate::coupling::panel::{self, PanelCoupled};
 use crate::coupling::reduced::{Cutoff, Reduced, ReducedBody, cache, compress};
-use crate::coupling::{Coupling, Isolated};
+use crate::coupling::{Coupling, Exclusions, Isolated};
 use crate::scene::{Shape, Wall};
 use crate::shape::{self, TriMesh};
 use crate::{Error, Result};
@@ -23,6 +24,8 @@ pub(super) struct Wet<'a> {
     pub mesh: Option<&'a TriMesh>,
     /// The shape by formula and its pose in the body's frame, if it is an ellipsoid.
     pub ellipsoid: Option<([f64; 3], Pose)>,
+    /// A coarser mesh of the shape, where it is one by formula.
+    pub coarse: Option<&'a TriMesh>,
     /// Given added mass at unit density.
     pub added_mass: Option<Mat6>,
 }
@@ -54,6 +57,8 @@ pub struct Discretisation {
     pub resolved_gap: Option<f64>,
     /// Asymmetry of its own added mass before symmetrising.
     pub asymmetry: f64,
+    /// Estimated error of its own added mass, where two meshes tell one.
+    pub added_mass_error: Option<f64>,
     /// Error of the compressed flow of the body itself at points not fitted to, relative.
     pub radiated_error: f64,
     /// Error of the compressed flow scattered between such points, relative.
@@ -117,7 +122,17 @@ impl<'a> Wet<'a> {
                 let b = &settings.boundary;
                 Box::new(BodyBoundary::new(self.name, vertices, faces, b)?)
             }
-            _ => Box::new(PanelBoundary::new(self.name, vertices, faces)?),
+            _ => {
+                let fine = PanelBoundary::new(self.name, vertices, faces)?;
+                match self.coarse {
+                    Some(mesh) => {
+                        let (vertices, faces) = (mesh.vertices(), mesh.faces());
+                        let coarse = PanelBoundary::new(self.name, vertices, faces)?;
+                        Box::new(Extrapolated::new(fine, coarse)?)
+                    }
+                    None => Box::new(fine),
+                }
+            }
         })
     }
 }
@@ -130,20 +145,28 @@ fn name_of(method: OneBody) -> &'static str {
     }
 }
 
+/// What is around the bodies.
+pub(super) struct Water<'a> {
+    pub walls: &'a [Wall],
+    /// Pairs that don't feel each other, by their numbers among the bodies in the water.
+    pub excluded: Exclusions,
+    /// Where compressed bodies are kept.
+    pub folder: Option<&'a Path>,
+}
+
 /// The coupling of `bodies`, with a fidelity that isn't `Auto`.
 pub(super) fn couple(
     bodies: &[Wet],
-    walls: &[Wall],
+    water: &Water,
     settings: &Settings,
     fidelity: Fidelity,
     plan: &Plan,
-    folder: Option<&Path>,
 ) -> Result<Made> {
     match fidelity {
-        Fidelity::Isolated => isolated(bodies, walls, settings),
-        Fidelity::Full if settings.one_body == OneBody::Panel => panels(bodies, walls, settings),
-        Fidelity::Full => full(bodies, walls, settings),
-        Fidelity::Reduced | Fidelity::Auto => reduced(bodies, walls, settings, plan, folder),
+        Fidelity::Isolated => isolated(bodies, water.walls, settings),
+        Fidelity::Full if settings.one_body == OneBody::Panel => panels(bodies, water, settings),
+        Fidelity::Full => full(bodies, water, settings),
+        Fidelity::Reduced | Fidelity::Auto => reduced(bodies, water, settings, plan),
     }
 }
 
@@ -186,6 +209,7 @@ fn isolated(bodies: &[Wet], walls: &[Wall], settings: &Settings) -> Result<Made>
                 method: own.method,
                 faces: own.faces,
                 asymmetry: own.asymmetry,
+                added_mass_error: own.error,
                 ..Discretisation::empty()
             })
             .collect(),
@@ -203,6 +227,7 @@ struct Own {
     method: &'static str,
     faces: usize,
     asymmetry: f64,
+    error: Option<f64>,
     warnings: Vec<String>,
 }
 
@@ -225,6 +250,7 @@ fn own(body: &Wet, settings: &Settings) -> Result<Own> {
             method: "given",
             faces: 0,
             asymmetry: 0.0,
+            error: None,
             warnings: Vec::new(),
         });
     }
@@ -241,6 +267,7 @@ fn own(body: &Wet, settings: &Settings) -> Result<Own> {
         method: name_of(method),
         faces,
         asymmetry: response.asymmetry(),
+        error: response.error(),
         warnings: response.warnings().to_vec(),
     })
 }
@@ -255,6 +282,7 @@ impl Discretisation {
             points: 0,
             resolved_gap: None,
             asymmetry: 0.0,
+            added_mass_error: None,
             radiated_error: 0.0,
             scattered_error: 0.0,
         }
@@ -281,7 +309,7 @@ fn once<T>(made: &[Arc<T>], of: impl Fn(&T) -> &[String]) -> Vec<String> {
     distinct.flat_map(|i| of(&made[i]).to_vec()).collect()
 }
 
-fn full(bodies: &[Wet], walls: &[Wall], settings: &Settings) -> Result<Made> {
+fn full(bodies: &[Wet], water: &Water, settings: &Settings) -> Result<Made> {
     if settings.one_body == OneBody::Exact {
         return Err(Error::Unsupported {
             what: "the method exact with the fidelity full".into(),
@@ -315,11 +343,16 @@ fn full(bodies: &[Wet], walls: &[Wall], settings: &Settings) -> Result<Made> {
                 ..Discretisation::empty()
             })
             .collect(),
-        coupling: Box::new(Full::new(made, walls, settings.solve)?),
+        coupling: Box::new(Full::new(
+            made,
+            water.walls,
+            water.excluded.clone(),
+            settings.solve,
+        )?),
     })
 }
 
-fn panels(bodies: &[Wet], walls: &[Wall], settings: &Settings) -> Result<Made> {
+fn panels(bodies: &[Wet], water: &Water, settings: &Settings) -> Result<Made> {
     let made = shared(bodies, |body, mesh| {
         PanelBoundary::new(body.name, mesh.vertices(), mesh.faces())
     })?;
@@ -343,18 +376,14 @@ fn panels(bodies: &[Wet], walls: &[Wall], settings: &Settings) -> Result<Made> {
                 ..Discretisation::empty()
             })
             .collect(),
-        coupling: Box::new(PanelCoupled::new(made, walls, solve)?),
+        coupling: Box::new(
+            PanelCoupled::new(made, water.walls, solve)?.excluding(water.excluded.clone())?,
+        ),
     })
 }
 
-fn reduced(
-    bodies: &[Wet],
-    walls: &[Wall],
-    settings: &Settings,
-    plan: &Plan,
-    folder: Option<&Path>,
-) -> Result<Made> {
-    let coupling = compressed_all(bodies, walls, settings, plan, folder)?;
+fn reduced(bodies: &[Wet], water: &Water, settings: &Settings, plan: &Plan) -> Result<Made> {
+    let coupling = compressed_all(bodies, water, settings, plan)?;
     let made = coupling.reduced_bodies();
     let method = |body: &Wet| Ok(name_of(body.method(settings)?));
     let methods = bodies.iter().map(method).collect::<Result<Vec<_>>>()?;
@@ -378,6 +407,7 @@ fn reduced(
                     points: m.points(),
                     resolved_gap: Some(fit.resolved_gap),
                     asymmetry: fit.body_asymmetry,
+                    added_mass_error: fit.body_error,
                     radiated_error: fit.radiated,
                     scattered_error: fit.scattered,
                 }
@@ -390,16 +420,15 @@ fn reduced(
 /// All bodies compressed and coupled.
 pub(super) fn compressed_all(
     bodies: &[Wet],
-    walls: &[Wall],
+    water: &Water,
     settings: &Settings,
     plan: &Plan,
-    folder: Option<&Path>,
 ) -> Result<Reduced> {
     let mut made: Vec<Arc<ReducedBody>> = Vec::with_capacity(bodies.len());
     for (b, body) in bodies.iter().enumerate() {
         let method = body.method(settings)?;
         let chosen = plan.compress.get(b).copied().unwrap_or(settings.compress);
-        made.push(compressed(body, method, settings, &chosen, folder)?);
+        made.push(compressed(body, method, settings, &chosen, water.folder)?);
     }
     let cutoff = |a: usize, b: usize| {
         let pair = (a.min(b), a.max(b));
@@ -407,7 +436,9 @@ pub(super) fn compressed_all(
         found.map(|(_, cutoff)| *cutoff)
     };
     let names = bodies.iter().map(|b| b.name.to_string());
-    Ok(Reduced::new(made, walls, cutoff)?.named(names))
+    Ok(Reduced::new(made, water.walls, cutoff)?
+        .excluding(&water.excluded)?
+        .named(names))
 }
 
 /// What each body answers by its own method; bodies that are equal share one. Sources as near as
@@ -458,7 +489,7 @@ fn compression_warnings(
             .unwrap_or(&settings.compress)
             .resolved_gap;
         let got = parts.fit.resolved_gap;
-        if let Some(asked) = asked.filter(|a| *a < (1.0 - 1e-6) * got) {
+        if let Some(asked) = asked.filter(|a| *a < 0.98 * got) {
             out.push(format!(
                 "body {:?}: gaps under {got:.3e} m aren't resolved by its compressed sources, for all \
                  that {asked:.3e} m were asked for: its surface is too large; use a plane wall for a \
@@ -510,6 +541,11 @@ fn compressed(
     let round = |x: f64| (x / size * GRID).round() / GRID;
     let vertices: Vec<Vec3> = mesh.vertices().iter().map(|v| v.map(round)).collect();
     let unit = TriMesh::new(mesh.name(), vertices, mesh.faces().to_vec())?;
+    let coarse = body.coarse.filter(|_| method == OneBody::Panel).map(|m| {
+        let vertices = m.vertices().iter().map(|v| v.map(round)).collect();
+        TriMesh::new(m.name(), vertices, m.faces().to_vec())
+    });
+    let coarse = coarse.transpose()?;
     let ellipsoid = body.ellipsoid.filter(|_| method == OneBody::Exact);
     let ellipsoid = ellipsoid.map(|(axes, pose)| {
         let at = Pose::new(pose.rotation, pose.translation.map(round));
@@ -528,13 +564,19 @@ fn compressed(
         (axes, turn, <[f64; 3]>::from(pose.translation))
     });
     let fundamental = (method == OneBody::Mfs).then_some(settings.boundary);
-    let made_from = (method, formula, fundamental);
+    let made_from = (
+        method,
+        formula,
+        fundamental,
+        coarse.as_ref().map(|m| m.faces().len()),
+    );
     let key = cache::Key::new(unit.vertices(), unit.faces(), &made_from, &chosen);
     let found = cache::fetch(key, folder, || {
         let own = Wet {
             name: body.name,
             mesh: Some(&unit),
             ellipsoid,
+            coarse: coarse.as_ref(),
             added_mass: None,
         };
         let gap = chosen

@@ -8,7 +8,7 @@ use hydrograd::boundary::{BodyBoundary, Method, Settings};
 use hydrograd::coupling::full::{Full, SolveSettings, Solver, WetBody};
 use hydrograd::coupling::image::Image;
 use hydrograd::coupling::reduced::{Cutoff, Reduced, compress};
-use hydrograd::coupling::{Coupling, Direction, Isolated};
+use hydrograd::coupling::{Coupling, Direction, Exclusions, Isolated};
 use hydrograd::scene::{Shape, Wall, WallSurface};
 use hydrograd::shape;
 use nalgebra::{DMatrix, DVector};
@@ -63,6 +63,10 @@ fn body(shape: Shape, method: Method, solver: Solver) -> Arc<WetBody> {
 }
 
 fn full(method: Method, solver: Solver, walls: &[Wall]) -> Full {
+    without(Exclusions::none(), method, solver, walls)
+}
+
+fn without(excluded: Exclusions, method: Method, solver: Solver, walls: &[Wall]) -> Full {
     let bodies = vec![
         body(Shape::sphere(0.5), method, solver),
         body(Shape::ellipsoid([0.6, 0.3, 0.4]), method, solver),
@@ -72,16 +76,23 @@ fn full(method: Method, solver: Solver, walls: &[Wall]) -> Full {
         tolerance: 1e-13,
         ..SolveSettings::default()
     };
-    Full::new(bodies, walls, settings).unwrap()
+    Full::new(bodies, walls, excluded, settings).unwrap()
 }
 
-/// Every method with every solver that it has, without walls, with one and with two.
+/// Every method with every solver that it has, without walls, with one and with two; and two bodies
+/// that feel each other's images alone.
 fn systems() -> Vec<Full> {
     vec![
         full(Method::MfsVertex, Solver::Cgls, &[]),
         full(Method::MfsVertex, Solver::Qr, &[WALL, SIDE]),
         full(Method::MfsFace, Solver::Cgls, &[WALL]),
         full(Method::MfsFace, Solver::Gmres, &[]),
+        without(
+            Exclusions::new([(0, 1)]),
+            Method::MfsVertex,
+            Solver::Cgls,
+            &[WALL],
+        ),
     ]
 }
 

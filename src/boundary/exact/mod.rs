@@ -23,7 +23,10 @@ const WANTED: f64 = 1e-4;
 /// Differences of squared semi-axes, relative, below which an ellipsoid is a sphere.
 const ROUND: f64 = 1e-9;
 
-/// A sphere or an ellipsoid in unbounded water.
+/// A sphere or an ellipsoid in unbounded water. `added_mass` and `radiated` are exact; `scattered` is exact for
+/// a sphere, and as good as `residual` for an ellipsoid where sources or points are at `resolved_gap` or
+/// farther. Nearer ones are answered as long as the error, estimated from the last harmonics, is below 1e-3, and
+/// refused beyond (about half the gap on both sides).
 #[derive(Clone, Debug)]
 pub struct ExactBoundary {
     /// Name, for messages.

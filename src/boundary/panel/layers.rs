@@ -267,12 +267,17 @@ impl Panel {
         let [l0, l1, l2] = self.edges.map(|e| &logs[e as usize]);
         let [m0, m1, m2] = &self.outward;
         let (n, v) = (&self.normal, &self.corner);
-        std::array::from_fn(|p| {
+        // A loop, since a closure would be compiled without the processor's wide vectors.
+        let mut out = [0.0; LANES];
+        for p in 0..LANES {
             let (a, b, c) = (v.x - x[0][p], v.y - x[1][p], v.z - x[2][p]);
-            let along = |m: &Vec3| m.x * a + m.y * b + m.z * c;
-            along(m0) * l0[p] + (along(m1) + self.height) * l1[p] + along(m2) * l2[p]
-                - along(n) * omega[p]
-        })
+            let d0 = m0.x * a + m0.y * b + m0.z * c;
+            let d1 = m1.x * a + m1.y * b + m1.z * c + self.height;
+            let d2 = m2.x * a + m2.y * b + m2.z * c;
+            let height = n.x * a + n.y * b + n.z * c;
+            out[p] = d0 * l0[p] + d1 * l1[p] + d2 * l2[p] - height * omega[p];
+        }
+        out
     }
 }
 

@@ -7,10 +7,11 @@
 //! M = M_fine + (M_fine − M_coarse)/(ρᵖ − 1)
 //! ```
 //!
-//! takes the leading part away. The fine mesh's error is estimated with the same p on a smooth body, and with
-//! p = 1 on one with sharp edges, where faces are seldom small enough for the leading part to be
-//! all; that of M as 1/ρ of it. A rim that the faces don't resolve counts as sharp. A thickness that
-//! they don't resolve isn't noticed: two faces across it at least.
+//! takes the leading part away. The fine mesh's error is estimated with the same p on a smooth body,
+//! and with p = 1 on one with sharp edges, where faces are seldom small enough for the leading part to be
+//! all; that of M as smaller by the factor from the coarse mesh's error to the fine one's once more. A
+//! rim that the faces don't resolve counts as sharp. A thickness that they don't resolve isn't noticed:
+//! several faces across it are needed.
 
 use super::PanelBoundary;
 use crate::adjoint::lie::Mat6;
@@ -69,7 +70,7 @@ pub fn richardson(fine: &PanelBoundary, coarse: &PanelBoundary) -> Result<Richar
     Ok(Richardson {
         added_mass: fine.added_mass + step / (ratio.powf(order) - 1.0),
         fine_error,
-        error: fine_error / ratio,
+        error: fine_error / ratio.powf(cautious),
         order,
         ratio,
     })

@@ -33,7 +33,7 @@ pub use body::WetBody;
 pub use system::{Preconditioner, SolveSettings, Solver};
 
 use super::image::Image;
-use super::{Coupling, Record};
+use super::{Coupling, Exclusions, Record};
 use crate::Result;
 use crate::adjoint::lie::Pose;
 use crate::scene::Wall;
@@ -45,6 +45,7 @@ use std::sync::{Arc, Mutex};
 pub struct Full {
     bodies: Vec<Arc<WetBody>>,
     images: Vec<Image>,
+    excluded: Exclusions,
     settings: SolveSettings,
     faces: Vec<Range<usize>>,
     sources: Vec<Range<usize>>,
@@ -53,12 +54,20 @@ pub struct Full {
 }
 
 impl Full {
-    /// From the bodies, the walls (one, or mutually perpendicular ones) and the solver's settings.
+    /// From the bodies, the walls (one, or mutually perpendicular ones), the pairs of bodies that
+    /// don't feel each other, and the solver's settings.
     ///
     /// # Errors
-    /// Walls that don't close under reflection, or settings out of range.
-    pub fn new(bodies: Vec<Arc<WetBody>>, walls: &[Wall], settings: SolveSettings) -> Result<Self> {
+    /// Walls that don't close under reflection, pairs of bodies that don't exist, or settings out of
+    /// range.
+    pub fn new(
+        bodies: Vec<Arc<WetBody>>,
+        walls: &[Wall],
+        excluded: Exclusions,
+        settings: SolveSettings,
+    ) -> Result<Self> {
         settings.validate(&bodies)?;
+        excluded.check(bodies.len())?;
         let ranges = |size: &dyn Fn(&WetBody) -> usize| {
             let mut at = 0;
             bodies
@@ -74,6 +83,7 @@ impl Full {
             faces: ranges(&|b| b.faces()),
             sources: ranges(&|b| b.sources()),
             images: Image::of_rigid_walls(walls, "the fidelity full")?,
+            excluded,
             bodies,
             settings,
             spare: Mutex::new(Vec::new()),

@@ -5,13 +5,15 @@ use crate::adjoint::lie::Pose;
 use crate::coupling::pair::Pair;
 
 impl Full {
-    /// All pairs but each body with its own sources.
+    /// All pairs but each body with its own sources and with those of bodies that it doesn't feel;
+    /// images count always.
     pub(super) fn pairs(&self, poses: &[Pose]) -> Vec<Pair> {
         let mut out = Vec::new();
         for target in 0..self.bodies.len() {
             for image in &self.images {
                 for source in 0..self.bodies.len() {
-                    if source == target && image.is_identity() {
+                    let apart = source == target || self.excluded.contains(source, target);
+                    if apart && image.is_identity() {
                         continue;
                     }
                     let own = &self.bodies[source].boundary.sources;

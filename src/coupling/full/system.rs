@@ -120,7 +120,7 @@ pub(super) struct Solved {
 }
 
 impl<'a> System<'a> {
-    /// Assembles K: own blocks from the bodies, all others from the pairs.
+    /// Assembles K: own blocks from the bodies, zero for excluded pairs, all others from the pairs.
     pub fn new(full: &'a Full, pairs: &[Pair]) -> Self {
         let (rows, columns) = (full.rows(), full.columns());
         // Every entry is written below, so that what a used matrix held doesn't matter.
@@ -134,9 +134,16 @@ impl<'a> System<'a> {
                 matrix[at..at + width].copy_from_slice(row);
             }
         }
+        for (a, b) in full.excluded.iter().flat_map(|(a, b)| [(a, b), (b, a)]) {
+            for i in full.faces[a].clone() {
+                let sources = &full.sources[b];
+                matrix[i * columns + sources.start..i * columns + sources.end].fill(0.0);
+            }
+        }
         for pair in pairs {
             let rows = &full.faces[pair.target];
             let out = &mut matrix[rows.start * columns..rows.end * columns];
+            // The first that is written there sets, the images after it add.
             let write = if pair.image.is_identity() {
                 Write::Set
             } else {

@@ -18,6 +18,7 @@
 mod record;
 mod system;
 
+use super::Exclusions;
 use super::image::Image;
 use super::settings::check_limits;
 use super::{Coupling, Record};
@@ -73,6 +74,7 @@ pub struct PanelCoupled {
     walls: Vec<(Vec3, Vec3)>,
     settings: SolveSettings,
     faces: Vec<Range<usize>>,
+    excluded: Exclusions,
 }
 
 impl PanelCoupled {
@@ -98,7 +100,7 @@ impl PanelCoupled {
             .collect();
         check_size(&format!("{} bodies", bodies.len()), at)?;
         Ok(Self {
-            images: Image::of_rigid_walls(walls, "the coupled panel method")?,
+            images: Image::of_walls(walls)?,
             walls: walls
                 .iter()
                 .map(|w| (Vec3::from(w.point), Vec3::from(w.normal).normalize()))
@@ -106,7 +108,18 @@ impl PanelCoupled {
             bodies,
             settings,
             faces,
+            excluded: Exclusions::none(),
         })
+    }
+
+    /// The same, without the flow between these pairs of bodies.
+    ///
+    /// # Errors
+    /// A pair that names a body that doesn't exist.
+    pub fn excluding(mut self, pairs: Exclusions) -> Result<Self> {
+        pairs.check(self.bodies.len())?;
+        self.excluded = pairs;
+        Ok(self)
     }
 
     /// Number of panels of all bodies.

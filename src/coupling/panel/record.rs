@@ -104,6 +104,9 @@ fn single_layers(
             let mu = mu.slice(points.start, points.end);
             let mu = MatRef::from_row_major_slice(mu, points.len(), k);
             for image in &coupled.images {
+                if image.is_identity() && coupled.excluded.contains(source, target) {
+                    continue;
+                }
                 let seen = seen_from(coupled, poses, image, source, target);
                 let layers = coupled.bodies[source].panels();
                 let (s_q, s_mu) = layers.single_layer_both(&seen, q, mu);

@@ -242,7 +242,8 @@ fn fill(
     let layers = coupled.bodies[source].panels();
     let points = coupled.faces[target].len();
     for image in &coupled.images {
-        if source == target && image.is_identity() {
+        let apart = source != target && !coupled.excluded.contains(source, target);
+        if image.is_identity() && !apart {
             continue;
         }
         let seen = seen_from(coupled, poses, image, source, target);

@@ -66,6 +66,8 @@ pub struct Fit {
     pub wrong_sign: f64,
     /// Asymmetry of the body's own added mass before symmetrising.
     pub body_asymmetry: f64,
+    /// Estimated relative error of the body's own added mass, where two resolutions tell one.
+    pub body_error: Option<f64>,
     /// What the user should know, each with the body's name and its numbers.
     pub warnings: Vec<String>,
 }

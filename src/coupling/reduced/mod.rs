@@ -29,7 +29,7 @@ pub use body::{Fit, Parts, ReducedBody};
 pub use cutoff::Cutoff;
 
 use super::image::Image;
-use super::{Coupling, Record};
+use super::{Coupling, Exclusions, Record};
 use crate::Result;
 use crate::adjoint::lie::Pose;
 use crate::scene::Wall;
@@ -78,6 +78,17 @@ impl Reduced {
             names: bodies.iter().map(|b| b.parts().name.clone()).collect(),
             bodies,
         })
+    }
+
+    /// The same, without the flow between these pairs of bodies.
+    ///
+    /// # Errors
+    /// A pair that names a body that doesn't exist.
+    pub fn excluding(mut self, pairs: &Exclusions) -> Result<Self> {
+        pairs.check(self.bodies.len())?;
+        let apart = |l: &Link| !l.image.is_identity() || !pairs.contains(l.target, l.source);
+        self.links.retain(apart);
+        Ok(self)
     }
 
     /// The same with names of the bodies, for messages; those beyond the bodies are dropped.

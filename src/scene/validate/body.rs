@@ -31,7 +31,33 @@ pub(super) fn check(scene: &Scene, index: usize) -> Result<()> {
             "the body can't move, so a thruster does nothing; give it a joint or take it away",
         ));
     }
+    check_overlap(scene, index)?;
     check_drag(body)
+}
+
+fn check_overlap(scene: &Scene, index: usize) -> Result<()> {
+    let body = &scene.bodies[index];
+    if !body.overlaps_parent {
+        return Ok(());
+    }
+    let refused = |remedy: &str| {
+        let place = place(body, "overlaps_parent");
+        Err(Error::input(place, true, remedy.to_owned()))
+    };
+    match (&body.parent, &body.shape) {
+        (None, _) => refused(
+            "the body has no parent, and only links of one mechanism may overlap: name the parent, \
+             or take `overlaps_parent` away and move the bodies apart",
+        ),
+        (_, None) => refused(
+            "the body has no shape that could overlap: take `overlaps_parent` away, or give it one",
+        ),
+        _ if scene.wet_parent(index).is_none() => refused(
+            "none of the bodies that carry this one has a shape to overlap: take `overlaps_parent` \
+             away",
+        ),
+        _ => Ok(()),
+    }
 }
 
 fn check_shape(body: &Body) -> Result<()> {

@@ -36,6 +36,25 @@ impl Scene {
         held && parent.is_none_or(|parent| self.is_static(parent.0))
     }
 
+    /// The nearest body with a shape among those that carry this one: what `overlaps_parent` speaks
+    /// of. The tree must have been checked.
+    pub(crate) fn wet_parent(&self, index: usize) -> Option<usize> {
+        let parent = self.bodies[index].parent.as_ref()?;
+        let parent = self.body(parent)?.0;
+        match self.bodies[parent].shape {
+            Some(_) => Some(parent),
+            None => self.wet_parent(parent),
+        }
+    }
+
+    /// Pairs of bodies declared to overlap, the carrying one first. The scene must have been checked.
+    pub(crate) fn overlapping(&self) -> Vec<(usize, usize)> {
+        let declared = (0..self.bodies.len()).filter(|&b| self.bodies[b].overlaps_parent);
+        declared
+            .filter_map(|b| Some((self.wet_parent(b)?, b)))
+            .collect()
+    }
+
     fn check_world(&self) -> Result<()> {
         let fluid = &self.fluid;
         finite("fluid.density", &[fluid.density])?;

@@ -7,11 +7,14 @@
 //! crossing edges.
 
 mod pair;
+mod share;
 mod surface;
 mod triangle;
 
 #[cfg(test)]
 mod tests;
+
+pub use share::Share;
 
 use super::mesh::TriMesh;
 use crate::error::{Error, Result};

@@ -1,9 +1,11 @@
 //! Shapes by formula, as meshes: vertices on the exact surface, faces near-equilateral, and
-//! mirror images of each other in x, y and z, so that the mesh adds no coupling that the shape
-//! doesn't have.
+//! mirror images of each other in x, y and z (prisms: in x), so that the mesh adds no coupling that
+//! the shape doesn't have.
 
 mod cuboid;
 mod parse;
+mod planar;
+mod prism;
 mod revolved;
 mod sphere;
 
@@ -47,6 +49,11 @@ pub fn build(shape: &Shape, base_dir: &Path, faces_override: Option<usize>) -> R
             length,
             faces,
         } => revolved::capsule(*radius, *length, target(faces)),
+        Shape::Prism {
+            profile,
+            length,
+            faces,
+        } => prism::prism(profile, *length, target(faces)),
         Shape::Mesh { path, scale } => return read(&base_dir.join(path), *scale),
     };
     TriMesh::new(name, vertices, faces)
@@ -121,6 +128,15 @@ pub fn validate(shape: &Shape, place: &str) -> Result<()> {
                     "a capsule without a cylindrical part is a sphere: use that",
                 ));
             }
+            length("length", *l)?;
+            faces
+        }
+        Shape::Prism {
+            profile,
+            length: l,
+            faces,
+        } => {
+            prism::check_profile(profile, place)?;
             length("length", *l)?;
             faces
         }

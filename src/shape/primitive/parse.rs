@@ -4,7 +4,8 @@ use super::validate;
 use crate::error::{Error, Result};
 use crate::scene::Shape;
 
-const FORMS: [(&str, usize, &str); 5] = [
+/// Name, how many numbers (zero: see [`counted`]), and how they are written.
+const FORMS: [(&str, usize, &str); 6] = [
     ("sphere", 1, "sphere:RADIUS"),
     ("ellipsoid", 3, "ellipsoid:A,B,C (semi-axes)"),
     ("box", 3, "box:A,B,C (edge lengths)"),
@@ -14,11 +15,24 @@ const FORMS: [(&str, usize, &str); 5] = [
         2,
         "capsule:RADIUS,LENGTH (of the cylindrical part)",
     ),
+    (
+        "prism",
+        0,
+        "prism:LENGTH,Y1,Z1,Y2,Z2,Y3,Z3,… (convex profile, length along x)",
+    ),
 ];
+
+/// Whether a form of so many numbers takes `given`; a prism takes its length and three corners or more.
+fn counted(form: usize, given: usize) -> bool {
+    match form {
+        0 => given >= 7 && given % 2 == 1,
+        _ => given == form,
+    }
+}
 
 /// A shape from its short form, lengths in m: `sphere:R`, `ellipsoid:A,B,C` (semi-axes),
 /// `box:A,B,C` (edge lengths), `cylinder:R,L`, `capsule:R,L` (both along z; a capsule's L is
-/// without its ends).
+/// without its ends), `prism:L,Y1,Z1,Y2,Z2,Y3,Z3,…` (length along x, then the profile's corners).
 ///
 /// # Errors
 /// [`Error::Input`] with the forms that are understood, or naming the number that can't be.
@@ -43,12 +57,16 @@ pub fn parse_shape(text: &str) -> Result<Shape> {
         .map(|n| n.trim().parse::<f64>())
         .collect::<std::result::Result<Vec<_>, _>>()
         .ok()
-        .filter(|v| v.len() == *count)
+        .filter(|v| counted(*count, v.len()))
         .ok_or_else(|| {
+            let count = match count {
+                0 => "7 or more, an odd number of".to_owned(),
+                n => format!("{n} number(s)"),
+            };
             Error::input(
                 "shape",
                 format!("{text:?}"),
-                format!("write {form}, {count} number(s) in metres"),
+                format!("write {form}, {count} in metres"),
             )
         })?;
     let faces = None;
@@ -70,9 +88,14 @@ pub fn parse_shape(text: &str) -> Result<Shape> {
             length: values[1],
             faces,
         },
-        _ => Shape::Capsule {
+        "capsule" => Shape::Capsule {
             radius: values[0],
             length: values[1],
+            faces,
+        },
+        _ => Shape::Prism {
+            length: values[0],
+            profile: values[1..].chunks_exact(2).map(|p| [p[0], p[1]]).collect(),
             faces,
         },
     };
@@ -93,6 +116,12 @@ pub fn shape_name(shape: &Shape) -> String {
         } => format!("box:{a:?},{b:?},{c:?}"),
         Shape::Cylinder { radius, length, .. } => format!("cylinder:{radius:?},{length:?}"),
         Shape::Capsule { radius, length, .. } => format!("capsule:{radius:?},{length:?}"),
+        Shape::Prism {
+            profile, length, ..
+        } => {
+            let corners = profile.iter().map(|[y, z]| format!(",{y:?},{z:?}"));
+            format!("prism:{length:?}{}", corners.collect::<String>())
+        }
         Shape::Mesh { path, .. } => path.display().to_string(),
     }
 }

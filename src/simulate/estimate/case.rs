@@ -5,10 +5,11 @@ use crate::adjoint::lie::Pose;
 use crate::boundary::{OneBody, Response};
 use crate::coupling::{Coupling, Report};
 use crate::scene::{Scene, Shape, WallSurface};
-use crate::shape::{Gap, Gaps, Other, TriMesh};
+use crate::shape::{Gap, Other};
+use crate::simulate::assemble::{self, Surface};
 use crate::simulate::simulator::world_axes;
-use crate::simulate::wet::{self, Wet};
-use crate::simulate::{Fidelity, Settings, Simulator, assemble};
+use crate::simulate::wet::{self, Water, Wet};
+use crate::simulate::{Fidelity, Settings, Simulator};
 use nalgebra::DMatrix;
 use std::sync::Arc;
 
@@ -33,7 +34,7 @@ pub(super) struct Case<'a> {
     matrix: DMatrix<f64>,
     diagonal: Vec<f64>,
     /// Of all bodies of the scene.
-    pub meshes: Vec<Option<TriMesh>>,
+    pub surfaces: Vec<Option<Surface>>,
     /// What compressed bodies are off from their own methods' answers.
     correction: Option<DMatrix<f64>>,
     pub report: Report,
@@ -71,8 +72,8 @@ impl<'a> Case<'a> {
                 matrix[(i, i)].max(LEAST * volume * squared)
             })
             .collect();
-        let faces = simulator.settings().faces;
-        let meshes = simulator.scene.bodies.iter();
+        let settings = simulator.settings();
+        let scene = simulator.scene.bodies.iter();
         let mut out = Self {
             simulator,
             fidelity: simulator.fidelity(),
@@ -81,14 +82,14 @@ impl<'a> Case<'a> {
             turn,
             matrix,
             diagonal,
-            meshes: meshes
-                .map(|b| assemble::mesh(b, faces))
+            surfaces: scene
+                .map(|b| assemble::surface(b, settings, settings.faces))
                 .collect::<Result<_>>()?,
             correction: None,
             report,
         };
         if matches!(out.fidelity, Fidelity::Reduced | Fidelity::Auto) {
-            out.correction = Some(out.correction(&out.wet(&out.meshes))?);
+            out.correction = Some(out.correction(&out.wet(&out.surfaces))?);
         }
         Ok(out)
     }
@@ -100,7 +101,7 @@ impl<'a> Case<'a> {
     /// The bodies whose answers come from their meshes, by their numbers in the scene.
     pub fn meshed(&self) -> Vec<usize> {
         let settings = self.simulator.settings();
-        let wet = self.wet(&self.meshes);
+        let wet = self.wet(&self.surfaces);
         let pairs = self.bodies.iter().zip(&wet);
         let used = pairs.filter(|(_, w)| w.meshed(settings, self.fidelity));
         used.map(|(b, _)| *b).collect()
@@ -132,34 +133,37 @@ impl<'a> Case<'a> {
         worst
     }
 
-    /// The bodies in the water with these meshes.
-    pub fn wet<'b>(&'b self, meshes: &'b [Option<TriMesh>]) -> Vec<Wet<'b>> {
-        let meshes: Vec<_> = meshes.iter().map(Option::as_ref).collect();
+    /// The bodies in the water with these surfaces.
+    pub fn wet<'b>(&'b self, surfaces: &'b [Option<Surface>]) -> Vec<Wet<'b>> {
         let tree = &self.simulator.system().tree;
         let asked = self.simulator.settings().fidelity;
-        assemble::in_water(&self.simulator.scene, &meshes, tree, asked).1
+        assemble::in_water(self.scene(), surfaces, tree, asked).1
     }
 
-    /// By how much the added mass differs with these meshes.
-    pub fn difference(&self, meshes: &[Option<TriMesh>]) -> Result<DMatrix<f64>> {
-        let wet = self.wet(meshes);
+    fn water(&self) -> Water<'_> {
+        let folder = self.simulator.folder.as_deref();
+        assemble::water(self.scene(), &self.bodies, folder)
+    }
+
+    /// By how much the added mass differs with these surfaces.
+    pub fn difference(&self, surfaces: &[Option<Surface>]) -> Result<DMatrix<f64>> {
+        let wet = self.wet(surfaces);
         if let Some(own) = &self.correction {
             return Ok(self.correction(&wet)? - own);
         }
-        let (scene, settings) = (self.scene(), self.simulator.settings());
+        let settings = self.simulator.settings();
         let plan = &self.simulator.assembled.plan;
-        let made = wet::couple(&wet, &scene.walls, settings, self.fidelity, plan, None)?;
+        let made = wet::couple(&wet, &self.water(), settings, self.fidelity, plan)?;
         let (m, _) = evaluate(made.coupling.as_ref(), &self.poses, &self.turn)?;
         Ok(m - &self.matrix)
     }
 
     /// What the compressed bodies' added mass is off if they answer as `bodies` do.
     fn correction(&self, bodies: &[Wet]) -> Result<DMatrix<f64>> {
-        let (scene, settings) = (self.scene(), self.simulator.settings());
+        let settings = self.simulator.settings();
         let plan = &self.simulator.assembled.plan;
-        let folder = self.simulator.folder.as_deref();
-        let own = self.wet(&self.meshes);
-        let coupling = wet::compressed_all(&own, &scene.walls, settings, plan, folder)?;
+        let own = self.wet(&self.surfaces);
+        let coupling = wet::compressed_all(&own, &self.water(), settings, plan)?;
         let made = coupling.reduced_bodies().iter();
         let gaps: Vec<f64> = made.map(|b| b.parts().fit.resolved_gap).collect();
         let answers: Vec<Arc<dyn Response>> = wet::answers(bodies, settings, &gaps)?;
@@ -169,7 +173,7 @@ impl<'a> Case<'a> {
     /// What is left at check points.
     pub fn residual(&self) -> Result<Option<f64>> {
         if let Some(own) = &self.correction {
-            return Ok(Some(self.size(own) * self.narrowness()?));
+            return Ok(Some(self.size(own) * self.narrowness()));
         }
         let coupling = &self.simulator.system().coupling;
         let found = coupling.residual(&self.poses, &self.turn)?;
@@ -178,18 +182,18 @@ impl<'a> Case<'a> {
 
     /// Where a gap is narrower than its compressed bodies resolve, their charges aren't what the first
     /// order takes them for: the root of what the gap lacks.
-    fn narrowness(&self) -> Result<f64> {
-        let (scene, system) = (self.scene(), self.simulator.system());
-        let meshes: Vec<_> = self.meshes.iter().map(Option::as_ref).collect();
-        let poses = system.tree.kinematics(self.simulator.start().0).poses;
+    fn narrowness(&self) -> f64 {
+        let tree = &self.simulator.system().tree;
+        let poses = tree.kinematics(self.simulator.start().0).poses;
         let resolved = self.simulator.resolved();
         let lacks = |gap: Gap| match gap.second {
             Other::Body(b) => resolved[gap.first].max(resolved[b]) / gap.distance,
             Other::Wall(_) => resolved[gap.first] / (2.0 * gap.distance),
         };
-        let gaps = Gaps::new(&meshes, &scene.walls, &[])?.all(&poses);
-        let worst = gaps.into_iter().map(lacks).fold(1.0, f64::max);
-        Ok(worst.sqrt().min(NARROWEST))
+        let clearance = self.simulator.clearance();
+        let gaps = [&clearance.moving, &clearance.rigid].into_iter();
+        let all = gaps.flat_map(|g| g.all(&poses));
+        all.map(lacks).fold(1.0, f64::max).sqrt().min(NARROWEST)
     }
 
     /// The coupling that the fidelity `Isolated` leaves out.
@@ -205,16 +209,18 @@ impl<'a> Case<'a> {
 
     fn left_out(&self) -> Result<DMatrix<f64>> {
         let (scene, system) = (self.scene(), self.simulator.system());
-        let mut meshes = Vec::with_capacity(scene.bodies.len());
-        for (body, own) in scene.bodies.iter().zip(&self.meshes) {
-            meshes.push(match (own, &body.shape) {
-                (Some(own), _) if own.faces().len() <= COUPLING_FACES => Some(own.clone()),
-                (Some(own), Some(Shape::Mesh { .. })) => Some(own.coarsened(COUPLING_FACES)?),
-                _ => assemble::mesh(body, Some(COUPLING_FACES))?,
-            });
+        let panel = Settings::default().one_body(OneBody::Panel);
+        let mut surfaces = Vec::with_capacity(scene.bodies.len());
+        for (body, own) in scene.bodies.iter().zip(&self.surfaces) {
+            let few = |s: &Surface| s.mesh.faces().len() <= COUPLING_FACES;
+            let mesh = match (own, &body.shape) {
+                (Some(own), _) if few(own) => Some(own.mesh.clone()),
+                (Some(own), Some(Shape::Mesh { .. })) => Some(own.mesh.coarsened(COUPLING_FACES)?),
+                _ => assemble::surface(body, &panel, Some(COUPLING_FACES))?.map(|s| s.mesh),
+            };
+            surfaces.push(mesh.map(Surface::of_mesh));
         }
-        let refs: Vec<_> = meshes.iter().map(Option::as_ref).collect();
-        let (numbers, wet) = assemble::in_water(scene, &refs, &system.tree, Fidelity::Full);
+        let (numbers, wet) = assemble::in_water(scene, &surfaces, &system.tree, Fidelity::Full);
         let n = 6 * self.bodies.len();
         if wet.len() <= 1 && scene.walls.is_empty() {
             return Ok(DMatrix::zeros(n, n));
@@ -222,16 +228,15 @@ impl<'a> Case<'a> {
         let all = system.tree.kinematics(self.simulator.start().0).poses;
         let poses: Vec<Pose> = numbers.iter().map(|b| all[*b]).collect();
         let turn = world_axes(&poses);
-        let panel = Settings::default().one_body(OneBody::Panel);
         let free = scene.walls.iter().any(|w| w.surface == WallSurface::Free);
         let fidelity = if free {
             Fidelity::Reduced
         } else {
             Fidelity::Full
         };
+        let water = assemble::water(scene, &numbers, None);
         let solve = |fidelity: Fidelity| -> Result<DMatrix<f64>> {
-            let plan = Default::default();
-            let made = wet::couple(&wet, &scene.walls, &panel, fidelity, &plan, None)?;
+            let made = wet::couple(&wet, &water, &panel, fidelity, &Default::default())?;
             Ok(evaluate(made.coupling.as_ref(), &poses, &turn)?.0)
         };
         let difference = solve(fidelity)? - solve(Fidelity::Isolated)?;

@@ -7,7 +7,7 @@
 use super::case::Case;
 use crate::scene::Shape;
 use crate::shape::TriMesh;
-use crate::simulate::assemble;
+use crate::simulate::assemble::{self, Surface};
 use crate::{Error, Result};
 use serde::Serialize;
 
@@ -74,26 +74,28 @@ pub(super) fn extrapolate(case: &Case, missing: &mut Vec<String>) -> (Vec<Level>
 }
 
 fn faces(case: &Case, body: usize) -> usize {
-    case.meshes[body].as_ref().map_or(0, |m| m.faces().len())
+    let surface = case.surfaces[body].as_ref();
+    surface.map_or(0, |s| s.mesh.faces().len())
 }
 
 /// The added mass with `factor` times the faces for `bodies`; `None` where their meshes can't have
 /// that.
 fn level(case: &Case, bodies: &[usize], factor: f64) -> Result<Option<Level>> {
     let (mut ratio, mut order, mut total) = (f64::INFINITY, SMOOTH, 0);
-    let mut meshes: Vec<Option<TriMesh>> = case.meshes.clone();
+    let mut surfaces = case.surfaces.clone();
     for b in bodies {
-        let Some(own) = &case.meshes[*b] else {
+        let Some(Surface { mesh: own, .. }) = &case.surfaces[*b] else {
             continue;
         };
-        let Some(mesh) = other(case, *b, own, factor)? else {
+        let Some(surface) = other(case, *b, own, factor)? else {
             return Ok(None);
         };
+        let faces = surface.mesh.faces().len();
         order = order.min(order_of(case, *b, own));
-        let more = mesh.faces().len() as f64 / own.faces().len() as f64;
+        let more = faces as f64 / own.faces().len() as f64;
         ratio = ratio.min(if factor < 1.0 { 1.0 / more } else { more });
-        total += mesh.faces().len();
-        meshes[*b] = Some(mesh);
+        total += faces;
+        surfaces[*b] = Some(surface);
     }
     if ratio < DIFFERENT {
         return Ok(None);
@@ -105,7 +107,7 @@ fn level(case: &Case, bodies: &[usize], factor: f64) -> Result<Option<Level>> {
             instead: format!("give every body at least {ENOUGH} faces"),
         });
     }
-    let difference = case.size(&case.difference(&meshes)?);
+    let difference = case.size(&case.difference(&surfaces)?);
     let error = match factor < 1.0 {
         true => difference / (ratio.powf(order) - 1.0),
         false => difference / (1.0 - ratio.powf(-order)),
@@ -117,14 +119,17 @@ fn level(case: &Case, bodies: &[usize], factor: f64) -> Result<Option<Level>> {
     }))
 }
 
-/// The mesh of a body with `factor` times the faces.
-fn other(case: &Case, body: usize, own: &TriMesh, factor: f64) -> Result<Option<TriMesh>> {
+/// The surface of a body with `factor` times the faces.
+fn other(case: &Case, body: usize, own: &TriMesh, factor: f64) -> Result<Option<Surface>> {
     let target = (own.faces().len() as f64 * factor).round() as usize;
-    match &case.scene().bodies[body].shape {
-        Some(Shape::Mesh { .. }) if factor < 1.0 => Ok(Some(own.coarsened(target)?)),
-        Some(Shape::Mesh { .. }) if factor == 4.0 => Ok(Some(own.split())),
+    let body = &case.scene().bodies[body];
+    match &body.shape {
+        Some(Shape::Mesh { .. }) if factor < 1.0 => {
+            Ok(Some(Surface::of_mesh(own.coarsened(target)?)))
+        }
+        Some(Shape::Mesh { .. }) if factor == 4.0 => Ok(Some(Surface::of_mesh(own.split()))),
         Some(Shape::Mesh { .. }) => Ok(None),
-        _ => assemble::mesh(&case.scene().bodies[body], Some(target)),
+        _ => assemble::surface(body, case.simulator.settings(), Some(target)),
     }
 }
 

@@ -28,6 +28,7 @@ mod legendre;
 mod radial;
 mod residual;
 mod top;
+mod tridiagonal;
 
 use super::confocal::{Confocal, Place};
 use crate::adjoint::lie::Vec3;
@@ -50,7 +51,7 @@ const LAST: f64 = 1e-5;
 /// Harmonics that are less of it than this are left out.
 const LEAST: f64 = 1e-7;
 /// A degree that is less of the answer than this is the last to be summed.
-const SUMMED: f64 = 1e-11;
+const SUMMED: f64 = 1e-9;
 /// Largest relative error of an answer, estimated from the last degree, that is let pass.
 const TRUNCATED: f64 = 1e-3;
 /// Sources that are tried to choose the harmonics.
@@ -59,7 +60,7 @@ const SAMPLES: usize = 60;
 const BLOCK: usize = 768;
 /// Points in a block of the evaluation.
 const POINTS: usize = 32;
-/// A smaller B than this, in squares of the longest semi-axis, is none.
+/// A smaller B than this, in squares of the shortest semi-axis, is none.
 const ROUND: f64 = 1e-9;
 
 /// The harmonics of one ellipsoid. Lengths in longest semi-axes.
@@ -129,7 +130,11 @@ impl Harmonics {
         }
         let semi_axes = Vec3::from(confocal.semi_axes) / scale;
         let [a, b, _] = confocal.offsets.map(|o| o / (scale * scale));
-        let b = if b < ROUND { 0.0 } else { b };
+        let b = if b < ROUND * semi_axes.z * semi_axes.z {
+            0.0
+        } else {
+            b
+        };
         let mut out = Self {
             scale,
             semi_axes,
@@ -427,10 +432,8 @@ impl Degree {
         for r in self.classes.iter().flat_map(|c| &c.radials) {
             used[*r] = Some(0);
         }
-        let mut next = 0;
-        for slot in used.iter_mut().flatten() {
+        for (next, slot) in used.iter_mut().flatten().enumerate() {
             *slot = next;
-            next += 1;
         }
         let mut index = used.iter();
         self.radials

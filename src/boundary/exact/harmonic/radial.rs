@@ -164,7 +164,7 @@ impl Grid {
 
     /// D of E at the surface.
     fn inside(&self, p: &impl Fn(&Coefficients) -> f64, odd: bool) -> f64 {
-        // The start is where E grows so much on the way that it is forgotten, or the focal ellipse.
+        // From where E grows so much on the way that its start is forgotten, or from the focal ellipse.
         let mut from = self.inside.len();
         let (mut growth, mut d) = (0.0, 0.0);
         while from > 0 && growth < FORGOTTEN {
@@ -172,7 +172,8 @@ impl Grid {
             let c = &self.inside[from][0];
             let half = 0.5 * c.kappa;
             let rate = (half * half + p(c)).sqrt();
-            growth += self.stride * rate;
+            // Near the focal ellipse (P → 0) even and odd E stay apart.
+            growth += self.stride * (rate - half);
             d = half + rate;
         }
         if growth < FORGOTTEN {

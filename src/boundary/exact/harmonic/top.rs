@@ -15,9 +15,11 @@
 //! S. C. Wang, "On the asymmetrical top in quantum mechanics", Phys. Rev. 34 (1929) 243–252;
 //! R. D. Spence, "Angular momentum in sphero-conal coordinates", Am. J. Phys. 27 (1959) 329–335.
 
+use super::tridiagonal;
 use crate::adjoint::lie::Vec3;
 use crate::{Error, Result};
-use faer::{Mat, Side};
+use faer::Mat;
+use rayon::prelude::*;
 
 /// The axes and coefficients of T for one ellipsoid.
 #[derive(Clone, Copy, Debug)]
@@ -73,17 +75,12 @@ impl Top {
 
     /// The four classes of degree n (fewer for n < 2).
     pub fn classes(&self, n: usize) -> Result<Vec<Class>> {
-        let mut out = Vec::with_capacity(4);
-        for sine in [false, true] {
-            for first in [0, 1] {
-                let first = if sine && first == 0 { 2 } else { first };
-                let orders: Vec<usize> = (first..=n).step_by(2).collect();
-                if !orders.is_empty() {
-                    out.push(self.class(n, sine, orders)?);
-                }
-            }
-        }
-        Ok(out)
+        let kinds = [(false, 0), (false, 1), (true, 2), (true, 1)];
+        kinds
+            .into_par_iter()
+            .filter(|&(_, first)| first <= n)
+            .map(|(sine, first)| self.class(n, sine, (first..=n).step_by(2).collect()))
+            .collect()
     }
 
     fn class(&self, n: usize, sine: bool, orders: Vec<usize>) -> Result<Class> {
@@ -107,28 +104,24 @@ impl Top {
         let (values, vectors) = if self.difference == 0.0 {
             (diagonal, None)
         } else {
-            let size = orders.len();
-            let mut matrix = Mat::<f64>::zeros(size, size);
-            for (i, &m) in orders.iter().enumerate() {
-                matrix[(i, i)] = diagonal[i];
-                if i + 1 < size {
-                    let m = m as f64;
+            let beside = orders
+                .windows(2)
+                .map(|pair| {
+                    let m = pair[0] as f64;
                     let up = (l - m) * (l + m + 1.0) * (l - m - 1.0) * (l + m + 2.0);
                     let fold = if m == 0.0 { 2.0 } else { 1.0 };
-                    matrix[(i + 1, i)] = 0.5 * self.difference * (fold * up).sqrt();
-                }
-            }
-            let eigen = matrix
-                .self_adjoint_eigen(Side::Lower)
-                .map_err(|_| Error::Unresolved {
+                    0.5 * self.difference * (fold * up).sqrt()
+                })
+                .collect();
+            let (values, vectors) =
+                tridiagonal::eigen(diagonal, beside).ok_or_else(|| Error::Unresolved {
                     place: "ellipsoid".into(),
-                    quantity: "degree of a harmonic whose eigenfunctions were sought".into(),
+                    quantity: "degree of a harmonic without eigenfunctions".into(),
                     value: l,
                     limit: l,
                     remedy: "use a mesh".into(),
                 })?;
-            let values = (0..size).map(|i| eigen.S()[i]).collect();
-            (values, Some(eigen.U().to_owned()))
+            (values, Some(vectors))
         };
         Ok(Class {
             sine,

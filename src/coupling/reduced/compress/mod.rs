@@ -236,6 +236,7 @@ pub fn compress(
             scattered,
             wrong_sign,
             body_asymmetry: response.asymmetry(),
+            body_error: response.error(),
             warnings,
         },
         points: chosen,

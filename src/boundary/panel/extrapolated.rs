@@ -1,0 +1,69 @@
+//! A body from two meshes of one shape: what each says, extrapolated.
+
+use super::{PanelBoundary, Richardson, richardson};
+use crate::Result;
+use crate::adjoint::lie::{Mat6, Vec3};
+use crate::boundary::Response;
+use faer::Mat;
+
+/// The answer of a fine mesh and, times a factor, its difference from that of a coarse one: see
+/// [`richardson`]. It is linear, so that the flow around the body is extrapolated as its added mass is.
+pub struct Extrapolated {
+    fine: PanelBoundary,
+    coarse: PanelBoundary,
+    found: Richardson,
+}
+
+impl Extrapolated {
+    /// From a fine and a coarse mesh of one shape.
+    ///
+    /// # Errors
+    /// Meshes that don't differ enough.
+    pub fn new(fine: PanelBoundary, coarse: PanelBoundary) -> Result<Self> {
+        let found = richardson(&fine, &coarse)?;
+        Ok(Self {
+            fine,
+            coarse,
+            found,
+        })
+    }
+
+    fn extrapolate(&self, fine: Mat<f64>, coarse: Mat<f64>) -> Mat<f64> {
+        let factor = 1.0 / (self.found.ratio.powf(self.found.order) - 1.0);
+        Mat::from_fn(fine.nrows(), fine.ncols(), |i, j| {
+            fine[(i, j)] + factor * (fine[(i, j)] - coarse[(i, j)])
+        })
+    }
+}
+
+impl Response for Extrapolated {
+    fn added_mass(&self) -> Mat6 {
+        self.found.added_mass
+    }
+
+    fn radiated(&self, points: &[Vec3]) -> Result<Mat<f64>> {
+        let fine = self.fine.radiated(points)?;
+        Ok(self.extrapolate(fine, self.coarse.radiated(points)?))
+    }
+
+    fn scattered(&self, sources: &[Vec3], points: &[Vec3]) -> Result<Mat<f64>> {
+        let fine = self.fine.scattered(sources, points)?;
+        Ok(self.extrapolate(fine, self.coarse.scattered(sources, points)?))
+    }
+
+    fn asymmetry(&self) -> f64 {
+        self.fine.asymmetry
+    }
+
+    fn condition(&self) -> f64 {
+        self.fine.condition
+    }
+
+    fn warnings(&self) -> &[String] {
+        &self.fine.warnings
+    }
+
+    fn error(&self) -> Option<f64> {
+        Some(self.found.error)
+    }
+}

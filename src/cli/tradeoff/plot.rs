@@ -1,0 +1,340 @@
+//! The picture: time against error, log–log.
+
+use std::fs;
+use std::path::Path;
+
+use plotters::coord::Shift;
+use plotters::prelude::*;
+
+use super::refuse;
+use super::report::{Reference, Report, Row};
+use crate::{Error, Result};
+
+const WIDTH: u32 = 860;
+const HEIGHT: u32 = 470;
+/// Room for the legend, right of the chart.
+const LEGEND: u32 = 200;
+/// Errors are drawn no lower than this: less is rounding.
+const FLOOR: f64 = 1e-12;
+
+/// Decades left free beside the outermost points, and shown at least.
+const MARGIN: f64 = 0.25;
+const LEAST: f64 = 1.6;
+
+type Panel<'a> = DrawingArea<SVGBackend<'a>, Shift>;
+
+/// A failure of the drawing itself, in words.
+type Drawn = std::result::Result<(), Box<dyn std::error::Error>>;
+
+/// Whether the picture can be written there.
+pub(super) fn prepare(file: &Path) -> Result<()> {
+    let extension = file.extension().unwrap_or_default().to_string_lossy();
+    if !extension.eq_ignore_ascii_case("svg") {
+        return Err(refuse(
+            file,
+            "give a name that ends in .svg: that is what is written",
+        ));
+    }
+    if file.is_dir() {
+        return Err(refuse(file, "is a folder: give the name of a file"));
+    }
+    let folder = file.parent().filter(|f| !f.as_os_str().is_empty());
+    let Some(folder) = folder else { return Ok(()) };
+    fs::create_dir_all(folder).map_err(|e| failed(file, e))
+}
+
+/// Writes the picture.
+pub(super) fn write(file: &Path, report: &Report) -> Result<()> {
+    let mut text = String::new();
+    draw(&mut text, report).map_err(|e| failed(file, std::io::Error::other(e.to_string())))?;
+    fs::write(file, text).map_err(|e| failed(file, e))
+}
+
+fn failed(file: &Path, source: std::io::Error) -> Error {
+    Error::File {
+        path: file.to_owned(),
+        action: "write",
+        source,
+    }
+}
+
+/// One chart of the picture.
+struct Chart<'a> {
+    title: String,
+    x: &'static str,
+    y: &'static str,
+    points: Vec<(&'a Row, (f64, f64))>,
+    on_front: fn(&Row) -> bool,
+    /// The reference's own error.
+    estimate: Option<f64>,
+}
+
+fn charts<'a>(report: &'a Report) -> Vec<Chart<'a>> {
+    let reference = &report.reference;
+    let points = |of: fn(&Row, &Reference) -> Option<(f64, f64)>, which: &dyn Fn(&Row) -> bool| {
+        let rows = report.rows.iter().filter(|r| which(r));
+        let found = rows.filter_map(|r| Some((r, of(r, reference)?)));
+        found
+            .map(|(r, (x, y))| (r, (x, y.max(FLOOR))))
+            .collect::<Vec<_>>()
+    };
+    let first = report.rows.first().map(|r| r.configuration);
+    let alike = |r: &Row| first.is_some_and(|f| r.configuration.steps_like(&f));
+    let steps = report
+        .rows
+        .first()
+        .map_or_else(String::new, |r| r.integrator.clone());
+    let mut out = vec![Chart {
+        title: format!("{}: added mass at the start", report.scene),
+        x: "time per step, ms",
+        y: "relative error of the added mass",
+        points: points(Row::by_added_mass, &alike),
+        on_front: |r| r.pareto,
+        estimate: reference.added_mass.error_estimate,
+    }];
+    if !steps.is_empty() {
+        out[0].title += &format!(" (steps by {steps})");
+    }
+    if let Some(end_state) = &reference.end_state {
+        out.push(Chart {
+            title: format!(
+                "{}: where it is after {} s",
+                report.scene, reference.horizon_seconds
+            ),
+            x: "time per simulated second, ms",
+            y: "relative error of the end state",
+            points: points(Row::by_end_state, &|_| true),
+            on_front: |r| r.pareto_end_state,
+            estimate: end_state.error_estimate,
+        });
+    }
+    out
+}
+
+fn draw(text: &mut String, report: &Report) -> Drawn {
+    let charts = charts(report);
+    let height = HEIGHT * charts.len() as u32;
+    let area = SVGBackend::with_string(text, (WIDTH, height)).into_drawing_area();
+    area.fill(&WHITE)?;
+    for (panel, chart) in area.split_evenly((charts.len(), 1)).iter().zip(&charts) {
+        chart.draw(panel)?;
+    }
+    area.present()?;
+    Ok(())
+}
+
+/// From a little below to a little above the values; more than a decade, so that there is something
+/// to read.
+fn around(values: impl Iterator<Item = f64>) -> std::ops::Range<f64> {
+    let (mut low, mut high) = (f64::INFINITY, f64::NEG_INFINITY);
+    for x in values.filter(|x| *x > 0.0 && x.is_finite()).map(f64::log10) {
+        (low, high) = (low.min(x), high.max(x));
+    }
+    if low > high {
+        (low, high) = (0.0, 0.0);
+    }
+    let widen = (0.5 * (LEAST - (high - low))).max(MARGIN);
+    10f64.powf(low - widen)..10f64.powf(high + widen)
+}
+
+/// A power of ten as people write it.
+fn tick(x: f64) -> String {
+    if (0.99e-3..1.01e4).contains(&x) {
+        let digits = (-x.log10().round()).max(0.0) as usize;
+        format!("{x:.digits$}")
+    } else {
+        format!("{x:.0e}")
+    }
+}
+
+impl Chart<'_> {
+    fn draw(&self, panel: &Panel) -> Drawn {
+        let (panel, legend) = panel.split_horizontally(WIDTH - LEGEND);
+        let x = around(self.points.iter().map(|p| p.1.0));
+        let y = around(self.points.iter().map(|p| p.1.1).chain(self.estimate));
+        let (left, right) = (x.start, x.end);
+        let mut chart = ChartBuilder::on(&panel)
+            .margin(12)
+            .caption(&self.title, ("sans-serif", 17))
+            .x_label_area_size(42)
+            .y_label_area_size(64)
+            .build_cartesian_2d(x.log_scale(), y.log_scale())?;
+        chart
+            .configure_mesh()
+            .x_desc(self.x)
+            .y_desc(self.y)
+            .axis_desc_style(("sans-serif", 14))
+            .label_style(("sans-serif", 12))
+            .bold_line_style(BLACK.mix(0.18))
+            .light_line_style(TRANSPARENT)
+            .x_label_formatter(&|x| tick(*x))
+            .y_label_formatter(&|y| format!("{y:.0e}"))
+            .draw()?;
+        let (across, down) = panel.get_pixel_range();
+        let corner = (across.start, down.start);
+        let mut entries = Vec::new();
+        if let Some(estimate) = self.estimate.filter(|e| *e >= FLOOR) {
+            let line = [(left, estimate), (right, estimate)];
+            chart.draw_series(DashedLineSeries::new(line, 5, 5, DASHED.into()))?;
+            entries.push((Sign::Dashes, "error of the reference".to_string()));
+        }
+        let mut front: Vec<(f64, f64)> = (self.points.iter())
+            .filter(|(row, _)| (self.on_front)(row))
+            .map(|(_, at)| *at)
+            .collect();
+        front.sort_by(|a, b| a.0.total_cmp(&b.0).then(b.1.total_cmp(&a.1)));
+        if !front.is_empty() {
+            chart.draw_series(LineSeries::new(front, FRONT))?;
+            entries.push((Sign::Line, "nothing faster is nearer".to_string()));
+        }
+        for (fidelity, method) in self.families() {
+            let look = Look::new(fidelity, method);
+            let of = |row: &Row| (row.fidelity.as_str(), row.method.as_str()) == (fidelity, method);
+            let points = self.points.iter().filter(|(row, _)| of(row));
+            for (row, at) in points {
+                let (x, y) = chart.backend_coord(at);
+                look.draw(&panel, (x - corner.0, y - corner.1), (self.on_front)(row))?;
+            }
+            entries.push((Sign::Point(look), format!("{fidelity}, {method}")));
+        }
+        for (i, (sign, text)) in entries.into_iter().enumerate() {
+            let at = (14, 52 + 20 * i as i32);
+            sign.draw(&legend, at)?;
+            legend.draw(&Text::new(text, (at.0 + 18, at.1 - 4), ("sans-serif", 13)))?;
+        }
+        Ok(())
+    }
+
+    /// Fidelities and methods that occur, in the order of the rows.
+    fn families(&self) -> Vec<(&str, &str)> {
+        let mut out = Vec::new();
+        for (row, _) in &self.points {
+            let family = (row.fidelity.as_str(), row.method.as_str());
+            if !out.contains(&family) {
+                out.push(family);
+            }
+        }
+        out
+    }
+}
+
+/// What stands in the legend beside a text.
+enum Sign {
+    Dashes,
+    Line,
+    Point(Look),
+}
+
+impl Sign {
+    fn draw(&self, area: &Panel, at: (i32, i32)) -> Drawn {
+        let line = [(at.0 - 9, at.1), (at.0 + 9, at.1)];
+        match self {
+            Sign::Dashes => {
+                for x in [-9, -1, 7] {
+                    let dash = [(at.0 + x, at.1), (at.0 + x + 4, at.1)];
+                    area.draw(&PathElement::new(dash, DASHED))?;
+                }
+            }
+            Sign::Line => area.draw(&PathElement::new(line, FRONT))?,
+            Sign::Point(look) => look.draw(area, at, true)?,
+        }
+        Ok(())
+    }
+}
+
+const DASHED: RGBAColor = RGBAColor(0, 0, 0, 0.6);
+const FRONT: RGBAColor = RGBAColor(0, 0, 0, 0.8);
+
+/// Colour by fidelity, marker by method: told apart without colours too.
+#[derive(Clone, Copy)]
+struct Look {
+    color: RGBColor,
+    marker: Marker,
+}
+
+#[derive(Clone, Copy)]
+enum Marker {
+    Circle,
+    Square,
+    Triangle,
+    Cross,
+    Diamond,
+}
+
+impl Look {
+    fn new(fidelity: &str, method: &str) -> Self {
+        Self {
+            color: match fidelity {
+                "isolated" => RGBColor(110, 110, 110),
+                "reduced" => RGBColor(0, 100, 190),
+                "auto" => RGBColor(0, 145, 90),
+                _ => RGBColor(200, 60, 20),
+            },
+            marker: match method {
+                "exact" => Marker::Circle,
+                "panel" => Marker::Square,
+                "mfs-vertex" => Marker::Triangle,
+                "mfs-face" => Marker::Cross,
+                _ => Marker::Diamond,
+            },
+        }
+    }
+
+    /// A marker at a pixel, filled if it is on the front.
+    fn draw(self, area: &Panel, (x, y): (i32, i32), filled: bool) -> Drawn {
+        let style = self.color.stroke_width(if filled { 2 } else { 1 });
+        let corners = match self.marker {
+            Marker::Circle => {
+                let style = if filled { style.filled() } else { style };
+                return Ok(area.draw(&Circle::new((x, y), 4, style))?);
+            }
+            Marker::Cross => return Ok(area.draw(&Cross::new((x, y), 4, style))?),
+            Marker::Square => vec![(-4, -4), (4, -4), (4, 4), (-4, 4)],
+            Marker::Triangle => vec![(0, -5), (5, 4), (-5, 4)],
+            Marker::Diamond => vec![(0, -5), (5, 0), (0, 5), (-5, 0)],
+        };
+        let mut corners: Vec<_> = corners.into_iter().map(|c| (x + c.0, y + c.1)).collect();
+        if filled {
+            return Ok(area.draw(&Polygon::new(corners, self.color))?);
+        }
+        corners.push(corners[0]);
+        Ok(area.draw(&PathElement::new(corners, style))?)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn ranges_hold_the_values_and_a_tick() {
+        for values in [
+            vec![0.02, 3.0, 0.0, f64::NAN],
+            vec![0.5],
+            vec![1.0, 1.1],
+            vec![],
+        ] {
+            let range = around(values.iter().copied());
+            assert!(range.start > 0.0 && range.end > 10.0 * range.start);
+            let known = values.iter().filter(|x| **x > 0.0);
+            known.for_each(|x| assert!(range.start < *x && *x < range.end));
+        }
+    }
+
+    #[test]
+    fn ticks_read_well() {
+        let texts = [1e-6, 1e-3, 0.1, 1.0, 100.0, 1e5].map(tick);
+        assert_eq!(texts, ["1e-6", "0.001", "0.1", "1", "100", "1e5"]);
+    }
+
+    #[test]
+    fn only_svg_is_written() {
+        let refused = |file: &Path| prepare(file).unwrap_err().to_string();
+        assert!(refused(Path::new("a.png")).contains(".svg"));
+        let folder = tempfile::tempdir().unwrap();
+        assert!(prepare(&folder.path().join("new/a.SVG")).is_ok());
+        let named = folder.path().join("folder.svg");
+        std::fs::create_dir(&named).unwrap();
+        assert!(refused(&named).contains("folder"));
+    }
+}

@@ -1,0 +1,296 @@
+//! Accelerations and trajectories by compressed bodies with growing accuracy and shrinking time
+//! steps; by the coupled system where gaps are too small to compress the bodies.
+
+use std::time::{Duration, Instant};
+
+use super::{Limits, climb, refinable, shapes};
+use crate::boundary::OneBody;
+use crate::cli::tradeoff::measure::{Path, Start};
+use crate::dynamics::Integrator;
+use crate::scene::{Scene, Shape};
+use crate::shape::Other;
+use crate::simulate::{Fidelity, Settings, Simulator};
+use crate::{Error, Result};
+
+/// Accuracy of the compression, and steps for each of the scene's.
+const LEVELS: [(f64, usize); 4] = [(1e-2, 1), (1e-3, 2), (1e-4, 2), (1e-5, 4)];
+/// The same where nothing is compressed.
+const FULL_LEVELS: [(f64, usize); 3] = [(0.0, 1), (0.0, 2), (0.0, 4)];
+/// How the time grows with each of them.
+const GROWTH: f64 = 3.0;
+/// Faces per body at these levels, then at the last of them on finer meshes.
+const FACES: [usize; 4] = [500, 980, 2000, 3920];
+/// How the time grows with each of them: the larger part is often that of the steps, which are the same.
+const MESH_GROWTH: f64 = 4.0;
+/// Part of the time that is left for finer meshes.
+const FOR_MESHES: f64 = 0.6;
+/// Residual of the coupled system, far below the other errors.
+const TOLERANCE: f64 = 1e-10;
+/// Of the smallest gap that bodies meet, what they are compressed to resolve.
+const ROOM: f64 = 0.6;
+/// Gaps below this part of what is resolved are left to the coupled system.
+const HOPELESS: f64 = 0.6;
+
+/// What a simulation of the reference says.
+#[derive(Clone)]
+pub(super) struct Probe {
+    pub start: Start,
+    pub path: Path,
+    level: Level,
+    /// Of all bodies.
+    faces: usize,
+    /// Smallest gap of each compressed body, and what it resolves, m.
+    gaps: Vec<(f64, f64)>,
+}
+
+#[derive(Clone, Copy, Debug)]
+struct Level {
+    way: Way,
+    accuracy: f64,
+    /// Steps for each of the scene's.
+    parts: usize,
+    /// Per body.
+    faces: usize,
+    /// Smallest gap that is resolved, m.
+    gap: Option<f64>,
+}
+
+/// How bodies are solved.
+#[derive(Clone, Copy, Debug, PartialEq)]
+enum Way {
+    Reduced(OneBody),
+    Full,
+}
+
+/// The best simulation, and pairs whose differences estimate its error.
+pub(super) struct Probes {
+    pub best: Probe,
+    pub said: String,
+    pairs: Vec<(Probe, Probe)>,
+}
+
+impl Probes {
+    /// By the first way that works, in about `time`.
+    pub fn new(
+        scene: &Scene,
+        limits: &Limits,
+        time: Duration,
+        tick: &mut dyn FnMut(),
+    ) -> Result<Self> {
+        let until = Instant::now() + time;
+        let ways = [
+            Way::Reduced(OneBody::Auto),
+            Way::Reduced(OneBody::Panel),
+            Way::Full,
+        ];
+        let mut failed = Vec::new();
+        for way in ways {
+            match Self::by(scene, way, limits, until, tick) {
+                Ok(mut found) => {
+                    if let Some(error) = failed.first() {
+                        found.said +=
+                            &format!(" (compressed bodies by the usual method fail: {error})");
+                    }
+                    return Ok(found);
+                }
+                Err(error) => failed.push(error),
+            }
+        }
+        Err(failed.swap_remove(0))
+    }
+
+    fn by(
+        scene: &Scene,
+        way: Way,
+        limits: &Limits,
+        until: Instant,
+        tick: &mut dyn FnMut(),
+    ) -> Result<Self> {
+        let mut run = |level: Level| {
+            let out = Probe::new(scene, &level, limits.steps)?;
+            tick();
+            Ok(out)
+        };
+        let levels = match way {
+            Way::Reduced(_) => LEVELS.as_slice(),
+            Way::Full => FULL_LEVELS.as_slice(),
+        };
+        let left = until.saturating_duration_since(Instant::now());
+        let first = Level {
+            way,
+            accuracy: levels[0].0,
+            parts: levels[0].1,
+            faces: FACES[0],
+            gap: None,
+        };
+        let rough = run(first)?;
+        let gap = rough.needed_gap();
+        let levels = levels.iter().map(|(accuracy, parts)| Level {
+            accuracy: *accuracy,
+            parts: *parts,
+            gap,
+            ..first
+        });
+        // The first level was run already, if it resolves all gaps.
+        let skip = usize::from(gap.is_none());
+        let early = until - left.mul_f64(FOR_MESHES);
+        let mut found = climb(levels.skip(skip), 2 - skip, GROWTH, early, &mut run)?;
+        if skip == 1 {
+            found.insert(0, rough);
+        }
+        let (Some(fine), coarse) = (found.pop(), found.pop()) else {
+            return Err(Error::input("reference: levels", 0, "at least one"));
+        };
+        fine.check_gaps()?;
+        let mut out = Self {
+            said: fine.level.say(scene),
+            pairs: coarse.map(|c| (c, fine.clone())).into_iter().collect(),
+            best: fine,
+        };
+        if out.best.level.meshed(scene) {
+            out.refine(limits, until, run)?;
+        }
+        Ok(out)
+    }
+
+    /// On finer meshes.
+    fn refine(
+        &mut self,
+        limits: &Limits,
+        until: Instant,
+        mut run: impl FnMut(Level) -> Result<Probe>,
+    ) -> Result<()> {
+        let most = limits.faces.unwrap_or(usize::MAX).max(FACES[1]);
+        let finer = FACES[1..].iter().filter(|n| **n <= most);
+        let levels = finer.map(|faces| Level {
+            faces: *faces,
+            ..self.best.level
+        });
+        let mut found = vec![self.best.clone()];
+        found.extend(climb(levels, 1, MESH_GROWTH, until, &mut run)?);
+        // Patterns allow only certain numbers.
+        found.dedup_by(|b, a| b.faces <= a.faces);
+        if let [.., coarse, fine] = found.as_slice() {
+            self.said += &format!(", {} faces a body", fine.level.faces);
+            self.pairs.push((coarse.clone(), fine.clone()));
+            self.best = fine.clone();
+        }
+        Ok(())
+    }
+
+    /// Sum over the pairs of their differences; none without pairs.
+    pub fn estimate(&self, of: impl Fn(&Probe, &Probe) -> Option<f64>) -> Option<f64> {
+        let differences: Option<Vec<f64>> = self.pairs.iter().map(|(a, b)| of(a, b)).collect();
+        differences
+            .filter(|d| !d.is_empty())
+            .map(|d| d.iter().sum())
+    }
+}
+
+impl Level {
+    /// Whether anything depends on the number of faces.
+    fn meshed(&self, scene: &Scene) -> bool {
+        let formula = |s: &Shape| matches!(s, Shape::Sphere { .. } | Shape::Ellipsoid { .. });
+        let exact = self.way == Way::Reduced(OneBody::Auto) && shapes(scene).all(formula);
+        let drag = scene.bodies.iter().any(|b| b.drag.is_some());
+        shapes(scene).any(refinable) && (!exact || drag)
+    }
+
+    fn say(&self, scene: &Scene) -> String {
+        let formula = |s: &Shape| matches!(s, Shape::Sphere { .. } | Shape::Ellipsoid { .. });
+        let accuracy = self.accuracy;
+        match self.way {
+            Way::Full => "the coupled system (full, mfs-vertex)".into(),
+            Way::Reduced(method) => {
+                let exact = method != OneBody::Panel;
+                let by = match () {
+                    () if exact && shapes(scene).all(formula) => "exact",
+                    () if exact && shapes(scene).any(formula) => "exact and panel",
+                    () => "panel",
+                };
+                format!("compressed bodies (reduced, {by}, accuracy {accuracy:.0e})")
+            }
+        }
+    }
+}
+
+impl Probe {
+    fn new(scene: &Scene, level: &Level, steps: usize) -> Result<Self> {
+        let settings = Settings::default()
+            .integrator(Integrator::Rk4)
+            .time_step(scene.time_step / level.parts as f64)
+            .faces(level.faces);
+        let mut settings = match level.way {
+            Way::Full => settings.fidelity(Fidelity::Full).tolerance(TOLERANCE),
+            Way::Reduced(method) => settings
+                .fidelity(Fidelity::Reduced)
+                .one_body(method)
+                .accuracy(level.accuracy),
+        };
+        settings.compress.resolved_gap = level.gap;
+        let simulator = Simulator::new(scene, settings)?;
+        let start = Start::with_forces(&simulator)?;
+        let path = Path::new(&simulator, steps * level.parts)?;
+        Ok(Self {
+            gaps: gaps(&simulator, &path),
+            faces: simulator.faces(),
+            level: *level,
+            start,
+            path,
+        })
+    }
+
+    /// What the bodies must be compressed to resolve, if that is less than they do by default.
+    fn needed_gap(&self) -> Option<f64> {
+        let tight = self
+            .gaps
+            .iter()
+            .filter(|(gap, resolved)| ROOM * gap < *resolved);
+        let smallest = tight
+            .map(|(gap, _)| ROOM * gap)
+            .fold(f64::INFINITY, f64::min);
+        (smallest > 0.0 && smallest.is_finite()).then_some(smallest)
+    }
+
+    /// Refuses bodies that come nearer to others than their compression resolves.
+    fn check_gaps(&self) -> Result<()> {
+        match self
+            .gaps
+            .iter()
+            .find(|(gap, resolved)| *gap < HOPELESS * resolved)
+        {
+            None => Ok(()),
+            Some((gap, resolved)) => Err(Error::Unresolved {
+                place: "reference by compressed bodies".into(),
+                quantity: "smallest gap of a body (m)".into(),
+                value: *gap,
+                limit: HOPELESS * resolved,
+                remedy: "the coupled system resolves it with finer meshes".into(),
+            }),
+        }
+    }
+}
+
+/// Smallest gap of each compressed body to others, or twice that to walls, at the start and at the
+/// end; with what its compression resolves.
+fn gaps(simulator: &Simulator, path: &Path) -> Vec<(f64, f64)> {
+    let names = simulator.names();
+    let ends = [path.q.first(), path.q.last()].into_iter().flatten();
+    let poses = ends.map(|q| simulator.system().tree.kinematics(q).poses);
+    let all: Vec<_> = poses.flat_map(|p| simulator.gaps().all(&p)).collect();
+    let nearest = |b: usize| {
+        let near = all
+            .iter()
+            .filter(|g| g.first == b || g.second == Other::Body(b));
+        let seen = near.map(|g| match g.second {
+            Other::Body(_) => g.distance,
+            Other::Wall(_) => 2.0 * g.distance,
+        });
+        seen.fold(f64::INFINITY, f64::min)
+    };
+    let compressed = simulator.discretisation().iter().filter_map(|d| {
+        let b = names.iter().position(|n| *n == d.body)?;
+        Some((nearest(b), d.resolved_gap?))
+    });
+    compressed.collect()
+}

@@ -1,0 +1,155 @@
+//! M_f by coupled panels at growing resolutions.
+//!
+//! Their error goes with h², that is with one over the number of faces N, so two resolutions give
+//!
+//! ```text
+//! M = M₂ + (M₂ − M₁)/(N₂/N₁ − 1)
+//! ```
+//!
+//! and three give two such values, whose difference is the estimate of the error. (At sharp edges the
+//! order is lower: the difference is then the larger.)
+
+use std::time::{Duration, Instant};
+
+use nalgebra::DMatrix;
+
+use super::{Limits, climb, refinable, shapes};
+use crate::Result;
+use crate::boundary::OneBody;
+use crate::cli::tradeoff::compare::matrix_error;
+use crate::cli::tradeoff::measure::Start;
+use crate::scene::Scene;
+use crate::simulate::{Fidelity, Settings, Simulator};
+
+/// Faces per body, one after another: icosahedra with edges in 5, 7, 10, 14, 20 parts, whose meshes
+/// are alike.
+const FACES: [usize; 5] = [500, 980, 2000, 3920, 8000];
+/// How the time grows with each of them.
+const GROWTH: f64 = 6.0;
+/// Numbers of faces with a smaller ratio aren't extrapolated.
+const APART: f64 = 1.2;
+
+/// The best M_f and another, for the estimate of its error.
+pub(super) struct Panels {
+    pub best: Start,
+    pub said: String,
+    other: Option<DMatrix<f64>>,
+}
+
+struct Level {
+    /// Asked for, of each body.
+    asked: usize,
+    /// Of all bodies.
+    faces: usize,
+    start: Start,
+}
+
+impl Level {
+    /// What the two resolutions tell of infinitely many faces.
+    fn extrapolated(&self, fine: &Self) -> DMatrix<f64> {
+        let ratio = fine.faces as f64 / self.faces as f64;
+        let (a, b) = (&self.start.added_mass, &fine.start.added_mass);
+        b + (b - a) / (ratio - 1.0)
+    }
+}
+
+impl Panels {
+    pub fn new(
+        scene: &Scene,
+        limits: &Limits,
+        until: Instant,
+        tick: &mut dyn FnMut(),
+    ) -> Result<Self> {
+        let (levels, until) = match limits.faces {
+            Some(n) => (
+                vec![n.div_ceil(4), n.div_ceil(2), n],
+                until + Duration::from_secs(1 << 30),
+            ),
+            None => (FACES.to_vec(), until),
+        };
+        let fixed = !shapes(scene).any(refinable);
+        let levels = levels.into_iter().take(if fixed { 1 } else { usize::MAX });
+        let mut found = climb(levels, 2, GROWTH, until, |asked| {
+            let settings = Settings::default()
+                .fidelity(Fidelity::Full)
+                .one_body(OneBody::Panel)
+                .faces(asked);
+            let simulator = Simulator::new(scene, settings)?;
+            let start = Start::values(&simulator)?;
+            tick();
+            let faces = simulator.faces();
+            Ok(Level {
+                asked,
+                faces,
+                start,
+            })
+        })?;
+        // Meshes of equal size say nothing new.
+        found.dedup_by(|b, a| (b.faces as f64) < APART * a.faces as f64);
+        let mut out = match found.as_slice() {
+            [.., a, b, c] => Self {
+                said: format!(
+                    "coupled panels (full, panel), extrapolated from {} and {} faces a body; its \
+                     error from the same with {} and {}",
+                    b.asked, c.asked, a.asked, b.asked
+                ),
+                best: c.start.with_added_mass(b.extrapolated(c)),
+                other: Some(a.extrapolated(b)),
+            },
+            [b, c] => Self {
+                said: format!(
+                    "coupled panels (full, panel), extrapolated from {} and {} faces a body; its \
+                     error from the correction",
+                    b.asked, c.asked
+                ),
+                best: c.start.with_added_mass(b.extrapolated(c)),
+                other: Some(c.start.added_mass.clone()),
+            },
+            all => {
+                let best = all[0].start.clone();
+                let said = format!(
+                    "coupled panels (full, panel), {} faces in all",
+                    all[0].faces
+                );
+                Self {
+                    best,
+                    said,
+                    other: None,
+                }
+            }
+        };
+        if !shapes(scene).all(refinable) {
+            out.said += "; meshes from files are taken as they are";
+        }
+        Ok(out)
+    }
+
+    /// Estimate of the error over the rows that mean something.
+    pub fn estimate(&self, felt: &[usize]) -> Option<f64> {
+        matrix_error(self.other.as_ref()?, &self.best.added_mass, felt)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn second_order_is_extrapolated_away() {
+        let level = |faces: usize| {
+            let value = |x: f64| DMatrix::from_element(1, 1, x);
+            let start = Start {
+                added_mass: value(3.0 + 5.0 / faces as f64),
+                mass: value(1.0),
+                force: nalgebra::DVector::zeros(1),
+            };
+            Level {
+                asked: faces,
+                faces,
+                start,
+            }
+        };
+        let found = level(100).extrapolated(&level(250));
+        assert!((found[(0, 0)] - 3.0).abs() < 1e-12);
+    }
+}

@@ -76,7 +76,7 @@ fn part(p: DragPart) -> Part {
 pub(super) struct Surface {
     pub mesh: TriMesh,
     /// A mesh of about a quarter of the faces, of a shape by formula with flat parts or edges.
-    coarse: Option<TriMesh>,
+    pub coarse: Option<TriMesh>,
     pub properties: MassProperties,
 }
 

@@ -2,7 +2,7 @@
 
 use super::{PanelBoundary, Richardson, richardson};
 use crate::Result;
-use crate::adjoint::lie::{Mat6, Vec3};
+use crate::adjoint::lie::{Mat6, Vec3, Vec6};
 use crate::boundary::Response;
 use faer::Mat;
 
@@ -20,7 +20,8 @@ impl Extrapolated {
     /// # Errors
     /// Meshes that don't differ enough.
     pub fn new(fine: PanelBoundary, coarse: PanelBoundary) -> Result<Self> {
-        let found = richardson(&fine, &coarse)?;
+        let mut found = richardson(&fine, &coarse)?;
+        found.added_mass = positive(&found.added_mass, fine.faces.volume());
         Ok(Self {
             fine,
             coarse,
@@ -34,6 +35,22 @@ impl Extrapolated {
             fine[(i, j)] + factor * (fine[(i, j)] - coarse[(i, j)])
         })
     }
+}
+
+/// The nearest added mass without negative energy: about an axis of revolution extrapolation can leave
+/// a little. Compared in units of the water displaced, `volume` in m³.
+fn positive(m: &Mat6, volume: f64) -> Mat6 {
+    let displaced = Vec6::from_fn(|i, _| {
+        let power = if i < 3 { 1.0 } else { 5.0 / 3.0 };
+        volume.powf(0.5 * power)
+    });
+    let units = Mat6::from_fn(|i, j| displaced[i] * displaced[j]);
+    let mut eigen = m.component_div(&units).symmetric_eigen();
+    if eigen.eigenvalues.min() >= 0.0 {
+        return *m;
+    }
+    eigen.eigenvalues.apply(|x| *x = x.max(0.0));
+    eigen.recompose().component_mul(&units)
 }
 
 impl Response for Extrapolated {

@@ -145,17 +145,24 @@ impl<'a> Case<'a> {
         assemble::water(self.scene(), &self.bodies, folder)
     }
 
-    /// By how much the added mass differs with these surfaces.
-    pub fn difference(&self, surfaces: &[Option<Surface>]) -> Result<DMatrix<f64>> {
+    /// The added mass with these surfaces; where bodies are compressed, what [`Reduced`] is off if
+    /// their answers are those of these surfaces.
+    ///
+    /// [`Reduced`]: crate::coupling::reduced::Reduced
+    pub fn value(&self, surfaces: &[Option<Surface>]) -> Result<DMatrix<f64>> {
         let wet = self.wet(surfaces);
-        if let Some(own) = &self.correction {
-            return Ok(self.correction(&wet)? - own);
+        if self.correction.is_some() {
+            return self.correction(&wet);
         }
         let settings = self.simulator.settings();
         let plan = &self.simulator.assembled.plan;
         let made = wet::couple(&wet, &self.water(), settings, self.fidelity, plan)?;
-        let (m, _) = evaluate(made.coupling.as_ref(), &self.poses, &self.turn)?;
-        Ok(m - &self.matrix)
+        Ok(evaluate(made.coupling.as_ref(), &self.poses, &self.turn)?.0)
+    }
+
+    /// The same with the scene's own surfaces.
+    pub fn own(&self) -> &DMatrix<f64> {
+        self.correction.as_ref().unwrap_or(&self.matrix)
     }
 
     /// What the compressed bodies' added mass is off if they answer as `bodies` do.

@@ -3,12 +3,16 @@
 //! Bodies with enough faces are coarsened, the others refined; the errors of both groups add up. Shapes by
 //! formula are meshed anew; a mesh from a file is coarsened by collapsing edges, or refined by
 //! splitting every face into four, so that the polyhedron is the shape.
+//!
+//! Panels of a body by formula are themselves extrapolated from two meshes, n and n/4. Then the error is
+//! the smaller of two: that of the finer mesh alone, and that which the pair n/2, n/8 tells.
 
 use super::case::Case;
 use crate::scene::Shape;
 use crate::shape::TriMesh;
 use crate::simulate::assemble::{self, Surface};
 use crate::{Error, Result};
+use nalgebra::DMatrix;
 use serde::Serialize;
 
 /// A mesh with at least so many faces is coarsened.
@@ -21,19 +25,24 @@ const MOST: usize = 6000;
 const SMOOTH: f64 = 1.0;
 const FACETED: f64 = 2.0 / 3.0;
 const SHARP: f64 = 0.5;
+/// The order where two meshes of a smooth body are extrapolated.
+const PAIR: f64 = 1.5;
 /// Turn of the surface (rad) from which an edge is sharp, and the length of sharp edges, in square roots
 /// of the area, from which a mesh from a file is.
 const TURN: f64 = 0.96;
 const LENGTH: f64 = 0.1;
 /// Ratio of faces from which on two meshes differ enough.
 const DIFFERENT: f64 = 1.2;
+/// What is said of bodies without levels.
+const NONE: &str = "extrapolation: no other mesh with enough more or fewer faces could be solved";
 
 /// The same bodies on other meshes.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct Level {
     /// Faces of all bodies whose meshes matter.
     pub faces: usize,
-    /// Size of the difference to the added mass on the scene's own meshes.
+    /// Size of the difference to the added mass on the scene's own meshes (where those come in pairs,
+    /// on the finer of each, or on both).
     pub difference: f64,
     /// The error of the latter that follows from it.
     pub error: f64,
@@ -41,82 +50,139 @@ pub struct Level {
 
 /// The levels, and the error that follows; `None` if some body has no level.
 pub(super) fn extrapolate(case: &Case, missing: &mut Vec<String>) -> (Vec<Level>, Option<f64>) {
-    let bodies = case.meshed();
-    let enough = |b: &usize| faces(case, *b) >= ENOUGH;
-    let (many, few): (Vec<usize>, Vec<usize>) = bodies.into_iter().partition(enough);
+    let enough = |b: &usize| {
+        let surface = case.surfaces[*b].as_ref();
+        surface.is_some_and(|s| s.mesh.faces().len() >= ENOUGH)
+    };
+    let (many, few): (Vec<usize>, Vec<usize>) = case.meshed().into_iter().partition(enough);
     let (mut levels, mut error) = (Vec::new(), Some(0.0));
-    for (group, factors) in [(many, [0.25, 0.5]), (few, [4.0, 2.0])] {
-        if group.is_empty() {
+    for (bodies, factors) in [(many, [0.25, 0.5]), (few, [4.0, 2.0])] {
+        if bodies.is_empty() {
             continue;
         }
-        let (mut worst, mut reasons) = (None, vec![]);
-        for factor in factors {
-            match level(case, &group, factor) {
-                Ok(Some(level)) => {
-                    worst = Some(level.error.max(worst.unwrap_or(0.0)));
-                    levels.push(level);
-                }
-                Ok(None) => {}
-                Err(error) => reasons.push(format!(
-                    "extrapolation from {factor} times the faces: {error}"
-                )),
-            }
+        let mut group = Group {
+            case,
+            bodies,
+            levels: Vec::new(),
+            reasons: Vec::new(),
+        };
+        let found = group.error(factors);
+        levels.append(&mut group.levels);
+        if found.is_none() {
+            group.reasons.insert(0, NONE.into());
+            missing.push(group.reasons.join("; "));
         }
-        if worst.is_none() && reasons.is_empty() {
-            reasons.push("extrapolation: no mesh with fewer or more faces".into());
-        }
-        if worst.is_none() {
-            missing.extend(reasons);
-        }
-        error = error.zip(worst).map(|(a, b)| a + b);
+        error = error.zip(found).map(|(a, b)| a + b);
     }
     (levels, error)
 }
 
-fn faces(case: &Case, body: usize) -> usize {
-    let surface = case.surfaces[body].as_ref();
-    surface.map_or(0, |s| s.mesh.faces().len())
+/// Bodies whose meshes change together.
+struct Group<'a> {
+    case: &'a Case<'a>,
+    bodies: Vec<usize>,
+    levels: Vec<Level>,
+    /// Why there aren't more.
+    reasons: Vec<String>,
 }
 
-/// The added mass with `factor` times the faces for `bodies`; `None` where their meshes can't have
-/// that.
-fn level(case: &Case, bodies: &[usize], factor: f64) -> Result<Option<Level>> {
-    let (mut ratio, mut order, mut total) = (f64::INFINITY, SMOOTH, 0);
-    let mut surfaces = case.surfaces.clone();
-    for b in bodies {
-        let Some(Surface { mesh: own, .. }) = &case.surfaces[*b] else {
-            continue;
-        };
-        let Some(surface) = other(case, *b, own, factor)? else {
+impl Group<'_> {
+    fn error(&mut self, factors: [f64; 2]) -> Option<f64> {
+        let case = self.case;
+        let mut single = case.surfaces.clone();
+        let mut pairs = 0;
+        for b in &self.bodies {
+            if let Some(surface) = &mut single[*b] {
+                pairs += usize::from(surface.coarse.take().is_some());
+            }
+        }
+        if pairs == 0 {
+            return self.worst(&case.surfaces, case.own(), &factors, false);
+        }
+        // The single mesh's error bounds that of the pair, whose own may tell more.
+        let known = case.value(&single);
+        let known = known.map_err(|e| self.reasons.push(e.to_string())).ok()?;
+        let plain = self.worst(&single, &known, &factors, false);
+        if factors[0] > 1.0 {
+            return plain;
+        }
+        let pair = self.worst(&case.surfaces, case.own(), &[0.5], true);
+        plain.into_iter().chain(pair).reduce(f64::min)
+    }
+
+    /// The largest error that the levels tell of `from`, whose added mass is `known`.
+    fn worst(
+        &mut self,
+        from: &[Option<Surface>],
+        known: &DMatrix<f64>,
+        factors: &[f64],
+        pairs: bool,
+    ) -> Option<f64> {
+        let mut worst: Option<f64> = None;
+        for factor in factors {
+            match self.level(from, known, *factor, pairs) {
+                Ok(Some(level)) => {
+                    worst = Some(level.error.max(worst.unwrap_or(0.0)));
+                    self.levels.push(level);
+                }
+                Ok(None) => {}
+                Err(error) => self
+                    .reasons
+                    .push(format!("with {factor} times the faces: {error}")),
+            }
+        }
+        worst
+    }
+
+    /// With `factor` times the faces; `None` where meshes can't have that.
+    fn level(
+        &self,
+        from: &[Option<Surface>],
+        known: &DMatrix<f64>,
+        factor: f64,
+        pairs: bool,
+    ) -> Result<Option<Level>> {
+        let case = self.case;
+        let (mut ratio, mut order, mut total) = (f64::INFINITY, f64::INFINITY, 0);
+        let mut surfaces = from.to_vec();
+        for b in &self.bodies {
+            let Some(own) = &from[*b] else { continue };
+            let Some(mut other) = other(case, *b, &own.mesh, factor)? else {
+                return Ok(None);
+            };
+            if !pairs {
+                other.coarse = None;
+            }
+            let alone = order_of(case, *b, &own.mesh);
+            let both = own.coarse.is_some() && other.coarse.is_some();
+            order = order.min(if both && alone == SMOOTH { PAIR } else { alone });
+            let faces = other.mesh.faces().len();
+            let more = faces as f64 / own.mesh.faces().len() as f64;
+            ratio = ratio.min(if factor < 1.0 { 1.0 / more } else { more });
+            total += faces;
+            surfaces[*b] = Some(other);
+        }
+        if ratio < DIFFERENT {
             return Ok(None);
+        }
+        if factor > 1.0 && total > MOST {
+            return Err(Error::Unsupported {
+                what: format!("a refined mesh with {total} faces"),
+                why: format!("it would take long; at most {MOST} are solved"),
+                instead: format!("give every body at least {ENOUGH} faces"),
+            });
+        }
+        let difference = case.size(&(case.value(&surfaces)? - known));
+        let error = match factor < 1.0 {
+            true => difference / (ratio.powf(order) - 1.0),
+            false => difference / (1.0 - ratio.powf(-order)),
         };
-        let faces = surface.mesh.faces().len();
-        order = order.min(order_of(case, *b, own));
-        let more = faces as f64 / own.faces().len() as f64;
-        ratio = ratio.min(if factor < 1.0 { 1.0 / more } else { more });
-        total += faces;
-        surfaces[*b] = Some(surface);
+        Ok(Some(Level {
+            faces: total,
+            difference,
+            error,
+        }))
     }
-    if ratio < DIFFERENT {
-        return Ok(None);
-    }
-    if factor > 1.0 && total > MOST {
-        return Err(Error::Unsupported {
-            what: format!("a refined mesh with {total} faces"),
-            why: format!("it would take long; at most {MOST} are solved"),
-            instead: format!("give every body at least {ENOUGH} faces"),
-        });
-    }
-    let difference = case.size(&case.difference(&surfaces)?);
-    let error = match factor < 1.0 {
-        true => difference / (ratio.powf(order) - 1.0),
-        false => difference / (1.0 - ratio.powf(-order)),
-    };
-    Ok(Some(Level {
-        faces: total,
-        difference,
-        error,
-    }))
 }
 
 /// The surface of a body with `factor` times the faces.

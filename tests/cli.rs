@@ -72,7 +72,14 @@ fn help_of_every_command_tells_flags_and_defaults() {
         ),
         (
             "added-mass",
-            vec!["--shape", "--density", "--fidelity", "--method", "--faces"],
+            vec![
+                "--shape",
+                "--density",
+                "--fidelity",
+                "--method",
+                "--faces",
+                "--estimate",
+            ],
         ),
         (
             "gradcheck",
@@ -419,6 +426,28 @@ fn added_mass_of_scenes_and_meshes() {
         .collect();
     let inverted = file(&folder, "inverted.obj", &inverted);
     fails(&["added-mass", &inverted], 1, &["inverted.obj", "inward"]);
+}
+
+#[test]
+fn added_mass_with_an_estimate_of_its_error() {
+    let asked = ["added-mass", "--shape", "sphere:1", "--density", "1"];
+    let asked = [&asked[..], &["--method", "panel", "--faces", "320"]].concat();
+    let report = json(&[&asked[..], &["--estimate"]].concat());
+    let estimate = &report["error_estimate"];
+    numbers(estimate, &["total", "asymmetry", "extrapolation", "solver"]);
+    assert_eq!(estimate["missing"].as_array().unwrap().len(), 0);
+    let total = estimate["total"].as_f64().unwrap();
+    let found = report["added_mass"][0][0].as_f64().unwrap();
+    let error = (found / (2.0 / 3.0 * std::f64::consts::PI) - 1.0).abs();
+    assert!(error < total && total < 3.0 * error, "{total} {error}");
+    // Only when asked for; and for people.
+    assert!(json(&asked).get("error_estimate").is_none());
+    let plain = hydrograd(&[&asked[..], &["--estimate"]].concat());
+    assert!(text(&plain.stdout).contains("estimated error 3.1e-2"));
+    let floor = scene("falling_ball.toml");
+    let alone = ["added-mass", &floor, "--fidelity", "isolated", "--estimate"];
+    let report = json(&[&alone[..], &["--faces", "320"]].concat());
+    numbers(&report["error_estimate"], &["total", "coupling"]);
 }
 
 #[test]

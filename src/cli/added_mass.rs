@@ -13,6 +13,7 @@ use super::options::{Water, name};
 use super::output::{Output, write_warnings};
 use crate::Result;
 use crate::scene::{Scene, Shape};
+use crate::simulate::ErrorEstimate;
 
 #[derive(Debug, Args)]
 pub(super) struct Arguments {
@@ -22,6 +23,10 @@ pub(super) struct Arguments {
     /// mesh or shape].
     #[arg(long, value_name = "RHO", allow_negative_numbers = true)]
     density: Option<f64>,
+    /// Estimate the error of the result, from the same bodies on other meshes and from what is left at
+    /// check points; takes a few times as long.
+    #[arg(long)]
+    estimate: bool,
     #[command(flatten)]
     water: Water,
 }
@@ -65,6 +70,9 @@ pub(super) struct Report {
     /// Density of the water, kg/m³.
     pub density: f64,
     pub warnings: Vec<String>,
+    /// With `--estimate`: the error of `added_mass`, max |ΔM_ij| / √(M_ii M_jj), and its parts.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub error_estimate: Option<ErrorEstimate>,
 }
 
 pub(super) fn main(arguments: &Arguments, output: Output) -> Result<ExitCode> {
@@ -85,6 +93,10 @@ fn added_mass(scene: &Scene, arguments: &Arguments) -> Result<Report> {
     let simulator = arguments.water.simulator(scene, settings)?;
     let found = simulator.added_mass()?;
     let seconds = start.elapsed().as_secs_f64();
+    let error_estimate = match arguments.estimate {
+        true => Some(simulator.error_estimate()?),
+        false => None,
+    };
     let bodies = &simulator.system().bodies;
     let in_water = bodies.iter().filter(|b| b.wet.is_some());
     let mut warnings = simulator.warnings().to_vec();
@@ -113,6 +125,7 @@ fn added_mass(scene: &Scene, arguments: &Arguments) -> Result<Report> {
         method: settings.method_name().into(),
         density: simulator.parameters().density,
         warnings,
+        error_estimate,
     })
 }
 
@@ -139,6 +152,29 @@ impl fmt::Display for Report {
             "asymmetry {:.1e}; volume {:.6e} m³; {} faces, {} unknowns, {} iterations, {:.3} s",
             self.asymmetry, self.volume, self.faces, self.unknowns, self.iterations, self.seconds
         )?;
+        if let Some(estimate) = &self.error_estimate {
+            write_estimate(f, estimate)?;
+        }
         write_warnings(f, &self.warnings)
     }
+}
+
+fn write_estimate(f: &mut fmt::Formatter<'_>, estimate: &ErrorEstimate) -> fmt::Result {
+    match estimate.total {
+        Some(total) => write!(f, "\nestimated error {total:.1e} of √(M_ii M_jj)")?,
+        None => write!(f, "\nno estimate of the error, only parts of it")?,
+    }
+    let parts = [
+        ("other meshes", estimate.extrapolation),
+        ("check points", estimate.residual),
+        ("missing coupling", estimate.coupling),
+        ("asymmetry", Some(estimate.asymmetry)),
+    ];
+    for (name, part) in parts {
+        if let Some(part) = part.filter(|p| *p > 0.0) {
+            write!(f, "; {name} {part:.1e}")?;
+        }
+    }
+    let mut missing = estimate.missing.iter();
+    missing.try_for_each(|m| write!(f, "\nnot estimated: {m}"))
 }

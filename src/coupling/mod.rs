@@ -54,6 +54,15 @@ pub trait Coupling: Send + Sync {
         basis: &DMatrix<f64>,
         derivative: bool,
     ) -> Result<Box<dyn Record + '_>>;
+
+    /// What normal velocities left between the collocation points are worth: the change of
+    /// `basisᵀ M̄_f basis` that they ask for, symmetric. `None` where there are no such points.
+    ///
+    /// # Errors
+    /// As [`Coupling::evaluate`].
+    fn residual(&self, _poses: &[Pose], _basis: &DMatrix<f64>) -> Result<Option<DMatrix<f64>>> {
+        Ok(None)
+    }
 }
 
 /// What one evaluation cost and how far to trust it.

@@ -76,6 +76,15 @@ impl TriMesh {
         })
     }
 
+    /// Parts that are known to be a surface.
+    pub(super) fn with_parts(name: &str, vertices: Vec<Vec3>, faces: Vec<[usize; 3]>) -> Self {
+        Self {
+            name: name.into(),
+            vertices,
+            faces,
+        }
+    }
+
     /// File or shape name, for messages.
     pub fn name(&self) -> &str {
         &self.name

@@ -12,6 +12,7 @@ pub mod gap;
 mod mass;
 mod mesh;
 pub mod primitive;
+mod remesh;
 mod topology;
 mod weld;
 

@@ -32,6 +32,8 @@ pub(super) struct Assembled {
     /// Smallest gap that each body's discretisation resolves, m; zero where it isn't limited but by
     /// its mesh.
     pub resolved: Vec<f64>,
+    /// What `Auto` chose for each body and pair.
+    pub plan: Plan,
     /// What `Auto` chose, and why.
     pub reasons: Vec<String>,
     pub clearance: Clearance,
@@ -70,6 +72,7 @@ fn part(p: DragPart) -> Part {
 }
 
 /// A body's surface in its own frame, with its mass properties.
+#[derive(Clone)]
 pub(super) struct Surface {
     pub mesh: TriMesh,
     /// A mesh of about a quarter of the faces, of a shape by formula with flat parts or edges.
@@ -77,12 +80,28 @@ pub(super) struct Surface {
     pub properties: MassProperties,
 }
 
-fn surface(body: &Body, settings: &Settings) -> Result<Option<Surface>> {
+impl Surface {
+    /// Of a mesh alone.
+    pub fn of_mesh(mesh: TriMesh) -> Self {
+        Self {
+            properties: mesh.mass_properties(),
+            coarse: None,
+            mesh,
+        }
+    }
+}
+
+/// A body's surface, with about `faces` faces if it is a shape by formula.
+pub(super) fn surface(
+    body: &Body,
+    settings: &Settings,
+    faces: Option<usize>,
+) -> Result<Option<Surface>> {
     let Some(shape) = &body.shape else {
         return Ok(None);
     };
     let at = pose(&body.shape_at);
-    let mesh = shape::build(shape, Path::new(""), settings.faces)?.transformed(&at);
+    let mesh = shape::build(shape, Path::new(""), faces)?.transformed(&at);
     let closed = settings.by_formula() && wet::semi_axes(shape).is_some();
     let panels = settings.fidelity != Fidelity::Full
         && matches!(settings.one_body, OneBody::Auto | OneBody::Panel);
@@ -109,6 +128,34 @@ fn surface(body: &Body, settings: &Settings) -> Result<Option<Surface>> {
         mesh,
         coarse,
     }))
+}
+
+/// The bodies that the water sees with a fidelity, with their numbers in the scene. Bodies that
+/// can't move matter only as boundaries of the coupled flow.
+pub(super) fn in_water<'a>(
+    scene: &'a Scene,
+    surfaces: &'a [Option<Surface>],
+    tree: &Tree,
+    fidelity: Fidelity,
+) -> (Vec<usize>, Vec<Wet<'a>>) {
+    let alone = fidelity == Fidelity::Isolated;
+    let seen = |b: &usize| !alone || moves(scene, tree, *b);
+    let wet = |b: usize| {
+        let (body, surface) = (&scene.bodies[b], surfaces[b].as_ref());
+        let given = body.added_mass.as_ref();
+        (surface.is_some() || given.is_some()).then(|| Wet {
+            name: &body.name,
+            mesh: surface.map(|s| &s.mesh),
+            ellipsoid: (body.shape.as_ref().and_then(wet::semi_axes))
+                .map(|axes| (axes, pose(&body.shape_at))),
+            coarse: surface.and_then(|s| s.coarse.as_ref()),
+            added_mass: given
+                .filter(|_| alone)
+                .map(|rows| Mat6::from_fn(|i, j| rows[i][j])),
+        })
+    };
+    let numbers = (0..scene.bodies.len()).filter(seen);
+    numbers.filter_map(|b| Some((b, wet(b)?))).unzip()
 }
 
 /// Mass, centre of mass and inertia of a body.
@@ -176,11 +223,10 @@ pub(super) fn assemble(
     parameters.density = scene.fluid.density;
     let mut surfaces = Vec::with_capacity(scene.bodies.len());
     for body in &scene.bodies {
-        surfaces.push(surface(body, settings)?);
+        surfaces.push(surface(body, settings, settings.faces)?);
     }
 
-    let mut wet: Vec<Wet> = Vec::new();
-    let mut of_wet = Vec::new();
+    let (of_wet, wet) = in_water(scene, &surfaces, &tree, settings.fidelity);
     let mut bodies = Vec::with_capacity(scene.bodies.len());
     let mut controls = 0;
     for (b, body) in scene.bodies.iter().enumerate() {
@@ -212,22 +258,7 @@ pub(super) fn assemble(
                 data.surface = pieces;
             }
         }
-        // Bodies that can't move matter only as boundaries of the coupled flow.
-        let seen = settings.fidelity != Fidelity::Isolated || moves(scene, &tree, b);
-        if seen && (surface.is_some() || body.added_mass.is_some()) {
-            data.wet = Some(wet.len());
-            of_wet.push(b);
-            wet.push(Wet {
-                name: &body.name,
-                mesh: surface.map(|s| &s.mesh),
-                ellipsoid: (body.shape.as_ref().and_then(wet::semi_axes))
-                    .map(|axes| (axes, pose(&body.shape_at))),
-                coarse: surface.and_then(|s| s.coarse.as_ref()),
-                added_mass: (body.added_mass.as_ref())
-                    .filter(|_| settings.fidelity == Fidelity::Isolated)
-                    .map(|rows| Mat6::from_fn(|i, j| rows[i][j])),
-            });
-        }
+        data.wet = of_wet.iter().position(|w| *w == b);
         if body.actuated {
             data.joint_control = Some(controls);
             controls += tree.links()[b].v.len();
@@ -263,14 +294,7 @@ pub(super) fn assemble(
         plan,
         reasons,
     } = choose(scene, settings, &system, &q, &clearance, &wet, &of_wet)?;
-    let number = |b: usize| of_wet.iter().position(|w| *w == b);
-    let declared = scene.overlapping().into_iter();
-    let excluded = Exclusions::new(declared.filter_map(|(a, b)| Some((number(a)?, number(b)?))));
-    let water = Water {
-        walls: &scene.walls,
-        excluded,
-        folder,
-    };
+    let water = water(scene, &of_wet, folder);
     let made = wet::couple(&wet, &water, settings, fidelity, &plan)?;
     system.coupling = made.coupling;
     warnings.extend(made.warnings);
@@ -289,10 +313,23 @@ pub(super) fn assemble(
         fidelity,
         discretisation: made.bodies,
         resolved,
+        plan,
         reasons,
         clearance,
         warnings,
     })
+}
+
+/// What is around the bodies in the water, `of_wet` being their numbers in the scene.
+pub(super) fn water<'a>(scene: &'a Scene, of_wet: &[usize], folder: Option<&'a Path>) -> Water<'a> {
+    let number = |b: usize| of_wet.iter().position(|w| *w == b);
+    let declared = scene.overlapping().into_iter();
+    let pairs = declared.filter_map(|(a, b)| Some((number(a)?, number(b)?)));
+    Water {
+        walls: &scene.walls,
+        excluded: Exclusions::new(pairs),
+        folder,
+    }
 }
 
 /// The fidelity to use, and what `Auto` makes of the scene.

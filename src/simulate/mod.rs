@@ -3,6 +3,7 @@
 mod assemble;
 mod clearance;
 mod controls;
+mod estimate;
 pub mod gradcheck;
 mod gradient;
 pub mod objective;
@@ -15,6 +16,7 @@ mod trajectory;
 mod wet;
 
 pub use controls::Controls;
+pub use estimate::{ErrorEstimate, Level};
 pub use gradient::{Cotangents, Gradient, Initial};
 pub use objective::Objective;
 pub use policy::{

@@ -4,6 +4,7 @@ use super::assemble::{self, Assembled};
 use super::clearance::Clearance;
 use super::trajectory::Trajectory;
 use super::{Controls, Discretisation, Fidelity, Policy, Rollout, Settings};
+use crate::adjoint::lie::Pose;
 use crate::adjoint::step;
 use crate::coupling::Report;
 use crate::dynamics::{Parameters, State, Stepper, System};
@@ -11,14 +12,17 @@ use crate::scene::Scene;
 use crate::shape::Gaps;
 use crate::{Error, Result};
 use nalgebra::{DMatrix, DVector};
-use std::path::Path;
+use std::path::{Path, PathBuf};
 
 /// Most steps of one rollout: some kilobytes are kept for each.
 const MOST_STEPS: usize = 5_000_000;
 
 /// A scene made ready: shapes discretised, bodies joined, coupling prepared.
 pub struct Simulator {
-    assembled: Assembled,
+    pub(super) scene: Scene,
+    pub(super) assembled: Assembled,
+    /// Where compressed bodies are kept.
+    pub(super) folder: Option<PathBuf>,
     settings: Settings,
     dt: f64,
     steps: usize,
@@ -67,7 +71,9 @@ impl Simulator {
         }
         let assembled = assemble::assemble(scene, &settings, folder)?;
         let out = Self {
+            scene: scene.clone(),
             assembled,
+            folder: folder.map(Path::to_path_buf),
             settings,
             dt,
             steps: scene.steps,
@@ -357,20 +363,8 @@ impl Simulator {
     /// Whatever the coupling reports.
     pub fn added_mass(&self) -> Result<AddedMass> {
         let system = self.system();
-        let n = 6 * system.coupling.bodies();
-        let kinematics = system.tree.kinematics(&self.assembled.q);
-        let wet: Vec<usize> = (0..system.len())
-            .filter(|b| system.bodies[*b].wet.is_some())
-            .collect();
-        let poses: Vec<_> = wet.iter().map(|b| kinematics.poses[*b]).collect();
-        // World axes about each body's origin: turn, don't shift.
-        let mut turn = DMatrix::zeros(n, n);
-        for (w, pose) in poses.iter().enumerate() {
-            for half in 0..2 {
-                turn.fixed_view_mut::<3, 3>(6 * w + 3 * half, 6 * w + 3 * half)
-                    .copy_from(&pose.rotation.transpose());
-            }
-        }
+        let (wet, poses) = self.in_water();
+        let turn = world_axes(&poses);
         let record = system.coupling.evaluate(&poses, &turn, false)?;
         let m = turn.tr_mul(record.momenta()) * self.parameters().density;
         Ok(AddedMass {
@@ -379,4 +373,27 @@ impl Simulator {
             report: record.report().clone(),
         })
     }
+
+    /// The bodies in the water, by their numbers in the scene, and their poses at the start.
+    pub(super) fn in_water(&self) -> (Vec<usize>, Vec<Pose>) {
+        let system = self.system();
+        let kinematics = system.tree.kinematics(&self.assembled.q);
+        (0..system.len())
+            .filter(|b| system.bodies[*b].wet.is_some())
+            .map(|b| (b, kinematics.poses[b]))
+            .unzip()
+    }
+}
+
+/// Unit twists along world axes about each body's origin, in body frames: turned, not shifted.
+pub(super) fn world_axes(poses: &[Pose]) -> DMatrix<f64> {
+    let n = 6 * poses.len();
+    let mut turn = DMatrix::zeros(n, n);
+    for (w, pose) in poses.iter().enumerate() {
+        for half in 0..2 {
+            turn.fixed_view_mut::<3, 3>(6 * w + 3 * half, 6 * w + 3 * half)
+                .copy_from(&pose.rotation.transpose());
+        }
+    }
+    turn
 }

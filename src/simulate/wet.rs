@@ -75,6 +75,13 @@ pub(super) fn semi_axes(shape: &Shape) -> Option<[f64; 3]> {
 }
 
 impl<'a> Wet<'a> {
+    /// Whether its answer depends on a mesh.
+    pub fn meshed(&self, settings: &Settings, fidelity: Fidelity) -> bool {
+        let formula =
+            fidelity != Fidelity::Full && matches!(self.method(settings), Ok(OneBody::Exact));
+        self.mesh.is_some() && self.added_mass.is_none() && !formula
+    }
+
     /// The method for this body.
     fn method(&self, settings: &Settings) -> Result<OneBody> {
         match (settings.one_body, self.ellipsoid) {
@@ -376,26 +383,16 @@ fn panels(bodies: &[Wet], water: &Water, settings: &Settings) -> Result<Made> {
 }
 
 fn reduced(bodies: &[Wet], water: &Water, settings: &Settings, plan: &Plan) -> Result<Made> {
-    let mut made: Vec<Arc<ReducedBody>> = Vec::with_capacity(bodies.len());
-    let mut methods = Vec::with_capacity(bodies.len());
-    for (b, body) in bodies.iter().enumerate() {
-        let method = body.method(settings)?;
-        let chosen = plan.compress.get(b).copied().unwrap_or(settings.compress);
-        made.push(compressed(body, method, settings, &chosen, water.folder)?);
-        methods.push(name_of(method));
-    }
-    let cutoff = |a: usize, b: usize| {
-        let pair = (a.min(b), a.max(b));
-        let found = plan.cutoffs.iter().find(|(p, _)| *p == pair);
-        found.map(|(_, cutoff)| *cutoff)
-    };
-    let names = bodies.iter().map(|b| b.name.to_string());
+    let coupling = compressed_all(bodies, water, settings, plan)?;
+    let made = coupling.reduced_bodies();
+    let method = |body: &Wet| Ok(name_of(body.method(settings)?));
+    let methods = bodies.iter().map(method).collect::<Result<Vec<_>>>()?;
     Ok(Made {
         faces: bodies
             .iter()
             .filter_map(|b| Some(b.mesh?.faces().len()))
             .sum(),
-        warnings: compression_warnings(bodies, &made, settings, plan),
+        warnings: compression_warnings(bodies, made, settings, plan),
         bodies: made
             .iter()
             .zip(bodies)
@@ -416,12 +413,53 @@ fn reduced(bodies: &[Wet], water: &Water, settings: &Settings, plan: &Plan) -> R
                 }
             })
             .collect(),
-        coupling: Box::new(
-            Reduced::new(made, water.walls, cutoff)?
-                .excluding(&water.excluded)?
-                .named(names),
-        ),
+        coupling: Box::new(coupling),
     })
+}
+
+/// All bodies compressed and coupled.
+pub(super) fn compressed_all(
+    bodies: &[Wet],
+    water: &Water,
+    settings: &Settings,
+    plan: &Plan,
+) -> Result<Reduced> {
+    let mut made: Vec<Arc<ReducedBody>> = Vec::with_capacity(bodies.len());
+    for (b, body) in bodies.iter().enumerate() {
+        let method = body.method(settings)?;
+        let chosen = plan.compress.get(b).copied().unwrap_or(settings.compress);
+        made.push(compressed(body, method, settings, &chosen, water.folder)?);
+    }
+    let cutoff = |a: usize, b: usize| {
+        let pair = (a.min(b), a.max(b));
+        let found = plan.cutoffs.iter().find(|(p, _)| *p == pair);
+        found.map(|(_, cutoff)| *cutoff)
+    };
+    let names = bodies.iter().map(|b| b.name.to_string());
+    Ok(Reduced::new(made, water.walls, cutoff)?
+        .excluding(&water.excluded)?
+        .named(names))
+}
+
+/// What each body answers by its own method; bodies that are equal share one. Sources as near as
+/// `gaps` (m, one a body) are resolved where the method has to know.
+pub(super) fn answers(
+    bodies: &[Wet],
+    settings: &Settings,
+    gaps: &[f64],
+) -> Result<Vec<Arc<dyn Response>>> {
+    let mut out: Vec<Arc<dyn Response>> = Vec::with_capacity(bodies.len());
+    for (b, body) in bodies.iter().enumerate() {
+        let same = |a: &usize| equal(&bodies[*a], body) && gaps[*a] == gaps[b];
+        out.push(match (0..b).find(same) {
+            Some(a) => out[a].clone(),
+            None => {
+                let method = body.method(settings)?;
+                Arc::from(body.response(method, settings, gaps[b])?)
+            }
+        });
+    }
+    Ok(out)
 }
 
 /// What the user should know of compressed bodies.

@@ -23,6 +23,7 @@
 //! which is Eq. 21 done once, transposed, with the least-squares residual terms that Eq. 21 drops.
 
 mod body;
+mod check;
 mod pairs;
 mod record;
 mod second;
@@ -117,5 +118,10 @@ impl Coupling for Full {
         Ok(Box::new(record::FullRecord::new(
             self, poses, basis, derivative,
         )?))
+    }
+
+    fn residual(&self, poses: &[Pose], basis: &DMatrix<f64>) -> Result<Option<DMatrix<f64>>> {
+        let record = record::FullRecord::new(self, poses, basis, false)?;
+        Ok(Some(record.residual()))
     }
 }

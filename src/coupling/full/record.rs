@@ -121,6 +121,11 @@ impl<'a> FullRecord<'a> {
         Ok(out)
     }
 
+    /// The basis and its strengths a.
+    pub fn solution(&self) -> (&DMatrix<f64>, &Columns) {
+        (&self.basis, &self.a)
+    }
+
     /// ½ {B₆ᵀ P a + F₆ᵀ μ}: body-frame impulses of all bodies (zero for those the basis doesn't move).
     pub fn impulse(&self, a: &[f64], mu: &[f64]) -> DVector<f64> {
         let mut out = DVector::zeros(6 * self.full.bodies.len());

@@ -56,8 +56,9 @@ impl Link {
         out
     }
 
-    /// The link at the poses, unless it has faded out.
-    pub fn place(&self, reduced: &Reduced, poses: &[Pose]) -> Option<Placed<'_>> {
+    /// The source body's centre in the target's frame, the same less the target's, and the weight at
+    /// that distance with two derivatives.
+    fn reach(&self, reduced: &Reduced, poses: &[Pose]) -> (Vec3, Vec3, [f64; 3]) {
         let parts = |b: usize| reduced.bodies[b].parts();
         let (t, s) = (self.target, self.source);
         let (rotation, shift) = self.image.placement(&poses[s]);
@@ -67,6 +68,27 @@ impl Link {
             Some(cutoff) => cutoff.weight(between.norm()),
             None => [1.0, 0.0, 0.0],
         };
+        (centre, between, weight)
+    }
+
+    /// Weight at the poses.
+    pub fn weight(&self, reduced: &Reduced, poses: &[Pose]) -> f64 {
+        self.reach(reduced, poses).2[0]
+    }
+
+    /// The bodies (target, source) that it couples, in both orders: one body and its image once.
+    pub fn ends(&self) -> impl Iterator<Item = (usize, usize)> {
+        let (t, s) = (self.target, self.source);
+        [(t, s), (s, t)]
+            .into_iter()
+            .take(if t == s { 1 } else { 2 })
+    }
+
+    /// The link at the poses, unless it has faded out.
+    pub fn place(&self, reduced: &Reduced, poses: &[Pose]) -> Option<Placed<'_>> {
+        let parts = |b: usize| reduced.bodies[b].parts();
+        let (t, s) = (self.target, self.source);
+        let (centre, between, weight) = self.reach(reduced, poses);
         (weight[0] > 0.0).then(|| Placed {
             link: self,
             pair: Pair::new(

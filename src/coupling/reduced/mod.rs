@@ -18,6 +18,7 @@
 
 mod body;
 pub mod cache;
+mod check;
 pub mod compress;
 mod cutoff;
 mod link;

@@ -40,7 +40,7 @@ pub(super) struct ReducedRecord<'a> {
     /// a of the basis columns.
     a: DMatrix<f64>,
     /// α of the basis columns.
-    alpha: DMatrix<f64>,
+    pub alpha: DMatrix<f64>,
     momenta: DMatrix<f64>,
     report: Report,
 }

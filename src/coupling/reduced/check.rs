@@ -1,0 +1,89 @@
+//! The coupling against what the bodies themselves answer, at the configuration itself.
+//!
+//! The charges α of the other bodies and of images, at y in a body's frame, are a flow that the body
+//! was not fitted to. What the compressed body answers there is `E L Lᵀ Eᵀ` and `E Ū`,
+//! `E_ij = 1/|y_i − x̄_j|`; what the body answers by its own method is Φ and φ. M̄_f depends on the
+//! answers in such a way that their differences enter, to first order, through α alone:
+//!
+//! ```text
+//! δM = Σ_bodies { δM̄₀ + 4π [ α_yᵀ (Φ − E L Lᵀ Eᵀ) α_y + α_yᵀ (φ − E Ū) + (φ − E Ū)ᵀ α_y ] } + 4π αᵀ δG α
+//! ```
+//!
+//! δG being what pairs that fade out leave out.
+
+use super::Reduced;
+use super::record::ReducedRecord;
+use crate::Result;
+use crate::adjoint::kernel::{Points, Sources, Write, potential_fill};
+use crate::adjoint::lie::{Pose, Vec3};
+use crate::boundary::Response;
+use crate::coupling::pair::Pair;
+use nalgebra::DMatrix;
+use std::f64::consts::PI;
+use std::sync::Arc;
+
+impl Reduced {
+    /// To first order, how much `basisᵀ M̄_f basis` is off at `poses` if the bodies really answer as
+    /// `answers` do (one a body): symmetric, columns of `basis` squared.
+    ///
+    /// # Errors
+    /// What [`Coupling::evaluate`](crate::coupling::Coupling::evaluate) and the answers report.
+    pub fn correction(
+        &self,
+        poses: &[Pose],
+        basis: &DMatrix<f64>,
+        answers: &[Arc<dyn Response>],
+    ) -> Result<DMatrix<f64>> {
+        let record = ReducedRecord::new(self, poses, basis, false)?;
+        let k = basis.ncols();
+        let mut out = DMatrix::zeros(k, k);
+        for (b, answer) in answers.iter().enumerate() {
+            let parts = self.bodies[b].parts();
+            let twists = basis.rows(6 * b, 6);
+            let own = answer.added_mass() - parts.added_mass;
+            out += twists.tr_mul(&(own * twists));
+            // Charges of the others, in this body's frame.
+            let (mut places, mut rows, mut faded) = (Vec::new(), Vec::new(), Vec::new());
+            for link in &self.links {
+                for (target, source) in link.ends() {
+                    if target != b {
+                        continue;
+                    }
+                    let weight = link.weight(self, poses);
+                    let points = &self.bodies[source].parts().points;
+                    let (at, from) = ((b, &poses[b]), (source, &poses[source]));
+                    places.extend(Pair::new(at, from, &link.image, points).positions);
+                    rows.extend(self.points[source].clone().map(|j| (j, link.image.sign)));
+                    faded.extend(vec![1.0 - weight; points.len()]);
+                }
+            }
+            if places.is_empty() {
+                continue;
+            }
+            let charges = DMatrix::from_fn(rows.len(), k, |i, c| {
+                rows[i].1 * record.alpha[(rows[i].0, c)]
+            });
+            let field = inverse_distances(&places, &parts.points);
+            let seen = parts.modes.tr_mul(&field.tr_mul(&charges));
+            let answered = answer.scattered(&places, &places)?;
+            let answered = DMatrix::from_fn(places.len(), places.len(), |i, j| answered[(i, j)]);
+            let scattered = charges.tr_mul(&(answered * &charges)) - seen.tr_mul(&seen);
+            let answered = answer.radiated(&places)?;
+            let answered = DMatrix::from_fn(places.len(), 6, |i, j| answered[(i, j)]);
+            let radiated = charges.tr_mul(&((answered - &field * &parts.strengths) * twists));
+            let faint = DMatrix::from_fn(rows.len(), k, |i, c| faded[i] * charges[(i, c)]);
+            let alpha = record.alpha.rows(self.points[b].start, parts.points.len());
+            let missing = alpha.tr_mul(&field.tr_mul(&faint));
+            out += 4.0 * PI * (scattered + &radiated + radiated.transpose() + missing);
+        }
+        Ok(0.5 * (&out + out.transpose()))
+    }
+}
+
+/// `1/|y_i − x_j|`.
+fn inverse_distances(y: &[Vec3], x: &[Vec3]) -> DMatrix<f64> {
+    let mut out = vec![0.0; y.len() * x.len()];
+    let sources = Sources::new(x);
+    potential_fill(&Points::bare(y), &sources, Write::Set, &mut out, x.len(), 0);
+    DMatrix::from_row_slice(y.len(), x.len(), &out)
+}

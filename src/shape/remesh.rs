@@ -1,0 +1,344 @@
+//! The surface of a mesh with more faces, or with fewer.
+
+use super::mesh::{TriMesh, area_vector};
+use crate::error::Result;
+use hydrograd_adjoint::lie::{Mat3, Vec3};
+use std::cmp::Ordering;
+use std::collections::{BinaryHeap, HashMap};
+
+/// Distance along the surface counts as this part of the distance from it: on flat ground edges come
+/// out even.
+const EVEN: f64 = 1e-2;
+/// Cosine of the most that a face may turn at once.
+const TURN: f64 = 0.3;
+/// Least height of a face over its longest edge.
+const SLIVER: f64 = 0.05;
+
+impl TriMesh {
+    /// The same polyhedron with every face split into four at the middles of its edges.
+    pub fn split(&self) -> Self {
+        let mut vertices = self.vertices().to_vec();
+        let mut known: HashMap<[usize; 2], usize> = HashMap::new();
+        let mut middle = |a: usize, b: usize| {
+            *known.entry([a.min(b), a.max(b)]).or_insert_with(|| {
+                vertices.push(vertices[a] + (vertices[b] - vertices[a]) * 0.5);
+                vertices.len() - 1
+            })
+        };
+        let mut faces = Vec::with_capacity(4 * self.faces().len());
+        for &[a, b, c] in self.faces() {
+            let [d, e, f] = [middle(a, b), middle(b, c), middle(c, a)];
+            faces.extend([[a, d, f], [d, b, e], [f, e, c], [d, e, f]]);
+        }
+        Self::with_parts(self.name(), vertices, faces)
+    }
+
+    /// Nearly the same surface with about `target` faces, or as few as it can lose without folding:
+    /// edges are collapsed one after the other, where the surface moves least.
+    ///
+    /// # Errors
+    /// [`Error::Mesh`](crate::Error::Mesh) where the result isn't a surface any more.
+    ///
+    /// # References
+    /// M. Garland, P. S. Heckbert, "Surface simplification using quadric error metrics", SIGGRAPH 1997,
+    /// 209–216.
+    pub fn coarsened(&self, target: usize) -> Result<Self> {
+        let mut surface = Surface::new(self);
+        surface.reduce(target);
+        let (vertices, faces) = surface.parts();
+        Self::new(self.name(), vertices, faces)
+    }
+
+    /// Length of the edges across which the surface turns by more than `angle` (rad), m.
+    pub fn sharp_edges(&self, angle: f64) -> f64 {
+        self.edges()
+            .iter()
+            .filter(|e| self.normal(e.faces[0]).dot(&self.normal(e.faces[1])) < angle.cos())
+            .map(|e| (self.vertices()[e.vertices[0]] - self.vertices()[e.vertices[1]]).norm())
+            .sum()
+    }
+}
+
+/// Weighted sum of squared distances from planes, `xᵀ a x + 2 b·x + c`.
+#[derive(Clone, Copy)]
+struct Quadric {
+    a: Mat3,
+    b: Vec3,
+    c: f64,
+    weight: f64,
+}
+
+impl Quadric {
+    fn zero() -> Self {
+        Self {
+            a: Mat3::zeros(),
+            b: Vec3::zeros(),
+            c: 0.0,
+            weight: 0.0,
+        }
+    }
+
+    fn plane(corners: &[Vec3; 3]) -> Self {
+        let area = area_vector(corners);
+        let weight = area.norm();
+        let n = area / weight;
+        let d = -n.dot(&corners[0]);
+        Self {
+            a: weight * n * n.transpose(),
+            b: weight * d * n,
+            c: weight * d * d,
+            weight,
+        }
+    }
+
+    fn add(&mut self, other: &Self) {
+        self.a += other.a;
+        self.b += other.b;
+        self.c += other.c;
+        self.weight += other.weight;
+    }
+
+    /// The best point between `from` and `to`, and what it costs.
+    fn best(&self, from: &Vec3, to: &Vec3) -> (Vec3, f64) {
+        let middle = 0.5 * (from + to);
+        let pull = EVEN * EVEN * self.weight;
+        let matrix = self.a + pull * Mat3::identity();
+        let solved = matrix
+            .cholesky()
+            .map(|m| m.solve(&(pull * middle - self.b)));
+        let x = solved.unwrap_or(middle);
+        let planes = x.dot(&(self.a * x)) + 2.0 * self.b.dot(&x) + self.c;
+        (x, planes.max(0.0) + pull * (from - to).norm_squared())
+    }
+}
+
+/// An edge that may be collapsed.
+struct Candidate {
+    cost: f64,
+    ends: [usize; 2],
+    /// How often its ends had moved.
+    moved: [u32; 2],
+    place: Vec3,
+}
+
+impl Ord for Candidate {
+    /// The cheapest is the greatest; ties by number.
+    fn cmp(&self, other: &Self) -> Ordering {
+        let cost = other.cost.total_cmp(&self.cost);
+        cost.then_with(|| other.ends.cmp(&self.ends))
+    }
+}
+
+impl PartialOrd for Candidate {
+    fn partial_cmp(&self, other: &Self) -> Option<Ordering> {
+        Some(self.cmp(other))
+    }
+}
+
+impl PartialEq for Candidate {
+    fn eq(&self, other: &Self) -> bool {
+        self.cmp(other) == Ordering::Equal
+    }
+}
+
+impl Eq for Candidate {}
+
+/// A surface that loses faces.
+struct Surface {
+    vertices: Vec<Vec3>,
+    faces: Vec<Option<[usize; 3]>>,
+    /// Faces at each vertex.
+    around: Vec<Vec<usize>>,
+    quadrics: Vec<Quadric>,
+    moved: Vec<u32>,
+    left: usize,
+    queue: BinaryHeap<Candidate>,
+    /// Lengths are in units of the body's size, about its middle.
+    size: f64,
+    middle: Vec3,
+}
+
+impl Surface {
+    fn new(mesh: &TriMesh) -> Self {
+        let [low, high] = mesh.bounds();
+        let (middle, size) = (0.5 * (low + high), mesh.diameter());
+        let vertices: Vec<Vec3> = (mesh.vertices().iter())
+            .map(|v| (v - middle) / size)
+            .collect();
+        let mut around = vec![Vec::new(); vertices.len()];
+        let mut quadrics = vec![Quadric::zero(); vertices.len()];
+        for (f, face) in mesh.faces().iter().enumerate() {
+            let plane = Quadric::plane(&face.map(|v| vertices[v]));
+            for v in face {
+                around[*v].push(f);
+                quadrics[*v].add(&plane);
+            }
+        }
+        let mut out = Self {
+            moved: vec![0; vertices.len()],
+            vertices,
+            faces: mesh.faces().iter().copied().map(Some).collect(),
+            around,
+            quadrics,
+            left: mesh.faces().len(),
+            queue: BinaryHeap::new(),
+            size,
+            middle,
+        };
+        for edge in mesh.edges() {
+            out.consider(edge.vertices);
+        }
+        out
+    }
+
+    fn consider(&mut self, ends: [usize; 2]) {
+        let [a, b] = [ends[0].min(ends[1]), ends[0].max(ends[1])];
+        let mut quadric = self.quadrics[a];
+        quadric.add(&self.quadrics[b]);
+        let (place, cost) = quadric.best(&self.vertices[a], &self.vertices[b]);
+        self.queue.push(Candidate {
+            cost,
+            ends: [a, b],
+            moved: [self.moved[a], self.moved[b]],
+            place,
+        });
+    }
+
+    fn reduce(&mut self, target: usize) {
+        while self.left > target.max(4) {
+            let Some(next) = self.queue.pop() else { return };
+            let [a, b] = next.ends;
+            let current = [self.moved[a], self.moved[b]] == next.moved;
+            if current && self.joined(a, b) && self.may_collapse(a, b, &next.place) {
+                self.collapse(a, b, next.place);
+            }
+        }
+    }
+
+    fn face(&self, f: usize) -> [usize; 3] {
+        self.faces[f].unwrap_or([usize::MAX; 3])
+    }
+
+    fn joined(&self, a: usize, b: usize) -> bool {
+        self.around[a].iter().any(|f| self.face(*f).contains(&b))
+    }
+
+    fn neighbours(&self, v: usize) -> Vec<usize> {
+        let corners = self.around[v].iter().flat_map(|f| self.face(*f));
+        let mut out: Vec<usize> = corners.filter(|w| *w != v).collect();
+        out.sort_unstable();
+        out.dedup();
+        out
+    }
+
+    /// Whether the surface stays one that doesn't fold.
+    fn may_collapse(&self, a: usize, b: usize, place: &Vec3) -> bool {
+        let (near_a, near_b) = (self.neighbours(a), self.neighbours(b));
+        let common: Vec<usize> = near_a.into_iter().filter(|v| near_b.contains(v)).collect();
+        if common.len() != 2 || common.iter().any(|v| self.around[*v].len() < 4) {
+            return false;
+        }
+        let stays = |v: usize, other: usize| {
+            self.around[v].iter().all(|f| {
+                let face = self.face(*f);
+                if face.contains(&other) {
+                    return true;
+                }
+                let before = face.map(|w| self.vertices[w]);
+                let after = face.map(|w| if w == v { *place } else { self.vertices[w] });
+                let (old, new) = (area_vector(&before), area_vector(&after));
+                let longest = (0..3)
+                    .map(|k| (after[(k + 1) % 3] - after[k]).norm_squared())
+                    .fold(0.0, f64::max);
+                old.dot(&new) > TURN * old.norm() * new.norm()
+                    && 2.0 * new.norm() > SLIVER * longest
+            })
+        };
+        stays(a, b) && stays(b, a)
+    }
+
+    fn collapse(&mut self, a: usize, b: usize, place: Vec3) {
+        for f in std::mem::take(&mut self.around[b]) {
+            let face = self.face(f);
+            if face.contains(&a) {
+                self.faces[f] = None;
+                self.left -= 1;
+                for v in face {
+                    self.around[v].retain(|g| *g != f);
+                }
+            } else {
+                self.faces[f] = Some(face.map(|v| if v == b { a } else { v }));
+                self.around[a].push(f);
+            }
+        }
+        let quadric = self.quadrics[b];
+        self.quadrics[a].add(&quadric);
+        self.vertices[a] = place;
+        self.moved[a] += 1;
+        self.moved[b] += 1;
+        for v in self.neighbours(a) {
+            self.consider([a, v]);
+        }
+    }
+
+    /// Vertices that are left, and faces.
+    fn parts(&self) -> (Vec<Vec3>, Vec<[usize; 3]>) {
+        let mut number = HashMap::new();
+        let mut vertices = Vec::new();
+        let faces = self.faces.iter().flatten().map(|face| {
+            face.map(|v| {
+                *number.entry(v).or_insert_with(|| {
+                    vertices.push(self.vertices[v] * self.size + self.middle);
+                    vertices.len() - 1
+                })
+            })
+        });
+        let faces = faces.collect();
+        (vertices, faces)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use crate::scene::Shape;
+    use crate::shape::{self, TriMesh};
+    use std::path::Path;
+
+    fn build(shape: Shape, faces: usize) -> TriMesh {
+        shape::build(&shape, Path::new(""), Some(faces)).unwrap()
+    }
+
+    #[test]
+    fn splitting_keeps_the_polyhedron() {
+        let mesh = build(Shape::ellipsoid([1.0, 0.5, 0.2]), 80);
+        let fine = mesh.split();
+        assert_eq!(fine.faces().len(), 4 * mesh.faces().len());
+        assert!(shape::check(&fine).is_ok());
+        let (a, b) = (mesh.mass_properties(), fine.mass_properties());
+        assert!((a.volume - b.volume).abs() < 1e-14 && (a.area - b.area).abs() < 1e-14);
+    }
+
+    #[test]
+    fn coarser_meshes_keep_volume_and_sharp_edges() {
+        for (shape, volume) in [
+            (Shape::sphere(2.0), 0.04),
+            (Shape::ellipsoid([1.0, 0.2, 1.0]), 0.06),
+            (Shape::cuboid([1.0, 0.3, 0.6]), 1e-4),
+        ] {
+            let fine = build(shape, 1280);
+            let mut last = fine.faces().len();
+            for target in [640, 320, 160] {
+                let mesh = fine.coarsened(target).unwrap();
+                let n = mesh.faces().len();
+                assert!(n < last && n <= target + 1, "{n} of {target}");
+                last = n;
+                let (a, b) = (fine.mass_properties(), mesh.mass_properties());
+                let off = (b.volume / a.volume - 1.0).abs();
+                assert!(off < volume, "{} {target}: {off}", fine.name());
+            }
+        }
+        let cube = build(Shape::cuboid([1.0; 3]), 1200);
+        assert!((cube.sharp_edges(1.0) - 12.0).abs() < 1e-12);
+        assert!((cube.coarsened(200).unwrap().sharp_edges(1.0) - 12.0).abs() < 0.02);
+    }
+}

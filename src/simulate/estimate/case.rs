@@ -1,0 +1,252 @@
+//! A simulator at its start, and the same on other meshes.
+
+use crate::Result;
+use crate::adjoint::lie::Pose;
+use crate::boundary::{OneBody, Response};
+use crate::coupling::{Coupling, Report};
+use crate::scene::{Scene, Shape, WallSurface};
+use crate::shape::{Gap, Other};
+use crate::simulate::assemble::{self, Surface};
+use crate::simulate::simulator::world_axes;
+use crate::simulate::wet::{self, Water, Wet};
+use crate::simulate::{Fidelity, Settings, Simulator};
+use nalgebra::DMatrix;
+use std::sync::Arc;
+
+/// A direction that hardly moves water (a round body's spin) counts as this part of the water
+/// displaced.
+const LEAST: f64 = 0.01;
+/// Faces a body on which the coupling that `Isolated` leaves out is computed.
+const COUPLING_FACES: usize = 320;
+
+/// Most that a gap which isn't resolved may weigh.
+const NARROWEST: f64 = 10.0;
+
+/// What the estimate is of.
+pub(super) struct Case<'a> {
+    pub simulator: &'a Simulator,
+    pub fidelity: Fidelity,
+    /// The bodies of the matrix, by their numbers in the scene.
+    bodies: Vec<usize>,
+    poses: Vec<Pose>,
+    turn: DMatrix<f64>,
+    /// Unit density, world axes.
+    matrix: DMatrix<f64>,
+    diagonal: Vec<f64>,
+    /// Of all bodies of the scene.
+    pub surfaces: Vec<Option<Surface>>,
+    /// What compressed bodies are off from their own methods' answers.
+    correction: Option<DMatrix<f64>>,
+    pub report: Report,
+}
+
+fn symmetric(m: &DMatrix<f64>) -> DMatrix<f64> {
+    0.5 * (m + m.transpose())
+}
+
+/// M̄ along world axes.
+fn evaluate(
+    coupling: &dyn Coupling,
+    poses: &[Pose],
+    turn: &DMatrix<f64>,
+) -> Result<(DMatrix<f64>, Report)> {
+    let record = coupling.evaluate(poses, turn, false)?;
+    let m = symmetric(&turn.tr_mul(record.momenta()));
+    Ok((m, record.report().clone()))
+}
+
+impl<'a> Case<'a> {
+    pub fn new(simulator: &'a Simulator) -> Result<Self> {
+        let (bodies, poses) = simulator.in_water();
+        let turn = world_axes(&poses);
+        let system = simulator.system();
+        let (matrix, report) = evaluate(system.coupling.as_ref(), &poses, &turn)?;
+        let diagonal = (0..matrix.nrows())
+            .map(|i| {
+                let volume = system.bodies[bodies[i / 6]].volume;
+                let squared = if i % 6 < 3 {
+                    1.0
+                } else {
+                    volume.cbrt().powi(2)
+                };
+                matrix[(i, i)].max(LEAST * volume * squared)
+            })
+            .collect();
+        let settings = simulator.settings();
+        let scene = simulator.scene.bodies.iter();
+        let mut out = Self {
+            simulator,
+            fidelity: simulator.fidelity(),
+            bodies,
+            poses,
+            turn,
+            matrix,
+            diagonal,
+            surfaces: scene
+                .map(|b| assemble::surface(b, settings, settings.faces))
+                .collect::<Result<_>>()?,
+            correction: None,
+            report,
+        };
+        if matches!(out.fidelity, Fidelity::Reduced | Fidelity::Auto) {
+            out.correction = Some(out.correction(&out.wet(&out.surfaces))?);
+        }
+        Ok(out)
+    }
+
+    pub fn scene(&self) -> &'a Scene {
+        &self.simulator.scene
+    }
+
+    /// The bodies whose answers come from their meshes, by their numbers in the scene.
+    pub fn meshed(&self) -> Vec<usize> {
+        let settings = self.simulator.settings();
+        let wet = self.wet(&self.surfaces);
+        let pairs = self.bodies.iter().zip(&wet);
+        let used = pairs.filter(|(_, w)| w.meshed(settings, self.fidelity));
+        used.map(|(b, _)| *b).collect()
+    }
+
+    /// What no estimate is made of.
+    pub fn unknown(&self) -> Vec<String> {
+        let own = self.simulator.discretisation().iter();
+        let given = own.filter(|d| d.method == "given");
+        let name = |body: &str| format!("the error of the added mass given for body {body:?}");
+        given.map(|d| name(&d.body)).collect()
+    }
+
+    /// max |D_ij| / √(M_ii M_jj); infinite where an entry isn't a number.
+    pub fn size(&self, difference: &DMatrix<f64>) -> f64 {
+        let mut worst = 0.0_f64;
+        for i in 0..difference.nrows() {
+            for j in 0..difference.ncols() {
+                let scale = (self.diagonal[i] * self.diagonal[j]).sqrt();
+                let off = difference[(i, j)].abs();
+                if off.is_nan() {
+                    return f64::INFINITY;
+                }
+                if scale > 0.0 {
+                    worst = worst.max(off / scale);
+                }
+            }
+        }
+        worst
+    }
+
+    /// The bodies in the water with these surfaces.
+    pub fn wet<'b>(&'b self, surfaces: &'b [Option<Surface>]) -> Vec<Wet<'b>> {
+        let tree = &self.simulator.system().tree;
+        let asked = self.simulator.settings().fidelity;
+        assemble::in_water(self.scene(), surfaces, tree, asked).1
+    }
+
+    fn water(&self) -> Water<'_> {
+        let folder = self.simulator.folder.as_deref();
+        assemble::water(self.scene(), &self.bodies, folder)
+    }
+
+    /// By how much the added mass differs with these surfaces.
+    pub fn difference(&self, surfaces: &[Option<Surface>]) -> Result<DMatrix<f64>> {
+        let wet = self.wet(surfaces);
+        if let Some(own) = &self.correction {
+            return Ok(self.correction(&wet)? - own);
+        }
+        let settings = self.simulator.settings();
+        let plan = &self.simulator.assembled.plan;
+        let made = wet::couple(&wet, &self.water(), settings, self.fidelity, plan)?;
+        let (m, _) = evaluate(made.coupling.as_ref(), &self.poses, &self.turn)?;
+        Ok(m - &self.matrix)
+    }
+
+    /// What the compressed bodies' added mass is off if they answer as `bodies` do.
+    fn correction(&self, bodies: &[Wet]) -> Result<DMatrix<f64>> {
+        let settings = self.simulator.settings();
+        let plan = &self.simulator.assembled.plan;
+        let own = self.wet(&self.surfaces);
+        let coupling = wet::compressed_all(&own, &self.water(), settings, plan)?;
+        let made = coupling.reduced_bodies().iter();
+        let gaps: Vec<f64> = made.map(|b| b.parts().fit.resolved_gap).collect();
+        let answers: Vec<Arc<dyn Response>> = wet::answers(bodies, settings, &gaps)?;
+        coupling.correction(&self.poses, &self.turn, &answers)
+    }
+
+    /// What is left at check points.
+    pub fn residual(&self) -> Result<Option<f64>> {
+        if let Some(own) = &self.correction {
+            return Ok(Some(self.size(own) * self.narrowness()));
+        }
+        let coupling = &self.simulator.system().coupling;
+        let found = coupling.residual(&self.poses, &self.turn)?;
+        Ok(found.map(|d| self.size(&d)))
+    }
+
+    /// Where a gap is narrower than its compressed bodies resolve, their charges aren't what the first
+    /// order takes them for: the root of what the gap lacks.
+    fn narrowness(&self) -> f64 {
+        let tree = &self.simulator.system().tree;
+        let poses = tree.kinematics(self.simulator.start().0).poses;
+        let resolved = self.simulator.resolved();
+        let lacks = |gap: Gap| match gap.second {
+            Other::Body(b) => resolved[gap.first].max(resolved[b]) / gap.distance,
+            Other::Wall(_) => resolved[gap.first] / (2.0 * gap.distance),
+        };
+        let clearance = self.simulator.clearance();
+        let gaps = [&clearance.moving, &clearance.rigid].into_iter();
+        let all = gaps.flat_map(|g| g.all(&poses));
+        all.map(lacks).fold(1.0, f64::max).sqrt().min(NARROWEST)
+    }
+
+    /// The coupling that the fidelity `Isolated` leaves out.
+    pub fn missing_coupling(&self, missing: &mut Vec<String>) -> Option<f64> {
+        match self.left_out() {
+            Ok(d) => Some(self.size(&d)),
+            Err(error) => {
+                missing.push(format!("the coupling that isolated leaves out: {error}"));
+                None
+            }
+        }
+    }
+
+    fn left_out(&self) -> Result<DMatrix<f64>> {
+        let (scene, system) = (self.scene(), self.simulator.system());
+        let panel = Settings::default().one_body(OneBody::Panel);
+        let mut surfaces = Vec::with_capacity(scene.bodies.len());
+        for (body, own) in scene.bodies.iter().zip(&self.surfaces) {
+            let few = |s: &Surface| s.mesh.faces().len() <= COUPLING_FACES;
+            let mesh = match (own, &body.shape) {
+                (Some(own), _) if few(own) => Some(own.mesh.clone()),
+                (Some(own), Some(Shape::Mesh { .. })) => Some(own.mesh.coarsened(COUPLING_FACES)?),
+                _ => assemble::surface(body, &panel, Some(COUPLING_FACES))?.map(|s| s.mesh),
+            };
+            surfaces.push(mesh.map(Surface::of_mesh));
+        }
+        let (numbers, wet) = assemble::in_water(scene, &surfaces, &system.tree, Fidelity::Full);
+        let n = 6 * self.bodies.len();
+        if wet.len() <= 1 && scene.walls.is_empty() {
+            return Ok(DMatrix::zeros(n, n));
+        }
+        let all = system.tree.kinematics(self.simulator.start().0).poses;
+        let poses: Vec<Pose> = numbers.iter().map(|b| all[*b]).collect();
+        let turn = world_axes(&poses);
+        let free = scene.walls.iter().any(|w| w.surface == WallSurface::Free);
+        let fidelity = if free {
+            Fidelity::Reduced
+        } else {
+            Fidelity::Full
+        };
+        let water = assemble::water(scene, &numbers, None);
+        let solve = |fidelity: Fidelity| -> Result<DMatrix<f64>> {
+            let made = wet::couple(&wet, &water, &panel, fidelity, &Default::default())?;
+            Ok(evaluate(made.coupling.as_ref(), &poses, &turn)?.0)
+        };
+        let difference = solve(fidelity)? - solve(Fidelity::Isolated)?;
+        let at = |i: usize| {
+            let of = numbers.iter().position(|b| *b == self.bodies[i / 6]);
+            of.map(|b| 6 * b + i % 6)
+        };
+        Ok(DMatrix::from_fn(n, n, |i, j| match (at(i), at(j)) {
+            (Some(i), Some(j)) => difference[(i, j)],
+            _ => 0.0,
+        }))
+    }
+}

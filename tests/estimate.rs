@@ -1,0 +1,478 @@
+//! Error estimates against true errors, where those are known. `cargo test --release --test estimate --
+//! --nocapture` prints the tables of `docs/accuracy-estimate.md`; with `--ignored` those with finer
+//! meshes.
+
+use hydrograd::adjoint::lie::Vec3;
+use hydrograd::boundary::exact::lamb;
+use hydrograd::boundary::{Method, OneBody};
+use hydrograd::scene::{Placement, Shape};
+use hydrograd::{Body, Fidelity, Fluid, Scene, Settings, Simulator};
+use nalgebra::{DMatrix, DVector};
+use serde_json::Value;
+use std::f64::consts::PI;
+use std::path::Path;
+
+// Scenes with known added mass
+
+/// A scene at unit density with its true added mass and its bodies' volumes.
+struct Known {
+    name: String,
+    scene: Scene,
+    truth: DMatrix<f64>,
+    volumes: Vec<f64>,
+}
+
+fn scene(bodies: &[(Shape, Placement)]) -> Scene {
+    let mut scene = Scene::new(Fluid {
+        density: 1.0,
+        ..Fluid::fresh_water()
+    });
+    for (shape, at) in bodies {
+        let mut body = Body::new(shape.clone()).density(1.0);
+        body.placement = *at;
+        scene.add(body);
+    }
+    scene
+}
+
+fn at(position: [f64; 3]) -> Placement {
+    Placement::new(position, [0.0; 3])
+}
+
+fn ball(radius: f64) -> f64 {
+    4.0 / 3.0 * PI * radius.powi(3)
+}
+
+fn data(name: &str) -> Value {
+    let path = Path::new(env!("CARGO_MANIFEST_DIR"))
+        .join("tests/data")
+        .join(name);
+    serde_json::from_str(&std::fs::read_to_string(path).unwrap()).unwrap()
+}
+
+fn list<'a>(value: &'a Value, key: &str) -> &'a [Value] {
+    value[key].as_array().unwrap()
+}
+
+fn number(value: &Value) -> f64 {
+    value.as_f64().unwrap()
+}
+
+/// Lamb's ellipsoids.
+fn ellipsoid(semi_axes: [f64; 3]) -> Known {
+    let [a, b, c] = semi_axes;
+    let m = lamb::added_mass(semi_axes).unwrap();
+    Known {
+        name: format!("ellipsoid {a}:{b}:{c}"),
+        scene: scene(&[(Shape::ellipsoid(semi_axes), at([0.0; 3]))]),
+        truth: DMatrix::from_fn(6, 6, |i, j| m[(i, j)]),
+        volumes: vec![4.0 / 3.0 * PI * a * b * c],
+    }
+}
+
+/// Two spheres along z.
+fn spheres() -> Vec<Known> {
+    let known = |radius: f64, d: f64, along: [[f64; 2]; 2], across: [[f64; 2]; 2]| Known {
+        name: format!("spheres 1 and {radius}, gap {:.2}", d - 1.0 - radius),
+        scene: scene(&[
+            (Shape::sphere(1.0), at([0.0; 3])),
+            (Shape::sphere(radius), at([0.0, 0.0, d])),
+        ]),
+        truth: DMatrix::from_fn(12, 12, |i, j| match (i % 6 == j % 6, i % 6) {
+            (true, 2) => along[i / 6][j / 6],
+            (true, 0 | 1) => across[i / 6][j / 6],
+            _ => 0.0,
+        }),
+        volumes: vec![ball(1.0), ball(radius)],
+    };
+    let file = data("two_spheres.json");
+    let equal = list(&file, "equal").iter().map(|row| {
+        let pair = |key: &str| {
+            let (own, other) = (number(&row[key]["M11"]), number(&row[key]["M12"]));
+            [[own, other], [other, own]]
+        };
+        known(
+            1.0,
+            number(&row["d"]),
+            pair("longitudinal"),
+            pair("transverse"),
+        )
+    });
+    let unequal = list(&file, "unequal").iter().map(|row| {
+        let pair = |key: &str| -> [[f64; 2]; 2] {
+            std::array::from_fn(|i| std::array::from_fn(|j| number(&row[key][i][j])))
+        };
+        known(
+            0.5,
+            number(&row["d"]),
+            pair("longitudinal"),
+            pair("transverse"),
+        )
+    });
+    equal.chain(unequal).collect()
+}
+
+/// A sphere above a wall.
+fn wall() -> Vec<Known> {
+    let known = |row: &Value| {
+        let [across, along] = ["perpendicular", "parallel"].map(|key| number(&row[key]));
+        let height = number(&row["h"]);
+        let mut scene = scene(&[(Shape::sphere(1.0), at([0.0, 0.0, height]))]);
+        scene.add_wall([0.0; 3], [0.0, 0.0, 1.0]);
+        let diagonal = [along, along, across, 0.0, 0.0, 0.0];
+        Known {
+            name: format!("sphere and wall, gap {:.3}", height - 1.0),
+            scene,
+            truth: DMatrix::from_diagonal(&DVector::from_row_slice(&diagonal)),
+            volumes: vec![ball(1.0)],
+        }
+    };
+    list(&data("sphere_wall.json"), "rows")
+        .iter()
+        .map(known)
+        .collect()
+}
+
+/// Bodies with edges.
+fn edged() -> Vec<Known> {
+    let cylinder = |radius, length| Shape::cylinder(radius, length);
+    let scenes = [
+        (
+            scene(&[
+                (Shape::cuboid([1.0, 0.6, 0.4]), at([0.0; 3])),
+                (cylinder(0.25, 0.8), at([0.9, 0.1, 0.1])),
+            ]),
+            vec![0.24, PI * 0.05],
+        ),
+        (
+            scene(&[
+                (Shape::cuboid([1.0, 1.0, 0.15]), at([0.0; 3])),
+                (Shape::sphere(0.4), at([0.1, 0.0, 0.6])),
+            ]),
+            vec![0.15, ball(0.4)],
+        ),
+        {
+            let mut scene = scene(&[
+                (
+                    Shape::capsule(0.2, 0.6),
+                    Placement::new([0.0, 0.0, 0.1], [0.0, 1.2, 0.0]),
+                ),
+                (
+                    Shape::cuboid([0.5; 3]),
+                    Placement::new([0.1, 0.7, -0.1], [0.0, 0.0, 0.3]),
+                ),
+            ]);
+            scene.add_wall([0.0, 0.0, -0.5], [0.0, 0.0, 1.0]);
+            (scene, vec![PI * 0.024 + ball(0.2), 0.125])
+        },
+    ];
+    let file = data("edged_bodies.json");
+    let rows = list(&file, "scenes").iter();
+    rows.zip(scenes)
+        .map(|(row, (scene, volumes))| {
+            let m = list(row, "added_mass");
+            Known {
+                name: row["name"].as_str().unwrap().replace('_', ", "),
+                scene,
+                truth: DMatrix::from_fn(12, 12, |i, j| number(&m[i][j])),
+                volumes,
+            }
+        })
+        .collect()
+}
+
+// Ways to solve them
+
+fn full() -> Settings {
+    Settings::default().fidelity(Fidelity::Full)
+}
+
+fn reduced() -> Settings {
+    Settings::default().fidelity(Fidelity::Reduced)
+}
+
+fn isolated() -> Settings {
+    Settings::default().fidelity(Fidelity::Isolated)
+}
+
+fn name(settings: &Settings) -> String {
+    let mut out = format!("{:?} {}", settings.fidelity, settings.method_name()).to_lowercase();
+    if let Some(faces) = settings.faces {
+        out += &format!(" {faces}");
+    }
+    if let Some(rank) = settings.compress.rank {
+        out += &format!(", rank {rank}");
+    }
+    if let Some(gap) = settings.compress.resolved_gap {
+        out += &format!(", resolved gap {gap}");
+    }
+    let defaults = Settings::default();
+    if settings.compress.tolerance != defaults.compress.tolerance {
+        out += &format!(", accuracy {}", settings.accuracy.0);
+    }
+    if settings.solve.tolerance != defaults.solve.tolerance {
+        out += &format!(", tolerance {}", settings.solve.tolerance);
+    }
+    out
+}
+
+/// The estimates of one family.
+#[derive(Default)]
+struct Table {
+    /// Estimate over truth.
+    ratios: Vec<f64>,
+}
+
+impl Table {
+    fn add(&mut self, known: &Known, settings: &Settings) {
+        let simulator = Simulator::new(&known.scene, *settings).unwrap();
+        let m = simulator.added_mass().unwrap().matrix;
+        let truth = size(&(m - &known.truth), &known.truth, &known.volumes);
+        let found = simulator.error_estimate().unwrap();
+        let what = format!("{}: {}", known.name, name(settings));
+        let total = found.total.unwrap_or_else(|| panic!("{what}: {found:?}"));
+        let ratio = total / truth;
+        println!("{what:<72} {total:.1e} {truth:.1e} {ratio:6.2}");
+        assert!(ratio > 1.0 / 3.0, "{what}: {found:?}, in truth {truth:e}");
+        self.ratios.push(ratio);
+    }
+
+    fn all(&mut self, known: &Known, settings: &[Settings]) {
+        settings.iter().for_each(|s| self.add(known, s));
+    }
+
+    fn finish(mut self, least: usize) {
+        self.ratios.sort_by(f64::total_cmp);
+        let n = self.ratios.len();
+        let (lowest, median, highest) = (self.ratios[0], self.ratios[n / 2], self.ratios[n - 1]);
+        println!(
+            "{n} cases: estimate over truth from {lowest:.2} to {highest:.1}, median {median:.2}"
+        );
+        assert!(n >= least, "{n} cases");
+        assert!(median < 10.0, "{median}");
+    }
+}
+
+const HEADING: &str = "case | estimate | true error | ratio";
+
+/// max |D_ij| / √(M_ii M_jj); a direction that hardly moves water counts as a hundredth of what is displaced.
+fn size(difference: &DMatrix<f64>, m: &DMatrix<f64>, volumes: &[f64]) -> f64 {
+    let diagonal = |i: usize| {
+        let volume = volumes[i / 6];
+        let displaced = if i % 6 < 3 {
+            volume
+        } else {
+            volume.powf(5.0 / 3.0)
+        };
+        m[(i, i)].max(0.01 * displaced)
+    };
+    let n = m.nrows();
+    let pairs = (0..n).flat_map(|i| (0..n).map(move |j| (i, j)));
+    pairs
+        .map(|(i, j)| difference[(i, j)].abs() / (diagonal(i) * diagonal(j)).sqrt())
+        .fold(0.0, f64::max)
+}
+
+const RATIOS: [[f64; 3]; 7] = [
+    [1.0, 1.0, 1.0],
+    [1.0, 0.5, 1.0],
+    [1.0, 0.2, 1.0],
+    [1.0, 0.1, 1.0],
+    [5.0, 1.0, 1.0],
+    [3.0, 2.0, 1.0],
+    [4.0, 2.0, 0.5],
+];
+
+fn methods() -> [Settings; 3] {
+    [
+        isolated().one_body(OneBody::Panel),
+        isolated().method(Method::MfsVertex),
+        isolated().method(Method::MfsFace),
+    ]
+}
+
+#[test]
+fn one_body() {
+    println!("{HEADING}");
+    let mut table = Table::default();
+    for semi_axes in RATIOS {
+        let known = ellipsoid(semi_axes);
+        for settings in methods() {
+            table.all(&known, &[320, 720].map(|n| settings.faces(n)));
+        }
+    }
+    let coin = ellipsoid([1.0, 0.2, 1.0]);
+    table.all(&coin, &methods().map(|s| s.faces(1280)));
+    table.all(&coin, &methods().map(|s| s.faces(80)));
+    table.finish(45);
+}
+
+#[test]
+fn two_spheres() {
+    println!("{HEADING}");
+    let mut table = Table::default();
+    let ranks = [20, 40, 80, 160, 320].map(|r| reduced().rank(r));
+    let accuracies = [3e-2, 1e-2, 1e-3].map(|a| reduced().accuracy(a));
+    for known in spheres() {
+        if known.name.contains("gap 8") || known.name.contains("gap 2.00") {
+            continue;
+        }
+        let coarse = full().faces(320);
+        table.all(
+            &known,
+            &[
+                isolated(),
+                coarse,
+                coarse.method(Method::MfsFace),
+                coarse.one_body(OneBody::Panel),
+                full().faces(720).one_body(OneBody::Panel),
+                reduced().one_body(OneBody::Panel).faces(320),
+                reduced().one_body(OneBody::Mfs).faces(320),
+                Settings::default().fidelity(Fidelity::Auto).accuracy(0.1),
+            ],
+        );
+        table.all(&known, &ranks);
+        table.all(&known, &accuracies);
+    }
+    let near = &spheres()[0];
+    table.all(
+        near,
+        &[full().faces(1280), reduced().resolved_gap(0.5).rank(20)],
+    );
+    table.all(near, &[0.1, 0.01].map(|t| full().faces(720).tolerance(t)));
+    table.finish(90);
+}
+
+#[test]
+fn sphere_and_wall() {
+    println!("{HEADING}");
+    let mut table = Table::default();
+    for known in wall() {
+        let coarse = full().faces(320);
+        table.all(
+            &known,
+            &[
+                isolated(),
+                coarse,
+                coarse.method(Method::MfsFace),
+                coarse.one_body(OneBody::Panel),
+                reduced().one_body(OneBody::Panel).faces(320),
+                reduced().rank(20),
+                reduced().rank(80),
+                reduced().resolved_gap(0.5).rank(20),
+                reduced().accuracy(1e-3),
+            ],
+        );
+    }
+    table.finish(50);
+}
+
+#[test]
+fn bodies_with_edges() {
+    println!("{HEADING}");
+    let mut table = Table::default();
+    for known in edged() {
+        table.all(
+            &known,
+            &[
+                isolated().faces(720),
+                full().faces(320).one_body(OneBody::Panel),
+                full().faces(720).one_body(OneBody::Panel),
+                full().faces(720),
+                full().faces(720).method(Method::MfsFace),
+                reduced().faces(320),
+                reduced().faces(720).accuracy(0.03),
+                reduced().faces(720).one_body(OneBody::Mfs),
+            ],
+        );
+    }
+    table.finish(24);
+}
+
+#[test]
+fn meshes_from_files() {
+    println!("{HEADING}");
+    let folder = tempfile::tempdir().unwrap();
+    let mut table = Table::default();
+    for (faces, settings) in [
+        (160, full().one_body(OneBody::Panel)),
+        (720, full().one_body(OneBody::Panel)),
+        (720, reduced()),
+        (720, full()),
+    ] {
+        let mut known = edged().swap_remove(0);
+        let shape = known.scene.bodies[0].shape.clone().unwrap();
+        let mesh = hydrograd::shape::build(&shape, Path::new(""), Some(faces)).unwrap();
+        let path = folder.path().join(format!("box{faces}.obj"));
+        let point = |v: &Vec3| format!("v {:e} {:e} {:e}\n", v.x, v.y, v.z);
+        let face = |f: &[usize; 3]| format!("f {} {} {}\n", f[0] + 1, f[1] + 1, f[2] + 1);
+        let lines = (mesh.vertices().iter().map(point)).chain(mesh.faces().iter().map(face));
+        std::fs::write(&path, lines.collect::<String>()).unwrap();
+        known.scene.bodies[0].shape = Some(Shape::mesh(path));
+        known.name = format!("box of a file, {faces} faces, cylinder");
+        table.add(&known, &settings.faces(720));
+    }
+    table.finish(4);
+}
+
+/// Slow: `--ignored`.
+#[test]
+#[ignore = "takes minutes"]
+fn finer_meshes() {
+    println!("{HEADING}");
+    let mut table = Table::default();
+    for semi_axes in RATIOS {
+        let known = ellipsoid(semi_axes);
+        for settings in methods() {
+            table.add(&known, &settings.faces(1280));
+        }
+        table.add(&known, &isolated().one_body(OneBody::Panel).faces(5120));
+        table.add(&known, &isolated().method(Method::MfsVertex).faces(5120));
+    }
+    for known in spheres().iter().chain(&wall()).chain(&edged()) {
+        let settings = [
+            full(),
+            full().method(Method::MfsFace),
+            full().one_body(OneBody::Panel),
+            reduced().one_body(OneBody::Panel),
+        ];
+        table.all(known, &settings.map(|s| s.faces(1280)));
+    }
+    table.finish(90);
+}
+
+// What can't be known
+
+#[test]
+fn what_is_missing_is_said() {
+    let mut scene = scene(&[(Shape::sphere(1.0), at([0.0; 3]))]);
+    let exact = Simulator::new(&scene, isolated()).unwrap();
+    let found = exact.error_estimate().unwrap();
+    assert_eq!(found.total, Some(0.0), "{found:?}");
+    let given = (0..6).map(|i| (0..6).map(|j| f64::from(u8::from(i == j))).collect());
+    scene.bodies[0].added_mass = Some(given.collect());
+    let found = Simulator::new(&scene, isolated()).unwrap().error_estimate();
+    let found = found.unwrap();
+    assert_eq!(found.total, None);
+    assert!(
+        found.missing[0].contains("given for body \"body 1\""),
+        "{found:?}"
+    );
+    // Without a shape the coupling can't be had either.
+    scene.bodies[0].shape = None;
+    scene.bodies[0].mass = Some(1.0);
+    scene.bodies[0].density = None;
+    scene.bodies[0].inertia = Some(vec![1.0; 3]);
+    scene.add(
+        Body::new(Shape::sphere(1.0))
+            .density(1.0)
+            .at([3.0, 0.0, 0.0]),
+    );
+    let found = Simulator::new(&scene, isolated()).unwrap().error_estimate();
+    let found = found.unwrap();
+    assert_eq!((found.total, found.coupling), (None, None));
+    assert!(
+        found.missing.iter().any(|m| m.contains("no shape")),
+        "{found:?}"
+    );
+}

@@ -494,8 +494,8 @@ mod tests {
         let sphere = Shape::sphere(1.0);
         let cube = Shape::cuboid([1.0; 3]);
         let all = ["exact", "panel", "mfs-vertex", "mfs-face"];
-        assert_eq!(methods(&[sphere.clone()]), all);
-        assert_eq!(methods(&[cube.clone()]), all[1..]);
+        assert_eq!(methods(std::slice::from_ref(&sphere)), all);
+        assert_eq!(methods(std::slice::from_ref(&cube)), all[1..]);
         assert_eq!(methods(&[sphere, cube])[0], "auto");
     }
 

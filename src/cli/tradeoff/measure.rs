@@ -268,7 +268,7 @@ fn time(
     row.ms_per_gradient_step = Some(1e3 * times.gradient / steps as f64);
     row.timed_steps = Some(steps);
     row.timed_repetitions = Some(repetitions);
-    if !(times.forward > 0.0) {
+    if times.forward.is_nan() || times.forward <= 0.0 {
         return Err(Error::input(
             "timing",
             times.forward,

@@ -223,7 +223,7 @@ pub(super) fn conclude(rows: &mut [Row], reference: &Reference) {
 fn number(x: Option<f64>) -> String {
     match x {
         None => "-".into(),
-        Some(x) if x == 0.0 => "0".into(),
+        Some(0.0) => "0".into(),
         Some(x) if (1e-3..1e5).contains(&x) => {
             let digits = (2 - x.log10().floor() as i32).max(0) as usize;
             format!("{x:.digits$}")

@@ -129,6 +129,7 @@ impl Reference {
         if let Some(probes) = probes {
             out.set_motion(scene, probes)?;
         }
+        out.said.finish();
         out.said.seconds = begin.elapsed().as_secs_f64();
         Ok(out)
     }

@@ -40,6 +40,8 @@ pub(super) struct Quantity {
 const ROUNDING: f64 = 1e-10;
 /// A reference that is less sure than this is none.
 const UNSURE: f64 = 0.1;
+/// A multiple of its error by which a reference may differ from another.
+const APART: f64 = 3.0;
 
 impl Reference {
     /// Estimates no better than rounding, and a word about those that are bad.
@@ -55,11 +57,16 @@ impl Reference {
             unsure |= quantity.error_estimate.is_some_and(|e| e > UNSURE);
         }
         if unsure {
-            self.notes.push(
-                "the reference itself is uncertain: give a larger budget, or more faces \
-                 (--reference-faces)"
-                    .into(),
-            );
+            let note = "the reference itself is uncertain: give a larger budget, or more faces \
+                        (--reference-faces)";
+            self.notes.push(note.into());
+        }
+        let estimate = self.added_mass.error_estimate.unwrap_or(0.0);
+        if let Some(by) = self.moving_differs_by.filter(|by| *by > APART * estimate) {
+            self.notes.push(format!(
+                "the two references for M_f differ by {by:.1e}, more than the first's own error: trust \
+                 errors of M_f, and those of accelerations and end states, to about that"
+            ));
         }
     }
 }

@@ -22,18 +22,6 @@ const SHAPES: [&str; 10] = [
     "capsule:0.3,1.2",
 ];
 
-/// A gripper's finger, a cube, a plate, a triangle given clockwise, a hexagon, and profiles with an edge
-/// far shorter than the others.
-const PRISMS: [&str; 7] = [
-    "prism:0.8,0,0.06,1.2,0,1.6,0,1.6,0.32,0,0.48",
-    "prism:1,-0.5,-0.5,0.5,-0.5,0.5,0.5,-0.5,0.5",
-    "prism:0.1,-0.5,-0.5,0.5,-0.5,0.5,0.5,-0.5,0.5",
-    "prism:1,0,0,0,1,1,0",
-    "prism:0.3,1,0,0.5,0.8,-0.5,0.8,-1,0,-0.5,-0.8,0.5,-0.8",
-    "prism:2,0,0,1.6,0,1.6,0.06,0,0.5",
-    "prism:0.8,0,0,0.06,0,0.3,1.5,0,1.6",
-];
-
 fn mesh(text: &str, faces: usize) -> TriMesh {
     build(&parse_shape(text).unwrap(), Path::new("."), Some(faces)).unwrap()
 }
@@ -81,7 +69,7 @@ fn exact(shape: &Shape) -> (f64, Vec3) {
             let along = side * r * r / 2.0 + ends * 0.4 * r * r;
             (side + ends, Vec3::new(across, across, along))
         }
-        Shape::Prism { .. } | Shape::Mesh { .. } => unreachable!("not about the origin"),
+        Shape::Prism { .. } | Shape::Mesh { .. } => unreachable!("not of this list"),
     }
 }
 
@@ -125,48 +113,9 @@ fn meshes_tend_to_the_formula() {
     let text = MassProperties::by_formula(&flat).unwrap_err().to_string();
     assert!(text.contains("size[1]: got 0"), "{text}");
 }
-
-/// Volume, centroid and inertia about it (per unit density) of a prism, by Green's theorem.
-fn exact_prism(shape: &Shape) -> (f64, Vec3, nalgebra::Matrix3<f64>) {
-    let Shape::Prism {
-        profile, length, ..
-    } = shape
-    else {
-        unreachable!("a prism is expected");
-    };
-    let n = profile.len();
-    // ∫ of 1, y, z, y², z², yz.
-    let mut moments = [0.0; 6];
-    for k in 0..n {
-        let ([a, b], [c, d]) = (profile[k], profile[(k + 1) % n]);
-        let w = a * d - c * b;
-        let each = [
-            1.0 / 2.0,
-            (a + c) / 6.0,
-            (b + d) / 6.0,
-            (a * a + a * c + c * c) / 12.0,
-            (b * b + b * d + d * d) / 12.0,
-            (a * d + 2.0 * a * b + 2.0 * c * d + c * b) / 24.0,
-        ];
-        moments.iter_mut().zip(each).for_each(|(m, x)| *m += w * x);
-    }
-    let sign = moments[0].signum();
-    let [area, y, z, yy, zz, yz] = moments.map(|m| m * sign);
-    let (y, z) = (y / area, z / area);
-    let (yy, zz, yz) = (yy - area * y * y, zz - area * z * z, yz - area * y * z);
-    let xx = area * length * length / 12.0;
-    #[rustfmt::skip]
-    let inertia = nalgebra::Matrix3::new(
-        yy + zz, 0.0,     0.0,
-        0.0,     xx + zz, -yz,
-        0.0,     -yz,     xx + yy,
-    ) * *length;
-    (area * length, Vec3::new(0.0, y, z), inertia)
-}
-
 #[test]
 fn primitives_are_closed_and_outward_at_any_resolution() {
-    for text in SHAPES.into_iter().chain(PRISMS) {
+    for text in SHAPES {
         for target in [1, 4, 13, 20, 100, 321, 1280, 5000, 60_000] {
             let mesh = mesh(text, target);
             let report = check(&mesh);
@@ -221,93 +170,6 @@ fn face_counts_are_near_the_target_and_faces_near_equilateral() {
 }
 
 #[test]
-fn prisms_have_even_faces_and_nearly_as_many_as_asked() {
-    for text in PRISMS {
-        let mut target = 100.0;
-        let (mut worst, mut off) = (0.0_f64, 0.0_f64);
-        let mut uneven = [1.0_f64, 1.0];
-        while target < 10_000.0 {
-            let mesh = mesh(text, target as usize);
-            let (aspect, count) = (check(&mesh).worst_aspect, mesh.faces().len() as f64);
-            // A plate a tenth as thick has cells across it that few faces can't make even.
-            let allowed = if target < 300.0 { 5.0 } else { 2.5 };
-            assert!(aspect < allowed, "{text} {target}: {aspect}");
-            let miss = (count / target - 1.0).abs();
-            assert!(
-                miss < if target < 700.0 { 0.1 } else { 0.03 },
-                "{text} {target}: {count}"
-            );
-            // As even as a box, whose smallest and largest faces of 1000 are 0.5 and 1.8 of the mean.
-            if target > 700.0 {
-                let areas = (0..mesh.faces().len()).map(|f| mesh.area(f));
-                let (least, most) =
-                    areas.fold((f64::INFINITY, 0.0_f64), |(a, b), x| (a.min(x), b.max(x)));
-                let mean = mesh.mass_properties().area / count;
-                uneven = [uneven[0].min(least / mean), uneven[1].max(most / mean)];
-            }
-            (worst, off) = (worst.max(aspect), off.max(miss));
-            target *= 1.13;
-        }
-        println!(
-            "{text}: aspect up to {worst:.2}, {:.1} % off the target, areas {uneven:.2?} of the mean",
-            100.0 * off
-        );
-        assert!(uneven[0] > 0.25 && uneven[1] < 3.0, "{text}: {uneven:?}");
-    }
-}
-
-#[test]
-fn prisms_are_exact_and_the_order_of_their_corners_does_not_matter() {
-    for text in PRISMS {
-        let shape = parse_shape(text).unwrap();
-        let (volume, centroid, inertia) = exact_prism(&shape);
-        for faces in [1, 100, 1280, 10_000] {
-            let body = mesh(text, faces);
-            let mass = body.mass_properties();
-            assert!((mass.volume / volume - 1.0).abs() < 1e-13, "{text} {faces}");
-            assert!((mass.centroid - centroid).norm() < 1e-13, "{text} {faces}");
-            let error = (mass.inertia - inertia).amax();
-            assert!(error < 1e-13 * inertia.trace(), "{text} {faces}: {error}");
-            let Shape::Prism {
-                profile, length, ..
-            } = &shape
-            else {
-                unreachable!();
-            };
-            let mut back = profile.clone();
-            back.reverse();
-            let reversed = build(&Shape::prism(back, *length), Path::new("."), Some(faces));
-            assert_eq!(reversed.unwrap().mass_properties().volume.signum(), 1.0);
-        }
-    }
-    // A profile's place doesn't matter, nor does the unit: bit for bit for powers of two.
-    let finger = mesh(PRISMS[0], 900);
-    for unit in [2f64.powi(-40), 2f64.powi(60)] {
-        let Shape::Prism {
-            profile, length, ..
-        } = parse_shape(PRISMS[0]).unwrap()
-        else {
-            unreachable!();
-        };
-        let profile: Vec<_> = profile.iter().map(|p| p.map(|x| x * unit)).collect();
-        let scaled = build(
-            &Shape::prism(profile, length * unit),
-            Path::new("."),
-            Some(900),
-        )
-        .unwrap();
-        assert_eq!(scaled.faces(), finger.faces());
-        assert!(
-            scaled
-                .vertices()
-                .iter()
-                .zip(finger.vertices())
-                .all(|(a, b)| *a == b * unit)
-        );
-    }
-}
-
-#[test]
 fn vertices_lie_on_the_exact_surface() {
     for n in [20, 180, 1280] {
         for v in mesh("ellipsoid:3,2,0.5", n).vertices() {
@@ -326,20 +188,6 @@ fn vertices_lie_on_the_exact_surface() {
     for v in mesh("box:1,0.5,0.1", 1280).vertices() {
         let level = v.component_div(&Vec3::new(0.5, 0.25, 0.05)).amax();
         assert!((level - 1.0).abs() < 1e-15);
-    }
-    for v in mesh(PRISMS[0], 1280).vertices() {
-        // Depth inside each plane of the finger; on the surface the least is zero.
-        let (x, y, z) = (v.x, v.y, v.z);
-        let planes = [
-            0.4 - x.abs(),
-            y,
-            1.6 - y,
-            z,
-            z - 0.06 + 0.05 * y,
-            0.48 - 0.1 * y - z,
-        ];
-        let least = planes.into_iter().fold(f64::INFINITY, f64::min);
-        assert!(least.abs() < 1e-15, "{v:?}: {least}");
     }
 }
 
@@ -401,13 +249,11 @@ fn volume_and_inertia_converge_with_order_two() {
 
 #[test]
 fn primitives_are_their_own_mirror_images() {
-    for text in SHAPES.into_iter().chain(PRISMS) {
-        let is_prism = text.starts_with("prism");
+    for text in SHAPES {
         for target in [1, 100, 330, 1280] {
             let mesh = mesh(text, target);
             let size = mesh.diameter();
-            // Prisms along x alone: their profile may have any shape.
-            for axis in 0..if is_prism { 1 } else { 3 } {
+            for axis in 0..3 {
                 let image: Vec<usize> = mesh
                     .vertices()
                     .iter()
@@ -434,10 +280,6 @@ fn primitives_are_their_own_mirror_images() {
                 }
             }
             let mass = mesh.mass_properties();
-            assert!(mass.centroid.x.abs() < 1e-15 * size);
-            if is_prism {
-                continue;
-            }
             assert!(mass.centroid.norm() < 1e-15 * size);
             let products =
                 mass.inertia - nalgebra::Matrix3::from_diagonal(&mass.inertia.diagonal());
@@ -736,7 +578,7 @@ fn warnings_do_not_refuse() {
 #[test]
 fn verdicts_do_not_depend_on_the_unit_of_length() {
     for scale in [1e-6, 1e-3, 1.0, 1e3, 1e6] {
-        for text in SHAPES.into_iter().chain(PRISMS) {
+        for text in SHAPES {
             let mesh = mesh(text, 320);
             let scaled = mesh.scaled(scale).unwrap();
             let (one, other) = (check(&mesh), check(&scaled));
@@ -780,7 +622,7 @@ fn reports_are_written_for_people_and_for_programs() {
 
 #[test]
 fn short_forms_come_back() {
-    for text in SHAPES.into_iter().chain(PRISMS) {
+    for text in SHAPES {
         let shape = parse_shape(text).unwrap();
         assert_eq!(parse_shape(&shape_name(&shape)).unwrap(), shape);
     }
@@ -806,42 +648,6 @@ fn bad_parameters_name_field_value_and_remedy() {
         ("cylinder:1,-2", ["length", "-2", "positive"]),
         ("capsule:1,0", ["length", "0", "sphere"]),
         ("capsule:-1,1", ["radius", "-1", "positive"]),
-        ("prism:1,0,0,1,0", ["prism:1,0,0,1,0", "Y1,Z1", "7 or more"]),
-        ("prism:1,0,0,1,0,1,1,0", ["prism:", "LENGTH", "odd"]),
-        ("prism:-1,0,0,1,0,0,1", ["length", "-1", "positive"]),
-        ("prism:1,0,0,nan,0,0,1", ["profile[1]", "NaN", "finite"]),
-        (
-            "prism:1,0,0,1,0,1,0,0,1",
-            ["profile[2]", "[1.0, 0.0]", "same as profile[1]"],
-        ),
-        (
-            "prism:1,0,0,1,0,0,1,0,0",
-            ["profile[0]", "[0.0, 0.0]", "same as profile[3]"],
-        ),
-        (
-            "prism:1,0,0,1,0,2,0,1,1",
-            ["profile[1]", "[1.0, 0.0]", "line between"],
-        ),
-        (
-            "prism:1,0,0,2,0,1,0,0,1",
-            ["profile[1]", "[2.0, 0.0]", "turns back"],
-        ),
-        (
-            "prism:1,0,0,1,0,1,1,0.5,0.2,0,1",
-            ["profile[3]", "[0.5, 0.2]", "inwards"],
-        ),
-        (
-            "prism:1,0,0,0,1,0.5,0.2,1,1,1,0",
-            ["profile[2]", "[0.5, 0.2]", "convex"],
-        ),
-        (
-            "prism:1,0,0,1,1,1,0,0,1",
-            ["profile[", "crosses itself", "convex"],
-        ),
-        (
-            "prism:1,1,0,-0.81,0.59,0.31,-0.95,0.31,0.95,-0.81,-0.59",
-            ["profile[2]", "more than once", "in their order"],
-        ),
         ("sphere:", ["sphere:", "RADIUS", "1 number"]),
         ("sphere", ["sphere", "RADIUS", "1 number"]),
         ("box:1,2", ["box:1,2", "box:A,B,C", "3 number"]),

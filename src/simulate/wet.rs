@@ -451,7 +451,7 @@ fn compression_warnings(
             .unwrap_or(&settings.compress)
             .resolved_gap;
         let got = parts.fit.resolved_gap;
-        if let Some(asked) = asked.filter(|a| *a < (1.0 - 1e-6) * got) {
+        if let Some(asked) = asked.filter(|a| *a < 0.98 * got) {
             out.push(format!(
                 "body {:?}: gaps under {got:.3e} m aren't resolved by its compressed sources, for all \
                  that {asked:.3e} m were asked for: its surface is too large; use a plane wall for a \

@@ -20,6 +20,10 @@ const FLUX: f64 = 4.0 * PI;
 /// meaning: at one digit lost the gap is far below what was fitted.
 const ILL_CONDITIONED: f64 = 1e4;
 
+/// Part of the water displaced that an energy may be below zero by: twists that move no water (a disc's
+/// spin) carry what the one-body method leaves of them.
+const ROUNDING: f64 = 1e-7;
+
 /// Record of [`Reduced`].
 pub(super) struct ReducedRecord<'a> {
     pub reduced: &'a Reduced,
@@ -419,7 +423,7 @@ fn check_energy(reduced: &Reduced, basis: &DMatrix<f64>, momenta: &DMatrix<f64>)
         .collect();
     for i in 0..k {
         if own[i] > 0.0 {
-            energy[(i, i)] += 1e-9 * own[i];
+            energy[(i, i)] += ROUNDING * own[i];
         } else {
             energy[(i, i)] = 1.0;
         }

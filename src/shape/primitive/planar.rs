@@ -220,9 +220,9 @@ impl Planar {
         for (t, f) in self.triangles.iter().enumerate() {
             f.iter().for_each(|&v| around[v].push(t));
         }
-        for v in self.boundary..self.points.len() {
+        for (v, around) in around.iter().enumerate().skip(self.boundary) {
             let (mut sum, mut weight) = (Point::zeros(), 0.0);
-            for &t in &around[v] {
+            for &t in around {
                 let [a, b, c] = self.corners(t);
                 let center = (a + b + c) / 3.0;
                 let w = cross(&a, &b, &c) / size(&center).powi(2);
@@ -231,7 +231,7 @@ impl Planar {
             }
             let old = std::mem::replace(&mut self.points[v], sum / weight);
             // The star of a point isn't always convex.
-            let good = around[v].iter().all(|&t| {
+            let good = around.iter().all(|&t| {
                 let [a, b, c] = self.corners(t);
                 let longest = (b - a).norm_squared().max((c - b).norm_squared());
                 cross(&a, &b, &c) > 0.1 * longest.max((a - c).norm_squared())

@@ -375,7 +375,7 @@ impl fmt::Display for Report {
             writeln!(
                 f,
                 "  end state     after {} s; {end_state}",
-                reference.horizon_seconds
+                short(reference.horizon_seconds)
             )?;
         }
         if let Some(difference) = reference.moving_differs_by {
@@ -412,11 +412,12 @@ impl fmt::Display for Report {
         }
         writeln!(
             f,
-            "\n* no other row with the same integrator and time step is as fast a step and as near in M_f"
+            "\n* Pareto front: no other row with this integrator and time step is as fast a step and as near in M_f"
         )?;
         write!(
             f,
-            "+ no other row simulates a second as fast and ends as near; gradients include their forward pass"
+            "+ Pareto front: no other row simulates a second as fast and ends as near; gradients include their \
+             forward pass"
         )?;
         if !self.left_out.is_empty() {
             write!(f, "\nleft out for the budget of {} s:", self.budget)?;

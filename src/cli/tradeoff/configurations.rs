@@ -3,6 +3,7 @@
 use clap::Args;
 use serde::Serialize;
 
+use super::report::short;
 use crate::boundary::OneBody;
 use crate::cli::options::{self, Method, name, positive, tolerance};
 use crate::coupling::{full, reduced::compress};
@@ -154,7 +155,7 @@ impl Configuration {
         if let Some(tolerance) = self.tolerance() {
             out += &format!(", tolerance {tolerance:.0e}");
         }
-        out + &format!(", {}, {} s", name(s.integrator), self.time_step())
+        out + &format!(", {}, {} s", name(s.integrator), short(self.time_step()))
     }
 }
 

@@ -42,3 +42,30 @@ impl Motion {
         }
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn rates_are_the_derivatives() {
+        let sine = Motion::Sine {
+            offset: 0.3,
+            amplitude: 1.7,
+            frequency: 2.1,
+            phase: 0.4,
+        };
+        let linear = Motion::Linear {
+            offset: -0.2,
+            rate: 0.9,
+        };
+        let h = 1e-5;
+        for motion in [sine, linear] {
+            for t in [0.0, 0.8, 3.1] {
+                let slope = |f: &dyn Fn(f64) -> f64| (f(t + h) - f(t - h)) / (2.0 * h);
+                assert!((slope(&|t| motion.value(t)) - motion.rate(t)).abs() < 1e-8);
+                assert!((slope(&|t| motion.rate(t)) - motion.acceleration(t)).abs() < 1e-8);
+            }
+        }
+    }
+}

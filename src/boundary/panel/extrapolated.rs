@@ -29,11 +29,14 @@ impl Extrapolated {
         })
     }
 
-    fn extrapolate(&self, fine: Mat<f64>, coarse: Mat<f64>) -> Mat<f64> {
+    fn extrapolate(&self, mut fine: Mat<f64>, coarse: &Mat<f64>) -> Mat<f64> {
         let factor = 1.0 / (self.found.ratio.powf(self.found.order) - 1.0);
-        Mat::from_fn(fine.nrows(), fine.ncols(), |i, j| {
-            fine[(i, j)] + factor * (fine[(i, j)] - coarse[(i, j)])
-        })
+        for j in 0..fine.ncols() {
+            for i in 0..fine.nrows() {
+                fine[(i, j)] += factor * (fine[(i, j)] - coarse[(i, j)]);
+            }
+        }
+        fine
     }
 }
 
@@ -60,12 +63,12 @@ impl Response for Extrapolated {
 
     fn radiated(&self, points: &[Vec3]) -> Result<Mat<f64>> {
         let fine = self.fine.radiated(points)?;
-        Ok(self.extrapolate(fine, self.coarse.radiated(points)?))
+        Ok(self.extrapolate(fine, &self.coarse.radiated(points)?))
     }
 
     fn scattered(&self, sources: &[Vec3], points: &[Vec3]) -> Result<Mat<f64>> {
         let fine = self.fine.scattered(sources, points)?;
-        Ok(self.extrapolate(fine, self.coarse.scattered(sources, points)?))
+        Ok(self.extrapolate(fine, &self.coarse.scattered(sources, points)?))
     }
 
     fn asymmetry(&self) -> f64 {

@@ -3,6 +3,7 @@
 use clap::Args;
 use serde::Serialize;
 
+use super::report::short;
 use crate::boundary::OneBody;
 use crate::cli::options::{self, Method, name, positive, tolerance};
 use crate::coupling::{full, reduced::compress};
@@ -154,7 +155,7 @@ impl Configuration {
         if let Some(tolerance) = self.tolerance() {
             out += &format!(", tolerance {tolerance:.0e}");
         }
-        out + &format!(", {}, {} s", name(s.integrator), self.time_step())
+        out + &format!(", {}, {} s", name(s.integrator), short(self.time_step()))
     }
 }
 
@@ -494,8 +495,8 @@ mod tests {
         let sphere = Shape::sphere(1.0);
         let cube = Shape::cuboid([1.0; 3]);
         let all = ["exact", "panel", "mfs-vertex", "mfs-face"];
-        assert_eq!(methods(&[sphere.clone()]), all);
-        assert_eq!(methods(&[cube.clone()]), all[1..]);
+        assert_eq!(methods(std::slice::from_ref(&sphere)), all);
+        assert_eq!(methods(std::slice::from_ref(&cube)), all[1..]);
         assert_eq!(methods(&[sphere, cube])[0], "auto");
     }
 

@@ -178,9 +178,13 @@ fn fill(
     allowance: f64,
 ) -> Result<()> {
     let begin = Instant::now();
-    let left = || allowance - begin.elapsed().as_secs_f64();
     let simulator = Simulator::new(scene, configuration.settings)?;
-    row.setup_seconds = Some(begin.elapsed().as_secs_f64());
+    let setup = begin.elapsed().as_secs_f64();
+    row.setup_seconds = Some(setup);
+    // Whoever waits for the setting up can wait as long for the steps.
+    let begin = Instant::now();
+    let allowance = (allowance - setup).max(setup);
+    let left = || allowance - begin.elapsed().as_secs_f64();
     describe(row, &simulator);
     row.added_mass_rel_error = reference.added_mass_error(&Start::values(&simulator)?);
     let start = Start::with_forces(&simulator)?;
@@ -268,7 +272,7 @@ fn time(
     row.ms_per_gradient_step = Some(1e3 * times.gradient / steps as f64);
     row.timed_steps = Some(steps);
     row.timed_repetitions = Some(repetitions);
-    if !(times.forward > 0.0) {
+    if times.forward.is_nan() || times.forward <= 0.0 {
         return Err(Error::input(
             "timing",
             times.forward,

@@ -162,8 +162,8 @@ fn horizon(scene: &Scene, asked: Option<usize>) -> usize {
     }
 }
 
-/// The order in which configurations are measured: first what all else is varied around, then from
-/// cheap to dear.
+/// The order in which configurations are measured, so that what the budget has no time for matters
+/// least: first what all else is varied around, then some of everything, and the dear ones last.
 fn order(configurations: &[Configuration]) -> Vec<usize> {
     let mut out: Vec<usize> = (0..configurations.len()).collect();
     out.sort_by_key(|i| {
@@ -171,7 +171,15 @@ fn order(configurations: &[Configuration]) -> Vec<usize> {
         let dear = c.settings.fidelity == Fidelity::Full;
         // Faces left to the scene are usually the most.
         let faces = c.settings.faces.unwrap_or(usize::MAX);
-        (c.family != Family::Base, if dear { faces } else { 0 })
+        let like =
+            |d: &&Configuration| (d.family, d.settings.fidelity) == (c.family, c.settings.fidelity);
+        let place = configurations[..*i].iter().filter(like).count();
+        (
+            c.family != Family::Base,
+            dear,
+            if dear { faces } else { 0 },
+            place,
+        )
     });
     out
 }

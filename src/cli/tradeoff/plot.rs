@@ -7,7 +7,7 @@ use plotters::coord::Shift;
 use plotters::prelude::*;
 
 use super::refuse;
-use super::report::{Reference, Report, Row};
+use super::report::{Reference, Report, Row, short};
 use crate::{Error, Result};
 
 const WIDTH: u32 = 860;
@@ -98,8 +98,9 @@ fn charts<'a>(report: &'a Report) -> Vec<Chart<'a>> {
     if let Some(end_state) = &reference.end_state {
         out.push(Chart {
             title: format!(
-                "{}: where it is after {} s",
-                report.scene, reference.horizon_seconds
+                "{}: where the bodies are after {} s",
+                report.scene,
+                short(reference.horizon_seconds)
             ),
             x: "time per simulated second, ms",
             y: "relative error of the end state",
@@ -185,7 +186,7 @@ impl Chart<'_> {
         front.sort_by(|a, b| a.0.total_cmp(&b.0).then(b.1.total_cmp(&a.1)));
         if !front.is_empty() {
             chart.draw_series(LineSeries::new(front, FRONT))?;
-            entries.push((Sign::Line, "nothing faster is nearer".to_string()));
+            entries.push((Sign::Line, "Pareto front".to_string()));
         }
         for (fidelity, method) in self.families() {
             let look = Look::new(fidelity, method);

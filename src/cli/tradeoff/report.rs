@@ -36,6 +36,41 @@ pub(super) struct Quantity {
     pub error_estimate: Option<f64>,
 }
 
+/// Differences below this are rounding: no error is known better.
+const ROUNDING: f64 = 1e-10;
+/// A reference that is less sure than this is none.
+const UNSURE: f64 = 0.1;
+/// A multiple of its error by which a reference may differ from another.
+const APART: f64 = 3.0;
+
+impl Reference {
+    /// Estimates no better than rounding, and a word about those that are bad.
+    pub fn finish(&mut self) {
+        let parts = [
+            Some(&mut self.added_mass),
+            self.acceleration.as_mut(),
+            self.end_state.as_mut(),
+        ];
+        let mut unsure = false;
+        for quantity in parts.into_iter().flatten() {
+            quantity.error_estimate = quantity.error_estimate.map(|e| e.max(ROUNDING));
+            unsure |= quantity.error_estimate.is_some_and(|e| e > UNSURE);
+        }
+        if unsure {
+            let note = "the reference itself is uncertain: give a larger budget, or more faces \
+                        (--reference-faces)";
+            self.notes.push(note.into());
+        }
+        let estimate = self.added_mass.error_estimate.unwrap_or(0.0);
+        if let Some(by) = self.moving_differs_by.filter(|by| *by > APART * estimate) {
+            self.notes.push(format!(
+                "the two references for M_f differ by {by:.1e}, more than the first's own error: trust \
+                 errors of M_f, and those of accelerations and end states, to about that"
+            ));
+        }
+    }
+}
+
 /// One configuration. Errors are relative; null where there is no number.
 #[derive(Clone, Debug, Serialize)]
 pub(super) struct Row {
@@ -223,12 +258,21 @@ pub(super) fn conclude(rows: &mut [Row], reference: &Reference) {
 fn number(x: Option<f64>) -> String {
     match x {
         None => "-".into(),
-        Some(x) if x == 0.0 => "0".into(),
+        Some(0.0) => "0".into(),
         Some(x) if (1e-3..1e5).contains(&x) => {
             let digits = (2 - x.log10().floor() as i32).max(0) as usize;
             format!("{x:.digits$}")
         }
         Some(x) => format!("{x:.2e}"),
+    }
+}
+
+/// The same without zeros at its end.
+pub(super) fn short(x: f64) -> String {
+    let digits = number(Some(x));
+    match digits.contains('.') && !digits.contains('e') {
+        true => digits.trim_end_matches('0').trim_end_matches('.').into(),
+        false => digits,
     }
 }
 
@@ -262,7 +306,7 @@ impl Row {
             count(self.points),
             self.knob(),
             self.integrator.clone(),
-            format!("{}", self.time_step),
+            short(self.time_step),
             number(self.ms_per_step),
             number(self.ms_per_gradient_step),
             error(
@@ -284,6 +328,9 @@ impl Row {
         ]
     }
 }
+
+/// Configurations left out that people are told by name.
+const LISTED: usize = 12;
 
 const HEAD: [&str; 15] = [
     "",
@@ -328,7 +375,7 @@ impl fmt::Display for Report {
             writeln!(
                 f,
                 "  end state     after {} s; {end_state}",
-                reference.horizon_seconds
+                short(reference.horizon_seconds)
             )?;
         }
         if let Some(difference) = reference.moving_differs_by {
@@ -365,16 +412,21 @@ impl fmt::Display for Report {
         }
         writeln!(
             f,
-            "\n* no other row with the same integrator and time step is as fast a step and as near in M_f"
+            "\n* Pareto front: no other row with this integrator and time step is as fast a step and as near in M_f"
         )?;
         write!(
             f,
-            "+ no other row simulates a second as fast and ends as near; gradients include their forward pass"
+            "+ Pareto front: no other row simulates a second as fast and ends as near; gradients include their \
+             forward pass"
         )?;
         if !self.left_out.is_empty() {
             write!(f, "\nleft out for the budget of {} s:", self.budget)?;
-            for label in &self.left_out {
-                write!(f, "\n  {label}")?;
+            let listed = self.left_out.iter().take(LISTED);
+            listed
+                .into_iter()
+                .try_for_each(|label| write!(f, "\n  {label}"))?;
+            if let Some(more @ 1..) = self.left_out.len().checked_sub(LISTED) {
+                write!(f, "\n  and {more} more (all with --json)")?;
             }
         }
         for file in &self.files {
@@ -459,6 +511,14 @@ mod tests {
             (Some(1e-7), "1.00e-7"),
         ] {
             assert_eq!(number(x), text);
+        }
+        for (x, text) in [
+            (0.01, "0.01"),
+            (6.2831853e-3, "0.00628"),
+            (1e-4, "1.00e-4"),
+            (20.0, "20"),
+        ] {
+            assert_eq!(short(x), text);
         }
         let reference = reference(Some(1e-4));
         let of = |x, below| error(Some(x), below, Some(&reference.added_mass));

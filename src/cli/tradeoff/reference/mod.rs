@@ -129,6 +129,7 @@ impl Reference {
         if let Some(probes) = probes {
             out.set_motion(scene, probes)?;
         }
+        out.said.finish();
         out.said.seconds = begin.elapsed().as_secs_f64();
         Ok(out)
     }
@@ -182,7 +183,8 @@ impl Reference {
             self.said.end_state = Some(report::Quantity {
                 what: format!(
                     "{}; rk4 with steps of {} s",
-                    probes.said, best.path.time_step
+                    probes.said,
+                    report::short(best.path.time_step)
                 ),
                 error_estimate: probes
                     .estimate(|a, b| end_error(&a.path, &b.path, &weights, &excursion)),

@@ -78,34 +78,41 @@ impl Probes {
         tick: &mut dyn FnMut(),
     ) -> Result<Self> {
         let until = Instant::now() + time;
-        let ways = [
-            Way::Reduced(OneBody::Auto),
-            Way::Reduced(OneBody::Panel),
-            Way::Full,
-        ];
-        let mut failed = Vec::new();
-        for way in ways {
-            match Self::by(scene, way, limits, until, tick) {
-                Ok(mut found) => {
-                    if let Some(error) = failed.first() {
-                        found.said +=
-                            &format!(" (compressed bodies by the usual method fail: {error})");
-                    }
-                    return Ok(found);
+        let mut why = None;
+        for method in [OneBody::Auto, OneBody::Panel] {
+            match Self::by(scene, Way::Reduced(method), limits, until, tick) {
+                Ok(Some(found)) => return Ok(found.because(why)),
+                Ok(None) => {
+                    why = Some("gaps are too small to compress the bodies".to_string());
+                    break;
                 }
-                Err(error) => failed.push(error),
+                Err(error) => {
+                    why.get_or_insert(format!("compressed bodies fail: {error}"));
+                }
             }
         }
-        Err(failed.swap_remove(0))
+        match Self::by(scene, Way::Full, limits, until, tick)? {
+            Some(found) => Ok(found.because(why)),
+            None => Err(Error::input("reference: levels", 0, "at least one")),
+        }
     }
 
+    fn because(mut self, why: Option<String>) -> Self {
+        if let Some(why) = why {
+            self.said += &format!(" ({why})");
+        }
+        self
+    }
+
+    /// In one way; none if gaps are too small for it.
     fn by(
         scene: &Scene,
         way: Way,
         limits: &Limits,
         until: Instant,
         tick: &mut dyn FnMut(),
-    ) -> Result<Self> {
+    ) -> Result<Option<Self>> {
+        let left = until.saturating_duration_since(Instant::now());
         let mut run = |level: Level| {
             let out = Probe::new(scene, &level, limits.steps)?;
             tick();
@@ -115,42 +122,37 @@ impl Probes {
             Way::Reduced(_) => LEVELS.as_slice(),
             Way::Full => FULL_LEVELS.as_slice(),
         };
-        let left = until.saturating_duration_since(Instant::now());
-        let first = Level {
+        let level = |(accuracy, parts): (f64, usize), gap| Level {
             way,
-            accuracy: levels[0].0,
-            parts: levels[0].1,
+            accuracy,
+            parts,
             faces: FACES[0],
-            gap: None,
-        };
-        let rough = run(first)?;
-        let gap = rough.needed_gap();
-        let levels = levels.iter().map(|(accuracy, parts)| Level {
-            accuracy: *accuracy,
-            parts: *parts,
             gap,
-            ..first
-        });
-        // The first level was run already, if it resolves all gaps.
-        let skip = usize::from(gap.is_none());
-        let early = until - left.mul_f64(FOR_MESHES);
-        let mut found = climb(levels.skip(skip), 2 - skip, GROWTH, early, &mut run)?;
-        if skip == 1 {
-            found.insert(0, rough);
-        }
-        let (Some(fine), coarse) = (found.pop(), found.pop()) else {
-            return Err(Error::input("reference: levels", 0, "at least one"));
         };
-        fine.check_gaps()?;
+        let mut rough = run(level(levels[0], None))?;
+        let gap = rough.needed_gap();
+        if gap.is_some() {
+            rough = run(level(levels[0], gap))?;
+        }
+        if rough.too_near() {
+            return Ok(None);
+        }
+        let better = levels[1..].iter().map(|l| level(*l, gap));
+        let early = until - left.mul_f64(FOR_MESHES);
+        let mut found = vec![rough];
+        found.extend(climb(better, 1, GROWTH, early, &mut run)?);
+        let Some(best) = found.pop() else {
+            return Ok(None);
+        };
         let mut out = Self {
-            said: fine.level.say(scene),
-            pairs: coarse.map(|c| (c, fine.clone())).into_iter().collect(),
-            best: fine,
+            said: best.level.say(scene),
+            pairs: found.pop().map(|c| (c, best.clone())).into_iter().collect(),
+            best,
         };
         if out.best.level.meshed(scene) {
             out.refine(limits, until, run)?;
         }
-        Ok(out)
+        Ok(Some(out))
     }
 
     /// On finer meshes.
@@ -252,22 +254,10 @@ impl Probe {
         (smallest > 0.0 && smallest.is_finite()).then_some(smallest)
     }
 
-    /// Refuses bodies that come nearer to others than their compression resolves.
-    fn check_gaps(&self) -> Result<()> {
-        match self
-            .gaps
-            .iter()
-            .find(|(gap, resolved)| *gap < HOPELESS * resolved)
-        {
-            None => Ok(()),
-            Some((gap, resolved)) => Err(Error::Unresolved {
-                place: "reference by compressed bodies".into(),
-                quantity: "smallest gap of a body (m)".into(),
-                value: *gap,
-                limit: HOPELESS * resolved,
-                remedy: "the coupled system resolves it with finer meshes".into(),
-            }),
-        }
+    /// Whether a body comes nearer to others than its compression resolves.
+    fn too_near(&self) -> bool {
+        let near = |(gap, resolved): &(f64, f64)| *gap < HOPELESS * resolved;
+        self.gaps.iter().any(near)
     }
 }
 

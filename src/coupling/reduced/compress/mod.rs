@@ -35,10 +35,14 @@ use serde::{Deserialize, Serialize};
 const SPACING: f64 = 0.75;
 /// Most proxies at the smallest distance; a smaller gap isn't resolved on so large a body.
 const MOST_PROXIES: f64 = 900.0;
+/// About as many proxies are fitted at most, unless a rank needs more.
+const MOST_FITTED: usize = 1100;
 /// Depths of the candidates, relative to the distances of the proxies.
 const DEPTH: f64 = 0.6;
 /// Candidates are this many times their depth apart.
 const CANDIDATES: f64 = 1.0;
+/// Most candidates.
+const MOST_CANDIDATES: usize = 1200;
 /// Candidates stay inside this part of the inner tangent ball.
 const TANGENT: f64 = 0.7;
 /// Modes below this times the root of the tolerance, relative to the largest, are left out.
@@ -153,7 +157,12 @@ pub fn compress(
         .max(finest);
     let (mut fitted, mut checked) = proxies(&surface, gap, radius, SPACING);
     let needed = FITTED * settings.rank.unwrap_or(0);
-    if fitted.points.len() < needed {
+    let count = fitted.points.len().max(1);
+    if count > needed.max(MOST_FITTED) {
+        // Long bodies have many on the outer surfaces.
+        let wider = (count as f64 / needed.max(MOST_FITTED) as f64).sqrt();
+        (fitted, checked) = proxies(&surface, gap, radius, wider * SPACING);
+    } else if count < needed {
         let closer = (fitted.points.len() as f64 / needed as f64).sqrt();
         (fitted, checked) = proxies(&surface, gap, radius, 0.9 * closer * SPACING);
     }
@@ -321,11 +330,18 @@ fn potentials_weighted(proxies: &Proxies, sources: &[Vec3]) -> Mat<f64> {
 
 /// Points inside, at several depths.
 fn candidates(surface: &Surface, gap: f64, radius: f64) -> Vec<Vec3> {
-    let mut out = Vec::new();
-    let mut depth = DEPTH * gap;
-    while depth < radius {
-        out.extend(samples::inside(surface, depth, CANDIDATES, TANGENT));
-        depth *= 2.0;
+    let mut spacing = CANDIDATES;
+    loop {
+        let mut out = Vec::new();
+        let mut depth = DEPTH * gap;
+        while depth < radius {
+            out.extend(samples::inside(surface, depth, spacing, TANGENT));
+            depth *= 2.0;
+        }
+        let out = samples::thin(out, 1e-3 * gap);
+        if out.len() <= MOST_CANDIDATES {
+            return out;
+        }
+        spacing *= 1.05 * (out.len() as f64 / MOST_CANDIDATES as f64).sqrt();
     }
-    samples::thin(out, 1e-3 * gap)
 }

@@ -24,7 +24,7 @@ pub(super) fn largest(a: &Mat<f64>, cut: f64) -> Option<Modes> {
     let n = a.nrows();
     let mut k = START.min(n);
     loop {
-        let mut space = Mat::from_fn(n, k, |i, j| noise(i, j));
+        let mut space = Mat::from_fn(n, k, noise);
         for _ in 0..POWERS {
             space = times(a.as_ref(), orthonormal(&space).as_ref());
         }

@@ -1,0 +1,199 @@
+//! The paper's table of costs again: its own choices beside this program's defaults.
+//!
+//! `cargo bench --bench paper [-- SCENE …] [--quick]`. For each scene `preset = "paper"` (velocity form, fundamental
+//! solutions a face, Eq. 20; here in double precision) and the defaults of `full`, `reduced` and `auto`, each in a process of
+//! its own: seconds a step, seconds a step with its gradient, peak memory, and the error of M_f at the start in generalised
+//! coordinates, max |ΔM_ij| / √(M_ii M_jj). The reference is the coupled panel method on two meshes, extrapolated; `--quick`
+//! takes coarser ones.
+
+mod common;
+
+use common::{Effort, added_mass, arguments, in_child, scene, serve_child};
+use hydrograd::boundary::OneBody;
+use hydrograd::scene::Scene;
+use hydrograd::{Fidelity, Settings, Shape, Simulator};
+use nalgebra::DMatrix;
+
+/// A scene of the paper's table.
+struct Row {
+    scene: &'static str,
+    /// Order of the coupled panel method in the faces' size: sharp edges lower it.
+    order: f64,
+    /// Seconds a frame on an RTX 3060 with an i7-11800H, single precision, as published.
+    published: Option<f64>,
+}
+
+const ROWS: [Row; 5] = [
+    Row {
+        scene: "falling_ball_box",
+        order: 4.0 / 3.0,
+        published: Some(0.310),
+    },
+    Row {
+        scene: "falling_ball",
+        order: 2.0,
+        published: None,
+    },
+    Row {
+        scene: "grasp_open",
+        order: 4.0 / 3.0,
+        published: Some(0.413),
+    },
+    Row {
+        scene: "fish_near_tail",
+        order: 2.0,
+        published: Some(0.819),
+    },
+    Row {
+        scene: "clown_fish",
+        order: 2.0,
+        published: Some(0.940),
+    },
+];
+
+/// Faces of the reference's two meshes relative to the scene's.
+const MESHES: [f64; 2] = [1.0, 2.25];
+const QUICK_MESHES: [f64; 2] = [0.25, 0.5625];
+
+/// M_f from two meshes, the difference of the finer one from it, and the faces of the finer one.
+struct Reference {
+    matrix: DMatrix<f64>,
+    rest: f64,
+    faces: usize,
+}
+
+fn main() {
+    if serve_child() {
+        return;
+    }
+    let arguments = arguments();
+    let quick = arguments.iter().any(|a| a == "--quick");
+    let chosen: Vec<&String> = arguments.iter().filter(|a| !a.starts_with("--")).collect();
+    println!(
+        "| scene | configuration | faces | unknowns | s/step | s/step with gradient | ratio | peak MB | error of M_f | paper, s/step |"
+    );
+    println!("|---|---|---|---|---|---|---|---|---|---|");
+    let mut notes = Vec::new();
+    for row in &ROWS {
+        if !chosen.is_empty() && !chosen.iter().any(|c| *c == row.scene) {
+            continue;
+        }
+        let Some(scene) = scene(row.scene) else {
+            continue;
+        };
+        let meshes = if quick { QUICK_MESHES } else { MESHES };
+        let reference = reference(&scene, meshes, row.order);
+        notes.push(match &reference {
+            Ok(r) => format!(
+                "{}: reference extrapolated from up to {} faces, {:.1e} from the finer mesh",
+                scene.name, r.faces, r.rest
+            ),
+            Err(e) => format!("{}: no reference ({e})", scene.name),
+        });
+        let mut name = scene.name.as_str();
+        let mut published = row.published.map_or("–".into(), |s| format!("{s:.3}"));
+        for configuration in ["paper", "full", "reduced", "auto"] {
+            print_row(
+                (name, row.scene, configuration),
+                reference.as_ref().ok(),
+                &published,
+                effort(configuration, quick),
+            );
+            (name, published) = ("", String::new());
+        }
+    }
+    println!();
+    notes.iter().for_each(|n| println!("- {n}"));
+}
+
+fn effort(configuration: &str, quick: bool) -> Effort {
+    let compressed = matches!(configuration, "reduced" | "auto");
+    let (steps, repeat) = match (compressed, quick) {
+        (true, false) => (50, 5),
+        (true, true) => (5, 1),
+        (false, false) => (3, 3),
+        (false, true) => (1, 1),
+    };
+    Effort { steps, repeat }
+}
+
+fn print_row(
+    (name, file, configuration): (&str, &str, &str),
+    reference: Option<&Reference>,
+    published: &str,
+    effort: Effort,
+) {
+    let run = match in_child(file, configuration, effort, None) {
+        Ok(run) => run,
+        Err(e) => {
+            println!("| {name} | {configuration} | {e} ||||||| {published} |");
+            return;
+        }
+    };
+    let label = match configuration {
+        "paper" => "`preset = \"paper\"`".to_string(),
+        "auto" => format!("`auto` ({})", run.fidelity),
+        other => format!("`{other}`"),
+    };
+    let error = reference.map_or("–".to_string(), |r| {
+        let n = r.matrix.nrows();
+        let found = DMatrix::from_column_slice(n, n, &run.added_mass);
+        format!("{:.1e}", scaled_error(&found, &r.matrix))
+    });
+    println!(
+        "| {name} | {label} | {} | {} | {:.2e} | {:.2e} | {:.2} | {:.0} | {error} | {published} |",
+        run.faces,
+        run.unknowns,
+        run.forward,
+        run.gradient,
+        run.gradient / run.forward,
+        run.memory,
+    );
+}
+
+/// max |ΔM_ij| / √(M_ii M_jj).
+fn scaled_error(found: &DMatrix<f64>, right: &DMatrix<f64>) -> f64 {
+    let size = |i: usize| right[(i, i)].sqrt();
+    let error = |(i, j)| (found[(i, j)] - right[(i, j)]).abs() / (size(i) * size(j));
+    let n = right.nrows();
+    let all = (0..n).flat_map(|i| (0..n).map(move |j| (i, j)));
+    all.map(error).fold(0.0, f64::max)
+}
+
+/// M = M_fine + (M_fine − M_coarse) / ((N_fine/N_coarse)^{p/2} − 1): the size of the faces is 1/√N.
+fn reference(scene: &Scene, meshes: [f64; 2], order: f64) -> hydrograd::Result<Reference> {
+    let settings = Settings::default()
+        .fidelity(Fidelity::Full)
+        .one_body(OneBody::Panel);
+    let solve = |factor: f64| {
+        let simulator = Simulator::new(&refined(scene, factor), settings)?;
+        Ok((simulator.faces(), added_mass(&simulator)?))
+    };
+    let (fewer, coarse) = solve(meshes[0])?;
+    let (faces, fine) = solve(meshes[1])?;
+    let gain = (faces as f64 / fewer as f64).powf(order / 2.0) - 1.0;
+    let matrix = &fine + (&fine - coarse) / gain;
+    Ok(Reference {
+        rest: scaled_error(&fine, &matrix),
+        matrix,
+        faces,
+    })
+}
+
+/// The scene with `factor` times as many faces on every body.
+fn refined(scene: &Scene, factor: f64) -> Scene {
+    let mut scene = scene.clone();
+    for shape in scene.bodies.iter_mut().filter_map(|b| b.shape.as_mut()) {
+        let faces = match shape {
+            Shape::Sphere { faces, .. }
+            | Shape::Ellipsoid { faces, .. }
+            | Shape::Box { faces, .. }
+            | Shape::Cylinder { faces, .. }
+            | Shape::Capsule { faces, .. }
+            | Shape::Prism { faces, .. } => faces,
+            Shape::Mesh { .. } => continue,
+        };
+        *faces = faces.map(|n| (factor * n as f64).round() as usize);
+    }
+    scene
+}

@@ -1,0 +1,654 @@
+//! What the reduced coupling costs, how far that is from the floor, how it grows, and how exact it is.
+//!
+//! `cargo bench --bench reduced [-- SECTION …] [--quick] [--plot]`, sections `scenes`, `floor`, `sizes`, `spheres`; all of them
+//! if none is named. `--plot` writes the last one to docs/two_spheres.svg as well.
+
+#[allow(dead_code)]
+mod common;
+
+use common::{Effort, arguments, in_child, median, scene, serve_child, settings, step_times};
+use faer::linalg::matmul::matmul;
+use faer::{Accum, Mat, MatRef, Par, Side};
+use hydrograd::adjoint::kernel::{Points, Sources, Write, potential_fill};
+use hydrograd::adjoint::lie::{Mat3, Pose, Vec3};
+use hydrograd::boundary::{ExactBoundary, OneBody};
+use hydrograd::coupling::Coupling;
+use hydrograd::coupling::Direction;
+use hydrograd::coupling::reduced::{Reduced, ReducedBody, cache, compress};
+use hydrograd::scene::{Body, Fluid, Scene, Shape};
+use hydrograd::{Fidelity, Settings, Simulator, shape};
+use nalgebra::{DMatrix, DVector};
+use plotters::prelude::*;
+use rayon::prelude::*;
+use std::f64::consts::PI;
+use std::path::Path;
+use std::sync::Arc;
+use std::time::Instant;
+
+const SCENES: [&str; 4] = ["falling_ball", "grasp_open", "fish_near_tail", "clown_fish"];
+
+fn main() -> Result<(), Box<dyn std::error::Error>> {
+    if serve_child() {
+        return Ok(());
+    }
+    let arguments = arguments();
+    let has = |name: &str| arguments.iter().any(|a| a == name);
+    let quick = has("--quick");
+    let all = arguments.iter().all(|a| a.starts_with("--"));
+    if all || has("scenes") {
+        scenes(quick)?;
+    }
+    if all || has("floor") {
+        floor(quick)?;
+    }
+    if all || has("sizes") {
+        sizes(quick)?;
+    }
+    if all || has("spheres") {
+        let curves = spheres(quick)?;
+        if has("--plot") {
+            let file = Path::new(env!("CARGO_MANIFEST_DIR")).join("docs/two_spheres.svg");
+            plot(&file, &curves)?;
+            println!("\nwrote {}", file.display());
+        }
+    }
+    Ok(())
+}
+
+/// Median seconds of a call: at least three calls, and a fifth of a second of them.
+fn time<T>(quick: bool, mut f: impl FnMut() -> T) -> f64 {
+    std::hint::black_box(f());
+    let enough = if quick { 0.05 } else { 0.2 };
+    let (start, mut times) = (Instant::now(), vec![]);
+    while times.len() < 3 || (start.elapsed().as_secs_f64() < enough && times.len() < 1000) {
+        let start = Instant::now();
+        std::hint::black_box(f());
+        times.push(start.elapsed().as_secs_f64());
+    }
+    median(times)
+}
+
+/// Numbers between −1 and 1, the same in every run.
+struct Random(u64);
+
+impl Random {
+    fn next(&mut self) -> f64 {
+        // A linear congruential generator, its upper 53 bits.
+        self.0 = self
+            .0
+            .wrapping_mul(6364136223846793005)
+            .wrapping_add(1442695040888963407);
+        (self.0 >> 11) as f64 / (1_u64 << 52) as f64 - 1.0
+    }
+
+    fn vector(&mut self) -> Vec3 {
+        Vec3::from_fn(|_, _| self.next())
+    }
+}
+
+/// Steps and gradients of the example scenes, beside `full`.
+fn scenes(quick: bool) -> Result<(), Box<dyn std::error::Error>> {
+    println!("\n### Scenes\n");
+    println!(
+        "| scene | configuration | unknowns | setup s | setup s, cached | ms/step | ms/step with gradient | ratio | full/this | peak MB | peak MB, cached |"
+    );
+    println!("|---|---|---|---|---|---|---|---|---|---|---|");
+    for file in SCENES {
+        let Some(scene) = scene(file) else { continue };
+        let effort = |steps, repeat| match quick {
+            true => Effort {
+                steps: steps / 5 + 1,
+                repeat: 1,
+            },
+            false => Effort { steps, repeat },
+        };
+        let full = in_child(file, "full", effort(4, 3), None);
+        match &full {
+            Ok(r) => println!(
+                "| {} | `full` | {} | {:.2} | – | {:.3} | {:.3} | {:.2} | 1 | {:.0} | – |",
+                scene.name,
+                r.unknowns,
+                r.setup,
+                1e3 * r.forward,
+                1e3 * r.gradient,
+                r.gradient / r.forward,
+                r.memory
+            ),
+            Err(e) => println!("| {} | `full` | {e} |||||||||", scene.name),
+        }
+        for configuration in ["reduced", "auto"] {
+            let folder = tempfile::tempdir()?;
+            let run = || in_child(file, configuration, effort(50, 5), Some(folder.path()));
+            let (cold, warm) = match (run(), run()) {
+                (Ok(cold), Ok(warm)) => (cold, warm),
+                (Err(e), _) | (_, Err(e)) => {
+                    println!("| | `{configuration}` | {e} |||||||||");
+                    continue;
+                }
+            };
+            let gain = full
+                .as_ref()
+                .map_or("–".into(), |f| format!("{:.0}", f.forward / warm.forward));
+            println!(
+                "| | `{configuration}` ({}) | {} | {:.2} | {:.3} | {:.3} | {:.3} | {:.2} | {gain} | {:.0} | {:.0} |",
+                warm.fidelity,
+                warm.unknowns,
+                cold.setup,
+                warm.setup,
+                1e3 * warm.forward,
+                1e3 * warm.gradient,
+                warm.gradient / warm.forward,
+                cold.memory,
+                warm.memory
+            );
+        }
+    }
+    Ok(())
+}
+
+/// One evaluation beside the bare linear algebra of the same sizes.
+fn floor(quick: bool) -> hydrograd::Result<()> {
+    println!("\n### How far from the floor\n");
+    println!(
+        "| scene | configuration | points | modes | links | kernel ms | products ms | Cholesky ms | sum ms | evaluation ms | evaluation/sum |"
+    );
+    println!("|---|---|---|---|---|---|---|---|---|---|---|");
+    let chosen = if quick { &SCENES[..1] } else { &SCENES[..] };
+    for file in chosen {
+        let Some(scene) = scene(file) else { continue };
+        for configuration in ["reduced", "auto"] {
+            let simulator = Simulator::new(&scene, settings(configuration))?;
+            if !matches!(simulator.fidelity(), Fidelity::Reduced) {
+                println!(
+                    "| {} | `{configuration}` | chose `{:?}` |||||||||",
+                    scene.name,
+                    simulator.fidelity()
+                );
+                continue;
+            }
+            let mut q = simulator.start().0.clone();
+            simulator.stepper().place_motions(&mut q, 0.0);
+            let (system, parameters) = (simulator.system(), simulator.parameters());
+            system.evaluate(parameters, &q, true, false)?;
+            let whole = time(quick, || {
+                system
+                    .evaluate(parameters, &q, true, false)
+                    .map(|e| e.mass_matrix)
+            });
+            let links = links(&scene, &simulator);
+            let parts = bare(quick, &links, simulator.unknowns());
+            let sum: f64 = parts.iter().sum();
+            let points: usize = simulator.discretisation().iter().map(|d| d.points).sum();
+            println!(
+                "| {} | `{configuration}` | {points} | {} | {} | {:.3} | {:.3} | {:.3} | {:.3} | {:.3} | {:.2} |",
+                scene.name,
+                simulator.unknowns(),
+                links.len(),
+                1e3 * parts[0],
+                1e3 * parts[1],
+                1e3 * parts[2],
+                1e3 * sum,
+                1e3 * whole,
+                whole / sum
+            );
+        }
+    }
+    Ok(())
+}
+
+/// Points and modes of the two bodies of a block of G.
+#[derive(Clone, Copy)]
+struct Link {
+    points: [usize; 2],
+    modes: [usize; 2],
+}
+
+/// The blocks of G: every two bodies and every body with its images, but not links that overlap.
+fn links(scene: &Scene, simulator: &Simulator) -> Vec<Link> {
+    let bodies = simulator.discretisation();
+    let images = 1_usize << scene.walls.len();
+    let overlap = |child: &str, parent: &str| {
+        let body = scene.bodies.iter().find(|b| b.name == child);
+        body.is_some_and(|b| b.overlaps_parent && b.parent.as_deref() == Some(parent))
+    };
+    let mut out = Vec::new();
+    for (t, target) in bodies.iter().enumerate() {
+        for (s, source) in bodies.iter().enumerate().skip(t) {
+            let apart = t != s
+                && !overlap(&target.body, &source.body)
+                && !overlap(&source.body, &target.body);
+            let link = Link {
+                points: [target.points, source.points],
+                modes: [target.unknowns, source.unknowns],
+            };
+            out.extend(vec![link; images - usize::from(!apart)]);
+        }
+    }
+    out
+}
+
+/// Seconds of the pair kernel, of the products LᵀGL and of one Cholesky factorisation, on as many threads
+/// as the evaluation uses.
+fn bare(quick: bool, links: &[Link], order: usize) -> [f64; 3] {
+    let mut random = Random(1);
+    let mut kernels: Vec<_> = links
+        .iter()
+        .map(|l| {
+            let mut cloud = |n, at: f64| -> Vec<Vec3> {
+                let shift = Vec3::new(at, 0.0, 0.0);
+                (0..n).map(|_| shift + random.vector()).collect()
+            };
+            let targets = Points::bare(&cloud(l.points[0], 0.0));
+            let sources = Sources::new(&cloud(l.points[1], 4.0));
+            (targets, sources, vec![0.0; l.points[0] * l.points[1]])
+        })
+        .collect();
+    let kernel = time(quick, || {
+        kernels.par_iter_mut().for_each(|(targets, sources, out)| {
+            let stride = sources.len();
+            potential_fill(targets, sources, Write::Set, out, stride, 0);
+        })
+    });
+    let mut matrices: Vec<_> = links
+        .iter()
+        .zip(&kernels)
+        .map(|(l, (_, _, g))| {
+            let mut dense = |r, c| Mat::from_fn(r, c, |_, _| random.next());
+            let left = dense(l.points[0], l.modes[0] + 6);
+            let right = dense(l.points[1], l.modes[1] + 6);
+            let half = Mat::<f64>::zeros(l.points[0], right.ncols());
+            let out = Mat::<f64>::zeros(left.ncols(), right.ncols());
+            (left, right, g, half, out)
+        })
+        .collect();
+    let products = time(quick, || {
+        matrices
+            .par_iter_mut()
+            .for_each(|(left, right, g, half, out)| {
+                let g = MatRef::from_row_major_slice(g, left.nrows(), right.nrows());
+                let add = Accum::Replace;
+                matmul(half.as_mut(), add, g, right.as_ref(), 1.0, Par::Seq);
+                matmul(
+                    out.as_mut(),
+                    add,
+                    left.transpose(),
+                    half.as_ref(),
+                    1.0,
+                    Par::Seq,
+                );
+            })
+    });
+    let system = Mat::from_fn(
+        order,
+        order,
+        |i, j| {
+            if i == j { 1.0 } else { 0.1 / order as f64 }
+        },
+    );
+    let cholesky = time(quick, || system.llt(Side::Lower).expect("definite"));
+    [kernel, products, cholesky]
+}
+
+/// Growth with the faces of the mesh, with the rank, and with the number of bodies.
+fn sizes(quick: bool) -> hydrograd::Result<()> {
+    let base = Settings::default().fidelity(Fidelity::Reduced);
+    let two = swarm(2);
+    println!("\n### Faces of the mesh (two spheres, a gap of one radius)\n");
+    heading("faces a body | one-body method");
+    for (faces, method) in [
+        (320, OneBody::Panel),
+        (1280, OneBody::Panel),
+        (5120, OneBody::Panel),
+        (320, OneBody::Exact),
+        (1280, OneBody::Exact),
+        (5120, OneBody::Exact),
+        (20480, OneBody::Exact),
+    ] {
+        if quick && faces > 1280 {
+            continue;
+        }
+        let name = if method == OneBody::Panel {
+            "panel"
+        } else {
+            "exact"
+        };
+        growth(
+            quick,
+            &format!("{faces} | {name}"),
+            &two,
+            base.faces(faces).one_body(method),
+        )?;
+    }
+    println!("\n### Rank (two spheres, a gap of one radius; as many modes as points)\n");
+    heading("points asked for");
+    for rank in [20, 40, 80, 160, 320] {
+        if quick && rank > 80 {
+            continue;
+        }
+        growth(
+            quick,
+            &rank.to_string(),
+            &two,
+            base.accuracy(1e-6).rank(rank),
+        )?;
+    }
+    println!("\n### Number of bodies (spheres on a jittered grid, gaps about one radius)\n");
+    heading("bodies | configuration");
+    for bodies in [2, 4, 8, 16, 32, 64] {
+        if quick && bodies > 16 {
+            continue;
+        }
+        for (name, fidelity) in [("reduced", Fidelity::Reduced), ("auto", Fidelity::Auto)] {
+            let label = format!("{bodies} | `{name}`");
+            growth(quick, &label, &swarm(bodies), base.fidelity(fidelity))?;
+        }
+    }
+    Ok(())
+}
+
+fn heading(what: &str) {
+    let title = format!(
+        "| {what} | points | unknowns | setup s | evaluation ms | ∇E ms | hvp ms | ms/step | ms/step with gradient | ratio |"
+    );
+    println!("{title}");
+    println!("{}|", "|---".repeat(title.matches('|').count() - 1));
+}
+
+/// Free spheres of radius 0.1 m about three radii apart, on a grid of the smallest cube that holds them.
+fn swarm(bodies: usize) -> Scene {
+    let side = (1..).find(|n: &usize| n.pow(3) >= bodies).unwrap_or(1);
+    let mut random = Random(7);
+    let mut scene = Scene::new(Fluid::fresh_water());
+    for i in 0..bodies {
+        let cell = [i % side, i / side % side, i / side / side];
+        let at = cell.map(|c| 0.3 * c as f64 + 0.015 * random.next());
+        let sphere = Body::new(Shape::sphere(0.1)).density(998.0).at(at);
+        scene.add(sphere.named(format!("sphere {i}")));
+    }
+    scene
+}
+
+fn growth(quick: bool, label: &str, scene: &Scene, settings: Settings) -> hydrograd::Result<()> {
+    cache::forget();
+    let start = Instant::now();
+    let mut simulator = Simulator::new(scene, settings)?;
+    let setup = start.elapsed().as_secs_f64();
+    // Nothing at rest: zeros would save work.
+    let mut random = Random(3);
+    let q = simulator.start().0.clone();
+    let v = DVector::from_fn(simulator.start().1.len(), |_, _| 0.01 * random.next());
+    simulator.set_start(q.clone(), v.clone())?;
+    let (system, parameters) = (simulator.system(), simulator.parameters());
+    let evaluation = system.evaluate(parameters, &q, true, true)?;
+    let evaluate = time(quick, || {
+        system
+            .evaluate(parameters, &q, true, true)
+            .map(|e| e.mass_matrix)
+    });
+    let [mut gradient, mut hvp] = [0.0; 2];
+    if let Some(fluid) = &evaluation.fluid {
+        gradient = time(quick, || fluid.gradient(&v, &v));
+        let along = vec![hydrograd::adjoint::lie::Vec6::repeat(0.1); scene.bodies.len()];
+        let direction = Direction::Basis(&v);
+        hvp = time(quick, || fluid.hvp(direction, direction, &along));
+    }
+    let effort = match (quick, evaluate > 0.02) {
+        (true, _) => Effort {
+            steps: 2,
+            repeat: 1,
+        },
+        (false, true) => Effort {
+            steps: 3,
+            repeat: 3,
+        },
+        (false, false) => Effort {
+            steps: 20,
+            repeat: 5,
+        },
+    };
+    let [forward, whole] = step_times(&simulator, effort)?;
+    let points: usize = simulator.discretisation().iter().map(|d| d.points).sum();
+    println!(
+        "| {label} | {points} | {} | {setup:.2} | {:.3} | {:.3} | {:.3} | {:.3} | {:.3} | {:.2} |",
+        simulator.unknowns(),
+        1e3 * evaluate,
+        1e3 * gradient,
+        1e3 * hvp,
+        1e3 * forward,
+        1e3 * whole,
+        whole / forward
+    );
+    Ok(())
+}
+
+/// Two equal spheres of radius 1 at unit density, centres d apart: along the line of centres M11 and
+/// M12, across it M11 and M12 (multipoles against images, agreeing to 1e-16).
+const TWO_SPHERES: [(f64, [f64; 4]); 6] = [
+    (
+        2.05,
+        [
+            2.32202493143995,
+            -0.8142853669628686,
+            2.1589776041169393,
+            0.3814265072810595,
+        ],
+    ),
+    (
+        2.2,
+        [
+            2.212295759450387,
+            -0.6176388786372325,
+            2.1287968395728725,
+            0.3003675369424352,
+        ],
+    ),
+    (
+        2.5,
+        [
+            2.1384756378903385,
+            -0.40744442892392174,
+            2.1070601149394723,
+            0.2020009329363651,
+        ],
+    ),
+    (
+        3.0,
+        [
+            2.106704831524129,
+            -0.23339113417708315,
+            2.0978073973851967,
+            0.11646306884048746,
+        ],
+    ),
+    (
+        4.0,
+        [
+            2.096257475425208,
+            -0.09821056164738921,
+            2.094889664936694,
+            0.049092479963193415,
+        ],
+    ),
+    (
+        6.0,
+        [
+            2.0945416527273335,
+            -0.029089560983682573,
+            2.094432756981481,
+            0.01454450833192825,
+        ],
+    ),
+];
+
+/// The same at any distance, from multipoles about both centres.
+///
+/// The flow of both spheres moving as mirror images (s = 1) or against each other (s = −1) is
+/// `Σ a_n (r⁻ⁿ⁻¹P_nᵐ + s their mirror images)`, m = 0 along the line of centres and m = 1 across it;
+/// the images have the coefficients `C(n+k, k+m) d⁻⁽ⁿ⁺ᵏ⁺¹⁾ rⁿ` about the other centre (Hobson 1931, §88), so
+///
+/// ```text
+/// −(n+1) a_n + s n Σ_k C(n+k, k+m) d⁻⁽ⁿ⁺ᵏ⁺¹⁾ a_k = δ_n1,      M = −4π/3 (1 + 3 a_1)
+/// ```
+fn exact(d: f64) -> [f64; 4] {
+    // Images gather where the terms fall like e^{−2η}, cosh η = d/2.
+    let eta = (0.5 * d).acosh();
+    let most = (20.0 / eta).ceil().clamp(20.0, 500.0) as usize;
+    let mode = |m: usize, s: f64| {
+        let mut matrix = Mat::<f64>::zeros(most, most);
+        let mut right = Mat::<f64>::zeros(most, 1);
+        right[(0, 0)] = 1.0;
+        for n in 1..=most {
+            // C(n+k, k+m) d^{−(n+k+1)} from k = 1 on, from logarithms and then by its ratio.
+            let mut log = -((n + 2) as f64) * d.ln();
+            log += ((n + 1) as f64).ln();
+            if m == 1 {
+                // C(n+1, 2) for C(n+1, 1).
+                log += (0.5 * n as f64).ln();
+            }
+            for k in 1..=most {
+                matrix[(n - 1, k - 1)] = s * n as f64 * log.exp();
+                log += ((n + k + 1) as f64 / ((k + m + 1) as f64 * d)).ln();
+            }
+            matrix[(n - 1, n - 1)] -= (n + 1) as f64;
+        }
+        use faer::linalg::solvers::Solve;
+        let a = matrix.partial_piv_lu().solve(&right);
+        -4.0 * PI / 3.0 * (1.0 + 3.0 * a[(0, 0)])
+    };
+    let [along, against] = [mode(0, 1.0), mode(0, -1.0)];
+    let [across, opposite] = [mode(1, 1.0), mode(1, -1.0)];
+    // Mirror images move in opposite directions along the line.
+    [
+        0.5 * (along + against),
+        -0.5 * (along - against),
+        0.5 * (across + opposite),
+        0.5 * (across - opposite),
+    ]
+}
+
+/// Error against gap for one number of points; gaps without an answer are left out.
+struct Curve {
+    rank: usize,
+    points: Vec<(f64, f64)>,
+}
+
+/// Error of two spheres, max |ΔM_ij| / √(M_ii M_jj), against the gap in radii.
+fn spheres(quick: bool) -> hydrograd::Result<Vec<Curve>> {
+    println!("\n### Two exact spheres: error of M_f against the gap\n");
+    let worst = TWO_SPHERES.iter().map(|(d, table)| {
+        let pairs = exact(*d).into_iter().zip(table);
+        pairs.fold(0.0_f64, |w, (a, b)| w.max((a - b).abs()))
+    });
+    let worst = worst.fold(0.0, f64::max);
+    assert!(worst < 1e-10, "the multipoles miss the table by {worst:e}");
+    let gaps = [4.0, 2.0, 1.0, 0.5, 0.2, 0.1, 0.05, 0.02, 0.01];
+    let ranks = if quick {
+        &[20, 80][..]
+    } else {
+        &[20, 40, 80, 160, 320][..]
+    };
+    let title: String = gaps.iter().map(|g| format!(" {g} R |")).collect();
+    println!("| points a sphere |{title}");
+    println!("|---|{}", "---|".repeat(gaps.len()));
+    let mesh = shape::build(&Shape::sphere(1.0), Path::new(""), Some(1280))?;
+    // The smallest gap that is resolved on a unit sphere.
+    let finest = compress::finest_gap(4.0 * PI);
+    let mut curves = Vec::new();
+    for rank in ranks {
+        let mut last: Option<(f64, Arc<ReducedBody>)> = None;
+        let (mut row, mut points) = (String::new(), Vec::new());
+        for gap in gaps {
+            let resolved = f64::max(gap, finest).min(1.0);
+            let body = match last.take().filter(|(g, _)| *g == resolved) {
+                Some((_, body)) => body,
+                None => sphere(&mesh, *rank, resolved)?,
+            };
+            let error = two_spheres_error(&body, gap);
+            row += &match &error {
+                Ok(e) => format!(" {e:.1e} |"),
+                Err(_) => " refused |".into(),
+            };
+            points.extend(error.ok().map(|e| (gap, e)));
+            last = Some((resolved, body));
+        }
+        println!("| {rank} |{row}");
+        curves.push(Curve {
+            rank: *rank,
+            points,
+        });
+    }
+    println!(
+        "\nEach gap with spheres compressed for it, but no finer than {finest:.3} R and no coarser than 1 R. \
+         Reference: multipoles, within {worst:.0e} of the tabulated values."
+    );
+    Ok(curves)
+}
+
+fn sphere(mesh: &hydrograd::TriMesh, rank: usize, gap: f64) -> hydrograd::Result<Arc<ReducedBody>> {
+    let response = ExactBoundary::new("sphere", [1.0; 3], &Pose::identity(), gap)?;
+    let settings = compress::Settings {
+        rank: Some(rank),
+        tolerance: 1e-8,
+        resolved_gap: Some(gap),
+    };
+    let (v, f) = (mesh.vertices(), mesh.faces());
+    let body = compress::compress("sphere", v, f, &response, &settings)?;
+    Ok(Arc::new(body))
+}
+
+fn two_spheres_error(body: &Arc<ReducedBody>, gap: f64) -> hydrograd::Result<f64> {
+    let pair = Reduced::new(vec![body.clone(); 2], &[], |_, _| None)?;
+    let at = |z| Pose::new(Mat3::identity(), Vec3::new(0.0, 0.0, z));
+    let record = pair.evaluate(&[at(0.0), at(2.0 + gap)], &DMatrix::identity(12, 12), false)?;
+    let m = record.momenta();
+    let exact = exact(2.0 + gap);
+    let found = [m[(2, 2)], m[(2, 8)], m[(0, 0)], m[(0, 6)]];
+    let size = [exact[0], exact[0], exact[2], exact[2]];
+    let errors = (0..4).map(|i| (found[i] - exact[i]).abs() / size[i]);
+    Ok(errors.fold(0.0, f64::max))
+}
+
+/// Log–log, one line a number of points.
+fn plot(file: &Path, curves: &[Curve]) -> Result<(), Box<dyn std::error::Error>> {
+    let errors = || curves.iter().flat_map(|c| c.points.iter().map(|p| p.1));
+    let low = errors().fold(1.0, f64::min).max(1e-16);
+    let high = errors().fold(0.0, f64::max);
+    let area = SVGBackend::new(file, (640, 420)).into_drawing_area();
+    area.fill(&WHITE)?;
+    let mut chart = ChartBuilder::on(&area)
+        .margin(12)
+        .caption("two spheres: error of the added mass", ("sans-serif", 15))
+        .x_label_area_size(36)
+        .y_label_area_size(64)
+        .build_cartesian_2d(
+            (0.009..5.0).log_scale(),
+            (0.5 * low..2.0 * high).log_scale(),
+        )?;
+    chart
+        .configure_mesh()
+        .x_desc("gap, radii")
+        .y_desc("max |ΔM_ij| / √(M_ii M_jj)")
+        .y_label_formatter(&|y| format!("{y:.0e}"))
+        .light_line_style(TRANSPARENT)
+        .draw()?;
+    let colors = [RED, MAGENTA, BLUE, GREEN, BLACK];
+    for (curve, color) in curves.iter().zip(colors) {
+        let dots = curve
+            .points
+            .iter()
+            .map(|p| Circle::new(*p, 3, color.filled()));
+        chart.draw_series(dots)?;
+        chart
+            .draw_series(LineSeries::new(curve.points.clone(), color.stroke_width(2)))?
+            .label(format!("{} points", curve.rank))
+            .legend(move |(x, y)| PathElement::new([(x, y), (x + 18, y)], color.stroke_width(2)));
+    }
+    chart
+        .configure_series_labels()
+        .position(SeriesLabelPosition::LowerLeft)
+        .border_style(BLACK.mix(0.3))
+        .background_style(WHITE)
+        .draw()?;
+    area.present()?;
+    Ok(())
+}

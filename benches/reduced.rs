@@ -311,7 +311,7 @@ fn sizes(quick: bool) {
             growth(quick, &label, &swarm(2, uneven), settings);
         }
     }
-    println!("\n### Rank (two spheres, a gap of one radius; as many modes as points)\n");
+    println!("\n### Rank (two spheres, a gap of one radius; modes for a tolerance of 1e-6)\n");
     heading("points asked for");
     for rank in [20, 40, 80, 160, 320] {
         if quick && rank > 80 {

@@ -2,7 +2,7 @@
 
 use hydrograd::adjoint::kernel::{Sources, Write};
 use hydrograd::adjoint::lie::{Pose, Vec3, Vec6, exp_matrix};
-use hydrograd::boundary::{self, BodyBoundary};
+use hydrograd::boundary::{self, BodyBoundary, OneBody};
 use hydrograd::coupling::full::{Full, SolveSettings, Solver, WetBody};
 use hydrograd::coupling::image::Image;
 use hydrograd::coupling::{Coupling, Exclusions};
@@ -93,7 +93,10 @@ fn declared_links_run_and_feel_all_but_each_other() {
     pair.bodies.truncate(2);
     pair.initial.v.truncate(4);
     let of = |fidelity| {
-        let settings = full().tolerance(1e-12).fidelity(fidelity);
+        let settings = full()
+            .one_body(OneBody::Mfs)
+            .tolerance(1e-12)
+            .fidelity(fidelity);
         let added = Simulator::new(&pair, settings).unwrap().added_mass();
         added.unwrap().matrix
     };

@@ -199,6 +199,33 @@ fn vertices_lie_on_the_exact_surface() {
     }
 }
 
+/// However extreme the lengths, there is a mesh of about the size asked, or an error.
+#[test]
+fn extreme_prisms_end() {
+    for thin in [1e-3, 1e-6, 1e-9, 1e-12, 1e-15, 1e-30] {
+        let flat = [[0.0, 0.0], [1.0, 0.0], [1.0, thin], [0.0, thin]];
+        let square = [[0.0, 0.0], [thin, 0.0], [thin, thin], [0.0, thin]];
+        let triangle = [[0.0, 0.0], [1.0, 0.0], [0.0, 1.0]];
+        for shape in [
+            Shape::prism(flat, 1.0),
+            Shape::prism(flat, thin),
+            Shape::prism(square, 1.0),
+            Shape::prism(triangle, thin),
+            Shape::prism(triangle, 1.0 / thin),
+        ] {
+            for target in [1, 100, 1280, 10_000] {
+                match build(&shape, Path::new("."), Some(target)) {
+                    Ok(mesh) => {
+                        let count = mesh.faces().len();
+                        assert!(count <= 2 * target.max(20), "{shape:?} {target}: {count}");
+                    }
+                    Err(error) => assert!(thin < 1e-5, "{shape:?} {target}: {error}"),
+                }
+            }
+        }
+    }
+}
+
 #[test]
 fn short_forms_come_back() {
     for text in PRISMS {

@@ -13,7 +13,8 @@
 //! with D the constant damping of [`crate::boundary`]. A body's own block doesn't change in its own frame; all other entries depend on a source's
 //! position in the target's frame alone, so a displacement enters through `d_j = Ẑ_c(s_j) − Z_b(s_j)`:
 //! with the right densities fixed, δE is the work of a force on each source of c and of the
-//! opposite wrench on b. The tangent (hvp) follows from
+//! opposite wrench on b. Between bodies that don't feel each other ([`Exclusions`]) K and P have no
+//! entries but those of images. The tangent (hvp) follows from
 //!
 //! ```text
 //! N δa = δKᵀ r − Kᵀ δK a              δr = −δK a − K δa

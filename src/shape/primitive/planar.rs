@@ -206,7 +206,13 @@ impl Planar {
     /// Flips until no flip is better.
     fn flip_all(&mut self) {
         let mut suspects: Vec<usize> = (0..self.triangles.len()).rev().collect();
+        // More than it takes; rounding could go round in circles on a polygon like a thread.
+        let mut left = 1000 * self.triangles.len();
         while let Some(t) = suspects.pop() {
+            left -= 1;
+            if left == 0 {
+                return;
+            }
             if let Some(other) = (0..3).find_map(|i| self.flip_if_better(t, i)) {
                 suspects.extend([other, t]);
             }

@@ -35,7 +35,9 @@ pub(super) fn prism(profile: &[[f64; 2]], length: f64, target: usize) -> Parts {
     }
     let solid = Solid::new(corners, length / unit);
     let target = target.min(MAX_FACES) as f64;
-    let mut size = (solid.area() / target * 4.0 / 3f64.sqrt()).sqrt();
+    let even = (solid.area() / target * 4.0 / 3f64.sqrt()).sqrt();
+    // Edges alone may need more faces than that, on a body like a needle.
+    let mut size = even.max(solid.edges() / target);
     let mut best = (f64::INFINITY, size, Parts::default());
     for attempt in 0..TRIES {
         let parts = solid.mesh(size);
@@ -88,7 +90,8 @@ struct Solid {
     sharp: Vec<bool>,
     /// Edges of the profile, `corners[k]` to `corners[k + 1]`.
     widths: Vec<f64>,
-    /// Radius of the largest circle in the profile, to within a factor of two.
+    /// Twice the area over the perimeter: between one and two radii of the largest circle in the
+    /// profile.
     inradius: f64,
 }
 
@@ -122,6 +125,11 @@ impl Solid {
         2.0 * signed_area(&self.corners) + self.length * self.widths.iter().sum::<f64>()
     }
 
+    /// Length of all edges.
+    fn edges(&self) -> f64 {
+        2.0 * self.widths.iter().sum::<f64>() + self.corners.len() as f64 * self.length
+    }
+
     fn next(&self, k: usize) -> usize {
         (k + 1) % self.corners.len()
     }
@@ -139,8 +147,8 @@ impl Solid {
         (p - a - (b - a) * along).norm()
     }
 
-    /// Size wanted at a point `p` of the end (y, z), or of a side (distance along its edge, x),
-    /// where cells in the middle of the sides are to be of size one times `size`.
+    /// Edge length wanted at a point `p` of the end (y, z), or of a side (distance along its edge, x),
+    /// where triangles far from edges are to be of this `size`.
     fn size(&self, side: Side, p: &Point, size: f64) -> f64 {
         let n = self.corners.len();
         let (profile, edge) = match side {
@@ -292,7 +300,7 @@ fn mirror(mut vertices: Vec<Vec3>, mut faces: Vec<[usize; 3]>) -> Parts {
 }
 
 /// Where a line of this length is cut so that its parts are about of the size wanted there: the
-/// distances from its start, the same from its end if the sizes are.
+/// distances from its start.
 fn divide(length: f64, size: impl Fn(f64) -> f64) -> Vec<f64> {
     // Number of cells up to each of many steps.
     const STEPS: usize = 256;

@@ -110,7 +110,7 @@ fn a_pair_that_comes_and_goes() {
     scene.add(ball(0.0, 0.0).named("near"));
     scene.add(ball(1.3, 0.28).named("far"));
     scene.initial.v = vec![1.0, 0.0, 0.0, -1.0, 0.0, 0.0];
-    scene.time_step = 0.01;
+    scene.time_step = 0.005;
     let settings = Settings::default()
         .fidelity(Fidelity::Auto)
         .integrator(Integrator::Rk4)
@@ -118,7 +118,7 @@ fn a_pair_that_comes_and_goes() {
     let simulator = Simulator::new(&scene, settings).unwrap();
     let reasons = simulator.reasons().join("; ");
     assert!(reasons.contains("not at all from"), "{reasons}");
-    let steps = 130;
+    let steps = 260;
     let rollout = simulator
         .rollout(&Controls::zeros(&simulator, steps))
         .unwrap();
@@ -136,7 +136,7 @@ fn a_pair_that_comes_and_goes() {
     }
     check(&scene, Fidelity::Auto, Integrator::Rk2, steps, 320);
     for integrator in INTEGRATORS {
-        check(&scene, Fidelity::Auto, integrator, 40, 320);
+        check(&scene, Fidelity::Auto, integrator, 80, 320);
     }
 }
 

@@ -7,7 +7,7 @@ use crate::boundary::Response;
 use faer::Mat;
 
 /// The answer of a fine mesh and, times a factor, its difference from that of a coarse one: see
-/// [`richardson`]. It is linear, so that the flow around the body is extrapolated as its added mass is.
+/// [`richardson()`]. It is linear, so that the flow around the body is extrapolated as its added mass is.
 pub struct Extrapolated {
     fine: PanelBoundary,
     coarse: PanelBoundary,

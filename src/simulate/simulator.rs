@@ -329,7 +329,7 @@ impl Simulator {
     pub fn rollout_with(
         &self,
         controls: &Controls,
-        progress: impl FnMut(usize),
+        progress: impl FnMut(usize) + Send,
     ) -> Result<Rollout<'_>> {
         let matrix = controls.matrix().clone();
         if matrix.nrows() != self.system().controls {
@@ -347,7 +347,9 @@ impl Simulator {
                 format!("must be at most {MOST_STEPS}: every state is kept; run in parts"),
             ));
         }
-        let path = step::forward(&self.trajectory(&matrix), self.initial()?, steps, progress)?;
+        let (trajectory, initial) = (self.trajectory(&matrix), self.initial()?);
+        // On a thread of the pool from first step to last: entering the pool costs as much as a small step's work.
+        let path = rayon::scope(|_| step::forward(&trajectory, initial, steps, progress))?;
         Ok(Rollout {
             simulator: self,
             path,

@@ -1,7 +1,7 @@
 //! One body as the reduced coupling sees it.
 
 use crate::adjoint::kernel::Points;
-use crate::adjoint::lie::{Mat6, Vec3, Vec6};
+use crate::adjoint::lie::{Mat6, Vec3};
 use crate::{Error, Result};
 use nalgebra::DMatrix;
 use serde::{Deserialize, Serialize};
@@ -165,21 +165,6 @@ impl ReducedBody {
 
     pub(super) fn targets(&self) -> &Points {
         &self.targets
-    }
-
-    /// Ū ν + L a.
-    pub(super) fn charges(&self, twist: &Vec6, a: &[f64], out: &mut [f64]) {
-        out.fill(0.0);
-        let m = self.modes();
-        let coefficients = a.iter().chain(twist.iter());
-        debug_assert_eq!(a.len(), m);
-        for (column, c) in self.basis.column_iter().zip(coefficients) {
-            if *c != 0.0 {
-                out.iter_mut()
-                    .zip(column.iter())
-                    .for_each(|(o, x)| *o += c * x);
-            }
-        }
     }
 }
 

@@ -21,6 +21,7 @@ pub mod cache;
 mod check;
 pub mod compress;
 mod cutoff;
+mod factor;
 mod link;
 mod record;
 mod second;
@@ -35,8 +36,12 @@ use crate::adjoint::lie::Pose;
 use crate::scene::Wall;
 use link::Link;
 use nalgebra::DMatrix;
+use rayon::prelude::*;
 use std::ops::Range;
 use std::sync::Arc;
+
+/// Coulomb forces that take as long as waking another thread, many times over (0.1 ms).
+const WORTH_WAKING: usize = 100_000;
 
 /// All bodies coupled through a few sources each.
 pub struct Reduced {
@@ -101,6 +106,22 @@ impl Reduced {
     /// The bodies.
     pub fn reduced_bodies(&self) -> &[Arc<ReducedBody>] {
         &self.bodies
+    }
+
+    /// `f` of each item (a link's), in order; on several threads where the points are so many that it
+    /// pays to wake them. `work` per pair of points is relative to one Coulomb force.
+    fn over<'i, I: Sync, T: Send>(
+        &self,
+        items: &'i [I],
+        work: usize,
+        f: impl Fn(&'i I) -> T + Sync + Send,
+    ) -> Vec<T> {
+        let mean = self.point_count() / self.bodies.len().max(1);
+        if items.len() * mean * mean * work < WORTH_WAKING {
+            items.iter().map(f).collect()
+        } else {
+            items.par_iter().map(f).collect()
+        }
     }
 
     fn point_count(&self) -> usize {

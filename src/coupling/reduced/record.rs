@@ -1,6 +1,7 @@
 //! One evaluation of the reduced coupling: value and first derivative.
 
-use super::link::Placed;
+use super::factor::Factor;
+use super::link::{Link, Placed};
 use super::{Parts, Reduced};
 use crate::adjoint::kernel::potential_vjp;
 use crate::adjoint::lie::{Mat6, Pose, Vec3, Vec6, six};
@@ -8,10 +9,9 @@ use crate::coupling::pair::wrench;
 use crate::coupling::{Direction, Pullback, Record, Report, Tangent};
 use crate::{Error, Result};
 use faer::linalg::matmul::matmul;
-use faer::linalg::solvers::{Llt, Solve};
-use faer::{Accum, Mat, MatMut, MatRef, Par, Side};
+use faer::reborrow::ReborrowMut;
+use faer::{Accum, Mat, MatMut, MatRef, Par};
 use nalgebra::{DMatrix, DVector};
-use rayon::prelude::*;
 use std::f64::consts::PI;
 
 /// 4π: a source of strength α makes the flux 4πα.
@@ -19,6 +19,11 @@ const FLUX: f64 = 4.0 * PI;
 /// Condition number of I − LᵀGL above which the answers of the bodies to one another lose their
 /// meaning: at one digit lost the gap is far below what was fitted.
 const ILL_CONDITIONED: f64 = 1e4;
+
+/// Work of [`ReducedRecord::new`] per pair of points, relative to that of its derivatives.
+const FILL: usize = 8;
+/// Of [`ReducedRecord::pull_back`].
+const PULL: usize = 1;
 
 /// Part of the water displaced that an energy may be below zero by: twists that move no water (a disc's
 /// spin) carry what the one-body method leaves of them.
@@ -30,8 +35,8 @@ pub(super) struct ReducedRecord<'a> {
     pub poses: Vec<Pose>,
     pub placed: Vec<Placed<'a>>,
     derivative: bool,
-    /// I − LᵀGL.
-    factor: Llt<f64>,
+    /// Of I − LᵀGL.
+    factor: Factor,
     /// LᵀGŪ, modes × 6 bodies.
     answer: DMatrix<f64>,
     /// ŪᵀGŪ, 6 bodies × 6 bodies.
@@ -58,7 +63,7 @@ fn view(m: &DMatrix<f64>) -> MatRef<'_, f64> {
     MatRef::from_column_major_slice(m.as_slice(), m.nrows(), m.ncols())
 }
 
-fn view_mut(m: &mut DMatrix<f64>) -> MatMut<'_, f64> {
+pub(super) fn view_mut(m: &mut DMatrix<f64>) -> MatMut<'_, f64> {
     let (r, c) = m.shape();
     MatMut::from_column_major_slice_mut(m.as_mut_slice(), r, c)
 }
@@ -85,15 +90,15 @@ impl<'a> ReducedRecord<'a> {
         basis: &DMatrix<f64>,
         derivative: bool,
     ) -> Result<Self> {
-        let (placed, blocks): (Vec<_>, Vec<_>) = reduced
-            .links
-            .par_iter()
-            .filter_map(|link| {
-                let placed = link.place(reduced, poses)?;
-                let block = block(reduced, &placed);
-                Some((placed, block))
-            })
-            .unzip();
+        let place = |link: &'a Link| {
+            let placed = link.place(reduced, poses)?;
+            let block = block(reduced, &placed);
+            Some((placed, block))
+        };
+        let (placed, blocks): (Vec<_>, Vec<_>) =
+            (reduced.over(&reduced.links, FILL, place).into_iter())
+                .flatten()
+                .unzip();
         let (n, w) = (reduced.mode_count(), 6 * reduced.bodies.len());
         let mut system = Mat::<f64>::identity(n, n);
         let mut answer = DMatrix::zeros(n, w);
@@ -113,10 +118,13 @@ impl<'a> ReducedRecord<'a> {
                 (&mut system, &mut answer, &mut direct),
             );
         }
-        let factor = factorise(reduced, &system, poses)?;
+        let Some(factor) = Factor::new(system) else {
+            let quantity = "smallest eigenvalue of I − LᵀGL, at most";
+            return Err(closest(reduced, poses, quantity, 0.0));
+        };
         let mut out = Self {
             report: Report {
-                condition: condition(&factor),
+                condition: factor.condition(),
                 ..Report::default()
             },
             reduced,
@@ -131,7 +139,7 @@ impl<'a> ReducedRecord<'a> {
             alpha: DMatrix::zeros(0, 0),
             momenta: DMatrix::zeros(0, 0),
         };
-        out.factor.solve_in_place(view_mut(&mut out.a));
+        out.factor.solve_in_place(&mut out.a);
         out.alpha = out.charges(basis, &out.a);
         out.momenta = out.impulses(basis, &out.a);
         check_energy(reduced, &out.basis, &out.momenta)?;
@@ -148,16 +156,17 @@ impl<'a> ReducedRecord<'a> {
 
     /// α = Ū x̄ + L a, column by column.
     fn charges(&self, twists: &DMatrix<f64>, a: &DMatrix<f64>) -> DMatrix<f64> {
-        let mut out = DMatrix::zeros(self.reduced.point_count(), twists.ncols());
+        let columns = twists.ncols();
+        let mut out = DMatrix::zeros(self.reduced.point_count(), columns);
+        let mut all = view_mut(&mut out);
         for (b, body) in self.reduced.bodies.iter().enumerate() {
-            let (points, modes) = (&self.reduced.points[b], self.reduced.modes[b].clone());
-            for k in 0..twists.ncols() {
-                let twist = twists.fixed_view::<6, 1>(6 * b, k).into_owned();
-                let a = a.column(k);
-                let mut column = out.column_mut(k);
-                let charges = &mut column.as_mut_slice()[points.clone()];
-                body.charges(&twist, &a.as_slice()[modes.clone()], charges);
-            }
+            let (points, modes) = (&self.reduced.points[b], &self.reduced.modes[b]);
+            let (l, u) = view(body.basis()).split_at_col(modes.len());
+            let mut own = all.rb_mut().subrows_mut(points.start, points.len());
+            let a = view(a).subrows(modes.start, modes.len());
+            let twists = view(twists).subrows(6 * b, 6);
+            matmul(own.rb_mut(), Accum::Replace, l, a, 1.0, Par::Seq);
+            matmul(own.rb_mut(), Accum::Add, u, twists, 1.0, Par::Seq);
         }
         out
     }
@@ -183,7 +192,7 @@ impl<'a> ReducedRecord<'a> {
             Direction::Twist(x) => {
                 let twists = DMatrix::from_column_slice(x.len(), 1, x.as_slice());
                 let mut a = &self.answer * &twists;
-                self.factor.solve_in_place(view_mut(&mut a));
+                self.factor.solve_in_place(&mut a);
                 Response {
                     alpha: self.charges(&twists, &a).column(0).into_owned(),
                     a: a.column(0).into_owned(),
@@ -213,7 +222,7 @@ impl<'a> ReducedRecord<'a> {
             a.rows_mut(at, m).copy_from(&projected.rows(0, m));
             direct.rows_mut(6 * b, 6).copy_from(&projected.rows(m, 6));
         }
-        self.factor.solve_in_place(view_mut(&mut a));
+        self.factor.solve_in_place(&mut a);
         let still = DMatrix::zeros(6 * self.reduced.bodies.len(), k);
         let alpha = self.charges(&still, &a);
         (alpha, FLUX * (direct + self.answer.tr_mul(&a)))
@@ -243,7 +252,7 @@ impl<'a> ReducedRecord<'a> {
             }
             total
         };
-        let wrenches: Vec<Vec6> = self.placed.par_iter().map(one).collect();
+        let wrenches = self.reduced.over(&self.placed, PULL, one);
         let mut out = vec![Vec6::zeros(); self.reduced.bodies.len()];
         for (placed, wrench) in self.placed.iter().zip(&wrenches) {
             let pose = &self.poses[placed.link.target];
@@ -319,10 +328,10 @@ fn scatter(
     (system, answer, direct): (&mut Mat<f64>, &mut DMatrix<f64>, &mut DMatrix<f64>),
 ) {
     let (t, s) = (reduced.modes[target].clone(), reduced.modes[source].clone());
-    for j in 0..s.len() {
-        for i in 0..t.len() {
-            system[(t.start + i, s.start + j)] -= factor * block[(i, j)];
-        }
+    // The lower triangle is all that the factorisation reads.
+    if target >= source {
+        let mut into = system.submatrix_mut(t.start, s.start, t.len(), s.len());
+        into -= faer::Scale(factor) * block.submatrix(0, 0, t.len(), s.len());
     }
     for k in 0..6 {
         for i in 0..t.len() {
@@ -331,32 +340,6 @@ fn scatter(
         for i in 0..6 {
             direct[(6 * target + i, 6 * source + k)] += factor * block[(t.len() + i, s.len() + k)];
         }
-    }
-}
-
-fn factorise(reduced: &Reduced, system: &Mat<f64>, poses: &[Pose]) -> Result<Llt<f64>> {
-    system.llt(Side::Lower).map_err(|_| {
-        closest(
-            reduced,
-            poses,
-            "smallest eigenvalue of I − LᵀGL, at most",
-            0.0,
-        )
-    })
-}
-
-/// (largest / smallest pivot)² of the Cholesky factor: the condition number, from below.
-fn condition(factor: &Llt<f64>) -> f64 {
-    let l = factor.L();
-    let (mut low, mut high) = (f64::INFINITY, 0.0_f64);
-    for i in 0..l.nrows() {
-        low = low.min(l[(i, i)]);
-        high = high.max(l[(i, i)]);
-    }
-    if high > 0.0 {
-        (high / low).powi(2)
-    } else {
-        1.0
     }
 }
 

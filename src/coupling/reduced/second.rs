@@ -6,8 +6,10 @@ use crate::adjoint::kernel::{potential_hvp, potential_jvp, potential_vjp};
 use crate::adjoint::lie::{Vec3, Vec6, angular, linear, six};
 use crate::coupling::{Direction, Tangent};
 use nalgebra::{DMatrix, DVector};
-use rayon::prelude::*;
 use std::f64::consts::PI;
+
+/// Work per pair of points, relative to that of the first derivative.
+const TANGENT: usize = 3;
 
 /// A link along a displacement.
 struct Moved {
@@ -85,7 +87,7 @@ impl ReducedRecord<'_> {
             }
             (on_target, on_source)
         };
-        let parts: Vec<_> = self.placed.par_iter().map(one).collect();
+        let parts = self.reduced.over(&self.placed, TANGENT, one);
         let mut out = DMatrix::zeros(alpha.first().map_or(0, |a| a.len()), k);
         let mut add = |b: usize, values: &[f64]| {
             let from = self.range(b).start;
@@ -117,7 +119,7 @@ impl ReducedRecord<'_> {
         let psi = self.tangent_potentials(&alpha, z);
         let (dalpha, dmomenta) = self.tangent_answer(&psi);
         let one = |placed: &Placed| self.link_tangent(placed, &responses, &dalpha, z);
-        let parts: Vec<(Vec6, Vec6)> = self.placed.par_iter().map(one).collect();
+        let parts = self.reduced.over(&self.placed, TANGENT, one);
         let mut wrench = vec![Vec6::zeros(); self.reduced.bodies.len()];
         for (placed, (w, dw)) in self.placed.iter().zip(&parts) {
             let t = placed.link.target;

@@ -279,8 +279,7 @@ impl<'a> Rollout<'a> {
                 rotations: cotangents.rotations.column(n).into_owned(),
             })
             .collect();
-        let (state_bar, locals) =
-            rayon::scope(|_| step::reverse(&trajectory, &self.path, &seeds))?;
+        let (state_bar, locals) = rayon::scope(|_| step::reverse(&trajectory, &self.path, &seeds))?;
         let mut controls = cotangents.controls.clone();
         let mut parameters = Parameters::zeros(simulator.system().len());
         let mut gains = vec![0.0; simulator.policy().gains().len()];

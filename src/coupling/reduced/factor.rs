@@ -1,30 +1,30 @@
 //! Cholesky factorisation of the coupled system, in its own memory.
 
-use super::record::view_mut;
+use super::record::{view, view_mut};
 use faer::dyn_stack::{MemBuffer, MemStack};
 use faer::linalg::cholesky::llt;
-use faer::{Conj, Mat, Par, Spec};
+use faer::{Conj, Par, Spec};
 use nalgebra::DMatrix;
 
 /// Lower factor of a symmetric positive definite matrix; above the diagonal stands what stood there.
-pub(super) struct Factor(Mat<f64>);
+pub(super) struct Factor(DMatrix<f64>);
 
 impl Factor {
     /// From the lower triangle, which is overwritten; `None` where it isn't positive definite.
-    pub fn new(mut lower: Mat<f64>) -> Option<Self> {
+    pub fn new(mut lower: DMatrix<f64>) -> Option<Self> {
         let (n, par) = (lower.nrows(), Par::Seq);
         let params: Spec<llt::factor::LltParams, f64> = Spec::default();
         let need = llt::factor::cholesky_in_place_scratch::<f64>(n, par, params);
         let mut buffer = MemBuffer::new(need);
         let stack = MemStack::new(&mut buffer);
         let none = llt::factor::LltRegularization::default();
-        llt::factor::cholesky_in_place(lower.as_mut(), none, par, stack, params).ok()?;
+        llt::factor::cholesky_in_place(view_mut(&mut lower), none, par, stack, params).ok()?;
         Some(Self(lower))
     }
 
     /// Solves for all columns, which are overwritten.
     pub fn solve_in_place(&self, columns: &mut DMatrix<f64>) {
-        let (l, right) = (self.0.as_ref(), view_mut(columns));
+        let (l, right) = (view(&self.0), view_mut(columns));
         let mut buffer = MemBuffer::new(llt::solve::solve_in_place_scratch::<f64>(
             l.nrows(),
             right.ncols(),

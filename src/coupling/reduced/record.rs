@@ -59,7 +59,7 @@ pub(super) struct Response {
 }
 
 /// A nalgebra matrix as faer sees it.
-fn view(m: &DMatrix<f64>) -> MatRef<'_, f64> {
+pub(super) fn view(m: &DMatrix<f64>) -> MatRef<'_, f64> {
     MatRef::from_column_major_slice(m.as_slice(), m.nrows(), m.ncols())
 }
 
@@ -100,7 +100,7 @@ impl<'a> ReducedRecord<'a> {
                 .flatten()
                 .unzip();
         let (n, w) = (reduced.mode_count(), 6 * reduced.bodies.len());
-        let mut system = Mat::<f64>::identity(n, n);
+        let mut system = DMatrix::identity(n, n);
         let mut answer = DMatrix::zeros(n, w);
         let mut direct = DMatrix::zeros(w, w);
         for (placed, block) in placed.iter().zip(&blocks) {
@@ -325,12 +325,13 @@ fn scatter(
     source: usize,
     factor: f64,
     block: MatRef<f64>,
-    (system, answer, direct): (&mut Mat<f64>, &mut DMatrix<f64>, &mut DMatrix<f64>),
+    (system, answer, direct): (&mut DMatrix<f64>, &mut DMatrix<f64>, &mut DMatrix<f64>),
 ) {
     let (t, s) = (reduced.modes[target].clone(), reduced.modes[source].clone());
     // The lower triangle is all that the factorisation reads.
     if target >= source {
-        let mut into = system.submatrix_mut(t.start, s.start, t.len(), s.len());
+        let all = view_mut(system);
+        let mut into = all.submatrix_mut(t.start, s.start, t.len(), s.len());
         into -= faer::Scale(factor) * block.submatrix(0, 0, t.len(), s.len());
     }
     for k in 0..6 {

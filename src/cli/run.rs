@@ -37,6 +37,10 @@ pub(super) struct Arguments {
 pub(super) struct Report {
     pub scene: String,
     pub fidelity: String,
+    /// What `auto` came to; the fidelity itself otherwise.
+    pub fidelity_used: String,
+    /// What `auto` chose for each body and pair, and why.
+    pub chosen: Vec<String>,
     pub method: String,
     pub integrator: String,
     pub bodies: usize,
@@ -99,6 +103,8 @@ fn simulate(
     let report = Report {
         scene: scene.name.clone(),
         fidelity: name(settings.fidelity),
+        fidelity_used: name(simulator.fidelity()),
+        chosen: simulator.reasons().to_vec(),
         method: settings.method_name().into(),
         integrator: name(settings.integrator),
         bodies: scene.bodies.len(),
@@ -182,11 +188,18 @@ fn velocities(joint: &Joint) -> &'static [&'static str] {
 
 impl fmt::Display for Report {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let used = match self.fidelity_used == self.fidelity {
+            true => self.fidelity.clone(),
+            false => format!("{}: {}", self.fidelity, self.fidelity_used),
+        };
         writeln!(
             f,
-            "{}: {} steps of {} s, {} ({}, {})",
-            self.scene, self.steps, self.dt, self.fidelity, self.method, self.integrator
+            "{}: {} steps of {} s, {used} (bodies by {}, {})",
+            self.scene, self.steps, self.dt, self.method, self.integrator
         )?;
+        for reason in &self.chosen {
+            writeln!(f, "  chosen  {reason}")?;
+        }
         writeln!(
             f,
             "  {} bodies, {} faces, {} unknowns",

@@ -25,8 +25,12 @@ const SAFETY: f64 = 1.5;
 const NEAR: f64 = 0.8;
 /// What is resolved, of the smallest gap at the start: bodies may come nearer.
 const ROOM: f64 = 0.6;
-/// Gaps under this part of the finest that compression resolves are left to the fidelity `Full`.
+/// Gaps under this part of the finest that compression resolves are left to the fidelity `Full`, if it does better there:
 const HOPELESS: f64 = 0.5;
+/// its forces hold down to this part of the edges, and compressed sources are the better answer below.
+const EDGES: f64 = 1.0 / 3.0;
+/// Under this part of the finest gap compressed sources may refuse: `Full` answers, and warns.
+const REFUSED: f64 = 0.1;
 
 /// The fidelity to use, what each body and pair gets, and why.
 pub(super) struct Planned {
@@ -71,20 +75,27 @@ pub(super) fn plan(
             Other::Body(_) => g.distance,
             Other::Wall(_) => 2.0 * g.distance,
         };
-        let smallest = gaps
+        let (smallest, edge) = gaps
             .iter()
             .filter(near)
-            .map(seen)
-            .fold(f64::INFINITY, f64::min);
+            .map(|g| (seen(g), g.edge))
+            .min_by(|a, b| a.0.total_cmp(&b.0))
+            .unwrap_or((f64::INFINITY, 0.0));
         let finest = compress::finest_gap(area(mesh));
         let rigid = walls.iter().all(|w| w.surface == WallSurface::Rigid);
         if smallest < HOPELESS * finest && rigid {
+            let full = smallest > EDGES * edge || smallest < REFUSED * finest;
+            let so = if full {
+                out.fidelity = Fidelity::Full;
+                "all bodies are solved together (full)"
+            } else {
+                "neither does full with such edges; use more faces and full for accurate forces there"
+            };
             out.reasons.push(format!(
-                "body {:?} starts with a gap of {smallest:.3e} m, and its compressed sources resolve \
-                 {finest:.3e} m at best: all bodies are solved together (full)",
+                "body {:?} starts with a gap of {smallest:.3e} m at edges of {edge:.3e} m; its compressed \
+                 sources resolve {finest:.3e} m at best: {so}",
                 body.name
             ));
-            out.fidelity = Fidelity::Full;
         }
         // Bodies that start apart may come near: no coarser than without a plan.
         let coarsest = compress::default_gap(properties.volume, area(mesh));

@@ -1,0 +1,96 @@
+//! What the fidelity `auto` chooses, and that it says so.
+
+use hydrograd::scene::{Placement, Shape};
+use hydrograd::{Body, Fidelity, Fluid, Scene, Settings, Simulator};
+use std::path::Path;
+use std::process::Command;
+
+fn balls(places: &[f64]) -> Scene {
+    let mut scene = Scene::new(Fluid::fresh_water());
+    for x in places {
+        let mut body = Body::new(Shape::sphere(1.0)).density(1000.0);
+        body.placement = Placement::new([*x, 0.0, 0.0], [0.0; 3]);
+        scene.add(body);
+    }
+    scene
+}
+
+fn example(name: &str) -> String {
+    let root = Path::new(env!("CARGO_MANIFEST_DIR"));
+    root.join("examples/scenes")
+        .join(name)
+        .display()
+        .to_string()
+}
+
+fn auto(scene: &Scene) -> Simulator {
+    Simulator::new(scene, Settings::default().fidelity(Fidelity::Auto)).unwrap()
+}
+
+#[test]
+fn bodies_that_are_near_get_more_sources_and_far_pairs_fade_out() {
+    let simulator = auto(&balls(&[0.0, 2.2, 40.0]));
+    assert_eq!(simulator.fidelity(), Fidelity::Reduced);
+    let unknowns: Vec<usize> = simulator
+        .discretisation()
+        .iter()
+        .map(|d| d.unknowns)
+        .collect();
+    assert!(
+        unknowns[0] == unknowns[1] && 2 * unknowns[0] > 3 * unknowns[2],
+        "{unknowns:?}"
+    );
+    let reasons = simulator.reasons().join("\n");
+    assert!(reasons.contains("coupled in full up to"), "{reasons}");
+}
+
+/// Between what compressed sources resolve and what they refuse, `full` is chosen where its edges resolve the gap.
+#[test]
+fn gaps_that_compression_does_not_resolve() {
+    for (gap, fidelity) in [
+        (0.1, Fidelity::Reduced),
+        (0.06, Fidelity::Full),
+        (0.03, Fidelity::Reduced),
+        (0.005, Fidelity::Full),
+    ] {
+        let simulator = auto(&balls(&[0.0, 2.0 + gap]));
+        let reasons = simulator.reasons().join("\n");
+        assert_eq!(simulator.fidelity(), fidelity, "gap {gap}: {reasons}");
+        assert_eq!(reasons.contains("at best"), gap < 0.07, "{reasons}");
+    }
+}
+
+/// The floor's triangles are longer than the coin's gap: solving for them all would be slow and no better.
+#[test]
+fn a_floor_of_large_triangles_stays_compressed() {
+    let scene = Scene::load(example("falling_ball_box.toml")).unwrap();
+    let simulator = auto(&scene);
+    let reasons = simulator.reasons().join("\n");
+    assert_eq!(simulator.fidelity(), Fidelity::Reduced, "{reasons}");
+    assert!(reasons.contains("neither does full"), "{reasons}");
+}
+
+#[test]
+fn a_run_says_what_was_chosen() {
+    let run = |more: &[&str]| {
+        let scene = example("falling_ball.toml");
+        let given = ["run", &scene, "--steps", "1", "--fidelity", "auto"];
+        let output = Command::new(env!("CARGO_BIN_EXE_hydrograd"))
+            .args([&given[..], more].concat())
+            .output()
+            .unwrap();
+        assert!(output.status.success());
+        String::from_utf8(output.stdout).unwrap()
+    };
+    let report: serde_json::Value = serde_json::from_str(&run(&["--json"])).unwrap();
+    assert_eq!(
+        (&report["fidelity"], &report["fidelity_used"]),
+        (&"auto".into(), &"reduced".into())
+    );
+    assert!(report["chosen"].as_array().unwrap().len() >= 2);
+    let text = run(&[]);
+    assert!(
+        text.contains("auto: reduced") && text.contains("chosen  body \"coin\" resolves gaps"),
+        "{text}"
+    );
+}

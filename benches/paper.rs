@@ -9,10 +9,8 @@
 
 mod common;
 
-use common::{Effort, added_mass, arguments, in_child, scene, serve_child};
-use hydrograd::boundary::OneBody;
-use hydrograd::scene::Scene;
-use hydrograd::{Fidelity, Settings, Shape, Simulator};
+use common::reference::{Reference, reference, scaled_error};
+use common::{Effort, arguments, in_child, scene, serve_child};
 use nalgebra::DMatrix;
 
 /// A scene of the paper's table.
@@ -55,13 +53,6 @@ const ROWS: [Row; 5] = [
 /// Faces of the reference's two meshes relative to the scene's.
 const MESHES: [f64; 2] = [1.0, 2.25];
 const QUICK_MESHES: [f64; 2] = [0.25, 0.5625];
-
-/// M_f from two meshes, the difference of the finer one from it, and the faces of the finer one.
-struct Reference {
-    matrix: DMatrix<f64>,
-    rest: f64,
-    faces: usize,
-}
 
 fn main() {
     if serve_child() {
@@ -155,51 +146,4 @@ fn print_row(
         run.gradient / run.forward,
         run.memory,
     );
-}
-
-/// max |ΔM_ij| / √(M_ii M_jj).
-fn scaled_error(found: &DMatrix<f64>, right: &DMatrix<f64>) -> f64 {
-    let size = |i: usize| right[(i, i)].sqrt();
-    let error = |(i, j)| (found[(i, j)] - right[(i, j)]).abs() / (size(i) * size(j));
-    let n = right.nrows();
-    let all = (0..n).flat_map(|i| (0..n).map(move |j| (i, j)));
-    all.map(error).fold(0.0, f64::max)
-}
-
-/// M = M_fine + (M_fine − M_coarse) / ((N_fine/N_coarse)^{p/2} − 1): the size of the faces is 1/√N.
-fn reference(scene: &Scene, meshes: [f64; 2], order: f64) -> hydrograd::Result<Reference> {
-    let settings = Settings::default()
-        .fidelity(Fidelity::Full)
-        .one_body(OneBody::Panel);
-    let solve = |factor: f64| {
-        let simulator = Simulator::new(&refined(scene, factor), settings)?;
-        Ok((simulator.faces(), added_mass(&simulator)?))
-    };
-    let (fewer, coarse) = solve(meshes[0])?;
-    let (faces, fine) = solve(meshes[1])?;
-    let gain = (faces as f64 / fewer as f64).powf(order / 2.0) - 1.0;
-    let matrix = &fine + (&fine - coarse) / gain;
-    Ok(Reference {
-        rest: scaled_error(&fine, &matrix),
-        matrix,
-        faces,
-    })
-}
-
-/// The scene with `factor` times as many faces on every body.
-fn refined(scene: &Scene, factor: f64) -> Scene {
-    let mut scene = scene.clone();
-    for shape in scene.bodies.iter_mut().filter_map(|b| b.shape.as_mut()) {
-        let faces = match shape {
-            Shape::Sphere { faces, .. }
-            | Shape::Ellipsoid { faces, .. }
-            | Shape::Box { faces, .. }
-            | Shape::Cylinder { faces, .. }
-            | Shape::Capsule { faces, .. }
-            | Shape::Prism { faces, .. } => faces,
-            Shape::Mesh { .. } => continue,
-        };
-        *faces = faces.map(|n| (factor * n as f64).round() as usize);
-    }
-    scene
 }

@@ -1,6 +1,8 @@
 //! What the benches share: scenes and configurations by name, and a measurement in a process of its own,
 //! so that its peak memory is its own.
 
+pub mod reference;
+
 use hydrograd::coupling::reduced::cache;
 use hydrograd::scene::{Preset, Scene};
 use hydrograd::{Controls, Fidelity, Settings, Simulator, objective};

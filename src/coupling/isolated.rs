@@ -94,6 +94,7 @@ impl Record for IsolatedRecord<'_> {
         Ok(Tangent {
             momentum_x: zero.clone(),
             momentum_y: zero,
+            gradient: vec![Vec6::zeros(); z.len()],
             wrench: vec![Vec6::zeros(); z.len()],
         })
     }

@@ -105,6 +105,8 @@ pub struct Tangent {
     pub momentum_x: DVector<f64>,
     /// `D_g M̄_f[Z] ȳ`.
     pub momentum_y: DVector<f64>,
+    /// The spatial wrenches ∇_g E(x̄, ȳ) themselves, as [`Record::vjp`] gives them.
+    pub gradient: Vec<Vec6>,
     /// Rate of the spatial wrenches ∇_g E(x̄, ȳ) as the bodies are displaced by exp(εZ), at fixed
     /// body-frame twists. For another displacement Y, D_Y(∇E·Z) = wrench·Y + ∇E·(Z × Y).
     pub wrench: Vec<Vec6>,

@@ -133,7 +133,6 @@ impl Evaluation<'_> {
         );
         let momenta = self.fluid_momenta(&direction);
         let momenta_virtual = self.fluid_momenta(&virtual_direction);
-        let pose_force = self.pose_force(&direction);
         let current = self.current_twist();
         let relative: Vec<Vec6> = fields.twist.iter().map(|t| self.relative(t)).collect();
         let carried: Vec<Vec6> = (0..n)
@@ -161,7 +160,8 @@ impl Evaluation<'_> {
         let impulse_w = self.wet_impulses(&along_twist.momentum_x);
         let impulse_v = self.wet_impulses(&along_twist.momentum_y);
         let wrench_twist = self.from_wet(&along_twist.wrench);
-        let pair = self.from_wet(&fluid.gradient(&virtual_direction, &direction));
+        let pose_force = self.half_from_wet(&along_virtual.gradient);
+        let pair = self.from_wet(&along_twist.gradient);
         for b in 0..n {
             if self.system.bodies[b].wet.is_none() {
                 continue;

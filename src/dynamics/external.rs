@@ -128,9 +128,11 @@ impl Evaluation<'_> {
             let power = zeta.dot(&unit);
             parameters_bar.quadratic_drag[b] += self.parameters.density * power;
             parameters_bar.density += self.parameters.quadratic_drag[b] * power;
-            wrench += quadratic_scale * unit;
-            nu_bar += quadratic_scale
-                * drag::quadratic_drag_vjp(&body.surface, body.quadratic_part, &nu, &zeta);
+            if quadratic_scale != 0.0 {
+                wrench += quadratic_scale * unit;
+                nu_bar += quadratic_scale
+                    * drag::quadratic_drag_vjp(&body.surface, body.quadratic_part, &nu, &zeta);
+            }
         }
         let (wrench, nu_bar) = (pose.wrench_to_world(&wrench), pose.wrench_to_world(&nu_bar));
         bar.twist += nu_bar;

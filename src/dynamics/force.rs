@@ -72,12 +72,14 @@ impl Evaluation<'_> {
     /// Fluid pose forces `½ ∂E(v, v)/∂g` on all bodies at unit density.
     pub(super) fn pose_force(&self, direction: &DVector<f64>) -> Vec<Vec6> {
         match &self.fluid {
-            Some(fluid) => {
-                let g = fluid.gradient(direction, direction);
-                self.from_wet(&g.iter().map(|w| 0.5 * w).collect::<Vec<_>>())
-            }
+            Some(fluid) => self.half_from_wet(&fluid.gradient(direction, direction)),
             None => vec![Vec6::zeros(); self.system.len()],
         }
+    }
+
+    /// Half of the wet bodies' field on all bodies.
+    pub(super) fn half_from_wet(&self, field: &[Vec6]) -> Vec<Vec6> {
+        self.from_wet(&field.iter().map(|w| 0.5 * w).collect::<Vec<_>>())
     }
 
     /// Joint forces in frame coordinates, X⁻ᵀ τ.
@@ -214,7 +216,6 @@ impl Evaluation<'_> {
             let direction = self.through_water(v);
             let water = Direction::Basis(&direction);
             let momenta = self.fluid_momenta(&direction);
-            let pose_force = self.pose_force(&direction);
             let current = self.current_twist();
             let n = self.system.len();
             // (D − U × Z) · h_f: one bilinear form with the direction D' = D − U × Z.
@@ -236,6 +237,7 @@ impl Evaluation<'_> {
             let tangent = fluid.hvp(water, water, &self.wet_field(&fields.virtual_twist))?;
             let impulse = self.wet_impulses(&tangent.momentum_x);
             let wrench = self.from_wet(&tangent.wrench);
+            let pose_force = self.half_from_wet(&tangent.gradient);
             for b in 0..n {
                 if self.system.bodies[b].wet.is_none() {
                     continue;

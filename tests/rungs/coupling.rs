@@ -260,6 +260,11 @@ fn hvp(s: &dyn Coupling, c: f64) -> Outcome {
             w.iter().flat_map(|w| (c * w).as_slice().to_vec()).collect()
         };
         let wrench = vector_along(|h| flat(&at(h).gradient(x, y), 1.0), &flat(&t.wrench, c));
+        let (value, right) = (flat(&t.gradient, 1.0), flat(&record.gradient(x, y), 1.0));
+        let size = right.iter().fold(0.0_f64, |m, r| m.max(r.abs()));
+        for (v, r) in value.iter().zip(&right) {
+            assert!((v - r).abs() <= 1e-9 * size, "{v} is not {r}");
+        }
         [impulse(x, &t.momentum_x), impulse(y, &t.momentum_y), wrench]
     }))
 }

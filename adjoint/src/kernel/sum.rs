@@ -35,6 +35,8 @@ pub(super) fn dispatch(op: impl WithSimd<Output = ()>) {
 pub(super) const TILE: usize = 64;
 /// Sources of one task of [`transposed`].
 const CHUNK: usize = 4 * WIDTH;
+/// Pairs that take as long as waking another thread, some times over (about 0.1 ms).
+const WORTH_WAKING: usize = 100_000;
 /// Vectors of sources whose terms [`forward`] keeps before it spends the columns on them.
 const GROUP: usize = 2;
 
@@ -61,6 +63,18 @@ pub(super) trait Terms<const C: usize>: Copy + Sync {
         scratch: &mut Scratch<S>,
         out: &mut [[S::f64s; C]; TILE],
     );
+}
+
+/// Gives `task` the numbered chunks of `out`, on several threads where there are so many pairs that it pays
+/// to wake them.
+fn parts(out: &mut [f64], size: usize, pairs: usize, task: impl Fn(usize, &mut [f64]) + Sync) {
+    if pairs < WORTH_WAKING {
+        let chunks = out.chunks_mut(size).enumerate();
+        chunks.for_each(|(n, out)| task(n, out));
+    } else {
+        let chunks = out.par_chunks_mut(size).enumerate();
+        chunks.for_each(|(n, out)| task(n, out));
+    }
 }
 
 /// Terms of a tile.
@@ -96,19 +110,18 @@ pub(super) fn transposed<const C: usize>(
         assert_eq!(d.len(), sources.len(), "one displacement per source");
         Sources::new(d)
     });
-    out.par_chunks_mut(CHUNK * columns * C)
-        .enumerate()
-        .for_each(|(chunk, out)| {
-            dispatch(Transposed {
-                terms,
-                sources,
-                d: d.as_ref(),
-                weight,
-                columns,
-                chunk,
-                out,
-            });
+    let pairs = terms.len() * sources.len();
+    parts(out, CHUNK * columns * C, pairs, |chunk, out| {
+        dispatch(Transposed {
+            terms,
+            sources,
+            d: d.as_ref(),
+            weight,
+            columns,
+            chunk,
+            out,
         });
+    });
 }
 
 struct Transposed<'a, const C: usize, T> {
@@ -234,19 +247,18 @@ pub(super) fn forward(
             by_column[k * padded + j] = *a;
         }
     }
-    out.par_chunks_mut(TILE * columns)
-        .enumerate()
-        .for_each(|(tile, out)| {
-            dispatch(Forward {
-                terms,
-                sources,
-                d: &d,
-                a: &by_column,
-                columns,
-                tile,
-                out,
-            });
+    let pairs = terms.len() * sources.len();
+    parts(out, TILE * columns, pairs, |tile, out| {
+        dispatch(Forward {
+            terms,
+            sources,
+            d: &d,
+            a: &by_column,
+            columns,
+            tile,
+            out,
         });
+    });
 }
 
 struct Forward<'a, T> {
@@ -357,10 +369,8 @@ pub(super) fn fill(
         "rows missing"
     );
     let end = out.len().min(targets * stride);
-    out[..end]
-        .par_chunks_mut(tile * stride)
-        .enumerate()
-        .for_each(|(n, out)| task(n, out));
+    let pairs = targets * sources.len();
+    parts(&mut out[..end], tile * stride, pairs, task);
 }
 
 /// A constant in every lane.

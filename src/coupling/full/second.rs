@@ -108,9 +108,11 @@ impl FullRecord<'_> {
             })
             .collect();
 
+        let mut gradient = vec![Vec6::zeros(); bodies];
         let mut wrench = vec![Vec6::zeros(); bodies];
         for (pair, first) in self.pairs.iter().zip(&kept) {
             let (w, dw) = self.pair_tangent(pair, first, &responses, &left, &tangent);
+            pair.apply(&self.poses[pair.target], &w, &mut gradient);
             pair.apply_jvp(
                 &self.poses[pair.target],
                 &w,
@@ -122,6 +124,7 @@ impl FullRecord<'_> {
         Ok(Tangent {
             momentum_x: momenta[0].clone(),
             momentum_y: momenta[n - 1].clone(),
+            gradient,
             wrench,
         })
     }

@@ -233,20 +233,25 @@ impl<'a> ReducedRecord<'a> {
         let one = |placed: &Placed| -> Vec6 {
             let link = placed.link;
             let (t, s) = (self.range(link.target), self.range(link.source));
-            let bar = interleave(&[&x[t.clone()], &y[t.clone()]]);
+            // Equal charges need one field.
+            let same = x == y;
+            let columns = if same { 1 } else { 2 };
+            let bar = interleave(&[&x[t.clone()], &y[t.clone()]][..columns]);
             let n = s.len();
             let (x, y) = (&x[s.clone()], &y[s]);
-            let mut field = vec![0.0; 6 * n];
+            let mut field = vec![0.0; 3 * columns * n];
             let targets = self.reduced.bodies[link.target].targets();
-            potential_vjp(targets, &placed.pair.points, &bar, 2, &mut field);
+            potential_vjp(targets, &placed.pair.points, &bar, columns, &mut field);
             let strength = FLUX * link.factor;
+            let last = columns - 1;
             let mut total = wrench(&placed.pair.positions, |j| {
-                let force = vector(&field, 2, j, 0) * y[j] + vector(&field, 2, j, 1) * x[j];
-                strength * placed.weight[0] * force
+                let at = |k| vector(&field, columns, j, k);
+                strength * placed.weight[0] * (at(0) * y[j] + at(last) * x[j])
             });
             if placed.fading() {
-                let p = self.sums(placed, &bar, 2);
-                let energy: f64 = (0..n).map(|j| p[2 * j] * y[j] + p[2 * j + 1] * x[j]).sum();
+                let p = self.sums(placed, &bar, columns);
+                let of = |j: usize| p[columns * j] * y[j] + p[columns * j + last] * x[j];
+                let energy: f64 = (0..n).map(of).sum();
                 let force = placed.between.normalize() * (strength * placed.weight[1] * energy);
                 total += six(&force, &placed.centre.cross(&force));
             }
@@ -461,7 +466,7 @@ impl Record for ReducedRecord<'_> {
             return DVector::zeros(y.len());
         }
         let y = &self.alpha * y;
-        let psi = self.tangent_potentials(&[y.as_slice()], z);
+        let (psi, _) = self.tangent_potentials(&[y.as_slice()], z);
         FLUX * self.alpha.tr_mul(&psi.column(0))
     }
 

@@ -12,7 +12,7 @@ use std::f64::consts::PI;
 const TANGENT: usize = 3;
 
 /// A link along a displacement.
-struct Moved {
+pub(super) struct Moved {
     /// Of each source point, in the target's frame relative to the target, m.
     points: Vec<Vec3>,
     /// Of the source body's centre.
@@ -39,10 +39,15 @@ impl ReducedRecord<'_> {
         }
     }
 
-    /// `DG[Z] α` at all points, a column for each of `alpha`.
-    pub(super) fn tangent_potentials(&self, alpha: &[&[f64]], z: &[Vec6]) -> DMatrix<f64> {
+    /// `DG[Z] α` at all points, a column for each of `alpha`; and of each link what the second derivative
+    /// takes from there.
+    pub(super) fn tangent_potentials(
+        &self,
+        alpha: &[&[f64]],
+        z: &[Vec6],
+    ) -> (DMatrix<f64>, Vec<(Moved, Vec<f64>)>) {
         let k = alpha.len();
-        let one = |placed: &Placed| -> (Vec<f64>, Vec<f64>) {
+        let one = |placed: &Placed| {
             let link = placed.link;
             let (t, s) = (self.range(link.target), self.range(link.source));
             let moved = self.moved(placed, z);
@@ -85,7 +90,7 @@ impl ReducedRecord<'_> {
                     }
                 }
             }
-            (on_target, on_source)
+            ((on_target, on_source), (moved, field))
         };
         let parts = self.reduced.over(&self.placed, TANGENT, one);
         let mut out = DMatrix::zeros(alpha.first().map_or(0, |a| a.len()), k);
@@ -97,11 +102,13 @@ impl ReducedRecord<'_> {
                 }
             }
         };
-        for (placed, (on_target, on_source)) in self.placed.iter().zip(&parts) {
-            add(placed.link.target, on_target);
-            add(placed.link.source, on_source);
+        let mut kept = Vec::with_capacity(parts.len());
+        for (placed, ((on_target, on_source), seen)) in self.placed.iter().zip(parts) {
+            add(placed.link.target, &on_target);
+            add(placed.link.source, &on_source);
+            kept.push(seen);
         }
-        out
+        (out, kept)
     }
 
     pub(super) fn second(&self, x: Direction, y: Direction, z: &[Vec6]) -> Tangent {
@@ -116,20 +123,26 @@ impl ReducedRecord<'_> {
         }
         let n = responses.len();
         let alpha: Vec<&[f64]> = responses.iter().map(|r| r.alpha.as_slice()).collect();
-        let psi = self.tangent_potentials(&alpha, z);
+        let (psi, seen) = self.tangent_potentials(&alpha, z);
         let (dalpha, dmomenta) = self.tangent_answer(&psi);
-        let one = |placed: &Placed| self.link_tangent(placed, &responses, &dalpha, z);
-        let parts = self.reduced.over(&self.placed, TANGENT, one);
-        let mut wrench = vec![Vec6::zeros(); self.reduced.bodies.len()];
+        let links: Vec<_> = self.placed.iter().zip(&seen).collect();
+        let one = |(placed, seen): &(&Placed, &(Moved, Vec<f64>))| {
+            self.link_tangent(placed, seen, &responses, &dalpha)
+        };
+        let parts = self.reduced.over(&links, TANGENT, one);
+        let mut gradient = vec![Vec6::zeros(); self.reduced.bodies.len()];
+        let mut wrench = gradient.clone();
         for (placed, (w, dw)) in self.placed.iter().zip(&parts) {
             let t = placed.link.target;
             let pose = &self.poses[t];
+            placed.pair.apply(pose, w, &mut gradient);
             placed.pair.apply_jvp(pose, w, dw, &z[t], &mut wrench);
         }
         let momentum = |k: usize| -> DVector<f64> { dmomenta.column(k).into_owned() };
         Tangent {
             momentum_x: momentum(0),
             momentum_y: momentum(n - 1),
+            gradient,
             wrench,
         }
     }
@@ -138,14 +151,13 @@ impl ReducedRecord<'_> {
     fn link_tangent(
         &self,
         placed: &Placed,
+        (moved, field): &(Moved, Vec<f64>),
         responses: &[Response],
         dalpha: &DMatrix<f64>,
-        z: &[Vec6],
     ) -> (Vec6, Vec6) {
         let (n, last) = (responses.len(), responses.len() - 1);
         let link = placed.link;
         let (t, s) = (self.range(link.target), self.range(link.source));
-        let moved = self.moved(placed, z);
         let column = |k: usize, range: &std::ops::Range<usize>| -> (Vec<f64>, Vec<f64>) {
             let tangent = dalpha.column(k).rows(range.start, range.len()).into_owned();
             (
@@ -156,22 +168,23 @@ impl ReducedRecord<'_> {
         let at_target: Vec<_> = (0..n).map(|k| column(k, &t)).collect();
         let at_source: Vec<_> = (0..n).map(|k| column(k, &s)).collect();
         let values: Vec<&[f64]> = at_target.iter().map(|c| c.0.as_slice()).collect();
-        let both: Vec<&[f64]> = (values.iter().copied())
-            .chain(at_target.iter().map(|c| c.1.as_slice()))
-            .collect();
-        let (values, both) = (interleave(&values), interleave(&both));
-        let targets = self.reduced.bodies[link.target].targets();
-        let points = &placed.pair.points;
-        // ∇ of the potentials of x.. and δx.., `[j][x.., δx..]`, and the tangent of the first.
-        let mut field = vec![0.0; 6 * n * s.len()];
-        potential_vjp(targets, points, &both, 2 * n, &mut field);
-        let mut bent = vec![0.0; 3 * n * s.len()];
-        potential_hvp(targets, points, &moved.points, &values, n, &mut bent);
+        let changes: Vec<&[f64]> = at_target.iter().map(|c| c.1.as_slice()).collect();
         let sums = if placed.fading() {
-            self.sums(placed, &both, 2 * n)
+            self.sums(
+                placed,
+                &interleave(&[&values[..], &changes].concat()),
+                2 * n,
+            )
         } else {
             Vec::new()
         };
+        let (values, changes) = (interleave(&values), interleave(&changes));
+        let targets = self.reduced.bodies[link.target].targets();
+        let points = &placed.pair.points;
+        // ∇ of the potentials of δx.., added to the tangent of that of x..
+        let mut bent = vec![0.0; 3 * n * s.len()];
+        potential_vjp(targets, points, &changes, n, &mut bent);
+        potential_hvp(targets, points, &moved.points, &values, n, &mut bent);
         let strength = 4.0 * PI * link.factor;
         let [weight, slope, bend] = placed.weight.map(|w| strength * w);
         let (mut w, mut dw) = (Vec6::zeros(), Vec6::zeros());
@@ -180,9 +193,9 @@ impl ReducedRecord<'_> {
             let (mut f, mut df) = (Vec3::zeros(), Vec3::zeros());
             for (x, y) in [(0, last), (last, 0)] {
                 let (a, da) = (at_source[y].0[j], at_source[y].1[j]);
-                let e = vector(&field, 2 * n, j, x);
+                let e = vector(field, n, j, x);
                 f += e * a;
-                df += (vector(&bent, n, j, x) + vector(&field, 2 * n, j, n + x)) * a + e * da;
+                df += vector(&bent, n, j, x) * a + e * da;
                 if !sums.is_empty() {
                     let p = &sums[2 * n * j..2 * n * (j + 1)];
                     energy += p[x] * a;

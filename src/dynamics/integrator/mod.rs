@@ -91,7 +91,7 @@ pub struct Stepper<'a> {
     pub dt: f64,
 }
 
-/// A converged inner stage, kept with a trajectory so that the reverse sweep needn't iterate again.
+/// Inner stages (a converged one, or the forces that others start from), kept with a trajectory so that the reverse sweep needn't iterate again.
 pub type Memo = Option<DVector<f64>>;
 
 /// Result of a step.
@@ -257,7 +257,7 @@ impl Stepper<'_> {
             Integrator::MomentumEuler => euler::step_vjp(self, e, state, v, input, memo, next_bar),
             Integrator::Midpoint => midpoint::step_vjp(self, e, state, v, input, memo, next_bar),
             Integrator::Rk2 | Integrator::Rk4 => {
-                runge_kutta::step_vjp(self, e, state, v, input, next_bar)
+                runge_kutta::step_vjp(self, e, state, v, input, memo, next_bar)
             }
             Integrator::VelocityEuler => {
                 velocity_euler::step_vjp(self, e, state, v, input, next_bar)

@@ -5,7 +5,9 @@
 //! the inverse left Jacobian times the angular velocity, so the order isn't lost on the group.
 
 use super::euler::next_state;
-use super::{Input, Integrator, Split, State, StateBar, StepBar, Stepped, Stepper, When, readout};
+use super::{
+    Input, Integrator, Memo, Split, State, StateBar, StepBar, Stepped, Stepper, When, readout,
+};
 use crate::Result;
 use crate::dynamics::Evaluation;
 use nalgebra::DVector;
@@ -55,7 +57,8 @@ impl<'a> Stage<'a> {
     }
 }
 
-/// The stages.
+/// The stages; made `again` for the reverse sweep, with the forces kept from the step: that of the last stage
+/// isn't asked for there.
 fn stages<'a>(
     s: &'a Stepper,
     e: &Evaluation,
@@ -63,7 +66,7 @@ fn stages<'a>(
     v: &DVector<f64>,
     input: &Input,
     start: &DVector<f64>,
-    reverse: bool,
+    again: Option<&Memo>,
 ) -> Result<Vec<Stage<'a>>> {
     let tree = &s.system.tree;
     let nv = tree.velocities();
@@ -83,7 +86,7 @@ fn stages<'a>(
         } else {
             let mut q = tree.integrate(&state.q, &xi);
             s.place_motions(&mut q, t);
-            Some(s.system.evaluate(s.parameters, &q, true, reverse)?)
+            Some(s.system.evaluate(s.parameters, &q, true, again.is_some())?)
         };
         let at = evaluation.as_ref().unwrap_or(e);
         // The readout's, unless a joint is newly held or released.
@@ -94,7 +97,11 @@ fn stages<'a>(
             readout::solve(at, &split, &p)?
         };
         let chart_rate = tree.chart_rate(&xi, &stage_v);
-        let force = at.force(&stage_v, &input.control);
+        let force = match again {
+            Some(_) if i + 1 == tableau(s).nodes.len() => DVector::zeros(nv),
+            Some(Some(kept)) => kept.rows(i * nv, nv).into_owned(),
+            _ => at.force(&stage_v, &input.control),
+        };
         out.push(Stage {
             evaluation,
             split,
@@ -118,7 +125,7 @@ pub(super) fn step(
 ) -> Result<Stepped> {
     let first = s.split(&input.hold, When::At(s.time(state)));
     let start = s.released_momentum(e, state, v, &first);
-    let stages = stages(s, e, state, v, input, &start, false)?;
+    let stages = stages(s, e, state, v, input, &start, None)?;
     let mut xi = DVector::zeros(v.len());
     let mut y = start;
     for (stage, weight) in stages.iter().zip(tableau(s).weights) {
@@ -127,9 +134,14 @@ pub(super) fn step(
     }
     let mut q = s.system.tree.integrate(&state.q, &xi);
     s.place_motions(&mut q, (state.step + 1) as f64 * s.dt);
+    let leant_on = &stages[..stages.len() - 1];
+    let kept = leant_on
+        .iter()
+        .flat_map(|stage| stage.force.iter().copied());
+    let kept = DVector::from_iterator(leant_on.len() * v.len(), kept);
     Ok(Stepped {
         state: next_state(state, &first, q, y, input),
-        memo: None,
+        memo: Some(kept),
     })
 }
 
@@ -139,12 +151,13 @@ pub(super) fn step_vjp(
     state: &State,
     v: &DVector<f64>,
     input: &Input,
+    memo: &Memo,
     next_bar: &StateBar,
 ) -> Result<StepBar> {
     let tree = &s.system.tree;
     let first = s.split(&input.hold, When::At(s.time(state)));
     let start = s.released_momentum(e, state, v, &first);
-    let stages = stages(s, e, state, v, input, &start, true)?;
+    let stages = stages(s, e, state, v, input, &start, Some(memo))?;
     let mut xi = DVector::zeros(v.len());
     for (stage, weight) in stages.iter().zip(tableau(s).weights) {
         xi += *weight * s.dt * &stage.chart_rate;

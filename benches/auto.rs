@@ -1,0 +1,158 @@
+//! What `auto` gains over one fixed setting for all bodies of a scene.
+//!
+//! `cargo bench --bench auto [-- --quick]`. On each scene `auto` at an aim of 1 %, and `reduced` over a grid of tolerances and
+//! resolved gaps, the same for all bodies. The errors are of M_f at the start, max |ΔM_ij| / √(M_ii M_jj), against coupled panels on
+//! two meshes, extrapolated. Its rival is the fastest of those that err no more.
+
+#[allow(dead_code)]
+mod common;
+
+use common::reference::{reference, scaled_error};
+use common::{Effort, added_mass, arguments, step_times};
+use hydrograd::scene::{Placement, Shape};
+use hydrograd::{Body, Fidelity, Fluid, Joint, Scene, Settings, Simulator};
+use nalgebra::DMatrix;
+
+/// Tolerances of the grid.
+const TOLERANCES: [f64; 4] = [1e-2, 3e-3, 1e-3, 3e-4];
+/// Resolved gaps of the grid, m; none leaves the default.
+const GAPS: [Option<f64>; 5] = [None, Some(0.12), Some(0.06), Some(0.03), Some(0.02)];
+
+fn main() -> hydrograd::Result<()> {
+    let quick = arguments().iter().any(|a| a == "--quick");
+    println!(
+        "| scene | configuration | unknowns | ms/step | ms/step with gradient | error of M_f |"
+    );
+    println!("|---|---|---|---|---|---|");
+    let mut notes = Vec::new();
+    for (name, scene) in [("school", school()), ("boulders", boulders())] {
+        // 320 and 720 faces a body, or 80 and 180.
+        let meshes = if quick { [1.0, 2.25] } else { [4.0, 9.0] };
+        let right = reference(&scene, meshes, 2.0)?;
+        notes.push(format!(
+            "{name}: reference extrapolated from up to {} faces, {:.1e} from the finer mesh",
+            right.faces, right.rest
+        ));
+        let measure = |settings: Settings| Measured::new(&scene, settings, &right.matrix, quick);
+        let auto = measure(Settings::default().fidelity(Fidelity::Auto))?;
+        auto.print(name, "`auto` (1 %)");
+        let mut best: Option<(String, Measured)> = None;
+        for tolerance in TOLERANCES {
+            for gap in GAPS {
+                let mut settings = Settings::default()
+                    .fidelity(Fidelity::Reduced)
+                    .accuracy(tolerance);
+                settings = gap.map_or(settings, |g| settings.resolved_gap(g));
+                let Ok(found) = measure(settings) else {
+                    continue;
+                };
+                let gap = gap.map_or("default".into(), |g| format!("{g} m"));
+                let label = format!("`reduced`, tolerance {tolerance:.0e}, resolved gap {gap}");
+                if !quick {
+                    found.print("", &label);
+                }
+                let better = best
+                    .as_ref()
+                    .is_none_or(|(_, b)| found.times[0] < b.times[0]);
+                if found.error <= auto.error && better {
+                    best = Some((label, found));
+                }
+            }
+        }
+        notes.push(match best {
+            Some((label, b)) => format!(
+                "{name}: the fastest that errs no more is {label}: {:.2} × the time of `auto` per step, {:.2} × with gradient",
+                b.times[0] / auto.times[0],
+                b.times[1] / auto.times[1]
+            ),
+            None => format!("{name}: no fixed setting errs so little"),
+        });
+    }
+    println!();
+    notes.iter().for_each(|n| println!("- {n}"));
+    Ok(())
+}
+
+struct Measured {
+    unknowns: usize,
+    /// Forward, and with gradient; s a step.
+    times: [f64; 2],
+    error: f64,
+}
+
+impl Measured {
+    fn new(
+        scene: &Scene,
+        settings: Settings,
+        right: &DMatrix<f64>,
+        quick: bool,
+    ) -> hydrograd::Result<Self> {
+        let simulator = Simulator::new(scene, settings)?;
+        let effort = match quick {
+            true => Effort {
+                steps: 3,
+                repeat: 1,
+            },
+            false => Effort {
+                steps: 20,
+                repeat: 5,
+            },
+        };
+        Ok(Self {
+            unknowns: simulator.unknowns(),
+            error: scaled_error(&added_mass(&simulator)?, right),
+            times: step_times(&simulator, effort)?,
+        })
+    }
+
+    fn print(&self, scene: &str, label: &str) {
+        println!(
+            "| {scene} | {label} | {} | {:.2} | {:.2} | {:.1e} |",
+            self.unknowns,
+            1e3 * self.times[0],
+            1e3 * self.times[1],
+            self.error
+        );
+    }
+}
+
+fn free(scene: &mut Scene, shape: Shape, place: [f64; 3], turn: [f64; 3]) {
+    let mut body = Body::new(shape).density(1100.0);
+    body.placement = Placement::new(place, turn);
+    body.joint = Joint::Free;
+    scene.add(body);
+}
+
+/// Eight fish-like ellipsoids, 0.6 m long, about two lengths apart; two of them swim side by side, 5 cm apart.
+fn school() -> Scene {
+    let mut scene = Scene::new(Fluid::fresh_water());
+    let fish = || Shape::ellipsoid([0.3, 0.1, 0.15]).faces(80);
+    free(&mut scene, fish(), [0.0, 0.25, 0.0], [0.0; 3]);
+    for i in 0..7 {
+        let (x, y, z) = (i / 4, (i / 2) % 2, i % 2);
+        let shift = |k: i32| 0.05 * f64::from((7 * i + 3 * k) % 5 - 2);
+        let place = [
+            1.3 * f64::from(x) + if i == 0 { 0.0 } else { shift(0) },
+            -1.2 * f64::from(y) + if i == 0 { 0.0 } else { shift(1) },
+            1.1 * f64::from(z) + if i == 0 { 0.0 } else { shift(2) },
+        ];
+        free(&mut scene, fish(), place, [0.0, 0.0, 0.1 * f64::from(i)]);
+    }
+    scene
+}
+
+/// Ten balls of 0.1 to 0.3 m radius, two of them 3 cm apart, the others loosely strewn.
+fn boulders() -> Scene {
+    let mut scene = Scene::new(Fluid::fresh_water());
+    let ball = |radius| Shape::sphere(radius).faces(80);
+    free(&mut scene, ball(0.2), [0.0; 3], [0.0; 3]);
+    free(&mut scene, ball(0.15), [0.38, 0.0, 0.0], [0.0; 3]);
+    for i in 0..8 {
+        let angle = 0.7 * f64::from(i);
+        let far = 1.2 + 0.25 * f64::from(i);
+        let radius = 0.1 + 0.05 * f64::from((3 * i) % 5);
+        let place = [far * angle.cos(), far * angle.sin(), 0.3 * f64::from(i % 3)];
+        free(&mut scene, ball(radius), place, [0.0; 3]);
+    }
+    scene
+}

@@ -16,7 +16,7 @@ use nalgebra::DMatrix;
 /// Tolerances of the grid.
 const TOLERANCES: [f64; 4] = [1e-2, 3e-3, 1e-3, 3e-4];
 /// Resolved gaps of the grid, m; none leaves the default.
-const GAPS: [Option<f64>; 5] = [None, Some(0.12), Some(0.06), Some(0.03), Some(0.02)];
+const GAPS: [Option<f64>; 5] = [None, Some(0.1), Some(0.05), Some(0.03), Some(0.02)];
 
 fn main() -> hydrograd::Result<()> {
     let quick = arguments().iter().any(|a| a == "--quick");
@@ -123,35 +123,42 @@ fn free(scene: &mut Scene, shape: Shape, place: [f64; 3], turn: [f64; 3]) {
     scene.add(body);
 }
 
-/// Eight fish-like ellipsoids, 0.6 m long, about two lengths apart; two of them swim side by side, 5 cm apart.
+/// Places on a grid with `spacing` (m), shaken by up to a twentieth of it.
+fn strewn(count: usize, spacing: f64) -> Vec<[f64; 3]> {
+    let shaken = |at: usize, i: usize, k: usize| {
+        let shift = ((7 * i + 3 * k) % 5) as f64 - 2.0;
+        spacing * (at as f64 + 0.025 * shift)
+    };
+    let place = |i: usize| {
+        [
+            shaken(i % 3, i, 0),
+            shaken((i / 3) % 3, i, 1),
+            shaken(i / 9, i, 2),
+        ]
+    };
+    (1..=count).map(place).collect()
+}
+
+/// Sixteen ellipsoids like fish, 0.6 m long, three lengths apart, but for two that swim side by side 3 cm apart.
 fn school() -> Scene {
     let mut scene = Scene::new(Fluid::fresh_water());
     let fish = || Shape::ellipsoid([0.3, 0.1, 0.15]).faces(80);
-    free(&mut scene, fish(), [0.0, 0.25, 0.0], [0.0; 3]);
-    for i in 0..7 {
-        let (x, y, z) = (i / 4, (i / 2) % 2, i % 2);
-        let shift = |k: i32| 0.05 * f64::from((7 * i + 3 * k) % 5 - 2);
-        let place = [
-            1.3 * f64::from(x) + if i == 0 { 0.0 } else { shift(0) },
-            -1.2 * f64::from(y) + if i == 0 { 0.0 } else { shift(1) },
-            1.1 * f64::from(z) + if i == 0 { 0.0 } else { shift(2) },
-        ];
-        free(&mut scene, fish(), place, [0.0, 0.0, 0.1 * f64::from(i)]);
+    free(&mut scene, fish(), [0.0; 3], [0.0; 3]);
+    free(&mut scene, fish(), [0.05, 0.23, 0.0], [0.0; 3]);
+    for (i, place) in strewn(14, 1.8).into_iter().enumerate() {
+        free(&mut scene, fish(), place, [0.0, 0.0, 0.1 * i as f64]);
     }
     scene
 }
 
-/// Ten balls of 0.1 to 0.3 m radius, two of them 3 cm apart, the others loosely strewn.
+/// Sixteen balls of 0.1 to 0.2 m radius, two of them 2 cm apart, the others strewn about 1 m apart.
 fn boulders() -> Scene {
     let mut scene = Scene::new(Fluid::fresh_water());
     let ball = |radius| Shape::sphere(radius).faces(80);
-    free(&mut scene, ball(0.2), [0.0; 3], [0.0; 3]);
-    free(&mut scene, ball(0.15), [0.38, 0.0, 0.0], [0.0; 3]);
-    for i in 0..8 {
-        let angle = 0.7 * f64::from(i);
-        let far = 1.2 + 0.25 * f64::from(i);
-        let radius = 0.1 + 0.05 * f64::from((3 * i) % 5);
-        let place = [far * angle.cos(), far * angle.sin(), 0.3 * f64::from(i % 3)];
+    free(&mut scene, ball(0.1), [0.0; 3], [0.0; 3]);
+    free(&mut scene, ball(0.1), [0.22, 0.0, 0.0], [0.0; 3]);
+    for (i, place) in strewn(14, 1.0).into_iter().enumerate() {
+        let radius = 0.1 + 0.025 * ((3 * i) % 5) as f64;
         free(&mut scene, ball(radius), place, [0.0; 3]);
     }
     scene

@@ -16,8 +16,9 @@ use crate::shape::{Gap, MassProperties, Other};
 use crate::{Error, Result};
 use std::f64::consts::PI;
 
-/// Of the aim, what compression may add to the error of the bodies themselves, and what each pair
-/// left out may.
+/// Of the aim, what compression may add to the error of the bodies themselves at the smallest gap that it resolves.
+const COMPRESSION: f64 = 0.5;
+/// What each pair left out may.
 const SHARE: f64 = 1.0 / 3.0;
 /// What the coupling of real bodies may be above that of their equivalent ellipsoids' dipoles.
 const SAFETY: f64 = 1.5;
@@ -25,6 +26,8 @@ const SAFETY: f64 = 1.5;
 const NEAR: f64 = 0.8;
 /// What is resolved, of the smallest gap at the start: bodies may come nearer.
 const ROOM: f64 = 0.6;
+/// Bodies that start apart may come near: they resolve this many times the gap that they would without a plan.
+const COARSEST: f64 = 2.0;
 /// Gaps under this part of the finest that compression resolves are left to the fidelity `Full`, if it does better there:
 const HOPELESS: f64 = 0.5;
 /// its forces hold down to this part of the edges, and compressed sources are the better answer below.
@@ -97,12 +100,11 @@ pub(super) fn plan(
                 body.name
             ));
         }
-        // Bodies that start apart may come near: no coarser than without a plan.
-        let coarsest = compress::default_gap(properties.volume, area(mesh));
+        let coarsest = COARSEST * compress::default_gap(properties.volume, area(mesh));
         let gap = (ROOM * smallest).clamp(finest, coarsest);
         out.plan.compress.push(compress::Settings {
             rank: None,
-            tolerance: SHARE * aim,
+            tolerance: COMPRESSION * aim,
             resolved_gap: Some(gap),
         });
     }

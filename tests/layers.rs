@@ -7,7 +7,7 @@ use std::path::{Path, PathBuf};
 /// `Error` and `Result` alone.
 ///
 /// `adjoint::lie` gives vectors and poses to everyone; the modules marked `adjoint` use the ladder too.
-const LAYERS: [(&str, &[&str]); 12] = [
+const LAYERS: [(&str, &[&str]); 13] = [
     ("error", &[]),
     ("scene", &["shape"]),
     ("special", &[]),
@@ -15,13 +15,18 @@ const LAYERS: [(&str, &[&str]); 12] = [
     ("solver", &[]),
     ("boundary", &["adjoint", "solver", "special"]),
     ("coupling", &["adjoint", "boundary", "scene", "solver"]),
+    ("contact", &["adjoint", "scene", "shape"]),
     ("multibody", &["adjoint", "scene"]),
-    ("dynamics", &["adjoint", "coupling", "multibody", "scene"]),
+    (
+        "dynamics",
+        &["adjoint", "contact", "coupling", "multibody", "scene"],
+    ),
     (
         "simulate",
         &[
             "adjoint",
             "boundary",
+            "contact",
             "coupling",
             "dynamics",
             "multibody",
@@ -40,11 +45,12 @@ const LAYERS: [(&str, &[&str]); 12] = [
 ];
 
 /// Modules of which only the named parts may be used.
-const ONLY: [(&str, &str, &[&str]); 3] = [
+const ONLY: [(&str, &str, &[&str]); 4] = [
     ("shape", "adjoint", &["lie"]),
     // Descriptions of shapes and walls are scene data, and a scene asks the shapes whether they are
     // right: the one pair that knows each other.
     ("shape", "scene", &["Shape", "Wall"]),
+    ("contact", "adjoint", &["lie"]),
     ("multibody", "adjoint", &["lie"]),
 ];
 

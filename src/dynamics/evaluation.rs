@@ -1,6 +1,6 @@
 //! Everything that depends on the configuration alone: kinematics, momenta per unit velocity, mass matrix.
 
-use super::{Parameters, System};
+use super::{Parameters, System, Touch};
 use crate::adjoint::lie::{Mat6, Vec3, Vec6, six};
 use crate::adjoint::rigid;
 use crate::coupling::{Record, Report};
@@ -20,6 +20,8 @@ pub struct Evaluation<'a> {
     pub kinematics: Kinematics,
     /// Rigid inertias, body frames.
     pub rigid: Vec<Mat6>,
+    /// Places where surfaces are near.
+    pub touches: Vec<Touch>,
     /// The fluid at unit density, if there is any.
     pub fluid: Option<Box<dyn Record + 'a>>,
     /// Spatial fluid momentum of each body at unit density per basis column (6 × k each).
@@ -116,6 +118,7 @@ impl System {
             system: self,
             parameters,
             q: q.clone(),
+            touches: self.touches(parameters, &kinematics.poses)?,
             kinematics,
             rigid,
             fluid,

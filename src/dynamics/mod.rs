@@ -1,6 +1,7 @@
 //! Equations of motion: forces, the coupled mass matrix, integrators, and their adjoints.
 
 mod acceleration;
+mod contact;
 mod evaluation;
 mod external;
 mod force;
@@ -9,8 +10,9 @@ mod momentum;
 mod parameters;
 mod system;
 
+pub use contact::{ContactModel, Regularisation, Touch};
 pub use evaluation::Evaluation;
 pub use force::ForceCotangents;
 pub use integrator::{Input, Integrator, Memo, State, StateBar, StepBar, Stepped, Stepper};
-pub use parameters::Parameters;
+pub use parameters::{Contact, Parameters};
 pub use system::{BodyData, Drive, System};

@@ -16,6 +16,19 @@ pub struct Parameters {
     /// Quadratic drag coefficient of each body, dimensionless. Zero, with zero derivative, for a body whose scene gives no
     /// drag at all: its surface isn't kept.
     pub quadratic_drag: Vec<f64>,
+    /// Contact, the same for all surfaces.
+    pub contact: Contact,
+}
+
+/// Parameters of contact that a trajectory is differentiated with respect to.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize)]
+pub struct Contact {
+    /// Stiffness of each point, N/m.
+    pub stiffness: f64,
+    /// Dissipation of Hunt and Crossley, s/m.
+    pub dissipation: f64,
+    /// Friction coefficient.
+    pub friction: f64,
 }
 
 impl Parameters {
@@ -27,10 +40,12 @@ impl Parameters {
             inertia: vec![[0.0; 6]; bodies],
             linear_drag: vec![0.0; bodies],
             quadratic_drag: vec![0.0; bodies],
+            contact: Contact::default(),
         }
     }
 
-    /// All values in one row: density, then per body mass, inertia (6), linear and quadratic drag.
+    /// All values in one row: density, then per body mass, inertia (6), linear and quadratic drag; then
+    /// stiffness, dissipation and friction of contact.
     pub fn to_vec(&self) -> Vec<f64> {
         let mut out = vec![self.density];
         for b in 0..self.mass.len() {
@@ -39,13 +54,18 @@ impl Parameters {
             out.push(self.linear_drag[b]);
             out.push(self.quadratic_drag[b]);
         }
+        out.extend([
+            self.contact.stiffness,
+            self.contact.dissipation,
+            self.contact.friction,
+        ]);
         out
     }
 
     /// Inverse of [`Parameters::to_vec`] for the same number of bodies; `None` if the length is wrong.
     pub fn with_values(&self, values: &[f64]) -> Option<Self> {
         let bodies = self.mass.len();
-        if values.len() != 1 + 9 * bodies {
+        if values.len() != 4 + 9 * bodies {
             return None;
         }
         let mut out = Self::zeros(bodies);
@@ -57,6 +77,12 @@ impl Parameters {
             out.linear_drag[b] = row[7];
             out.quadratic_drag[b] = row[8];
         }
+        let row = &values[1 + 9 * bodies..];
+        out.contact = Contact {
+            stiffness: row[0],
+            dissipation: row[1],
+            friction: row[2],
+        };
         Some(out)
     }
 
@@ -71,6 +97,7 @@ impl Parameters {
             out.push(format!("{name}.drag.linear"));
             out.push(format!("{name}.drag.quadratic"));
         }
+        out.extend(["stiffness", "dissipation", "friction"].map(|n| format!("contact.{n}")));
         out
     }
 
@@ -90,5 +117,8 @@ impl Parameters {
             self.linear_drag[b] += scale * other.linear_drag[b];
             self.quadratic_drag[b] += scale * other.quadratic_drag[b];
         }
+        self.contact.stiffness += scale * other.contact.stiffness;
+        self.contact.dissipation += scale * other.contact.dissipation;
+        self.contact.friction += scale * other.contact.friction;
     }
 }

@@ -1,5 +1,6 @@
 //! A system: the tree, its bodies' constants, and the coupling through the water.
 
+use super::ContactModel;
 use crate::adjoint::drag::{Element, Part};
 use crate::adjoint::lie::{Mat6, Vec3};
 use crate::coupling::Coupling;
@@ -59,6 +60,8 @@ pub struct System {
     pub controls: usize,
     /// The coupling; its bodies are those with `wet` set, in order.
     pub coupling: Box<dyn Coupling>,
+    /// Contact; none where bodies pass through each other.
+    pub contact: Option<ContactModel>,
 }
 
 impl System {

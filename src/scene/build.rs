@@ -30,6 +30,7 @@ impl Scene {
             steps: 100,
             preset: Preset::Default,
             walls: Vec::new(),
+            contact: None,
             bodies: Vec::new(),
             initial: Initial::default(),
             controller: None,

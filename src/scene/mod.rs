@@ -4,12 +4,14 @@
 //! `parent pose ∘ placement ∘ joint motion`; the body's origin is where its joint acts.
 
 mod build;
+mod contact;
 mod file;
 mod joint;
 mod motion;
 mod validate;
 
 pub use build::BodyId;
+pub use contact::Contact;
 
 use serde::{Deserialize, Serialize};
 
@@ -35,6 +37,9 @@ pub struct Scene {
     /// Plane rigid walls: one, or mutually perpendicular ones.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub walls: Vec<Wall>,
+    /// How surfaces touch; without it bodies may not.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub contact: Option<Contact>,
     /// The bodies, parents before children.
     pub bodies: Vec<Body>,
     /// Where the scene starts.

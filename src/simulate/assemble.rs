@@ -1,6 +1,7 @@
 //! From a scene to a system: meshes, masses, joints, coupling, controller.
 
 use super::clearance::Clearance;
+use super::contact;
 use super::plan::{Planned, plan};
 use super::policy::{Constant, OpenLoop, Pd, PdAxis, PushThenLock};
 use super::wet::{self, Discretisation, Plan, Water, Wet};
@@ -286,6 +287,7 @@ pub(super) fn assemble(
         current: Vec3::from(scene.fluid.current),
         controls,
         coupling: Box::new(Isolated::new(Vec::new())),
+        contact: None,
         tree,
     };
     let q = start_coordinates(scene, settings, &system, &parameters, &clearance)?;
@@ -301,6 +303,19 @@ pub(super) fn assemble(
     let mut resolved = vec![0.0; scene.bodies.len()];
     for (b, d) in of_wet.iter().zip(&made.bodies) {
         resolved[*b] = d.resolved_gap.unwrap_or(0.0);
+    }
+    if let Some(given) = &scene.contact {
+        let made = contact::assemble(contact::Parts {
+            scene,
+            given,
+            settings,
+            clearance: &clearance,
+            fidelity,
+            resolved: &resolved,
+            surfaces: &surfaces,
+            mass: &parameters.mass,
+        })?;
+        (system.contact, parameters.contact) = (Some(made.0), made.1);
     }
     let v = start_velocity(scene, settings, &system, &parameters, &q)?;
     Ok(Assembled {

@@ -2,6 +2,7 @@
 
 mod assemble;
 mod clearance;
+mod contact;
 mod controls;
 mod estimate;
 pub mod gradcheck;

@@ -84,8 +84,15 @@ impl Settings {
     }
 
     /// What a scene asks for.
+    ///
+    /// Contact is solved in the velocity at the end of a step: a scene with contact gets
+    /// [`Integrator::MomentumEuler`], which can do that.
     pub fn for_scene(scene: &Scene) -> Self {
-        Self::preset(scene.preset)
+        let settings = Self::preset(scene.preset);
+        match scene.contact {
+            Some(_) => settings.integrator(Integrator::MomentumEuler),
+            None => settings,
+        }
     }
 
     /// With another time step, s.

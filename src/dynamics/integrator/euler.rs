@@ -19,6 +19,30 @@ use nalgebra::{DMatrix, DVector, Dyn, LU};
 /// Most Newton iterations of a stage; quadratic convergence needs four or five.
 const ITERATIONS: usize = 40;
 
+/// Where surfaces may touch: the force bends within the width over which contact sets in.
+const TOUCHING_ITERATIONS: usize = 200;
+/// Relative residual below which a stage has converged once it stops shrinking.
+const RESIDUAL: f64 = 1e-13;
+/// The same where surfaces may touch: stiff forces of gaps that are known to round-off.
+const TOUCHING_RESIDUAL: f64 = 1e-11;
+/// What is accepted at the last iteration.
+const LAST_RESIDUAL: f64 = 1e-11;
+/// A step that doesn't shrink the imbalance is halved down to this part of it.
+const SHORTEST: f64 = 1e-9;
+
+/// A velocity tried for a stage.
+struct Trial {
+    v: DVector<f64>,
+    force: DVector<f64>,
+    /// p̂ + h f.
+    reached: DVector<f64>,
+    defect: DVector<f64>,
+    /// Size of the defect, masses scaled to one.
+    unbalanced: f64,
+    /// The same relative to what is balanced.
+    residual: f64,
+}
+
 /// A converged stage.
 pub(super) struct Stage {
     /// Its velocity.
@@ -74,7 +98,6 @@ pub(super) fn solve_stage(
     what: &dyn Fn() -> String,
 ) -> Result<Stage> {
     let tree = &e.system.tree;
-    let mut v = &split.driven + split.put(&split.take(guess));
     let scale = split
         .block(&e.mass_matrix)
         .diagonal()
@@ -83,41 +106,63 @@ pub(super) fn solve_stage(
     // Against the sum of what M v adds up, so that a total momentum of zero is no target for relative errors.
     let summands = e.mass_matrix.abs();
     let start = sized(&e.user_momentum(hat)).max(sized(&e.rest_momentum));
-    let mut previous = f64::INFINITY;
-    let mut residual = f64::INFINITY;
-    for iteration in 0..ITERATIONS {
+    let at = |v: DVector<f64>| {
         let force = e.force(&v, control);
         let reached = hat + rule.h * &force;
         let target = tree.chart_momentum(&e.q, &(rule.reach * &v), &reached);
         let defect = e.momentum(&v) - &target;
         let size = sized(&(&summands * v.abs())).max(sized(&target)).max(start);
-        residual = if size > 0.0 {
-            sized(&defect) / size
-        } else {
-            0.0
-        };
+        let unbalanced = sized(&defect);
+        let residual = if size > 0.0 { unbalanced / size } else { 0.0 };
+        Trial {
+            v,
+            force,
+            reached,
+            defect,
+            unbalanced,
+            residual,
+        }
+    };
+    let touching = !e.touches.is_empty();
+    let (most, enough) = match touching {
+        true => (TOUCHING_ITERATIONS, TOUCHING_RESIDUAL),
+        false => (ITERATIONS, RESIDUAL),
+    };
+    let mut now = at(&split.driven + split.put(&split.take(guess)));
+    let mut previous = f64::INFINITY;
+    for iteration in 0..most {
         // Stop where rounding ends the quadratic convergence.
-        let converged = residual == 0.0 || (residual <= 1e-13 && residual >= 0.25 * previous);
-        let at_last = iteration + 1 == ITERATIONS && residual <= 1e-11;
+        let stalled = now.residual >= 0.25 * previous;
+        let converged = now.residual == 0.0 || (now.residual <= enough && stalled);
+        let at_last = iteration + 1 == most && now.residual <= LAST_RESIDUAL;
         if converged || at_last {
+            let Trial { v, force, .. } = now;
             return Ok(Stage { v, force });
         }
-        if !residual.is_finite() {
+        if !now.residual.is_finite() {
             break;
         }
-        previous = residual;
-        let rates = e.force_velocity_jacobian(&v);
-        let matrix = stage_matrix(e, split, &v, &rates, &reached, rule);
-        let Some(step) = matrix.lu().solve(&split.take(&defect)) else {
+        previous = now.residual;
+        let rates = e.force_velocity_jacobian(&now.v);
+        let matrix = stage_matrix(e, split, &now.v, &rates, &now.reached, rule);
+        let Some(step) = matrix.lu().solve(&split.take(&now.defect)) else {
             break;
         };
-        v -= split.put(&step);
+        let step = split.put(&step);
+        let mut next = at(&now.v - &step);
+        let mut length = 1.0;
+        while touching && !(next.unbalanced < now.unbalanced) && length > SHORTEST {
+            length *= 0.5;
+            next = at(&now.v - length * &step);
+        }
+        now = next;
     }
+    let residual = now.residual;
     Err(Error::Solver {
         what: what(),
         iterations: ITERATIONS,
         residual,
-        tolerance: 1e-13,
+        tolerance: enough,
         remedy: "the time step is too long for these velocities or forces: take a smaller one"
             .into(),
     })

@@ -5,6 +5,7 @@
 //! positive definite) is checked where they are made.
 
 mod body;
+mod contact;
 mod start;
 
 use std::collections::HashMap;
@@ -24,6 +25,7 @@ impl Scene {
             body::check(self, index)?;
         }
         start::check(self)?;
+        contact::check(self)?;
         self.check_controller()
     }
 

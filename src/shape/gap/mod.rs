@@ -103,6 +103,11 @@ impl Gaps {
         })
     }
 
+    /// The pairs that are looked at: a body, and another or a wall.
+    pub fn pairs(&self) -> &[(usize, Other)] {
+        &self.pairs
+    }
+
     /// Smallest gap of all pairs, one pose per mesh; none when there is no pair. Of pairs
     /// equally near to rounding, always the same one. Pairs with a pose that is missing or isn't
     /// finite are passed over.

@@ -1,0 +1,89 @@
+//! The pairs of surfaces that may touch.
+
+use super::geometry::{ContactPoint, Geometry, against_wall, between};
+use crate::Result;
+use crate::adjoint::lie::{Pose, Vec3};
+use crate::scene::Wall;
+use crate::shape::Other;
+
+/// Two surfaces that may touch.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct ContactPair {
+    /// The body that normals point to.
+    pub first: usize,
+    /// What it may touch.
+    pub second: Other,
+}
+
+impl ContactPair {
+    /// Number of the second body, unless it's a wall.
+    pub fn second_body(&self) -> Option<usize> {
+        match self.second {
+            Other::Body(b) => Some(b),
+            Other::Wall(_) => None,
+        }
+    }
+}
+
+/// Shapes of the bodies of a scene, its walls, and which of them may touch.
+#[derive(Clone, Debug)]
+pub struct Contacts {
+    shapes: Vec<Option<Geometry>>,
+    /// Point and unit normal.
+    walls: Vec<(Vec3, Vec3)>,
+    pairs: Vec<ContactPair>,
+}
+
+/// Points are kept up to this part of the smaller body's radius beyond the distance asked for: what may close in a step.
+const AHEAD: f64 = 0.5;
+
+impl Contacts {
+    /// From the bodies' shapes (none for a body without surface) and the walls; pairs of which one has no surface are dropped.
+    pub fn new(shapes: Vec<Option<Geometry>>, walls: &[Wall], pairs: &[ContactPair]) -> Self {
+        let solid = |b: usize| shapes[b].is_some();
+        let whole = |p: &ContactPair| solid(p.first) && p.second_body().is_none_or(solid);
+        let plane = |w: &Wall| (Vec3::from(w.point), Vec3::from(w.normal).normalize());
+        Self {
+            pairs: pairs.iter().copied().filter(whole).collect(),
+            walls: walls.iter().map(plane).collect(),
+            shapes,
+        }
+    }
+
+    /// The pairs that may touch.
+    pub fn pairs(&self) -> &[ContactPair] {
+        &self.pairs
+    }
+
+    /// Shape of body `b`, if it has one.
+    pub fn shape(&self, b: usize) -> Option<&Geometry> {
+        self.shapes[b].as_ref()
+    }
+
+    /// Where the surfaces of pair `k` are near, the bodies being at `poses`; all places with a gap under `distance` (m) and some beyond,
+    /// as far as bodies may come in a step.
+    ///
+    /// # Errors
+    /// A signed distance that can't be found.
+    pub fn points(&self, k: usize, poses: &[Pose], distance: f64) -> Result<Vec<ContactPoint>> {
+        let pair = &self.pairs[k];
+        let (a, first) = (pair.first, &self.shapes[pair.first]);
+        let Some(first) = first else {
+            return Ok(Vec::new());
+        };
+        match pair.second {
+            Other::Wall(w) => {
+                let reach = distance + AHEAD * first.radius();
+                let (point, normal) = &self.walls[w];
+                Ok(against_wall(first, &poses[a], point, normal, reach))
+            }
+            Other::Body(b) => {
+                let Some(second) = &self.shapes[b] else {
+                    return Ok(Vec::new());
+                };
+                let reach = distance + AHEAD * first.radius().min(second.radius());
+                between((first, &poses[a]), (second, &poses[b]), reach)
+            }
+        }
+    }
+}

@@ -1,0 +1,181 @@
+//! Contact forces among bodies and with walls: the law of [`crate::adjoint::contact`] at every point where surfaces are near.
+//!
+//! Points, normals and gaps belong to the configuration; the velocity is the argument of the force, so that an integrator
+//! that is implicit in it solves contact implicitly, against the mass matrix with its fluid part.
+
+use super::{Evaluation, Parameters, System};
+use crate::Result;
+use crate::adjoint::contact::{
+    ContactBar, Law, Meeting, contact_force, contact_force_jvp, contact_force_vjp,
+};
+use crate::adjoint::lie::{Pose, Vec3, Vec6, angular, point_velocity, point_wrench, six};
+use crate::contact::{ContactPoint, Contacts};
+
+/// Constants of all contacts that no trajectory is differentiated with respect to.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Regularisation {
+    /// Speed below which friction holds with creep, m/s.
+    pub stiction_speed: f64,
+    /// Half the width over which the force sets in, m.
+    pub width: f64,
+    /// How far ahead the gap is foreseen, s: to the end of the step.
+    pub horizon: f64,
+}
+
+/// Which surfaces may touch, and how.
+pub struct ContactModel {
+    /// Their shapes.
+    pub shapes: Contacts,
+    /// Gap at which the surfaces of a pair are taken to touch, m, in the order of [`Contacts::pairs`].
+    pub gaps: Vec<f64>,
+    /// What smooths the law.
+    pub regularisation: Regularisation,
+}
+
+/// A place where two surfaces are near at a configuration.
+#[derive(Clone, Debug)]
+pub struct Touch {
+    /// Body to which the normal points.
+    pub first: usize,
+    /// The other body; none for a wall.
+    pub second: Option<usize>,
+    /// Its law.
+    pub law: Law,
+    /// Where, with its derivatives.
+    pub point: ContactPoint,
+}
+
+impl ContactModel {
+    fn law(&self, pair: usize, parameters: &Parameters) -> Law {
+        Law {
+            stiffness: parameters.contact.stiffness,
+            dissipation: parameters.contact.dissipation,
+            friction: parameters.contact.friction,
+            stiction_speed: self.regularisation.stiction_speed,
+            gap: self.gaps[pair],
+            width: self.regularisation.width,
+            horizon: self.regularisation.horizon,
+        }
+    }
+}
+
+impl System {
+    /// All places where surfaces are near.
+    ///
+    /// # Errors
+    /// A signed distance that can't be found.
+    pub(super) fn touches(&self, parameters: &Parameters, poses: &[Pose]) -> Result<Vec<Touch>> {
+        let mut out = Vec::new();
+        let Some(model) = &self.contact else {
+            return Ok(out);
+        };
+        for (k, pair) in model.shapes.pairs().iter().enumerate() {
+            let law = model.law(k, parameters);
+            for point in model.shapes.points(k, poses, law.gap + law.width)? {
+                out.push(Touch {
+                    first: pair.first,
+                    second: pair.second_body(),
+                    law,
+                    point,
+                });
+            }
+        }
+        Ok(out)
+    }
+}
+
+impl Touch {
+    /// Relative twist of two bodies' spatial fields.
+    fn relative(&self, field: &[Vec6]) -> Vec6 {
+        field[self.first] - self.second.map_or(Vec6::zeros(), |b| field[b])
+    }
+
+    fn meeting(&self, twists: &[Vec6]) -> Meeting {
+        let p = &self.point;
+        Meeting {
+            gap: p.gap,
+            weight: p.weight,
+            normal: p.normal,
+            velocity: point_velocity(&self.relative(twists), &p.position),
+        }
+    }
+
+    /// Adds a wrench to the first body and takes it from the second.
+    fn exchange(&self, wrench: &Vec6, out: &mut [Vec6]) {
+        out[self.first] += wrench;
+        if let Some(b) = self.second {
+            out[b] -= wrench;
+        }
+    }
+
+    /// Cotangent of a displacement of both bodies from those of what the point consists of: the point and its normal are carried
+    /// along by the second body, and its slopes tell what the first one's displacement relative to it adds.
+    fn displacement_vjp(&self, bar: &ContactBar, position: &Vec3, out: &mut [Vec6]) {
+        let (p, s) = (&self.point, &self.point.slopes);
+        let own = s.gap * bar.gap
+            + s.weight * bar.weight
+            + s.normal.tr_mul(&bar.normal)
+            + s.position.tr_mul(position);
+        self.exchange(&own, out);
+        if let Some(b) = self.second {
+            out[b] += point_wrench(&p.position, position)
+                + six(&Vec3::zeros(), &p.normal.cross(&bar.normal));
+        }
+    }
+}
+
+/// Cotangents that contact hands back.
+pub(super) struct ContactCotangents<'b> {
+    pub pose: &'b mut [Vec6],
+    pub twist: &'b mut [Vec6],
+    pub virtual_twist: &'b mut [Vec6],
+    pub parameters: &'b mut Parameters,
+}
+
+impl Evaluation<'_> {
+    /// Spatial contact wrenches on all bodies moving with `twists`.
+    pub fn contact_wrenches(&self, twists: &[Vec6]) -> Vec<Vec6> {
+        let mut out = vec![Vec6::zeros(); self.system.len()];
+        for t in &self.touches {
+            let force = contact_force(&t.law, &t.meeting(twists));
+            t.exchange(&point_wrench(&t.point.position, &force), &mut out);
+        }
+        out
+    }
+
+    /// Tangent of [`Evaluation::contact_wrenches`] along a change of the twists.
+    pub fn contact_wrenches_jvp(&self, twists: &[Vec6], dtwists: &[Vec6]) -> Vec<Vec6> {
+        let mut out = vec![Vec6::zeros(); self.system.len()];
+        for t in &self.touches {
+            let du = point_velocity(&t.relative(dtwists), &t.point.position);
+            let force = contact_force_jvp(&t.law, &t.meeting(twists), &du);
+            t.exchange(&point_wrench(&t.point.position, &force), &mut out);
+        }
+        out
+    }
+
+    /// Transpose: the gradient of `Σ_b Z_b · wrench_b` over poses (spatial displacements at fixed spatial twists), twists, the virtual
+    /// twists Z and the parameters.
+    pub(super) fn contact_wrenches_vjp(
+        &self,
+        twists: &[Vec6],
+        virtual_twists: &[Vec6],
+        bar: ContactCotangents,
+    ) {
+        for t in &self.touches {
+            let x = &t.point.position;
+            let meeting = t.meeting(twists);
+            let (v, z) = (t.relative(twists), t.relative(virtual_twists));
+            let force = contact_force(&t.law, &meeting);
+            t.exchange(&point_wrench(x, &force), bar.virtual_twist);
+            let own = contact_force_vjp(&t.law, &meeting, &point_velocity(&z, x));
+            t.exchange(&point_wrench(x, &own.velocity), bar.twist);
+            // Both u and Z's velocity are taken at the point.
+            let position = own.velocity.cross(&angular(&v)) + force.cross(&angular(&z));
+            t.displacement_vjp(&own, &position, bar.pose);
+            bar.parameters.contact.stiffness += own.stiffness;
+            bar.parameters.contact.dissipation += own.dissipation;
+            bar.parameters.contact.friction += own.friction;
+        }
+    }
+}

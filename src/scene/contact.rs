@@ -1,0 +1,41 @@
+//! How surfaces touch.
+
+use serde::{Deserialize, Serialize};
+
+/// Contact between bodies, and between bodies and walls. A scene that has it (`[contact]`, all keys of which may be left out)
+/// keeps its bodies apart; bodies of one chain of joints that are neighbours don't touch each other.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields, default)]
+pub struct Contact {
+    /// Stiffness of each point of contact, N/m. Default: a quarter of the heaviest moving body's mass over the square of the time
+    /// step, which is near rigid at that step.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub stiffness: Option<f64>,
+    /// Dissipation d of Hunt and Crossley, s/m: surfaces that part faster than 1/d don't press.
+    pub dissipation: f64,
+    /// Friction coefficient.
+    pub friction: f64,
+    /// Gap at which surfaces are taken to touch, m. Default: the gap that the coupling of the water resolves (zero with
+    /// `isolated`), so that the water between them stays resolved.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub gap: Option<f64>,
+    /// Half the width over which the force sets in, m; nothing acts at a larger distance than it beyond `gap`. Default: 0.2 % of
+    /// the smallest body's size.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub width: Option<f64>,
+    /// Speed below which friction holds with creep, m/s.
+    pub stiction_speed: f64,
+}
+
+impl Default for Contact {
+    fn default() -> Self {
+        Self {
+            stiffness: None,
+            dissipation: 0.5,
+            friction: 0.5,
+            gap: None,
+            width: None,
+            stiction_speed: 1e-3,
+        }
+    }
+}

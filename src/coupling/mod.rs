@@ -121,6 +121,16 @@ pub trait Record: Send + Sync {
     /// body. Zeros if the evaluation was made without derivative.
     fn gradient(&self, x: &DVector<f64>, y: &DVector<f64>) -> Vec<Vec6>;
 
+    /// ∇_g E(x, e_i) for every basis column e_i, as [`Record::gradient`].
+    fn gradient_columns(&self, x: &DVector<f64>) -> Vec<Vec<Vec6>> {
+        let unit = |i: usize| {
+            let mut e = DVector::zeros(x.len());
+            e[i] = 1.0;
+            e
+        };
+        (0..x.len()).map(|i| self.gradient(x, &unit(i))).collect()
+    }
+
     /// `D_g E(e_i, y)[Z]` for every basis column e_i, without a further solve.
     fn gradient_along(&self, y: &DVector<f64>, z: &[Vec6]) -> DVector<f64>;
 

@@ -132,6 +132,20 @@ impl Evaluation<'_> {
 
     /// Tangent of [`Evaluation::force`] along `dv` at fixed q and u.
     pub fn force_jvp(&self, v: &DVector<f64>, dv: &DVector<f64>) -> DVector<f64> {
+        let changed = match &self.fluid {
+            Some(f) => f.gradient(&self.through_water(v), &self.virtual_direction(dv)),
+            None => Vec::new(),
+        };
+        self.force_tangent(v, dv, &changed)
+    }
+
+    /// The same with the change of the fluid's pose force on the wet bodies.
+    fn force_tangent(
+        &self,
+        v: &DVector<f64>,
+        dv: &DVector<f64>,
+        dpose_force: &[Vec6],
+    ) -> DVector<f64> {
         let tree = &self.system.tree;
         let rho = self.parameters.density;
         let twists = tree.twists(&self.kinematics, v);
@@ -141,7 +155,7 @@ impl Evaluation<'_> {
         let fluid = self.fluid_momenta(&direction);
         let dfluid = self.fluid_momenta(&ddirection);
         let dpose_force = match &self.fluid {
-            Some(f) => self.from_wet(&f.gradient(&direction, &ddirection)),
+            Some(_) => self.from_wet(dpose_force),
             None => vec![Vec6::zeros(); self.system.len()],
         };
         let dcontact = self.contact_wrenches_jvp(&twists, &dtwists);
@@ -163,11 +177,15 @@ impl Evaluation<'_> {
     /// ∂f/∂v, column by column.
     pub fn force_velocity_jacobian(&self, v: &DVector<f64>) -> DMatrix<f64> {
         let n = v.len();
+        let changed = match &self.fluid {
+            Some(f) => f.gradient_columns(&self.through_water(v)),
+            None => vec![Vec::new(); n],
+        };
         let mut out = DMatrix::zeros(n, n);
-        for k in 0..n {
+        for (k, changed) in changed.iter().enumerate().take(n) {
             let mut unit = DVector::zeros(n);
             unit[k] = 1.0;
-            out.set_column(k, &self.force_jvp(v, &unit));
+            out.set_column(k, &self.force_tangent(v, &unit, changed));
         }
         out
     }

@@ -19,6 +19,7 @@
 mod body;
 pub mod cache;
 mod check;
+mod columns;
 pub mod compress;
 mod cutoff;
 mod factor;

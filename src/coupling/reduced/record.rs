@@ -1,5 +1,6 @@
 //! One evaluation of the reduced coupling: value and first derivative.
 
+use super::columns::Fields;
 use super::factor::Factor;
 use super::link::{Link, Placed};
 use super::{Parts, Reduced};
@@ -13,9 +14,10 @@ use faer::reborrow::ReborrowMut;
 use faer::{Accum, Mat, MatMut, MatRef, Par};
 use nalgebra::{DMatrix, DVector};
 use std::f64::consts::PI;
+use std::sync::OnceLock;
 
 /// 4π: a source of strength α makes the flux 4πα.
-const FLUX: f64 = 4.0 * PI;
+pub(super) const FLUX: f64 = 4.0 * PI;
 /// Condition number of I − LᵀGL above which the answers of the bodies to one another lose their
 /// meaning: at one digit lost the gap is far below what was fitted.
 const ILL_CONDITIONED: f64 = 1e4;
@@ -47,6 +49,8 @@ pub(super) struct ReducedRecord<'a> {
     /// α of the basis columns.
     pub alpha: DMatrix<f64>,
     momenta: DMatrix<f64>,
+    /// Made when first asked for.
+    pub fields: OnceLock<Vec<Fields>>,
     report: Report,
 }
 
@@ -138,6 +142,7 @@ impl<'a> ReducedRecord<'a> {
             basis: basis.clone(),
             alpha: DMatrix::zeros(0, 0),
             momenta: DMatrix::zeros(0, 0),
+            fields: OnceLock::new(),
         };
         out.factor.solve_in_place(&mut out.a);
         out.alpha = out.charges(basis, &out.a);
@@ -459,6 +464,13 @@ impl Record for ReducedRecord<'_> {
         }
         let (x, y) = (&self.alpha * x, &self.alpha * y);
         self.pull_back(x.as_slice(), y.as_slice())
+    }
+
+    fn gradient_columns(&self, x: &DVector<f64>) -> Vec<Vec<Vec6>> {
+        if !self.derivative {
+            return vec![vec![Vec6::zeros(); self.reduced.bodies.len()]; x.len()];
+        }
+        self.pull_back_columns(x)
     }
 
     fn gradient_along(&self, y: &DVector<f64>, z: &[Vec6]) -> DVector<f64> {

@@ -3,11 +3,11 @@
 //! Their error goes with h², that is with one over the number of faces N, so two resolutions give
 //!
 //! ```text
-//! M = M₂ + (M₂ − M₁)/(N₂/N₁ − 1)
+//! M = M₂ + (M₂ − M₁)/((N₂/N₁)^p − 1)          p = 1, or 2/3 where a body has sharp edges
 //! ```
 //!
-//! and three give two such values, whose difference is the estimate of the error. (At sharp edges the
-//! order is lower: the difference is then the larger.)
+//! and three give two such values, whose difference is the estimate of the error. With sharp edges the order is that of the
+//! leading part alone: the estimate is then no less than what p = 1 would have changed.
 
 use std::time::{Duration, Instant};
 
@@ -18,7 +18,7 @@ use crate::Result;
 use crate::boundary::OneBody;
 use crate::cli::tradeoff::compare::matrix_error;
 use crate::cli::tradeoff::measure::Start;
-use crate::scene::Scene;
+use crate::scene::{Scene, Shape};
 use crate::simulate::{Fidelity, Settings, Simulator};
 
 /// Faces per body, one after another: icosahedra with edges in 5, 7, 10, 14, 20 parts, whose meshes
@@ -29,11 +29,23 @@ const GROWTH: f64 = 6.0;
 /// Numbers of faces with a smaller ratio aren't extrapolated.
 const APART: f64 = 1.2;
 
-/// The best M_f and another, for the estimate of its error.
+/// Order of the error in 1/faces of smooth bodies, and of bodies with sharp edges.
+const SMOOTH: f64 = 1.0;
+const SHARP: f64 = 2.0 / 3.0;
+
+/// Whether a shape by formula has sharp edges.
+fn has_edges(shape: &Shape) -> bool {
+    matches!(
+        shape,
+        Shape::Box { .. } | Shape::Cylinder { .. } | Shape::Prism { .. }
+    )
+}
+
+/// The best M_f and others, for the estimate of its error.
 pub(super) struct Panels {
     pub best: Start,
     pub said: String,
-    other: Option<DMatrix<f64>>,
+    others: Vec<DMatrix<f64>>,
 }
 
 struct Level {
@@ -46,10 +58,10 @@ struct Level {
 
 impl Level {
     /// What the two resolutions tell of infinitely many faces.
-    fn extrapolated(&self, fine: &Self) -> DMatrix<f64> {
+    fn extrapolated(&self, fine: &Self, order: f64) -> DMatrix<f64> {
         let ratio = fine.faces as f64 / self.faces as f64;
         let (a, b) = (&self.start.added_mass, &fine.start.added_mass);
-        b + (b - a) / (ratio - 1.0)
+        b + (b - a) / (ratio.powf(order) - 1.0)
     }
 }
 
@@ -86,6 +98,8 @@ impl Panels {
         })?;
         // Meshes of equal size say nothing new.
         found.dedup_by(|b, a| (b.faces as f64) < APART * a.faces as f64);
+        let sharp = shapes(scene).any(has_edges);
+        let order = if sharp { SHARP } else { SMOOTH };
         let mut out = match found.as_slice() {
             [.., a, b, c] => Self {
                 said: format!(
@@ -93,8 +107,8 @@ impl Panels {
                      error from the same with {} and {}",
                     b.asked, c.asked, a.asked, b.asked
                 ),
-                best: c.start.with_added_mass(b.extrapolated(c)),
-                other: Some(a.extrapolated(b)),
+                best: c.start.with_added_mass(b.extrapolated(c, order)),
+                others: vec![a.extrapolated(b, order), b.extrapolated(c, SMOOTH)],
             },
             [b, c] => Self {
                 said: format!(
@@ -102,8 +116,8 @@ impl Panels {
                      error from the correction",
                     b.asked, c.asked
                 ),
-                best: c.start.with_added_mass(b.extrapolated(c)),
-                other: Some(c.start.added_mass.clone()),
+                best: c.start.with_added_mass(b.extrapolated(c, order)),
+                others: vec![c.start.added_mass.clone()],
             },
             all => {
                 let best = all[0].start.clone();
@@ -114,7 +128,7 @@ impl Panels {
                 Self {
                     best,
                     said,
-                    other: None,
+                    others: Vec::new(),
                 }
             }
         };
@@ -126,7 +140,9 @@ impl Panels {
 
     /// Estimate of the error over the rows that mean something.
     pub fn estimate(&self, felt: &[usize]) -> Option<f64> {
-        matrix_error(self.other.as_ref()?, &self.best.added_mass, felt)
+        let others = self.others.iter();
+        let error = |other| matrix_error(other, &self.best.added_mass, felt);
+        others.filter_map(error).reduce(f64::max)
     }
 }
 
@@ -135,21 +151,23 @@ mod tests {
     use super::*;
 
     #[test]
-    fn second_order_is_extrapolated_away() {
-        let level = |faces: usize| {
-            let value = |x: f64| DMatrix::from_element(1, 1, x);
-            let start = Start {
-                added_mass: value(3.0 + 5.0 / faces as f64),
-                mass: value(1.0),
-                force: nalgebra::DVector::zeros(1),
+    fn orders_are_extrapolated_away() {
+        for order in [SMOOTH, SHARP] {
+            let level = |faces: usize| {
+                let value = |x: f64| DMatrix::from_element(1, 1, x);
+                let start = Start {
+                    added_mass: value(3.0 + 5.0 / (faces as f64).powf(order)),
+                    mass: value(1.0),
+                    force: nalgebra::DVector::zeros(1),
+                };
+                Level {
+                    asked: faces,
+                    faces,
+                    start,
+                }
             };
-            Level {
-                asked: faces,
-                faces,
-                start,
-            }
-        };
-        let found = level(100).extrapolated(&level(250));
-        assert!((found[(0, 0)] - 3.0).abs() < 1e-12);
+            let found = level(100).extrapolated(&level(250), order);
+            assert!((found[(0, 0)] - 3.0).abs() < 1e-12);
+        }
     }
 }

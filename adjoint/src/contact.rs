@@ -230,9 +230,12 @@ mod tests {
             assert!(tangential.dot(&m.velocity) <= 0.0);
             assert!((normal - normal_force(&law, &m)).abs() <= 1e-12 * normal);
             let foreseen = law.gap - m.gap - law.horizon * Parts::new(&law, &m).approach;
-            assert_eq!(normal > 0.0, foreseen > -law.width && m.velocity.norm() < 1e3 && {
-                1.0 - law.dissipation * Parts::new(&law, &m).approach > -DAMPED
-            });
+            assert_eq!(
+                normal > 0.0,
+                foreseen > -law.width && m.velocity.norm() < 1e3 && {
+                    1.0 - law.dissipation * Parts::new(&law, &m).approach > -DAMPED
+                }
+            );
         }
     }
 
@@ -255,9 +258,20 @@ mod tests {
         for gap in [law.gap, law.gap + law.width, law.gap - law.width, 0.0] {
             let m = meeting(gap, Vec3::zeros());
             let bar = contact_force_vjp(&law, &m, &Vec3::new(1.0, 2.0, 3.0));
-            let all = [bar.gap, bar.weight, bar.stiffness, bar.dissipation, bar.friction];
+            let all = [
+                bar.gap,
+                bar.weight,
+                bar.stiffness,
+                bar.dissipation,
+                bar.friction,
+            ];
             assert!(all.iter().all(|x| x.is_finite()));
-            assert!(bar.normal.iter().chain(bar.velocity.iter()).all(|x| x.is_finite()));
+            assert!(
+                bar.normal
+                    .iter()
+                    .chain(bar.velocity.iter())
+                    .all(|x| x.is_finite())
+            );
             assert!(contact_force(&law, &m).iter().all(|x| x.is_finite()));
         }
     }

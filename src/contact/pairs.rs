@@ -75,14 +75,14 @@ impl Contacts {
             Other::Wall(w) => {
                 let reach = distance + AHEAD * first.radius();
                 let (point, normal) = &self.walls[w];
-                Ok(against_wall(first, &poses[a], point, normal, reach))
+                against_wall(first, point, normal, &poses[a], reach)
             }
             Other::Body(b) => {
                 let Some(second) = &self.shapes[b] else {
                     return Ok(Vec::new());
                 };
                 let reach = distance + AHEAD * first.radius().min(second.radius());
-                between((first, &poses[a]), (second, &poses[b]), reach)
+                between(first, second, &poses[a], &poses[b], reach)
             }
         }
     }

@@ -10,6 +10,7 @@ use crate::adjoint::contact::{
 };
 use crate::adjoint::lie::{Pose, Vec3, Vec6, angular, point_velocity, point_wrench, six};
 use crate::contact::{ContactPoint, Contacts};
+use nalgebra::DVector;
 
 /// Constants of all contacts that no trajectory is differentiated with respect to.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -139,6 +140,22 @@ impl Evaluation<'_> {
         for t in &self.touches {
             let force = contact_force(&t.law, &t.meeting(twists));
             t.exchange(&point_wrench(&t.point.position, &force), &mut out);
+        }
+        out
+    }
+
+    /// Sizes of the generalised forces of contact, without what cancels among them: what their rounding is relative to.
+    pub(super) fn contact_effort(&self, v: &DVector<f64>) -> DVector<f64> {
+        let tree = &self.system.tree;
+        let twists = tree.twists(&self.kinematics, v);
+        let mut out = DVector::zeros(v.len());
+        for t in &self.touches {
+            let force = contact_force(&t.law, &t.meeting(&twists));
+            if force != Vec3::zeros() {
+                let mut wrenches = vec![Vec6::zeros(); self.system.len()];
+                t.exchange(&point_wrench(&t.point.position, &force), &mut wrenches);
+                out += tree.project(&self.kinematics, wrenches).abs();
+            }
         }
         out
     }

@@ -7,7 +7,7 @@ use serde::{Deserialize, Serialize};
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields, default)]
 pub struct Contact {
-    /// Stiffness of each point of contact, N/m. Default: a quarter of the heaviest moving body's mass over the square of the time
+    /// Stiffness of each point of contact, N/m. Default: ten times the heaviest moving body's mass over the square of the time
     /// step, which is near rigid at that step.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub stiffness: Option<f64>,
@@ -15,12 +15,13 @@ pub struct Contact {
     pub dissipation: f64,
     /// Friction coefficient.
     pub friction: f64,
-    /// Gap at which surfaces are taken to touch, m. Default: the gap that the coupling of the water resolves (zero with
-    /// `isolated`), so that the water between them stays resolved.
+    /// Gap at which surfaces are taken to touch, m. Default: a quarter more than the coupling of the water resolves, so that the
+    /// water between them stays resolved when a body lands; at least a hundredth of the smallest moving body's radius, because
+    /// distances are smooth only outside a body.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub gap: Option<f64>,
-    /// Half the width over which the force sets in, m; nothing acts at a larger distance than it beyond `gap`. Default: 0.2 % of
-    /// the smallest body's size.
+    /// Half the width over which the force sets in, m; nothing acts at a larger distance than it beyond `gap`. Default: 0.4 % of
+    /// the smallest moving body's radius.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub width: Option<f64>,
     /// Speed below which friction holds with creep, m/s.

@@ -41,7 +41,7 @@ pub(super) struct Assembled {
     pub warnings: Vec<String>,
 }
 
-fn pose(p: &Placement) -> Pose {
+pub(super) fn pose(p: &Placement) -> Pose {
     Pose::new(exp_matrix(&Vec3::from(p.rotation)), Vec3::from(p.position))
 }
 

@@ -103,12 +103,20 @@ impl Clearance {
                 quantity: "gap in m".into(),
                 value: gap.distance,
                 limit: 0.0,
-                remedy: format!(
-                    "they overlap by {:.3e} m, and contact is not modelled: end the run earlier, \
-                     keep them apart by the controls, or use the fidelity isolated{}",
-                    -gap.distance,
-                    self.hint(gap, system)
-                ),
+                remedy: match system.contact {
+                    Some(_) => format!(
+                        "they overlap by {:.3e} m, where the water can't be solved: raise \
+                         contact.stiffness or contact.gap, or take a smaller time step",
+                        -gap.distance
+                    ),
+                    None => format!(
+                        "they overlap by {:.3e} m, and the scene has no contact: give it a section \
+                         [contact], end the run earlier, keep them apart by the controls, or use \
+                         the fidelity isolated{}",
+                        -gap.distance,
+                        self.hint(gap, system)
+                    ),
+                },
             });
         }
         self.refuse_depth(poses, system)?;

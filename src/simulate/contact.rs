@@ -1,18 +1,24 @@
 //! Contact of a scene: which surfaces may touch, at which gap, and how stiffly.
 
-use super::assemble::Surface;
+use super::assemble::{Surface, pose};
 use super::clearance::Clearance;
 use super::{Fidelity, Settings};
+use crate::adjoint::lie::Pose;
 use crate::contact::{ContactPair, Contacts, Geometry};
 use crate::dynamics::{self, ContactModel, Integrator, Regularisation};
-use crate::scene::{Contact, Scene};
+use crate::scene::{Body, Contact, Scene, Shape};
 use crate::shape::{Other, TriMesh};
 use crate::{Error, Result};
+use std::path::Path;
 
-/// Of the heaviest moving mass over Δt²: a mass on it rings with a period of some twelve steps, near rigid at that step.
-const STIFFNESS: f64 = 0.25;
+/// Of the heaviest moving mass over Δt²: within a step contact takes ten elevenths of the way that it would go too far.
+const STIFFNESS: f64 = 10.0;
 /// Half the width over which the force sets in, of the smallest body's radius.
 const WIDTH: f64 = 0.004;
+/// Gap at which surfaces touch, of what the coupling resolves: a body that lands goes a little further.
+const ROOM: f64 = 1.25;
+/// The same where the water isn't solved, of the smallest body's radius: distances are smooth outside a body only.
+const SKIN: f64 = 0.01;
 /// Part of the edges that the fidelity `Full` resolves.
 const EDGES: f64 = 0.5;
 
@@ -41,28 +47,36 @@ pub(super) fn assemble(p: Parts) -> Result<(ContactModel, dynamics::Contact)> {
     let mut shapes = Vec::with_capacity(p.scene.bodies.len());
     for (body, surface) in p.scene.bodies.iter().zip(p.surfaces) {
         shapes.push(match (&body.shape, surface) {
-            (Some(shape), Some(surface)) => {
-                Some(Geometry::new(&body.name, shape, &body.shape_at, &surface.mesh)?)
-            }
+            (Some(shape), Some(surface)) => Some(geometry(body, shape, surface)?),
             _ => None,
         });
     }
-    let neighbours = |a: usize, b: usize| {
-        p.scene.wet_parent(a) == Some(b) || p.scene.wet_parent(b) == Some(a)
-    };
+    let neighbours =
+        |a: usize, b: usize| p.scene.wet_parent(a) == Some(b) || p.scene.wet_parent(b) == Some(a);
     let pairs: Vec<ContactPair> = (p.clearance.moving.pairs().iter())
         .filter(|(a, other)| !matches!(other, Other::Body(b) if neighbours(*a, *b)))
         .map(|&(first, second)| ContactPair { first, second })
         .collect();
     let shapes = Contacts::new(shapes, &p.scene.walls, &pairs);
-    let gaps = (shapes.pairs().iter())
-        .map(|pair| p.given.gap.unwrap_or_else(|| resolved(&p, pair)))
-        .collect();
-    let dt = p.settings.time_step.unwrap_or(p.scene.time_step);
     let moving = |b: &usize| !p.scene.is_static(*b);
     let bodies = || (0..p.scene.bodies.len()).filter(moving);
+    let size = bodies()
+        .filter_map(|b| shapes.shape(b).map(Geometry::radius))
+        .reduce(f64::min)
+        .unwrap_or(1.0);
+    let gaps = (shapes.pairs().iter())
+        .map(|pair| {
+            p.given
+                .gap
+                .unwrap_or((ROOM * resolved(&p, pair)).max(SKIN * size))
+        })
+        .collect();
+    let dt = p.settings.time_step.unwrap_or(p.scene.time_step);
     let heaviest = bodies().map(|b| p.mass[b]).fold(0.0, f64::max);
-    let stiffness = p.given.stiffness.unwrap_or(STIFFNESS * heaviest / (dt * dt));
+    let stiffness = p
+        .given
+        .stiffness
+        .unwrap_or(STIFFNESS * heaviest / (dt * dt));
     if stiffness <= 0.0 {
         return Err(Error::input(
             "contact.stiffness",
@@ -70,14 +84,7 @@ pub(super) fn assemble(p: Parts) -> Result<(ContactModel, dynamics::Contact)> {
             "no moving body has mass to take a default from: give a stiffness, N/m",
         ));
     }
-    let smallest = bodies()
-        .filter_map(|b| shapes.shape(b).map(Geometry::radius))
-        .fold(f64::INFINITY, f64::min);
-    let width = match p.given.width {
-        Some(width) => width,
-        None if smallest.is_finite() => WIDTH * smallest,
-        None => WIDTH,
-    };
+    let width = p.given.width.unwrap_or(WIDTH * size);
     let model = ContactModel {
         shapes,
         gaps,
@@ -93,6 +100,20 @@ pub(super) fn assemble(p: Parts) -> Result<(ContactModel, dynamics::Contact)> {
         friction: p.given.friction,
     };
     Ok((model, parameters))
+}
+
+/// Shape of a body: by its formula, or a mesh that is convex.
+fn geometry(body: &Body, shape: &Shape, surface: &Surface) -> Result<Geometry> {
+    let made = match shape {
+        // Already placed in its body.
+        Shape::Mesh { .. } => Geometry::of_mesh(&surface.mesh, Pose::identity()),
+        _ => Geometry::of_shape(shape, pose(&body.shape_at), Path::new("")),
+    };
+    made.map_err(|e| Error::Unsupported {
+        what: format!("contact of body {:?}", body.name),
+        why: e.to_string(),
+        instead: "give it a convex shape, or convex bodies fixed to it".into(),
+    })
 }
 
 /// The gap that the coupling resolves between a pair, m.

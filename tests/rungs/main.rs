@@ -5,6 +5,7 @@
 //! the few in [`scan::OTHERS`]. One that isn't in [`registered`] fails the suite. Private helpers
 //! are listed with the registered rung whose check runs through them.
 
+mod contact;
 mod coupling;
 mod dynamics;
 mod multibody;
@@ -24,6 +25,7 @@ fn registered() -> Vec<(String, Rung)> {
     }
     for part in [
         multibody::rungs(),
+        contact::rungs(),
         coupling::rungs(),
         dynamics::rungs(),
         policy::rungs(),
@@ -44,6 +46,10 @@ const THROUGH: &[(&str, &str)] = &[
     ("coupling::pair::Pair::apply_jvp", FULL_HVP),
     ("coupling::full::system::System::respond_jvp", FULL_HVP),
     // Pieces of the equations of motion.
+    (
+        "dynamics::contact::Touch::displacement_vjp",
+        "dynamics::contact::Evaluation::contact_wrenches_vjp",
+    ),
     (
         "dynamics::external::Evaluation::external_jvp",
         "dynamics::force::Evaluation::force_jvp",

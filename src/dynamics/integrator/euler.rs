@@ -27,8 +27,10 @@ const RESIDUAL: f64 = 1e-13;
 const TOUCHING_RESIDUAL: f64 = 1e-11;
 /// What is accepted at the last iteration.
 const LAST_RESIDUAL: f64 = 1e-11;
-/// A step that doesn't shrink the imbalance is halved down to this part of it.
-const SHORTEST: f64 = 1e-9;
+/// Evaluations of a search along a step.
+const TRIALS: usize = 30;
+/// Part of the slope at its start that a search leaves.
+const LEFT: f64 = 0.3;
 
 /// A velocity tried for a stage.
 struct Trial {
@@ -37,10 +39,40 @@ struct Trial {
     /// p̂ + h f.
     reached: DVector<f64>,
     defect: DVector<f64>,
-    /// Size of the defect, masses scaled to one.
-    unbalanced: f64,
-    /// The same relative to what is balanced.
+    /// Size of the defect, masses scaled to one, relative to what is balanced.
     residual: f64,
+}
+
+/// Along Newton's step: contact is the slope of a convex function of v, and so nearly is the defect; where the full step runs past
+/// the least value on its way, goes back to about there (regula falsi on defect · step, with Illinois weights).
+fn search(
+    now: Trial,
+    full: Trial,
+    step: &DVector<f64>,
+    at: &dyn Fn(DVector<f64>) -> Trial,
+) -> Trial {
+    let slope = |t: &Trial| t.defect.dot(step);
+    let start = slope(&now);
+    let mut best = full;
+    // Slopes fall from `start`, above zero, to below it.
+    let (mut low, mut high) = ((0.0, start), (1.0, slope(&best)));
+    for _ in 0..TRIALS {
+        let here = slope(&best);
+        if here >= -LEFT * start && here.abs() <= start || !here.is_finite() {
+            break;
+        }
+        let length = (low.0 * high.1 - high.0 * low.1) / (high.1 - low.1);
+        best = at(&now.v - length * step);
+        let here = slope(&best);
+        if here < 0.0 {
+            high = (length, here);
+            low.1 *= 0.5;
+        } else {
+            low = (length, here);
+            high.1 *= 0.5;
+        }
+    }
+    best
 }
 
 /// A converged stage.
@@ -111,15 +143,19 @@ pub(super) fn solve_stage(
         let reached = hat + rule.h * &force;
         let target = tree.chart_momentum(&e.q, &(rule.reach * &v), &reached);
         let defect = e.momentum(&v) - &target;
-        let size = sized(&(&summands * v.abs())).max(sized(&target)).max(start);
-        let unbalanced = sized(&defect);
-        let residual = if size > 0.0 { unbalanced / size } else { 0.0 };
+        let pressed = rule.h * sized(&e.contact_effort(&v));
+        let size = sized(&(&summands * v.abs())).max(sized(&target));
+        let size = size.max(start).max(pressed);
+        let residual = if size > 0.0 {
+            sized(&defect) / size
+        } else {
+            0.0
+        };
         Trial {
             v,
             force,
             reached,
             defect,
-            unbalanced,
             residual,
         }
     };
@@ -149,18 +185,16 @@ pub(super) fn solve_stage(
             break;
         };
         let step = split.put(&step);
-        let mut next = at(&now.v - &step);
-        let mut length = 1.0;
-        while touching && !(next.unbalanced < now.unbalanced) && length > SHORTEST {
-            length *= 0.5;
-            next = at(&now.v - length * &step);
-        }
-        now = next;
+        let full = at(&now.v - &step);
+        now = match touching {
+            true => search(now, full, &step, &at),
+            false => full,
+        };
     }
     let residual = now.residual;
     Err(Error::Solver {
         what: what(),
-        iterations: ITERATIONS,
+        iterations: most,
         residual,
         tolerance: enough,
         remedy: "the time step is too long for these velocities or forces: take a smaller one"

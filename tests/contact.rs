@@ -1,0 +1,395 @@
+//! Contact: known answers, conservation, gradients, and bodies in water that touch.
+
+use hydrograd::dynamics::Integrator;
+use hydrograd::scene::{Body, Contact, Fluid, Joint, Plane, Scene, Shape};
+use hydrograd::simulate::Rollout;
+use hydrograd::simulate::gradcheck::{self, gradcheck};
+use hydrograd::{Controls, Fidelity, Settings, Simulator};
+
+const GRAVITY: f64 = 9.81;
+
+fn vacuum() -> Scene {
+    let mut scene = Scene::new(Fluid {
+        density: 0.0,
+        current: [0.0; 3],
+    });
+    scene.gravity = [0.0, 0.0, -GRAVITY];
+    scene.contact = Some(Contact::default());
+    scene
+}
+
+/// Above a floor at z = 0.
+fn above_floor() -> Scene {
+    let mut scene = vacuum();
+    scene.add_wall([0.0; 3], [0.0, 0.0, 1.0]);
+    scene
+}
+
+fn settings(fidelity: Fidelity) -> Settings {
+    Settings::default()
+        .fidelity(fidelity)
+        .integrator(Integrator::MomentumEuler)
+}
+
+fn simulator(scene: &Scene) -> Simulator {
+    Simulator::new(scene, settings(Fidelity::Isolated)).unwrap()
+}
+
+fn run(simulator: &Simulator, steps: usize) -> Rollout<'_> {
+    let rollout = simulator
+        .rollout(&Controls::zeros(simulator, steps))
+        .unwrap();
+    for sample in rollout.samples() {
+        assert!(
+            sample
+                .q
+                .iter()
+                .chain(sample.v.iter())
+                .all(|x| x.is_finite())
+        );
+    }
+    rollout
+}
+
+fn contact(scene: &mut Scene) -> &mut Contact {
+    scene.contact.get_or_insert_default()
+}
+
+#[test]
+fn a_ball_falls_lands_and_rests() {
+    let mut scene = above_floor();
+    scene.add(
+        Body::new(Shape::sphere(0.1))
+            .density(1000.0)
+            .at([0.0, 0.0, 0.3]),
+    );
+    let stiffness = 1e5;
+    contact(&mut scene).stiffness = Some(stiffness);
+    contact(&mut scene).gap = Some(0.002);
+    let simulator = simulator(&scene);
+    let rollout = run(&simulator, 300);
+    let mass = 1000.0 * 4.0 / 3.0 * std::f64::consts::PI * 1e-3;
+    // Free fall until it touches at t = √(2 · 0.198/g) = 0.201 s.
+    let z = |n: usize| rollout.samples()[n].poses[0].translation.z;
+    let fallen = 0.3 - z(18);
+    assert!(
+        (fallen - 0.5 * GRAVITY * 0.01_f64.powi(2) * 18.0 * 19.0).abs() < 1e-10,
+        "{fallen}"
+    );
+    // At rest its weight takes it below the gap by its weight over the stiffness.
+    let rest = 0.102 - mass * GRAVITY / stiffness;
+    assert!((z(300) - rest).abs() < 1e-6, "{} is not {rest}", z(300));
+    assert!(rollout.samples()[300].v.norm() < 1e-6);
+}
+
+/// On the way down and up, no step adds energy: kinetic, of position, and of the compressed contact.
+#[test]
+fn contact_never_adds_energy() {
+    for (dissipation, dt) in [(0.0, 0.01), (0.5, 0.01), (0.5, 0.001)] {
+        let mut scene = above_floor();
+        scene.time_step = dt;
+        scene.add(
+            Body::new(Shape::cuboid([0.3, 0.2, 0.1]))
+                .density(1000.0)
+                .at([0.0, 0.0, 0.5])
+                .rotated([0.3, 0.4, 0.0]),
+        );
+        scene.initial.v = vec![0.5, 0.0, 0.0, 1.0, 2.0, 0.5];
+        contact(&mut scene).stiffness = Some(2e4);
+        contact(&mut scene).dissipation = dissipation;
+        let simulator = simulator(&scene);
+        let rollout = run(&simulator, (2.0 / dt) as usize);
+        let energy: Vec<f64> = rollout.samples().iter().map(|s| s.energy()).collect();
+        let highest = energy.iter().fold(f64::NEG_INFINITY, |a, b| a.max(*b));
+        assert!(
+            highest <= energy[0] * (1.0 + 1e-3),
+            "{highest} from {}",
+            energy[0]
+        );
+        let last = energy[energy.len() - 1];
+        assert!(last < 0.6 * energy[0], "{last}");
+    }
+}
+
+#[test]
+fn a_block_sticks_below_the_friction_angle_and_slides_above() {
+    let friction = 0.5;
+    for (slope, sticks) in [(0.4_f64, true), (0.6, false)] {
+        let angle = slope.atan();
+        let mut scene = vacuum();
+        scene.add_wall([0.0; 3], [angle.sin(), 0.0, angle.cos()]);
+        let place = [0.05 * angle.sin(), 0.0, 0.05 * angle.cos()];
+        scene.add(
+            Body::new(Shape::cuboid([0.3, 0.3, 0.1]))
+                .density(1000.0)
+                .at(place)
+                .rotated([0.0, angle, 0.0]),
+        );
+        contact(&mut scene).friction = friction;
+        let simulator = simulator(&scene);
+        let rollout = run(&simulator, 200);
+        let along = |n: usize| {
+            let p = rollout.samples()[n].poses[0].translation;
+            p.x * angle.cos() - p.z * angle.sin()
+        };
+        if sticks {
+            // Creep: v_s · tan(slope)/√(μ² − tan²) at most, over two seconds.
+            let creep = 1e-3 * slope / (friction * friction - slope * slope).sqrt() * 2.0;
+            let moved = along(200) - along(20);
+            assert!(moved.abs() <= 1.1 * creep, "{moved} over {creep}");
+        } else {
+            let expected = GRAVITY * (angle.sin() - friction * angle.cos());
+            let h = 0.5;
+            let found = (along(200) - 2.0 * along(150) + along(100)) / (h * h);
+            assert!(
+                (found - expected).abs() < 0.01 * expected,
+                "{found} is not {expected}"
+            );
+        }
+    }
+}
+
+#[test]
+fn a_stack_of_three_rests_for_ten_seconds() {
+    let mut scene = above_floor();
+    for k in 0..3 {
+        scene.add(
+            Body::new(Shape::cuboid([0.2, 0.2, 0.1]))
+                .density(1000.0)
+                .at([0.0, 0.0, 0.053 + 0.103 * f64::from(k)]),
+        );
+    }
+    let simulator = simulator(&scene);
+    let rollout = run(&simulator, 1000);
+    for b in 0..3 {
+        let at = |n: usize| rollout.samples()[n].poses[b].translation;
+        let drift = (at(1000) - at(50)).norm();
+        assert!(drift < 1e-4, "body {b} drifts by {drift} m");
+    }
+}
+
+/// Two equal balls: momentum to the last digits, and the velocities change places as the contact is resolved in time.
+#[test]
+fn balls_that_meet_head_on() {
+    let mut passed = Vec::new();
+    for dt in [1e-3, 1e-4] {
+        let mut scene = vacuum();
+        scene.gravity = [0.0; 3];
+        scene.time_step = dt;
+        let rail = Joint::Prismatic {
+            axis: [1.0, 0.0, 0.0],
+        };
+        for x in [-0.15, 0.15] {
+            scene.add(
+                Body::new(Shape::sphere(0.1))
+                    .density(1000.0)
+                    .at([x, 0.0, 0.0])
+                    .joint(rail),
+            );
+        }
+        scene.initial.v = vec![1.0, 0.0];
+        let c = contact(&mut scene);
+        (c.stiffness, c.dissipation, c.friction) = (Some(2e4), 0.0, 0.0);
+        let simulator = simulator(&scene);
+        let rollout = run(&simulator, (0.3 / dt) as usize);
+        let end = &rollout.samples()[rollout.steps()].v;
+        let momentum = end[0] + end[1];
+        assert!((momentum - 1.0).abs() < 1e-12, "{momentum}");
+        passed.push(end[1]);
+    }
+    // Euler's loss falls with the step.
+    assert!(
+        passed[1] > 0.9 && 1.0 - passed[1] < 0.25 * (1.0 - passed[0]),
+        "{passed:?}"
+    );
+}
+
+/// Approach, stick, slip and release, in vacuum and in water.
+#[test]
+fn gradients_through_contact() {
+    let sliding = {
+        let mut scene = above_floor();
+        scene.add(
+            Body::new(Shape::ellipsoid([0.2, 0.1, 0.15]))
+                .density(1000.0)
+                .at([0.0, 0.0, 0.17])
+                .rotated([0.2, 0.3, 0.0]),
+        );
+        scene.initial.v = vec![1.0, 0.2, -0.5, 0.3, -0.2, 0.4];
+        scene
+    };
+    let pressed = {
+        let mut scene = above_floor();
+        scene.add(
+            Body::new(Shape::cuboid([0.3, 0.2, 0.1]))
+                .density(1000.0)
+                .at([0.0, 0.0, 0.051]),
+        );
+        scene.add(
+            Body::new(Shape::sphere(0.08))
+                .density(2000.0)
+                .at([0.03, 0.02, 0.19]),
+        );
+        scene
+    };
+    for (scene, steps) in [(&sliding, 40), (&pressed, 40)] {
+        let mut simulator = simulator(scene);
+        let asked = gradcheck::Settings {
+            steps,
+            directions: 2,
+            seed: 3,
+            timings: 0,
+        };
+        let report = gradcheck(&mut simulator, &asked).unwrap();
+        println!("{:.1e}", report.max_rel_error);
+        assert!(report.max_rel_error <= 1e-5, "{:#?}", report.directions);
+    }
+}
+
+/// In water the gap at which surfaces touch is what the coupling resolves, and the ball that lands carries its added mass.
+#[test]
+fn a_ball_lands_in_water() {
+    let mut scene = above_floor();
+    scene.fluid.density = 1000.0;
+    scene.add(
+        Body::new(Shape::sphere(0.1))
+            .density(3000.0)
+            .at([0.0, 0.0, 0.3])
+            .joint(Joint::Planar { plane: Plane::Zx }),
+    );
+    let mut simulator = Simulator::new(&scene, settings(Fidelity::Reduced)).unwrap();
+    let resolved = simulator.discretisation()[0].resolved_gap.unwrap();
+    let rollout = run(&simulator, 200);
+    let gap = rollout.samples()[200].poses[0].translation.z - 0.1;
+    assert!(
+        (gap - 1.25 * 0.5 * resolved).abs() < 5e-4,
+        "{gap}, resolved {resolved}"
+    );
+    assert!(rollout.warnings().is_empty(), "{:?}", rollout.warnings());
+    let asked = gradcheck::Settings {
+        steps: 60,
+        directions: 1,
+        seed: 3,
+        timings: 0,
+    };
+    let report = gradcheck(&mut simulator, &asked).unwrap();
+    assert!(report.max_rel_error <= 1e-5, "{:#?}", report.directions);
+}
+
+#[test]
+fn integrators_that_cannot_do_it_say_so() {
+    let mut scene = above_floor();
+    scene.add(
+        Body::new(Shape::sphere(0.1))
+            .density(1000.0)
+            .at([0.0, 0.0, 0.3]),
+    );
+    for integrator in [Integrator::Rk2, Integrator::Rk4, Integrator::VelocityEuler] {
+        let made = Simulator::new(
+            &scene,
+            Settings::default()
+                .fidelity(Fidelity::Isolated)
+                .integrator(integrator),
+        );
+        let said = made.map(|_| ()).unwrap_err().to_string();
+        assert!(
+            said.contains("contact") && said.contains("momentum-euler"),
+            "{said}"
+        );
+    }
+    assert_eq!(
+        Settings::for_scene(&scene).integrator,
+        Integrator::MomentumEuler
+    );
+}
+
+#[test]
+fn constants_are_checked_by_name() {
+    for (key, value) in [
+        ("stiffness", "-1.0"),
+        ("friction", "-0.1"),
+        ("gap", "nan"),
+        ("width", "0.0"),
+    ] {
+        let text = format!(
+            "time_step = 0.01\nsteps = 1\n[fluid]\ndensity = 0.0\n[contact]\n{key} = {value}\n[[bodies]]\nname = \"a\"\nshape = {{ kind = \"sphere\", radius = 0.1 }}\nmass = 1.0\ninertia = [1.0, 1.0, 1.0]\njoint = {{ kind = \"free\" }}\n"
+        );
+        let folder = tempfile::tempdir().unwrap();
+        let file = folder.path().join("scene.toml");
+        std::fs::write(&file, text).unwrap();
+        let said = Scene::load(&file)
+            .and_then(|s| s.validate())
+            .unwrap_err()
+            .to_string();
+        assert!(said.contains(&format!("contact.{key}")), "{said}");
+    }
+}
+
+/// Random convex shapes dropped on one another and on a floor, turning: no NaN, nothing flies off, and surfaces stay apart.
+#[test]
+fn a_thousand_random_drops() {
+    let mut state = 1_u64;
+    let mut next = |low: f64, high: f64| {
+        state = state
+            .wrapping_mul(6364136223846793005)
+            .wrapping_add(1442695040888963407);
+        low + (high - low) * (state >> 11) as f64 / (1_u64 << 53) as f64
+    };
+    let mut deepest = f64::INFINITY;
+    for drop in 0..1000 {
+        let mut scene = above_floor();
+        // They come to turn by 40 rad/s: a tenth of a radian a step.
+        scene.time_step = 2.5e-3;
+        for k in 0..2 {
+            let mut size = || next(0.05, 0.15);
+            let shape = match (drop + 3 * k) % 6 {
+                0 => Shape::sphere(size()),
+                1 => Shape::ellipsoid([size(), size(), size()]),
+                2 => Shape::cuboid([2.0 * size(), 2.0 * size(), 2.0 * size()]),
+                3 => Shape::capsule(size(), 2.0 * size()),
+                4 => Shape::cylinder(size(), 2.0 * size()),
+                _ => Shape::prism(
+                    vec![[-size(), 0.0], [size(), 0.0], [0.3 * size(), size()]],
+                    2.0 * size(),
+                ),
+            };
+            let turn = [next(-1.5, 1.5), next(-1.5, 1.5), next(-1.5, 1.5)];
+            let place = [
+                next(-0.03, 0.03),
+                next(-0.03, 0.03),
+                0.3 + 0.45 * f64::from(k),
+            ];
+            scene.add(
+                Body::new(shape.faces(80))
+                    .density(1000.0)
+                    .at(place)
+                    .rotated(turn),
+            );
+        }
+        scene.initial.v = (0..12)
+            .map(|i| {
+                if i % 6 < 3 {
+                    next(-1.0, 1.0)
+                } else {
+                    next(-5.0, 5.0)
+                }
+            })
+            .collect();
+        let simulator = simulator(&scene);
+        let rollout = run(&simulator, 400);
+        let first = rollout.samples()[0].energy();
+        for sample in rollout.samples() {
+            assert!(
+                sample.kinetic_energy <= 1.01 * first,
+                "drop {drop}: {} J from {first} J",
+                sample.kinetic_energy
+            );
+        }
+        for gap in rollout.gaps().iter().flatten() {
+            deepest = deepest.min(gap.distance);
+        }
+    }
+    println!("deepest {deepest:.2e} m");
+    // Contact acts from a hundredth of a radius on; at 3 m/s a step is 3 cm.
+    assert!(deepest > -5e-3, "{deepest}");
+}

@@ -1,0 +1,231 @@
+//! Rungs of contact: bodies of every kind of shape pressed together and on a wall, sliding and turning.
+
+use super::tools::{Group, all, groups, vector_along, wavy};
+use hydrograd::adjoint::check::{Outcome, Rung};
+use hydrograd::dynamics::{
+    Evaluation, Input, Integrator, Parameters, State, StateBar, Stepper, System,
+};
+use hydrograd::scene::{Body, Contact, Fluid, Scene, Shape};
+use hydrograd::{Fidelity, Settings, Simulator};
+use nalgebra::DVector;
+use std::sync::OnceLock;
+
+pub fn rungs() -> Vec<Rung> {
+    vec![
+        Rung {
+            name: "dynamics::contact::Evaluation::contact_wrenches_jvp",
+            check: jvp,
+        },
+        Rung {
+            name: "dynamics::contact::Evaluation::contact_wrenches_vjp",
+            check: |c| all([force_vjp(c), step_vjp(c)]),
+        },
+    ]
+}
+
+/// Every two neighbours overlap by millimetres, and the lower ones the wall.
+fn scene() -> Scene {
+    let mut scene = Scene::new(Fluid {
+        density: 0.0,
+        current: [0.0; 3],
+    });
+    scene.gravity = [0.0, 0.0, -9.81];
+    scene.add_wall([0.0, 0.0, -0.3], [0.0, 0.1, 1.0]);
+    scene.contact = Some(Contact {
+        stiffness: Some(3e3),
+        dissipation: 0.4,
+        friction: 0.6,
+        gap: Some(0.02),
+        width: Some(5e-3),
+        stiction_speed: 0.05,
+    });
+    let bodies = [
+        (Shape::ellipsoid([0.3, 0.2, 0.15]), [0.0, 0.0, -0.14]),
+        (Shape::sphere(0.2), [0.1, 0.39, -0.11]),
+        (Shape::cuboid([0.3, 0.2, 0.25]), [-0.42, 0.05, -0.16]),
+        (Shape::capsule(0.1, 0.3), [0.05, 0.05, 0.28]),
+    ];
+    for (shape, place) in bodies {
+        scene.add(
+            Body::new(shape.faces(80))
+                .density(1000.0)
+                .at(place)
+                .rotated([0.1, 0.2, 0.3]),
+        );
+    }
+    scene
+}
+
+fn simulator() -> &'static Simulator {
+    static MADE: OnceLock<Simulator> = OnceLock::new();
+    MADE.get_or_init(|| {
+        let settings = Settings::default()
+            .fidelity(Fidelity::Isolated)
+            .integrator(Integrator::MomentumEuler);
+        Simulator::new(&scene(), settings).expect("the scene is right")
+    })
+}
+
+fn system() -> &'static System {
+    simulator().system()
+}
+
+#[derive(Clone)]
+struct Point {
+    q: DVector<f64>,
+    v: DVector<f64>,
+    parameters: Parameters,
+}
+
+fn point() -> Point {
+    let n = system().tree.velocities();
+    Point {
+        q: simulator().start().0.clone(),
+        v: wavy(n, 0.8, 0.3),
+        parameters: simulator().parameters().clone(),
+    }
+}
+
+fn evaluate<'a>(parameters: &'a Parameters, q: &DVector<f64>) -> Evaluation<'a> {
+    system().evaluate(parameters, q, true, true).unwrap()
+}
+
+/// A scalar against its cotangents: every body's displacement and velocity, and every parameter of contact, apart.
+fn check(
+    value: &dyn Fn(&Point) -> f64,
+    at: &Point,
+    q: &DVector<f64>,
+    v: &DVector<f64>,
+    parameters: &Parameters,
+    c: f64,
+) -> Outcome {
+    let tree = &system().tree;
+    let n = tree.velocities();
+    let mut list = Vec::new();
+    for link in tree.links() {
+        let only = |d: DVector<f64>| {
+            DVector::from_fn(n, |i, _| if link.v.contains(&i) { d[i] } else { 0.0 })
+        };
+        let (dq, dv) = (only(wavy(n, 2.1, 0.02)), only(wavy(n, 3.1, 0.1)));
+        list.push(Group {
+            name: "q",
+            slope: q.dot(&dq),
+            value: Box::new(move |h| {
+                let q = tree.integrate(&at.q, &(h * &dq));
+                value(&Point { q, ..at.clone() })
+            }),
+        });
+        list.push(Group {
+            name: "v",
+            slope: v.dot(&dv),
+            value: Box::new(move |h| {
+                let v = &at.v + h * &dv;
+                value(&Point { v, ..at.clone() })
+            }),
+        });
+    }
+    let all = at.parameters.to_vec();
+    let bars = parameters.to_vec();
+    for (k, name) in ["stiffness", "dissipation", "friction"]
+        .into_iter()
+        .enumerate()
+    {
+        let i = all.len() - 3 + k;
+        let step = 0.1 * all[i];
+        list.push(Group {
+            name,
+            slope: bars[i] * step,
+            value: Box::new(move |h| {
+                let mut values = at.parameters.to_vec();
+                values[i] += h * step;
+                let parameters = at.parameters.with_values(&values).unwrap();
+                value(&Point {
+                    parameters,
+                    ..at.clone()
+                })
+            }),
+        });
+    }
+    groups(list, c)
+}
+
+fn jvp(c: f64) -> Outcome {
+    let p = point();
+    let e = evaluate(&p.parameters, &p.q);
+    // Each of the four on the next, and three on the wall.
+    let pairs: std::collections::BTreeSet<_> =
+        e.touches.iter().map(|t| (t.first, t.second)).collect();
+    assert!(pairs.len() >= 6, "{pairs:?}");
+    let dv = wavy(p.v.len(), 3.1, 0.1);
+    let tangent = c * e.force_jvp(&p.v, &dv);
+    let control = DVector::zeros(0);
+    vector_along(
+        |h| e.force(&(&p.v + h * &dv), &control).as_slice().to_vec(),
+        tangent.as_slice(),
+    )
+}
+
+fn force_vjp(c: f64) -> Outcome {
+    let p = point();
+    let z = wavy(p.v.len(), 5.1, 1.0);
+    let control = DVector::zeros(0);
+    let b = evaluate(&p.parameters, &p.q)
+        .force_vjp(&p.v, &control, &z)
+        .unwrap();
+    let value = |p: &Point| z.dot(&evaluate(&p.parameters, &p.q).force(&p.v, &control));
+    check(&value, &p, &b.q, &b.v, &b.parameters, c)
+}
+
+fn stepper(parameters: &Parameters) -> Stepper<'_> {
+    Stepper {
+        system: system(),
+        parameters,
+        integrator: Integrator::MomentumEuler,
+        dt: 0.01,
+    }
+}
+
+/// A whole step by momentum Euler from the momenta `v`, contact solved in its end velocity.
+fn step_vjp(c: f64) -> Outcome {
+    let mut p = point();
+    let n = p.v.len();
+    // Momenta of velocities.
+    p.v = evaluate(&p.parameters, &p.q).frame_momentum(&p.v);
+    let (q_bar, y_bar) = (wavy(n, 5.1, 1.0), wavy(n, 6.1, 0.3));
+    let input = Input {
+        control: DVector::zeros(0),
+        hold: Vec::new(),
+    };
+    let state = |p: &Point| State {
+        step: 0,
+        q: p.q.clone(),
+        y: p.v.clone(),
+        held: Vec::new(),
+    };
+    let s = stepper(&p.parameters);
+    let (start, e) = (state(&p), s.evaluate(&p.q, true).unwrap());
+    let v = s.velocity(&e, &start).unwrap();
+    let next = s.step(&e, &start, &v, &input).unwrap();
+    let end = next.state.q.clone();
+    let value = |p: &Point| {
+        let s = stepper(&p.parameters);
+        let (start, e) = (state(p), s.evaluate(&p.q, true).unwrap());
+        let v = s.velocity(&e, &start).unwrap();
+        let next = s.step(&e, &start, &v, &input).unwrap().state;
+        q_bar.dot(&super::multibody::tree_displacement(
+            &system().tree,
+            &end,
+            &next.q,
+        )) + y_bar.dot(&next.y)
+    };
+    let bar = StateBar {
+        q: q_bar.clone(),
+        y: y_bar.clone(),
+    };
+    let mut b = s
+        .step_vjp(&e, &start, &v, &input, &next.memo, &bar)
+        .unwrap();
+    let v_bar = b.v.clone();
+    s.velocity_vjp(&e, &start, &v, &v_bar, &mut b).unwrap();
+    check(&value, &p, &b.state.q, &b.state.y, &b.parameters, c)
+}

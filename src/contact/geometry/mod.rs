@@ -10,8 +10,9 @@
 //!   points. A ball has nothing but its centre and so gets one.
 //! - Ellipsoid and wall: the lowest point. Core and wall: all corners.
 //!
-//! Gaps of bodies apart are exact, except between edges that are parallel to within
-//! [`PARALLEL`]: they may come nearer than their corners tell, by at most 0.03 of the shorter one.
+//! Of bodies apart, the least gap is exact, except where two edges cross near the end of one or
+//! are parallel to within three times [`PARALLEL`]: the crossing has faded there, and the corners that
+//! are left may be farther, by at most 0.03 of the shorter edge.
 //!
 //! # How smooth
 //! Outside a body its distance has a continuous gradient, and so have gap and position; the normal
@@ -33,7 +34,7 @@ mod point;
 mod touch;
 
 pub use cross::PARALLEL;
-pub use form::Geometry;
+pub use form::{CYLINDER_SIDES, Geometry};
 pub use point::{ContactPoint, Rows3, Slopes};
 
 use crate::error::{Error, Result};

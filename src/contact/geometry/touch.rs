@@ -8,7 +8,7 @@
 //! corner with n in the cone of its faces' normals. Where one hands over to the next they are the
 //! same point with the same normal, outside and for overlaps less deep than the ellipsoid is curved.
 
-use super::core::Core;
+use super::core::{Core, Face};
 use super::ellipsoid::{Ellipsoid, Lowest};
 use super::point::{ContactPoint, Rows3, carry, turn};
 use hydrograd_adjoint::lie::{Pose, Vec3};
@@ -55,7 +55,9 @@ pub(super) fn contact(
     };
     let inward =
         |found: &ContactPoint, d: &Vec3| found.normal.dot(&(core_at.rotation * d)) >= -SLACK;
-    let mut pierced = false;
+    let center = to_ellipsoid.apply_inverse(&Vec3::zeros());
+    let behind = |f: &Face| f.normal.dot(&center) < f.offset;
+    let mut pierced = !core.faces.is_empty() && core.faces.iter().all(behind);
     for edge in &core.edges {
         let (from, along) = (
             to_ellipsoid.apply(&edge.from),

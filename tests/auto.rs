@@ -94,3 +94,38 @@ fn a_run_says_what_was_chosen() {
         "{text}"
     );
 }
+
+/// What can't be used or can't be right is said, and what would lose most of the added mass is refused.
+#[test]
+fn settings_out_of_place_are_told() {
+    let scene = balls(&[0.0, 3.0]);
+    let warned = |settings: Settings| {
+        Simulator::new(&scene, settings)
+            .unwrap()
+            .warnings()
+            .join("\n")
+    };
+    let full = Settings::default().faces(80);
+    assert!(warned(full.rank(10)).contains("rank has no effect with the fidelity full"));
+    let reduced = full.fidelity(Fidelity::Reduced);
+    assert!(warned(reduced.rank(2)).contains("compressed sources leave"));
+    assert_eq!(warned(reduced), "");
+    let refused = |settings: Settings| {
+        Simulator::new(&scene, settings)
+            .map(|_| ())
+            .unwrap_err()
+            .to_string()
+    };
+    assert!(refused(reduced.rank(100_000)).contains("from 1 to 1000"));
+    assert!(refused(reduced.resolved_gap(1e9)).contains("radii of the body"));
+    let mut plate = Scene::new(Fluid::fresh_water());
+    plate.add(Body::new(Shape::cuboid([1.0, 0.003, 1.0])).density(1000.0));
+    let thin = Simulator::new(&plate, Settings::default())
+        .map(|_| ())
+        .unwrap_err()
+        .to_string();
+    assert!(
+        thin.contains("far too thin") && thin.contains("panel"),
+        "{thin}"
+    );
+}

@@ -66,6 +66,10 @@ pub(super) struct Report {
     /// Wall time, s.
     pub seconds: f64,
     pub fidelity: String,
+    /// What `auto` came to; the fidelity itself otherwise.
+    pub fidelity_used: String,
+    /// What `auto` chose, and why.
+    pub chosen: Vec<String>,
     pub method: String,
     /// Density of the water, kg/m³.
     pub density: f64,
@@ -100,6 +104,7 @@ fn added_mass(scene: &Scene, arguments: &Arguments) -> Result<Report> {
     let bodies = &simulator.system().bodies;
     let in_water = bodies.iter().filter(|b| b.wet.is_some());
     let mut warnings = simulator.warnings().to_vec();
+    warnings.extend(simulator.start_gap_warning());
     let left_out: Vec<&str> = bodies
         .iter()
         .filter(|b| b.wet.is_none() && b.volume > 0.0)
@@ -122,6 +127,8 @@ fn added_mass(scene: &Scene, arguments: &Arguments) -> Result<Report> {
         iterations: found.report.iterations,
         seconds,
         fidelity: name(settings.fidelity),
+        fidelity_used: name(simulator.fidelity()),
+        chosen: simulator.reasons().to_vec(),
         method: settings.method_name().into(),
         density: simulator.parameters().density,
         warnings,
@@ -134,8 +141,11 @@ impl fmt::Display for Report {
         writeln!(
             f,
             "added mass in water of {} kg/m³, {} ({}): world axes, about each body's origin;",
-            self.density, self.fidelity, self.method
+            self.density, self.fidelity_used, self.method
         )?;
+        for reason in &self.chosen {
+            writeln!(f, "chosen: {reason}")?;
+        }
         writeln!(
             f,
             "rows and columns u_x u_y u_z (kg), w_x w_y w_z (kg m²) of {}",

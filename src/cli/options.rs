@@ -112,10 +112,10 @@ pub(super) struct Water {
     /// [default: 0.003 for reduced, which adds to that of the bodies themselves; 0.01 for auto].
     #[arg(long, value_name = "ERROR", value_parser = tolerance, allow_negative_numbers = true)]
     pub accuracy: Option<f64>,
-    /// Points of each compressed body [default: as many as the accuracy needs].
+    /// With `reduced` alone: points of each compressed body, up to 1000 [default: as many as the accuracy needs].
     #[arg(long, value_name = "N", value_parser = positive, allow_negative_numbers = true)]
     pub rank: Option<usize>,
-    /// Smallest gap in m that compressed bodies resolve [default: from each body's size].
+    /// With `reduced` alone: smallest gap in m that compressed bodies resolve [default: from each body's size].
     #[arg(long, value_name = "GAP", value_parser = length, allow_negative_numbers = true)]
     pub resolved_gap: Option<f64>,
     /// Folder that keeps compressed bodies for the next time.

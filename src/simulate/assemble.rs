@@ -296,6 +296,7 @@ pub(super) fn assemble(
         plan,
         reasons,
     } = choose(scene, settings, &system, &q, &clearance, &wet, &of_wet)?;
+    warnings.extend(without_effect(settings));
     let water = water(scene, &of_wet, folder);
     let made = wet::couple(&wet, &water, settings, fidelity, &plan)?;
     system.coupling = made.coupling;
@@ -345,6 +346,26 @@ pub(super) fn water<'a>(scene: &'a Scene, of_wet: &[usize], folder: Option<&'a P
         excluded: Exclusions::new(pairs),
         folder,
     }
+}
+
+/// Settings of the compression that the fidelity doesn't look at.
+fn without_effect(settings: &Settings) -> Vec<String> {
+    if settings.fidelity == Fidelity::Reduced {
+        return Vec::new();
+    }
+    let given = [
+        ("rank", settings.compress.rank.is_some()),
+        ("resolved_gap", settings.compress.resolved_gap.is_some()),
+    ];
+    let unused = given.iter().filter(|(_, given)| *given);
+    unused
+        .map(|(name, _)| {
+            format!(
+                "the setting {name} has no effect with the fidelity {}: only reduced takes it",
+                format!("{:?}", settings.fidelity).to_lowercase()
+            )
+        })
+        .collect()
 }
 
 /// The fidelity to use, and what `Auto` makes of the scene.

@@ -95,8 +95,8 @@ pub(super) fn plan(
                 "neither does full with such edges; use more faces and full for accurate forces there"
             };
             out.reasons.push(format!(
-                "body {:?} starts with a gap of {smallest:.3e} m at edges of {edge:.3e} m; its compressed \
-                 sources resolve {finest:.3e} m at best: {so}",
+                "body {:?} starts {smallest:.3e} m from a neighbour (or its own mirror image) at edges of \
+                 {edge:.3e} m; its compressed sources resolve {finest:.3e} m at best: {so}",
                 body.name
             ));
         }
@@ -115,7 +115,7 @@ pub(super) fn plan(
     for (b, body) in bodies.iter().enumerate() {
         let gap = out.plan.compress[b].resolved_gap.unwrap_or_default();
         out.reasons.push(format!(
-            "body {:?} resolves gaps from {gap:.3e} m on",
+            "body {:?} resolves gaps from {gap:.3e} m on (half that to a wall)",
             body.name
         ));
         for (a, other) in bodies.iter().enumerate().take(b + 1) {

@@ -359,6 +359,20 @@ impl Simulator {
         })
     }
 
+    /// What the user should know of the smallest gap at the start.
+    pub fn start_gap_warning(&self) -> Option<String> {
+        let system = self.system();
+        let poses = system.tree.kinematics(&self.assembled.q).poses;
+        let gap = self.gaps().smallest(&poses)?;
+        let fidelity = self.felt();
+        let warning = self.clearance().warning(0.0, &gap, fidelity, system);
+        let unresolved = || {
+            let start = std::iter::once((0.0, poses.as_slice(), gap));
+            super::clearance::unresolved(start, self.gaps(), self.resolved(), system)
+        };
+        warning.or_else(|| (fidelity == Fidelity::Reduced).then(unresolved).flatten())
+    }
+
     /// Added mass of all bodies in the water at the start.
     ///
     /// # Errors

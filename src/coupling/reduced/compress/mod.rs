@@ -35,6 +35,10 @@ use serde::{Deserialize, Serialize};
 const SPACING: f64 = 0.75;
 /// Most proxies at the smallest distance; a smaller gap isn't resolved on so large a body.
 const MOST_PROXIES: f64 = 900.0;
+/// Largest gap that is asked to be resolved, in radii of the body.
+const FARTHEST: f64 = 10.0;
+/// Largest rank: more points are no more accurate, and slow.
+const MOST_RANK: usize = 1000;
 /// About as many proxies are fitted at most, unless a rank needs more.
 const MOST_FITTED: usize = 1100;
 /// Depths of the candidates, relative to the distances of the proxies.
@@ -85,13 +89,15 @@ impl Settings {
     /// Checks the values.
     ///
     /// # Errors
-    /// A rank of zero, a tolerance outside 0 to 1, a gap that isn't a positive length.
+    /// A rank of zero or beyond what is fitted, a tolerance outside 0 to 1, a gap that isn't a positive length.
     pub fn validate(&self) -> Result<()> {
-        if self.rank == Some(0) {
+        if let Some(rank) = self.rank.filter(|r| *r == 0 || *r > MOST_RANK) {
             return Err(Error::input(
                 "settings: rank",
-                0,
-                "a whole number of points a body, such as 80, or none",
+                rank,
+                format!(
+                    "a whole number of points a body from 1 to {MOST_RANK}, such as 80, or none"
+                ),
             ));
         }
         if !(self.tolerance > 0.0 && self.tolerance < 1.0) {
@@ -152,6 +158,16 @@ pub fn compress(
     let warnings = response.warnings().to_vec();
     let finest = finest_gap(area);
     let asked = settings.resolved_gap;
+    if let Some(far) = asked.filter(|g| *g > FARTHEST * radius) {
+        return Err(Error::input(
+            format!("body {name:?}: resolved gap"),
+            far,
+            format!(
+                "at most {:.3e} m, {FARTHEST} radii of the body: there is no use in a larger one",
+                FARTHEST * radius
+            ),
+        ));
+    }
     let gap = asked
         .unwrap_or_else(|| default_gap(surface.faces.volume(), area))
         .max(finest);

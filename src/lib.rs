@@ -4,6 +4,7 @@ pub mod boundary;
 #[cfg(feature = "cli")]
 #[doc(hidden)]
 pub mod cli;
+pub mod contact;
 pub mod coupling;
 pub mod dynamics;
 pub mod error;

@@ -7,13 +7,14 @@ use std::path::{Path, PathBuf};
 /// `Error` and `Result` alone.
 ///
 /// `adjoint::lie` gives vectors and poses to everyone; the modules marked `adjoint` use the ladder too.
-const LAYERS: [(&str, &[&str]); 12] = [
+const LAYERS: [(&str, &[&str]); 13] = [
     ("error", &[]),
     ("scene", &["shape"]),
     ("special", &[]),
     ("shape", &["adjoint", "scene", "special"]),
     ("solver", &[]),
     ("boundary", &["adjoint", "solver", "special"]),
+    ("contact", &["adjoint", "scene", "shape"]),
     ("coupling", &["adjoint", "boundary", "scene", "solver"]),
     ("multibody", &["adjoint", "scene"]),
     ("dynamics", &["adjoint", "coupling", "multibody", "scene"]),
@@ -40,12 +41,14 @@ const LAYERS: [(&str, &[&str]); 12] = [
 ];
 
 /// Modules of which only the named parts may be used.
-const ONLY: [(&str, &str, &[&str]); 3] = [
+const ONLY: [(&str, &str, &[&str]); 5] = [
     ("shape", "adjoint", &["lie"]),
     // Descriptions of shapes and walls are scene data, and a scene asks the shapes whether they are
     // right: the one pair that knows each other.
     ("shape", "scene", &["Shape", "Wall"]),
     ("multibody", "adjoint", &["lie"]),
+    ("contact", "adjoint", &["lie"]),
+    ("contact", "scene", &["Shape"]),
 ];
 
 fn sources(folder: &Path) -> Vec<PathBuf> {

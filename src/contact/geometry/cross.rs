@@ -1,0 +1,208 @@
+//! Two cores: corners of either against the other, and edges across edges.
+//!
+//! Edges e_A, e_B with u = a₀ − b₀ between their beginnings: c = e_A × e_B, common normal n = ±c/|c|,
+//! gap n · u, nearest points at s = −u · (e_B × n)/(n · c) and t = −u · (e_A × n)/(n · c).
+
+use super::core::{Core, Edge};
+use super::point::{ContactPoint, Rows3, Slopes, across, carry, turn};
+use hydrograd_adjoint::lie::{Pose, Vec3, Vec6, skew};
+
+/// Sine of the angle between two edges below which they don't touch across one another; the weight
+/// grows from there to 1 at three times this. Nearly parallel edges touch with their corners.
+pub const PARALLEL: f64 = 0.02;
+/// Share of the shorter edge over which a crossing fades out towards an end; at least as long as
+/// the overlap is deep, for less than that from the end the corner is the way out.
+const END: f64 = 0.02;
+/// Sine of the angle by which the common normal may leave the normals of an edge's faces before
+/// the crossing has faded out.
+const LEAVE: f64 = 0.05;
+/// Share of the thinner body's thickness at which an overlap of edges has faded out (from half of
+/// it): deeper ones are of far sides, not of those that touch.
+const DEPTH: f64 = 0.5;
+
+/// All points with a gap below `reach`.
+pub(super) fn contacts(
+    a: &Core,
+    a_at: &Pose,
+    b: &Core,
+    b_at: &Pose,
+    reach: f64,
+) -> Vec<ContactPoint> {
+    let mut out = Vec::new();
+    if a.is_ball() || !b.is_ball() {
+        corners(a, a_at, b, b_at, reach, |p| out.push(p));
+    }
+    if !a.is_ball() {
+        corners(b, b_at, a, a_at, reach, |p| out.push(p.swapped()));
+    }
+    let beside = reach + a.radius + b.radius;
+    let ours = placed(a, a_at, b, b_at, beside);
+    let theirs = placed(b, b_at, a, a_at, beside);
+    let depth = DEPTH * a.thickness.min(b.thickness);
+    for first in &ours {
+        for second in &theirs {
+            let far = 0.5 * (first.length + second.length) + beside;
+            if (first.middle() - second.middle()).norm_squared() > far * far {
+                continue;
+            }
+            let radii = [a.radius, b.radius];
+            out.extend(crossing(first, second, radii, depth).filter(|p| p.gap < reach));
+        }
+    }
+    out
+}
+
+/// Corners of `a`, which moves, against `b`.
+fn corners(
+    a: &Core,
+    a_at: &Pose,
+    b: &Core,
+    b_at: &Pose,
+    reach: f64,
+    mut found: impl FnMut(ContactPoint),
+) {
+    let to_b = b_at.inverse().compose(a_at);
+    let radii = [a.radius, b.radius];
+    for corner in &a.corners {
+        let Some(field) = b.field(&to_b.apply(corner), reach + a.radius + b.radius) else {
+            continue;
+        };
+        let x = a_at.apply(corner);
+        let point = ContactPoint::probe(&x, &carry(&x), radii, &field.rotated(&b_at.rotation));
+        if point.gap < reach {
+            found(point);
+        }
+    }
+}
+
+/// Edges of `a` that may be nearer to `b` than `beside`, world frame.
+fn placed(a: &Core, a_at: &Pose, b: &Core, b_at: &Pose, beside: f64) -> Vec<Edge> {
+    let to_b = b_at.inverse().compose(a_at);
+    let [low, high] = &b.bounds;
+    let near = |edge: &&Edge| {
+        let from = to_b.apply(&edge.from);
+        let to = to_b.apply(&(edge.from + edge.length * edge.along));
+        let apart = (low - from.sup(&to)).sup(&(from.inf(&to) - high));
+        apart.max() <= beside
+    };
+    let place = |edge: &Edge| Edge {
+        from: a_at.apply(&edge.from),
+        along: a_at.rotation * edge.along,
+        length: edge.length,
+        inward: edge.inward.map(|v| v.map(|d| a_at.rotation * d)),
+    };
+    a.edges.iter().filter(near).map(place).collect()
+}
+
+impl Edge {
+    fn middle(&self) -> Vec3 {
+        self.from + 0.5 * self.length * self.along
+    }
+}
+
+/// A weight with its slope; a product of such.
+struct Weight {
+    value: f64,
+    slope: Vec6,
+}
+
+impl Weight {
+    /// Times 0 for x ≤ 0, 1 for x ≥ 1, 3x² − 2x³ in between.
+    fn fade(&mut self, x: f64, slope: &Vec6) {
+        if x < 1.0 {
+            let x = x.max(0.0);
+            let step = x * x * (3.0 - 2.0 * x);
+            self.slope = self.slope * step + self.value * 6.0 * x * (1.0 - x) * slope;
+            self.value *= step;
+        }
+    }
+}
+
+/// Where edge `a`, which moves, crosses edge `b`; none where that has faded out. `depth` is that
+/// at which an overlap of the cores has faded out, infinite for cores without inside.
+fn crossing(a: &Edge, b: &Edge, radii: [f64; 2], depth: f64) -> Option<ContactPoint> {
+    let cross = a.along.cross(&b.along);
+    let sine = cross.norm();
+    if sine <= PARALLEL {
+        return None;
+    }
+    let u = a.from - b.from;
+    let up = cross / sine;
+    // The normal leads out of b and into a. Bare edges are on the side where they are.
+    let into = |edge: &Edge| edge.inward.map_or(Vec3::zeros(), |[d, e]| d + e);
+    let side = if a.inward.is_none() && b.inward.is_none() {
+        u
+    } else {
+        into(a) - into(b)
+    };
+    let sign = 1f64.copysign(up.dot(&side));
+    let normal = sign * up;
+    let apart = normal.dot(&u);
+    let along = sign * sine;
+    let (b_side, a_side) = (b.along.cross(&normal), a.along.cross(&normal));
+    let (s, t) = (-u.dot(&b_side) / along, -u.dot(&a_side) / along);
+    // Outside the edges, or overlapping too deep: weight zero.
+    let ends = [s, a.length - s, t, b.length - t];
+    if ends.iter().any(|&x| x <= 0.0) || apart <= -depth {
+        return None;
+    }
+
+    // With dc = (ω × e_A) × e_B: dn = P dc (n · c)⁻¹, d(n · c) = n · dc.
+    let a_turn = turn(&a.along);
+    let cross_slope = -skew(&b.along) * a_turn;
+    let along_slope = cross_slope.tr_mul(&normal);
+    let normal_slope = across(&normal) * cross_slope / along;
+    let start = carry(&a.from);
+    let s_slope =
+        -(start.tr_mul(&b_side) + normal_slope.tr_mul(&u.cross(&b.along)) + s * along_slope)
+            / along;
+    let t_slope = -(start.tr_mul(&a_side)
+        + a_turn.tr_mul(&normal.cross(&u))
+        + normal_slope.tr_mul(&u.cross(&a.along))
+        + t * along_slope)
+        / along;
+    let [a_point, b_point] = [a.from + s * a.along, b.from + t * b.along];
+    let gap_slope = carry(&a_point).tr_mul(&normal);
+
+    let mut weight = Weight {
+        value: 1.0,
+        slope: Vec6::zeros(),
+    };
+    let ramp = 2.0 * PARALLEL;
+    weight.fade((sine - PARALLEL) / ramp, &(sign / ramp * along_slope));
+    if depth.is_finite() {
+        let ramp = 0.5 * depth;
+        weight.fade((apart + depth) / ramp, &(gap_slope / ramp));
+    }
+    let deep = apart.min(0.0);
+    let width = (END * a.length.min(b.length)).hypot(deep);
+    let width_slope = deep / width * gap_slope;
+    for (x, slope) in ends.iter().zip([s_slope, -s_slope, t_slope, -t_slope]) {
+        weight.fade(x / width, &((slope - x / width * width_slope) / width));
+    }
+    for d in a.inward.iter().flatten() {
+        let slope = normal_slope.tr_mul(d) + turn(d).tr_mul(&normal);
+        weight.fade(1.0 + normal.dot(d) / LEAVE, &(slope / LEAVE));
+    }
+    for d in b.inward.iter().flatten() {
+        let slope = normal_slope.tr_mul(d);
+        weight.fade(1.0 - normal.dot(d) / LEAVE, &(-slope / LEAVE));
+    }
+
+    let lean = radii[1] - radii[0];
+    let a_motion: Rows3 = carry(&a_point) + a.along * s_slope.transpose();
+    let b_motion: Rows3 = b.along * t_slope.transpose();
+    Some(ContactPoint {
+        gap: apart - radii[0] - radii[1],
+        weight: weight.value,
+        normal,
+        position: 0.5 * (a_point + b_point + lean * normal),
+        slopes: Slopes {
+            gap: gap_slope,
+            weight: weight.slope,
+            normal: normal_slope,
+            position: 0.5 * (a_motion + b_motion + lean * normal_slope),
+        },
+    })
+    .filter(|p| p.weight > 0.0)
+}

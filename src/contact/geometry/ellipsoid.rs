@@ -1,0 +1,198 @@
+//! Ellipsoids: support points and the signed distance.
+//!
+//! # References
+//! D. Eberly, "Distance from a point to an ellipse, an ellipsoid, or a hyperellipsoid" (2013): the
+//! scalar equation for the nearest point and the bracket of its root.
+
+use super::field::Field;
+use super::point::{ContactPoint, Rows3, across, carry, columns};
+use hydrograd_adjoint::lie::{Mat3, Pose, Vec3, Vec6, skew};
+
+/// Rounds of Newton's method; from where it starts it takes about six.
+const ROUNDS: usize = 100;
+
+/// An ellipsoid along the axes of its frame.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Ellipsoid {
+    /// m.
+    pub semi_axes: Vec3,
+}
+
+/// Outermost point in a direction.
+pub(super) struct Support {
+    /// World frame, m.
+    pub point: Vec3,
+    /// Its slope along the direction, taken at unit length, m: symmetric, zero along the direction.
+    pub spread: Mat3,
+}
+
+/// Where a straight edge is lowest over an ellipsoid.
+pub(super) enum Lowest {
+    /// At its beginning or end.
+    End,
+    /// In between, this far from its beginning, m.
+    Inside(f64),
+}
+
+impl Ellipsoid {
+    /// `R D² Rᵀ`.
+    fn squares(&self, at: &Pose) -> Mat3 {
+        let squares = self.semi_axes.component_mul(&self.semi_axes);
+        at.rotation * Mat3::from_diagonal(&squares) * at.rotation.transpose()
+    }
+
+    /// `c + Σ m/h` with h = √(mᵀ Σ m) and Σ = R D² Rᵀ, for a unit vector m.
+    pub fn support(&self, at: &Pose, direction: &Vec3) -> Support {
+        let squares = self.squares(at);
+        let across = squares * direction;
+        let height = across.dot(direction).sqrt();
+        Support {
+            point: at.translation + across / height,
+            spread: squares / height - across * across.transpose() / height.powi(3),
+        }
+    }
+
+    /// The lowest point over a plane through `point` with unit `normal`, both at rest.
+    pub fn against_plane(&self, at: &Pose, point: &Vec3, normal: &Vec3) -> ContactPoint {
+        let support = self.support(at, &-normal);
+        let field = Field::flat((support.point - point).dot(normal), *normal);
+        // The point slides along the surface, which the gap doesn't feel.
+        ContactPoint::probe(&support.point, &support.motion(normal), [0.0; 2], &field)
+    }
+
+    /// Signed distance of a point, frame of the ellipsoid. On the symmetry planes inside, where two
+    /// points of the surface are equally near, the one on the positive side is taken.
+    ///
+    /// The nearest point is xᵢ = aᵢ² yᵢ/(aᵢ² + t) with Σ (xᵢ/aᵢ)² = 1. The sum falls and is convex
+    /// in t, so that Newton's method from the left of the root climbs to it.
+    pub fn field(&self, y: &Vec3) -> Field {
+        let a = &self.semi_axes;
+        let least = a.imin();
+        // τ = t + a_min²: no cancellation near the pole.
+        let shift = a.map(|x| (x - a[least]) * (x + a[least]));
+        let weighted = a.component_mul(&y.abs());
+        let mut tau = (weighted - shift).max().max(0.0);
+        // Without y along the shortest axis the sum has no pole at τ = 0 and may have no root.
+        let rest: f64 = (0..3)
+            .filter(|&i| shift[i] > 0.0)
+            .map(|i| (weighted[i] / shift[i]).powi(2))
+            .sum();
+        let flat = (0..3).all(|i| shift[i] > 0.0 || weighted[i] == 0.0);
+        let mut nearest;
+        if flat && rest <= 1.0 {
+            tau = 0.0;
+            nearest = Vec3::from_fn(|i, _| {
+                if shift[i] > 0.0 {
+                    a[i] * (a[i] * y[i] / shift[i])
+                } else {
+                    0.0
+                }
+            });
+            nearest[least] = a[least] * (1.0 - rest).max(0.0).sqrt();
+        } else {
+            for _ in 0..ROUNDS {
+                let (mut sum, mut slope) = (-1.0, 0.0);
+                for i in 0..3 {
+                    if weighted[i] > 0.0 {
+                        let ratio = weighted[i] / (tau + shift[i]);
+                        sum += ratio * ratio;
+                        slope += 2.0 * ratio * ratio / (tau + shift[i]);
+                    }
+                }
+                let next = tau + sum / slope;
+                if next <= tau || next.is_nan() {
+                    break;
+                }
+                tau = next;
+            }
+            nearest = Vec3::from_fn(|i, _| {
+                if weighted[i] > 0.0 {
+                    a[i] * (a[i] * y[i] / (tau + shift[i]))
+                } else {
+                    0.0
+                }
+            });
+        }
+        let outward = nearest.component_div(a).component_div(a);
+        let steepness = outward.norm();
+        let normal = outward / steepness;
+        let distance = (tau - a[least] * a[least]) * steepness;
+        // Curvature of the surface, then that of the parallel surface through y.
+        let flatten = across(&normal);
+        let inverse_squares = Mat3::from_diagonal(&a.map(|x| 1.0 / (x * x)));
+        let curvature = flatten * inverse_squares * flatten / steepness;
+        let hessian = (Mat3::identity() + distance * curvature)
+            .try_inverse()
+            .map(|m| m * curvature)
+            .filter(|m| m.iter().all(|x| x.is_finite()))
+            .unwrap_or(Mat3::zeros());
+        Field {
+            distance,
+            gradient: normal,
+            hessian,
+        }
+    }
+
+    /// Where an edge comes nearest in the frame in which the ellipsoid is the unit ball: along the
+    /// edge (m), and how many radii from the centre.
+    pub fn approach(&self, from: &Vec3, along: &Vec3, length: f64) -> (f64, f64) {
+        let start = from.component_div(&self.semi_axes);
+        let step = along.component_div(&self.semi_axes);
+        let s = (-start.dot(&step) / step.norm_squared()).clamp(0.0, length);
+        (s, (start + s * step).norm())
+    }
+
+    /// A lower bound of the distance of points so many radii from the centre as in
+    /// [`Self::approach`].
+    pub fn distance_bound(&self, radii: f64) -> f64 {
+        self.semi_axes.min() * (radii - 1.0)
+    }
+
+    /// Where the signed distance is least along an edge, frame of the ellipsoid. The distance from
+    /// a convex body is convex, so its slope along the edge has one root at most.
+    pub fn lowest(&self, from: &Vec3, along: &Vec3, length: f64) -> Lowest {
+        let slope = |s: f64| {
+            let field = self.field(&(from + s * along));
+            let curvature = along.dot(&(field.hessian * along));
+            (field.gradient.dot(along), curvature)
+        };
+        if slope(0.0).0 >= 0.0 || slope(length).0 <= 0.0 {
+            return Lowest::End;
+        }
+        let (mut low, mut high) = (0.0, length);
+        let mut s = self.approach(from, along, length).0;
+        for _ in 0..ROUNDS {
+            let (value, curvature) = slope(s);
+            if value > 0.0 {
+                high = s;
+            } else {
+                low = s;
+            }
+            let newton = s - value / curvature;
+            let next = if newton >= low && newton <= high {
+                newton
+            } else {
+                0.5 * (low + high)
+            };
+            let step = (next - s).abs();
+            s = next;
+            if step <= 1e-15 * length {
+                break;
+            }
+        }
+        Lowest::Inside(s)
+    }
+}
+
+impl Support {
+    /// Slope of the support point in the direction −`normal`, at rest, along a displacement of the
+    /// body: carried along, and sliding by `C (ω × m)` against it.
+    pub fn motion(&self, normal: &Vec3) -> Rows3 {
+        carry(&self.point) - columns(&Mat3::zeros(), &(self.spread * skew(normal)))
+    }
+}
+
+/// The row `normal · (u + ω × x)`.
+pub(super) fn advance(normal: &Vec3, x: &Vec3) -> Vec6 {
+    carry(x).tr_mul(normal)
+}

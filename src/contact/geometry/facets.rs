@@ -1,0 +1,171 @@
+//! Flat faces of a convex triangle mesh.
+
+use crate::error::{Error, Result};
+use crate::shape::TriMesh;
+use hydrograd_adjoint::lie::Vec3;
+use std::collections::{BTreeMap, BTreeSet};
+
+/// Share of the diameter within which triangles lie in one plane: meshes in files are rounded to
+/// single precision.
+const FLAT: f64 = 1e-6;
+/// Share of the diameter by which a vertex may lie outside the plane of a face.
+const CONVEX: f64 = 1e-5;
+/// Most triangles: every face is held against every vertex.
+const MOST: usize = 20_000;
+
+/// Corners and, for every flat face, the numbers of its corners, counter-clockwise seen from
+/// outside.
+///
+/// # Errors
+/// As [`Geometry::of_mesh`](super::Geometry::of_mesh).
+pub(super) fn facets(mesh: &TriMesh) -> Result<(Vec<Vec3>, Vec<Vec<usize>>)> {
+    let count = mesh.faces().len();
+    if count > MOST {
+        return Err(unsupported(
+            mesh,
+            format!("it has {count} triangles, and contact holds every face against every vertex"),
+            format!("give its convex hull with at most {MOST} triangles"),
+        ));
+    }
+    let groups = flat_groups(mesh);
+    check_convex(mesh, &groups)?;
+    // A corner has three faces or more about it; the others lie within a face or a straight edge.
+    let mut about = vec![BTreeSet::new(); mesh.vertices().len()];
+    for (f, face) in mesh.faces().iter().enumerate() {
+        face.iter().for_each(|&v| {
+            about[v].insert(groups[f]);
+        });
+    }
+    let kept: Vec<usize> = (0..about.len()).filter(|&v| about[v].len() > 2).collect();
+    let numbers: BTreeMap<usize, usize> = kept.iter().enumerate().map(|(k, &v)| (v, k)).collect();
+    let count = groups.iter().max().map_or(0, |g| g + 1);
+    let loops = (0..count)
+        .map(|g| {
+            let border = border(mesh, &groups, g)?;
+            let corners: Vec<usize> = border
+                .iter()
+                .filter_map(|v| numbers.get(v).copied())
+                .collect();
+            (corners.len() > 2).then_some(corners)
+        })
+        .collect::<Option<Vec<_>>>();
+    let Some(loops) = loops else {
+        return Err(Error::Mesh {
+            name: mesh.name().into(),
+            problem: "triangles in one plane don't make a face with one border".into(),
+            location: format!("diameter {:.3e} m", mesh.diameter()),
+            remedy: "for contact use its convex hull, with flat parts flat to rounding".into(),
+        });
+    };
+    let corners = kept.iter().map(|&v| mesh.vertices()[v]).collect();
+    Ok((corners, loops))
+}
+
+/// The number of the flat face that each triangle belongs to: grown from the largest triangles.
+fn flat_groups(mesh: &TriMesh) -> Vec<usize> {
+    const NONE: usize = usize::MAX;
+    let slack = FLAT * mesh.diameter();
+    let mut neighbors = vec![Vec::new(); mesh.faces().len()];
+    for edge in mesh.edges() {
+        let [f, g] = edge.faces;
+        neighbors[f].push(g);
+        neighbors[g].push(f);
+    }
+    let mut order: Vec<usize> = (0..mesh.faces().len()).collect();
+    order.sort_by(|&f, &g| mesh.area(g).total_cmp(&mesh.area(f)).then(f.cmp(&g)));
+    let mut groups = vec![NONE; order.len()];
+    let mut count = 0;
+    for seed in order {
+        if groups[seed] != NONE {
+            continue;
+        }
+        let (normal, origin) = (mesh.normal(seed), mesh.centroid(seed));
+        let flat = |f: usize| {
+            let within = |x: &Vec3| (x - origin).dot(&normal).abs() <= slack;
+            mesh.corners(f).iter().all(within) && mesh.area_vector(f).dot(&normal) > 0.0
+        };
+        groups[seed] = count;
+        let mut waiting = vec![seed];
+        while let Some(f) = waiting.pop() {
+            for &g in &neighbors[f] {
+                if groups[g] == NONE && flat(g) {
+                    groups[g] = count;
+                    waiting.push(g);
+                }
+            }
+        }
+        count += 1;
+    }
+    groups
+}
+
+/// # Errors
+/// [`Error::Unsupported`] if a vertex lies outside a face, with the farthest.
+fn check_convex(mesh: &TriMesh, groups: &[usize]) -> Result<()> {
+    let count = groups.iter().max().map_or(0, |g| g + 1);
+    let mut areas = vec![Vec3::zeros(); count];
+    let mut origins = vec![Vec3::zeros(); count];
+    for (f, &g) in groups.iter().enumerate() {
+        areas[g] += mesh.area_vector(f);
+        origins[g] = mesh.centroid(f);
+    }
+    let mut worst = (0.0, Vec3::zeros());
+    for (area, origin) in areas.iter().zip(&origins) {
+        let normal = area.normalize();
+        for x in mesh.vertices() {
+            let height = (x - origin).dot(&normal);
+            if height > worst.0 {
+                worst = (height, *x);
+            }
+        }
+    }
+    let diameter = mesh.diameter();
+    if worst.0 <= CONVEX * diameter {
+        return Ok(());
+    }
+    Err(unsupported(
+        mesh,
+        format!(
+            "it isn't convex: the vertex at {:?} m lies {:.3e} m outside the plane of a face, {:.1e} \
+             of the diameter; {CONVEX:.0e} is allowed",
+            worst.1.as_slice(),
+            worst.0,
+            worst.0 / diameter
+        ),
+        "give its convex hull, or several convex bodies joined together".into(),
+    ))
+}
+
+/// Vertices around a group of triangles; none if its border isn't one loop.
+fn border(mesh: &TriMesh, groups: &[usize], group: usize) -> Option<Vec<usize>> {
+    let members = mesh
+        .faces()
+        .iter()
+        .zip(groups)
+        .filter(|(_, g)| **g == group);
+    let mut sides = BTreeSet::new();
+    for (&[a, b, c], _) in members {
+        for side in [[a, b], [b, c], [c, a]] {
+            sides.insert(side);
+        }
+    }
+    let outer = sides.iter().filter(|[a, b]| !sides.contains(&[*b, *a]));
+    let outer: Vec<[usize; 2]> = outer.copied().collect();
+    let next: BTreeMap<usize, usize> = outer.iter().map(|&[a, b]| (a, b)).collect();
+    let first = outer.first()?[0];
+    let mut out = vec![first];
+    let mut at = *next.get(&first)?;
+    while at != first && out.len() <= outer.len() {
+        out.push(at);
+        at = *next.get(&at)?;
+    }
+    (out.len() == outer.len()).then_some(out)
+}
+
+fn unsupported(mesh: &TriMesh, why: String, instead: String) -> Error {
+    Error::Unsupported {
+        what: format!("contact of the mesh {}", mesh.name()),
+        why,
+        instead,
+    }
+}

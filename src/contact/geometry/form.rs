@@ -1,0 +1,152 @@
+//! What a body is for contact.
+
+use super::core::Core;
+use super::ellipsoid::Ellipsoid;
+use super::facets::facets;
+use crate::error::Result;
+use crate::scene::Shape;
+use crate::shape::{self, TriMesh};
+use hydrograd_adjoint::lie::{Pose, Vec3};
+use std::f64::consts::TAU;
+use std::path::Path;
+
+/// Sides of the polyhedron that stands for a cylinder, with its corners on the rims: it is thinner
+/// than the cylinder by at most 0.0022 of the radius.
+pub const CYLINDER_SIDES: usize = 48;
+
+/// What a body is for contact: a ball, a capsule, an ellipsoid or a convex polyhedron, placed in
+/// the body's frame.
+#[derive(Clone, Debug)]
+pub struct Geometry {
+    pub(super) form: Form,
+    /// Frame of the shape to frame of the body.
+    pub(super) offset: Pose,
+    /// Centre, frame of the shape, and radius of a ball around it, m.
+    center: Vec3,
+    radius: f64,
+}
+
+#[derive(Clone, Debug)]
+pub(super) enum Form {
+    Ellipsoid(Ellipsoid),
+    Core(Core),
+}
+
+impl Geometry {
+    /// That of a shape with the pose `offset` in its body (shape to body). Spheres, capsules and
+    /// ellipsoids are exact, whatever number of faces the shape asks for; a cylinder is a
+    /// polyhedron of [`CYLINDER_SIDES`] sides. Mesh files are relative to `base_dir`.
+    ///
+    /// # Errors
+    /// [`Error::Input`](crate::Error::Input) if a parameter of the shape can't be, what reading a
+    /// mesh can give, and what [`Self::of_mesh`] can.
+    pub fn of_shape(shape: &Shape, offset: Pose, base_dir: &Path) -> Result<Self> {
+        let name = shape::shape_name(shape);
+        shape::validate(shape, &name)?;
+        let form = match shape {
+            Shape::Sphere { radius, .. } => Form::Core(Core::ball(*radius)),
+            Shape::Capsule { radius, length, .. } => Form::Core(Core::capsule(*radius, *length)),
+            Shape::Ellipsoid { semi_axes, .. } => Form::Ellipsoid(Ellipsoid {
+                semi_axes: Vec3::from(*semi_axes),
+            }),
+            Shape::Box { size, .. } => {
+                let [x, y, z] = size.map(|l| 0.5 * l);
+                let profile = [[-y, -z], [y, -z], [y, z], [-y, z]];
+                Form::Core(extrude(&name, &profile, x, along_x)?)
+            }
+            Shape::Prism {
+                profile, length, ..
+            } => Form::Core(extrude(&name, &corners_of(profile), 0.5 * length, along_x)?),
+            Shape::Cylinder { radius, length, .. } => {
+                let rim = (0..CYLINDER_SIDES).map(|k| {
+                    let (sin, cos) = (TAU * k as f64 / CYLINDER_SIDES as f64).sin_cos();
+                    [radius * cos, radius * sin]
+                });
+                let rim: Vec<_> = rim.collect();
+                let along_z = |z: f64, [x, y]: [f64; 2]| Vec3::new(x, y, z);
+                Form::Core(extrude(&name, &rim, 0.5 * length, along_z)?)
+            }
+            Shape::Mesh { .. } => {
+                return Self::of_mesh(&shape::build(shape, base_dir, None)?, offset);
+            }
+        };
+        Ok(Self::new(form, offset))
+    }
+
+    /// That of a convex mesh with the pose `offset` in its body (mesh to body). Triangles that lie
+    /// in one plane to within 10⁻⁶ of the mesh's diameter are one face.
+    ///
+    /// # Errors
+    /// [`Error::Unsupported`](crate::Error::Unsupported) if a vertex lies outside the plane of a
+    /// face by more than 10⁻⁵ of the diameter, saying by how much, or if the mesh has more than
+    /// 20 000 triangles; [`Error::Mesh`](crate::Error::Mesh) if its flat parts don't fit together.
+    pub fn of_mesh(mesh: &TriMesh, offset: Pose) -> Result<Self> {
+        let (corners, loops) = facets(mesh)?;
+        let core = Core::polyhedron(mesh.name(), corners, &loops)?;
+        Ok(Self::new(Form::Core(core), offset))
+    }
+
+    fn new(form: Form, offset: Pose) -> Self {
+        let (center, radius) = match &form {
+            Form::Ellipsoid(e) => (Vec3::zeros(), e.semi_axes.max()),
+            Form::Core(core) => {
+                let center = 0.5 * (core.bounds[0] + core.bounds[1]);
+                let reach = core.corners.iter().map(|c| (c - center).norm());
+                (center, reach.fold(0.0, f64::max) + core.radius)
+            }
+        };
+        Self {
+            form,
+            offset,
+            center,
+            radius,
+        }
+    }
+
+    /// Centre of a ball around the body, world frame, m, for the pose of the body.
+    pub fn center_at(&self, pose: &Pose) -> Vec3 {
+        pose.apply(&self.offset.apply(&self.center))
+    }
+
+    /// Radius of the ball around the body, m.
+    pub fn radius(&self) -> f64 {
+        self.radius
+    }
+}
+
+/// A prism over a counter-clockwise profile, from −`half` to `half` along the axis that `place`
+/// gives it; `place` must keep the handedness.
+fn extrude(
+    name: &str,
+    profile: &[[f64; 2]],
+    half: f64,
+    place: impl Fn(f64, [f64; 2]) -> Vec3,
+) -> Result<Core> {
+    let n = profile.len();
+    let end = |at: f64| profile.iter().map(move |&p| (at, p));
+    let corners = end(-half)
+        .chain(end(half))
+        .map(|(at, p)| place(at, p))
+        .collect();
+    let mut loops = vec![(0..n).rev().collect(), (n..2 * n).collect()];
+    loops.extend((0..n).map(|k| {
+        let next = (k + 1) % n;
+        vec![k, next, n + next, n + k]
+    }));
+    Core::polyhedron(name, corners, &loops)
+}
+
+/// Length along x, profile in the y-z plane.
+fn along_x(x: f64, [y, z]: [f64; 2]) -> Vec3 {
+    Vec3::new(x, y, z)
+}
+
+/// The corners of a convex profile, counter-clockwise.
+fn corners_of(profile: &[[f64; 2]]) -> Vec<[f64; 2]> {
+    let [[ax, ay], [bx, by], [cx, cy]] = [profile[0], profile[1], profile[2]];
+    let mut corners = profile.to_vec();
+    if (bx - ax) * (cy - by) < (by - ay) * (cx - bx) {
+        corners.reverse();
+    }
+    corners
+}

@@ -1,0 +1,149 @@
+//! Contact points: known answers, slopes against differences, symmetry, agreement with GJK.
+
+mod extremes;
+mod gjk;
+mod invariance;
+mod known;
+mod slopes;
+mod smooth;
+
+use hydrograd::adjoint::lie::{Mat3, Pose, Vec3, Vec6, exp_matrix, point_velocity};
+use hydrograd::contact::geometry::{ContactPoint, Geometry, against_wall, between};
+use hydrograd::shape::{TriMesh, build};
+use hydrograd::{Error, Shape};
+use std::path::Path;
+
+/// Numbers in [−1, 1] without a pattern, the same in every run (xorshift64*).
+struct Draw(u64);
+
+impl Draw {
+    fn number(&mut self) -> f64 {
+        self.0 ^= self.0 >> 12;
+        self.0 ^= self.0 << 25;
+        self.0 ^= self.0 >> 27;
+        let bits = self.0.wrapping_mul(0x2545_F491_4F6C_DD1D) >> 11;
+        bits as f64 / (1u64 << 52) as f64 - 1.0
+    }
+
+    fn vector(&mut self) -> Vec3 {
+        Vec3::new(self.number(), self.number(), self.number())
+    }
+
+    fn pose(&mut self) -> Pose {
+        Pose::new(exp_matrix(&(3.0 * self.vector())), self.vector())
+    }
+
+    fn pick<'a, T>(&mut self, from: &'a [T]) -> &'a T {
+        let k = (0.5 * (self.number() + 1.0) * from.len() as f64) as usize;
+        &from[k.min(from.len() - 1)]
+    }
+}
+
+fn sphere(radius: f64) -> Shape {
+    Shape::Sphere {
+        radius,
+        faces: None,
+    }
+}
+
+fn ellipsoid(semi_axes: [f64; 3]) -> Shape {
+    Shape::Ellipsoid {
+        semi_axes,
+        faces: None,
+    }
+}
+
+fn cuboid(size: [f64; 3]) -> Shape {
+    Shape::Box { size, faces: None }
+}
+
+fn capsule(radius: f64, length: f64) -> Shape {
+    Shape::Capsule {
+        radius,
+        length,
+        faces: None,
+    }
+}
+
+/// A prism with a trapezium for its profile, given clockwise.
+fn wedge() -> Shape {
+    Shape::Prism {
+        profile: vec![[-0.2, -0.1], [-0.15, 0.1], [0.25, 0.1], [0.3, -0.1]],
+        length: 0.6,
+        faces: None,
+    }
+}
+
+fn cylinder() -> Shape {
+    Shape::Cylinder {
+        radius: 0.15,
+        length: 0.3,
+        faces: None,
+    }
+}
+
+fn plain(shape: &Shape) -> Geometry {
+    Geometry::of_shape(shape, Pose::identity(), Path::new(".")).unwrap()
+}
+
+fn offset(shape: &Shape, offset: Pose) -> Geometry {
+    Geometry::of_shape(shape, offset, Path::new(".")).unwrap()
+}
+
+fn at(x: f64, y: f64, z: f64) -> Pose {
+    Pose::new(Mat3::identity(), Vec3::new(x, y, z))
+}
+
+fn turned(rotation: [f64; 3], translation: [f64; 3]) -> Pose {
+    Pose::new(exp_matrix(&Vec3::from(rotation)), Vec3::from(translation))
+}
+
+fn smallest(points: &[ContactPoint]) -> f64 {
+    let full = points.iter().filter(|p| p.weight >= 1.0 - 1e-12);
+    full.map(|p| p.gap).fold(f64::INFINITY, f64::min)
+}
+
+fn is_finite(p: &ContactPoint) -> bool {
+    let s = &p.slopes;
+    let values = [p.gap, p.weight];
+    let vectors = p.normal.iter().chain(p.position.iter());
+    let slopes = s.gap.iter().chain(s.weight.iter());
+    let rows = s.normal.iter().chain(s.position.iter());
+    values
+        .iter()
+        .chain(vectors)
+        .chain(slopes)
+        .chain(rows)
+        .all(|x| x.is_finite())
+        && (p.normal.norm() - 1.0).abs() < 1e-12
+        && (0.0..=1.0).contains(&p.weight)
+}
+
+fn every_kind() -> Vec<Shape> {
+    vec![
+        sphere(0.12),
+        capsule(0.06, 0.4),
+        ellipsoid([0.2, 0.05, 0.2]),
+        ellipsoid([0.12, 0.18, 0.25]),
+        cuboid([0.3, 0.2, 0.4]),
+        wedge(),
+        cylinder(),
+    ]
+}
+
+/// Moves `a` along `away` from where the centres meet until the smallest gap is `gap`.
+fn approach(a: &Geometry, b: &Geometry, from: &Pose, rest: &Pose, away: &Vec3, gap: f64) -> Pose {
+    let meet = b.center_at(rest) - a.center_at(from) + from.translation;
+    let moved = |t: f64| Pose::new(from.rotation, meet + t * away);
+    let (mut low, mut high) = (0.0, 2.0 * (a.radius() + b.radius()) + 2.0);
+    for _ in 0..60 {
+        let t = 0.5 * (low + high);
+        let points = between(a, b, &moved(t), rest, 10.0).unwrap();
+        if smallest(&points) > gap {
+            high = t;
+        } else {
+            low = t;
+        }
+    }
+    moved(high)
+}

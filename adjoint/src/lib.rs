@@ -1,6 +1,7 @@
 #![doc = include_str!("../README.md")]
 
 pub mod check;
+pub mod contact;
 pub mod drag;
 pub mod kernel;
 pub mod lie;

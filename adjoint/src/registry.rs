@@ -1,6 +1,7 @@
 //! Every derivative rung of this crate with its check.
 
 use crate::check::{Outcome, Rung, dot, outcome};
+use crate::contact::{Law, Meeting, contact_force, contact_force_jvp, contact_force_vjp};
 use crate::drag::{Element, Part, quadratic_drag, quadratic_drag_jvp, quadratic_drag_vjp};
 use crate::lie::{
     Mat3, Mat6, Vec3, Vec6, exp_jacobian_inverse, exp_jacobian_inverse_vjp, exp_matrix,
@@ -38,6 +39,14 @@ pub fn rungs() -> Vec<Rung> {
         Rung {
             name: "drag::quadratic_drag_vjp",
             check: quadratic_drag_vjp_check,
+        },
+        Rung {
+            name: "contact::contact_force_jvp",
+            check: contact_force_jvp_check,
+        },
+        Rung {
+            name: "contact::contact_force_vjp",
+            check: contact_force_vjp_check,
         },
     ]);
     out
@@ -161,6 +170,83 @@ fn quadratic_drag_vjp_check(corruption: f64) -> Outcome {
             x_bar.as_slice(),
             corruption,
         )
+    }))
+}
+
+/// Gap, weight, normal, velocity, stiffness, dissipation and friction in one row: setting in, pressed, sticking,
+/// sliding, and parting near the speed at which nothing presses.
+const CONTACTS: [[f64; 11]; 4] = [
+    [0.021, 0.8, 0.36, -0.48, 0.8, 0.3, 0.2, -0.1, 3e3, 0.4, 0.6],
+    [
+        0.008, 1.0, 0.36, -0.48, 0.8, 0.02, -0.01, -0.03, 3e3, 0.4, 0.6,
+    ],
+    [-0.03, 1.0, 0.6, 0.0, 0.8, -0.9, 0.4, -0.3, 3e3, 0.4, 0.6],
+    [-0.08, 0.5, 0.6, 0.0, 0.8, 0.9, 0.1, 2.2, 3e3, 0.5, 0.2],
+];
+
+fn contact(x: &[f64]) -> (Law, Meeting) {
+    let law = Law {
+        stiffness: x[8],
+        dissipation: x[9],
+        friction: x[10],
+        stiction_speed: 0.05,
+        gap: 0.02,
+        width: 5e-3,
+        horizon: 0.01,
+    };
+    let meeting = Meeting {
+        gap: x[0],
+        weight: x[1],
+        normal: Vec3::new(x[2], x[3], x[4]),
+        velocity: Vec3::new(x[5], x[6], x[7]),
+    };
+    (law, meeting)
+}
+
+fn contact_force_jvp_check(corruption: f64) -> Outcome {
+    all(CONTACTS.map(|x| {
+        let (law, meeting) = contact(&x);
+        let (at, du) = (meeting.velocity, numbers::<3>(7, 0.01));
+        let value = |u: &[f64]| {
+            let meeting = Meeting {
+                velocity: Vec3::from_column_slice(u),
+                ..meeting
+            };
+            contact_force(&law, &meeting).as_slice().to_vec()
+        };
+        let jvp = corruption * contact_force_jvp(&law, &meeting, &Vec3::from(du));
+        outcome(value, &[at.x, at.y, at.z], &du, jvp.as_slice(), TOLERANCE)
+    }))
+}
+
+fn contact_force_vjp_check(corruption: f64) -> Outcome {
+    let bar = Vec3::from(numbers(8, 1.0));
+    all(CONTACTS.map(|x| {
+        let (law, meeting) = contact(&x);
+        let b = contact_force_vjp(&law, &meeting, &bar);
+        let (n, u) = (b.normal, b.velocity);
+        let bars = [
+            b.gap,
+            b.weight,
+            n.x,
+            n.y,
+            n.z,
+            u.x,
+            u.y,
+            u.z,
+            b.stiffness,
+            b.dissipation,
+            b.friction,
+        ];
+        // In units of each argument's own size.
+        let size = [0.01, 0.1, 0.1, 0.1, 0.1, 0.01, 0.01, 0.01, 1e3, 0.1, 0.1];
+        let scaled: [f64; 11] = std::array::from_fn(|i| bars[i] * size[i]);
+        let value = |y: &[f64]| {
+            let row: [f64; 11] = std::array::from_fn(|i| x[i] + size[i] * y[i]);
+            let (law, meeting) = contact(&row);
+            contact_force(&law, &meeting).dot(&bar)
+        };
+        pulled_back::<11>(value, &[0.0; 11], &scaled, corruption)
     }))
 }
 

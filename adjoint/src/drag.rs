@@ -37,6 +37,15 @@ impl Part {
             Part::Total => Mat3::identity(),
         }
     }
+
+    /// The projector times `s`.
+    fn project(self, n: &Vec3, s: Vec3) -> Vec3 {
+        match self {
+            Part::Tangential => s - n * n.dot(&s),
+            Part::Normal => n * n.dot(&s),
+            Part::Total => s,
+        }
+    }
 }
 
 /// Resistance at unit coefficient, Σ ΔA Gᵀ Π G with `G = [1, −[x]×]`: constant in the body's frame,
@@ -66,7 +75,7 @@ pub fn quadratic_drag(surface: &[Element], part: Part, nu: &Vec6) -> Vec6 {
     let (u, o) = (linear(nu), angular(nu));
     let (mut force, mut moment) = (Vec3::zeros(), Vec3::zeros());
     for e in surface {
-        let w = part.projector(&e.normal) * (u + o.cross(&e.center));
+        let w = part.project(&e.normal, u + o.cross(&e.center));
         let f = -0.5 * e.area * w.norm() * w;
         force += f;
         moment += e.center.cross(&f);

@@ -3,14 +3,15 @@
 //! Points, normals and gaps belong to the configuration; the velocity is the argument of the force, so that an integrator
 //! that is implicit in it solves contact implicitly, against the mass matrix with its fluid part.
 
-use super::{Evaluation, Parameters, System};
+use super::{Evaluation, ForceCotangents, Parameters, System};
 use crate::Result;
 use crate::adjoint::contact::{
     ContactBar, Law, Meeting, contact_force, contact_force_jvp, contact_force_vjp,
 };
 use crate::adjoint::lie::{Pose, Vec3, Vec6, angular, point_velocity, point_wrench, six};
 use crate::contact::{ContactPoint, Contacts};
-use nalgebra::DVector;
+use crate::multibody::{Cotangents, Virtual};
+use nalgebra::{DMatrix, DVector};
 
 /// Constants of all contacts that no trajectory is differentiated with respect to.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -125,23 +126,34 @@ impl Touch {
     }
 }
 
-/// Cotangents that contact hands back.
-pub(super) struct ContactCotangents<'b> {
-    pub pose: &'b mut [Vec6],
-    pub twist: &'b mut [Vec6],
-    pub virtual_twist: &'b mut [Vec6],
-    pub parameters: &'b mut Parameters,
+/// In which coordinates generalised forces are dual to velocities.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Dual {
+    /// The user's: what M(q) v̇ is.
+    User,
+    /// The frame momenta's.
+    Frame,
 }
 
 impl Evaluation<'_> {
-    /// Spatial contact wrenches on all bodies moving with `twists`.
-    pub fn contact_wrenches(&self, twists: &[Vec6]) -> Vec<Vec6> {
+    /// Spatial contact wrenches on all bodies moving with the spatial `twists`.
+    fn contact_wrenches(&self, twists: &[Vec6]) -> Vec<Vec6> {
         let mut out = vec![Vec6::zeros(); self.system.len()];
         for t in &self.touches {
             let force = contact_force(&t.law, &t.meeting(twists));
             t.exchange(&point_wrench(&t.point.position, &force), &mut out);
         }
         out
+    }
+
+    /// Generalised forces of contact at the velocity `v`.
+    pub fn contact_force(&self, v: &DVector<f64>, dual: Dual) -> DVector<f64> {
+        let tree = &self.system.tree;
+        let wrenches = self.contact_wrenches(&tree.twists(&self.kinematics, v));
+        match dual {
+            Dual::User => tree.project(&self.kinematics, wrenches),
+            Dual::Frame => tree.project_frame(&self.kinematics, wrenches),
+        }
     }
 
     /// Sizes of the generalised forces of contact, without what cancels among them: what their rounding is relative to.
@@ -160,39 +172,65 @@ impl Evaluation<'_> {
         out
     }
 
-    /// Tangent of [`Evaluation::contact_wrenches`] along a change of the twists.
-    pub fn contact_wrenches_jvp(&self, twists: &[Vec6], dtwists: &[Vec6]) -> Vec<Vec6> {
+    /// Tangent of [`Evaluation::contact_force`] (the user's coordinates) along `dv`.
+    pub fn contact_force_jvp(&self, v: &DVector<f64>, dv: &DVector<f64>) -> DVector<f64> {
+        let tree = &self.system.tree;
+        let twists = tree.twists(&self.kinematics, v);
+        let dtwists = tree.twists(&self.kinematics, dv);
         let mut out = vec![Vec6::zeros(); self.system.len()];
         for t in &self.touches {
-            let du = point_velocity(&t.relative(dtwists), &t.point.position);
-            let force = contact_force_jvp(&t.law, &t.meeting(twists), &du);
+            let du = point_velocity(&t.relative(&dtwists), &t.point.position);
+            let force = contact_force_jvp(&t.law, &t.meeting(&twists), &du);
             t.exchange(&point_wrench(&t.point.position, &force), &mut out);
+        }
+        tree.project(&self.kinematics, out)
+    }
+
+    /// ∂g/∂v in the user's coordinates, column by column: symmetric, negative semi-definite.
+    pub(super) fn contact_jacobian(&self, v: &DVector<f64>) -> DMatrix<f64> {
+        let n = v.len();
+        let mut out = DMatrix::zeros(n, n);
+        for k in 0..n {
+            let mut unit = DVector::zeros(n);
+            unit[k] = 1.0;
+            out.set_column(k, &self.contact_force_jvp(v, &unit));
         }
         out
     }
 
-    /// Transpose: the gradient of `Σ_b Z_b · wrench_b` over poses (spatial displacements at fixed spatial twists), twists, the virtual
-    /// twists Z and the parameters.
-    pub(super) fn contact_wrenches_vjp(
+    /// Transpose of [`Evaluation::contact_force`]: the gradient of zᵀ g over q, v and the parameters.
+    pub fn contact_force_vjp(
         &self,
-        twists: &[Vec6],
-        virtual_twists: &[Vec6],
-        bar: ContactCotangents,
-    ) {
+        v: &DVector<f64>,
+        z: &DVector<f64>,
+        dual: Dual,
+    ) -> ForceCotangents {
+        let tree = &self.system.tree;
+        let virtual_velocity = match dual {
+            Dual::User => Virtual::User(z),
+            Dual::Frame => Virtual::Frame(z),
+        };
+        let fields = tree.fields(&self.kinematics, &self.q, v, virtual_velocity);
+        let mut bar = Cotangents::zeros(self.system.len());
+        let mut out = ForceCotangents::zeros(self);
         for t in &self.touches {
             let x = &t.point.position;
-            let meeting = t.meeting(twists);
-            let (v, z) = (t.relative(twists), t.relative(virtual_twists));
+            let meeting = t.meeting(&fields.twist);
+            let (twist, virt) = (t.relative(&fields.twist), t.relative(&fields.virtual_twist));
             let force = contact_force(&t.law, &meeting);
-            t.exchange(&point_wrench(x, &force), bar.virtual_twist);
-            let own = contact_force_vjp(&t.law, &meeting, &point_velocity(&z, x));
-            t.exchange(&point_wrench(x, &own.velocity), bar.twist);
-            // Both u and Z's velocity are taken at the point.
-            let position = own.velocity.cross(&angular(&v)) + force.cross(&angular(&z));
-            t.displacement_vjp(&own, &position, bar.pose);
-            bar.parameters.contact.stiffness += own.stiffness;
-            bar.parameters.contact.dissipation += own.dissipation;
-            bar.parameters.contact.friction += own.friction;
+            t.exchange(&point_wrench(x, &force), &mut bar.virtual_twist);
+            let own = contact_force_vjp(&t.law, &meeting, &point_velocity(&virt, x));
+            t.exchange(&point_wrench(x, &own.velocity), &mut bar.twist);
+            // Both u and the virtual velocity are taken at the point.
+            let position = own.velocity.cross(&angular(&twist)) + force.cross(&angular(&virt));
+            t.displacement_vjp(&own, &position, &mut bar.pose);
+            out.parameters.contact.stiffness += own.stiffness;
+            out.parameters.contact.dissipation += own.dissipation;
+            out.parameters.contact.friction += own.friction;
         }
+        let (q_bar, v_bar) = tree.reverse(&self.kinematics, v, virtual_velocity, &fields, bar);
+        out.q += q_bar;
+        out.v += v_bar;
+        out
     }
 }

@@ -12,7 +12,6 @@
 //! For a joint to the world the second term vanishes, and with no external force the sum of momenta is
 //! kept to round-off by any integrator that is linear in f.
 
-use super::contact::ContactCotangents;
 use super::{Evaluation, Parameters};
 use crate::Result;
 use crate::adjoint::lie::{Vec6, cross_force, cross_motion, six};
@@ -99,7 +98,6 @@ impl Evaluation<'_> {
         let direction = self.through_water(v);
         let fluid = self.fluid_momenta(&direction);
         let pose_force = self.pose_force(&direction);
-        let contact = self.contact_wrenches(&twists);
         let current = self.current_twist();
         let mut momenta = Vec::with_capacity(twists.len());
         let mut rates = Vec::with_capacity(twists.len());
@@ -107,7 +105,6 @@ impl Evaluation<'_> {
             momenta.push(self.rigid_momentum(b, twist) + rho * fluid[b]);
             rates.push(
                 self.external(b, twist, control)
-                    + contact[b]
                     + rho * (pose_force[b] + cross_force(&current, &fluid[b])),
             );
         }
@@ -158,7 +155,6 @@ impl Evaluation<'_> {
             Some(_) => self.from_wet(dpose_force),
             None => vec![Vec6::zeros(); self.system.len()],
         };
-        let dcontact = self.contact_wrenches_jvp(&twists, &dtwists);
         let current = self.current_twist();
         let (mut momenta, mut dmomenta, mut drates) = (vec![], vec![], vec![]);
         for (b, dtwist) in dtwists.iter().enumerate() {
@@ -166,7 +162,6 @@ impl Evaluation<'_> {
             dmomenta.push(self.rigid_momentum(b, dtwist) + rho * dfluid[b]);
             drates.push(
                 self.external_jvp(b, &twists[b], dtwist)
-                    + dcontact[b]
                     + rho * (dpose_force[b] + cross_force(&current, &dfluid[b])),
             );
         }
@@ -235,17 +230,6 @@ impl Evaluation<'_> {
             bar.pose[b] += e.pose;
             bar.twist[b] += e.twist;
         }
-        // Z · contact.
-        self.contact_wrenches_vjp(
-            &fields.twist,
-            &fields.virtual_twist,
-            ContactCotangents {
-                pose: &mut bar.pose,
-                twist: &mut bar.twist,
-                virtual_twist: &mut bar.virtual_twist,
-                parameters: &mut out.parameters,
-            },
-        );
         if let Some(fluid) = &self.fluid {
             let direction = self.through_water(v);
             let water = Direction::Basis(&direction);

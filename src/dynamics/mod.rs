@@ -10,7 +10,7 @@ mod momentum;
 mod parameters;
 mod system;
 
-pub use contact::{ContactModel, Regularisation, Touch};
+pub use contact::{ContactModel, Dual, Regularisation, Touch};
 pub use evaluation::Evaluation;
 pub use force::ForceCotangents;
 pub use integrator::{Input, Integrator, Memo, State, StateBar, StepBar, Stepped, Stepper};

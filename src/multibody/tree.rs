@@ -347,6 +347,18 @@ impl Tree {
         out
     }
 
+    /// The same on the frame columns: forces dual to frame velocities.
+    pub fn project_frame(&self, kinematics: &Kinematics, wrenches: Vec<Vec6>) -> DVector<f64> {
+        let composite = self.composite(wrenches);
+        let mut out = DVector::zeros(self.velocities);
+        for (l, f) in self.links.iter().zip(&composite) {
+            for k in l.v.clone() {
+                out[k] = kinematics.frame_columns[k].dot(f);
+            }
+        }
+        out
+    }
+
     /// Spatial twists of all bodies as columns of a 6B × nv matrix.
     pub fn jacobian(&self, kinematics: &Kinematics) -> DMatrix<f64> {
         let mut out = DMatrix::zeros(6 * self.links.len(), self.velocities);

@@ -3,7 +3,7 @@
 use super::tools::{Group, all, groups, vector_along, wavy};
 use hydrograd::adjoint::check::{Outcome, Rung};
 use hydrograd::dynamics::{
-    Evaluation, Input, Integrator, Parameters, State, StateBar, Stepper, System,
+    Dual, Evaluation, Input, Integrator, Parameters, State, StateBar, Stepper, System,
 };
 use hydrograd::scene::{Body, Contact, Fluid, Scene, Shape};
 use hydrograd::{Fidelity, Settings, Simulator};
@@ -13,11 +13,11 @@ use std::sync::OnceLock;
 pub fn rungs() -> Vec<Rung> {
     vec![
         Rung {
-            name: "dynamics::contact::Evaluation::contact_wrenches_jvp",
+            name: "dynamics::contact::Evaluation::contact_force_jvp",
             check: jvp,
         },
         Rung {
-            name: "dynamics::contact::Evaluation::contact_wrenches_vjp",
+            name: "dynamics::contact::Evaluation::contact_force_vjp",
             check: |c| all([force_vjp(c), step_vjp(c)]),
         },
     ]
@@ -168,12 +168,11 @@ fn jvp(c: f64) -> Outcome {
 fn force_vjp(c: f64) -> Outcome {
     let p = point();
     let z = wavy(p.v.len(), 5.1, 1.0);
-    let control = DVector::zeros(0);
-    let b = evaluate(&p.parameters, &p.q)
-        .force_vjp(&p.v, &control, &z)
-        .unwrap();
-    let value = |p: &Point| z.dot(&evaluate(&p.parameters, &p.q).force(&p.v, &control));
-    check(&value, &p, &b.q, &b.v, &b.parameters, c)
+    all([Dual::User, Dual::Frame].map(|dual| {
+        let b = evaluate(&p.parameters, &p.q).contact_force_vjp(&p.v, &z, dual);
+        let value = |p: &Point| z.dot(&evaluate(&p.parameters, &p.q).contact_force(&p.v, dual));
+        check(&value, &p, &b.q, &b.v, &b.parameters, c)
+    }))
 }
 
 fn stepper(parameters: &Parameters) -> Stepper<'_> {

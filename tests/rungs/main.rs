@@ -48,7 +48,11 @@ const THROUGH: &[(&str, &str)] = &[
     // Pieces of the equations of motion.
     (
         "dynamics::contact::Touch::displacement_vjp",
-        "dynamics::contact::Evaluation::contact_wrenches_vjp",
+        "dynamics::contact::Evaluation::contact_force_vjp",
+    ),
+    (
+        "dynamics::integrator::contact::solve_vjp",
+        "dynamics::contact::Evaluation::contact_force_vjp",
     ),
     (
         "dynamics::external::Evaluation::external_jvp",

@@ -11,69 +11,13 @@
 //! The stage is solved by Newton's method with exact derivatives; its adjoint is the implicit function theorem at
 //! the converged stage, with the transpose of the same matrix.
 
-use super::{Input, Memo, Split, State, StateBar, StepBar, Stepped, Stepper, When};
-use crate::dynamics::Evaluation;
+use super::{Input, Memo, Split, State, StateBar, StepBar, Stepped, Stepper, When, contact};
+use crate::dynamics::{Dual, Evaluation};
 use crate::{Error, Result};
 use nalgebra::{DMatrix, DVector, Dyn, LU};
 
 /// Most Newton iterations of a stage; quadratic convergence needs four or five.
 const ITERATIONS: usize = 40;
-
-/// Where surfaces may touch: the force bends within the width over which contact sets in.
-const TOUCHING_ITERATIONS: usize = 200;
-/// Relative residual below which a stage has converged once it stops shrinking.
-const RESIDUAL: f64 = 1e-13;
-/// The same where surfaces may touch: stiff forces of gaps that are known to round-off.
-const TOUCHING_RESIDUAL: f64 = 1e-11;
-/// What is accepted at the last iteration.
-const LAST_RESIDUAL: f64 = 1e-11;
-/// Evaluations of a search along a step.
-const TRIALS: usize = 30;
-/// Part of the slope at its start that a search leaves.
-const LEFT: f64 = 0.3;
-
-/// A velocity tried for a stage.
-struct Trial {
-    v: DVector<f64>,
-    force: DVector<f64>,
-    /// p̂ + h f.
-    reached: DVector<f64>,
-    defect: DVector<f64>,
-    /// Size of the defect, masses scaled to one, relative to what is balanced.
-    residual: f64,
-}
-
-/// Along Newton's step: contact is the slope of a convex function of v, and so nearly is the defect; where the full step runs past
-/// the least value on its way, goes back to about there (regula falsi on defect · step, with Illinois weights).
-fn search(
-    now: Trial,
-    full: Trial,
-    step: &DVector<f64>,
-    at: &dyn Fn(DVector<f64>) -> Trial,
-) -> Trial {
-    let slope = |t: &Trial| t.defect.dot(step);
-    let start = slope(&now);
-    let mut best = full;
-    // Slopes fall from `start`, above zero, to below it.
-    let (mut low, mut high) = ((0.0, start), (1.0, slope(&best)));
-    for _ in 0..TRIALS {
-        let here = slope(&best);
-        if here >= -LEFT * start && here.abs() <= start || !here.is_finite() {
-            break;
-        }
-        let length = (low.0 * high.1 - high.0 * low.1) / (high.1 - low.1);
-        best = at(&now.v - length * step);
-        let here = slope(&best);
-        if here < 0.0 {
-            high = (length, here);
-            low.1 *= 0.5;
-        } else {
-            low = (length, here);
-            high.1 *= 0.5;
-        }
-    }
-    best
-}
 
 /// A converged stage.
 pub(super) struct Stage {
@@ -130,6 +74,7 @@ pub(super) fn solve_stage(
     what: &dyn Fn() -> String,
 ) -> Result<Stage> {
     let tree = &e.system.tree;
+    let mut v = &split.driven + split.put(&split.take(guess));
     let scale = split
         .block(&e.mass_matrix)
         .diagonal()
@@ -138,65 +83,41 @@ pub(super) fn solve_stage(
     // Against the sum of what M v adds up, so that a total momentum of zero is no target for relative errors.
     let summands = e.mass_matrix.abs();
     let start = sized(&e.user_momentum(hat)).max(sized(&e.rest_momentum));
-    let at = |v: DVector<f64>| {
+    let mut previous = f64::INFINITY;
+    let mut residual = f64::INFINITY;
+    for iteration in 0..ITERATIONS {
         let force = e.force(&v, control);
         let reached = hat + rule.h * &force;
         let target = tree.chart_momentum(&e.q, &(rule.reach * &v), &reached);
         let defect = e.momentum(&v) - &target;
-        let pressed = rule.h * sized(&e.contact_effort(&v));
-        let size = sized(&(&summands * v.abs())).max(sized(&target));
-        let size = size.max(start).max(pressed);
-        let residual = if size > 0.0 {
+        let size = sized(&(&summands * v.abs())).max(sized(&target)).max(start);
+        residual = if size > 0.0 {
             sized(&defect) / size
         } else {
             0.0
         };
-        Trial {
-            v,
-            force,
-            reached,
-            defect,
-            residual,
-        }
-    };
-    let touching = !e.touches.is_empty();
-    let (most, enough) = match touching {
-        true => (TOUCHING_ITERATIONS, TOUCHING_RESIDUAL),
-        false => (ITERATIONS, RESIDUAL),
-    };
-    let mut now = at(&split.driven + split.put(&split.take(guess)));
-    let mut previous = f64::INFINITY;
-    for iteration in 0..most {
         // Stop where rounding ends the quadratic convergence.
-        let stalled = now.residual >= 0.25 * previous;
-        let converged = now.residual == 0.0 || (now.residual <= enough && stalled);
-        let at_last = iteration + 1 == most && now.residual <= LAST_RESIDUAL;
+        let converged = residual == 0.0 || (residual <= 1e-13 && residual >= 0.25 * previous);
+        let at_last = iteration + 1 == ITERATIONS && residual <= 1e-11;
         if converged || at_last {
-            let Trial { v, force, .. } = now;
             return Ok(Stage { v, force });
         }
-        if !now.residual.is_finite() {
+        if !residual.is_finite() {
             break;
         }
-        previous = now.residual;
-        let rates = e.force_velocity_jacobian(&now.v);
-        let matrix = stage_matrix(e, split, &now.v, &rates, &now.reached, rule);
-        let Some(step) = matrix.lu().solve(&split.take(&now.defect)) else {
+        previous = residual;
+        let rates = e.force_velocity_jacobian(&v);
+        let matrix = stage_matrix(e, split, &v, &rates, &reached, rule);
+        let Some(step) = matrix.lu().solve(&split.take(&defect)) else {
             break;
         };
-        let step = split.put(&step);
-        let full = at(&now.v - &step);
-        now = match touching {
-            true => search(now, full, &step, &at),
-            false => full,
-        };
+        v -= split.put(&step);
     }
-    let residual = now.residual;
     Err(Error::Solver {
         what: what(),
-        iterations: most,
+        iterations: ITERATIONS,
         residual,
-        tolerance: enough,
+        tolerance: 1e-13,
         remedy: "the time step is too long for these velocities or forces: take a smaller one"
             .into(),
     })
@@ -255,12 +176,26 @@ pub(super) fn step(
     let stage = solve_stage(e, &split, &p, &input.control, rule(s), v, &|| {
         stage_name(s, state)
     })?;
-    let y = &p + s.dt * &stage.force;
-    let q = advance(s, state, &stage.v);
+    let mut y = &p + s.dt * &stage.force;
+    let v = contact::solve(e, &split, &stage.v, s.dt, &|| stage_name(s, state))?;
+    if !e.touches.is_empty() {
+        y += s.dt * e.contact_force(&v, Dual::Frame);
+    }
+    let q = advance(s, state, &v);
     Ok(Stepped {
         state: next_state(state, &split, q, y, input),
-        memo: Some(stage.v),
+        memo: Some(kept(&stage.v, &v)),
     })
+}
+
+/// Velocities before and after contact, in one; the same one where nothing touches.
+fn kept(before: &DVector<f64>, after: &DVector<f64>) -> DVector<f64> {
+    DVector::from_iterator(2 * before.len(), before.iter().chain(after.iter()).copied())
+}
+
+/// The two of [`kept`].
+fn parted(both: &DVector<f64>, n: usize) -> (DVector<f64>, DVector<f64>) {
+    (both.rows(0, n).into_owned(), both.rows(n, n).into_owned())
 }
 
 /// Transpose of `q⁺ = q ⊕ Δt v` with motions placed: (q̄, v̄).
@@ -287,22 +222,32 @@ pub(super) fn step_vjp(
 ) -> Result<StepBar> {
     let split = s.split(&input.hold, When::Over(s.time(state), s.dt));
     let p = s.released_momentum(e, state, v, &split);
-    let stage = match memo {
-        Some(v) => Stage {
-            v: v.clone(),
-            force: e.force(v, &input.control),
-        },
-        None => solve_stage(e, &split, &p, &input.control, rule(s), v, &|| {
-            stage_name(s, state)
-        })?,
+    let (stage, after) = match memo {
+        Some(both) => {
+            let (before, after) = parted(both, v.len());
+            let force = e.force(&before, &input.control);
+            (Stage { v: before, force }, after)
+        }
+        None => {
+            let what = || stage_name(s, state);
+            let stage = solve_stage(e, &split, &p, &input.control, rule(s), v, &what)?;
+            let after = contact::solve(e, &split, &stage.v, s.dt, &what)?;
+            (stage, after)
+        }
     };
     let reached = &p + s.dt * &stage.force;
     let adjoint = AdjointStage::new(e, &split, &stage.v, &reached, rule(s));
     let mut bar = StepBar::zeros(e);
-    let (q_bar, mut v_bar) = advance_vjp(s, &split, &stage.v, &next_bar.q);
+    let (q_bar, mut v_bar) = advance_vjp(s, &split, &after, &next_bar.q);
     bar.state.q += q_bar;
     let mut z = next_bar.y.clone();
     split.forget_driven(&mut z);
+    if !e.touches.is_empty() {
+        let pressed = e.contact_force_vjp(&after, &z, Dual::Frame);
+        bar.add(s.dt, &pressed);
+        v_bar += s.dt * &pressed.v;
+        v_bar = contact::solve_vjp(e, &split, &stage.v, &after, &v_bar, s.dt, &mut bar)?;
+    }
     // v̄ of p̂⁺ through f; only the transpose of ∂f/∂v is needed here.
     v_bar += s.dt * adjoint.rates.tr_mul(&z);
     let w = adjoint.solve(&split, &v_bar)?;

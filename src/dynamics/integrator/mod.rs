@@ -11,6 +11,7 @@
 //! Joints that are driven (locked, held by the controller, or given a motion) have known
 //! velocities v_d; the others follow from rows f of the momentum balance (p_f = M_ff v_f + M_fd v_d).
 
+mod contact;
 mod euler;
 mod midpoint;
 mod readout;

@@ -1,0 +1,157 @@
+//! Contact at the end of a step, as a convex problem: from the velocity v* that the step would end with,
+//!
+//! ```text
+//! M(q) (v − v*) = Δt g(q, v)          g = −∂P/∂v: contact's generalised forces
+//! ```
+//!
+//! is the least of ½ (v − v*)ᵀ M (v − v*) + Δt P(v), which is strictly convex: Newton's method with a search along its step always gets there, however
+//! stiff. M holds the water. The impulse goes to the frame momenta at q, and q is stepped with v.
+//!
+//! # References
+//! A. Castro et al., "An Unconstrained Convex Formulation of Compliant Contact", 2022.
+
+use super::{Split, StepBar};
+use crate::dynamics::{Dual, Evaluation};
+use crate::{Error, Result};
+use nalgebra::{Cholesky, DMatrix, DVector, Dyn};
+
+/// Most Newton iterations.
+const ITERATIONS: usize = 200;
+/// Imbalance, relative to what is balanced, below which the search ends once it stops shrinking.
+const RESIDUAL: f64 = 1e-12;
+/// What is accepted at the last iteration.
+const ENOUGH: f64 = 1e-9;
+/// Evaluations of a search along a step.
+const TRIALS: usize = 60;
+/// Part of the slope at its start that a search may leave.
+const LEFT: f64 = 0.3;
+
+/// A velocity with its imbalance M (v − v*) − Δt g.
+struct Trial {
+    v: DVector<f64>,
+    imbalance: DVector<f64>,
+    residual: f64,
+}
+
+/// The Hessian M + Δt Jᵀ G J on the free rows, factored.
+fn hessian(e: &Evaluation, split: &Split, v: &DVector<f64>, dt: f64) -> Result<Cholesky<f64, Dyn>> {
+    let m = &e.mass_matrix - dt * e.contact_jacobian(v);
+    let m: DMatrix<f64> = 0.5 * (&m + m.transpose());
+    split.block(&m).cholesky().ok_or_else(|| Error::Solver {
+        what: "contact".into(),
+        iterations: 0,
+        residual: f64::INFINITY,
+        tolerance: 0.0,
+        remedy: "the mass matrix isn't positive definite, or the stiffness is out of range".into(),
+    })
+}
+
+/// The velocity after contact, from the one before it; the same bits where nothing touches.
+pub(super) fn solve(
+    e: &Evaluation,
+    split: &Split,
+    before: &DVector<f64>,
+    dt: f64,
+    what: &dyn Fn() -> String,
+) -> Result<DVector<f64>> {
+    if e.touches.is_empty() || split.free.is_empty() {
+        return Ok(before.clone());
+    }
+    let scale = split
+        .block(&e.mass_matrix)
+        .diagonal()
+        .map(|d| 1.0 / d.max(f64::MIN_POSITIVE).sqrt());
+    let sized = |p: &DVector<f64>| split.take(p).component_mul(&scale).norm();
+    let summands = e.mass_matrix.abs();
+    let start = sized(&(&summands * before.abs()));
+    let at = |v: DVector<f64>| {
+        let imbalance = &e.mass_matrix * (&v - before) - dt * e.contact_force(&v, Dual::User);
+        let size = sized(&(&summands * v.abs())).max(start);
+        let size = size.max(dt * sized(&e.contact_effort(&v)));
+        let residual = if size > 0.0 {
+            sized(&imbalance) / size
+        } else {
+            0.0
+        };
+        Trial {
+            v,
+            imbalance,
+            residual,
+        }
+    };
+    let mut now = at(before.clone());
+    let mut previous = f64::INFINITY;
+    for iteration in 0..ITERATIONS {
+        let stalled = now.residual >= 0.25 * previous;
+        let converged = now.residual == 0.0 || (now.residual <= RESIDUAL && stalled);
+        if converged || (iteration + 1 == ITERATIONS && now.residual <= ENOUGH) {
+            return Ok(now.v);
+        }
+        if !now.residual.is_finite() {
+            break;
+        }
+        previous = now.residual;
+        let step = hessian(e, split, &now.v, dt)?.solve(&split.take(&now.imbalance));
+        let step = split.put(&step);
+        now = search(now, &step, &at);
+    }
+    Err(Error::Solver {
+        what: what(),
+        iterations: ITERATIONS,
+        residual: now.residual,
+        tolerance: RESIDUAL,
+        remedy: "contact doesn't converge: take a smaller time step or a smaller contact.stiffness".into(),
+    })
+}
+
+/// Along Newton's step: the full one, or where that runs past the least value on its way, about there (regula falsi on the
+/// slope, in halves where it creeps).
+fn search(now: Trial, step: &DVector<f64>, at: &dyn Fn(DVector<f64>) -> Trial) -> Trial {
+    let slope = |t: &Trial| t.imbalance.dot(step);
+    let start = slope(&now);
+    let mut best = at(&now.v - step);
+    let (mut low, mut high) = ((0.0, start), (1.0, slope(&best)));
+    for trial in 0..TRIALS {
+        let here = slope(&best);
+        if here >= -LEFT * start || !(start > 0.0) {
+            break;
+        }
+        let length = match trial % 2 {
+            0 => (low.0 * high.1 - high.0 * low.1) / (high.1 - low.1),
+            _ => 0.5 * (low.0 + high.0),
+        };
+        let next = at(&now.v - length * step);
+        let there = slope(&next);
+        match there < 0.0 {
+            true => high = (length, there),
+            false => low = (length, there),
+        }
+        best = next;
+    }
+    best
+}
+
+/// Transpose of [`solve`]: from the cotangent of the velocity after contact to that of the one before; the rest is added to `bar`.
+pub(super) fn solve_vjp(
+    e: &Evaluation,
+    split: &Split,
+    before: &DVector<f64>,
+    after: &DVector<f64>,
+    after_bar: &DVector<f64>,
+    dt: f64,
+    bar: &mut StepBar,
+) -> Result<DVector<f64>> {
+    if e.touches.is_empty() || split.free.is_empty() {
+        return Ok(after_bar.clone());
+    }
+    let w = split.put(&hessian(e, split, after, dt)?.solve(&split.take(after_bar)));
+    bar.add(dt, &e.contact_force_vjp(after, &w, Dual::User));
+    bar.add(-1.0, &e.mass_vjp(&(after - before), &w)?);
+    // Driven velocities are what they are.
+    let mut before_bar = after_bar.clone();
+    let moved = &e.mass_matrix * &w;
+    for &i in &split.free {
+        before_bar[i] = moved[i];
+    }
+    Ok(before_bar)
+}

@@ -380,7 +380,11 @@ fn a_thousand_random_drops() {
             .collect();
         let simulator = simulator(&scene);
         let dt = simulator.time_step();
-        let Ok(rollout) = simulator.rollout(&Controls::zeros(&simulator, (1.0 / dt) as usize)) else { failed += 1; continue };
+        let Ok(rollout) = simulator.rollout(&Controls::zeros(&simulator, (1.0 / dt) as usize))
+        else {
+            failed += 1;
+            continue;
+        };
         let first = rollout.samples()[0].energy();
         for sample in rollout.samples() {
             assert!(

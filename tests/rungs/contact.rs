@@ -157,10 +157,13 @@ fn jvp(c: f64) -> Outcome {
         e.touches.iter().map(|t| (t.first, t.second)).collect();
     assert!(pairs.len() >= 6, "{pairs:?}");
     let dv = wavy(p.v.len(), 3.1, 0.1);
-    let tangent = c * e.force_jvp(&p.v, &dv);
-    let control = DVector::zeros(0);
+    let tangent = c * e.contact_force_jvp(&p.v, &dv);
     vector_along(
-        |h| e.force(&(&p.v + h * &dv), &control).as_slice().to_vec(),
+        |h| {
+            e.contact_force(&(&p.v + h * &dv), Dual::User)
+                .as_slice()
+                .to_vec()
+        },
         tangent.as_slice(),
     )
 }

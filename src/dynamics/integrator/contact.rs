@@ -100,7 +100,8 @@ pub(super) fn solve(
         iterations: ITERATIONS,
         residual: now.residual,
         tolerance: RESIDUAL,
-        remedy: "contact doesn't converge: take a smaller time step or a smaller contact.stiffness".into(),
+        remedy: "contact doesn't converge: take a smaller time step or a smaller contact.stiffness"
+            .into(),
     })
 }
 

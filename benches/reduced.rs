@@ -5,6 +5,8 @@
 
 #[allow(dead_code)]
 mod common;
+#[path = "../tests/common/two_spheres.rs"]
+mod two_spheres;
 
 use common::{Effort, arguments, in_child, median, scene, serve_child, settings, step_times};
 use faer::linalg::matmul::matmul;
@@ -416,66 +418,7 @@ fn grown(quick: bool, scene: &Scene, settings: Settings) -> hydrograd::Result<St
     ))
 }
 
-/// Two equal spheres of radius 1 at unit density, centres d apart: along the line of centres M11 and
-/// M12, across it M11 and M12 (multipoles against images, agreeing to 1e-16).
-const TWO_SPHERES: [(f64, [f64; 4]); 6] = [
-    (
-        2.05,
-        [
-            2.32202493143995,
-            -0.8142853669628686,
-            2.1589776041169393,
-            0.3814265072810595,
-        ],
-    ),
-    (
-        2.2,
-        [
-            2.212295759450387,
-            -0.6176388786372325,
-            2.1287968395728725,
-            0.3003675369424352,
-        ],
-    ),
-    (
-        2.5,
-        [
-            2.1384756378903385,
-            -0.40744442892392174,
-            2.1070601149394723,
-            0.2020009329363651,
-        ],
-    ),
-    (
-        3.0,
-        [
-            2.106704831524129,
-            -0.23339113417708315,
-            2.0978073973851967,
-            0.11646306884048746,
-        ],
-    ),
-    (
-        4.0,
-        [
-            2.096257475425208,
-            -0.09821056164738921,
-            2.094889664936694,
-            0.049092479963193415,
-        ],
-    ),
-    (
-        6.0,
-        [
-            2.0945416527273335,
-            -0.029089560983682573,
-            2.094432756981481,
-            0.01454450833192825,
-        ],
-    ),
-];
-
-/// The same at any distance, from multipoles about both centres.
+/// What the table of two equal spheres ([`two_spheres::table`]) holds, at any distance: from multipoles about both centres.
 ///
 /// The flow of both spheres moving as mirror images (s = 1) or against each other (s = −1) is
 /// `Σ a_n (r⁻ⁿ⁻¹P_nᵐ + s their mirror images)`, m = 0 along the line of centres and m = 1 across it;
@@ -530,8 +473,8 @@ struct Curve {
 /// Error of two spheres, max |ΔM_ij| / √(M_ii M_jj), against the gap in radii.
 fn spheres(quick: bool) -> hydrograd::Result<Vec<Curve>> {
     println!("\n### Two exact spheres: error of M_f against the gap\n");
-    let worst = TWO_SPHERES.iter().map(|(d, table)| {
-        let pairs = exact(*d).into_iter().zip(table);
+    let worst = two_spheres::table().into_iter().map(|(d, table)| {
+        let pairs = exact(d).into_iter().zip(table);
         pairs.fold(0.0_f64, |w, (a, b)| w.max((a - b).abs()))
     });
     let worst = worst.fold(0.0, f64::max);

@@ -1,5 +1,8 @@
 //! The reduced coupling against exact solutions, its symmetry, its cache, and what it refuses.
 
+#[path = "common/two_spheres.rs"]
+mod two_spheres;
+
 use hydrograd::adjoint::lie::{Mat3, Pose, Vec3};
 use hydrograd::boundary::{ExactBoundary, OneBody, PanelBoundary};
 use hydrograd::coupling::reduced::{Reduced, ReducedBody, cache, compress};
@@ -10,65 +13,6 @@ use hydrograd::{Controls, Fidelity, Settings, Simulator};
 use nalgebra::{DMatrix, DVector};
 use std::path::Path;
 use std::sync::Arc;
-
-/// Two equal spheres of radius 1 at unit density, centres d apart: along the line of centres M11 and
-/// M12, across it M11 and M12 (multipoles against images, agreeing to 1e-16).
-const TWO_SPHERES: [(f64, [f64; 4]); 6] = [
-    (
-        2.05,
-        [
-            2.32202493143995,
-            -0.8142853669628686,
-            2.1589776041169393,
-            0.3814265072810595,
-        ],
-    ),
-    (
-        2.2,
-        [
-            2.212295759450387,
-            -0.6176388786372325,
-            2.1287968395728725,
-            0.3003675369424352,
-        ],
-    ),
-    (
-        2.5,
-        [
-            2.1384756378903385,
-            -0.40744442892392174,
-            2.1070601149394723,
-            0.2020009329363651,
-        ],
-    ),
-    (
-        3.0,
-        [
-            2.106704831524129,
-            -0.23339113417708315,
-            2.0978073973851967,
-            0.11646306884048746,
-        ],
-    ),
-    (
-        4.0,
-        [
-            2.096257475425208,
-            -0.09821056164738921,
-            2.094889664936694,
-            0.049092479963193415,
-        ],
-    ),
-    (
-        6.0,
-        [
-            2.0945416527273335,
-            -0.029089560983682573,
-            2.094432756981481,
-            0.01454450833192825,
-        ],
-    ),
-];
 
 fn sphere(rank: Option<usize>, tolerance: f64, gap: f64) -> Arc<ReducedBody> {
     let mesh = shape::build(&Shape::sphere(1.0), Path::new(""), Some(1280)).unwrap();
@@ -104,6 +48,7 @@ fn two_spheres_error(body: &Arc<ReducedBody>, d: f64, exact: &[f64; 4]) -> f64 {
 
 #[test]
 fn two_spheres_meet_the_exact_table() {
+    let table = two_spheres::table();
     for (rank, gap, limits) in [
         (80, 0.5, [2e-2, 5e-3, 1e-3, 5e-4, 1e-4, 5e-5]),
         (160, 0.5, [2e-2, 5e-3, 5e-4, 1e-4, 1e-5, 1e-6]),
@@ -111,7 +56,7 @@ fn two_spheres_meet_the_exact_table() {
     ] {
         let body = sphere(Some(rank), 1e-4, gap);
         assert!(body.points() <= rank);
-        for ((d, exact), limit) in TWO_SPHERES.iter().zip(limits) {
+        for ((d, exact), limit) in table.iter().zip(limits) {
             let error = two_spheres_error(&body, *d, exact);
             println!(
                 "rank {rank}, resolved gap {gap}, gap {:.2}: {error:.1e}",
@@ -125,10 +70,10 @@ fn two_spheres_meet_the_exact_table() {
 #[test]
 fn a_tighter_tolerance_gives_more_points_and_smaller_errors() {
     let mut last = (0, f64::INFINITY);
+    let (d, exact) = two_spheres::table()[1];
     for tolerance in [3e-2, 3e-3, 3e-4] {
         let body = sphere(None, tolerance, 0.2);
-        let (d, exact) = &TWO_SPHERES[1];
-        let error = two_spheres_error(&body, *d, exact);
+        let error = two_spheres_error(&body, d, &exact);
         println!(
             "tolerance {tolerance:.0e}: {} points, error {error:.1e}",
             body.points()
@@ -143,7 +88,7 @@ fn a_tighter_tolerance_gives_more_points_and_smaller_errors() {
 #[test]
 fn a_sphere_by_a_wall_and_under_a_free_surface() {
     let body = sphere(None, 1e-4, 0.4);
-    for (d, [along, along12, across, across12]) in &TWO_SPHERES[2..5] {
+    for (d, [along, along12, across, across12]) in &two_spheres::table()[2..5] {
         let wall = |surface| Wall {
             point: [0.0, 0.0, 0.0],
             normal: [0.0, 0.0, -1.0],

@@ -183,26 +183,10 @@ impl<'a> Rollout<'a> {
     /// What the user should know about this trajectory, with names and numbers: gaps that the
     /// meshes don't resolve, and bodies in one another with the fidelity `isolated`.
     pub fn warnings(&self) -> Vec<String> {
-        let fidelity = self.simulator.felt();
-        let nearest = self.nearest();
-        let warning = nearest.and_then(|(time, gap)| {
-            let clearance = self.simulator.clearance();
-            clearance.warning(time, &gap, fidelity, self.simulator.system())
-        });
-        let warning = warning.or_else(|| self.unresolved_gap(fidelity));
-        warning.into_iter().chain(self.energy_warning()).collect()
-    }
-
-    /// A gap that compressed bodies don't resolve.
-    fn unresolved_gap(&self, fidelity: Fidelity) -> Option<String> {
-        if fidelity != Fidelity::Reduced {
-            return None;
-        }
         let samples = self.samples().iter();
         let states = samples.filter_map(|s| Some((s.time, s.poses.as_slice(), s.gap?)));
-        let simulator = self.simulator;
-        let (gaps, system) = (simulator.gaps(), simulator.system());
-        super::clearance::unresolved(states, gaps, simulator.resolved(), system)
+        let warning = self.simulator.gap_warning(self.nearest(), states);
+        warning.into_iter().chain(self.energy_warning()).collect()
     }
 
     /// Energy that grows though nothing does work: the step is too long.

@@ -1,7 +1,7 @@
 //! The simulator: a scene made ready to run.
 
 use super::assemble::{self, Assembled};
-use super::clearance::Clearance;
+use super::clearance::{Clearance, unresolved};
 use super::trajectory::Trajectory;
 use super::{Controls, Discretisation, Fidelity, Policy, Rollout, Settings};
 use crate::adjoint::lie::Pose;
@@ -9,7 +9,7 @@ use crate::adjoint::step;
 use crate::coupling::Report;
 use crate::dynamics::{Parameters, State, Stepper, System};
 use crate::scene::Scene;
-use crate::shape::Gaps;
+use crate::shape::{Gap, Gaps};
 use crate::{Error, Result};
 use nalgebra::{DMatrix, DVector};
 use std::path::{Path, PathBuf};
@@ -364,12 +364,22 @@ impl Simulator {
         let system = self.system();
         let poses = system.tree.kinematics(&self.assembled.q).poses;
         let gap = self.gaps().smallest(&poses)?;
-        let fidelity = self.felt();
-        let warning = self.clearance().warning(0.0, &gap, fidelity, system);
-        let unresolved = || {
-            let start = std::iter::once((0.0, poses.as_slice(), gap));
-            super::clearance::unresolved(start, self.gaps(), self.resolved(), system)
-        };
+        let start = std::iter::once((0.0, poses.as_slice(), gap));
+        self.gap_warning(Some((0.0, gap)), start)
+    }
+
+    /// What the user should know of gaps: of the smallest one and its time, against the meshes, and of all in `states` (times, poses,
+    /// smallest gaps), against what compressed bodies resolve.
+    pub(super) fn gap_warning<'s>(
+        &self,
+        smallest: Option<(f64, Gap)>,
+        states: impl Iterator<Item = (f64, &'s [Pose], Gap)>,
+    ) -> Option<String> {
+        let (fidelity, system) = (self.felt(), self.system());
+        let clearance = self.clearance();
+        let warning =
+            smallest.and_then(|(time, gap)| clearance.warning(time, &gap, fidelity, system));
+        let unresolved = || unresolved(states, self.gaps(), self.resolved(), system);
         warning.or_else(|| (fidelity == Fidelity::Reduced).then(unresolved).flatten())
     }
 

@@ -12,14 +12,13 @@
 //! δG being what pairs that fade out leave out.
 
 use super::Reduced;
-use super::record::ReducedRecord;
+use super::record::{FLUX, ReducedRecord};
 use crate::Result;
 use crate::adjoint::kernel::{Points, Sources, Write, potential_fill};
 use crate::adjoint::lie::{Pose, Vec3};
 use crate::boundary::Response;
 use crate::coupling::pair::Pair;
 use nalgebra::DMatrix;
-use std::f64::consts::PI;
 use std::sync::Arc;
 
 impl Reduced {
@@ -74,7 +73,7 @@ impl Reduced {
             let faint = DMatrix::from_fn(rows.len(), k, |i, c| faded[i] * charges[(i, c)]);
             let alpha = record.alpha.rows(self.points[b].start, parts.points.len());
             let missing = alpha.tr_mul(&field.tr_mul(&faint));
-            out += 4.0 * PI * (scattered + &radiated + radiated.transpose() + missing);
+            out += FLUX * (scattered + &radiated + radiated.transpose() + missing);
         }
         Ok(0.5 * (&out + out.transpose()))
     }

@@ -3,12 +3,12 @@
 use super::link::Placed;
 use super::record::{FLUX, ReducedRecord, vector};
 use crate::adjoint::kernel::potential_vjp;
-use crate::adjoint::lie::{Vec6, six};
+use crate::adjoint::lie::{Vec3, Vec6, six};
 use crate::coupling::pair::wrench;
 use nalgebra::DVector;
 
-/// ∇ of the potentials at a link's source points that the targets' charges make, one for each column of the basis, `[j][k][3]`; and where the
-/// link fades those potentials, `[j][k]`.
+/// ∇ of the potentials at a link's source points that the targets' charges make, one for each column of the
+/// basis, `[j][k][3]`; and where the link fades those potentials, `[j][k]`.
 pub(super) struct Fields {
     field: Vec<f64>,
     sums: Vec<f64>,
@@ -44,9 +44,9 @@ impl ReducedRecord<'_> {
             let charges = self.alpha.rows(s.start, s.len());
             let along: DVector<f64> = charges * x;
             let at = |j: usize, k: usize| vector(&f.field, columns, j, k);
-            let seen: Vec<_> = (0..s.len())
+            let seen: Vec<Vec3> = (0..s.len())
                 .map(|j| (0..columns).map(|k| at(j, k) * x[k]).sum())
-                .collect::<Vec<crate::adjoint::lie::Vec3>>();
+                .collect();
             let strength = FLUX * link.factor;
             for (k, out) in out.iter_mut().enumerate() {
                 let mut total = wrench(&placed.pair.positions, |j| {

@@ -1,12 +1,11 @@
 //! Second derivatives along one displacement: the tangent of the first.
 
 use super::link::Placed;
-use super::record::{ReducedRecord, Response, interleave, vector};
+use super::record::{FLUX, ReducedRecord, Response, interleave, vector};
 use crate::adjoint::kernel::{potential_hvp, potential_jvp, potential_vjp};
 use crate::adjoint::lie::{Vec3, Vec6, angular, linear, six};
 use crate::coupling::{Direction, Tangent};
 use nalgebra::{DMatrix, DVector};
-use std::f64::consts::PI;
 
 /// Work per pair of points, relative to that of the first derivative.
 const TANGENT: usize = 3;
@@ -185,7 +184,7 @@ impl ReducedRecord<'_> {
         let mut bent = vec![0.0; 3 * n * s.len()];
         potential_vjp(targets, points, &changes, n, &mut bent);
         potential_hvp(targets, points, &moved.points, &values, n, &mut bent);
-        let strength = 4.0 * PI * link.factor;
+        let strength = FLUX * link.factor;
         let [weight, slope, bend] = placed.weight.map(|w| strength * w);
         let (mut w, mut dw) = (Vec6::zeros(), Vec6::zeros());
         let (mut energy, mut denergy) = (0.0, 0.0);

@@ -400,4 +400,22 @@ pub enum Controller {
         /// negative, from below otherwise.
         stop_at: f64,
     },
+    /// Constant controls, stage by stage: a stage ends for good once the joint of one of `bodies` is faster than its
+    /// `until`, and after the last one nothing acts (the paper's grasps).
+    SpeedStages {
+        /// Bodies whose one-coordinate joints are watched.
+        bodies: Vec<String>,
+        /// In their order.
+        stages: Vec<SpeedStage>,
+    },
+}
+
+/// Controls until a speed is reached.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct SpeedStage {
+    /// Speed of a joint that ends the stage, m/s or rad/s.
+    pub until: f64,
+    /// One per control, N or N m.
+    pub control: Vec<f64>,
 }

@@ -2,8 +2,8 @@
 
 use super::clearance::Clearance;
 use super::contact;
+use super::controller;
 use super::plan::{Planned, plan};
-use super::policy::{Constant, OpenLoop, Pd, PdAxis, PushThenLock};
 use super::wet::{self, Discretisation, Plan, Water, Wet};
 use super::{Fidelity, Policy, Settings};
 use crate::adjoint::drag::{self, Element, Part};
@@ -12,9 +12,9 @@ use crate::boundary::OneBody;
 use crate::coupling::{Exclusions, Isolated};
 use crate::dynamics::{BodyData, Drive, Parameters, Stepper, System};
 use crate::multibody::{self, Tree};
-use crate::scene::{self, Body, Controller, DragPart, Placement, Scene, Shape};
+use crate::scene::{self, Body, DragPart, Placement, Scene, Shape};
 use crate::shape::{self, Gap, MassProperties, Other, TriMesh};
-use crate::{Error, Result};
+use crate::Result;
 use nalgebra::DVector;
 use std::path::Path;
 
@@ -320,7 +320,7 @@ pub(super) fn assemble(
     }
     let v = start_velocity(scene, settings, &system, &parameters, &q)?;
     Ok(Assembled {
-        policy: policy(scene, &system)?,
+        policy: controller::policy(scene, &system)?,
         system,
         parameters,
         q,
@@ -469,82 +469,4 @@ fn start_velocity(
         v = stepper.velocity_of_momentum(&e, &p)?;
     }
     Ok(v)
-}
-
-/// The scene's controller.
-fn policy(scene: &Scene, system: &System) -> Result<Box<dyn Policy>> {
-    let count = |name: &str, n: usize| {
-        if n == system.controls {
-            return Ok(());
-        }
-        Err(Error::input(
-            format!("controller.{name}"),
-            format!("{n} numbers"),
-            format!("must be {} numbers, one per control", system.controls),
-        ))
-    };
-    Ok(match &scene.controller {
-        None => Box::new(OpenLoop),
-        Some(Controller::Constant { control }) => {
-            count("control", control.len())?;
-            Box::new(Constant {
-                control: control.clone(),
-            })
-        }
-        Some(Controller::Pd {
-            target,
-            stiffness,
-            damping,
-        }) => {
-            count("target", target.len())?;
-            count("stiffness", stiffness.len())?;
-            count("damping", damping.len())?;
-            let mut axes = Vec::new();
-            for (body, link) in system.bodies.iter().zip(system.tree.links()) {
-                let Some(at) = body.joint_control else {
-                    continue;
-                };
-                for k in 0..link.v.len() {
-                    axes.push(PdAxis {
-                        control: at + k,
-                        q: link.q.start + k,
-                        v: link.v.start + k,
-                        target: target[at + k],
-                        stiffness: stiffness[at + k],
-                        damping: damping[at + k],
-                    });
-                }
-            }
-            Box::new(Pd {
-                controls: system.controls,
-                velocities: system.tree.velocities(),
-                axes,
-            })
-        }
-        Some(Controller::PushThenLock {
-            body,
-            force,
-            stop_at,
-        }) => {
-            let b = system.bodies.iter().position(|x| x.name == *body);
-            let found = b.and_then(|b| Some((b, system.bodies[b].joint_control?)));
-            let Some((b, control)) = found else {
-                return Err(Error::input(
-                    "controller.body",
-                    body,
-                    "must be the name of a body with an actuated one-coordinate joint",
-                ));
-            };
-            Box::new(PushThenLock {
-                controls: system.controls,
-                bodies: system.len(),
-                body: b,
-                control,
-                q: system.tree.links()[b].q.start,
-                force: *force,
-                stop_at: *stop_at,
-                from_above: *force < 0.0,
-            })
-        }
-    })
 }

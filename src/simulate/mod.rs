@@ -3,6 +3,7 @@
 mod assemble;
 mod clearance;
 mod contact;
+mod controller;
 mod controls;
 mod estimate;
 pub mod gradcheck;
@@ -21,7 +22,7 @@ pub use estimate::{ErrorEstimate, Level};
 pub use gradient::{Cotangents, Gradient, Initial};
 pub use objective::Objective;
 pub use policy::{
-    Action, ActionBar, Constant, Observation, OpenLoop, Pd, PdAxis, Policy, PushThenLock,
+    Action, ActionBar, Constant, Observation, OpenLoop, Pd, PdAxis, Policy, PushThenLock, SpeedStages, Stage,
 };
 pub use rollout::{Rollout, Sample, Summary};
 pub use settings::{Accuracy, Fidelity, Settings};

@@ -309,6 +309,7 @@ impl Simulator {
             y: stepper.conserved(&e, &self.assembled.v),
             q,
             held: Vec::new(),
+            mode: 0,
         };
         stepper.velocity(&e, &state)?;
         Ok(state)

@@ -75,13 +75,11 @@ impl<'a> Trajectory<'a> {
         })
     }
 
-    fn input(&self, index: usize, sample: &Sample) -> Result<Input> {
-        let action = self.policy.act(&Observation {
-            step: index,
-            time: sample.time,
-            q: &sample.q,
-            v: &sample.v,
-        });
+    /// What acts during a step, and the controller's next mode.
+    fn input(&self, state: &State, sample: &Sample) -> Result<(Input, usize)> {
+        let index = state.step;
+        let action = self.policy.act(&observation(state, sample));
+        let mode = action.mode;
         expect_length("hold", action.hold.len(), self.stepper.system.len(), "body")?;
         let mut control = self.controls.column(index).into_owned();
         if !action.control.is_empty() {
@@ -101,10 +99,8 @@ impl<'a> Trajectory<'a> {
                 "must be finite",
             ));
         }
-        Ok(Input {
-            control,
-            hold: action.hold,
-        })
+        let hold = action.hold;
+        Ok((Input { control, hold }, mode))
     }
 
     /// Cotangents that enter at a state: readings of q, v and poses.
@@ -132,7 +128,6 @@ impl<'a> Trajectory<'a> {
 
     fn reverse_step(
         &self,
-        index: usize,
         state: &State,
         sample: &Sample,
         next_bar: &StateBar,
@@ -146,15 +141,7 @@ impl<'a> Trajectory<'a> {
         let mut bar =
             self.stepper
                 .step_vjp(&e, state, &sample.v, &input, &sample.memo, next_bar)?;
-        let action = self.policy.act_vjp(
-            &Observation {
-                step: index,
-                time: sample.time,
-                q: &sample.q,
-                v: &sample.v,
-            },
-            &bar.control,
-        );
+        let action = (self.policy).act_vjp(&observation(state, sample), &bar.control);
         let velocities = self.stepper.system.tree.velocities();
         expect_length("cotangent of q", action.q.len(), velocities, "velocity")?;
         expect_length("cotangent of v", action.v.len(), velocities, "velocity")?;
@@ -197,6 +184,17 @@ impl<'a> Trajectory<'a> {
     }
 }
 
+/// What the controller sees at a state.
+fn observation<'a>(state: &State, sample: &'a Sample) -> Observation<'a> {
+    Observation {
+        step: state.step,
+        time: sample.time,
+        q: &sample.q,
+        v: &sample.v,
+        mode: state.mode,
+    }
+}
+
 /// A controller's list is empty or has one entry per item.
 fn expect_length(what: &str, given: usize, expected: usize, item: &str) -> Result<()> {
     if given == 0 || given == expected {
@@ -217,12 +215,13 @@ impl Step for Trajectory<'_> {
     type Local = Local;
     type Error = Error;
 
-    fn step(&self, index: usize, state: &State) -> Result<(State, Sample)> {
+    fn step(&self, _index: usize, state: &State) -> Result<(State, Sample)> {
         let run = || {
             let (e, gap) = self.evaluate(state)?;
             let mut sample = self.observe(&e, state, gap)?;
-            let input = self.input(index, &sample)?;
-            let next = self.stepper.step(&e, state, &sample.v, &input)?;
+            let (input, mode) = self.input(state, &sample)?;
+            let mut next = self.stepper.step(&e, state, &sample.v, &input)?;
+            next.state.mode = mode;
             sample.control = input.control;
             sample.hold = input.hold;
             sample.memo = next.memo;
@@ -241,13 +240,13 @@ impl Step for Trajectory<'_> {
 
     fn step_vjp(
         &self,
-        index: usize,
+        _index: usize,
         state: &State,
         sample: &Sample,
         next_bar: &StateBar,
         seed: &Seed,
     ) -> Result<(StateBar, Local)> {
-        self.reverse_step(index, state, sample, next_bar, seed)
+        self.reverse_step(state, sample, next_bar, seed)
             .map_err(|e| e.at_time(sample.time))
     }
 

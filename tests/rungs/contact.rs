@@ -203,6 +203,7 @@ fn step_vjp(c: f64) -> Outcome {
         q: p.q.clone(),
         y: p.v.clone(),
         held: Vec::new(),
+        mode: 0,
     };
     let s = stepper(&p.parameters);
     let (start, e) = (state(&p), s.evaluate(&p.q, true).unwrap());

@@ -376,6 +376,7 @@ fn state(p: &Point, held: &[bool]) -> State {
         q: p.q.clone(),
         y: p.v.clone(),
         held: held.to_vec(),
+        mode: 0,
     }
 }
 

@@ -49,6 +49,7 @@ fn act(policy: &dyn Policy, c: f64) -> Outcome {
             time: 0.03,
             q,
             v,
+            mode: 0,
         };
         let action = policy.with_gains(gains).unwrap().act(&observed);
         let pairs = action.control.iter().zip(bar.iter());
@@ -58,6 +59,7 @@ fn act(policy: &dyn Policy, c: f64) -> Outcome {
         step: 3,
         time: 0.03,
         q: &q,
+        mode: 0,
         v: &v,
     };
     let back = policy.act_vjp(&observed, &bar);
@@ -108,6 +110,7 @@ fn push_then_lock(c: f64) -> Outcome {
         step: 3,
         time: 0.03,
         q: &q,
+        mode: 0,
         v: &v,
     };
     let stopped = policy(q[2] + 1.0);
@@ -124,6 +127,7 @@ fn open_loop(c: f64) -> Outcome {
         step: 0,
         time: 0.0,
         q: &q,
+        mode: 0,
         v: &v,
     };
     assert_eq!(OpenLoop.act(&observed), Default::default());

@@ -99,6 +99,7 @@ fn action(simulator: &Simulator) -> (DVector<f64>, Vec<bool>) {
         time: 0.0,
         q,
         v,
+        mode: 0,
     });
     let mut control = DVector::zeros(simulator.system().controls);
     for (c, x) in control.iter_mut().zip(action.control) {

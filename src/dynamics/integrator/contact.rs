@@ -112,11 +112,10 @@ fn search(now: Trial, step: &DVector<f64>, at: &dyn Fn(DVector<f64>) -> Trial) -
     let start = slope(&now);
     let mut best = at(&now.v - step);
     let (mut low, mut high) = ((0.0, start), (1.0, slope(&best)));
+    if high.1 >= -LEFT * start || !(start > 0.0) {
+        return best;
+    }
     for trial in 0..TRIALS {
-        let here = slope(&best);
-        if here >= -LEFT * start || !(start > 0.0) {
-            break;
-        }
         let length = match trial % 2 {
             0 => (low.0 * high.1 - high.0 * low.1) / (high.1 - low.1),
             _ => 0.5 * (low.0 + high.0),
@@ -128,6 +127,9 @@ fn search(now: Trial, step: &DVector<f64>, at: &dyn Fn(DVector<f64>) -> Trial) -
             false => low = (length, there),
         }
         best = next;
+        if there.abs() <= LEFT * start {
+            break;
+        }
     }
     best
 }

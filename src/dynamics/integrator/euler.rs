@@ -144,6 +144,7 @@ pub(super) fn next_state(
         q,
         y,
         held: input.hold.clone(),
+        mode: state.mode,
     }
 }
 

@@ -59,6 +59,8 @@ pub struct State {
     pub y: DVector<f64>,
     /// Bodies whose joints the controller held during the step that led here.
     pub held: Vec<bool>,
+    /// What the controller remembers; no integrator reads it.
+    pub mode: usize,
 }
 
 /// What acts during a step.

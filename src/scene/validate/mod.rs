@@ -6,12 +6,13 @@
 
 mod body;
 mod contact;
+mod controller;
 mod start;
 
 use std::collections::HashMap;
 
 use super::file::nearest;
-use super::{Body, Controller, Joint, Scene};
+use super::{Body, Joint, Scene};
 use crate::{Error, Result};
 
 impl Scene {
@@ -207,94 +208,6 @@ impl Scene {
 
     fn name(&self, index: usize) -> String {
         format!("{:?}", self.bodies[index].name)
-    }
-
-    fn check_controller(&self) -> Result<()> {
-        let controls = self.controls();
-        let count = |field: &str, values: &[f64]| {
-            finite(&format!("controller.{field}"), values)?;
-            if values.len() == controls {
-                return Ok(());
-            }
-            let parts = self.bodies.iter().filter(|b| b.controls() > 0);
-            let parts: Vec<_> = parts
-                .map(|b| format!("{:?} {}", b.name, b.controls()))
-                .collect();
-            Err(Error::input(
-                format!("controller.{field}"),
-                format!("{} numbers", values.len()),
-                format!(
-                    "give one per control, {controls} in all ({})",
-                    if parts.is_empty() {
-                        "no body is actuated or has a thruster".into()
-                    } else {
-                        parts.join(", ")
-                    }
-                ),
-            ))
-        };
-        match &self.controller {
-            None => Ok(()),
-            Some(Controller::Constant { control }) => count("control", control),
-            Some(Controller::Pd {
-                target,
-                stiffness,
-                damping,
-            }) => {
-                let unfit = |b: &&Body| b.thruster || (b.actuated && b.joint.has_quaternion());
-                if let Some(body) = self.bodies.iter().find(unfit) {
-                    return Err(Error::input(
-                        "controller.kind",
-                        "pd",
-                        format!(
-                            "it drives prismatic, revolute and planar joints only, and body {:?} \
-                             has {}: use kind = \"constant\" or a controller of your own in Rust",
-                            body.name,
-                            if body.thruster {
-                                "a thruster".into()
-                            } else {
-                                format!("an actuated {} joint", body.joint.kind())
-                            }
-                        ),
-                    ));
-                }
-                count("target", target)?;
-                count("stiffness", stiffness)?;
-                count("damping", damping)
-            }
-            Some(Controller::PushThenLock {
-                body: name,
-                force,
-                stop_at,
-            }) => {
-                finite("controller.force", &[*force])?;
-                finite("controller.stop_at", &[*stop_at])?;
-                let Some(id) = self.body(name) else {
-                    let names = self.bodies.iter().map(|b| b.name.as_str());
-                    let near = nearest(name, names).map(|n| format!("; did you mean {n:?}?"));
-                    return Err(Error::input(
-                        "controller.body",
-                        format!("{name:?}"),
-                        format!("no body has that name{}", near.unwrap_or_default()),
-                    ));
-                };
-                let body = &self.bodies[id.0];
-                if body.joint.velocities() != 1 || !body.actuated {
-                    return Err(Error::input(
-                        "controller.body",
-                        format!("{name:?}"),
-                        format!(
-                            "push-then-lock pushes an actuated prismatic or revolute joint, and \
-                             this body has a {} joint with actuated = {}: change the body or name \
-                             another",
-                            body.joint.kind(),
-                            body.actuated
-                        ),
-                    ));
-                }
-                Ok(())
-            }
-        }
     }
 }
 

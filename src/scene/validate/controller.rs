@@ -1,0 +1,135 @@
+//! Controllers of a scene.
+
+use super::{finite, nearest};
+use crate::scene::{Body, Controller, Scene};
+use crate::{Error, Result};
+
+impl Scene {
+    pub(super) fn check_controller(&self) -> Result<()> {
+        let controls = self.controls();
+        let count = |field: &str, values: &[f64]| {
+            finite(&format!("controller.{field}"), values)?;
+            if values.len() == controls {
+                return Ok(());
+            }
+            let parts = self.bodies.iter().filter(|b| b.controls() > 0);
+            let parts: Vec<_> = parts
+                .map(|b| format!("{:?} {}", b.name, b.controls()))
+                .collect();
+            Err(Error::input(
+                format!("controller.{field}"),
+                format!("{} numbers", values.len()),
+                format!(
+                    "give one per control, {controls} in all ({})",
+                    if parts.is_empty() {
+                        "no body is actuated or has a thruster".into()
+                    } else {
+                        parts.join(", ")
+                    }
+                ),
+            ))
+        };
+        match &self.controller {
+            None => Ok(()),
+            Some(Controller::Constant { control }) => count("control", control),
+            Some(Controller::Pd {
+                target,
+                stiffness,
+                damping,
+            }) => {
+                let unfit = |b: &&Body| b.thruster || (b.actuated && b.joint.has_quaternion());
+                if let Some(body) = self.bodies.iter().find(unfit) {
+                    return Err(Error::input(
+                        "controller.kind",
+                        "pd",
+                        format!(
+                            "it drives prismatic, revolute and planar joints only, and body {:?} \
+                             has {}: use kind = \"constant\" or a controller of your own in Rust",
+                            body.name,
+                            if body.thruster {
+                                "a thruster".into()
+                            } else {
+                                format!("an actuated {} joint", body.joint.kind())
+                            }
+                        ),
+                    ));
+                }
+                count("target", target)?;
+                count("stiffness", stiffness)?;
+                count("damping", damping)
+            }
+            Some(Controller::PushThenLock {
+                body: name,
+                force,
+                stop_at,
+            }) => {
+                finite("controller.force", &[*force])?;
+                finite("controller.stop_at", &[*stop_at])?;
+                let body = self.named("controller.body", name)?;
+                if body.joint.velocities() != 1 || !body.actuated {
+                    return Err(Error::input(
+                        "controller.body",
+                        format!("{name:?}"),
+                        format!(
+                            "push-then-lock pushes an actuated prismatic or revolute joint, and \
+                             this body has a {} joint with actuated = {}: change the body or name \
+                             another",
+                            body.joint.kind(),
+                            body.actuated
+                        ),
+                    ));
+                }
+                Ok(())
+            }
+            Some(Controller::SpeedStages { bodies, stages }) => {
+                for name in bodies {
+                    let body = self.named("controller.bodies", name)?;
+                    if body.joint.velocities() != 1 {
+                        return Err(Error::input(
+                            "controller.bodies",
+                            format!("{name:?}"),
+                            format!(
+                                "speed-stages watches prismatic and revolute joints, and this body has a {} joint: name \
+                                 another",
+                                body.joint.kind()
+                            ),
+                        ));
+                    }
+                }
+                if bodies.is_empty() || stages.is_empty() {
+                    return Err(Error::input(
+                        "controller",
+                        format!("{} bodies, {} stages", bodies.len(), stages.len()),
+                        "give at least one body to watch and one stage",
+                    ));
+                }
+                for (k, stage) in stages.iter().enumerate() {
+                    let field = format!("stages[{k}]");
+                    if !(stage.until >= 0.0 && stage.until.is_finite()) {
+                        return Err(Error::input(
+                            format!("controller.{field}.until"),
+                            stage.until,
+                            "give a speed that is finite and not negative, m/s or rad/s",
+                        ));
+                    }
+                    count(&format!("{field}.control"), &stage.control)?;
+                }
+                Ok(())
+            }
+        }
+    }
+
+    /// The body that a controller names.
+    fn named(&self, field: &str, name: &str) -> Result<&Body> {
+        let Some(id) = self.body(name) else {
+            let names = self.bodies.iter().map(|b| b.name.as_str());
+            let near = nearest(name, names).map(|n| format!("; did you mean {n:?}?"));
+            return Err(Error::input(
+                field,
+                format!("{name:?}"),
+                format!("no body has that name{}", near.unwrap_or_default()),
+            ));
+        };
+        Ok(&self.bodies[id.0])
+    }
+}

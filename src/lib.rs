@@ -10,6 +10,8 @@ pub mod dynamics;
 pub mod error;
 pub mod multibody;
 pub mod notation;
+#[cfg(feature = "opt")]
+pub mod optimize;
 pub mod scene;
 pub mod shape;
 pub mod simulate;

@@ -12,6 +12,7 @@ use crate::adjoint::lie::{Pose, Vec3, Vec6, angular, point_velocity, point_wrenc
 use crate::contact::{ContactPoint, Contacts};
 use crate::multibody::{Cotangents, Virtual};
 use nalgebra::{DMatrix, DVector};
+use serde::Serialize;
 
 /// Constants of all contacts that no trajectory is differentiated with respect to.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -61,7 +62,48 @@ impl ContactModel {
     }
 }
 
+/// What two surfaces do to one another at a point.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize)]
+pub struct ContactForce {
+    /// Body that the force acts on.
+    pub first: usize,
+    /// The other one, on which the opposite force acts; none for a wall.
+    pub second: Option<usize>,
+    /// Signed distance of the surfaces, m.
+    pub gap: f64,
+    /// Where, m, world frame.
+    pub position: [f64; 3],
+    /// Unit normal, world frame, towards the first body.
+    pub normal: [f64; 3],
+    /// Force on the first body, N, world frame.
+    pub force: [f64; 3],
+}
+
 impl System {
+    /// Forces of all contacts that press, of bodies at `q` that end a step with the velocity `v`.
+    ///
+    /// # Errors
+    /// A signed distance that can't be found.
+    pub fn contact_forces(
+        &self,
+        parameters: &Parameters,
+        q: &DVector<f64>,
+        v: &DVector<f64>,
+    ) -> Result<Vec<ContactForce>> {
+        let kinematics = self.tree.kinematics(q);
+        let twists = self.tree.twists(&kinematics, v);
+        let touches = self.touches(parameters, &kinematics.poses)?;
+        let acting = touches.iter().map(|t| ContactForce {
+            first: t.first,
+            second: t.second,
+            gap: t.point.gap,
+            position: t.point.position.into(),
+            normal: t.point.normal.into(),
+            force: contact_force(&t.law, &t.meeting(&twists)).into(),
+        });
+        Ok(acting.filter(|c| c.force != [0.0; 3]).collect())
+    }
+
     /// All places where surfaces are near.
     ///
     /// # Errors

@@ -10,9 +10,11 @@ mod momentum;
 mod parameters;
 mod system;
 
-pub use contact::{ContactModel, Dual, Regularisation, Touch};
+pub use contact::{ContactForce, ContactModel, Dual, Regularisation, Touch};
 pub use evaluation::Evaluation;
 pub use force::ForceCotangents;
-pub use integrator::{Input, Integrator, Memo, State, StateBar, StepBar, Stepped, Stepper};
+pub use integrator::{
+    Input, Integrator, Memo, State, StateBar, StepBar, Stepped, Stepper, contact_velocity,
+};
 pub use parameters::{Contact, Parameters};
 pub use system::{BodyData, Drive, System};

@@ -8,6 +8,7 @@ mod controls;
 mod estimate;
 pub mod gradcheck;
 mod gradient;
+mod knots;
 pub mod objective;
 mod plan;
 mod policy;
@@ -20,6 +21,7 @@ mod wet;
 pub use controls::Controls;
 pub use estimate::{ErrorEstimate, Level};
 pub use gradient::{Cotangents, Gradient, Initial};
+pub use knots::Knots;
 pub use objective::Objective;
 pub use policy::{
     Action, ActionBar, Constant, Observation, OpenLoop, Pd, PdAxis, Policy, PushThenLock, SpeedStages, Stage,

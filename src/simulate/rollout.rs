@@ -5,7 +5,7 @@ use super::{Cotangents, Fidelity, Gradient, Initial, Objective, Simulator};
 use crate::adjoint::lie::{Pose, Vec6};
 use crate::adjoint::step::{self, Path};
 use crate::coupling::Report;
-use crate::dynamics::{Drive, Memo, Parameters, State, StepBar};
+use crate::dynamics::{ContactForce, Drive, Memo, Parameters, State, StepBar, contact_velocity};
 use crate::shape::Gap;
 use crate::{Error, Result};
 use nalgebra::{DMatrix, DVector};
@@ -171,6 +171,19 @@ impl<'a> Rollout<'a> {
                 _ => samples.map(|s| s.gap).collect(),
             }
         })
+    }
+
+    /// Contacts that press during step `n`, between the states n and n + 1; none where there is no such step.
+    ///
+    /// # Errors
+    /// A signed distance that can't be found.
+    pub fn contacts(&self, n: usize) -> Result<Vec<ContactForce>> {
+        let Some(sample) = self.samples().get(n).filter(|_| n < self.steps()) else {
+            return Ok(Vec::new());
+        };
+        let simulator = self.simulator;
+        let v = contact_velocity(&sample.memo, &sample.v);
+        (simulator.system()).contact_forces(simulator.parameters(), &sample.q, &v)
     }
 
     /// Time and size of the smallest gap of the whole trajectory.

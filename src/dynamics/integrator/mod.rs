@@ -97,6 +97,14 @@ pub struct Stepper<'a> {
 /// Inner stages (a converged one, or the forces that others start from), kept with a trajectory so that the reverse sweep needn't iterate again.
 pub type Memo = Option<DVector<f64>>;
 
+/// The velocity with which contacts act during a step, from what was kept of it; `v` where nothing was.
+pub fn contact_velocity(memo: &Memo, v: &DVector<f64>) -> DVector<f64> {
+    match memo {
+        Some(both) if both.len() == 2 * v.len() => both.rows(v.len(), v.len()).into_owned(),
+        _ => v.clone(),
+    }
+}
+
 /// Result of a step.
 pub struct Stepped {
     /// The next state.

@@ -1,0 +1,289 @@
+//! L-BFGS on a function that may fail.
+
+use super::{Found, Progress, Settings, Stop};
+use crate::{Error, Result};
+use argmin::core::{CostFunction, Gradient, IterState, Problem, Solver, State};
+use argmin::solver::linesearch::MoreThuenteLineSearch;
+use argmin::solver::quasinewton::LBFGS;
+use std::cell::RefCell;
+
+type Vector = Vec<f64>;
+type Search = MoreThuenteLineSearch<Vector, Vector, f64>;
+type Iterate = IterState<Vector, Vector, (), (), (), f64>;
+
+/// Sufficient decrease and curvature of the line search.
+const WOLFE: (f64, f64) = (1e-4, 0.9);
+/// Relative width at which a line search gives up.
+const WIDTH: f64 = 1e-3;
+/// Cost of a failed trial above the best one's, in multiples of it, and its growth with the square of the distance from there.
+const WALL: f64 = 10.0;
+
+/// Point, cost and gradient.
+#[derive(Clone, Debug)]
+struct Point {
+    x: Vector,
+    cost: f64,
+    gradient: Vector,
+}
+
+/// The function with what was seen of it. Costs and gradients are handed to the search divided by `scale`, so that its first step has the
+/// length that was asked for.
+struct Seen<F> {
+    function: F,
+    best: Point,
+    last: Point,
+    scale: f64,
+    clip: f64,
+    evaluations: usize,
+    most: usize,
+    failures: usize,
+}
+
+impl<F: FnMut(&[f64]) -> Result<(f64, Vector)>> Seen<F> {
+    /// Evaluates at `x`, unless that was the last point.
+    fn at(&mut self, x: &[f64]) -> std::result::Result<&Point, argmin::core::Error> {
+        if self.last.x != x {
+            if self.evaluations >= self.most {
+                return Err(argmin::core::Error::msg("no evaluations left"));
+            }
+            self.evaluations += 1;
+            self.last = match finite((self.function)(x)) {
+                Ok((cost, gradient)) => Point {
+                    x: x.to_vec(),
+                    cost,
+                    gradient: clipped(gradient, self.clip),
+                },
+                Err(_) => {
+                    self.failures += 1;
+                    self.wall(x)
+                }
+            };
+            if self.last.cost < self.best.cost {
+                self.best = self.last.clone();
+            }
+        }
+        Ok(&self.last)
+    }
+
+    /// What stands in for a failed trial: a bowl around the best point, above its cost.
+    fn wall(&self, x: &[f64]) -> Point {
+        let best = &self.best;
+        let away: Vector = x.iter().zip(&best.x).map(|(a, b)| a - b).collect();
+        let distance = norm(&away).max(f64::MIN_POSITIVE);
+        // As steep as the best point's gradient, at least.
+        let height = (WALL * best.cost.abs()).max(norm(&best.gradient) * distance);
+        Point {
+            x: x.to_vec(),
+            cost: best.cost + height,
+            gradient: away
+                .iter()
+                .map(|a| 2.0 * height * a / (distance * distance))
+                .collect(),
+        }
+    }
+}
+
+/// Shared with the search, which wants to own what it evaluates.
+struct Shared<'a, F>(&'a RefCell<Seen<F>>);
+
+impl<F: FnMut(&[f64]) -> Result<(f64, Vector)>> CostFunction for Shared<'_, F> {
+    type Param = Vector;
+    type Output = f64;
+
+    fn cost(&self, x: &Vector) -> std::result::Result<f64, argmin::core::Error> {
+        let mut seen = self.0.borrow_mut();
+        let scale = seen.scale;
+        Ok(seen.at(x)?.cost / scale)
+    }
+}
+
+impl<F: FnMut(&[f64]) -> Result<(f64, Vector)>> Gradient for Shared<'_, F> {
+    type Param = Vector;
+    type Gradient = Vector;
+
+    fn gradient(&self, x: &Vector) -> std::result::Result<Vector, argmin::core::Error> {
+        let mut seen = self.0.borrow_mut();
+        let scale = seen.scale;
+        let gradient = &seen.at(x)?.gradient;
+        Ok(gradient.iter().map(|g| g / scale).collect())
+    }
+}
+
+fn norm(x: &[f64]) -> f64 {
+    x.iter().map(|x| x * x).sum::<f64>().sqrt()
+}
+
+/// At most as long as `longest`.
+fn clipped(mut gradient: Vector, longest: f64) -> Vector {
+    let length = norm(&gradient);
+    if length > longest {
+        gradient.iter_mut().for_each(|g| *g *= longest / length);
+    }
+    gradient
+}
+
+/// Refuses what isn't a number.
+fn finite(result: Result<(f64, Vector)>) -> Result<(f64, Vector)> {
+    let (cost, gradient) = result?;
+    let bad = gradient.iter().chain([&cost]).find(|x| !x.is_finite());
+    match bad.copied() {
+        None => Ok((cost, gradient)),
+        Some(bad) => Err(Error::input("cost or gradient", bad, "must be finite")),
+    }
+}
+
+/// Lowers a function from `start`; `function` gives its value and its gradient, `progress` hears of every iteration.
+///
+/// # Errors
+/// Settings out of range, a gradient of another length than `start`, and whatever the function reports at `start`; failures at later trials
+/// turn the search back and are counted.
+pub fn minimise(
+    mut function: impl FnMut(&[f64]) -> Result<(f64, Vec<f64>)>,
+    start: &[f64],
+    settings: &Settings,
+    mut progress: impl FnMut(&Progress),
+) -> Result<Found> {
+    settings.validate()?;
+    let (cost, gradient) = finite(function(start))?;
+    if gradient.len() != start.len() {
+        return Err(Error::input(
+            "gradient",
+            format!("{} numbers", gradient.len()),
+            format!(
+                "must be {} numbers, as many as the point has",
+                start.len()
+            ),
+        ));
+    }
+    let first = norm(&gradient);
+    let point = Point {
+        x: start.to_vec(),
+        cost,
+        gradient,
+    };
+    let seen = RefCell::new(Seen {
+        function,
+        best: point.clone(),
+        last: point,
+        scale: if first > 0.0 { first / settings.first_step } else { 1.0 },
+        clip: settings.clip.map_or(f64::INFINITY, |c| c * first),
+        evaluations: 1,
+        most: settings.evaluations,
+        failures: 0,
+    });
+    let mut iterations = 0;
+    let mut restarted = false;
+    let mut descent = Descent::new(&seen, settings)?;
+    let stop = loop {
+        let before = seen.borrow().best.clone();
+        if settings.target.is_some_and(|t| before.cost <= t) {
+            break Stop::Target;
+        }
+        if norm(&before.gradient) <= settings.gradient_tolerance * first {
+            break Stop::Gradient;
+        }
+        if iterations == settings.iterations
+            || seen.borrow().evaluations >= settings.evaluations
+        {
+            break Stop::Budget;
+        }
+        let advanced = descent.advance();
+        iterations += 1;
+        let after = seen.borrow().best.clone();
+        progress(&Progress {
+            iteration: iterations,
+            cost: after.cost,
+            gradient: norm(&after.gradient),
+            evaluations: seen.borrow().evaluations,
+        });
+        let fell = before.cost - after.cost;
+        if fell > settings.cost_tolerance * before.cost.abs() {
+            restarted = false;
+            if advanced && descent.is_at(&after.x) {
+                continue;
+            }
+        } else if restarted {
+            break Stop::Cost;
+        } else {
+            restarted = true;
+        }
+        // The search lost its way, or ended elsewhere than at the best point: again from there, along the gradient.
+        descent = Descent::new(&seen, settings)?;
+    };
+    let seen = seen.into_inner();
+    Ok(Found {
+        gradient: norm(&seen.best.gradient),
+        cost: seen.best.cost,
+        x: seen.best.x,
+        iterations,
+        evaluations: seen.evaluations,
+        failures: seen.failures,
+        stop,
+    })
+}
+
+/// A search under way from the best point.
+struct Descent<'a, F> {
+    problem: Problem<Shared<'a, F>>,
+    solver: LBFGS<Search, Vector, Vector, f64>,
+    state: Option<Iterate>,
+}
+
+fn broken(error: &argmin::core::Error) -> Error {
+    Error::Solver {
+        what: "descent".into(),
+        iterations: 0,
+        residual: f64::NAN,
+        tolerance: 0.0,
+        remedy: error.to_string(),
+    }
+}
+
+impl<'a, F: FnMut(&[f64]) -> Result<(f64, Vector)>> Descent<'a, F> {
+    fn new(seen: &'a RefCell<Seen<F>>, settings: &Settings) -> Result<Self> {
+        let search = Search::new()
+            .with_c(WOLFE.0, WOLFE.1)
+            .and_then(|s| s.with_width_tolerance(WIDTH))
+            .map_err(|e| broken(&e))?;
+        let best = {
+            let mut seen = seen.borrow_mut();
+            // A first step of the length asked for, from here as from the start.
+            let slope = norm(&seen.best.gradient);
+            if slope > 0.0 {
+                seen.scale = slope / settings.first_step;
+            }
+            seen.last = seen.best.clone();
+            seen.best.clone()
+        };
+        let mut problem = Problem::new(Shared(seen));
+        let mut solver = LBFGS::new(search, settings.memory);
+        let state = Iterate::new().param(best.x);
+        let (state, _) = solver.init(&mut problem, state).map_err(|e| broken(&e))?;
+        Ok(Self {
+            problem,
+            solver,
+            state: Some(state),
+        })
+    }
+
+    /// One iteration; whether it came to an end.
+    fn advance(&mut self) -> bool {
+        let Some(state) = self.state.take() else {
+            return false;
+        };
+        match self.solver.next_iter(&mut self.problem, state) {
+            Ok((mut state, _)) => {
+                let ended = !state.terminated();
+                state.increment_iter();
+                self.state = Some(state);
+                ended
+            }
+            Err(_) => false,
+        }
+    }
+
+    fn is_at(&self, x: &[f64]) -> bool {
+        let at = self.state.as_ref().and_then(|s| s.get_param());
+        at.is_some_and(|at| at == x)
+    }
+}

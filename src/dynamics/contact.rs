@@ -146,6 +146,16 @@ impl Evaluation<'_> {
         out
     }
 
+    /// Whether any force acts in contact at the velocity `v`; where none does, none changes with v either.
+    pub(super) fn presses(&self, v: &DVector<f64>) -> bool {
+        if self.touches.is_empty() {
+            return false;
+        }
+        let twists = self.system.tree.twists(&self.kinematics, v);
+        let at = |t: &Touch| contact_force(&t.law, &t.meeting(&twists)) != Vec3::zeros();
+        self.touches.iter().any(at)
+    }
+
     /// Generalised forces of contact at the velocity `v`.
     pub fn contact_force(&self, v: &DVector<f64>, dual: Dual) -> DVector<f64> {
         let tree = &self.system.tree;

@@ -1,5 +1,6 @@
 //! How surfaces touch.
 
+use super::Scene;
 use serde::{Deserialize, Serialize};
 
 /// Contact between bodies, and between bodies and walls. A scene that has it (`[contact]`, all keys of which may be left out)
@@ -38,5 +39,12 @@ impl Default for Contact {
             width: None,
             stiction_speed: 1e-3,
         }
+    }
+}
+
+impl Scene {
+    /// Whether anything in it is stopped by touching: surfaces.
+    pub(crate) fn has_contact(&self) -> bool {
+        self.contact.is_some()
     }
 }

@@ -211,6 +211,7 @@ pub(super) fn assemble(
     settings: &Settings,
     folder: Option<&Path>,
 ) -> Result<Assembled> {
+    contact::check_integrator(scene, settings.integrator)?;
     let index = |name: &String| scene.bodies.iter().position(|b| b.name == *name);
     let tree = Tree::new(scene.bodies.iter().map(|b| {
         (

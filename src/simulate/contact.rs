@@ -35,15 +35,19 @@ pub(super) struct Parts<'a> {
     pub mass: &'a [f64],
 }
 
-pub(super) fn assemble(p: Parts) -> Result<(ContactModel, dynamics::Contact)> {
-    if p.settings.integrator != Integrator::MomentumEuler {
-        return Err(Error::Unsupported {
-            what: format!("contact with the integrator {:?}", p.settings.integrator),
-            why: "contact is solved in the velocity at the end of a step, and this one doesn't solve for it"
-                .into(),
-            instead: "use the integrator momentum-euler".into(),
-        });
+/// Refuses contact with an integrator that doesn't solve it.
+pub(super) fn check_integrator(scene: &Scene, integrator: Integrator) -> Result<()> {
+    if !scene.has_contact() || integrator.solves_contact() {
+        return Ok(());
     }
+    Err(Error::Unsupported {
+        what: format!("contact with the integrator {integrator:?}"),
+        why: "contact is solved in the velocity that a step moves by, and this one has none".into(),
+        instead: "use the integrator momentum-euler, midpoint or velocity-euler".into(),
+    })
+}
+
+pub(super) fn assemble(p: Parts) -> Result<(ContactModel, dynamics::Contact)> {
     let mut shapes = Vec::with_capacity(p.scene.bodies.len());
     for (body, surface) in p.scene.bodies.iter().zip(p.surfaces) {
         shapes.push(match (&body.shape, surface) {

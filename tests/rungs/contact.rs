@@ -10,6 +10,13 @@ use hydrograd::{Fidelity, Settings, Simulator};
 use nalgebra::DVector;
 use std::sync::OnceLock;
 
+/// Those that solve contact.
+const INTEGRATORS: [Integrator; 3] = [
+    Integrator::MomentumEuler,
+    Integrator::Midpoint,
+    Integrator::VelocityEuler,
+];
+
 pub fn rungs() -> Vec<Rung> {
     vec![
         Rung {
@@ -18,7 +25,11 @@ pub fn rungs() -> Vec<Rung> {
         },
         Rung {
             name: "dynamics::contact::Evaluation::contact_force_vjp",
-            check: |c| all([force_vjp(c), step_vjp(c)]),
+            check: force_vjp,
+        },
+        Rung {
+            name: "dynamics::integrator::contact::press_vjp",
+            check: |c| all(INTEGRATORS.map(|i| step_vjp(i, c))),
         },
     ]
 }
@@ -178,21 +189,20 @@ fn force_vjp(c: f64) -> Outcome {
     }))
 }
 
-fn stepper(parameters: &Parameters) -> Stepper<'_> {
+fn stepper(parameters: &Parameters, integrator: Integrator) -> Stepper<'_> {
     Stepper {
         system: system(),
         parameters,
-        integrator: Integrator::MomentumEuler,
+        integrator,
         dt: 0.01,
     }
 }
 
-/// A whole step by momentum Euler from the momenta `v`, contact solved in its end velocity.
-fn step_vjp(c: f64) -> Outcome {
+/// A whole step from the momenta or velocities `v`, contact solved in the velocity that it moves by.
+fn step_vjp(integrator: Integrator, c: f64) -> Outcome {
     let mut p = point();
     let n = p.v.len();
-    // Momenta of velocities.
-    p.v = evaluate(&p.parameters, &p.q).frame_momentum(&p.v);
+    p.v = stepper(&p.parameters, integrator).conserved(&evaluate(&p.parameters, &p.q), &p.v);
     let (q_bar, y_bar) = (wavy(n, 5.1, 1.0), wavy(n, 6.1, 0.3));
     let input = Input {
         control: DVector::zeros(0),
@@ -204,13 +214,13 @@ fn step_vjp(c: f64) -> Outcome {
         y: p.v.clone(),
         held: Vec::new(),
     };
-    let s = stepper(&p.parameters);
+    let s = stepper(&p.parameters, integrator);
     let (start, e) = (state(&p), s.evaluate(&p.q, true).unwrap());
     let v = s.velocity(&e, &start).unwrap();
     let next = s.step(&e, &start, &v, &input).unwrap();
     let end = next.state.q.clone();
     let value = |p: &Point| {
-        let s = stepper(&p.parameters);
+        let s = stepper(&p.parameters, integrator);
         let (start, e) = (state(p), s.evaluate(&p.q, true).unwrap());
         let v = s.velocity(&e, &start).unwrap();
         let next = s.step(&e, &start, &v, &input).unwrap().state;
@@ -224,6 +234,9 @@ fn step_vjp(c: f64) -> Outcome {
         q: q_bar.clone(),
         y: y_bar.clone(),
     };
+    // Pressed, and by more than rounding.
+    let both = next.memo.as_ref().unwrap();
+    assert!((both.rows(0, n) - both.rows(n, n)).norm() > 1e-3 * both.norm());
     let mut b = s
         .step_vjp(&e, &start, &v, &input, &next.memo, &bar)
         .unwrap();

@@ -43,8 +43,14 @@ impl Default for Contact {
 }
 
 impl Scene {
-    /// Whether anything in it is stopped by touching: surfaces.
+    /// Whether anything in it is stopped by touching: surfaces, or joints at their limits.
     pub(crate) fn has_contact(&self) -> bool {
-        self.contact.is_some()
+        self.contact.is_some() || self.limited().next().is_some()
+    }
+
+    /// Bodies whose joints have limits, with these.
+    pub(crate) fn limited(&self) -> impl Iterator<Item = (usize, [f64; 2])> {
+        let each = self.bodies.iter().enumerate();
+        each.filter_map(|(b, body)| Some((b, body.limits?)))
     }
 }

@@ -1,11 +1,11 @@
 //! From a scene to a system: meshes, masses, joints, coupling, controller.
 
 use super::clearance::Clearance;
-use super::contact;
 use super::plan::{Planned, plan};
 use super::policy::{Constant, OpenLoop, Pd, PdAxis, PushThenLock};
 use super::wet::{self, Discretisation, Plan, Water, Wet};
 use super::{Fidelity, Policy, Settings};
+use super::{contact, limits};
 use crate::adjoint::drag::{self, Element, Part};
 use crate::adjoint::lie::{Mat3, Mat6, Pose, Vec3, exp_matrix};
 use crate::boundary::OneBody;
@@ -289,6 +289,7 @@ pub(super) fn assemble(
         controls,
         coupling: Box::new(Isolated::new(Vec::new())),
         contact: None,
+        limits: Vec::new(),
         tree,
     };
     let q = start_coordinates(scene, settings, &system, &parameters, &clearance)?;
@@ -319,6 +320,8 @@ pub(super) fn assemble(
         })?;
         (system.contact, parameters.contact) = (Some(made.0), made.1);
     }
+    let dt = settings.time_step.unwrap_or(scene.time_step);
+    system.limits = limits::assemble(scene, dt, &system, &parameters, &q)?;
     let v = start_velocity(scene, settings, &system, &parameters, &q)?;
     Ok(Assembled {
         policy: policy(scene, &system)?,

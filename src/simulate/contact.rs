@@ -11,8 +11,8 @@ use crate::shape::{Other, TriMesh};
 use crate::{Error, Result};
 use std::path::Path;
 
-/// Of the heaviest moving mass over Δt²: within a step contact takes ten elevenths of the way that it would go too far.
-const STIFFNESS: f64 = 10.0;
+/// Of the heaviest moving mass (a joint's inertia, for its limits) over Δt²: within a step contact takes ten elevenths of the way that it would go too far.
+pub(super) const STIFFNESS: f64 = 10.0;
 /// Half the width over which the force sets in, of the smallest body's radius.
 const WIDTH: f64 = 0.004;
 /// Gap at which surfaces touch, of what the coupling resolves: a body that lands goes a little further.
@@ -40,9 +40,13 @@ pub(super) fn check_integrator(scene: &Scene, integrator: Integrator) -> Result<
     if !scene.has_contact() || integrator.solves_contact() {
         return Ok(());
     }
+    let what = match (scene.contact, scene.limited().next()) {
+        (None, Some((b, _))) => format!("limits of body {:?}", scene.bodies[b].name),
+        _ => "contact".into(),
+    };
     Err(Error::Unsupported {
-        what: format!("contact with the integrator {integrator:?}"),
-        why: "contact is solved in the velocity that a step moves by, and this one has none".into(),
+        what: format!("{what} with the integrator {integrator:?}"),
+        why: "contact and limits of joints are solved in the velocity that a step moves by, and this one has none".into(),
         instead: "use the integrator momentum-euler, midpoint or velocity-euler".into(),
     })
 }

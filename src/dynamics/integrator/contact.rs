@@ -101,7 +101,7 @@ pub(super) fn solve(
         iterations: ITERATIONS,
         residual: now.residual,
         tolerance: RESIDUAL,
-        remedy: "contact doesn't converge: take a smaller time step or a smaller contact.stiffness"
+        remedy: "contact doesn't converge: take a smaller time step or smaller contact.stiffness and limit_stiffness"
             .into(),
     })
 }
@@ -115,7 +115,7 @@ fn search(now: Trial, step: &DVector<f64>, at: &dyn Fn(DVector<f64>) -> Trial) -
     let (mut low, mut high) = ((0.0, start), (1.0, slope(&best)));
     for trial in 0..TRIALS {
         let here = slope(&best);
-        if here >= -LEFT * start || !(start > 0.0) {
+        if here >= -LEFT * start || start.is_nan() || start <= 0.0 {
             break;
         }
         let length = match trial % 2 {

@@ -7,7 +7,8 @@
 //! With contact, q⁺ = q ⊕ Δt v_s and p̂⁺ = p̂ + Δt f + Δt g(q, v_s), where v_s follows from v by
 //! [`contact::solve`] at q: the position is stepped implicitly, so contact is stable at any stiffness, and of
 //! first order. The impulse acts at once at the beginning of a step, the weight in its course: a body at rest under
-//! weight reads −½ g Δt at the states, between which its mean velocity v_s is zero.
+//! weight reads −½ g Δt at the states, between which its mean velocity v_s is zero. q_m still is on the way that
+//! contact hasn't stopped: bodies about to touch may overlap there by half of what they approach in a step.
 
 use super::euler::{AdjointStage, Rule, advance, advance_vjp, next_state, solve_stage, stage_name};
 use super::{Input, Memo, Split, State, StateBar, StepBar, Stepped, Stepper, When, contact};
@@ -35,7 +36,7 @@ fn middle<'a>(
 ) -> Result<Evaluation<'a>> {
     let mut q = s.system.tree.integrate(&state.q, &(0.5 * s.dt * v));
     s.place_motions(&mut q, s.time(state) + 0.5 * s.dt);
-    s.system.evaluate(s.parameters, &q, true, reverse)
+    s.system.evaluate_apart(s.parameters, &q, true, reverse)
 }
 
 /// Relative change of the velocity that says nothing: rounding, or what the coupled solve leaves open.

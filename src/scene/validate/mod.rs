@@ -6,6 +6,7 @@
 
 mod body;
 mod contact;
+mod limits;
 mod start;
 
 use std::collections::HashMap;

@@ -277,33 +277,6 @@ fn a_ball_lands_in_water() {
 }
 
 #[test]
-fn integrators_that_cannot_do_it_say_so() {
-    let mut scene = above_floor();
-    scene.add(
-        Body::new(Shape::sphere(0.1))
-            .density(1000.0)
-            .at([0.0, 0.0, 0.3]),
-    );
-    for integrator in [Integrator::Rk2, Integrator::Rk4, Integrator::VelocityEuler] {
-        let made = Simulator::new(
-            &scene,
-            Settings::default()
-                .fidelity(Fidelity::Isolated)
-                .integrator(integrator),
-        );
-        let said = made.map(|_| ()).unwrap_err().to_string();
-        assert!(
-            said.contains("contact") && said.contains("momentum-euler"),
-            "{said}"
-        );
-    }
-    assert_eq!(
-        Settings::for_scene(&scene).integrator,
-        Integrator::MomentumEuler
-    );
-}
-
-#[test]
 fn constants_are_checked_by_name() {
     for (key, value) in [
         ("stiffness", "-1.0"),

@@ -33,9 +33,7 @@ fn half_height(turn: f64) -> (f64, f64) {
 /// Fastest motion of the coin's rim against a finger, m/s.
 fn slip(s: &Sample) -> f64 {
     let spin = COIN_AXES[0] * s.v[COIN_TURN].abs();
-    let against = |f: usize| {
-        (s.v[COIN_Y] - s.v[COLUMN]).hypot(s.v[COIN_Z] - s.v[f]) + spin
-    };
+    let against = |f: usize| (s.v[COIN_Y] - s.v[COLUMN]).hypot(s.v[COIN_Z] - s.v[f]) + spin;
     against(FINGERS[0]).max(against(FINGERS[1]))
 }
 
@@ -118,7 +116,11 @@ impl Hold {
             (v[COIN_Y] - v[COLUMN], 0.05, [(COIN_Y, 1.0), (COLUMN, -1.0)]),
             (v[COIN_Z] - v[lower], 0.05, [(COIN_Z, 1.0), (lower, -1.0)]),
             (v[COIN_Z] - v[upper], 0.05, [(COIN_Z, 1.0), (upper, -1.0)]),
-            (COIN_AXES[0] * v[COIN_TURN], 0.05, [(COIN_TURN, COIN_AXES[0]), (COIN_TURN, 0.0)]),
+            (
+                COIN_AXES[0] * v[COIN_TURN],
+                0.05,
+                [(COIN_TURN, COIN_AXES[0]), (COIN_TURN, 0.0)],
+            ),
         ];
         for (rate, tolerable, parts) in rates {
             let (c, d) = miss(rate, tolerable);

@@ -1,4 +1,5 @@
-//! Contact forces among bodies and with walls: the law of [`crate::adjoint::contact`] at every point where surfaces are near.
+//! Contact forces among bodies, with walls, and of joints at their limits ([`super::JointLimit`]): the law of
+//! [`crate::adjoint::contact`] at every point where surfaces are near.
 //!
 //! Points, normals and gaps belong to the configuration; the velocity is the argument of the force, so that an integrator
 //! that is implicit in it solves contact implicitly, against the mass matrix with its fluid part.
@@ -188,14 +189,31 @@ impl Evaluation<'_> {
         out
     }
 
+    /// Whether any force acts in contact at the velocity `v`; where none does, none changes with v either.
+    pub(super) fn presses(&self, v: &DVector<f64>) -> bool {
+        if self.stops(v).any(|(_, forces)| forces != [0.0; 2]) {
+            return true;
+        }
+        if self.touches.is_empty() {
+            return false;
+        }
+        let twists = self.system.tree.twists(&self.kinematics, v);
+        let at = |t: &Touch| contact_force(&t.law, &t.meeting(&twists)) != Vec3::zeros();
+        self.touches.iter().any(at)
+    }
+
     /// Generalised forces of contact at the velocity `v`.
     pub fn contact_force(&self, v: &DVector<f64>, dual: Dual) -> DVector<f64> {
         let tree = &self.system.tree;
         let wrenches = self.contact_wrenches(&tree.twists(&self.kinematics, v));
-        match dual {
+        let mut out = match dual {
             Dual::User => tree.project(&self.kinematics, wrenches),
             Dual::Frame => tree.project_frame(&self.kinematics, wrenches),
+        };
+        for (limit, [lower, upper]) in self.stops(v) {
+            out[limit.v] += lower + upper;
         }
+        out
     }
 
     /// Sizes of the generalised forces of contact, without what cancels among them: what their rounding is relative to.
@@ -211,6 +229,9 @@ impl Evaluation<'_> {
                 out += tree.project(&self.kinematics, wrenches).abs();
             }
         }
+        for (limit, [lower, upper]) in self.stops(v) {
+            out[limit.v] += lower.abs() + upper.abs();
+        }
         out
     }
 
@@ -225,7 +246,11 @@ impl Evaluation<'_> {
             let force = contact_force_jvp(&t.law, &t.meeting(&twists), &du);
             t.exchange(&point_wrench(&t.point.position, &force), &mut out);
         }
-        tree.project(&self.kinematics, out)
+        let mut out = tree.project(&self.kinematics, out);
+        for l in &self.system.limits {
+            out[l.v] += l.forces_jvp(self.q[l.q], v[l.v], dv[l.v]);
+        }
+        out
     }
 
     /// ∂g/∂v in the user's coordinates, column by column: symmetric, negative semi-definite.
@@ -273,6 +298,12 @@ impl Evaluation<'_> {
         let (q_bar, v_bar) = tree.reverse(&self.kinematics, v, virtual_velocity, &fields, bar);
         out.q += q_bar;
         out.v += v_bar;
+        // The tangent of q is indexed as v.
+        for l in &self.system.limits {
+            let [q_bar, v_bar] = l.forces_vjp(self.q[l.q], v[l.v], z[l.v]);
+            out.q[l.v] += q_bar;
+            out.v[l.v] += v_bar;
+        }
         out
     }
 }

@@ -44,6 +44,19 @@ impl System {
         derivative: bool,
         reverse: bool,
     ) -> Result<Evaluation<'a>> {
+        let mut e = self.evaluate_apart(parameters, q, derivative, reverse)?;
+        e.touches = self.touches(parameters, &e.kinematics.poses)?;
+        Ok(e)
+    }
+
+    /// The same without looking for places where surfaces are near, for configurations where contact isn't asked for.
+    pub(super) fn evaluate_apart<'a>(
+        &'a self,
+        parameters: &'a Parameters,
+        q: &DVector<f64>,
+        derivative: bool,
+        reverse: bool,
+    ) -> Result<Evaluation<'a>> {
         if let Some(bad) = q.iter().position(|x| !x.is_finite()) {
             return Err(Error::input(
                 format!("coordinate q[{bad}]"),
@@ -118,7 +131,7 @@ impl System {
             system: self,
             parameters,
             q: q.clone(),
-            touches: self.touches(parameters, &kinematics.poses)?,
+            touches: Vec::new(),
             kinematics,
             rigid,
             fluid,

@@ -6,6 +6,7 @@ mod evaluation;
 mod external;
 mod force;
 mod integrator;
+mod limit;
 mod momentum;
 mod parameters;
 mod system;
@@ -16,5 +17,6 @@ pub use force::ForceCotangents;
 pub use integrator::{
     Input, Integrator, Memo, State, StateBar, StepBar, Stepped, Stepper, contact_velocity,
 };
+pub use limit::JointLimit;
 pub use parameters::{Contact, Parameters};
 pub use system::{BodyData, Drive, System};

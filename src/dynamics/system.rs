@@ -1,6 +1,6 @@
 //! A system: the tree, its bodies' constants, and the coupling through the water.
 
-use super::ContactModel;
+use super::{ContactModel, JointLimit};
 use crate::adjoint::drag::{Element, Part};
 use crate::adjoint::lie::{Mat6, Vec3};
 use crate::coupling::Coupling;
@@ -62,6 +62,8 @@ pub struct System {
     pub coupling: Box<dyn Coupling>,
     /// Contact; none where bodies pass through each other.
     pub contact: Option<ContactModel>,
+    /// Limits of joints.
+    pub limits: Vec<JointLimit>,
 }
 
 impl System {

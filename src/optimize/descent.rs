@@ -149,10 +149,7 @@ pub fn minimise(
         return Err(Error::input(
             "gradient",
             format!("{} numbers", gradient.len()),
-            format!(
-                "must be {} numbers, as many as the point has",
-                start.len()
-            ),
+            format!("must be {} numbers, as many as the point has", start.len()),
         ));
     }
     let first = norm(&gradient);
@@ -165,7 +162,11 @@ pub fn minimise(
         function,
         best: point.clone(),
         last: point,
-        scale: if first > 0.0 { first / settings.first_step } else { 1.0 },
+        scale: if first > 0.0 {
+            first / settings.first_step
+        } else {
+            1.0
+        },
         clip: settings.clip.map_or(f64::INFINITY, |c| c * first),
         evaluations: 1,
         most: settings.evaluations,
@@ -182,9 +183,7 @@ pub fn minimise(
         if norm(&before.gradient) <= settings.gradient_tolerance * first {
             break Stop::Gradient;
         }
-        if iterations == settings.iterations
-            || seen.borrow().evaluations >= settings.evaluations
-        {
+        if iterations == settings.iterations || seen.borrow().evaluations >= settings.evaluations {
             break Stop::Budget;
         }
         let advanced = descent.advance();

@@ -123,6 +123,8 @@ impl Body {
             joint: Joint::Free,
             motion: None,
             locked: false,
+            limits: None,
+            limit_stiffness: None,
             actuated: false,
             thruster: false,
             drag: None,
@@ -217,6 +219,18 @@ impl Body {
     /// Holds the joint where it starts.
     pub fn locked(mut self) -> Self {
         self.locked = true;
+        self
+    }
+
+    /// Stops a prismatic or revolute joint at the ends of a range `[lower, upper]`, m or rad.
+    pub fn limits(mut self, range: [f64; 2]) -> Self {
+        self.limits = Some(range);
+        self
+    }
+
+    /// Stiffness of the stops at the limits, N/m or N m/rad.
+    pub fn limit_stiffness(mut self, stiffness: f64) -> Self {
+        self.limit_stiffness = Some(stiffness);
         self
     }
 

@@ -1,5 +1,6 @@
 //! How surfaces touch.
 
+use super::Scene;
 use serde::{Deserialize, Serialize};
 
 /// Contact between bodies, and between bodies and walls. A scene that has it (`[contact]`, all keys of which may be left out)
@@ -38,5 +39,18 @@ impl Default for Contact {
             width: None,
             stiction_speed: 1e-3,
         }
+    }
+}
+
+impl Scene {
+    /// Whether anything in it is stopped by touching: surfaces, or joints at their limits.
+    pub(crate) fn has_contact(&self) -> bool {
+        self.contact.is_some() || self.limited().next().is_some()
+    }
+
+    /// Bodies whose joints have limits, with these.
+    pub(crate) fn limited(&self) -> impl Iterator<Item = (usize, [f64; 2])> {
+        let each = self.bodies.iter().enumerate();
+        each.filter_map(|(b, body)| Some((b, body.limits?)))
     }
 }

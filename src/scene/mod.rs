@@ -169,6 +169,16 @@ pub struct Body {
     /// Holds the joint where it starts.
     #[serde(default, skip_serializing_if = "is_default")]
     pub locked: bool,
+    /// Range of a prismatic or revolute joint's coordinate, lower and upper end, m or rad: at either a stop pushes back, by
+    /// the law of contact, without friction. It may start anywhere from one to the other. While a controller holds the joint its
+    /// stops have nothing to do.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub limits: Option<[f64; 2]>,
+    /// Stiffness of the stops at `limits`, N/m or N m/rad. Default: ten times the inertia that the joint's coordinate has at the
+    /// start, the water's and that of all bodies it carries included, over the square of the time step, which is near rigid at that
+    /// step. The force sets in over ± a thousandth of the range around a limit.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub limit_stiffness: Option<f64>,
     /// Whether the joint's generalised forces are controls.
     #[serde(default, skip_serializing_if = "is_default")]
     pub actuated: bool,

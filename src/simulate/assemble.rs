@@ -1,11 +1,11 @@
 //! From a scene to a system: meshes, masses, joints, coupling, controller.
 
 use super::clearance::Clearance;
-use super::contact;
-use super::controller;
 use super::plan::{Planned, plan};
 use super::wet::{self, Discretisation, Plan, Water, Wet};
 use super::{Fidelity, Policy, Settings};
+use super::{contact, controller, limits};
+use crate::Result;
 use crate::adjoint::drag::{self, Element, Part};
 use crate::adjoint::lie::{Mat3, Mat6, Pose, Vec3, exp_matrix};
 use crate::boundary::OneBody;
@@ -14,7 +14,6 @@ use crate::dynamics::{BodyData, Drive, Parameters, Stepper, System};
 use crate::multibody::{self, Tree};
 use crate::scene::{self, Body, DragPart, Placement, Scene, Shape};
 use crate::shape::{self, Gap, MassProperties, Other, TriMesh};
-use crate::Result;
 use nalgebra::DVector;
 use std::path::Path;
 
@@ -211,6 +210,7 @@ pub(super) fn assemble(
     settings: &Settings,
     folder: Option<&Path>,
 ) -> Result<Assembled> {
+    contact::check_integrator(scene, settings.integrator)?;
     let index = |name: &String| scene.bodies.iter().position(|b| b.name == *name);
     let tree = Tree::new(scene.bodies.iter().map(|b| {
         (
@@ -288,6 +288,7 @@ pub(super) fn assemble(
         controls,
         coupling: Box::new(Isolated::new(Vec::new())),
         contact: None,
+        limits: Vec::new(),
         tree,
     };
     let q = start_coordinates(scene, settings, &system, &parameters, &clearance)?;
@@ -318,6 +319,8 @@ pub(super) fn assemble(
         })?;
         (system.contact, parameters.contact) = (Some(made.0), made.1);
     }
+    let dt = settings.time_step.unwrap_or(scene.time_step);
+    system.limits = limits::assemble(scene, dt, &system, &parameters, &q)?;
     let v = start_velocity(scene, settings, &system, &parameters, &q)?;
     Ok(Assembled {
         policy: controller::policy(scene, &system)?,

@@ -11,8 +11,8 @@ use crate::shape::{Other, TriMesh};
 use crate::{Error, Result};
 use std::path::Path;
 
-/// Of the heaviest moving mass over Δt²: within a step contact takes ten elevenths of the way that it would go too far.
-const STIFFNESS: f64 = 10.0;
+/// Of the heaviest moving mass (a joint's inertia, for its limits) over Δt²: within a step contact takes ten elevenths of the way that it would go too far.
+pub(super) const STIFFNESS: f64 = 10.0;
 /// Half the width over which the force sets in, of the smallest body's radius.
 const WIDTH: f64 = 0.004;
 /// Gap at which surfaces touch, of what the coupling resolves: a body that lands goes a little further.
@@ -35,15 +35,23 @@ pub(super) struct Parts<'a> {
     pub mass: &'a [f64],
 }
 
-pub(super) fn assemble(p: Parts) -> Result<(ContactModel, dynamics::Contact)> {
-    if p.settings.integrator != Integrator::MomentumEuler {
-        return Err(Error::Unsupported {
-            what: format!("contact with the integrator {:?}", p.settings.integrator),
-            why: "contact is solved in the velocity at the end of a step, and this one doesn't solve for it"
-                .into(),
-            instead: "use the integrator momentum-euler".into(),
-        });
+/// Refuses contact with an integrator that doesn't solve it.
+pub(super) fn check_integrator(scene: &Scene, integrator: Integrator) -> Result<()> {
+    if !scene.has_contact() || integrator.solves_contact() {
+        return Ok(());
     }
+    let what = match (scene.contact, scene.limited().next()) {
+        (None, Some((b, _))) => format!("limits of body {:?}", scene.bodies[b].name),
+        _ => "contact".into(),
+    };
+    Err(Error::Unsupported {
+        what: format!("{what} with the integrator {integrator:?}"),
+        why: "contact and limits of joints are solved in the velocity that a step moves by, and this one has none".into(),
+        instead: "use the integrator momentum-euler, midpoint or velocity-euler".into(),
+    })
+}
+
+pub(super) fn assemble(p: Parts) -> Result<(ContactModel, dynamics::Contact)> {
     let mut shapes = Vec::with_capacity(p.scene.bodies.len());
     for (body, surface) in p.scene.bodies.iter().zip(p.surfaces) {
         shapes.push(match (&body.shape, surface) {

@@ -9,6 +9,7 @@ mod estimate;
 pub mod gradcheck;
 mod gradient;
 mod knots;
+mod limits;
 pub mod objective;
 mod plan;
 mod policy;
@@ -24,7 +25,8 @@ pub use gradient::{Cotangents, Gradient, Initial};
 pub use knots::Knots;
 pub use objective::Objective;
 pub use policy::{
-    Action, ActionBar, Constant, Observation, OpenLoop, Pd, PdAxis, Policy, PushThenLock, SpeedStages, Stage,
+    Action, ActionBar, Constant, Observation, OpenLoop, Pd, PdAxis, Policy, PushThenLock,
+    SpeedStages, Stage,
 };
 pub use rollout::{Rollout, Sample, Summary};
 pub use settings::{Accuracy, Fidelity, Settings};

@@ -85,14 +85,14 @@ impl Settings {
 
     /// What a scene asks for.
     ///
-    /// Contact is solved in the velocity at the end of a step: a scene with contact gets
-    /// [`Integrator::MomentumEuler`], which can do that.
+    /// Contact is solved in the velocity that a step moves by: a scene with contact gets
+    /// [`Integrator::MomentumEuler`] where the preset's integrator can't do that.
     pub fn for_scene(scene: &Scene) -> Self {
         let settings = Self::preset(scene.preset);
-        match scene.contact {
-            Some(_) => settings.integrator(Integrator::MomentumEuler),
-            None => settings,
+        if scene.has_contact() && !settings.integrator.solves_contact() {
+            return settings.integrator(Integrator::MomentumEuler);
         }
+        settings
     }
 
     /// With another time step, s.

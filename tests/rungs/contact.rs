@@ -1,29 +1,107 @@
 //! Rungs of contact: bodies of every kind of shape pressed together and on a wall, sliding and turning.
 
-use super::tools::{Group, all, groups, vector_along, wavy};
+use super::tools::{Group, all, along, groups, vector_along, wavy};
 use hydrograd::adjoint::check::{Outcome, Rung};
+use hydrograd::adjoint::contact::Law;
 use hydrograd::dynamics::{
-    Dual, Evaluation, Input, Integrator, Parameters, State, StateBar, Stepper, System,
+    Dual, Evaluation, Input, Integrator, JointLimit, Parameters, State, StateBar, Stepper, System,
 };
-use hydrograd::scene::{Body, Contact, Fluid, Scene, Shape};
+use hydrograd::scene::{Body, Contact, Fluid, Joint, Scene, Shape};
 use hydrograd::{Fidelity, Settings, Simulator};
 use nalgebra::DVector;
 use std::sync::OnceLock;
 
+/// Those that solve contact.
+const INTEGRATORS: [Integrator; 3] = [
+    Integrator::MomentumEuler,
+    Integrator::Midpoint,
+    Integrator::VelocityEuler,
+];
+
 pub fn rungs() -> Vec<Rung> {
     vec![
+        Rung {
+            name: "dynamics::limit::JointLimit::forces_jvp",
+            check: limit_jvp,
+        },
+        Rung {
+            name: "dynamics::limit::JointLimit::forces_vjp",
+            check: limit_vjp,
+        },
         Rung {
             name: "dynamics::contact::Evaluation::contact_force_jvp",
             check: jvp,
         },
         Rung {
             name: "dynamics::contact::Evaluation::contact_force_vjp",
-            check: |c| all([force_vjp(c), step_vjp(c)]),
+            check: force_vjp,
+        },
+        Rung {
+            name: "dynamics::integrator::contact::press_vjp",
+            check: |c| all(INTEGRATORS.map(|i| step_vjp(i, c))),
         },
     ]
 }
 
-/// Every two neighbours overlap by millimetres, and the lower ones the wall.
+/// Coordinates and rates of a joint at which one of its stops presses, within the width and deeper.
+const PRESSED: [(f64, f64); 5] = [
+    (-0.1003, 0.02),
+    (0.1, 0.3),
+    (0.0999, -0.005),
+    (-0.0999, -0.0001),
+    (0.3, 0.1),
+];
+
+fn limit() -> JointLimit {
+    JointLimit {
+        q: 0,
+        v: 0,
+        range: [-0.1, 0.1],
+        law: Law {
+            stiffness: 3e3,
+            dissipation: 0.2,
+            friction: 0.0,
+            stiction_speed: 1.0,
+            gap: 0.0,
+            width: 2e-4,
+            horizon: 0.01,
+        },
+    }
+}
+
+fn limit_jvp(c: f64) -> Outcome {
+    let l = limit();
+    all(PRESSED.map(|(q, v)| {
+        let value = |h: f64| l.forces(q, v + 1e-3 * h).iter().sum();
+        assert!(value(0.0) != 0.0);
+        along(value, c * l.forces_jvp(q, v, 1e-3))
+    }))
+}
+
+fn limit_vjp(c: f64) -> Outcome {
+    let l = limit();
+    all(PRESSED.map(|(q, v)| {
+        let [q_bar, v_bar] = l.forces_vjp(q, v, 0.7);
+        let value = |dq: f64, dv: f64| 0.7 * l.forces(q + dq, v + dv).iter().sum::<f64>();
+        groups(
+            vec![
+                Group {
+                    name: "q",
+                    slope: 1e-5 * q_bar,
+                    value: Box::new(move |h| value(1e-5 * h, 0.0)),
+                },
+                Group {
+                    name: "v",
+                    slope: 1e-3 * v_bar,
+                    value: Box::new(move |h| value(0.0, 1e-3 * h)),
+                },
+            ],
+            c,
+        )
+    }))
+}
+
+/// Every two neighbours overlap by millimetres, and the lower ones the wall; beside them an arm with both its joints at limits.
 fn scene() -> Scene {
     let mut scene = Scene::new(Fluid {
         density: 0.0,
@@ -53,6 +131,25 @@ fn scene() -> Scene {
                 .rotated([0.1, 0.2, 0.3]),
         );
     }
+    let arm = |mass: f64| {
+        let body = Body::dry().mass(mass).inertia([0.2, 0.3, 0.4]);
+        body.center_of_mass([0.2, 0.1, 0.3])
+    };
+    let axis = [0.2, 0.4, 1.0];
+    scene.add(
+        arm(2.0)
+            .named("slider")
+            .joint(Joint::Prismatic { axis })
+            .limits([-0.1, 5e-4])
+            .limit_stiffness(4e3),
+    );
+    scene.add(
+        arm(1.0)
+            .child_of("slider")
+            .at([0.3, 0.0, 0.1])
+            .joint(Joint::Revolute { axis })
+            .limits([-5e-4, 0.1]),
+    );
     scene
 }
 
@@ -79,9 +176,11 @@ struct Point {
 
 fn point() -> Point {
     let n = system().tree.velocities();
+    let mut v = wavy(n, 0.8, 0.3);
+    (v[n - 2], v[n - 1]) = (0.25, -0.3);
     Point {
         q: simulator().start().0.clone(),
-        v: wavy(n, 0.8, 0.3),
+        v,
         parameters: simulator().parameters().clone(),
     }
 }
@@ -156,6 +255,9 @@ fn jvp(c: f64) -> Outcome {
     let pairs: std::collections::BTreeSet<_> =
         e.touches.iter().map(|t| (t.first, t.second)).collect();
     assert!(pairs.len() >= 6, "{pairs:?}");
+    let n = p.v.len();
+    let pressed = e.contact_force(&p.v, Dual::User);
+    assert!(pressed[n - 2] < 0.0 && pressed[n - 1] > 0.0);
     let dv = wavy(p.v.len(), 3.1, 0.1);
     let tangent = c * e.contact_force_jvp(&p.v, &dv);
     vector_along(
@@ -178,21 +280,20 @@ fn force_vjp(c: f64) -> Outcome {
     }))
 }
 
-fn stepper(parameters: &Parameters) -> Stepper<'_> {
+fn stepper(parameters: &Parameters, integrator: Integrator) -> Stepper<'_> {
     Stepper {
         system: system(),
         parameters,
-        integrator: Integrator::MomentumEuler,
+        integrator,
         dt: 0.01,
     }
 }
 
-/// A whole step by momentum Euler from the momenta `v`, contact solved in its end velocity.
-fn step_vjp(c: f64) -> Outcome {
+/// A whole step from the momenta or velocities `v`, contact solved in the velocity that it moves by.
+fn step_vjp(integrator: Integrator, c: f64) -> Outcome {
     let mut p = point();
     let n = p.v.len();
-    // Momenta of velocities.
-    p.v = evaluate(&p.parameters, &p.q).frame_momentum(&p.v);
+    p.v = stepper(&p.parameters, integrator).conserved(&evaluate(&p.parameters, &p.q), &p.v);
     let (q_bar, y_bar) = (wavy(n, 5.1, 1.0), wavy(n, 6.1, 0.3));
     let input = Input {
         control: DVector::zeros(0),
@@ -205,13 +306,13 @@ fn step_vjp(c: f64) -> Outcome {
         held: Vec::new(),
         mode: 0,
     };
-    let s = stepper(&p.parameters);
+    let s = stepper(&p.parameters, integrator);
     let (start, e) = (state(&p), s.evaluate(&p.q, true).unwrap());
     let v = s.velocity(&e, &start).unwrap();
     let next = s.step(&e, &start, &v, &input).unwrap();
     let end = next.state.q.clone();
     let value = |p: &Point| {
-        let s = stepper(&p.parameters);
+        let s = stepper(&p.parameters, integrator);
         let (start, e) = (state(p), s.evaluate(&p.q, true).unwrap());
         let v = s.velocity(&e, &start).unwrap();
         let next = s.step(&e, &start, &v, &input).unwrap().state;
@@ -225,6 +326,9 @@ fn step_vjp(c: f64) -> Outcome {
         q: q_bar.clone(),
         y: y_bar.clone(),
     };
+    // Pressed, and by more than rounding.
+    let both = next.memo.as_ref().unwrap();
+    assert!((both.rows(0, n) - both.rows(n, n)).norm() > 1e-3 * both.norm());
     let mut b = s
         .step_vjp(&e, &start, &v, &input, &next.memo, &bar)
         .unwrap();

@@ -52,7 +52,7 @@ const THROUGH: &[(&str, &str)] = &[
     ),
     (
         "dynamics::integrator::contact::solve_vjp",
-        "dynamics::contact::Evaluation::contact_force_vjp",
+        "dynamics::integrator::contact::press_vjp",
     ),
     (
         "dynamics::external::Evaluation::external_jvp",

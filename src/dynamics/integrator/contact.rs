@@ -46,7 +46,7 @@ fn hessian(e: &Evaluation, split: &Split, v: &DVector<f64>, dt: f64) -> Result<C
     })
 }
 
-/// The velocity after contact, from the one before it; the same bits where nothing touches.
+/// The velocity after contact, from the one before it; the same bits where nothing presses.
 pub(super) fn solve(
     e: &Evaluation,
     split: &Split,
@@ -54,7 +54,8 @@ pub(super) fn solve(
     dt: f64,
     what: &dyn Fn() -> String,
 ) -> Result<DVector<f64>> {
-    if e.touches.is_empty() || split.free.is_empty() {
+    // At no force v* is the least of the convex problem.
+    if split.free.is_empty() || !e.presses(before) {
         return Ok(before.clone());
     }
     let scale = split
@@ -100,7 +101,7 @@ pub(super) fn solve(
         iterations: ITERATIONS,
         residual: now.residual,
         tolerance: RESIDUAL,
-        remedy: "contact doesn't converge: take a smaller time step or a smaller contact.stiffness"
+        remedy: "contact doesn't converge: take a smaller time step or smaller contact.stiffness and limit_stiffness"
             .into(),
     })
 }
@@ -112,7 +113,7 @@ fn search(now: Trial, step: &DVector<f64>, at: &dyn Fn(DVector<f64>) -> Trial) -
     let start = slope(&now);
     let mut best = at(&now.v - step);
     let (mut low, mut high) = ((0.0, start), (1.0, slope(&best)));
-    if high.1 >= -LEFT * start || !(start > 0.0) {
+    if high.1 >= -LEFT * start || start.is_nan() || start <= 0.0 {
         return best;
     }
     for trial in 0..TRIALS {
@@ -144,7 +145,7 @@ pub(super) fn solve_vjp(
     dt: f64,
     bar: &mut StepBar,
 ) -> Result<DVector<f64>> {
-    if e.touches.is_empty() || split.free.is_empty() {
+    if split.free.is_empty() || !e.presses(before) {
         return Ok(after_bar.clone());
     }
     let w = split.put(&hessian(e, split, after, dt)?.solve(&split.take(after_bar)));
@@ -157,4 +158,50 @@ pub(super) fn solve_vjp(
         before_bar[i] = moved[i];
     }
     Ok(before_bar)
+}
+
+/// Velocity and frame momenta after contact, from those before it.
+pub(super) fn press(
+    e: &Evaluation,
+    split: &Split,
+    before: &DVector<f64>,
+    hat: DVector<f64>,
+    dt: f64,
+    what: &dyn Fn() -> String,
+) -> Result<(DVector<f64>, DVector<f64>)> {
+    let after = solve(e, split, before, dt, what)?;
+    if !e.presses(before) {
+        return Ok((after, hat));
+    }
+    let hat = hat + dt * e.contact_force(&after, Dual::Frame);
+    Ok((after, hat))
+}
+
+/// Transpose of [`press`]: from the cotangents of velocity and momenta after contact to that of the velocity before (that of the
+/// momenta stays what it is); the rest is added to `bar`.
+pub(super) fn press_vjp(
+    e: &Evaluation,
+    split: &Split,
+    [before, after]: [&DVector<f64>; 2],
+    [after_bar, hat_bar]: [&DVector<f64>; 2],
+    dt: f64,
+    bar: &mut StepBar,
+) -> Result<DVector<f64>> {
+    if !e.presses(before) {
+        return Ok(after_bar.clone());
+    }
+    let pressed = e.contact_force_vjp(after, hat_bar, Dual::Frame);
+    bar.add(dt, &pressed);
+    let after_bar = after_bar + dt * &pressed.v;
+    solve_vjp(e, split, before, after, &after_bar, dt, bar)
+}
+
+/// Velocities before and after contact in one, for a step's memo.
+pub(super) fn kept(before: &DVector<f64>, after: &DVector<f64>) -> DVector<f64> {
+    DVector::from_iterator(2 * before.len(), before.iter().chain(after.iter()).copied())
+}
+
+/// The two of [`kept`].
+pub(super) fn parted(both: &DVector<f64>, n: usize) -> (DVector<f64>, DVector<f64>) {
+    (both.rows(0, n).into_owned(), both.rows(n, n).into_owned())
 }

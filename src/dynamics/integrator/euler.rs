@@ -12,7 +12,7 @@
 //! the converged stage, with the transpose of the same matrix.
 
 use super::{Input, Memo, Split, State, StateBar, StepBar, Stepped, Stepper, When, contact};
-use crate::dynamics::{Dual, Evaluation};
+use crate::dynamics::Evaluation;
 use crate::{Error, Result};
 use nalgebra::{DMatrix, DVector, Dyn, LU};
 
@@ -177,26 +177,13 @@ pub(super) fn step(
     let stage = solve_stage(e, &split, &p, &input.control, rule(s), v, &|| {
         stage_name(s, state)
     })?;
-    let mut y = &p + s.dt * &stage.force;
-    let v = contact::solve(e, &split, &stage.v, s.dt, &|| stage_name(s, state))?;
-    if !e.touches.is_empty() {
-        y += s.dt * e.contact_force(&v, Dual::Frame);
-    }
+    let y = &p + s.dt * &stage.force;
+    let (v, y) = contact::press(e, &split, &stage.v, y, s.dt, &|| stage_name(s, state))?;
     let q = advance(s, state, &v);
     Ok(Stepped {
         state: next_state(state, &split, q, y, input),
-        memo: Some(kept(&stage.v, &v)),
+        memo: Some(contact::kept(&stage.v, &v)),
     })
-}
-
-/// Velocities before and after contact, in one; the same one where nothing touches.
-fn kept(before: &DVector<f64>, after: &DVector<f64>) -> DVector<f64> {
-    DVector::from_iterator(2 * before.len(), before.iter().chain(after.iter()).copied())
-}
-
-/// The two of [`kept`].
-fn parted(both: &DVector<f64>, n: usize) -> (DVector<f64>, DVector<f64>) {
-    (both.rows(0, n).into_owned(), both.rows(n, n).into_owned())
 }
 
 /// Transpose of `q⁺ = q ⊕ Δt v` with motions placed: (q̄, v̄).
@@ -225,7 +212,7 @@ pub(super) fn step_vjp(
     let p = s.released_momentum(e, state, v, &split);
     let (stage, after) = match memo {
         Some(both) => {
-            let (before, after) = parted(both, v.len());
+            let (before, after) = contact::parted(both, v.len());
             let force = e.force(&before, &input.control);
             (Stage { v: before, force }, after)
         }
@@ -239,16 +226,12 @@ pub(super) fn step_vjp(
     let reached = &p + s.dt * &stage.force;
     let adjoint = AdjointStage::new(e, &split, &stage.v, &reached, rule(s));
     let mut bar = StepBar::zeros(e);
-    let (q_bar, mut v_bar) = advance_vjp(s, &split, &after, &next_bar.q);
+    let (q_bar, after_bar) = advance_vjp(s, &split, &after, &next_bar.q);
     bar.state.q += q_bar;
     let mut z = next_bar.y.clone();
     split.forget_driven(&mut z);
-    if !e.touches.is_empty() {
-        let pressed = e.contact_force_vjp(&after, &z, Dual::Frame);
-        bar.add(s.dt, &pressed);
-        v_bar += s.dt * &pressed.v;
-        v_bar = contact::solve_vjp(e, &split, &stage.v, &after, &v_bar, s.dt, &mut bar)?;
-    }
+    let both = [&stage.v, &after];
+    let mut v_bar = contact::press_vjp(e, &split, both, [&after_bar, &z], s.dt, &mut bar)?;
     // v̄ of p̂⁺ through f; only the transpose of ∂f/∂v is needed here.
     v_bar += s.dt * adjoint.rates.tr_mul(&z);
     let w = adjoint.solve(&split, &v_bar)?;

@@ -3,9 +3,15 @@
 //! q_m = q ⊕ ½Δt v, M(q_m) v + p_rest = Xᵀ(q_m) (p̂ + ½Δt f(q_m, v, u)), q⁺ = q ⊕ Δt v,
 //! p̂⁺ = p̂ + Δt f. The velocity is found by Newton at fixed q_m (cheap) inside a fixed point in
 //! q_m (one evaluation each); the adjoint iterates the transpose of the same splitting.
+//!
+//! With contact, q⁺ = q ⊕ Δt v_s and p̂⁺ = p̂ + Δt f + Δt g(q, v_s), where v_s follows from v by
+//! [`contact::solve`] at q: the position is stepped implicitly, so contact is stable at any stiffness, and of
+//! first order. The impulse acts at once at the beginning of a step, the weight in its course: a body at rest under
+//! weight reads −½ g Δt at the states, between which its mean velocity v_s is zero. q_m still is on the way that
+//! contact hasn't stopped: bodies about to touch may overlap there by half of what they approach in a step.
 
 use super::euler::{AdjointStage, Rule, advance, advance_vjp, next_state, solve_stage, stage_name};
-use super::{Input, Memo, Split, State, StateBar, StepBar, Stepped, Stepper, When};
+use super::{Input, Memo, Split, State, StateBar, StepBar, Stepped, Stepper, When, contact};
 use crate::dynamics::Evaluation;
 use crate::{Error, Result};
 use nalgebra::DVector;
@@ -30,7 +36,7 @@ fn middle<'a>(
 ) -> Result<Evaluation<'a>> {
     let mut q = s.system.tree.integrate(&state.q, &(0.5 * s.dt * v));
     s.place_motions(&mut q, s.time(state) + 0.5 * s.dt);
-    s.system.evaluate(s.parameters, &q, true, reverse)
+    s.system.evaluate_apart(s.parameters, &q, true, reverse)
 }
 
 /// Relative change of the velocity that says nothing: rounding, or what the coupled solve leaves open.
@@ -67,10 +73,11 @@ pub(super) fn step(
         // Down at rounding, or at the coupled solve's own tolerance, changes are noise: stop when they no longer halve.
         if moved <= TOLERANCE || (moved <= noise(&m) && moved > 0.5 * previous) {
             let y = &p + s.dt * next.force;
-            let q = advance(s, state, &stage);
+            let (after, y) = contact::press(e, &split, &stage, y, s.dt, &|| stage_name(s, state))?;
+            let q = advance(s, state, &after);
             return Ok(Stepped {
                 state: next_state(state, &split, q, y, input),
-                memo: Some(stage),
+                memo: Some(contact::kept(&stage, &after)),
             });
         }
         previous = moved;
@@ -116,18 +123,23 @@ pub(super) fn step_vjp(
 ) -> Result<StepBar> {
     let split = s.split(&input.hold, When::Over(s.time(state), s.dt));
     let p = s.released_momentum(e, state, v, &split);
-    let stage = match memo {
-        Some(stage) => stage.clone(),
+    let both = match memo {
+        Some(both) => both.clone(),
         None => step(s, e, state, v, input)?
             .memo
-            .unwrap_or_else(|| v.clone()),
+            .unwrap_or_else(|| contact::kept(v, v)),
     };
+    let (stage, after) = contact::parted(&both, v.len());
     let m = middle(s, state, &stage, true)?;
     let h = 0.5 * s.dt;
     let reached = &p + h * m.force(&stage, &input.control);
-    let (q_bar, v_bar_next) = advance_vjp(s, &split, &stage, &next_bar.q);
+    let mut bar = StepBar::zeros(e);
+    let (q_bar, after_bar) = advance_vjp(s, &split, &after, &next_bar.q);
+    bar.state.q += q_bar;
     let mut z = next_bar.y.clone();
     split.forget_driven(&mut z);
+    let both = [&stage, &after];
+    let v_bar_next = contact::press_vjp(e, &split, both, [&after_bar, &z], s.dt, &mut bar)?;
     let adjoint = AdjointStage::new(&m, &split, &stage, &reached, rule(s));
     let v_bar_force = s.dt * adjoint.rates.tr_mul(&z);
     let fixed = v_bar_next + v_bar_force;
@@ -147,8 +159,7 @@ pub(super) fn step_vjp(
             0.0
         };
         if moved <= 1e-13 || (moved <= 10.0 * noise(&m) && moved > 0.5 * previous) {
-            let mut bar = StepBar::zeros(e);
-            bar.state.q += q_bar + q_start;
+            bar.state.q += q_start;
             bar.control += inner.control;
             bar.parameters.add(&inner.parameters);
             let p_bar = &z + m.frame_velocity(&w);

@@ -8,6 +8,8 @@
 //! | [`Integrator::Rk4`] | frame momentum p̂ | 4 | 4 |
 //! | [`Integrator::VelocityEuler`] | velocity v | 1 | 1 |
 //!
+//! All but the Runge–Kutta schemes solve contact, at the end of the step ([`Integrator::solves_contact`]).
+//!
 //! Joints that are driven (locked, held by the controller, or given a motion) have known
 //! velocities v_d; the others follow from rows f of the momentum balance (p_f = M_ff v_f + M_fd v_d).
 
@@ -45,6 +47,11 @@ impl Integrator {
     /// Whether the state carries velocity instead of momentum.
     pub fn carries_velocity(self) -> bool {
         self == Integrator::VelocityEuler
+    }
+
+    /// Whether it solves contact, and limits of joints, in the velocity by which a step moves.
+    pub fn solves_contact(self) -> bool {
+        !matches!(self, Integrator::Rk2 | Integrator::Rk4)
     }
 }
 
@@ -271,7 +278,7 @@ impl Stepper<'_> {
                 runge_kutta::step_vjp(self, e, state, v, input, memo, next_bar)
             }
             Integrator::VelocityEuler => {
-                velocity_euler::step_vjp(self, e, state, v, input, next_bar)
+                velocity_euler::step_vjp(self, e, state, v, input, memo, next_bar)
             }
         }
     }

@@ -1,7 +1,11 @@
 //! The paper's semi-implicit Euler in velocity (Eq. 3–4): v⁺ = v + Δt a(q, v, u), q⁺ = q ⊕ Δt v⁺.
+//!
+//! With contact, v⁺ is what [`contact::solve`] makes of that velocity at q.
 
-use super::euler::{advance, advance_vjp, next_state};
-use super::{Input, Split, State, StateBar, StepBar, Stepped, Stepper, When, readout};
+use super::euler::{advance, advance_vjp, next_state, stage_name};
+use super::{
+    Input, Memo, Split, State, StateBar, StepBar, Stepped, Stepper, When, contact, readout,
+};
 use crate::Result;
 use crate::dynamics::Evaluation;
 use nalgebra::DVector;
@@ -32,11 +36,13 @@ pub(super) fn step(
 ) -> Result<Stepped> {
     let split = s.split(&input.hold, When::Over(s.time(state), s.dt));
     let a = acceleration(s, e, &split, v, &input.control)?;
-    let next = &split.driven + split.put(&split.take(&(v + s.dt * a)));
+    let free = &split.driven + split.put(&split.take(&(v + s.dt * a)));
+    let next = contact::solve(e, &split, &free, s.dt, &|| stage_name(s, state))?;
     let q = advance(s, state, &next);
     let mut state = next_state(state, &split, q, next.clone(), input);
     state.y = next;
-    Ok(Stepped { state, memo: None })
+    let memo = Some(contact::kept(&free, &state.y));
+    Ok(Stepped { state, memo })
 }
 
 pub(super) fn step_vjp(
@@ -45,15 +51,24 @@ pub(super) fn step_vjp(
     state: &State,
     v: &DVector<f64>,
     input: &Input,
+    memo: &Memo,
     next_bar: &StateBar,
 ) -> Result<StepBar> {
     let split = s.split(&input.hold, When::Over(s.time(state), s.dt));
     let a = acceleration(s, e, &split, v, &input.control)?;
-    let next = &split.driven + split.put(&split.take(&(v + s.dt * &a)));
+    let (free, next) = match memo {
+        Some(both) => contact::parted(both, v.len()),
+        None => {
+            let free = &split.driven + split.put(&split.take(&(v + s.dt * &a)));
+            let next = contact::solve(e, &split, &free, s.dt, &|| stage_name(s, state))?;
+            (free, next)
+        }
+    };
     let mut bar = StepBar::zeros(e);
     let (q_bar, mut next_v_bar) = advance_vjp(s, &split, &next, &next_bar.q);
     bar.state.q += q_bar;
     next_v_bar += &next_bar.y;
+    let mut next_v_bar = contact::solve_vjp(e, &split, &free, &next, &next_v_bar, s.dt, &mut bar)?;
     split.forget_driven(&mut next_v_bar);
     bar.v += &next_v_bar;
     // Free rows of M a = G − M_fd a_d, a_d = (v_d − v)/Δt.

@@ -2,7 +2,7 @@
 
 use nalgebra::{Matrix3, Matrix6};
 
-use super::{finite, list, norm, place};
+use super::{finite, limits, list, norm, place};
 use crate::scene::{Body, Joint, Motion, Scene, Shape};
 use crate::{Error, Result};
 
@@ -237,6 +237,7 @@ fn check_joint(body: &Body) -> Result<()> {
     if let Some(motion) = &body.motion {
         check_motion(body, motion)?;
     }
+    limits::check(body)?;
     if body.actuated && matches!(joint, Joint::Fixed) {
         return Err(Error::input(
             place(body, "actuated"),

@@ -7,6 +7,7 @@
 mod body;
 mod contact;
 mod controller;
+mod limits;
 mod start;
 
 use std::collections::HashMap;

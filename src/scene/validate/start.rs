@@ -1,6 +1,6 @@
 //! Where the scene starts: lengths against the joints, unit quaternions, prescribed joints.
 
-use super::{finite, place};
+use super::{finite, limits, place};
 use crate::scene::{Body, Joint, Motion, Scene};
 use crate::{Error, Result};
 
@@ -20,6 +20,7 @@ pub(super) fn check(scene: &Scene) -> Result<()> {
     let (mut nq, mut nv) = (0, 0);
     for body in &scene.bodies {
         let (dq, dv) = (body.joint.coordinates(), body.joint.velocities());
+        limits::check_start(body, nq, initial.q.get(nq).copied())?;
         if !initial.q.is_empty() {
             check_quaternion(body, nq, &initial.q[nq..nq + dq])?;
             check_driven(body, nq, "q", &initial.q[nq..nq + dq], |m| m.value(0.0))?;

@@ -1,0 +1,73 @@
+//! Limits of joints: stops at the ends of a coordinate's range, by the law of contact without friction.
+//!
+//! With the gap φ = q − lower or upper − q and the rate u of the gap's opening, a stop's generalised force along the opening is
+//! [`contact_force`] of a point that moves along its normal. The coordinate's rate is its velocity in the user's coordinates and
+//! in the frame's (X = 1 for a joint with one coordinate), and so the force is the same in both.
+
+use super::Evaluation;
+use crate::adjoint::contact::{Law, Meeting, contact_force, contact_force_jvp, contact_force_vjp};
+use crate::adjoint::lie::Vec3;
+use nalgebra::DVector;
+
+/// Range of a joint with one coordinate.
+#[derive(Clone, Debug, PartialEq)]
+pub struct JointLimit {
+    /// Place of the coordinate in q.
+    pub q: usize,
+    /// Place of its rate in v.
+    pub v: usize,
+    /// Lower and upper end, m or rad.
+    pub range: [f64; 2],
+    /// Law of the stops: lengths in m or rad, forces in N or N m.
+    pub law: Law,
+}
+
+impl JointLimit {
+    /// The meeting with either stop at the coordinate `q` and its rate `v`, with the sign of the force's direction.
+    fn meetings(&self, q: f64, v: f64) -> [(f64, Meeting); 2] {
+        let [lower, upper] = self.range;
+        [(1.0, q - lower), (-1.0, upper - q)].map(|(sign, gap)| {
+            let meeting = Meeting {
+                gap,
+                weight: 1.0,
+                normal: Vec3::x(),
+                velocity: Vec3::x() * (sign * v),
+            };
+            (sign, meeting)
+        })
+    }
+
+    /// Generalised forces of the lower and the upper stop, N or N m: not negative, not positive.
+    pub fn forces(&self, q: f64, v: f64) -> [f64; 2] {
+        self.meetings(q, v)
+            .map(|(sign, m)| sign * contact_force(&self.law, &m).x)
+    }
+
+    /// Tangent of the sum of [`JointLimit::forces`] along `dv`.
+    pub fn forces_jvp(&self, q: f64, v: f64, dv: f64) -> f64 {
+        let along = |sign: f64| Vec3::x() * (sign * dv);
+        self.meetings(q, v)
+            .map(|(sign, m)| sign * contact_force_jvp(&self.law, &m, &along(sign)).x)
+            .iter()
+            .sum()
+    }
+
+    /// Transpose of the sum of [`JointLimit::forces`]: cotangents of `q` and `v`.
+    pub fn forces_vjp(&self, q: f64, v: f64, bar: f64) -> [f64; 2] {
+        let mut out = [0.0; 2];
+        for (sign, m) in self.meetings(q, v) {
+            let own = contact_force_vjp(&self.law, &m, &(Vec3::x() * (sign * bar)));
+            out[0] += sign * own.gap;
+            out[1] += sign * own.velocity.x;
+        }
+        out
+    }
+}
+
+impl Evaluation<'_> {
+    /// Each limit with the forces of its stops at the velocity `v`.
+    pub(super) fn stops(&self, v: &DVector<f64>) -> impl Iterator<Item = (&JointLimit, [f64; 2])> {
+        let each = self.system.limits.iter();
+        each.map(|l| (l, l.forces(self.q[l.q], v[l.v])))
+    }
+}

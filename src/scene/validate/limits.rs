@@ -1,0 +1,76 @@
+//! Limits of joints.
+
+use super::{finite, list, place};
+use crate::scene::Body;
+use crate::{Error, Result};
+
+pub(super) fn check(body: &Body) -> Result<()> {
+    if let Some(stiffness) = body.limit_stiffness {
+        let place = place(body, "limit_stiffness");
+        finite(&place, &[stiffness])?;
+        if stiffness <= 0.0 {
+            return Err(Error::input(
+                place,
+                stiffness,
+                "give a stiffness above zero, N/m or N m/rad, or leave it out for one that is near rigid",
+            ));
+        }
+        if body.limits.is_none() {
+            return Err(Error::input(
+                place,
+                stiffness,
+                "the joint has no limits: give `limits = [lower, upper]`, or take the stiffness away",
+            ));
+        }
+    }
+    let Some([lower, upper]) = body.limits else {
+        return Ok(());
+    };
+    let place = place(body, "limits");
+    finite(&place, &[lower, upper])?;
+    if lower >= upper {
+        return Err(Error::input(
+            place,
+            list(&[lower, upper]),
+            "give the lower limit, then the upper one, which must be above it (m or rad)",
+        ));
+    }
+    if body.joint.coordinates() != 1 {
+        return Err(Error::input(
+            place,
+            format!("limits of a {} joint", body.joint.kind()),
+            "only prismatic and revolute joints have limits; build the motion from several of them",
+        ));
+    }
+    if body.is_prescribed() {
+        let (how, key) = match body.locked {
+            true => ("locked", "locked"),
+            false => ("driven", "motion"),
+        };
+        return Err(Error::input(
+            place,
+            list(&[lower, upper]),
+            format!("the joint is {how}, so nothing can stop it: take `limits` or `{key}` away"),
+        ));
+    }
+    Ok(())
+}
+
+/// A joint must start within its limits; `given` is its coordinate, number `first` of all, if the scene says.
+pub(super) fn check_start(body: &Body, first: usize, given: Option<f64>) -> Result<()> {
+    let (Some([lower, upper]), q) = (body.limits, given.unwrap_or(0.0)) else {
+        return Ok(());
+    };
+    if (lower..=upper).contains(&q) {
+        return Ok(());
+    }
+    let start = match given {
+        Some(_) => "",
+        None => " (no initial.q is given)",
+    };
+    Err(Error::input(
+        place(body, &format!("initial.q[{first}]")),
+        format!("{q}{start}"),
+        format!("the joint must start within its limits, from {lower} to {upper}"),
+    ))
+}

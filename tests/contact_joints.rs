@@ -1,0 +1,415 @@
+//! Joints at their limits: where they stop, what they lose, in water, gradients, and scenes that can't be.
+
+use hydrograd::dynamics::Integrator;
+use hydrograd::scene::{Body, Contact, Fluid, Joint, Motion, Preset, Scene, Shape};
+use hydrograd::simulate::Rollout;
+use hydrograd::simulate::gradcheck::{self, gradcheck};
+use hydrograd::{Controls, Fidelity, Settings, Simulator};
+use std::f64::consts::PI;
+
+const GRAVITY: f64 = 9.81;
+
+const INTEGRATORS: [Integrator; 3] = [
+    Integrator::MomentumEuler,
+    Integrator::Midpoint,
+    Integrator::VelocityEuler,
+];
+
+const Z: Joint = Joint::Prismatic {
+    axis: [0.0, 0.0, 1.0],
+};
+const HINGE: Joint = Joint::Revolute {
+    axis: [0.0, 1.0, 0.0],
+};
+
+fn vacuum() -> Scene {
+    let mut scene = Scene::new(Fluid::none());
+    scene.gravity = [0.0, 0.0, -GRAVITY];
+    scene
+}
+
+/// A mass of 2 kg that slides up and down by 0.3 m.
+fn slider() -> Scene {
+    let mut scene = vacuum();
+    scene.add(
+        Body::dry()
+            .named("slider")
+            .mass(2.0)
+            .inertia([0.01; 3])
+            .joint(Z)
+            .limits([-0.3, 0.3]),
+    );
+    scene
+}
+
+/// A mass of 1 kg on an arm of 0.5 m that falls from the horizontal and is stopped before it hangs.
+fn pendulum() -> Scene {
+    let mut scene = vacuum();
+    scene.time_step = 1e-3;
+    scene.add(
+        Body::dry()
+            .named("pendulum")
+            .mass(1.0)
+            .inertia([0.01; 3])
+            .center_of_mass([0.5, 0.0, 0.0])
+            .joint(HINGE)
+            .limits([-0.2, 1.0]),
+    );
+    scene
+}
+
+fn simulator(scene: &Scene, fidelity: Fidelity, integrator: Integrator) -> Simulator {
+    let settings = Settings::default()
+        .fidelity(fidelity)
+        .integrator(integrator);
+    Simulator::new(scene, settings).unwrap()
+}
+
+fn run(simulator: &Simulator, steps: usize) -> Rollout<'_> {
+    simulator
+        .rollout(&Controls::zeros(simulator, steps))
+        .unwrap()
+}
+
+/// Highest energy above that at the start.
+fn gain(rollout: &Rollout) -> f64 {
+    let first = rollout.samples()[0].energy();
+    let each = rollout.samples().iter().map(|s| s.energy() - first);
+    each.fold(f64::NEG_INFINITY, f64::max)
+}
+
+/// It goes past its limit by an eleventh of what it would in the step that reaches it, and rests where the smoothed
+/// law carries its weight.
+#[test]
+fn a_slider_falls_on_its_stop() {
+    for integrator in INTEGRATORS {
+        let simulator = simulator(&slider(), Fidelity::Isolated, integrator);
+        let rollout = run(&simulator, 200);
+        let q = |n: usize| rollout.samples()[n].q[0];
+        let dt = simulator.time_step();
+        let lowest = (0..=200).map(q).fold(f64::INFINITY, f64::min);
+        let fastest = (2.0 * GRAVITY * 0.3).sqrt() + GRAVITY * dt;
+        let bound = fastest * dt / 11.0;
+        let (depth, width) = (GRAVITY * dt * dt / 10.0, 6e-4);
+        let rest = -0.3 + width - 2.0 * (width * depth).sqrt();
+        println!(
+            "{integrator:?}: {:.2e} m past the limit, bound {bound:.2e}; rests {:.1e} m off; gains {:.1e} J",
+            -0.3 - lowest,
+            q(200) - rest,
+            gain(&rollout),
+        );
+        assert!(-0.3 - lowest <= bound);
+        assert!((q(200) - rest).abs() < 1e-9);
+        assert!((q(200) - q(199)).abs() < 1e-12);
+        assert!(gain(&rollout) <= 1e-12);
+        // It lost all that it had fallen.
+        let left = rollout.samples()[200].energy() + 2.0 * GRAVITY * 0.3;
+        assert!(left < 0.02 * 2.0 * GRAVITY * 0.3, "{left}");
+    }
+}
+
+#[test]
+fn a_pendulum_is_stopped() {
+    for integrator in INTEGRATORS {
+        let simulator = simulator(&pendulum(), Fidelity::Isolated, integrator);
+        let rollout = run(&simulator, 3000);
+        let q = |n: usize| rollout.samples()[n].q[0];
+        let dt = simulator.time_step();
+        let inertia = 0.01 + 0.25;
+        let law = simulator.system().limits[0].law;
+        assert!((law.stiffness * dt * dt / (10.0 * inertia) - 1.0).abs() < 1e-12);
+        let furthest = (0..=3000).map(q).fold(f64::NEG_INFINITY, f64::max);
+        let fastest = (2.0 * GRAVITY * 0.5 * 1.0_f64.sin() / inertia).sqrt();
+        // One step's pull more, at most.
+        let bound = (fastest + GRAVITY * 0.5 / inertia * dt) * dt / 11.0;
+        println!(
+            "{integrator:?}: {:.2e} rad past the limit, bound {bound:.2e}; gains {:.1e} J; ends {:.1e} rad off",
+            furthest - 1.0,
+            gain(&rollout),
+            q(3000) - 1.0
+        );
+        assert!(furthest - 1.0 <= bound);
+        // What a first-order integrator makes of a free swing.
+        let fallen = GRAVITY * 0.5 * 1.0_f64.sin();
+        assert!(gain(&rollout) <= 5e-3 * fallen);
+        assert!((q(3000) - 1.0).abs() <= law.width);
+        let left = rollout.samples()[3000].energy() + fallen;
+        assert!(left < 0.01 * fallen, "{left}");
+    }
+}
+
+/// A hinge at its limit gives to either side what it takes from the other.
+#[test]
+fn a_limit_between_bodies_keeps_momentum() {
+    for integrator in [Integrator::MomentumEuler, Integrator::Midpoint] {
+        let mut scene = vacuum();
+        scene.gravity = [0.0; 3];
+        scene.add(Body::dry().named("base").mass(3.0).inertia([0.2, 0.1, 0.2]));
+        scene.add(
+            Body::dry()
+                .named("arm")
+                .child_of("base")
+                .mass(1.0)
+                .inertia([0.02, 0.05, 0.04])
+                .center_of_mass([0.4, 0.1, 0.0])
+                .at([0.2, 0.0, 0.1])
+                .joint(HINGE)
+                .limits([-0.5, 0.5]),
+        );
+        scene.initial.v = vec![0.3, -0.2, 0.1, 0.5, 0.4, -0.3, 3.0];
+        let simulator = simulator(&scene, Fidelity::Isolated, integrator);
+        let rollout = run(&simulator, 100);
+        let furthest = rollout.samples().iter().map(|s| s.q[7]).fold(0.0, f64::max);
+        assert!(furthest > 0.5, "{furthest}");
+        let drift = rollout.summary().momentum_drift;
+        println!("{integrator:?}: momentum drifts by {drift:.1e}");
+        assert!(drift < 1e-12, "{drift}");
+    }
+}
+
+/// Without gravity the ball comes at constant speed; the step that reaches the stop is that of mass and added mass.
+#[test]
+fn water_is_stopped_as_well() {
+    let dt = 0.01;
+    let density = 998.0;
+    let volume = 4.0 / 3.0 * PI * 1e-3;
+    let mass = (800.0 + 0.5 * density) * volume;
+    for stiffness in [None, Some(3e4)] {
+        for integrator in INTEGRATORS {
+            let mut scene = Scene::new(Fluid::fresh_water());
+            scene.time_step = dt;
+            let ball = Body::new(Shape::sphere(0.1)).density(800.0).named("ball");
+            let mut ball = ball.joint(Z).limits([-0.02, 0.103]);
+            ball.limit_stiffness = stiffness;
+            scene.add(ball);
+            scene.initial.v = vec![1.0];
+            let simulator = simulator(&scene, Fidelity::Isolated, integrator);
+            let law = simulator.system().limits[0].law;
+            let k = stiffness.unwrap_or(10.0 * mass / (dt * dt));
+            assert!((law.stiffness / k - 1.0).abs() < 1e-9);
+            let rollout = run(&simulator, 11);
+            let q = |n: usize| rollout.samples()[n].q[0];
+            assert!((q(10) - 0.1).abs() < 1e-12);
+            // M (v − 1) = −Δt k (q + Δt v − 0.103).
+            let v = (mass - dt * k * (0.1 - 0.103)) / (mass + dt * dt * k);
+            let found = (q(11) - q(10)) / dt;
+            assert!((found - v).abs() < 1e-9, "{integrator:?}: {found}, not {v}");
+        }
+    }
+}
+
+/// Both joints of an arm that is driven into its limits: one by a torque, one by its weight.
+fn arm(water: f64) -> Scene {
+    let mut scene = vacuum();
+    scene.fluid.density = water;
+    let link = |length: f64| {
+        Body::new(Shape::ellipsoid([0.5 * length, 0.05, 0.04]))
+            .density(1500.0)
+            .shape_at([0.6 * length, 0.0, 0.0], [0.0; 3])
+    };
+    scene.add(
+        link(0.4)
+            .named("upper")
+            .joint(HINGE)
+            .limits([-0.3, 0.25])
+            .actuated(),
+    );
+    scene.add(
+        link(0.3)
+            .named("lower")
+            .child_of("upper")
+            .at([0.6, 0.0, 0.0])
+            .joint(HINGE)
+            .limits([-0.1, 0.2])
+            .limit_stiffness(2e3)
+            .actuated(),
+    );
+    scene
+}
+
+#[test]
+fn gradients_through_a_limit() {
+    let mut cases = Vec::new();
+    for integrator in INTEGRATORS {
+        cases.push(("slider", slider(), Fidelity::Isolated, integrator, 40));
+        cases.push(("arm", arm(0.0), Fidelity::Isolated, integrator, 40));
+        cases.push((
+            "arm in water",
+            arm(998.0),
+            Fidelity::Reduced,
+            integrator,
+            40,
+        ));
+    }
+    for (name, scene, fidelity, integrator, steps) in cases {
+        let mut simulator = simulator(&scene, fidelity, integrator);
+        let rollout = run(&simulator, steps);
+        let limits = &simulator.system().limits;
+        let at = |l: &hydrograd::dynamics::JointLimit| {
+            let q = rollout.samples().iter().map(|s| s.q[l.q]);
+            q.fold(0.0_f64, |m, q| m.max(q - l.range[1]).max(l.range[0] - q))
+        };
+        let past: Vec<f64> = limits.iter().map(at).collect();
+        assert!(past.iter().all(|p| *p > 0.0), "{name}: {past:?}");
+        drop(rollout);
+        let asked = gradcheck::Settings {
+            steps,
+            directions: 2,
+            seed: 3,
+            timings: 0,
+        };
+        let report = gradcheck(&mut simulator, &asked).unwrap();
+        println!(
+            "{name} {integrator:?}: {:.1e}, past {past:?}",
+            report.max_rel_error
+        );
+        assert!(
+            report.max_rel_error <= 1e-5,
+            "{name} {integrator:?}: {:#?}",
+            report.directions
+        );
+    }
+}
+
+#[test]
+fn integrators_that_cannot_do_it_say_so() {
+    let mut scene = slider();
+    for integrator in [Integrator::Rk2, Integrator::Rk4] {
+        let settings = Settings::default().fidelity(Fidelity::Isolated);
+        let made = Simulator::new(&scene, settings.integrator(integrator));
+        let said = made.map(|_| ()).unwrap_err().to_string();
+        for word in [
+            "limits",
+            "\"slider\"",
+            "momentum-euler",
+            "midpoint",
+            "velocity-euler",
+        ] {
+            assert!(said.contains(word), "no {word} in: {said}");
+        }
+    }
+    let chosen = |scene: &Scene| Settings::for_scene(scene).integrator;
+    assert_eq!(chosen(&scene), Integrator::MomentumEuler);
+    scene.preset = Preset::Paper;
+    assert_eq!(chosen(&scene), Integrator::VelocityEuler);
+}
+
+#[track_caller]
+fn refused(change: impl FnOnce(&mut Body), words: &[&str]) {
+    let mut scene = slider();
+    scene.validate().unwrap();
+    change(&mut scene.bodies[0]);
+    let said = scene.validate().unwrap_err().to_string();
+    for word in words {
+        assert!(said.contains(word), "no {word:?} in: {said}");
+    }
+}
+
+#[test]
+fn limits_are_checked_by_name() {
+    let field = "body \"slider\": limits";
+    refused(|b| b.limits = Some([0.1, -0.1]), &[field, "[0.1, -0.1]"]);
+    refused(|b| b.limits = Some([0.1, 0.1]), &[field, "above it"]);
+    refused(
+        |b| b.limits = Some([f64::NAN, 0.1]),
+        &[field, "NaN", "finite"],
+    );
+    refused(
+        |b| b.limits = Some([0.0, f64::INFINITY]),
+        &[field, "inf", "finite"],
+    );
+    refused(
+        |b| b.joint = Joint::Free,
+        &[field, "free joint", "prismatic and revolute"],
+    );
+    refused(|b| b.locked = true, &[field, "`locked`"]);
+    let motion = Motion::Linear {
+        offset: 0.0,
+        rate: 1.0,
+    };
+    refused(|b| b.motion = Some(vec![motion]), &[field, "`motion`"]);
+    let field = "body \"slider\": limit_stiffness";
+    refused(|b| b.limit_stiffness = Some(0.0), &[field, "got 0", "N/m"]);
+    refused(
+        |b| b.limit_stiffness = Some(f64::NAN),
+        &[field, "NaN", "finite"],
+    );
+    refused(
+        |b| (b.limits, b.limit_stiffness) = (None, Some(1.0)),
+        &[field, "no limits"],
+    );
+    let field = "body \"slider\": initial.q[0]";
+    refused(
+        |b| b.limits = Some([0.1, 0.3]),
+        &[field, "got 0", "from 0.1 to 0.3"],
+    );
+    let mut scene = slider();
+    scene.initial.q = vec![-0.31];
+    let said = scene.validate().unwrap_err().to_string();
+    assert!(said.contains(field) && said.contains("-0.31"), "{said}");
+    // A start at the limit itself is one within.
+    scene.initial.q = vec![-0.3];
+    scene.validate().unwrap();
+}
+
+/// A joint that carries no inertia has no default.
+#[test]
+fn a_limit_without_inertia_asks_for_a_stiffness() {
+    let mut scene = slider();
+    scene.bodies[0].mass = Some(0.0);
+    let settings = Settings::for_scene(&scene).fidelity(Fidelity::Isolated);
+    let made = Simulator::new(&scene, settings);
+    let said = made.map(|_| ()).unwrap_err().to_string();
+    assert!(said.contains("\"slider\": limit_stiffness"), "{said}");
+}
+
+#[test]
+fn limits_in_a_scene_file() {
+    let text = |limits: &str| {
+        format!(
+            "time_step = 0.01\nsteps = 1\n[fluid]\ndensity = 0.0\n[[bodies]]\nname = \"a\"\nmass = 1.0\n\
+             inertia = [1.0, 1.0, 1.0]\n{limits}\njoint = {{ kind = \"prismatic\", axis = [0, 0, 1] }}\n"
+        )
+    };
+    let read = |limits: &str| Scene::from_toml(&text(limits), "");
+    let scene = read("limits = [-0.3, 0.4]\nlimit_stiffness = 2e3").unwrap();
+    assert_eq!(scene.bodies[0].limits, Some([-0.3, 0.4]));
+    assert_eq!(scene.bodies[0].limit_stiffness, Some(2e3));
+    let again = Scene::from_toml(&scene.to_toml().unwrap(), "").unwrap();
+    assert_eq!(scene, again);
+    for (wrong, word) in [
+        ("limits = [-0.3]", "2"),
+        ("limit = [-0.3, 0.4]", "limits"),
+        ("limits = [-0.3, 0.4]\nlimit_width = 1.0", "limit_width"),
+    ] {
+        let said = read(wrong).unwrap_err().to_string();
+        assert!(said.contains(word), "no {word:?} in: {said}");
+    }
+}
+
+/// Limits beside surfaces that touch: the ball is pressed on the floor by a joint that can't come down any further than it.
+#[test]
+fn limits_and_surfaces_share_the_load() {
+    let mut scene = slider();
+    scene.add_wall([0.0, 0.0, -0.5], [0.0, 0.0, 1.0]);
+    scene.contact = Some(Contact {
+        gap: Some(0.0),
+        width: Some(1e-5),
+        stiffness: Some(2e5),
+        ..Contact::default()
+    });
+    let body = &mut scene.bodies[0];
+    body.shape = Some(Shape::sphere(0.2));
+    body.limit_stiffness = Some(2e5);
+    // The range is small, so that the depth at which the two carry is beyond the width.
+    body.limits = Some([-0.3, -0.29]);
+    scene.initial.q = vec![-0.295];
+    for integrator in INTEGRATORS {
+        let simulator = simulator(&scene, Fidelity::Isolated, integrator);
+        let rollout = run(&simulator, 300);
+        let depth = -0.3 - rollout.samples()[300].q[0];
+        let alone = 2.0 * GRAVITY / 2e5;
+        println!("{integrator:?}: {:.6} of the depth on one", depth / alone);
+        assert!((depth / alone - 0.5).abs() < 0.01);
+    }
+}

@@ -3,7 +3,9 @@
 use super::tools::{Group, all, groups, wavy};
 use hydrograd::adjoint::check::{Outcome, Rung};
 use hydrograd::scene::{Body, Controller, Fluid, Joint, Scene, Shape};
-use hydrograd::simulate::{Constant, Observation, OpenLoop, Pd, PdAxis, Policy, PushThenLock};
+use hydrograd::simulate::{
+    Constant, Observation, OpenLoop, Pd, PdAxis, Playback, Policy, PushThenLock, SpeedStages, Stage,
+};
 use hydrograd::{Controls, Settings, Simulator};
 use nalgebra::{DMatrix, DVector};
 
@@ -18,6 +20,8 @@ pub fn rungs() -> Vec<Rung> {
         "simulate::policy::Constant::act_vjp" => |c| act(&Constant { control: vec![0.3, -0.7] }, c),
         "simulate::policy::Pd::act_vjp" => |c| act(&pd(), c),
         "simulate::policy::PushThenLock::act_vjp" => push_then_lock,
+        "simulate::policy::Playback::act_vjp" => |c| act(&playback(), c),
+        "simulate::policy::SpeedStages::act_vjp" => |c| act(&stages(), c),
         "simulate::rollout::Rollout::vjp" => rollout,
     ]
 }
@@ -35,6 +39,27 @@ fn pd() -> Pd {
         controls: 2,
         velocities: 3,
         axes: vec![axis(1, 0, 0), axis(0, 2, 2)],
+    }
+}
+
+/// Five steps, one of them observed.
+fn playback() -> Playback {
+    let steps = (0..5).map(|n| vec![0.3 + f64::from(n), -0.7 * f64::from(n)]);
+    Playback {
+        controls: 2,
+        steps: steps.collect(),
+    }
+}
+
+/// The observed speeds end the first stage and not the second.
+fn stages() -> SpeedStages {
+    let stage = |until: f64, control: f64| Stage {
+        until,
+        control: vec![control, -2.0 * control],
+    };
+    SpeedStages {
+        watch: vec![0, 2],
+        stages: vec![stage(1e-3, 0.4), stage(50.0, 0.6)],
     }
 }
 

@@ -106,7 +106,7 @@ pub(super) fn solve(
 }
 
 /// Along Newton's step: the full one, or where that runs past the least value on its way, about there (regula falsi on the
-/// slope, in halves where it creeps).
+/// slope, in halves where it creeps). Short of it won't do: where the slope turns steeply, regula falsi's first guess is hardly a step.
 fn search(now: Trial, step: &DVector<f64>, at: &dyn Fn(DVector<f64>) -> Trial) -> Trial {
     let slope = |t: &Trial| t.imbalance.dot(step);
     let start = slope(&now);
@@ -114,7 +114,8 @@ fn search(now: Trial, step: &DVector<f64>, at: &dyn Fn(DVector<f64>) -> Trial) -
     let (mut low, mut high) = ((0.0, start), (1.0, slope(&best)));
     for trial in 0..TRIALS {
         let here = slope(&best);
-        if here >= -LEFT * start || !(start > 0.0) {
+        let enough = here.abs() <= LEFT * start || (trial == 0 && here > 0.0);
+        if enough || !(start > 0.0) {
             break;
         }
         let length = match trial % 2 {

@@ -7,6 +7,7 @@ mod controls;
 mod estimate;
 pub mod gradcheck;
 mod gradient;
+pub mod growth;
 pub mod objective;
 mod plan;
 mod policy;

@@ -1,7 +1,7 @@
 //! How much a trajectory magnifies changes of its state: known answers, and differences.
 
 use hydrograd::dynamics::Integrator;
-use hydrograd::scene::{Body, Contact, Fluid, Joint, Scene, Shape};
+use hydrograd::scene::{Body, Contact, Fluid, Joint, Motion, Scene, Shape};
 use hydrograd::simulate::growth::growth;
 use hydrograd::{Controls, Fidelity, Settings, Simulator};
 use nalgebra::{DMatrix, DVector};
@@ -199,4 +199,35 @@ fn what_is_driven_does_not_grow() {
     let found = growth(&simulator(&scene, Integrator::Rk2), 5).unwrap();
     assert_eq!((found.total, found.course.len()), (1.0, 6));
     assert!(growth(&simulator(&scene, Integrator::Rk2), 0).is_err());
+
+    // A slider on a rail that swings: only the slider's own coordinate counts. It is carried along, but drifts as if it weren't.
+    let rail = |axis| Joint::Prismatic { axis };
+    let swing = Motion::Sine {
+        offset: 0.0,
+        amplitude: 0.2,
+        frequency: 3.0,
+        phase: 0.4,
+    };
+    let mut scene = Scene::new(Fluid {
+        density: 0.0,
+        current: [0.0; 3],
+    });
+    scene.add(
+        Body::new(Shape::sphere(0.1))
+            .named("rail")
+            .density(1000.0)
+            .joint(rail([0.0, 1.0, 0.0]))
+            .driven([swing]),
+    );
+    scene.add(
+        Body::new(Shape::sphere(0.1))
+            .density(1000.0)
+            .child_of("rail")
+            .at([0.0, 0.0, 0.5])
+            .joint(rail([1.0, 0.0, 0.0])),
+    );
+    for integrator in [Integrator::MomentumEuler, Integrator::Rk2] {
+        let found = growth(&simulator(&scene, integrator), 30).unwrap();
+        assert!((found.total - drift(1.0)).abs() < 1e-9, "{}", found.total);
+    }
 }

@@ -4,6 +4,7 @@ use super::{GRAVITY, RAIL, above_floor, contact, isolated, run, scene};
 use hydrograd::scene::{Body, Joint, Scene, Shape};
 use hydrograd::{Controls, Simulator};
 use nalgebra::{DMatrix, DVector};
+use std::f64::consts::FRAC_PI_2;
 
 /// A ball on a vertical rail, half a metre up; with a soft floor from which it comes back, or the default one.
 fn bouncing(stiffness: Option<f64>) -> Simulator {
@@ -214,21 +215,13 @@ fn gradients_at_a_change_of_mode_are_finite() {
                 .density(1000.0)
                 .at([0.0, 0.0, z])
         };
-        rods.add(
-            rod(0.0)
-                .rotated([0.0, 1.5707963267948966, 0.0])
-                .joint(Joint::Fixed),
-        );
-        rods.add(rod(0.1005).rotated([0.0, 1.5707963267948966, 0.0]));
+        rods.add(rod(0.0).rotated([0.0, FRAC_PI_2, 0.0]).joint(Joint::Fixed));
+        rods.add(rod(0.1005).rotated([0.0, FRAC_PI_2, 0.0]));
         cases.push(("parallel rods", rods));
         let mut crossed = scene(0.0);
         crossed.gravity = [0.0, 0.0, -gravity];
-        crossed.add(
-            rod(0.0)
-                .rotated([0.0, 1.5707963267948966, 0.0])
-                .joint(Joint::Fixed),
-        );
-        crossed.add(rod(0.1005).rotated([1.5707963267948966, 0.0, 0.0]));
+        crossed.add(rod(0.0).rotated([0.0, FRAC_PI_2, 0.0]).joint(Joint::Fixed));
+        crossed.add(rod(0.1005).rotated([FRAC_PI_2, 0.0, 0.0]));
         cases.push(("crossed rods", crossed));
     }
     for (name, mut scene) in cases {

@@ -115,7 +115,7 @@ fn search(now: Trial, step: &DVector<f64>, at: &dyn Fn(DVector<f64>) -> Trial) -
     for trial in 0..TRIALS {
         let here = slope(&best);
         let enough = here.abs() <= LEFT * start || (trial == 0 && here > 0.0);
-        if enough || !(start > 0.0) {
+        if enough || start.is_nan() || start <= 0.0 {
             break;
         }
         let length = match trial % 2 {

@@ -87,7 +87,9 @@ fn one(task: &Task, start: &[f64], target: f64, cap: usize, seed: u64) -> (Optio
         }
         cost
     };
-    let search = CMAESOptions::new(start.to_vec(), SPREAD).seed(seed).build(cost);
+    let search = CMAESOptions::new(start.to_vec(), SPREAD)
+        .seed(seed)
+        .build(cost);
     if let Ok(mut search) = search {
         while search.function_evals() < cap && !done.load(Ordering::Relaxed) {
             if search.next().is_some() {

@@ -49,7 +49,11 @@ pub fn hand_tuned(scene: &Scene) -> [Scene; 2] {
 }
 
 pub fn simulator(scene: &Scene, fidelity: Fidelity) -> Result<Simulator> {
-    let fidelity = if scene.fluid.density == 0.0 { Fidelity::Isolated } else { fidelity };
+    let fidelity = if scene.fluid.density == 0.0 {
+        Fidelity::Isolated
+    } else {
+        fidelity
+    };
     Simulator::new(scene, Settings::for_scene(scene).fidelity(fidelity))
 }
 
@@ -142,7 +146,8 @@ impl Task {
         for (n, sample) in rollout.samples().iter().take(self.steps).enumerate() {
             controls.set_column(n, &sample.control);
         }
-        self.knots.through(&Controls::from_matrix(&self.simulator, controls)?)
+        self.knots
+            .through(&Controls::from_matrix(&self.simulator, controls)?)
     }
 
     pub fn controls(&self, x: &[f64]) -> Result<Controls> {
@@ -154,10 +159,13 @@ impl Task {
         let start = Instant::now();
         let all = self.controls(x)?;
         let first = all.matrix().columns(0, steps).into_owned();
-        let rollout = self.simulator.rollout(&Controls::from_matrix(&self.simulator, first)?);
+        let rollout = self
+            .simulator
+            .rollout(&Controls::from_matrix(&self.simulator, first)?);
         self.simulated.set(self.simulated.get() + steps);
         let (simulating, differentiating) = self.seconds.get();
-        self.seconds.set((simulating + start.elapsed().as_secs_f64(), differentiating));
+        self.seconds
+            .set((simulating + start.elapsed().as_secs_f64(), differentiating));
         rollout
     }
 
@@ -171,7 +179,8 @@ impl Task {
         let gradient = self.knots.controls_vjp(x, &controls)?;
         self.differentiated.set(self.differentiated.get() + steps);
         let (simulating, differentiating) = self.seconds.get();
-        self.seconds.set((simulating, differentiating + start.elapsed().as_secs_f64()));
+        self.seconds
+            .set((simulating, differentiating + start.elapsed().as_secs_f64()));
         Ok((rollout.value(goal)?, gradient))
     }
 
@@ -196,8 +205,10 @@ impl Task {
 
     pub fn spent(&self) -> Spent {
         let whole = |steps: usize| steps as f64 / self.steps as f64;
-        let (simulations, gradients) =
-            (whole(self.simulated.get()), whole(self.differentiated.get()));
+        let (simulations, gradients) = (
+            whole(self.simulated.get()),
+            whole(self.differentiated.get()),
+        );
         let (simulating, differentiating) = self.seconds.get();
         Spent {
             simulations,

@@ -8,6 +8,7 @@ mod controls;
 mod estimate;
 pub mod gradcheck;
 mod gradient;
+pub mod growth;
 mod knots;
 mod limits;
 pub mod objective;

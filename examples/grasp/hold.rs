@@ -17,6 +17,9 @@ const FINGER_BODIES: [usize; 2] = [1, 2];
 const COIN_AXES: [f64; 2] = [0.2, 0.05];
 /// Reach of the fingers from the column, m.
 const REACH: f64 = 1.6;
+/// Surfaces this much farther apart than the gap at which they touch still count as touching, m: after an impact without rebound nothing
+/// presses any more.
+const TOUCH: f64 = 3e-3;
 /// How long the coin must be held, s.
 const HOLD: f64 = 0.5;
 /// The fastest that any point of it may move against a finger, m/s.
@@ -39,7 +42,7 @@ pub fn held_since(rollout: &Rollout) -> hydrograd::Result<Option<f64>> {
         let between = (0.0..=REACH).contains(&along)
             && s.q[FINGERS[0]] < s.q[COIN_Z]
             && s.q[COIN_Z] < s.q[FINGERS[1]];
-        let contacts = rollout.contacts(n)?;
+        let contacts = rollout.contacts(n, TOUCH)?;
         let touched = |finger: usize| {
             contacts.iter().any(|c| {
                 (c.first == finger && c.second == Some(COIN))

@@ -136,10 +136,6 @@ impl Task {
         })
     }
 
-    pub fn simulator(&self) -> &Simulator {
-        &self.simulator
-    }
-
     /// The knots through what another controller did.
     pub fn through(&self, rollout: &Rollout) -> Result<Vec<f64>> {
         let mut controls = DMatrix::zeros(LIMITS.len(), self.steps);

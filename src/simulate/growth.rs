@@ -113,7 +113,7 @@ pub fn growth_with(
     let mut e = trajectory.stepper.evaluate(&states[0].q, true)?;
     for n in 0..steps {
         let from = from_velocity(&trajectory, &e, &states[n], &samples[n])?;
-        let through = step(&trajectory, &e, n, &states[n], &samples[n])?;
+        let through = step(&trajectory, &e, &states[n], &samples[n])?;
         e = trajectory.stepper.evaluate(&states[n + 1].q, true)?;
         let to = to_velocity(&trajectory, &e, &states[n + 1], &samples[n + 1])?;
         let mut a = to * through * from;
@@ -180,7 +180,6 @@ fn rows(
 fn step(
     t: &Trajectory,
     e: &Evaluation,
-    index: usize,
     state: &State,
     sample: &Sample,
 ) -> Result<DMatrix<f64>> {
@@ -189,7 +188,7 @@ fn step(
             q: q.clone(),
             y: y.clone(),
         };
-        let bar = t.state_before(e, index, state, sample, &next_bar)?;
+        let bar = t.state_before(e, state, sample, &next_bar)?;
         Ok((bar.q, bar.y))
     })
 }

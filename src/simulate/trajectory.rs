@@ -160,7 +160,6 @@ impl<'a> Trajectory<'a> {
     pub(super) fn state_before(
         &self,
         e: &Evaluation,
-        index: usize,
         state: &State,
         sample: &Sample,
         next_bar: &StateBar,

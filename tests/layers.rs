@@ -7,7 +7,7 @@ use std::path::{Path, PathBuf};
 /// `Error` and `Result` alone.
 ///
 /// `adjoint::lie` gives vectors and poses to everyone; the modules marked `adjoint` use the ladder too.
-const LAYERS: [(&str, &[&str]); 13] = [
+const LAYERS: [(&str, &[&str]); 14] = [
     ("error", &[]),
     ("scene", &["shape"]),
     ("special", &[]),
@@ -34,6 +34,8 @@ const LAYERS: [(&str, &[&str]); 13] = [
             "shape",
         ],
     ),
+    // Descent stands on what a user sees.
+    ("optimize", &["simulate"]),
     // The facade names what it shows; the command line stands on the facade.
     ("lib", &["adjoint", "scene", "shape", "simulate"]),
     (

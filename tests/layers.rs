@@ -34,6 +34,7 @@ const LAYERS: [(&str, &[&str]); 14] = [
             "shape",
         ],
     ),
+    // Descent stands on what a user sees.
     ("optimize", &["simulate"]),
     // The facade names what it shows; the command line stands on the facade.
     ("lib", &["adjoint", "scene", "shape", "simulate"]),

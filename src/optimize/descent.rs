@@ -47,7 +47,7 @@ impl<F: FnMut(&[f64]) -> Result<(f64, Vector)>> Seen<F> {
                 return Err(argmin::core::Error::msg("no evaluations left"));
             }
             self.evaluations += 1;
-            self.last = match finite((self.function)(x)) {
+            self.last = match whole((self.function)(x), x.len()) {
                 Ok((cost, gradient)) => Point {
                     x: x.to_vec(),
                     cost,
@@ -122,9 +122,16 @@ fn clipped(mut gradient: Vector, longest: f64) -> Vector {
     gradient
 }
 
-/// Refuses what isn't a number.
-fn finite(result: Result<(f64, Vector)>) -> Result<(f64, Vector)> {
+/// Refuses what isn't a number, and gradients of another length than the point has.
+fn whole(result: Result<(f64, Vector)>, length: usize) -> Result<(f64, Vector)> {
     let (cost, gradient) = result?;
+    if gradient.len() != length {
+        return Err(Error::input(
+            "gradient",
+            format!("{} numbers", gradient.len()),
+            format!("must be {length} numbers, as many as the point has"),
+        ));
+    }
     let bad = gradient.iter().chain([&cost]).find(|x| !x.is_finite());
     match bad.copied() {
         None => Ok((cost, gradient)),
@@ -135,7 +142,7 @@ fn finite(result: Result<(f64, Vector)>) -> Result<(f64, Vector)> {
 /// Lowers a function from `start`; `function` gives its value and its gradient, `progress` hears of every iteration.
 ///
 /// # Errors
-/// Settings out of range, a gradient of another length than `start`, and whatever the function reports at `start`; failures at later trials
+/// Settings out of range, no numbers in `start`, a gradient of another length there, and whatever the function reports at `start`; failures at later trials
 /// turn the search back and are counted.
 pub fn minimise(
     mut function: impl FnMut(&[f64]) -> Result<(f64, Vec<f64>)>,
@@ -144,19 +151,20 @@ pub fn minimise(
     mut progress: impl FnMut(&Progress),
 ) -> Result<Found> {
     settings.validate()?;
-    let (cost, gradient) = finite(function(start))?;
-    if gradient.len() != start.len() {
+    if start.is_empty() {
         return Err(Error::input(
-            "gradient",
-            format!("{} numbers", gradient.len()),
-            format!("must be {} numbers, as many as the point has", start.len()),
+            "start of the descent",
+            "0 numbers",
+            "must be at least 1 number",
         ));
     }
+    let (cost, gradient) = whole(function(start), start.len())?;
     let first = norm(&gradient);
+    let clip = settings.clip.map_or(f64::INFINITY, |c| c * first);
     let point = Point {
         x: start.to_vec(),
         cost,
-        gradient,
+        gradient: clipped(gradient, clip),
     };
     let seen = RefCell::new(Seen {
         function,
@@ -167,7 +175,7 @@ pub fn minimise(
         } else {
             1.0
         },
-        clip: settings.clip.map_or(f64::INFINITY, |c| c * first),
+        clip,
         evaluations: 1,
         most: settings.evaluations,
         failures: 0,

@@ -64,7 +64,7 @@ pub struct Progress {
     pub iteration: usize,
     /// Cost.
     pub cost: f64,
-    /// Length of the gradient.
+    /// Length of the gradient, after [`Settings::clip`].
     pub gradient: f64,
     /// Values and gradients evaluated.
     pub evaluations: usize,
@@ -91,7 +91,7 @@ pub struct Found {
     pub x: Vec<f64>,
     /// Its cost.
     pub cost: f64,
-    /// Length of its gradient.
+    /// Length of its gradient, after [`Settings::clip`].
     pub gradient: f64,
     /// Iterations made.
     pub iterations: usize,
@@ -166,6 +166,26 @@ impl Settings {
                     "must be a positive number",
                 ));
             }
+        }
+        let tolerances = [
+            ("gradient_tolerance", self.gradient_tolerance),
+            ("cost_tolerance", self.cost_tolerance),
+        ];
+        for (name, value) in tolerances {
+            if !(value >= 0.0 && value.is_finite()) {
+                return Err(Error::input(
+                    format!("optimize settings: {name}"),
+                    value,
+                    "must be zero or a positive number",
+                ));
+            }
+        }
+        if let Some(target) = self.target.filter(|t| t.is_nan()) {
+            return Err(Error::input(
+                "optimize settings: target",
+                target,
+                "must be a number",
+            ));
         }
         let counts = [
             ("iterations", self.iterations),

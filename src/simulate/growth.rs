@@ -177,12 +177,7 @@ fn rows(
 }
 
 /// B: rows are cotangents of the state before the step.
-fn step(
-    t: &Trajectory,
-    e: &Evaluation,
-    state: &State,
-    sample: &Sample,
-) -> Result<DMatrix<f64>> {
+fn step(t: &Trajectory, e: &Evaluation, state: &State, sample: &Sample) -> Result<DMatrix<f64>> {
     rows(state.y.len(), |q, y| {
         let next_bar = StateBar {
             q: q.clone(),

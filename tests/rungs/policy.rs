@@ -1,12 +1,13 @@
-//! Rungs of the controllers, and of a whole rollout.
+//! Rungs of the controllers, of controls through knots, and of a whole rollout.
 
 use super::tools::{Group, all, groups, wavy};
 use hydrograd::adjoint::check::{Outcome, Rung};
 use hydrograd::scene::{Body, Controller, Fluid, Joint, Scene, Shape};
 use hydrograd::simulate::{
-    Constant, Observation, OpenLoop, Pd, PdAxis, Playback, Policy, PushThenLock, SpeedStages, Stage,
+    Constant, Knots, Observation, OpenLoop, Pd, PdAxis, Playback, Policy, PushThenLock,
+    SpeedStages, Stage,
 };
-use hydrograd::{Controls, Settings, Simulator};
+use hydrograd::{Controls, Fidelity, Settings, Simulator};
 use nalgebra::{DMatrix, DVector};
 
 pub fn rungs() -> Vec<Rung> {
@@ -18,10 +19,11 @@ pub fn rungs() -> Vec<Rung> {
     rungs![
         "simulate::policy::OpenLoop::act_vjp" => open_loop,
         "simulate::policy::Constant::act_vjp" => |c| act(&Constant { control: vec![0.3, -0.7] }, c),
-        "simulate::policy::Pd::act_vjp" => |c| act(&pd(), c),
-        "simulate::policy::PushThenLock::act_vjp" => push_then_lock,
-        "simulate::policy::Playback::act_vjp" => |c| act(&playback(), c),
-        "simulate::policy::SpeedStages::act_vjp" => |c| act(&stages(), c),
+        "simulate::policy::pd::Pd::act_vjp" => |c| act(&pd(), c),
+        "simulate::policy::push::PushThenLock::act_vjp" => push_then_lock,
+        "simulate::policy::stages::SpeedStages::act_vjp" => speed_stages,
+        "simulate::policy::playback::Playback::act_vjp" => |c| act(&playback(), c),
+        "simulate::knots::Knots::controls_vjp" => knots,
         "simulate::rollout::Rollout::vjp" => rollout,
     ]
 }
@@ -48,18 +50,6 @@ fn playback() -> Playback {
     Playback {
         controls: 2,
         steps: steps.collect(),
-    }
-}
-
-/// The observed speeds end the first stage and not the second.
-fn stages() -> SpeedStages {
-    let stage = |until: f64, control: f64| Stage {
-        until,
-        control: vec![control, -2.0 * control],
-    };
-    SpeedStages {
-        watch: vec![0, 2],
-        stages: vec![stage(1e-3, 0.4), stage(50.0, 0.6)],
     }
 }
 
@@ -143,6 +133,67 @@ fn push_then_lock(c: f64) -> Outcome {
     assert_eq!((action.control.len(), action.hold), (0, vec![false, true]));
     assert_eq!(stopped.act_vjp(&observed, &wavy(2, 2.5, 1.0)).gains, [0.0]);
     act(&policy(q[2] - 1.0), c)
+}
+
+/// In its first stage and in its second, and after the last one nothing.
+fn speed_stages(c: f64) -> Outcome {
+    let v = wavy(3, 1.5, 1.0);
+    let fastest = v[0].abs().max(v[2].abs());
+    let stage = |until: f64, control: [f64; 2]| Stage {
+        until,
+        control: control.to_vec(),
+    };
+    let policy = |first: f64, second: f64| SpeedStages {
+        watch: vec![0, 2],
+        stages: vec![stage(first, [0.3, -0.7]), stage(second, [-1.1, 0.4])],
+    };
+    let q = wavy(3, 0.5, 1.0);
+    let observed = Observation {
+        step: 3,
+        time: 0.03,
+        q: &q,
+        mode: 0,
+        v: &v,
+    };
+    let over = policy(0.5 * fastest, 0.9 * fastest);
+    let (action, back) = (
+        over.act(&observed),
+        over.act_vjp(&observed, &wavy(2, 2.5, 1.0)),
+    );
+    assert_eq!((action.control.len(), action.mode), (0, 2));
+    assert_eq!(back.gains, [0.0; 4]);
+    all([
+        act(&policy(2.0 * fastest, 3.0 * fastest), c),
+        act(&policy(0.5 * fastest, 3.0 * fastest), c),
+    ])
+}
+
+/// Two controls over knots that fall on steps and between them, and over one knot per step.
+fn knots(c: f64) -> Outcome {
+    let mut scene = Scene::new(Fluid::none());
+    for mass in [1.0, 2.0] {
+        let slide = Joint::Prismatic {
+            axis: [1.0, 0.0, 0.0],
+        };
+        let body = Body::dry().mass(mass).inertia([0.1; 3]);
+        scene.add(body.joint(slide).actuated());
+    }
+    let settings = Settings::default().fidelity(Fidelity::Isolated);
+    let simulator = Simulator::new(&scene, settings).unwrap();
+    all([(11, 3), (12, 5), (4, 4)].map(|(steps, count)| {
+        let knots = Knots::new(&simulator, steps, count, &[3.0, 0.5]).unwrap();
+        let (x, dx) = (wavy(knots.len(), 0.5, 1.2), wavy(knots.len(), 1.5, 1.0));
+        let bar = wavy(2 * steps, 2.5, 1.0);
+        let bar = DMatrix::from_column_slice(2, steps, bar.as_slice());
+        let back = knots.controls_vjp(x.as_slice(), &bar).unwrap();
+        let slope: f64 = back.iter().zip(dx.iter()).map(|(b, d)| b * d).sum();
+        let value = |h: f64| {
+            let moved = &x + h * &dx;
+            let controls = knots.controls(&simulator, moved.as_slice()).unwrap();
+            controls.matrix().dot(&bar)
+        };
+        super::tools::along(value, c * slope)
+    }))
 }
 
 /// No action, no cotangent; corrupted means not nothing here.

@@ -26,7 +26,7 @@ mod rival;
 #[path = "grasp/task.rs"]
 mod task;
 
-use hydrograd::optimize::{Progress, Settings, minimise};
+use hydrograd::optimize::Progress;
 use hydrograd::scene::Controller;
 use hydrograd::simulate::{Fidelity, Recording, Rollout};
 use hydrograd::{Controls, Scene};
@@ -35,31 +35,6 @@ use std::error::Error;
 use std::path::PathBuf;
 use std::time::Instant;
 use task::{Spent, Task};
-
-/// Descent of the approach: it needn't be exact.
-const APPROACH: Settings = Settings {
-    iterations: 10,
-    evaluations: 20,
-    memory: 10,
-    first_step: 0.3,
-    gradient_tolerance: 1e-3,
-    cost_tolerance: 1e-3,
-    target: Some(0.3),
-    clip: None,
-};
-
-/// Descent of the hold, to a cost at which the coin is held firmly.
-const HOLD: Settings = Settings {
-    iterations: 30,
-    evaluations: 40,
-    memory: 10,
-    first_step: 0.3,
-    gradient_tolerance: 1e-6,
-    cost_tolerance: 1e-9,
-    target: Some(0.1),
-    // Gradients through a collision that is about to happen otherwise are hundreds of times this, and say little.
-    clip: Some(0.1),
-};
 
 /// What the command line asks for.
 struct Options {
@@ -124,8 +99,7 @@ fn main() -> Result<(), Box<dyn Error>> {
     let task = Task::new(&scene)?;
     let x = task.through(&naive)?;
     let cost_naive = task.hold(&x)?.0;
-    let approach = minimise(|x| task.approach(x), &x, &APPROACH, |p| say("approach", p))?;
-    let found = minimise(|x| task.hold(x), &approach.x, &HOLD, |p| say("hold", p))?;
+    let found = task.find(&x, say)?;
     let spent = task.spent();
     let optimised = task.rollout(&found.x)?;
     let optimised_held_since = hold::held_since(&optimised)?;
@@ -168,7 +142,7 @@ fn main() -> Result<(), Box<dyn Error>> {
         hand_tuned_held_since,
         optimised_caught,
         optimised_held_since,
-        iterations: approach.iterations + found.iterations,
+        iterations: found.iterations,
         simulations,
         rollouts: spent.gradients,
         seconds,

@@ -25,8 +25,9 @@ const PANELS: [(&str, Reading); 4] = [
 pub fn draw(file: &Path, curves: &[(&str, &Rollout)]) -> Result<(), Box<dyn Error>> {
     let area = SVGBackend::new(file, (820, 560)).into_drawing_area();
     area.fill(&WHITE)?;
-    for (part, (title, reading)) in area.split_evenly((2, 2)).iter().zip(PANELS) {
-        panel(part, title, curves, reading)?;
+    for (k, (part, (title, reading))) in area.split_evenly((2, 2)).iter().zip(PANELS).enumerate() {
+        // Where nothing runs through the legend.
+        panel(part, title, curves, reading, k == 1)?;
     }
     area.present()?;
     Ok(())
@@ -37,6 +38,7 @@ fn panel(
     title: &str,
     curves: &[(&str, &Rollout)],
     reading: Reading,
+    legend: bool,
 ) -> Result<(), Box<dyn Error>> {
     let points = |rollout: &Rollout| -> Vec<(f64, f64)> {
         let samples = rollout.samples().iter();
@@ -65,11 +67,13 @@ fn panel(
             .label(*name)
             .legend(move |(x, y)| PathElement::new([(x, y), (x + 18, y)], color.stroke_width(2)));
     }
-    chart
-        .configure_series_labels()
-        .position(SeriesLabelPosition::LowerLeft)
-        .border_style(BLACK.mix(0.3))
-        .background_style(WHITE)
-        .draw()?;
+    if legend {
+        chart
+            .configure_series_labels()
+            .position(SeriesLabelPosition::UpperRight)
+            .border_style(BLACK.mix(0.3))
+            .background_style(WHITE)
+            .draw()?;
+    }
     Ok(())
 }

@@ -1,6 +1,7 @@
 //! The task: the scene with and without water, its controllers, and controls through knots with their cost and its gradient.
 
 use crate::hold::{Hold, Tolerable};
+use hydrograd::optimize::{self, Found, Progress, minimise};
 use hydrograd::scene::{Controller, SpeedStage};
 use hydrograd::simulate::{Knots, OpenLoop, Rollout};
 use hydrograd::{Controls, Fidelity, Result, Scene, Settings, Simulator};
@@ -15,6 +16,31 @@ const LIMITS: [f64; 3] = [500.0; 3];
 const KNOTS: usize = 11;
 /// Steps of the approach: until shortly before the fingers touch the coin.
 const APPROACH: usize = 130;
+
+/// Descent of the approach: it needn't be exact.
+const REACHING: optimize::Settings = optimize::Settings {
+    iterations: 10,
+    evaluations: 20,
+    memory: 10,
+    first_step: 0.3,
+    gradient_tolerance: 1e-3,
+    cost_tolerance: 1e-3,
+    target: Some(0.3),
+    clip: None,
+};
+
+/// Descent of the hold, to a cost at which the coin is held firmly.
+const HOLDING: optimize::Settings = optimize::Settings {
+    iterations: 30,
+    evaluations: 40,
+    memory: 10,
+    first_step: 0.3,
+    gradient_tolerance: 1e-6,
+    cost_tolerance: 1e-9,
+    target: Some(0.1),
+    // Gradients through a collision that is about to happen otherwise are hundreds of times this, and say little.
+    clip: Some(0.1),
+};
 
 pub fn load() -> Result<Scene> {
     let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("examples/scenes");
@@ -188,6 +214,17 @@ impl Task {
     /// Cost of not holding the coin at the end, and its gradient.
     pub fn hold(&self, x: &[f64]) -> Result<(f64, Vec<f64>)> {
         self.descend(x, &self.hold, self.steps)
+    }
+
+    /// Forces that hold the coin, from `x`: by a descent to a good approach, and by one of the whole trajectory from there. Iterations are those
+    /// of both; `say` hears of every one.
+    pub fn find(&self, x: &[f64], say: impl Fn(&str, &Progress)) -> Result<Found> {
+        let reached = minimise(|x| self.approach(x), x, &REACHING, |p| say("approach", p))?;
+        let held = minimise(|x| self.hold(x), &reached.x, &HOLDING, |p| say("hold", p))?;
+        Ok(Found {
+            iterations: reached.iterations + held.iterations,
+            ..held
+        })
     }
 
     /// The same cost alone.

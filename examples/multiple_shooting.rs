@@ -15,7 +15,7 @@
 //! MEASURED
 //!
 //! ```text
-//! cargo run --release --example multiple_shooting -- [--simulations N] [--json]
+//! cargo run --release --example multiple_shooting -- [--simulations N] [--target X,Y] [--json]
 //! ```
 
 use hydrograd::optimize::{Settings as Descent, minimise};
@@ -30,27 +30,31 @@ use serde::Serialize;
 use std::error::Error;
 use std::time::Instant;
 
-/// Time step, s, segments, and steps of each.
+/// Time step, s; spans of constant force, a power of two, and steps of each.
 const TIME_STEP: f64 = 0.005;
-const SEGMENTS: usize = 20;
+const SPANS: usize = 16;
 const PART: usize = 40;
-/// Where the ball should be at the end, m.
-const TARGET: [f64; 2] = [-0.4, -1.6];
+/// Where the ball should be at the end if nothing else is said, m.
+const TARGET: [f64; 2] = [0.2, -1.0];
 /// A tolerable miss at the end, m, and the force whose mean square costs as much as that, N.
 const MISS: f64 = 0.02;
 const FORCE: f64 = 0.5;
 /// Units of the unknowns: force, N; place, m, and speed, m/s, of a segment's start.
-const FORCE_UNIT: f64 = 0.05;
+const FORCE_UNIT: f64 = 0.4;
 const PLACE: f64 = 0.02;
 const SPEED: f64 = 0.1;
 /// Longest gradient of *clipped*, in multiples of the first one.
 const CLIP: f64 = 0.1;
+/// Length of the first trial step in these units, and the shortest that is worth another start.
+const FIRST_STEP: f64 = 0.2;
+const SHORTEST: f64 = 1e-7;
 /// Weight of defects in the first round and its growth from round to round; simulations of a round; part of all simulations for
 /// the end in one piece, 1/POLISH.
-const WEIGHT: f64 = 1.0;
+const WEIGHT: f64 = 10.0;
 const GROWTH: f64 = 3.0;
-const ROUND: usize = 20;
-const POLISH: usize = 3;
+const ROUND: usize = 40;
+const TOGETHER: f64 = 0.05;
+const POLISH: usize = 8;
 
 fn simulator() -> hydrograd::Result<Simulator> {
     let mut scene = Scene::new(Fluid::fresh_water());
@@ -84,7 +88,7 @@ type State = [f64; 4];
 const UNITS: State = [PLACE, PLACE, SPEED, SPEED];
 
 /// Forces over and across, two per segment in units of [`FORCE_UNIT`].
-const FORCES: usize = 2 * SEGMENTS;
+const FORCES: usize = 2 * SPANS;
 
 /// Rollout with forces that are constant over each `PART` steps.
 fn rollout<'a>(simulator: &'a Simulator, forces: &[f64]) -> hydrograd::Result<Rollout<'a>> {
@@ -122,8 +126,8 @@ fn from_end(rollout: &Rollout, end_bar: State) -> hydrograd::Result<Gradient> {
 }
 
 /// What the end costs, with its derivative.
-fn miss(end: State) -> (f64, State) {
-    let [x, y] = [end[0] - TARGET[0], end[1] - TARGET[1]];
+fn miss(end: State, target: [f64; 2]) -> (f64, State) {
+    let [x, y] = [end[0] - target[0], end[1] - target[1]];
     let weight = MISS.powi(-2);
     (
         weight * (x * x + y * y),
@@ -142,9 +146,13 @@ fn effort(forces: &[f64]) -> (f64, Vec<f64>) {
 }
 
 /// One rollout of the whole time: cost and gradient.
-fn whole(simulator: &Simulator, forces: &[f64]) -> hydrograd::Result<(f64, Vec<f64>)> {
+fn whole(
+    simulator: &Simulator,
+    target: [f64; 2],
+    forces: &[f64],
+) -> hydrograd::Result<(f64, Vec<f64>)> {
     let rollout = rollout(simulator, forces)?;
-    let (cost, end_bar) = miss(end(&rollout));
+    let (cost, end_bar) = miss(end(&rollout), target);
     let (more, mut gradient) = effort(forces);
     let back = forces_bar(&from_end(&rollout, end_bar)?);
     for (g, b) in gradient.iter_mut().zip(&back) {
@@ -157,6 +165,7 @@ fn whole(simulator: &Simulator, forces: &[f64]) -> hydrograd::Result<(f64, Vec<f
 struct Segments {
     parts: Vec<Simulator>,
     first: State,
+    target: [f64; 2],
     /// Multipliers of the defects in their units, and their common weight.
     multipliers: Vec<State>,
     weight: f64,
@@ -173,6 +182,23 @@ struct Part {
 }
 
 impl Segments {
+    /// One segment per span, each with a simulator.
+    fn new(simulator: &Simulator, target: [f64; 2]) -> hydrograd::Result<Self> {
+        let parts = (0..SPANS).map(|_| self::simulator());
+        let (q, v) = simulator.start();
+        Ok(Self {
+            parts: parts.collect::<hydrograd::Result<_>>()?,
+            target,
+            first: [q[0], q[1], v[0], v[1]],
+            multipliers: vec![[0.0; 4]; SPANS - 1],
+            weight: WEIGHT,
+        })
+    }
+
+    fn len(&self) -> usize {
+        self.multipliers.len() + 1
+    }
+
     /// Start of segment k among the unknowns: forces, then the starts of all but the first segment.
     fn start(&self, x: &[f64], k: usize) -> State {
         let Some(k) = k.checked_sub(1) else {
@@ -187,12 +213,13 @@ impl Segments {
             DVector::from_vec(vec![from[0], from[1], 0.0]),
             DVector::from_vec(vec![from[2], from[3], 0.0]),
         )?;
-        let rollout = rollout(simulator, &x[2 * k..2 * k + 2])?;
+        let forces = FORCES / self.len();
+        let rollout = rollout(simulator, &x[forces * k..forces * (k + 1)])?;
         let end = end(&rollout);
         let (mut cost, mut end_bar) = (0.0, [0.0; 4]);
         let (mut defect, mut next) = ([0.0; 4], [0.0; 4]);
-        if k + 1 == SEGMENTS {
-            (cost, end_bar) = miss(end);
+        if k + 1 == self.len() {
+            (cost, end_bar) = miss(end, self.target);
         } else {
             let wanted = self.start(x, k + 1);
             for i in 0..4 {
@@ -227,17 +254,19 @@ impl Segments {
     fn evaluate(&mut self, x: &[f64]) -> hydrograd::Result<(f64, Vec<f64>)> {
         let (mut cost, mut gradient) = effort(&x[..FORCES]);
         gradient.resize(x.len(), 0.0);
+        let mut add = |at: usize, more: &[f64]| {
+            for (g, m) in gradient[at..].iter_mut().zip(more) {
+                *g += m;
+            }
+        };
         for (k, part) in self.run(x)?.into_iter().enumerate() {
             cost += part.cost;
-            gradient[2 * k] += part.forces[0];
-            gradient[2 * k + 1] += part.forces[1];
-            for i in 0..4 {
-                if k > 0 {
-                    gradient[FORCES + 4 * (k - 1) + i] += part.start[i];
-                }
-                if k + 1 < SEGMENTS {
-                    gradient[FORCES + 4 * k + i] += part.next[i];
-                }
+            add(k * part.forces.len(), &part.forces);
+            if k > 0 {
+                add(FORCES + 4 * (k - 1), &part.start);
+            }
+            if k + 1 < self.len() {
+                add(FORCES + 4 * k, &part.next);
             }
         }
         Ok((cost, gradient))
@@ -246,14 +275,25 @@ impl Segments {
     /// Multipliers take over what the weight pulls; the largest defect, in its unit.
     fn update(&mut self, x: &[f64]) -> hydrograd::Result<f64> {
         let mut largest = 0.0_f64;
-        for (k, part) in self.run(x)?.iter().enumerate().take(SEGMENTS - 1) {
+        for (multiplier, part) in self.run(x)?.iter().enumerate().take(self.len() - 1) {
             for i in 0..4 {
-                self.multipliers[k][i] += self.weight * part.defect[i];
+                self.multipliers[multiplier][i] += self.weight * part.defect[i];
                 largest = largest.max(part.defect[i].abs());
             }
         }
         self.weight *= GROWTH;
         Ok(largest)
+    }
+
+    /// Every second start goes: segments twice as long.
+    fn join(&mut self, x: &[f64]) -> Vec<f64> {
+        let mut kept = x[..FORCES].to_vec();
+        let starts = x[FORCES..].chunks_exact(4);
+        kept.extend(starts.skip(1).step_by(2).flatten());
+        let multipliers = self.multipliers.iter().skip(1).step_by(2);
+        self.multipliers = multipliers.copied().collect();
+        self.parts.truncate(self.len());
+        kept
     }
 }
 
@@ -287,9 +327,15 @@ impl Way {
         self.best.push(cost.map_or(so_far, |c| c.min(so_far)));
     }
 
-    fn end(mut self, simulator: &Simulator, x: &[f64], began: Instant) -> hydrograd::Result<Self> {
+    fn end(
+        mut self,
+        simulator: &Simulator,
+        target: [f64; 2],
+        x: &[f64],
+        began: Instant,
+    ) -> hydrograd::Result<Self> {
         let end = end(&rollout(simulator, x)?);
-        self.miss = (end[0] - TARGET[0]).hypot(end[1] - TARGET[1]);
+        self.miss = (end[0] - target[0]).hypot(end[1] - target[1]);
         self.force = FORCE * effort(x).0.sqrt();
         self.seconds = began.elapsed().as_secs_f64();
         let best = self.best[self.best.len() - 1];
@@ -302,69 +348,69 @@ impl Way {
     }
 }
 
-/// In one piece from `start`, for as many simulations as are left; starts again along the gradient where the search gives up.
+/// In one piece from `start`, for as many simulations as are left: where the search gives up it starts again from its best point with
+/// a first step a tenth as long.
 fn single(
     way: &mut Way,
     simulator: &Simulator,
+    target: [f64; 2],
     start: &[f64],
     clip: Option<f64>,
     simulations: usize,
 ) -> hydrograd::Result<Vec<f64>> {
-    let settings = Descent {
-        evaluations: simulations - way.best.len(),
-        iterations: simulations,
-        clip,
-        ..descent()
-    };
-    let evaluate = |x: &[f64]| {
-        let out = whole(simulator, x);
-        way.note(out.as_ref().ok().map(|(cost, _)| *cost));
-        out
-    };
-    Ok(minimise(evaluate, start, &settings, |_| {})?.x)
+    let mut x = start.to_vec();
+    let mut first_step = FIRST_STEP;
+    while way.best.len() < simulations && first_step > SHORTEST {
+        let settings = Descent {
+            evaluations: simulations - way.best.len(),
+            iterations: simulations,
+            first_step,
+            clip,
+            ..descent()
+        };
+        let evaluate = |x: &[f64]| {
+            let out = whole(simulator, target, x);
+            way.note(out.as_ref().ok().map(|(cost, _)| *cost));
+            out
+        };
+        x = minimise(evaluate, &x, &settings, |_| {})?.x;
+        first_step *= 0.1;
+    }
+    Ok(x)
 }
 
 fn descent() -> Descent {
     Descent {
-        first_step: 0.2,
+        first_step: FIRST_STEP,
         cost_tolerance: 1e-6,
+        memory: 40,
         ..Descent::default()
     }
 }
 
-/// In segments that are pulled together, then in one piece.
+/// In segments that are pulled together and joined two by two, until they are one piece.
 fn multiple(
     way: &mut Way,
     simulator: &Simulator,
+    target: [f64; 2],
     start: &[f64],
     simulations: usize,
 ) -> hydrograd::Result<Vec<f64>> {
-    let mut parts = Vec::with_capacity(SEGMENTS);
-    for _ in 0..SEGMENTS {
-        parts.push(self::simulator()?);
-    }
-    // Segments start where the unsteered ball passes: no defects.
+    let mut segments = Segments::new(simulator, target)?;
+    // They start where the unsteered ball passes: no defects.
     let unsteered = rollout(simulator, start)?;
-    let state = |n: usize| {
-        let s = &unsteered.samples()[n];
-        [s.q[0], s.q[1], s.v[0], s.v[1]]
-    };
-    let mut x = start.to_vec();
-    for k in 1..SEGMENTS {
-        x.extend((0..4).map(|i| state(k * PART)[i] / UNITS[i]));
-    }
-    let mut segments = Segments {
-        parts,
-        first: state(0),
-        multipliers: vec![[0.0; 4]; SEGMENTS - 1],
-        weight: WEIGHT,
-    };
     way.note(None);
-    let mut best = (f64::INFINITY, start.to_vec());
-    let together = simulations - simulations / POLISH;
-    while way.best.len() + ROUND + 2 < together {
+    let mut x = start.to_vec();
+    for k in 1..SPANS {
+        let s = &unsteered.samples()[k * PART];
+        let state = [s.q[0], s.q[1], s.v[0], s.v[1]];
+        x.extend((0..4).map(|i| state[i] / UNITS[i]));
+    }
+    let last = simulations - simulations / POLISH;
+    while segments.len() > 1 && way.best.len() + ROUND <= last {
+        // One of a round's simulations is that of the update.
         let settings = Descent {
-            evaluations: ROUND,
+            evaluations: ROUND - 1,
             ..descent()
         };
         let evaluate = |x: &[f64]| {
@@ -375,19 +421,18 @@ fn multiple(
         x = found.x;
         way.note(None);
         let defect = segments.update(&x)?;
-        let end = end(&rollout(simulator, &x[..FORCES])?);
-        let cost = miss(end).0 + effort(&x[..FORCES]).0;
-        way.note(Some(cost));
         eprintln!(
-            "multiple: {:3} simulations, {:.3e} in segments, largest defect {defect:.1e}, in one piece {cost:.3e}",
+            "multiple: {:3} simulations, {:2} segments, cost {:.3e}, largest defect {defect:.1e}",
             way.best.len(),
+            segments.len(),
             found.cost
         );
-        if cost < best.0 {
-            best = (cost, x[..FORCES].to_vec());
+        if defect < TOGETHER {
+            x = segments.join(&x);
         }
     }
-    single(way, simulator, &best.1, None, simulations)
+    x.truncate(FORCES);
+    single(way, simulator, target, &x, None, simulations)
 }
 
 /// How much faster the place changes than that at the start: the largest derivative, second by second.
@@ -417,18 +462,24 @@ struct Report {
 }
 
 fn main() -> Result<(), Box<dyn Error>> {
-    let (simulations, json) = options()?;
+    let Options {
+        simulations,
+        target,
+        json,
+    } = options()?;
     let simulator = simulator()?;
     let start = vec![0.0; FORCES];
-    let mut ways = Vec::new();
-    for (name, clip) in [("single", None), ("clipped", Some(CLIP))] {
+    let one = |name, clip| -> hydrograd::Result<Way> {
         let (mut way, began) = (Way::new(name), Instant::now());
-        let x = single(&mut way, &simulator, &start, clip, simulations)?;
-        ways.push(way.end(&simulator, &x, began)?);
-    }
+        let x = single(&mut way, &simulator, target, &start, clip, simulations)?;
+        way.end(&simulator, target, &x, began)
+    };
+    // At the same time: a rollout of one ball keeps one core busy.
+    let (free, clipped) = rayon::join(|| one("single", None), || one("clipped", Some(CLIP)));
+    let mut ways = vec![free?, clipped?];
     let (mut way, began) = (Way::new("multiple"), Instant::now());
-    let x = multiple(&mut way, &simulator, &start, simulations)?;
-    ways.push(way.end(&simulator, &x, began)?);
+    let x = multiple(&mut way, &simulator, target, &start, simulations)?;
+    ways.push(way.end(&simulator, target, &x, began)?);
     let report = Report {
         growth: growth(&simulator)?,
         cost_at_start: ways[0].best[0],
@@ -459,21 +510,44 @@ fn main() -> Result<(), Box<dyn Error>> {
     Ok(())
 }
 
-fn options() -> Result<(usize, bool), String> {
-    let (mut simulations, mut json) = (200, false);
+struct Options {
+    simulations: usize,
+    target: [f64; 2],
+    json: bool,
+}
+
+fn options() -> Result<Options, String> {
+    let mut out = Options {
+        simulations: 240,
+        target: TARGET,
+        json: false,
+    };
     let mut arguments = std::env::args().skip(1);
     while let Some(name) = arguments.next() {
+        let mut value = || arguments.next().ok_or(format!("{name} needs a value"));
         match name.as_str() {
             "--simulations" => {
-                let text = arguments.next().ok_or("--simulations needs a value")?;
-                simulations = match text.parse() {
-                    Ok(n) if n >= 50 => n,
-                    _ => return Err(format!("{text}: not a number of at least 50")),
+                let text = value()?;
+                out.simulations = match text.parse() {
+                    Ok(n) if n >= 100 => n,
+                    _ => return Err(format!("{text}: not a number of at least 100")),
                 };
             }
-            "--json" => json = true,
-            _ => return Err(format!("{name}: expected --simulations or --json")),
+            "--target" => {
+                let text = value()?;
+                let numbers: Vec<f64> = text.split(',').flat_map(str::parse).collect();
+                out.target = match *numbers {
+                    [x, y] if x.is_finite() && y.is_finite() => [x, y],
+                    _ => return Err(format!("{text}: not X,Y in m")),
+                };
+            }
+            "--json" => out.json = true,
+            _ => {
+                return Err(format!(
+                    "{name}: expected --simulations, --target or --json"
+                ));
+            }
         }
     }
-    Ok((simulations, json))
+    Ok(out)
 }

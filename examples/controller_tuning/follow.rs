@@ -12,7 +12,7 @@ pub const COIN_Y: usize = 3;
 pub const COIN_Z: usize = 4;
 
 /// Opening at the start and at the end, m, and how long closing takes, s.
-pub const OPENING: [f64; 2] = [0.8, 0.5];
+pub const OPENING: [f64; 2] = [0.8, 0.55];
 pub const CLOSING: f64 = 1.5;
 /// Proportional–derivative control of column and fingers, with the coin's speed fed forward to the column.
 #[derive(Clone, Copy, Debug, Serialize)]

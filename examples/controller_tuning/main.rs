@@ -1,6 +1,6 @@
 //! Gains of a gripper's controller, tuned by gradients through the water.
 //!
-//! Two fingers close from 0.8 m to 0.5 m around a coin, in 1.5 s; half a second later the coin should still be where it was along
+//! Two fingers close from 0.8 m to 0.55 m around a coin, in 1.5 s; half a second later the coin should still be where it was along
 //! the fingers, and in the middle between them. The water that they press out carries it away, so the gripper has to follow. Its controller is
 //! `Follow`: proportional and derivative on the three actuated joints, with the coin's speed fed forward to the column. The task
 //! ends before anything touches the coin: there the cost is smooth in the gains, and its gradient means what it says. What
@@ -139,6 +139,8 @@ struct Outcome {
     worst_miss_mm: f64,
     /// Smallest gap between any two bodies, m.
     nearest: f64,
+    /// Steps during which anything touched.
+    touching: usize,
     /// Miss along the fingers at all states, mm.
     #[serde(skip)]
     misses: Vec<f64>,
@@ -186,11 +188,16 @@ impl Trial {
         self.run(x, |rollout, untuned| {
             let miss = |s: &Sample| 1e3 * (s.q[COIN_Y] - s.q[COLUMN] - untuned.along);
             let misses: Vec<f64> = rollout.samples().iter().map(miss).collect();
+            let mut touching = 0;
+            for n in 0..rollout.steps() {
+                touching += usize::from(!rollout.contacts(n)?.is_empty());
+            }
             let gaps = rollout.gaps().iter().flatten().map(|g| g.distance);
             Ok(Outcome {
                 cost: cost(rollout, untuned.along).0,
                 worst_miss_mm: misses.iter().fold(0.0, |m, x| x.abs().max(m)),
                 nearest: gaps.fold(f64::INFINITY, f64::min),
+                touching,
                 misses,
             })
         })

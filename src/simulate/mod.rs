@@ -16,6 +16,7 @@ mod policy;
 mod rollout;
 mod settings;
 mod simulator;
+mod surface;
 mod trajectory;
 mod wet;
 

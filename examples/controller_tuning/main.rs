@@ -190,7 +190,7 @@ impl Trial {
             let misses: Vec<f64> = rollout.samples().iter().map(miss).collect();
             let mut touching = 0;
             for n in 0..rollout.steps() {
-                touching += usize::from(!rollout.contacts(n)?.is_empty());
+                touching += usize::from(!rollout.contacts(n, 0.0)?.is_empty());
             }
             let gaps = rollout.gaps().iter().flatten().map(|g| g.distance);
             Ok(Outcome {

@@ -471,9 +471,27 @@ fn gradcheck_passes_and_tells_its_cost() {
         assert!(report["max_rel_error"].as_f64().unwrap() <= 1e-6);
         assert_eq!(report["ok"], true);
         assert_eq!(report["tolerance"], 1e-12);
+        let growth = &report["growth"];
+        numbers(growth, &["total", "duration"]);
+        numbers(&growth["largest_step"], &["factor", "time"]);
+        numbers(&growth["peak"], &["factor", "time"]);
+        assert!(growth["total"].as_f64().unwrap() > 1.0);
+        assert!(report["advice"].is_null());
     }
     let plain = hydrograd(&base);
-    assert!(text(&plain.stdout).contains("pass"));
+    let said = text(&plain.stdout);
+    assert!(said.contains("pass") && said.contains("grows by at most"));
+    let without = json(&[&base[..], &["--no-growth"]].concat());
+    assert!(without["growth"].is_null());
+    // A pencil on its tip: changes grow by e^(√(g/l) t).
+    let folder = tempfile::tempdir().unwrap();
+    let pencil = file(&folder, "pencil.toml", PENCIL);
+    let report = json(&["gradcheck", &pencil]);
+    let total = report["growth"]["total"].as_f64().unwrap();
+    assert!((100.0..1e4).contains(&total), "{total}");
+    assert!(report["advice"].to_string().contains("multiple shooting"));
+    let plain = hydrograd(&["gradcheck", &pencil]);
+    assert!(text(&plain.stdout).contains("clip the gradient"));
     // A solve to one digit can't agree with its own differences.
     let ball = scene("falling_ball.toml");
     let loose = hydrograd(&[
@@ -491,6 +509,20 @@ fn gradcheck_passes_and_tells_its_cost() {
     assert_eq!(report["ok"], false, "{report}");
     assert_eq!(loose.status.code(), Some(1));
 }
+
+const PENCIL: &str = r#"
+time_step = 0.01
+steps = 150
+gravity = [0.0, 0.0, -9.81]
+[fluid]
+density = 0.0
+[[bodies]]
+name = "pencil"
+mass = 2.0
+inertia = [0.0, 0.0, 0.0]
+center_of_mass = [0.0, 0.0, 0.5]
+joint = { kind = "revolute", axis = [1.0, 0.0, 0.0] }
+"#;
 
 const TWO_SPHERES: &str = r#"
 time_step = 0.05
@@ -517,7 +549,7 @@ fn bodies_in_one_another_are_refused() {
     fails(
         &["run", &apart],
         1,
-        &["mover", "target", "at t = 0.", "contact is not modelled"],
+        &["mover", "target", "at t = 0.", "the scene has no contact"],
     );
     let report = json(&["run", &apart, "--fidelity", "isolated"]);
     assert!(report["warnings"].to_string().contains("overlap"));

@@ -17,18 +17,13 @@ const FINGER_BODIES: [usize; 2] = [1, 2];
 const COIN_AXES: [f64; 2] = [0.2, 0.05];
 /// Reach of the fingers from the column, m.
 const REACH: f64 = 1.6;
+/// Surfaces this much farther apart than the gap at which they touch still count as touching, m: after an impact without rebound nothing
+/// presses any more.
+const TOUCH: f64 = 3e-3;
 /// How long the coin must be held, s.
 const HOLD: f64 = 0.5;
 /// The fastest that any point of it may move against a finger, m/s.
 const STILL: f64 = 5e-3;
-
-/// Half the coin's height along z at a turn, m, and its derivative.
-fn half_height(turn: f64) -> (f64, f64) {
-    let [a, b] = COIN_AXES;
-    let (sin, cos) = turn.sin_cos();
-    let half = (a * a * cos * cos + b * b * sin * sin).sqrt();
-    (half, (b * b - a * a) * sin * cos / half)
-}
 
 /// Fastest motion of the coin's rim against a finger, m/s.
 fn slip(s: &Sample) -> f64 {
@@ -47,7 +42,7 @@ pub fn held_since(rollout: &Rollout) -> hydrograd::Result<Option<f64>> {
         let between = (0.0..=REACH).contains(&along)
             && s.q[FINGERS[0]] < s.q[COIN_Z]
             && s.q[COIN_Z] < s.q[FINGERS[1]];
-        let contacts = rollout.contacts(n)?;
+        let contacts = rollout.contacts(n, TOUCH)?;
         let touched = |finger: usize| {
             contacts.iter().any(|c| {
                 (c.first == finger && c.second == Some(COIN))
@@ -68,97 +63,136 @@ pub fn caught(rollout: &Rollout) -> hydrograd::Result<bool> {
     Ok(held_since(rollout)?.is_some_and(|t| end - t >= HOLD - 1e-9))
 }
 
-/// Distance of coin and gripper from a hold, meant over the last states, and the effort. Terms are squares of lengths and speeds over those
-/// that would be a tolerable miss.
+/// Distance of coin and gripper from where they should be from a time on: squares of lengths, speeds and forces over those that would be a tolerable
+/// miss, meant over the states from then.
 pub struct Hold {
-    /// Gap at which surfaces touch, m.
-    pub gap: f64,
+    /// Time from which they should be there, s.
+    pub from: f64,
     /// Where along the fingers the coin is wanted, m from the column.
     pub along: f64,
-    /// Time from which it should be held, s.
-    pub from: f64,
-    /// Weight of the mean squared control, per N².
-    pub effort: f64,
+    /// Between the fingers' joints, m.
+    pub opening: f64,
+    /// Force with which each finger should press, N.
+    pub grip: f64,
+    /// Misses that cost 1.
+    pub tolerable: Tolerable,
 }
 
-/// One term: (x / tolerable)², with the derivative over x.
-fn miss(x: f64, tolerable: f64) -> (f64, f64) {
-    ((x / tolerable).powi(2), 2.0 * x / (tolerable * tolerable))
+/// Misses that cost 1; infinite: it doesn't matter.
+pub struct Tolerable {
+    /// Of the coin's place along the fingers, m.
+    pub along: f64,
+    /// Of its place between them, m.
+    pub across: f64,
+    /// Of the opening, m.
+    pub opening: f64,
+    /// Speed of the coin along the fingers, m/s.
+    pub drift: f64,
+    /// Speed of the coin against each finger across, and of its rim as it turns, m/s.
+    pub closing: f64,
+    /// Of the pressing forces, N.
+    pub grip: f64,
+}
+
+/// Cost so far, with its derivatives over q and v.
+#[derive(Default)]
+struct Slope {
+    cost: f64,
+    q: [f64; 6],
+    v: [f64; 6],
+}
+
+impl Slope {
+    /// Adds (x / tolerable)² of a sum x of parts of coordinates.
+    fn place(&mut self, x: f64, tolerable: f64, parts: &[(usize, f64)]) {
+        self.cost += (x / tolerable).powi(2);
+        for (i, part) in parts {
+            self.q[*i] += part * 2.0 * x / tolerable.powi(2);
+        }
+    }
+
+    /// The same of velocities.
+    fn speed(&mut self, x: f64, tolerable: f64, parts: &[(usize, f64)]) {
+        self.cost += (x / tolerable).powi(2);
+        for (i, part) in parts {
+            self.v[*i] += part * 2.0 * x / tolerable.powi(2);
+        }
+    }
 }
 
 impl Hold {
-    /// Cost of one state, with its derivatives over q and v.
-    fn state(&self, s: &Sample) -> (f64, [f64; 6], [f64; 6]) {
-        let (q, v) = (&s.q, &s.v);
+    /// Cost of a state, with its derivatives.
+    fn state(&self, s: &Sample) -> Slope {
+        let (q, v, t) = (&s.q, &s.v, &self.tolerable);
         let [lower, upper] = FINGERS;
-        let (half, half_slope) = half_height(q[COIN_TURN]);
-        let mut cost = 0.0;
-        let (mut dq, mut dv) = ([0.0; 6], [0.0; 6]);
-        // Open by no more than the coin with the gaps on both sides.
-        let (c, d) = miss(q[upper] - q[lower] - 2.0 * (half + self.gap), 0.05);
-        cost += c;
-        dq[upper] += d;
-        dq[lower] -= d;
-        dq[COIN_TURN] -= 2.0 * half_slope * d;
-        // In the middle between them.
-        let (c, d) = miss(q[COIN_Z] - 0.5 * (q[lower] + q[upper]), 0.05);
-        cost += c;
-        dq[COIN_Z] += d;
-        dq[lower] -= 0.5 * d;
-        dq[upper] -= 0.5 * d;
-        // At its place along them.
-        let (c, d) = miss(q[COIN_Y] - q[COLUMN] - self.along, 0.1);
-        cost += c;
-        dq[COIN_Y] += d;
-        dq[COLUMN] -= d;
-        // And still.
-        let rates = [
-            (v[COIN_Y] - v[COLUMN], 0.05, [(COIN_Y, 1.0), (COLUMN, -1.0)]),
-            (v[COIN_Z] - v[lower], 0.05, [(COIN_Z, 1.0), (lower, -1.0)]),
-            (v[COIN_Z] - v[upper], 0.05, [(COIN_Z, 1.0), (upper, -1.0)]),
-            (
-                COIN_AXES[0] * v[COIN_TURN],
-                0.05,
-                [(COIN_TURN, COIN_AXES[0]), (COIN_TURN, 0.0)],
-            ),
-        ];
-        for (rate, tolerable, parts) in rates {
-            let (c, d) = miss(rate, tolerable);
-            cost += c;
-            for (i, part) in parts {
-                dv[i] += part * d;
-            }
+        let mut out = Slope::default();
+        let along = q[COIN_Y] - q[COLUMN] - self.along;
+        out.place(along, t.along, &[(COIN_Y, 1.0), (COLUMN, -1.0)]);
+        let across = q[COIN_Z] - 0.5 * (q[lower] + q[upper]);
+        let between = [(COIN_Z, 1.0), (lower, -0.5), (upper, -0.5)];
+        out.place(across, t.across, &between);
+        let opening = q[upper] - q[lower] - self.opening;
+        out.place(opening, t.opening, &[(upper, 1.0), (lower, -1.0)]);
+        let drift = [(COIN_Y, 1.0), (COLUMN, -1.0)];
+        out.speed(v[COIN_Y] - v[COLUMN], t.drift, &drift);
+        for finger in FINGERS {
+            let against = [(COIN_Z, 1.0), (finger, -1.0)];
+            out.speed(v[COIN_Z] - v[finger], t.closing, &against);
         }
-        (cost, dq, dv)
+        let rim = COIN_AXES[0];
+        out.speed(rim * v[COIN_TURN], t.closing, &[(COIN_TURN, rim)]);
+        out
     }
 
-    fn states<'a>(&self, rollout: &'a Rollout) -> impl Iterator<Item = (usize, &'a Sample)> {
+    /// The states that count, each with its share.
+    fn states<'a>(&self, rollout: &'a Rollout) -> impl Iterator<Item = (usize, &'a Sample, f64)> {
         let from = self.from - 1e-9;
-        let all = rollout.samples().iter().enumerate();
+        let samples = rollout.samples();
+        let count = samples.iter().filter(|s| s.time >= from).count();
+        let share = 1.0 / count.max(1) as f64;
+        let all = samples.iter().enumerate();
         all.filter(move |(_, s)| s.time >= from)
+            .map(move |(n, s)| (n, s, share))
+    }
+
+    /// Sum over the fingers of the squared miss of the grip in step `n`, with its derivatives over the controls.
+    fn grip(&self, rollout: &Rollout, n: usize) -> (f64, [f64; 2]) {
+        let u = rollout.controls();
+        // The lower finger presses up, the upper one down.
+        let misses = [(FINGERS[0], 1.0), (FINGERS[1], -1.0)]
+            .map(|(finger, sign)| (u[(finger, n)] - sign * self.grip) / self.tolerable.grip);
+        let cost = misses.iter().map(|m| m * m).sum();
+        (cost, misses.map(|m| 2.0 * m / self.tolerable.grip))
     }
 }
 
 impl Objective for Hold {
     fn value(&self, rollout: &Rollout) -> f64 {
-        let count = self.states(rollout).count().max(1) as f64;
-        let hold: f64 = self.states(rollout).map(|(_, s)| self.state(s).0).sum();
-        let controls = rollout.controls();
-        hold / count + self.effort * controls.norm_squared() / controls.len() as f64
+        let of = |(n, sample, share): (usize, &Sample, f64)| {
+            let grip = match n < rollout.steps() {
+                true => self.grip(rollout, n).0,
+                false => 0.0,
+            };
+            share * (self.state(sample).cost + grip)
+        };
+        self.states(rollout).map(of).sum()
     }
 
     fn cotangents(&self, rollout: &Rollout) -> Cotangents {
         let mut out = rollout.zero_cotangents();
-        let count = self.states(rollout).count().max(1) as f64;
-        for (n, s) in self.states(rollout) {
-            let (_, dq, dv) = self.state(s);
+        for (n, sample, share) in self.states(rollout) {
+            let slope = self.state(sample);
             for i in 0..6 {
-                out.q[(i, n)] += dq[i] / count;
-                out.v[(i, n)] += dv[i] / count;
+                out.q[(i, n)] += share * slope.q[i];
+                out.v[(i, n)] += share * slope.v[i];
+            }
+            if n < rollout.steps() {
+                let (_, slopes) = self.grip(rollout, n);
+                for (finger, slope) in FINGERS.into_iter().zip(slopes) {
+                    out.controls[(finger, n)] += share * slope;
+                }
             }
         }
-        let controls = rollout.controls();
-        out.controls += 2.0 * self.effort / controls.len() as f64 * controls;
         out
     }
 }

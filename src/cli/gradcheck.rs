@@ -14,6 +14,7 @@ use super::progress::Progress;
 use crate::Result;
 use crate::scene::Scene;
 use crate::simulate::gradcheck::{self, gradcheck_with};
+use crate::simulate::growth::{Growth, growth};
 
 /// Largest relative error that passes.
 const LIMIT: f64 = 1e-6;
@@ -42,6 +43,9 @@ pub(super) struct Arguments {
     /// Seed of the random directions.
     #[arg(long, value_name = "SEED", default_value_t = 1)]
     seed: u64,
+    /// Leaves out how much the trajectory magnifies small changes: for many bodies that takes longest.
+    #[arg(long)]
+    no_growth: bool,
 }
 
 /// How well gradient and finite differences agree, and what the gradient costs.
@@ -72,6 +76,10 @@ pub(super) struct Report {
     pub gradient_seconds: f64,
     /// `gradient_seconds / forward_seconds`.
     pub ratio: f64,
+    /// How much the trajectory magnifies small changes of its state; null with `--no-growth`.
+    pub growth: Option<Growth>,
+    /// What to do about it, where it is large.
+    pub advice: Option<String>,
     pub warnings: Vec<String>,
 }
 
@@ -107,6 +115,10 @@ fn check(scene: &Scene, arguments: &Arguments, progress: &Progress) -> Result<Re
         },
         |done, all| progress.set_of(done, all),
     )?;
+    let growth = match arguments.no_growth {
+        true => None,
+        false => Some(growth(&simulator, steps)?),
+    };
     let warnings = simulator.warnings().to_vec();
     drop(simulator);
     let times = gradcheck::timings(&arguments.water.simulator(scene, usual)?, steps, TIMINGS)?;
@@ -126,6 +138,8 @@ fn check(scene: &Scene, arguments: &Arguments, progress: &Progress) -> Result<Re
         forward_seconds: times.forward,
         gradient_seconds: times.gradient,
         ratio: times.ratio(),
+        advice: growth.as_ref().and_then(Growth::advice),
+        growth,
         warnings,
     })
 }
@@ -161,6 +175,23 @@ impl fmt::Display for Report {
             "  trajectory {:.4} s, with its gradient {:.4} s: {:.2} times",
             self.forward_seconds, self.gradient_seconds, self.ratio
         )?;
+        if let Some(growth) = &self.growth {
+            let (step, peak) = (&growth.largest_step, &growth.peak);
+            write!(
+                f,
+                "\n  a change of the state grows by at most {:.3e} over {} s ({:.3e} by t = {} s), in one step by {:.3e} (step {}, t = {} s)",
+                growth.total,
+                growth.duration,
+                peak.factor,
+                peak.time,
+                step.factor,
+                step.step,
+                step.time
+            )?;
+        }
+        if let Some(advice) = &self.advice {
+            write!(f, "\n  {advice}")?;
+        }
         write_warnings(f, &self.warnings)
     }
 }

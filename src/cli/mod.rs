@@ -13,7 +13,6 @@ mod output;
 mod progress;
 mod run;
 mod tradeoff;
-mod trajectory;
 
 use std::process::ExitCode;
 

@@ -12,10 +12,9 @@ use super::input;
 use super::options::{Time, Water, name};
 use super::output::{Output, or_dash, peak_memory_mb, write_warnings};
 use super::progress::Progress;
-use super::trajectory::{self, Trajectory};
 use crate::Result;
-use crate::scene::{Joint, Plane, Scene};
-use crate::simulate::{Controls, Rollout};
+use crate::scene::Scene;
+use crate::simulate::{Controls, Recording};
 
 #[derive(Debug, Args)]
 pub(super) struct Arguments {
@@ -73,13 +72,13 @@ pub(super) struct Report {
 pub(super) fn main(arguments: &Arguments, output: Output) -> Result<ExitCode> {
     let scene = input::scene(&arguments.scene, &arguments.water, &arguments.time)?;
     if let Some(folder) = &arguments.out {
-        trajectory::prepare(folder)?;
+        Recording::prepare(folder)?;
     }
     let progress = Progress::new("steps", scene.steps);
-    let (mut report, trajectory) = simulate(&scene, arguments, &progress)?;
+    let (mut report, recording) = simulate(&scene, arguments, &progress)?;
     drop(progress);
     if let Some(folder) = &arguments.out {
-        report.files = trajectory.write(folder)?.into();
+        report.files = recording.write(folder)?.into();
     }
     output.result(&report);
     Ok(ExitCode::SUCCESS)
@@ -90,7 +89,7 @@ fn simulate(
     scene: &Scene,
     arguments: &Arguments,
     progress: &Progress,
-) -> Result<(Report, Trajectory)> {
+) -> Result<(Report, Recording)> {
     let start = Instant::now();
     let settings = arguments.time.choose(arguments.water.settings(scene));
     let simulator = arguments.water.simulator(scene, settings)?;
@@ -125,65 +124,7 @@ fn simulate(
         warnings: [simulator.warnings(), &rollout.warnings()].concat(),
         files: Vec::new(),
     };
-    Ok((report, trajectory(scene, &rollout)))
-}
-
-/// Every state of a rollout, for the files.
-fn trajectory(scene: &Scene, rollout: &Rollout) -> Trajectory {
-    let samples = rollout.samples();
-    let of_joints = |names: fn(&Joint) -> &'static [&'static str]| {
-        let bodies = scene.bodies.iter();
-        let all = bodies.flat_map(|b| names(&b.joint).iter().map(|n| format!("{}.{n}", b.name)));
-        all.collect::<Vec<_>>()
-    };
-    Trajectory {
-        scene: scene.name.clone(),
-        dt: rollout.simulator().time_step(),
-        coordinates: of_joints(coordinates),
-        velocities: of_joints(velocities),
-        time: samples.iter().map(|s| s.time).collect(),
-        q: samples.iter().map(|s| s.q.as_slice().to_vec()).collect(),
-        v: samples.iter().map(|s| s.v.as_slice().to_vec()).collect(),
-        energy: samples.iter().map(|s| s.energy()).collect(),
-        momentum: samples.iter().map(|s| s.momentum.into()).collect(),
-        min_gap: rollout
-            .gaps()
-            .iter()
-            .map(|g| g.map(|g| g.distance))
-            .collect(),
-    }
-}
-
-/// Names of a joint's coordinates.
-fn coordinates(joint: &Joint) -> &'static [&'static str] {
-    match joint {
-        Joint::Fixed => &[],
-        Joint::Prismatic { .. } => &["position"],
-        Joint::Revolute { .. } => &["angle"],
-        Joint::Planar { plane } => match plane {
-            Plane::Yz => &["y", "z", "angle"],
-            Plane::Zx => &["z", "x", "angle"],
-            Plane::Xy => &["x", "y", "angle"],
-        },
-        Joint::Spherical => &["qw", "qx", "qy", "qz"],
-        Joint::Free => &["x", "y", "z", "qw", "qx", "qy", "qz"],
-    }
-}
-
-/// Names of a joint's velocities.
-fn velocities(joint: &Joint) -> &'static [&'static str] {
-    match joint {
-        Joint::Fixed => &[],
-        Joint::Prismatic { .. } => &["velocity"],
-        Joint::Revolute { .. } => &["rate"],
-        Joint::Planar { plane } => match plane {
-            Plane::Yz => &["vy", "vz", "rate"],
-            Plane::Zx => &["vz", "vx", "rate"],
-            Plane::Xy => &["vx", "vy", "rate"],
-        },
-        Joint::Spherical => &["wx", "wy", "wz"],
-        Joint::Free => &["vx", "vy", "vz", "wx", "wy", "wz"],
-    }
+    Ok((report, Recording::of(scene, &rollout)))
 }
 
 impl fmt::Display for Report {

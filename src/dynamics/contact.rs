@@ -81,7 +81,8 @@ pub struct ContactForce {
 }
 
 impl System {
-    /// Forces of all contacts that press, of bodies at `q` that end a step with the velocity `v`.
+    /// Contacts of bodies at `q` that end a step with the velocity `v`: all places where surfaces are no more than `slack` (m) farther apart than
+    /// the gap at which they touch, and what presses there, if anything does.
     ///
     /// # Errors
     /// A signed distance that can't be found.
@@ -90,11 +91,15 @@ impl System {
         parameters: &Parameters,
         q: &DVector<f64>,
         v: &DVector<f64>,
+        slack: f64,
     ) -> Result<Vec<ContactForce>> {
         let kinematics = self.tree.kinematics(q);
         let twists = self.tree.twists(&kinematics, v);
         let touches = self.touches(parameters, &kinematics.poses)?;
-        let acting = touches.iter().map(|t| ContactForce {
+        let near = touches
+            .iter()
+            .filter(|t| t.point.gap <= t.law.gap + slack.max(t.law.width));
+        let acting = near.map(|t| ContactForce {
             first: t.first,
             second: t.second,
             gap: t.point.gap,
@@ -102,7 +107,7 @@ impl System {
             normal: t.point.normal.into(),
             force: contact_force(&t.law, &t.meeting(&twists)).into(),
         });
-        Ok(acting.filter(|c| c.force != [0.0; 3]).collect())
+        Ok(acting.collect())
     }
 
     /// All places where surfaces are near.

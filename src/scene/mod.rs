@@ -410,6 +410,11 @@ pub enum Controller {
         /// negative, from below otherwise.
         stop_at: f64,
     },
+    /// Given controls, step by step, and nothing after the last: an optimised trajectory to be run again.
+    Playback {
+        /// One row per step, in it one per control, N or N m.
+        control: Vec<Vec<f64>>,
+    },
     /// Constant controls, stage by stage: a stage ends for good once the joint of one of `bodies` is faster than its
     /// `until`, and after the last one nothing acts (the paper's grasps).
     SpeedStages {

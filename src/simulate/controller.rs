@@ -1,7 +1,7 @@
 //! The controller that a scene names.
 
 use super::Policy;
-use super::policy::{Constant, OpenLoop, Pd, PdAxis, PushThenLock, SpeedStages, Stage};
+use super::policy::{Constant, OpenLoop, Pd, PdAxis, Playback, PushThenLock, SpeedStages, Stage};
 use crate::dynamics::System;
 use crate::scene::{self, Controller, Scene};
 use crate::{Error, Result};
@@ -105,6 +105,15 @@ pub(super) fn policy(scene: &Scene, system: &System) -> Result<Box<dyn Policy>> 
             Box::new(SpeedStages {
                 watch,
                 stages: stages.iter().map(of).collect(),
+            })
+        }
+        Some(Controller::Playback { control }) => {
+            for (n, step) in control.iter().enumerate() {
+                count(&format!("control[{n}]"), step.len())?;
+            }
+            Box::new(Playback {
+                controls: system.controls,
+                steps: control.clone(),
             })
         }
     })

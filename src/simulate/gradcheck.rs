@@ -185,13 +185,12 @@ impl Probe {
     }
 }
 
-fn scales(simulator: &Simulator, rollout: &Rollout, steps: usize) -> Result<Scales> {
+/// A displacement of each joint coordinate that is as large as the largest body, or a radian; and that length, m.
+pub(super) fn unit_displacements(simulator: &Simulator) -> (DVector<f64>, f64) {
     let system = simulator.system();
     let volume = system.bodies.iter().map(|b| b.volume).fold(0.0, f64::max);
     let length = if volume > 0.0 { volume.cbrt() } else { 1.0 };
-    let duration = simulator.time_step() * steps as f64;
-    let nv = system.tree.velocities();
-    let mut displacement = DVector::from_element(nv, length);
+    let mut displacement = DVector::from_element(system.tree.velocities(), length);
     for link in system.tree.links() {
         for (k, basis) in link.v.clone().zip(link.joint.basis()) {
             if basis.fixed_rows::<3>(3).norm() > 0.0 {
@@ -199,6 +198,13 @@ fn scales(simulator: &Simulator, rollout: &Rollout, steps: usize) -> Result<Scal
             }
         }
     }
+    (displacement, length)
+}
+
+fn scales(simulator: &Simulator, rollout: &Rollout, steps: usize) -> Result<Scales> {
+    let system = simulator.system();
+    let duration = simulator.time_step() * steps as f64;
+    let (displacement, length) = unit_displacements(simulator);
     let stepper = simulator.stepper();
     let e = stepper.evaluate(simulator.start().0, false)?;
     let mut velocity = &displacement / duration.max(1.0);

@@ -8,11 +8,13 @@ mod controls;
 mod estimate;
 pub mod gradcheck;
 mod gradient;
+pub mod growth;
 mod knots;
 mod limits;
 pub mod objective;
 mod plan;
 mod policy;
+mod recording;
 mod rollout;
 mod settings;
 mod simulator;
@@ -25,9 +27,10 @@ pub use gradient::{Cotangents, Gradient, Initial};
 pub use knots::Knots;
 pub use objective::Objective;
 pub use policy::{
-    Action, ActionBar, Constant, Observation, OpenLoop, Pd, PdAxis, Policy, PushThenLock,
+    Action, ActionBar, Constant, Observation, OpenLoop, Pd, PdAxis, Playback, Policy, PushThenLock,
     SpeedStages, Stage,
 };
+pub use recording::Recording;
 pub use rollout::{Rollout, Sample, Summary};
 pub use settings::{Accuracy, Fidelity, Settings};
 pub use simulator::{AddedMass, Simulator};

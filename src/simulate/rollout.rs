@@ -173,17 +173,18 @@ impl<'a> Rollout<'a> {
         })
     }
 
-    /// Contacts that press during step `n`, between the states n and n + 1; none where there is no such step.
+    /// Contacts during step `n`, between the states n and n + 1: where surfaces are no more than `slack` (m) farther apart than the gap at which
+    /// they touch, and what presses there; none where there is no such step.
     ///
     /// # Errors
     /// A signed distance that can't be found.
-    pub fn contacts(&self, n: usize) -> Result<Vec<ContactForce>> {
+    pub fn contacts(&self, n: usize, slack: f64) -> Result<Vec<ContactForce>> {
         let Some(sample) = self.samples().get(n).filter(|_| n < self.steps()) else {
             return Ok(Vec::new());
         };
         let simulator = self.simulator;
         let v = contact_velocity(&sample.memo, &sample.v);
-        (simulator.system()).contact_forces(simulator.parameters(), &sample.q, &v)
+        (simulator.system()).contact_forces(simulator.parameters(), &sample.q, &v, slack)
     }
 
     /// Time and size of the smallest gap of the whole trajectory.

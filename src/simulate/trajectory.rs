@@ -126,21 +126,21 @@ impl<'a> Trajectory<'a> {
         self.stepper.velocity_vjp(e, state, &sample.v, &v_bar, bar)
     }
 
-    fn reverse_step(
+    /// Transpose of a step and its controller at a state where `e` was evaluated; the cotangent of the velocity isn't carried on yet.
+    fn step_bar(
         &self,
+        e: &Evaluation,
         state: &State,
         sample: &Sample,
         next_bar: &StateBar,
-        seed: &Seed,
-    ) -> Result<(StateBar, Local)> {
-        let e = self.stepper.evaluate(&state.q, true)?;
+    ) -> Result<(StepBar, Vec<f64>)> {
         let input = Input {
             control: sample.control.clone(),
             hold: sample.hold.clone(),
         };
-        let mut bar =
-            self.stepper
-                .step_vjp(&e, state, &sample.v, &input, &sample.memo, next_bar)?;
+        let mut bar = self
+            .stepper
+            .step_vjp(e, state, &sample.v, &input, &sample.memo, next_bar)?;
         let action = (self.policy).act_vjp(&observation(state, sample), &bar.control);
         let velocities = self.stepper.system.tree.velocities();
         expect_length("cotangent of q", action.q.len(), velocities, "velocity")?;
@@ -153,13 +153,43 @@ impl<'a> Trajectory<'a> {
         if !action.v.is_empty() {
             bar.v += DVector::from_vec(action.v);
         }
+        Ok((bar, action.gains))
+    }
+
+    /// Cotangent of a state from that of the next one alone.
+    pub(super) fn state_before(
+        &self,
+        e: &Evaluation,
+        state: &State,
+        sample: &Sample,
+        next_bar: &StateBar,
+    ) -> Result<StateBar> {
+        let run = || {
+            let (mut bar, _) = self.step_bar(e, state, sample, next_bar)?;
+            let v_bar = bar.v.clone();
+            self.stepper
+                .velocity_vjp(e, state, &sample.v, &v_bar, &mut bar)?;
+            Ok(bar.state)
+        };
+        run().map_err(|e: Error| e.at_time(sample.time))
+    }
+
+    fn reverse_step(
+        &self,
+        state: &State,
+        sample: &Sample,
+        next_bar: &StateBar,
+        seed: &Seed,
+    ) -> Result<(StateBar, Local)> {
+        let e = self.stepper.evaluate(&state.q, true)?;
+        let (mut bar, gains) = self.step_bar(&e, state, sample, next_bar)?;
         self.observe_vjp(&e, state, sample, seed, &mut bar)?;
         Ok((
             bar.state,
             Local {
                 control: bar.control,
                 parameters: bar.parameters,
-                gains: action.gains,
+                gains,
             },
         ))
     }

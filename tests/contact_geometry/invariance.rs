@@ -89,3 +89,37 @@ fn points_scale_with_the_bodies() {
         }
     }
 }
+
+/// A smaller reach leaves points out and changes none: bodies apart by more than that touch nowhere.
+#[test]
+fn reach_only_leaves_points_out() {
+    let mut draw = Draw(77);
+    let (kinds, mut kept, mut dropped) = (every_kind(), 0, 0);
+    for first in &kinds {
+        for second in &kinds {
+            let (a, b) = (plain(first), plain(second));
+            for _ in 0..400 {
+                let (pose, rest) = (draw.pose(), draw.pose());
+                let pose = Pose::new(pose.rotation, 0.5 * pose.translation);
+                let rest = Pose::new(rest.rotation, 0.1 * rest.translation);
+                let all = between(&a, &b, &pose, &rest, 10.0).unwrap();
+                for reach in [0.01, 0.1] {
+                    // Edges that overlap deeper than the reach are left out too.
+                    if all.iter().any(|p| p.gap < -reach) {
+                        continue;
+                    }
+                    let near = between(&a, &b, &pose, &rest, reach).unwrap();
+                    let expected: Vec<_> = all.iter().filter(|p| p.gap < reach).collect();
+                    assert_eq!(
+                        near.iter().collect::<Vec<_>>(),
+                        expected,
+                        "{first:?} {second:?} {pose:?} {rest:?}"
+                    );
+                    kept += near.len();
+                    dropped += all.len() - near.len();
+                }
+            }
+        }
+    }
+    assert!(kept > 1000 && dropped > 1000, "{kept} {dropped}");
+}

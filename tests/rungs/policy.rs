@@ -4,7 +4,8 @@ use super::tools::{Group, all, groups, wavy};
 use hydrograd::adjoint::check::{Outcome, Rung};
 use hydrograd::scene::{Body, Controller, Fluid, Joint, Scene, Shape};
 use hydrograd::simulate::{
-    Constant, Knots, Observation, OpenLoop, Pd, PdAxis, Policy, PushThenLock, SpeedStages, Stage,
+    Constant, Knots, Observation, OpenLoop, Pd, PdAxis, Playback, Policy, PushThenLock,
+    SpeedStages, Stage,
 };
 use hydrograd::{Controls, Fidelity, Settings, Simulator};
 use nalgebra::{DMatrix, DVector};
@@ -21,6 +22,7 @@ pub fn rungs() -> Vec<Rung> {
         "simulate::policy::pd::Pd::act_vjp" => |c| act(&pd(), c),
         "simulate::policy::push::PushThenLock::act_vjp" => push_then_lock,
         "simulate::policy::stages::SpeedStages::act_vjp" => speed_stages,
+        "simulate::policy::playback::Playback::act_vjp" => |c| act(&playback(), c),
         "simulate::knots::Knots::controls_vjp" => knots,
         "simulate::rollout::Rollout::vjp" => rollout,
     ]
@@ -39,6 +41,15 @@ fn pd() -> Pd {
         controls: 2,
         velocities: 3,
         axes: vec![axis(1, 0, 0), axis(0, 2, 2)],
+    }
+}
+
+/// Five steps, one of them observed.
+fn playback() -> Playback {
+    let steps = (0..5).map(|n| vec![0.3 + f64::from(n), -0.7 * f64::from(n)]);
+    Playback {
+        controls: 2,
+        steps: steps.collect(),
     }
 }
 

@@ -58,35 +58,42 @@ pub(super) fn contact(
     let center = to_ellipsoid.apply_inverse(&Vec3::zeros());
     let behind = |f: &Face| f.normal.dot(&center) < f.offset;
     let mut pierced = !core.faces.is_empty() && core.faces.iter().all(behind);
-    for edge in &core.edges {
-        let (from, along) = (
-            to_ellipsoid.apply(&edge.from),
-            to_ellipsoid.rotation * edge.along,
-        );
-        let (_, radii) = ellipsoid.approach(&from, &along, edge.length);
-        pierced |= radii < 1.0;
-        if !near(radii) {
-            continue;
+    // Features beyond the reach are looked at only where what was found overlaps: a face on the far side does for a body that is
+    // apart, and then the nearest feature is one of those.
+    for beyond in [false, true] {
+        if beyond && best.as_ref().is_none_or(|b| b.gap >= 0.0) {
+            break;
         }
-        let Lowest::Inside(s) = ellipsoid.lowest(&from, &along, edge.length) else {
-            continue;
-        };
-        let x = core_at.apply(&(edge.from + s * edge.along));
-        let along = core_at.rotation * edge.along;
-        let still = seen(&x, &carry(&x));
-        if edge.inward.iter().flatten().all(|d| inward(&still, d)) {
-            take(&mut best, seen(&x, &sliding(&still, &x, &along)).swapped());
+        for edge in &core.edges {
+            let (from, along) = (
+                to_ellipsoid.apply(&edge.from),
+                to_ellipsoid.rotation * edge.along,
+            );
+            let (_, radii) = ellipsoid.approach(&from, &along, edge.length);
+            pierced |= radii < 1.0;
+            if near(radii) == beyond {
+                continue;
+            }
+            let Lowest::Inside(s) = ellipsoid.lowest(&from, &along, edge.length) else {
+                continue;
+            };
+            let x = core_at.apply(&(edge.from + s * edge.along));
+            let along = core_at.rotation * edge.along;
+            let still = seen(&x, &carry(&x));
+            if edge.inward.iter().flatten().all(|d| inward(&still, d)) {
+                take(&mut best, seen(&x, &sliding(&still, &x, &along)).swapped());
+            }
         }
-    }
-    for (corner, spokes) in core.corners.iter().zip(&core.spokes) {
-        let there = to_ellipsoid.apply(corner);
-        if !near(there.component_div(&ellipsoid.semi_axes).norm()) {
-            continue;
-        }
-        let x = core_at.apply(corner);
-        let found = seen(&x, &carry(&x));
-        if spokes.iter().all(|d| inward(&found, d)) {
-            take(&mut best, found.swapped());
+        for (corner, spokes) in core.corners.iter().zip(&core.spokes) {
+            let there = to_ellipsoid.apply(corner);
+            if near(there.component_div(&ellipsoid.semi_axes).norm()) == beyond {
+                continue;
+            }
+            let x = core_at.apply(corner);
+            let found = seen(&x, &carry(&x));
+            if spokes.iter().all(|d| inward(&found, d)) {
+                take(&mut best, found.swapped());
+            }
         }
     }
     if best.is_none() && pierced {

@@ -107,7 +107,7 @@ pub(super) fn solve(
 }
 
 /// Along Newton's step: the full one, or where that runs past the least value on its way, about there (regula falsi on the
-/// slope, in halves where it creeps).
+/// slope, in halves where it creeps). Short of it won't do: where the slope turns steeply, regula falsi's first guess is hardly a step.
 fn search(now: Trial, step: &DVector<f64>, at: &dyn Fn(DVector<f64>) -> Trial) -> Trial {
     let slope = |t: &Trial| t.imbalance.dot(step);
     let start = slope(&now);

@@ -12,6 +12,7 @@
 //! the converged stage, with the transpose of the same matrix.
 
 use super::{Input, Memo, Split, State, StateBar, StepBar, Stepped, Stepper, When, contact};
+use crate::adjoint::lie::angular;
 use crate::dynamics::Evaluation;
 use crate::{Error, Result};
 use nalgebra::{DMatrix, DVector, Dyn, LU};
@@ -113,13 +114,20 @@ pub(super) fn solve_stage(
         };
         v -= split.put(&step);
     }
+    let twists = tree.twists(&e.kinematics, guess);
+    let turning = (twists.iter())
+        .map(|t| angular(t).norm())
+        .fold(0.0, f64::max);
     Err(Error::Solver {
         what: what(),
         iterations: ITERATIONS,
         residual,
         tolerance: 1e-13,
-        remedy: "the time step is too long for these velocities or forces: take a smaller one"
-            .into(),
+        remedy: format!(
+            "the time step is too long for these velocities or forces: take a smaller one (bodies turn by up to {:.2} rad \
+             in it)",
+            turning * rule.reach.max(2.0 * (rule.h - rule.reach))
+        ),
     })
 }
 

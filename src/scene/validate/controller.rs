@@ -81,6 +81,10 @@ impl Scene {
                 }
                 Ok(())
             }
+            Some(Controller::Playback { control }) => {
+                let mut rows = control.iter().enumerate();
+                rows.try_for_each(|(n, row)| count(&format!("control[{n}]"), row))
+            }
             Some(Controller::SpeedStages { bodies, stages }) => {
                 for name in bodies {
                     let body = self.named("controller.bodies", name)?;

@@ -1,10 +1,12 @@
 //! Controllers: what acts, from what is observed, with its transpose.
 
 mod pd;
+mod playback;
 mod push;
 mod stages;
 
 pub use pd::{Pd, PdAxis};
+pub use playback::Playback;
 pub use push::PushThenLock;
 pub use stages::{SpeedStages, Stage};
 

@@ -7,11 +7,13 @@ use std::path::{Path, PathBuf};
 
 use serde::Serialize;
 
+use super::Rollout;
+use crate::scene::{Joint, Plane, Scene};
 use crate::{Error, Result};
 
 /// What is written of a run: one row for the start and one after each step. SI units.
 #[derive(Clone, Debug, Serialize)]
-pub(super) struct Trajectory {
+pub struct Recording {
     /// Name of the scene.
     pub scene: String,
     /// Time step, s.
@@ -43,11 +45,41 @@ const MOMENTA: [&str; 6] = [
     "angular_momentum_z",
 ];
 
-impl Trajectory {
+impl Recording {
+    /// Every state of a rollout of a scene.
+    pub fn of(scene: &Scene, rollout: &Rollout) -> Self {
+        let samples = rollout.samples();
+        let of_joints = |names: fn(&Joint) -> &'static [&'static str]| {
+            let bodies = scene.bodies.iter();
+            let all =
+                bodies.flat_map(|b| names(&b.joint).iter().map(|n| format!("{}.{n}", b.name)));
+            all.collect::<Vec<_>>()
+        };
+        Self {
+            scene: scene.name.clone(),
+            dt: rollout.simulator().time_step(),
+            coordinates: of_joints(coordinates),
+            velocities: of_joints(velocities),
+            time: samples.iter().map(|s| s.time).collect(),
+            q: samples.iter().map(|s| s.q.as_slice().to_vec()).collect(),
+            v: samples.iter().map(|s| s.v.as_slice().to_vec()).collect(),
+            energy: samples.iter().map(|s| s.energy()).collect(),
+            momentum: samples.iter().map(|s| s.momentum.into()).collect(),
+            min_gap: rollout
+                .gaps()
+                .iter()
+                .map(|g| g.map(|g| g.distance))
+                .collect(),
+        }
+    }
+
     /// Writes `trajectory.csv` and `trajectory.json` into a folder; a file that stood there before
     /// is replaced only once the new one is complete.
+    ///
+    /// # Errors
+    /// A folder or file that can't be written.
     pub fn write(&self, folder: &Path) -> Result<[PathBuf; 2]> {
-        prepare(folder)?;
+        Self::prepare(folder)?;
         let csv = folder.join("trajectory.csv");
         let json = folder.join("trajectory.json");
         replace(&csv, |file| self.write_csv(file))?;
@@ -56,6 +88,18 @@ impl Trajectory {
             writeln!(file)
         })?;
         Ok([csv, json])
+    }
+
+    /// Makes the folder and tries to write there, so that a long run isn't lost to a wrong path.
+    ///
+    /// # Errors
+    /// A folder that can't be made or written to.
+    pub fn prepare(folder: &Path) -> Result<()> {
+        fs::create_dir_all(folder).map_err(|e| failed(folder, e))?;
+        let probe = temporary(&folder.join("probe"));
+        let made = OpenOptions::new().write(true).create_new(true).open(&probe);
+        made.map_err(|e| failed(folder, e))?;
+        fs::remove_file(&probe).map_err(|e| failed(folder, e))
     }
 
     fn write_csv(&self, file: &mut impl Write) -> io::Result<()> {
@@ -89,15 +133,6 @@ impl Trajectory {
         }
         Ok(())
     }
-}
-
-/// Makes the folder and tries to write there, so that a long run isn't lost to a wrong path.
-pub(super) fn prepare(folder: &Path) -> Result<()> {
-    fs::create_dir_all(folder).map_err(|e| failed(folder, e))?;
-    let probe = temporary(&folder.join("probe"));
-    let made = OpenOptions::new().write(true).create_new(true).open(&probe);
-    made.map_err(|e| failed(folder, e))?;
-    fs::remove_file(&probe).map_err(|e| failed(folder, e))
 }
 
 /// Writes beside the file and renames, so that the file is never seen half written.
@@ -140,6 +175,38 @@ fn cell(text: &str) -> String {
         format!("\"{}\"", text.replace('"', "\"\""))
     } else {
         text.to_owned()
+    }
+}
+
+/// Names of a joint's coordinates.
+fn coordinates(joint: &Joint) -> &'static [&'static str] {
+    match joint {
+        Joint::Fixed => &[],
+        Joint::Prismatic { .. } => &["position"],
+        Joint::Revolute { .. } => &["angle"],
+        Joint::Planar { plane } => match plane {
+            Plane::Yz => &["y", "z", "angle"],
+            Plane::Zx => &["z", "x", "angle"],
+            Plane::Xy => &["x", "y", "angle"],
+        },
+        Joint::Spherical => &["qw", "qx", "qy", "qz"],
+        Joint::Free => &["x", "y", "z", "qw", "qx", "qy", "qz"],
+    }
+}
+
+/// Names of a joint's velocities.
+fn velocities(joint: &Joint) -> &'static [&'static str] {
+    match joint {
+        Joint::Fixed => &[],
+        Joint::Prismatic { .. } => &["velocity"],
+        Joint::Revolute { .. } => &["rate"],
+        Joint::Planar { plane } => match plane {
+            Plane::Yz => &["vy", "vz", "rate"],
+            Plane::Zx => &["vz", "vx", "rate"],
+            Plane::Xy => &["vx", "vy", "rate"],
+        },
+        Joint::Spherical => &["wx", "wy", "wz"],
+        Joint::Free => &["vx", "vy", "vz", "wx", "wy", "wz"],
     }
 }
 

@@ -1,0 +1,273 @@
+//! An underwater grasp, found by gradients.
+//!
+//! A gripper closes on a coin as it would on dry land. There it catches it; under water the fingers press out the water between
+//! them, and the coin with it, and close behind it. Descending the gradient of the whole trajectory, contact and water included, finds
+//! forces that catch it.
+//!
+//! The descent has two stages, because a trajectory through a collision is a rugged thing to descend: first the approach alone, to
+//! where the coin lies well between the fingers before they touch it; from there the whole trajectory, to a coin that is held.
+//!
+//! ```text
+//! cargo run --release --example grasp -- [--json] [--out FOLDER] [--replay full] [--rival-seeds N] [--rival-cap N] [--no-rival]
+//! ```
+//!
+//! Into the folder go the found trajectory as CSV and JSON, the scene with the found forces as its controller (`grasp_caught.toml`, to be run
+//! again with any fidelity), and a picture. `--replay full` runs it with the coupled equations of all bodies on meshes fine enough for the
+//! gap; the rival is CMA-ES with the same cost, start and knots.
+
+#[path = "grasp/hold.rs"]
+mod hold;
+#[path = "grasp/plot.rs"]
+mod plot;
+#[path = "grasp/replay.rs"]
+mod replay;
+#[path = "grasp/rival.rs"]
+mod rival;
+#[path = "grasp/task.rs"]
+mod task;
+
+use hydrograd::optimize::Progress;
+use hydrograd::scene::Controller;
+use hydrograd::simulate::{Fidelity, Recording, Rollout};
+use hydrograd::{Controls, Scene};
+use serde::Serialize;
+use std::error::Error;
+use std::path::PathBuf;
+use std::time::Instant;
+use task::{Spent, Task};
+
+/// What the command line asks for.
+struct Options {
+    json: bool,
+    out: PathBuf,
+    replay: bool,
+    rival: bool,
+    seeds: usize,
+    /// Most simulations of a rival; none: twelve times those of the descent.
+    cap: Option<usize>,
+}
+
+#[derive(Serialize)]
+struct Report {
+    /// The naive push without water.
+    naive_dry_caught: bool,
+    /// The naive push in water.
+    naive_caught: bool,
+    /// The paper's two hand-tuned controllers in water, for the last half second.
+    hand_tuned_caught: [bool; 2],
+    /// Since when they hold the coin at the end, s; null if they don't.
+    hand_tuned_held_since: [Option<f64>; 2],
+    optimised_caught: bool,
+    /// Since when the coin is held, s.
+    optimised_held_since: Option<f64>,
+    /// Iterations of both descents.
+    iterations: usize,
+    /// Simulations that the descents cost, gradients counted by their time over a simulation's.
+    simulations: f64,
+    /// Rollouts with gradients, shorter ones by their share.
+    rollouts: f64,
+    /// Wall time from the scene to the found forces, s.
+    seconds: f64,
+    /// Time of a simulation, s.
+    seconds_per_simulation: f64,
+    /// Time of a gradient, its simulation included, s.
+    seconds_per_gradient: f64,
+    cost_naive: f64,
+    cost_optimised: f64,
+    /// The same trajectory with `full`; null without `--replay full`.
+    replay: Option<replay::Replay>,
+    /// Median of what the rival needed for the same cost; a lower bound where `rival.at_least`.
+    rival_simulations: Option<usize>,
+    /// Over the descent's.
+    rival_ratio: Option<f64>,
+    rival: Option<rival::Rival>,
+    warnings: Vec<String>,
+    files: Vec<PathBuf>,
+}
+
+fn main() -> Result<(), Box<dyn Error>> {
+    let options = options()?;
+    let start = Instant::now();
+    let scene = task::load()?;
+
+    let dry = task::simulator(&task::dry(&scene), Fidelity::Isolated)?;
+    let naive_dry_caught = hold::caught(&task::run(&dry, scene.steps)?)?;
+    let wet = task::simulator(&scene, Fidelity::Reduced)?;
+    let naive = task::run(&wet, scene.steps)?;
+    let naive_caught = hold::caught(&naive)?;
+
+    let task = Task::new(&scene)?;
+    let x = task.through(&naive)?;
+    let cost_naive = task.hold(&x)?.0;
+    let found = task.find(&x, say)?;
+    let spent = task.spent();
+    let optimised = task.rollout(&found.x)?;
+    let optimised_held_since = hold::held_since(&optimised)?;
+    let optimised_caught = hold::caught(&optimised)?;
+    let seconds = start.elapsed().as_secs_f64();
+
+    let mut hand_tuned_caught = [false; 2];
+    let mut hand_tuned_held_since = [None; 2];
+    for (k, tuned) in task::hand_tuned(&scene).iter().enumerate() {
+        let simulator = task::simulator(tuned, Fidelity::Reduced)?;
+        let rollout = task::run(&simulator, scene.steps)?;
+        hand_tuned_caught[k] = hold::caught(&rollout)?;
+        hand_tuned_held_since[k] = hold::held_since(&rollout)?;
+    }
+
+    let replayable = playback(&scene, &task.controls(&found.x)?);
+    let mut files: Vec<PathBuf> = Recording::of(&scene, &optimised)
+        .write(&options.out)?
+        .into();
+    let text = options.out.join("grasp_caught.toml");
+    std::fs::write(&text, replayable.to_toml()?)?;
+    let picture = options.out.join("grasp.svg");
+    plot::draw(&picture, &[("naive", &naive), ("optimised", &optimised)])?;
+    files.extend([text, picture]);
+
+    let replay = match options.replay {
+        true => Some(replay::full(&replayable)?),
+        false => None,
+    };
+    let simulations = equivalent(&spent);
+    let cap = options.cap.unwrap_or((12.0 * simulations).ceil() as usize);
+    let rival = match options.rival {
+        true => Some(rival::run(&scene, &x, found.cost, cap, options.seeds)?),
+        false => None,
+    };
+    let report = Report {
+        naive_dry_caught,
+        naive_caught,
+        hand_tuned_caught,
+        hand_tuned_held_since,
+        optimised_caught,
+        optimised_held_since,
+        iterations: found.iterations,
+        simulations,
+        rollouts: spent.gradients,
+        seconds,
+        seconds_per_simulation: spent.seconds_per_simulation,
+        seconds_per_gradient: spent.seconds_per_simulation + spent.seconds_per_gradient,
+        cost_naive,
+        cost_optimised: found.cost,
+        replay,
+        rival_simulations: rival.as_ref().map(|r| r.median),
+        rival_ratio: rival.as_ref().map(|r| r.median as f64 / simulations),
+        rival,
+        warnings: optimised.warnings(),
+        files,
+    };
+    match options.json {
+        true => println!("{}", serde_json::to_string(&report)?),
+        false => print(&report, &optimised),
+    }
+    Ok(())
+}
+
+/// Simulations that would have taken as long.
+fn equivalent(spent: &Spent) -> f64 {
+    spent.simulations + spent.gradients * spent.seconds_per_gradient / spent.seconds_per_simulation
+}
+
+/// The scene with the found forces as its controller.
+fn playback(scene: &Scene, controls: &Controls) -> Scene {
+    let mut scene = scene.clone();
+    scene.name = "grasp, caught".into();
+    let columns = controls.matrix().column_iter();
+    scene.controller = Some(Controller::Playback {
+        control: columns.map(|c| c.as_slice().to_vec()).collect(),
+    });
+    scene
+}
+
+fn say(stage: &str, p: &Progress) {
+    eprintln!(
+        "{stage}, iteration {:2}: cost {:.4}, |gradient| {:.2e}, {} rollouts with gradient",
+        p.iteration, p.cost, p.gradient, p.evaluations
+    );
+}
+
+fn print(r: &Report, optimised: &Rollout) {
+    let word = |caught: bool| if caught { "caught" } else { "lost" };
+    println!("naive push without water: {}", word(r.naive_dry_caught));
+    println!("naive push in water: {}", word(r.naive_caught));
+    for (k, (caught, since)) in
+        (r.hand_tuned_caught.iter().zip(&r.hand_tuned_held_since)).enumerate()
+    {
+        let since = since.map_or("not held".into(), |t| format!("held since {t:.2} s"));
+        println!(
+            "hand-tuned controller {}: {} ({since})",
+            k + 2,
+            word(*caught)
+        );
+    }
+    println!(
+        "optimised: {} (held since {:.2} s of {:.2} s), cost {:.1} -> {:.3}",
+        word(r.optimised_caught),
+        r.optimised_held_since.unwrap_or(f64::NAN),
+        optimised.samples()[optimised.steps()].time,
+        r.cost_naive,
+        r.cost_optimised
+    );
+    println!(
+        "{} iterations, {:.1} rollouts with gradients = {:.0} simulations, {:.1} s",
+        r.iterations, r.rollouts, r.simulations, r.seconds
+    );
+    if let Some(replay) = &r.replay {
+        println!(
+            "replayed with full, {} faces, edges near contact {:.3} m: {}",
+            replay.faces,
+            replay.edge,
+            word(replay.caught)
+        );
+    }
+    if let (Some(rival), Some(ratio)) = (&r.rival, r.rival_ratio) {
+        let bound = if rival.at_least { "at least " } else { "" };
+        println!(
+            "CMA-ES for the same cost: {bound}{} simulations, {bound}{ratio:.0} times as many",
+            rival.median
+        );
+    }
+    for w in &r.warnings {
+        println!("warning: {w}");
+    }
+    for f in &r.files {
+        println!("wrote {}", f.display());
+    }
+}
+
+fn options() -> Result<Options, String> {
+    let mut out = Options {
+        json: false,
+        out: "grasp".into(),
+        replay: false,
+        rival: true,
+        seeds: 5,
+        cap: None,
+    };
+    let mut arguments = std::env::args().skip(1);
+    while let Some(name) = arguments.next() {
+        let mut value = || arguments.next().ok_or(format!("{name} needs a value"));
+        let number = |text: String| text.parse().map_err(|_| format!("{text}: not a number"));
+        match name.as_str() {
+            "--json" => out.json = true,
+            "--out" => out.out = value()?.into(),
+            "--replay" => match value()?.as_str() {
+                "full" => out.replay = true,
+                other => return Err(format!("--replay {other}: expected full")),
+            },
+            "--no-rival" => out.rival = false,
+            "--rival-seeds" => out.seeds = number(value()?)?,
+            "--rival-cap" => out.cap = Some(number(value()?)?),
+            _ => {
+                return Err(format!(
+                    "{name}: expected --json, --out, --replay, --rival-seeds, --rival-cap or --no-rival"
+                ));
+            }
+        }
+    }
+    if out.rival && out.seeds == 0 {
+        return Err("--rival-seeds must be at least 1".into());
+    }
+    Ok(out)
+}

@@ -1,0 +1,253 @@
+//! The task: the scene with and without water, its controllers, and controls through knots with their cost and its gradient.
+
+use crate::hold::{Hold, Tolerable};
+use hydrograd::optimize::{self, Found, Progress, minimise};
+use hydrograd::scene::{Controller, SpeedStage};
+use hydrograd::simulate::{Knots, OpenLoop, Rollout};
+use hydrograd::{Controls, Fidelity, Result, Scene, Settings, Simulator};
+use nalgebra::DMatrix;
+use std::cell::Cell;
+use std::path::Path;
+use std::time::Instant;
+
+/// Largest force on the column and on each finger, N.
+const LIMITS: [f64; 3] = [500.0; 3];
+/// Knots of the controls, a quarter of a second apart.
+const KNOTS: usize = 11;
+/// Steps of the approach: until shortly before the fingers touch the coin.
+const APPROACH: usize = 130;
+
+/// Descent of the approach: it needn't be exact.
+const REACHING: optimize::Settings = optimize::Settings {
+    iterations: 10,
+    evaluations: 20,
+    memory: 10,
+    first_step: 0.3,
+    gradient_tolerance: 1e-3,
+    cost_tolerance: 1e-3,
+    target: Some(0.3),
+    clip: None,
+};
+
+/// Descent of the hold, to a cost at which the coin is held firmly.
+const HOLDING: optimize::Settings = optimize::Settings {
+    iterations: 30,
+    evaluations: 40,
+    memory: 10,
+    first_step: 0.3,
+    gradient_tolerance: 1e-6,
+    cost_tolerance: 1e-9,
+    target: Some(0.1),
+    // Gradients through a collision that is about to happen otherwise are hundreds of times this, and say little.
+    clip: Some(0.1),
+};
+
+pub fn load() -> Result<Scene> {
+    let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("examples/scenes");
+    Scene::load(folder.join("grasp.toml"))
+}
+
+/// As on dry land.
+pub fn dry(scene: &Scene) -> Scene {
+    let mut dry = scene.clone();
+    dry.fluid.density = 0.0;
+    dry
+}
+
+/// The paper's two hand-tuned controllers: the naive push, and from a speed of the fingers on one of the column as well.
+pub fn hand_tuned(scene: &Scene) -> [Scene; 2] {
+    let stages = [
+        [(0.12, [0.0, 400.0, -400.0]), (0.18, [850.0, 400.0, -400.0])],
+        [(0.08, [0.0, 400.0, -400.0]), (0.2, [1000.0, 400.0, -400.0])],
+    ];
+    stages.map(|stages| {
+        let mut scene = scene.clone();
+        let stage = |(until, control): (f64, [f64; 3])| SpeedStage {
+            until,
+            control: control.to_vec(),
+        };
+        scene.controller = Some(Controller::SpeedStages {
+            bodies: vec!["finger 1".into(), "finger 2".into()],
+            stages: stages.map(stage).to_vec(),
+        });
+        scene
+    })
+}
+
+pub fn simulator(scene: &Scene, fidelity: Fidelity) -> Result<Simulator> {
+    let fidelity = if scene.fluid.density == 0.0 {
+        Fidelity::Isolated
+    } else {
+        fidelity
+    };
+    Simulator::new(scene, Settings::for_scene(scene).fidelity(fidelity))
+}
+
+/// The scene's own controller.
+pub fn run(simulator: &Simulator, steps: usize) -> Result<Rollout<'_>> {
+    simulator.rollout(&Controls::zeros(simulator, steps))
+}
+
+/// Open-loop controls of the scene, through knots.
+pub struct Task {
+    simulator: Simulator,
+    knots: Knots,
+    steps: usize,
+    /// Where the fingers should be, and the coin between them, before they touch it.
+    approach: Hold,
+    hold: Hold,
+    /// Steps simulated.
+    simulated: Cell<usize>,
+    /// Steps simulated that were differentiated as well.
+    differentiated: Cell<usize>,
+    /// Time of simulating and of differentiating, s.
+    seconds: Cell<(f64, f64)>,
+}
+
+/// What evaluations cost so far.
+#[derive(Clone, Copy)]
+pub struct Spent {
+    /// Whole simulations, shorter ones by their share.
+    pub simulations: f64,
+    /// Whole gradients.
+    pub gradients: f64,
+    /// Time of a simulation, s.
+    pub seconds_per_simulation: f64,
+    /// Time of a gradient, its simulation left out, s.
+    pub seconds_per_gradient: f64,
+}
+
+impl Task {
+    pub fn new(scene: &Scene) -> Result<Self> {
+        let mut simulator = simulator(scene, Fidelity::Reduced)?;
+        simulator.set_policy(Box::new(OpenLoop));
+        let steps = scene.steps;
+        let gap = scene.contact.and_then(|c| c.gap).unwrap_or(0.0);
+        let never = f64::INFINITY;
+        Ok(Self {
+            knots: Knots::new(&simulator, steps, KNOTS, &LIMITS)?,
+            simulator,
+            steps,
+            approach: Hold {
+                from: 1.2,
+                along: 1.25,
+                opening: 0.44,
+                grip: 0.0,
+                tolerable: Tolerable {
+                    along: 0.05,
+                    across: 0.05,
+                    opening: 0.05,
+                    drift: 0.05,
+                    closing: never,
+                    grip: never,
+                },
+            },
+            hold: Hold {
+                from: 1.9,
+                along: 1.2,
+                opening: 0.1 + 2.0 * gap,
+                grip: 100.0,
+                tolerable: Tolerable {
+                    along: 0.2,
+                    across: 0.1,
+                    opening: 0.1,
+                    drift: 0.1,
+                    closing: 0.1,
+                    grip: 100.0,
+                },
+            },
+            simulated: Cell::new(0),
+            differentiated: Cell::new(0),
+            seconds: Cell::new((0.0, 0.0)),
+        })
+    }
+
+    /// The knots through what another controller did.
+    pub fn through(&self, rollout: &Rollout) -> Result<Vec<f64>> {
+        let mut controls = DMatrix::zeros(LIMITS.len(), self.steps);
+        for (n, sample) in rollout.samples().iter().take(self.steps).enumerate() {
+            controls.set_column(n, &sample.control);
+        }
+        self.knots
+            .through(&Controls::from_matrix(&self.simulator, controls)?)
+    }
+
+    pub fn controls(&self, x: &[f64]) -> Result<Controls> {
+        self.knots.controls(&self.simulator, x)
+    }
+
+    /// A rollout of the first steps, counted.
+    fn simulate(&self, x: &[f64], steps: usize) -> Result<Rollout<'_>> {
+        let start = Instant::now();
+        let all = self.controls(x)?;
+        let first = all.matrix().columns(0, steps).into_owned();
+        let rollout = self
+            .simulator
+            .rollout(&Controls::from_matrix(&self.simulator, first)?);
+        self.simulated.set(self.simulated.get() + steps);
+        let (simulating, differentiating) = self.seconds.get();
+        self.seconds
+            .set((simulating + start.elapsed().as_secs_f64(), differentiating));
+        rollout
+    }
+
+    /// Cost of a rollout with its gradient over x, counted.
+    fn descend(&self, x: &[f64], goal: &Hold, steps: usize) -> Result<(f64, Vec<f64>)> {
+        let rollout = self.simulate(x, steps)?;
+        let start = Instant::now();
+        let gradient = rollout.gradient(goal)?;
+        let mut controls = DMatrix::zeros(LIMITS.len(), self.steps);
+        controls.columns_mut(0, steps).copy_from(&gradient.controls);
+        let gradient = self.knots.controls_vjp(x, &controls)?;
+        self.differentiated.set(self.differentiated.get() + steps);
+        let (simulating, differentiating) = self.seconds.get();
+        self.seconds
+            .set((simulating, differentiating + start.elapsed().as_secs_f64()));
+        Ok((rollout.value(goal)?, gradient))
+    }
+
+    /// Cost of being away from a good place before the fingers touch the coin, and its gradient.
+    pub fn approach(&self, x: &[f64]) -> Result<(f64, Vec<f64>)> {
+        self.descend(x, &self.approach, APPROACH)
+    }
+
+    /// Cost of not holding the coin at the end, and its gradient.
+    pub fn hold(&self, x: &[f64]) -> Result<(f64, Vec<f64>)> {
+        self.descend(x, &self.hold, self.steps)
+    }
+
+    /// Forces that hold the coin, from `x`: by a descent to a good approach, and by one of the whole trajectory from there. Iterations are those
+    /// of both; `say` hears of every one.
+    pub fn find(&self, x: &[f64], say: impl Fn(&str, &Progress)) -> Result<Found> {
+        let reached = minimise(|x| self.approach(x), x, &REACHING, |p| say("approach", p))?;
+        let held = minimise(|x| self.hold(x), &reached.x, &HOLDING, |p| say("hold", p))?;
+        Ok(Found {
+            iterations: reached.iterations + held.iterations,
+            ..held
+        })
+    }
+
+    /// The same cost alone.
+    pub fn cost(&self, x: &[f64]) -> Result<f64> {
+        self.simulate(x, self.steps)?.value(&self.hold)
+    }
+
+    pub fn rollout(&self, x: &[f64]) -> Result<Rollout<'_>> {
+        self.simulator.rollout(&self.controls(x)?)
+    }
+
+    pub fn spent(&self) -> Spent {
+        let whole = |steps: usize| steps as f64 / self.steps as f64;
+        let (simulations, gradients) = (
+            whole(self.simulated.get()),
+            whole(self.differentiated.get()),
+        );
+        let (simulating, differentiating) = self.seconds.get();
+        Spent {
+            simulations,
+            gradients,
+            seconds_per_simulation: simulating / simulations.max(1.0),
+            seconds_per_gradient: differentiating / gradients.max(1.0),
+        }
+    }
+}

@@ -43,7 +43,7 @@ struct Options {
     replay: bool,
     rival: bool,
     seeds: usize,
-    /// Most simulations of a rival; none: twelve times those of the descent.
+    /// Most simulations of a rival; none: eleven times those of the descent.
     cap: Option<usize>,
 }
 
@@ -130,7 +130,7 @@ fn main() -> Result<(), Box<dyn Error>> {
         false => None,
     };
     let simulations = equivalent(&spent);
-    let cap = options.cap.unwrap_or((12.0 * simulations).ceil() as usize);
+    let cap = options.cap.unwrap_or((11.0 * simulations).ceil() as usize);
     let rival = match options.rival {
         true => Some(rival::run(&scene, &x, found.cost, cap, options.seeds)?),
         false => None,

@@ -31,6 +31,7 @@ impl Policy for Lengths {
         Action {
             control: vec![0.0; self.control],
             hold: vec![false; self.hold],
+            mode: 0,
         }
     }
 

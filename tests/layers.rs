@@ -51,7 +51,7 @@ const ONLY: [(&str, &str, &[&str]); 4] = [
     ("shape", "adjoint", &["lie"]),
     // Descriptions of shapes and walls are scene data, and a scene asks the shapes whether they are
     // right: the one pair that knows each other.
-    ("shape", "scene", &["Shape", "Wall"]),
+    ("shape", "scene", &["Refinement", "Shape", "Wall"]),
     ("contact", "adjoint", &["lie"]),
     ("multibody", "adjoint", &["lie"]),
 ];

@@ -377,6 +377,7 @@ impl Policy for HoldAndRelease {
         Action {
             control: self.control.clone(),
             hold: (0..self.bodies).map(|b| held && b == self.body).collect(),
+            mode: 0,
         }
     }
 

@@ -13,7 +13,9 @@
 
 use std::path::PathBuf;
 
-use super::{Body, Drag, Fluid, Initial, Joint, Motion, Placement, Preset, Scene, Shape, Wall};
+use super::{
+    Body, Drag, Fluid, Initial, Joint, Motion, Placement, Preset, Refinement, Scene, Shape, Wall,
+};
 
 /// A body of a scene, by its place in [`Scene::bodies`].
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, PartialOrd, Ord)]
@@ -112,6 +114,7 @@ impl Body {
             name: String::new(),
             shape: None,
             shape_at: Placement::default(),
+            refine: Vec::new(),
             mass: None,
             density: None,
             center_of_mass: None,
@@ -183,6 +186,17 @@ impl Body {
     /// Pose of the shape in the body's frame: translation, m, and rotation vector, rad.
     pub fn shape_at(mut self, position: [f64; 3], rotation: [f64; 3]) -> Self {
         self.shape_at = Placement::new(position, rotation);
+        self
+    }
+
+    /// Makes faces that touch a ball (body's frame; center and radius in m) smaller, until no edge is longer
+    /// than `edge`, m. Call it again for more balls.
+    pub fn refine(mut self, center: [f64; 3], radius: f64, edge: f64) -> Self {
+        self.refine.push(Refinement {
+            center,
+            radius,
+            edge,
+        });
         self
     }
 

@@ -132,6 +132,10 @@ pub struct Body {
     /// Pose of the shape in the body's frame.
     #[serde(default, skip_serializing_if = "is_default")]
     pub shape_at: Placement,
+    /// Regions where the faces of the shape are made smaller: where the body comes near others. Elsewhere the
+    /// mesh stays as its number of faces makes it.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub refine: Vec<Refinement>,
     /// Mass, kg. Give this or `density`; a body fixed to the world needs neither.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub mass: Option<f64>,
@@ -188,6 +192,20 @@ pub struct Body {
     /// Drag on the body's surface.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub drag: Option<Drag>,
+}
+
+/// A ball in which a body's faces are made smaller. Faces that touch it are split at their longest edges until
+/// none is longer than `edge`; around it they grow from ring to ring. New vertices lie on the shape
+/// itself, also where that is curved.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Refinement {
+    /// Its centre, m, in the body's frame.
+    pub center: [f64; 3],
+    /// Its radius, m.
+    pub radius: f64,
+    /// Longest edge inside, m: a gap is resolved from about twice its width on.
+    pub edge: f64,
 }
 
 /// A closed surface, by formula or from a file.

@@ -2,18 +2,18 @@
 
 use super::clearance::Clearance;
 use super::plan::{Planned, plan};
+use super::surface::{Surface, surface};
 use super::wet::{self, Discretisation, Plan, Water, Wet};
 use super::{Fidelity, Policy, Settings};
 use super::{contact, controller, limits};
 use crate::Result;
 use crate::adjoint::drag::{self, Element, Part};
 use crate::adjoint::lie::{Mat3, Mat6, Pose, Vec3, exp_matrix};
-use crate::boundary::OneBody;
 use crate::coupling::{Exclusions, Isolated};
 use crate::dynamics::{BodyData, Drive, Parameters, Stepper, System};
 use crate::multibody::{self, Tree};
-use crate::scene::{self, Body, DragPart, Placement, Scene, Shape};
-use crate::shape::{self, Gap, MassProperties, Other, TriMesh};
+use crate::scene::{self, Body, DragPart, Placement, Scene};
+use crate::shape::{Gap, Other, TriMesh};
 use nalgebra::DVector;
 use std::path::Path;
 
@@ -69,65 +69,6 @@ fn part(p: DragPart) -> Part {
         DragPart::Normal => Part::Normal,
         DragPart::Total => Part::Total,
     }
-}
-
-/// A body's surface in its own frame, with its mass properties.
-#[derive(Clone)]
-pub(super) struct Surface {
-    pub mesh: TriMesh,
-    /// A mesh of about a quarter of the faces, of a shape by formula with flat parts or edges.
-    pub coarse: Option<TriMesh>,
-    pub properties: MassProperties,
-}
-
-impl Surface {
-    /// Of a mesh alone.
-    pub fn of_mesh(mesh: TriMesh) -> Self {
-        Self {
-            properties: mesh.mass_properties(),
-            coarse: None,
-            mesh,
-        }
-    }
-}
-
-/// A body's surface, with about `faces` faces if it is a shape by formula.
-pub(super) fn surface(
-    body: &Body,
-    settings: &Settings,
-    faces: Option<usize>,
-) -> Result<Option<Surface>> {
-    let Some(shape) = &body.shape else {
-        return Ok(None);
-    };
-    let at = pose(&body.shape_at);
-    let mesh = shape::build(shape, Path::new(""), faces)?.transformed(&at);
-    let closed = settings.by_formula() && wet::semi_axes(shape).is_some();
-    let panels = settings.fidelity != Fidelity::Full
-        && matches!(settings.one_body, OneBody::Auto | OneBody::Panel);
-    let coarse = if panels && !closed && !matches!(shape, Shape::Mesh { .. }) {
-        let quarter = (mesh.faces().len() / 4).max(12);
-        let coarse = shape::build(shape, Path::new(""), Some(quarter))?.transformed(&at);
-        // Patterns allow only certain numbers.
-        Some(coarse).filter(|c| 2 * c.faces().len() <= mesh.faces().len())
-    } else {
-        None
-    };
-    // Where the water sees the shape itself and not a mesh of it, so do gravity and buoyancy.
-    let formula = if closed || coarse.is_some() {
-        MassProperties::by_formula(shape)?
-    } else {
-        None
-    };
-    let properties = match &formula {
-        Some(p) => p.transformed(&at),
-        None => mesh.mass_properties(),
-    };
-    Ok(Some(Surface {
-        properties,
-        mesh,
-        coarse,
-    }))
 }
 
 /// The bodies that the water sees with a fidelity, with their numbers in the scene. Bodies that
@@ -224,7 +165,7 @@ pub(super) fn assemble(
     parameters.density = scene.fluid.density;
     let mut surfaces = Vec::with_capacity(scene.bodies.len());
     for body in &scene.bodies {
-        surfaces.push(surface(body, settings, settings.faces)?);
+        surfaces.push(surface(body, settings, settings.faces, 1.0)?);
     }
 
     let (of_wet, wet) = in_water(scene, &surfaces, &tree, settings.fidelity);

@@ -1,7 +1,7 @@
 //! How near the bodies are to one another and to the walls, and what that means for the flow.
 
 use super::Fidelity;
-use super::assemble::Surface;
+use super::surface::Surface;
 use crate::adjoint::lie::Pose;
 use crate::dynamics::{Drive, System};
 use crate::error::readable;
@@ -160,7 +160,8 @@ impl Clearance {
                 format!(
                     "{place}: the smallest gap, {:.3e} m at t = {time} s, is narrower than half \
                      the edges there ({:.3e} m): forces across it may be off by several percent \
-                     and more; use more faces, or end the run before{hint}",
+                     and more; use more faces, refine the bodies there (`refine`), or end the run \
+                     before{hint}",
                     gap.distance.max(0.0),
                     gap.edge
                 )

@@ -1,13 +1,14 @@
 //! Contact of a scene: which surfaces may touch, at which gap, and how stiffly.
 
-use super::assemble::{Surface, pose};
+use super::assemble::pose;
 use super::clearance::Clearance;
+use super::surface::Surface;
 use super::{Fidelity, Settings};
 use crate::adjoint::lie::Pose;
 use crate::contact::{ContactPair, Contacts, Geometry};
 use crate::dynamics::{self, ContactModel, Integrator, Regularisation};
 use crate::scene::{Body, Contact, Scene, Shape};
-use crate::shape::{Other, TriMesh};
+use crate::shape::Other;
 use crate::{Error, Result};
 use std::path::Path;
 
@@ -126,7 +127,7 @@ fn geometry(body: &Body, shape: &Shape, surface: &Surface) -> Result<Geometry> {
 
 /// The gap that the coupling resolves between a pair, m.
 fn resolved(p: &Parts, pair: &ContactPair) -> f64 {
-    let edge = |b: usize| p.surfaces[b].as_ref().map_or(0.0, |s| mean_edge(&s.mesh));
+    let edge = |b: usize| p.surfaces[b].as_ref().map_or(0.0, mean_edge);
     let of = |value: &dyn Fn(usize) -> f64| match pair.second {
         Other::Body(b) => value(pair.first).max(value(b)),
         // The image is twice as far away.
@@ -139,8 +140,9 @@ fn resolved(p: &Parts, pair: &ContactPair) -> f64 {
     }
 }
 
-/// Edge of the equilateral triangle of mean area.
-fn mean_edge(mesh: &TriMesh) -> f64 {
+/// Edge of the equilateral triangle of mean area. Refined regions don't count: contact may be elsewhere.
+fn mean_edge(surface: &Surface) -> f64 {
+    let mesh = &surface.mesh;
     let area: f64 = (0..mesh.faces().len()).map(|f| mesh.area(f)).sum();
-    (4.0 / 3.0_f64.sqrt() * area / mesh.faces().len() as f64).sqrt()
+    (4.0 / 3.0_f64.sqrt() * area / surface.base as f64).sqrt()
 }

@@ -18,6 +18,7 @@ mod recording;
 mod rollout;
 mod settings;
 mod simulator;
+mod surface;
 mod trajectory;
 mod wet;
 

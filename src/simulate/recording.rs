@@ -214,8 +214,8 @@ fn velocities(joint: &Joint) -> &'static [&'static str] {
 mod tests {
     use super::*;
 
-    fn example() -> Trajectory {
-        Trajectory {
+    fn example() -> Recording {
+        Recording {
             scene: "two".into(),
             dt: 0.1,
             coordinates: vec!["a, b.position".into()],

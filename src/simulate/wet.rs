@@ -1,5 +1,6 @@
 //! The bodies in the water: discretised as the settings ask, and coupled.
 
+use super::surface::Coarse;
 use super::{Fidelity, Settings};
 use crate::adjoint::lie::{Mat6, Pose, Vec3};
 use crate::boundary::exact::ExactBoundary;
@@ -25,7 +26,7 @@ pub(super) struct Wet<'a> {
     /// The shape by formula and its pose in the body's frame, if it is an ellipsoid.
     pub ellipsoid: Option<([f64; 3], Pose)>,
     /// A coarser mesh of the shape, where it is one by formula.
-    pub coarse: Option<&'a TriMesh>,
+    pub coarse: Option<&'a Coarse>,
     /// Given added mass at unit density.
     pub added_mass: Option<Mat6>,
 }
@@ -125,10 +126,10 @@ impl<'a> Wet<'a> {
             _ => {
                 let fine = PanelBoundary::new(self.name, vertices, faces)?;
                 match self.coarse {
-                    Some(mesh) => {
+                    Some(Coarse { mesh, ratio }) => {
                         let (vertices, faces) = (mesh.vertices(), mesh.faces());
                         let coarse = PanelBoundary::new(self.name, vertices, faces)?;
-                        Box::new(Extrapolated::new(fine, coarse)?)
+                        Box::new(Extrapolated::new(fine, coarse, *ratio)?)
                     }
                     None => Box::new(fine),
                 }
@@ -555,9 +556,10 @@ fn compressed(
     let round = |x: f64| (x / size * GRID).round() / GRID;
     let vertices: Vec<Vec3> = mesh.vertices().iter().map(|v| v.map(round)).collect();
     let unit = TriMesh::new(mesh.name(), vertices, mesh.faces().to_vec())?;
-    let coarse = body.coarse.filter(|_| method == OneBody::Panel).map(|m| {
-        let vertices = m.vertices().iter().map(|v| v.map(round)).collect();
-        TriMesh::new(m.name(), vertices, m.faces().to_vec())
+    let coarse = body.coarse.filter(|_| method == OneBody::Panel).map(|c| {
+        let vertices = c.mesh.vertices().iter().map(|v| v.map(round)).collect();
+        let mesh = TriMesh::new(c.mesh.name(), vertices, c.mesh.faces().to_vec())?;
+        Ok::<_, Error>(Coarse { mesh, ..*c })
     });
     let coarse = coarse.transpose()?;
     let ellipsoid = body.ellipsoid.filter(|_| method == OneBody::Exact);
@@ -582,7 +584,7 @@ fn compressed(
         method,
         formula,
         fundamental,
-        coarse.as_ref().map(|m| m.faces().len()),
+        coarse.as_ref().map(|c| c.mesh.faces().len()),
     );
     let key = cache::Key::new(unit.vertices(), unit.faces(), &made_from, &chosen);
     let found = cache::fetch(key, folder, || {

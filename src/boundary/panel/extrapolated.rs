@@ -1,5 +1,6 @@
 //! A body from two meshes of one shape: what each says, extrapolated.
 
+use super::richardson::richardson_of_ratio;
 use super::{PanelBoundary, Richardson, richardson};
 use crate::Result;
 use crate::adjoint::lie::{Mat6, Vec3, Vec6};
@@ -15,12 +16,16 @@ pub struct Extrapolated {
 }
 
 impl Extrapolated {
-    /// From a fine and a coarse mesh of one shape.
+    /// From a fine and a coarse mesh of one shape, and the ratio of their edges where the numbers of faces
+    /// don't tell it.
     ///
     /// # Errors
     /// Meshes that don't differ enough.
-    pub fn new(fine: PanelBoundary, coarse: PanelBoundary) -> Result<Self> {
-        let mut found = richardson(&fine, &coarse)?;
+    pub fn new(fine: PanelBoundary, coarse: PanelBoundary, ratio: Option<f64>) -> Result<Self> {
+        let mut found = match ratio {
+            Some(ratio) => richardson_of_ratio(&fine, &coarse, ratio)?,
+            None => richardson(&fine, &coarse)?,
+        };
         found.added_mass = positive(&found.added_mass, fine.faces.volume());
         Ok(Self {
             fine,

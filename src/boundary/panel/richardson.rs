@@ -46,11 +46,22 @@ pub struct Richardson {
 /// # Errors
 /// Meshes that don't differ enough: ρ, the ratio of √(area/faces), under 1.2.
 pub fn richardson(fine: &PanelBoundary, coarse: &PanelBoundary) -> Result<Richardson> {
-    let edge = |b: &PanelBoundary| {
-        let area: f64 = b.faces.areas.iter().sum();
-        (area / b.faces.len() as f64).sqrt()
-    };
-    let ratio = edge(coarse) / edge(fine);
+    richardson_of_ratio(fine, coarse, edge(coarse) / edge(fine))
+}
+
+/// √(area/faces), m.
+fn edge(b: &PanelBoundary) -> f64 {
+    let area: f64 = b.faces.areas.iter().sum();
+    (area / b.faces.len() as f64).sqrt()
+}
+
+/// The same for meshes whose edges have a known ratio everywhere: where regions are refined, the number of
+/// faces doesn't tell it.
+pub(super) fn richardson_of_ratio(
+    fine: &PanelBoundary,
+    coarse: &PanelBoundary,
+    ratio: f64,
+) -> Result<Richardson> {
     if ratio.is_nan() || ratio < RATIO {
         return Err(Error::input(
             format!("body \"{}\": faces of two meshes", fine.name),

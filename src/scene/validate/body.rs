@@ -61,7 +61,15 @@ fn check_overlap(scene: &Scene, index: usize) -> Result<()> {
 }
 
 fn check_shape(body: &Body) -> Result<()> {
+    crate::shape::validate_refinements(&body.refine, &format!("body {:?}", body.name))?;
     let Some(shape) = &body.shape else {
+        if !body.refine.is_empty() {
+            return Err(Error::input(
+                place(body, "refine"),
+                "regions without a shape",
+                "there are no faces to make smaller: add a shape or take the regions away",
+            ));
+        }
         return Ok(());
     };
     if let Shape::Mesh { path, .. } = shape

@@ -9,7 +9,7 @@
 mod pair;
 mod share;
 mod surface;
-mod triangle;
+pub(super) mod triangle;
 
 #[cfg(test)]
 mod tests;

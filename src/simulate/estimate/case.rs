@@ -6,8 +6,9 @@ use crate::boundary::{OneBody, Response};
 use crate::coupling::{Coupling, Report};
 use crate::scene::{Scene, Shape, WallSurface};
 use crate::shape::{Gap, Other};
-use crate::simulate::assemble::{self, Surface};
+use crate::simulate::assemble;
 use crate::simulate::simulator::world_axes;
+use crate::simulate::surface::{Surface, surface};
 use crate::simulate::wet::{self, Water, Wet};
 use crate::simulate::{Fidelity, Settings, Simulator};
 use nalgebra::DMatrix;
@@ -83,7 +84,7 @@ impl<'a> Case<'a> {
             matrix,
             diagonal,
             surfaces: scene
-                .map(|b| assemble::surface(b, settings, settings.faces))
+                .map(|b| surface(b, settings, settings.faces, 1.0))
                 .collect::<Result<_>>()?,
             correction: None,
             report,
@@ -223,7 +224,17 @@ impl<'a> Case<'a> {
             let mesh = match (own, &body.shape) {
                 (Some(own), _) if few(own) => Some(own.mesh.clone()),
                 (Some(own), Some(Shape::Mesh { .. })) => Some(own.mesh.coarsened(COUPLING_FACES)?),
-                _ => assemble::surface(body, &panel, Some(COUPLING_FACES))?.map(|s| s.mesh),
+                (own, _) => {
+                    // Refined regions keep their share of the faces.
+                    let fewer = own
+                        .as_ref()
+                        .map_or(1.0, |s| COUPLING_FACES as f64 / s.mesh.faces().len() as f64);
+                    let base = own.as_ref().map_or(COUPLING_FACES, |s| {
+                        (s.base as f64 * fewer).round().max(1.0) as usize
+                    });
+                    let edges = 1.0 / fewer.sqrt();
+                    surface(body, &panel, Some(base), edges)?.map(|s| s.mesh)
+                }
             };
             surfaces.push(mesh.map(Surface::of_mesh));
         }

@@ -10,7 +10,7 @@
 use super::case::Case;
 use crate::scene::Shape;
 use crate::shape::TriMesh;
-use crate::simulate::assemble::{self, Surface};
+use crate::simulate::surface::{Surface, surface};
 use crate::{Error, Result};
 use nalgebra::DMatrix;
 use serde::Serialize;
@@ -147,7 +147,7 @@ impl Group<'_> {
         let mut surfaces = from.to_vec();
         for b in &self.bodies {
             let Some(own) = &from[*b] else { continue };
-            let Some(mut other) = other(case, *b, &own.mesh, factor)? else {
+            let Some(mut other) = other(case, *b, own, factor)? else {
                 return Ok(None);
             };
             if !pairs {
@@ -185,9 +185,11 @@ impl Group<'_> {
     }
 }
 
-/// The surface of a body with `factor` times the faces.
-fn other(case: &Case, body: usize, own: &TriMesh, factor: f64) -> Result<Option<Surface>> {
-    let target = (own.faces().len() as f64 * factor).round() as usize;
+/// The surface of a body with `factor` times the faces, also in its refined regions.
+fn other(case: &Case, body: usize, own: &Surface, factor: f64) -> Result<Option<Surface>> {
+    let times = |faces: usize| (faces as f64 * factor).round() as usize;
+    let (own, base) = (&own.mesh, times(own.base));
+    let target = times(own.faces().len());
     let body = &case.scene().bodies[body];
     match &body.shape {
         Some(Shape::Mesh { .. }) if factor < 1.0 => {
@@ -195,7 +197,10 @@ fn other(case: &Case, body: usize, own: &TriMesh, factor: f64) -> Result<Option<
         }
         Some(Shape::Mesh { .. }) if factor == 4.0 => Ok(Some(Surface::of_mesh(own.split()))),
         Some(Shape::Mesh { .. }) => Ok(None),
-        _ => assemble::surface(body, case.simulator.settings(), Some(target)),
+        _ => {
+            let settings = case.simulator.settings();
+            surface(body, settings, Some(base), factor.powf(-0.5))
+        }
     }
 }
 

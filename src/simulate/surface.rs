@@ -1,0 +1,104 @@
+//! Bodies' surfaces, as their shapes are meshed for the water.
+
+use super::assemble::pose;
+use super::{Fidelity, Settings, wet};
+use crate::Result;
+use crate::adjoint::lie::Vec3;
+use crate::boundary::OneBody;
+use crate::scene::{Body, Refinement, Shape};
+use crate::shape::{self, MassProperties, TriMesh};
+use std::path::Path;
+
+/// A body's surface in its own frame, with its mass properties.
+#[derive(Clone)]
+pub(super) struct Surface {
+    pub mesh: TriMesh,
+    /// Its faces before regions of it were refined.
+    pub base: usize,
+    /// A mesh of about a quarter of the faces, of a shape by formula with flat parts or edges.
+    pub coarse: Option<Coarse>,
+    pub properties: MassProperties,
+}
+
+/// A coarser mesh of a shape.
+#[derive(Clone)]
+pub(super) struct Coarse {
+    pub mesh: TriMesh,
+    /// The ratio of its edges to those of the finer one, where regions are refined: there the numbers of
+    /// faces don't tell it.
+    pub ratio: Option<f64>,
+}
+
+impl Surface {
+    /// Of a mesh alone.
+    pub fn of_mesh(mesh: TriMesh) -> Self {
+        Self {
+            properties: mesh.mass_properties(),
+            base: mesh.faces().len(),
+            coarse: None,
+            mesh,
+        }
+    }
+}
+
+/// A body's surface, with about `faces` faces if it is a shape by formula, before its regions are refined
+/// to `edges` times the edges that they ask for.
+pub(super) fn surface(
+    body: &Body,
+    settings: &Settings,
+    faces: Option<usize>,
+    edges: f64,
+) -> Result<Option<Surface>> {
+    let Some(shape) = &body.shape else {
+        return Ok(None);
+    };
+    let at = pose(&body.shape_at);
+    let even = |faces: Option<usize>| shape::build(shape, Path::new(""), faces);
+    let refined = |base: &TriMesh, edges: f64| -> Result<TriMesh> {
+        let regions = body.refine.iter().map(|r| Refinement {
+            center: at.apply_inverse(&Vec3::from(r.center)).into(),
+            edge: r.edge * edges,
+            ..*r
+        });
+        let regions: Vec<Refinement> = regions.collect();
+        let place = format!("body {:?}", body.name);
+        Ok(shape::refine(base, shape, &regions, &place)?.transformed(&at))
+    };
+    let mesh = even(faces)?;
+    let base = mesh.faces().len();
+    let mesh = refined(&mesh, edges)?;
+    let closed = settings.by_formula() && wet::semi_axes(shape).is_some();
+    let panels = settings.fidelity != Fidelity::Full
+        && matches!(settings.one_body, OneBody::Auto | OneBody::Panel);
+    let coarse = if panels && !closed && !matches!(shape, Shape::Mesh { .. }) {
+        let quarter = (base / 4).max(12);
+        let coarse = even(Some(quarter))?;
+        let fewer = coarse.faces().len();
+        // As many bisections as in the fine mesh.
+        let ratio = (base as f64 / fewer as f64).sqrt();
+        let coarse = Coarse {
+            mesh: refined(&coarse, ratio * edges)?,
+            ratio: (!body.refine.is_empty()).then_some(ratio),
+        };
+        // Patterns allow only certain numbers.
+        Some(coarse).filter(|_| 2 * fewer <= base)
+    } else {
+        None
+    };
+    // Where the water sees the shape itself and not a mesh of it, so do gravity and buoyancy.
+    let formula = if closed || coarse.is_some() {
+        MassProperties::by_formula(shape)?
+    } else {
+        None
+    };
+    let properties = match &formula {
+        Some(p) => p.transformed(&at),
+        None => mesh.mass_properties(),
+    };
+    Ok(Some(Surface {
+        properties,
+        mesh,
+        base,
+        coarse,
+    }))
+}

@@ -87,6 +87,7 @@ struct Report {
 
 fn main() -> Result<(), Box<dyn Error>> {
     let options = options()?;
+    Recording::prepare(&options.out)?;
     let start = Instant::now();
     let scene = task::load()?;
 

@@ -109,7 +109,7 @@ impl<F: FnMut(&[f64]) -> Result<(f64, Vector)>> Gradient for Shared<'_, F> {
     }
 }
 
-fn norm(x: &[f64]) -> f64 {
+pub(super) fn norm(x: &[f64]) -> f64 {
     x.iter().map(|x| x * x).sum::<f64>().sqrt()
 }
 
@@ -148,9 +148,18 @@ pub fn minimise(
     mut function: impl FnMut(&[f64]) -> Result<(f64, Vec<f64>)>,
     start: &[f64],
     settings: &Settings,
-    mut progress: impl FnMut(&Progress),
+    progress: impl FnMut(&Progress),
 ) -> Result<Found> {
     settings.validate()?;
+    let begun = begin(&mut function, start)?;
+    descend(function, start, begun, settings, progress)
+}
+
+/// Value and gradient where a descent starts.
+pub(super) fn begin(
+    mut function: impl FnMut(&[f64]) -> Result<(f64, Vec<f64>)>,
+    start: &[f64],
+) -> Result<(f64, Vec<f64>)> {
     if start.is_empty() {
         return Err(Error::input(
             "start of the descent",
@@ -158,7 +167,17 @@ pub fn minimise(
             "must be at least 1 number",
         ));
     }
-    let (cost, gradient) = whole(function(start), start.len())?;
+    whole(function(start), start.len())
+}
+
+/// As [`minimise`], from a point whose cost and gradient are known; that evaluation counts.
+pub(super) fn descend(
+    function: impl FnMut(&[f64]) -> Result<(f64, Vec<f64>)>,
+    start: &[f64],
+    (cost, gradient): (f64, Vec<f64>),
+    settings: &Settings,
+    mut progress: impl FnMut(&Progress),
+) -> Result<Found> {
     let first = norm(&gradient);
     let clip = settings.clip.map_or(f64::INFINITY, |c| c * first);
     let point = Point {
@@ -170,11 +189,7 @@ pub fn minimise(
         function,
         best: point.clone(),
         last: point,
-        scale: if first > 0.0 {
-            first / settings.first_step
-        } else {
-            1.0
-        },
+        scale: 1.0,
         clip,
         evaluations: 1,
         most: settings.evaluations,

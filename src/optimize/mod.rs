@@ -134,18 +134,19 @@ pub fn lbfgs(simulator: &Simulator, start: Controls, objective: &dyn Objective) 
         let gradient = rollout.gradient(objective)?.controls;
         Ok((cost, gradient.as_slice().to_vec()))
     };
-    let (cost, gradient) = evaluate(start.matrix().as_slice())?;
-    let slope = gradient.iter().map(|g| g * g).sum::<f64>().sqrt();
+    let x = start.matrix().as_slice();
+    let begun = descent::begin(evaluate, x)?;
+    let (cost, slope) = (begun.0, descent::norm(&begun.1));
     let reach = if slope > 0.0 { cost.abs() / slope } else { 1.0 };
     let settings = Settings {
         first_step: if reach > 0.0 { 0.01 * reach } else { 1.0 },
         ..Settings::default()
     };
-    let found = minimise(evaluate, start.matrix().as_slice(), &settings, |_| {})?;
+    let found = descent::descend(evaluate, x, begun, &settings, |_| {})?;
     Ok(Best {
         controls: of(&found.x)?,
         cost: found.cost,
-        rollouts: found.evaluations + 1,
+        rollouts: found.evaluations,
         iterations: found.iterations,
         stop: found.stop,
     })

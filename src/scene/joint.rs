@@ -72,7 +72,7 @@ impl Joint {
     pub fn velocity_labels(&self) -> &'static [&'static str] {
         match self {
             Joint::Fixed => &[],
-            Joint::Prismatic { .. } => &["rate"],
+            Joint::Prismatic { .. } => &["velocity"],
             Joint::Revolute { .. } => &["rate"],
             Joint::Planar { plane } => match plane {
                 Plane::Yz => &["vy", "vz", "rate"],

@@ -8,7 +8,7 @@ use std::path::{Path, PathBuf};
 use serde::Serialize;
 
 use super::Rollout;
-use crate::scene::{Joint, Plane, Scene};
+use crate::scene::Scene;
 use crate::{Error, Result};
 
 /// What is written of a run: one row for the start and one after each step. SI units.
@@ -49,17 +49,11 @@ impl Recording {
     /// Every state of a rollout of a scene.
     pub fn of(scene: &Scene, rollout: &Rollout) -> Self {
         let samples = rollout.samples();
-        let of_joints = |names: fn(&Joint) -> &'static [&'static str]| {
-            let bodies = scene.bodies.iter();
-            let all =
-                bodies.flat_map(|b| names(&b.joint).iter().map(|n| format!("{}.{n}", b.name)));
-            all.collect::<Vec<_>>()
-        };
         Self {
             scene: scene.name.clone(),
             dt: rollout.simulator().time_step(),
-            coordinates: of_joints(coordinates),
-            velocities: of_joints(velocities),
+            coordinates: scene.coordinate_labels(),
+            velocities: scene.velocity_labels(),
             time: samples.iter().map(|s| s.time).collect(),
             q: samples.iter().map(|s| s.q.as_slice().to_vec()).collect(),
             v: samples.iter().map(|s| s.v.as_slice().to_vec()).collect(),
@@ -175,38 +169,6 @@ fn cell(text: &str) -> String {
         format!("\"{}\"", text.replace('"', "\"\""))
     } else {
         text.to_owned()
-    }
-}
-
-/// Names of a joint's coordinates.
-fn coordinates(joint: &Joint) -> &'static [&'static str] {
-    match joint {
-        Joint::Fixed => &[],
-        Joint::Prismatic { .. } => &["position"],
-        Joint::Revolute { .. } => &["angle"],
-        Joint::Planar { plane } => match plane {
-            Plane::Yz => &["y", "z", "angle"],
-            Plane::Zx => &["z", "x", "angle"],
-            Plane::Xy => &["x", "y", "angle"],
-        },
-        Joint::Spherical => &["qw", "qx", "qy", "qz"],
-        Joint::Free => &["x", "y", "z", "qw", "qx", "qy", "qz"],
-    }
-}
-
-/// Names of a joint's velocities.
-fn velocities(joint: &Joint) -> &'static [&'static str] {
-    match joint {
-        Joint::Fixed => &[],
-        Joint::Prismatic { .. } => &["velocity"],
-        Joint::Revolute { .. } => &["rate"],
-        Joint::Planar { plane } => match plane {
-            Plane::Yz => &["vy", "vz", "rate"],
-            Plane::Zx => &["vz", "vx", "rate"],
-            Plane::Xy => &["vx", "vy", "rate"],
-        },
-        Joint::Spherical => &["wx", "wy", "wz"],
-        Joint::Free => &["vx", "vy", "vz", "wx", "wy", "wz"],
     }
 }
 

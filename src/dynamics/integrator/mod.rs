@@ -107,7 +107,7 @@ pub type Memo = Option<DVector<f64>>;
 /// The velocity with which contacts act during a step, from what was kept of it; `v` where nothing was.
 pub fn contact_velocity(memo: &Memo, v: &DVector<f64>) -> DVector<f64> {
     match memo {
-        Some(both) if both.len() == 2 * v.len() => both.rows(v.len(), v.len()).into_owned(),
+        Some(both) if both.len() == 2 * v.len() => contact::parted(both, v.len()).1,
         _ => v.clone(),
     }
 }

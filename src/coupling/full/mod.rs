@@ -23,15 +23,20 @@
 //!
 //! which is Eq. 21 done once, transposed, with the least-squares residual terms that Eq. 21 drops.
 
+mod backend;
 mod body;
 mod check;
+mod model;
 mod pairs;
 mod record;
 mod second;
+mod settings;
 mod system;
 
+pub use backend::{Backend, Reached, Response};
 pub use body::WetBody;
-pub use system::{Preconditioner, SolveSettings, Solver};
+pub use model::Model;
+pub use settings::{Preconditioner, SolveSettings, Solver};
 
 use super::image::Image;
 use super::{Coupling, Exclusions, Record};
@@ -67,26 +72,14 @@ impl Full {
         excluded: Exclusions,
         settings: SolveSettings,
     ) -> Result<Self> {
-        settings.validate(&bodies)?;
-        excluded.check(bodies.len())?;
-        let ranges = |size: &dyn Fn(&WetBody) -> usize| {
-            let mut at = 0;
-            bodies
-                .iter()
-                .map(|b| {
-                    let from = at;
-                    at += size(b);
-                    from..at
-                })
-                .collect::<Vec<_>>()
-        };
+        let model = Model::new(bodies, walls, excluded, settings)?;
         Ok(Self {
-            faces: ranges(&|b| b.faces()),
-            sources: ranges(&|b| b.sources()),
-            images: Image::of_rigid_walls(walls, "the fidelity full")?,
-            excluded,
-            bodies,
-            settings,
+            bodies: model.bodies,
+            images: model.images,
+            excluded: model.excluded,
+            settings: model.settings,
+            faces: model.faces,
+            sources: model.sources,
             spare: Mutex::new(Vec::new()),
         })
     }

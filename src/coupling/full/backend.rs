@@ -81,3 +81,13 @@ pub struct Reached {
     /// Largest relative residual of the normal equations.
     pub residual: f64,
 }
+
+impl Reached {
+    /// The worse of both.
+    pub fn worst(self, other: Self) -> Self {
+        Self {
+            iterations: self.iterations.max(other.iterations),
+            residual: self.residual.max(other.residual),
+        }
+    }
+}

@@ -44,7 +44,8 @@ const THROUGH: &[(&str, &str)] = &[
     ("coupling::full::body::WetBody::potential_vjp", FULL_VJP),
     ("coupling::full::body::WetBody::potential_hvp", FULL_HVP),
     ("coupling::pair::Pair::apply_jvp", FULL_HVP),
-    ("coupling::full::system::System::respond_jvp", FULL_HVP),
+    ("coupling::full::cpu::system::System::respond_jvp", FULL_HVP),
+    ("coupling::full::cpu::response::Answer::gradient", FULL_VJP),
     // Pieces of the equations of motion.
     (
         "dynamics::contact::Touch::displacement_vjp",

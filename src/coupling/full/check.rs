@@ -7,8 +7,9 @@
 //! reported is what normal velocities left between the collocation points are worth.
 
 use super::record::FullRecord;
+use crate::Result;
 use crate::adjoint::kernel::{Points, Sources, Triangles, Write, flux_fill, potential_fill};
-use crate::adjoint::lie::{Vec3, Vec6, six};
+use crate::adjoint::lie::{Pose, Vec3, Vec6, six};
 use crate::coupling::Record;
 use crate::solver::{Columns, product};
 use nalgebra::DMatrix;
@@ -19,20 +20,21 @@ const FACES: usize = 256;
 impl FullRecord<'_> {
     /// The energy of pairs of basis columns over the quarters of all faces, less that reported;
     /// k × k, symmetric.
-    pub fn residual(&self) -> DMatrix<f64> {
-        let (basis, a) = self.solution();
+    pub fn residual(&self, poses: &[Pose], basis: &DMatrix<f64>) -> Result<DMatrix<f64>> {
+        let a = self.response.strengths()?;
+        let pairs = self.model.pairs(poses);
         let k = basis.ncols();
         let mut energy = DMatrix::<f64>::zeros(k, k);
-        for (b, body) in self.full.bodies.iter().enumerate() {
+        for (b, body) in self.model.bodies.iter().enumerate() {
             let boundary = &body.boundary;
             let mut fields = vec![(
                 Sources::new(&boundary.sources),
-                part(a, &self.full.sources[b]),
+                part(&a, &self.model.sources[b]),
             )];
-            for pair in self.pairs.iter().filter(|p| p.target == b) {
+            for pair in pairs.iter().filter(|p| p.target == b) {
                 fields.push((
                     pair.points.clone(),
-                    part(a, &self.full.sources[pair.source]),
+                    part(&a, &self.model.sources[pair.source]),
                 ));
             }
             let twists = basis.rows(6 * b, 6);
@@ -57,7 +59,7 @@ impl FullRecord<'_> {
         }
         let reported = basis.tr_mul(self.momenta());
         let difference = energy - reported;
-        0.5 * (&difference + difference.transpose())
+        Ok(0.5 * (&difference + difference.transpose()))
     }
 }
 

@@ -22,92 +22,80 @@
 //! ```
 //!
 //! which is Eq. 21 done once, transposed, with the least-squares residual terms that Eq. 21 drops.
+//!
+//! What the system consists of is the [`Model`]; a [`Backend`] computes with it, here [`Cpu`].
 
+mod backend;
 mod body;
 mod check;
-mod pairs;
+mod cpu;
+mod model;
 mod record;
-mod second;
-mod system;
+mod settings;
 
+pub use backend::{Backend, Reached, Response};
 pub use body::WetBody;
-pub use system::{Preconditioner, SolveSettings, Solver};
+pub use cpu::Cpu;
+pub use model::Model;
+pub use settings::{Preconditioner, SolveSettings, Solver};
 
-use super::image::Image;
 use super::{Coupling, Exclusions, Record};
 use crate::Result;
 use crate::adjoint::lie::Pose;
 use crate::scene::Wall;
 use nalgebra::DMatrix;
-use std::ops::Range;
-use std::sync::{Arc, Mutex};
+use std::sync::Arc;
 
 /// All bodies coupled through one boundary integral system.
 pub struct Full {
-    bodies: Vec<Arc<WetBody>>,
-    images: Vec<Image>,
-    excluded: Exclusions,
-    settings: SolveSettings,
-    faces: Vec<Range<usize>>,
-    sources: Vec<Range<usize>>,
-    /// Matrices to be used again: fresh memory costs as much as filling it.
-    spare: Mutex<Vec<Vec<f64>>>,
+    model: Arc<Model>,
+    backend: Box<dyn Backend>,
 }
 
 impl Full {
-    /// From the bodies, the walls (one, or mutually perpendicular ones), the pairs of bodies that
-    /// don't feel each other, and the solver's settings.
+    /// On the CPU, from the bodies, the walls (one, or mutually perpendicular ones), the pairs of bodies
+    /// that don't feel each other, and the solver's settings.
     ///
     /// # Errors
-    /// Walls that don't close under reflection, pairs of bodies that don't exist, or settings out of
-    /// range.
+    /// As [`Model::new`].
     pub fn new(
         bodies: Vec<Arc<WetBody>>,
         walls: &[Wall],
         excluded: Exclusions,
         settings: SolveSettings,
     ) -> Result<Self> {
-        settings.validate(&bodies)?;
-        excluded.check(bodies.len())?;
-        let ranges = |size: &dyn Fn(&WetBody) -> usize| {
-            let mut at = 0;
-            bodies
-                .iter()
-                .map(|b| {
-                    let from = at;
-                    at += size(b);
-                    from..at
-                })
-                .collect::<Vec<_>>()
-        };
-        Ok(Self {
-            faces: ranges(&|b| b.faces()),
-            sources: ranges(&|b| b.sources()),
-            images: Image::of_rigid_walls(walls, "the fidelity full")?,
-            excluded,
-            bodies,
-            settings,
-            spare: Mutex::new(Vec::new()),
-        })
+        let model = Arc::new(Model::new(bodies, walls, excluded, settings)?);
+        Ok(Self::on(model.clone(), Box::new(Cpu::new(model))))
+    }
+
+    /// On a backend made for the same model.
+    pub fn on(model: Arc<Model>, backend: Box<dyn Backend>) -> Self {
+        Self { model, backend }
+    }
+
+    /// What the system consists of.
+    pub fn model(&self) -> &Model {
+        &self.model
+    }
+
+    /// What computes it.
+    pub fn backend(&self) -> &dyn Backend {
+        self.backend.as_ref()
     }
 
     /// Number of rows.
     pub fn rows(&self) -> usize {
-        self.faces.last().map_or(0, |r| r.end)
-    }
-
-    fn columns(&self) -> usize {
-        self.sources.last().map_or(0, |r| r.end)
+        self.model.rows()
     }
 }
 
 impl Coupling for Full {
     fn bodies(&self) -> usize {
-        self.bodies.len()
+        self.model.bodies.len()
     }
 
     fn unknowns(&self) -> usize {
-        self.columns()
+        self.model.columns()
     }
 
     fn evaluate(
@@ -123,6 +111,6 @@ impl Coupling for Full {
 
     fn residual(&self, poses: &[Pose], basis: &DMatrix<f64>) -> Result<Option<DMatrix<f64>>> {
         let record = record::FullRecord::new(self, poses, basis, false)?;
-        Ok(Some(record.residual()))
+        Ok(Some(record.residual(poses, basis)?))
     }
 }

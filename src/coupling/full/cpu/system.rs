@@ -1,99 +1,17 @@
 //! The assembled matrix at given poses, and its solves.
 
-use super::{Full, WetBody};
+use super::super::{Preconditioner, Reached, Solver, WetBody};
+use super::Cpu;
 use crate::adjoint::kernel::Write;
-use crate::boundary::Method;
 use crate::coupling::pair::Pair;
-use crate::coupling::settings::check_limits;
 use crate::solver::{Columns, Outcome, cgls, gmres, normal_product, product, transposed_product};
 use crate::{Error, Result};
 use faer::linalg::solvers::Qr;
 use faer::{Mat, MatMut};
-use serde::{Deserialize, Serialize};
-use std::sync::Arc;
-
-/// How the coupled system is solved.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
-#[serde(rename_all = "kebab-case")]
-pub enum Solver {
-    /// Conjugate gradients on the normal equations (Eq. 20), preconditioned.
-    #[default]
-    Cgls,
-    /// Dense QR: the reference.
-    Qr,
-    /// GMRES on the square system of face sources (Eq. 18), and on its transpose.
-    Gmres,
-}
-
-/// Right preconditioner of the iterative solvers.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
-#[serde(rename_all = "kebab-case")]
-pub enum Preconditioner {
-    /// Each body's own QR factor, made once.
-    #[default]
-    Factors,
-    /// Column norms.
-    Jacobi,
-    /// None.
-    None,
-}
-
-/// Settings of the coupled solve.
-#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
-#[serde(deny_unknown_fields, default)]
-pub struct SolveSettings {
-    /// The solver.
-    pub solver: Solver,
-    /// Its preconditioner.
-    pub preconditioner: Preconditioner,
-    /// Relative residual at which it stops: ‖R⁻ᵀ(g − KᵀKx)‖ ≤ tolerance ‖R⁻ᵀg‖ for CGLS,
-    /// ‖b − Kx‖ ≤ tolerance ‖b‖ for GMRES.
-    pub tolerance: f64,
-    /// Iterations after which it gives up with an error.
-    pub max_iterations: usize,
-}
-
-impl Default for SolveSettings {
-    fn default() -> Self {
-        Self {
-            solver: Solver::default(),
-            preconditioner: Preconditioner::default(),
-            tolerance: 1e-8,
-            max_iterations: 2000,
-        }
-    }
-}
-
-impl SolveSettings {
-    pub(super) fn validate(&self, bodies: &[Arc<WetBody>]) -> Result<()> {
-        check_limits(self.tolerance, self.max_iterations)?;
-        let square = |b: &Arc<WetBody>| b.boundary.settings.method == Method::MfsFace;
-        if self.solver == Solver::Gmres
-            && let Some(body) = bodies.iter().find(|b| !square(b))
-        {
-            return Err(Error::Unsupported {
-                what: format!("GMRES for body \"{}\"", body.boundary.name),
-                why: "its system isn't square (vertex sources, a row per face)".into(),
-                instead: "use --method mfs-face, or the solver cgls".into(),
-            });
-        }
-        let damped = |b: &Arc<WetBody>| b.boundary.settings.damping != 0.0;
-        if self.solver == Solver::Gmres
-            && let Some(body) = bodies.iter().find(|b| damped(b))
-        {
-            return Err(Error::input(
-                format!("body \"{}\": damping", body.boundary.name),
-                body.boundary.settings.damping,
-                "must be 0 for GMRES, which solves the square system as it is",
-            ));
-        }
-        Ok(())
-    }
-}
 
 /// K at given poses with what its solver needs.
 pub(super) struct System<'a> {
-    full: &'a Full,
+    cpu: &'a Cpu,
     matrix: Vec<f64>,
     jacobi: Vec<f64>,
     /// D² of the bodies' damping, per source.
@@ -103,7 +21,7 @@ pub(super) struct System<'a> {
 
 impl Drop for System<'_> {
     fn drop(&mut self) {
-        if let Ok(mut spare) = self.full.spare.lock() {
+        if let Ok(mut spare) = self.cpu.spare.lock() {
             spare.push(std::mem::take(&mut self.matrix));
         }
     }
@@ -115,33 +33,33 @@ pub(super) struct Solved {
     pub lambda: Columns,
     pub r: Columns,
     pub mu: Columns,
-    pub iterations: usize,
-    pub residual: f64,
+    pub reached: Reached,
 }
 
 impl<'a> System<'a> {
     /// Assembles K: own blocks from the bodies, zero for excluded pairs, all others from the pairs.
-    pub fn new(full: &'a Full, pairs: &[Pair]) -> Self {
-        let (rows, columns) = (full.rows(), full.columns());
+    pub fn new(cpu: &'a Cpu, pairs: &[Pair]) -> Self {
+        let model = &cpu.model;
+        let (rows, columns) = (model.rows(), model.columns());
         // Every entry is written below, so that what a used matrix held doesn't matter.
-        let spare = full.spare.lock().ok().and_then(|mut s| s.pop());
+        let spare = cpu.spare.lock().ok().and_then(|mut s| s.pop());
         let mut matrix = spare.unwrap_or_else(|| vec![0.0; rows * columns]);
-        for (b, body) in full.bodies.iter().enumerate() {
+        for (b, body) in model.bodies.iter().enumerate() {
             let own = &body.boundary.flux_rows;
             let width = body.sources();
             for (i, row) in own.chunks_exact(width).enumerate() {
-                let at = (full.faces[b].start + i) * columns + full.sources[b].start;
+                let at = (model.faces[b].start + i) * columns + model.sources[b].start;
                 matrix[at..at + width].copy_from_slice(row);
             }
         }
-        for (a, b) in full.excluded.iter().flat_map(|(a, b)| [(a, b), (b, a)]) {
-            for i in full.faces[a].clone() {
-                let sources = &full.sources[b];
+        for (a, b) in model.excluded.iter().flat_map(|(a, b)| [(a, b), (b, a)]) {
+            for i in model.faces[a].clone() {
+                let sources = &model.sources[b];
                 matrix[i * columns + sources.start..i * columns + sources.end].fill(0.0);
             }
         }
         for pair in pairs {
-            let rows = &full.faces[pair.target];
+            let rows = &model.faces[pair.target];
             let out = &mut matrix[rows.start * columns..rows.end * columns];
             // The first that is written there sets, the images after it add.
             let write = if pair.image.is_identity() {
@@ -149,21 +67,21 @@ impl<'a> System<'a> {
             } else {
                 Write::Add
             };
-            let column = full.sources[pair.source].start;
-            full.bodies[pair.target].fill(&pair.points, write, out, columns, column);
+            let column = model.sources[pair.source].start;
+            model.bodies[pair.target].fill(&pair.points, write, out, columns, column);
         }
         let mut out = Self {
-            full,
+            cpu,
             matrix,
             jacobi: Vec::new(),
-            damping: full
+            damping: model
                 .bodies
                 .iter()
                 .flat_map(|b| b.boundary.damping.iter().map(|d| d * d))
                 .collect(),
             qr: None,
         };
-        let settings = &full.settings;
+        let settings = &model.settings;
         if settings.solver == Solver::Qr {
             // [K; D], so that KᵀK + D² = RᵀR.
             let stacked = Mat::from_fn(rows + columns, columns, |i, j| {
@@ -190,7 +108,7 @@ impl<'a> System<'a> {
 
     /// (KᵀK + D²) x.
     fn normal(&self, x: &Columns) -> Columns {
-        let mut out = normal_product(&self.matrix, self.full.rows(), x);
+        let mut out = normal_product(&self.matrix, self.cpu.model.rows(), x);
         let n = x.columns.max(1);
         let rows = out.data.chunks_exact_mut(n).zip(x.data.chunks_exact(n));
         for ((o, x), d) in rows.zip(&self.damping) {
@@ -203,18 +121,18 @@ impl<'a> System<'a> {
 
     /// K x.
     pub fn apply(&self, x: &Columns) -> Columns {
-        product(&self.matrix, self.full.rows(), x)
+        product(&self.matrix, self.cpu.model.rows(), x)
     }
 
     /// Kᵀ y.
     pub fn apply_transpose(&self, y: &Columns) -> Columns {
-        transposed_product(&self.matrix, self.full.columns(), y)
+        transposed_product(&self.matrix, self.cpu.model.columns(), y)
     }
 
     /// Applies a body's factor to its rows of `x`.
     fn per_body(&self, x: &mut Columns, f: impl Fn(&WetBody, MatMut<'_, f64>)) {
         let n = x.columns;
-        for (body, range) in self.full.bodies.iter().zip(&self.full.sources) {
+        for (body, range) in self.cpu.model.bodies.iter().zip(&self.cpu.model.sources) {
             let part = x.slice_mut(range.start, range.end);
             let part = MatMut::from_row_major_slice_mut(part, range.len(), n);
             f(body, part);
@@ -229,7 +147,7 @@ impl<'a> System<'a> {
     }
 
     fn precondition(&self, x: &mut Columns) {
-        match self.full.settings.preconditioner {
+        match self.cpu.model.settings.preconditioner {
             Preconditioner::Factors => self.per_body(x, |b, x| b.boundary.solve_factor(x)),
             Preconditioner::Jacobi => self.scale(x),
             Preconditioner::None => {}
@@ -237,7 +155,7 @@ impl<'a> System<'a> {
     }
 
     fn precondition_transpose(&self, x: &mut Columns) {
-        match self.full.settings.preconditioner {
+        match self.cpu.model.settings.preconditioner {
             Preconditioner::Factors => {
                 self.per_body(x, |b, x| b.boundary.solve_factor_transpose(x));
             }
@@ -248,7 +166,7 @@ impl<'a> System<'a> {
 
     /// `x ← K_bb⁻¹ x` per body, or its transpose, for square blocks: (R⁻¹R⁻ᵀ) Kᵀ and K (R⁻¹R⁻ᵀ).
     fn square_precondition(&self, x: &mut Columns, transpose: bool) {
-        match self.full.settings.preconditioner {
+        match self.cpu.model.settings.preconditioner {
             Preconditioner::Factors => self.per_body(x, |b, mut x| {
                 let own = b.boundary.flux_matrix();
                 let normal = |m: &mut Mat<f64>| {
@@ -272,7 +190,7 @@ impl<'a> System<'a> {
 
     /// Solves `(KᵀK + D²) x = g`.
     pub fn normal_solve(&self, g: &Columns, what: &str) -> Result<Outcome> {
-        let settings = &self.full.settings;
+        let settings = &self.cpu.model.settings;
         if let Some(qr) = &self.qr {
             let mut x = g.as_mat().to_owned();
             let r = qr.thin_R();
@@ -296,7 +214,7 @@ impl<'a> System<'a> {
     }
 
     fn check(&self, outcome: Outcome, what: &str) -> Result<Outcome> {
-        let settings = &self.full.settings;
+        let settings = &self.cpu.model.settings;
         // The recurrence's residual may stall a little above at round-off.
         if outcome.residual <= settings.tolerance.max(1e-13) * 1.001 {
             return Ok(outcome);
@@ -304,8 +222,8 @@ impl<'a> System<'a> {
         Err(Error::Solver {
             what: format!(
                 "{what} ({} rows, {} unknowns)",
-                self.full.rows(),
-                self.full.columns()
+                self.cpu.model.rows(),
+                self.cpu.model.columns()
             ),
             iterations: outcome.iterations,
             residual: outcome.residual,
@@ -317,7 +235,7 @@ impl<'a> System<'a> {
     }
 
     fn square_solve(&self, b: &Columns, transpose: bool, what: &str) -> Result<Outcome> {
-        let settings = &self.full.settings;
+        let settings = &self.cpu.model.settings;
         let outcome = gmres(
             |x| {
                 if transpose {
@@ -337,14 +255,13 @@ impl<'a> System<'a> {
 
     /// Solves for a and λ from `F x̄` and `Pᵀ B x̄`.
     pub fn respond(&self, f: &Columns, g: &Columns) -> Result<Solved> {
-        if self.full.settings.solver == Solver::Gmres {
+        if self.cpu.model.settings.solver == Solver::Gmres {
             let a = self.square_solve(f, false, "coupled system (Eq. 18)")?;
             let mu = self.square_solve(g, true, "transposed coupled system")?;
             return Ok(Solved {
                 lambda: Columns::zeros(g.rows, g.columns),
                 r: Columns::zeros(f.rows, f.columns),
-                iterations: a.iterations.max(mu.iterations),
-                residual: a.residual.max(mu.residual),
+                reached: reached(&a).worst(reached(&mu)),
                 a: a.x,
                 mu: mu.x,
             });
@@ -363,8 +280,7 @@ impl<'a> System<'a> {
             lambda,
             r,
             mu,
-            iterations: solved.iterations,
-            residual: solved.residual,
+            reached: reached(&solved),
         })
     }
 
@@ -378,7 +294,7 @@ impl<'a> System<'a> {
     ) -> Result<Solved> {
         let n = dka.columns;
         let minus = vec![-1.0; n];
-        if self.full.settings.solver == Solver::Gmres {
+        if self.cpu.model.settings.solver == Solver::Gmres {
             let mut right = dka.clone();
             right.data.iter_mut().for_each(|x| *x = -*x);
             let a = self.square_solve(&right, false, "tangent of the coupled system (Eq. 21)")?;
@@ -386,8 +302,7 @@ impl<'a> System<'a> {
             return Ok(Solved {
                 lambda: Columns::zeros(dg.rows, n),
                 r: Columns::zeros(dka.rows, n),
-                iterations: a.iterations.max(mu.iterations),
-                residual: a.residual.max(mu.residual),
+                reached: reached(&a).worst(reached(&mu)),
                 a: a.x,
                 mu: mu.x,
             });
@@ -409,20 +324,28 @@ impl<'a> System<'a> {
             lambda,
             r,
             mu,
-            iterations: solved.iterations,
-            residual: solved.residual,
+            reached: reached(&solved),
         })
     }
 }
 
-fn join(a: &Columns, b: &Columns) -> Columns {
+fn reached(outcome: &Outcome) -> Reached {
+    Reached {
+        iterations: outcome.iterations,
+        residual: outcome.residual,
+    }
+}
+
+/// The columns of both side by side.
+pub(super) fn join(a: &Columns, b: &Columns) -> Columns {
     let n = a.columns;
     Columns::from_fn(a.rows, n + b.columns, |i, k| {
         if k < n { a.at(i, k) } else { b.at(i, k - n) }
     })
 }
 
-fn split(x: &Columns, n: usize) -> (Columns, Columns) {
+/// The first n columns and the others.
+pub(super) fn split(x: &Columns, n: usize) -> (Columns, Columns) {
     (
         Columns::from_fn(x.rows, n, |i, k| x.at(i, k)),
         Columns::from_fn(x.rows, x.columns - n, |i, k| x.at(i, n + k)),

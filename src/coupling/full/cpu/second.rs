@@ -1,10 +1,13 @@
 //! Second derivatives along one displacement: the tangent of the first.
 
-use super::body::unit_twists;
-use super::record::{FullRecord, Response, gradient_at};
+use super::super::body::unit_twists;
+use super::gradient_at;
+use super::placed::{Placed, Solution, body_twists};
+use super::system::{Solved, join, split};
 use crate::Result;
 use crate::adjoint::lie::{Vec3, Vec6, six};
-use crate::coupling::{Direction, Tangent};
+use crate::coupling::Tangent;
+use crate::coupling::pair::Pair;
 use crate::solver::Columns;
 use nalgebra::DVector;
 
@@ -17,41 +20,23 @@ struct PairFields {
     readout: Vec<f64>,
 }
 
-/// Column `k` of every response, `[row][column]`.
-fn gather(responses: &[&Response], part: impl Fn(&Response) -> [&Vec<f64>; 2]) -> Columns {
-    let all: Vec<&[f64]> = (0..2)
-        .flat_map(|h| responses.iter().map(move |r| (h, r)))
-        .map(|(h, r)| part(r)[h].as_slice())
-        .collect();
-    Columns::from_columns(&all)
-}
+impl Placed<'_> {
+    /// The tangent along z of the energy of the first with the last of one or two columns.
+    pub fn second(&self, solution: &Solution, z: &[Vec6]) -> Result<Tangent> {
+        let n = solution.columns();
+        let right = join(&solution.a, &solution.lambda);
+        let left = join(&solution.mu, &solution.r);
+        let bodies = self.model.bodies.len();
 
-impl FullRecord<'_> {
-    pub(super) fn second(&self, x: Direction, y: Direction, z: &[Vec6]) -> Result<Tangent> {
-        let same = match (&x, &y) {
-            (Direction::Basis(a), Direction::Basis(b)) => a == b,
-            (Direction::Twist(a), Direction::Twist(b)) => a == b,
-            _ => false,
-        };
-        let mut owned = vec![self.respond(x)?];
-        if !same {
-            owned.push(self.respond(y)?);
-        }
-        let responses: Vec<&Response> = owned.iter().collect();
-        let n = responses.len();
-        let right = gather(&responses, |r| [&r.a, &r.lambda]);
-        let left = gather(&responses, |r| [&r.mu, &r.r]);
-        let bodies = self.full.bodies.len();
-
-        let mut dk = Columns::zeros(self.full.rows(), 2 * n);
+        let mut dk = Columns::zeros(self.model.rows(), 2 * n);
         let mut dkr = Columns::zeros(right.rows, n);
         let mut dg = Columns::zeros(right.rows, n);
         let mut impulse = vec![vec![Vec6::zeros(); n]; bodies];
         let mut kept = Vec::with_capacity(self.pairs.len());
         for pair in &self.pairs {
-            let body = &self.full.bodies[pair.target];
-            let faces = &self.full.faces[pair.target];
-            let sources = &self.full.sources[pair.source];
+            let body = &self.model.bodies[pair.target];
+            let faces = &self.model.faces[pair.target];
+            let sources = &self.model.sources[pair.source];
             let d = pair.displacements(&self.poses[pair.target], z);
             body.jvp(
                 &pair.points,
@@ -63,24 +48,24 @@ impl FullRecord<'_> {
             let fields = body.vjp(&pair.points, left.slice(faces.start, faces.end), 2 * n);
             let mut readout = vec![0.0; 3 * n * d.len()];
             let units = unit_twists();
+            let twists = body_twists(&solution.twists, pair.target);
             let six_fields = match self.readout[pair.target] {
                 Some(_) => body.potential_vjp(&pair.points, &body.readout_rows(&units), 6),
                 None => Vec::new(),
             };
             for (j, dj) in d.iter().enumerate() {
                 let s = sources.start + j;
-                for (k, response) in responses.iter().enumerate() {
+                for (k, twist) in twists.iter().enumerate() {
                     dkr.data[s * n + k] += dj.dot(&gradient_at(&fields, 2 * n, j, n + k));
                     dg.data[s * n + k] -= dj.dot(&gradient_at(&fields, 2 * n, j, k));
                     if six_fields.is_empty() {
                         continue;
                     }
                     let mut field = Vec3::zeros();
-                    let twist = &response.twists[pair.target];
                     for (m, part) in impulse[pair.target][k].iter_mut().enumerate() {
                         let g = gradient_at(&six_fields, 6, j, m);
                         field += g * twist[m];
-                        *part += dj.dot(&g) * response.a[s];
+                        *part += dj.dot(&g) * right.at(s, k);
                     }
                     dg.data[s * n + k] += dj.dot(&field);
                     let at = 3 * (j * n + k);
@@ -93,8 +78,7 @@ impl FullRecord<'_> {
                 readout,
             });
         }
-        let dka = Columns::from_fn(dk.rows, n, |i, k| dk.at(i, k));
-        let dkl = Columns::from_fn(dk.rows, n, |i, k| dk.at(i, n + k));
+        let (dka, dkl) = split(&dk, n);
         let tangent = self.system.respond_jvp(&dka, &dkl, &dkr, &dg)?;
 
         let momenta: Vec<DVector<f64>> = (0..n)
@@ -111,7 +95,7 @@ impl FullRecord<'_> {
         let mut gradient = vec![Vec6::zeros(); bodies];
         let mut wrench = vec![Vec6::zeros(); bodies];
         for (pair, first) in self.pairs.iter().zip(&kept) {
-            let (w, dw) = self.pair_tangent(pair, first, &responses, &left, &tangent);
+            let (w, dw) = self.pair_tangent(pair, first, solution, &left, &tangent);
             pair.apply(&self.poses[pair.target], &w, &mut gradient);
             pair.apply_jvp(
                 &self.poses[pair.target],
@@ -132,15 +116,15 @@ impl FullRecord<'_> {
     /// Wrench on the sources of a pair and its tangent, in the target's frame.
     fn pair_tangent(
         &self,
-        pair: &crate::coupling::pair::Pair,
+        pair: &Pair,
         first: &PairFields,
-        responses: &[&Response],
+        solution: &Solution,
         left: &Columns,
-        tangent: &super::system::Solved,
+        tangent: &Solved,
     ) -> (Vec6, Vec6) {
-        let n = responses.len();
-        let body = &self.full.bodies[pair.target];
-        let faces = self.full.faces[pair.target].clone();
+        let n = solution.columns();
+        let body = &self.model.bodies[pair.target];
+        let faces = self.model.faces[pair.target].clone();
         let d = &first.displacement;
         let moved: Vec<f64> = faces
             .clone()
@@ -151,9 +135,9 @@ impl FullRecord<'_> {
             .collect();
         let dfields = body.vjp(&pair.points, &moved, 2 * n);
         let bent = body.hvp(&pair.points, d, left.slice(faces.start, faces.end), 2 * n);
-        let twists: Vec<Vec6> = responses.iter().map(|r| r.twists[pair.target]).collect();
+        let twists = body_twists(&solution.twists, pair.target);
         let bent_readout = body.potential_hvp(&pair.points, d, &body.readout_rows(&twists), n);
-        let at = self.full.sources[pair.source].start;
+        let at = self.model.sources[pair.source].start;
         // (x, y, weight) of the symmetrised form.
         let terms: &[(usize, usize, f64)] = if n == 1 {
             &[(0, 0, 1.0)]
@@ -173,7 +157,7 @@ impl FullRecord<'_> {
                     - gradient_at(&dfields, 2 * n, j, x);
                 let dresidual =
                     gradient_at(&bent, 2 * n, j, n + x) + gradient_at(&dfields, 2 * n, j, n + x);
-                let (a, lambda) = (responses[y].a[source], responses[y].lambda[source]);
+                let (a, lambda) = (solution.a.at(source, y), solution.lambda.at(source, y));
                 let (da, dlambda) = (tangent.a.at(source, y), tangent.lambda.at(source, y));
                 f += weight * (charge * a + residual * lambda);
                 df +=

@@ -1,0 +1,134 @@
+//! First derivatives with the bodies' displacement.
+
+use super::gradient_at;
+use super::placed::{Placed, Solution, body_twists};
+use crate::adjoint::lie::Vec6;
+use crate::coupling::PairTensor;
+use crate::coupling::pair::{Pair, wrench};
+use crate::solver::{Columns, transposed_product};
+use nalgebra::DMatrix;
+
+impl Placed<'_> {
+    /// ∇_g E of all pairs of columns by products of matrices, for many columns.
+    pub fn tensor(&self, solution: &Solution) -> PairTensor {
+        let k = solution.columns();
+        let mut wrenches = vec![DMatrix::zeros(6, k * k); self.model.bodies.len()];
+        for pair in &self.pairs {
+            let raw = self.pair_tensor(pair, solution);
+            let pose = &self.poses[pair.target];
+            for x in 0..k {
+                for y in 0..=x {
+                    let w =
+                        Vec6::from_fn(|c, _| 0.5 * (raw.at(6 * x + c, y) + raw.at(6 * y + c, x)));
+                    let world = pose.wrench_to_world(&w);
+                    let back = pair.image.twist_vjp(&world);
+                    let mut add = |b: usize, w: &Vec6| {
+                        let mut column = wrenches[b].fixed_view_mut::<6, 1>(0, x * k + y);
+                        column += w;
+                        if x != y {
+                            let mut column = wrenches[b].fixed_view_mut::<6, 1>(0, y * k + x);
+                            column += w;
+                        }
+                    };
+                    add(pair.source, &back);
+                    add(pair.target, &-world);
+                }
+            }
+        }
+        PairTensor::new(k, wrenches)
+    }
+
+    /// Σ_j arm_j { (∇P_x − ∇μ_x) a_y + ∇r_x λ_y }, rows 6·x + component, columns y, in the target's frame.
+    fn pair_tensor(&self, pair: &Pair, solution: &Solution) -> Columns {
+        let k = solution.columns();
+        let body = &self.model.bodies[pair.target];
+        let twists = body_twists(&solution.twists, pair.target);
+        let active: Vec<usize> = (0..k).filter(|x| twists[*x] != Vec6::zeros()).collect();
+        let own: Vec<Vec6> = active.iter().map(|x| twists[*x]).collect();
+        let faces = &self.model.faces[pair.target];
+        let (mu, r) = (
+            solution.mu.slice(faces.start, faces.end),
+            solution.r.slice(faces.start, faces.end),
+        );
+        let mut bar = Vec::with_capacity(2 * mu.len());
+        for (m, r) in mu.chunks_exact(k).zip(r.chunks_exact(k)) {
+            bar.extend_from_slice(m);
+            bar.extend_from_slice(r);
+        }
+        let fields = body.vjp(&pair.points, &bar, 2 * k);
+        let potential = body.potential_vjp(&pair.points, &body.readout_rows(&own), own.len());
+        let sources = pair.positions.len();
+        let mut charge = vec![0.0; sources * 6 * k];
+        let mut residual = vec![0.0; sources * 6 * k];
+        for (j, s) in pair.positions.iter().enumerate() {
+            for x in 0..k {
+                let mut q = -gradient_at(&fields, 2 * k, j, x);
+                if let Some(at) = active.iter().position(|i| *i == x) {
+                    q += gradient_at(&potential, own.len(), j, at);
+                }
+                let rho = gradient_at(&fields, 2 * k, j, k + x);
+                let at = (j * k + x) * 6;
+                charge[at..at + 3].copy_from_slice(q.as_slice());
+                charge[at + 3..at + 6].copy_from_slice(s.cross(&q).as_slice());
+                residual[at..at + 3].copy_from_slice(rho.as_slice());
+                residual[at + 3..at + 6].copy_from_slice(s.cross(&rho).as_slice());
+            }
+        }
+        let range = &self.model.sources[pair.source];
+        let part = |x: &Columns| Columns {
+            rows: sources,
+            columns: k,
+            data: x.slice(range.start, range.end).to_vec(),
+        };
+        let mut out = transposed_product(&charge, 6 * k, &part(&solution.a));
+        let rest = transposed_product(&residual, 6 * k, &part(&solution.lambda));
+        out.add_scaled(&rest, &vec![1.0; k]);
+        out
+    }
+
+    /// ∇_g E of all pairs of columns by plain sums, which for one or two columns cost less than
+    /// setting up the products of [`Placed::tensor`].
+    pub fn few(&self, solution: &Solution) -> PairTensor {
+        let k = solution.columns();
+        let combinations: Vec<(usize, usize)> =
+            (0..k).flat_map(|x| (x..k).map(move |y| (x, y))).collect();
+        let bodies = self.model.bodies.len();
+        let mut sums = vec![vec![Vec6::zeros(); bodies]; combinations.len()];
+        let (a, lambda) = (&solution.a, &solution.lambda);
+        for pair in &self.pairs {
+            let t = pair.target;
+            let body = &self.model.bodies[t];
+            let faces = self.model.faces[t].clone();
+            let (mu, r) = (&solution.mu, &solution.r);
+            let bar: Vec<f64> = faces
+                .flat_map(|i| mu.row(i).iter().chain(r.row(i)).copied())
+                .collect();
+            let fields = body.vjp(&pair.points, &bar, 2 * k);
+            let rows = body.readout_rows(&body_twists(&solution.twists, t));
+            let potential = body.potential_vjp(&pair.points, &rows, k);
+            let at = self.model.sources[pair.source].start;
+            for ((x, y), out) in combinations.iter().copied().zip(&mut sums) {
+                let w = wrench(&pair.positions, |j| {
+                    let (g, p) = (
+                        |k2| gradient_at(&fields, 2 * k, j, k2),
+                        |k1| gradient_at(&potential, k, j, k1),
+                    );
+                    let s = at + j;
+                    0.5 * ((p(x) - g(x)) * a.at(s, y)
+                        + g(k + x) * lambda.at(s, y)
+                        + (p(y) - g(y)) * a.at(s, x)
+                        + g(k + y) * lambda.at(s, x))
+                });
+                pair.apply(&self.poses[t], &w, out);
+            }
+        }
+        let mut wrenches = vec![DMatrix::zeros(6, k * k); bodies];
+        for ((x, y), sums) in combinations.into_iter().zip(&sums) {
+            for (out, w) in wrenches.iter_mut().zip(sums) {
+                out.set_column(x * k + y, w);
+                out.set_column(y * k + x, w);
+            }
+        }
+        PairTensor::new(k, wrenches)
+    }
+}

@@ -1,0 +1,204 @@
+//! The coupled system at given poses: what all answers there share.
+
+use super::super::body::unit_twists;
+use super::super::{Model, Reached};
+use super::Cpu;
+use super::system::{Solved, System};
+use crate::Result;
+use crate::adjoint::lie::{Pose, Vec6};
+use crate::coupling::pair::Pair;
+use crate::solver::Columns;
+use nalgebra::{DMatrix, DVector};
+
+/// The system at given poses.
+pub(super) struct Placed<'a> {
+    pub model: &'a Model,
+    pub poses: Vec<Pose>,
+    pub pairs: Vec<Pair>,
+    pub system: System<'a>,
+    /// Pᵀ B₆ of each body that the first twists move, over all sources.
+    pub readout: Vec<Option<Columns>>,
+}
+
+/// Twists, 6·bodies × k, and what they make.
+pub(super) struct Solution {
+    pub twists: DMatrix<f64>,
+    pub a: Columns,
+    pub lambda: Columns,
+    pub mu: Columns,
+    pub r: Columns,
+    pub reached: Reached,
+}
+
+impl<'a> Placed<'a> {
+    /// For twists that move the same bodies as these, or fewer.
+    pub fn new(cpu: &'a Cpu, poses: &[Pose], twists: &DMatrix<f64>) -> Self {
+        let model = &*cpu.model;
+        let pairs = model.pairs(poses);
+        let moving: Vec<bool> = (0..model.bodies.len()).map(|b| moves(twists, b)).collect();
+        Self {
+            model,
+            poses: poses.to_vec(),
+            system: System::new(cpu, &pairs),
+            readout: readouts(model, &pairs, &moving),
+            pairs,
+        }
+    }
+
+    /// Pᵀ B x̄ of columns of twists, sources × k.
+    pub fn source_side(&self, twists: &DMatrix<f64>) -> Columns {
+        let mut out = Columns::zeros(self.model.columns(), twists.ncols());
+        for (b, readout) in self.readout.iter().enumerate() {
+            let Some(readout) = readout.as_ref().filter(|_| moves(twists, b)) else {
+                continue;
+            };
+            let twists = body_twists(twists, b);
+            for j in 0..out.rows {
+                let row = Vec6::from_row_slice(readout.row(j));
+                for (x, twist) in out.slice_mut(j, j + 1).iter_mut().zip(&twists) {
+                    *x += row.dot(twist);
+                }
+            }
+        }
+        out
+    }
+
+    /// F x̄ of columns of twists, faces × k.
+    fn face_side(&self, twists: &DMatrix<f64>) -> Columns {
+        let mut out = Columns::zeros(self.model.rows(), twists.ncols());
+        for (b, body) in self.model.bodies.iter().enumerate() {
+            if moves(twists, b) {
+                let range = &self.model.faces[b];
+                out.slice_mut(range.start, range.end)
+                    .copy_from_slice(&body.twist_rows(&body_twists(twists, b)));
+            }
+        }
+        out
+    }
+
+    /// Solves for columns of twists.
+    pub fn solve(&self, twists: DMatrix<f64>) -> Result<Solution> {
+        let (f, g) = (self.face_side(&twists), self.source_side(&twists));
+        let Solved {
+            a,
+            lambda,
+            r,
+            mu,
+            reached,
+        } = self.system.respond(&f, &g)?;
+        Ok(Solution {
+            twists,
+            a,
+            lambda,
+            mu,
+            r,
+            reached,
+        })
+    }
+
+    /// ½ {B₆ᵀ P a + F₆ᵀ μ} of one column: body-frame impulses of all bodies, zero for those without a
+    /// readout.
+    pub fn impulse(&self, a: &[f64], mu: &[f64]) -> DVector<f64> {
+        let mut out = DVector::zeros(6 * self.model.bodies.len());
+        for (b, body) in self.model.bodies.iter().enumerate() {
+            let Some(readout) = &self.readout[b] else {
+                continue;
+            };
+            let mut h = Vec6::zeros();
+            for (j, strength) in a.iter().enumerate() {
+                h += Vec6::from_row_slice(readout.row(j)) * *strength;
+            }
+            let range = self.model.faces[b].clone();
+            for (row, m) in body.boundary.twist_rows.iter().zip(&mu[range]) {
+                h += row * *m;
+            }
+            out.fixed_rows_mut::<6>(6 * b).copy_from(&(0.5 * h));
+        }
+        out
+    }
+}
+
+impl Solution {
+    /// Number of columns.
+    pub fn columns(&self) -> usize {
+        self.twists.ncols()
+    }
+
+    /// One column from coefficients on those there are.
+    pub fn combine(&self, coefficients: &DVector<f64>) -> Self {
+        let c = coefficients.as_slice();
+        let combined = |x: &Columns| Columns {
+            rows: x.rows,
+            columns: 1,
+            data: x.combine(c),
+        };
+        let twists = &self.twists * coefficients;
+        Self {
+            twists: DMatrix::from_column_slice(twists.len(), 1, twists.as_slice()),
+            a: combined(&self.a),
+            lambda: combined(&self.lambda),
+            mu: combined(&self.mu),
+            r: combined(&self.r),
+            reached: self.reached,
+        }
+    }
+
+    /// Single columns side by side.
+    pub fn beside(parts: &[Self]) -> Self {
+        let all = |part: fn(&Self) -> &Columns| {
+            let columns: Vec<&[f64]> = parts.iter().map(|p| part(p).data.as_slice()).collect();
+            Columns::from_columns(&columns)
+        };
+        let rows = parts.first().map_or(0, |p| p.twists.nrows());
+        let reached = parts.iter().map(|p| p.reached);
+        Self {
+            twists: DMatrix::from_fn(rows, parts.len(), |i, k| parts[k].twists[(i, 0)]),
+            a: all(|p| &p.a),
+            lambda: all(|p| &p.lambda),
+            mu: all(|p| &p.mu),
+            r: all(|p| &p.r),
+            reached: reached.fold(Reached::default(), Reached::worst),
+        }
+    }
+}
+
+/// Whether any column moves body `b`.
+fn moves(twists: &DMatrix<f64>, b: usize) -> bool {
+    twists.rows(6 * b, 6).iter().any(|x| *x != 0.0)
+}
+
+/// Twists of body `b` in the columns of a stacked matrix.
+pub(super) fn body_twists(twists: &DMatrix<f64>, b: usize) -> Vec<Vec6> {
+    (0..twists.ncols())
+        .map(|k| twists.fixed_view::<6, 1>(6 * b, k).into_owned())
+        .collect()
+}
+
+/// Pᵀ B₆ of each moving body over all sources: its own block and every image that its faces see.
+fn readouts(model: &Model, pairs: &[Pair], moving: &[bool]) -> Vec<Option<Columns>> {
+    let units = unit_twists();
+    let mut out: Vec<Option<Columns>> = moving
+        .iter()
+        .map(|m| m.then(|| Columns::zeros(model.columns(), 6)))
+        .collect();
+    for (b, body) in model.bodies.iter().enumerate() {
+        if let Some(columns) = &mut out[b] {
+            let own = columns.slice_mut(model.sources[b].start, model.sources[b].end);
+            for (row, p) in own.chunks_exact_mut(6).zip(&body.boundary.readout) {
+                row.copy_from_slice(p.as_slice());
+            }
+        }
+    }
+    for pair in pairs {
+        let body = &model.bodies[pair.target];
+        if let Some(columns) = &mut out[pair.target] {
+            let part = body.potential(&pair.points, &body.readout_rows(&units), 6);
+            let range = &model.sources[pair.source];
+            let target = columns.slice_mut(range.start, range.end);
+            for (t, p) in target.iter_mut().zip(part) {
+                *t += p;
+            }
+        }
+    }
+    out
+}

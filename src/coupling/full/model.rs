@@ -1,0 +1,94 @@
+//! What the coupled system consists of.
+
+use super::{SolveSettings, WetBody};
+use crate::Result;
+use crate::adjoint::lie::Pose;
+use crate::coupling::Exclusions;
+use crate::coupling::image::Image;
+use crate::coupling::pair::Pair;
+use crate::scene::Wall;
+use std::ops::Range;
+use std::sync::Arc;
+
+/// What the coupled system consists of, whoever solves it: all that doesn't change with the poses.
+pub struct Model {
+    /// The bodies, each in its own frame; those of equal shape share one.
+    pub bodies: Vec<Arc<WetBody>>,
+    /// Images that the walls make, in the world frame; the identity first.
+    pub images: Vec<Image>,
+    /// Pairs of bodies that don't feel each other but by images.
+    pub excluded: Exclusions,
+    /// How the system is solved.
+    pub settings: SolveSettings,
+    /// Rows of K of each body: its faces.
+    pub faces: Vec<Range<usize>>,
+    /// Columns of K of each body: its sources.
+    pub sources: Vec<Range<usize>>,
+}
+
+impl Model {
+    /// From the bodies, the walls (one, or mutually perpendicular ones), the pairs of bodies that
+    /// don't feel each other, and the solver's settings.
+    ///
+    /// # Errors
+    /// Walls that don't close under reflection, pairs of bodies that don't exist, or settings out of
+    /// range.
+    pub fn new(
+        bodies: Vec<Arc<WetBody>>,
+        walls: &[Wall],
+        excluded: Exclusions,
+        settings: SolveSettings,
+    ) -> Result<Self> {
+        settings.validate(&bodies)?;
+        excluded.check(bodies.len())?;
+        let ranges = |size: &dyn Fn(&WetBody) -> usize| {
+            let mut at = 0;
+            bodies
+                .iter()
+                .map(|b| {
+                    let from = at;
+                    at += size(b);
+                    from..at
+                })
+                .collect::<Vec<_>>()
+        };
+        Ok(Self {
+            faces: ranges(&|b| b.faces()),
+            sources: ranges(&|b| b.sources()),
+            images: Image::of_rigid_walls(walls, "the fidelity full")?,
+            excluded,
+            bodies,
+            settings,
+        })
+    }
+
+    /// Number of rows of K: the faces of all bodies.
+    pub fn rows(&self) -> usize {
+        self.faces.last().map_or(0, |r| r.end)
+    }
+
+    /// Number of columns of K: the sources of all bodies.
+    pub fn columns(&self) -> usize {
+        self.sources.last().map_or(0, |r| r.end)
+    }
+
+    /// The pairs of (target body, source body's image) whose placement changes: all but each body with
+    /// its own sources and with those of bodies that it doesn't feel; images count always.
+    pub(super) fn pairs(&self, poses: &[Pose]) -> Vec<Pair> {
+        let mut out = Vec::new();
+        for target in 0..self.bodies.len() {
+            for image in &self.images {
+                for source in 0..self.bodies.len() {
+                    let apart = source == target || self.excluded.contains(source, target);
+                    if apart && image.is_identity() {
+                        continue;
+                    }
+                    let own = &self.bodies[source].boundary.sources;
+                    let (at, from) = ((target, &poses[target]), (source, &poses[source]));
+                    out.push(Pair::new(at, from, image, own));
+                }
+            }
+        }
+        out
+    }
+}

@@ -1,0 +1,87 @@
+//! How the coupled system is solved, whoever solves it.
+
+use super::WetBody;
+use crate::boundary::Method;
+use crate::coupling::settings::check_limits;
+use crate::{Error, Result};
+use serde::{Deserialize, Serialize};
+use std::sync::Arc;
+
+/// How the coupled system is solved.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "kebab-case")]
+pub enum Solver {
+    /// Conjugate gradients on the normal equations (Eq. 20), preconditioned.
+    #[default]
+    Cgls,
+    /// Dense QR: the reference.
+    Qr,
+    /// GMRES on the square system of face sources (Eq. 18), and on its transpose.
+    Gmres,
+}
+
+/// Right preconditioner of the iterative solvers.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "kebab-case")]
+pub enum Preconditioner {
+    /// Each body's own QR factor, made once.
+    #[default]
+    Factors,
+    /// Column norms.
+    Jacobi,
+    /// None.
+    None,
+}
+
+/// Settings of the coupled solve.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields, default)]
+pub struct SolveSettings {
+    /// The solver.
+    pub solver: Solver,
+    /// Its preconditioner.
+    pub preconditioner: Preconditioner,
+    /// Relative residual at which it stops: ‖R⁻ᵀ(g − KᵀKx)‖ ≤ tolerance ‖R⁻ᵀg‖ for CGLS,
+    /// ‖b − Kx‖ ≤ tolerance ‖b‖ for GMRES.
+    pub tolerance: f64,
+    /// Iterations after which it gives up with an error.
+    pub max_iterations: usize,
+}
+
+impl Default for SolveSettings {
+    fn default() -> Self {
+        Self {
+            solver: Solver::default(),
+            preconditioner: Preconditioner::default(),
+            tolerance: 1e-8,
+            max_iterations: 2000,
+        }
+    }
+}
+
+impl SolveSettings {
+    pub(super) fn validate(&self, bodies: &[Arc<WetBody>]) -> Result<()> {
+        check_limits(self.tolerance, self.max_iterations)?;
+        let square = |b: &Arc<WetBody>| b.boundary.settings.method == Method::MfsFace;
+        if self.solver == Solver::Gmres
+            && let Some(body) = bodies.iter().find(|b| !square(b))
+        {
+            return Err(Error::Unsupported {
+                what: format!("GMRES for body \"{}\"", body.boundary.name),
+                why: "its system isn't square (vertex sources, a row per face)".into(),
+                instead: "use --method mfs-face, or the solver cgls".into(),
+            });
+        }
+        let damped = |b: &Arc<WetBody>| b.boundary.settings.damping != 0.0;
+        if self.solver == Solver::Gmres
+            && let Some(body) = bodies.iter().find(|b| damped(b))
+        {
+            return Err(Error::input(
+                format!("body \"{}\": damping", body.boundary.name),
+                body.boundary.settings.damping,
+                "must be 0 for GMRES, which solves the square system as it is",
+            ));
+        }
+        Ok(())
+    }
+}

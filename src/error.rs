@@ -80,6 +80,16 @@ pub enum Error {
         /// What to change.
         remedy: String,
     },
+    /// A GPU that isn't there, can't do what is needed, or failed.
+    #[error("GPU {adapter}: {what}; {remedy}")]
+    Device {
+        /// The adapter's name.
+        adapter: String,
+        /// What it lacks, with the number needed, or how it failed.
+        what: String,
+        /// What to do.
+        remedy: String,
+    },
     /// A combination of settings that has no meaning or isn't offered.
     #[error("{what} is not available: {why}; {instead}")]
     Unsupported {
@@ -132,6 +142,7 @@ impl Error {
             | Self::Parse { message: said, .. }
             | Self::Solver { what: said, .. }
             | Self::Unresolved { place: said, .. }
+            | Self::Device { what: said, .. }
             | Self::Unsupported { what: said, .. } => {
                 if !said.contains("t = ") {
                     said.push_str(&format!(" at t = {} s", readable(time)));

@@ -8,6 +8,8 @@ pub mod contact;
 pub mod coupling;
 pub mod dynamics;
 pub mod error;
+#[cfg(feature = "gpu")]
+pub mod gpu;
 pub mod multibody;
 pub mod notation;
 #[cfg(feature = "opt")]

@@ -7,7 +7,7 @@ use std::path::{Path, PathBuf};
 /// `Error` and `Result` alone.
 ///
 /// `adjoint::lie` gives vectors and poses to everyone; the modules marked `adjoint` use the ladder too.
-const LAYERS: [(&str, &[&str]); 14] = [
+const LAYERS: [(&str, &[&str]); 15] = [
     ("error", &[]),
     ("scene", &["shape"]),
     ("special", &[]),
@@ -15,6 +15,7 @@ const LAYERS: [(&str, &[&str]); 14] = [
     ("solver", &[]),
     ("boundary", &["adjoint", "solver", "special"]),
     ("coupling", &["adjoint", "boundary", "scene", "solver"]),
+    ("gpu", &["adjoint", "boundary", "coupling", "solver"]),
     ("contact", &["adjoint", "scene", "shape"]),
     ("multibody", &["adjoint", "scene"]),
     (

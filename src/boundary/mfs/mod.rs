@@ -258,6 +258,11 @@ impl BodyBoundary {
         self.r.as_ref()
     }
 
+    /// Whether it has a factor.
+    pub fn factored(&self) -> bool {
+        self.r.ncols() == self.sources.len()
+    }
+
     /// `x ← R⁻¹ x`, x sources × columns.
     pub fn solve_factor(&self, x: MatMut<'_, f64>) {
         factor::solve_upper(self.r.as_ref(), x);

@@ -1,0 +1,94 @@
+// out = R⁻¹ x of every body, or R⁻ᵀ x: the right preconditioner. R⁻¹ lies there as a dense upper triangle
+// for the bodies where it fits; the others have a diagonal. A workgroup makes 64 rows of one body from
+// tiles of R⁻¹ in its own memory. Twin: boundary BodyBoundary::{solve_factor, solve_factor_transpose}.
+
+//! uses: gate
+//! constants: COLUMNS TRANSPOSE
+
+struct Counts { face_blocks: u32, pad0: u32, pad1: u32, pad2: u32 }
+
+@group(0) @binding(0) var<storage, read> blocks: array<vec4<u32>>;    // as in pairs.wgsl
+@group(0) @binding(1) var<storage, read> factors: array<real>;        // [shape]: n × n, row-major
+@group(0) @binding(2) var<storage, read> places: array<vec4<u32>>;    // [body]: start in `factors`, n, first source, kind
+@group(0) @binding(3) var<storage, read> scaling: array<real>;        // [source]: 1/√diagonal
+@group(0) @binding(4) var<storage, read> x: array<real>;              // [source][COLUMNS]
+@group(0) @binding(5) var<storage, read_write> out: array<real>;      // [source][COLUMNS]
+@group(0) @binding(6) var<uniform> counts: Counts;
+
+const BLOCK: u32 = 64u;
+const WIDTH: u32 = 16u;
+const DENSE: u32 = 1u;
+
+var<workgroup> tile: array<real, 1040>;
+var<workgroup> rows: array<real, WIDTH * COLUMNS>;
+
+@compute @workgroup_size(64)
+fn main(
+    @builtin(workgroup_id) group: vec3<u32>,
+    @builtin(local_invocation_index) lane: u32,
+) {
+    if idle() {
+        return;
+    }
+    let own = blocks[counts.face_blocks + group.x];
+    let place = places[own.x];
+    let i = own.y + lane;
+    if place.w != DENSE {
+        if lane < own.z {
+            for (var k = 0u; k < COLUMNS; k++) {
+                out[i * COLUMNS + k] = mul(scaling[i], x[i * COLUMNS + k]);
+            }
+        }
+        return;
+    }
+    let n = place.y;
+    let base_row = own.y - place.z;
+    var sums: array<real, COLUMNS>;
+    for (var k = 0u; k < COLUMNS; k++) {
+        sums[k] = num(0.0);
+    }
+    // Below the diagonal R⁻¹ is zero.
+    var start = base_row;
+    var end = n;
+    if TRANSPOSE {
+        start = 0u;
+        end = base_row + own.z;
+    }
+    for (var j = start; j < end; j += WIDTH) {
+        let width = min(WIDTH, end - j);
+        workgroupBarrier();
+        for (var at = lane; at < BLOCK * WIDTH; at += BLOCK) {
+            // The faster index runs along the rows of memory.
+            var r = at / WIDTH;
+            var c = at % WIDTH;
+            if TRANSPOSE {
+                r = at % BLOCK;
+                c = at / BLOCK;
+            }
+            var value = num(0.0);
+            if r < own.z && c < width {
+                if TRANSPOSE {
+                    value = factors[place.x + (j + c) * n + base_row + r];
+                } else {
+                    value = factors[place.x + (base_row + r) * n + j + c];
+                }
+            }
+            tile[r * WIDTH + r / 4u + c] = value;
+        }
+        for (var at = lane; at < width * COLUMNS; at += BLOCK) {
+            rows[at] = x[(place.z + j) * COLUMNS + at];
+        }
+        workgroupBarrier();
+        for (var c = 0u; c < width; c++) {
+            let value = tile[lane * WIDTH + lane / 4u + c];
+            for (var k = 0u; k < COLUMNS; k++) {
+                sums[k] = add(sums[k], mul(value, rows[c * COLUMNS + k]));
+            }
+        }
+    }
+    if lane < own.z {
+        for (var k = 0u; k < COLUMNS; k++) {
+            out[i * COLUMNS + k] = sums[k];
+        }
+    }
+}

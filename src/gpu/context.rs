@@ -1,0 +1,353 @@
+//! The device: what it is, its limits, its faults, its counters.
+
+use super::kernel::Kernel;
+use super::source::{Arithmetic, Constant};
+use crate::{Error, Result};
+use std::collections::HashMap;
+use std::sync::atomic::{AtomicU64, Ordering};
+use std::sync::{Arc, Mutex};
+
+/// Storage buffers that the largest shader binds.
+const STORAGE_BUFFERS: u32 = 12;
+/// Bytes of workgroup memory that the largest shader takes.
+const WORKGROUP_BYTES: u32 = 16 << 10;
+/// Threads of the largest workgroup.
+const THREADS: u32 = 256;
+
+/// What to run on.
+#[derive(Clone, Debug, Default, PartialEq, Eq)]
+pub struct Options {
+    /// Part of the adapter's name, in any case; `None` for the fastest there is.
+    pub adapter: Option<String>,
+    /// Arithmetic of residuals and derivatives; `None` for double precision where the adapter has it,
+    /// two-float numbers otherwise.
+    pub fine: Option<Arithmetic>,
+}
+
+/// What an adapter is and can do.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Adapter {
+    /// Its name.
+    pub name: String,
+    /// Its driver.
+    pub driver: String,
+    /// The interface it is reached by: Vulkan, Metal, Dx12.
+    pub interface: String,
+    /// Discrete, integrated, virtual, or a CPU that stands for one.
+    pub kind: String,
+    /// Whether it computes in double precision.
+    pub double: bool,
+    /// Largest buffer that a shader can see, bytes.
+    pub largest_binding: u64,
+    /// What it lacks, if anything.
+    pub lacks: Option<String>,
+}
+
+/// What was done on a device since it was opened.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct Counts {
+    /// Shaders started.
+    pub dispatches: u64,
+    /// Times that the host waited for numbers.
+    pub read_backs: u64,
+    /// Bytes that came back.
+    pub bytes_back: u64,
+    /// Bytes in the device's memory now.
+    pub memory: u64,
+    /// The most there were at once.
+    pub peak_memory: u64,
+}
+
+#[derive(Debug, Default)]
+pub(super) struct Counters {
+    pub dispatches: AtomicU64,
+    pub read_backs: AtomicU64,
+    pub bytes_back: AtomicU64,
+    pub memory: AtomicU64,
+    pub peak: AtomicU64,
+}
+
+impl Counters {
+    pub fn allocate(&self, bytes: u64) {
+        let now = self.memory.fetch_add(bytes, Ordering::Relaxed) + bytes;
+        self.peak.fetch_max(now, Ordering::Relaxed);
+    }
+
+    pub fn free(&self, bytes: u64) {
+        self.memory.fetch_sub(bytes, Ordering::Relaxed);
+    }
+}
+
+type Key = (
+    &'static str,
+    String,
+    Arithmetic,
+    Vec<(&'static str, Constant)>,
+);
+
+/// An open device.
+pub struct Context {
+    pub(super) device: wgpu::Device,
+    pub(super) queue: wgpu::Queue,
+    adapter: Adapter,
+    fine: Arithmetic,
+    limits: wgpu::Limits,
+    pub(super) counters: Arc<Counters>,
+    kernels: Mutex<HashMap<Key, Arc<Kernel>>>,
+    fault: Arc<Mutex<Option<String>>>,
+}
+
+fn instance() -> wgpu::Instance {
+    wgpu::Instance::new(wgpu::InstanceDescriptor::new_without_display_handle_from_env())
+}
+
+fn describe(adapter: &wgpu::Adapter) -> Adapter {
+    let (info, limits) = (adapter.get_info(), adapter.limits());
+    Adapter {
+        name: info.name,
+        driver: format!("{} {}", info.driver, info.driver_info)
+            .trim()
+            .to_string(),
+        interface: format!("{:?}", info.backend),
+        kind: format!("{:?}", info.device_type),
+        double: adapter.features().contains(wgpu::Features::SHADER_F64),
+        largest_binding: limits
+            .max_storage_buffer_binding_size
+            .min(limits.max_buffer_size),
+        lacks: lacks(&limits),
+    }
+}
+
+/// The first limit of an adapter that is below what the shaders need.
+fn lacks(limits: &wgpu::Limits) -> Option<String> {
+    let needs = [
+        (
+            "storage buffers a shader",
+            limits.max_storage_buffers_per_shader_stage,
+            STORAGE_BUFFERS,
+        ),
+        (
+            "bytes of workgroup memory",
+            limits.max_compute_workgroup_storage_size,
+            WORKGROUP_BYTES,
+        ),
+        (
+            "threads a workgroup",
+            limits.max_compute_invocations_per_workgroup,
+            THREADS,
+        ),
+    ];
+    needs
+        .iter()
+        .find(|(_, has, needed)| has < needed)
+        .map(|(what, has, needed)| format!("{what}: it has {has}, {needed} are needed"))
+}
+
+/// Every adapter of this machine.
+pub fn adapters() -> Vec<Adapter> {
+    let all = pollster::block_on(instance().enumerate_adapters(wgpu::Backends::all()));
+    all.iter().map(describe).collect()
+}
+
+impl Context {
+    /// Opens an adapter.
+    ///
+    /// # Errors
+    /// [`Error::Device`] if there is none, none of that name, or its limits are too small.
+    pub fn new(options: &Options) -> Result<Arc<Self>> {
+        let found = find(options)?;
+        let adapter = describe(&found);
+        let failed = |what: String, remedy: &str| Error::Device {
+            adapter: adapter.name.clone(),
+            what,
+            remedy: remedy.into(),
+        };
+        if let Some(lack) = &adapter.lacks {
+            return Err(failed(
+                format!("its limits are too small: {lack}"),
+                "use another adapter, or the backend cpu",
+            ));
+        }
+        let fine = match options.fine {
+            Some(Arithmetic::Double) if !adapter.double => {
+                return Err(failed(
+                    "it has no double precision".into(),
+                    "use two-float arithmetic",
+                ));
+            }
+            Some(fine) => fine,
+            None if adapter.double => Arithmetic::Double,
+            None => Arithmetic::TwoFloat,
+        };
+        let has = found.limits();
+        let limits = wgpu::Limits {
+            max_storage_buffers_per_shader_stage: STORAGE_BUFFERS,
+            max_compute_workgroup_storage_size: WORKGROUP_BYTES,
+            max_storage_buffer_binding_size: has.max_storage_buffer_binding_size,
+            max_buffer_size: has.max_buffer_size,
+            max_compute_workgroups_per_dimension: has.max_compute_workgroups_per_dimension,
+            ..wgpu::Limits::default()
+        };
+        let features = if fine == Arithmetic::Double {
+            wgpu::Features::SHADER_F64
+        } else {
+            wgpu::Features::empty()
+        };
+        let asked = found.request_device(&wgpu::DeviceDescriptor {
+            label: Some("hydrograd"),
+            required_features: features,
+            required_limits: limits.clone(),
+            ..Default::default()
+        });
+        let (device, queue) = pollster::block_on(asked)
+            .map_err(|e| failed(e.to_string(), "update its driver, or use the backend cpu"))?;
+        let fault = Arc::new(Mutex::new(None));
+        let keep = |fault: &Arc<Mutex<Option<String>>>| {
+            let fault = fault.clone();
+            move |what: String| {
+                if let Ok(mut fault) = fault.lock() {
+                    fault.get_or_insert(what);
+                }
+            }
+        };
+        let lost = keep(&fault);
+        device.set_device_lost_callback(move |reason, message| {
+            // Its own end is no loss.
+            if reason != wgpu::DeviceLostReason::Destroyed {
+                lost(format!("the device was lost: {message}"));
+            }
+        });
+        let uncaptured = keep(&fault);
+        device.on_uncaptured_error(Arc::new(move |e: wgpu::Error| uncaptured(e.to_string())));
+        let context = Arc::new(Self {
+            device,
+            queue,
+            adapter,
+            fine,
+            limits,
+            counters: Arc::default(),
+            kernels: Mutex::default(),
+            fault,
+        });
+        if fine == Arithmetic::TwoFloat {
+            super::trial::two_float(&context)?;
+        }
+        Ok(context)
+    }
+
+    /// The adapter.
+    pub fn adapter(&self) -> &Adapter {
+        &self.adapter
+    }
+
+    /// Arithmetic of residuals and derivatives.
+    pub fn fine(&self) -> Arithmetic {
+        self.fine
+    }
+
+    /// What was done so far.
+    pub fn counts(&self) -> Counts {
+        let c = &self.counters;
+        let of = |x: &AtomicU64| x.load(Ordering::Relaxed);
+        Counts {
+            dispatches: of(&c.dispatches),
+            read_backs: of(&c.read_backs),
+            bytes_back: of(&c.bytes_back),
+            memory: of(&c.memory),
+            peak_memory: of(&c.peak),
+        }
+    }
+
+    /// Largest buffer that a shader can see, bytes.
+    pub fn largest_binding(&self) -> u64 {
+        self.limits
+            .max_storage_buffer_binding_size
+            .min(self.limits.max_buffer_size)
+    }
+
+    /// Most workgroups along one dimension of a dispatch.
+    pub(super) fn most_groups(&self) -> u32 {
+        self.limits.max_compute_workgroups_per_dimension
+    }
+
+    /// The entry of a shader in an arithmetic, compiled once.
+    pub(super) fn kernel(
+        &self,
+        shader: &'static str,
+        entry: &str,
+        arithmetic: Arithmetic,
+        constants: &[(&'static str, Constant)],
+    ) -> Result<Arc<Kernel>> {
+        let key = (shader, entry.to_string(), arithmetic, constants.to_vec());
+        let lost =
+            || self.failure("a thread of this program ended while it held the shaders".into());
+        if let Some(kernel) = self.kernels.lock().map_err(|_| lost())?.get(&key) {
+            return Ok(kernel.clone());
+        }
+        let kernel = Arc::new(Kernel::new(self, shader, entry, arithmetic, constants)?);
+        self.kernels
+            .lock()
+            .map_err(|_| lost())?
+            .insert(key, kernel.clone());
+        Ok(kernel)
+    }
+
+    /// An error of this device.
+    pub(super) fn failure(&self, what: String) -> Error {
+        Error::Device {
+            adapter: self.adapter.name.clone(),
+            what,
+            remedy: "use a smaller scene, or the backend cpu".into(),
+        }
+    }
+
+    /// The first fault that the device reported, if any.
+    ///
+    /// # Errors
+    /// That fault.
+    pub fn check(&self) -> Result<()> {
+        let fault = self.fault.lock().map_or(None, |f| f.clone());
+        fault.map_or(Ok(()), |what| Err(self.failure(what)))
+    }
+
+    /// As if the device had been lost, for tests of what follows.
+    pub fn lose(&self) {
+        self.device.destroy();
+        if let Ok(mut fault) = self.fault.lock() {
+            fault.get_or_insert("the device was lost".into());
+        }
+    }
+}
+
+fn find(options: &Options) -> Result<wgpu::Adapter> {
+    let instance = instance();
+    let none = |what: String, adapter: &str| {
+        Error::Device {
+        adapter: adapter.into(),
+        what,
+        remedy: "install a Vulkan, Metal or Direct3D 12 driver (a software one does: Debian's mesa-vulkan-drivers), or use the \
+                 backend cpu"
+            .into(),
+    }
+    };
+    let Some(wanted) = &options.adapter else {
+        let asked = instance.request_adapter(&wgpu::RequestAdapterOptions {
+            power_preference: wgpu::PowerPreference::HighPerformance,
+            ..Default::default()
+        });
+        return pollster::block_on(asked).map_err(|e| none(e.to_string(), "any"));
+    };
+    let all = pollster::block_on(instance.enumerate_adapters(wgpu::Backends::all()));
+    let names: Vec<String> = all.iter().map(|a| a.get_info().name).collect();
+    let matches = |name: &String| name.to_lowercase().contains(&wanted.to_lowercase());
+    match names.iter().position(matches) {
+        Some(i) => Ok(all
+            .into_iter()
+            .nth(i)
+            .ok_or_else(|| none("it is gone".into(), wanted))?),
+        None => Err(none(
+            format!("there is none of this name among {names:?}"),
+            wanted,
+        )),
+    }
+}

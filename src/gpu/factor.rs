@@ -1,0 +1,40 @@
+//! `shaders/factor.wgsl`: the right preconditioner.
+
+use super::buffer::Buffer;
+use super::context::Context;
+use super::geometry::Placed;
+use super::kernel::Call;
+use super::source::{Arithmetic, Constant};
+use crate::Result;
+
+/// `out = R⁻¹ x`, or `R⁻ᵀ x`, columns beside each other, in single precision.
+pub(super) fn factor(
+    context: &Context,
+    placed: &Placed,
+    transpose: bool,
+    (x, out, columns): (&Buffer, &Buffer, usize),
+    gate: &Buffer,
+) -> Result<Call> {
+    let constants = [
+        ("COLUMNS", Constant::Number(columns as u32)),
+        ("TRANSPOSE", Constant::Flag(transpose)),
+    ];
+    let kernel = context.kernel("factor", "main", Arithmetic::Single, &constants)?;
+    let geometry = &placed.geometry;
+    let uniform = context.uniform(&[geometry.sizes.face_blocks as u32, 0, 0, 0]);
+    let buffers = [
+        ("blocks", (&geometry.blocks).into()),
+        ("factors", (&geometry.factors).into()),
+        ("places", (&geometry.layout).into()),
+        ("scaling", (&placed.scaling).into()),
+        ("x", x.into()),
+        ("out", out.into()),
+        ("counts", (&uniform).into()),
+        ("going", gate.into()),
+    ];
+    context.call(
+        &kernel,
+        &buffers,
+        [geometry.sizes.source_blocks as u32, 1, 1],
+    )
+}

@@ -1,0 +1,89 @@
+//! The coupled system of [`crate::coupling::full`] on the device.
+//!
+//! In its notation, with everything scaled as [`super::geometry`] says: strengths `X = [a, λ]` by source,
+//! densities `[μ, r, β]` by face, β = B x̄ and, to begin with, F x̄ where r will stand.
+
+mod products;
+mod response;
+mod second;
+mod solve;
+
+use super::context::{Context, Options};
+use super::geometry::{Geometry, Placed};
+use crate::adjoint::lie::Pose;
+use crate::coupling::full::{Backend, Model, Response, Solver};
+use crate::{Error, Result};
+use nalgebra::DMatrix;
+use std::sync::Arc;
+
+/// Most columns of one pass over the pairs.
+const WIDE: usize = 12;
+
+/// The backend of [`crate::coupling::full::Full`] on a device.
+pub struct Gpu {
+    name: String,
+    geometry: Arc<Geometry>,
+}
+
+impl Gpu {
+    /// Uploads a model to an open device.
+    ///
+    /// # Errors
+    /// A solver that isn't there on the device, a device that fails, or too little memory.
+    pub fn new(context: &Arc<Context>, model: &Arc<Model>) -> Result<Self> {
+        if model.settings.solver != Solver::Cgls {
+            return Err(Error::Unsupported {
+                what: format!(
+                    "the solver {:?} with the backend gpu",
+                    model.settings.solver
+                ),
+                why: "it needs the matrix, which the device doesn't store".into(),
+                instead: "use the solver cgls, or the backend cpu".into(),
+            });
+        }
+        Ok(Self {
+            name: format!("gpu: {}", context.adapter().name),
+            geometry: Arc::new(Geometry::new(context, model)?),
+        })
+    }
+
+    /// As [`Gpu::new`], on a device opened for it.
+    ///
+    /// # Errors
+    /// As there, and no fitting adapter.
+    pub fn open(options: &Options, model: &Arc<Model>) -> Result<Self> {
+        Self::new(&Context::new(options)?, model)
+    }
+
+    /// The device.
+    pub fn context(&self) -> &Arc<Context> {
+        &self.geometry.context
+    }
+}
+
+impl Backend for Gpu {
+    fn name(&self) -> &str {
+        &self.name
+    }
+
+    fn respond(&self, poses: &[Pose], twists: &DMatrix<f64>) -> Result<Box<dyn Response + '_>> {
+        let placed = Arc::new(Placed::new(&self.geometry, poses)?);
+        let moving = (0..poses.len())
+            .map(|b| twists.rows(6 * b, 6).iter().any(|x| *x != 0.0))
+            .collect();
+        Ok(Box::new(response::Answer::solve(
+            placed,
+            Arc::new(moving),
+            twists,
+        )?))
+    }
+}
+
+/// The columns of an array in passes of at most [`WIDE`], as even as can be: (first, count).
+fn passes(columns: usize) -> impl Iterator<Item = (usize, usize)> {
+    let parts = columns.div_ceil(WIDE).max(1);
+    (0..parts).map(move |p| {
+        let first = p * columns / parts;
+        (first, (p + 1) * columns / parts - first)
+    })
+}

@@ -1,0 +1,149 @@
+//! Products with K and P of any number of columns, in passes.
+
+use super::passes;
+use crate::Result;
+use crate::gpu::apply::apply;
+use crate::gpu::apply_jvp::apply_jvp;
+use crate::gpu::apply_transpose::apply_transpose;
+use crate::gpu::apply_transpose_jvp::apply_transpose_jvp;
+use crate::gpu::buffer::Buffer;
+use crate::gpu::geometry::Placed;
+use crate::gpu::kernel::{Batch, Call};
+use crate::gpu::source::Arithmetic;
+use crate::gpu::sum::{Base, Slice, Sum, sum};
+
+/// Which product.
+#[derive(Clone, Copy)]
+pub(super) enum Product<'a> {
+    /// Sources to faces: K, or P.
+    Forward { potential: bool },
+    /// Faces to sources: Kᵀ, or Pᵀ.
+    Transpose { potential: bool },
+    /// δK, or δP, for these motions.
+    ForwardTangent {
+        potential: bool,
+        motions: &'a Buffer,
+    },
+    /// δKᵀ, or δPᵀ.
+    TransposeTangent {
+        potential: bool,
+        motions: &'a Buffer,
+    },
+}
+
+/// Where some columns of a product go: `out[to..] = scale · product[from..from + count] (+ out)`.
+pub(super) struct To<'a> {
+    pub from: usize,
+    pub count: usize,
+    pub out: Slice<'a>,
+    pub scale: f32,
+    pub base: Option<Slice<'a>>,
+    /// Whether it is added to what is there.
+    pub accumulate: bool,
+}
+
+impl<'a> To<'a> {
+    /// All `count` columns, as they are.
+    pub fn plain(count: usize, out: Slice<'a>) -> Self {
+        Self {
+            from: 0,
+            count,
+            out,
+            scale: 1.0,
+            base: None,
+            accumulate: false,
+        }
+    }
+}
+
+/// The calls of a product of `columns` columns of `x` in the fine arithmetic, with the memory that they use.
+pub(super) fn product<'a>(
+    placed: &Placed,
+    what: Product,
+    (x, stride, offset): Slice,
+    columns: usize,
+    to: &[To<'a>],
+) -> Result<Vec<Call>> {
+    let geometry = &placed.geometry;
+    let (context, sizes) = (&geometry.context, &geometry.sizes);
+    let fine = context.fine();
+    let (rows, own, other) = match what {
+        Product::Forward { .. } | Product::ForwardTangent { .. } => {
+            (sizes.faces, sizes.face_blocks, sizes.source_blocks)
+        }
+        _ => (sizes.sources, sizes.source_blocks, sizes.face_blocks),
+    };
+    let shares = sizes.shares(own, other);
+    let mut calls = Vec::new();
+    for (first, width) in passes(columns) {
+        let parts = context.reals("shares of a product", fine, shares * rows * width)?;
+        let x = (x, stride, offset + first);
+        calls.push(once(
+            placed,
+            fine,
+            what,
+            x,
+            (&parts, width),
+            &geometry.open,
+        )?);
+        for t in to {
+            // The columns of this pass that go there.
+            let (from, end) = (t.from.max(first), (t.from + t.count).min(first + width));
+            if from >= end {
+                continue;
+            }
+            let shifted = |(b, s, o): Slice<'a>| (b, s, o + from - t.from);
+            let base = match (t.base, t.accumulate) {
+                (Some(base), _) => Base::Other(shifted(base)),
+                (None, true) => Base::Out,
+                (None, false) => Base::Nothing,
+            };
+            let task = Sum {
+                rows,
+                columns: end - from,
+                parts: (&parts, shares, width, from - first),
+                scale: t.scale,
+                base,
+                damped: None,
+                out: shifted(t.out),
+            };
+            calls.push(sum(context, fine, &task, &geometry.open)?);
+        }
+    }
+    Ok(calls)
+}
+
+/// One pass of a product, as shares.
+pub(super) fn once(
+    placed: &Placed,
+    arithmetic: Arithmetic,
+    what: Product,
+    x: Slice,
+    out: (&Buffer, usize),
+    gate: &Buffer,
+) -> Result<Call> {
+    let context = &placed.geometry.context;
+    match what {
+        Product::Forward { potential } => {
+            apply(context, arithmetic, placed, potential, x, out, gate)
+        }
+        Product::Transpose { potential } => {
+            apply_transpose(context, arithmetic, placed, potential, x, out, gate)
+        }
+        Product::ForwardTangent { potential, motions } => {
+            apply_jvp(context, arithmetic, placed, potential, x, out, motions)
+        }
+        Product::TransposeTangent { potential, motions } => {
+            apply_transpose_jvp(context, arithmetic, placed, potential, x, out, motions)
+        }
+    }
+}
+
+/// All of them, in order.
+pub(super) fn run(placed: &Placed, calls: &[&[Call]]) -> Result<()> {
+    let mut batch = Batch::default();
+    for c in calls {
+        batch.extend(*c);
+    }
+    placed.geometry.context.submit(&batch)
+}

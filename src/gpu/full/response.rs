@@ -1,0 +1,440 @@
+//! The water's answer, on the device: value and first derivative.
+
+use super::products::{Product, To, product, run};
+use super::solve::Solves;
+use crate::adjoint::lie::{Vec3, Vec6, six};
+use crate::coupling::full::{Reached, Response};
+use crate::coupling::{Direction, PairTensor, Tangent};
+use crate::gpu::buffer::Buffer;
+use crate::gpu::combine::combine;
+use crate::gpu::geometry::{Geometry, Placed};
+use crate::gpu::impulse::impulse;
+use crate::gpu::kernel::{Batch, Call};
+use crate::gpu::pair_vjp::pair_vjp;
+use crate::gpu::products::{Task, products};
+use crate::gpu::reduce::reduce;
+use crate::gpu::rows::{Table, rows};
+use crate::solver::Columns;
+use crate::{Error, Result};
+use nalgebra::DMatrix;
+use std::sync::Arc;
+
+/// Columns on the left of one pass of a derivative.
+const LEFT: usize = 4;
+
+/// a, λ, r, μ of some columns, on the device.
+pub(super) struct Answer {
+    pub placed: Arc<Placed>,
+    /// Bodies that the columns first given move.
+    moving: Arc<Vec<bool>>,
+    twists: DMatrix<f64>,
+    /// What each column is in units of: on the device all are about 1.
+    pub scale: Vec<f64>,
+    pub columns: usize,
+    /// X = [a, λ], `[source][2·columns]`.
+    pub strengths: Buffer,
+    /// [μ, r, β], `[face][3·columns]`.
+    pub densities: Buffer,
+    momenta: DMatrix<f64>,
+    energies: DMatrix<f64>,
+    reached: Reached,
+}
+
+/// Size of a column of twists: of its velocities, at the scene's size, and rates.
+fn size(twists: &DMatrix<f64>, k: usize, length: f64) -> f64 {
+    let column = twists.column(k);
+    let of = |(i, x): (usize, &f64)| if i % 6 < 3 { x.abs() / length } else { x.abs() };
+    match column.iter().enumerate().map(of).fold(0.0, f64::max) {
+        0.0 => 1.0,
+        s => s,
+    }
+}
+
+/// Twists as the device has them: `[body][6][columns]`.
+fn scaled(twists: &DMatrix<f64>, scale: &[f64], length: f64) -> Vec<f64> {
+    let mut out = Vec::with_capacity(twists.len());
+    for i in 0..twists.nrows() {
+        let unit = if i % 6 < 3 { length } else { 1.0 };
+        out.extend((0..twists.ncols()).map(|k| twists[(i, k)] / (unit * scale[k])));
+    }
+    out
+}
+
+/// A wrench about the scene's middle in the device's units as a spatial wrench.
+pub(super) fn spatial(placed: &Placed, w: &[f64], scale: f64) -> Vec6 {
+    let l4 = placed.geometry.length.powi(4) * scale;
+    let force = Vec3::new(w[0], w[1], w[2]) * l4;
+    let moment = Vec3::new(w[3], w[4], w[5]) * (l4 * placed.geometry.length);
+    six(&force, &(moment + placed.middle.cross(&force)))
+}
+
+/// Body-frame impulses from the device's `[body][6][columns]`.
+pub(super) fn impulses(
+    geometry: &Geometry,
+    moving: &[bool],
+    values: &[f64],
+    scale: &[f64],
+) -> DMatrix<f64> {
+    let k = scale.len();
+    DMatrix::from_fn(6 * moving.len(), k, |i, c| {
+        if !moving[i / 6] {
+            return 0.0;
+        }
+        let power = if i % 6 < 3 { 4 } else { 5 };
+        values[i * k + c] * scale[c] * geometry.length.powi(power)
+    })
+}
+
+impl Answer {
+    /// Solves for columns of twists.
+    pub fn solve(
+        placed: Arc<Placed>,
+        moving: Arc<Vec<bool>>,
+        twists: &DMatrix<f64>,
+    ) -> Result<Self> {
+        let geometry = placed.geometry.clone();
+        let (context, sizes) = (&geometry.context, &geometry.sizes);
+        let fine = context.fine();
+        let k = twists.ncols();
+        let n = sizes.sources;
+        let scale: Vec<f64> = (0..k).map(|c| size(twists, c, geometry.length)).collect();
+        let values = scaled(twists, &scale, geometry.length);
+        let device_twists = context.upload("twists", fine, &values)?;
+        let densities = context.reals("densities", fine, sizes.faces * 3 * k)?;
+        let strengths = context.reals("strengths", fine, n * 2 * k)?;
+        let g = context.reals("right-hand sides", fine, n * 2 * k)?;
+        let mut out = Self {
+            moving,
+            twists: twists.clone(),
+            scale,
+            columns: k,
+            strengths,
+            densities,
+            momenta: DMatrix::zeros(twists.nrows(), k),
+            energies: DMatrix::zeros(k, k),
+            reached: Reached::default(),
+            placed: placed.clone(),
+        };
+        if k == 0 || n == 0 {
+            return Ok(out);
+        }
+        let table = |first| Table {
+            values: &geometry.face_table,
+            width: 12,
+            first,
+            map: &geometry.face_map,
+            rows: sizes.faces,
+        };
+        let own = Table {
+            values: &geometry.source_table,
+            width: 6,
+            first: 0,
+            map: &geometry.source_map,
+            rows: n,
+        };
+        let given = (&device_twists, k);
+        let at = |block: usize| (&out.densities, 3 * k, block * k);
+        let asked = [
+            rows(context, fine, &table(0), given, at(1), false)?,
+            rows(context, fine, &table(6), given, at(2), false)?,
+        ];
+        let back = |potential| Product::Transpose { potential };
+        let gathered = product(
+            &placed,
+            back(false),
+            at(1),
+            k,
+            &[To::plain(k, (&g, 2 * k, 0))],
+        )?;
+        let read = product(
+            &placed,
+            back(true),
+            at(2),
+            k,
+            &[To::plain(k, (&g, 2 * k, k))],
+        )?;
+        let added = [rows(context, fine, &own, given, (&g, 2 * k, k), true)?];
+        run(&placed, &[&asked, &gathered, &read, &added])?;
+
+        let solves = Solves::new(&placed, (&g, 2 * k, 0), (&out.strengths, 2 * k, 0), 2 * k)?;
+        let mut batch = Batch::default();
+        solves.begin(&mut batch);
+        context.submit(&batch)?;
+        // Most solves end within the first batch: what follows from them is read together with how they
+        // stand.
+        let what = "coupled system (Eq. 20)";
+        let (mut found, states) = out.follow(&g, Some(&solves))?;
+        let reached = match solves.reached(&placed, &states, what)? {
+            Some(reached) => reached,
+            None => {
+                let reached = solves.finish(&placed, what)?;
+                // r was made of an unfinished solution: again from F x̄.
+                let again = rows(context, fine, &table(0), given, at(1), false)?;
+                run(&placed, &[&[again]])?;
+                found = out.follow(&g, None)?.0;
+                reached
+            }
+        };
+        out.reached = reached;
+        [out.momenta, out.energies] = found;
+        Ok(out)
+    }
+
+    /// r and μ from X, then momenta and energies, and how the solves stand; `g` are the right-hand sides.
+    fn follow(
+        &self,
+        g: &Buffer,
+        solves: Option<&Solves>,
+    ) -> Result<([DMatrix<f64>; 2], Vec<Vec<u8>>)> {
+        let (placed, k) = (self.placed.clone(), self.columns);
+        let geometry = &placed.geometry;
+        let (context, fine) = (&geometry.context, geometry.context.fine());
+        let residual = To {
+            scale: -1.0,
+            accumulate: true,
+            ..To::plain(k, (&self.densities, 3 * k, k))
+        };
+        let mu = To {
+            from: k,
+            ..To::plain(k, (&self.densities, 3 * k, 0))
+        };
+        let forward = Product::Forward { potential: false };
+        let x = (&self.strengths, 2 * k, 0);
+        let image = product(&placed, forward, x, 2 * k, &[residual, mu])?;
+        let (impulses_of, momenta) = self.impulse_calls()?;
+        let energies = context.reals("energies", fine, k * k)?;
+        let task = Task {
+            rows: geometry.sizes.sources,
+            g: (2 * k, k),
+            a: (2 * k, 0),
+            columns: k,
+        };
+        let dots = [products(
+            context,
+            fine,
+            g,
+            &self.strengths,
+            &energies,
+            &task,
+        )?];
+        run(&placed, &[&image, &impulses_of, &dots])?;
+        let count = 6 * geometry.sizes.bodies * k;
+        let mut wanted = vec![
+            (&momenta, count * fine.size()),
+            (&energies, k * k * fine.size()),
+        ];
+        wanted.extend(solves.iter().flat_map(|s| s.report()));
+        let mut bytes = context.read_bytes(&wanted)?;
+        let states = bytes.split_off(2);
+        let values = fine.numbers(&bytes[0]);
+        let momenta = impulses(geometry, &self.moving, &values, &self.scale);
+        let e = fine.numbers(&bytes[1]);
+        let l5 = geometry.length.powi(5);
+        let energies = DMatrix::from_fn(k, k, |x, y| {
+            e[x * k + y] * self.scale[x] * self.scale[y] * l5
+        });
+        Ok(([momenta, energies], states))
+    }
+
+    /// φ = P a and the impulses: the calls, and where the impulses will be.
+    fn impulse_calls(&self) -> Result<(Vec<Call>, Buffer)> {
+        let k = self.columns;
+        let geometry = &self.placed.geometry;
+        let (context, fine) = (&geometry.context, geometry.context.fine());
+        let phi = context.reals("potentials", fine, geometry.sizes.faces * k)?;
+        let out = context.reals("momenta", fine, 6 * geometry.sizes.bodies * k)?;
+        let forward = Product::Forward { potential: true };
+        let a = (&self.strengths, 2 * k, 0);
+        let mut calls = product(&self.placed, forward, a, k, &[To::plain(k, (&phi, k, 0))])?;
+        let mu = (&self.densities, 3 * k, 0);
+        calls.push(impulse(context, geometry, &phi, mu, a, (&out, k))?);
+        Ok((calls, out))
+    }
+
+    /// A combination of the columns, coefficients columns × n.
+    fn combination(&self, coefficients: &DMatrix<f64>) -> Result<Self> {
+        let geometry = &self.placed.geometry;
+        let (context, sizes) = (&geometry.context, &geometry.sizes);
+        let fine = context.fine();
+        let n = coefficients.ncols();
+        let twists = &self.twists * coefficients;
+        let scale: Vec<f64> = (0..n).map(|c| size(&twists, c, geometry.length)).collect();
+        let units = DMatrix::from_fn(self.columns, n, |k, c| {
+            coefficients[(k, c)] * self.scale[k] / scale[c]
+        });
+        let mut out = Self {
+            placed: self.placed.clone(),
+            moving: self.moving.clone(),
+            twists,
+            columns: n,
+            strengths: context.reals("strengths", fine, sizes.sources * 2 * n)?,
+            densities: context.reals("densities", fine, sizes.faces * 3 * n)?,
+            momenta: DMatrix::zeros(6 * sizes.bodies, n),
+            energies: coefficients.tr_mul(&self.energies) * coefficients,
+            reached: self.reached,
+            scale,
+        };
+        if n == 0 || self.columns == 0 {
+            return Ok(out);
+        }
+        let combined = [
+            combine(
+                context,
+                fine,
+                &self.strengths,
+                &units,
+                &out.strengths,
+                (sizes.sources, 2),
+            )?,
+            combine(
+                context,
+                fine,
+                &self.densities,
+                &units,
+                &out.densities,
+                (sizes.faces, 3),
+            )?,
+        ];
+        let (calls, momenta) = out.impulse_calls()?;
+        run(&self.placed, &[&combined, &calls])?;
+        let values = context.read(fine, &[(&momenta, 6 * sizes.bodies * n)])?;
+        out.momenta = impulses(geometry, &self.moving, &values[0], &out.scale);
+        Ok(out)
+    }
+
+    /// Bodies that the columns first given move.
+    pub fn moving(&self) -> &[bool] {
+        &self.moving
+    }
+}
+
+impl Response for Answer {
+    fn reached(&self) -> Reached {
+        self.reached
+    }
+
+    fn momenta(&self) -> Result<DMatrix<f64>> {
+        Ok(self.momenta.clone())
+    }
+
+    fn energies(&self) -> Result<DMatrix<f64>> {
+        Ok(self.energies.clone())
+    }
+
+    fn gradient(&self) -> Result<PairTensor> {
+        let k = self.columns;
+        let placed = &self.placed;
+        let geometry = &placed.geometry;
+        let (context, fine) = (&geometry.context, geometry.context.fine());
+        let bodies = geometry.sizes.bodies;
+        if k == 0 || geometry.pairs.is_empty() {
+            return Ok(PairTensor::zeros(bodies, k));
+        }
+        // W(x, y) of every pair, x in passes.
+        let passes = k.div_ceil(LEFT);
+        let width = k.div_ceil(passes);
+        let elements = width * k * 6;
+        let tasks = geometry.task_count();
+        let mut outs = Vec::new();
+        for p in 0..passes {
+            let parts = context.reals("tasks of a derivative", fine, tasks * elements)?;
+            let out = context.reals("wrenches", fine, geometry.pairs.len() * elements)?;
+            let densities = (&self.densities, &self.strengths);
+            let calls = [
+                pair_vjp(context, placed, densities, k, (p * width, width), &parts)?,
+                reduce(
+                    context,
+                    fine,
+                    &parts,
+                    &geometry.ranges,
+                    &out,
+                    (geometry.pairs.len(), elements),
+                )?,
+            ];
+            run(placed, &[&calls])?;
+            outs.push(out);
+        }
+        let wanted: Vec<(&Buffer, usize)> = outs
+            .iter()
+            .map(|o| (o, geometry.pairs.len() * elements))
+            .collect();
+        let values = context.read(fine, &wanted)?;
+        let mut wrenches = vec![DMatrix::zeros(6, k * k); bodies];
+        for (number, pair) in geometry.pairs.iter().enumerate() {
+            let raw = |x: usize, y: usize| {
+                let at = ((number * width + x % width) * k + y) * 6;
+                spatial(
+                    placed,
+                    &values[x / width][at..at + 6],
+                    self.scale[x] * self.scale[y],
+                )
+            };
+            let image = &geometry.model.images[pair.image];
+            for x in 0..k {
+                for y in 0..=x {
+                    let world = 0.5 * (raw(x, y) + raw(y, x));
+                    let back = image.twist_vjp(&world);
+                    let mut add = |b: usize, w: &Vec6| {
+                        let mut column = wrenches[b].fixed_view_mut::<6, 1>(0, x * k + y);
+                        column += w;
+                        if x != y {
+                            let mut column = wrenches[b].fixed_view_mut::<6, 1>(0, y * k + x);
+                            column += w;
+                        }
+                    };
+                    add(pair.source, &back);
+                    add(pair.target, &-world);
+                }
+            }
+        }
+        Ok(PairTensor::new(k, wrenches))
+    }
+
+    fn directions(&self, directions: &[Direction]) -> Result<Box<dyn Response + '_>> {
+        let n = directions.len();
+        let mut coefficients = DMatrix::zeros(self.columns, n);
+        let mut twists = DMatrix::zeros(self.twists.nrows(), n);
+        let mut combined = true;
+        for (k, direction) in directions.iter().enumerate() {
+            match direction {
+                Direction::Basis(c) => {
+                    coefficients.set_column(k, c);
+                    twists.set_column(k, &(&self.twists * *c));
+                }
+                Direction::Twist(x) => {
+                    combined = false;
+                    twists.set_column(k, x);
+                }
+            }
+        }
+        let answer = if combined {
+            self.combination(&coefficients)?
+        } else {
+            // One more column costs a solve little: the kernels are evaluated once for all.
+            Self::solve(self.placed.clone(), self.moving.clone(), &twists)?
+        };
+        Ok(Box::new(answer))
+    }
+
+    fn tangent(&self, z: &[Vec6]) -> Result<Tangent> {
+        if !(1..=2).contains(&self.columns) {
+            return Err(Error::input(
+                "tangent of the coupled system: columns",
+                self.columns,
+                "must be 1 or 2",
+            ));
+        }
+        self.second(z)
+    }
+
+    fn strengths(&self) -> Result<Columns> {
+        let (k, n) = (self.columns, self.placed.geometry.sizes.sources);
+        let geometry = &self.placed.geometry;
+        let context = &geometry.context;
+        let values = context.read(context.fine(), &[(&self.strengths, n * 2 * k)])?;
+        let l3 = geometry.length.powi(3);
+        Ok(Columns::from_fn(n, k, |j, c| {
+            values[0][j * 2 * k + c] * self.scale[c] * l3
+        }))
+    }
+}

@@ -1,0 +1,463 @@
+//! What of a coupled system lies on the device: constants once, placed surfaces at each set of poses.
+//!
+//! Lengths are in units of the scene's size and positions relative to its middle, so that single precision
+//! resolves them; boundary rows are in units of the largest row weight. With L that size and w that
+//! weight: `K = w K̂`, `P = P̂/L`, `a = L³ â`, `r = w L³ r̂`, `λ = L²/w² λ̂`, `μ = L²/w μ̂`, energies `L⁵`.
+
+use super::buffer::Buffer;
+use super::context::Context;
+use super::diagonal::diagonal;
+use super::kernel::{Batch, Bound};
+use super::place::place;
+use super::source::Arithmetic;
+use crate::Result;
+use crate::adjoint::lie::{Mat3, Pose, Vec3};
+use crate::boundary::{BodyBoundary, Method};
+use crate::coupling::full::{Model, Preconditioner};
+use faer::Mat;
+use std::sync::Arc;
+
+/// Faces or sources of one block.
+const BLOCK: usize = 64;
+/// Workgroups that keep a large card busy.
+const BUSY: usize = 512;
+/// Tasks of a derivative, about.
+const TASKS: usize = 2048;
+
+/// Numbers of things.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Sizes {
+    pub faces: usize,
+    pub sources: usize,
+    pub bodies: usize,
+    pub images: usize,
+    pub face_blocks: usize,
+    pub source_blocks: usize,
+}
+
+impl Sizes {
+    /// Into how many shares the work of `own` blocks is cut that each go over `other` blocks.
+    pub fn shares(&self, own: usize, other: usize) -> usize {
+        BUSY.div_ceil(own.max(1)).clamp(1, other.max(1))
+    }
+}
+
+/// A pair of (the image of) a body's sources and the faces that see them.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct DevicePair {
+    pub target: usize,
+    pub source: usize,
+    pub image: usize,
+}
+
+/// All that doesn't change with the poses.
+pub(super) struct Geometry {
+    pub context: Arc<Context>,
+    pub model: Arc<Model>,
+    /// L, m.
+    pub length: f64,
+    pub sizes: Sizes,
+    pub pairs: Vec<DevicePair>,
+    pub shape_faces: Buffer,
+    pub shape_sources: Buffer,
+    pub face_map: Buffer,
+    pub source_map: Buffer,
+    pub blocks: Buffer,
+    pub relations: Buffer,
+    sizes_uniform: wgpu::Buffer,
+    pub face_table: Buffer,
+    pub source_table: Buffer,
+    pub bodies: Buffer,
+    pub shapes: Buffer,
+    /// D², fine and single.
+    pub damping: Buffer,
+    pub damping_single: Buffer,
+    pub factors: Buffer,
+    pub layout: Buffer,
+    /// Whether some body has no factor here and takes the diagonal.
+    diagonal: bool,
+    pub tasks: Buffer,
+    pub ranges: Buffer,
+    task_count: usize,
+    /// Always one: what isn't part of a solve goes on.
+    pub open: Buffer,
+}
+
+/// Faces and sources where they are, in one arithmetic.
+pub(super) struct Surfaces {
+    pub faces: Buffer,
+    pub sources: Buffer,
+}
+
+/// The system at given poses.
+pub(super) struct Placed {
+    pub geometry: Arc<Geometry>,
+    /// The scene's middle, m.
+    pub middle: Vec3,
+    fine: Surfaces,
+    single: Surfaces,
+    /// The diagonal preconditioner.
+    pub scaling: Buffer,
+}
+
+/// Distinct shapes, and which one each body has.
+fn shapes(model: &Model) -> (Vec<Arc<BodyBoundary>>, Vec<usize>) {
+    let mut all: Vec<Arc<BodyBoundary>> = Vec::new();
+    let of = model.bodies.iter().map(|body| {
+        let same = |b: &Arc<BodyBoundary>| Arc::ptr_eq(b, &body.boundary);
+        all.iter().position(same).unwrap_or_else(|| {
+            all.push(body.boundary.clone());
+            all.len() - 1
+        })
+    });
+    let of = of.collect();
+    (all, of)
+}
+
+/// Where each begins, and the end.
+fn starts(sizes: impl Iterator<Item = usize>) -> Vec<usize> {
+    let mut out = vec![0];
+    for n in sizes {
+        out.push(out[out.len() - 1] + n);
+    }
+    out
+}
+
+/// (body, first, count, method) of every block.
+fn blocks(ranges: &[std::ops::Range<usize>], method: impl Fn(usize) -> u32) -> Vec<[u32; 4]> {
+    let mut out = Vec::new();
+    for (b, range) in ranges.iter().enumerate() {
+        for first in range.clone().step_by(BLOCK) {
+            let count = BLOCK.min(range.end - first);
+            out.push([b as u32, first as u32, count as u32, method(b)]);
+        }
+    }
+    out
+}
+
+/// (body, row of the body's shape) of every row.
+fn map(ranges: &[std::ops::Range<usize>], of: &[usize], starts: &[usize]) -> Vec<u32> {
+    let mut out = Vec::new();
+    for (b, range) in ranges.iter().enumerate() {
+        for i in 0..range.len() {
+            out.extend([b as u32, (starts[of[b]] + i) as u32]);
+        }
+    }
+    out
+}
+
+/// R⁻¹ of a body, row-major, times `scale`.
+fn inverse(boundary: &BodyBoundary, scale: f64) -> Vec<f64> {
+    let n = boundary.sources.len();
+    let mut x = Mat::<f64>::identity(n, n);
+    boundary.solve_factor(x.as_mut());
+    (0..n * n).map(|at| scale * x[(at / n, at % n)]).collect()
+}
+
+impl Geometry {
+    /// Uploads a model.
+    ///
+    /// # Errors
+    /// A device that fails, or has too little memory.
+    pub fn new(context: &Arc<Context>, model: &Arc<Model>) -> Result<Self> {
+        let fine = context.fine();
+        let (all, of) = shapes(model);
+        let length = all
+            .iter()
+            .flat_map(|b| b.faces.corners.iter().flatten())
+            .map(|v| v.norm())
+            .fold(0.0, f64::max);
+        let row_unit = |b: &BodyBoundary| match b.settings.method {
+            Method::MfsVertex => 1.0,
+            Method::MfsFace => 1.0 / (length * length),
+        };
+        let weight = all
+            .iter()
+            .flat_map(|b| b.row_weights.iter().map(|w| w * row_unit(b)))
+            .fold(0.0, f64::max);
+        let face_starts = starts(all.iter().map(|b| b.faces.len()));
+        let source_starts = starts(all.iter().map(|b| b.sources.len()));
+
+        let mut shape_faces = Vec::new();
+        let mut face_table = Vec::new();
+        for b in &all {
+            let unit = row_unit(b);
+            for i in 0..b.faces.len() {
+                let corners = b.faces.corners[i].map(|v| v / length);
+                corners.iter().for_each(|v| shape_faces.extend(v.iter()));
+                let m = match b.settings.method {
+                    Method::MfsVertex => {
+                        (corners[1] - corners[0]).cross(&(corners[2] - corners[0]))
+                    }
+                    Method::MfsFace => b.faces.normals[i],
+                };
+                shape_faces.extend(m.iter());
+                shape_faces.push(b.row_weights[i] * unit / weight);
+                let scaled = |row: &crate::adjoint::lie::Vec6, unit: f64| -> Vec<f64> {
+                    let of = |k: usize| if k < 3 { length } else { 1.0 };
+                    (0..6).map(|k| row[k] * of(k) / unit).collect()
+                };
+                face_table.extend(scaled(&b.twist_rows[i], weight * length.powi(3)));
+                face_table.extend(scaled(&b.readout_flux[i], length.powi(3)));
+            }
+        }
+        let mut shape_sources = Vec::new();
+        let mut source_table = Vec::new();
+        for b in &all {
+            for (s, p) in b.sources.iter().zip(&b.readout) {
+                shape_sources.extend((s / length).iter());
+                let of = |k: usize| if k < 3 { length } else { 1.0 };
+                source_table.extend((0..6).map(|k| p[k] * of(k) / (length * length)));
+            }
+        }
+        let method = |b: usize| match model.bodies[b].boundary.settings.method {
+            Method::MfsVertex => 0,
+            Method::MfsFace => 1,
+        };
+        let face_blocks = blocks(&model.faces, method);
+        let source_blocks = blocks(&model.sources, method);
+        let sizes = Sizes {
+            faces: model.rows(),
+            sources: model.columns(),
+            bodies: model.bodies.len(),
+            images: model.images.len(),
+            face_blocks: face_blocks.len(),
+            source_blocks: source_blocks.len(),
+        };
+        let all_blocks: Vec<u32> = face_blocks
+            .iter()
+            .chain(&source_blocks)
+            .flatten()
+            .copied()
+            .collect();
+        let n = sizes.bodies;
+        let mut relations = vec![0; n * n];
+        for t in 0..n {
+            for s in 0..n {
+                relations[t * n + s] = match (t == s, model.excluded.contains(t, s)) {
+                    (true, _) => 1,
+                    (_, true) => 2,
+                    _ => 0,
+                };
+            }
+        }
+        let damping: Vec<f64> = model
+            .bodies
+            .iter()
+            .flat_map(|b| b.boundary.damping.iter().map(|d| (d / weight).powi(2)))
+            .collect();
+
+        let (factors, layout, diagonal) = factors(context, model, &all, &of, weight);
+        let (pairs, tasks, ranges) = tasks(model, &relations, &face_blocks, &source_blocks);
+        let bodies: Vec<u32> = (0..n)
+            .flat_map(|b| [&model.faces[b], &model.sources[b]])
+            .flat_map(|r| [r.start as u32, r.len() as u32])
+            .collect();
+        let shape_of: Vec<u32> = of
+            .iter()
+            .flat_map(|s| [face_starts[*s] as u32, source_starts[*s] as u32])
+            .collect();
+        let words = [
+            sizes.faces,
+            sizes.sources,
+            sizes.bodies,
+            sizes.images,
+            sizes.face_blocks,
+            sizes.source_blocks,
+            0,
+            0,
+        ];
+        Ok(Self {
+            sizes_uniform: context.uniform(&words.map(|n| n as u32)),
+            shape_faces: context.upload("faces of the shapes", fine, &shape_faces)?,
+            shape_sources: context.upload("sources of the shapes", fine, &shape_sources)?,
+            face_map: context
+                .upload_words("map of the faces", &map(&model.faces, &of, &face_starts))?,
+            source_map: context.upload_words(
+                "map of the sources",
+                &map(&model.sources, &of, &source_starts),
+            )?,
+            blocks: context.upload_words("blocks", &all_blocks)?,
+            relations: context.upload_words("relations", &relations)?,
+            face_table: context.upload("rows of the faces", fine, &face_table)?,
+            source_table: context.upload("readout of the sources", fine, &source_table)?,
+            bodies: context.upload_words("bodies", &bodies)?,
+            shapes: context.upload_words("shapes", &shape_of)?,
+            damping: context.upload("damping", fine, &damping)?,
+            damping_single: context.upload("damping", Arithmetic::Single, &damping)?,
+            factors: context.upload("factors", Arithmetic::Single, &factors)?,
+            layout: context.upload_words("layout of the factors", &layout)?,
+            diagonal,
+            task_count: tasks.len() / 4,
+            tasks: context.upload_words("tasks", &tasks)?,
+            ranges: context.upload_words("ranges of the tasks", &ranges)?,
+            open: context.upload_words("open", &[1])?,
+            context: context.clone(),
+            model: model.clone(),
+            length,
+            sizes,
+            pairs,
+        })
+    }
+
+    /// Number of tasks of a derivative.
+    pub fn task_count(&self) -> usize {
+        self.task_count
+    }
+
+    /// Workgroups for all tasks.
+    pub fn task_groups(&self) -> [u32; 3] {
+        let y = self.task_count.div_ceil(32768).max(1);
+        [self.task_count.div_ceil(y) as u32, y as u32, 1]
+    }
+}
+
+/// The factors that fit (each shape's once), where each body's lies, and whether some have none.
+fn factors(
+    context: &Context,
+    model: &Model,
+    all: &[Arc<BodyBoundary>],
+    of: &[usize],
+    weight: f64,
+) -> (Vec<f64>, Vec<u32>, bool) {
+    let room = (context.largest_binding() / 4) as usize;
+    let mut values = Vec::new();
+    let mut at: Vec<Option<usize>> = vec![None; all.len()];
+    if model.settings.preconditioner == Preconditioner::Factors {
+        for (s, b) in all.iter().enumerate() {
+            let n = b.sources.len();
+            if b.factored() && values.len() + n * n <= room {
+                at[s] = Some(values.len());
+                values.extend(inverse(b, weight));
+            }
+        }
+    }
+    let mut layout = Vec::new();
+    let mut diagonal = false;
+    for (b, s) in of.iter().enumerate() {
+        let first = model.sources[b].start as u32;
+        let n = all[*s].sources.len() as u32;
+        layout.extend(match at[*s] {
+            Some(at) => [at as u32, n, first, 1],
+            None => [0, n, first, 0],
+        });
+        diagonal |= at[*s].is_none();
+    }
+    (
+        values,
+        layout,
+        diagonal && model.settings.preconditioner != Preconditioner::None,
+    )
+}
+
+/// Pairs, the tasks (block of sources, image, first and last block of faces) of each in order, and
+/// their ranges.
+fn tasks(
+    model: &Model,
+    relations: &[u32],
+    face_blocks: &[[u32; 4]],
+    source_blocks: &[[u32; 4]],
+) -> (Vec<DevicePair>, Vec<u32>, Vec<u32>) {
+    let n = model.bodies.len();
+    let of = |blocks: &[[u32; 4]], b: usize| -> std::ops::Range<usize> {
+        let first = blocks.partition_point(|x| (x[0] as usize) < b);
+        let last = blocks.partition_point(|x| (x[0] as usize) <= b);
+        first..last
+    };
+    let work = face_blocks.len() * source_blocks.len() * model.images.len();
+    let chunk = work.div_ceil(TASKS).max(1);
+    let (mut pairs, mut tasks, mut ranges) = (Vec::new(), Vec::new(), Vec::new());
+    for target in 0..n {
+        let rows = of(face_blocks, target);
+        for image in 0..model.images.len() {
+            for source in 0..n {
+                if image == 0 && relations[target * n + source] != 0 {
+                    continue;
+                }
+                let start = (tasks.len() / 4) as u32;
+                for s in of(source_blocks, source) {
+                    for first in rows.clone().step_by(chunk) {
+                        let last = (first + chunk).min(rows.end);
+                        tasks.extend([s as u32, image as u32, first as u32, last as u32]);
+                    }
+                }
+                ranges.extend([start, (tasks.len() / 4) as u32]);
+                pairs.push(DevicePair {
+                    target,
+                    source,
+                    image,
+                });
+            }
+        }
+    }
+    (pairs, tasks, ranges)
+}
+
+impl Placed {
+    /// Places all bodies.
+    ///
+    /// # Errors
+    /// A device that fails.
+    pub fn new(geometry: &Arc<Geometry>, poses: &[Pose]) -> Result<Self> {
+        let context = &geometry.context;
+        let sizes = &geometry.sizes;
+        let length = geometry.length;
+        let sum: Vec3 = poses.iter().map(|p| p.translation).sum();
+        let middle = sum / poses.len().max(1) as f64;
+        let mut values = Vec::new();
+        let mut add = |linear: &Mat3, shift: &Vec3| {
+            for i in 0..3 {
+                values.extend(linear.row(i).iter());
+            }
+            values.extend(shift.iter());
+        };
+        for pose in poses {
+            add(&pose.rotation, &((pose.translation - middle) / length));
+        }
+        for image in &geometry.model.images {
+            let shift = image.linear * middle + image.shift - middle;
+            add(&image.linear, &(shift / length));
+        }
+        let surfaces = |arithmetic| -> Result<Surfaces> {
+            Ok(Surfaces {
+                faces: context.reals("faces", arithmetic, 13 * sizes.faces)?,
+                sources: context.reals("sources", arithmetic, 3 * sizes.images * sizes.sources)?,
+            })
+        };
+        let out = Self {
+            geometry: geometry.clone(),
+            middle,
+            fine: surfaces(context.fine())?,
+            single: surfaces(Arithmetic::Single)?,
+            scaling: context.upload("scaling", Arithmetic::Single, &vec![1.0; sizes.sources])?,
+        };
+        let poses = context.upload("poses", context.fine(), &values)?;
+        let calls = place(context, geometry, &poses, &out.fine, &out.single)?;
+        let mut batch = Batch::default();
+        batch.extend(&calls);
+        let scaling = geometry
+            .diagonal
+            .then(|| diagonal(context, &out, &out.scaling));
+        let scaling = scaling.transpose()?;
+        batch.extend(&scaling);
+        context.submit(&batch)?;
+        Ok(out)
+    }
+
+    /// The variables of `pairs.wgsl`.
+    pub fn buffers(&self, arithmetic: Arithmetic) -> Vec<(&'static str, Bound<'_>)> {
+        let surfaces = if arithmetic == Arithmetic::Single {
+            &self.single
+        } else {
+            &self.fine
+        };
+        let geometry = &self.geometry;
+        vec![
+            ("faces", (&surfaces.faces).into()),
+            ("sources", (&surfaces.sources).into()),
+            ("blocks", (&geometry.blocks).into()),
+            ("relations", (&geometry.relations).into()),
+            ("sizes", (&geometry.sizes_uniform).into()),
+        ]
+    }
+}

@@ -1,0 +1,260 @@
+//! Compiled shaders, and their calls.
+
+use super::buffer::Buffer;
+use super::context::Context;
+use super::source::{Arithmetic, Constant, Shader};
+use crate::Result;
+use std::sync::Arc;
+use std::sync::atomic::Ordering;
+use wgpu::naga;
+
+/// A variable that a shader's entry uses.
+struct Binding {
+    name: String,
+    group: u32,
+    binding: u32,
+}
+
+/// One entry of a shader, compiled.
+pub(super) struct Kernel {
+    name: String,
+    pipeline: wgpu::ComputePipeline,
+    layouts: Vec<wgpu::BindGroupLayout>,
+    bindings: Vec<Binding>,
+}
+
+/// A kernel with its buffers and its number of workgroups.
+pub(super) struct Call {
+    kernel: Arc<Kernel>,
+    groups: Vec<wgpu::BindGroup>,
+    count: [u32; 3],
+}
+
+/// What is to be done on the device, in order.
+#[derive(Default)]
+pub(super) struct Batch<'a> {
+    calls: Vec<&'a Call>,
+}
+
+/// What stands in a variable.
+pub(super) enum Bound<'a> {
+    Buffer(&'a Buffer),
+    Uniform(&'a wgpu::Buffer),
+}
+
+impl<'a> From<&'a Buffer> for Bound<'a> {
+    fn from(b: &'a Buffer) -> Self {
+        Self::Buffer(b)
+    }
+}
+
+impl<'a> From<&'a wgpu::Buffer> for Bound<'a> {
+    fn from(b: &'a wgpu::Buffer) -> Self {
+        Self::Uniform(b)
+    }
+}
+
+/// Whether a shader writes to a variable, and whether it is one of the uniforms.
+fn kind(space: naga::AddressSpace) -> Option<wgpu::BufferBindingType> {
+    match space {
+        naga::AddressSpace::Uniform => Some(wgpu::BufferBindingType::Uniform),
+        naga::AddressSpace::Storage { access } => Some(wgpu::BufferBindingType::Storage {
+            read_only: !access.contains(naga::StorageAccess::STORE),
+        }),
+        _ => None,
+    }
+}
+
+impl Kernel {
+    pub fn new(
+        context: &Context,
+        shader: &'static str,
+        entry: &str,
+        arithmetic: Arithmetic,
+        constants: &[(&'static str, Constant)],
+    ) -> Result<Self> {
+        let name = format!("{shader}::{entry} ({})", arithmetic.name());
+        let wrong = |what: String| context.failure(format!("shader {name}: {what}"));
+        let text = Shader::named(shader)
+            .and_then(|s| s.assemble(arithmetic, constants))
+            .ok_or_else(|| wrong("a piece or a constant is missing".into()))?;
+        let module =
+            naga::front::wgsl::parse_str(&text).map_err(|e| wrong(e.emit_to_string(&text)))?;
+        let mut capabilities = naga::valid::Capabilities::empty();
+        capabilities.set(
+            naga::valid::Capabilities::FLOAT64,
+            arithmetic == Arithmetic::Double,
+        );
+        let info = naga::valid::Validator::new(naga::valid::ValidationFlags::all(), capabilities)
+            .validate(&module)
+            .map_err(|e| wrong(e.emit_to_string(&text)))?;
+        let at = module.entry_points.iter().position(|e| e.name == entry);
+        let at = at.ok_or_else(|| wrong("there is no such entry".into()))?;
+        let used = info.get_entry_point(at);
+        let mut bindings = Vec::new();
+        let mut entries: Vec<Vec<wgpu::BindGroupLayoutEntry>> = Vec::new();
+        for (handle, variable) in module.global_variables.iter() {
+            let (Some(place), Some(ty)) = (&variable.binding, kind(variable.space)) else {
+                continue;
+            };
+            entries.resize_with(entries.len().max(place.group as usize + 1), Vec::new);
+            if used[handle].is_empty() {
+                continue;
+            }
+            entries[place.group as usize].push(wgpu::BindGroupLayoutEntry {
+                binding: place.binding,
+                visibility: wgpu::ShaderStages::COMPUTE,
+                ty: wgpu::BindingType::Buffer {
+                    ty,
+                    has_dynamic_offset: false,
+                    min_binding_size: None,
+                },
+                count: None,
+            });
+            bindings.push(Binding {
+                name: variable.name.clone().unwrap_or_default(),
+                group: place.group,
+                binding: place.binding,
+            });
+        }
+        let device = &context.device;
+        let layouts: Vec<wgpu::BindGroupLayout> = entries
+            .iter()
+            .map(|entries| {
+                device.create_bind_group_layout(&wgpu::BindGroupLayoutDescriptor {
+                    label: Some(&name),
+                    entries,
+                })
+            })
+            .collect();
+        let of: Vec<Option<&wgpu::BindGroupLayout>> = layouts.iter().map(Some).collect();
+        let layout = device.create_pipeline_layout(&wgpu::PipelineLayoutDescriptor {
+            label: Some(&name),
+            bind_group_layouts: &of,
+            immediate_size: 0,
+        });
+        let guard = device.push_error_scope(wgpu::ErrorFilter::Validation);
+        let module = device.create_shader_module(wgpu::ShaderModuleDescriptor {
+            label: Some(&name),
+            source: wgpu::ShaderSource::Wgsl(text.into()),
+        });
+        let pipeline = device.create_compute_pipeline(&wgpu::ComputePipelineDescriptor {
+            label: Some(&name),
+            layout: Some(&layout),
+            module: &module,
+            entry_point: Some(entry),
+            compilation_options: wgpu::PipelineCompilationOptions {
+                zero_initialize_workgroup_memory: false,
+                ..Default::default()
+            },
+            cache: None,
+        });
+        if let Some(e) = pollster::block_on(guard.pop()) {
+            return Err(wrong(e.to_string()));
+        }
+        Ok(Self {
+            name,
+            pipeline,
+            layouts,
+            bindings,
+        })
+    }
+}
+
+impl Context {
+    /// A call of a kernel with these buffers, by the shader's own names for them.
+    pub(super) fn call(
+        &self,
+        kernel: &Arc<Kernel>,
+        buffers: &[(&str, Bound)],
+        count: [u32; 3],
+    ) -> Result<Call> {
+        let wrong = |what: String| self.failure(format!("{}: {what}", kernel.name));
+        let most = self.most_groups();
+        if count.iter().any(|n| *n > most) {
+            return Err(wrong(format!(
+                "{count:?} workgroups are more than {most} along one dimension"
+            )));
+        }
+        let mut entries: Vec<Vec<wgpu::BindGroupEntry>> =
+            kernel.layouts.iter().map(|_| Vec::new()).collect();
+        for b in &kernel.bindings {
+            let (_, bound) = buffers
+                .iter()
+                .find(|(name, _)| *name == b.name)
+                .ok_or_else(|| wrong(format!("no buffer for {}", b.name)))?;
+            let resource = match bound {
+                Bound::Buffer(buffer) => buffer.raw().as_entire_binding(),
+                Bound::Uniform(buffer) => buffer.as_entire_binding(),
+            };
+            entries[b.group as usize].push(wgpu::BindGroupEntry {
+                binding: b.binding,
+                resource,
+            });
+        }
+        let guard = self.device.push_error_scope(wgpu::ErrorFilter::Validation);
+        let groups = kernel
+            .layouts
+            .iter()
+            .zip(&entries)
+            .map(|(layout, entries)| {
+                self.device.create_bind_group(&wgpu::BindGroupDescriptor {
+                    label: Some(&kernel.name),
+                    layout,
+                    entries,
+                })
+            })
+            .collect();
+        if let Some(e) = pollster::block_on(guard.pop()) {
+            return Err(wrong(e.to_string()));
+        }
+        Ok(Call {
+            kernel: kernel.clone(),
+            groups,
+            count,
+        })
+    }
+
+    /// Starts everything of a batch, in order; returns at once.
+    ///
+    /// # Errors
+    /// A fault of the device.
+    pub(super) fn submit(&self, batch: &Batch) -> Result<()> {
+        let mut encoder = self.device.create_command_encoder(&Default::default());
+        {
+            let mut pass = encoder.begin_compute_pass(&Default::default());
+            for call in &batch.calls {
+                if call.count.contains(&0) {
+                    continue;
+                }
+                pass.set_pipeline(&call.kernel.pipeline);
+                for (i, group) in call.groups.iter().enumerate() {
+                    pass.set_bind_group(i as u32, group, &[]);
+                }
+                let [x, y, z] = call.count;
+                pass.dispatch_workgroups(x, y, z);
+            }
+        }
+        let count = batch.calls.len() as u64;
+        self.counters.dispatches.fetch_add(count, Ordering::Relaxed);
+        self.queue.submit([encoder.finish()]);
+        self.check()
+    }
+}
+
+impl<'a> Batch<'a> {
+    pub fn push(&mut self, call: &'a Call) {
+        self.calls.push(call);
+    }
+
+    pub fn extend(&mut self, calls: impl IntoIterator<Item = &'a Call>) {
+        self.calls.extend(calls);
+    }
+}
+
+/// Workgroups of 64 threads for so many elements, over two dimensions where one doesn't do.
+pub(super) fn threads(elements: usize) -> [u32; 3] {
+    let groups = elements.div_ceil(64);
+    let y = groups.div_ceil(32768).max(1);
+    [groups.div_ceil(y) as u32, y as u32, 1]
+}

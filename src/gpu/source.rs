@@ -1,0 +1,143 @@
+//! The shaders' text: each is put together from an arithmetic, the pieces it names, and its constants.
+//!
+//! A shader says in a line `//! uses:` which files of `shaders/lib` it stands on, in order, and in a line
+//! `//! constants:` what is fixed when it is compiled (a number of columns, a variant). Nothing here needs a device.
+
+/// Real numbers that a shader computes with.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, PartialOrd, Ord)]
+pub enum Arithmetic {
+    /// f32.
+    Single,
+    /// f64, where the adapter has it.
+    Double,
+    /// Two f32, high and low: about 14 digits.
+    TwoFloat,
+}
+
+impl Arithmetic {
+    /// Name, for messages.
+    pub fn name(self) -> &'static str {
+        match self {
+            Self::Single => "single",
+            Self::Double => "double",
+            Self::TwoFloat => "two-float",
+        }
+    }
+
+    fn text(self) -> &'static str {
+        match self {
+            Self::Single => include_str!("../../shaders/lib/real_single.wgsl"),
+            Self::Double => include_str!("../../shaders/lib/real_double.wgsl"),
+            Self::TwoFloat => include_str!("../../shaders/lib/real_two.wgsl"),
+        }
+    }
+}
+
+/// One shader file.
+#[derive(Clone, Copy, Debug)]
+pub struct Shader {
+    /// Stem of its file in `shaders/`.
+    pub name: &'static str,
+    /// Its text.
+    pub text: &'static str,
+    /// The function of the CPU that gives the same values, `path::name`.
+    pub twin: &'static str,
+}
+
+macro_rules! shaders {
+    ($($name:literal => $twin:literal,)*) => {
+        /// Every shader, with its twin on the CPU.
+        pub const SHADERS: &[Shader] = &[$(Shader {
+            name: $name,
+            text: include_str!(concat!("../../shaders/", $name, ".wgsl")),
+            twin: $twin,
+        },)*];
+    };
+}
+
+shaders! {
+    "apply" => "coupling/full/cpu/system.rs::apply",
+    "apply_jvp" => "adjoint/src/kernel/flux/jvp.rs::flux_jvp",
+    "apply_transpose" => "coupling/full/cpu/system.rs::apply_transpose",
+    "apply_transpose_jvp" => "adjoint/src/kernel/flux/vjp.rs::flux_vjp",
+    "cgls" => "solver/cgls.rs::cgls",
+    "combine" => "solver/columns.rs::combine",
+    "diagonal" => "coupling/full/cpu/system.rs::new",
+    "factor" => "boundary/mfs/mod.rs::solve_factor",
+    "impulse" => "coupling/full/cpu/response.rs::impulse",
+    "pair_hvp" => "coupling/full/cpu/second.rs::pair_tangent",
+    "pair_vjp" => "coupling/full/cpu/response.rs::pair_tensor",
+    "place" => "coupling/pair.rs::new",
+    "products" => "solver/columns.rs::dots",
+    "reduce" => "solver/columns.rs::add_scaled",
+    "refine" => "solver/cgls.rs::cgls",
+    "rows" => "coupling/full/body.rs::twist_rows",
+    "sum" => "solver/columns.rs::add_scaled",
+}
+
+macro_rules! pieces {
+    ($($name:literal)*) => {
+        /// The pieces that shaders stand on.
+        const PIECES: &[(&str, &str)] = &[
+            $(($name, include_str!(concat!("../../shaders/lib/", $name, ".wgsl"))),)*
+        ];
+    };
+}
+
+pieces! { "vector" "flux" "normal" "potential" "pairs" "tile" "motion" "gate" "gate_state" }
+
+/// What is fixed when a shader is compiled.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
+pub enum Constant {
+    /// A size.
+    Number(u32),
+    /// A variant.
+    Flag(bool),
+}
+
+/// The words after `//! key:`.
+fn directive<'a>(text: &'a str, key: &str) -> Vec<&'a str> {
+    text.lines()
+        .filter_map(|l| l.strip_prefix("//! ")?.strip_prefix(key)?.strip_prefix(':'))
+        .flat_map(str::split_whitespace)
+        .collect()
+}
+
+impl Shader {
+    /// The shader of this name.
+    pub fn named(name: &str) -> Option<&'static Self> {
+        SHADERS.iter().find(|s| s.name == name)
+    }
+
+    /// Names of its constants.
+    pub fn constants(&self) -> Vec<&'static str> {
+        directive(self.text, "constants")
+    }
+
+    /// Its text in an arithmetic; `None` if a piece or a constant is missing.
+    pub fn assemble(
+        &self,
+        arithmetic: Arithmetic,
+        constants: &[(&str, Constant)],
+    ) -> Option<String> {
+        let mut out = arithmetic.text().to_string();
+        for name in self.constants() {
+            let (_, value) = constants.iter().find(|(n, _)| *n == name)?;
+            out.push_str(&match value {
+                Constant::Number(n) => format!("\nconst {name}: u32 = {n}u;"),
+                Constant::Flag(f) => format!("\nconst {name}: bool = {f};"),
+            });
+        }
+        for name in directive(self.text, "uses") {
+            out.push('\n');
+            out.push_str(PIECES.iter().find(|(n, _)| *n == name)?.1);
+        }
+        // Inner doc lines are read above; they are no comments that the language knows.
+        for line in self.text.lines().filter(|l| !l.starts_with("//! ")) {
+            out.push('\n');
+            out.push_str(line);
+        }
+        out.push('\n');
+        Some(out)
+    }
+}

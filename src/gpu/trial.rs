@@ -1,0 +1,44 @@
+//! Whether an adapter's compiler keeps the order of sums that two-float arithmetic stands on.
+
+use super::context::Context;
+use super::kernel::Batch;
+use super::products;
+use super::source::Arithmetic;
+use crate::Result;
+
+/// Digits that must be there.
+const ACCURACY: f64 = 1e-12;
+
+/// Tries two-float numbers on a sum whose digits single precision loses.
+///
+/// # Errors
+/// An adapter that reorders.
+pub(super) fn two_float(context: &Context) -> Result<()> {
+    let arithmetic = Arithmetic::TwoFloat;
+    let x: Vec<f64> = (0..64)
+        .map(|i| 1.0 + f64::from(i) * 1.23456789e-9)
+        .collect();
+    let y: Vec<f64> = (0..64).map(|i| 1.0 / (3.0 + f64::from(i))).collect();
+    let exact: f64 = x.iter().zip(&y).map(|(x, y)| x * y).sum();
+    let g = context.upload("trial", arithmetic, &x)?;
+    let a = context.upload("trial", arithmetic, &y)?;
+    let out = context.reals("trial", arithmetic, 1)?;
+    let task = products::Task {
+        rows: 64,
+        g: (1, 0),
+        a: (1, 0),
+        columns: 1,
+    };
+    let call = products::products(context, arithmetic, &g, &a, &out, &task)?;
+    let mut batch = Batch::default();
+    batch.push(&call);
+    context.submit(&batch)?;
+    let got = context.read(arithmetic, &[(&out, 1)])?[0][0];
+    let error = (got - exact).abs() / exact;
+    if error <= ACCURACY {
+        return Ok(());
+    }
+    Err(context.failure(format!(
+        "it has no double precision, and its compiler spoils two-float arithmetic (error {error:.1e}, must be below {ACCURACY:.0e})"
+    )))
+}

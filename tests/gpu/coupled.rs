@@ -1,0 +1,78 @@
+//! The coupled system on the device against the CPU's: value, vjp, jvp and hvp.
+
+use super::fixture::*;
+use hydrograd::boundary::Method;
+use hydrograd::coupling::full::{Model, Preconditioner};
+use hydrograd::coupling::{Coupling, Direction, Exclusions, Record};
+use hydrograd::gpu::Context;
+use nalgebra::DVector;
+use std::sync::Arc;
+
+/// Largest difference of each rung: value, gradient, along, vjp, momenta of the tangent, tangent.
+fn differences(context: &Arc<Context>, model: &Arc<Model>, columns: usize) -> [f64; 6] {
+    let (cpu, gpu) = both(context, model);
+    let n = model.bodies.len();
+    let (poses, basis) = (poses(), basis(n, columns, 0.3));
+    let a = cpu.evaluate(&poses, &basis, true).unwrap();
+    let b = gpu.evaluate(&poses, &basis, true).unwrap();
+    println!("cpu {:?}\ngpu {:?}", a.report(), b.report());
+    let x = DVector::from_vec(wavy(columns, 0.7));
+    let y = DVector::from_vec(wavy(columns, 1.9));
+    let z = displacement(n, 2.3);
+    let free = twist(n, 4.1);
+    let value = difference(b.momenta().as_slice(), a.momenta().as_slice());
+    let gradient = difference(&flat(&b.gradient(&x, &y)), &flat(&a.gradient(&x, &y)));
+    let along = difference(
+        b.gradient_along(&y, &z).as_slice(),
+        a.gradient_along(&y, &z).as_slice(),
+    );
+    let pull = |r: &dyn Record| {
+        let p = r
+            .vjp(Direction::Basis(&x), Direction::Twist(&free))
+            .unwrap();
+        [
+            p.momentum_x.as_slice(),
+            p.momentum_y.as_slice(),
+            &flat(&p.wrench),
+        ]
+        .concat()
+    };
+    let vjp = difference(&pull(&*b), &pull(&*a));
+    let second = |r: &dyn Record, same: bool| {
+        let right = if same {
+            Direction::Basis(&x)
+        } else {
+            Direction::Twist(&free)
+        };
+        let t = r.hvp(Direction::Basis(&x), right, &z).unwrap();
+        let momenta = [t.momentum_x.as_slice(), t.momentum_y.as_slice()].concat();
+        (momenta, [flat(&t.gradient), flat(&t.wrench)].concat())
+    };
+    let (mut jvp, mut hvp) = (0.0_f64, 0.0_f64);
+    for same in [true, false] {
+        let (a, b) = (second(&*a, same), second(&*b, same));
+        jvp = jvp.max(difference(&b.0, &a.0));
+        hvp = hvp.max(difference(&b.1, &a.1));
+    }
+    [value, gradient, along, vjp, jvp, hvp]
+}
+
+fn holds(context: &Arc<Context>, model: &Arc<Model>, columns: usize, limit: f64) {
+    let found = differences(context, model, columns);
+    println!("value, gradient, along, vjp, jvp, hvp: {found:?}");
+    assert!(
+        found.iter().all(|d| *d <= limit),
+        "{found:?} past {limit:.0e}"
+    );
+}
+
+#[test]
+fn flux_rows_without_walls() {
+    let model = model(
+        Method::MfsVertex,
+        &[],
+        Exclusions::none(),
+        tight(Preconditioner::Factors),
+    );
+    holds(context(), &model, 5, 1e-8);
+}

@@ -1,0 +1,105 @@
+//! Every shader is right WGSL in every arithmetic, has a wrapper and a twin on the CPU; no device is needed.
+
+#[path = "../src/gpu/source.rs"]
+#[allow(dead_code)]
+mod source;
+
+use naga::valid::{Capabilities, ValidationFlags, Validator};
+use source::{Arithmetic, Constant, SHADERS, Shader};
+use std::collections::BTreeSet;
+use std::path::Path;
+
+fn root() -> &'static Path {
+    Path::new(env!("CARGO_MANIFEST_DIR"))
+}
+
+/// Every setting of a shader's constants that differs in kind.
+fn settings(shader: &Shader) -> Vec<Vec<(&'static str, Constant)>> {
+    let mut all = vec![Vec::new()];
+    for name in shader.constants() {
+        let values = match name {
+            "COLUMNS" => vec![Constant::Number(1), Constant::Number(12)],
+            "LEFT" => vec![Constant::Number(1), Constant::Number(4)],
+            _ => vec![Constant::Flag(false), Constant::Flag(true)],
+        };
+        all = all
+            .iter()
+            .flat_map(|given: &Vec<_>| {
+                values.iter().map(move |v| {
+                    let mut more = given.clone();
+                    more.push((name, *v));
+                    more
+                })
+            })
+            .collect();
+    }
+    all
+}
+
+#[test]
+fn every_shader_is_valid_in_every_arithmetic() {
+    for shader in SHADERS {
+        for arithmetic in [Arithmetic::Single, Arithmetic::Double, Arithmetic::TwoFloat] {
+            for constants in settings(shader) {
+                let text = shader.assemble(arithmetic, &constants).expect(shader.name);
+                let place = format!("{} ({}, {constants:?})", shader.name, arithmetic.name());
+                let module = naga::front::wgsl::parse_str(&text)
+                    .unwrap_or_else(|e| panic!("{place}: {}", e.emit_to_string(&text)));
+                let capabilities = match arithmetic {
+                    Arithmetic::Double => Capabilities::FLOAT64,
+                    _ => Capabilities::empty(),
+                };
+                if let Err(e) =
+                    Validator::new(ValidationFlags::all(), capabilities).validate(&module)
+                {
+                    panic!("{place}: {}", e.emit_to_string(&text));
+                }
+                assert!(!module.entry_points.is_empty(), "{place}: no entry");
+            }
+        }
+    }
+}
+
+#[test]
+fn every_shader_file_is_known_and_has_a_wrapper_a_twin_and_a_comparison() {
+    let stems = |folder: &str, extension: &str| -> BTreeSet<String> {
+        std::fs::read_dir(root().join(folder))
+            .unwrap()
+            .map(|f| f.unwrap().path())
+            .filter(|p| p.extension().is_some_and(|e| e == extension))
+            .map(|p| p.file_stem().unwrap().to_string_lossy().into_owned())
+            .collect()
+    };
+    let known: BTreeSet<String> = SHADERS.iter().map(|s| s.name.to_string()).collect();
+    assert_eq!(
+        stems("shaders", "wgsl"),
+        known,
+        "shaders and src/gpu/source.rs"
+    );
+    let comparisons = std::fs::read_to_string(root().join("tests/gpu/main.rs")).unwrap();
+    for shader in SHADERS {
+        let name = shader.name;
+        let wrapper = root().join(format!("src/gpu/{name}.rs"));
+        let code =
+            std::fs::read_to_string(&wrapper).unwrap_or_else(|_| panic!("{name}: no wrapper"));
+        assert!(
+            code.contains(&format!("\"{name}\"")),
+            "{name}: its wrapper doesn't call it"
+        );
+        let (file, function) = shader.twin.split_once("::").expect(name);
+        let paths = [format!("src/{file}"), file.to_string()];
+        let twin = paths
+            .iter()
+            .find_map(|p| std::fs::read_to_string(root().join(p)).ok());
+        let twin = twin.unwrap_or_else(|| panic!("{name}: no file {file} of its twin"));
+        assert!(
+            twin.contains(&format!("fn {function}")),
+            "{name}: no twin {}",
+            shader.twin
+        );
+        assert!(
+            comparisons.contains(&format!("\"{name}\" =>")),
+            "{name}: nothing compares it in tests/gpu"
+        );
+    }
+}

@@ -95,6 +95,8 @@ pub struct Context {
     pub(super) counters: Arc<Counters>,
     kernels: Mutex<HashMap<Key, Arc<Kernel>>>,
     fault: Arc<Mutex<Option<String>>>,
+    /// Zero, for shaders whose compiler mustn't know it.
+    pub(super) nothing: wgpu::Buffer,
 }
 
 fn instance() -> wgpu::Instance {
@@ -219,7 +221,15 @@ impl Context {
         });
         let uncaptured = keep(&fault);
         device.on_uncaptured_error(Arc::new(move |e: wgpu::Error| uncaptured(e.to_string())));
+        // Fresh memory is zero.
+        let nothing = device.create_buffer(&wgpu::BufferDescriptor {
+            label: Some("nothing"),
+            size: 16,
+            usage: wgpu::BufferUsages::UNIFORM,
+            mapped_at_creation: false,
+        });
         let context = Arc::new(Self {
+            nothing,
             device,
             queue,
             adapter,

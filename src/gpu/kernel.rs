@@ -179,13 +179,11 @@ impl Context {
         let mut entries: Vec<Vec<wgpu::BindGroupEntry>> =
             kernel.layouts.iter().map(|_| Vec::new()).collect();
         for b in &kernel.bindings {
-            let (_, bound) = buffers
-                .iter()
-                .find(|(name, _)| *name == b.name)
-                .ok_or_else(|| wrong(format!("no buffer for {}", b.name)))?;
-            let resource = match bound {
-                Bound::Buffer(buffer) => buffer.raw().as_entire_binding(),
-                Bound::Uniform(buffer) => buffer.as_entire_binding(),
+            let resource = match buffers.iter().find(|(name, _)| *name == b.name) {
+                Some((_, Bound::Buffer(buffer))) => buffer.raw().as_entire_binding(),
+                Some((_, Bound::Uniform(buffer))) => buffer.as_entire_binding(),
+                None if b.name == "nothing" => self.nothing.as_entire_binding(),
+                None => return Err(wrong(format!("no buffer for {}", b.name))),
             };
             entries[b.group as usize].push(wgpu::BindGroupEntry {
                 binding: b.binding,

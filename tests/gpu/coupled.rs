@@ -2,7 +2,7 @@
 
 use super::fixture::*;
 use hydrograd::boundary::Method;
-use hydrograd::coupling::full::{Model, Preconditioner};
+use hydrograd::coupling::full::{Model, Preconditioner, SolveSettings};
 use hydrograd::coupling::{Coupling, Direction, Exclusions, Record};
 use hydrograd::gpu::Context;
 use nalgebra::DVector;
@@ -75,4 +75,46 @@ fn flux_rows_without_walls() {
         tight(Preconditioner::Factors),
     );
     holds(context(), &model, 5, 1e-8);
+}
+
+#[test]
+fn flux_rows_with_two_walls() {
+    let model = model(
+        Method::MfsVertex,
+        &[WALL, SIDE],
+        Exclusions::none(),
+        tight(Preconditioner::Factors),
+    );
+    holds(context(), &model, 5, 1e-8);
+}
+
+#[test]
+fn normal_rows_with_an_excluded_pair_and_a_wall() {
+    let model = model(
+        Method::MfsFace,
+        &[WALL],
+        Exclusions::new([(0, 1)]),
+        tight(Preconditioner::Factors),
+    );
+    holds(context(), &model, 5, 1e-8);
+}
+
+#[test]
+fn without_double_precision() {
+    let settings = SolveSettings {
+        tolerance: 1e-9,
+        ..tight(Preconditioner::Factors)
+    };
+    let model = model(Method::MfsVertex, &[WALL], Exclusions::none(), settings);
+    holds(two_float(), &model, 5, 1e-7);
+}
+
+#[test]
+fn without_factors() {
+    let settings = SolveSettings {
+        tolerance: 1e-9,
+        ..tight(Preconditioner::Jacobi)
+    };
+    let model = model(Method::MfsVertex, &[], Exclusions::none(), settings);
+    holds(context(), &model, 5, 1e-6);
 }

@@ -56,6 +56,8 @@ pub(super) struct Geometry {
     pub model: Arc<Model>,
     /// L, m.
     pub length: f64,
+    /// w.
+    pub weight: f64,
     pub sizes: Sizes,
     pub pairs: Vec<DevicePair>,
     pub shape_faces: Buffer,
@@ -295,6 +297,7 @@ impl Geometry {
             context: context.clone(),
             model: model.clone(),
             length,
+            weight,
             sizes,
             pairs,
         })

@@ -141,6 +141,7 @@ impl Answer {
         let back = |potential| Product::Transpose { potential };
         let gathered = product(
             &placed,
+            fine,
             back(false),
             at(1),
             k,
@@ -148,6 +149,7 @@ impl Answer {
         )?;
         let read = product(
             &placed,
+            fine,
             back(true),
             at(2),
             k,
@@ -200,7 +202,7 @@ impl Answer {
         };
         let forward = Product::Forward { potential: false };
         let x = (&self.strengths, 2 * k, 0);
-        let image = product(&placed, forward, x, 2 * k, &[residual, mu])?;
+        let image = product(&placed, fine, forward, x, 2 * k, &[residual, mu])?;
         let (impulses_of, momenta) = self.impulse_calls()?;
         let energies = context.reals("energies", fine, k * k)?;
         let task = Task {
@@ -245,7 +247,14 @@ impl Answer {
         let out = context.reals("momenta", fine, 6 * geometry.sizes.bodies * k)?;
         let forward = Product::Forward { potential: true };
         let a = (&self.strengths, 2 * k, 0);
-        let mut calls = product(&self.placed, forward, a, k, &[To::plain(k, (&phi, k, 0))])?;
+        let mut calls = product(
+            &self.placed,
+            fine,
+            forward,
+            a,
+            k,
+            &[To::plain(k, (&phi, k, 0))],
+        )?;
         let mu = (&self.densities, 3 * k, 0);
         calls.push(impulse(context, geometry, &phi, mu, a, (&out, k))?);
         Ok((calls, out))
@@ -341,7 +350,15 @@ impl Response for Answer {
             let out = context.reals("wrenches", fine, geometry.pairs.len() * elements)?;
             let densities = (&self.densities, &self.strengths);
             let calls = [
-                pair_vjp(context, placed, densities, k, (p * width, width), &parts)?,
+                pair_vjp(
+                    context,
+                    fine,
+                    placed,
+                    densities,
+                    k,
+                    (p * width, width),
+                    &parts,
+                )?,
                 reduce(
                     context,
                     fine,

@@ -20,7 +20,7 @@ use std::sync::Arc;
 /// Faces or sources of one block.
 const BLOCK: usize = 64;
 /// Workgroups that keep a large card busy.
-const BUSY: usize = 512;
+const BUSY: usize = 2048;
 /// Tasks of a derivative, about.
 const TASKS: usize = 2048;
 

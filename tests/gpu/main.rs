@@ -3,6 +3,8 @@
 mod coupled;
 mod fixture;
 mod kernels;
+mod large;
+mod refined;
 
 use hydrograd::gpu::source::SHADERS;
 use std::collections::BTreeSet;

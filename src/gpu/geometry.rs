@@ -303,6 +303,19 @@ impl Geometry {
         })
     }
 
+    /// Shares of a product with the factors: none shorter than a block.
+    pub fn factor_shares(&self) -> usize {
+        let widest = self
+            .model
+            .sources
+            .iter()
+            .map(|r| r.len())
+            .max()
+            .unwrap_or(0);
+        self.sizes
+            .shares(self.sizes.source_blocks, widest.div_ceil(BLOCK))
+    }
+
     /// Number of tasks of a derivative.
     pub fn task_count(&self) -> usize {
         self.task_count

@@ -31,7 +31,7 @@ pub(super) struct Solve {
     first: Vec<Call>,
     again: Vec<Call>,
     opening: [Cycle; 2],
-    lead: [Call; 1],
+    lead: [Call; 2],
     iteration: Vec<Call>,
     /// Keeps what the calls use.
     _memory: Vec<Buffer>,
@@ -116,13 +116,25 @@ impl Solve {
                 x,
             )
         };
-        let lead = [factor(
-            context,
-            placed,
-            true,
-            (&refined.shrunk, &iterates.s, columns),
-            gate,
-        )?];
+        let factor_shares = geometry.factor_shares();
+        let parts = context.reals("shares of R⁻¹ x", single, factor_shares * n * columns)?;
+        let preconditioned =
+            |transpose: bool, x: &Buffer, out: &Buffer, gate: &Buffer| -> Result<[Call; 2]> {
+                let task = Sum {
+                    rows: n,
+                    columns,
+                    parts: (&parts, factor_shares, columns, 0),
+                    scale: 1.0,
+                    base: Base::Nothing,
+                    damped: None,
+                    out: (out, columns, 0),
+                };
+                Ok([
+                    factor(context, placed, transpose, (x, &parts, columns), gate)?,
+                    sum(context, single, &task, gate)?,
+                ])
+            };
+        let lead = preconditioned(true, &refined.shrunk, &iterates.s, gate)?;
         let active = &iterates.active;
         let [curvature, advance, measure, turn] = cgls(context, &iterates, n, columns)?;
         let direction = (&iterates.direction, columns, 0);
@@ -135,14 +147,14 @@ impl Solve {
             damped: Some((&geometry.damping_single, direction)),
             out: (&q, columns, 0),
         };
-        let iteration = vec![
-            factor(
-                context,
-                placed,
-                false,
-                (&iterates.p, &iterates.direction, columns),
-                active,
-            )?,
+        let mut iteration = Vec::new();
+        iteration.extend(preconditioned(
+            false,
+            &iterates.p,
+            &iterates.direction,
+            active,
+        )?);
+        iteration.extend([
             once(
                 placed,
                 single,
@@ -161,12 +173,9 @@ impl Solve {
                 active,
             )?,
             sum(context, single, &damped, active)?,
-            factor(context, placed, true, (&q, &iterates.q, columns), active)?,
-            curvature,
-            advance,
-            measure,
-            turn,
-        ];
+        ]);
+        iteration.extend(preconditioned(true, &q, &iterates.q, active)?);
+        iteration.extend([curvature, advance, measure, turn]);
         Ok(Self {
             columns,
             opening: [cycle(true)?, cycle(false)?],
@@ -176,7 +185,7 @@ impl Solve {
             iteration,
             iterates,
             refined,
-            _memory: vec![rows, y, gathered, rows1, y1, gathered1, q],
+            _memory: vec![rows, y, gathered, rows1, y1, gathered1, q, parts],
         })
     }
 

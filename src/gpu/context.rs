@@ -1,5 +1,6 @@
 //! The device: what it is, its limits, its faults, its counters.
 
+use super::buffer::Pool;
 use super::kernel::Kernel;
 use super::source::{Arithmetic, Constant};
 use crate::{Error, Result};
@@ -92,7 +93,7 @@ pub struct Context {
     adapter: Adapter,
     fine: Arithmetic,
     limits: wgpu::Limits,
-    pub(super) counters: Arc<Counters>,
+    pub(super) pool: Arc<Pool>,
     kernels: Mutex<HashMap<Key, Arc<Kernel>>>,
     fault: Arc<Mutex<Option<String>>>,
     /// Zero, for shaders whose compiler mustn't know it.
@@ -235,7 +236,7 @@ impl Context {
             adapter,
             fine,
             limits,
-            counters: Arc::default(),
+            pool: Arc::default(),
             kernels: Mutex::default(),
             fault,
         });
@@ -257,7 +258,7 @@ impl Context {
 
     /// What was done so far.
     pub fn counts(&self) -> Counts {
-        let c = &self.counters;
+        let c = &self.pool.counters;
         let of = |x: &AtomicU64| x.load(Ordering::Relaxed);
         Counts {
             dispatches: of(&c.dispatches),

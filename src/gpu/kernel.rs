@@ -28,6 +28,7 @@ pub(super) struct Call {
     kernel: Arc<Kernel>,
     groups: Vec<wgpu::BindGroup>,
     count: [u32; 3],
+    _held: Vec<Buffer>,
 }
 
 /// What is to be done on the device, in order.
@@ -206,10 +207,15 @@ impl Context {
         if let Some(e) = pollster::block_on(guard.pop()) {
             return Err(wrong(e.to_string()));
         }
+        let held = buffers.iter().filter_map(|(_, bound)| match bound {
+            Bound::Buffer(buffer) => Some((*buffer).clone()),
+            Bound::Uniform(_) => None,
+        });
         Ok(Call {
             kernel: kernel.clone(),
             groups,
             count,
+            _held: held.collect(),
         })
     }
 
@@ -234,7 +240,10 @@ impl Context {
             }
         }
         let count = batch.calls.len() as u64;
-        self.counters.dispatches.fetch_add(count, Ordering::Relaxed);
+        self.pool
+            .counters
+            .dispatches
+            .fetch_add(count, Ordering::Relaxed);
         self.queue.submit([encoder.finish()]);
         self.check()
     }

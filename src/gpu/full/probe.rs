@@ -17,6 +17,7 @@ use crate::gpu::reduce::reduce;
 use crate::gpu::source::Arithmetic;
 use crate::solver::Columns;
 use std::sync::Arc;
+use std::time::Instant;
 
 /// The coupled system at given poses, kernel by kernel.
 pub struct Probe {
@@ -112,6 +113,43 @@ impl Probe {
         )
     }
 
+    /// Seconds of a product with K of so many columns: the mean of `repeat` in a row, nothing read back
+    /// between them.
+    ///
+    /// # Errors
+    /// A device that fails.
+    pub fn time_apply(&self, arithmetic: Arithmetic, columns: usize, repeat: usize) -> Result<f64> {
+        let sizes = &self.placed.geometry.sizes;
+        let context = self.context();
+        let x = context.zeros("probe", arithmetic, sizes.sources * columns)?;
+        let out = context.reals("probe", arithmetic, sizes.faces * columns)?;
+        let to = [To::plain(columns, (&out, columns, 0))];
+        let what = Product::Forward { potential: false };
+        let calls = product(
+            &self.placed,
+            arithmetic,
+            what,
+            (&x, columns, 0),
+            columns,
+            &to,
+        )?;
+        let time = |repeat: usize| -> Result<f64> {
+            let start = Instant::now();
+            for _ in 0..repeat {
+                run(&self.placed, &[&calls])?;
+            }
+            context.read(arithmetic, &[(&out, 1)])?;
+            Ok(start.elapsed().as_secs_f64())
+        };
+        // What waiting costs, and the first start of a shader, are no part of it.
+        time(1)?;
+        let once = time(1)?;
+        Ok(match repeat {
+            0 | 1 => once,
+            n => (time(n)? - once).max(0.0) / (n - 1) as f64,
+        })
+    }
+
     /// Kᵀ y, or Pᵀ y: `[source][k]`.
     ///
     /// # Errors
@@ -180,7 +218,7 @@ impl Probe {
         let geometry = &self.placed.geometry;
         let (context, fine, k) = (self.context(), self.context().fine(), g.columns);
         let right = self.upload(fine, g)?;
-        let x = context.reals("probe", fine, g.rows * k)?;
+        let x = context.zeros("probe", fine, g.rows * k)?;
         let solves = Solves::new(&self.placed, (&right, k, 0), (&x, k, 0), k)?;
         let mut batch = Batch::default();
         solves.begin(&mut batch);
@@ -189,6 +227,7 @@ impl Probe {
             &self.placed,
             &context.read_bytes(&solves.report())?,
             "solve",
+            false,
         )? {
             Some(reached) => reached,
             None => solves.finish(&self.placed, "solve")?,

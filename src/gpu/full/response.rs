@@ -101,7 +101,7 @@ impl Answer {
         let values = scaled(twists, &scale, geometry.length);
         let device_twists = context.upload("twists", fine, &values)?;
         let densities = context.reals("densities", fine, sizes.faces * 3 * k)?;
-        let strengths = context.reals("strengths", fine, n * 2 * k)?;
+        let strengths = context.zeros("strengths", fine, n * 2 * k)?;
         let g = context.reals("right-hand sides", fine, n * 2 * k)?;
         let mut out = Self {
             moving,
@@ -166,7 +166,7 @@ impl Answer {
         // stand.
         let what = "coupled system (Eq. 20)";
         let (mut found, states) = out.follow(&g, Some(&solves))?;
-        let reached = match solves.reached(&placed, &states, what)? {
+        let reached = match solves.reached(&placed, &states, what, false)? {
             Some(reached) => reached,
             None => {
                 let reached = solves.finish(&placed, what)?;

@@ -45,7 +45,7 @@ impl Answer {
         let dphi = context.reals("δP a", fine, faces * n)?;
         // [δKᵀ r − Kᵀ δK a, δPᵀ β − δKᵀ μ − Kᵀ δK λ] by source.
         let g = context.reals("right-hand sides", fine, sources * 2 * n)?;
-        let x = context.reals("tangent of the strengths", fine, sources * 2 * n)?;
+        let x = context.zeros("tangent of the strengths", fine, sources * 2 * n)?;
         let forward = |potential| Product::ForwardTangent {
             potential,
             motions: &motion,
@@ -118,7 +118,7 @@ impl Answer {
             x: &x,
         };
         let (momenta, wrenches, states) = after.run(Some(&solves))?;
-        let (momenta, wrenches) = match solves.reached(placed, &states, what)? {
+        let (momenta, wrenches) = match solves.reached(placed, &states, what, false)? {
             Some(_) => (momenta, wrenches),
             None => {
                 solves.finish(placed, what)?;

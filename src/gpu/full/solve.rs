@@ -33,8 +33,6 @@ pub(super) struct Solve {
     opening: [Cycle; 2],
     lead: [Call; 2],
     iteration: Vec<Call>,
-    /// Keeps what the calls use.
-    _memory: Vec<Buffer>,
 }
 
 /// Several solves, all columns of G.
@@ -185,7 +183,6 @@ impl Solve {
             iteration,
             iterates,
             refined,
-            _memory: vec![rows, y, gathered, rows1, y1, gathered1, q, parts],
         })
     }
 
@@ -287,7 +284,8 @@ impl Solves {
             .collect()
     }
 
-    /// Whether all columns are done, from what [`Solves::report`] names; where one can't be, the error.
+    /// Whether all columns are done, from what [`Solves::report`] names; where one can't be, or isn't after the
+    /// last batch, the error.
     ///
     /// # Errors
     /// [`Error::Solver`] with what was reached.
@@ -296,6 +294,7 @@ impl Solves {
         placed: &Placed,
         bytes: &[Vec<u8>],
         what: &str,
+        last: bool,
     ) -> Result<Option<Reached>> {
         let settings = &placed.geometry.model.settings;
         let standing = self.standing(bytes);
@@ -304,7 +303,8 @@ impl Solves {
             residual: standing.iter().map(|s| s.residual).fold(0.0, f64::max),
         };
         let bad = |s: &Standing| s.stalled || !s.residual.is_finite();
-        let spent = |s: &Standing| s.unfinished && s.iterations >= settings.max_iterations;
+        let most = settings.max_iterations;
+        let spent = |s: &Standing| s.unfinished && (last || s.iterations >= most);
         if standing.iter().any(bad) || standing.iter().any(spent) {
             let model = &placed.geometry.model;
             let context = &placed.geometry.context;
@@ -328,16 +328,19 @@ impl Solves {
     pub fn finish(&self, placed: &Placed, what: &str) -> Result<Reached> {
         let context = &placed.geometry.context;
         let most = placed.geometry.model.settings.max_iterations;
-        let mut iterations = self.few;
+        let (mut iterations, mut granted) = (self.few, 0);
         loop {
             iterations = (2 * iterations).min(most);
+            granted += CYCLES * iterations;
             for solve in &self.all {
                 let mut batch = Batch::default();
                 solve.push(&mut batch, false, CYCLES, iterations);
                 context.submit(&batch)?;
             }
             let bytes = context.read_bytes(&self.report())?;
-            if let Some(reached) = self.reached(placed, &bytes, what)? {
+            // A direction without curvature counts no iterations, and must not go on for ever.
+            let last = granted > 4 * CYCLES * most;
+            if let Some(reached) = self.reached(placed, &bytes, what, last)? {
                 return Ok(reached);
             }
         }

@@ -1,8 +1,12 @@
 //! The GPU against the CPU. Fails where there is no adapter: a software one does.
 
+#[cfg(feature = "cli")]
+mod cli;
 mod coupled;
 mod fixture;
 mod kernels;
+mod robust;
+mod trajectory;
 
 use hydrograd::gpu::source::SHADERS;
 use std::collections::BTreeSet;

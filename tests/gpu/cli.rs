@@ -1,6 +1,6 @@
 //! The command line's GPU flags, on an adapter that is there and on one that isn't.
 
-use super::fixture::difference;
+use super::fixture::{context, difference};
 use std::process::{Command, Output};
 
 fn command(arguments: &[&str]) -> Command {
@@ -54,7 +54,7 @@ fn a_run_on_the_gpu_is_the_cpus_and_says_what_it_ran_on() {
     );
     assert!(cpu["device"].is_null() && cpu["backend_reason"].is_null());
     for arithmetic in ["double", "two-float"] {
-        if arithmetic == "double" && !hydrograd::gpu::adapters()[0].double {
+        if arithmetic == "double" && !context().adapter().double {
             continue;
         }
         let flags = ["--backend", "gpu", "--gpu-arithmetic", arithmetic];
@@ -72,7 +72,7 @@ fn a_run_on_the_gpu_is_the_cpus_and_says_what_it_ran_on() {
         assert!(off < 1e-7, "{arithmetic}: {off:e}");
     }
     let said = text(&[&base[..], &["--backend", "gpu"]].concat());
-    let name = &hydrograd::gpu::adapters()[0].name;
+    let name = context().adapter().name.as_str();
     for word in [name, "peak memory", "dispatches", "read-backs"] {
         assert!(said.contains(word), "no {word:?} in {said}");
     }

@@ -1,10 +1,14 @@
 //! The GPU against the CPU. Fails where there is no adapter: a software one does.
 
+#[cfg(feature = "cli")]
+mod cli;
 mod coupled;
 mod fixture;
 mod kernels;
 mod large;
 mod refined;
+mod robust;
+mod trajectory;
 
 use hydrograd::gpu::source::SHADERS;
 use std::collections::BTreeSet;

@@ -35,6 +35,25 @@ fn registered() -> Vec<(String, Rung)> {
     out
 }
 
+/// Rungs on a GPU, each with the shader whose comparison in tests/gpu holds it against its twin on the CPU.
+const ON_DEVICE: &[(&str, &str)] = &[
+    ("gpu::apply_jvp::apply_jvp", "apply_jvp"),
+    (
+        "gpu::apply_transpose_jvp::apply_transpose_jvp",
+        "apply_transpose_jvp",
+    ),
+    ("gpu::pair_hvp::pair_hvp", "pair_hvp"),
+    ("gpu::pair_vjp::pair_vjp", "pair_vjp"),
+    ("gpu::full::probe::Probe::apply_jvp", "apply_jvp"),
+    (
+        "gpu::full::probe::Probe::apply_transpose_jvp",
+        "apply_transpose_jvp",
+    ),
+    ("gpu::full::probe::Probe::pair_hvp", "pair_hvp"),
+    ("gpu::full::probe::Probe::pair_vjp", "pair_vjp"),
+    ("gpu::full::response::Answer::gradient", "pair_vjp"),
+];
+
 /// Helpers and declarations that are checked through a registered rung: (helper, rung).
 const THROUGH: &[(&str, &str)] = &[
     // Kernels behind a body's rows, and the pieces of the coupled record.
@@ -139,6 +158,7 @@ fn every_rung_in_the_source_is_registered() {
     let registered: BTreeSet<String> = registered().into_iter().map(|(name, _)| name).collect();
     let through = THROUGH.iter().map(|(helper, _)| *helper);
     let helpers: BTreeSet<&str> = through
+        .chain(ON_DEVICE.iter().map(|(rung, _)| *rung))
         .chain(VALUES_ONLY.iter().copied())
         .chain(PASSED_ON.iter().copied())
         .collect();
@@ -157,6 +177,14 @@ fn every_rung_in_the_source_is_registered() {
         stale.is_empty(),
         "registered, but not in the source: {stale:#?}"
     );
+    let folder = std::path::Path::new(env!("CARGO_MANIFEST_DIR"));
+    let compared = std::fs::read_to_string(folder.join("tests/gpu/main.rs")).unwrap();
+    for (rung, shader) in ON_DEVICE {
+        assert!(
+            compared.contains(&format!("\"{shader}\" =>")),
+            "{rung}: nothing compares {shader}"
+        );
+    }
     for (helper, rung) in THROUGH {
         assert!(
             registered.contains(*rung),

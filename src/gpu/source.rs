@@ -1,7 +1,9 @@
 //! The shaders' text: each is put together from an arithmetic, the pieces it names, and its constants.
 //!
 //! A shader says in a line `//! uses:` which files of `shaders/lib` it stands on, in order, and in a line
-//! `//! constants:` what is fixed when it is compiled (a number of columns, a variant). Nothing here needs a device.
+//! `//! constants:` what is fixed when it is compiled (a number of columns, a variant). Loops over such a number are
+//! written out: what they index by then stays in registers, whatever the driver's compiler makes of loops. Nothing here
+//! needs a device.
 
 /// Real numbers that a shader computes with.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, PartialOrd, Ord)]
@@ -133,11 +135,50 @@ impl Shader {
             out.push_str(PIECES.iter().find(|(n, _)| *n == name)?.1);
         }
         // Inner doc lines are read above; they are no comments that the language knows.
-        for line in self.text.lines().filter(|l| !l.starts_with("//! ")) {
-            out.push('\n');
-            out.push_str(line);
-        }
+        let lines: Vec<&str> = (self.text.lines())
+            .filter(|l| !l.starts_with("//! "))
+            .collect();
         out.push('\n');
+        write_out(&lines, constants, &mut out);
         Some(out)
+    }
+}
+
+/// Counter and end of a loop over one of the constants.
+fn counted<'a>(line: &'a str, constants: &[(&str, Constant)]) -> Option<(&'a str, u32)> {
+    let (counter, rest) = line
+        .trim_start()
+        .strip_prefix("for (var ")?
+        .split_once(" = 0u; ")?;
+    let end = rest.strip_prefix(counter)?.strip_prefix(" < ")?;
+    let (name, step) = end.split_once("; ")?;
+    let known = constants.iter().find(|(n, _)| *n == name);
+    match known {
+        Some((_, Constant::Number(n))) if step == format!("{counter}++) {{") => Some((counter, *n)),
+        _ => None,
+    }
+}
+
+/// Lines with their loops over constants written out.
+fn write_out(lines: &[&str], constants: &[(&str, Constant)], out: &mut String) {
+    let mut at = 0;
+    while at < lines.len() {
+        let line = lines[at];
+        let indent = &line[..line.len() - line.trim_start().len()];
+        let closing = || (at + 1..lines.len()).find(|i| lines[*i] == format!("{indent}}}"));
+        if let (Some((counter, count)), Some(end)) = (counted(line, constants), closing()) {
+            for k in 0..count {
+                out.push_str(&format!(
+                    "{indent}{{\n{indent}    const {counter}: u32 = {k}u;\n"
+                ));
+                write_out(&lines[at + 1..end], constants, out);
+                out.push_str(&format!("{indent}}}\n"));
+            }
+            at = end + 1;
+            continue;
+        }
+        out.push_str(line);
+        out.push('\n');
+        at += 1;
     }
 }

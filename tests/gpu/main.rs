@@ -2,3 +2,4 @@
 
 mod coupled;
 mod fixture;
+mod reduced;

@@ -2,7 +2,7 @@
 
 use super::fixture::*;
 use hydrograd::Error;
-use hydrograd::adjoint::lie::{Pose, Vec3};
+use hydrograd::adjoint::lie::{Pose, Vec3, exp_matrix};
 use hydrograd::boundary::{BodyBoundary, Settings};
 use hydrograd::coupling::reduced::{Cutoff, Reduced, ReducedBody, compress};
 use hydrograd::coupling::{Coupling, Direction, Exclusions, Record};
@@ -179,10 +179,11 @@ fn many(count: usize) -> (Arc<Reduced>, Vec<Pose>) {
     let turns = displacement(count, 5.5);
     let poses = (0..count)
         .map(|b| {
-            let place = Vec3::new((b % 4) as f64, (b / 4 % 4) as f64, (b / 16) as f64) * 1.4;
-            Pose::identity()
-                .displace(&(0.2 * turns[b]))
-                .translated(&place)
+            let place = Vec3::new((b % 4) as f64, (b / 4 % 4) as f64, (b / 16) as f64);
+            Pose::new(
+                exp_matrix(&turns[b].fixed_rows::<3>(0).into_owned()),
+                1.4 * place,
+            )
         })
         .collect();
     let reduced = Reduced::new(bodies, &[], |_, _| None).unwrap();

@@ -1,18 +1,18 @@
 // out = R⁻¹ x of every body, or R⁻ᵀ x: the right preconditioner. R⁻¹ lies there as a dense upper triangle
 // for the bodies where it fits; the others have a diagonal. A workgroup makes 64 rows of one body from
-// tiles of R⁻¹ in its own memory. Twin: boundary BodyBoundary::{solve_factor, solve_factor_transpose}.
+// tiles of R⁻¹ in its own memory, for one share of the columns of R⁻¹; sum.wgsl adds the shares up. Twin: boundary BodyBoundary::{solve_factor, solve_factor_transpose}.
 
 //! uses: gate
 //! constants: COLUMNS TRANSPOSE
 
-struct Counts { face_blocks: u32, pad0: u32, pad1: u32, pad2: u32 }
+struct Counts { face_blocks: u32, sources: u32, shares: u32, pad: u32 }
 
 @group(0) @binding(0) var<storage, read> blocks: array<vec4<u32>>;    // as in pairs.wgsl
 @group(0) @binding(1) var<storage, read> factors: array<real>;        // [shape]: n × n, row-major
 @group(0) @binding(2) var<storage, read> places: array<vec4<u32>>;    // [body]: start in `factors`, n, first source, kind
 @group(0) @binding(3) var<storage, read> scaling: array<real>;        // [source]: 1/√diagonal
 @group(0) @binding(4) var<storage, read> x: array<real>;              // [source][COLUMNS]
-@group(0) @binding(5) var<storage, read_write> out: array<real>;      // [source][COLUMNS]
+@group(0) @binding(5) var<storage, read_write> out: array<real>;      // [share][source][COLUMNS]
 @group(0) @binding(6) var<uniform> counts: Counts;
 
 const BLOCK: u32 = 64u;
@@ -33,10 +33,14 @@ fn main(
     let own = blocks[counts.face_blocks + group.x];
     let place = places[own.x];
     let i = own.y + lane;
+    let to = (group.y * counts.sources + i) * COLUMNS;
     if place.w != DENSE {
         if lane < own.z {
             for (var k = 0u; k < COLUMNS; k++) {
-                out[i * COLUMNS + k] = mul(scaling[i], x[i * COLUMNS + k]);
+                out[to + k] = num(0.0);
+                if group.y == 0u {
+                    out[to + k] = mul(scaling[i], x[i * COLUMNS + k]);
+                }
             }
         }
         return;
@@ -54,8 +58,10 @@ fn main(
         start = 0u;
         end = base_row + own.z;
     }
-    for (var j = start; j < end; j += WIDTH) {
-        let width = min(WIDTH, end - j);
+    let first = start + group.y * (end - start) / counts.shares;
+    let last = start + (group.y + 1u) * (end - start) / counts.shares;
+    for (var j = first; j < last; j += WIDTH) {
+        let width = min(WIDTH, last - j);
         workgroupBarrier();
         for (var at = lane; at < BLOCK * WIDTH; at += BLOCK) {
             // The faster index runs along the rows of memory.
@@ -88,7 +94,7 @@ fn main(
     }
     if lane < own.z {
         for (var k = 0u; k < COLUMNS; k++) {
-            out[i * COLUMNS + k] = sums[k];
+            out[to + k] = sums[k];
         }
     }
 }

@@ -68,6 +68,8 @@ fn help_of_every_command_tells_flags_and_defaults() {
                 "--integrator",
                 "--steps",
                 "--out",
+                "--backend",
+                "--gpu-fallback",
             ],
         ),
         (
@@ -92,6 +94,7 @@ fn help_of_every_command_tells_flags_and_defaults() {
             ],
         ),
         ("check-mesh", vec!["--scale"]),
+        ("gpu-info", vec!["--adapter", "--gpu-arithmetic"]),
     ];
     for (command, flags) in commands {
         assert!(top.contains(command), "{top}");
@@ -606,5 +609,60 @@ fn bad_starts_are_refused() {
         &["gradcheck", &good, "--directions", "0"],
         2,
         &["above zero"],
+    );
+}
+
+/// Without the feature the GPU's flags are there and say what to build.
+#[cfg(not(feature = "gpu"))]
+#[test]
+fn a_build_without_the_gpu_says_how_to_get_it() {
+    let ball = scene("falling_ball.toml");
+    let small = ["--faces", "80", "--backend", "gpu"];
+    let words = [
+        "backend gpu",
+        "feature gpu",
+        "cargo build --release --features gpu",
+    ];
+    for command in ["run", "gradcheck", "added-mass"] {
+        for fidelity in ["isolated", "full"] {
+            let asked = [&[command, &ball, "--fidelity", fidelity][..], &small].concat();
+            fails(&asked, 1, &words);
+        }
+    }
+    fails(&["gpu-info"], 1, &words);
+    // With the fallback it runs, on the CPU, and says why.
+    let run = ["run", &ball, "--steps", "1"];
+    let report = json(&[&run[..], &small, &["--gpu-fallback"]].concat());
+    assert_eq!(
+        (&report["backend"], &report["backend_used"]),
+        (&"gpu".into(), &"cpu".into())
+    );
+    for place in ["backend_reason", "warnings"] {
+        assert!(report[place].to_string().contains("feature gpu"), "{place}");
+    }
+    let plain = json(&[&run[..], &["--faces", "80"]].concat());
+    assert_eq!(plain["final_q"], report["final_q"]);
+}
+
+#[test]
+fn the_backend_is_in_every_summary() {
+    let ball = scene("falling_ball.toml");
+    let report = json(&["run", &ball, "--faces", "80", "--steps", "1"]);
+    assert_eq!(
+        (&report["backend"], &report["backend_used"]),
+        (&"cpu".into(), &"cpu".into())
+    );
+    assert!(report["device"].is_null() && report["backend_reason"].is_null());
+    let plain = hydrograd(&["added-mass", "--shape", "sphere:1", "--faces", "80"]);
+    assert!(text(&plain.stdout).contains("backend cpu"));
+    // A GPU's settings without the GPU.
+    let unused = ["--adapter", "llvmpipe", "--faces", "80", "--steps", "1"];
+    let report = json(&[&["run", &ball][..], &unused].concat());
+    assert!(report["warnings"].to_string().contains("no effect"));
+    fails(&["run", &ball, "--adapter", ""], 2, &["64 bytes"]);
+    fails(
+        &["run", &ball, "--backend", "gup"],
+        2,
+        &["gup", "cpu", "gpu"],
     );
 }

@@ -30,6 +30,7 @@ const LAYERS: [(&str, &[&str]); 15] = [
             "contact",
             "coupling",
             "dynamics",
+            "gpu",
             "multibody",
             "scene",
             "shape",
@@ -42,7 +43,7 @@ const LAYERS: [(&str, &[&str]); 15] = [
     (
         "cli",
         &[
-            "adjoint", "boundary", "coupling", "dynamics", "scene", "shape", "simulate",
+            "adjoint", "boundary", "coupling", "dynamics", "gpu", "scene", "shape", "simulate",
         ],
     ),
 ];

@@ -13,7 +13,7 @@ use super::options::{Water, name};
 use super::output::{Output, write_warnings};
 use crate::Result;
 use crate::scene::{Scene, Shape};
-use crate::simulate::ErrorEstimate;
+use crate::simulate::{BackendReport, ErrorEstimate};
 
 #[derive(Debug, Args)]
 pub(super) struct Arguments {
@@ -70,6 +70,8 @@ pub(super) struct Report {
     pub fidelity_used: String,
     /// What `auto` chose, and why.
     pub chosen: Vec<String>,
+    #[serde(flatten)]
+    pub backend: BackendReport,
     pub method: String,
     /// Density of the water, kg/m³.
     pub density: f64,
@@ -129,6 +131,7 @@ fn added_mass(scene: &Scene, arguments: &Arguments) -> Result<Report> {
         fidelity: name(settings.fidelity),
         fidelity_used: name(simulator.fidelity()),
         chosen: simulator.reasons().to_vec(),
+        backend: simulator.backend(),
         method: settings.method_name().into(),
         density: simulator.parameters().density,
         warnings,
@@ -162,6 +165,7 @@ impl fmt::Display for Report {
             "asymmetry {:.1e}; volume {:.6e} m³; {} faces, {} unknowns, {} iterations, {:.3} s",
             self.asymmetry, self.volume, self.faces, self.unknowns, self.iterations, self.seconds
         )?;
+        write!(f, "\nbackend {}", self.backend)?;
         if let Some(estimate) = &self.error_estimate {
             write_estimate(f, estimate)?;
         }

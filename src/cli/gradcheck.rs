@@ -13,6 +13,7 @@ use super::output::{Output, write_warnings};
 use super::progress::Progress;
 use crate::Result;
 use crate::scene::Scene;
+use crate::simulate::BackendReport;
 use crate::simulate::gradcheck::{self, gradcheck_with};
 use crate::simulate::growth::{Growth, growth};
 
@@ -53,6 +54,8 @@ pub(super) struct Arguments {
 pub(super) struct Report {
     pub scene: String,
     pub fidelity: String,
+    #[serde(flatten)]
+    pub backend: BackendReport,
     pub method: String,
     pub integrator: String,
     pub steps: usize,
@@ -120,11 +123,13 @@ fn check(scene: &Scene, arguments: &Arguments, progress: &Progress) -> Result<Re
         false => Some(growth(&simulator, steps)?),
     };
     let warnings = simulator.warnings().to_vec();
+    let backend = simulator.backend();
     drop(simulator);
     let times = gradcheck::timings(&arguments.water.simulator(scene, usual)?, steps, TIMINGS)?;
     Ok(Report {
         scene: scene.name.clone(),
         fidelity: name(usual.fidelity),
+        backend,
         method: usual.method_name().into(),
         integrator: name(usual.integrator),
         steps,
@@ -175,6 +180,7 @@ impl fmt::Display for Report {
             "  trajectory {:.4} s, with its gradient {:.4} s: {:.2} times",
             self.forward_seconds, self.gradient_seconds, self.ratio
         )?;
+        write!(f, "\n  backend {}", self.backend)?;
         if let Some(growth) = &self.growth {
             let (step, peak) = (&growth.largest_step, &growth.peak);
             write!(

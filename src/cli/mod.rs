@@ -1,11 +1,13 @@
-//! The command line: `hydrograd run | added-mass | gradcheck | tradeoff | check-mesh`.
+//! The command line: `hydrograd run | added-mass | gradcheck | tradeoff | check-mesh | gpu-info`.
 //!
 //! Results go to standard output, everything else (progress, warnings, errors) to standard error.
 //! With `--json` standard output holds one JSON object and nothing else: the result, or
 //! `{"error": …}`. Exit codes: 0 done, 1 failed, 2 wrong usage.
 
 mod added_mass;
+mod backend;
 mod check_mesh;
+mod gpu_info;
 mod gradcheck;
 mod input;
 mod options;
@@ -48,6 +50,8 @@ enum Command {
     Tradeoff(tradeoff::Arguments),
     /// Say whether a mesh can be simulated: what is wrong, where, and how to mend it.
     CheckMesh(check_mesh::Arguments),
+    /// List the GPUs of this machine, and which one `--backend gpu` would use.
+    GpuInfo(gpu_info::Arguments),
 }
 
 /// Runs the command line of this process.
@@ -73,6 +77,7 @@ pub fn main() -> ExitCode {
         Command::Gradcheck(arguments) => gradcheck::main(&arguments, output),
         Command::Tradeoff(arguments) => tradeoff::main(&arguments, output),
         Command::CheckMesh(arguments) => check_mesh::main(&arguments, output),
+        Command::GpuInfo(arguments) => gpu_info::main(&arguments, output),
     };
     done.unwrap_or_else(|error| {
         output.error(&error);

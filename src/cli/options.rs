@@ -4,6 +4,7 @@ use clap::{Args, ValueEnum};
 use serde::Serialize;
 use std::path::PathBuf;
 
+use super::backend::Compute;
 use crate::Result;
 use crate::boundary::{self, OneBody};
 use crate::coupling::{full, panel};
@@ -144,6 +145,8 @@ pub(super) struct Water {
     /// Preconditioner of the coupled system [default: factors].
     #[arg(long, value_enum)]
     pub preconditioner: Option<Preconditioner>,
+    #[command(flatten)]
+    pub compute: Compute,
 }
 
 /// How time is stepped.
@@ -212,7 +215,8 @@ impl Water {
     /// The settings of a scene that has been through [`Water::apply`]: its preset, then what was
     /// given.
     pub fn settings(&self, scene: &Scene) -> Settings {
-        let mut settings = Settings::for_scene(scene).fidelity(self.fidelity.into());
+        let settings = Settings::for_scene(scene).fidelity(self.fidelity.into());
+        let mut settings = self.compute.choose(settings);
         if let Some(method) = self.method {
             settings = method.choose(settings);
         }

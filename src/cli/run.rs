@@ -14,7 +14,7 @@ use super::output::{Output, or_dash, peak_memory_mb, write_warnings};
 use super::progress::Progress;
 use crate::Result;
 use crate::scene::Scene;
-use crate::simulate::{Controls, Recording};
+use crate::simulate::{BackendReport, Controls, Recording};
 
 #[derive(Debug, Args)]
 pub(super) struct Arguments {
@@ -40,6 +40,8 @@ pub(super) struct Report {
     pub fidelity_used: String,
     /// What `auto` chose for each body and pair, and why.
     pub chosen: Vec<String>,
+    #[serde(flatten)]
+    pub backend: BackendReport,
     pub method: String,
     pub integrator: String,
     pub bodies: usize,
@@ -104,6 +106,7 @@ fn simulate(
         fidelity: name(settings.fidelity),
         fidelity_used: name(simulator.fidelity()),
         chosen: simulator.reasons().to_vec(),
+        backend: simulator.backend(),
         method: settings.method_name().into(),
         integrator: name(settings.integrator),
         bodies: scene.bodies.len(),
@@ -141,6 +144,7 @@ impl fmt::Display for Report {
         for reason in &self.chosen {
             writeln!(f, "  chosen  {reason}")?;
         }
+        writeln!(f, "  backend {}", self.backend)?;
         writeln!(
             f,
             "  {} bodies, {} faces, {} unknowns",

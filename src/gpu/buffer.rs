@@ -3,25 +3,56 @@
 use super::context::{Context, Counters};
 use super::source::Arithmetic;
 use crate::{Error, Result};
-use std::sync::Arc;
+use std::collections::HashMap;
 use std::sync::atomic::Ordering;
+use std::sync::{Arc, Mutex};
 
-/// An array in the device's memory.
-pub(super) struct Buffer {
+/// An array in the device's memory. Clones are the same array; calls hold one, so that nothing is used again
+/// before what was to be done with it has been started.
+#[derive(Clone)]
+pub(super) struct Buffer(Arc<Held>);
+
+struct Held {
     raw: wgpu::Buffer,
     bytes: u64,
-    counters: Arc<Counters>,
+    pool: Arc<Pool>,
 }
 
-impl Drop for Buffer {
+/// Memory to be used again, by size: every evaluation asks for the same sizes, and fresh memory has to be
+/// made and filled with zeros.
+#[derive(Default)]
+pub(super) struct Pool {
+    free: Mutex<HashMap<u64, Vec<wgpu::Buffer>>>,
+    pub counters: Arc<Counters>,
+}
+
+impl Pool {
+    fn take(&self, bytes: u64) -> Option<wgpu::Buffer> {
+        self.free.lock().ok()?.get_mut(&bytes)?.pop()
+    }
+
+    /// Gives everything that isn't in use back to the device.
+    fn drain(&self) {
+        if let Ok(mut free) = self.free.lock() {
+            for (bytes, buffers) in free.drain() {
+                self.counters.free(bytes * buffers.len() as u64);
+            }
+        }
+    }
+}
+
+impl Drop for Held {
     fn drop(&mut self) {
-        self.counters.free(self.bytes);
+        match self.pool.free.lock() {
+            Ok(mut free) => free.entry(self.bytes).or_default().push(self.raw.clone()),
+            Err(_) => self.pool.counters.free(self.bytes),
+        }
     }
 }
 
 impl Buffer {
     pub fn raw(&self) -> &wgpu::Buffer {
-        &self.raw
+        &self.0.raw
     }
 }
 
@@ -80,7 +111,7 @@ impl Arithmetic {
 }
 
 impl Context {
-    /// An array of so many bytes, zero at first.
+    /// An array of so many bytes, whatever they hold.
     ///
     /// # Errors
     /// [`Error::Device`] where it is larger than a shader can see, or the memory is at its end.
@@ -96,25 +127,52 @@ impl Context {
         if bytes > most {
             return Err(failed(format!("a shader sees at most {most}")));
         }
-        let guard = self.device.push_error_scope(wgpu::ErrorFilter::OutOfMemory);
-        let raw = self.device.create_buffer(&wgpu::BufferDescriptor {
-            label: Some(label),
-            size: bytes,
-            usage: wgpu::BufferUsages::STORAGE
-                | wgpu::BufferUsages::COPY_DST
-                | wgpu::BufferUsages::COPY_SRC,
-            mapped_at_creation: false,
-        });
-        if let Some(e) = pollster::block_on(guard.pop()) {
-            return Err(failed(e.to_string()));
+        let of = |raw| {
+            let pool = self.pool.clone();
+            Buffer(Arc::new(Held { raw, bytes, pool }))
+        };
+        if let Some(raw) = self.pool.take(bytes) {
+            return Ok(of(raw));
         }
+        let attempt = || {
+            let guard = self.device.push_error_scope(wgpu::ErrorFilter::OutOfMemory);
+            let raw = self.device.create_buffer(&wgpu::BufferDescriptor {
+                label: Some(label),
+                size: bytes,
+                usage: wgpu::BufferUsages::STORAGE
+                    | wgpu::BufferUsages::COPY_DST
+                    | wgpu::BufferUsages::COPY_SRC,
+                mapped_at_creation: false,
+            });
+            pollster::block_on(guard.pop()).map_or(Ok(raw), Err)
+        };
+        let raw = match attempt() {
+            Ok(raw) => raw,
+            Err(_) => {
+                self.pool.drain();
+                attempt().map_err(|e| failed(e.to_string()))?
+            }
+        };
         self.check()?;
-        self.counters.allocate(bytes);
-        Ok(Buffer {
-            raw,
-            bytes,
-            counters: self.counters.clone(),
-        })
+        self.pool.counters.allocate(bytes);
+        Ok(of(raw))
+    }
+
+    /// An array of so many real numbers, zero at first.
+    ///
+    /// # Errors
+    /// As [`Context::bytes`].
+    pub(super) fn zeros(
+        &self,
+        label: &str,
+        arithmetic: Arithmetic,
+        count: usize,
+    ) -> Result<Buffer> {
+        let out = self.reals(label, arithmetic, count)?;
+        let mut encoder = self.device.create_command_encoder(&Default::default());
+        encoder.clear_buffer(out.raw(), 0, None);
+        self.queue.submit([encoder.finish()]);
+        Ok(out)
     }
 
     /// An array of so many real numbers.
@@ -151,7 +209,10 @@ impl Context {
     /// As [`Context::bytes`].
     pub(super) fn upload_words(&self, label: &str, words: &[u32]) -> Result<Buffer> {
         let out = self.bytes(label, 4 * words.len())?;
-        self.write_words(&out, words);
+        // Shaders see the padding, too.
+        let mut words = words.to_vec();
+        words.resize((out.0.bytes / 4) as usize, 0);
+        self.write_words(&out, &words);
         Ok(out)
     }
 
@@ -215,7 +276,7 @@ impl Context {
                 0,
                 &staging,
                 at,
-                padded(*n).min(buffer.bytes),
+                padded(*n).min(buffer.0.bytes),
             );
             at += padded(*n);
         }
@@ -242,8 +303,14 @@ impl Context {
             out.push(view[at..at + n].to_vec());
             at += padded(*n) as usize;
         }
-        self.counters.read_backs.fetch_add(1, Ordering::Relaxed);
-        self.counters.bytes_back.fetch_add(total, Ordering::Relaxed);
+        self.pool
+            .counters
+            .read_backs
+            .fetch_add(1, Ordering::Relaxed);
+        self.pool
+            .counters
+            .bytes_back
+            .fetch_add(total, Ordering::Relaxed);
         Ok(out)
     }
 

@@ -30,8 +30,8 @@ impl Iterates {
             direction: vector("direction")?,
             x: vector("x")?,
             s: vector("s")?,
-            scalars: context.reals("scalars", Arithmetic::Single, 4 * columns)?,
-            counts: context.bytes("counts", 16 * columns)?,
+            scalars: context.zeros("scalars", Arithmetic::Single, 4 * columns)?,
+            counts: context.upload_words("counts", &vec![0; 4 * columns])?,
             active: context.upload_words("going", &vec![0; columns])?,
         })
     }

@@ -1,5 +1,6 @@
 //! The device: what it is, its limits, its faults, its counters.
 
+use super::buffer::Pool;
 use super::kernel::Kernel;
 use super::source::{Arithmetic, Constant};
 use crate::{Error, Result};
@@ -92,9 +93,11 @@ pub struct Context {
     adapter: Adapter,
     fine: Arithmetic,
     limits: wgpu::Limits,
-    pub(super) counters: Arc<Counters>,
+    pub(super) pool: Arc<Pool>,
     kernels: Mutex<HashMap<Key, Arc<Kernel>>>,
     fault: Arc<Mutex<Option<String>>>,
+    /// Zero, for shaders whose compiler mustn't know it.
+    pub(super) nothing: wgpu::Buffer,
 }
 
 fn instance() -> wgpu::Instance {
@@ -219,13 +222,21 @@ impl Context {
         });
         let uncaptured = keep(&fault);
         device.on_uncaptured_error(Arc::new(move |e: wgpu::Error| uncaptured(e.to_string())));
+        // Fresh memory is zero.
+        let nothing = device.create_buffer(&wgpu::BufferDescriptor {
+            label: Some("nothing"),
+            size: 16,
+            usage: wgpu::BufferUsages::UNIFORM,
+            mapped_at_creation: false,
+        });
         let context = Arc::new(Self {
+            nothing,
             device,
             queue,
             adapter,
             fine,
             limits,
-            counters: Arc::default(),
+            pool: Arc::default(),
             kernels: Mutex::default(),
             fault,
         });
@@ -247,7 +258,7 @@ impl Context {
 
     /// What was done so far.
     pub fn counts(&self) -> Counts {
-        let c = &self.counters;
+        let c = &self.pool.counters;
         let of = |x: &AtomicU64| x.load(Ordering::Relaxed);
         Counts {
             dispatches: of(&c.dispatches),

@@ -7,7 +7,8 @@ use super::kernel::Call;
 use super::source::{Arithmetic, Constant};
 use crate::Result;
 
-/// `out = R⁻¹ x`, or `R⁻ᵀ x`, columns beside each other, in single precision.
+/// `R⁻¹ x`, or `R⁻ᵀ x`, columns beside each other, in single precision, as shares
+/// `[share][source][columns]` to be summed.
 pub(super) fn factor(
     context: &Context,
     placed: &Placed,
@@ -21,7 +22,9 @@ pub(super) fn factor(
     ];
     let kernel = context.kernel("factor", "main", Arithmetic::Single, &constants)?;
     let geometry = &placed.geometry;
-    let uniform = context.uniform(&[geometry.sizes.face_blocks as u32, 0, 0, 0]);
+    let (sizes, shares) = (&geometry.sizes, geometry.factor_shares());
+    let words = [sizes.face_blocks, sizes.sources, shares, 0];
+    let uniform = context.uniform(&words.map(|n| n as u32));
     let buffers = [
         ("blocks", (&geometry.blocks).into()),
         ("factors", (&geometry.factors).into()),
@@ -35,6 +38,6 @@ pub(super) fn factor(
     context.call(
         &kernel,
         &buffers,
-        [geometry.sizes.source_blocks as u32, 1, 1],
+        [sizes.source_blocks as u32, shares as u32, 1],
     )
 }

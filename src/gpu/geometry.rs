@@ -20,7 +20,7 @@ use std::sync::Arc;
 /// Faces or sources of one block.
 const BLOCK: usize = 64;
 /// Workgroups that keep a large card busy.
-const BUSY: usize = 512;
+const BUSY: usize = 2048;
 /// Tasks of a derivative, about.
 const TASKS: usize = 2048;
 
@@ -56,6 +56,8 @@ pub(super) struct Geometry {
     pub model: Arc<Model>,
     /// L, m.
     pub length: f64,
+    /// w.
+    pub weight: f64,
     pub sizes: Sizes,
     pub pairs: Vec<DevicePair>,
     pub shape_faces: Buffer,
@@ -295,9 +297,23 @@ impl Geometry {
             context: context.clone(),
             model: model.clone(),
             length,
+            weight,
             sizes,
             pairs,
         })
+    }
+
+    /// Shares of a product with the factors: none shorter than a block.
+    pub fn factor_shares(&self) -> usize {
+        let widest = self
+            .model
+            .sources
+            .iter()
+            .map(|r| r.len())
+            .max()
+            .unwrap_or(0);
+        self.sizes
+            .shares(self.sizes.source_blocks, widest.div_ceil(BLOCK))
     }
 
     /// Number of tasks of a derivative.

@@ -28,6 +28,7 @@ pub(super) struct Call {
     kernel: Arc<Kernel>,
     groups: Vec<wgpu::BindGroup>,
     count: [u32; 3],
+    _held: Vec<Buffer>,
 }
 
 /// What is to be done on the device, in order.
@@ -179,13 +180,11 @@ impl Context {
         let mut entries: Vec<Vec<wgpu::BindGroupEntry>> =
             kernel.layouts.iter().map(|_| Vec::new()).collect();
         for b in &kernel.bindings {
-            let (_, bound) = buffers
-                .iter()
-                .find(|(name, _)| *name == b.name)
-                .ok_or_else(|| wrong(format!("no buffer for {}", b.name)))?;
-            let resource = match bound {
-                Bound::Buffer(buffer) => buffer.raw().as_entire_binding(),
-                Bound::Uniform(buffer) => buffer.as_entire_binding(),
+            let resource = match buffers.iter().find(|(name, _)| *name == b.name) {
+                Some((_, Bound::Buffer(buffer))) => buffer.raw().as_entire_binding(),
+                Some((_, Bound::Uniform(buffer))) => buffer.as_entire_binding(),
+                None if b.name == "nothing" => self.nothing.as_entire_binding(),
+                None => return Err(wrong(format!("no buffer for {}", b.name))),
             };
             entries[b.group as usize].push(wgpu::BindGroupEntry {
                 binding: b.binding,
@@ -208,10 +207,15 @@ impl Context {
         if let Some(e) = pollster::block_on(guard.pop()) {
             return Err(wrong(e.to_string()));
         }
+        let held = buffers.iter().filter_map(|(_, bound)| match bound {
+            Bound::Buffer(buffer) => Some((*buffer).clone()),
+            Bound::Uniform(_) => None,
+        });
         Ok(Call {
             kernel: kernel.clone(),
             groups,
             count,
+            _held: held.collect(),
         })
     }
 
@@ -236,7 +240,10 @@ impl Context {
             }
         }
         let count = batch.calls.len() as u64;
-        self.counters.dispatches.fetch_add(count, Ordering::Relaxed);
+        self.pool
+            .counters
+            .dispatches
+            .fetch_add(count, Ordering::Relaxed);
         self.queue.submit([encoder.finish()]);
         self.check()
     }

@@ -36,8 +36,8 @@ impl Refined {
         Ok(Self {
             rho: context.reals("residual", fine, rows * columns)?,
             shrunk: context.reals("shrunk", single, rows * columns)?,
-            norms: context.reals("norms", fine, 2 * columns)?,
-            relative: context.reals("relative", single, columns)?,
+            norms: context.zeros("norms", fine, 2 * columns)?,
+            relative: context.zeros("relative", single, columns)?,
             unfinished: context.upload_words("unfinished", &vec![1; columns])?,
         })
     }

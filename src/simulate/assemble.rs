@@ -1,6 +1,8 @@
 //! From a scene to a system: meshes, masses, joints, coupling, controller.
 
+use super::backend::{Backend, GpuSettings};
 use super::clearance::Clearance;
+use super::device::Device;
 use super::plan::{Planned, plan};
 use super::surface::{Surface, surface};
 use super::wet::{self, Discretisation, Plan, Water, Wet};
@@ -36,6 +38,8 @@ pub(super) struct Assembled {
     pub plan: Plan,
     /// What `Auto` chose, and why.
     pub reasons: Vec<String>,
+    /// What the coupling is computed on.
+    pub device: Device,
     pub clearance: Clearance,
     pub warnings: Vec<String>,
 }
@@ -240,7 +244,9 @@ pub(super) fn assemble(
     } = choose(scene, settings, &system, &q, &clearance, &wet, &of_wet)?;
     warnings.extend(without_effect(settings));
     let water = water(scene, &of_wet, folder);
-    let made = wet::couple(&wet, &water, settings, fidelity, &plan)?;
+    let mut device = Device::open(settings, fidelity)?;
+    let made = wet::couple(&wet, &water, settings, fidelity, &plan, &mut device)?;
+    warnings.extend(device.warning());
     system.coupling = made.coupling;
     warnings.extend(made.warnings);
     let mut resolved = vec![0.0; scene.bodies.len()];
@@ -275,6 +281,7 @@ pub(super) fn assemble(
         resolved,
         plan,
         reasons,
+        device,
         clearance,
         warnings,
     })
@@ -292,24 +299,27 @@ pub(super) fn water<'a>(scene: &'a Scene, of_wet: &[usize], folder: Option<&'a P
     }
 }
 
-/// Settings of the compression that the fidelity doesn't look at.
+/// Settings that the backend or the fidelity doesn't look at.
 fn without_effect(settings: &Settings) -> Vec<String> {
+    let mut out = Vec::new();
+    if settings.backend == Backend::Cpu && settings.gpu != GpuSettings::default() {
+        out.push("the settings of the GPU have no effect with the backend cpu".into());
+    }
     if settings.fidelity == Fidelity::Reduced {
-        return Vec::new();
+        return out;
     }
     let given = [
         ("rank", settings.compress.rank.is_some()),
         ("resolved_gap", settings.compress.resolved_gap.is_some()),
     ];
     let unused = given.iter().filter(|(_, given)| *given);
-    unused
-        .map(|(name, _)| {
-            format!(
-                "the setting {name} has no effect with the fidelity {}: only reduced takes it",
-                format!("{:?}", settings.fidelity).to_lowercase()
-            )
-        })
-        .collect()
+    out.extend(unused.map(|(name, _)| {
+        format!(
+            "the setting {name} has no effect with the fidelity {}: only reduced takes it",
+            format!("{:?}", settings.fidelity).to_lowercase()
+        )
+    }));
+    out
 }
 
 /// The fidelity to use, and what `Auto` makes of the scene.

@@ -1,10 +1,12 @@
 //! Simulations: settings, controllers, rollouts and their gradients.
 
 mod assemble;
+pub(crate) mod backend;
 mod clearance;
 mod contact;
 mod controller;
 mod controls;
+mod device;
 mod estimate;
 pub mod gradcheck;
 mod gradient;
@@ -22,6 +24,7 @@ mod surface;
 mod trajectory;
 mod wet;
 
+pub use backend::{AdapterName, Arithmetic, Backend, BackendReport, DeviceReport, GpuSettings};
 pub use controls::Controls;
 pub use estimate::{ErrorEstimate, Level};
 pub use gradient::{Cotangents, Gradient, Initial};

@@ -1,5 +1,6 @@
 //! What a user may choose about a simulation.
 
+use super::backend::{Backend, GpuSettings};
 use crate::boundary::{self, OneBody};
 use crate::coupling::full::{SolveSettings, Solver};
 use crate::coupling::panel;
@@ -60,6 +61,10 @@ pub struct Settings {
     pub time_step: Option<f64>,
     /// Faces per body of shapes by formula; default: the scene's.
     pub faces: Option<usize>,
+    /// What computes the coupling.
+    pub backend: Backend,
+    /// Choices of [`Backend::Gpu`].
+    pub gpu: GpuSettings,
 }
 
 impl Settings {
@@ -148,6 +153,12 @@ impl Settings {
     pub fn accuracy(mut self, error: f64) -> Self {
         self.compress.tolerance = error;
         self.accuracy = Accuracy(error);
+        self
+    }
+
+    /// With another backend.
+    pub fn backend(mut self, backend: Backend) -> Self {
+        self.backend = backend;
         self
     }
 

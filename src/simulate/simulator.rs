@@ -3,7 +3,7 @@
 use super::assemble::{self, Assembled};
 use super::clearance::{Clearance, unresolved};
 use super::trajectory::Trajectory;
-use super::{Controls, Discretisation, Fidelity, Policy, Rollout, Settings};
+use super::{BackendReport, Controls, Discretisation, Fidelity, Policy, Rollout, Settings};
 use crate::adjoint::lie::Pose;
 use crate::adjoint::step;
 use crate::coupling::Report;
@@ -130,6 +130,17 @@ impl Simulator {
     /// The fidelity in use: what was asked for, or what `Auto` chose.
     pub fn fidelity(&self) -> Fidelity {
         self.assembled.fidelity
+    }
+
+    /// What computes the coupling, why, and what was done on the GPU so far.
+    pub fn backend(&self) -> BackendReport {
+        self.assembled.device.report()
+    }
+
+    /// The GPU that computes the coupling, if one does.
+    #[cfg(feature = "gpu")]
+    pub fn context(&self) -> Option<&std::sync::Arc<crate::gpu::Context>> {
+        self.assembled.device.context()
     }
 
     /// What the fidelity `Auto` chose, and why; empty with others.
@@ -348,7 +359,8 @@ impl Simulator {
                 format!("must be at most {MOST_STEPS}: every state is kept; run in parts"),
             ));
         }
-        let (trajectory, initial) = (self.trajectory(&matrix), self.initial()?);
+        let initial = self.initial().map_err(|e| e.at_time(0.0))?;
+        let trajectory = self.trajectory(&matrix);
         // On a thread of the pool from first step to last: entering the pool costs as much as a small step's work.
         let path = rayon::scope(|_| step::forward(&trajectory, initial, steps, progress))?;
         Ok(Rollout {

@@ -1,12 +1,13 @@
 //! The bodies in the water: discretised as the settings ask, and coupled.
 
+use super::device::Device;
 use super::surface::Coarse;
 use super::{Fidelity, Settings};
 use crate::adjoint::lie::{Mat6, Pose, Vec3};
 use crate::boundary::exact::ExactBoundary;
 use crate::boundary::panel::Extrapolated;
 use crate::boundary::{BodyBoundary, OneBody, PanelBoundary, Response};
-use crate::coupling::full::{Full, Solver, WetBody};
+use crate::coupling::full::{Model, Solver, WetBody};
 use crate::coupling::panel::{self, PanelCoupled};
 use crate::coupling::reduced::{Cutoff, Reduced, ReducedBody, cache, compress};
 use crate::coupling::{Coupling, Exclusions, Isolated};
@@ -155,19 +156,20 @@ pub(super) struct Water<'a> {
     pub folder: Option<&'a Path>,
 }
 
-/// The coupling of `bodies`, with a fidelity that isn't `Auto`.
+/// The coupling of `bodies`, with a fidelity that isn't `Auto`, computed on `device`.
 pub(super) fn couple(
     bodies: &[Wet],
     water: &Water,
     settings: &Settings,
     fidelity: Fidelity,
     plan: &Plan,
+    device: &mut Device,
 ) -> Result<Made> {
     match fidelity {
         Fidelity::Isolated => isolated(bodies, water.walls, settings),
         Fidelity::Full if settings.one_body == OneBody::Panel => panels(bodies, water, settings),
-        Fidelity::Full => full(bodies, water, settings),
-        Fidelity::Reduced | Fidelity::Auto => reduced(bodies, water, settings, plan),
+        Fidelity::Full => full(bodies, water, settings, device),
+        Fidelity::Reduced | Fidelity::Auto => reduced(bodies, water, settings, plan, device),
     }
 }
 
@@ -310,7 +312,7 @@ fn once<T>(made: &[Arc<T>], of: impl Fn(&T) -> &[String]) -> Vec<String> {
     distinct.flat_map(|i| of(&made[i]).to_vec()).collect()
 }
 
-fn full(bodies: &[Wet], water: &Water, settings: &Settings) -> Result<Made> {
+fn full(bodies: &[Wet], water: &Water, settings: &Settings, device: &mut Device) -> Result<Made> {
     if settings.one_body == OneBody::Exact {
         return Err(Error::Unsupported {
             what: "the method exact with the fidelity full".into(),
@@ -344,12 +346,12 @@ fn full(bodies: &[Wet], water: &Water, settings: &Settings) -> Result<Made> {
                 ..Discretisation::empty()
             })
             .collect(),
-        coupling: Box::new(Full::new(
+        coupling: Box::new(device.full(Model::new(
             made,
             water.walls,
             water.excluded.clone(),
             settings.solve,
-        )?),
+        )?)?),
     })
 }
 
@@ -383,7 +385,13 @@ fn panels(bodies: &[Wet], water: &Water, settings: &Settings) -> Result<Made> {
     })
 }
 
-fn reduced(bodies: &[Wet], water: &Water, settings: &Settings, plan: &Plan) -> Result<Made> {
+fn reduced(
+    bodies: &[Wet],
+    water: &Water,
+    settings: &Settings,
+    plan: &Plan,
+    device: &mut Device,
+) -> Result<Made> {
     let coupling = compressed_all(bodies, water, settings, plan)?;
     let made = coupling.reduced_bodies();
     let method = |body: &Wet| Ok(name_of(body.method(settings)?));
@@ -414,7 +422,7 @@ fn reduced(bodies: &[Wet], water: &Water, settings: &Settings, plan: &Plan) -> R
                 }
             })
             .collect(),
-        coupling: Box::new(coupling),
+        coupling: device.reduced(coupling)?,
     })
 }
 

@@ -1,6 +1,6 @@
 //! Conjugate gradients on the normal equations, right-preconditioned (Eq. 20).
 
-use super::Columns;
+use super::{Columns, count};
 
 /// What an iteration reached.
 #[derive(Clone, Debug)]
@@ -31,6 +31,7 @@ pub fn cgls(
     tolerance: f64,
     max_iterations: usize,
 ) -> Outcome {
+    count::call();
     let n = g.columns;
     let mut x = Columns::zeros(g.rows, n);
     let mut s = g.clone();

@@ -1,6 +1,6 @@
 //! GMRES with a right preconditioner, for square systems.
 
-use super::{Columns, Outcome};
+use super::{Columns, Outcome, count};
 
 /// Solves `A x = b` for several columns at once, each with its own Krylov space: full Arnoldi with
 /// modified Gram–Schmidt and Givens rotations, restarted every `restart` iterations, until
@@ -19,6 +19,7 @@ pub fn gmres(
     max_iterations: usize,
     restart: usize,
 ) -> Outcome {
+    count::call();
     let n = b.columns;
     let mut x = Columns::zeros(b.rows, n);
     let size = norms(b);

@@ -1,6 +1,6 @@
 //! Dense LU with partial pivoting, in the memory of the matrix, parallel over fixed groups of columns.
 
-use super::{Columns, product, transposed_product};
+use super::{Columns, count, product, transposed_product};
 use faer::dyn_stack::{MemBuffer, MemStack};
 use faer::linalg::lu::partial_pivoting::{factor, solve};
 use faer::linalg::matmul::matmul;
@@ -31,6 +31,7 @@ impl Lu {
     /// Factors the `size` × `size` matrix in `data` (column-major), which it takes over. A singular
     /// matrix has the condition number infinity and no use.
     pub fn new(mut data: Vec<f64>, size: usize) -> Self {
+        count::call();
         assert_eq!(data.len(), size * size, "a square matrix");
         // The memory of A by columns is that of Aᵀ by rows.
         let largest = largest(size, |x| {
@@ -81,6 +82,7 @@ impl Lu {
 
     /// `x ← A⁻¹ x`, x size × columns.
     pub fn solve(&self, x: MatMut<'_, f64>) {
+        count::call();
         let (lu, rows) = self.factors();
         let scratch = solve::solve_in_place_scratch::<usize, f64>(self.size, x.ncols(), Par::Seq);
         let mut memory = MemBuffer::new(scratch);
@@ -90,6 +92,7 @@ impl Lu {
 
     /// `x ← A⁻ᵀ x`.
     pub fn solve_transpose(&self, x: MatMut<'_, f64>) {
+        count::call();
         let (lu, rows) = self.factors();
         let scratch =
             solve::solve_transpose_in_place_scratch::<usize, f64>(self.size, x.ncols(), Par::Seq);

@@ -6,12 +6,14 @@
 
 mod cgls;
 mod columns;
+mod count;
 mod gmres;
 mod lu;
 mod product;
 
 pub use cgls::{Outcome, cgls};
 pub use columns::Columns;
+pub use count::calls_made;
 pub use gmres::gmres;
 pub use lu::Lu;
 pub use product::{normal_product, product, transposed_product};

@@ -3,7 +3,7 @@
 //! With few columns a general matrix product spends its time packing the large factor; here tiles of rows are
 //! used twice, for `K x` and for `Kᵀ y`, while they are in cache.
 
-use super::Columns;
+use super::{Columns, count};
 use pulp::{Arch, Simd, WithSimd};
 use rayon::prelude::*;
 
@@ -189,6 +189,7 @@ fn group_rows(rows: usize) -> usize {
 
 /// `K x`, K row-major rows × x.rows.
 pub fn product(k: &[f64], rows: usize, x: &Columns) -> Columns {
+    count::call();
     let n = x.columns;
     let mut out = Columns::zeros(rows, n);
     if n == 0 || rows == 0 || x.rows == 0 {
@@ -213,6 +214,7 @@ pub fn product(k: &[f64], rows: usize, x: &Columns) -> Columns {
 
 /// `Kᵀ y`, K row-major y.rows × columns.
 pub fn transposed_product(k: &[f64], columns: usize, y: &Columns) -> Columns {
+    count::call();
     let n = y.columns;
     if n == 0 || y.rows == 0 || columns == 0 {
         return Columns::zeros(columns, n);
@@ -239,6 +241,7 @@ pub fn transposed_product(k: &[f64], columns: usize, y: &Columns) -> Columns {
 
 /// `Kᵀ (K x)` with K read once, K row-major rows × x.rows.
 pub fn normal_product(k: &[f64], rows: usize, x: &Columns) -> Columns {
+    count::call();
     let n = x.columns;
     if n == 0 || rows == 0 || x.rows == 0 {
         return Columns::zeros(x.rows, n);

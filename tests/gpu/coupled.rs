@@ -2,7 +2,7 @@
 
 use super::fixture::*;
 use hydrograd::boundary::Method;
-use hydrograd::coupling::full::{Model, Preconditioner};
+use hydrograd::coupling::full::{Full, Model, Preconditioner, SolveSettings};
 use hydrograd::coupling::{Coupling, Direction, Exclusions, Record};
 use hydrograd::gpu::Context;
 use nalgebra::DVector;
@@ -75,4 +75,88 @@ fn flux_rows_without_walls() {
         tight(Preconditioner::Factors),
     );
     holds(context(), &model, 5, 1e-8);
+}
+
+#[test]
+fn flux_rows_with_two_walls() {
+    let model = model(
+        Method::MfsVertex,
+        &[WALL, SIDE],
+        Exclusions::none(),
+        tight(Preconditioner::Factors),
+    );
+    holds(context(), &model, 5, 1e-8);
+}
+
+#[test]
+fn normal_rows_with_an_excluded_pair_and_a_wall() {
+    let model = model(
+        Method::MfsFace,
+        &[WALL],
+        Exclusions::new([(0, 1)]),
+        tight(Preconditioner::Factors),
+    );
+    holds(context(), &model, 5, 1e-8);
+}
+
+#[test]
+fn without_double_precision() {
+    let settings = SolveSettings {
+        tolerance: 1e-9,
+        ..tight(Preconditioner::Factors)
+    };
+    let model = model(Method::MfsVertex, &[WALL], Exclusions::none(), settings);
+    holds(two_float(), &model, 5, 1e-7);
+}
+
+#[test]
+fn without_factors() {
+    let settings = SolveSettings {
+        tolerance: 1e-9,
+        ..tight(Preconditioner::Jacobi)
+    };
+    let model = model(Method::MfsVertex, &[], Exclusions::none(), settings);
+    holds(context(), &model, 5, 1e-6);
+}
+
+/// Energies and momenta of columns, and of combinations of them.
+pub fn combinations() {
+    let model = model(
+        Method::MfsVertex,
+        &[],
+        Exclusions::none(),
+        tight(Preconditioner::Factors),
+    );
+    for context in [context(), two_float()] {
+        let (cpu, gpu) = both(context, &model);
+        let n = model.bodies.len();
+        let basis = basis(n, 5, 0.3);
+        let (x, y) = (
+            DVector::from_vec(wavy(5, 0.7)),
+            DVector::from_vec(wavy(5, 1.9)),
+        );
+        let of = |full: &Full| {
+            let response = full.backend().respond(&poses(), &basis).unwrap();
+            let some = response
+                .directions(&[Direction::Basis(&x), Direction::Basis(&y)])
+                .unwrap();
+            let numbers = [
+                response.energies().unwrap(),
+                response.momenta().unwrap(),
+                some.energies().unwrap(),
+                some.momenta().unwrap(),
+            ];
+            let strengths = [response.strengths().unwrap(), some.strengths().unwrap()];
+            numbers
+                .iter()
+                .map(|m| m.as_slice().to_vec())
+                .chain(strengths.into_iter().map(|s| s.data))
+                .collect::<Vec<_>>()
+        };
+        for (got, right) in of(&gpu).iter().zip(of(&cpu)) {
+            let found = difference(got, &right);
+            println!("combinations: {found:.1e}");
+            assert!(found <= 1e-8, "{found:.1e}");
+        }
+    }
 }

@@ -113,7 +113,7 @@ pub fn displacement(bodies: usize, phase: f64) -> Vec<Vec6> {
 pub fn both(context: &Arc<Context>, model: &Arc<Model>) -> (Full, Full) {
     let cpu = Full::on(
         model.clone(),
-        Box::new(hydrograd::coupling::full::Cpu::new(model.clone())),
+        Box::new(hydrograd::coupling::full::Cpu::new(model.clone()).unwrap()),
     );
     let gpu = Full::on(model.clone(), Box::new(Gpu::new(context, model).unwrap()));
     (cpu, gpu)

@@ -14,17 +14,6 @@ use nalgebra::{DMatrix, DVector};
 use std::path::Path;
 use std::sync::{Arc, OnceLock};
 
-/// The shaders that these comparisons run, and in which rungs they show.
-pub const COMPARED: &[(&str, &str)] = &[
-    ("blocks", "momenta"),
-    ("conjugate", "momenta"),
-    ("coulomb", "momenta"),
-    ("coulomb_vjp", "gradient, vjp"),
-    ("coulomb_jvp", "jvp"),
-    ("coulomb_hvp", "hvp"),
-    ("wrench", "gradient, vjp, hvp"),
-];
-
 fn compressed(shape: &Shape, rank: usize) -> Arc<ReducedBody> {
     let mesh = shape::build(shape, Path::new("."), Some(320)).unwrap();
     let (v, f) = (mesh.vertices(), mesh.faces());
@@ -121,16 +110,16 @@ fn holds(
     );
 }
 
-#[test]
-fn reduced_without_walls() {
-    let reduced = three(&[], None, &Exclusions::none());
+/// In both fine arithmetics.
+pub fn rungs() {
+    let reduced = three(&[WALL], None, &Exclusions::none());
     holds(context(), &reduced, &poses(), 5, 1e-8);
+    holds(two_float(), &reduced, &poses(), 5, 1e-7);
 }
 
 #[test]
-fn reduced_in_two_float_arithmetic() {
-    let reduced = three(&[WALL], None, &Exclusions::none());
-    holds(two_float(), &reduced, &poses(), 5, 1e-7);
+fn reduced_in_both_arithmetics() {
+    rungs();
 }
 
 #[test]

@@ -46,6 +46,17 @@ const THROUGH: &[(&str, &str)] = &[
     ("coupling::pair::Pair::apply_jvp", FULL_HVP),
     ("coupling::full::cpu::system::System::respond_jvp", FULL_HVP),
     ("coupling::full::cpu::response::Answer::gradient", FULL_VJP),
+    // Compressed bodies on the device, held against the CPU's record by tests/gpu/reduced.rs.
+    ("gpu::coulomb_vjp::coulomb_vjp", REDUCED_VJP),
+    ("gpu::coulomb_jvp::coulomb_jvp", REDUCED_HVP),
+    ("gpu::coulomb_hvp::coulomb_hvp", REDUCED_HVP),
+    ("gpu::reduced::record::GpuRecord::gradient", REDUCED_VJP),
+    (
+        "gpu::reduced::record::GpuRecord::gradient_along",
+        REDUCED_VJP,
+    ),
+    ("gpu::reduced::record::GpuRecord::vjp", REDUCED_VJP),
+    ("gpu::reduced::record::GpuRecord::hvp", REDUCED_HVP),
     // Pieces of the equations of motion.
     (
         "dynamics::contact::Touch::displacement_vjp",
@@ -130,6 +141,8 @@ const PASSED_ON: &[&str] = &["optimize::descent::Shared::gradient"];
 
 const FULL_VJP: &str = "coupling::full::record::FullRecord::vjp";
 const FULL_HVP: &str = "coupling::full::record::FullRecord::hvp";
+const REDUCED_VJP: &str = "coupling::reduced::record::ReducedRecord::vjp";
+const REDUCED_HVP: &str = "coupling::reduced::record::ReducedRecord::hvp";
 
 #[test]
 fn every_rung_in_the_source_is_registered() {

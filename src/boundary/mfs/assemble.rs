@@ -4,6 +4,7 @@ use super::settings::{Method, RowScaling};
 use crate::adjoint::kernel::{self, Points, Sources, Triangles, Write};
 use crate::adjoint::lie::{Vec3, Vec6};
 use crate::boundary::surface::Faces;
+use rayon::prelude::*;
 
 /// Weight of each face's row. A row is `weight · flux` (vertex sources) or
 /// `weight · normal velocity` (face sources).
@@ -44,4 +45,26 @@ pub(crate) fn flux_matrix(
         Method::MfsFace => kernel::normal_fill(points, &sources, Write::Set, &mut k, n, 0),
     }
     k
+}
+
+/// Columns that [`column_norms`] makes at once.
+const CHUNK: usize = 64;
+
+/// Norms of K's columns, without K.
+pub(crate) fn column_norms(
+    method: Method,
+    triangles: &Triangles,
+    points: &Points,
+    sources: &[Vec3],
+) -> Vec<f64> {
+    let norms = |chunk: &[Vec3]| {
+        let n = chunk.len();
+        let k = flux_matrix(method, triangles, points, chunk);
+        let mut squares = vec![0.0; n];
+        for row in k.chunks_exact(n) {
+            squares.iter_mut().zip(row).for_each(|(s, x)| *s += x * x);
+        }
+        squares.into_iter().map(f64::sqrt).collect::<Vec<_>>()
+    };
+    sources.par_chunks(CHUNK).flat_map_iter(norms).collect()
 }

@@ -133,11 +133,48 @@ impl BodyBoundary {
         Self::build(&surface, placement, settings)
     }
 
+    /// As [`BodyBoundary::new`] for bodies of too many faces to factor: nothing of the size of a matrix
+    /// is made. What a solve of the body alone gives is missing: K, strengths, the factor and the added mass
+    /// are empty or zero, and the potential is read out without the own residual flux ([`Readout`]'s centre
+    /// flux). For backends that need no matrix.
+    ///
+    /// # Errors
+    /// As [`BodyBoundary::new`].
+    pub fn unfactored(
+        name: &str,
+        vertices: &[Vec3],
+        faces: &[[usize; 3]],
+        settings: &Settings,
+    ) -> Result<Self> {
+        let surface = Surface::new(name, vertices, faces)?;
+        let placement = depth::place(&surface, settings.method, settings.depth)?;
+        let mut out = Self::lay_out(&surface, placement, settings)?;
+        if settings.damping > 0.0 {
+            let (method, sources) = (settings.method, &out.sources);
+            let norms = assemble::column_norms(method, &out.triangles, &out.points, sources);
+            out.damping = norms.iter().map(|n| settings.damping * n).collect();
+        }
+        let rule = readout::points(&out.faces, &out.sources, settings.readout);
+        out.readout = readout::own(&rule, &out.sources, &out.readout_flux);
+        Ok(out)
+    }
+
     fn build(surface: &Surface, placement: depth::Placement, settings: &Settings) -> Result<Self> {
+        let mut out = Self::lay_out(surface, placement, settings)?;
+        out.solve_alone()?;
+        Ok(out)
+    }
+
+    /// All that needs no solve; no damping yet.
+    fn lay_out(
+        surface: &Surface,
+        placement: depth::Placement,
+        settings: &Settings,
+    ) -> Result<Self> {
         let depth::Placement {
             sources,
             depths,
-            mut warnings,
+            warnings,
         } = placement;
         let name = surface.name;
         let damping = settings.damping;
@@ -151,15 +188,40 @@ impl BodyBoundary {
         let faces = surface.faces.clone();
         let method = settings.method;
         let row_weights = assemble::row_weights(&faces, method, settings.rows);
-        let twist_rows = assemble::twist_rows(&faces, method, &row_weights);
         let twist_flux: Vec<Vec6> = (0..faces.len()).map(|i| faces.twist_flux(i)).collect();
-        let triangles = Triangles::new(surface.vertices, surface.triangles, row_weights.clone());
-        let points = Points::new(&faces.centres, &faces.normals, row_weights.clone());
-        let flux_rows = assemble::flux_matrix(method, &triangles, &points, &sources);
+        Ok(Self {
+            name: name.to_string(),
+            settings: *settings,
+            twist_rows: assemble::twist_rows(&faces, method, &row_weights),
+            triangles: Triangles::new(surface.vertices, surface.triangles, row_weights.clone()),
+            points: Points::new(&faces.centres, &faces.normals, row_weights.clone()),
+            readout_flux: twist_flux.clone(),
+            damping: vec![0.0; sources.len()],
+            twist_flux,
+            row_weights,
+            sources,
+            depths,
+            warnings,
+            faces,
+            flux_rows: Vec::new(),
+            readout: Vec::new(),
+            strengths: Vec::new(),
+            added_mass: Mat6::zeros(),
+            asymmetry: 0.0,
+            residual: Vec6::zeros(),
+            condition: 0.0,
+            r: Mat::new(),
+        })
+    }
 
-        let k = MatRef::from_row_major_slice(&flux_rows, faces.len(), sources.len());
-        let rhs = Mat::from_fn(faces.len(), 6, |i, j| twist_rows[i][j]);
-        let factored = factor::solve(k, rhs.as_ref(), damping);
+    /// The body alone in the water: its factor, strengths and added mass.
+    fn solve_alone(&mut self) -> Result<()> {
+        let (method, faces) = (self.settings.method, &self.faces);
+        let (name, sources) = (&self.name, &self.sources);
+        self.flux_rows = assemble::flux_matrix(method, &self.triangles, &self.points, sources);
+        let k = MatRef::from_row_major_slice(&self.flux_rows, faces.len(), sources.len());
+        let rhs = Mat::from_fn(faces.len(), 6, |i, j| self.twist_rows[i][j]);
+        let factored = factor::solve(k, rhs.as_ref(), self.settings.damping);
         let alpha = &factored.solution;
         let strengths: Vec<Vec6> = (0..sources.len())
             .map(|i| Vec6::from_fn(|j, _| alpha[(i, j)]))
@@ -176,20 +238,20 @@ impl BodyBoundary {
                 0.0
             }
         });
-        let readout_flux: Vec<Vec6> = match settings.readout {
-            Readout::Centre => twist_flux.clone(),
+        let readout_flux: Vec<Vec6> = match self.settings.readout {
+            Readout::Centre => self.twist_flux.clone(),
             Readout::Corrected => (0..faces.len())
                 .map(|i| {
                     let per_row = match method {
-                        Method::MfsVertex => 1.0 / row_weights[i],
-                        Method::MfsFace => faces.areas[i] / row_weights[i],
+                        Method::MfsVertex => 1.0 / self.row_weights[i],
+                        Method::MfsFace => faces.areas[i] / self.row_weights[i],
                     };
-                    twist_flux[i] + Vec6::from_fn(|j, _| left[(i, j)] * per_row)
+                    self.twist_flux[i] + Vec6::from_fn(|j, _| left[(i, j)] * per_row)
                 })
                 .collect(),
         };
-        let rule = readout::points(&faces, &sources, settings.readout);
-        let readout = readout::own(&rule, &sources, &readout_flux);
+        let rule = readout::points(faces, sources, self.settings.readout);
+        let readout = readout::own(&rule, sources, &readout_flux);
         let mut raw = Mat6::zeros();
         for (p, a) in readout.iter().zip(&strengths) {
             raw += p * a.transpose();
@@ -215,36 +277,23 @@ impl BodyBoundary {
             });
         }
         if factored.condition > ILL_CONDITIONED {
-            warnings.push(format!(
+            self.warnings.push(format!(
                 "body \"{name}\": condition number {:.1e} of the flux matrix is above {ILL_CONDITIONED:.0e}{}; \
                  use a smaller or automatic source depth, or a more even mesh",
                 factored.condition,
                 if factored.singular { " (solved with damping 1e-10)" } else { "" }
             ));
         }
-        Ok(Self {
-            name: name.to_string(),
-            settings: *settings,
-            sources,
-            depths,
-            row_weights,
-            triangles,
-            points,
-            twist_rows,
-            twist_flux,
-            readout_flux,
-            flux_rows,
-            readout,
-            strengths,
-            added_mass,
-            asymmetry: asymmetry(&raw, &faces),
-            residual,
-            condition: factored.condition,
-            warnings,
-            damping: factored.damping,
-            r: factored.r,
-            faces,
-        })
+        self.asymmetry = asymmetry(&raw, faces);
+        self.condition = factored.condition;
+        self.damping = factored.damping;
+        self.r = factored.r;
+        self.strengths = strengths;
+        self.residual = residual;
+        self.readout_flux = readout_flux;
+        self.readout = readout;
+        self.added_mass = added_mass;
+        Ok(())
     }
 
     /// K, faces × sources.

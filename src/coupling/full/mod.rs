@@ -57,7 +57,7 @@ impl Full {
     /// that don't feel each other, and the solver's settings.
     ///
     /// # Errors
-    /// As [`Model::new`].
+    /// As [`Model::new`] and [`Cpu::new`].
     pub fn new(
         bodies: Vec<Arc<WetBody>>,
         walls: &[Wall],
@@ -65,7 +65,7 @@ impl Full {
         settings: SolveSettings,
     ) -> Result<Self> {
         let model = Arc::new(Model::new(bodies, walls, excluded, settings)?);
-        Ok(Self::on(model.clone(), Box::new(Cpu::new(model))))
+        Ok(Self::on(model.clone(), Box::new(Cpu::new(model)?)))
     }
 
     /// On a backend made for the same model.

@@ -3,10 +3,13 @@
 //! In its notation, with everything scaled as [`super::geometry`] says: strengths `X = [a, λ]` by source,
 //! densities `[μ, r, β]` by face, β = B x̄ and, to begin with, F x̄ where r will stand.
 
+mod probe;
 mod products;
 mod response;
 mod second;
 mod solve;
+
+pub use probe::{PairWrenches, Probe};
 
 use super::context::{Context, Options};
 use super::geometry::{Geometry, Placed};

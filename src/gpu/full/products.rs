@@ -56,9 +56,10 @@ impl<'a> To<'a> {
     }
 }
 
-/// The calls of a product of `columns` columns of `x` in the fine arithmetic, with the memory that they use.
+/// The calls of a product of `columns` columns of `x`, with the memory that they use.
 pub(super) fn product<'a>(
     placed: &Placed,
+    arithmetic: Arithmetic,
     what: Product,
     (x, stride, offset): Slice,
     columns: usize,
@@ -66,7 +67,6 @@ pub(super) fn product<'a>(
 ) -> Result<Vec<Call>> {
     let geometry = &placed.geometry;
     let (context, sizes) = (&geometry.context, &geometry.sizes);
-    let fine = context.fine();
     let (rows, own, other) = match what {
         Product::Forward { .. } | Product::ForwardTangent { .. } => {
             (sizes.faces, sizes.face_blocks, sizes.source_blocks)
@@ -76,11 +76,11 @@ pub(super) fn product<'a>(
     let shares = sizes.shares(own, other);
     let mut calls = Vec::new();
     for (first, width) in passes(columns) {
-        let parts = context.reals("shares of a product", fine, shares * rows * width)?;
+        let parts = context.reals("shares of a product", arithmetic, shares * rows * width)?;
         let x = (x, stride, offset + first);
         calls.push(once(
             placed,
-            fine,
+            arithmetic,
             what,
             x,
             (&parts, width),
@@ -107,7 +107,7 @@ pub(super) fn product<'a>(
                 damped: None,
                 out: shifted(t.out),
             };
-            calls.push(sum(context, fine, &task, &geometry.open)?);
+            calls.push(sum(context, arithmetic, &task, &geometry.open)?);
         }
     }
     Ok(calls)

@@ -79,7 +79,7 @@ impl Answer {
         let values = scaled(twists, &scale, geometry.length);
         let device_twists = context.upload("twists", fine, &values)?;
         let densities = context.reals("densities", fine, sizes.faces * 3 * k)?;
-        let strengths = context.reals("strengths", fine, n * 2 * k)?;
+        let strengths = context.zeros("strengths", fine, n * 2 * k)?;
         let g = context.reals("right-hand sides", fine, n * 2 * k)?;
         let mut out = Self {
             moving,
@@ -119,6 +119,7 @@ impl Answer {
         let back = |potential| Product::Transpose { potential };
         let gathered = product(
             &placed,
+            fine,
             back(false),
             at(1),
             k,
@@ -126,6 +127,7 @@ impl Answer {
         )?;
         let read = product(
             &placed,
+            fine,
             back(true),
             at(2),
             k,
@@ -142,7 +144,7 @@ impl Answer {
         // stand.
         let what = "coupled system (Eq. 20)";
         let (mut found, states) = out.follow(&g, Some(&solves))?;
-        let reached = match solves.reached(&placed, &states, what)? {
+        let reached = match solves.reached(&placed, &states, what, false)? {
             Some(reached) => reached,
             None => {
                 let reached = solves.finish(&placed, what)?;
@@ -178,7 +180,7 @@ impl Answer {
         };
         let forward = Product::Forward { potential: false };
         let x = (&self.strengths, 2 * k, 0);
-        let image = product(&placed, forward, x, 2 * k, &[residual, mu])?;
+        let image = product(&placed, fine, forward, x, 2 * k, &[residual, mu])?;
         let (impulses_of, momenta) = self.impulse_calls()?;
         let energies = context.reals("energies", fine, k * k)?;
         let task = Task {
@@ -223,7 +225,14 @@ impl Answer {
         let out = context.reals("momenta", fine, 6 * geometry.sizes.bodies * k)?;
         let forward = Product::Forward { potential: true };
         let a = (&self.strengths, 2 * k, 0);
-        let mut calls = product(&self.placed, forward, a, k, &[To::plain(k, (&phi, k, 0))])?;
+        let mut calls = product(
+            &self.placed,
+            fine,
+            forward,
+            a,
+            k,
+            &[To::plain(k, (&phi, k, 0))],
+        )?;
         let mu = (&self.densities, 3 * k, 0);
         calls.push(impulse(context, geometry, &phi, mu, a, (&out, k))?);
         Ok((calls, out))
@@ -319,7 +328,15 @@ impl Response for Answer {
             let out = context.reals("wrenches", fine, geometry.pairs.len() * elements)?;
             let densities = (&self.densities, &self.strengths);
             let calls = [
-                pair_vjp(context, placed, densities, k, (p * width, width), &parts)?,
+                pair_vjp(
+                    context,
+                    fine,
+                    placed,
+                    densities,
+                    k,
+                    (p * width, width),
+                    &parts,
+                )?,
                 reduce(
                     context,
                     fine,

@@ -15,7 +15,7 @@ use crate::gpu::reduce::reduce;
 use crate::gpu::sum::{Base, Slice, Sum, sum};
 
 /// Twists of all images of all bodies, then of the bodies as they see, about the scene's middle.
-fn motions(placed: &Placed, z: &[Vec6]) -> Vec<f64> {
+pub(super) fn motions(placed: &Placed, z: &[Vec6]) -> Vec<f64> {
     let geometry = &placed.geometry;
     let mut out = Vec::new();
     let mut add = |z: &Vec6| {
@@ -45,7 +45,7 @@ impl Answer {
         let dphi = context.reals("δP a", fine, faces * n)?;
         // [δKᵀ r − Kᵀ δK a, δPᵀ β − δKᵀ μ − Kᵀ δK λ] by source.
         let g = context.reals("right-hand sides", fine, sources * 2 * n)?;
-        let x = context.reals("tangent of the strengths", fine, sources * 2 * n)?;
+        let x = context.zeros("tangent of the strengths", fine, sources * 2 * n)?;
         let forward = |potential| Product::ForwardTangent {
             potential,
             motions: &motion,
@@ -77,6 +77,7 @@ impl Answer {
         let calls = [
             product(
                 placed,
+                fine,
                 forward(false),
                 strengths,
                 2 * n,
@@ -84,15 +85,17 @@ impl Answer {
             )?,
             product(
                 placed,
+                fine,
                 forward(true),
                 strengths,
                 n,
                 &[To::plain(n, (&dphi, n, 0))],
             )?,
-            product(placed, back(false), densities(0), 2 * n, &[mu, r])?,
-            product(placed, back(true), densities(2), n, &[beta])?,
+            product(placed, fine, back(false), densities(0), 2 * n, &[mu, r])?,
+            product(placed, fine, back(true), densities(2), n, &[beta])?,
             product(
                 placed,
+                fine,
                 Product::Transpose { potential: false },
                 (&dk, 2 * n, 0),
                 2 * n,
@@ -115,7 +118,7 @@ impl Answer {
             x: &x,
         };
         let (momenta, wrenches, states) = after.run(Some(&solves))?;
-        let (momenta, wrenches) = match solves.reached(placed, &states, what)? {
+        let (momenta, wrenches) = match solves.reached(placed, &states, what, false)? {
             Some(_) => (momenta, wrenches),
             None => {
                 solves.finish(placed, what)?;
@@ -233,6 +236,7 @@ impl After<'_> {
         let x = (self.x, 2 * n, 0);
         let image = product(
             placed,
+            fine,
             Product::Forward { potential: false },
             x,
             2 * n,
@@ -244,6 +248,7 @@ impl After<'_> {
         };
         let read = product(
             placed,
+            fine,
             Product::Forward { potential: true },
             x,
             n,
@@ -268,6 +273,7 @@ impl After<'_> {
         if pairs > 0 {
             last.push(pair_hvp(
                 context,
+                fine,
                 placed,
                 (&left, &right),
                 n,

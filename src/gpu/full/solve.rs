@@ -31,10 +31,8 @@ pub(super) struct Solve {
     first: Vec<Call>,
     again: Vec<Call>,
     opening: [Cycle; 2],
-    lead: [Call; 1],
+    lead: [Call; 2],
     iteration: Vec<Call>,
-    /// Keeps what the calls use.
-    _memory: Vec<Buffer>,
 }
 
 /// Several solves, all columns of G.
@@ -116,13 +114,25 @@ impl Solve {
                 x,
             )
         };
-        let lead = [factor(
-            context,
-            placed,
-            true,
-            (&refined.shrunk, &iterates.s, columns),
-            gate,
-        )?];
+        let factor_shares = geometry.factor_shares();
+        let parts = context.reals("shares of R⁻¹ x", single, factor_shares * n * columns)?;
+        let preconditioned =
+            |transpose: bool, x: &Buffer, out: &Buffer, gate: &Buffer| -> Result<[Call; 2]> {
+                let task = Sum {
+                    rows: n,
+                    columns,
+                    parts: (&parts, factor_shares, columns, 0),
+                    scale: 1.0,
+                    base: Base::Nothing,
+                    damped: None,
+                    out: (out, columns, 0),
+                };
+                Ok([
+                    factor(context, placed, transpose, (x, &parts, columns), gate)?,
+                    sum(context, single, &task, gate)?,
+                ])
+            };
+        let lead = preconditioned(true, &refined.shrunk, &iterates.s, gate)?;
         let active = &iterates.active;
         let [curvature, advance, measure, turn] = cgls(context, &iterates, n, columns)?;
         let direction = (&iterates.direction, columns, 0);
@@ -135,14 +145,14 @@ impl Solve {
             damped: Some((&geometry.damping_single, direction)),
             out: (&q, columns, 0),
         };
-        let iteration = vec![
-            factor(
-                context,
-                placed,
-                false,
-                (&iterates.p, &iterates.direction, columns),
-                active,
-            )?,
+        let mut iteration = Vec::new();
+        iteration.extend(preconditioned(
+            false,
+            &iterates.p,
+            &iterates.direction,
+            active,
+        )?);
+        iteration.extend([
             once(
                 placed,
                 single,
@@ -161,12 +171,9 @@ impl Solve {
                 active,
             )?,
             sum(context, single, &damped, active)?,
-            factor(context, placed, true, (&q, &iterates.q, columns), active)?,
-            curvature,
-            advance,
-            measure,
-            turn,
-        ];
+        ]);
+        iteration.extend(preconditioned(true, &q, &iterates.q, active)?);
+        iteration.extend([curvature, advance, measure, turn]);
         Ok(Self {
             columns,
             opening: [cycle(true)?, cycle(false)?],
@@ -176,7 +183,6 @@ impl Solve {
             iteration,
             iterates,
             refined,
-            _memory: vec![rows, y, gathered, rows1, y1, gathered1, q],
         })
     }
 
@@ -278,7 +284,8 @@ impl Solves {
             .collect()
     }
 
-    /// Whether all columns are done, from what [`Solves::report`] names; where one can't be, the error.
+    /// Whether all columns are done, from what [`Solves::report`] names; where one can't be, or isn't after the
+    /// last batch, the error.
     ///
     /// # Errors
     /// [`Error::Solver`] with what was reached.
@@ -287,6 +294,7 @@ impl Solves {
         placed: &Placed,
         bytes: &[Vec<u8>],
         what: &str,
+        last: bool,
     ) -> Result<Option<Reached>> {
         let settings = &placed.geometry.model.settings;
         let standing = self.standing(bytes);
@@ -295,7 +303,8 @@ impl Solves {
             residual: standing.iter().map(|s| s.residual).fold(0.0, f64::max),
         };
         let bad = |s: &Standing| s.stalled || !s.residual.is_finite();
-        let spent = |s: &Standing| s.unfinished && s.iterations >= settings.max_iterations;
+        let most = settings.max_iterations;
+        let spent = |s: &Standing| s.unfinished && (last || s.iterations >= most);
         if standing.iter().any(bad) || standing.iter().any(spent) {
             let model = &placed.geometry.model;
             let context = &placed.geometry.context;
@@ -319,16 +328,19 @@ impl Solves {
     pub fn finish(&self, placed: &Placed, what: &str) -> Result<Reached> {
         let context = &placed.geometry.context;
         let most = placed.geometry.model.settings.max_iterations;
-        let mut iterations = self.few;
+        let (mut iterations, mut granted) = (self.few, 0);
         loop {
             iterations = (2 * iterations).min(most);
+            granted += CYCLES * iterations;
             for solve in &self.all {
                 let mut batch = Batch::default();
                 solve.push(&mut batch, false, CYCLES, iterations);
                 context.submit(&batch)?;
             }
             let bytes = context.read_bytes(&self.report())?;
-            if let Some(reached) = self.reached(placed, &bytes, what)? {
+            // A direction without curvature counts no iterations, and must not go on for ever.
+            let last = granted > 4 * CYCLES * most;
+            if let Some(reached) = self.reached(placed, &bytes, what, last)? {
                 return Ok(reached);
             }
         }

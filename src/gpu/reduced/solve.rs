@@ -23,8 +23,6 @@ pub(super) struct Solve {
     steps: Steps,
     /// q = p − LᵀG L p.
     apply: Vec<Call>,
-    /// What the calls use.
-    _memory: [Buffer; 2],
 }
 
 /// How far a solve came.
@@ -91,7 +89,6 @@ impl Solve {
             steps,
             apply,
             directions,
-            _memory: [charges, psi],
         })
     }
 

@@ -157,7 +157,9 @@ impl<'a> Case<'a> {
         }
         let settings = self.simulator.settings();
         let plan = &self.simulator.assembled.plan;
-        let made = wet::couple(&wet, &self.water(), settings, self.fidelity, plan)?;
+        let mut device = self.simulator.assembled.device.clone();
+        let water = self.water();
+        let made = wet::couple(&wet, &water, settings, self.fidelity, plan, &mut device)?;
         Ok(evaluate(made.coupling.as_ref(), &self.poses, &self.turn)?.0)
     }
 
@@ -254,7 +256,8 @@ impl<'a> Case<'a> {
         };
         let water = assemble::water(scene, &numbers, None);
         let solve = |fidelity: Fidelity| -> Result<DMatrix<f64>> {
-            let made = wet::couple(&wet, &water, &panel, fidelity, &Default::default())?;
+            let (plan, mut cpu) = Default::default();
+            let made = wet::couple(&wet, &water, &panel, fidelity, &plan, &mut cpu)?;
             Ok(evaluate(made.coupling.as_ref(), &poses, &turn)?.0)
         };
         let difference = solve(fidelity)? - solve(Fidelity::Isolated)?;

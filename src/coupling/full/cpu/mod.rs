@@ -7,8 +7,8 @@ mod second;
 mod system;
 
 use super::{Backend, Model, Response};
-use crate::Result;
 use crate::adjoint::lie::{Pose, Vec3};
+use crate::{Error, Result};
 use nalgebra::DMatrix;
 use std::sync::{Arc, Mutex};
 
@@ -21,11 +21,25 @@ pub struct Cpu {
 
 impl Cpu {
     /// For a model.
-    pub fn new(model: Arc<Model>) -> Self {
-        Self {
+    ///
+    /// # Errors
+    /// A body that was never factored: this backend stores its matrix.
+    pub fn new(model: Arc<Model>) -> Result<Self> {
+        if let Some(body) = model.bodies.iter().find(|b| !b.boundary.factored()) {
+            return Err(Error::Unsupported {
+                what: format!(
+                    "body \"{}\" with {} faces on the backend cpu",
+                    body.boundary.name,
+                    body.faces()
+                ),
+                why: "its matrix wasn't made, and this backend needs it".into(),
+                instead: "use the backend gpu, or fewer faces".into(),
+            });
+        }
+        Ok(Self {
             model,
             spare: Mutex::new(Vec::new()),
-        }
+        })
     }
 }
 

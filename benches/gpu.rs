@@ -1,0 +1,278 @@
+//! The coupled system on the GPU beside the CPU: steps and their gradients, memory, and how fast pairs are.
+//!
+//! `cargo bench --features gpu --bench gpu [-- --minutes M] [--peak TFLOPS]`, on whatever adapter there is. First the four scenes
+//! of the paper's size with the fidelity `full`: seconds a step (momentum Euler: one evaluation with its derivatives) and seconds
+//! a step with its gradient, on both. Then rows of spheres, one of which moves: one evaluation with its derivatives and one
+//! second derivative. Last, products with K alone: pairs of a face and a source a second, and what share that is of the card's
+//! single-precision peak (`--peak`, or of a card known here). What wouldn't end within the minutes given (default 9), or
+//! not fit into memory, is left out, with the reason.
+
+use hydrograd::adjoint::lie::{Pose, Vec3, Vec6};
+use hydrograd::boundary::{BodyBoundary, Settings as BodySettings};
+use hydrograd::coupling::full::{Cpu, Full, Model, SolveSettings, WetBody};
+use hydrograd::coupling::{Coupling, Direction, Exclusions};
+use hydrograd::dynamics::Integrator;
+use hydrograd::gpu::full::{Gpu, Probe};
+use hydrograd::gpu::{Arithmetic, Context, Options};
+use hydrograd::scene::Scene;
+use hydrograd::shape;
+use hydrograd::simulate::Backend;
+use hydrograd::{Controls, Fidelity, Settings, Shape, Simulator, objective};
+use nalgebra::{DMatrix, DVector, Matrix3};
+use std::path::Path;
+use std::sync::Arc;
+use std::time::Instant;
+
+const SCENES: [&str; 4] = [
+    "falling_ball_box",
+    "grasp_open",
+    "fish_near_tail",
+    "clown_fish",
+];
+/// Spheres of this many faces, 642 sources each.
+const FACES: usize = 1280;
+/// Numbers of spheres: about 10⁴, 5·10⁴ and 10⁵ sources.
+const ROWS: [usize; 3] = [16, 78, 156];
+/// Operations of a pair, square roots and divisions counted once: solid angle, and two a column.
+const OPERATIONS: f64 = 105.0;
+/// Columns of the products that are timed alone.
+const COLUMNS: usize = 12;
+/// Products of an evaluation with first and second derivatives, about: iterations of two solves, twice
+/// each, and what surrounds them.
+const PRODUCTS: f64 = 70.0;
+/// Memory that the CPU's matrix may take, bytes.
+const MATRIX: f64 = 12e9;
+/// Single-precision peak of some cards, TFLOPS, as published.
+const PEAKS: [(&str, f64); 5] = [
+    ("H200", 66.9),
+    ("H100", 66.9),
+    ("A100", 19.5),
+    ("RTX 4090", 82.6),
+    ("RTX 3060", 12.7),
+];
+
+fn argument(name: &str) -> Option<f64> {
+    let all: Vec<String> = std::env::args().collect();
+    let at = all.iter().position(|a| a == name)?;
+    all.get(at + 1)?.parse().ok()
+}
+
+/// Seconds of a call, the shortest of a few.
+fn seconds(repeat: usize, mut call: impl FnMut()) -> f64 {
+    let once = |call: &mut dyn FnMut()| {
+        let start = Instant::now();
+        call();
+        start.elapsed().as_secs_f64()
+    };
+    (0..repeat)
+        .map(|_| once(&mut call))
+        .fold(f64::INFINITY, f64::min)
+}
+
+/// Seconds a step, and a step with its gradient.
+fn step(simulator: &Simulator, steps: usize, repeat: usize) -> hydrograd::Result<(f64, f64)> {
+    let controls = Controls::zeros(simulator, steps);
+    let goal = objective::final_velocity(0, 0.0, 1.0);
+    let (mut forward, mut whole) = (f64::INFINITY, f64::INFINITY);
+    // The first compiles shaders.
+    for round in 0..=repeat {
+        let start = Instant::now();
+        let rollout = simulator.rollout(&controls)?;
+        let middle = start.elapsed().as_secs_f64();
+        rollout.gradient(&goal)?;
+        if round > 0 {
+            forward = forward.min(middle / steps as f64);
+            whole = whole.min(start.elapsed().as_secs_f64() / steps as f64);
+        }
+    }
+    Ok((forward, whole))
+}
+
+fn scenes(left: &dyn Fn() -> f64) -> hydrograd::Result<()> {
+    println!(
+        "| scene | faces | unknowns | CPU, ms/step | with gradient | GPU, ms/step | with gradient | CPU/GPU | device, MB |"
+    );
+    println!("|---|---|---|---|---|---|---|---|---|");
+    let mut last = 0.0;
+    for name in SCENES {
+        if left() < 2.0 * last {
+            println!("| {name} | left out: the time given is over |");
+            continue;
+        }
+        let start = Instant::now();
+        let file =
+            Path::new(env!("CARGO_MANIFEST_DIR")).join(format!("examples/scenes/{name}.toml"));
+        let scene = Scene::load(file)?;
+        let settings = Settings::default()
+            .fidelity(Fidelity::Full)
+            .integrator(Integrator::MomentumEuler);
+        let cpu = Simulator::new(&scene, settings)?;
+        let gpu = Simulator::new(&scene, settings.backend(Backend::Gpu))?;
+        let on_cpu = step(&cpu, 2, 1)?;
+        let on_gpu = step(&gpu, 2, 1)?;
+        let memory = gpu
+            .backend()
+            .device
+            .map_or(0.0, |d| d.peak_memory as f64 / 1e6);
+        let bodies = cpu.bodies();
+        println!(
+            "| {name} | {} | {} | {:.1} | {:.1} | {:.1} | {:.1} | {:.2} | {memory:.0} |",
+            bodies.iter().map(|b| b.faces).sum::<usize>(),
+            bodies.iter().map(|b| b.unknowns).sum::<usize>(),
+            1e3 * on_cpu.0,
+            1e3 * on_cpu.1,
+            1e3 * on_gpu.0,
+            1e3 * on_gpu.1,
+            on_cpu.1 / on_gpu.1,
+        );
+        last = start.elapsed().as_secs_f64();
+    }
+    Ok(())
+}
+
+/// Spheres in a cubic lattice, gaps of half a radius.
+fn lattice(count: usize) -> hydrograd::Result<(Arc<Model>, Vec<Pose>)> {
+    let mesh = shape::build(&Shape::sphere(0.5), Path::new("."), Some(FACES))?;
+    let boundary = BodyBoundary::new(
+        "ball",
+        mesh.vertices(),
+        mesh.faces(),
+        &BodySettings::default(),
+    )?;
+    let body = Arc::new(WetBody::new(Arc::new(boundary)));
+    let settings = SolveSettings {
+        tolerance: 1e-6,
+        ..SolveSettings::default()
+    };
+    let model = Model::new(vec![body; count], &[], Exclusions::none(), settings)?;
+    let side = (count as f64).cbrt().ceil() as usize;
+    let poses = (0..count)
+        .map(|i| {
+            let at = [i % side, i / side % side, i / side / side].map(|n| 1.25 * n as f64);
+            Pose::new(Matrix3::identity(), Vec3::from(at))
+        })
+        .collect();
+    Ok((Arc::new(model), poses))
+}
+
+/// One evaluation with its derivatives, and one second derivative.
+fn evaluate(full: &Full, poses: &[Pose]) -> hydrograd::Result<()> {
+    let bodies = poses.len();
+    let mut basis = DMatrix::zeros(6 * bodies, 6);
+    basis.rows_mut(0, 6).fill_with_identity();
+    let record = full.evaluate(poses, &basis, true)?;
+    let x = DVector::from_element(6, 1.0);
+    let mut z = vec![Vec6::zeros(); bodies];
+    z[0] = Vec6::repeat(1.0);
+    record.hvp(Direction::Basis(&x), Direction::Basis(&x), &z)?;
+    Ok(())
+}
+
+fn rows(context: &Arc<Context>, left: &dyn Fn() -> f64, rate: f64) -> hydrograd::Result<()> {
+    println!("\n| spheres | faces | sources | CPU, s | GPU, s | CPU/GPU | device, MB |");
+    println!("|---|---|---|---|---|---|---|");
+    for count in ROWS {
+        let (model, poses) = lattice(count)?;
+        let (faces, sources) = (model.rows() as f64, model.columns() as f64);
+        let start = format!("| {count} | {faces} | {sources} |");
+        let expected = PRODUCTS * faces * sources / rate;
+        if 2.0 * expected > left() {
+            println!("{start} left out: about {expected:.0} s on this adapter |");
+            continue;
+        }
+        let gpu = Full::on(model.clone(), Box::new(Gpu::new(context, &model)?));
+        let mut result = Ok(());
+        let on_gpu = seconds(2, || result = evaluate(&gpu, &poses));
+        result?;
+        let memory = context.counts().peak_memory as f64 / 1e6;
+        let matrix = 8.0 * faces * sources;
+        // A matrix as large as that is made in about so many seconds, and read as often as there are products.
+        if matrix > MATRIX {
+            println!(
+                "{start} – (a matrix of {:.0} GB) | {on_gpu:.3} | – | {memory:.0} |",
+                matrix / 1e9
+            );
+            continue;
+        }
+        let cpu = Full::on(model.clone(), Box::new(Cpu::new(model.clone())?));
+        let mut result = Ok(());
+        let on_cpu = seconds(1, || result = evaluate(&cpu, &poses));
+        result?;
+        println!(
+            "{start} {on_cpu:.3} | {on_gpu:.3} | {:.2} | {memory:.0} |",
+            on_cpu / on_gpu
+        );
+    }
+    Ok(())
+}
+
+/// Pairs a second of products with K.
+fn rate(
+    context: &Arc<Context>,
+    arithmetic: Arithmetic,
+    count: usize,
+    repeat: usize,
+) -> hydrograd::Result<f64> {
+    let (model, poses) = lattice(count)?;
+    let gpu = Gpu::new(context, &model)?;
+    let probe = Probe::new(&gpu, &poses)?;
+    let seconds = probe.time_apply(arithmetic, COLUMNS, repeat)?;
+    Ok((model.rows() * model.columns()) as f64 / seconds)
+}
+
+fn main() -> hydrograd::Result<()> {
+    let start = Instant::now();
+    let minutes = argument("--minutes").unwrap_or(9.0);
+    let left = || 60.0 * minutes - start.elapsed().as_secs_f64();
+    let context = Context::new(&Options::default())?;
+    let adapter = context.adapter();
+    println!(
+        "{} ({}, {}), fine arithmetic: {}\n",
+        adapter.name,
+        adapter.driver,
+        adapter.interface,
+        context.fine().name()
+    );
+    let first = rate(&context, Arithmetic::Single, 2, 3)?;
+    scenes(&left)?;
+    rows(&context, &left, first)?;
+
+    let peak = argument("--peak").or_else(|| {
+        let known = PEAKS.iter().find(|(name, _)| adapter.name.contains(name));
+        known.map(|(_, peak)| *peak)
+    });
+    println!(
+        "\n| products with K, {COLUMNS} columns | sources | pairs/s | TFLOPS | share of the peak |"
+    );
+    println!("|---|---|---|---|---|");
+    for (arithmetic, count) in [
+        (Arithmetic::Single, 4),
+        (Arithmetic::Single, 16),
+        (Arithmetic::Single, 78),
+        (context.fine(), 4),
+        (context.fine(), 16),
+    ] {
+        let pairs = (FACES * count) as f64 * (FACES * count / 2) as f64;
+        if 30.0 * pairs / first > left() {
+            continue;
+        }
+        let rate = rate(
+            &context,
+            arithmetic,
+            count,
+            if pairs / first > 1.0 { 1 } else { 10 },
+        )?;
+        let flops = rate * (OPERATIONS + 2.0 * COLUMNS as f64) / 1e12;
+        let share = match (arithmetic, peak) {
+            (Arithmetic::Single, Some(peak)) => format!("{:.0} %", 100.0 * flops / peak),
+            _ => "–".into(),
+        };
+        println!(
+            "| {} | {} | {rate:.2e} | {flops:.2} | {share} |",
+            arithmetic.name(),
+            642 * count
+        );
+    }
+    println!("\n{:.0} s in all", start.elapsed().as_secs_f64());
+    Ok(())
+}

@@ -1,0 +1,182 @@
+//! What the couplings of a simulator are computed on: the CPU, or one open GPU that all of them share.
+
+use super::backend::{Backend, BackendReport};
+use super::{Fidelity, Settings};
+use crate::boundary::OneBody;
+use crate::coupling::Coupling;
+use crate::coupling::full::{Cpu, Full, Model};
+use crate::coupling::reduced::Reduced;
+use crate::{Error, Result};
+use std::sync::Arc;
+
+#[cfg(feature = "gpu")]
+use {
+    super::backend::{Arithmetic, DeviceReport, GpuSettings},
+    crate::gpu::{self, Context, full::Gpu},
+};
+
+/// The CPU unless a GPU is open.
+#[derive(Clone, Default)]
+pub(super) struct Device {
+    asked: Backend,
+    /// Why it isn't what was asked for.
+    reason: Option<String>,
+    #[cfg(feature = "gpu")]
+    fallback: bool,
+    #[cfg(feature = "gpu")]
+    context: Option<Arc<Context>>,
+}
+
+impl Device {
+    /// What the settings ask for, with a fidelity that isn't `Auto` any more.
+    pub fn open(settings: &Settings, fidelity: Fidelity) -> Result<Self> {
+        let mut out = Self {
+            asked: settings.backend,
+            ..Self::default()
+        };
+        if settings.backend == Backend::Cpu {
+            return Ok(out);
+        }
+        let panels = fidelity == Fidelity::Full && settings.one_body == OneBody::Panel;
+        if cfg!(feature = "gpu") && panels {
+            return Err(Error::Unsupported {
+                what: "the method panel with the fidelity full and the backend gpu".into(),
+                why: "coupled panels are the reference, on the CPU alone".into(),
+                instead: "use the backend cpu, or the method mfs-vertex".into(),
+            });
+        }
+        match out.fill(settings, fidelity) {
+            Err(error) if settings.gpu.fallback => {
+                out.reason = Some(fallen_back(&error));
+                Ok(out)
+            }
+            done => done.map(|()| out),
+        }
+    }
+
+    #[cfg(feature = "gpu")]
+    fn fill(&mut self, settings: &Settings, fidelity: Fidelity) -> Result<()> {
+        if fidelity == Fidelity::Isolated {
+            self.reason = Some(
+                "the fidelity isolated runs on the CPU: it has nothing to compute on the backend gpu"
+                    .into(),
+            );
+            return Ok(());
+        }
+        self.fallback = settings.gpu.fallback;
+        self.context = Some(Context::new(&settings.gpu.into())?);
+        Ok(())
+    }
+
+    #[cfg(not(feature = "gpu"))]
+    fn fill(&mut self, _: &Settings, _: Fidelity) -> Result<()> {
+        Err(super::backend::not_built())
+    }
+
+    /// The fidelity `Full` here.
+    pub fn full(&mut self, model: Model) -> Result<Full> {
+        let model = Arc::new(model);
+        #[cfg(feature = "gpu")]
+        if let Some(context) = &self.context {
+            match Gpu::new(context, &model) {
+                Ok(gpu) => return Ok(Full::on(model, Box::new(gpu))),
+                Err(error) => self.leave(error)?,
+            }
+        }
+        Ok(Full::on(model.clone(), Box::new(Cpu::new(model)?)))
+    }
+
+    /// The fidelity `Reduced` here.
+    pub fn reduced(&mut self, coupling: Reduced) -> Result<Box<dyn Coupling>> {
+        #[cfg(feature = "gpu")]
+        if let Some(_context) = &self.context {
+            // The one place where `gpu::reduced` goes in: made of `_context` and `coupling`; its
+            // `Error::Device` goes to `leave`, as in `full`.
+            return Err(Error::Unsupported {
+                what: "the fidelity reduced with the backend gpu".into(),
+                why: "it is computed on the CPU alone so far".into(),
+                instead: "use the fidelity full, or the backend cpu".into(),
+            });
+        }
+        Ok(Box::new(coupling))
+    }
+
+    /// Goes on with the CPU after a failure of the device, if that was asked for.
+    #[cfg(feature = "gpu")]
+    fn leave(&mut self, error: Error) -> Result<()> {
+        if !(self.fallback && matches!(error, Error::Device { .. })) {
+            return Err(error);
+        }
+        self.reason = Some(fallen_back(&error));
+        self.context = None;
+        Ok(())
+    }
+
+    /// What the user should know.
+    pub fn warning(&self) -> Option<String> {
+        self.reason.clone()
+    }
+
+    /// The open GPU.
+    #[cfg(feature = "gpu")]
+    pub fn context(&self) -> Option<&Arc<Context>> {
+        self.context.as_ref()
+    }
+
+    /// What computes, and what was done so far.
+    pub fn report(&self) -> BackendReport {
+        #[cfg(feature = "gpu")]
+        let device = self.context.as_ref().map(|context| {
+            let (adapter, counts) = (context.adapter(), context.counts());
+            DeviceReport {
+                adapter: adapter.name.clone(),
+                driver: adapter.driver.clone(),
+                interface: adapter.interface.clone(),
+                arithmetic: context.fine().into(),
+                peak_memory: counts.peak_memory,
+                dispatches: counts.dispatches,
+                read_backs: counts.read_backs,
+                bytes_back: counts.bytes_back,
+            }
+        });
+        #[cfg(not(feature = "gpu"))]
+        let device = None;
+        BackendReport {
+            backend: self.asked,
+            backend_used: match device {
+                Some(_) => Backend::Gpu,
+                None => Backend::Cpu,
+            },
+            backend_reason: self.reason.clone(),
+            device,
+        }
+    }
+}
+
+fn fallen_back(error: &Error) -> String {
+    format!("it runs on the CPU instead of the backend gpu: {error}")
+}
+
+#[cfg(feature = "gpu")]
+impl From<GpuSettings> for gpu::Options {
+    fn from(settings: GpuSettings) -> Self {
+        Self {
+            adapter: settings.adapter.map(String::from),
+            fine: match settings.arithmetic {
+                Arithmetic::Auto => None,
+                Arithmetic::Double => Some(gpu::Arithmetic::Double),
+                Arithmetic::TwoFloat => Some(gpu::Arithmetic::TwoFloat),
+            },
+        }
+    }
+}
+
+#[cfg(feature = "gpu")]
+impl From<gpu::Arithmetic> for Arithmetic {
+    fn from(fine: gpu::Arithmetic) -> Self {
+        match fine {
+            gpu::Arithmetic::Double => Self::Double,
+            gpu::Arithmetic::Single | gpu::Arithmetic::TwoFloat => Self::TwoFloat,
+        }
+    }
+}

@@ -1,0 +1,271 @@
+//! Every kernel on the device against the same sums over the scalar kernels of the CPU.
+
+use super::fixture::*;
+use hydrograd::adjoint::kernel::{
+    flux, flux_gradient, flux_hessian_product, normal, normal_gradient, normal_hessian_product,
+    potential, potential_gradient, potential_hessian_product,
+};
+use hydrograd::adjoint::lie::{Pose, Vec3, Vec6, angular, linear, six};
+use hydrograd::boundary::Method;
+use hydrograd::coupling::Exclusions;
+use hydrograd::coupling::full::{Model, Preconditioner};
+use hydrograd::gpu::Arithmetic;
+use hydrograd::gpu::full::{Gpu, PairWrenches, Probe};
+use hydrograd::solver::Columns;
+use std::sync::Arc;
+
+/// A pair of a face and (the image of) a source, everything in the world frame.
+struct Entry {
+    target: usize,
+    source: usize,
+    image: usize,
+    face: usize,
+    column: usize,
+    /// Position of the source.
+    at: Vec3,
+    /// Its displacement relative to the face's body.
+    d: Vec3,
+    /// Entries of K and P, their gradients and Hessian products; P is zero within a body.
+    k: (f64, Vec3, Vec3),
+    p: (f64, Vec3, Vec3),
+}
+
+/// Every pair.
+fn entries(model: &Model, poses: &[Pose], z: &[Vec6], mut each: impl FnMut(Entry)) {
+    for (t, target) in model.bodies.iter().enumerate() {
+        let (b, pose) = (&target.boundary, &poses[t]);
+        for (number, image) in model.images.iter().enumerate() {
+            for (c, source) in model.bodies.iter().enumerate() {
+                if number == 0 && model.excluded.contains(t, c) {
+                    continue;
+                }
+                let (linear_part, shift) = image.placement(&poses[c]);
+                let motion = image.twist(&z[c]) - z[t];
+                for (j, s) in source.boundary.sources.iter().enumerate() {
+                    let at = linear_part * s + shift;
+                    let d = linear(&motion) + angular(&motion).cross(&at);
+                    let (s, ds) = (pose.apply_inverse(&at), pose.rotation.tr_mul(&d));
+                    for i in 0..b.faces.len() {
+                        let (corners, w) = (&b.faces.corners[i], b.row_weights[i]);
+                        let (x, n) = (&b.faces.centres[i], &b.faces.normals[i]);
+                        let k = match b.settings.method {
+                            Method::MfsVertex => (
+                                flux(corners, w, &s),
+                                flux_gradient(corners, w, &s),
+                                flux_hessian_product(corners, w, &s, &ds),
+                            ),
+                            Method::MfsFace => (
+                                normal(x, n, w, &s),
+                                normal_gradient(x, n, w, &s),
+                                normal_hessian_product(x, n, w, &s, &ds),
+                            ),
+                        };
+                        let p = if number == 0 && t == c {
+                            (0.0, Vec3::zeros(), Vec3::zeros())
+                        } else {
+                            (
+                                potential(x, &s),
+                                potential_gradient(x, &s),
+                                potential_hessian_product(x, &s, &ds),
+                            )
+                        };
+                        let turn = |(v, g, h): (f64, Vec3, Vec3)| {
+                            (v, pose.rotation * g, pose.rotation * h)
+                        };
+                        each(Entry {
+                            target: t,
+                            source: c,
+                            image: number,
+                            face: model.faces[t].start + i,
+                            column: model.sources[c].start + j,
+                            at,
+                            d,
+                            k: turn(k),
+                            p: turn(p),
+                        });
+                    }
+                }
+            }
+        }
+    }
+}
+
+/// Two models: solid angles with walls, normal velocities with an excluded pair.
+fn models() -> [Arc<Model>; 2] {
+    let settings = tight(Preconditioner::Factors);
+    [
+        model(Method::MfsVertex, &[WALL], Exclusions::none(), settings),
+        model(Method::MfsFace, &[], Exclusions::new([(0, 2)]), settings),
+    ]
+}
+
+fn columns(rows: usize, columns: usize, phase: f64) -> Columns {
+    Columns {
+        rows,
+        columns,
+        data: wavy(rows * columns, phase),
+    }
+}
+
+/// Largest accepted differences, relative to the largest number, in single precision and finer.
+const LIMITS: [(Arithmetic, f64); 2] = [(Arithmetic::Single, 1e-5), (Arithmetic::Double, 1e-12)];
+/// In two-float arithmetic.
+const TWO: f64 = 1e-11;
+
+/// Each arithmetic with a backend that has it, and its limit.
+fn each_arithmetic(model: &Arc<Model>, mut check: impl FnMut(&Probe, Arithmetic, f64)) {
+    let gpu = Gpu::new(context(), model).unwrap();
+    let probe = Probe::new(&gpu, &poses()).unwrap();
+    for (arithmetic, limit) in LIMITS {
+        if arithmetic == Arithmetic::Single || context().fine() == arithmetic {
+            check(&probe, arithmetic, limit);
+        }
+    }
+    let gpu = Gpu::new(two_float(), model).unwrap();
+    check(
+        &Probe::new(&gpu, &poses()).unwrap(),
+        Arithmetic::TwoFloat,
+        TWO,
+    );
+}
+
+fn close(what: &str, arithmetic: Arithmetic, got: &[f64], right: &[f64], limit: f64) {
+    let found = difference(got, right);
+    println!("{what} ({}): {found:.1e}", arithmetic.name());
+    assert!(
+        found <= limit,
+        "{what} ({}): {found:.1e} past {limit:.0e}",
+        arithmetic.name()
+    );
+}
+
+/// K x, P x, Kᵀ y, Pᵀ y and their tangents, of five columns.
+pub fn products() {
+    for model in models() {
+        let k = 5;
+        let (rows, sources) = (model.rows(), model.columns());
+        let (x, y) = (columns(sources, k, 0.4), columns(rows, k, 1.7));
+        let z = displacement(model.bodies.len(), 0.9);
+        let mut right = vec![vec![0.0; rows * k]; 4];
+        let mut back = vec![vec![0.0; sources * k]; 4];
+        entries(&model, &poses(), &z, |e| {
+            let own = e.target == e.source && e.image == 0;
+            let slope = |g: &Vec3| if own { 0.0 } else { g.dot(&e.d) };
+            let values = [e.k.0, e.p.0, slope(&e.k.1), slope(&e.p.1)];
+            for (v, value) in values.iter().enumerate() {
+                for c in 0..k {
+                    right[v][e.face * k + c] += value * x.at(e.column, c);
+                    back[v][e.column * k + c] += value * y.at(e.face, c);
+                }
+            }
+        });
+        each_arithmetic(&model, |probe, a, limit| {
+            for (v, potential) in [false, true].into_iter().enumerate() {
+                let of = |name: &str| format!("{} {name}", if potential { "P" } else { "K" });
+                let got = probe.apply(a, potential, &x).unwrap();
+                close(&of("apply"), a, &got.data, &right[v], limit);
+                let got = probe.apply_transpose(a, potential, &y).unwrap();
+                close(&of("apply_transpose"), a, &got.data, &back[v], limit);
+                let got = probe.apply_jvp(a, potential, &z, &x).unwrap();
+                close(&of("apply_jvp"), a, &got.data, &right[2 + v], limit);
+                let got = probe.apply_transpose_jvp(a, potential, &z, &y).unwrap();
+                close(
+                    &of("apply_transpose_jvp"),
+                    a,
+                    &got.data,
+                    &back[2 + v],
+                    limit,
+                );
+            }
+        });
+    }
+}
+
+/// The wrenches of all pairs, and their tangents, beside each other.
+fn numbers(pairs: &[PairWrenches]) -> (Vec<f64>, Vec<f64>) {
+    let wrenches: Vec<Vec6> = pairs.iter().flat_map(|p| p.wrenches.clone()).collect();
+    let tangents: Vec<Vec6> = pairs.iter().flat_map(|p| p.tangents.clone()).collect();
+    (flat(&wrenches), flat(&tangents))
+}
+
+/// Wrenches and their tangents of two columns.
+pub fn derivatives() {
+    for model in models() {
+        let n = 2;
+        let (rows, sources) = (model.rows(), model.columns());
+        let (left, right) = (columns(rows, 5 * n, 2.2), columns(sources, 4 * n, 3.1));
+        let z = displacement(model.bodies.len(), 0.2);
+        let images = model.images.len();
+        let bodies = model.bodies.len();
+        let mut sums = vec![vec![(Vec6::zeros(), Vec6::zeros()); n * n]; bodies * images * bodies];
+        entries(&model, &poses(), &z, |e| {
+            if e.target == e.source && e.image == 0 {
+                return;
+            }
+            let pair = &mut sums[(e.target * images + e.image) * bodies + e.source];
+            for x in 0..n {
+                let l = |block: usize| left.at(e.face, block * n + x);
+                for y in 0..n {
+                    let r = |block: usize| right.at(e.column, block * n + y);
+                    let q = l(2) * e.p.1 - l(0) * e.k.1;
+                    let rho = l(1) * e.k.1;
+                    let dq = l(2) * e.p.2 - l(0) * e.k.2 - l(3) * e.k.1;
+                    let drho = l(1) * e.k.2 + l(4) * e.k.1;
+                    let f = q * r(0) + rho * r(1);
+                    let df = dq * r(0) + q * r(2) + drho * r(1) + rho * r(3);
+                    let sum = &mut pair[x * n + y];
+                    sum.0 += six(&f, &e.at.cross(&f));
+                    sum.1 += six(&df, &(e.d.cross(&f) + e.at.cross(&df)));
+                }
+            }
+        });
+        let values = |pairs: &[PairWrenches], tangent: bool| -> Vec<f64> {
+            let of = |p: &PairWrenches| {
+                let sum = &sums[(p.target * images + p.image) * bodies + p.source];
+                sum.iter()
+                    .map(|s| if tangent { s.1 } else { s.0 })
+                    .collect::<Vec<_>>()
+            };
+            flat(&pairs.iter().flat_map(of).collect::<Vec<_>>())
+        };
+        let part = |c: &Columns, n: usize| Columns::from_fn(c.rows, n, |i, k| c.at(i, k));
+        each_arithmetic(&model, |probe, a, limit| {
+            let first = probe
+                .pair_vjp(a, &part(&left, 3 * n), &part(&right, 2 * n))
+                .unwrap();
+            let (got, _) = numbers(&first);
+            close("pair_vjp", a, &got, &values(&first, false), limit);
+            let second = probe.pair_hvp(a, &z, &left, &right).unwrap();
+            let (got, tangents) = numbers(&second);
+            close("pair_hvp, first", a, &got, &values(&second, false), limit);
+            close("pair_hvp", a, &tangents, &values(&second, true), limit);
+        });
+    }
+}
+
+/// The refined solve of random right-hand sides, with every preconditioner.
+pub fn solves() {
+    for preconditioner in [Preconditioner::Factors, Preconditioner::Jacobi] {
+        let mut settings = tight(preconditioner);
+        settings.tolerance = 1e-10;
+        let model = model(Method::MfsVertex, &[WALL], Exclusions::none(), settings);
+        let g = columns(model.columns(), 4, 5.5);
+        for context in [context(), two_float()] {
+            let gpu = Gpu::new(context, &model).unwrap();
+            let probe = Probe::new(&gpu, &poses()).unwrap();
+            // KᵀK x + D² x is made in the fine arithmetic, apart from the solve.
+            let (x, reached) = probe.normal_solve(&g).unwrap();
+            let a = context.fine();
+            let kx = probe.apply(a, false, &x).unwrap();
+            let mut back = probe.apply_transpose(a, false, &kx).unwrap();
+            let damping = model.bodies.iter().flat_map(|b| &b.boundary.damping);
+            for (j, d) in damping.enumerate() {
+                for k in 0..4 {
+                    back.data[j * 4 + k] += d * d * x.at(j, k);
+                }
+            }
+            println!("{preconditioner:?}: {reached:?}");
+            close("solve", a, &back.data, &g.data, 1e-8);
+        }
+    }
+}

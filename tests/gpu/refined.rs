@@ -1,0 +1,101 @@
+//! What a refined solve reaches, and what it says where it can't.
+
+use super::fixture::*;
+use hydrograd::Error;
+use hydrograd::boundary::Method;
+use hydrograd::coupling::full::{Preconditioner, Solver};
+use hydrograd::coupling::{Coupling, Exclusions};
+use hydrograd::gpu::full::Gpu;
+
+#[test]
+fn an_answer_meets_the_tolerance_asked_for() {
+    let mut worst = 0.0_f64;
+    let exact = {
+        let model = model(
+            Method::MfsVertex,
+            &[],
+            Exclusions::none(),
+            tight(Preconditioner::Factors),
+        );
+        let (cpu, _) = both(context(), &model);
+        cpu.evaluate(&poses(), &basis(3, 5, 0.3), false)
+            .unwrap()
+            .momenta()
+            .clone()
+    };
+    for tolerance in [1e-3, 1e-6, 1e-8, 1e-12] {
+        let mut settings = tight(Preconditioner::Factors);
+        settings.tolerance = tolerance;
+        let model = model(Method::MfsVertex, &[], Exclusions::none(), settings);
+        let (_, gpu) = both(context(), &model);
+        let record = gpu.evaluate(&poses(), &basis(3, 5, 0.3), false).unwrap();
+        let report = record.report();
+        let error = difference(record.momenta().as_slice(), exact.as_slice());
+        println!(
+            "{tolerance:.0e}: {} iterations, residual {:.1e}, error {error:.1e}",
+            report.iterations, report.residual
+        );
+        assert!(report.residual <= tolerance, "{report:?}");
+        worst = worst.max(error / tolerance);
+    }
+    // The energy's error is of second order in the residual; the condition number takes some of it back.
+    assert!(worst <= 10.0, "{worst}");
+}
+
+#[test]
+fn what_cannot_be_reached_is_an_error_with_the_residual() {
+    let mut settings = tight(Preconditioner::Factors);
+    settings.tolerance = 1e-17;
+    let model = model(Method::MfsVertex, &[], Exclusions::none(), settings);
+    let (_, gpu) = both(context(), &model);
+    match gpu.evaluate(&poses(), &basis(3, 5, 0.3), false).err() {
+        Some(Error::Solver {
+            residual,
+            tolerance,
+            ..
+        }) => {
+            assert!(residual > tolerance && residual < 1e-9, "{residual:e}");
+        }
+        other => panic!("{other:?}"),
+    }
+}
+
+#[test]
+fn too_few_iterations_are_an_error() {
+    let mut settings = tight(Preconditioner::None);
+    settings.max_iterations = 5;
+    let model = model(Method::MfsVertex, &[], Exclusions::none(), settings);
+    let (_, gpu) = both(context(), &model);
+    let error = gpu.evaluate(&poses(), &basis(3, 5, 0.3), false).err();
+    assert!(matches!(error, Some(Error::Solver { .. })), "{error:?}");
+}
+
+#[test]
+fn solvers_that_need_a_matrix_are_refused() {
+    let mut settings = tight(Preconditioner::Factors);
+    settings.solver = Solver::Qr;
+    let model = model(Method::MfsVertex, &[], Exclusions::none(), settings);
+    let message = Gpu::new(context(), &model)
+        .err()
+        .expect("refused")
+        .to_string();
+    assert!(message.contains("cgls"), "{message}");
+}
+
+#[test]
+fn the_same_input_gives_the_same_bits() {
+    let model = model(
+        Method::MfsVertex,
+        &[WALL],
+        Exclusions::none(),
+        tight(Preconditioner::Factors),
+    );
+    let (_, gpu) = both(context(), &model);
+    let run = || {
+        let record = gpu.evaluate(&poses(), &basis(3, 5, 0.3), true).unwrap();
+        let x = nalgebra::DVector::from_vec(wavy(5, 0.7));
+        let wrench = flat(&record.gradient(&x, &x));
+        (record.momenta().clone(), wrench)
+    };
+    assert_eq!(run(), run());
+}

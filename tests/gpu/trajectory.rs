@@ -1,0 +1,70 @@
+//! A rollout and its gradient with the backend gpu against the CPU's.
+
+use super::fixture::{difference, wavy};
+use hydrograd::simulate::Backend;
+use hydrograd::{Controls, Gradient, Rollout, Scene, Settings, Simulator};
+use nalgebra::DMatrix;
+use std::path::Path;
+
+pub const STEPS: usize = 6;
+
+/// The falling ball: a sphere, a coin and the image of a wall, on small meshes.
+pub fn falling_ball() -> Scene {
+    let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("examples/scenes");
+    let mut scene = Scene::load(folder.join("falling_ball.toml")).unwrap();
+    scene.set_faces(80);
+    scene
+}
+
+pub fn simulator(backend: Backend, tolerance: f64) -> Simulator {
+    let scene = falling_ball();
+    let settings = Settings::for_scene(&scene)
+        .backend(backend)
+        .tolerance(tolerance);
+    Simulator::new(&scene, settings).unwrap()
+}
+
+/// The gradient of a fixed combination of all states.
+fn gradient(rollout: &Rollout) -> Gradient {
+    let mut cotangents = rollout.zero_cotangents();
+    let fill = |m: &mut DMatrix<f64>, phase: f64| {
+        m.copy_from_slice(&wavy(m.len(), phase));
+    };
+    fill(&mut cotangents.q, 0.3);
+    fill(&mut cotangents.v, 0.7);
+    fill(&mut cotangents.positions, 1.1);
+    fill(&mut cotangents.rotations, 1.9);
+    rollout.vjp(&cotangents).unwrap()
+}
+
+/// End state, controls, initial state and parameters, each by itself.
+fn groups(simulator: &Simulator) -> [Vec<f64>; 5] {
+    let controls = Controls::zeros(simulator, STEPS);
+    let rollout = simulator.rollout(&controls).unwrap();
+    let last = &rollout.samples()[STEPS];
+    let end = [last.q.as_slice(), last.v.as_slice()].concat();
+    let g = gradient(&rollout);
+    [
+        end,
+        g.controls.as_slice().to_vec(),
+        g.initial.q.as_slice().to_vec(),
+        g.initial.v.as_slice().to_vec(),
+        g.parameters.to_vec(),
+    ]
+}
+
+#[test]
+fn a_rollout_with_its_gradient_is_the_cpus() {
+    let cpu = groups(&simulator(Backend::Cpu, 1e-10));
+    let simulator = simulator(Backend::Gpu, 1e-10);
+    let gpu = groups(&simulator);
+    let names = ["end", "controls", "initial q", "initial v", "parameters"];
+    for ((name, cpu), gpu) in names.iter().zip(&cpu).zip(&gpu) {
+        let off = difference(gpu, cpu);
+        println!("{name}: {off:.1e}");
+        assert!(off <= 1e-6, "{name}: {off:e}");
+    }
+    println!("{}", simulator.backend());
+    let again = groups(&simulator);
+    assert_eq!(gpu, again, "two runs on one device");
+}

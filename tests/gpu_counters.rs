@@ -1,0 +1,48 @@
+//! On the GPU a rollout and its gradient leave no pair work and no solver vectors to the CPU, and it
+//! waits for numbers as often whatever the tolerance.
+//!
+//! The counters are the process's: one test, in a binary of its own.
+
+use hydrograd::adjoint::kernel::pairs_computed;
+use hydrograd::simulate::Backend;
+use hydrograd::solver::calls_made;
+use hydrograd::{Controls, Scene, Settings, Simulator, objective};
+use std::path::Path;
+
+/// What a rollout with its gradient costs the CPU, after the set-up: pairs and calls of solvers.
+fn work(simulator: &Simulator) -> (u64, u64) {
+    let before = (pairs_computed(), calls_made());
+    let controls = Controls::zeros(simulator, 3);
+    let rollout = simulator.rollout(&controls).unwrap();
+    let goal = objective::final_coordinate(1, 0.7, 1.0);
+    let gradient = rollout.gradient(&goal).unwrap();
+    assert!(gradient.controls.norm() > 0.0);
+    (pairs_computed() - before.0, calls_made() - before.1)
+}
+
+#[test]
+fn the_gpu_does_the_work() {
+    let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("examples/scenes");
+    let mut scene = Scene::load(folder.join("falling_ball.toml")).unwrap();
+    scene.set_faces(80);
+    let settings = Settings::for_scene(&scene);
+
+    let cpu = Simulator::new(&scene, settings).unwrap();
+    let (pairs, calls) = work(&cpu);
+    println!("cpu: {pairs} pairs, {calls} calls");
+    assert!(pairs > 0 && calls > 0, "the counters count");
+
+    let read_backs = |tolerance: f64| {
+        let settings = settings.backend(Backend::Gpu).tolerance(tolerance);
+        let simulator = Simulator::new(&scene, settings).unwrap();
+        let counts = || simulator.context().unwrap().counts();
+        let before = counts();
+        let done = work(&simulator);
+        let after = counts();
+        println!("{tolerance:e}: {after:?}");
+        assert_eq!(done, (0, 0), "pairs and calls of solvers on the CPU");
+        assert!(after.dispatches > before.dispatches);
+        after.read_backs - before.read_backs
+    };
+    assert_eq!(read_backs(1e-4), read_backs(1e-9));
+}

@@ -6,8 +6,8 @@ use hydrograd::adjoint::lie::{Pose, Vec3, exp_matrix};
 use hydrograd::boundary::{BodyBoundary, Settings};
 use hydrograd::coupling::reduced::{Cutoff, Reduced, ReducedBody, compress};
 use hydrograd::coupling::{Coupling, Direction, Exclusions, Record};
-use hydrograd::gpu::Context;
 use hydrograd::gpu::reduced::GpuReduced;
+use hydrograd::gpu::{Context, Options};
 use hydrograd::scene::{Shape, Wall, WallSurface};
 use hydrograd::shape;
 use nalgebra::{DMatrix, DVector};
@@ -55,14 +55,8 @@ fn pull(r: &dyn Record, x: Direction, y: Direction) -> Vec<f64> {
 }
 
 /// Largest difference of each rung: value, gradient, columns, along, vjp, momenta of the tangent, tangent.
-fn differences(
-    context: &Arc<Context>,
-    reduced: &Arc<Reduced>,
-    poses: &[Pose],
-    columns: usize,
-) -> [f64; 7] {
-    let n = poses.len();
-    let gpu = GpuReduced::new(context, reduced.clone()).unwrap();
+fn differences(gpu: &GpuReduced, poses: &[Pose], columns: usize) -> [f64; 7] {
+    let (n, reduced) = (poses.len(), gpu.reduced());
     let basis = basis(n, columns, 0.3);
     let a = reduced.evaluate(poses, &basis, true).unwrap();
     let b = gpu.evaluate(poses, &basis, true).unwrap();
@@ -102,7 +96,8 @@ fn holds(
     columns: usize,
     limit: f64,
 ) {
-    let found = differences(context, reduced, poses, columns);
+    let gpu = GpuReduced::new(context, reduced.clone()).unwrap();
+    let found = differences(&gpu, poses, columns);
     println!("value, gradient, columns, along, vjp, jvp, hvp: {found:?}");
     assert!(
         found.iter().all(|d| *d <= limit),
@@ -249,5 +244,62 @@ fn bodies_in_one_another_are_refused_as_by_the_cpu() {
         assert!(cpu.1.contains("smallest eigenvalue"), "{cpu:?}");
         assert_eq!((&cpu.0, &cpu.1, cpu.3), (&gpu.0, &gpu.1, gpu.3));
         assert!(gpu.2 <= 0.0);
+    }
+}
+
+/// So close that the host has to look again.
+#[test]
+fn reduced_close_to_one_another() {
+    let reduced = three(&[], None, &Exclusions::none());
+    let gpu = GpuReduced::new(context(), reduced.clone()).unwrap();
+    let gpu = gpu.within(1e-13).unwrap();
+    let mut poses = poses();
+    poses[1].translation = Vec3::new(0.0, 4.0, 0.0);
+    poses[2].translation = poses[0].translation + Vec3::new(0.7, 0.0, 0.0);
+    let found = differences(&gpu, &poses, 5);
+    println!("value, gradient, columns, along, vjp, jvp, hvp: {found:?}");
+    assert!(found.iter().all(|d| *d <= 1e-8), "{found:?}");
+    let report = gpu.evaluate(&poses, &basis(3, 5, 0.3), false).unwrap();
+    assert!(report.report().iterations > 16, "{:?}", report.report());
+}
+
+#[test]
+fn tolerances_out_of_range_are_refused() {
+    for tolerance in [0.0, 1e-15, 1.0, f64::NAN] {
+        let reduced = three(&[], None, &Exclusions::none());
+        let gpu = GpuReduced::new(context(), reduced).unwrap();
+        assert!(gpu.within(tolerance).is_err(), "{tolerance}");
+    }
+}
+
+#[test]
+fn reduced_without_columns_or_neighbours() {
+    let reduced = Arc::new(Reduced::new(vec![shapes()[0].clone()], &[], |_, _| None).unwrap());
+    holds(context(), &reduced, &poses()[..1], 5, 1e-8);
+    let gpu = GpuReduced::new(context(), reduced).unwrap();
+    let none = gpu.evaluate(&poses()[..1], &DMatrix::zeros(6, 0), true);
+    assert_eq!(none.unwrap().momenta().shape(), (6, 0));
+}
+
+/// Derivatives on the basis have no way to fail: they are no numbers then, and the next evaluation tells.
+#[test]
+fn reduced_on_a_lost_device_is_an_error() {
+    let own = Context::new(&Options::default()).unwrap();
+    let gpu = GpuReduced::new(&own, three(&[], None, &Exclusions::none())).unwrap();
+    let basis = basis(3, 30, 0.3);
+    let record = gpu.evaluate(&poses(), &basis, true).unwrap();
+    own.lose();
+    let x = DVector::from_vec(wavy(30, 0.7));
+    let z = displacement(3, 2.3);
+    assert!(record.gradient(&x, &x).iter().all(|w| w[0].is_nan()));
+    assert!(record.gradient_along(&x, &z).iter().all(|g| g.is_nan()));
+    let on = Direction::Basis(&x);
+    let failed = [
+        record.vjp(on, on).err(),
+        record.hvp(on, on, &z).err(),
+        gpu.evaluate(&poses(), &basis, true).err(),
+    ];
+    for e in failed {
+        assert!(matches!(e, Some(Error::Device { .. })), "{e:?}");
     }
 }

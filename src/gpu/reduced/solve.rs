@@ -11,7 +11,7 @@ use crate::{Error, Result};
 use nalgebra::DMatrix;
 
 /// Iterations that are started before the host first looks.
-const FEW: usize = 16;
+const FEW: usize = 12;
 /// After so many the system isn't solved.
 const MOST: usize = 1000;
 

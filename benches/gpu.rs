@@ -69,37 +69,49 @@ fn seconds(repeat: usize, mut call: impl FnMut()) -> f64 {
         .fold(f64::INFINITY, f64::min)
 }
 
-/// Seconds a step, and a step with its gradient.
-fn step(simulator: &Simulator, steps: usize, repeat: usize) -> hydrograd::Result<(f64, f64)> {
-    let controls = Controls::zeros(simulator, steps);
+/// Seconds a step, and a step with its gradient: the least of some rounds, the first of which compiles
+/// shaders; more of them, and more steps, where they are quick.
+fn step(simulator: &Simulator) -> hydrograd::Result<(f64, f64)> {
     let goal = objective::final_velocity(0, 0.0, 1.0);
     let (mut forward, mut whole) = (f64::INFINITY, f64::INFINITY);
-    // The first compiles shaders.
-    for round in 0..=repeat {
+    let all = Instant::now();
+    for round in 0.. {
+        let steps = if whole < 0.2 { 10 } else { 1 };
+        let controls = Controls::zeros(simulator, steps);
         let start = Instant::now();
         let rollout = simulator.rollout(&controls)?;
         let middle = start.elapsed().as_secs_f64();
         rollout.gradient(&goal)?;
-        if round > 0 {
-            forward = forward.min(middle / steps as f64);
-            whole = whole.min(start.elapsed().as_secs_f64() / steps as f64);
+        forward = forward.min(middle / steps as f64);
+        whole = whole.min(start.elapsed().as_secs_f64() / steps as f64);
+        if round >= 4 || round >= 1 && all.elapsed().as_secs_f64() > 5.0 {
+            break;
         }
     }
     Ok((forward, whole))
 }
 
-fn scenes(left: &dyn Fn() -> f64) -> hydrograd::Result<()> {
+/// Seconds that are left, and how fast this adapter makes entries of K.
+struct Budget<'a> {
+    left: &'a dyn Fn() -> f64,
+    rate: f64,
+}
+
+impl Budget<'_> {
+    /// What an evaluation with first and second derivatives takes, about; `None` if so many of them end
+    /// in time.
+    fn refuses(&self, pairs: f64, evaluations: f64) -> Option<f64> {
+        let expected = PRODUCTS * pairs / self.rate;
+        (evaluations * expected > (self.left)()).then_some(expected)
+    }
+}
+
+fn scenes(budget: &Budget) -> hydrograd::Result<()> {
     println!(
-        "| scene | faces | unknowns | CPU, ms/step | with gradient | GPU, ms/step | with gradient | CPU/GPU | device, MB |"
+        "\n| scene | faces | unknowns | CPU, ms/step | with gradient | GPU, ms/step | with gradient | CPU/GPU | device, MB |"
     );
     println!("|---|---|---|---|---|---|---|---|---|");
-    let mut last = 0.0;
     for name in SCENES {
-        if left() < 2.0 * last {
-            println!("| {name} | left out: the time given is over |");
-            continue;
-        }
-        let start = Instant::now();
         let file =
             Path::new(env!("CARGO_MANIFEST_DIR")).join(format!("examples/scenes/{name}.toml"));
         let scene = Scene::load(file)?;
@@ -107,25 +119,24 @@ fn scenes(left: &dyn Fn() -> f64) -> hydrograd::Result<()> {
             .fidelity(Fidelity::Full)
             .integrator(Integrator::MomentumEuler);
         let cpu = Simulator::new(&scene, settings)?;
+        let start = format!("| {name} | {} | {} |", cpu.faces(), cpu.unknowns());
+        let on_cpu = step(&cpu)?;
+        let both = format!("{:.1} | {:.1}", 1e3 * on_cpu.0, 1e3 * on_cpu.1);
+        let pairs = (cpu.faces() * cpu.unknowns()) as f64;
+        // Two rounds of a step and its gradient, and what compiling takes.
+        if let Some(seconds) = budget.refuses(pairs, 3.0) {
+            println!("{start} {both} | left out: about {seconds:.0} s a step on this adapter |");
+            continue;
+        }
         let gpu = Simulator::new(&scene, settings.backend(Backend::Gpu))?;
-        let on_cpu = step(&cpu, 2, 1)?;
-        let on_gpu = step(&gpu, 2, 1)?;
-        let memory = gpu
-            .backend()
-            .device
-            .map_or(0.0, |d| d.peak_memory as f64 / 1e6);
-        let bodies = cpu.bodies();
+        let on_gpu = step(&gpu)?;
+        let memory = (gpu.backend().device).map_or(0.0, |d| d.peak_memory as f64 / 1e6);
         println!(
-            "| {name} | {} | {} | {:.1} | {:.1} | {:.1} | {:.1} | {:.2} | {memory:.0} |",
-            bodies.iter().map(|b| b.faces).sum::<usize>(),
-            bodies.iter().map(|b| b.unknowns).sum::<usize>(),
-            1e3 * on_cpu.0,
-            1e3 * on_cpu.1,
+            "{start} {both} | {:.1} | {:.1} | {:.2} | {memory:.0} |",
             1e3 * on_gpu.0,
             1e3 * on_gpu.1,
             on_cpu.1 / on_gpu.1,
         );
-        last = start.elapsed().as_secs_f64();
     }
     Ok(())
 }
@@ -168,16 +179,15 @@ fn evaluate(full: &Full, poses: &[Pose]) -> hydrograd::Result<()> {
     Ok(())
 }
 
-fn rows(context: &Arc<Context>, left: &dyn Fn() -> f64, rate: f64) -> hydrograd::Result<()> {
+fn rows(context: &Arc<Context>, budget: &Budget) -> hydrograd::Result<()> {
     println!("\n| spheres | faces | sources | CPU, s | GPU, s | CPU/GPU | device, MB |");
     println!("|---|---|---|---|---|---|---|");
     for count in ROWS {
         let (model, poses) = lattice(count)?;
         let (faces, sources) = (model.rows() as f64, model.columns() as f64);
         let start = format!("| {count} | {faces} | {sources} |");
-        let expected = PRODUCTS * faces * sources / rate;
-        if 2.0 * expected > left() {
-            println!("{start} left out: about {expected:.0} s on this adapter |");
+        if let Some(seconds) = budget.refuses(faces * sources, 2.0) {
+            println!("{start} left out: about {seconds:.0} s on this adapter |");
             continue;
         }
         let gpu = Full::on(model.clone(), Box::new(Gpu::new(context, &model)?));
@@ -220,6 +230,43 @@ fn rate(
     Ok((model.rows() * model.columns()) as f64 / seconds)
 }
 
+fn products(context: &Arc<Context>, budget: &Budget) -> hydrograd::Result<()> {
+    let name = &context.adapter().name;
+    let peak = argument("--peak").or_else(|| {
+        let known = PEAKS.iter().find(|(card, _)| name.contains(card));
+        known.map(|(_, peak)| *peak)
+    });
+    println!(
+        "| products with K, {COLUMNS} columns | sources | pairs/s | TFLOPS | share of the peak |"
+    );
+    println!("|---|---|---|---|---|");
+    for (arithmetic, count) in [
+        (Arithmetic::Single, 4),
+        (Arithmetic::Single, 16),
+        (Arithmetic::Single, 78),
+        (context.fine(), 4),
+        (context.fine(), 16),
+    ] {
+        let pairs = (FACES * count) as f64 * (FACES * count / 2) as f64;
+        let once = pairs / budget.rate;
+        if 100.0 * once > (budget.left)() {
+            continue;
+        }
+        let rate = rate(context, arithmetic, count, if once > 0.5 { 1 } else { 20 })?;
+        let flops = rate * (OPERATIONS + 2.0 * COLUMNS as f64) / 1e12;
+        let share = match (arithmetic, peak) {
+            (Arithmetic::Single, Some(peak)) => format!("{:.0} %", 100.0 * flops / peak),
+            _ => "–".into(),
+        };
+        println!(
+            "| {} | {} | {rate:.2e} | {flops:.2} | {share} |",
+            arithmetic.name(),
+            642 * count
+        );
+    }
+    Ok(())
+}
+
 fn main() -> hydrograd::Result<()> {
     let start = Instant::now();
     let minutes = argument("--minutes").unwrap_or(9.0);
@@ -233,46 +280,13 @@ fn main() -> hydrograd::Result<()> {
         adapter.interface,
         context.fine().name()
     );
-    let first = rate(&context, Arithmetic::Single, 2, 3)?;
-    scenes(&left)?;
-    rows(&context, &left, first)?;
-
-    let peak = argument("--peak").or_else(|| {
-        let known = PEAKS.iter().find(|(name, _)| adapter.name.contains(name));
-        known.map(|(_, peak)| *peak)
-    });
-    println!(
-        "\n| products with K, {COLUMNS} columns | sources | pairs/s | TFLOPS | share of the peak |"
-    );
-    println!("|---|---|---|---|---|");
-    for (arithmetic, count) in [
-        (Arithmetic::Single, 4),
-        (Arithmetic::Single, 16),
-        (Arithmetic::Single, 78),
-        (context.fine(), 4),
-        (context.fine(), 16),
-    ] {
-        let pairs = (FACES * count) as f64 * (FACES * count / 2) as f64;
-        if 30.0 * pairs / first > left() {
-            continue;
-        }
-        let rate = rate(
-            &context,
-            arithmetic,
-            count,
-            if pairs / first > 1.0 { 1 } else { 10 },
-        )?;
-        let flops = rate * (OPERATIONS + 2.0 * COLUMNS as f64) / 1e12;
-        let share = match (arithmetic, peak) {
-            (Arithmetic::Single, Some(peak)) => format!("{:.0} %", 100.0 * flops / peak),
-            _ => "–".into(),
-        };
-        println!(
-            "| {} | {} | {rate:.2e} | {flops:.2} | {share} |",
-            arithmetic.name(),
-            642 * count
-        );
-    }
+    let budget = Budget {
+        left: &left,
+        rate: rate(&context, Arithmetic::Single, 2, 3)?,
+    };
+    products(&context, &budget)?;
+    scenes(&budget)?;
+    rows(&context, &budget)?;
     println!("\n{:.0} s in all", start.elapsed().as_secs_f64());
     Ok(())
 }

@@ -73,6 +73,17 @@ impl Device {
         Err(super::backend::not_built())
     }
 
+    /// Whether a body of so many faces is to be factored: on the CPU always, on a GPU where that doesn't
+    /// take minutes.
+    pub fn factors(&self, faces: usize) -> bool {
+        const MOST: usize = 20_000;
+        #[cfg(feature = "gpu")]
+        let matrix_free = self.context.is_some();
+        #[cfg(not(feature = "gpu"))]
+        let matrix_free = false;
+        !matrix_free || faces <= MOST
+    }
+
     /// The fidelity `Full` here.
     pub fn full(&mut self, model: Model) -> Result<Full> {
         let model = Arc::new(model);

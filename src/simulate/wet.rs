@@ -328,8 +328,14 @@ fn full(bodies: &[Wet], water: &Water, settings: &Settings, device: &mut Device)
     }
     let made = shared(bodies, |body, mesh| {
         let (vertices, faces) = (mesh.vertices(), mesh.faces());
-        let b = BodyBoundary::new(body.name, vertices, faces, &boundary)?;
-        Ok(WetBody::new(Arc::new(b)))
+        let make = if device.factors(faces.len()) {
+            BodyBoundary::new
+        } else {
+            BodyBoundary::unfactored
+        };
+        Ok(WetBody::new(Arc::new(make(
+            body.name, vertices, faces, &boundary,
+        )?)))
     })?;
     Ok(Made {
         faces: made.iter().map(|m| m.faces()).sum(),

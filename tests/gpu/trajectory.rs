@@ -56,15 +56,16 @@ fn groups(simulator: &Simulator) -> [Vec<f64>; 5] {
 #[test]
 fn a_rollout_with_its_gradient_is_the_cpus() {
     let cpu = groups(&simulator(Backend::Cpu, 1e-10));
-    let simulator = simulator(Backend::Gpu, 1e-10);
-    let gpu = groups(&simulator);
+    let on_gpu = simulator(Backend::Gpu, 1e-10);
+    let gpu = groups(&on_gpu);
     let names = ["end", "controls", "initial q", "initial v", "parameters"];
     for ((name, cpu), gpu) in names.iter().zip(&cpu).zip(&gpu) {
         let off = difference(gpu, cpu);
         println!("{name}: {off:.1e}");
         assert!(off <= 1e-6, "{name}: {off:e}");
     }
-    println!("{}", simulator.backend());
-    let again = groups(&simulator);
-    assert_eq!(gpu, again, "two runs on one device");
+    println!("{}", on_gpu.backend());
+    assert_eq!(gpu, groups(&on_gpu), "two runs of one simulator");
+    let again = simulator(Backend::Gpu, 1e-10);
+    assert_eq!(gpu, groups(&again), "two simulators on one adapter");
 }

@@ -35,6 +35,35 @@ fn registered() -> Vec<(String, Rung)> {
     out
 }
 
+/// Rungs on a GPU, each with the shader whose comparison in tests/gpu holds it against its twin on the CPU.
+const ON_DEVICE: &[(&str, &str)] = &[
+    ("gpu::apply_jvp::apply_jvp", "apply_jvp"),
+    (
+        "gpu::apply_transpose_jvp::apply_transpose_jvp",
+        "apply_transpose_jvp",
+    ),
+    ("gpu::pair_hvp::pair_hvp", "pair_hvp"),
+    ("gpu::pair_vjp::pair_vjp", "pair_vjp"),
+    ("gpu::full::probe::Probe::apply_jvp", "apply_jvp"),
+    (
+        "gpu::full::probe::Probe::apply_transpose_jvp",
+        "apply_transpose_jvp",
+    ),
+    ("gpu::full::probe::Probe::pair_hvp", "pair_hvp"),
+    ("gpu::full::probe::Probe::pair_vjp", "pair_vjp"),
+    ("gpu::full::response::Answer::gradient", "pair_vjp"),
+    ("gpu::coulomb_jvp::coulomb_jvp", "coulomb_jvp"),
+    ("gpu::coulomb_vjp::coulomb_vjp", "coulomb_vjp"),
+    ("gpu::coulomb_hvp::coulomb_hvp", "coulomb_hvp"),
+    ("gpu::reduced::record::GpuRecord::gradient", "coulomb_vjp"),
+    (
+        "gpu::reduced::record::GpuRecord::gradient_along",
+        "coulomb_vjp",
+    ),
+    ("gpu::reduced::record::GpuRecord::vjp", "coulomb_vjp"),
+    ("gpu::reduced::record::GpuRecord::hvp", "coulomb_hvp"),
+];
+
 /// Helpers and declarations that are checked through a registered rung: (helper, rung).
 const THROUGH: &[(&str, &str)] = &[
     // Kernels behind a body's rows, and the pieces of the coupled record.
@@ -46,17 +75,6 @@ const THROUGH: &[(&str, &str)] = &[
     ("coupling::pair::Pair::apply_jvp", FULL_HVP),
     ("coupling::full::cpu::system::System::respond_jvp", FULL_HVP),
     ("coupling::full::cpu::response::Answer::gradient", FULL_VJP),
-    // Compressed bodies on the device, held against the CPU's record by tests/gpu/reduced.rs.
-    ("gpu::coulomb_vjp::coulomb_vjp", REDUCED_VJP),
-    ("gpu::coulomb_jvp::coulomb_jvp", REDUCED_HVP),
-    ("gpu::coulomb_hvp::coulomb_hvp", REDUCED_HVP),
-    ("gpu::reduced::record::GpuRecord::gradient", REDUCED_VJP),
-    (
-        "gpu::reduced::record::GpuRecord::gradient_along",
-        REDUCED_VJP,
-    ),
-    ("gpu::reduced::record::GpuRecord::vjp", REDUCED_VJP),
-    ("gpu::reduced::record::GpuRecord::hvp", REDUCED_HVP),
     // Pieces of the equations of motion.
     (
         "dynamics::contact::Touch::displacement_vjp",
@@ -141,8 +159,6 @@ const PASSED_ON: &[&str] = &["optimize::descent::Shared::gradient"];
 
 const FULL_VJP: &str = "coupling::full::record::FullRecord::vjp";
 const FULL_HVP: &str = "coupling::full::record::FullRecord::hvp";
-const REDUCED_VJP: &str = "coupling::reduced::record::ReducedRecord::vjp";
-const REDUCED_HVP: &str = "coupling::reduced::record::ReducedRecord::hvp";
 
 #[test]
 fn every_rung_in_the_source_is_registered() {
@@ -152,6 +168,7 @@ fn every_rung_in_the_source_is_registered() {
     let registered: BTreeSet<String> = registered().into_iter().map(|(name, _)| name).collect();
     let through = THROUGH.iter().map(|(helper, _)| *helper);
     let helpers: BTreeSet<&str> = through
+        .chain(ON_DEVICE.iter().map(|(rung, _)| *rung))
         .chain(VALUES_ONLY.iter().copied())
         .chain(PASSED_ON.iter().copied())
         .collect();
@@ -170,6 +187,14 @@ fn every_rung_in_the_source_is_registered() {
         stale.is_empty(),
         "registered, but not in the source: {stale:#?}"
     );
+    let folder = std::path::Path::new(env!("CARGO_MANIFEST_DIR"));
+    let compared = std::fs::read_to_string(folder.join("tests/gpu/main.rs")).unwrap();
+    for (rung, shader) in ON_DEVICE {
+        assert!(
+            compared.contains(&format!("\"{shader}\" =>")),
+            "{rung}: nothing compares {shader}"
+        );
+    }
     for (helper, rung) in THROUGH {
         assert!(
             registered.contains(*rung),

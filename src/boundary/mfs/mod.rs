@@ -156,6 +156,11 @@ impl BodyBoundary {
         }
         let rule = readout::points(&out.faces, &out.sources, settings.readout);
         out.readout = readout::own(&rule, &out.sources, &out.readout_flux);
+        out.warnings.push(format!(
+            "body \"{name}\": its {} faces are solved without a factor of its own: more iterations, and the \
+             potential is read out to first order in what its rows leave",
+            out.faces.len()
+        ));
         Ok(out)
     }
 

@@ -41,6 +41,14 @@ pub(super) struct Answer {
     reached: Reached,
 }
 
+/// What follows from X.
+struct Followed {
+    momenta: DMatrix<f64>,
+    energies: DMatrix<f64>,
+    /// How the solves stand.
+    states: Vec<Vec<u8>>,
+}
+
 /// A wrench about the scene's middle in the device's units as a spatial wrench.
 pub(super) fn spatial(placed: &Placed, w: &[f64], scale: f64) -> Vec6 {
     units::spatial(placed.geometry.length, &placed.middle, w, scale)
@@ -143,29 +151,25 @@ impl Answer {
         // Most solves end within the first batch: what follows from them is read together with how they
         // stand.
         let what = "coupled system (Eq. 20)";
-        let (mut found, states) = out.follow(&g, Some(&solves))?;
-        let reached = match solves.reached(&placed, &states, what, false)? {
+        let mut found = out.follow(&g, Some(&solves))?;
+        let reached = match solves.reached(&placed, &found.states, what, false)? {
             Some(reached) => reached,
             None => {
                 let reached = solves.finish(&placed, what)?;
                 // r was made of an unfinished solution: again from F x̄.
                 let again = rows(context, fine, &table(0), given, at(1), false)?;
                 run(&placed, &[&[again]])?;
-                found = out.follow(&g, None)?.0;
+                found = out.follow(&g, None)?;
                 reached
             }
         };
         out.reached = reached;
-        [out.momenta, out.energies] = found;
+        (out.momenta, out.energies) = (found.momenta, found.energies);
         Ok(out)
     }
 
     /// r and μ from X, then momenta and energies, and how the solves stand; `g` are the right-hand sides.
-    fn follow(
-        &self,
-        g: &Buffer,
-        solves: Option<&Solves>,
-    ) -> Result<([DMatrix<f64>; 2], Vec<Vec<u8>>)> {
+    fn follow(&self, g: &Buffer, solves: Option<&Solves>) -> Result<Followed> {
         let (placed, k) = (self.placed.clone(), self.columns);
         let geometry = &placed.geometry;
         let (context, fine) = (&geometry.context, geometry.context.fine());
@@ -213,7 +217,11 @@ impl Answer {
         let energies = DMatrix::from_fn(k, k, |x, y| {
             e[x * k + y] * self.scale[x] * self.scale[y] * l5
         });
-        Ok(([momenta, energies], states))
+        Ok(Followed {
+            momenta,
+            energies,
+            states,
+        })
     }
 
     /// φ = P a and the impulses: the calls, and where the impulses will be.

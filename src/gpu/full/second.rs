@@ -117,16 +117,12 @@ impl Answer {
             dphi: &dphi,
             x: &x,
         };
-        let (momenta, wrenches, states) = after.run(Some(&solves))?;
-        let (momenta, wrenches) = match solves.reached(placed, &states, what, false)? {
-            Some(_) => (momenta, wrenches),
-            None => {
-                solves.finish(placed, what)?;
-                let (momenta, wrenches, _) = after.run(None)?;
-                (momenta, wrenches)
-            }
-        };
-        Ok(self.assemble(z, &momenta, &wrenches))
+        let mut found = after.run(Some(&solves))?;
+        if (solves.reached(placed, &found.states, what, false)?).is_none() {
+            solves.finish(placed, what)?;
+            found = after.run(None)?;
+        }
+        Ok(self.assemble(z, &found.momenta, &found.wrenches))
     }
 
     /// Both bodies' share of every pair's wrench.
@@ -162,6 +158,14 @@ impl Answer {
     }
 }
 
+/// What was derived from it, as the device has it.
+struct Derived {
+    momenta: Vec<f64>,
+    wrenches: Vec<f64>,
+    /// How the solves stand.
+    states: Vec<Vec<u8>>,
+}
+
 /// What follows from the tangent X of the strengths.
 struct After<'a> {
     answer: &'a Answer,
@@ -173,7 +177,7 @@ struct After<'a> {
 
 impl After<'_> {
     /// Momenta, wrenches, and how the solves stand.
-    fn run(&self, solves: Option<&Solves>) -> Result<(Vec<f64>, Vec<f64>, Vec<Vec<u8>>)> {
+    fn run(&self, solves: Option<&Solves>) -> Result<Derived> {
         let n = self.answer.columns;
         let placed = &self.answer.placed;
         let geometry = &placed.geometry;
@@ -297,6 +301,10 @@ impl After<'_> {
         wanted.extend(solves.iter().flat_map(|s| s.report()));
         let mut bytes = context.read_bytes(&wanted)?;
         let states = bytes.split_off(2);
-        Ok((fine.numbers(&bytes[0]), fine.numbers(&bytes[1]), states))
+        Ok(Derived {
+            momenta: fine.numbers(&bytes[0]),
+            wrenches: fine.numbers(&bytes[1]),
+            states,
+        })
     }
 }

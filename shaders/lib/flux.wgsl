@@ -75,9 +75,7 @@ fn flux_gradient(a: V3, b: V3, c: V3, m: V3, s: V3) -> V3 {
     return v_scale(q, v_sub(v_scale(n, grad), v_scale(d, m)));
 }
 
-// ∇∇Ω d and ∇Ω.
-struct Bent { gradient: V3, product: V3 }
-
+// ∇Ω and ∇∇Ω d.
 fn flux_hessian_product(a: V3, b: V3, c: V3, m: V3, s: V3, d: V3) -> Bent {
     let r0 = v_sub(a, s);
     let r1 = v_sub(b, s);

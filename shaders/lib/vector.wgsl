@@ -2,6 +2,9 @@
 
 struct V3 { x: real, y: real, z: real }
 
+// ∇f, and ∇∇f d for some displacement d.
+struct Bent { gradient: V3, product: V3 }
+
 fn v_add(a: V3, b: V3) -> V3 { return V3(add(a.x, b.x), add(a.y, b.y), add(a.z, b.z)); }
 fn v_sub(a: V3, b: V3) -> V3 { return V3(sub(a.x, b.x), sub(a.y, b.y), sub(a.z, b.z)); }
 fn v_neg(a: V3) -> V3 { return V3(neg(a.x), neg(a.y), neg(a.z)); }

@@ -4,6 +4,7 @@ use super::buffer::Buffer;
 use super::context::Context;
 use super::geometry::{Geometry, Surfaces};
 use super::kernel::{Call, threads};
+use super::source::Arithmetic;
 use crate::Result;
 
 /// Faces and sources in the fine arithmetic and in single precision; poses `[body][12]`, then
@@ -35,4 +36,27 @@ pub(super) fn place(
         context.call(&of("place_faces")?, &buffers, threads(sizes.faces))?,
         context.call(&of("place_sources")?, &buffers, threads(sizes.sources))?,
     ])
+}
+
+/// Points of compressed bodies and their images, fine; shapes' points, which body and point each is, poses as
+/// above. `counts`: 0, points, bodies, images.
+pub(super) fn place_points(
+    context: &Context,
+    (shape_points, map, poses): (&Buffer, &Buffer, &Buffer),
+    out: &Buffer,
+    counts: [usize; 4],
+) -> Result<Call> {
+    let uniform = context.uniform(&counts.map(|n| n as u32));
+    // The entry writes both arithmetics.
+    let single = context.reals("points", Arithmetic::Single, 3 * counts[1] * counts[3])?;
+    let buffers = [
+        ("shape_sources", shape_points.into()),
+        ("poses", poses.into()),
+        ("source_map", map.into()),
+        ("sources", out.into()),
+        ("sources_single", (&single).into()),
+        ("counts", (&uniform).into()),
+    ];
+    let kernel = context.kernel("place", "place_sources", context.fine(), &[])?;
+    context.call(&kernel, &buffers, threads(counts[1]))
 }

@@ -62,8 +62,14 @@ shaders! {
     "apply_jvp" => "adjoint/src/kernel/flux/jvp.rs::flux_jvp",
     "apply_transpose" => "coupling/full/cpu/system.rs::apply_transpose",
     "apply_transpose_jvp" => "adjoint/src/kernel/flux/vjp.rs::flux_vjp",
+    "blocks" => "coupling/reduced/record.rs::charges",
     "cgls" => "solver/cgls.rs::cgls",
     "combine" => "solver/columns.rs::combine",
+    "conjugate" => "coupling/reduced/factor.rs::solve_in_place",
+    "coulomb" => "coupling/reduced/link.rs::potentials",
+    "coulomb_hvp" => "coupling/reduced/second.rs::link_tangent",
+    "coulomb_jvp" => "coupling/reduced/second.rs::tangent_potentials",
+    "coulomb_vjp" => "coupling/reduced/record.rs::pull_back",
     "diagonal" => "coupling/full/cpu/system.rs::new",
     "factor" => "boundary/mfs/mod.rs::solve_factor",
     "impulse" => "coupling/full/cpu/response.rs::impulse",
@@ -75,6 +81,7 @@ shaders! {
     "refine" => "solver/cgls.rs::cgls",
     "rows" => "coupling/full/body.rs::twist_rows",
     "sum" => "solver/columns.rs::add_scaled",
+    "wrench" => "coupling/pair.rs::wrench",
 }
 
 macro_rules! pieces {
@@ -86,7 +93,10 @@ macro_rules! pieces {
     };
 }
 
-pieces! { "vector" "flux" "normal" "potential" "pairs" "tile" "motion" "gate" "gate_state" }
+pieces! {
+    "vector" "flux" "normal" "potential" "pairs" "tile" "motion" "gate" "gate_state"
+    "points" "slopes" "displaced" "shifts"
+}
 
 /// What is fixed when a shader is compiled.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]

@@ -6,6 +6,7 @@ mod coupled;
 mod fixture;
 mod kernels;
 mod large;
+mod reduced;
 mod refined;
 mod robust;
 mod trajectory;
@@ -25,8 +26,14 @@ comparisons! {
     "apply_jvp" => kernels::products,
     "apply_transpose" => kernels::products,
     "apply_transpose_jvp" => kernels::products,
+    "blocks" => reduced::rungs,
     "cgls" => kernels::solves,
     "combine" => coupled::combinations,
+    "conjugate" => reduced::rungs,
+    "coulomb" => reduced::rungs,
+    "coulomb_hvp" => reduced::rungs,
+    "coulomb_jvp" => reduced::rungs,
+    "coulomb_vjp" => reduced::rungs,
     "diagonal" => kernels::solves,
     "factor" => kernels::solves,
     "impulse" => coupled::combinations,
@@ -38,6 +45,7 @@ comparisons! {
     "refine" => kernels::solves,
     "rows" => coupled::combinations,
     "sum" => kernels::products,
+    "wrench" => reduced::rungs,
 }
 
 #[test]

@@ -52,6 +52,16 @@ const ON_DEVICE: &[(&str, &str)] = &[
     ("gpu::full::probe::Probe::pair_hvp", "pair_hvp"),
     ("gpu::full::probe::Probe::pair_vjp", "pair_vjp"),
     ("gpu::full::response::Answer::gradient", "pair_vjp"),
+    ("gpu::coulomb_jvp::coulomb_jvp", "coulomb_jvp"),
+    ("gpu::coulomb_vjp::coulomb_vjp", "coulomb_vjp"),
+    ("gpu::coulomb_hvp::coulomb_hvp", "coulomb_hvp"),
+    ("gpu::reduced::record::GpuRecord::gradient", "coulomb_vjp"),
+    (
+        "gpu::reduced::record::GpuRecord::gradient_along",
+        "coulomb_vjp",
+    ),
+    ("gpu::reduced::record::GpuRecord::vjp", "coulomb_vjp"),
+    ("gpu::reduced::record::GpuRecord::hvp", "coulomb_hvp"),
 ];
 
 /// Helpers and declarations that are checked through a registered rung: (helper, rung).

@@ -8,10 +8,14 @@ use crate::coupling::pair::Pair;
 
 /// A block of G that depends on the poses. G is symmetric and the images of perpendicular walls are
 /// their own inverses, so a pair of bodies needs one block per image.
-pub(super) struct Link {
+pub struct Link {
+    /// The body whose points see; not above `source`.
     pub target: usize,
+    /// The body whose points, or whose images, are seen.
     pub source: usize,
+    /// The image.
     pub image: Image,
+    /// Distances of the centres between which the block fades out.
     pub cutoff: Option<Cutoff>,
     /// How often the block counts in `α_xᵀGα_y`, written `Σ_ij P_ij (x_i y_j + y_i x_j)`: 1 between
     /// different bodies, ½ within one; negative for images of opposite sign.
@@ -30,7 +34,7 @@ pub(super) struct Placed<'a> {
 }
 
 impl Link {
-    pub fn all(
+    pub(super) fn all(
         bodies: usize,
         images: &[Image],
         cutoff: impl Fn(usize, usize) -> Option<Cutoff>,
@@ -72,12 +76,12 @@ impl Link {
     }
 
     /// Weight at the poses.
-    pub fn weight(&self, reduced: &Reduced, poses: &[Pose]) -> f64 {
+    pub(super) fn weight(&self, reduced: &Reduced, poses: &[Pose]) -> f64 {
         self.reach(reduced, poses).2[0]
     }
 
     /// The bodies (target, source) that it couples, in both orders: one body and its image once.
-    pub fn ends(&self) -> impl Iterator<Item = (usize, usize)> {
+    pub(super) fn ends(&self) -> impl Iterator<Item = (usize, usize)> {
         let (t, s) = (self.target, self.source);
         [(t, s), (s, t)]
             .into_iter()
@@ -85,7 +89,7 @@ impl Link {
     }
 
     /// The link at the poses, unless it has faded out.
-    pub fn place(&self, reduced: &Reduced, poses: &[Pose]) -> Option<Placed<'_>> {
+    pub(super) fn place(&self, reduced: &Reduced, poses: &[Pose]) -> Option<Placed<'_>> {
         let parts = |b: usize| reduced.bodies[b].parts();
         let (t, s) = (self.target, self.source);
         let (centre, between, weight) = self.reach(reduced, poses);

@@ -25,17 +25,18 @@ mod cutoff;
 mod factor;
 mod link;
 mod record;
+mod resolved;
 mod second;
 
 pub use body::{Fit, Parts, ReducedBody};
 pub use cutoff::Cutoff;
+pub use link::Link;
 
 use super::image::Image;
 use super::{Coupling, Exclusions, Record};
 use crate::Result;
 use crate::adjoint::lie::Pose;
 use crate::scene::Wall;
-use link::Link;
 use nalgebra::DMatrix;
 use rayon::prelude::*;
 use std::ops::Range;
@@ -107,6 +108,11 @@ impl Reduced {
     /// The bodies.
     pub fn reduced_bodies(&self) -> &[Arc<ReducedBody>] {
         &self.bodies
+    }
+
+    /// The blocks of G that aren't zero, those below the diagonal left out.
+    pub fn links(&self) -> &[Link] {
+        &self.links
     }
 
     /// `f` of each item (a link's), in order; on several threads where the points are so many that it

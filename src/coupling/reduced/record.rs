@@ -1,14 +1,14 @@
 //! One evaluation of the reduced coupling: value and first derivative.
 
+use super::Reduced;
 use super::columns::Fields;
 use super::factor::Factor;
 use super::link::{Link, Placed};
-use super::{Parts, Reduced};
+use crate::Result;
 use crate::adjoint::kernel::potential_vjp;
-use crate::adjoint::lie::{Mat6, Pose, Vec3, Vec6, six};
+use crate::adjoint::lie::{Pose, Vec3, Vec6, six};
 use crate::coupling::pair::wrench;
 use crate::coupling::{Direction, Pullback, Record, Report, Tangent};
-use crate::{Error, Result};
 use faer::linalg::matmul::matmul;
 use faer::reborrow::ReborrowMut;
 use faer::{Accum, Mat, MatMut, MatRef, Par};
@@ -18,18 +18,10 @@ use std::sync::OnceLock;
 
 /// 4π: a source of strength α makes the flux 4πα.
 pub(super) const FLUX: f64 = 4.0 * PI;
-/// Condition number of I − LᵀGL above which the answers of the bodies to one another lose their
-/// meaning: at one digit lost the gap is far below what was fitted.
-const ILL_CONDITIONED: f64 = 1e4;
-
 /// Work of [`ReducedRecord::new`] per pair of points, relative to that of its derivatives.
 const FILL: usize = 8;
 /// Of [`ReducedRecord::pull_back`].
 const PULL: usize = 1;
-
-/// Part of the water displaced that an energy may be below zero by: twists that move no water (a disc's
-/// spin) carry what the one-body method leaves of them.
-const ROUNDING: f64 = 1e-7;
 
 /// Record of [`Reduced`].
 pub(super) struct ReducedRecord<'a> {
@@ -123,8 +115,7 @@ impl<'a> ReducedRecord<'a> {
             );
         }
         let Some(factor) = Factor::new(system) else {
-            let quantity = "smallest eigenvalue of I − LᵀGL, at most";
-            return Err(closest(reduced, poses, quantity, 0.0));
+            return Err(reduced.indefinite(poses, 0.0));
         };
         let mut out = Self {
             report: Report {
@@ -147,15 +138,7 @@ impl<'a> ReducedRecord<'a> {
         out.factor.solve_in_place(&mut out.a);
         out.alpha = out.charges(basis, &out.a);
         out.momenta = out.impulses(basis, &out.a);
-        check_energy(reduced, &out.basis, &out.momenta)?;
-        if out.report.condition > ILL_CONDITIONED {
-            return Err(closest(
-                reduced,
-                poses,
-                "condition number",
-                out.report.condition,
-            ));
-        }
+        reduced.check_answer(poses, &out.basis, &out.momenta, out.report.condition)?;
         Ok(out)
     }
 
@@ -352,105 +335,6 @@ fn scatter(
             direct[(6 * target + i, 6 * source + k)] += factor * block[(t.len() + i, s.len() + k)];
         }
     }
-}
-
-/// What the pair of bodies that come closest doesn't resolve.
-fn closest(reduced: &Reduced, poses: &[Pose], quantity: &str, value: f64) -> Error {
-    let parts = |b: usize| reduced.bodies[b].parts();
-    let world = |b: usize, p: &Vec3| poses[b].apply(p);
-    let mut worst = (f64::INFINITY, String::from("all bodies"), 0.0);
-    for link in &reduced.links {
-        let (t, s) = (parts(link.target), parts(link.source));
-        let seen = |p: &Vec3| link.image.linear * world(link.source, p) + link.image.shift;
-        let points: Vec<Vec3> = s.points.iter().map(seen).collect();
-        let distance = |p: &Vec3| {
-            let p = world(link.target, p);
-            points
-                .iter()
-                .map(|q| (p - q).norm())
-                .fold(f64::INFINITY, f64::min)
-        };
-        let d = t.points.iter().map(distance).fold(f64::INFINITY, f64::min);
-        if d < worst.0 {
-            let of = |name: &str| format!("body {name:?}");
-            let (one, other) = (&reduced.names[link.target], &reduced.names[link.source]);
-            let place = match (link.target == link.source, link.image.is_identity()) {
-                (true, _) => format!("{} and a wall", of(one)),
-                (false, true) => format!("{} and {}", of(one), of(other)),
-                (false, false) => format!("{} and {} by a wall", of(one), of(other)),
-            };
-            worst = (d, place, t.fit.resolved_gap.max(s.fit.resolved_gap));
-        }
-    }
-    let (distance, place, resolved) = worst;
-    Error::Unresolved {
-        place,
-        quantity: format!(
-            "coupling of their compressed sources, {distance:.3e} m apart, fitted for surfaces at \
-             least {resolved:.3e} m apart: {quantity}"
-        ),
-        value,
-        limit: if value > 0.0 { ILL_CONDITIONED } else { 0.0 },
-        remedy: "the bodies overlap or their gap isn't resolved: use a smaller resolved gap, a \
-                 higher rank, or the fidelity full"
-            .into(),
-    }
-}
-
-/// What a body's own added mass is below zero by, scaled by the water displaced: the one-body method's
-/// error in a spin that moves no water, and no matter of gaps.
-fn deficit(p: &Parts) -> f64 {
-    let mass = p.volume.max(p.added_mass.fixed_view::<3, 3>(0, 0).trace());
-    let arm = p.radius + p.centre.norm();
-    let scale = |i: usize| mass.sqrt() * if i < 3 { 1.0 } else { arm };
-    let scaled = Mat6::from_fn(|i, j| p.added_mass[(i, j)] / (scale(i) * scale(j)));
-    (-scaled.symmetric_eigenvalues().min()).max(0.0)
-}
-
-/// The energy of the basis must not be negative beyond rounding.
-fn check_energy(reduced: &Reduced, basis: &DMatrix<f64>, momenta: &DMatrix<f64>) -> Result<()> {
-    let mut energy = basis.tr_mul(momenta);
-    let k = energy.nrows();
-    // Twists that hardly move water (a round body's spin) have no energy: shift by rounding.
-    let own: Vec<f64> = (0..k)
-        .map(|i| {
-            let bodies = reduced.bodies.iter().enumerate();
-            let inertia = bodies.map(|(b, body)| {
-                let p = body.parts();
-                let twist = basis.fixed_view::<6, 1>(6 * b, i);
-                let (u, w) = (twist.fixed_rows::<3>(0), twist.fixed_rows::<3>(3));
-                let scale = u.norm() + (p.radius + p.centre.norm()) * w.norm();
-                p.volume.max(p.added_mass.fixed_view::<3, 3>(0, 0).trace()) * scale * scale
-            });
-            inertia.sum::<f64>()
-        })
-        .collect();
-    let bodies = reduced.bodies.iter().map(|b| deficit(b.parts()));
-    let rounding = ROUNDING + 2.0 * bodies.fold(0.0, f64::max);
-    for i in 0..k {
-        if own[i] > 0.0 {
-            energy[(i, i)] += rounding * own[i];
-        } else {
-            energy[(i, i)] = 1.0;
-        }
-    }
-    if energy.iter().all(|x| x.is_finite()) && energy.clone().cholesky().is_some() {
-        return Ok(());
-    }
-    let symmetric = 0.5 * (&energy + energy.transpose());
-    let scaled = DMatrix::from_fn(k, k, |i, j| {
-        symmetric[(i, j)] / (own[i].max(f64::MIN_POSITIVE) * own[j].max(f64::MIN_POSITIVE)).sqrt()
-    });
-    let lowest = scaled.symmetric_eigenvalues().min();
-    Err(Error::Unresolved {
-        place: format!("bodies {}", reduced.names.join(", ")),
-        quantity: "smallest eigenvalue of their added mass, scaled by the water displaced".into(),
-        value: lowest,
-        limit: 0.0,
-        remedy: "a gap isn't resolved: use a smaller resolved gap, a higher rank, or the fidelity \
-                 full"
-            .into(),
-    })
 }
 
 impl Record for ReducedRecord<'_> {

@@ -2,7 +2,7 @@
 
 use super::products::{Product, To, product, run};
 use super::solve::Solves;
-use crate::adjoint::lie::{Vec3, Vec6, six};
+use crate::adjoint::lie::Vec6;
 use crate::coupling::full::{Reached, Response};
 use crate::coupling::{Direction, PairTensor, Tangent};
 use crate::gpu::buffer::Buffer;
@@ -14,6 +14,7 @@ use crate::gpu::pair_vjp::pair_vjp;
 use crate::gpu::products::{Task, products};
 use crate::gpu::reduce::reduce;
 use crate::gpu::rows::{Table, rows};
+use crate::gpu::units::{self, scaled, size};
 use crate::solver::Columns;
 use crate::{Error, Result};
 use nalgebra::DMatrix;
@@ -48,32 +49,9 @@ struct Followed {
     states: Vec<Vec<u8>>,
 }
 
-/// Size of a column of twists: of its velocities, at the scene's size, and rates.
-fn size(twists: &DMatrix<f64>, k: usize, length: f64) -> f64 {
-    let column = twists.column(k);
-    let of = |(i, x): (usize, &f64)| if i % 6 < 3 { x.abs() / length } else { x.abs() };
-    match column.iter().enumerate().map(of).fold(0.0, f64::max) {
-        0.0 => 1.0,
-        s => s,
-    }
-}
-
-/// Twists as the device has them: `[body][6][columns]`.
-fn scaled(twists: &DMatrix<f64>, scale: &[f64], length: f64) -> Vec<f64> {
-    let mut out = Vec::with_capacity(twists.len());
-    for i in 0..twists.nrows() {
-        let unit = if i % 6 < 3 { length } else { 1.0 };
-        out.extend((0..twists.ncols()).map(|k| twists[(i, k)] / (unit * scale[k])));
-    }
-    out
-}
-
 /// A wrench about the scene's middle in the device's units as a spatial wrench.
 pub(super) fn spatial(placed: &Placed, w: &[f64], scale: f64) -> Vec6 {
-    let l4 = placed.geometry.length.powi(4) * scale;
-    let force = Vec3::new(w[0], w[1], w[2]) * l4;
-    let moment = Vec3::new(w[3], w[4], w[5]) * (l4 * placed.geometry.length);
-    six(&force, &(moment + placed.middle.cross(&force)))
+    units::spatial(placed.geometry.length, &placed.middle, w, scale)
 }
 
 /// Body-frame impulses from the device's `[body][6][columns]`.

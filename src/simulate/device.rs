@@ -12,7 +12,7 @@ use std::sync::Arc;
 #[cfg(feature = "gpu")]
 use {
     super::backend::{Arithmetic, DeviceReport, GpuSettings},
-    crate::gpu::{self, Context, full::Gpu},
+    crate::gpu::{self, Context, full::Gpu, reduced::GpuReduced},
 };
 
 /// The CPU unless a GPU is open.
@@ -100,14 +100,11 @@ impl Device {
     /// The fidelity `Reduced` here.
     pub fn reduced(&mut self, coupling: Reduced) -> Result<Box<dyn Coupling>> {
         #[cfg(feature = "gpu")]
-        if let Some(_context) = &self.context {
-            // The one place where `gpu::reduced` goes in: made of `_context` and `coupling`; its
-            // `Error::Device` goes to `leave`, as in `full`.
-            return Err(Error::Unsupported {
-                what: "the fidelity reduced with the backend gpu".into(),
-                why: "it is computed on the CPU alone so far".into(),
-                instead: "use the fidelity full, or the backend cpu".into(),
-            });
+        if let Some(context) = &self.context {
+            match GpuReduced::new(context, coupling.clone()) {
+                Ok(gpu) => return Ok(Box::new(gpu)),
+                Err(error) => self.leave(error)?,
+            }
         }
         Ok(Box::new(coupling))
     }

@@ -8,6 +8,7 @@ use crate::coupling::pair::Pair;
 
 /// A block of G that depends on the poses. G is symmetric and the images of perpendicular walls are
 /// their own inverses, so a pair of bodies needs one block per image.
+#[derive(Clone)]
 pub struct Link {
     /// The body whose points see; not above `source`.
     pub target: usize,

@@ -46,6 +46,7 @@ use std::sync::Arc;
 const WORTH_WAKING: usize = 100_000;
 
 /// All bodies coupled through a few sources each.
+#[derive(Clone)]
 pub struct Reduced {
     bodies: Vec<Arc<ReducedBody>>,
     /// For messages: bodies of equal shape share what they are compressed to.

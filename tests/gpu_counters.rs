@@ -6,7 +6,7 @@
 use hydrograd::adjoint::kernel::pairs_computed;
 use hydrograd::simulate::Backend;
 use hydrograd::solver::calls_made;
-use hydrograd::{Controls, Scene, Settings, Simulator, objective};
+use hydrograd::{Controls, Fidelity, Scene, Settings, Simulator, objective};
 use std::path::Path;
 
 /// What a rollout with its gradient costs the CPU, after the set-up: pairs and calls of solvers.
@@ -45,4 +45,8 @@ fn the_gpu_does_the_work() {
         after.read_backs - before.read_backs
     };
     assert_eq!(read_backs(1e-4), read_backs(1e-9));
+
+    let settings = settings.fidelity(Fidelity::Reduced).backend(Backend::Gpu);
+    let (pairs, calls) = work(&Simulator::new(&scene, settings).unwrap());
+    assert_eq!((pairs, calls), (0, 0), "compressed bodies");
 }

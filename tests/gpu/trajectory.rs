@@ -2,7 +2,7 @@
 
 use super::fixture::{difference, wavy};
 use hydrograd::simulate::Backend;
-use hydrograd::{Controls, Gradient, Rollout, Scene, Settings, Simulator};
+use hydrograd::{Controls, Fidelity, Gradient, Rollout, Scene, Settings, Simulator};
 use nalgebra::DMatrix;
 use std::path::Path;
 
@@ -17,8 +17,13 @@ pub fn falling_ball() -> Scene {
 }
 
 pub fn simulator(backend: Backend, tolerance: f64) -> Simulator {
+    of(Fidelity::Full, backend, tolerance)
+}
+
+fn of(fidelity: Fidelity, backend: Backend, tolerance: f64) -> Simulator {
     let scene = falling_ball();
     let settings = Settings::for_scene(&scene)
+        .fidelity(fidelity)
         .backend(backend)
         .tolerance(tolerance);
     Simulator::new(&scene, settings).unwrap()
@@ -53,19 +58,28 @@ fn groups(simulator: &Simulator) -> [Vec<f64>; 5] {
     ]
 }
 
-#[test]
-fn a_rollout_with_its_gradient_is_the_cpus() {
-    let cpu = groups(&simulator(Backend::Cpu, 1e-10));
-    let on_gpu = simulator(Backend::Gpu, 1e-10);
+fn holds(fidelity: Fidelity) {
+    let cpu = groups(&of(fidelity, Backend::Cpu, 1e-10));
+    let on_gpu = of(fidelity, Backend::Gpu, 1e-10);
     let gpu = groups(&on_gpu);
     let names = ["end", "controls", "initial q", "initial v", "parameters"];
     for ((name, cpu), gpu) in names.iter().zip(&cpu).zip(&gpu) {
         let off = difference(gpu, cpu);
-        println!("{name}: {off:.1e}");
-        assert!(off <= 1e-6, "{name}: {off:e}");
+        println!("{fidelity:?}, {name}: {off:.1e}");
+        assert!(off <= 1e-6, "{fidelity:?}, {name}: {off:e}");
     }
     println!("{}", on_gpu.backend());
     assert_eq!(gpu, groups(&on_gpu), "two runs of one simulator");
-    let again = simulator(Backend::Gpu, 1e-10);
+    let again = of(fidelity, Backend::Gpu, 1e-10);
     assert_eq!(gpu, groups(&again), "two simulators on one adapter");
+}
+
+#[test]
+fn a_rollout_with_its_gradient_is_the_cpus() {
+    holds(Fidelity::Full);
+}
+
+#[test]
+fn so_is_one_of_compressed_bodies() {
+    holds(Fidelity::Reduced);
 }

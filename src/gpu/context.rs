@@ -362,3 +362,24 @@ fn find(options: &Options) -> Result<wgpu::Adapter> {
         )),
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn limits_that_are_too_small_are_named_with_what_is_needed() {
+        let enough = wgpu::Limits {
+            max_storage_buffers_per_shader_stage: STORAGE_BUFFERS,
+            max_compute_workgroup_storage_size: WORKGROUP_BYTES,
+            ..wgpu::Limits::default()
+        };
+        assert_eq!(lacks(&enough), None);
+        let few = wgpu::Limits {
+            max_storage_buffers_per_shader_stage: 4,
+            ..enough
+        };
+        let message = lacks(&few).unwrap();
+        assert!(message.contains("it has 4, 12 are needed"), "{message}");
+    }
+}

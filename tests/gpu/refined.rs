@@ -5,7 +5,9 @@ use hydrograd::Error;
 use hydrograd::boundary::Method;
 use hydrograd::coupling::full::{Preconditioner, Solver};
 use hydrograd::coupling::{Coupling, Exclusions};
-use hydrograd::gpu::full::Gpu;
+use hydrograd::gpu::Arithmetic;
+use hydrograd::gpu::full::{Gpu, Probe};
+use hydrograd::solver::Columns;
 
 #[test]
 fn an_answer_meets_the_tolerance_asked_for() {
@@ -98,4 +100,30 @@ fn the_same_input_gives_the_same_bits() {
         (record.momenta().clone(), wrench)
     };
     assert_eq!(run(), run());
+}
+
+#[test]
+fn what_is_too_large_for_a_buffer_is_an_error_with_the_bytes() {
+    let model = model(
+        Method::MfsVertex,
+        &[],
+        Exclusions::none(),
+        tight(Preconditioner::Factors),
+    );
+    let gpu = Gpu::new(context(), &model).unwrap();
+    let probe = Probe::new(&gpu, &poses()).unwrap();
+    let most = context().adapter().largest_binding;
+    if most > 1 << 30 {
+        println!("not tried: {most} bytes would take the host's memory first");
+        return;
+    }
+    let columns = (most / 4) as usize / model.columns() + 1;
+    let x = Columns::zeros(model.columns(), columns);
+    match probe.apply(Arithmetic::Single, false, &x) {
+        Err(error @ Error::Device { .. }) => {
+            let message = error.to_string();
+            assert!(message.contains(&most.to_string()), "{message}");
+        }
+        other => panic!("{:?}", other.map(|c| c.columns)),
+    }
 }

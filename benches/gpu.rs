@@ -282,7 +282,8 @@ fn main() -> hydrograd::Result<()> {
     );
     let budget = Budget {
         left: &left,
-        rate: rate(&context, Arithmetic::Single, 2, 3)?,
+        // Never infinite, however short it was.
+        rate: rate(&context, Arithmetic::Single, 2, 20)?.min(1e13),
     };
     products(&context, &budget)?;
     scenes(&budget)?;

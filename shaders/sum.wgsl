@@ -19,7 +19,7 @@ struct Task {
     // Whether the diagonal counts.
     damped: u32,
     scale: f32,
-    base_scale: f32,
+    pad1: u32,
     // First column of `parts`.
     first: u32,
     pad: u32,
@@ -47,9 +47,9 @@ fn main(@builtin(global_invocation_id) id: vec3<u32>, @builtin(num_workgroups) g
     sum = mul(num(task.scale), sum);
     let to = i * task.out_stride + task.out_offset + k;
     if task.base_kind == 1u {
-        sum = add(sum, mul(num(task.base_scale), base[i * task.base_stride + task.base_offset + k]));
+        sum = add(sum, base[i * task.base_stride + task.base_offset + k]);
     } else if task.base_kind == 2u {
-        sum = add(sum, mul(num(task.base_scale), out[to]));
+        sum = add(sum, out[to]);
     }
     if task.damped != 0u {
         let x = vector[i * task.vector_stride + task.vector_offset + k];

@@ -19,6 +19,7 @@ fn settings(shader: &Shader) -> Vec<Vec<(&'static str, Constant)>> {
     for name in shader.constants() {
         let values = match name {
             "COLUMNS" => vec![Constant::Number(1), Constant::Number(12)],
+            "LEFT" if shader.name == "pair_hvp" => vec![Constant::Number(1), Constant::Number(2)],
             "LEFT" => vec![Constant::Number(1), Constant::Number(4)],
             _ => vec![Constant::Flag(false), Constant::Flag(true)],
         };
@@ -55,6 +56,60 @@ fn every_shader_is_valid_in_every_arithmetic() {
                     panic!("{place}: {}", e.emit_to_string(&text));
                 }
                 assert!(!module.entry_points.is_empty(), "{place}: no entry");
+            }
+        }
+    }
+}
+
+/// Bytes of workgroup memory and storage buffers that src/gpu/context.rs asks an adapter for.
+fn asked_for(name: &str) -> u32 {
+    let context = std::fs::read_to_string(root().join("src/gpu/context.rs")).unwrap();
+    let line = context
+        .lines()
+        .find(|l| l.contains(&format!("const {name}: u32")));
+    let value = line
+        .unwrap()
+        .split(" = ")
+        .nth(1)
+        .unwrap()
+        .trim_end_matches(';');
+    match value.split_once(" << ") {
+        Some((n, shift)) => n.parse::<u32>().unwrap() << shift.parse::<u32>().unwrap(),
+        None => value.parse().unwrap(),
+    }
+}
+
+#[test]
+fn every_shader_stays_within_what_is_asked_of_an_adapter() {
+    let (bytes, buffers) = (asked_for("WORKGROUP_BYTES"), asked_for("STORAGE_BUFFERS"));
+    for shader in SHADERS {
+        for constants in settings(shader) {
+            let text = shader.assemble(Arithmetic::Double, &constants).unwrap();
+            let module = naga::front::wgsl::parse_str(&text).unwrap();
+            let info = Validator::new(ValidationFlags::all(), Capabilities::FLOAT64)
+                .validate(&module)
+                .unwrap();
+            for (at, entry) in module.entry_points.iter().enumerate() {
+                let used = info.get_entry_point(at);
+                let (mut memory, mut storage) = (0, 0);
+                for (handle, variable) in module.global_variables.iter() {
+                    if used[handle].is_empty() {
+                        continue;
+                    }
+                    match variable.space {
+                        naga::AddressSpace::WorkGroup => {
+                            memory += module.types[variable.ty].inner.size(module.to_ctx());
+                        }
+                        naga::AddressSpace::Storage { .. } => storage += 1,
+                        _ => {}
+                    }
+                }
+                let place = format!("{}::{} {constants:?}", shader.name, entry.name);
+                assert!(memory <= bytes, "{place}: {memory} bytes of {bytes}");
+                assert!(
+                    storage <= buffers,
+                    "{place}: {storage} buffers of {buffers}"
+                );
             }
         }
     }

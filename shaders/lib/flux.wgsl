@@ -116,7 +116,8 @@ fn flux_hessian_product(a: V3, b: V3, c: V3, m: V3, s: V3, d: V3) -> Bent {
         v_scale(add(add(c0, c1), c2), d),
     );
     let q = div(num(2.0), add(mul(n, n), mul(p, p)));
-    let dq = neg(mul(mul(q, q), add(mul(n, dn), mul(p, dp))));
+    // q² alone would leave the range of single precision.
+    let dq = neg(mul(q, mul(q, add(mul(n, dn), mul(p, dp)))));
     let inner = v_sub(v_scale(n, grad), v_scale(p, m));
     let dinner = v_sub(v_add(v_scale(dn, grad), v_scale(n, dgrad)), v_scale(dp, m));
     return Bent(v_scale(q, inner), v_add(v_scale(dq, inner), v_scale(q, dinner)));

@@ -150,6 +150,8 @@ impl Context {
             Ok(raw) => raw,
             Err(_) => {
                 self.pool.drain();
+                // What is still in use is given back only once that has ended.
+                let _ = self.device.poll(wgpu::PollType::wait_indefinitely());
                 attempt().map_err(|e| failed(e.to_string()))?
             }
         };
@@ -262,12 +264,22 @@ impl Context {
             return Ok(parts.iter().map(|_| Vec::new()).collect());
         }
         self.check()?;
+        let most = self.largest_buffer();
+        if total > most {
+            return Err(self.failure(format!(
+                "{total} bytes are to be read back at once, and a buffer holds at most {most}"
+            )));
+        }
+        let guard = self.device.push_error_scope(wgpu::ErrorFilter::OutOfMemory);
         let staging = self.device.create_buffer(&wgpu::BufferDescriptor {
             label: Some("read-back"),
             size: total,
             usage: wgpu::BufferUsages::MAP_READ | wgpu::BufferUsages::COPY_DST,
             mapped_at_creation: false,
         });
+        if let Some(e) = pollster::block_on(guard.pop()) {
+            return Err(self.failure(format!("reading {total} bytes back: {e}")));
+        }
         let mut encoder = self.device.create_command_encoder(&Default::default());
         let mut at = 0;
         for (buffer, n) in parts {

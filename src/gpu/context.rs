@@ -11,7 +11,7 @@ use std::sync::{Arc, Mutex};
 /// Storage buffers that the largest shader binds.
 const STORAGE_BUFFERS: u32 = 12;
 /// Bytes of workgroup memory that the largest shader takes.
-const WORKGROUP_BYTES: u32 = 16 << 10;
+pub(super) const WORKGROUP_BYTES: u32 = 20 << 10;
 /// Threads of the largest workgroup.
 const THREADS: u32 = 256;
 
@@ -47,13 +47,13 @@ pub struct Adapter {
 /// What was done on a device since it was opened.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct Counts {
-    /// Shaders started.
+    /// Calls of shaders, those included that had nothing to do.
     pub dispatches: u64,
     /// Times that the host waited for numbers.
     pub read_backs: u64,
     /// Bytes that came back.
     pub bytes_back: u64,
-    /// Bytes in the device's memory now.
+    /// Bytes of arrays in the device's memory now, those kept to be used again included.
     pub memory: u64,
     /// The most there were at once.
     pub peak_memory: u64,
@@ -276,6 +276,11 @@ impl Context {
             .min(self.limits.max_buffer_size)
     }
 
+    /// Largest buffer, bytes.
+    pub(super) fn largest_buffer(&self) -> u64 {
+        self.limits.max_buffer_size
+    }
+
     /// Most workgroups along one dimension of a dispatch.
     pub(super) fn most_groups(&self) -> u32 {
         self.limits.max_compute_workgroups_per_dimension
@@ -309,6 +314,13 @@ impl Context {
             adapter: self.adapter.name.clone(),
             what,
             remedy: "use a smaller scene, or the backend cpu".into(),
+        }
+    }
+
+    /// Makes every later call fail, after an error that its caller can't pass on.
+    pub(super) fn latch(&self, error: &Error) {
+        if let Ok(mut fault) = self.fault.lock() {
+            fault.get_or_insert_with(|| error.to_string());
         }
     }
 

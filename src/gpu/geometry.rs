@@ -77,7 +77,7 @@ pub(super) struct Geometry {
     pub factors: Buffer,
     pub layout: Buffer,
     /// Whether some body has no factor here and takes the diagonal.
-    diagonal: bool,
+    pub diagonal: bool,
     pub tasks: Buffer,
     pub ranges: Buffer,
     task_count: usize,

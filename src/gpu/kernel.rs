@@ -8,6 +8,9 @@ use std::sync::Arc;
 use std::sync::atomic::Ordering;
 use wgpu::naga;
 
+/// Calls of one submission: systems reset a card that works too long on one.
+const AT_ONCE: usize = 64;
+
 /// A variable that a shader's entry uses.
 struct Binding {
     name: String,
@@ -224,10 +227,15 @@ impl Context {
     /// # Errors
     /// A fault of the device.
     pub(super) fn submit(&self, batch: &Batch) -> Result<()> {
+        batch.calls.chunks(AT_ONCE).for_each(|c| self.start(c));
+        self.check()
+    }
+
+    fn start(&self, calls: &[&Call]) {
         let mut encoder = self.device.create_command_encoder(&Default::default());
         {
             let mut pass = encoder.begin_compute_pass(&Default::default());
-            for call in &batch.calls {
+            for call in calls {
                 if call.count.contains(&0) {
                     continue;
                 }
@@ -239,13 +247,12 @@ impl Context {
                 pass.dispatch_workgroups(x, y, z);
             }
         }
-        let count = batch.calls.len() as u64;
+        let count = calls.len() as u64;
         self.pool
             .counters
             .dispatches
             .fetch_add(count, Ordering::Relaxed);
         self.queue.submit([encoder.finish()]);
-        self.check()
     }
 }
 

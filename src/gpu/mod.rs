@@ -5,7 +5,7 @@
 //! but the bodies' own factors, every entry of K and P is made where it is used. [`reduced`] is
 //! [`crate::coupling::reduced`], for more bodies or points than a dense system is made for.
 //!
-//! Solves run in single precision inside an iterative refinement whose residuals, and all derivatives,
+//! Solves of [`full`] run in single precision inside an iterative refinement whose residuals, and all derivatives,
 //! are in a *fine* arithmetic ([`source::Arithmetic`]): double precision where the adapter has it, two-float
 //! numbers otherwise. Sums have a fixed order: one adapter gives the same bits for the same input.
 

@@ -65,7 +65,7 @@ pub(super) fn sum(
     ]
     .map(|n| n as u32)
     .to_vec();
-    words.extend([task.scale.to_bits(), 1.0_f32.to_bits(), first as u32, 0]);
+    words.extend([task.scale.to_bits(), 0, first as u32, 0]);
     let uniform = context.uniform(&words);
     let buffers = [
         ("parts", parts.into()),

@@ -1,6 +1,8 @@
 //! Twists and wrenches in the device's units: lengths over the scene's size, every column over its own size.
 
+use crate::Result;
 use crate::adjoint::lie::{Vec3, Vec6, six};
+use crate::coupling::Tangent;
 use nalgebra::DMatrix;
 
 /// Size of a column of twists: of its velocities, at the scene's size, and rates.
@@ -29,4 +31,20 @@ pub(super) fn spatial(length: f64, middle: &Vec3, w: &[f64], scale: f64) -> Vec6
     let force = Vec3::new(w[0], w[1], w[2]) * l4;
     let moment = Vec3::new(w[3], w[4], w[5]) * (l4 * length);
     six(&force, &(moment + middle.cross(&force)))
+}
+
+/// A tangent along z, which it is linear in, made with a z of about unit size.
+pub(super) fn along(
+    z: &[Vec6],
+    length: f64,
+    tangent: impl FnOnce(&[Vec6]) -> Result<Tangent>,
+) -> Result<Tangent> {
+    let all = DMatrix::from_fn(6 * z.len(), 1, |i, _| z[i / 6][i % 6]);
+    let scale = size(&all, 0, length);
+    let unit: Vec<Vec6> = z.iter().map(|z| z / scale).collect();
+    let mut out = tangent(&unit)?;
+    out.momentum_x *= scale;
+    out.momentum_y *= scale;
+    out.wrench.iter_mut().for_each(|w| *w *= scale);
+    Ok(out)
 }

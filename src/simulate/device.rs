@@ -91,6 +91,10 @@ impl Device {
         if let Some(context) = &self.context {
             match Gpu::new(context, &model) {
                 Ok(gpu) => return Ok(Full::on(model, Box::new(gpu))),
+                // The CPU has no use for bodies without a factor: the device's error is the one that tells.
+                Err(error) if model.bodies.iter().any(|b| !b.boundary.factored()) => {
+                    return Err(error);
+                }
                 Err(error) => self.leave(error)?,
             }
         }

@@ -119,6 +119,43 @@ fn without_factors() {
     holds(context(), &model, 5, 1e-6);
 }
 
+#[test]
+fn more_columns_than_one_pass_takes() {
+    let model = model(
+        Method::MfsVertex,
+        &[],
+        Exclusions::none(),
+        tight(Preconditioner::Factors),
+    );
+    holds(context(), &model, 13, 1e-8);
+}
+
+#[test]
+fn a_displacement_of_any_size_gives_a_tangent_of_that_size() {
+    let model = model(
+        Method::MfsVertex,
+        &[],
+        Exclusions::none(),
+        tight(Preconditioner::Factors),
+    );
+    let (_, gpu) = both(two_float(), &model);
+    let n = model.bodies.len();
+    let record = gpu.evaluate(&poses(), &basis(n, 5, 0.3), false).unwrap();
+    let x = DVector::from_vec(wavy(5, 0.7));
+    let along = |size: f64| {
+        let z: Vec<_> = (displacement(n, 2.3).iter()).map(|z| z * size).collect();
+        let t = record
+            .hvp(Direction::Basis(&x), Direction::Basis(&x), &z)
+            .unwrap();
+        let numbers = [t.momentum_x.as_slice(), &flat(&t.wrench)].concat();
+        numbers.iter().map(|v| v / size).collect::<Vec<_>>()
+    };
+    for size in [1e-25, 1e25] {
+        let found = difference(&along(size), &along(1.0));
+        assert!(found <= 1e-9, "{size:e}: {found:.1e}");
+    }
+}
+
 /// Energies and momenta of columns, and of combinations of them.
 pub fn combinations() {
     let model = model(

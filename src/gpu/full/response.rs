@@ -262,8 +262,8 @@ impl Answer {
             moving: self.moving.clone(),
             twists,
             columns: n,
-            strengths: context.reals("strengths", fine, sizes.sources * 2 * n)?,
-            densities: context.reals("densities", fine, sizes.faces * 3 * n)?,
+            strengths: context.zeros("strengths", fine, sizes.sources * 2 * n)?,
+            densities: context.zeros("densities", fine, sizes.faces * 3 * n)?,
             momenta: DMatrix::zeros(6 * sizes.bodies, n),
             energies: coefficients.tr_mul(&self.energies) * coefficients,
             reached: self.reached,
@@ -427,7 +427,7 @@ impl Response for Answer {
                 "must be 1 or 2",
             ));
         }
-        self.second(z)
+        units::along(z, self.placed.geometry.length, |z| self.second(z))
     }
 
     fn strengths(&self) -> Result<Columns> {

@@ -192,7 +192,7 @@ impl After<'_> {
             let task = Sum {
                 rows,
                 columns,
-                parts: (base.0, usize::from(scale != 0.0), base.1, base.2),
+                parts: (base.0, 1, base.1, base.2),
                 scale,
                 base: Base::Nothing,
                 damped: None,

@@ -217,6 +217,11 @@ struct Standing {
     unfinished: bool,
 }
 
+/// The larger one, or what isn't a number.
+fn worse(a: f64, b: f64) -> f64 {
+    if a.is_nan() || a > b { a } else { b }
+}
+
 impl Solves {
     /// `columns` columns of G into those of X, both by source.
     ///
@@ -232,9 +237,11 @@ impl Solves {
             })
             .collect::<Result<_>>()?;
         let settings = &placed.geometry.model.settings;
-        let few = match settings.preconditioner {
-            Preconditioner::Factors => FEW,
-            _ => MANY,
+        let factored = settings.preconditioner == Preconditioner::Factors;
+        let few = if factored && !placed.geometry.diagonal {
+            FEW
+        } else {
+            MANY
         };
         Ok(Self {
             all,
@@ -300,7 +307,8 @@ impl Solves {
         let standing = self.standing(bytes);
         let reached = Reached {
             iterations: standing.iter().map(|s| s.iterations).max().unwrap_or(0),
-            residual: standing.iter().map(|s| s.residual).fold(0.0, f64::max),
+            // What isn't a number is the worst.
+            residual: standing.iter().map(|s| s.residual).fold(0.0, worse),
         };
         let bad = |s: &Standing| s.stalled || !s.residual.is_finite();
         let most = settings.max_iterations;

@@ -7,6 +7,7 @@ use crate::coupling::{Direction, PairTensor, Pullback, Record, Report, Tangent};
 use crate::gpu::buffer::Buffer;
 use crate::gpu::combine::combine;
 use crate::gpu::points::Placed;
+use crate::gpu::units;
 use nalgebra::{DMatrix, DVector};
 use std::sync::Arc;
 
@@ -88,12 +89,13 @@ impl GpuRecord {
         Ok((one, out))
     }
 
-    /// ∇_g E(x, e_i) of every column, `[column][body]`; numbers that aren't there after a fault of the device, which
-    /// the next evaluation reports: a record's derivatives on its basis have no way to.
+    /// ∇_g E(x, e_i) of every column, `[column][body]`; no numbers after a failure of the device, which every
+    /// later call on it reports: a record's derivatives on its basis have no way to.
     fn columns(&self, pulls: &Buffer, x: &DVector<f64>) -> Vec<Vec<Vec6>> {
         let found = self
             .along(pulls, x)
-            .and_then(|(one, own)| self.answer.wrenches(pulls, (&one, &own)));
+            .and_then(|(one, own)| self.answer.wrenches(pulls, (&one, &own)))
+            .inspect_err(|e| self.answer.placed.model.context.latch(e));
         let of = |b: usize, k: usize| match &found {
             Ok(all) => all[b][k],
             Err(_) => Vec6::repeat(f64::NAN),
@@ -109,7 +111,10 @@ impl GpuRecord {
             let ((x, of_x), (y, of_y)) = (self.along(pulls, x)?, self.along(pulls, y)?);
             Ok(x.wrenches(&of_x, (&y, &of_y))?.concat())
         };
-        found().unwrap_or_else(|_| vec![Vec6::repeat(f64::NAN); self.bodies()])
+        found().unwrap_or_else(|e| {
+            self.answer.placed.model.context.latch(&e);
+            vec![Vec6::repeat(f64::NAN); self.bodies()]
+        })
     }
 
     /// The answers to directions: combinations of what is there, or another solve.
@@ -183,7 +188,9 @@ impl Record for GpuRecord {
     }
 
     fn hvp(&self, x: Direction, y: Direction, z: &[Vec6]) -> Result<Tangent> {
-        self.answers(&distinct(x, y))?.second(z, self.tolerance)
+        let answer = self.answers(&distinct(x, y))?;
+        let length = answer.placed.model.length;
+        units::along(z, length, |z| answer.second(z, self.tolerance))
     }
 
     fn report(&self) -> &Report {

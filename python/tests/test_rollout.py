@@ -135,4 +135,5 @@ def test_meshes_from_arrays_objects_and_files(tmp_path):
         scene.add(hg.Body(made, density=1000.0))
         assert hg.Scene.from_toml(scene.to_toml()) == scene
         matrices.append(hg.added_mass(scene))
-    assert np.array_equal(*matrices)
+    # A file's vertices may be numbered in another order.
+    assert np.allclose(*matrices, rtol=1e-9, atol=1e-12)

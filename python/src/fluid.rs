@@ -10,6 +10,9 @@ use pyo3::prelude::*;
 #[derive(Clone, PartialEq)]
 pub struct Fluid(pub hydrograd::Fluid);
 
+/// Density and current.
+type Parts = (f64, (f64, f64, f64));
+
 #[pymethods]
 impl Fluid {
     #[new]
@@ -41,7 +44,7 @@ impl Fluid {
         )
     }
 
-    fn __reduce__<'py>(slf: &Bound<'py, Self>) -> (Bound<'py, PyAny>, (f64, (f64, f64, f64))) {
+    fn __reduce__<'py>(slf: &Bound<'py, Self>) -> (Bound<'py, PyAny>, Parts) {
         let fluid = slf.get();
         (
             slf.get_type().into_any(),

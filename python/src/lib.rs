@@ -8,6 +8,7 @@ mod gradient;
 mod interrupt;
 mod joint;
 mod objective;
+mod prepare;
 mod rollout;
 mod scene;
 mod settings;
@@ -29,9 +30,9 @@ fn _simulator(
     settings: &str,
     cache: Option<PathBuf>,
     parameters: Vec<f64>,
-    start: (Vec<f64>, Vec<f64>),
+    start: (Vec<f64>, Vec<f64>, Vec<f64>),
 ) -> PyResult<Simulator> {
-    simulator::rebuild(py, scene, settings, cache, &parameters, start)
+    prepare::rebuild(py, scene, settings, cache, &parameters, start)
 }
 
 /// Unpickles a state.

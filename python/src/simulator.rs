@@ -4,11 +4,12 @@ use crate::array::{self, Dim, array};
 use crate::error::{OrRaise, input};
 use crate::gradient::by_name;
 use crate::interrupt::{long, short};
+use crate::prepare::{Parts, Start, build, set_gains};
 use crate::rollout::{Owned, Rollout};
 use crate::scene::Scene;
 use crate::settings::{Keywords, fidelity_name, integrator_name, row_or};
 use crate::state::{Record, State, one_step};
-use hydrograd::{Controls, Settings, dynamics};
+use hydrograd::Controls;
 use nalgebra::{DMatrix, DVector};
 use numpy::PyArrayDyn;
 use pyo3::prelude::*;
@@ -32,55 +33,13 @@ pub struct Simulator {
     pub inner: Arc<hydrograd::Simulator>,
     /// What it was made from.
     pub scene: hydrograd::Scene,
-    cache: Option<PathBuf>,
-}
-
-fn build(
-    py: Python<'_>,
-    scene: hydrograd::Scene,
-    settings: Settings,
-    cache: Option<PathBuf>,
-) -> PyResult<Simulator> {
-    let (of, folder) = (scene.clone(), cache.clone());
-    let made = long(py, move |_| match folder {
-        Some(folder) => hydrograd::Simulator::cached(&of, settings, &folder),
-        None => hydrograd::Simulator::new(&of, settings),
-    })?;
-    Ok(Simulator {
-        inner: Arc::new(made),
-        scene,
-        cache,
-    })
-}
-
-/// A simulator from what `__reduce__` gives.
-pub fn rebuild(
-    py: Python<'_>,
-    toml: &str,
-    settings: &str,
-    cache: Option<PathBuf>,
-    parameters: &[f64],
-    start: (Vec<f64>, Vec<f64>),
-) -> PyResult<Simulator> {
-    let scene = hydrograd::Scene::from_toml(toml, "").or_raise()?;
-    let settings = serde_json::from_str(settings).map_err(|e| {
-        input(
-            "pickled simulator: settings",
-            e,
-            "must come from this version of hydrograd",
-        )
-    })?;
-    let out = build(py, scene, settings, cache)?;
-    out.changed(|inner| {
-        if let Some(values) = inner.parameters().with_values(parameters) {
-            inner.set_parameters(values)?;
-        }
-        inner.set_start(start.0.into(), start.1.into())
-    })
+    /// Where compressed bodies are kept.
+    pub cache: Option<PathBuf>,
 }
 
 impl Simulator {
-    fn changed(
+    /// A clone with something changed.
+    pub fn changed(
         &self,
         change: impl FnOnce(&mut hydrograd::Simulator) -> hydrograd::Result<()>,
     ) -> PyResult<Self> {
@@ -142,27 +101,6 @@ impl Simulator {
             (None, None) => Start::Scene,
             _ => Start::From(row_or("rollout: q", q, q0)?, row_or("rollout: v", v, v0)?),
         })
-    }
-}
-
-/// Where a run begins.
-#[derive(Clone)]
-pub enum Start {
-    /// Where the simulator says.
-    Scene,
-    /// At coordinates and a velocity.
-    From(DVector<f64>, DVector<f64>),
-    /// At a state.
-    At(dynamics::State),
-}
-
-impl Start {
-    fn state(&self, simulator: &hydrograd::Simulator) -> hydrograd::Result<dynamics::State> {
-        match self {
-            Self::Scene => simulator.initial(),
-            Self::From(q, v) => simulator.state(0, q, v),
-            Self::At(state) => Ok(state.clone()),
-        }
     }
 }
 
@@ -400,6 +338,20 @@ impl Simulator {
         self.changed(|inner| inner.set_start(q, v))
     }
 
+    /// The same with other gains of the scene's controller, (gains,).
+    fn with_gains(&self, gains: &Bound<'_, PyAny>) -> PyResult<Self> {
+        let gains = array::row("with_gains: gains", gains)?;
+        self.changed(|inner| set_gains(inner, &gains))
+    }
+
+    /// Gains of the scene's controller, (gains,); none without one.
+    #[getter]
+    fn gains<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyArrayDyn<f64>>> {
+        let gains = self.inner.policy().gains();
+        let n = gains.len();
+        array::to_python(py, gains, &[n])
+    }
+
     /// The physical parameters by name: density, masses, inertias, drag and contact, SI units.
     #[getter]
     fn parameters<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyDict>> {
@@ -496,20 +448,7 @@ impl Simulator {
         )
     }
 
-    #[expect(clippy::type_complexity, reason = "what pickle asks for")]
-    fn __reduce__<'py>(
-        &self,
-        py: Python<'py>,
-    ) -> PyResult<(
-        Bound<'py, PyAny>,
-        (
-            String,
-            String,
-            Option<PathBuf>,
-            Vec<f64>,
-            (Vec<f64>, Vec<f64>),
-        ),
-    )> {
+    fn __reduce__<'py>(&self, py: Python<'py>) -> PyResult<(Bound<'py, PyAny>, Parts)> {
         let make = py.import("hydrograd._hydrograd")?.getattr("_simulator")?;
         let settings = serde_json::to_string(self.inner.settings()).map_err(|e| {
             input(
@@ -519,17 +458,13 @@ impl Simulator {
             )
         })?;
         let (q, v) = self.inner.start();
-        let start = (q.as_slice().to_vec(), v.as_slice().to_vec());
+        let list = |x: &DVector<f64>| x.as_slice().to_vec();
+        let start = (list(q), list(v), self.inner.policy().gains());
         let parameters = self.inner.parameters().to_vec();
+        let scene = self.scene.to_toml().or_raise()?;
         Ok((
             make,
-            (
-                self.scene.to_toml().or_raise()?,
-                settings,
-                self.cache.clone(),
-                parameters,
-                start,
-            ),
+            (scene, settings, self.cache.clone(), parameters, start),
         ))
     }
 }

@@ -1,5 +1,7 @@
 """Gradients against central differences."""
 
+import pickle
+
 import numpy as np
 import pytest
 
@@ -91,6 +93,21 @@ def test_parameters_by_name(sim, controls, seeds):
 
         found = (value(base + step) - value(base - step)) / (2 * step)
         assert abs(gradient.parameters[name] - found) <= 1e-4 * abs(found), name
+
+
+def test_gains_of_the_scenes_controller():
+    scene = hg.Scene(time_step=0.02, steps=8)
+    scene.add(hg.Body(hg.sphere(0.1), name="ball", density=1100.0, joint=hg.prismatic((0, 0, 1)), actuated=True))
+    pd = '[controller]\nkind = "pd"\ntarget = [0.3]\nstiffness = [4.0]\ndamping = [2.0]\n'
+    sim = hg.Simulator(hg.Scene.from_toml(scene.to_toml() + "\n" + pd), fidelity="isolated")
+    goal = hg.objective.final_coordinate(0, 0.2)
+    found = sim.rollout().gradient(goal).gains
+    assert found.shape == sim.gains.shape == (3,)
+    close(found, slopes(lambda g: sim.with_gains(g).rollout().value(goal), sim.gains, 1e-3))
+    again = pickle.loads(pickle.dumps(sim.with_gains(2 * sim.gains)))
+    assert np.array_equal(again.gains, 2 * sim.gains)
+    with pytest.raises(hg.InputError, match="3 numbers"):
+        sim.with_gains([1.0])
 
 
 def test_objectives(sim, controls):

@@ -90,6 +90,12 @@ pub enum Error {
         /// What to do.
         remedy: String,
     },
+    /// What whoever asked for it ended before it was done.
+    #[error("{what}: stopped as asked")]
+    Stopped {
+        /// What was going on, and how far it had come.
+        what: String,
+    },
     /// A combination of settings that has no meaning or isn't offered.
     #[error("{what} is not available: {why}; {instead}")]
     Unsupported {
@@ -148,7 +154,7 @@ impl Error {
                     said.push_str(&format!(" at t = {} s", readable(time)));
                 }
             }
-            Self::File { .. } => {}
+            Self::File { .. } | Self::Stopped { .. } => {}
         }
         self
     }

@@ -69,7 +69,9 @@ fn exact(shape: &Shape) -> (f64, Vec3) {
             let along = side * r * r / 2.0 + ends * 0.4 * r * r;
             (side + ends, Vec3::new(across, across, along))
         }
-        Shape::Prism { .. } | Shape::Mesh { .. } => unreachable!("not of this list"),
+        Shape::Prism { .. } | Shape::Mesh { .. } | Shape::Triangles { .. } => {
+            unreachable!("not of this list")
+        }
     }
 }
 

@@ -78,15 +78,15 @@ impl<State, Kept> Path<State, Kept> {
     }
 }
 
-/// Runs `steps` steps from `initial`; `progress` hears of each step made.
+/// Runs `steps` steps from `initial`; `progress` hears of each step made, and may end the run with an error.
 ///
 /// # Errors
-/// The first step that fails.
+/// The first step that fails, or that of `progress`.
 pub fn forward<S: Step>(
     step: &S,
     initial: S::State,
     steps: usize,
-    mut progress: impl FnMut(usize),
+    mut progress: impl FnMut(usize) -> Result<(), S::Error>,
 ) -> Result<Path<S::State, S::Kept>, S::Error> {
     let mut states = vec![initial];
     let mut kept = Vec::new();
@@ -94,7 +94,7 @@ pub fn forward<S: Step>(
         let (next, observed) = step.step(n, &states[n])?;
         states.push(next);
         kept.push(observed);
-        progress(n + 1);
+        progress(n + 1)?;
     }
     kept.push(step.last(steps, &states[steps])?);
     Ok(Path { states, kept })
@@ -103,10 +103,11 @@ pub fn forward<S: Step>(
 /// Cotangent of the initial state, and what every step yields.
 pub type Swept<S> = (<S as Step>::Bar, Vec<<S as Step>::Local>);
 
-/// Cotangent of the initial state, and what every step yields, in the order of time, from one seed per state.
+/// Cotangent of the initial state, and what every step yields, in the order of time, from one seed per state;
+/// `progress` hears of each step gone back, and may end the sweep with an error.
 ///
 /// # Errors
-/// The first transpose that fails.
+/// The first transpose that fails, or that of `progress`.
 ///
 /// # Panics
 /// If there isn't one seed per state.
@@ -114,6 +115,7 @@ pub fn reverse<S: Step>(
     step: &S,
     path: &Path<S::State, S::Kept>,
     seeds: &[S::Seed],
+    mut progress: impl FnMut(usize) -> Result<(), S::Error>,
 ) -> Result<Swept<S>, S::Error> {
     assert_eq!(seeds.len(), path.states.len(), "one seed per state");
     let last = path.states.len() - 1;
@@ -125,6 +127,7 @@ pub fn reverse<S: Step>(
             step.step_vjp(n, &path.states[n], &path.kept[n], &bar, &seeds[n])?;
         bar = previous;
         locals.push(local);
+        progress(last - n)?;
     }
     locals.reverse();
     Ok((bar, locals))

@@ -53,7 +53,7 @@ fn refined(scene: &Scene, factor: f64) -> Scene {
             | Shape::Cylinder { faces, .. }
             | Shape::Capsule { faces, .. }
             | Shape::Prism { faces, .. } => faces,
-            Shape::Mesh { .. } => continue,
+            Shape::Mesh { .. } | Shape::Triangles { .. } => continue,
         };
         *faces = faces.map(|n| (factor * n as f64).round() as usize);
     }

@@ -27,6 +27,7 @@ pub struct Regularisation {
 }
 
 /// Which surfaces may touch, and how.
+#[derive(Clone)]
 pub struct ContactModel {
     /// Their shapes.
     pub shapes: Contacts,

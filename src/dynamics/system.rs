@@ -7,6 +7,7 @@ use crate::coupling::Coupling;
 use crate::multibody::Tree;
 use crate::scene::Motion;
 use nalgebra::DVector;
+use std::sync::Arc;
 
 /// Constants of one body.
 #[derive(Clone, Debug)]
@@ -44,7 +45,8 @@ pub enum Drive {
     Motion(Vec<Motion>),
 }
 
-/// A mechanical system in water.
+/// A mechanical system in water. Clones share the coupling.
+#[derive(Clone)]
 pub struct System {
     /// Joints and bodies.
     pub tree: Tree,
@@ -59,7 +61,7 @@ pub struct System {
     /// Number of controls.
     pub controls: usize,
     /// The coupling; its bodies are those with `wet` set, in order.
-    pub coupling: Box<dyn Coupling>,
+    pub coupling: Arc<dyn Coupling>,
     /// Contact; none where bodies pass through each other.
     pub contact: Option<ContactModel>,
     /// Limits of joints.

@@ -324,7 +324,19 @@ impl Shape {
         }
     }
 
-    /// With this target number of faces; a mesh from a file stays as it is.
+    /// A closed triangle mesh: vertices, m, and faces as triples of their numbers, counted from 0, counter-clockwise seen
+    /// from outside.
+    pub fn triangles(
+        vertices: impl Into<Vec<[f64; 3]>>,
+        faces: impl Into<Vec<[usize; 3]>>,
+    ) -> Self {
+        Self::Triangles {
+            vertices: vertices.into(),
+            faces: faces.into(),
+        }
+    }
+
+    /// With this target number of faces; a mesh stays as it is.
     pub fn faces(mut self, faces: usize) -> Self {
         self.set_faces(faces);
         self
@@ -340,6 +352,7 @@ impl Shape {
             Self::Capsule { .. } => "capsule",
             Self::Prism { .. } => "prism",
             Self::Mesh { .. } => "mesh",
+            Self::Triangles { .. } => "triangles",
         }
     }
 
@@ -351,7 +364,7 @@ impl Shape {
             | Self::Cylinder { faces, .. }
             | Self::Capsule { faces, .. }
             | Self::Prism { faces, .. } => *faces = Some(target),
-            Self::Mesh { .. } => {}
+            Self::Mesh { .. } | Self::Triangles { .. } => {}
         }
     }
 }

@@ -274,6 +274,13 @@ pub enum Shape {
         #[serde(default = "one")]
         scale: f64,
     },
+    /// A closed triangle mesh given number by number.
+    Triangles {
+        /// Vertices, m.
+        vertices: Vec<[f64; 3]>,
+        /// Vertex numbers of each face, counted from 0, counter-clockwise seen from outside.
+        faces: Vec<[usize; 3]>,
+    },
 }
 
 fn is_default<T: Default + PartialEq>(value: &T) -> bool {

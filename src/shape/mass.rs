@@ -123,7 +123,7 @@ impl MassProperties {
             }
             // Flat faces: any mesh of it is exact.
             Shape::Prism { .. } => return Ok(Some(Self::of(&build(shape, Path::new(""), None)?))),
-            Shape::Mesh { .. } => return Ok(None),
+            Shape::Mesh { .. } | Shape::Triangles { .. } => return Ok(None),
         };
         let moments = Mat3::from_diagonal(&Vec3::from(second));
         Ok(Some(Self {

@@ -18,12 +18,14 @@ use crate::scene::{self, Body, DragPart, Placement, Scene};
 use crate::shape::{Gap, Other, TriMesh};
 use nalgebra::DVector;
 use std::path::Path;
+use std::sync::Arc;
 
 /// A scene made ready.
+#[derive(Clone)]
 pub(super) struct Assembled {
     pub system: System,
     pub parameters: Parameters,
-    pub policy: Box<dyn Policy>,
+    pub policy: Arc<dyn Policy>,
     pub q: DVector<f64>,
     pub v: DVector<f64>,
     pub faces: usize,
@@ -231,7 +233,7 @@ pub(super) fn assemble(
         gravity: Vec3::from(scene.gravity),
         current: Vec3::from(scene.fluid.current),
         controls,
-        coupling: Box::new(Isolated::new(Vec::new())),
+        coupling: Arc::new(Isolated::new(Vec::new())),
         contact: None,
         limits: Vec::new(),
         tree,
@@ -247,7 +249,7 @@ pub(super) fn assemble(
     let mut device = Device::open(settings, fidelity)?;
     let made = wet::couple(&wet, &water, settings, fidelity, &plan, &mut device)?;
     warnings.extend(device.warning());
-    system.coupling = made.coupling;
+    system.coupling = made.coupling.into();
     warnings.extend(made.warnings);
     let mut resolved = vec![0.0; scene.bodies.len()];
     for (b, d) in of_wet.iter().zip(&made.bodies) {
@@ -270,7 +272,7 @@ pub(super) fn assemble(
     system.limits = limits::assemble(scene, dt, &system, &parameters, &q)?;
     let v = start_velocity(scene, settings, &system, &parameters, &q)?;
     Ok(Assembled {
-        policy: controller::policy(scene, &system)?,
+        policy: controller::policy(scene, &system)?.into(),
         system,
         parameters,
         q,

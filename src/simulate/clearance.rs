@@ -23,6 +23,7 @@ const TOUCHING: f64 = 1e-9;
 const MOST_SHARED: f64 = 0.5;
 
 /// The gaps of a scene's bodies, from their surfaces in body frames.
+#[derive(Clone)]
 pub(super) struct Clearance {
     /// Between pairs that move relative to one another and aren't declared to overlap, and to the
     /// walls.

@@ -115,7 +115,9 @@ pub(super) fn assemble(p: Parts) -> Result<(ContactModel, dynamics::Contact)> {
 fn geometry(body: &Body, shape: &Shape, surface: &Surface) -> Result<Geometry> {
     let made = match shape {
         // Already placed in its body.
-        Shape::Mesh { .. } => Geometry::of_mesh(&surface.mesh, Pose::identity()),
+        Shape::Mesh { .. } | Shape::Triangles { .. } => {
+            Geometry::of_mesh(&surface.mesh, Pose::identity())
+        }
         _ => Geometry::of_shape(shape, pose(&body.shape_at), Path::new("")),
     };
     made.map_err(|e| Error::Unsupported {

@@ -11,6 +11,7 @@ mod estimate;
 pub mod gradcheck;
 mod gradient;
 pub mod growth;
+mod jacobians;
 mod knots;
 mod limits;
 pub mod objective;
@@ -28,6 +29,7 @@ pub use backend::{AdapterName, Arithmetic, Backend, BackendReport, DeviceReport,
 pub use controls::Controls;
 pub use estimate::{ErrorEstimate, Level};
 pub use gradient::{Cotangents, Gradient, Initial};
+pub use jacobians::Jacobians;
 pub use knots::Knots;
 pub use objective::Objective;
 pub use policy::{

@@ -36,16 +36,17 @@ pub struct Recording {
     pub min_gap: Vec<Option<f64>>,
 }
 
-const MOMENTA: [&str; 6] = [
-    "momentum_x",
-    "momentum_y",
-    "momentum_z",
-    "angular_momentum_x",
-    "angular_momentum_y",
-    "angular_momentum_z",
-];
-
 impl Recording {
+    /// Names of the columns of the momentum.
+    pub const MOMENTA: [&str; 6] = [
+        "momentum_x",
+        "momentum_y",
+        "momentum_z",
+        "angular_momentum_x",
+        "angular_momentum_y",
+        "angular_momentum_z",
+    ];
+
     /// Every state of a rollout of a scene.
     pub fn of(scene: &Scene, rollout: &Rollout) -> Self {
         let samples = rollout.samples();
@@ -103,7 +104,7 @@ impl Recording {
         for name in q
             .chain(v)
             .chain(["energy"])
-            .chain(MOMENTA)
+            .chain(Self::MOMENTA)
             .chain(["min_gap"])
         {
             line.push(',');

@@ -2,7 +2,7 @@
 
 use super::trajectory::Seed;
 use super::{Cotangents, Fidelity, Gradient, Initial, Objective, Simulator};
-use crate::adjoint::lie::{Pose, Vec6};
+use crate::adjoint::lie::{Pose, Vec3, Vec6};
 use crate::adjoint::step::{self, Path};
 use crate::coupling::Report;
 use crate::dynamics::{ContactForce, Drive, Memo, Parameters, State, StepBar, contact_velocity};
@@ -10,6 +10,7 @@ use crate::shape::Gap;
 use crate::{Error, Result};
 use nalgebra::{DMatrix, DVector};
 use serde::Serialize;
+use std::ops::ControlFlow;
 use std::sync::OnceLock;
 
 /// What is observed at one state.
@@ -113,6 +114,23 @@ impl<'a> Rollout<'a> {
     pub fn v(&self) -> DMatrix<f64> {
         let columns: Vec<_> = self.samples().iter().map(|s| s.v.clone()).collect();
         DMatrix::from_columns(&columns)
+    }
+
+    /// Velocities of the bodies at states 0 … N, 6·bodies × (N + 1), world axes: a body's rows are the velocity of its
+    /// origin, m/s, and its angular velocity, rad/s.
+    pub fn velocities(&self) -> DMatrix<f64> {
+        let tree = &self.simulator.system().tree;
+        let mut out = DMatrix::zeros(6 * self.simulator.system().len(), self.samples().len());
+        for (mut column, sample) in out.column_iter_mut().zip(self.samples()) {
+            let twists = tree.twists(&tree.kinematics(&sample.q), &sample.v);
+            for (b, (twist, pose)) in twists.iter().zip(&sample.poses).enumerate() {
+                let turn = Vec3::from(twist.fixed_rows::<3>(3));
+                let origin = twist.fixed_rows::<3>(0) + turn.cross(&pose.translation);
+                column.fixed_rows_mut::<3>(6 * b).copy_from(&origin);
+                column.fixed_rows_mut::<3>(6 * b + 3).copy_from(&turn);
+            }
+        }
+        out
     }
 
     /// The open-loop controls, controls × N.
@@ -266,7 +284,25 @@ impl<'a> Rollout<'a> {
     /// Cotangents of other sizes than [`Rollout::zero_cotangents`] or not finite; a solve that misses its
     /// tolerance.
     pub fn vjp(&self, cotangents: &Cotangents) -> Result<Gradient> {
+        self.vjp_with(cotangents, |_| ControlFlow::Continue(()))
+    }
+
+    /// As [`Rollout::vjp`]; `progress` hears the number of steps gone back, and may end the sweep.
+    ///
+    /// # Errors
+    /// As [`Rollout::vjp`], and [`Error::Stopped`] if `progress` breaks.
+    pub fn vjp_with(
+        &self,
+        cotangents: &Cotangents,
+        mut progress: impl FnMut(usize) -> ControlFlow<()> + Send,
+    ) -> Result<Gradient> {
         self.check(cotangents)?;
+        let heard = |done| match progress(done) {
+            ControlFlow::Continue(()) => Ok(()),
+            ControlFlow::Break(()) => Err(Error::Stopped {
+                what: format!("the gradient, {done} of {} steps back", self.steps()),
+            }),
+        };
         let simulator = self.simulator;
         let trajectory = simulator.trajectory(&self.controls);
         let seeds: Vec<Seed> = (0..=self.steps())
@@ -277,7 +313,8 @@ impl<'a> Rollout<'a> {
                 rotations: cotangents.rotations.column(n).into_owned(),
             })
             .collect();
-        let (state_bar, locals) = rayon::scope(|_| step::reverse(&trajectory, &self.path, &seeds))?;
+        let (state_bar, locals) =
+            rayon::scope(|_| step::reverse(&trajectory, &self.path, &seeds, heard))?;
         let mut controls = cotangents.controls.clone();
         let mut parameters = Parameters::zeros(simulator.system().len());
         let mut gains = vec![0.0; simulator.policy().gains().len()];

@@ -12,12 +12,15 @@ use crate::scene::Scene;
 use crate::shape::{Gap, Gaps};
 use crate::{Error, Result};
 use nalgebra::{DMatrix, DVector};
+use std::ops::ControlFlow;
 use std::path::{Path, PathBuf};
 
 /// Most steps of one rollout: some kilobytes are kept for each.
 const MOST_STEPS: usize = 5_000_000;
 
-/// A scene made ready: shapes discretised, bodies joined, coupling prepared.
+/// A scene made ready: shapes discretised, bodies joined, coupling prepared. Clones share what was prepared, so that
+/// one with other parameters, another start or another controller costs next to nothing.
+#[derive(Clone)]
 pub struct Simulator {
     pub(super) scene: Scene,
     pub(super) assembled: Assembled,
@@ -170,7 +173,7 @@ impl Simulator {
 
     /// The same with another controller.
     pub fn set_policy(&mut self, policy: Box<dyn Policy>) {
-        self.assembled.policy = policy;
+        self.assembled.policy = policy.into();
     }
 
     /// The same with other physical parameters.
@@ -241,8 +244,15 @@ impl Simulator {
     /// # Errors
     /// Wrong lengths or values that aren't finite.
     pub fn set_start(&mut self, q: DVector<f64>, v: DVector<f64>) -> Result<()> {
+        self.check_start(&q, &v)?;
+        self.assembled.q = q;
+        self.assembled.v = v;
+        Ok(())
+    }
+
+    fn check_start(&self, q: &DVector<f64>, v: &DVector<f64>) -> Result<()> {
         let tree = &self.system().tree;
-        for (name, x, n) in [("q", &q, tree.coordinates()), ("v", &v, tree.velocities())] {
+        for (name, x, n) in [("q", q, tree.coordinates()), ("v", v, tree.velocities())] {
             if x.len() != n || x.iter().any(|x| !x.is_finite()) {
                 return Err(Error::input(
                     format!("initial {name}"),
@@ -270,8 +280,6 @@ impl Simulator {
                 ));
             }
         }
-        self.assembled.q = q;
-        self.assembled.v = v;
         Ok(())
     }
 
@@ -309,15 +317,19 @@ impl Simulator {
     /// # Errors
     /// An indefinite mass matrix, or whatever the coupling reports.
     pub fn initial(&self) -> Result<State> {
+        self.state_unchecked(0, &self.assembled.q, &self.assembled.v)
+    }
+
+    fn state_unchecked(&self, step: usize, q: &DVector<f64>, v: &DVector<f64>) -> Result<State> {
         let stepper = self.stepper();
-        let mut q = self.assembled.q.clone();
-        stepper.place_motions(&mut q, 0.0);
+        let mut q = q.clone();
+        stepper.place_motions(&mut q, step as f64 * self.dt);
         let e = self
             .system()
             .evaluate(self.parameters(), &q, false, false)?;
         let state = State {
-            step: 0,
-            y: stepper.conserved(&e, &self.assembled.v),
+            step,
+            y: stepper.conserved(&e, v),
             q,
             held: Vec::new(),
             mode: 0,
@@ -341,7 +353,57 @@ impl Simulator {
     pub fn rollout_with(
         &self,
         controls: &Controls,
-        progress: impl FnMut(usize) + Send,
+        mut progress: impl FnMut(usize) + Send,
+    ) -> Result<Rollout<'_>> {
+        let heard = |done| {
+            progress(done);
+            ControlFlow::Continue(())
+        };
+        let initial = self.initial().map_err(|e| e.at_time(0.0))?;
+        let v = self.assembled.v.clone();
+        self.run(initial, Some(v), controls, heard)
+    }
+
+    /// The integrator's state at coordinates `q` and generalised velocity `v` after `step` steps: where
+    /// [`Simulator::rollout_from`] may begin. Driven joints are taken to where their motion has them then.
+    ///
+    /// # Errors
+    /// Wrong lengths, values that aren't finite, quaternions not of length 1, or as [`Simulator::initial`].
+    pub fn state(&self, step: usize, q: &DVector<f64>, v: &DVector<f64>) -> Result<State> {
+        self.check_start(q, v)?;
+        self.state_unchecked(step, q, v)
+    }
+
+    /// As [`Simulator::rollout`], from any state: that of [`Simulator::state`], or one of another rollout's
+    /// [`Rollout::states`], which it goes on from to the bit. `progress` hears the number of steps made, and may end the run.
+    ///
+    /// # Errors
+    /// A state of other sizes, the first step that fails, with its time, and [`Error::Stopped`] if `progress` breaks.
+    pub fn rollout_from(
+        &self,
+        state: &State,
+        controls: &Controls,
+        progress: impl FnMut(usize) -> ControlFlow<()> + Send,
+    ) -> Result<Rollout<'_>> {
+        let tree = &self.system().tree;
+        let sizes = [state.q.len(), state.y.len()];
+        let right = [tree.coordinates(), tree.velocities()];
+        if sizes != right {
+            return Err(Error::input(
+                "state: numbers of coordinates and velocities",
+                format!("{sizes:?}"),
+                format!("must be {right:?}, as the scene's"),
+            ));
+        }
+        self.run(state.clone(), None, controls, progress)
+    }
+
+    fn run(
+        &self,
+        initial: State,
+        initial_velocity: Option<DVector<f64>>,
+        controls: &Controls,
+        mut progress: impl FnMut(usize) -> ControlFlow<()> + Send,
     ) -> Result<Rollout<'_>> {
         let matrix = controls.matrix().clone();
         if matrix.nrows() != self.system().controls {
@@ -359,14 +421,19 @@ impl Simulator {
                 format!("must be at most {MOST_STEPS}: every state is kept; run in parts"),
             ));
         }
-        let initial = self.initial().map_err(|e| e.at_time(0.0))?;
+        let heard = |done| match progress(done) {
+            ControlFlow::Continue(()) => Ok(()),
+            ControlFlow::Break(()) => Err(Error::Stopped {
+                what: format!("the rollout, after {done} of {steps} steps"),
+            }),
+        };
         let trajectory = self.trajectory(&matrix);
         // On a thread of the pool from first step to last: entering the pool costs as much as a small step's work.
-        let path = rayon::scope(|_| step::forward(&trajectory, initial, steps, progress))?;
+        let path = rayon::scope(|_| step::forward(&trajectory, initial, steps, heard))?;
         Ok(Rollout {
             simulator: self,
+            initial_velocity: initial_velocity.unwrap_or_else(|| path.kept()[0].v.clone()),
             path,
-            initial_velocity: self.assembled.v.clone(),
             gaps: Default::default(),
             controls: matrix,
         })

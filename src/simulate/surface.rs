@@ -70,21 +70,22 @@ pub(super) fn surface(
     let closed = settings.by_formula() && wet::semi_axes(shape).is_some();
     let panels = settings.fidelity != Fidelity::Full
         && matches!(settings.one_body, OneBody::Auto | OneBody::Panel);
-    let coarse = if panels && !closed && !matches!(shape, Shape::Mesh { .. }) {
-        let quarter = (base / 4).max(12);
-        let coarse = even(Some(quarter))?;
-        let fewer = coarse.faces().len();
-        // As many bisections as in the fine mesh.
-        let ratio = (base as f64 / fewer as f64).sqrt();
-        let coarse = Coarse {
-            mesh: refined(&coarse, ratio * edges)?,
-            ratio: (!body.refine.is_empty()).then_some(ratio),
+    let coarse =
+        if panels && !closed && !matches!(shape, Shape::Mesh { .. } | Shape::Triangles { .. }) {
+            let quarter = (base / 4).max(12);
+            let coarse = even(Some(quarter))?;
+            let fewer = coarse.faces().len();
+            // As many bisections as in the fine mesh.
+            let ratio = (base as f64 / fewer as f64).sqrt();
+            let coarse = Coarse {
+                mesh: refined(&coarse, ratio * edges)?,
+                ratio: (!body.refine.is_empty()).then_some(ratio),
+            };
+            // Patterns allow only certain numbers.
+            Some(coarse).filter(|_| 2 * fewer <= base)
+        } else {
+            None
         };
-        // Patterns allow only certain numbers.
-        Some(coarse).filter(|_| 2 * fewer <= base)
-    } else {
-        None
-    };
     // Where the water sees the shape itself and not a mesh of it, so do gravity and buoyancy.
     let formula = if closed || coarse.is_some() {
         MassProperties::by_formula(shape)?

@@ -76,8 +76,7 @@ impl<'a> Trajectory<'a> {
     }
 
     /// What acts during a step, and the controller's next mode.
-    fn input(&self, state: &State, sample: &Sample) -> Result<(Input, usize)> {
-        let index = state.step;
+    fn input(&self, index: usize, state: &State, sample: &Sample) -> Result<(Input, usize)> {
         let action = self.policy.act(&observation(state, sample));
         let mode = action.mode;
         expect_length("hold", action.hold.len(), self.stepper.system.len(), "body")?;
@@ -245,11 +244,11 @@ impl Step for Trajectory<'_> {
     type Local = Local;
     type Error = Error;
 
-    fn step(&self, _index: usize, state: &State) -> Result<(State, Sample)> {
+    fn step(&self, index: usize, state: &State) -> Result<(State, Sample)> {
         let run = || {
             let (e, gap) = self.evaluate(state)?;
             let mut sample = self.observe(&e, state, gap)?;
-            let (input, mode) = self.input(state, &sample)?;
+            let (input, mode) = self.input(index, state, &sample)?;
             let mut next = self.stepper.step(&e, state, &sample.v, &input)?;
             next.state.mode = mode;
             sample.control = input.control;

@@ -432,7 +432,7 @@ impl<'a> Plan<'a> {
             | Shape::Cylinder { faces, .. }
             | Shape::Capsule { faces, .. }
             | Shape::Prism { faces, .. } => Some(faces.unwrap_or(DEFAULT_FACES)),
-            Shape::Mesh { .. } => None,
+            Shape::Mesh { .. } | Shape::Triangles { .. } => None,
         };
         let shapes = self.scene.bodies.iter().filter_map(|b| b.shape.as_ref());
         shapes.filter_map(own).all(|n| n == faces)

@@ -66,7 +66,7 @@ impl Geometry {
                 let along_z = |z: f64, [x, y]: [f64; 2]| Vec3::new(x, y, z);
                 Form::Core(extrude(&name, &rim, 0.5 * length, along_z)?)
             }
-            Shape::Mesh { .. } => {
+            Shape::Mesh { .. } | Shape::Triangles { .. } => {
                 return Self::of_mesh(&shape::build(shape, base_dir, None)?, offset);
             }
         };

@@ -14,6 +14,7 @@ pub use parse::{parse_shape, shape_name};
 use super::mesh::TriMesh;
 use crate::error::{Error, Result};
 use crate::scene::Shape;
+use hydrograd_adjoint::lie::Vec3;
 use std::path::Path;
 
 /// Faces of a shape that doesn't ask for a number: four times refined icosahedron for spheres.
@@ -55,6 +56,10 @@ pub fn build(shape: &Shape, base_dir: &Path, faces_override: Option<usize>) -> R
             faces,
         } => prism::prism(profile, *length, target(faces)),
         Shape::Mesh { path, scale } => return read(&base_dir.join(path), *scale),
+        Shape::Triangles { vertices, faces } => (
+            vertices.iter().map(|v| Vec3::from(*v)).collect(),
+            faces.clone(),
+        ),
     };
     TriMesh::new(name, vertices, faces)
 }
@@ -150,6 +155,8 @@ pub fn validate(shape: &Shape, place: &str) -> Result<()> {
             }
             &None
         }
+        // What is wrong with it, its mesh tells.
+        Shape::Triangles { .. } => &None,
     };
     asked.map_or(Ok(()), |faces| check_faces(place, faces))
 }

@@ -123,5 +123,6 @@ pub fn shape_name(shape: &Shape) -> String {
             format!("prism:{length:?}{}", corners.collect::<String>())
         }
         Shape::Mesh { path, .. } => path.display().to_string(),
+        Shape::Triangles { faces, .. } => format!("of {} triangles", faces.len()),
     }
 }

@@ -31,7 +31,10 @@ impl Form {
                 radius,
                 half: 0.5 * length,
             },
-            Shape::Box { .. } | Shape::Prism { .. } | Shape::Mesh { .. } => Self::Flat,
+            Shape::Box { .. }
+            | Shape::Prism { .. }
+            | Shape::Mesh { .. }
+            | Shape::Triangles { .. } => Self::Flat,
         }
     }
 

@@ -225,7 +225,9 @@ impl<'a> Case<'a> {
             let few = |s: &Surface| s.mesh.faces().len() <= COUPLING_FACES;
             let mesh = match (own, &body.shape) {
                 (Some(own), _) if few(own) => Some(own.mesh.clone()),
-                (Some(own), Some(Shape::Mesh { .. })) => Some(own.mesh.coarsened(COUPLING_FACES)?),
+                (Some(own), Some(Shape::Mesh { .. } | Shape::Triangles { .. })) => {
+                    Some(own.mesh.coarsened(COUPLING_FACES)?)
+                }
                 (own, _) => {
                     // Refined regions keep their share of the faces.
                     let fewer = own

@@ -192,11 +192,13 @@ fn other(case: &Case, body: usize, own: &Surface, factor: f64) -> Result<Option<
     let target = times(own.faces().len());
     let body = &case.scene().bodies[body];
     match &body.shape {
-        Some(Shape::Mesh { .. }) if factor < 1.0 => {
+        Some(Shape::Mesh { .. } | Shape::Triangles { .. }) if factor < 1.0 => {
             Ok(Some(Surface::of_mesh(own.coarsened(target)?)))
         }
-        Some(Shape::Mesh { .. }) if factor == 4.0 => Ok(Some(Surface::of_mesh(own.split()))),
-        Some(Shape::Mesh { .. }) => Ok(None),
+        Some(Shape::Mesh { .. } | Shape::Triangles { .. }) if factor == 4.0 => {
+            Ok(Some(Surface::of_mesh(own.split())))
+        }
+        Some(Shape::Mesh { .. } | Shape::Triangles { .. }) => Ok(None),
         _ => {
             let settings = case.simulator.settings();
             surface(body, settings, Some(base), factor.powf(-0.5))
@@ -208,7 +210,7 @@ fn other(case: &Case, body: usize, own: &Surface, factor: f64) -> Result<Option<
 fn order_of(case: &Case, body: usize, own: &TriMesh) -> f64 {
     match &case.scene().bodies[body].shape {
         Some(Shape::Sphere { .. } | Shape::Ellipsoid { .. } | Shape::Capsule { .. }) => SMOOTH,
-        Some(Shape::Mesh { .. })
+        Some(Shape::Mesh { .. } | Shape::Triangles { .. })
             if own.sharp_edges(TURN) <= LENGTH * own.mass_properties().area.sqrt() =>
         {
             FACETED

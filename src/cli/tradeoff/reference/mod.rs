@@ -302,7 +302,7 @@ fn shapes(scene: &Scene) -> impl Iterator<Item = &Shape> {
 
 /// Whether a shape's number of faces can be chosen.
 fn refinable(shape: &Shape) -> bool {
-    !matches!(shape, Shape::Mesh { .. })
+    !matches!(shape, Shape::Mesh { .. } | Shape::Triangles { .. })
 }
 
 /// A force for every velocity, of unit length in the metric of the mass matrix's diagonal: by the

@@ -1,0 +1,19 @@
+"""Scalars of a rollout, added with `+` and weighted with `*`, for `Rollout.value` and `Rollout.gradient`."""
+
+from hydrograd._hydrograd import (
+    Objective,
+    effort,
+    final_coordinate,
+    final_position,
+    final_velocity,
+    mean_position,
+)
+
+__all__ = [
+    "Objective",
+    "effort",
+    "final_coordinate",
+    "final_position",
+    "final_velocity",
+    "mean_position",
+]

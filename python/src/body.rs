@@ -1,0 +1,226 @@
+//! Bodies and their drag.
+
+use crate::array::{self, Dim, fixed, or_zeros, row};
+use crate::error::input;
+use crate::joint::{Joint, Motion};
+use crate::shape::Shape;
+use hydrograd::scene::{self, DragPart, Placement, Refinement};
+use pyo3::prelude::*;
+
+/// Drag per area of a body's surface: `linear` in kg/(m² s), `quadratic` dimensionless (½ρc|w|w); the parts of the local
+/// velocity that drag are "tangential", "normal" or "total".
+#[pyclass(frozen, eq, module = "hydrograd")]
+#[derive(Clone, PartialEq)]
+pub struct Drag(pub scene::Drag);
+
+fn part(name: &str, given: &str) -> PyResult<DragPart> {
+    match given {
+        "tangential" => Ok(DragPart::Tangential),
+        "normal" => Ok(DragPart::Normal),
+        "total" => Ok(DragPart::Total),
+        _ => Err(input(
+            format!("drag: {name}"),
+            format!("{given:?}"),
+            "must be \"tangential\", \"normal\" or \"total\"",
+        )),
+    }
+}
+
+#[pymethods]
+impl Drag {
+    #[new]
+    #[pyo3(signature = (*, linear=0.0, part="tangential", quadratic=0.0, quadratic_part="tangential"))]
+    fn new(linear: f64, part: &str, quadratic: f64, quadratic_part: &str) -> PyResult<Self> {
+        Ok(Self(scene::Drag {
+            part: self::part("part", part)?,
+            linear,
+            quadratic_part: self::part("quadratic_part", quadratic_part)?,
+            quadratic,
+        }))
+    }
+
+    fn __repr__(&self) -> String {
+        format!("{:?}", self.0)
+    }
+}
+
+/// A rigid body with the joint that carries it.
+///
+/// `shape` is what the water sees; without one the body is dry. Give `density` (kg/m³) or `mass` (kg); `inertia` about
+/// the centre of mass (xx, yy, zz or also xy, xz, yz; kg m²) and `center_of_mass` (m) follow from the shape if left out.
+/// `position` (m) and `rotation` (axis times angle, rad) place the joint's frame in the frame of `parent`, a body's name or
+/// number, or the world. `actuated` makes the joint's forces controls (N, N m; a free joint has six), `thruster` a wrench on
+/// the body in world axes. `locked` holds the joint, `motion` (one per coordinate) drives it, `limits` (m or rad) stop it.
+/// `shape_position` and `shape_rotation` place the shape in the body; `refine` lists balls (center, radius, edge), m,
+/// where its faces are made smaller. `added_mass` (6, 6) replaces the body's own at unit density, with `isolated`.
+#[pyclass(frozen, eq, module = "hydrograd")]
+#[derive(Clone, PartialEq)]
+pub struct Body {
+    /// The body, without its parent where that is a number.
+    pub body: hydrograd::Body,
+    /// The parent, where it was given as a number.
+    pub parent: Option<usize>,
+}
+
+#[derive(FromPyObject)]
+enum Parent {
+    Number(usize),
+    Name(String),
+}
+
+#[derive(FromPyObject)]
+struct Ball<'py>(Bound<'py, PyAny>, f64, f64);
+
+#[pymethods]
+impl Body {
+    #[new]
+    #[pyo3(signature = (
+        shape=None, *, name=String::new(), density=None, mass=None, inertia=None, center_of_mass=None, position=None,
+        rotation=None, joint=None, parent=None, actuated=false, thruster=false, locked=false, motion=None, limits=None,
+        limit_stiffness=None, drag=None, shape_position=None, shape_rotation=None, refine=Vec::new(), added_mass=None,
+        overlaps_parent=false
+    ))]
+    #[expect(
+        clippy::too_many_arguments,
+        reason = "one per keyword of the constructor"
+    )]
+    fn new(
+        shape: Option<PyRef<'_, Shape>>,
+        name: String,
+        density: Option<f64>,
+        mass: Option<f64>,
+        inertia: Option<&Bound<'_, PyAny>>,
+        center_of_mass: Option<&Bound<'_, PyAny>>,
+        position: Option<&Bound<'_, PyAny>>,
+        rotation: Option<&Bound<'_, PyAny>>,
+        joint: Option<PyRef<'_, Joint>>,
+        parent: Option<Parent>,
+        actuated: bool,
+        thruster: bool,
+        locked: bool,
+        motion: Option<Vec<PyRef<'_, Motion>>>,
+        limits: Option<&Bound<'_, PyAny>>,
+        limit_stiffness: Option<f64>,
+        drag: Option<PyRef<'_, Drag>>,
+        shape_position: Option<&Bound<'_, PyAny>>,
+        shape_rotation: Option<&Bound<'_, PyAny>>,
+        refine: Vec<Ball<'_>>,
+        added_mass: Option<&Bound<'_, PyAny>>,
+        overlaps_parent: bool,
+    ) -> PyResult<Self> {
+        let at = |field: &str| {
+            if name.is_empty() {
+                format!("body: {field}")
+            } else {
+                format!("body {name:?}: {field}")
+            }
+        };
+        for (field, value) in [("density", density), ("mass", mass)] {
+            if let Some(value) = value
+                && !(value >= 0.0 && value.is_finite())
+            {
+                return Err(input(at(field), value, "must be finite and not negative"));
+            }
+        }
+        let added_mass = added_mass.map(|given| {
+            let rows = array::array(&at("added_mass"), given, &[Dim::Is(6), Dim::Is(6)])?;
+            PyResult::Ok(rows.values.chunks(6).map(<[f64]>::to_vec).collect())
+        });
+        let refine = refine.iter().map(|Ball(center, radius, edge)| {
+            Ok(Refinement {
+                center: fixed(&at("refine: center"), center)?,
+                radius: *radius,
+                edge: *edge,
+            })
+        });
+        let optional = |field: &str, given: Option<&Bound<'_, PyAny>>| {
+            given.map(|g| fixed(&at(field), g)).transpose()
+        };
+        let (number, parent) = match parent {
+            Some(Parent::Number(number)) => (Some(number), None),
+            Some(Parent::Name(name)) => (None, Some(name)),
+            None => (None, None),
+        };
+        let body = hydrograd::Body {
+            shape: shape.map(|s| s.0.clone()),
+            shape_at: Placement::new(
+                or_zeros(&at("shape_position"), shape_position)?,
+                or_zeros(&at("shape_rotation"), shape_rotation)?,
+            ),
+            refine: refine.collect::<PyResult<_>>()?,
+            mass,
+            density,
+            center_of_mass: optional("center_of_mass", center_of_mass)?,
+            inertia: inertia
+                .map(|given| row(&at("inertia"), given))
+                .transpose()?,
+            added_mass: added_mass.transpose()?,
+            parent,
+            overlaps_parent,
+            placement: Placement::new(
+                or_zeros(&at("position"), position)?,
+                or_zeros(&at("rotation"), rotation)?,
+            ),
+            joint: joint.map_or_else(Default::default, |j| j.0),
+            motion: motion.map(|list| list.iter().map(|m| m.0).collect()),
+            locked,
+            limits: limits
+                .map(|given| fixed(&at("limits"), given))
+                .transpose()?,
+            limit_stiffness,
+            actuated,
+            thruster,
+            drag: drag.map(|d| d.0),
+            name: name.clone(),
+        };
+        Ok(Self {
+            body,
+            parent: number,
+        })
+    }
+
+    /// Its name; empty until it is added to a scene if it was given none.
+    #[getter]
+    fn name(&self) -> &str {
+        &self.body.name
+    }
+
+    /// Its shape.
+    #[getter]
+    fn shape(&self) -> Option<Shape> {
+        self.body.shape.clone().map(Shape)
+    }
+
+    /// Its joint.
+    #[getter]
+    fn joint(&self) -> Joint {
+        Joint(self.body.joint)
+    }
+
+    /// Its density, kg/m³, if that was given.
+    #[getter]
+    fn density(&self) -> Option<f64> {
+        self.body.density
+    }
+
+    /// Its mass, kg, if that was given.
+    #[getter]
+    fn mass(&self) -> Option<f64> {
+        self.body.mass
+    }
+
+    /// Position of its joint in the parent's frame, m.
+    #[getter]
+    fn position(&self) -> (f64, f64, f64) {
+        self.body.placement.position.into()
+    }
+
+    fn __repr__(&self) -> String {
+        let shape = self.body.shape.as_ref().map_or("dry", |s| s.kind());
+        format!(
+            "Body({:?}, {shape}, {})",
+            self.body.name,
+            self.body.joint.kind()
+        )
+    }
+}

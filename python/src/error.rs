@@ -1,0 +1,163 @@
+//! Exceptions: one tree under `hydrograd.Error`, each with the message of the Rust side.
+
+use pyo3::exceptions::{PyException, PyOSError, PyValueError};
+use pyo3::prelude::*;
+use pyo3::sync::PyOnceLock;
+use pyo3::types::{PyTuple, PyType};
+
+/// Names of the exceptions, the built-in one that each also is, and what they say.
+const KINDS: [(&str, Option<Builtin>, &str); 8] = [
+    (
+        "InputError",
+        Some(Builtin::Value),
+        "A value that can't be used: the message names the place, the value and what would be right.",
+    ),
+    (
+        "MeshError",
+        None,
+        "A surface mesh that doesn't bound a volume, or bounds it badly.",
+    ),
+    (
+        "FileError",
+        Some(Builtin::Os),
+        "A file that can't be read, written or understood.",
+    ),
+    (
+        "SolverError",
+        None,
+        "A linear or nonlinear solve that didn't reach its tolerance.",
+    ),
+    (
+        "UnresolvedError",
+        None,
+        "The physics left what the discretisation or the time step resolves.",
+    ),
+    (
+        "UnsupportedError",
+        None,
+        "A combination of settings that has no meaning or isn't offered.",
+    ),
+    (
+        "DeviceError",
+        None,
+        "A GPU that isn't there, can't do what is needed, or failed.",
+    ),
+    (
+        "InternalError",
+        None,
+        "A fault of hydrograd itself; please report it with its message.",
+    ),
+];
+
+#[derive(Clone, Copy)]
+enum Builtin {
+    Value,
+    Os,
+}
+
+static BASE: PyOnceLock<Py<PyType>> = PyOnceLock::new();
+static CLASSES: PyOnceLock<Vec<Py<PyType>>> = PyOnceLock::new();
+
+fn base(py: Python<'_>) -> PyResult<&Bound<'_, PyType>> {
+    let made = BASE.get_or_try_init(py, || {
+        let doc = c"Base of all errors of hydrograd.";
+        let class = PyErr::new_type(
+            py,
+            c"hydrograd.Error",
+            Some(doc),
+            Some(&py.get_type::<PyException>()),
+            None,
+        )?;
+        PyResult::Ok(class)
+    })?;
+    Ok(made.bind(py))
+}
+
+fn classes(py: Python<'_>) -> PyResult<&Vec<Py<PyType>>> {
+    CLASSES.get_or_try_init(py, || KINDS.iter().map(|kind| class(py, kind)).collect())
+}
+
+/// One exception class: `type(name, bases, {...})`, because some have two bases.
+fn class(
+    py: Python<'_>,
+    (name, builtin, doc): &(&str, Option<Builtin>, &str),
+) -> PyResult<Py<PyType>> {
+    let base = base(py)?;
+    let bases = match builtin {
+        None => PyTuple::new(py, [base.clone()])?,
+        Some(Builtin::Value) => PyTuple::new(py, [base.clone(), py.get_type::<PyValueError>()])?,
+        Some(Builtin::Os) => PyTuple::new(py, [base.clone(), py.get_type::<PyOSError>()])?,
+    };
+    let namespace = pyo3::types::PyDict::new(py);
+    namespace.set_item("__doc__", doc)?;
+    namespace.set_item("__module__", "hydrograd")?;
+    let made = py.get_type::<PyType>().call1((*name, bases, namespace))?;
+    Ok(made.cast_into::<PyType>()?.unbind())
+}
+
+/// An exception of the kind named, with a message.
+fn raise(name: &str, message: String) -> PyErr {
+    Python::attach(|py| {
+        let at = KINDS.iter().position(|(kind, ..)| *kind == name);
+        match (classes(py), at) {
+            (Ok(classes), Some(at)) => PyErr::from_type(classes[at].bind(py).clone(), message),
+            (Err(error), _) => error,
+            (_, None) => PyException::new_err(message),
+        }
+    })
+}
+
+/// The exception of an error of the Rust side.
+pub fn exception(error: hydrograd::Error) -> PyErr {
+    use hydrograd::Error;
+    let name = match &error {
+        Error::Input { .. } => "InputError",
+        Error::Mesh { .. } => "MeshError",
+        Error::File { .. } | Error::Parse { .. } => "FileError",
+        Error::Solver { .. } => "SolverError",
+        Error::Unresolved { .. } => "UnresolvedError",
+        Error::Unsupported { .. } => "UnsupportedError",
+        Error::Device { .. } => "DeviceError",
+        _ => "InternalError",
+    };
+    raise(name, error.to_string())
+}
+
+/// An `InputError`: what was given where, and what would be right.
+pub fn input(
+    place: impl Into<String>,
+    value: impl std::fmt::Display,
+    expected: impl Into<String>,
+) -> PyErr {
+    exception(hydrograd::Error::input(place, value, expected))
+}
+
+/// An `InternalError`: what a panic said.
+pub fn internal(message: &str) -> PyErr {
+    raise(
+        "InternalError",
+        format!("hydrograd failed unexpectedly: {message}; please report this"),
+    )
+}
+
+/// A result of the Rust side for Python.
+pub trait OrRaise<T> {
+    /// The value, or the exception of its error.
+    fn or_raise(self) -> PyResult<T>;
+}
+
+impl<T> OrRaise<T> for hydrograd::Result<T> {
+    fn or_raise(self) -> PyResult<T> {
+        self.map_err(exception)
+    }
+}
+
+/// Adds the exceptions to the module.
+pub fn register(m: &Bound<'_, PyModule>) -> PyResult<()> {
+    let py = m.py();
+    m.add("Error", base(py)?)?;
+    for ((name, ..), class) in KINDS.iter().zip(classes(py)?) {
+        m.add(*name, class.bind(py))?;
+    }
+    Ok(())
+}

@@ -1,0 +1,151 @@
+//! Joints, and given motions of their coordinates.
+
+use crate::array::fixed;
+use crate::error::input;
+use hydrograd::scene::{self, Plane};
+use pyo3::prelude::*;
+
+/// How a body moves against its parent: made by `free`, `fixed`, `prismatic`, `revolute`, `planar` or `spherical`.
+#[pyclass(frozen, eq, module = "hydrograd")]
+#[derive(Clone, PartialEq)]
+pub struct Joint(pub hydrograd::Joint);
+
+#[pymethods]
+impl Joint {
+    /// The joint's name in a scene file.
+    #[getter]
+    fn kind(&self) -> &'static str {
+        self.0.kind()
+    }
+
+    /// Number of coordinates q.
+    #[getter]
+    fn q_size(&self) -> usize {
+        self.0.coordinates()
+    }
+
+    /// Number of generalised velocities v.
+    #[getter]
+    fn v_size(&self) -> usize {
+        self.0.velocities()
+    }
+
+    fn __repr__(&self) -> String {
+        match self.0 {
+            hydrograd::Joint::Prismatic { axis: [x, y, z] }
+            | hydrograd::Joint::Revolute { axis: [x, y, z] } => {
+                format!("{}(({x:?}, {y:?}, {z:?}))", self.0.kind())
+            }
+            hydrograd::Joint::Planar { plane } => {
+                format!("planar({:?})", format!("{plane:?}").to_lowercase())
+            }
+            _ => format!("{}()", self.0.kind()),
+        }
+    }
+}
+
+/// A given motion of one joint coordinate, q(t): made by `Motion.linear` or `Motion.sine`.
+#[pyclass(frozen, eq, module = "hydrograd")]
+#[derive(Clone, PartialEq)]
+pub struct Motion(pub scene::Motion);
+
+#[pymethods]
+impl Motion {
+    /// `offset + rate·t`: offset in m or rad, rate in m/s or rad/s.
+    #[staticmethod]
+    #[pyo3(signature = (rate, offset=0.0))]
+    fn linear(rate: f64, offset: f64) -> Self {
+        Self(scene::Motion::Linear { offset, rate })
+    }
+
+    /// `offset + amplitude·sin(frequency·t + phase)`: amplitude and offset in m or rad, frequency in rad/s, phase in rad.
+    #[staticmethod]
+    #[pyo3(signature = (amplitude, frequency, phase=0.0, offset=0.0))]
+    fn sine(amplitude: f64, frequency: f64, phase: f64, offset: f64) -> Self {
+        Self(scene::Motion::Sine {
+            offset,
+            amplitude,
+            frequency,
+            phase,
+        })
+    }
+
+    fn __repr__(&self) -> String {
+        match self.0 {
+            scene::Motion::Linear { offset, rate } => {
+                format!("Motion.linear(rate={rate:?}, offset={offset:?})")
+            }
+            scene::Motion::Sine {
+                offset,
+                amplitude,
+                frequency,
+                phase,
+            } => format!(
+                "Motion.sine(amplitude={amplitude:?}, frequency={frequency:?}, phase={phase:?}, offset={offset:?})"
+            ),
+        }
+    }
+}
+
+/// A joint that lets a body move freely: q = position (m) and unit quaternion (w, x, y, z), v = velocity of the body's
+/// origin (m/s) and angular velocity (rad/s), in the parent's frame.
+#[pyfunction]
+fn free() -> Joint {
+    Joint(hydrograd::Joint::Free)
+}
+
+/// A joint that doesn't move.
+#[pyfunction(name = "fixed")]
+fn rigid() -> Joint {
+    Joint(hydrograd::Joint::Fixed)
+}
+
+/// A joint along `axis` (three numbers, joint's frame): q in m, v in m/s.
+#[pyfunction]
+fn prismatic(axis: &Bound<'_, PyAny>) -> PyResult<Joint> {
+    Ok(Joint(hydrograd::Joint::Prismatic {
+        axis: fixed("prismatic: axis", axis)?,
+    }))
+}
+
+/// A joint about `axis` (three numbers, joint's frame): q in rad, v in rad/s.
+#[pyfunction]
+fn revolute(axis: &Bound<'_, PyAny>) -> PyResult<Joint> {
+    Ok(Joint(hydrograd::Joint::Revolute {
+        axis: fixed("revolute: axis", axis)?,
+    }))
+}
+
+/// A joint in a plane, "xy", "yz" or "zx": q = two translations in that order (m) and the angle about the normal (rad).
+#[pyfunction]
+fn planar(plane: &str) -> PyResult<Joint> {
+    let plane = match plane {
+        "xy" => Plane::Xy,
+        "yz" => Plane::Yz,
+        "zx" => Plane::Zx,
+        _ => {
+            return Err(input(
+                "planar: plane",
+                format!("{plane:?}"),
+                "must be \"xy\", \"yz\" or \"zx\"",
+            ));
+        }
+    };
+    Ok(Joint(hydrograd::Joint::Planar { plane }))
+}
+
+/// A joint about a point: q a unit quaternion (w, x, y, z), v the angular velocity in the parent's frame, rad/s.
+#[pyfunction]
+fn spherical() -> Joint {
+    Joint(hydrograd::Joint::Spherical)
+}
+
+/// Adds the functions to the module.
+pub fn register(m: &Bound<'_, PyModule>) -> PyResult<()> {
+    m.add_function(wrap_pyfunction!(free, m)?)?;
+    m.add_function(wrap_pyfunction!(rigid, m)?)?;
+    m.add_function(wrap_pyfunction!(prismatic, m)?)?;
+    m.add_function(wrap_pyfunction!(revolute, m)?)?;
+    m.add_function(wrap_pyfunction!(planar, m)?)?;
+    m.add_function(wrap_pyfunction!(spherical, m)?)
+}

@@ -1,0 +1,88 @@
+//! The Python face of hydrograd: types and arrays in, types and arrays out. No numerics.
+
+mod array;
+mod body;
+mod error;
+mod fluid;
+mod gradient;
+mod interrupt;
+mod joint;
+mod objective;
+mod prepare;
+mod rollout;
+mod scene;
+mod settings;
+mod shape;
+mod simulator;
+mod state;
+
+use numpy::PyArrayDyn;
+use pyo3::prelude::*;
+use simulator::Simulator;
+use state::State;
+use std::path::PathBuf;
+
+/// Unpickles a simulator: prepares it again.
+#[pyfunction]
+fn _simulator(
+    py: Python<'_>,
+    scene: &str,
+    settings: &str,
+    cache: Option<PathBuf>,
+    parameters: Vec<f64>,
+    start: (Vec<f64>, Vec<f64>, Vec<f64>),
+) -> PyResult<Simulator> {
+    prepare::rebuild(py, scene, settings, cache, &parameters, start)
+}
+
+/// Unpickles a state.
+#[pyfunction]
+fn _state(
+    simulator: Py<Simulator>,
+    step: usize,
+    q: Vec<f64>,
+    y: Vec<f64>,
+    held: Vec<bool>,
+    mode: usize,
+    v: Vec<f64>,
+) -> State {
+    State::from_parts((simulator, step, q, y, held, mode, v))
+}
+
+/// Unpickles a rollout: runs it again.
+#[pyfunction]
+fn _rollout<'py>(
+    simulator: &Bound<'py, Simulator>,
+    state: &Bound<'py, State>,
+    controls: &Bound<'py, PyArrayDyn<f64>>,
+) -> PyResult<Bound<'py, PyAny>> {
+    let options = pyo3::types::PyDict::new(simulator.py());
+    options.set_item("state", state)?;
+    simulator.call_method("rollout", (controls,), Some(&options))
+}
+
+/// Rigid bodies in water, simulated and differentiated; the compiled part of `hydrograd`.
+#[pymodule]
+fn _hydrograd(m: &Bound<'_, PyModule>) -> PyResult<()> {
+    m.add("__version__", env!("CARGO_PKG_VERSION"))?;
+    error::register(m)?;
+    m.add_class::<fluid::Fluid>()?;
+    m.add_class::<fluid::Contact>()?;
+    m.add_class::<body::Body>()?;
+    m.add_class::<body::Drag>()?;
+    m.add_class::<shape::Shape>()?;
+    m.add_class::<joint::Joint>()?;
+    m.add_class::<joint::Motion>()?;
+    m.add_class::<scene::Scene>()?;
+    m.add_class::<simulator::Simulator>()?;
+    m.add_class::<state::State>()?;
+    m.add_class::<state::Record>()?;
+    m.add_class::<rollout::Rollout>()?;
+    m.add_class::<objective::Objective>()?;
+    shape::register(m)?;
+    joint::register(m)?;
+    m.add_function(wrap_pyfunction!(_simulator, m)?)?;
+    m.add_function(wrap_pyfunction!(_state, m)?)?;
+    m.add_function(wrap_pyfunction!(_rollout, m)?)?;
+    objective::register(m)
+}

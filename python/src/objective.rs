@@ -1,0 +1,73 @@
+//! Objectives: weighted sums of terms of a trajectory.
+
+use crate::array::fixed;
+use hydrograd::objective::{self, Sum};
+use hydrograd::scene::BodyId;
+use pyo3::prelude::*;
+
+/// A scalar of a rollout: made by the functions of `hydrograd.objective`, added with `+` and weighted with `*`.
+#[pyclass(frozen, module = "hydrograd")]
+#[derive(Clone)]
+pub struct Objective(pub Sum);
+
+#[pymethods]
+impl Objective {
+    fn __add__(&self, other: PyRef<'_, Self>) -> Self {
+        Self(self.0.clone() + other.0.clone())
+    }
+
+    fn __mul__(&self, factor: f64) -> Self {
+        Self(self.0.clone().scaled(factor))
+    }
+
+    fn __rmul__(&self, factor: f64) -> Self {
+        self.__mul__(factor)
+    }
+
+    fn __repr__(&self) -> String {
+        format!("Objective({:?})", self.0)
+    }
+}
+
+/// Squared distance (m²) of the origin of body number `body` from `target` (m, world axes) at the end.
+#[pyfunction]
+fn final_position(body: usize, target: &Bound<'_, PyAny>) -> PyResult<Objective> {
+    let target = fixed("final_position: target", target)?;
+    Ok(Objective(objective::final_position(BodyId(body), target)))
+}
+
+/// Mean squared distance (m²) of the origin of body number `body` from `target` (m, world axes) over all states.
+#[pyfunction]
+fn mean_position(body: usize, target: &Bound<'_, PyAny>) -> PyResult<Objective> {
+    let target = fixed("mean_position: target", target)?;
+    Ok(Objective(objective::mean_position(BodyId(body), target)))
+}
+
+/// `weight · (q[index] − target)²` at the end, for a coordinate of a prismatic, revolute or planar joint (m or rad).
+#[pyfunction]
+#[pyo3(signature = (index, target, weight=1.0))]
+fn final_coordinate(index: usize, target: f64, weight: f64) -> Objective {
+    Objective(objective::final_coordinate(index, target, weight))
+}
+
+/// `weight · (v[index] − target)²` at the end (m/s or rad/s).
+#[pyfunction]
+#[pyo3(signature = (index, target, weight=1.0))]
+fn final_velocity(index: usize, target: f64, weight: f64) -> Objective {
+    Objective(objective::final_velocity(index, target, weight))
+}
+
+/// `weight` times the sum of the squared open-loop controls (N², N² m²).
+#[pyfunction]
+fn effort(weight: f64) -> Objective {
+    Objective(objective::effort(weight))
+}
+
+/// Adds the functions to the module.
+pub fn register(m: &Bound<'_, PyModule>) -> PyResult<()> {
+    m.add_function(wrap_pyfunction!(final_position, m)?)?;
+    m.add_function(wrap_pyfunction!(mean_position, m)?)?;
+    m.add_function(wrap_pyfunction!(final_coordinate, m)?)?;
+    m.add_function(wrap_pyfunction!(final_velocity, m)?)?;
+    m.add_function(wrap_pyfunction!(effort, m)?)
+}

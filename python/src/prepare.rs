@@ -1,0 +1,94 @@
+//! How simulators are made and made again, and where their runs begin.
+
+use crate::error::{OrRaise, input};
+use crate::interrupt::long;
+use crate::simulator::Simulator;
+use hydrograd::{Settings, dynamics};
+use nalgebra::DVector;
+use pyo3::prelude::*;
+use std::path::PathBuf;
+use std::sync::Arc;
+
+/// A simulator of a scene; Ctrl-C gives it up.
+pub fn build(
+    py: Python<'_>,
+    scene: hydrograd::Scene,
+    settings: Settings,
+    cache: Option<PathBuf>,
+) -> PyResult<Simulator> {
+    let (of, folder) = (scene.clone(), cache.clone());
+    let made = long(py, move |_| match folder {
+        Some(folder) => hydrograd::Simulator::cached(&of, settings, &folder),
+        None => hydrograd::Simulator::new(&of, settings),
+    })?;
+    Ok(Simulator {
+        inner: Arc::new(made),
+        scene,
+        cache,
+    })
+}
+
+/// Scene, settings, folder, parameters, and initial q, v and gains.
+pub type Parts = (
+    String,
+    String,
+    Option<PathBuf>,
+    Vec<f64>,
+    (Vec<f64>, Vec<f64>, Vec<f64>),
+);
+
+/// A simulator from what `__reduce__` gives.
+pub fn rebuild(
+    py: Python<'_>,
+    toml: &str,
+    settings: &str,
+    cache: Option<PathBuf>,
+    parameters: &[f64],
+    start: (Vec<f64>, Vec<f64>, Vec<f64>),
+) -> PyResult<Simulator> {
+    let scene = hydrograd::Scene::from_toml(toml, "").or_raise()?;
+    let settings = serde_json::from_str(settings).map_err(|e| {
+        input(
+            "pickled simulator: settings",
+            e,
+            "must come from this version of hydrograd",
+        )
+    })?;
+    let out = build(py, scene, settings, cache)?;
+    out.changed(|inner| {
+        if let Some(values) = inner.parameters().with_values(parameters) {
+            inner.set_parameters(values)?;
+        }
+        inner.set_start(start.0.into(), start.1.into())?;
+        set_gains(inner, &start.2)
+    })
+}
+
+/// Gives the controller other gains.
+pub fn set_gains(simulator: &mut hydrograd::Simulator, gains: &[f64]) -> hydrograd::Result<()> {
+    let policy = simulator.policy().with_gains(gains)?;
+    simulator.set_policy(policy);
+    Ok(())
+}
+
+/// Where a run begins.
+#[derive(Clone)]
+pub enum Start {
+    /// Where the simulator says.
+    Scene,
+    /// At coordinates and a velocity.
+    From(DVector<f64>, DVector<f64>),
+    /// At a state.
+    At(dynamics::State),
+}
+
+impl Start {
+    /// The state there.
+    pub fn state(&self, simulator: &hydrograd::Simulator) -> hydrograd::Result<dynamics::State> {
+        match self {
+            Self::Scene => simulator.initial(),
+            Self::From(q, v) => simulator.state(0, q, v),
+            Self::At(state) => Ok(state.clone()),
+        }
+    }
+}

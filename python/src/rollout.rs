@@ -1,0 +1,343 @@
+//! Rollouts: trajectories with the key to their gradients.
+
+use crate::array::{self, Dim};
+use crate::gradient;
+use crate::interrupt::{long, short};
+use crate::objective::Objective;
+use crate::simulator::Simulator;
+use crate::state::State;
+use hydrograd::simulate::{Cotangents, Recording, Sample};
+use nalgebra::DMatrix;
+use numpy::PyArrayDyn;
+use pyo3::prelude::*;
+use pyo3::types::PyDict;
+use self_cell::self_cell;
+use std::sync::Arc;
+
+type Borrowed<'a> = hydrograd::Rollout<'a>;
+
+self_cell!(
+    /// A rollout with the simulator that it belongs to.
+    pub struct Owned {
+        owner: Arc<hydrograd::Simulator>,
+        #[covariant]
+        dependent: Borrowed,
+    }
+);
+
+/// A trajectory of states 0 … N: the forward pass, and the only key to its gradient. Each access to an array makes a new one.
+#[pyclass(frozen, module = "hydrograd")]
+pub struct Rollout {
+    simulator: Py<Simulator>,
+    cell: Arc<Owned>,
+}
+
+type Numbers<'py> = PyResult<Bound<'py, PyArrayDyn<f64>>>;
+
+impl Rollout {
+    /// A rollout of a simulator.
+    pub fn new(simulator: &Bound<'_, Simulator>, cell: Arc<Owned>) -> Self {
+        Self {
+            simulator: simulator.clone().unbind(),
+            cell,
+        }
+    }
+
+    fn rollout(&self) -> &hydrograd::Rollout<'_> {
+        self.cell.borrow_dependent()
+    }
+
+    fn numbers<'py>(
+        &self,
+        py: Python<'py>,
+        of: impl Fn(&Sample) -> Vec<f64>,
+        shape: &[usize],
+    ) -> Numbers<'py> {
+        let samples = self.rollout().samples();
+        let mut whole = vec![samples.len()];
+        whole.extend(shape);
+        array::to_python(py, samples.iter().flat_map(of).collect(), &whole)
+    }
+
+    fn bodies(&self) -> usize {
+        self.cell.borrow_owner().system().len()
+    }
+}
+
+#[pymethods]
+impl Rollout {
+    /// The simulator that made it.
+    #[getter]
+    fn simulator(&self, py: Python<'_>) -> Py<Simulator> {
+        self.simulator.clone_ref(py)
+    }
+
+    /// Number of steps N.
+    #[getter]
+    fn steps(&self) -> usize {
+        self.rollout().steps()
+    }
+
+    /// Time, (N + 1,), s.
+    #[getter]
+    fn time<'py>(&self, py: Python<'py>) -> Numbers<'py> {
+        self.numbers(py, |s| vec![s.time], &[])
+    }
+
+    /// Joint coordinates, (N + 1, q_size), m, rad and unit quaternions (w, x, y, z).
+    #[getter]
+    fn q<'py>(&self, py: Python<'py>) -> Numbers<'py> {
+        let n = self.cell.borrow_owner().system().tree.coordinates();
+        self.numbers(py, |s| s.q.as_slice().to_vec(), &[n])
+    }
+
+    /// Generalised velocities, (N + 1, v_size), m/s and rad/s.
+    #[getter]
+    fn v<'py>(&self, py: Python<'py>) -> Numbers<'py> {
+        let n = self.cell.borrow_owner().system().tree.velocities();
+        self.numbers(py, |s| s.v.as_slice().to_vec(), &[n])
+    }
+
+    /// The open-loop controls, (N, control_size), N and N m.
+    #[getter]
+    fn controls<'py>(&self, py: Python<'py>) -> Numbers<'py> {
+        let controls = self.rollout().controls();
+        array::transposed(py, controls, &[controls.nrows()])
+    }
+
+    /// Positions of the bodies' origins, (N + 1, bodies, 3), m, world axes.
+    #[getter]
+    fn positions<'py>(&self, py: Python<'py>) -> Numbers<'py> {
+        let of = |s: &Sample| {
+            s.poses
+                .iter()
+                .flat_map(|p| [p.translation.x, p.translation.y, p.translation.z])
+                .collect()
+        };
+        self.numbers(py, of, &[self.bodies(), 3])
+    }
+
+    /// Rotation matrices of the bodies, body to world, (N + 1, bodies, 3, 3).
+    #[getter]
+    fn rotations<'py>(&self, py: Python<'py>) -> Numbers<'py> {
+        let of = |s: &Sample| {
+            s.poses
+                .iter()
+                .flat_map(|p| p.rotation.transpose().as_slice().to_vec())
+                .collect()
+        };
+        self.numbers(py, of, &[self.bodies(), 3, 3])
+    }
+
+    /// Velocities of the bodies, (N + 1, bodies, 6), world axes: of the origin, m/s, and angular, rad/s.
+    #[getter]
+    fn velocities<'py>(&self, py: Python<'py>) -> Numbers<'py> {
+        array::transposed(py, &self.rollout().velocities(), &[self.bodies(), 6])
+    }
+
+    /// Kinetic energy of bodies and fluid, (N + 1,), J.
+    #[getter]
+    fn kinetic_energy<'py>(&self, py: Python<'py>) -> Numbers<'py> {
+        self.numbers(py, |s| vec![s.kinetic_energy], &[])
+    }
+
+    /// Potential energy of weight and buoyancy, (N + 1,), J.
+    #[getter]
+    fn potential_energy<'py>(&self, py: Python<'py>) -> Numbers<'py> {
+        self.numbers(py, |s| vec![s.potential_energy], &[])
+    }
+
+    /// Total momentum of bodies and fluid, (N + 1, 6): linear, kg m/s, then angular about the world's origin, kg m²/s.
+    #[getter]
+    fn momentum<'py>(&self, py: Python<'py>) -> Numbers<'py> {
+        self.numbers(py, |s| s.momentum.as_slice().to_vec(), &[6])
+    }
+
+    /// Smallest gap between bodies or to a wall, (N + 1,), m; NaN where there is nothing to meet.
+    #[getter]
+    fn min_gap<'py>(&self, py: Python<'py>) -> Numbers<'py> {
+        let gaps = short(py, || Ok(self.rollout().gaps()))?;
+        let distances: Vec<f64> = gaps
+            .iter()
+            .map(|g| g.map_or(f64::NAN, |g| g.distance))
+            .collect();
+        let n = distances.len();
+        array::to_python(py, distances, &[n])
+    }
+
+    /// What should be known about this trajectory, with names and numbers.
+    #[getter]
+    fn warnings(&self) -> Vec<String> {
+        self.rollout().warnings()
+    }
+
+    /// The state after `step` steps, from which a run may go on; negative numbers count from the end.
+    #[pyo3(signature = (step=-1))]
+    fn state(&self, py: Python<'_>, step: isize) -> PyResult<State> {
+        let count = self.rollout().states().len();
+        let at = if step < 0 {
+            step + count as isize
+        } else {
+            step
+        };
+        let found = usize::try_from(at).ok().filter(|at| *at < count);
+        let at = found.ok_or_else(|| {
+            pyo3::exceptions::PyIndexError::new_err(format!(
+                "state {step} of a rollout that has {count}"
+            ))
+        })?;
+        Ok(State {
+            simulator: self.simulator.clone_ref(py),
+            state: self.rollout().states()[at].clone(),
+            velocity: self.rollout().samples()[at].v.clone(),
+        })
+    }
+
+    /// Value of an objective.
+    fn value(&self, py: Python<'_>, objective: PyRef<'_, Objective>) -> PyResult<f64> {
+        let objective = objective.0.clone();
+        short(py, || self.rollout().value(&objective))
+    }
+
+    /// Gradient of an objective, in one reverse sweep. Ctrl-C ends it.
+    fn gradient<'py>(
+        &self,
+        py: Python<'py>,
+        objective: PyRef<'py, Objective>,
+    ) -> PyResult<Bound<'py, PyAny>> {
+        use hydrograd::simulate::Objective as _;
+        let objective = objective.0.clone();
+        let cell = self.cell.clone();
+        let made = long(py, move |wish| {
+            let rollout = cell.borrow_dependent();
+            objective.check(rollout)?;
+            rollout.vjp_with(&objective.cotangents(rollout), |_| wish.go_on())
+        })?;
+        gradient::of_rollout(py, self.cell.borrow_owner(), &made)
+    }
+
+    /// Transpose of the rollout: the gradient of Σ cotangent · δ(observation), for any loss of your own. `q` in the tangent
+    /// space of the coordinates and `v` are (N + 1, v_size), `positions` and `rotations` (δR = δθ × R, world axes)
+    /// (N + 1, bodies, 3), `controls`, what the loss has of them directly, (N, control_size). What is None is zero. Ctrl-C ends
+    /// it.
+    #[pyo3(signature = (*, positions=None, rotations=None, q=None, v=None, controls=None))]
+    fn vjp<'py>(
+        &self,
+        py: Python<'py>,
+        positions: Option<&Bound<'py, PyAny>>,
+        rotations: Option<&Bound<'py, PyAny>>,
+        q: Option<&Bound<'py, PyAny>>,
+        v: Option<&Bound<'py, PyAny>>,
+        controls: Option<&Bound<'py, PyAny>>,
+    ) -> PyResult<Bound<'py, PyAny>> {
+        let mut seed: Cotangents = self.rollout().zero_cotangents();
+        let (states, steps) = (self.steps() + 1, self.steps());
+        let bodies = [Dim::Is(self.bodies()), Dim::Is(3)];
+        let nv = [Dim::Is(seed.q.nrows())];
+        let nu = [Dim::Is(seed.controls.nrows())];
+        let parts: [(&str, _, &mut DMatrix<f64>, usize, &[Dim]); 5] = [
+            (
+                "vjp: positions",
+                positions,
+                &mut seed.positions,
+                states,
+                &bodies,
+            ),
+            (
+                "vjp: rotations",
+                rotations,
+                &mut seed.rotations,
+                states,
+                &bodies,
+            ),
+            ("vjp: q", q, &mut seed.q, states, &nv),
+            ("vjp: v", v, &mut seed.v, states, &nv),
+            ("vjp: controls", controls, &mut seed.controls, steps, &nu),
+        ];
+        for (place, given, part, count, inner) in parts {
+            if let Some(given) = given {
+                let mut shape = vec![Dim::Is(count)];
+                shape.extend(inner);
+                *part = array::array(place, given, &shape)?.columns(part.nrows());
+            }
+        }
+        let cell = self.cell.clone();
+        let made = long(py, move |wish| {
+            cell.borrow_dependent().vjp_with(&seed, |_| wish.go_on())
+        })?;
+        gradient::of_rollout(py, self.cell.borrow_owner(), &made)
+    }
+
+    /// Columns by name, one row a state: time, each coordinate and velocity, energy, momentum and smallest gap, SI units;
+    /// `pandas.DataFrame(rollout.to_dict())` is a table.
+    fn to_dict<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyDict>> {
+        let recording = Recording::of(&self.simulator.get().scene, self.rollout());
+        let out = PyDict::new(py);
+        let n = recording.time.len();
+        let column = |values: Vec<f64>| array::to_python(py, values, &[n]);
+        out.set_item("time", column(recording.time.clone())?)?;
+        for (names, rows) in [
+            (&recording.coordinates, &recording.q),
+            (&recording.velocities, &recording.v),
+        ] {
+            for (i, name) in names.iter().enumerate() {
+                out.set_item(name, column(rows.iter().map(|row| row[i]).collect())?)?;
+            }
+        }
+        out.set_item("energy", column(recording.energy.clone())?)?;
+        for (i, name) in Recording::MOMENTA.iter().enumerate() {
+            out.set_item(
+                name,
+                column(recording.momentum.iter().map(|m| m[i]).collect())?,
+            )?;
+        }
+        out.set_item("min_gap", self.min_gap(py)?)?;
+        Ok(out)
+    }
+
+    /// Figures of the whole trajectory: energies (J), drift of momentum (relative), iterations, smallest gap (m).
+    fn summary<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyDict>> {
+        let s = self.rollout().summary();
+        let out = PyDict::new(py);
+        out.set_item("steps", s.steps)?;
+        out.set_item("energy_initial", s.energy_initial)?;
+        out.set_item("energy_final", s.energy_final)?;
+        out.set_item("momentum_drift", s.momentum_drift)?;
+        out.set_item("iterations", s.iterations)?;
+        out.set_item("asymmetry", s.asymmetry)?;
+        out.set_item("min_gap", s.min_gap)?;
+        Ok(out)
+    }
+
+    fn __len__(&self) -> usize {
+        self.rollout().states().len()
+    }
+
+    fn __repr__(&self) -> String {
+        format!(
+            "Rollout(steps={}, bodies={:?})",
+            self.steps(),
+            self.cell.borrow_owner().names()
+        )
+    }
+
+    /// Run again where it is unpickled: its simulator, where it began, and the controls.
+    #[expect(clippy::type_complexity, reason = "what pickle asks for")]
+    fn __reduce__<'py>(
+        &self,
+        py: Python<'py>,
+    ) -> PyResult<(
+        Bound<'py, PyAny>,
+        (Py<Simulator>, State, Bound<'py, PyArrayDyn<f64>>),
+    )> {
+        let make = py.import("hydrograd._hydrograd")?.getattr("_rollout")?;
+        Ok((
+            make,
+            (
+                self.simulator.clone_ref(py),
+                self.state(py, 0)?,
+                self.controls(py)?,
+            ),
+        ))
+    }
+}

@@ -1,0 +1,191 @@
+//! Scenes.
+
+use crate::array::{fixed, or_zeros, row};
+use crate::body::Body;
+use crate::error::{OrRaise, input};
+use crate::fluid::{Contact, Fluid};
+use hydrograd::scene::{Wall, WallSurface};
+use pyo3::prelude::*;
+use std::path::PathBuf;
+
+/// What a simulation starts from: the fluid, walls, and bodies with their joints.
+///
+/// `gravity` is in m/s², world axes; `time_step` (s) and `steps` are what a run takes unless told otherwise. Without a
+/// `contact`, surfaces may not touch. Bodies are numbered in the order in which they are added.
+#[pyclass(eq, module = "hydrograd")]
+#[derive(Clone, PartialEq)]
+pub struct Scene(pub hydrograd::Scene);
+
+#[pymethods]
+impl Scene {
+    #[new]
+    #[pyo3(signature = (fluid=None, *, name=String::new(), gravity=None, contact=None, time_step=0.01, steps=100))]
+    fn new(
+        fluid: Option<PyRef<'_, Fluid>>,
+        name: String,
+        gravity: Option<&Bound<'_, PyAny>>,
+        contact: Option<PyRef<'_, Contact>>,
+        time_step: f64,
+        steps: usize,
+    ) -> PyResult<Self> {
+        let fluid = fluid.map_or_else(hydrograd::Fluid::fresh_water, |f| f.0);
+        let mut scene = hydrograd::Scene::new(fluid);
+        scene.name = name;
+        scene.gravity = or_zeros("scene: gravity", gravity)?;
+        scene.contact = contact.map(|c| c.0);
+        scene.time_step = time_step;
+        scene.steps = steps;
+        Ok(Self(scene))
+    }
+
+    /// Reads a scene file (TOML); paths of meshes are relative to it.
+    #[staticmethod]
+    fn load(path: PathBuf) -> PyResult<Self> {
+        hydrograd::Scene::load(path).or_raise().map(Self)
+    }
+
+    /// A scene from TOML text; paths of meshes are relative to `folder`.
+    #[staticmethod]
+    #[pyo3(signature = (text, folder=PathBuf::new()))]
+    fn from_toml(text: &str, folder: PathBuf) -> PyResult<Self> {
+        hydrograd::Scene::from_toml(text, folder)
+            .or_raise()
+            .map(Self)
+    }
+
+    /// The scene as TOML text, from which `from_toml` makes an equal one.
+    fn to_toml(&self) -> PyResult<String> {
+        self.0.to_toml().or_raise()
+    }
+
+    /// Adds a body and gives its number, by which `positions[step, number]` and objectives know it.
+    fn add(&mut self, body: PyRef<'_, Body>) -> PyResult<usize> {
+        let mut added = body.body.clone();
+        if let Some(parent) = body.parent {
+            let carrier = self.0.bodies.get(parent).ok_or_else(|| {
+                input(
+                    "body: parent",
+                    parent,
+                    "must be the number of a body that was added before",
+                )
+            })?;
+            added.parent = Some(carrier.name.clone());
+        }
+        Ok(self.0.add(added).0)
+    }
+
+    /// Adds a plane wall through `point` (m) with `normal` into the fluid. `surface` is "rigid", or "free" for a flat free
+    /// surface without waves (fidelity "reduced" only).
+    #[pyo3(signature = (point, normal, surface="rigid"))]
+    fn add_wall(
+        &mut self,
+        point: &Bound<'_, PyAny>,
+        normal: &Bound<'_, PyAny>,
+        surface: &str,
+    ) -> PyResult<()> {
+        let surface = match surface {
+            "rigid" => WallSurface::Rigid,
+            "free" => WallSurface::Free,
+            _ => {
+                return Err(input(
+                    "wall: surface",
+                    format!("{surface:?}"),
+                    "must be \"rigid\" or \"free\"",
+                ));
+            }
+        };
+        self.0.walls.push(Wall {
+            point: fixed("wall: point", point)?,
+            normal: fixed("wall: normal", normal)?,
+            surface,
+        });
+        Ok(())
+    }
+
+    /// Where the scene starts: joint coordinates `q` (q_size), generalised velocity `v` (v_size) or, instead of it, generalised
+    /// momentum M(q)v. What is None starts at the origin and at rest.
+    #[pyo3(signature = (q=None, v=None, *, momentum=None))]
+    fn set_initial(
+        &mut self,
+        q: Option<&Bound<'_, PyAny>>,
+        v: Option<&Bound<'_, PyAny>>,
+        momentum: Option<&Bound<'_, PyAny>>,
+    ) -> PyResult<()> {
+        let list = |place: &str, given: Option<&Bound<'_, PyAny>>| {
+            given.map_or(Ok(Vec::new()), |g| row(place, g))
+        };
+        self.0.initial = hydrograd::scene::Initial {
+            q: list("initial: q", q)?,
+            v: list("initial: v", v)?,
+            momentum: list("initial: momentum", momentum)?,
+        };
+        Ok(())
+    }
+
+    /// Says what is wrong with the scene, if anything is.
+    fn validate(&self) -> PyResult<()> {
+        self.0.validate().or_raise()
+    }
+
+    /// Number of the body with this name.
+    fn index(&self, name: &str) -> PyResult<usize> {
+        let found = self.0.body(name).map(|id| id.0);
+        found.ok_or_else(|| {
+            let names: Vec<&str> = self.0.bodies.iter().map(|b| b.name.as_str()).collect();
+            input(
+                "scene: body",
+                format!("{name:?}"),
+                format!("must be one of {names:?}"),
+            )
+        })
+    }
+
+    /// Names of the bodies, in order.
+    #[getter]
+    fn body_names(&self) -> Vec<String> {
+        self.0.bodies.iter().map(|b| b.name.clone()).collect()
+    }
+
+    /// Name of the scene.
+    #[getter]
+    fn name(&self) -> &str {
+        &self.0.name
+    }
+
+    /// The fluid.
+    #[getter]
+    fn fluid(&self) -> Fluid {
+        Fluid(self.0.fluid)
+    }
+
+    /// Gravity, m/s², world axes.
+    #[getter]
+    fn gravity(&self) -> (f64, f64, f64) {
+        self.0.gravity.into()
+    }
+
+    /// Time step that a run takes unless told otherwise, s.
+    #[getter]
+    fn time_step(&self) -> f64 {
+        self.0.time_step
+    }
+
+    /// Steps that a run takes unless told otherwise.
+    #[getter]
+    fn steps(&self) -> usize {
+        self.0.steps
+    }
+
+    fn __len__(&self) -> usize {
+        self.0.bodies.len()
+    }
+
+    fn __repr__(&self) -> String {
+        format!("Scene({:?}, bodies={:?})", self.0.name, self.body_names())
+    }
+
+    fn __reduce__<'py>(slf: &Bound<'py, Self>) -> PyResult<(Bound<'py, PyAny>, (String,))> {
+        let text = slf.borrow().to_toml()?;
+        Ok((slf.get_type().getattr("from_toml")?, (text,)))
+    }
+}

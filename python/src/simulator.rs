@@ -1,0 +1,470 @@
+//! Simulators.
+
+use crate::array::{self, Dim, array};
+use crate::error::{OrRaise, input};
+use crate::gradient::by_name;
+use crate::interrupt::{long, short};
+use crate::prepare::{Parts, Start, build, set_gains};
+use crate::rollout::{Owned, Rollout};
+use crate::scene::Scene;
+use crate::settings::{Keywords, fidelity_name, integrator_name, row_or};
+use crate::state::{Record, State, one_step};
+use hydrograd::Controls;
+use nalgebra::{DMatrix, DVector};
+use numpy::PyArrayDyn;
+use pyo3::prelude::*;
+use pyo3::types::PyDict;
+use rayon::prelude::*;
+use std::collections::HashMap;
+use std::path::PathBuf;
+use std::sync::Arc;
+
+/// A scene made ready: shapes discretised, bodies joined, coupling prepared. It doesn't change.
+///
+/// `dt` is the time step, s (default: the scene's). `fidelity` says how much of the coupling through the water is
+/// computed: "isolated", "reduced", "auto" or "full"; `method` how each body alone is solved: "auto", "exact", "panel",
+/// "mfs-vertex" or "mfs-face". `integrator`: "momentum-euler", "midpoint", "rk2", "rk4" or "velocity-euler". `tolerance` is the
+/// relative residual at which iterative solves stop ("full"), `faces` the number of triangles of shapes by formula.
+/// `accuracy` (relative), `rank` (points a body) and `resolved_gap` (m) belong to "reduced" and "auto", and `cache` is a
+/// folder that keeps compressed bodies.
+#[pyclass(frozen, module = "hydrograd")]
+pub struct Simulator {
+    /// The simulator of the Rust side.
+    pub inner: Arc<hydrograd::Simulator>,
+    /// What it was made from.
+    pub scene: hydrograd::Scene,
+    /// Where compressed bodies are kept.
+    pub cache: Option<PathBuf>,
+}
+
+impl Simulator {
+    /// A clone with something changed.
+    pub fn changed(
+        &self,
+        change: impl FnOnce(&mut hydrograd::Simulator) -> hydrograd::Result<()>,
+    ) -> PyResult<Self> {
+        let mut inner = hydrograd::Simulator::clone(&self.inner);
+        change(&mut inner).or_raise()?;
+        Ok(Self {
+            inner: Arc::new(inner),
+            scene: self.scene.clone(),
+            cache: self.cache.clone(),
+        })
+    }
+
+    fn controls_size(&self) -> usize {
+        self.inner.system().controls
+    }
+
+    fn matrix(
+        &self,
+        place: &str,
+        given: Option<&Bound<'_, PyAny>>,
+        steps: Option<usize>,
+    ) -> PyResult<DMatrix<f64>> {
+        let n = self.controls_size();
+        let Some(given) = given else {
+            return Ok(DMatrix::zeros(n, steps.unwrap_or(self.scene.steps)));
+        };
+        let found = array(place, given, &[Dim::Any("steps"), Dim::Is(n)])?;
+        if let Some(steps) = steps
+            && steps != found.shape[0]
+        {
+            return Err(input(
+                "rollout: steps",
+                steps,
+                format!("must be {}, as the controls say", found.shape[0]),
+            ));
+        }
+        Ok(found.columns(n))
+    }
+
+    /// The state where a run begins.
+    fn begin(
+        &self,
+        state: Option<&Bound<'_, State>>,
+        q: Option<&Bound<'_, PyAny>>,
+        v: Option<&Bound<'_, PyAny>>,
+    ) -> PyResult<Start> {
+        if let Some(state) = state {
+            if q.is_some() || v.is_some() {
+                return Err(input(
+                    "rollout: state",
+                    "a state beside q or v",
+                    "give one or the other",
+                ));
+            }
+            return Ok(Start::At(state.get().state.clone()));
+        }
+        let (q0, v0) = self.inner.start();
+        Ok(match (q, v) {
+            (None, None) => Start::Scene,
+            _ => Start::From(row_or("rollout: q", q, q0)?, row_or("rollout: v", v, v0)?),
+        })
+    }
+}
+
+#[pymethods]
+impl Simulator {
+    #[new]
+    #[pyo3(signature = (
+        scene, dt=None, *, fidelity=None, method=None, tolerance=None, integrator=None, faces=None, accuracy=None,
+        rank=None, resolved_gap=None, cache=None
+    ))]
+    #[expect(
+        clippy::too_many_arguments,
+        reason = "one per keyword of the constructor"
+    )]
+    fn new(
+        py: Python<'_>,
+        scene: PyRef<'_, Scene>,
+        dt: Option<f64>,
+        fidelity: Option<&str>,
+        method: Option<&str>,
+        tolerance: Option<f64>,
+        integrator: Option<&str>,
+        faces: Option<usize>,
+        accuracy: Option<f64>,
+        rank: Option<usize>,
+        resolved_gap: Option<f64>,
+        cache: Option<PathBuf>,
+    ) -> PyResult<Self> {
+        let keywords = Keywords {
+            dt,
+            fidelity,
+            method,
+            tolerance,
+            integrator,
+            faces,
+            accuracy,
+            rank,
+            resolved_gap,
+        };
+        let scene = scene.0.clone();
+        let settings = keywords.settings(&scene)?;
+        build(py, scene, settings, cache)
+    }
+
+    /// Runs the scene, with its own controller if it has one, and `controls` (steps, control_size) added to it: generalised
+    /// forces of actuated joints and wrenches of thrusters, N and N m. Without them, `steps` (default: the scene's) without
+    /// control. It begins where the simulator does unless given a `state`, or `q` (q_size,) and `v` (v_size,). Ctrl-C ends it.
+    #[pyo3(signature = (controls=None, *, steps=None, state=None, q=None, v=None))]
+    fn rollout(
+        slf: &Bound<'_, Self>,
+        controls: Option<&Bound<'_, PyAny>>,
+        steps: Option<usize>,
+        state: Option<&Bound<'_, State>>,
+        q: Option<&Bound<'_, PyAny>>,
+        v: Option<&Bound<'_, PyAny>>,
+    ) -> PyResult<Rollout> {
+        let me = slf.get();
+        let start = me.begin(state, q, v)?;
+        let matrix = me.matrix("rollout: controls", controls, steps)?;
+        let inner = me.inner.clone();
+        let cell = long(slf.py(), move |wish| {
+            Owned::try_new(inner, |s| {
+                let controls = Controls::from_matrix(s, matrix)?;
+                s.rollout_from(&start.state(s)?, &controls, |_| wish.go_on())
+            })
+        })?;
+        Ok(Rollout::new(slf, Arc::new(cell)))
+    }
+
+    /// Runs many controls, (batch, steps, control_size), on all cores: the same rollouts, to the bit, as one after the other.
+    /// `q` (batch, q_size) and `v` (batch, v_size) are where each begins, if given.
+    #[pyo3(signature = (controls, *, q=None, v=None))]
+    fn rollout_batch(
+        slf: &Bound<'_, Self>,
+        controls: &Bound<'_, PyAny>,
+        q: Option<&Bound<'_, PyAny>>,
+        v: Option<&Bound<'_, PyAny>>,
+    ) -> PyResult<Vec<Rollout>> {
+        let me = slf.get();
+        let n = me.controls_size();
+        let found = array(
+            "rollout_batch: controls",
+            controls,
+            &[Dim::Any("batch"), Dim::Any("steps"), Dim::Is(n)],
+        )?;
+        let (batch, steps) = (found.shape[0], found.shape[1]);
+        let (q0, v0) = me.inner.start();
+        let each = |place: &str, given: Option<&Bound<'_, PyAny>>, default: &DVector<f64>| {
+            let Some(given) = given else {
+                return Ok(vec![default.clone(); batch]);
+            };
+            let found = array(place, given, &[Dim::Is(batch), Dim::Is(default.len())])?;
+            let rows =
+                (0..batch).map(|b| &found.values[b * default.len()..(b + 1) * default.len()]);
+            PyResult::Ok(rows.map(DVector::from_column_slice).collect())
+        };
+        let starts = match (q, v) {
+            (None, None) => vec![Start::Scene; batch],
+            _ => {
+                let q = each("rollout_batch: q", q, q0)?;
+                let v = each("rollout_batch: v", v, v0)?;
+                q.into_iter()
+                    .zip(v)
+                    .map(|(q, v)| Start::From(q, v))
+                    .collect()
+            }
+        };
+        let size = n * steps;
+        let runs: Vec<(Start, DMatrix<f64>)> = starts
+            .into_iter()
+            .enumerate()
+            .map(|(b, start)| {
+                let values = &found.values[b * size..(b + 1) * size];
+                (start, DMatrix::from_column_slice(n, steps, values))
+            })
+            .collect();
+        let inner = me.inner.clone();
+        let cells = long(slf.py(), move |wish| {
+            let one = |(start, matrix): (Start, DMatrix<f64>)| {
+                Owned::try_new(inner.clone(), |s| {
+                    let controls = Controls::from_matrix(s, matrix)?;
+                    s.rollout_from(&start.state(s)?, &controls, |_| wish.go_on())
+                })
+            };
+            runs.into_par_iter()
+                .map(one)
+                .collect::<hydrograd::Result<Vec<_>>>()
+        })?;
+        Ok(cells
+            .into_iter()
+            .map(|cell| Rollout::new(slf, Arc::new(cell)))
+            .collect())
+    }
+
+    /// The state at coordinates `q` (q_size,) and generalised velocity `v` (v_size,) after `step` steps; what is None is
+    /// where the simulator starts.
+    #[pyo3(signature = (q=None, v=None, *, step=0))]
+    fn state(
+        slf: &Bound<'_, Self>,
+        q: Option<&Bound<'_, PyAny>>,
+        v: Option<&Bound<'_, PyAny>>,
+        step: usize,
+    ) -> PyResult<State> {
+        let me = slf.get();
+        let (q0, v0) = me.inner.start();
+        let (q, v) = (row_or("state: q", q, q0)?, row_or("state: v", v, v0)?);
+        let state = short(slf.py(), || me.inner.state(step, &q, &v))?;
+        Ok(State {
+            simulator: slf.clone().unbind(),
+            state,
+            velocity: v,
+        })
+    }
+
+    /// One step from a state with the controls `u` (control_size,), N and N m: the next state, and the record that has the
+    /// step's derivatives. The steps of a rollout, to the bit.
+    #[pyo3(signature = (state, u=None))]
+    fn step(
+        slf: &Bound<'_, Self>,
+        state: &Bound<'_, State>,
+        u: Option<&Bound<'_, PyAny>>,
+    ) -> PyResult<(State, Record)> {
+        let me = slf.get();
+        let n = me.controls_size();
+        let matrix = match u {
+            Some(u) => one_step(array("step: u", u, &[Dim::Is(n)])?.values),
+            None => DMatrix::zeros(n, 1),
+        };
+        let from = &state.get().state;
+        let inner = me.inner.clone();
+        let cell = short(slf.py(), || {
+            Owned::try_new(inner, |s| {
+                let controls = Controls::from_matrix(s, matrix)?;
+                s.rollout_from(from, &controls, |_| std::ops::ControlFlow::Continue(()))
+            })
+        })?;
+        let rollout = cell.borrow_dependent();
+        let next = State {
+            simulator: slf.clone().unbind(),
+            state: rollout.states()[1].clone(),
+            velocity: rollout.samples()[1].v.clone(),
+        };
+        Ok((
+            next,
+            Record {
+                cell: Arc::new(cell),
+            },
+        ))
+    }
+
+    /// Added mass of the bodies in the water at the start, (6 n, 6 n), world axes: per body three rows of force per acceleration of
+    /// its origin, then three of torque per angular acceleration; kg, kg m, kg m².
+    fn added_mass<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyArrayDyn<f64>>> {
+        let inner = self.inner.clone();
+        let made = long(py, move |_| inner.added_mass())?;
+        array::matrix(py, &made.matrix)
+    }
+
+    /// The same with other physical parameters, by name as in `parameters`; what isn't named stays. It shares what was
+    /// prepared, so it costs next to nothing.
+    fn with_parameters(&self, changes: HashMap<String, f64>) -> PyResult<Self> {
+        self.changed(|inner| {
+            let parameters = inner.parameters();
+            let names = parameters.names(&inner.names());
+            let mut values = parameters.to_vec();
+            for (name, value) in &changes {
+                let at = names.iter().position(|n| n == name).ok_or_else(|| {
+                    hydrograd::Error::input(
+                        "with_parameters",
+                        format!("{name:?}"),
+                        format!("must be one of {names:?}"),
+                    )
+                })?;
+                values[at] = *value;
+            }
+            match parameters.with_values(&values) {
+                Some(changed) => inner.set_parameters(changed),
+                None => Ok(()),
+            }
+        })
+    }
+
+    /// The same with another start: coordinates `q` (q_size,) and generalised velocity `v` (v_size,).
+    #[pyo3(signature = (q=None, v=None))]
+    fn with_start(
+        &self,
+        q: Option<&Bound<'_, PyAny>>,
+        v: Option<&Bound<'_, PyAny>>,
+    ) -> PyResult<Self> {
+        let (q0, v0) = self.inner.start();
+        let (q, v) = (
+            row_or("with_start: q", q, q0)?,
+            row_or("with_start: v", v, v0)?,
+        );
+        self.changed(|inner| inner.set_start(q, v))
+    }
+
+    /// The same with other gains of the scene's controller, (gains,).
+    fn with_gains(&self, gains: &Bound<'_, PyAny>) -> PyResult<Self> {
+        let gains = array::row("with_gains: gains", gains)?;
+        self.changed(|inner| set_gains(inner, &gains))
+    }
+
+    /// Gains of the scene's controller, (gains,); none without one.
+    #[getter]
+    fn gains<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyArrayDyn<f64>>> {
+        let gains = self.inner.policy().gains();
+        let n = gains.len();
+        array::to_python(py, gains, &[n])
+    }
+
+    /// The physical parameters by name: density, masses, inertias, drag and contact, SI units.
+    #[getter]
+    fn parameters<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyDict>> {
+        by_name(py, &self.inner, self.inner.parameters().to_vec())
+    }
+
+    /// Coordinates at the start, (q_size,).
+    #[getter]
+    fn initial_q<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyArrayDyn<f64>>> {
+        let q = self.inner.start().0;
+        array::to_python(py, q.as_slice().to_vec(), &[q.len()])
+    }
+
+    /// Generalised velocity at the start, (v_size,).
+    #[getter]
+    fn initial_v<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyArrayDyn<f64>>> {
+        let v = self.inner.start().1;
+        array::to_python(py, v.as_slice().to_vec(), &[v.len()])
+    }
+
+    /// The scene that it was made from.
+    #[getter]
+    fn scene(&self) -> Scene {
+        Scene(self.scene.clone())
+    }
+
+    /// Time step, s.
+    #[getter]
+    fn dt(&self) -> f64 {
+        self.inner.time_step()
+    }
+
+    /// Number of controls a step.
+    #[getter]
+    fn control_size(&self) -> usize {
+        self.controls_size()
+    }
+
+    /// Number of joint coordinates q.
+    #[getter]
+    fn q_size(&self) -> usize {
+        self.inner.system().tree.coordinates()
+    }
+
+    /// Number of generalised velocities v.
+    #[getter]
+    fn v_size(&self) -> usize {
+        self.inner.system().tree.velocities()
+    }
+
+    /// Names of the bodies, in order.
+    #[getter]
+    fn body_names(&self) -> Vec<String> {
+        self.inner.names()
+    }
+
+    /// Names of the entries of q.
+    #[getter]
+    fn q_names(&self) -> Vec<String> {
+        self.scene.coordinate_labels()
+    }
+
+    /// Names of the entries of v.
+    #[getter]
+    fn v_names(&self) -> Vec<String> {
+        self.scene.velocity_labels()
+    }
+
+    /// The fidelity in use: what was asked for, or what "auto" chose.
+    #[getter]
+    fn fidelity(&self) -> &'static str {
+        fidelity_name(self.inner.fidelity())
+    }
+
+    /// The integrator.
+    #[getter]
+    fn integrator(&self) -> &'static str {
+        integrator_name(self.inner.settings().integrator)
+    }
+
+    /// What should be known about the scene, with names and numbers.
+    #[getter]
+    fn warnings(&self) -> Vec<String> {
+        self.inner.warnings().to_vec()
+    }
+
+    fn __repr__(&self) -> String {
+        format!(
+            "Simulator(bodies={:?}, dt={:?} s, fidelity={:?}, integrator={:?})",
+            self.inner.names(),
+            self.dt(),
+            self.fidelity(),
+            self.integrator()
+        )
+    }
+
+    fn __reduce__<'py>(&self, py: Python<'py>) -> PyResult<(Bound<'py, PyAny>, Parts)> {
+        let make = py.import("hydrograd._hydrograd")?.getattr("_simulator")?;
+        let settings = serde_json::to_string(self.inner.settings()).map_err(|e| {
+            input(
+                "simulator: settings",
+                e,
+                "must be numbers that JSON can hold",
+            )
+        })?;
+        let (q, v) = self.inner.start();
+        let list = |x: &DVector<f64>| x.as_slice().to_vec();
+        let start = (list(q), list(v), self.inner.policy().gains());
+        let parameters = self.inner.parameters().to_vec();
+        let scene = self.scene.to_toml().or_raise()?;
+        Ok((
+            make,
+            (scene, settings, self.cache.clone(), parameters, start),
+        ))
+    }
+}

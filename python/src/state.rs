@@ -1,0 +1,190 @@
+//! One step at a time: states, and what a step leaves for its transpose.
+
+use crate::array::{self, Dim};
+use crate::gradient;
+use crate::interrupt::{long, short};
+use crate::rollout::Owned;
+use crate::simulator::Simulator;
+use hydrograd::dynamics;
+use nalgebra::{DMatrix, DVector};
+use numpy::PyArrayDyn;
+use pyo3::prelude::*;
+use std::sync::Arc;
+
+/// A state between two steps: made by `Simulator.state`, `Simulator.step` or `Rollout.state`.
+#[pyclass(frozen, module = "hydrograd")]
+pub struct State {
+    /// The simulator that it belongs to.
+    pub simulator: Py<Simulator>,
+    /// The integrator's state.
+    pub state: dynamics::State,
+    /// Its generalised velocity.
+    pub velocity: DVector<f64>,
+}
+
+type Parts = (
+    Py<Simulator>,
+    usize,
+    Vec<f64>,
+    Vec<f64>,
+    Vec<bool>,
+    usize,
+    Vec<f64>,
+);
+
+impl State {
+    fn poses(&self) -> Vec<hydrograd::adjoint::lie::Pose> {
+        self.simulator
+            .get()
+            .inner
+            .system()
+            .tree
+            .kinematics(&self.state.q)
+            .poses
+    }
+
+    /// From its parts, as `__reduce__` gives them.
+    pub fn from_parts((simulator, step, q, y, held, mode, v): Parts) -> Self {
+        Self {
+            simulator,
+            state: dynamics::State {
+                step,
+                q: q.into(),
+                y: y.into(),
+                held,
+                mode,
+            },
+            velocity: v.into(),
+        }
+    }
+}
+
+#[pymethods]
+impl State {
+    /// Number of steps made.
+    #[getter]
+    fn step(&self) -> usize {
+        self.state.step
+    }
+
+    /// Time, s.
+    #[getter]
+    fn time(&self) -> f64 {
+        self.simulator.get().inner.stepper().time(&self.state)
+    }
+
+    /// Joint coordinates, (q_size,).
+    #[getter]
+    fn q<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyArrayDyn<f64>>> {
+        array::to_python(py, self.state.q.as_slice().to_vec(), &[self.state.q.len()])
+    }
+
+    /// Generalised velocity, (v_size,).
+    #[getter]
+    fn v<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyArrayDyn<f64>>> {
+        array::to_python(
+            py,
+            self.velocity.as_slice().to_vec(),
+            &[self.velocity.len()],
+        )
+    }
+
+    /// Positions of the bodies' origins, (bodies, 3), m, world axes.
+    #[getter]
+    fn positions<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyArrayDyn<f64>>> {
+        let poses = self.poses();
+        let numbers = poses
+            .iter()
+            .flat_map(|p| p.translation.iter().copied().collect::<Vec<_>>());
+        array::to_python(py, numbers.collect(), &[poses.len(), 3])
+    }
+
+    /// Rotation matrices of the bodies, body to world, (bodies, 3, 3).
+    #[getter]
+    fn rotations<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyArrayDyn<f64>>> {
+        let poses = self.poses();
+        let numbers = poses
+            .iter()
+            .flat_map(|p| p.rotation.transpose().as_slice().to_vec());
+        array::to_python(py, numbers.collect(), &[poses.len(), 3, 3])
+    }
+
+    fn __repr__(&self) -> String {
+        format!("State(step={}, time={:?} s)", self.state.step, self.time())
+    }
+
+    fn __reduce__<'py>(&self, py: Python<'py>) -> PyResult<(Bound<'py, PyAny>, Parts)> {
+        let make = py.import("hydrograd._hydrograd")?.getattr("_state")?;
+        let s = &self.state;
+        let list = |x: &DVector<f64>| x.as_slice().to_vec();
+        let simulator = self.simulator.clone_ref(py);
+        Ok((
+            make,
+            (
+                simulator,
+                s.step,
+                list(&s.q),
+                list(&s.y),
+                s.held.clone(),
+                s.mode,
+                list(&self.velocity),
+            ),
+        ))
+    }
+}
+
+/// What one step leaves behind: the key to its derivatives.
+#[pyclass(frozen, module = "hydrograd")]
+pub struct Record {
+    /// The step, as a rollout of one.
+    pub cell: Arc<Owned>,
+}
+
+#[pymethods]
+impl Record {
+    /// Transpose of the step: derivatives of `q·δq + v·δv` of the state after it, with `q` (v_size,) in the tangent space of
+    /// the coordinates and `v` (v_size,); what is None is zero.
+    #[pyo3(signature = (*, q=None, v=None))]
+    fn vjp<'py>(
+        &self,
+        py: Python<'py>,
+        q: Option<&Bound<'py, PyAny>>,
+        v: Option<&Bound<'py, PyAny>>,
+    ) -> PyResult<Bound<'py, PyAny>> {
+        let rollout = self.cell.borrow_dependent();
+        let mut seed = rollout.zero_cotangents();
+        for (place, given, part) in [("vjp: q", q, &mut seed.q), ("vjp: v", v, &mut seed.v)] {
+            if let Some(given) = given {
+                let found = array::array(place, given, &[Dim::Is(part.nrows())])?;
+                part.set_column(1, &DVector::from_vec(found.values));
+            }
+        }
+        let made = short(py, || rollout.vjp(&seed))?;
+        gradient::of_step(py, self.cell.borrow_owner(), &made)
+    }
+
+    /// The linearisation x₁ ≈ A x₀ + B u of the step in x = (q, v), coordinates in their tangent space: A (2 v_size, 2 v_size)
+    /// and B (2 v_size, control_size).
+    #[expect(clippy::type_complexity, reason = "two arrays")]
+    fn jacobians<'py>(
+        &self,
+        py: Python<'py>,
+    ) -> PyResult<(Bound<'py, PyArrayDyn<f64>>, Bound<'py, PyArrayDyn<f64>>)> {
+        let cell = self.cell.clone();
+        let made = long(py, move |_| cell.borrow_dependent().jacobians())?;
+        Ok((
+            array::matrix(py, &made.state)?,
+            array::matrix(py, &made.controls)?,
+        ))
+    }
+
+    fn __repr__(&self) -> String {
+        let n = self.cell.borrow_dependent().states()[0].step;
+        format!("Record(step {n} to {})", n + 1)
+    }
+}
+
+/// The controls of one step.
+pub fn one_step(controls: Vec<f64>) -> DMatrix<f64> {
+    DMatrix::from_vec(controls.len(), 1, controls)
+}

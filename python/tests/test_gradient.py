@@ -1,0 +1,167 @@
+"""Gradients against central differences."""
+
+import pickle
+
+import numpy as np
+import pytest
+
+import hydrograd as hg
+
+# Relative error of the largest entry: differences themselves are good to about this.
+TOLERANCE = 2e-6
+
+
+def slopes(value, x, step):
+    """Central differences of a function of an array, in the array's shape."""
+    out = np.zeros_like(x)
+    for at in np.ndindex(x.shape):
+        up, down = x.copy(), x.copy()
+        up[at] += step
+        down[at] -= step
+        out[at] = (value(up) - value(down)) / (2 * step)
+    return out
+
+
+def close(found, right):
+    assert np.shape(found) == np.shape(right)
+    assert np.abs(found - right).max() <= TOLERANCE * np.abs(right).max()
+
+
+@pytest.fixture
+def seeds(sim):
+    """A loss Σ weight · observation, with the weights of every kind of observation."""
+    random = np.random.default_rng(5)
+    return {
+        "positions": random.normal(size=(8, 2, 3)),
+        "v": random.normal(size=(8, 12)),
+        "controls": random.normal(size=(7, 6)),
+    }
+
+
+def loss(rollout, seeds):
+    return (
+        np.sum(seeds["positions"] * rollout.positions)
+        + np.sum(seeds["v"] * rollout.v)
+        + np.sum(seeds["controls"] * rollout.controls)
+    )
+
+
+def test_vjp_of_controls(sim, controls, seeds):
+    gradient = sim.rollout(controls).vjp(**seeds)
+    assert gradient.controls.shape == (7, 6)
+    close(gradient.controls, slopes(lambda u: loss(sim.rollout(u), seeds), controls, 1e-4))
+
+
+def test_vjp_of_the_start(sim, controls, seeds):
+    gradient = sim.rollout(controls).vjp(**seeds)
+    found = slopes(lambda v: loss(sim.rollout(controls, v=v), seeds), sim.initial_v, 1e-4)
+    close(gradient.initial_v, found)
+    # Positions have plain coordinates; their tangent is themselves.
+    q = sim.initial_q
+
+    def moved(x):
+        start = q.copy()
+        start[7:10] = x
+        return loss(sim.rollout(controls, q=start), seeds)
+
+    close(gradient.initial_q[6:9], slopes(moved, q[7:10].copy(), 1e-4))
+
+
+def test_vjp_of_rotations(sim, controls):
+    # tr(Gᵀ R) changes by Σ 2 axial(…)·δθ: seed δR = δθ × R with the gradient of the trace.
+    weight = np.random.default_rng(7).normal(size=(3, 3))
+
+    def value(u):
+        return np.sum(weight * sim.rollout(u).rotations[-1, 1])
+
+    rollout = sim.rollout(controls)
+    seed = np.zeros((8, 2, 3))
+    seed[-1, 1] = np.cross(rollout.rotations[-1, 1], weight, axis=0).sum(axis=1)
+    gradient = rollout.vjp(rotations=seed)
+    close(gradient.controls, slopes(value, controls, 1e-4))
+
+
+def test_parameters_by_name(sim, controls, seeds):
+    gradient = sim.rollout(controls).vjp(**seeds)
+    assert set(gradient.parameters) == set(sim.parameters)
+    for name in ("ball.mass", "coin.inertia.xx", "coin.drag.linear", "coin.drag.quadratic", "fluid.density"):
+        base = sim.parameters[name]
+        step = 1e-3 * base
+
+        def value(x):
+            return loss(sim.with_parameters({name: x}).rollout(controls), seeds)
+
+        found = (value(base + step) - value(base - step)) / (2 * step)
+        assert abs(gradient.parameters[name] - found) <= 1e-4 * abs(found), name
+
+
+def test_gains_of_the_scenes_controller():
+    scene = hg.Scene(time_step=0.02, steps=8)
+    scene.add(hg.Body(hg.sphere(0.1), name="ball", density=1100.0, joint=hg.prismatic((0, 0, 1)), actuated=True))
+    pd = '[controller]\nkind = "pd"\ntarget = [0.3]\nstiffness = [4.0]\ndamping = [2.0]\n'
+    sim = hg.Simulator(hg.Scene.from_toml(scene.to_toml() + "\n" + pd), fidelity="isolated")
+    goal = hg.objective.final_coordinate(0, 0.2)
+    found = sim.rollout().gradient(goal).gains
+    assert found.shape == sim.gains.shape == (3,)
+    close(found, slopes(lambda g: sim.with_gains(g).rollout().value(goal), sim.gains, 1e-3))
+    again = pickle.loads(pickle.dumps(sim.with_gains(2 * sim.gains)))
+    assert np.array_equal(again.gains, 2 * sim.gains)
+    with pytest.raises(hg.InputError, match="3 numbers"):
+        sim.with_gains([1.0])
+
+
+def test_objectives(sim, controls):
+    goal = hg.objective.final_position(1, (0.1, 0.0, 0.0)) + 1e-3 * hg.objective.effort(1.0)
+    rollout = sim.rollout(controls)
+    miss = rollout.positions[-1, 1] - [0.1, 0.0, 0.0]
+    assert np.isclose(rollout.value(goal), miss @ miss + 1e-3 * np.sum(controls**2), rtol=1e-13)
+    close(rollout.gradient(goal).controls, slopes(lambda u: sim.rollout(u).value(goal), controls, 1e-4))
+    with pytest.raises(hg.InputError, match="under 2"):
+        rollout.value(hg.objective.mean_position(2, (0, 0, 0)))
+
+
+def test_one_step(sim, controls):
+    rollout = sim.rollout(controls)
+    state = sim.state()
+    for n in range(3):
+        assert state.step == n
+        assert np.array_equal(state.q, rollout.q[n]) and np.array_equal(state.positions, rollout.positions[n])
+        state, record = sim.step(state, controls[n])
+    q_bar, v_bar = np.arange(12.0), np.linspace(-1, 1, 12)
+    bar = record.vjp(q=q_bar, v=v_bar)
+    a, b = record.jacobians()
+    assert a.shape == (24, 24) and b.shape == (24, 6)
+    both = np.concatenate([q_bar, v_bar])
+    assert np.allclose(np.concatenate([bar.q, bar.v]), both @ a) and np.allclose(bar.controls, both @ b)
+
+
+def test_jacobians_of_a_step(sim, controls):
+    """A and B against differences, where coordinates are plain: positions and velocities."""
+    state = sim.state(v=np.linspace(-0.1, 0.1, 12))
+    _, record = sim.step(state, controls[0])
+    a, b = record.jacobians()
+    plain = np.r_[0:3, 6:9, 12:24]  # rows of x = (δq, v) that aren't rotations
+    at = np.r_[0:3, 7:10]
+
+    def after(q, v, u):
+        state, _ = sim.step(sim.state(q, v), u)
+        return np.concatenate([state.q[at], state.v])
+
+    def columns(of, x):
+        found = []
+        for i in range(len(x)):
+            step = np.zeros(len(x))
+            step[i] = 1e-4
+            found.append((of(x + step) - of(x - step)) / 2e-4)
+        return np.array(found).T
+
+    q, v, u = state.q, state.v, controls[0]
+    close(b[plain], columns(lambda x: after(q, v, x), u))
+    close(a[plain][:, 12:], columns(lambda x: after(q, x, u), v))
+
+    def placed(x):
+        start = q.copy()
+        start[at] = x
+        return after(start, v, u)
+
+    close(a[plain][:, np.r_[0:3, 6:9]], columns(placed, q[at]))

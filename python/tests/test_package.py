@@ -1,0 +1,92 @@
+"""The package itself: version, stubs and docstrings."""
+
+import ast
+import inspect
+import pathlib
+import re
+
+import hydrograd as hg
+from hydrograd import _hydrograd
+
+ROOT = pathlib.Path(__file__).parents[2]
+STUBS = pathlib.Path(hg.__file__).with_name("_hydrograd.pyi")
+
+
+def public(names):
+    return {name for name in names if not name.startswith("_")}
+
+
+def stubbed():
+    """Names of the stubs, with those of each class."""
+    out = {}
+    for node in ast.parse(STUBS.read_text()).body:
+        if isinstance(node, ast.ClassDef):
+            out[node.name] = {item.name for item in node.body if isinstance(item, ast.FunctionDef)}
+        elif isinstance(node, ast.FunctionDef):
+            out[node.name] = node
+    return out
+
+
+def test_every_name_has_a_stub_and_every_stub_a_name():
+    stubs = stubbed()
+    assert public(stubs) == public(dir(_hydrograd))
+    for name in public(stubs):
+        members = stubs[name]
+        value = getattr(_hydrograd, name)
+        if inspect.isclass(value) and not issubclass(value, Exception):
+            assert public(members) == public(vars(value)), name
+
+
+def test_keywords_are_those_of_the_stubs():
+    def keywords(node):
+        a = node.args
+        return [x.arg for x in a.posonlyargs + a.args + a.kwonlyargs if x.arg not in ("self", "cls")]
+
+    for node in ast.walk(ast.parse(STUBS.read_text())):
+        if isinstance(node, ast.ClassDef) and not node.name.startswith("_") and hasattr(hg, node.name):
+            owner = getattr(hg, node.name)
+            for item in node.body:
+                if not isinstance(item, ast.FunctionDef) or any(
+                    isinstance(d, ast.Name) and d.id == "property" for d in item.decorator_list
+                ):
+                    continue
+                target = owner if item.name == "__new__" else getattr(owner, item.name)
+                if item.name.startswith("__") and item.name != "__new__":
+                    continue
+                found = [p for p in inspect.signature(target).parameters if p != "self"]
+                assert found == keywords(item), f"{node.name}.{item.name}"
+    for name, node in stubbed().items():
+        if isinstance(node, ast.FunctionDef):
+            found = list(inspect.signature(getattr(_hydrograd, name)).parameters)
+            assert found == keywords(node), name
+
+
+def test_everything_is_documented():
+    for name in public(dir(hg)) & set(hg.__all__):
+        value = getattr(hg, name)
+        assert (value.__doc__ or "").strip(), name
+        if inspect.isclass(value) and not issubclass(value, Exception):
+            for member in public(vars(value)):
+                if name.endswith("Gradient"):
+                    continue  # data classes document their fields beside them
+                assert (getattr(value, member).__doc__ or "").strip(), f"{name}.{member}"
+    for name in hg.objective.__all__:
+        assert (getattr(hg.objective, name).__doc__ or "").strip(), name
+
+
+def test_version_is_that_of_the_crate():
+    text = (ROOT / "Cargo.toml").read_text()
+    found = re.search(r'^\[workspace.package\]\nversion = "([^"]+)"', text, re.MULTILINE)
+    assert hg.__version__ == found[1]
+    assert STUBS.with_name("py.typed").exists()
+
+
+def test_readme():
+    """The example of the README runs and cuts the miss tenfold."""
+    blocks = re.findall(r"^```python\n(.*?)^```", (ROOT / "README.md").read_text(), re.MULTILINE | re.DOTALL)
+    assert blocks
+    names = {}
+    exec(blocks[0], names)
+    start, _ = names["cost_and_gradient"](0 * names["best"].x)
+    # The squared miss: a tenfold cut of the miss is a hundredfold one of the cost.
+    assert names["best"].fun < start / 100

@@ -1,0 +1,57 @@
+"""Batches over threads, and pickles to other processes."""
+
+import multiprocessing
+import pickle
+
+import numpy as np
+import pytest
+
+import hydrograd as hg
+
+
+def test_a_batch_is_the_same_to_the_bit(sim):
+    random = np.random.default_rng(1)
+    controls = random.normal(scale=0.1, size=(5, 4, 6))
+    together = sim.rollout_batch(controls)
+    assert len(together) == 5
+    for one, u in zip(together, controls):
+        alone = sim.rollout(u)
+        assert np.array_equal(one.q, alone.q) and np.array_equal(one.v, alone.v)
+        seed = np.ones_like(one.positions)
+        assert np.array_equal(one.vjp(positions=seed).controls, alone.vjp(positions=seed).controls)
+    v = random.normal(scale=0.05, size=(5, 12))
+    for one, u, start in zip(sim.rollout_batch(controls, v=v), controls, v):
+        assert np.array_equal(one.q, sim.rollout(u, v=start).q)
+    assert sim.rollout_batch(np.zeros((0, 4, 6))) == []
+    with pytest.raises(hg.InputError, match=r"\(batch, steps, 6\)"):
+        sim.rollout_batch(controls[0])
+
+
+def test_pickles(sim, controls):
+    changed = sim.with_parameters({"ball.mass": 0.7}).with_start(v=sim.initial_v + 0.01)
+    rollout = changed.rollout(controls)
+    again = pickle.loads(pickle.dumps(rollout))
+    assert np.array_equal(again.q, rollout.q) and np.array_equal(again.controls, controls)
+    assert again.simulator.parameters == changed.parameters and again.simulator.dt == sim.dt
+    scene = pickle.loads(pickle.dumps(sim.scene))
+    assert scene == sim.scene
+    state = pickle.loads(pickle.dumps(rollout.state(3)))
+    assert state.step == 3
+    one, other = again.simulator.step(state, controls[3])[0], changed.step(rollout.state(3), controls[3])[0]
+    assert np.array_equal(one.q, other.q) and np.array_equal(one.q, rollout.q[4])
+    gradient = rollout.vjp(v=np.ones_like(rollout.v))
+    assert np.array_equal(pickle.loads(pickle.dumps(gradient)).controls, gradient.controls)
+    assert pickle.loads(pickle.dumps(hg.Fluid(2.0))) == hg.Fluid(2.0)
+
+
+def final_position(work):
+    """In another process."""
+    simulator, controls = work
+    return simulator.rollout(controls).positions[-1]
+
+
+def test_other_processes(sim, controls):
+    with multiprocessing.get_context("spawn").Pool(2) as pool:
+        found = pool.map(final_position, [(sim, controls), (sim, 2 * controls)])
+    assert np.array_equal(found[0], sim.rollout(controls).positions[-1])
+    assert np.array_equal(found[1], sim.rollout(2 * controls).positions[-1])

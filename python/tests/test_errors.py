@@ -160,6 +160,8 @@ def test_states(sim):
 
 def test_ctrl_c_within_a_second(sim):
     """A rollout of hours ends at once, and so does making a large simulator."""
+    # Where the tests run in the background, the signal may be ignored.
+    before = signal.signal(signal.SIGINT, signal.default_int_handler)
     scene = hg.Scene()
     scene.add(hg.Body(hg.sphere(1.0), density=1000.0))
     for work in (
@@ -179,6 +181,7 @@ def test_ctrl_c_within_a_second(sim):
             work()
         thread.join()
         assert time.monotonic() - sent[0] < 1.0
+    signal.signal(signal.SIGINT, before)
 
 
 def test_other_threads_run_meanwhile(sim):

@@ -87,6 +87,17 @@ pub enum Direction<'a> {
     Twist(&'a DVector<f64>),
 }
 
+impl Direction<'_> {
+    /// Both directions, or the one that they are.
+    pub fn distinct(x: Self, y: Self) -> Vec<Self> {
+        let same = match (&x, &y) {
+            (Self::Basis(a), Self::Basis(b)) | (Self::Twist(a), Self::Twist(b)) => a == b,
+            _ => false,
+        };
+        if same { vec![x] } else { vec![x, y] }
+    }
+}
+
 /// First derivatives for a pair of directions.
 #[derive(Clone, Debug)]
 pub struct Pullback {

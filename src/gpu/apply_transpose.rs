@@ -4,7 +4,8 @@ use super::buffer::Buffer;
 use super::context::Context;
 use super::geometry::Placed;
 use super::kernel::Call;
-use super::source::{Arithmetic, Constant};
+use super::pass::{Pass, Side, pass};
+use super::source::Arithmetic;
 use super::sum::Slice;
 use crate::Result;
 
@@ -14,28 +15,16 @@ pub(super) fn apply_transpose(
     arithmetic: Arithmetic,
     placed: &Placed,
     potential: bool,
-    (y, stride, offset): Slice,
-    (out, columns): (&Buffer, usize),
+    y: Slice,
+    out: (&Buffer, usize),
     gate: &Buffer,
 ) -> Result<Call> {
-    let constants = [
-        ("COLUMNS", Constant::Number(columns as u32)),
-        ("POTENTIAL", Constant::Flag(potential)),
-    ];
-    let kernel = context.kernel("apply_transpose", "main", arithmetic, &constants)?;
-    let sizes = &placed.geometry.sizes;
-    let shares = sizes.shares(sizes.source_blocks, sizes.face_blocks);
-    let uniform = context.uniform(&[shares, stride, offset, 0].map(|n| n as u32));
-    let mut buffers = placed.buffers(arithmetic);
-    buffers.extend([
-        ("y", y.into()),
-        ("out", out.into()),
-        ("task", (&uniform).into()),
-        ("going", gate.into()),
-    ]);
-    context.call(
-        &kernel,
-        &buffers,
-        [sizes.source_blocks as u32, shares as u32, 1],
-    )
+    let what = Pass {
+        shader: "apply_transpose",
+        side: Side::Sources,
+        potential,
+        name: "y",
+        beside: ("going", gate),
+    };
+    pass(context, arithmetic, placed, &what, y, out)
 }

@@ -7,8 +7,9 @@
 use super::buffer::Buffer;
 use super::context::Context;
 use super::diagonal::diagonal;
-use super::kernel::{Batch, Bound};
+use super::kernel::{Batch, Bound, groups};
 use super::place::place;
+use super::share::shapes;
 use super::source::Arithmetic;
 use crate::Result;
 use crate::adjoint::lie::{Mat3, Pose, Vec3};
@@ -102,20 +103,6 @@ pub(super) struct Placed {
     pub scaling: Buffer,
 }
 
-/// Distinct shapes, and which one each body has.
-fn shapes(model: &Model) -> (Vec<Arc<BodyBoundary>>, Vec<usize>) {
-    let mut all: Vec<Arc<BodyBoundary>> = Vec::new();
-    let of = model.bodies.iter().map(|body| {
-        let same = |b: &Arc<BodyBoundary>| Arc::ptr_eq(b, &body.boundary);
-        all.iter().position(same).unwrap_or_else(|| {
-            all.push(body.boundary.clone());
-            all.len() - 1
-        })
-    });
-    let of = of.collect();
-    (all, of)
-}
-
 /// Where each begins, and the end.
 fn starts(sizes: impl Iterator<Item = usize>) -> Vec<usize> {
     let mut out = vec![0];
@@ -163,7 +150,7 @@ impl Geometry {
     /// A device that fails, or has too little memory.
     pub fn new(context: &Arc<Context>, model: &Arc<Model>) -> Result<Self> {
         let fine = context.fine();
-        let (all, of) = shapes(model);
+        let (all, of) = shapes(model.bodies.iter().map(|b| &b.boundary));
         let length = all
             .iter()
             .flat_map(|b| b.faces.corners.iter().flatten())
@@ -323,8 +310,7 @@ impl Geometry {
 
     /// Workgroups for all tasks.
     pub fn task_groups(&self) -> [u32; 3] {
-        let y = self.task_count.div_ceil(32768).max(1);
-        [self.task_count.div_ceil(y) as u32, y as u32, 1]
+        groups(self.task_count)
     }
 }
 

@@ -231,6 +231,16 @@ impl Context {
         self.check()
     }
 
+    /// As [`Context::submit`], of calls in groups.
+    ///
+    /// # Errors
+    /// As there.
+    pub(super) fn run(&self, groups: &[&[Call]]) -> Result<()> {
+        let mut batch = Batch::default();
+        groups.iter().for_each(|calls| batch.extend(*calls));
+        self.submit(&batch)
+    }
+
     fn start(&self, calls: &[&Call]) {
         let mut encoder = self.device.create_command_encoder(&Default::default());
         {
@@ -266,9 +276,13 @@ impl<'a> Batch<'a> {
     }
 }
 
-/// Workgroups of 64 threads for so many elements, over two dimensions where one doesn't do.
+/// Workgroups of 64 threads for so many elements.
 pub(super) fn threads(elements: usize) -> [u32; 3] {
-    let groups = elements.div_ceil(64);
-    let y = groups.div_ceil(32768).max(1);
-    [groups.div_ceil(y) as u32, y as u32, 1]
+    groups(elements.div_ceil(64))
+}
+
+/// So many workgroups, or a few more: over two dimensions where one doesn't do.
+pub(super) fn groups(count: usize) -> [u32; 3] {
+    let y = count.div_ceil(32768).max(1);
+    [count.div_ceil(y) as u32, y as u32, 1]
 }

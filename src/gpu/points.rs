@@ -8,6 +8,7 @@ use super::buffer::Buffer;
 use super::context::Context;
 use super::kernel::{Batch, Bound};
 use super::place::place_points;
+use super::share::shapes;
 use crate::Result;
 use crate::adjoint::lie::{Pose, Vec3, Vec6, angular, linear};
 use crate::coupling::image::Image;
@@ -96,20 +97,6 @@ pub(super) struct Motion {
     rates: Buffer,
 }
 
-/// Distinct shapes, and which one each body has.
-fn shapes(reduced: &Reduced) -> (Vec<Arc<ReducedBody>>, Vec<usize>) {
-    let mut all: Vec<Arc<ReducedBody>> = Vec::new();
-    let of = |body: &Arc<ReducedBody>| {
-        let same = |b: &Arc<ReducedBody>| Arc::ptr_eq(b, body);
-        all.iter().position(same).unwrap_or_else(|| {
-            all.push(body.clone());
-            all.len() - 1
-        })
-    };
-    let of = reduced.reduced_bodies().iter().map(of).collect();
-    (all, of)
-}
-
 /// Largest distance of a point from its body's origin.
 fn length(shapes: &[Arc<ReducedBody>]) -> f64 {
     let of = |b: &Arc<ReducedBody>| -> f64 {
@@ -129,7 +116,7 @@ impl Compressed {
     /// A device that fails, or has too little memory.
     pub fn new(context: &Arc<Context>, reduced: &Arc<Reduced>) -> Result<Self> {
         let fine = context.fine();
-        let (all, of) = shapes(reduced);
+        let (all, of) = shapes(reduced.reduced_bodies().iter());
         let length = length(&all);
         let (mut shape_points, mut table) = (Vec::new(), Vec::new());
         let mut starts = Vec::new();

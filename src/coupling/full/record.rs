@@ -49,16 +49,6 @@ impl<'a> FullRecord<'a> {
     }
 }
 
-/// Both directions, or the one that they are.
-fn distinct<'a>(x: Direction<'a>, y: Direction<'a>) -> Vec<Direction<'a>> {
-    let same = match (&x, &y) {
-        (Direction::Basis(a), Direction::Basis(b)) => a == b,
-        (Direction::Twist(a), Direction::Twist(b)) => a == b,
-        _ => false,
-    };
-    if same { vec![x] } else { vec![x, y] }
-}
-
 impl Record for FullRecord<'_> {
     fn momenta(&self) -> &DMatrix<f64> {
         &self.momenta
@@ -73,7 +63,7 @@ impl Record for FullRecord<'_> {
     }
 
     fn vjp(&self, x: Direction, y: Direction) -> Result<Pullback> {
-        let directions = distinct(x, y);
+        let directions = Direction::distinct(x, y);
         let n = directions.len();
         let response = self.response.directions(&directions)?;
         let momenta = response.momenta()?;
@@ -86,7 +76,9 @@ impl Record for FullRecord<'_> {
     }
 
     fn hvp(&self, x: Direction, y: Direction, z: &[Vec6]) -> Result<Tangent> {
-        self.response.directions(&distinct(x, y))?.tangent(z)
+        self.response
+            .directions(&Direction::distinct(x, y))?
+            .tangent(z)
     }
 
     fn report(&self) -> &Report {

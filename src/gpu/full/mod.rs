@@ -81,12 +81,3 @@ impl Backend for Gpu {
         )?))
     }
 }
-
-/// The columns of an array in passes of at most [`WIDE`], as even as can be: (first, count).
-fn passes(columns: usize) -> impl Iterator<Item = (usize, usize)> {
-    let parts = columns.div_ceil(WIDE).max(1);
-    (0..parts).map(move |p| {
-        let first = p * columns / parts;
-        (first, (p + 1) * columns / parts - first)
-    })
-}

@@ -1,7 +1,7 @@
 //! The kernels one at a time, in SI units: for comparisons and benchmarks.
 
 use super::Gpu;
-use super::products::{Product, To, product, run};
+use super::products::{Product, To, product};
 use super::second::motions;
 use super::solve::Solves;
 use crate::Result;
@@ -76,7 +76,7 @@ impl Probe {
         let out = self.context().reals("probe", arithmetic, rows * k)?;
         let to = [To::plain(k, (&out, k, 0))];
         let calls = product(&self.placed, arithmetic, what, (&from, k, 0), k, &to)?;
-        run(&self.placed, &[&calls])?;
+        self.context().run(&[&calls])?;
         let mut values = self.context().read(arithmetic, &[(&out, rows * k)])?;
         let data = values
             .swap_remove(0)
@@ -136,7 +136,7 @@ impl Probe {
         let time = |repeat: usize| -> Result<f64> {
             let start = Instant::now();
             for _ in 0..repeat {
-                run(&self.placed, &[&calls])?;
+                context.run(&[&calls])?;
             }
             context.read(arithmetic, &[(&out, 1)])?;
             Ok(start.elapsed().as_secs_f64())
@@ -283,7 +283,7 @@ impl Probe {
                 (geometry.pairs.len(), elements),
             )?,
         ];
-        run(&self.placed, &[&calls])?;
+        context.run(&[&calls])?;
         let values = context.read(arithmetic, &[(&out, geometry.pairs.len() * elements)])?;
         Ok(self.wrenches(&values[0], k, 6))
     }
@@ -327,7 +327,7 @@ impl Probe {
                 (geometry.pairs.len(), elements),
             )?,
         ];
-        run(&self.placed, &[&calls])?;
+        context.run(&[&calls])?;
         let values = context.read(arithmetic, &[(&out, geometry.pairs.len() * elements)])?;
         Ok(self.wrenches(&values[0], k, 12))
     }

@@ -1,6 +1,6 @@
 //! Products with K and P of any number of columns, in passes.
 
-use super::passes;
+use super::WIDE;
 use crate::Result;
 use crate::gpu::apply::apply;
 use crate::gpu::apply_jvp::apply_jvp;
@@ -8,7 +8,8 @@ use crate::gpu::apply_transpose::apply_transpose;
 use crate::gpu::apply_transpose_jvp::apply_transpose_jvp;
 use crate::gpu::buffer::Buffer;
 use crate::gpu::geometry::Placed;
-use crate::gpu::kernel::{Batch, Call};
+use crate::gpu::kernel::Call;
+use crate::gpu::share::passes;
 use crate::gpu::source::Arithmetic;
 use crate::gpu::sum::{Base, Slice, Sum, sum};
 
@@ -75,7 +76,7 @@ pub(super) fn product<'a>(
     };
     let shares = sizes.shares(own, other);
     let mut calls = Vec::new();
-    for (first, width) in passes(columns) {
+    for (first, width) in passes(columns, WIDE) {
         let parts = context.reals("shares of a product", arithmetic, shares * rows * width)?;
         let x = (x, stride, offset + first);
         calls.push(once(
@@ -137,13 +138,4 @@ pub(super) fn once(
             apply_transpose_jvp(context, arithmetic, placed, potential, x, out, motions)
         }
     }
-}
-
-/// All of them, in order.
-pub(super) fn run(placed: &Placed, calls: &[&[Call]]) -> Result<()> {
-    let mut batch = Batch::default();
-    for c in calls {
-        batch.extend(*c);
-    }
-    placed.geometry.context.submit(&batch)
 }

@@ -1,6 +1,6 @@
 //! The water's answer, on the device: value and first derivative.
 
-use super::products::{Product, To, product, run};
+use super::products::{Product, To, product};
 use super::solve::Solves;
 use crate::adjoint::lie::Vec6;
 use crate::coupling::full::{Reached, Response};
@@ -142,7 +142,7 @@ impl Answer {
             &[To::plain(k, (&g, 2 * k, k))],
         )?;
         let added = [rows(context, fine, &own, given, (&g, 2 * k, k), true)?];
-        run(&placed, &[&asked, &gathered, &read, &added])?;
+        context.run(&[&asked, &gathered, &read, &added])?;
 
         let solves = Solves::new(&placed, (&g, 2 * k, 0), (&out.strengths, 2 * k, 0), 2 * k)?;
         let mut batch = Batch::default();
@@ -158,7 +158,7 @@ impl Answer {
                 let reached = solves.finish(&placed, what)?;
                 // r was made of an unfinished solution: again from F x̄.
                 let again = rows(context, fine, &table(0), given, at(1), false)?;
-                run(&placed, &[&[again]])?;
+                context.run(&[&[again]])?;
                 found = out.follow(&g, None)?;
                 reached
             }
@@ -201,7 +201,7 @@ impl Answer {
             &energies,
             &task,
         )?];
-        run(&placed, &[&image, &impulses_of, &dots])?;
+        context.run(&[&image, &impulses_of, &dots])?;
         let count = 6 * geometry.sizes.bodies * k;
         let mut wanted = vec![
             (&momenta, count * fine.size()),
@@ -291,7 +291,7 @@ impl Answer {
             )?,
         ];
         let (calls, momenta) = out.impulse_calls()?;
-        run(&self.placed, &[&combined, &calls])?;
+        context.run(&[&combined, &calls])?;
         let values = context.read(fine, &[(&momenta, 6 * sizes.bodies * n)])?;
         out.momenta = impulses(geometry, &self.moving, &values[0], &out.scale);
         Ok(out)
@@ -354,7 +354,7 @@ impl Response for Answer {
                     (geometry.pairs.len(), elements),
                 )?,
             ];
-            run(placed, &[&calls])?;
+            context.run(&[&calls])?;
             outs.push(out);
         }
         let wanted: Vec<(&Buffer, usize)> = outs

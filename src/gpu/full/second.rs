@@ -1,6 +1,6 @@
 //! The tangent along one displacement, on the device: Eq. 21, and the second derivatives of the kernels.
 
-use super::products::{Product, To, product, run};
+use super::products::{Product, To, product};
 use super::response::{Answer, impulses, spatial};
 use super::solve::Solves;
 use crate::Result;
@@ -103,7 +103,7 @@ impl Answer {
             )?,
         ];
         let all: Vec<&[_]> = calls.iter().map(Vec::as_slice).collect();
-        run(placed, &all)?;
+        context.run(&all)?;
 
         let solves = Solves::new(placed, (&g, 2 * n, 0), (&x, 2 * n, 0), 2 * n)?;
         let mut batch = Batch::default();
@@ -293,7 +293,7 @@ impl After<'_> {
                 (pairs, elements),
             )?);
         }
-        run(placed, &[&copies, &image, &read, &last])?;
+        context.run(&[&copies, &image, &read, &last])?;
         let mut wanted = vec![
             (&momenta, 6 * sizes.bodies * n * fine.size()),
             (&wrenches, pairs * elements * fine.size()),

@@ -1,6 +1,6 @@
 //! `(KᵀK + D²) X = G` on the device (Eq. 20 and 21): conjugate gradients in single precision, refined.
 
-use super::passes;
+use super::WIDE;
 use super::products::{Product, once};
 use crate::coupling::full::{Preconditioner, Reached};
 use crate::gpu::buffer::Buffer;
@@ -9,6 +9,7 @@ use crate::gpu::factor::factor;
 use crate::gpu::geometry::Placed;
 use crate::gpu::kernel::{Batch, Call};
 use crate::gpu::refine::{Cycle, Refined, refine};
+use crate::gpu::share::passes;
 use crate::gpu::source::Arithmetic;
 use crate::gpu::sum::{Base, Slice, Sum, sum};
 use crate::{Error, Result};
@@ -228,7 +229,7 @@ impl Solves {
     /// # Errors
     /// A device that fails, or has too little memory.
     pub fn new(placed: &Placed, g: Slice, x: Slice, columns: usize) -> Result<Self> {
-        let all = passes(columns)
+        let all = passes(columns, WIDE)
             .filter(|(_, width)| *width > 0)
             .map(|(first, width)| {
                 let g = (g.0, g.1, g.2 + first);

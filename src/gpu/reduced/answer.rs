@@ -1,6 +1,6 @@
 //! The bodies' answer to columns of twists: charges and momenta, what they pull with, and wrenches.
 
-use super::products::{Product, product, run};
+use super::products::{Product, product};
 use super::solve::{Reached, Solve};
 use crate::Result;
 use crate::adjoint::lie::Vec6;
@@ -130,7 +130,7 @@ impl Answer {
         )?];
         let follow = |batch: &mut Batch<'_>| -> Result<()> {
             context.submit(batch)?;
-            run(&placed, &[&moved, &added, &gathered, &read])
+            context.run(&[&moved, &added, &gathered, &read])
         };
         let mut batch = Batch::default();
         for calls in [&moved[..], &gathered, &asked] {
@@ -193,7 +193,7 @@ impl Answer {
             &alpha,
             (model.sizes.points, 1),
         )?;
-        run(&self.placed, &[&[call]])?;
+        context.run(&[&[call]])?;
         Ok(Self {
             placed: self.placed.clone(),
             momenta: &self.momenta * coefficients,
@@ -233,7 +233,7 @@ impl Answer {
             (&out, k, 0),
             &model.open,
         )?;
-        run(&self.placed, &[&calls])?;
+        context.run(&[&calls])?;
         Ok(out)
     }
 
@@ -258,7 +258,7 @@ impl Answer {
         let out = context.reals("wrenches", fine, count)?;
         let sides = (self.side(pulls), other.0.side(other.1));
         let call = wrench(context, &self.placed, sides, None, &out)?;
-        run(&self.placed, &[&[call]])?;
+        context.run(&[&[call]])?;
         let values = context.read(fine, &[(&out, count)])?.swap_remove(0);
         let of = |b: usize, x: usize, y: usize| {
             let at = ((b * n + x) * m + y) * 6;

@@ -5,8 +5,9 @@ use crate::gpu::buffer::Buffer;
 use crate::gpu::coulomb::coulomb;
 use crate::gpu::coulomb_jvp::coulomb_jvp;
 use crate::gpu::coulomb_vjp::coulomb_vjp;
-use crate::gpu::kernel::{Batch, Call};
+use crate::gpu::kernel::Call;
 use crate::gpu::points::{Motion, Placed};
+use crate::gpu::share::passes;
 use crate::gpu::sum::{Base, Slice, Sum, sum};
 
 /// Most columns of one pass of potentials.
@@ -23,15 +24,6 @@ pub(super) enum Product<'a> {
     Tangent(&'a Motion),
     /// The pulls, `[point][F, D][columns]`.
     Pull,
-}
-
-/// The columns of an array in passes as even as can be: (first, count).
-fn passes(columns: usize, most: usize) -> impl Iterator<Item = (usize, usize)> {
-    let parts = columns.div_ceil(most).max(1);
-    (0..parts).map(move |p| {
-        let first = p * columns / parts;
-        (first, (p + 1) * columns / parts - first)
-    })
 }
 
 /// `out = product · x`; a product with G is skipped where no column of `gate` goes on.
@@ -75,13 +67,4 @@ pub(super) fn product(
         calls.push(sum(context, fine, &task, gate)?);
     }
     Ok(calls)
-}
-
-/// All of them, in order.
-pub(super) fn run(placed: &Placed, calls: &[&[Call]]) -> Result<()> {
-    let mut batch = Batch::default();
-    for c in calls {
-        batch.extend(*c);
-    }
-    placed.model.context.submit(&batch)
 }

@@ -31,16 +31,6 @@ enum Derivative {
     Pulls(Buffer),
 }
 
-/// Both directions, or the one that they are.
-fn distinct<'a>(x: Direction<'a>, y: Direction<'a>) -> Vec<Direction<'a>> {
-    let same = match (&x, &y) {
-        (Direction::Basis(a), Direction::Basis(b)) => a == b,
-        (Direction::Twist(a), Direction::Twist(b)) => a == b,
-        _ => false,
-    };
-    if same { vec![x] } else { vec![x, y] }
-}
-
 impl GpuRecord {
     pub fn new(
         placed: Arc<Placed>,
@@ -85,7 +75,7 @@ impl GpuRecord {
         let out = context.reals("pulls", context.fine(), rows.0 * rows.1)?;
         let units = self.answer.units(&coefficients, &one.scale);
         let call = combine(context, context.fine(), pulls, &units, &out, rows)?;
-        super::products::run(&one.placed, &[&[call]])?;
+        context.run(&[&[call]])?;
         Ok((one, out))
     }
 
@@ -176,7 +166,7 @@ impl Record for GpuRecord {
     }
 
     fn vjp(&self, x: Direction, y: Direction) -> Result<Pullback> {
-        let answer = self.answers(&distinct(x, y))?;
+        let answer = self.answers(&Direction::distinct(x, y))?;
         let last = answer.columns - 1;
         let pulls = answer.pulls()?;
         let wrenches = answer.wrenches(&pulls, (&answer, &pulls))?;
@@ -188,7 +178,7 @@ impl Record for GpuRecord {
     }
 
     fn hvp(&self, x: Direction, y: Direction, z: &[Vec6]) -> Result<Tangent> {
-        let answer = self.answers(&distinct(x, y))?;
+        let answer = self.answers(&Direction::distinct(x, y))?;
         let length = answer.placed.model.length;
         units::along(z, length, |z| answer.second(z, self.tolerance))
     }

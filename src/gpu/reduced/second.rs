@@ -1,7 +1,7 @@
 //! The tangent along one displacement, on the device.
 
 use super::answer::{Answer, FLUX, expand, impulses, project};
-use super::products::{Product, product, run};
+use super::products::{Product, product};
 use super::solve::Solve;
 use crate::Result;
 use crate::adjoint::lie::Vec6;
@@ -123,7 +123,7 @@ impl Answer {
         let mut found: Vec<Vec<f64>> = bytes.iter().map(|b| fine.numbers(b)).collect();
         if solve.reached(placed, &states)?.is_none() {
             solve.finish(placed)?;
-            run(placed, &[&last])?;
+            context.run(&[&last])?;
             found = context.read(fine, &[(&momenta, impulse_count), (&wrenches, count)])?;
         }
         let momenta = impulses(model, &found[0], &self.scale);

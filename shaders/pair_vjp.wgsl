@@ -11,12 +11,12 @@
 //! uses: vector flux normal potential pairs tile
 //! constants: LEFT
 
-struct Columns { columns: u32, first: u32, pad0: u32, pad1: u32 }
+struct Columns { columns: u32, first: u32, first_task: u32, tasks: u32 }
 
 @group(1) @binding(0) var<storage, read> left: array<real>;       // [face][3·columns]: μ, r, β
 @group(1) @binding(1) var<storage, read> right: array<real>;      // [source][2·columns]: a, λ
 @group(1) @binding(2) var<storage, read> tasks: array<vec4<u32>>; // source block, image, first and last block of faces
-@group(1) @binding(3) var<storage, read_write> out: array<real>;  // [task][LEFT][columns][6]
+@group(1) @binding(3) var<storage, read_write> out: array<real>;  // [task of this call][LEFT][columns][6]
 @group(1) @binding(4) var<uniform> task: Columns;
 
 var<workgroup> densities: array<real, BLOCK * 3u * LEFT>;
@@ -35,10 +35,10 @@ fn main(
     @builtin(local_invocation_index) lane: u32,
 ) {
     let number = group.y * groups.x + group.x;
-    if number >= arrayLength(&tasks) {
+    if number >= task.tasks {
         return;
     }
-    let mine = tasks[number];
+    let mine = tasks[task.first_task + number];
     let own = blocks[sizes.face_blocks + mine.x];
     let j = own.y + min(lane, own.z - 1u);
     let s = source_at(mine.y, j);

@@ -1,11 +1,11 @@
-// out[pair][element] = sum over the pair's tasks, in their order.
+// out[pair][element] = sum over the pair's tasks, in their order, for some of the pairs.
 
 //! uses:
 //! constants:
 
-struct Task { pairs: u32, elements: u32, pad0: u32, pad1: u32 }
+struct Task { pairs: u32, elements: u32, first_pair: u32, first_task: u32 }
 
-@group(0) @binding(0) var<storage, read> parts: array<real>;           // [task][element]
+@group(0) @binding(0) var<storage, read> parts: array<real>;           // [task from first_task][element]
 @group(0) @binding(1) var<storage, read> ranges: array<vec2<u32>>;     // [pair]: first task, one past the last
 @group(0) @binding(2) var<storage, read_write> out: array<real>;       // [pair][element]
 @group(0) @binding(3) var<uniform> task: Task;
@@ -16,11 +16,11 @@ fn main(@builtin(global_invocation_id) id: vec3<u32>, @builtin(num_workgroups) g
     if at >= task.pairs * task.elements {
         return;
     }
-    let pair = at / task.elements;
+    let pair = task.first_pair + at / task.elements;
     let element = at % task.elements;
     var sum = num(0.0);
     for (var t = ranges[pair].x; t < ranges[pair].y; t++) {
-        sum = add(sum, parts[t * task.elements + element]);
+        sum = add(sum, parts[(t - task.first_task) * task.elements + element]);
     }
-    out[at] = sum;
+    out[pair * task.elements + element] = sum;
 }

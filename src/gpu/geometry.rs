@@ -7,7 +7,7 @@
 use super::buffer::Buffer;
 use super::context::Context;
 use super::diagonal::diagonal;
-use super::kernel::{Batch, Bound, groups};
+use super::kernel::{Batch, Bound};
 use super::place::place;
 use super::share::shapes;
 use super::source::Arithmetic;
@@ -16,14 +16,17 @@ use crate::adjoint::lie::{Mat3, Pose, Vec3};
 use crate::boundary::{BodyBoundary, Method};
 use crate::coupling::full::{Model, Preconditioner};
 use faer::Mat;
+use std::ops::Range;
 use std::sync::Arc;
 
 /// Faces or sources of one block.
 const BLOCK: usize = 64;
 /// Workgroups that keep a large card busy.
 const BUSY: usize = 2048;
-/// Tasks of a derivative, about.
+/// Tasks of a derivative, about, unless there are more pairs.
 const TASKS: usize = 2048;
+/// Memory for what the tasks of one batch of pairs leave, bytes.
+const BATCH: usize = 1 << 20;
 
 /// Numbers of things.
 #[derive(Clone, Copy, Debug)]
@@ -49,6 +52,13 @@ pub(super) struct DevicePair {
     pub target: usize,
     pub source: usize,
     pub image: usize,
+}
+
+/// Pairs that one call works on, and their tasks.
+#[derive(Clone, Debug)]
+pub(super) struct PairBatch {
+    pub pairs: Range<usize>,
+    pub tasks: Range<usize>,
 }
 
 /// All that doesn't change with the poses.
@@ -81,7 +91,8 @@ pub(super) struct Geometry {
     pub diagonal: bool,
     pub tasks: Buffer,
     pub ranges: Buffer,
-    task_count: usize,
+    /// Tasks of every pair, as `ranges` has them.
+    pair_tasks: Vec<Range<usize>>,
     /// Always one: what isn't part of a solve goes on.
     pub open: Buffer,
 }
@@ -113,7 +124,7 @@ fn starts(sizes: impl Iterator<Item = usize>) -> Vec<usize> {
 }
 
 /// (body, first, count, method) of every block.
-fn blocks(ranges: &[std::ops::Range<usize>], method: impl Fn(usize) -> u32) -> Vec<[u32; 4]> {
+fn blocks(ranges: &[Range<usize>], method: impl Fn(usize) -> u32) -> Vec<[u32; 4]> {
     let mut out = Vec::new();
     for (b, range) in ranges.iter().enumerate() {
         for first in range.clone().step_by(BLOCK) {
@@ -125,7 +136,7 @@ fn blocks(ranges: &[std::ops::Range<usize>], method: impl Fn(usize) -> u32) -> V
 }
 
 /// (body, row of the body's shape) of every row.
-fn map(ranges: &[std::ops::Range<usize>], of: &[usize], starts: &[usize]) -> Vec<u32> {
+fn map(ranges: &[Range<usize>], of: &[usize], starts: &[usize]) -> Vec<u32> {
     let mut out = Vec::new();
     for (b, range) in ranges.iter().enumerate() {
         for i in 0..range.len() {
@@ -237,7 +248,11 @@ impl Geometry {
             .collect();
 
         let (factors, layout, diagonal) = factors(context, model, &all, &of, weight);
-        let (pairs, tasks, ranges) = tasks(model, &relations, &face_blocks, &source_blocks);
+        let (pairs, tasks, pair_tasks) = tasks(model, &relations, &face_blocks, &source_blocks);
+        let ranges: Vec<u32> = pair_tasks
+            .iter()
+            .flat_map(|r| [r.start as u32, r.end as u32])
+            .collect();
         let bodies: Vec<u32> = (0..n)
             .flat_map(|b| [&model.faces[b], &model.sources[b]])
             .flat_map(|r| [r.start as u32, r.len() as u32])
@@ -277,9 +292,9 @@ impl Geometry {
             factors: context.upload("factors", Arithmetic::Single, &factors)?,
             layout: context.upload_words("layout of the factors", &layout)?,
             diagonal,
-            task_count: tasks.len() / 4,
             tasks: context.upload_words("tasks", &tasks)?,
             ranges: context.upload_words("ranges of the tasks", &ranges)?,
+            pair_tasks,
             open: context.upload_words("open", &[1])?,
             context: context.clone(),
             model: model.clone(),
@@ -303,14 +318,23 @@ impl Geometry {
             .shares(self.sizes.source_blocks, widest.div_ceil(BLOCK))
     }
 
-    /// Number of tasks of a derivative.
-    pub fn task_count(&self) -> usize {
-        self.task_count
-    }
-
-    /// Workgroups for all tasks.
-    pub fn task_groups(&self) -> [u32; 3] {
-        groups(self.task_count)
+    /// The pairs in batches, where each task leaves so many bytes.
+    pub fn batches(&self, bytes: usize) -> Vec<PairBatch> {
+        let most = (BATCH.min(self.context.largest_binding() as usize) / bytes.max(1)).max(1);
+        let mut out: Vec<PairBatch> = Vec::new();
+        for (number, tasks) in self.pair_tasks.iter().enumerate() {
+            match out.last_mut() {
+                Some(batch) if tasks.end - batch.tasks.start <= most => {
+                    batch.pairs.end = number + 1;
+                    batch.tasks.end = tasks.end;
+                }
+                _ => out.push(PairBatch {
+                    pairs: number..number + 1,
+                    tasks: tasks.clone(),
+                }),
+            }
+        }
+        out
     }
 }
 
@@ -352,16 +376,16 @@ fn factors(
     )
 }
 
-/// Pairs, the tasks (block of sources, image, first and last block of faces) of each in order, and
-/// their ranges.
+/// Pairs, the tasks (block of sources, image, first and last block of faces) of all in order, and which
+/// are each pair's.
 fn tasks(
     model: &Model,
     relations: &[u32],
     face_blocks: &[[u32; 4]],
     source_blocks: &[[u32; 4]],
-) -> (Vec<DevicePair>, Vec<u32>, Vec<u32>) {
+) -> (Vec<DevicePair>, Vec<u32>, Vec<Range<usize>>) {
     let n = model.bodies.len();
-    let of = |blocks: &[[u32; 4]], b: usize| -> std::ops::Range<usize> {
+    let of = |blocks: &[[u32; 4]], b: usize| -> Range<usize> {
         let first = blocks.partition_point(|x| (x[0] as usize) < b);
         let last = blocks.partition_point(|x| (x[0] as usize) <= b);
         first..last
@@ -376,14 +400,14 @@ fn tasks(
                 if image == 0 && relations[target * n + source] != 0 {
                     continue;
                 }
-                let start = (tasks.len() / 4) as u32;
+                let start = tasks.len() / 4;
                 for s in of(source_blocks, source) {
                     for first in rows.clone().step_by(chunk) {
                         let last = (first + chunk).min(rows.end);
                         tasks.extend([s as u32, image as u32, first as u32, last as u32]);
                     }
                 }
-                ranges.extend([start, (tasks.len() / 4) as u32]);
+                ranges.push(start..tasks.len() / 4);
                 pairs.push(DevicePair {
                     target,
                     source,

@@ -1,25 +1,27 @@
 //! `shaders/pair_hvp.wgsl`: the tangent of [`pair_vjp`](super::pair_vjp), mirrored.
 
 use super::buffer::Buffer;
-use super::context::Context;
 use super::geometry::Placed;
-use super::kernel::Call;
+use super::kernel::{Call, groups};
 use super::source::{Arithmetic, Constant};
 use crate::Result;
+use std::ops::Range;
 
-/// `out[task][columns][columns][12]`: wrenches and their tangents; left densities
+/// `out[task][columns][columns][12]` of these tasks: wrenches and their tangents; left densities
 /// `[face][μ, r, β, δμ, δr]`, right ones `[source][a, λ, δa, δλ]`.
 pub(super) fn pair_hvp(
-    context: &Context,
     arithmetic: Arithmetic,
     placed: &Placed,
     (left, right): (&Buffer, &Buffer),
     columns: usize,
     motions: &Buffer,
+    tasks: &Range<usize>,
     out: &Buffer,
 ) -> Result<Call> {
+    let context = &placed.geometry.context;
     let constants = [("LEFT", Constant::Number(columns as u32))];
     let kernel = context.kernel("pair_hvp", "main", arithmetic, &constants)?;
+    let uniform = context.uniform(&[tasks.start as u32, tasks.len() as u32, 0, 0]);
     let mut buffers = placed.buffers(arithmetic);
     buffers.extend([
         ("left", left.into()),
@@ -27,6 +29,7 @@ pub(super) fn pair_hvp(
         ("tasks", (&placed.geometry.tasks).into()),
         ("motions", motions.into()),
         ("out", out.into()),
+        ("share", (&uniform).into()),
     ]);
-    context.call(&kernel, &buffers, placed.geometry.task_groups())
+    context.call(&kernel, &buffers, groups(tasks.len()))
 }

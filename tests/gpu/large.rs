@@ -1,9 +1,10 @@
 //! Bodies too large to factor: nothing of the size of a matrix, on either side.
 
 use super::fixture::*;
+use hydrograd::adjoint::lie::{Pose, Vec3, exp_matrix};
 use hydrograd::boundary::{BodyBoundary, Readout, Settings};
 use hydrograd::coupling::full::{Cpu, Full, Model, Preconditioner, SolveSettings, WetBody};
-use hydrograd::coupling::{Coupling, Exclusions};
+use hydrograd::coupling::{Coupling, Direction, Exclusions};
 use hydrograd::gpu::full::Gpu;
 use hydrograd::scene::Shape;
 use hydrograd::shape;
@@ -62,4 +63,49 @@ fn a_body_without_factor_gives_the_same_answer() {
 fn the_cpu_refuses_a_body_without_factor() {
     let message = Cpu::new(model(false)).err().expect("refused").to_string();
     assert!(message.contains("backend gpu"), "{message}");
+}
+
+/// Bodies in a cubic lattice with `n` along each edge, none like its neighbour in turn.
+fn lattice(n: usize) -> Vec<Pose> {
+    let at = |k: usize| [k % n, k / n % n, k / (n * n)].map(|x| 1.5 * x as f64);
+    (0..n * n * n)
+        .map(|k| {
+            let turn = Vec3::new(0.3 * k as f64, 1.0, 0.1 * (k * k) as f64);
+            Pose::new(exp_matrix(&turn), Vec3::from(at(k)))
+        })
+        .collect()
+}
+
+#[test]
+fn derivatives_of_many_pairs_go_in_batches() {
+    let mesh = shape::build(&Shape::ellipsoid([0.5, 0.3, 0.4]), Path::new("."), Some(20)).unwrap();
+    let (v, f) = (mesh.vertices(), mesh.faces());
+    let boundary = BodyBoundary::new("b", v, f, &Settings::default()).unwrap();
+    let body = Arc::new(WetBody::new(Arc::new(boundary)));
+    let poses = lattice(4);
+    let settings = SolveSettings {
+        tolerance: 1e-10,
+        ..SolveSettings::default()
+    };
+    let model = Model::new(vec![body; poses.len()], &[], Exclusions::none(), settings);
+    let model = Arc::new(model.unwrap());
+    let (cpu, gpu) = both(context(), &model);
+    // 4032 pairs, 720 and 384 bytes each: more than the device is asked to hold of them at once (1 MiB).
+    let basis = basis(poses.len(), 5, 0.3);
+    let (x, y) = (twist(1, 0.1).rows(0, 5).into_owned(), twist(1, 0.9));
+    let y = y.rows(0, 5).into_owned();
+    let z = displacement(poses.len(), 0.7);
+    let of = |full: &Full| {
+        let record = full.evaluate(&poses, &basis, true).unwrap();
+        let columns = record.gradient_columns(&x).concat();
+        let tangent = record
+            .hvp(Direction::Basis(&x), Direction::Basis(&y), &z)
+            .unwrap();
+        (flat(&columns), flat(&tangent.wrench))
+    };
+    let (on_gpu, on_cpu) = (of(&gpu), of(&cpu));
+    let found = difference(&on_gpu.0, &on_cpu.0);
+    assert!(found <= 1e-7, "{found:.1e}");
+    let found = difference(&on_gpu.1, &on_cpu.1);
+    assert!(found <= 1e-7, "{found:.1e}");
 }

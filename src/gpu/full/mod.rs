@@ -3,6 +3,7 @@
 //! In its notation, with everything scaled as `gpu::geometry` says: strengths `X = [a, λ]` by source,
 //! densities `[μ, r, β]` by face, β = B x̄ and, to begin with, F x̄ where r will stand.
 
+mod pairs;
 mod probe;
 mod products;
 mod response;

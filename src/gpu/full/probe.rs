@@ -1,6 +1,7 @@
 //! The kernels one at a time, in SI units: for comparisons and benchmarks.
 
 use super::Gpu;
+use super::pairs::{Densities, pairs_hvp, pairs_vjp};
 use super::products::{Product, To, product};
 use super::second::motions;
 use super::solve::Solves;
@@ -11,9 +12,6 @@ use crate::gpu::buffer::Buffer;
 use crate::gpu::context::Context;
 use crate::gpu::geometry::Placed;
 use crate::gpu::kernel::Batch;
-use crate::gpu::pair_hvp::pair_hvp;
-use crate::gpu::pair_vjp::pair_vjp;
-use crate::gpu::reduce::reduce;
 use crate::gpu::source::Arithmetic;
 use crate::solver::Columns;
 use std::sync::Arc;
@@ -255,36 +253,19 @@ impl Probe {
         right: &Columns,
     ) -> Result<Vec<PairWrenches>> {
         let k = right.columns / 2;
-        let geometry = &self.placed.geometry;
         let context = self.context();
-        let elements = k * k * 6;
         let (left, right) = (
             self.upload(arithmetic, &self.weighed(left, k, &[0, 1]))?,
             self.upload(arithmetic, right)?,
         );
-        let parts = context.reals("tasks", arithmetic, geometry.task_count() * elements)?;
-        let out = context.reals("wrenches", arithmetic, geometry.pairs.len() * elements)?;
-        let calls = [
-            pair_vjp(
-                context,
-                arithmetic,
-                &self.placed,
-                (&left, &right),
-                k,
-                (0, k),
-                &parts,
-            )?,
-            reduce(
-                context,
-                arithmetic,
-                &parts,
-                &geometry.ranges,
-                &out,
-                (geometry.pairs.len(), elements),
-            )?,
-        ];
+        let of = Densities {
+            left: &left,
+            right: &right,
+            columns: k,
+        };
+        let (calls, out, count) = pairs_vjp(&self.placed, arithmetic, &of, (0, k))?;
         context.run(&[&calls])?;
-        let values = context.read(arithmetic, &[(&out, geometry.pairs.len() * elements)])?;
+        let values = context.read(arithmetic, &[(&out, count)])?;
         Ok(self.wrenches(&values[0], k, 6))
     }
 
@@ -300,35 +281,20 @@ impl Probe {
         right: &Columns,
     ) -> Result<Vec<PairWrenches>> {
         let k = right.columns / 4;
-        let geometry = &self.placed.geometry;
         let context = self.context();
-        let elements = k * k * 12;
         let motions = context.upload("motions", arithmetic, &motions(&self.placed, z))?;
-        let left = self.upload(arithmetic, &self.weighed(left, k, &[0, 1, 3, 4]))?;
-        let right = self.upload(arithmetic, right)?;
-        let parts = context.reals("tasks", arithmetic, geometry.task_count() * elements)?;
-        let out = context.reals("wrenches", arithmetic, geometry.pairs.len() * elements)?;
-        let calls = [
-            pair_hvp(
-                context,
-                arithmetic,
-                &self.placed,
-                (&left, &right),
-                k,
-                &motions,
-                &parts,
-            )?,
-            reduce(
-                context,
-                arithmetic,
-                &parts,
-                &geometry.ranges,
-                &out,
-                (geometry.pairs.len(), elements),
-            )?,
-        ];
+        let (left, right) = (
+            self.upload(arithmetic, &self.weighed(left, k, &[0, 1, 3, 4]))?,
+            self.upload(arithmetic, right)?,
+        );
+        let of = Densities {
+            left: &left,
+            right: &right,
+            columns: k,
+        };
+        let (calls, out, count) = pairs_hvp(&self.placed, arithmetic, &of, &motions)?;
         context.run(&[&calls])?;
-        let values = context.read(arithmetic, &[(&out, geometry.pairs.len() * elements)])?;
+        let values = context.read(arithmetic, &[(&out, count)])?;
         Ok(self.wrenches(&values[0], k, 12))
     }
 

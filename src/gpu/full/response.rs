@@ -1,5 +1,6 @@
 //! The water's answer, on the device: value and first derivative.
 
+use super::pairs::{Densities, pairs_vjp};
 use super::products::{Product, To, product};
 use super::solve::Solves;
 use crate::adjoint::lie::Vec6;
@@ -10,10 +11,9 @@ use crate::gpu::combine::combine;
 use crate::gpu::geometry::{Geometry, Placed};
 use crate::gpu::impulse::impulse;
 use crate::gpu::kernel::{Batch, Call};
-use crate::gpu::pair_vjp::pair_vjp;
 use crate::gpu::products::{Task, products};
-use crate::gpu::reduce::reduce;
 use crate::gpu::rows::{Table, rows};
+use crate::gpu::share::passes;
 use crate::gpu::units::{self, scaled, size};
 use crate::solver::Columns;
 use crate::{Error, Result};
@@ -326,49 +326,31 @@ impl Response for Answer {
             return Ok(PairTensor::zeros(bodies, k));
         }
         // W(x, y) of every pair, x in passes.
-        let passes = k.div_ceil(LEFT);
-        let width = k.div_ceil(passes);
-        let elements = width * k * 6;
-        let tasks = geometry.task_count();
+        let of = Densities {
+            left: &self.densities,
+            right: &self.strengths,
+            columns: k,
+        };
+        let shares: Vec<(usize, usize)> = passes(k, LEFT).collect();
         let mut outs = Vec::new();
-        for p in 0..passes {
-            let parts = context.reals("tasks of a derivative", fine, tasks * elements)?;
-            let out = context.reals("wrenches", fine, geometry.pairs.len() * elements)?;
-            let densities = (&self.densities, &self.strengths);
-            let calls = [
-                pair_vjp(
-                    context,
-                    fine,
-                    placed,
-                    densities,
-                    k,
-                    (p * width, width),
-                    &parts,
-                )?,
-                reduce(
-                    context,
-                    fine,
-                    &parts,
-                    &geometry.ranges,
-                    &out,
-                    (geometry.pairs.len(), elements),
-                )?,
-            ];
+        for share in &shares {
+            let (calls, out, count) = pairs_vjp(placed, fine, &of, *share)?;
             context.run(&[&calls])?;
-            outs.push(out);
+            outs.push((out, count));
         }
-        let wanted: Vec<(&Buffer, usize)> = outs
-            .iter()
-            .map(|o| (o, geometry.pairs.len() * elements))
-            .collect();
+        let wanted: Vec<(&Buffer, usize)> = outs.iter().map(|(out, n)| (out, *n)).collect();
         let values = context.read(fine, &wanted)?;
+        let place: Vec<(usize, usize, usize)> = (shares.iter().enumerate())
+            .flat_map(|(p, (_, width))| (0..*width).map(move |x| (p, x, *width)))
+            .collect();
         let mut wrenches = vec![DMatrix::zeros(6, k * k); bodies];
         for (number, pair) in geometry.pairs.iter().enumerate() {
             let raw = |x: usize, y: usize| {
-                let at = ((number * width + x % width) * k + y) * 6;
+                let (share, x_there, width) = place[x];
+                let at = ((number * width + x_there) * k + y) * 6;
                 spatial(
                     placed,
-                    &values[x / width][at..at + 6],
+                    &values[share][at..at + 6],
                     self.scale[x] * self.scale[y],
                 )
             };

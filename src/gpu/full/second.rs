@@ -1,5 +1,6 @@
 //! The tangent along one displacement, on the device: Eq. 21, and the second derivatives of the kernels.
 
+use super::pairs::{Densities, pairs_hvp};
 use super::products::{Product, To, product};
 use super::response::{Answer, impulses, spatial};
 use super::solve::Solves;
@@ -10,8 +11,6 @@ use crate::gpu::buffer::Buffer;
 use crate::gpu::geometry::Placed;
 use crate::gpu::impulse::impulse;
 use crate::gpu::kernel::Batch;
-use crate::gpu::pair_hvp::pair_hvp;
-use crate::gpu::reduce::reduce;
 use crate::gpu::sum::{Base, Slice, Sum, sum};
 
 /// Twists of all images of all bodies, then of the bodies as they see, about the scene's middle.
@@ -258,15 +257,13 @@ impl After<'_> {
             n,
             &[potential],
         )?;
-        let elements = n * n * 12;
-        let pairs = geometry.pairs.len();
-        let parts = context.reals(
-            "tasks of a derivative",
-            fine,
-            geometry.task_count() * elements,
-        )?;
-        let wrenches = context.reals("wrenches", fine, pairs * elements)?;
-        let mut last = vec![impulse(
+        let of = Densities {
+            left: &left,
+            right: &right,
+            columns: n,
+        };
+        let (pairs, wrenches, count) = pairs_hvp(placed, fine, &of, self.motion)?;
+        let last = [impulse(
             context,
             geometry,
             &phi,
@@ -274,29 +271,10 @@ impl After<'_> {
             x,
             (&momenta, n),
         )?];
-        if pairs > 0 {
-            last.push(pair_hvp(
-                context,
-                fine,
-                placed,
-                (&left, &right),
-                n,
-                self.motion,
-                &parts,
-            )?);
-            last.push(reduce(
-                context,
-                fine,
-                &parts,
-                &geometry.ranges,
-                &wrenches,
-                (pairs, elements),
-            )?);
-        }
-        context.run(&[&copies, &image, &read, &last])?;
+        context.run(&[&copies, &image, &read, &last, &pairs])?;
         let mut wanted = vec![
             (&momenta, 6 * sizes.bodies * n * fine.size()),
-            (&wrenches, pairs * elements * fine.size()),
+            (&wrenches, count * fine.size()),
         ];
         wanted.extend(solves.iter().flat_map(|s| s.report()));
         let mut bytes = context.read_bytes(&wanted)?;

@@ -13,7 +13,7 @@ struct Task { rows: u32, first: u32, stride: u32, offset: u32, tolerance: f32, i
 @group(0) @binding(4) var<storage, read_write> p: array<f32>;
 @group(0) @binding(5) var<storage, read_write> x: array<f32>;
 @group(0) @binding(6) var<storage, read_write> scalars: array<f32>;      // as in cgls.wgsl
-@group(0) @binding(7) var<storage, read_write> counts: array<u32>;       // [column][4]: iterations, inner solve reached its end, stalled, cycles
+@group(0) @binding(7) var<storage, read_write> counts: array<u32>;       // [column][4]: iterations, inner solve reached its end, stalled, unused
 @group(0) @binding(8) var<storage, read_write> relative: array<f32>;     // [column]: residual reached
 @group(0) @binding(9) var<storage, read_write> unfinished: array<u32>;   // [column]
 @group(0) @binding(10) var<storage, read_write> solution: array<real>;   // [source][stride]
@@ -93,7 +93,6 @@ fn begin(@builtin(workgroup_id) group: vec3<u32>, @builtin(local_invocation_inde
             }
         } else {
             going[k] = 1u;
-            counts[4u * k + 3u] += 1u;
         }
         counts[4u * k + 1u] = 0u;
         let end = max(task.inner, 0.5 * task.tolerance / max(now, task.tolerance));

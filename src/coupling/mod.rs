@@ -130,10 +130,16 @@ pub trait Record: Send + Sync {
 
     /// ∇_g E(x, y) for coefficients on the basis, without a further solve: a spatial wrench on each
     /// body. Zeros if the evaluation was made without derivative.
-    fn gradient(&self, x: &DVector<f64>, y: &DVector<f64>) -> Vec<Vec6>;
+    ///
+    /// # Errors
+    /// A device that fails.
+    fn gradient(&self, x: &DVector<f64>, y: &DVector<f64>) -> Result<Vec<Vec6>>;
 
     /// ∇_g E(x, e_i) for every basis column e_i, as [`Record::gradient`].
-    fn gradient_columns(&self, x: &DVector<f64>) -> Vec<Vec<Vec6>> {
+    ///
+    /// # Errors
+    /// As there.
+    fn gradient_columns(&self, x: &DVector<f64>) -> Result<Vec<Vec<Vec6>>> {
         let unit = |i: usize| {
             let mut e = DVector::zeros(x.len());
             e[i] = 1.0;
@@ -143,7 +149,10 @@ pub trait Record: Send + Sync {
     }
 
     /// `D_g E(e_i, y)[Z]` for every basis column e_i, without a further solve.
-    fn gradient_along(&self, y: &DVector<f64>, z: &[Vec6]) -> DVector<f64>;
+    ///
+    /// # Errors
+    /// As [`Record::gradient`].
+    fn gradient_along(&self, y: &DVector<f64>, z: &[Vec6]) -> Result<DVector<f64>>;
 
     /// Impulses of both directions and ∇_g E(x̄, ȳ), for any directions.
     ///

@@ -19,14 +19,17 @@ use nalgebra::DVector;
 
 impl Evaluation<'_> {
     /// M(q) v̇: the right-hand side of Eq. 3 with all forces, user coordinates.
-    pub fn inertial_force(&self, v: &DVector<f64>, control: &DVector<f64>) -> DVector<f64> {
+    ///
+    /// # Errors
+    /// A coupling that fails.
+    pub fn inertial_force(&self, v: &DVector<f64>, control: &DVector<f64>) -> Result<DVector<f64>> {
         let tree = &self.system.tree;
         let rho = self.parameters.density;
         let zero = DVector::zeros(v.len());
         let fields = tree.fields(&self.kinematics, &self.q, v, Virtual::User(&zero));
         let direction = self.through_water(v);
         let fluid = self.fluid_momenta(&direction);
-        let pose_force = self.pose_force(&direction);
+        let pose_force = self.pose_force(&direction)?;
         let fluid_bias = self.fluid_bias(&fields);
         let mut out = DVector::zeros(v.len());
         let mut wrenches = Vec::with_capacity(fluid.len());
@@ -39,10 +42,10 @@ impl Evaluation<'_> {
             out -= rho * self.fluid_columns(b).tr_mul(&fluid_bias[b]);
         }
         if let Some(f) = &self.fluid {
-            let along = f.gradient_along(&direction, &self.wet_field(&fields.twist));
+            let along = f.gradient_along(&direction, &self.wet_field(&fields.twist))?;
             out -= rho * along.rows(0, v.len());
         }
-        out + tree.project(&self.kinematics, wrenches) + self.system.joint_forces(control)
+        Ok(out + tree.project(&self.kinematics, wrenches) + self.system.joint_forces(control))
     }
 
     /// C − U × V of every wet body, zero for dry ones.

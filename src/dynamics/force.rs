@@ -70,11 +70,11 @@ impl Evaluation<'_> {
     }
 
     /// Fluid pose forces `½ ∂E(v, v)/∂g` on all bodies at unit density.
-    pub(super) fn pose_force(&self, direction: &DVector<f64>) -> Vec<Vec6> {
-        match &self.fluid {
-            Some(fluid) => self.half_from_wet(&fluid.gradient(direction, direction)),
+    pub(super) fn pose_force(&self, direction: &DVector<f64>) -> Result<Vec<Vec6>> {
+        Ok(match &self.fluid {
+            Some(fluid) => self.half_from_wet(&fluid.gradient(direction, direction)?),
             None => vec![Vec6::zeros(); self.system.len()],
-        }
+        })
     }
 
     /// Half of the wet bodies' field on all bodies.
@@ -91,13 +91,16 @@ impl Evaluation<'_> {
     }
 
     /// f(q, v, u).
-    pub fn force(&self, v: &DVector<f64>, control: &DVector<f64>) -> DVector<f64> {
+    ///
+    /// # Errors
+    /// A coupling that fails.
+    pub fn force(&self, v: &DVector<f64>, control: &DVector<f64>) -> Result<DVector<f64>> {
         let tree = &self.system.tree;
         let rho = self.parameters.density;
         let twists = tree.twists(&self.kinematics, v);
         let direction = self.through_water(v);
         let fluid = self.fluid_momenta(&direction);
-        let pose_force = self.pose_force(&direction);
+        let pose_force = self.pose_force(&direction)?;
         let current = self.current_twist();
         let mut momenta = Vec::with_capacity(twists.len());
         let mut rates = Vec::with_capacity(twists.len());
@@ -108,7 +111,7 @@ impl Evaluation<'_> {
                     + rho * (pose_force[b] + cross_force(&current, &fluid[b])),
             );
         }
-        self.project_frame(&twists, momenta, rates) + self.frame_joint_forces(control)
+        Ok(self.project_frame(&twists, momenta, rates) + self.frame_joint_forces(control))
     }
 
     /// Projects momenta and their rates on the turning frame columns.
@@ -128,12 +131,15 @@ impl Evaluation<'_> {
     }
 
     /// Tangent of [`Evaluation::force`] along `dv` at fixed q and u.
-    pub fn force_jvp(&self, v: &DVector<f64>, dv: &DVector<f64>) -> DVector<f64> {
+    ///
+    /// # Errors
+    /// As there.
+    pub fn force_jvp(&self, v: &DVector<f64>, dv: &DVector<f64>) -> Result<DVector<f64>> {
         let changed = match &self.fluid {
-            Some(f) => f.gradient(&self.through_water(v), &self.virtual_direction(dv)),
+            Some(f) => f.gradient(&self.through_water(v), &self.virtual_direction(dv))?,
             None => Vec::new(),
         };
-        self.force_tangent(v, dv, &changed)
+        Ok(self.force_tangent(v, dv, &changed))
     }
 
     /// The same with the change of the fluid's pose force on the wet bodies.
@@ -170,10 +176,13 @@ impl Evaluation<'_> {
     }
 
     /// ∂f/∂v, column by column.
-    pub fn force_velocity_jacobian(&self, v: &DVector<f64>) -> DMatrix<f64> {
+    ///
+    /// # Errors
+    /// As [`Evaluation::force`].
+    pub fn force_velocity_jacobian(&self, v: &DVector<f64>) -> Result<DMatrix<f64>> {
         let n = v.len();
         let changed = match &self.fluid {
-            Some(f) => f.gradient_columns(&self.through_water(v)),
+            Some(f) => f.gradient_columns(&self.through_water(v))?,
             None => vec![Vec::new(); n],
         };
         let mut out = DMatrix::zeros(n, n);
@@ -182,7 +191,7 @@ impl Evaluation<'_> {
             unit[k] = 1.0;
             out.set_column(k, &self.force_tangent(v, &unit, changed));
         }
-        out
+        Ok(out)
     }
 
     /// Transpose of [`Evaluation::force`] in all its arguments: the gradient of `ẑᵀ f(q, v, u)`.

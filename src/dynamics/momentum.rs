@@ -81,7 +81,7 @@ impl Evaluation<'_> {
                 self.fluid_momenta(&direction),
                 self.fluid_momenta(&virtual_direction),
             );
-            let pair = self.from_wet(&fluid.gradient(&virtual_direction, &direction));
+            let pair = self.from_wet(&fluid.gradient(&virtual_direction, &direction)?);
             for b in 0..self.system.len() {
                 if self.system.bodies[b].wet.is_none() {
                     continue;

@@ -317,13 +317,6 @@ impl Context {
         }
     }
 
-    /// Makes every later call fail, after an error that its caller can't pass on.
-    pub(super) fn latch(&self, error: &Error) {
-        if let Ok(mut fault) = self.fault.lock() {
-            fault.get_or_insert_with(|| error.to_string());
-        }
-    }
-
     /// The first fault that the device reported, if any.
     ///
     /// # Errors

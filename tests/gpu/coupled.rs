@@ -21,10 +21,13 @@ fn differences(context: &Arc<Context>, model: &Arc<Model>, columns: usize) -> [f
     let z = displacement(n, 2.3);
     let free = twist(n, 4.1);
     let value = difference(b.momenta().as_slice(), a.momenta().as_slice());
-    let gradient = difference(&flat(&b.gradient(&x, &y)), &flat(&a.gradient(&x, &y)));
+    let gradient = difference(
+        &flat(&b.gradient(&x, &y).unwrap()),
+        &flat(&a.gradient(&x, &y).unwrap()),
+    );
     let along = difference(
-        b.gradient_along(&y, &z).as_slice(),
-        a.gradient_along(&y, &z).as_slice(),
+        b.gradient_along(&y, &z).unwrap().as_slice(),
+        a.gradient_along(&y, &z).unwrap().as_slice(),
     );
     let pull = |r: &dyn Record| {
         let p = r

@@ -11,16 +11,16 @@ use hydrograd::shape;
 use std::path::Path;
 use std::sync::Arc;
 
-fn bodies(factored: bool) -> Vec<Arc<WetBody>> {
+fn bodies(factored: [bool; 3]) -> Vec<Arc<WetBody>> {
     // Without the body's own residual flux both read the same potential out.
     let settings = Settings {
         readout: Readout::Centre,
         ..Settings::default()
     };
-    let of = |shape: &Shape| {
+    let of = |k: usize, shape: &Shape| {
         let mesh = shape::build(shape, Path::new("."), Some(80)).unwrap();
         let (v, f) = (mesh.vertices(), mesh.faces());
-        let made = if factored {
+        let made = if factored[k] {
             BodyBoundary::new("b", v, f, &settings)
         } else {
             BodyBoundary::unfactored("b", v, f, &settings)
@@ -28,30 +28,30 @@ fn bodies(factored: bool) -> Vec<Arc<WetBody>> {
         Arc::new(WetBody::new(Arc::new(made.unwrap())))
     };
     vec![
-        of(&Shape::sphere(0.5)),
-        of(&Shape::ellipsoid([0.6, 0.3, 0.4])),
-        of(&Shape::sphere(0.4)),
+        of(0, &Shape::sphere(0.5)),
+        of(1, &Shape::ellipsoid([0.6, 0.3, 0.4])),
+        of(2, &Shape::sphere(0.4)),
     ]
 }
 
-fn model(factored: bool) -> Arc<Model> {
+fn model(factored: [bool; 3], preconditioner: Preconditioner) -> Arc<Model> {
     let settings = SolveSettings {
-        preconditioner: Preconditioner::Jacobi,
+        preconditioner,
         tolerance: 1e-9,
         ..SolveSettings::default()
     };
     Arc::new(Model::new(bodies(factored), &[], Exclusions::none(), settings).unwrap())
 }
 
-#[test]
-fn a_body_without_factor_gives_the_same_answer() {
+/// The impulses of some columns on the device against the CPU's, that has all factors.
+fn compare(factored: [bool; 3], preconditioner: Preconditioner) {
     let basis = basis(3, 5, 0.3);
-    let with = model(true);
+    let with = model([true; 3], preconditioner);
     let cpu = Full::on(with.clone(), Box::new(Cpu::new(with).unwrap()));
-    let without = model(false);
+    let model = model(factored, preconditioner);
     let gpu = Full::on(
-        without.clone(),
-        Box::new(Gpu::new(context(), &without).unwrap()),
+        model.clone(),
+        Box::new(Gpu::new(context(), &model).unwrap()),
     );
     let a = cpu.evaluate(&poses(), &basis, false).unwrap();
     let b = gpu.evaluate(&poses(), &basis, false).unwrap();
@@ -60,8 +60,19 @@ fn a_body_without_factor_gives_the_same_answer() {
 }
 
 #[test]
+fn bodies_without_factor_give_the_same_answer() {
+    compare([false; 3], Preconditioner::Jacobi);
+}
+
+#[test]
+fn bodies_with_and_without_factor_go_together() {
+    compare([true, false, true], Preconditioner::Factors);
+}
+
+#[test]
 fn the_cpu_refuses_a_body_without_factor() {
-    let message = Cpu::new(model(false)).err().expect("refused").to_string();
+    let model = model([false; 3], Preconditioner::Jacobi);
+    let message = Cpu::new(model).err().expect("refused").to_string();
     assert!(message.contains("backend gpu"), "{message}");
 }
 
@@ -97,7 +108,7 @@ fn derivatives_of_many_pairs_go_in_batches() {
     let z = displacement(poses.len(), 0.7);
     let of = |full: &Full| {
         let record = full.evaluate(&poses, &basis, true).unwrap();
-        let columns = record.gradient_columns(&x).concat();
+        let columns = record.gradient_columns(&x).unwrap().concat();
         let tangent = record
             .hvp(Direction::Basis(&x), Direction::Basis(&y), &z)
             .unwrap();

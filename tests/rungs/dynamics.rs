@@ -298,9 +298,14 @@ fn force_jvp(c: f64) -> Outcome {
     let p = point();
     let e = evaluate(&p.parameters, &p.q);
     let dv = wavy(p.v.len(), 3.1, 0.2);
-    let tangent = c * e.force_jvp(&p.v, &dv);
+    let tangent = c * e.force_jvp(&p.v, &dv).unwrap();
     vector_along(
-        |h| e.force(&(&p.v + h * &dv), &p.u).as_slice().to_vec(),
+        |h| {
+            e.force(&(&p.v + h * &dv), &p.u)
+                .unwrap()
+                .as_slice()
+                .to_vec()
+        },
         tangent.as_slice(),
     )
 }
@@ -310,7 +315,7 @@ fn force_vjp(c: f64) -> Outcome {
     let z = wavy(p.v.len(), 5.1, 1.0);
     let e = evaluate(&p.parameters, &p.q);
     let b = e.force_vjp(&p.v, &p.u, &z).unwrap();
-    let value = |p: &Point| z.dot(&evaluate(&p.parameters, &p.q).force(&p.v, &p.u));
+    let value = |p: &Point| z.dot(&evaluate(&p.parameters, &p.q).force(&p.v, &p.u).unwrap());
     let bar = Bar {
         q: b.q,
         v: b.v,
@@ -355,7 +360,13 @@ fn inertial_force(c: f64) -> Outcome {
     let w = wavy(p.v.len(), 5.1, 1.0);
     let e = evaluate(&p.parameters, &p.q);
     let b = e.inertial_force_vjp(&p.v, &p.u, &w).unwrap();
-    let value = |p: &Point| w.dot(&evaluate(&p.parameters, &p.q).inertial_force(&p.v, &p.u));
+    let value = |p: &Point| {
+        w.dot(
+            &evaluate(&p.parameters, &p.q)
+                .inertial_force(&p.v, &p.u)
+                .unwrap(),
+        )
+    };
     let bar = Bar {
         q: b.q,
         v: b.v,

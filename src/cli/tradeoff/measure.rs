@@ -64,7 +64,7 @@ impl Start {
             true => {
                 let control = action(simulator).0;
                 let given = given_accelerations(simulator);
-                let all = wet.inertial_force(v, &control) - &wet.mass_matrix * given;
+                let all = wet.inertial_force(v, &control)? - &wet.mass_matrix * given;
                 all.select_rows(&free)
             }
             false => DVector::zeros(free.len()),

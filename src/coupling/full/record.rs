@@ -54,12 +54,12 @@ impl Record for FullRecord<'_> {
         &self.momenta
     }
 
-    fn gradient(&self, x: &DVector<f64>, y: &DVector<f64>) -> Vec<Vec6> {
-        self.gradient.contract(x, y)
+    fn gradient(&self, x: &DVector<f64>, y: &DVector<f64>) -> Result<Vec<Vec6>> {
+        Ok(self.gradient.contract(x, y))
     }
 
-    fn gradient_along(&self, y: &DVector<f64>, z: &[Vec6]) -> DVector<f64> {
-        self.gradient.along(y, z)
+    fn gradient_along(&self, y: &DVector<f64>, z: &[Vec6]) -> Result<DVector<f64>> {
+        Ok(self.gradient.along(y, z))
     }
 
     fn vjp(&self, x: Direction, y: Direction) -> Result<Pullback> {

@@ -124,12 +124,12 @@ impl Record for PanelRecord {
         &self.momenta
     }
 
-    fn gradient(&self, _x: &DVector<f64>, _y: &DVector<f64>) -> Vec<Vec6> {
-        vec![Vec6::zeros(); self.bodies]
+    fn gradient(&self, _x: &DVector<f64>, _y: &DVector<f64>) -> Result<Vec<Vec6>> {
+        Ok(vec![Vec6::zeros(); self.bodies])
     }
 
-    fn gradient_along(&self, y: &DVector<f64>, _z: &[Vec6]) -> DVector<f64> {
-        DVector::zeros(y.len())
+    fn gradient_along(&self, y: &DVector<f64>, _z: &[Vec6]) -> Result<DVector<f64>> {
+        Ok(DVector::zeros(y.len()))
     }
 
     fn vjp(&self, _x: Direction, _y: Direction) -> Result<Pullback> {

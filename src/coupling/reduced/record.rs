@@ -342,28 +342,31 @@ impl Record for ReducedRecord<'_> {
         &self.momenta
     }
 
-    fn gradient(&self, x: &DVector<f64>, y: &DVector<f64>) -> Vec<Vec6> {
+    fn gradient(&self, x: &DVector<f64>, y: &DVector<f64>) -> Result<Vec<Vec6>> {
         if !self.derivative {
-            return vec![Vec6::zeros(); self.reduced.bodies.len()];
+            return Ok(vec![Vec6::zeros(); self.reduced.bodies.len()]);
         }
         let (x, y) = (&self.alpha * x, &self.alpha * y);
-        self.pull_back(x.as_slice(), y.as_slice())
+        Ok(self.pull_back(x.as_slice(), y.as_slice()))
     }
 
-    fn gradient_columns(&self, x: &DVector<f64>) -> Vec<Vec<Vec6>> {
+    fn gradient_columns(&self, x: &DVector<f64>) -> Result<Vec<Vec<Vec6>>> {
         if !self.derivative {
-            return vec![vec![Vec6::zeros(); self.reduced.bodies.len()]; x.len()];
+            return Ok(vec![
+                vec![Vec6::zeros(); self.reduced.bodies.len()];
+                x.len()
+            ]);
         }
-        self.pull_back_columns(x)
+        Ok(self.pull_back_columns(x))
     }
 
-    fn gradient_along(&self, y: &DVector<f64>, z: &[Vec6]) -> DVector<f64> {
+    fn gradient_along(&self, y: &DVector<f64>, z: &[Vec6]) -> Result<DVector<f64>> {
         if !self.derivative {
-            return DVector::zeros(y.len());
+            return Ok(DVector::zeros(y.len()));
         }
         let y = &self.alpha * y;
         let (psi, _) = self.tangent_potentials(&[y.as_slice()], z);
-        FLUX * self.alpha.tr_mul(&psi.column(0))
+        Ok(FLUX * self.alpha.tr_mul(&psi.column(0)))
     }
 
     fn vjp(&self, x: Direction, y: Direction) -> Result<Pullback> {

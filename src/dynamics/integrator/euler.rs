@@ -87,7 +87,7 @@ pub(super) fn solve_stage(
     let mut previous = f64::INFINITY;
     let mut residual = f64::INFINITY;
     for iteration in 0..ITERATIONS {
-        let force = e.force(&v, control);
+        let force = e.force(&v, control)?;
         let reached = hat + rule.h * &force;
         let target = tree.chart_momentum(&e.q, &(rule.reach * &v), &reached);
         let defect = e.momentum(&v) - &target;
@@ -107,7 +107,7 @@ pub(super) fn solve_stage(
             break;
         }
         previous = residual;
-        let rates = e.force_velocity_jacobian(&v);
+        let rates = e.force_velocity_jacobian(&v)?;
         let matrix = stage_matrix(e, split, &v, &rates, &reached, rule);
         let Some(step) = matrix.lu().solve(&split.take(&defect)) else {
             break;
@@ -221,7 +221,7 @@ pub(super) fn step_vjp(
     let (stage, after) = match memo {
         Some(both) => {
             let (before, after) = contact::parted(both, v.len());
-            let force = e.force(&before, &input.control);
+            let force = e.force(&before, &input.control)?;
             (Stage { v: before, force }, after)
         }
         None => {
@@ -232,7 +232,7 @@ pub(super) fn step_vjp(
         }
     };
     let reached = &p + s.dt * &stage.force;
-    let adjoint = AdjointStage::new(e, &split, &stage.v, &reached, rule(s));
+    let adjoint = AdjointStage::new(e, &split, &stage.v, &reached, rule(s))?;
     let mut bar = StepBar::zeros(e);
     let (q_bar, after_bar) = advance_vjp(s, &split, &after, &next_bar.q);
     bar.state.q += q_bar;
@@ -263,17 +263,20 @@ pub(super) struct AdjointStage {
 
 impl AdjointStage {
     /// At velocity v and momentum p̂ + h f.
+    ///
+    /// # Errors
+    /// A coupling that fails.
     pub fn new(
         e: &Evaluation,
         split: &Split,
         v: &DVector<f64>,
         reached: &DVector<f64>,
         rule: Rule,
-    ) -> Self {
-        let rates = e.force_velocity_jacobian(v);
+    ) -> Result<Self> {
+        let rates = e.force_velocity_jacobian(v)?;
         let matrix = stage_matrix(e, split, v, &rates, reached, rule);
         let factor = matrix.transpose().lu();
-        Self { rates, factor }
+        Ok(Self { rates, factor })
     }
 
     /// w_f with (stage matrix)ᵀ w_f = v̄_f, zero on driven entries.

@@ -132,7 +132,7 @@ pub(super) fn step_vjp(
     let (stage, after) = contact::parted(&both, v.len());
     let m = middle(s, state, &stage, true)?;
     let h = 0.5 * s.dt;
-    let reached = &p + h * m.force(&stage, &input.control);
+    let reached = &p + h * m.force(&stage, &input.control)?;
     let mut bar = StepBar::zeros(e);
     let (q_bar, after_bar) = advance_vjp(s, &split, &after, &next_bar.q);
     bar.state.q += q_bar;
@@ -140,7 +140,7 @@ pub(super) fn step_vjp(
     split.forget_driven(&mut z);
     let both = [&stage, &after];
     let v_bar_next = contact::press_vjp(e, &split, both, [&after_bar, &z], s.dt, &mut bar)?;
-    let adjoint = AdjointStage::new(&m, &split, &stage, &reached, rule(s));
+    let adjoint = AdjointStage::new(&m, &split, &stage, &reached, rule(s))?;
     let v_bar_force = s.dt * adjoint.rates.tr_mul(&z);
     let fixed = v_bar_next + v_bar_force;
     // v̄ = fixed + (∂q_m/∂v)ᵀ q̄_m(w), w = J⁻ᵀ v̄.

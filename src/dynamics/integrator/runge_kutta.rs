@@ -100,7 +100,7 @@ fn stages<'a>(
         let force = match again {
             Some(_) if i + 1 == tableau(s).nodes.len() => DVector::zeros(nv),
             Some(Some(kept)) => kept.rows(i * nv, nv).into_owned(),
-            _ => at.force(&stage_v, &input.control),
+            _ => at.force(&stage_v, &input.control)?,
         };
         out.push(Stage {
             evaluation,

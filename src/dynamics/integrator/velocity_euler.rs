@@ -22,7 +22,7 @@ fn acceleration(
     for &i in &split.free {
         driven[i] = 0.0;
     }
-    let right = e.inertial_force(v, control) - &e.mass_matrix * &driven;
+    let right = e.inertial_force(v, control)? - &e.mass_matrix * &driven;
     let free = readout::factor(e, split)?.solve(&split.take(&right));
     Ok(driven + split.put(&free))
 }

@@ -79,32 +79,18 @@ impl GpuRecord {
         Ok((one, out))
     }
 
-    /// ∇_g E(x, e_i) of every column, `[column][body]`; no numbers after a failure of the device, which every
-    /// later call on it reports: a record's derivatives on its basis have no way to.
-    fn columns(&self, pulls: &Buffer, x: &DVector<f64>) -> Vec<Vec<Vec6>> {
-        let found = self
-            .along(pulls, x)
-            .and_then(|(one, own)| self.answer.wrenches(pulls, (&one, &own)))
-            .inspect_err(|e| self.answer.placed.model.context.latch(e));
-        let of = |b: usize, k: usize| match &found {
-            Ok(all) => all[b][k],
-            Err(_) => Vec6::repeat(f64::NAN),
-        };
-        (0..self.answer.columns)
-            .map(|k| (0..self.bodies()).map(|b| of(b, k)).collect())
-            .collect()
+    /// ∇_g E(x, e_i) of every column, `[column][body]`.
+    fn columns(&self, pulls: &Buffer, x: &DVector<f64>) -> Result<Vec<Vec<Vec6>>> {
+        let (one, own) = self.along(pulls, x)?;
+        let found = self.answer.wrenches(pulls, (&one, &own))?;
+        let of = |k: usize| (0..self.bodies()).map(|b| found[b][k]).collect();
+        Ok((0..self.answer.columns).map(of).collect())
     }
 
-    /// ∇_g E(x, y), as [`GpuRecord::columns`].
-    fn pair(&self, pulls: &Buffer, x: &DVector<f64>, y: &DVector<f64>) -> Vec<Vec6> {
-        let found = || -> Result<Vec<Vec6>> {
-            let ((x, of_x), (y, of_y)) = (self.along(pulls, x)?, self.along(pulls, y)?);
-            Ok(x.wrenches(&of_x, (&y, &of_y))?.concat())
-        };
-        found().unwrap_or_else(|e| {
-            self.answer.placed.model.context.latch(&e);
-            vec![Vec6::repeat(f64::NAN); self.bodies()]
-        })
+    /// ∇_g E(x, y).
+    fn pair(&self, pulls: &Buffer, x: &DVector<f64>, y: &DVector<f64>) -> Result<Vec<Vec6>> {
+        let ((x, of_x), (y, of_y)) = (self.along(pulls, x)?, self.along(pulls, y)?);
+        Ok(x.wrenches(&of_x, (&y, &of_y))?.concat())
     }
 
     /// The answers to directions: combinations of what is there, or another solve.
@@ -137,15 +123,15 @@ impl Record for GpuRecord {
         &self.answer.momenta
     }
 
-    fn gradient(&self, x: &DVector<f64>, y: &DVector<f64>) -> Vec<Vec6> {
+    fn gradient(&self, x: &DVector<f64>, y: &DVector<f64>) -> Result<Vec<Vec6>> {
         match &self.derivative {
-            Derivative::None => vec![Vec6::zeros(); self.bodies()],
-            Derivative::Pairs(tensor) => tensor.contract(x, y),
+            Derivative::None => Ok(vec![Vec6::zeros(); self.bodies()]),
+            Derivative::Pairs(tensor) => Ok(tensor.contract(x, y)),
             Derivative::Pulls(pulls) => self.pair(pulls, x, y),
         }
     }
 
-    fn gradient_columns(&self, x: &DVector<f64>) -> Vec<Vec<Vec6>> {
+    fn gradient_columns(&self, x: &DVector<f64>) -> Result<Vec<Vec<Vec6>>> {
         let unit = |i: usize| DVector::from_fn(x.len(), |k, _| f64::from(u8::from(k == i)));
         match &self.derivative {
             Derivative::Pulls(pulls) => self.columns(pulls, x),
@@ -153,14 +139,14 @@ impl Record for GpuRecord {
         }
     }
 
-    fn gradient_along(&self, y: &DVector<f64>, z: &[Vec6]) -> DVector<f64> {
+    fn gradient_along(&self, y: &DVector<f64>, z: &[Vec6]) -> Result<DVector<f64>> {
         match &self.derivative {
-            Derivative::None => DVector::zeros(y.len()),
-            Derivative::Pairs(tensor) => tensor.along(y, z),
+            Derivative::None => Ok(DVector::zeros(y.len())),
+            Derivative::Pairs(tensor) => Ok(tensor.along(y, z)),
             Derivative::Pulls(pulls) => {
-                let all = self.columns(pulls, y);
+                let all = self.columns(pulls, y)?;
                 let dot = |w: &Vec<Vec6>| w.iter().zip(z).map(|(w, z)| w.dot(z)).sum();
-                DVector::from_iterator(y.len(), all.iter().map(dot))
+                Ok(DVector::from_iterator(y.len(), all.iter().map(dot)))
             }
         }
     }

@@ -45,6 +45,7 @@ from hydrograd._hydrograd import (
     sphere,
     spherical,
 )
+from hydrograd._policy import Observation, Policy
 
 __all__ = [
     "Body",
@@ -60,6 +61,8 @@ __all__ = [
     "Joint",
     "MeshError",
     "Motion",
+    "Observation",
+    "Policy",
     "Record",
     "Rollout",
     "Scene",

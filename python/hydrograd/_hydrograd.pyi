@@ -6,6 +6,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from hydrograd._gradient import Gradient, StepGradient
+from hydrograd._policy import Policy
 
 __version__: str
 
@@ -202,6 +203,7 @@ class Simulator:
         rank: int | None = None,
         resolved_gap: float | None = None,
         cache: _Path | None = None,
+        backend: Literal["cpu", "gpu"] | None = None,
     ) -> Simulator: ...
     def rollout(
         self,
@@ -221,6 +223,9 @@ class Simulator:
     def with_parameters(self, changes: Mapping[str, float]) -> Simulator: ...
     def with_start(self, q: ArrayLike | None = None, v: ArrayLike | None = None) -> Simulator: ...
     def with_gains(self, gains: ArrayLike) -> Simulator: ...
+    def with_policy(self, policy: Policy) -> Simulator: ...
+    @property
+    def policy(self) -> Policy | None: ...
     @property
     def gains(self) -> _Array: ...
     @property
@@ -248,6 +253,8 @@ class Simulator:
     @property
     def fidelity(self) -> str: ...
     @property
+    def backend(self) -> str: ...
+    @property
     def integrator(self) -> str: ...
     @property
     def warnings(self) -> list[str]: ...
@@ -269,7 +276,14 @@ class State:
 
 @final
 class Record:
-    def vjp(self, *, q: ArrayLike | None = None, v: ArrayLike | None = None) -> StepGradient: ...
+    def vjp(
+        self,
+        *,
+        q: ArrayLike | None = None,
+        v: ArrayLike | None = None,
+        positions: ArrayLike | None = None,
+        rotations: ArrayLike | None = None,
+    ) -> StepGradient: ...
     def jacobians(self) -> tuple[_Array, _Array]: ...
 
 @final

@@ -1,12 +1,13 @@
 //! Long work without the interpreter's lock, which Ctrl-C ends.
 
-use crate::error::{OrRaise, internal};
+use crate::error::{exception, internal};
+use crate::policy::Raised;
 use pyo3::prelude::*;
 use std::ops::ControlFlow;
 use std::panic::{AssertUnwindSafe, catch_unwind};
-use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::mpsc::{RecvTimeoutError, sync_channel};
+use std::sync::{Arc, OnceLock};
 use std::time::Duration;
 
 /// How often signals are looked at.
@@ -14,17 +15,39 @@ const PATIENCE: Duration = Duration::from_millis(50);
 
 /// Whether work should go on.
 #[derive(Clone, Default)]
-pub struct Wish(Arc<AtomicBool>);
+pub struct Wish {
+    stop: Arc<AtomicBool>,
+    raised: Raised,
+}
 
 impl Wish {
-    /// For the progress of a rollout.
+    /// For the progress of a rollout; it ends too where its controller has raised an exception.
     pub fn go_on(&self) -> ControlFlow<()> {
-        if self.0.load(Ordering::Relaxed) {
+        if self.stop.load(Ordering::Relaxed) {
             ControlFlow::Break(())
         } else {
-            ControlFlow::Continue(())
+            self.raised.go_on()
         }
     }
+}
+
+/// The process whose threads do the work.
+static PROCESS: OnceLock<u32> = OnceLock::new();
+
+/// A forked process has none of the threads that its parent's work has started: it would wait for them for ever.
+fn not_forked() -> PyResult<()> {
+    let own = std::process::id();
+    let first = *PROCESS.get_or_init(|| own);
+    if first == own {
+        return Ok(());
+    }
+    Err(exception(hydrograd::Error::Unsupported {
+        what: format!("work in process {own}, a fork of process {first}"),
+        why: "hydrograd had started its threads there, and threads don't survive a fork".into(),
+        instead:
+            "start processes by \"spawn\" or \"forkserver\": multiprocessing.get_context(\"spawn\")"
+                .into(),
+    }))
 }
 
 fn said(panic: &(dyn std::any::Any + Send)) -> &str {
@@ -34,12 +57,17 @@ fn said(panic: &(dyn std::any::Any + Send)) -> &str {
 }
 
 /// Does work on a thread of its own while this one listens for signals. After Ctrl-C it is asked to stop and left
-/// to itself: the exception doesn't wait for it.
+/// to itself: the exception doesn't wait for it. What a controller has `raised` meanwhile comes first.
 pub fn long<T: Send + 'static>(
     py: Python<'_>,
+    raised: &Raised,
     work: impl FnOnce(&Wish) -> hydrograd::Result<T> + Send + 'static,
 ) -> PyResult<T> {
-    let wish = Wish::default();
+    not_forked()?;
+    let wish = Wish {
+        raised: raised.clone(),
+        ..Wish::default()
+    };
     let (send, receive) = sync_channel(1);
     let theirs = wish.clone();
     let thread = std::thread::Builder::new()
@@ -59,11 +87,11 @@ pub fn long<T: Send + 'static>(
         });
         receive = back;
         match heard {
-            Ok(Ok(done)) => return done.or_raise(),
+            Ok(Ok(done)) => return raised.before(done),
             Ok(Err(panic)) => return Err(internal(said(panic.as_ref()))),
             Err(RecvTimeoutError::Timeout) => {
                 if let Err(stop) = py.check_signals() {
-                    wish.0.store(true, Ordering::Relaxed);
+                    wish.stop.store(true, Ordering::Relaxed);
                     return Err(stop);
                 }
             }
@@ -75,12 +103,14 @@ pub fn long<T: Send + 'static>(
 /// Does work that takes a step's time, on this thread.
 pub fn short<T: Send>(
     py: Python<'_>,
+    raised: &Raised,
     work: impl FnOnce() -> hydrograd::Result<T> + Send,
 ) -> PyResult<T> {
+    not_forked()?;
     match py.detach(|| catch_unwind(AssertUnwindSafe(work))) {
         Ok(done) => {
             py.check_signals()?;
-            done.or_raise()
+            raised.before(done)
         }
         Err(panic) => Err(internal(said(panic.as_ref()))),
     }

@@ -8,6 +8,7 @@ mod gradient;
 mod interrupt;
 mod joint;
 mod objective;
+mod policy;
 mod prepare;
 mod rollout;
 mod scene;
@@ -31,8 +32,13 @@ fn _simulator(
     cache: Option<PathBuf>,
     parameters: Vec<f64>,
     start: (Vec<f64>, Vec<f64>, Vec<f64>),
+    policy: Option<Bound<'_, PyAny>>,
 ) -> PyResult<Simulator> {
-    prepare::rebuild(py, scene, settings, cache, &parameters, start)
+    let made = prepare::rebuild(py, scene, settings, cache, &parameters, start)?;
+    match policy {
+        Some(policy) => made.with_policy(&policy),
+        None => Ok(made),
+    }
 }
 
 /// Unpickles a state.

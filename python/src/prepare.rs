@@ -2,6 +2,7 @@
 
 use crate::error::{OrRaise, input};
 use crate::interrupt::long;
+use crate::policy::Raised;
 use crate::simulator::Simulator;
 use hydrograd::{Settings, dynamics};
 use nalgebra::DVector;
@@ -17,7 +18,7 @@ pub fn build(
     cache: Option<PathBuf>,
 ) -> PyResult<Simulator> {
     let (of, folder) = (scene.clone(), cache.clone());
-    let made = long(py, move |_| match folder {
+    let made = long(py, &Raised::default(), move |_| match folder {
         Some(folder) => hydrograd::Simulator::cached(&of, settings, &folder),
         None => hydrograd::Simulator::new(&of, settings),
     })?;
@@ -25,16 +26,18 @@ pub fn build(
         inner: Arc::new(made),
         scene,
         cache,
+        policy: None,
     })
 }
 
-/// Scene, settings, folder, parameters, and initial q, v and gains.
+/// Scene, settings, folder, parameters, initial q, v and gains, and the controller if it is written in Python.
 pub type Parts = (
     String,
     String,
     Option<PathBuf>,
     Vec<f64>,
     (Vec<f64>, Vec<f64>, Vec<f64>),
+    Option<Py<PyAny>>,
 );
 
 /// A simulator from what `__reduce__` gives.
@@ -60,7 +63,10 @@ pub fn rebuild(
             inner.set_parameters(values)?;
         }
         inner.set_start(start.0.into(), start.1.into())?;
-        set_gains(inner, &start.2)
+        match start.2.is_empty() {
+            true => Ok(()),
+            false => set_gains(inner, &start.2),
+        }
     })
 }
 

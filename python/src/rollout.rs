@@ -4,6 +4,7 @@ use crate::array::{self, Dim};
 use crate::gradient;
 use crate::interrupt::{long, short};
 use crate::objective::Objective;
+use crate::policy::Raised;
 use crate::simulator::Simulator;
 use crate::state::State;
 use hydrograd::simulate::{Cotangents, Recording, Sample};
@@ -30,16 +31,18 @@ self_cell!(
 pub struct Rollout {
     simulator: Py<Simulator>,
     cell: Arc<Owned>,
+    raised: Raised,
 }
 
 type Numbers<'py> = PyResult<Bound<'py, PyArrayDyn<f64>>>;
 
 impl Rollout {
-    /// A rollout of a simulator.
-    pub fn new(simulator: &Bound<'_, Simulator>, cell: Arc<Owned>) -> Self {
+    /// A rollout of a simulator, and where what its controller raises will be.
+    pub fn new(simulator: &Bound<'_, Simulator>, cell: Arc<Owned>, raised: Raised) -> Self {
         Self {
             simulator: simulator.clone().unbind(),
             cell,
+            raised,
         }
     }
 
@@ -156,7 +159,7 @@ impl Rollout {
     /// Smallest gap between bodies or to a wall, (N + 1,), m; NaN where there is nothing to meet.
     #[getter]
     fn min_gap<'py>(&self, py: Python<'py>) -> Numbers<'py> {
-        let gaps = short(py, || Ok(self.rollout().gaps()))?;
+        let gaps = short(py, &self.raised, || Ok(self.rollout().gaps()))?;
         let distances: Vec<f64> = gaps
             .iter()
             .map(|g| g.map_or(f64::NAN, |g| g.distance))
@@ -196,7 +199,7 @@ impl Rollout {
     /// Value of an objective.
     fn value(&self, py: Python<'_>, objective: PyRef<'_, Objective>) -> PyResult<f64> {
         let objective = objective.0.clone();
-        short(py, || self.rollout().value(&objective))
+        short(py, &self.raised, || self.rollout().value(&objective))
     }
 
     /// Gradient of an objective, in one reverse sweep. Ctrl-C ends it.
@@ -208,7 +211,7 @@ impl Rollout {
         use hydrograd::simulate::Objective as _;
         let objective = objective.0.clone();
         let cell = self.cell.clone();
-        let made = long(py, move |wish| {
+        let made = long(py, &self.raised, move |wish| {
             let rollout = cell.borrow_dependent();
             objective.check(rollout)?;
             rollout.vjp_with(&objective.cotangents(rollout), |_| wish.go_on())
@@ -262,7 +265,7 @@ impl Rollout {
             }
         }
         let cell = self.cell.clone();
-        let made = long(py, move |wish| {
+        let made = long(py, &self.raised, move |wish| {
             cell.borrow_dependent().vjp_with(&seed, |_| wish.go_on())
         })?;
         gradient::of_rollout(py, self.cell.borrow_owner(), &made)

@@ -3,6 +3,7 @@
 use crate::array::{Dim, array};
 use crate::error::input;
 use hydrograd::boundary::{Method, OneBody};
+use hydrograd::simulate::Backend;
 use hydrograd::{Fidelity, Scene, Settings, dynamics::Integrator};
 use pyo3::prelude::*;
 
@@ -38,6 +39,14 @@ pub fn fidelity_name(of: Fidelity) -> &'static str {
 /// The name of an integrator.
 pub fn integrator_name(of: Integrator) -> &'static str {
     let found = INTEGRATORS.iter().find(|(_, f)| *f == of);
+    found.map_or("", |(name, _)| name)
+}
+
+const BACKENDS: [(&str, Backend); 2] = [("cpu", Backend::Cpu), ("gpu", Backend::Gpu)];
+
+/// The name of a backend.
+pub fn backend_name(of: Backend) -> &'static str {
+    let found = BACKENDS.iter().find(|(_, b)| *b == of);
     found.map_or("", |(name, _)| name)
 }
 
@@ -81,6 +90,8 @@ pub struct Keywords<'a> {
     pub rank: Option<usize>,
     /// Smallest gap resolved, m.
     pub resolved_gap: Option<f64>,
+    /// What computes the coupling.
+    pub backend: Option<&'a str>,
 }
 
 impl Keywords<'_> {
@@ -125,6 +136,12 @@ impl Keywords<'_> {
         }
         if let Some(gap) = self.resolved_gap {
             out = out.resolved_gap(positive("resolved_gap", gap)?);
+        }
+        if let Some(name) = self.backend {
+            let found = BACKENDS.iter().find(|(n, _)| *n == name);
+            let (_, backend) =
+                found.ok_or_else(|| unknown("backend", name, BACKENDS.iter().map(|b| b.0)))?;
+            out = out.backend(*backend);
         }
         Ok(out)
     }

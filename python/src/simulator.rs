@@ -4,10 +4,11 @@ use crate::array::{self, Dim, array};
 use crate::error::{OrRaise, input};
 use crate::gradient::by_name;
 use crate::interrupt::{long, short};
+use crate::policy::{Controller, Raised};
 use crate::prepare::{Parts, Start, build, set_gains};
 use crate::rollout::{Owned, Rollout};
 use crate::scene::Scene;
-use crate::settings::{Keywords, fidelity_name, integrator_name, row_or};
+use crate::settings::{Keywords, backend_name, fidelity_name, integrator_name, row_or};
 use crate::state::{Record, State, one_step};
 use hydrograd::Controls;
 use nalgebra::{DMatrix, DVector};
@@ -26,7 +27,7 @@ use std::sync::Arc;
 /// "mfs-vertex" or "mfs-face". `integrator`: "momentum-euler", "midpoint", "rk2", "rk4" or "velocity-euler". `tolerance` is the
 /// relative residual at which iterative solves stop ("full"), `faces` the number of triangles of shapes by formula.
 /// `accuracy` (relative), `rank` (points a body) and `resolved_gap` (m) belong to "reduced" and "auto", and `cache` is a
-/// folder that keeps compressed bodies.
+/// folder that keeps compressed bodies. `backend`: "cpu" (the default), or "gpu" in a build with the feature of that name.
 #[pyclass(frozen, module = "hydrograd")]
 pub struct Simulator {
     /// The simulator of the Rust side.
@@ -35,6 +36,8 @@ pub struct Simulator {
     pub scene: hydrograd::Scene,
     /// Where compressed bodies are kept.
     pub cache: Option<PathBuf>,
+    /// Its controller, if that is written in Python.
+    pub policy: Option<Py<PyAny>>,
 }
 
 impl Simulator {
@@ -49,7 +52,21 @@ impl Simulator {
             inner: Arc::new(inner),
             scene: self.scene.clone(),
             cache: self.cache.clone(),
+            policy: Python::attach(|py| self.policy.as_ref().map(|p| p.clone_ref(py))),
         })
+    }
+
+    /// What a run uses, and what its controller raises.
+    fn for_run(&self, py: Python<'_>) -> PyResult<(Arc<hydrograd::Simulator>, Raised)> {
+        let raised = Raised::default();
+        let Some(policy) = &self.policy else {
+            return Ok((self.inner.clone(), raised));
+        };
+        let sizes = (self.controls_size(), self.v_size());
+        let controller = Controller::new(policy.bind(py), sizes, &raised)?;
+        let mut inner = hydrograd::Simulator::clone(&self.inner);
+        inner.set_policy(Box::new(controller));
+        Ok((Arc::new(inner), raised))
     }
 
     fn controls_size(&self) -> usize {
@@ -109,7 +126,7 @@ impl Simulator {
     #[new]
     #[pyo3(signature = (
         scene, dt=None, *, fidelity=None, method=None, tolerance=None, integrator=None, faces=None, accuracy=None,
-        rank=None, resolved_gap=None, cache=None
+        rank=None, resolved_gap=None, cache=None, backend=None
     ))]
     #[expect(
         clippy::too_many_arguments,
@@ -128,6 +145,7 @@ impl Simulator {
         rank: Option<usize>,
         resolved_gap: Option<f64>,
         cache: Option<PathBuf>,
+        backend: Option<&str>,
     ) -> PyResult<Self> {
         let keywords = Keywords {
             dt,
@@ -139,6 +157,7 @@ impl Simulator {
             accuracy,
             rank,
             resolved_gap,
+            backend,
         };
         let scene = scene.0.clone();
         let settings = keywords.settings(&scene)?;
@@ -160,14 +179,14 @@ impl Simulator {
         let me = slf.get();
         let start = me.begin(state, q, v)?;
         let matrix = me.matrix("rollout: controls", controls, steps)?;
-        let inner = me.inner.clone();
-        let cell = long(slf.py(), move |wish| {
+        let (inner, raised) = me.for_run(slf.py())?;
+        let cell = long(slf.py(), &raised, move |wish| {
             Owned::try_new(inner, |s| {
                 let controls = Controls::from_matrix(s, matrix)?;
                 s.rollout_from(&start.state(s)?, &controls, |_| wish.go_on())
             })
         })?;
-        Ok(Rollout::new(slf, Arc::new(cell)))
+        Ok(Rollout::new(slf, Arc::new(cell), raised))
     }
 
     /// Runs many controls, (batch, steps, control_size), on all cores: the same rollouts, to the bit, as one after the other.
@@ -217,8 +236,8 @@ impl Simulator {
                 (start, DMatrix::from_column_slice(n, steps, values))
             })
             .collect();
-        let inner = me.inner.clone();
-        let cells = long(slf.py(), move |wish| {
+        let (inner, raised) = me.for_run(slf.py())?;
+        let cells = long(slf.py(), &raised, move |wish| {
             let one = |(start, matrix): (Start, DMatrix<f64>)| {
                 Owned::try_new(inner.clone(), |s| {
                     let controls = Controls::from_matrix(s, matrix)?;
@@ -231,7 +250,7 @@ impl Simulator {
         })?;
         Ok(cells
             .into_iter()
-            .map(|cell| Rollout::new(slf, Arc::new(cell)))
+            .map(|cell| Rollout::new(slf, Arc::new(cell), raised.clone()))
             .collect())
     }
 
@@ -247,7 +266,9 @@ impl Simulator {
         let me = slf.get();
         let (q0, v0) = me.inner.start();
         let (q, v) = (row_or("state: q", q, q0)?, row_or("state: v", v, v0)?);
-        let state = short(slf.py(), || me.inner.state(step, &q, &v))?;
+        let state = short(slf.py(), &Raised::default(), || {
+            me.inner.state(step, &q, &v)
+        })?;
         Ok(State {
             simulator: slf.clone().unbind(),
             state,
@@ -270,11 +291,11 @@ impl Simulator {
             None => DMatrix::zeros(n, 1),
         };
         let from = &state.get().state;
-        let inner = me.inner.clone();
-        let cell = short(slf.py(), || {
+        let (inner, raised) = me.for_run(slf.py())?;
+        let cell = short(slf.py(), &raised, || {
             Owned::try_new(inner, |s| {
                 let controls = Controls::from_matrix(s, matrix)?;
-                s.rollout_from(from, &controls, |_| std::ops::ControlFlow::Continue(()))
+                s.rollout_from(from, &controls, |_| raised.go_on())
             })
         })?;
         let rollout = cell.borrow_dependent();
@@ -287,6 +308,7 @@ impl Simulator {
             next,
             Record {
                 cell: Arc::new(cell),
+                raised,
             },
         ))
     }
@@ -295,7 +317,7 @@ impl Simulator {
     /// its origin, then three of torque per angular acceleration; kg, kg m, kg m².
     fn added_mass<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyArrayDyn<f64>>> {
         let inner = self.inner.clone();
-        let made = long(py, move |_| inner.added_mass())?;
+        let made = long(py, &Raised::default(), move |_| inner.added_mass())?;
         array::matrix(py, &made.matrix)
     }
 
@@ -338,13 +360,44 @@ impl Simulator {
         self.changed(|inner| inner.set_start(q, v))
     }
 
-    /// The same with other gains of the scene's controller, (gains,).
+    /// The same with a controller of your own in place of the scene's: an object with `act(observation)`, which gives the controls
+    /// (control_size,), and, for gradients, `act_vjp`: see `hydrograd.Policy`. It is called once a step, and once a step of the
+    /// reverse sweep, with the interpreter's lock.
+    pub fn with_policy(&self, policy: &Bound<'_, PyAny>) -> PyResult<Self> {
+        let sizes = (self.controls_size(), self.v_size());
+        let controller = Controller::new(policy, sizes, &Raised::default())?;
+        let mut out = self.changed(|inner| {
+            inner.set_policy(Box::new(controller));
+            Ok(())
+        })?;
+        out.policy = Some(policy.clone().unbind());
+        Ok(out)
+    }
+
+    /// The same with other gains of its controller, (gains,).
     fn with_gains(&self, gains: &Bound<'_, PyAny>) -> PyResult<Self> {
+        if let Some(policy) = &self.policy {
+            let policy = policy.bind(gains.py());
+            return match policy.getattr_opt("with_gains")? {
+                Some(method) => self.with_policy(&method.call1((gains,))?),
+                None => Err(input(
+                    "with_gains",
+                    format!("a controller of type {}", policy.get_type().name()?),
+                    "must have a method with_gains(gains)",
+                )),
+            };
+        }
         let gains = array::row("with_gains: gains", gains)?;
         self.changed(|inner| set_gains(inner, &gains))
     }
 
-    /// Gains of the scene's controller, (gains,); none without one.
+    /// Its controller, if that is written in Python.
+    #[getter]
+    fn policy(&self, py: Python<'_>) -> Option<Py<PyAny>> {
+        self.policy.as_ref().map(|p| p.clone_ref(py))
+    }
+
+    /// Gains of its controller, (gains,); none without one.
     #[getter]
     fn gains<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyArrayDyn<f64>>> {
         let gains = self.inner.policy().gains();
@@ -426,6 +479,12 @@ impl Simulator {
         fidelity_name(self.inner.fidelity())
     }
 
+    /// What computes the coupling: "cpu" or "gpu".
+    #[getter]
+    fn backend(&self) -> &'static str {
+        backend_name(self.inner.backend().backend_used)
+    }
+
     /// The integrator.
     #[getter]
     fn integrator(&self) -> &'static str {
@@ -459,12 +518,24 @@ impl Simulator {
         })?;
         let (q, v) = self.inner.start();
         let list = |x: &DVector<f64>| x.as_slice().to_vec();
-        let start = (list(q), list(v), self.inner.policy().gains());
+        let policy = self.policy(py);
+        let gains = match policy {
+            Some(_) => Vec::new(),
+            None => self.inner.policy().gains(),
+        };
+        let start = (list(q), list(v), gains);
         let parameters = self.inner.parameters().to_vec();
         let scene = self.scene.to_toml().or_raise()?;
         Ok((
             make,
-            (scene, settings, self.cache.clone(), parameters, start),
+            (
+                scene,
+                settings,
+                self.cache.clone(),
+                parameters,
+                start,
+                policy,
+            ),
         ))
     }
 }

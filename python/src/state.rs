@@ -3,6 +3,7 @@
 use crate::array::{self, Dim};
 use crate::gradient;
 use crate::interrupt::{long, short};
+use crate::policy::Raised;
 use crate::rollout::Owned;
 use crate::simulator::Simulator;
 use hydrograd::dynamics;
@@ -138,28 +139,41 @@ impl State {
 pub struct Record {
     /// The step, as a rollout of one.
     pub cell: Arc<Owned>,
+    /// What its controller raises.
+    pub raised: Raised,
 }
 
 #[pymethods]
 impl Record {
-    /// Transpose of the step: derivatives of `q·δq + v·δv` of the state after it, with `q` (v_size,) in the tangent space of
-    /// the coordinates and `v` (v_size,); what is None is zero.
-    #[pyo3(signature = (*, q=None, v=None))]
+    /// Transpose of the step: derivatives of `q·δq + v·δv + positions·δx + rotations·δθ` of the state after it, with `q` (v_size,) in
+    /// the tangent space of the coordinates, `v` (v_size,), and `positions` and `rotations` (δR = δθ × R, world axes) (bodies, 3);
+    /// what is None is zero.
+    #[pyo3(signature = (*, q=None, v=None, positions=None, rotations=None))]
     fn vjp<'py>(
         &self,
         py: Python<'py>,
         q: Option<&Bound<'py, PyAny>>,
         v: Option<&Bound<'py, PyAny>>,
+        positions: Option<&Bound<'py, PyAny>>,
+        rotations: Option<&Bound<'py, PyAny>>,
     ) -> PyResult<Bound<'py, PyAny>> {
         let rollout = self.cell.borrow_dependent();
         let mut seed = rollout.zero_cotangents();
-        for (place, given, part) in [("vjp: q", q, &mut seed.q), ("vjp: v", v, &mut seed.v)] {
+        let nv = [Dim::Is(seed.q.nrows())];
+        let bodies = [Dim::Is(seed.positions.nrows() / 3), Dim::Is(3)];
+        let parts: [(&str, _, &mut DMatrix<f64>, &[Dim]); 4] = [
+            ("vjp: q", q, &mut seed.q, &nv),
+            ("vjp: v", v, &mut seed.v, &nv),
+            ("vjp: positions", positions, &mut seed.positions, &bodies),
+            ("vjp: rotations", rotations, &mut seed.rotations, &bodies),
+        ];
+        for (place, given, part, shape) in parts {
             if let Some(given) = given {
-                let found = array::array(place, given, &[Dim::Is(part.nrows())])?;
+                let found = array::array(place, given, shape)?;
                 part.set_column(1, &DVector::from_vec(found.values));
             }
         }
-        let made = short(py, || rollout.vjp(&seed))?;
+        let made = short(py, &self.raised, || rollout.vjp(&seed))?;
         gradient::of_step(py, self.cell.borrow_owner(), &made)
     }
 
@@ -171,7 +185,9 @@ impl Record {
         py: Python<'py>,
     ) -> PyResult<(Bound<'py, PyArrayDyn<f64>>, Bound<'py, PyArrayDyn<f64>>)> {
         let cell = self.cell.clone();
-        let made = long(py, move |_| cell.borrow_dependent().jacobians())?;
+        let made = long(py, &self.raised, move |_| {
+            cell.borrow_dependent().jacobians()
+        })?;
         Ok((
             array::matrix(py, &made.state)?,
             array::matrix(py, &made.controls)?,

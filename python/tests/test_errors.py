@@ -124,6 +124,15 @@ def test_settings(sim):
             hg.Simulator(scene, **wrong)
     with pytest.raises(OverflowError):
         hg.Simulator(scene, faces=-1)
+    with pytest.raises(hg.InputError, match='must be one of "cpu", "gpu"'):
+        hg.Simulator(scene, backend="tpu")
+    assert sim.backend == "cpu"
+    try:
+        assert hg.Simulator(scene, fidelity="full", faces=80, backend="gpu").backend == "gpu"
+    except hg.UnsupportedError as error:
+        assert "feature gpu" in str(error)  # a build without it
+    except hg.DeviceError as error:
+        assert "adapter" in str(error)  # a machine without one
     with pytest.raises(hg.Error):
         hg.Simulator(scene, method="exact", fidelity="full").rollout(steps=1)
     with pytest.raises(hg.InputError, match="ball.mass"):

@@ -135,6 +135,17 @@ def test_one_step(sim, controls):
     assert np.allclose(np.concatenate([bar.q, bar.v]), both @ a) and np.allclose(bar.controls, both @ b)
 
 
+def test_one_step_is_a_rollout_of_one(sim, controls):
+    random = np.random.default_rng(9)
+    seeds = {"positions": random.normal(size=(2, 3)), "rotations": random.normal(size=(2, 3)), "v": random.normal(size=12)}
+    _, record = sim.step(sim.state(), controls[0])
+    found = record.vjp(**seeds)
+    right = sim.rollout(controls[:1]).vjp(**{name: np.stack([0 * x, x]) for name, x in seeds.items()})
+    assert np.array_equal(found.controls, right.controls[0])
+    assert np.array_equal(found.q, right.initial_q) and np.array_equal(found.v, right.initial_v)
+    assert np.abs(found.controls).max() > 0
+
+
 def test_jacobians_of_a_step(sim, controls):
     """A and B against differences, where coordinates are plain: positions and velocities."""
     state = sim.state(v=np.linspace(-0.1, 0.1, 12))

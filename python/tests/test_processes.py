@@ -1,7 +1,9 @@
 """Batches over threads, and pickles to other processes."""
 
 import multiprocessing
+import os
 import pickle
+import select
 
 import numpy as np
 import pytest
@@ -55,3 +57,28 @@ def test_other_processes(sim, controls):
         found = pool.map(final_position, [(sim, controls), (sim, 2 * controls)])
     assert np.array_equal(found[0], sim.rollout(controls).positions[-1])
     assert np.array_equal(found[1], sim.rollout(2 * controls).positions[-1])
+
+
+@pytest.mark.skipif(not hasattr(os, "fork"), reason="there is no fork here")
+@pytest.mark.filterwarnings("ignore:.*fork.*:DeprecationWarning")
+def test_a_forked_process_is_told_so(sim, controls):
+    sim.rollout(controls)
+    read, write = os.pipe()
+    child = os.fork()
+    if child == 0:
+        # Whatever happens, the tests don't go on here.
+        try:
+            sim.rollout(controls)
+            said = "it ran"
+        except hg.UnsupportedError as error:
+            said = str(error)
+        except BaseException as error:  # noqa: BLE001
+            said = repr(error)
+        os.write(write, said.encode())
+        os._exit(0)
+    os.close(write)
+    assert select.select([read], [], [], 20.0)[0], "the child hangs"
+    said = os.read(read, 10_000).decode()
+    os.close(read)
+    os.waitpid(child, 0)
+    assert "fork" in said and "spawn" in said, said

@@ -1,0 +1,155 @@
+"""Controllers written in Python: they act, are differentiated, and what they raise comes out."""
+
+import pickle
+
+import numpy as np
+import pytest
+
+import hydrograd as hg
+
+
+def scene():
+    scene = hg.Scene(steps=6)
+    ball = hg.Body(
+        hg.sphere(0.05), name="ball", density=1100.0, joint=hg.planar("xy"), position=(-0.12, 0, 0), actuated=True
+    )
+    scene.add(ball)
+    scene.add(hg.Body(hg.ellipsoid(0.02, 0.04, 0.04), name="coin", density=1050.0))
+    return scene
+
+
+class Spring:
+    """Pulls the ball towards a place: proportional and derivative, with two gains; q and v are (x, y, angle)."""
+
+    home = np.array([0.05, -0.03])
+
+    def __init__(self, gains=(3.0, 0.4)):
+        self.gains = np.asarray(gains, dtype=float)
+
+    def act(self, seen):
+        stiffness, damping = self.gains
+        return np.append(stiffness * (self.home - seen.q[:2]) - damping * seen.v[:2], 0.0)
+
+    def act_vjp(self, seen, control_bar):
+        stiffness, damping = self.gains
+        q_bar, v_bar = np.zeros_like(seen.v), np.zeros_like(seen.v)
+        q_bar[:2], v_bar[:2] = -stiffness * control_bar[:2], -damping * control_bar[:2]
+        return q_bar, v_bar, [control_bar[:2] @ (self.home - seen.q[:2]), -control_bar[:2] @ seen.v[:2]]
+
+    def with_gains(self, gains):
+        return Spring(gains)
+
+
+@pytest.fixture(scope="module")
+def planar():
+    return hg.Simulator(scene(), 0.02, fidelity="full", faces=80, tolerance=1e-12)
+
+
+def test_it_acts_as_the_same_controls_would(planar):
+    policy = Spring()
+    rollout = planar.with_policy(policy).rollout()
+    seen = [hg.Observation(n, 0.02 * n, q, v) for n, (q, v) in enumerate(zip(rollout.q, rollout.v))]
+    controls = np.array([policy.act(s) for s in seen[:-1]])
+    assert np.array_equal(planar.rollout(controls).q, rollout.q)
+    assert np.linalg.norm(rollout.q[-1] - rollout.q[0]) > 1e-4
+
+
+def test_its_gradient_is_that_of_differences(planar):
+    sim = planar.with_policy(Spring())
+    rollout = sim.rollout()
+    seed = np.zeros_like(rollout.v)
+    seed[-1] = np.linspace(1.0, 2.0, seed.shape[1])
+    gradient = rollout.vjp(v=seed)
+    assert gradient.gains.shape == (2,)
+
+    def value(gains, v):
+        return seed[-1] @ sim.with_gains(gains).rollout(v=v).v[-1]
+
+    h = 1e-5
+    for k in range(2):
+        d = h * np.eye(2)[k]
+        slope = (value(sim.gains + d, sim.initial_v) - value(sim.gains - d, sim.initial_v)) / (2 * h)
+        assert gradient.gains[k] == pytest.approx(slope, rel=1e-6)
+    for k in range(3):
+        d = h * np.eye(sim.v_size)[k]
+        slope = (value(sim.gains, sim.initial_v + d) - value(sim.gains, sim.initial_v - d)) / (2 * h)
+        assert gradient.initial_v[k] == pytest.approx(slope, rel=1e-6)
+
+
+def test_what_it_raises_comes_out(planar):
+    class Fails(Spring):
+        def act(self, seen):
+            if seen.step == 3:
+                raise RuntimeError("the motor is gone")
+            return super().act(seen)
+
+    sim = planar.with_policy(Fails())
+    with pytest.raises(RuntimeError, match="the motor is gone"):
+        sim.rollout(steps=50)
+    with pytest.raises(RuntimeError, match="the motor is gone"):
+        sim.rollout_batch(np.zeros((4, 50, 3)))
+    # The thread that raised it is as it was.
+    assert planar.rollout(steps=5).steps == 5
+    state, _ = sim.step(sim.state())
+    assert state.step == 1
+    with pytest.raises(RuntimeError, match="the motor is gone"):
+        sim.step(sim.state(step=3))
+
+
+def test_what_its_transpose_raises_comes_out(planar):
+    class Broken(Spring):
+        def act_vjp(self, seen, control_bar):
+            raise RuntimeError("no derivative today")
+
+    rollout = planar.with_policy(Broken()).rollout()
+    with pytest.raises(RuntimeError, match="no derivative today"):
+        rollout.vjp(v=np.ones_like(rollout.v))
+
+
+@pytest.mark.parametrize(
+    ("act", "message"),
+    [
+        (lambda seen: np.zeros(5), r"policy: act"),
+        (lambda seen: [np.nan, 0.0, 0.0], r"policy: act"),
+        (lambda seen: "push", r"policy: act"),
+        (lambda seen: None, r"policy: act"),
+    ],
+)
+def test_controls_that_are_none(planar, act, message):
+    policy = Spring()
+    policy.act = act
+    with pytest.raises(hg.InputError, match=message):
+        planar.with_policy(policy).rollout()
+
+
+def test_objects_that_are_no_controllers(planar):
+    with pytest.raises(hg.InputError, match=r"act\(observation\)"):
+        planar.with_policy(3)
+
+    class Forward:
+        def act(self, seen):
+            return np.zeros(3)
+
+    sim = planar.with_policy(Forward())
+    with pytest.raises(hg.InputError, match="with_gains"):
+        sim.with_gains([1.0])
+    rollout = sim.rollout()
+    with pytest.raises(hg.UnsupportedError, match="act_vjp"):
+        rollout.vjp(v=np.ones_like(rollout.v))
+
+    class Odd(Spring):
+        def act_vjp(self, seen, control_bar):
+            return np.zeros(3)
+
+    rollout = planar.with_policy(Odd()).rollout()
+    with pytest.raises(hg.InputError, match="q_bar, v_bar"):
+        rollout.vjp(v=np.ones_like(rollout.v))
+
+
+def test_it_travels_with_its_simulator(planar):
+    sim = planar.with_policy(Spring((2.0, 0.1)))
+    again = pickle.loads(pickle.dumps(sim))
+    assert np.array_equal(again.gains, [2.0, 0.1])
+    assert np.array_equal(again.rollout().q, sim.rollout().q)
+    batch = sim.rollout_batch(np.zeros((3, 6, 3)))
+    assert all(np.array_equal(one.q, sim.rollout().q) for one in batch)

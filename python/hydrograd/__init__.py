@@ -7,6 +7,7 @@ as their first index.
 
 from hydrograd import objective
 from hydrograd._added_mass import added_mass
+from hydrograd._contacts import ContactForces
 from hydrograd._gradient import Gradient, StepGradient
 from hydrograd._hydrograd import (
     Body,
@@ -45,10 +46,12 @@ from hydrograd._hydrograd import (
     sphere,
     spherical,
 )
+from hydrograd._viewer import View, view
 
 __all__ = [
     "Body",
     "Contact",
+    "ContactForces",
     "DeviceError",
     "Drag",
     "Error",
@@ -70,6 +73,7 @@ __all__ = [
     "StepGradient",
     "UnresolvedError",
     "UnsupportedError",
+    "View",
     "__version__",
     "added_mass",
     "box",
@@ -86,4 +90,5 @@ __all__ = [
     "revolute",
     "sphere",
     "spherical",
+    "view",
 ]

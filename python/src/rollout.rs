@@ -1,6 +1,8 @@
 //! Rollouts: trajectories with the key to their gradients.
 
 use crate::array::{self, Dim};
+use crate::contact;
+use crate::error::input;
 use crate::gradient;
 use crate::interrupt::{long, short};
 use crate::objective::Objective;
@@ -30,6 +32,20 @@ self_cell!(
 pub struct Rollout {
     simulator: Py<Simulator>,
     cell: Arc<Owned>,
+}
+
+/// The one meant by a number that counts from the end if it is negative.
+fn numbered(number: isize, count: usize, what: &str) -> PyResult<usize> {
+    let at = if number < 0 {
+        number + count as isize
+    } else {
+        number
+    };
+    let found = usize::try_from(at).ok().filter(|at| *at < count);
+    found.ok_or_else(|| {
+        let message = format!("{what} {number} of a rollout that has {count}");
+        pyo3::exceptions::PyIndexError::new_err(message)
+    })
 }
 
 type Numbers<'py> = PyResult<Bound<'py, PyArrayDyn<f64>>>;
@@ -174,23 +190,34 @@ impl Rollout {
     /// The state after `step` steps, from which a run may go on; negative numbers count from the end.
     #[pyo3(signature = (step=-1))]
     fn state(&self, py: Python<'_>, step: isize) -> PyResult<State> {
-        let count = self.rollout().states().len();
-        let at = if step < 0 {
-            step + count as isize
-        } else {
-            step
-        };
-        let found = usize::try_from(at).ok().filter(|at| *at < count);
-        let at = found.ok_or_else(|| {
-            pyo3::exceptions::PyIndexError::new_err(format!(
-                "state {step} of a rollout that has {count}"
-            ))
-        })?;
+        let at = numbered(step, self.rollout().states().len(), "state")?;
         Ok(State {
             simulator: self.simulator.clone_ref(py),
             state: self.rollout().states()[at].clone(),
             velocity: self.rollout().samples()[at].v.clone(),
         })
+    }
+
+    /// Contacts during the step from state `step` to the next, at the pose of that state: where surfaces are no more than `slack` (m)
+    /// farther apart than the gap at which they touch, and what presses there. None where the scene has no contact. Negative
+    /// numbers count from the end: -1 is the last step.
+    #[pyo3(signature = (step, slack=0.0))]
+    fn contacts<'py>(
+        &self,
+        py: Python<'py>,
+        step: isize,
+        slack: f64,
+    ) -> PyResult<Bound<'py, PyAny>> {
+        if !(slack.is_finite() && slack >= 0.0) {
+            return Err(input(
+                "contacts: slack",
+                slack,
+                "must be finite and not negative, in m",
+            ));
+        }
+        let at = numbered(step, self.steps(), "step")?;
+        let found = short(py, || self.rollout().contacts(at, slack))?;
+        contact::of_step(py, &found)
     }
 
     /// Value of an objective.

@@ -20,9 +20,6 @@ Array = NDArray[np.float64]
 # Told apart also by most who see few colours; none is the red of the forces.
 PALETTE = ("#3f74b5", "#e6a23c", "#3a9d78", "#8f6bb3", "#59b4c9", "#a9714b", "#8a949c", "#b9b545")
 
-# The force that is drawn this long, in parts of the scene's size: that which 95 of 100 contacts don't exceed.
-ARROW = 0.2
-
 
 @dataclass(frozen=True)
 class Look:
@@ -37,7 +34,7 @@ class Look:
     contacts: bool
     """Whether contacts are there."""
     force_scale: float | None
-    """Length of the arrow of a newton, m/N; None: it is chosen."""
+    """Length of the arrow of a newton, m/N; None: lengths go with the logarithm."""
 
 
 def colors(names: Sequence[str], given: Mapping[str, str]) -> list[str]:
@@ -45,14 +42,7 @@ def colors(names: Sequence[str], given: Mapping[str, str]) -> list[str]:
     return [given.get(name, PALETTE[i % len(PALETTE)]) for i, name in enumerate(names)]
 
 
-def scale_of(size: float, forces: Array) -> float:
-    """Length of the arrow of a newton, m/N."""
-    strengths = np.linalg.norm(forces, axis=1)
-    strengths = strengths[strengths > 0.0]
-    return float(ARROW * size / np.quantile(strengths, 0.95)) if len(strengths) else 0.0
-
-
-def contact_data(rollout: Rollout, frames: Frames, center: Array, size: float, look: Look) -> dict[str, Any]:
+def contact_data(rollout: Rollout, frames: Frames, center: Array, look: Look) -> dict[str, Any]:
     """Contacts of the steps that begin at the frames."""
     starts = [0]
     positions, forces = [np.zeros((0, 3))], [np.zeros((0, 3))]
@@ -69,7 +59,8 @@ def contact_data(rollout: Rollout, frames: Frames, center: Array, size: float, l
         "starts": packed(starts, "i4"),
         "positions": packed(np.concatenate(positions), "f4"),
         "forces": packed(force, "f4"),
-        "scale": scale_of(size, force) if look.force_scale is None else look.force_scale,
+        "scale": look.force_scale,
+        "largest": float(np.linalg.norm(force, axis=1).max(initial=0.0)),
     }
 
 
@@ -126,6 +117,6 @@ def page_data(rollout: Rollout, frames: Frames, look: Look) -> dict[str, Any]:
         "rotations": packed(quaternions(frames.rotations), "f4"),
         "bodies": body_data(rollout.simulator.body_names, frames, look),
         "walls": wall_data(rollout, center),
-        "contacts": contact_data(rollout, frames, center, size, look),
+        "contacts": contact_data(rollout, frames, center, look),
         "series": series_data(rollout, frames),
     }

@@ -35,7 +35,8 @@ def quaternions(rotations: Array) -> Array:
         products[..., i, 3] = products[..., 3, i] = r[..., a, b] - r[..., b, a]
     largest = np.argmax(np.diagonal(products, axis1=-2, axis2=-1), axis=-1)
     row: Array = np.take_along_axis(products, largest[..., None, None], axis=-2)[..., 0, :]
-    return row / np.linalg.norm(row, axis=-1, keepdims=True)
+    row /= np.linalg.norm(row, axis=-1, keepdims=True)
+    return row
 
 
 @dataclass(frozen=True, eq=False)
@@ -50,12 +51,14 @@ class Surface:
     @property
     def middle(self) -> Array:
         """Middle of the box, (3,), m."""
-        return 0.5 * (self.vertices.min(axis=0) + self.vertices.max(axis=0))
+        out: Array = 0.5 * (self.vertices.min(axis=0) + self.vertices.max(axis=0))
+        return out
 
     @property
     def reach(self) -> Array:
         """Half the box, (3,), m."""
-        return 0.5 * (self.vertices.max(axis=0) - self.vertices.min(axis=0))
+        out: Array = 0.5 * (self.vertices.max(axis=0) - self.vertices.min(axis=0))
+        return out
 
 
 @dataclass(frozen=True, eq=False)

@@ -146,8 +146,9 @@ def view(
     warning tells where the page is. In a notebook, the result shows itself, `height` pixels high.
 
     Bodies are drawn by the triangles that gaps are measured between, at the poses of the rollout; of a rollout of more than
-    `max_frames` states so many, evenly spread, with the first and the last. With `contacts`, points and forces (N) of contact
-    are there too, `force_scale` (m/N) long; without one, that of the larger forces is a fifth of the scene's size. `colors` are
+    `max_frames` states so many, evenly spread, with the first and the last. With `contacts`, points and forces of contact
+    are there too, the arrow of a newton `force_scale` (m/N) long; without one, the largest force has an arrow of a quarter of the
+    scene's size, and every tenth of it one that is a quarter of that shorter. `colors` are
     "#rrggbb" by the names of bodies, `up` is the direction that stays upright and `view_from` the one from the scene to where it
     is seen from at first, world axes. `title` is the scene's name unless given.
     """

@@ -21,8 +21,8 @@ hydrograd.Arrows = class {
     if (this.dots) this.dots.material.color.set(dots);
   }
 
-  /** Shows arrows from points along vectors, both (count, 3) from an offset on, `scale` m a unit and no longer than `longest`. */
-  show(points, vectors, count, { scale, longest, points_from = 0, vectors_from = 0 }) {
+  /** Shows arrows from points along vectors, both (count, 3) from an offset on, as long (m) as `length` makes of a strength. */
+  show(points, vectors, count, { length, points_from = 0, vectors_from = 0 }) {
     const [from, along, up] = [new THREE.Vector3(), new THREE.Vector3(), new THREE.Vector3(0, 1, 0)];
     const [turn, matrix, size] = [new THREE.Quaternion(), new THREE.Matrix4(), new THREE.Vector3()];
     const still = new THREE.Quaternion();
@@ -32,12 +32,12 @@ hydrograd.Arrows = class {
       if (this.dots) this.dots.setMatrixAt(i, matrix.compose(from, still, size.setScalar(this.thickness)));
       along.fromArray(vectors, vectors_from + 3 * i);
       const strength = along.length();
-      const length = Math.min(scale * strength, longest);
-      if (!(length > 1e-3 * longest)) continue;
+      const long = length(strength);
+      if (!(long > 0)) continue;
       turn.setFromUnitVectors(up, along.divideScalar(strength));
       // Short arrows are thinner, so that the head is never longer than half of one.
-      const thick = Math.min(this.thickness, length / 7.2);
-      const shaft = length - 3.6 * thick;
+      const thick = Math.min(this.thickness, long / 7.2);
+      const shaft = long - 3.6 * thick;
       this.shafts.setMatrixAt(drawn, matrix.compose(from, turn, size.set(thick, shaft, thick)));
       from.addScaledVector(along, shaft);
       this.heads.setMatrixAt(drawn, matrix.compose(from, turn, size.setScalar(thick)));
@@ -59,10 +59,12 @@ hydrograd.Arrows = class {
 /** Contacts, frame by frame. */
 hydrograd.Contacts = class {
   constructor(data, stage) {
-    const { starts, positions, forces, scale } = data.contacts;
+    const { starts, positions, forces, scale, largest } = data.contacts;
     [this.starts, this.positions, this.forces] = [starts, positions, forces].map(hydrograd.decode);
-    this.scale = scale; // m/N
-    this.longest = 0.35 * data.size;
+    // An impact may press ten thousand times as hard as what rests: a quarter shorter for every tenth of the largest force.
+    const longest = 0.25 * data.size;
+    const shortening = (force) => longest * (1 + Math.log10(force / largest) / 4);
+    this.length = scale === null ? shortening : (force) => Math.min(scale * force, data.size);
     let most = 0;
     for (let f = 0; f + 1 < this.starts.length; f++) most = Math.max(most, this.starts[f + 1] - this.starts[f]);
     const look = { thickness: 0.006 * data.size, color: 0xc81e2b, on_top: true, dots: 0x2b1718 };
@@ -76,8 +78,7 @@ hydrograd.Contacts = class {
   /** Shows those of a frame; gives how many there are and the largest force, N. */
   place(frame) {
     const [from, to] = [this.starts[frame], this.starts[frame + 1]];
-    const { scale, longest } = this;
-    const where = { scale, longest, points_from: 3 * from, vectors_from: 3 * from };
+    const where = { length: this.length, points_from: 3 * from, vectors_from: 3 * from };
     this.arrows.show(this.positions, this.forces, to - from, where);
     let largest = 0;
     for (let i = from; i < to; i++) largest = Math.max(largest, Math.hypot(...this.forces.subarray(3 * i, 3 * i + 3)));

@@ -33,7 +33,8 @@ hydrograd.Frames = class {
 
   /** The frame at or before a time, and how far it is to the next one, 0 to 1. */
   locate(time) {
-    const t = Math.min(Math.max(time, this.first), this.last);
+    // What lies before a frame by rounding alone is that frame.
+    const t = Math.min(Math.max(time, this.first) + 1e-9 * (this.last - this.first), this.last);
     let [low, high] = [0, this.count - 1];
     while (high - low > 1) {
       const middle = (low + high) >> 1;
@@ -41,7 +42,7 @@ hydrograd.Frames = class {
       else high = middle;
     }
     if (t >= this.time[high]) return { frame: high, share: 0 };
-    return { frame: low, share: (t - this.time[low]) / (this.time[high] - this.time[low]) };
+    return { frame: low, share: Math.max(time - this.time[low], 0) / (this.time[high] - this.time[low]) };
   }
 
   /** Writes the pose of a body: straight between positions, along the shortest turn between rotations. */

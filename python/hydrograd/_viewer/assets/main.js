@@ -19,13 +19,14 @@
     Object.assign(hydrograd, { player, panel, stage });
     document.getElementById("grid").textContent = `grid ${hydrograd.metres(player.cell)}`;
 
-    // `#t=1.5` shows that moment (s), now or whenever the address changes.
+    // `#t=1.5` shows that moment (s), `#t=1.5&play` goes on from there; now, or whenever the address changes.
     const jump = () => {
       const found = /[#&]t=([-+.\deE]+)/.exec(window.location.hash);
       if (found) {
         player.pause();
         player.seek(Number(found[1]));
       }
+      if (/[#&]play\b/.test(window.location.hash)) player.play();
     };
     window.addEventListener("hashchange", jump);
     jump();

@@ -27,8 +27,9 @@ hydrograd.Panel = class {
     this.on("back", "click", () => player.step(-1));
     this.on("on", "click", () => player.step(1));
     this.on("scrub", "input", () => {
+      const time = player.frames.first + Number(scrub.value); // before pausing writes to it
       player.pause();
-      player.seek(player.frames.first + Number(scrub.value));
+      player.seek(time);
     });
     this.on("speed", "change", (event) => (player.speed = Number(event.target.value)));
     this.on("loop", "change", (event) => (player.loop = event.target.checked));
@@ -130,7 +131,7 @@ hydrograd.Panel = class {
     });
     if (player.contacts.any) {
       const { count, largest } = player.touching;
-      facts.push(count ? `contacts ${count}, force ≤ ${hydrograd.figure(largest)} N` : "contacts 0");
+      facts.push(count ? `contacts ${count}, up to ${hydrograd.figure(largest)} N` : "contacts 0");
     }
     this.get("facts").replaceChildren(...facts.filter(Boolean).map((fact) => {
       const line = document.createElement("div");

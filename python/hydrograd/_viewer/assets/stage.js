@@ -21,18 +21,22 @@ hydrograd.Stage = class {
     this.controls.addEventListener("change", () => this.ask());
     this.light();
     this.wanted = true;
-    new ResizeObserver(() => this.resize()).observe(element);
     this.resize();
+    // At once: a canvas of another size is empty, and would be shown so until the next picture.
+    new ResizeObserver(() => {
+      this.resize();
+      this.draw();
+    }).observe(element);
     this.look(this.direction);
   }
 
   light() {
-    const sky = new THREE.HemisphereLight(0xffffff, 0x8ba0ad, 2.0);
+    const sky = new THREE.HemisphereLight(0xffffff, 0x93a8b5, 2.3);
     sky.position.copy(this.up);
     // From above, off to the side of the first view, so that shadows show depth.
     const side = new THREE.Vector3().crossVectors(this.direction, this.up).normalize();
     const sun = new THREE.DirectionalLight(0xffffff, 2.2);
-    sun.position.copy(this.up).multiplyScalar(1.6).addScaledVector(this.direction, 0.5).addScaledVector(side, -0.8);
+    sun.position.copy(this.up).multiplyScalar(1.6).addScaledVector(this.direction, 0.9).addScaledVector(side, -0.8);
     sun.castShadow = true;
     sun.shadow.mapSize.set(2048, 2048);
     Object.assign(sun.shadow.camera, { left: -1, right: 1, top: 1, bottom: -1, near: 0.1, far: 4 });
@@ -44,9 +48,9 @@ hydrograd.Stage = class {
   /** Looks at the whole scene from a direction. */
   look(direction) {
     const half = (this.camera.fov * Math.PI) / 360;
-    // All of the scene lies within half its size around its centre.
+    // All of the scene lies within half its size around its centre, and hardly anything near that.
     const narrow = Math.min(1, this.camera.aspect);
-    const distance = 0.5 / Math.sin(Math.atan(narrow * Math.tan(half)));
+    const distance = 0.43 / Math.sin(Math.atan(narrow * Math.tan(half)));
     const from = direction.clone().normalize();
     // Along the upward axis the camera has no upright: a little beside it.
     if (Math.abs(from.dot(this.up)) > 0.999) {

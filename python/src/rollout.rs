@@ -9,8 +9,8 @@ use crate::objective::Objective;
 use crate::simulator::Simulator;
 use crate::state::State;
 use hydrograd::simulate::{Cotangents, Recording, Sample};
-use nalgebra::DMatrix;
-use numpy::PyArrayDyn;
+use nalgebra::{DMatrix, Vector3};
+use numpy::{PyArray1, PyArrayDyn};
 use pyo3::prelude::*;
 use pyo3::types::PyDict;
 use self_cell::self_cell;
@@ -46,6 +46,16 @@ fn numbered(number: isize, count: usize, what: &str) -> PyResult<usize> {
         let message = format!("{what} {number} of a rollout that has {count}");
         pyo3::exceptions::PyIndexError::new_err(message)
     })
+}
+
+/// Points of space.
+fn vectors(place: &str, given: &Bound<'_, PyAny>) -> PyResult<Vec<Vector3<f64>>> {
+    let found = array::array(place, given, &[Dim::Any("n"), Dim::Is(3)])?;
+    Ok(found
+        .values
+        .chunks(3)
+        .map(Vector3::from_column_slice)
+        .collect())
 }
 
 type Numbers<'py> = PyResult<Bound<'py, PyArrayDyn<f64>>>;
@@ -218,6 +228,30 @@ impl Rollout {
         let at = numbered(step, self.steps(), "step")?;
         let found = short(py, || self.rollout().contacts(at, slack))?;
         contact::of_step(py, &found)
+    }
+
+    /// The water's velocity at `points` (n, 3), m, at state `state`: (n, 3), m/s, world axes, the current included. It takes a
+    /// solve, and a simulator with the fidelity "full". Points within a body, behind a wall, or nearer to a surface than half an
+    /// edge of its mesh are refused: `flow_resolved` tells them apart. Negative numbers count states from the end.
+    fn flow<'py>(&self, py: Python<'py>, state: isize, points: &Bound<'py, PyAny>) -> Numbers<'py> {
+        let at = numbered(state, self.rollout().states().len(), "state")?;
+        let points = vectors("flow: points", points)?;
+        let made = short(py, || self.rollout().flow(at, &points))?;
+        let values = made.iter().flat_map(|u| [u.x, u.y, u.z]).collect();
+        array::to_python(py, values, &[points.len(), 3])
+    }
+
+    /// Whether `flow` knows the velocity at each of `points` (n, 3), m, at state `state`: (n,).
+    fn flow_resolved<'py>(
+        &self,
+        py: Python<'py>,
+        state: isize,
+        points: &Bound<'py, PyAny>,
+    ) -> PyResult<Bound<'py, PyArray1<bool>>> {
+        let at = numbered(state, self.rollout().states().len(), "state")?;
+        let points = vectors("flow_resolved: points", points)?;
+        let made = short(py, || self.rollout().flow_resolved(at, &points))?;
+        Ok(PyArray1::from_vec(py, made))
     }
 
     /// Value of an objective.

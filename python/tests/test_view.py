@@ -222,6 +222,64 @@ def test_contacts():
     assert data_of(hg.view(rollout, force_scale=0.1))["contacts"]["scale"] == 0.1
 
 
+@pytest.fixture(scope="module")
+def stirring() -> hg.Rollout:
+    """A ball with an arm that moves and turns, in a current, over three steps."""
+    out = hg.Scene(hg.Fluid(998.0, current=(0.0, 0.1, 0.0)), steps=3)
+    out.add(hg.Body(hg.sphere(0.1, faces=320), name="ball", density=998.0, shape_position=(0.2, 0.0, 0.0)))
+    sim = hg.Simulator(out, fidelity="full")
+    return sim.with_start(v=[0.5, 0.0, 0.2, 0.0, 1.0, 3.0]).rollout()
+
+
+def test_flow_around_a_sphere(stirring):
+    for state in (0, -1):
+        velocity, spin = stirring.velocities[state, 0, :3], stirring.velocities[state, 0, 3:]
+        arm = stirring.rotations[state, 0] @ [0.2, 0.0, 0.0]
+        current = np.array([0.0, 0.1, 0.0])
+        u = velocity + np.cross(spin, arm) - current  # of its middle, through the water
+        rays = np.random.default_rng(1).normal(size=(50, 3))
+        rays *= np.linspace(0.13, 0.5, 50)[:, None] / np.linalg.norm(rays, axis=1, keepdims=True)
+        points = stirring.positions[state, 0] + arm + rays
+        distance = np.linalg.norm(rays, axis=1, keepdims=True)
+        along = rays / distance
+        right = (0.1 / distance) ** 3 / 2 * (3 * (along @ u)[:, None] * along - u)
+        found = stirring.flow(state, points) - current
+        # 320 faces: within 3 % of the speed there.
+        assert np.all(np.linalg.norm(found - right, axis=1) < 0.03 * np.linalg.norm(right, axis=1))
+        inside = np.vstack([points, stirring.positions[state, 0] + arm])
+        assert stirring.flow_resolved(state, inside).tolist() == [True] * 50 + [False]
+        with pytest.raises(hg.UnresolvedError, match=r"points\[50\].*ball"):
+            stirring.flow(state, inside)
+    with pytest.raises(IndexError):
+        stirring.flow(4, points)
+    with pytest.raises(hg.InputError, match=r"flow: points.*\(n, 3\)"):
+        stirring.flow(0, np.zeros(3))
+    with pytest.raises(hg.InputError, match="finite"):
+        stirring.flow_resolved(0, [[np.nan, 0, 0]])
+
+
+def grid() -> np.ndarray:
+    x, z = np.meshgrid(np.arange(-0.2, 0.61, 0.1), np.arange(-0.3, 0.31, 0.1))
+    return np.stack([x, 0 * x, z], axis=-1).reshape(-1, 3)
+
+
+def test_flow_in_a_page(rollout, stirring):
+    data = data_of(hg.view(stirring, flow=grid()))["flow"]
+    velocities = unpacked(data["velocities"])
+    assert velocities.shape == (4, 63, 3)
+    known = stirring.flow_resolved(2, grid())
+    assert 0 < known.sum() < 63
+    assert np.allclose(velocities[2, known], stirring.flow(2, grid()[known]), atol=1e-7)
+    assert np.all(velocities[2, ~known] == 0.0)
+    assert np.isclose(data["longest"], 0.15)  # one and a half of the way to the next
+    assert data_of(hg.view(stirring, flow=grid(), flow_scale=2.0))["flow"]["scale"] == 2.0
+    assert data_of(hg.view(stirring))["flow"] is None
+    with pytest.raises(hg.UnsupportedError, match="full"):
+        hg.view(rollout, flow=grid())
+    with pytest.raises(hg.InputError, match="fewer points"):
+        hg.view(stirring, flow=np.zeros((1_000_000, 3)))
+
+
 def test_walls():
     assert scene().walls == [([0.0, 0.0, -0.5], [0.0, 0.0, 2.0], "rigid")]
 
@@ -240,6 +298,11 @@ def test_walls():
         ({"colors": {"red": "red"}}, "#rrggbb"),
         ({"force_scale": -1.0}, "force_scale"),
         ({"force_scale": np.nan}, "force_scale"),
+        ({"force_scale": "x"}, "force_scale"),
+        ({"flow": (0, 0, 0)}, r"flow: got an array of shape \(3,\)"),
+        ({"flow": "x"}, "flow"),
+        ({"flow": [[0, 0, np.inf]]}, "finite"),
+        ({"flow_scale": 0}, "flow_scale"),
     ],
 )
 def test_wrong_input(rollout, given, says):
@@ -379,6 +442,23 @@ def test_buttons(page):
     assert found["followed"] < 1e-6 < 0.1 < found["left"]
     assert found["above"] > 0.5
     assert np.isclose(found["turn"], 0.125 * np.pi, atol=1e-5)
+
+
+def test_a_browser_draws_forces_and_flow(stirring, tmp_path):
+    """In their colours, and not where they are switched off."""
+    file = tmp_path / "arrows.html"
+    for rollout, more, switch, like in (
+        (resting(), {"max_frames": 50}, "forces", lambda p: (p[..., 0] > 150) & (p[..., 1:].max(axis=-1) < 80)),
+        (stirring, {"flow": grid()}, "flow", lambda p: (p[..., 0] < 60) & (p[..., 2] > 90) & (p[..., 2] < 190)),
+    ):
+        text = hg.view(rollout, view_from=(0, -1, 0.2), colors={rollout.simulator.body_names[0]: "#cccccc"}, **more).html
+        seen = []
+        for shown in (True, False):
+            press = "" if shown else f"document.getElementById('{switch}').click();"
+            file.write_text(text.replace("</body>", f"<script>{press}</script></body>"), encoding="utf-8")
+            seen.append(like(stage(browser.picture(file, "#t=1"))).sum())
+        assert seen[0] > 150 + seen[1], (switch, seen)
+        assert seen[1] < 50
 
 
 def test_without_webgl_it_says_so(page):

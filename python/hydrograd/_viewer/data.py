@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
+from hydrograd._viewer.flow import flow_data
 from hydrograd._viewer.frames import Frames, quaternions
 from hydrograd._viewer.page import packed
 
@@ -35,6 +36,10 @@ class Look:
     """Whether contacts are there."""
     force_scale: float | None
     """Length of the arrow of a newton, m/N; None: lengths go with the logarithm."""
+    flow: Array | None
+    """Points where the water's velocity is drawn, (n, 3), m."""
+    flow_scale: float | None
+    """Length of the arrow of a speed, m per m/s; None: it is chosen."""
 
 
 def colors(names: Sequence[str], given: Mapping[str, str]) -> list[str]:
@@ -105,7 +110,11 @@ def page_data(rollout: Rollout, frames: Frames, look: Look) -> dict[str, Any]:
     low, high = frames.box()
     center = 0.5 * (low + high)
     size = float(np.linalg.norm(high - low)) or 1.0
+    flow = None
+    if look.flow is not None:
+        flow = flow_data(rollout, frames, look.flow, center, size, look.flow_scale)
     return {
+        "flow": flow,
         "up": look.up.tolist(),
         "view_from": look.view_from.tolist(),
         "center": center.tolist(),

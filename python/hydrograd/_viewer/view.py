@@ -118,6 +118,28 @@ def _whole(place: str, given: int, least: int) -> int:
     return int(given)
 
 
+def _scale(place: str, given: float | None, unit: str) -> float | None:
+    """A positive number, if one is given."""
+    if given is None:
+        return None
+    if not isinstance(given, (int, float, np.integer, np.floating)) or not 0.0 < given < np.inf:
+        raise InputError(f"view: {place}: got {given!r}; must be finite and positive, in {unit}")
+    return float(given)
+
+
+def _points(given: ArrayLike) -> Array:
+    """Points of space, (n, 3)."""
+    try:
+        points = np.asarray(given, dtype=np.float64)
+    except (TypeError, ValueError):
+        raise InputError(f"view: flow: got a value of type {type(given).__name__}; must be points (n, 3), in m") from None
+    if points.ndim != 2 or points.shape[1] != 3 or not len(points):
+        raise InputError(f"view: flow: got an array of shape {points.shape}; must be points (n, 3), in m")
+    if not np.all(np.isfinite(points)):
+        raise InputError("view: flow: got numbers that aren't finite; must be points (n, 3), in m")
+    return points
+
+
 def _noted(frames: Frames, states: int) -> str:
     """What is said of the states that are left out."""
     shown = len(frames.steps)
@@ -135,6 +157,8 @@ def view(
     max_frames: int = 1000,
     contacts: bool = True,
     force_scale: float | None = None,
+    flow: ArrayLike | None = None,
+    flow_scale: float | None = None,
     colors: Mapping[str, str] | None = None,
     up: ArrayLike = (0.0, 0.0, 1.0),
     view_from: ArrayLike | None = None,
@@ -148,14 +172,14 @@ def view(
     Bodies are drawn by the triangles that gaps are measured between, at the poses of the rollout; of a rollout of more than
     `max_frames` states so many, evenly spread, with the first and the last. With `contacts`, points and forces of contact
     are there too, the arrow of a newton `force_scale` (m/N) long; without one, the largest force has an arrow of a quarter of the
-    scene's size, and every tenth of it one that is a quarter of that shorter. `colors` are
+    scene's size, and every tenth of it one that is a quarter of that shorter. `flow` are points (n, 3), m, where arrows show the water's velocity,
+    `flow_scale` (m per m/s) long, at the price of a solve a frame; it takes a simulator with the fidelity "full"
+    (`Rollout.flow`). `colors` are
     "#rrggbb" by the names of bodies, `up` is the direction that stays upright and `view_from` the one from the scene to where it
     is seen from at first, world axes. `title` is the scene's name unless given.
     """
     if not isinstance(rollout, Rollout):
         raise InputError(f"view: rollout: got a value of type {type(rollout).__name__}; must be a Rollout")
-    if force_scale is not None and not (np.isreal(force_scale) and 0.0 < force_scale < np.inf):
-        raise InputError(f"view: force_scale: got {force_scale!r}; must be finite and positive, in m/N")
     simulator = rollout.simulator
     upward = _direction("up", up)
     look = Look(
@@ -163,7 +187,9 @@ def view(
         view_from=_beside(upward) if view_from is None else _direction("view_from", view_from),
         colors=_colors(simulator.body_names, colors),
         contacts=contacts,
-        force_scale=None if force_scale is None else float(force_scale),
+        force_scale=_scale("force_scale", force_scale, "m/N"),
+        flow=None if flow is None else _points(flow),
+        flow_scale=_scale("flow_scale", flow_scale, "m per m/s"),
     )
     frames = Frames.of(rollout, _whole("max_frames", max_frames, 2))
     heading = (simulator.scene.name or "rollout") if title is None else str(title)

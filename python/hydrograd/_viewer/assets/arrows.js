@@ -85,3 +85,30 @@ hydrograd.Contacts = class {
     return { count: to - from, largest };
   }
 };
+
+/** The water's velocity at given points, frame by frame. */
+hydrograd.Flow = class {
+  constructor(data, stage) {
+    const { points, velocities, scale, longest } = data.flow;
+    [this.points, this.velocities] = [points, velocities].map(hydrograd.decode);
+    // Where it isn't known it is written as nothing, and no arrow is drawn.
+    this.length = (speed) => (scale * speed < 0.03 * longest ? 0 : Math.min(scale * speed, longest));
+    const look = { thickness: 0.06 * longest, color: 0x0f5f8c, on_top: false };
+    this.arrows = new hydrograd.Arrows(stage.world, this.count, look);
+  }
+
+  get count() {
+    return this.points.length / 3;
+  }
+
+  /** Shows that of a frame; gives the largest speed, m/s. */
+  place(frame) {
+    const from = 3 * this.count * frame;
+    this.arrows.show(this.points, this.velocities, this.count, { length: this.length, vectors_from: from });
+    let largest = 0;
+    for (let i = from; i < from + 3 * this.count; i += 3) {
+      largest = Math.max(largest, Math.hypot(...this.velocities.subarray(i, i + 3)));
+    }
+    return largest;
+  }
+};

@@ -60,10 +60,12 @@ hydrograd.Panel = class {
       player.contacts.arrows.visible({ arrows: this.get("forces").checked, dots: this.get("points").checked });
     of("forces", touching);
     of("points", touching);
+    of("flow", (shown) => player.flow && player.flow.arrows.visible({ arrows: shown }));
     of("trails", (shown) => player.bodies.trails(shown));
     of("edges", (shown) => player.bodies.edges(shown));
     of("glass", (seen) => player.bodies.glass(seen));
     for (const part of document.querySelectorAll(".contact")) part.hidden = !player.contacts.any;
+    this.get("flow").parentElement.hidden = !player.flow;
   }
 
   /** A line for each body: shown or not, and whom the camera may follow. */
@@ -133,6 +135,7 @@ hydrograd.Panel = class {
       const { count, largest } = player.touching;
       facts.push(count ? `contacts ${count}, up to ${hydrograd.figure(largest)} N` : "contacts 0");
     }
+    if (player.flow) facts.push(`flow up to ${hydrograd.figure(player.fastest)} m/s`);
     this.get("facts").replaceChildren(...facts.filter(Boolean).map((fact) => {
       const line = document.createElement("div");
       line.textContent = fact;

@@ -9,6 +9,7 @@ hydrograd.Player = class {
     this.cell = hydrograd.addWalls(data, stage);
     this.bodies = new hydrograd.Bodies(data, this.frames, stage);
     this.contacts = new hydrograd.Contacts(data, stage);
+    this.flow = data.flow ? new hydrograd.Flow(data, stage) : null;
     this.followed = -1;
     this.speed = 1;
     this.playing = false;
@@ -31,6 +32,7 @@ hydrograd.Player = class {
     this.frame = at.frame;
     this.bodies.place(at);
     this.touching = this.contacts.place(at.frame);
+    this.fastest = this.flow ? this.flow.place(at.frame) : 0;
     if (before) this.stage.shift(this.bodies.middle(this.followed).sub(before));
     this.stage.ask();
     this.listeners.forEach((listener) => listener(this));

@@ -19,16 +19,17 @@ import hydrograd as hg
 NASTY = '</script><script>alert("&")</script>{{data}}<!--'
 
 
-def scene() -> hg.Scene:
+def scene(size: float = 1.0) -> hg.Scene:
     """A ball carried round the world's z axis by a shape far from its body's origin, beside a fixed one and a floor."""
     out = hg.Scene(name="round", steps=20, time_step=0.05)
     turn = [hg.Motion.linear(np.pi)]  # half a turn in a second
     joint = hg.revolute((0, 0, 1))
-    carried = {"shape_position": (0.5, 0.0, 0.0), "shape_rotation": (0.0, 0.3, 0.0)}
-    out.add(hg.Body(hg.sphere(0.1, faces=320), name="red", density=1000.0, joint=joint, motion=turn, **carried))
-    out.add(hg.Body(hg.sphere(0.1, faces=320), name="blue", mass=1.0, joint=hg.fixed(), position=(0.0, 0.0, 0.4)))
+    carried = {"shape_position": (0.5 * size, 0.0, 0.0), "shape_rotation": (0.0, 0.3, 0.0)}
+    ball = hg.sphere(0.1 * size, faces=320)
+    out.add(hg.Body(ball, name="red", density=1000.0, joint=joint, motion=turn, **carried))
+    out.add(hg.Body(ball, name="blue", mass=1.0, joint=hg.fixed(), position=(0.0, 0.0, 0.4 * size)))
     out.add(hg.Body(mass=1.0, inertia=(1, 1, 1), name=NASTY))
-    out.add_wall((0.0, 0.0, -0.5), (0.0, 0.0, 2.0))
+    out.add_wall((0.0, 0.0, -0.5 * size), (0.0, 0.0, 2.0))
     return out
 
 
@@ -217,6 +218,8 @@ def test_contacts():
     assert len(starts) == 302 and starts[-1] == len(forces) == len(unpacked(data["positions"]))
     assert starts[-1] == starts[-2]  # no step begins at the last state
     assert np.allclose(forces[starts[299] : starts[300]], found.forces)
+    center = data_of(hg.view(rollout))["center"]
+    assert np.allclose(unpacked(data["positions"])[starts[299] : starts[300]] + center, found.positions, atol=1e-7)
     assert data["largest"] > weight and data["scale"] is None
     assert data_of(hg.view(rollout, contacts=False))["contacts"]["largest"] == 0.0
     assert data_of(hg.view(rollout, force_scale=0.1))["contacts"]["scale"] == 0.1
@@ -393,6 +396,15 @@ def test_a_browser_draws_it(page):
         red, size = blob(picture, 0)
         assert np.isclose(size, radius, rtol=0.15)
         assert np.allclose((red - blue) / radius, np.array([x, -0.4]) / 0.1, rtol=0.06)
+
+
+@pytest.mark.parametrize("size", [1e-3, 1e3])
+def test_a_browser_draws_it_whatever_its_size(page, tmp_path, size):
+    rollout = hg.Simulator(scene(size), fidelity="isolated").rollout()
+    file = tmp_path / "sized.html"
+    hg.view(rollout, file, colors=COLORS, view_from=(0, -1, 0))
+    change = np.abs(stage(browser.picture(page, "#t=1")) - stage(browser.picture(file, "#t=1")))
+    assert (change.max(axis=-1) > 12).mean() < 1e-3
 
 
 def test_a_browser_plays_it(page):

@@ -25,8 +25,12 @@ hydrograd.Bodies = class {
       group.add(this.cross());
       return group;
     }
+    // three.js takes vertices for one that are 1e-5 apart: measured in the body's own size, wherever its frame is.
+    const middle = group.userData.middle.toArray();
+    const vertices = hydrograd.decode(body.vertices).map((x, i) => x - middle[i % 3]);
+    const unit = vertices.reduce((most, x) => Math.max(most, Math.abs(x)), 0) || 1;
     const indexed = new THREE.BufferGeometry();
-    indexed.setAttribute("position", new THREE.BufferAttribute(hydrograd.decode(body.vertices), 3));
+    indexed.setAttribute("position", new THREE.BufferAttribute(vertices.map((x) => x / unit), 3));
     indexed.setIndex(new THREE.BufferAttribute(new Uint32Array(hydrograd.decode(body.faces)), 1));
     const material = new THREE.MeshStandardMaterial({ color: body.color, roughness: 0.6, metalness: 0.0 });
     const skin = new THREE.Mesh(THREE.toCreasedNormals(indexed, CREASE), material);
@@ -34,6 +38,10 @@ hydrograd.Bodies = class {
     const thin = new THREE.LineBasicMaterial({ color: 0x102030, transparent: true, opacity: 0.35 });
     const lines = new THREE.LineSegments(new THREE.EdgesGeometry(indexed, 0.01), thin);
     lines.visible = false;
+    for (const part of [skin, lines]) {
+      part.position.copy(group.userData.middle);
+      part.scale.setScalar(unit);
+    }
     group.add(skin, lines);
     Object.assign(group.userData, { skin, lines });
     return group;

@@ -9,7 +9,7 @@ use crate::objective::Objective;
 use crate::simulator::Simulator;
 use crate::state::State;
 use hydrograd::simulate::{Cotangents, Recording, Sample};
-use nalgebra::{DMatrix, Vector3};
+use nalgebra::DMatrix;
 use numpy::{PyArray1, PyArrayDyn};
 use pyo3::prelude::*;
 use pyo3::types::PyDict;
@@ -32,30 +32,6 @@ self_cell!(
 pub struct Rollout {
     simulator: Py<Simulator>,
     cell: Arc<Owned>,
-}
-
-/// The one meant by a number that counts from the end if it is negative.
-fn numbered(number: isize, count: usize, what: &str) -> PyResult<usize> {
-    let at = if number < 0 {
-        number + count as isize
-    } else {
-        number
-    };
-    let found = usize::try_from(at).ok().filter(|at| *at < count);
-    found.ok_or_else(|| {
-        let message = format!("{what} {number} of a rollout that has {count}");
-        pyo3::exceptions::PyIndexError::new_err(message)
-    })
-}
-
-/// Points of space.
-fn vectors(place: &str, given: &Bound<'_, PyAny>) -> PyResult<Vec<Vector3<f64>>> {
-    let found = array::array(place, given, &[Dim::Any("n"), Dim::Is(3)])?;
-    Ok(found
-        .values
-        .chunks(3)
-        .map(Vector3::from_column_slice)
-        .collect())
 }
 
 type Numbers<'py> = PyResult<Bound<'py, PyArrayDyn<f64>>>;
@@ -200,7 +176,7 @@ impl Rollout {
     /// The state after `step` steps, from which a run may go on; negative numbers count from the end.
     #[pyo3(signature = (step=-1))]
     fn state(&self, py: Python<'_>, step: isize) -> PyResult<State> {
-        let at = numbered(step, self.rollout().states().len(), "state")?;
+        let at = array::numbered(step, self.rollout().states().len(), "state")?;
         Ok(State {
             simulator: self.simulator.clone_ref(py),
             state: self.rollout().states()[at].clone(),
@@ -225,7 +201,7 @@ impl Rollout {
                 "must be finite and not negative, in m",
             ));
         }
-        let at = numbered(step, self.steps(), "step")?;
+        let at = array::numbered(step, self.steps(), "step")?;
         let found = short(py, || self.rollout().contacts(at, slack))?;
         contact::of_step(py, &found)
     }
@@ -234,8 +210,8 @@ impl Rollout {
     /// solve, and a simulator with the fidelity "full". Points within a body, behind a wall, or nearer to a surface than half an
     /// edge of its mesh are refused: `flow_resolved` tells them apart. Negative numbers count states from the end.
     fn flow<'py>(&self, py: Python<'py>, state: isize, points: &Bound<'py, PyAny>) -> Numbers<'py> {
-        let at = numbered(state, self.rollout().states().len(), "state")?;
-        let points = vectors("flow: points", points)?;
+        let at = array::numbered(state, self.rollout().states().len(), "state")?;
+        let points = array::vectors("flow: points", points)?;
         let made = short(py, || self.rollout().flow(at, &points))?;
         let values = made.iter().flat_map(|u| [u.x, u.y, u.z]).collect();
         array::to_python(py, values, &[points.len(), 3])
@@ -248,8 +224,8 @@ impl Rollout {
         state: isize,
         points: &Bound<'py, PyAny>,
     ) -> PyResult<Bound<'py, PyArray1<bool>>> {
-        let at = numbered(state, self.rollout().states().len(), "state")?;
-        let points = vectors("flow_resolved: points", points)?;
+        let at = array::numbered(state, self.rollout().states().len(), "state")?;
+        let points = array::vectors("flow_resolved: points", points)?;
         let made = short(py, || self.rollout().flow_resolved(at, &points))?;
         Ok(PyArray1::from_vec(py, made))
     }

@@ -419,8 +419,14 @@ def test_buttons(page):
     const put = (id, value) => { const e = document.getElementById(id); e.value = value; e.dispatchEvent(new Event("change")); };
     const { player, stage } = hydrograd;
     const found = {};
+    const key = (name, where) => where.dispatchEvent(new KeyboardEvent("keydown", { key: name, bubbles: true }));
     press("on"); press("on"); press("back");
     found.stepped = player.time;
+    key("End", document.getElementById("play"));
+    found.end = player.time;
+    key("ArrowLeft", document.body);
+    key("Home", document.getElementById("scrub")); // the slider's own
+    found.back = player.time;
     press("trails"); press("edges"); press("glass");
     found.shown = [player.bodies.paths[0].visible, player.bodies.groups[0].userData.lines.visible];
     put("follow", "0");
@@ -450,6 +456,7 @@ def test_buttons(page):
     assert says["status"] == "drawn" and "errors" not in says
     found = json.loads(Parts(after).title)
     assert np.isclose(found["stepped"], 0.05) and np.isclose(found["scrubbed"], 0.5)
+    assert np.isclose(found["end"], 1.0) and np.isclose(found["back"], 0.95)
     assert found["shown"] == [True, True] and found["hidden"]
     assert found["followed"] < 1e-6 < 0.1 < found["left"]
     assert found["above"] > 0.5

@@ -114,8 +114,10 @@ hydrograd.Panel = class {
       r: () => this.reset(),
     };
     window.addEventListener("keydown", (event) => {
-      const typing = ["INPUT", "SELECT", "BUTTON"].includes(event.target.tagName);
-      if (typing || event.ctrlKey || event.metaKey || event.altKey || !actions[event.key]) return;
+      // What has the focus takes its own keys: lists and sliders all of these, buttons and boxes the space bar.
+      const { tagName, type } = event.target;
+      const taken = tagName === "SELECT" || type === "range" || (["BUTTON", "INPUT"].includes(tagName) && event.key === " ");
+      if (taken || event.ctrlKey || event.metaKey || event.altKey || !actions[event.key]) return;
       event.preventDefault();
       actions[event.key]();
     });

@@ -7,7 +7,6 @@ export {
   CylinderGeometry,
   DirectionalLight,
   DoubleSide,
-  EdgesGeometry,
   FrontSide,
   Group,
   HemisphereLight,
@@ -28,6 +27,7 @@ export {
   SphereGeometry,
   Vector3,
   WebGLRenderer,
+  WireframeGeometry,
 } from "three";
 export { OrbitControls } from "three/examples/jsm/controls/OrbitControls.js";
 export { toCreasedNormals } from "three/examples/jsm/utils/BufferGeometryUtils.js";

@@ -36,7 +36,7 @@ hydrograd.Bodies = class {
     const skin = new THREE.Mesh(THREE.toCreasedNormals(indexed, CREASE), material);
     skin.castShadow = skin.receiveShadow = true;
     const thin = new THREE.LineBasicMaterial({ color: 0x102030, transparent: true, opacity: 0.35 });
-    const lines = new THREE.LineSegments(new THREE.EdgesGeometry(indexed, 0.01), thin);
+    const lines = new THREE.LineSegments(new THREE.WireframeGeometry(indexed), thin);
     lines.visible = false;
     for (const part of [skin, lines]) {
       part.position.copy(group.userData.middle);

@@ -7,6 +7,7 @@ as their first index.
 
 from hydrograd import objective
 from hydrograd._added_mass import added_mass
+from hydrograd._contacts import ContactForces
 from hydrograd._gradient import Gradient, StepGradient
 from hydrograd._hydrograd import (
     Body,
@@ -46,10 +47,12 @@ from hydrograd._hydrograd import (
     spherical,
 )
 from hydrograd._policy import Observation, Policy
+from hydrograd._viewer import View, view
 
 __all__ = [
     "Body",
     "Contact",
+    "ContactForces",
     "DeviceError",
     "Drag",
     "Error",
@@ -73,6 +76,7 @@ __all__ = [
     "StepGradient",
     "UnresolvedError",
     "UnsupportedError",
+    "View",
     "__version__",
     "added_mass",
     "box",
@@ -89,4 +93,5 @@ __all__ = [
     "revolute",
     "sphere",
     "spherical",
+    "view",
 ]

@@ -1,7 +1,7 @@
 //! Numbers from Python and arrays to Python, with errors that name what was given.
 
 use crate::error::input;
-use nalgebra::DMatrix;
+use nalgebra::{DMatrix, Vector3};
 use numpy::{
     PyArray1, PyArrayDyn, PyArrayMethods, PyReadonlyArrayDyn, PyUntypedArray, PyUntypedArrayMethods,
 };
@@ -142,6 +142,30 @@ pub fn or_zeros<const N: usize>(
 /// Any number of finite numbers in a row.
 pub fn row(place: &str, given: &Bound<'_, PyAny>) -> PyResult<Vec<f64>> {
     Ok(array(place, given, &[Dim::Any("n")])?.values)
+}
+
+/// Points of space.
+pub fn vectors(place: &str, given: &Bound<'_, PyAny>) -> PyResult<Vec<Vector3<f64>>> {
+    let found = array(place, given, &[Dim::Any("n"), Dim::Is(3)])?;
+    Ok(found
+        .values
+        .chunks(3)
+        .map(Vector3::from_column_slice)
+        .collect())
+}
+
+/// The one meant by a number that counts from the end if it is negative.
+pub fn numbered(number: isize, count: usize, what: &str) -> PyResult<usize> {
+    let at = if number < 0 {
+        number + count as isize
+    } else {
+        number
+    };
+    let found = usize::try_from(at).ok().filter(|at| *at < count);
+    found.ok_or_else(|| {
+        let message = format!("{what} {number} of a rollout that has {count}");
+        pyo3::exceptions::PyIndexError::new_err(message)
+    })
 }
 
 /// A new array of this shape from numbers in the order of C.

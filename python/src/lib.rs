@@ -2,11 +2,13 @@
 
 mod array;
 mod body;
+mod contact;
 mod error;
 mod fluid;
 mod gradient;
 mod interrupt;
 mod joint;
+mod mesh;
 mod objective;
 mod policy;
 mod prepare;

@@ -1,6 +1,8 @@
 //! Rollouts: trajectories with the key to their gradients.
 
 use crate::array::{self, Dim};
+use crate::contact;
+use crate::error::input;
 use crate::gradient;
 use crate::interrupt::{long, short};
 use crate::objective::Objective;
@@ -9,7 +11,7 @@ use crate::simulator::Simulator;
 use crate::state::State;
 use hydrograd::simulate::{Cotangents, Recording, Sample};
 use nalgebra::DMatrix;
-use numpy::PyArrayDyn;
+use numpy::{PyArray1, PyArrayDyn};
 use pyo3::prelude::*;
 use pyo3::types::PyDict;
 use self_cell::self_cell;
@@ -177,23 +179,58 @@ impl Rollout {
     /// The state after `step` steps, from which a run may go on; negative numbers count from the end.
     #[pyo3(signature = (step=-1))]
     fn state(&self, py: Python<'_>, step: isize) -> PyResult<State> {
-        let count = self.rollout().states().len();
-        let at = if step < 0 {
-            step + count as isize
-        } else {
-            step
-        };
-        let found = usize::try_from(at).ok().filter(|at| *at < count);
-        let at = found.ok_or_else(|| {
-            pyo3::exceptions::PyIndexError::new_err(format!(
-                "state {step} of a rollout that has {count}"
-            ))
-        })?;
+        let at = array::numbered(step, self.rollout().states().len(), "state")?;
         Ok(State {
             simulator: self.simulator.clone_ref(py),
             state: self.rollout().states()[at].clone(),
             velocity: self.rollout().samples()[at].v.clone(),
         })
+    }
+
+    /// Contacts during the step from state `step` to the next, at the pose of that state: where surfaces are no more than `slack` (m)
+    /// farther apart than the gap at which they touch, and what presses there. None where the scene has no contact. Negative
+    /// numbers count from the end: -1 is the last step.
+    #[pyo3(signature = (step, slack=0.0))]
+    fn contacts<'py>(
+        &self,
+        py: Python<'py>,
+        step: isize,
+        slack: f64,
+    ) -> PyResult<Bound<'py, PyAny>> {
+        if !(slack.is_finite() && slack >= 0.0) {
+            return Err(input(
+                "contacts: slack",
+                slack,
+                "must be finite and not negative, in m",
+            ));
+        }
+        let at = array::numbered(step, self.steps(), "step")?;
+        let found = short(py, || self.rollout().contacts(at, slack))?;
+        contact::of_step(py, &found)
+    }
+
+    /// The water's velocity at `points` (n, 3), m, at state `state`: (n, 3), m/s, world axes, the current included. It takes a
+    /// solve, and a simulator with the fidelity "full". Points within a body, behind a wall, or nearer to a surface than half an
+    /// edge of its mesh are refused: `flow_resolved` tells them apart. Negative numbers count states from the end.
+    fn flow<'py>(&self, py: Python<'py>, state: isize, points: &Bound<'py, PyAny>) -> Numbers<'py> {
+        let at = array::numbered(state, self.rollout().states().len(), "state")?;
+        let points = array::vectors("flow: points", points)?;
+        let made = short(py, || self.rollout().flow(at, &points))?;
+        let values = made.iter().flat_map(|u| [u.x, u.y, u.z]).collect();
+        array::to_python(py, values, &[points.len(), 3])
+    }
+
+    /// Whether `flow` knows the velocity at each of `points` (n, 3), m, at state `state`: (n,).
+    fn flow_resolved<'py>(
+        &self,
+        py: Python<'py>,
+        state: isize,
+        points: &Bound<'py, PyAny>,
+    ) -> PyResult<Bound<'py, PyArray1<bool>>> {
+        let at = array::numbered(state, self.rollout().states().len(), "state")?;
+        let points = array::vectors("flow_resolved: points", points)?;
+        let made = short(py, || self.rollout().flow_resolved(at, &points))?;
+        Ok(PyArray1::from_vec(py, made))
     }
 
     /// Value of an objective.

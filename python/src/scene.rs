@@ -152,6 +152,17 @@ impl Scene {
         &self.0.name
     }
 
+    /// The walls: a point (m) and the normal into the fluid, as they were given, and "rigid" or "free".
+    #[getter]
+    fn walls(&self) -> Vec<([f64; 3], [f64; 3], &'static str)> {
+        let surface = |wall: &Wall| match wall.surface {
+            WallSurface::Rigid => "rigid",
+            WallSurface::Free => "free",
+        };
+        let walls = self.0.walls.iter();
+        walls.map(|w| (w.point, w.normal, surface(w))).collect()
+    }
+
     /// The fluid.
     #[getter]
     fn fluid(&self) -> Fluid {

@@ -2,6 +2,7 @@
 
 use crate::array::{self, Dim};
 use crate::error::{OrRaise, input};
+use crate::mesh::{Triangles, triangles};
 use hydrograd::{MassProperties, TriMesh, shape};
 use nalgebra::Vector3;
 use pyo3::prelude::*;
@@ -22,18 +23,8 @@ impl Shape {
     }
 
     /// Its triangles: vertices (n, 3) in m and faces (m, 3), vertex numbers counted from 0.
-    fn triangles<'py>(&self, py: Python<'py>) -> PyResult<(Bound<'py, PyAny>, Bound<'py, PyAny>)> {
-        let mesh = self.mesh()?;
-        let numbers = mesh
-            .vertices()
-            .iter()
-            .flat_map(|v| [v.x, v.y, v.z])
-            .collect();
-        let vertices = array::to_python(py, numbers, &[mesh.vertices().len(), 3])?;
-        let faces: Vec<i64> = mesh.faces().iter().flatten().map(|v| *v as i64).collect();
-        let faces = numpy::PyArray1::from_vec(py, faces)
-            .call_method1("reshape", (mesh.faces().len(), 3))?;
-        Ok((vertices.into_any(), faces))
+    fn triangles<'py>(&self, py: Python<'py>) -> PyResult<Triangles<'py>> {
+        triangles(py, &self.mesh()?)
     }
 
     /// Volume of the triangles, m³.

@@ -4,6 +4,7 @@ use crate::array::{self, Dim, array};
 use crate::error::{OrRaise, input};
 use crate::gradient::by_name;
 use crate::interrupt::{long, short};
+use crate::mesh::{Triangles, triangles};
 use crate::policy::{Controller, Raised};
 use crate::prepare::{Parts, Start, build, set_gains};
 use crate::rollout::{Owned, Rollout};
@@ -453,6 +454,17 @@ impl Simulator {
     #[getter]
     fn v_size(&self) -> usize {
         self.inner.system().tree.velocities()
+    }
+
+    /// The bodies' surfaces, as gaps are measured between them, each in its body's frame: vertices (n, 3) in m and faces (m, 3)
+    /// of vertex numbers; None for a body without a shape.
+    fn meshes<'py>(&self, py: Python<'py>) -> PyResult<Vec<Option<Triangles<'py>>>> {
+        let inner = self.inner.clone();
+        let made = long(py, move |_| inner.meshes())?;
+        let meshes = made.iter();
+        meshes
+            .map(|mesh| mesh.as_ref().map(|m| triangles(py, m)).transpose())
+            .collect()
     }
 
     /// Names of the bodies, in order.

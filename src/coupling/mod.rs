@@ -30,8 +30,8 @@ pub use isolated::Isolated;
 pub use panel::PanelCoupled;
 pub use tensor::PairTensor;
 
-use crate::Result;
-use crate::adjoint::lie::{Pose, Vec6};
+use crate::adjoint::lie::{Pose, Vec3, Vec6};
+use crate::{Error, Result};
 use nalgebra::{DMatrix, DVector};
 use serde::Serialize;
 
@@ -62,6 +62,25 @@ pub trait Coupling: Send + Sync {
     /// As [`Coupling::evaluate`].
     fn residual(&self, _poses: &[Pose], _basis: &DMatrix<f64>) -> Result<Option<DMatrix<f64>>> {
         Ok(None)
+    }
+
+    /// The water's velocity at points (m, world frame) that lie outside all bodies, per body-frame twists of the bodies
+    /// (6·bodies) in water at rest: m/s, world axes.
+    ///
+    /// # Errors
+    /// A fidelity that doesn't compute the flow itself; as [`Coupling::evaluate`].
+    fn velocity(
+        &self,
+        _poses: &[Pose],
+        _twists: &DVector<f64>,
+        _points: &[Vec3],
+    ) -> Result<Vec<Vec3>> {
+        Err(Error::Unsupported {
+            what: "the water's velocity with this fidelity or method".into(),
+            why: "only the sources of all bodies, solved together, give it up to the surfaces"
+                .into(),
+            instead: "use the fidelity full with the method mfs-vertex or mfs-face".into(),
+        })
     }
 }
 

@@ -18,7 +18,7 @@ mod topology;
 mod weld;
 
 pub use check::{Finding, Kind, MeshReport, Severity, check, check_parts};
-pub use gap::{Gap, Gaps, Other};
+pub use gap::{Distance, Gap, Gaps, Other};
 pub use mass::MassProperties;
 pub use mesh::{Edge, TriMesh};
 pub use primitive::{DEFAULT_FACES, MAX_FACES, build, parse_shape, shape_name, validate};

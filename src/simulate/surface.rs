@@ -1,7 +1,7 @@
 //! Bodies' surfaces, as their shapes are meshed for the water.
 
 use super::assemble::pose;
-use super::{Fidelity, Settings, wet};
+use super::{Fidelity, Settings, Simulator, wet};
 use crate::Result;
 use crate::adjoint::lie::Vec3;
 use crate::boundary::OneBody;
@@ -102,4 +102,18 @@ pub(super) fn surface(
         base,
         coarse,
     }))
+}
+
+impl Simulator {
+    /// The bodies' surfaces, each in its body's frame, as gaps are measured between them; none for a body without a shape.
+    /// Shapes are meshed anew, the same way.
+    ///
+    /// # Errors
+    /// A file of a mesh that can't be read any more.
+    pub fn meshes(&self) -> Result<Vec<Option<TriMesh>>> {
+        let settings = self.settings();
+        let bodies = self.scene.bodies.iter();
+        let meshes = bodies.map(|b| Ok(surface(b, settings, settings.faces, 1.0)?.map(|s| s.mesh)));
+        meshes.collect()
+    }
 }

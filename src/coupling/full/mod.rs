@@ -29,6 +29,7 @@ mod backend;
 mod body;
 mod check;
 mod cpu;
+mod flow;
 mod model;
 mod record;
 mod settings;
@@ -41,9 +42,9 @@ pub use settings::{Preconditioner, SolveSettings, Solver};
 
 use super::{Coupling, Exclusions, Record};
 use crate::Result;
-use crate::adjoint::lie::Pose;
+use crate::adjoint::lie::{Pose, Vec3};
 use crate::scene::Wall;
-use nalgebra::DMatrix;
+use nalgebra::{DMatrix, DVector};
 use std::sync::Arc;
 
 /// All bodies coupled through one boundary integral system.
@@ -112,5 +113,14 @@ impl Coupling for Full {
     fn residual(&self, poses: &[Pose], basis: &DMatrix<f64>) -> Result<Option<DMatrix<f64>>> {
         let record = record::FullRecord::new(self, poses, basis, false)?;
         Ok(Some(record.residual(poses, basis)?))
+    }
+
+    fn velocity(
+        &self,
+        poses: &[Pose],
+        twists: &DVector<f64>,
+        points: &[Vec3],
+    ) -> Result<Vec<Vec3>> {
+        flow::velocity(self, poses, twists, points)
     }
 }

@@ -7,6 +7,7 @@
 //! crossing edges.
 
 mod pair;
+mod point;
 mod share;
 mod surface;
 pub(super) mod triangle;
@@ -14,6 +15,7 @@ pub(super) mod triangle;
 #[cfg(test)]
 mod tests;
 
+pub use point::Distance;
 pub use share::Share;
 
 use super::mesh::TriMesh;

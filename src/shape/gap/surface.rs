@@ -235,6 +235,16 @@ impl Surface {
         (best.point, best.face)
     }
 
+    /// Distance of a point, negative inside, and the closest face; none if the point isn't finite.
+    pub fn signed(&self, p: &Vec3) -> Option<(f64, usize)> {
+        let mut best = Nearest::none(p);
+        self.nearest(0, p, 0.0, &mut best);
+        let distance = best.square.sqrt();
+        let inside = distance > 0.0 && self.inside(p, &best);
+        let signed = if inside { -distance } else { distance };
+        signed.is_finite().then_some((signed, best.face))
+    }
+
     /// Smallest height of a vertex above the plane with unit normal `normal` through `point`,
     /// world frame, and the mean edge length there.
     pub fn height(&self, pose: &Pose, point: &Vec3, normal: &Vec3) -> (f64, f64) {

@@ -1,0 +1,5 @@
+"""Replays of rollouts in 3-D, as pages of HTML that need nothing else."""
+
+from hydrograd._viewer.view import View, view
+
+__all__ = ["View", "view"]

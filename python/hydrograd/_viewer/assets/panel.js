@@ -1,0 +1,148 @@
+// Buttons, sliders and keys.
+"use strict";
+
+hydrograd.Panel = class {
+  constructor(player, stage, data) {
+    this.get = (id) => document.getElementById(id);
+    this.player = player;
+    this.stage = stage;
+    this.data = data;
+    this.buttons();
+    this.switches();
+    this.legend();
+    this.curves();
+    this.keys();
+    player.listen(() => this.show());
+  }
+
+  on(id, event, action) {
+    this.get(id).addEventListener(event, action);
+  }
+
+  buttons() {
+    const { player, stage } = this;
+    const scrub = this.get("scrub");
+    scrub.max = player.frames.last - player.frames.first;
+    this.on("play", "click", () => (player.playing ? player.pause() : player.play()));
+    this.on("back", "click", () => player.step(-1));
+    this.on("on", "click", () => player.step(1));
+    this.on("scrub", "input", () => {
+      const time = player.frames.first + Number(scrub.value); // before pausing writes to it
+      player.pause();
+      player.seek(time);
+    });
+    this.on("speed", "change", (event) => (player.speed = Number(event.target.value)));
+    this.on("loop", "change", (event) => (player.loop = event.target.checked));
+    this.on("reset", "click", () => this.reset());
+    for (const [id, axis] of [["look-x", [1, 0, 0]], ["look-y", [0, -1, 0]], ["look-z", [0, 0, 1]]]) {
+      this.on(id, "click", () => this.reset(new THREE.Vector3(...axis)));
+    }
+    this.on("follow", "change", (event) => player.follow(Number(event.target.value)));
+  }
+
+  reset(direction = this.stage.direction) {
+    this.get("follow").value = "-1";
+    this.player.follow(-1);
+    this.stage.look(direction);
+  }
+
+  switches() {
+    const { player, stage } = this;
+    const of = (id, action) => {
+      const set = () => {
+        action(this.get(id).checked);
+        stage.ask();
+      };
+      this.on(id, "change", set);
+      set();
+    };
+    const touching = () =>
+      player.contacts.arrows.visible({ arrows: this.get("forces").checked, dots: this.get("points").checked });
+    of("forces", touching);
+    of("points", touching);
+    of("flow", (shown) => player.flow && player.flow.arrows.visible({ arrows: shown }));
+    of("trails", (shown) => player.bodies.trails(shown));
+    of("edges", (shown) => player.bodies.edges(shown));
+    of("glass", (seen) => player.bodies.glass(seen));
+    for (const part of document.querySelectorAll(".contact")) part.hidden = !player.contacts.any;
+    this.get("flow").parentElement.hidden = !player.flow;
+  }
+
+  /** A line for each body: shown or not, and whom the camera may follow. */
+  legend() {
+    this.data.bodies.forEach((body, number) => {
+      const label = document.createElement("label");
+      const box = Object.assign(document.createElement("input"), { type: "checkbox", checked: true });
+      box.addEventListener("change", () => {
+        this.player.bodies.show(number, box.checked);
+        this.stage.ask();
+      });
+      const chip = document.createElement("i");
+      chip.style.background = body.color;
+      label.append(box, chip, body.name);
+      this.get("bodies").append(label);
+      this.get("follow").append(new Option(body.name, String(number)));
+    });
+  }
+
+  curves() {
+    const { player, data } = this;
+    this.plot = new hydrograd.Plot(this.get("plot"), player.frames, (time) => {
+      player.pause();
+      player.seek(time);
+    });
+    this.series = data.series.map(({ name, unit, values }) => ({ name, unit, values: hydrograd.decode(values) }));
+    this.series.forEach(({ name, unit }, number) => this.get("curve").append(new Option(`${name}, ${unit}`, number)));
+    const take = () => {
+      const { values, unit } = this.series[Number(this.get("curve").value)];
+      this.plot.take(values, unit);
+      this.plot.draw(player.time);
+    };
+    this.on("curve", "change", take);
+    new ResizeObserver(() => this.plot.draw(player.time)).observe(this.get("plot"));
+    take();
+  }
+
+  keys() {
+    const { player } = this;
+    const actions = {
+      " ": () => (player.playing ? player.pause() : player.play()),
+      ArrowLeft: () => player.step(-1),
+      ArrowRight: () => player.step(1),
+      Home: () => player.seek(player.frames.first),
+      End: () => player.seek(player.frames.last),
+      r: () => this.reset(),
+    };
+    window.addEventListener("keydown", (event) => {
+      // What has the focus takes its own keys: lists and sliders all of these, buttons and boxes the space bar.
+      const { tagName, type } = event.target;
+      const taken = tagName === "SELECT" || type === "range" || (["BUTTON", "INPUT"].includes(tagName) && event.key === " ");
+      if (taken || event.ctrlKey || event.metaKey || event.altKey || !actions[event.key]) return;
+      event.preventDefault();
+      actions[event.key]();
+    });
+  }
+
+  show() {
+    const { player } = this;
+    this.get("play").textContent = player.playing ? "❚❚" : "▶";
+    this.get("play").title = player.playing ? "pause (space)" : "play (space)";
+    this.get("scrub").value = player.time - player.frames.first;
+    this.get("time").textContent = `${player.time.toFixed(3)} s, step ${player.frames.steps[player.frame]}`;
+    const facts = this.series.map(({ name, unit, values }) => {
+      const value = values[player.frame];
+      return Number.isFinite(value) ? `${name} ${hydrograd.figure(value)} ${unit}` : null;
+    });
+    if (player.contacts.any) {
+      const { count, largest } = player.touching;
+      facts.push(count ? `contacts ${count}, up to ${hydrograd.figure(largest)} N` : "contacts 0");
+    }
+    if (player.flow) facts.push(`flow up to ${hydrograd.figure(player.fastest)} m/s`);
+    this.get("facts").replaceChildren(...facts.filter(Boolean).map((fact) => {
+      const line = document.createElement("div");
+      line.textContent = fact;
+      return line;
+    }));
+    this.plot.draw(player.time);
+  }
+};

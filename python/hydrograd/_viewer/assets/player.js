@@ -1,0 +1,79 @@
+// The clock, and everything that shows one moment.
+"use strict";
+
+hydrograd.Player = class {
+  constructor(data, stage) {
+    this.data = data;
+    this.stage = stage;
+    this.frames = new hydrograd.Frames(data);
+    this.cell = hydrograd.addWalls(data, stage);
+    this.bodies = new hydrograd.Bodies(data, this.frames, stage);
+    this.contacts = new hydrograd.Contacts(data, stage);
+    this.flow = data.flow ? new hydrograd.Flow(data, stage) : null;
+    this.followed = -1;
+    this.speed = 1;
+    this.playing = false;
+    this.time = this.frames.first;
+    this.listeners = [];
+    this.seek(this.time);
+  }
+
+  /** Calls back whenever another moment is shown. */
+  listen(listener) {
+    this.listeners.push(listener);
+    listener(this);
+  }
+
+  seek(time) {
+    const { first, last } = this.frames;
+    this.time = Math.min(Math.max(Number.isFinite(time) ? time : first, first), last);
+    const before = this.followed < 0 ? null : this.bodies.middle(this.followed);
+    const at = this.frames.locate(this.time);
+    this.frame = at.frame;
+    this.bodies.place(at);
+    this.touching = this.contacts.place(at.frame);
+    this.fastest = this.flow ? this.flow.place(at.frame) : 0;
+    if (before) this.stage.shift(this.bodies.middle(this.followed).sub(before));
+    this.stage.ask();
+    this.listeners.forEach((listener) => listener(this));
+  }
+
+  /** Goes some frames on, or back. */
+  step(frames) {
+    this.pause();
+    const to = Math.min(Math.max(this.frame + frames, 0), this.frames.count - 1);
+    this.seek(this.frames.time[to]);
+  }
+
+  follow(body) {
+    this.followed = body;
+    if (body >= 0) this.stage.shift(this.bodies.middle(body).sub(this.stage.controls.target));
+  }
+
+  play() {
+    if (this.time >= this.frames.last) this.seek(this.frames.first);
+    this.playing = this.frames.last > this.frames.first;
+    this.clock = null;
+    this.listeners.forEach((listener) => listener(this));
+  }
+
+  pause() {
+    this.playing = false;
+    this.listeners.forEach((listener) => listener(this));
+  }
+
+  /** Called for every picture of the browser, with its time in ms. */
+  tick(now) {
+    if (this.playing) {
+      const passed = this.clock === null ? 0 : (now - this.clock) / 1000;
+      this.clock = now;
+      const next = this.time + this.speed * passed;
+      this.seek(next);
+      if (next >= this.frames.last) {
+        if (this.loop) this.seek(this.frames.first);
+        else this.pause();
+      }
+    }
+    if (this.stage.wanted) this.stage.draw();
+  }
+};

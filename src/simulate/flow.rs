@@ -1,0 +1,111 @@
+//! The water's velocity around the bodies.
+
+use super::{Rollout, Sample, Simulator};
+use crate::adjoint::lie::{Pose, Vec3, six};
+use crate::shape::Other;
+use crate::{Error, Result};
+use nalgebra::DVector;
+
+/// Distance from a surface, in edges of its mesh, from which on the flow is shown. Sources lie within the bodies, one under each
+/// vertex; nearer than this the flow between the places that were fitted isn't what it should be.
+pub const FLOW_EDGES: f64 = 0.5;
+
+/// What is too near to a point.
+struct Obstacle {
+    from: Other,
+    distance: f64,
+    limit: f64,
+}
+
+impl Simulator {
+    fn flow(&self, q: &DVector<f64>, v: &DVector<f64>, points: &[Vec3]) -> Result<Vec<Vec3>> {
+        let system = self.system();
+        let kinematics = system.tree.kinematics(q);
+        for (i, point) in points.iter().enumerate() {
+            if let Some(bad) = point.iter().find(|x| !x.is_finite()) {
+                return Err(Error::input(
+                    format!("flow: points[{i}]"),
+                    bad,
+                    "must be finite",
+                ));
+            }
+            if let Some(obstacle) = self.obstacle(point, &kinematics.poses) {
+                return Err(self.too_near(i, point, &obstacle));
+            }
+        }
+        let still = six(&system.current, &Vec3::zeros());
+        let twists = system.tree.twists(&kinematics, v);
+        let wet = |b: &usize| system.bodies[*b].wet.is_some();
+        let seen: Vec<usize> = (0..system.len()).filter(wet).collect();
+        let poses: Vec<Pose> = seen.iter().map(|b| kinematics.poses[*b]).collect();
+        let mut through = DVector::zeros(6 * seen.len());
+        for (i, b) in seen.iter().enumerate() {
+            let twist = kinematics.poses[*b].twist_to_body(&(twists[*b] - still));
+            through.fixed_rows_mut::<6>(6 * i).copy_from(&twist);
+        }
+        let made = system.coupling.velocity(&poses, &through, points)?;
+        Ok(made.into_iter().map(|u| u + system.current).collect())
+    }
+
+    fn obstacle(&self, point: &Vec3, poses: &[Pose]) -> Option<Obstacle> {
+        let mut distances = self.gaps().distances(point, poses);
+        let found = distances.find(|d| d.distance < FLOW_EDGES * d.edge)?;
+        Some(Obstacle {
+            from: found.from,
+            distance: found.distance,
+            limit: FLOW_EDGES * found.edge,
+        })
+    }
+
+    fn too_near(&self, number: usize, point: &Vec3, obstacle: &Obstacle) -> Error {
+        let what = match obstacle.from {
+            Other::Body(b) => format!("body {:?}", self.system().bodies[b].name),
+            Other::Wall(w) => format!("wall {w}"),
+        };
+        let remedy = match obstacle.from {
+            Other::Body(_) => {
+                "it lies within the body or too near to its surface for the mesh: leave it out, or use more faces"
+            }
+            Other::Wall(_) => "it lies behind the wall: leave it out",
+        };
+        Error::Unresolved {
+            place: format!("flow: points[{number}] at {:?} m: {what}", point.as_slice()),
+            quantity: "distance in m".into(),
+            value: obstacle.distance,
+            limit: obstacle.limit,
+            remedy: remedy.into(),
+        }
+    }
+}
+
+impl Rollout<'_> {
+    /// The water's velocity at points (m, world frame) at state `n`: m/s, world axes, the current included. It takes a solve.
+    ///
+    /// # Errors
+    /// A state that there isn't; points that aren't finite, within a body, behind a wall, or nearer to a surface than
+    /// [`FLOW_EDGES`] of its edges; another fidelity than `Full`, and whatever its solve reports.
+    pub fn flow(&self, n: usize, points: &[Vec3]) -> Result<Vec<Vec3>> {
+        let sample = self.sample(n)?;
+        self.simulator().flow(&sample.q, &sample.v, points)
+    }
+
+    /// Whether [`Rollout::flow`] knows the velocity at each of these points at state `n`: one that is finite, in the water, and far
+    /// enough from all surfaces.
+    ///
+    /// # Errors
+    /// A state that there isn't.
+    pub fn flow_resolved(&self, n: usize, points: &[Vec3]) -> Result<Vec<bool>> {
+        let poses = &self.sample(n)?.poses;
+        let clear = |x: &Vec3| {
+            x.iter().all(|c| c.is_finite()) && self.simulator().obstacle(x, poses).is_none()
+        };
+        Ok(points.iter().map(clear).collect())
+    }
+
+    fn sample(&self, n: usize) -> Result<&Sample> {
+        self.samples().get(n).ok_or_else(|| {
+            let expected = format!("must be at most {}", self.steps());
+            Error::input("flow: state", n, expected)
+        })
+    }
+}

@@ -1,0 +1,279 @@
+//! The water's velocity around bodies, against what is known in closed form.
+
+use hydrograd::adjoint::lie::Vec3;
+use hydrograd::scene::{Body, Fluid, Placement, Scene, Shape, Wall};
+use hydrograd::simulate::FLOW_EDGES;
+use hydrograd::{Controls, Error, Fidelity, Settings, Simulator};
+use nalgebra::DVector;
+
+/// Radius of the sphere, m; its place in the body; where the body is and how it is turned.
+const RADIUS: f64 = 0.3;
+const SHAPE_AT: [f64; 3] = [0.4, -0.1, 0.2];
+const ORIGIN: [f64; 3] = [1.0, 2.0, -0.5];
+const TURN: [f64; 3] = [0.5, -0.7, 0.3];
+/// Velocity of the body's origin, m/s, and its angular velocity, rad/s.
+const V: [f64; 6] = [0.3, -0.2, 0.9, 0.4, 0.8, -0.5];
+
+fn scene() -> Scene {
+    let mut scene = Scene::new(Fluid::fresh_water());
+    let mut body = Body::new(Shape::sphere(RADIUS)).density(900.0);
+    body.name = "ball".into();
+    body.shape_at = Placement::new(SHAPE_AT, [0.0; 3]);
+    body.placement = Placement::new(ORIGIN, [0.0; 3]);
+    scene.add(body);
+    let half = 0.5 * Vec3::from(TURN).norm();
+    let axis = Vec3::from(TURN).normalize() * half.sin();
+    scene.initial.q = vec![0.0, 0.0, 0.0, half.cos(), axis.x, axis.y, axis.z];
+    scene.initial.v = V.to_vec();
+    scene
+}
+
+fn simulator(scene: &Scene, faces: usize) -> Simulator {
+    Simulator::new(scene, Settings::default().faces(faces)).unwrap()
+}
+
+fn flow(simulator: &Simulator, points: &[Vec3]) -> hydrograd::Result<Vec<Vec3>> {
+    let controls = Controls::zeros(simulator, 0);
+    simulator.rollout(&controls).unwrap().flow(0, points)
+}
+
+/// Middle of the sphere and its velocity.
+fn sphere() -> (Vec3, Vec3) {
+    let turn = nalgebra::Rotation3::new(Vec3::from(TURN));
+    let arm = turn * Vec3::from(SHAPE_AT);
+    let spin = Vec3::new(V[3], V[4], V[5]);
+    (
+        Vec3::from(ORIGIN) + arm,
+        Vec3::new(V[0], V[1], V[2]) + spin.cross(&arm),
+    )
+}
+
+/// Around a sphere that moves with `u`: (R³ / 2r³) (3 (u·r̂) r̂ − u), Lamb 1932, art. 92. A sphere that turns moves nothing.
+fn dipole(u: &Vec3, r: &Vec3) -> Vec3 {
+    let along = r.normalize();
+    0.5 * (RADIUS / r.norm()).powi(3) * (3.0 * u.dot(&along) * along - u)
+}
+
+/// Directions that are spread evenly.
+fn directions(count: usize) -> Vec<Vec3> {
+    let golden = std::f64::consts::PI * (3.0 - 5.0_f64.sqrt());
+    let direction = |i: usize| {
+        let z = 1.0 - 2.0 * (i as f64 + 0.5) / count as f64;
+        let (sine, cosine) = (golden * i as f64).sin_cos();
+        let width = (1.0 - z * z).sqrt();
+        Vec3::new(width * cosine, width * sine, z)
+    };
+    (0..count).map(direction).collect()
+}
+
+/// Largest error relative to the speed there, at distances (in radii) from the surface.
+fn error(faces: usize, away: f64) -> f64 {
+    let (middle, u) = sphere();
+    let radius = RADIUS * (1.0 + away);
+    let rays: Vec<Vec3> = directions(300).iter().map(|d| radius * d).collect();
+    let points: Vec<Vec3> = rays.iter().map(|r| middle + r).collect();
+    let made = flow(&simulator(&scene(), faces), &points).unwrap();
+    let pairs = made.iter().zip(&rays);
+    pairs.fold(0.0, |worst: f64, (found, r)| {
+        let right = dipole(&u, r);
+        worst.max((found - right).norm() / right.norm())
+    })
+}
+
+#[test]
+fn a_moving_sphere_makes_a_dipole() {
+    // Half an edge of 1280 faces is 0.075 radii, one of 320 faces 0.15.
+    for (faces, away, most) in [
+        (320, 0.16, 0.03),
+        (1280, 0.08, 0.01),
+        (1280, 0.5, 0.008),
+        (1280, 3.0, 0.007),
+    ] {
+        let found = error(faces, away);
+        assert!(found < most, "{faces} {away}: {found}");
+    }
+    // Four times the faces: a quarter of the error.
+    let (coarse, fine) = (error(320, 0.5), error(1280, 0.5));
+    assert!(fine < coarse / 3.0, "{coarse} {fine}");
+}
+
+/// What 320 and 1280 faces of a box of 1, 0.6 and 0.4 m err by, held against 4000: the median and the largest, of the box's speed.
+#[test]
+fn edges_are_harder() {
+    let size = Vec3::new(1.0, 0.6, 0.4);
+    let u = Vec3::new(0.3, -0.2, 0.9);
+    let mut scene = Scene::new(Fluid::fresh_water());
+    scene.add(Body::new(Shape::cuboid(size.into())).density(900.0));
+    scene.initial.v = [u.as_slice(), &[0.0; 3]].concat();
+    // 0.12 m from the surface, more than half an edge of 320 faces.
+    let near = |d: &Vec3| {
+        let half = size / 2.0;
+        let scale = (0..3)
+            .map(|i| half[i] / d[i].abs())
+            .fold(f64::INFINITY, f64::min);
+        let surface = d * scale;
+        let face =
+            (0..3).max_by(|i, j| (d[*i].abs() / half[*i]).total_cmp(&(d[*j].abs() / half[*j])));
+        let mut out = Vec3::zeros();
+        let face = face.unwrap();
+        out[face] = 0.12 * d[face].signum();
+        surface + out
+    };
+    let points: Vec<Vec3> = directions(300).iter().map(near).collect();
+    let right = flow(&simulator(&scene, 4000), &points).unwrap();
+    for (faces, typical, worst) in [(320, 0.08, 0.4), (1280, 0.01, 0.02)] {
+        let made = flow(&simulator(&scene, faces), &points).unwrap();
+        let pairs = made.iter().zip(&right);
+        let mut errors: Vec<f64> = pairs.map(|(a, b)| (a - b).norm() / u.norm()).collect();
+        errors.sort_by(f64::total_cmp);
+        assert!(
+            errors[150] < typical && errors[299] < worst,
+            "{faces}: {} {}",
+            errors[150],
+            errors[299]
+        );
+    }
+}
+
+#[test]
+fn a_current_is_part_of_it() {
+    let current = Vec3::new(0.2, 0.1, -0.3);
+    let mut moved = scene();
+    moved.fluid.current = current.into();
+    let mut carried = scene();
+    // What moves with the current, as seen from there.
+    for (v, c) in carried.initial.v.iter_mut().zip(current.iter()) {
+        *v -= c;
+    }
+    let points: Vec<Vec3> = directions(20).iter().map(|d| sphere().0 + d).collect();
+    let found = flow(&simulator(&moved, 320), &points).unwrap();
+    let right = flow(&simulator(&carried, 320), &points).unwrap();
+    for (found, right) in found.iter().zip(&right) {
+        assert!((found - right - current).norm() < 1e-9);
+    }
+}
+
+#[test]
+fn nothing_goes_through_walls() {
+    let (middle, u) = sphere();
+    let mut scene = scene();
+    let (at, normal) = (middle - Vec3::new(0.0, 0.0, 0.4), Vec3::z());
+    scene.walls.push(Wall::rigid(at.into(), [0.0, 0.0, 2.0]));
+    let simulator = simulator(&scene, 320);
+    let along: Vec<Vec3> = directions(40)
+        .iter()
+        .map(|d| at + Vec3::new(d.x, d.y, 0.0))
+        .collect();
+    for u in flow(&simulator, &along).unwrap() {
+        assert!(u.dot(&normal).abs() < 1e-12, "{u:?}");
+        assert!(u.norm() > 1e-3);
+    }
+    // The sphere's image counts: without it, the flow below would be another.
+    let below = at + 0.02 * Vec3::z();
+    let found = flow(&simulator, &[below]).unwrap()[0];
+    assert!((found - dipole(&u, &(below - middle))).norm() > 0.1 * u.norm());
+}
+
+#[test]
+fn two_spheres_move_what_their_surfaces_do() {
+    // A driven sphere near one at rest: the water neither goes into the one nor leaves the other.
+    let mut scene = Scene::new(Fluid::fresh_water());
+    let shape = Shape::sphere(RADIUS);
+    let second = Vec3::new(0.8, 0.0, 0.0);
+    scene.add(Body::new(shape.clone()).density(900.0));
+    scene.add(Body::new(shape).density(900.0).at(second.into()));
+    let push = Vec3::new(1.0, 0.5, 0.0);
+    scene.initial.v = vec![0.0; 12];
+    scene.initial.v[..3].copy_from_slice(push.as_slice());
+    let simulator = simulator(&scene, 1280);
+    for (center, u) in [(Vec3::zeros(), push), (second, Vec3::zeros())] {
+        let rays = directions(200);
+        let around = |share: f64| -> Vec<Vec3> {
+            let points: Vec<Vec3> = (rays.iter()).map(|d| center + share * RADIUS * d).collect();
+            flow(&simulator, &points).unwrap()
+        };
+        let shells = [around(1.08), around(1.16), around(1.24)];
+        for (i, d) in rays.iter().enumerate() {
+            // Continued to the surface, as a parabola in the distance, it is the body's.
+            let [a, b, c] = [0, 1, 2].map(|k| shells[k][i].dot(d));
+            let continued = 3.0 * a - 3.0 * b + c;
+            assert!(
+                (continued - u.dot(d)).abs() < 0.04 * push.norm(),
+                "{continued} {}",
+                u.dot(d)
+            );
+        }
+        let made = &shells[0];
+        // No net flow out of a surface around either.
+        let net: f64 = made.iter().zip(&rays).map(|(u, d)| u.dot(d)).sum::<f64>() / 200.0;
+        assert!(net.abs() < 2e-3, "{net}");
+    }
+    // And the one at rest changes what the other makes.
+    let beside = Vec3::new(0.8, 0.4, 0.0);
+    let found = flow(&simulator, &[beside]).unwrap()[0];
+    let alone = dipole(&push, &beside);
+    assert!((found - alone).norm() > 0.2 * alone.norm());
+}
+
+#[test]
+fn points_that_are_not_resolved_are_refused() {
+    let (middle, _) = sphere();
+    let mut scene = scene();
+    scene.walls.push(Wall::rigid(
+        (middle - Vec3::new(0.0, 0.0, 1.0)).into(),
+        [0.0, 0.0, 1.0],
+    ));
+    let simulator = simulator(&scene, 1280);
+    let controls = Controls::zeros(&simulator, 0);
+    let rollout = simulator.rollout(&controls).unwrap();
+    let edge = 0.151 * RADIUS; // mean length
+    let out = |share: f64| middle + (RADIUS + share * FLOW_EDGES * edge) * Vec3::x();
+    let behind = middle - Vec3::new(0.0, 0.0, 1.01);
+    let cases = [
+        (middle, "body \"ball\""),
+        (out(0.0), "body \"ball\""),
+        (out(0.8), "more faces"),
+        (behind, "wall 0"),
+    ];
+    for (point, says) in cases {
+        let error = rollout.flow(0, &[out(3.0), point]).unwrap_err();
+        let text = error.to_string();
+        assert!(matches!(error, Error::Unresolved { .. }), "{text}");
+        assert!(text.contains("points[1]") && text.contains(says), "{text}");
+    }
+    let nan = Vec3::new(0.0, f64::NAN, 0.0);
+    assert!(matches!(rollout.flow(0, &[nan]), Err(Error::Input { .. })));
+    assert!(rollout.flow(1, &[out(3.0)]).is_err());
+    let points = [middle, out(0.8), out(1.2), behind, nan];
+    let resolved = rollout.flow_resolved(0, &points).unwrap();
+    assert_eq!(resolved, [false, false, true, false, false]);
+    assert!(rollout.flow(0, &[]).unwrap().is_empty());
+
+    for fidelity in [Fidelity::Isolated, Fidelity::Reduced] {
+        let settings = Settings::default().fidelity(fidelity);
+        let simulator = Simulator::new(&self::scene(), settings).unwrap();
+        let error = flow(&simulator, &[out(3.0)]).unwrap_err().to_string();
+        assert!(error.contains("fidelity full"), "{error}");
+    }
+}
+
+#[test]
+fn the_same_to_the_bit_again() {
+    let simulator = simulator(&scene(), 320);
+    let controls = Controls::zeros(&simulator, 3);
+    let points = [Vec3::new(0.0, 1.0, 0.0), Vec3::new(1.0, 0.5, 0.3)];
+    let rollout = simulator.rollout(&controls).unwrap();
+    let again = simulator.rollout(&controls).unwrap();
+    for n in 0..=3 {
+        let found = rollout.flow(n, &points).unwrap();
+        assert_eq!(found, again.flow(n, &points).unwrap());
+        // As at a start there, whose momentum is that of the velocity to rounding.
+        let mut other = simulator.clone();
+        let sample = &rollout.samples()[n];
+        let (q, v): (DVector<f64>, DVector<f64>) = (sample.q.clone(), sample.v.clone());
+        other.set_start(q, v).unwrap();
+        for (found, right) in found.iter().zip(flow(&other, &points).unwrap()) {
+            assert!((found - right).norm() < 1e-12);
+        }
+    }
+}

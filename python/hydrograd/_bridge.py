@@ -151,6 +151,11 @@ def observe(physics: Physics, steps: int, rollouts: Sequence[Rollout]) -> Observ
     return out
 
 
+def seen(observed: Observed) -> list[Array]:
+    """The arrays of what was observed."""
+    return [array for array in observed if array is not None]
+
+
 def pull(physics: Physics, rollouts: Sequence[Rollout], q: Array, lengths: Array, bar: Observed) -> Pulled:
     """Transpose of rollouts that began at `q`, with the `lengths` that its quaternions were given with."""
 

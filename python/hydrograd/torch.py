@@ -142,7 +142,7 @@ class _Rollout(torch.autograd.Function):
         ctx.set_materialize_grads(False)
         if any(ctx.needs_input_grad):
             ctx.kept = (physics, rollouts, begin, lengths)
-        seen = _bridge.observe(physics, controls.shape[1], rollouts)
+        seen = _bridge.seen(_bridge.observe(physics, controls.shape[1], rollouts))
         return (*(torch.from_numpy(part) for part in seen), rollouts)
 
     @staticmethod

@@ -14,7 +14,10 @@ from dataclasses import dataclass
 from typing import Any, Generic, TypeVar
 
 import jax
+import jax.numpy as jnp
 import numpy as np
+from jax.extend.core import Primitive
+from jax.interpreters import batching, mlir
 from numpy.typing import NDArray
 
 from hydrograd import _bridge
@@ -58,7 +61,7 @@ steps_kept: Memo[Stepped] = Memo(1024)
 
 @dataclass(frozen=True)
 class Host:
-    """Work for the host on arrays with one batch dimension before their `inner` ones; others follow from it by JAX.
+    """Work for the host on arrays with one batch dimension before their `inner` ones.
 
     Hosts that do the same are equal, so that JAX compiles what calls them once.
     """
@@ -79,9 +82,46 @@ class Host:
 
     def call(self, arrays: Sequence[Array], out: Sequence[tuple[tuple[int, ...], Any]]) -> tuple[Array, ...]:
         """Its result in JAX, given the shape and dtype of each part."""
-        shapes = tuple(jax.ShapeDtypeStruct(*part) for part in out)  # type: ignore[no-untyped-call]
-        # Under vmap it is called once, with all members: they run on all cores.
-        return tuple(jax.pure_callback(self, shapes, *arrays, vmap_method="expand_dims"))
+        return tuple(host_call.bind(*arrays, host=self, out=tuple(out)))  # type: ignore[no-untyped-call]
+
+
+# `jax.pure_callback` would do, but it hands the host arrays of JAX: those over 100 kB are copied by the threads that
+# run callbacks, and once all of these wait in callbacks for such copies, the program stands still. Here the host reads what
+# XLA holds.
+host_call = Primitive("hydrograd")
+host_call.multiple_results = True
+
+
+@host_call.def_impl  # type: ignore[untyped-decorator]
+def _now(*arrays: Array, host: Host, out: Any) -> list[Array]:
+    return [jnp.asarray(part) for part in host(*arrays)]
+
+
+@host_call.def_abstract_eval  # type: ignore[untyped-decorator]
+def _shapes(*arrays: Any, host: Host, out: Sequence[tuple[tuple[int, ...], Any]]) -> list[Any]:
+    return [jax.core.ShapedArray(shape, dtype) for shape, dtype in out]
+
+
+def _lowered(ctx: Any, *operands: Any, host: Host, out: Any) -> Any:
+    results, *_ = mlir.emit_python_callback(
+        ctx, host, None, list(operands), ctx.avals_in, ctx.avals_out, has_side_effect=False
+    )
+    return results
+
+
+def _batched(arrays: Sequence[Any], axes: Sequence[int | None], *, host: Host, out: Any) -> Any:
+    # One call with all members, which run on all cores; arrays that are the same for all have 1 there.
+    size = next(array.shape[axis] for array, axis in zip(arrays, axes, strict=True) if axis is not None)
+    moved = [
+        jnp.expand_dims(array, 0) if axis is None else jnp.moveaxis(array, axis, 0)
+        for array, axis in zip(arrays, axes, strict=True)
+    ]
+    results = host.call(moved, [((size, *shape), dtype) for shape, dtype in out])
+    return results, [0] * len(results)
+
+
+mlir.register_lowering(host_call, _lowered)
+batching.primitive_batchers[host_call] = _batched
 
 
 # Dimensions of controls, q, v, values and gains without the batch's; then those of cotangents or of a state's memory.

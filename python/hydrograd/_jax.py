@@ -49,6 +49,9 @@ class Memo(Generic[Kept]):
             if len(self._kept) > self._most:
                 self._kept.popitem(last=False)
 
+    def __len__(self) -> int:
+        return len(self._kept)
+
     def take(self, key: Any) -> Kept | None:
         with self._lock:
             return self._kept.pop(key, None)

@@ -39,7 +39,7 @@ LOWEST, HIGHEST = torch.tensor([[1.25, -0.02, 0.2], [1.5, 0.02, 0.6]], dtype=tor
 # What would be a tolerable miss: of lengths, m, of speeds, m/s, and of forces, N.
 LENGTH, SPEED, FORCE = 0.01, 0.05, 1000.0
 # Force of a unit of the network's output, N.
-UNIT = 200.0
+UNIT = 1000.0
 SEED = 7
 
 
@@ -68,7 +68,7 @@ class Controller(torch.nn.Module):
         self.gripper = sim.parameters["column.mass"] + 2 * self.finger
         layers = [torch.nn.Linear(10, width), torch.nn.Linear(width, width), torch.nn.Linear(width, 3)]
         with torch.no_grad():
-            layers[-1].weight *= 0.05
+            layers[-1].weight *= 0.02
             layers[-1].bias.zero_()
         network = torch.nn.Sequential(layers[0], torch.nn.Tanh(), layers[1], torch.nn.Tanh(), layers[2])
         self.network = network.to(torch.float64)
@@ -96,7 +96,8 @@ class Controller(torch.nn.Module):
         law = [self.gripper * (stiffness * miss - damping * v[:, COLUMN])]
         for finger, side in ((LOWER, -0.5), (UPPER, 0.5)):
             law.append(self.finger * (stiffness * (side * wide - q[:, finger]) + damping * (side * rate - v[:, finger])))
-        return torch.stack(law, dim=1) + UNIT * self.network(seen)
+        added: torch.Tensor = UNIT * self.network(seen)
+        return torch.stack(law, dim=1) + added
 
 
 class Run(NamedTuple):
@@ -136,7 +137,8 @@ def run(sim: hg.Simulator, controller: Controller, starts: torch.Tensor) -> Run:
 
 def draw(random: torch.Generator, count: int) -> torch.Tensor:
     """Starts of the coin, (count, 3)."""
-    return LOWEST + (HIGHEST - LOWEST) * torch.rand(count, 3, generator=random, dtype=torch.float64)
+    part = torch.rand(count, 3, generator=random, dtype=torch.float64)
+    return torch.lerp(LOWEST.expand_as(part), HIGHEST.expand_as(part), part)
 
 
 def train(sim: hg.Simulator, controller: Controller, random: torch.Generator, options: argparse.Namespace) -> list[float]:
@@ -148,7 +150,7 @@ def train(sim: hg.Simulator, controller: Controller, random: torch.Generator, op
     for n in range(options.iterations):
         cost = run(sim, controller, draw(random, options.starts)).cost.mean()
         optimiser.zero_grad()
-        cost.backward()
+        torch.autograd.backward(cost)
         size = torch.nn.utils.clip_grad_norm_(controller.parameters(), 10.0)
         optimiser.step()
         schedule.step()

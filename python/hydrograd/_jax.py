@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import collections
 import functools
+import math
 import threading
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
@@ -76,7 +77,7 @@ class Host:
     def __call__(self, *given: Any) -> tuple[NDArray[Any], ...]:
         arrays = [np.asarray(array) for array in given]
         lead = np.broadcast_shapes(*(a.shape[: a.ndim - n] for a, n in zip(arrays, self.inner, strict=True)))
-        size = int(np.prod(lead))
+        size = math.prod(lead)
         flat = []
         for array, n in zip(arrays, self.inner, strict=True):
             last = array.shape[array.ndim - n :]

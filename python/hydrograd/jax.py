@@ -25,10 +25,12 @@ import numpy as np
 try:
     import jax
     import jax.numpy as jnp
-except ImportError as error:
-    raise ImportError("hydrograd.jax needs JAX: pip install jax") from error
 
-from hydrograd import _bridge, _jax
+    from hydrograd import _jax
+except ImportError as error:
+    raise ImportError("hydrograd.jax needs JAX, 0.4.38 or later: pip install jax") from error
+
+from hydrograd import _bridge
 from hydrograd._bridge import Physics
 from hydrograd._charts import Array as NumpyArray
 from hydrograd._hydrograd import InputError, Simulator

@@ -12,6 +12,7 @@ by their length, and gradients are those of the entries before that. docs/autodi
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping, Sequence
 from typing import Any, NamedTuple
 
@@ -216,11 +217,11 @@ def _adjustable(
 def _flat(place: str, physics: Physics, parts: Parts) -> tuple[tuple[int, ...], list[Tensor]]:
     """Leading dimensions, and the tensors with one batch dimension instead: controls, q, v, values, gains."""
     lead = _bridge.leading(place, {name: (tuple(tensor.shape), inner) for name, (tensor, inner) in parts.items()})
+    batch = math.prod(lead)
     spread = []
     for tensor, inner in parts.values():
         last = tensor.shape[tensor.dim() - len(inner) :]
-        spread.append(tensor.expand((*lead, *last)).reshape(-1, *last))
-    batch = spread[0].shape[0]
+        spread.append(tensor.expand((*lead, *last)).reshape((batch, *last)))
     count = len(physics.names)
     values = torch.stack(spread[3 : 3 + count], dim=1) if count else spread[0].new_zeros(batch, 0)
     gains = spread[3 + count] if len(spread) > 3 + count else spread[0].new_zeros(batch, 0)
@@ -233,7 +234,7 @@ def _memory(state: State, lead: tuple[int, ...], physics: Physics) -> Memory:
         if tensor.is_floating_point() or tensor.is_complex():
             raise InputError(f"step: state.{name}: got dtype {tensor.dtype}; must be whole numbers")
         try:
-            return tensor.expand((*lead, *inner)).reshape(-1, *inner).numpy()
+            return tensor.expand((*lead, *inner)).reshape((math.prod(lead), *inner)).numpy()
         except RuntimeError:
             wanted = (*lead, *inner)
             raise InputError(f"step: state.{name}: got shape {tuple(tensor.shape)}; must go with {wanted}") from None

@@ -86,3 +86,10 @@ def locking():
     )
     push = '[controller]\nkind = "push-then-lock"\nbody = "ball"\nforce = 8.0\nstop_at = 0.02\n'
     return hg.Simulator(hg.Scene.from_toml(scene.to_toml() + "\n" + push), fidelity="reduced")
+
+
+def passive():
+    """A coin that sinks: nothing drives it."""
+    scene = hg.Scene(gravity=(0.0, 0.0, -9.81))
+    scene.add(hg.Body(hg.ellipsoid(0.01, 0.04, 0.04), name="coin", density=2000.0))
+    return hg.Simulator(scene, 0.01, fidelity="isolated")

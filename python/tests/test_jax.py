@@ -230,6 +230,15 @@ def test_steps_remember_what_the_controller_does():
     assert last.step == 16 and last.held.tolist() == [True, False] and not states.held[0].any()
 
 
+def test_without_steps_and_without_controls(coupled):
+    v_bar = jax.grad(lambda v: jnp.sum(hj.rollout(coupled.sim, jnp.zeros((2, 0, 1)), v=v).v))(jnp.asarray(coupled.v))
+    assert np.allclose(v_bar, 2.0)
+    sim = bridge_scenes.passive()
+    made = jax.jit(lambda: hj.rollout(sim, jnp.zeros((3, 5, 0))))()
+    assert np.array_equal(made.q[1], sim.rollout(steps=5).q)
+    assert np.allclose(hj.step(sim, hj.initial_state(sim)).q, made.q[0, 1], rtol=1e-13)
+
+
 def test_jit_is_compiled_once(coupled):
     traced = []
 

@@ -3,6 +3,8 @@
 import pathlib
 import subprocess
 import sys
+import threading
+import time
 
 import bridge_scenes
 import numpy as np
@@ -215,6 +217,38 @@ def test_nothing_is_kept_where_nothing_is_differentiated(coupled):
     assert not made.q.requires_grad and made.q.grad_fn is None
     with torch.no_grad():
         assert not ht.step(coupled.sim, ht.initial_state(coupled.sim), tensor([1.0])).v.requires_grad
+
+
+def test_without_steps_and_without_controls(coupled):
+    """Nothing to do is nothing special, alone and in a batch."""
+    v = tensor(coupled.v)
+    made = ht.rollout(coupled.sim, torch.zeros(2, 0, 1, dtype=torch.float64), v=v)
+    made.v.sum().backward()
+    assert made.q.shape == (2, 1, 8) and torch.allclose(v.grad, torch.full_like(v, 2.0))
+    sim = bridge_scenes.passive()
+    mass = tensor(sim.parameters["coin.mass"])
+    made = ht.rollout(sim, torch.zeros(3, 5, 0, dtype=torch.float64), parameters={"coin.mass": mass})
+    made.positions.sum().backward()
+    assert np.array_equal(made.q[1].detach(), sim.rollout(steps=5).q) and mass.grad < 0  # heavier, lower
+    state = ht.step(sim, ht.initial_state(sim))
+    assert torch.allclose(state.q, made.q[0, 1], rtol=1e-13)
+
+
+def test_backward_passes_leave_the_interpreters_lock(coupled):
+    rollout = ht.rollout(coupled.sim, tensor(np.zeros((4, 300, 1))))
+    count, done = 0, threading.Event()
+
+    def work():
+        rollout.positions.sum().backward()
+        done.set()
+
+    thread = threading.Thread(target=work)
+    thread.start()
+    while not done.is_set():
+        count += 1
+        time.sleep(0.001)
+    thread.join()
+    assert count > 10
 
 
 def test_second_derivatives_are_refused(coupled):

@@ -1,7 +1,7 @@
 """What the bridges to torch and JAX cost, against the simulator's own calls on NumPy arrays.
 
-A ball driven along a rail beside a free coin, the fidelity `auto`: a scene whose steps are so short that what surrounds them
-shows. Prints a table of medians, µs, and the fastest in brackets.
+A ball driven along a rail beside a free coin, the fidelity `auto`: a scene whose steps are so short that what surrounds
+them shows. Prints a table of medians, µs, and the fastest in brackets.
 
     python benches/bridges.py [--repeat N] [--steps N] [--batch N]
 """

@@ -1,15 +1,20 @@
 """A neural network that closes a gripper around a coin, trained by gradients through the water.
 
-Two fingers close from 0.8 m to 0.55 m around a coin, in 1.5 s; half a second later the coin should still be where it was along the
-fingers, and in the middle between them. The water that they press out carries it away, so the gripper has to follow. It is the task of
-examples/controller_tuning.rs, that tunes six gains of a hand-made law; here the law is a network of two hidden layers, whose forces (N) on
-column and fingers are added to those of a controller that would be right on dry land: both motions critically damped at 3 rad/s. The
-untrained network's last layer is small, so that it starts as that controller.
+Two fingers close from 0.8 m to 0.55 m around a coin, in 1.5 s; half a second later the coin should still be where it
+was along the fingers, and in the middle between them. The water that they press out carries it away, so the gripper has
+to follow. It is the task of examples/controller_tuning.rs, that tunes six gains of a hand-made law; here the law is a
+network of two hidden layers, whose forces (N) on column and fingers are added to those of a controller that would be
+right on dry land: both motions critically damped at 3 rad/s. The untrained network's last layer is small, so that it
+starts as that controller.
 
-Every iteration simulates starts of the coin that weren't there before, all at once, differentiates their mean cost back through every step
-(`hydrograd.torch.step`) to the weights, and moves these by Adam's rule. Untrained and trained are then compared on starts that none of
-this has seen. Costs are squares of tolerable misses (1 cm, 5 cm/s, 1 kN): along the fingers at all times; at the end the opening,
-the middle, and speeds; and the mean force. The task ends before anything touches.
+Every iteration simulates starts of the coin that weren't there before, all at once, differentiates their mean cost back
+through every step (`hydrograd.torch.step`) to the weights, and moves these by Adam's rule. Untrained and trained are
+then compared on starts that none of this has seen. Costs are squares of tolerable misses (1 cm, 5 cm/s, 1 kN): along
+the fingers at all times; at the end the opening, the middle, and speeds; and the mean force. The task ends before
+anything touches (`--json` has the smallest gaps; surfaces touch at 15 mm).
+
+Measured beside other work, on two cores: mean cost of 16 unseen starts 25.4 untrained and 0.18 trained, after 60
+iterations of 8 starts in 43 s; the coin leaves its place by at most 33.6 mm untrained and 2.5 mm trained.
 
     python examples/neural_controller.py [--iterations N] [--starts N] [--unseen N] [--out FILE.svg] [--json]
 """
@@ -95,7 +100,9 @@ class Controller(torch.nn.Module):
         stiffness, damping = self.FREQUENCY**2, 2.0 * self.FREQUENCY
         law = [self.gripper * (stiffness * miss - damping * v[:, COLUMN])]
         for finger, side in ((LOWER, -0.5), (UPPER, 0.5)):
-            law.append(self.finger * (stiffness * (side * wide - q[:, finger]) + damping * (side * rate - v[:, finger])))
+            law.append(
+                self.finger * (stiffness * (side * wide - q[:, finger]) + damping * (side * rate - v[:, finger]))
+            )
         added: torch.Tensor = UNIT * self.network(seen)
         return torch.stack(law, dim=1) + added
 
@@ -130,9 +137,19 @@ def run(sim: hg.Simulator, controller: Controller, starts: torch.Tensor) -> Run:
     ]
     speeds = [speed[:, COIN_Y] - speed[:, COLUMN], speed[:, LOWER], speed[:, UPPER]]
     cost = (miss / LENGTH).square().mean(dim=1)
-    cost = cost + (torch.stack(lengths) / LENGTH).square().sum(dim=0) + (torch.stack(speeds) / SPEED).square().sum(dim=0)
+    cost = (
+        cost + (torch.stack(lengths) / LENGTH).square().sum(dim=0) + (torch.stack(speeds) / SPEED).square().sum(dim=0)
+    )
     cost = cost + (torch.stack(forces, dim=1) / FORCE).square().mean(dim=(1, 2))
     return Run(cost, miss, positions)
+
+
+def nearest(sim: hg.Simulator, made: Run) -> float:
+    """Smallest gap between bodies in every fifth state, m."""
+    states = made.q[:, ::5].reshape(-1, made.q.shape[-1])
+    none = torch.zeros(len(states), 0, sim.control_size, dtype=torch.float64)
+    rollouts = ht.rollout(sim, none, states).rollouts
+    return min(float(rollout.min_gap[0]) for rollout in rollouts)
 
 
 def draw(random: torch.Generator, count: int) -> torch.Tensor:
@@ -141,11 +158,15 @@ def draw(random: torch.Generator, count: int) -> torch.Tensor:
     return torch.lerp(LOWEST.expand_as(part), HIGHEST.expand_as(part), part)
 
 
-def train(sim: hg.Simulator, controller: Controller, random: torch.Generator, options: argparse.Namespace) -> list[float]:
+def train(
+    sim: hg.Simulator, controller: Controller, random: torch.Generator, options: argparse.Namespace
+) -> list[float]:
     """Mean cost of the starts of each iteration, before its step; a line for each on standard error."""
     optimiser = torch.optim.Adam(controller.parameters(), lr=options.rate)
     # Large steps first, ever smaller ones then.
-    schedule = torch.optim.lr_scheduler.CosineAnnealingLR(optimiser, max(1, options.iterations), eta_min=0.05 * options.rate)
+    schedule = torch.optim.lr_scheduler.CosineAnnealingLR(
+        optimiser, max(1, options.iterations), eta_min=0.05 * options.rate
+    )
     history = []
     for n in range(options.iterations):
         cost = run(sim, controller, draw(random, options.starts)).cost.mean()
@@ -165,7 +186,7 @@ def plot(file: pathlib.Path, history: list[float], before: Run, after: Run) -> N
 
     matplotlib.use("Agg")
     # The same numbers give the same file.
-    matplotlib.rcParams["svg.hashsalt"] = "neural_controller"
+    matplotlib.rcParams.update({"svg.hashsalt": "neural_controller", "svg.fonttype": "none"})
     import matplotlib.pyplot as plt
 
     figure, (left, right) = plt.subplots(1, 2, figsize=(10, 4), layout="constrained")
@@ -207,6 +228,7 @@ def main() -> None:
     trained = time.perf_counter()
     with torch.no_grad():
         after = run(sim, controller, unseen)
+        gaps = [1e3 * nearest(sim, made) for made in (before, after)]
     plot(options.out, history, before, after)
     costs = before.cost.mean().item(), after.cost.mean().item()
     misses = [1e3 * made.miss.abs().max().item() for made in (before, after)]
@@ -217,6 +239,8 @@ def main() -> None:
         "trained_costs": after.cost.tolist(),
         "untrained_miss_mm": misses[0],
         "trained_miss_mm": misses[1],
+        "untrained_nearest_mm": gaps[0],
+        "trained_nearest_mm": gaps[1],
         "history": history,
         "training_seconds": trained - prepared,
         "seconds": time.perf_counter() - began,
@@ -227,7 +251,8 @@ def main() -> None:
     print(
         f"{options.unseen} unseen starts: mean cost {costs[0]:.2f} untrained, {costs[1]:.2f} trained, "
         f"{costs[0] / costs[1]:.1f} times less; coin off its place by at most {misses[0]:.1f} mm, {misses[1]:.1f} mm; "
-        f"{options.iterations} iterations of {options.starts} starts in {report['training_seconds']:.0f} s; wrote {options.out}"
+        f"{options.iterations} iterations of {options.starts} starts in {report['training_seconds']:.0f} s; "
+        f"wrote {options.out}"
     )
 
 

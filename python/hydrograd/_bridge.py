@@ -1,7 +1,7 @@
 """What the bridges to torch and JAX share: batches of rollouts and steps on NumPy arrays, and their transposes.
 
-Every array has one leading batch dimension here. Batches run on all cores, and each of their members is what it would be
-alone, to the bit.
+Every array has one leading batch dimension here. Batches run on all cores, and each of their members is what it would
+be alone, to the bit.
 """
 
 from __future__ import annotations
@@ -189,8 +189,8 @@ def _stacked(
 class Memory(NamedTuple):
     """What a state carries beyond q and v: it isn't differentiated.
 
-    Numbers of steps made (batch,), modes of the scene's controller (batch,), and which joints it held in the step before
-    (batch, bodies).
+    Numbers of steps made (batch,), modes of the scene's controller (batch,), and which joints it held in the step
+    before (batch, bodies).
     """
 
     step: NDArray[np.int64]
@@ -257,7 +257,13 @@ def advance(
 
 
 def pull_step(
-    physics: Physics, records: Sequence[Record], q: Array, lengths: Array, after: Array, q_bar: Array | None, v_bar: Array | None
+    physics: Physics,
+    records: Sequence[Record],
+    q: Array,
+    lengths: Array,
+    after: Array,
+    q_bar: Array | None,
+    v_bar: Array | None,
 ) -> Pulled:
     """Transpose of steps from `q` to `after`, with the `lengths` that the quaternions of `q` were given with."""
     seeds = None if q_bar is None else physics.charts.tangent(after, q_bar)

@@ -1,8 +1,8 @@
 """Coordinates with unit quaternions and their tangent space, for frameworks that know only arrays.
 
-The simulator differentiates with respect to a rotation vector δθ (rad, R ← exp(δθ) R, axes of the joint's frame). Arrays
-of coordinates hold quaternions (w, x, y, z) in four entries, that a framework may move one by one: what is differentiated
-then is the rotation of the quaternion divided by its length.
+The simulator differentiates with respect to a rotation vector δθ (rad, R ← exp(δθ) R, axes of the joint's frame).
+Arrays of coordinates hold quaternions (w, x, y, z) in four entries, that a framework may move one by one: what is
+differentiated then is the rotation of the quaternion divided by its length.
 """
 
 from __future__ import annotations
@@ -53,8 +53,8 @@ class Charts:
             batch, turn = bad[0]
             first = self.turn_q[turn, 0]
             raise InputError(
-                f"{place}: quaternion (w, x, y, z) at q[{first}:{first + 4}]: got length {lengths[batch, turn]}; must be "
-                f"within {LENGTH_TOLERANCE:.0%} of length 1: divide it by its length"
+                f"{place}: quaternion (w, x, y, z) at q[{first}:{first + 4}]: got length {lengths[batch, turn]}; must "
+                f"be within {LENGTH_TOLERANCE:.0%} of length 1: divide it by its length"
             )
         lengths[np.abs(lengths - 1.0) <= ROUNDING] = 1.0
         out = q.copy()
@@ -84,7 +84,9 @@ class Charts:
         turn, theta = q[:, self.turn_q], bar[:, self.turn_v]
         w, u = turn[..., :1], turn[..., 1:]
         scalar = -np.sum(u * theta, axis=-1, keepdims=True)
-        out[:, self.turn_q] = 2.0 * np.concatenate([scalar, w * theta + np.cross(theta, u)], axis=-1) / lengths[..., None]
+        out[:, self.turn_q] = (
+            2.0 * np.concatenate([scalar, w * theta + np.cross(theta, u)], axis=-1) / lengths[..., None]
+        )
         return out
 
 

@@ -90,8 +90,8 @@ class Host:
 
 
 # `jax.pure_callback` would do, but it hands the host arrays of JAX: those over 100 kB are copied by the threads that
-# run callbacks, and once all of these wait in callbacks for such copies, the program stands still. Here the host reads what
-# XLA holds.
+# run callbacks, and once all of these wait in callbacks for such copies, the program stands still. Here the host reads
+# what XLA holds.
 host_call = Primitive("hydrograd")
 host_call.multiple_results = True
 
@@ -135,7 +135,8 @@ STEP, MEMORY = (1, 1, 1, 1, 1), (0, 0, 1)
 
 @functools.partial(jax.custom_vjp, nondiff_argnums=(0,))
 def rollout(physics: Physics, *arrays: Array) -> tuple[Array, ...]:
-    """Positions, rotations, q and v of rollouts of controls, q, v, values and gains with the same leading dimensions."""
+    """Positions, rotations, q and v of rollouts of controls, q, v, values and gains with the same leading
+    dimensions."""
     return Host(_roll, physics, ROLLOUT).call(arrays, _observed(physics, arrays))
 
 

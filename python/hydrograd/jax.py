@@ -9,10 +9,10 @@
 
     value, gradient = jax.jit(jax.value_and_grad(cost))(controls)
 
-Arrays are float64, in SI units. Any leading dimensions, written out or made by `vmap`, are a batch, that runs on all cores of the
-host: each of its members is what it would be alone, to the bit. A simulator is a constant of what is traced. Quaternions (w, x, y, z)
-in q may be off length 1 by up to 1 %: they are divided by their length, and gradients are those of the entries before
-that. docs/autodiff.md has more.
+Arrays are float64, in SI units. Any leading dimensions, written out or made by `vmap`, are a batch, that runs on all
+cores of the host: each of its members is what it would be alone, to the bit. A simulator is a constant of what is
+traced. Quaternions (w, x, y, z) in q may be off length 1 by up to 1 %: they are divided by their length, and gradients
+are those of the entries before that. docs/autodiff.md has more.
 """
 
 from __future__ import annotations
@@ -80,10 +80,10 @@ def rollout(
 ) -> Trajectory:
     """Runs a simulator, differentiably in all that is given.
 
-    `controls` (…, steps, control_size), N and N m, are added to what the scene's controller does. `q` (…, q_size) and `v`
-    (…, v_size) are where the run begins, by default where the simulator does. `parameters` maps names of `sim.parameters` to
-    values (…), `gains` (…, gains) are those of the scene's controller; what isn't given stays as it is in `sim`. Leading dimensions
-    are broadcast.
+    `controls` (…, steps, control_size), N and N m, are added to what the scene's controller does. `q` (…, q_size) and
+    `v` (…, v_size) are where the run begins, by default where the simulator does. `parameters` maps names of
+    `sim.parameters` to values (…), `gains` (…, gains) are those of the scene's controller; what isn't given stays as it
+    is in `sim`. Leading dimensions are broadcast.
     """
     physics = _bridge.physics_of("rollout", sim, parameters)
     parts = {
@@ -103,7 +103,9 @@ def initial_state(sim: Simulator, q: Numbers | None = None, v: Numbers | None = 
     lead = _bridge.leading("initial_state", {"q": (first.shape, (sim.q_size,)), "v": (second.shape, (sim.v_size,))})
     count = jnp.zeros(lead, dtype=jnp.int64)
     held = jnp.zeros((*lead, len(sim.body_names)), dtype=bool)
-    return State(jnp.broadcast_to(first, (*lead, sim.q_size)), jnp.broadcast_to(second, (*lead, sim.v_size)), count, count, held)
+    return State(
+        jnp.broadcast_to(first, (*lead, sim.q_size)), jnp.broadcast_to(second, (*lead, sim.v_size)), count, count, held
+    )
 
 
 def step(
@@ -113,11 +115,11 @@ def step(
     parameters: Mapping[str, Numbers] | None = None,
     gains: Numbers | None = None,
 ) -> State:
-    """The state one step later, differentiable in `state.q`, `state.v`, the controls `u` (…, control_size), N and N m, and
-    `parameters` and `gains` as in `rollout`.
+    """The state one step later, differentiable in `state.q`, `state.v`, the controls `u` (…, control_size), N and N m,
+    and `parameters` and `gains` as in `rollout`.
 
-    It is a function of what it is given alone, and a state may be what `jax.lax.scan` carries. Steps are those of a rollout up to
-    rounding (relative 1e-15 or so): a state holds the velocity, and most integrators carry the momentum.
+    It is a function of what it is given alone, and a state may be what `jax.lax.scan` carries. Steps are those of a
+    rollout up to rounding (relative 1e-15 or so): a state holds the velocity, and most integrators carry the momentum.
     """
     physics = _bridge.physics_of("step", sim, parameters)
     state = State(*state)
@@ -167,9 +169,7 @@ def _whole(name: str, given: Array | int, shape: tuple[int, ...], dtype: Any) ->
 Parts = dict[str, tuple[Array, tuple[int | str, ...]]]
 
 
-def _adjustable(
-    place: str, sim: Simulator, parameters: Mapping[str, Numbers] | None, gains: Numbers | None
-) -> Parts:
+def _adjustable(place: str, sim: Simulator, parameters: Mapping[str, Numbers] | None, gains: Numbers | None) -> Parts:
     """Parameters and gains, each with what its shape must end in."""
     out: Parts = {}
     for name, value in (parameters or {}).items():

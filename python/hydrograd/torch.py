@@ -5,9 +5,9 @@
     trajectory = ht.rollout(sim, controls)                  # controls: (steps, control_size), float64
     trajectory.positions[-1, 0].square().sum().backward()
 
-Tensors are float64 on the CPU, in SI units. Any leading dimensions are a batch, that runs on all cores: each of its members is
-what it would be alone, to the bit. Quaternions (w, x, y, z) in q may be off length 1 by up to 1 %: they are divided
-by their length, and gradients are those of the entries before that. docs/autodiff.md has more.
+Tensors are float64 on the CPU, in SI units. Any leading dimensions are a batch, that runs on all cores: each of its
+members is what it would be alone, to the bit. Quaternions (w, x, y, z) in q may be off length 1 by up to 1 %: they are
+divided by their length, and gradients are those of the entries before that. docs/autodiff.md has more.
 """
 
 from __future__ import annotations
@@ -76,10 +76,10 @@ def rollout(
 ) -> Trajectory:
     """Runs a simulator, differentiably in all that is given as tensors.
 
-    `controls` (…, steps, control_size), N and N m, are added to what the scene's controller does. `q` (…, q_size) and `v`
-    (…, v_size) are where the run begins, by default where the simulator does. `parameters` maps names of `sim.parameters` to
-    values (…), `gains` (…, gains) are those of the scene's controller; what isn't given stays as it is in `sim`. Leading dimensions
-    are broadcast.
+    `controls` (…, steps, control_size), N and N m, are added to what the scene's controller does. `q` (…, q_size) and
+    `v` (…, v_size) are where the run begins, by default where the simulator does. `parameters` maps names of
+    `sim.parameters` to values (…), `gains` (…, gains) are those of the scene's controller; what isn't given stays as it
+    is in `sim`. Leading dimensions are broadcast.
     """
     physics = _bridge.physics_of("rollout", sim, parameters)
     parts = {
@@ -112,11 +112,11 @@ def step(
     parameters: Mapping[str, Numbers] | None = None,
     gains: Numbers | None = None,
 ) -> State:
-    """The state one step later, differentiable in `state.q`, `state.v`, the controls `u` (…, control_size), N and N m, and
-    `parameters` and `gains` as in `rollout`.
+    """The state one step later, differentiable in `state.q`, `state.v`, the controls `u` (…, control_size), N and N m,
+    and `parameters` and `gains` as in `rollout`.
 
-    It is a function of what it is given alone. Steps are those of a rollout up to rounding (relative 1e-15 or so): a state holds the
-    velocity, and most integrators carry the momentum.
+    It is a function of what it is given alone. Steps are those of a rollout up to rounding (relative 1e-15 or so): a
+    state holds the velocity, and most integrators carry the momentum.
     """
     physics = _bridge.physics_of("step", sim, parameters)
     state = State(*state)
@@ -199,9 +199,7 @@ def _tensor(place: str, given: Numbers) -> Tensor:
 Parts = dict[str, tuple[Tensor, tuple[int | str, ...]]]
 
 
-def _adjustable(
-    place: str, sim: Simulator, parameters: Mapping[str, Numbers] | None, gains: Numbers | None
-) -> Parts:
+def _adjustable(place: str, sim: Simulator, parameters: Mapping[str, Numbers] | None, gains: Numbers | None) -> Parts:
     """Parameters and gains, each with what its shape must end in."""
     out: Parts = {}
     for name, value in (parameters or {}).items():

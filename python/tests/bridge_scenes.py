@@ -70,7 +70,8 @@ def governed():
 
 
 def locking():
-    """A ball that the scene's controller pushes until it passes 2 cm, and then holds, beside one that swings by a motion of time."""
+    """A ball that the scene's controller pushes until it passes 2 cm, and then holds, beside one that swings by a
+    motion of time."""
     scene = hg.Scene(time_step=0.02)
     rail = hg.prismatic((1, 0, 0))
     scene.add(hg.Body(hg.sphere(0.1), name="ball", density=1000.0, joint=rail, actuated=True))

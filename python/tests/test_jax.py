@@ -156,7 +156,11 @@ def test_jit_grad_and_vmap_are_the_simulators_vjp(coupled, seeds):
 def test_a_batch_goes_to_the_host_in_one_call(coupled, monkeypatch):
     calls = []
     right = hj._bridge.roll
-    monkeypatch.setattr(hj._bridge, "roll", lambda physics, controls, *rest: (calls.append(controls.shape), right(physics, controls, *rest))[1])
+    monkeypatch.setattr(
+        hj._bridge,
+        "roll",
+        lambda physics, controls, *rest: (calls.append(controls.shape), right(physics, controls, *rest))[1],
+    )
     inner = jax.vmap(lambda u, q: hj.rollout(coupled.sim, u, q).q, in_axes=(0, None))
     outer = jax.jit(jax.vmap(inner, in_axes=(None, 0)))
     q = jnp.stack([jnp.asarray(coupled.q)] * 2).at[1, 0].add(0.01)
@@ -179,7 +183,9 @@ def test_batches_written_out_and_vmapped_are_one_by_one(coupled):
     for b in np.ndindex(2, 3):
         alone = run(batch[b], masses[b[1]])
         for many in (written, mapped):
-            assert all(np.array_equal(a[b], c) for a, c in zip(jax.tree.leaves(many), jax.tree.leaves(alone), strict=True))
+            assert all(
+                np.array_equal(a[b], c) for a, c in zip(jax.tree.leaves(many), jax.tree.leaves(alone), strict=True)
+            )
 
 
 def test_scan_over_steps(coupled):
@@ -208,7 +214,9 @@ def test_what_is_run_again_is_the_same_to_the_bit(coupled, monkeypatch):
     controls = jnp.asarray(coupled.controls)
 
     def function(u):
-        return jnp.sum(hj.rollout(coupled.sim, u).positions ** 2) + jnp.sum(hj.step(coupled.sim, hj.initial_state(coupled.sim), u[0]).v ** 2)
+        return jnp.sum(hj.rollout(coupled.sim, u).positions ** 2) + jnp.sum(
+            hj.step(coupled.sim, hj.initial_state(coupled.sim), u[0]).v ** 2
+        )
 
     calls = []
     right = hj._bridge.roll
@@ -224,7 +232,9 @@ def test_what_is_run_again_is_the_same_to_the_bit(coupled, monkeypatch):
 def test_steps_remember_what_the_controller_does():
     sim = bridge_scenes.locking()
     right = hj.rollout(sim, jnp.zeros((16, 1)))
-    last, states = jax.jit(lambda: jax.lax.scan(lambda s, _: (hj.step(sim, s),) * 2, hj.initial_state(sim), length=16))()
+    last, states = jax.jit(
+        lambda: jax.lax.scan(lambda s, _: (hj.step(sim, s),) * 2, hj.initial_state(sim), length=16)
+    )()
     assert np.allclose(states.q, right.q[1:], rtol=1e-12, atol=1e-15)
     assert np.allclose(states.v, right.v[1:], rtol=1e-12, atol=1e-15)
     assert last.step == 16 and last.held.tolist() == [True, False] and not states.held[0].any()
@@ -275,7 +285,9 @@ def test_wrong_input(coupled, given, says):
 
 def test_wrong_values_under_jit_keep_their_message(coupled):
     run = jax.jit(lambda u: hj.rollout(coupled.sim, u).q)
-    with pytest.raises(jax.errors.JaxRuntimeError, match=r"InputError: rollout: controls\[2, 0\]: got NaN; must be finite"):
+    with pytest.raises(
+        jax.errors.JaxRuntimeError, match=r"InputError: rollout: controls\[2, 0\]: got NaN; must be finite"
+    ):
         jax.block_until_ready(run(jnp.zeros((4, 1)).at[2, 0].set(jnp.nan)))
     assert np.isfinite(run(jnp.zeros((4, 1)))).all()  # and it goes on
 

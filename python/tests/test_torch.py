@@ -26,7 +26,8 @@ def inputs(case):
 
 
 def check(function, leaves, tolerance=1e-6):
-    """Gradients against central differences of all entries, quaternions' included: relative to the largest of each pair."""
+    """Gradients against central differences of all entries, quaternions' included: relative to the largest of each
+    pair."""
     weights = [torch.linspace(-1.0, 1.3, out.numel(), dtype=torch.float64).sin() for out in function(*leaves)]
 
     def scalar(*given):

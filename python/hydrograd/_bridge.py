@@ -15,7 +15,7 @@ from typing import Any, NamedTuple, TypeVar, cast
 import numpy as np
 from numpy.typing import NDArray
 
-from hydrograd._charts import Array, Charts, charts
+from hydrograd._charts import Array, Charts, charts, cross
 from hydrograd._hydrograd import InputError, Record, Rollout, Simulator, State
 
 Given = TypeVar("Given")
@@ -167,7 +167,7 @@ def pull(physics: Physics, rollouts: Sequence[Rollout], q: Array, lengths: Array
         if bar.rotations is not None:
             # δR = δθ × R, column by column.
             columns = np.swapaxes(rollout.rotations, -1, -2), np.swapaxes(bar.rotations[b], -1, -2)
-            seeds["rotations"] = np.cross(*columns).sum(axis=-2)
+            seeds["rotations"] = cross(*columns).sum(axis=-2)
         if bar.q is not None:
             seeds["q"] = chart.tangent(rollout.q, bar.q[b])
         if bar.v is not None:

@@ -46,16 +46,16 @@ def measured(work: Work, repeat: int) -> str:
     return f"{np.median(times):.0f} [{min(times):.0f}]"
 
 
-def one_step(sim: hg.Simulator) -> dict[str, tuple[Work, Work]]:
-    """A step, and a step with its gradient, by each way."""
-    u, bar = np.zeros(sim.control_size), np.ones(sim.v_size)
+def steps(sim: hg.Simulator, batch: int) -> dict[str, tuple[Work, Work]]:
+    """A step of each of `batch` states, and steps with their gradients, by each way."""
+    u, bar = np.zeros((batch, sim.control_size)), np.ones(sim.v_size)
     q, v = sim.initial_q, sim.initial_v
+    many = np.broadcast_to(q, (batch, len(q)))
 
     def numpy_gradient() -> object:
-        _, record = sim.step(sim.state(q, v), u)
-        return record.vjp(v=bar).controls
+        return [sim.step(sim.state(q, v), row)[1].vjp(v=bar).controls for row in u]
 
-    state, force = ht.initial_state(sim), torch.zeros(sim.control_size, dtype=torch.float64)
+    state, force = ht.initial_state(sim, many), torch.from_numpy(u)
 
     def torch_step() -> object:
         with torch.no_grad():
@@ -65,25 +65,29 @@ def one_step(sim: hg.Simulator) -> dict[str, tuple[Work, Work]]:
         leaf = force.clone().requires_grad_()
         return torch.autograd.grad(ht.step(sim, state, leaf).v.sum(), leaf)
 
-    began = hj.initial_state(sim)
-    step = jax.jit(lambda u: hj.step(sim, began, u))
-    slope = jax.jit(jax.value_and_grad(lambda u: hj.step(sim, began, u).v.sum()))
-    push = jax.numpy.zeros(sim.control_size)
+    began, push = hj.initial_state(sim, many), jax.numpy.asarray(u)
+
+    def step(u: jax.Array) -> hj.State:
+        return hj.step(sim, began, u)
+
+    slope = jax.value_and_grad(lambda u: step(u).v.sum())
+    fast, fast_slope = jax.jit(step), jax.jit(slope)
     return {
-        "NumPy": (lambda: sim.step(sim.state(q, v), u), numpy_gradient),
+        "NumPy, one by one": (lambda: [sim.step(sim.state(q, v), row) for row in u], numpy_gradient),
         "torch": (torch_step, torch_gradient),
-        "JAX, jit": (lambda: jax.block_until_ready(step(push)), lambda: jax.block_until_ready(slope(push))),
+        "JAX, jit": (lambda: jax.block_until_ready(fast(push)), lambda: jax.block_until_ready(fast_slope(push))),
+        "JAX, not compiled": (lambda: jax.block_until_ready(step(push)), lambda: jax.block_until_ready(slope(push))),
     }
 
 
-def rollouts(sim: hg.Simulator, steps: int, batch: int) -> dict[str, tuple[Work, Work]]:
+def rollouts(sim: hg.Simulator, length: int, batch: int) -> dict[str, tuple[Work, Work]]:
     """`batch` rollouts, and rollouts with their gradients, by each way."""
-    shape = (batch, steps, sim.control_size)
-    bar = np.ones((steps + 1, sim.v_size))
+    shape = (batch, length, sim.control_size)
+    bar = np.ones((length + 1, sim.v_size))
 
     def seen() -> list[hg.Rollout]:
         made = sim.rollout_batch(np.zeros(shape))
-        # What the bridges hand over: torch and JAX have all arrays at once.
+        # What the bridges hand over, all of it.
         for rollout in made:
             _ = rollout.positions, rollout.rotations, rollout.q, rollout.v
         return made
@@ -104,7 +108,7 @@ def rollouts(sim: hg.Simulator, steps: int, batch: int) -> dict[str, tuple[Work,
     again = jax.jit(jax.grad(lambda u: hj.rollout(sim, u).v.sum()))
     push = jax.numpy.zeros(shape)
     return {
-        "NumPy, gradients one by one": (seen, numpy_gradient),
+        "NumPy": (seen, numpy_gradient),
         "torch": (torch_rollout, torch_gradient),
         "JAX, jit": (lambda: jax.block_until_ready(roll(push)), lambda: jax.block_until_ready(slope(push))),
         "JAX, jit of grad alone": (lambda: None, lambda: jax.block_until_ready(again(push))),
@@ -121,7 +125,8 @@ def main() -> None:
     sim = hg.Simulator(scene(), 0.01, fidelity="auto")
     few = max(3, options.repeat // 10)
     tables = [
-        ("a step", one_step(sim), options.repeat),
+        ("a step", steps(sim, 1), options.repeat),
+        (f"{options.batch} steps", steps(sim, options.batch), options.repeat),
         (f"a rollout of {options.steps} steps", rollouts(sim, options.steps, 1), few),
         (f"{options.batch} rollouts of {options.steps} steps", rollouts(sim, options.steps, options.batch), few),
     ]

@@ -99,13 +99,6 @@ def test_check_grads_sees_a_wrong_gradient(coupled, monkeypatch):
         check_grads(rolled(coupled), inputs(coupled), order=1, modes=["rev"], eps=1e-5, rtol=1e-6)
 
 
-@pytest.mark.parametrize("scene", ["full", "touching"])
-@pytest.mark.parametrize("function", [rolled, stepped])
-def test_gradients_of_every_input(scene, function, request):
-    case = request.getfixturevalue(scene)
-    each_entry(function(case), inputs(case), 1e-5)
-
-
 def test_gradients_of_gains():
     sim = bridge_scenes.governed()
     each_entry(lambda gains: hj.rollout(sim, jnp.zeros((6, 1)), gains=gains), (jnp.asarray(sim.gains),))

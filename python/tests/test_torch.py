@@ -339,3 +339,14 @@ def test_without_the_framework(name):
     done = subprocess.run([sys.executable, "-c", program], capture_output=True, text=True, cwd=folder)
     assert done.returncode == 1
     assert f"ImportError: hydrograd.{name} needs" in done.stderr and f"pip install {name}" in done.stderr
+
+
+def test_what_the_page_shows(coupled):
+    """The program of docs/autodiff.md."""
+    page = pathlib.Path(__file__).parents[2] / "docs/autodiff.md"
+    program = page.read_text().split("```python\n")[1].split("```")[0]
+    assert "import hydrograd.torch as ht" in program
+    names = {"sim": coupled.sim, "policy": lambda q, v: -0.1 * v[..., :1]}
+    exec(program, names)
+    assert names["controls"].grad.abs().max() > 0 and names["mass"].grad is not None
+    assert names["state"].step == 100

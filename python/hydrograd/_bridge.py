@@ -1,0 +1,275 @@
+"""What the bridges to torch and JAX share: batches of rollouts and steps on NumPy arrays, and their transposes.
+
+Every array has one leading batch dimension here. Batches run on all cores, and each of their members is what it would
+be alone, to the bit.
+"""
+
+from __future__ import annotations
+
+import functools
+import os
+from collections.abc import Callable, Iterable, Mapping, Sequence
+from concurrent.futures import ThreadPoolExecutor
+from typing import Any, NamedTuple, TypeVar, cast
+
+import numpy as np
+from numpy.typing import NDArray
+
+from hydrograd._charts import Array, Charts, charts, cross
+from hydrograd._hydrograd import InputError, Record, Rollout, Simulator, State
+
+Given = TypeVar("Given")
+Made = TypeVar("Made")
+
+
+class Physics(NamedTuple):
+    """A simulator, and which of its parameters are given by value, by name."""
+
+    sim: Simulator
+    names: tuple[str, ...]
+
+    @property
+    def charts(self) -> Charts:
+        """Where its quaternions are."""
+        return charts(tuple(self.sim.q_names))
+
+    @property
+    def bodies(self) -> int:
+        """Number of its bodies."""
+        return len(self.sim.body_names)
+
+    def variants(self, values: Array, gains: Array) -> list[Simulator]:
+        """Simulators with these parameters (batch, names) and gains (batch, gains); equal rows share one."""
+        return [_variant(self, row.tobytes(), gain.tobytes()) for row, gain in zip(values, gains, strict=True)]
+
+
+class Observed(NamedTuple):
+    """What is read off rollouts, or cotangents of it; a cotangent that is None is zero."""
+
+    positions: Array | None
+    rotations: Array | None
+    q: Array | None
+    v: Array | None
+
+
+class Pulled(NamedTuple):
+    """Cotangents of what rollouts or steps begin with, each with its batch dimension; `q` of its entries."""
+
+    controls: Array
+    q: Array
+    v: Array
+    values: Array
+    gains: Array
+
+
+@functools.lru_cache(maxsize=32)
+def _variant(physics: Physics, values: bytes, gains: bytes) -> Simulator:
+    sim = physics.sim
+    if values:
+        sim = sim.with_parameters(dict(zip(physics.names, np.frombuffer(values).tolist(), strict=True)))
+    return sim.with_gains(np.frombuffer(gains)) if gains else sim
+
+
+def physics_of(place: str, sim: Simulator, parameters: Mapping[str, object] | None) -> Physics:
+    """Checks the names of the parameters given."""
+    if not isinstance(sim, Simulator):
+        raise InputError(f"{place}: sim: got a value of type {type(sim).__name__}; must be a hydrograd.Simulator")
+    names = tuple(parameters or ())
+    known = sim.parameters if names else {}
+    for name in names:
+        if name not in known:
+            raise InputError(f"{place}: parameters: got {name!r}; must be one of {list(known)}")
+    return Physics(sim, names)
+
+
+def leading(place: str, shapes: Mapping[str, tuple[tuple[int, ...], tuple[int | str, ...]]]) -> tuple[int, ...]:
+    """The leading dimensions that all arrays share by broadcasting, from each one's shape and what it must end in.
+
+    A name in place of a number stands for any number.
+    """
+    lead: tuple[int, ...] = ()
+    for name, (shape, inner) in shapes.items():
+        last = shape[len(shape) - len(inner) :]
+        fits = len(shape) >= len(inner) and all(isinstance(n, str) or m == n for m, n in zip(last, inner, strict=True))
+        if not fits:
+            wanted = ", ".join(str(n) for n in inner)
+            raise InputError(f"{place}: {name}: got an array of shape {shape}; must have the shape (..., {wanted})")
+        try:
+            lead = np.broadcast_shapes(lead, shape[: len(shape) - len(inner)])
+        except ValueError:
+            raise InputError(
+                f"{place}: {name}: got an array of shape {shape}; its leading dimensions must go with {lead}, those of "
+                f"the others"
+            ) from None
+    if 0 in lead:
+        raise InputError(f"{place}: got a batch of the shape {lead}; must hold at least one")
+    return lead
+
+
+def finite(place: str, array: Array) -> None:
+    """Refuses what isn't finite."""
+    bad = np.argwhere(~np.isfinite(array))
+    if len(bad):
+        at = tuple(bad[0])
+        raise InputError(f"{place}{[int(i) for i in at]}: got {array[at]}; must be finite")
+
+
+def each(work: Callable[[Given], Made], given: Iterable[Given]) -> list[Made]:
+    """Does work that leaves the interpreter's lock on all cores; results in order."""
+    listed = list(given)
+    if len(listed) < 2:
+        return [work(one) for one in listed]
+    return list(_pool(os.getpid()).map(work, listed))
+
+
+@functools.lru_cache(maxsize=1)
+def _pool(process: int) -> ThreadPoolExecutor:
+    # By process: threads don't survive a fork.
+    return ThreadPoolExecutor(os.cpu_count() or 1, thread_name_prefix="hydrograd")
+
+
+def roll(physics: Physics, controls: Array, q: Array, v: Array, values: Array, gains: Array) -> list[Rollout]:
+    """Rollouts of controls (batch, steps, control_size) from unit q (batch, q_size) and v (batch, v_size)."""
+    sims = physics.variants(values, gains)
+    if len(sims) > 1 and all(sim is sims[0] for sim in sims):
+        return sims[0].rollout_batch(controls, q=q, v=v)
+    return each(lambda b: sims[b].rollout(controls[b], q=q[b], v=v[b]), range(len(sims)))
+
+
+def observe(physics: Physics, steps: int, rollouts: Sequence[Rollout]) -> Observed:
+    """What was observed of rollouts of `steps` steps."""
+    sim, batch, states = physics.sim, len(rollouts), steps + 1
+    out = Observed(
+        np.empty((batch, states, physics.bodies, 3)),
+        np.empty((batch, states, physics.bodies, 3, 3)),
+        np.empty((batch, states, sim.q_size)),
+        np.empty((batch, states, sim.v_size)),
+    )
+    for name, array in out._asdict().items():
+        for b, rollout in enumerate(rollouts):
+            array[b] = getattr(rollout, name)
+    return out
+
+
+def seen(observed: Observed) -> list[Array]:
+    """The arrays of what was observed."""
+    return [array for array in observed if array is not None]
+
+
+def pull(physics: Physics, rollouts: Sequence[Rollout], q: Array, lengths: Array, bar: Observed) -> Pulled:
+    """Transpose of rollouts that began at `q`, with the `lengths` that its quaternions were given with."""
+
+    def one(b: int) -> tuple[Array, Array, Array, list[float], Array]:
+        rollout, chart = rollouts[b], physics.charts
+        seeds: dict[str, Array] = {}
+        if bar.positions is not None:
+            seeds["positions"] = bar.positions[b]
+        if bar.rotations is not None:
+            # δR = δθ × R, column by column.
+            columns = np.swapaxes(rollout.rotations, -1, -2), np.swapaxes(bar.rotations[b], -1, -2)
+            seeds["rotations"] = cross(*columns).sum(axis=-2)
+        if bar.q is not None:
+            seeds["q"] = chart.tangent(rollout.q, bar.q[b])
+        if bar.v is not None:
+            seeds["v"] = bar.v[b]
+        made = rollout.vjp(**seeds)
+        values = [made.parameters[name] for name in physics.names]
+        return made.controls, made.initial_q, made.initial_v, values, made.gains
+
+    return _stacked(physics, each(one, range(len(rollouts))), q, lengths)
+
+
+def _stacked(
+    physics: Physics, made: Sequence[tuple[Array, Array, Array, list[float], Array]], q: Array, lengths: Array
+) -> Pulled:
+    controls, tangents, v, values, gains = (np.array(part, dtype=np.float64) for part in zip(*made, strict=True))
+    return Pulled(controls, physics.charts.entries(q, lengths, tangents), v, values, gains)
+
+
+class Memory(NamedTuple):
+    """What a state carries beyond q and v: it isn't differentiated.
+
+    Numbers of steps made (batch,), modes of the scene's controller (batch,), and which joints it held in the step
+    before (batch, bodies).
+    """
+
+    step: NDArray[np.int64]
+    mode: NDArray[np.int64]
+    held: NDArray[np.bool_]
+
+
+class Stepped(NamedTuple):
+    """Where steps led to, and the keys to their derivatives."""
+
+    q: Array
+    v: Array
+    memory: Memory
+    records: list[Record]
+
+
+def _state(sim: Simulator, q: Array, v: Array, step: int, mode: int, held: NDArray[np.bool_]) -> State:
+    if step < 0:
+        raise InputError(f"step: state.step: got {step}; must be at least 0")
+    state = sim.state(q, v, step=step)
+    if mode == 0 and not held.any():
+        return state
+    make, parts = _reduced(state)
+    return make(parts._replace(held=held.tolist(), mode=mode))
+
+
+class _Parts(NamedTuple):
+    # What a state is pickled as, in that order.
+    simulator: Simulator
+    step: int
+    q: list[float]
+    y: list[float]
+    held: list[bool]
+    mode: int
+    v: list[float]
+
+
+def _reduced(state: State) -> tuple[Callable[[_Parts], State], _Parts]:
+    # What a controller remembers is seen, and put back, nowhere but in pickling.
+    make, parts = cast("tuple[Callable[..., State], tuple[Any, ...]]", state.__reduce__())
+    return lambda given: make(*given), _Parts(*parts)
+
+
+def advance(
+    physics: Physics, q: Array, v: Array, controls: Array, values: Array, gains: Array, memory: Memory
+) -> Stepped:
+    """One step of each state, from unit q (batch, q_size) and v (batch, v_size) with controls (batch, control_size)."""
+    sims = physics.variants(values, gains)
+
+    def one(b: int) -> tuple[State, Record]:
+        state = _state(sims[b], q[b], v[b], int(memory.step[b]), int(memory.mode[b]), memory.held[b])
+        return sims[b].step(state, controls[b])
+
+    made = each(one, range(len(sims)))
+    fresh = Memory(np.zeros_like(memory.step), np.zeros_like(memory.mode), np.zeros_like(memory.held))
+    after = Stepped(np.empty_like(q), np.empty_like(v), fresh, [record for _, record in made])
+    for b, (state, _) in enumerate(made):
+        after.q[b], after.v[b] = state.q, state.v
+        parts = _reduced(state)[1]
+        fresh.step[b], fresh.mode[b] = parts.step, parts.mode
+        # An empty list holds nothing.
+        fresh.held[b] = parts.held or False
+    return after
+
+
+def pull_step(
+    physics: Physics,
+    records: Sequence[Record],
+    q: Array,
+    lengths: Array,
+    after: Array,
+    q_bar: Array | None,
+    v_bar: Array | None,
+) -> Pulled:
+    """Transpose of steps from `q` to `after`, with the `lengths` that the quaternions of `q` were given with."""
+    seeds = None if q_bar is None else physics.charts.tangent(after, q_bar)
+
+    def one(b: int) -> tuple[Array, Array, Array, list[float], Array]:
+        made = records[b].vjp(q=None if seeds is None else seeds[b], v=None if v_bar is None else v_bar[b])
+        return made.controls, made.q, made.v, [made.parameters[name] for name in physics.names], made.gains
+
+    return _stacked(physics, each(one, range(len(records))), q, lengths)

@@ -20,6 +20,8 @@ COIN_Y = 3
 COIN_Z = 4
 COIN_TURN = 5
 
+COORDINATES = ("column.position", "finger 1.position", "finger 2.position", "coin.y", "coin.z", "coin.angle")
+"""Names of q."""
 TIME_STEP = 0.01
 """Of the scene, s."""
 STEPS = 250
@@ -132,3 +134,10 @@ def caught(rollout: hg.Rollout) -> bool:
     """Whether it is held for the last half second."""
     since = held_since(rollout)
     return since is not None and bool(rollout.time[-1] - since >= _HOLD - 1e-9)
+
+
+def finger_outline(q: ArrayLike, finger: int) -> NDArray[np.float64]:
+    """Corners of finger 0 or 1 in the world's plane y-z, (5, 2), m."""
+    q = np.asarray(q, dtype=float)
+    side = (1.0, -1.0)[finger]
+    return np.asarray(np.array(_FINGER) * [1.0, side] + [q[COLUMN], q[FINGERS[finger]]])

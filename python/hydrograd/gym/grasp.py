@@ -82,7 +82,7 @@ class GraspEnv(SimulationEnv):
         return q, np.zeros(6)
 
     def _observe(self, q: _Array, v: _Array) -> _Array:
-        turn = np.mod(q[COIN_TURN] + np.pi, 2.0 * np.pi) - np.pi
+        turn = q[COIN_TURN] - 2.0 * np.pi * np.rint(q[COIN_TURN] / (2.0 * np.pi))
         return np.concatenate([q[:COIN_TURN], [turn], v, _places(q), grasp.gaps(q)])
 
     def _begin(self, state: hg.State) -> dict[str, Any]:

@@ -135,7 +135,7 @@ def test_out_of_reach():
     assert lane.step(np.zeros(3))[2]
 
 
-@pytest.mark.parametrize("v", [[0, 60, -60, 0, 0, 0], [0, 0, 0, 0, 1e160, 0]])
+@pytest.mark.parametrize("v", [[0, 1e5, -1e5, 0, 0, 0], [0, 0, 0, 0, 1e160, 0]])
 def test_where_the_simulator_cannot_go_on_the_episode_ends(v):
     env = environments.GraspEnv()
     start, _ = env.reset(seed=0, options={"v": np.array(v, dtype=float)})
@@ -146,6 +146,39 @@ def test_where_the_simulator_cannot_go_on_the_episode_ends(v):
     assert np.array_equal(observation, start)
     env.reset(seed=0)
     assert "error" not in env.step(np.ones(3))[4]
+
+
+class Stuck:
+    """A simulator that can't go on."""
+
+    def __init__(self, simulator):
+        self.simulator = simulator
+
+    def rollout(self, *_, **__):
+        raise hg.SolverError("stuck")
+
+    def __getattr__(self, name):
+        return getattr(self.simulator, name)
+
+
+def test_a_step_that_fails_is_made_again_with_shorter_ones(monkeypatch):
+    env, right = environments.GraspEnv(fidelity="isolated"), environments.GraspEnv(fidelity="isolated")
+    for e in (env, right):
+        e.reset(seed=4)
+    monkeypatch.setattr(env, "_simulator", Stuck(env.simulator))
+    action = np.array([0.5, 1.0, -1.0])
+    found, wanted = env.step(action), right.step(action)
+    assert found[4].pop("refined") and not wanted[4].pop("refined")
+    assert not found[2] and found[4] == pytest.approx(wanted[4])
+    assert not np.array_equal(found[0], wanted[0]) and np.allclose(found[0], wanted[0], atol=1e-3)
+    assert env.state.step == 5
+    monkeypatch.setattr(env, "_simulator", right.simulator)
+    assert not env.step(action)[4]["refined"]
+    # One that was given isn't changed.
+    given = environments.GraspEnv(simulator=right.simulator)
+    given.reset(seed=4)
+    monkeypatch.setattr(given, "_simulator", Stuck(right.simulator))
+    assert given.step(action)[4] == {"error": "SolverError: stuck"}
 
 
 def test_wrong_input():

@@ -55,3 +55,12 @@ def test_other_processes(sim, controls):
         found = pool.map(final_position, [(sim, controls), (sim, 2 * controls)])
     assert np.array_equal(found[0], sim.rollout(controls).positions[-1])
     assert np.array_equal(found[1], sim.rollout(2 * controls).positions[-1])
+
+
+def test_joblib(sim, controls):
+    """Its workers are processes of their own, which get the simulator pickled."""
+    joblib = pytest.importorskip("joblib")
+    work = [(sim, controls), (sim, 2 * controls), (sim, -controls)]
+    found = joblib.Parallel(n_jobs=2)(joblib.delayed(final_position)(w) for w in work)
+    for positions, (_, u) in zip(found, work):
+        assert np.array_equal(positions, sim.rollout(u).positions[-1])

@@ -26,9 +26,9 @@ _SUCCESS = 0.5
 
 
 @functools.lru_cache(maxsize=None)
-def _simulator(fidelity: str) -> hg.Simulator:
+def _simulator(fidelity: str, refinement: int) -> hg.Simulator:
     """One for all environments of a process: simulators don't change."""
-    return hg.Simulator(grasp.scene(), fidelity=fidelity)  # type: ignore[arg-type]
+    return hg.Simulator(grasp.scene(), grasp.TIME_STEP / refinement, fidelity=fidelity)  # type: ignore[arg-type]
 
 
 class GraspEnv(SimulationEnv):
@@ -73,8 +73,8 @@ class GraspEnv(SimulationEnv):
         )
         self._held_for = 0.0
 
-    def _own_simulator(self) -> hg.Simulator:
-        return _simulator(self._fidelity)
+    def _own_simulator(self, refinement: int) -> hg.Simulator:
+        return _simulator(self._fidelity, refinement)
 
     def _start(self) -> tuple[_Array, _Array]:
         spread = np.array([0.03, 0.03, 0.03, 0.03, 0.03, 0.2])
@@ -93,15 +93,15 @@ class GraspEnv(SimulationEnv):
         success = self._held_for >= _SUCCESS - 1e-9
         return {"time": state.time, "held": held, "held_for": self._held_for, "is_success": success}
 
-    def _judge(self, rollout: hg.Rollout, action: _Array) -> tuple[float, bool, dict[str, Any]]:
+    def _judge(self, rollout: hg.Rollout, after: hg.State, action: _Array) -> tuple[float, bool, dict[str, Any]]:
         for held in grasp.held(rollout.q[1:], rollout.v[1:]):
-            self._held_for = self._held_for + self.simulator.dt if held else 0.0
+            self._held_for = self._held_for + rollout.simulator.dt if held else 0.0
         q = rollout.q[-1]
         along, across, opening = _places(q)
         miss = ((along - _ALONG) / 0.2) ** 2 + (across / 0.1) ** 2 + ((opening - _OPENING) / 0.4) ** 2
         reward = 1.0 / (1.0 + miss) + 2.0 * bool(held) - 0.01 * float(np.mean(action**2))
         lost = not -0.3 <= along <= grasp.REACH + 0.4 or abs(q[COIN_Z]) > 1.0 or abs(q[COLUMN]) > 1.5
-        return float(reward), bool(lost), self._info(rollout.state(-1), bool(held))
+        return float(reward), bool(lost), self._info(after, bool(held))
 
     def render(self) -> NDArray[np.uint8] | None:
         """The gripper and the coin seen along x, (height, width, 3), or None without a render mode."""

@@ -14,6 +14,8 @@ import hydrograd as hg
 from hydrograd.gym.forking import ensure_threads
 
 _Array = NDArray[np.float64]
+# By how much shorter steps are where the usual ones fail.
+_REFINEMENT = 4
 _FIDELITIES = ("isolated", "reduced", "auto", "full")
 
 
@@ -21,8 +23,11 @@ class SimulationEnv(gymnasium.Env[_Array, NDArray[np.float32]]):
     """An environment around a simulator, that never changes; the state is the environment's own.
 
     An action (control_size,) in [-1, 1] is the part of `largest` (N, N m) that acts during the next `frame_skip` steps of the
-    simulator; what is beyond is clipped. Where the simulator can't go on, the episode terminates with the reason in
-    `info["error"]`, a reward of 0 and the observation before.
+    simulator; what is beyond is clipped.
+
+    Where the simulator can't go on (contact whose implicit stage isn't found, bodies driven into one another), the step is made
+    again with a quarter of the time step (`info["refined"]`), unless the simulator was given. Where that can't either, the
+    episode terminates with the reason in `info["error"]`, a reward of 0 and the observation before.
     """
 
     metadata: dict[str, Any] = {"render_modes": ["rgb_array"], "render_fps": 20}
@@ -58,6 +63,7 @@ class SimulationEnv(gymnasium.Env[_Array, NDArray[np.float32]]):
                 )
             time_step = simulator.dt
         self._simulator = simulator
+        self._given = simulator is not None
         self._fidelity = fidelity
         self.frame_skip = int(frame_skip)
         self.dt = time_step * self.frame_skip
@@ -77,7 +83,7 @@ class SimulationEnv(gymnasium.Env[_Array, NDArray[np.float32]]):
         """The simulator."""
         if self._simulator is None:
             ensure_threads()
-            self._simulator = self._own_simulator()
+            self._simulator = self._own_simulator(1)
         return self._simulator
 
     @property
@@ -109,16 +115,30 @@ class SimulationEnv(gymnasium.Env[_Array, NDArray[np.float32]]):
         state = self.state
         given = self.checked(action)
         try:
-            rollout = self.simulator.rollout(np.tile(self._largest * given, (self.frame_skip, 1)), state=state)
+            rollout, after, refined = self._advance(state, self._largest * given)
         except hg.Error as error:
             self._state = None
             return self._seen.copy(), 0.0, True, False, {"error": f"{type(error).__name__}: {error}"}
-        self._state = rollout.state(-1)
-        self._seen = self._observation(self._state)
-        reward, terminated, info = self._judge(rollout, given)
+        self._state = after
+        self._seen = self._observation(after)
+        reward, terminated, info = self._judge(rollout, after, given)
+        info["refined"] = refined
         if terminated:
             self._state = None
         return self._seen.copy(), reward, terminated, False, info
+
+    def _advance(self, state: hg.State, control: _Array) -> tuple[hg.Rollout, hg.State, bool]:
+        """What happens in a step, the state after it, and whether it needed shorter steps."""
+        try:
+            rollout = self.simulator.rollout(np.tile(control, (self.frame_skip, 1)), state=state)
+            return rollout, rollout.state(-1), False
+        except hg.Error:
+            if self._given:
+                raise
+        fine = self._own_simulator(_REFINEMENT)
+        rollout = fine.rollout(np.tile(control, (_REFINEMENT * self.frame_skip, 1)), q=state.q, v=state.v)
+        after = self.simulator.state(rollout.q[-1], rollout.v[-1], step=state.step + self.frame_skip)
+        return rollout, after, True
 
     def checked(self, action: ArrayLike) -> _Array:
         """The action as numbers in [-1, 1]."""
@@ -137,8 +157,9 @@ class SimulationEnv(gymnasium.Env[_Array, NDArray[np.float32]]):
 
     # What a task says.
 
-    def _own_simulator(self) -> hg.Simulator:
-        """Of the task's scene; not made at once, because processes can't be forked once it has run."""
+    def _own_simulator(self, refinement: int) -> hg.Simulator:
+        """Of the task's scene, with its time step over a number; not made at once, because processes can't be forked once it
+        has run."""
         raise NotImplementedError
 
     def _start(self) -> tuple[_Array, _Array]:
@@ -153,7 +174,7 @@ class SimulationEnv(gymnasium.Env[_Array, NDArray[np.float32]]):
         """The info of a start."""
         raise NotImplementedError
 
-    def _judge(self, rollout: hg.Rollout, action: _Array) -> tuple[float, bool, dict[str, Any]]:
-        """Reward, whether the episode terminates, and info after the steps of an action."""
+    def _judge(self, rollout: hg.Rollout, after: hg.State, action: _Array) -> tuple[float, bool, dict[str, Any]]:
+        """Reward, whether the episode terminates, and info after the steps of an action, that led to a state."""
         raise NotImplementedError
 

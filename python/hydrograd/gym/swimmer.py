@@ -24,9 +24,9 @@ _EFFORT = 0.05
 
 
 @functools.lru_cache(maxsize=None)
-def _simulator(fidelity: str) -> hg.Simulator:
+def _simulator(fidelity: str, refinement: int) -> hg.Simulator:
     """One for all environments of a process: simulators don't change."""
-    return hg.Simulator(swimmer.scene(), fidelity=fidelity, resolved_gap=swimmer.RESOLVED_GAP)  # type: ignore[arg-type]
+    return hg.Simulator(swimmer.scene(), swimmer.TIME_STEP / refinement, fidelity=fidelity, resolved_gap=swimmer.RESOLVED_GAP)  # type: ignore[arg-type]
 
 
 class SwimmerEnv(SimulationEnv):
@@ -66,8 +66,8 @@ class SwimmerEnv(SimulationEnv):
             render_mode=render_mode,
         )
 
-    def _own_simulator(self) -> hg.Simulator:
-        return _simulator(self._fidelity)
+    def _own_simulator(self, refinement: int) -> hg.Simulator:
+        return _simulator(self._fidelity, refinement)
 
     def _start(self) -> tuple[_Array, _Array]:
         spread = np.array([0.0, 0.0] + [0.3] * swimmer.LINKS)
@@ -86,11 +86,11 @@ class SwimmerEnv(SimulationEnv):
         x, y = swimmer.center_of_mass(state.q)
         return {"time": state.time, "x": float(x), "y": float(y), "effort": effort}
 
-    def _judge(self, rollout: hg.Rollout, action: _Array) -> tuple[float, bool, dict[str, Any]]:
-        before, after = swimmer.center_of_mass(rollout.q[[0, -1]])
+    def _judge(self, rollout: hg.Rollout, after: hg.State, action: _Array) -> tuple[float, bool, dict[str, Any]]:
+        start, end = swimmer.center_of_mass(rollout.q[[0, -1]])
         effort = float(np.mean(action**2))
-        reward = float((after[0] - before[0]) / self.dt) - _EFFORT * effort
-        return reward, bool(abs(after[1]) > LANE), self._info(rollout.state(-1), effort)
+        reward = float((end[0] - start[0]) / self.dt) - _EFFORT * effort
+        return reward, bool(abs(end[1]) > LANE), self._info(after, effort)
 
     def render(self) -> NDArray[np.uint8] | None:
         """The fish seen along z, (height, width, 3), or None without a render mode."""

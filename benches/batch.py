@@ -1,9 +1,9 @@
 """How `Simulator.rollout_batch` scales with cores: grasps of random forces on one core and on several.
 
-Each number of cores is measured in a process of its own (RAYON_NUM_THREADS), the best of some repetitions; what comes out must
-be that of the rollouts one by one, to the last bit.
+Each number of cores is measured in a process of its own (RAYON_NUM_THREADS), the best of some repetitions; what comes
+out must be that of the rollouts one by one, to the last bit.
 
-    python benches/batch.py [--rollouts N] [--steps N] [--cores 1,2] [--repeats N] [--json]
+    python benches/batch.py [--rollouts N] [--steps N] [--cores 1,2] [--repeats N] [--fidelity NAME] [--json]
 
 Measure on an idle machine: what else runs takes its share of the cores.
 """
@@ -33,10 +33,12 @@ def digest(rollouts):
 
 def measure(options):
     """In a process with so many threads: the time of a batch, and what came out."""
-    sim = hg.Simulator(grasp.scene(), fidelity="reduced")
+    sim = hg.Simulator(grasp.scene(), fidelity=options.fidelity)
     # Smooth pushes, a quarter of a second long, with which most fingers close.
     random = np.random.default_rng(0)
-    pushes = random.uniform([-100.0, 100.0, -200.0], [100.0, 200.0, -100.0], (options.rollouts, options.steps // 25 + 1, 3))
+    pushes = random.uniform(
+        [-100.0, 100.0, -200.0], [100.0, 200.0, -100.0], (options.rollouts, options.steps // 25 + 1, 3)
+    )
     controls = np.repeat(pushes, 25, axis=1)[:, : options.steps]
     sim.rollout_batch(controls[:2, :10])
     seconds = []
@@ -55,7 +57,7 @@ def measure(options):
 def run(options, cores, alone):
     """The same in a child."""
     command = [sys.executable, __file__, "--measure", "--rollouts", options.rollouts, "--steps", options.steps]
-    command += ["--repeats", options.repeats] + ["--alone"] * alone
+    command += ["--repeats", options.repeats, "--fidelity", options.fidelity] + ["--alone"] * alone
     environment = {**os.environ, "RAYON_NUM_THREADS": str(cores)}
     done = subprocess.run(list(map(str, command)), env=environment, stdout=subprocess.PIPE, text=True, check=True)
     return json.loads(done.stdout)
@@ -75,6 +77,7 @@ def main():
     parser.add_argument("--steps", type=int, default=grasp.STEPS, help="%(default)s")
     parser.add_argument("--cores", type=numbers, default=[1, 2], help="1,2")
     parser.add_argument("--repeats", type=int, default=2, help="%(default)s")
+    parser.add_argument("--fidelity", default="reduced", help="%(default)s")
     parser.add_argument("--json", action="store_true")
     parser.add_argument("--measure", action="store_true", help=argparse.SUPPRESS)
     parser.add_argument("--alone", action="store_true", help=argparse.SUPPRESS)
@@ -95,9 +98,12 @@ def main():
     else:
         print(f"one by one: {first['seconds_alone']:.2f} s")
         for cores, result in results.items():
-            print(f"{cores} cores: {result['seconds']:.2f} s, {speedup[cores]:.2f} times as fast as with {options.cores[0]}")
+            factor = f"{speedup[cores]:.2f} times as fast as with {options.cores[0]}"
+            print(f"{cores} cores: {result['seconds']:.2f} s, {factor}")
         equal = "the same to the last bit" if same else "NOT the same"
-        print(f"{options.rollouts} rollouts of {options.steps} steps: {equal} as one by one, with every number of cores")
+        print(
+            f"{options.rollouts} rollouts of {options.steps} steps: {equal} as one by one, with every number of cores"
+        )
     if not same:
         sys.exit(1)
 

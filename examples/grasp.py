@@ -1,12 +1,12 @@
 """An underwater grasp, found by gradients and SciPy: the twin of grasp.rs.
 
-A gripper closes on a coin as it would on dry land. There it catches it; under water the fingers press out the water between
-them, and the coin with it, and close behind it. Descending the gradient of the whole trajectory, contact and water included,
-finds forces that catch it.
+A gripper closes on a coin as it would on dry land. There it catches it; under water the fingers press out the water
+between them, and the coin with it, and close behind it. Descending the gradient of the whole trajectory, contact and
+water included, finds forces that catch it.
 
-The unknowns are 33 numbers: each of the three forces at eleven knots, within ±500 N. The descent (L-BFGS-B) has two stages,
-because a trajectory through a collision is a rugged thing to descend: first the approach alone, to where the coin lies well
-between the fingers before they touch it; from there the whole trajectory, to a coin that is held.
+The unknowns are 33 numbers: each of the three forces at eleven knots, within ±500 N. The descent (L-BFGS-B) has two
+stages, because a trajectory through a collision is a rugged thing to descend: first the approach alone, to where the
+coin lies well between the fingers before they touch it; from there the whole trajectory, to a coin that is held.
 
     python examples/grasp.py [--out FILE] [--json] [--approach N] [--hold N]
 
@@ -35,8 +35,9 @@ SCENE = pathlib.Path(__file__).parent / "scenes/grasp.toml"
 
 @dataclasses.dataclass(frozen=True)
 class Hold:
-    """Distance of coin and gripper from where they should be from a time on: squares of lengths, speeds and forces over those
-    that would be a tolerable miss, meant over the states from then."""
+    """Distance of coin and gripper from where they should be from a time on: squares of lengths, speeds and forces over
+    those that would be a tolerable miss, meant over the states from then.
+    """
 
     start: float  # time from which they should be there, s
     along: float  # where along the fingers the coin is wanted, m from the column
@@ -90,7 +91,9 @@ HOLDING = Hold(1.9, 1.2, 0.1 + 2.0 * grasp.GAP, 100.0, 0.2, 0.1, 0.1, 0.1, 0.1, 
 
 
 class Knots:
-    """Controls that run straight from knot to knot, evenly spaced from the first step to the last: LIMIT · tanh x at a knot."""
+    """Controls that run straight from knot to knot, evenly spaced from the first step to the last: LIMIT · tanh x at a
+    knot.
+    """
 
     def __init__(self, steps):
         at = np.arange(steps) * (KNOTS - 1) / (steps - 1)
@@ -116,10 +119,18 @@ class Enough(Exception):
 
 
 class Descent:
-    """L-BFGS-B to a target cost, within a number of evaluations, that takes failed rollouts and jumps of the gradient."""
+    """L-BFGS-B to a target cost, within a number of evaluations, that takes failed rollouts and jumps of the
+    gradient.
+    """
 
     def __init__(self, function, target, evaluations, clip=None, first_step=0.3):
-        self.function, self.target, self.most, self.clip, self.first_step = function, target, evaluations, clip, first_step
+        self.function, self.target, self.most, self.clip, self.first_step = (
+            function,
+            target,
+            evaluations,
+            clip,
+            first_step,
+        )
         self.evaluations, self.failures, self.iterations = 0, 0, 0
         self.best, self.cost = None, np.inf
 
@@ -138,7 +149,8 @@ class Descent:
             return 10.0 * self.cost * (1.0 + away @ away), 20.0 * self.cost * away
         if self.evaluations == 1:
             self.first = np.linalg.norm(gradient)
-        # Gradients through a collision that is about to happen otherwise are hundreds of times the first, and say little.
+        # Gradients through a collision that is about to happen otherwise are hundreds of times the first, and say
+        # little.
         if self.clip is not None:
             gradient = gradient * min(1.0, self.clip * self.first / max(np.linalg.norm(gradient), 1e-300))
         if cost < self.cost:
@@ -158,7 +170,7 @@ class Descent:
 
         try:
             self.evaluate(x)
-            while True:
+            while iterations > 0:
                 # In units in which the first step has the length that is wanted.
                 center, before = self.best, self.cost
                 scale = self.first_step * max(self.slope, 1e-300)

@@ -2,20 +2,22 @@
 
 A ball is pushed past a coin that floats beside its rail, and the water turns the coin. Two questions:
 
-1. How far is the coin turned, against the gap at which the ball passes and the coin's density? One simulation for each pair.
-2. Which push turns the coin by 0.08 rad at all of many gaps and densities as well as can be? Each step of the descent (Adam)
-   takes the mean of the gradients of all starts, data-parallel: every worker has its share of the starts.
+1. How far is the coin turned, against the gap at which the ball passes and the coin's density? One simulation for each
+   pair.
+2. Which push turns the coin by 0.08 rad at all of many gaps and densities as well as can be? Each step of the descent
+   (Adam) takes the mean of the gradients of all starts, data-parallel: every worker has its share of the starts.
 
     python examples/ray_study.py [--serial] [--workers N] [--address ADDRESS] [--gaps N] [--densities N] [--descent N]
                                  [--out FILE] [--json]
 
-Without an address Ray starts on this machine, with as many processes as there are workers, and ends with the program. On a
-cluster, start Ray on every machine (`ray start --head` on the first, `ray start --address FIRST:6379` on the others), with
-the same version of this package installed, and give `--address auto` on one of them, or `--address ray://FIRST:10001` from
-elsewhere: `ray.init(address=...)` is all that changes. Each worker gets the simulator once, pickled, and makes it again.
+Without an address Ray starts on this machine, with as many processes as there are workers, and ends with the program.
+On a cluster, start Ray on every machine (`ray start --head` on the first, `ray start --address FIRST:6379` on the
+others), with the same version of this package installed, and give `--address auto` on one of them, or `--address
+ray://FIRST:10001` from elsewhere: `ray.init(address=...)` is all that changes. Each worker gets the simulator once,
+pickled, and makes it again.
 
-`--serial` does the same without Ray; what comes out is the same to the last bit, and the last line shows it: it ends with a
-digest of all numbers.
+`--serial` does the same without Ray; what comes out is the same to the last bit, and the last line shows it: it ends
+with a digest of all numbers.
 """
 
 import argparse
@@ -123,7 +125,7 @@ def descend(team, push, starts, steps, say):
             return push, costs
         slope = sum(gradient for _, gradient in found) / len(found)
         first, second = 0.8 * first + 0.2 * slope, 0.99 * second + 0.01 * slope**2
-        push = push - 0.2 * (first / (1.0 - 0.8**k)) / (np.sqrt(second / (1.0 - 0.99**k)) + 1e-12)
+        push = push - 0.1 * (first / (1.0 - 0.8**k)) / (np.sqrt(second / (1.0 - 0.99**k)) + 1e-12)
     raise AssertionError
 
 
@@ -150,7 +152,7 @@ def main():
     parser.add_argument("--address", help="of a running cluster; default: one on this machine for as long as this runs")
     parser.add_argument("--gaps", type=int, default=8, help="%(default)s")
     parser.add_argument("--densities", type=int, default=4, help="%(default)s")
-    parser.add_argument("--descent", type=int, default=10, help="steps (%(default)s)")
+    parser.add_argument("--descent", type=int, default=5, help="steps (%(default)s)")
     parser.add_argument("--out", default="ray_study.png", help="picture; default: %(default)s")
     parser.add_argument("--json", action="store_true", help="one JSON object on standard output")
     options = parser.parse_args()
@@ -186,7 +188,10 @@ def main():
     if options.json:
         print(json.dumps(report))
         return
-    print(f"{len(starts)} simulations in {studied - begun:.2f} s; {(options.descent + 1) * len(starts)} gradients in {descended - studied:.2f} s")
+    print(
+        f"{len(starts)} simulations in {studied - begun:.2f} s; "
+        f"{len(costs) * len(starts)} gradients in {descended - studied:.2f} s"
+    )
     print(f"turned by {np.degrees(turns.min()):.2f}° to {np.degrees(turns.max()):.2f}°")
     print(f"mean squared miss {costs[0]:.3e} -> {costs[-1]:.3e} rad² in {options.descent} steps; digest {digest}")
 

@@ -1,16 +1,16 @@
 """Mass and drag of a coin, recovered from a noisy recording of how it sinks: the twin of system_id.rs.
 
-A coin sinks and swings above the floor of a tank, and a camera sees where its centre is, to within 2 mm (Gaussian, the same at
-every frame). From this recording alone the coin's mass and its drag coefficient are to be found; its shape and inertia, the
-water, and the place and time at which it was let go are known. The recording is made by the simulator itself with known
-values, so that what is found can be held against the truth.
+A coin sinks and swings above the floor of a tank, and a camera sees where its centre is, to within 2 mm (Gaussian, the
+same at every frame). From this recording alone the coin's mass and its drag coefficient are to be found; its shape and
+inertia, the water, and the place and time at which it was let go are known. The recording is made by the simulator
+itself with known values, so that what is found can be held against the truth.
 
-The misfit, half the sum of squared deviations over the variance of the noise, falls by L-BFGS-B with the exact gradient of the
-rollout, over the logarithms of both values: neither can become negative, and a step is a part of the value. Where it is least
-its curvature is JᵀJ (Gauss and Newton), with J the positions' change with the two logarithms over the noise's deviation; the
-inverse of that is their covariance, and its diagonal the squared standard errors. One recording either is within two standard
-errors or isn't, so the fit is repeated for many, of other noise: some 95 % of the values should be within two, and the square
-of their deviations over the standard errors should be 1 on the mean.
+The misfit, half the sum of squared deviations over the variance of the noise, falls by L-BFGS-B with the exact
+gradient of the rollout, over the logarithms of both values: neither can become negative, and a step is a part of the
+value. Where it is least its curvature is JᵀJ (Gauss and Newton), with J the positions' change with the two logarithms
+over the noise's deviation; the inverse of that is their covariance, and its diagonal the squared standard errors. One
+recording either is within two standard errors or isn't, so the fit is repeated for many, of other noise: some 95 % of
+the values should be within two, and the square of their deviations over the standard errors should be 1 on the mean.
 
     python examples/system_id.py [--noise METRES] [--seed N] [--recordings N] [--out FILE] [--json]
 """
@@ -119,7 +119,9 @@ def draw(file, fits):
         print("no picture: matplotlib isn't installed (pip install matplotlib)", file=sys.stderr)
         return
     figure = Figure(figsize=(5, 4.4), layout="constrained")
-    axes = figure.add_subplot(title="fits with standard errors; the truth in red", xlabel="mass, g", ylabel="drag coefficient")
+    axes = figure.add_subplot(
+        title="fits with standard errors; the truth in red", xlabel="mass, g", ylabel="drag coefficient"
+    )
     for f in fits:
         axes.errorbar(
             1e3 * f["mass"],
@@ -153,7 +155,10 @@ def main():
 
     # Over threads: a rollout doesn't hold the interpreter's lock.
     with concurrent.futures.ThreadPoolExecutor() as pool:
-        work = [pool.submit(fit, sim, exact, options.noise, options.seed + k, None if k else say) for k in range(options.recordings)]
+        work = [
+            pool.submit(fit, sim, exact, options.noise, options.seed + k, None if k else say)
+            for k in range(options.recordings)
+        ]
         fits = [w.result() for w in work]
     draw(options.out, fits)
     shown = fits[0]
@@ -174,13 +179,21 @@ def main():
         print(json.dumps(report))
         return
     off = shown["deviations"]
-    print(f"positions seen to {1e3 * options.noise:.1f} mm, {STEPS} frames; correlation of the two {shown['correlation']:+.2f}")
+    print(
+        f"positions seen to {1e3 * options.noise:.1f} mm, {STEPS} frames; "
+        f"correlation of the two {shown['correlation']:+.2f}"
+    )
     print(
         f"mass {1e3 * shown['mass']:.3f} ± {1e3 * shown['mass_standard_error']:.3f} g, true {1e3 * MASS:.3f} g: "
         f"{off[0]:+.2f} standard errors"
     )
-    print(f"drag {shown['drag']:.4f} ± {shown['drag_standard_error']:.4f}, true {DRAG:.4f}: {off[1]:+.2f} standard errors")
-    print(f"misfit per degree of freedom {shown['chi_squared']:.2f}; {shown['evaluations']} rollouts with gradient, {shown['stop']}")
+    print(
+        f"drag {shown['drag']:.4f} ± {shown['drag_standard_error']:.4f}, true {DRAG:.4f}: {off[1]:+.2f} standard errors"
+    )
+    print(
+        f"misfit per degree of freedom {shown['chi_squared']:.2f}; "
+        f"{shown['evaluations']} rollouts with gradient, {shown['stop']}"
+    )
     print(
         f"{len(fits)} recordings: {100.0 * report['part_within_two']:.0f} % of the values within two standard errors, "
         f"mean square {report['mean_square']:.2f}; {report['seconds']:.0f} s"

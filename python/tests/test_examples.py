@@ -46,9 +46,9 @@ def test_falling_ball(tmp_path):
 
 
 def test_grasp(tmp_path):
-    """The first iterations of both descents; all of them take half a minute."""
+    """The beginning; all of it takes half a minute."""
     pytest.importorskip("scipy")
-    said = run("grasp", tmp_path, "--approach", 2, "--hold", 1).split("\n")
+    said = run("grasp", tmp_path, "--approach", 2, "--hold", 0).split("\n")
     assert said[0] == "naive push without water: caught"
     assert said[1] == "naive push in water: lost"
     closing = re.fullmatch(r"found by descent: lost \(.*\), cost 13\.0 -> (\d+\.\d+)", said[-2])
@@ -83,7 +83,11 @@ def test_system_id(tmp_path):
     pytest.importorskip("scipy")
     found = json.loads(run("system_id", tmp_path, "--recordings", 1, "--json"))
     fit = found["fit"]
-    assert found["within_two"] and fit["mass"] == pytest.approx(0.030, rel=0.02) and fit["drag"] == pytest.approx(0.4, rel=0.1)
+    assert (
+        found["within_two"]
+        and fit["mass"] == pytest.approx(0.030, rel=0.02)
+        and fit["drag"] == pytest.approx(0.4, rel=0.1)
+    )
     assert fit["mass_standard_error"] == pytest.approx(0.143e-3, rel=0.02)
     assert fit["drag_standard_error"] == pytest.approx(0.0093, rel=0.03)
     assert 0.7 < fit["chi_squared"] < 1.3 and fit["correlation"] == pytest.approx(0.98, abs=0.01)
@@ -99,7 +103,6 @@ def study(tmp_path, *options):
 
 def test_the_study_over_ray_is_that_without(tmp_path):
     serial = study(tmp_path, "--serial")
-    assert study(tmp_path, "--serial") == serial
     pytest.importorskip("ray")
     assert study(tmp_path, "--workers", 2) == serial
 
@@ -114,7 +117,8 @@ def test_the_study_without_ray_says_what_is_missing():
 
 def test_the_bench_of_batches():
     """Small: what it measures is the same to the bit, however many cores."""
-    command = [sys.executable, ROOT / "benches/batch.py", "--rollouts", 3, "--steps", 5, "--repeats", 1, "--json"]
+    command = [sys.executable, ROOT / "benches/batch.py", "--rollouts", 3, "--steps", 5, "--repeats", 1]
+    command += ["--fidelity", "isolated", "--json"]
     done = subprocess.run(list(map(str, command)), capture_output=True, text=True)
     assert done.returncode == 0, done.stderr
     found = json.loads(done.stdout)

@@ -254,7 +254,9 @@ def several(env, steps):
 
 def test_many_over_threads_are_those_one_after_the_other():
     def make(mode, **settings):
-        return gymnasium.make_vec(IDS[1], 3, vectorization_mode=mode, max_episode_steps=4, fidelity="isolated", **settings)
+        return gymnasium.make_vec(
+            IDS[1], 3, vectorization_mode=mode, max_episode_steps=4, fidelity="isolated", **settings
+        )
 
     # Ten steps: two episodes cut off, and their new starts.
     right = several(make("sync"), 10)

@@ -5,8 +5,8 @@ Importing this registers
 - `hydrograd/Grasp-v0`: a gripper under water catches a coin and holds it (`GraspEnv`),
 - `hydrograd/Swimmer-v0`: a fish of four links swims forward (`SwimmerEnv`),
 
-for `gymnasium.make` and `gymnasium.make_vec`. The latter steps many environments over threads unless it is told otherwise
-(`vectorization_mode="sync"` or `"async"`).
+for `gymnasium.make` and `gymnasium.make_vec`. The latter steps many environments over threads unless it is told
+otherwise (`vectorization_mode="sync"` or `"async"`).
 """
 
 try:

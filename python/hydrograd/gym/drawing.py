@@ -20,8 +20,9 @@ def picture(
     labels: tuple[str, str],
     time: float,
 ) -> NDArray[np.uint8]:
-    """Polygons (n, 2) and ellipses (centre, angle of the first axis in rad, semi-axes) in a window (m), at a time (s): an
-    image (360, 480, 3)."""
+    """Polygons (n, 2) and ellipses (centre, angle of the first axis in rad, semi-axes) in a window (m), at a time (s):
+    an image (360, 480, 3).
+    """
     try:
         from matplotlib.backends.backend_agg import FigureCanvasAgg
         from matplotlib.figure import Figure

@@ -39,8 +39,8 @@ def ensure_threads() -> None:
     threading.Thread(target=simulate, daemon=True).start()
     if not done.wait(_PATIENCE):
         raise hg.UnsupportedError(
-            "this process was forked from one in which simulations had run, and threads don't survive a fork; start it with "
-            "spawn: gymnasium.make_vec(…, vectorization_mode='async', vector_kwargs={'context': 'spawn'}), or step over threads "
-            "with vectorization_mode='vector_entry_point'"
+            "this process was forked from one in which simulations had run, and threads don't survive a fork; start it "
+            "with spawn: gymnasium.make_vec(…, vectorization_mode='async', vector_kwargs={'context': 'spawn'}), or "
+            "step over threads with vectorization_mode='vector_entry_point'"
         )
     _unsure = False

@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 import hydrograd as hg
 from hydrograd.gym import drawing
-from hydrograd.gym.simulation import SimulationEnv
+from hydrograd.gym.simulation import Fidelity, SimulationEnv
 from hydrograd.tasks import grasp
 from hydrograd.tasks.grasp import COIN_TURN, COIN_Y, COIN_Z, COLUMN, FINGERS
 
@@ -25,10 +25,10 @@ _ALONG, _OPENING = 1.2, 0.1 + 2.0 * grasp.GAP
 _SUCCESS = 0.5
 
 
-@functools.lru_cache(maxsize=None)
-def _simulator(fidelity: str, refinement: int) -> hg.Simulator:
+@functools.cache
+def _simulator(fidelity: Fidelity, refinement: int) -> hg.Simulator:
     """One for all environments of a process: simulators don't change."""
-    return hg.Simulator(grasp.scene(), grasp.TIME_STEP / refinement, fidelity=fidelity)  # type: ignore[arg-type]
+    return hg.Simulator(grasp.scene(), grasp.TIME_STEP / refinement, fidelity=fidelity)
 
 
 class GraspEnv(SimulationEnv):
@@ -36,25 +36,25 @@ class GraspEnv(SimulationEnv):
 
     Action (3,): forces on the column and both fingers over 500 N, for `frame_skip` steps of 0.01 s.
 
-    Observation (17,): q (6), v (6), the coin's place along the fingers and from the middle between them, their opening, and the
-    gaps between the coin and each finger (m); the coin's angle within ±π. World frame, SI units.
+    Observation (17,): q (6), v (6), the coin's place along the fingers and from the middle between them, their opening,
+    and the gaps between the coin and each finger (m); the coin's angle within ±π. World frame, SI units.
 
-    Reward of a step: 1/(1 + miss) + 2 · held − 0.01 · mean(action²), with
-    miss = ((along − 1.2)/0.2)² + (across/0.1)² + ((opening − 0.13)/0.4)², m, and held 1 while the coin is between the fingers,
-    touched by both (to 3 mm) and no point of it faster than 5 mm/s against a finger.
+    Reward of a step: 1/(1 + miss) + 2 · held − 0.01 · mean(action²), with miss = ((along − 1.2)/0.2)² + (across/0.1)² +
+    ((opening − 0.13)/0.4)², m, and held 1 while the coin is between the fingers, touched by both (to 3 mm) and no point
+    of it faster than 5 mm/s against a finger.
 
     Start: at rest; each of the column, the fingers and the coin's place within ±0.03 m of the scene's, its angle within
-    ±0.2 rad of 0.4. Terminates where the coin is out of reach (0.4 m beyond the tips, 0.3 m behind the column, 1 m aside)
-    or the column 1.5 m away. Info: `time` (s), `held`, `held_for` (s), `is_success` (held for half a second).
+    ±0.2 rad of 0.4. Terminates where the coin is out of reach (0.4 m beyond the tips, 0.3 m behind the column, 1 m
+    aside) or the column 1.5 m away. Info: `time` (s), `held`, `held_for` (s), `is_success` (held for half a second).
 
-    `simulator` takes another one with the same coordinates and controls, e.g. other masses by `with_parameters`; without it
-    the scene's own is made with `fidelity`, once a process.
+    `simulator` takes another one with the same coordinates and controls, e.g. other masses by `with_parameters`;
+    without it the scene's own is made with `fidelity`, once a process.
     """
 
     def __init__(
         self,
         *,
-        fidelity: str = "reduced",
+        fidelity: Fidelity = "reduced",
         frame_skip: int = 5,
         simulator: hg.Simulator | None = None,
         render_mode: str | None = None,

@@ -1,9 +1,9 @@
-"""What the environments share: one simulator, actions held for some of its steps, episodes that end where it can't go on."""
+"""What the environments share: a simulator, actions held for some of its steps, an end where it can't go on."""
 
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import Any
+from typing import Any, Literal, get_args
 
 import gymnasium
 import numpy as np
@@ -14,20 +14,23 @@ import hydrograd as hg
 from hydrograd.gym.forking import ensure_threads
 
 _Array = NDArray[np.float64]
+Fidelity = Literal["isolated", "reduced", "auto", "full"]
+"""Those of `hydrograd.Simulator`."""
+
 # By how much shorter steps are where the usual ones fail.
 _REFINEMENT = 4
-_FIDELITIES = ("isolated", "reduced", "auto", "full")
+_FIDELITIES: tuple[Fidelity, ...] = get_args(Fidelity)
 
 
 class SimulationEnv(gymnasium.Env[_Array, NDArray[np.float32]]):
     """An environment around a simulator, that never changes; the state is the environment's own.
 
-    An action (control_size,) in [-1, 1] is the part of `largest` (N, N m) that acts during the next `frame_skip` steps of the
-    simulator; what is beyond is clipped.
+    An action (control_size,) in [-1, 1] is the part of `largest` (N, N m) that acts during the next `frame_skip` steps
+    of the simulator; what is beyond is clipped.
 
-    Where the simulator can't go on (contact whose implicit stage isn't found, bodies driven into one another), the step is made
-    again with a quarter of the time step (`info["refined"]`), unless the simulator was given. Where that can't either, the
-    episode terminates with the reason in `info["error"]`, a reward of 0 and the observation before.
+    Where the simulator can't go on (contact whose implicit stage isn't found, bodies driven into one another), the step
+    is made again with a quarter of the time step (`info["refined"]`), unless the simulator was given. Where that can't
+    either, the episode terminates with the reason in `info["error"]`, a reward of 0 and the observation before.
     """
 
     metadata: dict[str, Any] = {"render_modes": ["rgb_array"], "render_fps": 20}
@@ -40,25 +43,29 @@ class SimulationEnv(gymnasium.Env[_Array, NDArray[np.float32]]):
         time_step: float,
         largest: ArrayLike,
         bounds: ArrayLike,
-        fidelity: str,
+        fidelity: Fidelity,
         frame_skip: int,
         render_mode: str | None,
     ) -> None:
-        """A simulator that was given must have the task's `coordinates` (names of q) and controls; the task's own, with its
-        `time_step` (s) and a `fidelity`, is made when it is first needed. `largest` is the control at an action of 1 (control_size,), `bounds`
-        the largest absolute value of each observation."""
+        """A simulator that was given must have the task's `coordinates` (names of q) and controls; the task's own, with
+        its `time_step` (s) and a `fidelity`, is made when it is first needed. `largest` is the control at an action of
+        1 (control_size,), `bounds` the largest absolute value of each observation.
+        """
         if isinstance(frame_skip, bool) or not isinstance(frame_skip, (int, np.integer)) or frame_skip < 1:
             raise hg.InputError(f"frame_skip: got {frame_skip!r}; must be a whole number of at least 1")
         if fidelity not in _FIDELITIES:
             raise hg.InputError(f"fidelity: got {fidelity!r}; must be one of {_FIDELITIES}")
         if render_mode is not None and render_mode not in self.metadata["render_modes"]:
-            raise hg.InputError(f"render_mode: got {render_mode!r}; must be None or one of {self.metadata['render_modes']}")
+            raise hg.InputError(
+                f"render_mode: got {render_mode!r}; must be None or one of {self.metadata['render_modes']}"
+            )
         self._largest = np.asarray(largest, dtype=float)
         if simulator is not None:
             size = self._largest.size
             if simulator.q_names != list(coordinates) or simulator.control_size != size:
                 raise hg.InputError(
-                    f"simulator: got one with the coordinates {simulator.q_names} and {simulator.control_size} controls; "
+                    f"simulator: got one with the coordinates {simulator.q_names} and "
+                    f"{simulator.control_size} controls; "
                     f"must have {list(coordinates)} and {size} controls"
                 )
             time_step = simulator.dt
@@ -158,8 +165,9 @@ class SimulationEnv(gymnasium.Env[_Array, NDArray[np.float32]]):
     # What a task says.
 
     def _own_simulator(self, refinement: int) -> hg.Simulator:
-        """Of the task's scene, with its time step over a number; not made at once, because processes can't be forked once it
-        has run."""
+        """Of the task's scene, with its time step over a number; not made at once, because processes can't be forked
+        once it has run.
+        """
         raise NotImplementedError
 
     def _start(self) -> tuple[_Array, _Array]:
@@ -177,4 +185,3 @@ class SimulationEnv(gymnasium.Env[_Array, NDArray[np.float32]]):
     def _judge(self, rollout: hg.Rollout, after: hg.State, action: _Array) -> tuple[float, bool, dict[str, Any]]:
         """Reward, whether the episode terminates, and info after the steps of an action, that led to a state."""
         raise NotImplementedError
-

@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 import hydrograd as hg
 from hydrograd.gym import drawing
-from hydrograd.gym.simulation import SimulationEnv
+from hydrograd.gym.simulation import Fidelity, SimulationEnv
 from hydrograd.tasks import swimmer
 
 _Array = NDArray[np.float64]
@@ -23,10 +23,12 @@ LANE = 2.0
 _EFFORT = 0.05
 
 
-@functools.lru_cache(maxsize=None)
-def _simulator(fidelity: str, refinement: int) -> hg.Simulator:
+@functools.cache
+def _simulator(fidelity: Fidelity, refinement: int) -> hg.Simulator:
     """One for all environments of a process: simulators don't change."""
-    return hg.Simulator(swimmer.scene(), swimmer.TIME_STEP / refinement, fidelity=fidelity, resolved_gap=swimmer.RESOLVED_GAP)  # type: ignore[arg-type]
+    return hg.Simulator(
+        swimmer.scene(), swimmer.TIME_STEP / refinement, fidelity=fidelity, resolved_gap=swimmer.RESOLVED_GAP
+    )
 
 
 class SwimmerEnv(SimulationEnv):
@@ -34,22 +36,24 @@ class SwimmerEnv(SimulationEnv):
 
     Action (3,): torques of the hinges, head to tail, over 0.1 N m, for `frame_skip` steps of 0.01 s.
 
-    Observation (11,): cosine and sine of the heading; the hinges' angles (3, rad); the head's velocity in its own frame, forward
-    and to the left (m/s), and its turning (rad/s); the hinges' rates (3, rad/s). Where the fish is in the world isn't told.
+    Observation (11,): cosine and sine of the heading; the hinges' angles (3, rad); the head's velocity in its own
+    frame, forward and to the left (m/s), and its turning (rad/s); the hinges' rates (3, rad/s). Where the fish is in
+    the world isn't told.
 
     Reward of a step: mean velocity of its centre of mass along x (m/s) − 0.05 · mean(action²).
 
-    Start: heading and hinges within ±0.3 rad, the hinges' rates within ±0.05 rad/s, the head at rest. Terminates where the
-    centre of mass leaves the lane, |y| > 2 m. Info: `time` (s), `x`, `y` of the centre of mass (m), `effort`, mean(action²).
+    Start: heading and hinges within ±0.3 rad, the hinges' rates within ±0.05 rad/s, the head at rest. Terminates where
+    the centre of mass leaves the lane, |y| > 2 m. Info: `time` (s), `x`, `y` of the centre of mass (m), `effort`,
+    mean(action²).
 
-    `simulator` takes another one with the same coordinates and controls; without it the scene's own is made with `fidelity`,
-    once a process.
+    `simulator` takes another one with the same coordinates and controls; without it the scene's own is made with
+    `fidelity`, once a process.
     """
 
     def __init__(
         self,
         *,
-        fidelity: str = "reduced",
+        fidelity: Fidelity = "reduced",
         frame_skip: int = 5,
         simulator: hg.Simulator | None = None,
         render_mode: str | None = None,

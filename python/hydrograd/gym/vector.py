@@ -23,11 +23,11 @@ _Step = tuple[_Array, float, bool, bool, dict[str, Any]]
 
 
 class ThreadVectorEnv(gymnasium.vector.VectorEnv[_Array, _Array, NDArray[Any]]):
-    """Environments in one process that share a simulator and are stepped over a pool of threads: a rollout doesn't hold the
-    interpreter's lock.
+    """Environments in one process that share a simulator and are stepped over a pool of threads: a rollout doesn't hold
+    the interpreter's lock.
 
-    What comes out is that of `gymnasium.vector.SyncVectorEnv` with the same seeds, to the last bit, whatever the number of
-    threads. An environment whose episode has ended starts anew in its next step, whose action is left aside.
+    What comes out is that of `gymnasium.vector.SyncVectorEnv` with the same seeds, to the last bit, whatever the number
+    of threads. An environment whose episode has ended starts anew in its next step, whose action is left aside.
     """
 
     def __init__(
@@ -38,7 +38,9 @@ class ThreadVectorEnv(gymnasium.vector.VectorEnv[_Array, _Array, NDArray[Any]]):
         max_episode_steps: int | None = None,
         threads: int | None = None,
     ) -> None:
-        """`num_envs` environments of `make`, cut off after `max_episode_steps`; `threads` are the machine's cores if not given."""
+        """`num_envs` environments of `make`, cut off after `max_episode_steps`; `threads` are the machine's cores if
+        not given.
+        """
         wanted = os.cpu_count() or 1 if threads is None else threads
         for name, value in (("num_envs", num_envs), ("threads", wanted), ("max_episode_steps", max_episode_steps)):
             if value is not None and (isinstance(value, bool) or not isinstance(value, (int, np.integer)) or value < 1):
@@ -65,7 +67,9 @@ class ThreadVectorEnv(gymnasium.vector.VectorEnv[_Array, _Array, NDArray[Any]]):
     def reset(
         self, *, seed: int | Sequence[int | None] | None = None, options: dict[str, Any] | None = None
     ) -> tuple[_Array, dict[str, Any]]:
-        """All starts, or those of `options["reset_mask"]`; a number seeds the environments with it and those that follow."""
+        """All starts, or those of `options["reset_mask"]`; a number seeds the environments with it and those that
+        follow.
+        """
         given = dict(options or {})
         mask = np.asarray(given.pop("reset_mask", np.ones(self.num_envs, dtype=bool)))
         if mask.shape != (self.num_envs,) or mask.dtype != np.bool_:

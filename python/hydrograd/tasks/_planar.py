@@ -5,8 +5,8 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-# Halvings of the cone of normals at a corner, to some 1e-5 rad: the separation is flat where it is largest, and so off by the
-# square of that.
+# Halvings of the cone of normals at a corner, to some 1e-5 rad: the separation is flat where it is largest, and so off
+# by the square of that.
 _HALVINGS = 18
 
 
@@ -15,16 +15,17 @@ def ellipse_polygon_gap(
 ) -> NDArray[np.float64]:
     """Distance between an ellipse and a convex polygon, negative where they overlap.
 
-    `center` (…, 2) and `angle` (…), of the first axis (rad), place the ellipse with the semi-axes `axes` in the frame of the
-    polygon, whose `corners` (n, 2) run counter-clockwise; m. It is the largest separation along any direction: those
-    square to an edge, and at each corner the best one between its edges'.
+    `center` (…, 2) and `angle` (…), of the first axis (rad), place the ellipse with the semi-axes `axes` in the frame
+    of the polygon, whose `corners` (n, 2) run counter-clockwise; m. It is the largest separation along any direction:
+    those square to an edge, and at each corner the best one between its edges'.
     """
     points = np.asarray(corners, dtype=float)
     angles = np.asarray(angle, dtype=float)[..., None]
     # The ellipse's centre from each corner, (…, n).
     across, up = np.moveaxis(np.asarray(center, dtype=float)[..., None, :] - points, -1, 0)
     edges = np.roll(points, -1, axis=0) - points
-    # Outward normal of the edge that leaves each corner, rad; at a corner the normals run from the entering edge's to it.
+    # Outward normal of the edge that leaves each corner, rad; at a corner the normals run from the entering edge's to
+    # it.
     leaving = np.arctan2(-edges[:, 0], edges[:, 1])
     entering = np.roll(leaving, 1)
     width = np.mod(leaving - entering, 2.0 * np.pi)

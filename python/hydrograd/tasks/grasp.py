@@ -1,8 +1,9 @@
 """The grasp: a gripper under water that has to catch a coin and hold it.
 
-A column that slides along y carries two fingers that close along z on a coin, which moves in the plane y-z. It is the scene of
-`examples/scenes/grasp.toml`, without its controller. Coordinates `q` (…, 6): column y, finger 1 z, finger 2 z, coin y and
-z (m), and its angle about x (rad); `v` their rates. Controls (3,): the forces on column and fingers, N. World frame.
+A column that slides along y carries two fingers that close along z on a coin, which moves in the plane y-z. It is the
+scene of `examples/scenes/grasp.toml`, without its controller. Coordinates `q` (…, 6): column y, finger 1 z, finger 2 z,
+coin y and z (m), and its angle about x (rad); `v` their rates. Controls (3,): the forces on column and fingers, N.
+World frame.
 """
 
 from __future__ import annotations
@@ -116,7 +117,8 @@ def between(q: ArrayLike) -> NDArray[np.bool_]:
 
 def held(q: ArrayLike, v: ArrayLike) -> NDArray[np.bool_]:
     """Whether the coin is held, (…): between the fingers, touched by both (to 3 mm), no point of it faster than 5 mm/s
-    against a finger."""
+    against a finger.
+    """
     touched = (gaps(q) <= _TOUCH).all(-1)
     return np.asarray(between(q) & touched & (slip(v) < _STILL))
 

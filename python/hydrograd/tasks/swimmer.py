@@ -1,8 +1,8 @@
 """The swimmer: a fish of four links that has to swim along x.
 
-The links are ellipsoids of the water's density, hinged end to end about z; the head moves in the plane x-y. Coordinates `q`
-(…, 6): head x, y (m) and heading (rad), then the angles of the three hinges (rad); `v` their rates. Controls (3,): the torques
-of the hinges, N m. World frame. Without effort the fish drifts: the hinges have no springs.
+The links are ellipsoids of the water's density, hinged end to end about z; the head moves in the plane x-y.
+Coordinates `q` (…, 6): head x, y (m) and heading (rad), then the angles of the three hinges (rad); `v` their rates.
+Controls (3,): the torques of the hinges, N m. World frame. Without effort the fish drifts: the hinges have no springs.
 """
 
 from __future__ import annotations

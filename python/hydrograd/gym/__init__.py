@@ -11,8 +11,9 @@ otherwise (`vectorization_mode="sync"` or `"async"`).
 
 try:
     import gymnasium as _gymnasium
+    from gymnasium.vector import AutoresetMode as _since_1_1  # noqa: F401
 except ImportError as missing:
-    raise ImportError("hydrograd.gym needs Gymnasium: pip install gymnasium") from missing
+    raise ImportError("hydrograd.gym needs Gymnasium 1.1 or later: pip install gymnasium") from missing
 
 from hydrograd.gym.grasp import GraspEnv
 from hydrograd.gym.simulation import SimulationEnv

@@ -30,6 +30,10 @@ class ThreadVectorEnv(gymnasium.vector.VectorEnv[_Array, _Array, NDArray[Any]]):
     of threads. An environment whose episode has ended starts anew in its next step, whose action is left aside.
     """
 
+    # Gymnasium closes also what was refused.
+    envs: list[SimulationEnv] = []
+    _pool: ThreadPoolExecutor | None = None
+
     def __init__(
         self,
         make: Callable[[], SimulationEnv],
@@ -98,6 +102,8 @@ class ThreadVectorEnv(gymnasium.vector.VectorEnv[_Array, _Array, NDArray[Any]]):
         # Checked together, before any environment has moved.
         for env, action in zip(self.envs, given):
             env.checked(action)
+        if self._pool is None:
+            raise hg.InputError("step: the environments are closed; must be open")
         steps = list(self._pool.map(self._one, range(self.num_envs), given))
         infos: dict[str, Any] = {}
         for i, (_, _, terminated, truncated, info) in enumerate(steps):
@@ -128,7 +134,9 @@ class ThreadVectorEnv(gymnasium.vector.VectorEnv[_Array, _Array, NDArray[Any]]):
 
     def close_extras(self, **kwargs: Any) -> None:
         """Ends the threads."""
-        self._pool.shutdown()
+        if self._pool is not None:
+            self._pool.shutdown()
+            self._pool = None
         for env in self.envs:
             env.close()
 

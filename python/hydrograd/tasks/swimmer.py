@@ -24,7 +24,7 @@ TIME_STEP = 0.01
 STEPS = 1000
 """Of the scene: 10 s."""
 RESOLVED_GAP = 0.05
-"""To which the water between two links is to be resolved, m: those that aren't neighbours keep 0.1 m apart."""
+"""To which the water between two links is to be resolved, m: those that aren't neighbours keep 0.19 m apart."""
 
 OUTLINE = (HALF_LENGTH, 0.02)
 """Semi-axes of a link in the plane, m."""

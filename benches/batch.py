@@ -99,7 +99,7 @@ def main():
         print(f"one by one: {first['seconds_alone']:.2f} s")
         for cores, result in results.items():
             factor = f"{speedup[cores]:.2f} times as fast as with {options.cores[0]}"
-            print(f"{cores} cores: {result['seconds']:.2f} s, {factor}")
+            print(f"{cores} {'core' if cores == 1 else 'cores'}: {result['seconds']:.2f} s, {factor}")
         equal = "the same to the last bit" if same else "NOT the same"
         print(
             f"{options.rollouts} rollouts of {options.steps} steps: {equal} as one by one, with every number of cores"

@@ -2,8 +2,9 @@
 
     python benches/environments.py [--seeds N] [--envs N] [--steps N] [--json]
 
-Returns are means over the seeds 0 … N − 1, whole episodes. The speed is that of random actions, in steps of an environment
-(5 steps of the simulator) per second, all environments together.
+Returns are means over the seeds 0 … N − 1, whole episodes. The speed is that of random actions, in steps of an
+environment (5 steps of the simulator) per second, all environments together. Only those of one run can be compared:
+measure on an idle machine.
 """
 
 import argparse
@@ -23,7 +24,7 @@ def nothing(step, observation):
     return np.zeros(3)
 
 
-def rash(step, observation):
+def at_random(step, observation):
     """Any force."""
     return np.random.default_rng([step, *np.abs(observation * 1e6).astype(int) % 1000]).uniform(-1.0, 1.0, 3)
 
@@ -49,7 +50,7 @@ def wave(step, observation):
     return np.clip(10.0 * (wanted - observation[2:5]) - 0.5 * observation[8:], -1.0, 1.0)
 
 
-POLICIES = {GRASP: (nothing, rash, naive_push, follow_and_close), SWIMMER: (nothing, rash, wave)}
+POLICIES = {GRASP: (nothing, at_random, naive_push, follow_and_close), SWIMMER: (nothing, at_random, wave)}
 
 
 def episode(env, policy, seed):
@@ -86,7 +87,7 @@ def returns(name, seeds):
 def speeds(name, count, steps):
     """Steps a second, by the way in which many are stepped."""
     rows = {}
-    # Other processes first: none can be forked from one that has run simulations, so they are spawned.
+    # Processes can't be forked from one that has run simulations.
     for label, mode, settings in (
         ("async", "async", {"vector_kwargs": {"context": "spawn"}}),
         ("sync", "sync", {}),
@@ -122,8 +123,9 @@ def main():
         print(name)
         for row in found["returns"]:
             print(
-                f"  {row['policy']:17} {row['mean']:7.2f} ({row['least']:.2f} to {row['most']:.2f}), "
-                f"{row['successes']} of {options.seeds} succeed; {row['refined']} steps refined, {row['errors']} errors"
+                f"  {row['policy']:17} {row['mean']:7.2f} ({row['least']:.2f} to {row['most']:.2f})"
+                + (f", {row['successes']} of {options.seeds} succeed" if name == GRASP else "")
+                + f"; {row['refined']} steps refined, {row['errors']} errors"
             )
         print("  steps a second: " + ", ".join(f"{label} {speed:.0f}" for label, speed in found["speeds"].items()))
 

@@ -101,7 +101,10 @@ class Cluster:
             sys.exit("this example needs Ray (pip install ray), or --serial")
         self.ray = ray
         here = {} if address else {"num_cpus": workers, "object_store_memory": 80 * 2**20, "include_dashboard": False}
-        ray.init(address=address, log_to_driver=False, logging_level="error", **here)
+        try:
+            ray.init(address=address, log_to_driver=False, logging_level="error", **here)
+        except ConnectionError as error:
+            sys.exit(f"--address {address}: no Ray cluster answers there: {error}")
         shared = ray.put(sim)
         self.workers = [ray.remote(Worker).remote(shared) for _ in range(workers)]
 

@@ -102,7 +102,8 @@ class Cluster:
         self.ray = ray
         here = {} if address else {"num_cpus": workers, "object_store_memory": 80 * 2**20, "include_dashboard": False}
         try:
-            ray.init(address=address, log_to_driver=False, logging_level="error", **here)
+            # "local": a new one, even where another runs.
+            ray.init(address=address or "local", log_to_driver=False, logging_level="error", **here)
         except ConnectionError as error:
             sys.exit(f"--address {address}: no Ray cluster answers there: {error}")
         shared = ray.put(sim)

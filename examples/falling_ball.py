@@ -3,12 +3,15 @@
 A heavy sphere is driven down beside a coin that lies flat above the sea floor. With the fidelity `full` the water that
 the sphere pushes away turns the coin before anything touches it; with `isolated` the coin never hears of the sphere.
 
-    python examples/falling_ball.py [--faces N] [--steps N] [--json]
+    python examples/falling_ball.py [--faces N] [--steps N] [--out FILE] [--json]
+
+FILE is a picture of the coin's angle and of the heights against time (PNG, SVG or PDF, by its ending).
 """
 
 import argparse
 import json
 import pathlib
+import sys
 import time
 
 import numpy as np
@@ -37,15 +40,40 @@ def simulate(scene, fidelity, options):
     }
 
 
+def draw(file, curves):
+    """Angle and height of the coin, and the sphere's height, against time, drawn into a file."""
+    try:
+        from matplotlib.figure import Figure
+    except ImportError:
+        print("no picture: matplotlib isn't installed (pip install matplotlib)", file=sys.stderr)
+        return
+    figure = Figure(figsize=(6, 8), layout="constrained")
+    readings = [
+        ("coin_angle", "angle of the coin from lying flat, °"),
+        ("coin_height", "coin's centre above the floor, m"),
+        ("sphere_gap", "sphere's lowest point above the floor, m"),
+    ]
+    for axes, (key, title) in zip(figure.subplots(3, 1, sharex=True), readings):
+        for curve, style in zip(curves, ("-", "--")):
+            axes.plot(curve["time"], curve[key], style, label=curve["fidelity"])
+        axes.set_title(title)
+    axes.set_xlabel("time, s")
+    figure.axes[0].legend()
+    figure.savefig(file)
+    print(f"wrote {file}", file=sys.stderr)
+
+
 def main():
     parser = argparse.ArgumentParser(description=__doc__.split("\n")[0])
     parser.add_argument("--faces", type=int, default=320)
     parser.add_argument("--steps", type=int, help="default: the scene's")
+    parser.add_argument("--out", default="falling_ball.png", help="picture; default: %(default)s")
     parser.add_argument("--json", action="store_true")
     options = parser.parse_args()
     file = pathlib.Path(__file__).parent / "scenes/falling_ball.toml"
     scene = hg.Scene.load(file)
     curves = [simulate(scene, fidelity, options) for fidelity in ("full", "isolated")]
+    draw(options.out, curves)
     if options.json:
         print(json.dumps(curves))
         return

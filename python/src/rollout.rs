@@ -205,7 +205,7 @@ impl Rollout {
             ));
         }
         let at = array::numbered(step, self.steps(), "step")?;
-        let found = short(py, || self.rollout().contacts(at, slack))?;
+        let found = short(py, &self.raised, || self.rollout().contacts(at, slack))?;
         contact::of_step(py, &found)
     }
 
@@ -215,7 +215,7 @@ impl Rollout {
     fn flow<'py>(&self, py: Python<'py>, state: isize, points: &Bound<'py, PyAny>) -> Numbers<'py> {
         let at = array::numbered(state, self.rollout().states().len(), "state")?;
         let points = array::vectors("flow: points", points)?;
-        let made = short(py, || self.rollout().flow(at, &points))?;
+        let made = short(py, &self.raised, || self.rollout().flow(at, &points))?;
         let values = made.iter().flat_map(|u| [u.x, u.y, u.z]).collect();
         array::to_python(py, values, &[points.len(), 3])
     }
@@ -229,7 +229,9 @@ impl Rollout {
     ) -> PyResult<Bound<'py, PyArray1<bool>>> {
         let at = array::numbered(state, self.rollout().states().len(), "state")?;
         let points = array::vectors("flow_resolved: points", points)?;
-        let made = short(py, || self.rollout().flow_resolved(at, &points))?;
+        let made = short(py, &self.raised, || {
+            self.rollout().flow_resolved(at, &points)
+        })?;
         Ok(PyArray1::from_vec(py, made))
     }
 

@@ -460,7 +460,7 @@ impl Simulator {
     /// of vertex numbers; None for a body without a shape.
     fn meshes<'py>(&self, py: Python<'py>) -> PyResult<Vec<Option<Triangles<'py>>>> {
         let inner = self.inner.clone();
-        let made = long(py, move |_| inner.meshes())?;
+        let made = long(py, &Raised::default(), move |_| inner.meshes())?;
         let meshes = made.iter();
         meshes
             .map(|mesh| mesh.as_ref().map(|m| triangles(py, m)).transpose())

@@ -82,3 +82,12 @@ def test_a_forked_process_is_told_so(sim, controls):
     os.close(read)
     os.waitpid(child, 0)
     assert "fork" in said and "spawn" in said, said
+
+
+def test_joblib(sim, controls):
+    """Its workers are processes of their own, which get the simulator pickled."""
+    joblib = pytest.importorskip("joblib")
+    work = [(sim, controls), (sim, 2 * controls), (sim, -controls)]
+    found = joblib.Parallel(n_jobs=2)(joblib.delayed(final_position)(w) for w in work)
+    for positions, (_, u) in zip(found, work):
+        assert np.array_equal(positions, sim.rollout(u).positions[-1])

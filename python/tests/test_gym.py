@@ -18,7 +18,6 @@ gymnasium = pytest.importorskip("gymnasium")
 
 import hydrograd.gym as environments  # noqa: E402
 from gymnasium.utils.env_checker import check_env  # noqa: E402
-from hydrograd.gym import forking  # noqa: E402
 from hydrograd.tasks import grasp, swimmer  # noqa: E402
 
 ROOT = pathlib.Path(__file__).parents[2]
@@ -318,8 +317,7 @@ def told(queue):
 
 @pytest.mark.skipif("fork" not in multiprocessing.get_all_start_methods(), reason="no forks here")
 @pytest.mark.filterwarnings("ignore::DeprecationWarning")
-def test_a_fork_after_simulations_is_told_to_spawn(monkeypatch):
-    monkeypatch.setattr(forking, "_PATIENCE", 0.5)
+def test_a_fork_after_simulations_is_told_to_spawn():
     environments.SwimmerEnv(fidelity="isolated").reset(seed=0)
     episode(environments.SwimmerEnv(fidelity="isolated"), pushes(0), 0, 1)
     context = multiprocessing.get_context("fork")

@@ -11,7 +11,6 @@ from gymnasium.error import ResetNeeded
 from numpy.typing import ArrayLike, NDArray
 
 import hydrograd as hg
-from hydrograd.gym.forking import ensure_threads
 
 _Array = NDArray[np.float64]
 Fidelity = Literal["isolated", "reduced", "auto", "full"]
@@ -89,7 +88,6 @@ class SimulationEnv(gymnasium.Env[_Array, NDArray[np.float32]]):
     def simulator(self) -> hg.Simulator:
         """The simulator."""
         if self._simulator is None:
-            ensure_threads()
             self._simulator = self._own_simulator(1)
         return self._simulator
 

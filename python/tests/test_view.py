@@ -491,4 +491,4 @@ def test_in_a_sandbox(rollout, tmp_path):
     file = tmp_path / "notebook.html"
     shown = hg.view(rollout, colors=COLORS, height=500)._repr_html_()
     file.write_text(f"<!DOCTYPE html><body style='margin: 0'>{shown}</body>", encoding="utf-8")
-    blob(stage(browser.picture(file)), 0)
+    blob(stage(browser.picture(file, clock=8000)), 0)

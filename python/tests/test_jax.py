@@ -318,7 +318,7 @@ scene = hg.Scene(); scene.add(hg.Body(hg.sphere(0.05), density=998.0, actuated=T
 sim = hg.Simulator(scene, 0.01, fidelity="isolated")
 function = jax.jit(jax.vmap(jax.value_and_grad(lambda u: jax.numpy.sum(hj.rollout(sim, 2 * u).positions ** 2))))
 controls = jax.numpy.full((40, 60, 6), 0.01)  # 115 kB
-for _ in range(20):
+for _ in range(8):
     # More is asked for before the host has done what was.
     value, gradient = function(controls)
     controls = controls - gradient @ jax.numpy.eye(6)

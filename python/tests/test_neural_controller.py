@@ -25,7 +25,7 @@ def example():
 
 
 def run(example, monkeypatch, capsys, *options):
-    few = ["--iterations", "4", "--starts", "2", "--unseen", "2", "--rate", "3e-3"]
+    few = ["--iterations", "3", "--starts", "2", "--unseen", "2", "--rate", "3e-3"]
     monkeypatch.setattr(sys, "argv", ["neural_controller.py", *few, *map(str, options)])
     example.main()
     return capsys.readouterr()
@@ -37,7 +37,7 @@ def test_the_cost_falls_and_the_last_line_says_so(example, monkeypatch, capsys, 
     number = r"(\d+\.\d+)"
     line = (
         rf"2 unseen starts: mean cost {number} untrained, {number} trained, {number} times less; coin off its place "
-        rf"by at most {number} mm, {number} mm; 4 iterations of 2 starts in \d+ s; wrote (.*)"
+        rf"by at most {number} mm, {number} mm; 3 iterations of 2 starts in \d+ s; wrote (.*)"
     )
     found = re.fullmatch(line, said.out.splitlines()[-1])
     assert found, said.out
@@ -45,14 +45,14 @@ def test_the_cost_falls_and_the_last_line_says_so(example, monkeypatch, capsys, 
     assert float(trained) < 0.8 * float(untrained) and float(less) < float(miss)
     assert abs(float(untrained) / float(trained) / float(times) - 1.0) < 0.05
     assert name == str(file) and "<svg" in file.read_text()
-    assert said.err.count("iteration") == 4
+    assert said.err.count("iteration") == 3
 
     # Again, to the last bit.
     again = json.loads(run(example, monkeypatch, capsys, "--json", "--out", file).out)
     assert f"{again['untrained_cost']:.2f}" == untrained and f"{again['trained_cost']:.2f}" == trained
     # Nothing touched: surfaces do so at 15 mm, where the cost would be another.
     assert again["untrained_nearest_mm"] > 20.0 and again["trained_nearest_mm"] > 20.0
-    assert [f"{cost:9.4f}" in said.err for cost in again["history"]] == [True] * 4
+    assert [f"{cost:9.4f}" in said.err for cost in again["history"]] == [True] * 3
 
 
 def test_wrong_options(example, monkeypatch, capsys):

@@ -117,7 +117,7 @@ def test_the_study_without_ray_says_what_is_missing():
 
 def test_the_bench_of_batches():
     """Small: what it measures is the same to the bit, however many cores."""
-    command = [sys.executable, ROOT / "benches/batch.py", "--rollouts", 3, "--steps", 5, "--repeats", 1]
+    command = [sys.executable, ROOT / "benches/batch.py", "--rollouts", 3, "--steps", 5, "--rounds", 2]
     command += ["--fidelity", "isolated", "--json"]
     done = subprocess.run(list(map(str, command)), capture_output=True, text=True)
     assert done.returncode == 0, done.stderr

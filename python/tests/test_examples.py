@@ -41,14 +41,14 @@ def test_falling_ball(tmp_path):
     # The water turns or presses the coin only where the bodies feel each other.
     assert max(map(abs, isolated["coin_angle"])) < 1e-9
     assert max(map(abs, full["coin_angle"])) > 1e-3
-    said = last_line(run("falling_ball", tmp_path, "--faces", 80, "--steps", 12))
-    assert said.startswith("isolated  coin at 0.12 s: +0.00° and 0.1050 m above the floor   (")
+    said = last_line(run("falling_ball", tmp_path, "--faces", 80, "--steps", 3))
+    assert said.startswith("isolated  coin at 0.03 s: +0.00° and 0.1050 m above the floor   (")
 
 
 def test_grasp(tmp_path):
     """The beginning; all of it takes half a minute."""
     pytest.importorskip("scipy")
-    said = run("grasp", tmp_path, "--approach", 2, "--hold", 0).split("\n")
+    said = run("grasp", tmp_path, "--approach", 1, "--hold", 0).split("\n")
     assert said[0] == "naive push without water: caught"
     assert said[1] == "naive push in water: lost"
     closing = re.fullmatch(r"found by descent: lost \(.*\), cost 13\.0 -> (\d+\.\d+)", said[-2])

@@ -48,7 +48,7 @@ def test_falling_ball(tmp_path):
 def test_grasp(tmp_path):
     """The beginning; all of it takes half a minute."""
     pytest.importorskip("scipy")
-    said = run("grasp", tmp_path, "--approach", 1, "--hold", 0).split("\n")
+    said = run("grasp", tmp_path, "--approach", 2, "--hold", 0).split("\n")
     assert said[0] == "naive push without water: caught"
     assert said[1] == "naive push in water: lost"
     closing = re.fullmatch(r"found by descent: lost \(.*\), cost 13\.0 -> (\d+\.\d+)", said[-2])

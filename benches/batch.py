@@ -1,9 +1,9 @@
 """How `Simulator.rollout_batch` scales with cores: grasps of random forces on one core and on several.
 
-Each number of cores is measured in a process of its own (RAYON_NUM_THREADS), the best of some repetitions; what comes
-out must be that of the rollouts one by one, to the last bit.
+Each number of cores is measured in processes of their own (RAYON_NUM_THREADS), in turns, and the best of some rounds
+counts; what comes out must be that of the rollouts one by one, to the last bit.
 
-    python benches/batch.py [--rollouts N] [--steps N] [--cores 1,2] [--repeats N] [--fidelity NAME] [--json]
+    python benches/batch.py [--rollouts N] [--steps N] [--cores 1,2] [--rounds N] [--fidelity NAME] [--json]
 
 Measure on an idle machine: what else runs takes its share of the cores.
 """
@@ -41,12 +41,9 @@ def measure(options):
     )
     controls = np.repeat(pushes, 25, axis=1)[:, : options.steps]
     sim.rollout_batch(controls[:2, :10])
-    seconds = []
-    for _ in range(options.repeats):
-        start = time.perf_counter()
-        batch = sim.rollout_batch(controls)
-        seconds.append(time.perf_counter() - start)
-    found = {"seconds": min(seconds), "digest": digest(batch)}
+    start = time.perf_counter()
+    batch = sim.rollout_batch(controls)
+    found = {"seconds": time.perf_counter() - start, "digest": digest(batch)}
     if options.alone:
         start = time.perf_counter()
         found["digest_alone"] = digest([sim.rollout(u) for u in controls])
@@ -57,7 +54,7 @@ def measure(options):
 def run(options, cores, alone):
     """The same in a child."""
     command = [sys.executable, __file__, "--measure", "--rollouts", options.rollouts, "--steps", options.steps]
-    command += ["--repeats", options.repeats, "--fidelity", options.fidelity] + ["--alone"] * alone
+    command += ["--fidelity", options.fidelity] + ["--alone"] * alone
     environment = {**os.environ, "RAYON_NUM_THREADS": str(cores)}
     done = subprocess.run(list(map(str, command)), env=environment, stdout=subprocess.PIPE, text=True, check=True)
     return json.loads(done.stdout)
@@ -76,27 +73,34 @@ def main():
     parser.add_argument("--rollouts", type=int, default=64, help="%(default)s")
     parser.add_argument("--steps", type=int, default=grasp.STEPS, help="%(default)s")
     parser.add_argument("--cores", type=numbers, default=[1, 2], help="1,2")
-    parser.add_argument("--repeats", type=int, default=2, help="%(default)s")
+    parser.add_argument("--rounds", type=int, default=2, help="%(default)s")
     parser.add_argument("--fidelity", default="reduced", help="%(default)s")
     parser.add_argument("--json", action="store_true")
     parser.add_argument("--measure", action="store_true", help=argparse.SUPPRESS)
     parser.add_argument("--alone", action="store_true", help=argparse.SUPPRESS)
     options = parser.parse_args()
-    if min(options.rollouts, options.steps, options.repeats) < 1:
-        parser.error("--rollouts, --steps and --repeats must be at least 1")
+    if min(options.rollouts, options.steps, options.rounds) < 1:
+        parser.error("--rollouts, --steps and --rounds must be at least 1")
     if options.measure:
         print(json.dumps(measure(options)))
         return
-    results = {cores: run(options, cores, alone=k == 0) for k, cores in enumerate(options.cores)}
+    alone = run(options, options.cores[0], alone=True)
+    runs = {cores: [] for cores in options.cores}
+    runs[options.cores[0]].append(alone)
+    for number in range(options.rounds):
+        for k, cores in enumerate(options.cores):
+            if number > 0 or k > 0:
+                runs[cores].append(run(options, cores, alone=False))
+    results = {cores: min(found, key=lambda r: r["seconds"]) for cores, found in runs.items()}
     first = results[options.cores[0]]
-    same = {r["digest"] for r in results.values()} == {first["digest_alone"]}
+    same = {r["digest"] for found in runs.values() for r in found} == {alone["digest_alone"]}
     speedup = {cores: first["seconds"] / r["seconds"] for cores, r in results.items()}
     if options.json:
         report = {"rollouts": options.rollouts, "steps": options.steps, "same_to_the_bit": same}
         report["cores"] = {cores: {"seconds": r["seconds"], "speedup": speedup[cores]} for cores, r in results.items()}
         print(json.dumps(report))
     else:
-        print(f"one by one: {first['seconds_alone']:.2f} s")
+        print(f"one by one: {alone['seconds_alone']:.2f} s")
         for cores, result in results.items():
             factor = f"{speedup[cores]:.2f} times as fast as with {options.cores[0]}"
             print(f"{cores} {'core' if cores == 1 else 'cores'}: {result['seconds']:.2f} s, {factor}")

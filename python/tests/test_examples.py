@@ -41,8 +41,8 @@ def test_falling_ball(tmp_path):
     # The water turns or presses the coin only where the bodies feel each other.
     assert max(map(abs, isolated["coin_angle"])) < 1e-9
     assert max(map(abs, full["coin_angle"])) > 1e-3
-    said = last_line(run("falling_ball", tmp_path, "--faces", 80, "--steps", 12))
-    assert said.startswith("isolated  coin at 0.12 s: +0.00° and 0.1050 m above the floor   (")
+    said = last_line(run("falling_ball", tmp_path, "--faces", 80, "--steps", 3))
+    assert said.startswith("isolated  coin at 0.03 s: +0.00° and 0.1050 m above the floor   (")
 
 
 def test_grasp(tmp_path):
@@ -117,7 +117,7 @@ def test_the_study_without_ray_says_what_is_missing():
 
 def test_the_bench_of_batches():
     """Small: what it measures is the same to the bit, however many cores."""
-    command = [sys.executable, ROOT / "benches/batch.py", "--rollouts", 3, "--steps", 5, "--repeats", 1]
+    command = [sys.executable, ROOT / "benches/batch.py", "--rollouts", 3, "--steps", 5, "--rounds", 2]
     command += ["--fidelity", "isolated", "--json"]
     done = subprocess.run(list(map(str, command)), capture_output=True, text=True)
     assert done.returncode == 0, done.stderr

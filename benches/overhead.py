@@ -1,11 +1,12 @@
-"""What Python costs over Rust: the same rollouts, gradients and single steps on both sides, in one run.
+"""What Python costs over Rust: the same rollouts, gradients and single steps, both sides in turns.
 
-    python benches/overhead.py
+    python benches/overhead.py [--rounds N]
 
 Prints a row a scene: microseconds a step of a rollout, of a rollout with its gradient, and of a single `step` call, in Rust and
-in Python, the least of some rounds each. Builds the Rust side (`cargo bench --bench overhead`).
+in Python, the least of all rounds. Builds the Rust side (`cargo bench --bench overhead`).
 """
 
+import argparse
 import json
 import pathlib
 import subprocess
@@ -14,8 +15,6 @@ import time
 import hydrograd as hg
 
 ROOT = pathlib.Path(__file__).parents[1]
-# As benches/overhead.rs has it.
-ROUNDS = 15
 CASES = [
     ("kirchhoff_ellipsoid", "isolated", 1000),
     ("two_spheres", "isolated", 1000),
@@ -25,19 +24,14 @@ CASES = [
 
 
 def seconds(call):
-    """The shortest of some calls, s."""
-    least = float("inf")
-    for _ in range(ROUNDS):
-        start = time.perf_counter()
-        call()
-        least = min(least, time.perf_counter() - start)
-    return least
+    """Seconds of a call."""
+    start = time.perf_counter()
+    call()
+    return time.perf_counter() - start
 
 
-def measure(name, fidelity, steps):
-    """Seconds a step in Python, as the Rust side gives them."""
-    scene = hg.Scene.load(ROOT / f"examples/scenes/{name}.toml")
-    sim = hg.Simulator(scene, fidelity=fidelity)
+def python_side(sim, steps):
+    """Seconds a step, as the Rust side gives them."""
     goal = hg.objective.final_velocity(0, 0.0)
 
     def one_by_one():
@@ -53,23 +47,43 @@ def measure(name, fidelity, steps):
     return {kind: seconds(call) / steps for kind, call in calls.items()}
 
 
+def rust_side(process):
+    """What the Rust side measures next."""
+    process.stdin.write("\n")
+    process.stdin.flush()
+    return json.loads(process.stdout.readline())
+
+
+def measure(name, fidelity, steps, rounds):
+    """The least of all rounds, in Rust and in Python."""
+    scene = hg.Scene.load(ROOT / f"examples/scenes/{name}.toml")
+    sim = hg.Simulator(scene, fidelity=fidelity)
+    command = ["cargo", "bench", "--quiet", "--bench", "overhead", "--", name, fidelity, str(steps)]
+    least = [{}, {}]
+    with subprocess.Popen(command, cwd=ROOT, stdin=subprocess.PIPE, stdout=subprocess.PIPE, text=True) as process:
+        for _ in range(rounds):
+            for best, found in zip(least, (rust_side(process), python_side(sim, steps)), strict=True):
+                for kind, value in found.items():
+                    best[kind] = min(value, best.get(kind, value))
+        process.stdin.close()
+    return least
+
+
 def main():
-    arguments = [str(part) for case in CASES for part in case]
-    command = ["cargo", "bench", "--quiet", "--bench", "overhead", "--", *arguments]
-    done = subprocess.run(command, cwd=ROOT, stdout=subprocess.PIPE, text=True, check=True)
-    in_rust = [json.loads(line) for line in done.stdout.splitlines() if line.startswith("{")]
+    parser = argparse.ArgumentParser(description=__doc__.split("\n")[0])
+    parser.add_argument("--rounds", type=int, default=40)
+    rounds = parser.parse_args().rounds
     print("| scene | fidelity | steps | rollout, µs/step: Rust, Python | with gradient | `step`, µs: Rust, Python | more |")
     print("|---|---|---|---|---|---|---|")
-    for case, rust in zip(CASES, in_rust, strict=True):
-        python = measure(*case)
+    for name, fidelity, steps in CASES:
+        rust, python = measure(name, fidelity, steps, rounds)
 
         def pair(kind, rust=rust, python=python):
             a, b = rust[kind], python[kind]
             return f"{1e6 * a:.1f}, {1e6 * b:.1f} ({100 * (b / a - 1):+.1f} %)"
 
-        more = 1e6 * (python["step"] - rust["step"])
-        name, fidelity, steps = case
         step = f"{1e6 * rust['step']:.1f}, {1e6 * python['step']:.1f}"
+        more = 1e6 * (python["step"] - rust["step"])
         print(f"| {name} | {fidelity} | {steps} | {pair('rollout')} | {pair('gradient')} | {step} | {more:.1f} |")
 
 

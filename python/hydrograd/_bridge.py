@@ -62,8 +62,13 @@ class Pulled(NamedTuple):
     gains: Array
 
 
-@functools.lru_cache(maxsize=32)
 def _variant(physics: Physics, values: bytes, gains: bytes) -> Simulator:
+    return _changed(physics, values, gains) if values or gains else physics.sim
+
+
+# Steps of one rollout ask for the same variant one after the other.
+@functools.lru_cache(maxsize=32)
+def _changed(physics: Physics, values: bytes, gains: bytes) -> Simulator:
     sim = physics.sim
     if values:
         sim = sim.with_parameters(dict(zip(physics.names, np.frombuffer(values).tolist(), strict=True)))
@@ -208,8 +213,9 @@ class Stepped(NamedTuple):
 
 
 def _state(sim: Simulator, q: Array, v: Array, step: int, mode: int, held: NDArray[np.bool_]) -> State:
-    if step < 0:
-        raise InputError(f"step: state.step: got {step}; must be at least 0")
+    for name, number in (("step", step), ("mode", mode)):
+        if number < 0:
+            raise InputError(f"step: state.{name}: got {number}; must be at least 0")
     state = sim.state(q, v, step=step)
     if mode == 0 and not held.any():
         return state

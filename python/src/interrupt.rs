@@ -1,7 +1,7 @@
 //! Long work without the interpreter's lock, which Ctrl-C ends.
 
 use crate::error::{exception, internal};
-use crate::policy::Raised;
+use crate::policy::{Raised, Watch};
 use pyo3::prelude::*;
 use std::ops::ControlFlow;
 use std::panic::{AssertUnwindSafe, catch_unwind};
@@ -14,10 +14,10 @@ use std::time::Duration;
 const PATIENCE: Duration = Duration::from_millis(50);
 
 /// Whether work should go on.
-#[derive(Clone, Default)]
+#[derive(Clone)]
 pub struct Wish {
     stop: Arc<AtomicBool>,
-    raised: Raised,
+    watch: Watch,
 }
 
 impl Wish {
@@ -26,7 +26,7 @@ impl Wish {
         if self.stop.load(Ordering::Relaxed) {
             ControlFlow::Break(())
         } else {
-            self.raised.go_on()
+            self.watch.go_on()
         }
     }
 }
@@ -65,9 +65,13 @@ pub fn long<T: Send + 'static>(
 ) -> PyResult<T> {
     not_forked()?;
     let wish = Wish {
-        raised: raised.clone(),
-        ..Wish::default()
+        stop: Arc::default(),
+        watch: raised.watch(),
     };
+    // A controller that simulates is called by a thread that the simulation waits for: it can't wait for another.
+    if rayon::current_thread_index().is_some() {
+        return finish(py, &wish.watch, || work(&wish));
+    }
     let (send, receive) = sync_channel(1);
     let theirs = wish.clone();
     let thread = std::thread::Builder::new()
@@ -87,7 +91,7 @@ pub fn long<T: Send + 'static>(
         });
         receive = back;
         match heard {
-            Ok(Ok(done)) => return raised.before(done),
+            Ok(Ok(done)) => return wish.watch.outcome(py, done),
             Ok(Err(panic)) => return Err(internal(said(panic.as_ref()))),
             Err(RecvTimeoutError::Timeout) => {
                 if let Err(stop) = py.check_signals() {
@@ -107,10 +111,18 @@ pub fn short<T: Send>(
     work: impl FnOnce() -> hydrograd::Result<T> + Send,
 ) -> PyResult<T> {
     not_forked()?;
+    finish(py, &raised.watch(), work)
+}
+
+fn finish<T: Send>(
+    py: Python<'_>,
+    watch: &Watch,
+    work: impl FnOnce() -> hydrograd::Result<T> + Send,
+) -> PyResult<T> {
     match py.detach(|| catch_unwind(AssertUnwindSafe(work))) {
         Ok(done) => {
             py.check_signals()?;
-            raised.before(done)
+            watch.outcome(py, done)
         }
         Err(panic) => Err(internal(said(panic.as_ref()))),
     }

@@ -1,7 +1,9 @@
 //! Controllers written in Python.
 //!
 //! An exception of one can't pass through a rollout. It waits beside it, the rollout ends at its next step, and
-//! whoever started it raises the exception.
+//! whoever started it raises the exception. Exceptions are counted: a call that finds more of them at its end than at
+//! its beginning gives no result, so that calls at the same time on one rollout can't take what another one's
+//! exception left undone for an answer.
 
 use crate::array::{self, Dim};
 use crate::error::{OrRaise, exception, input};
@@ -14,27 +16,58 @@ use std::sync::{Arc, Mutex, PoisonError};
 
 /// What the controller of a run has raised.
 #[derive(Clone, Default)]
-pub struct Raised(Arc<Mutex<Option<PyErr>>>);
+pub struct Raised(Arc<Mutex<Exceptions>>);
+
+#[derive(Default)]
+struct Exceptions {
+    count: u64,
+    last: Option<PyErr>,
+}
+
+/// The time between two moments of a run.
+#[derive(Clone)]
+pub struct Watch {
+    raised: Raised,
+    before: u64,
+}
 
 impl Raised {
-    fn with<T>(&self, of: impl FnOnce(&mut Option<PyErr>) -> T) -> T {
+    fn with<T>(&self, of: impl FnOnce(&mut Exceptions) -> T) -> T {
         of(&mut self.0.lock().unwrap_or_else(PoisonError::into_inner))
     }
 
+    fn add(&self, error: PyErr) {
+        self.with(|all| {
+            all.count += 1;
+            all.last = Some(error);
+        });
+    }
+
+    /// From now on.
+    pub fn watch(&self) -> Watch {
+        Watch {
+            raised: self.clone(),
+            before: self.with(|all| all.count),
+        }
+    }
+}
+
+impl Watch {
     /// For the progress of a run: not after an exception.
     pub fn go_on(&self) -> ControlFlow<()> {
-        if self.with(|raised| raised.is_some()) {
+        if self.raised.with(|all| all.count) > self.before {
             ControlFlow::Break(())
         } else {
             ControlFlow::Continue(())
         }
     }
 
-    /// What the run gave, unless its controller raised an exception.
-    pub fn before<T>(&self, done: hydrograd::Result<T>) -> PyResult<T> {
-        match self.with(Option::take) {
-            Some(raised) => Err(raised),
-            None => done.or_raise(),
+    /// What the run gave, unless its controller raised an exception meanwhile.
+    pub fn outcome<T>(&self, py: Python<'_>, done: hydrograd::Result<T>) -> PyResult<T> {
+        let last = (self.raised).with(|all| all.last.as_ref().map(|e| e.clone_ref(py)));
+        match last {
+            Some(error) if self.go_on().is_break() => Err(error),
+            _ => done.or_raise(),
         }
     }
 }
@@ -132,13 +165,10 @@ impl Controller {
         })
     }
 
-    /// What Python gives, unless something was raised already; nothing then.
+    /// What Python gives; nothing where it raises an exception, which is kept.
     fn ask<T: Default>(&self, call: impl FnOnce(Python<'_>) -> PyResult<T>) -> T {
-        if self.raised.go_on().is_break() {
-            return T::default();
-        }
         Python::attach(call).unwrap_or_else(|error| {
-            self.raised.with(|raised| *raised = Some(error));
+            self.raised.add(error);
             T::default()
         })
     }

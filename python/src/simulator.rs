@@ -293,10 +293,11 @@ impl Simulator {
         };
         let from = &state.get().state;
         let (inner, raised) = me.for_run(slf.py())?;
+        let watch = raised.watch();
         let cell = short(slf.py(), &raised, || {
             Owned::try_new(inner, |s| {
                 let controls = Controls::from_matrix(s, matrix)?;
-                s.rollout_from(from, &controls, |_| raised.go_on())
+                s.rollout_from(from, &controls, |_| watch.go_on())
             })
         })?;
         let rollout = cell.borrow_dependent();

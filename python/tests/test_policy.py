@@ -1,6 +1,11 @@
 """Controllers written in Python: they act, are differentiated, and what they raise comes out."""
 
+import os
+import pathlib
 import pickle
+import subprocess
+import sys
+import threading
 
 import numpy as np
 import pytest
@@ -153,3 +158,72 @@ def test_it_travels_with_its_simulator(planar):
     assert np.array_equal(again.rollout().q, sim.rollout().q)
     batch = sim.rollout_batch(np.zeros((3, 6, 3)))
     assert all(np.array_equal(one.q, sim.rollout().q) for one in batch)
+
+
+class Looks(Spring):
+    """A controller that simulates ahead."""
+
+    def __init__(self, ahead, gains=(3.0, 0.4)):
+        super().__init__(gains)
+        self.ahead = ahead
+
+    def act(self, seen):
+        off = self.ahead.rollout(np.zeros((2, 3)), q=seen.q, v=seen.v).q[-1, :2] - self.home
+        return np.append(-self.gains[0] * off, 0.0)
+
+
+def test_a_controller_may_simulate(planar):
+    """With one thread, and with all of them inside a controller: nothing waits for ever."""
+    code = """
+import sys
+import numpy as np
+sys.path.insert(0, {folder!r})
+import hydrograd as hg
+from test_policy import Looks, scene
+sim = hg.Simulator(scene(), 0.02, fidelity="reduced")
+looks = sim.with_policy(Looks(sim))
+one = looks.rollout(steps=3).q
+assert all(np.array_equal(r.q, one) for r in looks.rollout_batch(np.zeros((6, 3, 3))))
+print(np.abs(one[-1] - one[0]).max())
+"""
+    folder = str(pathlib.Path(__file__).parent)
+    for threads in ("1", "2"):
+        environment = {**os.environ, "RAYON_NUM_THREADS": threads}
+        command = [sys.executable, "-c", code.format(folder=folder)]
+        done = subprocess.run(command, capture_output=True, text=True, timeout=120, env=environment)
+        assert done.returncode == 0, done.stderr
+        assert float(done.stdout) > 1e-6
+
+
+def test_sweeps_at_the_same_time_on_one_rollout(planar):
+    """One that fails doesn't leave its hole in the other's gradient."""
+
+    class Sometimes(Spring):
+        def act_vjp(self, seen, control_bar):
+            if seen.step == 3 and float(np.abs(control_bar).max()) > 1.0:
+                raise RuntimeError("too much")
+            return super().act_vjp(seen, control_bar)
+
+    rollout = planar.with_policy(Sometimes()).rollout()
+    seed = np.zeros_like(rollout.v)
+    seed[-1] = 1e-3
+    right = rollout.vjp(v=seed).gains
+    outcomes = []
+
+    def sweep(scale):
+        for _ in range(10):
+            try:
+                outcomes.append((scale, rollout.vjp(v=scale * seed).gains))
+            except RuntimeError:
+                outcomes.append((scale, None))
+
+    threads = [threading.Thread(target=sweep, args=(scale,)) for scale in (1.0, 1e9)]
+    for thread in threads:
+        thread.start()
+    for thread in threads:
+        thread.join()
+    assert len(outcomes) == 20
+    for scale, found in outcomes:
+        assert found is None or scale == 1.0 and np.array_equal(found, right)
+    # What was raised then is over.
+    assert np.array_equal(rollout.vjp(v=seed).gains, right)

@@ -25,8 +25,10 @@ const BLOCK: usize = 64;
 const BUSY: usize = 2048;
 /// Tasks of a derivative, about, unless there are more pairs.
 const TASKS: usize = 2048;
-/// Memory for what the tasks of one batch of pairs leave, bytes.
+/// Memory for what the tasks of one batch of pairs leave, bytes; more, up to the second, where tasks leave so
+/// much that a large card would have too few of them.
 const BATCH: usize = 1 << 20;
+const LARGEST_BATCH: usize = 64 << 20;
 
 /// Numbers of things.
 #[derive(Clone, Copy, Debug)]
@@ -320,7 +322,8 @@ impl Geometry {
 
     /// The pairs in batches, where each task leaves so many bytes.
     pub fn batches(&self, bytes: usize) -> Vec<PairBatch> {
-        let most = (BATCH.min(self.context.largest_binding() as usize) / bytes.max(1)).max(1);
+        let largest = LARGEST_BATCH.min(self.context.largest_binding() as usize);
+        let most = (BATCH.max(BUSY * bytes).min(largest) / bytes.max(1)).max(1);
         let mut out: Vec<PairBatch> = Vec::new();
         for (number, tasks) in self.pair_tasks.iter().enumerate() {
             match out.last_mut() {

@@ -101,7 +101,7 @@ fn derivatives_of_many_pairs_go_in_batches() {
     let model = Model::new(vec![body; poses.len()], &[], Exclusions::none(), settings);
     let model = Arc::new(model.unwrap());
     let (cpu, gpu) = both(context(), &model);
-    // 4032 pairs, 720 and 384 bytes each: more than the device is asked to hold of them at once (1 MiB).
+    // 4032 pairs, 720 and 384 bytes each: more than the device is asked to hold of them at once (2048 pairs, or 1 MiB).
     let basis = basis(poses.len(), 5, 0.3);
     let (x, y) = (twist(1, 0.1).rows(0, 5).into_owned(), twist(1, 0.9));
     let y = y.rows(0, 5).into_owned();

@@ -49,6 +49,8 @@ const ON_DEVICE: &[(&str, &str)] = &[
         "gpu::full::probe::Probe::apply_transpose_jvp",
         "apply_transpose_jvp",
     ),
+    ("gpu::full::pairs::pairs_hvp", "pair_hvp"),
+    ("gpu::full::pairs::pairs_vjp", "pair_vjp"),
     ("gpu::full::probe::Probe::pair_hvp", "pair_hvp"),
     ("gpu::full::probe::Probe::pair_vjp", "pair_vjp"),
     ("gpu::full::response::Answer::gradient", "pair_vjp"),

@@ -82,6 +82,8 @@ class SimulationEnv(gymnasium.Env[_Array, NDArray[np.float32]]):
         self.action_space = gymnasium.spaces.Box(-1.0, 1.0, self._largest.shape, dtype=np.float32)
         self._bounds = high
         self._state: hg.State | None = None
+        self._over = True
+        self._told: dict[str, Any] = {}
         self._seen = np.zeros_like(high)
 
     @property
@@ -93,9 +95,9 @@ class SimulationEnv(gymnasium.Env[_Array, NDArray[np.float32]]):
 
     @property
     def state(self) -> hg.State:
-        """The simulator's state now."""
+        """The simulator's state now, or where the episode ended."""
         if self._state is None:
-            raise ResetNeeded("the episode has ended or not begun: call reset()")
+            raise ResetNeeded("no episode has begun: call reset()")
         return self._state
 
     @property
@@ -113,24 +115,26 @@ class SimulationEnv(gymnasium.Env[_Array, NDArray[np.float32]]):
             raise hg.InputError(f"options: got {sorted(given)}; expected only 'q' and 'v'")
         self._state = self.simulator.state(q, v)
         self._seen = self._observation(self._state)
-        return self._seen.copy(), self._begin(self._state)
+        self._over, self._told = False, self._begin(self._state)
+        return self._seen.copy(), dict(self._told)
 
     def step(self, action: ArrayLike) -> tuple[_Array, float, bool, bool, dict[str, Any]]:
         """Observation, reward, whether it terminated, False (the horizon is `gymnasium.make`'s), and info."""
         state = self.state
+        if self._over:
+            raise ResetNeeded("the episode has ended: call reset()")
         given = self.checked(action)
         try:
             rollout, after, refined = self._advance(state, self._largest * given)
         except hg.Error as error:
-            self._state = None
-            return self._seen.copy(), 0.0, True, False, {"error": f"{type(error).__name__}: {error}"}
+            self._over = True
+            return self._seen.copy(), 0.0, True, False, {**self._told, "error": f"{type(error).__name__}: {error}"}
         self._state = after
         self._seen = self._observation(after)
         reward, terminated, info = self._judge(rollout, after, given)
         info["refined"] = refined
-        if terminated:
-            self._state = None
-        return self._seen.copy(), reward, terminated, False, info
+        self._over, self._told = terminated, info
+        return self._seen.copy(), reward, terminated, False, dict(info)
 
     def _advance(self, state: hg.State, control: _Array) -> tuple[hg.Rollout, hg.State, bool]:
         """What happens in a step, the state after it, and whether it needed shorter steps."""

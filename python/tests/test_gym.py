@@ -177,7 +177,11 @@ def test_a_step_that_fails_is_made_again_with_shorter_ones(monkeypatch):
     given = environments.GraspEnv(simulator=right.simulator)
     given.reset(seed=4)
     monkeypatch.setattr(given, "_simulator", Stuck(right.simulator))
-    assert given.step(action)[4] == {"error": "SolverError: stuck"}
+    given.render_mode = "rgb_array"
+    told = given.step(action)[4]
+    # As recorders do after the last step.
+    assert given.render().shape == (360, 480, 3)
+    assert told["error"] == "SolverError: stuck" and not told["is_success"]
 
 
 def test_wrong_input():

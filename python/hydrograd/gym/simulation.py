@@ -128,7 +128,8 @@ class SimulationEnv(gymnasium.Env[_Array, NDArray[np.float32]]):
             rollout, after, refined = self._advance(state, self._largest * given)
         except hg.Error as error:
             self._over = True
-            return self._seen.copy(), 0.0, True, False, {**self._told, "error": f"{type(error).__name__}: {error}"}
+            said = f"{type(error).__name__}: {error}"
+            return self._seen.copy(), 0.0, True, False, {**self._told, "refined": False, "error": said}
         self._state = after
         self._seen = self._observation(after)
         reward, terminated, info = self._judge(rollout, after, given)

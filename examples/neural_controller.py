@@ -13,8 +13,8 @@ then compared on starts that none of this has seen. Costs are squares of tolerab
 the fingers at all times; at the end the opening, the middle, and speeds; and the mean force. The task ends before
 anything touches (`--json` has the smallest gaps; surfaces touch at 15 mm).
 
-Measured beside other work, on two cores: mean cost of 16 unseen starts 25.4 untrained and 0.18 trained, after 60
-iterations of 8 starts in 43 s; the coin leaves its place by at most 33.6 mm untrained and 2.5 mm trained.
+Measured on two cores: mean cost of 16 unseen starts 25.4 untrained and 0.18 trained, after 60 iterations of 8 starts
+in 53 s; the coin leaves its place by at most 33.6 mm untrained and 2.5 mm trained.
 
     python examples/neural_controller.py [--iterations N] [--starts N] [--unseen N] [--out FILE.svg] [--json]
 """

@@ -32,11 +32,12 @@ import torch
 
 import hydrograd as hg
 import hydrograd.torch as ht
+from hydrograd.tasks import grasp
+from hydrograd.tasks.grasp import COIN_TURN, COIN_Y, COIN_Z, COLUMN, FINGERS
 
 TIME_STEP = 0.04  # s
 STEPS = 50
-# Entries of q and v: the scene's joints are plain.
-COLUMN, LOWER, UPPER, COIN_Y, COIN_Z, COIN_TURN = range(6)
+LOWER, UPPER = FINGERS
 # Opening at the start and at the end, m, and how long closing takes, s.
 WIDE, NARROW, CLOSING = 0.8, 0.55, 1.5
 # Where the coin starts: y, m from the column; z, m; turn, rad.
@@ -50,9 +51,7 @@ SEED = 7
 
 def simulator() -> hg.Simulator:
     """The grasp without its own controller."""
-    file = pathlib.Path(__file__).parent / "scenes/grasp.toml"
-    text, _ = hg.Scene.load(file).to_toml().split("[controller]")
-    return hg.Simulator(hg.Scene.from_toml(text), TIME_STEP, fidelity="auto")
+    return hg.Simulator(grasp.scene(), TIME_STEP, fidelity="auto")
 
 
 def opening(time: float) -> tuple[float, float]:

@@ -10,7 +10,7 @@ import functools
 import os
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from concurrent.futures import ThreadPoolExecutor
-from typing import Any, NamedTuple, TypeVar, cast
+from typing import Any, NamedTuple, TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
@@ -109,6 +109,27 @@ def leading(place: str, shapes: Mapping[str, tuple[tuple[int, ...], tuple[int | 
     if 0 in lead:
         raise InputError(f"{place}: got a batch of the shape {lead}; must hold at least one")
     return lead
+
+
+Ending = tuple["int | str", ...]
+"""What a shape must end in; a name stands for any number."""
+
+
+def adjustable(
+    place: str,
+    sim: Simulator,
+    parameters: Mapping[str, Any] | None,
+    gains: Any,
+    convert: Callable[[str, Any], Made],
+) -> dict[str, tuple[Made, Ending]]:
+    """Parameters and gains, converted, each with what its shape must end in."""
+    out: dict[str, tuple[Made, Ending]] = {}
+    for name, value in (parameters or {}).items():
+        where = f"parameters[{name!r}]"
+        out[where] = convert(f"{place}: {where}", value), ()
+    if gains is not None:
+        out["gains"] = convert(f"{place}: gains", gains), (len(sim.gains),)
+    return out
 
 
 def finite(place: str, array: Array) -> None:
@@ -216,28 +237,7 @@ def _state(sim: Simulator, q: Array, v: Array, step: int, mode: int, held: NDArr
     for name, number in (("step", step), ("mode", mode)):
         if number < 0:
             raise InputError(f"step: state.{name}: got {number}; must be at least 0")
-    state = sim.state(q, v, step=step)
-    if mode == 0 and not held.any():
-        return state
-    make, parts = _reduced(state)
-    return make(parts._replace(held=held.tolist(), mode=mode))
-
-
-class _Parts(NamedTuple):
-    # What a state is pickled as, in that order.
-    simulator: Simulator
-    step: int
-    q: list[float]
-    y: list[float]
-    held: list[bool]
-    mode: int
-    v: list[float]
-
-
-def _reduced(state: State) -> tuple[Callable[[_Parts], State], _Parts]:
-    # What a controller remembers is seen, and put back, nowhere but in pickling.
-    make, parts = cast("tuple[Callable[..., State], tuple[Any, ...]]", state.__reduce__())
-    return lambda given: make(*given), _Parts(*parts)
+    return sim.state(q, v, step=step, mode=mode, held=held.tolist() if held.any() else None)
 
 
 def advance(
@@ -255,10 +255,7 @@ def advance(
     after = Stepped(np.empty_like(q), np.empty_like(v), fresh, [record for _, record in made])
     for b, (state, _) in enumerate(made):
         after.q[b], after.v[b] = state.q, state.v
-        parts = _reduced(state)[1]
-        fresh.step[b], fresh.mode[b] = parts.step, parts.mode
-        # An empty list holds nothing.
-        fresh.held[b] = parts.held or False
+        fresh.step[b], fresh.mode[b], fresh.held[b] = state.step, state.mode, state.held
     return after
 
 

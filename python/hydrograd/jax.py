@@ -86,11 +86,11 @@ def rollout(
     is in `sim`. Leading dimensions are broadcast.
     """
     physics = _bridge.physics_of("rollout", sim, parameters)
-    parts = {
+    parts: Parts = {
         "controls": (_array("rollout: controls", controls), ("steps", sim.control_size)),
         "q": (_array("rollout: q", sim.initial_q if q is None else q), (sim.q_size,)),
         "v": (_array("rollout: v", sim.initial_v if v is None else v), (sim.v_size,)),
-        **_adjustable("rollout", sim, parameters, gains),
+        **_bridge.adjustable("rollout", sim, parameters, gains, _array),
     }
     _, spread = _spread("rollout", physics, parts)
     return Trajectory(*_jax.rollout(physics, *spread))
@@ -123,11 +123,11 @@ def step(
     """
     physics = _bridge.physics_of("step", sim, parameters)
     state = State(*state)
-    parts = {
+    parts: Parts = {
         "u": (_array("step: u", np.zeros(sim.control_size) if u is None else u), (sim.control_size,)),
         "state.q": (_array("step: state.q", state.q), (sim.q_size,)),
         "state.v": (_array("step: state.v", state.v), (sim.v_size,)),
-        **_adjustable("step", sim, parameters, gains),
+        **_bridge.adjustable("step", sim, parameters, gains, _array),
     }
     lead, spread = _spread("step", physics, parts)
     memory = (
@@ -166,17 +166,7 @@ def _whole(name: str, given: Array | int, shape: tuple[int, ...], dtype: Any) ->
         raise InputError(f"step: state.{name}: got shape {array.shape}; must go with {shape}") from None
 
 
-Parts = dict[str, tuple[Array, tuple[int | str, ...]]]
-
-
-def _adjustable(place: str, sim: Simulator, parameters: Mapping[str, Numbers] | None, gains: Numbers | None) -> Parts:
-    """Parameters and gains, each with what its shape must end in."""
-    out: Parts = {}
-    for name, value in (parameters or {}).items():
-        out[f"parameters[{name!r}]"] = (_array(f"{place}: parameters[{name!r}]", value), ())
-    if gains is not None:
-        out["gains"] = (_array(f"{place}: gains", gains), (len(sim.gains),))
-    return out
+Parts = dict[str, tuple[Array, _bridge.Ending]]
 
 
 def _spread(place: str, physics: Physics, parts: Parts) -> tuple[tuple[int, ...], list[Array]]:

@@ -82,11 +82,11 @@ def rollout(
     is in `sim`. Leading dimensions are broadcast.
     """
     physics = _bridge.physics_of("rollout", sim, parameters)
-    parts = {
+    parts: Parts = {
         "controls": (_tensor("rollout: controls", controls), ("steps", sim.control_size)),
         "q": (_tensor("rollout: q", sim.initial_q if q is None else q), (sim.q_size,)),
         "v": (_tensor("rollout: v", sim.initial_v if v is None else v), (sim.v_size,)),
-        **_adjustable("rollout", sim, parameters, gains),
+        **_bridge.adjustable("rollout", sim, parameters, gains, _value),
     }
     lead, flat = _flat("rollout", physics, parts)
     made = _Rollout.apply(physics, *flat)
@@ -120,11 +120,11 @@ def step(
     """
     physics = _bridge.physics_of("step", sim, parameters)
     state = State(*state)
-    parts = {
+    parts: Parts = {
         "u": (_tensor("step: u", np.zeros(sim.control_size) if u is None else u), (sim.control_size,)),
         "state.q": (_tensor("step: state.q", state.q), (sim.q_size,)),
         "state.v": (_tensor("step: state.v", state.v), (sim.v_size,)),
-        **_adjustable("step", sim, parameters, gains),
+        **_bridge.adjustable("step", sim, parameters, gains, _value),
     }
     lead, flat = _flat("step", physics, parts)
     memory = _memory(state, lead, physics)
@@ -196,20 +196,14 @@ def _tensor(place: str, given: Numbers) -> Tensor:
     return tensor.to(torch.float64)
 
 
-Parts = dict[str, tuple[Tensor, tuple[int | str, ...]]]
+def _value(place: str, given: Numbers) -> Tensor:
+    """A tensor of finite numbers: values that a simulator is made anew with."""
+    tensor = _tensor(place, given)
+    _bridge.finite(place, tensor.detach().numpy())
+    return tensor
 
 
-def _adjustable(place: str, sim: Simulator, parameters: Mapping[str, Numbers] | None, gains: Numbers | None) -> Parts:
-    """Parameters and gains, each with what its shape must end in."""
-    out: Parts = {}
-    for name, value in (parameters or {}).items():
-        where = f"parameters[{name!r}]"
-        tensor = _tensor(f"{place}: {where}", value)
-        _bridge.finite(f"{place}: {where}", tensor.detach().numpy())
-        out[where] = (tensor, ())
-    if gains is not None:
-        out["gains"] = (_tensor(f"{place}: gains", gains), (len(sim.gains),))
-    return out
+Parts = dict[str, tuple[Tensor, _bridge.Ending]]
 
 
 def _flat(place: str, physics: Physics, parts: Parts) -> tuple[tuple[int, ...], list[Tensor]]:

@@ -11,7 +11,7 @@ use crate::rollout::{Owned, Rollout};
 use crate::scene::Scene;
 use crate::settings::{Keywords, backend_name, fidelity_name, integrator_name, row_or};
 use crate::state::{Record, State, one_step};
-use hydrograd::Controls;
+use hydrograd::{Controls, dynamics};
 use nalgebra::{DMatrix, DVector};
 use numpy::PyArrayDyn;
 use pyo3::prelude::*;
@@ -256,20 +256,33 @@ impl Simulator {
     }
 
     /// The state at coordinates `q` (q_size,) and generalised velocity `v` (v_size,) after `step` steps; what is None is
-    /// where the simulator starts.
-    #[pyo3(signature = (q=None, v=None, *, step=0))]
+    /// where the simulator starts. `mode` is what the scene's controller remembers, `held` (bodies,) whose joints it held in the
+    /// step that led here, by default none.
+    #[pyo3(signature = (q=None, v=None, *, step=0, mode=0, held=None))]
     fn state(
         slf: &Bound<'_, Self>,
         q: Option<&Bound<'_, PyAny>>,
         v: Option<&Bound<'_, PyAny>>,
         step: usize,
+        mode: usize,
+        held: Option<Vec<bool>>,
     ) -> PyResult<State> {
         let me = slf.get();
+        let bodies = me.inner.system().len();
+        let held = held.unwrap_or_default();
+        if ![0, bodies].contains(&held.len()) {
+            return Err(input(
+                "state: held",
+                format!("{} numbers", held.len()),
+                format!("must be {bodies}, one a body"),
+            ));
+        }
         let (q0, v0) = me.inner.start();
         let (q, v) = (row_or("state: q", q, q0)?, row_or("state: v", v, v0)?);
-        let state = short(slf.py(), &Raised::default(), || {
+        let made = short(slf.py(), &Raised::default(), || {
             me.inner.state(step, &q, &v)
         })?;
+        let state = dynamics::State { held, mode, ..made };
         Ok(State {
             simulator: slf.clone().unbind(),
             state,

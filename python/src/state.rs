@@ -8,7 +8,7 @@ use crate::rollout::Owned;
 use crate::simulator::Simulator;
 use hydrograd::dynamics;
 use nalgebra::{DMatrix, DVector};
-use numpy::PyArrayDyn;
+use numpy::{PyArray1, PyArrayDyn};
 use pyo3::prelude::*;
 use std::sync::Arc;
 
@@ -88,6 +88,20 @@ impl State {
             self.velocity.as_slice().to_vec(),
             &[self.velocity.len()],
         )
+    }
+
+    /// What the scene's controller remembers; 0 without one.
+    #[getter]
+    fn mode(&self) -> usize {
+        self.state.mode
+    }
+
+    /// Bodies whose joints the scene's controller held in the step that led here, (bodies,).
+    #[getter]
+    fn held<'py>(&self, py: Python<'py>) -> Bound<'py, PyArray1<bool>> {
+        let mut held = self.state.held.clone();
+        held.resize(self.simulator.get().inner.system().len(), false);
+        PyArray1::from_vec(py, held)
     }
 
     /// Positions of the bodies' origins, (bodies, 3), m, world axes.

@@ -158,6 +158,11 @@ def test_states(sim):
         sim.state(q=np.zeros(14))
     with pytest.raises(hg.InputError, match=r"\(6,\)"):
         sim.step(sim.state(), np.zeros(5))
+    with pytest.raises(hg.InputError, match="held: got 1 numbers; must be 2, one a body"):
+        sim.state(held=[True])
+    state = sim.state(step=3, mode=2, held=[False, True])
+    assert state.step == 3 and state.mode == 2 and state.held.tolist() == [False, True]
+    assert sim.state().mode == 0 and sim.state().held.tolist() == [False, False]
     scene = hg.Scene()
     scene.add(hg.Body(hg.sphere(1.0), density=1.0))
     other = hg.Simulator(scene, fidelity="isolated")

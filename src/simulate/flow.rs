@@ -79,7 +79,8 @@ impl Simulator {
 }
 
 impl Rollout<'_> {
-    /// The water's velocity at points (m, world frame) at state `n`: m/s, world axes, the current included. It takes a solve.
+    /// The water's velocity at points (m, world frame) at state `n`: m/s, world axes, the current included. It takes a solve. It is
+    /// there to be looked at: nothing of a step depends on it, and it has no transpose.
     ///
     /// # Errors
     /// A state that there isn't; points that aren't finite, within a body, behind a wall, or nearer to a surface than

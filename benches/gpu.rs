@@ -9,7 +9,7 @@
 
 use hydrograd::adjoint::lie::{Pose, Vec3, Vec6};
 use hydrograd::boundary::{BodyBoundary, Settings as BodySettings};
-use hydrograd::coupling::full::{Cpu, Full, Model, SolveSettings, WetBody};
+use hydrograd::coupling::full::{Cpu, Full, MfsBody, Model, SolveSettings};
 use hydrograd::coupling::{Coupling, Direction, Exclusions};
 use hydrograd::dynamics::Integrator;
 use hydrograd::gpu::full::{Gpu, Probe};
@@ -150,7 +150,7 @@ fn lattice(count: usize) -> hydrograd::Result<(Arc<Model>, Vec<Pose>)> {
         mesh.faces(),
         &BodySettings::default(),
     )?;
-    let body = Arc::new(WetBody::new(Arc::new(boundary)));
+    let body = Arc::new(MfsBody::new(Arc::new(boundary)));
     let settings = SolveSettings {
         tolerance: 1e-6,
         ..SolveSettings::default()

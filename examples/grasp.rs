@@ -93,8 +93,8 @@ fn main() -> Result<(), Box<dyn Error>> {
 
     let dry = task::simulator(&task::dry(&scene), Fidelity::Isolated)?;
     let naive_dry_caught = hold::caught(&task::run(&dry, scene.steps)?)?;
-    let wet = task::simulator(&scene, Fidelity::Reduced)?;
-    let naive = task::run(&wet, scene.steps)?;
+    let submerged = task::simulator(&scene, Fidelity::Reduced)?;
+    let naive = task::run(&submerged, scene.steps)?;
     let naive_caught = hold::caught(&naive)?;
 
     let task = Task::new(&scene)?;

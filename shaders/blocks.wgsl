@@ -1,5 +1,5 @@
 // Products with the bodies' dense blocks [L, Ū], which bodies of equal shape share. Twins: coupling::reduced's
-// charges (expand) and tangent_answer (project).
+// charges (expand) and tangent_solution (project).
 
 //! uses: gate
 //! constants:

@@ -5,7 +5,7 @@
 use hydrograd::Error;
 use hydrograd::adjoint::lie::{Mat3, Mat6, Pose, Vec3, Vec6, exp_matrix, skew};
 use hydrograd::boundary::{BodyBoundary, Method, RowScaling, Settings};
-use hydrograd::coupling::full::{Full, Preconditioner, SolveSettings, Solver, WetBody};
+use hydrograd::coupling::full::{Full, MfsBody, Preconditioner, SolveSettings, Solver};
 use hydrograd::coupling::{Coupling, Direction, Exclusions, Isolated, Report};
 use hydrograd::scene::{Shape, Wall};
 use hydrograd::shape;
@@ -14,26 +14,26 @@ use serde_json::Value;
 use std::path::Path;
 use std::sync::{Arc, LazyLock};
 
-fn wet(semi_axes: [f64; 3], faces: usize, settings: &Settings) -> Arc<WetBody> {
+fn submerged(semi_axes: [f64; 3], faces: usize, settings: &Settings) -> Arc<MfsBody> {
     let shape = Shape::Ellipsoid {
         semi_axes,
         faces: None,
     };
     let mesh = shape::build(&shape, Path::new("."), Some(faces)).unwrap();
     let b = BodyBoundary::new("body", mesh.vertices(), mesh.faces(), settings).unwrap();
-    Arc::new(WetBody::new(Arc::new(b)))
+    Arc::new(MfsBody::new(Arc::new(b)))
 }
 
-fn ellipsoid(semi_axes: [f64; 3], faces: usize) -> Arc<WetBody> {
-    wet(semi_axes, faces, &Settings::default())
+fn ellipsoid(semi_axes: [f64; 3], faces: usize) -> Arc<MfsBody> {
+    submerged(semi_axes, faces, &Settings::default())
 }
 
 /// Unit sphere and coin, 1280 faces.
-static SPHERE: LazyLock<Arc<WetBody>> = LazyLock::new(|| ellipsoid([1.0; 3], 1280));
-static COIN: LazyLock<Arc<WetBody>> = LazyLock::new(|| ellipsoid([1.0, 0.2, 1.0], 1280));
+static SPHERE: LazyLock<Arc<MfsBody>> = LazyLock::new(|| ellipsoid([1.0; 3], 1280));
+static COIN: LazyLock<Arc<MfsBody>> = LazyLock::new(|| ellipsoid([1.0, 0.2, 1.0], 1280));
 
 /// Two bodies without symmetry of revolution, so that every twist moves fluid.
-fn uneven(faces: usize) -> Vec<Arc<WetBody>> {
+fn uneven(faces: usize) -> Vec<Arc<MfsBody>> {
     vec![
         ellipsoid([1.0, 0.8, 0.9], faces),
         ellipsoid([0.5, 0.8, 0.3], faces),
@@ -54,7 +54,7 @@ fn uneven_poses() -> Vec<Pose> {
     ]
 }
 
-fn full(bodies: &[Arc<WetBody>], walls: &[Wall], settings: SolveSettings) -> Full {
+fn full(bodies: &[Arc<MfsBody>], walls: &[Wall], settings: SolveSettings) -> Full {
     Full::new(bodies.to_vec(), walls, Exclusions::none(), settings).unwrap()
 }
 
@@ -192,7 +192,7 @@ fn two_spheres(longitudinal: [[f64; 2]; 2], transverse: [[f64; 2]; 2]) -> DMatri
 }
 
 /// Translations of two spheres at the distance d along z, for three orientations of the meshes.
-fn two_sphere_matrices(bodies: &[Arc<WetBody>], d: f64) -> [DMatrix<f64>; 3] {
+fn two_sphere_matrices(bodies: &[Arc<MfsBody>], d: f64) -> [DMatrix<f64>; 3] {
     let coupling = full(bodies, &[], SolveSettings::default());
     let (near, far) = (orientations(&Vec3::z()), orientations(&-Vec3::z()));
     std::array::from_fn(|k| {
@@ -396,7 +396,7 @@ fn a_sphere_near_a_wall() {
 
 /// M̄ of one body in front of walls from the explicit mirror images: all of them move as mirrors do, and
 /// each has the same share of the energy.
-fn explicit_images(body: &Arc<WetBody>, pose: &Pose, mirrors: &[[f64; 3]]) -> DMatrix<f64> {
+fn explicit_images(body: &Arc<MfsBody>, pose: &Pose, mirrors: &[[f64; 3]]) -> DMatrix<f64> {
     let n = mirrors.len();
     let mut poses = Vec::new();
     let mut basis = DMatrix::zeros(6 * n, 6);
@@ -495,8 +495,8 @@ fn solvers_of_the_square_system_agree() {
         ..Settings::default()
     };
     let bodies = [
-        wet([1.0, 0.8, 0.9], 320, &settings),
-        wet([0.5, 0.8, 0.3], 320, &settings),
+        submerged([1.0, 0.8, 0.9], 320, &settings),
+        submerged([0.5, 0.8, 0.3], 320, &settings),
     ];
     let solve = |solver, preconditioner, tolerance| {
         let settings = SolveSettings {
@@ -530,7 +530,7 @@ fn iterations(gap: f64, preconditioner: Preconditioner, tolerance: f64) -> usize
 }
 
 fn iterations_of(
-    bodies: &[Arc<WetBody>],
+    bodies: &[Arc<MfsBody>],
     gap: f64,
     preconditioner: Preconditioner,
     tolerance: f64,
@@ -570,7 +570,7 @@ fn many_iterations_without_them() {
             damping: 0.0,
             ..Settings::default()
         };
-        [[1.0; 3], [1.0, 0.2, 1.0]].map(|axes| wet(axes, 1280, &settings))
+        [[1.0; 3], [1.0, 0.2, 1.0]].map(|axes| submerged(axes, 1280, &settings))
     });
     println!("gap | factors without damping, 1e-3 and 1e-8: scaled rows, unscaled | Jacobi 1e-8");
     for gap in [1.0, 0.2, 0.1, 0.02] {
@@ -783,7 +783,7 @@ fn bodies_in_another_order_or_frame_give_the_same() {
     let mesh = shape::build(&shape, Path::new("."), Some(320)).unwrap();
     let vertices: Vec<Vec3> = mesh.vertices().iter().map(|v| v + shift).collect();
     let b = BodyBoundary::new("b", &vertices, mesh.faces(), &Settings::default()).unwrap();
-    let shifted = Arc::new(WetBody::new(Arc::new(b)));
+    let shifted = Arc::new(MfsBody::new(Arc::new(b)));
     let mut placed = poses.clone();
     placed[1].translation = poses[1].apply(&-shift);
     let other = matrix(&full(&[bodies[0].clone(), shifted], &[], tight()), &placed).0;

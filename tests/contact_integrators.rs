@@ -198,20 +198,20 @@ fn gradients_through_contact() {
     pressed.add(block.at([0.0, 0.0, 0.051]));
     let ball = Body::new(Shape::sphere(0.08)).density(2000.0);
     pressed.add(ball.at([0.03, 0.02, 0.19]));
-    let mut wet = above(0.0, Contact::default());
-    wet.name = "wet".into();
-    wet.fluid.density = 1000.0;
-    wet.add(
+    let mut submerged = above(0.0, Contact::default());
+    submerged.name = "submerged".into();
+    submerged.fluid.density = 1000.0;
+    submerged.add(
         Body::new(Shape::sphere(0.1))
             .density(3000.0)
             .at([0.0, 0.0, 0.2])
             .joint(Joint::Planar { plane: Plane::Zx }),
     );
-    wet.initial.v = vec![-0.3, 0.2, 0.0];
+    submerged.initial.v = vec![-0.3, 0.2, 0.0];
     for integrator in INTEGRATORS {
         check_gradient(&sliding, Fidelity::Isolated, integrator, 40);
         check_gradient(&pressed, Fidelity::Isolated, integrator, 40);
-        check_gradient(&wet, Fidelity::Reduced, integrator, 40);
+        check_gradient(&submerged, Fidelity::Reduced, integrator, 40);
     }
 }
 

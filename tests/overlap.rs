@@ -3,7 +3,7 @@
 use hydrograd::adjoint::kernel::{Sources, Write};
 use hydrograd::adjoint::lie::{Pose, Vec3, Vec6, exp_matrix};
 use hydrograd::boundary::{self, BodyBoundary, OneBody};
-use hydrograd::coupling::full::{Full, SolveSettings, Solver, WetBody};
+use hydrograd::coupling::full::{Full, MfsBody, SolveSettings, Solver};
 use hydrograd::coupling::image::Image;
 use hydrograd::coupling::{Coupling, Exclusions};
 use hydrograd::scene::{Body, Controller, Fluid, Joint, Plane, Scene, Shape, Wall};
@@ -255,13 +255,13 @@ fn matrix(coupling: &dyn Coupling, poses: &[Pose]) -> DMatrix<f64> {
 /// The coupled equations written out, in dense matrices: own blocks, and between bodies that feel each
 /// other (for all images but the body itself) the kernels; between excluded ones those of images alone.
 fn written_out(
-    bodies: &[Arc<WetBody>],
+    bodies: &[Arc<MfsBody>],
     walls: &[Wall],
     excluded: &[(usize, usize)],
     poses: &[Pose],
 ) -> DMatrix<f64> {
     let images = Image::of_walls(walls).unwrap();
-    let starts = |size: &dyn Fn(&WetBody) -> usize| {
+    let starts = |size: &dyn Fn(&MfsBody) -> usize| {
         let mut at = vec![0];
         for b in bodies {
             at.push(at[at.len() - 1] + size(b));
@@ -330,7 +330,7 @@ fn written_out(
 
 #[test]
 fn excluded_pairs_do_not_feel_each_other_and_feel_all_else() {
-    let bodies: Vec<Arc<WetBody>> = [
+    let bodies: Vec<Arc<MfsBody>> = [
         Shape::sphere(0.5),
         Shape::ellipsoid([0.6, 0.3, 0.4]),
         Shape::cuboid([0.3, 0.5, 0.4]),
@@ -344,7 +344,7 @@ fn excluded_pairs_do_not_feel_each_other_and_feel_all_else() {
             mesh.faces(),
             &boundary::Settings::default(),
         );
-        Arc::new(WetBody::new(Arc::new(b.unwrap())))
+        Arc::new(MfsBody::new(Arc::new(b.unwrap())))
     })
     .collect();
     // The first two overlap by some 0.2.

@@ -108,9 +108,9 @@ pub fn added_mass(simulator: &Simulator) -> hydrograd::Result<DMatrix<f64>> {
     let system = simulator.system();
     let mut dry = simulator.parameters().clone();
     dry.density = 0.0;
-    let wet = system.evaluate(simulator.parameters(), &q, false, false)?;
+    let submerged = system.evaluate(simulator.parameters(), &q, false, false)?;
     let dry = system.evaluate(&dry, &q, false, false)?;
-    Ok(&wet.mass_matrix - &dry.mass_matrix)
+    Ok(&submerged.mass_matrix - &dry.mass_matrix)
 }
 
 fn measure(

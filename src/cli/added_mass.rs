@@ -104,12 +104,12 @@ fn added_mass(scene: &Scene, arguments: &Arguments) -> Result<Report> {
         false => None,
     };
     let bodies = &simulator.system().bodies;
-    let in_water = bodies.iter().filter(|b| b.wet.is_some());
+    let in_water = bodies.iter().filter(|b| b.submerged.is_some());
     let mut warnings = simulator.warnings().to_vec();
     warnings.extend(simulator.start_gap_warning());
     let left_out: Vec<&str> = bodies
         .iter()
-        .filter(|b| b.wet.is_none() && b.volume > 0.0)
+        .filter(|b| b.submerged.is_none() && b.volume > 0.0)
         .map(|b| b.name.as_str())
         .collect();
     if !left_out.is_empty() {

@@ -42,19 +42,19 @@ impl Evaluation<'_> {
             out -= rho * self.fluid_columns(b).tr_mul(&fluid_bias[b]);
         }
         if let Some(f) = &self.fluid {
-            let along = f.gradient_along(&direction, &self.wet_field(&fields.twist))?;
+            let along = f.gradient_along(&direction, &self.submerged_field(&fields.twist))?;
             out -= rho * along.rows(0, v.len());
         }
         Ok(out + tree.project(&self.kinematics, wrenches) + self.system.joint_forces(control))
     }
 
-    /// C − U × V of every wet body, zero for dry ones.
+    /// C − U × V of every submerged body, zero for dry ones.
     fn fluid_bias(&self, fields: &Fields) -> Vec<Vec6> {
         let current = self.current_twist();
         let of = |b: usize| fields.bias[b] - cross_motion(&current, &fields.twist[b]);
         (0..self.system.len())
             .map(|b| {
-                if self.system.bodies[b].wet.is_some() {
+                if self.system.bodies[b].submerged.is_some() {
                     of(b)
                 } else {
                     Vec6::zeros()
@@ -144,29 +144,30 @@ impl Evaluation<'_> {
         let bias = self.fluid_bias(fields);
         let zero = vec![Vec6::zeros(); n];
         let respond = |field: &[Vec6], other| -> Result<(Vec<Vec6>, Vec<Vec6>)> {
-            let wet = self.wet_twists(field);
-            if wet.iter().all(|x| *x == 0.0) {
+            let submerged = self.submerged_twists(field);
+            if submerged.iter().all(|x| *x == 0.0) {
                 return Ok((zero.clone(), zero.clone()));
             }
-            let pullback = fluid.vjp(Direction::Twist(&wet), other)?;
+            let pullback = fluid.vjp(Direction::Twist(&submerged), other)?;
             Ok((
-                self.wet_impulses(&pullback.momentum_x),
-                self.from_wet(&pullback.wrench),
+                self.submerged_impulses(&pullback.momentum_x),
+                self.from_submerged(&pullback.wrench),
             ))
         };
         let (momenta_carried, pair_carried) = respond(&carried, water)?;
         let (momenta_bias, pair_bias) = respond(&bias, virt)?;
-        let along_virtual = fluid.hvp(water, water, &self.wet_field(&fields.virtual_twist))?;
-        let along_twist = fluid.hvp(virt, water, &self.wet_field(&fields.twist))?;
-        let impulse_virtual = self.wet_impulses(&along_virtual.momentum_x);
-        let wrench_virtual = self.from_wet(&along_virtual.wrench);
-        let impulse_w = self.wet_impulses(&along_twist.momentum_x);
-        let impulse_v = self.wet_impulses(&along_twist.momentum_y);
-        let wrench_twist = self.from_wet(&along_twist.wrench);
-        let pose_force = self.half_from_wet(&along_virtual.gradient);
-        let pair = self.from_wet(&along_twist.gradient);
+        let along_virtual =
+            fluid.hvp(water, water, &self.submerged_field(&fields.virtual_twist))?;
+        let along_twist = fluid.hvp(virt, water, &self.submerged_field(&fields.twist))?;
+        let impulse_virtual = self.submerged_impulses(&along_virtual.momentum_x);
+        let wrench_virtual = self.from_submerged(&along_virtual.wrench);
+        let impulse_w = self.submerged_impulses(&along_twist.momentum_x);
+        let impulse_v = self.submerged_impulses(&along_twist.momentum_y);
+        let wrench_twist = self.from_submerged(&along_twist.wrench);
+        let pose_force = self.half_from_submerged(&along_virtual.gradient);
+        let pair = self.from_submerged(&along_twist.gradient);
         for b in 0..n {
-            if self.system.bodies[b].wet.is_none() {
+            if self.system.bodies[b].submerged.is_none() {
                 continue;
             }
             let (v_rel, w_b, twist) = (&relative[b], &fields.virtual_twist[b], &fields.twist[b]);

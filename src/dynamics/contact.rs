@@ -39,7 +39,7 @@ pub struct ContactModel {
 
 /// A place where two surfaces are near at a configuration.
 #[derive(Clone, Debug)]
-pub struct Touch {
+pub struct PairContact {
     /// Body to which the normal points.
     pub first: usize,
     /// The other body; none for a wall.
@@ -96,8 +96,8 @@ impl System {
     ) -> Result<Vec<ContactForce>> {
         let kinematics = self.tree.kinematics(q);
         let twists = self.tree.twists(&kinematics, v);
-        let touches = self.touches(parameters, &kinematics.poses)?;
-        let near = touches
+        let contact_points = self.contact_points(parameters, &kinematics.poses)?;
+        let near = contact_points
             .iter()
             .filter(|t| t.point.gap <= t.law.gap + slack.max(t.law.width));
         let acting = near.map(|t| ContactForce {
@@ -115,7 +115,11 @@ impl System {
     ///
     /// # Errors
     /// A signed distance that can't be found.
-    pub(super) fn touches(&self, parameters: &Parameters, poses: &[Pose]) -> Result<Vec<Touch>> {
+    pub(super) fn contact_points(
+        &self,
+        parameters: &Parameters,
+        poses: &[Pose],
+    ) -> Result<Vec<PairContact>> {
         let mut out = Vec::new();
         let Some(model) = &self.contact else {
             return Ok(out);
@@ -123,7 +127,7 @@ impl System {
         for (k, pair) in model.shapes.pairs().iter().enumerate() {
             let law = model.law(k, parameters);
             for point in model.shapes.points(k, poses, law.gap + law.width)? {
-                out.push(Touch {
+                out.push(PairContact {
                     first: pair.first,
                     second: pair.second_body(),
                     law,
@@ -135,7 +139,7 @@ impl System {
     }
 }
 
-impl Touch {
+impl PairContact {
     /// Relative twist of two bodies' spatial fields.
     fn relative(&self, field: &[Vec6]) -> Vec6 {
         field[self.first] - self.second.map_or(Vec6::zeros(), |b| field[b])
@@ -188,7 +192,7 @@ impl Evaluation<'_> {
     /// Spatial contact wrenches on all bodies moving with the spatial `twists`.
     fn contact_wrenches(&self, twists: &[Vec6]) -> Vec<Vec6> {
         let mut out = vec![Vec6::zeros(); self.system.len()];
-        for t in &self.touches {
+        for t in &self.contact_points {
             let force = contact_force(&t.law, &t.meeting(twists));
             t.exchange(&point_wrench(&t.point.position, &force), &mut out);
         }
@@ -200,12 +204,12 @@ impl Evaluation<'_> {
         if self.stops(v).any(|(_, forces)| forces != [0.0; 2]) {
             return true;
         }
-        if self.touches.is_empty() {
+        if self.contact_points.is_empty() {
             return false;
         }
         let twists = self.system.tree.twists(&self.kinematics, v);
-        let at = |t: &Touch| contact_force(&t.law, &t.meeting(&twists)) != Vec3::zeros();
-        self.touches.iter().any(at)
+        let at = |t: &PairContact| contact_force(&t.law, &t.meeting(&twists)) != Vec3::zeros();
+        self.contact_points.iter().any(at)
     }
 
     /// Generalised forces of contact at the velocity `v`.
@@ -227,7 +231,7 @@ impl Evaluation<'_> {
         let tree = &self.system.tree;
         let twists = tree.twists(&self.kinematics, v);
         let mut out = DVector::zeros(v.len());
-        for t in &self.touches {
+        for t in &self.contact_points {
             let force = contact_force(&t.law, &t.meeting(&twists));
             if force != Vec3::zeros() {
                 let mut wrenches = vec![Vec6::zeros(); self.system.len()];
@@ -247,7 +251,7 @@ impl Evaluation<'_> {
         let twists = tree.twists(&self.kinematics, v);
         let dtwists = tree.twists(&self.kinematics, dv);
         let mut out = vec![Vec6::zeros(); self.system.len()];
-        for t in &self.touches {
+        for t in &self.contact_points {
             let du = point_velocity(&t.relative(&dtwists), &t.point.position);
             let force = contact_force_jvp(&t.law, &t.meeting(&twists), &du);
             t.exchange(&point_wrench(&t.point.position, &force), &mut out);
@@ -286,7 +290,7 @@ impl Evaluation<'_> {
         let fields = tree.fields(&self.kinematics, &self.q, v, virtual_velocity);
         let mut bar = Cotangents::zeros(self.system.len());
         let mut out = ForceCotangents::zeros(self);
-        for t in &self.touches {
+        for t in &self.contact_points {
             let x = &t.point.position;
             let meeting = t.meeting(&fields.twist);
             let (twist, virt) = (t.relative(&fields.twist), t.relative(&fields.virtual_twist));

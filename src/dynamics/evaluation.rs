@@ -1,6 +1,6 @@
 //! Everything that depends on the configuration alone: kinematics, momenta per unit velocity, mass matrix.
 
-use super::{Parameters, System, Touch};
+use super::{PairContact, Parameters, System};
 use crate::adjoint::lie::{Mat6, Vec3, Vec6, six};
 use crate::adjoint::rigid;
 use crate::coupling::{Record, Report};
@@ -21,7 +21,7 @@ pub struct Evaluation<'a> {
     /// Rigid inertias, body frames.
     pub rigid: Vec<Mat6>,
     /// Places where surfaces are near.
-    pub touches: Vec<Touch>,
+    pub contact_points: Vec<PairContact>,
     /// The fluid at unit density, if there is any.
     pub fluid: Option<Box<dyn Record + 'a>>,
     /// Spatial fluid momentum of each body at unit density per basis column (6 × k each).
@@ -45,7 +45,7 @@ impl System {
         reverse: bool,
     ) -> Result<Evaluation<'a>> {
         let mut e = self.evaluate_apart(parameters, q, derivative, reverse)?;
-        e.touches = self.touches(parameters, &e.kinematics.poses)?;
+        e.contact_points = self.contact_points(parameters, &e.kinematics.poses)?;
         Ok(e)
     }
 
@@ -84,7 +84,7 @@ impl System {
             let mut poses = Vec::with_capacity(self.coupling.bodies());
             let rest = six(&-self.current, &Vec3::zeros());
             for (b, body) in self.bodies.iter().enumerate() {
-                let Some(w) = body.wet else { continue };
+                let Some(w) = body.submerged else { continue };
                 let pose = &kinematics.poses[b];
                 poses.push(*pose);
                 for k in 0..columns {
@@ -100,7 +100,7 @@ impl System {
             }
             let record = self.coupling.evaluate(&poses, &basis, derivative)?;
             for (b, body) in self.bodies.iter().enumerate() {
-                let Some(w) = body.wet else { continue };
+                let Some(w) = body.submerged else { continue };
                 for k in 0..columns {
                     let h = record.momenta().fixed_view::<6, 1>(6 * w, k).into_owned();
                     fluid_momenta[b].set_column(k, &kinematics.poses[b].wrench_to_world(&h));
@@ -131,7 +131,7 @@ impl System {
             system: self,
             parameters,
             q: q.clone(),
-            touches: Vec::new(),
+            contact_points: Vec::new(),
             kinematics,
             rigid,
             fluid,
@@ -186,11 +186,11 @@ impl<'a> Evaluation<'a> {
         pose.wrench_to_world(&(self.rigid[b] * pose.twist_to_body(v)))
     }
 
-    /// Spatial six-vectors of the wet bodies, in each body's frame as twists, stacked.
-    pub fn wet_twists(&self, field: &[Vec6]) -> DVector<f64> {
+    /// Spatial six-vectors of the submerged bodies, in each body's frame as twists, stacked.
+    pub fn submerged_twists(&self, field: &[Vec6]) -> DVector<f64> {
         let mut out = DVector::zeros(6 * self.system.coupling.bodies());
         for (b, body) in self.system.bodies.iter().enumerate() {
-            if let Some(w) = body.wet {
+            if let Some(w) = body.submerged {
                 out.fixed_rows_mut::<6>(6 * w)
                     .copy_from(&self.kinematics.poses[b].twist_to_body(&field[b]));
             }
@@ -198,23 +198,25 @@ impl<'a> Evaluation<'a> {
         out
     }
 
-    /// A field of the wet bodies.
-    pub fn wet_field(&self, field: &[Vec6]) -> Vec<Vec6> {
-        let wet = self.system.bodies.iter().zip(field);
-        wet.filter_map(|(body, f)| body.wet.map(|_| *f)).collect()
+    /// A field of the submerged bodies.
+    pub fn submerged_field(&self, field: &[Vec6]) -> Vec<Vec6> {
+        let submerged = self.system.bodies.iter().zip(field);
+        submerged
+            .filter_map(|(body, f)| body.submerged.map(|_| *f))
+            .collect()
     }
 
-    /// The wet bodies' field on all bodies, zero elsewhere.
-    pub fn from_wet(&self, field: &[Vec6]) -> Vec<Vec6> {
+    /// The submerged bodies' field on all bodies, zero elsewhere.
+    pub fn from_submerged(&self, field: &[Vec6]) -> Vec<Vec6> {
         let of = |w: Option<usize>| w.map_or(Vec6::zeros(), |w| field[w]);
-        self.system.bodies.iter().map(|b| of(b.wet)).collect()
+        self.system.bodies.iter().map(|b| of(b.submerged)).collect()
     }
 
-    /// Body-frame impulses of the wet bodies (stacked) as spatial momenta of all bodies.
-    pub fn wet_impulses(&self, impulses: &DVector<f64>) -> Vec<Vec6> {
+    /// Body-frame impulses of the submerged bodies (stacked) as spatial momenta of all bodies.
+    pub fn submerged_impulses(&self, impulses: &DVector<f64>) -> Vec<Vec6> {
         let mut out = vec![Vec6::zeros(); self.system.len()];
         for (b, body) in self.system.bodies.iter().enumerate() {
-            if let Some(w) = body.wet {
+            if let Some(w) = body.submerged {
                 let h = impulses.fixed_rows::<6>(6 * w).into_owned();
                 out[b] = self.kinematics.poses[b].wrench_to_world(&h);
             }

@@ -72,14 +72,14 @@ impl Evaluation<'_> {
     /// Fluid pose forces `½ ∂E(v, v)/∂g` on all bodies at unit density.
     pub(super) fn pose_force(&self, direction: &DVector<f64>) -> Result<Vec<Vec6>> {
         Ok(match &self.fluid {
-            Some(fluid) => self.half_from_wet(&fluid.gradient(direction, direction)?),
+            Some(fluid) => self.half_from_submerged(&fluid.gradient(direction, direction)?),
             None => vec![Vec6::zeros(); self.system.len()],
         })
     }
 
-    /// Half of the wet bodies' field on all bodies.
-    pub(super) fn half_from_wet(&self, field: &[Vec6]) -> Vec<Vec6> {
-        self.from_wet(&field.iter().map(|w| 0.5 * w).collect::<Vec<_>>())
+    /// Half of the submerged bodies' field on all bodies.
+    pub(super) fn half_from_submerged(&self, field: &[Vec6]) -> Vec<Vec6> {
+        self.from_submerged(&field.iter().map(|w| 0.5 * w).collect::<Vec<_>>())
     }
 
     /// Joint forces in frame coordinates, X⁻ᵀ τ.
@@ -142,7 +142,7 @@ impl Evaluation<'_> {
         Ok(self.force_tangent(v, dv, &changed))
     }
 
-    /// The same with the change of the fluid's pose force on the wet bodies.
+    /// The same with the change of the fluid's pose force on the submerged bodies.
     fn force_tangent(
         &self,
         v: &DVector<f64>,
@@ -158,7 +158,7 @@ impl Evaluation<'_> {
         let fluid = self.fluid_momenta(&direction);
         let dfluid = self.fluid_momenta(&ddirection);
         let dpose_force = match &self.fluid {
-            Some(_) => self.from_wet(dpose_force),
+            Some(_) => self.from_submerged(dpose_force),
             None => vec![Vec6::zeros(); self.system.len()],
         };
         let current = self.current_twist();
@@ -249,24 +249,24 @@ impl Evaluation<'_> {
             let carried: Vec<Vec6> = (0..n)
                 .map(|b| fields.turning[b] - cross_motion(&current, &fields.virtual_twist[b]))
                 .collect();
-            let wet_carried = self.wet_twists(&carried);
-            let (momenta_carried, pair) = if wet_carried.iter().any(|x| *x != 0.0) {
-                let carried = Direction::Twist(&wet_carried);
+            let submerged_carried = self.submerged_twists(&carried);
+            let (momenta_carried, pair) = if submerged_carried.iter().any(|x| *x != 0.0) {
+                let carried = Direction::Twist(&submerged_carried);
                 let pullback = fluid.vjp(carried, water)?;
                 (
-                    self.wet_impulses(&pullback.momentum_x),
-                    self.from_wet(&pullback.wrench),
+                    self.submerged_impulses(&pullback.momentum_x),
+                    self.from_submerged(&pullback.wrench),
                 )
             } else {
                 (vec![Vec6::zeros(); n], vec![Vec6::zeros(); n])
             };
             // ½ D_g E(v, v)[Z].
-            let tangent = fluid.hvp(water, water, &self.wet_field(&fields.virtual_twist))?;
-            let impulse = self.wet_impulses(&tangent.momentum_x);
-            let wrench = self.from_wet(&tangent.wrench);
-            let pose_force = self.half_from_wet(&tangent.gradient);
+            let tangent = fluid.hvp(water, water, &self.submerged_field(&fields.virtual_twist))?;
+            let impulse = self.submerged_impulses(&tangent.momentum_x);
+            let wrench = self.from_submerged(&tangent.wrench);
+            let pose_force = self.half_from_submerged(&tangent.gradient);
             for b in 0..n {
-                if self.system.bodies[b].wet.is_none() {
+                if self.system.bodies[b].submerged.is_none() {
                     continue;
                 }
                 let relative = self.relative(&fields.twist[b]);

@@ -11,7 +11,7 @@ mod momentum;
 mod parameters;
 mod system;
 
-pub use contact::{ContactForce, ContactModel, Dual, Regularisation, Touch};
+pub use contact::{ContactForce, ContactModel, Dual, PairContact, Regularisation};
 pub use evaluation::Evaluation;
 pub use force::ForceCotangents;
 pub use integrator::{

@@ -81,9 +81,9 @@ impl Evaluation<'_> {
                 self.fluid_momenta(&direction),
                 self.fluid_momenta(&virtual_direction),
             );
-            let pair = self.from_wet(&fluid.gradient(&virtual_direction, &direction)?);
+            let pair = self.from_submerged(&fluid.gradient(&virtual_direction, &direction)?);
             for b in 0..self.system.len() {
-                if self.system.bodies[b].wet.is_none() {
+                if self.system.bodies[b].submerged.is_none() {
                     continue;
                 }
                 let relative = fields.twist[b] - current;

@@ -27,7 +27,7 @@ pub struct BodyData {
     /// Part of the quadratic drag.
     pub quadratic_part: Part,
     /// Index among the bodies that the coupling knows.
-    pub wet: Option<usize>,
+    pub submerged: Option<usize>,
     /// First control of the joint's generalised forces.
     pub joint_control: Option<usize>,
     /// First control of the wrench on the body.
@@ -60,7 +60,7 @@ pub struct System {
     pub current: Vec3,
     /// Number of controls.
     pub controls: usize,
-    /// The coupling; its bodies are those with `wet` set, in order.
+    /// The coupling; its bodies are those with `submerged` set, in order.
     pub coupling: Arc<dyn Coupling>,
     /// Contact; none where bodies pass through each other.
     pub contact: Option<ContactModel>,

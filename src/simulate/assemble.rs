@@ -4,8 +4,8 @@ use super::backend::{Backend, GpuSettings};
 use super::clearance::Clearance;
 use super::device::Device;
 use super::plan::{Planned, plan};
+use super::submerged::{self, Discretisation, Plan, SubmergedBody, Water};
 use super::surface::{Surface, surface};
-use super::wet::{self, Discretisation, Plan, Water, Wet};
 use super::{Fidelity, Policy, Settings};
 use super::{contact, controller, limits};
 use crate::Result;
@@ -84,16 +84,16 @@ pub(super) fn in_water<'a>(
     surfaces: &'a [Option<Surface>],
     tree: &Tree,
     fidelity: Fidelity,
-) -> (Vec<usize>, Vec<Wet<'a>>) {
+) -> (Vec<usize>, Vec<SubmergedBody<'a>>) {
     let alone = fidelity == Fidelity::Isolated;
     let seen = |b: &usize| !alone || moves(scene, tree, *b);
-    let wet = |b: usize| {
+    let submerged = |b: usize| {
         let (body, surface) = (&scene.bodies[b], surfaces[b].as_ref());
         let given = body.added_mass.as_ref();
-        (surface.is_some() || given.is_some()).then(|| Wet {
+        (surface.is_some() || given.is_some()).then(|| SubmergedBody {
             name: &body.name,
             mesh: surface.map(|s| &s.mesh),
-            ellipsoid: (body.shape.as_ref().and_then(wet::semi_axes))
+            ellipsoid: (body.shape.as_ref().and_then(submerged::semi_axes))
                 .map(|axes| (axes, pose(&body.shape_at))),
             coarse: surface.and_then(|s| s.coarse.as_ref()),
             added_mass: given
@@ -102,7 +102,7 @@ pub(super) fn in_water<'a>(
         })
     };
     let numbers = (0..scene.bodies.len()).filter(seen);
-    numbers.filter_map(|b| Some((b, wet(b)?))).unzip()
+    numbers.filter_map(|b| Some((b, submerged(b)?))).unzip()
 }
 
 /// Mass, centre of mass and inertia of a body.
@@ -174,7 +174,7 @@ pub(super) fn assemble(
         surfaces.push(surface(body, settings, settings.faces, 1.0)?);
     }
 
-    let (of_wet, wet) = in_water(scene, &surfaces, &tree, settings.fidelity);
+    let (of_submerged, submerged) = in_water(scene, &surfaces, &tree, settings.fidelity);
     let mut bodies = Vec::with_capacity(scene.bodies.len());
     let mut controls = 0;
     for (b, body) in scene.bodies.iter().enumerate() {
@@ -190,7 +190,7 @@ pub(super) fn assemble(
             resistance: Mat6::zeros(),
             surface: Vec::new(),
             quadratic_part: Part::default(),
-            wet: None,
+            submerged: None,
             joint_control: None,
             thruster: None,
         };
@@ -206,7 +206,7 @@ pub(super) fn assemble(
                 data.surface = pieces;
             }
         }
-        data.wet = of_wet.iter().position(|w| *w == b);
+        data.submerged = of_submerged.iter().position(|w| *w == b);
         if body.actuated {
             data.joint_control = Some(controls);
             controls += tree.links()[b].v.len();
@@ -243,16 +243,24 @@ pub(super) fn assemble(
         fidelity,
         plan,
         reasons,
-    } = choose(scene, settings, &system, &q, &clearance, &wet, &of_wet)?;
+    } = choose(
+        scene,
+        settings,
+        &system,
+        &q,
+        &clearance,
+        &submerged,
+        &of_submerged,
+    )?;
     warnings.extend(without_effect(settings));
-    let water = water(scene, &of_wet, folder);
+    let water = water(scene, &of_submerged, folder);
     let mut device = Device::open(settings, fidelity)?;
-    let made = wet::couple(&wet, &water, settings, fidelity, &plan, &mut device)?;
+    let made = submerged::couple(&submerged, &water, settings, fidelity, &plan, &mut device)?;
     warnings.extend(device.warning());
     system.coupling = made.coupling.into();
     warnings.extend(made.warnings);
     let mut resolved = vec![0.0; scene.bodies.len()];
-    for (b, d) in of_wet.iter().zip(&made.bodies) {
+    for (b, d) in of_submerged.iter().zip(&made.bodies) {
         resolved[*b] = d.resolved_gap.unwrap_or(0.0);
     }
     if let Some(given) = &scene.contact {
@@ -289,9 +297,13 @@ pub(super) fn assemble(
     })
 }
 
-/// What is around the bodies in the water, `of_wet` being their numbers in the scene.
-pub(super) fn water<'a>(scene: &'a Scene, of_wet: &[usize], folder: Option<&'a Path>) -> Water<'a> {
-    let number = |b: usize| of_wet.iter().position(|w| *w == b);
+/// What is around the bodies in the water, `of_submerged` being their numbers in the scene.
+pub(super) fn water<'a>(
+    scene: &'a Scene,
+    of_submerged: &[usize],
+    folder: Option<&'a Path>,
+) -> Water<'a> {
+    let number = |b: usize| of_submerged.iter().position(|w| *w == b);
     let declared = scene.overlapping().into_iter();
     let pairs = declared.filter_map(|(a, b)| Some((number(a)?, number(b)?)));
     Water {
@@ -331,8 +343,8 @@ fn choose(
     system: &System,
     q: &DVector<f64>,
     clearance: &Clearance,
-    wet: &[Wet],
-    of_wet: &[usize],
+    submerged: &[SubmergedBody],
+    of_submerged: &[usize],
 ) -> Result<Planned> {
     if settings.fidelity != Fidelity::Auto || scene.fluid.density <= 0.0 {
         return Ok(Planned {
@@ -342,8 +354,8 @@ fn choose(
         });
     }
     let all = system.tree.kinematics(q).poses;
-    let poses: Vec<Pose> = of_wet.iter().map(|b| all[*b]).collect();
-    let number = |b: usize| of_wet.iter().position(|w| *w == b);
+    let poses: Vec<Pose> = of_submerged.iter().map(|b| all[*b]).collect();
+    let number = |b: usize| of_submerged.iter().position(|w| *w == b);
     let mut gaps = Vec::new();
     for gap in [&clearance.moving, &clearance.rigid]
         .into_iter()
@@ -361,7 +373,7 @@ fn choose(
             });
         }
     }
-    plan(wet, &poses, &gaps, &scene.walls, settings.accuracy.0)
+    plan(submerged, &poses, &gaps, &scene.walls, settings.accuracy.0)
 }
 
 /// Initial coordinates.

@@ -74,7 +74,7 @@ impl Clearance {
             rigid: Gaps::new(&meshes, &[], &but(&moving))?,
             moving: Gaps::new(&meshes, &scene.walls, &but(&rigid))?,
             declared: shares,
-            parents: (0..bodies).map(|b| scene.wet_parent(b)).collect(),
+            parents: (0..bodies).map(|b| scene.submerged_parent(b)).collect(),
         })
     }
 

@@ -60,8 +60,9 @@ pub(super) fn assemble(p: Parts) -> Result<(ContactModel, dynamics::Contact)> {
             _ => None,
         });
     }
-    let neighbours =
-        |a: usize, b: usize| p.scene.wet_parent(a) == Some(b) || p.scene.wet_parent(b) == Some(a);
+    let neighbours = |a: usize, b: usize| {
+        p.scene.submerged_parent(a) == Some(b) || p.scene.submerged_parent(b) == Some(a)
+    };
     let pairs: Vec<ContactPair> = (p.clearance.moving.pairs().iter())
         .filter(|(a, other)| !matches!(other, Other::Body(b) if neighbours(*a, *b)))
         .map(|&(first, second)| ContactPair { first, second })

@@ -35,8 +35,8 @@ impl Simulator {
         }
         let still = six(&system.current, &Vec3::zeros());
         let twists = system.tree.twists(&kinematics, v);
-        let wet = |b: &usize| system.bodies[*b].wet.is_some();
-        let seen: Vec<usize> = (0..system.len()).filter(wet).collect();
+        let submerged = |b: &usize| system.bodies[*b].submerged.is_some();
+        let seen: Vec<usize> = (0..system.len()).filter(submerged).collect();
         let poses: Vec<Pose> = seen.iter().map(|b| kinematics.poses[*b]).collect();
         let mut through = DVector::zeros(6 * seen.len());
         for (i, b) in seen.iter().enumerate() {

@@ -22,9 +22,9 @@ mod recording;
 mod rollout;
 mod settings;
 mod simulator;
+mod submerged;
 mod surface;
 mod trajectory;
-mod wet;
 
 pub use backend::{AdapterName, Arithmetic, Backend, BackendReport, DeviceReport, GpuSettings};
 pub use controls::Controls;
@@ -42,4 +42,4 @@ pub use recording::Recording;
 pub use rollout::{Rollout, Sample, Summary};
 pub use settings::{Accuracy, Fidelity, Settings};
 pub use simulator::{AddedMass, Simulator};
-pub use wet::Discretisation;
+pub use submerged::Discretisation;

@@ -7,7 +7,7 @@
 //! starts with.
 
 use super::Fidelity;
-use super::wet::{Plan, Wet, area, centre};
+use super::submerged::{Plan, SubmergedBody, area, centre};
 use crate::adjoint::lie::{Pose, Vec3};
 use crate::boundary::exact::lamb;
 use crate::coupling::reduced::{Cutoff, compress};
@@ -42,9 +42,9 @@ pub(super) struct Planned {
     pub reasons: Vec<String>,
 }
 
-/// Chooses for `bodies` at `poses` with the `gaps` (of wet bodies, by their numbers among `bodies`).
+/// Chooses for `bodies` at `poses` with the `gaps` (of submerged bodies, by their numbers among `bodies`).
 pub(super) fn plan(
-    bodies: &[Wet],
+    bodies: &[SubmergedBody],
     poses: &[Pose],
     gaps: &[Gap],
     walls: &[Wall],

@@ -469,12 +469,15 @@ impl Simulator {
     /// Whatever the coupling reports.
     pub fn added_mass(&self) -> Result<AddedMass> {
         let system = self.system();
-        let (wet, poses) = self.in_water();
+        let (submerged, poses) = self.in_water();
         let turn = world_axes(&poses);
         let record = system.coupling.evaluate(&poses, &turn, false)?;
         let m = turn.tr_mul(record.momenta()) * self.parameters().density;
         Ok(AddedMass {
-            bodies: wet.iter().map(|b| system.bodies[*b].name.clone()).collect(),
+            bodies: submerged
+                .iter()
+                .map(|b| system.bodies[*b].name.clone())
+                .collect(),
             matrix: 0.5 * (&m + m.transpose()),
             report: record.report().clone(),
         })
@@ -485,7 +488,7 @@ impl Simulator {
         let system = self.system();
         let kinematics = system.tree.kinematics(&self.assembled.q);
         (0..system.len())
-            .filter(|b| system.bodies[*b].wet.is_some())
+            .filter(|b| system.bodies[*b].submerged.is_some())
             .map(|b| (b, kinematics.poses[b]))
             .unzip()
     }

@@ -1,7 +1,7 @@
 //! Bodies' surfaces, as their shapes are meshed for the water.
 
 use super::assemble::pose;
-use super::{Fidelity, Settings, Simulator, wet};
+use super::{Fidelity, Settings, Simulator, submerged};
 use crate::Result;
 use crate::adjoint::lie::Vec3;
 use crate::boundary::OneBody;
@@ -67,7 +67,7 @@ pub(super) fn surface(
     let mesh = even(faces)?;
     let base = mesh.faces().len();
     let mesh = refined(&mesh, edges)?;
-    let closed = settings.by_formula() && wet::semi_axes(shape).is_some();
+    let closed = settings.by_formula() && submerged::semi_axes(shape).is_some();
     let panels = settings.fidelity != Fidelity::Full
         && matches!(settings.one_body, OneBody::Auto | OneBody::Panel);
     let coarse =

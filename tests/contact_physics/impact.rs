@@ -229,18 +229,19 @@ fn added_mass_lengthens_the_impact() {
     };
     let heavy = 1.0 + 0.5 * WATER / DENSITY;
     let (dt, exact) = (2e-5, PI * (MASS / STIFFNESS).sqrt());
-    let ((dry, dry_impulse), (wet, wet_impulse)) = (measure(0.0, dt), measure(WATER, dt));
+    let ((dry, dry_impulse), (submerged, submerged_impulse)) =
+        (measure(0.0, dt), measure(WATER, dt));
     println!(
-        "contact {:.4} ms dry, {:.4} ms wet: {:.5} times, √((m + m_a)/m) = {:.5}; impulse {:.5} times, (m + m_a)/m = {heavy:.5}",
+        "contact {:.4} ms dry, {:.4} ms submerged: {:.5} times, √((m + m_a)/m) = {:.5}; impulse {:.5} times, (m + m_a)/m = {heavy:.5}",
         1e3 * dry,
-        1e3 * wet,
-        wet / dry,
+        1e3 * submerged,
+        submerged / dry,
         heavy.sqrt(),
-        wet_impulse / dry_impulse
+        submerged_impulse / dry_impulse
     );
     assert!((dry / exact - 1.0).abs() < 1e-3, "{dry} is not {exact}");
-    assert!((wet / dry / heavy.sqrt() - 1.0).abs() < 2e-4);
-    assert!((wet_impulse / dry_impulse / heavy - 1.0).abs() < 2e-4);
+    assert!((submerged / dry / heavy.sqrt() - 1.0).abs() < 2e-4);
+    assert!((submerged_impulse / dry_impulse / heavy - 1.0).abs() < 2e-4);
     // It comes back as fast as it went, but for Euler's loss, which falls with the step.
     let lost = |impulse: f64| 1.0 - impulse / (2.0 * MASS * 1.5);
     let coarse = measure(0.0, 4.0 * dt).1;

@@ -108,17 +108,17 @@ fn compressed(x: f64, width: f64) -> f64 {
 
 /// Elastic energy of all contacts at a configuration, J.
 fn elastic(e: &Evaluation) -> f64 {
-    let of = |t: &hydrograd::dynamics::Touch| {
+    let of = |t: &hydrograd::dynamics::PairContact| {
         t.law.stiffness * t.point.weight * compressed(t.law.gap - t.point.gap, t.law.width)
     };
-    e.touches.iter().map(of).sum()
+    e.contact_points.iter().map(of).sum()
 }
 
 /// What the contacts give up, by their law, between the configuration and what is foreseen with the velocity v, J.
 fn released(e: &Evaluation, v: &DVector<f64>) -> f64 {
     let twists = e.system.tree.twists(&e.kinematics, v);
     let mut out = 0.0;
-    for t in &e.touches {
+    for t in &e.contact_points {
         let relative: Vec6 = twists[t.first] - t.second.map_or(Vec6::zeros(), |b| twists[b]);
         let u = point_velocity(&relative, &t.point.position);
         let along = u.dot(&t.point.normal);

@@ -3,7 +3,7 @@
 use hydrograd::adjoint::lie::{Pose, Vec3, Vec6, exp_matrix};
 use hydrograd::boundary::{BodyBoundary, Method, Settings};
 use hydrograd::coupling::Exclusions;
-use hydrograd::coupling::full::{Full, Model, Preconditioner, SolveSettings, WetBody};
+use hydrograd::coupling::full::{Full, MfsBody, Model, Preconditioner, SolveSettings};
 use hydrograd::gpu::full::Gpu;
 use hydrograd::gpu::{Arithmetic, Context, Options};
 use hydrograd::scene::{Shape, Wall, WallSurface};
@@ -41,14 +41,14 @@ pub fn two_float() -> &'static Arc<Context> {
     CONTEXT.get_or_init(|| Context::new(&options).expect("a GPU, or a driver that stands for one"))
 }
 
-pub fn body(shape: &Shape, faces: usize, method: Method) -> Arc<WetBody> {
+pub fn body(shape: &Shape, faces: usize, method: Method) -> Arc<MfsBody> {
     let mesh = shape::build(shape, Path::new("."), Some(faces)).unwrap();
     let settings = Settings {
         method,
         ..Settings::default()
     };
     let b = BodyBoundary::new("b", mesh.vertices(), mesh.faces(), &settings).unwrap();
-    Arc::new(WetBody::new(Arc::new(b)))
+    Arc::new(MfsBody::new(Arc::new(b)))
 }
 
 /// Three bodies, two of one shape, none of whose sizes is a multiple of a block.

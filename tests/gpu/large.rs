@@ -3,7 +3,7 @@
 use super::fixture::*;
 use hydrograd::adjoint::lie::{Pose, Vec3, exp_matrix};
 use hydrograd::boundary::{BodyBoundary, Readout, Settings};
-use hydrograd::coupling::full::{Cpu, Full, Model, Preconditioner, SolveSettings, WetBody};
+use hydrograd::coupling::full::{Cpu, Full, MfsBody, Model, Preconditioner, SolveSettings};
 use hydrograd::coupling::{Coupling, Direction, Exclusions};
 use hydrograd::gpu::full::Gpu;
 use hydrograd::scene::Shape;
@@ -11,7 +11,7 @@ use hydrograd::shape;
 use std::path::Path;
 use std::sync::Arc;
 
-fn bodies(factored: [bool; 3]) -> Vec<Arc<WetBody>> {
+fn bodies(factored: [bool; 3]) -> Vec<Arc<MfsBody>> {
     // Without the body's own residual flux both read the same potential out.
     let settings = Settings {
         readout: Readout::Centre,
@@ -25,7 +25,7 @@ fn bodies(factored: [bool; 3]) -> Vec<Arc<WetBody>> {
         } else {
             BodyBoundary::unfactored("b", v, f, &settings)
         };
-        Arc::new(WetBody::new(Arc::new(made.unwrap())))
+        Arc::new(MfsBody::new(Arc::new(made.unwrap())))
     };
     vec![
         of(0, &Shape::sphere(0.5)),
@@ -92,7 +92,7 @@ fn derivatives_of_many_pairs_go_in_batches() {
     let mesh = shape::build(&Shape::ellipsoid([0.5, 0.3, 0.4]), Path::new("."), Some(20)).unwrap();
     let (v, f) = (mesh.vertices(), mesh.faces());
     let boundary = BodyBoundary::new("b", v, f, &Settings::default()).unwrap();
-    let body = Arc::new(WetBody::new(Arc::new(boundary)));
+    let body = Arc::new(MfsBody::new(Arc::new(boundary)));
     let poses = lattice(4);
     let settings = SolveSettings {
         tolerance: 1e-10,

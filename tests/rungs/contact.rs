@@ -252,8 +252,11 @@ fn jvp(c: f64) -> Outcome {
     let p = point();
     let e = evaluate(&p.parameters, &p.q);
     // Each of the four on the next, and three on the wall.
-    let pairs: std::collections::BTreeSet<_> =
-        e.touches.iter().map(|t| (t.first, t.second)).collect();
+    let pairs: std::collections::BTreeSet<_> = e
+        .contact_points
+        .iter()
+        .map(|t| (t.first, t.second))
+        .collect();
     assert!(pairs.len() >= 6, "{pairs:?}");
     let n = p.v.len();
     let pressed = e.contact_force(&p.v, Dual::User);

@@ -5,7 +5,7 @@ use super::tools::{all, along, vector_along, wavy};
 use hydrograd::adjoint::check::{Outcome, Rung};
 use hydrograd::adjoint::lie::{Mat6, Pose, Vec3, Vec6, cross_motion, exp_matrix};
 use hydrograd::boundary::{BodyBoundary, Method, Settings};
-use hydrograd::coupling::full::{Full, SolveSettings, Solver, WetBody};
+use hydrograd::coupling::full::{Full, MfsBody, SolveSettings, Solver};
 use hydrograd::coupling::image::Image;
 use hydrograd::coupling::reduced::{Cutoff, Reduced, compress};
 use hydrograd::coupling::{Coupling, Direction, Exclusions, Isolated};
@@ -49,7 +49,7 @@ const SIDE: Wall = Wall {
     normal: [1.0, 0.0, -0.1],
 };
 
-fn body(shape: Shape, method: Method, solver: Solver) -> Arc<WetBody> {
+fn body(shape: Shape, method: Method, solver: Solver) -> Arc<MfsBody> {
     let mesh = shape::build(&shape, Path::new("."), Some(80)).unwrap();
     let mut settings = Settings {
         method,
@@ -59,7 +59,7 @@ fn body(shape: Shape, method: Method, solver: Solver) -> Arc<WetBody> {
         settings.damping = 0.0;
     }
     let b = BodyBoundary::new("b", mesh.vertices(), mesh.faces(), &settings).unwrap();
-    Arc::new(WetBody::new(Arc::new(b)))
+    Arc::new(MfsBody::new(Arc::new(b)))
 }
 
 fn full(method: Method, solver: Solver, walls: &[Wall]) -> Full {

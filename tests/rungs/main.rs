@@ -53,7 +53,7 @@ const ON_DEVICE: &[(&str, &str)] = &[
     ("gpu::full::pairs::pairs_vjp", "pair_vjp"),
     ("gpu::full::probe::Probe::pair_hvp", "pair_hvp"),
     ("gpu::full::probe::Probe::pair_vjp", "pair_vjp"),
-    ("gpu::full::response::Answer::gradient", "pair_vjp"),
+    ("gpu::full::response::Solution::gradient", "pair_vjp"),
     ("gpu::coulomb_jvp::coulomb_jvp", "coulomb_jvp"),
     ("gpu::coulomb_vjp::coulomb_vjp", "coulomb_vjp"),
     ("gpu::coulomb_hvp::coulomb_hvp", "coulomb_hvp"),
@@ -69,17 +69,20 @@ const ON_DEVICE: &[(&str, &str)] = &[
 /// Helpers and declarations that are checked through a registered rung: (helper, rung).
 const THROUGH: &[(&str, &str)] = &[
     // Kernels behind a body's rows, and the pieces of the coupled record.
-    ("coupling::full::body::WetBody::jvp", FULL_HVP),
-    ("coupling::full::body::WetBody::vjp", FULL_VJP),
-    ("coupling::full::body::WetBody::hvp", FULL_HVP),
-    ("coupling::full::body::WetBody::potential_vjp", FULL_VJP),
-    ("coupling::full::body::WetBody::potential_hvp", FULL_HVP),
+    ("coupling::full::body::MfsBody::jvp", FULL_HVP),
+    ("coupling::full::body::MfsBody::vjp", FULL_VJP),
+    ("coupling::full::body::MfsBody::hvp", FULL_HVP),
+    ("coupling::full::body::MfsBody::potential_vjp", FULL_VJP),
+    ("coupling::full::body::MfsBody::potential_hvp", FULL_HVP),
     ("coupling::pair::Pair::apply_jvp", FULL_HVP),
     ("coupling::full::cpu::system::System::respond_jvp", FULL_HVP),
-    ("coupling::full::cpu::response::Answer::gradient", FULL_VJP),
+    (
+        "coupling::full::cpu::response::CoupledSolution::gradient",
+        FULL_VJP,
+    ),
     // Pieces of the equations of motion.
     (
-        "dynamics::contact::Touch::displacement_vjp",
+        "dynamics::contact::PairContact::displacement_vjp",
         "dynamics::contact::Evaluation::contact_force_vjp",
     ),
     (

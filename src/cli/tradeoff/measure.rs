@@ -57,21 +57,21 @@ impl Start {
         let mut dry = parameters.clone();
         dry.density = 0.0;
         let rigid = system.evaluate(&dry, q, false, false)?.mass_matrix;
-        let wet = system.evaluate(parameters, q, forces, false)?;
+        let submerged = system.evaluate(parameters, q, forces, false)?;
         let free = free(simulator);
         let block = |m: &DMatrix<f64>| m.select_rows(&free).select_columns(&free);
         let force = match forces {
             true => {
                 let control = action(simulator).0;
                 let given = given_accelerations(simulator);
-                let all = wet.inertial_force(v, &control)? - &wet.mass_matrix * given;
+                let all = submerged.inertial_force(v, &control)? - &submerged.mass_matrix * given;
                 all.select_rows(&free)
             }
             false => DVector::zeros(free.len()),
         };
         Ok(Self {
-            added_mass: block(&(&wet.mass_matrix - rigid)),
-            mass: block(&wet.mass_matrix),
+            added_mass: block(&(&submerged.mass_matrix - rigid)),
+            mass: block(&submerged.mass_matrix),
             force,
         })
     }

@@ -23,7 +23,7 @@ pub trait Backend: Send + Sync {
     fn respond(&self, poses: &[Pose], twists: &DMatrix<f64>) -> Result<Box<dyn Response + '_>>;
 }
 
-/// The water's answer to k columns of twists at given poses: a, λ, r, μ, wherever they lie.
+/// The water's solution to k columns of twists at given poses: a, λ, r, μ, wherever they lie.
 ///
 /// Bodies that none of the columns given to [`Backend::respond`] moves have no impulses, there and in
 /// all that comes from it by [`Response::directions`].
@@ -52,7 +52,7 @@ pub trait Response: Send + Sync {
     /// A device that fails.
     fn gradient(&self) -> Result<PairTensor>;
 
-    /// The answer to these directions, one column each: [`Direction::Basis`] a combination of the
+    /// The solution to these directions, one column each: [`Direction::Basis`] a combination of the
     /// columns there are, [`Direction::Twist`] a further solve.
     ///
     /// # Errors

@@ -10,12 +10,12 @@ use std::sync::Arc;
 
 /// A body of the coupled system, in its own frame; bodies of equal shape share one.
 #[derive(Clone, Debug)]
-pub struct WetBody {
+pub struct MfsBody {
     /// The body alone.
     pub boundary: Arc<BodyBoundary>,
 }
 
-impl WetBody {
+impl MfsBody {
     /// From the body's discretisation.
     pub fn new(boundary: Arc<BodyBoundary>) -> Self {
         Self { boundary }

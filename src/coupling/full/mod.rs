@@ -35,7 +35,7 @@ mod record;
 mod settings;
 
 pub use backend::{Backend, Reached, Response};
-pub use body::WetBody;
+pub use body::MfsBody;
 pub use cpu::Cpu;
 pub use model::Model;
 pub use settings::{Preconditioner, SolveSettings, Solver};
@@ -60,7 +60,7 @@ impl Full {
     /// # Errors
     /// As [`Model::new`] and [`Cpu::new`].
     pub fn new(
-        bodies: Vec<Arc<WetBody>>,
+        bodies: Vec<Arc<MfsBody>>,
         walls: &[Wall],
         excluded: Exclusions,
         settings: SolveSettings,

@@ -1,6 +1,6 @@
 //! What the coupled system consists of.
 
-use super::{SolveSettings, WetBody};
+use super::{MfsBody, SolveSettings};
 use crate::Result;
 use crate::adjoint::lie::Pose;
 use crate::coupling::Exclusions;
@@ -13,7 +13,7 @@ use std::sync::Arc;
 /// What the coupled system consists of, whoever solves it: all that doesn't change with the poses.
 pub struct Model {
     /// The bodies, each in its own frame; those of equal shape share one.
-    pub bodies: Vec<Arc<WetBody>>,
+    pub bodies: Vec<Arc<MfsBody>>,
     /// Images that the walls make, in the world frame; the identity first.
     pub images: Vec<Image>,
     /// Pairs of bodies that don't feel each other but by images.
@@ -34,14 +34,14 @@ impl Model {
     /// Walls that don't close under reflection, pairs of bodies that don't exist, or settings out of
     /// range.
     pub fn new(
-        bodies: Vec<Arc<WetBody>>,
+        bodies: Vec<Arc<MfsBody>>,
         walls: &[Wall],
         excluded: Exclusions,
         settings: SolveSettings,
     ) -> Result<Self> {
         settings.validate(&bodies)?;
         excluded.check(bodies.len())?;
-        let ranges = |size: &dyn Fn(&WetBody) -> usize| {
+        let ranges = |size: &dyn Fn(&MfsBody) -> usize| {
             let mut at = 0;
             bodies
                 .iter()

@@ -1,4 +1,4 @@
-//! One evaluation of the coupled system: what a backend's answer means.
+//! One evaluation of the coupled system: what a backend's solution means.
 
 use super::{Full, Model, Response};
 use crate::Result;
@@ -10,7 +10,7 @@ use nalgebra::{DMatrix, DVector};
 /// Record of [`Full`].
 pub(super) struct FullRecord<'a> {
     pub model: &'a Model,
-    /// Answer to the basis.
+    /// Solution to the basis.
     pub response: Box<dyn Response + 'a>,
     momenta: DMatrix<f64>,
     gradient: PairTensor,

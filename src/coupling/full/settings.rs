@@ -1,6 +1,6 @@
 //! How the coupled system is solved, whoever solves it.
 
-use super::WetBody;
+use super::MfsBody;
 use crate::boundary::Method;
 use crate::coupling::settings::check_limits;
 use crate::{Error, Result};
@@ -60,9 +60,9 @@ impl Default for SolveSettings {
 }
 
 impl SolveSettings {
-    pub(super) fn validate(&self, bodies: &[Arc<WetBody>]) -> Result<()> {
+    pub(super) fn validate(&self, bodies: &[Arc<MfsBody>]) -> Result<()> {
         check_limits(self.tolerance, self.max_iterations)?;
-        let square = |b: &Arc<WetBody>| b.boundary.settings.method == Method::MfsFace;
+        let square = |b: &Arc<MfsBody>| b.boundary.settings.method == Method::MfsFace;
         if self.solver == Solver::Gmres
             && let Some(body) = bodies.iter().find(|b| !square(b))
         {
@@ -72,7 +72,7 @@ impl SolveSettings {
                 instead: "use --method mfs-face, or the solver cgls".into(),
             });
         }
-        let damped = |b: &Arc<WetBody>| b.boundary.settings.damping != 0.0;
+        let damped = |b: &Arc<MfsBody>| b.boundary.settings.damping != 0.0;
         if self.solver == Solver::Gmres
             && let Some(body) = bodies.iter().find(|b| damped(b))
         {

@@ -154,7 +154,7 @@ impl Coupling for PanelCoupled {
     }
 }
 
-/// The panel method answers values only.
+/// The panel method solutions values only.
 fn no_derivative(what: &str) -> Error {
     Error::Unsupported {
         what: format!("{what} of the coupled panel method"),

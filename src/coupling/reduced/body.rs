@@ -9,8 +9,8 @@ use serde::{Deserialize, Serialize};
 /// A body compressed to a few sources, in its own frame, for density 1, immutable. Bodies of equal
 /// shape share one (`Arc`).
 ///
-/// Held fixed in a flow with potential ψ, the body answers with the strengths `L Lᵀ ψ(x̄)` at its
-/// points x̄; moved with the twist ν it answers with `Ū ν`; α makes the potential `Σ α_j/|x − x̄_j|`.
+/// Held fixed in a flow with potential ψ, the body solutions with the strengths `L Lᵀ ψ(x̄)` at its
+/// points x̄; moved with the twist ν it solutions with `Ū ν`; α makes the potential `Σ α_j/|x − x̄_j|`.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(try_from = "Parts", into = "Parts")]
 pub struct ReducedBody {
@@ -29,9 +29,9 @@ pub struct Parts {
     pub name: String,
     /// x̄, m.
     pub points: Vec<Vec3>,
-    /// L, points × modes, √m: answer to the potential at the points, S̄ = L Lᵀ (m).
+    /// L, points × modes, √m: solution to the potential at the points, S̄ = L Lᵀ (m).
     pub modes: DMatrix<f64>,
-    /// Ū, points × 6: strengths (m³/s) that answer a unit twist of the body about its origin.
+    /// Ū, points × 6: strengths (m³/s) that solution a unit twist of the body about its origin.
     pub strengths: DMatrix<f64>,
     /// M̄₀: the body's own added mass about its origin; m³, m⁴, m⁵.
     pub added_mass: Mat6,
@@ -49,7 +49,7 @@ pub struct Parts {
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Fit {
-    /// Smallest distance from the surface at which its answers were fitted, m.
+    /// Smallest distance from the surface at which its solutions were fitted, m.
     pub resolved_gap: f64,
     /// Points on the surfaces around the body at which it was fitted.
     pub proxies: usize,
@@ -61,7 +61,7 @@ pub struct Fit {
     /// Largest error of the scattered flow between check points not used in the fit, each scaled by
     /// its distance from the surface, relative to the largest.
     pub scattered: f64,
-    /// Largest mode left out for being of the wrong sign (the answer of a rigid body is positive
+    /// Largest mode left out for being of the wrong sign (the solution of a rigid body is positive
     /// definite), relative to the largest mode.
     pub wrong_sign: f64,
     /// Asymmetry of the body's own added mass before symmetrising.

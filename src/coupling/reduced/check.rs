@@ -1,9 +1,9 @@
-//! The coupling against what the bodies themselves answer, at the configuration itself.
+//! The coupling against what the bodies themselves solution, at the configuration itself.
 //!
 //! The charges α of the other bodies and of images, at y in a body's frame, are a flow that the body
-//! was not fitted to. What the compressed body answers there is `E L Lᵀ Eᵀ` and `E Ū`,
-//! `E_ij = 1/|y_i − x̄_j|`; what the body answers by its own method is Φ and φ. M̄_f depends on the
-//! answers in such a way that their differences enter, to first order, through α alone:
+//! was not fitted to. What the compressed body solutions there is `E L Lᵀ Eᵀ` and `E Ū`,
+//! `E_ij = 1/|y_i − x̄_j|`; what the body solutions by its own method is Φ and φ. M̄_f depends on the
+//! solutions in such a way that their differences enter, to first order, through α alone:
 //!
 //! ```text
 //! δM = Σ_bodies { δM̄₀ + 4π [ α_yᵀ (Φ − E L Lᵀ Eᵀ) α_y + α_yᵀ (φ − E Ū) + (φ − E Ū)ᵀ α_y ] } + 4π αᵀ δG α
@@ -22,24 +22,24 @@ use nalgebra::DMatrix;
 use std::sync::Arc;
 
 impl Reduced {
-    /// To first order, how much `basisᵀ M̄_f basis` is off at `poses` if the bodies really answer as
-    /// `answers` do (one a body): symmetric, columns of `basis` squared.
+    /// To first order, how much `basisᵀ M̄_f basis` is off at `poses` if the bodies really solution as
+    /// `solutions` do (one a body): symmetric, columns of `basis` squared.
     ///
     /// # Errors
-    /// What [`Coupling::evaluate`](crate::coupling::Coupling::evaluate) and the answers report.
+    /// What [`Coupling::evaluate`](crate::coupling::Coupling::evaluate) and the solutions report.
     pub fn correction(
         &self,
         poses: &[Pose],
         basis: &DMatrix<f64>,
-        answers: &[Arc<dyn Response>],
+        solutions: &[Arc<dyn Response>],
     ) -> Result<DMatrix<f64>> {
         let record = ReducedRecord::new(self, poses, basis, false)?;
         let k = basis.ncols();
         let mut out = DMatrix::zeros(k, k);
-        for (b, answer) in answers.iter().enumerate() {
+        for (b, solution) in solutions.iter().enumerate() {
             let parts = self.bodies[b].parts();
             let twists = basis.rows(6 * b, 6);
-            let own = answer.added_mass() - parts.added_mass;
+            let own = solution.added_mass() - parts.added_mass;
             out += twists.tr_mul(&(own * twists));
             // Charges of the others, in this body's frame.
             let (mut places, mut rows, mut faded) = (Vec::new(), Vec::new(), Vec::new());
@@ -64,10 +64,10 @@ impl Reduced {
             });
             let field = inverse_distances(&places, &parts.points);
             let seen = parts.modes.tr_mul(&field.tr_mul(&charges));
-            let answered = answer.scattered(&places, &places)?;
+            let answered = solution.scattered(&places, &places)?;
             let answered = DMatrix::from_fn(places.len(), places.len(), |i, j| answered[(i, j)]);
             let scattered = charges.tr_mul(&(answered * &charges)) - seen.tr_mul(&seen);
-            let answered = answer.radiated(&places)?;
+            let answered = solution.radiated(&places)?;
             let answered = DMatrix::from_fn(places.len(), 6, |i, j| answered[(i, j)]);
             let radiated = charges.tr_mul(&((answered - &field * &parts.strengths) * twists));
             let faint = DMatrix::from_fn(rows.len(), k, |i, c| faded[i] * charges[(i, c)]);

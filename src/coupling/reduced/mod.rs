@@ -1,4 +1,4 @@
-//! Multiple scattering between a few sources a body: the answer of each body to the water is computed
+//! Multiple scattering between a few sources a body: the solution of each body to the water is computed
 //! once per shape ([`compress`]); what remains at run time are Coulomb sums and a small dense system.
 //!
 //! With all points x of all bodies, `G_ij = 1/|x_i − x_j|` between points of different bodies (with

@@ -32,7 +32,7 @@ pub(super) struct ReducedRecord<'a> {
     /// Of I − LᵀGL.
     factor: Factor,
     /// LᵀGŪ, modes × 6 bodies.
-    answer: DMatrix<f64>,
+    solution: DMatrix<f64>,
     /// ŪᵀGŪ, 6 bodies × 6 bodies.
     direct: DMatrix<f64>,
     basis: DMatrix<f64>,
@@ -46,7 +46,7 @@ pub(super) struct ReducedRecord<'a> {
     report: Report,
 }
 
-/// Answer to one combination of twists.
+/// Solution to one combination of twists.
 pub(super) struct Response {
     twists: DVector<f64>,
     a: DVector<f64>,
@@ -97,13 +97,13 @@ impl<'a> ReducedRecord<'a> {
                 .unzip();
         let (n, w) = (reduced.mode_count(), 6 * reduced.bodies.len());
         let mut system = DMatrix::identity(n, n);
-        let mut answer = DMatrix::zeros(n, w);
+        let mut solution = DMatrix::zeros(n, w);
         let mut direct = DMatrix::zeros(w, w);
         for (placed, block) in placed.iter().zip(&blocks) {
             let link = placed.link;
             let factor = link.factor * placed.weight[0];
             scatter(reduced, link.target, link.source, factor, block.as_ref(), {
-                (&mut system, &mut answer, &mut direct)
+                (&mut system, &mut solution, &mut direct)
             });
             scatter(
                 reduced,
@@ -111,7 +111,7 @@ impl<'a> ReducedRecord<'a> {
                 link.target,
                 factor,
                 block.transpose(),
-                (&mut system, &mut answer, &mut direct),
+                (&mut system, &mut solution, &mut direct),
             );
         }
         let Some(factor) = Factor::new(system) else {
@@ -127,8 +127,8 @@ impl<'a> ReducedRecord<'a> {
             placed,
             derivative,
             factor,
-            a: &answer * basis,
-            answer,
+            a: &solution * basis,
+            solution,
             direct,
             basis: basis.clone(),
             alpha: DMatrix::zeros(0, 0),
@@ -138,7 +138,7 @@ impl<'a> ReducedRecord<'a> {
         out.factor.solve_in_place(&mut out.a);
         out.alpha = out.charges(basis, &out.a);
         out.momenta = out.impulses(basis, &out.a);
-        reduced.check_answer(poses, &out.basis, &out.momenta, out.report.condition)?;
+        reduced.check_solution(poses, &out.basis, &out.momenta, out.report.condition)?;
         Ok(out)
     }
 
@@ -161,7 +161,7 @@ impl<'a> ReducedRecord<'a> {
 
     /// M̄₀ x̄ + 4π (ŪᵀGŪ x̄ + ŪᵀGL a).
     fn impulses(&self, twists: &DMatrix<f64>, a: &DMatrix<f64>) -> DMatrix<f64> {
-        let mut out = FLUX * (&self.direct * twists + self.answer.tr_mul(a));
+        let mut out = FLUX * (&self.direct * twists + self.solution.tr_mul(a));
         for (b, body) in self.reduced.bodies.iter().enumerate() {
             let mut rows = out.rows_mut(6 * b, 6);
             rows += body.parts().added_mass * twists.rows(6 * b, 6);
@@ -169,7 +169,7 @@ impl<'a> ReducedRecord<'a> {
         out
     }
 
-    /// Answer to a direction: a combination of what is there, or one more back-substitution.
+    /// Solution to a direction: a combination of what is there, or one more back-substitution.
     pub fn respond(&self, x: Direction) -> Response {
         match x {
             Direction::Basis(c) => Response {
@@ -179,7 +179,7 @@ impl<'a> ReducedRecord<'a> {
             },
             Direction::Twist(x) => {
                 let twists = DMatrix::from_column_slice(x.len(), 1, x.as_slice());
-                let mut a = &self.answer * &twists;
+                let mut a = &self.solution * &twists;
                 self.factor.solve_in_place(&mut a);
                 Response {
                     alpha: self.charges(&twists, &a).column(0).into_owned(),
@@ -198,7 +198,7 @@ impl<'a> ReducedRecord<'a> {
 
     /// From a potential ψ at all points (one column each): δa = (I − LᵀGL)⁻¹ Lᵀψ, the charges L δa, and
     /// the impulses 4π (Ūᵀψ + ŪᵀGL δa).
-    pub fn tangent_answer(&self, psi: &DMatrix<f64>) -> (DMatrix<f64>, DMatrix<f64>) {
+    pub fn tangent_solution(&self, psi: &DMatrix<f64>) -> (DMatrix<f64>, DMatrix<f64>) {
         let k = psi.ncols();
         let mut a = DMatrix::zeros(self.reduced.mode_count(), k);
         let mut direct = DMatrix::zeros(6 * self.reduced.bodies.len(), k);
@@ -213,7 +213,7 @@ impl<'a> ReducedRecord<'a> {
         self.factor.solve_in_place(&mut a);
         let still = DMatrix::zeros(6 * self.reduced.bodies.len(), k);
         let alpha = self.charges(&still, &a);
-        (alpha, FLUX * (direct + self.answer.tr_mul(&a)))
+        (alpha, FLUX * (direct + self.solution.tr_mul(&a)))
     }
 
     /// 4π α_xᵀ δG α_y: the Coulomb forces among the charges, as a wrench on each body.
@@ -318,7 +318,7 @@ fn scatter(
     source: usize,
     factor: f64,
     block: MatRef<f64>,
-    (system, answer, direct): (&mut DMatrix<f64>, &mut DMatrix<f64>, &mut DMatrix<f64>),
+    (system, solution, direct): (&mut DMatrix<f64>, &mut DMatrix<f64>, &mut DMatrix<f64>),
 ) {
     let (t, s) = (reduced.modes[target].clone(), reduced.modes[source].clone());
     // The lower triangle is all that the factorisation reads.
@@ -329,7 +329,7 @@ fn scatter(
     }
     for k in 0..6 {
         for i in 0..t.len() {
-            answer[(t.start + i, 6 * source + k)] += factor * block[(i, s.len() + k)];
+            solution[(t.start + i, 6 * source + k)] += factor * block[(i, s.len() + k)];
         }
         for i in 0..6 {
             direct[(6 * target + i, 6 * source + k)] += factor * block[(t.len() + i, s.len() + k)];

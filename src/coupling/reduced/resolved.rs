@@ -5,7 +5,7 @@ use crate::adjoint::lie::{Mat6, Pose, Vec3};
 use crate::{Error, Result};
 use nalgebra::DMatrix;
 
-/// Condition number of I − LᵀGL above which the answers of the bodies to one another lose their
+/// Condition number of I − LᵀGL above which the solutions of the bodies to one another lose their
 /// meaning: at one digit lost the gap is far below what was fitted.
 const ILL_CONDITIONED: f64 = 1e4;
 
@@ -24,7 +24,7 @@ impl Reduced {
     ///
     /// # Errors
     /// [`Error::Unresolved`] with the bodies and what was found.
-    pub(crate) fn check_answer(
+    pub(crate) fn check_solution(
         &self,
         poses: &[Pose],
         basis: &DMatrix<f64>,

@@ -123,7 +123,7 @@ impl ReducedRecord<'_> {
         let n = responses.len();
         let alpha: Vec<&[f64]> = responses.iter().map(|r| r.alpha.as_slice()).collect();
         let (psi, seen) = self.tangent_potentials(&alpha, z);
-        let (dalpha, dmomenta) = self.tangent_answer(&psi);
+        let (dalpha, dmomenta) = self.tangent_solution(&psi);
         let links: Vec<_> = self.placed.iter().zip(&seen).collect();
         let one = |(placed, seen): &(&Placed, &(Moved, Vec<f64>))| {
             self.link_tangent(placed, seen, &responses, &dalpha)

@@ -75,7 +75,7 @@ impl Backend for Gpu {
         let moving = (0..poses.len())
             .map(|b| twists.rows(6 * b, 6).iter().any(|x| *x != 0.0))
             .collect();
-        Ok(Box::new(response::Answer::solve(
+        Ok(Box::new(response::Solution::solve(
             placed,
             Arc::new(moving),
             twists,

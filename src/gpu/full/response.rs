@@ -1,4 +1,4 @@
-//! The water's answer, on the device: value and first derivative.
+//! The water's solution, on the device: value and first derivative.
 
 use super::pairs::{Densities, pairs_vjp};
 use super::products::{Product, To, product};
@@ -24,7 +24,7 @@ use std::sync::Arc;
 const LEFT: usize = 4;
 
 /// a, λ, r, μ of some columns, on the device.
-pub(super) struct Answer {
+pub(super) struct Solution {
     pub placed: Arc<Placed>,
     /// Bodies that the columns first given move.
     moving: Arc<Vec<bool>>,
@@ -71,7 +71,7 @@ pub(super) fn impulses(
     })
 }
 
-impl Answer {
+impl Solution {
     /// Solves for columns of twists.
     pub fn solve(
         placed: Arc<Placed>,
@@ -303,7 +303,7 @@ impl Answer {
     }
 }
 
-impl Response for Answer {
+impl Response for Solution {
     fn reached(&self) -> Reached {
         self.reached
     }
@@ -392,13 +392,13 @@ impl Response for Answer {
                 }
             }
         }
-        let answer = if combined {
+        let solution = if combined {
             self.combination(&coefficients)?
         } else {
             // One more column costs a solve little: the kernels are evaluated once for all.
             Self::solve(self.placed.clone(), self.moving.clone(), &twists)?
         };
-        Ok(Box::new(answer))
+        Ok(Box::new(solution))
     }
 
     fn tangent(&self, z: &[Vec6]) -> Result<Tangent> {

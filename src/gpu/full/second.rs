@@ -2,7 +2,7 @@
 
 use super::pairs::{Densities, pairs_hvp};
 use super::products::{Product, To, product};
-use super::response::{Answer, impulses, spatial};
+use super::response::{Solution, impulses, spatial};
 use super::solve::Solves;
 use crate::Result;
 use crate::adjoint::lie::{Vec6, angular, cross_force, linear};
@@ -29,7 +29,7 @@ pub(super) fn motions(placed: &Placed, z: &[Vec6]) -> Vec<f64> {
     out
 }
 
-impl Answer {
+impl Solution {
     /// As the CPU's: the tangent of the first column's energy with the last.
     pub(super) fn second(&self, z: &[Vec6]) -> Result<Tangent> {
         let (placed, n) = (&self.placed, self.columns);
@@ -110,7 +110,7 @@ impl Answer {
         context.submit(&batch)?;
         let what = "tangent of the coupled system (Eq. 21)";
         let after = After {
-            answer: self,
+            solution: self,
             motion: &motion,
             dk: &dk,
             dphi: &dphi,
@@ -167,7 +167,7 @@ struct Derived {
 
 /// What follows from the tangent X of the strengths.
 struct After<'a> {
-    answer: &'a Answer,
+    solution: &'a Solution,
     motion: &'a Buffer,
     dk: &'a Buffer,
     dphi: &'a Buffer,
@@ -177,8 +177,8 @@ struct After<'a> {
 impl After<'_> {
     /// Momenta, wrenches, and how the solves stand.
     fn run(&self, solves: Option<&Solves>) -> Result<Derived> {
-        let n = self.answer.columns;
-        let placed = &self.answer.placed;
+        let n = self.solution.columns;
+        let placed = &self.solution.placed;
         let geometry = &placed.geometry;
         let (context, sizes) = (&geometry.context, &geometry.sizes);
         let fine = context.fine();
@@ -199,13 +199,13 @@ impl After<'_> {
             };
             sum(context, fine, &task, &geometry.open)
         };
-        let answer = self.answer;
+        let solution = self.solution;
         // [μ, r, β | δμ, δr] and [a, λ | δa, δλ]: δr = −δK a − K δa, δμ = δK λ + K δλ.
         let copies = [
             copy(
                 faces,
                 3 * n,
-                (&answer.densities, 3 * n, 0),
+                (&solution.densities, 3 * n, 0),
                 (&left, 5 * n, 0),
                 1.0,
             )?,
@@ -214,7 +214,7 @@ impl After<'_> {
             copy(
                 sources,
                 2 * n,
-                (&answer.strengths, 2 * n, 0),
+                (&solution.strengths, 2 * n, 0),
                 (&right, 4 * n, 0),
                 1.0,
             )?,

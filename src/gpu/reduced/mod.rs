@@ -9,10 +9,10 @@
 //! With images their own inverses, G is symmetric over all points, and the force on a point is what both columns'
 //! charges pull with there: derivatives are a pass over G for the pulls, and sums over each body.
 
-mod answer;
 mod products;
 mod record;
 mod second;
+mod solution;
 mod solve;
 
 use super::context::Context;

@@ -1,6 +1,6 @@
 //! One evaluation on the device.
 
-use super::answer::Answer;
+use super::solution::Solution;
 use crate::Result;
 use crate::adjoint::lie::{Pose, Vec6};
 use crate::coupling::{Direction, PairTensor, Pullback, Record, Report, Tangent};
@@ -16,7 +16,7 @@ const TENSOR: usize = 24;
 
 /// Record of [`GpuReduced`](super::GpuReduced).
 pub(super) struct GpuRecord {
-    answer: Answer,
+    solution: Solution,
     tolerance: f64,
     derivative: Derivative,
     report: Report,
@@ -38,23 +38,23 @@ impl GpuRecord {
         basis: &DMatrix<f64>,
         derivative: bool,
     ) -> Result<Self> {
-        let answer = Answer::solve(placed, basis, tolerance, true)?;
-        let (reduced, reached) = (&answer.placed.model.reduced, &answer.reached);
-        let poses: &[Pose] = &answer.placed.poses;
-        reduced.check_answer(poses, basis, &answer.momenta, reached.condition)?;
+        let solution = Solution::solve(placed, basis, tolerance, true)?;
+        let (reduced, reached) = (&solution.placed.model.reduced, &solution.reached);
+        let poses: &[Pose] = &solution.placed.poses;
+        reduced.check_solution(poses, basis, &solution.momenta, reached.condition)?;
         let report = Report {
             iterations: reached.iterations,
             residual: reached.residual,
             asymmetry: 0.0,
             condition: reached.condition,
         };
-        let derivative = match (derivative, answer.columns) {
+        let derivative = match (derivative, solution.columns) {
             (false, _) | (_, 0) => Derivative::None,
-            (_, k) if k <= TENSOR => Derivative::Pairs(answer.tensor(&answer.pulls()?)?),
-            _ => Derivative::Pulls(answer.pulls()?),
+            (_, k) if k <= TENSOR => Derivative::Pairs(solution.tensor(&solution.pulls()?)?),
+            _ => Derivative::Pulls(solution.pulls()?),
         };
         Ok(Self {
-            answer,
+            solution,
             tolerance,
             derivative,
             report,
@@ -62,18 +62,18 @@ impl GpuRecord {
     }
 
     fn bodies(&self) -> usize {
-        self.answer.placed.model.sizes.bodies
+        self.solution.placed.model.sizes.bodies
     }
 
     /// Columns on the basis and what they pull with.
-    fn along(&self, pulls: &Buffer, x: &DVector<f64>) -> Result<(Answer, Buffer)> {
+    fn along(&self, pulls: &Buffer, x: &DVector<f64>) -> Result<(Solution, Buffer)> {
         let coefficients = DMatrix::from_column_slice(x.len(), 1, x.as_slice());
-        let one = self.answer.combination(&coefficients)?;
+        let one = self.solution.combination(&coefficients)?;
         let model = &one.placed.model;
         let context = &model.context;
         let rows = (model.sizes.points, model.pull());
         let out = context.reals("pulls", context.fine(), rows.0 * rows.1)?;
-        let units = self.answer.units(&coefficients, &one.scale);
+        let units = self.solution.units(&coefficients, &one.scale);
         let call = combine(context, context.fine(), pulls, &units, &out, rows)?;
         context.run(&[&[call]])?;
         Ok((one, out))
@@ -82,9 +82,9 @@ impl GpuRecord {
     /// ∇_g E(x, e_i) of every column, `[column][body]`.
     fn columns(&self, pulls: &Buffer, x: &DVector<f64>) -> Result<Vec<Vec<Vec6>>> {
         let (one, own) = self.along(pulls, x)?;
-        let found = self.answer.wrenches(pulls, (&one, &own))?;
+        let found = self.solution.wrenches(pulls, (&one, &own))?;
         let of = |k: usize| (0..self.bodies()).map(|b| found[b][k]).collect();
-        Ok((0..self.answer.columns).map(of).collect())
+        Ok((0..self.solution.columns).map(of).collect())
     }
 
     /// ∇_g E(x, y).
@@ -93,17 +93,17 @@ impl GpuRecord {
         Ok(x.wrenches(&of_x, (&y, &of_y))?.concat())
     }
 
-    /// The answers to directions: combinations of what is there, or another solve.
-    fn answers(&self, directions: &[Direction]) -> Result<Answer> {
+    /// The solutions to directions: combinations of what is there, or another solve.
+    fn solutions(&self, directions: &[Direction]) -> Result<Solution> {
         let n = directions.len();
-        let mut coefficients = DMatrix::zeros(self.answer.columns, n);
-        let mut twists = DMatrix::zeros(self.answer.twists.nrows(), n);
+        let mut coefficients = DMatrix::zeros(self.solution.columns, n);
+        let mut twists = DMatrix::zeros(self.solution.twists.nrows(), n);
         let mut combined = true;
         for (k, direction) in directions.iter().enumerate() {
             match direction {
                 Direction::Basis(c) => {
                     coefficients.set_column(k, c);
-                    twists.set_column(k, &(&self.answer.twists * *c));
+                    twists.set_column(k, &(&self.solution.twists * *c));
                 }
                 Direction::Twist(x) => {
                     combined = false;
@@ -112,15 +112,15 @@ impl GpuRecord {
             }
         }
         if combined {
-            return self.answer.combination(&coefficients);
+            return self.solution.combination(&coefficients);
         }
-        Answer::solve(self.answer.placed.clone(), &twists, self.tolerance, false)
+        Solution::solve(self.solution.placed.clone(), &twists, self.tolerance, false)
     }
 }
 
 impl Record for GpuRecord {
     fn momenta(&self) -> &DMatrix<f64> {
-        &self.answer.momenta
+        &self.solution.momenta
     }
 
     fn gradient(&self, x: &DVector<f64>, y: &DVector<f64>) -> Result<Vec<Vec6>> {
@@ -152,21 +152,21 @@ impl Record for GpuRecord {
     }
 
     fn vjp(&self, x: Direction, y: Direction) -> Result<Pullback> {
-        let answer = self.answers(&Direction::distinct(x, y))?;
-        let last = answer.columns - 1;
-        let pulls = answer.pulls()?;
-        let wrenches = answer.wrenches(&pulls, (&answer, &pulls))?;
+        let solution = self.solutions(&Direction::distinct(x, y))?;
+        let last = solution.columns - 1;
+        let pulls = solution.pulls()?;
+        let wrenches = solution.wrenches(&pulls, (&solution, &pulls))?;
         Ok(Pullback {
-            momentum_x: answer.momenta.column(0).into_owned(),
-            momentum_y: answer.momenta.column(last).into_owned(),
+            momentum_x: solution.momenta.column(0).into_owned(),
+            momentum_y: solution.momenta.column(last).into_owned(),
             wrench: wrenches.iter().map(|pairs| pairs[last]).collect(),
         })
     }
 
     fn hvp(&self, x: Direction, y: Direction, z: &[Vec6]) -> Result<Tangent> {
-        let answer = self.answers(&Direction::distinct(x, y))?;
-        let length = answer.placed.model.length;
-        units::along(z, length, |z| answer.second(z, self.tolerance))
+        let solution = self.solutions(&Direction::distinct(x, y))?;
+        let length = solution.placed.model.length;
+        units::along(z, length, |z| solution.second(z, self.tolerance))
     }
 
     fn report(&self) -> &Report {

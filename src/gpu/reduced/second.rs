@@ -1,7 +1,7 @@
 //! The tangent along one displacement, on the device.
 
-use super::answer::{Answer, FLUX, expand, impulses, project};
 use super::products::{Product, product};
+use super::solution::{FLUX, Solution, expand, impulses, project};
 use super::solve::Solve;
 use crate::Result;
 use crate::adjoint::lie::Vec6;
@@ -13,7 +13,7 @@ use crate::gpu::sum::{Base, Sum, sum};
 use crate::gpu::units::spatial;
 use crate::gpu::wrench::{Side, wrench};
 
-impl Answer {
+impl Solution {
     /// As the CPU's: the tangent of the first column's energy with the last; one column or two.
     ///
     /// # Errors
@@ -28,7 +28,7 @@ impl Answer {
         let psi = reals("δG α", sizes.points * n)?;
         let total = reals("δG α + G δα", sizes.points * n)?;
         let given = reals("right-hand sides", sizes.modes * n)?;
-        let da = reals("tangent of the answers", sizes.modes * n)?;
+        let da = reals("tangent of the solutions", sizes.modes * n)?;
         let dalpha = reals("tangent of the charges", sizes.points * n)?;
         let momenta = reals("momenta", 6 * sizes.bodies * n)?;
         let open = &model.open;

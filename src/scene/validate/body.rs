@@ -52,7 +52,7 @@ fn check_overlap(scene: &Scene, index: usize) -> Result<()> {
         (_, None) => refused(
             "the body has no shape that could overlap: take `overlaps_parent` away, or give it one",
         ),
-        _ if scene.wet_parent(index).is_none() => refused(
+        _ if scene.submerged_parent(index).is_none() => refused(
             "none of the bodies that carry this one has a shape to overlap: take `overlaps_parent` \
              away",
         ),

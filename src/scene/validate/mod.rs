@@ -42,12 +42,12 @@ impl Scene {
 
     /// The nearest body with a shape among those that carry this one: what `overlaps_parent` speaks
     /// of. The tree must have been checked.
-    pub(crate) fn wet_parent(&self, index: usize) -> Option<usize> {
+    pub(crate) fn submerged_parent(&self, index: usize) -> Option<usize> {
         let parent = self.bodies[index].parent.as_ref()?;
         let parent = self.body(parent)?.0;
         match self.bodies[parent].shape {
             Some(_) => Some(parent),
-            None => self.wet_parent(parent),
+            None => self.submerged_parent(parent),
         }
     }
 
@@ -55,7 +55,7 @@ impl Scene {
     pub(crate) fn overlapping(&self) -> Vec<(usize, usize)> {
         let declared = (0..self.bodies.len()).filter(|&b| self.bodies[b].overlaps_parent);
         declared
-            .filter_map(|b| Some((self.wet_parent(b)?, b)))
+            .filter_map(|b| Some((self.submerged_parent(b)?, b)))
             .collect()
     }
 

@@ -91,10 +91,12 @@ impl Gaps {
             .collect::<Result<Vec<_>>>()?;
         let ignored: BTreeSet<(usize, usize)> =
             ignore.iter().map(|&(a, b)| (a.min(b), a.max(b))).collect();
-        let wet: Vec<usize> = (0..count).filter(|&i| surfaces[i].is_some()).collect();
+        let submerged: Vec<usize> = (0..count).filter(|&i| surfaces[i].is_some()).collect();
         let mut pairs = Vec::new();
-        for (k, &i) in wet.iter().enumerate() {
-            let others = wet[k + 1..].iter().filter(|&&j| !ignored.contains(&(i, j)));
+        for (k, &i) in submerged.iter().enumerate() {
+            let others = submerged[k + 1..]
+                .iter()
+                .filter(|&&j| !ignored.contains(&(i, j)));
             pairs.extend(others.map(|&j| (i, Other::Body(j))));
             pairs.extend((0..walls.len()).map(|w| (i, Other::Wall(w))));
         }

@@ -8,8 +8,8 @@ use crate::scene::{Scene, Shape, WallSurface};
 use crate::shape::{Gap, Other};
 use crate::simulate::assemble;
 use crate::simulate::simulator::world_axes;
+use crate::simulate::submerged::{self, SubmergedBody, Water};
 use crate::simulate::surface::{Surface, surface};
-use crate::simulate::wet::{self, Water, Wet};
 use crate::simulate::{Fidelity, Settings, Simulator};
 use nalgebra::DMatrix;
 use std::sync::Arc;
@@ -90,7 +90,7 @@ impl<'a> Case<'a> {
             report,
         };
         if matches!(out.fidelity, Fidelity::Reduced | Fidelity::Auto) {
-            out.correction = Some(out.correction(&out.wet(&out.surfaces))?);
+            out.correction = Some(out.correction(&out.submerged(&out.surfaces))?);
         }
         Ok(out)
     }
@@ -102,8 +102,8 @@ impl<'a> Case<'a> {
     /// The bodies whose answers come from their meshes, by their numbers in the scene.
     pub fn meshed(&self) -> Vec<usize> {
         let settings = self.simulator.settings();
-        let wet = self.wet(&self.surfaces);
-        let pairs = self.bodies.iter().zip(&wet);
+        let submerged = self.submerged(&self.surfaces);
+        let pairs = self.bodies.iter().zip(&submerged);
         let used = pairs.filter(|(_, w)| w.meshed(settings, self.fidelity));
         used.map(|(b, _)| *b).collect()
     }
@@ -135,7 +135,7 @@ impl<'a> Case<'a> {
     }
 
     /// The bodies in the water with these surfaces.
-    pub fn wet<'b>(&'b self, surfaces: &'b [Option<Surface>]) -> Vec<Wet<'b>> {
+    pub fn submerged<'b>(&'b self, surfaces: &'b [Option<Surface>]) -> Vec<SubmergedBody<'b>> {
         let tree = &self.simulator.system().tree;
         let asked = self.simulator.settings().fidelity;
         assemble::in_water(self.scene(), surfaces, tree, asked).1
@@ -151,15 +151,22 @@ impl<'a> Case<'a> {
     ///
     /// [`Reduced`]: crate::coupling::reduced::Reduced
     pub fn value(&self, surfaces: &[Option<Surface>]) -> Result<DMatrix<f64>> {
-        let wet = self.wet(surfaces);
+        let submerged = self.submerged(surfaces);
         if self.correction.is_some() {
-            return self.correction(&wet);
+            return self.correction(&submerged);
         }
         let settings = self.simulator.settings();
         let plan = &self.simulator.assembled.plan;
         let mut device = self.simulator.assembled.device.clone();
         let water = self.water();
-        let made = wet::couple(&wet, &water, settings, self.fidelity, plan, &mut device)?;
+        let made = submerged::couple(
+            &submerged,
+            &water,
+            settings,
+            self.fidelity,
+            plan,
+            &mut device,
+        )?;
         Ok(evaluate(made.coupling.as_ref(), &self.poses, &self.turn)?.0)
     }
 
@@ -169,15 +176,15 @@ impl<'a> Case<'a> {
     }
 
     /// What the compressed bodies' added mass is off if they answer as `bodies` do.
-    fn correction(&self, bodies: &[Wet]) -> Result<DMatrix<f64>> {
+    fn correction(&self, bodies: &[SubmergedBody]) -> Result<DMatrix<f64>> {
         let settings = self.simulator.settings();
         let plan = &self.simulator.assembled.plan;
-        let own = self.wet(&self.surfaces);
-        let coupling = wet::compressed_all(&own, &self.water(), settings, plan)?;
+        let own = self.submerged(&self.surfaces);
+        let coupling = submerged::compressed_all(&own, &self.water(), settings, plan)?;
         let made = coupling.reduced_bodies().iter();
         let gaps: Vec<f64> = made.map(|b| b.parts().fit.resolved_gap).collect();
-        let answers: Vec<Arc<dyn Response>> = wet::answers(bodies, settings, &gaps)?;
-        coupling.correction(&self.poses, &self.turn, &answers)
+        let responses: Vec<Arc<dyn Response>> = submerged::responses(bodies, settings, &gaps)?;
+        coupling.correction(&self.poses, &self.turn, &responses)
     }
 
     /// What is left at check points.
@@ -242,9 +249,10 @@ impl<'a> Case<'a> {
             };
             surfaces.push(mesh.map(Surface::of_mesh));
         }
-        let (numbers, wet) = assemble::in_water(scene, &surfaces, &system.tree, Fidelity::Full);
+        let (numbers, submerged) =
+            assemble::in_water(scene, &surfaces, &system.tree, Fidelity::Full);
         let n = 6 * self.bodies.len();
-        if wet.len() <= 1 && scene.walls.is_empty() {
+        if submerged.len() <= 1 && scene.walls.is_empty() {
             return Ok(DMatrix::zeros(n, n));
         }
         let all = system.tree.kinematics(self.simulator.start().0).poses;
@@ -259,7 +267,7 @@ impl<'a> Case<'a> {
         let water = assemble::water(scene, &numbers, None);
         let solve = |fidelity: Fidelity| -> Result<DMatrix<f64>> {
             let (plan, mut cpu) = Default::default();
-            let made = wet::couple(&wet, &water, &panel, fidelity, &plan, &mut cpu)?;
+            let made = submerged::couple(&submerged, &water, &panel, fidelity, &plan, &mut cpu)?;
             Ok(evaluate(made.coupling.as_ref(), &poses, &turn)?.0)
         };
         let difference = solve(fidelity)? - solve(Fidelity::Isolated)?;

@@ -49,7 +49,9 @@ impl Backend for Cpu {
     }
 
     fn respond(&self, poses: &[Pose], twists: &DMatrix<f64>) -> Result<Box<dyn Response + '_>> {
-        Ok(Box::new(response::Answer::new(self, poses, twists)?))
+        Ok(Box::new(response::CoupledSolution::new(
+            self, poses, twists,
+        )?))
     }
 }
 

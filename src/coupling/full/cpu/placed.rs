@@ -1,4 +1,4 @@
-//! The coupled system at given poses: what all answers there share.
+//! The coupled system at given poses: what all solutions there share.
 
 use super::super::body::unit_twists;
 use super::super::{Model, Reached};

@@ -10,15 +10,15 @@ use crate::{Error, Result};
 use nalgebra::DMatrix;
 use std::sync::Arc;
 
-/// Answer of the system at given poses, in memory.
-pub(super) struct Answer<'a> {
+/// Solution of the system at given poses, in memory.
+pub(super) struct CoupledSolution<'a> {
     placed: Arc<Placed<'a>>,
     solution: Solution,
     /// Whether these are directions, of which there are few, and not the columns of a basis.
     few: bool,
 }
 
-impl<'a> Answer<'a> {
+impl<'a> CoupledSolution<'a> {
     /// Solves for columns of body-frame twists at the given poses.
     pub fn new(cpu: &'a Cpu, poses: &[Pose], twists: &DMatrix<f64>) -> Result<Self> {
         let placed = Placed::new(cpu, poses, twists);
@@ -30,7 +30,7 @@ impl<'a> Answer<'a> {
     }
 }
 
-impl Response for Answer<'_> {
+impl Response for CoupledSolution<'_> {
     fn reached(&self) -> Reached {
         self.solution.reached
     }

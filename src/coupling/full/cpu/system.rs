@@ -1,6 +1,6 @@
 //! The assembled matrix at given poses, and its solves.
 
-use super::super::{Preconditioner, Reached, Solver, WetBody};
+use super::super::{MfsBody, Preconditioner, Reached, Solver};
 use super::Cpu;
 use crate::adjoint::kernel::Write;
 use crate::coupling::pair::Pair;
@@ -130,7 +130,7 @@ impl<'a> System<'a> {
     }
 
     /// Applies a body's factor to its rows of `x`.
-    fn per_body(&self, x: &mut Columns, f: impl Fn(&WetBody, MatMut<'_, f64>)) {
+    fn per_body(&self, x: &mut Columns, f: impl Fn(&MfsBody, MatMut<'_, f64>)) {
         let n = x.columns;
         for (body, range) in self.cpu.model.bodies.iter().zip(&self.cpu.model.sources) {
             let part = x.slice_mut(range.start, range.end);

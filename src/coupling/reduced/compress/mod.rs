@@ -8,12 +8,12 @@
 //!
 //! ```text
 //! W Φ W = V Λ Vᵀ          Φ the potentials at proxies scattered from unit sources at proxies;
-//!                         the largest modes of the answer are kept
+//!                         the largest modes of the solution are kept
 //! W E_x̄ L ≈ V √Λ          least squares, x̄ the few candidates that explain modes and
 //! W E_x̄ Ū ≈ W Φ_own       the body's own flow best
 //! ```
 //!
-//! Φ is symmetric (reciprocity) and positive definite, for a rigid body answers every flow; what the
+//! Φ is symmetric (reciprocity) and positive definite, for a rigid body solutions every flow; what the
 //! one-body method and the fit leave of asymmetry and of negative modes is reported.
 //!
 //! How tight the fit must be for an error `tolerance` of M̄_f was measured on pairs of spheres, thin
@@ -200,7 +200,7 @@ pub fn compress(
     let cut = MODES * settings.tolerance.sqrt();
     let found = modes::largest(&scattered, cut).ok_or_else(|| Error::Unresolved {
         place: format!("body {name:?}"),
-        quantity: "modes of its answer to the water that were found".into(),
+        quantity: "modes of its solution to the water that were found".into(),
         value: 0.0,
         limit: 1.0,
         remedy: "use a more even mesh".into(),
@@ -242,8 +242,8 @@ pub fn compress(
     let radiated = relative(&(&there * &strengths), &own);
     let scattered = response.scattered(&checked.points, &checked.points)?;
     let scattered = checked.both(scattered);
-    let answer = &there * &modes;
-    let scattered = relative(&(&answer * answer.transpose()), &scattered);
+    let solution = &there * &modes;
+    let scattered = relative(&(&solution * solution.transpose()), &scattered);
     let dense = |m: &Mat<f64>| DMatrix::from_fn(m.nrows(), m.ncols(), |i, j| m[(i, j)]);
     ReducedBody::new(Parts {
         name: name.to_string(),

@@ -1,4 +1,4 @@
-//! The bodies' answer to columns of twists: charges and momenta, what they pull with, and wrenches.
+//! The bodies' solution to columns of twists: charges and momenta, what they pull with, and wrenches.
 
 use super::products::{Product, product};
 use super::solve::{Reached, Solve};
@@ -21,7 +21,7 @@ use std::sync::Arc;
 pub(super) const FLUX: f64 = 4.0 * PI;
 
 /// α of some columns, on the device.
-pub(super) struct Answer {
+pub(super) struct Solution {
     pub placed: Arc<Placed>,
     pub twists: DMatrix<f64>,
     /// What each column is in units of: on the device all are about 1.
@@ -49,7 +49,7 @@ pub(super) fn impulses(model: &Compressed, values: &[f64], scale: &[f64]) -> DMa
     })
 }
 
-impl Answer {
+impl Solution {
     /// Solves for columns of twists; `probing` tells of the condition number too.
     ///
     /// # Errors
@@ -71,7 +71,7 @@ impl Answer {
         let alpha = context.reals("charges", fine, sizes.points * k)?;
         let psi = context.reals("potentials", fine, sizes.points * k)?;
         let given = context.reals("right-hand sides", fine, sizes.modes * all)?;
-        let a = context.reals("answers", fine, sizes.modes * all)?;
+        let a = context.reals("solutions", fine, sizes.modes * all)?;
         let momenta = context.reals("momenta", fine, 6 * sizes.bodies * k)?;
         let open = &model.open;
         let whole = |b| (b, k, 0);

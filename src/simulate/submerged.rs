@@ -7,7 +7,7 @@ use crate::adjoint::lie::{Mat6, Pose, Vec3};
 use crate::boundary::exact::ExactBoundary;
 use crate::boundary::panel::Extrapolated;
 use crate::boundary::{BodyBoundary, OneBody, PanelBoundary, Response};
-use crate::coupling::full::{Model, Solver, WetBody};
+use crate::coupling::full::{MfsBody, Model, Solver};
 use crate::coupling::panel::{self, PanelCoupled};
 use crate::coupling::reduced::{Cutoff, Reduced, ReducedBody, cache, compress};
 use crate::coupling::{Coupling, Exclusions, Isolated};
@@ -20,7 +20,7 @@ use std::path::Path;
 use std::sync::Arc;
 
 /// A body that the water sees.
-pub(super) struct Wet<'a> {
+pub(super) struct SubmergedBody<'a> {
     pub name: &'a str,
     /// Surface in the body's frame.
     pub mesh: Option<&'a TriMesh>,
@@ -76,7 +76,7 @@ pub(super) fn semi_axes(shape: &Shape) -> Option<[f64; 3]> {
     }
 }
 
-impl<'a> Wet<'a> {
+impl<'a> SubmergedBody<'a> {
     /// Whether its answer depends on a mesh.
     pub fn meshed(&self, settings: &Settings, fidelity: Fidelity) -> bool {
         let formula =
@@ -158,7 +158,7 @@ pub(super) struct Water<'a> {
 
 /// The coupling of `bodies`, with a fidelity that isn't `Auto`, computed on `device`.
 pub(super) fn couple(
-    bodies: &[Wet],
+    bodies: &[SubmergedBody],
     water: &Water,
     settings: &Settings,
     fidelity: Fidelity,
@@ -182,7 +182,7 @@ pub(super) struct Plan {
     pub cutoffs: Vec<((usize, usize), Cutoff)>,
 }
 
-fn isolated(bodies: &[Wet], walls: &[Wall], settings: &Settings) -> Result<Made> {
+fn isolated(bodies: &[SubmergedBody], walls: &[Wall], settings: &Settings) -> Result<Made> {
     let mut warnings = Vec::new();
     if !walls.is_empty() {
         warnings.push(format!(
@@ -235,7 +235,7 @@ struct Own {
 }
 
 /// Whether two bodies have the same surface in their own frames.
-fn equal(a: &Wet, b: &Wet) -> bool {
+fn equal(a: &SubmergedBody, b: &SubmergedBody) -> bool {
     let same = |a: &TriMesh, b: &TriMesh| a.vertices() == b.vertices() && a.faces() == b.faces();
     a.added_mass == b.added_mass
         && a.ellipsoid == b.ellipsoid
@@ -246,7 +246,7 @@ fn equal(a: &Wet, b: &Wet) -> bool {
         }
 }
 
-fn own(body: &Wet, settings: &Settings) -> Result<Own> {
+fn own(body: &SubmergedBody, settings: &Settings) -> Result<Own> {
     if let Some(added_mass) = body.added_mass {
         return Ok(Own {
             added_mass,
@@ -293,7 +293,10 @@ impl Discretisation {
 }
 
 /// One value per body; bodies with equal surfaces share one.
-fn shared<T>(bodies: &[Wet], make: impl Fn(&Wet, &TriMesh) -> Result<T>) -> Result<Vec<Arc<T>>> {
+fn shared<T>(
+    bodies: &[SubmergedBody],
+    make: impl Fn(&SubmergedBody, &TriMesh) -> Result<T>,
+) -> Result<Vec<Arc<T>>> {
     let mut out: Vec<Arc<T>> = Vec::with_capacity(bodies.len());
     for (b, body) in bodies.iter().enumerate() {
         let mesh = body.surface("full")?;
@@ -312,7 +315,12 @@ fn once<T>(made: &[Arc<T>], of: impl Fn(&T) -> &[String]) -> Vec<String> {
     distinct.flat_map(|i| of(&made[i]).to_vec()).collect()
 }
 
-fn full(bodies: &[Wet], water: &Water, settings: &Settings, device: &mut Device) -> Result<Made> {
+fn full(
+    bodies: &[SubmergedBody],
+    water: &Water,
+    settings: &Settings,
+    device: &mut Device,
+) -> Result<Made> {
     if settings.one_body == OneBody::Exact {
         return Err(Error::Unsupported {
             what: "the method exact with the fidelity full".into(),
@@ -333,7 +341,7 @@ fn full(bodies: &[Wet], water: &Water, settings: &Settings, device: &mut Device)
         } else {
             BodyBoundary::unfactored
         };
-        Ok(WetBody::new(Arc::new(make(
+        Ok(MfsBody::new(Arc::new(make(
             body.name, vertices, faces, &boundary,
         )?)))
     })?;
@@ -361,7 +369,7 @@ fn full(bodies: &[Wet], water: &Water, settings: &Settings, device: &mut Device)
     })
 }
 
-fn panels(bodies: &[Wet], water: &Water, settings: &Settings) -> Result<Made> {
+fn panels(bodies: &[SubmergedBody], water: &Water, settings: &Settings) -> Result<Made> {
     let made = shared(bodies, |body, mesh| {
         PanelBoundary::new(body.name, mesh.vertices(), mesh.faces())
     })?;
@@ -392,7 +400,7 @@ fn panels(bodies: &[Wet], water: &Water, settings: &Settings) -> Result<Made> {
 }
 
 fn reduced(
-    bodies: &[Wet],
+    bodies: &[SubmergedBody],
     water: &Water,
     settings: &Settings,
     plan: &Plan,
@@ -400,7 +408,7 @@ fn reduced(
 ) -> Result<Made> {
     let coupling = compressed_all(bodies, water, settings, plan)?;
     let made = coupling.reduced_bodies();
-    let method = |body: &Wet| Ok(name_of(body.method(settings)?));
+    let method = |body: &SubmergedBody| Ok(name_of(body.method(settings)?));
     let methods = bodies.iter().map(method).collect::<Result<Vec<_>>>()?;
     Ok(Made {
         faces: bodies
@@ -434,7 +442,7 @@ fn reduced(
 
 /// All bodies compressed and coupled.
 pub(super) fn compressed_all(
-    bodies: &[Wet],
+    bodies: &[SubmergedBody],
     water: &Water,
     settings: &Settings,
     plan: &Plan,
@@ -458,8 +466,8 @@ pub(super) fn compressed_all(
 
 /// What each body answers by its own method; bodies that are equal share one. Sources as near as
 /// `gaps` (m, one a body) are resolved where the method has to know.
-pub(super) fn answers(
-    bodies: &[Wet],
+pub(super) fn responses(
+    bodies: &[SubmergedBody],
     settings: &Settings,
     gaps: &[f64],
 ) -> Result<Vec<Arc<dyn Response>>> {
@@ -483,7 +491,7 @@ const MISSED: f64 = 0.6;
 
 /// What the user should know of compressed bodies.
 fn compression_warnings(
-    bodies: &[Wet],
+    bodies: &[SubmergedBody],
     made: &[Arc<ReducedBody>],
     settings: &Settings,
     plan: &Plan,
@@ -535,7 +543,7 @@ fn compression_warnings(
 const LAYOUT_FACES: usize = 2000;
 
 /// The surface that a body is compressed around, in the body's frame.
-fn layout<'a>(body: &Wet<'a>, method: OneBody) -> Result<Cow<'a, TriMesh>> {
+fn layout<'a>(body: &SubmergedBody<'a>, method: OneBody) -> Result<Cow<'a, TriMesh>> {
     let mesh = body.surface("reduced")?;
     match (method, body.ellipsoid) {
         (OneBody::Exact, Some((semi_axes, pose))) => {
@@ -556,7 +564,7 @@ const GRID: f64 = (1u64 << 30) as f64;
 /// It is computed in units of its own size, with lengths rounded to [`GRID`]: bodies of the same
 /// shape share it whatever their size, to the last bit.
 fn compressed(
-    body: &Wet,
+    body: &SubmergedBody,
     method: OneBody,
     settings: &Settings,
     chosen: &compress::Settings,
@@ -602,7 +610,7 @@ fn compressed(
     );
     let key = cache::Key::new(unit.vertices(), unit.faces(), &made_from, &chosen);
     let found = cache::fetch(key, folder, || {
-        let own = Wet {
+        let own = SubmergedBody {
             name: body.name,
             mesh: Some(&unit),
             ellipsoid,

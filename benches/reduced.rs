@@ -5,7 +5,7 @@
 
 #[allow(dead_code)]
 mod common;
-#[path = "../tests/common/two_spheres.rs"]
+#[path = "../tests/support/two_spheres.rs"]
 mod two_spheres;
 
 use common::{Effort, arguments, in_child, median, scene, serve_child, settings, step_times};

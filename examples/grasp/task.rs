@@ -1,6 +1,6 @@
 //! The task: the scene with and without water, its controllers, and controls through knots with their cost and its gradient.
 
-use crate::hold::{Hold, Tolerable};
+use super::hold::{Hold, Tolerable};
 use hydrograd::optimize::{self, Found, Progress, minimise};
 use hydrograd::scene::{Controller, SpeedStage};
 use hydrograd::simulate::{Knots, OpenLoop, Rollout};

@@ -1,4 +1,4 @@
-//! The command line as a person or a script meets it.
+//! Every command but `tradeoff`.
 
 use std::path::{Path, PathBuf};
 use std::process::{Command, Output};

@@ -1,6 +1,6 @@
 //! Every shader is right WGSL in every arithmetic, has a wrapper and a twin on the CPU; no device is needed.
 
-#[path = "../src/gpu/source.rs"]
+#[path = "../../src/gpu/source.rs"]
 #[allow(dead_code)]
 mod source;
 

@@ -1,8 +1,6 @@
 //! The reduced coupling against exact solutions, its symmetry, its cache, and what it refuses.
 
-#[path = "common/two_spheres.rs"]
-mod two_spheres;
-
+use crate::support::two_spheres;
 use hydrograd::adjoint::lie::{Mat3, Pose, Vec3};
 use hydrograd::boundary::{ExactBoundary, OneBody, PanelBoundary};
 use hydrograd::coupling::reduced::{Reduced, ReducedBody, cache, compress};

@@ -1,4 +1,4 @@
-//! `hydrograd tradeoff` as a person or a script meets it.
+//! `hydrograd tradeoff`.
 
 use serde_json::Value;
 use std::path::Path;

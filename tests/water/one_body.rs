@@ -1,5 +1,5 @@
-//! Added mass of single bodies against exact values. `cargo test --release --test one_body -- \
-//! --ignored --nocapture` prints the tables of `docs/accuracy.md`.
+//! Added mass of single bodies against exact values. `cargo test --release --test water \
+//! one_body -- --ignored --nocapture` prints the tables of `docs/accuracy.md`.
 
 use hydrograd::Error;
 use hydrograd::adjoint::lie::{Mat6, Vec3, skew};

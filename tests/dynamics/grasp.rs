@@ -1,12 +1,10 @@
 //! The grasp: lost by the naive push in water, caught on dry land, and caught in water by forces that a descent finds.
 
-#![cfg(feature = "opt")]
-
 #[allow(dead_code)]
-#[path = "../examples/grasp/hold.rs"]
+#[path = "../../examples/grasp/hold.rs"]
 mod hold;
 #[allow(dead_code)]
-#[path = "../examples/grasp/task.rs"]
+#[path = "../../examples/grasp/task.rs"]
 mod task;
 
 use hydrograd::Fidelity;

@@ -1,4 +1,4 @@
-//! Spheres and ellipsoids in the flow of sources. `cargo test --release --test exact -- --ignored
+//! Spheres and ellipsoids in the flow of sources. `cargo test --release --test water exact -- --ignored
 //! --nocapture` prints the table of `docs/accuracy.md`.
 
 use super::{exact, longest, off_surface, surface};

@@ -1,5 +1,5 @@
-//! Error estimates against true errors, where those are known. `cargo test --release --test estimate --
-//! --nocapture` prints the tables of `docs/accuracy-estimate.md`; with `--ignored` those with finer
+//! Error estimates against true errors, where those are known. `cargo test --release --test water estimate
+//! -- --nocapture` prints the tables of `docs/accuracy-estimate.md`; with `--ignored` those with finer
 //! meshes.
 
 use hydrograd::adjoint::lie::Vec3;

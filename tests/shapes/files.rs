@@ -1,5 +1,4 @@
 //! Mesh files: round trips, and files that are broken in every way.
-#![cfg(feature = "meshio")]
 
 use hydrograd::Error;
 use hydrograd::adjoint::lie::Vec3;

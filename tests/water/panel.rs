@@ -1,5 +1,5 @@
 //! One body by the panel method, against exact values.
-//! `cargo test --release --test panel -- --ignored --nocapture` prints the table of `docs/accuracy.md`.
+//! `cargo test --release --test water panel:: -- --ignored --nocapture` prints the table of `docs/accuracy.md`.
 
 use faer::Mat;
 use hydrograd::Error;

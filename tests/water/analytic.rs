@@ -1,6 +1,6 @@
 //! Coupled bodies against exact values, against other solvers of the same system, and against the
-//! symmetries of the problem. Every test prints its figures: `cargo test --release --test analytic --
-//! --nocapture --test-threads 1` gives the tables of `docs/accuracy-coupled.md`.
+//! symmetries of the problem. Every test prints its figures: `cargo test --release --test water analytic
+//! -- --nocapture --test-threads 1` gives the tables of `docs/accuracy-coupled.md`.
 
 use hydrograd::Error;
 use hydrograd::adjoint::lie::{Mat3, Mat6, Pose, Vec3, Vec6, exp_matrix, skew};

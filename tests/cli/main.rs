@@ -1,0 +1,4 @@
+//! The command line as a person or a script meets it.
+
+mod commands;
+mod tradeoff;

@@ -1,0 +1,7 @@
+//! Contact of bodies with one another and with walls, and joints at their limits.
+
+mod drops;
+mod geometry;
+mod integrators;
+mod joints;
+mod physics;

@@ -1,0 +1,12 @@
+//! Motion: what it conserves, its gradients, how runs are resumed and ended, and descent on them.
+
+mod extremes;
+#[cfg(feature = "opt")]
+mod grasp;
+mod growth;
+mod invariants;
+#[cfg(feature = "opt")]
+mod optimize;
+mod resume;
+mod rollout_gradient;
+mod trees;

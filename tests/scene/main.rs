@@ -1,0 +1,6 @@
+//! Scenes: files, what is refused and how that is said, and the example scenes.
+
+mod api_input;
+mod examples;
+mod input;
+mod validate;

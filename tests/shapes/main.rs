@@ -1,0 +1,7 @@
+//! Bodies' surfaces: primitives, prisms, files and refinement.
+
+#[cfg(feature = "meshio")]
+mod files;
+mod primitives;
+mod prisms;
+mod refine;

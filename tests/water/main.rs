@@ -1,0 +1,17 @@
+//! Added mass and flow: one body by each method, coupled bodies by each fidelity, against exact values.
+
+mod analytic;
+#[cfg(feature = "cli")]
+mod auto;
+mod estimate;
+mod exact;
+mod flow;
+mod one_body;
+mod overlap;
+mod panel;
+mod panel_coupled;
+mod reduced;
+mod refine;
+
+#[path = "../support/mod.rs"]
+mod support;

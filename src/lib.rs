@@ -1,5 +1,6 @@
 #![doc = include_str!("../README.md")]
 
+mod assembly;
 pub mod boundary;
 #[cfg(feature = "cli")]
 #[doc(hidden)]
@@ -14,11 +15,13 @@ pub mod multibody;
 pub mod notation;
 #[cfg(feature = "opt")]
 pub mod optimize;
+mod policy;
 pub mod scene;
 pub mod shape;
 pub mod simulate;
 pub mod solver;
 mod special;
+mod water;
 
 pub use error::{Error, Result};
 pub use hydrograd_adjoint as adjoint;

@@ -34,7 +34,7 @@ pub(super) fn main(arguments: &Arguments, output: Output) -> Result<ExitCode> {
 
 #[cfg(not(feature = "gpu"))]
 pub(super) fn main(_: &Arguments, _: Output) -> Result<ExitCode> {
-    Err(crate::simulate::backend::not_built())
+    Err(crate::water::backend::not_built())
 }
 
 #[cfg(feature = "gpu")]

@@ -1,11 +1,11 @@
 //! A rollout as steps with transposes: controller, integrator and observations together.
 
-use super::clearance::Clearance;
 use super::{Fidelity, Observation, Policy, Sample};
 use crate::adjoint::lie::{Vec3, Vec6, point_wrench};
 use crate::adjoint::step::Step;
 use crate::dynamics::{Evaluation, Input, Parameters, State, StateBar, StepBar, Stepper};
 use crate::shape::Gap;
+use crate::water::Clearance;
 use crate::{Error, Result};
 use nalgebra::{DMatrix, DVector};
 
@@ -40,7 +40,7 @@ impl<'a> Trajectory<'a> {
         let mut gap = None;
         if self.fidelity != Fidelity::Isolated {
             let poses = system.tree.kinematics(&state.q).poses;
-            gap = self.clearance.keep_apart(&poses, system)?;
+            gap = self.clearance.keep_apart(&poses)?;
         }
         Ok((self.stepper.evaluate(&state.q, false)?, gap))
     }

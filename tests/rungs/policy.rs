@@ -17,12 +17,12 @@ pub fn rungs() -> Vec<Rung> {
         };
     }
     rungs![
-        "simulate::policy::OpenLoop::act_vjp" => open_loop,
-        "simulate::policy::Constant::act_vjp" => |c| act(&Constant { control: vec![0.3, -0.7] }, c),
-        "simulate::policy::pd::Pd::act_vjp" => |c| act(&pd(), c),
-        "simulate::policy::push::PushThenLock::act_vjp" => push_then_lock,
-        "simulate::policy::stages::SpeedStages::act_vjp" => speed_stages,
-        "simulate::policy::playback::Playback::act_vjp" => |c| act(&playback(), c),
+        "policy::OpenLoop::act_vjp" => open_loop,
+        "policy::Constant::act_vjp" => |c| act(&Constant { control: vec![0.3, -0.7] }, c),
+        "policy::pd::Pd::act_vjp" => |c| act(&pd(), c),
+        "policy::push::PushThenLock::act_vjp" => push_then_lock,
+        "policy::stages::SpeedStages::act_vjp" => speed_stages,
+        "policy::playback::Playback::act_vjp" => |c| act(&playback(), c),
         "simulate::knots::Knots::controls_vjp" => knots,
         "simulate::rollout::Rollout::vjp" => rollout,
     ]

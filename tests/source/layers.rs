@@ -7,7 +7,7 @@ use std::path::{Path, PathBuf};
 /// `Error` and `Result` alone.
 ///
 /// `adjoint::lie` gives vectors and poses to everyone; the modules marked `adjoint` use the ladder too.
-const LAYERS: [(&str, &[&str]); 15] = [
+const LAYERS: [(&str, &[&str]); 18] = [
     ("error", &[]),
     ("scene", &["shape"]),
     ("special", &[]),
@@ -22,18 +22,52 @@ const LAYERS: [(&str, &[&str]); 15] = [
         "dynamics",
         &["adjoint", "contact", "coupling", "multibody", "scene"],
     ),
+    // Controllers: what acts, from what is observed.
+    ("policy", &[]),
+    // How the bodies feel each other: methods, fidelities, device, gaps.
     (
-        "simulate",
+        "water",
         &[
             "adjoint",
             "boundary",
-            "contact",
             "coupling",
             "dynamics",
             "gpu",
             "multibody",
             "scene",
             "shape",
+        ],
+    ),
+    // From a scene to a system.
+    (
+        "assembly",
+        &[
+            "adjoint",
+            "contact",
+            "coupling",
+            "dynamics",
+            "multibody",
+            "policy",
+            "scene",
+            "shape",
+            "water",
+        ],
+    ),
+    // What runs.
+    (
+        "simulate",
+        &[
+            "adjoint",
+            "assembly",
+            "contact",
+            "coupling",
+            "dynamics",
+            "gpu",
+            "multibody",
+            "policy",
+            "scene",
+            "shape",
+            "water",
         ],
     ),
     // Descent stands on what a user sees.
@@ -44,6 +78,7 @@ const LAYERS: [(&str, &[&str]); 15] = [
         "cli",
         &[
             "adjoint", "boundary", "coupling", "dynamics", "gpu", "scene", "shape", "simulate",
+            "water",
         ],
     ),
 ];

@@ -19,11 +19,12 @@
 mod case;
 mod levels;
 
-use super::{Fidelity, Simulator};
+use super::Fidelity;
 use crate::Result;
 use case::Case;
 use serde::Serialize;
 
+pub(crate) use case::Subject;
 pub use levels::Level;
 
 /// On all parts together.
@@ -32,7 +33,7 @@ const SAFETY: f64 = 1.5;
 /// order where the error is of the second.
 const RESIDUAL: f64 = 0.25;
 
-/// An estimate of the error of [`Simulator::added_mass`]: `max |ΔM_ij| / √(M_ii M_jj)`, all numbers
+/// An estimate of the error of [`crate::Simulator::added_mass`]: `max |ΔM_ij| / √(M_ii M_jj)`, all numbers
 /// dimensionless.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct ErrorEstimate {
@@ -63,31 +64,25 @@ pub struct ErrorEstimate {
     pub missing: Vec<String>,
 }
 
-impl Simulator {
-    /// Estimates the error of [`Simulator::added_mass`] at the start, from the asymmetry, from what is
-    /// left at check points, and from other meshes of the same bodies.
-    ///
-    /// It costs about as much again as preparing the scene and one added mass; several times as much
-    /// for bodies with fewer than 240 faces, whose meshes are refined instead of coarsened. With the
-    /// fidelity `Isolated` the coupling is computed on up to 320 faces a body, some tenths of a second.
-    ///
-    /// # Errors
-    /// Whatever the coupling reports on the scene's own meshes.
-    pub fn error_estimate(&self) -> Result<ErrorEstimate> {
+impl Subject<'_> {
+    /// Estimates the error of the added mass, from the asymmetry, from what is left at check points, and from other
+    /// meshes of the same bodies.
+    pub fn error_estimate(self) -> Result<ErrorEstimate> {
         let case = Case::new(self)?;
+        let fidelity = case.fidelity;
         let mut missing = case.unknown();
         let known = missing.is_empty();
         let residual = case.residual()?;
         let (levels, extrapolation) = levels::extrapolate(&case, &mut missing);
-        let coupling = match self.fidelity() {
+        let coupling = match fidelity {
             Fidelity::Isolated => case.missing_coupling(&mut missing),
             _ => None,
         };
-        let own = self.discretisation().iter().map(|d| d.asymmetry);
+        let own = self.water.discretisation.iter().map(|d| d.asymmetry);
         let asymmetry = own.fold(case.report.asymmetry, f64::max);
         let total = extrapolation.filter(|_| known).and_then(|extrapolation| {
             let bodies = extrapolation.max(asymmetry);
-            let together = match self.fidelity() {
+            let together = match fidelity {
                 Fidelity::Isolated => bodies + coupling?,
                 Fidelity::Full => bodies.max((RESIDUAL * residual.unwrap_or(0.0)).min(1.0)),
                 Fidelity::Reduced | Fidelity::Auto => bodies + residual?,

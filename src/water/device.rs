@@ -17,7 +17,7 @@ use {
 
 /// The CPU unless a GPU is open.
 #[derive(Clone, Default)]
-pub(super) struct Device {
+pub(crate) struct Device {
     asked: Backend,
     /// Why it isn't what was asked for.
     reason: Option<String>,

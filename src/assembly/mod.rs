@@ -1,53 +1,32 @@
-//! From a scene to a system: meshes, masses, joints, coupling, controller.
+//! From a scene to a system: masses, joints, water, contact, limits, controller.
 
-use super::backend::{Backend, GpuSettings};
-use super::clearance::Clearance;
-use super::device::Device;
-use super::plan::{Planned, plan};
-use super::submerged::{self, Discretisation, Plan, SubmergedBody, Water};
-use super::surface::{Surface, surface};
-use super::{Fidelity, Policy, Settings};
-use super::{contact, controller, limits};
+mod contact;
+mod controller;
+mod limits;
+
 use crate::Result;
 use crate::adjoint::drag::{self, Element, Part};
-use crate::adjoint::lie::{Mat3, Mat6, Pose, Vec3, exp_matrix};
-use crate::coupling::{Exclusions, Isolated};
+use crate::adjoint::lie::{Mat3, Mat6, Vec3};
+use crate::coupling::Isolated;
 use crate::dynamics::{BodyData, Drive, Parameters, Stepper, System};
 use crate::multibody::{self, Tree};
-use crate::scene::{self, Body, DragPart, Placement, Scene};
-use crate::shape::{Gap, Other, TriMesh};
+use crate::policy::Policy;
+use crate::scene::{self, Body, DragPart, Scene};
+use crate::shape::TriMesh;
+use crate::water::{self, Clearance, Fidelity, Prepared, Settings, Surface, pose};
 use nalgebra::DVector;
 use std::path::Path;
 use std::sync::Arc;
 
 /// A scene made ready.
 #[derive(Clone)]
-pub(super) struct Assembled {
+pub(crate) struct Assembled {
     pub system: System,
     pub parameters: Parameters,
     pub policy: Arc<dyn Policy>,
     pub q: DVector<f64>,
     pub v: DVector<f64>,
-    pub faces: usize,
-    /// The fidelity in use: not `Auto`.
-    pub fidelity: Fidelity,
-    /// What each body in the water became.
-    pub discretisation: Vec<Discretisation>,
-    /// Smallest gap that each body's discretisation resolves, m; zero where it isn't limited but by
-    /// its mesh.
-    pub resolved: Vec<f64>,
-    /// What `Auto` chose for each body and pair.
-    pub plan: Plan,
-    /// What `Auto` chose, and why.
-    pub reasons: Vec<String>,
-    /// What the coupling is computed on.
-    pub device: Device,
-    pub clearance: Clearance,
-    pub warnings: Vec<String>,
-}
-
-pub(super) fn pose(p: &Placement) -> Pose {
-    Pose::new(exp_matrix(&Vec3::from(p.rotation)), Vec3::from(p.position))
+    pub water: Prepared,
 }
 
 fn joint(j: &scene::Joint) -> multibody::Joint {
@@ -75,34 +54,6 @@ fn part(p: DragPart) -> Part {
         DragPart::Normal => Part::Normal,
         DragPart::Total => Part::Total,
     }
-}
-
-/// The bodies that the water sees with a fidelity, with their numbers in the scene. Bodies that
-/// can't move matter only as boundaries of the coupled flow.
-pub(super) fn in_water<'a>(
-    scene: &'a Scene,
-    surfaces: &'a [Option<Surface>],
-    tree: &Tree,
-    fidelity: Fidelity,
-) -> (Vec<usize>, Vec<SubmergedBody<'a>>) {
-    let alone = fidelity == Fidelity::Isolated;
-    let seen = |b: &usize| !alone || moves(scene, tree, *b);
-    let submerged = |b: usize| {
-        let (body, surface) = (&scene.bodies[b], surfaces[b].as_ref());
-        let given = body.added_mass.as_ref();
-        (surface.is_some() || given.is_some()).then(|| SubmergedBody {
-            name: &body.name,
-            mesh: surface.map(|s| &s.mesh),
-            ellipsoid: (body.shape.as_ref().and_then(submerged::semi_axes))
-                .map(|axes| (axes, pose(&body.shape_at))),
-            coarse: surface.and_then(|s| s.coarse.as_ref()),
-            added_mass: given
-                .filter(|_| alone)
-                .map(|rows| Mat6::from_fn(|i, j| rows[i][j])),
-        })
-    };
-    let numbers = (0..scene.bodies.len()).filter(seen);
-    numbers.filter_map(|b| Some((b, submerged(b)?))).unzip()
 }
 
 /// Mass, centre of mass and inertia of a body.
@@ -147,12 +98,8 @@ fn elements(mesh: &TriMesh) -> Vec<Element> {
         .collect()
 }
 
-/// Whether anything moves body `b`.
-fn moves(scene: &Scene, tree: &Tree, b: usize) -> bool {
-    (0..scene.bodies.len()).any(|a| tree.carries(a, b) && !tree.links()[a].v.is_empty())
-}
-
-pub(super) fn assemble(
+/// Prepares the scene; compressed bodies are kept in `folder`.
+pub(crate) fn assemble(
     scene: &Scene,
     settings: &Settings,
     folder: Option<&Path>,
@@ -166,15 +113,10 @@ pub(super) fn assemble(
             joint(&b.joint),
         )
     }));
-    let mut warnings = Vec::new();
     let mut parameters = Parameters::zeros(scene.bodies.len());
     parameters.density = scene.fluid.density;
-    let mut surfaces = Vec::with_capacity(scene.bodies.len());
-    for body in &scene.bodies {
-        surfaces.push(surface(body, settings, settings.faces, 1.0)?);
-    }
-
-    let (of_submerged, submerged) = in_water(scene, &surfaces, &tree, settings.fidelity);
+    let surfaces = water::surfaces(scene, settings)?;
+    let in_water = water::in_water(scene, &surfaces, &tree, settings.fidelity);
     let mut bodies = Vec::with_capacity(scene.bodies.len());
     let mut controls = 0;
     for (b, body) in scene.bodies.iter().enumerate() {
@@ -206,7 +148,7 @@ pub(super) fn assemble(
                 data.surface = pieces;
             }
         }
-        data.submerged = of_submerged.iter().position(|w| *w == b);
+        data.submerged = in_water.0.iter().position(|w| *w == b);
         if body.actuated {
             data.joint_control = Some(controls);
             controls += tree.links()[b].v.len();
@@ -226,7 +168,7 @@ pub(super) fn assemble(
             None => Drive::Free,
         })
         .collect();
-    let clearance = Clearance::new(scene, &surfaces, &tree, &drives)?;
+    let clearance = Clearance::new(scene, &surfaces, &tree)?;
     let mut system = System {
         bodies,
         drives,
@@ -239,38 +181,15 @@ pub(super) fn assemble(
         tree,
     };
     let q = start_coordinates(scene, settings, &system, &parameters, &clearance)?;
-    let Planned {
-        fidelity,
-        plan,
-        reasons,
-    } = choose(
-        scene,
-        settings,
-        &system,
-        &q,
-        &clearance,
-        &submerged,
-        &of_submerged,
-    )?;
-    warnings.extend(without_effect(settings));
-    let water = water(scene, &of_submerged, folder);
-    let mut device = Device::open(settings, fidelity)?;
-    let made = submerged::couple(&submerged, &water, settings, fidelity, &plan, &mut device)?;
-    warnings.extend(device.warning());
-    system.coupling = made.coupling.into();
-    warnings.extend(made.warnings);
-    let mut resolved = vec![0.0; scene.bodies.len()];
-    for (b, d) in of_submerged.iter().zip(&made.bodies) {
-        resolved[*b] = d.resolved_gap.unwrap_or(0.0);
-    }
+    let poses = system.tree.kinematics(&q).poses;
+    let water = water::prepare(scene, settings, in_water, &poses, clearance, folder)?;
+    system.coupling = water.coupling.clone();
     if let Some(given) = &scene.contact {
         let made = contact::assemble(contact::Parts {
             scene,
             given,
             settings,
-            clearance: &clearance,
-            fidelity,
-            resolved: &resolved,
+            water: &water,
             surfaces: &surfaces,
             mass: &parameters.mass,
         })?;
@@ -285,95 +204,8 @@ pub(super) fn assemble(
         parameters,
         q,
         v,
-        faces: made.faces,
-        fidelity,
-        discretisation: made.bodies,
-        resolved,
-        plan,
-        reasons,
-        device,
-        clearance,
-        warnings,
+        water,
     })
-}
-
-/// What is around the bodies in the water, `of_submerged` being their numbers in the scene.
-pub(super) fn water<'a>(
-    scene: &'a Scene,
-    of_submerged: &[usize],
-    folder: Option<&'a Path>,
-) -> Water<'a> {
-    let number = |b: usize| of_submerged.iter().position(|w| *w == b);
-    let declared = scene.overlapping().into_iter();
-    let pairs = declared.filter_map(|(a, b)| Some((number(a)?, number(b)?)));
-    Water {
-        walls: &scene.walls,
-        excluded: Exclusions::new(pairs),
-        folder,
-    }
-}
-
-/// Settings that the backend or the fidelity doesn't look at.
-fn without_effect(settings: &Settings) -> Vec<String> {
-    let mut out = Vec::new();
-    if settings.backend == Backend::Cpu && settings.gpu != GpuSettings::default() {
-        out.push("the settings of the GPU have no effect with the backend cpu".into());
-    }
-    if settings.fidelity == Fidelity::Reduced {
-        return out;
-    }
-    let given = [
-        ("rank", settings.compress.rank.is_some()),
-        ("resolved_gap", settings.compress.resolved_gap.is_some()),
-    ];
-    let unused = given.iter().filter(|(_, given)| *given);
-    out.extend(unused.map(|(name, _)| {
-        format!(
-            "the setting {name} has no effect with the fidelity {}: only reduced takes it",
-            format!("{:?}", settings.fidelity).to_lowercase()
-        )
-    }));
-    out
-}
-
-/// The fidelity to use, and what `Auto` makes of the scene.
-fn choose(
-    scene: &Scene,
-    settings: &Settings,
-    system: &System,
-    q: &DVector<f64>,
-    clearance: &Clearance,
-    submerged: &[SubmergedBody],
-    of_submerged: &[usize],
-) -> Result<Planned> {
-    if settings.fidelity != Fidelity::Auto || scene.fluid.density <= 0.0 {
-        return Ok(Planned {
-            fidelity: settings.fidelity,
-            plan: Plan::default(),
-            reasons: Vec::new(),
-        });
-    }
-    let all = system.tree.kinematics(q).poses;
-    let poses: Vec<Pose> = of_submerged.iter().map(|b| all[*b]).collect();
-    let number = |b: usize| of_submerged.iter().position(|w| *w == b);
-    let mut gaps = Vec::new();
-    for gap in [&clearance.moving, &clearance.rigid]
-        .into_iter()
-        .flat_map(|g| g.all(&all))
-    {
-        let second = match gap.second {
-            Other::Body(b) => number(b).map(Other::Body),
-            wall => Some(wall),
-        };
-        if let (Some(first), Some(second)) = (number(gap.first), second) {
-            gaps.push(Gap {
-                first,
-                second,
-                ..gap
-            });
-        }
-    }
-    plan(submerged, &poses, &gaps, &scene.walls, settings.accuracy.0)
 }
 
 /// Initial coordinates.
@@ -391,7 +223,7 @@ fn start_coordinates(
     };
     stepper(scene, settings, system, parameters).place_motions(&mut q, 0.0);
     if settings.fidelity != Fidelity::Isolated && scene.fluid.density > 0.0 {
-        clearance.refuse_start(&q, system)?;
+        clearance.refuse_start(&system.tree.kinematics(&q).poses)?;
     }
     Ok(q)
 }

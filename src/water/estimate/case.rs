@@ -1,16 +1,15 @@
-//! A simulator at its start, and the same on other meshes.
+//! The water of a scene at its start, and the same on other meshes.
 
 use crate::Result;
 use crate::adjoint::lie::Pose;
 use crate::boundary::{OneBody, Response};
 use crate::coupling::{Coupling, Report};
+use crate::multibody::Tree;
 use crate::scene::{Scene, Shape, WallSurface};
 use crate::shape::{Gap, Other};
-use crate::simulate::assemble;
-use crate::simulate::simulator::world_axes;
-use crate::simulate::submerged::{self, SubmergedBody, Water};
-use crate::simulate::surface::{Surface, surface};
-use crate::simulate::{Fidelity, Settings, Simulator};
+use crate::water::submerged::{self, SubmergedBody, Water};
+use crate::water::surface::{Surface, surface, surfaces};
+use crate::water::{Fidelity, Prepared, Settings, around, in_water, world_axes};
 use nalgebra::DMatrix;
 use std::sync::Arc;
 
@@ -23,9 +22,20 @@ const COUPLING_FACES: usize = 320;
 /// Most that a gap which isn't resolved may weigh.
 const NARROWEST: f64 = 10.0;
 
+/// What an estimate is asked for.
+#[derive(Clone, Copy)]
+pub(crate) struct Subject<'a> {
+    pub scene: &'a Scene,
+    pub settings: &'a Settings,
+    pub tree: &'a Tree,
+    /// Poses of all bodies of the scene.
+    pub poses: &'a [Pose],
+    pub water: &'a Prepared,
+}
+
 /// What the estimate is of.
-pub(super) struct Case<'a> {
-    pub simulator: &'a Simulator,
+pub(crate) struct Case<'a> {
+    pub subject: Subject<'a>,
     pub fidelity: Fidelity,
     /// The bodies of the matrix, by their numbers in the scene.
     bodies: Vec<usize>,
@@ -57,14 +67,22 @@ fn evaluate(
 }
 
 impl<'a> Case<'a> {
-    pub fn new(simulator: &'a Simulator) -> Result<Self> {
-        let (bodies, poses) = simulator.in_water();
+    pub fn new(subject: Subject<'a>) -> Result<Self> {
+        let Subject {
+            scene,
+            settings,
+            water,
+            ..
+        } = subject;
+        let bodies = water.bodies.clone();
+        let poses: Vec<Pose> = bodies.iter().map(|b| subject.poses[*b]).collect();
+        let surfaces = surfaces(scene, settings)?;
         let turn = world_axes(&poses);
-        let system = simulator.system();
-        let (matrix, report) = evaluate(system.coupling.as_ref(), &poses, &turn)?;
+        let (matrix, report) = evaluate(water.coupling.as_ref(), &poses, &turn)?;
         let diagonal = (0..matrix.nrows())
             .map(|i| {
-                let volume = system.bodies[bodies[i / 6]].volume;
+                let surface = surfaces[bodies[i / 6]].as_ref();
+                let volume = surface.map_or(0.0, |s| s.properties.volume);
                 let squared = if i % 6 < 3 {
                     1.0
                 } else {
@@ -73,19 +91,15 @@ impl<'a> Case<'a> {
                 matrix[(i, i)].max(LEAST * volume * squared)
             })
             .collect();
-        let settings = simulator.settings();
-        let scene = simulator.scene.bodies.iter();
         let mut out = Self {
-            simulator,
-            fidelity: simulator.fidelity(),
+            subject,
+            fidelity: water.fidelity,
             bodies,
             poses,
             turn,
             matrix,
             diagonal,
-            surfaces: scene
-                .map(|b| surface(b, settings, settings.faces, 1.0))
-                .collect::<Result<_>>()?,
+            surfaces,
             correction: None,
             report,
         };
@@ -96,12 +110,12 @@ impl<'a> Case<'a> {
     }
 
     pub fn scene(&self) -> &'a Scene {
-        &self.simulator.scene
+        self.subject.scene
     }
 
     /// The bodies whose answers come from their meshes, by their numbers in the scene.
     pub fn meshed(&self) -> Vec<usize> {
-        let settings = self.simulator.settings();
+        let settings = self.subject.settings;
         let submerged = self.submerged(&self.surfaces);
         let pairs = self.bodies.iter().zip(&submerged);
         let used = pairs.filter(|(_, w)| w.meshed(settings, self.fidelity));
@@ -110,7 +124,7 @@ impl<'a> Case<'a> {
 
     /// What no estimate is made of.
     pub fn unknown(&self) -> Vec<String> {
-        let own = self.simulator.discretisation().iter();
+        let own = self.subject.water.discretisation.iter();
         let given = own.filter(|d| d.method == "given");
         let name = |body: &str| format!("the error of the added mass given for body {body:?}");
         given.map(|d| name(&d.body)).collect()
@@ -136,14 +150,13 @@ impl<'a> Case<'a> {
 
     /// The bodies in the water with these surfaces.
     pub fn submerged<'b>(&'b self, surfaces: &'b [Option<Surface>]) -> Vec<SubmergedBody<'b>> {
-        let tree = &self.simulator.system().tree;
-        let asked = self.simulator.settings().fidelity;
-        assemble::in_water(self.scene(), surfaces, tree, asked).1
+        let asked = self.subject.settings.fidelity;
+        in_water(self.scene(), surfaces, self.subject.tree, asked).1
     }
 
     fn water(&self) -> Water<'_> {
-        let folder = self.simulator.folder.as_deref();
-        assemble::water(self.scene(), &self.bodies, folder)
+        let folder = self.subject.water.folder.as_deref();
+        around(self.scene(), &self.bodies, folder)
     }
 
     /// The added mass with these surfaces; where bodies are compressed, what [`Reduced`] is off if
@@ -155,9 +168,9 @@ impl<'a> Case<'a> {
         if self.correction.is_some() {
             return self.correction(&submerged);
         }
-        let settings = self.simulator.settings();
-        let plan = &self.simulator.assembled.plan;
-        let mut device = self.simulator.assembled.device.clone();
+        let settings = self.subject.settings;
+        let plan = &self.subject.water.plan;
+        let mut device = self.subject.water.device.clone();
         let water = self.water();
         let made = submerged::couple(
             &submerged,
@@ -177,8 +190,8 @@ impl<'a> Case<'a> {
 
     /// What the compressed bodies' added mass is off if they answer as `bodies` do.
     fn correction(&self, bodies: &[SubmergedBody]) -> Result<DMatrix<f64>> {
-        let settings = self.simulator.settings();
-        let plan = &self.simulator.assembled.plan;
+        let settings = self.subject.settings;
+        let plan = &self.subject.water.plan;
         let own = self.submerged(&self.surfaces);
         let coupling = submerged::compressed_all(&own, &self.water(), settings, plan)?;
         let made = coupling.reduced_bodies().iter();
@@ -192,7 +205,7 @@ impl<'a> Case<'a> {
         if let Some(own) = &self.correction {
             return Ok(Some(self.size(own) * self.narrowness()));
         }
-        let coupling = &self.simulator.system().coupling;
+        let coupling = &self.subject.water.coupling;
         let found = coupling.residual(&self.poses, &self.turn)?;
         Ok(found.map(|d| self.size(&d)))
     }
@@ -200,16 +213,14 @@ impl<'a> Case<'a> {
     /// Where a gap is narrower than its compressed bodies resolve, their charges aren't what the first
     /// order takes them for: the root of what the gap lacks.
     fn narrowness(&self) -> f64 {
-        let tree = &self.simulator.system().tree;
-        let poses = tree.kinematics(self.simulator.start().0).poses;
-        let resolved = self.simulator.resolved();
+        let resolved = &self.subject.water.resolved;
         let lacks = |gap: Gap| match gap.second {
             Other::Body(b) => resolved[gap.first].max(resolved[b]) / gap.distance,
             Other::Wall(_) => resolved[gap.first] / (2.0 * gap.distance),
         };
-        let clearance = self.simulator.clearance();
+        let clearance = &self.subject.water.clearance;
         let gaps = [&clearance.moving, &clearance.rigid].into_iter();
-        let all = gaps.flat_map(|g| g.all(&poses));
+        let all = gaps.flat_map(|g| g.all(self.subject.poses));
         all.map(lacks).fold(1.0, f64::max).sqrt().min(NARROWEST)
     }
 
@@ -225,7 +236,7 @@ impl<'a> Case<'a> {
     }
 
     fn left_out(&self) -> Result<DMatrix<f64>> {
-        let (scene, system) = (self.scene(), self.simulator.system());
+        let scene = self.scene();
         let panel = Settings::default().one_body(OneBody::Panel);
         let mut surfaces = Vec::with_capacity(scene.bodies.len());
         for (body, own) in scene.bodies.iter().zip(&self.surfaces) {
@@ -249,14 +260,12 @@ impl<'a> Case<'a> {
             };
             surfaces.push(mesh.map(Surface::of_mesh));
         }
-        let (numbers, submerged) =
-            assemble::in_water(scene, &surfaces, &system.tree, Fidelity::Full);
+        let (numbers, submerged) = in_water(scene, &surfaces, self.subject.tree, Fidelity::Full);
         let n = 6 * self.bodies.len();
         if submerged.len() <= 1 && scene.walls.is_empty() {
             return Ok(DMatrix::zeros(n, n));
         }
-        let all = system.tree.kinematics(self.simulator.start().0).poses;
-        let poses: Vec<Pose> = numbers.iter().map(|b| all[*b]).collect();
+        let poses: Vec<Pose> = numbers.iter().map(|b| self.subject.poses[*b]).collect();
         let turn = world_axes(&poses);
         let free = scene.walls.iter().any(|w| w.surface == WallSurface::Free);
         let fidelity = if free {
@@ -264,7 +273,7 @@ impl<'a> Case<'a> {
         } else {
             Fidelity::Full
         };
-        let water = assemble::water(scene, &numbers, None);
+        let water = around(scene, &numbers, None);
         let solve = |fidelity: Fidelity| -> Result<DMatrix<f64>> {
             let (plan, mut cpu) = Default::default();
             let made = submerged::couple(&submerged, &water, &panel, fidelity, &plan, &mut cpu)?;

@@ -36,14 +36,14 @@ const EDGES: f64 = 1.0 / 3.0;
 const REFUSED: f64 = 0.1;
 
 /// The fidelity to use, what each body and pair gets, and why.
-pub(super) struct Planned {
+pub(crate) struct Planned {
     pub fidelity: Fidelity,
     pub plan: Plan,
     pub reasons: Vec<String>,
 }
 
 /// Chooses for `bodies` at `poses` with the `gaps` (of submerged bodies, by their numbers among `bodies`).
-pub(super) fn plan(
+pub(crate) fn plan(
     bodies: &[SubmergedBody],
     poses: &[Pose],
     gaps: &[Gap],

@@ -3,14 +3,12 @@
 use super::Fidelity;
 use super::surface::Surface;
 use crate::adjoint::lie::Pose;
-use crate::dynamics::{Drive, System};
 use crate::error::readable;
 use crate::multibody::Tree;
 use crate::scene::Scene;
 use crate::shape::gap::{Share, overlap_error};
 use crate::shape::{Gap, Gaps, Other};
 use crate::{Error, Result};
-use nalgebra::DVector;
 
 /// Gaps narrower than this many edges aren't resolved. A sphere near a wall: at 0.3 edges the gap
 /// adds 1 % to the error of its added mass with 320 faces (0.1 % with 5120), and the force along
@@ -24,7 +22,7 @@ const MOST_SHARED: f64 = 0.5;
 
 /// The gaps of a scene's bodies, from their surfaces in body frames.
 #[derive(Clone)]
-pub(super) struct Clearance {
+pub(crate) struct Clearance {
     /// Between pairs that move relative to one another and aren't declared to overlap, and to the
     /// walls.
     pub moving: Gaps,
@@ -34,23 +32,23 @@ pub(super) struct Clearance {
     declared: Vec<Share>,
     /// The nearest body with a shape that carries each.
     parents: Vec<Option<usize>>,
+    /// Names of the bodies.
+    names: Vec<String>,
+    /// Whether the scene has contact.
+    contact: bool,
 }
 
 impl Clearance {
-    pub fn new(
-        scene: &Scene,
-        surfaces: &[Option<Surface>],
-        tree: &Tree,
-        drives: &[Drive],
-    ) -> Result<Self> {
-        let bodies = drives.len();
+    pub fn new(scene: &Scene, surfaces: &[Option<Surface>], tree: &Tree) -> Result<Self> {
+        let bodies = scene.bodies.len();
         let meshes: Vec<_> = surfaces
             .iter()
             .map(|s| s.as_ref().map(|s| &s.mesh))
             .collect();
         let movers = |b: usize| -> Vec<usize> {
             let carry = |a: &usize| {
-                tree.carries(*a, b) && !tree.links()[*a].v.is_empty() && drives[*a] != Drive::Locked
+                let held = scene.bodies[*a].locked && scene.bodies[*a].motion.is_none();
+                tree.carries(*a, b) && !tree.links()[*a].v.is_empty() && !held
             };
             (0..bodies).filter(carry).collect()
         };
@@ -75,62 +73,63 @@ impl Clearance {
             moving: Gaps::new(&meshes, &scene.walls, &but(&rigid))?,
             declared: shares,
             parents: (0..bodies).map(|b| scene.submerged_parent(b)).collect(),
+            names: scene.bodies.iter().map(|b| b.name.clone()).collect(),
+            contact: scene.contact.is_some(),
         })
     }
 
     /// Refuses a start with bodies in one another or in a wall: the coupled flow has no meaning there.
-    pub fn refuse_start(&self, q: &DVector<f64>, system: &System) -> Result<()> {
-        let poses = system.tree.kinematics(q).poses;
+    pub fn refuse_start(&self, poses: &[Pose]) -> Result<()> {
         for gaps in [&self.moving, &self.rigid] {
-            if let Some(gap) = gaps.smallest(&poses)
+            if let Some(gap) = gaps.smallest(poses)
                 && overlaps(&gap)
             {
-                let mut error = overlap_error(&gap, &names(system));
+                let mut error = overlap_error(&gap, &self.names());
                 if let Error::Unresolved { remedy, .. } = &mut error {
-                    remedy.push_str(&self.hint(&gap, system));
+                    remedy.push_str(&self.hint(&gap));
                 }
                 return Err(error);
             }
         }
-        self.refuse_depth(&poses, system)
+        self.refuse_depth(poses)
     }
 
     /// The smallest gap at these poses; stops a run when bodies get into one another or into a wall.
-    pub fn keep_apart(&self, poses: &[Pose], system: &System) -> Result<Option<Gap>> {
+    pub fn keep_apart(&self, poses: &[Pose]) -> Result<Option<Gap>> {
         let smallest = self.moving.smallest(poses);
         if let Some(gap) = smallest.as_ref().filter(|gap| overlaps(gap)) {
             return Err(Error::Unresolved {
-                place: place(gap, system),
+                place: self.place(gap),
                 quantity: "gap in m".into(),
                 value: gap.distance,
                 limit: 0.0,
-                remedy: match system.contact {
-                    Some(_) => format!(
+                remedy: match self.contact {
+                    true => format!(
                         "they overlap by {:.3e} m, where the water can't be solved: raise \
                          contact.stiffness or contact.gap, or take a smaller time step",
                         -gap.distance
                     ),
-                    None => format!(
+                    false => format!(
                         "they overlap by {:.3e} m, and the scene has no contact: give it a section \
                          [contact], end the run earlier, keep them apart by the controls, or use \
                          the fidelity isolated{}",
                         -gap.distance,
-                        self.hint(gap, system)
+                        self.hint(gap)
                     ),
                 },
             });
         }
-        self.refuse_depth(poses, system)?;
+        self.refuse_depth(poses)?;
         Ok(smallest)
     }
 
     /// Refuses bodies that lie too far inside one another though they may overlap.
-    fn refuse_depth(&self, poses: &[Pose], system: &System) -> Result<()> {
+    fn refuse_depth(&self, poses: &[Pose]) -> Result<()> {
         for share in &self.declared {
             let value = share.at(poses);
             if value > MOST_SHARED {
                 let (inner, outer) = share.bodies();
-                let name = |b: usize| format!("body {:?}", system.bodies[b].name);
+                let name = |b: usize| format!("body {:?}", self.names[b]);
                 return Err(Error::Unresolved {
                     place: format!("{} inside {}", name(inner), name(outer)),
                     quantity: "part of its volume".into(),
@@ -146,16 +145,10 @@ impl Clearance {
     }
 
     /// What the smallest gap of a run means.
-    pub fn warning(
-        &self,
-        time: f64,
-        gap: &Gap,
-        fidelity: Fidelity,
-        system: &System,
-    ) -> Option<String> {
+    pub fn warning(&self, time: f64, gap: &Gap, fidelity: Fidelity) -> Option<String> {
         let time = readable(time);
-        let place = place(gap, system);
-        let hint = self.hint(gap, system);
+        let place = self.place(gap);
+        let hint = self.hint(gap);
         match fidelity {
             Fidelity::Full | Fidelity::Auto => (gap.distance < RESOLVED * gap.edge).then(|| {
                 format!(
@@ -180,7 +173,7 @@ impl Clearance {
     }
 
     /// How bodies of which one carries the other may be declared to overlap.
-    fn hint(&self, gap: &Gap, system: &System) -> String {
+    fn hint(&self, gap: &Gap) -> String {
         let Other::Body(second) = gap.second else {
             return String::new();
         };
@@ -191,67 +184,66 @@ impl Clearance {
         format!(
             ". If they are links that belong together, write `overlaps_parent = true` for body {:?}: \
              the two then don't feel each other through the water",
-            system.bodies[b].name
+            self.names[b]
         )
+    }
+
+    fn names(&self) -> Vec<&str> {
+        self.names.iter().map(String::as_str).collect()
+    }
+
+    /// Names of both.
+    fn place(&self, gap: &Gap) -> String {
+        let name = |b: usize| format!("body {:?}", self.names[b]);
+        match gap.second {
+            Other::Body(b) => format!("{} and {}", name(gap.first), name(b)),
+            Other::Wall(w) => format!("{} and wall {w}", name(gap.first)),
+        }
+    }
+
+    /// The gap that is smallest against what compressed bodies resolve, if it isn't resolved. `states`
+    /// are times, poses and smallest gaps; `resolved` the smallest gap (m) of each body.
+    pub fn unresolved<'a>(
+        &self,
+        states: impl Iterator<Item = (f64, &'a [Pose], Gap)>,
+        resolved: &[f64],
+    ) -> Option<String> {
+        let coarsest = resolved.iter().copied().fold(0.0, f64::max);
+        // Of a gap to a wall, the image is twice as far away.
+        let judge = |gap: &Gap| match gap.second {
+            Other::Body(b) => (gap.distance, resolved[gap.first].max(resolved[b])),
+            Other::Wall(_) => (2.0 * gap.distance, resolved[gap.first]),
+        };
+        let mut worst: Option<(f64, f64, Gap, f64)> = None;
+        for (time, poses, smallest) in states {
+            if smallest.distance >= coarsest {
+                continue;
+            }
+            for gap in self.moving.all(poses) {
+                let (seen, limit) = judge(&gap);
+                let ratio = seen / limit;
+                if limit > 0.0 && ratio < 1.0 && worst.is_none_or(|w| ratio < w.0) {
+                    worst = Some((ratio, time, gap, limit));
+                }
+            }
+        }
+        let (ratio, time, gap, limit) = worst?;
+        let limit = match gap.second {
+            Other::Body(_) => limit,
+            Other::Wall(_) => 0.5 * limit,
+        };
+        Some(format!(
+            "{}: the smallest gap, {:.3e} m at t = {} s, is {ratio:.2} of what their compressed sources \
+         resolve ({limit:.3e} m): forces across it may be off by several percent and more; use a \
+         smaller resolved gap, or the fidelity full with more faces, or end the run before",
+            self.place(&gap),
+            gap.distance.max(0.0),
+            readable(time)
+        ))
     }
 }
 
 /// Whether surfaces cross.
 fn overlaps(gap: &Gap) -> bool {
     gap.distance < -TOUCHING * gap.edge
-}
-
-fn names(system: &System) -> Vec<&str> {
-    system.bodies.iter().map(|b| b.name.as_str()).collect()
-}
-
-/// Names of both.
-fn place(gap: &Gap, system: &System) -> String {
-    let name = |b: usize| format!("body {:?}", system.bodies[b].name);
-    match gap.second {
-        Other::Body(b) => format!("{} and {}", name(gap.first), name(b)),
-        Other::Wall(w) => format!("{} and wall {w}", name(gap.first)),
-    }
-}
-
-/// The gap that is smallest against what compressed bodies resolve, if it isn't resolved. `states`
-/// are times, poses and smallest gaps; `resolved` the smallest gap (m) of each body.
-pub(super) fn unresolved<'a>(
-    states: impl Iterator<Item = (f64, &'a [Pose], Gap)>,
-    gaps: &Gaps,
-    resolved: &[f64],
-    system: &System,
-) -> Option<String> {
-    let coarsest = resolved.iter().copied().fold(0.0, f64::max);
-    // Of a gap to a wall, the image is twice as far away.
-    let judge = |gap: &Gap| match gap.second {
-        Other::Body(b) => (gap.distance, resolved[gap.first].max(resolved[b])),
-        Other::Wall(_) => (2.0 * gap.distance, resolved[gap.first]),
-    };
-    let mut worst: Option<(f64, f64, Gap, f64)> = None;
-    for (time, poses, smallest) in states {
-        if smallest.distance >= coarsest {
-            continue;
-        }
-        for gap in gaps.all(poses) {
-            let (seen, limit) = judge(&gap);
-            let ratio = seen / limit;
-            if limit > 0.0 && ratio < 1.0 && worst.is_none_or(|w| ratio < w.0) {
-                worst = Some((ratio, time, gap, limit));
-            }
-        }
-    }
-    let (ratio, time, gap, limit) = worst?;
-    let limit = match gap.second {
-        Other::Body(_) => limit,
-        Other::Wall(_) => 0.5 * limit,
-    };
-    Some(format!(
-        "{}: the smallest gap, {:.3e} m at t = {} s, is {ratio:.2} of what their compressed sources \
-         resolve ({limit:.3e} m): forces across it may be off by several percent and more; use a \
-         smaller resolved gap, or the fidelity full with more faces, or end the run before",
-        place(&gap, system),
-        gap.distance.max(0.0),
-        readable(time)
-    ))
 }

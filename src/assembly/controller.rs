@@ -1,8 +1,9 @@
 //! The controller that a scene names.
 
-use super::Policy;
-use super::policy::{Constant, OpenLoop, Pd, PdAxis, Playback, PushThenLock, SpeedStages, Stage};
 use crate::dynamics::System;
+use crate::policy::{
+    Constant, OpenLoop, Pd, PdAxis, Playback, Policy, PushThenLock, SpeedStages, Stage,
+};
 use crate::scene::{self, Controller, Scene};
 use crate::{Error, Result};
 

@@ -20,7 +20,7 @@ use std::path::Path;
 use std::sync::Arc;
 
 /// A body that the water sees.
-pub(super) struct SubmergedBody<'a> {
+pub(crate) struct SubmergedBody<'a> {
     pub name: &'a str,
     /// Surface in the body's frame.
     pub mesh: Option<&'a TriMesh>,
@@ -33,7 +33,7 @@ pub(super) struct SubmergedBody<'a> {
 }
 
 /// What was made of the bodies.
-pub(super) struct Made {
+pub(crate) struct Made {
     pub coupling: Box<dyn Coupling>,
     /// Faces of all surfaces that were discretised.
     pub faces: usize,
@@ -68,7 +68,7 @@ pub struct Discretisation {
 }
 
 /// The semi-axes of a shape by formula that closed forms are known for.
-pub(super) fn semi_axes(shape: &Shape) -> Option<[f64; 3]> {
+pub(crate) fn semi_axes(shape: &Shape) -> Option<[f64; 3]> {
     match shape {
         Shape::Sphere { radius, .. } => Some([*radius; 3]),
         Shape::Ellipsoid { semi_axes, .. } => Some(*semi_axes),
@@ -148,7 +148,7 @@ fn name_of(method: OneBody) -> &'static str {
 }
 
 /// What is around the bodies.
-pub(super) struct Water<'a> {
+pub(crate) struct Water<'a> {
     pub walls: &'a [Wall],
     /// Pairs that don't feel each other, by their numbers among the bodies in the water.
     pub excluded: Exclusions,
@@ -157,7 +157,7 @@ pub(super) struct Water<'a> {
 }
 
 /// The coupling of `bodies`, with a fidelity that isn't `Auto`, computed on `device`.
-pub(super) fn couple(
+pub(crate) fn couple(
     bodies: &[SubmergedBody],
     water: &Water,
     settings: &Settings,
@@ -175,7 +175,7 @@ pub(super) fn couple(
 
 /// What `Auto` chose for each body and pair; empty: what the settings say.
 #[derive(Clone, Debug, Default)]
-pub(super) struct Plan {
+pub(crate) struct Plan {
     /// Per body.
     pub compress: Vec<compress::Settings>,
     /// Per pair of bodies, equal for a body and its images.
@@ -441,7 +441,7 @@ fn reduced(
 }
 
 /// All bodies compressed and coupled.
-pub(super) fn compressed_all(
+pub(crate) fn compressed_all(
     bodies: &[SubmergedBody],
     water: &Water,
     settings: &Settings,
@@ -466,7 +466,7 @@ pub(super) fn compressed_all(
 
 /// What each body answers by its own method; bodies that are equal share one. Sources as near as
 /// `gaps` (m, one a body) are resolved where the method has to know.
-pub(super) fn responses(
+pub(crate) fn responses(
     bodies: &[SubmergedBody],
     settings: &Settings,
     gaps: &[f64],
@@ -635,12 +635,12 @@ fn compressed(
 }
 
 /// Surface of a mesh, m².
-pub(super) fn area(mesh: &TriMesh) -> f64 {
+pub(crate) fn area(mesh: &TriMesh) -> f64 {
     (0..mesh.faces().len()).map(|f| mesh.area(f)).sum()
 }
 
 /// Middle of the bounding box of a mesh.
-pub(super) fn centre(mesh: &TriMesh) -> Vec3 {
+pub(crate) fn centre(mesh: &TriMesh) -> Vec3 {
     let v = mesh.vertices();
     let low = v.iter().fold(v[0], |m, v| m.inf(v));
     let high = v.iter().fold(v[0], |m, v| m.sup(v));

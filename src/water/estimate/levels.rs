@@ -10,7 +10,7 @@
 use super::case::Case;
 use crate::scene::Shape;
 use crate::shape::TriMesh;
-use crate::simulate::surface::{Surface, surface};
+use crate::water::surface::{Surface, surface};
 use crate::{Error, Result};
 use nalgebra::DMatrix;
 use serde::Serialize;
@@ -49,7 +49,7 @@ pub struct Level {
 }
 
 /// The levels, and the error that follows; `None` if some body has no level.
-pub(super) fn extrapolate(case: &Case, missing: &mut Vec<String>) -> (Vec<Level>, Option<f64>) {
+pub(crate) fn extrapolate(case: &Case, missing: &mut Vec<String>) -> (Vec<Level>, Option<f64>) {
     let enough = |b: &usize| {
         let surface = case.surfaces[*b].as_ref();
         surface.is_some_and(|s| s.mesh.faces().len() >= ENOUGH)
@@ -200,7 +200,7 @@ fn other(case: &Case, body: usize, own: &Surface, factor: f64) -> Result<Option<
         }
         Some(Shape::Mesh { .. } | Shape::Triangles { .. }) => Ok(None),
         _ => {
-            let settings = case.simulator.settings();
+            let settings = case.subject.settings;
             surface(body, settings, Some(base), factor.powf(-0.5))
         }
     }

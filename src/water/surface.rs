@@ -1,17 +1,21 @@
 //! Bodies' surfaces, as their shapes are meshed for the water.
 
-use super::assemble::pose;
-use super::{Fidelity, Settings, Simulator, submerged};
+use super::{Fidelity, Settings, submerged};
 use crate::Result;
-use crate::adjoint::lie::Vec3;
+use crate::adjoint::lie::{Pose, Vec3, exp_matrix};
 use crate::boundary::OneBody;
-use crate::scene::{Body, Refinement, Shape};
+use crate::scene::{Body, Placement, Refinement, Scene, Shape};
 use crate::shape::{self, MassProperties, TriMesh};
 use std::path::Path;
 
+/// Where a placement is.
+pub(crate) fn pose(p: &Placement) -> Pose {
+    Pose::new(exp_matrix(&Vec3::from(p.rotation)), Vec3::from(p.position))
+}
+
 /// A body's surface in its own frame, with its mass properties.
 #[derive(Clone)]
-pub(super) struct Surface {
+pub(crate) struct Surface {
     pub mesh: TriMesh,
     /// Its faces before regions of it were refined.
     pub base: usize,
@@ -22,7 +26,7 @@ pub(super) struct Surface {
 
 /// A coarser mesh of a shape.
 #[derive(Clone)]
-pub(super) struct Coarse {
+pub(crate) struct Coarse {
     pub mesh: TriMesh,
     /// The ratio of its edges to those of the finer one, where regions are refined: there the numbers of
     /// faces don't tell it.
@@ -43,7 +47,7 @@ impl Surface {
 
 /// A body's surface, with about `faces` faces if it is a shape by formula, before its regions are refined
 /// to `edges` times the edges that they ask for.
-pub(super) fn surface(
+pub(crate) fn surface(
     body: &Body,
     settings: &Settings,
     faces: Option<usize>,
@@ -104,16 +108,10 @@ pub(super) fn surface(
     }))
 }
 
-impl Simulator {
-    /// The bodies' surfaces, each in its body's frame, as gaps are measured between them; none for a body without a shape.
-    /// Shapes are meshed anew, the same way.
-    ///
-    /// # Errors
-    /// A file of a mesh that can't be read any more.
-    pub fn meshes(&self) -> Result<Vec<Option<TriMesh>>> {
-        let settings = self.settings();
-        let bodies = self.scene.bodies.iter();
-        let meshes = bodies.map(|b| Ok(surface(b, settings, settings.faces, 1.0)?.map(|s| s.mesh)));
-        meshes.collect()
-    }
+/// The surfaces of all bodies of a scene; none for a body without a shape.
+pub(crate) fn surfaces(scene: &Scene, settings: &Settings) -> Result<Vec<Option<Surface>>> {
+    let bodies = scene.bodies.iter();
+    bodies
+        .map(|body| surface(body, settings, settings.faces, 1.0))
+        .collect()
 }

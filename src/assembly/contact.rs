@@ -1,14 +1,11 @@
 //! Contact of a scene: which surfaces may touch, at which gap, and how stiffly.
 
-use super::assemble::pose;
-use super::clearance::Clearance;
-use super::surface::Surface;
-use super::{Fidelity, Settings};
 use crate::adjoint::lie::Pose;
 use crate::contact::{ContactPair, Contacts, Geometry};
 use crate::dynamics::{self, ContactModel, Integrator, Regularisation};
 use crate::scene::{Body, Contact, Scene, Shape};
 use crate::shape::Other;
+use crate::water::{Fidelity, Prepared, Settings, Surface, pose};
 use crate::{Error, Result};
 use std::path::Path;
 
@@ -28,10 +25,7 @@ pub(super) struct Parts<'a> {
     pub scene: &'a Scene,
     pub given: &'a Contact,
     pub settings: &'a Settings,
-    pub clearance: &'a Clearance,
-    pub fidelity: Fidelity,
-    /// Gap that each body's compression resolves, m.
-    pub resolved: &'a [f64],
+    pub water: &'a Prepared,
     pub surfaces: &'a [Option<Surface>],
     pub mass: &'a [f64],
 }
@@ -63,7 +57,7 @@ pub(super) fn assemble(p: Parts) -> Result<(ContactModel, dynamics::Contact)> {
     let neighbours = |a: usize, b: usize| {
         p.scene.submerged_parent(a) == Some(b) || p.scene.submerged_parent(b) == Some(a)
     };
-    let pairs: Vec<ContactPair> = (p.clearance.moving.pairs().iter())
+    let pairs: Vec<ContactPair> = (p.water.clearance.moving.pairs().iter())
         .filter(|(a, other)| !matches!(other, Other::Body(b) if neighbours(*a, *b)))
         .map(|&(first, second)| ContactPair { first, second })
         .collect();
@@ -136,9 +130,9 @@ fn resolved(p: &Parts, pair: &ContactPair) -> f64 {
         // The image is twice as far away.
         Other::Wall(_) => 0.5 * value(pair.first),
     };
-    match p.fidelity {
+    match p.water.fidelity {
         Fidelity::Isolated => 0.0,
-        Fidelity::Reduced => of(&|b| p.resolved[b]),
+        Fidelity::Reduced => of(&|b| p.water.resolved[b]),
         Fidelity::Full | Fidelity::Auto => EDGES * of(&edge),
     }
 }

@@ -10,7 +10,7 @@
 use hydrograd::adjoint::lie::{Pose, Vec3, Vec6};
 use hydrograd::boundary::{BodyBoundary, Settings as BodySettings};
 use hydrograd::coupling::full::{Cpu, Full, MfsBody, Model, SolveSettings};
-use hydrograd::coupling::{Coupling, Direction, Exclusions};
+use hydrograd::coupling::{Direction, Exclusions, Linearise};
 use hydrograd::dynamics::Integrator;
 use hydrograd::gpu::full::{Gpu, Probe};
 use hydrograd::gpu::{Arithmetic, Context, Options};
@@ -171,7 +171,7 @@ fn evaluate(full: &Full, poses: &[Pose]) -> hydrograd::Result<()> {
     let bodies = poses.len();
     let mut basis = DMatrix::zeros(6 * bodies, 6);
     basis.rows_mut(0, 6).fill_with_identity();
-    let record = full.evaluate(poses, &basis, true)?;
+    let record = full.linearise(poses, &basis)?;
     let x = DVector::from_element(6, 1.0);
     let mut z = vec![Vec6::zeros(); bodies];
     z[0] = Vec6::repeat(1.0);

@@ -172,11 +172,9 @@ fn floor(quick: bool) -> hydrograd::Result<()> {
             let mut q = simulator.start().0.clone();
             simulator.stepper().place_motions(&mut q, 0.0);
             let (system, parameters) = (simulator.system(), simulator.parameters());
-            system.evaluate(parameters, &q, true, false)?;
+            system.linearise(parameters, &q)?;
             let whole = time(quick, || {
-                system
-                    .evaluate(parameters, &q, true, false)
-                    .map(|e| e.mass_matrix)
+                system.linearise(parameters, &q).map(|e| e.report().clone())
             });
             let links = links(&scene, &simulator);
             let parts = bare(quick, &links, simulator.unknowns());
@@ -377,14 +375,12 @@ fn grown(quick: bool, scene: &Scene, settings: Settings) -> hydrograd::Result<St
     let v = DVector::from_fn(simulator.start().1.len(), |_, _| 0.01 * random.next());
     simulator.set_start(q.clone(), v.clone())?;
     let (system, parameters) = (simulator.system(), simulator.parameters());
-    let evaluation = system.evaluate(parameters, &q, true, true)?;
+    let evaluation = system.linearise(parameters, &q)?;
     let evaluate = time(quick, || {
-        system
-            .evaluate(parameters, &q, true, true)
-            .map(|e| e.mass_matrix)
+        system.linearise(parameters, &q).map(|e| e.report().clone())
     });
     let [mut gradient, mut hvp] = [0.0; 2];
-    if let Some(fluid) = &evaluation.fluid {
+    if let Some(fluid) = evaluation.fluid() {
         gradient = time(quick, || fluid.gradient(&v, &v));
         let along = vec![hydrograd::adjoint::lie::Vec6::repeat(0.1); scene.bodies.len()];
         let direction = Direction::Basis(&v);
@@ -537,7 +533,7 @@ fn sphere(mesh: &hydrograd::TriMesh, rank: usize, gap: f64) -> hydrograd::Result
 fn two_spheres_error(body: &Arc<ReducedBody>, gap: f64) -> hydrograd::Result<f64> {
     let pair = Reduced::new(vec![body.clone(); 2], &[], |_, _| None)?;
     let at = |z| Pose::new(Mat3::identity(), Vec3::new(0.0, 0.0, z));
-    let record = pair.evaluate(&[at(0.0), at(2.0 + gap)], &DMatrix::identity(12, 12), false)?;
+    let record = pair.evaluate(&[at(0.0), at(2.0 + gap)], &DMatrix::identity(12, 12))?;
     let m = record.momenta();
     let exact = exact(2.0 + gap);
     let found = [m[(2, 2)], m[(2, 8)], m[(0, 0)], m[(0, 6)]];

@@ -108,8 +108,8 @@ pub fn added_mass(simulator: &Simulator) -> hydrograd::Result<DMatrix<f64>> {
     let system = simulator.system();
     let mut dry = simulator.parameters().clone();
     dry.density = 0.0;
-    let submerged = system.evaluate(simulator.parameters(), &q, false, false)?;
-    let dry = system.evaluate(&dry, &q, false, false)?;
+    let submerged = system.evaluate(simulator.parameters(), &q)?;
+    let dry = system.evaluate(&dry, &q)?;
     Ok(&submerged.mass_matrix - &dry.mass_matrix)
 }
 

@@ -264,7 +264,7 @@ fn start_velocity(
     }
     if !scene.initial.momentum.is_empty() {
         let stepper = stepper(scene, settings, system, parameters);
-        let e = system.evaluate(parameters, q, false, false)?;
+        let e = system.evaluate(parameters, q)?;
         let p = DVector::from_vec(scene.initial.momentum.clone());
         v = stepper.velocity_of_momentum(&e, &p)?;
     }

@@ -1,6 +1,6 @@
 //! Bodies that don't feel each other: each keeps its own constant added mass (Eq. 12).
 
-use super::{Coupling, Direction, Pullback, Record, Report, Tangent};
+use super::{Coupling, Direction, Linearise, Linearised, Momenta, Pullback, Report, Tangent};
 use crate::Result;
 use crate::adjoint::lie::{Mat6, Pose, Vec6};
 use nalgebra::{DMatrix, DVector};
@@ -19,6 +19,10 @@ impl Isolated {
 }
 
 impl Coupling for Isolated {
+    fn name(&self) -> &'static str {
+        "the fidelity isolated"
+    }
+
     fn bodies(&self) -> usize {
         self.added_mass.len()
     }
@@ -27,36 +31,39 @@ impl Coupling for Isolated {
         0
     }
 
-    fn evaluate(
-        &self,
-        _poses: &[Pose],
-        basis: &DMatrix<f64>,
-        _derivative: bool,
-    ) -> Result<Box<dyn Record + '_>> {
+    fn evaluate(&self, _poses: &[Pose], basis: &DMatrix<f64>) -> Result<Momenta> {
         let mut momenta = DMatrix::zeros(basis.nrows(), basis.ncols());
         for (b, m) in self.added_mass.iter().enumerate() {
             momenta
                 .rows_mut(6 * b, 6)
                 .copy_from(&(m * basis.rows(6 * b, 6)));
         }
-        Ok(Box::new(IsolatedRecord {
+        Ok(Momenta::new(momenta, Report::default()))
+    }
+
+    fn differentiable(&self) -> Option<&dyn Linearise> {
+        Some(self)
+    }
+}
+
+impl Linearise for Isolated {
+    fn linearise(&self, poses: &[Pose], basis: &DMatrix<f64>) -> Result<Box<dyn Linearised + '_>> {
+        Ok(Box::new(IsolatedLinearised {
             coupling: self,
-            momenta,
-            report: Report::default(),
+            value: self.evaluate(poses, basis)?,
         }))
     }
 }
 
-struct IsolatedRecord<'a> {
+struct IsolatedLinearised<'a> {
     coupling: &'a Isolated,
-    momenta: DMatrix<f64>,
-    report: Report,
+    value: Momenta,
 }
 
-impl IsolatedRecord<'_> {
+impl IsolatedLinearised<'_> {
     fn impulse(&self, x: Direction) -> DVector<f64> {
         match x {
-            Direction::Basis(c) => &self.momenta * c,
+            Direction::Basis(c) => self.value.momenta() * c,
             Direction::Twist(x) => {
                 let mut out = DVector::zeros(x.len());
                 for (b, m) in self.coupling.added_mass.iter().enumerate() {
@@ -68,9 +75,9 @@ impl IsolatedRecord<'_> {
     }
 }
 
-impl Record for IsolatedRecord<'_> {
+impl Linearised for IsolatedLinearised<'_> {
     fn momenta(&self) -> &DMatrix<f64> {
-        &self.momenta
+        self.value.momenta()
     }
 
     fn gradient(&self, _x: &DVector<f64>, _y: &DVector<f64>) -> Result<Vec<Vec6>> {
@@ -100,6 +107,6 @@ impl Record for IsolatedRecord<'_> {
     }
 
     fn report(&self) -> &Report {
-        &self.report
+        self.value.report()
     }
 }

@@ -12,8 +12,9 @@
 //! wrenches. Velocities come as combinations of a few *basis* columns, so that a solve is
 //! made once per column and every other quantity is a combination.
 //!
-//! The ladder of E: value [`Record::momenta`], vjp [`Record::gradient`] (on the basis) and
-//! [`Record::vjp`] (any pair), jvp and hvp together in [`Record::hvp`].
+//! The ladder of E: value [`Coupling::evaluate`], vjp [`Linearised::gradient`] (on the basis) and
+//! [`Linearised::vjp`] (any pair), jvp and hvp together in [`Linearised::hvp`]. A fidelity that has values alone is
+//! a [`Coupling`]; one that has derivatives too is also [`Linearise`].
 
 mod exclude;
 pub mod full;
@@ -35,25 +36,27 @@ use crate::{Error, Result};
 use nalgebra::{DMatrix, DVector};
 use serde::Serialize;
 
-/// A fidelity: a way to get M̄_f and its derivatives from the bodies' poses.
+/// A fidelity: a way to get M̄_f from the bodies' poses.
 pub trait Coupling: Send + Sync {
+    /// What it is, for messages: "the …".
+    fn name(&self) -> &'static str;
+
     /// Number of bodies in the water.
     fn bodies(&self) -> usize;
 
     /// Number of unknowns of one solve.
     fn unknowns(&self) -> usize;
 
-    /// M̄_f applied to the columns of `basis` (6·bodies × k, body-frame twists) at the given
-    /// poses; with `derivative`, also what its derivatives need.
+    /// M̄_f applied to the columns of `basis` (6·bodies × k, body-frame twists) at the given poses.
     ///
     /// # Errors
     /// A solve that misses its tolerance, bodies that overlap, or a gap that isn't resolved.
-    fn evaluate(
-        &self,
-        poses: &[Pose],
-        basis: &DMatrix<f64>,
-        derivative: bool,
-    ) -> Result<Box<dyn Record + '_>>;
+    fn evaluate(&self, poses: &[Pose], basis: &DMatrix<f64>) -> Result<Momenta>;
+
+    /// The same fidelity with its derivatives, if it has any.
+    fn differentiable(&self) -> Option<&dyn Linearise> {
+        None
+    }
 
     /// What normal velocities left between the collocation points are worth: the change of
     /// `basisᵀ M̄_f basis` that they ask for, symmetric. `None` where there are no such points.
@@ -81,6 +84,39 @@ pub trait Coupling: Send + Sync {
                 .into(),
             instead: "use the fidelity full with the method mfs-vertex or mfs-face".into(),
         })
+    }
+}
+
+/// A fidelity with derivatives of M̄_f with respect to the poses.
+pub trait Linearise: Coupling {
+    /// As [`Coupling::evaluate`], with what the derivatives there need.
+    ///
+    /// # Errors
+    /// As there.
+    fn linearise(&self, poses: &[Pose], basis: &DMatrix<f64>) -> Result<Box<dyn Linearised + '_>>;
+}
+
+/// M̄_f applied to columns of body-frame twists.
+#[derive(Clone, Debug)]
+pub struct Momenta {
+    momenta: DMatrix<f64>,
+    report: Report,
+}
+
+impl Momenta {
+    /// Impulses with what they cost.
+    pub fn new(momenta: DMatrix<f64>, report: Report) -> Self {
+        Self { momenta, report }
+    }
+
+    /// M̄_f times the basis: body-frame impulses, 6·bodies × k.
+    pub fn momenta(&self) -> &DMatrix<f64> {
+        &self.momenta
+    }
+
+    /// What it cost.
+    pub fn report(&self) -> &Report {
+        &self.report
     }
 }
 
@@ -135,26 +171,26 @@ pub struct Tangent {
     pub momentum_x: DVector<f64>,
     /// `D_g M̄_f[Z] ȳ`.
     pub momentum_y: DVector<f64>,
-    /// The spatial wrenches ∇_g E(x̄, ȳ) themselves, as [`Record::vjp`] gives them.
+    /// The spatial wrenches ∇_g E(x̄, ȳ) themselves, as [`Linearised::vjp`] gives them.
     pub gradient: Vec<Vec6>,
     /// Rate of the spatial wrenches ∇_g E(x̄, ȳ) as the bodies are displaced by exp(εZ), at fixed
     /// body-frame twists. For another displacement Y, D_Y(∇E·Z) = wrench·Y + ∇E·(Z × Y).
     pub wrench: Vec<Vec6>,
 }
 
-/// One evaluation at given poses; the only key to the derivatives there.
-pub trait Record: Send + Sync {
+/// One evaluation at given poses with the key to the derivatives there.
+pub trait Linearised: Send + Sync {
     /// M̄_f times the basis: body-frame impulses, 6·bodies × k.
     fn momenta(&self) -> &DMatrix<f64>;
 
     /// ∇_g E(x, y) for coefficients on the basis, without a further solve: a spatial wrench on each
-    /// body. Zeros if the evaluation was made without derivative.
+    /// body.
     ///
     /// # Errors
     /// A device that fails.
     fn gradient(&self, x: &DVector<f64>, y: &DVector<f64>) -> Result<Vec<Vec6>>;
 
-    /// ∇_g E(x, e_i) for every basis column e_i, as [`Record::gradient`].
+    /// ∇_g E(x, e_i) for every basis column e_i, as [`Linearised::gradient`].
     ///
     /// # Errors
     /// As there.
@@ -170,7 +206,7 @@ pub trait Record: Send + Sync {
     /// `D_g E(e_i, y)[Z]` for every basis column e_i, without a further solve.
     ///
     /// # Errors
-    /// As [`Record::gradient`].
+    /// As [`Linearised::gradient`].
     fn gradient_along(&self, y: &DVector<f64>, z: &[Vec6]) -> Result<DVector<f64>>;
 
     /// Impulses of both directions and ∇_g E(x̄, ȳ), for any directions.

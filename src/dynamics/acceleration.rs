@@ -10,7 +10,7 @@
 //! ```
 
 use super::force::rigid_parameters_vjp;
-use super::{Evaluation, ForceCotangents};
+use super::{Evaluation, ForceCotangents, Linearisation};
 use crate::Result;
 use crate::adjoint::lie::{Vec6, cross_force, cross_motion};
 use crate::coupling::Direction;
@@ -18,6 +18,23 @@ use crate::multibody::{Cotangents, Fields, Virtual};
 use nalgebra::DVector;
 
 impl Evaluation<'_> {
+    /// C − U × V of every submerged body, zero for dry ones.
+    fn fluid_bias(&self, fields: &Fields) -> Vec<Vec6> {
+        let current = self.current_twist();
+        let of = |b: usize| fields.bias[b] - cross_motion(&current, &fields.twist[b]);
+        (0..self.system.len())
+            .map(|b| {
+                if self.system.bodies[b].submerged.is_some() {
+                    of(b)
+                } else {
+                    Vec6::zeros()
+                }
+            })
+            .collect()
+    }
+}
+
+impl Linearisation<'_> {
     /// M(q) v̇: the right-hand side of Eq. 3 with all forces, user coordinates.
     ///
     /// # Errors
@@ -41,29 +58,15 @@ impl Evaluation<'_> {
             wrenches.push(self.external(b, twist, control) - rigid + rho * water);
             out -= rho * self.fluid_columns(b).tr_mul(&fluid_bias[b]);
         }
-        if let Some(f) = &self.fluid {
-            let along = f.gradient_along(&direction, &self.submerged_field(&fields.twist))?;
+        if let Some(water) = self.acting() {
+            let twist = self.submerged_field(&fields.twist);
+            let along = water.linearised.gradient_along(&direction, &twist)?;
             out -= rho * along.rows(0, v.len());
         }
         Ok(out + tree.project(&self.kinematics, wrenches) + self.system.joint_forces(control))
     }
 
-    /// C − U × V of every submerged body, zero for dry ones.
-    fn fluid_bias(&self, fields: &Fields) -> Vec<Vec6> {
-        let current = self.current_twist();
-        let of = |b: usize| fields.bias[b] - cross_motion(&current, &fields.twist[b]);
-        (0..self.system.len())
-            .map(|b| {
-                if self.system.bodies[b].submerged.is_some() {
-                    of(b)
-                } else {
-                    Vec6::zeros()
-                }
-            })
-            .collect()
-    }
-
-    /// Transpose of [`Evaluation::inertial_force`]: the gradient of its product with `w`.
+    /// Transpose of [`Linearisation::inertial_force`]: the gradient of its product with `w`.
     ///
     /// # Errors
     /// A solve of the coupling that misses its tolerance.
@@ -124,18 +127,19 @@ impl Evaluation<'_> {
         bar: &mut Cotangents,
         out: &mut ForceCotangents,
     ) -> Result<()> {
-        let Some(fluid) = &self.fluid else {
+        let Some(water) = self.water()? else {
             return Ok(());
         };
+        let fluid = &water.linearised;
         let rho = self.parameters.density;
         let n = self.system.len();
         let (direction, virtual_direction) = (self.through_water(v), self.virtual_direction(w));
-        let (water, virt) = (
+        let (through, virt) = (
             Direction::Basis(&direction),
             Direction::Basis(&virtual_direction),
         );
-        let momenta = self.fluid_momenta(&direction);
-        let momenta_virtual = self.fluid_momenta(&virtual_direction);
+        let momenta = water.momenta(&direction);
+        let momenta_virtual = water.momenta(&virtual_direction);
         let current = self.current_twist();
         let relative: Vec<Vec6> = fields.twist.iter().map(|t| self.relative(t)).collect();
         let carried: Vec<Vec6> = (0..n)
@@ -154,11 +158,14 @@ impl Evaluation<'_> {
                 self.from_submerged(&pullback.wrench),
             ))
         };
-        let (momenta_carried, pair_carried) = respond(&carried, water)?;
+        let (momenta_carried, pair_carried) = respond(&carried, through)?;
         let (momenta_bias, pair_bias) = respond(&bias, virt)?;
-        let along_virtual =
-            fluid.hvp(water, water, &self.submerged_field(&fields.virtual_twist))?;
-        let along_twist = fluid.hvp(virt, water, &self.submerged_field(&fields.twist))?;
+        let along_virtual = fluid.hvp(
+            through,
+            through,
+            &self.submerged_field(&fields.virtual_twist),
+        )?;
+        let along_twist = fluid.hvp(virt, through, &self.submerged_field(&fields.twist))?;
         let impulse_virtual = self.submerged_impulses(&along_virtual.momentum_x);
         let wrench_virtual = self.from_submerged(&along_virtual.wrench);
         let impulse_w = self.submerged_impulses(&along_twist.momentum_x);

@@ -1,14 +1,14 @@
 //! Everything that depends on the configuration alone: kinematics, momenta per unit velocity, mass matrix.
 
 use super::{PairContact, Parameters, System};
-use crate::adjoint::lie::{Mat6, Vec3, Vec6, six};
+use crate::adjoint::lie::{Mat6, Pose, Vec3, Vec6, six};
 use crate::adjoint::rigid;
-use crate::coupling::{Record, Report};
+use crate::coupling::Report;
 use crate::multibody::{Joint, Kinematics};
 use crate::{Error, Result};
 use nalgebra::{DMatrix, DVector};
 
-/// The system at one configuration.
+/// The system at one configuration: values alone. What has derivatives too is a [`Linearisation`](super::Linearisation).
 pub struct Evaluation<'a> {
     /// The system.
     pub system: &'a System,
@@ -22,18 +22,24 @@ pub struct Evaluation<'a> {
     pub rigid: Vec<Mat6>,
     /// Places where surfaces are near.
     pub contact_points: Vec<PairContact>,
-    /// The fluid at unit density, if there is any.
-    pub fluid: Option<Box<dyn Record + 'a>>,
     /// Spatial fluid momentum of each body at unit density per basis column (6 × k each).
     fluid_momenta: Vec<DMatrix<f64>>,
     /// M(q) = M_r + Jᵀ M_f J, user coordinates.
     pub mass_matrix: DMatrix<f64>,
     /// Generalised momentum at v = 0, from the current.
     pub rest_momentum: DVector<f64>,
+    report: Report,
+}
+
+/// Where the bodies in the water are, and the body-frame twists of the basis on which the water is solved: one column a
+/// generalised velocity, and one for the current if there is any.
+pub(super) struct Basis {
+    pub poses: Vec<Pose>,
+    pub twists: DMatrix<f64>,
 }
 
 impl System {
-    /// Evaluates the system at `q`. With `reverse`, the fluid's record is made even at zero density, because the gradient with respect to density needs it.
+    /// Evaluates the system at `q`.
     ///
     /// # Errors
     /// Whatever the coupling reports, or a configuration that isn't finite.
@@ -41,22 +47,27 @@ impl System {
         &'a self,
         parameters: &'a Parameters,
         q: &DVector<f64>,
-        derivative: bool,
-        reverse: bool,
     ) -> Result<Evaluation<'a>> {
-        let mut e = self.evaluate_apart(parameters, q, derivative, reverse)?;
+        let kinematics = self.kinematics(q)?;
+        let basis = self.basis(&kinematics);
+        let solved = match self.in_water(parameters) {
+            true => Some(self.coupling.evaluate(&basis.poses, &basis.twists)?),
+            false => None,
+        };
+        let momenta = solved.as_ref().map(|s| s.momenta());
+        let momenta = self.spatial_momenta(&kinematics, momenta);
+        let report = solved.map_or_else(Report::default, |s| s.report().clone());
+        let mut e = Evaluation::new(self, parameters, q, kinematics, momenta, report);
         e.contact_points = self.contact_points(parameters, &e.kinematics.poses)?;
         Ok(e)
     }
 
-    /// The same without looking for places where surfaces are near, for configurations where contact isn't asked for.
-    pub(super) fn evaluate_apart<'a>(
-        &'a self,
-        parameters: &'a Parameters,
-        q: &DVector<f64>,
-        derivative: bool,
-        reverse: bool,
-    ) -> Result<Evaluation<'a>> {
+    /// Whether any water acts on any body.
+    pub(super) fn in_water(&self, parameters: &Parameters) -> bool {
+        parameters.density > 0.0 && self.coupling.bodies() > 0
+    }
+
+    pub(super) fn kinematics(&self, q: &DVector<f64>) -> Result<Kinematics> {
         if let Some(bad) = q.iter().position(|x| !x.is_finite()) {
             return Err(Error::input(
                 format!("coordinate q[{bad}]"),
@@ -64,53 +75,89 @@ impl System {
                 "coordinates must be finite: the step is too long or a force too large",
             ));
         }
-        let kinematics = self.tree.kinematics(q);
-        let rigid: Vec<Mat6> = (0..self.len())
+        Ok(self.tree.kinematics(q))
+    }
+
+    /// Columns of the basis.
+    fn columns(&self) -> usize {
+        self.tree.velocities() + usize::from(self.has_current())
+    }
+
+    pub(super) fn basis(&self, kinematics: &Kinematics) -> Basis {
+        let (nv, columns) = (self.tree.velocities(), self.columns());
+        let jacobian = self.tree.jacobian(kinematics);
+        let mut twists = DMatrix::zeros(6 * self.coupling.bodies(), columns);
+        let mut poses = Vec::with_capacity(self.coupling.bodies());
+        let rest = six(&-self.current, &Vec3::zeros());
+        for (b, body) in self.bodies.iter().enumerate() {
+            let Some(w) = body.submerged else { continue };
+            let pose = &kinematics.poses[b];
+            poses.push(*pose);
+            for k in 0..columns {
+                let world = if k < nv {
+                    jacobian.fixed_view::<6, 1>(6 * b, k).into_owned()
+                } else {
+                    rest
+                };
+                twists
+                    .fixed_view_mut::<6, 1>(6 * w, k)
+                    .copy_from(&pose.twist_to_body(&world));
+            }
+        }
+        Basis { poses, twists }
+    }
+
+    /// Spatial momenta of all bodies from the body-frame impulses of those in the water; zeros without water.
+    pub(super) fn spatial_momenta(
+        &self,
+        kinematics: &Kinematics,
+        impulses: Option<&DMatrix<f64>>,
+    ) -> Vec<DMatrix<f64>> {
+        let columns = self.columns();
+        let mut out = vec![DMatrix::zeros(6, columns); self.len()];
+        let Some(impulses) = impulses else { return out };
+        for (b, body) in self.bodies.iter().enumerate() {
+            let Some(w) = body.submerged else { continue };
+            for k in 0..columns {
+                let h = impulses.fixed_view::<6, 1>(6 * w, k).into_owned();
+                out[b].set_column(k, &kinematics.poses[b].wrench_to_world(&h));
+            }
+        }
+        out
+    }
+}
+
+/// Spatial momenta of the bodies for coefficients on the basis, from those of its columns.
+pub(super) fn combined(columns: &[DMatrix<f64>], direction: &DVector<f64>) -> Vec<Vec6> {
+    (columns.iter())
+        .map(|m| (m * direction).fixed_rows::<6>(0).into_owned())
+        .collect()
+}
+
+impl<'a> Evaluation<'a> {
+    /// From the spatial fluid momenta per basis column; without places where surfaces are near.
+    pub(super) fn new(
+        system: &'a System,
+        parameters: &'a Parameters,
+        q: &DVector<f64>,
+        kinematics: Kinematics,
+        fluid_momenta: Vec<DMatrix<f64>>,
+        report: Report,
+    ) -> Self {
+        let rigid: Vec<Mat6> = (0..system.len())
             .map(|b| {
                 rigid::spatial_inertia(
                     parameters.mass[b],
-                    &self.bodies[b].center_of_mass,
+                    &system.bodies[b].center_of_mass,
                     &parameters.inertia[b],
                 )
             })
             .collect();
-        let jacobian = self.tree.jacobian(&kinematics);
-        let nv = self.tree.velocities();
-        let columns = nv + usize::from(self.has_current());
-        let mut fluid = None;
-        let mut fluid_momenta = vec![DMatrix::zeros(6, columns); self.len()];
-        if (parameters.density > 0.0 || reverse) && self.coupling.bodies() > 0 {
-            let mut basis = DMatrix::zeros(6 * self.coupling.bodies(), columns);
-            let mut poses = Vec::with_capacity(self.coupling.bodies());
-            let rest = six(&-self.current, &Vec3::zeros());
-            for (b, body) in self.bodies.iter().enumerate() {
-                let Some(w) = body.submerged else { continue };
-                let pose = &kinematics.poses[b];
-                poses.push(*pose);
-                for k in 0..columns {
-                    let world = if k < nv {
-                        jacobian.fixed_view::<6, 1>(6 * b, k).into_owned()
-                    } else {
-                        rest
-                    };
-                    basis
-                        .fixed_view_mut::<6, 1>(6 * w, k)
-                        .copy_from(&pose.twist_to_body(&world));
-                }
-            }
-            let record = self.coupling.evaluate(&poses, &basis, derivative)?;
-            for (b, body) in self.bodies.iter().enumerate() {
-                let Some(w) = body.submerged else { continue };
-                for k in 0..columns {
-                    let h = record.momenta().fixed_view::<6, 1>(6 * w, k).into_owned();
-                    fluid_momenta[b].set_column(k, &kinematics.poses[b].wrench_to_world(&h));
-                }
-            }
-            fluid = Some(record);
-        }
+        let jacobian = system.tree.jacobian(&kinematics);
+        let nv = system.tree.velocities();
         let mut mass_matrix = DMatrix::zeros(nv, nv);
         let mut rest_momentum = DVector::zeros(nv);
-        for b in 0..self.len() {
+        for b in 0..system.len() {
             let j = jacobian.rows(6 * b, 6);
             let mut momenta = parameters.density * fluid_momenta[b].columns(0, nv).into_owned();
             let pose = &kinematics.poses[b];
@@ -122,27 +169,25 @@ impl System {
                 }
             }
             mass_matrix += j.tr_mul(&momenta);
-            if columns > nv {
+            if system.has_current() {
                 rest_momentum += parameters.density * j.tr_mul(&fluid_momenta[b].column(nv));
             }
         }
         let mass_matrix = 0.5 * (&mass_matrix + mass_matrix.transpose());
-        Ok(Evaluation {
-            system: self,
+        Self {
+            system,
             parameters,
             q: q.clone(),
             contact_points: Vec::new(),
             kinematics,
             rigid,
-            fluid,
             fluid_momenta,
             mass_matrix,
             rest_momentum,
-        })
+            report,
+        }
     }
-}
 
-impl<'a> Evaluation<'a> {
     /// Coefficients on the fluid's basis of the velocity `v` through the water.
     pub fn through_water(&self, v: &DVector<f64>) -> DVector<f64> {
         self.extended(v, 1.0)
@@ -168,10 +213,7 @@ impl<'a> Evaluation<'a> {
 
     /// Spatial fluid momenta of the bodies at unit density for coefficients on the basis.
     pub fn fluid_momenta(&self, direction: &DVector<f64>) -> Vec<Vec6> {
-        self.fluid_momenta
-            .iter()
-            .map(|m| (m * direction).fixed_rows::<6>(0).into_owned())
-            .collect()
+        combined(&self.fluid_momenta, direction)
     }
 
     /// Spatial fluid momenta of body `b` at unit density per generalised velocity (6 × nv).
@@ -279,9 +321,7 @@ impl<'a> Evaluation<'a> {
     }
 
     /// What the coupling reports.
-    pub fn report(&self) -> Report {
-        self.fluid
-            .as_ref()
-            .map_or_else(Report::default, |f| f.report().clone())
+    pub fn report(&self) -> &Report {
+        &self.report
     }
 }

@@ -12,7 +12,7 @@
 //! For a joint to the world the second term vanishes, and with no external force the sum of momenta is
 //! kept to round-off by any integrator that is linear in f.
 
-use super::{Evaluation, Parameters};
+use super::{Evaluation, Linearisation, Parameters};
 use crate::Result;
 use crate::adjoint::lie::{Vec6, cross_force, cross_motion, six};
 use crate::adjoint::rigid;
@@ -69,14 +69,6 @@ impl Evaluation<'_> {
         six(&self.system.current, &nalgebra::Vector3::zeros())
     }
 
-    /// Fluid pose forces `½ ∂E(v, v)/∂g` on all bodies at unit density.
-    pub(super) fn pose_force(&self, direction: &DVector<f64>) -> Result<Vec<Vec6>> {
-        Ok(match &self.fluid {
-            Some(fluid) => self.half_from_submerged(&fluid.gradient(direction, direction)?),
-            None => vec![Vec6::zeros(); self.system.len()],
-        })
-    }
-
     /// Half of the submerged bodies' field on all bodies.
     pub(super) fn half_from_submerged(&self, field: &[Vec6]) -> Vec<Vec6> {
         self.from_submerged(&field.iter().map(|w| 0.5 * w).collect::<Vec<_>>())
@@ -88,6 +80,49 @@ impl Evaluation<'_> {
         self.system
             .tree
             .per_joint(&self.q, &tau, |j, q, p| j.frame_momentum(q, p))
+    }
+
+    /// Projects momenta and their rates on the turning frame columns.
+    fn project_frame(&self, twists: &[Vec6], momenta: Vec<Vec6>, rates: Vec<Vec6>) -> DVector<f64> {
+        let tree = &self.system.tree;
+        let (momenta, rates) = (tree.composite(momenta), tree.composite(rates));
+        let mut out = DVector::zeros(tree.velocities());
+        for (b, link) in tree.links().iter().enumerate() {
+            let carried = link
+                .parent
+                .map_or(Vec6::zeros(), |p| cross_force(&twists[p], &momenta[b]));
+            for k in link.v.clone() {
+                out[k] = self.kinematics.frame_columns[k].dot(&(rates[b] - carried));
+            }
+        }
+        out
+    }
+
+    /// Gradient over q of `p̂ᵀ X(q) v`, joint by joint.
+    pub(super) fn frame_velocity_vjp(&self, v: &DVector<f64>, hat: &DVector<f64>) -> DVector<f64> {
+        let mut out = DVector::zeros(v.len());
+        for l in self.system.tree.links() {
+            let r = l.v.clone();
+            let part = l
+                .joint
+                .frame_velocity_vjp(&v.as_slice()[r.clone()], &hat.as_slice()[r.clone()]);
+            for (k, x) in r.zip(part) {
+                out[k] = x;
+            }
+        }
+        out
+    }
+}
+
+impl Linearisation<'_> {
+    /// Fluid pose forces `½ ∂E(v, v)/∂g` on all bodies at unit density; zeros where no water acts.
+    pub(super) fn pose_force(&self, direction: &DVector<f64>) -> Result<Vec<Vec6>> {
+        Ok(match self.acting() {
+            Some(water) => {
+                self.half_from_submerged(&water.linearised.gradient(direction, direction)?)
+            }
+            None => vec![Vec6::zeros(); self.system.len()],
+        })
     }
 
     /// f(q, v, u).
@@ -114,29 +149,15 @@ impl Evaluation<'_> {
         Ok(self.project_frame(&twists, momenta, rates) + self.frame_joint_forces(control))
     }
 
-    /// Projects momenta and their rates on the turning frame columns.
-    fn project_frame(&self, twists: &[Vec6], momenta: Vec<Vec6>, rates: Vec<Vec6>) -> DVector<f64> {
-        let tree = &self.system.tree;
-        let (momenta, rates) = (tree.composite(momenta), tree.composite(rates));
-        let mut out = DVector::zeros(tree.velocities());
-        for (b, link) in tree.links().iter().enumerate() {
-            let carried = link
-                .parent
-                .map_or(Vec6::zeros(), |p| cross_force(&twists[p], &momenta[b]));
-            for k in link.v.clone() {
-                out[k] = self.kinematics.frame_columns[k].dot(&(rates[b] - carried));
-            }
-        }
-        out
-    }
-
-    /// Tangent of [`Evaluation::force`] along `dv` at fixed q and u.
+    /// Tangent of [`Linearisation::force`] along `dv` at fixed q and u.
     ///
     /// # Errors
     /// As there.
     pub fn force_jvp(&self, v: &DVector<f64>, dv: &DVector<f64>) -> Result<DVector<f64>> {
-        let changed = match &self.fluid {
-            Some(f) => f.gradient(&self.through_water(v), &self.virtual_direction(dv))?,
+        let changed = match self.acting() {
+            Some(water) => {
+                (water.linearised).gradient(&self.through_water(v), &self.virtual_direction(dv))?
+            }
             None => Vec::new(),
         };
         Ok(self.force_tangent(v, dv, &changed))
@@ -157,7 +178,7 @@ impl Evaluation<'_> {
         let ddirection = self.virtual_direction(dv);
         let fluid = self.fluid_momenta(&direction);
         let dfluid = self.fluid_momenta(&ddirection);
-        let dpose_force = match &self.fluid {
+        let dpose_force = match self.acting() {
             Some(_) => self.from_submerged(dpose_force),
             None => vec![Vec6::zeros(); self.system.len()],
         };
@@ -178,11 +199,11 @@ impl Evaluation<'_> {
     /// ∂f/∂v, column by column.
     ///
     /// # Errors
-    /// As [`Evaluation::force`].
+    /// As [`Linearisation::force`].
     pub fn force_velocity_jacobian(&self, v: &DVector<f64>) -> Result<DMatrix<f64>> {
         let n = v.len();
-        let changed = match &self.fluid {
-            Some(f) => f.gradient_columns(&self.through_water(v))?,
+        let changed = match self.acting() {
+            Some(water) => water.linearised.gradient_columns(&self.through_water(v))?,
             None => vec![Vec::new(); n],
         };
         let mut out = DMatrix::zeros(n, n);
@@ -194,7 +215,7 @@ impl Evaluation<'_> {
         Ok(out)
     }
 
-    /// Transpose of [`Evaluation::force`] in all its arguments: the gradient of `ẑᵀ f(q, v, u)`.
+    /// Transpose of [`Linearisation::force`] in all its arguments: the gradient of `ẑᵀ f(q, v, u)`.
     ///
     /// # Errors
     /// A solve of the coupling that misses its tolerance.
@@ -239,10 +260,10 @@ impl Evaluation<'_> {
             bar.pose[b] += e.pose;
             bar.twist[b] += e.twist;
         }
-        if let Some(fluid) = &self.fluid {
+        if let Some(water) = self.water()? {
             let direction = self.through_water(v);
-            let water = Direction::Basis(&direction);
-            let momenta = self.fluid_momenta(&direction);
+            let through = Direction::Basis(&direction);
+            let momenta = water.momenta(&direction);
             let current = self.current_twist();
             let n = self.system.len();
             // (D − U × Z) · h_f: one bilinear form with the direction D' = D − U × Z.
@@ -252,7 +273,7 @@ impl Evaluation<'_> {
             let submerged_carried = self.submerged_twists(&carried);
             let (momenta_carried, pair) = if submerged_carried.iter().any(|x| *x != 0.0) {
                 let carried = Direction::Twist(&submerged_carried);
-                let pullback = fluid.vjp(carried, water)?;
+                let pullback = water.linearised.vjp(carried, through)?;
                 (
                     self.submerged_impulses(&pullback.momentum_x),
                     self.from_submerged(&pullback.wrench),
@@ -261,7 +282,8 @@ impl Evaluation<'_> {
                 (vec![Vec6::zeros(); n], vec![Vec6::zeros(); n])
             };
             // ½ D_g E(v, v)[Z].
-            let tangent = fluid.hvp(water, water, &self.submerged_field(&fields.virtual_twist))?;
+            let virt = self.submerged_field(&fields.virtual_twist);
+            let tangent = water.linearised.hvp(through, through, &virt)?;
             let impulse = self.submerged_impulses(&tangent.momentum_x);
             let wrench = self.from_submerged(&tangent.wrench);
             let pose_force = self.half_from_submerged(&tangent.gradient);
@@ -292,20 +314,5 @@ impl Evaluation<'_> {
         self.system.joint_forces_vjp(&tau_bar, &mut out.control);
         out.q -= self.frame_velocity_vjp(&tau_bar, &tau_frame);
         Ok(out)
-    }
-
-    /// Gradient over q of `p̂ᵀ X(q) v`, joint by joint.
-    pub(super) fn frame_velocity_vjp(&self, v: &DVector<f64>, hat: &DVector<f64>) -> DVector<f64> {
-        let mut out = DVector::zeros(v.len());
-        for l in self.system.tree.links() {
-            let r = l.v.clone();
-            let part = l
-                .joint
-                .frame_velocity_vjp(&v.as_slice()[r.clone()], &hat.as_slice()[r.clone()]);
-            for (k, x) in r.zip(part) {
-                out[k] = x;
-            }
-        }
-        out
     }
 }

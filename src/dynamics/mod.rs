@@ -7,6 +7,7 @@ mod external;
 mod force;
 mod integrator;
 mod limit;
+mod linearisation;
 mod momentum;
 mod parameters;
 mod system;
@@ -18,5 +19,6 @@ pub use integrator::{
     Input, Integrator, Memo, State, StateBar, StepBar, Stepped, Stepper, contact_velocity,
 };
 pub use limit::JointLimit;
+pub use linearisation::Linearisation;
 pub use parameters::{Contact, Parameters};
 pub use system::{BodyData, Drive, System};

@@ -1,7 +1,7 @@
 //! Generalised momentum p = M(q) v + p_rest(q) and its transpose.
 
 use super::force::rigid_parameters_vjp;
-use super::{Evaluation, ForceCotangents};
+use super::{Evaluation, ForceCotangents, Linearisation};
 use crate::Result;
 use crate::adjoint::lie::{Vec6, cross_force};
 use crate::multibody::{Cotangents, Virtual};
@@ -34,7 +34,9 @@ impl Evaluation<'_> {
             .tree
             .per_joint(&self.q, w, |j, q, w| j.frame_velocity(q, w))
     }
+}
 
+impl Linearisation<'_> {
     /// Gradient of `wᵀ (M(q) v + p_rest(q))` over q, v and the parameters.
     ///
     /// # Errors
@@ -70,18 +72,17 @@ impl Evaluation<'_> {
             bar.pose[b] -= cross_force(twist, &h_virtual) + cross_force(virt, &h);
             rigid_parameters_vjp(self, b, virt, twist, &mut out.parameters);
         }
-        if let Some(fluid) = &self.fluid {
+        if let Some(water) = self.water()? {
             let direction = if *current == Vec6::zeros() {
                 self.virtual_direction(v)
             } else {
                 self.through_water(v)
             };
             let virtual_direction = self.virtual_direction(w);
-            let (momenta, momenta_virtual) = (
-                self.fluid_momenta(&direction),
-                self.fluid_momenta(&virtual_direction),
-            );
-            let pair = self.from_submerged(&fluid.gradient(&virtual_direction, &direction)?);
+            let (momenta, momenta_virtual) =
+                (water.momenta(&direction), water.momenta(&virtual_direction));
+            let pair = water.linearised.gradient(&virtual_direction, &direction)?;
+            let pair = self.from_submerged(&pair);
             for b in 0..self.system.len() {
                 if self.system.bodies[b].submerged.is_none() {
                     continue;

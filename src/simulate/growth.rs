@@ -14,7 +14,7 @@
 use super::gradcheck::unit_displacements;
 use super::trajectory::Trajectory;
 use super::{Controls, Sample, Simulator};
-use crate::dynamics::{Drive, Evaluation, State, StateBar, StepBar};
+use crate::dynamics::{Drive, Linearisation, State, StateBar, StepBar};
 use crate::{Error, Result};
 use nalgebra::{DMatrix, DVector};
 use rayon::prelude::*;
@@ -110,11 +110,11 @@ pub fn growth_with(
     // The product so far, as e^size times a matrix whose entries are of order one.
     let (mut product, mut size) = (DMatrix::<f64>::identity(2 * nv, 2 * nv), 0.0);
     let (states, samples) = (rollout.states(), rollout.samples());
-    let mut e = trajectory.stepper.evaluate(&states[0].q, true)?;
+    let mut e = trajectory.stepper.linearise(&states[0].q)?;
     for n in 0..steps {
         let from = from_velocity(&trajectory, &e, &states[n], &samples[n])?;
         let through = step(&trajectory, &e, &states[n], &samples[n])?;
-        e = trajectory.stepper.evaluate(&states[n + 1].q, true)?;
+        e = trajectory.stepper.linearise(&states[n + 1].q)?;
         let to = to_velocity(&trajectory, &e, &states[n + 1], &samples[n + 1])?;
         let mut a = to * through * from;
         for i in 0..2 * nv {
@@ -177,7 +177,12 @@ fn rows(
 }
 
 /// B: rows are cotangents of the state before the step.
-fn step(t: &Trajectory, e: &Evaluation, state: &State, sample: &Sample) -> Result<DMatrix<f64>> {
+fn step<'a>(
+    t: &Trajectory<'a>,
+    e: &Linearisation<'a>,
+    state: &State,
+    sample: &Sample,
+) -> Result<DMatrix<f64>> {
     rows(state.y.len(), |q, y| {
         let next_bar = StateBar {
             q: q.clone(),
@@ -191,7 +196,7 @@ fn step(t: &Trajectory, e: &Evaluation, state: &State, sample: &Sample) -> Resul
 /// T: what (q, v) are in (q, y).
 fn to_velocity(
     t: &Trajectory,
-    e: &Evaluation,
+    e: &Linearisation,
     state: &State,
     sample: &Sample,
 ) -> Result<DMatrix<f64>> {
@@ -205,7 +210,7 @@ fn to_velocity(
 /// T⁻¹: what (q, y) are in (q, v).
 fn from_velocity(
     t: &Trajectory,
-    e: &Evaluation,
+    e: &Linearisation,
     state: &State,
     sample: &Sample,
 ) -> Result<DMatrix<f64>> {

@@ -329,7 +329,7 @@ impl<'a> Rollout<'a> {
             }
         }
         // y₀ = y(q₀, v₀).
-        let e = trajectory.stepper.evaluate(&self.states()[0].q, true)?;
+        let e = trajectory.stepper.linearise(&self.states()[0].q)?;
         let mut bar = StepBar::zeros(&e);
         bar.state.q = state_bar.q;
         trajectory

@@ -318,9 +318,7 @@ impl Simulator {
         let stepper = self.stepper();
         let mut q = q.clone();
         stepper.place_motions(&mut q, step as f64 * self.dt);
-        let e = self
-            .system()
-            .evaluate(self.parameters(), &q, false, false)?;
+        let e = self.system().evaluate(self.parameters(), &q)?;
         let state = State {
             step,
             y: stepper.conserved(&e, v),
@@ -464,7 +462,7 @@ impl Simulator {
         let system = self.system();
         let (submerged, poses) = self.in_water();
         let turn = world_axes(&poses);
-        let record = system.coupling.evaluate(&poses, &turn, false)?;
+        let record = system.coupling.evaluate(&poses, &turn)?;
         let m = turn.tr_mul(record.momenta()) * self.parameters().density;
         Ok(AddedMass {
             bodies: submerged

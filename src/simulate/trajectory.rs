@@ -3,7 +3,9 @@
 use super::{Fidelity, Observation, Policy, Sample};
 use crate::adjoint::lie::{Vec3, Vec6, point_wrench};
 use crate::adjoint::step::Step;
-use crate::dynamics::{Evaluation, Input, Parameters, State, StateBar, StepBar, Stepper};
+use crate::dynamics::{
+    Evaluation, Input, Linearisation, Parameters, State, StateBar, StepBar, Stepper,
+};
 use crate::shape::Gap;
 use crate::water::Clearance;
 use crate::{Error, Result};
@@ -34,15 +36,14 @@ pub(super) struct Local {
 }
 
 impl<'a> Trajectory<'a> {
-    /// Evaluates a state whose bodies keep apart; with the smallest gap.
-    fn evaluate(&self, state: &State) -> Result<(Evaluation<'_>, Option<Gap>)> {
+    /// The smallest gap at a state, whose bodies must keep apart; not asked for where it has no effect.
+    fn gap(&self, state: &State) -> Result<Option<Gap>> {
         let system = self.stepper.system;
-        let mut gap = None;
-        if self.fidelity != Fidelity::Isolated {
-            let poses = system.tree.kinematics(&state.q).poses;
-            gap = self.clearance.keep_apart(&poses)?;
+        if self.fidelity == Fidelity::Isolated {
+            return Ok(None);
         }
-        Ok((self.stepper.evaluate(&state.q, false)?, gap))
+        let poses = system.tree.kinematics(&state.q).poses;
+        self.clearance.keep_apart(&poses)
     }
 
     fn observe(&self, e: &Evaluation, state: &State, gap: Option<Gap>) -> Result<Sample> {
@@ -66,7 +67,7 @@ impl<'a> Trajectory<'a> {
             momentum: e.total_momentum(&v, &momenta),
             largest_momentum: momenta.iter().fold(Vec6::zeros(), |m, h| m.sup(&h.abs())),
             poses: e.kinematics.poses.clone(),
-            report: e.report(),
+            report: e.report().clone(),
             gap,
             control: DVector::zeros(0),
             hold: Vec::new(),
@@ -105,7 +106,7 @@ impl<'a> Trajectory<'a> {
     /// Cotangents that enter at a state: readings of q, v and poses.
     fn observe_vjp(
         &self,
-        e: &Evaluation,
+        e: &Linearisation,
         state: &State,
         sample: &Sample,
         seed: &Seed,
@@ -128,7 +129,7 @@ impl<'a> Trajectory<'a> {
     /// Transpose of a step and its controller at a state where `e` was evaluated; the cotangent of the velocity isn't carried on yet.
     fn step_bar(
         &self,
-        e: &Evaluation,
+        e: &Linearisation<'a>,
         state: &State,
         sample: &Sample,
         next_bar: &StateBar,
@@ -158,7 +159,7 @@ impl<'a> Trajectory<'a> {
     /// Cotangent of a state from that of the next one alone.
     pub(super) fn state_before(
         &self,
-        e: &Evaluation,
+        e: &Linearisation<'a>,
         state: &State,
         sample: &Sample,
         next_bar: &StateBar,
@@ -180,7 +181,7 @@ impl<'a> Trajectory<'a> {
         next_bar: &StateBar,
         seed: &Seed,
     ) -> Result<(StateBar, Local)> {
-        let e = self.stepper.evaluate(&state.q, true)?;
+        let e = self.stepper.linearise(&state.q)?;
         let (mut bar, gains) = self.step_bar(&e, state, sample, next_bar)?;
         self.observe_vjp(&e, state, sample, seed, &mut bar)?;
         Ok((
@@ -199,7 +200,7 @@ impl<'a> Trajectory<'a> {
         sample: &Sample,
         seed: &Seed,
     ) -> Result<(StateBar, Local)> {
-        let e = self.stepper.evaluate(&state.q, true)?;
+        let e = self.stepper.linearise(&state.q)?;
         let mut bar = StepBar::zeros(&e);
         self.observe_vjp(&e, state, sample, seed, &mut bar)?;
         Ok((
@@ -246,7 +247,8 @@ impl Step for Trajectory<'_> {
 
     fn step(&self, index: usize, state: &State) -> Result<(State, Sample)> {
         let run = || {
-            let (e, gap) = self.evaluate(state)?;
+            let gap = self.gap(state)?;
+            let e = self.stepper.linearise(&state.q)?;
             let mut sample = self.observe(&e, state, gap)?;
             let (input, mode) = self.input(index, state, &sample)?;
             let mut next = self.stepper.step(&e, state, &sample.v, &input)?;
@@ -261,7 +263,8 @@ impl Step for Trajectory<'_> {
 
     fn last(&self, _index: usize, state: &State) -> Result<Sample> {
         let run = || {
-            let (e, gap) = self.evaluate(state)?;
+            let gap = self.gap(state)?;
+            let e = self.stepper.evaluate(&state.q)?;
             self.observe(&e, state, gap)
         };
         run().map_err(|e: Error| e.at_time(self.stepper.time(state)))

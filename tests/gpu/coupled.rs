@@ -3,7 +3,7 @@
 use super::fixture::*;
 use hydrograd::boundary::Method;
 use hydrograd::coupling::full::{Full, Model, Preconditioner, SolveSettings};
-use hydrograd::coupling::{Coupling, Direction, Exclusions, Record};
+use hydrograd::coupling::{Direction, Exclusions, Linearise, Linearised};
 use hydrograd::gpu::Context;
 use nalgebra::DVector;
 use std::sync::Arc;
@@ -13,8 +13,8 @@ fn differences(context: &Arc<Context>, model: &Arc<Model>, columns: usize) -> [f
     let (cpu, gpu) = both(context, model);
     let n = model.bodies.len();
     let (poses, basis) = (poses(), basis(n, columns, 0.3));
-    let a = cpu.evaluate(&poses, &basis, true).unwrap();
-    let b = gpu.evaluate(&poses, &basis, true).unwrap();
+    let a = cpu.linearise(&poses, &basis).unwrap();
+    let b = gpu.linearise(&poses, &basis).unwrap();
     println!("cpu {:?}\ngpu {:?}", a.report(), b.report());
     let x = DVector::from_vec(wavy(columns, 0.7));
     let y = DVector::from_vec(wavy(columns, 1.9));
@@ -29,7 +29,7 @@ fn differences(context: &Arc<Context>, model: &Arc<Model>, columns: usize) -> [f
         b.gradient_along(&y, &z).unwrap().as_slice(),
         a.gradient_along(&y, &z).unwrap().as_slice(),
     );
-    let pull = |r: &dyn Record| {
+    let pull = |r: &dyn Linearised| {
         let p = r
             .vjp(Direction::Basis(&x), Direction::Twist(&free))
             .unwrap();
@@ -41,7 +41,7 @@ fn differences(context: &Arc<Context>, model: &Arc<Model>, columns: usize) -> [f
         .concat()
     };
     let vjp = difference(&pull(&*b), &pull(&*a));
-    let second = |r: &dyn Record, same: bool| {
+    let second = |r: &dyn Linearised, same: bool| {
         let right = if same {
             Direction::Basis(&x)
         } else {
@@ -143,7 +143,7 @@ fn a_displacement_of_any_size_gives_a_tangent_of_that_size() {
     );
     let (_, gpu) = both(two_float(), &model);
     let n = model.bodies.len();
-    let record = gpu.evaluate(&poses(), &basis(n, 5, 0.3), false).unwrap();
+    let record = gpu.linearise(&poses(), &basis(n, 5, 0.3)).unwrap();
     let x = DVector::from_vec(wavy(5, 0.7));
     let along = |size: f64| {
         let z: Vec<_> = (displacement(n, 2.3).iter()).map(|z| z * size).collect();

@@ -4,7 +4,7 @@ use super::fixture::*;
 use hydrograd::adjoint::lie::{Pose, Vec3, exp_matrix};
 use hydrograd::boundary::{BodyBoundary, Readout, Settings};
 use hydrograd::coupling::full::{Cpu, Full, MfsBody, Model, Preconditioner, SolveSettings};
-use hydrograd::coupling::{Coupling, Direction, Exclusions};
+use hydrograd::coupling::{Coupling, Direction, Exclusions, Linearise};
 use hydrograd::gpu::full::Gpu;
 use hydrograd::scene::Shape;
 use hydrograd::shape;
@@ -53,8 +53,8 @@ fn compare(factored: [bool; 3], preconditioner: Preconditioner) {
         model.clone(),
         Box::new(Gpu::new(context(), &model).unwrap()),
     );
-    let a = cpu.evaluate(&poses(), &basis, false).unwrap();
-    let b = gpu.evaluate(&poses(), &basis, false).unwrap();
+    let a = cpu.evaluate(&poses(), &basis).unwrap();
+    let b = gpu.evaluate(&poses(), &basis).unwrap();
     let found = difference(b.momenta().as_slice(), a.momenta().as_slice());
     assert!(found <= 1e-6, "{found:.1e}");
 }
@@ -107,7 +107,7 @@ fn derivatives_of_many_pairs_go_in_batches() {
     let y = y.rows(0, 5).into_owned();
     let z = displacement(poses.len(), 0.7);
     let of = |full: &Full| {
-        let record = full.evaluate(&poses, &basis, true).unwrap();
+        let record = full.linearise(&poses, &basis).unwrap();
         let columns = record.gradient_columns(&x).unwrap().concat();
         let tangent = record
             .hvp(Direction::Basis(&x), Direction::Basis(&y), &z)

@@ -5,7 +5,7 @@ use hydrograd::Error;
 use hydrograd::adjoint::lie::{Pose, Vec3, exp_matrix};
 use hydrograd::boundary::{BodyBoundary, Settings};
 use hydrograd::coupling::reduced::{Cutoff, Reduced, ReducedBody, compress};
-use hydrograd::coupling::{Coupling, Direction, Exclusions, Record};
+use hydrograd::coupling::{Coupling, Direction, Exclusions, Linearise, Linearised};
 use hydrograd::gpu::reduced::GpuReduced;
 use hydrograd::gpu::{Context, Options};
 use hydrograd::scene::{Shape, Wall, WallSurface};
@@ -44,7 +44,7 @@ fn three(walls: &[Wall], cutoff: Option<Cutoff>, excluded: &Exclusions) -> Arc<R
     Arc::new(reduced.excluding(excluded).unwrap())
 }
 
-fn pull(r: &dyn Record, x: Direction, y: Direction) -> Vec<f64> {
+fn pull(r: &dyn Linearised, x: Direction, y: Direction) -> Vec<f64> {
     let p = r.vjp(x, y).unwrap();
     [
         p.momentum_x.as_slice(),
@@ -58,8 +58,8 @@ fn pull(r: &dyn Record, x: Direction, y: Direction) -> Vec<f64> {
 fn differences(gpu: &GpuReduced, poses: &[Pose], columns: usize) -> [f64; 7] {
     let (n, reduced) = (poses.len(), gpu.reduced());
     let basis = basis(n, columns, 0.3);
-    let a = reduced.evaluate(poses, &basis, true).unwrap();
-    let b = gpu.evaluate(poses, &basis, true).unwrap();
+    let a = reduced.linearise(poses, &basis).unwrap();
+    let b = gpu.linearise(poses, &basis).unwrap();
     println!("cpu {:?}\ngpu {:?}", a.report(), b.report());
     let x = DVector::from_vec(wavy(columns, 0.7));
     let y = DVector::from_vec(wavy(columns, 1.9));
@@ -70,7 +70,7 @@ fn differences(gpu: &GpuReduced, poses: &[Pose], columns: usize) -> [f64; 7] {
         &flat(&b.gradient(&x, &y).unwrap()),
         &flat(&a.gradient(&x, &y).unwrap()),
     );
-    let each = |r: &dyn Record| flat(&r.gradient_columns(&x).unwrap().concat());
+    let each = |r: &dyn Linearised| flat(&r.gradient_columns(&x).unwrap().concat());
     let each = difference(&each(&*b), &each(&*a));
     let along = difference(
         b.gradient_along(&y, &z).unwrap().as_slice(),
@@ -78,7 +78,7 @@ fn differences(gpu: &GpuReduced, poses: &[Pose], columns: usize) -> [f64; 7] {
     );
     let (on, off) = (Direction::Basis(&x), Direction::Twist(&free));
     let vjp = difference(&pull(&*b, on, off), &pull(&*a, on, off));
-    let second = |r: &dyn Record, right: Direction| {
+    let second = |r: &dyn Linearised, right: Direction| {
         let t = r.hvp(on, right, &z).unwrap();
         let momenta = [t.momentum_x.as_slice(), t.momentum_y.as_slice()].concat();
         (momenta, flat(&t.gradient), flat(&t.wrench))
@@ -182,8 +182,8 @@ fn reduced_of_64_bodies() {
     let (reduced, poses) = many(64);
     let gpu = GpuReduced::new(context(), reduced.clone()).unwrap();
     let basis = basis(64, 5, 0.3);
-    let a = reduced.evaluate(&poses, &basis, true).unwrap();
-    let b = gpu.evaluate(&poses, &basis, true).unwrap();
+    let a = reduced.linearise(&poses, &basis).unwrap();
+    let b = gpu.linearise(&poses, &basis).unwrap();
     println!("cpu {:?}\ngpu {:?}", a.report(), b.report());
     let x = DVector::from_vec(wavy(5, 0.7));
     let y = DVector::from_vec(wavy(5, 1.9));
@@ -208,7 +208,7 @@ fn reduced_gives_the_same_bits_again() {
     let basis = basis(3, 5, 0.3);
     let x = DVector::from_vec(wavy(5, 0.7));
     let once = || {
-        let r = gpu.evaluate(&poses(), &basis, true).unwrap();
+        let r = gpu.linearise(&poses(), &basis).unwrap();
         let on = Direction::Basis(&x);
         let t = r.hvp(on, on, &displacement(3, 2.3)).unwrap();
         [
@@ -232,7 +232,7 @@ fn bodies_in_one_another_are_refused_as_by_the_cpu() {
         basis(3, 5, 0.3),
         DMatrix::from_fn(18, 1, |i, _| f64::from(u8::from(i == 12))),
     ] {
-        let of = |c: &dyn Coupling| match c.evaluate(&poses, &basis, false).err() {
+        let of = |c: &dyn Coupling| match c.evaluate(&poses, &basis).err() {
             Some(Error::Unresolved {
                 place,
                 quantity,
@@ -262,7 +262,7 @@ fn reduced_close_to_one_another() {
     let found = differences(&gpu, &poses, 5);
     println!("value, gradient, columns, along, vjp, jvp, hvp: {found:?}");
     assert!(found.iter().all(|d| *d <= 1e-8), "{found:?}");
-    let report = gpu.evaluate(&poses, &basis(3, 5, 0.3), false).unwrap();
+    let report = gpu.evaluate(&poses, &basis(3, 5, 0.3)).unwrap();
     assert!(report.report().iterations > 16, "{:?}", report.report());
 }
 
@@ -280,7 +280,7 @@ fn reduced_without_columns_or_neighbours() {
     let reduced = Arc::new(Reduced::new(vec![shapes()[0].clone()], &[], |_, _| None).unwrap());
     holds(context(), &reduced, &poses()[..1], 5, 1e-8);
     let gpu = GpuReduced::new(context(), reduced).unwrap();
-    let none = gpu.evaluate(&poses()[..1], &DMatrix::zeros(6, 0), true);
+    let none = gpu.linearise(&poses()[..1], &DMatrix::zeros(6, 0));
     assert_eq!(none.unwrap().momenta().shape(), (6, 0));
 }
 
@@ -289,7 +289,7 @@ fn reduced_on_a_lost_device_is_an_error() {
     let own = Context::new(&Options::default()).unwrap();
     let gpu = GpuReduced::new(&own, three(&[], None, &Exclusions::none())).unwrap();
     let basis = basis(3, 30, 0.3);
-    let record = gpu.evaluate(&poses(), &basis, true).unwrap();
+    let record = gpu.linearise(&poses(), &basis).unwrap();
     own.lose();
     let x = DVector::from_vec(wavy(30, 0.7));
     let z = displacement(3, 2.3);
@@ -300,7 +300,7 @@ fn reduced_on_a_lost_device_is_an_error() {
         record.gradient_along(&x, &z).err(),
         record.vjp(on, on).err(),
         record.hvp(on, on, &z).err(),
-        gpu.evaluate(&poses(), &basis, true).err(),
+        gpu.linearise(&poses(), &basis).err(),
     ];
     for e in failed {
         assert!(matches!(e, Some(Error::Device { .. })), "{e:?}");

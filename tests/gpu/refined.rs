@@ -4,7 +4,7 @@ use super::fixture::*;
 use hydrograd::Error;
 use hydrograd::boundary::Method;
 use hydrograd::coupling::full::{Preconditioner, Solver};
-use hydrograd::coupling::{Coupling, Exclusions};
+use hydrograd::coupling::{Coupling, Exclusions, Linearise};
 use hydrograd::gpu::Arithmetic;
 use hydrograd::gpu::full::{Gpu, Probe};
 use hydrograd::solver::Columns;
@@ -20,7 +20,7 @@ fn an_answer_meets_the_tolerance_asked_for() {
             tight(Preconditioner::Factors),
         );
         let (cpu, _) = both(context(), &model);
-        cpu.evaluate(&poses(), &basis(3, 5, 0.3), false)
+        cpu.evaluate(&poses(), &basis(3, 5, 0.3))
             .unwrap()
             .momenta()
             .clone()
@@ -30,7 +30,7 @@ fn an_answer_meets_the_tolerance_asked_for() {
         settings.tolerance = tolerance;
         let model = model(Method::MfsVertex, &[], Exclusions::none(), settings);
         let (_, gpu) = both(context(), &model);
-        let record = gpu.evaluate(&poses(), &basis(3, 5, 0.3), false).unwrap();
+        let record = gpu.evaluate(&poses(), &basis(3, 5, 0.3)).unwrap();
         let report = record.report();
         let error = difference(record.momenta().as_slice(), exact.as_slice());
         println!(
@@ -50,7 +50,7 @@ fn what_cannot_be_reached_is_an_error_with_the_residual() {
     settings.tolerance = 1e-17;
     let model = model(Method::MfsVertex, &[], Exclusions::none(), settings);
     let (_, gpu) = both(context(), &model);
-    match gpu.evaluate(&poses(), &basis(3, 5, 0.3), false).err() {
+    match gpu.evaluate(&poses(), &basis(3, 5, 0.3)).err() {
         Some(Error::Solver {
             residual,
             tolerance,
@@ -68,7 +68,7 @@ fn too_few_iterations_are_an_error() {
     settings.max_iterations = 5;
     let model = model(Method::MfsVertex, &[], Exclusions::none(), settings);
     let (_, gpu) = both(context(), &model);
-    let error = gpu.evaluate(&poses(), &basis(3, 5, 0.3), false).err();
+    let error = gpu.evaluate(&poses(), &basis(3, 5, 0.3)).err();
     assert!(matches!(error, Some(Error::Solver { .. })), "{error:?}");
 }
 
@@ -94,7 +94,7 @@ fn the_same_input_gives_the_same_bits() {
     );
     let (_, gpu) = both(context(), &model);
     let run = || {
-        let record = gpu.evaluate(&poses(), &basis(3, 5, 0.3), true).unwrap();
+        let record = gpu.linearise(&poses(), &basis(3, 5, 0.3)).unwrap();
         let x = nalgebra::DVector::from_vec(wavy(5, 0.7));
         let wrench = flat(&record.gradient(&x, &x).unwrap());
         (record.momenta().clone(), wrench)

@@ -4,7 +4,8 @@ use super::tools::{Group, all, along, groups, vector_along, wavy};
 use hydrograd::adjoint::check::{Outcome, Rung};
 use hydrograd::adjoint::contact::Law;
 use hydrograd::dynamics::{
-    Dual, Evaluation, Input, Integrator, JointLimit, Parameters, State, StateBar, Stepper, System,
+    Dual, Input, Integrator, JointLimit, Linearisation, Parameters, State, StateBar, Stepper,
+    System,
 };
 use hydrograd::scene::{Body, Contact, Fluid, Joint, Scene, Shape};
 use hydrograd::{Fidelity, Settings, Simulator};
@@ -185,8 +186,8 @@ fn point() -> Point {
     }
 }
 
-fn evaluate<'a>(parameters: &'a Parameters, q: &DVector<f64>) -> Evaluation<'a> {
-    system().evaluate(parameters, q, true, true).unwrap()
+fn evaluate<'a>(parameters: &'a Parameters, q: &DVector<f64>) -> Linearisation<'a> {
+    system().linearise(parameters, q).unwrap()
 }
 
 /// A scalar against its cotangents: every body's displacement and velocity, and every parameter of contact, apart.
@@ -310,13 +311,13 @@ fn step_vjp(integrator: Integrator, c: f64) -> Outcome {
         mode: 0,
     };
     let s = stepper(&p.parameters, integrator);
-    let (start, e) = (state(&p), s.evaluate(&p.q, true).unwrap());
+    let (start, e) = (state(&p), s.linearise(&p.q).unwrap());
     let v = s.velocity(&e, &start).unwrap();
     let next = s.step(&e, &start, &v, &input).unwrap();
     let end = next.state.q.clone();
     let value = |p: &Point| {
         let s = stepper(&p.parameters, integrator);
-        let (start, e) = (state(p), s.evaluate(&p.q, true).unwrap());
+        let (start, e) = (state(p), s.linearise(&p.q).unwrap());
         let v = s.velocity(&e, &start).unwrap();
         let next = s.step(&e, &start, &v, &input).unwrap().state;
         q_bar.dot(&super::multibody::tree_displacement(

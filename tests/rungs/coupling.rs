@@ -8,7 +8,7 @@ use hydrograd::boundary::{BodyBoundary, Method, Settings};
 use hydrograd::coupling::full::{Full, MfsBody, SolveSettings, Solver};
 use hydrograd::coupling::image::Image;
 use hydrograd::coupling::reduced::{Cutoff, Reduced, compress};
-use hydrograd::coupling::{Coupling, Direction, Exclusions, Isolated};
+use hydrograd::coupling::{Direction, Exclusions, Isolated, Linearise};
 use hydrograd::scene::{Shape, Wall, WallSurface};
 use hydrograd::shape;
 use nalgebra::{DMatrix, DVector};
@@ -23,18 +23,18 @@ pub fn rungs() -> Vec<Rung> {
     }
     rungs![
         "coupling::image::Image::twist_vjp" => image_twist,
-        "coupling::isolated::IsolatedRecord::gradient" => |c| zero_gradient(c, false),
-        "coupling::isolated::IsolatedRecord::gradient_along" => |c| zero_gradient(c, true),
-        "coupling::isolated::IsolatedRecord::vjp" => |c| vjp(&isolated(), c),
-        "coupling::isolated::IsolatedRecord::hvp" => isolated_hvp,
-        "coupling::full::record::FullRecord::gradient" => |c| all(systems().iter().map(|s| gradient(s, c))),
-        "coupling::full::record::FullRecord::gradient_along" => |c| all(systems().iter().map(|s| gradient_along(s, c))),
-        "coupling::full::record::FullRecord::vjp" => |c| all(systems().iter().map(|s| vjp(s, c))),
-        "coupling::full::record::FullRecord::hvp" => |c| all(systems().iter().map(|s| hvp(s, c))),
-        "coupling::reduced::record::ReducedRecord::gradient" => |c| all(reduced_systems().iter().map(|s| gradient(s, c))),
-        "coupling::reduced::record::ReducedRecord::gradient_along" => |c| all(reduced_systems().iter().map(|s| gradient_along(s, c))),
-        "coupling::reduced::record::ReducedRecord::vjp" => |c| all(reduced_systems().iter().map(|s| vjp(s, c))),
-        "coupling::reduced::record::ReducedRecord::hvp" => |c| all(reduced_systems().iter().map(|s| hvp(s, c))),
+        "coupling::isolated::IsolatedLinearised::gradient" => |c| zero_gradient(c, false),
+        "coupling::isolated::IsolatedLinearised::gradient_along" => |c| zero_gradient(c, true),
+        "coupling::isolated::IsolatedLinearised::vjp" => |c| vjp(&isolated(), c),
+        "coupling::isolated::IsolatedLinearised::hvp" => isolated_hvp,
+        "coupling::full::linearised::FullLinearised::gradient" => |c| all(systems().iter().map(|s| gradient(s, c))),
+        "coupling::full::linearised::FullLinearised::gradient_along" => |c| all(systems().iter().map(|s| gradient_along(s, c))),
+        "coupling::full::linearised::FullLinearised::vjp" => |c| all(systems().iter().map(|s| vjp(s, c))),
+        "coupling::full::linearised::FullLinearised::hvp" => |c| all(systems().iter().map(|s| hvp(s, c))),
+        "coupling::reduced::linearised::ReducedLinearised::gradient" => |c| all(reduced_systems().iter().map(|s| gradient(s, c))),
+        "coupling::reduced::linearised::ReducedLinearised::gradient_along" => |c| all(reduced_systems().iter().map(|s| gradient_along(s, c))),
+        "coupling::reduced::linearised::ReducedLinearised::vjp" => |c| all(reduced_systems().iter().map(|s| vjp(s, c))),
+        "coupling::reduced::linearised::ReducedLinearised::hvp" => |c| all(reduced_systems().iter().map(|s| hvp(s, c))),
     ]
 }
 
@@ -187,24 +187,24 @@ fn dot(a: &[Vec6], b: &[Vec6]) -> f64 {
 }
 
 /// E(g; x, y) for body twists x, y with the poses displaced by `h z`.
-fn energy(s: &dyn Coupling, z: &[Vec6], h: f64, x: &DVector<f64>, y: &DVector<f64>) -> f64 {
+fn energy(s: &dyn Linearise, z: &[Vec6], h: f64, x: &DVector<f64>, y: &DVector<f64>) -> f64 {
     let b = DMatrix::from_columns(&[x.clone(), y.clone()]);
-    let r = s.evaluate(&displaced(z, h), &b, false).unwrap();
+    let r = s.evaluate(&displaced(z, h), &b).unwrap();
     let m = b.tr_mul(r.momenta());
     0.5 * (m[(0, 1)] + m[(1, 0)])
 }
 
-fn gradient(s: &dyn Coupling, c: f64) -> Outcome {
+fn gradient(s: &dyn Linearise, c: f64) -> Outcome {
     let k = case();
-    let record = s.evaluate(&poses(), &k.basis, true).unwrap();
+    let record = s.linearise(&poses(), &k.basis).unwrap();
     let slope = c * dot(&record.gradient(&k.x, &k.y).unwrap(), &k.z);
     let (x, y) = (&k.basis * &k.x, &k.basis * &k.y);
     along(|h| energy(s, &k.z, h, &x, &y), slope)
 }
 
-fn gradient_along(s: &dyn Coupling, c: f64) -> Outcome {
+fn gradient_along(s: &dyn Linearise, c: f64) -> Outcome {
     let k = case();
-    let record = s.evaluate(&poses(), &k.basis, true).unwrap();
+    let record = s.linearise(&poses(), &k.basis).unwrap();
     let tangent = c * record.gradient_along(&k.y, &k.z).unwrap();
     let y = &k.basis * &k.y;
     let value = |h: f64| -> Vec<f64> {
@@ -215,9 +215,9 @@ fn gradient_along(s: &dyn Coupling, c: f64) -> Outcome {
 }
 
 /// All three parts, for a direction outside the basis and one on it.
-fn vjp(s: &dyn Coupling, c: f64) -> Outcome {
+fn vjp(s: &dyn Linearise, c: f64) -> Outcome {
     let k = case();
-    let record = s.evaluate(&poses(), &k.basis, true).unwrap();
+    let record = s.linearise(&poses(), &k.basis).unwrap();
     let pull = record
         .vjp(Direction::Twist(&k.twist), Direction::Basis(&k.y))
         .unwrap();
@@ -242,10 +242,10 @@ fn vjp(s: &dyn Coupling, c: f64) -> Outcome {
 }
 
 /// Tangents of impulses and wrenches, for two directions and for one taken twice.
-fn hvp(s: &dyn Coupling, c: f64) -> Outcome {
+fn hvp(s: &dyn Linearise, c: f64) -> Outcome {
     let k = case();
-    let record = s.evaluate(&poses(), &k.basis, true).unwrap();
-    let at = |h: f64| s.evaluate(&displaced(&k.z, h), &k.basis, true).unwrap();
+    let record = s.linearise(&poses(), &k.basis).unwrap();
+    let at = |h: f64| s.linearise(&displaced(&k.z, h), &k.basis).unwrap();
     all([(&k.x, &k.y), (&k.x, &k.x)].into_iter().flat_map(|(x, y)| {
         let t = record
             .hvp(Direction::Basis(x), Direction::Basis(y), &k.z)
@@ -278,7 +278,7 @@ fn hvp(s: &dyn Coupling, c: f64) -> Outcome {
 /// The gradient of isolated bodies' energy is zero exactly; corrupted means not zero here.
 fn zero_gradient(c: f64, along: bool) -> Outcome {
     let (k, s) = (case(), isolated());
-    let record = s.evaluate(&poses(), &k.basis, true).unwrap();
+    let record = s.linearise(&poses(), &k.basis).unwrap();
     let y = &k.basis * &k.y;
     let x = &k.basis * &k.x;
     assert_eq!(energy(&s, &k.z, 0.3, &x, &y), energy(&s, &k.z, 0.0, &x, &y));
@@ -296,7 +296,7 @@ fn zero_gradient(c: f64, along: bool) -> Outcome {
 
 fn isolated_hvp(c: f64) -> Outcome {
     let (k, s) = (case(), isolated());
-    let record = s.evaluate(&poses(), &k.basis, true).unwrap();
+    let record = s.linearise(&poses(), &k.basis).unwrap();
     let t = record
         .hvp(Direction::Basis(&k.x), Direction::Basis(&k.y), &k.z)
         .unwrap();
@@ -325,14 +325,14 @@ fn image_twist(c: f64) -> Outcome {
 fn second_derivatives_commute_up_to_the_bracket() {
     let full = systems()
         .into_iter()
-        .map(|s| Box::new(s) as Box<dyn Coupling>);
+        .map(|s| Box::new(s) as Box<dyn Linearise>);
     let reduced = reduced_systems()
         .into_iter()
-        .map(|s| Box::new(s) as Box<dyn Coupling>);
+        .map(|s| Box::new(s) as Box<dyn Linearise>);
     for s in full.chain(reduced) {
         let k = case();
         let other = field(1.9);
-        let record = s.evaluate(&poses(), &k.basis, true).unwrap();
+        let record = s.linearise(&poses(), &k.basis).unwrap();
         for (x, y) in [(&k.x, &k.y), (&k.x, &k.x)] {
             let along = |z: &[Vec6]| {
                 record

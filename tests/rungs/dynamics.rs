@@ -5,7 +5,7 @@ use super::multibody::tree_displacement;
 use super::tools::{Group, all, along, groups, vector_along, wavy};
 use hydrograd::adjoint::check::{Outcome, Rung};
 use hydrograd::dynamics::{
-    Drive, Evaluation, Input, Integrator, Parameters, State, StateBar, StepBar, Stepper, System,
+    Drive, Input, Integrator, Linearisation, Parameters, State, StateBar, StepBar, Stepper, System,
 };
 use hydrograd::scene::{Body, Drag, DragPart, Fluid, Joint, Motion, Plane, Scene, Shape};
 use hydrograd::{Settings, Simulator};
@@ -20,11 +20,11 @@ pub fn rungs() -> Vec<Rung> {
     }
     rungs![
         "dynamics::system::System::joint_forces_vjp" => joint_forces,
-        "dynamics::force::Evaluation::force_jvp" => force_jvp,
-        "dynamics::force::Evaluation::force_vjp" => force_vjp,
-        "dynamics::momentum::Evaluation::momentum_vjp" => momentum,
-        "dynamics::momentum::Evaluation::mass_vjp" => mass,
-        "dynamics::acceleration::Evaluation::inertial_force_vjp" => inertial_force,
+        "dynamics::force::Linearisation::force_jvp" => force_jvp,
+        "dynamics::force::Linearisation::force_vjp" => force_vjp,
+        "dynamics::momentum::Linearisation::momentum_vjp" => momentum,
+        "dynamics::momentum::Linearisation::mass_vjp" => mass,
+        "dynamics::acceleration::Linearisation::inertial_force_vjp" => inertial_force,
         "dynamics::integrator::readout::Stepper::velocity_vjp" => velocity,
         "dynamics::integrator::readout::Stepper::conserved_vjp" => conserved,
         "dynamics::integrator::Stepper::released_momentum_vjp" => released,
@@ -173,8 +173,8 @@ fn stepper(parameters: &Parameters, integrator: Integrator) -> Stepper<'_> {
     }
 }
 
-fn evaluate<'a>(parameters: &'a Parameters, q: &DVector<f64>) -> Evaluation<'a> {
-    system().evaluate(parameters, q, true, true).unwrap()
+fn evaluate<'a>(parameters: &'a Parameters, q: &DVector<f64>) -> Linearisation<'a> {
+    system().linearise(parameters, q).unwrap()
 }
 
 /// The parameters in groups of like units: first entry, stride, name, scale of a step.

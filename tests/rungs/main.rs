@@ -57,13 +57,22 @@ const ON_DEVICE: &[(&str, &str)] = &[
     ("gpu::coulomb_jvp::coulomb_jvp", "coulomb_jvp"),
     ("gpu::coulomb_vjp::coulomb_vjp", "coulomb_vjp"),
     ("gpu::coulomb_hvp::coulomb_hvp", "coulomb_hvp"),
-    ("gpu::reduced::record::GpuRecord::gradient", "coulomb_vjp"),
     (
-        "gpu::reduced::record::GpuRecord::gradient_along",
+        "gpu::reduced::linearised::GpuLinearised::gradient",
         "coulomb_vjp",
     ),
-    ("gpu::reduced::record::GpuRecord::vjp", "coulomb_vjp"),
-    ("gpu::reduced::record::GpuRecord::hvp", "coulomb_hvp"),
+    (
+        "gpu::reduced::linearised::GpuLinearised::gradient_along",
+        "coulomb_vjp",
+    ),
+    (
+        "gpu::reduced::linearised::GpuLinearised::vjp",
+        "coulomb_vjp",
+    ),
+    (
+        "gpu::reduced::linearised::GpuLinearised::hvp",
+        "coulomb_hvp",
+    ),
 ];
 
 /// Helpers and declarations that are checked through a registered rung: (helper, rung).
@@ -91,27 +100,27 @@ const THROUGH: &[(&str, &str)] = &[
     ),
     (
         "dynamics::external::Evaluation::external_jvp",
-        "dynamics::force::Evaluation::force_jvp",
+        "dynamics::force::Linearisation::force_jvp",
     ),
     (
         "dynamics::external::Evaluation::external_vjp",
-        "dynamics::force::Evaluation::force_vjp",
+        "dynamics::force::Linearisation::force_vjp",
     ),
     (
         "dynamics::force::rigid_parameters_vjp",
-        "dynamics::momentum::Evaluation::momentum_vjp",
+        "dynamics::momentum::Linearisation::momentum_vjp",
     ),
     (
         "dynamics::force::Evaluation::frame_velocity_vjp",
         "dynamics::integrator::readout::Stepper::conserved_vjp",
     ),
     (
-        "dynamics::momentum::Evaluation::bilinear_vjp",
-        "dynamics::momentum::Evaluation::momentum_vjp",
+        "dynamics::momentum::Linearisation::bilinear_vjp",
+        "dynamics::momentum::Linearisation::momentum_vjp",
     ),
     (
-        "dynamics::acceleration::Evaluation::fluid_inertial_vjp",
-        "dynamics::acceleration::Evaluation::inertial_force_vjp",
+        "dynamics::acceleration::Linearisation::fluid_inertial_vjp",
+        "dynamics::acceleration::Linearisation::inertial_force_vjp",
     ),
     // Pieces of the integrators.
     (
@@ -150,20 +159,11 @@ const THROUGH: &[(&str, &str)] = &[
     ),
 ];
 
-/// Rungs that a fidelity with values alone must have and doesn't offer: zeros or an error, held by
-/// `tests/panel_coupled.rs`.
-const VALUES_ONLY: &[&str] = &[
-    "coupling::panel::record::PanelRecord::gradient",
-    "coupling::panel::record::PanelRecord::gradient_along",
-    "coupling::panel::record::PanelRecord::vjp",
-    "coupling::panel::record::PanelRecord::hvp",
-];
-
 /// What hands over a derivative that its caller gave.
 const PASSED_ON: &[&str] = &["optimize::descent::Shared::gradient"];
 
-const FULL_VJP: &str = "coupling::full::record::FullRecord::vjp";
-const FULL_HVP: &str = "coupling::full::record::FullRecord::hvp";
+const FULL_VJP: &str = "coupling::full::linearised::FullLinearised::vjp";
+const FULL_HVP: &str = "coupling::full::linearised::FullLinearised::hvp";
 
 #[test]
 fn every_rung_in_the_source_is_registered() {
@@ -174,7 +174,6 @@ fn every_rung_in_the_source_is_registered() {
     let through = THROUGH.iter().map(|(helper, _)| *helper);
     let helpers: BTreeSet<&str> = through
         .chain(ON_DEVICE.iter().map(|(rung, _)| *rung))
-        .chain(VALUES_ONLY.iter().copied())
         .chain(PASSED_ON.iter().copied())
         .collect();
     let missing: Vec<_> = found

@@ -6,7 +6,7 @@ use hydrograd::Error;
 use hydrograd::adjoint::lie::{Mat3, Mat6, Pose, Vec3, Vec6, exp_matrix, skew};
 use hydrograd::boundary::{BodyBoundary, Method, RowScaling, Settings};
 use hydrograd::coupling::full::{Full, MfsBody, Preconditioner, SolveSettings, Solver};
-use hydrograd::coupling::{Coupling, Direction, Exclusions, Isolated, Report};
+use hydrograd::coupling::{Coupling, Direction, Exclusions, Isolated, Linearise, Report};
 use hydrograd::scene::{Shape, Wall};
 use hydrograd::shape;
 use nalgebra::{DMatrix, DVector};
@@ -68,9 +68,7 @@ fn tight() -> SolveSettings {
 /// M̄ of all bodies in their frames, density 1.
 fn matrix(coupling: &dyn Coupling, poses: &[Pose]) -> (DMatrix<f64>, Report) {
     let n = 6 * poses.len();
-    let record = coupling
-        .evaluate(poses, &DMatrix::identity(n, n), false)
-        .unwrap();
+    let record = coupling.evaluate(poses, &DMatrix::identity(n, n)).unwrap();
     (record.momenta().clone(), record.report().clone())
 }
 
@@ -83,7 +81,7 @@ fn translations(coupling: &dyn Coupling, poses: &[Pose]) -> DMatrix<f64> {
             .view_mut((6 * b, 3 * b), (3, 3))
             .copy_from(&pose.rotation.transpose());
     }
-    let record = coupling.evaluate(poses, &basis, false).unwrap();
+    let record = coupling.evaluate(poses, &basis).unwrap();
     basis.tr_mul(record.momenta())
 }
 
@@ -340,7 +338,7 @@ fn forces_between_spheres_that_approach() {
                     let speed = poses[b].rotation.transpose() * Vec3::z() * *sign;
                     basis.view_mut((6 * b, 0), (3, 1)).copy_from(&speed);
                 }
-                let record = coupling.evaluate(&poses, &basis, true).unwrap();
+                let record = coupling.linearise(&poses, &basis).unwrap();
                 let one = DVector::from_element(1, 1.0);
                 let force = 0.5 * record.gradient(&one, &one).unwrap()[1][2];
                 100.0 * (force / exact - 1.0)
@@ -416,7 +414,7 @@ fn explicit_images(body: &Arc<MfsBody>, pose: &Pose, mirrors: &[[f64; 3]]) -> DM
     }
     let bodies = vec![body.clone(); n];
     let coupling = full(&bodies, &[], tight());
-    let record = coupling.evaluate(&poses, &basis, false).unwrap();
+    let record = coupling.evaluate(&poses, &basis).unwrap();
     basis.tr_mul(record.momenta()) / n as f64
 }
 
@@ -817,7 +815,7 @@ fn threads_do_not_change_a_bit() {
             .build()
             .unwrap();
         pool.install(|| {
-            let record = coupling.evaluate(&uneven_poses(), &basis, true).unwrap();
+            let record = coupling.linearise(&uneven_poses(), &basis).unwrap();
             let tangent = record
                 .hvp(Direction::Basis(&x), Direction::Twist(&x), &z)
                 .unwrap();
@@ -846,9 +844,9 @@ fn threads_do_not_change_a_bit() {
 fn a_static_body_is_boundary_only() {
     let coupling = full(&uneven(320), &[], tight());
     let basis = DMatrix::identity(12, 12);
-    let all = coupling.evaluate(&uneven_poses(), &basis, true).unwrap();
+    let all = coupling.linearise(&uneven_poses(), &basis).unwrap();
     let moving = basis.columns(0, 6).into_owned();
-    let part = coupling.evaluate(&uneven_poses(), &moving, true).unwrap();
+    let part = coupling.linearise(&uneven_poses(), &moving).unwrap();
     let block = |m: &DMatrix<f64>| m.view((0, 0), (6, 6)).into_owned();
     let (reference, m) = (block(all.momenta()), block(part.momenta()));
     let error = scaled_error(&m, &reference);
@@ -883,11 +881,11 @@ fn nothing_that_moves_costs_nothing() {
             };
             let coupling = full(&uneven(80), &[], settings);
             let none = DMatrix::zeros(12, 0);
-            let record = coupling.evaluate(&uneven_poses(), &none, true).unwrap();
+            let record = coupling.linearise(&uneven_poses(), &none).unwrap();
             assert_eq!(record.momenta().shape(), (12, 0));
             assert_eq!(record.report(), &Report::default());
             let zero = DMatrix::zeros(12, 2);
-            let record = coupling.evaluate(&uneven_poses(), &zero, true).unwrap();
+            let record = coupling.linearise(&uneven_poses(), &zero).unwrap();
             assert_eq!(record.momenta(), &zero);
             assert_eq!(record.report(), &Report::default());
         }
@@ -904,7 +902,7 @@ fn a_solve_that_misses_its_tolerance_says_so() {
     };
     let message = {
         let coupling = full(&bodies, &[], settings);
-        let error = coupling.evaluate(&uneven_poses(), &basis, false).err();
+        let error = coupling.evaluate(&uneven_poses(), &basis).err();
         let error = error.expect("three iterations can't do");
         let Error::Solver {
             iterations,
@@ -926,7 +924,7 @@ fn a_solve_that_misses_its_tolerance_says_so() {
     let mut poses = uneven_poses();
     poses[1].translation.x = f64::NAN;
     let coupling = full(&bodies, &[], tight());
-    let result = coupling.evaluate(&poses, &basis, false);
+    let result = coupling.evaluate(&poses, &basis);
     assert!(matches!(result.err(), Some(Error::Solver { .. })));
 }
 

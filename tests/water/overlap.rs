@@ -248,7 +248,7 @@ fn isolated_bodies_may_overlap_and_are_told_of_it_unless_declared() {
 /// M̄ of all bodies in their frames, density 1.
 fn matrix(coupling: &dyn Coupling, poses: &[Pose]) -> DMatrix<f64> {
     let n = 6 * poses.len();
-    let record = coupling.evaluate(poses, &DMatrix::identity(n, n), false);
+    let record = coupling.evaluate(poses, &DMatrix::identity(n, n));
     record.unwrap().momenta().clone()
 }
 

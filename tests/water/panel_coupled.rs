@@ -1,13 +1,15 @@
 //! Bodies and walls in one panel system, against exact values and against itself.
 
 use hydrograd::adjoint::lie::{Mat3, Pose, Vec3, exp_matrix};
+use hydrograd::boundary::OneBody;
 use hydrograd::boundary::PanelBoundary;
 use hydrograd::boundary::panel::MOST_FACES;
 use hydrograd::coupling::panel::{SolveSettings, Solver};
-use hydrograd::coupling::{Coupling, Direction, PanelCoupled};
-use hydrograd::scene::{Shape, Wall, WallSurface};
+use hydrograd::coupling::{Coupling, PanelCoupled};
+use hydrograd::scene::{Scene, Shape, Wall, WallSurface};
+use hydrograd::simulate::{Controls, Fidelity, Settings, Simulator};
 use hydrograd::{Error, Result};
-use nalgebra::{DMatrix, DVector};
+use nalgebra::DMatrix;
 use std::path::Path;
 use std::sync::Arc;
 
@@ -52,7 +54,7 @@ fn momenta(
     };
     let c = PanelCoupled::new(bodies.to_vec(), walls, settings)?;
     let n = 6 * bodies.len();
-    let record = c.evaluate(poses, &DMatrix::identity(n, n), false)?;
+    let record = c.evaluate(poses, &DMatrix::identity(n, n))?;
     assert_eq!(record.report().iterations == 0, solver == Solver::Lu);
     assert!(record.report().asymmetry < 5e-3, "{:?}", record.report());
     let m = record.momenta().clone();
@@ -267,9 +269,7 @@ fn alone_or_moved_together_nothing_changes() {
     // No iteration is needed for one body; its own value comes back.
     let settings = SolveSettings::default();
     let c = PanelCoupled::new(vec![coin.clone()], &[], settings).unwrap();
-    let m = c
-        .evaluate(&[pose], &DMatrix::identity(6, 6), false)
-        .unwrap();
+    let m = c.evaluate(&[pose], &DMatrix::identity(6, 6)).unwrap();
     let own = DMatrix::from_column_slice(6, 6, coin.added_mass.as_slice());
     assert!((m.momenta() - &own).abs().max() < 1e-12);
     assert!((alone.unwrap() - own).abs().max() < 1e-12);
@@ -277,9 +277,7 @@ fn alone_or_moved_together_nothing_changes() {
     let pair = vec![coin.clone(), coin];
     let c = PanelCoupled::new(pair.clone(), &[], settings).unwrap();
     let poses = [pose, pose.compose(&at(0.9))];
-    let full = c
-        .evaluate(&poses, &DMatrix::identity(12, 12), false)
-        .unwrap();
+    let full = c.evaluate(&poses, &DMatrix::identity(12, 12)).unwrap();
     let basis = DMatrix::from_fn(12, 2, |i, k| {
         if i < 6 {
             (1.0 + (i + 7 * k) as f64).sin()
@@ -287,7 +285,7 @@ fn alone_or_moved_together_nothing_changes() {
             0.0
         }
     });
-    let few = c.evaluate(&poses, &basis, false).unwrap();
+    let few = c.evaluate(&poses, &basis).unwrap();
     let error = (few.momenta() - full.momenta() * &basis).abs().max();
     assert!(error < 1e-8, "{error:e}");
     let turn = Pose::new(
@@ -295,9 +293,9 @@ fn alone_or_moved_together_nothing_changes() {
         Vec3::new(30.0, 1.0, -7.0),
     );
     let moved = poses.map(|p| turn.compose(&p));
-    let there = c.evaluate(&moved, &basis, false).unwrap();
+    let there = c.evaluate(&moved, &basis).unwrap();
     assert!((there.momenta() - few.momenta()).abs().max() < 1e-9);
-    let nothing = c.evaluate(&poses, &DMatrix::zeros(12, 0), false).unwrap();
+    let nothing = c.evaluate(&poses, &DMatrix::zeros(12, 0)).unwrap();
     assert_eq!(nothing.momenta().shape(), (12, 0));
 }
 
@@ -307,24 +305,32 @@ fn values_only() {
     let c = PanelCoupled::new(vec![ball; 2], &[], SolveSettings::default()).unwrap();
     let poses = [at(0.0), at(2.5)];
     let basis = DMatrix::identity(12, 12);
-    let refused = |error: Error| {
-        assert!(matches!(error, Error::Unsupported { .. }), "{error}");
-        assert!(error.to_string().contains("full"), "{error}");
-    };
-    refused(c.evaluate(&poses, &basis, true).err().unwrap());
-    let r = c.evaluate(&poses, &basis, false).unwrap();
-    let x = DVector::from_element(12, 1.0);
-    refused(
-        r.vjp(Direction::Basis(&x), Direction::Twist(&x))
-            .unwrap_err(),
+    assert!(c.evaluate(&poses, &basis).is_ok());
+    assert!(c.differentiable().is_none());
+    // A system of it has values, and the first that needs more says why there is none.
+    let scene = Scene::from_toml(
+        "name = \"pair\"\nsteps = 1\ntime_step = 0.1\n\n\
+         [[body]]\nname = \"a\"\nshape = { type = \"sphere\", radius = 1.0 }\ndensity = 1000.0\n\n\
+         [[body]]\nname = \"b\"\nshape = { type = \"sphere\", radius = 1.0 }\ndensity = 1000.0\nposition = [0.0, 0.0, 3.0]\n",
+        "",
+    )
+    .unwrap();
+    let settings = Settings::default().fidelity(Fidelity::Full);
+    let settings = settings.one_body(OneBody::Panel).faces(80);
+    let simulator = Simulator::new(&scene, settings).unwrap();
+    assert!(simulator.added_mass().is_ok());
+    let (system, q) = (simulator.system(), simulator.start().0);
+    assert!(system.evaluate(simulator.parameters(), q).is_ok());
+    let error = system.linearise(simulator.parameters(), q).err().unwrap();
+    assert!(matches!(error, Error::Unsupported { .. }), "{error}");
+    let text = error.to_string();
+    assert!(
+        text.contains("panel method") && text.contains("full"),
+        "{text}"
     );
-    let z = vec![nalgebra::Vector6::zeros(); 2];
-    refused(
-        r.hvp(Direction::Basis(&x), Direction::Basis(&x), &z)
-            .unwrap_err(),
-    );
-    assert!(r.gradient(&x, &x).unwrap().iter().all(|w| w.norm() == 0.0));
-    assert_eq!(r.gradient_along(&x, &z).unwrap(), DVector::zeros(12));
+    let steps = simulator.rollout(&Controls::zeros(&simulator, 1)).err();
+    let text = steps.unwrap().to_string();
+    assert!(text.contains("panel method"), "{text}");
 }
 
 #[test]
@@ -379,10 +385,10 @@ fn overlaps_and_impossible_settings_are_errors() {
         ..SolveSettings::default()
     };
     let c = PanelCoupled::new(vec![ball; 2], &[], settings).unwrap();
-    let error = c.evaluate(&[at(0.0), at(2.1)], &DMatrix::identity(12, 12), false);
+    let error = c.evaluate(&[at(0.0), at(2.1)], &DMatrix::identity(12, 12));
     assert!(matches!(error, Err(Error::Solver { iterations: 1, .. })));
     // Poses for fewer bodies.
-    let error = c.evaluate(&[at(0.0)], &DMatrix::identity(12, 12), false);
+    let error = c.evaluate(&[at(0.0)], &DMatrix::identity(12, 12));
     assert!(matches!(error, Err(Error::Input { .. })));
 }
 

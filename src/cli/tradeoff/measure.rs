@@ -8,7 +8,7 @@ use super::configurations::Configuration;
 use super::reference::Reference;
 use super::report::Row;
 use crate::cli::options::name;
-use crate::dynamics::Drive;
+use crate::dynamics::{Drive, Evaluation};
 use crate::scene::Scene;
 use crate::simulate::{Controls, Fidelity, Observation, Simulator, gradcheck};
 use crate::{Error, Result};
@@ -40,7 +40,9 @@ impl Start {
     /// # Errors
     /// Whatever the coupling reports.
     pub fn values(simulator: &Simulator) -> Result<Self> {
-        Self::new(simulator, false)
+        let e = (simulator.system()).evaluate(simulator.parameters(), simulator.start().0)?;
+        let force = DVector::zeros(free(simulator).len());
+        Self::new(simulator, &e, force)
     }
 
     /// With the forces on it: the scene's own, and those that its velocity makes.
@@ -48,30 +50,23 @@ impl Start {
     /// # Errors
     /// Whatever the coupling reports, and a method without derivatives.
     pub fn with_forces(simulator: &Simulator) -> Result<Self> {
-        Self::new(simulator, true)
+        let (q, v) = simulator.start();
+        let e = (simulator.system()).linearise(simulator.parameters(), q)?;
+        let control = action(simulator).0;
+        let given = given_accelerations(simulator);
+        let force = e.inertial_force(v, &control)? - &e.mass_matrix * given;
+        Self::new(simulator, &e, force.select_rows(&free(simulator)))
     }
 
-    fn new(simulator: &Simulator, forces: bool) -> Result<Self> {
-        let (system, parameters) = (simulator.system(), simulator.parameters());
-        let (q, v) = simulator.start();
-        let mut dry = parameters.clone();
+    fn new(simulator: &Simulator, e: &Evaluation, force: DVector<f64>) -> Result<Self> {
+        let mut dry = simulator.parameters().clone();
         dry.density = 0.0;
-        let rigid = system.evaluate(&dry, q, false, false)?.mass_matrix;
-        let submerged = system.evaluate(parameters, q, forces, false)?;
+        let rigid = (simulator.system()).evaluate(&dry, simulator.start().0)?;
         let free = free(simulator);
         let block = |m: &DMatrix<f64>| m.select_rows(&free).select_columns(&free);
-        let force = match forces {
-            true => {
-                let control = action(simulator).0;
-                let given = given_accelerations(simulator);
-                let all = submerged.inertial_force(v, &control)? - &submerged.mass_matrix * given;
-                all.select_rows(&free)
-            }
-            false => DVector::zeros(free.len()),
-        };
         Ok(Self {
-            added_mass: block(&(&submerged.mass_matrix - rigid)),
-            mass: block(&submerged.mass_matrix),
+            added_mass: block(&(&e.mass_matrix - rigid.mass_matrix)),
+            mass: block(&e.mass_matrix),
             force,
         })
     }

@@ -6,18 +6,17 @@
 //! flux through each quarter and the potential at its middle. What it differs by from the energy that is
 //! reported is what normal velocities left between the collocation points are worth.
 
-use super::record::FullRecord;
+use super::linearised::Solved;
 use crate::Result;
 use crate::adjoint::kernel::{Points, Sources, Triangles, Write, flux_fill, potential_fill};
 use crate::adjoint::lie::{Pose, Vec3, Vec6, six};
-use crate::coupling::Record;
 use crate::solver::{Columns, product};
 use nalgebra::DMatrix;
 
 /// Faces of one piece of work: the matrices of their quarters are kept for so many.
 const FACES: usize = 256;
 
-impl FullRecord<'_> {
+impl Solved<'_> {
     /// The energy of pairs of basis columns over the quarters of all faces, less that reported;
     /// k × k, symmetric.
     pub fn residual(&self, poses: &[Pose], basis: &DMatrix<f64>) -> Result<DMatrix<f64>> {
@@ -57,7 +56,7 @@ impl FullRecord<'_> {
                 energy += potential.tr_mul(&left);
             }
         }
-        let reported = basis.tr_mul(self.momenta());
+        let reported = basis.tr_mul(self.value.momenta());
         let difference = energy - reported;
         Ok(0.5 * (&difference + difference.transpose()))
     }

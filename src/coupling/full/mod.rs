@@ -30,8 +30,8 @@ mod body;
 mod check;
 mod cpu;
 mod flow;
+mod linearised;
 mod model;
-mod record;
 mod settings;
 
 pub use backend::{Backend, Reached, Response};
@@ -40,10 +40,11 @@ pub use cpu::Cpu;
 pub use model::Model;
 pub use settings::{Preconditioner, SolveSettings, Solver};
 
-use super::{Coupling, Exclusions, Record};
+use super::{Coupling, Exclusions, Linearise, Linearised, Momenta};
 use crate::Result;
 use crate::adjoint::lie::{Pose, Vec3};
 use crate::scene::Wall;
+use linearised::Solved;
 use nalgebra::{DMatrix, DVector};
 use std::sync::Arc;
 
@@ -91,6 +92,10 @@ impl Full {
 }
 
 impl Coupling for Full {
+    fn name(&self) -> &'static str {
+        "the fidelity full"
+    }
+
     fn bodies(&self) -> usize {
         self.model.bodies.len()
     }
@@ -99,20 +104,17 @@ impl Coupling for Full {
         self.model.columns()
     }
 
-    fn evaluate(
-        &self,
-        poses: &[Pose],
-        basis: &DMatrix<f64>,
-        derivative: bool,
-    ) -> Result<Box<dyn Record + '_>> {
-        Ok(Box::new(record::FullRecord::new(
-            self, poses, basis, derivative,
-        )?))
+    fn evaluate(&self, poses: &[Pose], basis: &DMatrix<f64>) -> Result<Momenta> {
+        Ok(Solved::new(self, poses, basis)?.value)
+    }
+
+    fn differentiable(&self) -> Option<&dyn Linearise> {
+        Some(self)
     }
 
     fn residual(&self, poses: &[Pose], basis: &DMatrix<f64>) -> Result<Option<DMatrix<f64>>> {
-        let record = record::FullRecord::new(self, poses, basis, false)?;
-        Ok(Some(record.residual(poses, basis)?))
+        let solved = Solved::new(self, poses, basis)?;
+        Ok(Some(solved.residual(poses, basis)?))
     }
 
     fn velocity(
@@ -122,5 +124,12 @@ impl Coupling for Full {
         points: &[Vec3],
     ) -> Result<Vec<Vec3>> {
         flow::velocity(self, poses, twists, points)
+    }
+}
+
+impl Linearise for Full {
+    fn linearise(&self, poses: &[Pose], basis: &DMatrix<f64>) -> Result<Box<dyn Linearised + '_>> {
+        let solved = Solved::new(self, poses, basis)?;
+        Ok(Box::new(solved.linearise()?))
     }
 }

@@ -15,18 +15,18 @@
 //! alone are offered: no derivatives. Bodies and images that come closer than about half an edge
 //! length lose accuracy.
 
-mod record;
 mod system;
+mod value;
 
 use super::Exclusions;
 use super::image::Image;
 use super::settings::check_limits;
-use super::{Coupling, Record};
+use super::{Coupling, Momenta};
+use crate::Result;
 use crate::adjoint::lie::{Pose, Vec3};
 use crate::boundary::PanelBoundary;
 use crate::boundary::panel::check_size;
 use crate::scene::Wall;
-use crate::{Error, Result};
 use nalgebra::DMatrix;
 use serde::{Deserialize, Serialize};
 use std::ops::Range;
@@ -129,6 +129,10 @@ impl PanelCoupled {
 }
 
 impl Coupling for PanelCoupled {
+    fn name(&self) -> &'static str {
+        "the coupled panel method"
+    }
+
     fn bodies(&self) -> usize {
         self.bodies.len()
     }
@@ -138,30 +142,9 @@ impl Coupling for PanelCoupled {
     }
 
     /// # Errors
-    /// Derivatives asked for ([`Error::Unsupported`]), a solve that misses its tolerance, bodies
-    /// that overlap or reach through a wall. Overlap is noticed where a panel's centroid is inside
-    /// another body.
-    fn evaluate(
-        &self,
-        poses: &[Pose],
-        basis: &DMatrix<f64>,
-        derivative: bool,
-    ) -> Result<Box<dyn Record + '_>> {
-        if derivative {
-            return Err(no_derivative("the pose gradient"));
-        }
-        Ok(Box::new(record::PanelRecord::new(self, poses, basis)?))
-    }
-}
-
-/// The panel method solutions values only.
-fn no_derivative(what: &str) -> Error {
-    Error::Unsupported {
-        what: format!("{what} of the coupled panel method"),
-        why: "it has values only, as a reference".into(),
-        instead:
-            "use the coupled system of fundamental solutions (fidelity `full`), which has all \
-                  derivatives"
-                .into(),
+    /// A solve that misses its tolerance, bodies that overlap or reach through a wall. Overlap is
+    /// noticed where a panel's centroid is inside another body.
+    fn evaluate(&self, poses: &[Pose], basis: &DMatrix<f64>) -> Result<Momenta> {
+        value::momenta(self, poses, basis)
     }
 }

@@ -12,7 +12,7 @@
 //! δG being what pairs that fade out leave out.
 
 use super::Reduced;
-use super::record::{FLUX, ReducedRecord};
+use super::linearised::{FLUX, ReducedLinearised};
 use crate::Result;
 use crate::adjoint::kernel::{Points, Sources, Write, potential_fill};
 use crate::adjoint::lie::{Pose, Vec3};
@@ -33,7 +33,7 @@ impl Reduced {
         basis: &DMatrix<f64>,
         solutions: &[Arc<dyn Response>],
     ) -> Result<DMatrix<f64>> {
-        let record = ReducedRecord::new(self, poses, basis, false)?;
+        let solved = ReducedLinearised::new(self, poses, basis)?;
         let k = basis.ncols();
         let mut out = DMatrix::zeros(k, k);
         for (b, solution) in solutions.iter().enumerate() {
@@ -60,7 +60,7 @@ impl Reduced {
                 continue;
             }
             let charges = DMatrix::from_fn(rows.len(), k, |i, c| {
-                rows[i].1 * record.alpha[(rows[i].0, c)]
+                rows[i].1 * solved.alpha[(rows[i].0, c)]
             });
             let field = inverse_distances(&places, &parts.points);
             let seen = parts.modes.tr_mul(&field.tr_mul(&charges));
@@ -71,7 +71,7 @@ impl Reduced {
             let answered = DMatrix::from_fn(places.len(), 6, |i, j| answered[(i, j)]);
             let radiated = charges.tr_mul(&((answered - &field * &parts.strengths) * twists));
             let faint = DMatrix::from_fn(rows.len(), k, |i, c| faded[i] * charges[(i, c)]);
-            let alpha = record.alpha.rows(self.points[b].start, parts.points.len());
+            let alpha = solved.alpha.rows(self.points[b].start, parts.points.len());
             let missing = alpha.tr_mul(&field.tr_mul(&faint));
             out += FLUX * (scattered + &radiated + radiated.transpose() + missing);
         }

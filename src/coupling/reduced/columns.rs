@@ -1,7 +1,7 @@
 //! First derivatives of the energy of one direction with every column of the basis.
 
+use super::linearised::{FLUX, ReducedLinearised, vector};
 use super::link::Placed;
-use super::record::{FLUX, ReducedRecord, vector};
 use crate::adjoint::kernel::potential_vjp;
 use crate::adjoint::lie::{Vec3, Vec6, six};
 use crate::coupling::pair::wrench;
@@ -14,7 +14,7 @@ pub(super) struct Fields {
     sums: Vec<f64>,
 }
 
-impl ReducedRecord<'_> {
+impl ReducedLinearised<'_> {
     fn fields(&self) -> &[Fields] {
         self.fields.get_or_init(|| {
             let columns = self.alpha.ncols();

@@ -23,8 +23,8 @@ mod columns;
 pub mod compress;
 mod cutoff;
 mod factor;
+mod linearised;
 mod link;
-mod record;
 mod resolved;
 mod second;
 
@@ -33,10 +33,11 @@ pub use cutoff::Cutoff;
 pub use link::Link;
 
 use super::image::Image;
-use super::{Coupling, Exclusions, Record};
+use super::{Coupling, Exclusions, Linearise, Linearised, Momenta};
 use crate::Result;
 use crate::adjoint::lie::Pose;
 use crate::scene::Wall;
+use linearised::ReducedLinearised;
 use nalgebra::DMatrix;
 use rayon::prelude::*;
 use std::ops::Range;
@@ -142,6 +143,10 @@ impl Reduced {
 }
 
 impl Coupling for Reduced {
+    fn name(&self) -> &'static str {
+        "the fidelity reduced"
+    }
+
     fn bodies(&self) -> usize {
         self.bodies.len()
     }
@@ -150,14 +155,17 @@ impl Coupling for Reduced {
         self.mode_count()
     }
 
-    fn evaluate(
-        &self,
-        poses: &[Pose],
-        basis: &DMatrix<f64>,
-        derivative: bool,
-    ) -> Result<Box<dyn Record + '_>> {
-        Ok(Box::new(record::ReducedRecord::new(
-            self, poses, basis, derivative,
-        )?))
+    fn evaluate(&self, poses: &[Pose], basis: &DMatrix<f64>) -> Result<Momenta> {
+        Ok(ReducedLinearised::new(self, poses, basis)?.value())
+    }
+
+    fn differentiable(&self) -> Option<&dyn Linearise> {
+        Some(self)
+    }
+}
+
+impl Linearise for Reduced {
+    fn linearise(&self, poses: &[Pose], basis: &DMatrix<f64>) -> Result<Box<dyn Linearised + '_>> {
+        Ok(Box::new(ReducedLinearised::new(self, poses, basis)?))
     }
 }

@@ -1,7 +1,7 @@
 //! Second derivatives along one displacement: the tangent of the first.
 
+use super::linearised::{FLUX, ReducedLinearised, Response, interleave, vector};
 use super::link::Placed;
-use super::record::{FLUX, ReducedRecord, Response, interleave, vector};
 use crate::adjoint::kernel::{potential_hvp, potential_jvp, potential_vjp};
 use crate::adjoint::lie::{Vec3, Vec6, angular, linear, six};
 use crate::coupling::{Direction, Tangent};
@@ -20,7 +20,7 @@ pub(super) struct Moved {
     rate: f64,
 }
 
-impl ReducedRecord<'_> {
+impl ReducedLinearised<'_> {
     fn moved(&self, placed: &Placed, z: &[Vec6]) -> Moved {
         let pose = &self.poses[placed.link.target];
         let relative = placed.pair.image.twist(&z[placed.link.source]) - z[placed.link.target];

@@ -11,7 +11,7 @@
 //! A. Castro et al., "An Unconstrained Convex Formulation of Compliant Contact", 2022.
 
 use super::{Split, StepBar};
-use crate::dynamics::{Dual, Evaluation};
+use crate::dynamics::{Dual, Linearisation};
 use crate::{Error, Result};
 use nalgebra::{Cholesky, DMatrix, DVector, Dyn};
 
@@ -34,7 +34,12 @@ struct Trial {
 }
 
 /// The Hessian M + Δt Jᵀ G J on the free rows, factored.
-fn hessian(e: &Evaluation, split: &Split, v: &DVector<f64>, dt: f64) -> Result<Cholesky<f64, Dyn>> {
+fn hessian(
+    e: &Linearisation,
+    split: &Split,
+    v: &DVector<f64>,
+    dt: f64,
+) -> Result<Cholesky<f64, Dyn>> {
     let m = &e.mass_matrix - dt * e.contact_jacobian(v);
     let m: DMatrix<f64> = 0.5 * (&m + m.transpose());
     split.block(&m).cholesky().ok_or_else(|| Error::Solver {
@@ -48,7 +53,7 @@ fn hessian(e: &Evaluation, split: &Split, v: &DVector<f64>, dt: f64) -> Result<C
 
 /// The velocity after contact, from the one before it; the same bits where nothing presses.
 pub(super) fn solve(
-    e: &Evaluation,
+    e: &Linearisation,
     split: &Split,
     before: &DVector<f64>,
     dt: f64,
@@ -137,7 +142,7 @@ fn search(now: Trial, step: &DVector<f64>, at: &dyn Fn(DVector<f64>) -> Trial) -
 
 /// Transpose of [`solve`]: from the cotangent of the velocity after contact to that of the one before; the rest is added to `bar`.
 pub(super) fn solve_vjp(
-    e: &Evaluation,
+    e: &Linearisation,
     split: &Split,
     before: &DVector<f64>,
     after: &DVector<f64>,
@@ -162,7 +167,7 @@ pub(super) fn solve_vjp(
 
 /// Velocity and frame momenta after contact, from those before it.
 pub(super) fn press(
-    e: &Evaluation,
+    e: &Linearisation,
     split: &Split,
     before: &DVector<f64>,
     hat: DVector<f64>,
@@ -180,7 +185,7 @@ pub(super) fn press(
 /// Transpose of [`press`]: from the cotangents of velocity and momenta after contact to that of the velocity before (that of the
 /// momenta stays what it is); the rest is added to `bar`.
 pub(super) fn press_vjp(
-    e: &Evaluation,
+    e: &Linearisation,
     split: &Split,
     [before, after]: [&DVector<f64>; 2],
     [after_bar, hat_bar]: [&DVector<f64>; 2],

@@ -13,7 +13,7 @@
 
 use super::{Input, Memo, Split, State, StateBar, StepBar, Stepped, Stepper, When, contact};
 use crate::adjoint::lie::angular;
-use crate::dynamics::Evaluation;
+use crate::dynamics::Linearisation;
 use crate::{Error, Result};
 use nalgebra::{DMatrix, DVector, Dyn, LU};
 
@@ -39,7 +39,7 @@ pub(super) struct Rule {
 
 /// Matrix of the stage on the free rows, from ∂f/∂v and the momentum p̂ + h f.
 fn stage_matrix(
-    e: &Evaluation,
+    e: &Linearisation,
     split: &Split,
     v: &DVector<f64>,
     rates: &DMatrix<f64>,
@@ -66,7 +66,7 @@ fn stage_matrix(
 
 /// Solves a stage on the free rows, from the guess `v`.
 pub(super) fn solve_stage(
-    e: &Evaluation,
+    e: &Linearisation,
     split: &Split,
     hat: &DVector<f64>,
     control: &DVector<f64>,
@@ -175,7 +175,7 @@ fn rule(s: &Stepper) -> Rule {
 
 pub(super) fn step(
     s: &Stepper,
-    e: &Evaluation,
+    e: &Linearisation,
     state: &State,
     v: &DVector<f64>,
     input: &Input,
@@ -209,7 +209,7 @@ pub(super) fn advance_vjp(
 
 pub(super) fn step_vjp(
     s: &Stepper,
-    e: &Evaluation,
+    e: &Linearisation,
     state: &State,
     v: &DVector<f64>,
     input: &Input,
@@ -267,7 +267,7 @@ impl AdjointStage {
     /// # Errors
     /// A coupling that fails.
     pub fn new(
-        e: &Evaluation,
+        e: &Linearisation,
         split: &Split,
         v: &DVector<f64>,
         reached: &DVector<f64>,

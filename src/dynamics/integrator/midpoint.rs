@@ -12,7 +12,7 @@
 
 use super::euler::{AdjointStage, Rule, advance, advance_vjp, next_state, solve_stage, stage_name};
 use super::{Input, Memo, Split, State, StateBar, StepBar, Stepped, Stepper, When, contact};
-use crate::dynamics::Evaluation;
+use crate::dynamics::Linearisation;
 use crate::{Error, Result};
 use nalgebra::DVector;
 
@@ -28,24 +28,19 @@ fn rule(s: &Stepper) -> Rule {
     }
 }
 
-fn middle<'a>(
-    s: &'a Stepper,
-    state: &State,
-    v: &DVector<f64>,
-    reverse: bool,
-) -> Result<Evaluation<'a>> {
+fn middle<'a>(s: &Stepper<'a>, state: &State, v: &DVector<f64>) -> Result<Linearisation<'a>> {
     let mut q = s.system.tree.integrate(&state.q, &(0.5 * s.dt * v));
     s.place_motions(&mut q, s.time(state) + 0.5 * s.dt);
-    s.system.evaluate_apart(s.parameters, &q, true, reverse)
+    s.system.linearise_apart(s.parameters, &q)
 }
 
 /// Relative change of the velocity that says nothing: rounding, or what the coupled solve leaves open.
-fn noise(e: &Evaluation) -> f64 {
+fn noise(e: &Linearisation) -> f64 {
     (10.0 * e.report().residual).max(1e-11)
 }
 
 /// Relative change between two velocities, each joint coordinate weighed by its inertia.
-fn change(e: &Evaluation, a: &DVector<f64>, b: &DVector<f64>) -> f64 {
+fn change(e: &Linearisation, a: &DVector<f64>, b: &DVector<f64>) -> f64 {
     let weight = e.mass_matrix.diagonal().map(|m| m.max(0.0).sqrt());
     let size = b.component_mul(&weight).norm();
     let step = (a - b).component_mul(&weight).norm();
@@ -54,7 +49,7 @@ fn change(e: &Evaluation, a: &DVector<f64>, b: &DVector<f64>) -> f64 {
 
 pub(super) fn step(
     s: &Stepper,
-    e: &Evaluation,
+    e: &Linearisation,
     state: &State,
     v: &DVector<f64>,
     input: &Input,
@@ -64,7 +59,7 @@ pub(super) fn step(
     let mut stage = &split.driven + split.put(&split.take(v));
     let mut previous = f64::INFINITY;
     for _ in 0..ITERATIONS {
-        let m = middle(s, state, &stage, false)?;
+        let m = middle(s, state, &stage)?;
         let next = solve_stage(&m, &split, &p, &input.control, rule(s), &stage, &|| {
             stage_name(s, state)
         })?;
@@ -96,7 +91,7 @@ pub(super) fn step(
 
 /// Gradient over q_m of `−wᵀ{M v + p_rest − Xᵀ(p̂ + h f)} + zᵀ Δt f` and the rest of the cotangents; z_total = Δt z + h X w.
 fn configuration_vjp(
-    m: &Evaluation,
+    m: &Linearisation,
     split: &Split,
     stage: &DVector<f64>,
     control: &DVector<f64>,
@@ -114,7 +109,7 @@ fn configuration_vjp(
 
 pub(super) fn step_vjp(
     s: &Stepper,
-    e: &Evaluation,
+    e: &Linearisation,
     state: &State,
     v: &DVector<f64>,
     input: &Input,
@@ -130,7 +125,7 @@ pub(super) fn step_vjp(
             .unwrap_or_else(|| contact::kept(v, v)),
     };
     let (stage, after) = contact::parted(&both, v.len());
-    let m = middle(s, state, &stage, true)?;
+    let m = middle(s, state, &stage)?;
     let h = 0.5 * s.dt;
     let reached = &p + h * m.force(&stage, &input.control)?;
     let mut bar = StepBar::zeros(e);

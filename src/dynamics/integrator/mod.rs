@@ -20,7 +20,7 @@ mod readout;
 mod runge_kutta;
 mod velocity_euler;
 
-use super::{Drive, Evaluation, ForceCotangents, Parameters, System};
+use super::{Drive, Evaluation, ForceCotangents, Linearisation, Parameters, System};
 use crate::Result;
 use nalgebra::{DMatrix, DVector};
 use serde::{Deserialize, Serialize};
@@ -181,7 +181,7 @@ pub(super) enum When {
     Over(f64, f64),
 }
 
-impl Stepper<'_> {
+impl<'a> Stepper<'a> {
     /// Time of a state, s.
     pub fn time(&self, state: &State) -> f64 {
         state.step as f64 * self.dt
@@ -229,12 +229,20 @@ impl Stepper<'_> {
         }
     }
 
-    /// Evaluation at a state's configuration, shared by its readout and its step.
+    /// [`System::evaluate`] at a state's configuration: what its readout needs.
     ///
     /// # Errors
-    /// Whatever the coupling reports.
-    pub fn evaluate(&self, q: &DVector<f64>, reverse: bool) -> Result<Evaluation<'_>> {
-        self.system.evaluate(self.parameters, q, true, reverse)
+    /// As there.
+    pub fn evaluate(&self, q: &DVector<f64>) -> Result<Evaluation<'a>> {
+        self.system.evaluate(self.parameters, q)
+    }
+
+    /// [`System::linearise`] at a state's configuration, shared by its readout, its step and their transposes.
+    ///
+    /// # Errors
+    /// As there.
+    pub fn linearise(&self, q: &DVector<f64>) -> Result<Linearisation<'a>> {
+        self.system.linearise(self.parameters, q)
     }
 
     /// One step from `state`, at which `e` was evaluated and where the velocity is `v`
@@ -244,7 +252,7 @@ impl Stepper<'_> {
     /// A solve that misses its tolerance or a step too long for its implicit stage.
     pub fn step(
         &self,
-        e: &Evaluation,
+        e: &Linearisation<'a>,
         state: &State,
         v: &DVector<f64>,
         input: &Input,
@@ -264,7 +272,7 @@ impl Stepper<'_> {
     /// As the step itself.
     pub fn step_vjp(
         &self,
-        e: &Evaluation,
+        e: &Linearisation<'a>,
         state: &State,
         v: &DVector<f64>,
         input: &Input,
@@ -287,7 +295,7 @@ impl Stepper<'_> {
     /// follow from the velocity.
     fn released_momentum(
         &self,
-        e: &Evaluation,
+        e: &Linearisation,
         state: &State,
         v: &DVector<f64>,
         split: &Split,
@@ -316,7 +324,7 @@ impl Stepper<'_> {
     /// Transpose of [`Stepper::released_momentum`], added to `bar`.
     fn released_momentum_vjp(
         &self,
-        e: &Evaluation,
+        e: &Linearisation,
         state: &State,
         v: &DVector<f64>,
         split: &Split,

@@ -1,7 +1,7 @@
 //! The velocity at a state, v = M(q)⁻¹ (Xᵀ p̂ − p_rest), and its transpose.
 
 use super::{Split, State, StepBar, Stepper, When};
-use crate::dynamics::Evaluation;
+use crate::dynamics::{Evaluation, Linearisation};
 use crate::{Error, Result};
 use nalgebra::{Cholesky, DVector, Dyn};
 
@@ -53,7 +53,7 @@ pub(super) fn solve(e: &Evaluation, split: &Split, hat: &DVector<f64>) -> Result
 
 /// Transpose of [`solve`], added to `bar` (y is p̂ here).
 pub(super) fn solve_vjp(
-    e: &Evaluation,
+    e: &Linearisation,
     split: &Split,
     hat: &DVector<f64>,
     v: &DVector<f64>,
@@ -86,7 +86,7 @@ impl Stepper<'_> {
     /// As the value, or a solve of the coupling.
     pub fn velocity_vjp(
         &self,
-        e: &Evaluation,
+        e: &Linearisation,
         state: &State,
         v: &DVector<f64>,
         v_bar: &DVector<f64>,
@@ -131,7 +131,7 @@ impl Stepper<'_> {
     /// A solve of the coupling.
     pub fn conserved_vjp(
         &self,
-        e: &Evaluation,
+        e: &Linearisation,
         v: &DVector<f64>,
         y_bar: &DVector<f64>,
         bar: &mut StepBar,

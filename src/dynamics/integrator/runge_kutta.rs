@@ -9,7 +9,7 @@ use super::{
     Input, Integrator, Memo, Split, State, StateBar, StepBar, Stepped, Stepper, When, readout,
 };
 use crate::Result;
-use crate::dynamics::Evaluation;
+use crate::dynamics::Linearisation;
 use nalgebra::DVector;
 
 /// Nodes and weights of a method; stage i starts from stage i − 1 over `nodes[i]` of the step.
@@ -40,7 +40,7 @@ fn tableau(s: &Stepper) -> &'static Tableau {
 
 struct Stage<'a> {
     /// The first stage has none: it is the step's own.
-    evaluation: Option<Evaluation<'a>>,
+    evaluation: Option<Linearisation<'a>>,
     split: Split,
     xi: DVector<f64>,
     p: DVector<f64>,
@@ -52,7 +52,7 @@ struct Stage<'a> {
 }
 
 impl<'a> Stage<'a> {
-    fn at<'e>(&'e self, e: &'e Evaluation<'a>) -> &'e Evaluation<'a> {
+    fn at<'e>(&'e self, e: &'e Linearisation<'a>) -> &'e Linearisation<'a> {
         self.evaluation.as_ref().unwrap_or(e)
     }
 }
@@ -60,8 +60,8 @@ impl<'a> Stage<'a> {
 /// The stages; made `again` for the reverse sweep, with the forces kept from the step: that of the last stage
 /// isn't asked for there.
 fn stages<'a>(
-    s: &'a Stepper,
-    e: &Evaluation,
+    s: &Stepper<'a>,
+    e: &Linearisation<'a>,
     state: &State,
     v: &DVector<f64>,
     input: &Input,
@@ -86,7 +86,7 @@ fn stages<'a>(
         } else {
             let mut q = tree.integrate(&state.q, &xi);
             s.place_motions(&mut q, t);
-            Some(s.system.evaluate(s.parameters, &q, true, again.is_some())?)
+            Some(s.system.linearise(s.parameters, &q)?)
         };
         let at = evaluation.as_ref().unwrap_or(e);
         // The readout's, unless a joint is newly held or released.
@@ -116,9 +116,9 @@ fn stages<'a>(
     Ok(out)
 }
 
-pub(super) fn step(
-    s: &Stepper,
-    e: &Evaluation,
+pub(super) fn step<'a>(
+    s: &Stepper<'a>,
+    e: &Linearisation<'a>,
     state: &State,
     v: &DVector<f64>,
     input: &Input,
@@ -145,9 +145,9 @@ pub(super) fn step(
     })
 }
 
-pub(super) fn step_vjp(
-    s: &Stepper,
-    e: &Evaluation,
+pub(super) fn step_vjp<'a>(
+    s: &Stepper<'a>,
+    e: &Linearisation<'a>,
     state: &State,
     v: &DVector<f64>,
     input: &Input,

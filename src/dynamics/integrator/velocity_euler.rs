@@ -7,13 +7,13 @@ use super::{
     Input, Memo, Split, State, StateBar, StepBar, Stepped, Stepper, When, contact, readout,
 };
 use crate::Result;
-use crate::dynamics::Evaluation;
+use crate::dynamics::Linearisation;
 use nalgebra::DVector;
 
 /// Acceleration: driven joints reach their new velocity within the step, the others follow Eq. 3.
 fn acceleration(
     s: &Stepper,
-    e: &Evaluation,
+    e: &Linearisation,
     split: &Split,
     v: &DVector<f64>,
     control: &DVector<f64>,
@@ -29,7 +29,7 @@ fn acceleration(
 
 pub(super) fn step(
     s: &Stepper,
-    e: &Evaluation,
+    e: &Linearisation,
     state: &State,
     v: &DVector<f64>,
     input: &Input,
@@ -47,7 +47,7 @@ pub(super) fn step(
 
 pub(super) fn step_vjp(
     s: &Stepper,
-    e: &Evaluation,
+    e: &Linearisation,
     state: &State,
     v: &DVector<f64>,
     input: &Input,

@@ -9,8 +9,8 @@
 //! With images their own inverses, G is symmetric over all points, and the force on a point is what both columns'
 //! charges pull with there: derivatives are a pass over G for the pulls, and sums over each body.
 
+mod linearised;
 mod products;
-mod record;
 mod second;
 mod solution;
 mod solve;
@@ -19,8 +19,9 @@ use super::context::Context;
 use super::points::{Compressed, Placed};
 use crate::adjoint::lie::Pose;
 use crate::coupling::reduced::Reduced;
-use crate::coupling::{Coupling, Record};
+use crate::coupling::{Coupling, Linearise, Linearised, Momenta};
 use crate::{Error, Result};
+use linearised::Solved;
 use nalgebra::DMatrix;
 use std::sync::Arc;
 
@@ -75,6 +76,10 @@ impl GpuReduced {
 }
 
 impl Coupling for GpuReduced {
+    fn name(&self) -> &'static str {
+        "the fidelity reduced on the GPU"
+    }
+
     fn bodies(&self) -> usize {
         self.model.sizes.bodies
     }
@@ -83,18 +88,20 @@ impl Coupling for GpuReduced {
         self.model.sizes.modes
     }
 
-    fn evaluate(
-        &self,
-        poses: &[Pose],
-        basis: &DMatrix<f64>,
-        derivative: bool,
-    ) -> Result<Box<dyn Record + '_>> {
+    fn evaluate(&self, poses: &[Pose], basis: &DMatrix<f64>) -> Result<Momenta> {
         let placed = Arc::new(Placed::new(&self.model, poses)?);
-        Ok(Box::new(record::GpuRecord::new(
-            placed,
-            self.tolerance,
-            basis,
-            derivative,
-        )?))
+        Ok(Solved::new(placed, self.tolerance, basis)?.value())
+    }
+
+    fn differentiable(&self) -> Option<&dyn Linearise> {
+        Some(self)
+    }
+}
+
+impl Linearise for GpuReduced {
+    fn linearise(&self, poses: &[Pose], basis: &DMatrix<f64>) -> Result<Box<dyn Linearised + '_>> {
+        let placed = Arc::new(Placed::new(&self.model, poses)?);
+        let solved = Solved::new(placed, self.tolerance, basis)?;
+        Ok(Box::new(solved.linearise()?))
     }
 }

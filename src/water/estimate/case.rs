@@ -61,7 +61,7 @@ fn evaluate(
     poses: &[Pose],
     turn: &DMatrix<f64>,
 ) -> Result<(DMatrix<f64>, Report)> {
-    let record = coupling.evaluate(poses, turn, false)?;
+    let record = coupling.evaluate(poses, turn)?;
     let m = symmetric(&turn.tr_mul(record.momenta()));
     Ok((m, record.report().clone()))
 }

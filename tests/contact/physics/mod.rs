@@ -6,7 +6,7 @@ mod modes;
 mod smooth;
 
 use hydrograd::adjoint::lie::{Vec6, point_velocity};
-use hydrograd::dynamics::{Evaluation, Input, Integrator, State, Stepper};
+use hydrograd::dynamics::{Evaluation, Input, Integrator, Linearisation, State, Stepper};
 use hydrograd::scene::{Contact, Fluid, Joint, Scene};
 use hydrograd::{Controls, Fidelity, Rollout, Settings, Simulator};
 use nalgebra::DVector;
@@ -81,9 +81,9 @@ impl Random {
 }
 
 /// A step's velocities before and after contact.
-fn velocities(
-    stepper: &Stepper,
-    e: &Evaluation,
+fn velocities<'a>(
+    stepper: &Stepper<'a>,
+    e: &Linearisation<'a>,
     state: &State,
     v: &DVector<f64>,
 ) -> [DVector<f64>; 2] {

@@ -1,4 +1,4 @@
-//! One evaluation of the reduced coupling: value and first derivative.
+//! One evaluation of the reduced coupling: value and first derivative. What a value costs is all that the derivatives need.
 
 use super::Reduced;
 use super::columns::Fields;
@@ -8,7 +8,7 @@ use crate::Result;
 use crate::adjoint::kernel::potential_vjp;
 use crate::adjoint::lie::{Pose, Vec3, Vec6, six};
 use crate::coupling::pair::wrench;
-use crate::coupling::{Direction, Pullback, Record, Report, Tangent};
+use crate::coupling::{Direction, Linearised, Momenta, Pullback, Report, Tangent};
 use faer::linalg::matmul::matmul;
 use faer::reborrow::ReborrowMut;
 use faer::{Accum, Mat, MatMut, MatRef, Par};
@@ -18,17 +18,16 @@ use std::sync::OnceLock;
 
 /// 4π: a source of strength α makes the flux 4πα.
 pub(super) const FLUX: f64 = 4.0 * PI;
-/// Work of [`ReducedRecord::new`] per pair of points, relative to that of its derivatives.
+/// Work of [`ReducedLinearised::new`] per pair of points, relative to that of its derivatives.
 const FILL: usize = 8;
-/// Of [`ReducedRecord::pull_back`].
+/// Of [`ReducedLinearised::pull_back`].
 const PULL: usize = 1;
 
-/// Record of [`Reduced`].
-pub(super) struct ReducedRecord<'a> {
+/// [`Reduced`] solved for a basis.
+pub(super) struct ReducedLinearised<'a> {
     pub reduced: &'a Reduced,
     pub poses: Vec<Pose>,
     pub placed: Vec<Placed<'a>>,
-    derivative: bool,
     /// Of I − LᵀGL.
     factor: Factor,
     /// LᵀGŪ, modes × 6 bodies.
@@ -79,13 +78,8 @@ pub(super) fn vector(g: &[f64], columns: usize, j: usize, k: usize) -> Vec3 {
     Vec3::new(g[at], g[at + 1], g[at + 2])
 }
 
-impl<'a> ReducedRecord<'a> {
-    pub fn new(
-        reduced: &'a Reduced,
-        poses: &[Pose],
-        basis: &DMatrix<f64>,
-        derivative: bool,
-    ) -> Result<Self> {
+impl<'a> ReducedLinearised<'a> {
+    pub fn new(reduced: &'a Reduced, poses: &[Pose], basis: &DMatrix<f64>) -> Result<Self> {
         let place = |link: &'a Link| {
             let placed = link.place(reduced, poses)?;
             let block = block(reduced, &placed);
@@ -125,7 +119,6 @@ impl<'a> ReducedRecord<'a> {
             reduced,
             poses: poses.to_vec(),
             placed,
-            derivative,
             factor,
             a: &solution * basis,
             solution,
@@ -140,6 +133,11 @@ impl<'a> ReducedRecord<'a> {
         out.momenta = out.impulses(basis, &out.a);
         reduced.check_solution(poses, &out.basis, &out.momenta, out.report.condition)?;
         Ok(out)
+    }
+
+    /// The value alone.
+    pub fn value(self) -> Momenta {
+        Momenta::new(self.momenta, self.report)
     }
 
     /// α = Ū x̄ + L a, column by column.
@@ -337,33 +335,21 @@ fn scatter(
     }
 }
 
-impl Record for ReducedRecord<'_> {
+impl Linearised for ReducedLinearised<'_> {
     fn momenta(&self) -> &DMatrix<f64> {
         &self.momenta
     }
 
     fn gradient(&self, x: &DVector<f64>, y: &DVector<f64>) -> Result<Vec<Vec6>> {
-        if !self.derivative {
-            return Ok(vec![Vec6::zeros(); self.reduced.bodies.len()]);
-        }
         let (x, y) = (&self.alpha * x, &self.alpha * y);
         Ok(self.pull_back(x.as_slice(), y.as_slice()))
     }
 
     fn gradient_columns(&self, x: &DVector<f64>) -> Result<Vec<Vec<Vec6>>> {
-        if !self.derivative {
-            return Ok(vec![
-                vec![Vec6::zeros(); self.reduced.bodies.len()];
-                x.len()
-            ]);
-        }
         Ok(self.pull_back_columns(x))
     }
 
     fn gradient_along(&self, y: &DVector<f64>, z: &[Vec6]) -> Result<DVector<f64>> {
-        if !self.derivative {
-            return Ok(DVector::zeros(y.len()));
-        }
         let y = &self.alpha * y;
         let (psi, _) = self.tangent_potentials(&[y.as_slice()], z);
         Ok(FLUX * self.alpha.tr_mul(&psi.column(0)))

@@ -1,9 +1,9 @@
-//! One evaluation on the device.
+//! One evaluation on the device, and its derivatives.
 
 use super::solution::Solution;
 use crate::Result;
 use crate::adjoint::lie::{Pose, Vec6};
-use crate::coupling::{Direction, PairTensor, Pullback, Record, Report, Tangent};
+use crate::coupling::{Direction, Linearised, Momenta, PairTensor, Pullback, Report, Tangent};
 use crate::gpu::buffer::Buffer;
 use crate::gpu::combine::combine;
 use crate::gpu::points::Placed;
@@ -14,30 +14,31 @@ use std::sync::Arc;
 /// Most columns of which the derivatives of all pairs are kept: with more, those asked for are made.
 const TENSOR: usize = 24;
 
-/// Record of [`GpuReduced`](super::GpuReduced).
-pub(super) struct GpuRecord {
+/// [`GpuReduced`](super::GpuReduced) solved for a basis.
+pub(super) struct Solved {
     solution: Solution,
     tolerance: f64,
-    derivative: Derivative,
     report: Report,
+}
+
+/// The same with its derivatives.
+pub(super) struct GpuLinearised {
+    solution: Solution,
+    tolerance: f64,
+    report: Report,
+    derivative: Derivative,
 }
 
 /// First derivatives on the basis.
 enum Derivative {
-    None,
     /// Of all pairs of columns.
     Pairs(PairTensor),
     /// What the columns pull with.
     Pulls(Buffer),
 }
 
-impl GpuRecord {
-    pub fn new(
-        placed: Arc<Placed>,
-        tolerance: f64,
-        basis: &DMatrix<f64>,
-        derivative: bool,
-    ) -> Result<Self> {
+impl Solved {
+    pub fn new(placed: Arc<Placed>, tolerance: f64, basis: &DMatrix<f64>) -> Result<Self> {
         let solution = Solution::solve(placed, basis, tolerance, true)?;
         let (reduced, reached) = (&solution.placed.model.reduced, &solution.reached);
         let poses: &[Pose] = &solution.placed.poses;
@@ -48,19 +49,35 @@ impl GpuRecord {
             asymmetry: 0.0,
             condition: reached.condition,
         };
-        let derivative = match (derivative, solution.columns) {
-            (false, _) | (_, 0) => Derivative::None,
-            (_, k) if k <= TENSOR => Derivative::Pairs(solution.tensor(&solution.pulls()?)?),
-            _ => Derivative::Pulls(solution.pulls()?),
-        };
         Ok(Self {
             solution,
             tolerance,
-            derivative,
             report,
         })
     }
 
+    /// The value alone.
+    pub fn value(self) -> Momenta {
+        Momenta::new(self.solution.momenta, self.report)
+    }
+
+    pub fn linearise(self) -> Result<GpuLinearised> {
+        let solution = &self.solution;
+        let derivative = match solution.columns {
+            0 => Derivative::Pairs(PairTensor::zeros(solution.placed.model.sizes.bodies, 0)),
+            k if k <= TENSOR => Derivative::Pairs(solution.tensor(&solution.pulls()?)?),
+            _ => Derivative::Pulls(solution.pulls()?),
+        };
+        Ok(GpuLinearised {
+            solution: self.solution,
+            tolerance: self.tolerance,
+            report: self.report,
+            derivative,
+        })
+    }
+}
+
+impl GpuLinearised {
     fn bodies(&self) -> usize {
         self.solution.placed.model.sizes.bodies
     }
@@ -118,14 +135,13 @@ impl GpuRecord {
     }
 }
 
-impl Record for GpuRecord {
+impl Linearised for GpuLinearised {
     fn momenta(&self) -> &DMatrix<f64> {
         &self.solution.momenta
     }
 
     fn gradient(&self, x: &DVector<f64>, y: &DVector<f64>) -> Result<Vec<Vec6>> {
         match &self.derivative {
-            Derivative::None => Ok(vec![Vec6::zeros(); self.bodies()]),
             Derivative::Pairs(tensor) => Ok(tensor.contract(x, y)),
             Derivative::Pulls(pulls) => self.pair(pulls, x, y),
         }
@@ -141,7 +157,6 @@ impl Record for GpuRecord {
 
     fn gradient_along(&self, y: &DVector<f64>, z: &[Vec6]) -> Result<DVector<f64>> {
         match &self.derivative {
-            Derivative::None => Ok(DVector::zeros(y.len())),
             Derivative::Pairs(tensor) => Ok(tensor.along(y, z)),
             Derivative::Pulls(pulls) => {
                 let all = self.columns(pulls, y)?;

@@ -1,29 +1,28 @@
-//! One evaluation of the coupled system: what a backend's solution means.
+//! One evaluation of the coupled system, and its derivatives: what a backend's solution means.
 
 use super::{Full, Model, Response};
 use crate::Result;
 use crate::adjoint::lie::{Pose, Vec6};
 use crate::coupling::settings::asymmetry;
-use crate::coupling::{Direction, PairTensor, Pullback, Record, Report, Tangent};
+use crate::coupling::{Direction, Linearised, Momenta, PairTensor, Pullback, Report, Tangent};
 use nalgebra::{DMatrix, DVector};
 
-/// Record of [`Full`].
-pub(super) struct FullRecord<'a> {
+/// [`Full`] solved for a basis.
+pub(super) struct Solved<'a> {
     pub model: &'a Model,
     /// Solution to the basis.
     pub response: Box<dyn Response + 'a>,
-    momenta: DMatrix<f64>,
-    gradient: PairTensor,
-    report: Report,
+    pub value: Momenta,
 }
 
-impl<'a> FullRecord<'a> {
-    pub fn new(
-        full: &'a Full,
-        poses: &[Pose],
-        basis: &DMatrix<f64>,
-        derivative: bool,
-    ) -> Result<Self> {
+/// [`Full`] with its derivatives.
+pub(super) struct FullLinearised<'a> {
+    solved: Solved<'a>,
+    gradient: PairTensor,
+}
+
+impl<'a> Solved<'a> {
+    pub fn new(full: &'a Full, poses: &[Pose], basis: &DMatrix<f64>) -> Result<Self> {
         let model = full.model();
         let response = full.backend().respond(poses, basis)?;
         let volume = |b: usize| model.bodies[b].boundary.faces.volume();
@@ -34,24 +33,28 @@ impl<'a> FullRecord<'a> {
             asymmetry: asymmetry(&response.energies()?, basis, volume),
             condition: 0.0,
         };
-        let k = basis.ncols();
         Ok(Self {
-            momenta: response.momenta()?,
-            gradient: if derivative && k > 0 {
-                response.gradient()?
-            } else {
-                PairTensor::zeros(model.bodies.len(), k)
-            },
+            value: Momenta::new(response.momenta()?, report),
             model,
             response,
-            report,
+        })
+    }
+
+    pub fn linearise(self) -> Result<FullLinearised<'a>> {
+        let gradient = match self.value.momenta().ncols() {
+            0 => PairTensor::zeros(self.model.bodies.len(), 0),
+            _ => self.response.gradient()?,
+        };
+        Ok(FullLinearised {
+            solved: self,
+            gradient,
         })
     }
 }
 
-impl Record for FullRecord<'_> {
+impl Linearised for FullLinearised<'_> {
     fn momenta(&self) -> &DMatrix<f64> {
-        &self.momenta
+        self.solved.value.momenta()
     }
 
     fn gradient(&self, x: &DVector<f64>, y: &DVector<f64>) -> Result<Vec<Vec6>> {
@@ -65,7 +68,7 @@ impl Record for FullRecord<'_> {
     fn vjp(&self, x: Direction, y: Direction) -> Result<Pullback> {
         let directions = Direction::distinct(x, y);
         let n = directions.len();
-        let response = self.response.directions(&directions)?;
+        let response = self.solved.response.directions(&directions)?;
         let momenta = response.momenta()?;
         let unit = |i: usize| DVector::from_fn(n, |k, _| if k == i { 1.0 } else { 0.0 });
         Ok(Pullback {
@@ -76,12 +79,13 @@ impl Record for FullRecord<'_> {
     }
 
     fn hvp(&self, x: Direction, y: Direction, z: &[Vec6]) -> Result<Tangent> {
-        self.response
+        self.solved
+            .response
             .directions(&Direction::distinct(x, y))?
             .tangent(z)
     }
 
     fn report(&self) -> &Report {
-        &self.report
+        self.solved.value.report()
     }
 }

@@ -7,6 +7,7 @@ pub mod kernel;
 pub mod lie;
 mod registry;
 pub mod rigid;
+pub mod sample;
 pub mod step;
 
 pub use registry::rungs;

@@ -8,6 +8,7 @@ use crate::lie::{
     exp_matrix_vjp,
 };
 use crate::rigid::{spatial_inertia, spatial_inertia_vjp};
+use crate::sample;
 
 /// Largest accepted relative error.
 const TOLERANCE: f64 = 1e-6;
@@ -52,13 +53,20 @@ pub fn rungs() -> Vec<Rung> {
     out
 }
 
-/// Fixed numbers between −`size` and `size`, without the linear relations that samples of a sine
-/// have.
-fn numbers<const N: usize>(seed: usize, size: f64) -> [f64; N] {
-    std::array::from_fn(|i| {
-        let x = 43758.545 * (12.9898 * (i + 50 * seed) as f64 + 1.0).sin();
-        size * (2.0 * (x - x.floor()) - 1.0)
-    })
+/// Numbers between −`size` and `size` of which all checks are made.
+pub(crate) fn numbers(seed: u64, count: usize, size: f64) -> Vec<f64> {
+    let drawn = sample::numbers(seed, count, size);
+    #[cfg(test)]
+    tests::DRAWN.with_borrow_mut(|all| all.push(drawn.clone()));
+    drawn
+}
+
+fn array<const N: usize>(seed: u64, size: f64) -> [f64; N] {
+    numbers(seed, N, size).try_into().expect("N numbers")
+}
+
+fn vector(seed: u64) -> Vec3 {
+    Vec3::from(array(seed, 1.0))
 }
 
 /// The worst of several checks.
@@ -69,65 +77,87 @@ fn all(outcomes: impl IntoIterator<Item = Outcome>) -> Outcome {
         .expect("at least one check")
 }
 
-/// `bar · f(x)` against the cotangent `x_bar`.
-fn pulled_back<const N: usize>(
-    f: impl Fn(&[f64]) -> f64,
+/// `f` along as many directions as span its arguments and three more, each with a cotangent of its own, against `vjp`.
+fn transposed<const N: usize>(
+    f: impl Fn(&[f64]) -> Vec<f64>,
     x: &[f64; N],
-    x_bar: &[f64],
+    vjp: impl Fn(&[f64]) -> Vec<f64>,
     corruption: f64,
 ) -> Outcome {
-    let dx = numbers::<N>(9, 0.3);
-    let slope = corruption * dot(x_bar, &dx);
-    outcome(|x| vec![f(x)], x, &dx, &[slope], TOLERANCE)
+    let size = f(x).len();
+    all((0..N as u64 + 3).map(|k| {
+        let (dx, bar) = (numbers(100 + k, N, 0.3), numbers(200 + k, size, 1.0));
+        let slope = corruption * dot(&vjp(&bar), &dx);
+        outcome(|x| vec![dot(&f(x), &bar)], x, &dx, &[slope], TOLERANCE)
+    }))
+}
+
+/// Rotation vectors of all angles about several axes.
+fn rotations() -> impl Iterator<Item = Vec3> {
+    let axes = [10, 11, 12, 13].map(|seed| vector(seed).normalize());
+    axes.into_iter()
+        .flat_map(|axis| ANGLES.map(|angle| angle * axis))
 }
 
 fn exp_matrix_check(corruption: f64) -> Outcome {
-    let bar = Mat3::from_row_slice(&numbers::<9>(1, 1.0));
-    all(ANGLES.map(|angle| {
-        let theta = angle * Vec3::new(0.36, -0.48, 0.8);
-        let x_bar = exp_matrix_vjp(&theta, &bar);
-        pulled_back::<3>(
-            |x| exp_matrix(&Vec3::from_column_slice(x)).dot(&bar),
+    all(rotations().map(|theta| {
+        transposed::<3>(
+            |x| exp_matrix(&Vec3::from_column_slice(x)).as_slice().to_vec(),
             &theta.into(),
-            x_bar.as_slice(),
+            |bar| {
+                exp_matrix_vjp(&theta, &Mat3::from_column_slice(bar))
+                    .as_slice()
+                    .to_vec()
+            },
             corruption,
         )
     }))
 }
 
 fn exp_jacobian_inverse_check(corruption: f64) -> Outcome {
-    let (omega, bar) = (Vec3::from(numbers(2, 1.0)), Vec3::from(numbers(3, 1.0)));
-    all(ANGLES.map(|angle| {
-        let theta = angle * Vec3::new(0.36, -0.48, 0.8);
-        let x_bar = exp_jacobian_inverse_vjp(&theta, &omega, &bar);
-        pulled_back::<3>(
-            |x| (exp_jacobian_inverse(&Vec3::from_column_slice(x)) * omega).dot(&bar),
+    all((20..).zip(rotations()).map(|(seed, theta)| {
+        let omega = vector(seed);
+        transposed::<3>(
+            |x| {
+                let x = exp_jacobian_inverse(&Vec3::from_column_slice(x)) * omega;
+                x.as_slice().to_vec()
+            },
             &theta.into(),
-            x_bar.as_slice(),
+            |bar| {
+                exp_jacobian_inverse_vjp(&theta, &omega, &Vec3::from_column_slice(bar))
+                    .as_slice()
+                    .to_vec()
+            },
             corruption,
         )
     }))
 }
 
-/// Mass and inertia, in which the value is linear.
+/// Mass and inertia, in which the value is linear, about several centres.
 fn spatial_inertia_check(corruption: f64) -> Outcome {
-    let center = Vec3::new(0.2, -0.1, 0.4);
-    let bar = Mat6::from_row_slice(&numbers::<36>(4, 1.0));
-    let (mass_bar, inertia_bar) = spatial_inertia_vjp(&center, &bar);
     let inertia = [0.7, 0.9, 1.1, 0.1, -0.05, 0.02];
-    let mass = pulled_back::<1>(
-        |x| spatial_inertia(x[0], &center, &inertia).dot(&bar),
-        &[2.5],
-        &[mass_bar],
-        corruption,
-    );
-    let turning = pulled_back::<6>(
-        |x| spatial_inertia(2.5, &center, &std::array::from_fn(|k| x[k])).dot(&bar),
-        &inertia,
-        &inertia_bar,
-        corruption,
-    );
-    mass.worst(turning)
+    all([50, 51, 52].map(|seed| {
+        let center = 0.4 * vector(seed);
+        let of = |mass: f64, inertia: &[f64]| {
+            spatial_inertia(mass, &center, &std::array::from_fn(|k| inertia[k]))
+                .as_slice()
+                .to_vec()
+        };
+        let bars = |bar: &[f64]| spatial_inertia_vjp(&center, &Mat6::from_column_slice(bar));
+        let mass = transposed::<1>(
+            |x| of(x[0], &inertia),
+            &[2.5],
+            |bar| vec![bars(bar).0],
+            corruption,
+        );
+        let rotational = transposed::<6>(
+            |x| of(2.5, x),
+            &inertia,
+            |bar| bars(bar).1.to_vec(),
+            corruption,
+        );
+        mass.worst(rotational)
+    }))
 }
 
 fn surface() -> Vec<Element> {
@@ -147,27 +177,39 @@ fn surface() -> Vec<Element> {
 const NU: [f64; 6] = [0.9, -0.8, 0.5, 0.4, 0.3, -0.2];
 
 fn quadratic_drag_jvp_check(corruption: f64) -> Outcome {
-    let (surface, dnu) = (surface(), numbers::<6>(5, 0.1));
-    all(PARTS.map(|part| {
-        let jvp = quadratic_drag_jvp(&surface, part, &Vec6::from(NU), &Vec6::from(dnu));
+    let surface = surface();
+    all(PARTS.into_iter().flat_map(|part| {
         let value = |x: &[f64]| {
             quadratic_drag(&surface, part, &Vec6::from_column_slice(x))
                 .as_slice()
                 .to_vec()
         };
-        let jvp = corruption * jvp;
-        outcome(value, &NU, &dnu, jvp.as_slice(), TOLERANCE)
+        let along = |dnu: [f64; 6]| {
+            let jvp = quadratic_drag_jvp(&surface, part, &Vec6::from(NU), &Vec6::from(dnu));
+            outcome(value, &NU, &dnu, (corruption * jvp).as_slice(), TOLERANCE)
+        };
+        (60..68)
+            .map(|seed| along(array(seed, 0.1)))
+            .collect::<Vec<_>>()
     }))
 }
 
 fn quadratic_drag_vjp_check(corruption: f64) -> Outcome {
-    let (surface, bar) = (surface(), Vec6::from(numbers(6, 1.0)));
+    let surface = surface();
     all(PARTS.map(|part| {
-        let x_bar = quadratic_drag_vjp(&surface, part, &Vec6::from(NU), &bar);
-        pulled_back::<6>(
-            |x| quadratic_drag(&surface, part, &Vec6::from_column_slice(x)).dot(&bar),
+        transposed::<6>(
+            |x| {
+                quadratic_drag(&surface, part, &Vec6::from_column_slice(x))
+                    .as_slice()
+                    .to_vec()
+            },
             &NU,
-            x_bar.as_slice(),
+            |bar| {
+                let bar = Vec6::from_column_slice(bar);
+                quadratic_drag_vjp(&surface, part, &Vec6::from(NU), &bar)
+                    .as_slice()
+                    .to_vec()
+            },
             corruption,
         )
     }))
@@ -178,10 +220,10 @@ fn quadratic_drag_vjp_check(corruption: f64) -> Outcome {
 const CONTACTS: [[f64; 11]; 4] = [
     [0.021, 0.8, 0.36, -0.48, 0.8, 0.3, 0.2, -0.1, 3e3, 0.4, 0.6],
     [
-        0.008, 1.0, 0.36, -0.48, 0.8, 0.02, -0.01, -0.03, 3e3, 0.4, 0.6,
+        0.008, 1.0, 0.8, 0.36, -0.48, -0.03, 0.02, -0.01, 3e3, 0.4, 0.6,
     ],
     [-0.03, 1.0, 0.6, 0.0, 0.8, -0.9, 0.4, -0.3, 3e3, 0.4, 0.6],
-    [-0.08, 0.5, 0.6, 0.0, 0.8, 0.9, 0.1, 2.2, 3e3, 0.5, 0.2],
+    [-0.08, 0.5, 0.0, 0.6, 0.8, 0.1, 0.9, 2.2, 3e3, 0.5, 0.2],
 ];
 
 fn contact(x: &[f64]) -> (Law, Meeting) {
@@ -204,9 +246,9 @@ fn contact(x: &[f64]) -> (Law, Meeting) {
 }
 
 fn contact_force_jvp_check(corruption: f64) -> Outcome {
-    all(CONTACTS.map(|x| {
+    all(CONTACTS.into_iter().flat_map(|x| {
         let (law, meeting) = contact(&x);
-        let (at, du) = (meeting.velocity, numbers::<3>(7, 0.01));
+        let at = meeting.velocity;
         let value = |u: &[f64]| {
             let meeting = Meeting {
                 velocity: Vec3::from_column_slice(u),
@@ -214,52 +256,99 @@ fn contact_force_jvp_check(corruption: f64) -> Outcome {
             };
             contact_force(&law, &meeting).as_slice().to_vec()
         };
-        let jvp = corruption * contact_force_jvp(&law, &meeting, &Vec3::from(du));
-        outcome(value, &[at.x, at.y, at.z], &du, jvp.as_slice(), TOLERANCE)
+        let along = |du: [f64; 3]| {
+            let jvp = corruption * contact_force_jvp(&law, &meeting, &Vec3::from(du));
+            outcome(value, &[at.x, at.y, at.z], &du, jvp.as_slice(), TOLERANCE)
+        };
+        (70..75)
+            .map(|seed| along(array(seed, 0.01)))
+            .collect::<Vec<_>>()
     }))
 }
 
 fn contact_force_vjp_check(corruption: f64) -> Outcome {
-    let bar = Vec3::from(numbers(8, 1.0));
     all(CONTACTS.map(|x| {
         let (law, meeting) = contact(&x);
-        let b = contact_force_vjp(&law, &meeting, &bar);
-        let (n, u) = (b.normal, b.velocity);
-        let bars = [
-            b.gap,
-            b.weight,
-            n.x,
-            n.y,
-            n.z,
-            u.x,
-            u.y,
-            u.z,
-            b.stiffness,
-            b.dissipation,
-            b.friction,
-        ];
         // In units of each argument's own size.
         let size = [0.01, 0.1, 0.1, 0.1, 0.1, 0.01, 0.01, 0.01, 1e3, 0.1, 0.1];
-        let scaled: [f64; 11] = std::array::from_fn(|i| bars[i] * size[i]);
         let value = |y: &[f64]| {
             let row: [f64; 11] = std::array::from_fn(|i| x[i] + size[i] * y[i]);
             let (law, meeting) = contact(&row);
-            contact_force(&law, &meeting).dot(&bar)
+            contact_force(&law, &meeting).as_slice().to_vec()
         };
-        pulled_back::<11>(value, &[0.0; 11], &scaled, corruption)
+        let bars = |bar: &[f64]| {
+            let b = contact_force_vjp(&law, &meeting, &Vec3::from_column_slice(bar));
+            let (n, u) = (b.normal, b.velocity);
+            let bars = [
+                b.gap,
+                b.weight,
+                n.x,
+                n.y,
+                n.z,
+                u.x,
+                u.y,
+                u.z,
+                b.stiffness,
+                b.dissipation,
+                b.friction,
+            ];
+            bars.iter().zip(size).map(|(b, size)| b * size).collect()
+        };
+        transposed::<11>(value, &[0.0; 11], bars, corruption)
     }))
 }
 
 #[cfg(test)]
 mod tests {
+    use super::*;
+    use crate::sample::span;
+    use std::cell::RefCell;
+
+    thread_local! {
+        /// What the checks of this thread drew.
+        pub static DRAWN: RefCell<Vec<Vec<f64>>> = const { RefCell::new(Vec::new()) };
+    }
+
     #[test]
     fn every_rung_passes_and_fails_when_corrupted() {
-        for rung in super::rungs() {
+        for rung in rungs() {
             let right = (rung.check)(1.0);
             println!("{} {right:?}", rung.name);
             assert!(right.passes(), "{} {right:?}", rung.name);
             let wrong = (rung.check)(1.01);
             assert!(!wrong.passes(), "{} {wrong:?}", rung.name);
+        }
+    }
+
+    fn triples(x: &[f64]) -> impl Iterator<Item = [f64; 3]> + '_ {
+        x.chunks_exact(3).map(|c| [c[0], c[1], c[2]])
+    }
+
+    /// Least part of the largest singular value that the smallest must be: of the vectors of an array of at least
+    /// nine, and of all vectors of a length that a check draws.
+    const SPANNED: f64 = 0.3;
+
+    /// A check along vectors in one plane doesn't see the component of a derivative across it.
+    #[test]
+    fn vectors_of_every_check_span_space() {
+        for rung in rungs() {
+            DRAWN.take();
+            (rung.check)(1.0);
+            let drawn = DRAWN.take();
+            assert!(!drawn.is_empty(), "{} draws nothing", rung.name);
+            let mut lengths: Vec<usize> = drawn.iter().map(Vec::len).collect();
+            lengths.sort_unstable();
+            lengths.dedup();
+            let mut least = f64::INFINITY;
+            for length in lengths.into_iter().filter(|l| l % 3 == 0) {
+                let of = || drawn.iter().filter(|d| d.len() == length);
+                least = least.min(span(of().flat_map(|d| triples(d))));
+                if length >= 27 {
+                    least = of().map(|d| span(triples(d))).fold(least, f64::min);
+                }
+            }
+            println!("{} {least:.2}", rung.name);
+            assert!(least > SPANNED, "{}: {least}", rung.name);
         }
     }
 }

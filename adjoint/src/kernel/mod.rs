@@ -36,6 +36,7 @@ mod count;
 pub mod flux;
 mod lane;
 pub mod normal;
+mod point;
 pub mod potential;
 mod registry;
 mod source;

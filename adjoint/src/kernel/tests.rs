@@ -2,9 +2,13 @@
 
 use super::flux::value_of_corners;
 use super::lane::Lane;
+use super::normal::Normal;
+use super::point::PointKernel;
+use super::potential::Potential;
 use super::*;
 use crate::check::{dot, dot_product_gap};
 use crate::lie::Vec3;
+use crate::sample::Samples;
 use num_dual::{DualNum, HyperDual64};
 use std::sync::Mutex;
 use std::sync::atomic::{AtomicUsize, Ordering::Relaxed};
@@ -32,20 +36,9 @@ impl Lane for HyperDual64 {
     }
 }
 
-/// Numbers between −1 and 1 without a pattern.
-struct Random(u64);
-
-impl Random {
-    fn number(&mut self) -> f64 {
-        self.0 = self.0.wrapping_mul(6364136223846793005).wrapping_add(1);
-        (self.0 >> 11) as f64 / (1_u64 << 52) as f64 - 1.0
-    }
-    fn vector(&mut self) -> Vec3 {
-        Vec3::new(self.number(), self.number(), self.number())
-    }
-    fn numbers(&mut self, n: usize) -> Vec<f64> {
-        (0..n).map(|_| self.number()).collect()
-    }
+/// A vector of numbers between −1 and 1.
+fn vector(random: &mut Samples) -> Vec3 {
+    Vec3::from(random.array())
 }
 
 /// Gradient and Hessian times `d` of `f` at `s`, by hyper-dual numbers.
@@ -67,10 +60,14 @@ fn close(a: &Vec3, b: &Vec3) {
 
 #[test]
 fn gradients_and_hessians_agree_with_dual_numbers() {
-    let mut random = Random(1);
+    let mut random = Samples::new(1);
     for _ in 0..50 {
-        let corners = [random.vector(), random.vector(), random.vector()];
-        let (s, d) = (random.vector() * 2.0, random.vector());
+        let corners = [
+            vector(&mut random),
+            vector(&mut random),
+            vector(&mut random),
+        ];
+        let (s, d) = (vector(&mut random) * 2.0, vector(&mut random));
         let w = 1.7;
         let (g, h) = derivatives(|s| value_of_corners(&corners, s) * w, &s, &d);
         // The value's numerator and denominator cancel near the edges, the edge terms do not.
@@ -78,13 +75,13 @@ fn gradients_and_hessians_agree_with_dual_numbers() {
         assert!((flux_gradient(&corners, w, &s) - g).norm() < 1e-9 * size);
         assert!((flux_hessian_product(&corners, w, &s, &d) - h).norm() < 1e-8 * h.norm().max(1e-3));
 
-        let (x, n) = (random.vector(), random.vector().normalize());
+        let (x, n) = (vector(&mut random), vector(&mut random).normalize());
         let lanes = |v: &Vec3, s: [HyperDual64; 3]| [0, 1, 2].map(|c| s[c].like(v[c]));
         let r = |s| lane::sub(lanes(&x, s), s);
-        let (g, h) = derivatives(|s| normal::velocity(lanes(&(w * n), s), r(s)), &s, &d);
+        let (g, h) = derivatives(|s| Normal::value_of(lanes(&(w * n), s), r(s)), &s, &d);
         close(&normal_gradient(&x, &n, w, &s), &g);
         close(&normal_hessian_product(&x, &n, w, &s, &d), &h);
-        let (g, h) = derivatives(|s| potential::inverse_distance(r(s)), &s, &d);
+        let (g, h) = derivatives(|s| Potential::value_of(r(s), r(s)), &s, &d);
         close(&potential_gradient(&x, &s), &g);
         close(&potential_hessian_product(&x, &s, &d), &h);
     }
@@ -120,7 +117,7 @@ fn solid_angle_has_known_values() {
 
 /// A ball of `n` bands, its vertices shaken, size `r`; faces outward, 4 n² of them less the poles'.
 fn ball(n: usize, r: f64) -> Triangles {
-    let mut random = Random(7);
+    let mut random = Samples::new(7);
     let m = 2 * n;
     let angle = std::f64::consts::PI / n as f64;
     let mut vertices = vec![Vec3::z() * r];
@@ -128,7 +125,7 @@ fn ball(n: usize, r: f64) -> Triangles {
         for j in 0..m {
             let (t, p) = (angle * i as f64, angle * j as f64);
             let x = Vec3::new(t.sin() * p.cos(), t.sin() * p.sin(), t.cos());
-            vertices.push(r * (x + 0.05 * angle * random.vector()));
+            vertices.push(r * (x + 0.05 * angle * vector(&mut random)));
         }
     }
     vertices.push(-Vec3::z() * r);
@@ -162,9 +159,12 @@ fn points_of(t: &Triangles) -> Points {
 
 /// `count` sources well inside, with displacements.
 fn inside(count: usize, r: f64) -> (Sources, Vec<Vec3>) {
-    let mut random = Random(11);
-    let sources = (0..count).map(|_| 0.45 * r * random.vector()).collect();
-    (sources, (0..count).map(|_| r * random.vector()).collect())
+    let mut random = Samples::new(11);
+    let sources = (0..count).map(|_| 0.45 * r * vector(&mut random)).collect();
+    (
+        sources,
+        (0..count).map(|_| r * vector(&mut random)).collect(),
+    )
 }
 
 #[test]
@@ -203,8 +203,8 @@ fn sums_against_scalars(bands: usize, count: usize, k: usize, size: f64) -> f64 
     let p = points_of(&t);
     let (s, d) = inside(count, size);
     let n = t.len();
-    let mut random = Random(3);
-    let (bar, a) = (random.numbers(n * k), random.numbers(count * k));
+    let mut random = Samples::new(3);
+    let (bar, a) = (random.numbers(n * k, 1.0), random.numbers(count * k, 1.0));
     let mut worst: f64 = 0.0;
 
     // Fill a block in the middle of a larger array, then add.
@@ -347,8 +347,11 @@ fn everything() -> Vec<f64> {
     let (t, k, count) = (ball(12, 1.0), 3, 101);
     let p = points_of(&t);
     let (s, d) = inside(count, 1.0);
-    let mut random = Random(5);
-    let (bar, a) = (random.numbers(t.len() * k), random.numbers(count * k));
+    let mut random = Samples::new(5);
+    let (bar, a) = (
+        random.numbers(t.len() * k, 1.0),
+        random.numbers(count * k, 1.0),
+    );
     let mut all = Vec::new();
     let mut add = |len: usize, f: &dyn Fn(&mut [f64])| {
         let start = all.len();
@@ -398,9 +401,12 @@ fn forward_and_transposed_sums_are_transposes_and_hessians_symmetric() {
     let (t, k, count) = (ball(6, 1.0), 4, 29);
     let p = points_of(&t);
     let (s, d) = inside(count, 1.0);
-    let mut random = Random(9);
-    let (bar, a) = (random.numbers(t.len() * k), random.numbers(count * k));
-    let other: Vec<Vec3> = (0..count).map(|_| random.vector()).collect();
+    let mut random = Samples::new(9);
+    let (bar, a) = (
+        random.numbers(t.len() * k, 1.0),
+        random.numbers(count * k, 1.0),
+    );
+    let other: Vec<Vec3> = (0..count).map(|_| vector(&mut random)).collect();
     // Σ_k a[j][k] g[j][k], then flat coordinates.
     let contract = |g: &[f64]| -> Vec<f64> {
         let at = |j: usize, c: usize| (0..k).map(|m| a[j * k + m] * g[(j * k + m) * 3 + c]).sum();

@@ -2,6 +2,7 @@
 
 use super::{Controls, Cotangents, Rollout, Sample, Simulator};
 use crate::adjoint::lie::Vec3;
+use crate::adjoint::sample::Samples;
 use crate::dynamics::{Drive, Parameters};
 use crate::{Error, Result};
 use nalgebra::{DMatrix, DVector};
@@ -82,20 +83,6 @@ const NEGLIGIBLE: f64 = 1e-9;
 /// Rounding of a derivative against the sum of the absolute values that its functional adds up: where nothing in a group
 /// matters, adjoint and differences are both under it.
 const ROUNDING: f64 = 1e-11;
-
-/// Uniform numbers in (−1, 1) by the splitmix64 generator: the same on every machine.
-struct Random(u64);
-
-impl Random {
-    fn next(&mut self) -> f64 {
-        self.0 = self.0.wrapping_add(0x9E37_79B9_7F4A_7C15);
-        let mut z = self.0;
-        z = (z ^ (z >> 30)).wrapping_mul(0xBF58_476D_1CE4_E5B9);
-        z = (z ^ (z >> 27)).wrapping_mul(0x94D0_49BB_1331_11EB);
-        z ^= z >> 31;
-        (z >> 11) as f64 / (1u64 << 52) as f64 - 1.0
-    }
-}
 
 /// Sizes that make the check independent of units.
 struct Scales {
@@ -250,8 +237,8 @@ pub fn timings(simulator: &Simulator, steps: usize, repetitions: usize) -> Resul
     }
     let zero = Controls::zeros(simulator, steps);
     let scale = scales(simulator, &simulator.rollout(&zero)?, steps)?;
-    let mut random = Random(1);
-    let vector = |n: usize| DVector::from_fn(n, |_, _| random.next());
+    let mut random = Samples::new(1);
+    let vector = |n: usize| DVector::from_fn(n, |_, _| random.number());
     let probe = Probe::new(simulator, &scale, steps, vector);
     time(simulator, &zero, &probe, repetitions)
 }
@@ -284,8 +271,8 @@ pub fn gradcheck_with(
     let zero = Controls::zeros(simulator, steps);
     let rollout = simulator.rollout(&zero)?;
     let scale = scales(simulator, &rollout, steps)?;
-    let mut random = Random(settings.seed);
-    let mut vector = |n: usize| DVector::from_fn(n, |_, _| random.next());
+    let mut random = Samples::new(settings.seed);
+    let mut vector = |n: usize| DVector::from_fn(n, |_, _| random.number());
     let nv = simulator.system().tree.velocities();
     let probe = Probe::new(simulator, &scale, steps, &mut vector);
     let gradient = rollout.vjp(&probe.cotangents(&rollout))?;

@@ -1,6 +1,7 @@
 //! What the comparisons share: bodies, poses, and two backends of one model.
 
 use hydrograd::adjoint::lie::{Pose, Vec3, Vec6, exp_matrix};
+use hydrograd::adjoint::sample;
 use hydrograd::boundary::{BodyBoundary, Method, Settings};
 use hydrograd::coupling::Exclusions;
 use hydrograd::coupling::full::{Full, MfsBody, Model, Preconditioner, SolveSettings};
@@ -87,11 +88,7 @@ pub fn poses() -> Vec<Pose> {
 
 /// Fixed numbers between −1 and 1.
 pub fn wavy(count: usize, phase: f64) -> Vec<f64> {
-    let of = |i: usize| {
-        let x = 43758.545 * (12.9898 * i as f64 + 78.233 * phase + 1.0).sin();
-        2.0 * (x - x.floor()) - 1.0
-    };
-    (0..count).map(of).collect()
+    sample::numbers(phase.to_bits(), count, 1.0)
 }
 
 pub fn basis(bodies: usize, columns: usize, phase: f64) -> DMatrix<f64> {

@@ -223,3 +223,37 @@ fn every_rung_is_right_and_fails_when_corrupted() {
     }
     assert!(wrong.is_empty(), "{wrong:#?}");
 }
+
+/// Least ratio of the smallest singular value of a check's vectors to the largest.
+const SPANNED: f64 = 0.15;
+
+/// A check along vectors in one plane doesn't see the component of a derivative across it. The rungs of `adjoint` are
+/// held to this by a test of their own.
+#[test]
+fn vectors_of_every_check_span_space() {
+    let mut flat = Vec::new();
+    for (name, rung) in registered() {
+        let drawn = tools::drawn_by(|| {
+            (rung.check)(1.0);
+        });
+        // Arrays of vectors, each of unit size.
+        let vectors: Vec<[f64; 3]> = drawn
+            .iter()
+            .filter(|d| d.len() % 3 == 0)
+            .flat_map(|d| {
+                let size = adjoint::check::norm(d);
+                d.chunks(3).map(move |v| [0, 1, 2].map(|c| v[c] / size))
+            })
+            .collect();
+        // A policy without actions has no derivative.
+        if vectors.is_empty() || name == "simulate::policy::OpenLoop::act_vjp" {
+            continue;
+        }
+        let span = adjoint::sample::span(vectors.iter().copied());
+        println!("{span:.2} {:4} {name}", vectors.len());
+        if span < SPANNED {
+            flat.push(name);
+        }
+    }
+    assert!(flat.is_empty(), "{flat:#?}");
+}

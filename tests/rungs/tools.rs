@@ -1,18 +1,30 @@
 //! What the checks share.
 
 use hydrograd::adjoint::check::{Outcome, outcome};
+use hydrograd::adjoint::sample;
 use nalgebra::DVector;
+use std::cell::RefCell;
 
 /// Largest accepted relative error.
 pub const TOLERANCE: f64 = 1e-6;
 
-/// Fixed numbers between −`size` and `size`, without the linear relations that samples of a sine
-/// have.
+thread_local! {
+    /// What the checks of this thread drew.
+    static DRAWN: RefCell<Vec<Vec<f64>>> = const { RefCell::new(Vec::new()) };
+}
+
+/// Fixed numbers between −`size` and `size`, of which all checks are made.
 pub fn wavy(count: usize, phase: f64, size: f64) -> DVector<f64> {
-    DVector::from_fn(count, |i, _| {
-        let x = 43758.545 * (12.9898 * i as f64 + 78.233 * phase + 1.0).sin();
-        size * (2.0 * (x - x.floor()) - 1.0)
-    })
+    let drawn = sample::numbers(phase.to_bits(), count, size);
+    DRAWN.with_borrow_mut(|all| all.push(drawn.clone()));
+    DVector::from_vec(drawn)
+}
+
+/// What `check` draws.
+pub fn drawn_by(check: impl FnOnce()) -> Vec<Vec<f64>> {
+    DRAWN.take();
+    check();
+    DRAWN.take()
 }
 
 /// The worst of several checks.

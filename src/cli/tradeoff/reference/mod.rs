@@ -13,6 +13,7 @@ use nalgebra::{DMatrix, DVector};
 use super::compare::{Excursion, Weights, end_error, felt, matrix_error, norm, vector_error};
 use super::measure::{Path, Start, free};
 use super::report;
+use crate::adjoint::sample;
 use crate::scene::{Scene, Shape};
 use crate::simulate::{Fidelity, Settings, Simulator};
 use crate::{Error, Result};
@@ -305,20 +306,11 @@ fn refinable(shape: &Shape) -> bool {
     !matches!(shape, Shape::Mesh { .. } | Shape::Triangles { .. })
 }
 
-/// A force for every velocity, of unit length in the metric of the mass matrix's diagonal: by the
-/// splitmix64 generator, the same on every machine.
+/// A reproducible force for every velocity, of unit length in the metric of the mass matrix's diagonal.
 fn pseudo_random_force(mass: &DMatrix<f64>) -> DVector<f64> {
-    let mut state = 1_u64;
-    let mut next = || {
-        state = state.wrapping_add(0x9E37_79B9_7F4A_7C15);
-        let mut z = state;
-        z = (z ^ (z >> 30)).wrapping_mul(0xBF58_476D_1CE4_E5B9);
-        z = (z ^ (z >> 27)).wrapping_mul(0x94D0_49BB_1331_11EB);
-        z ^= z >> 31;
-        (z >> 11) as f64 / (1_u64 << 52) as f64 - 1.0
-    };
-    let unit = DVector::from_fn(mass.nrows(), |_, _| next()).normalize();
-    DVector::from_fn(mass.nrows(), |i, _| unit[i] * mass[(i, i)].max(0.0).sqrt())
+    let n = mass.nrows();
+    let unit = DVector::from_vec(sample::numbers(1, n, 1.0)).normalize();
+    DVector::from_fn(n, |i, _| unit[i] * mass[(i, i)].max(0.0).sqrt())
 }
 
 #[cfg(test)]

@@ -1,5 +1,6 @@
 //! The largest modes of a symmetric matrix.
 
+use crate::adjoint::sample;
 use faer::linalg::matmul::matmul;
 use faer::linalg::solvers::Qr;
 use faer::{Accum, Mat, MatRef, Par, Side};
@@ -60,12 +61,7 @@ fn orthonormal(a: &Mat<f64>) -> Mat<f64> {
 
 /// A fixed number between −1 and 1.
 fn noise(i: usize, j: usize) -> f64 {
-    let mut x = (i as u64) << 32 | j as u64;
-    // SplitMix64.
-    x = x.wrapping_add(0x9e37_79b9_7f4a_7c15);
-    x = (x ^ (x >> 30)).wrapping_mul(0xbf58_476d_1ce4_e5b9);
-    x = (x ^ (x >> 27)).wrapping_mul(0x94d0_49bb_1331_11eb);
-    (x ^ (x >> 31)) as f64 / (u64::MAX / 2) as f64 - 1.0
+    sample::number((i as u64) << 32 | j as u64)
 }
 
 #[cfg(test)]

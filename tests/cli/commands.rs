@@ -1,56 +1,16 @@
 //! Every command but `tradeoff`.
 
+use crate::support::command::{fails, hydrograd, json, scene, text as said};
 use std::path::{Path, PathBuf};
-use std::process::{Command, Output};
-
-fn hydrograd(arguments: &[&str]) -> Output {
-    Command::new(env!("CARGO_BIN_EXE_hydrograd"))
-        .args(arguments)
-        .output()
-        .unwrap()
-}
 
 fn text(bytes: &[u8]) -> String {
     String::from_utf8(bytes.to_vec()).unwrap()
-}
-
-fn scene(name: &str) -> String {
-    let root = Path::new(env!("CARGO_MANIFEST_DIR"));
-    root.join("examples/scenes")
-        .join(name)
-        .display()
-        .to_string()
 }
 
 fn file(folder: &tempfile::TempDir, name: &str, contents: &str) -> String {
     let path: PathBuf = folder.path().join(name);
     std::fs::write(&path, contents).unwrap();
     path.display().to_string()
-}
-
-/// Fails with this code and these words, without a panic, and with one JSON object if asked.
-fn fails(arguments: &[&str], code: i32, words: &[&str]) {
-    let plain = hydrograd(arguments);
-    let message = text(&plain.stderr);
-    assert_eq!(plain.status.code(), Some(code), "{arguments:?}: {message}");
-    assert!(!message.contains("panicked"), "{message}");
-    assert_eq!(text(&plain.stdout), "", "{arguments:?}");
-    for word in words {
-        assert!(
-            message.contains(word),
-            "{arguments:?}: no {word:?} in {message}"
-        );
-    }
-    let json = hydrograd(&[arguments, &["--json"]].concat());
-    assert_eq!(json.status.code(), Some(code));
-    let value: serde_json::Value = serde_json::from_slice(&json.stdout).unwrap();
-    let message = value["error"].as_str().unwrap();
-    for word in words {
-        assert!(
-            message.contains(word),
-            "{arguments:?}: no {word:?} in {message}"
-        );
-    }
 }
 
 #[test]
@@ -157,12 +117,12 @@ fn bad_scenes_are_told_with_code_1() {
         fails(&[command, &negative], 1, &["body \"a\": mass", "-1"]);
     }
     fails(
-        &["run", &scene("cube.toml"), "--time-step", "0"],
+        &["run", &scene("cube"), "--time-step", "0"],
         1,
         &["time_step", "above zero"],
     );
     fails(
-        &["added-mass", &scene("cube.toml"), "--density=-2"],
+        &["added-mass", &scene("cube"), "--density=-2"],
         1,
         &["fluid.density", "-2"],
     );
@@ -173,7 +133,7 @@ fn bad_scenes_are_told_with_code_1() {
     );
     let taken = file(&folder, "taken", "");
     fails(
-        &["run", &scene("cube.toml"), "--out", &taken],
+        &["run", &scene("cube"), "--out", &taken],
         1,
         &["taken: write failed"],
     );
@@ -221,17 +181,6 @@ fn bad_mesh_fails_the_check_and_keeps_its_report() {
     fails(&["check-mesh", "nowhere.stl"], 1, &["nowhere.stl"]);
 }
 
-/// The one JSON object of a command that succeeds.
-fn json(arguments: &[&str]) -> serde_json::Value {
-    let done = hydrograd(&[arguments, &["--json"]].concat());
-    assert!(
-        done.status.success(),
-        "{arguments:?}: {}",
-        text(&done.stderr)
-    );
-    serde_json::from_slice(&done.stdout).unwrap()
-}
-
 /// All these keys hold finite numbers.
 fn numbers(value: &serde_json::Value, keys: &[&str]) {
     for key in keys {
@@ -253,7 +202,7 @@ fn list(value: &serde_json::Value) -> Vec<f64> {
 fn run_summarises_and_writes_the_trajectory() {
     let folder = tempfile::tempdir().unwrap();
     let out = folder.path().join("out").display().to_string();
-    let ball = scene("falling_ball.toml");
+    let ball = scene("falling_ball");
     for fidelity in ["full", "isolated"] {
         let arguments = [
             "run",
@@ -324,7 +273,7 @@ fn run_summarises_and_writes_the_trajectory() {
 
 #[test]
 fn settings_reach_the_simulator() {
-    let ball = scene("falling_ball.toml");
+    let ball = scene("falling_ball");
     let base = ["run", &ball, "--faces", "80", "--steps", "2"];
     let paper = json(&[&base[..], &["--preset", "paper"]].concat());
     assert_eq!(
@@ -389,7 +338,7 @@ fn added_mass_of_a_sphere() {
 #[test]
 fn added_mass_of_scenes_and_meshes() {
     // Bodies that nothing moves belong to the coupled matrix.
-    let floor = scene("falling_ball_box.toml");
+    let floor = scene("falling_ball_box");
     let report = json(&["added-mass", &floor, "--faces", "80"]);
     let rows: Vec<_> = report["added_mass"]
         .as_array()
@@ -447,7 +396,7 @@ fn added_mass_with_an_estimate_of_its_error() {
     assert!(json(&asked).get("error_estimate").is_none());
     let plain = hydrograd(&[&asked[..], &["--estimate"]].concat());
     assert!(text(&plain.stdout).contains("estimated error 3.1e-2"));
-    let floor = scene("falling_ball.toml");
+    let floor = scene("falling_ball");
     let alone = ["added-mass", &floor, "--fidelity", "isolated", "--estimate"];
     let report = json(&[&alone[..], &["--faces", "320"]].concat());
     numbers(&report["error_estimate"], &["total", "coupling"]);
@@ -455,7 +404,7 @@ fn added_mass_with_an_estimate_of_its_error() {
 
 #[test]
 fn gradcheck_passes_and_tells_its_cost() {
-    let ellipsoid = scene("kirchhoff_ellipsoid.toml");
+    let ellipsoid = scene("kirchhoff_ellipsoid");
     let base = ["gradcheck", &ellipsoid, "--faces", "80", "--steps", "4"];
     for fidelity in ["full", "isolated"] {
         let report = json(&[&base[..], &["--fidelity", fidelity]].concat());
@@ -496,7 +445,7 @@ fn gradcheck_passes_and_tells_its_cost() {
     let plain = hydrograd(&["gradcheck", &pencil]);
     assert!(text(&plain.stdout).contains("clip the gradient"));
     // A solve to one digit can't agree with its own differences.
-    let ball = scene("falling_ball.toml");
+    let ball = scene("falling_ball");
     let loose = hydrograd(&[
         "gradcheck",
         &ball,
@@ -616,7 +565,7 @@ fn bad_starts_are_refused() {
 #[cfg(not(feature = "gpu"))]
 #[test]
 fn a_build_without_the_gpu_says_how_to_get_it() {
-    let ball = scene("falling_ball.toml");
+    let ball = scene("falling_ball");
     let small = ["--faces", "80", "--backend", "gpu"];
     let words = [
         "backend gpu",
@@ -646,7 +595,7 @@ fn a_build_without_the_gpu_says_how_to_get_it() {
 
 #[test]
 fn the_backend_is_in_every_summary() {
-    let ball = scene("falling_ball.toml");
+    let ball = scene("falling_ball");
     let report = json(&["run", &ball, "--faces", "80", "--steps", "1"]);
     assert_eq!(
         (&report["backend"], &report["backend_used"]),
@@ -664,5 +613,21 @@ fn the_backend_is_in_every_summary() {
         &["run", &ball, "--backend", "gup"],
         2,
         &["gup", "cpu", "gpu"],
+    );
+}
+
+#[test]
+fn a_run_says_what_auto_chose() {
+    let scene = scene("falling_ball");
+    let arguments = ["run", &scene, "--steps", "1", "--fidelity", "auto"];
+    let report = json(&arguments);
+    assert_eq!(
+        (&report["fidelity"], &report["fidelity_used"]),
+        (&"auto".into(), &"reduced".into())
+    );
+    assert!(report["chosen"].as_array().unwrap().len() >= 2);
+    crate::support::says(
+        said(&arguments),
+        &["auto: reduced", "chosen  body \"coin\" resolves gaps"],
     );
 }

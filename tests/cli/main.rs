@@ -2,3 +2,6 @@
 
 mod commands;
 mod tradeoff;
+
+#[path = "../support/mod.rs"]
+mod support;

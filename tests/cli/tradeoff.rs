@@ -1,40 +1,16 @@
 //! `hydrograd tradeoff`.
 
+use crate::support::command::{self, hydrograd, scene};
 use serde_json::Value;
 use std::path::Path;
-use std::process::{Command, Output};
-
-fn hydrograd(arguments: &[&str]) -> Output {
-    Command::new(env!("CARGO_BIN_EXE_hydrograd"))
-        .args(arguments)
-        .output()
-        .unwrap()
-}
-
-fn scene(name: &str) -> String {
-    let root = Path::new(env!("CARGO_MANIFEST_DIR"));
-    let file = root.join("examples/scenes").join(name);
-    file.display().to_string()
-}
 
 fn json(arguments: &[&str]) -> Value {
-    let done = hydrograd(&[&["tradeoff"], arguments, &["--json"]].concat());
-    let errors = String::from_utf8_lossy(&done.stderr);
-    assert!(done.status.success(), "{arguments:?}: {errors}");
-    serde_json::from_slice(&done.stdout).unwrap()
+    command::json(&[&["tradeoff"], arguments].concat())
 }
 
 /// Fails with this code and these words, for people and for programs.
 fn fails(arguments: &[&str], code: i32, words: &[&str]) {
-    let done = hydrograd(&[&["tradeoff"], arguments, &["--json"]].concat());
-    let told = String::from_utf8_lossy(&done.stderr);
-    assert_eq!(done.status.code(), Some(code), "{arguments:?}: {told}");
-    let value: Value = serde_json::from_slice(&done.stdout).unwrap();
-    let message = value["error"].as_str().unwrap();
-    for word in words {
-        assert!(told.contains(word), "{arguments:?}: no {word:?} in {told}");
-        assert!(message.contains(word), "no {word:?} in {message}");
-    }
+    command::fails(&[&["tradeoff"], arguments].concat(), code, words);
 }
 
 /// A row's entry that must be a number above zero.
@@ -91,7 +67,7 @@ fn two_spheres_compared() {
     let folder = tempfile::tempdir().unwrap();
     let picture = folder.path().join("new/two.svg").display().to_string();
     let report = json(&[
-        &scene("two_spheres.toml"),
+        &scene("two_spheres"),
         "--fidelities",
         "isolated,reduced,auto,full",
         "--methods",
@@ -257,7 +233,7 @@ fn fronts_are_right(report: &Value) {
 fn what_the_budget_has_no_time_for_is_said() {
     let arguments = [
         "tradeoff",
-        &scene("cube.toml"),
+        &scene("cube"),
         "--faces-list",
         "48",
         "--steps",
@@ -335,7 +311,7 @@ fn a_scene_at_rest_is_compared_by_its_accelerations() {
 
 #[test]
 fn wrong_usage_is_told() {
-    let two = scene("two_spheres.toml");
+    let two = scene("two_spheres");
     fails(&["nowhere.toml"], 1, &["nowhere.toml", "no such file"]);
     fails(&[], 2, &["SCENE.toml"]);
     fails(

@@ -1,94 +1,23 @@
-//! Contact: known answers, conservation, gradients, and bodies in water that touch.
+//! Bodies that fall, rest, meet and land in water: bounds, conservation, and many drops at random.
 
+use super::tools::{above_floor, contact, touching};
+use crate::support::random::Random;
+use crate::support::{self, check_gradient, run};
 use hydrograd::adjoint::lie::{Vec3, exp_matrix};
 use hydrograd::dynamics::Integrator;
-use hydrograd::scene::{Body, Contact, Fluid, Joint, Plane, Scene, Shape};
-use hydrograd::simulate::Rollout;
-use hydrograd::simulate::gradcheck::{self, gradcheck};
-use hydrograd::{Controls, Fidelity, Settings, Simulator};
+use hydrograd::scene::{Body, Joint, Plane, Scene, Shape};
+use hydrograd::{Controls, Fidelity, Simulator};
 use rayon::prelude::*;
 
-const GRAVITY: f64 = 9.81;
-
-fn vacuum() -> Scene {
-    let mut scene = Scene::new(Fluid {
-        density: 0.0,
-        current: [0.0; 3],
-    });
-    scene.gravity = [0.0, 0.0, -GRAVITY];
-    scene.contact = Some(Contact::default());
-    scene
-}
-
-/// Above a floor at z = 0.
-fn above_floor() -> Scene {
-    let mut scene = vacuum();
-    scene.add_wall([0.0; 3], [0.0, 0.0, 1.0]);
-    scene
-}
-
-fn settings(fidelity: Fidelity) -> Settings {
-    Settings::default()
-        .fidelity(fidelity)
-        .integrator(Integrator::MomentumEuler)
-}
-
 fn simulator(scene: &Scene) -> Simulator {
-    Simulator::new(scene, settings(Fidelity::Isolated)).unwrap()
-}
-
-fn run(simulator: &Simulator, steps: usize) -> Rollout<'_> {
-    let rollout = simulator
-        .rollout(&Controls::zeros(simulator, steps))
-        .unwrap();
-    for sample in rollout.samples() {
-        assert!(
-            sample
-                .q
-                .iter()
-                .chain(sample.v.iter())
-                .all(|x| x.is_finite())
-        );
-    }
-    rollout
-}
-
-fn contact(scene: &mut Scene) -> &mut Contact {
-    scene.contact.get_or_insert_default()
-}
-
-#[test]
-fn a_ball_falls_lands_and_rests() {
-    let mut scene = above_floor();
-    scene.add(
-        Body::new(Shape::sphere(0.1))
-            .density(1000.0)
-            .at([0.0, 0.0, 0.3]),
-    );
-    let stiffness = 1e5;
-    contact(&mut scene).stiffness = Some(stiffness);
-    contact(&mut scene).gap = Some(0.002);
-    let simulator = simulator(&scene);
-    let rollout = run(&simulator, 300);
-    let mass = 1000.0 * 4.0 / 3.0 * std::f64::consts::PI * 1e-3;
-    // Free fall until it touches at t = √(2 · 0.198/g) = 0.201 s.
-    let z = |n: usize| rollout.samples()[n].poses[0].translation.z;
-    let fallen = 0.3 - z(18);
-    assert!(
-        (fallen - 0.5 * GRAVITY * 0.01_f64.powi(2) * 18.0 * 19.0).abs() < 1e-10,
-        "{fallen}"
-    );
-    // At rest its weight takes it below the gap by its weight over the stiffness.
-    let rest = 0.102 - mass * GRAVITY / stiffness;
-    assert!((z(300) - rest).abs() < 1e-6, "{} is not {rest}", z(300));
-    assert!(rollout.samples()[300].v.norm() < 1e-6);
+    support::simulator(scene, Fidelity::Isolated, Integrator::MomentumEuler)
 }
 
 /// On the way down and up, no step adds energy: kinetic, of position, and of the compressed contact.
 #[test]
 fn contact_never_adds_energy() {
     for (dissipation, dt) in [(0.0, 0.01), (0.5, 0.01), (0.5, 0.001)] {
-        let mut scene = above_floor();
+        let mut scene = above_floor(0.0);
         scene.time_step = dt;
         scene.add(
             Body::new(Shape::cuboid([0.3, 0.2, 0.1]))
@@ -114,46 +43,8 @@ fn contact_never_adds_energy() {
 }
 
 #[test]
-fn a_block_sticks_below_the_friction_angle_and_slides_above() {
-    let friction = 0.5;
-    for (slope, sticks) in [(0.4_f64, true), (0.6, false)] {
-        let angle = slope.atan();
-        let mut scene = vacuum();
-        scene.add_wall([0.0; 3], [angle.sin(), 0.0, angle.cos()]);
-        let place = [0.05 * angle.sin(), 0.0, 0.05 * angle.cos()];
-        scene.add(
-            Body::new(Shape::cuboid([0.3, 0.3, 0.1]))
-                .density(1000.0)
-                .at(place)
-                .rotated([0.0, angle, 0.0]),
-        );
-        contact(&mut scene).friction = friction;
-        let simulator = simulator(&scene);
-        let rollout = run(&simulator, 200);
-        let along = |n: usize| {
-            let p = rollout.samples()[n].poses[0].translation;
-            p.x * angle.cos() - p.z * angle.sin()
-        };
-        if sticks {
-            // Creep: v_s · tan(slope)/√(μ² − tan²) at most, over two seconds.
-            let creep = 1e-3 * slope / (friction * friction - slope * slope).sqrt() * 2.0;
-            let moved = along(200) - along(20);
-            assert!(moved.abs() <= 1.1 * creep, "{moved} over {creep}");
-        } else {
-            let expected = GRAVITY * (angle.sin() - friction * angle.cos());
-            let h = 0.5;
-            let found = (along(200) - 2.0 * along(150) + along(100)) / (h * h);
-            assert!(
-                (found - expected).abs() < 0.01 * expected,
-                "{found} is not {expected}"
-            );
-        }
-    }
-}
-
-#[test]
 fn a_stack_of_three_rests_for_ten_seconds() {
-    let mut scene = above_floor();
+    let mut scene = above_floor(0.0);
     for k in 0..3 {
         scene.add(
             Body::new(Shape::cuboid([0.2, 0.2, 0.1]))
@@ -175,7 +66,7 @@ fn a_stack_of_three_rests_for_ten_seconds() {
 fn balls_that_meet_head_on() {
     let mut passed = Vec::new();
     for dt in [1e-3, 1e-4] {
-        let mut scene = vacuum();
+        let mut scene = touching(0.0);
         scene.gravity = [0.0; 3];
         scene.time_step = dt;
         let rail = Joint::Prismatic {
@@ -206,60 +97,17 @@ fn balls_that_meet_head_on() {
     );
 }
 
-/// Approach, stick, slip and release, in vacuum and in water.
-#[test]
-fn gradients_through_contact() {
-    let sliding = {
-        let mut scene = above_floor();
-        scene.add(
-            Body::new(Shape::ellipsoid([0.2, 0.1, 0.15]))
-                .density(1000.0)
-                .at([0.0, 0.0, 0.17])
-                .rotated([0.2, 0.3, 0.0]),
-        );
-        scene.initial.v = vec![1.0, 0.2, -0.5, 0.3, -0.2, 0.4];
-        scene
-    };
-    let pressed = {
-        let mut scene = above_floor();
-        scene.add(
-            Body::new(Shape::cuboid([0.3, 0.2, 0.1]))
-                .density(1000.0)
-                .at([0.0, 0.0, 0.051]),
-        );
-        scene.add(
-            Body::new(Shape::sphere(0.08))
-                .density(2000.0)
-                .at([0.03, 0.02, 0.19]),
-        );
-        scene
-    };
-    for (scene, steps) in [(&sliding, 40), (&pressed, 40)] {
-        let mut simulator = simulator(scene);
-        let asked = gradcheck::Settings {
-            steps,
-            directions: 2,
-            seed: 3,
-            timings: 0,
-        };
-        let report = gradcheck(&mut simulator, &asked).unwrap();
-        println!("{:.1e}", report.max_rel_error);
-        assert!(report.max_rel_error <= 1e-5, "{:#?}", report.directions);
-    }
-}
-
 /// In water the gap at which surfaces touch is what the coupling resolves, and the ball that lands carries its added mass.
 #[test]
 fn a_ball_lands_in_water() {
-    let mut scene = above_floor();
-    scene.fluid.density = 1000.0;
+    let mut scene = above_floor(1000.0);
     scene.add(
         Body::new(Shape::sphere(0.1))
             .density(3000.0)
             .at([0.0, 0.0, 0.3])
             .joint(Joint::Planar { plane: Plane::Zx }),
     );
-    let mut simulator = Simulator::new(&scene, settings(Fidelity::Reduced)).unwrap();
+    let mut simulator = support::simulator(&scene, Fidelity::Reduced, Integrator::MomentumEuler);
     let resolved = simulator.discretisation()[0].resolved_gap.unwrap();
     let rollout = run(&simulator, 200);
     let gap = rollout.samples()[200].poses[0].translation.z - 0.1;
@@ -268,14 +116,8 @@ fn a_ball_lands_in_water() {
         "{gap}, resolved {resolved}"
     );
     assert!(rollout.warnings().is_empty(), "{:?}", rollout.warnings());
-    let asked = gradcheck::Settings {
-        steps: 60,
-        directions: 1,
-        seed: 3,
-        timings: 0,
-    };
-    let report = gradcheck(&mut simulator, &asked).unwrap();
-    assert!(report.max_rel_error <= 1e-5, "{:#?}", report.directions);
+    drop(rollout);
+    check_gradient("a ball in water", &mut simulator, 60, 1, 1e-5);
 }
 
 #[test]
@@ -303,16 +145,11 @@ fn constants_are_checked_by_name() {
 /// Two of six kinds of convex shapes above a floor, turning; with `aimed`, the upper one is thrown at the lower one, and all pairs of
 /// kinds come up.
 fn drops(count: usize, dt: f64, aimed: bool) -> Vec<Scene> {
-    let mut state = 1_u64;
-    let mut next = |low: f64, high: f64| {
-        state = state
-            .wrapping_mul(6364136223846793005)
-            .wrapping_add(1442695040888963407);
-        low + (high - low) * (state >> 11) as f64 / (1_u64 << 53) as f64
-    };
+    let mut random = Random(1);
+    let mut next = |low, high| random.between(low, high);
     let mut out = Vec::new();
     for drop in 0..count {
-        let mut scene = above_floor();
+        let mut scene = above_floor(0.0);
         scene.time_step = dt;
         for k in 0..2 {
             let mut size = || next(0.05, 0.15);

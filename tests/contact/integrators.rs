@@ -1,43 +1,11 @@
-//! Contact with each integrator that solves it: rest, sliding, order and gradients; the others refuse.
+//! What every integrator that solves contact does with it, and with joint limits: rest, sliding, gradients; the others refuse.
 
+use super::joints::{arm, slider};
+use super::tools::{above_floor, above_slope, contact};
+use crate::support::{CONTACT_INTEGRATORS, GRAVITY, check_gradient, run, says, simulator};
 use hydrograd::dynamics::Integrator;
-use hydrograd::scene::{Body, Contact, Fluid, Joint, Plane, Preset, Scene, Shape};
-use hydrograd::simulate::Rollout;
-use hydrograd::simulate::gradcheck::{self, gradcheck};
-use hydrograd::{Controls, Fidelity, Settings, Simulator};
-
-const GRAVITY: f64 = 9.81;
-
-const INTEGRATORS: [Integrator; 3] = [
-    Integrator::MomentumEuler,
-    Integrator::Midpoint,
-    Integrator::VelocityEuler,
-];
-
-/// Above a floor that leans by `slope`, with a contact of these constants.
-fn above(slope: f64, contact: Contact) -> Scene {
-    let mut scene = Scene::new(Fluid {
-        density: 0.0,
-        current: [0.0; 3],
-    });
-    scene.gravity = [0.0, 0.0, -GRAVITY];
-    scene.add_wall([0.0; 3], [slope.atan().sin(), 0.0, slope.atan().cos()]);
-    scene.contact = Some(contact);
-    scene
-}
-
-fn simulator(scene: &Scene, fidelity: Fidelity, integrator: Integrator) -> Simulator {
-    let settings = Settings::default()
-        .fidelity(fidelity)
-        .integrator(integrator);
-    Simulator::new(scene, settings).unwrap()
-}
-
-fn run(simulator: &Simulator, steps: usize) -> Rollout<'_> {
-    simulator
-        .rollout(&Controls::zeros(simulator, steps))
-        .unwrap()
-}
+use hydrograd::scene::{Body, Joint, Plane, Preset, Scene, Shape};
+use hydrograd::{Fidelity, Settings, Simulator};
 
 /// What the velocity at a state reads of a body at rest under weight: with midpoint the weight's half step is still to come.
 fn at_rest(integrator: Integrator, dt: f64) -> f64 {
@@ -49,47 +17,48 @@ fn at_rest(integrator: Integrator, dt: f64) -> f64 {
 
 /// Dropped on the floor it rests where its weight presses it to, at any stiffness.
 #[test]
-fn a_ball_comes_to_rest() {
+fn a_ball_falls_and_comes_to_rest() {
     let mass = 1000.0 * 4.0 / 3.0 * std::f64::consts::PI * 1e-3;
-    for integrator in INTEGRATORS {
-        for stiffness in [1e4, 1e6, 1e9] {
-            let width = 1e-4;
-            let mut scene = above(
-                0.0,
-                Contact {
-                    stiffness: Some(stiffness),
-                    gap: Some(0.002),
-                    width: Some(width),
-                    ..Contact::default()
-                },
-            );
+    for integrator in CONTACT_INTEGRATORS {
+        for (stiffness, width) in [
+            (1e4, Some(1e-4)),
+            (1e5, None),
+            (1e6, Some(1e-4)),
+            (1e9, Some(1e-4)),
+        ] {
+            let mut scene = above_floor(0.0);
+            let c = contact(&mut scene);
+            (c.stiffness, c.gap, c.width) = (Some(stiffness), Some(0.002), width);
             let ball = Body::new(Shape::sphere(0.1)).density(1000.0);
             scene.add(ball.at([0.0, 0.0, 0.3]));
             let simulator = simulator(&scene, Fidelity::Isolated, integrator);
             let rollout = run(&simulator, 300);
-            let end = &rollout.samples()[300];
-            // Depth at which the smoothed law carries the weight.
+            let at = |n: usize| rollout.samples()[n].poses[0].translation;
+            // It falls freely until it touches at t = √(2 · 0.198/g) = 0.201 s; Euler's method takes the speed after each step.
+            if integrator == Integrator::MomentumEuler {
+                let fallen = 0.3 - at(18).z;
+                let expected = 0.5 * GRAVITY * 0.01_f64.powi(2) * 18.0 * 19.0;
+                assert!((fallen - expected).abs() < 1e-10, "{fallen}");
+            }
+            // Depth at which the smoothed law carries the weight; the default width is less than that.
             let depth = mass * GRAVITY / stiffness;
-            let depth = match depth < width {
-                true => 2.0 * (width * depth).sqrt() - width,
-                false => depth,
+            let depth = match width {
+                Some(width) if depth < width => 2.0 * (width * depth).sqrt() - width,
+                _ => depth,
             };
             let rest = 0.102 - depth;
-            let moved = end.poses[0].translation - rollout.samples()[299].poses[0].translation;
+            let (v, moved) = (&rollout.samples()[300].v, at(300) - at(299));
             println!(
                 "{integrator:?} {stiffness:.0e}: {:.1e} m off, reads {:.6} m/s, moves {:.1e} m a step",
-                end.poses[0].translation.z - rest,
-                end.v[2],
+                at(300).z - rest,
+                v[2],
                 moved.norm(),
             );
-            assert!((end.poses[0].translation.z - rest).abs() < 1e-6);
+            assert!((at(300).z - rest).abs() < 1e-6);
             assert!(moved.norm() < 1e-8);
-            let reads = at_rest(integrator, simulator.time_step());
-            assert!(
-                (end.v[2] - reads).abs() < 1e-6,
-                "{} is not {reads}",
-                end.v[2]
-            );
+            let mut reads = v.clone();
+            reads[2] -= at_rest(integrator, simulator.time_step());
+            assert!(reads.norm() < 1e-6, "{reads}");
         }
     }
 }
@@ -97,15 +66,10 @@ fn a_ball_comes_to_rest() {
 #[test]
 fn a_block_sticks_below_the_friction_angle_and_slides_above() {
     let friction = 0.5;
-    for integrator in INTEGRATORS {
+    for integrator in CONTACT_INTEGRATORS {
         for (slope, sticks) in [(0.4_f64, true), (0.6, false)] {
-            let mut scene = above(
-                slope,
-                Contact {
-                    friction,
-                    ..Contact::default()
-                },
-            );
+            let mut scene = above_slope(slope, 0.0);
+            contact(&mut scene).friction = friction;
             let angle = slope.atan();
             scene.add(
                 Body::new(Shape::cuboid([0.3, 0.3, 0.1]))
@@ -120,6 +84,7 @@ fn a_block_sticks_below_the_friction_angle_and_slides_above() {
                 p.x * angle.cos() - p.z * angle.sin()
             };
             if sticks {
+                // Creep at v_s · tan(slope)/√(μ² − tan²) at most, over 1.8 seconds.
                 let creep = 1e-3 * slope / (friction * friction - slope * slope).sqrt();
                 let moved = along(200) - along(20);
                 println!("{integrator:?}: creeps {:.2e} m/s", moved / 1.8);
@@ -137,8 +102,8 @@ fn a_block_sticks_below_the_friction_angle_and_slides_above() {
 /// Before anything touches, contact changes no bit.
 #[test]
 fn nothing_changes_where_nothing_touches() {
-    for integrator in INTEGRATORS {
-        let mut with = above(0.0, Contact::default());
+    for integrator in CONTACT_INTEGRATORS {
+        let mut with = above_floor(0.0);
         let body = Body::new(Shape::ellipsoid([0.2, 0.1, 0.15])).density(1000.0);
         with.add(body.at([0.0, 0.0, 2.0]));
         with.initial.v = vec![1.0, 0.2, -0.5, 0.3, -0.2, 0.4];
@@ -153,38 +118,9 @@ fn nothing_changes_where_nothing_touches() {
     }
 }
 
-fn check_gradient(scene: &Scene, fidelity: Fidelity, integrator: Integrator, steps: usize) {
-    let end = |scene: &Scene| {
-        let simulator = simulator(scene, fidelity, integrator);
-        run(&simulator, steps).samples()[steps].q.clone()
-    };
-    let mut alone = scene.clone();
-    (alone.contact, alone.walls) = (None, Vec::new());
-    assert!((end(scene) - end(&alone)).norm() > 0.1, "nothing touches");
-    let mut simulator = simulator(scene, fidelity, integrator);
-    let asked = gradcheck::Settings {
-        steps,
-        directions: 2,
-        seed: 3,
-        timings: 0,
-    };
-    let report = gradcheck(&mut simulator, &asked).unwrap();
-    println!(
-        "{} {integrator:?}: {:.1e}",
-        scene.name, report.max_rel_error
-    );
-    assert!(
-        report.max_rel_error <= 1e-5,
-        "{integrator:?}: {:#?}",
-        report.directions
-    );
-}
-
-/// Approach, stick, slip and release, in vacuum and in water.
-#[test]
-fn gradients_through_contact() {
-    let mut sliding = above(0.0, Contact::default());
-    sliding.name = "sliding".into();
+/// An ellipsoid that lands, slides and comes off; a ball pressed on a block; a ball that lands in water.
+fn landing() -> [(&'static str, Scene, Fidelity); 3] {
+    let mut sliding = above_floor(0.0);
     sliding.add(
         Body::new(Shape::ellipsoid([0.2, 0.1, 0.15]))
             .density(1000.0)
@@ -192,15 +128,12 @@ fn gradients_through_contact() {
             .rotated([0.2, 0.3, 0.0]),
     );
     sliding.initial.v = vec![1.0, 0.2, -0.5, 0.3, -0.2, 0.4];
-    let mut pressed = above(0.0, Contact::default());
-    pressed.name = "pressed".into();
+    let mut pressed = above_floor(0.0);
     let block = Body::new(Shape::cuboid([0.3, 0.2, 0.1])).density(1000.0);
     pressed.add(block.at([0.0, 0.0, 0.051]));
     let ball = Body::new(Shape::sphere(0.08)).density(2000.0);
     pressed.add(ball.at([0.03, 0.02, 0.19]));
-    let mut submerged = above(0.0, Contact::default());
-    submerged.name = "submerged".into();
-    submerged.fluid.density = 1000.0;
+    let mut submerged = above_floor(1000.0);
     submerged.add(
         Body::new(Shape::sphere(0.1))
             .density(3000.0)
@@ -208,28 +141,92 @@ fn gradients_through_contact() {
             .joint(Joint::Planar { plane: Plane::Zx }),
     );
     submerged.initial.v = vec![-0.3, 0.2, 0.0];
-    for integrator in INTEGRATORS {
-        check_gradient(&sliding, Fidelity::Isolated, integrator, 40);
-        check_gradient(&pressed, Fidelity::Isolated, integrator, 40);
-        check_gradient(&submerged, Fidelity::Reduced, integrator, 40);
+    [
+        ("sliding", sliding, Fidelity::Isolated),
+        ("pressed", pressed, Fidelity::Isolated),
+        ("submerged", submerged, Fidelity::Reduced),
+    ]
+}
+
+/// Joints that are driven past their limits, in vacuum and in water.
+fn limited() -> [(&'static str, Scene, Fidelity); 3] {
+    [
+        ("slider", slider(), Fidelity::Isolated),
+        ("arm", arm(0.0), Fidelity::Isolated),
+        ("arm in water", arm(998.0), Fidelity::Reduced),
+    ]
+}
+
+const STEPS: usize = 40;
+
+/// Approach, stick, slip and release, in vacuum and in water; joints on their way to the limit and at it.
+fn gradients(integrator: Integrator) {
+    for (name, scene, fidelity) in landing() {
+        let mut with = simulator(&scene, fidelity, integrator);
+        let mut alone = scene.clone();
+        (alone.contact, alone.walls) = (None, Vec::new());
+        let alone = simulator(&alone, fidelity, integrator);
+        let [there, free] = [&with, &alone].map(|s| run(s, STEPS).samples()[STEPS].q.clone());
+        assert!((there - free).norm() > 0.1, "{name}: nothing touches");
+        check_gradient(&format!("{name} {integrator:?}"), &mut with, STEPS, 2, 1e-5);
+    }
+    for (name, scene, fidelity) in limited() {
+        let mut simulator = simulator(&scene, fidelity, integrator);
+        let rollout = run(&simulator, STEPS);
+        for limit in &simulator.system().limits {
+            let q = rollout.samples().iter().map(|s| s.q[limit.q]);
+            let [low, high] = limit.range;
+            let past = q.fold(0.0_f64, |m, q| m.max(q - high).max(low - q));
+            assert!(past > 0.0, "{name}: {limit:?} is not reached");
+        }
+        drop(rollout);
+        check_gradient(
+            &format!("{name} {integrator:?}"),
+            &mut simulator,
+            STEPS,
+            2,
+            1e-5,
+        );
     }
 }
 
 #[test]
+fn gradients_with_momentum_euler() {
+    gradients(Integrator::MomentumEuler);
+}
+
+#[test]
+fn gradients_with_midpoint() {
+    gradients(Integrator::Midpoint);
+}
+
+#[test]
+fn gradients_with_velocity_euler() {
+    gradients(Integrator::VelocityEuler);
+}
+
+#[test]
 fn integrators_that_cannot_do_it_say_so() {
-    let mut scene = above(0.0, Contact::default());
-    let ball = Body::new(Shape::sphere(0.1)).density(1000.0);
-    scene.add(ball.at([0.0, 0.0, 0.3]));
-    for integrator in [Integrator::Rk2, Integrator::Rk4] {
-        let settings = Settings::default().fidelity(Fidelity::Isolated);
-        let made = Simulator::new(&scene, settings.integrator(integrator));
-        let said = made.map(|_| ()).unwrap_err().to_string();
-        for word in ["contact", "momentum-euler", "midpoint", "velocity-euler"] {
-            assert!(said.contains(word), "no {word} in: {said}");
+    let mut ball = above_floor(0.0);
+    ball.add(
+        Body::new(Shape::sphere(0.1))
+            .density(1000.0)
+            .at([0.0, 0.0, 0.3]),
+    );
+    for (mut scene, words) in [
+        (ball, &["contact"][..]),
+        (slider(), &["limits", "\"slider\""]),
+    ] {
+        for integrator in [Integrator::Rk2, Integrator::Rk4] {
+            let settings = Settings::default().fidelity(Fidelity::Isolated);
+            let made = Simulator::new(&scene, settings.integrator(integrator));
+            let said = made.map(|_| ()).unwrap_err();
+            says(&said, words);
+            says(&said, &["momentum-euler", "midpoint", "velocity-euler"]);
         }
+        let chosen = |scene: &Scene| Settings::for_scene(scene).integrator;
+        assert_eq!(chosen(&scene), Integrator::MomentumEuler);
+        scene.preset = Preset::Paper;
+        assert_eq!(chosen(&scene), Integrator::VelocityEuler);
     }
-    let chosen = |scene: &Scene| Settings::for_scene(scene).integrator;
-    assert_eq!(chosen(&scene), Integrator::MomentumEuler);
-    scene.preset = Preset::Paper;
-    assert_eq!(chosen(&scene), Integrator::VelocityEuler);
 }

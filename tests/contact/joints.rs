@@ -1,42 +1,25 @@
-//! Joints at their limits: where they stop, what they lose, in water, gradients, and scenes that can't be.
+//! Joints at their limits: where they stop, what they lose, in water, and scenes that can't be.
 
+use super::tools::{RAIL, under_gravity};
+use crate::support::{CONTACT_INTEGRATORS, GRAVITY, run, says, simulator};
 use hydrograd::dynamics::Integrator;
-use hydrograd::scene::{Body, Contact, Fluid, Joint, Motion, Preset, Scene, Shape};
-use hydrograd::simulate::Rollout;
-use hydrograd::simulate::gradcheck::{self, gradcheck};
-use hydrograd::{Controls, Fidelity, Settings, Simulator};
+use hydrograd::scene::{Body, Contact, Fluid, Joint, Motion, Scene, Shape};
+use hydrograd::{Fidelity, Rollout, Settings, Simulator};
 use std::f64::consts::PI;
 
-const GRAVITY: f64 = 9.81;
-
-const INTEGRATORS: [Integrator; 3] = [
-    Integrator::MomentumEuler,
-    Integrator::Midpoint,
-    Integrator::VelocityEuler,
-];
-
-const Z: Joint = Joint::Prismatic {
-    axis: [0.0, 0.0, 1.0],
-};
 const HINGE: Joint = Joint::Revolute {
     axis: [0.0, 1.0, 0.0],
 };
 
-fn vacuum() -> Scene {
-    let mut scene = Scene::new(Fluid::none());
-    scene.gravity = [0.0, 0.0, -GRAVITY];
-    scene
-}
-
 /// A mass of 2 kg that slides up and down by 0.3 m.
-fn slider() -> Scene {
-    let mut scene = vacuum();
+pub fn slider() -> Scene {
+    let mut scene = under_gravity(0.0);
     scene.add(
         Body::dry()
             .named("slider")
             .mass(2.0)
             .inertia([0.01; 3])
-            .joint(Z)
+            .joint(RAIL)
             .limits([-0.3, 0.3]),
     );
     scene
@@ -44,7 +27,7 @@ fn slider() -> Scene {
 
 /// A mass of 1 kg on an arm of 0.5 m that falls from the horizontal and is stopped before it hangs.
 fn pendulum() -> Scene {
-    let mut scene = vacuum();
+    let mut scene = under_gravity(0.0);
     scene.time_step = 1e-3;
     scene.add(
         Body::dry()
@@ -58,19 +41,6 @@ fn pendulum() -> Scene {
     scene
 }
 
-fn simulator(scene: &Scene, fidelity: Fidelity, integrator: Integrator) -> Simulator {
-    let settings = Settings::default()
-        .fidelity(fidelity)
-        .integrator(integrator);
-    Simulator::new(scene, settings).unwrap()
-}
-
-fn run(simulator: &Simulator, steps: usize) -> Rollout<'_> {
-    simulator
-        .rollout(&Controls::zeros(simulator, steps))
-        .unwrap()
-}
-
 /// Highest energy above that at the start.
 fn gain(rollout: &Rollout) -> f64 {
     let first = rollout.samples()[0].energy();
@@ -82,7 +52,7 @@ fn gain(rollout: &Rollout) -> f64 {
 /// law carries its weight.
 #[test]
 fn a_slider_falls_on_its_stop() {
-    for integrator in INTEGRATORS {
+    for integrator in CONTACT_INTEGRATORS {
         let simulator = simulator(&slider(), Fidelity::Isolated, integrator);
         let rollout = run(&simulator, 200);
         let q = |n: usize| rollout.samples()[n].q[0];
@@ -110,7 +80,7 @@ fn a_slider_falls_on_its_stop() {
 
 #[test]
 fn a_pendulum_is_stopped() {
-    for integrator in INTEGRATORS {
+    for integrator in CONTACT_INTEGRATORS {
         let simulator = simulator(&pendulum(), Fidelity::Isolated, integrator);
         let rollout = run(&simulator, 3000);
         let q = |n: usize| rollout.samples()[n].q[0];
@@ -142,7 +112,7 @@ fn a_pendulum_is_stopped() {
 #[test]
 fn a_limit_between_bodies_keeps_momentum() {
     for integrator in [Integrator::MomentumEuler, Integrator::Midpoint] {
-        let mut scene = vacuum();
+        let mut scene = under_gravity(0.0);
         scene.gravity = [0.0; 3];
         scene.add(Body::dry().named("base").mass(3.0).inertia([0.2, 0.1, 0.2]));
         scene.add(
@@ -175,11 +145,11 @@ fn water_is_stopped_as_well() {
     let volume = 4.0 / 3.0 * PI * 1e-3;
     let mass = (800.0 + 0.5 * density) * volume;
     for stiffness in [None, Some(3e4)] {
-        for integrator in INTEGRATORS {
+        for integrator in CONTACT_INTEGRATORS {
             let mut scene = Scene::new(Fluid::fresh_water());
             scene.time_step = dt;
             let ball = Body::new(Shape::sphere(0.1)).density(800.0).named("ball");
-            let mut ball = ball.joint(Z).limits([-0.02, 0.103]);
+            let mut ball = ball.joint(RAIL).limits([-0.02, 0.103]);
             ball.limit_stiffness = stiffness;
             scene.add(ball);
             scene.initial.v = vec![1.0];
@@ -199,9 +169,8 @@ fn water_is_stopped_as_well() {
 }
 
 /// Both joints of an arm that is driven into its limits: one by a torque, one by its weight.
-fn arm(water: f64) -> Scene {
-    let mut scene = vacuum();
-    scene.fluid.density = water;
+pub fn arm(water: f64) -> Scene {
+    let mut scene = under_gravity(water);
     let link = |length: f64| {
         Body::new(Shape::ellipsoid([0.5 * length, 0.05, 0.04]))
             .density(1500.0)
@@ -227,82 +196,12 @@ fn arm(water: f64) -> Scene {
     scene
 }
 
-#[test]
-fn gradients_through_a_limit() {
-    let mut cases = Vec::new();
-    for integrator in INTEGRATORS {
-        cases.push(("slider", slider(), Fidelity::Isolated, integrator, 40));
-        cases.push(("arm", arm(0.0), Fidelity::Isolated, integrator, 40));
-        cases.push((
-            "arm in water",
-            arm(998.0),
-            Fidelity::Reduced,
-            integrator,
-            40,
-        ));
-    }
-    for (name, scene, fidelity, integrator, steps) in cases {
-        let mut simulator = simulator(&scene, fidelity, integrator);
-        let rollout = run(&simulator, steps);
-        let limits = &simulator.system().limits;
-        let at = |l: &hydrograd::dynamics::JointLimit| {
-            let q = rollout.samples().iter().map(|s| s.q[l.q]);
-            q.fold(0.0_f64, |m, q| m.max(q - l.range[1]).max(l.range[0] - q))
-        };
-        let past: Vec<f64> = limits.iter().map(at).collect();
-        assert!(past.iter().all(|p| *p > 0.0), "{name}: {past:?}");
-        drop(rollout);
-        let asked = gradcheck::Settings {
-            steps,
-            directions: 2,
-            seed: 3,
-            timings: 0,
-        };
-        let report = gradcheck(&mut simulator, &asked).unwrap();
-        println!(
-            "{name} {integrator:?}: {:.1e}, past {past:?}",
-            report.max_rel_error
-        );
-        assert!(
-            report.max_rel_error <= 1e-5,
-            "{name} {integrator:?}: {:#?}",
-            report.directions
-        );
-    }
-}
-
-#[test]
-fn integrators_that_cannot_do_it_say_so() {
-    let mut scene = slider();
-    for integrator in [Integrator::Rk2, Integrator::Rk4] {
-        let settings = Settings::default().fidelity(Fidelity::Isolated);
-        let made = Simulator::new(&scene, settings.integrator(integrator));
-        let said = made.map(|_| ()).unwrap_err().to_string();
-        for word in [
-            "limits",
-            "\"slider\"",
-            "momentum-euler",
-            "midpoint",
-            "velocity-euler",
-        ] {
-            assert!(said.contains(word), "no {word} in: {said}");
-        }
-    }
-    let chosen = |scene: &Scene| Settings::for_scene(scene).integrator;
-    assert_eq!(chosen(&scene), Integrator::MomentumEuler);
-    scene.preset = Preset::Paper;
-    assert_eq!(chosen(&scene), Integrator::VelocityEuler);
-}
-
 #[track_caller]
 fn refused(change: impl FnOnce(&mut Body), words: &[&str]) {
     let mut scene = slider();
     scene.validate().unwrap();
     change(&mut scene.bodies[0]);
-    let said = scene.validate().unwrap_err().to_string();
-    for word in words {
-        assert!(said.contains(word), "no {word:?} in: {said}");
-    }
+    says(scene.validate().unwrap_err(), words);
 }
 
 #[test]
@@ -404,7 +303,7 @@ fn limits_and_surfaces_share_the_load() {
     // The range is small, so that the depth at which the two carry is beyond the width.
     body.limits = Some([-0.3, -0.29]);
     scene.initial.q = vec![-0.295];
-    for integrator in INTEGRATORS {
+    for integrator in CONTACT_INTEGRATORS {
         let simulator = simulator(&scene, Fidelity::Isolated, integrator);
         let rollout = run(&simulator, 300);
         let depth = -0.3 - rollout.samples()[300].q[0];

@@ -5,3 +5,7 @@ mod geometry;
 mod integrators;
 mod joints;
 mod physics;
+mod tools;
+
+#[path = "../support/mod.rs"]
+mod support;

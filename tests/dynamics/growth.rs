@@ -1,5 +1,6 @@
 //! How much a trajectory magnifies changes of its state: known answers, and differences.
 
+use crate::support;
 use hydrograd::dynamics::Integrator;
 use hydrograd::scene::{Body, Contact, Fluid, Joint, Motion, Scene, Shape};
 use hydrograd::simulate::growth::growth;
@@ -7,10 +8,7 @@ use hydrograd::{Controls, Fidelity, Settings, Simulator};
 use nalgebra::{DMatrix, DVector};
 
 fn simulator(scene: &Scene, integrator: Integrator) -> Simulator {
-    let settings = Settings::default()
-        .fidelity(Fidelity::Isolated)
-        .integrator(integrator);
-    Simulator::new(scene, settings).unwrap()
+    support::simulator(scene, Fidelity::Isolated, integrator)
 }
 
 /// Largest singular value of [1 s; 0 1].

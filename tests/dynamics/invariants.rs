@@ -1,5 +1,6 @@
 //! What motion in an ideal fluid conserves, how integrators converge, and what can be told without computing.
 
+use crate::support::{INTEGRATORS, example};
 use hydrograd::adjoint::lie::Vec6;
 use hydrograd::boundary::OneBody;
 use hydrograd::dynamics::{Input, Integrator, State};
@@ -7,7 +8,6 @@ use hydrograd::scene::{Body, Controller, Fluid, Joint, Motion, Scene, Shape};
 use hydrograd::simulate::Sample;
 use hydrograd::{Controls, Fidelity, Settings, Simulator};
 use nalgebra::DVector;
-use std::path::Path;
 
 const MOMENTUM_FORMS: [Integrator; 4] = [
     Integrator::MomentumEuler,
@@ -15,14 +15,6 @@ const MOMENTUM_FORMS: [Integrator; 4] = [
     Integrator::Rk2,
     Integrator::Rk4,
 ];
-const INTEGRATORS: [Integrator; 5] = [
-    Integrator::MomentumEuler,
-    Integrator::Midpoint,
-    Integrator::Rk2,
-    Integrator::Rk4,
-    Integrator::VelocityEuler,
-];
-
 fn simulator(scene: &Scene, fidelity: Fidelity, integrator: Integrator) -> Simulator {
     let settings = Settings::default()
         .fidelity(fidelity)
@@ -403,8 +395,7 @@ fn a_bubble_rises_at_nearly_twice_gravity() {
 
 /// Net displacement of the fish's middle link over a cycle, in its length, and its turn.
 fn swim(with_mass: bool, integrator: Integrator) -> (f64, f64) {
-    let file = Path::new(env!("CARGO_MANIFEST_DIR")).join("examples/scenes/fish.toml");
-    let mut scene = Scene::load(file).unwrap();
+    let mut scene = example("fish");
     assert!(matches!(
         scene.bodies[1].motion.as_deref(),
         Some([Motion::Sine { .. }])

@@ -10,3 +10,6 @@ mod optimize;
 mod resume;
 mod rollout_gradient;
 mod trees;
+
+#[path = "../support/mod.rs"]
+mod support;

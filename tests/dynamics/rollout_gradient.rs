@@ -1,21 +1,13 @@
 //! Gradients of whole rollouts against central differences: every integrator, every fidelity,
 //! every kind of joint.
 
+use crate::support::{INTEGRATORS, example};
 use hydrograd::dynamics::Integrator;
 use hydrograd::scene::{Body, BodyId, Fluid, Joint, Plane, Scene, Shape};
 use hydrograd::simulate::Sample;
 use hydrograd::simulate::gradcheck::{self, gradcheck};
 use hydrograd::{Controls, Fidelity, Settings, Simulator, objective};
 use nalgebra::DVector;
-use std::path::Path;
-
-const INTEGRATORS: [Integrator; 5] = [
-    Integrator::MomentumEuler,
-    Integrator::Midpoint,
-    Integrator::Rk2,
-    Integrator::Rk4,
-    Integrator::VelocityEuler,
-];
 
 const FIDELITIES: [Fidelity; 4] = [
     Fidelity::Isolated,
@@ -55,16 +47,17 @@ fn check(scene: &Scene, fidelity: Fidelity, integrator: Integrator, steps: usize
     );
 }
 
-fn scene(name: &str) -> Scene {
-    let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("examples/scenes");
-    Scene::load(folder.join(format!("{name}.toml"))).unwrap()
-}
-
 #[test]
 fn kirchhoff_ellipsoid() {
     for integrator in INTEGRATORS {
         for fidelity in FIDELITIES {
-            check(&scene("kirchhoff_ellipsoid"), fidelity, integrator, 10, 80);
+            check(
+                &example("kirchhoff_ellipsoid"),
+                fidelity,
+                integrator,
+                10,
+                80,
+            );
         }
     }
 }
@@ -73,7 +66,7 @@ fn kirchhoff_ellipsoid() {
 fn coins() {
     for integrator in INTEGRATORS {
         for fidelity in FIDELITIES {
-            check(&scene("coins"), fidelity, integrator, 8, 80);
+            check(&example("coins"), fidelity, integrator, 8, 80);
         }
     }
 }
@@ -82,7 +75,7 @@ fn coins() {
 fn falling_ball() {
     for integrator in INTEGRATORS {
         for fidelity in FIDELITIES {
-            check(&scene("falling_ball"), fidelity, integrator, 20, 80);
+            check(&example("falling_ball"), fidelity, integrator, 20, 80);
         }
     }
 }
@@ -91,7 +84,7 @@ fn falling_ball() {
 fn falling_ball_for_a_hundred_steps() {
     for integrator in INTEGRATORS {
         for fidelity in FIDELITIES {
-            check(&scene("falling_ball"), fidelity, integrator, 100, 20);
+            check(&example("falling_ball"), fidelity, integrator, 100, 20);
         }
     }
 }
@@ -144,7 +137,7 @@ fn a_pair_that_comes_and_goes() {
 #[test]
 fn objectives_are_checked_and_differentiated() {
     let settings = Settings::default().faces(80).tolerance(1e-13);
-    let mut simulator = Simulator::new(&scene("coins"), settings).unwrap();
+    let mut simulator = Simulator::new(&example("coins"), settings).unwrap();
     let controls = Controls::zeros(&simulator, 5);
     let body = BodyId(1);
     let goal = objective::final_position(body, [0.1, 0.0, 0.2])

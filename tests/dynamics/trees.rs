@@ -1,6 +1,8 @@
 //! Trees of every joint type in a current, with gravity, buoyancy and drag: the momentum form against the
 //! velocity form, and gradients of rollouts against differences.
 
+use crate::support::INTEGRATORS;
+use crate::support::random::Random;
 use hydrograd::dynamics::{Drive, Integrator, System};
 use hydrograd::scene::{
     Body, Controller, Drag, DragPart, Fluid, Joint, Motion, Plane, Scene, Shape,
@@ -9,37 +11,6 @@ use hydrograd::simulate::gradcheck::{self, gradcheck};
 use hydrograd::simulate::{Action, ActionBar, Observation, Policy};
 use hydrograd::{Controls, Fidelity, Settings, Simulator};
 use nalgebra::DVector;
-
-const INTEGRATORS: [Integrator; 5] = [
-    Integrator::MomentumEuler,
-    Integrator::Midpoint,
-    Integrator::Rk2,
-    Integrator::Rk4,
-    Integrator::VelocityEuler,
-];
-
-/// Uniform numbers in (−1, 1), the same on every machine.
-struct Random(u64);
-
-impl Random {
-    fn next(&mut self) -> f64 {
-        self.0 = self
-            .0
-            .wrapping_mul(6364136223846793005)
-            .wrapping_add(1442695040888963407);
-        (self.0 >> 11) as f64 / (1u64 << 52) as f64 - 1.0
-    }
-
-    fn vector(&mut self, scale: f64) -> [f64; 3] {
-        std::array::from_fn(|_| scale * self.next())
-    }
-
-    fn direction(&mut self) -> [f64; 3] {
-        let v = self.vector(1.0);
-        let norm = v.iter().map(|x| x * x).sum::<f64>().sqrt();
-        v.map(|x| x / norm)
-    }
-}
 
 /// How one joint of a tree is moved.
 #[derive(Clone, Copy, PartialEq)]
@@ -107,7 +78,7 @@ fn attempt(tree: usize, random: &mut Random) -> Scene {
             .rotated(random.vector(1.0))
             .shape_at(random.vector(0.02), random.vector(1.0))
             .center_of_mass(random.vector(0.01))
-            .density(998.0 + 200.0 * random.next())
+            .density(998.0 + 200.0 * random.number())
             .joint(joint)
             .drag(Drag {
                 part: parts[b % 3],
@@ -125,10 +96,10 @@ fn attempt(tree: usize, random: &mut Random) -> Scene {
             Moved::ByMotion => {
                 let motions: Vec<Motion> = (0..joint.coordinates())
                     .map(|k| Motion::Sine {
-                        offset: 0.02 * random.next(),
-                        amplitude: 0.1 + 0.05 * random.next(),
+                        offset: 0.02 * random.number(),
+                        amplitude: 0.1 + 0.05 * random.number(),
                         frequency: 4.0 + k as f64,
-                        phase: random.next(),
+                        phase: random.number(),
                     })
                     .collect();
                 body = body.driven(motions);
@@ -145,9 +116,12 @@ fn attempt(tree: usize, random: &mut Random) -> Scene {
             scene.initial.v.extend(vec![0.0; nv]);
             continue;
         }
-        scene.initial.v.extend((0..nv).map(|_| 0.4 * random.next()));
+        scene
+            .initial
+            .v
+            .extend((0..nv).map(|_| 0.4 * random.number()));
         let quaternion = |r: &mut Random| {
-            let q: [f64; 4] = std::array::from_fn(|k| if k == 0 { 1.0 } else { 0.4 * r.next() });
+            let q: [f64; 4] = std::array::from_fn(|k| if k == 0 { 1.0 } else { 0.4 * r.number() });
             let norm = q.iter().map(|x| x * x).sum::<f64>().sqrt();
             q.map(|x| x / norm)
         };
@@ -158,11 +132,13 @@ fn attempt(tree: usize, random: &mut Random) -> Scene {
                 q.extend(random.vector(0.05));
                 q.extend(quaternion(random));
             }
-            _ => q.extend((0..nq).map(|_| 0.1 * random.next())),
+            _ => q.extend((0..nq).map(|_| 0.1 * random.number())),
         }
     }
     scene.controller = Some(Controller::Constant {
-        control: (0..scene.controls()).map(|_| 0.3 * random.next()).collect(),
+        control: (0..scene.controls())
+            .map(|_| 0.3 * random.number())
+            .collect(),
     });
     scene
 }

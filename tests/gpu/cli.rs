@@ -1,41 +1,14 @@
 //! The command line's GPU flags, on an adapter that is there and on one that isn't.
 
 use super::fixture::{context, difference};
-use std::process::{Command, Output};
+use crate::support::command::{command, json, scene, text};
+use std::process::Output;
 
-fn command(arguments: &[&str]) -> Command {
-    let mut command = Command::new(env!("CARGO_BIN_EXE_hydrograd"));
-    command.args(arguments);
-    command
-}
-
-fn json(output: &Output) -> serde_json::Value {
+/// The one JSON object on standard output, whatever the end.
+fn object(output: &Output) -> serde_json::Value {
     let message = String::from_utf8_lossy(&output.stderr);
     assert!(!message.contains("panicked"), "{message}");
     serde_json::from_slice(&output.stdout).unwrap()
-}
-
-/// The one JSON object of a command that succeeds.
-fn good(arguments: &[&str]) -> serde_json::Value {
-    let done = command(arguments).arg("--json").output().unwrap();
-    let message = String::from_utf8_lossy(&done.stderr);
-    assert!(done.status.success(), "{arguments:?}: {message}");
-    json(&done)
-}
-
-/// Text for people of a command that succeeds.
-fn text(arguments: &[&str]) -> String {
-    let done = command(arguments).output().unwrap();
-    let message = String::from_utf8_lossy(&done.stderr);
-    assert!(done.status.success(), "{arguments:?}: {message}");
-    String::from_utf8(done.stdout).unwrap()
-}
-
-fn ball() -> String {
-    format!(
-        "{}/examples/scenes/falling_ball.toml",
-        env!("CARGO_MANIFEST_DIR")
-    )
 }
 
 fn list(value: &serde_json::Value) -> Vec<f64> {
@@ -45,9 +18,9 @@ fn list(value: &serde_json::Value) -> Vec<f64> {
 
 #[test]
 fn a_run_on_the_gpu_is_the_cpus_and_says_what_it_ran_on() {
-    let ball = ball();
+    let ball = scene("falling_ball");
     let base = ["run", &ball, "--faces", "80", "--steps", "2"];
-    let cpu = good(&base);
+    let cpu = json(&base);
     assert_eq!(
         (&cpu["backend"], &cpu["backend_used"]),
         (&"cpu".into(), &"cpu".into())
@@ -58,7 +31,7 @@ fn a_run_on_the_gpu_is_the_cpus_and_says_what_it_ran_on() {
             continue;
         }
         let flags = ["--backend", "gpu", "--gpu-arithmetic", arithmetic];
-        let gpu = good(&[&base[..], &flags].concat());
+        let gpu = json(&[&base[..], &flags].concat());
         assert_eq!(
             (&gpu["backend"], &gpu["backend_used"]),
             (&"gpu".into(), &"gpu".into())
@@ -81,15 +54,15 @@ fn a_run_on_the_gpu_is_the_cpus_and_says_what_it_ran_on() {
 
 #[test]
 fn other_commands_run_on_the_gpu() {
-    let ball = ball();
+    let ball = scene("falling_ball");
     let mass = ["added-mass", &ball, "--faces", "80"];
     let rows = |report: &serde_json::Value| -> Vec<f64> {
         let rows = report["added_mass"].as_array().unwrap().iter();
         rows.flat_map(list).collect()
     };
     let (cpu, gpu) = (
-        good(&mass),
-        good(&[&mass[..], &["--backend", "gpu"]].concat()),
+        json(&mass),
+        json(&[&mass[..], &["--backend", "gpu"]].concat()),
     );
     assert_eq!(gpu["backend_used"], "gpu");
     assert!(difference(&rows(&gpu), &rows(&cpu)) < 1e-6);
@@ -104,7 +77,7 @@ fn other_commands_run_on_the_gpu() {
         "--no-growth",
     ];
     let check = [&["gradcheck", &ball][..], &flags, &["--backend", "gpu"]].concat();
-    let report = good(&check);
+    let report = json(&check);
     assert_eq!(
         (&report["ok"], &report["backend_used"]),
         (&true.into(), &"gpu".into())
@@ -114,22 +87,22 @@ fn other_commands_run_on_the_gpu() {
 
 #[test]
 fn a_fallback_is_taken_and_said() {
-    let ball = ball();
+    let ball = scene("falling_ball");
     let base = ["run", &ball, "--faces", "80", "--steps", "1"];
     let wanted = ["--backend", "gpu", "--adapter", "nobody's card"];
     let wanted = [&base[..], &wanted].concat();
     let done = command(&wanted).arg("--json").output().unwrap();
     assert_eq!(done.status.code(), Some(1));
-    let message = json(&done)["error"].to_string();
+    let message = object(&done)["error"].to_string();
     assert!(message.contains("nobody's card") && message.contains("backend cpu"));
 
     let fallen = [&wanted[..], &["--gpu-fallback"]].concat();
-    let report = good(&fallen);
+    let report = json(&fallen);
     assert_eq!(report["backend_used"], "cpu");
     for place in ["backend_reason", "warnings"] {
         assert!(report[place].to_string().contains("nobody's card"));
     }
-    assert_eq!(report["final_q"], good(&base)["final_q"]);
+    assert_eq!(report["final_q"], json(&base)["final_q"]);
     let said = text(&fallen);
     assert!(said.contains("backend cpu, for all that gpu was asked for"));
     assert!(said.contains("nobody's card"), "{said}");
@@ -137,7 +110,7 @@ fn a_fallback_is_taken_and_said() {
 
 #[test]
 fn gpu_info_lists_what_is_there() {
-    let report = good(&["gpu-info"]);
+    let report = json(&["gpu-info"]);
     let adapters = report["adapters"].as_array().unwrap();
     assert_eq!(adapters.len(), hydrograd::gpu::adapters().len());
     for a in adapters {
@@ -148,7 +121,7 @@ fn gpu_info_lists_what_is_there() {
         assert!(a.get("lacks").is_some());
     }
     assert!(report["used"]["adapter"].is_string());
-    let two = good(&["gpu-info", "--gpu-arithmetic", "two-float"]);
+    let two = json(&["gpu-info", "--gpu-arithmetic", "two-float"]);
     assert_eq!(two["used"]["arithmetic"], "two-float");
     let said = text(&["gpu-info"]);
     assert!(said.contains("used with --backend gpu"), "{said}");
@@ -158,7 +131,7 @@ fn gpu_info_lists_what_is_there() {
         .output()
         .unwrap();
     assert_eq!(done.status.code(), Some(1));
-    let report = json(&done);
+    let report = object(&done);
     assert!(report["used"].is_null() && report["adapters"].is_array());
     assert!(report["error"].as_str().unwrap().contains("nobody's card"));
 }
@@ -167,7 +140,7 @@ fn gpu_info_lists_what_is_there() {
 #[cfg(target_os = "linux")]
 #[test]
 fn without_an_adapter_it_is_said_what_to_install() {
-    let ball = ball();
+    let ball = scene("falling_ball");
     let run = ["run", &ball, "--faces", "80", "--steps", "1"];
     let run = [&run[..], &["--backend", "gpu"]].concat();
     for arguments in [&["gpu-info"][..], &run] {
@@ -178,7 +151,7 @@ fn without_an_adapter_it_is_said_what_to_install() {
         }
         let done = bare.output().unwrap();
         assert_eq!(done.status.code(), Some(1), "{arguments:?}");
-        let message = json(&done)["error"].to_string();
+        let message = object(&done)["error"].to_string();
         for word in ["install", "Vulkan", "mesa-vulkan-drivers", "backend cpu"] {
             assert!(message.contains(word), "no {word:?} in {message}");
         }

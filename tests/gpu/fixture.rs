@@ -1,5 +1,6 @@
 //! What the comparisons share: bodies, poses, and two backends of one model.
 
+use crate::support::mesh;
 use hydrograd::adjoint::lie::{Pose, Vec3, Vec6, exp_matrix};
 use hydrograd::adjoint::sample;
 use hydrograd::boundary::{BodyBoundary, Method, Settings};
@@ -8,9 +9,7 @@ use hydrograd::coupling::full::{Full, MfsBody, Model, Preconditioner, SolveSetti
 use hydrograd::gpu::full::Gpu;
 use hydrograd::gpu::{Arithmetic, Context, Options};
 use hydrograd::scene::{Shape, Wall, WallSurface};
-use hydrograd::shape;
 use nalgebra::{DMatrix, DVector};
-use std::path::Path;
 use std::sync::{Arc, OnceLock};
 
 pub const WALL: Wall = Wall {
@@ -43,7 +42,7 @@ pub fn two_float() -> &'static Arc<Context> {
 }
 
 pub fn body(shape: &Shape, faces: usize, method: Method) -> Arc<MfsBody> {
-    let mesh = shape::build(shape, Path::new("."), Some(faces)).unwrap();
+    let mesh = mesh(shape, faces);
     let settings = Settings {
         method,
         ..Settings::default()

@@ -11,6 +11,9 @@ mod refined;
 mod robust;
 mod trajectory;
 
+#[path = "../support/mod.rs"]
+mod support;
+
 use hydrograd::gpu::source::SHADERS;
 use std::collections::BTreeSet;
 

@@ -1,17 +1,16 @@
 //! A rollout and its gradient with the backend gpu against the CPU's.
 
 use super::fixture::{difference, wavy};
+use crate::support::example;
 use hydrograd::simulate::Backend;
 use hydrograd::{Controls, Fidelity, Gradient, Rollout, Scene, Settings, Simulator};
 use nalgebra::DMatrix;
-use std::path::Path;
 
 pub const STEPS: usize = 6;
 
 /// The falling ball: a sphere, a coin and the image of a wall, on small meshes.
 pub fn falling_ball() -> Scene {
-    let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("examples/scenes");
-    let mut scene = Scene::load(folder.join("falling_ball.toml")).unwrap();
+    let mut scene = example("falling_ball");
     scene.set_faces(80);
     scene
 }

@@ -1,20 +1,15 @@
 //! What a program hands to the simulator is checked: parameters, starts, controllers, steps.
 
+use crate::support::example;
 use hydrograd::dynamics::Integrator;
 use hydrograd::scene::Scene;
 use hydrograd::simulate::{Action, ActionBar, Observation, Policy};
 use hydrograd::{Controls, Fidelity, Result, Settings, Simulator, objective};
 use nalgebra::DVector;
-use std::path::Path;
-
-fn scene(name: &str) -> Scene {
-    let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("examples/scenes");
-    Scene::load(folder.join(format!("{name}.toml"))).unwrap()
-}
 
 fn simulator(name: &str) -> Simulator {
     let settings = Settings::default().faces(80).fidelity(Fidelity::Isolated);
-    Simulator::new(&scene(name), settings).unwrap()
+    Simulator::new(&example(name), settings).unwrap()
 }
 
 /// A controller whose lists have the lengths that it is told.
@@ -167,7 +162,7 @@ fn drag_works_where_the_scene_gives_none() {
 /// Explicit steps of stiff drag blow up: the run says so, with the numbers.
 #[test]
 fn energy_from_nowhere_is_told() {
-    let mut stiff = scene("kirchhoff_ellipsoid");
+    let mut stiff = example("kirchhoff_ellipsoid");
     let settings = Settings::default().faces(80).fidelity(Fidelity::Isolated);
     let calm = Simulator::new(&stiff, settings).unwrap();
     let controls = Controls::zeros(&calm, 20);
@@ -202,7 +197,7 @@ fn energy_from_nowhere_is_told() {
 
 #[test]
 fn runs_too_long_to_be_kept_are_refused() {
-    let mut long = scene("kirchhoff_ellipsoid");
+    let mut long = example("kirchhoff_ellipsoid");
     long.steps = 1_000_000_000;
     let settings = Settings::default().faces(80).fidelity(Fidelity::Isolated);
     let s = Simulator::new(&long, settings).unwrap();

@@ -1,6 +1,7 @@
 //! Every scene of `examples/scenes`, and scenes written in Rust.
 
-use std::path::{Path, PathBuf};
+use crate::support::{example, root};
+use std::path::Path;
 
 use hydrograd::{Controls, Fidelity, Settings, Simulator};
 
@@ -8,18 +9,10 @@ use hydrograd::scene::{
     Body, Controller, Drag, DragPart, Fluid, Joint, Motion, Placement, Plane, Preset, Scene, Shape,
 };
 
-fn folder() -> PathBuf {
-    Path::new(env!("CARGO_MANIFEST_DIR")).join("examples/scenes")
-}
-
-fn example(name: &str) -> Scene {
-    Scene::load(folder().join(format!("{name}.toml"))).unwrap()
-}
-
 #[test]
 fn every_example_scene_loads_validates_and_survives_a_round_trip() {
     let mut found = Vec::new();
-    for entry in std::fs::read_dir(folder()).unwrap() {
+    for entry in std::fs::read_dir(root().join("examples/scenes")).unwrap() {
         let path = entry.unwrap().path();
         if path.extension().is_none_or(|e| e != "toml") {
             continue;
@@ -102,7 +95,9 @@ fn scenes_have_the_papers_figures() {
             ([0.0; 3], 0.01, 250)
         );
         // The file says how many there are.
-        let text = std::fs::read_to_string(folder().join(format!("{name}.toml"))).unwrap();
+        let text =
+            std::fs::read_to_string(root().join("examples/scenes").join(format!("{name}.toml")))
+                .unwrap();
         assert!(text.contains(&format!("= {sum} faces)")), "{name}: {sum}");
     }
 }
@@ -300,7 +295,7 @@ fn mesh_paths_are_relative_to_the_scene_file() {
 
 #[test]
 fn every_example_scene_runs_at_every_fidelity() {
-    for entry in std::fs::read_dir(folder()).unwrap() {
+    for entry in std::fs::read_dir(root().join("examples/scenes")).unwrap() {
         let path = entry.unwrap().path();
         let scene = Scene::load(&path).unwrap();
         for fidelity in [

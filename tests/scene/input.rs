@@ -1,5 +1,6 @@
 //! Bad scene files: each gets an error that names the place and the remedy, and never a panic.
 
+use crate::support::{example_path, says};
 use hydrograd::Scene;
 
 /// A scene file with one ball; `body` is added to the ball, `rest` after it.
@@ -11,15 +12,8 @@ fn text(body: &str, rest: &str) -> String {
 }
 
 #[track_caller]
-fn has(message: &str, words: &[&str]) {
-    for word in words {
-        assert!(message.contains(word), "no {word:?} in: {message}");
-    }
-}
-
-#[track_caller]
 fn unread(text: &str, words: &[&str]) {
-    has(&Scene::from_toml(text, "").unwrap_err().to_string(), words);
+    says(&Scene::from_toml(text, "").unwrap_err().to_string(), words);
 }
 
 #[test]
@@ -288,7 +282,7 @@ fn broken_toml_gets_its_line() {
 fn files_that_are_no_scenes() {
     let folder = tempfile::tempdir().unwrap();
     let unread = |name: &str, words: &[&str]| {
-        has(
+        says(
             &Scene::load(folder.path().join(name))
                 .unwrap_err()
                 .to_string(),
@@ -315,13 +309,12 @@ fn files_that_are_no_scenes() {
 /// a line number, never a panic.
 #[test]
 fn mangled_scenes_never_panic() {
-    let folder = std::path::Path::new(env!("CARGO_MANIFEST_DIR")).join("examples/scenes");
     let judge = |text: &str| match Scene::from_toml(text, "") {
         Ok(scene) => drop(scene.validate()),
-        Err(error) => has(&error.to_string(), &["line "]),
+        Err(error) => says(&error.to_string(), &["line "]),
     };
     for name in ["falling_ball", "fish"] {
-        let text = std::fs::read_to_string(folder.join(format!("{name}.toml"))).unwrap();
+        let text = std::fs::read_to_string(example_path(name)).unwrap();
         let lines: Vec<&str> = text.lines().collect();
         for k in 0..lines.len() {
             let without = [&lines[..k], &lines[k + 1..]].concat().join("\n");

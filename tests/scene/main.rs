@@ -4,3 +4,6 @@ mod api_input;
 mod examples;
 mod input;
 mod validate;
+
+#[path = "../support/mod.rs"]
+mod support;

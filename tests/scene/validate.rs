@@ -1,13 +1,7 @@
 //! Scenes that can't be: each gets an error that names body, field, value and remedy.
 
+use crate::support::says;
 use hydrograd::scene::{Body, Controller, Drag, Fluid, Joint, Motion, Plane, Scene, Shape, Wall};
-
-#[track_caller]
-fn has(message: &str, words: &[&str]) {
-    for word in words {
-        assert!(message.contains(word), "no {word:?} in: {message}");
-    }
-}
 
 /// Two bodies that are right: a ball that slides along z, a coin that hangs on it.
 fn good() -> Scene {
@@ -36,7 +30,7 @@ fn refused(change: impl FnOnce(&mut Scene), words: &[&str]) {
     let mut scene = good();
     scene.validate().unwrap();
     change(&mut scene);
-    has(&scene.validate().unwrap_err().to_string(), words);
+    says(&scene.validate().unwrap_err().to_string(), words);
 }
 
 #[test]

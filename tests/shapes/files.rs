@@ -1,5 +1,6 @@
 //! Mesh files: round trips, and files that are broken in every way.
 
+use crate::support::random::Random;
 use hydrograd::Error;
 use hydrograd::adjoint::lie::Vec3;
 use hydrograd::shape::file::{FileMesh, read, read_unchecked, write_obj};
@@ -516,13 +517,7 @@ fn damaged_files_never_panic() {
         counter.fetch_add(1, Ordering::Relaxed);
         usual(info);
     }));
-    let mut state = 12345u64;
-    let mut random = |n: usize| {
-        state = state
-            .wrapping_mul(6364136223846793005)
-            .wrapping_add(1442695040888963407);
-        (state >> 33) as usize % n
-    };
+    let mut random = Random(12345);
     for (name, whole) in &files {
         assert_eq!(
             read(&put(&dir, name, whole), 1.0).unwrap().faces().len(),
@@ -540,9 +535,9 @@ fn damaged_files_never_panic() {
         );
         for _ in 0..2000 {
             let mut bytes = whole.clone();
-            for _ in 0..=random(4) {
-                let at = random(bytes.len());
-                bytes[at] = random(256) as u8;
+            for _ in 0..=random.below(4) {
+                let at = random.below(bytes.len());
+                bytes[at] = random.below(256) as u8;
             }
             if let Ok(read) = read(&put(&dir, name, bytes), 1.0) {
                 assert!(read.mass_properties().volume > 0.0);

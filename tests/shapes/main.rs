@@ -5,3 +5,6 @@ mod files;
 mod primitives;
 mod prisms;
 mod refine;
+
+#[path = "../support/mod.rs"]
+mod support;

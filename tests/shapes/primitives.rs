@@ -1,5 +1,6 @@
 //! Primitives against closed forms, and the verdict on broken meshes.
 
+use crate::support;
 use hydrograd::adjoint::lie::{Pose, Vec3, exp_matrix};
 use hydrograd::scene::Shape;
 use hydrograd::shape::{
@@ -23,7 +24,7 @@ const SHAPES: [&str; 10] = [
 ];
 
 fn mesh(text: &str, faces: usize) -> TriMesh {
-    build(&parse_shape(text).unwrap(), Path::new("."), Some(faces)).unwrap()
+    support::mesh(&parse_shape(text).unwrap(), faces)
 }
 
 /// Volume and principal inertia (per unit density) of the exact shape.

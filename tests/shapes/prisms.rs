@@ -1,5 +1,6 @@
 //! Prisms: their meshes against closed forms, and profiles that can't be.
 
+use crate::support;
 use hydrograd::adjoint::lie::Vec3;
 use hydrograd::scene::Shape;
 use hydrograd::shape::{Kind, TriMesh, build, check, parse_shape, shape_name};
@@ -19,7 +20,7 @@ const PRISMS: [&str; 7] = [
 ];
 
 fn mesh(text: &str, faces: usize) -> TriMesh {
-    build(&parse_shape(text).unwrap(), Path::new("."), Some(faces)).unwrap()
+    support::mesh(&parse_shape(text).unwrap(), faces)
 }
 
 /// Volume, centroid and inertia about it (per unit density) of a prism, by Green's theorem.

@@ -1,5 +1,6 @@
 //! Meshes refined where bodies come near others.
 
+use crate::support::{self, says};
 use hydrograd::adjoint::lie::Vec3;
 use hydrograd::scene::{Body, Fluid, Refinement, Scene, Shape};
 use hydrograd::shape::{
@@ -30,7 +31,7 @@ const CASES: [(&str, [f64; 3], usize); 12] = [
 
 fn mesh(text: &str, faces: usize) -> (Shape, TriMesh) {
     let shape = parse_shape(text).unwrap();
-    let mesh = build(&shape, Path::new("."), Some(faces)).unwrap();
+    let mesh = support::mesh(&shape, faces);
     (shape, mesh)
 }
 
@@ -229,21 +230,13 @@ fn a_mesh_from_a_file_is_refined_on_its_own_faces() {
     assert!((of(&fine).radius() - of(&base).radius()).abs() < 1e-15);
 }
 
-#[track_caller]
-fn has(error: impl ToString, words: &[&str]) {
-    let message = error.to_string();
-    for word in words {
-        assert!(message.contains(word), "no {word:?} in: {message}");
-    }
-}
-
 #[test]
 fn regions_that_can_not_be_are_refused_by_name() {
     let (shape, base) = mesh("box:1,1,1", 300);
     let refused = |region: Refinement, words: &[&str]| {
         let good = ball([0.5; 3], 0.1, 0.05);
         let error = shape::refine(&base, &shape, &[good, region], "body \"box\"").unwrap_err();
-        has(error, words);
+        says(error, words);
     };
     let corner = [0.5; 3];
     let nan = f64::NAN;
@@ -279,7 +272,7 @@ fn regions_that_can_not_be_are_refused_by_name() {
     );
     let open = TriMesh::unchecked("open", base.vertices().to_vec(), base.faces()[1..].to_vec());
     let region = ball(corner, 0.1, 0.01);
-    has(
+    says(
         shape::refine(&open.unwrap(), &shape, &[region], "body \"box\"").unwrap_err(),
         &["mesh open"],
     );
@@ -337,7 +330,7 @@ fn scenes_take_regions_in_the_body_s_frame() {
     let error = Simulator::new(&make([0.5, 0.25, 0.15]), settings(100))
         .err()
         .unwrap();
-    has(error, &["body \"box\": refine[0]", "nowhere"]);
+    says(error, &["body \"box\": refine[0]", "nowhere"]);
     // As text, there and back.
     let scene = make([1.75, 0.5, 0.15]);
     let text = scene.to_toml().unwrap();
@@ -352,7 +345,7 @@ fn scenes_take_regions_in_the_body_s_frame() {
     };
     let good = file("{ center = [0.5, 0.25, 0.15], radius = 0.05, edge = 0.01 }").unwrap();
     assert_eq!(good.bodies[0].refine, [ball([0.5, 0.25, 0.15], 0.05, 0.01)]);
-    has(
+    says(
         file("{ center = [0.5, 0.25, 0.15], radius = 0.05, edges = 0.01 }").unwrap_err(),
         &[
             "line 8",
@@ -361,16 +354,16 @@ fn scenes_take_regions_in_the_body_s_frame() {
             "did you mean `edge`?",
         ],
     );
-    has(
+    says(
         file("{ center = [0.5, 0.25, 0.15], radius = 0.05 }").unwrap_err(),
         &["line 8", "refine[0] lacks the key `edge`"],
     );
     let checked = |scene: Scene| scene.validate().unwrap_err();
-    has(
+    says(
         checked(boxed(|b| b.refine([0.0; 3], -1.0, 0.1))),
         &["body \"box\": refine[0].radius", "-1"],
     );
     let mut dry = boxed(|b| b.refine([0.0; 3], 1.0, 0.1));
     dry.bodies[0].shape = None;
-    has(checked(dry), &["body \"box\": refine", "without a shape"]);
+    says(checked(dry), &["body \"box\": refine", "without a shape"]);
 }

@@ -1,4 +1,129 @@
 //! What tests and benches share. Each of them uses a part of it.
 #![allow(dead_code)]
 
-pub mod two_spheres;
+#[cfg(feature = "cli")]
+pub mod command;
+pub mod random;
+pub mod reference;
+
+use hydrograd::adjoint::lie::Vec3;
+use hydrograd::dynamics::Integrator;
+use hydrograd::shape::{self, TriMesh};
+use hydrograd::simulate::gradcheck;
+use hydrograd::{Controls, Fidelity, Rollout, Scene, Settings, Shape, Simulator};
+use nalgebra::DMatrix;
+use std::path::{Path, PathBuf};
+
+/// Acceleration of gravity, m/s².
+pub const GRAVITY: f64 = 9.81;
+
+pub const INTEGRATORS: [Integrator; 5] = [
+    Integrator::MomentumEuler,
+    Integrator::Midpoint,
+    Integrator::Rk2,
+    Integrator::Rk4,
+    Integrator::VelocityEuler,
+];
+
+/// Those that solve contact and joint limits.
+pub const CONTACT_INTEGRATORS: [Integrator; 3] = [
+    Integrator::MomentumEuler,
+    Integrator::Midpoint,
+    Integrator::VelocityEuler,
+];
+
+pub fn root() -> &'static Path {
+    Path::new(env!("CARGO_MANIFEST_DIR"))
+}
+
+/// File of an example scene.
+pub fn example_path(name: &str) -> PathBuf {
+    root().join(format!("examples/scenes/{name}.toml"))
+}
+
+pub fn example(name: &str) -> Scene {
+    Scene::load(example_path(name)).unwrap()
+}
+
+/// Default settings but for these two.
+pub fn simulator(scene: &Scene, fidelity: Fidelity, integrator: Integrator) -> Simulator {
+    let settings = Settings::default()
+        .fidelity(fidelity)
+        .integrator(integrator);
+    Simulator::new(scene, settings).unwrap()
+}
+
+/// A rollout without control, all of whose states are finite.
+pub fn run(simulator: &Simulator, steps: usize) -> Rollout<'_> {
+    let rollout = simulator
+        .rollout(&Controls::zeros(simulator, steps))
+        .unwrap();
+    for sample in rollout.samples() {
+        assert!(sample.q.iter().chain(&sample.v).all(|x| x.is_finite()));
+    }
+    rollout
+}
+
+/// Holds the gradient of a rollout against differences along `directions` in each group of variables.
+#[track_caller]
+pub fn check_gradient(
+    what: &str,
+    simulator: &mut Simulator,
+    steps: usize,
+    directions: usize,
+    limit: f64,
+) {
+    let settings = gradcheck::Settings {
+        steps,
+        directions,
+        seed: 3,
+        timings: 0,
+    };
+    let report = gradcheck::gradcheck(simulator, &settings).unwrap();
+    println!("{what}: {:.1e}", report.max_rel_error);
+    assert!(
+        report.max_rel_error <= limit,
+        "{what}: {:#?}",
+        report.directions
+    );
+}
+
+/// The message has all of these words.
+#[track_caller]
+pub fn says(message: impl ToString, words: &[&str]) {
+    let message = message.to_string();
+    for word in words {
+        assert!(message.contains(word), "no {word:?} in: {message}");
+    }
+}
+
+/// A shape's mesh of about this many faces.
+pub fn mesh(shape: &Shape, faces: usize) -> TriMesh {
+    shape::build(shape, Path::new("."), Some(faces)).unwrap()
+}
+
+/// max |ΔM_ij| / √(M_ii M_jj), the reference's diagonal, which must not vanish.
+pub fn scaled_error(m: &DMatrix<f64>, reference: &DMatrix<f64>) -> f64 {
+    assert_eq!(m.shape(), reference.shape());
+    let mut worst = 0.0_f64;
+    for i in 0..m.nrows() {
+        for j in 0..m.ncols() {
+            let scale = (reference[(i, i)] * reference[(j, j)]).sqrt();
+            assert!(scale > 0.0, "diagonal {i} {j} of the reference");
+            worst = worst.max((m[(i, j)] - reference[(i, j)]).abs() / scale);
+        }
+    }
+    worst
+}
+
+/// Unit vectors spread evenly over the sphere.
+pub fn directions(count: usize) -> Vec<Vec3> {
+    let golden = std::f64::consts::PI * (3.0 - 5.0_f64.sqrt());
+    let direction = |i: usize| {
+        let z = 1.0 - (2 * i + 1) as f64 / count as f64;
+        let (sine, cosine) = (golden * i as f64).sin_cos();
+        let width = (1.0 - z * z).sqrt();
+        Vec3::new(width * cosine, width * sine, z)
+    };
+    (0..count).map(direction).collect()
+}

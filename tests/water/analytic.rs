@@ -2,24 +2,21 @@
 //! symmetries of the problem. Every test prints its figures: `cargo test --release --test water analytic
 //! -- --nocapture --test-threads 1` gives the tables of `docs/accuracy-coupled.md`.
 
+use crate::support::reference::{
+    ellipsoids, equal_spheres, image_series, spheres_by_wall, unequal_spheres,
+};
+use crate::support::{mesh, scaled_error};
 use hydrograd::Error;
 use hydrograd::adjoint::lie::{Mat3, Mat6, Pose, Vec3, Vec6, exp_matrix, skew};
 use hydrograd::boundary::{BodyBoundary, Method, RowScaling, Settings};
 use hydrograd::coupling::full::{Full, MfsBody, Preconditioner, SolveSettings, Solver};
 use hydrograd::coupling::{Coupling, Direction, Exclusions, Isolated, Linearise, Report};
 use hydrograd::scene::{Shape, Wall};
-use hydrograd::shape;
 use nalgebra::{DMatrix, DVector};
-use serde_json::Value;
-use std::path::Path;
 use std::sync::{Arc, LazyLock};
 
 fn submerged(semi_axes: [f64; 3], faces: usize, settings: &Settings) -> Arc<MfsBody> {
-    let shape = Shape::Ellipsoid {
-        semi_axes,
-        faces: None,
-    };
-    let mesh = shape::build(&shape, Path::new("."), Some(faces)).unwrap();
+    let mesh = mesh(&Shape::ellipsoid(semi_axes), faces);
     let b = BodyBoundary::new("body", mesh.vertices(), mesh.faces(), settings).unwrap();
     Arc::new(MfsBody::new(Arc::new(b)))
 }
@@ -85,35 +82,6 @@ fn translations(coupling: &dyn Coupling, poses: &[Pose]) -> DMatrix<f64> {
     basis.tr_mul(record.momenta())
 }
 
-/// max |ΔM_ij| / √(M_ii M_jj), the reference's diagonal.
-fn scaled_error(m: &DMatrix<f64>, reference: &DMatrix<f64>) -> f64 {
-    assert_eq!(m.shape(), reference.shape());
-    let mut worst = 0.0_f64;
-    for i in 0..m.nrows() {
-        for j in 0..m.ncols() {
-            let scale = (reference[(i, i)] * reference[(j, j)]).sqrt();
-            assert!(scale > 0.0, "diagonal {i} {j} of the reference");
-            worst = worst.max((m[(i, j)] - reference[(i, j)]).abs() / scale);
-        }
-    }
-    worst
-}
-
-fn data(name: &str) -> Value {
-    let path = Path::new(env!("CARGO_MANIFEST_DIR"))
-        .join("tests/data")
-        .join(name);
-    serde_json::from_str(&std::fs::read_to_string(path).unwrap()).unwrap()
-}
-
-fn rows<'a>(value: &'a Value, key: &str) -> &'a Vec<Value> {
-    value[key].as_array().unwrap()
-}
-
-fn number(value: &Value) -> f64 {
-    value.as_f64().unwrap()
-}
-
 /// Orientations of a sphere's mesh against the direction of its neighbour: a vertex, the middle of a
 /// face, and none in particular turned that way.
 fn orientations(towards: &Vec3) -> [Mat3; 3] {
@@ -136,11 +104,7 @@ fn orientations(towards: &Vec3) -> [Mat3; 3] {
 #[test]
 fn sphere_and_ellipsoids_alone() {
     println!("semi-axes | errors of translation and rotation, %");
-    for row in rows(&data("ellipsoids.json"), "rows") {
-        let list = |key: &str| -> Vec<f64> { rows(row, key).iter().map(number).collect() };
-        let axes: [f64; 3] = list("semi_axes").try_into().unwrap();
-        let mut exact = list("added_mass");
-        exact.extend(list("added_inertia"));
+    for (axes, exact) in ellipsoids() {
         let body = ellipsoid(axes, 1280);
         let coupling = full(&[body], &[], tight());
         let (m, _) = matrix(&coupling, &[Pose::identity()]);
@@ -179,15 +143,6 @@ fn one_body_alone_is_the_isolated_one() {
 }
 
 // Two spheres
-
-/// Exact matrix of the translations of two spheres whose centres lie along z.
-fn two_spheres(longitudinal: [[f64; 2]; 2], transverse: [[f64; 2]; 2]) -> DMatrix<f64> {
-    DMatrix::from_fn(6, 6, |i, j| match (i % 3 == j % 3, i % 3) {
-        (false, _) => 0.0,
-        (true, 2) => longitudinal[i / 3][j / 3],
-        (true, _) => transverse[i / 3][j / 3],
-    })
-}
 
 /// Translations of two spheres at the distance d along z, for three orientations of the meshes.
 fn two_sphere_matrices(bodies: &[Arc<MfsBody>], d: f64) -> [DMatrix<f64>; 3] {
@@ -228,13 +183,8 @@ const HEADING: &str =
 #[test]
 fn two_equal_spheres() {
     println!("{HEADING}");
-    for row in rows(&data("two_spheres.json"), "equal") {
-        let d = number(&row["d"]);
-        let pair = |key: &str| {
-            let (own, other) = (number(&row[key]["M11"]), number(&row[key]["M12"]));
-            [[own, other], [other, own]]
-        };
-        let exact = two_spheres(pair("longitudinal"), pair("transverse"));
+    for pair in equal_spheres() {
+        let (d, exact) = (pair.distance, pair.translations());
         let matrices = two_sphere_matrices(&[SPHERE.clone(), SPHERE.clone()], d);
         let errors = two_sphere_errors(&matrices, &exact);
         println!("{:.2} | {errors:.3?}", d - 2.0);
@@ -244,8 +194,6 @@ fn two_equal_spheres() {
             _ => 0.6,
         };
         assert!(errors[4] < limit, "{d}: {errors:?}");
-        assert!((image_series(d, -1.0) / (exact[(2, 2)] + exact[(2, 5)]) - 1.0).abs() < 1e-10);
-        assert!((image_series(d, 1.0) / (exact[(2, 2)] - exact[(2, 5)]) - 1.0).abs() < 1e-10);
     }
 }
 
@@ -253,37 +201,14 @@ fn two_equal_spheres() {
 fn two_unequal_spheres() {
     println!("{HEADING}");
     let small = ellipsoid([0.5; 3], 1280);
-    for row in rows(&data("two_spheres.json"), "unequal") {
-        let pair = |key: &str| -> [[f64; 2]; 2] {
-            std::array::from_fn(|i| std::array::from_fn(|j| number(&row[key][i][j])))
-        };
-        assert_eq!((number(&row["a"]), number(&row["b"])), (1.0, 0.5));
-        let d = number(&row["d"]);
-        let exact = two_spheres(pair("longitudinal"), pair("transverse"));
+    for pair in unequal_spheres() {
+        let (d, exact) = (pair.distance, pair.translations());
         let matrices = two_sphere_matrices(&[SPHERE.clone(), small.clone()], d);
         let errors = two_sphere_errors(&matrices, &exact);
         println!("{:.2} | {errors:.3?}", d - 1.5);
         let limit = if d < 1.7 { 0.6 } else { 0.35 };
         assert!(errors[4] < limit, "{d}: {errors:?}");
     }
-}
-
-/// Added mass of a unit sphere that moves along the line to an equal one, which moves as its mirror image
-/// (sign 1) or with it (−1): Lamb, Hydrodynamics, §98; a dipole in the centre and its images on the line, each
-/// of (a/s)³ times the strength of the last, s that one's distance from the centre in which it is
-/// mirrored.
-fn image_series(d: f64, sign: f64) -> f64 {
-    let (mut at, mut strength, mut sum) = (0.0, 1.0_f64, 0.0);
-    while strength.abs() > 1e-16 {
-        let s = d - at;
-        strength *= sign / (s * s * s);
-        at = 1.0 / s;
-        sum += strength;
-        if at > 0.999_999 && strength.abs() < 1e-13 {
-            break;
-        }
-    }
-    2.0 / 3.0 * std::f64::consts::PI * (1.0 + 3.0 * sum)
 }
 
 #[test]
@@ -364,9 +289,9 @@ fn a_sphere_near_a_wall() {
         SolveSettings::default(),
     );
     println!("gap | error, %: across, along, all entries");
-    for row in rows(&data("sphere_wall.json"), "rows") {
-        let height = number(&row["h"]);
-        let exact = ["parallel", "parallel", "perpendicular"].map(|key| number(&row[key]));
+    for known in spheres_by_wall() {
+        let height = known.height;
+        let exact = [known.along, known.along, known.across];
         let exact = DMatrix::from_diagonal(&DVector::from_row_slice(&exact));
         let mut worst = [0.0_f64; 3];
         for turn in orientations(&-Vec3::z()) {
@@ -778,7 +703,7 @@ fn bodies_in_another_order_or_frame_give_the_same() {
         semi_axes: [0.5, 0.8, 0.3],
         faces: None,
     };
-    let mesh = shape::build(&shape, Path::new("."), Some(320)).unwrap();
+    let mesh = mesh(&shape, 320);
     let vertices: Vec<Vec3> = mesh.vertices().iter().map(|v| v + shift).collect();
     let b = BodyBoundary::new("b", &vertices, mesh.faces(), &Settings::default()).unwrap();
     let shifted = Arc::new(MfsBody::new(Arc::new(b)));

@@ -1,9 +1,8 @@
 //! What the fidelity `auto` chooses, and that it says so.
 
+use crate::support::example;
 use hydrograd::scene::{Placement, Shape};
 use hydrograd::{Body, Fidelity, Fluid, Scene, Settings, Simulator};
-use std::path::Path;
-use std::process::Command;
 
 fn balls(places: &[f64]) -> Scene {
     let mut scene = Scene::new(Fluid::fresh_water());
@@ -13,14 +12,6 @@ fn balls(places: &[f64]) -> Scene {
         scene.add(body);
     }
     scene
-}
-
-fn example(name: &str) -> String {
-    let root = Path::new(env!("CARGO_MANIFEST_DIR"));
-    root.join("examples/scenes")
-        .join(name)
-        .display()
-        .to_string()
 }
 
 fn auto(scene: &Scene) -> Simulator {
@@ -63,36 +54,10 @@ fn gaps_that_compression_does_not_resolve() {
 /// The floor's triangles are longer than the coin's gap: solving for them all would be slow and no better.
 #[test]
 fn a_floor_of_large_triangles_stays_compressed() {
-    let scene = Scene::load(example("falling_ball_box.toml")).unwrap();
-    let simulator = auto(&scene);
+    let simulator = auto(&example("falling_ball_box"));
     let reasons = simulator.reasons().join("\n");
     assert_eq!(simulator.fidelity(), Fidelity::Reduced, "{reasons}");
     assert!(reasons.contains("neither does full"), "{reasons}");
-}
-
-#[test]
-fn a_run_says_what_was_chosen() {
-    let run = |more: &[&str]| {
-        let scene = example("falling_ball.toml");
-        let given = ["run", &scene, "--steps", "1", "--fidelity", "auto"];
-        let output = Command::new(env!("CARGO_BIN_EXE_hydrograd"))
-            .args([&given[..], more].concat())
-            .output()
-            .unwrap();
-        assert!(output.status.success());
-        String::from_utf8(output.stdout).unwrap()
-    };
-    let report: serde_json::Value = serde_json::from_str(&run(&["--json"])).unwrap();
-    assert_eq!(
-        (&report["fidelity"], &report["fidelity_used"]),
-        (&"auto".into(), &"reduced".into())
-    );
-    assert!(report["chosen"].as_array().unwrap().len() >= 2);
-    let text = run(&[]);
-    assert!(
-        text.contains("auto: reduced") && text.contains("chosen  body \"coin\" resolves gaps"),
-        "{text}"
-    );
 }
 
 /// What can't be used or can't be right is said, and what would lose most of the added mass is refused.

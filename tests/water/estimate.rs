@@ -2,13 +2,15 @@
 //! -- --nocapture` prints the tables of `docs/accuracy-estimate.md`; with `--ignored` those with finer
 //! meshes.
 
+use crate::support::reference::{
+    SphereByWall, TwoSpheres, data, equal_spheres, lamb, number, rows, spheres_by_wall,
+    unequal_spheres,
+};
 use hydrograd::adjoint::lie::Vec3;
-use hydrograd::boundary::exact::lamb;
 use hydrograd::boundary::{Method, OneBody};
 use hydrograd::scene::{Placement, Shape};
 use hydrograd::{Body, Fidelity, Fluid, Scene, Settings, Simulator};
 use nalgebra::{DMatrix, DVector};
-use serde_json::Value;
 use std::f64::consts::PI;
 use std::path::Path;
 
@@ -43,80 +45,40 @@ fn ball(radius: f64) -> f64 {
     4.0 / 3.0 * PI * radius.powi(3)
 }
 
-fn data(name: &str) -> Value {
-    let path = Path::new(env!("CARGO_MANIFEST_DIR"))
-        .join("tests/data")
-        .join(name);
-    serde_json::from_str(&std::fs::read_to_string(path).unwrap()).unwrap()
-}
-
-fn list<'a>(value: &'a Value, key: &str) -> &'a [Value] {
-    value[key].as_array().unwrap()
-}
-
-fn number(value: &Value) -> f64 {
-    value.as_f64().unwrap()
-}
-
 /// Lamb's ellipsoids.
 fn ellipsoid(semi_axes: [f64; 3]) -> Known {
     let [a, b, c] = semi_axes;
-    let m = lamb::added_mass(semi_axes).unwrap();
     Known {
         name: format!("ellipsoid {a}:{b}:{c}"),
         scene: scene(&[(Shape::ellipsoid(semi_axes), at([0.0; 3]))]),
-        truth: DMatrix::from_fn(6, 6, |i, j| m[(i, j)]),
+        truth: DMatrix::from_diagonal(&DVector::from_row_slice(&lamb(semi_axes))),
         volumes: vec![4.0 / 3.0 * PI * a * b * c],
     }
 }
 
 /// Two spheres along z.
 fn spheres() -> Vec<Known> {
-    let known = |radius: f64, d: f64, along: [[f64; 2]; 2], across: [[f64; 2]; 2]| Known {
-        name: format!("spheres 1 and {radius}, gap {:.2}", d - 1.0 - radius),
+    let known = |pair: &TwoSpheres| Known {
+        name: format!("spheres 1 and {}, gap {:.2}", pair.radius, pair.gap()),
         scene: scene(&[
             (Shape::sphere(1.0), at([0.0; 3])),
-            (Shape::sphere(radius), at([0.0, 0.0, d])),
+            (Shape::sphere(pair.radius), at([0.0, 0.0, pair.distance])),
         ]),
-        truth: DMatrix::from_fn(12, 12, |i, j| match (i % 6 == j % 6, i % 6) {
-            (true, 2) => along[i / 6][j / 6],
-            (true, 0 | 1) => across[i / 6][j / 6],
-            _ => 0.0,
-        }),
-        volumes: vec![ball(1.0), ball(radius)],
+        truth: pair.matrix(),
+        volumes: vec![ball(1.0), ball(pair.radius)],
     };
-    let file = data("two_spheres.json");
-    let equal = list(&file, "equal").iter().map(|row| {
-        let pair = |key: &str| {
-            let (own, other) = (number(&row[key]["M11"]), number(&row[key]["M12"]));
-            [[own, other], [other, own]]
-        };
-        known(
-            1.0,
-            number(&row["d"]),
-            pair("longitudinal"),
-            pair("transverse"),
-        )
-    });
-    let unequal = list(&file, "unequal").iter().map(|row| {
-        let pair = |key: &str| -> [[f64; 2]; 2] {
-            std::array::from_fn(|i| std::array::from_fn(|j| number(&row[key][i][j])))
-        };
-        known(
-            0.5,
-            number(&row["d"]),
-            pair("longitudinal"),
-            pair("transverse"),
-        )
-    });
-    equal.chain(unequal).collect()
+    let all = equal_spheres().into_iter().chain(unequal_spheres());
+    all.map(|pair| known(&pair)).collect()
 }
 
 /// A sphere above a wall.
 fn wall() -> Vec<Known> {
-    let known = |row: &Value| {
-        let [across, along] = ["perpendicular", "parallel"].map(|key| number(&row[key]));
-        let height = number(&row["h"]);
+    let known = |exact: SphereByWall| {
+        let SphereByWall {
+            height,
+            across,
+            along,
+        } = exact;
         let mut scene = scene(&[(Shape::sphere(1.0), at([0.0, 0.0, height]))]);
         scene.add_wall([0.0; 3], [0.0, 0.0, 1.0]);
         let diagonal = [along, along, across, 0.0, 0.0, 0.0];
@@ -127,10 +89,7 @@ fn wall() -> Vec<Known> {
             volumes: vec![ball(1.0)],
         }
     };
-    list(&data("sphere_wall.json"), "rows")
-        .iter()
-        .map(known)
-        .collect()
+    spheres_by_wall().into_iter().map(known).collect()
 }
 
 /// Bodies with edges.
@@ -167,10 +126,11 @@ fn edged() -> Vec<Known> {
         },
     ];
     let file = data("edged_bodies.json");
-    let rows = list(&file, "scenes").iter();
-    rows.zip(scenes)
+    let known = rows(&file, "scenes").iter();
+    known
+        .zip(scenes)
         .map(|(row, (scene, volumes))| {
-            let m = list(row, "added_mass");
+            let m = rows(row, "added_mass");
             Known {
                 name: row["name"].as_str().unwrap().replace('_', ", "),
                 scene,

@@ -1,5 +1,6 @@
 //! The water's velocity around bodies, against what is known in closed form.
 
+use crate::support::directions;
 use hydrograd::adjoint::lie::Vec3;
 use hydrograd::scene::{Body, Fluid, Placement, Scene, Shape, Wall};
 use hydrograd::simulate::FLOW_EDGES;
@@ -52,18 +53,6 @@ fn sphere() -> (Vec3, Vec3) {
 fn dipole(u: &Vec3, r: &Vec3) -> Vec3 {
     let along = r.normalize();
     0.5 * (RADIUS / r.norm()).powi(3) * (3.0 * u.dot(&along) * along - u)
-}
-
-/// Directions that are spread evenly.
-fn directions(count: usize) -> Vec<Vec3> {
-    let golden = std::f64::consts::PI * (3.0 - 5.0_f64.sqrt());
-    let direction = |i: usize| {
-        let z = 1.0 - 2.0 * (i as f64 + 0.5) / count as f64;
-        let (sine, cosine) = (golden * i as f64).sin_cos();
-        let width = (1.0 - z * z).sqrt();
-        Vec3::new(width * cosine, width * sine, z)
-    };
-    (0..count).map(direction).collect()
 }
 
 /// Largest error relative to the speed there, at distances (in radii) from the surface.

@@ -1,7 +1,6 @@
 //! Added mass and flow: one body by each method, coupled bodies by each fidelity, against exact values.
 
 mod analytic;
-#[cfg(feature = "cli")]
 mod auto;
 mod estimate;
 mod exact;

@@ -1,5 +1,6 @@
 //! Links that touch or overlap at their joint: refused unless declared, and what is declared.
 
+use crate::support::says;
 use hydrograd::adjoint::kernel::{Sources, Write};
 use hydrograd::adjoint::lie::{Pose, Vec3, Vec6, exp_matrix};
 use hydrograd::boundary::{self, BodyBoundary, OneBody};
@@ -50,17 +51,11 @@ fn refused(scene: &Scene) -> String {
     error.to_string()
 }
 
-fn has(message: &str, words: &[&str]) {
-    for word in words {
-        assert!(message.contains(word), "no {word:?} in: {message}");
-    }
-}
-
 #[test]
 fn overlap_that_is_not_declared_is_refused_with_the_way_to_declare_it() {
     let message = refused(&linked(false));
     let declare = "`overlaps_parent = true` for body \"lower\"";
-    has(
+    says(
         &message,
         &["\"upper\" and body \"lower\"", "overlap", declare],
     );
@@ -68,7 +63,7 @@ fn overlap_that_is_not_declared_is_refused_with_the_way_to_declare_it() {
     let mut scene = linked(true);
     scene.bodies[2].placement.position = [0.0, 0.05, 0.0];
     let message = refused(&scene);
-    has(&message, &["coin", "overlap", "move them apart"]);
+    says(&message, &["coin", "overlap", "move them apart"]);
     assert!(!message.contains("overlaps_parent"), "{message}");
 }
 
@@ -158,7 +153,7 @@ fn touching_links_warn_with_the_way_to_declare_them() {
     };
     let narrow = warnings(&scene);
     assert_eq!(narrow.len(), 1, "{narrow:?}");
-    has(
+    says(
         &narrow[0],
         &[
             "narrower than half",
@@ -175,7 +170,7 @@ fn declared_links_may_not_lie_within_each_other() {
     // The lower capsule's middle comes to lie 0.06 below the upper one's: three quarters are inside.
     scene.bodies[1].placement.position = [0.0, 0.0, 0.04];
     let message = refused(&scene);
-    has(
+    says(
         &message,
         &["\"upper\"", "\"lower\"", "part of its volume", "up to half"],
     );
@@ -190,7 +185,7 @@ fn declared_links_may_not_lie_within_each_other() {
         .rollout(&Controls::zeros(&simulator, 20))
         .err()
         .unwrap();
-    has(
+    says(
         &error.to_string(),
         &["t = 0.", "part of its volume", "limit 5.000000e-1"],
     );
@@ -217,7 +212,7 @@ fn the_overlapping_parent_is_the_nearest_with_a_shape() {
     };
     assert_eq!(run(&scene), Vec::<String>::new());
     scene.bodies[2].overlaps_parent = false;
-    has(
+    says(
         &refused(&scene),
         &["`overlaps_parent = true` for body \"lower\""],
     );
@@ -229,7 +224,7 @@ fn the_overlapping_parent_is_the_nearest_with_a_shape() {
     hull.initial.v.remove(3);
     assert_eq!(run(&hull), Vec::<String>::new());
     hull.bodies[1].overlaps_parent = false;
-    has(
+    says(
         &refused(&hull),
         &["overlap", "`overlaps_parent = true` for body \"lower\""],
     );

@@ -1,6 +1,8 @@
 //! One body by the panel method, against exact values.
 //! `cargo test --release --test water panel:: -- --ignored --nocapture` prints the table of `docs/accuracy.md`.
 
+use crate::support::reference::lamb;
+use crate::support::{self, directions};
 use faer::Mat;
 use hydrograd::Error;
 use hydrograd::adjoint::lie::{Mat6, Vec3};
@@ -9,59 +11,20 @@ use hydrograd::boundary::{PanelBoundary, Response};
 use hydrograd::scene::Shape;
 use std::collections::HashMap;
 use std::f64::consts::PI;
-use std::path::Path;
 
 type Mesh = (Vec<Vec3>, Vec<[usize; 3]>);
 
 fn mesh(shape: &Shape, faces: usize) -> Mesh {
-    let m = hydrograd::shape::build(shape, Path::new("."), Some(faces)).unwrap();
+    let m = support::mesh(shape, faces);
     (m.vertices().to_vec(), m.faces().to_vec())
 }
 
 fn ellipsoid(semi_axes: [f64; 3], faces: usize) -> Mesh {
-    let shape = Shape::Ellipsoid {
-        semi_axes,
-        faces: None,
-    };
-    mesh(&shape, faces)
+    mesh(&Shape::ellipsoid(semi_axes), faces)
 }
 
 fn build(mesh: &Mesh) -> PanelBoundary {
     PanelBoundary::new("body", &mesh.0, &mesh.1).unwrap()
-}
-
-/// Carlson's R_D by duplication: ³⁄₂ ∫ dt / (√(t+x) √(t+y) (t+z)^{3/2}).
-fn carlson(mut x: f64, mut y: f64, mut z: f64) -> f64 {
-    let (mut sum, mut power) = (0.0, 1.0);
-    for _ in 0..60 {
-        let (a, b, c) = (x.sqrt(), y.sqrt(), z.sqrt());
-        let lambda = a * b + b * c + c * a;
-        sum += 3.0 * power / (c * (z + lambda));
-        power *= 0.25;
-        (x, y, z) = ((x + lambda) / 4.0, (y + lambda) / 4.0, (z + lambda) / 4.0);
-    }
-    sum + power / (z * z.sqrt())
-}
-
-/// Added mass of an ellipsoid, translation along and rotation about its axes, density 1 (Lamb 1932, §114, §115).
-fn lamb(s: [f64; 3]) -> [f64; 6] {
-    let q = s.map(|a| a * a);
-    let volume = 4.0 / 3.0 * PI * s[0] * s[1] * s[2];
-    let of =
-        |i: usize, j: usize, k: usize| 2.0 / 3.0 * s[0] * s[1] * s[2] * carlson(q[j], q[k], q[i]);
-    let alpha = [of(0, 1, 2), of(1, 2, 0), of(2, 0, 1)];
-    std::array::from_fn(|i| {
-        if i < 3 {
-            return volume * alpha[i] / (2.0 - alpha[i]);
-        }
-        let (j, k) = ((i + 1) % 3, (i + 2) % 3);
-        let (difference, alphas) = (q[j] - q[k], alpha[k] - alpha[j]);
-        if difference == 0.0 {
-            return 0.0;
-        }
-        let below = 2.0 * difference - (q[j] + q[k]) * alphas;
-        volume / 5.0 * difference * difference * alphas / below
-    })
 }
 
 /// Largest relative error of the diagonal, where the exact value isn't 0.
@@ -72,27 +35,8 @@ fn worst(m: &Mat6, exact: &[f64; 6]) -> f64 {
         .fold(0.0, f64::max)
 }
 
-/// Directions spread over the sphere.
-fn directions(n: usize) -> Vec<Vec3> {
-    let at = |i: usize| {
-        let z = 1.0 - (2 * i + 1) as f64 / n as f64;
-        let (angle, r) = (2.399_963_229_728_653 * i as f64, (1.0 - z * z).sqrt());
-        Vec3::new(r * angle.cos(), r * angle.sin(), z)
-    };
-    (0..n).map(at).collect()
-}
-
 fn relative(a: &Mat<f64>, b: &Mat<f64>) -> f64 {
     (a - b).norm_l2() / b.norm_l2()
-}
-
-#[test]
-fn lamb_by_carlson() {
-    let known = [0.0313338533441, 0.0313338533441, 2.5904017967];
-    let found = lamb([1.0, 1.0, 0.1]);
-    assert!((0..3).all(|i| (found[i] / known[i] - 1.0).abs() < 1e-10));
-    assert!((found[3] / 0.340341498576 - 1.0).abs() < 1e-10);
-    assert!((lamb([1.0; 3])[0] / 2.09439510239 - 1.0).abs() < 1e-10);
 }
 
 #[test]

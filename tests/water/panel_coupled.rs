@@ -1,5 +1,7 @@
 //! Bodies and walls in one panel system, against exact values and against itself.
 
+use crate::support::mesh;
+use crate::support::reference::{TwoSpheres, equal_spheres, spheres_by_wall, unequal_spheres};
 use hydrograd::adjoint::lie::{Mat3, Pose, Vec3, exp_matrix};
 use hydrograd::boundary::OneBody;
 use hydrograd::boundary::PanelBoundary;
@@ -10,17 +12,12 @@ use hydrograd::scene::{Scene, Shape, Wall, WallSurface};
 use hydrograd::simulate::{Controls, Fidelity, Settings, Simulator};
 use hydrograd::{Error, Result};
 use nalgebra::DMatrix;
-use std::path::Path;
 use std::sync::Arc;
 
 type Mesh = (Vec<Vec3>, Vec<[usize; 3]>);
 
 fn ellipsoid(semi_axes: [f64; 3], faces: usize) -> Mesh {
-    let shape = Shape::Ellipsoid {
-        semi_axes,
-        faces: None,
-    };
-    let m = hydrograd::shape::build(&shape, Path::new("."), Some(faces)).unwrap();
+    let m = mesh(&Shape::ellipsoid(semi_axes), faces);
     (m.vertices().to_vec(), m.faces().to_vec())
 }
 
@@ -64,53 +61,22 @@ fn momenta(
 
 #[test]
 fn two_spheres() {
-    // Centre distance; along the line of centres own and mutual; the same across (exact).
-    let equal = [
-        (
-            2.05,
-            [
-                2.32202493143995,
-                -0.8142853669628686,
-                2.1589776041169393,
-                0.3814265072810595,
-            ],
-            0.009,
-        ),
-        (
-            2.2,
-            [
-                2.212295759450387,
-                -0.6176388786372325,
-                2.1287968395728725,
-                0.3003675369424352,
-            ],
-            0.007,
-        ),
-        (
-            3.0,
-            [
-                2.106704831524129,
-                -0.23339113417708315,
-                2.0978073973851967,
-                0.11646306884048746,
-            ],
-            0.0055,
-        ),
-    ];
     let ball = named("ball", &ellipsoid([1.0; 3], 1280));
     let pair = [ball.clone(), ball.clone()];
     let worst = |m: &DMatrix<f64>, exact: &[f64; 4]| {
-        let found = [m[(2, 2)], m[(2, 8)], m[(0, 0)], m[(0, 6)]];
+        let found = TwoSpheres::coefficients_of(m);
         let own = exact[0].max(exact[2]);
         let errors = found.iter().zip(exact).map(|(f, e)| (f - e).abs() / own);
         errors.fold(0.0, f64::max)
     };
-    for (d, exact, limit) in equal {
+    let table = equal_spheres();
+    for (i, limit) in [(0, 0.009), (1, 0.007), (3, 0.0055)] {
+        let (d, exact) = (table[i].distance, table[i].coefficients());
         let poses = [at(0.0), at(d)];
         let iterative = momenta(&pair, &[], Solver::Gmres, &poses).unwrap();
         let error = worst(&iterative, &exact);
         assert!(error < limit, "{d}: {error}");
-        if d == 2.2 {
+        if i == 1 {
             let direct = momenta(&pair, &[], Solver::Lu, &poses).unwrap();
             let apart = (&iterative - &direct).abs().max() / direct.max();
             assert!(apart < 1e-8, "{apart:e}");
@@ -124,16 +90,10 @@ fn two_spheres() {
     let coarse = at_faces(named("ball", &ellipsoid([1.0; 3], 320)), 320);
     let better = &fine + (&fine - coarse) / (1.985 * 1.985 - 1.0);
     // Along the line of centres and across: large, mutual, small.
-    for (i, exact) in [
-        (
-            2,
-            [2.163176112461505, -0.20346286079767356, 0.2900123148869534],
-        ),
-        (
-            0,
-            [2.112504291132812, 0.09821453193767603, 0.2711781848554391],
-        ),
-    ] {
+    let known = &unequal_spheres()[0];
+    assert_eq!((known.radius, known.distance), (0.5, 1.6));
+    for (i, exact) in [(2, known.along), (0, known.across)] {
+        let exact = [exact[0][0], exact[0][1], exact[1][1]];
         let scale = [exact[0], f64::sqrt(exact[0] * exact[2]), exact[2]];
         for (k, (row, column)) in [(i, i), (i, i + 6), (i + 6, i + 6)].into_iter().enumerate() {
             let error = |m: &DMatrix<f64>| (m[(row, column)] - exact[k]).abs() / scale[k];
@@ -146,13 +106,9 @@ fn two_spheres() {
 #[test]
 fn a_sphere_by_a_wall() {
     let ball = [named("ball", &ellipsoid([1.0; 3], 1280))];
-    // Height of the centre; across and along the wall (exact).
-    for (h, across, along, limit) in [
-        (1.025, 3.1363102984028184, 2.540404111397999, 0.011),
-        (1.1, 2.82993463808762, 2.4291643765153075, 0.009),
-        (1.5, 2.340095965701212, 2.2142704662256842, 0.0065),
-        (2.0, 2.1944680370725975, 2.1439821448998875, 0.006),
-    ] {
+    let table = spheres_by_wall();
+    for (i, limit) in [(0, 0.011), (1, 0.009), (3, 0.0065), (4, 0.006)] {
+        let (h, across, along) = (table[i].height, table[i].across, table[i].along);
         let rigid = [wall(-0.7, WallSurface::Rigid)];
         let m = momenta(&ball, &rigid, Solver::Gmres, &[at(h - 0.7)]).unwrap();
         for (found, exact) in [(m[(2, 2)], across), (m[(0, 0)], along)] {
@@ -164,8 +120,9 @@ fn a_sphere_by_a_wall() {
     // A free surface: the image moves along, two spheres 2.2 apart in step.
     let free = [wall(-0.7, WallSurface::Free)];
     let m = momenta(&ball, &free, Solver::Gmres, &[at(0.4)]).unwrap();
-    let across = 2.212295759450387 - 0.6176388786372325;
-    let along = 2.1287968395728725 - 0.3003675369424352;
+    let step = &equal_spheres()[1];
+    let across = step.along[0][0] + step.along[0][1];
+    let along = step.across[0][0] - step.across[0][1];
     assert!((m[(2, 2)] / across - 1.0).abs() < 0.006, "{}", m[(2, 2)]);
     assert!((m[(0, 0)] / along - 1.0).abs() < 0.006, "{}", m[(0, 0)]);
 }

@@ -1,19 +1,18 @@
 //! The reduced coupling against exact solutions, its symmetry, its cache, and what it refuses.
 
-use crate::support::two_spheres;
+use crate::support::mesh;
+use crate::support::reference::{TwoSpheres, equal_spheres};
 use hydrograd::adjoint::lie::{Mat3, Pose, Vec3};
 use hydrograd::boundary::{ExactBoundary, OneBody, PanelBoundary};
 use hydrograd::coupling::reduced::{Reduced, ReducedBody, cache, compress};
 use hydrograd::coupling::{Coupling, Direction, Linearise};
 use hydrograd::scene::{Body, Fluid, Scene, Shape, Wall, WallSurface};
-use hydrograd::shape;
 use hydrograd::{Controls, Fidelity, Settings, Simulator};
 use nalgebra::{DMatrix, DVector};
-use std::path::Path;
 use std::sync::Arc;
 
 fn sphere(rank: Option<usize>, tolerance: f64, gap: f64) -> Arc<ReducedBody> {
-    let mesh = shape::build(&Shape::sphere(1.0), Path::new(""), Some(1280)).unwrap();
+    let mesh = mesh(&Shape::sphere(1.0), 1280);
     let response = ExactBoundary::new("sphere", [1.0; 3], &Pose::identity(), gap).unwrap();
     let settings = compress::Settings {
         rank,
@@ -36,17 +35,17 @@ fn matrix(coupling: &dyn Coupling, poses: &[Pose]) -> DMatrix<f64> {
 }
 
 /// Largest error of the two spheres' coefficients relative to M11.
-fn two_spheres_error(body: &Arc<ReducedBody>, d: f64, exact: &[f64; 4]) -> f64 {
+fn two_spheres_error(body: &Arc<ReducedBody>, exact: &TwoSpheres) -> f64 {
     let pair = Reduced::new(vec![body.clone(); 2], &[], |_, _| None).unwrap();
-    let m = matrix(&pair, &[at(0.0, 0.0, 0.0), at(0.0, 0.0, d)]);
-    let found = [m[(2, 2)], m[(2, 8)], m[(0, 0)], m[(0, 6)]];
+    let m = matrix(&pair, &[at(0.0, 0.0, 0.0), at(0.0, 0.0, exact.distance)]);
+    let (found, exact) = (TwoSpheres::coefficients_of(&m), exact.coefficients());
     let errors = found.iter().zip(exact).map(|(a, b)| (a - b).abs());
     errors.fold(0.0, f64::max) / exact[0]
 }
 
 #[test]
 fn two_spheres_meet_the_exact_table() {
-    let table = two_spheres::table();
+    let table = equal_spheres();
     for (rank, gap, limits) in [
         (80, 0.5, [2e-2, 5e-3, 1e-3, 5e-4, 1e-4, 5e-5]),
         (160, 0.5, [2e-2, 5e-3, 5e-4, 1e-4, 1e-5, 1e-6]),
@@ -54,13 +53,13 @@ fn two_spheres_meet_the_exact_table() {
     ] {
         let body = sphere(Some(rank), 1e-4, gap);
         assert!(body.points() <= rank);
-        for ((d, exact), limit) in table.iter().zip(limits) {
-            let error = two_spheres_error(&body, *d, exact);
+        for (exact, limit) in table.iter().zip(limits) {
+            let error = two_spheres_error(&body, exact);
             println!(
                 "rank {rank}, resolved gap {gap}, gap {:.2}: {error:.1e}",
-                d - 2.0
+                exact.gap()
             );
-            assert!(error <= limit, "rank {rank} gap {}: {error:e}", d - 2.0);
+            assert!(error <= limit, "rank {rank} gap {}: {error:e}", exact.gap());
         }
     }
 }
@@ -68,10 +67,10 @@ fn two_spheres_meet_the_exact_table() {
 #[test]
 fn a_tighter_tolerance_gives_more_points_and_smaller_errors() {
     let mut last = (0, f64::INFINITY);
-    let (d, exact) = two_spheres::table()[1];
+    let exact = &equal_spheres()[1];
     for tolerance in [3e-2, 3e-3, 3e-4] {
         let body = sphere(None, tolerance, 0.2);
-        let error = two_spheres_error(&body, d, &exact);
+        let error = two_spheres_error(&body, exact);
         println!(
             "tolerance {tolerance:.0e}: {} points, error {error:.1e}",
             body.points()
@@ -86,7 +85,8 @@ fn a_tighter_tolerance_gives_more_points_and_smaller_errors() {
 #[test]
 fn a_sphere_by_a_wall_and_under_a_free_surface() {
     let body = sphere(None, 1e-4, 0.4);
-    for (d, [along, along12, across, across12]) in &two_spheres::table()[2..5] {
+    for pair in &equal_spheres()[2..5] {
+        let (d, [along, along12, across, across12]) = (pair.distance, pair.coefficients());
         let wall = |surface| Wall {
             point: [0.0, 0.0, 0.0],
             normal: [0.0, 0.0, -1.0],
@@ -110,7 +110,7 @@ fn a_sphere_by_a_wall_and_under_a_free_surface() {
 #[test]
 fn the_matrix_is_symmetric_to_rounding() {
     let panel = |shape: Shape| {
-        let mesh = shape::build(&shape, Path::new(""), Some(320)).unwrap();
+        let mesh = mesh(&shape, 320);
         let (v, f) = (mesh.vertices(), mesh.faces());
         let response = PanelBoundary::new("box", v, f).unwrap();
         let settings = compress::Settings::default();

@@ -37,14 +37,14 @@ fn deep_and_degenerate_poses_stay_finite() {
     }
     assert_eq!(refused, 0);
     // Swallowed whole, the ellipsoid still has its one point.
-    let (coin, hall) = (plain(&kinds[2]), plain(&cuboid([1.0, 0.8, 0.9])));
+    let (coin, hall) = (plain(&kinds[2]), plain(&Shape::cuboid([1.0, 0.8, 0.9])));
     for _ in 0..200 {
         let pose = Pose::new(draw.pose().rotation, 0.4 * draw.vector());
         let points = between(&coin, &hall, &pose, &Pose::identity(), 0.05).unwrap();
         assert!(points.len() == 1 && points[0].gap < 0.0 && is_finite(&points[0]));
     }
     let bad = at(f64::NAN, 0.0, 0.0);
-    let ball = plain(&sphere(0.1));
+    let ball = plain(&Shape::sphere(0.1));
     assert!(between(&ball, &ball, &bad, &bad, 0.1).is_err());
     assert!(between(&ball, &ball, &Pose::identity(), &at(1., 0., 0.), f64::NAN).is_err());
     let nowhere = Vec3::zeros();
@@ -53,7 +53,7 @@ fn deep_and_degenerate_poses_stay_finite() {
 
 #[test]
 fn meshes_are_taken_by_their_flat_faces_and_refused_if_not_convex() {
-    let shape = cuboid([0.3, 0.2, 0.4]);
+    let shape = Shape::cuboid([0.3, 0.2, 0.4]);
     let mesh = build(&shape, Path::new("."), Some(400)).unwrap();
     let offset = turned([0.2, 0.5, -0.3], [0.1, 0.2, 0.3]);
     let from_mesh = Geometry::of_mesh(&mesh, offset).unwrap();
@@ -77,7 +77,7 @@ fn meshes_are_taken_by_their_flat_faces_and_refused_if_not_convex() {
     assert_eq!((ours.len(), theirs.len()), (8, 8));
     assert!(ours.iter().zip(&theirs).all(|(x, y)| (x - y).abs() < 1e-14));
 
-    let round = build(&sphere(0.1), Path::new("."), None).unwrap();
+    let round = build(&Shape::sphere(0.1), Path::new("."), None).unwrap();
     let round = Geometry::of_mesh(&round, Pose::identity()).unwrap();
     let points = between(&round, &exact, &Pose::identity(), &Pose::identity(), 0.01).unwrap();
     assert!(points.iter().all(is_finite));
@@ -107,10 +107,10 @@ fn ellipsoids_of_any_aspect_have_a_common_normal() {
     let (mut refused, mut worst) = (0, 0.0f64);
     for _ in 0..2000 {
         let mut axes = || [0; 3].map(|_| 10f64.powf(1.25 * draw.number() - 1.25));
-        let shapes = [ellipsoid(axes()), ellipsoid(axes())];
+        let shapes = [Shape::ellipsoid(axes()), Shape::ellipsoid(axes())];
         let [a, b] = shapes.each_ref().map(plain);
         let (pose, rest) = (draw.pose(), draw.pose());
-        let ball = plain(&sphere(1e-9));
+        let ball = plain(&Shape::sphere(1e-9));
         for spread in [0.02, 0.3, 2.0] {
             let place = Pose::new(pose.rotation, rest.translation + spread * draw.vector());
             match between(&a, &b, &place, &rest, 10.0) {

@@ -29,9 +29,9 @@ fn gaps_of_random_polyhedra_are_those_of_gjk() {
     use parry3d_f64::{math::Pose as Place, query::distance, shape::ConvexPolyhedron};
     let mut draw = Draw(43);
     let shapes = [
-        cuboid([0.3, 0.2, 0.4]),
-        cuboid([1.0, 0.1, 0.05]),
-        cuboid([0.5, 0.6, 0.02]),
+        Shape::cuboid([0.3, 0.2, 0.4]),
+        Shape::cuboid([1.0, 0.1, 0.05]),
+        Shape::cuboid([0.5, 0.6, 0.02]),
         wedge(),
     ];
     let (mut apart, mut worst, mut off) = (0, 0.0f64, 0);

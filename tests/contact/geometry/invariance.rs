@@ -61,10 +61,10 @@ fn swapping_and_moving_both_bodies_change_nothing() {
 fn points_scale_with_the_bodies() {
     let mut draw = Draw(53);
     let scaled = |shape: &Shape, by: f64| match shape.clone() {
-        Shape::Sphere { radius, .. } => sphere(by * radius),
-        Shape::Capsule { radius, length, .. } => capsule(by * radius, by * length),
-        Shape::Ellipsoid { semi_axes, .. } => ellipsoid(semi_axes.map(|a| by * a)),
-        Shape::Box { size, .. } => cuboid(size.map(|a| by * a)),
+        Shape::Sphere { radius, .. } => Shape::sphere(by * radius),
+        Shape::Capsule { radius, length, .. } => Shape::capsule(by * radius, by * length),
+        Shape::Ellipsoid { semi_axes, .. } => Shape::ellipsoid(semi_axes.map(|a| by * a)),
+        Shape::Box { size, .. } => Shape::cuboid(size.map(|a| by * a)),
         other => other,
     };
     let kinds: Vec<Shape> = every_kind().into_iter().take(5).collect();

@@ -1,10 +1,11 @@
 //! Gaps, normals and positions with known answers.
 
 use super::*;
+use crate::support::directions;
 
 #[test]
 fn balls_and_walls_have_known_gaps() {
-    let (a, b) = (plain(&sphere(0.1)), plain(&sphere(0.2)));
+    let (a, b) = (plain(&Shape::sphere(0.1)), plain(&Shape::sphere(0.2)));
     let points = between(&a, &b, &at(0.0, 0.0, 0.35), &at(0.0, 0.0, 0.0), 0.1).unwrap();
     assert_eq!(points.len(), 1);
     assert!((points[0].gap - 0.05).abs() < 1e-15);
@@ -23,13 +24,13 @@ fn balls_and_walls_have_known_gaps() {
     assert!((points[0].gap + 0.01).abs() < 1e-15);
     assert!((points[0].position - Vec3::new(0.3, -0.2, -0.005)).norm() < 1e-15);
 
-    let box_ = plain(&cuboid([0.3, 0.2, 0.1]));
+    let box_ = plain(&Shape::cuboid([0.3, 0.2, 0.1]));
     let points = floor(&box_, &at(0.0, 0.0, 0.05 + 1e-3));
     assert_eq!(points.len(), 4);
     assert!(points.iter().all(|p| (p.gap - 1e-3).abs() < 1e-15));
 
     let lying = turned([0.0, std::f64::consts::FRAC_PI_2, 0.0], [0.0, 0.0, 0.07]);
-    let points = floor(&plain(&capsule(0.06, 0.4)), &lying);
+    let points = floor(&plain(&Shape::capsule(0.06, 0.4)), &lying);
     assert_eq!(points.len(), 2);
     for p in &points {
         assert!((p.gap - 0.01).abs() < 1e-15);
@@ -37,7 +38,7 @@ fn balls_and_walls_have_known_gaps() {
     }
 
     // Height of a plane's support: √(nᵀ R D² Rᵀ n).
-    let coin = plain(&ellipsoid([0.2, 0.05, 0.2]));
+    let coin = plain(&Shape::ellipsoid([0.2, 0.05, 0.2]));
     let tilt: f64 = 0.4;
     let points = floor(&coin, &turned([tilt, 0.0, 0.0], [0.0, 0.0, 0.2]));
     let height = (0.2 * tilt.cos()).hypot(0.05 * tilt.sin());
@@ -48,8 +49,8 @@ fn balls_and_walls_have_known_gaps() {
 #[test]
 fn boxes_lie_on_boxes_at_their_corners_and_crossings() {
     let (a, b) = (
-        plain(&cuboid([0.2, 0.2, 0.1])),
-        plain(&cuboid([0.6, 0.5, 0.2])),
+        plain(&Shape::cuboid([0.2, 0.2, 0.1])),
+        plain(&Shape::cuboid([0.6, 0.5, 0.2])),
     );
     let points = between(&a, &b, &at(0.05, 0.0, 0.149), &at(0.0, 0.0, 0.0), 0.01).unwrap();
     let touching: Vec<_> = points.iter().filter(|p| p.gap < 0.0).collect();
@@ -60,7 +61,7 @@ fn boxes_lie_on_boxes_at_their_corners_and_crossings() {
     }
 
     // Two planks across one another: no corner of either is over the other.
-    let plank = plain(&cuboid([1.0, 0.1, 0.05]));
+    let plank = plain(&Shape::cuboid([1.0, 0.1, 0.05]));
     let across = turned([0.0, 0.0, 1.2], [0.0, 0.0, 0.049]);
     let points = between(&plank, &plank, &across, &at(0.0, 0.0, 0.0), 0.01).unwrap();
     assert_eq!(points.len(), 4);
@@ -73,7 +74,7 @@ fn boxes_lie_on_boxes_at_their_corners_and_crossings() {
 
     // Edge across edge, both boxes standing on an edge.
     let quarter = std::f64::consts::FRAC_PI_4;
-    let cube = plain(&cuboid([0.2; 3]));
+    let cube = plain(&Shape::cuboid([0.2; 3]));
     let diagonal = 0.2 * 2f64.sqrt();
     let below = turned([quarter, 0.0, 0.0], [0.0; 3]);
     for gap in [2e-3, -2e-3] {
@@ -91,7 +92,7 @@ fn boxes_lie_on_boxes_at_their_corners_and_crossings() {
 
 #[test]
 fn an_ellipsoid_meets_faces_edges_and_corners_of_a_prism_as_its_distance_says() {
-    let (coin, prism) = (plain(&ellipsoid([0.2, 0.05, 0.2])), plain(&wedge()));
+    let (coin, prism) = (plain(&Shape::ellipsoid([0.2, 0.05, 0.2])), plain(&wedge()));
     let rest = Pose::identity();
     let on = |g: &Geometry, pose: &Pose| {
         let points = between(g, &prism, pose, &rest, 0.05).unwrap();
@@ -110,7 +111,10 @@ fn an_ellipsoid_meets_faces_edges_and_corners_of_a_prism_as_its_distance_says() 
         assert!((p.normal - Vec3::z()).norm() < 1e-14);
     }
     // A round ellipsoid is a ball: the same gap, normal, position over all features.
-    let (round, ball) = (plain(&ellipsoid([0.1; 3])), plain(&sphere(0.1)));
+    let (round, ball) = (
+        plain(&Shape::ellipsoid([0.1; 3])),
+        plain(&Shape::sphere(0.1)),
+    );
     let mut draw = Draw(7);
     let mut met = 0;
     for _ in 0..400 {
@@ -131,31 +135,22 @@ fn an_ellipsoid_meets_faces_edges_and_corners_of_a_prism_as_its_distance_says() 
 }
 
 /// Points evenly over the unit sphere.
-fn directions(count: usize) -> impl Iterator<Item = Vec3> {
-    let golden = std::f64::consts::PI * (3.0 - 5f64.sqrt());
-    (0..count).map(move |k| {
-        let z = 1.0 - (2 * k + 1) as f64 / count as f64;
-        let r = (1.0 - z * z).sqrt();
-        let angle = golden * k as f64;
-        Vec3::new(r * angle.cos(), r * angle.sin(), z)
-    })
-}
-
 #[test]
 fn ellipsoids_are_as_far_apart_as_their_surfaces() {
     let mut draw = Draw(11);
     let axes = [[0.2, 0.05, 0.2], [0.12, 0.18, 0.25], [0.3, 0.1, 0.04]];
-    let ball = plain(&sphere(0.07));
+    let ball = plain(&Shape::sphere(0.07));
     for (k, semi_axes) in axes.iter().enumerate() {
-        let body = plain(&ellipsoid(*semi_axes));
+        let body = plain(&Shape::ellipsoid(*semi_axes));
         let other_axes = axes[(k + 1) % 3];
-        let other = plain(&ellipsoid(other_axes));
+        let other = plain(&Shape::ellipsoid(other_axes));
         for _ in 0..4 {
             let pose = draw.pose();
             let away = draw.vector().normalize();
             let there = Pose::new(exp_matrix(&draw.vector()), pose.translation + 0.6 * away);
             let points = between(&ball, &body, &there, &pose, 1.0).unwrap();
             let nearest = directions(1_000_000)
+                .into_iter()
                 .map(|d| pose.apply(&d.component_mul(&Vec3::from(*semi_axes))))
                 .map(|x| (x - there.translation).norm() - 0.07)
                 .fold(f64::INFINITY, f64::min);
@@ -173,6 +168,7 @@ fn ellipsoids_are_as_far_apart_as_their_surfaces() {
                     - h(&pose, semi_axes)
             };
             let largest = directions(1_000_000)
+                .into_iter()
                 .map(|n| height(&n))
                 .fold(f64::NEG_INFINITY, f64::max);
             let error = p.gap - largest;
@@ -180,7 +176,10 @@ fn ellipsoids_are_as_far_apart_as_their_surfaces() {
         }
     }
     // Round ones are balls, overlapping too.
-    let (a, b) = (plain(&ellipsoid([0.1; 3])), plain(&ellipsoid([0.2; 3])));
+    let (a, b) = (
+        plain(&Shape::ellipsoid([0.1; 3])),
+        plain(&Shape::ellipsoid([0.2; 3])),
+    );
     for gap in [0.03, 0.0, -0.02, -0.15] {
         let pose = Pose::new(
             exp_matrix(&Vec3::new(0.3, 0.2, -0.5)),

@@ -39,47 +39,16 @@ impl Draw {
     }
 }
 
-fn sphere(radius: f64) -> Shape {
-    Shape::Sphere {
-        radius,
-        faces: None,
-    }
-}
-
-fn ellipsoid(semi_axes: [f64; 3]) -> Shape {
-    Shape::Ellipsoid {
-        semi_axes,
-        faces: None,
-    }
-}
-
-fn cuboid(size: [f64; 3]) -> Shape {
-    Shape::Box { size, faces: None }
-}
-
-fn capsule(radius: f64, length: f64) -> Shape {
-    Shape::Capsule {
-        radius,
-        length,
-        faces: None,
-    }
-}
-
 /// A prism with a trapezium for its profile, given clockwise.
 fn wedge() -> Shape {
-    Shape::Prism {
-        profile: vec![[-0.2, -0.1], [-0.15, 0.1], [0.25, 0.1], [0.3, -0.1]],
-        length: 0.6,
-        faces: None,
-    }
+    Shape::prism(
+        vec![[-0.2, -0.1], [-0.15, 0.1], [0.25, 0.1], [0.3, -0.1]],
+        0.6,
+    )
 }
 
 fn cylinder() -> Shape {
-    Shape::Cylinder {
-        radius: 0.15,
-        length: 0.3,
-        faces: None,
-    }
+    Shape::cylinder(0.15, 0.3)
 }
 
 fn plain(shape: &Shape) -> Geometry {
@@ -121,11 +90,11 @@ fn is_finite(p: &ContactPoint) -> bool {
 
 fn every_kind() -> Vec<Shape> {
     vec![
-        sphere(0.12),
-        capsule(0.06, 0.4),
-        ellipsoid([0.2, 0.05, 0.2]),
-        ellipsoid([0.12, 0.18, 0.25]),
-        cuboid([0.3, 0.2, 0.4]),
+        Shape::sphere(0.12),
+        Shape::capsule(0.06, 0.4),
+        Shape::ellipsoid([0.2, 0.05, 0.2]),
+        Shape::ellipsoid([0.12, 0.18, 0.25]),
+        Shape::cuboid([0.3, 0.2, 0.4]),
         wedge(),
         cylinder(),
     ]

@@ -74,8 +74,8 @@ fn slopes_of_every_pair_agree_with_differences() {
 #[test]
 fn slopes_of_flat_contact_and_fading_crossings_agree_with_differences() {
     let mut draw = Draw(29);
-    let plank = plain(&cuboid([1.0, 0.1, 0.05]));
-    let rod = plain(&capsule(0.03, 0.7));
+    let plank = plain(&Shape::cuboid([1.0, 0.1, 0.05]));
+    let rod = plain(&Shape::capsule(0.03, 0.7));
     let mut faded = 0;
     for (a, b) in [
         (&plank, &plank),

@@ -4,7 +4,7 @@ use super::*;
 
 #[test]
 fn a_coin_that_slides_off_a_prism_feels_no_jump() {
-    let (coin, prism) = (plain(&ellipsoid([0.2, 0.05, 0.2])), plain(&wedge()));
+    let (coin, prism) = (plain(&Shape::ellipsoid([0.2, 0.05, 0.2])), plain(&wedge()));
     let reach = 0.02;
     for (tilt, aside) in [(0.0, 0.0), (0.1, 0.05), (-0.2, 0.31)] {
         let spin = exp_matrix(&Vec3::new(tilt, 0.7 * tilt, 0.3));
@@ -42,8 +42,8 @@ fn a_coin_that_slides_off_a_prism_feels_no_jump() {
 #[test]
 fn planks_that_slide_off_one_another_feel_no_jump() {
     let (plank, rod) = (
-        plain(&cuboid([1.0, 0.1, 0.05])),
-        plain(&capsule(0.025, 0.8)),
+        plain(&Shape::cuboid([1.0, 0.1, 0.05])),
+        plain(&Shape::capsule(0.025, 0.8)),
     );
     let reach = 0.02;
     let stand = exp_matrix(&Vec3::new(0.0, std::f64::consts::FRAC_PI_2, 0.0));

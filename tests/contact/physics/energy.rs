@@ -15,8 +15,8 @@ fn falling(
     scene.time_step = 0.005;
     for k in 0..2 {
         let made = shape(random, k);
-        let [x, y, _] = random.three(0.03);
-        let turn = random.three(1.5);
+        let [x, y, _] = random.vector(0.03);
+        let turn = random.vector(1.5);
         scene.add(
             Body::new(made.faces(80))
                 .density(random.between(1500.0, 4000.0))
@@ -26,7 +26,7 @@ fn falling(
     }
     scene.initial.v = [1.0, 4.0, 1.0, 4.0]
         .iter()
-        .flat_map(|size| random.three(*size))
+        .flat_map(|size| random.vector(*size))
         .collect();
     let soft = random.between(3.0, 5.0);
     let c = contact(&mut scene);

@@ -1,6 +1,6 @@
 //! A ball that lands, against the equation of its height, and two balls that meet.
 
-use super::{GRAVITY, RAIL, above_floor, contact, isolated, run, scene, simulator};
+use super::{GRAVITY, RAIL, above_floor, contact, isolated, run, simulator, touching};
 use hydrograd::scene::{Body, Joint, Scene, Shape};
 use hydrograd::{Fidelity, Rollout, Simulator};
 use nalgebra::{DVector, Matrix2};
@@ -250,7 +250,7 @@ fn added_mass_lengthens_the_impact() {
 
 /// Two equal balls on one line, of which the first moves.
 fn meeting(stiffness: f64, dt: f64) -> Simulator {
-    let mut scene = scene(0.0);
+    let mut scene = touching(0.0);
     scene.gravity = [0.0; 3];
     scene.time_step = dt;
     let line = Joint::Prismatic {

@@ -5,79 +5,21 @@ mod impact;
 mod modes;
 mod smooth;
 
+use super::tools::{RAIL, above_floor, contact, touching};
+use crate::support::random::Random;
+use crate::support::{self, GRAVITY, run};
 use hydrograd::adjoint::lie::{Vec6, point_velocity};
 use hydrograd::dynamics::{Evaluation, Input, Integrator, Linearisation, State, Stepper};
-use hydrograd::scene::{Contact, Fluid, Joint, Scene};
-use hydrograd::{Controls, Fidelity, Rollout, Settings, Simulator};
+use hydrograd::scene::Scene;
+use hydrograd::{Fidelity, Simulator};
 use nalgebra::DVector;
 
-const GRAVITY: f64 = 9.81;
-const RAIL: Joint = Joint::Prismatic {
-    axis: [0.0, 0.0, 1.0],
-};
-
-/// Under gravity, without a wall.
-fn scene(density: f64) -> Scene {
-    let mut scene = Scene::new(Fluid {
-        density,
-        current: [0.0; 3],
-    });
-    scene.gravity = [0.0, 0.0, -GRAVITY];
-    scene.contact = Some(Contact::default());
-    scene
-}
-
-/// Above a floor at z = 0.
-fn above_floor(density: f64) -> Scene {
-    let mut scene = scene(density);
-    scene.add_wall([0.0; 3], [0.0, 0.0, 1.0]);
-    scene
-}
-
-fn contact(scene: &mut Scene) -> &mut Contact {
-    scene.contact.get_or_insert_default()
-}
-
 fn simulator(scene: &Scene, fidelity: Fidelity) -> Simulator {
-    let settings = Settings::default()
-        .fidelity(fidelity)
-        .integrator(Integrator::MomentumEuler);
-    Simulator::new(scene, settings).unwrap()
+    support::simulator(scene, fidelity, Integrator::MomentumEuler)
 }
 
 fn isolated(scene: &Scene) -> Simulator {
     simulator(scene, Fidelity::Isolated)
-}
-
-fn run(simulator: &Simulator, steps: usize) -> Rollout<'_> {
-    let rollout = simulator
-        .rollout(&Controls::zeros(simulator, steps))
-        .unwrap();
-    let finite = |x: &DVector<f64>| x.iter().all(|x| x.is_finite());
-    assert!(
-        rollout
-            .samples()
-            .iter()
-            .all(|s| finite(&s.q) && finite(&s.v))
-    );
-    rollout
-}
-
-/// Numbers by a linear congruential generator: the same on every machine.
-struct Random(u64);
-
-impl Random {
-    fn between(&mut self, low: f64, high: f64) -> f64 {
-        self.0 = self
-            .0
-            .wrapping_mul(6364136223846793005)
-            .wrapping_add(1442695040888963407);
-        low + (high - low) * (self.0 >> 11) as f64 / (1_u64 << 53) as f64
-    }
-
-    fn three(&mut self, size: f64) -> [f64; 3] {
-        [0; 3].map(|_| self.between(-size, size))
-    }
 }
 
 /// A step's velocities before and after contact.

@@ -1,6 +1,6 @@
 //! The gradient against differences in each mode of contact, which the run is shown to keep.
 
-use super::{above_floor, contact, isolated, run, velocities};
+use super::{above_floor, contact, isolated, run, touching, velocities};
 use hydrograd::Simulator;
 use hydrograd::dynamics::Dual;
 use hydrograd::scene::{Body, Scene, Shape};
@@ -75,7 +75,7 @@ fn release() {
 /// A block on a slope: below the angle of friction, and above it.
 fn on_a_slope(slope: f64) -> Simulator {
     let angle = slope.atan();
-    let mut scene = super::scene(0.0);
+    let mut scene = touching(0.0);
     scene.add_wall([0.0; 3], [angle.sin(), 0.0, angle.cos()]);
     scene.add(
         Body::new(Shape::cuboid([0.3, 0.3, 0.1]))

@@ -1,6 +1,6 @@
 //! Continuity: where a bouncing ball ends as its start varies, and derivatives across and at changes of mode.
 
-use super::{GRAVITY, RAIL, above_floor, contact, isolated, run, scene};
+use super::{GRAVITY, RAIL, above_floor, contact, isolated, run, touching};
 use hydrograd::scene::{Body, Joint, Scene, Shape};
 use hydrograd::{Controls, Simulator};
 use nalgebra::{DMatrix, DVector};
@@ -208,7 +208,7 @@ fn gradients_at_a_change_of_mode_are_finite() {
         cases.push(("flat box", flat.clone()));
         flat.add(block(0.152));
         cases.push(("box on box, edges in line", flat));
-        let mut rods = scene(0.0);
+        let mut rods = touching(0.0);
         rods.gravity = [0.0, 0.0, -gravity];
         let rod = |z: f64| {
             Body::new(Shape::capsule(0.05, 0.3))
@@ -218,7 +218,7 @@ fn gradients_at_a_change_of_mode_are_finite() {
         rods.add(rod(0.0).rotated([0.0, FRAC_PI_2, 0.0]).joint(Joint::Fixed));
         rods.add(rod(0.1005).rotated([0.0, FRAC_PI_2, 0.0]));
         cases.push(("parallel rods", rods));
-        let mut crossed = scene(0.0);
+        let mut crossed = touching(0.0);
         crossed.gravity = [0.0, 0.0, -gravity];
         crossed.add(rod(0.0).rotated([0.0, FRAC_PI_2, 0.0]).joint(Joint::Fixed));
         crossed.add(rod(0.1005).rotated([FRAC_PI_2, 0.0, 0.0]));

@@ -1,85 +1,15 @@
 //! Added mass and flow of an ellipsoid in motion.
 
 use super::{exact, surface};
+use crate::support::reference::ellipsoids;
 use hydrograd::adjoint::lie::{Mat6, Vec3, Vec6};
 use hydrograd::boundary::Response;
 use hydrograd::boundary::exact::lamb;
 use std::f64::consts::PI;
 
-/// Semi-axes; added mass in translation along and rotation about x, y, z at unit density, by
-/// independent quadrature of Lamb's integrals.
-const LAMB: [([f64; 3], [f64; 6]); 6] = [
-    (
-        [1.0, 1.0, 1.0],
-        [
-            2.0943951023931957,
-            2.0943951023931957,
-            2.0943951023931957,
-            0.0,
-            0.0,
-            0.0,
-        ],
-    ),
-    (
-        [2.0, 1.0, 1.0],
-        [
-            1.7594179600221793,
-            5.899579467820825,
-            5.899579467820825,
-            0.0,
-            2.0057929172153726,
-            2.0057929172153726,
-        ],
-    ),
-    (
-        [1.0, 1.0, 0.5],
-        [
-            0.6483952523583104,
-            0.6483952523583104,
-            2.3353772201132488,
-            0.1772789898160723,
-            0.1772789898160723,
-            0.0,
-        ],
-    ),
-    (
-        [1.0, 1.0, 0.1],
-        [
-            0.031333853344129144,
-            0.031333853344129144,
-            2.5904017967032096,
-            0.3403414985758897,
-            0.3403414985758897,
-            0.0,
-        ],
-    ),
-    (
-        [5.0, 1.0, 1.0],
-        [
-            1.2382309077616358,
-            18.729348944434047,
-            18.729348944434047,
-            0.0,
-            76.21975609966997,
-            76.21975609966997,
-        ],
-    ),
-    (
-        [3.0, 2.0, 1.0],
-        [
-            4.6560012697568816,
-            9.161970906562738,
-            34.21891765849272,
-            9.632557631369707,
-            35.599830507687976,
-            3.9141914749957225,
-        ],
-    ),
-];
-
 #[test]
 fn lambs_coefficients() {
-    for (semi_axes, exact) in LAMB {
+    for (semi_axes, exact) in ellipsoids() {
         let m = lamb::added_mass(semi_axes).unwrap();
         for i in 0..6 {
             let (got, exact) = (m[(i, i)], exact[i]);

@@ -1,6 +1,7 @@
 //! Spheres and ellipsoids by formula, against what is known in closed form and against each other.
 
 mod lamb;
+mod references;
 mod scattering;
 
 use hydrograd::Error;

@@ -2,7 +2,6 @@
 
 use crate::support::command::{self, hydrograd, scene};
 use serde_json::Value;
-use std::path::Path;
 
 fn json(arguments: &[&str]) -> Value {
     command::json(&[&["tradeoff"], arguments].concat())

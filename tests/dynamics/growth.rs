@@ -4,7 +4,7 @@ use crate::support;
 use hydrograd::dynamics::Integrator;
 use hydrograd::scene::{Body, Contact, Fluid, Joint, Motion, Scene, Shape};
 use hydrograd::simulate::growth::growth;
-use hydrograd::{Controls, Fidelity, Settings, Simulator};
+use hydrograd::{Controls, Fidelity, Simulator};
 use nalgebra::{DMatrix, DVector};
 
 fn simulator(scene: &Scene, integrator: Integrator) -> Simulator {

@@ -2,7 +2,6 @@
 
 use crate::support::example;
 use hydrograd::dynamics::Integrator;
-use hydrograd::scene::Scene;
 use hydrograd::simulate::{Action, ActionBar, Observation, Policy};
 use hydrograd::{Controls, Fidelity, Result, Settings, Simulator, objective};
 use nalgebra::DVector;

@@ -81,8 +81,8 @@ fn positions(simulator: &Simulator) -> hydrograd::Result<DVector<f64>> {
 /// Sets mass and drag from their logarithms over the truth's.
 fn set(simulator: &mut Simulator, x: &[f64]) -> hydrograd::Result<()> {
     let mut parameters = simulator.parameters().clone();
-    parameters.mass[COIN] = MASS * x[0].exp();
-    parameters.quadratic_drag[COIN] = DRAG * x[1].exp();
+    parameters.set("coin.mass", MASS * x[0].exp())?;
+    parameters.set("coin.drag.quadratic", DRAG * x[1].exp())?;
     simulator.set_parameters(parameters)
 }
 
@@ -108,11 +108,8 @@ fn misfit(
     let gradient = rollout.vjp(&bar)?.parameters;
     let p = simulator.parameters();
     // Over logarithms.
-    let slope = vec![
-        gradient.mass[COIN] * p.mass[COIN],
-        gradient.quadratic_drag[COIN] * p.quadratic_drag[COIN],
-    ];
-    Ok((sum, slope))
+    let slope = ["coin.mass", "coin.drag.quadratic"].map(|x| Ok(gradient.get(x)? * p.get(x)?));
+    Ok((sum, slope.into_iter().collect::<hydrograd::Result<_>>()?))
 }
 
 /// Covariance of x where the misfit is least, by Gauss and Newton; J by central differences, two rollouts a column.

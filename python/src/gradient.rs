@@ -1,7 +1,7 @@
 //! Gradients for Python: instances of the data classes in `hydrograd/_gradient.py`.
 
 use crate::array;
-use hydrograd::Simulator;
+use hydrograd::dynamics::Parameters;
 use nalgebra::DVector;
 use numpy::PyArrayDyn;
 use pyo3::prelude::*;
@@ -16,18 +16,9 @@ fn vector<'py>(py: Python<'py>, v: &DVector<f64>) -> PyResult<Bound<'py, PyArray
 }
 
 /// The parameters by name.
-pub fn by_name<'py>(
-    py: Python<'py>,
-    simulator: &Simulator,
-    values: Vec<f64>,
-) -> PyResult<Bound<'py, PyDict>> {
+pub fn by_name<'py>(py: Python<'py>, parameters: &Parameters) -> PyResult<Bound<'py, PyDict>> {
     let out = PyDict::new(py);
-    for (name, value) in simulator
-        .parameters()
-        .names(&simulator.names())
-        .iter()
-        .zip(values)
-    {
+    for (name, value) in parameters.names().zip(parameters.to_vec()) {
         out.set_item(name, value)?;
     }
     Ok(out)
@@ -36,7 +27,6 @@ pub fn by_name<'py>(
 /// The gradient of a rollout.
 pub fn of_rollout<'py>(
     py: Python<'py>,
-    simulator: &Simulator,
     gradient: &hydrograd::Gradient,
 ) -> PyResult<Bound<'py, PyAny>> {
     let controls = array::transposed(py, &gradient.controls, &[gradient.controls.nrows()])?;
@@ -44,7 +34,7 @@ pub fn of_rollout<'py>(
         controls,
         vector(py, &gradient.initial.q)?,
         vector(py, &gradient.initial.v)?,
-        by_name(py, simulator, gradient.parameters.to_vec())?,
+        by_name(py, &gradient.parameters)?,
         array::to_python(py, gradient.gains.clone(), &[gradient.gains.len()])?,
     );
     class(py, "Gradient")?.call1(parts)
@@ -53,7 +43,6 @@ pub fn of_rollout<'py>(
 /// The gradient of one step.
 pub fn of_step<'py>(
     py: Python<'py>,
-    simulator: &Simulator,
     gradient: &hydrograd::Gradient,
 ) -> PyResult<Bound<'py, PyAny>> {
     let controls = gradient.controls.column(0).into_owned();
@@ -61,7 +50,7 @@ pub fn of_step<'py>(
         vector(py, &gradient.initial.q)?,
         vector(py, &gradient.initial.v)?,
         vector(py, &controls)?,
-        by_name(py, simulator, gradient.parameters.to_vec())?,
+        by_name(py, &gradient.parameters)?,
         array::to_python(py, gradient.gains.clone(), &[gradient.gains.len()])?,
     );
     class(py, "StepGradient")?.call1(parts)

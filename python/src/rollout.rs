@@ -255,7 +255,7 @@ impl Rollout {
             objective.check(rollout)?;
             rollout.vjp_with(&objective.cotangents(rollout), |_| wish.go_on())
         })?;
-        gradient::of_rollout(py, self.cell.borrow_owner(), &made)
+        gradient::of_rollout(py, &made)
     }
 
     /// Transpose of the rollout: the gradient of Σ cotangent · δ(observation), for any loss of your own. `q` in the tangent
@@ -307,7 +307,7 @@ impl Rollout {
         let made = long(py, &self.raised, move |wish| {
             cell.borrow_dependent().vjp_with(&seed, |_| wish.go_on())
         })?;
-        gradient::of_rollout(py, self.cell.borrow_owner(), &made)
+        gradient::of_rollout(py, &made)
     }
 
     /// Columns by name, one row a state: time, each coordinate and velocity, energy, momentum and smallest gap, SI units;

@@ -340,23 +340,11 @@ impl Simulator {
     /// prepared, so it costs next to nothing.
     fn with_parameters(&self, changes: HashMap<String, f64>) -> PyResult<Self> {
         self.changed(|inner| {
-            let parameters = inner.parameters();
-            let names = parameters.names(&inner.names());
-            let mut values = parameters.to_vec();
+            let mut parameters = inner.parameters().clone();
             for (name, value) in &changes {
-                let at = names.iter().position(|n| n == name).ok_or_else(|| {
-                    hydrograd::Error::input(
-                        "with_parameters",
-                        format!("{name:?}"),
-                        format!("must be one of {names:?}"),
-                    )
-                })?;
-                values[at] = *value;
+                parameters.set(name, *value)?;
             }
-            match parameters.with_values(&values) {
-                Some(changed) => inner.set_parameters(changed),
-                None => Ok(()),
-            }
+            inner.set_parameters(parameters)
         })
     }
 
@@ -423,7 +411,7 @@ impl Simulator {
     /// The physical parameters by name: density, masses, inertias, drag and contact, SI units.
     #[getter]
     fn parameters<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyDict>> {
-        by_name(py, &self.inner, self.inner.parameters().to_vec())
+        by_name(py, self.inner.parameters())
     }
 
     /// Coordinates at the start, (q_size,).

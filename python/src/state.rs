@@ -188,7 +188,7 @@ impl Record {
             }
         }
         let made = short(py, &self.raised, || rollout.vjp(&seed))?;
-        gradient::of_step(py, self.cell.borrow_owner(), &made)
+        gradient::of_step(py, &made)
     }
 
     /// The linearisation x₁ ≈ A x₀ + B u of the step in x = (q, v), coordinates in their tangent space: A (2 v_size, 2 v_size)

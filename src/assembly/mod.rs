@@ -5,13 +5,13 @@ mod controller;
 mod limits;
 
 use crate::Result;
-use crate::adjoint::drag::{self, Element, Part};
-use crate::adjoint::lie::{Mat3, Mat6, Vec3};
+use crate::adjoint::drag::Element;
+use crate::adjoint::lie::{Mat3, Vec3};
 use crate::coupling::Isolated;
-use crate::dynamics::{BodyData, Drive, Parameters, Stepper, System};
+use crate::dynamics::{BodyData, Declarations, Drive, Parameters, Stepper, System, force};
 use crate::multibody::{self, Tree};
 use crate::policy::Policy;
-use crate::scene::{self, Body, DragPart, Scene};
+use crate::scene::{self, Body, Scene};
 use crate::shape::TriMesh;
 use crate::water::{self, Clearance, Fidelity, Prepared, Settings, Surface, pose};
 use nalgebra::DVector;
@@ -45,14 +45,6 @@ fn joint(j: &scene::Joint) -> multibody::Joint {
         }
         scene::Joint::Spherical => multibody::Joint::Spherical,
         scene::Joint::Free => multibody::Joint::Free,
-    }
-}
-
-fn part(p: DragPart) -> Part {
-    match p {
-        DragPart::Tangential => Part::Tangential,
-        DragPart::Normal => Part::Normal,
-        DragPart::Total => Part::Total,
     }
 }
 
@@ -113,41 +105,30 @@ pub(crate) fn assemble(
             joint(&b.joint),
         )
     }));
-    let mut parameters = Parameters::zeros(scene.bodies.len());
-    parameters.density = scene.fluid.density;
     let surfaces = water::surfaces(scene, settings)?;
     let in_water = water::in_water(scene, &surfaces, &tree, settings.fidelity);
+    let names = scene.bodies.iter().map(|b| b.name.clone()).collect();
+    let mut declared = Declarations::new(names);
+    declared.set_density(scene.fluid.density);
     let mut bodies = Vec::with_capacity(scene.bodies.len());
+    let mut faces = Vec::with_capacity(scene.bodies.len());
+    let mut masses = Vec::with_capacity(scene.bodies.len());
     let mut controls = 0;
     for (b, body) in scene.bodies.iter().enumerate() {
         let surface = surfaces[b].as_ref();
         let (mass, center, inertia) = inertia(body, surface);
-        parameters.mass[b] = mass;
-        parameters.inertia[b] = inertia;
+        declared.set_inertia(b, mass, &inertia);
+        masses.push(mass);
+        faces.push(surface.map_or(Vec::new(), |s| elements(&s.mesh)));
         let mut data = BodyData {
             name: body.name.clone(),
             center_of_mass: center,
             volume: surface.map_or(0.0, |s| s.properties.volume),
             centroid: surface.map_or(center, |s| s.properties.centroid),
-            resistance: Mat6::zeros(),
-            surface: Vec::new(),
-            quadratic_part: Part::default(),
             submerged: None,
             joint_control: None,
             thruster: None,
         };
-        if let Some(s) = surface {
-            // Also at zero coefficient: the derivative with respect to it isn't zero.
-            let pieces = elements(&s.mesh);
-            let d = body.drag.unwrap_or_default();
-            data.resistance = drag::resistance(&pieces, part(d.part));
-            parameters.linear_drag[b] = d.linear;
-            parameters.quadratic_drag[b] = d.quadratic;
-            if body.drag.is_some() {
-                data.quadratic_part = part(d.quadratic_part);
-                data.surface = pieces;
-            }
-        }
         data.submerged = in_water.0.iter().position(|w| *w == b);
         if body.actuated {
             data.joint_control = Some(controls);
@@ -169,10 +150,18 @@ pub(crate) fn assemble(
         })
         .collect();
     let clearance = Clearance::new(scene, &surfaces, &tree)?;
+    let parts = force::Parts {
+        scene,
+        tree: &tree,
+        bodies: &bodies,
+        surfaces: &faces,
+    };
+    let forces = force::assemble(&parts, &mut declared);
+    let mut parameters = declared.finish();
     let mut system = System {
         bodies,
         drives,
-        gravity: Vec3::from(scene.gravity),
+        forces,
         current: Vec3::from(scene.fluid.current),
         controls,
         coupling: Arc::new(Isolated::new(Vec::new())),
@@ -191,9 +180,10 @@ pub(crate) fn assemble(
             settings,
             water: &water,
             surfaces: &surfaces,
-            mass: &parameters.mass,
+            mass: &masses,
         })?;
-        (system.contact, parameters.contact) = (Some(made.0), made.1);
+        system.contact = Some(made.0);
+        parameters.add_contact(made.1);
     }
     let dt = settings.time_step.unwrap_or(scene.time_step);
     system.limits = limits::assemble(scene, dt, &system, &parameters, &q)?;

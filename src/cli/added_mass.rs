@@ -133,7 +133,7 @@ fn added_mass(scene: &Scene, arguments: &Arguments) -> Result<Report> {
         chosen: simulator.reasons().to_vec(),
         backend: simulator.backend(),
         method: settings.method_name().into(),
-        density: simulator.parameters().density,
+        density: simulator.parameters().density(),
         warnings,
         error_estimate,
     })

@@ -9,7 +9,8 @@
 //! M v̇ = Sᵀ { external + ρ(F + U ×* h_f) − V ×* h − ρ D_gM_f[V] V' − M_r C − ρ M_f (C − U×V) } + τ
 //! ```
 
-use super::force::rigid_parameters_vjp;
+use super::balance::rigid_parameters_vjp;
+use super::force::{Loads, Velocity};
 use super::{Evaluation, ForceCotangents, Linearisation};
 use crate::Result;
 use crate::adjoint::lie::{Vec6, cross_force, cross_motion};
@@ -41,7 +42,7 @@ impl Linearisation<'_> {
     /// A coupling that fails.
     pub fn inertial_force(&self, v: &DVector<f64>, control: &DVector<f64>) -> Result<DVector<f64>> {
         let tree = &self.system.tree;
-        let rho = self.parameters.density;
+        let rho = self.parameters.density();
         let zero = DVector::zeros(v.len());
         let fields = tree.fields(&self.kinematics, &self.q, v, Virtual::User(&zero));
         let direction = self.through_water(v);
@@ -49,13 +50,16 @@ impl Linearisation<'_> {
         let pose_force = self.pose_force(&direction)?;
         let fluid_bias = self.fluid_bias(&fields);
         let mut out = DVector::zeros(v.len());
-        let mut wrenches = Vec::with_capacity(fluid.len());
+        let Loads {
+            mut wrenches,
+            joints,
+        } = self.loads(&fields.twist, v, control);
         for (b, twist) in fields.twist.iter().enumerate() {
             let rigid = cross_force(twist, &self.rigid_momentum(b, twist))
                 + self.rigid_momentum(b, &fields.bias[b]);
             let relative = self.relative(twist);
             let water = pose_force[b] - cross_force(&relative, &fluid[b]);
-            wrenches.push(self.external(b, twist, control) - rigid + rho * water);
+            wrenches[b] += rho * water - rigid;
             out -= rho * self.fluid_columns(b).tr_mul(&fluid_bias[b]);
         }
         if let Some(water) = self.acting() {
@@ -63,7 +67,7 @@ impl Linearisation<'_> {
             let along = water.linearised.gradient_along(&direction, &twist)?;
             out -= rho * along.rows(0, v.len());
         }
-        Ok(out + tree.project(&self.kinematics, wrenches) + self.system.joint_forces(control))
+        Ok(out + tree.project(&self.kinematics, wrenches) + joints)
     }
 
     /// Transpose of [`Linearisation::inertial_force`]: the gradient of its product with `w`.
@@ -96,24 +100,21 @@ impl Linearisation<'_> {
             bar.pose[b] += cross_force(bias, &h_virt) + cross_force(virt, &h_bias);
             rigid_parameters_vjp(self, b, &carried, twist, &mut out.parameters);
             rigid_parameters_vjp(self, b, &-virt, bias, &mut out.parameters);
-            // W · external.
-            bar.virtual_twist[b] += self.external(b, twist, control);
-            let e = self.external_vjp(
-                b,
-                twist,
-                control,
-                virt,
-                &mut out.control,
-                &mut out.parameters,
-            );
-            bar.pose[b] += e.pose;
-            bar.twist[b] += e.twist;
         }
+        // W · wrenches + wᵀ τ.
+        let loads = self.loads(&fields.twist, v, control);
+        for (bar, wrench) in bar.virtual_twist.iter_mut().zip(&loads.wrenches) {
+            *bar += wrench;
+        }
+        let power = Velocity {
+            twists: &fields.virtual_twist,
+            v: w,
+        };
+        self.loads_vjp(&fields.twist, v, control, &power, &mut bar, &mut out);
         self.fluid_inertial_vjp(v, w, &fields, &mut bar, &mut out)?;
         let (q_bar, v_bar) = tree.reverse(&self.kinematics, v, Virtual::User(w), &fields, bar);
         out.q += q_bar;
         out.v += v_bar;
-        self.system.joint_forces_vjp(w, &mut out.control);
         Ok(out)
     }
 
@@ -131,7 +132,7 @@ impl Linearisation<'_> {
             return Ok(());
         };
         let fluid = &water.linearised;
-        let rho = self.parameters.density;
+        let rho = self.parameters.density();
         let n = self.system.len();
         let (direction, virtual_direction) = (self.through_water(v), self.virtual_direction(w));
         let (through, virt) = (
@@ -179,7 +180,7 @@ impl Linearisation<'_> {
             }
             let (v_rel, w_b, twist) = (&relative[b], &fields.virtual_twist[b], &fields.twist[b]);
             let h = &momenta[b];
-            out.parameters.density += carried[b].dot(h) - w_b.dot(&momenta_bias[b])
+            *out.parameters.density_mut() += carried[b].dot(h) - w_b.dot(&momenta_bias[b])
                 + w_b.dot(&pose_force[b])
                 - twist.dot(&pair[b]);
             bar.twist[b] += rho

@@ -4,7 +4,7 @@
 //! Points, normals and gaps belong to the configuration; the velocity is the argument of the force, so that an integrator
 //! that is implicit in it solves contact implicitly, against the mass matrix with its fluid part.
 
-use super::{Evaluation, ForceCotangents, Parameters, System};
+use super::{Contact, Evaluation, ForceCotangents, Parameters, System};
 use crate::Result;
 use crate::adjoint::contact::{
     ContactBar, Law, Meeting, contact_force, contact_force_jvp, contact_force_vjp,
@@ -52,10 +52,11 @@ pub struct PairContact {
 
 impl ContactModel {
     fn law(&self, pair: usize, parameters: &Parameters) -> Law {
+        let contact = parameters.contact();
         Law {
-            stiffness: parameters.contact.stiffness,
-            dissipation: parameters.contact.dissipation,
-            friction: parameters.contact.friction,
+            stiffness: contact.stiffness,
+            dissipation: contact.dissipation,
+            friction: contact.friction,
             stiction_speed: self.regularisation.stiction_speed,
             gap: self.gaps[pair],
             width: self.regularisation.width,
@@ -301,9 +302,11 @@ impl Evaluation<'_> {
             // Both u and the virtual velocity are taken at the point.
             let position = own.velocity.cross(&angular(&twist)) + force.cross(&angular(&virt));
             t.displacement_vjp(&own, &position, &mut bar.pose);
-            out.parameters.contact.stiffness += own.stiffness;
-            out.parameters.contact.dissipation += own.dissipation;
-            out.parameters.contact.friction += own.friction;
+            out.parameters.add_contact(Contact {
+                stiffness: own.stiffness,
+                dissipation: own.dissipation,
+                friction: own.friction,
+            });
         }
         let (q_bar, v_bar) = tree.reverse(&self.kinematics, v, virtual_velocity, &fields, bar);
         out.q += q_bar;

@@ -64,7 +64,7 @@ impl System {
 
     /// Whether any water acts on any body.
     pub(super) fn in_water(&self, parameters: &Parameters) -> bool {
-        parameters.density > 0.0 && self.coupling.bodies() > 0
+        parameters.density() > 0.0 && self.coupling.bodies() > 0
     }
 
     pub(super) fn kinematics(&self, q: &DVector<f64>) -> Result<Kinematics> {
@@ -147,9 +147,9 @@ impl<'a> Evaluation<'a> {
         let rigid: Vec<Mat6> = (0..system.len())
             .map(|b| {
                 rigid::spatial_inertia(
-                    parameters.mass[b],
+                    parameters.mass(b),
                     &system.bodies[b].center_of_mass,
-                    &parameters.inertia[b],
+                    &parameters.inertia(b),
                 )
             })
             .collect();
@@ -159,7 +159,7 @@ impl<'a> Evaluation<'a> {
         let mut rest_momentum = DVector::zeros(nv);
         for b in 0..system.len() {
             let j = jacobian.rows(6 * b, 6);
-            let mut momenta = parameters.density * fluid_momenta[b].columns(0, nv).into_owned();
+            let mut momenta = parameters.density() * fluid_momenta[b].columns(0, nv).into_owned();
             let pose = &kinematics.poses[b];
             for k in 0..nv {
                 let twist = pose.twist_to_body(&j.column(k).fixed_rows::<6>(0).into_owned());
@@ -170,7 +170,7 @@ impl<'a> Evaluation<'a> {
             }
             mass_matrix += j.tr_mul(&momenta);
             if system.has_current() {
-                rest_momentum += parameters.density * j.tr_mul(&fluid_momenta[b].column(nv));
+                rest_momentum += parameters.density() * j.tr_mul(&fluid_momenta[b].column(nv));
             }
         }
         let mass_matrix = 0.5 * (&mass_matrix + mass_matrix.transpose());
@@ -271,7 +271,7 @@ impl<'a> Evaluation<'a> {
         let twists = self.system.tree.twists(&self.kinematics, v);
         let fluid = self.fluid_momenta(&self.through_water(v));
         (0..self.system.len())
-            .map(|b| self.rigid_momentum(b, &twists[b]) + self.parameters.density * fluid[b])
+            .map(|b| self.rigid_momentum(b, &twists[b]) + self.parameters.density() * fluid[b])
             .collect()
     }
 
@@ -303,21 +303,9 @@ impl<'a> Evaluation<'a> {
         let mut twice = 0.0;
         for (b, twist) in twists.iter().enumerate() {
             twice += twist.dot(&self.rigid_momentum(b, twist));
-            twice += self.parameters.density * self.relative(twist).dot(&fluid[b]);
+            twice += self.parameters.density() * self.relative(twist).dot(&fluid[b]);
         }
         0.5 * twice
-    }
-
-    /// Potential energy of gravity on dry mass and buoyancy on displaced volume, J.
-    pub fn potential_energy(&self) -> f64 {
-        let mut out = 0.0;
-        for (b, body) in self.system.bodies.iter().enumerate() {
-            let pose = &self.kinematics.poses[b];
-            let mass = self.parameters.mass[b] * pose.apply(&body.center_of_mass);
-            let water = self.parameters.density * body.volume * pose.apply(&body.centroid);
-            out -= self.system.gravity.dot(&(mass - water));
-        }
-        out
     }
 
     /// What the coupling reports.

@@ -1,10 +1,10 @@
 //! Equations of motion: forces, the coupled mass matrix, integrators, and their adjoints.
 
 mod acceleration;
+mod balance;
 mod contact;
 mod evaluation;
-mod external;
-mod force;
+pub mod force;
 mod integrator;
 mod limit;
 mod linearisation;
@@ -12,13 +12,15 @@ mod momentum;
 mod parameters;
 mod system;
 
+pub use balance::ForceCotangents;
 pub use contact::{ContactForce, ContactModel, Dual, PairContact, Regularisation};
 pub use evaluation::Evaluation;
-pub use force::ForceCotangents;
 pub use integrator::{
     Input, Integrator, Memo, State, StateBar, StepBar, Stepped, Stepper, contact_velocity,
 };
 pub use limit::JointLimit;
 pub use linearisation::Linearisation;
-pub use parameters::{Contact, Parameters};
+pub use parameters::{
+    Contact, Declarations, Declared, Entry, Owner, Parameter, Parameters, Range, Typical,
+};
 pub use system::{BodyData, Drive, System};

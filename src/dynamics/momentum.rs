@@ -1,6 +1,6 @@
 //! Generalised momentum p = M(q) v + p_rest(q) and its transpose.
 
-use super::force::rigid_parameters_vjp;
+use super::balance::rigid_parameters_vjp;
 use super::{Evaluation, ForceCotangents, Linearisation};
 use crate::Result;
 use crate::adjoint::lie::{Vec6, cross_force};
@@ -60,7 +60,7 @@ impl Linearisation<'_> {
         current: &Vec6,
     ) -> Result<ForceCotangents> {
         let tree = &self.system.tree;
-        let rho = self.parameters.density;
+        let rho = self.parameters.density();
         let mut out = ForceCotangents::zeros(self);
         let fields = tree.fields(&self.kinematics, &self.q, v, Virtual::User(w));
         let mut bar = Cotangents::zeros(self.system.len());
@@ -89,7 +89,7 @@ impl Linearisation<'_> {
                 }
                 let relative = fields.twist[b] - current;
                 let virt = &fields.virtual_twist[b];
-                out.parameters.density += virt.dot(&momenta[b]);
+                *out.parameters.density_mut() += virt.dot(&momenta[b]);
                 bar.virtual_twist[b] += rho * momenta[b];
                 bar.twist[b] += rho * momenta_virtual[b];
                 bar.pose[b] += rho

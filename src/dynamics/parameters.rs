@@ -1,27 +1,238 @@
 //! The physical parameters that a trajectory is differentiated with respect to.
+//!
+//! There is one table of them: each is declared once, by what uses it (the fluid, a body's inertia, a force, contact),
+//! with its name, its bounds and the size of a change that says something. Values and cotangents are rows with a shared
+//! table; packing, names, checks and gradient checks read the table.
 
-use serde::Serialize;
+use crate::{Error, Result};
+use std::fmt;
+use std::ops::{Index, IndexMut};
+use std::sync::Arc;
 
-/// Parameters of a system; the same structure holds their cotangents.
-#[derive(Clone, Debug, PartialEq, Serialize)]
-pub struct Parameters {
-    /// Fluid density, kg/m³.
-    pub density: f64,
-    /// Mass of each body, kg.
-    pub mass: Vec<f64>,
-    /// Inertia of each body about its centre of mass, body axes: xx, yy, zz, xy, xz, yz, kg m².
-    pub inertia: Vec<[f64; 6]>,
-    /// Linear drag coefficient of each body, kg/(m² s): νρ of Eq. 22.
-    pub linear_drag: Vec<f64>,
-    /// Quadratic drag coefficient of each body, dimensionless. Zero, with zero derivative, for a body whose scene gives no
-    /// drag at all: its surface isn't kept.
-    pub quadratic_drag: Vec<f64>,
-    /// Contact, the same for all surfaces.
-    pub contact: Contact,
+/// What a parameter belongs to: the first part of its name, and its place in the order of all of them.
+#[derive(Clone, Debug, PartialEq, Eq, PartialOrd, Ord)]
+pub enum Owner {
+    /// The fluid.
+    Fluid,
+    /// A body, by its number.
+    Body(usize),
+    /// Anything else, by its name; in the order of declaration, after the bodies.
+    Named(String),
 }
 
-/// Parameters of contact that a trajectory is differentiated with respect to.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize)]
+/// Values that a parameter may have.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Range {
+    /// Any finite number.
+    Finite,
+    /// Zero and above.
+    NotNegative,
+    /// Zero alone; what would have to be done to change that.
+    Zero(&'static str),
+}
+
+/// Sizes of a system's motion, which sizes of changes follow from.
+#[derive(Clone, Copy, Debug)]
+pub struct Typical {
+    /// Density of the fluid, kg/m³.
+    pub density: f64,
+    /// Largest velocity of a joint, m/s or rad/s.
+    pub speed: f64,
+    /// Size of the largest body, m.
+    pub length: f64,
+    /// Largest moment of inertia of the body that the parameter belongs to, kg m²; zero if to none.
+    pub moment: f64,
+}
+
+/// Declaration of a parameter.
+#[derive(Clone, Copy, Debug)]
+pub struct Declared {
+    /// Name, without its owner's.
+    pub name: &'static str,
+    /// Unit.
+    pub unit: &'static str,
+    /// Values that it may have.
+    pub range: Range,
+    /// Size of a change that says something, from its value.
+    pub size: fn(f64, &Typical) -> f64,
+}
+
+impl Declared {
+    /// A parameter that isn't negative, whose changes are measured by its value.
+    pub const fn new(name: &'static str, unit: &'static str) -> Self {
+        Self {
+            name,
+            unit,
+            range: Range::NotNegative,
+            size: |value, _| value,
+        }
+    }
+
+    /// With other values allowed.
+    pub const fn range(mut self, range: Range) -> Self {
+        self.range = range;
+        self
+    }
+
+    /// With another size of a change.
+    pub const fn size(mut self, size: fn(f64, &Typical) -> f64) -> Self {
+        self.size = size;
+        self
+    }
+}
+
+/// Where the value of a declared parameter stands: its index in [`Parameters`].
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Parameter(usize);
+
+/// One line of the table.
+#[derive(Clone, Debug)]
+pub struct Entry {
+    /// Full name: its owner's, a dot, its own.
+    pub name: String,
+    /// What it belongs to.
+    pub owner: Owner,
+    /// How it was declared.
+    pub declared: Declared,
+}
+
+/// Parameters of a body's inertia.
+#[derive(Clone, Copy, Debug)]
+struct Inertial {
+    mass: Parameter,
+    inertia: [Parameter; 6],
+}
+
+/// All parameters of a system.
+#[derive(Clone, Debug)]
+pub struct ParameterTable {
+    /// In the order of packing.
+    entries: Vec<Entry>,
+    /// Place of each parameter in that order, by its number of declaration.
+    places: Vec<usize>,
+    density: Parameter,
+    bodies: Vec<Inertial>,
+    contact: [Parameter; 3],
+}
+
+/// A table in the making, with the values that it starts from.
+#[derive(Clone, Debug)]
+pub struct Declarations {
+    bodies: Vec<String>,
+    /// Entries with their values, in the order of declaration.
+    made: Vec<(Entry, f64)>,
+    density: Parameter,
+    inertial: Vec<Inertial>,
+    contact: [Parameter; 3],
+}
+
+const DENSITY: Declared = Declared::new("density", "kg/m³");
+const MASS: Declared = Declared::new("mass", "kg");
+const CONTACT: [Declared; 3] = [
+    Declared::new("stiffness", "N/m"),
+    Declared::new("dissipation", "s/m"),
+    Declared::new("friction", "1"),
+];
+
+/// Moments, then products.
+const INERTIA: [Declared; 6] = {
+    const fn product(name: &'static str) -> Declared {
+        Declared::new(name, "kg m²")
+            .range(Range::Finite)
+            .size(|_, typical| 0.1 * typical.moment)
+    }
+    [
+        Declared::new("inertia.xx", "kg m²"),
+        Declared::new("inertia.yy", "kg m²"),
+        Declared::new("inertia.zz", "kg m²"),
+        product("inertia.xy"),
+        product("inertia.xz"),
+        product("inertia.yz"),
+    ]
+};
+
+impl Declarations {
+    /// Density, masses, inertias and contact of bodies of these names, all zero.
+    pub fn new(bodies: Vec<String>) -> Self {
+        let none = Parameter(0);
+        let mut out = Self {
+            inertial: Vec::with_capacity(bodies.len()),
+            bodies,
+            made: Vec::new(),
+            density: none,
+            contact: [none; 3],
+        };
+        out.density = out.declare(Owner::Fluid, DENSITY, 0.0);
+        for b in 0..out.bodies.len() {
+            let inertial = Inertial {
+                mass: out.declare(Owner::Body(b), MASS, 0.0),
+                inertia: INERTIA.map(|i| out.declare(Owner::Body(b), i, 0.0)),
+            };
+            out.inertial.push(inertial);
+        }
+        out.contact = CONTACT.map(|c| out.declare(Owner::Named("contact".into()), c, 0.0));
+        out
+    }
+
+    /// Sets the fluid's density, kg/m³.
+    pub fn set_density(&mut self, density: f64) {
+        self.made[self.density.0].1 = density;
+    }
+
+    /// Sets mass (kg) and inertia (xx, yy, zz, xy, xz, yz, kg m²) of body `b`.
+    pub fn set_inertia(&mut self, b: usize, mass: f64, inertia: &[f64; 6]) {
+        let at = self.inertial[b];
+        self.made[at.mass.0].1 = mass;
+        for (i, x) in at.inertia.iter().zip(inertia) {
+            self.made[i.0].1 = *x;
+        }
+    }
+
+    /// Adds a parameter with its value.
+    pub fn declare(&mut self, owner: Owner, declared: Declared, value: f64) -> Parameter {
+        let of = match &owner {
+            Owner::Fluid => "fluid",
+            Owner::Body(b) => &self.bodies[*b],
+            Owner::Named(name) => name,
+        };
+        let entry = Entry {
+            name: format!("{of}.{}", declared.name),
+            owner,
+            declared,
+        };
+        self.made.push((entry, value));
+        Parameter(self.made.len() - 1)
+    }
+
+    /// The parameters, with the values that were declared.
+    pub fn finish(self) -> Parameters {
+        let rank = |i: usize| match &self.made[i].0.owner {
+            Owner::Fluid => (0, 0),
+            Owner::Body(b) => (1, *b),
+            Owner::Named(_) => (2, 0),
+        };
+        let mut order: Vec<usize> = (0..self.made.len()).collect();
+        order.sort_by_key(|i| rank(*i));
+        let mut places = vec![0; order.len()];
+        for (place, i) in order.iter().enumerate() {
+            places[*i] = place;
+        }
+        let (entries, values) = order.iter().map(|i| self.made[*i].clone()).unzip();
+        Parameters {
+            table: Arc::new(ParameterTable {
+                entries,
+                places,
+                density: self.density,
+                bodies: self.inertial,
+                contact: self.contact,
+            }),
+            values,
+        }
+    }
+}
+
+/// Parameters of contact.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Contact {
     /// Stiffness of each point, N/m.
     pub stiffness: f64,
@@ -31,74 +242,154 @@ pub struct Contact {
     pub friction: f64,
 }
 
+/// Values of all parameters of a system, or their cotangents. Clones share the table.
+#[derive(Clone)]
+pub struct Parameters {
+    table: Arc<ParameterTable>,
+    values: Vec<f64>,
+}
+
+impl Index<Parameter> for Parameters {
+    type Output = f64;
+
+    fn index(&self, at: Parameter) -> &f64 {
+        &self.values[self.table.places[at.0]]
+    }
+}
+
+impl IndexMut<Parameter> for Parameters {
+    fn index_mut(&mut self, at: Parameter) -> &mut f64 {
+        &mut self.values[self.table.places[at.0]]
+    }
+}
+
+impl PartialEq for Parameters {
+    fn eq(&self, other: &Self) -> bool {
+        self.same_table(other) && self.values == other.values
+    }
+}
+
+impl fmt::Debug for Parameters {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.debug_map()
+            .entries(self.names().zip(&self.values))
+            .finish()
+    }
+}
+
 impl Parameters {
-    /// All zero, for `bodies` bodies.
-    pub fn zeros(bodies: usize) -> Self {
-        Self {
-            density: 0.0,
-            mass: vec![0.0; bodies],
-            inertia: vec![[0.0; 6]; bodies],
-            linear_drag: vec![0.0; bodies],
-            quadratic_drag: vec![0.0; bodies],
-            contact: Contact::default(),
-        }
+    /// The table.
+    pub fn table(&self) -> &[Entry] {
+        &self.table.entries
     }
 
-    /// All values in one row: density, then per body mass, inertia (6), linear and quadratic drag; then
-    /// stiffness, dissipation and friction of contact.
+    /// Names, in the order of [`Parameters::to_vec`]: the fluid's density; per body mass, inertia and what its forces
+    /// declare; contact; what belongs to other things.
+    pub fn names(&self) -> impl Iterator<Item = &str> {
+        self.table.entries.iter().map(|e| e.name.as_str())
+    }
+
+    /// All values in one row.
     pub fn to_vec(&self) -> Vec<f64> {
-        let mut out = vec![self.density];
-        for b in 0..self.mass.len() {
-            out.push(self.mass[b]);
-            out.extend(self.inertia[b]);
-            out.push(self.linear_drag[b]);
-            out.push(self.quadratic_drag[b]);
-        }
-        out.extend([
-            self.contact.stiffness,
-            self.contact.dissipation,
-            self.contact.friction,
-        ]);
-        out
+        self.values.clone()
     }
 
-    /// Inverse of [`Parameters::to_vec`] for the same number of bodies; `None` if the length is wrong.
+    /// Inverse of [`Parameters::to_vec`] with the same table; `None` if the length is wrong.
     pub fn with_values(&self, values: &[f64]) -> Option<Self> {
-        let bodies = self.mass.len();
-        if values.len() != 4 + 9 * bodies {
-            return None;
-        }
-        let mut out = Self::zeros(bodies);
-        out.density = values[0];
-        for b in 0..bodies {
-            let row = &values[1 + 9 * b..10 + 9 * b];
-            out.mass[b] = row[0];
-            out.inertia[b].copy_from_slice(&row[1..7]);
-            out.linear_drag[b] = row[7];
-            out.quadratic_drag[b] = row[8];
-        }
-        let row = &values[1 + 9 * bodies..];
-        out.contact = Contact {
-            stiffness: row[0],
-            dissipation: row[1],
-            friction: row[2],
-        };
-        Some(out)
+        (values.len() == self.values.len()).then(|| Self {
+            table: self.table.clone(),
+            values: values.to_vec(),
+        })
     }
 
-    /// Names of [`Parameters::to_vec`]'s entries, with the given body names.
-    pub fn names(&self, bodies: &[String]) -> Vec<String> {
-        let mut out = vec!["fluid.density".to_string()];
-        for name in bodies {
-            out.push(format!("{name}.mass"));
-            for axis in ["xx", "yy", "zz", "xy", "xz", "yz"] {
-                out.push(format!("{name}.inertia.{axis}"));
-            }
-            out.push(format!("{name}.drag.linear"));
-            out.push(format!("{name}.drag.quadratic"));
+    /// All zero, with the same table.
+    pub fn zeros(&self) -> Self {
+        Self {
+            table: self.table.clone(),
+            values: vec![0.0; self.values.len()],
         }
-        out.extend(["stiffness", "dissipation", "friction"].map(|n| format!("contact.{n}")));
-        out
+    }
+
+    /// The value of this name.
+    ///
+    /// # Errors
+    /// A name that isn't in the table.
+    pub fn get(&self, name: &str) -> Result<f64> {
+        Ok(self.values[self.place(name)?])
+    }
+
+    /// Sets the value of this name, unchecked.
+    ///
+    /// # Errors
+    /// A name that isn't in the table.
+    pub fn set(&mut self, name: &str, value: f64) -> Result<()> {
+        let at = self.place(name)?;
+        self.values[at] = value;
+        Ok(())
+    }
+
+    fn place(&self, name: &str) -> Result<usize> {
+        self.names().position(|n| n == name).ok_or_else(|| {
+            let known: Vec<&str> = self.names().collect();
+            Error::input(
+                "parameters",
+                format!("{name:?}"),
+                format!("must be one of {known:?}"),
+            )
+        })
+    }
+
+    /// Density of the fluid, kg/m³.
+    pub fn density(&self) -> f64 {
+        self[self.table.density]
+    }
+
+    /// The same, to be changed.
+    pub fn density_mut(&mut self) -> &mut f64 {
+        let at = self.table.density;
+        &mut self[at]
+    }
+
+    /// Mass of body `b`, kg.
+    pub fn mass(&self, b: usize) -> f64 {
+        self[self.table.bodies[b].mass]
+    }
+
+    /// The same, to be changed.
+    pub fn mass_mut(&mut self, b: usize) -> &mut f64 {
+        let at = self.table.bodies[b].mass;
+        &mut self[at]
+    }
+
+    /// Inertia of body `b` about its centre of mass, body axes: xx, yy, zz, xy, xz, yz, kg m².
+    pub fn inertia(&self, b: usize) -> [f64; 6] {
+        self.table.bodies[b].inertia.map(|i| self[i])
+    }
+
+    /// Adds to the inertia of body `b`.
+    pub fn add_inertia(&mut self, b: usize, more: &[f64; 6]) {
+        let at = self.table.bodies[b].inertia;
+        for (i, x) in at.into_iter().zip(more) {
+            self[i] += x;
+        }
+    }
+
+    /// Parameters of contact.
+    pub fn contact(&self) -> Contact {
+        let [stiffness, dissipation, friction] = self.table.contact.map(|i| self[i]);
+        Contact {
+            stiffness,
+            dissipation,
+            friction,
+        }
+    }
+
+    /// Adds to the parameters of contact.
+    pub fn add_contact(&mut self, more: Contact) {
+        let more = [more.stiffness, more.dissipation, more.friction];
+        for (i, x) in self.table.contact.into_iter().zip(more) {
+            self[i] += x;
+        }
     }
 
     /// Adds another set of values.
@@ -108,17 +399,51 @@ impl Parameters {
 
     /// Adds `scale` times another set of values.
     pub fn add_scaled(&mut self, scale: f64, other: &Self) {
-        self.density += scale * other.density;
-        for b in 0..self.mass.len() {
-            self.mass[b] += scale * other.mass[b];
-            for k in 0..6 {
-                self.inertia[b][k] += scale * other.inertia[b][k];
-            }
-            self.linear_drag[b] += scale * other.linear_drag[b];
-            self.quadratic_drag[b] += scale * other.quadratic_drag[b];
+        for (x, y) in self.values.iter_mut().zip(&other.values) {
+            *x += scale * y;
         }
-        self.contact.stiffness += scale * other.contact.stiffness;
-        self.contact.dissipation += scale * other.contact.dissipation;
-        self.contact.friction += scale * other.contact.friction;
+    }
+
+    /// Whether both have the same parameters, by name.
+    pub fn same_table(&self, other: &Self) -> bool {
+        Arc::ptr_eq(&self.table, &other.table) || self.names().eq(other.names())
+    }
+
+    /// Holds every value against what it may be.
+    ///
+    /// # Errors
+    /// The first one that is out of its range.
+    pub fn check(&self) -> Result<()> {
+        for (entry, value) in self.table.entries.iter().zip(&self.values) {
+            let refused = match entry.declared.range {
+                Range::Zero(remedy) if *value != 0.0 => remedy,
+                Range::NotNegative if !(*value >= 0.0 && value.is_finite()) => {
+                    "must be finite and not negative"
+                }
+                Range::Finite if !value.is_finite() => "must be finite",
+                _ => continue,
+            };
+            let place = format!("parameter {}", entry.name);
+            return Err(Error::input(place, value, refused));
+        }
+        Ok(())
+    }
+
+    /// Sizes of changes that say something, in the order of [`Parameters::to_vec`].
+    pub fn sizes(&self, speed: f64, length: f64) -> Vec<f64> {
+        let moment = |owner: &Owner| match owner {
+            Owner::Body(b) => self.inertia(*b)[0..3].iter().copied().fold(0.0, f64::max),
+            _ => 0.0,
+        };
+        let size = |(entry, value): (&Entry, &f64)| {
+            let typical = Typical {
+                density: self.density(),
+                speed,
+                length,
+                moment: moment(&entry.owner),
+            };
+            (entry.declared.size)(*value, &typical)
+        };
+        self.table.entries.iter().zip(&self.values).map(size).collect()
     }
 }

@@ -1,12 +1,11 @@
 //! A system: the tree, its bodies' constants, and the coupling through the water.
 
+use super::force::Force;
 use super::{ContactModel, JointLimit};
-use crate::adjoint::drag::{Element, Part};
-use crate::adjoint::lie::{Mat6, Vec3};
+use crate::adjoint::lie::Vec3;
 use crate::coupling::Coupling;
 use crate::multibody::Tree;
 use crate::scene::Motion;
-use nalgebra::DVector;
 use std::sync::Arc;
 
 /// Constants of one body.
@@ -20,12 +19,6 @@ pub struct BodyData {
     pub volume: f64,
     /// Its centroid in the body's frame, m.
     pub centroid: Vec3,
-    /// Linear drag at unit coefficient.
-    pub resistance: Mat6,
-    /// Surface and part of the quadratic drag; empty where it isn't used.
-    pub surface: Vec<Element>,
-    /// Part of the quadratic drag.
-    pub quadratic_part: Part,
     /// Index among the bodies that the coupling knows.
     pub submerged: Option<usize>,
     /// First control of the joint's generalised forces.
@@ -54,8 +47,8 @@ pub struct System {
     pub bodies: Vec<BodyData>,
     /// What moves each joint.
     pub drives: Vec<Drive>,
-    /// Gravity, m/s².
-    pub gravity: Vec3,
+    /// Forces that don't come from the water's kinetic energy; clones share them.
+    pub forces: Arc<[Box<dyn Force>]>,
     /// Uniform current, m/s.
     pub current: Vec3,
     /// Number of controls.
@@ -77,30 +70,6 @@ impl System {
     /// Whether there is no body.
     pub fn is_empty(&self) -> bool {
         self.bodies.is_empty()
-    }
-
-    /// Joint forces of a control vector, in the user's coordinates.
-    pub fn joint_forces(&self, control: &DVector<f64>) -> DVector<f64> {
-        let mut out = DVector::zeros(self.tree.velocities());
-        for (body, link) in self.bodies.iter().zip(self.tree.links()) {
-            if let Some(at) = body.joint_control {
-                for (k, i) in link.v.clone().enumerate() {
-                    out[i] = control[at + k];
-                }
-            }
-        }
-        out
-    }
-
-    /// Transpose of [`System::joint_forces`], added to `control_bar`.
-    pub fn joint_forces_vjp(&self, force_bar: &DVector<f64>, control_bar: &mut DVector<f64>) {
-        for (body, link) in self.bodies.iter().zip(self.tree.links()) {
-            if let Some(at) = body.joint_control {
-                for (k, i) in link.v.clone().enumerate() {
-                    control_bar[at + k] += force_bar[i];
-                }
-            }
-        }
     }
 
     /// Whether the water moves past bodies at rest.

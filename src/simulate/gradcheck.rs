@@ -420,17 +420,7 @@ fn dot(a: &[f64], b: &[f64]) -> f64 {
 
 /// A direction in parameter space: a part of each value, or a size of its own where the value is zero.
 fn parameter_direction(p: &Parameters, random: &DVector<f64>, scale: &Scales) -> Vec<f64> {
-    let mut size = p.clone();
-    let speed = scale.velocity.max();
-    for b in 0..p.mass.len() {
-        let spin = p.inertia[b][0..3].iter().copied().fold(0.0, f64::max);
-        for k in 3..6 {
-            size.inertia[b][k] = 0.1 * spin;
-        }
-        size.linear_drag[b] = p.linear_drag[b].max(1e-3 * p.density * speed);
-    }
-    let values = size.to_vec();
-    values
+    p.sizes(scale.velocity.max(), scale.length)
         .iter()
         .zip(random.iter())
         .map(|(v, r)| 0.3 * v * r)

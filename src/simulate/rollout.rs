@@ -5,7 +5,7 @@ use super::{Cotangents, Fidelity, Gradient, Initial, Objective, Simulator};
 use crate::adjoint::lie::{Pose, Vec3, Vec6};
 use crate::adjoint::step::{self, Path};
 use crate::coupling::Report;
-use crate::dynamics::{ContactForce, Drive, Memo, Parameters, State, StepBar, contact_velocity};
+use crate::dynamics::{ContactForce, Drive, Memo, State, StepBar, contact_velocity};
 use crate::shape::Gap;
 use crate::{Error, Result};
 use nalgebra::{DMatrix, DVector};
@@ -316,7 +316,7 @@ impl<'a> Rollout<'a> {
         let (state_bar, locals) =
             rayon::scope(|_| step::reverse(&trajectory, &self.path, &seeds, heard))?;
         let mut controls = cotangents.controls.clone();
-        let mut parameters = Parameters::zeros(simulator.system().len());
+        let mut parameters = simulator.parameters().zeros();
         let mut gains = vec![0.0; simulator.policy().gains().len()];
         for (n, local) in locals.iter().enumerate() {
             if n < self.steps() {

@@ -173,43 +173,17 @@ impl Simulator {
     /// The same with other physical parameters.
     ///
     /// # Errors
-    /// Values that aren't finite, or negative density, mass or drag.
+    /// Parameters of another scene, or values out of their range ([`crate::dynamics::Range`]).
     pub fn set_parameters(&mut self, parameters: Parameters) -> Result<()> {
-        let n = self.system().len();
-        let sizes = [
-            parameters.mass.len(),
-            parameters.inertia.len(),
-            parameters.linear_drag.len(),
-            parameters.quadratic_drag.len(),
-        ];
-        if sizes != [n; 4] {
+        if !parameters.same_table(self.parameters()) {
+            let of = |p: &Parameters| format!("{:?}", p.names().collect::<Vec<_>>());
             return Err(Error::input(
-                "parameters: numbers of masses, inertias, linear and quadratic drags",
-                format!("{sizes:?}"),
-                format!("must each be {n}, the number of bodies"),
+                "parameters",
+                of(&parameters),
+                format!("must be {}", of(self.parameters())),
             ));
         }
-        for (body, quadratic) in self.system().bodies.iter().zip(&parameters.quadratic_drag) {
-            if *quadratic != 0.0 && body.surface.is_empty() {
-                return Err(Error::input(
-                    format!("parameter {}.drag.quadratic", body.name),
-                    quadratic,
-                    "must be 0 for a body whose scene gives no drag; give it `drag` there, zero if need be",
-                ));
-            }
-        }
-        let names = parameters.names(&self.names());
-        for (name, value) in names.iter().zip(parameters.to_vec()) {
-            let products = [".inertia.xy", ".inertia.xz", ".inertia.yz"];
-            let signed = products.iter().any(|p| name.ends_with(p));
-            if !value.is_finite() || (value < 0.0 && !signed) {
-                return Err(Error::input(
-                    format!("parameter {name}"),
-                    value,
-                    "must be finite and not negative",
-                ));
-            }
-        }
+        parameters.check()?;
         self.assembled.parameters = parameters;
         Ok(())
     }
@@ -289,7 +263,7 @@ impl Simulator {
 
     /// The fidelity that matters: without water bodies don't feel each other.
     pub(super) fn felt(&self) -> Fidelity {
-        if self.parameters().density > 0.0 {
+        if self.parameters().density() > 0.0 {
             self.assembled.water.fidelity
         } else {
             Fidelity::Isolated
@@ -463,7 +437,7 @@ impl Simulator {
         let (submerged, poses) = self.in_water();
         let turn = world_axes(&poses);
         let record = system.coupling.evaluate(&poses, &turn)?;
-        let m = turn.tr_mul(record.momenta()) * self.parameters().density;
+        let m = turn.tr_mul(record.momenta()) * self.parameters().density();
         Ok(AddedMass {
             bodies: submerged
                 .iter()

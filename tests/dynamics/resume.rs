@@ -102,7 +102,7 @@ fn clones_share_what_was_prepared_and_nothing_else() {
     let sim = simulator(Settings::default());
     let mut other = sim.clone();
     let mut parameters = sim.parameters().clone();
-    parameters.mass[0] *= 2.0;
+    *parameters.mass_mut(0) *= 2.0;
     other.set_parameters(parameters).unwrap();
     let controls = push(&sim, 3);
     let (one, two) = (
@@ -202,7 +202,7 @@ fn triangles_are_a_mesh() {
     let mass = Simulator::new(&scene, Settings::default())
         .unwrap()
         .parameters()
-        .mass[0];
+        .mass(0);
     assert!((mass - 6.0).abs() < 1e-9);
 
     let hole = Shape::triangles(vertices, &mesh.faces()[1..]);

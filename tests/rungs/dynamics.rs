@@ -2,10 +2,10 @@
 //! wall, a current, weight, both drags, thrusters, and driven, held and released joints.
 
 use super::multibody::tree_displacement;
-use super::tools::{Group, all, along, groups, vector_along, wavy};
+use super::tools::{Group, all, groups, vector_along, wavy};
 use hydrograd::adjoint::check::{Outcome, Rung};
 use hydrograd::dynamics::{
-    Drive, Input, Integrator, Linearisation, Parameters, State, StateBar, StepBar, Stepper, System,
+    Drive, Input, Integrator, Linearisation, Owner, Parameters, State, StateBar, StepBar, Stepper, System,
 };
 use hydrograd::scene::{Body, Drag, DragPart, Fluid, Joint, Motion, Plane, Scene, Shape};
 use hydrograd::{Settings, Simulator};
@@ -19,9 +19,8 @@ pub fn rungs() -> Vec<Rung> {
         };
     }
     rungs![
-        "dynamics::system::System::joint_forces_vjp" => joint_forces,
-        "dynamics::force::Linearisation::force_jvp" => force_jvp,
-        "dynamics::force::Linearisation::force_vjp" => force_vjp,
+        "dynamics::balance::Linearisation::force_jvp" => force_jvp,
+        "dynamics::balance::Linearisation::force_vjp" => force_vjp,
         "dynamics::momentum::Linearisation::momentum_vjp" => momentum,
         "dynamics::momentum::Linearisation::mass_vjp" => mass,
         "dynamics::acceleration::Linearisation::inertial_force_vjp" => inertial_force,
@@ -126,12 +125,12 @@ fn simulator() -> &'static Simulator {
 
 /// Everything that the rungs are functions of.
 #[derive(Clone)]
-struct Point {
-    q: DVector<f64>,
+pub struct Point {
+    pub q: DVector<f64>,
     /// Velocity, or the state's conserved variable.
-    v: DVector<f64>,
-    u: DVector<f64>,
-    parameters: Parameters,
+    pub v: DVector<f64>,
+    pub u: DVector<f64>,
+    pub parameters: Parameters,
 }
 
 /// Cotangents of a point.
@@ -142,11 +141,11 @@ struct Bar {
     parameters: Parameters,
 }
 
-fn system() -> &'static System {
+pub fn system() -> &'static System {
     simulator().system()
 }
 
-fn point() -> Point {
+pub fn point() -> Point {
     let (s, tree) = (system(), &system().tree);
     let n = tree.velocities();
     let mut q = tree.integrate(simulator().start().0, &wavy(n, 0.3, 0.05));
@@ -177,30 +176,31 @@ fn evaluate<'a>(parameters: &'a Parameters, q: &DVector<f64>) -> Linearisation<'
     system().linearise(parameters, q).unwrap()
 }
 
-/// The parameters in groups of like units: first entry, stride, name, scale of a step.
-fn parameter_groups(bodies: usize) -> Vec<(&'static str, DVector<f64>)> {
-    let all = simulator().parameters().to_vec();
-    let pick = |wanted: &dyn Fn(usize) -> bool, floor: f64, phase: f64| {
-        let w = wavy(all.len(), phase, 1.0);
-        DVector::from_fn(all.len(), |i, _| {
-            if wanted(i) {
-                0.1 * w[i] * all[i].abs().max(floor)
-            } else {
-                0.0
-            }
-        })
-    };
-    assert_eq!(all.len(), 4 + 9 * bodies);
-    // Contact, which this scene has none of, is checked apart.
-    let last = all.len() - 3;
-    let column = |i: usize| if i == 0 || i >= last { 9 } else { (i - 1) % 9 };
-    vec![
-        ("density", pick(&|i| i == 0, 0.0, 0.7)),
-        ("mass", pick(&|i| column(i) == 0, 0.1, 1.7)),
-        ("inertia", pick(&|i| (1..7).contains(&column(i)), 1e-3, 2.7)),
-        ("linear drag", pick(&|i| column(i) == 7, 1.0, 3.7)),
-        ("quadratic drag", pick(&|i| column(i) == 8, 0.1, 4.7)),
-    ]
+/// Directions of the parameters, one for each kind of them; contact, which this scene has none of, is checked apart.
+pub fn directions(at: &Parameters) -> Vec<(&'static str, DVector<f64>)> {
+    // Sizes for values that are zero.
+    let floors = [
+        ("mass", 0.1),
+        ("inertia", 1e-3),
+        ("drag.linear", 1.0),
+        ("drag.quadratic", 0.1),
+    ];
+    let kind = |name: &'static str| name.split_once("inertia").map_or(name, |_| "inertia");
+    let mut out: Vec<(&'static str, DVector<f64>)> = Vec::new();
+    for (i, (entry, value)) in at.table().iter().zip(at.to_vec()).enumerate() {
+        if entry.owner == Owner::Named("contact".into()) {
+            continue;
+        }
+        let kind = kind(entry.declared.name);
+        let floor = floors.iter().find(|(k, _)| *k == kind).map_or(0.0, |f| f.1);
+        let k = out.iter().position(|(k, _)| *k == kind).unwrap_or_else(|| {
+            out.push((kind, DVector::zeros(at.table().len())));
+            out.len() - 1
+        });
+        let sample = wavy(at.table().len(), 0.7 + k as f64, 1.0)[i];
+        out[k].1[i] = 0.1 * sample * value.abs().max(floor);
+    }
+    out
 }
 
 /// A scalar of a point against its cotangents, group by group; with `fine`, every joint and every
@@ -256,7 +256,7 @@ fn check(fine: bool, value: &dyn Fn(&Point) -> f64, at: &Point, bar: &Bar, c: f6
             }),
         });
     }
-    let mut parameters = parameter_groups(system().len());
+    let mut parameters = directions(&at.parameters);
     if !fine {
         let sum = parameters.iter().map(|(_, d)| d).sum();
         parameters = vec![("parameters", sum)];
@@ -279,26 +279,11 @@ fn check(fine: bool, value: &dyn Fn(&Point) -> f64, at: &Point, bar: &Bar, c: f6
     groups(list, c)
 }
 
-fn joint_forces(c: f64) -> Outcome {
-    let s = system();
-    let (bar, d) = (
-        wavy(s.tree.velocities(), 0.3, 1.0),
-        wavy(s.controls, 1.3, 0.3),
-    );
-    let mut u_bar = DVector::zeros(s.controls);
-    s.joint_forces_vjp(&bar, &mut u_bar);
-    let at = wavy(s.controls, 2.3, 1.0);
-    along(
-        |h| bar.dot(&s.joint_forces(&(&at + h * &d))),
-        c * u_bar.dot(&d),
-    )
-}
-
 fn force_jvp(c: f64) -> Outcome {
     let p = point();
     let e = evaluate(&p.parameters, &p.q);
     let dv = wavy(p.v.len(), 3.1, 0.2);
-    let tangent = c * e.force_jvp(&p.v, &dv).unwrap();
+    let tangent = c * e.force_velocity_jacobian(&p.v, &p.u).unwrap() * &dv;
     vector_along(
         |h| {
             e.force(&(&p.v + h * &dv), &p.u)

@@ -8,6 +8,7 @@
 mod contact;
 mod coupling;
 mod dynamics;
+mod force;
 mod multibody;
 mod policy;
 mod scan;
@@ -28,6 +29,7 @@ fn registered() -> Vec<(String, Rung)> {
         contact::rungs(),
         coupling::rungs(),
         dynamics::rungs(),
+        force::rungs(),
         policy::rungs(),
     ] {
         out.extend(part.into_iter().map(|r| (r.name.to_string(), r)));
@@ -99,19 +101,20 @@ const THROUGH: &[(&str, &str)] = &[
         "dynamics::integrator::contact::press_vjp",
     ),
     (
-        "dynamics::external::Evaluation::external_jvp",
-        "dynamics::force::Linearisation::force_jvp",
+        "dynamics::balance::Evaluation::loads_vjp",
+        "dynamics::balance::Linearisation::force_vjp",
     ),
+    // Forces that don't depend on the velocity: nothing that 1 % could be wrong with.
+    ("dynamics::force::gravity::Gravity::jvp", FORCE_JVP),
+    ("dynamics::force::buoyancy::Buoyancy::jvp", FORCE_JVP),
+    ("dynamics::force::thruster::Thrusters::jvp", FORCE_JVP),
+    ("dynamics::force::actuation::Actuation::jvp", FORCE_JVP),
     (
-        "dynamics::external::Evaluation::external_vjp",
-        "dynamics::force::Linearisation::force_vjp",
-    ),
-    (
-        "dynamics::force::rigid_parameters_vjp",
+        "dynamics::balance::rigid_parameters_vjp",
         "dynamics::momentum::Linearisation::momentum_vjp",
     ),
     (
-        "dynamics::force::Evaluation::frame_velocity_vjp",
+        "dynamics::balance::Evaluation::frame_velocity_vjp",
         "dynamics::integrator::readout::Stepper::conserved_vjp",
     ),
     (
@@ -162,6 +165,7 @@ const THROUGH: &[(&str, &str)] = &[
 /// What hands over a derivative that its caller gave.
 const PASSED_ON: &[&str] = &["optimize::descent::Shared::gradient"];
 
+const FORCE_JVP: &str = "dynamics::balance::Linearisation::force_jvp";
 const FULL_VJP: &str = "coupling::full::linearised::FullLinearised::vjp";
 const FULL_HVP: &str = "coupling::full::linearised::FullLinearised::hvp";
 

@@ -100,16 +100,15 @@ fn controllers_with_lists_of_wrong_length_are_refused() {
 fn parameters_and_starts_that_can_not_be_are_refused() {
     let mut s = simulator("kirchhoff_ellipsoid");
     let good = s.parameters().clone();
-    let mut short = good.clone();
-    short.linear_drag.clear();
+    let other = simulator("two_spheres").parameters().clone();
     assert!(
-        s.set_parameters(short)
+        s.set_parameters(other)
             .unwrap_err()
             .to_string()
             .contains("linear")
     );
     let mut negative = good.clone();
-    negative.inertia[0][0] = -1.0;
+    negative.set("ellipsoid.inertia.xx", -1.0).unwrap();
     assert!(
         s.set_parameters(negative)
             .unwrap_err()
@@ -117,7 +116,7 @@ fn parameters_and_starts_that_can_not_be_are_refused() {
             .contains("inertia.xx")
     );
     let mut quadratic = good.clone();
-    quadratic.quadratic_drag[0] = 1.0;
+    quadratic.set("ellipsoid.drag.quadratic", 1.0).unwrap();
     assert!(
         s.set_parameters(quadratic)
             .unwrap_err()
@@ -143,12 +142,13 @@ fn drag_works_where_the_scene_gives_none() {
     let goal = objective::final_velocity(0, 0.0, 1.0);
     let (slope, free) = {
         let r = s.rollout(&controls).unwrap();
-        let slope = r.gradient(&goal).unwrap().parameters.linear_drag[0];
+        let slope = r.gradient(&goal).unwrap().parameters;
+        let slope = slope.get("ellipsoid.drag.linear").unwrap();
         (slope, r.value(&goal).unwrap())
     };
     assert!(slope < 0.0, "{slope}");
     let mut p = s.parameters().clone();
-    p.linear_drag[0] = 1e-3;
+    p.set("ellipsoid.drag.linear", 1e-3).unwrap();
     s.set_parameters(p).unwrap();
     let dragged = s.rollout(&controls).unwrap().value(&goal).unwrap();
     let difference = (dragged - free) / 1e-3;

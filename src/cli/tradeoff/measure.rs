@@ -60,7 +60,7 @@ impl Start {
 
     fn new(simulator: &Simulator, e: &Evaluation, force: DVector<f64>) -> Result<Self> {
         let mut dry = simulator.parameters().clone();
-        dry.density = 0.0;
+        *dry.density_mut() = 0.0;
         let rigid = (simulator.system()).evaluate(&dry, simulator.start().0)?;
         let free = free(simulator);
         let block = |m: &DMatrix<f64>| m.select_rows(&free).select_columns(&free);

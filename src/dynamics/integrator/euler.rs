@@ -107,7 +107,7 @@ pub(super) fn solve_stage(
             break;
         }
         previous = residual;
-        let rates = e.force_velocity_jacobian(&v)?;
+        let rates = e.force_velocity_jacobian(&v, control)?;
         let matrix = stage_matrix(e, split, &v, &rates, &reached, rule);
         let Some(step) = matrix.lu().solve(&split.take(&defect)) else {
             break;
@@ -232,7 +232,7 @@ pub(super) fn step_vjp(
         }
     };
     let reached = &p + s.dt * &stage.force;
-    let adjoint = AdjointStage::new(e, &split, &stage.v, &reached, rule(s))?;
+    let adjoint = AdjointStage::new(e, &split, &stage.v, &input.control, &reached, rule(s))?;
     let mut bar = StepBar::zeros(e);
     let (q_bar, after_bar) = advance_vjp(s, &split, &after, &next_bar.q);
     bar.state.q += q_bar;
@@ -262,7 +262,7 @@ pub(super) struct AdjointStage {
 }
 
 impl AdjointStage {
-    /// At velocity v and momentum p̂ + h f.
+    /// At velocity v, controls and momentum p̂ + h f.
     ///
     /// # Errors
     /// A coupling that fails.
@@ -270,10 +270,11 @@ impl AdjointStage {
         e: &Linearisation,
         split: &Split,
         v: &DVector<f64>,
+        control: &DVector<f64>,
         reached: &DVector<f64>,
         rule: Rule,
     ) -> Result<Self> {
-        let rates = e.force_velocity_jacobian(v)?;
+        let rates = e.force_velocity_jacobian(v, control)?;
         let matrix = stage_matrix(e, split, v, &rates, reached, rule);
         let factor = matrix.transpose().lu();
         Ok(Self { rates, factor })

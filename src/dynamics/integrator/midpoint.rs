@@ -135,7 +135,7 @@ pub(super) fn step_vjp(
     split.forget_driven(&mut z);
     let both = [&stage, &after];
     let v_bar_next = contact::press_vjp(e, &split, both, [&after_bar, &z], s.dt, &mut bar)?;
-    let adjoint = AdjointStage::new(&m, &split, &stage, &reached, rule(s))?;
+    let adjoint = AdjointStage::new(&m, &split, &stage, &input.control, &reached, rule(s))?;
     let v_bar_force = s.dt * adjoint.rates.tr_mul(&z);
     let fixed = v_bar_next + v_bar_force;
     // v̄ = fixed + (∂q_m/∂v)ᵀ q̄_m(w), w = J⁻ᵀ v̄.

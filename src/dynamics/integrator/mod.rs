@@ -380,7 +380,7 @@ impl StepBar {
             },
             v: DVector::zeros(nv),
             control: DVector::zeros(e.system.controls),
-            parameters: Parameters::zeros(e.system.len()),
+            parameters: e.parameters.zeros(),
         }
     }
 

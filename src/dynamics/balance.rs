@@ -1,8 +1,8 @@
 //! The rate of the frame momenta, p̂˙ = f(q, v, u), with its tangent in v and its transpose.
 //!
 //! Per body, with spatial momentum h_b = h_r + h_f (rigid and fluid), current U and the fluid's pose
-//! force F_b = ½ ∂E(v, v)/∂g_b, the balance is ḣ_b = F_b + (U,0) ×* h_f + external; projected on
-//! the frame columns, which turn with their parent's twist,
+//! force F_b = ½ ∂E(v, v)/∂g_b, the balance is ḣ_b = F_b + (U,0) ×* h_f + the wrenches of [`super::force`];
+//! projected on the frame columns, which rotate with their parent's twist,
 //!
 //! ```text
 //! f_i = Ŝ_iᵀ Ḣ_i + (V_parent × Ŝ_i)ᵀ H_i + (X⁻ᵀ τ)_i          H, Ḣ: sums over the subtree
@@ -12,6 +12,7 @@
 //! For a joint to the world the second term vanishes, and with no external force the sum of momenta is
 //! kept to round-off by any integrator that is linear in f.
 
+use super::force::{LoadBars, Loads, Moving, Place, Velocity};
 use super::{Evaluation, Linearisation, Parameters};
 use crate::Result;
 use crate::adjoint::lie::{Vec6, cross_force, cross_motion, six};
@@ -41,7 +42,7 @@ impl ForceCotangents {
             q: DVector::zeros(nv),
             v: DVector::zeros(nv),
             control: DVector::zeros(e.system.controls),
-            parameters: Parameters::zeros(e.system.len()),
+            parameters: e.parameters.zeros(),
         }
     }
 }
@@ -57,10 +58,8 @@ pub(super) fn rigid_parameters_vjp(
     let pose = &e.kinematics.poses[b];
     let outer: Matrix6<f64> = pose.twist_to_body(x) * pose.twist_to_body(y).transpose();
     let (mass, inertia) = rigid::spatial_inertia_vjp(&e.system.bodies[b].center_of_mass, &outer);
-    bar.mass[b] += mass;
-    for (total, part) in bar.inertia[b].iter_mut().zip(inertia) {
-        *total += part;
-    }
+    *bar.mass_mut(b) += mass;
+    bar.add_inertia(b, &inertia);
 }
 
 impl Evaluation<'_> {
@@ -74,15 +73,84 @@ impl Evaluation<'_> {
         self.from_submerged(&field.iter().map(|w| 0.5 * w).collect::<Vec<_>>())
     }
 
-    /// Joint forces in frame coordinates, X⁻ᵀ τ.
-    pub(super) fn frame_joint_forces(&self, control: &DVector<f64>) -> DVector<f64> {
-        let tau = self.system.joint_forces(control);
-        self.system
-            .tree
-            .per_joint(&self.q, &tau, |j, q, p| j.frame_momentum(q, p))
+    /// Bodies and joints as forces see them.
+    fn moving<'b>(
+        &'b self,
+        twists: &'b [Vec6],
+        v: &'b DVector<f64>,
+        control: &'b DVector<f64>,
+    ) -> Moving<'b> {
+        Moving {
+            place: self.place(),
+            twists,
+            v,
+            current: &self.system.current,
+            control,
+        }
     }
 
-    /// Projects momenta and their rates on the turning frame columns.
+    /// The same without motion.
+    fn place(&self) -> Place<'_> {
+        Place {
+            poses: &self.kinematics.poses,
+            q: &self.q,
+            parameters: self.parameters,
+        }
+    }
+
+    /// What all forces do to bodies that move with spatial `twists`.
+    pub(super) fn loads(
+        &self,
+        twists: &[Vec6],
+        v: &DVector<f64>,
+        control: &DVector<f64>,
+    ) -> Loads {
+        let at = self.moving(twists, v, control);
+        let mut out = Loads::zeros(twists.len(), v.len());
+        for force in self.system.forces.iter() {
+            force.add(&at, &mut out);
+        }
+        out
+    }
+
+    /// Transpose of [`Evaluation::loads`]: the gradient of the power on the velocity `z`, added to `bar` and `out`.
+    pub(super) fn loads_vjp(
+        &self,
+        twists: &[Vec6],
+        v: &DVector<f64>,
+        control: &DVector<f64>,
+        z: &Velocity,
+        bar: &mut Cotangents,
+        out: &mut ForceCotangents,
+    ) {
+        let at = self.moving(twists, v, control);
+        let mut bars = LoadBars {
+            pose: &mut bar.pose,
+            twist: &mut bar.twist,
+            q: &mut out.q,
+            v: &mut out.v,
+            control: &mut out.control,
+            parameters: &mut out.parameters,
+        };
+        for force in self.system.forces.iter() {
+            force.vjp(&at, z, &mut bars);
+        }
+    }
+
+    /// Potential energy of all forces that have one, J.
+    pub fn potential_energy(&self) -> f64 {
+        let forces = self.system.forces.iter();
+        forces.map(|f| f.potential_energy(&self.place())).sum()
+    }
+
+    /// Joint forces in frame coordinates, X⁻ᵀ τ.
+    fn frame_joint_forces(&self, tau: &DVector<f64>) -> DVector<f64> {
+        self.system
+            .tree
+            .per_joint(&self.q, tau, |j, q, p| j.frame_momentum(q, p))
+    }
+
+    /// Projects momenta and their rates on the rotating frame columns.
     fn project_frame(&self, twists: &[Vec6], momenta: Vec<Vec6>, rates: Vec<Vec6>) -> DVector<f64> {
         let tree = &self.system.tree;
         let (momenta, rates) = (tree.composite(momenta), tree.composite(rates));
@@ -131,47 +199,35 @@ impl Linearisation<'_> {
     /// A coupling that fails.
     pub fn force(&self, v: &DVector<f64>, control: &DVector<f64>) -> Result<DVector<f64>> {
         let tree = &self.system.tree;
-        let rho = self.parameters.density;
+        let rho = self.parameters.density();
         let twists = tree.twists(&self.kinematics, v);
         let direction = self.through_water(v);
         let fluid = self.fluid_momenta(&direction);
         let pose_force = self.pose_force(&direction)?;
         let current = self.current_twist();
         let mut momenta = Vec::with_capacity(twists.len());
-        let mut rates = Vec::with_capacity(twists.len());
+        let Loads {
+            wrenches: mut rates,
+            joints,
+        } = self.loads(&twists, v, control);
         for (b, twist) in twists.iter().enumerate() {
             momenta.push(self.rigid_momentum(b, twist) + rho * fluid[b]);
-            rates.push(
-                self.external(b, twist, control)
-                    + rho * (pose_force[b] + cross_force(&current, &fluid[b])),
-            );
+            rates[b] += rho * (pose_force[b] + cross_force(&current, &fluid[b]));
         }
-        Ok(self.project_frame(&twists, momenta, rates) + self.frame_joint_forces(control))
+        Ok(self.project_frame(&twists, momenta, rates) + self.frame_joint_forces(&joints))
     }
 
-    /// Tangent of [`Linearisation::force`] along `dv` at fixed q and u.
-    ///
-    /// # Errors
-    /// As there.
-    pub fn force_jvp(&self, v: &DVector<f64>, dv: &DVector<f64>) -> Result<DVector<f64>> {
-        let changed = match self.acting() {
-            Some(water) => {
-                (water.linearised).gradient(&self.through_water(v), &self.virtual_direction(dv))?
-            }
-            None => Vec::new(),
-        };
-        Ok(self.force_tangent(v, dv, &changed))
-    }
-
-    /// The same with the change of the fluid's pose force on the submerged bodies.
-    fn force_tangent(
+    /// Tangent of [`Linearisation::force`] along `dv` at fixed q and u, with the change of the fluid's pose force on the
+    /// submerged bodies.
+    fn force_jvp(
         &self,
         v: &DVector<f64>,
+        control: &DVector<f64>,
         dv: &DVector<f64>,
         dpose_force: &[Vec6],
     ) -> DVector<f64> {
         let tree = &self.system.tree;
-        let rho = self.parameters.density;
+        let rho = self.parameters.density();
         let twists = tree.twists(&self.kinematics, v);
         let dtwists = tree.twists(&self.kinematics, dv);
         let direction = self.through_water(v);
@@ -183,24 +239,44 @@ impl Linearisation<'_> {
             None => vec![Vec6::zeros(); self.system.len()],
         };
         let current = self.current_twist();
-        let (mut momenta, mut dmomenta, mut drates) = (vec![], vec![], vec![]);
+        let (mut momenta, mut dmomenta) = (vec![], vec![]);
+        let mut dloads = Loads::zeros(twists.len(), v.len());
+        let (at, change) = (
+            self.moving(&twists, v, control),
+            Velocity {
+                twists: &dtwists,
+                v: dv,
+            },
+        );
+        for force in self.system.forces.iter() {
+            force.jvp(&at, &change, &mut dloads);
+        }
+        let Loads {
+            wrenches: mut drates,
+            joints,
+        } = dloads;
         for (b, dtwist) in dtwists.iter().enumerate() {
             momenta.push(self.rigid_momentum(b, &twists[b]) + rho * fluid[b]);
             dmomenta.push(self.rigid_momentum(b, dtwist) + rho * dfluid[b]);
-            drates.push(
-                self.external_jvp(b, &twists[b], dtwist)
-                    + rho * (dpose_force[b] + cross_force(&current, &dfluid[b])),
-            );
+            drates[b] += rho * (dpose_force[b] + cross_force(&current, &dfluid[b]));
         }
-        self.project_frame(&twists, dmomenta, drates)
-            + self.project_frame(&dtwists, momenta, vec![Vec6::zeros(); twists.len()])
+        let out = self.project_frame(&twists, dmomenta, drates)
+            + self.project_frame(&dtwists, momenta, vec![Vec6::zeros(); twists.len()]);
+        match joints.iter().all(|x| *x == 0.0) {
+            true => out,
+            false => out + self.frame_joint_forces(&joints),
+        }
     }
 
     /// ∂f/∂v, column by column.
     ///
     /// # Errors
     /// As [`Linearisation::force`].
-    pub fn force_velocity_jacobian(&self, v: &DVector<f64>) -> Result<DMatrix<f64>> {
+    pub fn force_velocity_jacobian(
+        &self,
+        v: &DVector<f64>,
+        control: &DVector<f64>,
+    ) -> Result<DMatrix<f64>> {
         let n = v.len();
         let changed = match self.acting() {
             Some(water) => water.linearised.gradient_columns(&self.through_water(v))?,
@@ -210,7 +286,7 @@ impl Linearisation<'_> {
         for (k, changed) in changed.iter().enumerate().take(n) {
             let mut unit = DVector::zeros(n);
             unit[k] = 1.0;
-            out.set_column(k, &self.force_tangent(v, &unit, changed));
+            out.set_column(k, &self.force_jvp(v, control, &unit, changed));
         }
         Ok(out)
     }
@@ -226,17 +302,13 @@ impl Linearisation<'_> {
         z: &DVector<f64>,
     ) -> Result<ForceCotangents> {
         let tree = &self.system.tree;
-        let rho = self.parameters.density;
+        let rho = self.parameters.density();
         let mut out = ForceCotangents::zeros(self);
         let fields = tree.fields(&self.kinematics, &self.q, v, Virtual::Frame(z));
         let mut bar = Cotangents::zeros(self.system.len());
 
         for b in 0..self.system.len() {
-            let (twist, virt, turning) = (
-                &fields.twist[b],
-                &fields.virtual_twist[b],
-                &fields.turning[b],
-            );
+            let (twist, turning) = (&fields.twist[b], &fields.turning[b]);
             // D · h_r, with the rigid momentum h_r = I V constant in the body's frame.
             let (h, h_turning) = (
                 self.rigid_momentum(b, twist),
@@ -246,20 +318,19 @@ impl Linearisation<'_> {
             bar.twist[b] += h_turning;
             bar.pose[b] -= cross_force(twist, &h_turning) + cross_force(turning, &h);
             rigid_parameters_vjp(self, b, turning, twist, &mut out.parameters);
-            // Z · external.
-            let external = self.external(b, twist, control);
-            bar.virtual_twist[b] += external;
-            let e = self.external_vjp(
-                b,
-                twist,
-                control,
-                virt,
-                &mut out.control,
-                &mut out.parameters,
-            );
-            bar.pose[b] += e.pose;
-            bar.twist[b] += e.twist;
         }
+        // Z · wrenches + ẑᵀ X⁻ᵀ τ.
+        let loads = self.loads(&fields.twist, v, control);
+        let tau_bar = tree.per_joint(&self.q, z, |j, q, z| j.frame_velocity_inverse(q, z));
+        for (bar, wrench) in bar.virtual_twist.iter_mut().zip(&loads.wrenches) {
+            *bar += wrench;
+        }
+        let power = Velocity {
+            twists: &fields.virtual_twist,
+            v: &tau_bar,
+        };
+        self.loads_vjp(&fields.twist, v, control, &power, &mut bar, &mut out);
+        out.q -= self.frame_velocity_vjp(&tau_bar, &self.frame_joint_forces(&loads.joints));
         if let Some(water) = self.water()? {
             let direction = self.through_water(v);
             let through = Direction::Basis(&direction);
@@ -294,7 +365,7 @@ impl Linearisation<'_> {
                 let relative = self.relative(&fields.twist[b]);
                 let virt = &fields.virtual_twist[b];
                 let rate = pose_force[b] + cross_force(&current, &momenta[b]);
-                out.parameters.density += fields.turning[b].dot(&momenta[b]) + virt.dot(&rate);
+                *out.parameters.density_mut() += fields.turning[b].dot(&momenta[b]) + virt.dot(&rate);
                 bar.turning[b] += rho * momenta[b];
                 bar.virtual_twist[b] += rho * rate;
                 bar.twist[b] += rho * (momenta_carried[b] + impulse[b]);
@@ -308,11 +379,6 @@ impl Linearisation<'_> {
         let (q_bar, v_bar) = tree.reverse(&self.kinematics, v, Virtual::Frame(z), &fields, bar);
         out.q += q_bar;
         out.v += v_bar;
-        // ẑᵀ X(q)⁻ᵀ τ.
-        let tau_frame = self.frame_joint_forces(control);
-        let tau_bar = tree.per_joint(&self.q, z, |j, q, z| j.frame_velocity_inverse(q, z));
-        self.system.joint_forces_vjp(&tau_bar, &mut out.control);
-        out.q -= self.frame_velocity_vjp(&tau_bar, &tau_frame);
         Ok(out)
     }
 }

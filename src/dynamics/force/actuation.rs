@@ -1,0 +1,40 @@
+//! Actuated joints: controls are their generalised forces, in the user's coordinates.
+
+use super::{Force, LoadBars, Loads, Moving, Parts, Velocity};
+use crate::dynamics::Declarations;
+use std::ops::Range;
+
+/// Velocities of each actuated joint, with the first of its controls.
+struct Actuation(Vec<(Range<usize>, usize)>);
+
+pub(super) fn assemble(parts: &Parts, _: &mut Declarations) -> Option<Box<dyn Force>> {
+    let each = parts.bodies.iter().zip(parts.tree.links());
+    let joints: Vec<_> = each
+        .filter_map(|(body, link)| Some((link.v.clone(), body.joint_control?)))
+        .collect();
+    (!joints.is_empty()).then(|| Box::new(Actuation(joints)) as Box<dyn Force>)
+}
+
+impl Force for Actuation {
+    fn name(&self) -> &'static str {
+        "actuation"
+    }
+
+    fn add(&self, at: &Moving, out: &mut Loads) {
+        for (v, control) in &self.0 {
+            for (k, i) in v.clone().enumerate() {
+                out.joints[i] += at.control[control + k];
+            }
+        }
+    }
+
+    fn jvp(&self, _: &Moving, _: &Velocity, _: &mut Loads) {}
+
+    fn vjp(&self, _: &Moving, z: &Velocity, bar: &mut LoadBars) {
+        for (v, control) in &self.0 {
+            for (k, i) in v.clone().enumerate() {
+                bar.control[control + k] += z.v[i];
+            }
+        }
+    }
+}

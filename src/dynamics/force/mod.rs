@@ -1,0 +1,153 @@
+//! Forces on bodies and joints that don't come from the water's kinetic energy, one file each.
+//!
+//! A force adds spatial wrenches (moment about the world's origin) on bodies, and generalised forces of joints (user
+//! coordinates), at a configuration and a velocity; the balance of momenta ([`super::balance`]) knows forces by this trait alone.
+//! To add one: a file with the type, its declared parameters and its `assemble`, and its line in [`FORCES`].
+
+mod actuation;
+mod buoyancy;
+mod gravity;
+mod linear_drag;
+mod quadratic_drag;
+mod thruster;
+
+use super::{BodyData, Declarations, Parameters};
+use crate::adjoint::drag::{Element, Part};
+use crate::adjoint::lie::{Pose, Vec3, Vec6, six};
+use crate::multibody::Tree;
+use crate::scene::{DragPart, Scene};
+use nalgebra::DVector;
+use std::sync::Arc;
+
+/// How each force is made from a scene; `None` where a scene has none of its kind. The order is that in which they are added up.
+const FORCES: &[fn(&Parts, &mut Declarations) -> Option<Box<dyn Force>>] = &[
+    gravity::assemble,
+    buoyancy::assemble,
+    linear_drag::assemble,
+    quadratic_drag::assemble,
+    thruster::assemble,
+    actuation::assemble,
+];
+
+/// What forces are made from.
+pub struct Parts<'a> {
+    /// The scene.
+    pub scene: &'a Scene,
+    /// Its joints.
+    pub tree: &'a Tree,
+    /// Constants of its bodies.
+    pub bodies: &'a [BodyData],
+    /// Surface of each body that has one.
+    pub surfaces: &'a [Vec<Element>],
+}
+
+/// All forces of a scene.
+pub fn assemble(parts: &Parts, parameters: &mut Declarations) -> Arc<[Box<dyn Force>]> {
+    let made = FORCES.iter().filter_map(|make| make(parts, parameters));
+    made.collect()
+}
+
+/// Where bodies and joints are.
+#[derive(Clone, Copy)]
+pub struct Place<'a> {
+    /// Poses of the bodies in the world.
+    pub poses: &'a [Pose],
+    /// Joint coordinates.
+    pub q: &'a DVector<f64>,
+    /// The parameters.
+    pub parameters: &'a Parameters,
+}
+
+/// How they move there, and what controls them.
+#[derive(Clone, Copy)]
+pub struct Moving<'a> {
+    /// Where they are.
+    pub place: Place<'a>,
+    /// Spatial twists of the bodies.
+    pub twists: &'a [Vec6],
+    /// Generalised velocity.
+    pub v: &'a DVector<f64>,
+    /// Velocity of the undisturbed water, m/s.
+    pub current: &'a Vec3,
+    /// Controls.
+    pub control: &'a DVector<f64>,
+}
+
+impl Moving<'_> {
+    /// Twist of body `b` through the water.
+    pub fn relative(&self, b: usize) -> Vec6 {
+        self.twists[b] - six(self.current, &Vec3::zeros())
+    }
+}
+
+/// A change of the velocity at a fixed configuration, or a virtual velocity that does work against forces.
+#[derive(Clone, Copy)]
+pub struct Velocity<'a> {
+    /// Spatial twists of the bodies.
+    pub twists: &'a [Vec6],
+    /// Of the joints, user coordinates.
+    pub v: &'a DVector<f64>,
+}
+
+/// What forces add up to.
+pub struct Loads {
+    /// Spatial wrench on each body, N and N m about the world's origin.
+    pub wrenches: Vec<Vec6>,
+    /// Generalised force of each joint velocity, N or N m, user coordinates.
+    pub joints: DVector<f64>,
+}
+
+impl Loads {
+    /// None, on `bodies` bodies with `velocities` velocities.
+    pub fn zeros(bodies: usize, velocities: usize) -> Self {
+        Self {
+            wrenches: vec![Vec6::zeros(); bodies],
+            joints: DVector::zeros(velocities),
+        }
+    }
+}
+
+/// What a transpose adds to.
+pub struct LoadBars<'a> {
+    /// Cotangents of the poses: work on a spatial displacement of each body.
+    pub pose: &'a mut [Vec6],
+    /// Of the twists.
+    pub twist: &'a mut [Vec6],
+    /// Of the joint coordinates as such, in their tangent space; that of the poses isn't part of it.
+    pub q: &'a mut DVector<f64>,
+    /// Of the joint velocities as such.
+    pub v: &'a mut DVector<f64>,
+    /// Of the controls.
+    pub control: &'a mut DVector<f64>,
+    /// Of the parameters.
+    pub parameters: &'a mut Parameters,
+}
+
+/// A force, on any bodies and joints. It is a pure function of where they are, how they move, controls and parameters.
+pub trait Force: Send + Sync {
+    /// Its name, for messages and checks.
+    fn name(&self) -> &'static str;
+
+    /// Adds what it does.
+    fn add(&self, at: &Moving, out: &mut Loads);
+
+    /// Adds the tangent of [`Force::add`] along a change of the velocity; nothing where it doesn't depend on it.
+    fn jvp(&self, at: &Moving, change: &Velocity, out: &mut Loads);
+
+    /// Adds the transpose of [`Force::add`] in all its arguments: the gradient of its power on the velocity `z`.
+    fn vjp(&self, at: &Moving, z: &Velocity, bar: &mut LoadBars);
+
+    /// Potential energy, J, of a force that has one.
+    fn potential_energy(&self, _place: &Place) -> f64 {
+        0.0
+    }
+}
+
+/// A scene's name for which part of a surface's velocity drags.
+fn drag_part(part: DragPart) -> Part {
+    match part {
+        DragPart::Tangential => Part::Tangential,
+        DragPart::Normal => Part::Normal,
+        DragPart::Total => Part::Total,
+    }
+}

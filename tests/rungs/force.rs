@@ -1,0 +1,215 @@
+//! Rungs of every force by itself: bodies are displaced, and their twists changed, one by one, as no joint would let them.
+
+use super::dynamics::{directions, point, system};
+use super::tools::{Group, groups, vector_along, wavy};
+use hydrograd::adjoint::check::{Outcome, Rung};
+use hydrograd::adjoint::lie::{Pose, Vec6, angular, exp_matrix, linear};
+use hydrograd::dynamics::Parameters;
+use hydrograd::dynamics::force::{Force, LoadBars, Loads, Moving, Place, Velocity};
+use nalgebra::DVector;
+
+pub fn rungs() -> Vec<Rung> {
+    macro_rules! rungs {
+        ($($name:literal => $check:expr),* $(,)?) => {
+            vec![$(Rung { name: $name, check: $check }),*]
+        };
+    }
+    rungs![
+        "dynamics::force::gravity::Gravity::vjp" => |c| vjp("gravity", c),
+        "dynamics::force::buoyancy::Buoyancy::vjp" => |c| vjp("buoyancy", c),
+        "dynamics::force::linear_drag::LinearDrag::jvp" => |c| jvp("linear drag", c),
+        "dynamics::force::linear_drag::LinearDrag::vjp" => |c| vjp("linear drag", c),
+        "dynamics::force::quadratic_drag::QuadraticDrag::jvp" => |c| jvp("quadratic drag", c),
+        "dynamics::force::quadratic_drag::QuadraticDrag::vjp" => |c| vjp("quadratic drag", c),
+        "dynamics::force::thruster::Thrusters::vjp" => |c| vjp("thruster", c),
+        "dynamics::force::actuation::Actuation::vjp" => |c| vjp("actuation", c),
+    ]
+}
+
+/// What a force is a function of.
+#[derive(Clone)]
+struct At {
+    poses: Vec<Pose>,
+    q: DVector<f64>,
+    twists: Vec<Vec6>,
+    v: DVector<f64>,
+    control: DVector<f64>,
+    parameters: Parameters,
+}
+
+impl At {
+    fn new() -> Self {
+        let (p, tree) = (point(), &system().tree);
+        let kinematics = tree.kinematics(&p.q);
+        Self {
+            twists: tree.twists(&kinematics, &p.v),
+            poses: kinematics.poses,
+            q: p.q,
+            v: p.v,
+            control: p.u,
+            parameters: p.parameters,
+        }
+    }
+
+    fn moving(&self) -> Moving<'_> {
+        Moving {
+            place: Place {
+                poses: &self.poses,
+                q: &self.q,
+                parameters: &self.parameters,
+            },
+            twists: &self.twists,
+            v: &self.v,
+            current: &system().current,
+            control: &self.control,
+        }
+    }
+
+    fn loads(&self, force: &dyn Force) -> Loads {
+        let mut out = Loads::zeros(self.poses.len(), self.v.len());
+        force.add(&self.moving(), &mut out);
+        out
+    }
+}
+
+fn force(name: &str) -> &'static dyn Force {
+    let mut all = system().forces.iter();
+    all.find(|f| f.name() == name).expect("the scene has every force").as_ref()
+}
+
+/// A six-vector for each body.
+fn field(phase: f64, size: f64) -> Vec<Vec6> {
+    let n = system().len();
+    let all = wavy(6 * n, phase, size);
+    (0..n).map(|b| all.fixed_rows::<6>(6 * b).into_owned()).collect()
+}
+
+fn displaced(poses: &[Pose], by: &[Vec6], h: f64) -> Vec<Pose> {
+    let one = |(pose, x): (&Pose, &Vec6)| {
+        let rotation = exp_matrix(&(h * angular(x)));
+        Pose::new(
+            rotation * pose.rotation,
+            rotation * pose.translation + h * linear(x),
+        )
+    };
+    poses.iter().zip(by).map(one).collect()
+}
+
+fn along(twists: &[Vec6], by: &[Vec6], h: f64) -> Vec<Vec6> {
+    twists.iter().zip(by).map(|(t, d)| t + h * d).collect()
+}
+
+fn row(loads: &Loads) -> Vec<f64> {
+    let wrenches = loads.wrenches.iter().flat_map(|w| w.iter().copied());
+    wrenches.chain(loads.joints.iter().copied()).collect()
+}
+
+fn jvp(name: &str, c: f64) -> Outcome {
+    let (force, at) = (force(name), At::new());
+    let (dtwists, dv) = (field(3.1, 0.2), wavy(at.v.len(), 3.7, 0.2));
+    let mut tangent = Loads::zeros(at.poses.len(), at.v.len());
+    let change = Velocity {
+        twists: &dtwists,
+        v: &dv,
+    };
+    force.jvp(&at.moving(), &change, &mut tangent);
+    let tangent: Vec<f64> = row(&tangent).iter().map(|x| c * x).collect();
+    let value = |h: f64| {
+        let twists = along(&at.twists, &dtwists, h);
+        let v = &at.v + h * &dv;
+        row(&At { twists, v, ..at.clone() }.loads(force))
+    };
+    vector_along(value, &tangent)
+}
+
+fn vjp(name: &str, c: f64) -> Outcome {
+    let (force, at) = (force(name), At::new());
+    let (n, nv) = (at.poses.len(), at.v.len());
+    let (z, z_joints) = (field(5.1, 1.0), wavy(nv, 5.7, 1.0));
+    let power = |at: &At| {
+        let loads = at.loads(force);
+        let wrenches: f64 = loads.wrenches.iter().zip(&z).map(|(w, z)| w.dot(z)).sum();
+        wrenches + loads.joints.dot(&z_joints)
+    };
+    let (mut pose, mut twist) = (vec![Vec6::zeros(); n], vec![Vec6::zeros(); n]);
+    let (mut q, mut v) = (DVector::zeros(nv), DVector::zeros(nv));
+    let mut control = DVector::zeros(at.control.len());
+    let mut parameters = at.parameters.zeros();
+    let mut bars = LoadBars {
+        pose: &mut pose,
+        twist: &mut twist,
+        q: &mut q,
+        v: &mut v,
+        control: &mut control,
+        parameters: &mut parameters,
+    };
+    let on = Velocity {
+        twists: &z,
+        v: &z_joints,
+    };
+    force.vjp(&at.moving(), &on, &mut bars);
+
+    let (at, power) = (&at, &power);
+    let work = |field: &[Vec6], by: &[Vec6]| field.iter().zip(by).map(|(a, b)| a.dot(b)).sum();
+    let (dpose, dtwist) = (field(2.1, 0.05), field(3.1, 0.2));
+    let (dq, dv) = (wavy(nv, 2.7, 0.05), wavy(nv, 3.7, 0.2));
+    let du = wavy(at.control.len(), 4.1, 1.0);
+    let mut list: Vec<Group> = vec![
+        Group {
+            name: "pose",
+            slope: work(&pose, &dpose),
+            value: Box::new(move |h| {
+                let poses = displaced(&at.poses, &dpose, h);
+                power(&At { poses, ..at.clone() })
+            }),
+        },
+        Group {
+            name: "twist",
+            slope: work(&twist, &dtwist),
+            value: Box::new(move |h| {
+                let twists = along(&at.twists, &dtwist, h);
+                power(&At { twists, ..at.clone() })
+            }),
+        },
+        Group {
+            name: "q",
+            slope: q.dot(&dq),
+            value: Box::new(move |h| {
+                let q = system().tree.integrate(&at.q, &(h * &dq));
+                power(&At { q, ..at.clone() })
+            }),
+        },
+        Group {
+            name: "v",
+            slope: v.dot(&dv),
+            value: Box::new(move |h| {
+                let v = &at.v + h * &dv;
+                power(&At { v, ..at.clone() })
+            }),
+        },
+        Group {
+            name: "control",
+            slope: control.dot(&du),
+            value: Box::new(move |h| {
+                let control = &at.control + h * &du;
+                power(&At { control, ..at.clone() })
+            }),
+        },
+    ];
+    let bars = DVector::from_vec(parameters.to_vec());
+    for (name, d) in directions(&at.parameters) {
+        list.push(Group {
+            name,
+            slope: bars.dot(&d),
+            value: Box::new(move |h| {
+                let values = DVector::from_vec(at.parameters.to_vec()) + h * &d;
+                let parameters = at.parameters.with_values(values.as_slice()).unwrap();
+                power(&At {
+                    parameters,
+                    ..at.clone()
+                })
+            }),
+        });
+    }
+    groups(list, c)
+}

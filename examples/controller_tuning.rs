@@ -157,9 +157,8 @@ impl Trial {
             .fidelity(Fidelity::Reduced)
             .time_step(TIME_STEP);
         let simulator = Simulator::new(&scene, settings)?;
-        let mass = &simulator.parameters().mass;
-        let gripper = mass[0] + mass[1] + mass[2];
-        let untuned = Follow::on_dry_land(y, gripper, mass[1]);
+        let mass = |b| simulator.parameters().mass(b);
+        let untuned = Follow::on_dry_land(y, mass(0) + mass(1) + mass(2), mass(1));
         Ok(Self { simulator, untuned })
     }
 

@@ -107,7 +107,7 @@ pub fn added_mass(simulator: &Simulator) -> hydrograd::Result<DMatrix<f64>> {
     simulator.stepper().place_motions(&mut q, 0.0);
     let system = simulator.system();
     let mut dry = simulator.parameters().clone();
-    dry.density = 0.0;
+    *dry.density_mut() = 0.0;
     let submerged = system.evaluate(simulator.parameters(), &q)?;
     let dry = system.evaluate(&dry, &q)?;
     Ok(&submerged.mass_matrix - &dry.mass_matrix)

@@ -99,12 +99,7 @@ impl Evaluation<'_> {
     }
 
     /// What all forces do to bodies that move with spatial `twists`.
-    pub(super) fn loads(
-        &self,
-        twists: &[Vec6],
-        v: &DVector<f64>,
-        control: &DVector<f64>,
-    ) -> Loads {
+    pub(super) fn loads(&self, twists: &[Vec6], v: &DVector<f64>, control: &DVector<f64>) -> Loads {
         let at = self.moving(twists, v, control);
         let mut out = Loads::zeros(twists.len(), v.len());
         for force in self.system.forces.iter() {
@@ -365,7 +360,8 @@ impl Linearisation<'_> {
                 let relative = self.relative(&fields.twist[b]);
                 let virt = &fields.virtual_twist[b];
                 let rate = pose_force[b] + cross_force(&current, &momenta[b]);
-                *out.parameters.density_mut() += fields.turning[b].dot(&momenta[b]) + virt.dot(&rate);
+                *out.parameters.density_mut() +=
+                    fields.turning[b].dot(&momenta[b]) + virt.dot(&rate);
                 bar.turning[b] += rho * momenta[b];
                 bar.virtual_twist[b] += rho * rate;
                 bar.twist[b] += rho * (momenta_carried[b] + impulse[b]);

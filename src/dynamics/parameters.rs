@@ -444,6 +444,11 @@ impl Parameters {
             };
             (entry.declared.size)(*value, &typical)
         };
-        self.table.entries.iter().zip(&self.values).map(size).collect()
+        self.table
+            .entries
+            .iter()
+            .zip(&self.values)
+            .map(size)
+            .collect()
     }
 }

@@ -74,14 +74,18 @@ impl At {
 
 fn force(name: &str) -> &'static dyn Force {
     let mut all = system().forces.iter();
-    all.find(|f| f.name() == name).expect("the scene has every force").as_ref()
+    all.find(|f| f.name() == name)
+        .expect("the scene has every force")
+        .as_ref()
 }
 
 /// A six-vector for each body.
 fn field(phase: f64, size: f64) -> Vec<Vec6> {
     let n = system().len();
     let all = wavy(6 * n, phase, size);
-    (0..n).map(|b| all.fixed_rows::<6>(6 * b).into_owned()).collect()
+    (0..n)
+        .map(|b| all.fixed_rows::<6>(6 * b).into_owned())
+        .collect()
 }
 
 fn displaced(poses: &[Pose], by: &[Vec6], h: f64) -> Vec<Pose> {
@@ -117,7 +121,12 @@ fn jvp(name: &str, c: f64) -> Outcome {
     let value = |h: f64| {
         let twists = along(&at.twists, &dtwists, h);
         let v = &at.v + h * &dv;
-        row(&At { twists, v, ..at.clone() }.loads(force))
+        row(&At {
+            twists,
+            v,
+            ..at.clone()
+        }
+        .loads(force))
     };
     vector_along(value, &tangent)
 }
@@ -160,7 +169,10 @@ fn vjp(name: &str, c: f64) -> Outcome {
             slope: work(&pose, &dpose),
             value: Box::new(move |h| {
                 let poses = displaced(&at.poses, &dpose, h);
-                power(&At { poses, ..at.clone() })
+                power(&At {
+                    poses,
+                    ..at.clone()
+                })
             }),
         },
         Group {
@@ -168,7 +180,10 @@ fn vjp(name: &str, c: f64) -> Outcome {
             slope: work(&twist, &dtwist),
             value: Box::new(move |h| {
                 let twists = along(&at.twists, &dtwist, h);
-                power(&At { twists, ..at.clone() })
+                power(&At {
+                    twists,
+                    ..at.clone()
+                })
             }),
         },
         Group {
@@ -192,7 +207,10 @@ fn vjp(name: &str, c: f64) -> Outcome {
             slope: control.dot(&du),
             value: Box::new(move |h| {
                 let control = &at.control + h * &du;
-                power(&At { control, ..at.clone() })
+                power(&At {
+                    control,
+                    ..at.clone()
+                })
             }),
         },
     ];

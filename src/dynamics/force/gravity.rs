@@ -30,8 +30,7 @@ impl Force for Gravity {
     fn add(&self, at: &Moving, out: &mut Loads) {
         for (b, center) in self.centers.iter().enumerate() {
             let x = at.place.poses[b].apply(center);
-            out.wrenches[b] +=
-                point_wrench(&x, &(at.place.parameters.mass(b) * self.acceleration));
+            out.wrenches[b] += point_wrench(&x, &(at.place.parameters.mass(b) * self.acceleration));
         }
     }
 

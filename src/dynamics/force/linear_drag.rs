@@ -22,7 +22,11 @@ pub(super) fn assemble(parts: &Parts, parameters: &mut Declarations) -> Option<B
     let mut bodies = Vec::new();
     for (body, surface) in parts.surfaces.iter().enumerate() {
         let given = parts.scene.bodies[body].drag.unwrap_or_default();
-        let value = if surface.is_empty() { 0.0 } else { given.linear };
+        let value = if surface.is_empty() {
+            0.0
+        } else {
+            given.linear
+        };
         let coefficient = parameters.declare(Owner::Body(body), COEFFICIENT, value);
         // Also at zero coefficient: the derivative with respect to it isn't zero.
         if !surface.is_empty() {

@@ -5,7 +5,8 @@ use super::multibody::tree_displacement;
 use super::tools::{Group, all, groups, vector_along, wavy};
 use hydrograd::adjoint::check::{Outcome, Rung};
 use hydrograd::dynamics::{
-    Drive, Input, Integrator, Linearisation, Owner, Parameters, State, StateBar, StepBar, Stepper, System,
+    Drive, Input, Integrator, Linearisation, Owner, Parameters, State, StateBar, StepBar, Stepper,
+    System,
 };
 use hydrograd::scene::{Body, Drag, DragPart, Fluid, Joint, Motion, Plane, Scene, Shape};
 use hydrograd::{Settings, Simulator};

@@ -3,21 +3,21 @@
 //!
 //! The counters are the process's: one test, in a binary of its own.
 
-use hydrograd::adjoint::kernel::pairs_computed;
+use hydrograd::adjoint::count::PAIRS;
 use hydrograd::simulate::Backend;
-use hydrograd::solver::calls_made;
+use hydrograd::solver::CALLS;
 use hydrograd::{Controls, Fidelity, Scene, Settings, Simulator, objective};
 use std::path::Path;
 
 /// What a rollout with its gradient costs the CPU, after the set-up: pairs and calls of solvers.
 fn work(simulator: &Simulator) -> (u64, u64) {
-    let before = (pairs_computed(), calls_made());
+    let before = (PAIRS.total(), CALLS.total());
     let controls = Controls::zeros(simulator, 3);
     let rollout = simulator.rollout(&controls).unwrap();
     let goal = objective::final_coordinate(1, 0.7, 1.0);
     let gradient = rollout.gradient(&goal).unwrap();
     assert!(gradient.controls.norm() > 0.0);
-    (pairs_computed() - before.0, calls_made() - before.1)
+    (PAIRS.total() - before.0, CALLS.total() - before.1)
 }
 
 #[test]

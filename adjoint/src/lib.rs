@@ -2,12 +2,15 @@
 
 pub mod check;
 pub mod contact;
+#[doc(hidden)]
+pub mod count;
 pub mod drag;
 pub mod kernel;
 pub mod lie;
 mod registry;
 pub mod rigid;
 pub mod sample;
+pub mod solve;
 pub mod step;
 
 pub use registry::rungs;

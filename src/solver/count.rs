@@ -1,17 +1,12 @@
 //! How much was solved.
 
-use std::sync::atomic::{AtomicU64, Ordering};
+use crate::adjoint::count::Counter;
 
-static CALLS: AtomicU64 = AtomicU64::new(0);
+/// Calls of this module's solvers and products ([`cgls`](super::cgls), [`gmres`](super::gmres()),
+/// [`product`](super::product()) and its kin, [`Lu`](super::Lu)) in this process.
+pub static CALLS: Counter = Counter::new();
 
 /// Counts one call.
 pub(super) fn call() {
-    CALLS.fetch_add(1, Ordering::Relaxed);
-}
-
-/// Calls of this module's solvers and products ([`cgls`](super::cgls), [`gmres`](super::gmres()),
-/// [`product`](super::product()) and its kin, [`Lu`](super::Lu)) so far, in all threads of this process.
-/// What is solved elsewhere, on a GPU say, doesn't show here.
-pub fn calls_made() -> u64 {
-    CALLS.load(Ordering::Relaxed)
+    CALLS.add(1);
 }

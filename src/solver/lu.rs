@@ -1,18 +1,14 @@
 //! Dense LU with partial pivoting, in the memory of the matrix, parallel over fixed groups of columns.
 
-use super::{Columns, count, product, transposed_product};
+use super::{condition, count, largest_eigenvalue, product, transposed_product};
 use faer::dyn_stack::{MemBuffer, MemStack};
 use faer::linalg::lu::partial_pivoting::{factor, solve};
 use faer::linalg::matmul::matmul;
 use faer::linalg::triangular_solve::solve_unit_lower_triangular_in_place;
 use faer::perm::PermRef;
 use faer::{Accum, MatMut, MatRef, Par};
-use nalgebra::DMatrix;
 use rayon::prelude::*;
 
-/// Most and least steps of the iterations behind [`Lu::condition`].
-const STEPS: usize = 24;
-const LEAST: usize = 8;
 /// Columns factored at once, and columns of one task: the same whatever the number of threads.
 const BLOCK: usize = 192;
 
@@ -34,7 +30,7 @@ impl Lu {
         count::call();
         assert_eq!(data.len(), size * size, "a square matrix");
         // The memory of A by columns is that of Aᵀ by rows.
-        let largest = largest(size, |x| {
+        let largest = largest_eigenvalue(size, |x| {
             product(&data, size, &transposed_product(&data, size, x))
         });
         let permutation = factor(&mut data, size);
@@ -49,16 +45,13 @@ impl Lu {
             inverse,
             condition: f64::INFINITY,
         };
-        let reciprocal = self::largest(size, |x| {
+        let reciprocal = largest_eigenvalue(size, |x| {
             let mut y = x.clone();
             out.solve_transpose(y.as_mat_mut());
             out.solve(y.as_mat_mut());
             y
         });
-        let condition = (largest * reciprocal).sqrt();
-        if condition.is_finite() {
-            out.condition = condition;
-        }
+        out.condition = condition(largest, reciprocal);
         out
     }
 
@@ -156,54 +149,10 @@ fn factor(data: &mut [f64], n: usize) -> Vec<usize> {
     permutation
 }
 
-/// Largest eigenvalue of a symmetric positive operator, from below, by Lanczos with full
-/// orthogonalisation.
-fn largest(n: usize, apply: impl Fn(&Columns) -> Columns) -> f64 {
-    // A start without pattern, the same on each run: scrambled counters (Steele et al. 2014).
-    let mut w = Columns::from_fn(n, 1, |i, _| {
-        let mut z = (i as u64 + 1).wrapping_mul(0x9e37_79b9_7f4a_7c15);
-        z = (z ^ (z >> 30)).wrapping_mul(0xbf58_476d_1ce4_e5b9);
-        z = (z ^ (z >> 27)).wrapping_mul(0x94d0_49bb_1331_11eb);
-        (z >> 11) as f64 / (1u64 << 52) as f64 - 1.0
-    });
-    let length = |x: &Columns| x.dots(x)[0].sqrt();
-    let mut size = length(&w);
-    let mut basis: Vec<Columns> = Vec::new();
-    let (mut diagonal, mut beside): (Vec<f64>, Vec<f64>) = (Vec::new(), Vec::new());
-    let mut best = 0.0;
-    for step in 0..STEPS.min(n) {
-        w.data.iter_mut().for_each(|x| *x /= size);
-        basis.push(w);
-        w = apply(&basis[step]);
-        diagonal.push(w.dots(&basis[step])[0]);
-        // Twice is enough (Kahan and Parlett).
-        for v in basis.iter().chain(&basis) {
-            let product = w.dots(v)[0];
-            w.add_scaled(v, &[-product]);
-        }
-        size = length(&w);
-        if !(diagonal[step].is_finite() && size.is_finite()) {
-            return f64::INFINITY;
-        }
-        let tridiagonal = DMatrix::from_fn(step + 1, step + 1, |i, j| match i.abs_diff(j) {
-            0 => diagonal[i],
-            1 => beside[i.min(j)],
-            _ => 0.0,
-        });
-        let next = tridiagonal.symmetric_eigenvalues().max();
-        let settled = step >= LEAST && next - best <= 1e-4 * next;
-        best = next;
-        if settled || size <= f64::EPSILON * best {
-            break;
-        }
-        beside.push(size);
-    }
-    best
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::solver::Columns;
 
     fn matrix(n: usize) -> Vec<f64> {
         let entry = |i: usize, j: usize| {

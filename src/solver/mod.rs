@@ -1,19 +1,22 @@
 //! Iterative solvers with several right-hand sides at once.
 //!
 //! Arrays are row-major `[row][column]`, columns fastest. Every column has its own coefficients and stops on its own, so
-//! that a column's answer doesn't depend on its neighbours; sums run over fixed chunks, so that it
+//! that a column's solution doesn't depend on its neighbours; sums run over fixed chunks, so that it
 //! doesn't depend on the number of threads either.
 
 mod cgls;
 mod columns;
 mod count;
+mod eigenvalue;
 mod gmres;
 mod lu;
 mod product;
 
 pub use cgls::{Outcome, cgls};
 pub use columns::Columns;
-pub use count::calls_made;
+#[doc(hidden)]
+pub use count::CALLS;
+pub(crate) use eigenvalue::{condition, largest_eigenvalue};
 pub use gmres::gmres;
 pub use lu::Lu;
 pub use product::{normal_product, product, transposed_product};

@@ -32,7 +32,6 @@
 //! Results do not depend on the number of threads, to the last bit. They may differ in round-off
 //! between processors of different vector width.
 
-mod count;
 pub mod flux;
 mod lane;
 pub mod normal;
@@ -45,7 +44,6 @@ mod target;
 #[cfg(test)]
 mod tests;
 
-pub use count::pairs_computed;
 pub use flux::{
     flux, flux_fill, flux_gradient, flux_hessian_product, flux_hvp, flux_jvp, flux_vjp,
 };

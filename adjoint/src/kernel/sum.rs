@@ -8,9 +8,9 @@
 //! The division into tiles and tasks is fixed and every number is added up within one task in one
 //! order: results do not depend on the number of threads.
 
-use super::count;
 use super::lane::{Lane, Lanes, V3, dot};
 use super::source::{Sources, WIDTH};
+use crate::count::PAIRS;
 use crate::lie::Vec3;
 use pulp::{Arch, Simd, WithSimd};
 use rayon::prelude::*;
@@ -112,7 +112,7 @@ pub(super) fn transposed<const C: usize>(
         Sources::new(d)
     });
     let pairs = terms.len() * sources.len();
-    count::add(pairs);
+    PAIRS.add(pairs);
     parts(out, CHUNK * columns * C, pairs, |chunk, out| {
         dispatch(Transposed {
             terms,
@@ -250,7 +250,7 @@ pub(super) fn forward(
         }
     }
     let pairs = terms.len() * sources.len();
-    count::add(pairs);
+    PAIRS.add(pairs);
     parts(out, TILE * columns, pairs, |tile, out| {
         dispatch(Forward {
             terms,
@@ -373,7 +373,7 @@ pub(super) fn fill(
     );
     let end = out.len().min(targets * stride);
     let pairs = targets * sources.len();
-    count::add(pairs);
+    PAIRS.add(pairs);
     parts(&mut out[..end], tile * stride, pairs, task);
 }
 

@@ -1,5 +1,6 @@
 //! Thin QR factorisation of one body's flux matrix, deterministic and sequential.
 
+use crate::solver::{self, largest_eigenvalue};
 use faer::dyn_stack::{MemBuffer, MemStack};
 use faer::linalg::qr::no_pivoting::{factor, solve};
 use faer::linalg::triangular_solve;
@@ -112,7 +113,7 @@ pub(crate) fn solve_upper_transpose(r: MatRef<f64>, x: MatMut<f64>) {
     triangular_solve::solve_lower_triangular_in_place(r.transpose(), x, Par::Seq);
 }
 
-/// Condition number σmax/σmin of R D⁻¹, D its column norms, by power and inverse iteration.
+/// Condition number σmax/σmin of R D⁻¹, D its column norms.
 fn condition(r: MatRef<f64>) -> f64 {
     let n = r.ncols();
     let mut scaled = r.to_owned();
@@ -125,30 +126,18 @@ fn condition(r: MatRef<f64>) -> f64 {
             scaled[(i, j)] /= norm;
         }
     }
-    // A start with every frequency in it, the same on each run.
-    let start = || Mat::from_fn(n, 1, |i, _| (1.0 + 7.0 * i as f64).sin() + 0.3);
-    let (mut x, mut y) = (start(), start());
-    let (mut largest, mut inverse) = (0.0, 0.0);
-    for _ in 0..8 {
-        normalise(&mut x);
-        x = scaled.transpose() * (&scaled * &x);
-        largest = x.norm_l2().sqrt();
-        normalise(&mut y);
-        solve_upper_transpose(scaled.as_ref(), y.as_mut());
-        solve_upper(scaled.as_ref(), y.as_mut());
-        inverse = y.norm_l2().sqrt();
-    }
-    let condition = largest * inverse;
-    if condition.is_finite() {
-        condition
-    } else {
-        f64::INFINITY
-    }
-}
-
-fn normalise(x: &mut Mat<f64>) {
-    let norm = x.norm_l2();
-    for i in 0..x.nrows() {
-        x[(i, 0)] /= norm;
-    }
+    let scaled = scaled.as_ref();
+    let largest = largest_eigenvalue(n, |x| {
+        let mut out = x.clone();
+        let product = scaled.transpose() * (scaled * x.as_mat());
+        out.as_mat_mut().copy_from(product);
+        out
+    });
+    let inverse = largest_eigenvalue(n, |x| {
+        let mut out = x.clone();
+        solve_upper_transpose(scaled, out.as_mat_mut());
+        solve_upper(scaled, out.as_mat_mut());
+        out
+    });
+    solver::condition(largest, inverse)
 }

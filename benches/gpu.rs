@@ -144,12 +144,7 @@ fn scenes(budget: &Budget) -> hydrograd::Result<()> {
 /// Spheres in a cubic lattice, gaps of half a radius.
 fn lattice(count: usize) -> hydrograd::Result<(Arc<Model>, Vec<Pose>)> {
     let mesh = shape::build(&Shape::sphere(0.5), Path::new("."), Some(FACES))?;
-    let boundary = BodyBoundary::new(
-        "ball",
-        mesh.vertices(),
-        mesh.faces(),
-        &BodySettings::default(),
-    )?;
+    let boundary = BodyBoundary::new("ball", &mesh, &BodySettings::default())?;
     let body = Arc::new(MfsBody::new(Arc::new(boundary)));
     let settings = SolveSettings {
         tolerance: 1e-6,

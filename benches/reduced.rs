@@ -458,8 +458,7 @@ fn sphere(mesh: &hydrograd::TriMesh, rank: usize, gap: f64) -> hydrograd::Result
         tolerance: 1e-8,
         resolved_gap: Some(gap),
     };
-    let (v, f) = (mesh.vertices(), mesh.faces());
-    let body = compress::compress("sphere", v, f, &response, &settings)?;
+    let body = compress::compress("sphere", &mesh, &response, &settings)?;
     Ok(Arc::new(body))
 }
 

@@ -9,6 +9,7 @@ pub mod contact;
 pub mod coupling;
 pub mod dynamics;
 pub mod error;
+pub mod geometry;
 #[cfg(feature = "gpu")]
 pub mod gpu;
 pub mod multibody;
@@ -24,7 +25,7 @@ mod special;
 mod water;
 
 pub use error::{Error, Result};
+pub use geometry::{MassProperties, MeshReport, TriMesh};
 pub use hydrograd_adjoint as adjoint;
 pub use scene::{Body, BodyId, Fluid, Joint, Scene, Shape};
-pub use shape::{MassProperties, MeshReport, TriMesh};
 pub use simulate::{Controls, Fidelity, Gradient, Rollout, Settings, Simulator, objective};

@@ -3,8 +3,8 @@
 use crate::adjoint::lie::Pose;
 use crate::contact::{ContactPair, Contacts, Geometry};
 use crate::dynamics::{self, ContactModel, Integrator, Regularisation};
+use crate::geometry::Other;
 use crate::scene::{Body, Contact, Scene, Shape};
-use crate::shape::Other;
 use crate::water::{Fidelity, Prepared, Settings, Surface, pose};
 use crate::{Error, Result};
 use std::path::Path;
@@ -61,7 +61,7 @@ pub(super) fn assemble(p: Parts) -> Result<(ContactModel, dynamics::Contact)> {
         .filter(|(a, other)| !matches!(other, Other::Body(b) if neighbours(*a, *b)))
         .map(|&(first, second)| ContactPair { first, second })
         .collect();
-    let shapes = Contacts::new(shapes, &p.scene.walls, &pairs);
+    let shapes = Contacts::new(shapes, &p.scene.walls, &pairs)?;
     let moving = |b: &usize| !p.scene.is_static(*b);
     let bodies = || (0..p.scene.bodies.len()).filter(moving);
     let size = bodies()
@@ -110,9 +110,7 @@ pub(super) fn assemble(p: Parts) -> Result<(ContactModel, dynamics::Contact)> {
 fn geometry(body: &Body, shape: &Shape, surface: &Surface) -> Result<Geometry> {
     let made = match shape {
         // Already placed in its body.
-        Shape::Mesh { .. } | Shape::Triangles { .. } => {
-            Geometry::of_mesh(&surface.mesh, Pose::identity())
-        }
+        mesh if mesh.is_mesh() => Geometry::of_mesh(&surface.mesh, Pose::identity()),
         _ => Geometry::of_shape(shape, pose(&body.shape_at), Path::new("")),
     };
     made.map_err(|e| Error::Unsupported {
@@ -140,6 +138,5 @@ fn resolved(p: &Parts, pair: &ContactPair) -> f64 {
 /// Edge of the equilateral triangle of mean area. Refined regions don't count: contact may be elsewhere.
 fn mean_edge(surface: &Surface) -> f64 {
     let mesh = &surface.mesh;
-    let area: f64 = (0..mesh.faces().len()).map(|f| mesh.area(f)).sum();
-    (4.0 / 3.0_f64.sqrt() * area / surface.base as f64).sqrt()
+    (4.0 / 3.0_f64.sqrt() * mesh.surface_area() / surface.base as f64).sqrt()
 }

@@ -6,19 +6,17 @@
 //! spheres and ellipsoids by formula; [`Response`] is what any method must answer for a body to be
 //! compressed.
 
+mod asymmetry;
 pub mod exact;
 pub mod mfs;
 pub mod panel;
 mod response;
-mod surface;
 
 pub use exact::ExactBoundary;
 pub use mfs::{BodyBoundary, Depth, Method, Readout, RowScaling, Settings, depth, readout};
 pub(crate) use mfs::{solve_upper, solve_upper_transpose};
 pub use panel::PanelBoundary;
 pub use response::Response;
-pub use surface::Faces;
-pub(crate) use surface::Surface;
 
 /// The method by which a body's own answer to the water is computed, where the fidelity leaves a
 /// choice.

@@ -57,7 +57,7 @@ mod report {
 
     use serde::Serialize;
 
-    use crate::shape::MeshReport;
+    use crate::geometry::MeshReport;
     use crate::shape::file::Repairs;
 
     /// What was found in a mesh file.

@@ -2,9 +2,8 @@
 
 use super::geometry::{ContactPoint, Geometry, against_wall, between};
 use crate::Result;
-use crate::adjoint::lie::{Pose, Vec3};
-use crate::scene::Wall;
-use crate::shape::Other;
+use crate::adjoint::lie::Pose;
+use crate::geometry::{HalfSpace, Other, Wall};
 
 /// Two surfaces that may touch.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -29,8 +28,7 @@ impl ContactPair {
 #[derive(Clone, Debug)]
 pub struct Contacts {
     shapes: Vec<Option<Geometry>>,
-    /// Point and unit normal.
-    walls: Vec<(Vec3, Vec3)>,
+    walls: Vec<HalfSpace>,
     pairs: Vec<ContactPair>,
 }
 
@@ -39,15 +37,21 @@ const AHEAD: f64 = 0.5;
 
 impl Contacts {
     /// From the bodies' shapes (none for a body without surface) and the walls; pairs of which one has no surface are dropped.
-    pub fn new(shapes: Vec<Option<Geometry>>, walls: &[Wall], pairs: &[ContactPair]) -> Self {
+    ///
+    /// # Errors
+    /// A wall without a normal.
+    pub fn new(
+        shapes: Vec<Option<Geometry>>,
+        walls: &[Wall],
+        pairs: &[ContactPair],
+    ) -> Result<Self> {
         let solid = |b: usize| shapes[b].is_some();
         let whole = |p: &ContactPair| solid(p.first) && p.second_body().is_none_or(solid);
-        let plane = |w: &Wall| (Vec3::from(w.point), Vec3::from(w.normal).normalize());
-        Self {
+        Ok(Self {
             pairs: pairs.iter().copied().filter(whole).collect(),
-            walls: walls.iter().map(plane).collect(),
+            walls: Wall::half_spaces(walls)?,
             shapes,
-        }
+        })
     }
 
     /// The pairs that may touch.
@@ -74,8 +78,7 @@ impl Contacts {
         match pair.second {
             Other::Wall(w) => {
                 let reach = distance + AHEAD * first.radius();
-                let (point, normal) = &self.walls[w];
-                against_wall(first, point, normal, &poses[a], reach)
+                against_wall(first, &self.walls[w], &poses[a], reach)
             }
             Other::Body(b) => {
                 let Some(second) = &self.shapes[b] else {

@@ -18,7 +18,6 @@
 
 mod exclude;
 pub mod full;
-pub mod image;
 mod isolated;
 mod pair;
 pub mod panel;

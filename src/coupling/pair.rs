@@ -1,8 +1,8 @@
 //! A body and the points of another body's image, whose relative placement changes.
 
-use super::image::Image;
 use crate::adjoint::kernel::Sources;
 use crate::adjoint::lie::{Pose, Vec3, Vec6, angular, cross_force, linear, six};
+use crate::geometry::Image;
 
 /// One pair at given poses.
 pub(super) struct Pair {

@@ -11,8 +11,8 @@ use super::place::place_points;
 use super::share::shapes;
 use crate::Result;
 use crate::adjoint::lie::{Pose, Vec3, Vec6, angular, linear};
-use crate::coupling::image::Image;
 use crate::coupling::reduced::{Reduced, ReducedBody};
+use crate::geometry::Image;
 use std::sync::Arc;
 
 /// Points of one block of sources.

@@ -11,8 +11,6 @@
 //! # Ok::<(), hydrograd::Error>(())
 //! ```
 
-use std::path::PathBuf;
-
 use super::{
     Body, Drag, Fluid, Initial, Joint, Motion, Placement, Preset, Refinement, Scene, Shape, Wall,
 };
@@ -264,107 +262,5 @@ impl Body {
     pub fn drag(mut self, drag: Drag) -> Self {
         self.drag = Some(drag);
         self
-    }
-}
-
-impl Shape {
-    /// A sphere of this radius, m.
-    pub fn sphere(radius: f64) -> Self {
-        Self::Sphere {
-            radius,
-            faces: None,
-        }
-    }
-
-    /// An ellipsoid with these semi-axes along x, y, z, m.
-    pub fn ellipsoid(semi_axes: [f64; 3]) -> Self {
-        Self::Ellipsoid {
-            semi_axes,
-            faces: None,
-        }
-    }
-
-    /// A box with these edge lengths along x, y, z, m.
-    pub fn cuboid(size: [f64; 3]) -> Self {
-        Self::Box { size, faces: None }
-    }
-
-    /// A cylinder along z: radius and length, m.
-    pub fn cylinder(radius: f64, length: f64) -> Self {
-        Self::Cylinder {
-            radius,
-            length,
-            faces: None,
-        }
-    }
-
-    /// A capsule along z: radius, and length of its cylindrical part, m.
-    pub fn capsule(radius: f64, length: f64) -> Self {
-        Self::Capsule {
-            radius,
-            length,
-            faces: None,
-        }
-    }
-
-    /// A prism along x, centred at x = 0: corners (y, z) of its convex profile and its length, m.
-    pub fn prism(profile: impl Into<Vec<[f64; 2]>>, length: f64) -> Self {
-        Self::Prism {
-            profile: profile.into(),
-            length,
-            faces: None,
-        }
-    }
-
-    /// A closed triangle mesh in an OBJ, STL or PLY file, in metres.
-    pub fn mesh(path: impl Into<PathBuf>) -> Self {
-        Self::Mesh {
-            path: path.into(),
-            scale: 1.0,
-        }
-    }
-
-    /// A closed triangle mesh: vertices, m, and faces as triples of their numbers, counted from 0, counter-clockwise seen
-    /// from outside.
-    pub fn triangles(
-        vertices: impl Into<Vec<[f64; 3]>>,
-        faces: impl Into<Vec<[usize; 3]>>,
-    ) -> Self {
-        Self::Triangles {
-            vertices: vertices.into(),
-            faces: faces.into(),
-        }
-    }
-
-    /// With this target number of faces; a mesh stays as it is.
-    pub fn faces(mut self, faces: usize) -> Self {
-        self.set_faces(faces);
-        self
-    }
-
-    /// The shape's name in a scene file.
-    pub fn kind(&self) -> &'static str {
-        match self {
-            Self::Sphere { .. } => "sphere",
-            Self::Ellipsoid { .. } => "ellipsoid",
-            Self::Box { .. } => "box",
-            Self::Cylinder { .. } => "cylinder",
-            Self::Capsule { .. } => "capsule",
-            Self::Prism { .. } => "prism",
-            Self::Mesh { .. } => "mesh",
-            Self::Triangles { .. } => "triangles",
-        }
-    }
-
-    fn set_faces(&mut self, target: usize) {
-        match self {
-            Self::Sphere { faces, .. }
-            | Self::Ellipsoid { faces, .. }
-            | Self::Box { faces, .. }
-            | Self::Cylinder { faces, .. }
-            | Self::Capsule { faces, .. }
-            | Self::Prism { faces, .. } => *faces = Some(target),
-            Self::Mesh { .. } | Self::Triangles { .. } => {}
-        }
     }
 }

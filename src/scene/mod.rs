@@ -10,6 +10,8 @@ mod joint;
 mod motion;
 mod validate;
 
+pub use crate::geometry::{Refinement, Wall, WallSurface};
+pub use crate::shape::Shape;
 pub use build::BodyId;
 pub use contact::Contact;
 
@@ -70,42 +72,6 @@ pub struct Fluid {
     /// Uniform steady current, m/s, world frame; must be parallel to the walls.
     #[serde(default, skip_serializing_if = "is_default")]
     pub current: [f64; 3],
-}
-
-/// A plane that bounds the water.
-#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
-#[serde(deny_unknown_fields)]
-pub struct Wall {
-    /// A point of the plane, m.
-    pub point: [f64; 3],
-    /// Normal into the fluid; need not be of unit length.
-    pub normal: [f64; 3],
-    /// What the plane is.
-    #[serde(default, skip_serializing_if = "is_default")]
-    pub surface: WallSurface,
-}
-
-impl Wall {
-    /// A rigid wall through `point` (m) with the normal into the fluid.
-    pub const fn rigid(point: [f64; 3], normal: [f64; 3]) -> Self {
-        Self {
-            point,
-            normal,
-            surface: WallSurface::Rigid,
-        }
-    }
-}
-
-/// What a plane does to the flow.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
-#[serde(rename_all = "kebab-case")]
-pub enum WallSurface {
-    /// No flow through it: images of the same sign.
-    #[default]
-    Rigid,
-    /// Potential zero: a flat free surface in the limit of fast motion, without waves; images of the
-    /// opposite sign. With the fidelity `reduced` only.
-    Free,
 }
 
 /// A rigid placement: rotation first, then translation.
@@ -194,101 +160,8 @@ pub struct Body {
     pub drag: Option<Drag>,
 }
 
-/// A ball in which a body's faces are made smaller. Faces that touch it are split at their longest edges until
-/// none is longer than `edge`; around it they grow from ring to ring. New vertices lie on the shape
-/// itself, also where that is curved.
-#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
-#[serde(deny_unknown_fields)]
-pub struct Refinement {
-    /// Its centre, m, in the body's frame.
-    pub center: [f64; 3],
-    /// Its radius, m.
-    pub radius: f64,
-    /// Longest edge inside, m: a gap is resolved from about twice its width on.
-    pub edge: f64,
-}
-
-/// A closed surface, by formula or from a file.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
-#[serde(tag = "kind", rename_all = "kebab-case", deny_unknown_fields)]
-pub enum Shape {
-    /// Sphere, a subdivided icosahedron.
-    Sphere {
-        /// Radius, m.
-        radius: f64,
-        /// Target number of faces; the nearest that the subdivision allows is taken.
-        #[serde(default, skip_serializing_if = "Option::is_none")]
-        faces: Option<usize>,
-    },
-    /// Ellipsoid along the axes, a stretched subdivided icosahedron.
-    Ellipsoid {
-        /// Semi-axes, m.
-        semi_axes: [f64; 3],
-        /// Target number of faces.
-        #[serde(default, skip_serializing_if = "Option::is_none")]
-        faces: Option<usize>,
-    },
-    /// Box along the axes.
-    Box {
-        /// Edge lengths, m.
-        size: [f64; 3],
-        /// Target number of faces.
-        #[serde(default, skip_serializing_if = "Option::is_none")]
-        faces: Option<usize>,
-    },
-    /// Cylinder along z.
-    Cylinder {
-        /// Radius, m.
-        radius: f64,
-        /// Length along z, m.
-        length: f64,
-        /// Target number of faces.
-        #[serde(default, skip_serializing_if = "Option::is_none")]
-        faces: Option<usize>,
-    },
-    /// Capsule along z: a cylinder with hemispherical ends.
-    Capsule {
-        /// Radius, m.
-        radius: f64,
-        /// Length of the cylindrical part along z, m.
-        length: f64,
-        /// Target number of faces.
-        #[serde(default, skip_serializing_if = "Option::is_none")]
-        faces: Option<usize>,
-    },
-    /// Prism along x: a convex profile in the y-z plane, extruded.
-    Prism {
-        /// Corners of the profile, (y, z), m, in either order around it; must be convex.
-        profile: Vec<[f64; 2]>,
-        /// Length along x, m; the prism reaches from −length/2 to length/2.
-        length: f64,
-        /// Target number of faces.
-        #[serde(default, skip_serializing_if = "Option::is_none")]
-        faces: Option<usize>,
-    },
-    /// A closed triangle mesh in a file (OBJ, STL, PLY).
-    Mesh {
-        /// The file; relative to the scene file.
-        path: std::path::PathBuf,
-        /// Factor from file units to metres.
-        #[serde(default = "one")]
-        scale: f64,
-    },
-    /// A closed triangle mesh given number by number.
-    Triangles {
-        /// Vertices, m.
-        vertices: Vec<[f64; 3]>,
-        /// Vertex numbers of each face, counted from 0, counter-clockwise seen from outside.
-        faces: Vec<[usize; 3]>,
-    },
-}
-
 fn is_default<T: Default + PartialEq>(value: &T) -> bool {
     *value == T::default()
-}
-
-fn one() -> f64 {
-    1.0
 }
 
 /// How a body moves against its parent (coordinates q, generalised velocity v).

@@ -1,84 +1,17 @@
-//! Volume, area, centroid and inertia of the volume inside a closed mesh, in closed form, and of shapes by
-//! formula.
-//!
-//! The volume is the sum of signed tetrahedra from a reference point to the faces, so any closed
-//! mesh is right, convex or not. For a tetrahedron with one corner at the reference and the others
-//! at a, b, c, with det = a · (b × c) and s = a + b + c,
-//!
-//! ∫ dV = det/6,  ∫ x dV = det/24 s,  ∫ x xᵀ dV = det/120 (a aᵀ + b bᵀ + c cᵀ + s sᵀ).
-//!
-//! # References
-//! F. Tonon, "Explicit exact formulas for the 3-D tetrahedron inertia tensor in terms of its
-//! vertex coordinates", J. Math. Stat. 1 (2005) 8–11.
+//! Mass properties of shapes by formula.
 
-use super::mesh::{TriMesh, area_vector, bounds};
-use super::primitive::{build, shape_name, validate};
+use super::build::build;
+use super::description::Shape;
+use super::text::shape_name;
+use super::validate::validate;
 use crate::error::Result;
-use crate::scene::Shape;
+use crate::geometry::MassProperties;
 use crate::special::r_d;
-use hydrograd_adjoint::lie::{Mat3, Pose, Vec3};
+use hydrograd_adjoint::lie::{Mat3, Vec3};
 use std::f64::consts::PI;
 use std::path::Path;
 
-/// What a body filled evenly at unit density has.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct MassProperties {
-    /// Volume, m³.
-    pub volume: f64,
-    /// Area of the surface, m².
-    pub area: f64,
-    /// Centroid of the volume, m, frame of the shape.
-    pub centroid: Vec3,
-    /// Inertia about the centroid per unit density, axes of the shape, m⁵: kg m² after
-    /// multiplication with kg/m³.
-    pub inertia: Mat3,
-}
-
 impl MassProperties {
-    /// Of the volume inside `mesh`. Without an inside (an open or flat mesh) the numbers mean
-    /// nothing, and centroid and inertia can be NaN.
-    pub fn of(mesh: &TriMesh) -> Self {
-        // About the middle of the bounding box: far from the origin, differences of large
-        // numbers would eat the digits.
-        let [low, high] = mesh.bounds();
-        let reference = low + (high - low) * 0.5;
-        let mut area = 0.0;
-        let mut volume = 0.0;
-        let mut first = Vec3::zeros();
-        let mut second = Mat3::zeros();
-        for f in 0..mesh.faces().len() {
-            let corners = mesh.corners(f).map(|x| x - reference);
-            area += area_vector(&corners).norm();
-            let [a, b, c] = corners;
-            let det = a.dot(&b.cross(&c));
-            let s = a + b + c;
-            volume += det;
-            first += det * s;
-            second += det
-                * (a * a.transpose() + b * b.transpose() + c * c.transpose() + s * s.transpose());
-        }
-        volume /= 6.0;
-        let offset = first / (24.0 * volume);
-        let moments = second / 120.0 - volume * offset * offset.transpose();
-        Self {
-            volume,
-            area,
-            centroid: reference + offset,
-            inertia: Mat3::identity() * moments.trace() - moments,
-        }
-    }
-}
-
-impl MassProperties {
-    /// The same of the body placed at `pose`.
-    pub fn transformed(&self, pose: &Pose) -> Self {
-        Self {
-            centroid: pose.apply(&self.centroid),
-            inertia: pose.rotation * self.inertia * pose.rotation.transpose(),
-            ..*self
-        }
-    }
-
     /// Of a shape by formula, m, in the shape's frame: what finer and finer meshes of it tend to. None
     /// for a mesh.
     ///
@@ -146,17 +79,4 @@ fn ellipsoid(semi_axes: [f64; 3]) -> (f64, f64, [f64; 3]) {
     let mean = x * (y + z) * r_d(y, z, x) + y * (z + x) * r_d(z, x, y) + z * (x + y) * r_d(x, y, z);
     let area = 4.0 * PI * scale * scale * mean / 6.0;
     (volume, area, semi_axes.map(|l| volume * l * l / 5.0))
-}
-
-/// Signed volume inside some faces, m³, about the middle of their own bounding box.
-pub(super) fn signed_volume(corners: &[[Vec3; 3]]) -> f64 {
-    let [low, high] = bounds(corners.iter().flatten());
-    let reference = low + (high - low) * 0.5;
-    corners
-        .iter()
-        .map(|t| {
-            let [a, b, c] = t.map(|x| x - reference);
-            a.dot(&b.cross(&c)) / 6.0
-        })
-        .sum()
 }

@@ -1,25 +1,26 @@
-//! Surfaces: closed triangle meshes, their mass properties, their check, formulas and files.
+//! Shapes: what a user writes of a body's surface, and the closed triangle mesh that it becomes.
 //!
-//! A [`TriMesh`] bounds a volume: every edge has two faces, corners run counter-clockwise seen
-//! from the water, so that normals point into the water. Lengths are in metres, in the frame of
-//! the shape. [`TriMesh::new`] refuses anything else; [`check()`] says what is wrong, where, and what
-//! to do about it.
+//! A [`Shape`] is given by formula or as a mesh, number by number or in a file. [`build()`] makes its
+//! [`TriMesh`]. Lengths are in metres, in the frame of the shape.
 
-pub mod check;
+mod build;
+mod description;
 #[cfg(feature = "meshio")]
 pub mod file;
-pub mod gap;
+mod limits;
 mod mass;
-mod mesh;
-pub mod primitive;
+mod primitive;
 mod refine;
-mod remesh;
-mod topology;
-mod weld;
+mod text;
+mod validate;
 
-pub use check::{Finding, Kind, MeshReport, Severity, check, check_parts};
-pub use gap::{Distance, Gap, Gaps, Other};
-pub use mass::MassProperties;
-pub use mesh::{Edge, TriMesh};
-pub use primitive::{DEFAULT_FACES, MAX_FACES, build, parse_shape, shape_name, validate};
-pub use refine::{MAX_ADDED_FACES, refine, validate_refinements};
+pub use crate::geometry::{
+    Distance, Edge, Finding, Gap, Gaps, Kind, MAX_ADDED_FACES, MassProperties, MeshReport, Other,
+    Severity, TriMesh, check_parts, validate_refinements,
+};
+pub use build::build;
+pub use description::Shape;
+pub use limits::{DEFAULT_FACES, MAX_FACES};
+pub use refine::refine;
+pub use text::{parse_shape, shape_name};
+pub use validate::validate;

@@ -2,7 +2,7 @@
 
 use super::{Rollout, Sample, Simulator};
 use crate::adjoint::lie::{Pose, Vec3, six};
-use crate::shape::Other;
+use crate::geometry::Other;
 use crate::{Error, Result};
 use nalgebra::DVector;
 

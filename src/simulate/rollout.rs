@@ -6,7 +6,7 @@ use crate::adjoint::lie::{Pose, Vec3, Vec6};
 use crate::adjoint::step::{self, Path};
 use crate::coupling::Report;
 use crate::dynamics::{ContactForce, Drive, Memo, State, StepBar, contact_velocity};
-use crate::shape::Gap;
+use crate::geometry::Gap;
 use crate::{Error, Result};
 use nalgebra::{DMatrix, DVector};
 use serde::Serialize;

@@ -6,7 +6,7 @@ use crate::adjoint::step::Step;
 use crate::dynamics::{
     Evaluation, Input, Linearisation, Parameters, State, StateBar, StepBar, Stepper,
 };
-use crate::shape::Gap;
+use crate::geometry::Gap;
 use crate::water::Clearance;
 use crate::{Error, Result};
 use nalgebra::{DMatrix, DVector};

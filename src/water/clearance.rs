@@ -4,10 +4,9 @@ use super::Fidelity;
 use super::surface::Surface;
 use crate::adjoint::lie::Pose;
 use crate::error::readable;
+use crate::geometry::{Gap, Gaps, Other, Share, overlap_error};
 use crate::multibody::Tree;
 use crate::scene::Scene;
-use crate::shape::gap::{Share, overlap_error};
-use crate::shape::{Gap, Gaps, Other};
 use crate::{Error, Result};
 
 /// Gaps narrower than this many edges aren't resolved. A sphere near a wall: at 0.3 edges the gap
@@ -59,7 +58,7 @@ impl Clearance {
             for b in a + 1..bodies {
                 let pair = (a, b);
                 if declared.contains(&pair) {
-                    shares.extend(Share::new(&meshes, pair)?);
+                    shares.extend(Share::new(&meshes, pair));
                 } else if of[a] == of[b] {
                     rigid.push(pair);
                 } else {

@@ -7,12 +7,11 @@
 //! starts with.
 
 use super::Fidelity;
-use super::submerged::{Plan, SubmergedBody, area, centre};
+use super::submerged::{Plan, SubmergedBody};
 use crate::adjoint::lie::{Pose, Vec3};
 use crate::boundary::exact::lamb;
 use crate::coupling::reduced::{Cutoff, compress};
-use crate::scene::{Wall, WallSurface};
-use crate::shape::{Gap, MassProperties, Other};
+use crate::geometry::{Gap, MassProperties, Other, Wall, WallSurface};
 use crate::{Error, Result};
 use std::f64::consts::PI;
 
@@ -72,7 +71,10 @@ pub(crate) fn plan(
             });
         };
         let properties = mesh.mass_properties();
-        strengths.push((strength(&properties)?, poses[b].apply(&centre(mesh))));
+        strengths.push((
+            strength(&properties)?,
+            poses[b].apply(&mesh.bounding_ball().center),
+        ));
         let near = |g: &&Gap| g.first == b || g.second == Other::Body(b);
         let seen = |g: &Gap| match g.second {
             Other::Body(_) => g.distance,
@@ -84,7 +86,7 @@ pub(crate) fn plan(
             .map(|g| (seen(g), g.edge))
             .min_by(|a, b| a.0.total_cmp(&b.0))
             .unwrap_or((f64::INFINITY, 0.0));
-        let finest = compress::finest_gap(area(mesh));
+        let finest = compress::finest_gap(mesh.surface_area());
         let rigid = walls.iter().all(|w| w.surface == WallSurface::Rigid);
         if smallest < HOPELESS * finest && rigid {
             let full = smallest > EDGES * edge || smallest < REFUSED * finest;
@@ -100,7 +102,7 @@ pub(crate) fn plan(
                 body.name
             ));
         }
-        let coarsest = COARSEST * compress::default_gap(properties.volume, area(mesh));
+        let coarsest = COARSEST * compress::default_gap(properties.volume, mesh.surface_area());
         let gap = (ROOM * smallest).clamp(finest, coarsest);
         out.plan.compress.push(compress::Settings {
             rank: None,

@@ -11,8 +11,9 @@ use crate::coupling::full::{MfsBody, Model, Solver};
 use crate::coupling::panel::{self, PanelCoupled};
 use crate::coupling::reduced::{Cutoff, Reduced, ReducedBody, cache, compress};
 use crate::coupling::{Coupling, Exclusions, Isolated};
+use crate::geometry::TriMesh;
 use crate::scene::{Shape, Wall};
-use crate::shape::{self, TriMesh};
+use crate::shape;
 use crate::{Error, Result};
 use serde::Serialize;
 use std::borrow::Cow;
@@ -115,21 +116,19 @@ impl<'a> SubmergedBody<'a> {
         gap: f64,
     ) -> Result<Box<dyn Response>> {
         let mesh = self.surface("reduced")?;
-        let (vertices, faces) = (mesh.vertices(), mesh.faces());
         Ok(match (method, &self.ellipsoid) {
             (OneBody::Exact, Some((axes, pose))) => {
                 Box::new(ExactBoundary::new(self.name, *axes, pose, gap)?)
             }
             (OneBody::Mfs, _) => {
                 let b = &settings.boundary;
-                Box::new(BodyBoundary::new(self.name, vertices, faces, b)?)
+                Box::new(BodyBoundary::new(self.name, mesh, b)?)
             }
             _ => {
-                let fine = PanelBoundary::new(self.name, vertices, faces)?;
+                let fine = PanelBoundary::new(self.name, mesh)?;
                 match self.coarse {
                     Some(Coarse { mesh, ratio }) => {
-                        let (vertices, faces) = (mesh.vertices(), mesh.faces());
-                        let coarse = PanelBoundary::new(self.name, vertices, faces)?;
+                        let coarse = PanelBoundary::new(self.name, mesh)?;
                         Box::new(Extrapolated::new(fine, coarse, *ratio)?)
                     }
                     None => Box::new(fine),
@@ -263,7 +262,7 @@ fn own(body: &SubmergedBody, settings: &Settings) -> Result<Own> {
         _ => body.surface("isolated")?.faces().len(),
     };
     // Nothing is near: the flow around it isn't asked for.
-    let far = body.mesh.map_or(1.0, |m| area(m).sqrt());
+    let far = body.mesh.map_or(1.0, |m| m.surface_area().sqrt());
     let response = body.response(method, settings, far)?;
     Ok(Own {
         added_mass: response.added_mass(),
@@ -335,15 +334,12 @@ fn full(
         boundary.damping = 0.0;
     }
     let made = shared(bodies, |body, mesh| {
-        let (vertices, faces) = (mesh.vertices(), mesh.faces());
-        let make = if device.factors(faces.len()) {
+        let make = if device.factors(mesh.faces().len()) {
             BodyBoundary::new
         } else {
             BodyBoundary::unfactored
         };
-        Ok(MfsBody::new(Arc::new(make(
-            body.name, vertices, faces, &boundary,
-        )?)))
+        Ok(MfsBody::new(Arc::new(make(body.name, mesh, &boundary)?)))
     })?;
     Ok(Made {
         faces: made.iter().map(|m| m.faces()).sum(),
@@ -370,9 +366,7 @@ fn full(
 }
 
 fn panels(bodies: &[SubmergedBody], water: &Water, settings: &Settings) -> Result<Made> {
-    let made = shared(bodies, |body, mesh| {
-        PanelBoundary::new(body.name, mesh.vertices(), mesh.faces())
-    })?;
+    let made = shared(bodies, |body, mesh| PanelBoundary::new(body.name, mesh))?;
     let solve = panel::SolveSettings {
         solver: settings.panel,
         tolerance: settings.solve.tolerance,
@@ -572,9 +566,7 @@ fn compressed(
 ) -> Result<Arc<ReducedBody>> {
     chosen.validate()?;
     let mesh = layout(body, method)?;
-    let middle = centre(&mesh);
-    let far = |r: f64, v: &Vec3| r.max((v - middle).norm());
-    let size = mesh.vertices().iter().fold(0.0, far);
+    let size = mesh.bounding_ball().radius;
     let round = |x: f64| (x / size * GRID).round() / GRID;
     let vertices: Vec<Vec3> = mesh.vertices().iter().map(|v| v.map(round)).collect();
     let unit = TriMesh::new(mesh.name(), vertices, mesh.faces().to_vec())?;
@@ -590,13 +582,12 @@ fn compressed(
         (axes.map(round), at)
     });
     let gap = chosen.resolved_gap.map(round);
-    let chosen =
-        compress::Settings {
-            resolved_gap: Some(gap.unwrap_or_else(|| {
-                compress::default_gap(unit.mass_properties().volume, area(&unit))
-            })),
-            ..*chosen
-        };
+    let chosen = compress::Settings {
+        resolved_gap: Some(gap.unwrap_or_else(|| {
+            compress::default_gap(unit.mass_properties().volume, unit.surface_area())
+        })),
+        ..*chosen
+    };
     let formula = ellipsoid.map(|(axes, pose)| {
         let turn: Vec<f64> = pose.rotation.iter().copied().collect();
         (axes, turn, <[f64; 3]>::from(pose.translation))
@@ -608,7 +599,7 @@ fn compressed(
         fundamental,
         coarse.as_ref().map(|c| c.mesh.faces().len()),
     );
-    let key = cache::Key::new(unit.vertices(), unit.faces(), &made_from, &chosen);
+    let key = cache::Key::new(&unit, &made_from, &chosen);
     let found = cache::fetch(key, folder, || {
         let own = SubmergedBody {
             name: body.name,
@@ -620,29 +611,10 @@ fn compressed(
         let gap = chosen
             .resolved_gap
             .unwrap_or(0.0)
-            .max(compress::finest_gap(area(&unit)));
+            .max(compress::finest_gap(unit.surface_area()));
         let response = own.response(method, settings, gap)?;
-        compress::compress(
-            body.name,
-            unit.vertices(),
-            unit.faces(),
-            response.as_ref(),
-            &chosen,
-        )
+        compress::compress(body.name, &unit, response.as_ref(), &chosen)
     });
     let found = found.map_err(|e| e.in_units_of(size))?;
     Ok(Arc::new(found.scaled(size)?))
-}
-
-/// Surface of a mesh, m².
-pub(crate) fn area(mesh: &TriMesh) -> f64 {
-    (0..mesh.faces().len()).map(|f| mesh.area(f)).sum()
-}
-
-/// Middle of the bounding box of a mesh.
-pub(crate) fn centre(mesh: &TriMesh) -> Vec3 {
-    let v = mesh.vertices();
-    let low = v.iter().fold(v[0], |m, v| m.inf(v));
-    let high = v.iter().fold(v[0], |m, v| m.sup(v));
-    0.5 * (low + high)
 }

@@ -4,8 +4,9 @@ use super::{Fidelity, Settings, submerged};
 use crate::Result;
 use crate::adjoint::lie::{Pose, Vec3, exp_matrix};
 use crate::boundary::OneBody;
-use crate::scene::{Body, Placement, Refinement, Scene, Shape};
-use crate::shape::{self, MassProperties, TriMesh};
+use crate::geometry::{MassProperties, TriMesh};
+use crate::scene::{Body, Placement, Refinement, Scene};
+use crate::shape;
 use std::path::Path;
 
 /// Where a placement is.
@@ -74,22 +75,21 @@ pub(crate) fn surface(
     let closed = settings.by_formula() && submerged::semi_axes(shape).is_some();
     let panels = settings.fidelity != Fidelity::Full
         && matches!(settings.one_body, OneBody::Auto | OneBody::Panel);
-    let coarse =
-        if panels && !closed && !matches!(shape, Shape::Mesh { .. } | Shape::Triangles { .. }) {
-            let quarter = (base / 4).max(12);
-            let coarse = even(Some(quarter))?;
-            let fewer = coarse.faces().len();
-            // As many bisections as in the fine mesh.
-            let ratio = (base as f64 / fewer as f64).sqrt();
-            let coarse = Coarse {
-                mesh: refined(&coarse, ratio * edges)?,
-                ratio: (!body.refine.is_empty()).then_some(ratio),
-            };
-            // Patterns allow only certain numbers.
-            Some(coarse).filter(|_| 2 * fewer <= base)
-        } else {
-            None
+    let coarse = if panels && !closed && !shape.is_mesh() {
+        let quarter = (base / 4).max(12);
+        let coarse = even(Some(quarter))?;
+        let fewer = coarse.faces().len();
+        // As many bisections as in the fine mesh.
+        let ratio = (base as f64 / fewer as f64).sqrt();
+        let coarse = Coarse {
+            mesh: refined(&coarse, ratio * edges)?,
+            ratio: (!body.refine.is_empty()).then_some(ratio),
         };
+        // Patterns allow only certain numbers.
+        Some(coarse).filter(|_| 2 * fewer <= base)
+    } else {
+        None
+    };
     // Where the water sees the shape itself and not a mesh of it, so do gravity and buoyancy.
     let formula = if closed || coarse.is_some() {
         MassProperties::by_formula(shape)?

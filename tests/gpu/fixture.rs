@@ -47,7 +47,7 @@ pub fn body(shape: &Shape, faces: usize, method: Method) -> Arc<MfsBody> {
         method,
         ..Settings::default()
     };
-    let b = BodyBoundary::new("b", mesh.vertices(), mesh.faces(), &settings).unwrap();
+    let b = BodyBoundary::new("b", &mesh, &settings).unwrap();
     Arc::new(MfsBody::new(Arc::new(b)))
 }
 

@@ -19,11 +19,10 @@ fn bodies(factored: [bool; 3]) -> Vec<Arc<MfsBody>> {
     };
     let of = |k: usize, shape: &Shape| {
         let mesh = shape::build(shape, Path::new("."), Some(80)).unwrap();
-        let (v, f) = (mesh.vertices(), mesh.faces());
         let made = if factored[k] {
-            BodyBoundary::new("b", v, f, &settings)
+            BodyBoundary::new("b", &mesh, &settings)
         } else {
-            BodyBoundary::unfactored("b", v, f, &settings)
+            BodyBoundary::unfactored("b", &mesh, &settings)
         };
         Arc::new(MfsBody::new(Arc::new(made.unwrap())))
     };
@@ -90,8 +89,7 @@ fn lattice(n: usize) -> Vec<Pose> {
 #[test]
 fn derivatives_of_many_pairs_go_in_batches() {
     let mesh = shape::build(&Shape::ellipsoid([0.5, 0.3, 0.4]), Path::new("."), Some(20)).unwrap();
-    let (v, f) = (mesh.vertices(), mesh.faces());
-    let boundary = BodyBoundary::new("b", v, f, &Settings::default()).unwrap();
+    let boundary = BodyBoundary::new("b", &mesh, &Settings::default()).unwrap();
     let body = Arc::new(MfsBody::new(Arc::new(boundary)));
     let poses = lattice(4);
     let settings = SolveSettings {

@@ -16,13 +16,12 @@ use std::sync::{Arc, OnceLock};
 
 fn compressed(shape: &Shape, rank: usize) -> Arc<ReducedBody> {
     let mesh = shape::build(shape, Path::new("."), Some(320)).unwrap();
-    let (v, f) = (mesh.vertices(), mesh.faces());
-    let b = BodyBoundary::new("b", v, f, &Settings::default()).unwrap();
+    let b = BodyBoundary::new("b", &mesh, &Settings::default()).unwrap();
     let settings = compress::Settings {
         rank: Some(rank),
         ..compress::Settings::default()
     };
-    Arc::new(compress::compress("b", v, f, &b, &settings).unwrap())
+    Arc::new(compress::compress("b", &mesh, &b, &settings).unwrap())
 }
 
 /// Two shapes, one of more points than a block.

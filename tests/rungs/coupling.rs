@@ -6,9 +6,9 @@ use hydrograd::adjoint::check::{Outcome, Rung};
 use hydrograd::adjoint::lie::{Mat6, Pose, Vec3, Vec6, cross_motion, exp_matrix};
 use hydrograd::boundary::{BodyBoundary, Method, Settings};
 use hydrograd::coupling::full::{Full, MfsBody, SolveSettings, Solver};
-use hydrograd::coupling::image::Image;
 use hydrograd::coupling::reduced::{Cutoff, Reduced, compress};
 use hydrograd::coupling::{Direction, Exclusions, Isolated, Linearise};
+use hydrograd::geometry::Image;
 use hydrograd::scene::{Shape, Wall, WallSurface};
 use hydrograd::shape;
 use nalgebra::{DMatrix, DVector};
@@ -22,7 +22,7 @@ pub fn rungs() -> Vec<Rung> {
         };
     }
     rungs![
-        "coupling::image::Image::twist_vjp" => image_twist,
+        "geometry::image::Image::twist_vjp" => image_twist,
         "coupling::isolated::IsolatedLinearised::gradient" => |c| zero_gradient(c, false),
         "coupling::isolated::IsolatedLinearised::gradient_along" => |c| zero_gradient(c, true),
         "coupling::isolated::IsolatedLinearised::vjp" => |c| vjp(&isolated(), c),
@@ -58,7 +58,7 @@ fn body(shape: Shape, method: Method, solver: Solver) -> Arc<MfsBody> {
     if solver == Solver::Gmres {
         settings.damping = 0.0;
     }
-    let b = BodyBoundary::new("b", mesh.vertices(), mesh.faces(), &settings).unwrap();
+    let b = BodyBoundary::new("b", &mesh, &settings).unwrap();
     Arc::new(MfsBody::new(Arc::new(b)))
 }
 
@@ -101,13 +101,12 @@ fn systems() -> Vec<Full> {
 fn reduced_systems() -> Vec<Reduced> {
     let compressed = |shape: Shape| {
         let mesh = shape::build(&shape, Path::new("."), Some(320)).unwrap();
-        let (v, f) = (mesh.vertices(), mesh.faces());
-        let b = BodyBoundary::new("b", v, f, &Settings::default()).unwrap();
+        let b = BodyBoundary::new("b", &mesh, &Settings::default()).unwrap();
         let settings = compress::Settings {
             rank: Some(20),
             ..compress::Settings::default()
         };
-        Arc::new(compress::compress("b", v, f, &b, &settings).unwrap())
+        Arc::new(compress::compress("b", &mesh, &b, &settings).unwrap())
     };
     let bodies = [
         compressed(Shape::sphere(0.4)),

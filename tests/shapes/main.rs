@@ -1,7 +1,8 @@
-//! Bodies' surfaces: primitives, prisms, files and refinement.
+//! Bodies' surfaces: primitives, prisms, files, refinement, and the gaps between them.
 
 #[cfg(feature = "meshio")]
 mod files;
+mod gaps;
 mod primitives;
 mod prisms;
 mod refine;

@@ -4,7 +4,7 @@ use crate::support;
 use hydrograd::adjoint::lie::{Pose, Vec3, exp_matrix};
 use hydrograd::scene::Shape;
 use hydrograd::shape::{
-    Kind, MassProperties, Severity, TriMesh, build, check, check_parts, parse_shape, shape_name,
+    Kind, MassProperties, Severity, TriMesh, build, check_parts, parse_shape, shape_name,
 };
 use std::collections::HashSet;
 use std::f64::consts::PI;
@@ -121,7 +121,7 @@ fn primitives_are_closed_and_outward_at_any_resolution() {
     for text in SHAPES {
         for target in [1, 4, 13, 20, 100, 321, 1280, 5000, 60_000] {
             let mesh = mesh(text, target);
-            let report = check(&mesh);
+            let report = mesh.check();
             assert!(report.is_ok(), "{report}");
             let nothing_odd = report.findings.iter().all(|f| f.kind == Kind::Aspect);
             assert!(nothing_odd, "{report}");
@@ -143,7 +143,7 @@ fn face_counts_are_near_the_target_and_faces_near_equilateral() {
         for target in [300, 1280, 5000, 20_000] {
             let mesh = mesh(text, target);
             let ratio = mesh.faces().len() as f64 / target as f64;
-            let aspect = check(&mesh).worst_aspect;
+            let aspect = mesh.check().worst_aspect;
             println!(
                 "{text} {target}: {} ({ratio:.3}), worst aspect {aspect:.2}",
                 mesh.faces().len()
@@ -570,7 +570,7 @@ fn warnings_do_not_refuse() {
     assert!(report.volume.unwrap() > 0.0);
     TriMesh::new("loose", v, f).unwrap();
 
-    let needle = check(&mesh("ellipsoid:1,0.01,0.01", 320));
+    let needle = mesh("ellipsoid:1,0.01,0.01", 320).check();
     assert_eq!(
         needle.find(Kind::Aspect).unwrap().severity,
         Severity::Warning
@@ -584,7 +584,7 @@ fn verdicts_do_not_depend_on_the_unit_of_length() {
         for text in SHAPES {
             let mesh = mesh(text, 320);
             let scaled = mesh.scaled(scale).unwrap();
-            let (one, other) = (check(&mesh), check(&scaled));
+            let (one, other) = (mesh.check(), scaled.check());
             assert_eq!(one.findings.len(), other.findings.len(), "{other}");
             assert!(other.is_ok());
             let ratio = other.volume.unwrap() / one.volume.unwrap() / scale.powi(3);
@@ -613,7 +613,7 @@ fn reports_are_written_for_people_and_for_programs() {
     assert_eq!(json["findings"][0]["kind"], "open-edge");
     assert_eq!(json["findings"][0]["severity"], "error");
     assert_eq!(json["volume"], serde_json::Value::Null);
-    let good = check(&mesh("sphere:1", 1280));
+    let good = mesh("sphere:1", 1280).check();
     assert!(good.to_string().contains("ok: closed"), "{good}");
     assert!(
         serde_json::to_value(&good).unwrap()["volume"]
@@ -676,7 +676,7 @@ fn bad_parameters_name_field_value_and_remedy() {
 
 #[test]
 fn an_index_out_of_range_is_refused_before_it_is_used() {
-    let error = TriMesh::unchecked("few", vec![Vec3::zeros(); 2], vec![[0, 1, 2]]).unwrap_err();
+    let error = TriMesh::new("few", vec![Vec3::zeros(); 2], vec![[0, 1, 2]]).unwrap_err();
     let text = error.to_string();
     assert!(
         text.contains("face 0") && text.contains("[0, 1, 2]"),

@@ -3,7 +3,7 @@
 use crate::support;
 use hydrograd::adjoint::lie::Vec3;
 use hydrograd::scene::Shape;
-use hydrograd::shape::{Kind, TriMesh, build, check, parse_shape, shape_name};
+use hydrograd::shape::{Kind, TriMesh, build, parse_shape, shape_name};
 use std::collections::HashSet;
 use std::path::Path;
 
@@ -66,7 +66,7 @@ fn prisms_are_closed_and_symmetric_at_any_resolution() {
     for text in PRISMS {
         for target in [1, 4, 13, 20, 100, 321, 1280, 5000, 20_000] {
             let mesh = mesh(text, target);
-            let report = check(&mesh);
+            let report = mesh.check();
             assert!(report.is_ok(), "{report}");
             let nothing_odd = report.findings.iter().all(|f| f.kind == Kind::Aspect);
             assert!(nothing_odd, "{report}");
@@ -100,7 +100,7 @@ fn prisms_have_even_faces_and_nearly_as_many_as_asked() {
         let mut uneven = [1.0_f64, 1.0];
         while target < 10_000.0 {
             let mesh = mesh(text, target as usize);
-            let (aspect, count) = (check(&mesh).worst_aspect, mesh.faces().len() as f64);
+            let (aspect, count) = (mesh.check().worst_aspect, mesh.faces().len() as f64);
             // A plate a tenth as thick has cells across it that few faces can't make even.
             let allowed = if target < 300.0 { 5.0 } else { 2.5 };
             assert!(aspect < allowed, "{text} {target}: {aspect}");

@@ -7,16 +7,21 @@ use std::path::{Path, PathBuf};
 /// `Error` and `Result` alone.
 ///
 /// `adjoint::lie` gives vectors and poses to everyone; the modules marked `adjoint` use the ladder too.
-const LAYERS: [(&str, &[&str]); 18] = [
+const LAYERS: [(&str, &[&str]); 19] = [
     ("error", &[]),
-    ("scene", &["shape"]),
     ("special", &[]),
-    ("shape", &["adjoint", "scene", "special"]),
+    // Closed meshes and walls, and what is asked of them.
+    ("geometry", &["adjoint"]),
+    ("shape", &["adjoint", "geometry", "special"]),
+    ("scene", &["geometry", "shape"]),
     ("solver", &[]),
-    ("boundary", &["adjoint", "solver", "special"]),
-    ("coupling", &["adjoint", "boundary", "scene", "solver"]),
-    ("gpu", &["adjoint", "boundary", "coupling", "solver"]),
-    ("contact", &["adjoint", "scene", "shape"]),
+    ("boundary", &["adjoint", "geometry", "solver", "special"]),
+    ("coupling", &["adjoint", "boundary", "geometry", "solver"]),
+    (
+        "gpu",
+        &["adjoint", "boundary", "coupling", "geometry", "solver"],
+    ),
+    ("contact", &["adjoint", "geometry", "shape"]),
     ("multibody", &["adjoint", "scene"]),
     (
         "dynamics",
@@ -33,6 +38,7 @@ const LAYERS: [(&str, &[&str]); 18] = [
             "coupling",
             "dynamics",
             "gpu",
+            "geometry",
             "multibody",
             "scene",
             "shape",
@@ -46,6 +52,7 @@ const LAYERS: [(&str, &[&str]); 18] = [
             "contact",
             "coupling",
             "dynamics",
+            "geometry",
             "multibody",
             "policy",
             "scene",
@@ -63,6 +70,7 @@ const LAYERS: [(&str, &[&str]); 18] = [
             "coupling",
             "dynamics",
             "gpu",
+            "geometry",
             "multibody",
             "policy",
             "scene",
@@ -73,22 +81,22 @@ const LAYERS: [(&str, &[&str]); 18] = [
     // Descent stands on what a user sees.
     ("optimize", &["simulate"]),
     // The facade names what it shows; the command line stands on the facade.
-    ("lib", &["adjoint", "scene", "shape", "simulate"]),
+    (
+        "lib",
+        &["adjoint", "geometry", "scene", "shape", "simulate"],
+    ),
     (
         "cli",
         &[
-            "adjoint", "boundary", "coupling", "dynamics", "gpu", "scene", "shape", "simulate",
-            "water",
+            "adjoint", "boundary", "coupling", "dynamics", "geometry", "gpu", "scene", "shape",
+            "simulate", "water",
         ],
     ),
 ];
 
 /// Modules of which only the named parts may be used.
-const ONLY: [(&str, &str, &[&str]); 4] = [
+const ONLY: [(&str, &str, &[&str]); 3] = [
     ("shape", "adjoint", &["lie"]),
-    // Descriptions of shapes and walls are scene data, and a scene asks the shapes whether they are
-    // right: the one pair that knows each other.
-    ("shape", "scene", &["Refinement", "Shape", "Wall"]),
     ("contact", "adjoint", &["lie"]),
     ("multibody", "adjoint", &["lie"]),
 ];
@@ -223,10 +231,9 @@ fn layers_are_ordered() {
     let table: BTreeMap<_, _> = LAYERS.iter().copied().collect();
     let mut done: BTreeSet<&str> = BTreeSet::from(["adjoint"]);
     while done.len() <= table.len() {
-        let ready = table.iter().find(|(m, may)| {
-            let ready = |u: &&str| done.contains(u) || (**m, *u) == ("shape", "scene");
-            !done.contains(*m) && may.iter().all(ready)
-        });
+        let ready = table
+            .iter()
+            .find(|(m, may)| !done.contains(*m) && may.iter().all(|u| done.contains(u)));
         let (module, _) = ready.expect("the layers have a cycle");
         done.insert(module);
     }

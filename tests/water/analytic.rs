@@ -17,7 +17,7 @@ use std::sync::{Arc, LazyLock};
 
 fn submerged(semi_axes: [f64; 3], faces: usize, settings: &Settings) -> Arc<MfsBody> {
     let mesh = mesh(&Shape::ellipsoid(semi_axes), faces);
-    let b = BodyBoundary::new("body", mesh.vertices(), mesh.faces(), settings).unwrap();
+    let b = BodyBoundary::new("body", &mesh, settings).unwrap();
     Arc::new(MfsBody::new(Arc::new(b)))
 }
 
@@ -704,8 +704,8 @@ fn bodies_in_another_order_or_frame_give_the_same() {
         faces: None,
     };
     let mesh = mesh(&shape, 320);
-    let vertices: Vec<Vec3> = mesh.vertices().iter().map(|v| v + shift).collect();
-    let b = BodyBoundary::new("b", &vertices, mesh.faces(), &Settings::default()).unwrap();
+    let moved = mesh.transformed(&Pose::new(Mat3::identity(), shift));
+    let b = BodyBoundary::new("b", &moved, &Settings::default()).unwrap();
     let shifted = Arc::new(MfsBody::new(Arc::new(b)));
     let mut placed = poses.clone();
     placed[1].translation = poses[1].apply(&-shift);

@@ -3,10 +3,10 @@
 
 use crate::support;
 use crate::support::reference::lamb;
-use hydrograd::Error;
 use hydrograd::adjoint::lie::{Mat6, Vec3, skew};
 use hydrograd::boundary::{BodyBoundary, Depth, Method, Readout, RowScaling, Settings};
 use hydrograd::scene::Shape;
+use hydrograd::{Error, TriMesh};
 
 type Mesh = (Vec<Vec3>, Vec<[usize; 3]>);
 
@@ -20,7 +20,11 @@ fn ellipsoid(semi_axes: [f64; 3], faces: usize) -> Mesh {
 }
 
 fn build(mesh: &Mesh, settings: &Settings) -> BodyBoundary {
-    BodyBoundary::new("body", &mesh.0, &mesh.1, settings).unwrap()
+    BodyBoundary::new("body", &closed(mesh), settings).unwrap()
+}
+
+fn closed(mesh: &Mesh) -> TriMesh {
+    TriMesh::new("mesh", mesh.0.clone(), mesh.1.clone()).unwrap()
 }
 
 const ELLIPSOIDS: [[f64; 3]; 9] = [
@@ -98,7 +102,7 @@ fn a_fixed_depth_is_checked() {
             depth: Depth::Fixed(d),
             ..Default::default()
         };
-        BodyBoundary::new("coin", &coin.0, &coin.1, &settings)
+        BodyBoundary::new("coin", &closed(&coin), &settings)
     };
     let shallow = at(1e-3).unwrap().warnings.join("\n");
     assert!(
@@ -227,7 +231,7 @@ fn coarsest_meshes_give_positive_matrices_or_an_error() {
                             damping,
                             depth: Depth::Auto,
                         };
-                        match BodyBoundary::new("body", &mesh.0, &mesh.1, &settings) {
+                        match BodyBoundary::new("body", &closed(&mesh), &settings) {
                             Ok(b) => {
                                 assert!(b.added_mass.iter().all(|x| x.is_finite()));
                                 assert!((0..3).all(|i| b.added_mass[(i, i)] > 0.0));
@@ -270,7 +274,7 @@ fn the_factor_is_that_of_the_damped_equations() {
 #[test]
 fn bad_surfaces_are_errors() {
     let (v, f) = ellipsoid([1.0; 3], 80);
-    let new = |v: &[Vec3], f: &[[usize; 3]]| BodyBoundary::new("bad", v, f, &Settings::default());
+    let new = |v: &[Vec3], f: &[[usize; 3]]| TriMesh::new("bad", v.to_vec(), f.to_vec());
     let refused = |v: &[Vec3], f: &[[usize; 3]]| {
         let error = new(v, f).unwrap_err();
         assert!(matches!(error, Error::Mesh { .. }), "{error}");
@@ -286,7 +290,9 @@ fn bad_surfaces_are_errors() {
     refused(&broken, &f);
     let mut unused = v.clone();
     unused.push(Vec3::new(0.1, 0.0, 0.0));
-    refused(&unused, &f);
+    // What no face uses is left out.
+    let (used, same) = (new(&unused, &f).unwrap(), new(&v, &f).unwrap());
+    assert_eq!(used, same);
     let mut wild = f.clone();
     wild[0][1] = 999;
     refused(&v, &wild);
@@ -294,10 +300,13 @@ fn bad_surfaces_are_errors() {
         damping: f64::NAN,
         ..Default::default()
     };
-    assert!(BodyBoundary::new("bad", &v, &f, &settings).is_err());
-    // A source outside.
-    let outside = [Vec3::new(2.0, 0.0, 0.0)];
-    let error = BodyBoundary::with_sources("bad", &v, &f, &outside, &Settings::default());
+    assert!(BodyBoundary::new("bad", &same, &settings).is_err());
+    // Sources outside, past the other side.
+    let settings = Settings {
+        depth: Depth::Fixed(3.0),
+        ..Default::default()
+    };
+    let error = BodyBoundary::new("bad", &same, &settings);
     assert!(matches!(error, Err(Error::Unresolved { .. })));
 }
 

@@ -5,8 +5,8 @@ use hydrograd::adjoint::kernel::{Sources, Write};
 use hydrograd::adjoint::lie::{Pose, Vec3, Vec6, exp_matrix};
 use hydrograd::boundary::{self, BodyBoundary, OneBody};
 use hydrograd::coupling::full::{Full, MfsBody, SolveSettings, Solver};
-use hydrograd::coupling::image::Image;
 use hydrograd::coupling::{Coupling, Exclusions};
+use hydrograd::geometry::Image;
 use hydrograd::scene::{Body, Controller, Fluid, Joint, Plane, Scene, Shape, Wall};
 use hydrograd::simulate::gradcheck::{self, gradcheck};
 use hydrograd::{Controls, Fidelity, Settings, Simulator, shape};
@@ -333,12 +333,7 @@ fn excluded_pairs_do_not_feel_each_other_and_feel_all_else() {
     .into_iter()
     .map(|shape| {
         let mesh = shape::build(&shape, Path::new("."), Some(80)).unwrap();
-        let b = BodyBoundary::new(
-            "b",
-            mesh.vertices(),
-            mesh.faces(),
-            &boundary::Settings::default(),
-        );
+        let b = BodyBoundary::new("b", &mesh, &boundary::Settings::default());
         Arc::new(MfsBody::new(Arc::new(b.unwrap())))
     })
     .collect();

@@ -4,11 +4,11 @@
 use crate::support::reference::lamb;
 use crate::support::{self, directions};
 use faer::Mat;
-use hydrograd::Error;
 use hydrograd::adjoint::lie::{Mat6, Vec3};
 use hydrograd::boundary::panel::{MOST_FACES, richardson};
 use hydrograd::boundary::{PanelBoundary, Response};
 use hydrograd::scene::Shape;
+use hydrograd::{Error, TriMesh};
 use std::collections::HashMap;
 use std::f64::consts::PI;
 
@@ -24,7 +24,11 @@ fn ellipsoid(semi_axes: [f64; 3], faces: usize) -> Mesh {
 }
 
 fn build(mesh: &Mesh) -> PanelBoundary {
-    PanelBoundary::new("body", &mesh.0, &mesh.1).unwrap()
+    PanelBoundary::new("body", &closed(mesh)).unwrap()
+}
+
+fn closed(mesh: &Mesh) -> TriMesh {
+    TriMesh::new("mesh", mesh.0.clone(), mesh.1.clone()).unwrap()
 }
 
 /// Largest relative error of the diagonal, where the exact value isn't 0.
@@ -283,7 +287,7 @@ fn a_sphere_in_the_flow_of_a_source() {
 fn bad_surfaces_are_errors() {
     let (v, f) = ellipsoid([1.0; 3], 80);
     let refused = |v: &[Vec3], f: &[[usize; 3]]| {
-        let error = PanelBoundary::new("bad", v, f).unwrap_err();
+        let error = TriMesh::new("bad", v.to_vec(), f.to_vec()).unwrap_err();
         assert!(matches!(error, Error::Mesh { .. }), "{error}");
         assert!(error.to_string().contains("bad"), "{error}");
     };
@@ -297,12 +301,14 @@ fn bad_surfaces_are_errors() {
     let mut one = f.clone();
     one[0].swap(0, 1);
     refused(&v, &one);
-    let many = vec![[0, 1, 2]; MOST_FACES + 2];
-    let error = PanelBoundary::new("large", &v, &many).unwrap_err();
+    let many = closed(&ellipsoid([1.0; 3], MOST_FACES + 400));
+    let faces = many.faces().len();
+    assert!(faces > MOST_FACES);
+    let error = PanelBoundary::new("large", &many).unwrap_err();
     assert!(matches!(error, Error::Unsupported { .. }), "{error}");
     let text = error.to_string();
     assert!(
-        text.contains("large") && text.contains("20002") && text.contains("GB"),
+        text.contains("large") && text.contains(&faces.to_string()) && text.contains("GB"),
         "{text}"
     );
 }

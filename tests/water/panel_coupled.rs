@@ -10,7 +10,7 @@ use hydrograd::coupling::panel::{SolveSettings, Solver};
 use hydrograd::coupling::{Coupling, PanelCoupled};
 use hydrograd::scene::{Scene, Shape, Wall, WallSurface};
 use hydrograd::simulate::{Controls, Fidelity, Settings, Simulator};
-use hydrograd::{Error, Result};
+use hydrograd::{Error, Result, TriMesh};
 use nalgebra::DMatrix;
 use std::sync::Arc;
 
@@ -22,7 +22,8 @@ fn ellipsoid(semi_axes: [f64; 3], faces: usize) -> Mesh {
 }
 
 fn named(name: &str, mesh: &Mesh) -> Arc<PanelBoundary> {
-    Arc::new(PanelBoundary::new(name, &mesh.0, &mesh.1).unwrap())
+    let mesh = TriMesh::new(name, mesh.0.clone(), mesh.1.clone()).unwrap();
+    Arc::new(PanelBoundary::new(name, &mesh).unwrap())
 }
 
 /// Plane z = height, fluid above.

@@ -19,8 +19,7 @@ fn sphere(rank: Option<usize>, tolerance: f64, gap: f64) -> Arc<ReducedBody> {
         tolerance,
         resolved_gap: Some(gap),
     };
-    let (v, f) = (mesh.vertices(), mesh.faces());
-    Arc::new(compress::compress("sphere", v, f, &response, &settings).unwrap())
+    Arc::new(compress::compress("sphere", &mesh, &response, &settings).unwrap())
 }
 
 fn at(x: f64, y: f64, z: f64) -> Pose {
@@ -111,10 +110,9 @@ fn a_sphere_by_a_wall_and_under_a_free_surface() {
 fn the_matrix_is_symmetric_to_rounding() {
     let panel = |shape: Shape| {
         let mesh = mesh(&shape, 320);
-        let (v, f) = (mesh.vertices(), mesh.faces());
-        let response = PanelBoundary::new("box", v, f).unwrap();
+        let response = PanelBoundary::new("box", &mesh).unwrap();
         let settings = compress::Settings::default();
-        Arc::new(compress::compress("box", v, f, &response, &settings).unwrap())
+        Arc::new(compress::compress("box", &mesh, &response, &settings).unwrap())
     };
     let wall = Wall::rigid([0.0, 0.0, -2.0], [0.0, 0.2, 1.0]);
     let bodies = vec![

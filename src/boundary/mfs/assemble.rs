@@ -3,7 +3,7 @@
 use super::settings::{Method, RowScaling};
 use crate::adjoint::kernel::{self, Points, Sources, Triangles, Write};
 use crate::adjoint::lie::{Vec3, Vec6};
-use crate::boundary::surface::Faces;
+use crate::geometry::Faces;
 use rayon::prelude::*;
 
 /// Weight of each face's row. A row is `weight · flux` (vertex sources) or

@@ -22,7 +22,7 @@
 
 use super::settings::{Depth, Method};
 use crate::adjoint::lie::Vec3;
-use crate::boundary::surface::Surface;
+use crate::geometry::{Interior, equilateral_edge};
 use crate::{Error, Result};
 use rayon::prelude::*;
 
@@ -66,19 +66,32 @@ struct Site {
 /// No vertex, or no face.
 const NONE: usize = usize::MAX;
 
+/// Mean size of the faces that meet at each vertex: the edge of an equilateral triangle of their area, m.
+fn vertex_edges(surface: &Interior) -> Vec<f64> {
+    let mut sums = vec![(0.0, 0usize); surface.vertex_normals.len()];
+    for (t, area) in surface.mesh.faces().iter().zip(&surface.faces.areas) {
+        for v in t {
+            sums[*v].0 += equilateral_edge(*area);
+            sums[*v].1 += 1;
+        }
+    }
+    sums.iter().map(|(sum, n)| sum / *n as f64).collect()
+}
+
 /// One site per vertex; with `split` one per smooth side at sharp edges.
-fn vertex_sites(surface: &Surface, split: bool) -> Vec<Site> {
+fn vertex_sites(surface: &Interior, split: bool) -> Vec<Site> {
+    let (vertices, edges) = (surface.mesh.vertices(), vertex_edges(surface));
     let plain = |i: usize| Site {
-        point: surface.vertices[i],
+        point: vertices[i],
         normal: surface.vertex_normals[i],
-        edge: surface.vertex_edge[i],
+        edge: edges[i],
         own: (i, NONE),
     };
-    let patches = surface.patches(SHARP);
+    let patches = surface.mesh.smooth_sides(SHARP);
     let count: usize = patches.iter().map(Vec::len).sum();
     // A very coarse mesh has too few rows for them.
     if !split || 10 * count > 9 * surface.faces.len() {
-        return (0..surface.vertices.len()).map(plain).collect();
+        return (0..vertices.len()).map(plain).collect();
     }
     let side = |i: usize, side: &Vec<usize>| {
         let (mut normal, mut middle) = (Vec3::zeros(), Vec3::zeros());
@@ -106,8 +119,9 @@ fn vertex_sites(surface: &Surface, split: bool) -> Vec<Site> {
 }
 
 /// One site per face.
-fn face_sites(surface: &Surface) -> Vec<Site> {
-    let edge = |i: usize| surface.triangles[i].map(|k| surface.vertex_edge[k]);
+fn face_sites(surface: &Interior) -> Vec<Site> {
+    let edges = vertex_edges(surface);
+    let edge = |i: usize| surface.mesh.faces()[i].map(|v| edges[v]);
     (0..surface.faces.len())
         .map(|i| Site {
             point: surface.faces.centres[i],
@@ -120,7 +134,12 @@ fn face_sites(surface: &Surface) -> Vec<Site> {
 
 /// Places the sources. Those that an automatic depth left outside a coarse surface, where points
 /// don't show all of it, are moved towards it.
-pub(crate) fn place(surface: &Surface, method: Method, depth: Depth) -> Result<Placement> {
+pub(crate) fn place(
+    name: &str,
+    surface: &Interior,
+    method: Method,
+    depth: Depth,
+) -> Result<Placement> {
     let sites = match method {
         Method::MfsVertex => vertex_sites(surface, depth == Depth::Auto),
         Method::MfsFace => face_sites(surface),
@@ -138,7 +157,7 @@ pub(crate) fn place(surface: &Surface, method: Method, depth: Depth) -> Result<P
             .par_iter()
             .zip(&thickness)
             .map(|(site, t)| {
-                let radius = surface.ball(&site.point, &site.normal, *t);
+                let radius = surface.tangent_ball(&site.point, &site.normal, *t);
                 let mut d = (EDGES * site.edge).min(BALL * radius);
                 for _ in 0..30 {
                     if surface.contains(&(site.point - site.normal * d)) {
@@ -150,7 +169,7 @@ pub(crate) fn place(surface: &Surface, method: Method, depth: Depth) -> Result<P
             })
             .collect(),
         Depth::Fixed(d) => {
-            check_fixed(surface.name, d, &sites, &thickness, &mut warnings)?;
+            check_fixed(name, d, &sites, &thickness, &mut warnings)?;
             vec![d; sites.len()]
         }
     };
@@ -160,7 +179,7 @@ pub(crate) fn place(surface: &Surface, method: Method, depth: Depth) -> Result<P
         let median = ratios[ratios.len() / 2];
         if median < REFUSED {
             return Err(Error::Unresolved {
-                place: format!("body {:?}", surface.name),
+                place: format!("body {name:?}"),
                 quantity: "median depth of its sources, in edge lengths".into(),
                 value: median,
                 limit: REFUSED,
@@ -179,9 +198,8 @@ pub(crate) fn place(surface: &Surface, method: Method, depth: Depth) -> Result<P
                 false => "errors of 5 % and more are likely",
             };
             warnings.push(format!(
-                "body \"{}\": half of the sources are less than {median:.2} edge lengths deep: the mesh \
+                "body \"{name}\": half of the sources are less than {median:.2} edge lengths deep: the mesh \
                  ({} faces) is coarse for a body this thin; {off}",
-                surface.name,
                 surface.faces.len()
             ));
         }
@@ -191,7 +209,7 @@ pub(crate) fn place(surface: &Surface, method: Method, depth: Depth) -> Result<P
         .zip(&depths)
         .map(|(s, d)| s.point - s.normal * *d)
         .collect();
-    check_inside(surface, &sources)?;
+    check_inside(name, surface, &sources)?;
     Ok(Placement {
         sources,
         depths,
@@ -241,13 +259,12 @@ fn check_fixed(
 }
 
 /// Every source must be strictly inside.
-pub(crate) fn check_inside(surface: &Surface, sources: &[Vec3]) -> Result<()> {
+fn check_inside(name: &str, surface: &Interior, sources: &[Vec3]) -> Result<()> {
     let outside = sources.par_iter().position_first(|s| !surface.contains(s));
     let Some(i) = outside else { return Ok(()) };
     Err(Error::Unresolved {
         place: format!(
-            "body \"{}\": source {i} of {} at {:?}",
-            surface.name,
+            "body \"{name}\": source {i} of {} at {:?}",
             sources.len(),
             sources[i].as_slice()
         ),

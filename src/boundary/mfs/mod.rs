@@ -23,9 +23,10 @@ pub mod readout;
 mod response;
 mod settings;
 
-use super::surface::{Faces, Surface, asymmetry};
+use super::asymmetry::asymmetry;
 use crate::adjoint::kernel::{Points, Triangles};
 use crate::adjoint::lie::{Mat6, Vec3, Vec6};
+use crate::geometry::{Faces, Interior, TriMesh};
 use crate::{Error, Result};
 use faer::{Mat, MatMut, MatRef};
 
@@ -88,49 +89,14 @@ pub struct BodyBoundary {
 }
 
 impl BodyBoundary {
-    /// Discretises the closed surface of `vertices` (m, body frame) and `faces` (counter-clockwise
-    /// seen from the fluid).
-    pub fn new(
-        name: &str,
-        vertices: &[Vec3],
-        faces: &[[usize; 3]],
-        settings: &Settings,
-    ) -> Result<Self> {
-        let surface = Surface::new(name, vertices, faces)?;
-        let placement = depth::place(&surface, settings.method, settings.depth)?;
-        Self::build(&surface, placement, settings)
-    }
-
-    /// As [`BodyBoundary::new`], with the sources (m, body frame) given; `settings.depth` isn't used.
-    pub fn with_sources(
-        name: &str,
-        vertices: &[Vec3],
-        faces: &[[usize; 3]],
-        sources: &[Vec3],
-        settings: &Settings,
-    ) -> Result<Self> {
-        let surface = Surface::new(name, vertices, faces)?;
-        if sources.is_empty() || sources.len() > faces.len() {
-            return Err(Error::input(
-                format!("body \"{name}\": number of sources"),
-                sources.len(),
-                format!("from 1 to the number of faces, {}", faces.len()),
-            ));
-        }
-        let depths = sources
-            .iter()
-            .map(|s| {
-                let d = vertices.iter().map(|v| (v - s).norm());
-                d.fold(f64::INFINITY, f64::min)
-            })
-            .collect();
-        depth::check_inside(&surface, sources)?;
-        let placement = depth::Placement {
-            sources: sources.to_vec(),
-            depths,
-            warnings: Vec::new(),
-        };
-        Self::build(&surface, placement, settings)
+    /// Discretises the body `name` with a mesh in its frame.
+    ///
+    /// # Errors
+    /// Settings out of range, and a mesh that doesn't resolve the body.
+    pub fn new(name: &str, mesh: &TriMesh, settings: &Settings) -> Result<Self> {
+        let mut out = Self::lay_out(name, mesh, settings)?;
+        out.solve_alone()?;
+        Ok(out)
     }
 
     /// As [`BodyBoundary::new`] for bodies of too many faces to factor: nothing of the size of a matrix
@@ -140,15 +106,8 @@ impl BodyBoundary {
     ///
     /// # Errors
     /// As [`BodyBoundary::new`].
-    pub fn unfactored(
-        name: &str,
-        vertices: &[Vec3],
-        faces: &[[usize; 3]],
-        settings: &Settings,
-    ) -> Result<Self> {
-        let surface = Surface::new(name, vertices, faces)?;
-        let placement = depth::place(&surface, settings.method, settings.depth)?;
-        let mut out = Self::lay_out(&surface, placement, settings)?;
+    pub fn unfactored(name: &str, mesh: &TriMesh, settings: &Settings) -> Result<Self> {
+        let mut out = Self::lay_out(name, mesh, settings)?;
         if settings.damping > 0.0 {
             let (method, sources) = (settings.method, &out.sources);
             let norms = assemble::column_norms(method, &out.triangles, &out.points, sources);
@@ -164,24 +123,14 @@ impl BodyBoundary {
         Ok(out)
     }
 
-    fn build(surface: &Surface, placement: depth::Placement, settings: &Settings) -> Result<Self> {
-        let mut out = Self::lay_out(surface, placement, settings)?;
-        out.solve_alone()?;
-        Ok(out)
-    }
-
     /// All that needs no solve; no damping yet.
-    fn lay_out(
-        surface: &Surface,
-        placement: depth::Placement,
-        settings: &Settings,
-    ) -> Result<Self> {
+    fn lay_out(name: &str, mesh: &TriMesh, settings: &Settings) -> Result<Self> {
+        let surface = Interior::new(mesh);
         let depth::Placement {
             sources,
             depths,
             warnings,
-        } = placement;
-        let name = surface.name;
+        } = depth::place(name, &surface, settings.method, settings.depth)?;
         let damping = settings.damping;
         if !(damping.is_finite() && damping >= 0.0) {
             return Err(Error::input(
@@ -190,7 +139,7 @@ impl BodyBoundary {
                 "0 for none, or a small positive number such as 0.003",
             ));
         }
-        let faces = surface.faces.clone();
+        let faces = surface.faces;
         let method = settings.method;
         let row_weights = assemble::row_weights(&faces, method, settings.rows);
         let twist_flux: Vec<Vec6> = (0..faces.len()).map(|i| faces.twist_flux(i)).collect();
@@ -198,7 +147,7 @@ impl BodyBoundary {
             name: name.to_string(),
             settings: *settings,
             twist_rows: assemble::twist_rows(&faces, method, &row_weights),
-            triangles: Triangles::new(surface.vertices, surface.triangles, row_weights.clone()),
+            triangles: Triangles::new(mesh.vertices(), mesh.faces(), row_weights.clone()),
             points: Points::new(&faces.centres, &faces.normals, row_weights.clone()),
             readout_flux: twist_flux.clone(),
             damping: vec![0.0; sources.len()],

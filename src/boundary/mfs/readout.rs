@@ -13,7 +13,7 @@
 use super::settings::Readout;
 use crate::adjoint::kernel::{self, Points, Sources};
 use crate::adjoint::lie::{Vec3, Vec6};
-use crate::boundary::surface::{Faces, equilateral_edge};
+use crate::geometry::{Faces, equilateral_edge};
 use rayon::prelude::*;
 
 /// Distance to the nearest source, in edges, from which one point does, and below which three

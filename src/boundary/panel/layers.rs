@@ -19,7 +19,7 @@
 
 use crate::adjoint::kernel::{Sources, Triangles, Write, flux_fill};
 use crate::adjoint::lie::Vec3;
-use crate::boundary::surface::Surface;
+use crate::geometry::{Faces, TriMesh};
 use faer::linalg::matmul::matmul;
 use faer::{Accum, MatMut, MatRef, Par};
 use pulp::Arch;
@@ -63,13 +63,14 @@ pub(crate) struct Panels {
 }
 
 impl Panels {
-    pub fn new(surface: &Surface) -> Self {
-        let (vertices, faces) = (surface.vertices, surface.triangles);
+    /// Of a mesh and its faces.
+    pub fn new(mesh: &TriMesh, faces: &Faces) -> Self {
+        let (vertices, normals, faces) = (mesh.vertices(), &faces.normals, mesh.faces());
         let mut edges = Vec::new();
         let mut known: HashMap<[usize; 2], u32> = HashMap::new();
         let panels = faces
             .iter()
-            .zip(&surface.faces.normals)
+            .zip(normals)
             .map(|(f, normal)| {
                 let corners = f.map(|v| vertices[v]);
                 let ends: [[usize; 2]; 3] = std::array::from_fn(|k| [f[k], f[(k + 1) % 3]]);

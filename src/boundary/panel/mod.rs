@@ -24,9 +24,10 @@ mod layers;
 mod response;
 pub mod richardson;
 
-use super::surface::{Faces, Surface, asymmetry};
+use super::asymmetry::asymmetry;
 use crate::adjoint::kernel::Write;
-use crate::adjoint::lie::{Mat6, Vec3, Vec6};
+use crate::adjoint::lie::{Mat6, Vec6};
+use crate::geometry::{Faces, TriMesh};
 use crate::solver::Lu;
 use crate::{Error, Result};
 pub use extrapolated::Extrapolated;
@@ -68,17 +69,14 @@ pub struct PanelBoundary {
 }
 
 impl PanelBoundary {
-    /// Solves for the closed surface of `vertices` (m, body frame) and `faces` (counter-clockwise
-    /// seen from the fluid).
+    /// Solves for the body `name` with a mesh in its frame.
     ///
     /// # Errors
-    /// A surface that isn't closed or is turned inside out, more than [`MOST_FACES`] faces, and
-    /// a mesh too coarse to resolve the body.
-    pub fn new(name: &str, vertices: &[Vec3], faces: &[[usize; 3]]) -> Result<Self> {
-        check_size(&format!("body \"{name}\""), faces.len())?;
-        let surface = Surface::new(name, vertices, faces)?;
-        let panels = Panels::new(&surface);
-        let faces = surface.faces.clone();
+    /// More than [`MOST_FACES`] faces, and a mesh too coarse to resolve the body.
+    pub fn new(name: &str, mesh: &TriMesh) -> Result<Self> {
+        check_size(&format!("body \"{name}\""), mesh.faces().len())?;
+        let faces = Faces::of(mesh);
+        let panels = Panels::new(mesh, &faces);
         let n = faces.len();
         let mut matrix = vec![0.0; n * n];
         panels.double_layer(&faces.centres, Write::Set, &mut matrix, n, 0);
@@ -130,7 +128,7 @@ impl PanelBoundary {
             added_mass,
             condition,
             warnings,
-            sharp_edges: surface.sharp_edges(SHARP),
+            sharp_edges: mesh.sharp_edge_length(SHARP),
             panels,
             lu,
             normal_velocity,

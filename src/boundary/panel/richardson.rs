@@ -15,7 +15,7 @@
 
 use super::PanelBoundary;
 use crate::adjoint::lie::Mat6;
-use crate::boundary::surface::scaled;
+use crate::boundary::asymmetry::scaled;
 use crate::{Error, Result};
 
 /// Least ratio of edge lengths from which two meshes say something.
@@ -51,8 +51,7 @@ pub fn richardson(fine: &PanelBoundary, coarse: &PanelBoundary) -> Result<Richar
 
 /// √(area/faces), m.
 fn edge(b: &PanelBoundary) -> f64 {
-    let area: f64 = b.faces.areas.iter().sum();
-    (area / b.faces.len() as f64).sqrt()
+    (b.faces.area() / b.faces.len() as f64).sqrt()
 }
 
 /// The same for meshes whose edges have a known ratio everywhere: where regions are refined, the number of

@@ -3,6 +3,7 @@
 use super::field::Field;
 use super::point::{ContactPoint, carry};
 use crate::error::{Error, Result};
+use crate::geometry::HalfSpace;
 use hydrograd_adjoint::lie::{Pose, Vec3};
 use std::collections::BTreeMap;
 
@@ -233,11 +234,11 @@ impl Core {
         Field::round(best.1, best.2, least)
     }
 
-    /// All corners against a plane through `point` with unit `normal`, world frame.
-    pub fn against_plane(&self, at: &Pose, point: &Vec3, normal: &Vec3) -> Vec<ContactPoint> {
+    /// All corners against a wall, world frame.
+    pub fn against_plane(&self, at: &Pose, wall: &HalfSpace) -> Vec<ContactPoint> {
         let contact = |corner: &Vec3| {
             let x = at.apply(corner);
-            let field = Field::flat((x - point).dot(normal), *normal);
+            let field = Field::flat(wall.height(&x), wall.normal);
             ContactPoint::probe(&x, &carry(&x), [self.radius, 0.0], &field)
         };
         self.corners.iter().map(contact).collect()

@@ -6,6 +6,7 @@
 
 use super::field::Field;
 use super::point::{ContactPoint, Rows3, across, carry, columns};
+use crate::geometry::HalfSpace;
 use hydrograd_adjoint::lie::{Mat3, Pose, Vec3, Vec6, skew};
 
 /// Rounds of Newton's method; from where it starts it takes about six.
@@ -52,10 +53,11 @@ impl Ellipsoid {
         }
     }
 
-    /// The lowest point over a plane through `point` with unit `normal`, both at rest.
-    pub fn against_plane(&self, at: &Pose, point: &Vec3, normal: &Vec3) -> ContactPoint {
+    /// The lowest point over a plane at rest.
+    pub fn against_plane(&self, at: &Pose, plane: &HalfSpace) -> ContactPoint {
+        let normal = &plane.normal;
         let support = self.support(at, &-normal);
-        let field = Field::flat((support.point - point).dot(normal), *normal);
+        let field = Field::flat(plane.height(&support.point), *normal);
         // The point slides along the surface, which the gap doesn't feel.
         ContactPoint::probe(&support.point, &support.motion(normal), [0.0; 2], &field)
     }

@@ -1,7 +1,7 @@
 //! Flat faces of a convex triangle mesh.
 
 use crate::error::{Error, Result};
-use crate::shape::TriMesh;
+use crate::geometry::TriMesh;
 use hydrograd_adjoint::lie::Vec3;
 use std::collections::{BTreeMap, BTreeSet};
 

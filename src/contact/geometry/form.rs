@@ -4,8 +4,8 @@ use super::core::Core;
 use super::ellipsoid::Ellipsoid;
 use super::facets::facets;
 use crate::error::Result;
-use crate::scene::Shape;
-use crate::shape::{self, TriMesh};
+use crate::geometry::{Ball, TriMesh};
+use crate::shape::{self, Shape};
 use hydrograd_adjoint::lie::{Pose, Vec3};
 use std::f64::consts::TAU;
 use std::path::Path;
@@ -21,9 +21,8 @@ pub struct Geometry {
     pub(super) form: Form,
     /// Frame of the shape to frame of the body.
     pub(super) offset: Pose,
-    /// Centre, frame of the shape, and radius of a ball around it, m.
-    center: Vec3,
-    radius: f64,
+    /// A ball around it, frame of the shape.
+    ball: Ball,
 }
 
 #[derive(Clone, Debug)]
@@ -87,30 +86,30 @@ impl Geometry {
     }
 
     fn new(form: Form, offset: Pose) -> Self {
-        let (center, radius) = match &form {
-            Form::Ellipsoid(e) => (Vec3::zeros(), e.semi_axes.max()),
+        let ball = match &form {
+            Form::Ellipsoid(e) => Ball {
+                center: Vec3::zeros(),
+                radius: e.semi_axes.max(),
+            },
             Form::Core(core) => {
-                let center = 0.5 * (core.bounds[0] + core.bounds[1]);
-                let reach = core.corners.iter().map(|c| (c - center).norm());
-                (center, reach.fold(0.0, f64::max) + core.radius)
+                let ball = Ball::around(core.corners.iter());
+                Ball {
+                    radius: ball.radius + core.radius,
+                    ..ball
+                }
             }
         };
-        Self {
-            form,
-            offset,
-            center,
-            radius,
-        }
+        Self { form, offset, ball }
     }
 
-    /// Centre of a ball around the body, world frame, m, for the pose of the body.
-    pub fn center_at(&self, pose: &Pose) -> Vec3 {
-        pose.apply(&self.offset.apply(&self.center))
+    /// A ball around the body, world frame, for the pose of the body.
+    pub fn ball_at(&self, pose: &Pose) -> Ball {
+        self.ball.transformed(&self.offset).transformed(pose)
     }
 
     /// Radius of the ball around the body, m.
     pub fn radius(&self) -> f64 {
-        self.radius
+        self.ball.radius
     }
 }
 

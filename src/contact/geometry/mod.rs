@@ -38,8 +38,9 @@ pub use form::{CYLINDER_SIDES, Geometry};
 pub use point::{ContactPoint, Rows3, Slopes};
 
 use crate::error::{Error, Result};
+use crate::geometry::HalfSpace;
 use form::Form;
-use hydrograd_adjoint::lie::{Pose, Vec3};
+use hydrograd_adjoint::lie::Pose;
 
 /// The places where two bodies are nearer than `reach` (m); poses are body to world. The order is
 /// always the same: corners of the first body, corners of the second, edges.
@@ -55,8 +56,7 @@ pub fn between(
     reach: f64,
 ) -> Result<Vec<ContactPoint>> {
     check(reach, &[first_at, second_at])?;
-    let apart = (first.center_at(first_at) - second.center_at(second_at)).norm();
-    if apart - first.radius() - second.radius() >= reach {
+    if first.ball_at(first_at).distance(&second.ball_at(second_at)) >= reach {
         return Ok(Vec::new());
     }
     let (a_at, b_at) = (
@@ -76,39 +76,26 @@ pub fn between(
     Ok(found.into_iter().collect())
 }
 
-/// The places where a body is nearer than `reach` (m) to a wall through `point` (m) with `normal`
-/// into the fluid, world frame; the wall counts as the second body. In the order of the corners.
+/// The places where a body is nearer than `reach` (m) to a wall, world frame; the wall counts as the second
+/// body. In the order of the corners.
 ///
 /// # Errors
-/// [`Error::Input`] if the pose, the wall or `reach` isn't finite, or the normal is zero.
+/// [`Error::Input`] if the pose or `reach` isn't finite.
 pub fn against_wall(
     geometry: &Geometry,
-    point: &Vec3,
-    normal: &Vec3,
+    wall: &HalfSpace,
     at: &Pose,
     reach: f64,
 ) -> Result<Vec<ContactPoint>> {
     check(reach, &[at])?;
-    let largest = normal.amax();
-    if !(largest > 0.0 && normal.iter().chain(point.iter()).all(|x| x.is_finite())) {
-        return Err(Error::input(
-            "contact: wall",
-            format!(
-                "point {:?}, normal {:?}",
-                point.as_slice(),
-                normal.as_slice()
-            ),
-            "give a finite point and a finite normal that isn't zero, pointing into the fluid",
-        ));
-    }
-    let normal = (normal / largest).normalize();
-    if (geometry.center_at(at) - point).dot(&normal) - geometry.radius() >= reach {
+    let ball = geometry.ball_at(at);
+    if wall.height(&ball.center) - ball.radius >= reach {
         return Ok(Vec::new());
     }
     let at = at.compose(&geometry.offset);
     let mut found = match &geometry.form {
-        Form::Ellipsoid(ellipsoid) => vec![ellipsoid.against_plane(&at, point, &normal)],
-        Form::Core(core) => core.against_plane(&at, point, &normal),
+        Form::Ellipsoid(ellipsoid) => vec![ellipsoid.against_plane(&at, wall)],
+        Form::Core(core) => core.against_plane(&at, wall),
     };
     found.retain(|p| p.gap < reach);
     Ok(found)

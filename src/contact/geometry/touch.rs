@@ -11,6 +11,7 @@
 use super::core::{Core, Face};
 use super::ellipsoid::{Ellipsoid, Lowest};
 use super::point::{ContactPoint, Rows3, carry, turn};
+use crate::geometry::HalfSpace;
 use hydrograd_adjoint::lie::{Pose, Vec3};
 
 /// Room for rounding where a feature hands over to the next.
@@ -34,8 +35,11 @@ pub(super) fn contact(
     let mut highest: Option<ContactPoint> = None;
     for face in &core.faces {
         let normal = core_at.rotation * face.normal;
-        let point = core_at.apply(&(face.offset * face.normal));
-        let found = ellipsoid.against_plane(ellipsoid_at, &point, &normal);
+        let plane = HalfSpace {
+            point: core_at.apply(&(face.offset * face.normal)),
+            normal,
+        };
+        let found = ellipsoid.against_plane(ellipsoid_at, &plane);
         let foot = core_at.apply_inverse(&found.position);
         if face.is_below(&foot, SLACK * core.diameter()) {
             take(&mut best, found.clone());

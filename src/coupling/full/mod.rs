@@ -43,7 +43,7 @@ pub use settings::{Preconditioner, SolveSettings, Solver};
 use super::{Coupling, Exclusions, Linearise, Linearised, Momenta};
 use crate::Result;
 use crate::adjoint::lie::{Pose, Vec3};
-use crate::scene::Wall;
+use crate::geometry::Wall;
 use linearised::Solved;
 use nalgebra::{DMatrix, DVector};
 use std::sync::Arc;

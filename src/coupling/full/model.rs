@@ -4,9 +4,9 @@ use super::{MfsBody, SolveSettings};
 use crate::Result;
 use crate::adjoint::lie::Pose;
 use crate::coupling::Exclusions;
-use crate::coupling::image::Image;
 use crate::coupling::pair::Pair;
-use crate::scene::Wall;
+use crate::geometry::Image;
+use crate::geometry::Wall;
 use std::ops::Range;
 use std::sync::Arc;
 

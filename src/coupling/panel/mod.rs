@@ -19,14 +19,13 @@ mod system;
 mod value;
 
 use super::Exclusions;
-use super::image::Image;
 use super::settings::check_limits;
 use super::{Coupling, Momenta};
 use crate::Result;
-use crate::adjoint::lie::{Pose, Vec3};
+use crate::adjoint::lie::Pose;
 use crate::boundary::PanelBoundary;
 use crate::boundary::panel::check_size;
-use crate::scene::Wall;
+use crate::geometry::{HalfSpace, Image, Wall};
 use nalgebra::DMatrix;
 use serde::{Deserialize, Serialize};
 use std::ops::Range;
@@ -70,8 +69,7 @@ impl Default for SolveSettings {
 pub struct PanelCoupled {
     bodies: Vec<Arc<PanelBoundary>>,
     images: Vec<Image>,
-    /// A point and the unit normal into the fluid of each wall.
-    walls: Vec<(Vec3, Vec3)>,
+    walls: Vec<HalfSpace>,
     settings: SolveSettings,
     faces: Vec<Range<usize>>,
     excluded: Exclusions,
@@ -101,10 +99,7 @@ impl PanelCoupled {
         check_size(&format!("{} bodies", bodies.len()), at)?;
         Ok(Self {
             images: Image::of_walls(walls)?,
-            walls: walls
-                .iter()
-                .map(|w| (Vec3::from(w.point), Vec3::from(w.normal).normalize()))
-                .collect(),
+            walls: Wall::half_spaces(walls)?,
             bodies,
             settings,
             faces,

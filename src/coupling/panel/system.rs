@@ -3,7 +3,7 @@
 use super::{PanelCoupled, Solver};
 use crate::adjoint::kernel::Write;
 use crate::adjoint::lie::{Pose, Vec3};
-use crate::coupling::image::Image;
+use crate::geometry::Image;
 use crate::solver::{Columns, Lu, gmres, product, transposed_product};
 use crate::{Error, Result};
 use faer::MatMut;
@@ -314,9 +314,9 @@ fn overlap(
 /// Every body must be on the fluid's side of every wall.
 fn check_walls(coupled: &PanelCoupled, poses: &[Pose]) -> Result<()> {
     for (body, pose) in coupled.bodies.iter().zip(poses) {
-        for (w, (point, normal)) in coupled.walls.iter().enumerate() {
+        for (w, wall) in coupled.walls.iter().enumerate() {
             let corners = body.faces.corners.iter().flatten();
-            let height = |c: &Vec3| normal.dot(&(pose.apply(c) - point));
+            let height = |c: &Vec3| wall.height(&pose.apply(c));
             let lowest = corners.map(height).fold(f64::INFINITY, f64::min);
             if lowest < 0.0 {
                 return Err(Error::Unresolved {

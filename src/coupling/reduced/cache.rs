@@ -7,7 +7,7 @@
 
 use super::ReducedBody;
 use super::compress::Settings;
-use crate::adjoint::lie::Vec3;
+use crate::geometry::TriMesh;
 use crate::{Error, Result};
 use serde::Serialize;
 use sha2::{Digest, Sha256};
@@ -32,20 +32,15 @@ static MEMORY: LazyLock<Mutex<HashMap<Key, Arc<ReducedBody>>>> = LazyLock::new(D
 pub struct Key([u8; 32]);
 
 impl Key {
-    /// Digest of a surface (m, body frame), of what else the one-body `method` depends on, and of the
+    /// Digest of a mesh in the body's frame, of what else the one-body `method` depends on, and of the
     /// compression's settings.
-    pub fn new(
-        vertices: &[Vec3],
-        faces: &[[usize; 3]],
-        method: &impl Serialize,
-        settings: &Settings,
-    ) -> Self {
+    pub fn new(mesh: &TriMesh, method: &impl Serialize, settings: &Settings) -> Self {
         let mut digest = Sha256::new();
         digest.update(FORMAT);
-        for x in vertices.iter().flat_map(|v| v.iter()) {
+        for x in mesh.vertices().iter().flat_map(|v| v.iter()) {
             digest.update(x.to_bits().to_le_bytes());
         }
-        for i in faces.iter().flatten() {
+        for i in mesh.faces().iter().flatten() {
             digest.update((*i as u64).to_le_bytes());
         }
         // Settings are plain data: they always serialise.

@@ -3,8 +3,8 @@
 use super::{Cutoff, Reduced};
 use crate::adjoint::kernel::{Write, potential_fill};
 use crate::adjoint::lie::{Pose, Vec3};
-use crate::coupling::image::Image;
 use crate::coupling::pair::Pair;
+use crate::geometry::Image;
 
 /// A block of G that depends on the poses. G is symmetric and the images of perpendicular walls are
 /// their own inverses, so a pair of bodies needs one block per image.

@@ -32,11 +32,10 @@ pub use body::{Fit, Parts, ReducedBody};
 pub use cutoff::Cutoff;
 pub use link::Link;
 
-use super::image::Image;
 use super::{Coupling, Exclusions, Linearise, Linearised, Momenta};
 use crate::Result;
 use crate::adjoint::lie::Pose;
-use crate::scene::Wall;
+use crate::geometry::{Image, Wall};
 use linearised::ReducedLinearised;
 use nalgebra::DMatrix;
 use rayon::prelude::*;

@@ -61,7 +61,7 @@ fn check_overlap(scene: &Scene, index: usize) -> Result<()> {
 }
 
 fn check_shape(body: &Body) -> Result<()> {
-    crate::shape::validate_refinements(&body.refine, &format!("body {:?}", body.name))?;
+    crate::geometry::validate_refinements(&body.refine, &format!("body {:?}", body.name))?;
     let Some(shape) = &body.shape else {
         if !body.refine.is_empty() {
             return Err(Error::input(

@@ -1,9 +1,10 @@
 //! Wavefront OBJ: vertex positions and faces; groups, materials, normals and textures are
 //! passed over.
 
-use super::{Parsed, Raw, brief, polygon};
+use super::polygon;
+use super::raw::{Parsed, Raw, brief};
 use crate::error::{Error, Result};
-use crate::shape::mesh::TriMesh;
+use crate::geometry::TriMesh;
 use hydrograd_adjoint::lie::Vec3;
 use std::fmt::Write;
 use std::path::Path;

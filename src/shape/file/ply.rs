@@ -1,6 +1,7 @@
 //! PLY, text and binary: the elements `vertex` (x, y, z) and `face` (`vertex_indices`).
 
-use super::{Parsed, Raw, brief, polygon};
+use super::polygon;
+use super::raw::{Parsed, Raw, brief};
 use hydrograd_adjoint::lie::Vec3;
 use ply_rs_bw::parser::{Parser, Reader};
 use ply_rs_bw::ply::{

@@ -1,27 +1,11 @@
 //! Merging of vertices that a file holds several times.
 
-use super::Raw;
-use crate::shape::mesh::bounds;
-use crate::shape::{topology, weld};
-use serde::Serialize;
+use super::raw::Raw;
+use crate::geometry::{bounds, topology, weld};
 
 /// Distance over diameter within which vertices are merged if that closes the surface: single
 /// precision of the coordinates, and a little for the exporter.
 const TOLERANCE: f64 = 1e-6;
-
-/// What was done to a file's contents.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize)]
-pub struct Repairs {
-    /// Polygons with more than three corners that were split into triangles.
-    pub polygons_split: usize,
-    /// Vertices merged with one of exactly the same coordinates.
-    pub merged_same: usize,
-    /// Vertices merged with one nearby (within 1e-6 of the diameter, or the coordinates' single
-    /// precision).
-    pub merged_near: usize,
-    /// Faces that had no area after the merge and were left out.
-    pub collapsed: usize,
-}
 
 /// Merges vertices where that closes the surface: first those with the same coordinates (`always`:
 /// for formats that have no other way to share vertices), then those nearby. A merge that leaves

@@ -1,7 +1,7 @@
 //! STL, text and binary. Coordinates are in single precision, and each face has vertices of its
 //! own: they are merged afterwards.
 
-use super::{Parsed, Raw, brief};
+use super::raw::{Parsed, Raw, brief};
 use hydrograd_adjoint::lie::Vec3;
 use std::io::Cursor;
 

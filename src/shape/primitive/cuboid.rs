@@ -1,6 +1,6 @@
 //! Boxes: a grid on each side, somewhat finer towards the edges, where the flow is sharp.
 
-use super::misfit;
+use super::layout::{Parts, misfit};
 use hydrograd_adjoint::lie::Vec3;
 use std::collections::HashMap;
 
@@ -10,10 +10,10 @@ const GRADING: f64 = 0.5;
 
 /// A box with the given edge lengths (m) along x, y, z, centred at the origin, with about
 /// `target` faces (at least 12).
-pub(super) fn cuboid(size: [f64; 3], target: usize) -> (Vec<Vec3>, Vec<[usize; 3]>) {
+pub(in crate::shape) fn cuboid(size: [f64; 3], target: usize) -> Parts {
     let cells = choose_cells(size, target as f64);
     let lines = [0, 1, 2].map(|i| grid_lines(size[i], cells[i]));
-    let mut surface = Surface {
+    let mut grid = Grid {
         lines: &lines,
         known: HashMap::new(),
         vertices: Vec::new(),
@@ -21,10 +21,10 @@ pub(super) fn cuboid(size: [f64; 3], target: usize) -> (Vec<Vec3>, Vec<[usize; 3
     };
     for axis in 0..3 {
         for outward in [false, true] {
-            surface.side(axis, outward, cells);
+            grid.side(axis, outward, cells);
         }
     }
-    (surface.vertices, surface.faces)
+    (grid.vertices, grid.faces)
 }
 
 /// Faces of a grid with so many cells. A middle row of cells gets four triangles a cell instead
@@ -97,7 +97,8 @@ fn grid_lines(length: f64, n: usize) -> Vec<f64> {
         .collect()
 }
 
-struct Surface<'a> {
+/// Cells on all sides.
+struct Grid<'a> {
     /// Per axis: grid lines at even, cell middles at odd numbers.
     lines: &'a [Vec<f64>; 3],
     known: HashMap<[usize; 3], usize>,
@@ -105,7 +106,7 @@ struct Surface<'a> {
     faces: Vec<[usize; 3]>,
 }
 
-impl Surface<'_> {
+impl Grid<'_> {
     /// The vertex at some lines.
     fn vertex(&mut self, at: [usize; 3]) -> usize {
         *self.known.entry(at).or_insert_with(|| {

@@ -4,13 +4,12 @@
 //! divided first, so that neighbouring sides agree on them. Triangles are somewhat smaller at sharp
 //! edges, as on a box, and where the profile has edges shorter than the rest.
 
-use super::MAX_FACES;
+use super::layout::Parts;
 use super::planar::{Planar, Point};
 use crate::error::{Error, Result};
+use crate::shape::limits::MAX_FACES;
 use hydrograd_adjoint::lie::Vec3;
 use std::f64::consts::{PI, TAU};
-
-type Parts = (Vec<Vec3>, Vec<[usize; 3]>);
 
 /// Size of triangles at a sharp edge, as a part of that at the middle of a side.
 const EDGE: f64 = 0.6;
@@ -25,7 +24,7 @@ const GROWTH: f64 = 0.4;
 
 /// A prism of length `length` (m) along x, centred at x = 0, with about `target` faces. The
 /// profile's corners (y, z) are in m.
-pub(super) fn prism(profile: &[[f64; 2]], length: f64, target: usize) -> Parts {
+pub(in crate::shape) fn prism(profile: &[[f64; 2]], length: f64, target: usize) -> Parts {
     // Near one, by a power of two: lengths may be as extreme as their type allows.
     let largest = profile.iter().flatten().fold(length, |m, x| m.max(x.abs()));
     let unit = largest.log2().floor().exp2();
@@ -337,7 +336,7 @@ const LEAST: f64 = 1e-9;
 ///
 /// # Errors
 /// [`Error::Input`] naming the corner.
-pub(super) fn check_profile(profile: &[[f64; 2]], place: &str) -> Result<()> {
+pub(in crate::shape) fn check_profile(profile: &[[f64; 2]], place: &str) -> Result<()> {
     let corner = |k: usize, remedy: String| {
         let place = format!("{place}: profile[{k}]");
         Err(Error::input(place, format!("{:?}", profile[k]), remedy))

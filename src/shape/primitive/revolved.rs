@@ -4,14 +4,12 @@
 //! pole and no fan of slivers appears; s = 6 suits a flat disc, s = 4 a hemisphere. Sides: an
 //! even number of bands between rings that are turned by half a step in turn.
 
-use super::misfit;
+use super::layout::{Parts, misfit};
 use hydrograd_adjoint::lie::Vec3;
 use std::f64::consts::{FRAC_PI_2, TAU};
 
-type Parts = (Vec<Vec3>, Vec<[usize; 3]>);
-
 /// A cylinder about z, centred at the origin (m), with about `target` faces (at least 36).
-pub(super) fn cylinder(radius: f64, length: f64, target: usize) -> Parts {
+pub(in crate::shape) fn cylinder(radius: f64, length: f64, target: usize) -> Parts {
     let (rings, bands) = choose(6, radius, length, 1.0, target as f64);
     let end = |k: usize| (radius * k as f64 / rings as f64, 0.0);
     revolve(6, rings, bands, radius, length, end)
@@ -19,7 +17,7 @@ pub(super) fn cylinder(radius: f64, length: f64, target: usize) -> Parts {
 
 /// A capsule about z, centred at the origin, with `length` between the hemispheres (m), and
 /// about `target` faces (at least 24).
-pub(super) fn capsule(radius: f64, length: f64, target: usize) -> Parts {
+pub(in crate::shape) fn capsule(radius: f64, length: f64, target: usize) -> Parts {
     let (rings, bands) = choose(4, radius, length, FRAC_PI_2, target as f64);
     let end = |k: usize| {
         if k == rings {

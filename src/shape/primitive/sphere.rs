@@ -1,14 +1,13 @@
 //! Spheres and ellipsoids: subdivided icosahedra.
 
-use super::MAX_FACES;
+use super::layout::Parts;
+use crate::shape::limits::MAX_FACES;
 use hydrograd_adjoint::lie::Vec3;
 use std::collections::HashMap;
 
-type Parts = (Vec<Vec3>, Vec<[usize; 3]>);
-
 /// An ellipsoid with the given semi-axes (m) along x, y, z, with its vertices on the surface: a
 /// subdivided icosahedron, stretched. Faces: the 20 n² nearest to `target`.
-pub(super) fn ellipsoid(semi_axes: [f64; 3], target: usize) -> Parts {
+pub(in crate::shape) fn ellipsoid(semi_axes: [f64; 3], target: usize) -> Parts {
     let (mut vertices, faces) = geodesic(frequency(target));
     let axes = Vec3::from(semi_axes);
     for v in &mut vertices {

@@ -4,9 +4,9 @@ use crate::Result;
 use crate::adjoint::lie::Pose;
 use crate::boundary::{OneBody, Response};
 use crate::coupling::{Coupling, Report};
+use crate::geometry::{Gap, Other};
 use crate::multibody::Tree;
-use crate::scene::{Scene, Shape, WallSurface};
-use crate::shape::{Gap, Other};
+use crate::scene::{Scene, WallSurface};
 use crate::water::submerged::{self, SubmergedBody, Water};
 use crate::water::surface::{Surface, surface, surfaces};
 use crate::water::{Fidelity, Prepared, Settings, around, in_water, world_axes};
@@ -243,7 +243,7 @@ impl<'a> Case<'a> {
             let few = |s: &Surface| s.mesh.faces().len() <= COUPLING_FACES;
             let mesh = match (own, &body.shape) {
                 (Some(own), _) if few(own) => Some(own.mesh.clone()),
-                (Some(own), Some(Shape::Mesh { .. } | Shape::Triangles { .. })) => {
+                (Some(own), Some(shape)) if shape.is_mesh() => {
                     Some(own.mesh.coarsened(COUPLING_FACES)?)
                 }
                 (own, _) => {

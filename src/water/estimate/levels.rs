@@ -8,8 +8,8 @@
 //! the smaller of two: that of the finer mesh alone, and that which the pair n/2, n/8 tells.
 
 use super::case::Case;
+use crate::geometry::TriMesh;
 use crate::scene::Shape;
-use crate::shape::TriMesh;
 use crate::water::surface::{Surface, surface};
 use crate::{Error, Result};
 use nalgebra::DMatrix;
@@ -192,13 +192,11 @@ fn other(case: &Case, body: usize, own: &Surface, factor: f64) -> Result<Option<
     let target = times(own.faces().len());
     let body = &case.scene().bodies[body];
     match &body.shape {
-        Some(Shape::Mesh { .. } | Shape::Triangles { .. }) if factor < 1.0 => {
+        Some(shape) if shape.is_mesh() && factor < 1.0 => {
             Ok(Some(Surface::of_mesh(own.coarsened(target)?)))
         }
-        Some(Shape::Mesh { .. } | Shape::Triangles { .. }) if factor == 4.0 => {
-            Ok(Some(Surface::of_mesh(own.split())))
-        }
-        Some(Shape::Mesh { .. } | Shape::Triangles { .. }) => Ok(None),
+        Some(shape) if shape.is_mesh() && factor == 4.0 => Ok(Some(Surface::of_mesh(own.split()))),
+        Some(shape) if shape.is_mesh() => Ok(None),
         _ => {
             let settings = case.subject.settings;
             surface(body, settings, Some(base), factor.powf(-0.5))
@@ -210,8 +208,9 @@ fn other(case: &Case, body: usize, own: &Surface, factor: f64) -> Result<Option<
 fn order_of(case: &Case, body: usize, own: &TriMesh) -> f64 {
     match &case.scene().bodies[body].shape {
         Some(Shape::Sphere { .. } | Shape::Ellipsoid { .. } | Shape::Capsule { .. }) => SMOOTH,
-        Some(Shape::Mesh { .. } | Shape::Triangles { .. })
-            if own.sharp_edges(TURN) <= LENGTH * own.mass_properties().area.sqrt() =>
+        Some(shape)
+            if shape.is_mesh()
+                && own.sharp_edge_length(TURN) <= LENGTH * own.mass_properties().area.sqrt() =>
         {
             FACETED
         }

@@ -48,7 +48,9 @@ fn deep_and_degenerate_poses_stay_finite() {
     assert!(between(&ball, &ball, &bad, &bad, 0.1).is_err());
     assert!(between(&ball, &ball, &Pose::identity(), &at(1., 0., 0.), f64::NAN).is_err());
     let nowhere = Vec3::zeros();
-    assert!(against_wall(&ball, &nowhere, &nowhere, &Pose::identity(), 0.1).is_err());
+    assert!(HalfSpace::new(&nowhere, &nowhere).is_none());
+    let floor = HalfSpace::new(&nowhere, &Vec3::z()).unwrap();
+    assert!(against_wall(&ball, &floor, &bad, 0.1).is_err());
 }
 
 #[test]
@@ -61,8 +63,7 @@ fn meshes_are_taken_by_their_flat_faces_and_refused_if_not_convex() {
     let wall = |g: &Geometry| {
         let mut heights: Vec<f64> = against_wall(
             g,
-            &Vec3::zeros(),
-            &Vec3::new(0.2, 0.5, 1.0),
+            &HalfSpace::new(&Vec3::zeros(), &Vec3::new(0.2, 0.5, 1.0)).unwrap(),
             &Pose::identity(),
             9.0,
         )

@@ -18,7 +18,8 @@ fn balls_and_walls_have_known_gaps() {
     );
 
     let floor = |g: &Geometry, pose: &Pose| {
-        against_wall(g, &Vec3::zeros(), &(2.0 * Vec3::z()), pose, 0.1).unwrap()
+        let plane = HalfSpace::new(&Vec3::zeros(), &(2.0 * Vec3::z())).unwrap();
+        against_wall(g, &plane, pose, 0.1).unwrap()
     };
     let points = floor(&a, &at(0.3, -0.2, 0.09));
     assert!((points[0].gap + 0.01).abs() < 1e-15);

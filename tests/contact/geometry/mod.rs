@@ -9,6 +9,7 @@ mod smooth;
 
 use hydrograd::adjoint::lie::{Mat3, Pose, Vec3, Vec6, exp_matrix, point_velocity};
 use hydrograd::contact::geometry::{ContactPoint, Geometry, against_wall, between};
+use hydrograd::geometry::HalfSpace;
 use hydrograd::shape::{TriMesh, build};
 use hydrograd::{Error, Shape};
 use std::path::Path;
@@ -102,7 +103,7 @@ fn every_kind() -> Vec<Shape> {
 
 /// Moves `a` along `away` from where the centres meet until the smallest gap is `gap`.
 fn approach(a: &Geometry, b: &Geometry, from: &Pose, rest: &Pose, away: &Vec3, gap: f64) -> Pose {
-    let meet = b.center_at(rest) - a.center_at(from) + from.translation;
+    let meet = b.ball_at(rest).center - a.ball_at(from).center + from.translation;
     let moved = |t: f64| Pose::new(from.rotation, meet + t * away);
     let (mut low, mut high) = (0.0, 2.0 * (a.radius() + b.radius()) + 2.0);
     for _ in 0..60 {

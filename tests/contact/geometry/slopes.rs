@@ -111,7 +111,8 @@ fn slopes_against_walls_agree_with_differences() {
         for _ in 0..3 {
             let body = offset(&shape, draw.pose());
             let (point, normal, pose) = (draw.vector(), draw.vector(), draw.pose());
-            let evaluate = |g: &Pose| against_wall(&body, &point, &normal, g, 100.0).unwrap();
+            let plane = HalfSpace::new(&point, &normal).unwrap();
+            let evaluate = |g: &Pose| against_wall(&body, &plane, g, 100.0).unwrap();
             assert!(!evaluate(&pose).is_empty());
             let error = slope_error(evaluate, &pose);
             assert!(error < 1e-6, "{shape:?}: {error:e}");

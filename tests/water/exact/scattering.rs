@@ -235,8 +235,7 @@ fn meshes_scatter_nearly_the_same() {
             faces: None,
         };
         let mesh = hydrograd::shape::build(&shape, Path::new("."), Some(1280)).unwrap();
-        let mesh =
-            BodyBoundary::new("body", mesh.vertices(), mesh.faces(), &Settings::default()).unwrap();
+        let mesh = BodyBoundary::new("body", &mesh, &Settings::default()).unwrap();
         let body = exact("body", semi_axes, 0.3);
         let points = off_surface(semi_axes, 0.4, 40);
         for (a, b) in [

@@ -303,7 +303,7 @@ fn shapes(scene: &Scene) -> impl Iterator<Item = &Shape> {
 
 /// Whether a shape's number of faces can be chosen.
 fn refinable(shape: &Shape) -> bool {
-    !matches!(shape, Shape::Mesh { .. } | Shape::Triangles { .. })
+    !shape.is_mesh()
 }
 
 /// A reproducible force for every velocity, of unit length in the metric of the mass matrix's diagonal.

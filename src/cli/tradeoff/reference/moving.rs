@@ -7,8 +7,8 @@ use super::{Limits, climb, refinable, shapes};
 use crate::boundary::OneBody;
 use crate::cli::tradeoff::measure::{Path, Start};
 use crate::dynamics::Integrator;
+use crate::geometry::Other;
 use crate::scene::{Scene, Shape};
-use crate::shape::Other;
 use crate::simulate::{Fidelity, Settings, Simulator};
 use crate::{Error, Result};
 

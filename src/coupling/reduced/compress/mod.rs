@@ -25,7 +25,8 @@ mod samples;
 
 use super::{Fit, Parts, ReducedBody};
 use crate::adjoint::lie::Vec3;
-use crate::boundary::{Response, Surface};
+use crate::boundary::Response;
+use crate::geometry::{Ball, Interior, TriMesh};
 use crate::{Error, Result};
 use faer::Mat;
 use nalgebra::DMatrix;
@@ -136,25 +137,22 @@ impl Proxies {
     }
 }
 
-/// Compresses the body whose closed surface is `vertices` (m, body frame) and `faces`, and whose flow
-/// `response` knows.
+/// Compresses the body `name` with a mesh in its frame, whose flow `response` knows.
 ///
 /// A resolved gap below [`finest_gap`] is raised to it: see [`Fit::resolved_gap`].
 ///
 /// # Errors
-/// Settings out of range, a surface that doesn't bound a volume, and what the one-body method
-/// doesn't resolve.
+/// Settings out of range, and what the one-body method doesn't resolve.
 pub fn compress(
     name: &str,
-    vertices: &[Vec3],
-    faces: &[[usize; 3]],
+    mesh: &TriMesh,
     response: &dyn Response,
     settings: &Settings,
 ) -> Result<ReducedBody> {
     settings.validate()?;
-    let surface = Surface::new(name, vertices, faces)?;
-    let (centre, radius) = ball(vertices);
-    let area: f64 = surface.faces.areas.iter().sum();
+    let surface = Interior::new(mesh);
+    let Ball { center, radius } = mesh.bounding_ball();
+    let area = surface.faces.area();
     let warnings = response.warnings().to_vec();
     let finest = finest_gap(area);
     let asked = settings.resolved_gap;
@@ -190,7 +188,7 @@ pub fn compress(
             quantity: "points inside for its compressed sources".into(),
             value: 0.0,
             limit: 1.0,
-            remedy: format!("the mesh ({} faces) is too coarse", faces.len()),
+            remedy: format!("the mesh ({} faces) is too coarse", surface.faces.len()),
         });
     }
     let own = response.radiated(&fitted.points)?;
@@ -250,7 +248,7 @@ pub fn compress(
         modes: dense(&modes),
         strengths: dense(&strengths),
         added_mass: response.added_mass(),
-        centre,
+        centre: center,
         radius,
         volume: surface.faces.volume(),
         fit: Fit {
@@ -300,17 +298,8 @@ fn relative(a: &Mat<f64>, b: &Mat<f64>) -> f64 {
     (a - b).norm_max() / b.norm_max()
 }
 
-/// Middle of the bounding box, and the largest distance of a vertex from it.
-fn ball(vertices: &[Vec3]) -> (Vec3, f64) {
-    let low = vertices.iter().fold(vertices[0], |m, v| m.inf(v));
-    let high = vertices.iter().fold(vertices[0], |m, v| m.sup(v));
-    let centre = 0.5 * (low + high);
-    let far = |r: f64, v: &Vec3| r.max((v - centre).norm());
-    (centre, vertices.iter().fold(0.0, far))
-}
-
 /// Proxies to fit to and others to check at, `spacing` times their distance from the surface apart.
-fn proxies(surface: &Surface, gap: f64, radius: f64, spacing: f64) -> (Proxies, Proxies) {
+fn proxies(surface: &Interior, gap: f64, radius: f64, spacing: f64) -> (Proxies, Proxies) {
     let empty = || Proxies {
         points: Vec::new(),
         distances: Vec::new(),
@@ -345,7 +334,7 @@ fn potentials_weighted(proxies: &Proxies, sources: &[Vec3]) -> Mat<f64> {
 }
 
 /// Points inside, at several depths.
-fn candidates(surface: &Surface, gap: f64, radius: f64) -> Vec<Vec3> {
+fn candidates(surface: &Interior, gap: f64, radius: f64) -> Vec<Vec3> {
     let mut spacing = CANDIDATES;
     loop {
         let mut out = Vec::new();

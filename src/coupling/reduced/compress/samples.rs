@@ -1,11 +1,11 @@
 //! Points around a body, at given distances from its surface, and inside it.
 
 use crate::adjoint::lie::Vec3;
-use crate::boundary::Surface;
+use crate::geometry::{Edge, Interior};
 use rayon::prelude::*;
 use std::collections::HashMap;
 
-/// Turn of the surface, rad, from which an edge is sharp.
+/// Bend of the surface, rad, from which an edge is sharp.
 const SHARP: f64 = 0.6;
 
 /// A point of the surface with a direction into the fluid.
@@ -19,30 +19,26 @@ pub(super) struct Sample {
 
 /// Points of the surface no farther apart than about `spacing`; at sharp edges and corners with
 /// directions between the faces' normals.
-pub(super) fn surface_points(surface: &Surface, spacing: f64) -> Vec<Sample> {
+pub(super) fn surface_points(surface: &Interior, spacing: f64) -> Vec<Sample> {
     let mut out = Vec::new();
     let normals = &surface.faces.normals;
     let smooth = |v: usize, f: usize| {
         let n = &surface.vertex_normals[v];
         (n.dot(&normals[f]) > SHARP.cos()).then_some(*n)
     };
-    let mut edges: HashMap<(usize, usize), usize> = HashMap::new();
-    let mut ridges = Vec::new();
-    for (f, t) in surface.triangles.iter().enumerate() {
-        for k in 0..3 {
-            let (a, b) = (t[k], t[(k + 1) % 3]);
-            if let Some(g) = edges.remove(&(a.min(b), a.max(b))) {
-                if normals[f].dot(&normals[g]) < SHARP.cos() {
-                    ridges.push((a, b, f, (normals[f] + normals[g]).normalize()));
-                }
-            } else {
-                edges.insert((a.min(b), a.max(b)), f);
-            }
-        }
-    }
+    let faces = surface.mesh.faces();
+    // In the order of their second faces, and along each of these.
+    let mut ridges: Vec<(usize, usize, Edge)> = (surface.mesh.sharp_edges(SHARP).into_iter())
+        .map(|e| {
+            let [second, from] = [e.faces[1], e.vertices[1]];
+            let corner = faces[second].iter().position(|v| *v == from);
+            (second, corner.unwrap_or(0), e)
+        })
+        .collect();
+    ridges.sort_unstable_by_key(|(face, corner, _)| (*face, *corner));
     for (v, normal) in surface.vertex_normals.iter().enumerate() {
-        let point = surface.vertices[v];
-        let face = surface.triangles.iter().position(|t| t.contains(&v));
+        let point = surface.mesh.vertices()[v];
+        let face = faces.iter().position(|t| t.contains(&v));
         if let Some(face) = face {
             out.push(Sample {
                 point,
@@ -51,8 +47,9 @@ pub(super) fn surface_points(surface: &Surface, spacing: f64) -> Vec<Sample> {
             });
         }
     }
-    for (a, b, face, normal) in ridges {
-        let (a, b) = (surface.vertices[a], surface.vertices[b]);
+    for (face, _, Edge { vertices, faces }) in ridges {
+        let [b, a] = vertices.map(|v| surface.mesh.vertices()[v]);
+        let normal = (normals[faces[0]] + normals[faces[1]]).normalize();
         let n = ((b - a).norm() / spacing).ceil() as usize;
         for i in 1..n {
             let point = a + (b - a) * (i as f64 / n as f64);
@@ -63,7 +60,7 @@ pub(super) fn surface_points(surface: &Surface, spacing: f64) -> Vec<Sample> {
             });
         }
     }
-    for (face, t) in surface.triangles.iter().enumerate() {
+    for (face, t) in faces.iter().enumerate() {
         let c = &surface.faces.corners[face];
         let longest = (0..3).map(|k| (c[(k + 1) % 3] - c[k]).norm());
         let n = (longest.fold(0.0, f64::max) / spacing).ceil().max(1.0) as usize;
@@ -117,7 +114,7 @@ pub(super) fn thin(points: impl IntoIterator<Item = Vec3>, spacing: f64) -> Vec<
 }
 
 /// Points at `offset` from the surface, about `spacing` apart.
-pub(super) fn around(surface: &Surface, offset: f64, spacing: f64) -> Vec<Vec3> {
+pub(super) fn around(surface: &Interior, offset: f64, spacing: f64) -> Vec<Vec3> {
     let samples = surface_points(surface, 0.5 * spacing);
     let moved = samples.iter().map(|s| s.point + s.normal * offset);
     let points = thin(moved, spacing);
@@ -135,7 +132,7 @@ pub(super) fn around(surface: &Surface, offset: f64, spacing: f64) -> Vec<Vec3> 
 
 /// Points inside the surface, `depth` deep or as deep as the body allows there, `spacing` apart
 /// relative to their depth.
-pub(super) fn inside(surface: &Surface, depth: f64, spacing: f64, tangent: f64) -> Vec<Vec3> {
+pub(super) fn inside(surface: &Interior, depth: f64, spacing: f64, tangent: f64) -> Vec<Vec3> {
     let samples = thin_samples(
         surface_points(surface, 0.7 * spacing * depth),
         spacing * depth,
@@ -145,7 +142,7 @@ pub(super) fn inside(surface: &Surface, depth: f64, spacing: f64, tangent: f64) 
         .map(|s| {
             let start = s.point - s.normal * (1e-9 * depth);
             let thickness = surface.ray(&start, &-s.normal, usize::MAX, s.face)?;
-            let ball = surface.ball(&s.point, &s.normal, thickness);
+            let ball = surface.tangent_ball(&s.point, &s.normal, thickness);
             let d = depth.min(tangent * ball);
             let p = s.point - s.normal * d;
             surface.contains(&p).then_some((p, d))

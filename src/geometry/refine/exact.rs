@@ -1,45 +1,36 @@
-//! The surfaces that meshes of shapes by formula stand for.
+//! The exact surfaces that meshes stand for.
 
-use crate::scene::Shape;
 use hydrograd_adjoint::lie::Vec3;
 
 /// Height above a cylinder's end, as a part of its length, that still counts as on it.
 const LEVEL: f64 = 1e-9;
 
-/// Where a surface is curved, and how it is reached.
-pub(super) enum Form {
+/// The exact surface that a mesh stands for: where it is curved, and how it is reached.
+#[derive(Clone, Debug, PartialEq)]
+pub enum ExactSurface {
     /// Flat faces only.
     Flat,
-    /// An ellipsoid along the axes.
+    /// An ellipsoid along the axes: its semi-axes, m.
     Ellipsoid(Vec3),
     /// About z; its ends are flat.
-    Cylinder { radius: f64, half: f64 },
-    /// About z; `half` is half the length of the straight part.
-    Capsule { radius: f64, half: f64 },
+    Cylinder {
+        /// m.
+        radius: f64,
+        /// Half its length, m.
+        half: f64,
+    },
+    /// About z, with hemispherical ends.
+    Capsule {
+        /// m.
+        radius: f64,
+        /// Half the length of the straight part, m.
+        half: f64,
+    },
 }
 
-impl Form {
-    pub fn of(shape: &Shape) -> Self {
-        match *shape {
-            Shape::Sphere { radius, .. } => Self::Ellipsoid(Vec3::repeat(radius)),
-            Shape::Ellipsoid { semi_axes, .. } => Self::Ellipsoid(semi_axes.into()),
-            Shape::Cylinder { radius, length, .. } => Self::Cylinder {
-                radius,
-                half: 0.5 * length,
-            },
-            Shape::Capsule { radius, length, .. } => Self::Capsule {
-                radius,
-                half: 0.5 * length,
-            },
-            Shape::Box { .. }
-            | Shape::Prism { .. }
-            | Shape::Mesh { .. }
-            | Shape::Triangles { .. } => Self::Flat,
-        }
-    }
-
+impl ExactSurface {
     /// Whether a face stands for a curved part.
-    pub fn curved(&self, corners: &[Vec3; 3]) -> bool {
+    pub(super) fn curved(&self, corners: &[Vec3; 3]) -> bool {
         match self {
             Self::Flat => false,
             Self::Ellipsoid(_) | Self::Capsule { .. } => true,
@@ -52,7 +43,7 @@ impl Form {
 
     /// The point of the curved part that `x`, the middle of a chord, stands for: the same way as the base
     /// mesh is laid out, so that an ellipsoid's is a stretched sphere's.
-    pub fn onto(&self, x: &Vec3) -> Vec3 {
+    pub(super) fn onto(&self, x: &Vec3) -> Vec3 {
         match self {
             Self::Flat => *x,
             Self::Ellipsoid(axes) => over(x, x.component_div(axes).norm()),

@@ -1,10 +1,9 @@
 //! The passes over a mesh that fill a report.
 
-use super::{Finding, Kind, MeshReport, Severity, counted, number};
-use crate::shape::mass::signed_volume;
-use crate::shape::mesh::{TriMesh, area_vector, bounds};
-use crate::shape::topology::{self, Component, Edges};
-use crate::shape::weld;
+use super::report::{Finding, Kind, MeshReport, Severity, counted, number};
+use crate::geometry::points::{area_vector, bounds, signed_volume, vertex_normal_sums};
+use crate::geometry::topology::{self, Component, Edges};
+use crate::geometry::weld;
 use hydrograd_adjoint::lie::Vec3;
 use std::collections::HashMap;
 
@@ -17,21 +16,22 @@ const POINT_FACE: f64 = 1e-10;
 const SAME_PLACE: f64 = 1e-10;
 /// Volume over area^1.5 at which a closed piece has no inside.
 const FLAT_PIECE: f64 = 1e-9;
+/// Largest coordinate, m: products of four lengths stay in double precision.
+const FARTHEST: f64 = 1e60;
+/// Length of the sum of angle-weighted unit normals below which a vertex has no normal.
+const FOLDED: f64 = 1e-9;
 /// Aspect ratio from which a warning is given.
 const LONG_FACE: f64 = 30.0;
 
-/// Checks a mesh; see [`Kind`] for what is looked for.
-pub fn check(mesh: &TriMesh) -> MeshReport {
-    check_parts(mesh.name(), mesh.vertices(), mesh.faces())
-}
-
-/// Checks the parts of a mesh, which may be anything: `vertices` in m, `faces` counted from 0.
+/// Checks the parts of a mesh, which may be anything: `vertices` in m, `faces` counted from 0. See [`Kind`]
+/// for what is looked for.
 pub fn check_parts(name: &str, vertices: &[Vec3], faces: &[[usize; 3]]) -> MeshReport {
     let mut checker = Checker::new(vertices, faces);
     checker.indices_and_numbers();
     checker.duplicate_faces();
     checker.shapes();
     let components = checker.connections();
+    checker.folds();
     checker.vertices_alone();
 
     let mut findings = checker.findings;
@@ -56,6 +56,10 @@ pub fn check_parts(name: &str, vertices: &[Vec3], faces: &[[usize; 3]]) -> MeshR
     }
 }
 
+fn is_usable(x: &Vec3) -> bool {
+    x.iter().all(|c| c.abs() <= FARTHEST)
+}
+
 fn corners(vertices: &[Vec3], face: [usize; 3]) -> [Vec3; 3] {
     face.map(|v| vertices[v])
 }
@@ -76,7 +80,7 @@ struct Checker<'a> {
 
 impl<'a> Checker<'a> {
     fn new(vertices: &'a [Vec3], faces: &'a [[usize; 3]]) -> Self {
-        let is_finite = |v: usize| vertices[v].iter().all(|x| x.is_finite());
+        let is_finite = |v: usize| is_usable(&vertices[v]);
         let indexed: Vec<usize> = (0..faces.len())
             .filter(|&f| faces[f].iter().all(|&v| v < vertices.len()))
             .collect();
@@ -180,7 +184,7 @@ impl<'a> Checker<'a> {
             self.report_faces(Kind::IndexOutOfRange, &wrong, problem, remedy);
         }
         let bad: Vec<usize> = (0..count)
-            .filter(|&v| !self.vertices[v].iter().all(|x| x.is_finite()))
+            .filter(|&v| !is_usable(&self.vertices[v]))
             .collect();
         if let Some(&first) = bad.first() {
             let face = (0..self.faces.len()).find(|&f| self.faces[f].contains(&first));
@@ -191,10 +195,10 @@ impl<'a> Checker<'a> {
                 face,
                 Some(self.vertices[first]),
                 format!(
-                    "{} NaN or infinite coordinates, the first is vertex {first}",
+                    "{} coordinates that are NaN, infinite or over {FARTHEST:.0e} m, the first is vertex {first}",
                     counted(bad.len(), "vertex has", "vertices have")
                 ),
-                "export the mesh again; coordinates must be finite numbers",
+                "export the mesh again; coordinates must be finite numbers, in metres",
             );
         }
     }
@@ -410,6 +414,35 @@ impl<'a> Checker<'a> {
         let remedy = "reverse the order of the corners of its faces (flip normals); delete it if \
                       it is a cavity";
         self.report_faces(Kind::Inward, &inward, problem, remedy);
+    }
+
+    /// Vertices without a normal; looked for only where all else is right.
+    fn folds(&mut self) {
+        let is_error = |f: &Finding| f.severity == Severity::Error;
+        if self.findings.iter().any(is_error) {
+            return;
+        }
+        let sums = vertex_normal_sums(self.vertices, self.faces);
+        let mut used = vec![None; sums.len()];
+        for (f, face) in self.faces.iter().enumerate().rev() {
+            face.iter().for_each(|&v| used[v] = Some(f));
+        }
+        let folded = |v: &usize| used[*v].is_some() && sums[*v].norm() <= FOLDED;
+        let folded: Vec<usize> = (0..sums.len()).filter(folded).collect();
+        if let Some(&v) = folded.first() {
+            self.report(
+                Kind::FoldedVertex,
+                Severity::Error,
+                folded.len(),
+                used[v],
+                Some(self.vertices[v]),
+                format!(
+                    "{} faces that fold back on each other, the first is vertex {v}",
+                    counted(folded.len(), "vertex has", "vertices have")
+                ),
+                "mend the surface there, or split what touches in a point only",
+            );
+        }
     }
 
     fn vertices_alone(&mut self) {

@@ -1,21 +1,28 @@
-//! Finer faces where a body comes near others.
-//!
-//! Faces that touch a region (a ball) are split at their longest edges until these are short enough; around
-//! it the mesh grows coarser from ring to ring. See [`bisection`] for how, and [`form`] for curved parts.
+//! Regions, and the faces that are split for them.
 
-mod bisection;
-mod form;
-
-use super::check::check;
-use super::gap::triangle::Triangle;
-use super::mesh::{TriMesh, area_vector};
+use super::bisection::{Bisection, EdgeLength};
+use super::exact::ExactSurface;
 use crate::error::{Error, Result};
-use crate::scene::Refinement;
-use crate::scene::Shape;
-use bisection::{Bisection, Edge};
-use form::Form;
+use crate::geometry::mesh::TriMesh;
+use crate::geometry::points::area_vector;
+use crate::geometry::triangle::Triangle;
 use hydrograd_adjoint::lie::Vec3;
+use serde::{Deserialize, Serialize};
 use std::collections::BinaryHeap;
+
+/// A ball in which a body's faces are made smaller. Faces that touch it are split at their longest edges until
+/// none is longer than `edge`; around it they grow from ring to ring. New vertices lie on the shape
+/// itself, also where that is curved.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Refinement {
+    /// Its centre, m, in the body's frame.
+    pub center: [f64; 3],
+    /// Its radius, m.
+    pub radius: f64,
+    /// Longest edge inside, m: a gap is resolved from about twice its width on.
+    pub edge: f64,
+}
 
 /// Most faces that refinement may add to a mesh.
 pub const MAX_ADDED_FACES: usize = 200_000;
@@ -51,17 +58,17 @@ pub fn validate_refinements(regions: &[Refinement], place: &str) -> Result<()> {
     Ok(())
 }
 
-/// The mesh of a shape, with faces split where they touch one of the regions (frame of the shape) until
-/// none of their edges is longer than the region's. New vertices lie on the shape's own surface where that
+/// A mesh with faces split where they touch one of the regions (frame of the mesh) until none of their edges
+/// is longer than the region's. New vertices lie on the exact surface that the mesh stands for where that
 /// is curved, and everything else stays as it is: a polyhedron keeps its volume. `place` begins messages.
 ///
 /// # Errors
 /// [`Error::Input`] naming region and field: a number that can't be, an edge that would add more than
 /// [`MAX_ADDED_FACES`] faces or is under a millionth of the mesh's diameter, a region that doesn't reach the
-/// surface. [`Error::Mesh`] if the mesh isn't closed.
+/// surface.
 pub fn refine(
     mesh: &TriMesh,
-    shape: &Shape,
+    exact: &ExactSurface,
     regions: &[Refinement],
     place: &str,
 ) -> Result<TriMesh> {
@@ -69,7 +76,6 @@ pub fn refine(
     if regions.is_empty() {
         return Ok(mesh.clone());
     }
-    check(mesh).into_result()?;
     let least = SHORTEST * mesh.diameter();
     if let Some(i) = regions.iter().position(|r| r.edge < least) {
         return Err(Error::input(
@@ -79,7 +85,7 @@ pub fn refine(
         ));
     }
     let mut work = Work {
-        bisection: Bisection::new(mesh, Form::of(shape)),
+        bisection: Bisection::new(mesh, exact.clone()),
         least,
         most: mesh.faces().len() + MAX_ADDED_FACES,
         place,
@@ -102,7 +108,7 @@ struct Work<'a> {
 
 impl Work<'_> {
     /// Whether a face is still too long for a region that it touches.
-    fn too_long(&self, f: usize, longest: &Edge, region: &Refinement) -> bool {
+    fn too_long(&self, f: usize, longest: &EdgeLength, region: &Refinement) -> bool {
         if longest.squared <= region.edge * region.edge {
             return false;
         }
@@ -150,7 +156,7 @@ impl Work<'_> {
     /// Splits what is too long, the longest first.
     fn split(&mut self, regions: &[Refinement]) -> Result<()> {
         let mut waiting = BinaryHeap::new();
-        let consider = |work: &Self, f: usize, waiting: &mut BinaryHeap<(Edge, usize)>| {
+        let consider = |work: &Self, f: usize, waiting: &mut BinaryHeap<(EdgeLength, usize)>| {
             let longest = work.bisection.longest(f);
             if regions.iter().any(|r| work.too_long(f, &longest, r)) {
                 waiting.push((longest, f));

@@ -1,8 +1,8 @@
 //! Shapes in one word: `sphere:0.05`, `box:1,2,3`.
 
-use super::validate;
+use super::description::Shape;
+use super::validate::validate;
 use crate::error::{Error, Result};
-use crate::scene::Shape;
 
 /// Name, how many numbers (zero: see [`counted`]), and how they are written.
 const FORMS: [(&str, usize, &str); 6] = [

@@ -1,31 +1,14 @@
-//! Smallest gaps between placed surfaces, and between surfaces and walls.
-//!
-//! A [`Gaps`] is built once per scene and asked at every step. Distances between surfaces that
-//! don't overlap are those of the triangle meshes themselves, to rounding. Overlap is found
-//! where surfaces cross and where one lies inside the other; its depth is a lower bound of the
-//! shift that separates the two, measured at vertices, face centres, points well inside and along
-//! crossing edges.
+//! The gaps of a scene.
 
-mod pair;
-mod point;
-mod share;
-mod surface;
-pub(super) mod triangle;
-
-#[cfg(test)]
-mod tests;
-
-pub use point::Distance;
-pub use share::Share;
-
-use super::mesh::TriMesh;
+use super::pair::{Between, Pair};
 use crate::error::{Error, Result};
-use crate::scene::Wall;
+use crate::geometry::ball::Ball;
+use crate::geometry::mesh::TriMesh;
+use crate::geometry::tree::MeshTree;
+use crate::geometry::wall::{HalfSpace, Wall};
 use hydrograd_adjoint::lie::{Pose, Vec3};
-use pair::{Between, Pair};
 use std::cmp::Reverse;
 use std::collections::{BTreeSet, BinaryHeap};
-use surface::Surface;
 
 /// Smallest distance between two surfaces, or a surface and a wall.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -42,6 +25,17 @@ pub struct Gap {
     pub edge: f64,
 }
 
+/// Signed distance of a point from a surface or a wall.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Distance {
+    /// m; negative inside a body or behind a wall.
+    pub distance: f64,
+    /// From what.
+    pub from: Other,
+    /// Mean edge length near the closest point, m; zero at a wall.
+    pub edge: f64,
+}
+
 /// What a body is near.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Other {
@@ -54,9 +48,8 @@ pub enum Other {
 /// The surfaces and walls of a scene, ready to be asked for gaps.
 #[derive(Clone, Debug)]
 pub struct Gaps {
-    surfaces: Vec<Option<Surface>>,
-    /// Point and unit normal.
-    walls: Vec<(Vec3, Vec3)>,
+    trees: Vec<Option<MeshTree>>,
+    walls: Vec<HalfSpace>,
     pairs: Vec<(usize, Other)>,
 }
 
@@ -65,8 +58,7 @@ impl Gaps {
     /// in either order, are left out: those that never move relative to one another.
     ///
     /// # Errors
-    /// [`Error::Mesh`] if a mesh has no faces or a vertex that isn't finite, [`Error::Input`] if a
-    /// wall has no normal or `ignore` names a body that doesn't exist.
+    /// [`Error::Input`] if a wall has no normal or `ignore` names a body that doesn't exist.
     pub fn new(
         meshes: &[Option<&TriMesh>],
         walls: &[Wall],
@@ -80,18 +72,12 @@ impl Gaps {
                 format!("bodies are counted from 0 and there are {count}"),
             ));
         }
-        let surfaces = meshes
-            .iter()
-            .map(|mesh| mesh.map(Surface::new).transpose())
-            .collect::<Result<Vec<_>>>()?;
-        let walls = walls
-            .iter()
-            .enumerate()
-            .map(|(w, wall)| plane(w, wall))
-            .collect::<Result<Vec<_>>>()?;
+        let tree = |mesh: &Option<&TriMesh>| mesh.map(MeshTree::new);
+        let trees: Vec<Option<MeshTree>> = meshes.iter().map(tree).collect();
+        let walls = Wall::half_spaces(walls)?;
         let ignored: BTreeSet<(usize, usize)> =
             ignore.iter().map(|&(a, b)| (a.min(b), a.max(b))).collect();
-        let submerged: Vec<usize> = (0..count).filter(|&i| surfaces[i].is_some()).collect();
+        let submerged: Vec<usize> = (0..count).filter(|&i| trees[i].is_some()).collect();
         let mut pairs = Vec::new();
         for (k, &i) in submerged.iter().enumerate() {
             let others = submerged[k + 1..]
@@ -101,7 +87,7 @@ impl Gaps {
             pairs.extend((0..walls.len()).map(|w| (i, Other::Wall(w))));
         }
         Ok(Self {
-            surfaces,
+            trees,
             walls,
             pairs,
         })
@@ -116,12 +102,10 @@ impl Gaps {
     /// equally near to rounding, always the same one. Pairs with a pose that is missing or isn't
     /// finite are passed over.
     pub fn smallest(&self, poses: &[Pose]) -> Option<Gap> {
-        let balls: Vec<Option<(Vec3, f64)>> = self
-            .surfaces
-            .iter()
-            .zip(poses)
-            .map(|(s, pose)| s.as_ref().map(|s| (pose.apply(&s.center), s.radius)))
-            .collect();
+        let placed = |(tree, pose): (&Option<MeshTree>, &Pose)| {
+            tree.as_ref().map(|t| t.ball.transformed(pose))
+        };
+        let balls: Vec<Option<Ball>> = self.trees.iter().zip(poses).map(placed).collect();
         // Nearest first by the balls around them. Bits of numbers ≥ 0 sort as the numbers do.
         let mut waiting: BinaryHeap<Reverse<(u64, usize)>> = self
             .pairs
@@ -156,32 +140,25 @@ impl Gaps {
     }
 
     /// A lower bound of a gap that isn't negative, from balls around the bodies.
-    fn bound(&self, balls: &[Option<(Vec3, f64)>], (i, other): (usize, Other)) -> Option<f64> {
-        let (center, radius) = (*balls.get(i)?)?;
+    fn bound(&self, balls: &[Option<Ball>], (i, other): (usize, Other)) -> Option<f64> {
+        let ball = (*balls.get(i)?)?;
         let bound = match other {
-            Other::Body(j) => {
-                let (there, other_radius) = (*balls.get(j)?)?;
-                (there - center).norm() - (radius + other_radius)
-            }
-            Other::Wall(w) => {
-                let (point, normal) = self.walls[w];
-                (center - point).dot(&normal) - radius
-            }
+            Other::Body(j) => ball.distance(&(*balls.get(j)?)?),
+            Other::Wall(w) => self.walls[w].height(&ball.center) - ball.radius,
         };
         // Room for rounding.
-        let slack = 1e-14 * (center.norm() + radius + bound.abs());
+        let slack = 1e-14 * (ball.center.norm() + ball.radius + bound.abs());
         bound.is_finite().then_some(bound - slack)
     }
 
     /// A pair's gap if it is below `limit`.
     fn gap(&self, (first, second): (usize, Other), poses: &[Pose], limit: f64) -> Option<Gap> {
-        let placed = |i: usize| Some((self.surfaces.get(i)?.as_ref()?, poses.get(i)?));
-        let (surface, pose) = placed(first)?;
+        let placed = |i: usize| Some((self.trees.get(i)?.as_ref()?, poses.get(i)?));
+        let (tree, pose) = placed(first)?;
         let Between { distance, edge } = match second {
-            Other::Body(j) => Pair::new((surface, pose), placed(j)?)?.between(limit)?,
+            Other::Body(j) => Pair::new((tree, pose), placed(j)?)?.between(limit)?,
             Other::Wall(w) => {
-                let (point, normal) = &self.walls[w];
-                let (distance, edge) = surface.height(pose, point, normal);
+                let (distance, edge) = tree.height(pose, &self.walls[w]);
                 Between { distance, edge }
             }
         };
@@ -192,58 +169,29 @@ impl Gaps {
             edge,
         })
     }
-}
 
-/// Point and unit normal of a wall.
-fn plane(number: usize, wall: &Wall) -> Result<(Vec3, Vec3)> {
-    let (point, normal) = (Vec3::from(wall.point), Vec3::from(wall.normal));
-    let largest = normal.amax();
-    if !(largest > 0.0 && normal.iter().chain(point.iter()).all(|x| x.is_finite())) {
-        return Err(Error::input(
-            format!("wall {number}"),
-            format!("point {:?}, normal {:?}", wall.point, wall.normal),
-            "give a finite point and a finite normal that isn't zero, pointing into the fluid",
-        ));
-    }
-    Ok((point, (normal / largest).normalize()))
-}
-
-/// The error of a gap that isn't positive: names both, says how deep and how to mend it.
-/// `names` are those of the bodies; a body without name is called by its number.
-pub fn overlap_error(gap: &Gap, names: &[impl AsRef<str>]) -> Error {
-    let body = |i: usize| {
-        names
-            .get(i)
-            .map_or_else(|| format!("body {i}"), |n| format!("body {:?}", n.as_ref()))
-    };
-    let first = body(gap.first);
-    let depth = -gap.distance;
-    let edge = gap.edge;
-    let (place, remedy) = match gap.second {
-        Other::Body(j) if depth > 0.0 => (
-            format!("{first} and {}", body(j)),
-            format!("they overlap: move them apart by at least {depth:.6e} m"),
-        ),
-        Other::Wall(w) if depth > 0.0 => (
-            format!("{first} and wall {w}"),
-            format!(
-                "it reaches through the wall: move it into the fluid by at least {depth:.6e} m"
-            ),
-        ),
-        Other::Body(j) => (
-            format!("{first} and {}", body(j)),
-            format!("they are too near: move them apart; edges there are {edge:.3e} m long"),
-        ),
-        Other::Wall(w) => (
-            format!("{first} and wall {w}"),
-            format!("it is too near: move it into the fluid; edges there are {edge:.3e} m long"),
-        ),
-    };
-    Error::Unresolved {
-        place,
-        quantity: "gap in m".into(),
-        value: gap.distance,
-        limit: 0.0,
-        remedy,
+    /// Distances of a point (world frame) from every surface, one pose per mesh, and then from every wall. A pose that is missing or
+    /// isn't finite is passed over.
+    pub fn distances<'a>(
+        &'a self,
+        point: &'a Vec3,
+        poses: &'a [Pose],
+    ) -> impl Iterator<Item = Distance> + 'a {
+        let placed = self.trees.iter().zip(poses).enumerate();
+        let bodies = placed.filter_map(|(body, (tree, pose))| {
+            let tree = tree.as_ref()?;
+            let (distance, face) = tree.signed(&pose.apply_inverse(point))?;
+            Some(Distance {
+                distance,
+                from: Other::Body(body),
+                edge: tree.edge_at_face(face),
+            })
+        });
+        let walls = self.walls.iter().enumerate();
+        bodies.chain(walls.map(move |(number, wall)| Distance {
+            distance: wall.height(point),
+            from: Other::Wall(number),
+            edge: 0.0,
+        }))
     }
 }

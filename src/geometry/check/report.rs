@@ -1,12 +1,4 @@
-//! What is wrong with a mesh, where, and what to do about it.
-//!
-//! All thresholds are relative to the mesh itself, so a verdict doesn't depend on the unit of
-//! length. Self-intersection (a face that passes through another) is *not* looked for: it
-//! needs a spatial search and exact predicates, and a mesh tool is the place for it.
-
-mod scan;
-
-pub use scan::{check, check_parts};
+//! What a check found, in numbers and in words.
 
 use crate::error::{Error, Result};
 use serde::Serialize;
@@ -31,7 +23,7 @@ pub enum Kind {
     Empty,
     /// A face names a vertex that doesn't exist.
     IndexOutOfRange,
-    /// A vertex with NaN or infinite coordinates.
+    /// A vertex with NaN or infinite coordinates, or so far away that products of lengths leave double precision.
     NotFinite,
     /// A face given twice.
     DuplicateFace,
@@ -45,6 +37,8 @@ pub enum Kind {
     Orientation,
     /// A surface with one side only.
     OneSided,
+    /// A vertex whose faces fold back on each other, so that it has no normal.
+    FoldedVertex,
     /// A closed piece without volume.
     NoVolume,
     /// A closed piece with its normals pointing inward.
@@ -94,7 +88,7 @@ impl Finding {
     }
 }
 
-/// All that [`check()`] found, and the size of the mesh.
+/// All that [`check_parts`](super::check_parts) found, and the size of the mesh.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct MeshReport {
     /// File or shape name.
@@ -194,12 +188,12 @@ impl fmt::Display for MeshReport {
 }
 
 /// "1 face", "3 faces".
-fn counted(n: usize, one: &str, many: &str) -> String {
+pub(super) fn counted(n: usize, one: &str, many: &str) -> String {
     format!("{n} {}", if n == 1 { one } else { many })
 }
 
 /// A number with six digits, in exponent form only where that is shorter to read.
-fn number(x: f64) -> String {
+pub(super) fn number(x: f64) -> String {
     if x == 0.0 || (1e-3..1e5).contains(&x.abs()) {
         let text = format!("{x:.6}");
         let text = text.trim_end_matches('0').trim_end_matches('.');

@@ -5,9 +5,9 @@
 //! high frequency) it has the opposite sign. Mutually perpendicular planes close under
 //! reflection: two need three images, three need seven.
 
-use crate::adjoint::lie::{Mat3, Pose, Vec3, Vec6, angular, linear, six};
-use crate::scene::{Wall, WallSurface};
-use crate::{Error, Result};
+use super::wall::{Wall, WallSurface};
+use crate::error::{Error, Result};
+use hydrograd_adjoint::lie::{Mat3, Pose, Vec3, Vec6, angular, linear, six};
 
 /// A product of reflections, `x ↦ linear · x + shift`.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -41,16 +41,8 @@ impl Image {
         let mut out = vec![Self::identity()];
         let mut normals: Vec<Vec3> = Vec::new();
         for (i, wall) in walls.iter().enumerate() {
-            let n = Vec3::from(wall.normal);
-            let length = n.norm();
-            if !(length > 0.0 && length.is_finite()) {
-                return Err(Error::input(
-                    format!("walls[{i}].normal"),
-                    format!("{:?}", wall.normal),
-                    "must be a direction, finite and not zero",
-                ));
-            }
-            let n = n / length;
+            let plane = wall.half_space(i)?;
+            let n = plane.normal;
             if let Some(k) = normals.iter().position(|m| m.dot(&n).abs() > 1e-9) {
                 return Err(Error::input(
                     format!("walls[{i}].normal"),
@@ -67,7 +59,7 @@ impl Image {
                 WallSurface::Rigid => 1.0,
                 WallSurface::Free => -1.0,
             };
-            let shift = 2.0 * n.dot(&Vec3::from(wall.point)) * n;
+            let shift = 2.0 * n.dot(&plane.point) * n;
             let reflected: Vec<Image> = out
                 .iter()
                 .map(|image| Image {
@@ -113,8 +105,8 @@ impl Image {
 
     /// Spatial twist of the image of a body that moves with the spatial twist `z`.
     pub fn twist(&self, z: &Vec6) -> Vec6 {
-        let turn = self.parity * (self.linear * angular(z));
-        six(&(self.linear * linear(z) - turn.cross(&self.shift)), &turn)
+        let rate = self.parity * (self.linear * angular(z));
+        six(&(self.linear * linear(z) - rate.cross(&self.shift)), &rate)
     }
 
     /// Transpose of [`Image::twist`]: the wrench on the body from that on its image.

@@ -1,10 +1,11 @@
-//! One surface, ready to be asked: its faces in a tree of boxes, and its normals.
+//! One mesh, ready to be asked for closest points: its faces in a tree of boxes, and its normals.
 
-use super::super::mesh::TriMesh;
+use super::ball::Ball;
+use super::mesh::TriMesh;
+use super::points::{bounds, winding_number};
 use super::triangle::{Feature, Triangle};
-use crate::error::{Error, Result};
+use super::wall::HalfSpace;
 use hydrograd_adjoint::lie::{Pose, Vec3};
-use std::collections::HashMap;
 
 /// Faces in a leaf, at most.
 const LEAF: usize = 2;
@@ -29,9 +30,9 @@ impl Node {
     }
 }
 
-/// A surface in its body frame.
+/// A mesh in its body frame.
 #[derive(Clone, Debug)]
-pub(super) struct Surface {
+pub(super) struct MeshTree {
     pub nodes: Vec<Node>,
     /// In the order of the tree, as are `corners` and `edge_normals`.
     pub triangles: Vec<Triangle>,
@@ -39,68 +40,37 @@ pub(super) struct Surface {
     pub vertices: Vec<Vec3>,
     /// Sum of the unit normals at each edge of a face, from its corner k to the next.
     edge_normals: Vec<[Vec3; 3]>,
-    /// Normals weighted with the angles at each vertex.
+    /// Unit normals at each vertex.
     vertex_normals: Vec<Vec3>,
     /// Mean edge length around each vertex, m.
     edge_at_vertex: Vec<f64>,
-    /// One vertex of every connected piece.
-    pub seeds: Vec<usize>,
-    /// Centre and radius of a ball around all.
-    pub center: Vec3,
-    pub radius: f64,
+    /// A ball around all.
+    pub ball: Ball,
     /// Largest distance of a vertex from the body's origin.
     pub reach: f64,
 }
 
-impl Surface {
-    pub fn new(mesh: &TriMesh) -> Result<Self> {
-        let refuse = |problem: String, location: String, remedy: &str| Error::Mesh {
-            name: mesh.name().into(),
-            problem,
-            location,
-            remedy: remedy.into(),
-        };
-        if mesh.faces().is_empty() {
-            return Err(refuse(
-                "no faces".into(),
-                "whole mesh".into(),
-                "give a closed surface",
-            ));
-        }
-        let vertices = mesh.vertices().to_vec();
-        // Finite, and far enough from the limits for products of four lengths.
-        let usable = |x: &Vec3| x.iter().all(|c| c.abs() <= 1e60);
-        if let Some((v, x)) = vertices.iter().enumerate().find(|(_, x)| !usable(x)) {
-            return Err(refuse(
-                "vertex out of range".into(),
-                format!("vertex {v} at {:?} m, counted from 0", x.as_slice()),
-                "give finite coordinates in metres",
-            ));
-        }
+impl MeshTree {
+    pub fn new(mesh: &TriMesh) -> Self {
         let all: Vec<Triangle> = (0..mesh.faces().len())
             .map(|f| Triangle::new(mesh.corners(f)))
             .collect();
-        let (edge_normals, vertex_normals) = normals(mesh, &all);
+        let edge_normals = edge_normals(mesh, &all);
         let centroids: Vec<Vec3> = (0..all.len()).map(|f| mesh.centroid(f)).collect();
         let mut order: Vec<usize> = (0..all.len()).collect();
         let mut nodes = Vec::with_capacity(2 * all.len());
         grow(&mut nodes, &mut order, 0, &centroids, &all);
-        let center = nodes[0].center;
-        // Only vertices that faces use bound the surface.
-        let used = || all.iter().flat_map(|t| t.corners.iter());
-        Ok(Self {
+        Self {
             triangles: order.iter().map(|&f| all[f]).collect(),
             corners: order.iter().map(|&f| mesh.faces()[f]).collect(),
             edge_normals: order.iter().map(|&f| edge_normals[f]).collect(),
-            vertex_normals,
+            vertex_normals: mesh.vertex_normals(),
             edge_at_vertex: edge_lengths(mesh),
-            seeds: seeds(mesh),
-            radius: used().map(|x| (x - center).norm()).fold(0.0, f64::max),
-            reach: used().map(|x| x.norm()).fold(0.0, f64::max),
+            ball: mesh.bounding_ball(),
+            reach: mesh.vertices().iter().map(|x| x.norm()).fold(0.0, f64::max),
             nodes,
-            vertices,
-            center,
-        })
+            vertices: mesh.vertices().to_vec(),
+        }
     }
 
     /// Mean edge length around a face, m.
@@ -182,29 +152,15 @@ impl Surface {
             return side < 0.0;
         }
         // Undecided: the solid angle of the whole surface decides.
-        self.turns(p) > 0.5
-    }
-
-    /// How often the surface winds around a point.
-    fn turns(&self, p: &Vec3) -> f64 {
-        let half: f64 = self
-            .triangles
-            .iter()
-            .map(|t| {
-                let [a, b, c] = t.corners.map(|x| x - p);
-                let (la, lb, lc) = (a.norm(), b.norm(), c.norm());
-                let below = la * lb * lc + a.dot(&b) * lc + b.dot(&c) * la + c.dot(&a) * lb;
-                a.dot(&b.cross(&c)).atan2(below)
-            })
-            .sum();
-        half / std::f64::consts::TAU
+        let corners = self.triangles.iter().map(|t| &t.corners);
+        winding_number(corners, p) > 0.5
     }
 
     /// Midway between a face and what lies opposite inside the surface.
     pub fn middle(&self, face: usize) -> Option<Vec3> {
         let from = self.centroid(face);
         let inward = -self.triangles[face].normal;
-        let to = from + inward * (2.5 * self.radius);
+        let to = from + inward * (2.5 * self.ball.radius);
         // Steps over what touches the face itself.
         let least = 1e-9;
         let mut first = 1.0;
@@ -245,12 +201,13 @@ impl Surface {
         signed.is_finite().then_some((signed, best.face))
     }
 
-    /// Smallest height of a vertex above the plane with unit normal `normal` through `point`,
-    /// world frame, and the mean edge length there.
-    pub fn height(&self, pose: &Pose, point: &Vec3, normal: &Vec3) -> (f64, f64) {
-        let (lowest, vertex) = self.lowest(&pose.rotation.tr_mul(normal));
-        let shift = (pose.translation - point).dot(normal);
-        (lowest + shift, self.edge_at_vertex[vertex])
+    /// Smallest height of a vertex in a half space (world frame), and the mean edge length there.
+    pub fn height(&self, pose: &Pose, wall: &HalfSpace) -> (f64, f64) {
+        let (lowest, vertex) = self.lowest(&pose.rotation.tr_mul(&wall.normal));
+        (
+            lowest + wall.height(&pose.translation),
+            self.edge_at_vertex[vertex],
+        )
     }
 
     /// The vertex least far along a direction, body frame, and how far it is.
@@ -328,8 +285,7 @@ fn grow(
     centroids: &[Vec3],
     triangles: &[Triangle],
 ) -> usize {
-    let [low, high] =
-        super::super::mesh::bounds(order.iter().flat_map(|&f| triangles[f].corners.iter()));
+    let [low, high] = bounds(order.iter().flat_map(|&f| triangles[f].corners.iter()));
     let root = nodes.len();
     let center = low + (high - low) * 0.5;
     nodes.push(Node {
@@ -340,7 +296,7 @@ fn grow(
         second: None,
     });
     if order.len() > LEAF {
-        let [low, high] = super::super::mesh::bounds(order.iter().map(|&f| &centroids[f]));
+        let [low, high] = bounds(order.iter().map(|&f| &centroids[f]));
         let axis = (high - low).imax();
         let half = order.len() / 2;
         order.select_nth_unstable_by(half, |&f, &g| {
@@ -356,27 +312,20 @@ fn grow(
     root
 }
 
-/// Normals at edges (of each face) and at vertices.
-fn normals(mesh: &TriMesh, triangles: &[Triangle]) -> (Vec<[Vec3; 3]>, Vec<Vec3>) {
-    let key = |a: usize, b: usize| (a.min(b), a.max(b));
-    let mut at_edge: HashMap<(usize, usize), Vec3> = HashMap::new();
-    let mut at_vertex = vec![Vec3::zeros(); mesh.vertices().len()];
-    for (face, t) in mesh.faces().iter().zip(triangles) {
-        for k in 0..3 {
-            let (a, b) = (face[k], face[(k + 1) % 3]);
-            *at_edge.entry(key(a, b)).or_insert_with(Vec3::zeros) += t.normal;
-            let x = &t.corners;
-            let (to, back) = (x[(k + 1) % 3] - x[k], x[(k + 2) % 3] - x[k]);
-            let angle = to.cross(&back).norm().atan2(to.dot(&back));
-            at_vertex[a] += t.normal * angle;
+/// Of each face the sum of the unit normals at each of its edges.
+fn edge_normals(mesh: &TriMesh, triangles: &[Triangle]) -> Vec<[Vec3; 3]> {
+    let mut out = vec![[Vec3::zeros(); 3]; triangles.len()];
+    for edge in mesh.edges() {
+        let [f, g] = edge.faces;
+        let [a, b] = edge.vertices;
+        let sum = triangles[f].normal + triangles[g].normal;
+        for (face, from) in [(f, a), (g, b)] {
+            let start = mesh.faces()[face].iter().position(|&v| v == from);
+            // Each of the two faces runs through the edge from this vertex.
+            out[face][start.unwrap_or(0)] = sum;
         }
     }
-    let edges = mesh
-        .faces()
-        .iter()
-        .map(|&[a, b, c]| [(a, b), (b, c), (c, a)].map(|(a, b)| at_edge[&key(a, b)]))
-        .collect();
-    (edges, at_vertex)
+    out
 }
 
 /// Mean edge length of the faces around each vertex.
@@ -393,30 +342,4 @@ fn edge_lengths(mesh: &TriMesh) -> Vec<f64> {
     sum.iter()
         .map(|&(total, count): &(f64, f64)| total / count.max(1.0))
         .collect()
-}
-
-/// One vertex of every connected piece.
-fn seeds(mesh: &TriMesh) -> Vec<usize> {
-    let mut parent: Vec<usize> = (0..mesh.vertices().len()).collect();
-    fn root(parent: &mut [usize], mut v: usize) -> usize {
-        while parent[v] != v {
-            parent[v] = parent[parent[v]];
-            v = parent[v];
-        }
-        v
-    }
-    for face in mesh.faces() {
-        for &v in &face[1..] {
-            let (a, b) = (root(&mut parent, face[0]), root(&mut parent, v));
-            parent[a.max(b)] = a.min(b);
-        }
-    }
-    let mut found: Vec<usize> = mesh
-        .faces()
-        .iter()
-        .map(|face| root(&mut parent, face[0]))
-        .collect();
-    found.sort_unstable();
-    found.dedup();
-    found
 }

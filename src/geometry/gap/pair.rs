@@ -1,7 +1,7 @@
 //! Two placed surfaces: how far apart, or how deep in one another.
 
-use super::surface::{Node, Surface};
-use super::triangle::Triangle;
+use crate::geometry::tree::{MeshTree, Node};
+use crate::geometry::triangle::Triangle;
 use hydrograd_adjoint::lie::{Mat3, Pose, Vec3};
 
 /// Points of each kind, at most, at which a depth is measured.
@@ -28,17 +28,18 @@ pub(super) struct Between {
 
 /// Two surfaces, the second in the frame of the first.
 pub(super) struct Pair<'a> {
-    a: &'a Surface,
-    b: &'a Surface,
+    a: &'a MeshTree,
+    b: &'a MeshTree,
     /// Frame of b in the frame of a.
     pose: Pose,
-    turn: Mat3,
+    /// Absolute values of its rotation.
+    spread: Mat3,
     /// Distance that counts as touching, m.
     touching: f64,
 }
 
 /// An outer and an inner surface, and where the inner one's points are in the outer's frame.
-type Side<'s> = (&'s Surface, &'s Surface, &'s dyn Fn(&Vec3) -> Vec3);
+type Side<'s> = (&'s MeshTree, &'s MeshTree, &'s dyn Fn(&Vec3) -> Vec3);
 
 /// The closest faces found so far.
 struct Closest {
@@ -49,8 +50,8 @@ struct Closest {
 impl<'a> Pair<'a> {
     /// None unless both poses are finite.
     pub fn new(
-        (a, pose_a): (&'a Surface, &Pose),
-        (b, pose_b): (&'a Surface, &Pose),
+        (a, pose_a): (&'a MeshTree, &Pose),
+        (b, pose_b): (&'a MeshTree, &Pose),
     ) -> Option<Self> {
         // Difference of the translations first: nothing is lost far from the origin.
         let pose = Pose::new(
@@ -66,7 +67,7 @@ impl<'a> Pair<'a> {
         // The translations were rounded in the world.
         let placed = pose_a.translation.amax().max(pose_b.translation.amax());
         Some(Self {
-            turn: pose.rotation.abs(),
+            spread: pose.rotation.abs(),
             touching: TOUCHING * (a.reach + b.reach) + 4.0 * f64::EPSILON * placed,
             a,
             b,
@@ -111,7 +112,7 @@ impl<'a> Pair<'a> {
     /// between the planes through both points is empty, which proves them closest: true if it
     /// is, none if the distance is proven not to be below `limit`.
     fn approach(&self, limit: f64, closest: &mut Closest) -> Option<bool> {
-        let mut q = self.pose.apply(&self.b.center);
+        let mut q = self.pose.apply(&self.b.ball.center);
         let mut last = (f64::INFINITY, Vec3::zeros(), 0, 0);
         for _ in 0..APPROACHES {
             let (p, f) = self.a.closest(&q);
@@ -164,8 +165,8 @@ impl<'a> Pair<'a> {
         let apart = self.pose.apply(&b.center) - a.center;
         let (along_a, along_b) = (apart.abs(), self.pose.rotation.tr_mul(&apart).abs());
         let outside = |v: Vec3| v.map(|x| x.max(0.0)).norm_squared();
-        let bound = outside(along_a - a.half - self.turn * b.half)
-            .max(outside(along_b - b.half - self.turn.tr_mul(&a.half)));
+        let bound = outside(along_a - a.half - self.spread * b.half)
+            .max(outside(along_b - b.half - self.spread.tr_mul(&a.half)));
         let whole = apart.norm_squared();
         let free = whole - along_a.dot(&a.half) - along_b.dot(&b.half);
         if free > 0.0 {
@@ -235,13 +236,10 @@ impl<'a> Pair<'a> {
         }
     }
 
-    /// Whether a piece of one is inside the other; surfaces that don't cross.
+    /// Whether one is inside the other; surfaces that don't cross.
     fn contained(&self) -> bool {
-        let inside = |outer: &Surface, inner: &Surface, place: &dyn Fn(&Vec3) -> Vec3| {
-            inner
-                .seeds
-                .iter()
-                .any(|&v| outer.depth_above(&place(&inner.vertices[v]), 0.0).is_some())
+        let inside = |outer: &MeshTree, inner: &MeshTree, place: &dyn Fn(&Vec3) -> Vec3| {
+            outer.depth_above(&place(&inner.vertices[0]), 0.0).is_some()
         };
         inside(self.a, self.b, &|x| self.pose.apply(x))
             || inside(self.b, self.a, &|x| self.pose.apply_inverse(x))
@@ -253,7 +251,7 @@ impl<'a> Pair<'a> {
         let to_a = |x: &Vec3| self.pose.apply(x);
         let to_b = |x: &Vec3| self.pose.apply_inverse(x);
         let deepest =
-            |depth: f64, outer: &Surface, p: &Vec3| outer.depth_above(p, depth).unwrap_or(depth);
+            |depth: f64, outer: &MeshTree, p: &Vec3| outer.depth_above(p, depth).unwrap_or(depth);
         let mut depth = 0.0;
         let sides: [Side; 2] = [(self.a, self.b, &to_a), (self.b, self.a, &to_b)];
         for (outer, inner, place) in sides {
@@ -282,7 +280,7 @@ impl<'a> Pair<'a> {
         for (outer, inner, place) in sides {
             let faces = inner.triangles.len();
             let middles = (0..faces).step_by(faces / MIDDLES + 1);
-            let center = Some(inner.center).filter(|c| inner.depth_above(c, 0.0).is_some());
+            let center = Some(inner.ball.center).filter(|c| inner.depth_above(c, 0.0).is_some());
             for p in middles.filter_map(|f| inner.middle(f)).chain(center) {
                 depth = deepest(depth, outer, &place(&p));
             }

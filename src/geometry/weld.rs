@@ -5,7 +5,7 @@ use std::collections::HashMap;
 
 /// For each vertex the first vertex at its place: bit for bit if `tolerance` is zero, else within
 /// that distance (m). Vertices that aren't finite stay alone.
-pub(super) fn representatives(vertices: &[Vec3], tolerance: f64) -> Vec<usize> {
+pub(crate) fn representatives(vertices: &[Vec3], tolerance: f64) -> Vec<usize> {
     if tolerance > 0.0 {
         return near(vertices, tolerance);
     }

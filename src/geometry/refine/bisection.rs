@@ -11,8 +11,8 @@
 //! F. Stenger, "A lower bound on the angles of triangles constructed by bisecting the longest side",
 //! Math. Comp. 29 (1975) 390–395.
 
-use super::form::Form;
-use crate::shape::TriMesh;
+use super::exact::ExactSurface;
+use crate::geometry::mesh::TriMesh;
 use hydrograd_adjoint::lie::Vec3;
 use std::cmp::Ordering;
 use std::collections::HashMap;
@@ -20,32 +20,32 @@ use std::collections::HashMap;
 /// An edge with its length, ordered by it. Equal lengths are told apart by the vertices: a strict order, or
 /// paths of ever longer edges might run in circles.
 #[derive(Clone, Copy, Debug)]
-pub(super) struct Edge {
+pub(super) struct EdgeLength {
     pub squared: f64,
     /// The smaller number first.
     pub ends: [usize; 2],
 }
 
-impl Ord for Edge {
+impl Ord for EdgeLength {
     fn cmp(&self, other: &Self) -> Ordering {
         let length = self.squared.total_cmp(&other.squared);
         length.then_with(|| self.ends.cmp(&other.ends))
     }
 }
 
-impl PartialOrd for Edge {
+impl PartialOrd for EdgeLength {
     fn partial_cmp(&self, other: &Self) -> Option<Ordering> {
         Some(self.cmp(other))
     }
 }
 
-impl PartialEq for Edge {
+impl PartialEq for EdgeLength {
     fn eq(&self, other: &Self) -> bool {
         self.cmp(other) == Ordering::Equal
     }
 }
 
-impl Eq for Edge {}
+impl Eq for EdgeLength {}
 
 /// A closed mesh whose triangles can be split.
 pub(super) struct Bisection {
@@ -53,14 +53,14 @@ pub(super) struct Bisection {
     pub faces: Vec<[usize; 3]>,
     /// Whether each face stands for a curved part.
     curved: Vec<bool>,
-    form: Form,
+    exact: ExactSurface,
     /// The two faces of each edge, which is known by its vertices, the smaller number first.
     sides: HashMap<[usize; 2], [usize; 2]>,
 }
 
 impl Bisection {
-    /// Of a mesh that has been checked: every edge has two faces.
-    pub fn new(mesh: &TriMesh, form: Form) -> Self {
+    /// Of a mesh and the surface that it stands for.
+    pub fn new(mesh: &TriMesh, exact: ExactSurface) -> Self {
         let sides = mesh.edges().into_iter().map(|e| {
             let [a, b] = e.vertices;
             ([a.min(b), a.max(b)], e.faces)
@@ -68,8 +68,8 @@ impl Bisection {
         let all = 0..mesh.faces().len();
         Self {
             sides: sides.collect(),
-            curved: all.map(|f| form.curved(&mesh.corners(f))).collect(),
-            form,
+            curved: all.map(|f| exact.curved(&mesh.corners(f))).collect(),
+            exact,
             vertices: mesh.vertices().to_vec(),
             faces: mesh.faces().to_vec(),
         }
@@ -84,9 +84,9 @@ impl Bisection {
     }
 
     /// The longest edge of a face.
-    pub fn longest(&self, f: usize) -> Edge {
+    pub fn longest(&self, f: usize) -> EdgeLength {
         let [a, b, c] = self.faces[f];
-        let edge = |a: usize, b: usize| Edge {
+        let edge = |a: usize, b: usize| EdgeLength {
             squared: (self.vertices[b] - self.vertices[a]).norm_squared(),
             ends: [a.min(b), a.max(b)],
         };
@@ -113,13 +113,13 @@ impl Bisection {
         let [a, b] = ends.map(|v| self.vertices[v]);
         let mut middle = a + (b - a) * 0.5;
         if faces.iter().any(|f| self.curved[*f]) {
-            middle = self.form.onto(&middle);
+            middle = self.exact.onto(&middle);
         }
         let m = self.vertices.len();
         self.vertices.push(middle);
         let added = [self.faces.len(), self.faces.len() + 1];
         for (f, new) in faces.into_iter().zip(added) {
-            // The face keeps the first end, the new one gets the second; both turn as before.
+            // The face keeps the first end, the new one gets the second; both run around as before.
             let swap = |old: usize| self.faces[f].map(|v| if v == old { m } else { v });
             let (near, far) = (swap(ends[1]), swap(ends[0]));
             let apex = near.into_iter().find(|v| *v != m && *v != ends[0]);

@@ -2,7 +2,7 @@
 
 /// One passage of a face through an edge.
 #[derive(Clone, Copy, Debug)]
-pub(super) struct EdgeUse {
+pub(crate) struct EdgeUse {
     /// The edge's vertices, smaller number first.
     pub vertices: [usize; 2],
     /// The face.
@@ -20,10 +20,10 @@ impl EdgeUse {
 }
 
 /// The passages of the given (numbered) faces, sorted by edge and face.
-pub(super) struct Edges(Vec<EdgeUse>);
+pub(crate) struct Edges(Vec<EdgeUse>);
 
 /// Gathers the edges of faces; corners of a face must differ.
-pub(super) fn edges(faces: impl Iterator<Item = (usize, [usize; 3])>) -> Edges {
+pub(crate) fn edges(faces: impl Iterator<Item = (usize, [usize; 3])>) -> Edges {
     let mut uses: Vec<EdgeUse> = faces
         .flat_map(|(face, [a, b, c])| {
             [[a, b], [b, c], [c, a]].map(|[i, j]| EdgeUse {
@@ -46,7 +46,7 @@ impl Edges {
 
 /// A set of faces connected through edges.
 #[derive(Debug)]
-pub(super) struct Component {
+pub(crate) struct Component {
     /// Its faces, ascending.
     pub faces: Vec<usize>,
     /// The faces turned against the majority, ascending. Not looked for where more than two
@@ -59,7 +59,7 @@ pub(super) struct Component {
 }
 
 /// Splits faces (numbers below `count`) into connected components and compares their turns.
-pub(super) fn components(
+pub(crate) fn components(
     count: usize,
     present: impl Iterator<Item = usize>,
     edges: &Edges,

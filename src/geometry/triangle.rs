@@ -6,14 +6,14 @@ use hydrograd_adjoint::lie::Vec3;
 
 /// A triangle and its unit normal; zero if it has no area.
 #[derive(Clone, Copy, Debug)]
-pub(in crate::shape) struct Triangle {
+pub(super) struct Triangle {
     pub corners: [Vec3; 3],
     pub normal: Vec3,
 }
 
 /// The part of a triangle that a closest point lies on.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(in crate::shape) enum Feature {
+pub(super) enum Feature {
     /// Its inside.
     Face,
     /// The edge from this corner to the next.

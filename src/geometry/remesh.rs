@@ -1,6 +1,7 @@
 //! The surface of a mesh with more faces, or with fewer.
 
-use super::mesh::{TriMesh, area_vector};
+use super::mesh::TriMesh;
+use super::points::area_vector;
 use crate::error::Result;
 use hydrograd_adjoint::lie::{Mat3, Vec3};
 use std::cmp::Ordering;
@@ -9,7 +10,7 @@ use std::collections::{BinaryHeap, HashMap};
 /// Distance along the surface counts as this part of the distance from it: on flat ground edges come
 /// out even.
 const EVEN: f64 = 1e-2;
-/// Cosine of the most that a face may turn at once.
+/// Cosine of the most that a face's normal may turn at once.
 const TURN: f64 = 0.3;
 /// Least height of a face over its longest edge.
 const SLIVER: f64 = 0.05;
@@ -43,19 +44,10 @@ impl TriMesh {
     /// M. Garland, P. S. Heckbert, "Surface simplification using quadric error metrics", SIGGRAPH 1997,
     /// 209–216.
     pub fn coarsened(&self, target: usize) -> Result<Self> {
-        let mut surface = Surface::new(self);
-        surface.reduce(target);
-        let (vertices, faces) = surface.parts();
+        let mut collapse = Collapse::new(self);
+        collapse.reduce(target);
+        let (vertices, faces) = collapse.parts();
         Self::new(self.name(), vertices, faces)
-    }
-
-    /// Length of the edges across which the surface turns by more than `angle` (rad), m.
-    pub fn sharp_edges(&self, angle: f64) -> f64 {
-        self.edges()
-            .iter()
-            .filter(|e| self.normal(e.faces[0]).dot(&self.normal(e.faces[1])) < angle.cos())
-            .map(|e| (self.vertices()[e.vertices[0]] - self.vertices()[e.vertices[1]]).norm())
-            .sum()
     }
 }
 
@@ -144,7 +136,7 @@ impl PartialEq for Candidate {
 impl Eq for Candidate {}
 
 /// A surface that loses faces.
-struct Surface {
+struct Collapse {
     vertices: Vec<Vec3>,
     faces: Vec<Option<[usize; 3]>>,
     /// Faces at each vertex.
@@ -158,7 +150,7 @@ struct Surface {
     middle: Vec3,
 }
 
-impl Surface {
+impl Collapse {
     fn new(mesh: &TriMesh) -> Self {
         let [low, high] = mesh.bounds();
         let (middle, size) = (0.5 * (low + high), mesh.diameter());
@@ -295,50 +287,5 @@ impl Surface {
         });
         let faces = faces.collect();
         (vertices, faces)
-    }
-}
-
-#[cfg(test)]
-mod tests {
-    use crate::scene::Shape;
-    use crate::shape::{self, TriMesh};
-    use std::path::Path;
-
-    fn build(shape: Shape, faces: usize) -> TriMesh {
-        shape::build(&shape, Path::new(""), Some(faces)).unwrap()
-    }
-
-    #[test]
-    fn splitting_keeps_the_polyhedron() {
-        let mesh = build(Shape::ellipsoid([1.0, 0.5, 0.2]), 80);
-        let fine = mesh.split();
-        assert_eq!(fine.faces().len(), 4 * mesh.faces().len());
-        assert!(shape::check(&fine).is_ok());
-        let (a, b) = (mesh.mass_properties(), fine.mass_properties());
-        assert!((a.volume - b.volume).abs() < 1e-14 && (a.area - b.area).abs() < 1e-14);
-    }
-
-    #[test]
-    fn coarser_meshes_keep_volume_and_sharp_edges() {
-        for (shape, volume) in [
-            (Shape::sphere(2.0), 0.04),
-            (Shape::ellipsoid([1.0, 0.2, 1.0]), 0.06),
-            (Shape::cuboid([1.0, 0.3, 0.6]), 1e-4),
-        ] {
-            let fine = build(shape, 1280);
-            let mut last = fine.faces().len();
-            for target in [640, 320, 160] {
-                let mesh = fine.coarsened(target).unwrap();
-                let n = mesh.faces().len();
-                assert!(n < last && n <= target + 1, "{n} of {target}");
-                last = n;
-                let (a, b) = (fine.mass_properties(), mesh.mass_properties());
-                let off = (b.volume / a.volume - 1.0).abs();
-                assert!(off < volume, "{} {target}: {off}", fine.name());
-            }
-        }
-        let cube = build(Shape::cuboid([1.0; 3]), 1200);
-        assert!((cube.sharp_edges(1.0) - 12.0).abs() < 1e-12);
-        assert!((cube.coarsened(200).unwrap().sharp_edges(1.0) - 12.0).abs() < 0.02);
     }
 }

@@ -1,8 +1,9 @@
-use super::triangle::Triangle;
-use super::*;
-use crate::scene::Shape;
-use crate::shape::build;
-use hydrograd_adjoint::lie::exp_matrix;
+//! Gaps between placed meshes and walls, shares of volumes, and meshes with other numbers of faces.
+
+use hydrograd::adjoint::lie::{Pose, Vec3, exp_matrix};
+use hydrograd::geometry::{Edge, Gap, Gaps, Kind, Other, Share, Wall, check_parts, overlap_error};
+use hydrograd::shape::build;
+use hydrograd::{Shape, TriMesh};
 use std::path::Path;
 
 fn sphere(radius: f64, faces: usize) -> TriMesh {
@@ -62,77 +63,6 @@ impl Random {
 
     fn vector(&mut self) -> Vec3 {
         Vec3::new(self.next(), self.next(), self.next())
-    }
-}
-
-#[test]
-fn triangles_against_alternating_projections() {
-    let mut random = Random(7);
-    let mut disjoint = 0;
-    for _ in 0..300 {
-        let shift = random.vector() * 2.0;
-        let a = Triangle::new([random.vector(), random.vector(), random.vector()]);
-        let b =
-            Triangle::new([random.vector(), random.vector(), random.vector()].map(|x| x + shift));
-        let found = a.distance_squared(&b, f64::INFINITY).unwrap().sqrt();
-        let mut p = a.corners[0];
-        let mut q = p;
-        for _ in 0..20_000 {
-            q = b.closest(&p).0;
-            p = a.closest(&q).0;
-        }
-        let expected = (p - q).norm();
-        assert!(found <= expected + 1e-15, "{found} {expected}");
-        if found > 0.0 {
-            disjoint += 1;
-            assert!(found > expected * (1.0 - 1e-6) - 1e-3, "{found} {expected}");
-        }
-    }
-    assert!(disjoint > 100);
-}
-
-#[test]
-fn closest_point_of_a_triangle_is_no_farther_than_any_other() {
-    let mut random = Random(3);
-    for _ in 0..200 {
-        let t = Triangle::new([random.vector(), random.vector(), random.vector()]);
-        let p = random.vector() * 2.0;
-        let (closest, _) = t.closest(&p);
-        let [a, b, c] = t.corners;
-        for i in 0..=20 {
-            for j in 0..=(20 - i) {
-                let (u, v) = (i as f64 / 20.0, j as f64 / 20.0);
-                let x = a + (b - a) * u + (c - a) * v;
-                assert!((p - closest).norm() <= (p - x).norm() + 1e-14);
-            }
-        }
-    }
-}
-
-#[test]
-fn the_tree_finds_what_all_pairs_of_faces_give() {
-    let mut random = Random(11);
-    let (a, b) = (sphere(1.0, 320), cuboid([1.0, 0.2, 0.6], 200));
-    for _ in 0..20 {
-        let (pose_a, pose_b) = (turned(random.vector().into(), [0.0; 3]), {
-            let x = random.vector().normalize() * (2.0 + 0.4 * random.next());
-            turned((random.vector() * 2.0).into(), x.into())
-        });
-        let (placed_a, placed_b) = (a.transformed(&pose_a), b.transformed(&pose_b));
-        let mut least = f64::INFINITY;
-        for f in 0..placed_a.faces().len() {
-            let here = Triangle::new(placed_a.corners(f));
-            for g in 0..placed_b.faces().len() {
-                let there = Triangle::new(placed_b.corners(g));
-                least = here.distance_squared(&there, least).unwrap_or(least);
-            }
-        }
-        let found = gap(&a, pose_a, &b, pose_b);
-        let expected = least.sqrt();
-        assert!(
-            (found - expected).abs() < 1e-11 * expected,
-            "{found} {expected}"
-        );
     }
 }
 
@@ -262,40 +192,54 @@ fn one_inside_another_overlaps() {
     assert!((found - 0.0995).abs() < 1e-12, "{found}");
 }
 
+/// A square frame around z: `outer` and `inner` are half the widths of its two squares, `half` is half its
+/// height.
+fn frame(outer: f64, inner: f64, half: f64) -> TriMesh {
+    let corner = |r: f64, z: f64, k: usize| {
+        let (x, y) = [(1.0, 1.0), (-1.0, 1.0), (-1.0, -1.0), (1.0, -1.0)][k % 4];
+        Vec3::new(r * x, r * y, z)
+    };
+    // Around the section, outward seen from its middle.
+    let section = [(inner, -half), (outer, -half), (outer, half), (inner, half)];
+    let at = |k: usize, s: usize| 4 * (k % 4) + s % 4;
+    let vertices = (0..4).flat_map(|k| section.map(|(r, z)| corner(r, z, k)));
+    let sides = (0..4).flat_map(|k| (0..4).map(move |s| (k, s)));
+    let faces = sides.flat_map(|(k, s)| {
+        let [a, b, c, d] = [at(k, s), at(k + 1, s), at(k + 1, s + 1), at(k, s + 1)];
+        [[a, b, c], [a, c, d]]
+    });
+    let (vertices, faces): (Vec<_>, Vec<_>) = (vertices.collect(), faces.collect());
+    let turned = faces.iter().map(|&[a, b, c]| [a, c, b]).collect();
+    TriMesh::new("frame", vertices.clone(), faces)
+        .or_else(|_| TriMesh::new("frame", vertices, turned))
+        .unwrap()
+}
+
 #[test]
 fn inside_a_hollow_is_not_overlap() {
-    let (outer, hole) = (sphere(1.0, 320), sphere(0.8, 320));
-    let count = outer.vertices().len();
-    let vertices = [outer.vertices(), hole.vertices()].concat();
-    let turned_in = hole
-        .faces()
-        .iter()
-        .map(|&[a, b, c]| [a + count, c + count, b + count]);
-    let faces = outer.faces().iter().copied().chain(turned_in).collect();
-    let shell = TriMesh::unchecked("shell", vertices, faces).unwrap();
+    let frame = frame(1.0, 0.8, 0.5).split().split();
     let ball = sphere(0.3, 320);
-    let found = gap(&shell, at(0.0, 0.0, 0.0), &ball, at(0.1, 0.0, 0.0));
-    assert!((0.38..0.41).contains(&found), "{found}");
+    let found = gap(&frame, at(0.0, 0.0, 0.0), &ball, at(0.1, 0.0, 0.0));
+    assert!((0.4 - 1e-12..0.41).contains(&found), "{found}");
     let stuck = sphere(0.05, 320);
-    let found = gap(&shell, at(0.0, 0.0, 0.0), &stuck, at(0.9, 0.0, 0.0));
+    let found = gap(&frame, at(0.0, 0.0, 0.0), &stuck, at(0.9, 0.0, 0.0));
     assert!(found < 0.0, "{found}");
 }
 
 #[test]
-fn pieces_inside_are_found() {
+fn a_mesh_is_in_one_piece() {
     let (far, near) = (sphere(0.1, 80), sphere(0.1, 80));
     let count = far.vertices().len();
     let moved = near.transformed(&at(3.0, 0.0, 0.0));
     let vertices = [far.vertices(), moved.vertices()].concat();
     let second = near.faces().iter().map(|f| f.map(|v| v + count));
-    let faces = far.faces().iter().copied().chain(second).collect();
-    let two = TriMesh::unchecked("two", vertices, faces).unwrap();
-    let found = gap(
-        &sphere(1.0, 320),
-        at(3.0, 0.0, 0.0),
-        &two,
-        at(0.0, 0.0, 0.0),
-    );
+    let faces: Vec<_> = far.faces().iter().copied().chain(second).collect();
+    let report = check_parts("two", &vertices, &faces);
+    assert!(report.find(Kind::Components).is_some());
+    assert!(TriMesh::new("two", vertices, faces).is_err());
+    // Each piece alone inside another body overlaps it.
+    let outer = sphere(1.0, 320);
+    let found = gap(&outer, at(3.0, 0.0, 0.0), &moved, at(0.0, 0.0, 0.0));
     assert!(found < -0.9, "{found}");
 }
 
@@ -421,9 +365,7 @@ fn edges_are_those_near_the_closest_points() {
     let (coarse, fine) = (sphere(1.0, 320), sphere(1.0, 5120));
     let mean = |m: &TriMesh| {
         let all = m.edges();
-        let length = |e: &crate::shape::Edge| {
-            (m.vertices()[e.vertices[0]] - m.vertices()[e.vertices[1]]).norm()
-        };
+        let length = |e: &Edge| (m.vertices()[e.vertices[0]] - m.vertices()[e.vertices[1]]).norm();
         all.iter().map(length).sum::<f64>() / all.len() as f64
     };
     for (mesh, expected) in [(&coarse, mean(&coarse)), (&fine, mean(&fine))] {
@@ -472,7 +414,7 @@ fn nothing_panics() {
             assert!(gaps.smallest(&poses).is_none_or(|g| g.distance.is_finite()));
         }
     }
-    // Faces without area, and surfaces that don't close.
+    // Faces without area, and surfaces that don't close, are no meshes.
     let flat = vec![
         Vec3::zeros(),
         Vec3::x(),
@@ -481,11 +423,7 @@ fn nothing_panics() {
         Vec3::y(),
     ];
     let faces = vec![[0, 1, 2], [0, 3, 0], [0, 1, 4], [2, 2, 2]];
-    let bad = TriMesh::unchecked("bad", flat, faces).unwrap();
-    let gaps = Gaps::new(&[Some(&bad), Some(&ball), Some(&bad)], &[wall], &[]).unwrap();
-    for x in [0.0, 0.5, 1.0, 3.0] {
-        assert_eq!(gaps.all(&[o, at(x, 0.0, 2.0), at(0.0, x, 2.5)]).len(), 6);
-    }
+    assert!(TriMesh::new("bad", flat, faces).is_err());
 }
 
 #[test]
@@ -498,13 +436,14 @@ fn what_can_not_be_is_refused() {
             normal,
         };
         let error = Gaps::new(&[Some(&ball)], &[wall], &[]).unwrap_err();
-        assert!(error.to_string().starts_with("wall 0"), "{error}");
+        assert!(error.to_string().starts_with("walls[0]"), "{error}");
     }
     assert!(Gaps::new(&[Some(&ball)], &[], &[(0, 1)]).is_err());
-    let empty = TriMesh::unchecked("empty", vec![], vec![]).unwrap();
-    assert!(Gaps::new(&[Some(&empty)], &[], &[]).is_err());
-    let lost = TriMesh::unchecked("lost", vec![Vec3::repeat(f64::NAN); 3], vec![[0, 1, 2]]);
-    assert!(Gaps::new(&[Some(&lost.unwrap())], &[], &[]).is_err());
+    assert!(TriMesh::new("empty", vec![], vec![]).is_err());
+    let lost = TriMesh::new("lost", vec![Vec3::repeat(f64::NAN); 3], vec![[0, 1, 2]]);
+    assert!(lost.is_err());
+    let far = ball.vertices().iter().map(|x| x * 1e61).collect();
+    assert!(TriMesh::new("far", far, ball.faces().to_vec()).is_err());
 }
 
 #[test]
@@ -536,7 +475,7 @@ fn the_error_names_both_and_the_remedy() {
     assert!(unnamed.contains("body 0 and body 1"), "{unnamed}");
 }
 
-/// Prints how long a question takes: `cargo test --release --lib gap -- --ignored --nocapture`.
+/// Prints how long a question takes: `cargo test --release --test shapes gaps::time -- --ignored --nocapture`.
 #[test]
 #[ignore = "measures time"]
 fn time() {
@@ -606,4 +545,87 @@ fn time() {
         found.distance,
         start.elapsed()
     );
+}
+
+fn mesh(shape: Shape, faces: usize) -> TriMesh {
+    build(&shape, Path::new(""), Some(faces)).unwrap()
+}
+
+fn share(a: &TriMesh, b: &TriMesh, shift: [f64; 3]) -> f64 {
+    let turn = exp_matrix(&Vec3::new(0.3, -0.2, 0.5));
+    let first = Pose::new(turn, Vec3::new(1.0, 2.0, 3.0));
+    let poses = [
+        first,
+        Pose::new(turn, first.translation + turn * Vec3::from(shift)),
+    ];
+    let either = Share::new(&[Some(a), Some(b)], (0, 1)).unwrap();
+    either.at(&poses)
+}
+
+#[test]
+fn the_lens_of_two_balls() {
+    for (faces, within) in [(80, 0.06), (320, 0.03), (1280, 0.02)] {
+        let ball = sphere(0.5, faces);
+        for d in [0.1, 0.3, 0.5, 0.8] {
+            let x: f64 = d / 0.5;
+            let exact = 1.0 - 0.75 * x + x.powi(3) / 16.0;
+            let found = share(&ball, &ball, [0.0, d * 0.6, d * 0.8]);
+            println!("{faces} {d}: {found:.4} of {exact:.4}");
+            assert!(
+                (found - exact).abs() < within,
+                "{faces} {d}: {found} {exact}"
+            );
+        }
+        assert_eq!(share(&ball, &ball, [1.01, 0.0, 0.0]), 0.0);
+    }
+}
+
+#[test]
+fn the_smaller_one_counts_in_either_order() {
+    let (plate, peg) = (
+        mesh(Shape::cuboid([1.0, 1.0, 0.2]), 300),
+        mesh(Shape::cylinder(0.1, 0.8), 300),
+    );
+    // A quarter of the peg's length is in the plate.
+    for (a, b) in [(&plate, &peg), (&peg, &plate)] {
+        let found = share(a, b, [0.1, 0.2, 0.05]);
+        assert!((found - 0.25).abs() < 0.03, "{found}");
+    }
+    let small = sphere(0.05, 80);
+    assert!((share(&small, &plate, [0.0; 3]) - 1.0).abs() < 1e-12);
+    assert!(Share::new(&[Some(&plate), None], (0, 1)).is_none());
+}
+
+#[test]
+fn splitting_keeps_the_polyhedron() {
+    let mesh = mesh(Shape::ellipsoid([1.0, 0.5, 0.2]), 80);
+    let fine = mesh.split();
+    assert_eq!(fine.faces().len(), 4 * mesh.faces().len());
+    assert!(fine.check().is_ok());
+    let (a, b) = (mesh.mass_properties(), fine.mass_properties());
+    assert!((a.volume - b.volume).abs() < 1e-14 && (a.area - b.area).abs() < 1e-14);
+}
+
+#[test]
+fn coarser_meshes_keep_volume_and_sharp_edges() {
+    for (shape, volume) in [
+        (Shape::sphere(2.0), 0.04),
+        (Shape::ellipsoid([1.0, 0.2, 1.0]), 0.06),
+        (Shape::cuboid([1.0, 0.3, 0.6]), 1e-4),
+    ] {
+        let fine = mesh(shape, 1280);
+        let mut last = fine.faces().len();
+        for target in [640, 320, 160] {
+            let mesh = fine.coarsened(target).unwrap();
+            let n = mesh.faces().len();
+            assert!(n < last && n <= target + 1, "{n} of {target}");
+            last = n;
+            let (a, b) = (fine.mass_properties(), mesh.mass_properties());
+            let off = (b.volume / a.volume - 1.0).abs();
+            assert!(off < volume, "{} {target}: {off}", fine.name());
+        }
+    }
+    let cube = mesh(Shape::cuboid([1.0; 3]), 1200);
+    assert!((cube.sharp_edge_length(1.0) - 12.0).abs() < 1e-12);
+    assert!((cube.coarsened(200).unwrap().sharp_edge_length(1.0) - 12.0).abs() < 0.02);
 }

@@ -1,13 +1,15 @@
-//! The triangle mesh and the geometry of its faces.
+//! The closed triangle mesh and the geometry of its faces.
 
-use super::check::{check, check_parts};
-use super::mass::MassProperties;
+use super::ball::Ball;
+use super::check::{Kind, MeshReport, check_parts};
+use super::points::{area_vector, bounds, vertex_normal_sums};
 use super::topology;
 use crate::error::{Error, Result};
 use hydrograd_adjoint::lie::{Pose, Vec3};
 
-/// A triangle mesh: vertices (m, frame of the shape) and faces as triples of vertex numbers,
-/// counted from 0, counter-clockwise seen from outside.
+/// A closed triangle mesh: vertices (m, frame of the shape) and faces as triples of vertex numbers,
+/// counted from 0, counter-clockwise seen from outside. It bounds one volume: what [`TriMesh::new`] checks
+/// holds for every one.
 #[derive(Clone, Debug, PartialEq)]
 pub struct TriMesh {
     name: String,
@@ -25,55 +27,47 @@ pub struct Edge {
 }
 
 impl TriMesh {
-    /// A closed, outward oriented mesh; `vertices` in m.
+    /// A closed, outward oriented mesh; `vertices` in m. Vertices that no face uses are left out.
     ///
     /// # Errors
-    /// [`Error::Mesh`] with the first problem that [`check()`] calls an error: the mesh is empty, has
+    /// [`Error::Mesh`] with the first problem that [`check_parts`] calls an error: the mesh is empty, has
     /// an index out of range, a vertex that isn't finite, a face without area or given twice, an
-    /// edge without exactly two faces, a face turned against its neighbours, an inward
-    /// orientation, or several separate pieces.
+    /// edge without exactly two faces, a face turned against its neighbours, a vertex whose faces fold back
+    /// on each other, an inward orientation, or several separate pieces.
     pub fn new(
         name: impl Into<String>,
         vertices: Vec<Vec3>,
         faces: Vec<[usize; 3]>,
     ) -> Result<Self> {
         let name = name.into();
-        check_parts(&name, &vertices, &faces).into_result()?;
-        Ok(Self {
+        let report = check_parts(&name, &vertices, &faces).into_result()?;
+        let mut mesh = Self {
             name,
             vertices,
             faces,
-        })
+        };
+        if report.find(Kind::UnreferencedVertex).is_some() {
+            mesh.leave_out_loose_vertices();
+        }
+        Ok(mesh)
     }
 
-    /// Any set of faces whose indices exist: for meshes that are still to be checked or mended.
-    ///
-    /// # Errors
-    /// [`Error::Mesh`] if a face names a vertex that doesn't exist.
-    pub fn unchecked(
-        name: impl Into<String>,
-        vertices: Vec<Vec3>,
-        faces: Vec<[usize; 3]>,
-    ) -> Result<Self> {
-        let name = name.into();
-        let count = vertices.len();
-        if let Some((f, face)) = faces
+    fn leave_out_loose_vertices(&mut self) {
+        let mut number = vec![None; self.vertices.len()];
+        self.faces
             .iter()
-            .enumerate()
-            .find(|(_, face)| face.iter().any(|&v| v >= count))
-        {
-            return Err(Error::Mesh {
-                name,
-                problem: format!("vertex index out of range: {face:?} with {count} vertices"),
-                location: format!("face {f}, counted from 0"),
-                remedy: "count vertices from 0, or add the missing vertices".into(),
-            });
+            .flatten()
+            .for_each(|&v| number[v] = Some(0));
+        let mut kept = Vec::with_capacity(self.vertices.len());
+        for (n, x) in number.iter_mut().zip(&self.vertices) {
+            if let Some(n) = n {
+                *n = kept.len();
+                kept.push(*x);
+            }
         }
-        Ok(Self {
-            name,
-            vertices,
-            faces,
-        })
+        self.vertices = kept;
+        let renumbered = |face: &mut [usize; 3]| *face = face.map(|v| number[v].unwrap_or(v));
+        self.faces.iter_mut().for_each(renumbered);
     }
 
     /// Parts that are known to be a surface.
@@ -134,8 +128,7 @@ impl TriMesh {
         a + ((b - a) + (c - a)) / 3.0
     }
 
-    /// All edges, each once, with the two faces on its sides. Edges without exactly two
-    /// oppositely running faces are left out; a mesh from [`TriMesh::new`] has none of those.
+    /// All edges, each once, with the two faces on its sides, in the order of their vertices' numbers.
     pub fn edges(&self) -> Vec<Edge> {
         topology::edges(self.faces.iter().copied().enumerate())
             .groups()
@@ -163,9 +156,26 @@ impl TriMesh {
         (high - low).norm()
     }
 
-    /// Volume, area, centroid and inertia.
-    pub fn mass_properties(&self) -> MassProperties {
-        MassProperties::of(self)
+    /// A ball around it.
+    pub fn bounding_ball(&self) -> Ball {
+        Ball::around(self.vertices.iter())
+    }
+
+    /// What can be said of the mesh: its size, and warnings.
+    pub fn check(&self) -> MeshReport {
+        check_parts(&self.name, &self.vertices, &self.faces)
+    }
+
+    /// Area of all faces, m².
+    pub fn surface_area(&self) -> f64 {
+        (0..self.faces.len()).map(|f| self.area(f)).sum()
+    }
+
+    /// Unit normals at the vertices: those of the faces around, weighted with their angles there.
+    pub fn vertex_normals(&self) -> Vec<Vec3> {
+        let mut normals = vertex_normal_sums(&self.vertices, &self.faces);
+        normals.iter_mut().for_each(|n| *n = n.normalize());
+        normals
     }
 
     /// The same surface after a rigid motion.
@@ -190,39 +200,9 @@ impl TriMesh {
                 "give a finite, positive factor (0.001 for a file in millimetres)",
             ));
         }
-        let scaled = Self {
-            name: self.name.clone(),
-            vertices: self.vertices.iter().map(|x| x * factor).collect(),
-            faces: self.faces.clone(),
-        };
-        // Only what scaling can break is refused here: an unchecked mesh may be scaled too.
-        if check(self).is_ok() {
-            check(&scaled).into_result()?;
-        }
-        Ok(scaled)
+        let vertices = self.vertices.iter().map(|x| x * factor).collect();
+        Self::new(self.name.clone(), vertices, self.faces.clone())
     }
-}
-
-/// Normal times area of a triangle.
-#[inline]
-pub(super) fn area_vector([a, b, c]: &[Vec3; 3]) -> Vec3 {
-    (b - a).cross(&(c - a)) * 0.5
-}
-
-/// Smallest and largest coordinates; zero without points.
-pub(super) fn bounds<'a>(points: impl Iterator<Item = &'a Vec3>) -> [Vec3; 2] {
-    let mut low = Vec3::repeat(f64::INFINITY);
-    let mut high = Vec3::repeat(f64::NEG_INFINITY);
-    for p in points {
-        for i in 0..3 {
-            low[i] = low[i].min(p[i]);
-            high[i] = high[i].max(p[i]);
-        }
-    }
-    if low.iter().zip(high.iter()).any(|(l, h)| l > h) {
-        return [Vec3::zeros(), Vec3::zeros()];
-    }
-    [low, high]
 }
 
 #[cfg(test)]

@@ -1,0 +1,46 @@
+//! Closed triangle meshes and plane walls, and what is asked of them; all else that knows surfaces stands
+//! on this folder.
+//!
+//! A [`TriMesh`] bounds a volume: every edge has two faces, corners run counter-clockwise seen from
+//! the water, so that normals point into the water. [`TriMesh::new`] refuses anything else, so that
+//! whoever has one needs no check of his own; [`check_parts`] says what is wrong, where, and what to do about
+//! it. Lengths are in metres, in the frame of the shape or body.
+//!
+//! - [`MassProperties`], [`Faces`], [`Ball`]: volume, inertia, face geometry, bounding balls.
+//! - `sharp`, `remesh`, [`refine`]: sharp edges, meshes with more or fewer faces, everywhere or in regions.
+//! - [`Gaps`]: signed distances between placed meshes, walls and points; `interior`: rays, inner
+//!   tangent balls and winding numbers of one mesh.
+//! - [`Wall`], [`HalfSpace`], [`Image`]: plane walls and the mirror images that they make.
+
+mod ball;
+mod check;
+mod faces;
+mod gap;
+mod image;
+mod interior;
+mod mass;
+mod mesh;
+mod points;
+mod refine;
+mod remesh;
+mod sharp;
+#[cfg(test)]
+mod tests;
+pub(crate) mod topology;
+mod tree;
+mod triangle;
+mod wall;
+pub(crate) mod weld;
+
+pub use ball::Ball;
+pub use check::{Finding, Kind, MeshReport, Severity, check_parts};
+pub use faces::Faces;
+pub(crate) use faces::equilateral_edge;
+pub use gap::{Distance, Gap, Gaps, Other, Share, overlap_error};
+pub use image::Image;
+pub(crate) use interior::Interior;
+pub use mass::MassProperties;
+pub use mesh::{Edge, TriMesh};
+pub(crate) use points::bounds;
+pub use refine::{ExactSurface, MAX_ADDED_FACES, Refinement, refine, validate_refinements};
+pub use wall::{HalfSpace, Wall, WallSurface};

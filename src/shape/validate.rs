@@ -1,0 +1,100 @@
+//! Parameters of shapes that can't be.
+
+use super::description::Shape;
+use super::limits::{DEFAULT_FACES, MAX_FACES};
+use super::primitive::prism;
+use crate::error::{Error, Result};
+
+/// Whether a shape's parameters can be: lengths finite and positive, faces in range. `place`
+/// begins the message: the body's or the shape's name.
+///
+/// # Errors
+/// [`Error::Input`] naming place and field, the value and what would be right.
+pub fn validate(shape: &Shape, place: &str) -> Result<()> {
+    let length = |field: &str, value: f64| -> Result<()> {
+        // Outside this range areas, volumes and inertias leave double precision.
+        if (1e-30..=1e30).contains(&value) {
+            return Ok(());
+        }
+        Err(Error::input(
+            format!("{place}: {field}"),
+            value,
+            "give a finite, positive length in metres",
+        ))
+    };
+    let lengths = |field: &str, values: &[f64; 3]| -> Result<()> {
+        (0..3).try_for_each(|i| length(&format!("{field}[{i}]"), values[i]))
+    };
+    let asked = match shape {
+        Shape::Sphere { radius, faces } => {
+            length("radius", *radius)?;
+            faces
+        }
+        Shape::Ellipsoid { semi_axes, faces } => {
+            lengths("semi_axes", semi_axes)?;
+            faces
+        }
+        Shape::Box { size, faces } => {
+            lengths("size", size)?;
+            faces
+        }
+        Shape::Cylinder {
+            radius,
+            length: l,
+            faces,
+        } => {
+            length("radius", *radius)?;
+            length("length", *l)?;
+            faces
+        }
+        Shape::Capsule {
+            radius,
+            length: l,
+            faces,
+        } => {
+            length("radius", *radius)?;
+            if *l == 0.0 {
+                return Err(Error::input(
+                    format!("{place}: length"),
+                    l,
+                    "a capsule without a cylindrical part is a sphere: use that",
+                ));
+            }
+            length("length", *l)?;
+            faces
+        }
+        Shape::Prism {
+            profile,
+            length: l,
+            faces,
+        } => {
+            prism::check_profile(profile, place)?;
+            length("length", *l)?;
+            faces
+        }
+        Shape::Mesh { scale, .. } => {
+            if !(scale.is_finite() && *scale > 0.0) {
+                return Err(Error::input(
+                    format!("{place}: scale"),
+                    scale,
+                    "give a finite, positive factor (0.001 for a file in millimetres)",
+                ));
+            }
+            &None
+        }
+        // What is wrong with it, its mesh tells.
+        Shape::Triangles { .. } => &None,
+    };
+    asked.map_or(Ok(()), |faces| check_faces(place, faces))
+}
+
+pub(super) fn check_faces(place: &str, faces: usize) -> Result<()> {
+    if (1..=MAX_FACES).contains(&faces) {
+        return Ok(());
+    }
+    Err(Error::input(
+        format!("{place}: faces"),
+        faces,
+        format!("ask for 1 to {MAX_FACES} faces (default {DEFAULT_FACES})"),
+    ))
+}

@@ -30,7 +30,7 @@
 mod follow;
 
 use follow::{COIN_Y, COIN_Z, COLUMN, Follow, LOWER, OPENING, UPPER};
-use hydrograd::optimize::{self, Found, minimise};
+use hydrograd::optimize::{self, OptimizeSettings, Optimum, minimise};
 use hydrograd::simulate::{Cotangents, Observation, Policy, Rollout, Sample};
 use hydrograd::{Controls, Fidelity, Scene, Settings, Simulator};
 use plotters::prelude::*;
@@ -353,13 +353,13 @@ fn main() -> Result<(), Box<dyn Error>> {
 }
 
 /// The lowest mean cost, and the costs on the way; a line per iteration on standard error.
-fn tune(trials: &mut [Trial], iterations: usize) -> hydrograd::Result<(Found, Vec<f64>)> {
+fn tune(trials: &mut [Trial], iterations: usize) -> hydrograd::Result<(Optimum, Vec<f64>)> {
     let start = [0.0; 6];
-    let settings = optimize::Settings {
+    let settings = OptimizeSettings {
         iterations,
-        first_step: 0.3,
+        first_step: Some(0.3),
         cost_tolerance: 1e-3,
-        ..optimize::Settings::default()
+        ..OptimizeSettings::default()
     };
     let mut history = Vec::new();
     let found = minimise(

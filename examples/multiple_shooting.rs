@@ -6,7 +6,7 @@
 //! simulations of the whole time, each with its gradient:
 //!
 //! - *single*: the forces are the unknowns, the whole time is one rollout, `optimize::minimise`;
-//! - *clipped*: the same with gradients shortened to a tenth of the first one (`optimize::Settings::clip`);
+//! - *clipped*: the same with gradients shortened to a tenth of the first one (`optimize::OptimizeSettings::clip`);
 //! - *multiple*: every span is a segment, and the segments' start states are unknowns as well. Each segment is a rollout of its own, through
 //!   which derivatives can't grow much; that it ends where the next one starts is asked for by an augmented Lagrangian, whose multipliers and weight are
 //!   renewed round by round. Once no segment ends far from the next one's start, segments are joined two by two, until they are one piece: the
@@ -26,7 +26,7 @@
 #[path = "multiple_shooting/segments.rs"]
 mod segments;
 
-use hydrograd::optimize::{Settings as Descent, minimise};
+use hydrograd::optimize::{OptimizeSettings, minimise};
 use hydrograd::scene::{Contact, Plane};
 use hydrograd::simulate::Rollout;
 use hydrograd::{
@@ -235,10 +235,10 @@ fn single(
     let mut x = start.to_vec();
     let mut first_step = FIRST_STEP;
     while way.best.len() < simulations && first_step > SHORTEST {
-        let settings = Descent {
+        let settings = OptimizeSettings {
             evaluations: simulations - way.best.len(),
             iterations: simulations,
-            first_step,
+            first_step: Some(first_step),
             clip,
             ..descent()
         };
@@ -253,12 +253,12 @@ fn single(
     Ok(x)
 }
 
-fn descent() -> Descent {
-    Descent {
-        first_step: FIRST_STEP,
+fn descent() -> OptimizeSettings {
+    OptimizeSettings {
+        first_step: Some(FIRST_STEP),
         cost_tolerance: 1e-6,
         memory: 40,
-        ..Descent::default()
+        ..OptimizeSettings::default()
     }
 }
 
@@ -283,7 +283,7 @@ fn multiple(
     let last = simulations - simulations / POLISH;
     while segments.len() > 1 && way.best.len() + ROUND <= last {
         // One of a round's simulations is that of the update.
-        let settings = Descent {
+        let settings = OptimizeSettings {
             evaluations: ROUND - 1,
             ..descent()
         };

@@ -20,7 +20,7 @@
 //! cargo run --release --example system_id -- [--noise METRES] [--seed N] [--recordings N] [--out FILE.svg] [--json]
 //! ```
 
-use hydrograd::optimize::{self, minimise};
+use hydrograd::optimize::{self, OptimizeSettings, minimise};
 use hydrograd::scene::{Drag, DragPart, Plane, Wall};
 use hydrograd::{Body, Controls, Fidelity, Fluid, Joint, Scene, Settings, Shape, Simulator};
 use nalgebra::{DMatrix, DVector, Matrix2, Vector2};
@@ -164,10 +164,10 @@ fn fit(
     let mut random = ChaCha8Rng::seed_from_u64(seed);
     let normal = Normal::new(0.0, noise)?;
     let recording = exact.map(|x| x + normal.sample(&mut random));
-    let settings = optimize::Settings {
-        first_step: 0.1,
+    let settings = OptimizeSettings {
+        first_step: Some(0.1),
         gradient_tolerance: 1e-8,
-        ..optimize::Settings::default()
+        ..OptimizeSettings::default()
     };
     let start = GUESS.map(f64::ln);
     let found = minimise(

@@ -22,6 +22,7 @@ pub mod shape;
 pub mod simulate;
 pub mod solver;
 mod special;
+pub mod tradeoff;
 mod water;
 
 pub use error::{Error, Result};

@@ -1,7 +1,7 @@
 //! The task: the scene with and without water, its controllers, and controls through knots with their cost and its gradient.
 
 use super::hold::{Hold, Tolerable};
-use hydrograd::optimize::{self, Found, Progress, minimise};
+use hydrograd::optimize::{OptimizeSettings, Optimum, Progress, minimise};
 use hydrograd::scene::{Controller, SpeedStage};
 use hydrograd::simulate::{Knots, OpenLoop, Rollout};
 use hydrograd::{Controls, Fidelity, Result, Scene, Settings, Simulator};
@@ -18,11 +18,11 @@ const KNOTS: usize = 11;
 const APPROACH: usize = 130;
 
 /// Descent of the approach: it needn't be exact.
-const REACHING: optimize::Settings = optimize::Settings {
+const REACHING: OptimizeSettings = OptimizeSettings {
     iterations: 10,
     evaluations: 20,
     memory: 10,
-    first_step: 0.3,
+    first_step: Some(0.3),
     gradient_tolerance: 1e-3,
     cost_tolerance: 1e-3,
     target: Some(0.3),
@@ -30,11 +30,11 @@ const REACHING: optimize::Settings = optimize::Settings {
 };
 
 /// Descent of the hold, to a cost at which the coin is held firmly.
-const HOLDING: optimize::Settings = optimize::Settings {
+const HOLDING: OptimizeSettings = OptimizeSettings {
     iterations: 30,
     evaluations: 40,
     memory: 10,
-    first_step: 0.3,
+    first_step: Some(0.3),
     gradient_tolerance: 1e-6,
     cost_tolerance: 1e-9,
     target: Some(0.1),
@@ -218,10 +218,10 @@ impl Task {
 
     /// Forces that hold the coin, from `x`: by a descent to a good approach, and by one of the whole trajectory from there. Iterations are those
     /// of both; `say` hears of every one.
-    pub fn find(&self, x: &[f64], say: impl Fn(&str, &Progress)) -> Result<Found> {
+    pub fn find(&self, x: &[f64], say: impl Fn(&str, &Progress)) -> Result<Optimum> {
         let reached = minimise(|x| self.approach(x), x, &REACHING, |p| say("approach", p))?;
         let held = minimise(|x| self.hold(x), &reached.x, &HOLDING, |p| say("hold", p))?;
-        Ok(Found {
+        Ok(Optimum {
             iterations: reached.iterations + held.iterations,
             ..held
         })

@@ -45,8 +45,10 @@ from hydrograd._hydrograd import (
     revolute,
     sphere,
     spherical,
+    tradeoff,
 )
 from hydrograd._policy import Observation, Policy
+from hydrograd._tradeoff import Tradeoff, TradeoffQuantity, TradeoffReference, TradeoffRow
 from hydrograd._viewer import View, view
 
 __all__ = [
@@ -74,6 +76,10 @@ __all__ = [
     "SolverError",
     "State",
     "StepGradient",
+    "Tradeoff",
+    "TradeoffQuantity",
+    "TradeoffReference",
+    "TradeoffRow",
     "UnresolvedError",
     "UnsupportedError",
     "View",
@@ -93,5 +99,6 @@ __all__ = [
     "revolute",
     "sphere",
     "spherical",
+    "tradeoff",
     "view",
 ]

@@ -8,6 +8,7 @@ from numpy.typing import ArrayLike, NDArray
 from hydrograd._contacts import ContactForces
 from hydrograd._gradient import Gradient, StepGradient
 from hydrograd._policy import Policy
+from hydrograd._tradeoff import Tradeoff
 
 __version__: str
 
@@ -362,3 +363,20 @@ def mean_position(body: int, target: ArrayLike) -> Objective: ...
 def final_coordinate(index: int, target: float, weight: float = 1.0) -> Objective: ...
 def final_velocity(index: int, target: float, weight: float = 1.0) -> Objective: ...
 def effort(weight: float) -> Objective: ...
+
+def tradeoff(
+    scene: Scene,
+    *,
+    fidelities: Sequence[_Fidelity] | None = None,
+    methods: Sequence[_Method] | None = None,
+    faces: Sequence[int] | None = None,
+    ranks: Sequence[int] | None = None,
+    accuracies: Sequence[float] | None = None,
+    tolerances: Sequence[float] | None = None,
+    integrators: Sequence[_Integrator] | None = None,
+    time_steps: Sequence[float] | None = None,
+    full_product: bool = False,
+    steps: int | None = None,
+    reference_faces: int | None = None,
+    budget: float = 120.0,
+) -> Tradeoff: ...

@@ -18,6 +18,7 @@ mod settings;
 mod shape;
 mod simulator;
 mod state;
+mod tradeoff;
 
 use numpy::PyArrayDyn;
 use pyo3::prelude::*;
@@ -92,5 +93,6 @@ fn _hydrograd(m: &Bound<'_, PyModule>) -> PyResult<()> {
     m.add_function(wrap_pyfunction!(_simulator, m)?)?;
     m.add_function(wrap_pyfunction!(_state, m)?)?;
     m.add_function(wrap_pyfunction!(_rollout, m)?)?;
+    m.add_function(wrap_pyfunction!(tradeoff::tradeoff, m)?)?;
     objective::register(m)
 }

@@ -173,7 +173,7 @@ def test_states(sim):
 
 
 def test_ctrl_c_within_a_second(sim):
-    """A rollout of hours ends at once, and so does making a large simulator."""
+    """A rollout of hours ends at once, and so do making a large simulator and a comparison."""
     # Where the tests run in the background, the signal may be ignored.
     before = signal.signal(signal.SIGINT, signal.default_int_handler)
     scene = hg.Scene()
@@ -181,6 +181,7 @@ def test_ctrl_c_within_a_second(sim):
     for work in (
         lambda: sim.rollout(np.zeros((1_000_000, 6))),
         lambda: hg.Simulator(scene, fidelity="full", faces=8000),
+        lambda: hg.tradeoff(scene, budget=600.0),
     ):
         sent = []
 

@@ -8,12 +8,13 @@ use std::time::Instant;
 use clap::Args;
 use serde::Serialize;
 
+use super::choices::ChoicesReport;
 use super::input;
-use super::options::{Water, name};
+use super::options::Water;
 use super::output::{Output, write_warnings};
 use crate::Result;
 use crate::scene::{Scene, Shape};
-use crate::simulate::{BackendReport, ErrorEstimate};
+use crate::simulate::ErrorEstimate;
 
 #[derive(Debug, Args)]
 pub(super) struct Arguments {
@@ -47,7 +48,7 @@ struct Source {
 
 /// The added mass of all bodies. SI units.
 #[derive(Clone, Debug, Serialize)]
-pub(super) struct Report {
+pub(super) struct AddedMassReport {
     /// Names, in the order of the matrix.
     pub bodies: Vec<String>,
     /// 6B × 6B, rows; per body linear x y z, then angular x y z; world axes, about each body's
@@ -65,14 +66,8 @@ pub(super) struct Report {
     pub iterations: usize,
     /// Wall time, s.
     pub seconds: f64,
-    pub fidelity: String,
-    /// What `auto` came to; the fidelity itself otherwise.
-    pub fidelity_used: String,
-    /// What `auto` chose, and why.
-    pub chosen: Vec<String>,
     #[serde(flatten)]
-    pub backend: BackendReport,
-    pub method: String,
+    pub choices: ChoicesReport,
     /// Density of the water, kg/m³.
     pub density: f64,
     pub warnings: Vec<String>,
@@ -93,7 +88,7 @@ pub(super) fn main(arguments: &Arguments, output: Output) -> Result<ExitCode> {
 }
 
 /// M_f of all bodies at the scene's start.
-fn added_mass(scene: &Scene, arguments: &Arguments) -> Result<Report> {
+fn added_mass(scene: &Scene, arguments: &Arguments) -> Result<AddedMassReport> {
     let start = Instant::now();
     let settings = arguments.water.settings(scene);
     let simulator = arguments.water.simulator(scene, settings)?;
@@ -119,7 +114,7 @@ fn added_mass(scene: &Scene, arguments: &Arguments) -> Result<Report> {
         ));
     }
     let rows = found.matrix.row_iter();
-    Ok(Report {
+    Ok(AddedMassReport {
         added_mass: rows.map(|r| r.iter().copied().collect()).collect(),
         bodies: found.bodies,
         asymmetry: found.report.asymmetry,
@@ -128,25 +123,22 @@ fn added_mass(scene: &Scene, arguments: &Arguments) -> Result<Report> {
         unknowns: simulator.unknowns(),
         iterations: found.report.iterations,
         seconds,
-        fidelity: name(settings.fidelity),
-        fidelity_used: name(simulator.fidelity()),
-        chosen: simulator.reasons().to_vec(),
-        backend: simulator.backend(),
-        method: settings.method_name().into(),
+        choices: ChoicesReport::new(&simulator),
         density: simulator.parameters().density(),
         warnings,
         error_estimate,
     })
 }
 
-impl fmt::Display for Report {
+impl fmt::Display for AddedMassReport {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let choices = &self.choices;
         writeln!(
             f,
             "added mass in water of {} kg/m³, {} ({}): world axes, about each body's origin;",
-            self.density, self.fidelity_used, self.method
+            self.density, choices.fidelity_used, choices.method
         )?;
-        for reason in &self.chosen {
+        for reason in &choices.chosen {
             writeln!(f, "chosen: {reason}")?;
         }
         writeln!(
@@ -165,7 +157,7 @@ impl fmt::Display for Report {
             "asymmetry {:.1e}; volume {:.6e} m³; {} faces, {} unknowns, {} iterations, {:.3} s",
             self.asymmetry, self.volume, self.faces, self.unknowns, self.iterations, self.seconds
         )?;
-        write!(f, "\nbackend {}", self.backend)?;
+        write!(f, "\nbackend {}", choices.backend)?;
         if let Some(estimate) = &self.error_estimate {
             write_estimate(f, estimate)?;
         }

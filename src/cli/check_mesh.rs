@@ -29,7 +29,7 @@ pub(super) fn main(arguments: &Arguments, output: Output) -> Result<ExitCode> {
     let mesh = crate::shape::file::read_unchecked(&arguments.file, arguments.scale)?;
     let report = mesh.check();
     let error = report.clone().into_result().err();
-    output.result(&report::Report {
+    output.result(&report::MeshFileReport {
         ok: error.is_none(),
         error: error.as_ref().map(ToString::to_string),
         repairs: mesh.repairs,
@@ -62,7 +62,7 @@ mod report {
 
     /// What was found in a mesh file.
     #[derive(Debug, Serialize)]
-    pub struct Report {
+    pub struct MeshFileReport {
         /// Whether it can be simulated.
         pub ok: bool,
         /// The first thing that keeps it from that.
@@ -74,7 +74,7 @@ mod report {
         pub mesh: MeshReport,
     }
 
-    impl fmt::Display for Report {
+    impl fmt::Display for MeshFileReport {
         fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
             write!(f, "{}", self.mesh)?;
             for (count, what) in [

@@ -24,7 +24,7 @@ pub(super) fn main(arguments: &Arguments, output: Output) -> Result<ExitCode> {
         opened?;
         return Ok(ExitCode::SUCCESS);
     }
-    output.result(&report::Report::new(&adapters, &opened));
+    output.result(&report::AdaptersReport::new(&adapters, &opened));
     let Err(error) = opened else {
         return Ok(ExitCode::SUCCESS);
     };
@@ -75,7 +75,7 @@ mod report {
 
     /// The adapters of this machine.
     #[derive(Debug, Serialize)]
-    pub struct Report {
+    pub struct AdaptersReport {
         adapters: Vec<Adapter>,
         /// Null where none can be used as asked.
         used: Option<Used>,
@@ -84,7 +84,7 @@ mod report {
         error: Option<String>,
     }
 
-    impl Report {
+    impl AdaptersReport {
         pub fn new(adapters: &[gpu::Adapter], opened: &Result<Arc<Context>>) -> Self {
             let adapters = adapters.iter().cloned().map(|a| Adapter {
                 name: a.name,
@@ -107,7 +107,7 @@ mod report {
         }
     }
 
-    impl fmt::Display for Report {
+    impl fmt::Display for AdaptersReport {
         fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
             for a in &self.adapters {
                 writeln!(f, "{}", a.name)?;

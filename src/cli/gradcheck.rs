@@ -7,13 +7,13 @@ use std::process::ExitCode;
 use clap::Args;
 use serde::Serialize;
 
+use super::choices::ChoicesReport;
 use super::input;
-use super::options::{Time, Water, name, positive};
+use super::options::{Time, Water, positive};
 use super::output::{Output, write_warnings};
 use super::progress::Progress;
 use crate::Result;
 use crate::scene::Scene;
-use crate::simulate::BackendReport;
 use crate::simulate::gradcheck::{self, gradcheck_with};
 use crate::simulate::growth::{Growth, growth};
 
@@ -51,13 +51,10 @@ pub(super) struct Arguments {
 
 /// How well gradient and finite differences agree, and what the gradient costs.
 #[derive(Clone, Debug, Serialize)]
-pub(super) struct Report {
+pub(super) struct CheckReport {
     pub scene: String,
-    pub fidelity: String,
     #[serde(flatten)]
-    pub backend: BackendReport,
-    pub method: String,
-    pub integrator: String,
+    pub choices: ChoicesReport,
     pub steps: usize,
     /// Whether `max_rel_error` is at most [`LIMIT`].
     pub ok: bool,
@@ -100,7 +97,7 @@ pub(super) fn main(arguments: &Arguments, output: Output) -> Result<ExitCode> {
 }
 
 /// The check at a tight tolerance, then the times at the usual one.
-fn check(scene: &Scene, arguments: &Arguments, progress: &Progress) -> Result<Report> {
+fn check(scene: &Scene, arguments: &Arguments, progress: &Progress) -> Result<CheckReport> {
     let usual = arguments.time.choose(arguments.water.settings(scene));
     let tight = match arguments.water.tolerance {
         Some(_) => usual,
@@ -123,15 +120,12 @@ fn check(scene: &Scene, arguments: &Arguments, progress: &Progress) -> Result<Re
         false => Some(growth(&simulator, steps)?),
     };
     let warnings = simulator.warnings().to_vec();
-    let backend = simulator.backend();
+    let choices = ChoicesReport::new(&simulator);
     drop(simulator);
     let times = gradcheck::timings(&arguments.water.simulator(scene, usual)?, steps, TIMINGS)?;
-    Ok(Report {
+    Ok(CheckReport {
         scene: scene.name.clone(),
-        fidelity: name(usual.fidelity),
-        backend,
-        method: usual.method_name().into(),
-        integrator: name(usual.integrator),
+        choices,
         steps,
         ok: found.max_rel_error <= LIMIT,
         tolerance: tight.solve.tolerance,
@@ -149,12 +143,13 @@ fn check(scene: &Scene, arguments: &Arguments, progress: &Progress) -> Result<Re
     })
 }
 
-impl fmt::Display for Report {
+impl fmt::Display for CheckReport {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let choices = &self.choices;
         writeln!(
             f,
             "{}: {} steps, {} ({}, {}); relative error of the gradient against central differences",
-            self.scene, self.steps, self.fidelity, self.method, self.integrator
+            self.scene, self.steps, choices.fidelity, choices.method, choices.integrator
         )?;
         match self.rel_error_controls {
             Some(error) => writeln!(f, "  controls      {error:.2e}")?,
@@ -180,7 +175,7 @@ impl fmt::Display for Report {
             "  trajectory {:.4} s, with its gradient {:.4} s: {:.2} times",
             self.forward_seconds, self.gradient_seconds, self.ratio
         )?;
-        write!(f, "\n  backend {}", self.backend)?;
+        write!(f, "\n  backend {}", choices.backend)?;
         if let Some(growth) = &self.growth {
             let (step, peak) = (&growth.largest_step, &growth.peak);
             write!(

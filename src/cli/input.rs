@@ -6,13 +6,19 @@ use super::options::{Time, Water};
 use crate::scene::{Body, Fluid, Scene, Shape};
 use crate::{Error, Result};
 
-/// The scene of a file with the command line's choices put in, checked.
-pub(super) fn scene(path: &Path, water: &Water, time: &Time) -> Result<Scene> {
+/// The scene of a file; one without a name is called as the file.
+pub(super) fn load(path: &Path) -> Result<Scene> {
     let mut scene = Scene::load(path)?;
     if scene.name.is_empty() {
         let stem = path.file_stem().unwrap_or_default();
         scene.name = stem.to_string_lossy().into_owned();
     }
+    Ok(scene)
+}
+
+/// The scene of a file with the command line's choices put in, checked.
+pub(super) fn scene(path: &Path, water: &Water, time: &Time) -> Result<Scene> {
+    let mut scene = load(path)?;
     water.apply(&mut scene);
     time.apply(&mut scene);
     scene.validate()?;

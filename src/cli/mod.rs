@@ -7,6 +7,7 @@
 mod added_mass;
 mod backend;
 mod check_mesh;
+mod choices;
 mod gpu_info;
 mod gradcheck;
 mod input;

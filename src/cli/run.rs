@@ -8,13 +8,14 @@ use std::time::Instant;
 use clap::Args;
 use serde::Serialize;
 
+use super::choices::ChoicesReport;
 use super::input;
-use super::options::{Time, Water, name};
+use super::options::{Time, Water};
 use super::output::{Output, or_dash, peak_memory_mb, write_warnings};
 use super::progress::Progress;
 use crate::Result;
 use crate::scene::Scene;
-use crate::simulate::{BackendReport, Controls, Recording};
+use crate::simulate::{Controls, Recording};
 
 #[derive(Debug, Args)]
 pub(super) struct Arguments {
@@ -33,17 +34,10 @@ pub(super) struct Arguments {
 
 /// Summary of a run. SI units.
 #[derive(Clone, Debug, Serialize)]
-pub(super) struct Report {
+pub(super) struct RunReport {
     pub scene: String,
-    pub fidelity: String,
-    /// What `auto` came to; the fidelity itself otherwise.
-    pub fidelity_used: String,
-    /// What `auto` chose for each body and pair, and why.
-    pub chosen: Vec<String>,
     #[serde(flatten)]
-    pub backend: BackendReport,
-    pub method: String,
-    pub integrator: String,
+    pub choices: ChoicesReport,
     pub bodies: usize,
     pub faces: usize,
     pub unknowns: usize,
@@ -91,7 +85,7 @@ fn simulate(
     scene: &Scene,
     arguments: &Arguments,
     progress: &Progress,
-) -> Result<(Report, Recording)> {
+) -> Result<(RunReport, Recording)> {
     let start = Instant::now();
     let settings = arguments.time.choose(arguments.water.settings(scene));
     let simulator = arguments.water.simulator(scene, settings)?;
@@ -101,14 +95,9 @@ fn simulate(
     let seconds = start.elapsed().as_secs_f64();
     let summary = rollout.summary();
     let last = &rollout.samples()[rollout.steps()];
-    let report = Report {
+    let report = RunReport {
         scene: scene.name.clone(),
-        fidelity: name(settings.fidelity),
-        fidelity_used: name(simulator.fidelity()),
-        chosen: simulator.reasons().to_vec(),
-        backend: simulator.backend(),
-        method: settings.method_name().into(),
-        integrator: name(settings.integrator),
+        choices: ChoicesReport::new(&simulator),
         bodies: scene.bodies.len(),
         faces: simulator.faces(),
         unknowns: simulator.unknowns(),
@@ -130,21 +119,22 @@ fn simulate(
     Ok((report, Recording::of(scene, &rollout)))
 }
 
-impl fmt::Display for Report {
+impl fmt::Display for RunReport {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        let used = match self.fidelity_used == self.fidelity {
-            true => self.fidelity.clone(),
-            false => format!("{}: {}", self.fidelity, self.fidelity_used),
+        let choices = &self.choices;
+        let used = match choices.fidelity_used == choices.fidelity {
+            true => choices.fidelity.clone(),
+            false => format!("{}: {}", choices.fidelity, choices.fidelity_used),
         };
         writeln!(
             f,
             "{}: {} steps of {} s, {used} (bodies by {}, {})",
-            self.scene, self.steps, self.dt, self.method, self.integrator
+            self.scene, self.steps, self.dt, choices.method, choices.integrator
         )?;
-        for reason in &self.chosen {
+        for reason in &choices.chosen {
             writeln!(f, "  chosen  {reason}")?;
         }
-        writeln!(f, "  backend {}", self.backend)?;
+        writeln!(f, "  backend {}", choices.backend)?;
         writeln!(
             f,
             "  {} bodies, {} faces, {} unknowns",

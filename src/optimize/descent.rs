@@ -1,6 +1,6 @@
 //! L-BFGS on a function that may fail.
 
-use super::{Found, Progress, Settings, Stop};
+use super::{OptimizeSettings, Optimum, Progress, Stop};
 use crate::{Error, Result};
 use argmin::core::{CostFunction, Gradient, IterState, Problem, Solver, State};
 use argmin::solver::linesearch::MoreThuenteLineSearch;
@@ -47,7 +47,7 @@ impl<F: FnMut(&[f64]) -> Result<(f64, Vector)>> Seen<F> {
                 return Err(argmin::core::Error::msg("no evaluations left"));
             }
             self.evaluations += 1;
-            self.last = match whole((self.function)(x), x.len()) {
+            self.last = match checked((self.function)(x), x.len()) {
                 Ok((cost, gradient)) => Point {
                     x: x.to_vec(),
                     cost,
@@ -123,7 +123,7 @@ fn clipped(mut gradient: Vector, longest: f64) -> Vector {
 }
 
 /// Refuses what isn't a number, and gradients of another length than the point has.
-fn whole(result: Result<(f64, Vector)>, length: usize) -> Result<(f64, Vector)> {
+fn checked(result: Result<(f64, Vector)>, length: usize) -> Result<(f64, Vector)> {
     let (cost, gradient) = result?;
     if gradient.len() != length {
         return Err(Error::input(
@@ -139,7 +139,7 @@ fn whole(result: Result<(f64, Vector)>, length: usize) -> Result<(f64, Vector)> 
     }
 }
 
-/// Lowers a function from `start`; `function` gives its value and its gradient, `progress` hears of every iteration.
+/// Lowers a function from `start`; `function` gives its value and its gradient, `progress` is called after every iteration.
 ///
 /// # Errors
 /// Settings out of range, no numbers in `start`, a gradient of another length there, and whatever the function reports at `start`; failures at later trials
@@ -147,19 +147,10 @@ fn whole(result: Result<(f64, Vector)>, length: usize) -> Result<(f64, Vector)> 
 pub fn minimise(
     mut function: impl FnMut(&[f64]) -> Result<(f64, Vec<f64>)>,
     start: &[f64],
-    settings: &Settings,
-    progress: impl FnMut(&Progress),
-) -> Result<Found> {
+    settings: &OptimizeSettings,
+    mut progress: impl FnMut(&Progress),
+) -> Result<Optimum> {
     settings.validate()?;
-    let begun = begin(&mut function, start)?;
-    descend(function, start, begun, settings, progress)
-}
-
-/// Value and gradient where a descent starts.
-pub(super) fn begin(
-    mut function: impl FnMut(&[f64]) -> Result<(f64, Vec<f64>)>,
-    start: &[f64],
-) -> Result<(f64, Vec<f64>)> {
     if start.is_empty() {
         return Err(Error::input(
             "start of the descent",
@@ -167,18 +158,12 @@ pub(super) fn begin(
             "must be at least 1 number",
         ));
     }
-    whole(function(start), start.len())
-}
-
-/// As [`minimise`], from a point whose cost and gradient are known; that evaluation counts.
-pub(super) fn descend(
-    function: impl FnMut(&[f64]) -> Result<(f64, Vec<f64>)>,
-    start: &[f64],
-    (cost, gradient): (f64, Vec<f64>),
-    settings: &Settings,
-    mut progress: impl FnMut(&Progress),
-) -> Result<Found> {
+    let (cost, gradient) = checked(function(start), start.len())?;
     let first = norm(&gradient);
+    let reach = 0.01 * (cost.abs() / first);
+    let first_step = (settings.first_step)
+        .or((reach > 0.0 && reach.is_finite()).then_some(reach))
+        .unwrap_or(1.0);
     let clip = settings.clip.map_or(f64::INFINITY, |c| c * first);
     let point = Point {
         x: start.to_vec(),
@@ -197,7 +182,7 @@ pub(super) fn descend(
     });
     let mut iterations = 0;
     let mut restarted = false;
-    let mut descent = Descent::new(&seen, settings)?;
+    let mut descent = Descent::new(&seen, first_step, settings.memory)?;
     let stop = loop {
         let before = seen.borrow().best.clone();
         if settings.target.is_some_and(|t| before.cost <= t) {
@@ -230,10 +215,10 @@ pub(super) fn descend(
             restarted = true;
         }
         // The search lost its way, or ended elsewhere than at the best point: again from there, along the gradient.
-        descent = Descent::new(&seen, settings)?;
+        descent = Descent::new(&seen, first_step, settings.memory)?;
     };
     let seen = seen.into_inner();
-    Ok(Found {
+    Ok(Optimum {
         gradient: norm(&seen.best.gradient),
         cost: seen.best.cost,
         x: seen.best.x,
@@ -262,7 +247,7 @@ fn broken(error: &argmin::core::Error) -> Error {
 }
 
 impl<'a, F: FnMut(&[f64]) -> Result<(f64, Vector)>> Descent<'a, F> {
-    fn new(seen: &'a RefCell<Seen<F>>, settings: &Settings) -> Result<Self> {
+    fn new(seen: &'a RefCell<Seen<F>>, first_step: f64, memory: usize) -> Result<Self> {
         let search = Search::new()
             .with_c(WOLFE.0, WOLFE.1)
             .and_then(|s| s.with_width_tolerance(WIDTH))
@@ -272,13 +257,13 @@ impl<'a, F: FnMut(&[f64]) -> Result<(f64, Vector)>> Descent<'a, F> {
             // A first step of the length asked for, from here as from the start.
             let slope = norm(&seen.best.gradient);
             if slope > 0.0 {
-                seen.scale = slope / settings.first_step;
+                seen.scale = slope / first_step;
             }
             seen.last = seen.best.clone();
             seen.best.clone()
         };
         let mut problem = Problem::new(Shared(seen));
-        let mut solver = LBFGS::new(search, settings.memory);
+        let mut solver = LBFGS::new(search, memory);
         let state = Iterate::new().param(best.x);
         let (state, _) = solver.init(&mut problem, state).map_err(|e| broken(&e))?;
         Ok(Self {

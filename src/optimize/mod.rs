@@ -22,15 +22,16 @@ use serde::Serialize;
 
 /// When and how far to descend.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Settings {
+pub struct OptimizeSettings {
     /// Most iterations.
     pub iterations: usize,
     /// Most evaluations of value and gradient.
     pub evaluations: usize,
     /// Pairs of steps and gradient changes that are remembered.
     pub memory: usize,
-    /// Length of the first trial step, in units of x.
-    pub first_step: f64,
+    /// Length of the first trial step, in units of x; `None`: a hundredth of the step that alone would take the cost to
+    /// zero, as far as the gradient tells.
+    pub first_step: Option<f64>,
     /// Ends once the gradient is shorter than this part of the first one.
     pub gradient_tolerance: f64,
     /// Ends once the cost falls by less than this part of itself in an iteration.
@@ -42,13 +43,13 @@ pub struct Settings {
     pub clip: Option<f64>,
 }
 
-impl Default for Settings {
+impl Default for OptimizeSettings {
     fn default() -> Self {
         Self {
             iterations: 100,
             evaluations: 1000,
             memory: 10,
-            first_step: 0.1,
+            first_step: Some(0.1),
             gradient_tolerance: 1e-6,
             cost_tolerance: 1e-9,
             target: None,
@@ -64,7 +65,7 @@ pub struct Progress {
     pub iteration: usize,
     /// Cost.
     pub cost: f64,
-    /// Length of the gradient, after [`Settings::clip`].
+    /// Length of the gradient, after [`OptimizeSettings::clip`].
     pub gradient: f64,
     /// Values and gradients evaluated.
     pub evaluations: usize,
@@ -74,24 +75,24 @@ pub struct Progress {
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum Stop {
-    /// The cost reached [`Settings::target`].
+    /// The cost reached [`OptimizeSettings::target`].
     Target,
-    /// The gradient fell below [`Settings::gradient_tolerance`].
+    /// The gradient fell below [`OptimizeSettings::gradient_tolerance`].
     Gradient,
-    /// The cost fell by less than [`Settings::cost_tolerance`], or no trial along the direction made it fall.
+    /// The cost fell by less than [`OptimizeSettings::cost_tolerance`], or no trial along the direction made it fall.
     Cost,
-    /// [`Settings::iterations`] or [`Settings::evaluations`] are used up.
+    /// [`OptimizeSettings::iterations`] or [`OptimizeSettings::evaluations`] are used up.
     Budget,
 }
 
-/// Where a descent ended: the best point that it saw.
+/// Where a descent ended: the best point that it saw, controls or plain numbers.
 #[derive(Clone, Debug, PartialEq)]
-pub struct Found {
+pub struct Optimum<X = Vec<f64>> {
     /// The point.
-    pub x: Vec<f64>,
+    pub x: X,
     /// Its cost.
     pub cost: f64,
-    /// Length of its gradient, after [`Settings::clip`].
+    /// Length of its gradient, after [`OptimizeSettings::clip`].
     pub gradient: f64,
     /// Iterations made.
     pub iterations: usize,
@@ -103,105 +104,70 @@ pub struct Found {
     pub stop: Stop,
 }
 
-/// The best controls that [`lbfgs`] found.
-#[derive(Clone, Debug, PartialEq)]
-pub struct Best {
-    /// The controls.
-    pub controls: Controls,
-    /// Their cost.
-    pub cost: f64,
-    /// Rollouts made, each with its gradient.
-    pub rollouts: usize,
-    /// Iterations made.
-    pub iterations: usize,
-    /// Why it ended.
-    pub stop: Stop,
-}
-
-/// Open-loop controls that lower an objective, from `start`, with the default [`Settings`] but for the first step: a hundredth of
-/// the controls that alone would balance the cost, as far as the gradient tells.
+/// Open-loop controls that lower an objective, from `start`, with the default [`OptimizeSettings`] but for the first step,
+/// which follows from the cost and its gradient there.
 ///
 /// # Errors
 /// The rollout of `start` fails, or the objective doesn't fit the scene.
-pub fn lbfgs(simulator: &Simulator, start: Controls, objective: &dyn Objective) -> Result<Best> {
-    let shape = start.matrix().shape();
-    let of = |x: &[f64]| {
-        Controls::from_matrix(simulator, DMatrix::from_column_slice(shape.0, shape.1, x))
-    };
+pub fn lbfgs(
+    simulator: &Simulator,
+    start: Controls,
+    objective: &dyn Objective,
+) -> Result<Optimum<Controls>> {
+    let (rows, columns) = start.matrix().shape();
+    let controls =
+        |x: &[f64]| Controls::from_matrix(simulator, DMatrix::from_column_slice(rows, columns, x));
     let evaluate = |x: &[f64]| {
-        let rollout = simulator.rollout(&of(x)?)?;
+        let rollout = simulator.rollout(&controls(x)?)?;
         let cost = rollout.value(objective)?;
         let gradient = rollout.gradient(objective)?.controls;
         Ok((cost, gradient.as_slice().to_vec()))
     };
-    let x = start.matrix().as_slice();
-    let begun = descent::begin(evaluate, x)?;
-    let (cost, slope) = (begun.0, descent::norm(&begun.1));
-    let reach = if slope > 0.0 { cost.abs() / slope } else { 1.0 };
-    let settings = Settings {
-        first_step: if reach > 0.0 { 0.01 * reach } else { 1.0 },
-        ..Settings::default()
+    let settings = OptimizeSettings {
+        first_step: None,
+        ..OptimizeSettings::default()
     };
-    let found = descent::descend(evaluate, x, begun, &settings, |_| {})?;
-    Ok(Best {
-        controls: of(&found.x)?,
+    let found = minimise(evaluate, start.matrix().as_slice(), &settings, |_| {})?;
+    Ok(Optimum {
+        x: controls(&found.x)?,
         cost: found.cost,
-        rollouts: found.evaluations,
+        gradient: found.gradient,
         iterations: found.iterations,
+        evaluations: found.evaluations,
+        failures: found.failures,
         stop: found.stop,
     })
 }
 
-impl Settings {
+impl OptimizeSettings {
     /// Checks the values.
     fn validate(&self) -> Result<()> {
-        let positive = [
-            ("first_step", self.first_step),
-            ("clip", self.clip.unwrap_or(1.0)),
+        let count = |n: usize| n as f64;
+        let (positive, least) = ("must be a positive number", "must be at least 1");
+        let not_negative = "must be zero or a positive number";
+        let fields = [
+            ("first_step", self.first_step.unwrap_or(1.0), positive),
+            ("clip", self.clip.unwrap_or(1.0), positive),
+            ("gradient_tolerance", self.gradient_tolerance, not_negative),
+            ("cost_tolerance", self.cost_tolerance, not_negative),
+            ("iterations", count(self.iterations), least),
+            ("evaluations", count(self.evaluations), least),
+            ("memory", count(self.memory), least),
         ];
-        for (name, value) in positive {
-            if !(value > 0.0 && value.is_finite()) {
-                return Err(Error::input(
-                    format!("optimize settings: {name}"),
-                    value,
-                    "must be a positive number",
-                ));
+        for (name, value, expected) in fields {
+            let zero = value == 0.0 && expected == not_negative;
+            if !(value.is_finite() && (value > 0.0 || zero)) {
+                let place = format!("optimize settings: {name}");
+                return Err(Error::input(place, value, expected));
             }
         }
-        let tolerances = [
-            ("gradient_tolerance", self.gradient_tolerance),
-            ("cost_tolerance", self.cost_tolerance),
-        ];
-        for (name, value) in tolerances {
-            if !(value >= 0.0 && value.is_finite()) {
-                return Err(Error::input(
-                    format!("optimize settings: {name}"),
-                    value,
-                    "must be zero or a positive number",
-                ));
-            }
-        }
-        if let Some(target) = self.target.filter(|t| t.is_nan()) {
-            return Err(Error::input(
+        match self.target {
+            Some(target) if target.is_nan() => Err(Error::input(
                 "optimize settings: target",
                 target,
                 "must be a number",
-            ));
+            )),
+            _ => Ok(()),
         }
-        let counts = [
-            ("iterations", self.iterations),
-            ("evaluations", self.evaluations),
-            ("memory", self.memory),
-        ];
-        for (name, value) in counts {
-            if value == 0 {
-                return Err(Error::input(
-                    format!("optimize settings: {name}"),
-                    value,
-                    "must be at least 1",
-                ));
-            }
-        }
-        Ok(())
     }
 }

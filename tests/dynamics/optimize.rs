@@ -1,6 +1,6 @@
 //! Descent: known minima, functions that fail in part of the plane, every way to end, settings that can't be.
 
-use hydrograd::optimize::{self, Found, Progress, Settings, Stop, minimise};
+use hydrograd::optimize::{self, OptimizeSettings, Optimum, Progress, Stop, minimise};
 use hydrograd::scene::{Body, Fluid, Scene, Shape};
 use hydrograd::{Controls, Error, Fidelity, Simulator, objective};
 
@@ -9,8 +9,8 @@ type Evaluated = hydrograd::Result<(f64, Vec<f64>)>;
 fn descend(
     function: impl FnMut(&[f64]) -> Evaluated,
     start: &[f64],
-    settings: &Settings,
-) -> hydrograd::Result<Found> {
+    settings: &OptimizeSettings,
+) -> hydrograd::Result<Optimum> {
     minimise(function, start, settings, |_| {})
 }
 
@@ -50,10 +50,10 @@ fn cliff(x: &[f64]) -> Evaluated {
 
 #[test]
 fn minima_are_found() {
-    let tight = Settings {
+    let tight = OptimizeSettings {
         gradient_tolerance: 1e-14,
         cost_tolerance: 0.0,
-        ..Settings::default()
+        ..OptimizeSettings::default()
     };
     let found = descend(rosenbrock, &[-1.2, 1.0], &tight).unwrap();
     println!("Rosenbrock: {found:?}");
@@ -79,9 +79,9 @@ fn the_best_point_is_what_was_found() {
         seen.push((x.to_vec(), out.0));
         Ok(out)
     };
-    let few = Settings {
+    let few = OptimizeSettings {
         evaluations: 17,
-        ..Settings::default()
+        ..OptimizeSettings::default()
     };
     let found = descend(function, &[-1.2, 1.0], &few).unwrap();
     let best = seen.iter().min_by(|a, b| a.1.total_cmp(&b.1)).unwrap();
@@ -93,7 +93,7 @@ fn the_best_point_is_what_was_found() {
 #[test]
 fn every_iteration_is_heard_of() {
     let mut heard: Vec<Progress> = Vec::new();
-    let settings = Settings::default();
+    let settings = OptimizeSettings::default();
     let found = minimise(rosenbrock, &[-1.2, 1.0], &settings, |p| heard.push(*p)).unwrap();
     let numbers: Vec<usize> = heard.iter().map(|p| p.iteration).collect();
     assert_eq!(numbers, (1..=found.iterations).collect::<Vec<_>>());
@@ -112,9 +112,9 @@ fn every_iteration_is_heard_of() {
 /// A first step of 40 lands where there is no value.
 #[test]
 fn failures_turn_the_search_back() {
-    let far = Settings {
-        first_step: 40.0,
-        ..Settings::default()
+    let far = OptimizeSettings {
+        first_step: Some(40.0),
+        ..OptimizeSettings::default()
     };
     let found = descend(half_plane, &[-5.0, 2.0], &far).unwrap();
     println!("half plane: {found:?}");
@@ -135,9 +135,9 @@ fn failures_turn_the_search_back() {
 /// What isn't a number, or of another length than the point, is a failure like any other.
 #[test]
 fn what_is_no_number_turns_the_search_back() {
-    let far = Settings {
-        first_step: 40.0,
-        ..Settings::default()
+    let far = OptimizeSettings {
+        first_step: Some(40.0),
+        ..OptimizeSettings::default()
     };
     for bad in [
         (f64::NAN, vec![0.0; 2]),
@@ -155,11 +155,11 @@ fn what_is_no_number_turns_the_search_back() {
 #[test]
 fn gradients_are_clipped() {
     let found = |clip: Option<f64>, evaluations: usize| {
-        let settings = Settings {
+        let settings = OptimizeSettings {
             clip,
-            first_step: 3.0,
+            first_step: Some(3.0),
             evaluations,
-            ..Settings::default()
+            ..OptimizeSettings::default()
         };
         descend(cliff, &[0.0], &settings).unwrap()
     };
@@ -175,38 +175,38 @@ fn gradients_are_clipped() {
 #[test]
 fn every_end_is_reached() {
     let from = [-1.2, 1.0];
-    let stop = |settings: Settings| descend(rosenbrock, &from, &settings).unwrap();
+    let stop = |settings: OptimizeSettings| descend(rosenbrock, &from, &settings).unwrap();
 
-    let target = stop(Settings {
+    let target = stop(OptimizeSettings {
         target: Some(1e-3),
-        ..Settings::default()
+        ..OptimizeSettings::default()
     });
     assert_eq!(target.stop, Stop::Target);
     assert!(target.cost <= 1e-3 && target.iterations > 0);
 
-    let gradient = stop(Settings {
+    let gradient = stop(OptimizeSettings {
         gradient_tolerance: 1e-3,
         cost_tolerance: 0.0,
-        ..Settings::default()
+        ..OptimizeSettings::default()
     });
     assert_eq!(gradient.stop, Stop::Gradient);
     assert!(gradient.gradient <= 1e-3 * 232.867_687_75);
 
-    let cost = stop(Settings {
+    let cost = stop(OptimizeSettings {
         gradient_tolerance: 0.0,
         cost_tolerance: 0.5,
-        ..Settings::default()
+        ..OptimizeSettings::default()
     });
     assert_eq!(cost.stop, Stop::Cost);
 
     for settings in [
-        Settings {
+        OptimizeSettings {
             iterations: 3,
-            ..Settings::default()
+            ..OptimizeSettings::default()
         },
-        Settings {
+        OptimizeSettings {
             evaluations: 5,
-            ..Settings::default()
+            ..OptimizeSettings::default()
         },
     ] {
         let found = stop(settings);
@@ -216,32 +216,32 @@ fn every_end_is_reached() {
     }
 
     // Where it starts is already right, or level.
-    let there = Settings {
+    let there = OptimizeSettings {
         target: Some(0.0),
-        ..Settings::default()
+        ..OptimizeSettings::default()
     };
     let found = descend(rosenbrock, &[1.0, 1.0], &there).unwrap();
     assert_eq!((found.stop, found.evaluations), (Stop::Target, 1));
-    let found = descend(rosenbrock, &[1.0, 1.0], &Settings::default()).unwrap();
+    let found = descend(rosenbrock, &[1.0, 1.0], &OptimizeSettings::default()).unwrap();
     assert_eq!((found.stop, found.evaluations), (Stop::Gradient, 1));
 
     // No trial is lower, because the gradient is a lie.
     let lie = |x: &[f64]| Ok((x[0].abs(), vec![-1.0]));
-    let found = descend(lie, &[0.0], &Settings::default()).unwrap();
+    let found = descend(lie, &[0.0], &OptimizeSettings::default()).unwrap();
     assert_eq!((found.stop, found.x), (Stop::Cost, vec![0.0]));
 }
 
 #[test]
 fn settings_that_cannot_be_are_named() {
-    let good = Settings::default;
+    let good = OptimizeSettings::default;
     let zero = |name| (name, 0.0);
-    let mut wrong: Vec<(&str, f64, Settings)> = Vec::new();
+    let mut wrong: Vec<(&str, f64, OptimizeSettings)> = Vec::new();
     for (name, value) in [zero("first_step"), ("first_step", f64::NAN)] {
         wrong.push((
             name,
             value,
-            Settings {
-                first_step: value,
+            OptimizeSettings {
+                first_step: Some(value),
                 ..good()
             },
         ));
@@ -250,7 +250,7 @@ fn settings_that_cannot_be_are_named() {
         wrong.push((
             name,
             value,
-            Settings {
+            OptimizeSettings {
                 clip: Some(value),
                 ..good()
             },
@@ -260,7 +260,7 @@ fn settings_that_cannot_be_are_named() {
         wrong.push((
             "gradient_tolerance",
             value,
-            Settings {
+            OptimizeSettings {
                 gradient_tolerance: value,
                 ..good()
             },
@@ -268,7 +268,7 @@ fn settings_that_cannot_be_are_named() {
         wrong.push((
             "cost_tolerance",
             value,
-            Settings {
+            OptimizeSettings {
                 cost_tolerance: value,
                 ..good()
             },
@@ -277,7 +277,7 @@ fn settings_that_cannot_be_are_named() {
     wrong.push((
         "target",
         f64::NAN,
-        Settings {
+        OptimizeSettings {
             target: Some(f64::NAN),
             ..good()
         },
@@ -285,7 +285,7 @@ fn settings_that_cannot_be_are_named() {
     wrong.push((
         "iterations",
         0.0,
-        Settings {
+        OptimizeSettings {
             iterations: 0,
             ..good()
         },
@@ -293,7 +293,7 @@ fn settings_that_cannot_be_are_named() {
     wrong.push((
         "evaluations",
         0.0,
-        Settings {
+        OptimizeSettings {
             evaluations: 0,
             ..good()
         },
@@ -301,7 +301,7 @@ fn settings_that_cannot_be_are_named() {
     wrong.push((
         "memory",
         0.0,
-        Settings {
+        OptimizeSettings {
             memory: 0,
             ..good()
         },
@@ -319,7 +319,7 @@ fn settings_that_cannot_be_are_named() {
 
 #[test]
 fn a_start_that_fails_is_an_error() {
-    let settings = Settings::default();
+    let settings = OptimizeSettings::default();
     let error = descend(half_plane, &[4.0, 0.0], &settings).unwrap_err();
     assert!(error.to_string().contains("must be under 3.2"), "{error}");
     let error = descend(|_| Ok((f64::NAN, vec![0.0])), &[0.0], &settings).unwrap_err();
@@ -335,17 +335,17 @@ fn a_start_that_fails_is_an_error() {
 
 #[test]
 fn the_same_again_gives_the_same() {
-    let far = Settings {
-        first_step: 40.0,
+    let far = OptimizeSettings {
+        first_step: Some(40.0),
         clip: Some(3.0),
-        ..Settings::default()
+        ..OptimizeSettings::default()
     };
     let once = || descend(half_plane, &[-5.0, 2.0], &far).unwrap();
     assert_eq!(once(), once());
 }
 
 /// A driven ball beside a free coin, both weightless: the water alone carries the coin.
-fn ball_and_coin() -> (Simulator, optimize::Best, f64) {
+fn ball_and_coin() -> (Simulator, Optimum<Controls>, f64) {
     let mut scene = Scene::new(Fluid::fresh_water());
     let ball = Body::new(Shape::sphere(0.05)).density(998.0);
     scene.add(ball.at([-0.12, 0.0, 0.0]).actuated());
@@ -357,7 +357,7 @@ fn ball_and_coin() -> (Simulator, optimize::Best, f64) {
     let start = Controls::zeros(&simulator, 40);
     let before = simulator.rollout(&start).unwrap().value(&goal).unwrap();
     let best = optimize::lbfgs(&simulator, start, &goal).unwrap();
-    let again = simulator.rollout(&best.controls).unwrap();
+    let again = simulator.rollout(&best.x).unwrap();
     assert_eq!(again.value(&goal).unwrap(), best.cost);
     (simulator, best, before)
 }
@@ -367,7 +367,7 @@ fn controls_of_a_small_scene_lower_its_objective_tenfold() {
     let (_, best, before) = ball_and_coin();
     println!(
         "{before:.3e} to {:.3e} m² in {} rollouts, {} iterations, {:?}",
-        best.cost, best.rollouts, best.iterations, best.stop
+        best.cost, best.evaluations, best.iterations, best.stop
     );
     assert!(best.cost < 0.1 * before);
     assert_eq!(ball_and_coin().1, best);

@@ -78,6 +78,12 @@ const LAYERS: [(&str, &[&str]); 19] = [
             "water",
         ],
     ),
+    (
+        "tradeoff",
+        &[
+            "adjoint", "geometry", "boundary", "coupling", "dynamics", "scene", "shape", "simulate",
+        ],
+    ),
     // Descent stands on what a user sees.
     ("optimize", &["simulate"]),
     // The facade names what it shows; the command line stands on the facade.
@@ -88,8 +94,7 @@ const LAYERS: [(&str, &[&str]); 19] = [
     (
         "cli",
         &[
-            "adjoint", "boundary", "coupling", "dynamics", "geometry", "gpu", "scene", "shape",
-            "simulate", "water",
+            "boundary", "coupling", "dynamics", "geometry", "gpu", "scene", "shape", "simulate", "tradeoff", "water",
         ],
     ),
 ];

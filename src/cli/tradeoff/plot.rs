@@ -6,8 +6,9 @@ use std::path::Path;
 use plotters::coord::Shift;
 use plotters::prelude::*;
 
-use super::refuse;
-use super::report::{Reference, Report, Row, short};
+use super::table::short;
+use crate::cli::options::name;
+use crate::tradeoff::{Tradeoff, TradeoffReference, TradeoffRow};
 use crate::{Error, Result};
 
 const WIDTH: u32 = 860;
@@ -25,6 +26,11 @@ type Panel<'a> = DrawingArea<SVGBackend<'a>, Shift>;
 
 /// A failure of the drawing itself, in words.
 type Drawn = std::result::Result<(), Box<dyn std::error::Error>>;
+
+/// What is refused of a file before hours are spent on it.
+fn refuse(file: &Path, expected: &str) -> Error {
+    Error::input("--plot", file.display().to_string(), expected)
+}
 
 /// Whether the picture can be written there.
 pub(super) fn prepare(file: &Path) -> Result<()> {
@@ -44,9 +50,9 @@ pub(super) fn prepare(file: &Path) -> Result<()> {
 }
 
 /// Writes the picture.
-pub(super) fn write(file: &Path, report: &Report) -> Result<()> {
+pub(super) fn write(file: &Path, found: &Tradeoff) -> Result<()> {
     let mut text = String::new();
-    draw(&mut text, report).map_err(|e| failed(file, std::io::Error::other(e.to_string())))?;
+    draw(&mut text, found).map_err(|e| failed(file, std::io::Error::other(e.to_string())))?;
     fs::write(file, text).map_err(|e| failed(file, e))
 }
 
@@ -63,48 +69,46 @@ struct Chart<'a> {
     title: String,
     x: &'static str,
     y: &'static str,
-    points: Vec<(&'a Row, (f64, f64))>,
-    on_front: fn(&Row) -> bool,
+    points: Vec<(&'a TradeoffRow, (f64, f64))>,
+    on_front: fn(&TradeoffRow) -> bool,
     /// The reference's own error.
     estimate: Option<f64>,
 }
 
-fn charts<'a>(report: &'a Report) -> Vec<Chart<'a>> {
-    let reference = &report.reference;
-    let points = |of: fn(&Row, &Reference) -> Option<(f64, f64)>, which: &dyn Fn(&Row) -> bool| {
-        let rows = report.rows.iter().filter(|r| which(r));
+fn charts(found: &Tradeoff) -> Vec<Chart<'_>> {
+    let reference = &found.reference;
+    type Point = fn(&TradeoffRow, &TradeoffReference) -> Option<(f64, f64)>;
+    let points = |of: Point, which: &dyn Fn(&TradeoffRow) -> bool| {
+        let rows = found.rows.iter().filter(|r| which(r));
         let found = rows.filter_map(|r| Some((r, of(r, reference)?)));
         found
             .map(|(r, (x, y))| (r, (x, y.max(FLOOR))))
             .collect::<Vec<_>>()
     };
-    let first = report.rows.first().map(|r| r.configuration);
-    let alike = |r: &Row| first.is_some_and(|f| r.configuration.steps_like(&f));
-    let steps = report
-        .rows
-        .first()
-        .map_or_else(String::new, |r| r.integrator.clone());
+    let first = found.rows.first();
+    let alike = |r: &TradeoffRow| first.is_some_and(|f| r.steps_like(f));
     let mut out = vec![Chart {
-        title: format!("{}: added mass at the start", report.scene),
+        title: format!("{}: added mass at the start", found.scene),
         x: "time per step, ms",
         y: "relative error of the added mass",
-        points: points(Row::by_added_mass, &alike),
+        points: points(TradeoffRow::by_added_mass, &alike),
         on_front: |r| r.pareto,
         estimate: reference.added_mass.error_estimate,
     }];
-    if !steps.is_empty() {
-        out[0].title += &format!(" (steps by {steps})");
+    if let Some(first) = first {
+        let integrator = name(first.configuration.integrator);
+        out[0].title += &format!(" (steps by {integrator})");
     }
     if let Some(end_state) = &reference.end_state {
         out.push(Chart {
             title: format!(
                 "{}: where the bodies are after {} s",
-                report.scene,
+                found.scene,
                 short(reference.horizon_seconds)
             ),
             x: "time per simulated second, ms",
             y: "relative error of the end state",
-            points: points(Row::by_end_state, &|_| true),
+            points: points(TradeoffRow::by_end_state, &|_| true),
             on_front: |r| r.pareto_end_state,
             estimate: end_state.error_estimate,
         });
@@ -112,8 +116,8 @@ fn charts<'a>(report: &'a Report) -> Vec<Chart<'a>> {
     out
 }
 
-fn draw(text: &mut String, report: &Report) -> Drawn {
-    let charts = charts(report);
+fn draw(text: &mut String, found: &Tradeoff) -> Drawn {
+    let charts = charts(found);
     let height = HEIGHT * charts.len() as u32;
     let area = SVGBackend::with_string(text, (WIDTH, height)).into_drawing_area();
     area.fill(&WHITE)?;
@@ -189,8 +193,8 @@ impl Chart<'_> {
             entries.push((Sign::Line, "Pareto front".to_string()));
         }
         for (fidelity, method) in self.families() {
-            let look = Look::new(fidelity, method);
-            let of = |row: &Row| (row.fidelity.as_str(), row.method.as_str()) == (fidelity, method);
+            let look = Look::new(&fidelity, &method);
+            let of = |row: &TradeoffRow| family(row) == (fidelity.clone(), method.clone());
             let points = self.points.iter().filter(|(row, _)| of(row));
             for (row, at) in points {
                 let (x, y) = chart.backend_coord(at);
@@ -207,16 +211,21 @@ impl Chart<'_> {
     }
 
     /// Fidelities and methods that occur, in the order of the rows.
-    fn families(&self) -> Vec<(&str, &str)> {
+    fn families(&self) -> Vec<(String, String)> {
         let mut out = Vec::new();
         for (row, _) in &self.points {
-            let family = (row.fidelity.as_str(), row.method.as_str());
+            let family = family(row);
             if !out.contains(&family) {
                 out.push(family);
             }
         }
         out
     }
+}
+
+fn family(row: &TradeoffRow) -> (String, String) {
+    let c = &row.configuration;
+    (name(c.fidelity), name(c.method))
 }
 
 /// What stands in the legend beside a text.

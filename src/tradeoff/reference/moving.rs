@@ -1,16 +1,17 @@
 //! Accelerations and trajectories by compressed bodies with growing accuracy and shrinking time
 //! steps; by the coupled system where gaps are too small to compress the bodies.
 
-use std::time::{Duration, Instant};
-
-use super::{Limits, climb, refinable, shapes};
+use super::{Limits, climb};
 use crate::boundary::OneBody;
-use crate::cli::tradeoff::measure::{Path, Start};
 use crate::dynamics::Integrator;
 use crate::geometry::Other;
-use crate::scene::{Scene, Shape};
+use crate::scene::Scene;
 use crate::simulate::{Fidelity, Settings, Simulator};
+use crate::tradeoff::progress::Watch;
+use crate::tradeoff::shapes::{ClosedForms, closed_forms, refinable, shapes};
+use crate::tradeoff::start::{Path, Start};
 use crate::{Error, Result};
+use std::time::{Duration, Instant};
 
 /// Accuracy of the compression, and steps for each of the scene's.
 const LEVELS: [(f64, usize); 4] = [(1e-2, 1), (1e-3, 2), (1e-4, 2), (1e-5, 4)];
@@ -26,14 +27,14 @@ const MESH_GROWTH: f64 = 4.0;
 const FOR_MESHES: f64 = 0.6;
 /// Residual of the coupled system, far below the other errors.
 const TOLERANCE: f64 = 1e-10;
-/// Of the smallest gap that bodies meet, what they are compressed to resolve.
+/// Of the smallest gap that bodies come to, what they are compressed to resolve.
 const ROOM: f64 = 0.6;
 /// Gaps below this part of what is resolved are left to the coupled system.
 const HOPELESS: f64 = 0.6;
 
 /// What a simulation of the reference says.
 #[derive(Clone)]
-pub(super) struct Probe {
+pub(super) struct Simulation {
     pub start: Start,
     pub path: Path,
     level: Level,
@@ -63,24 +64,19 @@ enum Way {
 }
 
 /// The best simulation, and pairs whose differences estimate its error.
-pub(super) struct Probes {
-    pub best: Probe,
-    pub said: String,
-    pairs: Vec<(Probe, Probe)>,
+pub(super) struct Simulations {
+    pub best: Simulation,
+    pub description: String,
+    pairs: Vec<(Simulation, Simulation)>,
 }
 
-impl Probes {
+impl Simulations {
     /// By the first way that works, in about `time`.
-    pub fn new(
-        scene: &Scene,
-        limits: &Limits,
-        time: Duration,
-        tick: &mut dyn FnMut(),
-    ) -> Result<Self> {
+    pub fn new(scene: &Scene, limits: &Limits, time: Duration, watch: &mut Watch) -> Result<Self> {
         let until = Instant::now() + time;
         let mut why = None;
         for method in [OneBody::Auto, OneBody::Panel] {
-            match Self::by(scene, Way::Reduced(method), limits, until, tick) {
+            match Self::by(scene, Way::Reduced(method), limits, until, watch) {
                 Ok(Some(found)) => return Ok(found.because(why)),
                 Ok(None) => {
                     why = Some("gaps are too small to compress the bodies".to_string());
@@ -91,7 +87,7 @@ impl Probes {
                 }
             }
         }
-        match Self::by(scene, Way::Full, limits, until, tick)? {
+        match Self::by(scene, Way::Full, limits, until, watch)? {
             Some(found) => Ok(found.because(why)),
             None => Err(Error::input("reference: levels", 0, "at least one")),
         }
@@ -99,7 +95,7 @@ impl Probes {
 
     fn because(mut self, why: Option<String>) -> Self {
         if let Some(why) = why {
-            self.said += &format!(" ({why})");
+            self.description += &format!(" ({why})");
         }
         self
     }
@@ -110,12 +106,12 @@ impl Probes {
         way: Way,
         limits: &Limits,
         until: Instant,
-        tick: &mut dyn FnMut(),
+        watch: &mut Watch,
     ) -> Result<Option<Self>> {
         let left = until.saturating_duration_since(Instant::now());
         let mut run = |level: Level| {
-            let out = Probe::new(scene, &level, limits.steps)?;
-            tick();
+            let out = Simulation::new(scene, &level, limits.steps, watch)?;
+            watch.advance()?;
             Ok(out)
         };
         let levels = match way {
@@ -145,7 +141,7 @@ impl Probes {
             return Ok(None);
         };
         let mut out = Self {
-            said: best.level.say(scene),
+            description: best.level.describe(scene),
             pairs: found.pop().map(|c| (c, best.clone())).into_iter().collect(),
             best,
         };
@@ -160,7 +156,7 @@ impl Probes {
         &mut self,
         limits: &Limits,
         until: Instant,
-        mut run: impl FnMut(Level) -> Result<Probe>,
+        mut run: impl FnMut(Level) -> Result<Simulation>,
     ) -> Result<()> {
         let most = limits.faces.unwrap_or(usize::MAX).max(FACES[1]);
         let finer = FACES[1..].iter().filter(|n| **n <= most);
@@ -173,7 +169,7 @@ impl Probes {
         // Patterns allow only certain numbers.
         found.dedup_by(|b, a| b.faces <= a.faces);
         if let [.., coarse, fine] = found.as_slice() {
-            self.said += &format!(", {} faces a body", fine.level.faces);
+            self.description += &format!(", {} faces a body", fine.level.faces);
             self.pairs.push((coarse.clone(), fine.clone()));
             self.best = fine.clone();
         }
@@ -181,7 +177,7 @@ impl Probes {
     }
 
     /// Sum over the pairs of their differences; none without pairs.
-    pub fn estimate(&self, of: impl Fn(&Probe, &Probe) -> Option<f64>) -> Option<f64> {
+    pub fn estimate(&self, of: impl Fn(&Simulation, &Simulation) -> Option<f64>) -> Option<f64> {
         let differences: Option<Vec<f64>> = self.pairs.iter().map(|(a, b)| of(a, b)).collect();
         differences
             .filter(|d| !d.is_empty())
@@ -192,47 +188,43 @@ impl Probes {
 impl Level {
     /// Whether anything depends on the number of faces.
     fn meshed(&self, scene: &Scene) -> bool {
-        let formula = |s: &Shape| matches!(s, Shape::Sphere { .. } | Shape::Ellipsoid { .. });
-        let exact = self.way == Way::Reduced(OneBody::Auto) && shapes(scene).all(formula);
+        let exact = self.way == Way::Reduced(OneBody::Auto);
+        let exact = exact && closed_forms(scene) == ClosedForms::All;
         let drag = scene.bodies.iter().any(|b| b.drag.is_some());
         shapes(scene).any(refinable) && (!exact || drag)
     }
 
-    fn say(&self, scene: &Scene) -> String {
-        let formula = |s: &Shape| matches!(s, Shape::Sphere { .. } | Shape::Ellipsoid { .. });
+    fn describe(&self, scene: &Scene) -> String {
+        let by = match (self.way, closed_forms(scene)) {
+            (Way::Full, _) => return "the coupled system (full, mfs-vertex)".into(),
+            (Way::Reduced(OneBody::Panel), _) | (_, ClosedForms::None) => "panel",
+            (_, ClosedForms::All) => "exact",
+            (_, ClosedForms::Some) => "exact and panel",
+        };
         let accuracy = self.accuracy;
-        match self.way {
-            Way::Full => "the coupled system (full, mfs-vertex)".into(),
-            Way::Reduced(method) => {
-                let exact = method != OneBody::Panel;
-                let by = match () {
-                    () if exact && shapes(scene).all(formula) => "exact",
-                    () if exact && shapes(scene).any(formula) => "exact and panel",
-                    () => "panel",
-                };
-                format!("compressed bodies (reduced, {by}, accuracy {accuracy:.0e})")
-            }
-        }
+        format!("compressed bodies (reduced, {by}, accuracy {accuracy:.0e})")
     }
 }
 
-impl Probe {
-    fn new(scene: &Scene, level: &Level, steps: usize) -> Result<Self> {
-        let settings = Settings::default()
+impl Simulation {
+    fn new(scene: &Scene, level: &Level, steps: usize, watch: &mut Watch) -> Result<Self> {
+        let mut settings = Settings::default()
             .integrator(Integrator::Rk4)
             .time_step(scene.time_step / level.parts as f64)
             .faces(level.faces);
-        let mut settings = match level.way {
+        settings = match level.way {
             Way::Full => settings.fidelity(Fidelity::Full).tolerance(TOLERANCE),
             Way::Reduced(method) => settings
                 .fidelity(Fidelity::Reduced)
                 .one_body(method)
                 .accuracy(level.accuracy),
         };
-        settings.compress.resolved_gap = level.gap;
+        if let Some(gap) = level.gap {
+            settings = settings.resolved_gap(gap);
+        }
         let simulator = Simulator::new(scene, settings)?;
-        let start = Start::with_forces(&simulator)?;
-        let path = Path::new(&simulator, steps * level.parts)?;
+        let start = Start::values(&simulator)?.with_forces(&simulator)?;
+        let path = Path::new(&simulator, steps * level.parts, watch)?;
         Ok(Self {
             gaps: gaps(&simulator, &path),
             faces: simulator.faces(),
@@ -244,20 +236,14 @@ impl Probe {
 
     /// What the bodies must be compressed to resolve, if that is less than they do by default.
     fn needed_gap(&self) -> Option<f64> {
-        let tight = self
-            .gaps
-            .iter()
-            .filter(|(gap, resolved)| ROOM * gap < *resolved);
-        let smallest = tight
-            .map(|(gap, _)| ROOM * gap)
-            .fold(f64::INFINITY, f64::min);
+        let tight = self.gaps.iter().filter(|(gap, to)| ROOM * gap < *to);
+        let smallest = tight.map(|(gap, _)| ROOM * gap).reduce(f64::min)?;
         (smallest > 0.0 && smallest.is_finite()).then_some(smallest)
     }
 
     /// Whether a body comes nearer to others than its compression resolves.
     fn too_near(&self) -> bool {
-        let near = |(gap, resolved): &(f64, f64)| *gap < HOPELESS * resolved;
-        self.gaps.iter().any(near)
+        self.gaps.iter().any(|(gap, to)| *gap < HOPELESS * to)
     }
 }
 

@@ -2,17 +2,17 @@
 
 use nalgebra::{DMatrix, DVector};
 
-use super::measure::Path;
+use super::start::Path;
 use crate::simulate::Simulator;
 
 /// Diagonal entries of the water's mass matrix below this part of the whole are not the water's own
 /// but the mesh's (a round body's spin).
-const FELT: f64 = 1e-3;
+const SIGNIFICANT: f64 = 1e-3;
 
 /// Rows of the reference's M_f that mean something.
-pub(super) fn felt(added_mass: &DMatrix<f64>, mass: &DMatrix<f64>) -> Vec<usize> {
+pub(super) fn significant(added_mass: &DMatrix<f64>, mass: &DMatrix<f64>) -> Vec<usize> {
     (0..added_mass.nrows())
-        .filter(|i| added_mass[(*i, *i)] > FELT * mass[(*i, *i)])
+        .filter(|i| added_mass[(*i, *i)] > SIGNIFICANT * mass[(*i, *i)])
         .collect()
 }
 
@@ -75,14 +75,14 @@ impl Weights {
                 continue;
             }
             for (i, axis) in link.v.clone().zip(link.joint.basis()) {
-                let turns = axis.fixed_rows::<3>(3).norm() > 0.0;
-                out.v[i] = if turns { length } else { 1.0 };
+                let angular = axis.fixed_rows::<3>(3).norm() > 0.0;
+                out.v[i] = if angular { length } else { 1.0 };
             }
             // Quaternions, which come last, change by half an angle.
             let quaternion = link.q.len() > link.v.len();
-            let turning = link.q.end - if quaternion { 4 } else { 0 };
+            let rotation = link.q.end - if quaternion { 4 } else { 0 };
             for (k, i) in link.q.clone().enumerate() {
-                out.q[i] = match (quaternion, i >= turning) {
+                out.q[i] = match (quaternion, i >= rotation) {
                     (true, true) => 2.0 * length,
                     (true, false) => 1.0,
                     (false, _) => out.v[link.v.start + k],
@@ -215,7 +215,7 @@ mod tests {
         let reference =
             DMatrix::from_row_slice(3, 3, &[4.0, 0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 1e-9]);
         let mass = DMatrix::identity(3, 3);
-        let rows = felt(&reference, &mass);
+        let rows = significant(&reference, &mass);
         assert_eq!(rows, [0, 1]);
         let mut found = reference.clone();
         found[(0, 1)] = 0.02;

@@ -6,19 +6,20 @@
 mod moving;
 mod panels;
 
-use std::time::{Duration, Instant};
-
-use nalgebra::{DMatrix, DVector};
-
-use super::compare::{Excursion, Weights, end_error, felt, matrix_error, norm, vector_error};
-use super::measure::{Path, Start, free};
-use super::report;
+use super::compare::{
+    Excursion, Weights, end_error, matrix_error, norm, significant, vector_error,
+};
+use super::progress::Watch;
+use super::row::{ReferenceQuantity, TradeoffReference};
+use super::start::{Path, Start, free};
 use crate::adjoint::sample;
-use crate::scene::{Scene, Shape};
+use crate::scene::{Preset, Scene};
 use crate::simulate::{Fidelity, Settings, Simulator};
 use crate::{Error, Result};
-use moving::Probes;
+use moving::Simulations;
+use nalgebra::{DMatrix, DVector};
 use panels::Panels;
+use std::time::{Duration, Instant};
 
 /// An acceleration with a larger error estimate says nothing.
 const VAGUE: f64 = 0.3;
@@ -40,11 +41,10 @@ pub(super) struct Limits {
 pub(super) struct Reference {
     added_mass: DMatrix<f64>,
     /// Rows of it that mean something.
-    felt: Vec<usize>,
+    significant: Vec<usize>,
     motion: Option<Motion>,
-    horizon: f64,
-    /// For the report.
-    pub said: report::Reference,
+    /// For users.
+    pub description: TradeoffReference,
 }
 
 /// Acceleration and trajectory.
@@ -59,115 +59,114 @@ struct Motion {
 }
 
 impl Reference {
-    /// Computes it; `tick` hears of each part that is done.
+    /// Computes it.
     ///
     /// # Errors
-    /// A scene without water or where nothing can move, and what no method can solve.
-    pub fn new(scene: &Scene, limits: Limits, tick: &mut dyn FnMut()) -> Result<Self> {
+    /// A scene without water or where nothing can move, what no method can solve, and the end that was asked for.
+    pub fn new(scene: &Scene, limits: Limits, watch: &mut Watch) -> Result<Self> {
         let begin = Instant::now();
         check(scene)?;
+        // A reference has no need of a scene's preset.
+        let scene = &Scene {
+            preset: Preset::Default,
+            ..scene.clone()
+        };
         let half = Duration::from_secs_f64(limits.seconds / 2.0);
-        let panels = Panels::new(scene, &limits, begin + half, tick);
-        let probes = Probes::new(scene, &limits, half, tick);
+        let panels = Panels::new(scene, &limits, begin + half, watch);
+        watch.check()?;
+        let simulations = Simulations::new(scene, &limits, half, watch);
+        watch.check()?;
         let mut notes = Vec::new();
-        let (panels, probes) = match (panels, probes) {
+        let (panels, simulations) = match (panels, simulations) {
             (Err(error), Err(_)) => return Err(error),
-            (panels, probes) => (
+            (panels, simulations) => (
                 noted(panels, "coupled panels", &mut notes),
-                noted(probes, "compressed bodies", &mut notes),
+                noted(simulations, "compressed bodies", &mut notes),
             ),
         };
-        let starts = [
-            panels.as_ref().map(|p| p.best.clone()),
-            probes.as_ref().map(|p| p.best.start.clone()),
-        ];
-        let mut starts = starts.into_iter().flatten();
-        let Some(best) = starts.next() else {
+        let moving = simulations.as_ref().map(|s| &s.best.start);
+        let best = panels.as_ref().map(|p| &p.best).or(moving);
+        let Some(best) = best.cloned() else {
             return Err(Error::input(
                 "reference",
                 "none",
                 "panels or compressed bodies",
             ));
         };
-        let felt = felt(&best.added_mass, &best.mass);
-        let (free, left_out) = (best.mass.nrows(), best.mass.nrows() - felt.len());
+        let significant = significant(&best.added_mass, &best.mass);
+        let difference =
+            |a: &Start, b: &Start| matrix_error(&a.added_mass, &b.added_mass, &significant);
+        let (free, left_out) = (best.mass.nrows(), best.mass.nrows() - significant.len());
         if left_out > 0 {
             notes.push(format!(
                 "{left_out} of {free} coordinates move next to no water (a round body's spin): M_f is \
                  compared without them"
             ));
         }
-        let horizon = limits.steps as f64 * scene.time_step;
-        let others = starts.next();
-        let moving_differs_by =
-            others.and_then(|s| matrix_error(&s.added_mass, &best.added_mass, &felt));
+        let (what, error_estimate) = match (&panels, &simulations) {
+            (Some(p), _) => (p.description.clone(), p.estimate(&significant)),
+            (None, Some(s)) => {
+                let estimate = s.estimate(|a, b| difference(&a.start, &b.start));
+                (s.description.clone(), estimate)
+            }
+            (None, None) => (String::new(), None),
+        };
+        let moving_differs_by = moving
+            .filter(|_| panels.is_some())
+            .and_then(|s| difference(s, &best));
         let mut out = Self {
-            said: report::Reference {
-                added_mass: match (&panels, &probes) {
-                    (None, Some(p)) => report::Quantity {
-                        what: p.said.clone(),
-                        error_estimate: p.estimate(|a, b| {
-                            matrix_error(&a.start.added_mass, &b.start.added_mass, &felt)
-                        }),
-                    },
-                    (panels, _) => report::Quantity {
-                        what: panels.as_ref().map_or_else(String::new, |p| p.said.clone()),
-                        error_estimate: panels.as_ref().and_then(|p| p.estimate(&felt)),
-                    },
+            description: TradeoffReference {
+                added_mass: ReferenceQuantity {
+                    what,
+                    error_estimate,
                 },
                 moving_differs_by,
                 acceleration: None,
                 end_state: None,
-                horizon_seconds: horizon,
+                horizon_seconds: limits.steps as f64 * scene.time_step,
                 seconds: 0.0,
                 notes,
             },
-            added_mass: best.added_mass.clone(),
-            felt,
+            added_mass: best.added_mass,
+            significant,
             motion: None,
-            horizon,
         };
-        if let Some(probes) = probes {
-            out.set_motion(scene, probes)?;
+        if let Some(simulations) = simulations {
+            out.set_motion(scene, simulations)?;
         }
-        out.said.finish();
-        out.said.seconds = begin.elapsed().as_secs_f64();
+        out.description.finish();
+        out.description.seconds = begin.elapsed().as_secs_f64();
         Ok(out)
     }
 
-    fn set_motion(&mut self, scene: &Scene, probes: Probes) -> Result<()> {
-        let best = &probes.best;
+    fn set_motion(&mut self, scene: &Scene, simulations: Simulations) -> Result<()> {
         let simulator = isolated(scene)?;
+        let start = &simulations.best.start;
         let free = free(&simulator);
         let weights = Weights::new(&simulator, &free);
-        let excursion = Excursion::new(&best.path, &weights);
-        let mass = best.start.mass.clone();
+        let excursion = Excursion::new(&simulations.best.path, &weights);
+        let mass = start.mass.clone();
         // Whether the scene's own forces accelerate anything at the start.
-        let rate = norm(&simulator.start().1.select_rows(&free), &mass) / self.horizon;
+        let rate = norm(&simulator.start().1.select_rows(&free), &mass) / self.horizon();
         let gravity = scene.gravity.iter().map(|g| g * g).sum::<f64>().sqrt();
         let least = NEGLIGIBLE * (rate + gravity * mass.diagonal().sum().sqrt());
         let none = DVector::zeros(free.len());
         let estimate = |extra: &DVector<f64>| {
-            probes.estimate(|a, b| {
+            simulations.estimate(|a, b| {
                 let (a, b) = (a.start.acceleration(extra)?, b.start.acceleration(extra)?);
                 vector_error(&a, &b, &mass)
             })
         };
-        let size = best
-            .start
-            .acceleration(&none)
-            .map_or(0.0, |a| norm(&a, &mass));
+        let size = start.acceleration(&none).map_or(0.0, |a| norm(&a, &mass));
         let own = size > least && estimate(&none).is_none_or(|e| e < VAGUE);
         let (extra, how) = if own {
             (none, "under the scene's own forces")
         } else {
+            let size = if rate > 0.0 { rate } else { 1.0 };
             let how = "under a pseudo-random force, as next to nothing accelerates the bodies then";
-            (
-                pseudo_random_force(&mass) * if rate > 0.0 { rate } else { 1.0 },
-                how,
-            )
+            (pseudo_random_force(&mass) * size, how)
         };
-        let Some(acceleration) = best.start.acceleration(&extra) else {
+        let Some(acceleration) = start.acceleration(&extra) else {
             return Err(Error::Unresolved {
                 place: "mass matrix of the reference".into(),
                 quantity: "smallest eigenvalue".into(),
@@ -176,27 +175,25 @@ impl Reference {
                 remedy: "give massless bodies mass".into(),
             });
         };
-        self.said.acceleration = Some(report::Quantity {
-            what: format!("{}; at the start, {how}", probes.said),
+        let by = &simulations.description;
+        self.description.acceleration = Some(ReferenceQuantity {
+            what: format!("{by}; at the start, {how}"),
             error_estimate: estimate(&extra),
         });
         if excursion.any() {
-            self.said.end_state = Some(report::Quantity {
-                what: format!(
-                    "{}; rk4 with steps of {} s",
-                    probes.said,
-                    report::short(best.path.time_step)
-                ),
-                error_estimate: probes
-                    .estimate(|a, b| end_error(&a.path, &b.path, &weights, &excursion)),
+            let dt = super::configuration::seconds(simulations.best.path.time_step);
+            let error = |a: &Path, b: &Path| end_error(a, b, &weights, &excursion);
+            self.description.end_state = Some(ReferenceQuantity {
+                what: format!("{by}; rk4 with steps of {dt} s"),
+                error_estimate: simulations.estimate(|a, b| error(&a.path, &b.path)),
             });
         } else {
             let note = "nothing moves within the horizon: end states aren't compared";
-            self.said.notes.push(note.into());
+            self.description.notes.push(note.into());
         }
         self.motion = Some(Motion {
             mass,
-            path: probes.best.path,
+            path: simulations.best.path,
             extra,
             acceleration,
             weights,
@@ -207,17 +204,17 @@ impl Reference {
 
     /// Time over which end states are compared, s.
     pub fn horizon(&self) -> f64 {
-        self.horizon
+        self.description.horizon_seconds
     }
 
     /// Whether there is an end state to compare with.
     pub fn moves(&self) -> bool {
-        self.said.end_state.is_some()
+        self.description.end_state.is_some()
     }
 
     /// Error of M_f.
     pub fn added_mass_error(&self, start: &Start) -> Option<f64> {
-        matrix_error(&start.added_mass, &self.added_mass, &self.felt)
+        matrix_error(&start.added_mass, &self.added_mass, &self.significant)
     }
 
     /// Error of the acceleration at the start.
@@ -235,10 +232,8 @@ impl Reference {
 }
 
 fn isolated(scene: &Scene) -> Result<Simulator> {
-    Simulator::new(
-        scene,
-        Settings::default().fidelity(Fidelity::Isolated).faces(80),
-    )
+    let settings = Settings::default().fidelity(Fidelity::Isolated).faces(80);
+    Simulator::new(scene, settings)
 }
 
 /// Refuses scenes in which there is nothing to compare.
@@ -261,16 +256,12 @@ fn check(scene: &Scene) -> Result<()> {
 }
 
 fn noted<T>(found: Result<T>, what: &str, notes: &mut Vec<String>) -> Option<T> {
-    match found {
-        Ok(found) => Some(found),
-        Err(error) => {
-            notes.push(format!("no reference from {what}: {error}"));
-            None
-        }
-    }
+    found
+        .map_err(|error| notes.push(format!("no reference from {what}: {error}")))
+        .ok()
 }
 
-/// Runs levels one after another while the next, `growth` times as dear, is expected to end in time;
+/// Runs levels one after another while the next, expected to take `growth` times as long, ends in time;
 /// at least `least` of them. An error ends the climb, and counts if nothing was found before.
 fn climb<L, T>(
     levels: impl IntoIterator<Item = L>,
@@ -295,15 +286,6 @@ fn climb<L, T>(
         last = now.elapsed().as_secs_f64();
     }
     Ok(out)
-}
-
-fn shapes(scene: &Scene) -> impl Iterator<Item = &Shape> {
-    scene.bodies.iter().filter_map(|b| b.shape.as_ref())
-}
-
-/// Whether a shape's number of faces can be chosen.
-fn refinable(shape: &Shape) -> bool {
-    !shape.is_mesh()
 }
 
 /// A reproducible force for every velocity, of unit length in the metric of the mass matrix's diagonal.
@@ -332,18 +314,14 @@ mod tests {
 
     #[test]
     fn scenes_without_anything_to_compare_are_refused() {
-        use crate::scene::{Body, Fluid};
+        use crate::scene::{Body, Fluid, Shape};
         let mut scene = Scene::new(Fluid::none());
         scene.add(Body::new(Shape::sphere(1.0)).density(998.0));
-        assert!(
-            check(&scene)
-                .unwrap_err()
-                .to_string()
-                .contains("fluid.density")
-        );
+        let refused = |scene: &Scene| check(scene).unwrap_err().to_string();
+        assert!(refused(&scene).contains("fluid.density"));
         scene.fluid = Fluid::fresh_water();
         assert!(check(&scene).is_ok());
         scene.bodies[0].locked = true;
-        assert!(check(&scene).unwrap_err().to_string().contains("joints"));
+        assert!(refused(&scene).contains("joints"));
     }
 }

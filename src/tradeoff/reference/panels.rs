@@ -9,17 +9,17 @@
 //! and three give two such values, whose difference is the estimate of the error. With sharp edges the order is that of the
 //! leading part alone: the estimate is then no less than what p = 1 would have changed.
 
-use std::time::{Duration, Instant};
-
-use nalgebra::DMatrix;
-
-use super::{Limits, climb, refinable, shapes};
+use super::{Limits, climb};
 use crate::Result;
 use crate::boundary::OneBody;
-use crate::cli::tradeoff::compare::matrix_error;
-use crate::cli::tradeoff::measure::Start;
-use crate::scene::{Scene, Shape};
+use crate::scene::Scene;
 use crate::simulate::{Fidelity, Settings, Simulator};
+use crate::tradeoff::compare::matrix_error;
+use crate::tradeoff::progress::Watch;
+use crate::tradeoff::shapes::{has_edges, refinable, shapes};
+use crate::tradeoff::start::Start;
+use nalgebra::DMatrix;
+use std::time::{Duration, Instant};
 
 /// Faces per body, one after another: icosahedra with edges in 5, 7, 10, 14, 20 parts, whose meshes
 /// are alike.
@@ -33,18 +33,10 @@ const APART: f64 = 1.2;
 const SMOOTH: f64 = 1.0;
 const SHARP: f64 = 2.0 / 3.0;
 
-/// Whether a shape by formula has sharp edges.
-fn has_edges(shape: &Shape) -> bool {
-    matches!(
-        shape,
-        Shape::Box { .. } | Shape::Cylinder { .. } | Shape::Prism { .. }
-    )
-}
-
 /// The best M_f and others, for the estimate of its error.
 pub(super) struct Panels {
     pub best: Start,
-    pub said: String,
+    pub description: String,
     others: Vec<DMatrix<f64>>,
 }
 
@@ -66,21 +58,17 @@ impl Level {
 }
 
 impl Panels {
-    pub fn new(
-        scene: &Scene,
-        limits: &Limits,
-        until: Instant,
-        tick: &mut dyn FnMut(),
-    ) -> Result<Self> {
-        let (levels, until) = match limits.faces {
+    pub fn new(scene: &Scene, limits: &Limits, until: Instant, watch: &mut Watch) -> Result<Self> {
+        let (mut levels, until) = match limits.faces {
             Some(n) => (
                 vec![n.div_ceil(4), n.div_ceil(2), n],
                 until + Duration::from_secs(1 << 30),
             ),
             None => (FACES.to_vec(), until),
         };
-        let fixed = !shapes(scene).any(refinable);
-        let levels = levels.into_iter().take(if fixed { 1 } else { usize::MAX });
+        if !shapes(scene).any(refinable) {
+            levels.truncate(1);
+        }
         let mut found = climb(levels, 2, GROWTH, until, |asked| {
             let settings = Settings::default()
                 .fidelity(Fidelity::Full)
@@ -88,7 +76,7 @@ impl Panels {
                 .faces(asked);
             let simulator = Simulator::new(scene, settings)?;
             let start = Start::values(&simulator)?;
-            tick();
+            watch.advance()?;
             let faces = simulator.faces();
             Ok(Level {
                 asked,
@@ -100,48 +88,48 @@ impl Panels {
         found.dedup_by(|b, a| (b.faces as f64) < APART * a.faces as f64);
         let sharp = shapes(scene).any(has_edges);
         let order = if sharp { SHARP } else { SMOOTH };
-        let mut out = match found.as_slice() {
-            [.., a, b, c] => Self {
-                said: format!(
-                    "coupled panels (full, panel), extrapolated from {} and {} faces a body; its \
-                     error from the same with {} and {}",
+        let by = "coupled panels (full, panel)";
+        let (best, mut description, others) = match found.as_slice() {
+            [.., a, b, c] => (
+                b.extrapolated(c, order),
+                format!(
+                    "{by}, extrapolated from {} and {} faces a body; its error from the same with {} and {}",
                     b.asked, c.asked, a.asked, b.asked
                 ),
-                best: c.start.with_added_mass(b.extrapolated(c, order)),
-                others: vec![a.extrapolated(b, order), b.extrapolated(c, SMOOTH)],
-            },
-            [b, c] => Self {
-                said: format!(
-                    "coupled panels (full, panel), extrapolated from {} and {} faces a body; its \
-                     error from the correction",
+                vec![a.extrapolated(b, order), b.extrapolated(c, SMOOTH)],
+            ),
+            [b, c] => (
+                b.extrapolated(c, order),
+                format!(
+                    "{by}, extrapolated from {} and {} faces a body; its error from the correction",
                     b.asked, c.asked
                 ),
-                best: c.start.with_added_mass(b.extrapolated(c, order)),
-                others: vec![c.start.added_mass.clone()],
-            },
-            all => {
-                let best = all[0].start.clone();
-                let said = format!(
-                    "coupled panels (full, panel), {} faces in all",
-                    all[0].faces
-                );
-                Self {
-                    best,
-                    said,
-                    others: Vec::new(),
-                }
-            }
+                vec![c.start.added_mass.clone()],
+            ),
+            all => (
+                all[0].start.added_mass.clone(),
+                format!("{by}, {} faces in all", all[0].faces),
+                Vec::new(),
+            ),
         };
         if !shapes(scene).all(refinable) {
-            out.said += "; meshes from files are taken as they are";
+            description += "; meshes from files are taken as they are";
         }
-        Ok(out)
+        let finest = found.swap_remove(found.len() - 1).start;
+        Ok(Self {
+            best: Start {
+                added_mass: best,
+                ..finest
+            },
+            description,
+            others,
+        })
     }
 
     /// Estimate of the error over the rows that mean something.
-    pub fn estimate(&self, felt: &[usize]) -> Option<f64> {
+    pub fn estimate(&self, significant: &[usize]) -> Option<f64> {
         let others = self.others.iter();
-        let error = |other| matrix_error(other, &self.best.added_mass, felt);
+        let error = |other| matrix_error(other, &self.best.added_mass, significant);
         others.filter_map(error).reduce(f64::max)
     }
 }

@@ -1,0 +1,85 @@
+//! Time against error for Python: an instance of the data class in `hydrograd/_tradeoff.py`.
+
+use crate::error::{input, internal};
+use crate::interrupt::long;
+use crate::policy::Raised;
+use crate::scene::Scene;
+use hydrograd::tradeoff::{TradeoffSettings, measure};
+use pyo3::prelude::*;
+use serde_json::Value;
+
+/// The choices of a list by their names, as in scene files.
+fn named<T>(
+    field: &str,
+    names: Option<Vec<String>>,
+    read: fn(Value) -> serde_json::Result<T>,
+) -> PyResult<Vec<T>> {
+    let names = names.unwrap_or_default().into_iter();
+    let one = |name: String| {
+        let found = read(Value::String(name.clone()));
+        found.map_err(|e| {
+            input(
+                format!("tradeoff: {field}"),
+                format!("{name:?}"),
+                e.to_string(),
+            )
+        })
+    };
+    names.map(one).collect()
+}
+
+/// Measures a scene's time per step against its error, over everything that can be chosen: a `Tradeoff`.
+///
+/// Each fidelity, method for a body alone, number of faces, of points (`ranks`) and accuracy of compressed bodies, tolerance,
+/// integrator and time step (s) is varied around the scene's own choice, or around the first value of a list that is given;
+/// with `full_product` every combination is measured. Errors are against coupled panels on finer and finer meshes (added
+/// mass) and against compressed bodies of high accuracy with a quarter of the time step (accelerations, and end states
+/// after `steps` steps). Configurations are timed one after another on this machine, so leave it alone meanwhile. `budget` is
+/// the time for all this, s; what it has no time for is in `left_out`. With `reference_faces` faces a body the reference
+/// takes the time it needs. Ctrl-C ends it.
+#[pyfunction]
+#[pyo3(signature = (
+    scene, *, fidelities=None, methods=None, faces=None, ranks=None, accuracies=None, tolerances=None, integrators=None,
+    time_steps=None, full_product=false, steps=None, reference_faces=None, budget=120.0
+))]
+#[expect(clippy::too_many_arguments, reason = "one per keyword")]
+pub fn tradeoff<'py>(
+    py: Python<'py>,
+    scene: PyRef<'py, Scene>,
+    fidelities: Option<Vec<String>>,
+    methods: Option<Vec<String>>,
+    faces: Option<Vec<usize>>,
+    ranks: Option<Vec<usize>>,
+    accuracies: Option<Vec<f64>>,
+    tolerances: Option<Vec<f64>>,
+    integrators: Option<Vec<String>>,
+    time_steps: Option<Vec<f64>>,
+    full_product: bool,
+    steps: Option<usize>,
+    reference_faces: Option<usize>,
+    budget: f64,
+) -> PyResult<Bound<'py, PyAny>> {
+    let settings = TradeoffSettings {
+        fidelities: named("fidelities", fidelities, serde_json::from_value)?,
+        methods: named("methods", methods, serde_json::from_value)?,
+        faces: faces.unwrap_or_default(),
+        ranks: ranks.unwrap_or_default(),
+        accuracies: accuracies.unwrap_or_default(),
+        tolerances: tolerances.unwrap_or_default(),
+        integrators: named("integrators", integrators, serde_json::from_value)?,
+        time_steps: time_steps.unwrap_or_default(),
+        full_product,
+        steps,
+        reference_faces,
+        budget,
+    };
+    let scene = scene.0.clone();
+    let text = long(py, &Raised::default(), move |wish| {
+        let found = measure(&scene, &settings, |_| wish.go_on())?;
+        Ok(serde_json::to_string(&found))
+    })?;
+    let text = text.map_err(|e| internal(&e.to_string()))?;
+    py.import("hydrograd._tradeoff")?
+        .getattr("Tradeoff")?
+        .call_method1("_from_json", (text,))
+}

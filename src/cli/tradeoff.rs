@@ -1,0 +1,143 @@
+//! `hydrograd tradeoff`: time per step against error, over everything that can be chosen.
+
+mod plot;
+mod table;
+
+use std::ops::ControlFlow;
+use std::path::PathBuf;
+use std::process::ExitCode;
+
+use clap::Args;
+
+use super::input;
+use super::options::{self, Method, positive, tolerance};
+use super::output::Output;
+use super::progress;
+use crate::Result;
+use crate::tradeoff::{self, Progress, Stage, TradeoffSettings};
+use table::TradeoffReport;
+
+#[derive(Debug, Args)]
+#[command(
+    after_help = "Errors are relative: of the added mass against coupled panels on finer and finer \
+                  meshes, of accelerations and end states against compressed bodies of high accuracy \
+                  with a quarter of the time step. Each configuration is timed by itself, one after \
+                  another. Of each list that is given, the first value is what all else is varied around."
+)]
+pub(super) struct Arguments {
+    /// The scene file.
+    #[arg(value_name = "SCENE.toml")]
+    scene: PathBuf,
+    /// Fidelities, with commas between [default: isolated,reduced,auto,full].
+    #[arg(long, value_enum, value_delimiter = ',', value_name = "LIST")]
+    fidelities: Vec<options::Fidelity>,
+    /// Methods by which a body alone is solved [default: what the scene asks for, and the others
+    /// that the fidelity has].
+    #[arg(long, value_enum, value_delimiter = ',', value_name = "LIST")]
+    methods: Vec<Method>,
+    /// Faces per body, for shapes by formula [default: the scene's own, and 80,320,1280].
+    #[arg(long, value_parser = positive, value_delimiter = ',', value_name = "LIST", allow_negative_numbers = true)]
+    faces_list: Vec<usize>,
+    /// Points of each compressed body, with the fidelity reduced [default: 20,40,80,160,320].
+    #[arg(long, value_parser = positive, value_delimiter = ',', value_name = "LIST", allow_negative_numbers = true)]
+    ranks: Vec<usize>,
+    /// Errors that reduced and auto aim at [default: their own, and 3e-2 to 1e-4].
+    #[arg(long, value_parser = tolerance, value_delimiter = ',', value_name = "LIST", allow_negative_numbers = true)]
+    accuracies: Vec<f64>,
+    /// Relative residuals of the coupled solve, with the fidelity full [default: its own, and 1e-3
+    /// to 1e-10].
+    #[arg(long, value_parser = tolerance, value_delimiter = ',', value_name = "LIST", allow_negative_numbers = true)]
+    tolerances: Vec<f64>,
+    /// Integrators, with one fidelity: reduced if it is among them [default: the scene's own, and
+    /// all others].
+    #[arg(long, value_enum, value_delimiter = ',', value_name = "LIST")]
+    integrators: Vec<options::Integrator>,
+    /// Time steps in s, with the same fidelity [default: the scene's own, and 4 times to a quarter of it].
+    #[arg(long, value_parser = seconds, value_delimiter = ',', value_name = "LIST", allow_negative_numbers = true)]
+    time_steps: Vec<f64>,
+    /// Every combination of what is varied, in place of one after the other.
+    #[arg(long)]
+    full_product: bool,
+    /// Steps of the scene's own length over which trajectories are compared [default: the scene's
+    /// own number, at most 50].
+    #[arg(long, value_name = "N", value_parser = positive, allow_negative_numbers = true)]
+    steps: Option<usize>,
+    /// Finest faces per body of the reference, whatever time it takes [default: as many as the
+    /// budget has time for].
+    #[arg(long, value_name = "N", value_parser = positive, allow_negative_numbers = true)]
+    reference_faces: Option<usize>,
+    /// Time in s to do all this in, roughly; what is left out for it is said.
+    #[arg(long, value_name = "SECONDS", value_parser = seconds, default_value_t = 120.0, allow_negative_numbers = true)]
+    budget: f64,
+    /// Picture to write, an SVG [default: none is written].
+    #[arg(long, value_name = "FILE.svg")]
+    plot: Option<PathBuf>,
+}
+
+/// A time above zero.
+fn seconds(text: &str) -> std::result::Result<f64, String> {
+    match text.parse() {
+        Ok(x) if x > 0.0 && f64::is_finite(x) => Ok(x),
+        _ => Err("give a time above zero, in s".into()),
+    }
+}
+
+impl Arguments {
+    fn settings(&self) -> TradeoffSettings {
+        let method = |m: &Method| match m {
+            Method::Auto => tradeoff::Method::Auto,
+            Method::Exact => tradeoff::Method::Exact,
+            Method::Panel => tradeoff::Method::Panel,
+            Method::MfsVertex => tradeoff::Method::MfsVertex,
+            Method::MfsFace => tradeoff::Method::MfsFace,
+        };
+        TradeoffSettings {
+            fidelities: self.fidelities.iter().map(|f| (*f).into()).collect(),
+            methods: self.methods.iter().map(method).collect(),
+            faces: self.faces_list.clone(),
+            ranks: self.ranks.clone(),
+            accuracies: self.accuracies.clone(),
+            tolerances: self.tolerances.clone(),
+            integrators: self.integrators.iter().map(|i| (*i).into()).collect(),
+            time_steps: self.time_steps.clone(),
+            full_product: self.full_product,
+            steps: self.steps,
+            reference_faces: self.reference_faces,
+            budget: self.budget,
+        }
+    }
+}
+
+pub(super) fn main(arguments: &Arguments, output: Output) -> Result<ExitCode> {
+    let scene = input::load(&arguments.scene)?;
+    scene.validate()?;
+    if let Some(file) = &arguments.plot {
+        plot::prepare(file)?;
+    }
+    let mut bar = None;
+    let found = tradeoff::measure(&scene, &arguments.settings(), |now: Progress| {
+        let what = match now.stage {
+            Stage::Reference => "reference",
+            Stage::Configurations => "configurations",
+        };
+        if bar.as_ref().is_none_or(|(of, _)| *of != what) {
+            bar = Some((what, progress::Progress::new(what, now.all)));
+        }
+        if let Some((_, bar)) = &bar {
+            bar.set_of(now.done, now.all);
+        }
+        ControlFlow::Continue(())
+    })?;
+    drop(bar);
+    let mut files = Vec::new();
+    if let Some(file) = &arguments.plot {
+        plot::write(file, &found)?;
+        files.push(file.clone());
+    }
+    let measured = found.rows.iter().any(|r| r.added_mass_rel_error.is_some());
+    output.result(&TradeoffReport::new(found, files));
+    Ok(match measured {
+        true => ExitCode::SUCCESS,
+        false => ExitCode::FAILURE,
+    })
+}

@@ -1,0 +1,401 @@
+//! Which configurations of a scene are compared, and in which order they are measured.
+
+use super::configuration::{Configuration, Family};
+use super::row::TradeoffRow;
+use super::shapes::{ClosedForms, closed_forms, has_faces};
+use super::{Method, TradeoffSettings};
+use crate::coupling::{full::SolveSettings, reduced::compress};
+use crate::dynamics::Integrator;
+use crate::scene::Scene;
+use crate::simulate::{Accuracy, Fidelity, Settings};
+
+const FACES: [usize; 3] = [80, 320, 1280];
+const RANKS: [usize; 5] = [20, 40, 80, 160, 320];
+const ACCURACIES: [f64; 6] = [3e-2, 1e-2, 3e-3, 1e-3, 3e-4, 1e-4];
+const TOLERANCES: [f64; 5] = [1e-3, 1e-4, 1e-6, 1e-8, 1e-10];
+/// Of the scene's time step.
+const TIME_STEPS: [f64; 5] = [4.0, 2.0, 1.0, 0.5, 0.25];
+const INTEGRATORS: [Integrator; 5] = [
+    Integrator::MomentumEuler,
+    Integrator::Midpoint,
+    Integrator::Rk2,
+    Integrator::Rk4,
+    Integrator::VelocityEuler,
+];
+const FIDELITIES: [Fidelity; 4] = [
+    Fidelity::Isolated,
+    Fidelity::Reduced,
+    Fidelity::Auto,
+    Fidelity::Full,
+];
+
+/// How setting up and stepping grow with the number of faces, at most: a guess, with a factor against
+/// starting what can't end in time.
+const GROWTH: f64 = 2.5;
+
+/// The configurations to compare, each once; the bases of the fidelities first.
+pub(super) fn plan(scene: &Scene, settings: &TradeoffSettings) -> Vec<Configuration> {
+    let mut plan = Plan {
+        scene,
+        settings,
+        closed_forms: closed_forms(scene),
+        out: Vec::new(),
+    };
+    let bases: Vec<Configuration> = or_default(&settings.fidelities, &FIDELITIES)
+        .into_iter()
+        .map(|fidelity| plan.base(fidelity))
+        .collect();
+    plan.add(Family::Base, bases.iter().copied());
+    if settings.full_product {
+        plan.product(&bases);
+    } else {
+        plan.one_by_one(&bases);
+    }
+    plan.out
+}
+
+struct Plan<'a> {
+    scene: &'a Scene,
+    settings: &'a TradeoffSettings,
+    closed_forms: ClosedForms,
+    out: Vec<Configuration>,
+}
+
+impl Plan<'_> {
+    fn one_by_one(&mut self, bases: &[Configuration]) {
+        for base in bases {
+            self.add(Family::Method, self.methods(*base));
+            if let Some(meshed) = self.with_mesh(*base) {
+                self.add(Family::Faces, self.faces(meshed));
+            }
+            for (family, configurations) in self.aims(*base) {
+                self.add(family, configurations);
+            }
+        }
+        let reduced = bases.iter().find(|b| b.fidelity == Fidelity::Reduced);
+        if let Some(base) = reduced.or(bases.last()) {
+            self.add(Family::Integrator, self.integrators(*base));
+            self.add(Family::TimeStep, self.time_steps(*base));
+        }
+    }
+
+    fn product(&mut self, bases: &[Configuration]) {
+        type More<'a> = &'a dyn Fn(Configuration) -> Vec<Configuration>;
+        for base in bases {
+            let vary = |all: Vec<Configuration>, more: More| {
+                let varied = |c: Configuration| std::iter::once(c).chain(more(c));
+                all.into_iter().flat_map(varied).collect::<Vec<_>>()
+            };
+            let mut all = vary(vec![*base], &|c| self.methods(c));
+            all = vary(all, &|c| self.faces(c));
+            all = vary(all, &|c| {
+                self.aims(c).into_iter().flat_map(|(_, c)| c).collect()
+            });
+            all = vary(all, &|c| self.integrators(c));
+            all = vary(all, &|c| self.time_steps(c));
+            self.add(Family::Product, all);
+        }
+    }
+
+    /// What the other configurations of a fidelity are varied around.
+    fn base(&self, fidelity: Fidelity) -> Configuration {
+        let own = Settings::for_scene(self.scene).fidelity(fidelity);
+        let given = self.settings;
+        // The coupled system is one of fundamental solutions.
+        let fits = |m: &&Method| match fidelity {
+            Fidelity::Full => !matches!(m, Method::Exact | Method::Panel),
+            _ => true,
+        };
+        let method = given.methods.iter().find(fits).copied();
+        let accuracy = given.accuracies.first().copied();
+        let time_step = given.time_steps.first().copied();
+        self.normalised(Configuration {
+            family: Family::Base,
+            fidelity,
+            method: method.unwrap_or(Method::of(&own)),
+            faces_per_body: given.faces.first().copied(),
+            rank: given.ranks.first().copied().filter(|_| accuracy.is_none()),
+            accuracy,
+            tolerance: given.tolerances.first().copied(),
+            integrator: *given.integrators.first().unwrap_or(&own.integrator),
+            time_step: time_step.unwrap_or(self.scene.time_step),
+        })
+    }
+
+    fn methods(&self, base: Configuration) -> Vec<Configuration> {
+        let own: &[Method] = match base.fidelity {
+            Fidelity::Isolated | Fidelity::Reduced => &[
+                Method::Auto,
+                Method::Panel,
+                Method::MfsVertex,
+                Method::MfsFace,
+            ],
+            Fidelity::Auto => &[],
+            Fidelity::Full => &[Method::MfsVertex, Method::MfsFace],
+        };
+        let of = |method| Configuration { method, ..base };
+        let methods = or_default(&self.settings.methods, own);
+        methods.into_iter().map(of).collect()
+    }
+
+    fn faces(&self, base: Configuration) -> Vec<Configuration> {
+        let own: &[usize] = match base.fidelity {
+            Fidelity::Auto => &[],
+            _ => &FACES,
+        };
+        let of = |faces| Configuration {
+            faces_per_body: Some(faces),
+            ..base
+        };
+        let faces = or_default(&self.settings.faces, own);
+        faces.into_iter().map(of).collect()
+    }
+
+    /// The base with a method whose solution depends on the mesh.
+    fn with_mesh(&self, base: Configuration) -> Option<Configuration> {
+        let meshed = |c: &Configuration| {
+            let exact = matches!(c.method, Method::Auto | Method::Exact);
+            c.fidelity == Fidelity::Full || !exact || self.closed_forms != ClosedForms::All
+        };
+        let methods = or_default(&self.settings.methods, &[Method::Panel]);
+        let others = methods
+            .into_iter()
+            .map(|method| Configuration { method, ..base });
+        std::iter::once(base).chain(others).find(meshed)
+    }
+
+    /// What one fidelity alone can vary.
+    fn aims(&self, base: Configuration) -> Vec<(Family, Vec<Configuration>)> {
+        let aim = |rank, accuracy, tolerance| Configuration {
+            rank,
+            accuracy,
+            tolerance,
+            ..base
+        };
+        let accuracies = || {
+            let all = or_default(&self.settings.accuracies, &ACCURACIES).into_iter();
+            let all = all.map(|a| aim(None, Some(a), None));
+            (Family::Accuracy, all.collect())
+        };
+        match base.fidelity {
+            Fidelity::Isolated => Vec::new(),
+            Fidelity::Reduced => {
+                let ranks = or_default(&self.settings.ranks, &RANKS).into_iter();
+                let ranks = ranks.map(|r| aim(Some(r), None, None));
+                vec![(Family::Rank, ranks.collect()), accuracies()]
+            }
+            Fidelity::Auto => vec![accuracies()],
+            Fidelity::Full => {
+                let tolerances = or_default(&self.settings.tolerances, &TOLERANCES).into_iter();
+                let tolerances = tolerances.map(|t| aim(None, None, Some(t)));
+                vec![(Family::Tolerance, tolerances.collect())]
+            }
+        }
+    }
+
+    fn integrators(&self, base: Configuration) -> Vec<Configuration> {
+        let of = |integrator| Configuration { integrator, ..base };
+        let all = or_default(&self.settings.integrators, &INTEGRATORS);
+        all.into_iter().map(of).collect()
+    }
+
+    fn time_steps(&self, base: Configuration) -> Vec<Configuration> {
+        let of = |time_step| Configuration { time_step, ..base };
+        let own = TIME_STEPS.map(|x| x * self.scene.time_step);
+        let all = or_default(&self.settings.time_steps, &own);
+        all.into_iter().map(of).collect()
+    }
+
+    fn add(&mut self, family: Family, configurations: impl IntoIterator<Item = Configuration>) {
+        for configuration in configurations {
+            let new = self.normalised(configuration);
+            let equal = |old: &Configuration| old.couples_like(&new) && old.steps_like(&new);
+            if !self.out.iter().any(equal) {
+                self.out.push(Configuration { family, ..new });
+            }
+        }
+    }
+
+    /// The same without what makes no difference, and with defaults written out, so that equals are equal.
+    fn normalised(&self, mut c: Configuration) -> Configuration {
+        c.rank = c.rank.filter(|_| c.fidelity == Fidelity::Reduced);
+        let own_accuracy = match c.fidelity {
+            Fidelity::Reduced => {
+                let own = compress::Settings::default().tolerance;
+                c.rank.is_none().then_some(own)
+            }
+            Fidelity::Auto => Some(Accuracy::default().0),
+            Fidelity::Isolated | Fidelity::Full => None,
+        };
+        c.accuracy = own_accuracy.map(|own| c.accuracy.unwrap_or(own));
+        let own_tolerance = SolveSettings::default().tolerance;
+        c.tolerance = (c.fidelity == Fidelity::Full).then(|| c.tolerance.unwrap_or(own_tolerance));
+        c.method = match (c.method, c.fidelity, self.closed_forms) {
+            (Method::Auto, Fidelity::Full, _) => Method::MfsVertex,
+            (method, Fidelity::Auto, _) => method,
+            (Method::Auto, _, ClosedForms::All) => Method::Exact,
+            (Method::Auto, _, ClosedForms::None) => Method::Panel,
+            (method, ..) => method,
+        };
+        c.faces_per_body = c.faces_per_body.filter(|n| !has_faces(self.scene, *n));
+        c
+    }
+}
+
+fn or_default<T: Clone>(given: &[T], default: &[T]) -> Vec<T> {
+    match given {
+        [] => default.to_vec(),
+        given => given.to_vec(),
+    }
+}
+
+/// The order in which configurations are measured, so that what the budget has no time for matters
+/// least: first what all else is varied around, then some of everything, and the expensive ones last.
+pub(super) fn order(configurations: &[Configuration]) -> Vec<usize> {
+    let mut out: Vec<usize> = (0..configurations.len()).collect();
+    out.sort_by_key(|i| {
+        let c = &configurations[*i];
+        let expensive = c.fidelity == Fidelity::Full;
+        // Faces left to the scene are usually the most.
+        let faces = c.faces_per_body.unwrap_or(usize::MAX);
+        let like = |d: &&Configuration| (d.family, d.fidelity) == (c.family, c.fidelity);
+        let place = configurations[..*i].iter().filter(like).count();
+        let faces = if expensive { faces } else { 0 };
+        (c.family != Family::Base, expensive, faces, place)
+    });
+    out
+}
+
+/// Seconds that a configuration takes at least, guessed from the same with fewer faces.
+pub(super) fn expected(configuration: &Configuration, rows: &[Option<TradeoffRow>]) -> f64 {
+    let Some(faces) = configuration.faces_per_body else {
+        return 0.0;
+    };
+    let known = rows.iter().flatten().filter_map(|row| {
+        let (c, d) = (&row.configuration, configuration);
+        let fewer = c.faces_per_body.filter(|f| *f < faces)?;
+        let seconds = row.setup_seconds? + 1e-3 * row.ms_per_step?;
+        ((c.fidelity, c.method) == (d.fidelity, d.method))
+            .then(|| seconds * (faces as f64 / fewer as f64).powf(GROWTH))
+    });
+    known.fold(0.0, f64::max)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::scene::{Body, Fluid, Shape};
+
+    fn scene(shapes: &[Shape]) -> Scene {
+        let mut scene = Scene::new(Fluid::fresh_water());
+        for shape in shapes {
+            scene.add(Body::new(shape.clone()).density(998.0));
+        }
+        scene
+    }
+
+    fn of(plan: &[Configuration], fidelity: Fidelity, family: Family) -> Vec<Configuration> {
+        let fits = |c: &&Configuration| (c.fidelity, c.family) == (fidelity, family);
+        plan.iter().filter(fits).copied().collect()
+    }
+
+    #[test]
+    fn configurations_are_distinct_and_bases_come_first() {
+        for shapes in [
+            vec![Shape::sphere(1.0)],
+            vec![Shape::cuboid([1.0; 3])],
+            vec![Shape::sphere(1.0), Shape::cuboid([1.0; 3])],
+        ] {
+            let plan = plan(&scene(&shapes), &TradeoffSettings::default());
+            assert!(plan[..4].iter().all(|c| c.family == Family::Base));
+            assert!(plan[4..].iter().all(|c| c.family != Family::Base));
+            for (i, c) in plan.iter().enumerate() {
+                let label = c.label();
+                assert!(plan[..i].iter().all(|d| d.label() != label), "{label}");
+            }
+        }
+    }
+
+    #[test]
+    fn methods_without_a_difference_are_one() {
+        let methods = |shapes: &[Shape]| -> Vec<Method> {
+            let plan = plan(&scene(shapes), &TradeoffSettings::default());
+            let families = [Family::Base, Family::Method];
+            let reduced = families.map(|f| of(&plan, Fidelity::Reduced, f)).concat();
+            reduced.iter().map(|c| c.method).collect()
+        };
+        let sphere = Shape::sphere(1.0);
+        let cube = Shape::cuboid([1.0; 3]);
+        let all = [
+            Method::Exact,
+            Method::Panel,
+            Method::MfsVertex,
+            Method::MfsFace,
+        ];
+        assert_eq!(methods(std::slice::from_ref(&sphere)), all);
+        assert_eq!(methods(std::slice::from_ref(&cube)), all[1..]);
+        assert_eq!(methods(&[sphere, cube])[0], Method::Auto);
+    }
+
+    #[test]
+    fn first_values_are_the_base() {
+        let settings = TradeoffSettings {
+            fidelities: vec![Fidelity::Reduced, Fidelity::Full],
+            methods: vec![Method::Panel, Method::MfsFace],
+            faces: vec![320, 80],
+            ranks: vec![20, 40],
+            tolerances: vec![1e-6],
+            integrators: vec![Integrator::Rk4],
+            time_steps: vec![0.02, 0.01],
+            ..TradeoffSettings::default()
+        };
+        let plan = plan(&scene(&[Shape::sphere(1.0)]), &settings);
+        let reduced = plan[0];
+        assert_eq!(reduced.method, Method::Panel);
+        assert_eq!(reduced.faces_per_body, Some(320));
+        assert_eq!((reduced.rank, reduced.accuracy), (Some(20), None));
+        assert_eq!(reduced.time_step, 0.02);
+        // Full takes the first method that it can step with; panels follow as a row of their own.
+        let full = plan[1];
+        assert_eq!(full.method, Method::MfsFace);
+        assert_eq!(full.tolerance, Some(1e-6));
+        let methods = of(&plan, Fidelity::Full, Family::Method);
+        assert_eq!(methods.len(), 1);
+        assert_eq!(methods[0].method, Method::Panel);
+        let steps = of(&plan, Fidelity::Reduced, Family::TimeStep);
+        assert_eq!(steps.len(), 1);
+        assert!(!steps[0].steps_like(&reduced) && steps[0].couples_like(&reduced));
+        assert!(plan.iter().all(|c| c.integrator == Integrator::Rk4));
+    }
+
+    #[test]
+    fn product_has_every_combination_once() {
+        let settings = TradeoffSettings {
+            fidelities: vec![Fidelity::Reduced],
+            methods: vec![Method::Panel, Method::MfsVertex],
+            faces: vec![80, 320],
+            ranks: vec![20, 40],
+            accuracies: vec![1e-2],
+            integrators: vec![Integrator::Rk2, Integrator::Rk4],
+            time_steps: vec![0.01, 0.02, 0.04],
+            full_product: true,
+            ..TradeoffSettings::default()
+        };
+        let plan = plan(&scene(&[Shape::sphere(1.0)]), &settings);
+        assert_eq!(plan.len(), 2 * 2 * 3 * 2 * 3);
+    }
+
+    #[test]
+    fn cheap_configurations_come_first() {
+        let plan = plan(&scene(&[]), &TradeoffSettings::default());
+        let order = order(&plan);
+        assert!(order[..4].iter().all(|i| plan[*i].family == Family::Base));
+        let full = |i: &usize| plan[*i].fidelity == Fidelity::Full;
+        let rest = &order[4..];
+        let first = rest.iter().position(full).unwrap();
+        assert!(rest[first..].iter().all(full));
+        let mut sorted = order.clone();
+        sorted.sort_unstable();
+        assert!(sorted.iter().enumerate().all(|(i, n)| i == *n));
+    }
+}

@@ -1,0 +1,102 @@
+//! What a user may choose about the comparison.
+
+use super::Method;
+use crate::dynamics::Integrator;
+use crate::simulate::Fidelity;
+use crate::{Error, Result};
+use serde::{Deserialize, Serialize};
+
+/// What is varied, and how long it may take. Of each list that isn't empty, the first value is what all else is varied
+/// around; what an empty one stands for is said with it.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(default, deny_unknown_fields)]
+pub struct TradeoffSettings {
+    /// Fidelities; empty: all of them.
+    pub fidelities: Vec<Fidelity>,
+    /// Methods by which a body alone is solved; empty: what the scene asks for, and the others that the fidelity has.
+    pub methods: Vec<Method>,
+    /// Faces per body of shapes by formula; empty: the scene's own, and 80, 320, 1280.
+    pub faces: Vec<usize>,
+    /// Points of each compressed body ([`Fidelity::Reduced`]); empty: 20, 40, 80, 160, 320.
+    pub ranks: Vec<usize>,
+    /// Errors that [`Fidelity::Reduced`] and [`Fidelity::Auto`] aim at; empty: their own, and 3e-2 to 1e-4.
+    pub accuracies: Vec<f64>,
+    /// Relative residuals of the coupled solve ([`Fidelity::Full`]); empty: its own, and 1e-3 to 1e-10.
+    pub tolerances: Vec<f64>,
+    /// Integrators, with one fidelity: reduced if it is among them; empty: the scene's own, and all others.
+    pub integrators: Vec<Integrator>,
+    /// Time steps in s, with the same fidelity; empty: the scene's own, and 4 times to a quarter of it.
+    pub time_steps: Vec<f64>,
+    /// Every combination of what is varied, in place of one after the other.
+    pub full_product: bool,
+    /// Steps of the scene's own length over which trajectories are compared; `None`: the scene's own number, at most 50.
+    pub steps: Option<usize>,
+    /// Finest faces per body of the reference, whatever time it takes; `None`: as many as the budget has time for.
+    pub reference_faces: Option<usize>,
+    /// Time to do all this in, roughly, s; what is left out for it is said.
+    pub budget: f64,
+}
+
+impl Default for TradeoffSettings {
+    fn default() -> Self {
+        Self {
+            fidelities: Vec::new(),
+            methods: Vec::new(),
+            faces: Vec::new(),
+            ranks: Vec::new(),
+            accuracies: Vec::new(),
+            tolerances: Vec::new(),
+            integrators: Vec::new(),
+            time_steps: Vec::new(),
+            full_product: false,
+            steps: None,
+            reference_faces: None,
+            budget: 120.0,
+        }
+    }
+}
+
+impl TradeoffSettings {
+    /// Checks the values.
+    pub(super) fn validate(&self) -> Result<()> {
+        let check =
+            |name: &str, values: &[f64], right: fn(f64) -> bool, expected: &str| match values
+                .iter()
+                .find(|x| !right(**x))
+            {
+                None => Ok(()),
+                Some(x) => Err(Error::input(
+                    format!("tradeoff settings: {name}"),
+                    x,
+                    expected,
+                )),
+            };
+        let counts = [
+            ("faces", self.faces.as_slice()),
+            ("ranks", self.ranks.as_slice()),
+            ("steps", self.steps.as_slice()),
+            ("reference_faces", self.reference_faces.as_slice()),
+        ];
+        for (name, values) in counts {
+            let values: Vec<f64> = values.iter().map(|n| *n as f64).collect();
+            check(name, &values, |n| n > 0.0, "must be above zero")?;
+        }
+        let errors = [
+            ("accuracies", &self.accuracies),
+            ("tolerances", &self.tolerances),
+        ];
+        for (name, values) in errors {
+            let right = |x| x > 0.0 && x < 1.0;
+            check(name, values, right, "must be between 0 and 1")?;
+        }
+        let times = [
+            ("time_steps", self.time_steps.as_slice()),
+            ("budget", &[self.budget]),
+        ];
+        for (name, values) in times {
+            let right = |x: f64| x > 0.0 && x.is_finite();
+            check(name, values, right, "must be above zero and finite, in s")?;
+        }
+        Ok(())
+    }
+}

@@ -1,0 +1,56 @@
+//! What the comparison asks about the shapes of a scene.
+
+use crate::scene::{Scene, Shape};
+use crate::shape::DEFAULT_FACES;
+
+/// How many of the shapes closed forms are known for.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) enum ClosedForms {
+    All,
+    Some,
+    None,
+}
+
+pub(super) fn closed_forms(scene: &Scene) -> ClosedForms {
+    let known = |s: &Shape| matches!(s, Shape::Sphere { .. } | Shape::Ellipsoid { .. });
+    match (shapes(scene).all(known), shapes(scene).any(known)) {
+        (true, _) => ClosedForms::All,
+        (false, true) => ClosedForms::Some,
+        (false, false) => ClosedForms::None,
+    }
+}
+
+pub(super) fn shapes(scene: &Scene) -> impl Iterator<Item = &Shape> {
+    scene.bodies.iter().filter_map(|b| b.shape.as_ref())
+}
+
+/// Number of faces that a shape by formula is given; none for meshes, whose number can't be chosen.
+fn faces(shape: &Shape) -> Option<usize> {
+    match shape {
+        Shape::Sphere { faces, .. }
+        | Shape::Ellipsoid { faces, .. }
+        | Shape::Box { faces, .. }
+        | Shape::Cylinder { faces, .. }
+        | Shape::Capsule { faces, .. }
+        | Shape::Prism { faces, .. } => Some(faces.unwrap_or(DEFAULT_FACES)),
+        Shape::Mesh { .. } | Shape::Triangles { .. } => None,
+    }
+}
+
+/// Whether a shape's number of faces can be chosen.
+pub(super) fn refinable(shape: &Shape) -> bool {
+    faces(shape).is_some()
+}
+
+/// Whether the scene itself has so many faces on every shape by formula.
+pub(super) fn has_faces(scene: &Scene, number: usize) -> bool {
+    shapes(scene).filter_map(faces).all(|n| n == number)
+}
+
+/// Whether a shape by formula has sharp edges.
+pub(super) fn has_edges(shape: &Shape) -> bool {
+    matches!(
+        shape,
+        Shape::Box { .. } | Shape::Cylinder { .. } | Shape::Prism { .. }
+    )
+}

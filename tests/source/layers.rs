@@ -7,7 +7,7 @@ use std::path::{Path, PathBuf};
 /// `Error` and `Result` alone.
 ///
 /// `adjoint::lie` gives vectors and poses to everyone; the modules marked `adjoint` use the ladder too.
-const LAYERS: [(&str, &[&str]); 19] = [
+const LAYERS: [(&str, &[&str]); 20] = [
     ("error", &[]),
     ("special", &[]),
     // Closed meshes and walls, and what is asked of them.

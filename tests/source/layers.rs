@@ -94,7 +94,8 @@ const LAYERS: [(&str, &[&str]); 20] = [
     (
         "cli",
         &[
-            "boundary", "coupling", "dynamics", "geometry", "gpu", "scene", "shape", "simulate", "tradeoff", "water",
+            "boundary", "coupling", "dynamics", "geometry", "gpu", "scene", "shape", "simulate",
+            "tradeoff", "water",
         ],
     ),
 ];

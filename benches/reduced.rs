@@ -13,6 +13,7 @@ use faer::linalg::matmul::matmul;
 use faer::{Accum, Mat, MatRef, Par, Side};
 use hydrograd::adjoint::kernel::{Points, Sources, Write, potential_fill};
 use hydrograd::adjoint::lie::{Mat3, Pose, Vec3};
+use hydrograd::adjoint::sample::Samples;
 use hydrograd::boundary::{ExactBoundary, OneBody};
 use hydrograd::coupling::Coupling;
 use hydrograd::coupling::Direction;
@@ -26,7 +27,6 @@ use std::f64::consts::PI;
 use std::path::Path;
 use std::sync::Arc;
 use std::time::Instant;
-use support::random::Random;
 use support::reference::{TwoSpheres, multipoles};
 
 const SCENES: [&str; 4] = ["falling_ball", "grasp_open", "fish_near_tail", "clown_fish"];
@@ -215,7 +215,7 @@ fn links(scene: &Scene, simulator: &Simulator) -> Vec<Link> {
 /// Seconds of the pair kernel, of the products LᵀGL and of one Cholesky factorisation, on as many threads
 /// as the evaluation uses.
 fn bare(quick: bool, links: &[Link], order: usize) -> [f64; 3] {
-    let mut random = Random(1);
+    let mut random = Samples::new(1);
     let mut kernels: Vec<_> = links
         .iter()
         .map(|l| {
@@ -331,7 +331,7 @@ fn heading(what: &str) {
 /// Free bodies of radius 0.1 m about three radii apart, on a grid of the smallest cube that holds them.
 fn swarm(bodies: usize, shape: impl Fn() -> Shape) -> Scene {
     let side = (1..).find(|n: &usize| n.pow(3) >= bodies).unwrap_or(1);
-    let mut random = Random(7);
+    let mut random = Samples::new(7);
     let mut scene = Scene::new(Fluid::fresh_water());
     for i in 0..bodies {
         let cell = [i % side, i / side % side, i / side / side];
@@ -356,7 +356,7 @@ fn grown(quick: bool, scene: &Scene, settings: Settings) -> hydrograd::Result<St
     let mut simulator = Simulator::new(scene, settings)?;
     let setup = start.elapsed().as_secs_f64();
     // Nothing at rest: zeros would save work.
-    let mut random = Random(3);
+    let mut random = Samples::new(3);
     let q = simulator.start().0.clone();
     let v = DVector::from_fn(simulator.start().1.len(), |_, _| 0.01 * random.number());
     simulator.set_start(q.clone(), v.clone())?;

@@ -50,6 +50,21 @@ impl Samples {
         low + 0.5 * (high - low) * (self.number() + 1.0)
     }
 
+    /// One of 0, …, `count` − 1.
+    pub fn below(&mut self, count: usize) -> usize {
+        (0.5 * (self.number() + 1.0) * count as f64) as usize
+    }
+
+    /// A vector with components in [−`size`, `size`).
+    pub fn vector(&mut self, size: f64) -> [f64; 3] {
+        self.array().map(|x| size * x)
+    }
+
+    /// A vector of unit length.
+    pub fn direction(&mut self) -> [f64; 3] {
+        nalgebra::Vector3::from(self.vector(1.0)).normalize().into()
+    }
+
     /// The next `N` numbers, uniform in [−1, 1).
     pub fn array<const N: usize>(&mut self) -> [f64; N] {
         std::array::from_fn(|_| self.number())

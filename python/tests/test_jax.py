@@ -1,4 +1,4 @@
-"""The bridge to JAX: its gradients against differences of what it computes, its numbers against the simulator's."""
+"""What the bridge to JAX has of its own: transformations. The rest is in test_bridges.py."""
 
 import os
 import pathlib
@@ -15,102 +15,11 @@ jax = pytest.importorskip("jax")
 jax.config.update("jax_enable_x64", True)
 hj = pytest.importorskip("hydrograd.jax")
 jnp = jax.numpy
-check_grads = pytest.importorskip("jax.test_util").check_grads
-
-
-def inputs(case):
-    """Controls, q, v, and by how much each parameter is multiplied."""
-    return tuple(jnp.asarray(x) for x in (case.controls, case.q, case.v, np.ones(len(case.parameters))))
-
-
-def scaled(case, factors):
-    return {name: value * factor for (name, value), factor in zip(case.parameters.items(), factors, strict=True)}
-
-
-def rolled(case):
-    def function(controls, q, v, factors):
-        return hj.rollout(case.sim, controls, q, v, scaled(case, factors))
-
-    return function
-
-
-def stepped(case):
-    """Two steps, one after the other."""
-
-    def function(controls, q, v, factors):
-        state = (q, v)
-        for u in controls[:2]:
-            state = hj.step(case.sim, state, u, scaled(case, factors))
-        return state[:2]
-
-    return function
 
 
 @pytest.fixture(scope="module")
 def coupled():
     return bridge_scenes.coupled()
-
-
-@pytest.fixture(scope="module")
-def full():
-    return bridge_scenes.coupled("full", steps=3)
-
-
-@pytest.fixture(scope="module")
-def touching():
-    case = bridge_scenes.touching()
-    gaps = case.sim.rollout(case.controls, q=case.q, v=case.v).min_gap
-    assert gaps[0] > bridge_scenes.GAP > gaps[-1]
-    return case
-
-
-def each_entry(function, leaves, tolerance=2e-6):
-    """Gradients of a weighted sum against central differences of all entries, relative to the largest of each input."""
-
-    def scalar(*given):
-        outs = jax.tree.leaves(function(*given))
-        return sum(jnp.sum(jnp.sin(jnp.linspace(-1.0, 1.3, out.size)) * out.reshape(-1)) for out in outs)
-
-    compiled = jax.jit(scalar)
-    found = jax.jit(jax.grad(scalar, argnums=tuple(range(len(leaves)))))(*leaves)
-    for i, gradient in enumerate(found):
-        slopes = np.zeros(gradient.shape)
-        for at in np.ndindex(*gradient.shape):
-            step = 1e-5 * max(1e-2, abs(float(leaves[i][at])))
-            ends = [compiled(*leaves[:i], leaves[i].at[at].add(sign * step), *leaves[i + 1 :]) for sign in (1, -1)]
-            slopes[at] = (ends[0] - ends[1]) / (2 * step)
-        assert np.abs(gradient - slopes).max() <= tolerance * np.abs(slopes).max(), (i, gradient, slopes)
-        assert np.abs(slopes).max() > 0
-
-
-# Contact sets in over half a millimetre: differences there are off by the square of a smaller length.
-@pytest.mark.parametrize(("scene", "eps"), [("coupled", 1e-5), ("full", 1e-5), ("touching", 1e-6)])
-@pytest.mark.parametrize("function", [rolled, stepped])
-def test_check_grads(scene, eps, function, request):
-    case = request.getfixturevalue(scene)
-    compiled = jax.jit(function(case))
-    check_grads(compiled, inputs(case), order=1, modes=["rev"], eps=eps, rtol=1e-6)
-
-
-def test_check_grads_sees_a_wrong_gradient(coupled, monkeypatch):
-    right = hj._bridge.Charts.entries
-    monkeypatch.setattr(hj._bridge.Charts, "entries", lambda *given: 1.01 * right(*given))
-    with pytest.raises(AssertionError):
-        check_grads(rolled(coupled), inputs(coupled), order=1, modes=["rev"], eps=1e-5, rtol=1e-6)
-
-
-def test_gradients_of_gains():
-    sim = bridge_scenes.governed()
-    each_entry(lambda gains: hj.rollout(sim, jnp.zeros((6, 1)), gains=gains), (jnp.asarray(sim.gains),))
-
-
-def test_quaternions_of_other_lengths(coupled):
-    controls, q, v, *_ = inputs(coupled)
-    q = q.at[4:].multiply(1.004)
-    each_entry(lambda q: hj.rollout(coupled.sim, controls, q, v), (q,))
-    gradient = jax.grad(lambda q: jnp.sum(hj.rollout(coupled.sim, controls, q, v).positions ** 2))(q)
-    assert np.abs(gradient[4:]).max() > 0
-    assert abs(gradient[4:] @ q[4:]) <= 1e-14 * np.linalg.norm(gradient[4:])
 
 
 def pushed(case, seeds, mass):
@@ -241,13 +150,10 @@ def test_steps_remember_what_the_controller_does():
     assert last.step == 16 and last.held.tolist() == [True, False] and not states.held[0].any()
 
 
-def test_without_steps_and_without_controls(coupled):
-    v_bar = jax.grad(lambda v: jnp.sum(hj.rollout(coupled.sim, jnp.zeros((2, 0, 1)), v=v).v))(jnp.asarray(coupled.v))
-    assert np.allclose(v_bar, 2.0)
+def test_jit_without_controls():
     sim = bridge_scenes.passive()
     made = jax.jit(lambda: hj.rollout(sim, jnp.zeros((3, 5, 0))))()
     assert np.array_equal(made.q[1], sim.rollout(steps=5).q)
-    assert np.allclose(hj.step(sim, hj.initial_state(sim)).q, made.q[0, 1], rtol=1e-13)
 
 
 def test_forward_mode_is_refused(coupled):
@@ -267,27 +173,6 @@ def test_jit_is_compiled_once(coupled):
     for scale in (0.0, 1.0, 2.0):
         function(scale * jnp.ones((4, 1)))
     assert len(traced) == 1
-
-
-@pytest.mark.parametrize(
-    ("given", "says"),
-    [
-        ({"controls": np.zeros((4, 1), dtype=np.float32)}, r"rollout: controls: got dtype float32; .*astype"),
-        ({"controls": np.zeros((4, 1), dtype=complex)}, "complex"),
-        ({"controls": np.zeros((4, 2))}, r"\(4, 2\); must have the shape \(\.\.\., steps, 1\)"),
-        ({"controls": np.full((4, 1), np.nan)}, r"controls\[0, 0\]: got nan; must be finite"),
-        ({"controls": "push"}, "must be an array or numbers"),
-        ({"controls": np.zeros((3, 4, 1)), "q": np.zeros((2, 8))}, r"must go with \(3,\)"),
-        ({"q": np.zeros(8)}, "quaternion .* length 0"),
-        ({"v": np.zeros(6)}, r"rollout: v: .*\(\.\.\., 7\)"),
-        ({"parameters": {"ball.weight": 1.0}}, r"parameters: got 'ball.weight'; must be one of .*ball\.mass"),
-        ({"parameters": {"ball.mass": -1.0}}, "mass"),
-        ({"gains": np.zeros(2)}, r"gains: .*\(\.\.\., 0\)"),
-    ],
-)
-def test_wrong_input(coupled, given, says):
-    with pytest.raises(hg.InputError, match=says):
-        hj.rollout(coupled.sim, **{"controls": np.zeros((4, 1)), **given})
 
 
 def test_wrong_values_under_jit_keep_their_message(coupled):
@@ -333,16 +218,3 @@ def test_large_arrays_on_one_core():
     done = subprocess.run([sys.executable, "-c", LARGE], capture_output=True, text=True, cwd=folder, timeout=120)
     assert done.returncode == 0, done.stderr
     assert done.stdout == "True\n"
-
-
-def test_what_the_page_shows(coupled):
-    """The program of docs/autodiff.md."""
-    page = pathlib.Path(__file__).parents[2] / "docs/autodiff.md"
-    program = page.read_text().split("```python\n")[2].split("```")[0]
-    assert "import hydrograd.jax as hj" in program
-    batch = jnp.asarray(np.random.default_rng(1).normal(size=(2, 100, 1)))
-    names = {"sim": coupled.sim, "batch": batch, "controls": batch[0]}
-    exec(program, names)
-    controls_bar, mass_bar = names["gradients"]
-    assert controls_bar.shape == (2, 100, 1) and mass_bar.shape == (2,) and np.abs(mass_bar).min() > 0
-    assert names["states"].q.shape == (100, 8)

@@ -3,22 +3,10 @@
 use super::triangle::Triangle;
 use super::{Gaps, TriMesh};
 use hydrograd_adjoint::lie::{Pose, Vec3, exp_matrix};
+use hydrograd_adjoint::sample::Samples;
 
-/// Numbers in [-1, 1], always the same.
-struct Random(u64);
-
-impl Random {
-    fn next(&mut self) -> f64 {
-        self.0 = self
-            .0
-            .wrapping_mul(6364136223846793005)
-            .wrapping_add(1442695040888963407);
-        (self.0 >> 11) as f64 / (1u64 << 52) as f64 - 1.0
-    }
-
-    fn vector(&mut self) -> Vec3 {
-        Vec3::new(self.next(), self.next(), self.next())
-    }
+fn vector(random: &mut Samples) -> Vec3 {
+    Vec3::from(random.vector(1.0))
 }
 
 fn turned(w: [f64; 3], x: [f64; 3]) -> Pose {
@@ -52,13 +40,23 @@ fn ball() -> TriMesh {
 
 #[test]
 fn triangles_against_alternating_projections() {
-    let mut random = Random(7);
+    let mut random = Samples::new(7);
     let mut disjoint = 0;
     for _ in 0..300 {
-        let shift = random.vector() * 2.0;
-        let a = Triangle::new([random.vector(), random.vector(), random.vector()]);
-        let b =
-            Triangle::new([random.vector(), random.vector(), random.vector()].map(|x| x + shift));
+        let shift = vector(&mut random) * 2.0;
+        let a = Triangle::new([
+            vector(&mut random),
+            vector(&mut random),
+            vector(&mut random),
+        ]);
+        let b = Triangle::new(
+            [
+                vector(&mut random),
+                vector(&mut random),
+                vector(&mut random),
+            ]
+            .map(|x| x + shift),
+        );
         let found = a.distance_squared(&b, f64::INFINITY).unwrap().sqrt();
         let mut p = a.corners[0];
         let mut q = p;
@@ -78,10 +76,14 @@ fn triangles_against_alternating_projections() {
 
 #[test]
 fn closest_point_of_a_triangle_is_no_farther_than_any_other() {
-    let mut random = Random(3);
+    let mut random = Samples::new(3);
     for _ in 0..200 {
-        let t = Triangle::new([random.vector(), random.vector(), random.vector()]);
-        let p = random.vector() * 2.0;
+        let t = Triangle::new([
+            vector(&mut random),
+            vector(&mut random),
+            vector(&mut random),
+        ]);
+        let p = vector(&mut random) * 2.0;
         let (closest, _) = t.closest(&p);
         let [a, b, c] = t.corners;
         for i in 0..=20 {
@@ -96,12 +98,12 @@ fn closest_point_of_a_triangle_is_no_farther_than_any_other() {
 
 #[test]
 fn the_tree_finds_what_all_pairs_of_faces_give() {
-    let mut random = Random(11);
+    let mut random = Samples::new(11);
     let (a, b) = (ball(), cuboid([1.0, 0.2, 0.6]));
     for _ in 0..20 {
-        let (pose_a, pose_b) = (turned(random.vector().into(), [0.0; 3]), {
-            let x = random.vector().normalize() * (2.0 + 0.4 * random.next());
-            turned((random.vector() * 2.0).into(), x.into())
+        let (pose_a, pose_b) = (turned(random.vector(1.0), [0.0; 3]), {
+            let x = vector(&mut random).normalize() * (2.0 + 0.4 * random.number());
+            turned((vector(&mut random) * 2.0).into(), x.into())
         });
         let (placed_a, placed_b) = (a.transformed(&pose_a), b.transformed(&pose_b));
         let mut least = f64::INFINITY;

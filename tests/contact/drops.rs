@@ -1,9 +1,9 @@
 //! Bodies that fall, rest, meet and land in water: bounds, conservation, and many drops at random.
 
 use super::tools::{above_floor, contact, touching};
-use crate::support::random::Random;
 use crate::support::{self, check_gradient, run};
 use hydrograd::adjoint::lie::{Vec3, exp_matrix};
+use hydrograd::adjoint::sample::Samples;
 use hydrograd::dynamics::Integrator;
 use hydrograd::scene::{Body, Joint, Plane, Scene, Shape};
 use hydrograd::{Controls, Fidelity, Simulator};
@@ -145,7 +145,7 @@ fn constants_are_checked_by_name() {
 /// Two of six kinds of convex shapes above a floor, turning; with `aimed`, the upper one is thrown at the lower one, and all pairs of
 /// kinds come up.
 fn drops(count: usize, dt: f64, aimed: bool) -> Vec<Scene> {
-    let mut random = Random(1);
+    let mut random = Samples::new(1);
     let mut next = |low, high| random.between(low, high);
     let mut out = Vec::new();
     for drop in 0..count {

@@ -2,7 +2,7 @@
 //! velocity form, and gradients of rollouts against differences.
 
 use crate::support::INTEGRATORS;
-use crate::support::random::Random;
+use hydrograd::adjoint::sample::Samples;
 use hydrograd::dynamics::{Drive, Integrator, System};
 use hydrograd::scene::{
     Body, Controller, Drag, DragPart, Fluid, Joint, Motion, Plane, Scene, Shape,
@@ -61,7 +61,7 @@ fn links(tree: usize) -> Vec<(Option<usize>, Joint, Moved)> {
 const TREES: std::ops::Range<usize> = 0..4;
 
 /// A random scene on the tree; its bodies may meet.
-fn attempt(tree: usize, random: &mut Random) -> Scene {
+fn attempt(tree: usize, random: &mut Samples) -> Scene {
     let mut scene = Scene::new(Fluid {
         density: 998.0,
         current: [0.2, -0.1, 0.15],
@@ -120,7 +120,7 @@ fn attempt(tree: usize, random: &mut Random) -> Scene {
             .initial
             .v
             .extend((0..nv).map(|_| 0.4 * random.number()));
-        let quaternion = |r: &mut Random| {
+        let quaternion = |r: &mut Samples| {
             let q: [f64; 4] = std::array::from_fn(|k| if k == 0 { 1.0 } else { 0.4 * r.number() });
             let norm = q.iter().map(|x| x * x).sum::<f64>().sqrt();
             q.map(|x| x / norm)
@@ -145,7 +145,7 @@ fn attempt(tree: usize, random: &mut Random) -> Scene {
 
 /// A random scene on the tree whose bodies keep apart.
 fn scene(tree: usize) -> Scene {
-    let mut random = Random(17 + tree as u64);
+    let mut random = Samples::new(17 + tree as u64);
     for _ in 0..100 {
         let scene = attempt(tree, &mut random);
         let simulator = Simulator::new(&scene, settings(Fidelity::Isolated)).unwrap();

@@ -1,8 +1,8 @@
 //! Mesh files: round trips, and files that are broken in every way.
 
-use crate::support::random::Random;
 use hydrograd::Error;
 use hydrograd::adjoint::lie::Vec3;
+use hydrograd::adjoint::sample::Samples;
 use hydrograd::shape::file::{FileMesh, read, read_unchecked, write_obj};
 use hydrograd::shape::{Kind, TriMesh, build, parse_shape};
 use std::fmt::Write;
@@ -517,7 +517,7 @@ fn damaged_files_never_panic() {
         counter.fetch_add(1, Ordering::Relaxed);
         usual(info);
     }));
-    let mut random = Random(12345);
+    let mut random = Samples::new(12345);
     for (name, whole) in &files {
         assert_eq!(
             read(&put(&dir, name, whole), 1.0).unwrap().faces().len(),

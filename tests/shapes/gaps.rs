@@ -1,6 +1,7 @@
 //! Gaps between placed meshes and walls, shares of volumes, and meshes with other numbers of faces.
 
 use hydrograd::adjoint::lie::{Pose, Vec3, exp_matrix};
+use hydrograd::adjoint::sample::Samples;
 use hydrograd::geometry::{Edge, Gap, Gaps, Kind, Other, Share, Wall, check_parts, overlap_error};
 use hydrograd::shape::build;
 use hydrograd::{Shape, TriMesh};
@@ -49,21 +50,8 @@ fn gap(a: &TriMesh, at_a: Pose, b: &TriMesh, at_b: Pose) -> f64 {
     d
 }
 
-/// Numbers in [-1, 1], always the same.
-struct Random(u64);
-
-impl Random {
-    fn next(&mut self) -> f64 {
-        self.0 = self
-            .0
-            .wrapping_mul(6364136223846793005)
-            .wrapping_add(1442695040888963407);
-        (self.0 >> 11) as f64 / (1u64 << 52) as f64 - 1.0
-    }
-
-    fn vector(&mut self) -> Vec3 {
-        Vec3::new(self.next(), self.next(), self.next())
-    }
+fn vector(random: &mut Samples) -> Vec3 {
+    Vec3::from(random.vector(1.0))
 }
 
 #[test]
@@ -270,16 +258,19 @@ fn walls() {
         let heights = ball.vertices().iter().map(|x| pose.apply(x)[2] + 1.0);
         heights.fold(f64::INFINITY, f64::min)
     };
-    let mut random = Random(5);
+    let mut random = Samples::new(5);
     for _ in 0..20 {
-        let pose = turned((random.vector() * 3.0).into(), [4.0, 0.0, random.next()]);
+        let pose = turned(
+            (vector(&mut random) * 3.0).into(),
+            [4.0, 0.0, random.number()],
+        );
         assert!((gaps.all(&[pose])[0].distance - least(pose)).abs() < 1e-14);
     }
 }
 
 #[test]
 fn the_smallest_of_many_is_that_of_all() {
-    let mut random = Random(23);
+    let mut random = Samples::new(23);
     let meshes = [
         sphere(0.3, 80),
         cuboid([0.5, 0.3, 0.2], 100),
@@ -301,8 +292,8 @@ fn the_smallest_of_many_is_that_of_all() {
             .iter()
             .map(|_| {
                 turned(
-                    (random.vector() * 2.0).into(),
-                    (random.vector() * spread).into(),
+                    (vector(&mut random) * 2.0).into(),
+                    (vector(&mut random) * spread).into(),
                 )
             })
             .collect();
@@ -509,11 +500,11 @@ fn time() {
     for (name, a, b) in cases {
         let gaps = Gaps::new(&[Some(a), Some(b)], &[], &[]).unwrap();
         for far in [0.01, 0.1, 1.0, 10.0] {
-            let mut random = Random(1);
+            let mut random = Samples::new(1);
             let (mut total, mut longest) = (0.0, 0.0);
             for _ in 0..100 {
-                let way = random.vector().normalize();
-                let turn: [f64; 3] = (random.vector() * 2.0).into();
+                let way = vector(&mut random).normalize();
+                let turn: [f64; 3] = (vector(&mut random) * 2.0).into();
                 let mut poses = [at(0.0, 0.0, 0.0), turned(turn, (way * 6.0).into())];
                 // Brought to this gap along the line between the centres, roughly.
                 for _ in 0..8 {

@@ -3,7 +3,6 @@
 
 #[cfg(feature = "cli")]
 pub mod command;
-pub mod random;
 pub mod reference;
 
 use hydrograd::adjoint::lie::Vec3;

@@ -4,7 +4,7 @@ use super::*;
 
 #[test]
 fn deep_and_degenerate_poses_stay_finite() {
-    let mut draw = Draw(41);
+    let mut draw = Draw::new(41);
     let kinds = every_kind();
     let mut refused = 0;
     for first in &kinds {
@@ -104,7 +104,7 @@ fn meshes_are_taken_by_their_flat_faces_and_refused_if_not_convex() {
 
 #[test]
 fn ellipsoids_of_any_aspect_have_a_common_normal() {
-    let mut draw = Draw(47);
+    let mut draw = Draw::new(47);
     let (mut refused, mut worst) = (0, 0.0f64);
     for _ in 0..2000 {
         let mut axes = || [0; 3].map(|_| 10f64.powf(1.25 * draw.number() - 1.25));

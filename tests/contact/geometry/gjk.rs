@@ -27,7 +27,7 @@ fn corners(shape: &Shape, pose: &Pose) -> Vec<parry3d_f64::math::Vector> {
 #[test]
 fn gaps_of_random_polyhedra_are_those_of_gjk() {
     use parry3d_f64::{math::Pose as Place, query::distance, shape::ConvexPolyhedron};
-    let mut draw = Draw(43);
+    let mut draw = Draw::new(43);
     let shapes = [
         Shape::cuboid([0.3, 0.2, 0.4]),
         Shape::cuboid([1.0, 0.1, 0.05]),

@@ -4,7 +4,7 @@ use super::*;
 
 #[test]
 fn swapping_and_moving_both_bodies_change_nothing() {
-    let mut draw = Draw(37);
+    let mut draw = Draw::new(37);
     let kinds = every_kind();
     for first in &kinds {
         for second in &kinds {
@@ -59,7 +59,7 @@ fn swapping_and_moving_both_bodies_change_nothing() {
 
 #[test]
 fn points_scale_with_the_bodies() {
-    let mut draw = Draw(53);
+    let mut draw = Draw::new(53);
     let scaled = |shape: &Shape, by: f64| match shape.clone() {
         Shape::Sphere { radius, .. } => Shape::sphere(by * radius),
         Shape::Capsule { radius, length, .. } => Shape::capsule(by * radius, by * length),
@@ -93,7 +93,7 @@ fn points_scale_with_the_bodies() {
 /// A smaller reach leaves points out and changes none: bodies apart by more than that touch nowhere.
 #[test]
 fn reach_only_leaves_points_out() {
-    let mut draw = Draw(77);
+    let mut draw = Draw::new(77);
     let (kinds, mut kept, mut dropped) = (every_kind(), 0, 0);
     for first in &kinds {
         for second in &kinds {

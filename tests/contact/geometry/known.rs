@@ -116,7 +116,7 @@ fn an_ellipsoid_meets_faces_edges_and_corners_of_a_prism_as_its_distance_says() 
         plain(&Shape::ellipsoid([0.1; 3])),
         plain(&Shape::sphere(0.1)),
     );
-    let mut draw = Draw(7);
+    let mut draw = Draw::new(7);
     let mut met = 0;
     for _ in 0..400 {
         let pose = Pose::new(exp_matrix(&draw.vector()), 0.5 * draw.vector());
@@ -138,7 +138,7 @@ fn an_ellipsoid_meets_faces_edges_and_corners_of_a_prism_as_its_distance_says() 
 /// Points evenly over the unit sphere.
 #[test]
 fn ellipsoids_are_as_far_apart_as_their_surfaces() {
-    let mut draw = Draw(11);
+    let mut draw = Draw::new(11);
     let axes = [[0.2, 0.05, 0.2], [0.12, 0.18, 0.25], [0.3, 0.1, 0.04]];
     let ball = plain(&Shape::sphere(0.07));
     for (k, semi_axes) in axes.iter().enumerate() {

@@ -8,26 +8,27 @@ mod slopes;
 mod smooth;
 
 use hydrograd::adjoint::lie::{Mat3, Pose, Vec3, Vec6, exp_matrix, point_velocity};
+use hydrograd::adjoint::sample::Samples;
 use hydrograd::contact::geometry::{ContactPoint, Geometry, against_wall, between};
 use hydrograd::geometry::HalfSpace;
 use hydrograd::shape::{TriMesh, build};
 use hydrograd::{Error, Shape};
 use std::path::Path;
 
-/// Numbers in [−1, 1] without a pattern, the same in every run (xorshift64*).
-struct Draw(u64);
+/// Numbers, vectors, poses and choices.
+struct Draw(Samples);
 
 impl Draw {
+    fn new(seed: u64) -> Self {
+        Self(Samples::new(seed))
+    }
+
     fn number(&mut self) -> f64 {
-        self.0 ^= self.0 >> 12;
-        self.0 ^= self.0 << 25;
-        self.0 ^= self.0 >> 27;
-        let bits = self.0.wrapping_mul(0x2545_F491_4F6C_DD1D) >> 11;
-        bits as f64 / (1u64 << 52) as f64 - 1.0
+        self.0.number()
     }
 
     fn vector(&mut self) -> Vec3 {
-        Vec3::new(self.number(), self.number(), self.number())
+        Vec3::from(self.0.vector(1.0))
     }
 
     fn pose(&mut self) -> Pose {
@@ -35,8 +36,7 @@ impl Draw {
     }
 
     fn pick<'a, T>(&mut self, from: &'a [T]) -> &'a T {
-        let k = (0.5 * (self.number() + 1.0) * from.len() as f64) as usize;
-        &from[k.min(from.len() - 1)]
+        &from[self.0.below(from.len())]
     }
 }
 

@@ -42,7 +42,7 @@ fn slope_error(evaluate: impl Fn(&Pose) -> Vec<ContactPoint>, pose: &Pose) -> f6
 
 #[test]
 fn slopes_of_every_pair_agree_with_differences() {
-    let mut draw = Draw(23);
+    let mut draw = Draw::new(23);
     let kinds = every_kind();
     let mut worst: f64 = 0.0;
     let (mut points, mut faded) = (0, 0);
@@ -73,7 +73,7 @@ fn slopes_of_every_pair_agree_with_differences() {
 
 #[test]
 fn slopes_of_flat_contact_and_fading_crossings_agree_with_differences() {
-    let mut draw = Draw(29);
+    let mut draw = Draw::new(29);
     let plank = plain(&Shape::cuboid([1.0, 0.1, 0.05]));
     let rod = plain(&Shape::capsule(0.03, 0.7));
     let mut faded = 0;
@@ -106,7 +106,7 @@ fn slopes_of_flat_contact_and_fading_crossings_agree_with_differences() {
 
 #[test]
 fn slopes_against_walls_agree_with_differences() {
-    let mut draw = Draw(31);
+    let mut draw = Draw::new(31);
     for shape in every_kind() {
         for _ in 0..3 {
             let body = offset(&shape, draw.pose());

@@ -1,15 +1,15 @@
 //! Energy through contact, over random scenes of two bodies and a floor.
 
-use super::{Random, above_floor, contact, elastic, released, run, simulator, velocities};
+use super::{Samples, above_floor, contact, elastic, released, run, simulator, velocities};
 use hydrograd::scene::{Body, Scene, Shape};
 use hydrograd::{Fidelity, Simulator};
 use nalgebra::DVector;
 
 /// Two bodies that fall, turn and meet.
 fn falling(
-    random: &mut Random,
+    random: &mut Samples,
     density: f64,
-    shape: impl Fn(&mut Random, usize) -> Shape,
+    shape: impl Fn(&mut Samples, usize) -> Shape,
 ) -> Scene {
     let mut scene = above_floor(density);
     scene.time_step = 0.005;
@@ -44,11 +44,11 @@ fn falling(
     scene
 }
 
-fn ball(random: &mut Random, _: usize) -> Shape {
+fn ball(random: &mut Samples, _: usize) -> Shape {
     Shape::sphere(random.between(0.05, 0.12))
 }
 
-fn any(random: &mut Random, k: usize) -> Shape {
+fn any(random: &mut Samples, k: usize) -> Shape {
     let mut size = || random.between(0.05, 0.12);
     let (a, b, c) = (size(), size(), size());
     match (k + (a * 1e6) as usize) % 5 {
@@ -89,7 +89,7 @@ fn exchanges(simulator: &Simulator, steps: usize) -> Vec<Exchange> {
 /// In every step of every scene: contact adds to the kinetic energy no more than its springs give up, and so no more than they hold.
 #[test]
 fn contact_gives_back_no_more_than_it_stored() {
-    let mut random = Random(5);
+    let mut random = Samples::new(5);
     let (mut steps, mut largest, mut share) = (0, 0.0_f64, 0.0_f64);
     let mut scenes: Vec<(Fidelity, Scene)> = Vec::new();
     for _ in 0..60 {
@@ -130,7 +130,7 @@ fn contact_gives_back_no_more_than_it_stored() {
 /// Balls, whose flight the integrator follows without gaining: kinetic, potential and elastic energy together never grow.
 #[test]
 fn energy_of_balls_never_grows() {
-    let mut random = Random(11);
+    let mut random = Samples::new(11);
     let (mut gain, mut stored, mut total) = (0.0_f64, 0.0_f64, f64::NEG_INFINITY);
     for scene in 0..60 {
         let simulator = simulator(&falling(&mut random, 0.0, ball), Fidelity::Isolated);
@@ -162,7 +162,7 @@ fn energy_of_balls_never_grows() {
 /// Other shapes turn as they fly, and gaps are foreseen along straight lines: what energy comes of that falls with the step.
 #[test]
 fn energy_of_other_shapes_rises_by_the_steps_error_alone() {
-    let mut random = Random(17);
+    let mut random = Samples::new(17);
     let scenes: Vec<Scene> = (0..30)
         .map(|_| {
             let mut scene = falling(&mut random, 0.0, any);

@@ -6,9 +6,9 @@ mod modes;
 mod smooth;
 
 use super::tools::{RAIL, above_floor, contact, touching};
-use crate::support::random::Random;
 use crate::support::{self, GRAVITY, run};
 use hydrograd::adjoint::lie::{Vec6, point_velocity};
+use hydrograd::adjoint::sample::Samples;
 use hydrograd::dynamics::{Evaluation, Input, Integrator, Linearisation, State, Stepper};
 use hydrograd::scene::Scene;
 use hydrograd::{Fidelity, Simulator};

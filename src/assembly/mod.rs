@@ -6,13 +6,13 @@ mod limits;
 
 use crate::Result;
 use crate::adjoint::drag::Element;
-use crate::adjoint::lie::{Mat3, Vec3};
+use crate::adjoint::lie::Vec3;
 use crate::coupling::Isolated;
 use crate::dynamics::{BodyData, Declarations, Drive, Parameters, Stepper, System, force};
 use crate::geometry::TriMesh;
-use crate::multibody::{self, Tree};
+use crate::multibody::Tree;
 use crate::policy::Policy;
-use crate::scene::{self, Body, Scene};
+use crate::scene::{Body, Scene};
 use crate::water::{self, Clearance, Fidelity, Prepared, Settings, Surface, pose};
 use nalgebra::DVector;
 use std::path::Path;
@@ -27,25 +27,6 @@ pub(crate) struct Assembled {
     pub q: DVector<f64>,
     pub v: DVector<f64>,
     pub water: Prepared,
-}
-
-fn joint(j: &scene::Joint) -> multibody::Joint {
-    let unit = |axis: &[f64; 3]| Vec3::from(*axis).normalize();
-    match j {
-        scene::Joint::Fixed => multibody::Joint::Fixed,
-        scene::Joint::Prismatic { axis } => multibody::Joint::Prismatic(unit(axis)),
-        scene::Joint::Revolute { axis } => multibody::Joint::Revolute(unit(axis)),
-        scene::Joint::Planar { plane } => {
-            let (x, y, z) = (Vec3::x(), Vec3::y(), Vec3::z());
-            multibody::Joint::Planar(Mat3::from_columns(&match plane {
-                scene::Plane::Yz => [y, z, x],
-                scene::Plane::Zx => [z, x, y],
-                scene::Plane::Xy => [x, y, z],
-            }))
-        }
-        scene::Joint::Spherical => multibody::Joint::Spherical,
-        scene::Joint::Free => multibody::Joint::Free,
-    }
 }
 
 /// Mass, centre of mass and inertia of a body.
@@ -102,7 +83,7 @@ pub(crate) fn assemble(
         (
             b.parent.as_ref().and_then(index),
             pose(&b.placement),
-            joint(&b.joint),
+            b.joint.model(),
         )
     }));
     let surfaces = water::surfaces(scene, settings)?;

@@ -4,7 +4,7 @@ use super::{PairContact, Parameters, System};
 use crate::adjoint::lie::{Mat6, Pose, Vec3, Vec6, six};
 use crate::adjoint::rigid;
 use crate::coupling::Report;
-use crate::multibody::{Joint, Kinematics};
+use crate::multibody::Kinematics;
 use crate::{Error, Result};
 use nalgebra::{DMatrix, DVector};
 
@@ -284,13 +284,13 @@ impl<'a> Evaluation<'a> {
         let hat = self.frame_momentum(v);
         let mut total = Vec6::zeros();
         for (b, link) in tree.links().iter().enumerate() {
-            total += match (link.parent, link.joint) {
+            total += match (link.parent, link.joint.is_free()) {
                 (Some(_), _) => Vec6::zeros(),
-                (None, Joint::Free) => {
+                (None, true) => {
                     let own = hat.fixed_rows::<6>(link.v.start).into_owned();
                     link.placement.wrench_to_world(&own)
                 }
-                (None, _) => composite[b],
+                (None, false) => composite[b],
             };
         }
         total

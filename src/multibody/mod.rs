@@ -15,5 +15,5 @@
 mod joint;
 mod tree;
 
-pub use joint::Joint;
+pub use joint::{Joint, JointModel, JointMotion, Plane, Refused};
 pub use tree::{Cotangents, Fields, Kinematics, Link, Tree, Virtual};

@@ -1,6 +1,6 @@
 //! The kinematic tree and the reverse of its velocity fields.
 
-use super::Joint;
+use super::JointModel;
 use crate::adjoint::lie::{Pose, Vec6, cross_force, cross_motion};
 use nalgebra::{DMatrix, DVector};
 use std::ops::Range;
@@ -13,7 +13,7 @@ pub struct Link {
     /// Pose of the joint's frame in the parent's frame.
     pub placement: Pose,
     /// The joint.
-    pub joint: Joint,
+    pub joint: JointModel,
     /// Place of the joint's coordinates in q.
     pub q: Range<usize>,
     /// Place of the joint's velocities in v.
@@ -99,7 +99,7 @@ impl Tree {
     ///
     /// # Panics
     /// If a parent doesn't come before its child; scenes are validated before they come here.
-    pub fn new(bodies: impl IntoIterator<Item = (Option<usize>, Pose, Joint)>) -> Self {
+    pub fn new(bodies: impl IntoIterator<Item = (Option<usize>, Pose, JointModel)>) -> Self {
         let (mut nq, mut nv) = (0, 0);
         let mut links = Vec::new();
         for (index, (parent, placement, joint)) in bodies.into_iter().enumerate() {
@@ -158,7 +158,7 @@ impl Tree {
         &self,
         q: &DVector<f64>,
         x: &DVector<f64>,
-        map: impl Fn(&Joint, &[f64], &[f64]) -> Vec<f64>,
+        map: impl Fn(&JointModel, &[f64], &[f64]) -> Vec<f64>,
     ) -> DVector<f64> {
         let mut out = Vec::with_capacity(self.velocities);
         for l in &self.links {

@@ -15,6 +15,8 @@ pub use crate::shape::Shape;
 pub use build::BodyId;
 pub use contact::Contact;
 
+pub use crate::multibody::{Joint, Plane};
+
 use serde::{Deserialize, Serialize};
 
 /// Everything that a simulation starts from.
@@ -164,6 +166,7 @@ fn is_default<T: Default + PartialEq>(value: &T) -> bool {
     *value == T::default()
 }
 
+<<<<<<< HEAD
 /// How a body moves against its parent (coordinates q, generalised velocity v).
 #[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
 #[serde(from = "joint::JointFile", into = "joint::JointFile")]
@@ -203,6 +206,10 @@ pub enum Plane {
     Zx,
     /// x, y, rotation about z.
     Xy,
+=======
+fn one() -> f64 {
+    1.0
+>>>>>>> db2f094 (Joints, one file each, declared once for scene files, kinematics and Python)
 }
 
 /// A given motion of one joint coordinate, q(t).

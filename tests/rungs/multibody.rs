@@ -3,7 +3,7 @@
 use super::tools::{Group, all, along, groups, wavy};
 use hydrograd::adjoint::check::{Outcome, Rung};
 use hydrograd::adjoint::lie::{Mat3, Pose, Vec3, Vec6, exp_matrix};
-use hydrograd::multibody::{Cotangents, Joint, Tree, Virtual};
+use hydrograd::multibody::{Cotangents, Joint, JointModel, Plane, Tree, Virtual};
 use nalgebra::{DVector, UnitQuaternion};
 
 pub fn rungs() -> Vec<Rung> {
@@ -13,31 +13,33 @@ pub fn rungs() -> Vec<Rung> {
         };
     }
     rungs![
-        "multibody::joint::Joint::integrate_vjp" => joint_integrate,
-        "multibody::joint::Joint::chart_rate_vjp" => joint_chart_rate,
-        "multibody::joint::Joint::frame_velocity_vjp" => joint_frame_velocity,
-        "multibody::joint::Joint::frame_bias_vjp" => joint_frame_bias,
+        "multibody::joint::model::JointModel::integrate_vjp" => joint_integrate,
+        "multibody::joint::model::JointModel::chart_rate_vjp" => joint_chart_rate,
+        "multibody::joint::model::JointModel::frame_velocity_vjp" => joint_frame_velocity,
+        "multibody::joint::model::JointModel::frame_bias_vjp" => joint_frame_bias,
         "multibody::tree::Tree::integrate_vjp" => tree_integrate,
         "multibody::tree::Tree::chart_rate_vjp" => tree_chart_rate,
-        "multibody::joint::Joint::chart_momentum_vjp" => |c| all(joints().iter().map(|j| chart_momentum(&Tree::new([(None, Pose::identity(), *j)]), c))),
+        "multibody::joint::model::JointModel::chart_momentum_vjp" => |c| all(joints().iter().map(|j| chart_momentum(&Tree::new([(None, Pose::identity(), j.clone())]), c))),
         "multibody::tree::Tree::chart_momentum_vjp" => |c| chart_momentum(&tree(), c),
         "multibody::tree::Tree::reverse" => tree_reverse,
     ]
 }
 
-fn joints() -> Vec<Joint> {
-    let axis = Vec3::new(0.36, -0.48, 0.8);
-    vec![
-        Joint::Prismatic(axis),
-        Joint::Revolute(axis),
-        Joint::Planar(Mat3::from_columns(&[Vec3::y(), Vec3::z(), Vec3::x()])),
+fn joints() -> Vec<JointModel> {
+    let axis = [0.36, -0.48, 0.8];
+    [
+        Joint::Prismatic { axis },
+        Joint::Revolute { axis },
+        Joint::Planar { plane: Plane::Yz },
         Joint::Spherical,
         Joint::Free,
     ]
+    .map(|j| j.model())
+    .into()
 }
 
 /// A generic configuration of a joint.
-fn generic(joint: &Joint) -> Vec<f64> {
+fn generic(joint: &JointModel) -> Vec<f64> {
     joint.integrate(
         &joint.origin(),
         wavy(joint.velocities(), 0.3, 0.8).as_slice(),
@@ -45,7 +47,7 @@ fn generic(joint: &Joint) -> Vec<f64> {
 }
 
 /// Tangent displacement from `base` to `q`, a chart whose derivative at `base` is the identity.
-pub fn displacement(joint: &Joint, base: &[f64], q: &[f64]) -> Vec<f64> {
+pub fn displacement(joint: &JointModel, base: &[f64], q: &[f64]) -> Vec<f64> {
     let turn = |a: &[f64], b: &[f64]| -> Vec<f64> {
         let of = |x: &[f64]| {
             UnitQuaternion::from_quaternion(nalgebra::Quaternion::new(x[0], x[1], x[2], x[3]))
@@ -53,14 +55,13 @@ pub fn displacement(joint: &Joint, base: &[f64], q: &[f64]) -> Vec<f64> {
         (of(b) * of(a).inverse()).scaled_axis().as_slice().to_vec()
     };
     let plain = |n: usize| -> Vec<f64> { (0..n).map(|k| q[k] - base[k]).collect() };
-    match joint {
-        Joint::Spherical => turn(base, q),
-        Joint::Free => {
-            let mut out = plain(3);
-            out.extend(turn(&base[3..7], &q[3..7]));
+    match joint.motion().quaternion_at() {
+        Some(at) => {
+            let mut out = plain(at);
+            out.extend(turn(&base[at..], &q[at..]));
             out
         }
-        _ => plain(q.len()),
+        None => plain(q.len()),
     }
 }
 
@@ -113,7 +114,7 @@ fn joint_chart_rate(c: f64) -> Outcome {
         let (bar, d) = (wavy(n, 2.0, 1.0), wavy(n, 3.3, 0.3));
         let (xi_bar, v_bar) = j.chart_rate_vjp(xi.as_slice(), v.as_slice(), bar.as_slice());
         let scalar = |xi: &[f64], v: &[f64]| dot(bar.as_slice(), &j.chart_rate(xi, v));
-        let turns = matches!(j, Joint::Spherical | Joint::Free);
+        let turns = j.motion().quaternion_at().is_some();
         let by_v = along(
             |h| scalar(xi.as_slice(), &moved(v.as_slice(), h, &d)),
             c * dot(&v_bar, d.as_slice()),
@@ -135,7 +136,7 @@ fn joint_chart_rate(c: f64) -> Outcome {
 
 /// Joints with a configuration-dependent velocity map.
 fn turning_joints() -> Vec<Joint> {
-    let turning = |j: &Joint| matches!(j, Joint::Planar(_) | Joint::Free);
+    let turning = |j: &JointModel| ["planar", "free"].contains(&j.motion().kind());
     let (some, others): (Vec<_>, Vec<_>) = joints().into_iter().partition(turning);
     for j in others {
         let v = wavy(j.velocities(), 0.4, 1.0);
@@ -193,7 +194,7 @@ fn tree() -> Tree {
         (Some(3), place(0.4), j[0]),
         (None, place(-1.2), j[2]),
         (Some(5), place(0.7), j[4]),
-        (Some(6), place(0.2), Joint::Fixed),
+        (Some(6), place(0.2), Joint::Fixed.model()),
     ])
 }
 

@@ -3,7 +3,7 @@
 use nalgebra::{Matrix3, Matrix6};
 
 use super::{finite, limits, list, norm, place};
-use crate::scene::{Body, Joint, Motion, Scene, Shape};
+use crate::scene::{Body, Motion, Scene, Shape};
 use crate::{Error, Result};
 
 pub(super) fn check(scene: &Scene, index: usize) -> Result<()> {
@@ -231,22 +231,15 @@ fn check_added_mass(body: &Body, rows: &[Vec<f64>]) -> Result<()> {
 
 fn check_joint(body: &Body) -> Result<()> {
     let joint = &body.joint;
-    if let Joint::Prismatic { axis } | Joint::Revolute { axis } = joint {
-        let place = place(body, "joint.axis");
-        finite(&place, axis)?;
-        if norm(*axis) == 0.0 {
-            return Err(Error::input(
-                place,
-                list(axis),
-                "give a direction, e.g. [0, 0, 1]; its length doesn't matter",
-            ));
-        }
+    if let Some(bad) = joint.refused() {
+        let field = format!("joint.{}", bad.field);
+        return Err(Error::input(place(body, &field), bad.given, bad.remedy));
     }
     if let Some(motion) = &body.motion {
         check_motion(body, motion)?;
     }
     limits::check(body)?;
-    if body.actuated && matches!(joint, Joint::Fixed) {
+    if body.actuated && joint.velocities() == 0 {
         return Err(Error::input(
             place(body, "actuated"),
             true,
@@ -277,11 +270,11 @@ fn check_motion(body: &Body, motion: &[Motion]) -> Result<()> {
             "a joint is either held or driven: take `locked` or `motion` away",
         ));
     }
-    if joint.has_quaternion() || matches!(joint, Joint::Fixed) {
+    if joint.has_quaternion() || joint.velocities() == 0 {
         return Err(Error::input(
             place(body, "motion"),
             format!("a motion of a {} joint", joint.kind()),
-            "only prismatic, revolute and planar joints can be driven; build the motion from \
+            "only joints whose coordinates are lengths and angles (such as prismatic, revolute and planar ones) can be driven; build the motion from \
              several of them",
         ));
     }

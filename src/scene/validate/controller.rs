@@ -43,7 +43,7 @@ impl Scene {
                         "controller.kind",
                         "pd",
                         format!(
-                            "it drives prismatic, revolute and planar joints only, and body {:?} \
+                            "it drives joints without quaternions only, and body {:?} \
                              has {}: use kind = \"constant\" or a controller of your own in Rust",
                             body.name,
                             if body.thruster {

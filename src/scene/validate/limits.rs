@@ -39,7 +39,7 @@ pub(super) fn check(body: &Body) -> Result<()> {
         return Err(Error::input(
             place,
             format!("limits of a {} joint", body.joint.kind()),
-            "only prismatic and revolute joints have limits; build the motion from several of them",
+            "only joints with one coordinate (such as prismatic and revolute ones) have limits; build the motion from several of them",
         ));
     }
     if body.is_prescribed() {

@@ -13,7 +13,7 @@ mod start;
 use std::collections::HashMap;
 
 use super::file::nearest;
-use super::{Body, Joint, Scene};
+use super::{Body, Scene};
 use crate::{Error, Result};
 
 impl Scene {
@@ -35,7 +35,7 @@ impl Scene {
     /// The tree must have been checked.
     pub(crate) fn is_static(&self, index: usize) -> bool {
         let body = &self.bodies[index];
-        let held = matches!(body.joint, Joint::Fixed) || body.locked;
+        let held = body.joint.velocities() == 0 || body.locked;
         let parent = body.parent.as_ref().and_then(|name| self.body(name));
         held && parent.is_none_or(|parent| self.is_static(parent.0))
     }

@@ -31,16 +31,24 @@ impl Joint {
     }
 
     fn __repr__(&self) -> String {
-        match self.0 {
-            hydrograd::Joint::Prismatic { axis: [x, y, z] }
-            | hydrograd::Joint::Revolute { axis: [x, y, z] } => {
-                format!("{}(({x:?}, {y:?}, {z:?}))", self.0.kind())
-            }
-            hydrograd::Joint::Planar { plane } => {
-                format!("planar({:?})", format!("{plane:?}").to_lowercase())
-            }
-            _ => format!("{}()", self.0.kind()),
+        let fields = match serde_json::to_value(self.0) {
+            Ok(serde_json::Value::Object(fields)) => fields,
+            _ => Default::default(),
+        };
+        let given = fields.iter().filter(|(key, _)| *key != "kind");
+        let given: Vec<String> = given.map(|(_, value)| shown(value)).collect();
+        format!("{}({})", self.0.kind(), given.join(", "))
+    }
+}
+
+/// A value of a joint as Python writes it.
+fn shown(value: &serde_json::Value) -> String {
+    match value {
+        serde_json::Value::Array(items) => {
+            let items: Vec<String> = items.iter().map(shown).collect();
+            format!("({})", items.join(", "))
         }
+        other => other.to_string(),
     }
 }
 

@@ -91,6 +91,25 @@ const THROUGH: &[(&str, &str)] = &[
         "coupling::full::cpu::response::CoupledSolution::gradient",
         FULL_VJP,
     ),
+    // Each joint's maps, through the model that all joints share.
+    (
+        "multibody::joint::JointMotion::frame_velocity_vjp",
+        FRAME_VELOCITY,
+    ),
+    (
+        "multibody::joint::planar::Planar::frame_velocity_vjp",
+        FRAME_VELOCITY,
+    ),
+    (
+        "multibody::joint::free::Free::frame_velocity_vjp",
+        FRAME_VELOCITY,
+    ),
+    ("multibody::joint::JointMotion::frame_bias_vjp", FRAME_BIAS),
+    (
+        "multibody::joint::planar::Planar::frame_bias_vjp",
+        FRAME_BIAS,
+    ),
+    ("multibody::joint::free::Free::frame_bias_vjp", FRAME_BIAS),
     // Pieces of the equations of motion.
     (
         "dynamics::contact::PairContact::displacement_vjp",
@@ -165,6 +184,8 @@ const THROUGH: &[(&str, &str)] = &[
 /// What hands over a derivative that its caller gave.
 const PASSED_ON: &[&str] = &["optimize::descent::Shared::gradient"];
 
+const FRAME_VELOCITY: &str = "multibody::joint::model::JointModel::frame_velocity_vjp";
+const FRAME_BIAS: &str = "multibody::joint::model::JointModel::frame_bias_vjp";
 const FORCE_JVP: &str = "dynamics::balance::Linearisation::force_jvp";
 const FULL_VJP: &str = "coupling::full::linearised::FullLinearised::vjp";
 const FULL_HVP: &str = "coupling::full::linearised::FullLinearised::hvp";

@@ -187,13 +187,13 @@ fn tree() -> Tree {
     };
     let j = joints();
     Tree::new([
-        (None, place(0.1), j[4]),
-        (Some(0), place(0.8), j[1]),
-        (Some(1), place(-0.6), j[3]),
-        (Some(0), place(0.5), j[2]),
-        (Some(3), place(0.4), j[0]),
-        (None, place(-1.2), j[2]),
-        (Some(5), place(0.7), j[4]),
+        (None, place(0.1), j[4].clone()),
+        (Some(0), place(0.8), j[1].clone()),
+        (Some(1), place(-0.6), j[3].clone()),
+        (Some(0), place(0.5), j[2].clone()),
+        (Some(3), place(0.4), j[0].clone()),
+        (None, place(-1.2), j[2].clone()),
+        (Some(5), place(0.7), j[4].clone()),
         (Some(6), place(0.2), Joint::Fixed.model()),
     ])
 }

@@ -73,7 +73,8 @@ impl JointModel {
     /// Coordinates after a finite tangent displacement: plain ones add, rotations are multiplied by
     /// `exp` on the left, in the joint's frame.
     pub fn integrate(&self, q: &[f64], xi: &[f64]) -> Vec<f64> {
-        let add = |q: &[f64], xi: &[f64]| -> Vec<f64> { q.iter().zip(xi).map(|(q, x)| q + x).collect() };
+        let add =
+            |q: &[f64], xi: &[f64]| -> Vec<f64> { q.iter().zip(xi).map(|(q, x)| q + x).collect() };
         let Some(at) = self.0.quaternion_at() else {
             return add(q, xi);
         };
@@ -89,7 +90,9 @@ impl JointModel {
     pub fn integrate_vjp(&self, xi: &[f64], out_bar: &[f64]) -> (Vec<f64>, Vec<f64>) {
         let (mut q_bar, mut xi_bar) = (out_bar.to_vec(), out_bar.to_vec());
         self.rotate(xi, &mut q_bar, |theta| lie::exp_matrix(theta).transpose());
-        self.rotate(xi, &mut xi_bar, |theta| lie::exp_jacobian(theta).transpose());
+        self.rotate(xi, &mut xi_bar, |theta| {
+            lie::exp_jacobian(theta).transpose()
+        });
         (q_bar, xi_bar)
     }
 

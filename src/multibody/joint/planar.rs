@@ -100,10 +100,6 @@ impl JointMotion for Planar {
     }
 
     fn frame_bias_vjp(&self, v: &[f64], bar: &[f64]) -> Vec<f64> {
-        vec![
-            -v[2] * bar[1],
-            v[2] * bar[0],
-            v[1] * bar[0] - v[0] * bar[1],
-        ]
+        vec![-v[2] * bar[1], v[2] * bar[0], v[1] * bar[0] - v[0] * bar[1]]
     }
 }

@@ -11,11 +11,10 @@ mod motion;
 mod validate;
 
 pub use crate::geometry::{Refinement, Wall, WallSurface};
+pub use crate::multibody::{Joint, Plane};
 pub use crate::shape::Shape;
 pub use build::BodyId;
 pub use contact::Contact;
-
-pub use crate::multibody::{Joint, Plane};
 
 use serde::{Deserialize, Serialize};
 
@@ -164,52 +163,6 @@ pub struct Body {
 
 fn is_default<T: Default + PartialEq>(value: &T) -> bool {
     *value == T::default()
-}
-
-<<<<<<< HEAD
-/// How a body moves against its parent (coordinates q, generalised velocity v).
-#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
-#[serde(from = "joint::JointFile", into = "joint::JointFile")]
-pub enum Joint {
-    /// Not at all.
-    Fixed,
-    /// Along an axis: q, v in m, m/s.
-    Prismatic {
-        /// Direction in the joint's frame; need not be of unit length.
-        axis: [f64; 3],
-    },
-    /// About an axis: q, v in rad, rad/s.
-    Revolute {
-        /// Direction in the joint's frame.
-        axis: [f64; 3],
-    },
-    /// In a plane of the joint's frame: two translations, then the rotation about its normal.
-    Planar {
-        /// The plane.
-        plane: Plane,
-    },
-    /// About a point: q a unit quaternion (w, x, y, z), v the angular velocity in the parent's frame.
-    Spherical,
-    /// Freely: q = position of the body's origin and unit quaternion (w, x, y, z), v = velocity
-    /// of the body's origin and angular velocity, all in the parent's (joint's) frame.
-    #[default]
-    Free,
-}
-
-/// A plane of a planar joint, by its two translations in order.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
-#[serde(rename_all = "kebab-case")]
-pub enum Plane {
-    /// y, z, rotation about x.
-    Yz,
-    /// z, x, rotation about y.
-    Zx,
-    /// x, y, rotation about z.
-    Xy,
-=======
-fn one() -> f64 {
-    1.0
->>>>>>> db2f094 (Joints, one file each, declared once for scene files, kinematics and Python)
 }
 
 /// A given motion of one joint coordinate, q(t).

@@ -2,7 +2,7 @@
 
 use super::tools::{Group, all, along, groups, wavy};
 use hydrograd::adjoint::check::{Outcome, Rung};
-use hydrograd::adjoint::lie::{Mat3, Pose, Vec3, Vec6, exp_matrix};
+use hydrograd::adjoint::lie::{Pose, Vec3, Vec6, exp_matrix};
 use hydrograd::multibody::{Cotangents, Joint, JointModel, Plane, Tree, Virtual};
 use nalgebra::{DVector, UnitQuaternion};
 
@@ -135,7 +135,7 @@ fn joint_chart_rate(c: f64) -> Outcome {
 }
 
 /// Joints with a configuration-dependent velocity map.
-fn turning_joints() -> Vec<Joint> {
+fn turning_joints() -> Vec<JointModel> {
     let turning = |j: &JointModel| ["planar", "free"].contains(&j.motion().kind());
     let (some, others): (Vec<_>, Vec<_>) = joints().into_iter().partition(turning);
     for j in others {

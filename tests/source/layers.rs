@@ -9,17 +9,12 @@ use std::path::{Path, PathBuf};
 /// `adjoint::lie` gives vectors and poses to everyone; the modules marked `adjoint` use the ladder too.
 const LAYERS: [(&str, &[&str]); 20] = [
     ("error", &[]),
-<<<<<<< HEAD
-=======
-    ("scene", &["multibody", "shape"]),
->>>>>>> db2f094 (Joints, one file each, declared once for scene files, kinematics and Python)
     ("special", &[]),
     // Closed meshes and walls, and what is asked of them.
     ("geometry", &["adjoint"]),
     ("shape", &["adjoint", "geometry", "special"]),
-    ("scene", &["geometry", "shape"]),
+    ("scene", &["geometry", "multibody", "shape"]),
     ("solver", &[]),
-<<<<<<< HEAD
     ("boundary", &["adjoint", "geometry", "solver", "special"]),
     ("coupling", &["adjoint", "boundary", "geometry", "solver"]),
     (
@@ -27,14 +22,7 @@ const LAYERS: [(&str, &[&str]); 20] = [
         &["adjoint", "boundary", "coupling", "geometry", "solver"],
     ),
     ("contact", &["adjoint", "geometry", "shape"]),
-    ("multibody", &["adjoint", "scene"]),
-=======
-    ("boundary", &["adjoint", "solver", "special"]),
-    ("coupling", &["adjoint", "boundary", "scene", "solver"]),
-    ("gpu", &["adjoint", "boundary", "coupling", "solver"]),
-    ("contact", &["adjoint", "scene", "shape"]),
     ("multibody", &["adjoint"]),
->>>>>>> db2f094 (Joints, one file each, declared once for scene files, kinematics and Python)
     (
         "dynamics",
         &["adjoint", "contact", "coupling", "multibody", "scene"],

@@ -2,7 +2,7 @@
 
 use nalgebra::{Matrix3, Matrix6};
 
-use super::{finite, limits, list, norm, place};
+use super::{finite, limits, list, place};
 use crate::scene::{Body, Motion, Scene, Shape};
 use crate::{Error, Result};
 

@@ -60,7 +60,7 @@ const FORCE: f64 = 1000.0;
 ///
 /// In squares of tolerable misses: along the fingers as the mean over all states; at the end also the opening, the middle, and
 /// the speeds of the coin along the fingers and of the fingers; and the mean force.
-fn cost(rollout: &Rollout, along: f64) -> (f64, Cotangents, Vec<f64>) {
+fn cost(rollout: &Rollout, along: f64) -> hydrograd::Result<(f64, Cotangents, Vec<f64>)> {
     let samples = rollout.samples();
     let policy = rollout.simulator().policy();
     let mut bar = rollout.zero_cotangents();
@@ -104,7 +104,7 @@ fn cost(rollout: &Rollout, along: f64) -> (f64, Cotangents, Vec<f64>) {
     let weight = FORCE.powi(-2) / rollout.controls().len() as f64;
     for (n, s) in samples[..end].iter().enumerate() {
         sum += weight * s.control.norm_squared();
-        let back = policy.act_vjp(&observation(n, s), &(2.0 * weight * &s.control));
+        let back = policy.act_vjp(&observation(n, s), &(2.0 * weight * &s.control))?;
         for i in 0..s.v.len() {
             bar.q[(i, n)] += back.q[i];
             bar.v[(i, n)] += back.v[i];
@@ -113,7 +113,7 @@ fn cost(rollout: &Rollout, along: f64) -> (f64, Cotangents, Vec<f64>) {
             *g += b;
         }
     }
-    (sum, bar, gains)
+    Ok((sum, bar, gains))
 }
 
 /// What the controller saw at a step.
@@ -176,7 +176,7 @@ impl Trial {
     /// Cost and gradient over x.
     fn evaluate(&mut self, x: &[f64]) -> hydrograd::Result<(f64, Vec<f64>)> {
         self.run(x, |rollout, untuned| {
-            let (value, bar, direct) = cost(rollout, untuned.along);
+            let (value, bar, direct) = cost(rollout, untuned.along)?;
             let mut gains = rollout.vjp(&bar)?.gains;
             for (g, d) in gains.iter_mut().zip(&direct) {
                 *g += d;
@@ -195,7 +195,7 @@ impl Trial {
             }
             let gaps = rollout.gaps().iter().flatten().map(|g| g.distance);
             Ok(Outcome {
-                cost: cost(rollout, untuned.along).0,
+                cost: cost(rollout, untuned.along)?.0,
                 worst_miss_mm: misses.iter().fold(0.0, |m, x| x.abs().max(m)),
                 nearest: gaps.fold(f64::INFINITY, f64::min),
                 touching,

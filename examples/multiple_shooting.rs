@@ -101,7 +101,7 @@ const UNITS: State = [PLACE, PLACE, SPEED, SPEED];
 const FORCES: usize = 2 * SPANS;
 
 /// Rollout with forces that are constant over each `PART` steps.
-fn rollout<'a>(simulator: &'a Simulator, forces: &[f64]) -> hydrograd::Result<Rollout<'a>> {
+fn rollout(simulator: &Simulator, forces: &[f64]) -> hydrograd::Result<Rollout> {
     let steps = forces.len() / 2 * PART;
     let force = |i: usize, n: usize| match i {
         0 | 1 => FORCE_UNIT * forces[n / PART * 2 + i],

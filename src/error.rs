@@ -96,6 +96,12 @@ pub enum Error {
         /// What was going on, and how far it had come.
         what: String,
     },
+    /// What a controller gives as its reason not to act.
+    #[error("controller: {source}")]
+    Controller {
+        /// The reason as the controller gave it: an error of another library, or an exception.
+        source: Box<dyn std::error::Error + Send + Sync>,
+    },
     /// A combination of settings that has no meaning or isn't offered.
     #[error("{what} is not available: {why}; {instead}")]
     Unsupported {
@@ -154,7 +160,7 @@ impl Error {
                     said.push_str(&format!(" at t = {} s", readable(time)));
                 }
             }
-            Self::File { .. } | Self::Stopped { .. } => {}
+            Self::File { .. } | Self::Stopped { .. } | Self::Controller { .. } => {}
         }
         self
     }

@@ -1,51 +1,48 @@
 //! A time step and its transpose, and the sweep through a trajectory.
 //!
-//! The forward pass keeps every state and what each step observed; the reverse pass recomputes a step's internals
-//! from them. [`reverse`] takes a [`Path`], which only [`forward`] makes.
+//! The forward pass keeps every state, what was observed there, and each step's record; the reverse pass makes a step's
+//! internals again from its record. [`reverse`] takes a [`Tape`], which only [`forward`] makes.
 
 /// One step of a simulation with its transpose.
 pub trait Step {
     /// State between steps.
     type State: Clone;
-    /// What a step observes at its state and needs to be redone: kept with the trajectory.
-    type Kept;
+    /// What is observed at a state.
+    type Observation;
+    /// What a step leaves behind: the key to its transpose.
+    type Record;
     /// Cotangent of a state.
-    type Bar;
+    type Cotangent;
     /// Cotangent that enters at a time: derivative of an objective with respect to what is observed there.
     type Seed;
     /// What a step's transpose yields besides the state's cotangent (controls, parameters).
-    type Local;
+    type Partial;
     /// Why a step can fail.
     type Error;
 
-    /// State n + 1 from state n.
+    /// State n + 1 from state n, what is observed at state n, and the step's record.
     ///
     /// # Errors
     /// As the implementation says.
-    fn step(
-        &self,
-        index: usize,
-        state: &Self::State,
-    ) -> Result<(Self::State, Self::Kept), Self::Error>;
+    fn step(&self, index: usize, state: &Self::State) -> Result<Made<Self>, Self::Error>;
 
     /// What is observed at the last state.
     ///
     /// # Errors
     /// As the implementation says.
-    fn last(&self, index: usize, state: &Self::State) -> Result<Self::Kept, Self::Error>;
+    fn last(&self, index: usize, state: &Self::State) -> Result<Self::Observation, Self::Error>;
 
-    /// Transpose of [`Step::step`] and of what it observes.
+    /// Transpose of [`Step::step`] and of what is observed there.
     ///
     /// # Errors
     /// As the implementation says.
     fn step_vjp(
         &self,
         index: usize,
-        state: &Self::State,
-        kept: &Self::Kept,
-        next_bar: &Self::Bar,
+        record: &Self::Record,
+        next_bar: &Self::Cotangent,
         seed: &Self::Seed,
-    ) -> Result<(Self::Bar, Self::Local), Self::Error>;
+    ) -> Result<(Self::Cotangent, Self::Partial), Self::Error>;
 
     /// Transpose of [`Step::last`].
     ///
@@ -55,30 +52,47 @@ pub trait Step {
         &self,
         index: usize,
         state: &Self::State,
-        kept: &Self::Kept,
+        observation: &Self::Observation,
         seed: &Self::Seed,
-    ) -> Result<(Self::Bar, Self::Local), Self::Error>;
+    ) -> Result<(Self::Cotangent, Self::Partial), Self::Error>;
 }
 
-/// States and observations of a trajectory: the key to its reverse sweep.
-pub struct Path<State, Kept> {
+/// What a step makes: the next state, what is observed at its own, and its record.
+pub type Made<S> = (
+    <S as Step>::State,
+    <S as Step>::Observation,
+    <S as Step>::Record,
+);
+
+/// A trajectory: states 0 … N, what was observed there, and the records of steps 0 … N − 1; the key to its reverse sweep.
+pub struct Tape<State, Observation, Record> {
     states: Vec<State>,
-    kept: Vec<Kept>,
+    observations: Vec<Observation>,
+    records: Vec<Record>,
 }
 
-impl<State, Kept> Path<State, Kept> {
+impl<State, Observation, Record> Tape<State, Observation, Record> {
     /// States, one more than steps.
     pub fn states(&self) -> &[State] {
         &self.states
     }
 
-    /// Observations at each state.
-    pub fn kept(&self) -> &[Kept] {
-        &self.kept
+    /// What was observed at each state.
+    pub fn observations(&self) -> &[Observation] {
+        &self.observations
+    }
+
+    /// What each step left behind.
+    pub fn records(&self) -> &[Record] {
+        &self.records
     }
 }
 
-/// Runs `steps` steps from `initial`; `progress` hears of each step made, and may end the run with an error.
+/// The tape of a simulation's steps.
+pub type TapeOf<S> = Tape<<S as Step>::State, <S as Step>::Observation, <S as Step>::Record>;
+
+/// Runs `steps` steps from `initial`; `progress` is called with the number of steps made after each, and may end the run with
+/// an error.
 ///
 /// # Errors
 /// The first step that fails, or that of `progress`.
@@ -87,24 +101,29 @@ pub fn forward<S: Step>(
     initial: S::State,
     steps: usize,
     mut progress: impl FnMut(usize) -> Result<(), S::Error>,
-) -> Result<Path<S::State, S::Kept>, S::Error> {
-    let mut states = vec![initial];
-    let mut kept = Vec::new();
+) -> Result<TapeOf<S>, S::Error> {
+    let mut tape = Tape {
+        states: vec![initial],
+        observations: Vec::new(),
+        records: Vec::new(),
+    };
     for n in 0..steps {
-        let (next, observed) = step.step(n, &states[n])?;
-        states.push(next);
-        kept.push(observed);
+        let (next, observation, record) = step.step(n, &tape.states[n])?;
+        tape.states.push(next);
+        tape.observations.push(observation);
+        tape.records.push(record);
         progress(n + 1)?;
     }
-    kept.push(step.last(steps, &states[steps])?);
-    Ok(Path { states, kept })
+    let last = step.last(steps, &tape.states[steps])?;
+    tape.observations.push(last);
+    Ok(tape)
 }
 
 /// Cotangent of the initial state, and what every step yields.
-pub type Swept<S> = (<S as Step>::Bar, Vec<<S as Step>::Local>);
+pub type Swept<S> = (<S as Step>::Cotangent, Vec<<S as Step>::Partial>);
 
 /// Cotangent of the initial state, and what every step yields, in the order of time, from one seed per state;
-/// `progress` hears of each step gone back, and may end the sweep with an error.
+/// `progress` is called with the number of steps gone back after each, and may end the sweep with an error.
 ///
 /// # Errors
 /// The first transpose that fails, or that of `progress`.
@@ -113,22 +132,25 @@ pub type Swept<S> = (<S as Step>::Bar, Vec<<S as Step>::Local>);
 /// If there isn't one seed per state.
 pub fn reverse<S: Step>(
     step: &S,
-    path: &Path<S::State, S::Kept>,
+    tape: &TapeOf<S>,
     seeds: &[S::Seed],
     mut progress: impl FnMut(usize) -> Result<(), S::Error>,
 ) -> Result<Swept<S>, S::Error> {
-    assert_eq!(seeds.len(), path.states.len(), "one seed per state");
-    let last = path.states.len() - 1;
-    let (mut bar, local) =
-        step.last_vjp(last, &path.states[last], &path.kept[last], &seeds[last])?;
-    let mut locals = vec![local];
-    for n in (0..last).rev() {
-        let (previous, local) =
-            step.step_vjp(n, &path.states[n], &path.kept[n], &bar, &seeds[n])?;
+    assert_eq!(seeds.len(), tape.states.len(), "one seed per state");
+    let last = tape.records.len();
+    let (mut bar, partial) = step.last_vjp(
+        last,
+        &tape.states[last],
+        &tape.observations[last],
+        &seeds[last],
+    )?;
+    let mut partials = vec![partial];
+    for (n, record) in tape.records.iter().enumerate().rev() {
+        let (previous, partial) = step.step_vjp(n, record, &bar, &seeds[n])?;
         bar = previous;
-        locals.push(local);
+        partials.push(partial);
         progress(last - n)?;
     }
-    locals.reverse();
-    Ok((bar, locals))
+    partials.reverse();
+    Ok((bar, partials))
 }

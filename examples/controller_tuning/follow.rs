@@ -89,7 +89,7 @@ struct Seen {
 }
 
 impl Policy for Follow {
-    fn act(&self, o: &Observation) -> Action {
+    fn act(&self, o: &Observation) -> hydrograd::Result<Action> {
         let s = self.see(o);
         let finger = |f: usize| {
             self.finger_stiffness * (s.off[f] + self.centring * o.q[COIN_Z])
@@ -97,13 +97,13 @@ impl Policy for Follow {
         };
         let speed = self.feed_forward * s.carried - o.v[COLUMN];
         let column = self.column_stiffness * s.miss + self.column_damping * speed;
-        Action {
+        Ok(Action {
             control: vec![column, finger(0), finger(1)],
             ..Action::default()
-        }
+        })
     }
 
-    fn act_vjp(&self, o: &Observation, u: &DVector<f64>) -> ActionBar {
+    fn act_vjp(&self, o: &Observation, u: &DVector<f64>) -> hydrograd::Result<ActionBar> {
         let s = self.see(o);
         let (mut q, mut v) = (vec![0.0; o.v.len()], vec![0.0; o.v.len()]);
         // Column.
@@ -134,7 +134,7 @@ impl Policy for Follow {
             u[1] * s.slow[0] + u[2] * s.slow[1],
             both * self.finger_stiffness * z,
         ];
-        ActionBar { q, v, gains }
+        Ok(ActionBar { q, v, gains })
     }
 
     fn gains(&self) -> Vec<f64> {

@@ -84,7 +84,7 @@ pub fn simulator(scene: &Scene, fidelity: Fidelity) -> Result<Simulator> {
 }
 
 /// The scene's own controller.
-pub fn run(simulator: &Simulator, steps: usize) -> Result<Rollout<'_>> {
+pub fn run(simulator: &Simulator, steps: usize) -> Result<Rollout> {
     simulator.rollout(&Controls::zeros(simulator, steps))
 }
 
@@ -177,7 +177,7 @@ impl Task {
     }
 
     /// A rollout of the first steps, counted.
-    fn simulate(&self, x: &[f64], steps: usize) -> Result<Rollout<'_>> {
+    fn simulate(&self, x: &[f64], steps: usize) -> Result<Rollout> {
         let start = Instant::now();
         let all = self.controls(x)?;
         let first = all.matrix().columns(0, steps).into_owned();
@@ -232,7 +232,7 @@ impl Task {
         self.simulate(x, self.steps)?.value(&self.hold)
     }
 
-    pub fn rollout(&self, x: &[f64]) -> Result<Rollout<'_>> {
+    pub fn rollout(&self, x: &[f64]) -> Result<Rollout> {
         self.simulator.rollout(&self.controls(x)?)
     }
 

@@ -302,6 +302,9 @@ class Record:
         rotations: ArrayLike | None = None,
     ) -> StepGradient: ...
     def jacobians(self) -> tuple[_Array, _Array]: ...
+    def jvp(
+        self, *, q: ArrayLike | None = None, v: ArrayLike | None = None, u: ArrayLike | None = None
+    ) -> tuple[_Array, _Array]: ...
 
 @final
 class Rollout:

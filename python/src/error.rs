@@ -110,6 +110,13 @@ fn raise(name: &str, message: String) -> PyErr {
 /// The exception of an error of the Rust side.
 pub fn exception(error: hydrograd::Error) -> PyErr {
     use hydrograd::Error;
+    let error = match error {
+        Error::Controller { source } => match source.downcast::<PyErr>() {
+            Ok(raised) => return *raised,
+            Err(source) => Error::Controller { source },
+        },
+        error => error,
+    };
     let name = match &error {
         Error::Input { .. } => "InputError",
         Error::Mesh { .. } => "MeshError",

@@ -1,7 +1,6 @@
 //! Long work without the interpreter's lock, which Ctrl-C ends.
 
-use crate::error::{exception, internal};
-use crate::policy::{Raised, Watch};
+use crate::error::{OrRaise, exception, internal};
 use pyo3::prelude::*;
 use std::ops::ControlFlow;
 use std::panic::{AssertUnwindSafe, catch_unwind};
@@ -14,19 +13,17 @@ use std::time::Duration;
 const PATIENCE: Duration = Duration::from_millis(50);
 
 /// Whether work should go on.
-#[derive(Clone)]
+#[derive(Clone, Default)]
 pub struct Wish {
     stop: Arc<AtomicBool>,
-    watch: Watch,
 }
 
 impl Wish {
-    /// For the progress of a rollout; it ends too where its controller has raised an exception.
+    /// For the progress of a rollout.
     pub fn go_on(&self) -> ControlFlow<()> {
-        if self.stop.load(Ordering::Relaxed) {
-            ControlFlow::Break(())
-        } else {
-            self.watch.go_on()
+        match self.stop.load(Ordering::Relaxed) {
+            true => ControlFlow::Break(()),
+            false => ControlFlow::Continue(()),
         }
     }
 }
@@ -57,20 +54,16 @@ fn said(panic: &(dyn std::any::Any + Send)) -> &str {
 }
 
 /// Does work on a thread of its own while this one listens for signals. After Ctrl-C it is asked to stop and left
-/// to itself: the exception doesn't wait for it. What a controller has `raised` meanwhile comes first.
+/// to itself: the exception doesn't wait for it.
 pub fn long<T: Send + 'static>(
     py: Python<'_>,
-    raised: &Raised,
     work: impl FnOnce(&Wish) -> hydrograd::Result<T> + Send + 'static,
 ) -> PyResult<T> {
     not_forked()?;
-    let wish = Wish {
-        stop: Arc::default(),
-        watch: raised.watch(),
-    };
+    let wish = Wish::default();
     // A controller that simulates is called by a thread that the simulation waits for: it can't wait for another.
     if rayon::current_thread_index().is_some() {
-        return finish(py, &wish.watch, || work(&wish));
+        return finish(py, || work(&wish));
     }
     let (send, receive) = sync_channel(1);
     let theirs = wish.clone();
@@ -91,7 +84,7 @@ pub fn long<T: Send + 'static>(
         });
         receive = back;
         match heard {
-            Ok(Ok(done)) => return wish.watch.outcome(py, done),
+            Ok(Ok(done)) => return done.or_raise(),
             Ok(Err(panic)) => return Err(internal(said(panic.as_ref()))),
             Err(RecvTimeoutError::Timeout) => {
                 if let Err(stop) = py.check_signals() {
@@ -107,22 +100,20 @@ pub fn long<T: Send + 'static>(
 /// Does work that takes a step's time, on this thread.
 pub fn short<T: Send>(
     py: Python<'_>,
-    raised: &Raised,
     work: impl FnOnce() -> hydrograd::Result<T> + Send,
 ) -> PyResult<T> {
     not_forked()?;
-    finish(py, &raised.watch(), work)
+    finish(py, work)
 }
 
 fn finish<T: Send>(
     py: Python<'_>,
-    watch: &Watch,
     work: impl FnOnce() -> hydrograd::Result<T> + Send,
 ) -> PyResult<T> {
     match py.detach(|| catch_unwind(AssertUnwindSafe(work))) {
         Ok(done) => {
             py.check_signals()?;
-            watch.outcome(py, done)
+            done.or_raise()
         }
         Err(panic) => Err(internal(said(panic.as_ref()))),
     }

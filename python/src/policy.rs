@@ -1,76 +1,11 @@
-//! Controllers written in Python.
-//!
-//! An exception of one can't pass through a rollout. It waits beside it, the rollout ends at its next step, and
-//! whoever started it raises the exception. Exceptions are counted: a call that finds more of them at its end than at
-//! its beginning gives no result, so that calls at the same time on one rollout can't take what another one's
-//! exception left undone for an answer.
+//! Controllers written in Python. What one raises ends the run as the run's error, and comes out as the exception that it was.
 
 use crate::array::{self, Dim};
-use crate::error::{OrRaise, exception, input};
+use crate::error::{exception, input};
 use hydrograd::simulate::{Action, ActionBar, Observation, Policy};
 use nalgebra::DVector;
 use pyo3::prelude::*;
 use pyo3::types::PyTuple;
-use std::ops::ControlFlow;
-use std::sync::{Arc, Mutex, PoisonError};
-
-/// What the controller of a run has raised.
-#[derive(Clone, Default)]
-pub struct Raised(Arc<Mutex<Exceptions>>);
-
-#[derive(Default)]
-struct Exceptions {
-    count: u64,
-    last: Option<PyErr>,
-}
-
-/// The time between two moments of a run.
-#[derive(Clone)]
-pub struct Watch {
-    raised: Raised,
-    before: u64,
-}
-
-impl Raised {
-    fn with<T>(&self, of: impl FnOnce(&mut Exceptions) -> T) -> T {
-        of(&mut self.0.lock().unwrap_or_else(PoisonError::into_inner))
-    }
-
-    fn add(&self, error: PyErr) {
-        self.with(|all| {
-            all.count += 1;
-            all.last = Some(error);
-        });
-    }
-
-    /// From now on.
-    pub fn watch(&self) -> Watch {
-        Watch {
-            raised: self.clone(),
-            before: self.with(|all| all.count),
-        }
-    }
-}
-
-impl Watch {
-    /// For the progress of a run: not after an exception.
-    pub fn go_on(&self) -> ControlFlow<()> {
-        if self.raised.with(|all| all.count) > self.before {
-            ControlFlow::Break(())
-        } else {
-            ControlFlow::Continue(())
-        }
-    }
-
-    /// What the run gave, unless its controller raised an exception meanwhile.
-    pub fn outcome<T>(&self, py: Python<'_>, done: hydrograd::Result<T>) -> PyResult<T> {
-        let last = (self.raised).with(|all| all.last.as_ref().map(|e| e.clone_ref(py)));
-        match last {
-            Some(error) if self.go_on().is_break() => Err(error),
-            _ => done.or_raise(),
-        }
-    }
-}
 
 /// A controller written in Python: an object with `act`, and, to be differentiated, `act_vjp`.
 pub struct Controller {
@@ -78,7 +13,6 @@ pub struct Controller {
     controls: usize,
     velocities: usize,
     gains: Vec<f64>,
-    raised: Raised,
 }
 
 impl Controller {
@@ -86,7 +20,6 @@ impl Controller {
     pub fn new(
         object: &Bound<'_, PyAny>,
         (controls, velocities): (usize, usize),
-        raised: &Raised,
     ) -> PyResult<Self> {
         if !object.hasattr("act")? {
             return Err(input(
@@ -104,7 +37,6 @@ impl Controller {
             controls,
             velocities,
             gains,
-            raised: raised.clone(),
         })
     }
 
@@ -164,26 +96,29 @@ impl Controller {
             gains: part(2, "gains_bar", self.gains.len())?,
         })
     }
+}
 
-    /// What Python gives; nothing where it raises an exception, which is kept.
-    fn ask<T: Default>(&self, call: impl FnOnce(Python<'_>) -> PyResult<T>) -> T {
-        Python::attach(call).unwrap_or_else(|error| {
-            self.raised.add(error);
-            T::default()
-        })
-    }
+/// What Python gives, or the exception that it raises as the reason for which it doesn't.
+fn ask<T>(call: impl FnOnce(Python<'_>) -> PyResult<T>) -> hydrograd::Result<T> {
+    Python::attach(call).map_err(|raised| hydrograd::Error::Controller {
+        source: Box::new(raised),
+    })
 }
 
 impl Policy for Controller {
-    fn act(&self, observed: &Observation) -> Action {
-        Action {
-            control: self.ask(|py| self.try_act(py, observed)),
+    fn act(&self, observed: &Observation) -> hydrograd::Result<Action> {
+        Ok(Action {
+            control: ask(|py| self.try_act(py, observed))?,
             ..Action::default()
-        }
+        })
     }
 
-    fn act_vjp(&self, observed: &Observation, control_bar: &DVector<f64>) -> ActionBar {
-        self.ask(|py| self.try_act_vjp(py, observed, control_bar))
+    fn act_vjp(
+        &self,
+        observed: &Observation,
+        control_bar: &DVector<f64>,
+    ) -> hydrograd::Result<ActionBar> {
+        ask(|py| self.try_act_vjp(py, observed, control_bar))
     }
 
     fn gains(&self) -> Vec<f64> {

@@ -2,7 +2,6 @@
 
 use crate::error::{OrRaise, input};
 use crate::interrupt::long;
-use crate::policy::Raised;
 use crate::simulator::Simulator;
 use hydrograd::{Settings, dynamics};
 use nalgebra::DVector;
@@ -18,7 +17,7 @@ pub fn build(
     cache: Option<PathBuf>,
 ) -> PyResult<Simulator> {
     let (of, folder) = (scene.clone(), cache.clone());
-    let made = long(py, &Raised::default(), move |_| match folder {
+    let made = long(py, move |_| match folder {
         Some(folder) => hydrograd::Simulator::cached(&of, settings, &folder),
         None => hydrograd::Simulator::new(&of, settings),
     })?;

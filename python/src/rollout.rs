@@ -6,7 +6,6 @@ use crate::error::input;
 use crate::gradient;
 use crate::interrupt::{long, short};
 use crate::objective::Objective;
-use crate::policy::Raised;
 use crate::simulator::Simulator;
 use crate::state::State;
 use hydrograd::simulate::{Cotangents, Recording, Sample};
@@ -14,42 +13,24 @@ use nalgebra::DMatrix;
 use numpy::{PyArray1, PyArrayDyn};
 use pyo3::prelude::*;
 use pyo3::types::PyDict;
-use self_cell::self_cell;
 use std::sync::Arc;
-
-type Borrowed<'a> = hydrograd::Rollout<'a>;
-
-self_cell!(
-    /// A rollout with the simulator that it belongs to.
-    pub struct Owned {
-        owner: Arc<hydrograd::Simulator>,
-        #[covariant]
-        dependent: Borrowed,
-    }
-);
 
 /// A trajectory of states 0 … N: the forward pass, and the only key to its gradient. Each access to an array makes a new one.
 #[pyclass(frozen, module = "hydrograd")]
 pub struct Rollout {
     simulator: Py<Simulator>,
-    cell: Arc<Owned>,
-    raised: Raised,
+    inner: Arc<hydrograd::Rollout>,
 }
 
 type Numbers<'py> = PyResult<Bound<'py, PyArrayDyn<f64>>>;
 
 impl Rollout {
-    /// A rollout of a simulator, and where what its controller raises will be.
-    pub fn new(simulator: &Bound<'_, Simulator>, cell: Arc<Owned>, raised: Raised) -> Self {
+    /// A rollout of a simulator.
+    pub fn new(simulator: &Bound<'_, Simulator>, inner: hydrograd::Rollout) -> Self {
         Self {
             simulator: simulator.clone().unbind(),
-            cell,
-            raised,
+            inner: Arc::new(inner),
         }
-    }
-
-    fn rollout(&self) -> &hydrograd::Rollout<'_> {
-        self.cell.borrow_dependent()
     }
 
     fn numbers<'py>(
@@ -58,14 +39,14 @@ impl Rollout {
         of: impl Fn(&Sample) -> Vec<f64>,
         shape: &[usize],
     ) -> Numbers<'py> {
-        let samples = self.rollout().samples();
+        let samples = self.inner.samples();
         let mut whole = vec![samples.len()];
         whole.extend(shape);
         array::to_python(py, samples.iter().flat_map(of).collect(), &whole)
     }
 
     fn bodies(&self) -> usize {
-        self.cell.borrow_owner().system().len()
+        self.inner.simulator().system().len()
     }
 }
 
@@ -80,7 +61,7 @@ impl Rollout {
     /// Number of steps N.
     #[getter]
     fn steps(&self) -> usize {
-        self.rollout().steps()
+        self.inner.steps()
     }
 
     /// Time, (N + 1,), s.
@@ -92,21 +73,21 @@ impl Rollout {
     /// Joint coordinates, (N + 1, q_size), m, rad and unit quaternions (w, x, y, z).
     #[getter]
     fn q<'py>(&self, py: Python<'py>) -> Numbers<'py> {
-        let n = self.cell.borrow_owner().system().tree.coordinates();
+        let n = self.inner.simulator().system().tree.coordinates();
         self.numbers(py, |s| s.q.as_slice().to_vec(), &[n])
     }
 
     /// Generalised velocities, (N + 1, v_size), m/s and rad/s.
     #[getter]
     fn v<'py>(&self, py: Python<'py>) -> Numbers<'py> {
-        let n = self.cell.borrow_owner().system().tree.velocities();
+        let n = self.inner.simulator().system().tree.velocities();
         self.numbers(py, |s| s.v.as_slice().to_vec(), &[n])
     }
 
     /// The open-loop controls, (N, control_size), N and N m.
     #[getter]
     fn controls<'py>(&self, py: Python<'py>) -> Numbers<'py> {
-        let controls = self.rollout().controls();
+        let controls = self.inner.controls();
         array::transposed(py, controls, &[controls.nrows()])
     }
 
@@ -137,7 +118,7 @@ impl Rollout {
     /// Velocities of the bodies, (N + 1, bodies, 6), world axes: of the origin, m/s, and angular, rad/s.
     #[getter]
     fn velocities<'py>(&self, py: Python<'py>) -> Numbers<'py> {
-        array::transposed(py, &self.rollout().velocities(), &[self.bodies(), 6])
+        array::transposed(py, &self.inner.velocities(), &[self.bodies(), 6])
     }
 
     /// Kinetic energy of bodies and fluid, (N + 1,), J.
@@ -161,7 +142,7 @@ impl Rollout {
     /// Smallest gap between bodies or to a wall, (N + 1,), m; NaN where there is nothing to meet.
     #[getter]
     fn min_gap<'py>(&self, py: Python<'py>) -> Numbers<'py> {
-        let gaps = short(py, &self.raised, || Ok(self.rollout().gaps()))?;
+        let gaps = short(py, || Ok(self.inner.gaps()))?;
         let distances: Vec<f64> = gaps
             .iter()
             .map(|g| g.map_or(f64::NAN, |g| g.distance))
@@ -173,17 +154,17 @@ impl Rollout {
     /// What should be known about this trajectory, with names and numbers.
     #[getter]
     fn warnings(&self) -> Vec<String> {
-        self.rollout().warnings()
+        self.inner.warnings()
     }
 
     /// The state after `step` steps, from which a run may go on; negative numbers count from the end.
     #[pyo3(signature = (step=-1))]
     fn state(&self, py: Python<'_>, step: isize) -> PyResult<State> {
-        let at = array::numbered(step, self.rollout().states().len(), "state")?;
+        let at = array::numbered(step, self.inner.states().len(), "state")?;
         Ok(State {
             simulator: self.simulator.clone_ref(py),
-            state: self.rollout().states()[at].clone(),
-            velocity: self.rollout().samples()[at].v.clone(),
+            state: self.inner.states()[at].clone(),
+            velocity: self.inner.samples()[at].v.clone(),
         })
     }
 
@@ -205,7 +186,7 @@ impl Rollout {
             ));
         }
         let at = array::numbered(step, self.steps(), "step")?;
-        let found = short(py, &self.raised, || self.rollout().contacts(at, slack))?;
+        let found = short(py, || self.inner.contacts(at, slack))?;
         contact::of_step(py, &found)
     }
 
@@ -213,9 +194,9 @@ impl Rollout {
     /// solve, and a simulator with the fidelity "full". Points within a body, behind a wall, or nearer to a surface than half an
     /// edge of its mesh are refused: `flow_resolved` tells them apart. Negative numbers count states from the end.
     fn flow<'py>(&self, py: Python<'py>, state: isize, points: &Bound<'py, PyAny>) -> Numbers<'py> {
-        let at = array::numbered(state, self.rollout().states().len(), "state")?;
+        let at = array::numbered(state, self.inner.states().len(), "state")?;
         let points = array::vectors("flow: points", points)?;
-        let made = short(py, &self.raised, || self.rollout().flow(at, &points))?;
+        let made = short(py, || self.inner.flow(at, &points))?;
         let values = made.iter().flat_map(|u| [u.x, u.y, u.z]).collect();
         array::to_python(py, values, &[points.len(), 3])
     }
@@ -227,18 +208,16 @@ impl Rollout {
         state: isize,
         points: &Bound<'py, PyAny>,
     ) -> PyResult<Bound<'py, PyArray1<bool>>> {
-        let at = array::numbered(state, self.rollout().states().len(), "state")?;
+        let at = array::numbered(state, self.inner.states().len(), "state")?;
         let points = array::vectors("flow_resolved: points", points)?;
-        let made = short(py, &self.raised, || {
-            self.rollout().flow_resolved(at, &points)
-        })?;
+        let made = short(py, || self.inner.flow_resolved(at, &points))?;
         Ok(PyArray1::from_vec(py, made))
     }
 
     /// Value of an objective.
     fn value(&self, py: Python<'_>, objective: PyRef<'_, Objective>) -> PyResult<f64> {
         let objective = objective.0.clone();
-        short(py, &self.raised, || self.rollout().value(&objective))
+        short(py, || self.inner.value(&objective))
     }
 
     /// Gradient of an objective, in one reverse sweep. Ctrl-C ends it.
@@ -249,11 +228,10 @@ impl Rollout {
     ) -> PyResult<Bound<'py, PyAny>> {
         use hydrograd::simulate::Objective as _;
         let objective = objective.0.clone();
-        let cell = self.cell.clone();
-        let made = long(py, &self.raised, move |wish| {
-            let rollout = cell.borrow_dependent();
-            objective.check(rollout)?;
-            rollout.vjp_with(&objective.cotangents(rollout), |_| wish.go_on())
+        let rollout = self.inner.clone();
+        let made = long(py, move |wish| {
+            objective.check(&rollout)?;
+            rollout.vjp_with(&objective.cotangents(&rollout), |_| wish.go_on())
         })?;
         gradient::of_rollout(py, &made)
     }
@@ -272,7 +250,7 @@ impl Rollout {
         v: Option<&Bound<'py, PyAny>>,
         controls: Option<&Bound<'py, PyAny>>,
     ) -> PyResult<Bound<'py, PyAny>> {
-        let mut seed: Cotangents = self.rollout().zero_cotangents();
+        let mut seed: Cotangents = self.inner.zero_cotangents();
         let (states, steps) = (self.steps() + 1, self.steps());
         let bodies = [Dim::Is(self.bodies()), Dim::Is(3)];
         let nv = [Dim::Is(seed.q.nrows())];
@@ -303,17 +281,15 @@ impl Rollout {
                 *part = array::array(place, given, &shape)?.columns(part.nrows());
             }
         }
-        let cell = self.cell.clone();
-        let made = long(py, &self.raised, move |wish| {
-            cell.borrow_dependent().vjp_with(&seed, |_| wish.go_on())
-        })?;
+        let rollout = self.inner.clone();
+        let made = long(py, move |wish| rollout.vjp_with(&seed, |_| wish.go_on()))?;
         gradient::of_rollout(py, &made)
     }
 
     /// Columns by name, one row a state: time, each coordinate and velocity, energy, momentum and smallest gap, SI units;
     /// `pandas.DataFrame(rollout.to_dict())` is a table.
     fn to_dict<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyDict>> {
-        let recording = Recording::of(&self.simulator.get().scene, self.rollout());
+        let recording = Recording::of(&self.simulator.get().scene, &self.inner);
         let out = PyDict::new(py);
         let n = recording.time.len();
         let column = |values: Vec<f64>| array::to_python(py, values, &[n]);
@@ -339,7 +315,7 @@ impl Rollout {
 
     /// Figures of the whole trajectory: energies (J), drift of momentum (relative), iterations, smallest gap (m).
     fn summary<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyDict>> {
-        let s = self.rollout().summary();
+        let s = self.inner.summary();
         let out = PyDict::new(py);
         out.set_item("steps", s.steps)?;
         out.set_item("energy_initial", s.energy_initial)?;
@@ -352,14 +328,14 @@ impl Rollout {
     }
 
     fn __len__(&self) -> usize {
-        self.rollout().states().len()
+        self.inner.states().len()
     }
 
     fn __repr__(&self) -> String {
         format!(
             "Rollout(steps={}, bodies={:?})",
             self.steps(),
-            self.cell.borrow_owner().names()
+            self.inner.simulator().names()
         )
     }
 

@@ -5,12 +5,12 @@ use crate::error::{OrRaise, input};
 use crate::gradient::by_name;
 use crate::interrupt::{long, short};
 use crate::mesh::{Triangles, triangles};
-use crate::policy::{Controller, Raised};
+use crate::policy::Controller;
 use crate::prepare::{Parts, Start, build, set_gains};
-use crate::rollout::{Owned, Rollout};
+use crate::rollout::Rollout;
 use crate::scene::Scene;
 use crate::settings::{Keywords, backend_name, fidelity_name, integrator_name, row_or};
-use crate::state::{Record, State, one_step};
+use crate::state::{Record, State};
 use hydrograd::{Controls, dynamics};
 use nalgebra::{DMatrix, DVector};
 use numpy::PyArrayDyn;
@@ -55,19 +55,6 @@ impl Simulator {
             cache: self.cache.clone(),
             policy: Python::attach(|py| self.policy.as_ref().map(|p| p.clone_ref(py))),
         })
-    }
-
-    /// What a run uses, and what its controller raises.
-    fn for_run(&self, py: Python<'_>) -> PyResult<(Arc<hydrograd::Simulator>, Raised)> {
-        let raised = Raised::default();
-        let Some(policy) = &self.policy else {
-            return Ok((self.inner.clone(), raised));
-        };
-        let sizes = (self.controls_size(), self.v_size());
-        let controller = Controller::new(policy.bind(py), sizes, &raised)?;
-        let mut inner = hydrograd::Simulator::clone(&self.inner);
-        inner.set_policy(Box::new(controller));
-        Ok((Arc::new(inner), raised))
     }
 
     fn controls_size(&self) -> usize {
@@ -180,14 +167,12 @@ impl Simulator {
         let me = slf.get();
         let start = me.begin(state, q, v)?;
         let matrix = me.matrix("rollout: controls", controls, steps)?;
-        let (inner, raised) = me.for_run(slf.py())?;
-        let cell = long(slf.py(), &raised, move |wish| {
-            Owned::try_new(inner, |s| {
-                let controls = Controls::from_matrix(s, matrix)?;
-                s.rollout_from(&start.state(s)?, &controls, |_| wish.go_on())
-            })
+        let inner = me.inner.clone();
+        let made = long(slf.py(), move |wish| {
+            let controls = Controls::from_matrix(&inner, matrix)?;
+            inner.rollout_from(&start.state(&inner)?, &controls, |_| wish.go_on())
         })?;
-        Ok(Rollout::new(slf, Arc::new(cell), raised))
+        Ok(Rollout::new(slf, made))
     }
 
     /// Runs many controls, (batch, steps, control_size), on all cores: the same rollouts, to the bit, as one after the other.
@@ -237,21 +222,19 @@ impl Simulator {
                 (start, DMatrix::from_column_slice(n, steps, values))
             })
             .collect();
-        let (inner, raised) = me.for_run(slf.py())?;
-        let cells = long(slf.py(), &raised, move |wish| {
+        let inner = me.inner.clone();
+        let made = long(slf.py(), move |wish| {
             let one = |(start, matrix): (Start, DMatrix<f64>)| {
-                Owned::try_new(inner.clone(), |s| {
-                    let controls = Controls::from_matrix(s, matrix)?;
-                    s.rollout_from(&start.state(s)?, &controls, |_| wish.go_on())
-                })
+                let controls = Controls::from_matrix(&inner, matrix)?;
+                inner.rollout_from(&start.state(&inner)?, &controls, |_| wish.go_on())
             };
             runs.into_par_iter()
                 .map(one)
                 .collect::<hydrograd::Result<Vec<_>>>()
         })?;
-        Ok(cells
+        Ok(made
             .into_iter()
-            .map(|cell| Rollout::new(slf, Arc::new(cell), raised.clone()))
+            .map(|rollout| Rollout::new(slf, rollout))
             .collect())
     }
 
@@ -279,9 +262,7 @@ impl Simulator {
         }
         let (q0, v0) = me.inner.start();
         let (q, v) = (row_or("state: q", q, q0)?, row_or("state: v", v, v0)?);
-        let made = short(slf.py(), &Raised::default(), || {
-            me.inner.state(step, &q, &v)
-        })?;
+        let made = short(slf.py(), || me.inner.state(step, &q, &v))?;
         let state = dynamics::State { held, mode, ..made };
         Ok(State {
             simulator: slf.clone().unbind(),
@@ -300,39 +281,25 @@ impl Simulator {
     ) -> PyResult<(State, Record)> {
         let me = slf.get();
         let n = me.controls_size();
-        let matrix = match u {
-            Some(u) => one_step(array("step: u", u, &[Dim::Is(n)])?.values),
-            None => DMatrix::zeros(n, 1),
+        let control = match u {
+            Some(u) => array("step: u", u, &[Dim::Is(n)])?.values.into(),
+            None => DVector::zeros(n),
         };
         let from = &state.get().state;
-        let (inner, raised) = me.for_run(slf.py())?;
-        let watch = raised.watch();
-        let cell = short(slf.py(), &raised, || {
-            Owned::try_new(inner, |s| {
-                let controls = Controls::from_matrix(s, matrix)?;
-                s.rollout_from(from, &controls, |_| watch.go_on())
-            })
-        })?;
-        let rollout = cell.borrow_dependent();
+        let (state, record) = short(slf.py(), || me.inner.step(from, &control))?;
         let next = State {
             simulator: slf.clone().unbind(),
-            state: rollout.states()[1].clone(),
-            velocity: rollout.samples()[1].v.clone(),
+            state,
+            velocity: record.rollout().samples()[1].v.clone(),
         };
-        Ok((
-            next,
-            Record {
-                cell: Arc::new(cell),
-                raised,
-            },
-        ))
+        Ok((next, Record(Arc::new(record))))
     }
 
     /// Added mass of the bodies in the water at the start, (6 n, 6 n), world axes: per body three rows of force per acceleration of
     /// its origin, then three of torque per angular acceleration; kg, kg m, kg m².
     fn added_mass<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyArrayDyn<f64>>> {
         let inner = self.inner.clone();
-        let made = long(py, &Raised::default(), move |_| inner.added_mass())?;
+        let made = long(py, move |_| inner.added_mass())?;
         array::matrix(py, &made.matrix)
     }
 
@@ -368,7 +335,7 @@ impl Simulator {
     /// reverse sweep, with the interpreter's lock.
     pub fn with_policy(&self, policy: &Bound<'_, PyAny>) -> PyResult<Self> {
         let sizes = (self.controls_size(), self.v_size());
-        let controller = Controller::new(policy, sizes, &Raised::default())?;
+        let controller = Controller::new(policy, sizes)?;
         let mut out = self.changed(|inner| {
             inner.set_policy(Box::new(controller));
             Ok(())
@@ -462,7 +429,7 @@ impl Simulator {
     /// of vertex numbers; None for a body without a shape.
     fn meshes<'py>(&self, py: Python<'py>) -> PyResult<Vec<Option<Triangles<'py>>>> {
         let inner = self.inner.clone();
-        let made = long(py, &Raised::default(), move |_| inner.meshes())?;
+        let made = long(py, move |_| inner.meshes())?;
         let meshes = made.iter();
         meshes
             .map(|mesh| mesh.as_ref().map(|m| triangles(py, m)).transpose())

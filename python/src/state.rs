@@ -3,8 +3,6 @@
 use crate::array::{self, Dim};
 use crate::gradient;
 use crate::interrupt::{long, short};
-use crate::policy::Raised;
-use crate::rollout::Owned;
 use crate::simulator::Simulator;
 use hydrograd::dynamics;
 use nalgebra::{DMatrix, DVector};
@@ -150,12 +148,7 @@ impl State {
 
 /// What one step leaves behind: the key to its derivatives.
 #[pyclass(frozen, module = "hydrograd")]
-pub struct Record {
-    /// The step, as a rollout of one.
-    pub cell: Arc<Owned>,
-    /// What its controller raises.
-    pub raised: Raised,
-}
+pub struct Record(pub Arc<hydrograd::simulate::Record>);
 
 #[pymethods]
 impl Record {
@@ -171,8 +164,7 @@ impl Record {
         positions: Option<&Bound<'py, PyAny>>,
         rotations: Option<&Bound<'py, PyAny>>,
     ) -> PyResult<Bound<'py, PyAny>> {
-        let rollout = self.cell.borrow_dependent();
-        let mut seed = rollout.zero_cotangents();
+        let mut seed = self.0.zero_cotangents();
         let nv = [Dim::Is(seed.q.nrows())];
         let bodies = [Dim::Is(seed.positions.nrows() / 3), Dim::Is(3)];
         let parts: [(&str, _, &mut DMatrix<f64>, &[Dim]); 4] = [
@@ -187,7 +179,7 @@ impl Record {
                 part.set_column(1, &DVector::from_vec(found.values));
             }
         }
-        let made = short(py, &self.raised, || rollout.vjp(&seed))?;
+        let made = short(py, || self.0.vjp(&seed))?;
         gradient::of_step(py, &made)
     }
 
@@ -198,23 +190,46 @@ impl Record {
         &self,
         py: Python<'py>,
     ) -> PyResult<(Bound<'py, PyArrayDyn<f64>>, Bound<'py, PyArrayDyn<f64>>)> {
-        let cell = self.cell.clone();
-        let made = long(py, &self.raised, move |_| {
-            cell.borrow_dependent().jacobians()
-        })?;
+        let record = self.0.clone();
+        let made = long(py, move |_| record.jacobians())?;
         Ok((
             array::matrix(py, &made.state)?,
             array::matrix(py, &made.controls)?,
         ))
     }
 
+    /// Tangent of the step: the changes (δq, δv) (v_size,) each of the state after it along `q` (v_size,) in the tangent space of the
+    /// coordinates and `v` (v_size,) of the state before it, and `u` (control_size,) of its controls; what is None is zero. It takes
+    /// `jacobians`: for several directions at one step, take those.
+    #[pyo3(signature = (*, q=None, v=None, u=None))]
+    #[expect(clippy::type_complexity, reason = "two arrays")]
+    fn jvp<'py>(
+        &self,
+        py: Python<'py>,
+        q: Option<&Bound<'py, PyAny>>,
+        v: Option<&Bound<'py, PyAny>>,
+        u: Option<&Bound<'py, PyAny>>,
+    ) -> PyResult<(Bound<'py, PyArrayDyn<f64>>, Bound<'py, PyArrayDyn<f64>>)> {
+        let system = self.0.rollout().simulator().system();
+        let (nv, nu) = (system.tree.velocities(), system.controls);
+        let part = |place: &str, given: Option<&Bound<'py, PyAny>>, n: usize| match given {
+            Some(given) => Ok(array::array(place, given, &[Dim::Is(n)])?.values),
+            None => PyResult::Ok(vec![0.0; n]),
+        };
+        let mut along = part("jvp: q", q, nv)?;
+        along.extend(part("jvp: v", v, nv)?);
+        let control = DVector::from_vec(part("jvp: u", u, nu)?);
+        let record = self.0.clone();
+        let made = long(py, move |_| record.jvp(&along.into(), &control))?;
+        let half = |from: usize| made.rows(from, nv).iter().copied().collect::<Vec<f64>>();
+        Ok((
+            array::to_python(py, half(0), &[nv])?,
+            array::to_python(py, half(nv), &[nv])?,
+        ))
+    }
+
     fn __repr__(&self) -> String {
-        let n = self.cell.borrow_dependent().states()[0].step;
+        let n = self.0.rollout().states()[0].step;
         format!("Record(step {n} to {})", n + 1)
     }
-}
-
-/// The controls of one step.
-pub fn one_step(controls: Vec<f64>) -> DMatrix<f64> {
-    DMatrix::from_vec(controls.len(), 1, controls)
 }

@@ -2,7 +2,6 @@
 
 use crate::error::{input, internal};
 use crate::interrupt::long;
-use crate::policy::Raised;
 use crate::scene::Scene;
 use hydrograd::tradeoff::{TradeoffSettings, measure};
 use pyo3::prelude::*;
@@ -74,7 +73,7 @@ pub fn tradeoff<'py>(
         budget,
     };
     let scene = scene.0.clone();
-    let text = long(py, &Raised::default(), move |wish| {
+    let text = long(py, move |wish| {
         let found = measure(&scene, &settings, |_| wish.go_on())?;
         Ok(serde_json::to_string(&found))
     })?;

@@ -16,7 +16,8 @@ pub use balance::ForceCotangents;
 pub use contact::{ContactForce, ContactModel, Dual, PairContact, Regularisation};
 pub use evaluation::Evaluation;
 pub use integrator::{
-    Input, Integrator, Memo, State, StateBar, StepBar, Stepped, Stepper, contact_velocity,
+    ContactVelocities, Input, Integrator, LinearisedStep, State, StateBar, StateTangent, StepBar,
+    StepJacobians, StepRecord, Stepper,
 };
 pub use limit::JointLimit;
 pub use linearisation::Linearisation;

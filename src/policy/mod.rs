@@ -59,10 +59,16 @@ pub struct ActionBar {
 /// switch is worth, and the gradient holds between two such jumps.
 pub trait Policy: Send + Sync {
     /// The action at an observation.
-    fn act(&self, observed: &Observation) -> Action;
+    ///
+    /// # Errors
+    /// Whatever keeps it from acting ([`Error::Controller`] for a reason of its own): the run ends with that.
+    fn act(&self, observed: &Observation) -> Result<Action>;
 
     /// Transpose of [`Policy::act`] for the cotangent of its control.
-    fn act_vjp(&self, observed: &Observation, control_bar: &DVector<f64>) -> ActionBar;
+    ///
+    /// # Errors
+    /// As [`Policy::act`].
+    fn act_vjp(&self, observed: &Observation, control_bar: &DVector<f64>) -> Result<ActionBar>;
 
     /// Adjustable gains.
     fn gains(&self) -> Vec<f64> {
@@ -92,12 +98,12 @@ fn expect(count: usize, gains: &[f64]) -> Result<()> {
 }
 
 impl Policy for OpenLoop {
-    fn act(&self, _: &Observation) -> Action {
-        Action::default()
+    fn act(&self, _: &Observation) -> Result<Action> {
+        Ok(Action::default())
     }
 
-    fn act_vjp(&self, _: &Observation, _: &DVector<f64>) -> ActionBar {
-        ActionBar::default()
+    fn act_vjp(&self, _: &Observation, _: &DVector<f64>) -> Result<ActionBar> {
+        Ok(ActionBar::default())
     }
 
     fn with_gains(&self, gains: &[f64]) -> Result<Box<dyn Policy>> {
@@ -114,18 +120,18 @@ pub struct Constant {
 }
 
 impl Policy for Constant {
-    fn act(&self, _: &Observation) -> Action {
-        Action {
+    fn act(&self, _: &Observation) -> Result<Action> {
+        Ok(Action {
             control: self.control.clone(),
             ..Action::default()
-        }
+        })
     }
 
-    fn act_vjp(&self, _: &Observation, control_bar: &DVector<f64>) -> ActionBar {
-        ActionBar {
+    fn act_vjp(&self, _: &Observation, control_bar: &DVector<f64>) -> Result<ActionBar> {
+        Ok(ActionBar {
             gains: control_bar.as_slice().to_vec(),
             ..ActionBar::default()
-        }
+        })
     }
 
     fn gains(&self) -> Vec<f64> {

@@ -34,19 +34,19 @@ pub struct Pd {
 }
 
 impl Policy for Pd {
-    fn act(&self, observed: &Observation) -> Action {
+    fn act(&self, observed: &Observation) -> Result<Action> {
         let mut control = vec![0.0; self.controls];
         for a in &self.axes {
             control[a.control] +=
                 a.stiffness * (a.target - observed.q[a.q]) - a.damping * observed.v[a.v];
         }
-        Action {
+        Ok(Action {
             control,
             ..Action::default()
-        }
+        })
     }
 
-    fn act_vjp(&self, observed: &Observation, control_bar: &DVector<f64>) -> ActionBar {
+    fn act_vjp(&self, observed: &Observation, control_bar: &DVector<f64>) -> Result<ActionBar> {
         let mut bar = ActionBar {
             q: vec![0.0; self.velocities],
             v: vec![0.0; self.velocities],
@@ -62,7 +62,7 @@ impl Policy for Pd {
                 -observed.v[a.v] * u,
             ]);
         }
-        bar
+        Ok(bar)
     }
 
     fn gains(&self) -> Vec<f64> {

@@ -14,23 +14,23 @@ pub struct Playback {
 }
 
 impl Policy for Playback {
-    fn act(&self, observed: &Observation) -> Action {
-        Action {
+    fn act(&self, observed: &Observation) -> Result<Action> {
+        Ok(Action {
             control: self.steps.get(observed.step).cloned().unwrap_or_default(),
             ..Action::default()
-        }
+        })
     }
 
-    fn act_vjp(&self, observed: &Observation, control_bar: &DVector<f64>) -> ActionBar {
+    fn act_vjp(&self, observed: &Observation, control_bar: &DVector<f64>) -> Result<ActionBar> {
         let mut gains = vec![0.0; self.controls * self.steps.len()];
         if observed.step < self.steps.len() {
             let from = self.controls * observed.step;
             gains[from..from + self.controls].copy_from_slice(control_bar.as_slice());
         }
-        ActionBar {
+        Ok(ActionBar {
             gains,
             ..ActionBar::default()
-        }
+        })
     }
 
     fn gains(&self) -> Vec<f64> {

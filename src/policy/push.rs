@@ -38,33 +38,33 @@ impl PushThenLock {
 }
 
 impl Policy for PushThenLock {
-    fn act(&self, observed: &Observation) -> Action {
+    fn act(&self, observed: &Observation) -> Result<Action> {
         if self.stopped(observed) {
             let mut hold = vec![false; self.bodies];
             hold[self.body] = true;
-            return Action {
+            return Ok(Action {
                 hold,
                 ..Action::default()
-            };
+            });
         }
         let mut control = vec![0.0; self.controls];
         control[self.control] = self.force;
-        Action {
+        Ok(Action {
             control,
             ..Action::default()
-        }
+        })
     }
 
-    fn act_vjp(&self, observed: &Observation, control_bar: &DVector<f64>) -> ActionBar {
+    fn act_vjp(&self, observed: &Observation, control_bar: &DVector<f64>) -> Result<ActionBar> {
         let gain = if self.stopped(observed) {
             0.0
         } else {
             control_bar[self.control]
         };
-        ActionBar {
+        Ok(ActionBar {
             gains: vec![gain],
             ..ActionBar::default()
-        }
+        })
     }
 
     fn gains(&self) -> Vec<f64> {

@@ -38,26 +38,26 @@ impl SpeedStages {
 }
 
 impl Policy for SpeedStages {
-    fn act(&self, observed: &Observation) -> Action {
+    fn act(&self, observed: &Observation) -> Result<Action> {
         let mode = self.stage(observed);
         let control = self.stages.get(mode).map(|s| s.control.clone());
-        Action {
+        Ok(Action {
             control: control.unwrap_or_default(),
             mode,
             ..Action::default()
-        }
+        })
     }
 
-    fn act_vjp(&self, observed: &Observation, control_bar: &DVector<f64>) -> ActionBar {
+    fn act_vjp(&self, observed: &Observation, control_bar: &DVector<f64>) -> Result<ActionBar> {
         let acting = self.stage(observed);
         let gains = self.stages.iter().enumerate().flat_map(|(k, s)| {
             let bar = (0..s.control.len()).map(move |i| (k == acting, i));
             bar.map(|(acts, i)| if acts { control_bar[i] } else { 0.0 })
         });
-        ActionBar {
+        Ok(ActionBar {
             gains: gains.collect(),
             ..ActionBar::default()
-        }
+        })
     }
 
     fn gains(&self) -> Vec<f64> {

@@ -78,7 +78,7 @@ impl Simulator {
     }
 }
 
-impl Rollout<'_> {
+impl Rollout {
     /// The water's velocity at points (m, world frame) at state `n`: m/s, world axes, the current included. It takes a solve. It is
     /// there to be looked at: nothing of a step depends on it, and it has no transpose.
     ///

@@ -12,7 +12,7 @@
 //! the same units per duration of the trajectory. A free body without forces then grows by 1.6, whatever its size and time.
 
 use super::gradcheck::unit_displacements;
-use super::trajectory::Trajectory;
+use super::trajectory::{ControlledStep, Seed, Trajectory};
 use super::{Controls, Sample, Simulator};
 use crate::dynamics::{Drive, Linearisation, State, StateBar, StepBar};
 use crate::{Error, Result};
@@ -72,7 +72,7 @@ pub fn growth(simulator: &Simulator, steps: usize) -> Result<Growth> {
     growth_with(simulator, steps, |_, _| {})
 }
 
-/// As [`growth`]; `progress` hears how many steps are done, and of how many.
+/// As [`growth`]; `progress` is called with how many steps are done, and of how many.
 ///
 /// # Errors
 /// As [`growth`].
@@ -88,7 +88,8 @@ pub fn growth_with(
     let rollout = simulator.rollout(&zero)?;
     let trajectory = simulator.trajectory(zero.matrix());
     let duration = simulator.time_step() * steps as f64;
-    let nv = simulator.system().tree.velocities();
+    let system = simulator.system();
+    let nv = system.tree.velocities();
     let displacement = unit_displacements(simulator).0;
     let unit = DVector::from_fn(2 * nv, |i, _| {
         displacement[i % nv.max(1)] / if i < nv { 1.0 } else { duration }
@@ -110,12 +111,19 @@ pub fn growth_with(
     // The product so far, as e^size times a matrix whose entries are of order one.
     let (mut product, mut size) = (DMatrix::<f64>::identity(2 * nv, 2 * nv), 0.0);
     let (states, samples) = (rollout.states(), rollout.samples());
-    let mut e = trajectory.stepper.linearise(&states[0].q)?;
+    let records = rollout.tape.records();
+    let last = trajectory.stepper.linearise(&states[steps].q)?;
+    let linearise = |n: usize| records.get(n).map(|r| trajectory.linearise(r)).transpose();
+    let mut now = linearise(0)?;
     for n in 0..steps {
-        let from = from_velocity(&trajectory, &e, &states[n], &samples[n])?;
-        let through = step(&trajectory, &e, &states[n], &samples[n])?;
-        e = trajectory.stepper.linearise(&states[n + 1].q)?;
-        let to = to_velocity(&trajectory, &e, &states[n + 1], &samples[n + 1])?;
+        let next = linearise(n + 1)?;
+        let Some(step) = &now else { break };
+        let e = step.linearisation();
+        let from = from_velocity(&trajectory, e, &states[n], &samples[n])?;
+        let through = through(step, nv, system.len())?;
+        let e = next.as_ref().map_or(&last, |next| next.linearisation());
+        let to = to_velocity(&trajectory, e, &states[n + 1], &samples[n + 1])?;
+        now = next;
         let mut a = to * through * from;
         for i in 0..2 * nv {
             for j in 0..2 * nv {
@@ -177,18 +185,14 @@ fn rows(
 }
 
 /// B: rows are cotangents of the state before the step.
-fn step<'a>(
-    t: &Trajectory<'a>,
-    e: &Linearisation<'a>,
-    state: &State,
-    sample: &Sample,
-) -> Result<DMatrix<f64>> {
-    rows(state.y.len(), |q, y| {
+fn through(step: &ControlledStep, nv: usize, bodies: usize) -> Result<DMatrix<f64>> {
+    let zero = Seed::zeros(nv, bodies);
+    rows(nv, |q, y| {
         let next_bar = StateBar {
             q: q.clone(),
             y: y.clone(),
         };
-        let bar = t.state_before(e, state, sample, &next_bar)?;
+        let (bar, _) = step.vjp(&next_bar, &zero)?;
         Ok((bar.q, bar.y))
     })
 }

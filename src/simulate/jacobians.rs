@@ -1,8 +1,10 @@
 //! The linearisation of a rollout: its last state against its first and its controls.
 
 use super::Rollout;
+use super::trajectory::Seed;
 use crate::Result;
-use nalgebra::DMatrix;
+use crate::dynamics::{Linearisation, StateBar, StepBar};
+use nalgebra::{DMatrix, DVector};
 use rayon::prelude::*;
 
 /// Derivatives of the last state x_N of a rollout, x = (q, v) with the coordinates in their tangent space.
@@ -14,34 +16,73 @@ pub struct Jacobians {
     pub controls: DMatrix<f64>,
 }
 
-impl Rollout<'_> {
-    /// Jacobians of the last state, row by row from [`Rollout::vjp`]: of a rollout of one step, the A and B of
-    /// x₁ ≈ A x₀ + B u.
+impl Rollout {
+    /// Jacobians of the last state, all rows in one reverse sweep: each step is evaluated, and its stages factored, once. Of a
+    /// rollout of one step, the A and B of x₁ ≈ A x₀ + B u. Each row is that of [`Rollout::vjp`], to the bit.
     ///
     /// # Errors
     /// As [`Rollout::vjp`].
     pub fn jacobians(&self) -> Result<Jacobians> {
-        let nv = self.simulator().system().tree.velocities();
-        let rows = (0..2 * nv).into_par_iter().map(|i| {
-            let mut seed = self.zero_cotangents();
-            let part = if i < nv { &mut seed.q } else { &mut seed.v };
-            part[(i % nv, self.steps())] = 1.0;
-            self.vjp(&seed)
-        });
-        let rows = rows.collect::<Result<Vec<_>>>()?;
-        let mut out = Jacobians {
-            state: DMatrix::zeros(2 * nv, 2 * nv),
-            controls: DMatrix::zeros(2 * nv, self.controls().len()),
+        let system = self.simulator.system();
+        let (nv, nu) = (system.tree.velocities(), system.controls);
+        let trajectory = self.simulator.trajectory(&self.controls);
+        let (states, steps) = (self.states(), self.steps());
+        let time = |n: usize| trajectory.stepper.time(&states[n]);
+        let at = |n: usize| {
+            let e = trajectory.stepper.linearise(&states[n].q);
+            e.map_err(|e| e.at_time(time(n)))
         };
-        for (i, row) in rows.iter().enumerate() {
-            let state = row.initial.q.iter().chain(&row.initial.v);
-            for (j, x) in state.enumerate() {
-                out.state[(i, j)] = *x;
+        let zero = Seed::zeros(nv, system.len());
+        let end = at(steps)?;
+        let mut rows = (0..2 * nv)
+            .into_par_iter()
+            .map(|row| {
+                let StateBar { q, y: v } = StateBar::unit(nv, row);
+                let mut seed = Seed::zeros(nv, system.len());
+                (seed.q, seed.v) = (q, v);
+                let read = &self.samples()[steps].v;
+                let bar = trajectory.seed_vjp(&end, &states[steps], read, &seed)?;
+                Ok(bar.state)
+            })
+            .collect::<Result<Vec<StateBar>>>()?;
+        let mut controls = DMatrix::zeros(2 * nv, nu * steps);
+        // y₀ = y(q₀, v₀).
+        let begin = |e: &Linearisation, rows: &[StateBar]| {
+            let each = rows.par_iter().map(|row| {
+                let mut bar = StepBar::zeros(e);
+                bar.state.q = row.q.clone();
+                trajectory
+                    .stepper
+                    .conserved_vjp(e, &self.initial_velocity, &row.y, &mut bar)?;
+                Ok((bar.state.q, bar.v))
+            });
+            each.collect::<Result<Vec<(DVector<f64>, DVector<f64>)>>>()
+        };
+        let mut found = None;
+        for (n, record) in self.tape.records().iter().enumerate().rev() {
+            let step = trajectory.linearise(record)?;
+            let before = rows.par_iter().map(|row| step.vjp(row, &zero));
+            let before = before.collect::<Result<Vec<_>>>()?;
+            rows.clear();
+            for (i, (state, partial)) in before.into_iter().enumerate() {
+                for (k, u) in partial.control.iter().enumerate() {
+                    controls[(i, n * nu + k)] = *u;
+                }
+                rows.push(state);
             }
-            for (j, x) in row.controls.iter().enumerate() {
-                out.controls[(i, j)] = *x;
+            if n == 0 {
+                found = Some(begin(step.linearisation(), &rows)?);
             }
         }
-        Ok(out)
+        let found = match found {
+            Some(found) => found,
+            None => begin(&end, &rows)?,
+        };
+        let mut state = DMatrix::zeros(2 * nv, 2 * nv);
+        for (i, (q, v)) in found.iter().enumerate() {
+            state.view_mut((i, 0), (1, nv)).copy_from(&q.transpose());
+            state.view_mut((i, nv), (1, nv)).copy_from(&v.transpose());
+        }
+        Ok(Jacobians { state, controls })
     }
 }

@@ -3,9 +3,9 @@
 use super::trajectory::Seed;
 use super::{Cotangents, Fidelity, Gradient, Initial, Objective, Simulator};
 use crate::adjoint::lie::{Pose, Vec3, Vec6};
-use crate::adjoint::step::{self, Path};
+use crate::adjoint::step::{self, Tape};
 use crate::coupling::Report;
-use crate::dynamics::{ContactForce, Drive, Memo, State, StepBar, contact_velocity};
+use crate::dynamics::{ContactForce, Drive, State, StepBar, StepRecord};
 use crate::geometry::Gap;
 use crate::{Error, Result};
 use nalgebra::{DMatrix, DVector};
@@ -40,7 +40,6 @@ pub struct Sample {
     pub report: Report,
     /// Smallest gap; for [`Rollout::gaps`].
     pub(super) gap: Option<Gap>,
-    pub(super) memo: Memo,
 }
 
 impl Sample {
@@ -54,11 +53,11 @@ impl Sample {
 /// stays under 1.2 % on the example scenes.
 const GAIN: f64 = 0.02;
 
-/// A trajectory: the forward pass, and the only key to its gradient.
-pub struct Rollout<'a> {
-    pub(super) simulator: &'a Simulator,
+/// A trajectory: the forward pass, and the only key to its gradient. It holds what it needs of the simulator that made it.
+pub struct Rollout {
+    pub(super) simulator: Simulator,
     pub(super) controls: DMatrix<f64>,
-    pub(super) path: Path<State, Sample>,
+    pub(super) tape: Tape<State, Sample, StepRecord>,
     pub(super) initial_velocity: DVector<f64>,
     pub(super) gaps: OnceLock<Vec<Option<Gap>>>,
 }
@@ -83,25 +82,25 @@ pub struct Summary {
     pub min_gap: Option<f64>,
 }
 
-impl<'a> Rollout<'a> {
+impl Rollout {
     /// Observations at states 0 … N.
     pub fn samples(&self) -> &[Sample] {
-        self.path.kept()
+        self.tape.observations()
     }
 
     /// States 0 … N.
     pub fn states(&self) -> &[State] {
-        self.path.states()
+        self.tape.states()
     }
 
     /// Number of steps.
     pub fn steps(&self) -> usize {
-        self.path.states().len() - 1
+        self.tape.records().len()
     }
 
     /// The simulator that made it.
-    pub fn simulator(&self) -> &'a Simulator {
-        self.simulator
+    pub fn simulator(&self) -> &Simulator {
+        &self.simulator
     }
 
     /// Coordinates, nq × (N + 1).
@@ -197,12 +196,15 @@ impl<'a> Rollout<'a> {
     /// # Errors
     /// A signed distance that can't be found.
     pub fn contacts(&self, n: usize, slack: f64) -> Result<Vec<ContactForce>> {
-        let Some(sample) = self.samples().get(n).filter(|_| n < self.steps()) else {
+        let Some(record) = self.tape.records().get(n) else {
             return Ok(Vec::new());
         };
-        let simulator = self.simulator;
-        let v = contact_velocity(&sample.memo, &sample.v);
-        (simulator.system()).contact_forces(simulator.parameters(), &sample.q, &v, slack)
+        let (simulator, q, v) = (
+            &self.simulator,
+            &record.state().q,
+            record.contact_velocity(),
+        );
+        (simulator.system()).contact_forces(simulator.parameters(), q, v, slack)
     }
 
     /// Time and size of the smallest gap of the whole trajectory.
@@ -287,7 +289,7 @@ impl<'a> Rollout<'a> {
         self.vjp_with(cotangents, |_| ControlFlow::Continue(()))
     }
 
-    /// As [`Rollout::vjp`]; `progress` hears the number of steps gone back, and may end the sweep.
+    /// As [`Rollout::vjp`]; `progress` is called with the number of steps gone back, and may end the sweep.
     ///
     /// # Errors
     /// As [`Rollout::vjp`], and [`Error::Stopped`] if `progress` breaks.
@@ -297,13 +299,13 @@ impl<'a> Rollout<'a> {
         mut progress: impl FnMut(usize) -> ControlFlow<()> + Send,
     ) -> Result<Gradient> {
         self.check(cotangents)?;
-        let heard = |done| match progress(done) {
+        let ended = |done| match progress(done) {
             ControlFlow::Continue(()) => Ok(()),
             ControlFlow::Break(()) => Err(Error::Stopped {
                 what: format!("the gradient, {done} of {} steps back", self.steps()),
             }),
         };
-        let simulator = self.simulator;
+        let simulator = &self.simulator;
         let trajectory = simulator.trajectory(&self.controls);
         let seeds: Vec<Seed> = (0..=self.steps())
             .map(|n| Seed {
@@ -313,18 +315,18 @@ impl<'a> Rollout<'a> {
                 rotations: cotangents.rotations.column(n).into_owned(),
             })
             .collect();
-        let (state_bar, locals) =
-            rayon::scope(|_| step::reverse(&trajectory, &self.path, &seeds, heard))?;
+        let (state_bar, partials) =
+            rayon::scope(|_| step::reverse(&trajectory, &self.tape, &seeds, ended))?;
         let mut controls = cotangents.controls.clone();
         let mut parameters = simulator.parameters().zeros();
         let mut gains = vec![0.0; simulator.policy().gains().len()];
-        for (n, local) in locals.iter().enumerate() {
+        for (n, partial) in partials.iter().enumerate() {
             if n < self.steps() {
                 let mut column = controls.column_mut(n);
-                column += &local.control;
+                column += &partial.control;
             }
-            parameters.add(&local.parameters);
-            for (g, x) in gains.iter_mut().zip(&local.gains) {
+            parameters.add(&partial.parameters);
+            for (g, x) in gains.iter_mut().zip(&partial.gains) {
                 *g += x;
             }
         }

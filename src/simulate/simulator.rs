@@ -2,7 +2,8 @@
 
 use super::trajectory::Trajectory;
 use super::{
-    BackendReport, Controls, Discretisation, ErrorEstimate, Fidelity, Policy, Rollout, Settings,
+    BackendReport, Controls, Discretisation, ErrorEstimate, Fidelity, Policy, Record, Rollout,
+    Settings,
 };
 use crate::adjoint::lie::Pose;
 use crate::adjoint::step;
@@ -16,6 +17,7 @@ use crate::{Error, Result};
 use nalgebra::{DMatrix, DVector};
 use std::ops::ControlFlow;
 use std::path::Path;
+use std::sync::Arc;
 
 /// Most steps of one rollout: some kilobytes are kept for each.
 const MOST_STEPS: usize = 5_000_000;
@@ -24,8 +26,8 @@ const MOST_STEPS: usize = 5_000_000;
 /// one with other parameters, another start or another controller costs next to nothing.
 #[derive(Clone)]
 pub struct Simulator {
-    pub(super) scene: Scene,
-    pub(super) assembled: Assembled,
+    pub(super) scene: Arc<Scene>,
+    pub(super) assembled: Arc<Assembled>,
     settings: Settings,
     dt: f64,
     steps: usize,
@@ -74,8 +76,8 @@ impl Simulator {
         }
         let assembled = assembly::assemble(scene, &settings, folder)?;
         let out = Self {
-            scene: scene.clone(),
-            assembled,
+            scene: Arc::new(scene.clone()),
+            assembled: Arc::new(assembled),
             settings,
             dt,
             steps: scene.steps,
@@ -167,7 +169,7 @@ impl Simulator {
 
     /// The same with another controller.
     pub fn set_policy(&mut self, policy: Box<dyn Policy>) {
-        self.assembled.policy = policy.into();
+        Arc::make_mut(&mut self.assembled).policy = policy.into();
     }
 
     /// The same with other physical parameters.
@@ -184,13 +186,13 @@ impl Simulator {
             ));
         }
         parameters.check()?;
-        self.assembled.parameters = parameters;
+        Arc::make_mut(&mut self.assembled).parameters = parameters;
         Ok(())
     }
 
     /// Replaces the parameters unchecked: differences step across zero.
     pub(super) fn replace_parameters(&mut self, parameters: Parameters) {
-        self.assembled.parameters = parameters;
+        Arc::make_mut(&mut self.assembled).parameters = parameters;
     }
 
     /// Names of the bodies.
@@ -213,8 +215,8 @@ impl Simulator {
     /// Wrong lengths or values that aren't finite.
     pub fn set_start(&mut self, q: DVector<f64>, v: DVector<f64>) -> Result<()> {
         self.check_start(&q, &v)?;
-        self.assembled.q = q;
-        self.assembled.v = v;
+        let assembled = Arc::make_mut(&mut self.assembled);
+        (assembled.q, assembled.v) = (q, v);
         Ok(())
     }
 
@@ -308,11 +310,11 @@ impl Simulator {
     ///
     /// # Errors
     /// The first step that fails, with its time.
-    pub fn rollout(&self, controls: &Controls) -> Result<Rollout<'_>> {
+    pub fn rollout(&self, controls: &Controls) -> Result<Rollout> {
         self.rollout_with(controls, |_| {})
     }
 
-    /// As [`Simulator::rollout`]; `progress` hears the number of steps made.
+    /// As [`Simulator::rollout`]; `progress` is called with the number of steps made.
     ///
     /// # Errors
     /// The first step that fails, with its time.
@@ -320,14 +322,14 @@ impl Simulator {
         &self,
         controls: &Controls,
         mut progress: impl FnMut(usize) + Send,
-    ) -> Result<Rollout<'_>> {
-        let heard = |done| {
+    ) -> Result<Rollout> {
+        let count = |done| {
             progress(done);
             ControlFlow::Continue(())
         };
         let initial = self.initial().map_err(|e| e.at_time(0.0))?;
         let v = self.assembled.v.clone();
-        self.run(initial, Some(v), controls, heard)
+        self.run(initial, Some(v), controls, count)
     }
 
     /// The integrator's state at coordinates `q` and generalised velocity `v` after `step` steps: where
@@ -341,7 +343,7 @@ impl Simulator {
     }
 
     /// As [`Simulator::rollout`], from any state: that of [`Simulator::state`], or one of another rollout's
-    /// [`Rollout::states`], which it goes on from to the bit. `progress` hears the number of steps made, and may end the run.
+    /// [`Rollout::states`], which it goes on from to the bit. `progress` is called with the number of steps made, and may end the run.
     ///
     /// # Errors
     /// A state of other sizes, the first step that fails, with its time, and [`Error::Stopped`] if `progress` breaks.
@@ -350,7 +352,7 @@ impl Simulator {
         state: &State,
         controls: &Controls,
         progress: impl FnMut(usize) -> ControlFlow<()> + Send,
-    ) -> Result<Rollout<'_>> {
+    ) -> Result<Rollout> {
         let tree = &self.system().tree;
         let sizes = [state.q.len(), state.y.len()];
         let right = [tree.coordinates(), tree.velocities()];
@@ -364,13 +366,25 @@ impl Simulator {
         self.run(state.clone(), None, controls, progress)
     }
 
+    /// One step from a state with the controls `control`, to which the scene's own controller adds: the next state, and the record
+    /// that has the step's derivatives. The steps of a rollout, to the bit.
+    ///
+    /// # Errors
+    /// As [`Simulator::rollout_from`], and controls of another number or not finite.
+    pub fn step(&self, state: &State, control: &DVector<f64>) -> Result<(State, Record)> {
+        let controls = DMatrix::from_column_slice(control.len(), 1, control.as_slice());
+        let controls = Controls::from_matrix(self, controls)?;
+        let rollout = self.rollout_from(state, &controls, |_| ControlFlow::Continue(()))?;
+        Ok((rollout.states()[1].clone(), Record::new(rollout)))
+    }
+
     fn run(
         &self,
         initial: State,
         initial_velocity: Option<DVector<f64>>,
         controls: &Controls,
         mut progress: impl FnMut(usize) -> ControlFlow<()> + Send,
-    ) -> Result<Rollout<'_>> {
+    ) -> Result<Rollout> {
         let matrix = controls.matrix().clone();
         if matrix.nrows() != self.system().controls {
             return Err(Error::input(
@@ -387,7 +401,7 @@ impl Simulator {
                 format!("must be at most {MOST_STEPS}: every state is kept; run in parts"),
             ));
         }
-        let heard = |done| match progress(done) {
+        let ended = |done| match progress(done) {
             ControlFlow::Continue(()) => Ok(()),
             ControlFlow::Break(()) => Err(Error::Stopped {
                 what: format!("the rollout, after {done} of {steps} steps"),
@@ -395,11 +409,11 @@ impl Simulator {
         };
         let trajectory = self.trajectory(&matrix);
         // On a thread of the pool from first step to last: entering the pool costs as much as a small step's work.
-        let path = rayon::scope(|_| step::forward(&trajectory, initial, steps, heard))?;
+        let tape = rayon::scope(|_| step::forward(&trajectory, initial, steps, ended))?;
         Ok(Rollout {
-            simulator: self,
-            initial_velocity: initial_velocity.unwrap_or_else(|| path.kept()[0].v.clone()),
-            path,
+            simulator: self.clone(),
+            initial_velocity: initial_velocity.unwrap_or_else(|| tape.observations()[0].v.clone()),
+            tape,
             gaps: Default::default(),
             controls: matrix,
         })

@@ -4,7 +4,8 @@ use super::{Fidelity, Observation, Policy, Sample};
 use crate::adjoint::lie::{Vec3, Vec6, point_wrench};
 use crate::adjoint::step::Step;
 use crate::dynamics::{
-    Evaluation, Input, Linearisation, Parameters, State, StateBar, StepBar, Stepper,
+    Evaluation, Input, Linearisation, LinearisedStep, Parameters, State, StateBar, StepBar,
+    StepRecord, Stepper,
 };
 use crate::geometry::Gap;
 use crate::water::Clearance;
@@ -28,8 +29,8 @@ pub(super) struct Seed {
     pub rotations: DVector<f64>,
 }
 
-/// What one step yields.
-pub(super) struct Local {
+/// What the transpose of one step yields beside the state's cotangent.
+pub(super) struct Partial {
     pub control: DVector<f64>,
     pub parameters: Parameters,
     pub gains: Vec<f64>,
@@ -71,14 +72,15 @@ impl<'a> Trajectory<'a> {
             gap,
             control: DVector::zeros(0),
             hold: Vec::new(),
-            memo: None,
             v,
         })
     }
 
     /// What acts during a step, and the controller's next mode.
     fn input(&self, index: usize, state: &State, sample: &Sample) -> Result<(Input, usize)> {
-        let action = self.policy.act(&observation(state, sample));
+        let action = self
+            .policy
+            .act(&observation(state, &sample.v, sample.time))?;
         let mode = action.mode;
         expect_length("hold", action.hold.len(), self.stepper.system.len(), "body")?;
         let mut control = self.controls.column(index).into_owned();
@@ -103,49 +105,102 @@ impl<'a> Trajectory<'a> {
         Ok((Input { control, hold }, mode))
     }
 
-    /// Cotangents that enter at a state: readings of q, v and poses.
+    /// Cotangents that enter at a state with the velocity `v`: readings of q, v and poses.
     fn observe_vjp(
         &self,
         e: &Linearisation,
         state: &State,
-        sample: &Sample,
+        v: &DVector<f64>,
         seed: &Seed,
         bar: &mut StepBar,
     ) -> Result<()> {
-        let wrenches: Vec<Vec6> = (0..sample.poses.len())
-            .map(|b| {
+        let wrenches: Vec<Vec6> = (e.kinematics.poses.iter().enumerate())
+            .map(|(b, pose)| {
                 let p = Vec3::from(seed.positions.fixed_rows::<3>(3 * b));
-                let mut w = point_wrench(&sample.poses[b].translation, &p);
-                let mut turn = w.fixed_rows_mut::<3>(3);
-                turn += seed.rotations.fixed_rows::<3>(3 * b);
+                let mut w = point_wrench(&pose.translation, &p);
+                let mut moment = w.fixed_rows_mut::<3>(3);
+                moment += seed.rotations.fixed_rows::<3>(3 * b);
                 w
             })
             .collect();
         bar.state.q += &seed.q + self.stepper.system.tree.project(&e.kinematics, wrenches);
         let v_bar = &bar.v + &seed.v;
-        self.stepper.velocity_vjp(e, state, &sample.v, &v_bar, bar)
+        self.stepper.velocity_vjp(e, state, v, &v_bar, bar)
     }
 
-    /// Transpose of a step and its controller at a state where `e` was evaluated; the cotangent of the velocity isn't carried on yet.
-    fn step_bar(
+    /// A step with its controller, and what all its derivatives share.
+    ///
+    /// # Errors
+    /// As [`Stepper::linearise_step`].
+    pub(super) fn linearise<'t>(
+        &'t self,
+        record: &'t StepRecord,
+    ) -> Result<ControlledStep<'t, 'a>> {
+        let step = self.stepper.linearise_step(record);
+        Ok(ControlledStep {
+            trajectory: self,
+            step: step.map_err(|e| e.at_time(self.stepper.time(record.state())))?,
+        })
+    }
+
+    /// Cotangent of a state from a seed there alone.
+    pub(super) fn seed_vjp(
         &self,
-        e: &Linearisation<'a>,
+        e: &Linearisation,
         state: &State,
-        sample: &Sample,
-        next_bar: &StateBar,
-    ) -> Result<(StepBar, Vec<f64>)> {
-        let input = Input {
-            control: sample.control.clone(),
-            hold: sample.hold.clone(),
+        v: &DVector<f64>,
+        seed: &Seed,
+    ) -> Result<StepBar> {
+        let mut bar = StepBar::zeros(e);
+        self.observe_vjp(e, state, v, seed, &mut bar)
+            .map_err(|e| e.at_time(self.stepper.time(state)))?;
+        Ok(bar)
+    }
+}
+
+/// A step of a trajectory with its controller, linearised.
+pub(super) struct ControlledStep<'t, 'a> {
+    trajectory: &'t Trajectory<'a>,
+    step: LinearisedStep<'t, 'a>,
+}
+
+impl<'a> ControlledStep<'_, 'a> {
+    /// The system at the state before the step.
+    pub fn linearisation(&self) -> &Linearisation<'a> {
+        self.step.linearisation()
+    }
+
+    /// Transpose of the step, its controller, and what is observed at its state.
+    pub fn vjp(&self, next_bar: &StateBar, seed: &Seed) -> Result<(StateBar, Partial)> {
+        let record = self.step.record();
+        let run = || {
+            let (mut bar, gains) = self.transpose(next_bar)?;
+            let e = self.step.linearisation();
+            self.trajectory
+                .observe_vjp(e, record.state(), record.velocity(), seed, &mut bar)?;
+            Ok((
+                bar.state,
+                Partial {
+                    control: bar.control,
+                    parameters: bar.parameters,
+                    gains,
+                },
+            ))
         };
-        let mut bar = self
-            .stepper
-            .step_vjp(e, state, &sample.v, &input, &sample.memo, next_bar)?;
-        let action = (self.policy).act_vjp(&observation(state, sample), &bar.control);
-        let velocities = self.stepper.system.tree.velocities();
+        run().map_err(|e: Error| e.at_time(self.trajectory.stepper.time(record.state())))
+    }
+
+    /// Transpose of the step and its controller; the cotangent of the velocity isn't carried on yet.
+    fn transpose(&self, next_bar: &StateBar) -> Result<(StepBar, Vec<f64>)> {
+        let (t, record) = (self.trajectory, self.step.record());
+        let mut bar = self.step.vjp(next_bar)?;
+        let state = record.state();
+        let seen = observation(state, record.velocity(), t.stepper.time(state));
+        let action = t.policy.act_vjp(&seen, &bar.control)?;
+        let velocities = t.stepper.system.tree.velocities();
         expect_length("cotangent of q", action.q.len(), velocities, "velocity")?;
         expect_length("cotangent of v", action.v.len(), velocities, "velocity")?;
-        let gains = self.policy.gains().len();
+        let gains = t.policy.gains().len();
         expect_length("cotangent of the gains", action.gains.len(), gains, "gain")?;
         if !action.q.is_empty() {
             bar.state.q += DVector::from_vec(action.q);
@@ -155,72 +210,27 @@ impl<'a> Trajectory<'a> {
         }
         Ok((bar, action.gains))
     }
+}
 
-    /// Cotangent of a state from that of the next one alone.
-    pub(super) fn state_before(
-        &self,
-        e: &Linearisation<'a>,
-        state: &State,
-        sample: &Sample,
-        next_bar: &StateBar,
-    ) -> Result<StateBar> {
-        let run = || {
-            let (mut bar, _) = self.step_bar(e, state, sample, next_bar)?;
-            let v_bar = bar.v.clone();
-            self.stepper
-                .velocity_vjp(e, state, &sample.v, &v_bar, &mut bar)?;
-            Ok(bar.state)
-        };
-        run().map_err(|e: Error| e.at_time(sample.time))
-    }
-
-    fn reverse_step(
-        &self,
-        state: &State,
-        sample: &Sample,
-        next_bar: &StateBar,
-        seed: &Seed,
-    ) -> Result<(StateBar, Local)> {
-        let e = self.stepper.linearise(&state.q)?;
-        let (mut bar, gains) = self.step_bar(&e, state, sample, next_bar)?;
-        self.observe_vjp(&e, state, sample, seed, &mut bar)?;
-        Ok((
-            bar.state,
-            Local {
-                control: bar.control,
-                parameters: bar.parameters,
-                gains,
-            },
-        ))
-    }
-
-    fn reverse_last(
-        &self,
-        state: &State,
-        sample: &Sample,
-        seed: &Seed,
-    ) -> Result<(StateBar, Local)> {
-        let e = self.stepper.linearise(&state.q)?;
-        let mut bar = StepBar::zeros(&e);
-        self.observe_vjp(&e, state, sample, seed, &mut bar)?;
-        Ok((
-            bar.state,
-            Local {
-                control: DVector::zeros(0),
-                parameters: bar.parameters,
-                gains: Vec::new(),
-            },
-        ))
+impl Seed {
+    /// All zero.
+    pub fn zeros(velocities: usize, bodies: usize) -> Self {
+        Self {
+            q: DVector::zeros(velocities),
+            v: DVector::zeros(velocities),
+            positions: DVector::zeros(3 * bodies),
+            rotations: DVector::zeros(3 * bodies),
+        }
     }
 }
 
 /// What the controller sees at a state.
-fn observation<'a>(state: &State, sample: &'a Sample) -> Observation<'a> {
+fn observation<'a>(state: &'a State, v: &'a DVector<f64>, time: f64) -> Observation<'a> {
     Observation {
         step: state.step,
-        time: sample.time,
-        q: &sample.q,
-        v: &sample.v,
+        time,
+        q: &state.q,
+        v,
         mode: state.mode,
     }
 }
@@ -239,24 +249,24 @@ fn expect_length(what: &str, given: usize, expected: usize, item: &str) -> Resul
 
 impl Step for Trajectory<'_> {
     type State = State;
-    type Kept = Sample;
-    type Bar = StateBar;
+    type Observation = Sample;
+    type Record = StepRecord;
+    type Cotangent = StateBar;
     type Seed = Seed;
-    type Local = Local;
+    type Partial = Partial;
     type Error = Error;
 
-    fn step(&self, index: usize, state: &State) -> Result<(State, Sample)> {
+    fn step(&self, index: usize, state: &State) -> Result<(State, Sample, StepRecord)> {
         let run = || {
             let gap = self.gap(state)?;
             let e = self.stepper.linearise(&state.q)?;
             let mut sample = self.observe(&e, state, gap)?;
             let (input, mode) = self.input(index, state, &sample)?;
-            let mut next = self.stepper.step(&e, state, &sample.v, &input)?;
-            next.state.mode = mode;
+            let (mut next, record) = self.stepper.step(&e, state, &sample.v, &input)?;
+            next.mode = mode;
             sample.control = input.control;
             sample.hold = input.hold;
-            sample.memo = next.memo;
-            Ok((next.state, sample))
+            Ok((next, sample, record))
         };
         run().map_err(|e: Error| e.at_time(self.stepper.time(state)))
     }
@@ -273,13 +283,11 @@ impl Step for Trajectory<'_> {
     fn step_vjp(
         &self,
         _index: usize,
-        state: &State,
-        sample: &Sample,
+        record: &StepRecord,
         next_bar: &StateBar,
         seed: &Seed,
-    ) -> Result<(StateBar, Local)> {
-        self.reverse_step(state, sample, next_bar, seed)
-            .map_err(|e| e.at_time(sample.time))
+    ) -> Result<(StateBar, Partial)> {
+        self.linearise(record)?.vjp(next_bar, seed)
     }
 
     fn last_vjp(
@@ -288,8 +296,17 @@ impl Step for Trajectory<'_> {
         state: &State,
         sample: &Sample,
         seed: &Seed,
-    ) -> Result<(StateBar, Local)> {
-        self.reverse_last(state, sample, seed)
-            .map_err(|e| e.at_time(sample.time))
+    ) -> Result<(StateBar, Partial)> {
+        let e = self.stepper.linearise(&state.q);
+        let e = e.map_err(|e| e.at_time(sample.time))?;
+        let bar = self.seed_vjp(&e, state, &sample.v, seed)?;
+        Ok((
+            bar.state,
+            Partial {
+                control: DVector::zeros(0),
+                parameters: bar.parameters,
+                gains: Vec::new(),
+            },
+        ))
     }
 }

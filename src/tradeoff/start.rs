@@ -29,7 +29,7 @@ impl Start {
         *dry.density_mut() = 0.0;
         let rigid = system.evaluate(&dry, q)?.mass_matrix;
         let all = system.evaluate(parameters, q)?.mass_matrix;
-        let free = free(simulator);
+        let free = free(simulator)?;
         let block = |m: &DMatrix<f64>| m.select_rows(&free).select_columns(&free);
         Ok(Self {
             added_mass: block(&(&all - rigid)),
@@ -47,9 +47,9 @@ impl Start {
         let system = simulator.system();
         let e = system.linearise(simulator.parameters(), q)?;
         let given = &e.mass_matrix * given_accelerations(simulator);
-        let force = e.inertial_force(v, &first_action(simulator).0)? - given;
+        let force = e.inertial_force(v, &first_action(simulator)?.0)? - given;
         Ok(Self {
-            force: force.select_rows(&free(simulator)),
+            force: force.select_rows(&free(simulator)?),
             ..self
         })
     }
@@ -62,7 +62,7 @@ impl Start {
 }
 
 /// Controls and held bodies of the first step.
-fn first_action(simulator: &Simulator) -> (DVector<f64>, Vec<bool>) {
+fn first_action(simulator: &Simulator) -> Result<(DVector<f64>, Vec<bool>)> {
     let (q, v) = simulator.start();
     let action = simulator.policy().act(&Observation {
         step: 0,
@@ -70,23 +70,23 @@ fn first_action(simulator: &Simulator) -> (DVector<f64>, Vec<bool>) {
         q,
         v,
         mode: 0,
-    });
+    })?;
     let mut control = DVector::zeros(simulator.system().controls);
     for (c, x) in control.iter_mut().zip(action.control) {
         *c += x;
     }
-    (control, action.hold)
+    Ok((control, action.hold))
 }
 
 /// Numbers of the velocities that forces decide at the start.
-pub(super) fn free(simulator: &Simulator) -> Vec<usize> {
+pub(super) fn free(simulator: &Simulator) -> Result<Vec<usize>> {
     let system = simulator.system();
-    let hold = first_action(simulator).1;
+    let hold = first_action(simulator)?.1;
     let links = system.tree.links().iter().zip(&system.drives).enumerate();
-    links
+    Ok(links
         .filter(|(b, (_, drive))| **drive == Drive::Free && !hold.get(*b).copied().unwrap_or(false))
         .flat_map(|(_, (link, _))| link.v.clone())
-        .collect()
+        .collect())
 }
 
 /// Accelerations of joints with a given motion, zero for others.

@@ -285,7 +285,7 @@ fn one_step(simulator: &Simulator) -> (State, DVector<f64>) {
         control: DVector::from_element(simulator.system().controls, 0.1),
         hold: Vec::new(),
     };
-    let next = stepper.step(&e, &state, &v, &input).unwrap().state;
+    let next = stepper.step(&e, &state, &v, &input).unwrap().0;
     (next, v)
 }
 

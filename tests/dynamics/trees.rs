@@ -348,20 +348,20 @@ struct HoldAndRelease {
 }
 
 impl Policy for HoldAndRelease {
-    fn act(&self, observed: &Observation) -> Action {
+    fn act(&self, observed: &Observation) -> hydrograd::Result<Action> {
         let held = self.steps.contains(&observed.step);
-        Action {
+        Ok(Action {
             control: self.control.clone(),
             hold: (0..self.bodies).map(|b| held && b == self.body).collect(),
             mode: 0,
-        }
+        })
     }
 
-    fn act_vjp(&self, _: &Observation, control_bar: &DVector<f64>) -> ActionBar {
-        ActionBar {
+    fn act_vjp(&self, _: &Observation, control_bar: &DVector<f64>) -> hydrograd::Result<ActionBar> {
+        Ok(ActionBar {
             gains: control_bar.as_slice().to_vec(),
             ..ActionBar::default()
-        }
+        })
     }
 
     fn gains(&self) -> Vec<f64> {

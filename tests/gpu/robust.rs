@@ -112,15 +112,15 @@ struct Unplug {
 }
 
 impl Policy for Unplug {
-    fn act(&self, observed: &Observation) -> Action {
+    fn act(&self, observed: &Observation) -> hydrograd::Result<Action> {
         if observed.step == self.step {
             self.context.lose();
         }
-        Action::default()
+        Ok(Action::default())
     }
 
-    fn act_vjp(&self, _: &Observation, _: &DVector<f64>) -> ActionBar {
-        ActionBar::default()
+    fn act_vjp(&self, _: &Observation, _: &DVector<f64>) -> hydrograd::Result<ActionBar> {
+        Ok(ActionBar::default())
     }
 
     fn with_gains(&self, _: &[f64]) -> Result<Box<dyn Policy>> {

@@ -5,10 +5,11 @@ use super::multibody::tree_displacement;
 use super::tools::{Group, all, groups, vector_along, wavy};
 use hydrograd::adjoint::check::{Outcome, Rung};
 use hydrograd::dynamics::{
-    Drive, Input, Integrator, Linearisation, Owner, Parameters, State, StateBar, StepBar, Stepper,
-    System,
+    Drive, Input, Integrator, Linearisation, Owner, Parameters, State, StateBar, StateTangent,
+    StepBar, Stepper, System,
 };
 use hydrograd::scene::{Body, Drag, DragPart, Fluid, Joint, Motion, Plane, Scene, Shape};
+use hydrograd::simulate::{Pd, PdAxis};
 use hydrograd::{Settings, Simulator};
 use nalgebra::DVector;
 use std::sync::OnceLock;
@@ -27,12 +28,14 @@ pub fn rungs() -> Vec<Rung> {
         "dynamics::acceleration::Linearisation::inertial_force_vjp" => inertial_force,
         "dynamics::integrator::readout::Stepper::velocity_vjp" => velocity,
         "dynamics::integrator::readout::Stepper::conserved_vjp" => conserved,
-        "dynamics::integrator::Stepper::released_momentum_vjp" => released,
-        "dynamics::integrator::euler::step_vjp" => |c| step(Integrator::MomentumEuler, c),
-        "dynamics::integrator::midpoint::step_vjp" => |c| step(Integrator::Midpoint, c),
-        "dynamics::integrator::runge_kutta::step_vjp" =>
+        "dynamics::integrator::start::Start::momentum_vjp" => released,
+        "dynamics::integrator::euler::Adjoint::vjp" => |c| step(Integrator::MomentumEuler, c),
+        "dynamics::integrator::midpoint::Adjoint::vjp" => |c| step(Integrator::Midpoint, c),
+        "dynamics::integrator::runge_kutta::Adjoint::vjp" =>
             |c| step(Integrator::Rk4, c).worst(step(Integrator::Rk2, c)),
-        "dynamics::integrator::velocity_euler::step_vjp" => |c| step(Integrator::VelocityEuler, c),
+        "dynamics::integrator::velocity_euler::Adjoint::vjp" => |c| step(Integrator::VelocityEuler, c),
+        "dynamics::integrator::record::LinearisedStep::jvp" => |c| all(INTEGRATORS.map(|i| step_jvp(i, c))),
+        "simulate::record::Record::jvp" => record_jvp,
     ]
 }
 
@@ -468,26 +471,16 @@ fn step_with(integrator: Integrator, before: &[&str], now: &[&str], c: f64) -> O
     let base = make(&p);
     let tree = &system().tree;
     let value = |p: &Point| {
-        let next = make(p).state;
-        q_bar.dot(&tree_displacement(tree, &base.state.q, &next.q)) + y_bar.dot(&next.y)
+        let next = make(p).0;
+        q_bar.dot(&tree_displacement(tree, &base.0.q, &next.q)) + y_bar.dot(&next.y)
     };
     let s = stepper(&p.parameters, integrator);
-    let e = evaluate(&p.parameters, &p.q);
-    let at = state(&p, &before);
-    let v = s.velocity(&e, &at).unwrap();
-    let input = Input {
-        control: p.u.clone(),
-        hold: now.clone(),
-    };
     let next_bar = StateBar {
         q: q_bar.clone(),
         y: y_bar.clone(),
     };
-    let mut b = s
-        .step_vjp(&e, &at, &v, &input, &base.memo, &next_bar)
-        .unwrap();
-    let v_bar = b.v.clone();
-    s.velocity_vjp(&e, &at, &v, &v_bar, &mut b).unwrap();
+    let b = s.linearise_step(&base.1).unwrap().state_vjp(&next_bar);
+    let b = b.unwrap();
     check(false, &value, &p, &bar_of(b), c)
 }
 
@@ -498,12 +491,126 @@ fn step(integrator: Integrator, c: f64) -> Outcome {
 
 /// Joints that come free take their momentum from the velocity.
 fn released(c: f64) -> Outcome {
-    all([
-        Integrator::MomentumEuler,
-        Integrator::Midpoint,
-        Integrator::Rk2,
-        Integrator::Rk4,
-        Integrator::VelocityEuler,
-    ]
-    .map(|integrator| step_with(integrator, &["arm", "coin"], &["tail"], c)))
+    all(INTEGRATORS.map(|integrator| step_with(integrator, &["arm", "coin"], &["tail"], c)))
+}
+
+const INTEGRATORS: [Integrator; 5] = [
+    Integrator::MomentumEuler,
+    Integrator::Midpoint,
+    Integrator::Rk2,
+    Integrator::Rk4,
+    Integrator::VelocityEuler,
+];
+
+/// A vector without the entries of joints with a given motion, which no change of a state moves.
+fn unmoved(mut d: DVector<f64>) -> DVector<f64> {
+    for (link, drive) in system().tree.links().iter().zip(&system().drives) {
+        if matches!(drive, Drive::Motion(_)) {
+            d.rows_mut(link.v.start, link.v.len()).fill(0.0);
+        }
+    }
+    d
+}
+
+/// The tangent of a step against differences of it, and against its transpose.
+fn step_jvp(integrator: Integrator, c: f64) -> Outcome {
+    let p = state_point(integrator);
+    let s = stepper(&p.parameters, integrator);
+    let (n, tree) = (p.v.len(), &system().tree);
+    let make = |q: DVector<f64>, y: DVector<f64>, u: DVector<f64>| {
+        let at = state(
+            &Point {
+                q,
+                v: y,
+                ..p.clone()
+            },
+            &[],
+        );
+        let e = s.linearise(&at.q).unwrap();
+        let v = s.velocity(&e, &at).unwrap();
+        let input = Input {
+            control: u,
+            hold: Vec::new(),
+        };
+        s.step(&e, &at, &v, &input).unwrap()
+    };
+    let (base, record) = make(p.q.clone(), p.v.clone(), p.u.clone());
+    let along = StateTangent {
+        q: unmoved(wavy(n, 2.1, 0.05)),
+        y: wavy(n, 3.1, 0.2),
+    };
+    let du = wavy(p.u.len(), 4.1, 1.0);
+    let step = s.linearise_step(&record).unwrap();
+    let tangent = step.jvp(&along, &du).unwrap();
+    let bar = StateBar {
+        q: wavy(n, 5.1, 1.0),
+        y: wavy(n, 6.1, 1.0),
+    };
+    let back = step.state_vjp(&bar).unwrap();
+    let forth = bar.q.dot(&tangent.q) + bar.y.dot(&tangent.y);
+    let back = back.state.q.dot(&along.q) + back.state.y.dot(&along.y) + back.control.dot(&du);
+    assert!(
+        (forth - back).abs() <= 1e-9 * forth.abs(),
+        "{forth} is not {back}"
+    );
+    let value = |h: f64| {
+        let q = tree.integrate(&p.q, &(h * &along.q));
+        let next = make(q, &p.v + h * &along.y, &p.u + h * &du).0;
+        let moved = tree_displacement(tree, &base.q, &next.q);
+        moved.iter().chain(next.y.iter()).copied().collect()
+    };
+    let all: Vec<f64> = tangent.q.iter().chain(tangent.y.iter()).copied().collect();
+    vector_along(value, (c * DVector::from_vec(all)).as_slice())
+}
+
+/// The same of a simulator's step, in q and v, with a controller.
+fn record_jvp(c: f64) -> Outcome {
+    let mut simulator = simulator().clone();
+    let tree = &system().tree;
+    let (nq, nv, nu) = (tree.coordinates(), tree.velocities(), system().controls);
+    let axes = (0..nu.min(2)).map(|k| PdAxis {
+        control: k,
+        q: nq - 1 - k,
+        v: nv - 1 - k,
+        target: 0.3,
+        stiffness: 2.0,
+        damping: 0.7,
+    });
+    simulator.set_policy(Box::new(Pd {
+        controls: nu,
+        velocities: nv,
+        axes: axes.collect(),
+    }));
+    let p = point();
+    let u = wavy(nu, 1.8, 3.0);
+    let make = |q: &DVector<f64>, v: &DVector<f64>, u: &DVector<f64>| {
+        let start = simulator.state(STEP, q, v).unwrap();
+        let (_, record) = simulator.step(&start, u).unwrap();
+        record
+    };
+    let base = make(&p.q, &p.v, &u);
+    let (dq, dv) = (unmoved(wavy(nv, 2.1, 0.05)), unmoved(wavy(nv, 3.1, 0.2)));
+    let du = wavy(nu, 4.1, 1.0);
+    let along = DVector::from_iterator(2 * nv, dq.iter().chain(dv.iter()).copied());
+    let tangent = base.jvp(&along, &du).unwrap();
+    let mut bar = base.zero_cotangents();
+    bar.q.set_column(1, &wavy(nv, 5.1, 1.0));
+    bar.v.set_column(1, &wavy(nv, 6.1, 1.0));
+    let back = base.vjp(&bar).unwrap();
+    let forth =
+        bar.q.column(1).dot(&tangent.rows(0, nv)) + bar.v.column(1).dot(&tangent.rows(nv, nv));
+    let back = back.initial.q.dot(&dq) + back.initial.v.dot(&dv) + back.controls.column(0).dot(&du);
+    assert!(
+        (forth - back).abs() <= 1e-9 * forth.abs(),
+        "{forth} is not {back}"
+    );
+    let end = base.rollout().samples()[1].q.clone();
+    let value = |h: f64| {
+        let q = tree.integrate(&p.q, &(h * &dq));
+        let record = make(&q, &(&p.v + h * &dv), &(&u + h * &du));
+        let next = &record.rollout().samples()[1];
+        let moved = tree_displacement(tree, &end, &next.q);
+        moved.iter().chain(next.v.iter()).copied().collect()
+    };
+    vector_along(value, (c * tangent).as_slice())
 }

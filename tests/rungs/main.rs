@@ -116,8 +116,8 @@ const THROUGH: &[(&str, &str)] = &[
         "dynamics::contact::Evaluation::contact_force_vjp",
     ),
     (
-        "dynamics::integrator::contact::solve_vjp",
-        "dynamics::integrator::contact::press_vjp",
+        "dynamics::integrator::contact::Adjoint::solve_vjp",
+        "dynamics::integrator::contact::Adjoint::press_vjp",
     ),
     (
         "dynamics::balance::Evaluation::loads_vjp",
@@ -150,16 +150,24 @@ const THROUGH: &[(&str, &str)] = &[
         "dynamics::integrator::readout::Stepper::velocity_vjp",
     ),
     (
-        "dynamics::integrator::euler::advance_vjp",
-        "dynamics::integrator::euler::step_vjp",
+        "dynamics::integrator::midpoint::Adjoint::configuration_vjp",
+        "dynamics::integrator::midpoint::Adjoint::vjp",
     ),
     (
-        "dynamics::integrator::midpoint::configuration_vjp",
-        "dynamics::integrator::midpoint::step_vjp",
+        "dynamics::integrator::start::Start::advance_vjp",
+        "dynamics::integrator::euler::Adjoint::vjp",
     ),
     (
-        "dynamics::integrator::Stepper::step_vjp",
-        "dynamics::integrator::euler::step_vjp",
+        "dynamics::integrator::start::Start::arrive_vjp",
+        "dynamics::integrator::euler::Adjoint::vjp",
+    ),
+    (
+        "dynamics::integrator::record::LinearisedStep::vjp",
+        "dynamics::integrator::euler::Adjoint::vjp",
+    ),
+    (
+        "dynamics::integrator::record::LinearisedStep::state_vjp",
+        "dynamics::integrator::record::LinearisedStep::jvp",
     ),
     // Whole rollouts: every integrator, both fidelities, in tests/rollout_gradient.rs as well.
     (
@@ -172,6 +180,18 @@ const THROUGH: &[(&str, &str)] = &[
     ),
     (
         "simulate::trajectory::Trajectory::last_vjp",
+        "simulate::rollout::Rollout::vjp",
+    ),
+    (
+        "simulate::trajectory::Trajectory::seed_vjp",
+        "simulate::rollout::Rollout::vjp",
+    ),
+    (
+        "simulate::trajectory::ControlledStep::vjp",
+        "simulate::rollout::Rollout::vjp",
+    ),
+    (
+        "simulate::record::Record::vjp",
         "simulate::rollout::Rollout::vjp",
     ),
     ("adjoint::step::reverse", "simulate::rollout::Rollout::vjp"),

@@ -66,7 +66,7 @@ fn act(policy: &dyn Policy, c: f64) -> Outcome {
             v,
             mode: 0,
         };
-        let action = policy.with_gains(gains).unwrap().act(&observed);
+        let action = policy.with_gains(gains).unwrap().act(&observed).unwrap();
         let pairs = action.control.iter().zip(bar.iter());
         pairs.map(|(u, b)| u * b).sum::<f64>()
     };
@@ -77,7 +77,7 @@ fn act(policy: &dyn Policy, c: f64) -> Outcome {
         mode: 0,
         v: &v,
     };
-    let back = policy.act_vjp(&observed, &bar);
+    let back = policy.act_vjp(&observed, &bar).unwrap();
     let dot = |bar: &[f64], d: &DVector<f64>| bar.iter().zip(d.iter()).map(|(b, d)| b * d).sum();
     let moved = |h: f64| -> Vec<f64> {
         gains
@@ -129,9 +129,10 @@ fn push_then_lock(c: f64) -> Outcome {
         v: &v,
     };
     let stopped = policy(q[2] + 1.0);
-    let action = stopped.act(&observed);
+    let action = stopped.act(&observed).unwrap();
     assert_eq!((action.control.len(), action.hold), (0, vec![false, true]));
-    assert_eq!(stopped.act_vjp(&observed, &wavy(2, 2.5, 1.0)).gains, [0.0]);
+    let back = stopped.act_vjp(&observed, &wavy(2, 2.5, 1.0)).unwrap();
+    assert_eq!(back.gains, [0.0]);
     act(&policy(q[2] - 1.0), c)
 }
 
@@ -157,8 +158,8 @@ fn speed_stages(c: f64) -> Outcome {
     };
     let over = policy(0.5 * fastest, 0.9 * fastest);
     let (action, back) = (
-        over.act(&observed),
-        over.act_vjp(&observed, &wavy(2, 2.5, 1.0)),
+        over.act(&observed).unwrap(),
+        over.act_vjp(&observed, &wavy(2, 2.5, 1.0)).unwrap(),
     );
     assert_eq!((action.control.len(), action.mode), (0, 2));
     assert_eq!(back.gains, [0.0; 4]);
@@ -206,8 +207,8 @@ fn open_loop(c: f64) -> Outcome {
         mode: 0,
         v: &v,
     };
-    assert_eq!(OpenLoop.act(&observed), Default::default());
-    let back = OpenLoop.act_vjp(&observed, &wavy(2, 2.5, 1.0));
+    assert_eq!(OpenLoop.act(&observed).unwrap(), Default::default());
+    let back = OpenLoop.act_vjp(&observed, &wavy(2, 2.5, 1.0)).unwrap();
     let size = back.q.len() + back.v.len() + back.gains.len();
     Outcome {
         rel_error: size as f64 + (c - 1.0),

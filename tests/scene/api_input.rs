@@ -21,20 +21,20 @@ struct Lengths {
 }
 
 impl Policy for Lengths {
-    fn act(&self, _: &Observation) -> Action {
-        Action {
+    fn act(&self, _: &Observation) -> hydrograd::Result<Action> {
+        Ok(Action {
             control: vec![0.0; self.control],
             hold: vec![false; self.hold],
             mode: 0,
-        }
+        })
     }
 
-    fn act_vjp(&self, _: &Observation, _: &DVector<f64>) -> ActionBar {
-        ActionBar {
+    fn act_vjp(&self, _: &Observation, _: &DVector<f64>) -> hydrograd::Result<ActionBar> {
+        Ok(ActionBar {
             q: vec![0.0; self.q],
             v: Vec::new(),
             gains: vec![0.0; self.gains],
-        }
+        })
     }
 
     fn gains(&self) -> Vec<f64> {

@@ -53,7 +53,7 @@ pub fn simulator(scene: &Scene, fidelity: Fidelity, integrator: Integrator) -> S
 }
 
 /// A rollout without control, all of whose states are finite.
-pub fn run(simulator: &Simulator, steps: usize) -> Rollout<'_> {
+pub fn run(simulator: &Simulator, steps: usize) -> Rollout {
     let rollout = simulator
         .rollout(&Controls::zeros(simulator, steps))
         .unwrap();

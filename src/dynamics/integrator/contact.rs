@@ -10,8 +10,11 @@
 //! # References
 //! A. Castro et al., "An Unconstrained Convex Formulation of Compliant Contact", 2022.
 
-use super::{Split, StepBar};
-use crate::dynamics::{Dual, Linearisation};
+use super::StepBar;
+use super::record::ContactVelocities;
+use super::split::Split;
+use super::start::Start;
+use crate::dynamics::{Dual, Evaluation};
 use crate::{Error, Result};
 use nalgebra::{Cholesky, DMatrix, DVector, Dyn};
 
@@ -34,12 +37,7 @@ struct Trial {
 }
 
 /// The Hessian M + Δt Jᵀ G J on the free rows, factored.
-fn hessian(
-    e: &Linearisation,
-    split: &Split,
-    v: &DVector<f64>,
-    dt: f64,
-) -> Result<Cholesky<f64, Dyn>> {
+fn hessian(e: &Evaluation, split: &Split, v: &DVector<f64>, dt: f64) -> Result<Cholesky<f64, Dyn>> {
     let m = &e.mass_matrix - dt * e.contact_jacobian(v);
     let m: DMatrix<f64> = 0.5 * (&m + m.transpose());
     split.block(&m).cholesky().ok_or_else(|| Error::Solver {
@@ -52,13 +50,8 @@ fn hessian(
 }
 
 /// The velocity after contact, from the one before it; the same bits where nothing presses.
-pub(super) fn solve(
-    e: &Linearisation,
-    split: &Split,
-    before: &DVector<f64>,
-    dt: f64,
-    what: &dyn Fn() -> String,
-) -> Result<DVector<f64>> {
+pub(super) fn solve(start: &Start, before: &DVector<f64>) -> Result<DVector<f64>> {
+    let (e, split, dt) = (start.e, start.split, start.stepper.dt);
     // At no force v* is the least of the convex problem.
     if split.free.is_empty() || !e.presses(before) {
         return Ok(before.clone());
@@ -69,10 +62,10 @@ pub(super) fn solve(
         .map(|d| 1.0 / d.max(f64::MIN_POSITIVE).sqrt());
     let sized = |p: &DVector<f64>| split.take(p).component_mul(&scale).norm();
     let summands = e.mass_matrix.abs();
-    let start = sized(&(&summands * before.abs()));
+    let least = sized(&(&summands * before.abs()));
     let at = |v: DVector<f64>| {
         let imbalance = &e.mass_matrix * (&v - before) - dt * e.contact_force(&v, Dual::User);
-        let size = sized(&(&summands * v.abs())).max(start);
+        let size = sized(&(&summands * v.abs())).max(least);
         let size = size.max(dt * sized(&e.contact_effort(&v)));
         let residual = if size > 0.0 {
             sized(&imbalance) / size
@@ -102,7 +95,7 @@ pub(super) fn solve(
         now = search(now, &step, &at);
     }
     Err(Error::Solver {
-        what: what(),
+        what: start.stage_name(),
         iterations: ITERATIONS,
         residual: now.residual,
         tolerance: RESIDUAL,
@@ -140,73 +133,99 @@ fn search(now: Trial, step: &DVector<f64>, at: &dyn Fn(DVector<f64>) -> Trial) -
     best
 }
 
-/// Transpose of [`solve`]: from the cotangent of the velocity after contact to that of the one before; the rest is added to `bar`.
-pub(super) fn solve_vjp(
-    e: &Linearisation,
-    split: &Split,
-    before: &DVector<f64>,
-    after: &DVector<f64>,
-    after_bar: &DVector<f64>,
-    dt: f64,
-    bar: &mut StepBar,
-) -> Result<DVector<f64>> {
-    if split.free.is_empty() || !e.presses(before) {
-        return Ok(after_bar.clone());
-    }
-    let w = split.put(&hessian(e, split, after, dt)?.solve(&split.take(after_bar)));
-    bar.add(dt, &e.contact_force_vjp(after, &w, Dual::User));
-    bar.add(-1.0, &e.mass_vjp(&(after - before), &w)?);
-    // Driven velocities are what they are.
-    let mut before_bar = after_bar.clone();
-    let moved = &e.mass_matrix * &w;
-    for &i in &split.free {
-        before_bar[i] = moved[i];
-    }
-    Ok(before_bar)
-}
-
-/// Velocity and frame momenta after contact, from those before it.
+/// Velocities with the frame momenta after contact, from the velocity and the momenta before it.
 pub(super) fn press(
-    e: &Linearisation,
-    split: &Split,
-    before: &DVector<f64>,
+    start: &Start,
+    before: DVector<f64>,
     hat: DVector<f64>,
-    dt: f64,
-    what: &dyn Fn() -> String,
-) -> Result<(DVector<f64>, DVector<f64>)> {
-    let after = solve(e, split, before, dt, what)?;
-    if !e.presses(before) {
-        return Ok((after, hat));
+) -> Result<(ContactVelocities, DVector<f64>)> {
+    let after = solve(start, &before)?;
+    let hat = match start.e.presses(&before) {
+        true => hat + start.stepper.dt * start.e.contact_force(&after, Dual::Frame),
+        false => hat,
+    };
+    Ok((ContactVelocities { before, after }, hat))
+}
+
+/// What the transposes of [`solve`] and [`press`] need.
+pub(super) struct Adjoint<'s> {
+    pub velocities: &'s ContactVelocities,
+    pressed: Pressed,
+}
+
+enum Pressed {
+    /// Nothing presses.
+    No,
+    /// Something does, but every velocity is driven.
+    Driven,
+    /// The problem's Hessian at its solution, factored.
+    Solved(Cholesky<f64, Dyn>),
+}
+
+impl<'s> Adjoint<'s> {
+    /// At a step's velocities before and after contact.
+    ///
+    /// # Errors
+    /// A Hessian that isn't positive definite.
+    pub fn new(start: &Start, velocities: &'s ContactVelocities) -> Result<Self> {
+        let (e, split) = (start.e, start.split);
+        let pressed = if !e.presses(&velocities.before) {
+            Pressed::No
+        } else if split.free.is_empty() {
+            Pressed::Driven
+        } else {
+            Pressed::Solved(hessian(e, split, &velocities.after, start.stepper.dt)?)
+        };
+        Ok(Self {
+            velocities,
+            pressed,
+        })
     }
-    let hat = hat + dt * e.contact_force(&after, Dual::Frame);
-    Ok((after, hat))
-}
 
-/// Transpose of [`press`]: from the cotangents of velocity and momenta after contact to that of the velocity before (that of the
-/// momenta stays what it is); the rest is added to `bar`.
-pub(super) fn press_vjp(
-    e: &Linearisation,
-    split: &Split,
-    [before, after]: [&DVector<f64>; 2],
-    [after_bar, hat_bar]: [&DVector<f64>; 2],
-    dt: f64,
-    bar: &mut StepBar,
-) -> Result<DVector<f64>> {
-    if !e.presses(before) {
-        return Ok(after_bar.clone());
+    /// Transpose of [`solve`]: from the cotangent of the velocity after contact to that of the one before; the rest is added to
+    /// `bar`.
+    pub fn solve_vjp(
+        &self,
+        start: &Start,
+        after_bar: &DVector<f64>,
+        bar: &mut StepBar,
+    ) -> Result<DVector<f64>> {
+        let Pressed::Solved(hessian) = &self.pressed else {
+            return Ok(after_bar.clone());
+        };
+        let (e, split) = (start.e, start.split);
+        let ContactVelocities { before, after } = self.velocities;
+        let w = split.put(&hessian.solve(&split.take(after_bar)));
+        bar.add(
+            start.stepper.dt,
+            &e.contact_force_vjp(after, &w, Dual::User),
+        );
+        bar.add(-1.0, &e.mass_vjp(&(after - before), &w)?);
+        // Driven velocities are what they are.
+        let mut before_bar = after_bar.clone();
+        let moved = &e.mass_matrix * &w;
+        for &i in &split.free {
+            before_bar[i] = moved[i];
+        }
+        Ok(before_bar)
     }
-    let pressed = e.contact_force_vjp(after, hat_bar, Dual::Frame);
-    bar.add(dt, &pressed);
-    let after_bar = after_bar + dt * &pressed.v;
-    solve_vjp(e, split, before, after, &after_bar, dt, bar)
-}
 
-/// Velocities before and after contact in one, for a step's memo.
-pub(super) fn kept(before: &DVector<f64>, after: &DVector<f64>) -> DVector<f64> {
-    DVector::from_iterator(2 * before.len(), before.iter().chain(after.iter()).copied())
-}
-
-/// The two of [`kept`].
-pub(super) fn parted(both: &DVector<f64>, n: usize) -> (DVector<f64>, DVector<f64>) {
-    (both.rows(0, n).into_owned(), both.rows(n, n).into_owned())
+    /// Transpose of [`press`]: from the cotangents of velocity and momenta after contact to that of the velocity before (that of
+    /// the momenta stays what it is); the rest is added to `bar`.
+    pub fn press_vjp(
+        &self,
+        start: &Start,
+        after_bar: &DVector<f64>,
+        hat_bar: &DVector<f64>,
+        bar: &mut StepBar,
+    ) -> Result<DVector<f64>> {
+        if matches!(self.pressed, Pressed::No) {
+            return Ok(after_bar.clone());
+        }
+        let dt = start.stepper.dt;
+        let after = &self.velocities.after;
+        let pressed = start.e.contact_force_vjp(after, hat_bar, Dual::Frame);
+        bar.add(dt, &pressed);
+        self.solve_vjp(start, &(after_bar + dt * &pressed.v), bar)
+    }
 }

@@ -11,7 +11,10 @@
 //! The stage is solved by Newton's method with exact derivatives; its adjoint is the implicit function theorem at
 //! the converged stage, with the transpose of the same matrix.
 
-use super::{Input, Memo, Split, State, StateBar, StepBar, Stepped, Stepper, When, contact};
+use super::record::ContactVelocities;
+use super::split::Split;
+use super::start::Start;
+use super::{State, StateBar, StepBar, Stepper, contact};
 use crate::adjoint::lie::angular;
 use crate::dynamics::Linearisation;
 use crate::{Error, Result};
@@ -64,16 +67,15 @@ fn stage_matrix(
     split.block(&m)
 }
 
-/// Solves a stage on the free rows, from the guess `v`.
+/// Solves a stage of a step at `e` on the free rows, from the momentum at the step's start and a guess of its velocity.
 pub(super) fn solve_stage(
+    start: &Start,
     e: &Linearisation,
-    split: &Split,
     hat: &DVector<f64>,
-    control: &DVector<f64>,
     rule: Rule,
     guess: &DVector<f64>,
-    what: &dyn Fn() -> String,
 ) -> Result<Stage> {
+    let (split, control) = (start.split, &start.input.control);
     let tree = &e.system.tree;
     let mut v = &split.driven + split.put(&split.take(guess));
     let scale = split
@@ -83,7 +85,7 @@ pub(super) fn solve_stage(
     let sized = |p: &DVector<f64>| split.take(p).component_mul(&scale).norm();
     // Against the sum of what M v adds up, so that a total momentum of zero is no target for relative errors.
     let summands = e.mass_matrix.abs();
-    let start = sized(&e.user_momentum(hat)).max(sized(&e.rest_momentum));
+    let least = sized(&e.user_momentum(hat)).max(sized(&e.rest_momentum));
     let mut previous = f64::INFINITY;
     let mut residual = f64::INFINITY;
     for iteration in 0..ITERATIONS {
@@ -91,7 +93,7 @@ pub(super) fn solve_stage(
         let reached = hat + rule.h * &force;
         let target = tree.chart_momentum(&e.q, &(rule.reach * &v), &reached);
         let defect = e.momentum(&v) - &target;
-        let size = sized(&(&summands * v.abs())).max(sized(&target)).max(start);
+        let size = sized(&(&summands * v.abs())).max(sized(&target)).max(least);
         residual = if size > 0.0 {
             sized(&defect) / size
         } else {
@@ -119,7 +121,7 @@ pub(super) fn solve_stage(
         .map(|t| angular(t).norm())
         .fold(0.0, f64::max);
     Err(Error::Solver {
-        what: what(),
+        what: start.stage_name(),
         iterations: ITERATIONS,
         residual,
         tolerance: 1e-13,
@@ -131,41 +133,6 @@ pub(super) fn solve_stage(
     })
 }
 
-/// Coordinates after the step, motions placed.
-pub(super) fn advance(s: &Stepper, state: &State, v: &DVector<f64>) -> DVector<f64> {
-    let mut q = s.system.tree.integrate(&state.q, &(s.dt * v));
-    s.place_motions(&mut q, (state.step + 1) as f64 * s.dt);
-    q
-}
-
-/// Momenta after the step: driven joints carry none of their own.
-pub(super) fn next_state(
-    state: &State,
-    split: &Split,
-    q: DVector<f64>,
-    mut y: DVector<f64>,
-    input: &Input,
-) -> State {
-    split.forget_driven(&mut y);
-    State {
-        step: state.step + 1,
-        q,
-        y,
-        held: input.hold.clone(),
-        mode: state.mode,
-    }
-}
-
-/// Message of a stage that failed.
-pub(super) fn stage_name(s: &Stepper, state: &State) -> String {
-    format!(
-        "implicit stage of step {} (t = {} s, Δt = {} s)",
-        state.step,
-        s.time(state),
-        s.dt
-    )
-}
-
 fn rule(s: &Stepper) -> Rule {
     Rule {
         h: s.dt,
@@ -173,84 +140,58 @@ fn rule(s: &Stepper) -> Rule {
     }
 }
 
-pub(super) fn step(
-    s: &Stepper,
-    e: &Linearisation,
-    state: &State,
-    v: &DVector<f64>,
-    input: &Input,
-) -> Result<Stepped> {
-    let split = s.split(&input.hold, When::Over(s.time(state), s.dt));
-    let p = s.released_momentum(e, state, v, &split);
-    let stage = solve_stage(e, &split, &p, &input.control, rule(s), v, &|| {
-        stage_name(s, state)
-    })?;
+pub(super) fn step(start: &Start) -> Result<(State, ContactVelocities)> {
+    let (s, e) = (start.stepper, start.e);
+    let p = start.momentum();
+    let stage = solve_stage(start, e, &p, rule(s), start.v)?;
     let y = &p + s.dt * &stage.force;
-    let (v, y) = contact::press(e, &split, &stage.v, y, s.dt, &|| stage_name(s, state))?;
-    let q = advance(s, state, &v);
-    Ok(Stepped {
-        state: next_state(state, &split, q, y, input),
-        memo: Some(contact::kept(&stage.v, &v)),
-    })
+    let (velocities, y) = contact::press(start, stage.v, y)?;
+    let q = start.advance(&velocities.after);
+    Ok((start.next_state(q, y), velocities))
 }
 
-/// Transpose of `q⁺ = q ⊕ Δt v` with motions placed: (q̄, v̄).
-pub(super) fn advance_vjp(
-    s: &Stepper,
-    split: &Split,
-    v: &DVector<f64>,
-    q_bar: &DVector<f64>,
-) -> (DVector<f64>, DVector<f64>) {
-    let mut q_bar = q_bar.clone();
-    split.forget_moved(&mut q_bar);
-    let (q, xi) = s.system.tree.integrate_vjp(&(s.dt * v), &q_bar);
-    (q, s.dt * xi)
+/// What the transpose of a step needs.
+pub(super) struct Adjoint<'s> {
+    contact: contact::Adjoint<'s>,
+    /// p̂ + Δt f.
+    reached: DVector<f64>,
+    stage: AdjointStage,
 }
 
-pub(super) fn step_vjp(
-    s: &Stepper,
-    e: &Linearisation,
-    state: &State,
-    v: &DVector<f64>,
-    input: &Input,
-    memo: &Memo,
-    next_bar: &StateBar,
-) -> Result<StepBar> {
-    let split = s.split(&input.hold, When::Over(s.time(state), s.dt));
-    let p = s.released_momentum(e, state, v, &split);
-    let (stage, after) = match memo {
-        Some(both) => {
-            let (before, after) = contact::parted(both, v.len());
-            let force = e.force(&before, &input.control)?;
-            (Stage { v: before, force }, after)
-        }
-        None => {
-            let what = || stage_name(s, state);
-            let stage = solve_stage(e, &split, &p, &input.control, rule(s), v, &what)?;
-            let after = contact::solve(e, &split, &stage.v, s.dt, &what)?;
-            (stage, after)
-        }
-    };
-    let reached = &p + s.dt * &stage.force;
-    let adjoint = AdjointStage::new(e, &split, &stage.v, &input.control, &reached, rule(s))?;
-    let mut bar = StepBar::zeros(e);
-    let (q_bar, after_bar) = advance_vjp(s, &split, &after, &next_bar.q);
-    bar.state.q += q_bar;
-    let mut z = next_bar.y.clone();
-    split.forget_driven(&mut z);
-    let both = [&stage.v, &after];
-    let mut v_bar = contact::press_vjp(e, &split, both, [&after_bar, &z], s.dt, &mut bar)?;
-    // v̄ of p̂⁺ through f; only the transpose of ∂f/∂v is needed here.
-    v_bar += s.dt * adjoint.rates.tr_mul(&z);
-    let w = adjoint.solve(&split, &v_bar)?;
-    let tree = &e.system.tree;
-    let [q_bar, _, hat_bar] = tree.chart_momentum_vjp(&e.q, &(s.dt * &stage.v), &reached, &w);
-    bar.state.q += q_bar;
-    let z_total = z + hat_bar;
-    bar.add(s.dt, &e.force_vjp(&stage.v, &input.control, &z_total)?);
-    bar.add(-1.0, &e.momentum_vjp(&stage.v, &w)?);
-    s.released_momentum_vjp(e, state, v, &split, &z_total, &mut bar)?;
-    Ok(bar)
+impl<'s> Adjoint<'s> {
+    pub fn new(start: &Start, velocities: &'s ContactVelocities) -> Result<Self> {
+        let (s, e) = (start.stepper, start.e);
+        let force = e.force(&velocities.before, &start.input.control)?;
+        let reached = start.momentum() + s.dt * force;
+        Ok(Self {
+            stage: AdjointStage::new(start, e, &velocities.before, &reached, rule(s))?,
+            contact: contact::Adjoint::new(start, velocities)?,
+            reached,
+        })
+    }
+
+    /// Transpose of [`step`].
+    pub fn vjp(&self, start: &Start, next_bar: &StateBar) -> Result<StepBar> {
+        let (s, e, split) = (start.stepper, start.e, start.split);
+        let ContactVelocities { before, after } = self.contact.velocities;
+        let mut bar = StepBar::zeros(e);
+        let (q_bar, after_bar) = start.advance_vjp(after, &next_bar.q);
+        bar.state.q += q_bar;
+        let z = start.next_momentum_bar(next_bar);
+        let mut v_bar = self.contact.press_vjp(start, &after_bar, &z, &mut bar)?;
+        // v̄ of p̂⁺ through f; only the transpose of ∂f/∂v is needed here.
+        v_bar += s.dt * self.stage.rates.tr_mul(&z);
+        let w = self.stage.solve(split, &v_bar)?;
+        let tree = &e.system.tree;
+        let [q_bar, _, hat_bar] =
+            tree.chart_momentum_vjp(&e.q, &(s.dt * before), &self.reached, &w);
+        bar.state.q += q_bar;
+        let z_total = z + hat_bar;
+        bar.add(s.dt, &e.force_vjp(before, &start.input.control, &z_total)?);
+        bar.add(-1.0, &e.momentum_vjp(before, &w)?);
+        start.momentum_vjp(&z_total, &mut bar)?;
+        Ok(bar)
+    }
 }
 
 /// What the transpose of a stage needs.
@@ -262,20 +203,19 @@ pub(super) struct AdjointStage {
 }
 
 impl AdjointStage {
-    /// At velocity v, controls and momentum p̂ + h f.
+    /// Of a step's stage at `e`, with velocity v and momentum p̂ + h f.
     ///
     /// # Errors
     /// A coupling that fails.
     pub fn new(
+        start: &Start,
         e: &Linearisation,
-        split: &Split,
         v: &DVector<f64>,
-        control: &DVector<f64>,
         reached: &DVector<f64>,
         rule: Rule,
     ) -> Result<Self> {
-        let rates = e.force_velocity_jacobian(v, control)?;
-        let matrix = stage_matrix(e, split, v, &rates, reached, rule);
+        let rates = e.force_velocity_jacobian(v, &start.input.control)?;
+        let matrix = stage_matrix(e, start.split, v, &rates, reached, rule);
         let factor = matrix.transpose().lu();
         Ok(Self { rates, factor })
     }

@@ -10,8 +10,10 @@
 //! weight reads −½ g Δt at the states, between which its mean velocity v_s is zero. q_m still is on the way that
 //! contact hasn't stopped: bodies about to touch may overlap there by half of what they approach in a step.
 
-use super::euler::{AdjointStage, Rule, advance, advance_vjp, next_state, solve_stage, stage_name};
-use super::{Input, Memo, Split, State, StateBar, StepBar, Stepped, Stepper, When, contact};
+use super::euler::{AdjointStage, Rule, solve_stage};
+use super::record::ContactVelocities;
+use super::start::Start;
+use super::{State, StateBar, StepBar, Stepper, contact};
 use crate::dynamics::Linearisation;
 use crate::{Error, Result};
 use nalgebra::DVector;
@@ -28,7 +30,9 @@ fn rule(s: &Stepper) -> Rule {
     }
 }
 
-fn middle<'a>(s: &Stepper<'a>, state: &State, v: &DVector<f64>) -> Result<Linearisation<'a>> {
+/// The system in the middle of a step with the velocity `v`.
+fn middle<'a>(start: &Start<'_, 'a>, v: &DVector<f64>) -> Result<Linearisation<'a>> {
+    let (s, state) = (start.stepper, start.state);
     let mut q = s.system.tree.integrate(&state.q, &(0.5 * s.dt * v));
     s.place_motions(&mut q, s.time(state) + 0.5 * s.dt);
     s.system.linearise_apart(s.parameters, &q)
@@ -47,38 +51,27 @@ fn change(e: &Linearisation, a: &DVector<f64>, b: &DVector<f64>) -> f64 {
     if step == 0.0 { 0.0 } else { step / size }
 }
 
-pub(super) fn step(
-    s: &Stepper,
-    e: &Linearisation,
-    state: &State,
-    v: &DVector<f64>,
-    input: &Input,
-) -> Result<Stepped> {
-    let split = s.split(&input.hold, When::Over(s.time(state), s.dt));
-    let p = s.released_momentum(e, state, v, &split);
-    let mut stage = &split.driven + split.put(&split.take(v));
+pub(super) fn step(start: &Start) -> Result<(State, ContactVelocities)> {
+    let (s, split) = (start.stepper, start.split);
+    let p = start.momentum();
+    let mut stage = &split.driven + split.put(&split.take(start.v));
     let mut previous = f64::INFINITY;
     for _ in 0..ITERATIONS {
-        let m = middle(s, state, &stage)?;
-        let next = solve_stage(&m, &split, &p, &input.control, rule(s), &stage, &|| {
-            stage_name(s, state)
-        })?;
+        let m = middle(start, &stage)?;
+        let next = solve_stage(start, &m, &p, rule(s), &stage)?;
         let moved = change(&m, &next.v, &stage);
         stage = next.v;
         // Down at rounding, or at the coupled solve's own tolerance, changes are noise: stop when they no longer halve.
         if moved <= TOLERANCE || (moved <= noise(&m) && moved > 0.5 * previous) {
             let y = &p + s.dt * next.force;
-            let (after, y) = contact::press(e, &split, &stage, y, s.dt, &|| stage_name(s, state))?;
-            let q = advance(s, state, &after);
-            return Ok(Stepped {
-                state: next_state(state, &split, q, y, input),
-                memo: Some(contact::kept(&stage, &after)),
-            });
+            let (velocities, y) = contact::press(start, stage, y)?;
+            let q = start.advance(&velocities.after);
+            return Ok((start.next_state(q, y), velocities));
         }
         previous = moved;
     }
     Err(Error::Solver {
-        what: stage_name(s, state),
+        what: start.stage_name(),
         iterations: ITERATIONS,
         residual: previous,
         tolerance: TOLERANCE,
@@ -89,86 +82,90 @@ pub(super) fn step(
     })
 }
 
-/// Gradient over q_m of `−wᵀ{M v + p_rest − Xᵀ(p̂ + h f)} + zᵀ Δt f` and the rest of the cotangents; z_total = Δt z + h X w.
-fn configuration_vjp(
-    m: &Linearisation,
-    split: &Split,
-    stage: &DVector<f64>,
-    control: &DVector<f64>,
-    reached: &DVector<f64>,
-    w: &DVector<f64>,
-    z_total: &DVector<f64>,
-) -> Result<StepBar> {
-    let mut bar = StepBar::zeros(m);
-    bar.add(1.0, &m.force_vjp(stage, control, z_total)?);
-    bar.add(-1.0, &m.momentum_vjp(stage, w)?);
-    bar.state.q += m.frame_velocity_vjp(w, reached);
-    split.forget_moved(&mut bar.state.q);
-    Ok(bar)
+/// What the transpose of a step needs.
+pub(super) struct Adjoint<'s, 'a> {
+    contact: contact::Adjoint<'s>,
+    /// The system in the middle of the step.
+    middle: Linearisation<'a>,
+    /// p̂ + ½Δt f.
+    reached: DVector<f64>,
+    stage: AdjointStage,
 }
 
-pub(super) fn step_vjp(
-    s: &Stepper,
-    e: &Linearisation,
-    state: &State,
-    v: &DVector<f64>,
-    input: &Input,
-    memo: &Memo,
-    next_bar: &StateBar,
-) -> Result<StepBar> {
-    let split = s.split(&input.hold, When::Over(s.time(state), s.dt));
-    let p = s.released_momentum(e, state, v, &split);
-    let both = match memo {
-        Some(both) => both.clone(),
-        None => step(s, e, state, v, input)?
-            .memo
-            .unwrap_or_else(|| contact::kept(v, v)),
-    };
-    let (stage, after) = contact::parted(&both, v.len());
-    let m = middle(s, state, &stage)?;
-    let h = 0.5 * s.dt;
-    let reached = &p + h * m.force(&stage, &input.control)?;
-    let mut bar = StepBar::zeros(e);
-    let (q_bar, after_bar) = advance_vjp(s, &split, &after, &next_bar.q);
-    bar.state.q += q_bar;
-    let mut z = next_bar.y.clone();
-    split.forget_driven(&mut z);
-    let both = [&stage, &after];
-    let v_bar_next = contact::press_vjp(e, &split, both, [&after_bar, &z], s.dt, &mut bar)?;
-    let adjoint = AdjointStage::new(&m, &split, &stage, &input.control, &reached, rule(s))?;
-    let v_bar_force = s.dt * adjoint.rates.tr_mul(&z);
-    let fixed = v_bar_next + v_bar_force;
-    // v̄ = fixed + (∂q_m/∂v)ᵀ q̄_m(w), w = J⁻ᵀ v̄.
-    let mut v_bar = fixed.clone();
-    let mut previous = f64::INFINITY;
-    for _ in 0..ITERATIONS {
-        let w = adjoint.solve(&split, &v_bar)?;
-        let z_total = s.dt * &z + h * m.frame_velocity(&w);
-        let inner = configuration_vjp(&m, &split, &stage, &input.control, &reached, &w, &z_total)?;
-        let (q_start, xi) = s.system.tree.integrate_vjp(&(h * &stage), &inner.state.q);
-        let next = &fixed + h * xi;
-        let size = next.norm();
-        let moved = if size > 0.0 {
-            (&next - &v_bar).norm() / size
-        } else {
-            0.0
-        };
-        if moved <= 1e-13 || (moved <= 10.0 * noise(&m) && moved > 0.5 * previous) {
-            bar.state.q += q_start;
-            bar.control += inner.control;
-            bar.parameters.add(&inner.parameters);
-            let p_bar = &z + m.frame_velocity(&w);
-            s.released_momentum_vjp(e, state, v, &split, &p_bar, &mut bar)?;
-            return Ok(bar);
-        }
-        previous = moved;
-        v_bar = next;
+impl<'s, 'a> Adjoint<'s, 'a> {
+    pub fn new(start: &Start<'_, 'a>, velocities: &'s ContactVelocities) -> Result<Self> {
+        let (s, before) = (start.stepper, &velocities.before);
+        let middle = middle(start, before)?;
+        let reached = start.momentum() + 0.5 * s.dt * middle.force(before, &start.input.control)?;
+        Ok(Self {
+            contact: contact::Adjoint::new(start, velocities)?,
+            stage: AdjointStage::new(start, &middle, before, &reached, rule(s))?,
+            middle,
+            reached,
+        })
     }
-    Err(Error::Solver {
-        what: format!("adjoint of the {}", stage_name(s, state)),
-        iterations: ITERATIONS,
-        residual: previous,
-        tolerance: 1e-13,
-        remedy: "take a smaller time step".into(),
-    })
+
+    /// Gradient over q_m of `−wᵀ{M v + p_rest − Xᵀ(p̂ + h f)} + zᵀ Δt f` and the rest of the cotangents;
+    /// z_total = Δt z + h X w.
+    fn configuration_vjp(
+        &self,
+        start: &Start,
+        w: &DVector<f64>,
+        z_total: &DVector<f64>,
+    ) -> Result<StepBar> {
+        let (m, stage) = (&self.middle, &self.contact.velocities.before);
+        let mut bar = StepBar::zeros(m);
+        bar.add(1.0, &m.force_vjp(stage, &start.input.control, z_total)?);
+        bar.add(-1.0, &m.momentum_vjp(stage, w)?);
+        bar.state.q += m.frame_velocity_vjp(w, &self.reached);
+        start.split.forget_moved(&mut bar.state.q);
+        Ok(bar)
+    }
+
+    /// Transpose of [`step`].
+    pub fn vjp(&self, start: &Start, next_bar: &StateBar) -> Result<StepBar> {
+        let (s, split, m) = (start.stepper, start.split, &self.middle);
+        let ContactVelocities { before, after } = self.contact.velocities;
+        let h = 0.5 * s.dt;
+        let mut bar = StepBar::zeros(start.e);
+        let (q_bar, after_bar) = start.advance_vjp(after, &next_bar.q);
+        bar.state.q += q_bar;
+        let z = start.next_momentum_bar(next_bar);
+        let v_bar_next = self.contact.press_vjp(start, &after_bar, &z, &mut bar)?;
+        let v_bar_force = s.dt * self.stage.rates.tr_mul(&z);
+        let fixed = v_bar_next + v_bar_force;
+        // v̄ = fixed + (∂q_m/∂v)ᵀ q̄_m(w), w = J⁻ᵀ v̄.
+        let mut v_bar = fixed.clone();
+        let mut previous = f64::INFINITY;
+        for _ in 0..ITERATIONS {
+            let w = self.stage.solve(split, &v_bar)?;
+            let z_total = s.dt * &z + h * m.frame_velocity(&w);
+            let inner = self.configuration_vjp(start, &w, &z_total)?;
+            let (q_start, xi) = s.system.tree.integrate_vjp(&(h * before), &inner.state.q);
+            let next = &fixed + h * xi;
+            let size = next.norm();
+            let moved = if size > 0.0 {
+                (&next - &v_bar).norm() / size
+            } else {
+                0.0
+            };
+            if moved <= 1e-13 || (moved <= 10.0 * noise(m) && moved > 0.5 * previous) {
+                bar.state.q += q_start;
+                bar.control += inner.control;
+                bar.parameters.add(&inner.parameters);
+                let p_bar = &z + m.frame_velocity(&w);
+                start.momentum_vjp(&p_bar, &mut bar)?;
+                return Ok(bar);
+            }
+            previous = moved;
+            v_bar = next;
+        }
+        Err(Error::Solver {
+            what: format!("adjoint of the {}", start.stage_name()),
+            iterations: ITERATIONS,
+            residual: previous,
+            tolerance: 1e-13,
+            remedy: "take a smaller time step".into(),
+        })
+    }
 }

@@ -1,6 +1,7 @@
 //! The velocity at a state, v = M(q)⁻¹ (Xᵀ p̂ − p_rest), and its transpose.
 
-use super::{Split, State, StepBar, Stepper, When};
+use super::split::{Split, When};
+use super::{State, StepBar, Stepper};
 use crate::dynamics::{Evaluation, Linearisation};
 use crate::{Error, Result};
 use nalgebra::{Cholesky, DVector, Dyn};
@@ -73,7 +74,7 @@ impl Stepper<'_> {
     /// # Errors
     /// A mass matrix that isn't positive definite.
     pub fn velocity(&self, e: &Evaluation, state: &State) -> Result<DVector<f64>> {
-        let split = self.split(&state.held, When::At(self.time(state)));
+        let split = self.split_at(state);
         if self.integrator.carries_velocity() {
             return Ok(&split.driven + split.put(&split.take(&state.y)));
         }
@@ -92,7 +93,7 @@ impl Stepper<'_> {
         v_bar: &DVector<f64>,
         bar: &mut StepBar,
     ) -> Result<()> {
-        let split = self.split(&state.held, When::At(self.time(state)));
+        let split = self.split_at(state);
         if v_bar.iter().all(|x| *x == 0.0) {
             return Ok(());
         }

@@ -2,86 +2,77 @@
 //!
 //! With contact, v⁺ is what [`contact::solve`] makes of that velocity at q.
 
-use super::euler::{advance, advance_vjp, next_state, stage_name};
-use super::{
-    Input, Memo, Split, State, StateBar, StepBar, Stepped, Stepper, When, contact, readout,
-};
+use super::record::ContactVelocities;
+use super::start::Start;
+use super::{State, StateBar, StepBar, contact, readout};
 use crate::Result;
-use crate::dynamics::Linearisation;
-use nalgebra::DVector;
+use nalgebra::{Cholesky, DVector, Dyn};
 
-/// Acceleration: driven joints reach their new velocity within the step, the others follow Eq. 3.
-fn acceleration(
-    s: &Stepper,
-    e: &Linearisation,
-    split: &Split,
-    v: &DVector<f64>,
-    control: &DVector<f64>,
-) -> Result<DVector<f64>> {
+/// Acceleration, with the factored mass matrix of free velocities: driven joints reach their new velocity within the step, the
+/// others follow Eq. 3.
+fn acceleration(start: &Start) -> Result<(DVector<f64>, Cholesky<f64, Dyn>)> {
+    let (s, e, split, v) = (start.stepper, start.e, start.split, start.v);
     let mut driven = (&split.driven - v) / s.dt;
     for &i in &split.free {
         driven[i] = 0.0;
     }
-    let right = e.inertial_force(v, control)? - &e.mass_matrix * &driven;
-    let free = readout::factor(e, split)?.solve(&split.take(&right));
-    Ok(driven + split.put(&free))
+    let right = e.inertial_force(v, &start.input.control)? - &e.mass_matrix * &driven;
+    let factor = readout::factor(e, split)?;
+    let free = factor.solve(&split.take(&right));
+    Ok((driven + split.put(&free), factor))
 }
 
-pub(super) fn step(
-    s: &Stepper,
-    e: &Linearisation,
-    state: &State,
-    v: &DVector<f64>,
-    input: &Input,
-) -> Result<Stepped> {
-    let split = s.split(&input.hold, When::Over(s.time(state), s.dt));
-    let a = acceleration(s, e, &split, v, &input.control)?;
-    let free = &split.driven + split.put(&split.take(&(v + s.dt * a)));
-    let next = contact::solve(e, &split, &free, s.dt, &|| stage_name(s, state))?;
-    let q = advance(s, state, &next);
-    let mut state = next_state(state, &split, q, next.clone(), input);
-    state.y = next;
-    let memo = Some(contact::kept(&free, &state.y));
-    Ok(Stepped { state, memo })
+pub(super) fn step(start: &Start) -> Result<(State, ContactVelocities)> {
+    let (s, split) = (start.stepper, start.split);
+    let (a, _) = acceleration(start)?;
+    let before = &split.driven + split.put(&split.take(&(start.v + s.dt * a)));
+    let after = contact::solve(start, &before)?;
+    let q = start.advance(&after);
+    let next = start.next_state(q, after.clone());
+    Ok((next, ContactVelocities { before, after }))
 }
 
-pub(super) fn step_vjp(
-    s: &Stepper,
-    e: &Linearisation,
-    state: &State,
-    v: &DVector<f64>,
-    input: &Input,
-    memo: &Memo,
-    next_bar: &StateBar,
-) -> Result<StepBar> {
-    let split = s.split(&input.hold, When::Over(s.time(state), s.dt));
-    let a = acceleration(s, e, &split, v, &input.control)?;
-    let (free, next) = match memo {
-        Some(both) => contact::parted(both, v.len()),
-        None => {
-            let free = &split.driven + split.put(&split.take(&(v + s.dt * &a)));
-            let next = contact::solve(e, &split, &free, s.dt, &|| stage_name(s, state))?;
-            (free, next)
-        }
-    };
-    let mut bar = StepBar::zeros(e);
-    let (q_bar, mut next_v_bar) = advance_vjp(s, &split, &next, &next_bar.q);
-    bar.state.q += q_bar;
-    next_v_bar += &next_bar.y;
-    let mut next_v_bar = contact::solve_vjp(e, &split, &free, &next, &next_v_bar, s.dt, &mut bar)?;
-    split.forget_driven(&mut next_v_bar);
-    bar.v += &next_v_bar;
-    // Free rows of M a = G − M_fd a_d, a_d = (v_d − v)/Δt.
-    let w = split.put(&readout::factor(e, &split)?.solve(&split.take(&(s.dt * &next_v_bar))));
-    let force = e.inertial_force_vjp(v, &input.control, &w)?;
-    bar.v += &force.v;
-    bar.add(1.0, &force);
-    bar.add(-1.0, &e.mass_vjp(&a, &w)?);
-    let through_driven = &e.mass_matrix * &w / s.dt;
-    for (i, driven) in split.is_driven.iter().enumerate() {
-        if *driven {
-            bar.v[i] += through_driven[i];
-        }
+/// What the transpose of a step needs.
+pub(super) struct Adjoint<'s> {
+    contact: contact::Adjoint<'s>,
+    acceleration: DVector<f64>,
+    /// Of the mass matrix of free velocities.
+    factor: Cholesky<f64, Dyn>,
+}
+
+impl<'s> Adjoint<'s> {
+    pub fn new(start: &Start, velocities: &'s ContactVelocities) -> Result<Self> {
+        let (acceleration, factor) = acceleration(start)?;
+        Ok(Self {
+            contact: contact::Adjoint::new(start, velocities)?,
+            acceleration,
+            factor,
+        })
     }
-    Ok(bar)
+
+    /// Transpose of [`step`].
+    pub fn vjp(&self, start: &Start, next_bar: &StateBar) -> Result<StepBar> {
+        let (s, e, split) = (start.stepper, start.e, start.split);
+        let mut bar = StepBar::zeros(e);
+        let after = &self.contact.velocities.after;
+        let (q_bar, mut after_bar) = start.advance_vjp(after, &next_bar.q);
+        bar.state.q += q_bar;
+        after_bar += &next_bar.y;
+        let mut v_bar = self.contact.solve_vjp(start, &after_bar, &mut bar)?;
+        split.forget_driven(&mut v_bar);
+        bar.v += &v_bar;
+        // Free rows of M a = G − M_fd a_d, a_d = (v_d − v)/Δt.
+        let w = split.put(&self.factor.solve(&split.take(&(s.dt * &v_bar))));
+        let force = e.inertial_force_vjp(start.v, &start.input.control, &w)?;
+        bar.v += &force.v;
+        bar.add(1.0, &force);
+        bar.add(-1.0, &e.mass_vjp(&self.acceleration, &w)?);
+        let through_driven = &e.mass_matrix * &w / s.dt;
+        for (i, driven) in split.is_driven.iter().enumerate() {
+            if *driven {
+                bar.v[i] += through_driven[i];
+            }
+        }
+        Ok(bar)
+    }
 }

@@ -142,7 +142,7 @@ impl Reference {
     fn set_motion(&mut self, scene: &Scene, simulations: Simulations) -> Result<()> {
         let simulator = isolated(scene)?;
         let start = &simulations.best.start;
-        let free = free(&simulator);
+        let free = free(&simulator)?;
         let weights = Weights::new(&simulator, &free);
         let excursion = Excursion::new(&simulations.best.path, &weights);
         let mass = start.mass.clone();
@@ -245,7 +245,7 @@ fn check(scene: &Scene) -> Result<()> {
             "must be above zero: without water all fidelities are the same",
         ));
     }
-    if free(&isolated(scene)?).is_empty() {
+    if free(&isolated(scene)?)?.is_empty() {
         return Err(Error::input(
             "joints that forces move at the start",
             0,

@@ -33,8 +33,9 @@ fn velocities<'a>(
         control: DVector::zeros(e.system.controls),
         hold: Vec::new(),
     };
-    let both = stepper.step(e, state, v, &input).unwrap().memo.unwrap();
-    [0, 1].map(|k| both.rows(k * v.len(), v.len()).into_owned())
+    let (_, record) = stepper.step(e, state, v, &input).unwrap();
+    let velocities = record.contact_velocities().unwrap().clone();
+    [velocities.before, velocities.after]
 }
 
 /// ∫ s(g₀ − φ) of the law, from the compression x = g₀ − φ.

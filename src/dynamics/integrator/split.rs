@@ -1,0 +1,104 @@
+//! Which velocities are free in a step, and what the others are.
+
+use super::{State, Stepper};
+use crate::dynamics::Drive;
+use nalgebra::{DMatrix, DVector};
+
+/// Which velocities are free, and the values of the others.
+#[derive(Clone, Debug)]
+pub(super) struct Split {
+    /// Indices of free velocities.
+    pub free: Vec<usize>,
+    /// Full-length velocity with driven values set and zeros elsewhere.
+    pub driven: DVector<f64>,
+    /// Per velocity: coordinate given by a motion.
+    pub moved: Vec<bool>,
+    /// Per velocity: driven in any way.
+    pub is_driven: Vec<bool>,
+}
+
+impl Split {
+    /// Free part of a vector.
+    pub fn take(&self, x: &DVector<f64>) -> DVector<f64> {
+        DVector::from_iterator(self.free.len(), self.free.iter().map(|&i| x[i]))
+    }
+
+    /// Scatter of a free part into zeros.
+    pub fn put(&self, x: &DVector<f64>) -> DVector<f64> {
+        let mut out = DVector::zeros(self.driven.len());
+        for (k, &i) in self.free.iter().enumerate() {
+            out[i] = x[k];
+        }
+        out
+    }
+
+    /// Free rows and columns.
+    pub fn block(&self, m: &DMatrix<f64>) -> DMatrix<f64> {
+        m.select_rows(&self.free).select_columns(&self.free)
+    }
+
+    /// Zeroes the entries whose value doesn't depend on the state: given motions.
+    pub fn forget_moved(&self, x: &mut DVector<f64>) {
+        for (x, moved) in x.iter_mut().zip(&self.moved) {
+            if *moved {
+                *x = 0.0;
+            }
+        }
+    }
+
+    /// Zeroes driven entries.
+    pub fn forget_driven(&self, x: &mut DVector<f64>) {
+        for (x, driven) in x.iter_mut().zip(&self.is_driven) {
+            if *driven {
+                *x = 0.0;
+            }
+        }
+    }
+}
+
+/// When a given motion's velocity is wanted.
+#[derive(Clone, Copy)]
+pub(super) enum When {
+    /// Exactly, at a time (s).
+    At(f64),
+    /// As the mean over a step that starts at a time (s).
+    Over(f64, f64),
+}
+
+impl Stepper<'_> {
+    /// Splits velocities into free and driven ones.
+    pub(super) fn split(&self, held: &[bool], when: When) -> Split {
+        let nv = self.system.tree.velocities();
+        let mut out = Split {
+            free: Vec::new(),
+            driven: DVector::zeros(nv),
+            moved: vec![false; nv],
+            is_driven: vec![false; nv],
+        };
+        for (b, link) in self.system.tree.links().iter().enumerate() {
+            let is_held = held.get(b).copied().unwrap_or(false);
+            for (k, i) in link.v.clone().enumerate() {
+                match &self.system.drives[b] {
+                    Drive::Motion(motions) => {
+                        out.moved[i] = true;
+                        out.is_driven[i] = true;
+                        out.driven[i] = match when {
+                            When::At(t) => motions[k].rate(t),
+                            When::Over(t, dt) => {
+                                (motions[k].value(t + dt) - motions[k].value(t)) / dt
+                            }
+                        };
+                    }
+                    Drive::Free if !is_held => out.free.push(i),
+                    _ => out.is_driven[i] = true,
+                }
+            }
+        }
+        out
+    }
+
+    /// Velocities as they are split at a state.
+    pub(super) fn split_at(&self, state: &State) -> Split {
+        self.split(&state.held, When::At(self.time(state)))
+    }
+}

@@ -7,7 +7,8 @@
 #[allow(dead_code)]
 mod common;
 
-use common::reference::{reference, scaled_error};
+use common::reference::reference;
+use common::support::scaled_error;
 use common::{Effort, added_mass, arguments, step_times};
 use hydrograd::scene::{Placement, Shape};
 use hydrograd::{Body, Fidelity, Fluid, Joint, Scene, Settings, Simulator};
@@ -98,10 +99,11 @@ impl Measured {
                 repeat: 5,
             },
         };
+        let times = step_times(&simulator, effort)?;
         Ok(Self {
             unknowns: simulator.unknowns(),
             error: scaled_error(&added_mass(&simulator)?, right),
-            times: step_times(&simulator, effort)?,
+            times: [times.forward, times.gradient],
         })
     }
 

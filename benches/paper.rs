@@ -9,7 +9,8 @@
 
 mod common;
 
-use common::reference::{Reference, reference, scaled_error};
+use common::reference::{Reference, reference};
+use common::support::scaled_error;
 use common::{Effort, arguments, in_child, scene, serve_child};
 use nalgebra::DMatrix;
 

@@ -5,9 +5,8 @@
 
 #[allow(dead_code)]
 mod common;
-#[path = "../tests/support/mod.rs"]
-mod support;
 
+use common::support::reference::{TwoSpheres, multipoles};
 use common::{Effort, arguments, in_child, median, scene, serve_child, settings, step_times};
 use faer::linalg::matmul::matmul;
 use faer::{Accum, Mat, MatRef, Par, Side};
@@ -27,7 +26,6 @@ use std::f64::consts::PI;
 use std::path::Path;
 use std::sync::Arc;
 use std::time::Instant;
-use support::reference::{TwoSpheres, multipoles};
 
 const SCENES: [&str; 4] = ["falling_ball", "grasp_open", "fish_near_tail", "clown_fish"];
 
@@ -386,7 +384,8 @@ fn grown(quick: bool, scene: &Scene, settings: Settings) -> hydrograd::Result<St
             repeat: 5,
         },
     };
-    let [forward, whole] = step_times(&simulator, effort)?;
+    let times = step_times(&simulator, effort)?;
+    let (forward, whole) = (times.forward, times.gradient);
     let points: usize = simulator.discretisation().iter().map(|d| d.points).sum();
     Ok(format!(
         "{points} | {} | {setup:.2} | {:.3} | {:.3} | {:.3} | {:.3} | {:.3} | {:.2}",

@@ -5,11 +5,15 @@
 //! memory of the process so far, and iterations; beside the default the other integrators, a looser tolerance, the
 //! paper's choices, a dense QR, Jacobi preconditioning and `isolated`.
 
+#[allow(dead_code)]
+mod common;
+
+use common::support::example;
+use common::{Effort, arguments, peak_memory, step_times};
 use hydrograd::coupling::full::{Preconditioner, Solver};
 use hydrograd::dynamics::Integrator;
 use hydrograd::scene::{Preset, Scene};
-use hydrograd::{Controls, Fidelity, Settings, Simulator, objective};
-use std::path::Path;
+use hydrograd::{Fidelity, Settings, Simulator};
 use std::time::Instant;
 
 struct Row {
@@ -24,19 +28,6 @@ struct Row {
     memory: f64,
 }
 
-fn median(mut x: Vec<f64>) -> f64 {
-    x.sort_by(f64::total_cmp);
-    x[x.len() / 2]
-}
-
-/// Peak resident memory of the process, MB; 0 where the system doesn't tell.
-fn peak_memory() -> f64 {
-    let status = std::fs::read_to_string("/proc/self/status").unwrap_or_default();
-    let line = status.lines().find(|l| l.starts_with("VmHWM"));
-    let kb = line.and_then(|l| l.split_whitespace().nth(1)?.parse::<f64>().ok());
-    kb.unwrap_or(0.0) / 1000.0
-}
-
 fn measure(
     scene: &Scene,
     name: &str,
@@ -47,41 +38,23 @@ fn measure(
     let start = Instant::now();
     let simulator = Simulator::new(scene, settings)?;
     let setup = start.elapsed().as_secs_f64();
-    let controls = Controls::zeros(&simulator, steps);
-    let goal = objective::final_velocity(0, 0.0, 1.0);
-    let (mut forward, mut whole, mut iterations) = (vec![], vec![], 0);
-    for i in 0..=repeat {
-        let start = Instant::now();
-        let rollout = simulator.rollout(&controls)?;
-        let middle = start.elapsed().as_secs_f64();
-        rollout.gradient(&goal)?;
-        if i > 0 {
-            forward.push(middle / steps as f64);
-            whole.push(start.elapsed().as_secs_f64() / steps as f64);
-        }
-        iterations = rollout.summary().iterations;
-    }
-    let forward = median(forward);
+    let times = step_times(&simulator, Effort { steps, repeat })?;
     Ok(Row {
         scene: scene.name.clone(),
         configuration: name.into(),
         faces: simulator.faces(),
         unknowns: simulator.unknowns(),
         setup,
-        forward,
-        ratio: median(whole) / forward,
-        iterations,
+        forward: times.forward,
+        ratio: times.gradient / times.forward,
+        iterations: times.iterations,
         memory: peak_memory(),
     })
 }
 
 fn main() {
-    let arguments: Vec<String> = std::env::args()
-        .skip(1)
-        .filter(|a| a != "--bench")
-        .collect();
+    let arguments = arguments();
     let chosen: Vec<&String> = arguments.iter().filter(|a| !a.starts_with("--")).collect();
-    let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("examples/scenes");
     println!(
         "| scene | configuration | faces | unknowns | setup s | forward s/step | gradient/forward | iterations | peak MB |"
     );
@@ -90,7 +63,7 @@ fn main() {
         if !chosen.is_empty() && !chosen.iter().any(|c| *c == name) {
             continue;
         }
-        let scene = Scene::load(folder.join(format!("{name}.toml"))).expect("an example scene");
+        let scene = example(name);
         let base = Settings::for_scene(&scene);
         let with = |solver, preconditioner| {
             let mut s = base;

@@ -2,6 +2,8 @@
 //! so that its peak memory is its own.
 
 pub mod reference;
+#[path = "../../tests/support/mod.rs"]
+pub mod support;
 
 use hydrograd::coupling::reduced::cache;
 use hydrograd::scene::{Preset, Scene};
@@ -48,8 +50,7 @@ pub fn arguments() -> Vec<String> {
 
 /// An example scene; None, with a line that says so, if there is no such file.
 pub fn scene(name: &str) -> Option<Scene> {
-    let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("examples/scenes");
-    let file = folder.join(format!("{name}.toml"));
+    let file = support::example_path(name);
     if !file.exists() {
         println!("(skipped: no examples/scenes/{name}.toml)");
         return None;
@@ -83,11 +84,20 @@ pub fn peak_memory() -> f64 {
     kb.unwrap_or(0.0) / 1000.0
 }
 
-/// Seconds a forward step, and a step of a rollout with its gradient.
-pub fn step_times(simulator: &Simulator, effort: Effort) -> hydrograd::Result<[f64; 2]> {
+/// What a step takes.
+pub struct StepTimes {
+    /// Forward, s.
+    pub forward: f64,
+    /// Of a rollout with its gradient, forward pass included, s.
+    pub gradient: f64,
+    /// Most iterations of a solve.
+    pub iterations: usize,
+}
+
+pub fn step_times(simulator: &Simulator, effort: Effort) -> hydrograd::Result<StepTimes> {
     let controls = Controls::zeros(simulator, effort.steps);
     let goal = objective::final_velocity(0, 0.0, 1.0);
-    let (mut forward, mut whole) = (vec![], vec![]);
+    let (mut forward, mut whole, mut iterations) = (vec![], vec![], 0);
     for i in 0..=effort.repeat {
         let start = Instant::now();
         let rollout = simulator.rollout(&controls)?;
@@ -97,8 +107,13 @@ pub fn step_times(simulator: &Simulator, effort: Effort) -> hydrograd::Result<[f
             forward.push(middle / effort.steps as f64);
             whole.push(start.elapsed().as_secs_f64() / effort.steps as f64);
         }
+        iterations = rollout.summary().iterations;
     }
-    Ok([median(forward), median(whole)])
+    Ok(StepTimes {
+        forward: median(forward),
+        gradient: median(whole),
+        iterations,
+    })
 }
 
 /// Fluid part of the mass matrix at the start: generalised coordinates, driven joints included.
@@ -125,14 +140,14 @@ fn measure(
         None => Simulator::new(scene, settings)?,
     };
     let setup = start.elapsed().as_secs_f64();
-    let [forward, gradient] = step_times(&simulator, effort)?;
+    let times = step_times(&simulator, effort)?;
     Ok(Run {
         fidelity: format!("{:?}", simulator.fidelity()).to_lowercase(),
         faces: simulator.faces(),
         unknowns: simulator.unknowns(),
         setup,
-        forward,
-        gradient,
+        forward: times.forward,
+        gradient: times.gradient,
         memory: peak_memory(),
         added_mass: added_mass(&simulator)?.as_slice().to_vec(),
     })

@@ -1,6 +1,7 @@
 //! Coupled panels on two meshes, extrapolated: what the errors of added mass are measured against.
 
 use super::added_mass;
+use super::support::scaled_error;
 use hydrograd::boundary::OneBody;
 use hydrograd::scene::Scene;
 use hydrograd::{Fidelity, Settings, Shape, Simulator};
@@ -11,15 +12,6 @@ pub struct Reference {
     pub matrix: DMatrix<f64>,
     pub rest: f64,
     pub faces: usize,
-}
-
-/// max |ΔM_ij| / √(M_ii M_jj).
-pub fn scaled_error(found: &DMatrix<f64>, right: &DMatrix<f64>) -> f64 {
-    let size = |i: usize| right[(i, i)].sqrt();
-    let error = |(i, j)| (found[(i, j)] - right[(i, j)]).abs() / (size(i) * size(j));
-    let n = right.nrows();
-    let all = (0..n).flat_map(|i| (0..n).map(move |j| (i, j)));
-    all.map(error).fold(0.0, f64::max)
 }
 
 /// M = M_fine + (M_fine − M_coarse) / ((N_fine/N_coarse)^{p/2} − 1): the size of the faces is 1/√N.

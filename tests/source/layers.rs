@@ -1,7 +1,8 @@
 //! What may import what: the crate's layers, held against its `use` lines and paths.
 
+use super::graph::{code, sources, split_group};
 use std::collections::{BTreeMap, BTreeSet};
-use std::path::{Path, PathBuf};
+use std::path::Path;
 
 /// Modules that each module may name. `error` is free for all, and so is the crate's root for
 /// `Error` and `Result` alone.
@@ -107,30 +108,6 @@ const ONLY: [(&str, &str, &[&str]); 3] = [
     ("multibody", "adjoint", &["lie"]),
 ];
 
-fn sources(folder: &Path) -> Vec<PathBuf> {
-    let mut out = Vec::new();
-    let mut folders = vec![folder.to_path_buf()];
-    while let Some(at) = folders.pop() {
-        for entry in std::fs::read_dir(&at).unwrap() {
-            let path = entry.unwrap().path();
-            if path.is_dir() {
-                folders.push(path);
-            } else if path.extension().is_some_and(|e| e == "rs") {
-                out.push(path);
-            }
-        }
-    }
-    out.sort();
-    out
-}
-
-/// Code without comments.
-fn code(path: &Path) -> String {
-    let text = std::fs::read_to_string(path).unwrap();
-    let lines = text.lines().map(|l| l.split("//").next().unwrap_or(""));
-    lines.collect::<Vec<_>>().join("\n")
-}
-
 /// Paths `from::a::b` in the text, as the segments after `from`; a group `from::{a::c, b}` gives one
 /// for each member.
 fn paths(text: &str, from: &str) -> Vec<Vec<String>> {
@@ -153,27 +130,6 @@ fn paths(text: &str, from: &str) -> Vec<Vec<String>> {
             out.push(segments.collect());
         }
     }
-    out
-}
-
-/// Members of a brace group at its outer level.
-fn split_group(text: &str) -> Vec<&str> {
-    let (mut depth, mut from, mut out) = (0, 0, Vec::new());
-    for (i, c) in text.char_indices() {
-        match c {
-            '{' => depth += 1,
-            '}' if depth > 0 => depth -= 1,
-            ',' | '}' if depth == 0 => {
-                out.push(text[from..i].trim());
-                from = i + 1;
-                if c == '}' {
-                    break;
-                }
-            }
-            _ => {}
-        }
-    }
-    out.retain(|m| !m.is_empty());
     out
 }
 

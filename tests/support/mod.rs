@@ -1,6 +1,7 @@
 //! What tests and benches share. Each of them uses a part of it.
 #![allow(dead_code)]
 
+pub mod bodies;
 #[cfg(feature = "cli")]
 pub mod command;
 pub mod reference;
@@ -113,6 +114,22 @@ pub fn scaled_error(m: &DMatrix<f64>, reference: &DMatrix<f64>) -> f64 {
         }
     }
     worst
+}
+
+/// max |ΔM_ij| / √(M_ii M_jj), but for directions in which next to no water moves: a round body's spin.
+pub fn felt_error(found: &DMatrix<f64>, exact: &DMatrix<f64>) -> f64 {
+    let most = [0, 3].map(|k| {
+        let own = (0..exact.nrows()).filter(|i| i % 6 / 3 == k / 3);
+        own.map(|i| exact[(i, i)]).fold(0.0, f64::max)
+    });
+    let felt = |i: &usize| exact[(*i, *i)] > 1e-3 * most[i % 6 / 3];
+    let felt: Vec<usize> = (0..exact.nrows()).filter(felt).collect();
+    let off = |i: usize, j: usize| {
+        let size = (exact[(i, i)] * exact[(j, j)]).sqrt();
+        (found[(i, j)] - exact[(i, j)]).abs() / size
+    };
+    let all = felt.iter().flat_map(|i| felt.iter().map(|j| off(*i, *j)));
+    all.fold(0.0, f64::max)
 }
 
 /// Unit vectors spread evenly over the sphere.

@@ -2,6 +2,7 @@
 //! symmetries of the problem. Every test prints its figures: `cargo test --release --test water analytic
 //! -- --nocapture --test-threads 1` gives the tables of `docs/accuracy-coupled.md`.
 
+use crate::support::bodies::coin_iterations;
 use crate::support::reference::{
     ellipsoids, equal_spheres, image_series, spheres_by_wall, unequal_spheres,
 };
@@ -449,26 +450,7 @@ fn solvers_of_the_square_system_agree() {
 /// Iterations for the unit sphere and the coin above it, flat side on, all twelve twists, cold start.
 fn iterations(gap: f64, preconditioner: Preconditioner, tolerance: f64) -> usize {
     let bodies = [SPHERE.clone(), COIN.clone()];
-    iterations_of(&bodies, gap, preconditioner, tolerance)
-}
-
-fn iterations_of(
-    bodies: &[Arc<MfsBody>],
-    gap: f64,
-    preconditioner: Preconditioner,
-    tolerance: f64,
-) -> usize {
-    let settings = SolveSettings {
-        preconditioner,
-        tolerance,
-        max_iterations: 50_000,
-        ..SolveSettings::default()
-    };
-    let poses = [
-        Pose::identity(),
-        Pose::new(Mat3::identity(), Vec3::new(0.0, 1.2 + gap, 0.0)),
-    ];
-    matrix(&full(bodies, &[], settings), &poses).1.iterations
+    coin_iterations(&bodies, gap, preconditioner, tolerance)
 }
 
 #[test]
@@ -481,28 +463,6 @@ fn few_iterations_with_the_bodies_factors() {
         assert!(tight <= limit, "gap {gap}: {tight}");
         assert!(loose <= limit * 2 / 3, "gap {gap}: {loose}");
         assert!(jacobi > 15 * tight, "gap {gap}: Jacobi {jacobi}");
-    }
-}
-
-#[test]
-#[ignore = "a table, in minutes"]
-fn many_iterations_without_them() {
-    let kinds = [RowScaling::Scaled, RowScaling::Unscaled].map(|rows| {
-        let settings = Settings {
-            rows,
-            damping: 0.0,
-            ..Settings::default()
-        };
-        [[1.0; 3], [1.0, 0.2, 1.0]].map(|axes| submerged(axes, 1280, &settings))
-    });
-    println!("gap | factors without damping, 1e-3 and 1e-8: scaled rows, unscaled | Jacobi 1e-8");
-    for gap in [1.0, 0.2, 0.1, 0.02] {
-        let jacobi = iterations(gap, Preconditioner::Jacobi, 1e-8);
-        let undamped = kinds.each_ref().map(|bodies| {
-            [1e-3, 1e-8].map(|t| iterations_of(bodies, gap, Preconditioner::Factors, t))
-        });
-        println!("{gap} | {undamped:?} | {jacobi}");
-        assert!(jacobi > 500, "gap {gap}: {jacobi}");
     }
 }
 

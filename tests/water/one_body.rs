@@ -1,5 +1,4 @@
-//! Added mass of single bodies against exact values. `cargo test --release --test water \
-//! one_body -- --ignored --nocapture` prints the tables of `docs/accuracy.md`.
+//! Added mass of single bodies against exact values.
 
 use crate::support;
 use crate::support::reference::lamb;
@@ -318,37 +317,4 @@ fn settings_read_from_toml() {
     assert_eq!(s.depth, Depth::Fixed(0.02));
     assert_eq!(s.rows, RowScaling::Unscaled);
     assert_eq!(s.damping, Settings::default().damping);
-}
-
-/// Prints the tables of `docs/accuracy.md`.
-#[test]
-#[ignore = "minutes; prints tables"]
-fn tables() {
-    let plain = Settings::plain(Method::MfsVertex, Depth::Auto);
-    let face = Settings::plain(Method::MfsFace, Depth::Auto);
-    for (name, settings, faces) in [
-        ("default", Settings::default(), &[320, 1280, 5120][..]),
-        ("vertex, read at the centre, undamped", plain, &[320, 1280]),
-        ("face, read at the centre, undamped", face, &[320, 1280]),
-    ] {
-        println!("\n{name}\n");
-        for faces in faces {
-            for semi_axes in ELLIPSOIDS {
-                let exact = lamb(semi_axes);
-                let b = build(&ellipsoid(semi_axes, *faces), &settings);
-                let cell = |(x, e): (&f64, f64)| match x {
-                    0.0 => "–".to_string(),
-                    _ => format!("{e:.2}"),
-                };
-                let e = errors(&b.added_mass, &exact);
-                let cells: Vec<String> = exact.iter().zip(e).map(cell).collect();
-                println!(
-                    "| {semi_axes:?} | {} | {} | {:.0e} |",
-                    b.faces.len(),
-                    cells.join(" | "),
-                    b.condition
-                );
-            }
-        }
-    }
 }

@@ -1,6 +1,6 @@
 //! One body by the panel method, against exact values.
-//! `cargo test --release --test water panel:: -- --ignored --nocapture` prints the table of `docs/accuracy.md`.
 
+use crate::support::bodies::graded_box;
 use crate::support::reference::lamb;
 use crate::support::{self, directions};
 use faer::Mat;
@@ -9,7 +9,6 @@ use hydrograd::boundary::panel::{MOST_FACES, richardson};
 use hydrograd::boundary::{PanelBoundary, Response};
 use hydrograd::scene::Shape;
 use hydrograd::{Error, TriMesh};
-use std::collections::HashMap;
 use std::f64::consts::PI;
 
 type Mesh = (Vec<Vec3>, Vec<[usize; 3]>);
@@ -313,38 +312,6 @@ fn bad_surfaces_are_errors() {
     );
 }
 
-/// A box whose cells shrink towards the edges with the square of the distance, `cells` along each
-/// axis; diagonals mirror each other.
-fn graded(size: [f64; 3], cells: [usize; 3]) -> Mesh {
-    let place = |axis: usize, i: usize| {
-        let t = 2.0 * i as f64 / cells[axis] as f64 - 1.0;
-        0.5 * size[axis] * t.signum() * (1.0 - (1.0 - t.abs()).powi(2))
-    };
-    let (mut vertices, mut faces) = (Vec::new(), Vec::new());
-    let mut known = HashMap::new();
-    for a in 0..3 {
-        let (b, c) = ((a + 1) % 3, (a + 2) % 3);
-        for side in [0, cells[a]] {
-            for (i, j) in (0..cells[b]).flat_map(|i| (0..cells[c]).map(move |j| (i, j))) {
-                let q = [(i, j), (i + 1, j), (i + 1, j + 1), (i, j + 1)].map(|(i, j)| {
-                    let mut at = [side; 3];
-                    (at[b], at[c]) = (i, j);
-                    *known.entry(at).or_insert_with(|| {
-                        vertices.push(Vec3::from(std::array::from_fn(|k| place(k, at[k]))));
-                        vertices.len() - 1
-                    })
-                });
-                let k = usize::from((2 * i < cells[b]) != (2 * j < cells[c]));
-                for t in [[k, k + 1, k + 2], [k, k + 2, (k + 3) % 4]] {
-                    let [x, y, z] = t.map(|i| q[i]);
-                    faces.push(if side == 0 { [x, z, y] } else { [x, y, z] });
-                }
-            }
-        }
-    }
-    (vertices, faces)
-}
-
 #[test]
 fn edges_want_small_faces() {
     let exact = [0.6384, 0.6384, 0.6384, 0.0393, 0.0393, 0.0393];
@@ -353,64 +320,10 @@ fn edges_want_small_faces() {
         faces: None,
     };
     let even = build(&mesh(&cube, 768));
-    let fine = build(&graded([1.0; 3], [8; 3]));
+    let fine = build(&graded_box([1.0; 3], [8; 3]));
     let (even, fine) = (
         worst(&even.added_mass, &exact),
         worst(&fine.added_mass, &exact),
     );
     assert!(fine < 0.02 && fine < 0.4 * even, "{fine} {even}");
-}
-
-/// Prints the tables of `docs/accuracy.md`.
-#[test]
-#[ignore = "minutes; prints tables"]
-fn tables() {
-    let cells = |m: &Mat6, exact: &[f64; 6]| -> String {
-        let cell = |i: usize| match exact[i] {
-            0.0 => "–".to_string(),
-            e => format!("{:.2}", 100.0 * (m[(i, i)] / e - 1.0)),
-        };
-        (0..6).map(cell).collect::<Vec<_>>().join(" | ")
-    };
-    for s in [
-        [1.0; 3],
-        [1.0, 0.5, 1.0],
-        [1.0, 0.2, 1.0],
-        [1.0, 0.1, 1.0],
-        [1.0, 0.03, 1.0],
-        [4.0, 2.0, 0.5],
-        [5.0, 1.0, 1.0],
-        [3.0, 2.0, 1.0],
-    ] {
-        let (exact, mut last) = (lamb(s), None);
-        for faces in [320, 1280, 5120] {
-            let b = build(&ellipsoid(s, faces));
-            let row = cells(&b.added_mass, &exact);
-            println!("| {s:?} | {faces} | {row} | {:.1} |", b.condition);
-            if let Some(coarse) = &last {
-                let r = richardson(&b, coarse).unwrap();
-                let (before, after) = (100.0 * r.fine_error, 100.0 * r.error);
-                let row = cells(&r.added_mass, &exact);
-                println!("| {s:?} | extrapolated | {row} | estimates {before:.2}, {after:.2} |");
-            }
-            last = Some(b);
-        }
-    }
-    for (size, base) in [
-        ([1.0; 3], [4; 3]),
-        ([1.0, 0.1, 1.0], [6, 2, 6]),
-        ([1.0, 0.4, 0.7], [6, 4, 4]),
-    ] {
-        let mut last: Option<Mat6> = None;
-        for k in [3, 4, 5] {
-            let m = build(&graded(size, base.map(|n| n * k))).added_mass;
-            println!("{size:?} graded {k}: {:.6?}", m.diagonal().as_slice());
-            if let Some(coarse) = last {
-                let ratio = k as f64 / (k - 1) as f64;
-                let better = m + (m - coarse) / (ratio * ratio - 1.0);
-                println!("extrapolated: {:.6?}", better.diagonal().as_slice());
-            }
-            last = Some(m);
-        }
-    }
 }

@@ -4,6 +4,7 @@ mod lamb;
 mod references;
 mod scattering;
 
+use crate::support::bodies::off_ellipsoid;
 use hydrograd::Error;
 use hydrograd::adjoint::lie::{Pose, Vec3, Vec6, exp_matrix};
 use hydrograd::boundary::{ExactBoundary, Response};
@@ -56,20 +57,6 @@ fn gauss_legendre(n: usize) -> (Vec<f64>, Vec<f64>) {
 
 fn exact(name: &str, semi_axes: [f64; 3], gap: f64) -> ExactBoundary {
     ExactBoundary::new(name, semi_axes, &Pose::identity(), gap).unwrap()
-}
-
-/// Points at a distance off the ellipsoid, spread over it.
-fn off_surface(semi_axes: [f64; 3], gap: f64, count: usize) -> Vec<Vec3> {
-    let axes = Vec3::from(semi_axes);
-    (0..count)
-        .map(|i| {
-            let z = 1.0 - (2.0 * i as f64 + 1.0) / count as f64;
-            let turn = 2.399_963 * i as f64;
-            let s = (1.0 - z * z).sqrt();
-            let unit = Vec3::new(s * turn.cos(), s * turn.sin(), z);
-            unit.component_mul(&axes) + unit.component_div(&axes).normalize() * gap
-        })
-        .collect()
 }
 
 fn longest(semi_axes: [f64; 3]) -> f64 {
@@ -191,7 +178,7 @@ fn extremes_give_numbers() {
             };
             assert!(body.residual < 1e-4, "{axes:?} {gap}: {:e}", body.residual);
             assert!(body.added_mass().iter().all(|x| x.is_finite()), "{axes:?}");
-            let points = off_surface(axes, gap, 9);
+            let points = off_ellipsoid(axes, gap, 9);
             for field in [
                 body.radiated(&points).unwrap(),
                 body.scattered(&points, &points).unwrap(),

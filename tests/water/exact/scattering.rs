@@ -1,14 +1,13 @@
-//! Spheres and ellipsoids in the flow of sources. `cargo test --release --test water exact -- --ignored
-//! --nocapture` prints the table of `docs/accuracy.md`.
+//! Spheres and ellipsoids in the flow of sources.
 
-use super::{exact, longest, off_surface, surface};
+use super::{exact, longest, surface};
+use crate::support::bodies::off_ellipsoid;
 use hydrograd::Error;
 use hydrograd::adjoint::lie::{Vec3, Vec6};
 use hydrograd::boundary::{BodyBoundary, Response, Settings};
 use hydrograd::scene::Shape;
 use std::f64::consts::PI;
 use std::path::Path;
-use std::time::Instant;
 
 const ELLIPSOIDS: [[f64; 3]; 12] = [
     [1.0, 0.2, 1.0],
@@ -66,14 +65,14 @@ fn no_water_passes_the_surface() {
         ([1.0, 0.5, 0.1], 0.3),
     ] {
         let body = exact("body", semi_axes, gap / 2.0);
-        let sources = off_surface(semi_axes, gap, 7);
+        let sources = off_ellipsoid(semi_axes, gap, 7);
         let axes = Vec3::from(semi_axes);
         let step = 1e-3
             * semi_axes
                 .iter()
                 .fold(f64::INFINITY, |m: f64, a| m.min(*a))
                 .powi(2);
-        let feet = off_surface(semi_axes, 0.0, 40);
+        let feet = off_ellipsoid(semi_axes, 0.0, 40);
         let weights = [-25.0, 48.0, -36.0, 16.0, -3.0].map(|w| w / 12.0 / step);
         let normals: Vec<Vec3> = feet
             .iter()
@@ -110,7 +109,7 @@ fn motion_and_scattering_belong_together() {
     for semi_axes in ELLIPSOIDS.into_iter().take(11) {
         let gap = 0.5 * longest(semi_axes);
         let body = exact("body", semi_axes, gap);
-        let sources = off_surface(semi_axes, gap, 5);
+        let sources = off_ellipsoid(semi_axes, gap, 5);
         let points = surface(semi_axes, 64, 80);
         let at: Vec<Vec3> = points.iter().map(|p| p.0).collect();
         let scattered = body.scattered(&sources, &at).unwrap();
@@ -139,7 +138,7 @@ fn motion_and_scattering_belong_together() {
 #[test]
 fn nearly_a_sphere_scatters_like_one() {
     let sphere = exact("ball", [1.0; 3], 0.2);
-    let points = off_surface([1.0; 3], 0.2, 30);
+    let points = off_ellipsoid([1.0; 3], 0.2, 30);
     let expected = sphere.scattered(&points, &points).unwrap();
     for d in [1e-3, 1e-5, 1e-8, 1e-12] {
         for axes in [
@@ -179,8 +178,8 @@ fn nearly_equal_axes_are_no_exception() {
 fn scattering_is_symmetric_and_knows_no_unit() {
     let axes = [3.0, 2.0, 1.0];
     let body = exact("body", axes, 0.5);
-    let sources = off_surface(axes, 0.6, 20);
-    let points = off_surface(axes, 1.1, 33);
+    let sources = off_ellipsoid(axes, 0.6, 20);
+    let points = off_ellipsoid(axes, 1.1, 33);
     let there = body.scattered(&sources, &points).unwrap();
     let back = body.scattered(&points, &sources).unwrap();
     assert!((&there - back.transpose()).norm_max() < 1e-13);
@@ -208,7 +207,7 @@ fn points_too_near_are_refused() {
     let fine = exact("coin", axes, 0.05);
     let body = exact("coin", axes, 0.4);
     for (gap, limit) in [(0.4, 1e-8), (0.2, 1e-4)] {
-        let points = off_surface(axes, gap, 50);
+        let points = off_ellipsoid(axes, gap, 50);
         let (got, exact) = (
             body.scattered(&points, &points).unwrap(),
             fine.scattered(&points, &points).unwrap(),
@@ -216,7 +215,7 @@ fn points_too_near_are_refused() {
         let error = (&got - &exact).norm_max() / exact.norm_max();
         assert!(error < limit, "{gap}: {error:e}");
     }
-    let points = off_surface(axes, 0.02, 50);
+    let points = off_ellipsoid(axes, 0.02, 50);
     let error = body.scattered(&points, &points).unwrap_err();
     assert!(matches!(error, Error::Unresolved { .. }));
     let text = error.to_string();
@@ -237,7 +236,7 @@ fn meshes_scatter_nearly_the_same() {
         let mesh = hydrograd::shape::build(&shape, Path::new("."), Some(1280)).unwrap();
         let mesh = BodyBoundary::new("body", &mesh, &Settings::default()).unwrap();
         let body = exact("body", semi_axes, 0.3);
-        let points = off_surface(semi_axes, 0.4, 40);
+        let points = off_ellipsoid(semi_axes, 0.4, 40);
         for (a, b) in [
             (
                 mesh.scattered(&points, &points).unwrap(),
@@ -311,7 +310,7 @@ fn planes_of_symmetry_are_no_exception() {
                 let x = d.component_mul(&scale) + d.component_div(&scale).normalize() * gap;
                 let side = Vec3::repeat(1e-10);
                 let points = [x, x + side, x - side];
-                let far = off_surface(axes, 0.5 * longest(axes), 3);
+                let far = off_ellipsoid(axes, 0.5 * longest(axes), 3);
                 for field in [
                     body.radiated(&points).unwrap(),
                     body.scattered(&far, &points).unwrap(),
@@ -325,32 +324,6 @@ fn planes_of_symmetry_are_no_exception() {
                     assert!(apart > 0.0);
                 }
             }
-        }
-    }
-}
-
-#[test]
-#[ignore = "prints a table"]
-fn table_of_harmonics() {
-    println!(
-        "| semi-axes | gap / longest | degree | harmonics | residual | made in | 1000 sources in |"
-    );
-    println!("|---|---|---|---|---|---|---|");
-    for axes in ELLIPSOIDS {
-        for part in [0.5, 0.2, 0.1, 0.05] {
-            let gap = part * longest(axes);
-            let start = Instant::now();
-            let body = exact("body", axes, gap);
-            let made = start.elapsed().as_secs_f64();
-            let points = off_surface(axes, gap, 1000);
-            let start = Instant::now();
-            body.scattered(&points, &points).unwrap();
-            let answered = start.elapsed().as_secs_f64();
-            let (count, degree) = body.harmonics();
-            println!(
-                "| {}:{}:{} | {} | {degree} | {count} | {:.0e} | {made:.2} s | {answered:.2} s |",
-                axes[0], axes[1], axes[2], part, body.residual
-            );
         }
     }
 }

@@ -7,6 +7,7 @@
 //! takes coarser ones and, unless scenes are
 //! named, the first two scenes.
 
+#[allow(dead_code)]
 mod common;
 
 use common::reference::{Reference, reference};

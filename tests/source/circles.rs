@@ -31,10 +31,6 @@ fn found(source: &str) -> Vec<(PathBuf, String)> {
                 .collect();
             let depth = common.iter().count();
             let entry = |file: &Path| -> PathBuf { file.iter().take(depth + 1).collect() };
-            let graph = folders.entry(common.clone()).or_default();
-            let (a, b) = (entry(from), entry(to));
-            graph.0.entry(a.clone()).or_default().insert(b.clone());
-            graph.0.entry(b.clone()).or_default();
             let strict = STRICT
                 .iter()
                 .any(|s| Path::new(source).join(&common).starts_with(s));
@@ -44,6 +40,10 @@ fn found(source: &str) -> Vec<(PathBuf, String)> {
             {
                 continue;
             }
+            let graph = folders.entry(common.clone()).or_default();
+            let (a, b) = (entry(from), entry(to));
+            graph.0.entry(a.clone()).or_default().insert(b.clone());
+            graph.0.entry(b.clone()).or_default();
             let example = format!("{} imports {path} of {}", from.display(), to.display());
             graph.1.entry((a, b)).or_insert(example);
         }
@@ -81,7 +81,6 @@ const STILL: &[&str] = &[
     "src",
     "src/cli/tradeoff",
     "src/contact/geometry",
-    "src/coupling/full/cpu",
     "src/coupling/reduced",
     "src/dynamics",
     "src/gpu",

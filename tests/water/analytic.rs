@@ -9,7 +9,7 @@ use crate::support::reference::{
 use crate::support::{mesh, scaled_error};
 use hydrograd::Error;
 use hydrograd::adjoint::lie::{Mat3, Mat6, Pose, Vec3, Vec6, exp_matrix, skew};
-use hydrograd::boundary::{BodyBoundary, Method, RowScaling, Settings};
+use hydrograd::boundary::{BodyBoundary, Method, Settings};
 use hydrograd::coupling::full::{Full, MfsBody, Preconditioner, SolveSettings, Solver};
 use hydrograd::coupling::{Coupling, Direction, Exclusions, Isolated, Linearise, Report};
 use hydrograd::scene::{Shape, Wall};

@@ -55,7 +55,7 @@ fn errors(m: &Mat6, exact: &[f64; 6]) -> String {
 
 fn sources(semi_axes: [f64; 3], faces: usize, settings: &MfsSettings) -> Result<BodyBoundary> {
     let mesh = mesh(&Shape::ellipsoid(semi_axes), faces);
-    BodyBoundary::new("body", mesh.vertices(), mesh.faces(), settings)
+    BodyBoundary::new("body", &mesh, settings)
 }
 
 fn mfs() -> Result<()> {
@@ -113,7 +113,7 @@ fn panel() -> Result<()> {
         let (exact, mut last) = (lamb(semi_axes), None);
         for faces in [320, 1280, 5120] {
             let mesh = mesh(&Shape::ellipsoid(semi_axes), faces);
-            let b = PanelBoundary::new("body", mesh.vertices(), mesh.faces())?;
+            let b = PanelBoundary::new("body", &mesh)?;
             let row = errors(&b.added_mass, &exact);
             println!("| {semi_axes:?} | {faces} | {row} | {:.1} |", b.condition);
             if let Some(coarse) = &last {
@@ -134,8 +134,8 @@ fn panel() -> Result<()> {
     ] {
         let mut last: Option<Mat6> = None;
         for k in [3, 4, 5] {
-            let (v, f) = graded_box(size, base.map(|n| n * k));
-            let m = PanelBoundary::new("box", &v, &f)?.added_mass;
+            let mesh = graded_box(size, base.map(|n| n * k));
+            let m = PanelBoundary::new("box", &mesh)?.added_mass;
             println!("{size:?} graded {k}: {:.6?}", m.diagonal().as_slice());
             if let Some(coarse) = last {
                 let ratio = k as f64 / (k - 1) as f64;

@@ -15,7 +15,7 @@ const LAYERS: [(&str, &[&str]); 20] = [
     ("geometry", &["adjoint"]),
     ("shape", &["adjoint", "geometry", "special"]),
     ("scene", &["geometry", "multibody", "shape"]),
-    ("solver", &[]),
+    ("solver", &["adjoint"]),
     ("boundary", &["adjoint", "geometry", "solver", "special"]),
     ("coupling", &["adjoint", "boundary", "geometry", "solver"]),
     (

@@ -1,5 +1,6 @@
 //! Bodies and scenes that more than one measurement uses.
 
+use hydrograd::TriMesh;
 use hydrograd::adjoint::lie::{Mat3, Pose, Vec3};
 use hydrograd::coupling::full::{Full, MfsBody, Preconditioner, SolveSettings};
 use hydrograd::coupling::{Coupling, Exclusions};
@@ -10,7 +11,7 @@ use std::sync::Arc;
 
 /// A box whose cells shrink towards the edges with the square of the distance, `cells` along each
 /// axis; diagonals mirror each other.
-pub fn graded_box(size: [f64; 3], cells: [usize; 3]) -> (Vec<Vec3>, Vec<[usize; 3]>) {
+pub fn graded_box(size: [f64; 3], cells: [usize; 3]) -> TriMesh {
     let place = |axis: usize, i: usize| {
         let t = 2.0 * i as f64 / cells[axis] as f64 - 1.0;
         0.5 * size[axis] * t.signum() * (1.0 - (1.0 - t.abs()).powi(2))
@@ -37,7 +38,7 @@ pub fn graded_box(size: [f64; 3], cells: [usize; 3]) -> (Vec<Vec3>, Vec<[usize; 
             }
         }
     }
-    (vertices, faces)
+    TriMesh::new("box", vertices, faces).unwrap()
 }
 
 /// A coin flat over a fixed box, with regions around the points where they are nearest.

@@ -320,7 +320,7 @@ fn edges_want_small_faces() {
         faces: None,
     };
     let even = build(&mesh(&cube, 768));
-    let fine = build(&graded_box([1.0; 3], [8; 3]));
+    let fine = PanelBoundary::new("box", &graded_box([1.0; 3], [8; 3])).unwrap();
     let (even, fine) = (
         worst(&even.added_mass, &exact),
         worst(&fine.added_mass, &exact),

@@ -5,7 +5,7 @@ use crate::error::input;
 use hydrograd::scene::{self, Plane};
 use pyo3::prelude::*;
 
-/// How a body moves against its parent: made by `free`, `fixed`, `prismatic`, `revolute`, `planar` or `spherical`.
+/// How a body moves against its parent: made by `free`, `fixed`, `prismatic`, `revolute`, `screw`, `planar` or `spherical`.
 #[pyclass(frozen, eq, module = "hydrograd")]
 #[derive(Clone, PartialEq)]
 pub struct Joint(pub hydrograd::Joint);
@@ -124,6 +124,16 @@ fn revolute(axis: &Bound<'_, PyAny>) -> PyResult<Joint> {
     }))
 }
 
+/// A joint about `axis` (three numbers, joint's frame) that advances along it by `pitch` (m) in one revolution; a negative
+/// pitch is a left-handed thread. q in rad, v in rad/s.
+#[pyfunction]
+fn screw(axis: &Bound<'_, PyAny>, pitch: f64) -> PyResult<Joint> {
+    Ok(Joint(hydrograd::Joint::Screw {
+        axis: fixed("screw: axis", axis)?,
+        pitch,
+    }))
+}
+
 /// A joint in a plane, "xy", "yz" or "zx": q = two translations in that order (m) and the angle about the normal (rad).
 #[pyfunction]
 fn planar(plane: &str) -> PyResult<Joint> {
@@ -154,6 +164,7 @@ pub fn register(m: &Bound<'_, PyModule>) -> PyResult<()> {
     m.add_function(wrap_pyfunction!(rigid, m)?)?;
     m.add_function(wrap_pyfunction!(prismatic, m)?)?;
     m.add_function(wrap_pyfunction!(revolute, m)?)?;
+    m.add_function(wrap_pyfunction!(screw, m)?)?;
     m.add_function(wrap_pyfunction!(planar, m)?)?;
     m.add_function(wrap_pyfunction!(spherical, m)?)
 }

@@ -5,6 +5,7 @@ mod extremes;
 mod grasp;
 mod growth;
 mod invariants;
+mod mechanisms;
 #[cfg(feature = "opt")]
 mod optimize;
 mod resume;

@@ -173,6 +173,7 @@ fn joint_dimensions() {
         (Joint::Fixed, 0, 0),
         (Joint::Prismatic { axis }, 1, 1),
         (Joint::Revolute { axis }, 1, 1),
+        (Joint::Screw { axis, pitch: 0.1 }, 1, 1),
         (Joint::Planar { plane: Plane::Zx }, 3, 3),
         (Joint::Spherical, 4, 3),
         (Joint::Free, 7, 6),
@@ -219,7 +220,7 @@ fn everything_survives_a_round_trip() {
         Joint::Planar { plane: Plane::Yz },
         Joint::Spherical,
         Joint::Free,
-        Joint::Fixed,
+        Joint::Screw { axis, pitch: -0.1 },
     ];
     let shapes = [
         Shape::sphere(0.1).faces(7),

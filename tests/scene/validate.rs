@@ -314,6 +314,16 @@ fn joints_are_checked() {
         |s| s.bodies[0].joint = Joint::Revolute { axis: [0.0; 3] },
         &["body \"ball\": joint.axis", "direction"],
     );
+    let axis = [0.0, 0.0, f64::NAN];
+    refused(
+        |s| s.bodies[0].joint = Joint::Screw { axis, pitch: 0.1 },
+        &["body \"ball\": joint.axis", "finite"],
+    );
+    let (axis, pitch) = ([0.0, 0.0, 1.0], f64::INFINITY);
+    refused(
+        |s| s.bodies[0].joint = Joint::Screw { axis, pitch },
+        &["body \"ball\": joint.pitch", "inf", "one revolution"],
+    );
     refused(
         |s| s.bodies[1].motion = Some(vec![linear]),
         &[

@@ -9,6 +9,7 @@ mod model;
 mod planar;
 mod prismatic;
 mod revolute;
+mod screw;
 mod spherical;
 
 pub use model::JointModel;
@@ -76,6 +77,13 @@ joints! {
         /// Direction in the joint's frame.
         axis: [f64; 3]
     } => revolute::Revolute::new(axis);
+    /// About an axis with an advance along it, as a nut on its thread: q, v in rad, rad/s.
+    Screw {
+        /// Direction in the joint's frame; need not be of unit length.
+        axis: [f64; 3],
+        /// Advance along the axis in one revolution, m; negative for a left-handed thread.
+        pitch: f64
+    } => screw::Screw::new(axis, pitch);
     /// In a plane of the joint's frame: two translations, then the rotation about its normal.
     Planar {
         /// The plane.

@@ -171,6 +171,19 @@ class Scene:
     def add_wall(
         self, point: ArrayLike, normal: ArrayLike, surface: Literal["rigid", "free"] = "rigid"
     ) -> None: ...
+    def add_force(
+        self,
+        kind: Literal["spring"],
+        *,
+        body: str,
+        stiffness: float,
+        at: ArrayLike = ...,
+        to: str | None = None,
+        to_at: ArrayLike = ...,
+        rest_length: float = 0.0,
+        damping: float = 0.0,
+        name: str | None = None,
+    ) -> None: ...
     def set_initial(
         self, q: ArrayLike | None = None, v: ArrayLike | None = None, *, momentum: ArrayLike | None = None
     ) -> None: ...

@@ -6,7 +6,17 @@ use crate::error::{OrRaise, input};
 use crate::fluid::{Contact, Fluid};
 use hydrograd::scene::{Wall, WallSurface};
 use pyo3::prelude::*;
+use pyo3::types::PyDict;
 use std::path::PathBuf;
+
+/// A force whose keys or values don't fit.
+fn not_a_force(kind: &str, why: impl std::fmt::Display) -> PyErr {
+    input(
+        "add_force",
+        format!("{kind:?}: {why}"),
+        "must be a kind of force with the keys that it has in a scene file",
+    )
+}
 
 /// What a simulation starts from: the fluid, walls, and bodies with their joints.
 ///
@@ -99,6 +109,36 @@ impl Scene {
             normal: fixed("wall: normal", normal)?,
             surface,
         });
+        Ok(())
+    }
+
+    /// Adds a force between bodies, by its kind and the keys that it has in a scene file, bodies by name. A "spring", with a damper
+    /// beside it, joins the point `at` (m, body's frame) of `body` and `to_at` of the body `to` (default: of the world): `stiffness`
+    /// in N/m, `rest_length` in m, `damping` in N s/m.
+    #[pyo3(signature = (kind, **fields))]
+    fn add_force(
+        &mut self,
+        kind: &str,
+        fields: Option<&Bound<'_, PyDict>>,
+        py: Python<'_>,
+    ) -> PyResult<()> {
+        let given = PyDict::new(py);
+        if let Some(fields) = fields {
+            given.update(fields.as_mapping())?;
+        }
+        given.set_item("kind", kind)?;
+        // Arrays as lists.
+        let options = PyDict::new(py);
+        let list = py
+            .import("operator")?
+            .call_method1("methodcaller", ("tolist",))?;
+        options.set_item("default", list)?;
+        let json = py
+            .import("json")?
+            .call_method("dumps", (given,), Some(&options));
+        let text: String = json.map_err(|e| not_a_force(kind, e))?.extract()?;
+        let force = serde_json::from_str(&text).map_err(|e| not_a_force(kind, e))?;
+        self.0.add_force(force);
         Ok(())
     }
 

@@ -1,6 +1,6 @@
 //! A system: the tree, its bodies' constants, and the coupling through the water.
 
-use super::force::Force;
+use super::force::ForceModel;
 use super::{ContactModel, JointLimit};
 use crate::adjoint::lie::Vec3;
 use crate::coupling::Coupling;
@@ -48,7 +48,7 @@ pub struct System {
     /// What moves each joint.
     pub drives: Vec<Drive>,
     /// Forces that don't come from the water's kinetic energy; clones share them.
-    pub forces: Arc<[Box<dyn Force>]>,
+    pub forces: Arc<[Box<dyn ForceModel>]>,
     /// Uniform current, m/s.
     pub current: Vec3,
     /// Number of controls.

@@ -32,6 +32,7 @@ impl Scene {
             walls: Vec::new(),
             contact: None,
             bodies: Vec::new(),
+            forces: Vec::new(),
             initial: Initial::default(),
             controller: None,
         }

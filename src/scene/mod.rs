@@ -6,6 +6,7 @@
 mod build;
 mod contact;
 mod file;
+mod force;
 mod joint;
 mod motion;
 mod validate;
@@ -15,6 +16,7 @@ pub use crate::multibody::{Joint, Plane};
 pub use crate::shape::Shape;
 pub use build::BodyId;
 pub use contact::Contact;
+pub use force::{Force, Spring};
 
 use serde::{Deserialize, Serialize};
 
@@ -45,6 +47,9 @@ pub struct Scene {
     pub contact: Option<Contact>,
     /// The bodies, parents before children.
     pub bodies: Vec<Body>,
+    /// Forces between bodies, beside those that bodies have of their own.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub forces: Vec<Force>,
     /// Where the scene starts.
     #[serde(default, skip_serializing_if = "is_default")]
     pub initial: Initial,

@@ -1,21 +1,21 @@
 //! Actuated joints: controls are their generalised forces, in the user's coordinates.
 
-use super::{Force, LoadBars, Loads, Moving, Parts, Velocity};
+use super::{ForceModel, LoadBars, Loads, Moving, Parts, Velocity};
 use crate::dynamics::Declarations;
 use std::ops::Range;
 
 /// Velocities of each actuated joint, with the first of its controls.
 struct Actuation(Vec<(Range<usize>, usize)>);
 
-pub(super) fn assemble(parts: &Parts, _: &mut Declarations) -> Option<Box<dyn Force>> {
+pub(super) fn assemble(parts: &Parts, _: &mut Declarations) -> Option<Box<dyn ForceModel>> {
     let each = parts.bodies.iter().zip(parts.tree.links());
     let joints: Vec<_> = each
         .filter_map(|(body, link)| Some((link.v.clone(), body.joint_control?)))
         .collect();
-    (!joints.is_empty()).then(|| Box::new(Actuation(joints)) as Box<dyn Force>)
+    (!joints.is_empty()).then(|| Box::new(Actuation(joints)) as Box<dyn ForceModel>)
 }
 
-impl Force for Actuation {
+impl ForceModel for Actuation {
     fn name(&self) -> &'static str {
         "actuation"
     }

@@ -1,6 +1,6 @@
 //! Buoyancy: −ρ V g at the centroid of the displaced volume.
 
-use super::{Force, LoadBars, Loads, Moving, Parts, Place, Velocity};
+use super::{ForceModel, LoadBars, Loads, Moving, Parts, Place, Velocity};
 use crate::adjoint::lie::{Vec3, angular, point_velocity, point_wrench};
 use crate::dynamics::Declarations;
 
@@ -19,7 +19,7 @@ struct Displaced {
     centroid: Vec3,
 }
 
-pub(super) fn assemble(parts: &Parts, _: &mut Declarations) -> Option<Box<dyn Force>> {
+pub(super) fn assemble(parts: &Parts, _: &mut Declarations) -> Option<Box<dyn ForceModel>> {
     let lift = -Vec3::from(parts.scene.gravity);
     let each = parts.bodies.iter().enumerate();
     let bodies: Vec<Displaced> = each
@@ -31,10 +31,10 @@ pub(super) fn assemble(parts: &Parts, _: &mut Declarations) -> Option<Box<dyn Fo
         })
         .collect();
     (lift != Vec3::zeros() && !bodies.is_empty())
-        .then(|| Box::new(Buoyancy { lift, bodies }) as Box<dyn Force>)
+        .then(|| Box::new(Buoyancy { lift, bodies }) as Box<dyn ForceModel>)
 }
 
-impl Force for Buoyancy {
+impl ForceModel for Buoyancy {
     fn name(&self) -> &'static str {
         "buoyancy"
     }

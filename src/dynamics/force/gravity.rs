@@ -1,6 +1,6 @@
 //! Weight of the bodies' masses: m g at the centre of mass.
 
-use super::{Force, LoadBars, Loads, Moving, Parts, Place, Velocity};
+use super::{ForceModel, LoadBars, Loads, Moving, Parts, Place, Velocity};
 use crate::adjoint::lie::{Vec3, angular, point_velocity, point_wrench};
 use crate::dynamics::Declarations;
 
@@ -11,18 +11,18 @@ struct Gravity {
     centers: Vec<Vec3>,
 }
 
-pub(super) fn assemble(parts: &Parts, _: &mut Declarations) -> Option<Box<dyn Force>> {
+pub(super) fn assemble(parts: &Parts, _: &mut Declarations) -> Option<Box<dyn ForceModel>> {
     let acceleration = Vec3::from(parts.scene.gravity);
     let centers = parts.bodies.iter().map(|b| b.center_of_mass).collect();
     (acceleration != Vec3::zeros()).then(|| {
         Box::new(Gravity {
             acceleration,
             centers,
-        }) as Box<dyn Force>
+        }) as Box<dyn ForceModel>
     })
 }
 
-impl Force for Gravity {
+impl ForceModel for Gravity {
     fn name(&self) -> &'static str {
         "gravity"
     }

@@ -1,6 +1,6 @@
 //! Drag linear in the velocity through the water (Eq. 22): −c R ν in the body's frame, summed over its surface.
 
-use super::{Force, LoadBars, Loads, Moving, Parts, Velocity, drag_part};
+use super::{ForceModel, LoadBars, Loads, Moving, Parts, Velocity, drag_part};
 use crate::adjoint::drag;
 use crate::adjoint::lie::{Mat6, cross_force};
 use crate::dynamics::parameters::{Declarations, Declared, Owner, Parameter};
@@ -18,7 +18,10 @@ struct Dragged {
     resistance: Mat6,
 }
 
-pub(super) fn assemble(parts: &Parts, parameters: &mut Declarations) -> Option<Box<dyn Force>> {
+pub(super) fn assemble(
+    parts: &Parts,
+    parameters: &mut Declarations,
+) -> Option<Box<dyn ForceModel>> {
     let mut bodies = Vec::new();
     for (body, surface) in parts.surfaces.iter().enumerate() {
         let given = parts.scene.bodies[body].drag.unwrap_or_default();
@@ -37,10 +40,10 @@ pub(super) fn assemble(parts: &Parts, parameters: &mut Declarations) -> Option<B
             });
         }
     }
-    (!bodies.is_empty()).then(|| Box::new(LinearDrag(bodies)) as Box<dyn Force>)
+    (!bodies.is_empty()).then(|| Box::new(LinearDrag(bodies)) as Box<dyn ForceModel>)
 }
 
-impl Force for LinearDrag {
+impl ForceModel for LinearDrag {
     fn name(&self) -> &'static str {
         "linear drag"
     }

@@ -9,6 +9,7 @@ mod buoyancy;
 mod gravity;
 mod linear_drag;
 mod quadratic_drag;
+mod spring;
 mod thruster;
 
 use super::{BodyData, Declarations, Parameters};
@@ -20,13 +21,14 @@ use nalgebra::DVector;
 use std::sync::Arc;
 
 /// How each force is made from a scene; `None` where a scene has none of its kind. The order is that in which they are added up.
-const FORCES: &[fn(&Parts, &mut Declarations) -> Option<Box<dyn Force>>] = &[
+const FORCES: &[fn(&Parts, &mut Declarations) -> Option<Box<dyn ForceModel>>] = &[
     gravity::assemble,
     buoyancy::assemble,
     linear_drag::assemble,
     quadratic_drag::assemble,
     thruster::assemble,
     actuation::assemble,
+    spring::assemble,
 ];
 
 /// What forces are made from.
@@ -42,7 +44,7 @@ pub struct Parts<'a> {
 }
 
 /// All forces of a scene.
-pub fn assemble(parts: &Parts, parameters: &mut Declarations) -> Arc<[Box<dyn Force>]> {
+pub fn assemble(parts: &Parts, parameters: &mut Declarations) -> Arc<[Box<dyn ForceModel>]> {
     let made = FORCES.iter().filter_map(|make| make(parts, parameters));
     made.collect()
 }
@@ -124,17 +126,17 @@ pub struct LoadBars<'a> {
 }
 
 /// A force, on any bodies and joints. It is a pure function of where they are, how they move, controls and parameters.
-pub trait Force: Send + Sync {
+pub trait ForceModel: Send + Sync {
     /// Its name, for messages and checks.
     fn name(&self) -> &'static str;
 
     /// Adds what it does.
     fn add(&self, at: &Moving, out: &mut Loads);
 
-    /// Adds the tangent of [`Force::add`] along a change of the velocity; nothing where it doesn't depend on it.
+    /// Adds the tangent of [`ForceModel::add`] along a change of the velocity; nothing where it doesn't depend on it.
     fn jvp(&self, at: &Moving, change: &Velocity, out: &mut Loads);
 
-    /// Adds the transpose of [`Force::add`] in all its arguments: the gradient of its power on the velocity `z`.
+    /// Adds the transpose of [`ForceModel::add`] in all its arguments: the gradient of its power on the velocity `z`.
     fn vjp(&self, at: &Moving, z: &Velocity, bar: &mut LoadBars);
 
     /// Potential energy, J, of a force that has one.

@@ -1,6 +1,6 @@
 //! Drag quadratic in the velocity through the water: −½ ρ c Σ ΔA |w| w, summed over the body's surface.
 
-use super::{Force, LoadBars, Loads, Moving, Parts, Velocity, drag_part};
+use super::{ForceModel, LoadBars, Loads, Moving, Parts, Velocity, drag_part};
 use crate::adjoint::drag::{Element, Part, quadratic_drag, quadratic_drag_jvp, quadratic_drag_vjp};
 use crate::adjoint::lie::cross_force;
 use crate::dynamics::parameters::{Declarations, Declared, Owner, Parameter, Range};
@@ -22,7 +22,10 @@ struct Dragged {
     part: Part,
 }
 
-pub(super) fn assemble(parts: &Parts, parameters: &mut Declarations) -> Option<Box<dyn Force>> {
+pub(super) fn assemble(
+    parts: &Parts,
+    parameters: &mut Declarations,
+) -> Option<Box<dyn ForceModel>> {
     let mut bodies = Vec::new();
     for (body, surface) in parts.surfaces.iter().enumerate() {
         let owner = Owner::Body(body);
@@ -38,10 +41,10 @@ pub(super) fn assemble(parts: &Parts, parameters: &mut Declarations) -> Option<B
             }
         }
     }
-    (!bodies.is_empty()).then(|| Box::new(QuadraticDrag(bodies)) as Box<dyn Force>)
+    (!bodies.is_empty()).then(|| Box::new(QuadraticDrag(bodies)) as Box<dyn ForceModel>)
 }
 
-impl Force for QuadraticDrag {
+impl ForceModel for QuadraticDrag {
     fn name(&self) -> &'static str {
         "quadratic drag"
     }

@@ -1,19 +1,19 @@
 //! Thrusters: a control wrench on a body, force and moment (world axes) about its origin.
 
-use super::{Force, LoadBars, Loads, Moving, Parts, Velocity};
+use super::{ForceModel, LoadBars, Loads, Moving, Parts, Velocity};
 use crate::adjoint::lie::{angular, linear, point_velocity, point_wrench};
 use crate::dynamics::Declarations;
 
 /// Bodies, each with the first of its six controls.
 struct Thrusters(Vec<(usize, usize)>);
 
-pub(super) fn assemble(parts: &Parts, _: &mut Declarations) -> Option<Box<dyn Force>> {
+pub(super) fn assemble(parts: &Parts, _: &mut Declarations) -> Option<Box<dyn ForceModel>> {
     let each = parts.bodies.iter().enumerate();
     let thrusters: Vec<_> = each.filter_map(|(b, d)| Some((b, d.thruster?))).collect();
-    (!thrusters.is_empty()).then(|| Box::new(Thrusters(thrusters)) as Box<dyn Force>)
+    (!thrusters.is_empty()).then(|| Box::new(Thrusters(thrusters)) as Box<dyn ForceModel>)
 }
 
-impl Force for Thrusters {
+impl ForceModel for Thrusters {
     fn name(&self) -> &'static str {
         "thruster"
     }

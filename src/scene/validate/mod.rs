@@ -26,6 +26,7 @@ impl Scene {
         for index in 0..self.bodies.len() {
             body::check(self, index)?;
         }
+        self.check_forces()?;
         start::check(self)?;
         contact::check(self)?;
         self.check_controller()

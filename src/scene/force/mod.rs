@@ -1,0 +1,88 @@
+//! Forces between bodies as a scene gives them, one file each.
+
+mod spring;
+
+pub use spring::Spring;
+
+use super::{BodyId, Scene};
+use crate::{Error, Result};
+use serde::{Deserialize, Serialize};
+
+/// A force between bodies, or between bodies and the world.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(tag = "kind", rename_all = "kebab-case")]
+pub enum Force {
+    /// Along the line between two points.
+    Spring(Spring),
+}
+
+impl Force {
+    fn data(&self) -> &dyn ForceData {
+        match self {
+            Force::Spring(spring) => spring,
+        }
+    }
+}
+
+/// What every kind of force says about itself.
+trait ForceData {
+    /// Its kind, as in a scene file.
+    fn kind(&self) -> &'static str;
+
+    /// Its name, if it was given one.
+    fn name(&self) -> Option<&str>;
+
+    /// Checks all that doesn't need the meshes; `place` names a field.
+    fn check(&self, scene: &Scene, place: &dyn Fn(&str) -> String) -> Result<()>;
+}
+
+impl Scene {
+    /// Adds a force between bodies.
+    pub fn add_force(&mut self, force: Force) {
+        self.forces.push(force);
+    }
+
+    /// Name of force number `index`, which its parameters begin with: its own, or its kind and number, counted from 1.
+    pub fn force_name(&self, index: usize) -> String {
+        let data = self.forces[index].data();
+        let counted = || format!("{} {}", data.kind(), index + 1);
+        data.name().map_or_else(counted, str::to_owned)
+    }
+
+    /// Checks the forces, once the bodies are known to be right.
+    pub(super) fn check_forces(&self) -> Result<()> {
+        let mut taken: Vec<String> = ["fluid", "contact"].map(String::from).into();
+        taken.extend(self.bodies.iter().map(|b| b.name.clone()));
+        for (i, force) in self.forces.iter().enumerate() {
+            let place = |field: &str| format!("forces[{i}].{field}");
+            let name = self.force_name(i);
+            if name.trim().is_empty() || taken.contains(&name) {
+                return Err(Error::input(
+                    place("name"),
+                    format!("{name:?}"),
+                    "give a name that no body and no other force has; its parameters begin with it",
+                ));
+            }
+            taken.push(name);
+            force.data().check(self, &place)?;
+        }
+        Ok(())
+    }
+
+    /// The body that a force names.
+    fn named_body(&self, name: &str, place: String) -> Result<BodyId> {
+        self.body(name).ok_or_else(|| {
+            let names: Vec<&str> = self.bodies.iter().map(|b| b.name.as_str()).collect();
+            let remedy = format!("no body has that name; the bodies are {}", names.join(", "));
+            Error::input(place, format!("{name:?}"), remedy)
+        })
+    }
+}
+
+/// Refuses what isn't finite, or is negative where it may not be.
+fn number(place: String, value: f64, negative: bool, remedy: &str) -> Result<()> {
+    match value.is_finite() && (negative || value >= 0.0) {
+        true => Ok(()),
+        false => Err(Error::input(place, value, remedy)),
+    }
+}

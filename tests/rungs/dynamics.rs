@@ -8,7 +8,7 @@ use hydrograd::dynamics::{
     Drive, Input, Integrator, Linearisation, Owner, Parameters, State, StateBar, StateTangent,
     StepBar, Stepper, System,
 };
-use hydrograd::scene::{Body, Drag, DragPart, Fluid, Joint, Motion, Plane, Scene, Shape};
+use hydrograd::scene::{Body, Drag, DragPart, Fluid, Joint, Motion, Plane, Scene, Shape, Spring};
 use hydrograd::simulate::{Pd, PdAxis};
 use hydrograd::{Settings, Simulator};
 use nalgebra::DVector;
@@ -104,6 +104,15 @@ fn scene() -> Scene {
             .joint(Joint::Prismatic { axis }),
     );
     scene.add(
+        Body::dry()
+            .named("nut")
+            .child_of("weight")
+            .mass(0.3)
+            .inertia([0.01, 0.02, 0.015])
+            .at([0.1, 0.0, 0.0])
+            .joint(Joint::Screw { axis, pitch: 0.3 }),
+    );
+    scene.add(
         Body::new(oval(0.1, 0.05, 0.1))
             .named("fin")
             .child_of("coin")
@@ -117,6 +126,11 @@ fn scene() -> Scene {
                 phase: 0.5,
             }]),
     );
+    let spring = Spring::new("hull").at([0.1, 0.05, 0.0]);
+    let spring = spring.to("coin", [0.0, -0.1, 0.05]).stiffness(40.0);
+    scene.add_force(spring.rest_length(0.3).damping(6.0).into());
+    let tether = Spring::new("tail").at([0.0, 0.05, 0.02]).damping(3.0);
+    scene.add_force(tether.anchored([-0.5, 0.4, 0.7]).stiffness(15.0).into());
     scene
 }
 
@@ -188,6 +202,7 @@ pub fn directions(at: &Parameters) -> Vec<(&'static str, DVector<f64>)> {
         ("inertia", 1e-3),
         ("drag.linear", 1.0),
         ("drag.quadratic", 0.1),
+        ("rest_length", 0.1),
     ];
     let kind = |name: &'static str| name.split_once("inertia").map_or(name, |_| "inertia");
     let mut out: Vec<(&'static str, DVector<f64>)> = Vec::new();

@@ -5,7 +5,7 @@ use super::tools::{Group, groups, vector_along, wavy};
 use hydrograd::adjoint::check::{Outcome, Rung};
 use hydrograd::adjoint::lie::{Pose, Vec6, angular, exp_matrix, linear};
 use hydrograd::dynamics::Parameters;
-use hydrograd::dynamics::force::{Force, LoadBars, Loads, Moving, Place, Velocity};
+use hydrograd::dynamics::force::{ForceModel, LoadBars, Loads, Moving, Place, Velocity};
 use nalgebra::DVector;
 
 pub fn rungs() -> Vec<Rung> {
@@ -23,6 +23,8 @@ pub fn rungs() -> Vec<Rung> {
         "dynamics::force::quadratic_drag::QuadraticDrag::vjp" => |c| vjp("quadratic drag", c),
         "dynamics::force::thruster::Thrusters::vjp" => |c| vjp("thruster", c),
         "dynamics::force::actuation::Actuation::vjp" => |c| vjp("actuation", c),
+        "dynamics::force::spring::Springs::jvp" => |c| jvp("spring", c),
+        "dynamics::force::spring::Springs::vjp" => |c| vjp("spring", c),
     ]
 }
 
@@ -65,14 +67,14 @@ impl At {
         }
     }
 
-    fn loads(&self, force: &dyn Force) -> Loads {
+    fn loads(&self, force: &dyn ForceModel) -> Loads {
         let mut out = Loads::zeros(self.poses.len(), self.v.len());
         force.add(&self.moving(), &mut out);
         out
     }
 }
 
-fn force(name: &str) -> &'static dyn Force {
+fn force(name: &str) -> &'static dyn ForceModel {
     let mut all = system().forces.iter();
     all.find(|f| f.name() == name)
         .expect("the scene has every force")

@@ -33,6 +33,7 @@ fn joints() -> Vec<JointModel> {
         Joint::Planar { plane: Plane::Yz },
         Joint::Spherical,
         Joint::Free,
+        Joint::Screw { axis, pitch: 0.4 },
     ]
     .map(|j| j.model())
     .into()
@@ -195,6 +196,7 @@ fn tree() -> Tree {
         (None, place(-1.2), j[2].clone()),
         (Some(5), place(0.7), j[4].clone()),
         (Some(6), place(0.2), Joint::Fixed.model()),
+        (Some(0), place(1.3), j[5].clone()),
     ])
 }
 

@@ -133,6 +133,10 @@ def test_one_step(sim, controls):
     assert a.shape == (24, 24) and b.shape == (24, 6)
     both = np.concatenate([q_bar, v_bar])
     assert np.allclose(np.concatenate([bar.q, bar.v]), both @ a) and np.allclose(bar.controls, both @ b)
+    q_dot, v_dot = record.jvp(q=v_bar, v=q_bar, u=np.ones(6))
+    assert np.allclose(np.concatenate([q_dot, v_dot]), a @ np.concatenate([v_bar, q_bar]) + b @ np.ones(6))
+    with pytest.raises(hg.InputError, match="jvp: u"):
+        record.jvp(u=np.ones(5))
 
 
 def test_one_step_is_a_rollout_of_one(sim, controls):

@@ -1,5 +1,6 @@
 //! Runs from any state and runs that are ended early; the Jacobians and velocities of a rollout; meshes number by number.
 
+use hydrograd::dynamics::Integrator;
 use hydrograd::{Body, Controls, Error, Fidelity, Fluid, Joint, Scene, Settings, Shape, Simulator};
 use nalgebra::{DMatrix, DVector};
 use std::ops::ControlFlow;
@@ -160,6 +161,57 @@ fn jacobians_are_slopes() {
             (&found - &slope).norm() < 1e-6 * slope.norm(),
             "{found} {slope}"
         );
+    }
+}
+
+/// All rows at once are those of one sweep a row; a record's tangent and its transpose are one linear map, with every integrator.
+#[test]
+fn rows_of_jacobians_are_sweeps() {
+    for integrator in [
+        Integrator::MomentumEuler,
+        Integrator::Midpoint,
+        Integrator::Rk2,
+        Integrator::Rk4,
+        Integrator::VelocityEuler,
+    ] {
+        let sim = simulator(Settings::default().integrator(integrator));
+        let (q, v) = (sim.start().0.clone(), DVector::from_element(7, 0.05));
+        let state = sim.state(0, &q, &v).unwrap();
+        let rollout = sim.rollout_from(&state, &push(&sim, 2), go_on).unwrap();
+        let all = rollout.jacobians().unwrap();
+        for row in 0..14 {
+            let mut seed = rollout.zero_cotangents();
+            let part = if row < 7 { &mut seed.q } else { &mut seed.v };
+            part[(row % 7, 2)] = 1.0;
+            let own = rollout.vjp(&seed).unwrap();
+            let start: Vec<f64> = own.initial.q.iter().chain(&own.initial.v).copied().collect();
+            assert_eq!(all.state.row(row).iter().copied().collect::<Vec<_>>(), start);
+            assert_eq!(
+                all.controls.row(row).iter().collect::<Vec<_>>(),
+                own.controls.iter().collect::<Vec<_>>(),
+                "{integrator:?}"
+            );
+        }
+
+        // A step is a rollout of one, to the bit.
+        let u = DVector::from_element(1, 0.5);
+        let (next, record) = sim.step(&state, &u).unwrap();
+        assert_eq!(&next, &rollout.states()[1]);
+        let wave = |n: usize, phase: f64| DVector::from_fn(n, |i, _| (phase + 1.7 * i as f64).sin());
+        let (along, du) = (wave(14, 0.3), wave(1, 0.9));
+        let forth = record.jvp(&along, &du).unwrap();
+        let bar = wave(14, 2.1);
+        let mut seed = record.zero_cotangents();
+        seed.q.set_column(1, &bar.rows(0, 7));
+        seed.v.set_column(1, &bar.rows(7, 7));
+        let back = record.vjp(&seed).unwrap();
+        let product = bar.dot(&forth);
+        let transposed = back.initial.q.dot(&along.rows(0, 7))
+            + back.initial.v.dot(&along.rows(7, 7))
+            + back.controls.column(0).dot(&du);
+        let error = (product - transposed).abs();
+        assert!(error <= 1e-10 * product.abs(), "{integrator:?}: {product} {transposed}");
+        assert!(record.jvp(&bar, &bar).is_err());
     }
 }
 

@@ -3,7 +3,7 @@
 use crate::support::example;
 use hydrograd::dynamics::Integrator;
 use hydrograd::simulate::{Action, ActionBar, Observation, Policy};
-use hydrograd::{Controls, Fidelity, Result, Settings, Simulator, objective};
+use hydrograd::{Controls, Error, Fidelity, Result, Settings, Simulator, objective};
 use nalgebra::DVector;
 
 fn simulator(name: &str) -> Simulator {
@@ -21,7 +21,7 @@ struct Lengths {
 }
 
 impl Policy for Lengths {
-    fn act(&self, _: &Observation) -> hydrograd::Result<Action> {
+    fn act(&self, _: &Observation) -> Result<Action> {
         Ok(Action {
             control: vec![0.0; self.control],
             hold: vec![false; self.hold],
@@ -29,7 +29,7 @@ impl Policy for Lengths {
         })
     }
 
-    fn act_vjp(&self, _: &Observation, _: &DVector<f64>) -> hydrograd::Result<ActionBar> {
+    fn act_vjp(&self, _: &Observation, _: &DVector<f64>) -> Result<ActionBar> {
         Ok(ActionBar {
             q: vec![0.0; self.q],
             v: Vec::new(),
@@ -94,6 +94,76 @@ fn controllers_with_lists_of_wrong_length_are_refused() {
             }
         }
     }
+}
+
+/// Why [`Unwilling`] doesn't act.
+#[derive(Clone, Copy, Debug, PartialEq)]
+struct Reason(usize);
+
+impl std::fmt::Display for Reason {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        write!(f, "not at step {}", self.0)
+    }
+}
+
+impl std::error::Error for Reason {}
+
+/// A controller that acts until a step, and is differentiated after one.
+#[derive(Clone, Copy)]
+struct Unwilling {
+    acts_until: usize,
+    differentiated_from: usize,
+}
+
+fn refused<T>(step: usize) -> Result<T> {
+    Err(Error::Controller {
+        source: Box::new(Reason(step)),
+    })
+}
+
+impl Policy for Unwilling {
+    fn act(&self, o: &Observation) -> Result<Action> {
+        match o.step < self.acts_until {
+            true => Ok(Action::default()),
+            false => refused(o.step),
+        }
+    }
+
+    fn act_vjp(&self, o: &Observation, _: &DVector<f64>) -> Result<ActionBar> {
+        match o.step >= self.differentiated_from {
+            true => Ok(ActionBar::default()),
+            false => refused(o.step),
+        }
+    }
+
+    fn with_gains(&self, _: &[f64]) -> Result<Box<dyn Policy>> {
+        Ok(Box::new(*self))
+    }
+}
+
+#[test]
+fn errors_of_controllers_come_out_as_what_they_were() {
+    let mut s = simulator("falling_ball");
+    let reason = |error: Error| match error {
+        Error::Controller { source } => *source.downcast::<Reason>().unwrap(),
+        error => panic!("{error}"),
+    };
+    let controls = Controls::zeros(&s, 4);
+    s.set_policy(Box::new(Unwilling {
+        acts_until: 2,
+        differentiated_from: 0,
+    }));
+    let error = s.rollout(&controls).err().unwrap();
+    assert_eq!(error.to_string(), "controller: not at step 2");
+    assert_eq!(reason(error), Reason(2));
+    s.set_policy(Box::new(Unwilling {
+        acts_until: 4,
+        differentiated_from: 1,
+    }));
+    let rollout = s.rollout(&controls).unwrap();
+    let error = rollout.gradient(&objective::final_velocity(0, 1.0, 1.0));
+    assert_eq!(reason(error.unwrap_err()), Reason(0));
+    assert_eq!(reason(rollout.jacobians().unwrap_err()), Reason(0));
 }
 
 #[test]

@@ -107,7 +107,7 @@ fn check(scene: &Scene, arguments: &Arguments, progress: &Progress) -> Result<Ch
     let mut simulator = arguments.water.simulator(scene, tight)?;
     let found = gradcheck_with(
         &mut simulator,
-        &gradcheck::Settings {
+        &gradcheck::GradcheckSettings {
             steps,
             directions: arguments.directions,
             seed: arguments.seed,

@@ -1,6 +1,6 @@
 //! Bodies that don't feel each other: each keeps its own constant added mass (Eq. 12).
 
-use super::{Coupling, Direction, Linearise, Linearised, Momenta, Pullback, Report, Tangent};
+use super::{Coupling, Direction, Linearise, Linearised, Momenta, Pullback, CouplingReport, Tangent};
 use crate::Result;
 use crate::adjoint::lie::{Mat6, Pose, Vec6};
 use nalgebra::{DMatrix, DVector};
@@ -38,7 +38,7 @@ impl Coupling for Isolated {
                 .rows_mut(6 * b, 6)
                 .copy_from(&(m * basis.rows(6 * b, 6)));
         }
-        Ok(Momenta::new(momenta, Report::default()))
+        Ok(Momenta::new(momenta, CouplingReport::default()))
     }
 
     fn differentiable(&self) -> Option<&dyn Linearise> {
@@ -106,7 +106,7 @@ impl Linearised for IsolatedLinearised<'_> {
         })
     }
 
-    fn report(&self) -> &Report {
+    fn report(&self) -> &CouplingReport {
         self.value.report()
     }
 }

@@ -99,12 +99,12 @@ pub trait Linearise: Coupling {
 #[derive(Clone, Debug)]
 pub struct Momenta {
     momenta: DMatrix<f64>,
-    report: Report,
+    report: CouplingReport,
 }
 
 impl Momenta {
     /// Impulses with what they cost.
-    pub fn new(momenta: DMatrix<f64>, report: Report) -> Self {
+    pub fn new(momenta: DMatrix<f64>, report: CouplingReport) -> Self {
         Self { momenta, report }
     }
 
@@ -114,14 +114,14 @@ impl Momenta {
     }
 
     /// What it cost.
-    pub fn report(&self) -> &Report {
+    pub fn report(&self) -> &CouplingReport {
         &self.report
     }
 }
 
 /// What one evaluation cost and how far to trust it.
 #[derive(Clone, Debug, Default, PartialEq, Serialize)]
-pub struct Report {
+pub struct CouplingReport {
     /// Iterations of the slowest column; 0 for direct solves.
     pub iterations: usize,
     /// Largest relative residual of the normal equations reached.
@@ -221,5 +221,5 @@ pub trait Linearised: Send + Sync {
     fn hvp(&self, x: Direction, y: Direction, z: &[Vec6]) -> Result<Tangent>;
 
     /// What it cost.
-    fn report(&self) -> &Report;
+    fn report(&self) -> &CouplingReport;
 }

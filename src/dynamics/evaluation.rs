@@ -3,7 +3,7 @@
 use super::{PairContact, Parameters, System};
 use crate::adjoint::lie::{Mat6, Pose, Vec3, Vec6, six};
 use crate::adjoint::rigid;
-use crate::coupling::Report;
+use crate::coupling::CouplingReport;
 use crate::multibody::Kinematics;
 use crate::{Error, Result};
 use nalgebra::{DMatrix, DVector};
@@ -28,7 +28,7 @@ pub struct Evaluation<'a> {
     pub mass_matrix: DMatrix<f64>,
     /// Generalised momentum at v = 0, from the current.
     pub rest_momentum: DVector<f64>,
-    report: Report,
+    report: CouplingReport,
 }
 
 /// Where the bodies in the water are, and the body-frame twists of the basis on which the water is solved: one column a
@@ -56,7 +56,7 @@ impl System {
         };
         let momenta = solved.as_ref().map(|s| s.momenta());
         let momenta = self.spatial_momenta(&kinematics, momenta);
-        let report = solved.map_or_else(Report::default, |s| s.report().clone());
+        let report = solved.map_or_else(CouplingReport::default, |s| s.report().clone());
         let mut e = Evaluation::new(self, parameters, q, kinematics, momenta, report);
         e.contact_points = self.contact_points(parameters, &e.kinematics.poses)?;
         Ok(e)
@@ -142,7 +142,7 @@ impl<'a> Evaluation<'a> {
         q: &DVector<f64>,
         kinematics: Kinematics,
         fluid_momenta: Vec<DMatrix<f64>>,
-        report: Report,
+        report: CouplingReport,
     ) -> Self {
         let rigid: Vec<Mat6> = (0..system.len())
             .map(|b| {
@@ -309,7 +309,7 @@ impl<'a> Evaluation<'a> {
     }
 
     /// What the coupling reports.
-    pub fn report(&self) -> &Report {
+    pub fn report(&self) -> &CouplingReport {
         &self.report
     }
 }

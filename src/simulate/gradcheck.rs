@@ -11,7 +11,7 @@ use std::time::Instant;
 
 /// What to check.
 #[derive(Clone, Copy, Debug)]
-pub struct Settings {
+pub struct GradcheckSettings {
     /// Steps of the rollout.
     pub steps: usize,
     /// Random directions per group.
@@ -29,7 +29,7 @@ pub struct Direction {
     pub group: &'static str,
     /// Derivative by the adjoint.
     pub adjoint: f64,
-    /// Central differences at each of [`Report::step_sizes`].
+    /// Central differences at each of [`GradcheckReport::step_sizes`].
     pub differences: Vec<f64>,
     /// Relative error at each step size.
     pub rel_errors: Vec<f64>,
@@ -37,7 +37,7 @@ pub struct Direction {
 
 /// Outcome of a check.
 #[derive(Clone, Debug, Serialize)]
-pub struct Report {
+pub struct GradcheckReport {
     /// Step sizes, relative to the scale of each direction.
     pub step_sizes: Vec<f64>,
     /// Every direction.
@@ -247,7 +247,7 @@ pub fn timings(simulator: &Simulator, steps: usize, repetitions: usize) -> Resul
 ///
 /// # Errors
 /// A rollout that fails.
-pub fn gradcheck(simulator: &mut Simulator, settings: &Settings) -> Result<Report> {
+pub fn gradcheck(simulator: &mut Simulator, settings: &GradcheckSettings) -> Result<GradcheckReport> {
     gradcheck_with(simulator, settings, |_, _| {})
 }
 
@@ -257,9 +257,9 @@ pub fn gradcheck(simulator: &mut Simulator, settings: &Settings) -> Result<Repor
 /// A rollout that fails.
 pub fn gradcheck_with(
     simulator: &mut Simulator,
-    settings: &Settings,
+    settings: &GradcheckSettings,
     mut progress: impl FnMut(usize, usize),
-) -> Result<Report> {
+) -> Result<GradcheckReport> {
     if settings.steps == 0 || settings.directions == 0 {
         return Err(Error::input(
             "gradcheck: steps and directions",
@@ -391,7 +391,7 @@ pub fn gradcheck_with(
         });
         errors.reduce(f64::max)
     };
-    Ok(Report {
+    Ok(GradcheckReport {
         max_rel_error: worst(&["controls", "initial", "parameters", "gains"]).unwrap_or(0.0),
         rel_error_controls: worst(&["controls"]),
         rel_error_initial: worst(&["initial"]),

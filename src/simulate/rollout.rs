@@ -4,7 +4,7 @@ use super::trajectory::Seed;
 use super::{Cotangents, Fidelity, Gradient, Initial, Objective, Simulator};
 use crate::adjoint::lie::{Pose, Vec3, Vec6};
 use crate::adjoint::step::{self, Tape};
-use crate::coupling::Report;
+use crate::coupling::CouplingReport;
 use crate::dynamics::{ContactForce, Drive, State, StepBar, StepRecord};
 use crate::geometry::Gap;
 use crate::{Error, Result};
@@ -37,7 +37,7 @@ pub struct Sample {
     /// Joints held during that step.
     pub hold: Vec<bool>,
     /// What the coupling reports.
-    pub report: Report,
+    pub report: CouplingReport,
     /// Smallest gap; for [`Rollout::gaps`].
     pub(super) gap: Option<Gap>,
 }

@@ -8,7 +8,7 @@ use super::{
 use crate::adjoint::lie::Pose;
 use crate::adjoint::step;
 use crate::assembly::{self, Assembled};
-use crate::coupling::Report;
+use crate::coupling::CouplingReport;
 use crate::dynamics::{Parameters, State, Stepper, System};
 use crate::geometry::{Gap, Gaps, TriMesh};
 use crate::scene::Scene;
@@ -41,7 +41,7 @@ pub struct AddedMass {
     /// 6B × 6B, world frame, per body linear then angular about its origin: kg, kg m, kg m².
     pub matrix: DMatrix<f64>,
     /// What the coupling reports.
-    pub report: Report,
+    pub report: CouplingReport,
 }
 
 impl Simulator {

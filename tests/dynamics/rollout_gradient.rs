@@ -27,7 +27,7 @@ fn check(scene: &Scene, fidelity: Fidelity, integrator: Integrator, steps: usize
     let mut simulator = Simulator::new(scene, settings).unwrap();
     let report = gradcheck(
         &mut simulator,
-        &gradcheck::Settings {
+        &gradcheck::GradcheckSettings {
             steps,
             directions,
             seed: 7,

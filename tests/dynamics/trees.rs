@@ -297,7 +297,7 @@ fn check(simulator: &mut Simulator, name: &str, steps: usize) {
     );
     let report = gradcheck(
         simulator,
-        &gradcheck::Settings {
+        &gradcheck::GradcheckSettings {
             steps,
             directions: 1,
             seed: 11,

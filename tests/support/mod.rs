@@ -73,7 +73,7 @@ pub fn check_gradient(
     directions: usize,
     limit: f64,
 ) {
-    let settings = gradcheck::Settings {
+    let settings = gradcheck::GradcheckSettings {
         steps,
         directions,
         seed: 3,

@@ -11,7 +11,7 @@ use hydrograd::Error;
 use hydrograd::adjoint::lie::{Mat3, Mat6, Pose, Vec3, Vec6, exp_matrix, skew};
 use hydrograd::boundary::{BodyBoundary, Method, Settings};
 use hydrograd::coupling::full::{Full, MfsBody, Preconditioner, SolveSettings, Solver};
-use hydrograd::coupling::{Coupling, Direction, Exclusions, Isolated, Linearise, Report};
+use hydrograd::coupling::{Coupling, Direction, Exclusions, Isolated, Linearise, CouplingReport};
 use hydrograd::scene::{Shape, Wall};
 use nalgebra::{DMatrix, DVector};
 use std::sync::{Arc, LazyLock};
@@ -64,7 +64,7 @@ fn tight() -> SolveSettings {
 }
 
 /// M̄ of all bodies in their frames, density 1.
-fn matrix(coupling: &dyn Coupling, poses: &[Pose]) -> (DMatrix<f64>, Report) {
+fn matrix(coupling: &dyn Coupling, poses: &[Pose]) -> (DMatrix<f64>, CouplingReport) {
     let n = 6 * poses.len();
     let record = coupling.evaluate(poses, &DMatrix::identity(n, n)).unwrap();
     (record.momenta().clone(), record.report().clone())
@@ -768,11 +768,11 @@ fn nothing_that_moves_costs_nothing() {
             let none = DMatrix::zeros(12, 0);
             let record = coupling.linearise(&uneven_poses(), &none).unwrap();
             assert_eq!(record.momenta().shape(), (12, 0));
-            assert_eq!(record.report(), &Report::default());
+            assert_eq!(record.report(), &CouplingReport::default());
             let zero = DMatrix::zeros(12, 2);
             let record = coupling.linearise(&uneven_poses(), &zero).unwrap();
             assert_eq!(record.momenta(), &zero);
-            assert_eq!(record.report(), &Report::default());
+            assert_eq!(record.report(), &CouplingReport::default());
         }
     }
 }

@@ -116,7 +116,7 @@ fn the_gradient_is_exact_with_declared_links() {
         let mut simulator = Simulator::new(&scene, settings).unwrap();
         let report = gradcheck(
             &mut simulator,
-            &gradcheck::Settings {
+            &gradcheck::GradcheckSettings {
                 steps: 4,
                 directions: 1,
                 seed: 7,

@@ -4,7 +4,7 @@ use super::{Full, Model, Response};
 use crate::Result;
 use crate::adjoint::lie::{Pose, Vec6};
 use crate::coupling::settings::asymmetry;
-use crate::coupling::{Direction, Linearised, Momenta, PairTensor, Pullback, Report, Tangent};
+use crate::coupling::{Direction, Linearised, Momenta, PairTensor, Pullback, CouplingReport, Tangent};
 use nalgebra::{DMatrix, DVector};
 
 /// [`Full`] solved for a basis.
@@ -27,7 +27,7 @@ impl<'a> Solved<'a> {
         let response = full.backend().respond(poses, basis)?;
         let volume = |b: usize| model.bodies[b].boundary.faces.volume();
         let reached = response.reached();
-        let report = Report {
+        let report = CouplingReport {
             iterations: reached.iterations,
             residual: reached.residual,
             asymmetry: asymmetry(&response.energies()?, basis, volume),
@@ -85,7 +85,7 @@ impl Linearised for FullLinearised<'_> {
             .tangent(z)
     }
 
-    fn report(&self) -> &Report {
+    fn report(&self) -> &CouplingReport {
         self.solved.value.report()
     }
 }

@@ -4,7 +4,7 @@ use super::PanelCoupled;
 use super::system::{System, seen_from};
 use crate::adjoint::lie::{Pose, Vec6};
 use crate::coupling::settings::asymmetry;
-use crate::coupling::{Momenta, Report};
+use crate::coupling::{Momenta, CouplingReport};
 use crate::solver::Columns;
 use crate::{Error, Result};
 use faer::MatRef;
@@ -26,7 +26,7 @@ pub(super) fn momenta(
     }
     let mut momenta = DMatrix::zeros(6 * bodies, k);
     if k == 0 || bodies == 0 {
-        return Ok(Momenta::new(momenta, Report::default()));
+        return Ok(Momenta::new(momenta, CouplingReport::default()));
     }
     let system = System::new(coupled, poses)?;
     let n = coupled.rows();
@@ -48,7 +48,7 @@ pub(super) fn momenta(
     let raw = DMatrix::from_fn(k, k, |i, j| {
         (0..n).map(|s| flux.at(s, i) * phi.x.at(s, j)).sum::<f64>()
     });
-    let report = Report {
+    let report = CouplingReport {
         iterations: phi.iterations.max(mu.iterations),
         residual: phi.residual.max(mu.residual),
         asymmetry: asymmetry(&raw, basis, |b| coupled.bodies[b].faces.volume()),

@@ -8,7 +8,7 @@ use crate::Result;
 use crate::adjoint::kernel::potential_vjp;
 use crate::adjoint::lie::{Pose, Vec3, Vec6, six};
 use crate::coupling::pair::wrench;
-use crate::coupling::{Direction, Linearised, Momenta, Pullback, Report, Tangent};
+use crate::coupling::{Direction, Linearised, Momenta, Pullback, CouplingReport, Tangent};
 use faer::linalg::matmul::matmul;
 use faer::reborrow::ReborrowMut;
 use faer::{Accum, Mat, MatMut, MatRef, Par};
@@ -42,7 +42,7 @@ pub(super) struct ReducedLinearised<'a> {
     momenta: DMatrix<f64>,
     /// Made when first asked for.
     pub fields: OnceLock<Vec<Fields>>,
-    report: Report,
+    report: CouplingReport,
 }
 
 /// Solution to one combination of twists.
@@ -112,9 +112,9 @@ impl<'a> ReducedLinearised<'a> {
             return Err(reduced.indefinite(poses, 0.0));
         };
         let mut out = Self {
-            report: Report {
+            report: CouplingReport {
                 condition: factor.condition(),
-                ..Report::default()
+                ..CouplingReport::default()
             },
             reduced,
             poses: poses.to_vec(),
@@ -368,7 +368,7 @@ impl Linearised for ReducedLinearised<'_> {
         Ok(self.second(x, y, z))
     }
 
-    fn report(&self) -> &Report {
+    fn report(&self) -> &CouplingReport {
         &self.report
     }
 }

@@ -3,7 +3,7 @@
 use super::solution::Solution;
 use crate::Result;
 use crate::adjoint::lie::{Pose, Vec6};
-use crate::coupling::{Direction, Linearised, Momenta, PairTensor, Pullback, Report, Tangent};
+use crate::coupling::{Direction, Linearised, Momenta, PairTensor, Pullback, CouplingReport, Tangent};
 use crate::gpu::buffer::Buffer;
 use crate::gpu::combine::combine;
 use crate::gpu::points::Placed;
@@ -18,14 +18,14 @@ const TENSOR: usize = 24;
 pub(super) struct Solved {
     solution: Solution,
     tolerance: f64,
-    report: Report,
+    report: CouplingReport,
 }
 
 /// The same with its derivatives.
 pub(super) struct GpuLinearised {
     solution: Solution,
     tolerance: f64,
-    report: Report,
+    report: CouplingReport,
     derivative: Derivative,
 }
 
@@ -43,7 +43,7 @@ impl Solved {
         let (reduced, reached) = (&solution.placed.model.reduced, &solution.reached);
         let poses: &[Pose] = &solution.placed.poses;
         reduced.check_solution(poses, basis, &solution.momenta, reached.condition)?;
-        let report = Report {
+        let report = CouplingReport {
             iterations: reached.iterations,
             residual: reached.residual,
             asymmetry: 0.0,
@@ -184,7 +184,7 @@ impl Linearised for GpuLinearised {
         units::along(z, length, |z| solution.second(z, self.tolerance))
     }
 
-    fn report(&self) -> &Report {
+    fn report(&self) -> &CouplingReport {
         &self.report
     }
 }

@@ -3,7 +3,7 @@
 use crate::Result;
 use crate::adjoint::lie::Pose;
 use crate::boundary::{OneBody, Response};
-use crate::coupling::{Coupling, Report};
+use crate::coupling::{Coupling, CouplingReport};
 use crate::geometry::{Gap, Other};
 use crate::multibody::Tree;
 use crate::scene::{Scene, WallSurface};
@@ -48,7 +48,7 @@ pub(crate) struct Case<'a> {
     pub surfaces: Vec<Option<Surface>>,
     /// What compressed bodies are off from their own methods' answers.
     correction: Option<DMatrix<f64>>,
-    pub report: Report,
+    pub report: CouplingReport,
 }
 
 fn symmetric(m: &DMatrix<f64>) -> DMatrix<f64> {
@@ -60,7 +60,7 @@ fn evaluate(
     coupling: &dyn Coupling,
     poses: &[Pose],
     turn: &DMatrix<f64>,
-) -> Result<(DMatrix<f64>, Report)> {
+) -> Result<(DMatrix<f64>, CouplingReport)> {
     let record = coupling.evaluate(poses, turn)?;
     let m = symmetric(&turn.tr_mul(record.momenta()));
     Ok((m, record.report().clone()))

@@ -22,7 +22,7 @@ fn loaded(simulator: &Simulator, steps: usize) -> Vec<bool> {
 }
 
 fn agrees(name: &str, simulator: &mut Simulator, steps: usize) {
-    let asked = gradcheck::Settings {
+    let asked = gradcheck::GradcheckSettings {
         steps,
         directions: 4,
         seed: 7,

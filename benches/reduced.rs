@@ -219,9 +219,7 @@ fn bare(quick: bool, links: &[Link], order: usize) -> [f64; 3] {
         .map(|l| {
             let mut cloud = |n, at: f64| -> Vec<Vec3> {
                 let shift = Vec3::new(at, 0.0, 0.0);
-                (0..n)
-                    .map(|_| shift + Vec3::from(random.array()))
-                    .collect()
+                (0..n).map(|_| shift + Vec3::from(random.array())).collect()
             };
             let targets = Points::bare(&cloud(l.points[0], 0.0));
             let sources = Sources::new(&cloud(l.points[1], 4.0));

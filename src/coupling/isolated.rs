@@ -1,6 +1,8 @@
 //! Bodies that don't feel each other: each keeps its own constant added mass (Eq. 12).
 
-use super::{Coupling, Direction, Linearise, Linearised, Momenta, Pullback, CouplingReport, Tangent};
+use super::{
+    Coupling, CouplingReport, Direction, Linearise, Linearised, Momenta, Pullback, Tangent,
+};
 use crate::Result;
 use crate::adjoint::lie::{Mat6, Pose, Vec6};
 use nalgebra::{DMatrix, DVector};

@@ -4,10 +4,8 @@
 //! [`contact_force`] of a point that moves along its normal. The coordinate's rate is its velocity in the user's coordinates and
 //! in the frame's (X = 1 for a joint with one coordinate), and so the force is the same in both.
 
-use super::Evaluation;
 use crate::adjoint::contact::{Law, Meeting, contact_force, contact_force_jvp, contact_force_vjp};
 use crate::adjoint::lie::Vec3;
-use nalgebra::DVector;
 
 /// Range of a joint with one coordinate.
 #[derive(Clone, Debug, PartialEq)]
@@ -61,13 +59,5 @@ impl JointLimit {
             out[1] += sign * own.velocity.x;
         }
         out
-    }
-}
-
-impl Evaluation<'_> {
-    /// Each limit with the forces of its stops at the velocity `v`.
-    pub(super) fn stops(&self, v: &DVector<f64>) -> impl Iterator<Item = (&JointLimit, [f64; 2])> {
-        let each = self.system.limits.iter();
-        each.map(|l| (l, l.forces(self.q[l.q], v[l.v])))
     }
 }

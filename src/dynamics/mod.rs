@@ -2,7 +2,9 @@
 
 mod acceleration;
 mod balance;
+mod body;
 mod contact;
+mod contact_force;
 mod evaluation;
 pub mod force;
 mod integrator;
@@ -13,6 +15,7 @@ mod parameters;
 mod system;
 
 pub use balance::ForceCotangents;
+pub use body::BodyData;
 pub use contact::{ContactForce, ContactModel, Dual, PairContact, Regularisation};
 pub use evaluation::Evaluation;
 pub use integrator::{
@@ -24,4 +27,4 @@ pub use linearisation::Linearisation;
 pub use parameters::{
     Contact, Declarations, Declared, Entry, Owner, Parameter, Parameters, Range, Typical,
 };
-pub use system::{BodyData, Drive, System};
+pub use system::{Drive, System};

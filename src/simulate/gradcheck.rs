@@ -247,7 +247,10 @@ pub fn timings(simulator: &Simulator, steps: usize, repetitions: usize) -> Resul
 ///
 /// # Errors
 /// A rollout that fails.
-pub fn gradcheck(simulator: &mut Simulator, settings: &GradcheckSettings) -> Result<GradcheckReport> {
+pub fn gradcheck(
+    simulator: &mut Simulator,
+    settings: &GradcheckSettings,
+) -> Result<GradcheckReport> {
     gradcheck_with(simulator, settings, |_, _| {})
 }
 

@@ -11,6 +11,8 @@ pub mod objective;
 mod record;
 mod recording;
 mod rollout;
+mod run;
+mod sample;
 mod simulator;
 mod trajectory;
 
@@ -22,7 +24,8 @@ pub use knots::Knots;
 pub use objective::Objective;
 pub use record::Record;
 pub use recording::Recording;
-pub use rollout::{Rollout, Sample, Summary};
+pub use rollout::{Rollout, Summary};
+pub use sample::Sample;
 pub use simulator::{AddedMass, Simulator};
 
 pub use crate::policy::{

@@ -1,6 +1,6 @@
 //! Scalars of a trajectory and their derivatives with respect to what is observed.
 
-use super::{Cotangents, Rollout};
+use super::{Cotangents, Gradient, Rollout};
 use crate::scene::BodyId;
 use crate::{Error, Result};
 use std::ops::Add;
@@ -20,6 +20,26 @@ pub trait Objective {
 
     /// Its derivatives.
     fn cotangents(&self, rollout: &Rollout) -> Cotangents;
+}
+
+impl Rollout {
+    /// Value of an objective.
+    ///
+    /// # Errors
+    /// An objective that doesn't fit the scene.
+    pub fn value(&self, objective: &dyn Objective) -> Result<f64> {
+        objective.check(self)?;
+        Ok(objective.value(self))
+    }
+
+    /// Gradient of an objective, in one reverse sweep.
+    ///
+    /// # Errors
+    /// An objective that doesn't fit the scene, or as [`Rollout::vjp`].
+    pub fn gradient(&self, objective: &dyn Objective) -> Result<Gradient> {
+        objective.check(self)?;
+        self.vjp(&objective.cotangents(self))
+    }
 }
 
 /// A weighted sum of the terms of this module; add terms with `+`.

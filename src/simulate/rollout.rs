@@ -1,10 +1,9 @@
 //! A trajectory, and its gradient.
 
 use super::trajectory::Seed;
-use super::{Cotangents, Fidelity, Gradient, Initial, Objective, Simulator};
-use crate::adjoint::lie::{Pose, Vec3, Vec6};
+use super::{Cotangents, Fidelity, Gradient, Initial, Sample, Simulator};
+use crate::adjoint::lie::{Vec3, Vec6};
 use crate::adjoint::step::{self, Tape};
-use crate::coupling::CouplingReport;
 use crate::dynamics::{ContactForce, Drive, State, StepBar, StepRecord};
 use crate::geometry::Gap;
 use crate::{Error, Result};
@@ -12,42 +11,6 @@ use nalgebra::{DMatrix, DVector};
 use serde::Serialize;
 use std::ops::ControlFlow;
 use std::sync::OnceLock;
-
-/// What is observed at one state.
-#[derive(Clone, Debug)]
-pub struct Sample {
-    /// Time, s.
-    pub time: f64,
-    /// Joint coordinates.
-    pub q: DVector<f64>,
-    /// Generalised velocity.
-    pub v: DVector<f64>,
-    /// Poses of the bodies.
-    pub poses: Vec<Pose>,
-    /// Kinetic energy of bodies and fluid, J.
-    pub kinetic_energy: f64,
-    /// Potential energy of weight and buoyancy, J.
-    pub potential_energy: f64,
-    /// Total momentum and angular momentum about the world origin, bodies and fluid.
-    pub momentum: Vec6,
-    /// Largest absolute entry of any single body's momentum.
-    pub largest_momentum: Vec6,
-    /// Total controls during the step that starts here; empty at the last state.
-    pub control: DVector<f64>,
-    /// Joints held during that step.
-    pub hold: Vec<bool>,
-    /// What the coupling reports.
-    pub report: CouplingReport,
-    /// Smallest gap; for [`Rollout::gaps`].
-    pub(super) gap: Option<Gap>,
-}
-
-impl Sample {
-    /// Kinetic and potential energy, J.
-    pub fn energy(&self) -> f64 {
-        self.kinetic_energy + self.potential_energy
-    }
-}
 
 /// Share of the largest kinetic energy that may come from nowhere before a run warns. Every integrator but the paper's
 /// stays under 1.2 % on the example scenes.
@@ -249,24 +212,6 @@ impl Rollout {
                 self.simulator.time_step()
             )
         })
-    }
-
-    /// Value of an objective.
-    ///
-    /// # Errors
-    /// An objective that doesn't fit the scene.
-    pub fn value(&self, objective: &dyn Objective) -> Result<f64> {
-        objective.check(self)?;
-        Ok(objective.value(self))
-    }
-
-    /// Gradient of an objective, in one reverse sweep.
-    ///
-    /// # Errors
-    /// An objective that doesn't fit the scene, or as [`Rollout::vjp`].
-    pub fn gradient(&self, objective: &dyn Objective) -> Result<Gradient> {
-        objective.check(self)?;
-        self.vjp(&objective.cotangents(self))
     }
 
     /// Cotangents of the right sizes for this rollout, all zero.

@@ -1,12 +1,7 @@
 //! The simulator: a scene made ready to run.
 
-use super::trajectory::Trajectory;
-use super::{
-    BackendReport, Controls, Discretisation, ErrorEstimate, Fidelity, Policy, Record, Rollout,
-    Settings,
-};
+use super::{BackendReport, Discretisation, ErrorEstimate, Fidelity, Policy, Settings};
 use crate::adjoint::lie::Pose;
-use crate::adjoint::step;
 use crate::assembly::{self, Assembled};
 use crate::coupling::CouplingReport;
 use crate::dynamics::{Parameters, State, Stepper, System};
@@ -15,12 +10,8 @@ use crate::scene::Scene;
 use crate::water::{Clearance, Subject, surfaces, world_axes};
 use crate::{Error, Result};
 use nalgebra::{DMatrix, DVector};
-use std::ops::ControlFlow;
 use std::path::Path;
 use std::sync::Arc;
-
-/// Most steps of one rollout: some kilobytes are kept for each.
-const MOST_STEPS: usize = 5_000_000;
 
 /// A scene made ready: shapes discretised, bodies joined, coupling prepared. Clones share what was prepared, so that
 /// one with other parameters, another start or another controller costs next to nothing.
@@ -272,16 +263,6 @@ impl Simulator {
         }
     }
 
-    pub(super) fn trajectory<'a>(&'a self, controls: &'a DMatrix<f64>) -> Trajectory<'a> {
-        Trajectory {
-            stepper: self.stepper(),
-            policy: self.policy(),
-            clearance: self.clearance(),
-            fidelity: self.felt(),
-            controls,
-        }
-    }
-
     /// The initial state of the integrator.
     ///
     /// # Errors
@@ -306,32 +287,6 @@ impl Simulator {
         Ok(state)
     }
 
-    /// Runs the scene's own controller with additional open-loop controls.
-    ///
-    /// # Errors
-    /// The first step that fails, with its time.
-    pub fn rollout(&self, controls: &Controls) -> Result<Rollout> {
-        self.rollout_with(controls, |_| {})
-    }
-
-    /// As [`Simulator::rollout`]; `progress` is called with the number of steps made.
-    ///
-    /// # Errors
-    /// The first step that fails, with its time.
-    pub fn rollout_with(
-        &self,
-        controls: &Controls,
-        mut progress: impl FnMut(usize) + Send,
-    ) -> Result<Rollout> {
-        let count = |done| {
-            progress(done);
-            ControlFlow::Continue(())
-        };
-        let initial = self.initial().map_err(|e| e.at_time(0.0))?;
-        let v = self.assembled.v.clone();
-        self.run(initial, Some(v), controls, count)
-    }
-
     /// The integrator's state at coordinates `q` and generalised velocity `v` after `step` steps: where
     /// [`Simulator::rollout_from`] may begin. Driven joints are taken to where their motion has them then.
     ///
@@ -340,83 +295,6 @@ impl Simulator {
     pub fn state(&self, step: usize, q: &DVector<f64>, v: &DVector<f64>) -> Result<State> {
         self.check_start(q, v)?;
         self.state_unchecked(step, q, v)
-    }
-
-    /// As [`Simulator::rollout`], from any state: that of [`Simulator::state`], or one of another rollout's
-    /// [`Rollout::states`], which it goes on from to the bit. `progress` is called with the number of steps made, and may end the run.
-    ///
-    /// # Errors
-    /// A state of other sizes, the first step that fails, with its time, and [`Error::Stopped`] if `progress` breaks.
-    pub fn rollout_from(
-        &self,
-        state: &State,
-        controls: &Controls,
-        progress: impl FnMut(usize) -> ControlFlow<()> + Send,
-    ) -> Result<Rollout> {
-        let tree = &self.system().tree;
-        let sizes = [state.q.len(), state.y.len()];
-        let right = [tree.coordinates(), tree.velocities()];
-        if sizes != right {
-            return Err(Error::input(
-                "state: numbers of coordinates and velocities",
-                format!("{sizes:?}"),
-                format!("must be {right:?}, as the scene's"),
-            ));
-        }
-        self.run(state.clone(), None, controls, progress)
-    }
-
-    /// One step from a state with the controls `control`, to which the scene's own controller adds: the next state, and the record
-    /// that has the step's derivatives. The steps of a rollout, to the bit.
-    ///
-    /// # Errors
-    /// As [`Simulator::rollout_from`], and controls of another number or not finite.
-    pub fn step(&self, state: &State, control: &DVector<f64>) -> Result<(State, Record)> {
-        let controls = DMatrix::from_column_slice(control.len(), 1, control.as_slice());
-        let controls = Controls::from_matrix(self, controls)?;
-        let rollout = self.rollout_from(state, &controls, |_| ControlFlow::Continue(()))?;
-        Ok((rollout.states()[1].clone(), Record::new(rollout)))
-    }
-
-    fn run(
-        &self,
-        initial: State,
-        initial_velocity: Option<DVector<f64>>,
-        controls: &Controls,
-        mut progress: impl FnMut(usize) -> ControlFlow<()> + Send,
-    ) -> Result<Rollout> {
-        let matrix = controls.matrix().clone();
-        if matrix.nrows() != self.system().controls {
-            return Err(Error::input(
-                "controls",
-                format!("{} rows", matrix.nrows()),
-                format!("must have {} rows, one per control", self.system().controls),
-            ));
-        }
-        let steps = matrix.ncols();
-        if steps > MOST_STEPS {
-            return Err(Error::input(
-                "steps",
-                steps,
-                format!("must be at most {MOST_STEPS}: every state is kept; run in parts"),
-            ));
-        }
-        let ended = |done| match progress(done) {
-            ControlFlow::Continue(()) => Ok(()),
-            ControlFlow::Break(()) => Err(Error::Stopped {
-                what: format!("the rollout, after {done} of {steps} steps"),
-            }),
-        };
-        let trajectory = self.trajectory(&matrix);
-        // On a thread of the pool from first step to last: entering the pool costs as much as a small step's work.
-        let tape = rayon::scope(|_| step::forward(&trajectory, initial, steps, ended))?;
-        Ok(Rollout {
-            simulator: self.clone(),
-            initial_velocity: initial_velocity.unwrap_or_else(|| tape.observations()[0].v.clone()),
-            tape,
-            gaps: Default::default(),
-            controls: matrix,
-        })
     }
 
     /// What the user should know of the smallest gap at the start.

@@ -1,6 +1,6 @@
 //! A rollout as steps with transposes: controller, integrator and observations together.
 
-use super::{Fidelity, Observation, Policy, Sample};
+use super::{Fidelity, Observation, Policy, Sample, Simulator};
 use crate::adjoint::lie::{Vec3, Vec6, point_wrench};
 use crate::adjoint::step::Step;
 use crate::dynamics::{
@@ -34,6 +34,19 @@ pub(super) struct Partial {
     pub control: DVector<f64>,
     pub parameters: Parameters,
     pub gains: Vec<f64>,
+}
+
+impl Simulator {
+    /// The steps of this simulator with open-loop controls.
+    pub(super) fn trajectory<'a>(&'a self, controls: &'a DMatrix<f64>) -> Trajectory<'a> {
+        Trajectory {
+            stepper: self.stepper(),
+            policy: self.policy(),
+            clearance: self.clearance(),
+            fidelity: self.felt(),
+            controls,
+        }
+    }
 }
 
 impl<'a> Trajectory<'a> {

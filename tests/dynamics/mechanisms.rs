@@ -23,7 +23,7 @@ fn simulator(scene: &Scene, integrator: Integrator) -> Simulator {
 /// Every group of the gradient against differences.
 fn gradients(scene: &Scene, integrator: Integrator) {
     let mut simulator = simulator(scene, integrator);
-    let settings = gradcheck::Settings {
+    let settings = gradcheck::GradcheckSettings {
         steps: 20,
         directions: 2,
         seed: 1,

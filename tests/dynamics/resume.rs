@@ -184,8 +184,17 @@ fn rows_of_jacobians_are_sweeps() {
             let part = if row < 7 { &mut seed.q } else { &mut seed.v };
             part[(row % 7, 2)] = 1.0;
             let own = rollout.vjp(&seed).unwrap();
-            let start: Vec<f64> = own.initial.q.iter().chain(&own.initial.v).copied().collect();
-            assert_eq!(all.state.row(row).iter().copied().collect::<Vec<_>>(), start);
+            let start: Vec<f64> = own
+                .initial
+                .q
+                .iter()
+                .chain(&own.initial.v)
+                .copied()
+                .collect();
+            assert_eq!(
+                all.state.row(row).iter().copied().collect::<Vec<_>>(),
+                start
+            );
             assert_eq!(
                 all.controls.row(row).iter().collect::<Vec<_>>(),
                 own.controls.iter().collect::<Vec<_>>(),
@@ -197,7 +206,8 @@ fn rows_of_jacobians_are_sweeps() {
         let u = DVector::from_element(1, 0.5);
         let (next, record) = sim.step(&state, &u).unwrap();
         assert_eq!(&next, &rollout.states()[1]);
-        let wave = |n: usize, phase: f64| DVector::from_fn(n, |i, _| (phase + 1.7 * i as f64).sin());
+        let wave =
+            |n: usize, phase: f64| DVector::from_fn(n, |i, _| (phase + 1.7 * i as f64).sin());
         let (along, du) = (wave(14, 0.3), wave(1, 0.9));
         let forth = record.jvp(&along, &du).unwrap();
         let bar = wave(14, 2.1);
@@ -210,7 +220,10 @@ fn rows_of_jacobians_are_sweeps() {
             + back.initial.v.dot(&along.rows(7, 7))
             + back.controls.column(0).dot(&du);
         let error = (product - transposed).abs();
-        assert!(error <= 1e-10 * product.abs(), "{integrator:?}: {product} {transposed}");
+        assert!(
+            error <= 1e-10 * product.abs(),
+            "{integrator:?}: {product} {transposed}"
+        );
         assert!(record.jvp(&bar, &bar).is_err());
     }
 }

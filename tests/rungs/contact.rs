@@ -30,11 +30,11 @@ pub fn rungs() -> Vec<Rung> {
             check: limit_vjp,
         },
         Rung {
-            name: "dynamics::contact::Evaluation::contact_force_jvp",
+            name: "dynamics::contact_force::Evaluation::contact_force_jvp",
             check: jvp,
         },
         Rung {
-            name: "dynamics::contact::Evaluation::contact_force_vjp",
+            name: "dynamics::contact_force::Evaluation::contact_force_vjp",
             check: force_vjp,
         },
         Rung {

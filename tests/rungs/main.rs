@@ -113,7 +113,7 @@ const THROUGH: &[(&str, &str)] = &[
     // Pieces of the equations of motion.
     (
         "dynamics::contact::PairContact::displacement_vjp",
-        "dynamics::contact::Evaluation::contact_force_vjp",
+        "dynamics::contact_force::Evaluation::contact_force_vjp",
     ),
     (
         "dynamics::integrator::contact::Adjoint::solve_vjp",
@@ -196,7 +196,7 @@ const THROUGH: &[(&str, &str)] = &[
     ),
     ("adjoint::step::reverse", "simulate::rollout::Rollout::vjp"),
     (
-        "simulate::rollout::Rollout::gradient",
+        "simulate::objective::Rollout::gradient",
         "simulate::rollout::Rollout::vjp",
     ),
 ];

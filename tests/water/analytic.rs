@@ -11,7 +11,7 @@ use hydrograd::Error;
 use hydrograd::adjoint::lie::{Mat3, Mat6, Pose, Vec3, Vec6, exp_matrix, skew};
 use hydrograd::boundary::{BodyBoundary, Method, Settings};
 use hydrograd::coupling::full::{Full, MfsBody, Preconditioner, SolveSettings, Solver};
-use hydrograd::coupling::{Coupling, Direction, Exclusions, Isolated, Linearise, CouplingReport};
+use hydrograd::coupling::{Coupling, CouplingReport, Direction, Exclusions, Isolated, Linearise};
 use hydrograd::scene::{Shape, Wall};
 use nalgebra::{DMatrix, DVector};
 use std::sync::{Arc, LazyLock};

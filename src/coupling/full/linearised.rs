@@ -4,7 +4,9 @@ use super::{Full, Model, Response};
 use crate::Result;
 use crate::adjoint::lie::{Pose, Vec6};
 use crate::coupling::settings::asymmetry;
-use crate::coupling::{Direction, Linearised, Momenta, PairTensor, Pullback, CouplingReport, Tangent};
+use crate::coupling::{
+    CouplingReport, Direction, Linearised, Momenta, PairTensor, Pullback, Tangent,
+};
 use nalgebra::{DMatrix, DVector};
 
 /// [`Full`] solved for a basis.

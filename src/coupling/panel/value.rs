@@ -4,7 +4,7 @@ use super::PanelCoupled;
 use super::system::{System, seen_from};
 use crate::adjoint::lie::{Pose, Vec6};
 use crate::coupling::settings::asymmetry;
-use crate::coupling::{Momenta, CouplingReport};
+use crate::coupling::{CouplingReport, Momenta};
 use crate::solver::Columns;
 use crate::{Error, Result};
 use faer::MatRef;

@@ -8,7 +8,7 @@ use crate::Result;
 use crate::adjoint::kernel::potential_vjp;
 use crate::adjoint::lie::{Pose, Vec3, Vec6, six};
 use crate::coupling::pair::wrench;
-use crate::coupling::{Direction, Linearised, Momenta, Pullback, CouplingReport, Tangent};
+use crate::coupling::{CouplingReport, Direction, Linearised, Momenta, Pullback, Tangent};
 use faer::linalg::matmul::matmul;
 use faer::reborrow::ReborrowMut;
 use faer::{Accum, Mat, MatMut, MatRef, Par};

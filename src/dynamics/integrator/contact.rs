@@ -11,7 +11,6 @@
 //! A. Castro et al., "An Unconstrained Convex Formulation of Compliant Contact", 2022.
 
 use super::StepBar;
-use super::record::ContactVelocities;
 use super::split::Split;
 use super::start::Start;
 use crate::dynamics::{Dual, Evaluation};
@@ -28,6 +27,15 @@ const ENOUGH: f64 = 1e-9;
 const TRIALS: usize = 60;
 /// Part of the slope at its start that a search may leave.
 const LEFT: f64 = 0.3;
+
+/// Velocities of a step that solves contact at its end.
+#[derive(Clone, Debug, PartialEq)]
+pub struct ContactVelocities {
+    /// With which the step would end without contact.
+    pub before: DVector<f64>,
+    /// By which it moves, and with which contacts act.
+    pub after: DVector<f64>,
+}
 
 /// A velocity with its imbalance M (v − v*) − Δt g.
 struct Trial {

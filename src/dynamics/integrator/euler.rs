@@ -11,10 +11,10 @@
 //! The stage is solved by Newton's method with exact derivatives; its adjoint is the implicit function theorem at
 //! the converged stage, with the transpose of the same matrix.
 
-use super::record::ContactVelocities;
+use super::contact::{self, ContactVelocities};
 use super::split::Split;
 use super::start::Start;
-use super::{State, StateBar, StepBar, Stepper, contact};
+use super::{State, StateBar, StepBar, Stepper};
 use crate::adjoint::lie::angular;
 use crate::dynamics::Linearisation;
 use crate::{Error, Result};

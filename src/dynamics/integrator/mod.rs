@@ -23,7 +23,8 @@ mod split;
 mod start;
 mod velocity_euler;
 
-pub use record::{ContactVelocities, LinearisedStep, StepJacobians, StepRecord};
+pub use contact::ContactVelocities;
+pub use record::{LinearisedStep, StepJacobians, StepRecord};
 
 use super::{Drive, Evaluation, ForceCotangents, Linearisation, Parameters, System};
 use crate::Result;

@@ -1,5 +1,6 @@
 //! What a step leaves behind, and its derivatives.
 
+use super::contact::ContactVelocities;
 use super::split::Split;
 use super::start::Start;
 use super::{Input, Integrator, State, StateBar, StateTangent, StepBar, Stepper};
@@ -8,15 +9,6 @@ use crate::Result;
 use crate::dynamics::Linearisation;
 use nalgebra::{DMatrix, DVector};
 use rayon::prelude::*;
-
-/// Velocities of a step that solves contact at its end.
-#[derive(Clone, Debug, PartialEq)]
-pub struct ContactVelocities {
-    /// With which the step would end without contact.
-    pub before: DVector<f64>,
-    /// By which it moves, and with which contacts act.
-    pub after: DVector<f64>,
-}
 
 /// What a step leaves behind: where it started, what acted, how it was made, and its converged stages. It is small, and the only
 /// key to the step's derivatives ([`Stepper::linearise_step`]), which needn't iterate again.

@@ -2,9 +2,9 @@
 //!
 //! With contact, v⁺ is what [`contact::solve`] makes of that velocity at q.
 
-use super::record::ContactVelocities;
+use super::contact::{self, ContactVelocities};
 use super::start::Start;
-use super::{State, StateBar, StepBar, contact, readout};
+use super::{State, StateBar, StepBar, readout};
 use crate::Result;
 use nalgebra::{Cholesky, DVector, Dyn};
 

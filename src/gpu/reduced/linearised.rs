@@ -3,7 +3,9 @@
 use super::solution::Solution;
 use crate::Result;
 use crate::adjoint::lie::{Pose, Vec6};
-use crate::coupling::{Direction, Linearised, Momenta, PairTensor, Pullback, CouplingReport, Tangent};
+use crate::coupling::{
+    CouplingReport, Direction, Linearised, Momenta, PairTensor, Pullback, Tangent,
+};
 use crate::gpu::buffer::Buffer;
 use crate::gpu::combine::combine;
 use crate::gpu::points::Placed;

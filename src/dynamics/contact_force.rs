@@ -1,0 +1,211 @@
+//! Contact forces among bodies, with walls, and of joints at their limits ([`JointLimit`]): the law of
+//! [`crate::adjoint::contact`] at every point where surfaces are near.
+//!
+//! Points, normals and gaps belong to the configuration; the velocity is the argument of the force, so that an integrator
+//! that is implicit in it solves contact implicitly, against the mass matrix with its fluid part.
+
+use super::{
+    Contact, ContactForce, Dual, Evaluation, ForceCotangents, JointLimit, PairContact, Parameters,
+    System,
+};
+use crate::Result;
+use crate::adjoint::contact::{contact_force, contact_force_jvp, contact_force_vjp};
+use crate::adjoint::lie::{Pose, Vec3, Vec6, angular, point_velocity, point_wrench};
+use crate::multibody::{Cotangents, Virtual};
+use nalgebra::{DMatrix, DVector};
+
+impl System {
+    /// Contacts of bodies at `q` that end a step with the velocity `v`: all places where surfaces are no more than `slack` (m) farther apart than
+    /// the gap at which they touch, and what presses there, if anything does.
+    ///
+    /// # Errors
+    /// A signed distance that can't be found.
+    pub fn contact_forces(
+        &self,
+        parameters: &Parameters,
+        q: &DVector<f64>,
+        v: &DVector<f64>,
+        slack: f64,
+    ) -> Result<Vec<ContactForce>> {
+        let kinematics = self.tree.kinematics(q);
+        let twists = self.tree.twists(&kinematics, v);
+        let contact_points = self.contact_points(parameters, &kinematics.poses)?;
+        let near = contact_points
+            .iter()
+            .filter(|t| t.point.gap <= t.law.gap + slack.max(t.law.width));
+        let acting = near.map(|t| ContactForce {
+            first: t.first,
+            second: t.second,
+            gap: t.point.gap,
+            position: t.point.position.into(),
+            normal: t.point.normal.into(),
+            force: contact_force(&t.law, &t.meeting(&twists)).into(),
+        });
+        Ok(acting.collect())
+    }
+
+    /// All places where surfaces are near.
+    ///
+    /// # Errors
+    /// A signed distance that can't be found.
+    pub(super) fn contact_points(
+        &self,
+        parameters: &Parameters,
+        poses: &[Pose],
+    ) -> Result<Vec<PairContact>> {
+        let mut out = Vec::new();
+        let Some(model) = &self.contact else {
+            return Ok(out);
+        };
+        for (k, pair) in model.shapes.pairs().iter().enumerate() {
+            let law = model.law(k, parameters);
+            for point in model.shapes.points(k, poses, law.gap + law.width)? {
+                out.push(PairContact {
+                    first: pair.first,
+                    second: pair.second_body(),
+                    law,
+                    point,
+                });
+            }
+        }
+        Ok(out)
+    }
+}
+
+impl Evaluation<'_> {
+    /// Spatial contact wrenches on all bodies moving with the spatial `twists`.
+    fn contact_wrenches(&self, twists: &[Vec6]) -> Vec<Vec6> {
+        let mut out = vec![Vec6::zeros(); self.system.len()];
+        for t in &self.contact_points {
+            let force = contact_force(&t.law, &t.meeting(twists));
+            t.exchange(&point_wrench(&t.point.position, &force), &mut out);
+        }
+        out
+    }
+
+    /// Whether any force acts in contact at the velocity `v`; where none does, none changes with v either.
+    pub(super) fn presses(&self, v: &DVector<f64>) -> bool {
+        if self.stops(v).any(|(_, forces)| forces != [0.0; 2]) {
+            return true;
+        }
+        if self.contact_points.is_empty() {
+            return false;
+        }
+        let twists = self.system.tree.twists(&self.kinematics, v);
+        let at = |t: &PairContact| contact_force(&t.law, &t.meeting(&twists)) != Vec3::zeros();
+        self.contact_points.iter().any(at)
+    }
+
+    /// Generalised forces of contact at the velocity `v`.
+    pub fn contact_force(&self, v: &DVector<f64>, dual: Dual) -> DVector<f64> {
+        let tree = &self.system.tree;
+        let wrenches = self.contact_wrenches(&tree.twists(&self.kinematics, v));
+        let mut out = match dual {
+            Dual::User => tree.project(&self.kinematics, wrenches),
+            Dual::Frame => tree.project_frame(&self.kinematics, wrenches),
+        };
+        for (limit, [lower, upper]) in self.stops(v) {
+            out[limit.v] += lower + upper;
+        }
+        out
+    }
+
+    /// Sizes of the generalised forces of contact, without what cancels among them: what their rounding is relative to.
+    pub(super) fn contact_effort(&self, v: &DVector<f64>) -> DVector<f64> {
+        let tree = &self.system.tree;
+        let twists = tree.twists(&self.kinematics, v);
+        let mut out = DVector::zeros(v.len());
+        for t in &self.contact_points {
+            let force = contact_force(&t.law, &t.meeting(&twists));
+            if force != Vec3::zeros() {
+                let mut wrenches = vec![Vec6::zeros(); self.system.len()];
+                t.exchange(&point_wrench(&t.point.position, &force), &mut wrenches);
+                out += tree.project(&self.kinematics, wrenches).abs();
+            }
+        }
+        for (limit, [lower, upper]) in self.stops(v) {
+            out[limit.v] += lower.abs() + upper.abs();
+        }
+        out
+    }
+
+    /// Tangent of [`Evaluation::contact_force`] (the user's coordinates) along `dv`.
+    pub fn contact_force_jvp(&self, v: &DVector<f64>, dv: &DVector<f64>) -> DVector<f64> {
+        let tree = &self.system.tree;
+        let twists = tree.twists(&self.kinematics, v);
+        let dtwists = tree.twists(&self.kinematics, dv);
+        let mut out = vec![Vec6::zeros(); self.system.len()];
+        for t in &self.contact_points {
+            let du = point_velocity(&t.relative(&dtwists), &t.point.position);
+            let force = contact_force_jvp(&t.law, &t.meeting(&twists), &du);
+            t.exchange(&point_wrench(&t.point.position, &force), &mut out);
+        }
+        let mut out = tree.project(&self.kinematics, out);
+        for l in &self.system.limits {
+            out[l.v] += l.forces_jvp(self.q[l.q], v[l.v], dv[l.v]);
+        }
+        out
+    }
+
+    /// ∂g/∂v in the user's coordinates, column by column: symmetric, negative semi-definite.
+    pub(super) fn contact_jacobian(&self, v: &DVector<f64>) -> DMatrix<f64> {
+        let n = v.len();
+        let mut out = DMatrix::zeros(n, n);
+        for k in 0..n {
+            let mut unit = DVector::zeros(n);
+            unit[k] = 1.0;
+            out.set_column(k, &self.contact_force_jvp(v, &unit));
+        }
+        out
+    }
+
+    /// Transpose of [`Evaluation::contact_force`]: the gradient of zᵀ g over q, v and the parameters.
+    pub fn contact_force_vjp(
+        &self,
+        v: &DVector<f64>,
+        z: &DVector<f64>,
+        dual: Dual,
+    ) -> ForceCotangents {
+        let tree = &self.system.tree;
+        let virtual_velocity = match dual {
+            Dual::User => Virtual::User(z),
+            Dual::Frame => Virtual::Frame(z),
+        };
+        let fields = tree.fields(&self.kinematics, &self.q, v, virtual_velocity);
+        let mut bar = Cotangents::zeros(self.system.len());
+        let mut out = ForceCotangents::zeros(self);
+        for t in &self.contact_points {
+            let x = &t.point.position;
+            let meeting = t.meeting(&fields.twist);
+            let (twist, virt) = (t.relative(&fields.twist), t.relative(&fields.virtual_twist));
+            let force = contact_force(&t.law, &meeting);
+            t.exchange(&point_wrench(x, &force), &mut bar.virtual_twist);
+            let own = contact_force_vjp(&t.law, &meeting, &point_velocity(&virt, x));
+            t.exchange(&point_wrench(x, &own.velocity), &mut bar.twist);
+            // Both u and the virtual velocity are taken at the point.
+            let position = own.velocity.cross(&angular(&twist)) + force.cross(&angular(&virt));
+            t.displacement_vjp(&own, &position, &mut bar.pose);
+            out.parameters.add_contact(Contact {
+                stiffness: own.stiffness,
+                dissipation: own.dissipation,
+                friction: own.friction,
+            });
+        }
+        let (q_bar, v_bar) = tree.reverse(&self.kinematics, v, virtual_velocity, &fields, bar);
+        out.q += q_bar;
+        out.v += v_bar;
+        // The tangent of q is indexed as v.
+        for l in &self.system.limits {
+            let [q_bar, v_bar] = l.forces_vjp(self.q[l.q], v[l.v], z[l.v]);
+            out.q[l.v] += q_bar;
+            out.v[l.v] += v_bar;
+        }
+        out
+    }
+
+    /// Each limit with the forces of its stops at the velocity `v`.
+    pub(super) fn stops(&self, v: &DVector<f64>) -> impl Iterator<Item = (&JointLimit, [f64; 2])> {
+        let each = self.system.limits.iter();
+        each.map(|l| (l, l.forces(self.q[l.q], v[l.v])))
+    }
+}

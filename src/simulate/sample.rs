@@ -1,0 +1,42 @@
+//! What is observed at a state of a trajectory.
+
+use crate::adjoint::lie::{Pose, Vec6};
+use crate::coupling::CouplingReport;
+use crate::geometry::Gap;
+use nalgebra::DVector;
+
+/// What is observed at one state.
+#[derive(Clone, Debug)]
+pub struct Sample {
+    /// Time, s.
+    pub time: f64,
+    /// Joint coordinates.
+    pub q: DVector<f64>,
+    /// Generalised velocity.
+    pub v: DVector<f64>,
+    /// Poses of the bodies.
+    pub poses: Vec<Pose>,
+    /// Kinetic energy of bodies and fluid, J.
+    pub kinetic_energy: f64,
+    /// Potential energy of weight and buoyancy, J.
+    pub potential_energy: f64,
+    /// Total momentum and angular momentum about the world origin, bodies and fluid.
+    pub momentum: Vec6,
+    /// Largest absolute entry of any single body's momentum.
+    pub largest_momentum: Vec6,
+    /// Total controls during the step that starts here; empty at the last state.
+    pub control: DVector<f64>,
+    /// Joints held during that step.
+    pub hold: Vec<bool>,
+    /// What the coupling reports.
+    pub report: CouplingReport,
+    /// Smallest gap; for [`Rollout::gaps`].
+    pub(super) gap: Option<Gap>,
+}
+
+impl Sample {
+    /// Kinetic and potential energy, J.
+    pub fn energy(&self) -> f64 {
+        self.kinetic_energy + self.potential_energy
+    }
+}

@@ -69,18 +69,6 @@ impl Growth {
 /// # Errors
 /// A rollout or a transpose that fails, or no steps.
 pub fn growth(simulator: &Simulator, steps: usize) -> Result<Growth> {
-    growth_with(simulator, steps, |_, _| {})
-}
-
-/// As [`growth`]; `progress` is called with how many steps are done, and of how many.
-///
-/// # Errors
-/// As [`growth`].
-pub fn growth_with(
-    simulator: &Simulator,
-    steps: usize,
-    mut progress: impl FnMut(usize, usize),
-) -> Result<Growth> {
     if steps == 0 {
         return Err(Error::input("growth: steps", steps, "must be at least 1"));
     }
@@ -154,7 +142,6 @@ pub fn growth_with(
             };
         }
         out.total = so_far;
-        progress(n + 1, steps);
     }
     Ok(out)
 }

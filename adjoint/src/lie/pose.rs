@@ -92,18 +92,6 @@ impl Pose {
             &(self.rotation * angular(f) + self.translation.cross(&force)),
         )
     }
-
-    /// Inverse of [`Pose::wrench_to_world`].
-    #[inline]
-    pub fn wrench_to_body(&self, f: &Vec6) -> Vec6 {
-        let (force, moment) = (linear(f), angular(f));
-        six(
-            &self.rotation.tr_mul(&force),
-            &self
-                .rotation
-                .tr_mul(&(moment - self.translation.cross(&force))),
-        )
-    }
 }
 
 #[cfg(test)]
@@ -124,7 +112,7 @@ mod tests {
         let v = Vec6::new(1.0, -2.0, 0.5, 0.3, 0.8, -0.6);
         let f = Vec6::new(-0.2, 0.9, 1.5, 2.0, -0.4, 0.7);
         assert!((g.twist_to_body(&g.twist_to_world(&v)) - v).norm() < 1e-14);
-        assert!((g.wrench_to_body(&g.wrench_to_world(&f)) - f).norm() < 1e-14);
+        assert!((g.inverse().wrench_to_world(&g.wrench_to_world(&f)) - f).norm() < 1e-14);
         assert!((g.wrench_to_world(&f).dot(&g.twist_to_world(&v)) - f.dot(&v)).abs() < 1e-14);
         assert!((cross_motion(&v, &f).dot(&f) + f.dot(&cross_force(&v, &f))).abs() < 1e-14);
     }

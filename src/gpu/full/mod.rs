@@ -10,6 +10,8 @@ mod response;
 mod second;
 mod solve;
 
+// For tests and benches alone.
+#[doc(hidden)]
 pub use probe::{PairWrenches, Probe};
 
 use super::context::{Context, Options};

@@ -1,5 +1,6 @@
 //! A few columns side by side.
 
+use crate::adjoint::solve::Columnwise;
 use faer::{MatMut, MatRef};
 
 /// Row-major `[row][column]` array with few columns.
@@ -116,6 +117,39 @@ impl Columns {
             for k in 0..n {
                 a[k] += b[k] * scale[k];
             }
+        }
+    }
+}
+
+impl Columnwise for Columns {
+    fn count(&self) -> usize {
+        self.columns
+    }
+
+    fn beside(&self, other: &Self) -> Self {
+        let n = self.columns;
+        Self::from_fn(self.rows, n + other.columns, |i, k| {
+            if k < n {
+                self.at(i, k)
+            } else {
+                other.at(i, k - n)
+            }
+        })
+    }
+
+    fn split(&self, n: usize) -> (Self, Self) {
+        (
+            Self::from_fn(self.rows, n, |i, k| self.at(i, k)),
+            Self::from_fn(self.rows, self.columns - n, |i, k| self.at(i, n + k)),
+        )
+    }
+
+    fn sum(alpha: f64, x: &Self, beta: f64, y: &Self) -> Self {
+        let pairs = x.data.iter().zip(&y.data);
+        Self {
+            rows: x.rows,
+            columns: x.columns,
+            data: pairs.map(|(x, y)| alpha * x + beta * y).collect(),
         }
     }
 }

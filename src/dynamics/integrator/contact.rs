@@ -13,9 +13,10 @@
 use super::StepBar;
 use super::split::Split;
 use super::start::Start;
+use crate::adjoint::solve::Definite;
 use crate::dynamics::{Dual, Evaluation};
 use crate::{Error, Result};
-use nalgebra::{Cholesky, DMatrix, DVector, Dyn};
+use nalgebra::{DMatrix, DVector};
 
 /// Most Newton iterations.
 const ITERATIONS: usize = 200;
@@ -45,10 +46,10 @@ struct Trial {
 }
 
 /// The Hessian M + Δt Jᵀ G J on the free rows, factored.
-fn hessian(e: &Evaluation, split: &Split, v: &DVector<f64>, dt: f64) -> Result<Cholesky<f64, Dyn>> {
+fn hessian(e: &Evaluation, split: &Split, v: &DVector<f64>, dt: f64) -> Result<Definite> {
     let m = &e.mass_matrix - dt * e.contact_jacobian(v);
     let m: DMatrix<f64> = 0.5 * (&m + m.transpose());
-    split.block(&m).cholesky().ok_or_else(|| Error::Solver {
+    Definite::new(split.block(&m)).ok_or_else(|| Error::Solver {
         what: "contact".into(),
         iterations: 0,
         residual: f64::INFINITY,
@@ -167,7 +168,7 @@ enum Pressed {
     /// Something does, but every velocity is driven.
     Driven,
     /// The problem's Hessian at its solution, factored.
-    Solved(Cholesky<f64, Dyn>),
+    Solved(Definite),
 }
 
 impl<'s> Adjoint<'s> {
@@ -203,7 +204,7 @@ impl<'s> Adjoint<'s> {
         };
         let (e, split) = (start.e, start.split);
         let ContactVelocities { before, after } = self.velocities;
-        let w = split.put(&hessian.solve(&split.take(after_bar)));
+        let w = split.put(&hessian.solve_vjp(&split.take(after_bar)));
         bar.add(
             start.stepper.dt,
             &e.contact_force_vjp(after, &w, Dual::User),

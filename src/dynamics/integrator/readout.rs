@@ -2,47 +2,30 @@
 
 use super::split::{Split, When};
 use super::{State, StepBar, Stepper};
+use crate::adjoint::solve::{Definite, smallest_scaled_eigenvalue};
 use crate::dynamics::{Evaluation, Linearisation};
 use crate::{Error, Result};
-use nalgebra::{Cholesky, DVector, Dyn};
+use nalgebra::DVector;
 
-/// Cholesky factor of the free block of the mass matrix.
-pub(super) fn factor(e: &Evaluation, split: &Split) -> Result<Cholesky<f64, Dyn>> {
+/// The free block of the mass matrix, factored.
+pub(super) fn factor(e: &Evaluation, split: &Split) -> Result<Definite> {
     let block = split.block(&e.mass_matrix);
-    // Scaled to unit diagonal, so that the verdict doesn't depend on units or sizes.
-    let scale = block
-        .diagonal()
-        .map(|d| if d > 0.0 { 1.0 / d.sqrt() } else { 0.0 });
-    let scaled = nalgebra::DMatrix::from_fn(block.nrows(), block.ncols(), |i, j| {
-        scale[i] * block[(i, j)] * scale[j]
-    });
-    let smallest = if scaled.is_empty() {
-        1.0
-    } else if scaled.iter().all(|x| x.is_finite()) {
-        scaled.symmetric_eigenvalues().min()
-    } else {
-        f64::NAN
-    };
-    if smallest.is_nan() || smallest <= 1e-13 {
-        return Err(Error::Unresolved {
-            place: "mass matrix M(q)".into(),
-            quantity: "smallest eigenvalue, diagonal scaled to one".into(),
-            value: smallest,
-            limit: 1e-13,
-            remedy:
-                "M must be positive definite. At the start: give massless bodies mass, inertia or \
-                     added mass, or refine the meshes where a gap isn't resolved. Later: the run \
-                     may have blown up, take a smaller time step or the integrator midpoint"
-                    .into(),
-        });
-    }
-    block.cholesky().ok_or_else(|| Error::Unresolved {
+    let smallest = smallest_scaled_eigenvalue(&block);
+    let unresolved = |remedy: &str| Error::Unresolved {
         place: "mass matrix M(q)".into(),
         quantity: "smallest eigenvalue, diagonal scaled to one".into(),
         value: smallest,
         limit: 1e-13,
-        remedy: "M must be positive definite".into(),
-    })
+        remedy: remedy.into(),
+    };
+    if smallest.is_nan() || smallest <= 1e-13 {
+        return Err(unresolved(
+            "M must be positive definite. At the start: give massless bodies mass, inertia or added \
+             mass, or refine the meshes where a gap isn't resolved. Later: the run may have blown up, \
+             take a smaller time step or the integrator midpoint",
+        ));
+    }
+    Definite::new(block).ok_or_else(|| unresolved("M must be positive definite"))
 }
 
 /// v with driven entries given and free ones from momentum p̂.
@@ -61,7 +44,7 @@ pub(super) fn solve_vjp(
     v_bar: &DVector<f64>,
     bar: &mut StepBar,
 ) -> Result<()> {
-    let w = split.put(&factor(e, split)?.solve(&split.take(v_bar)));
+    let w = split.put(&factor(e, split)?.solve_vjp(&split.take(v_bar)));
     bar.add(-1.0, &e.momentum_vjp(v, &w)?);
     bar.state.q += e.frame_velocity_vjp(&w, hat);
     bar.state.y += e.frame_velocity(&w);

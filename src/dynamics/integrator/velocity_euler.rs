@@ -6,11 +6,12 @@ use super::contact::{self, ContactVelocities};
 use super::start::Start;
 use super::{State, StateBar, StepBar, readout};
 use crate::Result;
-use nalgebra::{Cholesky, DVector, Dyn};
+use crate::adjoint::solve::Definite;
+use nalgebra::DVector;
 
 /// Acceleration, with the factored mass matrix of free velocities: driven joints reach their new velocity within the step, the
 /// others follow Eq. 3.
-fn acceleration(start: &Start) -> Result<(DVector<f64>, Cholesky<f64, Dyn>)> {
+fn acceleration(start: &Start) -> Result<(DVector<f64>, Definite)> {
     let (s, e, split, v) = (start.stepper, start.e, start.split, start.v);
     let mut driven = (&split.driven - v) / s.dt;
     for &i in &split.free {
@@ -37,7 +38,7 @@ pub(super) struct Adjoint<'s> {
     contact: contact::Adjoint<'s>,
     acceleration: DVector<f64>,
     /// Of the mass matrix of free velocities.
-    factor: Cholesky<f64, Dyn>,
+    factor: Definite,
 }
 
 impl<'s> Adjoint<'s> {
@@ -62,7 +63,7 @@ impl<'s> Adjoint<'s> {
         split.forget_driven(&mut v_bar);
         bar.v += &v_bar;
         // Free rows of M a = G − M_fd a_d, a_d = (v_d − v)/Δt.
-        let w = split.put(&self.factor.solve(&split.take(&(s.dt * &v_bar))));
+        let w = split.put(&self.factor.solve_vjp(&split.take(&(s.dt * &v_bar))));
         let force = e.inertial_force_vjp(start.v, &start.input.control, &w)?;
         bar.v += &force.v;
         bar.add(1.0, &force);

@@ -79,13 +79,7 @@ impl<'a> Placed<'a> {
     /// Solves for columns of twists.
     pub fn solve(&self, twists: DMatrix<f64>) -> Result<Solution> {
         let (f, g) = (self.face_side(&twists), self.source_side(&twists));
-        let Solved {
-            a,
-            lambda,
-            r,
-            mu,
-            reached,
-        } = self.system.respond(&f, &g)?;
+        let (Solved { a, lambda, r, mu }, reached) = self.system.respond(&f, &g)?;
         Ok(Solution {
             twists,
             a,

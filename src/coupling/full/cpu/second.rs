@@ -3,9 +3,10 @@
 use super::super::body::unit_twists;
 use super::gradient_at;
 use super::placed::{Placed, Solution, body_twists};
-use super::system::{Solved, join, split};
+use super::system::Solved;
 use crate::Result;
 use crate::adjoint::lie::{Vec3, Vec6, six};
+use crate::adjoint::solve::{Columnwise, Moved};
 use crate::coupling::Tangent;
 use crate::coupling::pair::Pair;
 use crate::solver::Columns;
@@ -24,8 +25,8 @@ impl Placed<'_> {
     /// The tangent along z of the energy of the first with the last of one or two columns.
     pub fn second(&self, solution: &Solution, z: &[Vec6]) -> Result<Tangent> {
         let n = solution.columns();
-        let right = join(&solution.a, &solution.lambda);
-        let left = join(&solution.mu, &solution.r);
+        let right = solution.a.beside(&solution.lambda);
+        let left = solution.mu.beside(&solution.r);
         let bodies = self.model.bodies.len();
 
         let mut dk = Columns::zeros(self.model.rows(), 2 * n);
@@ -78,8 +79,13 @@ impl Placed<'_> {
                 readout,
             });
         }
-        let (dka, dkl) = split(&dk, n);
-        let tangent = self.system.respond_jvp(&dka, &dkl, &dkr, &dg)?;
+        let (dka, dkl) = dk.split(n);
+        let (tangent, _) = self.system.respond_jvp(&Moved {
+            a: &dka,
+            lambda: &dkl,
+            r: &dkr,
+            g: &dg,
+        })?;
 
         let momenta: Vec<DVector<f64>> = (0..n)
             .map(|k| {

@@ -3,6 +3,7 @@
 use super::super::{MfsBody, Preconditioner, Reached, Solver};
 use super::Cpu;
 use crate::adjoint::kernel::Write;
+use crate::adjoint::solve::{Fitted, Moved, Operator, least_squares, least_squares_jvp};
 use crate::coupling::pair::Pair;
 use crate::solver::{Columns, Outcome, cgls, gmres, normal_product, product, transposed_product};
 use crate::{Error, Result};
@@ -28,12 +29,16 @@ impl Drop for System<'_> {
 }
 
 /// Solutions a and λ with r and μ.
-pub(super) struct Solved {
-    pub a: Columns,
-    pub lambda: Columns,
-    pub r: Columns,
-    pub mu: Columns,
-    pub reached: Reached,
+pub(super) type Solved = Fitted<Columns>;
+
+impl Operator<Columns> for System<'_> {
+    fn apply(&self, x: &Columns) -> Columns {
+        product(&self.matrix, self.cpu.model.rows(), x)
+    }
+
+    fn apply_transpose(&self, y: &Columns) -> Columns {
+        transposed_product(&self.matrix, self.cpu.model.columns(), y)
+    }
 }
 
 impl<'a> System<'a> {
@@ -119,16 +124,6 @@ impl<'a> System<'a> {
         out
     }
 
-    /// K x.
-    pub fn apply(&self, x: &Columns) -> Columns {
-        product(&self.matrix, self.cpu.model.rows(), x)
-    }
-
-    /// Kᵀ y.
-    pub fn apply_transpose(&self, y: &Columns) -> Columns {
-        transposed_product(&self.matrix, self.cpu.model.columns(), y)
-    }
-
     /// Applies a body's factor to its rows of `x`.
     fn per_body(&self, x: &mut Columns, f: impl Fn(&MfsBody, MatMut<'_, f64>)) {
         let n = x.columns;
@@ -189,7 +184,7 @@ impl<'a> System<'a> {
     }
 
     /// Solves `(KᵀK + D²) x = g`.
-    pub fn normal_solve(&self, g: &Columns, what: &str) -> Result<Outcome> {
+    fn normal_solve(&self, g: &Columns, what: &str) -> Result<Outcome> {
         let settings = &self.cpu.model.settings;
         if let Some(qr) = &self.qr {
             let mut x = g.as_mat().to_owned();
@@ -254,100 +249,49 @@ impl<'a> System<'a> {
     }
 
     /// Solves for a and λ from `F x̄` and `Pᵀ B x̄`.
-    pub fn respond(&self, f: &Columns, g: &Columns) -> Result<Solved> {
+    pub fn respond(&self, f: &Columns, g: &Columns) -> Result<(Solved, Reached)> {
         if self.cpu.model.settings.solver == Solver::Gmres {
             let a = self.square_solve(f, false, "coupled system (Eq. 18)")?;
             let mu = self.square_solve(g, true, "transposed coupled system")?;
-            return Ok(Solved {
-                lambda: Columns::zeros(g.rows, g.columns),
-                r: Columns::zeros(f.rows, f.columns),
-                reached: reached(&a).worst(reached(&mu)),
-                a: a.x,
-                mu: mu.x,
-            });
+            return Ok(square(a, mu));
         }
-        let n = f.columns;
-        let kf = self.apply_transpose(f);
-        let both = join(&kf, g);
-        let solved = self.normal_solve(&both, "coupled system (Eq. 20)")?;
-        let (a, lambda) = split(&solved.x, n);
-        let image = self.apply(&solved.x);
-        let (ka, mu) = split(&image, n);
-        let mut r = f.clone();
-        r.add_scaled(&ka, &vec![-1.0; n]);
-        Ok(Solved {
-            a,
-            lambda,
-            r,
-            mu,
-            reached: reached(&solved),
-        })
+        let normal = |b: &Columns| self.normal_solve(b, "coupled system (Eq. 20)").map(parts);
+        least_squares(self, normal, f, g)
     }
 
-    /// Tangents of (a, λ, r, μ) from δK a, δK λ (faces) and δKᵀ r, δPᵀB − δKᵀ μ (sources).
-    pub fn respond_jvp(
-        &self,
-        dka: &Columns,
-        dkl: &Columns,
-        dkr: &Columns,
-        dg: &Columns,
-    ) -> Result<Solved> {
-        let n = dka.columns;
-        let minus = vec![-1.0; n];
+    /// Tangents of the solutions.
+    pub fn respond_jvp(&self, moved: &Moved<Columns>) -> Result<(Solved, Reached)> {
         if self.cpu.model.settings.solver == Solver::Gmres {
-            let mut right = dka.clone();
+            let mut right = moved.a.clone();
             right.data.iter_mut().for_each(|x| *x = -*x);
             let a = self.square_solve(&right, false, "tangent of the coupled system (Eq. 21)")?;
-            let mu = self.square_solve(dg, true, "transposed tangent of the coupled system")?;
-            return Ok(Solved {
-                lambda: Columns::zeros(dg.rows, n),
-                r: Columns::zeros(dka.rows, n),
-                reached: reached(&a).worst(reached(&mu)),
-                a: a.x,
-                mu: mu.x,
-            });
+            let mu =
+                self.square_solve(moved.g, true, "transposed tangent of the coupled system")?;
+            return Ok(square(a, mu));
         }
-        let faces = join(dka, dkl);
-        let mut right = join(dkr, dg);
-        right.add_scaled(&self.apply_transpose(&faces), &vec![-1.0; 2 * n]);
-        let solved = self.normal_solve(&right, "tangent of the coupled system (Eq. 21)")?;
-        let image = self.apply(&solved.x);
-        let (kda, kdl) = split(&image, n);
-        let (a, lambda) = split(&solved.x, n);
-        let mut r = dka.clone();
-        r.data.iter_mut().for_each(|x| *x = -*x);
-        r.add_scaled(&kda, &minus);
-        let mut mu = dkl.clone();
-        mu.add_scaled(&kdl, &vec![1.0; n]);
-        Ok(Solved {
-            a,
-            lambda,
-            r,
-            mu,
-            reached: reached(&solved),
-        })
+        let what = "tangent of the coupled system (Eq. 21)";
+        let normal = |b: &Columns| self.normal_solve(b, what).map(parts);
+        least_squares_jvp(self, normal, moved)
     }
 }
 
-fn reached(outcome: &Outcome) -> Reached {
-    Reached {
+/// A solution, and what its solver reached.
+fn parts(outcome: Outcome) -> (Columns, Reached) {
+    let reached = Reached {
         iterations: outcome.iterations,
         residual: outcome.residual,
-    }
+    };
+    (outcome.x, reached)
 }
 
-/// The columns of both side by side.
-pub(super) fn join(a: &Columns, b: &Columns) -> Columns {
-    let n = a.columns;
-    Columns::from_fn(a.rows, n + b.columns, |i, k| {
-        if k < n { a.at(i, k) } else { b.at(i, k - n) }
-    })
-}
-
-/// The first n columns and the others.
-pub(super) fn split(x: &Columns, n: usize) -> (Columns, Columns) {
-    (
-        Columns::from_fn(x.rows, n, |i, k| x.at(i, k)),
-        Columns::from_fn(x.rows, x.columns - n, |i, k| x.at(i, n + k)),
-    )
+/// Solutions of a square system, that leaves no residual, and of the transposed one.
+fn square(a: Outcome, mu: Outcome) -> (Solved, Reached) {
+    let ((a, first), (mu, second)) = (parts(a), parts(mu));
+    let solved = Solved {
+        lambda: Columns::zeros(a.rows, a.columns),
+        r: Columns::zeros(mu.rows, mu.columns),
+        a,
+        mu,
+    };
+    (solved, first.worst(second))
 }

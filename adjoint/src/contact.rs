@@ -39,9 +39,9 @@ pub struct Law {
     pub horizon: f64,
 }
 
-/// Where and how two surfaces meet.
+/// State of a contact point.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Meeting {
+pub struct PointState {
     /// φ, m.
     pub gap: f64,
     /// Share of the point's stiffness.
@@ -102,7 +102,7 @@ struct Parts {
 }
 
 impl Parts {
-    fn new(law: &Law, m: &Meeting) -> Self {
+    fn new(law: &Law, m: &PointState) -> Self {
         let normal_speed = m.normal.dot(&m.velocity);
         let tangential = m.velocity - m.normal * normal_speed;
         let speed = tangential.norm_squared() + law.stiction_speed * law.stiction_speed;
@@ -131,40 +131,40 @@ impl Parts {
     }
 
     /// ∂(v_t/σ)/∂v_t within the tangent plane, all three directions.
-    fn turning(&self) -> Mat3 {
+    fn direction_slope(&self) -> Mat3 {
         let along = self.tangential / self.speed;
         (Mat3::identity() - along * along.transpose()) / self.speed
     }
 }
 
 /// F on the first body, N.
-pub fn contact_force(law: &Law, m: &Meeting) -> Vec3 {
+pub fn contact_force(law: &Law, m: &PointState) -> Vec3 {
     let p = Parts::new(law, m);
     p.direction * (m.weight * p.normal_force(law))
 }
 
 /// N, the normal part of [`contact_force`].
-pub fn normal_force(law: &Law, m: &Meeting) -> f64 {
+pub fn normal_force(law: &Law, m: &PointState) -> f64 {
     m.weight * Parts::new(law, m).normal_force(law)
 }
 
 /// ∂F/∂u: symmetric and negative semi-definite, −∂²P/∂u².
-pub fn contact_damping(law: &Law, m: &Meeting) -> Mat3 {
+pub fn contact_damping(law: &Law, m: &PointState) -> Mat3 {
     let p = Parts::new(law, m);
     let plane = Mat3::identity() - m.normal * m.normal.transpose();
     let e = &p.direction;
     let along = p.slope(law) * e * e.transpose();
-    let across = p.normal_force(law) * law.friction * (plane * p.turning() * plane);
+    let across = p.normal_force(law) * law.friction * (plane * p.direction_slope() * plane);
     m.weight * (along - across)
 }
 
 /// Tangent of [`contact_force`] along a change of the velocity.
-pub fn contact_force_jvp(law: &Law, m: &Meeting, velocity: &Vec3) -> Vec3 {
+pub fn contact_force_jvp(law: &Law, m: &PointState, velocity: &Vec3) -> Vec3 {
     contact_damping(law, m) * velocity
 }
 
 /// Transpose of [`contact_force`] in all its arguments.
-pub fn contact_force_vjp(law: &Law, m: &Meeting, bar: &Vec3) -> ContactBar {
+pub fn contact_force_vjp(law: &Law, m: &PointState, bar: &Vec3) -> ContactBar {
     let p = Parts::new(law, m);
     let force = p.normal_force(law);
     let (n, u) = (&m.normal, &m.velocity);
@@ -176,7 +176,8 @@ pub fn contact_force_vjp(law: &Law, m: &Meeting, bar: &Vec3) -> ContactBar {
     let damping_bar = force_bar * law.stiffness * p.depth.0 * p.damping.1;
     let z_bar = -law.horizon * depth_bar - law.dissipation * damping_bar;
     let t = p.tangential;
-    let t_bar = -law.friction * (p.turning() * e_bar) - t * (law.friction * z_bar / p.speed);
+    let t_bar =
+        -law.friction * (p.direction_slope() * e_bar) - t * (law.friction * z_bar / p.speed);
     // v_n = n·u, v_t = u − n v_n.
     let normal_speed_bar = z_bar - n.dot(&t_bar);
     ContactBar {
@@ -206,8 +207,8 @@ mod tests {
         }
     }
 
-    fn meeting(gap: f64, velocity: Vec3) -> Meeting {
-        Meeting {
+    fn point_state(gap: f64, velocity: Vec3) -> PointState {
+        PointState {
             gap,
             weight: 1.0,
             normal: Vec3::new(0.36, -0.48, 0.8),
@@ -222,7 +223,7 @@ mod tests {
         for k in 0..2000 {
             let x = f64::from(k);
             let velocity = Vec3::new((7.1 * x).sin(), (3.3 * x).cos(), (1.7 * x).sin());
-            let m = meeting(law.gap + 0.01 * (0.37 * x).sin(), velocity);
+            let m = point_state(law.gap + 0.01 * (0.37 * x).sin(), velocity);
             let f = contact_force(&law, &m);
             let normal = f.dot(&m.normal);
             let tangential = f - m.normal * normal;
@@ -245,7 +246,7 @@ mod tests {
         for k in 0..200 {
             let x = f64::from(k);
             let velocity = 1e-3 * Vec3::new((7.1 * x).sin(), (3.3 * x).cos(), (1.7 * x).sin());
-            let d = contact_damping(&law, &meeting(1.99e-3, velocity));
+            let d = contact_damping(&law, &point_state(1.99e-3, velocity));
             assert!((d - d.transpose()).norm() <= 1e-12 * d.norm());
             assert!(d.symmetric_eigenvalues().max() <= 1e-12 * d.norm());
         }
@@ -256,7 +257,7 @@ mod tests {
     fn zero_velocity_and_exact_touch_are_finite() {
         let law = law();
         for gap in [law.gap, law.gap + law.width, law.gap - law.width, 0.0] {
-            let m = meeting(gap, Vec3::zeros());
+            let m = point_state(gap, Vec3::zeros());
             let bar = contact_force_vjp(&law, &m, &Vec3::new(1.0, 2.0, 3.0));
             let all = [
                 bar.gap,

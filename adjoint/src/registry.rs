@@ -1,7 +1,7 @@
 //! Every derivative rung of this crate with its check.
 
 use crate::check::{Outcome, Rung, dot, outcome};
-use crate::contact::{Law, Meeting, contact_force, contact_force_jvp, contact_force_vjp};
+use crate::contact::{Law, PointState, contact_force, contact_force_jvp, contact_force_vjp};
 use crate::drag::{Element, Part, quadratic_drag, quadratic_drag_jvp, quadratic_drag_vjp};
 use crate::lie::{
     Mat3, Mat6, Vec3, Vec6, exp_jacobian_inverse, exp_jacobian_inverse_vjp, exp_matrix,
@@ -240,7 +240,7 @@ const CONTACTS: [[f64; 11]; 4] = [
     [-0.08, 0.5, 0.0, 0.6, 0.8, 0.1, 0.9, 2.2, 3e3, 0.5, 0.2],
 ];
 
-fn contact(x: &[f64]) -> (Law, Meeting) {
+fn contact(x: &[f64]) -> (Law, PointState) {
     let law = Law {
         stiffness: x[8],
         dissipation: x[9],
@@ -250,28 +250,28 @@ fn contact(x: &[f64]) -> (Law, Meeting) {
         width: 5e-3,
         horizon: 0.01,
     };
-    let meeting = Meeting {
+    let point_state = PointState {
         gap: x[0],
         weight: x[1],
         normal: Vec3::new(x[2], x[3], x[4]),
         velocity: Vec3::new(x[5], x[6], x[7]),
     };
-    (law, meeting)
+    (law, point_state)
 }
 
 fn contact_force_jvp_check(corruption: f64) -> Outcome {
     all(CONTACTS.into_iter().flat_map(|x| {
-        let (law, meeting) = contact(&x);
-        let at = meeting.velocity;
+        let (law, point_state) = contact(&x);
+        let at = point_state.velocity;
         let value = |u: &[f64]| {
-            let meeting = Meeting {
+            let point_state = PointState {
                 velocity: Vec3::from_column_slice(u),
-                ..meeting
+                ..point_state
             };
-            contact_force(&law, &meeting).as_slice().to_vec()
+            contact_force(&law, &point_state).as_slice().to_vec()
         };
         let along = |du: [f64; 3]| {
-            let jvp = corruption * contact_force_jvp(&law, &meeting, &Vec3::from(du));
+            let jvp = corruption * contact_force_jvp(&law, &point_state, &Vec3::from(du));
             outcome(value, &[at.x, at.y, at.z], &du, jvp.as_slice(), TOLERANCE)
         };
         (70..75)
@@ -282,16 +282,16 @@ fn contact_force_jvp_check(corruption: f64) -> Outcome {
 
 fn contact_force_vjp_check(corruption: f64) -> Outcome {
     all(CONTACTS.map(|x| {
-        let (law, meeting) = contact(&x);
+        let (law, point_state) = contact(&x);
         // In units of each argument's own size.
         let size = [0.01, 0.1, 0.1, 0.1, 0.1, 0.01, 0.01, 0.01, 1e3, 0.1, 0.1];
         let value = |y: &[f64]| {
             let row: [f64; 11] = std::array::from_fn(|i| x[i] + size[i] * y[i]);
-            let (law, meeting) = contact(&row);
-            contact_force(&law, &meeting).as_slice().to_vec()
+            let (law, point_state) = contact(&row);
+            contact_force(&law, &point_state).as_slice().to_vec()
         };
         let bars = |bar: &[f64]| {
-            let b = contact_force_vjp(&law, &meeting, &Vec3::from_column_slice(bar));
+            let b = contact_force_vjp(&law, &point_state, &Vec3::from_column_slice(bar));
             let (n, u) = (b.normal, b.velocity);
             let bars = [
                 b.gap,

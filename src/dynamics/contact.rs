@@ -1,7 +1,7 @@
 //! Contact among bodies and with walls: which surfaces may touch, by which law, and where they are near.
 
 use super::Parameters;
-use crate::adjoint::contact::{ContactBar, Law, Meeting};
+use crate::adjoint::contact::{ContactBar, Law, PointState};
 use crate::adjoint::lie::{Vec3, Vec6, point_velocity, point_wrench, six};
 use crate::contact::{ContactPoint, Contacts};
 use serde::Serialize;
@@ -79,9 +79,9 @@ impl PairContact {
         field[self.first] - self.second.map_or(Vec6::zeros(), |b| field[b])
     }
 
-    pub(super) fn meeting(&self, twists: &[Vec6]) -> Meeting {
+    pub(super) fn point_state(&self, twists: &[Vec6]) -> PointState {
         let p = &self.point;
-        Meeting {
+        PointState {
             gap: p.gap,
             weight: p.weight,
             normal: p.normal,

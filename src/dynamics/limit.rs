@@ -4,7 +4,9 @@
 //! [`contact_force`] of a point that moves along its normal. The coordinate's rate is its velocity in the user's coordinates and
 //! in the frame's (X = 1 for a joint with one coordinate), and so the force is the same in both.
 
-use crate::adjoint::contact::{Law, Meeting, contact_force, contact_force_jvp, contact_force_vjp};
+use crate::adjoint::contact::{
+    Law, PointState, contact_force, contact_force_jvp, contact_force_vjp,
+};
 use crate::adjoint::lie::Vec3;
 
 /// Range of a joint with one coordinate.
@@ -21,30 +23,30 @@ pub struct JointLimit {
 }
 
 impl JointLimit {
-    /// The meeting with either stop at the coordinate `q` and its rate `v`, with the sign of the force's direction.
-    fn meetings(&self, q: f64, v: f64) -> [(f64, Meeting); 2] {
+    /// The point_state with either stop at the coordinate `q` and its rate `v`, with the sign of the force's direction.
+    fn point_states(&self, q: f64, v: f64) -> [(f64, PointState); 2] {
         let [lower, upper] = self.range;
         [(1.0, q - lower), (-1.0, upper - q)].map(|(sign, gap)| {
-            let meeting = Meeting {
+            let point_state = PointState {
                 gap,
                 weight: 1.0,
                 normal: Vec3::x(),
                 velocity: Vec3::x() * (sign * v),
             };
-            (sign, meeting)
+            (sign, point_state)
         })
     }
 
     /// Generalised forces of the lower and the upper stop, N or N m: not negative, not positive.
     pub fn forces(&self, q: f64, v: f64) -> [f64; 2] {
-        self.meetings(q, v)
+        self.point_states(q, v)
             .map(|(sign, m)| sign * contact_force(&self.law, &m).x)
     }
 
     /// Tangent of the sum of [`JointLimit::forces`] along `dv`.
     pub fn forces_jvp(&self, q: f64, v: f64, dv: f64) -> f64 {
         let along = |sign: f64| Vec3::x() * (sign * dv);
-        self.meetings(q, v)
+        self.point_states(q, v)
             .map(|(sign, m)| sign * contact_force_jvp(&self.law, &m, &along(sign)).x)
             .iter()
             .sum()
@@ -53,7 +55,7 @@ impl JointLimit {
     /// Transpose of the sum of [`JointLimit::forces`]: cotangents of `q` and `v`.
     pub fn forces_vjp(&self, q: f64, v: f64, bar: f64) -> [f64; 2] {
         let mut out = [0.0; 2];
-        for (sign, m) in self.meetings(q, v) {
+        for (sign, m) in self.point_states(q, v) {
             let own = contact_force_vjp(&self.law, &m, &(Vec3::x() * (sign * bar)));
             out[0] += sign * own.gap;
             out[1] += sign * own.velocity.x;

@@ -18,7 +18,7 @@ pub struct Outcome {
 /// `‖R⁻ᵀ(g − KᵀK x)‖ ≤ tolerance · ‖R⁻ᵀ g‖` in every column.
 ///
 /// `normal` applies KᵀK, `precondition` R⁻¹ and `precondition_transpose` R⁻ᵀ in place. A column
-/// of zeros answers zero at no iteration.
+/// of zeros has the solution zero, at no iteration.
 ///
 /// # References
 /// Björck, Numerical Methods for Least Squares Problems (1996), §7.4 (CGLS); Hestenes and Stiefel

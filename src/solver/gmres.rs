@@ -6,8 +6,8 @@ use super::{Columns, Outcome, count};
 /// modified Gram–Schmidt and Givens rotations, restarted every `restart` iterations, until
 /// `‖b − A x‖ ≤ tolerance · ‖b‖`.
 ///
-/// `apply` is A, `precondition` the right preconditioner (x = M⁻¹ y). A column of zeros answers zero
-/// at no iteration.
+/// `apply` is A, `precondition` the right preconditioner (x = M⁻¹ y). A column of zeros has the
+/// solution zero, at no iteration.
 ///
 /// # References
 /// Saad and Schultz, SIAM J. Sci. Stat. Comput. 7 (1986) 856.
@@ -239,7 +239,7 @@ mod tests {
     }
 
     #[test]
-    fn columns_together_answer_as_alone() {
+    fn columns_are_solved_together_as_alone() {
         let n = 60;
         let a = matrix(n);
         let apply = |x: &Columns| product(&a, n, x);

@@ -149,7 +149,7 @@ impl<S: Simd> Lane for Lanes<S> {
     fn sqrt(self) -> Self {
         Self::new(self.simd, self.simd.sqrt_f64s(self.v))
     }
-    /// One division: the quotient of the smaller by the larger, turned by π/8 steps, then a
+    /// One division: the quotient of the smaller by the larger, rotated by π/4 where it is large, then a
     /// polynomial. Relative error about 2e-16, also for a tiny `self` and for `x ≤ 0`.
     #[inline(always)]
     fn atan2(self, x: Self) -> Self {
@@ -160,9 +160,9 @@ impl<S: Simd> Lane for Lanes<S> {
         let small = Self::new(simd, simd.min_f64s(ax.v, ay.v));
         let large = Self::new(simd, simd.max_f64s(ax.v, ay.v));
         // atan q = π/4 + atan((q − 1)/(q + 1))
-        let turned = simd.greater_than_f64s(small.v, (large * self.like(TAN_PI_8)).v);
-        let above = simd.select_f64s(turned, (small - large).v, small.v);
-        let below = simd.select_f64s(turned, (small + large).v, large.v);
+        let rotated = simd.greater_than_f64s(small.v, (large * self.like(TAN_PI_8)).v);
+        let above = simd.select_f64s(rotated, (small - large).v, small.v);
+        let below = simd.select_f64s(rotated, (small + large).v, large.v);
         let t = Self::new(simd, simd.div_f64s(above, below));
         let u = t * t;
         let mut p = self.like(ATAN[10]);
@@ -178,7 +178,7 @@ impl<S: Simd> Lane for Lanes<S> {
         p = p.mul_add(u, self.like(ATAN[0]));
         let mut angle = p.mul_add(t * u, t);
         let back = (angle + self.like(FRAC_PI_4)).v;
-        angle = Self::new(simd, simd.select_f64s(turned, back, angle.v));
+        angle = Self::new(simd, simd.select_f64s(rotated, back, angle.v));
         let steep = simd.greater_than_f64s(ay.v, ax.v);
         let back = (self.like(FRAC_PI_2) - angle).v;
         angle = Self::new(simd, simd.select_f64s(steep, back, angle.v));

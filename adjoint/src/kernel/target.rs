@@ -259,7 +259,7 @@ impl<'a> Table<'a> {
 }
 
 /// Every edge once, faces paired where one has `a → b` and another `b → a`; what finds no partner
-/// (a rim, a wrongly turned face) stays an edge with no right face.
+/// (a rim, a face of the wrong orientation) stays an edge with no right face.
 fn edges(faces: &[[usize; 3]]) -> (Vec<[usize; 2]>, Vec<Sides>) {
     let (mut ends, mut sides) = (Vec::new(), Vec::<Sides>::new());
     let mut open: HashMap<[usize; 2], Vec<usize>> = HashMap::new();

@@ -57,9 +57,12 @@ impl Pose {
     /// Moves the pose by the finite spatial displacement `exp(z)`, z = (δt-field, δθ).
     pub fn displace(&self, z: &Vec6) -> Pose {
         let (u, w) = (linear(z), angular(z));
-        let turn = super::exp_matrix(&w);
+        let rotation = super::exp_matrix(&w);
         let shift = super::exp_jacobian(&w) * u;
-        Pose::new(turn * self.rotation, turn * self.translation + shift)
+        Pose::new(
+            rotation * self.rotation,
+            rotation * self.translation + shift,
+        )
     }
 
     /// Spatial twist (about the world origin) of a twist given in this frame about its origin.

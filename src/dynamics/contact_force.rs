@@ -39,7 +39,7 @@ impl System {
             gap: t.point.gap,
             position: t.point.position.into(),
             normal: t.point.normal.into(),
-            force: contact_force(&t.law, &t.meeting(&twists)).into(),
+            force: contact_force(&t.law, &t.point_state(&twists)).into(),
         });
         Ok(acting.collect())
     }
@@ -77,7 +77,7 @@ impl Evaluation<'_> {
     fn contact_wrenches(&self, twists: &[Vec6]) -> Vec<Vec6> {
         let mut out = vec![Vec6::zeros(); self.system.len()];
         for t in &self.contact_points {
-            let force = contact_force(&t.law, &t.meeting(twists));
+            let force = contact_force(&t.law, &t.point_state(twists));
             t.exchange(&point_wrench(&t.point.position, &force), &mut out);
         }
         out
@@ -92,7 +92,7 @@ impl Evaluation<'_> {
             return false;
         }
         let twists = self.system.tree.twists(&self.kinematics, v);
-        let at = |t: &PairContact| contact_force(&t.law, &t.meeting(&twists)) != Vec3::zeros();
+        let at = |t: &PairContact| contact_force(&t.law, &t.point_state(&twists)) != Vec3::zeros();
         self.contact_points.iter().any(at)
     }
 
@@ -116,7 +116,7 @@ impl Evaluation<'_> {
         let twists = tree.twists(&self.kinematics, v);
         let mut out = DVector::zeros(v.len());
         for t in &self.contact_points {
-            let force = contact_force(&t.law, &t.meeting(&twists));
+            let force = contact_force(&t.law, &t.point_state(&twists));
             if force != Vec3::zeros() {
                 let mut wrenches = vec![Vec6::zeros(); self.system.len()];
                 t.exchange(&point_wrench(&t.point.position, &force), &mut wrenches);
@@ -137,7 +137,7 @@ impl Evaluation<'_> {
         let mut out = vec![Vec6::zeros(); self.system.len()];
         for t in &self.contact_points {
             let du = point_velocity(&t.relative(&dtwists), &t.point.position);
-            let force = contact_force_jvp(&t.law, &t.meeting(&twists), &du);
+            let force = contact_force_jvp(&t.law, &t.point_state(&twists), &du);
             t.exchange(&point_wrench(&t.point.position, &force), &mut out);
         }
         let mut out = tree.project(&self.kinematics, out);
@@ -176,11 +176,11 @@ impl Evaluation<'_> {
         let mut out = ForceCotangents::zeros(self);
         for t in &self.contact_points {
             let x = &t.point.position;
-            let meeting = t.meeting(&fields.twist);
+            let point_state = t.point_state(&fields.twist);
             let (twist, virt) = (t.relative(&fields.twist), t.relative(&fields.virtual_twist));
-            let force = contact_force(&t.law, &meeting);
+            let force = contact_force(&t.law, &point_state);
             t.exchange(&point_wrench(x, &force), &mut bar.virtual_twist);
-            let own = contact_force_vjp(&t.law, &meeting, &point_velocity(&virt, x));
+            let own = contact_force_vjp(&t.law, &point_state, &point_velocity(&virt, x));
             t.exchange(&point_wrench(x, &own.velocity), &mut bar.twist);
             // Both u and the virtual velocity are taken at the point.
             let position = own.velocity.cross(&angular(&twist)) + force.cross(&angular(&virt));

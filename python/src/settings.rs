@@ -2,72 +2,48 @@
 
 use crate::array::{Dim, array};
 use crate::error::input;
-use hydrograd::boundary::{Method, OneBody};
-use hydrograd::simulate::Backend;
-use hydrograd::{Fidelity, Scene, Settings, dynamics::Integrator};
+use hydrograd::Settings;
 use pyo3::prelude::*;
+use std::str::FromStr;
+use strum::VariantArray;
 
-const FIDELITIES: [(&str, Fidelity); 4] = [
-    ("isolated", Fidelity::Isolated),
-    ("reduced", Fidelity::Reduced),
-    ("auto", Fidelity::Auto),
-    ("full", Fidelity::Full),
-];
-
-const INTEGRATORS: [(&str, Integrator); 5] = [
-    ("momentum-euler", Integrator::MomentumEuler),
-    ("midpoint", Integrator::Midpoint),
-    ("rk2", Integrator::Rk2),
-    ("rk4", Integrator::Rk4),
-    ("velocity-euler", Integrator::VelocityEuler),
-];
-
-const METHODS: [(&str, OneBody, Option<Method>); 5] = [
-    ("auto", OneBody::Auto, None),
-    ("exact", OneBody::Exact, None),
-    ("panel", OneBody::Panel, None),
-    ("mfs-vertex", OneBody::Mfs, Some(Method::MfsVertex)),
-    ("mfs-face", OneBody::Mfs, Some(Method::MfsFace)),
-];
-
-/// The name of a fidelity.
-pub fn fidelity_name(of: Fidelity) -> &'static str {
-    let found = FIDELITIES.iter().find(|(_, f)| *f == of);
-    found.map_or("", |(name, _)| name)
+/// The choice of a list by its name; `place` is named where there is none.
+pub fn named<T: VariantArray + FromStr + Into<&'static str> + Copy>(
+    place: &str,
+    given: &str,
+) -> PyResult<T> {
+    given.parse().map_err(|_| {
+        let names = T::VARIANTS.iter().map(|v| format!("{:?}", (*v).into()));
+        input(
+            place,
+            format!("{given:?}"),
+            format!("must be one of {}", names.collect::<Vec<_>>().join(", ")),
+        )
+    })
 }
 
-/// The name of an integrator.
-pub fn integrator_name(of: Integrator) -> &'static str {
-    let found = INTEGRATORS.iter().find(|(_, f)| *f == of);
-    found.map_or("", |(name, _)| name)
+/// The name of a choice.
+pub fn name<T: Into<&'static str>>(of: T) -> &'static str {
+    of.into()
 }
 
-const BACKENDS: [(&str, Backend); 2] = [("cpu", Backend::Cpu), ("gpu", Backend::Gpu)];
-
-/// The name of a backend.
-pub fn backend_name(of: Backend) -> &'static str {
-    let found = BACKENDS.iter().find(|(_, b)| *b == of);
-    found.map_or("", |(name, _)| name)
+fn choice<T: VariantArray + FromStr + Into<&'static str> + Copy>(
+    field: &str,
+    given: Option<&str>,
+) -> PyResult<Option<T>> {
+    let place = format!("simulator: {field}");
+    given.map(|name| named(&place, name)).transpose()
 }
 
-fn unknown<'a>(field: &str, given: &str, names: impl Iterator<Item = &'a str>) -> PyErr {
-    let names: Vec<String> = names.map(|n| format!("{n:?}")).collect();
-    input(
-        format!("simulator: {field}"),
-        format!("{given:?}"),
-        format!("must be one of {}", names.join(", ")),
-    )
-}
-
-fn positive(field: &str, value: f64) -> PyResult<f64> {
-    if value > 0.0 && value.is_finite() {
-        return Ok(value);
+fn positive(field: &str, value: Option<f64>) -> PyResult<Option<f64>> {
+    match value.filter(|x| !(*x > 0.0 && x.is_finite())) {
+        None => Ok(value),
+        Some(wrong) => Err(input(
+            format!("simulator: {field}"),
+            wrong,
+            "must be finite and positive",
+        )),
     }
-    Err(input(
-        format!("simulator: {field}"),
-        value,
-        "must be finite and positive",
-    ))
 }
 
 /// What the keywords of a simulator say; what isn't given follows the scene.
@@ -95,55 +71,21 @@ pub struct Keywords<'a> {
 }
 
 impl Keywords<'_> {
-    /// The settings for a scene.
-    pub fn settings(&self, scene: &Scene) -> PyResult<Settings> {
-        let mut out = Settings::for_scene(scene);
-        if let Some(dt) = self.dt {
-            out = out.time_step(positive("dt", dt)?);
-        }
-        if let Some(name) = self.fidelity {
-            let found = FIDELITIES.iter().find(|(n, _)| *n == name);
-            let (_, fidelity) =
-                found.ok_or_else(|| unknown("fidelity", name, FIDELITIES.iter().map(|f| f.0)))?;
-            out = out.fidelity(*fidelity);
-        }
-        if let Some(name) = self.integrator {
-            let found = INTEGRATORS.iter().find(|(n, _)| *n == name);
-            let (_, integrator) = found
-                .ok_or_else(|| unknown("integrator", name, INTEGRATORS.iter().map(|f| f.0)))?;
-            out = out.integrator(*integrator);
-        }
-        if let Some(name) = self.method {
-            let found = METHODS.iter().find(|(n, ..)| *n == name);
-            let (_, one, method) =
-                found.ok_or_else(|| unknown("method", name, METHODS.iter().map(|f| f.0)))?;
-            out = match method {
-                Some(method) => out.method(*method),
-                None => out.one_body(*one),
-            };
-        }
-        if let Some(tolerance) = self.tolerance {
-            out = out.tolerance(positive("tolerance", tolerance)?);
-        }
-        if let Some(faces) = self.faces {
-            out = out.faces(faces);
-        }
-        if let Some(accuracy) = self.accuracy {
-            out = out.accuracy(positive("accuracy", accuracy)?);
-        }
-        if let Some(rank) = self.rank {
-            out = out.rank(rank);
-        }
-        if let Some(gap) = self.resolved_gap {
-            out = out.resolved_gap(positive("resolved_gap", gap)?);
-        }
-        if let Some(name) = self.backend {
-            let found = BACKENDS.iter().find(|(n, _)| *n == name);
-            let (_, backend) =
-                found.ok_or_else(|| unknown("backend", name, BACKENDS.iter().map(|b| b.0)))?;
-            out = out.backend(*backend);
-        }
-        Ok(out)
+    /// The settings.
+    pub fn settings(&self) -> PyResult<Settings> {
+        Ok(Settings {
+            time_step: positive("dt", self.dt)?,
+            fidelity: choice("fidelity", self.fidelity)?,
+            integrator: choice("integrator", self.integrator)?,
+            method: choice("method", self.method)?,
+            tolerance: positive("tolerance", self.tolerance)?,
+            faces: self.faces,
+            accuracy: positive("accuracy", self.accuracy)?,
+            rank: self.rank,
+            resolved_gap: positive("resolved_gap", self.resolved_gap)?,
+            backend: choice("backend", self.backend)?,
+            ..Settings::default()
+        })
     }
 }
 

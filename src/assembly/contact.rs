@@ -5,7 +5,7 @@ use crate::contact::{ContactPair, Contacts, Geometry};
 use crate::dynamics::{self, ContactModel, Integrator, Regularisation};
 use crate::geometry::Other;
 use crate::scene::{Body, Contact, Scene, Shape};
-use crate::water::{Fidelity, Prepared, Settings, Surface, pose};
+use crate::water::{Prepared, Surface, pose};
 use crate::{Error, Result};
 use std::path::Path;
 
@@ -17,14 +17,12 @@ const WIDTH: f64 = 0.004;
 const ROOM: f64 = 1.25;
 /// The same where the water isn't solved, of the smallest body's radius: distances are smooth outside a body only.
 const SKIN: f64 = 0.01;
-/// Part of the edges that the fidelity `Full` resolves.
-const EDGES: f64 = 0.5;
 
 /// What contact is made from.
 pub(super) struct Parts<'a> {
     pub scene: &'a Scene,
     pub given: &'a Contact,
-    pub settings: &'a Settings,
+    pub time_step: f64,
     pub water: &'a Prepared,
     pub surfaces: &'a [Option<Surface>],
     pub mass: &'a [f64],
@@ -75,7 +73,7 @@ pub(super) fn assemble(p: Parts) -> Result<(ContactModel, dynamics::Contact)> {
                 .unwrap_or((ROOM * resolved(&p, pair)).max(SKIN * size))
         })
         .collect();
-    let dt = p.settings.time_step.unwrap_or(p.scene.time_step);
+    let dt = p.time_step;
     let heaviest = bodies().map(|b| p.mass[b]).fold(0.0, f64::max);
     let stiffness = p
         .given
@@ -122,21 +120,13 @@ fn geometry(body: &Body, shape: &Shape, surface: &Surface) -> Result<Geometry> {
 
 /// The gap that the coupling resolves between a pair, m.
 fn resolved(p: &Parts, pair: &ContactPair) -> f64 {
-    let edge = |b: usize| p.surfaces[b].as_ref().map_or(0.0, mean_edge);
-    let of = |value: &dyn Fn(usize) -> f64| match pair.second {
-        Other::Body(b) => value(pair.first).max(value(b)),
-        // The image is twice as far away.
-        Other::Wall(_) => 0.5 * value(pair.first),
+    let of = |b: usize| {
+        let edge = p.surfaces[b].as_ref().map_or(0.0, Surface::mean_edge);
+        (p.water.fidelity).resolved_gap(p.water.resolved[b], edge)
     };
-    match p.water.fidelity {
-        Fidelity::Isolated => 0.0,
-        Fidelity::Reduced => of(&|b| p.water.resolved[b]),
-        Fidelity::Full | Fidelity::Auto => EDGES * of(&edge),
+    match pair.second {
+        Other::Body(b) => of(pair.first).max(of(b)),
+        // The image is twice as far away.
+        Other::Wall(_) => 0.5 * of(pair.first),
     }
-}
-
-/// Edge of the equilateral triangle of mean area. Refined regions don't count: contact may be elsewhere.
-fn mean_edge(surface: &Surface) -> f64 {
-    let mesh = &surface.mesh;
-    (4.0 / 3.0_f64.sqrt() * mesh.surface_area() / surface.base as f64).sqrt()
 }

@@ -1,10 +1,10 @@
 //! From a scene to a system: masses, joints, water, contact, limits, controller.
 
+mod choices;
 mod contact;
 mod controller;
 mod limits;
 
-use crate::Result;
 use crate::adjoint::drag::Element;
 use crate::adjoint::lie::Vec3;
 use crate::coupling::Isolated;
@@ -13,10 +13,13 @@ use crate::geometry::TriMesh;
 use crate::multibody::Tree;
 use crate::policy::Policy;
 use crate::scene::{Body, Scene};
-use crate::water::{self, Clearance, Fidelity, Prepared, Settings, Surface, pose};
+use crate::water::{self, Clearance, Prepared, Surface, pose};
+use crate::{Error, Result};
 use nalgebra::DVector;
 use std::path::Path;
 use std::sync::Arc;
+
+pub use choices::Choices;
 
 /// A scene made ready.
 #[derive(Clone)]
@@ -74,10 +77,18 @@ fn elements(mesh: &TriMesh) -> Vec<Element> {
 /// Prepares the scene; compressed bodies are kept in `folder`.
 pub(crate) fn assemble(
     scene: &Scene,
-    settings: &Settings,
+    choices: &Choices,
     folder: Option<&Path>,
 ) -> Result<Assembled> {
-    contact::check_integrator(scene, settings.integrator)?;
+    let dt = choices.time_step;
+    if !(dt > 0.0 && dt.is_finite()) {
+        return Err(Error::input(
+            "settings: time_step",
+            dt,
+            "must be positive and finite, in s",
+        ));
+    }
+    contact::check_integrator(scene, choices.integrator)?;
     let index = |name: &String| scene.bodies.iter().position(|b| b.name == *name);
     let tree = Tree::new(scene.bodies.iter().map(|b| {
         (
@@ -86,8 +97,8 @@ pub(crate) fn assemble(
             b.joint.model(),
         )
     }));
-    let surfaces = water::surfaces(scene, settings)?;
-    let in_water = water::in_water(scene, &surfaces, &tree, settings.fidelity);
+    let surfaces = water::surfaces(scene, &choices.water)?;
+    let in_water = water::in_water(scene, &surfaces, &tree, choices.water.fidelity.coupled());
     let names = scene.bodies.iter().map(|b| b.name.clone()).collect();
     let mut declared = Declarations::new(names);
     declared.set_density(scene.fluid.density);
@@ -150,15 +161,18 @@ pub(crate) fn assemble(
         limits: Vec::new(),
         tree,
     };
-    let q = start_coordinates(scene, settings, &system, &parameters, &clearance)?;
+    let q = start_coordinates(scene, choices, &system, &parameters);
     let poses = system.tree.kinematics(&q).poses;
-    let water = water::prepare(scene, settings, in_water, &poses, clearance, folder)?;
+    if choices.water.fidelity.coupled() && scene.fluid.density > 0.0 {
+        clearance.refuse_start(&poses)?;
+    }
+    let water = water::prepare(scene, &choices.water, in_water, &poses, clearance, folder)?;
     system.coupling = water.coupling.clone();
     if let Some(given) = &scene.contact {
         let made = contact::assemble(contact::Parts {
             scene,
             given,
-            settings,
+            time_step: dt,
             water: &water,
             surfaces: &surfaces,
             mass: &masses,
@@ -166,9 +180,8 @@ pub(crate) fn assemble(
         system.contact = Some(made.0);
         parameters.add_contact(made.1);
     }
-    let dt = settings.time_step.unwrap_or(scene.time_step);
     system.limits = limits::assemble(scene, dt, &system, &parameters, &q)?;
-    let v = start_velocity(scene, settings, &system, &parameters, &q)?;
+    let v = start_velocity(scene, choices, &system, &parameters, &q)?;
     Ok(Assembled {
         policy: controller::policy(scene, &system)?.into(),
         system,
@@ -182,41 +195,32 @@ pub(crate) fn assemble(
 /// Initial coordinates.
 fn start_coordinates(
     scene: &Scene,
-    settings: &Settings,
+    choices: &Choices,
     system: &System,
     parameters: &Parameters,
-    clearance: &Clearance,
-) -> Result<DVector<f64>> {
+) -> DVector<f64> {
     let mut q = if scene.initial.q.is_empty() {
         system.tree.origin()
     } else {
         DVector::from_vec(scene.initial.q.clone())
     };
-    stepper(scene, settings, system, parameters).place_motions(&mut q, 0.0);
-    if settings.fidelity != Fidelity::Isolated && scene.fluid.density > 0.0 {
-        clearance.refuse_start(&system.tree.kinematics(&q).poses)?;
-    }
-    Ok(q)
+    stepper(choices, system, parameters).place_motions(&mut q, 0.0);
+    q
 }
 
-fn stepper<'a>(
-    scene: &Scene,
-    settings: &Settings,
-    system: &'a System,
-    parameters: &'a Parameters,
-) -> Stepper<'a> {
+fn stepper<'a>(choices: &Choices, system: &'a System, parameters: &'a Parameters) -> Stepper<'a> {
     Stepper {
         system,
         parameters,
         integrator: Default::default(),
-        dt: settings.time_step.unwrap_or(scene.time_step),
+        dt: choices.time_step,
     }
 }
 
 /// Initial velocity; a given momentum is turned into velocity.
 fn start_velocity(
     scene: &Scene,
-    settings: &Settings,
+    choices: &Choices,
     system: &System,
     parameters: &Parameters,
     q: &DVector<f64>,
@@ -234,7 +238,7 @@ fn start_velocity(
         }
     }
     if !scene.initial.momentum.is_empty() {
-        let stepper = stepper(scene, settings, system, parameters);
+        let stepper = stepper(choices, system, parameters);
         let e = system.evaluate(parameters, q)?;
         let p = DVector::from_vec(scene.initial.momentum.clone());
         v = stepper.velocity_of_momentum(&e, &p)?;

@@ -17,20 +17,3 @@ pub use mfs::{BodyBoundary, Depth, Method, Readout, RowScaling, Settings, depth,
 pub(crate) use mfs::{solve_upper, solve_upper_transpose};
 pub use panel::PanelBoundary;
 pub use response::Response;
-
-/// The method by which a body's own answer to the water is computed, where the fidelity leaves a
-/// choice.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, serde::Serialize, serde::Deserialize)]
-#[serde(rename_all = "kebab-case")]
-pub enum OneBody {
-    /// The most accurate that costs nothing at run time: [`exact`] for spheres and ellipsoids by
-    /// formula, [`panel`] for other bodies; [`mfs`] where all bodies are solved together.
-    #[default]
-    Auto,
-    /// Closed forms; for spheres and ellipsoids by formula only.
-    Exact,
-    /// Direct boundary elements.
-    Panel,
-    /// Fundamental solutions, as [`Settings`] say.
-    Mfs,
-}

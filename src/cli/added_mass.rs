@@ -81,7 +81,6 @@ pub(super) fn main(arguments: &Arguments, output: Output) -> Result<ExitCode> {
         arguments.source.file.as_deref(),
         arguments.source.shape.as_ref(),
         arguments.density,
-        &arguments.water,
     )?;
     output.result(&added_mass(&scene, arguments)?);
     Ok(ExitCode::SUCCESS)
@@ -90,7 +89,7 @@ pub(super) fn main(arguments: &Arguments, output: Output) -> Result<ExitCode> {
 /// M_f of all bodies at the scene's start.
 fn added_mass(scene: &Scene, arguments: &Arguments) -> Result<AddedMassReport> {
     let start = Instant::now();
-    let settings = arguments.water.settings(scene);
+    let settings = arguments.water.settings();
     let simulator = arguments.water.simulator(scene, settings)?;
     let found = simulator.added_mass()?;
     let seconds = start.elapsed().as_secs_f64();

@@ -1,30 +1,9 @@
 //! Flags of what computes the coupling.
 
-use clap::{Args, ValueEnum};
+use clap::Args;
 
-use crate::simulate::{self, AdapterName, GpuSettings, Settings};
-
-/// What computes the coupling.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, ValueEnum)]
-pub(super) enum Backend {
-    /// The processor.
-    #[default]
-    Cpu,
-    /// A GPU, in builds with the feature gpu; `hydrograd gpu-info` lists them.
-    Gpu,
-}
-
-/// Arithmetic of residuals and derivatives on the GPU.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, ValueEnum)]
-pub(super) enum Arithmetic {
-    /// `double` where the GPU has it, `two-float` otherwise.
-    #[default]
-    Auto,
-    /// Double precision.
-    Double,
-    /// Sums of two single-precision numbers, about 14 digits.
-    TwoFloat,
-}
+use super::list::choice;
+use crate::simulate::{AdapterName, Arithmetic, Backend, GpuSettings};
 
 /// Which GPU, and how.
 #[derive(Clone, Debug, Args)]
@@ -33,7 +12,7 @@ pub(super) struct Adapter {
     #[arg(long, value_name = "NAME")]
     pub adapter: Option<AdapterName>,
     /// Arithmetic of residuals and derivatives on the GPU.
-    #[arg(long, value_enum, default_value_t = Arithmetic::Auto)]
+    #[arg(long, value_parser = choice::<Arithmetic>(), default_value = "auto")]
     pub gpu_arithmetic: Arithmetic,
 }
 
@@ -41,7 +20,7 @@ pub(super) struct Adapter {
 #[derive(Clone, Debug, Args)]
 pub(super) struct Compute {
     /// What computes the coupling.
-    #[arg(long, value_enum, default_value_t = Backend::Cpu)]
+    #[arg(long, value_parser = choice::<Backend>(), default_value = "cpu")]
     pub backend: Backend,
     #[command(flatten)]
     pub adapter: Adapter,
@@ -53,28 +32,19 @@ pub(super) struct Compute {
 impl Adapter {
     pub fn settings(&self) -> GpuSettings {
         GpuSettings {
-            adapter: self.adapter,
-            arithmetic: match self.gpu_arithmetic {
-                Arithmetic::Auto => simulate::Arithmetic::Auto,
-                Arithmetic::Double => simulate::Arithmetic::Double,
-                Arithmetic::TwoFloat => simulate::Arithmetic::TwoFloat,
-            },
+            adapter: self.adapter.clone(),
+            arithmetic: self.gpu_arithmetic,
             fallback: false,
         }
     }
 }
 
 impl Compute {
-    /// Puts the choice into the settings.
-    pub fn choose(&self, mut settings: Settings) -> Settings {
-        settings.backend = match self.backend {
-            Backend::Cpu => simulate::Backend::Cpu,
-            Backend::Gpu => simulate::Backend::Gpu,
-        };
-        settings.gpu = GpuSettings {
+    /// Choices of the GPU.
+    pub fn settings(&self) -> GpuSettings {
+        GpuSettings {
             fallback: self.gpu_fallback,
             ..self.adapter.settings()
-        };
-        settings
+        }
     }
 }

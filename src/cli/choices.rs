@@ -21,14 +21,14 @@ pub(super) struct ChoicesReport {
 
 impl ChoicesReport {
     pub fn new(simulator: &Simulator) -> Self {
-        let settings = simulator.settings();
+        let choices = simulator.choices();
         Self {
-            fidelity: name(settings.fidelity),
+            fidelity: name(choices.water.fidelity),
             fidelity_used: name(simulator.fidelity()),
             chosen: simulator.reasons().to_vec(),
             backend: simulator.backend(),
-            method: settings.method_name().into(),
-            integrator: name(settings.integrator),
+            method: name(choices.water.method_used()),
+            integrator: name(choices.integrator),
         }
     }
 }

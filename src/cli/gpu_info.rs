@@ -18,7 +18,7 @@ pub(super) struct Arguments {
 #[cfg(feature = "gpu")]
 pub(super) fn main(arguments: &Arguments, output: Output) -> Result<ExitCode> {
     let adapters = crate::gpu::adapters();
-    let opened = crate::gpu::Context::new(&arguments.adapter.settings().into());
+    let opened = crate::gpu::Context::new(&(&arguments.adapter.settings()).into());
     if adapters.is_empty() {
         // Its error says what to install.
         opened?;

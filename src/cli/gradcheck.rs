@@ -84,7 +84,7 @@ pub(super) struct CheckReport {
 }
 
 pub(super) fn main(arguments: &Arguments, output: Output) -> Result<ExitCode> {
-    let scene = input::scene(&arguments.scene, &arguments.water, &arguments.time)?;
+    let scene = input::scene(&arguments.scene, arguments.time.steps)?;
     let progress = Progress::new("directions", 3 * arguments.directions);
     let report = check(&scene, arguments, &progress)?;
     drop(progress);
@@ -98,10 +98,10 @@ pub(super) fn main(arguments: &Arguments, output: Output) -> Result<ExitCode> {
 
 /// The check at a tight tolerance, then the times at the usual one.
 fn check(scene: &Scene, arguments: &Arguments, progress: &Progress) -> Result<CheckReport> {
-    let usual = arguments.time.choose(arguments.water.settings(scene));
+    let usual = arguments.time.choose(arguments.water.settings());
     let tight = match arguments.water.tolerance {
-        Some(_) => usual,
-        None => usual.tolerance(TOLERANCE),
+        Some(_) => usual.clone(),
+        None => usual.clone().tolerance(TOLERANCE),
     };
     let steps = scene.steps;
     let mut simulator = arguments.water.simulator(scene, tight)?;
@@ -121,6 +121,7 @@ fn check(scene: &Scene, arguments: &Arguments, progress: &Progress) -> Result<Ch
     };
     let warnings = simulator.warnings().to_vec();
     let choices = ChoicesReport::new(&simulator);
+    let tolerance = simulator.choices().water.numerics.solve.tolerance;
     drop(simulator);
     let times = gradcheck::timings(&arguments.water.simulator(scene, usual)?, steps, TIMINGS)?;
     Ok(CheckReport {
@@ -128,7 +129,7 @@ fn check(scene: &Scene, arguments: &Arguments, progress: &Progress) -> Result<Ch
         choices,
         steps,
         ok: found.max_rel_error <= LIMIT,
-        tolerance: tight.solve.tolerance,
+        tolerance,
         step_sizes: found.step_sizes,
         max_rel_error: found.max_rel_error,
         rel_error_controls: found.rel_error_controls,

@@ -2,7 +2,6 @@
 
 use std::path::Path;
 
-use super::options::{Time, Water};
 use crate::scene::{Body, Fluid, Scene, Shape};
 use crate::{Error, Result};
 
@@ -16,11 +15,10 @@ pub(super) fn load(path: &Path) -> Result<Scene> {
     Ok(scene)
 }
 
-/// The scene of a file with the command line's choices put in, checked.
-pub(super) fn scene(path: &Path, water: &Water, time: &Time) -> Result<Scene> {
+/// The scene of a file, with so many steps if that is asked for, checked.
+pub(super) fn scene(path: &Path, steps: Option<usize>) -> Result<Scene> {
     let mut scene = load(path)?;
-    water.apply(&mut scene);
-    time.apply(&mut scene);
+    scene.steps = steps.unwrap_or(scene.steps);
     scene.validate()?;
     Ok(scene)
 }
@@ -31,7 +29,6 @@ pub(super) fn scene_or_shape(
     file: Option<&Path>,
     shape: Option<&Shape>,
     density: Option<f64>,
-    water: &Water,
 ) -> Result<Scene> {
     let alone = |shape: Shape, name: &str| {
         let mut scene = Scene::new(Fluid::fresh_water());
@@ -66,7 +63,6 @@ pub(super) fn scene_or_shape(
             ));
         }
     };
-    water.apply(&mut scene);
     if let Some(density) = density {
         scene.fluid.density = density;
     }

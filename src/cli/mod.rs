@@ -11,6 +11,7 @@ mod choices;
 mod gpu_info;
 mod gradcheck;
 mod input;
+mod list;
 mod options;
 mod output;
 mod progress;

@@ -66,7 +66,7 @@ pub(super) struct RunReport {
 }
 
 pub(super) fn main(arguments: &Arguments, output: Output) -> Result<ExitCode> {
-    let scene = input::scene(&arguments.scene, &arguments.water, &arguments.time)?;
+    let scene = input::scene(&arguments.scene, arguments.time.steps)?;
     if let Some(folder) = &arguments.out {
         Recording::prepare(folder)?;
     }
@@ -87,7 +87,7 @@ fn simulate(
     progress: &Progress,
 ) -> Result<(RunReport, Recording)> {
     let start = Instant::now();
-    let settings = arguments.time.choose(arguments.water.settings(scene));
+    let settings = arguments.time.choose(arguments.water.settings());
     let simulator = arguments.water.simulator(scene, settings)?;
     let setup_seconds = start.elapsed().as_secs_f64();
     let controls = Controls::zeros(&simulator, scene.steps);

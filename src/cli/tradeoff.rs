@@ -10,10 +10,13 @@ use std::process::ExitCode;
 use clap::Args;
 
 use super::input;
-use super::options::{self, Method, positive, tolerance};
+use super::list::choice;
+use super::options::{positive, tolerance};
 use super::output::Output;
 use super::progress;
 use crate::Result;
+use crate::dynamics::Integrator;
+use crate::simulate::{Fidelity, Method};
 use crate::tradeoff::{self, Progress, Stage, TradeoffSettings};
 use table::TradeoffReport;
 
@@ -29,11 +32,11 @@ pub(super) struct Arguments {
     #[arg(value_name = "SCENE.toml")]
     scene: PathBuf,
     /// Fidelities, with commas between [default: isolated,reduced,auto,full].
-    #[arg(long, value_enum, value_delimiter = ',', value_name = "LIST")]
-    fidelities: Vec<options::Fidelity>,
+    #[arg(long, value_parser = choice::<Fidelity>(), value_delimiter = ',', value_name = "LIST")]
+    fidelities: Vec<Fidelity>,
     /// Methods by which a body alone is solved [default: what the scene asks for, and the others
     /// that the fidelity has].
-    #[arg(long, value_enum, value_delimiter = ',', value_name = "LIST")]
+    #[arg(long, value_parser = choice::<Method>(), value_delimiter = ',', value_name = "LIST")]
     methods: Vec<Method>,
     /// Faces per body, for shapes by formula [default: the scene's own, and 80,320,1280].
     #[arg(long, value_parser = positive, value_delimiter = ',', value_name = "LIST", allow_negative_numbers = true)]
@@ -50,8 +53,8 @@ pub(super) struct Arguments {
     tolerances: Vec<f64>,
     /// Integrators, with one fidelity: reduced if it is among them [default: the scene's own, and
     /// all others].
-    #[arg(long, value_enum, value_delimiter = ',', value_name = "LIST")]
-    integrators: Vec<options::Integrator>,
+    #[arg(long, value_parser = choice::<Integrator>(), value_delimiter = ',', value_name = "LIST")]
+    integrators: Vec<Integrator>,
     /// Time steps in s, with the same fidelity [default: the scene's own, and 4 times to a quarter of it].
     #[arg(long, value_parser = seconds, value_delimiter = ',', value_name = "LIST", allow_negative_numbers = true)]
     time_steps: Vec<f64>,
@@ -84,21 +87,14 @@ fn seconds(text: &str) -> std::result::Result<f64, String> {
 
 impl Arguments {
     fn settings(&self) -> TradeoffSettings {
-        let method = |m: &Method| match m {
-            Method::Auto => tradeoff::Method::Auto,
-            Method::Exact => tradeoff::Method::Exact,
-            Method::Panel => tradeoff::Method::Panel,
-            Method::MfsVertex => tradeoff::Method::MfsVertex,
-            Method::MfsFace => tradeoff::Method::MfsFace,
-        };
         TradeoffSettings {
-            fidelities: self.fidelities.iter().map(|f| (*f).into()).collect(),
-            methods: self.methods.iter().map(method).collect(),
+            fidelities: self.fidelities.clone(),
+            methods: self.methods.clone(),
             faces: self.faces_list.clone(),
             ranks: self.ranks.clone(),
             accuracies: self.accuracies.clone(),
             tolerances: self.tolerances.clone(),
-            integrators: self.integrators.iter().map(|i| (*i).into()).collect(),
+            integrators: self.integrators.clone(),
             time_steps: self.time_steps.clone(),
             full_product: self.full_product,
             steps: self.steps,

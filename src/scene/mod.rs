@@ -19,6 +19,7 @@ pub use contact::Contact;
 pub use force::{Force, Spring};
 
 use serde::{Deserialize, Serialize};
+use strum::{EnumMessage, EnumString, IntoStaticStr, VariantArray};
 
 /// Everything that a simulation starts from.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
@@ -59,13 +60,27 @@ pub struct Scene {
 }
 
 /// A family of choices.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
+#[derive(
+    Clone,
+    Copy,
+    Debug,
+    Default,
+    PartialEq,
+    Eq,
+    Serialize,
+    Deserialize,
+    EnumMessage,
+    EnumString,
+    IntoStaticStr,
+    VariantArray,
+)]
 #[serde(rename_all = "kebab-case")]
+#[strum(serialize_all = "kebab-case")]
 pub enum Preset {
-    /// hydrograd's own defaults.
+    /// hydrograd's own.
     #[default]
     Default,
-    /// The paper's: face sources, centre collocation, Eq. 20, semi-implicit Euler in velocity.
+    /// The paper's: face sources, rows not scaled, potential read at face centres, semi-implicit Euler in velocity.
     Paper,
 }
 

@@ -13,6 +13,7 @@ mod recording;
 mod rollout;
 mod run;
 mod sample;
+mod settings;
 mod simulator;
 mod trajectory;
 
@@ -26,13 +27,15 @@ pub use record::Record;
 pub use recording::Recording;
 pub use rollout::{Rollout, Summary};
 pub use sample::Sample;
+pub use settings::Settings;
 pub use simulator::{AddedMass, Simulator};
 
+pub use crate::assembly::Choices;
 pub use crate::policy::{
     Action, ActionBar, Constant, Observation, OpenLoop, Pd, PdAxis, Playback, Policy, PushThenLock,
     SpeedStages, Stage,
 };
 pub use crate::water::{
-    Accuracy, AdapterName, Arithmetic, Backend, BackendReport, DeviceReport, Discretisation,
-    ErrorEstimate, Fidelity, GpuSettings, Level, Settings,
+    AdapterName, Arithmetic, Backend, BackendReport, DeviceReport, Discretisation, ErrorEstimate,
+    Fidelity, GpuSettings, Knob, Level, Method, Numerics, WaterChoices,
 };

@@ -1,7 +1,7 @@
 //! A trajectory, and its gradient.
 
 use super::trajectory::Seed;
-use super::{Cotangents, Fidelity, Gradient, Initial, Sample, Simulator};
+use super::{Cotangents, Gradient, Initial, Sample, Simulator};
 use crate::adjoint::lie::{Vec3, Vec6};
 use crate::adjoint::step::{self, Tape};
 use crate::dynamics::{ContactForce, Drive, State, StepBar, StepRecord};
@@ -144,11 +144,11 @@ impl Rollout {
     pub fn gaps(&self) -> &[Option<Gap>] {
         self.gaps.get_or_init(|| {
             let samples = self.samples().iter();
-            match self.simulator.felt() {
-                Fidelity::Isolated => samples
+            match self.simulator.felt().coupled() {
+                false => samples
                     .map(|s| self.simulator.gaps().smallest(&s.poses))
                     .collect(),
-                _ => samples.map(|s| s.gap).collect(),
+                true => samples.map(|s| s.gap).collect(),
             }
         })
     }

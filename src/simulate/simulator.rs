@@ -2,7 +2,7 @@
 
 use super::{BackendReport, Discretisation, ErrorEstimate, Fidelity, Policy, Settings};
 use crate::adjoint::lie::Pose;
-use crate::assembly::{self, Assembled};
+use crate::assembly::{self, Assembled, Choices};
 use crate::coupling::CouplingReport;
 use crate::dynamics::{Parameters, State, Stepper, System};
 use crate::geometry::{Gap, Gaps, TriMesh};
@@ -19,8 +19,7 @@ use std::sync::Arc;
 pub struct Simulator {
     pub(super) scene: Arc<Scene>,
     pub(super) assembled: Arc<Assembled>,
-    settings: Settings,
-    dt: f64,
+    choices: Choices,
     steps: usize,
 }
 
@@ -36,14 +35,13 @@ pub struct AddedMass {
 }
 
 impl Simulator {
-    /// Prepares a scene. The settings are taken as they are: a scene file's `preset` counts only through
-    /// [`Settings::for_scene`].
+    /// Prepares a scene, with what the settings ask for put over what the scene and its preset say.
     ///
     /// # Errors
     /// A scene that doesn't validate, meshes that don't bound a volume, bodies that overlap (with
     /// the fidelity `full`), or an inertia that leaves M(q) indefinite at the start.
     pub fn new(scene: &Scene, settings: Settings) -> Result<Self> {
-        Self::prepare(scene, settings, None)
+        Self::with_choices(scene, settings.resolve(scene), None)
     }
 
     /// As [`Simulator::new`], with a folder where compressed bodies (fidelities `Reduced` and `Auto`)
@@ -52,25 +50,21 @@ impl Simulator {
     /// # Errors
     /// As [`Simulator::new`], and a folder that can't be written.
     pub fn cached(scene: &Scene, settings: Settings, folder: &Path) -> Result<Self> {
-        Self::prepare(scene, settings, Some(folder))
+        Self::with_choices(scene, settings.resolve(scene), Some(folder))
     }
 
-    fn prepare(scene: &Scene, settings: Settings, folder: Option<&Path>) -> Result<Self> {
+    /// As [`Simulator::new`], with everything decided beforehand ([`Settings::resolve`]), and perhaps a folder where compressed
+    /// bodies are kept.
+    ///
+    /// # Errors
+    /// As [`Simulator::cached`].
+    pub fn with_choices(scene: &Scene, choices: Choices, folder: Option<&Path>) -> Result<Self> {
         scene.validate()?;
-        let dt = settings.time_step.unwrap_or(scene.time_step);
-        if !(dt > 0.0 && dt.is_finite()) {
-            return Err(Error::input(
-                "settings: time_step",
-                dt,
-                "must be positive and finite, in s",
-            ));
-        }
-        let assembled = assembly::assemble(scene, &settings, folder)?;
+        let assembled = assembly::assemble(scene, &choices, folder)?;
         let out = Self {
             scene: Arc::new(scene.clone()),
             assembled: Arc::new(assembled),
-            settings,
-            dt,
+            choices,
             steps: scene.steps,
         };
         out.initial()?;
@@ -92,14 +86,14 @@ impl Simulator {
         self.assembled.policy.as_ref()
     }
 
-    /// The settings.
-    pub fn settings(&self) -> &Settings {
-        &self.settings
+    /// What was decided, by the scene, its preset and the settings.
+    pub fn choices(&self) -> &Choices {
+        &self.choices
     }
 
     /// Time step, s.
     pub fn time_step(&self) -> f64 {
-        self.dt
+        self.choices.time_step
     }
 
     /// Steps that the scene asks for.
@@ -249,8 +243,8 @@ impl Simulator {
         Stepper {
             system: self.system(),
             parameters: self.parameters(),
-            integrator: self.settings.integrator,
-            dt: self.dt,
+            integrator: self.choices.integrator,
+            dt: self.choices.time_step,
         }
     }
 
@@ -274,7 +268,7 @@ impl Simulator {
     fn state_unchecked(&self, step: usize, q: &DVector<f64>, v: &DVector<f64>) -> Result<State> {
         let stepper = self.stepper();
         let mut q = q.clone();
-        stepper.place_motions(&mut q, step as f64 * self.dt);
+        stepper.place_motions(&mut q, step as f64 * self.choices.time_step);
         let e = self.system().evaluate(self.parameters(), &q)?;
         let state = State {
             step,
@@ -317,7 +311,7 @@ impl Simulator {
         let clearance = self.clearance();
         let warning = smallest.and_then(|(time, gap)| clearance.warning(time, &gap, fidelity));
         let unresolved = || clearance.unresolved(states, &self.assembled.water.resolved);
-        warning.or_else(|| (fidelity == Fidelity::Reduced).then(unresolved).flatten())
+        warning.or_else(|| fidelity.compresses().then(unresolved).flatten())
     }
 
     /// Added mass of all bodies in the water at the start.
@@ -353,7 +347,7 @@ impl Simulator {
         let tree = &self.system().tree;
         let subject = Subject {
             scene: &self.scene,
-            settings: &self.settings,
+            choices: &self.choices.water,
             tree,
             poses: &tree.kinematics(&self.assembled.q).poses,
             water: &self.assembled.water,
@@ -367,7 +361,7 @@ impl Simulator {
     /// # Errors
     /// A file of a mesh that can't be read any more.
     pub fn meshes(&self) -> Result<Vec<Option<TriMesh>>> {
-        let surfaces = surfaces(&self.scene, &self.settings)?.into_iter();
+        let surfaces = surfaces(&self.scene, &self.choices.water)?.into_iter();
         Ok(surfaces.map(|s| s.map(|s| s.mesh)).collect())
     }
 

@@ -1,9 +1,7 @@
 //! One way to simulate a scene.
 
-use super::Method;
 use crate::dynamics::Integrator;
-use crate::scene::Scene;
-use crate::simulate::{Fidelity, Settings};
+use crate::simulate::{Fidelity, Method, Settings};
 use serde::Serialize;
 
 /// What was varied to come to a configuration.
@@ -75,10 +73,11 @@ pub(super) fn seconds(x: f64) -> String {
 }
 
 impl Configuration {
-    /// The settings of a simulator of `scene`.
-    pub fn settings(&self, scene: &Scene) -> Settings {
-        let out = Settings::for_scene(scene).fidelity(self.fidelity);
-        let mut out = (self.method.choose(out))
+    /// The settings of a simulator.
+    pub fn settings(&self) -> Settings {
+        let mut out = Settings::default()
+            .fidelity(self.fidelity)
+            .method(self.method)
             .integrator(self.integrator)
             .time_step(self.time_step);
         if let Some(faces) = self.faces_per_body {

@@ -53,7 +53,7 @@ fn fill(
     watch: &mut Watch,
 ) -> Result<()> {
     let begin = Instant::now();
-    let simulator = Simulator::new(scene, row.configuration.settings(scene))?;
+    let simulator = Simulator::new(scene, row.configuration.settings())?;
     let setup = begin.elapsed().as_secs_f64();
     row.setup_seconds = Some(setup);
     watch.check()?;

@@ -24,7 +24,6 @@
 mod compare;
 mod configuration;
 mod measure;
-mod method;
 mod plan;
 mod progress;
 mod reference;
@@ -34,7 +33,6 @@ mod shapes;
 mod start;
 
 pub use configuration::{Configuration, Family};
-pub use method::Method;
 pub use progress::{Progress, Stage};
 pub use row::{ReferenceQuantity, TradeoffReference, TradeoffRow};
 pub use settings::TradeoffSettings;

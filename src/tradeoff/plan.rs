@@ -1,13 +1,14 @@
 //! Which configurations of a scene are compared, and in which order they are measured.
 
+use super::TradeoffSettings;
 use super::configuration::{Configuration, Family};
 use super::row::TradeoffRow;
 use super::shapes::{ClosedForms, closed_forms, has_faces};
-use super::{Method, TradeoffSettings};
-use crate::coupling::{full::SolveSettings, reduced::compress};
+use crate::coupling::full::SolveSettings;
 use crate::dynamics::Integrator;
 use crate::scene::Scene;
-use crate::simulate::{Accuracy, Fidelity, Settings};
+use crate::simulate::{Fidelity, Knob, Method, Settings};
+use strum::VariantArray;
 
 const FACES: [usize; 3] = [80, 320, 1280];
 const RANKS: [usize; 5] = [20, 40, 80, 160, 320];
@@ -15,20 +16,6 @@ const ACCURACIES: [f64; 6] = [3e-2, 1e-2, 3e-3, 1e-3, 3e-4, 1e-4];
 const TOLERANCES: [f64; 5] = [1e-3, 1e-4, 1e-6, 1e-8, 1e-10];
 /// Of the scene's time step.
 const TIME_STEPS: [f64; 5] = [4.0, 2.0, 1.0, 0.5, 0.25];
-const INTEGRATORS: [Integrator; 5] = [
-    Integrator::MomentumEuler,
-    Integrator::Midpoint,
-    Integrator::Rk2,
-    Integrator::Rk4,
-    Integrator::VelocityEuler,
-];
-const FIDELITIES: [Fidelity; 4] = [
-    Fidelity::Isolated,
-    Fidelity::Reduced,
-    Fidelity::Auto,
-    Fidelity::Full,
-];
-
 /// How setting up and stepping grow with the number of faces, at most: a guess, with a factor against
 /// starting what can't end in time.
 const GROWTH: f64 = 2.5;
@@ -41,7 +28,7 @@ pub(super) fn plan(scene: &Scene, settings: &TradeoffSettings) -> Vec<Configurat
         closed_forms: closed_forms(scene),
         out: Vec::new(),
     };
-    let bases: Vec<Configuration> = or_default(&settings.fidelities, &FIDELITIES)
+    let bases: Vec<Configuration> = or_default(&settings.fidelities, Fidelity::VARIANTS)
         .into_iter()
         .map(|fidelity| plan.base(fidelity))
         .collect();
@@ -99,49 +86,44 @@ impl Plan<'_> {
 
     /// What the other configurations of a fidelity are varied around.
     fn base(&self, fidelity: Fidelity) -> Configuration {
-        let own = Settings::for_scene(self.scene).fidelity(fidelity);
+        let own = Settings::default().fidelity(fidelity).resolve(self.scene);
         let given = self.settings;
         // The coupled system is one of fundamental solutions.
-        let fits = |m: &&Method| match fidelity {
-            Fidelity::Full => !matches!(m, Method::Exact | Method::Panel),
-            _ => true,
-        };
+        let fits = |m: &&Method| fidelity.solves_alone() || m.steps_together();
         let method = given.methods.iter().find(fits).copied();
         let accuracy = given.accuracies.first().copied();
         let time_step = given.time_steps.first().copied();
         self.normalised(Configuration {
             family: Family::Base,
             fidelity,
-            method: method.unwrap_or(Method::of(&own)),
+            method: method.unwrap_or(own.water.method_used()),
             faces_per_body: given.faces.first().copied(),
             rank: given.ranks.first().copied().filter(|_| accuracy.is_none()),
             accuracy,
             tolerance: given.tolerances.first().copied(),
             integrator: *given.integrators.first().unwrap_or(&own.integrator),
-            time_step: time_step.unwrap_or(self.scene.time_step),
+            time_step: time_step.unwrap_or(own.time_step),
         })
     }
 
     fn methods(&self, base: Configuration) -> Vec<Configuration> {
-        let own: &[Method] = match base.fidelity {
-            Fidelity::Isolated | Fidelity::Reduced => &[
-                Method::Auto,
-                Method::Panel,
-                Method::MfsVertex,
-                Method::MfsFace,
-            ],
-            Fidelity::Auto => &[],
-            Fidelity::Full => &[Method::MfsVertex, Method::MfsFace],
+        let varied = |m: &&Method| match base.fidelity.solves_alone() {
+            true => **m != Method::Exact,
+            false => m.steps_together() && m.together() == **m,
+        };
+        let own: Vec<Method> = match base.fidelity.chooses() {
+            true => Vec::new(),
+            false => Method::VARIANTS.iter().filter(varied).copied().collect(),
         };
         let of = |method| Configuration { method, ..base };
-        let methods = or_default(&self.settings.methods, own);
+        let methods = or_default(&self.settings.methods, &own);
         methods.into_iter().map(of).collect()
     }
 
     fn faces(&self, base: Configuration) -> Vec<Configuration> {
-        let own: &[usize] = match base.fidelity {
-            Fidelity::Auto => &[],
-            _ => &FACES,
+        let own: &[usize] = match base.fidelity.chooses() {
+            true => &[],
+            false => &FACES,
         };
         let of = |faces| Configuration {
             faces_per_body: Some(faces),
@@ -154,8 +136,8 @@ impl Plan<'_> {
     /// The base with a method whose solution depends on the mesh.
     fn with_mesh(&self, base: Configuration) -> Option<Configuration> {
         let meshed = |c: &Configuration| {
-            let exact = matches!(c.method, Method::Auto | Method::Exact);
-            c.fidelity == Fidelity::Full || !exact || self.closed_forms != ClosedForms::All
+            let exact = c.fidelity.solves_alone() && c.method.by_formula();
+            !exact || self.closed_forms != ClosedForms::All
         };
         let methods = or_default(&self.settings.methods, &[Method::Panel]);
         let others = methods
@@ -172,30 +154,34 @@ impl Plan<'_> {
             tolerance,
             ..base
         };
-        let accuracies = || {
-            let all = or_default(&self.settings.accuracies, &ACCURACIES).into_iter();
-            let all = all.map(|a| aim(None, Some(a), None));
-            (Family::Accuracy, all.collect())
-        };
-        match base.fidelity {
-            Fidelity::Isolated => Vec::new(),
-            Fidelity::Reduced => {
-                let ranks = or_default(&self.settings.ranks, &RANKS).into_iter();
-                let ranks = ranks.map(|r| aim(Some(r), None, None));
-                vec![(Family::Rank, ranks.collect()), accuracies()]
-            }
-            Fidelity::Auto => vec![accuracies()],
-            Fidelity::Full => {
-                let tolerances = or_default(&self.settings.tolerances, &TOLERANCES).into_iter();
-                let tolerances = tolerances.map(|t| aim(None, None, Some(t)));
-                vec![(Family::Tolerance, tolerances.collect())]
-            }
-        }
+        let ranks = or_default(&self.settings.ranks, &RANKS).into_iter();
+        let accuracies = or_default(&self.settings.accuracies, &ACCURACIES).into_iter();
+        let tolerances = or_default(&self.settings.tolerances, &TOLERANCES).into_iter();
+        let all: [(Knob, Family, Vec<Configuration>); 3] = [
+            (
+                Knob::Rank,
+                Family::Rank,
+                ranks.map(|r| aim(Some(r), None, None)).collect(),
+            ),
+            (
+                Knob::Accuracy,
+                Family::Accuracy,
+                accuracies.map(|a| aim(None, Some(a), None)).collect(),
+            ),
+            (
+                Knob::Tolerance,
+                Family::Tolerance,
+                tolerances.map(|t| aim(None, None, Some(t))).collect(),
+            ),
+        ];
+        let has = |knob: &Knob| base.fidelity.knobs().contains(knob);
+        let own = all.into_iter().filter(|(knob, ..)| has(knob));
+        own.map(|(_, family, varied)| (family, varied)).collect()
     }
 
     fn integrators(&self, base: Configuration) -> Vec<Configuration> {
         let of = |integrator| Configuration { integrator, ..base };
-        let all = or_default(&self.settings.integrators, &INTEGRATORS);
+        let all = or_default(&self.settings.integrators, Integrator::VARIANTS);
         all.into_iter().map(of).collect()
     }
 
@@ -218,24 +204,18 @@ impl Plan<'_> {
 
     /// The same without what makes no difference, and with defaults written out, so that equals are equal.
     fn normalised(&self, mut c: Configuration) -> Configuration {
-        c.rank = c.rank.filter(|_| c.fidelity == Fidelity::Reduced);
-        let own_accuracy = match c.fidelity {
-            Fidelity::Reduced => {
-                let own = compress::Settings::default().tolerance;
-                c.rank.is_none().then_some(own)
-            }
-            Fidelity::Auto => Some(Accuracy::default().0),
-            Fidelity::Isolated | Fidelity::Full => None,
-        };
+        let has = |knob| c.fidelity.knobs().contains(&knob);
+        c.rank = c.rank.filter(|_| has(Knob::Rank));
+        let own_accuracy = c.fidelity.own_accuracy().filter(|_| c.rank.is_none());
         c.accuracy = own_accuracy.map(|own| c.accuracy.unwrap_or(own));
         let own_tolerance = SolveSettings::default().tolerance;
-        c.tolerance = (c.fidelity == Fidelity::Full).then(|| c.tolerance.unwrap_or(own_tolerance));
-        c.method = match (c.method, c.fidelity, self.closed_forms) {
-            (Method::Auto, Fidelity::Full, _) => Method::MfsVertex,
-            (method, Fidelity::Auto, _) => method,
-            (Method::Auto, _, ClosedForms::All) => Method::Exact,
-            (Method::Auto, _, ClosedForms::None) => Method::Panel,
-            (method, ..) => method,
+        c.tolerance = has(Knob::Tolerance).then(|| c.tolerance.unwrap_or(own_tolerance));
+        c.method = match (c.method, self.closed_forms) {
+            (method, _) if c.fidelity.chooses() => method,
+            (method, _) if !c.fidelity.solves_alone() => method.together(),
+            (Method::Auto, ClosedForms::All) => Method::Exact,
+            (Method::Auto, ClosedForms::None) => Method::Panel,
+            (method, _) => method,
         };
         c.faces_per_body = c.faces_per_body.filter(|n| !has_faces(self.scene, *n));
         c

@@ -218,9 +218,10 @@ fn front(points: &[Option<(f64, f64)>]) -> Vec<bool> {
 
 #[cfg(test)]
 mod tests {
-    use super::super::{Family, Method};
+    use super::super::Family;
     use super::*;
     use crate::dynamics::Integrator;
+    use crate::simulate::Method;
 
     fn row(ms: Option<f64>, error: Option<f64>, integrator: Integrator) -> TradeoffRow {
         let configuration = Configuration {

@@ -1,8 +1,7 @@
 //! What a user may choose about the comparison.
 
-use super::Method;
 use crate::dynamics::Integrator;
-use crate::simulate::Fidelity;
+use crate::simulate::{Fidelity, Method};
 use crate::{Error, Result};
 use serde::{Deserialize, Serialize};
 

@@ -1,20 +1,13 @@
 //! How near the bodies are to one another and to the walls, and what that means for the flow.
 
-use super::Fidelity;
-use super::surface::Surface;
+use super::fidelity::Fidelity;
+use super::surface::{Surface, overlaps};
 use crate::adjoint::lie::Pose;
 use crate::error::readable;
 use crate::geometry::{Gap, Gaps, Other, Share, overlap_error};
 use crate::multibody::Tree;
 use crate::scene::Scene;
 use crate::{Error, Result};
-
-/// Gaps narrower than this many edges aren't resolved. A sphere near a wall: at 0.3 edges the gap
-/// adds 1 % to the error of its added mass with 320 faces (0.1 % with 5120), and the force along
-/// the gap is 7 % too small between 0.3 and 0.8 edges (320), 3 % between 0.2 and 0.7 (1280).
-const RESOLVED: f64 = 0.5;
-/// Depth in edges up to which surfaces count as touching: rounding.
-const TOUCHING: f64 = 1e-9;
 
 /// Largest part of a body's volume that may lie inside a larger one that it is declared to overlap.
 const MOST_SHARED: f64 = 0.5;
@@ -145,30 +138,8 @@ impl Clearance {
 
     /// What the smallest gap of a run means.
     pub fn warning(&self, time: f64, gap: &Gap, fidelity: Fidelity) -> Option<String> {
-        let time = readable(time);
-        let place = self.place(gap);
-        let hint = self.hint(gap);
-        match fidelity {
-            Fidelity::Full | Fidelity::Auto => (gap.distance < RESOLVED * gap.edge).then(|| {
-                format!(
-                    "{place}: the smallest gap, {:.3e} m at t = {time} s, is narrower than half \
-                     the edges there ({:.3e} m): forces across it may be off by several percent \
-                     and more; use more faces, refine the bodies there (`refine`), or end the run \
-                     before{hint}",
-                    gap.distance.max(0.0),
-                    gap.edge
-                )
-            }),
-            // Said pair by pair: what is resolved differs between bodies.
-            Fidelity::Reduced => None,
-            Fidelity::Isolated => overlaps(gap).then(|| {
-                format!(
-                    "{place} overlap, most at t = {time} s by {:.3e} m; nothing keeps them apart \
-                     without the coupled water{hint}",
-                    -gap.distance
-                )
-            }),
-        }
+        let (time, place, hint) = (readable(time), self.place(gap), self.hint(gap));
+        (fidelity.kind()).gap_warning(gap, &place, &time.to_string(), &hint)
     }
 
     /// How bodies of which one carries the other may be declared to overlap.
@@ -240,9 +211,4 @@ impl Clearance {
             readable(time)
         ))
     }
-}
-
-/// Whether surfaces cross.
-fn overlaps(gap: &Gap) -> bool {
-    gap.distance < -TOUCHING * gap.edge
 }

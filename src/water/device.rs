@@ -1,8 +1,6 @@
 //! What the couplings of a simulator are computed on: the CPU, or one open GPU that all of them share.
 
-use super::backend::{Backend, BackendReport};
-use super::{Fidelity, Settings};
-use crate::boundary::OneBody;
+use super::backend::{Backend, BackendReport, GpuSettings};
 use crate::coupling::Coupling;
 use crate::coupling::full::{Cpu, Full, Model};
 use crate::coupling::reduced::Reduced;
@@ -11,7 +9,7 @@ use std::sync::Arc;
 
 #[cfg(feature = "gpu")]
 use {
-    super::backend::{Arithmetic, DeviceReport, GpuSettings},
+    super::backend::{Arithmetic, DeviceReport},
     crate::gpu::{self, Context, full::Gpu, reduced::GpuReduced},
 };
 
@@ -28,25 +26,30 @@ pub(crate) struct Device {
 }
 
 impl Device {
-    /// What the settings ask for, with a fidelity that isn't `Auto` any more.
-    pub fn open(settings: &Settings, fidelity: Fidelity) -> Result<Self> {
+    /// What is asked for; `idle` says why the scene leaves a GPU nothing to compute, if it does, or refuses it.
+    ///
+    /// # Errors
+    /// What `idle` refuses, and a GPU that can't be opened, unless the CPU may take over.
+    pub fn open(
+        asked: Backend,
+        settings: &GpuSettings,
+        idle: impl FnOnce() -> Result<Option<&'static str>>,
+    ) -> Result<Self> {
         let mut out = Self {
-            asked: settings.backend,
+            asked,
             ..Self::default()
         };
-        if settings.backend == Backend::Cpu {
+        if asked == Backend::Cpu {
             return Ok(out);
         }
-        let panels = fidelity == Fidelity::Full && settings.one_body == OneBody::Panel;
-        if cfg!(feature = "gpu") && panels {
-            return Err(Error::Unsupported {
-                what: "the method panel with the fidelity full and the backend gpu".into(),
-                why: "coupled panels are the reference, on the CPU alone".into(),
-                instead: "use the backend cpu, or the method mfs-vertex".into(),
-            });
+        if cfg!(feature = "gpu")
+            && let Some(reason) = idle()?
+        {
+            out.reason = Some(reason.into());
+            return Ok(out);
         }
-        match out.fill(settings, fidelity) {
-            Err(error) if settings.gpu.fallback => {
+        match out.fill(settings) {
+            Err(error) if settings.fallback => {
                 out.reason = Some(fallen_back(&error));
                 Ok(out)
             }
@@ -55,21 +58,14 @@ impl Device {
     }
 
     #[cfg(feature = "gpu")]
-    fn fill(&mut self, settings: &Settings, fidelity: Fidelity) -> Result<()> {
-        if fidelity == Fidelity::Isolated {
-            self.reason = Some(
-                "the fidelity isolated runs on the CPU: it has nothing to compute on the backend gpu"
-                    .into(),
-            );
-            return Ok(());
-        }
-        self.fallback = settings.gpu.fallback;
-        self.context = Some(Context::new(&settings.gpu.into())?);
+    fn fill(&mut self, settings: &GpuSettings) -> Result<()> {
+        self.fallback = settings.fallback;
+        self.context = Some(Context::new(&settings.into())?);
         Ok(())
     }
 
     #[cfg(not(feature = "gpu"))]
-    fn fill(&mut self, _: &Settings, _: Fidelity) -> Result<()> {
+    fn fill(&mut self, _: &GpuSettings) -> Result<()> {
         Err(super::backend::not_built())
     }
 
@@ -170,10 +166,10 @@ fn fallen_back(error: &Error) -> String {
 }
 
 #[cfg(feature = "gpu")]
-impl From<GpuSettings> for gpu::Options {
-    fn from(settings: GpuSettings) -> Self {
+impl From<&GpuSettings> for gpu::Options {
+    fn from(settings: &GpuSettings) -> Self {
         Self {
-            adapter: settings.adapter.map(String::from),
+            adapter: settings.adapter.as_ref().map(|a| a.as_str().into()),
             fine: match settings.arithmetic {
                 Arithmetic::Auto => None,
                 Arithmetic::Double => Some(gpu::Arithmetic::Double),

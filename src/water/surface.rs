@@ -1,11 +1,9 @@
 //! Bodies' surfaces, as their shapes are meshed for the water.
 
-use super::{Fidelity, Settings, submerged};
 use crate::Result;
 use crate::adjoint::lie::{Pose, Vec3, exp_matrix};
-use crate::boundary::OneBody;
-use crate::geometry::{MassProperties, TriMesh};
-use crate::scene::{Body, Placement, Refinement, Scene};
+use crate::geometry::{Gap, MassProperties, TriMesh};
+use crate::scene::{Body, Placement, Refinement, Scene, Shape};
 use crate::shape;
 use std::path::Path;
 
@@ -35,6 +33,11 @@ pub(crate) struct Coarse {
 }
 
 impl Surface {
+    /// Edge of the equilateral triangle of mean area, m. Refined regions don't count.
+    pub fn mean_edge(&self) -> f64 {
+        (4.0 / 3.0_f64.sqrt() * self.mesh.surface_area() / self.base as f64).sqrt()
+    }
+
     /// Of a mesh alone.
     pub fn of_mesh(mesh: TriMesh) -> Self {
         Self {
@@ -46,14 +49,28 @@ impl Surface {
     }
 }
 
-/// A body's surface, with about `faces` faces if it is a shape by formula, before its regions are refined
-/// to `edges` times the edges that they ask for.
-pub(crate) fn surface(
-    body: &Body,
-    settings: &Settings,
-    faces: Option<usize>,
-    edges: f64,
-) -> Result<Option<Surface>> {
+/// What the water asks of surfaces.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Meshing {
+    /// Target number of faces of shapes by formula; `None`: the shape's own.
+    pub faces: Option<usize>,
+    /// Whether ellipsoids are solved by formula.
+    pub by_formula: bool,
+    /// Whether other shapes by formula get a second, coarser mesh.
+    pub pairs: bool,
+}
+
+/// The semi-axes of a shape by formula that closed forms are known for.
+pub(crate) fn semi_axes(shape: &Shape) -> Option<[f64; 3]> {
+    match shape {
+        Shape::Sphere { radius, .. } => Some([*radius; 3]),
+        Shape::Ellipsoid { semi_axes, .. } => Some(*semi_axes),
+        _ => None,
+    }
+}
+
+/// A body's surface, before its regions are refined to `edges` times the edges that they ask for.
+pub(crate) fn surface(body: &Body, meshing: Meshing, edges: f64) -> Result<Option<Surface>> {
     let Some(shape) = &body.shape else {
         return Ok(None);
     };
@@ -69,13 +86,11 @@ pub(crate) fn surface(
         let place = format!("body {:?}", body.name);
         Ok(shape::refine(base, shape, &regions, &place)?.transformed(&at))
     };
-    let mesh = even(faces)?;
+    let mesh = even(meshing.faces)?;
     let base = mesh.faces().len();
     let mesh = refined(&mesh, edges)?;
-    let closed = settings.by_formula() && submerged::semi_axes(shape).is_some();
-    let panels = settings.fidelity != Fidelity::Full
-        && matches!(settings.one_body, OneBody::Auto | OneBody::Panel);
-    let coarse = if panels && !closed && !shape.is_mesh() {
+    let closed = meshing.by_formula && semi_axes(shape).is_some();
+    let coarse = if meshing.pairs && !closed && !shape.is_mesh() {
         let quarter = (base / 4).max(12);
         let coarse = even(Some(quarter))?;
         let fewer = coarse.faces().len();
@@ -109,9 +124,15 @@ pub(crate) fn surface(
 }
 
 /// The surfaces of all bodies of a scene; none for a body without a shape.
-pub(crate) fn surfaces(scene: &Scene, settings: &Settings) -> Result<Vec<Option<Surface>>> {
+pub(super) fn meshed(scene: &Scene, meshing: Meshing) -> Result<Vec<Option<Surface>>> {
     let bodies = scene.bodies.iter();
-    bodies
-        .map(|body| surface(body, settings, settings.faces, 1.0))
-        .collect()
+    bodies.map(|body| surface(body, meshing, 1.0)).collect()
+}
+
+/// Depth in edges up to which surfaces count as touching: rounding.
+const TOUCHING: f64 = 1e-9;
+
+/// Whether surfaces cross.
+pub(crate) fn overlaps(gap: &Gap) -> bool {
+    gap.distance < -TOUCHING * gap.edge
 }

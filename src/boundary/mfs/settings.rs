@@ -1,6 +1,7 @@
 //! What a user may choose about the discretisation of one body.
 
 use serde::{Deserialize, Serialize};
+use strum::{EnumMessage, EnumString, IntoStaticStr, VariantArray};
 
 /// Discretisation of one body's surface.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
@@ -70,15 +71,28 @@ pub enum Depth {
 }
 
 /// Norm in which the rows are fitted.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
+#[derive(
+    Clone,
+    Copy,
+    Debug,
+    Default,
+    PartialEq,
+    Eq,
+    Serialize,
+    Deserialize,
+    EnumMessage,
+    EnumString,
+    IntoStaticStr,
+    VariantArray,
+)]
 #[serde(rename_all = "kebab-case")]
+#[strum(serialize_all = "kebab-case")]
 pub enum RowScaling {
-    /// The L² norm of the normal velocity over the surface: small and large faces, and small
-    /// and large bodies, count alike.
+    /// The L² norm of the normal velocity: small and large faces, and small and large bodies, count alike.
     #[default]
     Scaled,
-    /// Plain least squares of the flux (vertex sources) or of the normal velocity (face sources).
-    /// Ruins small bodies beside large ones; for comparison.
+    /// Plain least squares of the flux (vertex sources) or of the normal velocity (face sources); ruins small bodies beside
+    /// large ones.
     Unscaled,
 }
 

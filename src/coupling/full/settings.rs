@@ -6,28 +6,57 @@ use crate::coupling::settings::check_limits;
 use crate::{Error, Result};
 use serde::{Deserialize, Serialize};
 use std::sync::Arc;
+use strum::{EnumMessage, EnumString, IntoStaticStr, VariantArray};
 
 /// How the coupled system is solved.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
+#[derive(
+    Clone,
+    Copy,
+    Debug,
+    Default,
+    PartialEq,
+    Eq,
+    Serialize,
+    Deserialize,
+    EnumMessage,
+    EnumString,
+    IntoStaticStr,
+    VariantArray,
+)]
 #[serde(rename_all = "kebab-case")]
+#[strum(serialize_all = "kebab-case")]
 pub enum Solver {
-    /// Conjugate gradients on the normal equations (Eq. 20), preconditioned.
+    /// Conjugate gradients on the least-squares problem (Eq. 20).
     #[default]
     Cgls,
-    /// Dense QR: the reference.
+    /// A dense factorisation, as a reference: QR, or LU with the method panel.
     Qr,
-    /// GMRES on the square system of face sources (Eq. 18), and on its transpose.
+    /// GMRES; for the square systems of `mfs-face` (Eq. 18, and its transpose) and `panel` only.
     Gmres,
 }
 
 /// Right preconditioner of the iterative solvers.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
+#[derive(
+    Clone,
+    Copy,
+    Debug,
+    Default,
+    PartialEq,
+    Eq,
+    Serialize,
+    Deserialize,
+    EnumMessage,
+    EnumString,
+    IntoStaticStr,
+    VariantArray,
+)]
 #[serde(rename_all = "kebab-case")]
+#[strum(serialize_all = "kebab-case")]
 pub enum Preconditioner {
-    /// Each body's own QR factor, made once.
+    /// Each body's own factorisation, made once.
     #[default]
     Factors,
-    /// Column norms.
+    /// The diagonal (column norms).
     Jacobi,
     /// None.
     None,

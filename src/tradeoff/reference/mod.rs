@@ -232,7 +232,9 @@ impl Reference {
 }
 
 fn isolated(scene: &Scene) -> Result<Simulator> {
-    let settings = Settings::default().fidelity(Fidelity::Isolated).faces(80);
+    let settings = Settings::preset(Preset::Default)
+        .fidelity(Fidelity::Isolated)
+        .faces(80);
     Simulator::new(scene, settings)
 }
 

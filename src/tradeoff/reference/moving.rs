@@ -2,11 +2,10 @@
 //! steps; by the coupled system where gaps are too small to compress the bodies.
 
 use super::{Limits, climb};
-use crate::boundary::OneBody;
 use crate::dynamics::Integrator;
 use crate::geometry::Other;
-use crate::scene::Scene;
-use crate::simulate::{Fidelity, Settings, Simulator};
+use crate::scene::{Preset, Scene};
+use crate::simulate::{Fidelity, Method, Settings, Simulator};
 use crate::tradeoff::progress::Watch;
 use crate::tradeoff::shapes::{ClosedForms, closed_forms, refinable, shapes};
 use crate::tradeoff::start::{Path, Start};
@@ -59,7 +58,7 @@ struct Level {
 /// How bodies are solved.
 #[derive(Clone, Copy, Debug, PartialEq)]
 enum Way {
-    Reduced(OneBody),
+    Reduced(Method),
     Full,
 }
 
@@ -75,7 +74,7 @@ impl Simulations {
     pub fn new(scene: &Scene, limits: &Limits, time: Duration, watch: &mut Watch) -> Result<Self> {
         let until = Instant::now() + time;
         let mut why = None;
-        for method in [OneBody::Auto, OneBody::Panel] {
+        for method in [Method::Auto, Method::Panel] {
             match Self::by(scene, Way::Reduced(method), limits, until, watch) {
                 Ok(Some(found)) => return Ok(found.because(why)),
                 Ok(None) => {
@@ -188,7 +187,7 @@ impl Simulations {
 impl Level {
     /// Whether anything depends on the number of faces.
     fn meshed(&self, scene: &Scene) -> bool {
-        let exact = self.way == Way::Reduced(OneBody::Auto);
+        let exact = self.way == Way::Reduced(Method::Auto);
         let exact = exact && closed_forms(scene) == ClosedForms::All;
         let drag = scene.bodies.iter().any(|b| b.drag.is_some());
         shapes(scene).any(refinable) && (!exact || drag)
@@ -197,7 +196,7 @@ impl Level {
     fn describe(&self, scene: &Scene) -> String {
         let by = match (self.way, closed_forms(scene)) {
             (Way::Full, _) => return "the coupled system (full, mfs-vertex)".into(),
-            (Way::Reduced(OneBody::Panel), _) | (_, ClosedForms::None) => "panel",
+            (Way::Reduced(Method::Panel), _) | (_, ClosedForms::None) => "panel",
             (_, ClosedForms::All) => "exact",
             (_, ClosedForms::Some) => "exact and panel",
         };
@@ -208,7 +207,7 @@ impl Level {
 
 impl Simulation {
     fn new(scene: &Scene, level: &Level, steps: usize, watch: &mut Watch) -> Result<Self> {
-        let mut settings = Settings::default()
+        let mut settings = Settings::preset(Preset::Default)
             .integrator(Integrator::Rk4)
             .time_step(scene.time_step / level.parts as f64)
             .faces(level.faces);
@@ -216,7 +215,7 @@ impl Simulation {
             Way::Full => settings.fidelity(Fidelity::Full).tolerance(TOLERANCE),
             Way::Reduced(method) => settings
                 .fidelity(Fidelity::Reduced)
-                .one_body(method)
+                .method(method)
                 .accuracy(level.accuracy),
         };
         if let Some(gap) = level.gap {

@@ -11,9 +11,8 @@
 
 use super::{Limits, climb};
 use crate::Result;
-use crate::boundary::OneBody;
-use crate::scene::Scene;
-use crate::simulate::{Fidelity, Settings, Simulator};
+use crate::scene::{Preset, Scene};
+use crate::simulate::{Fidelity, Method, Settings, Simulator};
 use crate::tradeoff::compare::matrix_error;
 use crate::tradeoff::progress::Watch;
 use crate::tradeoff::shapes::{has_edges, refinable, shapes};
@@ -70,9 +69,9 @@ impl Panels {
             levels.truncate(1);
         }
         let mut found = climb(levels, 2, GROWTH, until, |asked| {
-            let settings = Settings::default()
+            let settings = Settings::preset(Preset::Default)
                 .fidelity(Fidelity::Full)
-                .one_body(OneBody::Panel)
+                .method(Method::Panel)
                 .faces(asked);
             let simulator = Simulator::new(scene, settings)?;
             let start = Start::values(&simulator)?;

@@ -2,14 +2,18 @@
 
 use crate::Result;
 use crate::adjoint::lie::Pose;
-use crate::boundary::{OneBody, Response};
+use crate::boundary::Response;
 use crate::coupling::{Coupling, CouplingReport};
 use crate::geometry::{Gap, Other};
 use crate::multibody::Tree;
 use crate::scene::{Scene, WallSurface};
-use crate::water::submerged::{self, SubmergedBody, Water};
-use crate::water::surface::{Surface, surface, surfaces};
-use crate::water::{Fidelity, Prepared, Settings, around, in_water, world_axes};
+use crate::water::choices::{WaterChoices, surfaces};
+use crate::water::device::Device;
+use crate::water::fidelity::{Fidelity, compressed_all, responses};
+use crate::water::method::Method;
+use crate::water::prepared::{Prepared, world_axes};
+use crate::water::submerged::{Around, SubmergedBody, in_water};
+use crate::water::surface::{Meshing, Surface, surface};
 use nalgebra::DMatrix;
 use std::sync::Arc;
 
@@ -26,7 +30,7 @@ const NARROWEST: f64 = 10.0;
 #[derive(Clone, Copy)]
 pub(crate) struct Subject<'a> {
     pub scene: &'a Scene,
-    pub settings: &'a Settings,
+    pub choices: &'a WaterChoices,
     pub tree: &'a Tree,
     /// Poses of all bodies of the scene.
     pub poses: &'a [Pose],
@@ -70,13 +74,13 @@ impl<'a> Case<'a> {
     pub fn new(subject: Subject<'a>) -> Result<Self> {
         let Subject {
             scene,
-            settings,
+            choices,
             water,
             ..
         } = subject;
         let bodies = water.bodies.clone();
         let poses: Vec<Pose> = bodies.iter().map(|b| subject.poses[*b]).collect();
-        let surfaces = surfaces(scene, settings)?;
+        let surfaces = surfaces(scene, choices)?;
         let turn = world_axes(&poses);
         let (matrix, report) = evaluate(water.coupling.as_ref(), &poses, &turn)?;
         let diagonal = (0..matrix.nrows())
@@ -103,7 +107,7 @@ impl<'a> Case<'a> {
             correction: None,
             report,
         };
-        if matches!(out.fidelity, Fidelity::Reduced | Fidelity::Auto) {
+        if out.fidelity.kind().compresses() {
             out.correction = Some(out.correction(&out.submerged(&out.surfaces))?);
         }
         Ok(out)
@@ -115,10 +119,13 @@ impl<'a> Case<'a> {
 
     /// The bodies whose answers come from their meshes, by their numbers in the scene.
     pub fn meshed(&self) -> Vec<usize> {
-        let settings = self.subject.settings;
+        let method = self.subject.choices.method.kind();
+        let alone = self.fidelity.kind().solves_alone();
+        let formula = |w: &SubmergedBody| method.for_body(w).is_ok_and(|m| m.by_formula());
         let submerged = self.submerged(&self.surfaces);
         let pairs = self.bodies.iter().zip(&submerged);
-        let used = pairs.filter(|(_, w)| w.meshed(settings, self.fidelity));
+        let used = pairs
+            .filter(|(_, w)| w.mesh.is_some() && w.added_mass.is_none() && !(alone && formula(w)));
         used.map(|(b, _)| *b).collect()
     }
 
@@ -150,13 +157,13 @@ impl<'a> Case<'a> {
 
     /// The bodies in the water with these surfaces.
     pub fn submerged<'b>(&'b self, surfaces: &'b [Option<Surface>]) -> Vec<SubmergedBody<'b>> {
-        let asked = self.subject.settings.fidelity;
-        in_water(self.scene(), surfaces, self.subject.tree, asked).1
+        let coupled = self.subject.choices.fidelity.coupled();
+        in_water(self.scene(), surfaces, self.subject.tree, coupled).1
     }
 
-    fn water(&self) -> Water<'_> {
+    fn around(&self) -> Around<'_> {
         let folder = self.subject.water.folder.as_deref();
-        around(self.scene(), &self.bodies, folder)
+        Around::new(self.scene(), &self.bodies, folder)
     }
 
     /// The added mass with these surfaces; where bodies are compressed, what [`Reduced`] is off if
@@ -168,17 +175,14 @@ impl<'a> Case<'a> {
         if self.correction.is_some() {
             return self.correction(&submerged);
         }
-        let settings = self.subject.settings;
-        let plan = &self.subject.water.plan;
-        let mut device = self.subject.water.device.clone();
-        let water = self.water();
-        let made = submerged::couple(
+        let choices = self.subject.choices;
+        let made = self.fidelity.kind().couple(
             &submerged,
-            &water,
-            settings,
-            self.fidelity,
-            plan,
-            &mut device,
+            &self.around(),
+            choices.method.kind(),
+            &choices.numerics,
+            &self.subject.water.plan,
+            &mut self.subject.water.device.clone(),
         )?;
         Ok(evaluate(made.coupling.as_ref(), &self.poses, &self.turn)?.0)
     }
@@ -190,13 +194,14 @@ impl<'a> Case<'a> {
 
     /// What the compressed bodies' added mass is off if they answer as `bodies` do.
     fn correction(&self, bodies: &[SubmergedBody]) -> Result<DMatrix<f64>> {
-        let settings = self.subject.settings;
+        let choices = self.subject.choices;
+        let (method, numerics) = (choices.method.kind(), &choices.numerics);
         let plan = &self.subject.water.plan;
         let own = self.submerged(&self.surfaces);
-        let coupling = submerged::compressed_all(&own, &self.water(), settings, plan)?;
+        let coupling = compressed_all(&own, &self.around(), method, numerics, plan)?;
         let made = coupling.reduced_bodies().iter();
         let gaps: Vec<f64> = made.map(|b| b.parts().fit.resolved_gap).collect();
-        let responses: Vec<Arc<dyn Response>> = submerged::responses(bodies, settings, &gaps)?;
+        let responses: Vec<Arc<dyn Response>> = responses(bodies, method, numerics, &gaps)?;
         coupling.correction(&self.poses, &self.turn, &responses)
     }
 
@@ -237,7 +242,11 @@ impl<'a> Case<'a> {
 
     fn left_out(&self) -> Result<DMatrix<f64>> {
         let scene = self.scene();
-        let panel = Settings::default().one_body(OneBody::Panel);
+        let panel = Meshing {
+            faces: None,
+            by_formula: false,
+            pairs: false,
+        };
         let mut surfaces = Vec::with_capacity(scene.bodies.len());
         for (body, own) in scene.bodies.iter().zip(&self.surfaces) {
             let few = |s: &Surface| s.mesh.faces().len() <= COUPLING_FACES;
@@ -255,12 +264,20 @@ impl<'a> Case<'a> {
                         (s.base as f64 * fewer).round().max(1.0) as usize
                     });
                     let edges = 1.0 / fewer.sqrt();
-                    surface(body, &panel, Some(base), edges)?.map(|s| s.mesh)
+                    surface(
+                        body,
+                        Meshing {
+                            faces: Some(base),
+                            ..panel
+                        },
+                        edges,
+                    )?
+                    .map(|s| s.mesh)
                 }
             };
             surfaces.push(mesh.map(Surface::of_mesh));
         }
-        let (numbers, submerged) = in_water(scene, &surfaces, self.subject.tree, Fidelity::Full);
+        let (numbers, submerged) = in_water(scene, &surfaces, self.subject.tree, true);
         let n = 6 * self.bodies.len();
         if submerged.len() <= 1 && scene.walls.is_empty() {
             return Ok(DMatrix::zeros(n, n));
@@ -273,10 +290,16 @@ impl<'a> Case<'a> {
         } else {
             Fidelity::Full
         };
-        let water = around(scene, &numbers, None);
+        let around = Around::new(scene, &numbers, None);
         let solve = |fidelity: Fidelity| -> Result<DMatrix<f64>> {
-            let (plan, mut cpu) = Default::default();
-            let made = submerged::couple(&submerged, &water, &panel, fidelity, &plan, &mut cpu)?;
+            let made = fidelity.kind().couple(
+                &submerged,
+                &around,
+                Method::Panel.kind(),
+                &Default::default(),
+                &Default::default(),
+                &mut Device::default(),
+            )?;
             Ok(evaluate(made.coupling.as_ref(), &poses, &turn)?.0)
         };
         let difference = solve(fidelity)? - solve(Fidelity::Isolated)?;

@@ -10,7 +10,7 @@
 use super::case::Case;
 use crate::geometry::TriMesh;
 use crate::scene::Shape;
-use crate::water::surface::{Surface, surface};
+use crate::water::surface::{Meshing, Surface, surface};
 use crate::{Error, Result};
 use nalgebra::DMatrix;
 use serde::Serialize;
@@ -198,8 +198,11 @@ fn other(case: &Case, body: usize, own: &Surface, factor: f64) -> Result<Option<
         Some(shape) if shape.is_mesh() && factor == 4.0 => Ok(Some(Surface::of_mesh(own.split()))),
         Some(shape) if shape.is_mesh() => Ok(None),
         _ => {
-            let settings = case.subject.settings;
-            surface(body, settings, Some(base), factor.powf(-0.5))
+            let meshing = Meshing {
+                faces: Some(base),
+                ..case.subject.choices.meshing()
+            };
+            surface(body, meshing, factor.powf(-0.5))
         }
     }
 }

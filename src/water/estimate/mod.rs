@@ -19,7 +19,7 @@
 mod case;
 mod levels;
 
-use super::Fidelity;
+use super::fidelity::kind::Parts;
 use crate::Result;
 use case::Case;
 use serde::Serialize;
@@ -29,9 +29,6 @@ pub use levels::Level;
 
 /// On all parts together.
 const SAFETY: f64 = 1.5;
-/// What the residual of the fidelity `Full` is worth: near a source it is large, and of the first
-/// order where the error is of the second.
-const RESIDUAL: f64 = 0.25;
 
 /// An estimate of the error of [`crate::Simulator::added_mass`]: `max |ΔM_ij| / √(M_ii M_jj)`, all numbers
 /// dimensionless.
@@ -74,19 +71,18 @@ impl Subject<'_> {
         let known = missing.is_empty();
         let residual = case.residual()?;
         let (levels, extrapolation) = levels::extrapolate(&case, &mut missing);
-        let coupling = match fidelity {
-            Fidelity::Isolated => case.missing_coupling(&mut missing),
-            _ => None,
+        let coupling = match fidelity.coupled() {
+            false => case.missing_coupling(&mut missing),
+            true => None,
         };
         let own = self.water.discretisation.iter().map(|d| d.asymmetry);
         let asymmetry = own.fold(case.report.asymmetry, f64::max);
         let total = extrapolation.filter(|_| known).and_then(|extrapolation| {
-            let bodies = extrapolation.max(asymmetry);
-            let together = match fidelity {
-                Fidelity::Isolated => bodies + coupling?,
-                Fidelity::Full => bodies.max((RESIDUAL * residual.unwrap_or(0.0)).min(1.0)),
-                Fidelity::Reduced | Fidelity::Auto => bodies + residual?,
-            };
+            let together = fidelity.kind().error(&Parts {
+                bodies: extrapolation.max(asymmetry),
+                residual,
+                coupling,
+            })?;
             Some(SAFETY * together + case.report.residual)
         });
         Ok(ErrorEstimate {

@@ -6,12 +6,17 @@
 //! coupling is below the aim fades out. What a body must resolve follows from the smallest gap that it
 //! starts with.
 
-use super::Fidelity;
-use super::submerged::{Plan, SubmergedBody};
-use crate::adjoint::lie::{Pose, Vec3};
+use super::full::Full;
+use super::kind::{FidelityKind, Knob, Parts, Plan, Planned, Start};
+use super::reduced::Reduced;
+use crate::adjoint::lie::Vec3;
 use crate::boundary::exact::lamb;
 use crate::coupling::reduced::{Cutoff, compress};
-use crate::geometry::{Gap, MassProperties, Other, Wall, WallSurface};
+use crate::geometry::{Gap, MassProperties, Other, WallSurface};
+use crate::water::device::Device;
+use crate::water::method::kind::BodyMethod;
+use crate::water::numerics::Numerics;
+use crate::water::submerged::{Around, Made, SubmergedBody};
 use crate::{Error, Result};
 use std::f64::consts::PI;
 
@@ -34,21 +39,69 @@ const EDGES: f64 = 1.0 / 3.0;
 /// Under this part of the finest gap compressed sources may refuse: `Full` answers, and warns.
 const REFUSED: f64 = 0.1;
 
-/// The fidelity to use, what each body and pair gets, and why.
-pub(crate) struct Planned {
-    pub fidelity: Fidelity,
-    pub plan: Plan,
-    pub reasons: Vec<String>,
+/// `reduced`, or `full` where gaps are too small for that, with what each body and pair needs.
+pub(super) struct Auto;
+
+impl FidelityKind for Auto {
+    fn name(&self) -> &'static str {
+        "auto"
+    }
+
+    fn knobs(&self) -> &'static [Knob] {
+        &[Knob::Accuracy]
+    }
+
+    fn chooses(&self) -> bool {
+        true
+    }
+
+    fn aim(&self, numerics: &Numerics) -> Option<f64> {
+        Some(numerics.accuracy)
+    }
+
+    fn compresses(&self) -> bool {
+        true
+    }
+
+    fn plan(&self, start: &Start, numerics: &Numerics) -> Result<Planned> {
+        plan(start, numerics.accuracy)
+    }
+
+    // A fidelity that chooses is in use itself only without water.
+    fn couple(
+        &self,
+        bodies: &[SubmergedBody],
+        around: &Around,
+        method: &'static dyn BodyMethod,
+        numerics: &Numerics,
+        plan: &Plan,
+        device: &mut Device,
+    ) -> Result<Made> {
+        Reduced.couple(bodies, around, method, numerics, plan, device)
+    }
+
+    fn resolved_gap(&self, compressed: f64, edge: f64) -> f64 {
+        Full.resolved_gap(compressed, edge)
+    }
+
+    fn gap_warning(&self, gap: &Gap, place: &str, time: &str, hint: &str) -> Option<String> {
+        Full.gap_warning(gap, place, time, hint)
+    }
+
+    fn error(&self, parts: &Parts) -> Option<f64> {
+        Reduced.error(parts)
+    }
 }
 
-/// Chooses for `bodies` at `poses` with the `gaps` (of submerged bodies, by their numbers among `bodies`).
-pub(crate) fn plan(
-    bodies: &[SubmergedBody],
-    poses: &[Pose],
-    gaps: &[Gap],
-    walls: &[Wall],
-    aim: f64,
-) -> Result<Planned> {
+/// Chooses for the bodies at the start, for an error of the coupling of `aim`.
+fn plan(start: &Start, aim: f64) -> Result<Planned> {
+    let Start {
+        bodies,
+        poses,
+        gaps,
+        walls,
+    } = *start;
+    let gaps = gaps();
     if !(aim > 0.0 && aim < 1.0) {
         return Err(Error::input(
             "settings: accuracy",
@@ -56,11 +109,8 @@ pub(crate) fn plan(
             "a number between 0 and 1, such as 0.01",
         ));
     }
-    let mut out = Planned {
-        fidelity: Fidelity::Reduced,
-        plan: Plan::default(),
-        reasons: Vec::new(),
-    };
+    let mut out = Planned::plain(&Reduced);
+    let mut together = false;
     let mut strengths = Vec::with_capacity(bodies.len());
     for (b, body) in bodies.iter().enumerate() {
         let Some(mesh) = body.mesh else {
@@ -91,7 +141,7 @@ pub(crate) fn plan(
         if smallest < HOPELESS * finest && rigid {
             let full = smallest > EDGES * edge || smallest < REFUSED * finest;
             let so = if full {
-                out.fidelity = Fidelity::Full;
+                together = true;
                 "all bodies are solved together (full)"
             } else {
                 "neither does full with such edges; use more faces and full for accurate forces there"
@@ -110,8 +160,8 @@ pub(crate) fn plan(
             resolved_gap: Some(gap),
         });
     }
-    if out.fidelity == Fidelity::Full {
-        out.plan = Plan::default();
+    if together {
+        (out.fidelity, out.plan) = (&Full, Plan::default());
         return Ok(out);
     }
     for (b, body) in bodies.iter().enumerate() {

@@ -1,0 +1,32 @@
+//! Everything that is decided about a simulation.
+
+use crate::dynamics::Integrator;
+use crate::scene::Preset;
+use crate::water::WaterChoices;
+use serde::{Deserialize, Serialize};
+
+/// Everything that is decided about a simulation: what a scene, its preset and the settings make together.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Choices {
+    /// How the water is computed.
+    pub water: WaterChoices,
+    /// How time is stepped.
+    pub integrator: Integrator,
+    /// Time step, s.
+    pub time_step: f64,
+}
+
+impl Choices {
+    /// The choices of a preset.
+    pub fn preset(preset: Preset, time_step: f64) -> Self {
+        Self {
+            water: WaterChoices::preset(preset),
+            integrator: match preset {
+                Preset::Default => Integrator::default(),
+                Preset::Paper => Integrator::VelocityEuler,
+            },
+            time_step,
+        }
+    }
+}

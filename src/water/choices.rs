@@ -1,0 +1,97 @@
+//! How the water is computed.
+
+use super::backend::{Backend, GpuSettings};
+use super::fidelity::Fidelity;
+use super::method::Method;
+use super::numerics::Numerics;
+use super::surface::{Meshing, Surface, meshed};
+use crate::Result;
+use crate::boundary::{self, Depth};
+use crate::scene::{Preset, Scene};
+use serde::{Deserialize, Serialize};
+
+/// How the water is computed, everything decided.
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct WaterChoices {
+    /// How much of the coupling is modelled.
+    pub fidelity: Fidelity,
+    /// Method by which each body alone is solved.
+    pub method: Method,
+    /// The numbers that both work with.
+    pub numerics: Numerics,
+    /// Faces per body of shapes by formula; `None`: what each shape says.
+    pub faces: Option<usize>,
+    /// What computes the coupling.
+    pub backend: Backend,
+    /// Choices of [`Backend::Gpu`].
+    pub gpu: GpuSettings,
+}
+
+impl WaterChoices {
+    /// The choices of a preset.
+    pub fn preset(preset: Preset) -> Self {
+        match preset {
+            Preset::Default => Self::default(),
+            Preset::Paper => Self {
+                method: Method::MfsFace,
+                numerics: Numerics {
+                    mfs: boundary::Settings {
+                        rows: boundary::RowScaling::Unscaled,
+                        ..boundary::Settings::plain(boundary::Method::MfsFace, Depth::Auto)
+                    },
+                    ..Numerics::default()
+                },
+                ..Self::default()
+            },
+        }
+    }
+
+    /// The body method that the fidelity makes of the one asked for.
+    pub fn method_used(&self) -> Method {
+        match self.fidelity.solves_alone() {
+            true => self.method,
+            false => self.method.together(),
+        }
+    }
+
+    /// What is asked of surfaces.
+    pub(crate) fn meshing(&self) -> Meshing {
+        let (alone, method) = (self.fidelity.solves_alone(), self.method.kind());
+        Meshing {
+            faces: self.faces,
+            by_formula: alone && method.by_formula(),
+            pairs: alone && method.extrapolates(),
+        }
+    }
+
+    /// Choices that the backend or the fidelity doesn't look at.
+    pub(crate) fn without_effect(&self) -> Vec<String> {
+        use super::fidelity::Knob::{Rank, ResolvedGap};
+        let mut out = Vec::new();
+        if self.backend == Backend::Cpu && self.gpu != GpuSettings::default() {
+            out.push("the settings of the GPU have no effect with the backend cpu".into());
+        }
+        let compress = &self.numerics.compress;
+        let given = [
+            ("rank", Rank, compress.rank.is_some()),
+            ("resolved_gap", ResolvedGap, compress.resolved_gap.is_some()),
+        ];
+        let unused = |(_, knob, given): &&_| *given && !self.fidelity.knobs().contains(knob);
+        out.extend(given.iter().filter(unused).map(|(name, ..)| {
+            format!(
+                "the setting {name} has no effect with the fidelity {}: only reduced takes it",
+                self.fidelity
+            )
+        }));
+        out
+    }
+}
+
+/// The surfaces of all bodies of a scene, each in its body's frame; none for a body without a shape.
+///
+/// # Errors
+/// A mesh that can't be read, or a shape that can't be meshed.
+pub(crate) fn surfaces(scene: &Scene, choices: &WaterChoices) -> Result<Vec<Option<Surface>>> {
+    meshed(scene, choices.meshing())
+}

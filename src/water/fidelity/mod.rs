@@ -1,0 +1,68 @@
+//! How much of the coupling is modelled.
+//!
+//! A fidelity is a file here that implements [`kind::FidelityKind`], its `mod` line, and its line in the list.
+
+mod auto;
+mod full;
+mod isolated;
+pub(super) mod kind;
+mod reduced;
+
+use super::list::listed;
+use super::numerics::Numerics;
+use kind::FidelityKind;
+
+pub use kind::Knob;
+pub(super) use reduced::{compressed_all, responses};
+
+listed! {
+    /// How much of the water's coupling is solved: see [`crate::coupling`].
+    pub enum Fidelity as FidelityKind {
+        /// Each body as if it were alone in the water, with its own constant added mass (Eq. 12); no walls.
+        Isolated => isolated::Isolated,
+        /// All bodies coupled, each compressed to a few sources; walls as images.
+        Reduced => reduced::Reduced,
+        /// `reduced`, with what each body and pair needs chosen for the scene; `full` where that can't resolve it.
+        Auto => auto::Auto,
+        /// All bodies coupled, at the resolution of their meshes (Eq. 18–20); walls as images.
+        #[default]
+        Full => full::Full,
+    }
+}
+
+impl Fidelity {
+    /// Whether the bodies feel each other and the walls at all.
+    pub fn coupled(self) -> bool {
+        self.kind().coupled()
+    }
+
+    /// Whether each body is solved alone, by its own method, before it is coupled.
+    pub(crate) fn solves_alone(self) -> bool {
+        self.kind().solves_alone()
+    }
+
+    /// Whether it chooses another for a scene.
+    pub(crate) fn chooses(self) -> bool {
+        self.kind().chooses()
+    }
+
+    /// The error that it aims at by itself, if it does.
+    pub(crate) fn own_accuracy(self) -> Option<f64> {
+        self.kind().aim(&Numerics::default())
+    }
+
+    /// Whether bodies are compressed: gaps then count against what they resolve.
+    pub(crate) fn compresses(self) -> bool {
+        self.kind().compresses()
+    }
+
+    /// The gap that it resolves where compressed bodies resolve `compressed` and the mesh has edges of `edge`, m.
+    pub(crate) fn resolved_gap(self, compressed: f64, edge: f64) -> f64 {
+        self.kind().resolved_gap(compressed, edge)
+    }
+
+    /// The choices that it looks at, of those that not all do.
+    pub fn knobs(self) -> &'static [Knob] {
+        self.kind().knobs()
+    }
+}

@@ -1,0 +1,74 @@
+//! The most accurate method that costs nothing at run time.
+
+use super::exact::Exact;
+use super::kind::BodyMethod;
+use super::mfs::Mfs;
+use super::panel::Panel;
+use crate::Result;
+use crate::boundary::{Method, Response};
+use crate::geometry::TriMesh;
+use crate::water::device::Device;
+use crate::water::numerics::Numerics;
+use crate::water::submerged::{Around, Made, SubmergedBody};
+use std::borrow::Cow;
+
+/// Closed forms where there is one, else panels; vertex sources where all bodies are solved together.
+pub(super) struct Auto;
+
+impl Auto {
+    fn of(&self, body: &SubmergedBody) -> &'static dyn BodyMethod {
+        match body.ellipsoid {
+            Some(_) => &Exact,
+            None => &Panel,
+        }
+    }
+}
+
+impl BodyMethod for Auto {
+    fn label(&self) -> &'static str {
+        "auto"
+    }
+
+    fn for_body(&self, body: &SubmergedBody) -> Result<&'static dyn BodyMethod> {
+        Ok(self.of(body))
+    }
+
+    fn by_formula(&self) -> bool {
+        true
+    }
+
+    fn extrapolates(&self) -> bool {
+        true
+    }
+
+    fn steps_together(&self) -> bool {
+        true
+    }
+
+    fn layout<'a>(&self, body: &SubmergedBody<'a>) -> Result<Cow<'a, TriMesh>> {
+        self.of(body).layout(body)
+    }
+
+    fn made_from(&self, body: &SubmergedBody, numerics: &Numerics) -> serde_json::Value {
+        self.of(body).made_from(body, numerics)
+    }
+
+    fn response(
+        &self,
+        body: &SubmergedBody,
+        numerics: &Numerics,
+        gap: f64,
+    ) -> Result<Box<dyn Response>> {
+        self.of(body).response(body, numerics, gap)
+    }
+
+    fn couple(
+        &self,
+        bodies: &[SubmergedBody],
+        around: &Around,
+        numerics: &Numerics,
+        device: &mut Device,
+    ) -> Result<Made> {
+        Mfs(Method::MfsVertex).couple(bodies, around, numerics, device)
+    }
+}

@@ -1,0 +1,100 @@
+//! Fundamental solutions: sources inside the surface.
+
+use super::kind::BodyMethod;
+use crate::Result;
+use crate::boundary::{self, BodyBoundary, Response};
+use crate::coupling::full::{MfsBody, Model, Solver};
+use crate::water::device::Device;
+use crate::water::numerics::Numerics;
+use crate::water::submerged::{Around, Discretisation, Made, SubmergedBody, once, shared};
+use std::sync::Arc;
+
+/// Sources under vertices or faces.
+pub(super) struct Mfs(pub boundary::Method);
+
+impl Mfs {
+    fn settings(&self, numerics: &Numerics) -> boundary::Settings {
+        boundary::Settings {
+            method: self.0,
+            ..numerics.mfs
+        }
+    }
+}
+
+impl BodyMethod for Mfs {
+    fn label(&self) -> &'static str {
+        "mfs"
+    }
+
+    fn for_body(&self, _: &SubmergedBody) -> Result<&'static dyn BodyMethod> {
+        Ok(match self.0 {
+            boundary::Method::MfsVertex => &Mfs(boundary::Method::MfsVertex),
+            boundary::Method::MfsFace => &Mfs(boundary::Method::MfsFace),
+        })
+    }
+
+    fn steps_together(&self) -> bool {
+        true
+    }
+
+    fn made_from(&self, _: &SubmergedBody, numerics: &Numerics) -> serde_json::Value {
+        serde_json::json!(["mfs", self.settings(numerics)])
+    }
+
+    fn response(
+        &self,
+        body: &SubmergedBody,
+        numerics: &Numerics,
+        _: f64,
+    ) -> Result<Box<dyn Response>> {
+        let mesh = body.surface("reduced")?;
+        let settings = self.settings(numerics);
+        let made = BodyBoundary::new(body.name, mesh, &settings)?;
+        Ok(Box::new(made))
+    }
+
+    fn couple(
+        &self,
+        bodies: &[SubmergedBody],
+        around: &Around,
+        numerics: &Numerics,
+        device: &mut Device,
+    ) -> Result<Made> {
+        let mut settings = self.settings(numerics);
+        if numerics.solve.solver == Solver::Gmres {
+            // GMRES solves the square system as it is; damping belongs to least squares.
+            settings.damping = 0.0;
+        }
+        let made = shared(bodies, |body, mesh| {
+            let make = if device.factors(mesh.faces().len()) {
+                BodyBoundary::new
+            } else {
+                BodyBoundary::unfactored
+            };
+            let boundary = make(body.name, mesh, &settings)?;
+            Ok(MfsBody::new(Arc::new(boundary)))
+        })?;
+        Ok(Made {
+            faces: made.iter().map(|m| m.faces()).sum(),
+            warnings: once(&made, |m| &m.boundary.warnings),
+            bodies: made
+                .iter()
+                .zip(bodies)
+                .map(|(m, body)| Discretisation {
+                    body: body.name.to_string(),
+                    method: self.label(),
+                    faces: m.faces(),
+                    unknowns: m.sources(),
+                    asymmetry: m.boundary.asymmetry,
+                    ..Discretisation::default()
+                })
+                .collect(),
+            coupling: Box::new(device.full(Model::new(
+                made,
+                around.walls,
+                around.excluded.clone(),
+                numerics.solve,
+            )?)?),
+        })
+    }
+}

@@ -1,0 +1,91 @@
+//! Direct boundary elements.
+
+use super::kind::BodyMethod;
+use crate::boundary::panel::Extrapolated;
+use crate::boundary::{PanelBoundary, Response};
+use crate::coupling::full::Solver;
+use crate::coupling::panel::{self, PanelCoupled};
+use crate::water::device::Device;
+use crate::water::numerics::Numerics;
+use crate::water::submerged::{Around, Discretisation, Made, SubmergedBody, once, shared};
+use crate::water::surface::Coarse;
+use crate::{Error, Result};
+
+/// Panels, of two meshes extrapolated where there are two.
+pub(super) struct Panel;
+
+impl BodyMethod for Panel {
+    fn label(&self) -> &'static str {
+        "panel"
+    }
+
+    fn for_body(&self, _: &SubmergedBody) -> Result<&'static dyn BodyMethod> {
+        Ok(&Panel)
+    }
+
+    fn extrapolates(&self) -> bool {
+        true
+    }
+
+    fn made_from(&self, body: &SubmergedBody, _: &Numerics) -> serde_json::Value {
+        let coarse = body.coarse.map(|c| c.mesh.faces().len());
+        serde_json::json!(["panel", coarse])
+    }
+
+    fn response(&self, body: &SubmergedBody, _: &Numerics, _: f64) -> Result<Box<dyn Response>> {
+        let mesh = body.surface("reduced")?;
+        let fine = PanelBoundary::new(body.name, mesh)?;
+        Ok(match body.coarse {
+            Some(Coarse { mesh, ratio }) => {
+                let coarse = PanelBoundary::new(body.name, mesh)?;
+                Box::new(Extrapolated::new(fine, coarse, *ratio)?)
+            }
+            None => Box::new(fine),
+        })
+    }
+
+    fn couple(
+        &self,
+        bodies: &[SubmergedBody],
+        around: &Around,
+        numerics: &Numerics,
+        _: &mut Device,
+    ) -> Result<Made> {
+        let made = shared(bodies, |body, mesh| PanelBoundary::new(body.name, mesh))?;
+        let solve = panel::SolveSettings {
+            solver: match numerics.solve.solver {
+                Solver::Qr => panel::Solver::Lu,
+                Solver::Cgls | Solver::Gmres => panel::Solver::Gmres,
+            },
+            tolerance: numerics.solve.tolerance,
+            ..panel::SolveSettings::default()
+        };
+        Ok(Made {
+            faces: made.iter().map(|m| m.faces.len()).sum(),
+            warnings: once(&made, |m| &m.warnings),
+            bodies: made
+                .iter()
+                .zip(bodies)
+                .map(|(m, body)| Discretisation {
+                    body: body.name.to_string(),
+                    method: self.label(),
+                    faces: m.faces.len(),
+                    unknowns: m.faces.len(),
+                    asymmetry: m.asymmetry,
+                    ..Discretisation::default()
+                })
+                .collect(),
+            coupling: Box::new(
+                PanelCoupled::new(made, around.walls, solve)?.excluding(around.excluded.clone())?,
+            ),
+        })
+    }
+
+    fn check_gpu(&self) -> Result<()> {
+        Err(Error::Unsupported {
+            what: "the method panel with the fidelity full and the backend gpu".into(),
+            why: "coupled panels are the reference, on the CPU alone".into(),
+            instead: "use the backend cpu, or the method mfs-vertex".into(),
+        })
+    }
+}

@@ -1,0 +1,31 @@
+//! Numbers that methods and fidelities work with.
+
+use crate::boundary;
+use crate::coupling::full::SolveSettings;
+use crate::coupling::reduced::compress;
+use serde::{Deserialize, Serialize};
+
+/// Discretisation, solve and compression.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Numerics {
+    /// Fundamental solutions, where they are used. Where the sources are is the body method's choice, not this one's.
+    pub mfs: boundary::Settings,
+    /// Coupled solve with the fidelity `full`.
+    pub solve: SolveSettings,
+    /// Compression with the fidelity `reduced`.
+    pub compress: compress::Settings,
+    /// Error of M_f, relative to √(M_ii M_jj), that the fidelity `auto` aims at.
+    pub accuracy: f64,
+}
+
+impl Default for Numerics {
+    fn default() -> Self {
+        Self {
+            mfs: boundary::Settings::default(),
+            solve: SolveSettings::default(),
+            compress: compress::Settings::default(),
+            accuracy: 0.01,
+        }
+    }
+}

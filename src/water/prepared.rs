@@ -1,0 +1,143 @@
+//! The water of a scene, ready to be evaluated.
+
+use super::choices::WaterChoices;
+use super::clearance::Clearance;
+use super::device::Device;
+use super::fidelity::Fidelity;
+use super::fidelity::kind::{Plan, Planned, Start};
+use super::submerged::{Around, Discretisation, SubmergedBody};
+use crate::Result;
+use crate::adjoint::lie::Pose;
+use crate::coupling::Coupling;
+use crate::geometry::{Gap, Other};
+use crate::scene::Scene;
+use nalgebra::DMatrix;
+use std::path::{Path, PathBuf};
+use std::sync::Arc;
+
+/// The water of a scene, ready to be evaluated.
+#[derive(Clone)]
+pub(crate) struct Prepared {
+    /// The bodies in the water, by their numbers in the scene.
+    pub bodies: Vec<usize>,
+    pub coupling: Arc<dyn Coupling>,
+    pub faces: usize,
+    /// The fidelity in use.
+    pub fidelity: Fidelity,
+    /// What each body in the water became.
+    pub discretisation: Vec<Discretisation>,
+    /// Smallest gap that the discretisation of each body of the scene resolves, m; zero where it isn't limited but by
+    /// its mesh.
+    pub resolved: Vec<f64>,
+    /// What was chosen for each body and pair.
+    pub plan: Plan,
+    /// What was chosen, and why.
+    pub reasons: Vec<String>,
+    /// What the coupling is computed on.
+    pub device: Device,
+    pub clearance: Clearance,
+    pub warnings: Vec<String>,
+    /// Where compressed bodies are kept.
+    pub folder: Option<PathBuf>,
+}
+
+/// Couples the bodies of a scene, which start at `poses` (all bodies of the scene).
+///
+/// # Errors
+/// A device that can't be opened, bodies that the method or the fidelity can't take, or whatever the discretisation reports.
+pub(crate) fn prepare(
+    scene: &Scene,
+    choices: &WaterChoices,
+    (numbers, submerged): (Vec<usize>, Vec<SubmergedBody>),
+    poses: &[Pose],
+    clearance: Clearance,
+    folder: Option<&Path>,
+) -> Result<Prepared> {
+    let planned = plan(scene, choices, poses, &clearance, &submerged, &numbers)?;
+    let (fidelity, method) = (planned.fidelity, choices.method.kind());
+    let mut warnings = choices.without_effect();
+    let around = Around::new(scene, &numbers, folder);
+    let mut device = Device::open(choices.backend, &choices.gpu, || fidelity.idle_gpu(method))?;
+    let numerics = &choices.numerics;
+    let made = fidelity.couple(
+        &submerged,
+        &around,
+        method,
+        numerics,
+        &planned.plan,
+        &mut device,
+    )?;
+    warnings.extend(device.warning());
+    warnings.extend(made.warnings);
+    let mut resolved = vec![0.0; scene.bodies.len()];
+    for (b, d) in numbers.iter().zip(&made.bodies) {
+        resolved[*b] = d.resolved_gap.unwrap_or(0.0);
+    }
+    Ok(Prepared {
+        bodies: numbers,
+        coupling: made.coupling.into(),
+        faces: made.faces,
+        fidelity: fidelity.name().parse().unwrap_or(choices.fidelity),
+        discretisation: made.bodies,
+        resolved,
+        plan: planned.plan,
+        reasons: planned.reasons,
+        device,
+        clearance,
+        warnings,
+        folder: folder.map(Path::to_path_buf),
+    })
+}
+
+/// The fidelity to use, and what it makes of the scene.
+fn plan(
+    scene: &Scene,
+    choices: &WaterChoices,
+    all: &[Pose],
+    clearance: &Clearance,
+    submerged: &[SubmergedBody],
+    numbers: &[usize],
+) -> Result<Planned> {
+    let fidelity = choices.fidelity.kind();
+    if scene.fluid.density <= 0.0 {
+        return Ok(Planned::plain(fidelity));
+    }
+    let poses: Vec<Pose> = numbers.iter().map(|b| all[*b]).collect();
+    let number = |b: usize| numbers.iter().position(|w| *w == b);
+    let gaps = || {
+        let all = [&clearance.moving, &clearance.rigid].map(|g| g.all(all));
+        let gap = |gap: Gap| {
+            let second = match gap.second {
+                Other::Body(b) => Other::Body(number(b)?),
+                wall => wall,
+            };
+            let first = number(gap.first)?;
+            Some(Gap {
+                first,
+                second,
+                ..gap
+            })
+        };
+        all.into_iter().flatten().filter_map(gap).collect()
+    };
+    let start = Start {
+        bodies: submerged,
+        poses: &poses,
+        gaps: &gaps,
+        walls: &scene.walls,
+    };
+    fidelity.plan(&start, &choices.numerics)
+}
+
+/// Unit twists along world axes about each body's origin, in body frames: rotated, not shifted.
+pub(crate) fn world_axes(poses: &[Pose]) -> DMatrix<f64> {
+    let n = 6 * poses.len();
+    let mut axes = DMatrix::zeros(n, n);
+    for (w, pose) in poses.iter().enumerate() {
+        for half in 0..2 {
+            axes.fixed_view_mut::<3, 3>(6 * w + 3 * half, 6 * w + 3 * half)
+                .copy_from(&pose.rotation.transpose());
+        }
+    }
+    axes
+}

@@ -16,12 +16,12 @@ use common::support::{felt_error, mesh};
 use hydrograd::adjoint::lie::{Mat6, Pose};
 use hydrograd::boundary::panel::richardson;
 use hydrograd::boundary::{
-    BodyBoundary, Depth, ExactBoundary, Method, OneBody, PanelBoundary, Response, RowScaling,
+    BodyBoundary, Depth, ExactBoundary, Method, PanelBoundary, Response, RowScaling,
     Settings as MfsSettings,
 };
 use hydrograd::coupling::full::{MfsBody, Preconditioner};
 use hydrograd::scene::{Scene, Shape};
-use hydrograd::{Fidelity, Result, Settings, Simulator};
+use hydrograd::{Fidelity, Result, Settings, Simulator, simulate};
 use nalgebra::{DMatrix, DVector};
 use std::sync::Arc;
 use std::time::Instant;
@@ -250,7 +250,7 @@ fn gap() -> Result<()> {
     let full = Settings::default().fidelity(Fidelity::Full);
     let panel = |edge, faces| {
         let scene = coin_over_box(Some((COIN_RADIUS, edge)), faces);
-        found(&scene, full.one_body(OneBody::Panel))
+        found(&scene, full.method(simulate::Method::Panel))
     };
     let coarse = panel(2.0 * COIN_GAP, [1000, 500])?;
     let fine = panel(1.4 * COIN_GAP, [2000, 980])?;
@@ -285,7 +285,7 @@ fn gap() -> Result<()> {
         ),
         ("even", None, [3000, 2000]),
     ] {
-        row(name, &found(&coin_over_box(regions, faces), full)?);
+        row(name, &found(&coin_over_box(regions, faces), full.clone())?);
     }
     Ok(())
 }

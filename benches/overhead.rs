@@ -44,7 +44,7 @@ fn main() -> Result<(), Box<dyn Error>> {
     let file = Path::new(env!("CARGO_MANIFEST_DIR")).join(format!("examples/scenes/{scene}.toml"));
     let scene = Scene::load(file)?;
     let fidelity: Fidelity = serde_json::from_value(fidelity.as_str().into())?;
-    let settings = Settings::for_scene(&scene).fidelity(fidelity);
+    let settings = Settings::default().fidelity(fidelity);
     let simulator = Simulator::new(&scene, settings)?;
     for line in std::io::stdin().lines() {
         line?;

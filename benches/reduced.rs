@@ -13,7 +13,8 @@ use faer::{Accum, Mat, MatRef, Par, Side};
 use hydrograd::adjoint::kernel::{Points, Sources, Write, potential_fill};
 use hydrograd::adjoint::lie::{Mat3, Pose, Vec3};
 use hydrograd::adjoint::sample::Samples;
-use hydrograd::boundary::{ExactBoundary, OneBody};
+use hydrograd::boundary::ExactBoundary;
+use hydrograd::simulate::Method;
 use hydrograd::coupling::Coupling;
 use hydrograd::coupling::Direction;
 use hydrograd::coupling::reduced::{Reduced, ReducedBody, cache, compress};
@@ -281,14 +282,14 @@ fn sizes(quick: bool) {
     println!("\n### Faces of the mesh (two ellipsoids 10 : 7 : 5)\n");
     heading("faces a body | one-body method");
     for (method, name, meshes) in [
-        (OneBody::Panel, "panel", &[320, 1280, 5120][..]),
-        (OneBody::Exact, "exact", &[320, 1280, 5120, 20480][..]),
+        (Method::Panel, "panel", &[320, 1280, 5120][..]),
+        (Method::Exact, "exact", &[320, 1280, 5120, 20480][..]),
     ] {
         for faces in meshes {
-            if quick && (*faces > 1280 || method == OneBody::Exact) {
+            if quick && (*faces > 1280 || method == Method::Exact) {
                 continue;
             }
-            let settings = base.faces(*faces).one_body(method);
+            let settings = base.faces(*faces).method(method);
             let label = format!("{faces} | {name}");
             growth(quick, &label, &swarm(2, uneven), settings);
         }

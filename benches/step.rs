@@ -64,7 +64,7 @@ fn main() {
             continue;
         }
         let scene = example(name);
-        let base = Settings::for_scene(&scene);
+        let base = Settings::default();
         let with = |solver, preconditioner| {
             let mut s = base;
             s.solve.solver = solver;

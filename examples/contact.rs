@@ -25,7 +25,7 @@ fn ball(water: f64, density: f64, height: f64) -> Scene {
 }
 
 fn simulator(scene: &Scene, fidelity: Fidelity) -> Result<Simulator> {
-    Simulator::new(scene, Settings::for_scene(scene).fidelity(fidelity))
+    Simulator::new(scene, Settings::default().fidelity(fidelity))
 }
 
 fn height(rollout: &Rollout, n: usize) -> f64 {

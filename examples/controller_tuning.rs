@@ -153,7 +153,7 @@ impl Trial {
         let half = 0.5 * OPENING[0];
         let mut scene = scene.clone();
         scene.initial.q = vec![0.0, -half, half, y, z, turn];
-        let settings = Settings::for_scene(&scene)
+        let settings = Settings::default()
             .fidelity(Fidelity::Reduced)
             .time_step(TIME_STEP);
         let simulator = Simulator::new(&scene, settings)?;

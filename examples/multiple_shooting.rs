@@ -89,7 +89,7 @@ fn simulator() -> hydrograd::Result<Simulator> {
     scene.initial.q = vec![0.03, -0.15, 0.0];
     scene.initial.v = vec![0.0, -0.3, 0.0];
     // The ball's own added mass: what pegs do to it through the water is left out, contacts are what matters here.
-    let settings = Settings::for_scene(&scene).fidelity(Fidelity::Isolated);
+    let settings = Settings::default().fidelity(Fidelity::Isolated);
     Simulator::new(&scene, settings.faces(80))
 }
 

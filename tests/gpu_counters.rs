@@ -25,7 +25,7 @@ fn the_gpu_does_the_work() {
     let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("examples/scenes");
     let mut scene = Scene::load(folder.join("falling_ball.toml")).unwrap();
     scene.set_faces(80);
-    let settings = Settings::for_scene(&scene);
+    let settings = Settings::default();
 
     let cpu = Simulator::new(&scene, settings).unwrap();
     let (pairs, calls) = work(&cpu);

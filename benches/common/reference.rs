@@ -2,7 +2,7 @@
 
 use super::added_mass;
 use super::support::scaled_error;
-use hydrograd::boundary::OneBody;
+use hydrograd::simulate::Method;
 use hydrograd::scene::Scene;
 use hydrograd::{Fidelity, Settings, Shape, Simulator};
 use nalgebra::DMatrix;
@@ -18,7 +18,7 @@ pub struct Reference {
 pub fn reference(scene: &Scene, meshes: [f64; 2], order: f64) -> hydrograd::Result<Reference> {
     let settings = Settings::default()
         .fidelity(Fidelity::Full)
-        .one_body(OneBody::Panel);
+        .method(Method::Panel);
     let solve = |factor: f64| {
         let simulator = Simulator::new(&refined(scene, factor), settings)?;
         Ok((simulator.faces(), added_mass(&simulator)?))

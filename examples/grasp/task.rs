@@ -80,7 +80,7 @@ pub fn simulator(scene: &Scene, fidelity: Fidelity) -> Result<Simulator> {
     } else {
         fidelity
     };
-    Simulator::new(scene, Settings::for_scene(scene).fidelity(fidelity))
+    Simulator::new(scene, Settings::default().fidelity(fidelity))
 }
 
 /// The scene's own controller.

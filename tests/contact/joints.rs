@@ -256,7 +256,7 @@ fn limits_are_checked_by_name() {
 fn a_limit_without_inertia_asks_for_a_stiffness() {
     let mut scene = slider();
     scene.bodies[0].mass = Some(0.0);
-    let settings = Settings::for_scene(&scene).fidelity(Fidelity::Isolated);
+    let settings = Settings::default().fidelity(Fidelity::Isolated);
     let made = Simulator::new(&scene, settings);
     let said = made.map(|_| ()).unwrap_err().to_string();
     assert!(said.contains("\"slider\": limit_stiffness"), "{said}");

@@ -3,7 +3,7 @@
 
 use crate::support::reference::multipoles;
 use hydrograd::adjoint::lie::Vec3;
-use hydrograd::boundary::OneBody;
+use hydrograd::simulate::Method;
 use hydrograd::dynamics::Integrator;
 use hydrograd::scene::{Body, Fluid, Joint, Plane, Scene, Shape};
 use hydrograd::{Controls, Fidelity, Settings, Simulator};
@@ -114,15 +114,15 @@ fn a_disc_a_hundredth_thick() {
     // A disc's 8/3 a³ρ, and the thickness' correction to first order in it (Lamb).
     let flat = 8.0 / 3.0 * 0.125 * 998.0;
     for fidelity in COUPLED {
-        for method in [OneBody::Auto, OneBody::Panel, OneBody::Mfs] {
-            match Simulator::new(&scene, settings(fidelity).one_body(method)) {
+        for method in [Method::Auto, Method::Panel, Method::MfsVertex] {
+            match Simulator::new(&scene, settings(fidelity).method(method)) {
                 Ok(simulator) => {
                     let m = simulator.added_mass().unwrap().matrix;
                     assert!(finite(&m));
                     let [own, together] = [flat, m[(2, 2)]];
                     println!("{fidelity:?} {method:?}: {together:.2} for a lone disc's {own:.2}");
                     println!("  {:?}", simulator.warnings());
-                    if method == OneBody::Auto {
+                    if method == Method::Auto {
                         assert!((together / own - 1.0).abs() < 0.1);
                         let rollout = simulator.rollout(&Controls::zeros(&simulator, 3)).unwrap();
                         assert!(rollout.samples()[3].v.iter().all(|x| x.is_finite()));

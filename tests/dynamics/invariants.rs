@@ -2,7 +2,7 @@
 
 use crate::support::{INTEGRATORS, example};
 use hydrograd::adjoint::lie::Vec6;
-use hydrograd::boundary::OneBody;
+use hydrograd::simulate::Method;
 use hydrograd::dynamics::{Input, Integrator, State};
 use hydrograd::scene::{Body, Controller, Fluid, Joint, Motion, Scene, Shape};
 use hydrograd::simulate::Sample;
@@ -370,7 +370,7 @@ fn joints_work_without_water() {
         // Of one method, or shapes and their meshes have different moments.
         let settings = Settings::default()
             .fidelity(f)
-            .one_body(OneBody::Mfs)
+            .method(Method::MfsVertex)
             .integrator(Integrator::Midpoint)
             .tolerance(1e-13);
         samples(&Simulator::new(&scene, settings).unwrap(), 30)[30].clone()

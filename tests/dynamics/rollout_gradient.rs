@@ -19,7 +19,7 @@ const FIDELITIES: [Fidelity; 4] = [
 fn check(scene: &Scene, fidelity: Fidelity, integrator: Integrator, steps: usize, faces: usize) {
     // Long rollouts along one direction of each group, short ones along two.
     let directions = if steps > 50 { 1 } else { 2 };
-    let settings = Settings::for_scene(scene)
+    let settings = Settings::default()
         .fidelity(fidelity)
         .integrator(integrator)
         .tolerance(1e-13)

@@ -2,7 +2,7 @@
 
 use super::fixture::context;
 use super::trajectory::{STEPS, falling_ball, simulator};
-use hydrograd::boundary::OneBody;
+use hydrograd::simulate::Method;
 use hydrograd::coupling::full::Solver;
 use hydrograd::gpu::{Context, Options};
 use hydrograd::simulate::{Action, ActionBar, Backend, Observation, Policy};
@@ -11,7 +11,7 @@ use nalgebra::DVector;
 use std::sync::Arc;
 
 fn settings() -> Settings {
-    Settings::for_scene(&falling_ball()).backend(Backend::Gpu)
+    Settings::default().backend(Backend::Gpu)
 }
 
 fn error(settings: Settings) -> Error {
@@ -85,7 +85,7 @@ fn what_the_gpu_has_no_part_in_runs_on_the_cpu_or_is_refused() {
     wanted.gpu.fallback = true;
     let mut dense = wanted;
     dense.solve.solver = Solver::Qr;
-    for (settings, word) in [(wanted.one_body(OneBody::Panel), "panel"), (dense, "Qr")] {
+    for (settings, word) in [(wanted.method(Method::Panel), "panel"), (dense, "Qr")] {
         let found = error(settings);
         assert!(matches!(found, Error::Unsupported { .. }), "{found:?}");
         let message = found.to_string();

@@ -21,7 +21,7 @@ pub fn simulator(backend: Backend, tolerance: f64) -> Simulator {
 
 fn of(fidelity: Fidelity, backend: Backend, tolerance: f64) -> Simulator {
     let scene = falling_ball();
-    let settings = Settings::for_scene(&scene)
+    let settings = Settings::default()
         .fidelity(fidelity)
         .backend(backend)
         .tolerance(tolerance);

@@ -305,7 +305,7 @@ fn every_example_scene_runs_at_every_fidelity() {
             Fidelity::Auto,
             Fidelity::Full,
         ] {
-            let settings = Settings::for_scene(&scene).fidelity(fidelity).faces(80);
+            let settings = Settings::default().fidelity(fidelity).faces(80);
             let simulator = Simulator::new(&scene, settings)
                 .unwrap_or_else(|e| panic!("{} {fidelity:?}: {e}", path.display()));
             let rollout = simulator
@@ -327,7 +327,7 @@ fn falling_ball_turns_the_coin_through_the_water_alone() {
         _ => panic!("push-then-lock expected"),
     };
     let run = |fidelity| {
-        let settings = Settings::for_scene(&scene).fidelity(fidelity).faces(80);
+        let settings = Settings::default().fidelity(fidelity).faces(80);
         let simulator = Simulator::new(&scene, settings).unwrap();
         let rollout = simulator
             .rollout(&Controls::zeros(&simulator, 200))
@@ -404,7 +404,7 @@ fn grasp_is_held_open() {
     assert_eq!((fingers[0].1[1].z, fingers[1].1[0].z), (0.0, 0.0));
 
     let run = |fidelity| {
-        let settings = Settings::for_scene(&scene).fidelity(fidelity).faces(150);
+        let settings = Settings::default().fidelity(fidelity).faces(150);
         let simulator = Simulator::new(&scene, settings).unwrap();
         let rollout = simulator
             .rollout(&Controls::zeros(&simulator, 250))
@@ -436,7 +436,7 @@ fn grasp_is_held_open() {
 
 /// Turns a scene's meshes coarse, runs it, and gives the middle link's and the last body's motion.
 fn swim(scene: &Scene, fidelity: Fidelity) -> (Vec<f64>, f64, f64) {
-    let settings = Settings::for_scene(scene).fidelity(fidelity).faces(80);
+    let settings = Settings::default().fidelity(fidelity).faces(80);
     let simulator = Simulator::new(scene, settings).unwrap();
     let rollout = simulator
         .rollout(&Controls::zeros(&simulator, scene.steps))

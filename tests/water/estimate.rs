@@ -7,7 +7,7 @@ use crate::support::reference::{
     unequal_spheres,
 };
 use hydrograd::adjoint::lie::Vec3;
-use hydrograd::boundary::{Method, OneBody};
+use hydrograd::simulate::Method;
 use hydrograd::scene::{Placement, Shape};
 use hydrograd::{Body, Fidelity, Fluid, Scene, Settings, Simulator};
 use nalgebra::{DMatrix, DVector};
@@ -251,7 +251,7 @@ const RATIOS: [[f64; 3]; 7] = [
 
 fn methods() -> [Settings; 3] {
     [
-        isolated().one_body(OneBody::Panel),
+        isolated().method(Method::Panel),
         isolated().method(Method::MfsVertex),
         isolated().method(Method::MfsFace),
     ]
@@ -290,10 +290,10 @@ fn two_spheres() {
                 isolated(),
                 coarse,
                 coarse.method(Method::MfsFace),
-                coarse.one_body(OneBody::Panel),
-                full().faces(720).one_body(OneBody::Panel),
-                reduced().one_body(OneBody::Panel).faces(320),
-                reduced().one_body(OneBody::Mfs).faces(320),
+                coarse.method(Method::Panel),
+                full().faces(720).method(Method::Panel),
+                reduced().method(Method::Panel).faces(320),
+                reduced().method(Method::MfsVertex).faces(320),
                 Settings::default().fidelity(Fidelity::Auto).accuracy(0.1),
             ],
         );
@@ -321,8 +321,8 @@ fn sphere_and_wall() {
                 isolated(),
                 coarse,
                 coarse.method(Method::MfsFace),
-                coarse.one_body(OneBody::Panel),
-                reduced().one_body(OneBody::Panel).faces(320),
+                coarse.method(Method::Panel),
+                reduced().method(Method::Panel).faces(320),
                 reduced().rank(20),
                 reduced().rank(80),
                 reduced().resolved_gap(0.5).rank(20),
@@ -342,13 +342,13 @@ fn bodies_with_edges() {
             &known,
             &[
                 isolated().faces(720),
-                full().faces(320).one_body(OneBody::Panel),
-                full().faces(720).one_body(OneBody::Panel),
+                full().faces(320).method(Method::Panel),
+                full().faces(720).method(Method::Panel),
                 full().faces(720),
                 full().faces(720).method(Method::MfsFace),
                 reduced().faces(320),
                 reduced().faces(720).accuracy(0.03),
-                reduced().faces(720).one_body(OneBody::Mfs),
+                reduced().faces(720).method(Method::MfsVertex),
             ],
         );
     }
@@ -361,8 +361,8 @@ fn meshes_from_files() {
     let folder = tempfile::tempdir().unwrap();
     let mut table = Table::default();
     for (faces, settings) in [
-        (160, full().one_body(OneBody::Panel)),
-        (720, full().one_body(OneBody::Panel)),
+        (160, full().method(Method::Panel)),
+        (720, full().method(Method::Panel)),
         (720, reduced()),
         (720, full()),
     ] {
@@ -392,15 +392,15 @@ fn finer_meshes() {
         for settings in methods() {
             table.add(&known, &settings.faces(1280));
         }
-        table.add(&known, &isolated().one_body(OneBody::Panel).faces(5120));
+        table.add(&known, &isolated().method(Method::Panel).faces(5120));
         table.add(&known, &isolated().method(Method::MfsVertex).faces(5120));
     }
     for known in spheres().iter().chain(&wall()).chain(&edged()) {
         let settings = [
             full(),
             full().method(Method::MfsFace),
-            full().one_body(OneBody::Panel),
-            reduced().one_body(OneBody::Panel),
+            full().method(Method::Panel),
+            reduced().method(Method::Panel),
         ];
         table.all(known, &settings.map(|s| s.faces(1280)));
     }

@@ -3,7 +3,8 @@
 use crate::support::says;
 use hydrograd::adjoint::kernel::{Sources, Write};
 use hydrograd::adjoint::lie::{Pose, Vec3, Vec6, exp_matrix};
-use hydrograd::boundary::{self, BodyBoundary, OneBody};
+use hydrograd::boundary::{self, BodyBoundary};
+use hydrograd::simulate::Method;
 use hydrograd::coupling::full::{Full, MfsBody, SolveSettings, Solver};
 use hydrograd::coupling::{Coupling, Exclusions};
 use hydrograd::geometry::Image;
@@ -89,7 +90,7 @@ fn declared_links_run_and_feel_all_but_each_other() {
     pair.initial.v.truncate(4);
     let of = |fidelity| {
         let settings = full()
-            .one_body(OneBody::Mfs)
+            .method(Method::MfsVertex)
             .tolerance(1e-12)
             .fidelity(fidelity);
         let added = Simulator::new(&pair, settings).unwrap().added_mass();

@@ -3,7 +3,7 @@
 use crate::support::mesh;
 use crate::support::reference::{TwoSpheres, equal_spheres, spheres_by_wall, unequal_spheres};
 use hydrograd::adjoint::lie::{Mat3, Pose, Vec3, exp_matrix};
-use hydrograd::boundary::OneBody;
+use hydrograd::simulate::Method;
 use hydrograd::boundary::PanelBoundary;
 use hydrograd::boundary::panel::MOST_FACES;
 use hydrograd::coupling::panel::{SolveSettings, Solver};
@@ -274,7 +274,7 @@ fn values_only() {
     )
     .unwrap();
     let settings = Settings::default().fidelity(Fidelity::Full);
-    let settings = settings.one_body(OneBody::Panel).faces(80);
+    let settings = settings.method(Method::Panel).faces(80);
     let simulator = Simulator::new(&scene, settings).unwrap();
     assert!(simulator.added_mass().is_ok());
     let (system, q) = (simulator.system(), simulator.start().0);

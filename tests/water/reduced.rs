@@ -3,7 +3,8 @@
 use crate::support::mesh;
 use crate::support::reference::{TwoSpheres, equal_spheres};
 use hydrograd::adjoint::lie::{Mat3, Pose, Vec3};
-use hydrograd::boundary::{ExactBoundary, OneBody, PanelBoundary};
+use hydrograd::boundary::{ExactBoundary, PanelBoundary};
+use hydrograd::simulate::Method;
 use hydrograd::coupling::reduced::{Reduced, ReducedBody, cache, compress};
 use hydrograd::coupling::{Coupling, Direction, Linearise};
 use hydrograd::scene::{Body, Fluid, Scene, Shape, Wall, WallSurface};
@@ -193,7 +194,7 @@ fn threads_do_not_change_a_bit() {
 #[test]
 fn the_cache_gives_the_same_bits_and_survives_damage() {
     let folder = tempfile::tempdir().unwrap();
-    let settings = reduced().one_body(OneBody::Panel).accuracy(7e-3);
+    let settings = reduced().method(Method::Panel).accuracy(7e-3);
     let run = || {
         end(
             &Simulator::cached(&scene(), settings, folder.path()).unwrap(),
@@ -263,7 +264,7 @@ fn settings_out_of_range_are_refused_by_name() {
         (reduced().accuracy(f64::NAN), "tolerance"),
         (reduced().resolved_gap(-1.0), "resolved_gap"),
         (reduced().resolved_gap(f64::INFINITY), "resolved_gap"),
-        (reduced().one_body(OneBody::Exact), "exact"),
+        (reduced().method(Method::Exact), "exact"),
         (reduced().fidelity(Fidelity::Auto).accuracy(2.0), "accuracy"),
     ] {
         let said = try_with(settings);

@@ -2,8 +2,8 @@
 
 use crate::support::bodies::{COIN_GAP, coin_over_box};
 use crate::support::felt_error;
-use hydrograd::boundary::OneBody;
 use hydrograd::scene::{Body, Fluid, Scene, Shape};
+use hydrograd::simulate::Method;
 use hydrograd::{Fidelity, Settings, Simulator};
 use nalgebra::DMatrix;
 
@@ -32,7 +32,7 @@ fn a_refined_corner_changes_little_of_the_added_mass() {
         ("full", base.fidelity(Fidelity::Full)),
         (
             "full, panel",
-            base.fidelity(Fidelity::Full).one_body(OneBody::Panel),
+            base.fidelity(Fidelity::Full).method(Method::Panel),
         ),
         ("isolated", base.fidelity(Fidelity::Isolated)),
         ("reduced", base.fidelity(Fidelity::Reduced)),

@@ -40,10 +40,12 @@ fn main() -> hydrograd::Result<()> {
         let mut best: Option<(String, Measured)> = None;
         for tolerance in TOLERANCES {
             for gap in GAPS {
-                let mut settings = Settings::default()
-                    .fidelity(Fidelity::Reduced)
-                    .accuracy(tolerance);
-                settings = gap.map_or(settings, |g| settings.resolved_gap(g));
+                let settings = Settings {
+                    resolved_gap: gap,
+                    ..Settings::default()
+                        .fidelity(Fidelity::Reduced)
+                        .accuracy(tolerance)
+                };
                 let Ok(found) = measure(settings) else {
                     continue;
                 };

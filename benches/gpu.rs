@@ -118,7 +118,7 @@ fn scenes(budget: &Budget) -> hydrograd::Result<()> {
         let settings = Settings::default()
             .fidelity(Fidelity::Full)
             .integrator(Integrator::MomentumEuler);
-        let cpu = Simulator::new(&scene, settings)?;
+        let cpu = Simulator::new(&scene, settings.clone())?;
         let start = format!("| {name} | {} | {} |", cpu.faces(), cpu.unknowns());
         let on_cpu = step(&cpu)?;
         let both = format!("{:.1} | {:.1}", 1e3 * on_cpu.0, 1e3 * on_cpu.1);

@@ -65,21 +65,18 @@ fn main() {
         }
         let scene = example(name);
         let base = Settings::default();
-        let with = |solver, preconditioner| {
-            let mut s = base;
-            s.solve.solver = solver;
-            s.solve.preconditioner = preconditioner;
-            s
+        let with = |solver, preconditioner| base.solver(solver).preconditioner(preconditioner);
+        let jacobi = Settings {
+            max_iterations: Some(5_000),
+            ..with(Solver::Cgls, Preconditioner::Jacobi)
         };
-        let mut jacobi = with(Solver::Cgls, Preconditioner::Jacobi);
-        jacobi.solve.max_iterations = 5_000;
-        let one_evaluation = |s: Settings| s.integrator(Integrator::MomentumEuler);
+        let one_evaluation = |s: &Settings| s.integrator(Integrator::MomentumEuler);
         let rows = [
-            ("default", base, 5, 5),
-            ("momentum Euler", one_evaluation(base), 5, 5),
+            ("default", base.clone(), 5, 5),
+            ("momentum Euler", one_evaluation(&base), 5, 5),
             (
                 "momentum Euler, tolerance 1e-6",
-                one_evaluation(base.tolerance(1e-6)),
+                one_evaluation(&base.tolerance(1e-6)),
                 5,
                 5,
             ),
@@ -88,11 +85,11 @@ fn main() {
             ("preset paper", Settings::preset(Preset::Paper), 2, 1),
             (
                 "momentum Euler, dense QR",
-                one_evaluation(with(Solver::Qr, Preconditioner::None)),
+                one_evaluation(&with(Solver::Qr, Preconditioner::None)),
                 1,
                 1,
             ),
-            ("momentum Euler, Jacobi", one_evaluation(jacobi), 1, 1),
+            ("momentum Euler, Jacobi", one_evaluation(&jacobi), 1, 1),
             ("isolated", base.fidelity(Fidelity::Isolated), 200, 5),
         ];
         for (configuration, settings, steps, repeat) in rows {

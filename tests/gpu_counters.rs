@@ -27,7 +27,7 @@ fn the_gpu_does_the_work() {
     scene.set_faces(80);
     let settings = Settings::default();
 
-    let cpu = Simulator::new(&scene, settings).unwrap();
+    let cpu = Simulator::new(&scene, settings.clone()).unwrap();
     let (pairs, calls) = work(&cpu);
     println!("cpu: {pairs} pairs, {calls} calls");
     assert!(pairs > 0 && calls > 0, "the counters count");

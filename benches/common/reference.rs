@@ -4,6 +4,7 @@ use super::added_mass;
 use super::support::scaled_error;
 use hydrograd::simulate::Method;
 use hydrograd::scene::Scene;
+use hydrograd::simulate::Method;
 use hydrograd::{Fidelity, Settings, Shape, Simulator};
 use nalgebra::DMatrix;
 
@@ -20,7 +21,7 @@ pub fn reference(scene: &Scene, meshes: [f64; 2], order: f64) -> hydrograd::Resu
         .fidelity(Fidelity::Full)
         .method(Method::Panel);
     let solve = |factor: f64| {
-        let simulator = Simulator::new(&refined(scene, factor), settings)?;
+        let simulator = Simulator::new(&refined(scene, factor), settings.clone())?;
         Ok((simulator.faces(), added_mass(&simulator)?))
     };
     let (fewer, coarse) = solve(meshes[0])?;

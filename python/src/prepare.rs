@@ -3,7 +3,8 @@
 use crate::error::{OrRaise, input};
 use crate::interrupt::long;
 use crate::simulator::Simulator;
-use hydrograd::{Settings, dynamics};
+use hydrograd::dynamics;
+use hydrograd::simulate::Choices;
 use nalgebra::DVector;
 use pyo3::prelude::*;
 use std::path::PathBuf;
@@ -13,13 +14,12 @@ use std::sync::Arc;
 pub fn build(
     py: Python<'_>,
     scene: hydrograd::Scene,
-    settings: Settings,
+    choices: Choices,
     cache: Option<PathBuf>,
 ) -> PyResult<Simulator> {
     let (of, folder) = (scene.clone(), cache.clone());
-    let made = long(py, move |_| match folder {
-        Some(folder) => hydrograd::Simulator::cached(&of, settings, &folder),
-        None => hydrograd::Simulator::new(&of, settings),
+    let made = long(py, move |_| {
+        hydrograd::Simulator::with_choices(&of, choices, folder.as_deref())
     })?;
     Ok(Simulator {
         inner: Arc::new(made),
@@ -29,7 +29,7 @@ pub fn build(
     })
 }
 
-/// Scene, settings, folder, parameters, initial q, v and gains, and the controller if it is written in Python.
+/// Scene, choices, folder, parameters, initial q, v and gains, and the controller if it is written in Python.
 pub type Parts = (
     String,
     String,
@@ -43,20 +43,20 @@ pub type Parts = (
 pub fn rebuild(
     py: Python<'_>,
     toml: &str,
-    settings: &str,
+    choices: &str,
     cache: Option<PathBuf>,
     parameters: &[f64],
     start: (Vec<f64>, Vec<f64>, Vec<f64>),
 ) -> PyResult<Simulator> {
     let scene = hydrograd::Scene::from_toml(toml, "").or_raise()?;
-    let settings = serde_json::from_str(settings).map_err(|e| {
+    let choices = serde_json::from_str(choices).map_err(|e| {
         input(
-            "pickled simulator: settings",
+            "pickled simulator: choices",
             e,
             "must come from this version of hydrograd",
         )
     })?;
-    let out = build(py, scene, settings, cache)?;
+    let out = build(py, scene, choices, cache)?;
     out.changed(|inner| {
         if let Some(values) = inner.parameters().with_values(parameters) {
             inner.set_parameters(values)?;

@@ -22,11 +22,6 @@ pub fn named<T: VariantArray + FromStr + Into<&'static str> + Copy>(
     })
 }
 
-/// The name of a choice.
-pub fn name<T: Into<&'static str>>(of: T) -> &'static str {
-    of.into()
-}
-
 fn choice<T: VariantArray + FromStr + Into<&'static str> + Copy>(
     field: &str,
     given: Option<&str>,

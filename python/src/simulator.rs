@@ -9,7 +9,7 @@ use crate::policy::Controller;
 use crate::prepare::{Parts, Start, build, set_gains};
 use crate::rollout::Rollout;
 use crate::scene::Scene;
-use crate::settings::{Keywords, backend_name, fidelity_name, integrator_name, row_or};
+use crate::settings::{Keywords, row_or};
 use crate::state::{Record, State};
 use hydrograd::{Controls, dynamics};
 use nalgebra::{DMatrix, DVector};
@@ -148,8 +148,8 @@ impl Simulator {
             backend,
         };
         let scene = scene.0.clone();
-        let settings = keywords.settings(&scene)?;
-        build(py, scene, settings, cache)
+        let choices = keywords.settings()?.resolve(&scene);
+        build(py, scene, choices, cache)
     }
 
     /// Runs the scene, with its own controller if it has one, and `controls` (steps, control_size) added to it: generalised
@@ -457,19 +457,19 @@ impl Simulator {
     /// The fidelity in use: what was asked for, or what "auto" chose.
     #[getter]
     fn fidelity(&self) -> &'static str {
-        fidelity_name(self.inner.fidelity())
+        self.inner.fidelity().into()
     }
 
     /// What computes the coupling: "cpu" or "gpu".
     #[getter]
     fn backend(&self) -> &'static str {
-        backend_name(self.inner.backend().backend_used)
+        self.inner.backend().backend_used.into()
     }
 
     /// The integrator.
     #[getter]
     fn integrator(&self) -> &'static str {
-        integrator_name(self.inner.settings().integrator)
+        self.inner.choices().integrator.into()
     }
 
     /// What should be known about the scene, with names and numbers.
@@ -490,9 +490,9 @@ impl Simulator {
 
     fn __reduce__<'py>(&self, py: Python<'py>) -> PyResult<(Bound<'py, PyAny>, Parts)> {
         let make = py.import("hydrograd._hydrograd")?.getattr("_simulator")?;
-        let settings = serde_json::to_string(self.inner.settings()).map_err(|e| {
+        let choices = serde_json::to_string(self.inner.choices()).map_err(|e| {
             input(
-                "simulator: settings",
+                "simulator: choices",
                 e,
                 "must be numbers that JSON can hold",
             )
@@ -511,7 +511,7 @@ impl Simulator {
             make,
             (
                 scene,
-                settings,
+                choices,
                 self.cache.clone(),
                 parameters,
                 start,

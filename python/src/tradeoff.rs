@@ -1,30 +1,22 @@
 //! Time against error for Python: an instance of the data class in `hydrograd/_tradeoff.py`.
 
-use crate::error::{input, internal};
+use crate::error::internal;
 use crate::interrupt::long;
 use crate::scene::Scene;
+use crate::settings::named;
 use hydrograd::tradeoff::{TradeoffSettings, measure};
 use pyo3::prelude::*;
-use serde_json::Value;
+use std::str::FromStr;
+use strum::VariantArray;
 
-/// The choices of a list by their names, as in scene files.
-fn named<T>(
+/// The choices of a list by their names.
+fn all<T: VariantArray + FromStr + Into<&'static str> + Copy>(
     field: &str,
     names: Option<Vec<String>>,
-    read: fn(Value) -> serde_json::Result<T>,
 ) -> PyResult<Vec<T>> {
-    let names = names.unwrap_or_default().into_iter();
-    let one = |name: String| {
-        let found = read(Value::String(name.clone()));
-        found.map_err(|e| {
-            input(
-                format!("tradeoff: {field}"),
-                format!("{name:?}"),
-                e.to_string(),
-            )
-        })
-    };
-    names.map(one).collect()
+    let place = format!("tradeoff: {field}");
+    let names = names.unwrap_or_default();
+    names.iter().map(|name| named(&place, name)).collect()
 }
 
 /// Measures a scene's time per step against its error, over everything that can be chosen: a `Tradeoff`.
@@ -59,13 +51,13 @@ pub fn tradeoff<'py>(
     budget: f64,
 ) -> PyResult<Bound<'py, PyAny>> {
     let settings = TradeoffSettings {
-        fidelities: named("fidelities", fidelities, serde_json::from_value)?,
-        methods: named("methods", methods, serde_json::from_value)?,
+        fidelities: all("fidelities", fidelities)?,
+        methods: all("methods", methods)?,
         faces: faces.unwrap_or_default(),
         ranks: ranks.unwrap_or_default(),
         accuracies: accuracies.unwrap_or_default(),
         tolerances: tolerances.unwrap_or_default(),
-        integrators: named("integrators", integrators, serde_json::from_value)?,
+        integrators: all("integrators", integrators)?,
         time_steps: time_steps.unwrap_or_default(),
         full_product,
         steps,

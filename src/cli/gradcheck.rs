@@ -101,7 +101,7 @@ fn check(scene: &Scene, arguments: &Arguments, progress: &Progress) -> Result<Ch
     let usual = arguments.time.choose(arguments.water.settings());
     let tight = match arguments.water.tolerance {
         Some(_) => usual.clone(),
-        None => usual.clone().tolerance(TOLERANCE),
+        None => usual.tolerance(TOLERANCE),
     };
     let steps = scene.steps;
     let mut simulator = arguments.water.simulator(scene, tight)?;

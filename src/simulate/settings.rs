@@ -130,80 +130,106 @@ impl Settings {
     }
 
     /// With another time step, s.
-    pub fn time_step(mut self, dt: f64) -> Self {
-        self.time_step = Some(dt);
-        self
+    pub fn time_step(&self, dt: f64) -> Self {
+        Self {
+            time_step: Some(dt),
+            ..self.clone()
+        }
     }
 
     /// With another fidelity.
-    pub fn fidelity(mut self, fidelity: Fidelity) -> Self {
-        self.fidelity = Some(fidelity);
-        self
+    pub fn fidelity(&self, fidelity: Fidelity) -> Self {
+        Self {
+            fidelity: Some(fidelity),
+            ..self.clone()
+        }
     }
 
     /// With another integrator.
-    pub fn integrator(mut self, integrator: Integrator) -> Self {
-        self.integrator = Some(integrator);
-        self
+    pub fn integrator(&self, integrator: Integrator) -> Self {
+        Self {
+            integrator: Some(integrator),
+            ..self.clone()
+        }
     }
 
     /// With another number of faces per body, for shapes by formula.
-    pub fn faces(mut self, faces: usize) -> Self {
-        self.faces = Some(faces);
-        self
+    pub fn faces(&self, faces: usize) -> Self {
+        Self {
+            faces: Some(faces),
+            ..self.clone()
+        }
     }
 
     /// With another method for single bodies.
-    pub fn method(mut self, method: Method) -> Self {
-        self.method = Some(method);
-        self
+    pub fn method(&self, method: Method) -> Self {
+        Self {
+            method: Some(method),
+            ..self.clone()
+        }
     }
 
     /// With another solver of the coupled system (`full`).
-    pub fn solver(mut self, solver: Solver) -> Self {
-        self.solver = Some(solver);
-        self
+    pub fn solver(&self, solver: Solver) -> Self {
+        Self {
+            solver: Some(solver),
+            ..self.clone()
+        }
     }
 
     /// With another preconditioner of the coupled system (`full`).
-    pub fn preconditioner(mut self, preconditioner: Preconditioner) -> Self {
-        self.preconditioner = Some(preconditioner);
-        self
+    pub fn preconditioner(&self, preconditioner: Preconditioner) -> Self {
+        Self {
+            preconditioner: Some(preconditioner),
+            ..self.clone()
+        }
     }
 
     /// With another number of points a body (`reduced`).
-    pub fn rank(mut self, rank: usize) -> Self {
-        self.rank = Some(rank);
-        self
+    pub fn rank(&self, rank: usize) -> Self {
+        Self {
+            rank: Some(rank),
+            ..self.clone()
+        }
     }
 
     /// With another smallest gap that is resolved (`reduced`), m.
-    pub fn resolved_gap(mut self, gap: f64) -> Self {
-        self.resolved_gap = Some(gap);
-        self
+    pub fn resolved_gap(&self, gap: f64) -> Self {
+        Self {
+            resolved_gap: Some(gap),
+            ..self.clone()
+        }
     }
 
     /// With another error of M_f to aim at (`reduced` and `auto`).
-    pub fn accuracy(mut self, error: f64) -> Self {
-        self.accuracy = Some(error);
-        self
+    pub fn accuracy(&self, error: f64) -> Self {
+        Self {
+            accuracy: Some(error),
+            ..self.clone()
+        }
     }
 
     /// With another backend.
-    pub fn backend(mut self, backend: Backend) -> Self {
-        self.backend = Some(backend);
-        self
+    pub fn backend(&self, backend: Backend) -> Self {
+        Self {
+            backend: Some(backend),
+            ..self.clone()
+        }
     }
 
     /// With other choices of the GPU.
-    pub fn gpu(mut self, gpu: GpuSettings) -> Self {
-        self.gpu = Some(gpu);
-        self
+    pub fn gpu(&self, gpu: GpuSettings) -> Self {
+        Self {
+            gpu: Some(gpu),
+            ..self.clone()
+        }
     }
 
     /// With another residual at which the iterative solves of the fidelity `full` stop.
-    pub fn tolerance(mut self, tolerance: f64) -> Self {
-        self.tolerance = Some(tolerance);
-        self
+    pub fn tolerance(&self, tolerance: f64) -> Self {
+        Self {
+            tolerance: Some(tolerance),
+            ..self.clone()
+        }
     }
 }

@@ -224,7 +224,7 @@ fn integrators_that_cannot_do_it_say_so() {
             says(&said, words);
             says(&said, &["momentum-euler", "midpoint", "velocity-euler"]);
         }
-        let chosen = |scene: &Scene| Settings::default().integrator;
+        let chosen = |scene: &Scene| Settings::default().resolve(scene).integrator;
         assert_eq!(chosen(&scene), Integrator::MomentumEuler);
         scene.preset = Preset::Paper;
         assert_eq!(chosen(&scene), Integrator::VelocityEuler);

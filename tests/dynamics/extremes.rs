@@ -3,9 +3,9 @@
 
 use crate::support::reference::multipoles;
 use hydrograd::adjoint::lie::Vec3;
-use hydrograd::simulate::Method;
 use hydrograd::dynamics::Integrator;
 use hydrograd::scene::{Body, Fluid, Joint, Plane, Scene, Shape};
+use hydrograd::simulate::Method;
 use hydrograd::{Controls, Fidelity, Settings, Simulator};
 use nalgebra::DMatrix;
 

@@ -2,9 +2,9 @@
 
 use crate::support::{INTEGRATORS, example};
 use hydrograd::adjoint::lie::Vec6;
-use hydrograd::simulate::Method;
 use hydrograd::dynamics::{Input, Integrator, State};
 use hydrograd::scene::{Body, Controller, Fluid, Joint, Motion, Scene, Shape};
+use hydrograd::simulate::Method;
 use hydrograd::simulate::Sample;
 use hydrograd::{Controls, Fidelity, Settings, Simulator};
 use nalgebra::DVector;
@@ -295,7 +295,7 @@ fn equal_arguments_give_equal_bits() {
     for integrator in INTEGRATORS {
         // The default tolerance: what a warm start would show.
         let settings = Settings::default().integrator(integrator);
-        let simulator = Simulator::new(&scene, settings).unwrap();
+        let simulator = Simulator::new(&scene, settings.clone()).unwrap();
         let before = one_step(&simulator);
         let rollout = simulator.rollout(&Controls::zeros(&simulator, 3)).unwrap();
         rollout.vjp(&rollout.zero_cotangents()).unwrap();

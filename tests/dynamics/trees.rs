@@ -292,8 +292,8 @@ fn momentum_form_is_the_velocity_form_coupled() {
 
 fn check(simulator: &mut Simulator, name: &str, steps: usize) {
     let (fidelity, integrator) = (
-        simulator.settings().fidelity,
-        simulator.settings().integrator,
+        simulator.choices().water.fidelity,
+        simulator.choices().integrator,
     );
     let report = gradcheck(
         simulator,

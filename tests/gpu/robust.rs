@@ -2,10 +2,10 @@
 
 use super::fixture::context;
 use super::trajectory::{STEPS, falling_ball, simulator};
-use hydrograd::simulate::Method;
 use hydrograd::coupling::full::Solver;
 use hydrograd::gpu::{Context, Options};
-use hydrograd::simulate::{Action, ActionBar, Backend, Observation, Policy};
+use hydrograd::simulate::Method;
+use hydrograd::simulate::{Action, ActionBar, Backend, GpuSettings, Observation, Policy};
 use hydrograd::{Controls, Error, Fidelity, Result, Settings, Simulator, objective};
 use nalgebra::DVector;
 use std::sync::Arc;
@@ -30,16 +30,32 @@ fn says(error: &Error, words: &[&str]) {
     }
 }
 
+fn with_fallback() -> GpuSettings {
+    GpuSettings {
+        fallback: true,
+        ..GpuSettings::default()
+    }
+}
+
 #[test]
 fn an_adapter_that_is_not_there_is_named() {
-    let mut wanted = settings();
-    wanted.gpu.adapter = Some("nobody's card".parse().unwrap());
+    let nobody = GpuSettings {
+        adapter: Some("nobody's card".parse().unwrap()),
+        ..GpuSettings::default()
+    };
+    let wanted = settings().gpu(nobody.clone());
     let has = &context().adapter().name;
-    says(&error(wanted), &["nobody's card", has, "backend cpu"]);
+    says(
+        &error(wanted.clone()),
+        &["nobody's card", has, "backend cpu"],
+    );
 
-    wanted.gpu.fallback = true;
+    let wanted = wanted.gpu(GpuSettings {
+        fallback: true,
+        ..nobody
+    });
     let scene = falling_ball();
-    let simulator = Simulator::new(&scene, wanted).unwrap();
+    let simulator = Simulator::new(&scene, wanted.clone()).unwrap();
     let report = simulator.backend();
     assert_eq!(
         (report.backend, report.backend_used),
@@ -81,10 +97,8 @@ fn what_the_gpu_has_no_part_in_runs_on_the_cpu_or_is_refused() {
     assert!(warnings.contains("nothing to compute"), "{warnings}");
 
     // A fallback is for devices that fail, not for what isn't offered.
-    let mut wanted = settings();
-    wanted.gpu.fallback = true;
-    let mut dense = wanted;
-    dense.solve.solver = Solver::Qr;
+    let wanted = settings().gpu(with_fallback());
+    let dense = wanted.solver(Solver::Qr);
     for (settings, word) in [(wanted.method(Method::Panel), "panel"), (dense, "Qr")] {
         let found = error(settings);
         assert!(matches!(found, Error::Unsupported { .. }), "{found:?}");
@@ -98,8 +112,7 @@ fn what_the_gpu_has_no_part_in_runs_on_the_cpu_or_is_refused() {
 
 #[test]
 fn settings_without_effect_are_told() {
-    let mut cpu = settings().backend(Backend::Cpu);
-    cpu.gpu.fallback = true;
+    let cpu = settings().backend(Backend::Cpu).gpu(with_fallback());
     let simulator = Simulator::new(&falling_ball(), cpu).unwrap();
     let warnings = simulator.warnings().join("\n");
     assert!(warnings.contains("no effect with the backend cpu"));

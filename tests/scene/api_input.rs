@@ -233,7 +233,7 @@ fn drag_works_where_the_scene_gives_none() {
 fn energy_from_nowhere_is_told() {
     let mut stiff = example("kirchhoff_ellipsoid");
     let settings = Settings::default().faces(80).fidelity(Fidelity::Isolated);
-    let calm = Simulator::new(&stiff, settings).unwrap();
+    let calm = Simulator::new(&stiff, settings.clone()).unwrap();
     let controls = Controls::zeros(&calm, 20);
     assert!(calm.rollout(&controls).unwrap().warnings().is_empty());
     // Past the stability limit: a warning, and where nothing can be computed any more, an error.

@@ -74,7 +74,7 @@ fn settings_out_of_place_are_told() {
     assert!(warned(full.rank(10)).contains("rank has no effect with the fidelity full"));
     let reduced = full.fidelity(Fidelity::Reduced);
     assert!(warned(reduced.rank(2)).contains("compressed sources leave"));
-    assert_eq!(warned(reduced), "");
+    assert_eq!(warned(reduced.clone()), "");
     let refused = |settings: Settings| {
         Simulator::new(&scene, settings)
             .map(|_| ())

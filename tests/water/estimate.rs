@@ -7,8 +7,8 @@ use crate::support::reference::{
     unequal_spheres,
 };
 use hydrograd::adjoint::lie::Vec3;
-use hydrograd::simulate::Method;
 use hydrograd::scene::{Placement, Shape};
+use hydrograd::simulate::Method;
 use hydrograd::{Body, Fidelity, Fluid, Scene, Settings, Simulator};
 use nalgebra::{DMatrix, DVector};
 use std::f64::consts::PI;
@@ -156,22 +156,22 @@ fn isolated() -> Settings {
 }
 
 fn name(settings: &Settings) -> String {
-    let mut out = format!("{:?} {}", settings.fidelity, settings.method_name()).to_lowercase();
+    let choices = settings.resolve(&Scene::new(Fluid::fresh_water())).water;
+    let mut out = format!("{} {}", choices.fidelity, choices.method_used());
     if let Some(faces) = settings.faces {
         out += &format!(" {faces}");
     }
-    if let Some(rank) = settings.compress.rank {
+    if let Some(rank) = settings.rank {
         out += &format!(", rank {rank}");
     }
-    if let Some(gap) = settings.compress.resolved_gap {
+    if let Some(gap) = settings.resolved_gap {
         out += &format!(", resolved gap {gap}");
     }
-    let defaults = Settings::default();
-    if settings.compress.tolerance != defaults.compress.tolerance {
-        out += &format!(", accuracy {}", settings.accuracy.0);
+    if let Some(accuracy) = settings.accuracy {
+        out += &format!(", accuracy {accuracy}");
     }
-    if settings.solve.tolerance != defaults.solve.tolerance {
-        out += &format!(", tolerance {}", settings.solve.tolerance);
+    if let Some(tolerance) = settings.tolerance {
+        out += &format!(", tolerance {tolerance}");
     }
     out
 }
@@ -187,7 +187,7 @@ struct Table {
 
 impl Table {
     fn add(&mut self, known: &Known, settings: &Settings) {
-        let simulator = Simulator::new(&known.scene, *settings).unwrap();
+        let simulator = Simulator::new(&known.scene, settings.clone()).unwrap();
         let m = simulator.added_mass().unwrap().matrix;
         let truth = size(&(m - &known.truth), &known.truth, &known.volumes);
         let found = simulator.error_estimate().unwrap();
@@ -288,7 +288,7 @@ fn two_spheres() {
             &known,
             &[
                 isolated(),
-                coarse,
+                coarse.clone(),
                 coarse.method(Method::MfsFace),
                 coarse.method(Method::Panel),
                 full().faces(720).method(Method::Panel),
@@ -319,7 +319,7 @@ fn sphere_and_wall() {
             &known,
             &[
                 isolated(),
-                coarse,
+                coarse.clone(),
                 coarse.method(Method::MfsFace),
                 coarse.method(Method::Panel),
                 reduced().method(Method::Panel).faces(320),

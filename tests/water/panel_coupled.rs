@@ -3,12 +3,12 @@
 use crate::support::mesh;
 use crate::support::reference::{TwoSpheres, equal_spheres, spheres_by_wall, unequal_spheres};
 use hydrograd::adjoint::lie::{Mat3, Pose, Vec3, exp_matrix};
-use hydrograd::simulate::Method;
 use hydrograd::boundary::PanelBoundary;
 use hydrograd::boundary::panel::MOST_FACES;
 use hydrograd::coupling::panel::{SolveSettings, Solver};
 use hydrograd::coupling::{Coupling, PanelCoupled};
 use hydrograd::scene::{Scene, Shape, Wall, WallSurface};
+use hydrograd::simulate::Method;
 use hydrograd::simulate::{Controls, Fidelity, Settings, Simulator};
 use hydrograd::{Error, Result, TriMesh};
 use nalgebra::DMatrix;

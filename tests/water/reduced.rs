@@ -4,10 +4,10 @@ use crate::support::mesh;
 use crate::support::reference::{TwoSpheres, equal_spheres};
 use hydrograd::adjoint::lie::{Mat3, Pose, Vec3};
 use hydrograd::boundary::{ExactBoundary, PanelBoundary};
-use hydrograd::simulate::Method;
 use hydrograd::coupling::reduced::{Reduced, ReducedBody, cache, compress};
 use hydrograd::coupling::{Coupling, Direction, Linearise};
 use hydrograd::scene::{Body, Fluid, Scene, Shape, Wall, WallSurface};
+use hydrograd::simulate::Method;
 use hydrograd::{Controls, Fidelity, Settings, Simulator};
 use nalgebra::{DMatrix, DVector};
 use std::sync::Arc;
@@ -197,7 +197,7 @@ fn the_cache_gives_the_same_bits_and_survives_damage() {
     let settings = reduced().method(Method::Panel).accuracy(7e-3);
     let run = || {
         end(
-            &Simulator::cached(&scene(), settings, folder.path()).unwrap(),
+            &Simulator::cached(&scene(), settings.clone(), folder.path()).unwrap(),
             5,
         )
     };
@@ -216,7 +216,10 @@ fn the_cache_gives_the_same_bits_and_survives_damage() {
     cache::forget();
     assert_eq!(run(), first);
     cache::forget();
-    assert_eq!(end(&Simulator::new(&scene(), settings).unwrap(), 5), first);
+    assert_eq!(
+        end(&Simulator::new(&scene(), settings.clone()).unwrap(), 5),
+        first
+    );
     // Cut short at many places, changed, empty, of another version.
     let mut damaged: Vec<Vec<u8>> = [0, 1, 50, 120, 1000, kept[0].len() - 1]
         .iter()

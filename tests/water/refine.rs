@@ -38,7 +38,10 @@ fn a_refined_corner_changes_little_of_the_added_mass() {
         ("reduced", base.fidelity(Fidelity::Reduced)),
     ];
     for (name, settings) in all {
-        let (a, b) = (added_mass(&plain, settings), added_mass(&corner, settings));
+        let (a, b) = (
+            added_mass(&plain, settings.clone()),
+            added_mass(&corner, settings),
+        );
         let (moved, before, after) = (
             felt_error(&b, &a),
             felt_error(&a, &best),
@@ -65,7 +68,7 @@ fn closed_forms_do_not_see_the_mesh() {
     for fidelity in [Fidelity::Isolated, Fidelity::Reduced] {
         let settings = Settings::default().fidelity(fidelity);
         let (a, b) = (
-            added_mass(&ball(false), settings),
+            added_mass(&ball(false), settings.clone()),
             added_mass(&ball(true), settings),
         );
         assert_eq!(a, b);

@@ -2,7 +2,6 @@
 
 use super::added_mass;
 use super::support::scaled_error;
-use hydrograd::simulate::Method;
 use hydrograd::scene::Scene;
 use hydrograd::simulate::Method;
 use hydrograd::{Fidelity, Settings, Shape, Simulator};

@@ -143,11 +143,6 @@ pub fn contact_force(law: &Law, m: &PointState) -> Vec3 {
     p.direction * (m.weight * p.normal_force(law))
 }
 
-/// N, the normal part of [`contact_force`].
-pub fn normal_force(law: &Law, m: &PointState) -> f64 {
-    m.weight * Parts::new(law, m).normal_force(law)
-}
-
 /// ∂F/∂u: symmetric and negative semi-definite, −∂²P/∂u².
 pub fn contact_damping(law: &Law, m: &PointState) -> Mat3 {
     let p = Parts::new(law, m);
@@ -229,7 +224,8 @@ mod tests {
             let tangential = f - m.normal * normal;
             assert!(normal >= 0.0 && tangential.norm() <= law.friction * normal * (1.0 + 1e-12));
             assert!(tangential.dot(&m.velocity) <= 0.0);
-            assert!((normal - normal_force(&law, &m)).abs() <= 1e-12 * normal);
+            let known = Parts::new(&law, &m).normal_force(&law);
+            assert!((normal - known).abs() <= 1e-12 * normal);
             let foreseen = law.gap - m.gap - law.horizon * Parts::new(&law, &m).approach;
             assert_eq!(
                 normal > 0.0,

@@ -3,10 +3,7 @@
 use crate::check::{Outcome, Rung, dot, outcome};
 use crate::contact::{Law, PointState, contact_force, contact_force_jvp, contact_force_vjp};
 use crate::drag::{Element, Part, quadratic_drag, quadratic_drag_jvp, quadratic_drag_vjp};
-use crate::lie::{
-    Mat3, Mat6, Vec3, Vec6, exp_jacobian_inverse, exp_jacobian_inverse_vjp, exp_matrix,
-    exp_matrix_vjp,
-};
+use crate::lie::{Mat6, Vec3, Vec6, exp_jacobian_inverse, exp_jacobian_inverse_vjp};
 use crate::rigid::{spatial_inertia, spatial_inertia_vjp};
 use crate::sample;
 use crate::solve::{Definite, Fitted, Moved, least_squares, least_squares_jvp};
@@ -23,10 +20,6 @@ const PARTS: [Part; 3] = [Part::Tangential, Part::Normal, Part::Total];
 pub fn rungs() -> Vec<Rung> {
     let mut out = crate::kernel::rungs();
     out.extend([
-        Rung {
-            name: "lie::rotation::exp_matrix_vjp",
-            check: exp_matrix_check,
-        },
         Rung {
             name: "lie::rotation::exp_jacobian_inverse_vjp",
             check: exp_jacobian_inverse_check,
@@ -50,10 +43,6 @@ pub fn rungs() -> Vec<Rung> {
         Rung {
             name: "contact::contact_force_vjp",
             check: contact_force_vjp_check,
-        },
-        Rung {
-            name: "solve::Definite::solve_jvp",
-            check: solve_jvp_check,
         },
         Rung {
             name: "solve::Definite::solve_vjp",
@@ -111,21 +100,6 @@ fn rotations() -> impl Iterator<Item = Vec3> {
     let axes = [10, 11, 12, 13].map(|seed| vector(seed).normalize());
     axes.into_iter()
         .flat_map(|axis| ANGLES.map(|angle| angle * axis))
-}
-
-fn exp_matrix_check(corruption: f64) -> Outcome {
-    all(rotations().map(|theta| {
-        transposed::<3>(
-            |x| exp_matrix(&Vec3::from_column_slice(x)).as_slice().to_vec(),
-            &theta.into(),
-            |bar| {
-                exp_matrix_vjp(&theta, &Mat3::from_column_slice(bar))
-                    .as_slice()
-                    .to_vec()
-            },
-            corruption,
-        )
-    }))
 }
 
 fn exp_jacobian_inverse_check(corruption: f64) -> Outcome {
@@ -351,16 +325,6 @@ fn lines() -> impl Iterator<Item = (Line, DVector<f64>)> {
         let x_bar = numbers(seed + 4, 6, 1.0);
         (Line::new(seed), DVector::from_vec(x_bar))
     })
-}
-
-fn solve_jvp_check(corruption: f64) -> Outcome {
-    all(lines().map(|(line, _)| {
-        let x = line.solve(0.0);
-        let dx = line.factor(0.0).solve_jvp(&(&line.a[1] * x), &line.b[1]);
-        let value = |h: &[f64]| line.solve(h[0]).as_slice().to_vec();
-        let dx = corruption * dx;
-        outcome(value, &[0.0], &[1.0], dx.as_slice(), TOLERANCE)
-    }))
 }
 
 fn solve_vjp_check(corruption: f64) -> Outcome {

@@ -27,11 +27,6 @@ impl Definite {
         self.0.solve(b)
     }
 
-    /// Tangent of the solution: `dx = A⁻¹ (db − dA x)`, from `dA x` and `db`.
-    pub fn solve_jvp(&self, da_x: &DVector<f64>, db: &DVector<f64>) -> DVector<f64> {
-        self.0.solve(&(db - da_x))
-    }
-
     /// Cotangent `w = A⁻¹ x̄` of `b`; that of A is `−w xᵀ`.
     pub fn solve_vjp(&self, x_bar: &DVector<f64>) -> DVector<f64> {
         self.0.solve(x_bar)

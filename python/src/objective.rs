@@ -57,6 +57,14 @@ fn final_velocity(index: usize, target: f64, weight: f64) -> Objective {
     Objective(objective::final_velocity(index, target, weight))
 }
 
+/// `weight · (x − target)²` at the end, x entry number `entry` (last index fastest) of the observable `name` as `Rollout.observe` gives
+/// it; the observable must have a transpose.
+#[pyfunction]
+#[pyo3(signature = (name, entry, target, weight=1.0))]
+fn final_observable(name: &str, entry: usize, target: f64, weight: f64) -> Objective {
+    Objective(objective::final_observable(name, entry, target, weight))
+}
+
 /// `weight` times the sum of the squared open-loop controls (N², N² m²).
 #[pyfunction]
 fn effort(weight: f64) -> Objective {
@@ -69,5 +77,6 @@ pub fn register(m: &Bound<'_, PyModule>) -> PyResult<()> {
     m.add_function(wrap_pyfunction!(mean_position, m)?)?;
     m.add_function(wrap_pyfunction!(final_coordinate, m)?)?;
     m.add_function(wrap_pyfunction!(final_velocity, m)?)?;
+    m.add_function(wrap_pyfunction!(final_observable, m)?)?;
     m.add_function(wrap_pyfunction!(effort, m)?)
 }

@@ -2,13 +2,13 @@
 
 use crate::array::{self, Dim};
 use crate::contact;
-use crate::error::input;
+use crate::error::{OrRaise, input};
 use crate::gradient;
 use crate::interrupt::{long, short};
 use crate::objective::Objective;
 use crate::simulator::Simulator;
 use crate::state::State;
-use hydrograd::simulate::{Cotangents, Recording, Sample};
+use hydrograd::simulate::{Cotangents, Recording, Sample, observable};
 use nalgebra::DMatrix;
 use numpy::{PyArray1, PyArrayDyn};
 use pyo3::prelude::*;
@@ -214,6 +214,16 @@ impl Rollout {
         Ok(PyArray1::from_vec(py, made))
     }
 
+    /// An observable at the states 0 … N by its name, (N + 1, …): "positions", "energy", "momentum", …; an unknown name's error has the list.
+    fn observe<'py>(&self, py: Python<'py>, name: &str) -> Numbers<'py> {
+        let made = short(py, || {
+            let found = observable::observable(name)?;
+            Ok((found, self.inner.observe(name)?))
+        })?;
+        let shape = made.0.shape(self.inner.simulator().system());
+        array::transposed(py, &made.1, &shape)
+    }
+
     /// Value of an objective.
     fn value(&self, py: Python<'_>, objective: PyRef<'_, Objective>) -> PyResult<f64> {
         let objective = objective.0.clone();
@@ -238,9 +248,9 @@ impl Rollout {
 
     /// Transpose of the rollout: the gradient of Σ cotangent · δ(observation), for any loss of your own. `q` in the tangent
     /// space of the coordinates and `v` are (N + 1, v_size), `positions` and `rotations` (δR = δθ × R, world axes)
-    /// (N + 1, bodies, 3), `controls`, what the loss has of them directly, (N, control_size). What is None is zero. Ctrl-C ends
-    /// it.
-    #[pyo3(signature = (*, positions=None, rotations=None, q=None, v=None, controls=None))]
+    /// (N + 1, bodies, 3), `controls`, what the loss has of them directly, (N, control_size); `observables` has
+    /// cotangents of others by name, each in the shape that `observe` gives. What is None is zero. Ctrl-C ends it.
+    #[pyo3(signature = (*, positions=None, rotations=None, q=None, v=None, controls=None, observables=None))]
     fn vjp<'py>(
         &self,
         py: Python<'py>,
@@ -249,6 +259,7 @@ impl Rollout {
         q: Option<&Bound<'py, PyAny>>,
         v: Option<&Bound<'py, PyAny>>,
         controls: Option<&Bound<'py, PyAny>>,
+        observables: Option<&Bound<'py, PyDict>>,
     ) -> PyResult<Bound<'py, PyAny>> {
         let mut seed: Cotangents = self.inner.zero_cotangents();
         let (states, steps) = (self.steps() + 1, self.steps());
@@ -281,6 +292,22 @@ impl Rollout {
                 *part = array::array(place, given, &shape)?.columns(part.nrows());
             }
         }
+        for (name, given) in observables.into_iter().flatten() {
+            let name: String = name.extract()?;
+            let place = format!("vjp: observables[{name:?}]");
+            let system = self.inner.simulator().system();
+            let found = observable::observable(&name).or_raise()?;
+            let rows = observable::transpose(&name).or_raise()?.tangents(system);
+            let mut shape = found.shape(system);
+            if shape.iter().product::<usize>() != rows {
+                // Cotangents live in the tangent space.
+                shape = vec![rows];
+            }
+            let mut whole = vec![Dim::Is(states)];
+            whole.extend(shape.into_iter().map(Dim::Is));
+            let columns = array::array(&place, &given, &whole)?.columns(rows);
+            seed.observables.insert(name, columns);
+        }
         let rollout = self.inner.clone();
         let made = long(py, move |wish| rollout.vjp_with(&seed, |_| wish.go_on()))?;
         gradient::of_rollout(py, &made)
@@ -294,22 +321,10 @@ impl Rollout {
         let n = recording.time.len();
         let column = |values: Vec<f64>| array::to_python(py, values, &[n]);
         out.set_item("time", column(recording.time.clone())?)?;
-        for (names, rows) in [
-            (&recording.coordinates, &recording.q),
-            (&recording.velocities, &recording.v),
-        ] {
-            for (i, name) in names.iter().enumerate() {
-                out.set_item(name, column(rows.iter().map(|row| row[i]).collect())?)?;
-            }
+        for (name, recorded, i) in recording.columns() {
+            let values = recorded.values.iter().map(|row| row[i]).collect();
+            out.set_item(name, column(values)?)?;
         }
-        out.set_item("energy", column(recording.energy.clone())?)?;
-        for (i, name) in Recording::MOMENTA.iter().enumerate() {
-            out.set_item(
-                name,
-                column(recording.momentum.iter().map(|m| m[i]).collect())?,
-            )?;
-        }
-        out.set_item("min_gap", self.min_gap(py)?)?;
         Ok(out)
     }
 

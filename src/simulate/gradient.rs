@@ -2,6 +2,7 @@
 
 use crate::dynamics::Parameters;
 use nalgebra::{DMatrix, DVector};
+use std::collections::BTreeMap;
 
 /// Derivatives of a scalar with respect to what a rollout observes; columns are states 0 … N
 /// (controls: steps 0 … N − 1).
@@ -17,6 +18,8 @@ pub struct Cotangents {
     pub rotations: DMatrix<f64>,
     /// Direct dependence on the open-loop controls, controls × N.
     pub controls: DMatrix<f64>,
+    /// Of any [`super::observable`] that has a transpose, by its name: its tangents × (N + 1).
+    pub observables: BTreeMap<String, DMatrix<f64>>,
 }
 
 impl Cotangents {
@@ -28,6 +31,7 @@ impl Cotangents {
             positions: DMatrix::zeros(3 * bodies, steps + 1),
             rotations: DMatrix::zeros(3 * bodies, steps + 1),
             controls: DMatrix::zeros(controls, steps),
+            observables: BTreeMap::new(),
         }
     }
 }

@@ -108,7 +108,7 @@ pub fn growth(simulator: &Simulator, steps: usize) -> Result<Growth> {
         let Some(step) = &now else { break };
         let e = step.linearisation();
         let from = from_velocity(&trajectory, e, &states[n], &samples[n])?;
-        let through = through(step, nv, system.len())?;
+        let through = through(step, nv)?;
         let e = next.as_ref().map_or(&last, |next| next.linearisation());
         let to = to_velocity(&trajectory, e, &states[n + 1], &samples[n + 1])?;
         now = next;
@@ -172,8 +172,8 @@ fn rows(
 }
 
 /// B: rows are cotangents of the state before the step.
-fn through(step: &ControlledStep, nv: usize, bodies: usize) -> Result<DMatrix<f64>> {
-    let zero = Seed::zeros(nv, bodies);
+fn through(step: &ControlledStep, nv: usize) -> Result<DMatrix<f64>> {
+    let zero = Seed::zeros(nv);
     rows(nv, |q, y| {
         let next_bar = StateBar {
             q: q.clone(),

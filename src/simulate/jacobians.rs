@@ -32,13 +32,13 @@ impl Rollout {
             let e = trajectory.stepper.linearise(&states[n].q);
             e.map_err(|e| e.at_time(time(n)))
         };
-        let zero = Seed::zeros(nv, system.len());
+        let zero = Seed::zeros(nv);
         let end = at(steps)?;
         let mut rows = (0..2 * nv)
             .into_par_iter()
             .map(|row| {
                 let StateBar { q, y: v } = StateBar::unit(nv, row);
-                let mut seed = Seed::zeros(nv, system.len());
+                let mut seed = Seed::zeros(nv);
                 (seed.q, seed.v) = (q, v);
                 let read = &self.samples()[steps].v;
                 let bar = trajectory.seed_vjp(&end, &states[steps], read, &seed)?;

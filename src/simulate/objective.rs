@@ -1,8 +1,10 @@
 //! Scalars of a trajectory and their derivatives with respect to what is observed.
 
+use super::observable::{observable, transpose};
 use super::{Cotangents, Gradient, Rollout};
 use crate::scene::BodyId;
 use crate::{Error, Result};
+use nalgebra::DMatrix;
 use std::ops::Add;
 
 /// A scalar function of a rollout.
@@ -64,6 +66,12 @@ enum Term {
         target: f64,
         weight: f64,
     },
+    Observable {
+        name: String,
+        entry: usize,
+        target: f64,
+        weight: f64,
+    },
     Effort(f64),
 }
 
@@ -114,6 +122,16 @@ pub fn final_velocity(index: usize, target: f64, weight: f64) -> Sum {
     }])
 }
 
+/// `weight · (x − target)²` at the end, x an entry of an observable that has a transpose ([`super::observable`]), by its name.
+pub fn final_observable(name: impl Into<String>, entry: usize, target: f64, weight: f64) -> Sum {
+    Sum(vec![Term::Observable {
+        name: name.into(),
+        entry,
+        target,
+        weight,
+    }])
+}
+
 /// `weight` times the sum of squared open-loop controls.
 pub fn effort(weight: f64) -> Sum {
     Sum(vec![Term::Effort(weight)])
@@ -127,6 +145,7 @@ impl Sum {
                 Term::Position { weight, .. }
                 | Term::Velocity { weight, .. }
                 | Term::Coordinate { weight, .. }
+                | Term::Observable { weight, .. }
                 | Term::Effort(weight) => *weight *= factor,
             }
         }
@@ -139,6 +158,12 @@ fn tangent_of(rollout: &Rollout, index: usize) -> Option<usize> {
     let links = rollout.simulator().system().tree.links();
     let link = links.iter().find(|l| l.q.contains(&index))?;
     (link.q.len() == link.v.len()).then(|| link.v.start + index - link.q.start)
+}
+
+/// An entry of an observable at the end; a name that none has was refused before.
+fn last_entry(rollout: &Rollout, name: &str, entry: usize) -> f64 {
+    let at = rollout.states().len() - 1;
+    observable(name).map_or(f64::NAN, |o| o.value(&rollout.reading(at))[entry])
 }
 
 impl Objective for Sum {
@@ -156,6 +181,24 @@ impl Objective for Sum {
         };
         for term in &self.0 {
             let numbers = match *term {
+                Term::Observable {
+                    ref name,
+                    entry,
+                    target,
+                    weight,
+                } => {
+                    // Entries of the value and of its cotangent must be the same ones.
+                    let rows: usize = observable(name)?.shape(system).iter().product();
+                    if transpose(name)?.tangents(system) != rows {
+                        return Err(Error::input(
+                            "objective: observable",
+                            name,
+                            "must have a value whose entries are independent, without quaternions or rotation matrices",
+                        ));
+                    }
+                    below("entry", entry, rows)?;
+                    [target, weight, 0.0, 0.0]
+                }
                 Term::Position {
                     body,
                     target,
@@ -231,6 +274,12 @@ impl Objective for Sum {
                 target,
                 weight,
             } => weight * (last.q[index] - target).powi(2),
+            Term::Observable {
+                ref name,
+                entry,
+                target,
+                weight,
+            } => weight * (last_entry(rollout, name, entry) - target).powi(2),
             Term::Effort(weight) => weight * rollout.controls().norm_squared(),
         };
         self.0.iter().map(of).sum()
@@ -273,6 +322,21 @@ impl Objective for Sum {
                     if let Some(i) = tangent_of(rollout, index) {
                         out.q[(i, end)] += 2.0 * weight * (samples[end].q[index] - target);
                     }
+                }
+                Term::Observable {
+                    ref name,
+                    entry,
+                    target,
+                    weight,
+                } => {
+                    let rows = observable(name).map_or(0, |o| {
+                        let system = rollout.simulator().system();
+                        o.shape(system).iter().product::<usize>()
+                    });
+                    let bars = out.observables.entry(name.clone());
+                    let bars = bars.or_insert_with(|| DMatrix::zeros(rows, end + 1));
+                    let miss = last_entry(rollout, name, entry) - target;
+                    bars[(entry, end)] += 2.0 * weight * miss;
                 }
                 Term::Effort(weight) => out.controls += 2.0 * weight * rollout.controls(),
             }

@@ -5,67 +5,77 @@ use std::fs::{self, File, OpenOptions};
 use std::io::{self, BufWriter, Write};
 use std::path::{Path, PathBuf};
 
-use serde::Serialize;
+use serde::ser::{Serialize, SerializeMap, Serializer};
 
 use super::Rollout;
+use super::observable::{OBSERVABLES, Observable};
 use crate::scene::Scene;
 use crate::{Error, Result};
 
+/// What a recording holds unless told otherwise, in its order.
+const RECORDED: [&str; 5] = ["q", "v", "energy", "momentum", "min_gap"];
+
 /// What is written of a run: one row for the start and one after each step. SI units.
-#[derive(Clone, Debug, Serialize)]
+#[derive(Clone, Debug)]
 pub struct Recording {
     /// Name of the scene.
     pub scene: String,
     /// Time step, s.
     pub dt: f64,
-    /// Names of the entries of q.
-    pub coordinates: Vec<String>,
-    /// Names of the entries of v.
-    pub velocities: Vec<String>,
     /// Time, s.
     pub time: Vec<f64>,
-    /// Joint coordinates, one row a time.
-    pub q: Vec<Vec<f64>>,
-    /// Generalised velocities, one row a time.
-    pub v: Vec<Vec<f64>>,
-    /// Kinetic energy of bodies and water, and potential energy, J.
-    pub energy: Vec<f64>,
-    /// Momentum of bodies and water: linear (kg m/s), then angular about the world's origin.
-    pub momentum: Vec<[f64; 6]>,
-    /// Smallest gap between bodies or to a wall, m; `None` where there is nothing to meet.
-    pub min_gap: Vec<Option<f64>>,
+    /// The observables, in the order of the columns.
+    pub observables: Vec<Recorded>,
+}
+
+/// An observable of a whole run.
+#[derive(Clone, Debug)]
+pub struct Recorded {
+    /// Its name.
+    pub name: &'static str,
+    /// Names of its entries.
+    pub labels: Vec<String>,
+    /// Whether it is one number.
+    pub scalar: bool,
+    /// Its values, one row a time; NaN where there is none.
+    pub values: Vec<Vec<f64>>,
 }
 
 impl Recording {
-    /// Names of the columns of the momentum.
-    pub const MOMENTA: [&str; 6] = [
-        "momentum_x",
-        "momentum_y",
-        "momentum_z",
-        "angular_momentum_x",
-        "angular_momentum_y",
-        "angular_momentum_z",
-    ];
-
-    /// Every state of a rollout of a scene.
+    /// Every state of a rollout of a scene: coordinates, velocities, energy, momentum and the smallest gap.
     pub fn of(scene: &Scene, rollout: &Rollout) -> Self {
-        let samples = rollout.samples();
+        let of = |name: &&str| OBSERVABLES.iter().find(|o| o.name() == *name);
+        Self::with(scene, rollout, RECORDED.iter().filter_map(of).copied())
+    }
+
+    /// The same with these observables.
+    pub fn with(
+        scene: &Scene,
+        rollout: &Rollout,
+        observables: impl IntoIterator<Item = &'static dyn Observable>,
+    ) -> Self {
+        let record = |o: &'static dyn Observable| Recorded {
+            name: o.name(),
+            labels: o.labels(scene),
+            scalar: o.shape(rollout.simulator().system()).is_empty(),
+            values: (0..rollout.states().len())
+                .map(|n| o.value(&rollout.reading(n)))
+                .collect(),
+        };
         Self {
             scene: scene.name.clone(),
             dt: rollout.simulator().time_step(),
-            coordinates: scene.coordinate_labels(),
-            velocities: scene.velocity_labels(),
-            time: samples.iter().map(|s| s.time).collect(),
-            q: samples.iter().map(|s| s.q.as_slice().to_vec()).collect(),
-            v: samples.iter().map(|s| s.v.as_slice().to_vec()).collect(),
-            energy: samples.iter().map(|s| s.energy()).collect(),
-            momentum: samples.iter().map(|s| s.momentum.into()).collect(),
-            min_gap: rollout
-                .gaps()
-                .iter()
-                .map(|g| g.map(|g| g.distance))
-                .collect(),
+            time: rollout.samples().iter().map(|s| s.time).collect(),
+            observables: observables.into_iter().map(record).collect(),
         }
+    }
+
+    /// Names of the columns after time, each with its place: observable and entry.
+    pub fn columns(&self) -> impl Iterator<Item = (&str, &Recorded, usize)> {
+        self.observables.iter().flat_map(|o| {
+            let labels = o.labels.iter().enumerate();
+            labels.map(move |(i, label)| (label.as_str(), o, i))
+        })
     }
 
     /// Writes `trajectory.csv` and `trajectory.json` into a folder; a file that stood there before
@@ -99,14 +109,7 @@ impl Recording {
 
     fn write_csv(&self, file: &mut impl Write) -> io::Result<()> {
         let mut line = String::from("time");
-        let q = self.coordinates.iter().map(String::as_str);
-        let v = self.velocities.iter().map(String::as_str);
-        for name in q
-            .chain(v)
-            .chain(["energy"])
-            .chain(Self::MOMENTA)
-            .chain(["min_gap"])
-        {
+        for (name, _, _) in self.columns() {
             line.push(',');
             line.push_str(&cell(name));
         }
@@ -115,18 +118,40 @@ impl Recording {
             line.clear();
             // Debug digits read back to the same bits, with an exponent where it is shorter.
             let _ = write!(line, "{time:?}");
-            let numbers = self.q[k].iter().chain(&self.v[k]);
-            let numbers = numbers.chain([&self.energy[k]]).chain(&self.momentum[k]);
-            for x in numbers {
-                let _ = write!(line, ",{x:?}");
-            }
-            line.push(',');
-            if let Some(gap) = self.min_gap[k] {
-                let _ = write!(line, "{gap:?}");
+            for (_, recorded, i) in self.columns() {
+                line.push(',');
+                let x = recorded.values[k][i];
+                if !x.is_nan() {
+                    let _ = write!(line, "{x:?}");
+                }
             }
             writeln!(file, "{line}")?;
         }
         Ok(())
+    }
+}
+
+impl Serialize for Recording {
+    fn serialize<S: Serializer>(&self, serializer: S) -> std::result::Result<S::Ok, S::Error> {
+        let mut map = serializer.serialize_map(None)?;
+        map.serialize_entry("scene", &self.scene)?;
+        map.serialize_entry("dt", &self.dt)?;
+        for (key, name) in [("coordinates", "q"), ("velocities", "v")] {
+            if let Some(o) = self.observables.iter().find(|o| o.name == name) {
+                map.serialize_entry(key, &o.labels)?;
+            }
+        }
+        map.serialize_entry("time", &self.time)?;
+        for o in &self.observables {
+            match o.scalar {
+                true => {
+                    let numbers: Vec<f64> = o.values.iter().map(|row| row[0]).collect();
+                    map.serialize_entry(o.name, &numbers)?;
+                }
+                false => map.serialize_entry(o.name, &o.values)?,
+            }
+        }
+        map.end()
     }
 }
 
@@ -178,17 +203,27 @@ mod tests {
     use super::*;
 
     fn example() -> Recording {
+        let recorded = |name, label: &str, scalar, values: [Vec<f64>; 2]| Recorded {
+            name,
+            labels: vec![label.into()],
+            scalar,
+            values: values.into(),
+        };
+        let momentum = Recorded {
+            labels: (0..6).map(|k| format!("momentum_{k}")).collect(),
+            ..recorded("momentum", "", false, [vec![0.0; 6], vec![0.0; 6]])
+        };
         Recording {
             scene: "two".into(),
             dt: 0.1,
-            coordinates: vec!["a, b.position".into()],
-            velocities: vec!["a, b.rate".into()],
             time: vec![0.0, 0.1],
-            q: vec![vec![1.0 / 3.0], vec![1e-300]],
-            v: vec![vec![-0.0], vec![2.0]],
-            energy: vec![1.0, 1.0],
-            momentum: vec![[0.0; 6]; 2],
-            min_gap: vec![None, Some(0.25)],
+            observables: vec![
+                recorded("q", "a, b.position", false, [vec![1.0 / 3.0], vec![1e-300]]),
+                recorded("v", "a, b.rate", false, [vec![-0.0], vec![2.0]]),
+                recorded("energy", "energy", true, [vec![1.0], vec![1.0]]),
+                momentum,
+                recorded("min_gap", "min_gap", true, [vec![f64::NAN], vec![0.25]]),
+            ],
         }
     }
 

@@ -1,8 +1,9 @@
 //! A trajectory, and its gradient.
 
+use super::observable::{Observable, Reading, observable, transpose, velocity};
 use super::trajectory::Seed;
 use super::{Cotangents, Gradient, Initial, Sample, Simulator};
-use crate::adjoint::lie::{Vec3, Vec6};
+use crate::adjoint::lie::Vec6;
 use crate::adjoint::step::{self, Tape};
 use crate::dynamics::{ContactForce, Drive, State, StepBar, StepRecord};
 use crate::geometry::Gap;
@@ -81,18 +82,32 @@ impl Rollout {
     /// Velocities of the bodies at states 0 … N, 6·bodies × (N + 1), world axes: a body's rows are the velocity of its
     /// origin, m/s, and its angular velocity, rad/s.
     pub fn velocities(&self) -> DMatrix<f64> {
-        let tree = &self.simulator.system().tree;
-        let mut out = DMatrix::zeros(6 * self.simulator.system().len(), self.samples().len());
-        for (mut column, sample) in out.column_iter_mut().zip(self.samples()) {
-            let twists = tree.twists(&tree.kinematics(&sample.q), &sample.v);
-            for (b, (twist, pose)) in twists.iter().zip(&sample.poses).enumerate() {
-                let turn = Vec3::from(twist.fixed_rows::<3>(3));
-                let origin = twist.fixed_rows::<3>(0) + turn.cross(&pose.translation);
-                column.fixed_rows_mut::<3>(6 * b).copy_from(&origin);
-                column.fixed_rows_mut::<3>(6 * b + 3).copy_from(&turn);
-            }
+        self.all(&velocity::Velocities)
+    }
+
+    /// An observable ([`super::observable`]) at states 0 … N by its name, one column each.
+    ///
+    /// # Errors
+    /// A name that no observable has.
+    pub fn observe(&self, name: &str) -> Result<DMatrix<f64>> {
+        Ok(self.all(observable(name)?))
+    }
+
+    fn all(&self, observable: &dyn Observable) -> DMatrix<f64> {
+        let rows: usize = observable.shape(self.simulator.system()).iter().product();
+        let states = self.states().len();
+        let values = (0..states).flat_map(|n| observable.value(&self.reading(n)));
+        DMatrix::from_iterator(rows, states, values)
+    }
+
+    /// State `n`, as observables read it.
+    pub(super) fn reading(&self, n: usize) -> Reading<'_> {
+        Reading {
+            system: self.simulator.system(),
+            parameters: self.simulator.parameters(),
+            sample: &self.samples()[n],
+            gap: Box::new(move || self.gaps()[n]),
         }
-        out
     }
 
     /// The open-loop controls, controls × N.
@@ -252,14 +267,7 @@ impl Rollout {
         };
         let simulator = &self.simulator;
         let trajectory = simulator.trajectory(&self.controls);
-        let seeds: Vec<Seed> = (0..=self.steps())
-            .map(|n| Seed {
-                q: cotangents.q.column(n).into_owned(),
-                v: cotangents.v.column(n).into_owned(),
-                positions: cotangents.positions.column(n).into_owned(),
-                rotations: cotangents.rotations.column(n).into_owned(),
-            })
-            .collect();
+        let seeds = self.seeds(cotangents)?;
         let (state_bar, partials) =
             rayon::scope(|_| step::reverse(&trajectory, &self.tape, &seeds, ended))?;
         let mut controls = cotangents.controls.clone();
@@ -294,21 +302,45 @@ impl Rollout {
         })
     }
 
+    /// The seeds of a reverse sweep, one a state: without the observables that have none there.
+    fn seeds(&self, c: &Cotangents) -> Result<Vec<Seed>> {
+        let poses = [("positions", &c.positions), ("rotations", &c.rotations)];
+        let given = c.observables.iter().map(|(name, x)| (name.as_str(), x));
+        let mut parts = Vec::new();
+        for (name, x) in poses.into_iter().chain(given) {
+            parts.push((transpose(name)?, x));
+        }
+        let seed = |n: usize| {
+            let columns = parts.iter().map(|(o, x)| (*o, x.column(n)));
+            let here = columns.filter(|(_, x)| x.iter().any(|x| *x != 0.0));
+            Seed {
+                q: c.q.column(n).into_owned(),
+                v: c.v.column(n).into_owned(),
+                observables: here.map(|(o, x)| (o, x.into_owned())).collect(),
+            }
+        };
+        Ok((0..=self.steps()).map(seed).collect())
+    }
+
     fn check(&self, c: &Cotangents) -> Result<()> {
         let z = self.zero_cotangents();
-        let parts = [
-            ("q", &c.q, &z.q),
-            ("v", &c.v, &z.v),
-            ("positions", &c.positions, &z.positions),
-            ("rotations", &c.rotations, &z.rotations),
-            ("controls", &c.controls, &z.controls),
+        let mut parts = vec![
+            ("q", &c.q, z.q.shape()),
+            ("v", &c.v, z.v.shape()),
+            ("positions", &c.positions, z.positions.shape()),
+            ("rotations", &c.rotations, z.rotations.shape()),
+            ("controls", &c.controls, z.controls.shape()),
         ];
+        for (name, x) in &c.observables {
+            let rows = transpose(name)?.tangents(self.simulator.system());
+            parts.push((name, x, (rows, self.steps() + 1)));
+        }
         for (name, given, right) in parts {
-            if given.shape() != right.shape() {
+            if given.shape() != right {
                 return Err(Error::input(
                     format!("cotangents.{name}"),
                     format!("{:?}", given.shape()),
-                    format!("must have the shape {:?}", right.shape()),
+                    format!("must have the shape {right:?}"),
                 ));
             }
             if let Some(bad) = given.iter().find(|x| !x.is_finite()) {

@@ -1,13 +1,15 @@
 //! A rollout as steps with transposes: controller, integrator and observations together.
 
+use super::observable::{Observed, ObservedBars, Transpose};
 use super::{Fidelity, Observation, Policy, Sample, Simulator};
-use crate::adjoint::lie::{Vec3, Vec6, point_wrench};
+use crate::adjoint::lie::Vec6;
 use crate::adjoint::step::Step;
 use crate::dynamics::{
     Evaluation, Input, Linearisation, LinearisedStep, Parameters, State, StateBar, StepBar,
     StepRecord, Stepper,
 };
 use crate::geometry::Gap;
+use crate::multibody::{Cotangents, Virtual};
 use crate::water::Clearance;
 use crate::{Error, Result};
 use nalgebra::{DMatrix, DVector};
@@ -25,8 +27,8 @@ pub(super) struct Trajectory<'a> {
 pub(super) struct Seed {
     pub q: DVector<f64>,
     pub v: DVector<f64>,
-    pub positions: DVector<f64>,
-    pub rotations: DVector<f64>,
+    /// Of other observables.
+    pub observables: Vec<(&'static dyn Transpose, DVector<f64>)>,
 }
 
 /// What the transpose of one step yields beside the state's cotangent.
@@ -118,7 +120,7 @@ impl<'a> Trajectory<'a> {
         Ok((Input { control, hold }, mode))
     }
 
-    /// Cotangents that enter at a state with the velocity `v`: readings of q, v and poses.
+    /// Cotangents that enter at a state with the velocity `v`: of q, v and other observables.
     fn observe_vjp(
         &self,
         e: &Linearisation,
@@ -127,17 +129,11 @@ impl<'a> Trajectory<'a> {
         seed: &Seed,
         bar: &mut StepBar,
     ) -> Result<()> {
-        let wrenches: Vec<Vec6> = (e.kinematics.poses.iter().enumerate())
-            .map(|(b, pose)| {
-                let p = Vec3::from(seed.positions.fixed_rows::<3>(3 * b));
-                let mut w = point_wrench(&pose.translation, &p);
-                let mut moment = w.fixed_rows_mut::<3>(3);
-                moment += seed.rotations.fixed_rows::<3>(3 * b);
-                w
-            })
-            .collect();
-        bar.state.q += &seed.q + self.stepper.system.tree.project(&e.kinematics, wrenches);
-        let v_bar = &bar.v + &seed.v;
+        bar.state.q += &seed.q;
+        let mut v_bar = &bar.v + &seed.v;
+        if !seed.observables.is_empty() {
+            observables_vjp(e, v, &seed.observables, &mut v_bar, bar);
+        }
         self.stepper.velocity_vjp(e, state, v, &v_bar, bar)
     }
 
@@ -227,14 +223,52 @@ impl<'a> ControlledStep<'_, 'a> {
 
 impl Seed {
     /// All zero.
-    pub fn zeros(velocities: usize, bodies: usize) -> Self {
+    pub fn zeros(velocities: usize) -> Self {
         Self {
             q: DVector::zeros(velocities),
             v: DVector::zeros(velocities),
-            positions: DVector::zeros(3 * bodies),
-            rotations: DVector::zeros(3 * bodies),
+            observables: Vec::new(),
         }
     }
+}
+
+/// Transposes of observables at a state with the velocity `v`, added to its cotangent and to those of q and the parameters.
+fn observables_vjp(
+    e: &Linearisation,
+    v: &DVector<f64>,
+    seeds: &[(&'static dyn Transpose, DVector<f64>)],
+    v_bar: &mut DVector<f64>,
+    bar: &mut StepBar,
+) {
+    let (system, kinematics) = (e.system, &e.kinematics);
+    let tree = &system.tree;
+    let mut on = Cotangents::zeros(system.len());
+    let mut out = ObservedBars {
+        pose: &mut on.pose,
+        twist: &mut on.twist,
+        q: &mut bar.state.q,
+        v: v_bar,
+        parameters: &mut bar.parameters,
+    };
+    let at = Observed {
+        system,
+        parameters: e.parameters,
+        kinematics,
+        v,
+        twists: &tree.twists(kinematics, v),
+    };
+    for (observable, seed) in seeds {
+        observable.vjp(&at, seed.as_slice(), &mut out);
+    }
+    if on.twist.iter().all(|t| *t == Vec6::zeros()) {
+        bar.state.q += tree.project(kinematics, on.pose);
+        return;
+    }
+    let zero = DVector::zeros(v.len());
+    let fields = tree.fields(kinematics, &e.q, v, Virtual::User(&zero));
+    let (q, more) = tree.reverse(kinematics, v, Virtual::User(&zero), &fields, on);
+    bar.state.q += q;
+    *v_bar += more;
 }
 
 /// What the controller sees at a state.

@@ -169,6 +169,27 @@ const THROUGH: &[(&str, &str)] = &[
         "dynamics::integrator::record::LinearisedStep::state_vjp",
         "dynamics::integrator::record::LinearisedStep::jvp",
     ),
+    // Observables that any rollout's seeds begin with.
+    (
+        "simulate::observable::joint::Coordinates::vjp",
+        "simulate::rollout::Rollout::vjp",
+    ),
+    (
+        "simulate::observable::joint::Velocities::vjp",
+        "simulate::rollout::Rollout::vjp",
+    ),
+    (
+        "simulate::observable::pose::Positions::vjp",
+        "simulate::rollout::Rollout::vjp",
+    ),
+    (
+        "simulate::observable::pose::Rotations::vjp",
+        "simulate::rollout::Rollout::vjp",
+    ),
+    (
+        "simulate::trajectory::observables_vjp",
+        "simulate::rollout::Rollout::vjp",
+    ),
     // Whole rollouts: every integrator, both fidelities, in tests/rollout_gradient.rs as well.
     (
         "simulate::trajectory::Trajectory::observe_vjp",

@@ -1,0 +1,85 @@
+//! Joint coordinates and generalised velocities.
+
+use super::{Observable, Observed, ObservedBars, Reading, Transpose};
+use crate::dynamics::System;
+use crate::scene::Scene;
+
+pub(super) struct Coordinates;
+
+impl Observable for Coordinates {
+    fn name(&self) -> &'static str {
+        "q"
+    }
+
+    fn unit(&self) -> &'static str {
+        "m, rad, and unit quaternions (w, x, y, z)"
+    }
+
+    fn shape(&self, system: &System) -> Vec<usize> {
+        vec![system.tree.coordinates()]
+    }
+
+    fn labels(&self, scene: &Scene) -> Vec<String> {
+        scene.coordinate_labels()
+    }
+
+    fn value(&self, at: &Reading) -> Vec<f64> {
+        at.sample.q.as_slice().to_vec()
+    }
+
+    fn transpose(&self) -> Option<&dyn Transpose> {
+        Some(self)
+    }
+}
+
+impl Transpose for Coordinates {
+    fn tangents(&self, system: &System) -> usize {
+        system.tree.velocities()
+    }
+
+    fn vjp(&self, _: &Observed, bar: &[f64], out: &mut ObservedBars) {
+        for (q, x) in out.q.iter_mut().zip(bar) {
+            *q += x;
+        }
+    }
+}
+
+pub(super) struct Velocities;
+
+impl Observable for Velocities {
+    fn name(&self) -> &'static str {
+        "v"
+    }
+
+    fn unit(&self) -> &'static str {
+        "m/s and rad/s"
+    }
+
+    fn shape(&self, system: &System) -> Vec<usize> {
+        vec![system.tree.velocities()]
+    }
+
+    fn labels(&self, scene: &Scene) -> Vec<String> {
+        scene.velocity_labels()
+    }
+
+    fn value(&self, at: &Reading) -> Vec<f64> {
+        at.sample.v.as_slice().to_vec()
+    }
+
+    fn transpose(&self) -> Option<&dyn Transpose> {
+        Some(self)
+    }
+}
+
+impl Transpose for Velocities {
+    fn tangents(&self, system: &System) -> usize {
+        system.tree.velocities()
+    }
+
+    fn vjp(&self, _: &Observed, bar: &[f64], out: &mut ObservedBars) {
+        for (v, x) in out.v.iter_mut().zip(bar) {
+            *v += x;
+        }
+    }
+}

@@ -41,6 +41,9 @@ macro_rules! energy {
 
 energy!(Kinetic, "kinetic_energy", |s: &crate::simulate::Sample| s
     .kinetic_energy);
-energy!(Potential, "potential_energy", |s: &crate::simulate::Sample| s
-    .potential_energy);
+energy!(
+    Potential,
+    "potential_energy",
+    |s: &crate::simulate::Sample| s.potential_energy
+);
 energy!(Total, "energy", crate::simulate::Sample::energy);

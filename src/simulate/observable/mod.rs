@@ -3,6 +3,7 @@
 //! To add one: a file with its type, its [`Observable`], and, if a cotangent of it can seed a reverse sweep, its [`Transpose`]; and
 //! its line in [`OBSERVABLES`].
 
+mod angular_momentum;
 mod energy;
 mod gap;
 mod joint;
@@ -30,6 +31,7 @@ pub const OBSERVABLES: &[&dyn Observable] = &[
     &energy::Potential,
     &energy::Total,
     &momentum::Momentum,
+    &angular_momentum::AngularMomentum,
     &gap::SmallestGap,
 ];
 

@@ -5,7 +5,7 @@ use hydrograd::dynamics::Integrator;
 use hydrograd::scene::{Body, Fluid, Joint, Scene, Shape, Spring};
 use hydrograd::simulate::Sample;
 use hydrograd::simulate::gradcheck::{self, gradcheck};
-use hydrograd::{Controls, Settings, Simulator};
+use hydrograd::{Controls, Fidelity, Settings, Simulator};
 use std::f64::consts::TAU;
 
 const GRAVITY: f64 = 9.81;
@@ -17,7 +17,8 @@ fn dry(name: &str, joint: Joint) -> Body {
 }
 
 fn simulator(scene: &Scene, integrator: Integrator) -> Simulator {
-    Simulator::new(scene, Settings::default().integrator(integrator)).unwrap()
+    let settings = Settings::default().fidelity(Fidelity::Isolated);
+    Simulator::new(scene, settings.integrator(integrator)).unwrap()
 }
 
 /// Every group of the gradient against differences.

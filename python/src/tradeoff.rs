@@ -62,7 +62,7 @@ pub fn tradeoff<'py>(
         full_product,
         steps,
         reference_faces,
-        budget,
+        budget: Some(budget),
     };
     let scene = scene.0.clone();
     let text = long(py, move |wish| {

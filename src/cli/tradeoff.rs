@@ -99,7 +99,7 @@ impl Arguments {
             full_product: self.full_product,
             steps: self.steps,
             reference_faces: self.reference_faces,
-            budget: self.budget,
+            budget: Some(self.budget),
         }
     }
 }

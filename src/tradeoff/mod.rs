@@ -12,7 +12,7 @@
 //!
 //! # fn main() -> hydrograd::Result<()> {
 //! let scene = hydrograd::Scene::load("scene.toml")?;
-//! let settings = TradeoffSettings { budget: 60.0, ..Default::default() };
+//! let settings = TradeoffSettings { budget: Some(60.0), ..Default::default() };
 //! let found = tradeoff::measure(&scene, &settings, |_| ControlFlow::Continue(()))?;
 //! for row in found.rows.iter().filter(|r| r.pareto) {
 //!     println!("{}: {:?} ms, {:?}", row.configuration.label(), row.ms_per_step, row.added_mass_rel_error);
@@ -48,6 +48,8 @@ use serde::Serialize;
 use std::ops::ControlFlow;
 use std::time::Instant;
 
+/// Time for everything, unless told otherwise, s.
+const BUDGET: f64 = 120.0;
 /// Part of the budget that the reference may take.
 const FOR_REFERENCE: f64 = 0.4;
 /// What one configuration may take, as a multiple of an equal share of the time that is left.
@@ -92,10 +94,11 @@ pub fn measure(
     settings.validate()?;
     scene.validate()?;
     let begin = Instant::now();
-    let left = || settings.budget - begin.elapsed().as_secs_f64();
+    let budget = settings.budget.unwrap_or(BUDGET);
+    let left = || budget - begin.elapsed().as_secs_f64();
     let mut watch = Watch::new(&mut progress);
     let limits = Limits {
-        seconds: FOR_REFERENCE * settings.budget,
+        seconds: FOR_REFERENCE * budget,
         faces: settings.reference_faces,
         steps: horizon(scene, settings.steps),
     };
@@ -139,7 +142,7 @@ pub fn measure(
         reference: reference.description,
         rows,
         left_out,
-        budget: settings.budget,
+        budget,
         seconds: begin.elapsed().as_secs_f64(),
         threads: rayon::current_num_threads(),
         warnings,

@@ -7,7 +7,7 @@ use serde::{Deserialize, Serialize};
 
 /// What is varied, and how long it may take. Of each list that isn't empty, the first value is what all else is varied
 /// around; what an empty one stands for is said with it.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 #[serde(default, deny_unknown_fields)]
 pub struct TradeoffSettings {
     /// Fidelities; empty: all of them.
@@ -32,27 +32,8 @@ pub struct TradeoffSettings {
     pub steps: Option<usize>,
     /// Finest faces per body of the reference, whatever time it takes; `None`: as many as the budget has time for.
     pub reference_faces: Option<usize>,
-    /// Time to do all this in, roughly, s; what is left out for it is said.
-    pub budget: f64,
-}
-
-impl Default for TradeoffSettings {
-    fn default() -> Self {
-        Self {
-            fidelities: Vec::new(),
-            methods: Vec::new(),
-            faces: Vec::new(),
-            ranks: Vec::new(),
-            accuracies: Vec::new(),
-            tolerances: Vec::new(),
-            integrators: Vec::new(),
-            time_steps: Vec::new(),
-            full_product: false,
-            steps: None,
-            reference_faces: None,
-            budget: 120.0,
-        }
-    }
+    /// Time to do all this in, roughly, s; what is left out for it is told. `None`: 120.
+    pub budget: Option<f64>,
 }
 
 impl TradeoffSettings {
@@ -90,7 +71,7 @@ impl TradeoffSettings {
         }
         let times = [
             ("time_steps", self.time_steps.as_slice()),
-            ("budget", &[self.budget]),
+            ("budget", self.budget.as_slice()),
         ];
         for (name, values) in times {
             let right = |x: f64| x > 0.0 && x.is_finite();

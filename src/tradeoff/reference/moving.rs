@@ -1,7 +1,7 @@
 //! Accelerations and trajectories by compressed bodies with growing accuracy and shrinking time
 //! steps; by the coupled system where gaps are too small to compress the bodies.
 
-use super::{Limits, climb};
+use super::levels::{Limits, climb};
 use crate::dynamics::Integrator;
 use crate::geometry::Other;
 use crate::scene::{Preset, Scene};

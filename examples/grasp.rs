@@ -26,7 +26,7 @@ mod rival;
 #[path = "grasp/task.rs"]
 mod task;
 
-use hydrograd::optimize::Progress;
+use hydrograd::optimize::OptimizeProgress;
 use hydrograd::scene::Controller;
 use hydrograd::simulate::{Fidelity, Recording, Rollout};
 use hydrograd::{Controls, Scene};
@@ -181,7 +181,7 @@ fn playback(scene: &Scene, controls: &Controls) -> Scene {
     scene
 }
 
-fn say(stage: &str, p: &Progress) {
+fn say(stage: &str, p: &OptimizeProgress) {
     eprintln!(
         "{stage}, iteration {:2}: cost {:.4}, |gradient| {:.2e}, {} rollouts with gradient",
         p.iteration, p.cost, p.gradient, p.evaluations

@@ -1,7 +1,7 @@
 //! The task: the scene with and without water, its controllers, and controls through knots with their cost and its gradient.
 
 use super::hold::{Hold, Tolerable};
-use hydrograd::optimize::{OptimizeSettings, Optimum, Progress, minimise};
+use hydrograd::optimize::{OptimizeProgress, OptimizeSettings, Optimum, minimise};
 use hydrograd::scene::{Controller, SpeedStage};
 use hydrograd::simulate::{Knots, OpenLoop, Rollout};
 use hydrograd::{Controls, Fidelity, Result, Scene, Settings, Simulator};
@@ -218,7 +218,7 @@ impl Task {
 
     /// Forces that hold the coin, from `x`: by a descent to a good approach, and by one of the whole trajectory from there. Iterations are those
     /// of both; `say` hears of every one.
-    pub fn find(&self, x: &[f64], say: impl Fn(&str, &Progress)) -> Result<Optimum> {
+    pub fn find(&self, x: &[f64], say: impl Fn(&str, &OptimizeProgress)) -> Result<Optimum> {
         let reached = minimise(|x| self.approach(x), x, &REACHING, |p| say("approach", p))?;
         let held = minimise(|x| self.hold(x), &reached.x, &HOLDING, |p| say("hold", p))?;
         Ok(Optimum {

@@ -11,7 +11,7 @@ use super::choices::ChoicesReport;
 use super::input;
 use super::options::{Time, Water, positive};
 use super::output::{Output, write_warnings};
-use super::progress::Progress;
+use super::progress::ProgressBar;
 use crate::Result;
 use crate::scene::Scene;
 use crate::simulate::gradcheck::{self, gradcheck_with};
@@ -85,7 +85,7 @@ pub(super) struct CheckReport {
 
 pub(super) fn main(arguments: &Arguments, output: Output) -> Result<ExitCode> {
     let scene = input::scene(&arguments.scene, arguments.time.steps)?;
-    let progress = Progress::new("directions", 3 * arguments.directions);
+    let progress = ProgressBar::new("directions", 3 * arguments.directions);
     let report = check(&scene, arguments, &progress)?;
     drop(progress);
     output.result(&report);
@@ -97,7 +97,7 @@ pub(super) fn main(arguments: &Arguments, output: Output) -> Result<ExitCode> {
 }
 
 /// The check at a tight tolerance, then the times at the usual one.
-fn check(scene: &Scene, arguments: &Arguments, progress: &Progress) -> Result<CheckReport> {
+fn check(scene: &Scene, arguments: &Arguments, progress: &ProgressBar) -> Result<CheckReport> {
     let usual = arguments.time.choose(arguments.water.settings());
     let tight = match arguments.water.tolerance {
         Some(_) => usual.clone(),

@@ -2,17 +2,17 @@
 
 use std::io::IsTerminal;
 
-use indicatif::{ProgressBar, ProgressStyle};
+use indicatif::ProgressStyle;
 
 /// A bar over `steps` steps of some work; hidden unless standard error is a terminal.
-pub(super) struct Progress(ProgressBar);
+pub(super) struct ProgressBar(indicatif::ProgressBar);
 
-impl Progress {
+impl ProgressBar {
     pub fn new(what: &'static str, steps: usize) -> Self {
         if !std::io::stderr().is_terminal() {
-            return Self(ProgressBar::hidden());
+            return Self(indicatif::ProgressBar::hidden());
         }
-        let bar = ProgressBar::new(steps as u64).with_message(what);
+        let bar = indicatif::ProgressBar::new(steps as u64).with_message(what);
         let style = ProgressStyle::with_template(
             "{msg} {wide_bar} {pos}/{len}  {elapsed} passed, {eta} to go",
         );
@@ -34,7 +34,7 @@ impl Progress {
     }
 }
 
-impl Drop for Progress {
+impl Drop for ProgressBar {
     fn drop(&mut self) {
         self.0.finish_and_clear();
     }

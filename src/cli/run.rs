@@ -12,7 +12,7 @@ use super::choices::ChoicesReport;
 use super::input;
 use super::options::{Time, Water};
 use super::output::{Output, or_dash, peak_memory_mb, write_warnings};
-use super::progress::Progress;
+use super::progress::ProgressBar;
 use crate::Result;
 use crate::scene::Scene;
 use crate::simulate::{Controls, Recording};
@@ -70,7 +70,7 @@ pub(super) fn main(arguments: &Arguments, output: Output) -> Result<ExitCode> {
     if let Some(folder) = &arguments.out {
         Recording::prepare(folder)?;
     }
-    let progress = Progress::new("steps", scene.steps);
+    let progress = ProgressBar::new("steps", scene.steps);
     let (mut report, recording) = simulate(&scene, arguments, &progress)?;
     drop(progress);
     if let Some(folder) = &arguments.out {
@@ -84,7 +84,7 @@ pub(super) fn main(arguments: &Arguments, output: Output) -> Result<ExitCode> {
 fn simulate(
     scene: &Scene,
     arguments: &Arguments,
-    progress: &Progress,
+    progress: &ProgressBar,
 ) -> Result<(RunReport, Recording)> {
     let start = Instant::now();
     let settings = arguments.time.choose(arguments.water.settings());

@@ -13,11 +13,11 @@ use super::input;
 use super::list::choice;
 use super::options::{positive, tolerance};
 use super::output::Output;
-use super::progress;
+use super::progress::ProgressBar;
 use crate::Result;
 use crate::dynamics::Integrator;
 use crate::simulate::{Fidelity, Method};
-use crate::tradeoff::{self, Progress, Stage, TradeoffSettings};
+use crate::tradeoff::{self, TradeoffProgress, TradeoffSettings, TradeoffStage};
 use table::TradeoffReport;
 
 #[derive(Debug, Args)]
@@ -111,13 +111,13 @@ pub(super) fn main(arguments: &Arguments, output: Output) -> Result<ExitCode> {
         plot::prepare(file)?;
     }
     let mut bar = None;
-    let found = tradeoff::measure(&scene, &arguments.settings(), |now: Progress| {
+    let found = tradeoff::measure(&scene, &arguments.settings(), |now: TradeoffProgress| {
         let what = match now.stage {
-            Stage::Reference => "reference",
-            Stage::Configurations => "configurations",
+            TradeoffStage::Reference => "reference",
+            TradeoffStage::Configurations => "configurations",
         };
         if bar.as_ref().is_none_or(|(of, _)| *of != what) {
-            bar = Some((what, progress::Progress::new(what, now.all)));
+            bar = Some((what, ProgressBar::new(what, now.all)));
         }
         if let Some((_, bar)) = &bar {
             bar.set_of(now.done, now.all);

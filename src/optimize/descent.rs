@@ -1,6 +1,6 @@
 //! L-BFGS on a function that may fail.
 
-use super::{OptimizeSettings, Optimum, Progress, Stop};
+use super::{OptimizeProgress, OptimizeSettings, Optimum, Stop};
 use crate::{Error, Result};
 use argmin::core::{CostFunction, Gradient, IterState, Problem, Solver, State};
 use argmin::solver::linesearch::MoreThuenteLineSearch;
@@ -148,7 +148,7 @@ pub fn minimise(
     mut function: impl FnMut(&[f64]) -> Result<(f64, Vec<f64>)>,
     start: &[f64],
     settings: &OptimizeSettings,
-    mut progress: impl FnMut(&Progress),
+    mut progress: impl FnMut(&OptimizeProgress),
 ) -> Result<Optimum> {
     settings.validate()?;
     if start.is_empty() {
@@ -197,7 +197,7 @@ pub fn minimise(
         let advanced = descent.advance();
         iterations += 1;
         let after = seen.borrow().best.clone();
-        progress(&Progress {
+        progress(&OptimizeProgress {
             iteration: iterations,
             cost: after.cost,
             gradient: norm(&after.gradient),

@@ -60,7 +60,7 @@ impl Default for OptimizeSettings {
 
 /// State of a descent after an iteration.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Progress {
+pub struct OptimizeProgress {
     /// Iterations made.
     pub iteration: usize,
     /// Cost.

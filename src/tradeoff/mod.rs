@@ -33,7 +33,7 @@ mod shapes;
 mod start;
 
 pub use configuration::{Configuration, Family};
-pub use progress::{Progress, Stage};
+pub use progress::{TradeoffProgress, TradeoffStage};
 pub use row::{ReferenceQuantity, TradeoffReference, TradeoffRow};
 pub use settings::TradeoffSettings;
 
@@ -89,7 +89,7 @@ pub struct Tradeoff {
 pub fn measure(
     scene: &Scene,
     settings: &TradeoffSettings,
-    mut progress: impl FnMut(Progress) -> ControlFlow<()> + Send,
+    mut progress: impl FnMut(TradeoffProgress) -> ControlFlow<()> + Send,
 ) -> Result<Tradeoff> {
     settings.validate()?;
     scene.validate()?;

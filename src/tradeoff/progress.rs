@@ -5,7 +5,7 @@ use std::ops::ControlFlow;
 
 /// The parts of a comparison, one after the other.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Stage {
+pub enum TradeoffStage {
     /// What errors are measured against is computed.
     Reference,
     /// Configurations are measured.
@@ -14,9 +14,9 @@ pub enum Stage {
 
 /// How far a comparison has come.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub struct Progress {
+pub struct TradeoffProgress {
     /// Which part is under way.
-    pub stage: Stage,
+    pub stage: TradeoffStage,
     /// What of it is done: simulations of the reference, or configurations.
     pub done: usize,
     /// Of how many; a guess for the reference.
@@ -28,15 +28,15 @@ const USUAL: usize = 10;
 
 /// Passes the progress on, and remembers if it broke.
 pub(super) struct Watch<'a> {
-    progress: &'a mut (dyn FnMut(Progress) -> ControlFlow<()> + Send),
-    now: Progress,
+    progress: &'a mut (dyn FnMut(TradeoffProgress) -> ControlFlow<()> + Send),
+    now: TradeoffProgress,
     stopped: bool,
 }
 
 impl<'a> Watch<'a> {
-    pub fn new(progress: &'a mut (dyn FnMut(Progress) -> ControlFlow<()> + Send)) -> Self {
-        let now = Progress {
-            stage: Stage::Reference,
+    pub fn new(progress: &'a mut (dyn FnMut(TradeoffProgress) -> ControlFlow<()> + Send)) -> Self {
+        let now = TradeoffProgress {
+            stage: TradeoffStage::Reference,
             done: 0,
             all: USUAL,
         };
@@ -49,8 +49,8 @@ impl<'a> Watch<'a> {
 
     /// Begins the configurations, so many.
     pub fn configurations(&mut self, all: usize) -> Result<()> {
-        self.now = Progress {
-            stage: Stage::Configurations,
+        self.now = TradeoffProgress {
+            stage: TradeoffStage::Configurations,
             done: 0,
             all,
         };
@@ -60,7 +60,7 @@ impl<'a> Watch<'a> {
     /// One more part is done.
     pub fn advance(&mut self) -> Result<()> {
         self.now.done += 1;
-        if self.now.stage == Stage::Reference {
+        if self.now.stage == TradeoffStage::Reference {
             self.now.all = USUAL.max(self.now.done + 1);
         }
         self.check()
@@ -81,10 +81,10 @@ impl<'a> Watch<'a> {
         match self.poll() {
             ControlFlow::Continue(()) => Ok(()),
             ControlFlow::Break(()) => {
-                let Progress { done, stage, .. } = self.now;
+                let TradeoffProgress { done, stage, .. } = self.now;
                 let part = match stage {
-                    Stage::Reference => "simulations of the reference",
-                    Stage::Configurations => "configurations",
+                    TradeoffStage::Reference => "simulations of the reference",
+                    TradeoffStage::Configurations => "configurations",
                 };
                 let what = format!("the comparison, after {done} {part}");
                 Err(Error::Stopped { what })

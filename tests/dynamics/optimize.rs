@@ -1,6 +1,6 @@
 //! Descent: known minima, functions that fail in part of the plane, every way to end, settings that can't be.
 
-use hydrograd::optimize::{self, OptimizeSettings, Optimum, Progress, Stop, minimise};
+use hydrograd::optimize::{self, OptimizeProgress, OptimizeSettings, Optimum, Stop, minimise};
 use hydrograd::scene::{Body, Fluid, Scene, Shape};
 use hydrograd::{Controls, Error, Fidelity, Simulator, objective};
 
@@ -92,7 +92,7 @@ fn the_best_point_is_what_was_found() {
 
 #[test]
 fn every_iteration_is_heard_of() {
-    let mut heard: Vec<Progress> = Vec::new();
+    let mut heard: Vec<OptimizeProgress> = Vec::new();
     let settings = OptimizeSettings::default();
     let found = minimise(rosenbrock, &[-1.2, 1.0], &settings, |p| heard.push(*p)).unwrap();
     let numbers: Vec<usize> = heard.iter().map(|p| p.iteration).collect();

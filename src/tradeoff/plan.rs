@@ -1,8 +1,8 @@
 //! Which configurations of a scene are compared, and in which order they are measured.
 
-use super::TradeoffSettings;
 use super::configuration::{Configuration, Family};
 use super::row::TradeoffRow;
+use super::settings::TradeoffSettings;
 use super::shapes::{ClosedForms, closed_forms, has_faces};
 use crate::coupling::full::SolveSettings;
 use crate::dynamics::Integrator;

@@ -58,11 +58,6 @@ impl Reference {
     pub fn new(scene: &Scene, limits: Limits, watch: &mut Watch) -> Result<Self> {
         let begin = Instant::now();
         check(scene)?;
-        // A reference has no need of a scene's preset.
-        let scene = &Scene {
-            preset: Preset::Default,
-            ..scene.clone()
-        };
         let half = Duration::from_secs_f64(limits.seconds / 2.0);
         let panels = Panels::new(scene, &limits, begin + half, watch);
         watch.check()?;

@@ -2,6 +2,7 @@
 
 #[cfg(feature = "cli")]
 mod cli;
+mod counters;
 mod coupled;
 mod fixture;
 mod kernels;

@@ -1,13 +1,14 @@
 //! On the GPU a rollout and its gradient leave no pair work and no solver vectors to the CPU, and it
 //! waits for numbers as often whatever the tolerance.
 //!
-//! The counters are the process's: one test, in a binary of its own.
+//! The counters are the process's: the test runs in a process of its own.
 
+use super::trajectory::falling_ball;
 use hydrograd::adjoint::count::PAIRS;
 use hydrograd::simulate::Backend;
 use hydrograd::solver::CALLS;
-use hydrograd::{Controls, Fidelity, Scene, Settings, Simulator, objective};
-use std::path::Path;
+use hydrograd::{Controls, Fidelity, Settings, Simulator, objective};
+use std::process::Command;
 
 /// What a rollout with its gradient costs the CPU, after the set-up: pairs and calls of solvers.
 fn work(simulator: &Simulator) -> (u64, u64) {
@@ -20,11 +21,28 @@ fn work(simulator: &Simulator) -> (u64, u64) {
     (PAIRS.total() - before.0, CALLS.total() - before.1)
 }
 
+/// In the child that [`the_gpu_does_the_work`] starts.
+const ALONE: &str = "HYDROGRAD_TEST_ALONE";
+
 #[test]
 fn the_gpu_does_the_work() {
-    let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("examples/scenes");
-    let mut scene = Scene::load(folder.join("falling_ball.toml")).unwrap();
-    scene.set_faces(80);
+    if std::env::var_os(ALONE).is_some() {
+        return count();
+    }
+    let name = "counters::the_gpu_does_the_work";
+    let child = Command::new(std::env::current_exe().unwrap())
+        .args(["--exact", name, "--nocapture"])
+        .env(ALONE, "1")
+        .output()
+        .unwrap();
+    let out = String::from_utf8_lossy(&child.stdout);
+    let errors = String::from_utf8_lossy(&child.stderr);
+    assert!(child.status.success(), "{out}{errors}");
+    assert!(out.contains("1 passed"), "{out}");
+}
+
+fn count() {
+    let scene = falling_ball();
     let settings = Settings::default();
 
     let cpu = Simulator::new(&scene, settings.clone()).unwrap();

@@ -9,6 +9,12 @@ use nalgebra::DMatrix;
 use std::collections::HashMap;
 use std::sync::Arc;
 
+/// A mesh whose vertices are moved.
+pub fn mapped(mesh: &TriMesh, to: impl Fn(&Vec3) -> Vec3) -> TriMesh {
+    let vertices = mesh.vertices().iter().map(to).collect();
+    TriMesh::new(mesh.name(), vertices, mesh.faces().to_vec()).unwrap()
+}
+
 /// A box whose cells shrink towards the edges with the square of the distance, `cells` along each
 /// axis; diagonals mirror each other.
 pub fn graded_box(size: [f64; 3], cells: [usize; 3]) -> TriMesh {

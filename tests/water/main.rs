@@ -5,6 +5,7 @@ mod auto;
 mod estimate;
 mod exact;
 mod flow;
+mod methods;
 mod one_body;
 mod overlap;
 mod panel;

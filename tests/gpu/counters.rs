@@ -51,7 +51,7 @@ fn count() {
     assert!(pairs > 0 && calls > 0, "the counters count");
 
     let read_backs = |tolerance: f64| {
-        let settings = settings.backend(Backend::Gpu).tolerance(tolerance);
+        let settings = settings.clone().backend(Backend::Gpu).tolerance(tolerance);
         let simulator = Simulator::new(&scene, settings).unwrap();
         let counts = || simulator.context().unwrap().counts();
         let before = counts();

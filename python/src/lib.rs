@@ -16,6 +16,7 @@ mod rollout;
 mod scene;
 mod settings;
 mod shape;
+mod simulation;
 mod simulator;
 mod state;
 mod tradeoff;

@@ -603,6 +603,14 @@ fn record_jvp(c: f64) -> Outcome {
         let (_, record) = simulator.step(&start, u).unwrap();
         record
     };
+    // Driven velocities are what they are read out as: others would be another state.
+    let start = make(&p.q, &p.v, &u);
+    let start = &start.rollout().samples()[0];
+    let p = Point {
+        q: start.q.clone(),
+        v: start.v.clone(),
+        ..p
+    };
     let base = make(&p.q, &p.v, &u);
     let (dq, dv) = (unmoved(wavy(nv, 2.1, 0.05)), unmoved(wavy(nv, 3.1, 0.2)));
     let du = wavy(nu, 4.1, 1.0);

@@ -80,12 +80,10 @@ const STRICT: [&str; 8] = [
 const STILL: &[&str] = &[
     "src/cli/tradeoff",
     "src/contact/geometry",
-    "src/coupling/reduced",
     "src/gpu",
     "src/gpu/full",
     "src/water",
     "adjoint/src",
-    "python/src",
 ];
 
 #[test]

@@ -12,7 +12,8 @@
 //! δG being what pairs that fade out leave out.
 
 use super::Reduced;
-use super::linearised::{FLUX, ReducedLinearised};
+use super::linearised::ReducedLinearised;
+use super::views::FLUX;
 use crate::Result;
 use crate::adjoint::kernel::{Points, Sources, Write, potential_fill};
 use crate::adjoint::lie::{Pose, Vec3};
@@ -48,7 +49,7 @@ impl Reduced {
                     if target != b {
                         continue;
                     }
-                    let weight = link.weight(self, poses);
+                    let weight = link.weight(&self.bodies, poses);
                     let points = &self.bodies[source].parts().points;
                     let (at, from) = ((b, &poses[b]), (source, &poses[source]));
                     places.extend(Pair::new(at, from, &link.image, points).positions);

@@ -1,18 +1,12 @@
 //! First derivatives of the energy of one direction with every column of the basis.
 
-use super::linearised::{FLUX, ReducedLinearised, vector};
+use super::linearised::{Fields, ReducedLinearised};
 use super::link::Placed;
+use super::views::{FLUX, vector};
 use crate::adjoint::kernel::potential_vjp;
 use crate::adjoint::lie::{Vec3, Vec6, six};
 use crate::coupling::pair::wrench;
 use nalgebra::DVector;
-
-/// ∇ of the potentials at a link's source points that the targets' charges make, one for each column of the
-/// basis, `[j][k][3]`; and where the link fades those potentials, `[j][k]`.
-pub(super) struct Fields {
-    field: Vec<f64>,
-    sums: Vec<f64>,
-}
 
 impl ReducedLinearised<'_> {
     fn fields(&self) -> &[Fields] {

@@ -1,6 +1,6 @@
 //! Cholesky factorisation of the coupled system, in its own memory.
 
-use super::linearised::{view, view_mut};
+use super::views::{view, view_mut};
 use faer::dyn_stack::{MemBuffer, MemStack};
 use faer::linalg::cholesky::llt;
 use faer::{Conj, Par, Spec};

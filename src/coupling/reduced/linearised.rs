@@ -1,23 +1,22 @@
 //! One evaluation of the reduced coupling: value and first derivative. What a value costs is all that the derivatives need.
 
 use super::Reduced;
-use super::columns::Fields;
 use super::factor::Factor;
 use super::link::{Link, Placed};
+use super::views::{FLUX, interleave, vector, view, view_mut};
 use crate::Result;
 use crate::adjoint::kernel::potential_vjp;
-use crate::adjoint::lie::{Pose, Vec3, Vec6, six};
+use crate::adjoint::lie::{Pose, Vec6, six};
 use crate::coupling::pair::wrench;
-use crate::coupling::{CouplingReport, Direction, Linearised, Momenta, Pullback, Tangent};
+use crate::coupling::{
+    Coupling, CouplingReport, Direction, Linearise, Linearised, Momenta, Pullback, Tangent,
+};
 use faer::linalg::matmul::matmul;
 use faer::reborrow::ReborrowMut;
-use faer::{Accum, Mat, MatMut, MatRef, Par};
+use faer::{Accum, Mat, MatRef, Par};
 use nalgebra::{DMatrix, DVector};
-use std::f64::consts::PI;
 use std::sync::OnceLock;
 
-/// 4π: a source of strength α makes the flux 4πα.
-pub(super) const FLUX: f64 = 4.0 * PI;
 /// Work of [`ReducedLinearised::new`] per pair of points, relative to that of its derivatives.
 const FILL: usize = 8;
 /// Of [`ReducedLinearised::pull_back`].
@@ -45,6 +44,13 @@ pub(super) struct ReducedLinearised<'a> {
     report: CouplingReport,
 }
 
+/// ∇ of the potentials at a link's source points that the targets' charges make, one for each column of the
+/// basis, `[j][k][3]`; and where the link fades those potentials, `[j][k]`.
+pub(super) struct Fields {
+    pub field: Vec<f64>,
+    pub sums: Vec<f64>,
+}
+
 /// Solution to one combination of twists.
 pub(super) struct Response {
     twists: DVector<f64>,
@@ -53,35 +59,10 @@ pub(super) struct Response {
     pub alpha: DVector<f64>,
 }
 
-/// A nalgebra matrix as faer sees it.
-pub(super) fn view(m: &DMatrix<f64>) -> MatRef<'_, f64> {
-    MatRef::from_column_major_slice(m.as_slice(), m.nrows(), m.ncols())
-}
-
-pub(super) fn view_mut(m: &mut DMatrix<f64>) -> MatMut<'_, f64> {
-    let (r, c) = m.shape();
-    MatMut::from_column_major_slice_mut(m.as_mut_slice(), r, c)
-}
-
-/// Columns `k` and `k'` of two vectors beside each other, `[row][column]`.
-pub(super) fn interleave(columns: &[&[f64]]) -> Vec<f64> {
-    let rows = columns.first().map_or(0, |c| c.len());
-    (0..rows)
-        .flat_map(|i| columns.iter().map(move |c| c[i]))
-        .collect()
-}
-
-/// Three-vector `k` of row `j` in a `[j][columns][3]` array.
-#[inline]
-pub(super) fn vector(g: &[f64], columns: usize, j: usize, k: usize) -> Vec3 {
-    let at = 3 * (j * columns + k);
-    Vec3::new(g[at], g[at + 1], g[at + 2])
-}
-
 impl<'a> ReducedLinearised<'a> {
     pub fn new(reduced: &'a Reduced, poses: &[Pose], basis: &DMatrix<f64>) -> Result<Self> {
         let place = |link: &'a Link| {
-            let placed = link.place(reduced, poses)?;
+            let placed = link.place(&reduced.bodies, poses)?;
             let block = block(reduced, &placed);
             Some((placed, block))
         };
@@ -270,7 +251,7 @@ impl<'a> ReducedLinearised<'a> {
 fn block(reduced: &Reduced, placed: &Placed) -> Mat<f64> {
     let link = placed.link;
     let (target, source) = (&reduced.bodies[link.target], &reduced.bodies[link.source]);
-    let p = placed.potentials(reduced);
+    let p = placed.potentials(&reduced.bodies);
     let p = MatRef::from_row_major_slice(&p, target.points(), source.points());
     let (left, right) = (view(target.basis()), view(source.basis()));
     let (m, n) = (left.ncols(), right.ncols());
@@ -370,5 +351,33 @@ impl Linearised for ReducedLinearised<'_> {
 
     fn report(&self) -> &CouplingReport {
         &self.report
+    }
+}
+
+impl Coupling for Reduced {
+    fn name(&self) -> &'static str {
+        "the fidelity reduced"
+    }
+
+    fn bodies(&self) -> usize {
+        self.bodies.len()
+    }
+
+    fn unknowns(&self) -> usize {
+        self.mode_count()
+    }
+
+    fn evaluate(&self, poses: &[Pose], basis: &DMatrix<f64>) -> Result<Momenta> {
+        Ok(ReducedLinearised::new(self, poses, basis)?.value())
+    }
+
+    fn differentiable(&self) -> Option<&dyn Linearise> {
+        Some(self)
+    }
+}
+
+impl Linearise for Reduced {
+    fn linearise(&self, poses: &[Pose], basis: &DMatrix<f64>) -> Result<Box<dyn Linearised + '_>> {
+        Ok(Box::new(ReducedLinearised::new(self, poses, basis)?))
     }
 }

@@ -1,10 +1,11 @@
 //! The blocks of G: a body and the image of another, or of itself.
 
-use super::{Cutoff, Reduced};
+use super::{Cutoff, ReducedBody};
 use crate::adjoint::kernel::{Write, potential_fill};
 use crate::adjoint::lie::{Pose, Vec3};
 use crate::coupling::pair::Pair;
 use crate::geometry::Image;
+use std::sync::Arc;
 
 /// A block of G that depends on the poses. G is symmetric and the images of perpendicular walls are
 /// their own inverses, so a pair of bodies needs one block per image.
@@ -63,8 +64,8 @@ impl Link {
 
     /// The source body's centre in the target's frame, the same less the target's, and the weight at
     /// that distance with two derivatives.
-    fn reach(&self, reduced: &Reduced, poses: &[Pose]) -> (Vec3, Vec3, [f64; 3]) {
-        let parts = |b: usize| reduced.bodies[b].parts();
+    fn reach(&self, bodies: &[Arc<ReducedBody>], poses: &[Pose]) -> (Vec3, Vec3, [f64; 3]) {
+        let parts = |b: usize| bodies[b].parts();
         let (t, s) = (self.target, self.source);
         let (rotation, shift) = self.image.placement(&poses[s]);
         let centre = poses[t].apply_inverse(&(rotation * parts(s).centre + shift));
@@ -77,8 +78,8 @@ impl Link {
     }
 
     /// Weight at the poses.
-    pub(super) fn weight(&self, reduced: &Reduced, poses: &[Pose]) -> f64 {
-        self.reach(reduced, poses).2[0]
+    pub(super) fn weight(&self, bodies: &[Arc<ReducedBody>], poses: &[Pose]) -> f64 {
+        self.reach(bodies, poses).2[0]
     }
 
     /// The bodies (target, source) that it couples, in both orders: one body and its image once.
@@ -90,10 +91,10 @@ impl Link {
     }
 
     /// The link at the poses, unless it has faded out.
-    pub(super) fn place(&self, reduced: &Reduced, poses: &[Pose]) -> Option<Placed<'_>> {
-        let parts = |b: usize| reduced.bodies[b].parts();
+    pub(super) fn place(&self, bodies: &[Arc<ReducedBody>], poses: &[Pose]) -> Option<Placed<'_>> {
+        let parts = |b: usize| bodies[b].parts();
         let (t, s) = (self.target, self.source);
-        let (centre, between, weight) = self.reach(reduced, poses);
+        let (centre, between, weight) = self.reach(bodies, poses);
         (weight[0] > 0.0).then(|| Placed {
             link: self,
             pair: Pair::new(
@@ -111,8 +112,8 @@ impl Link {
 
 impl Placed<'_> {
     /// P, target points × source points, row-major.
-    pub fn potentials(&self, reduced: &Reduced) -> Vec<f64> {
-        let targets = reduced.bodies[self.link.target].targets();
+    pub fn potentials(&self, bodies: &[Arc<ReducedBody>]) -> Vec<f64> {
+        let targets = bodies[self.link.target].targets();
         let stride = self.pair.points.len();
         let mut out = vec![0.0; targets.len() * stride];
         potential_fill(targets, &self.pair.points, Write::Set, &mut out, stride, 0);

@@ -1,7 +1,8 @@
 //! Second derivatives along one displacement: the tangent of the first.
 
-use super::linearised::{FLUX, ReducedLinearised, Response, interleave, vector};
+use super::linearised::{ReducedLinearised, Response};
 use super::link::Placed;
+use super::views::{FLUX, interleave, vector};
 use crate::adjoint::kernel::{potential_hvp, potential_jvp, potential_vjp};
 use crate::adjoint::lie::{Vec3, Vec6, angular, linear, six};
 use crate::coupling::{Direction, Tangent};
@@ -79,7 +80,7 @@ impl ReducedLinearised<'_> {
                 .chain(&mut on_source)
                 .for_each(|x| *x *= w);
             if placed.fading() {
-                let p = placed.potentials(self.reduced);
+                let p = placed.potentials(&self.reduced.bodies);
                 for (i, row) in p.chunks_exact(s.len()).enumerate() {
                     for (j, p) in row.iter().enumerate() {
                         for c in 0..k {

@@ -1,0 +1,484 @@
+//! What simulators do: the methods of their class.
+
+use crate::array::{self, Dim, array};
+use crate::error::{OrRaise, input};
+use crate::gradient::by_name;
+use crate::interrupt::{long, short};
+use crate::mesh::{Triangles, triangles};
+use crate::policy::Controller;
+use crate::prepare::{Parts, Start, build, set_gains};
+use crate::rollout::Rollout;
+use crate::scene::Scene;
+use crate::settings::{Keywords, row_or};
+use crate::simulator::Simulator;
+use crate::state::{Record, State};
+use hydrograd::{Controls, dynamics};
+use nalgebra::{DMatrix, DVector};
+use numpy::PyArrayDyn;
+use pyo3::prelude::*;
+use pyo3::types::PyDict;
+use rayon::prelude::*;
+use std::collections::HashMap;
+use std::path::PathBuf;
+use std::sync::Arc;
+
+impl Simulator {
+    fn matrix(
+        &self,
+        place: &str,
+        given: Option<&Bound<'_, PyAny>>,
+        steps: Option<usize>,
+    ) -> PyResult<DMatrix<f64>> {
+        let n = self.controls_size();
+        let Some(given) = given else {
+            return Ok(DMatrix::zeros(n, steps.unwrap_or(self.scene.steps)));
+        };
+        let found = array(place, given, &[Dim::Any("steps"), Dim::Is(n)])?;
+        if let Some(steps) = steps
+            && steps != found.shape[0]
+        {
+            return Err(input(
+                "rollout: steps",
+                steps,
+                format!("must be {}, as the controls say", found.shape[0]),
+            ));
+        }
+        Ok(found.columns(n))
+    }
+
+    /// The state where a run begins.
+    fn begin(
+        &self,
+        state: Option<&Bound<'_, State>>,
+        q: Option<&Bound<'_, PyAny>>,
+        v: Option<&Bound<'_, PyAny>>,
+    ) -> PyResult<Start> {
+        if let Some(state) = state {
+            if q.is_some() || v.is_some() {
+                return Err(input(
+                    "rollout: state",
+                    "a state beside q or v",
+                    "give one or the other",
+                ));
+            }
+            return Ok(Start::At(state.get().state.clone()));
+        }
+        let (q0, v0) = self.inner.start();
+        Ok(match (q, v) {
+            (None, None) => Start::Scene,
+            _ => Start::From(row_or("rollout: q", q, q0)?, row_or("rollout: v", v, v0)?),
+        })
+    }
+}
+
+#[pymethods]
+impl Simulator {
+    #[new]
+    #[pyo3(signature = (
+        scene, dt=None, *, fidelity=None, method=None, tolerance=None, integrator=None, faces=None, accuracy=None,
+        rank=None, resolved_gap=None, cache=None, backend=None
+    ))]
+    #[expect(
+        clippy::too_many_arguments,
+        reason = "one per keyword of the constructor"
+    )]
+    fn new(
+        py: Python<'_>,
+        scene: PyRef<'_, Scene>,
+        dt: Option<f64>,
+        fidelity: Option<&str>,
+        method: Option<&str>,
+        tolerance: Option<f64>,
+        integrator: Option<&str>,
+        faces: Option<usize>,
+        accuracy: Option<f64>,
+        rank: Option<usize>,
+        resolved_gap: Option<f64>,
+        cache: Option<PathBuf>,
+        backend: Option<&str>,
+    ) -> PyResult<Self> {
+        let keywords = Keywords {
+            dt,
+            fidelity,
+            method,
+            tolerance,
+            integrator,
+            faces,
+            accuracy,
+            rank,
+            resolved_gap,
+            backend,
+        };
+        let scene = scene.0.clone();
+        let choices = keywords.settings()?.resolve(&scene);
+        build(py, scene, choices, cache)
+    }
+
+    /// Runs the scene, with its own controller if it has one, and `controls` (steps, control_size) added to it: generalised
+    /// forces of actuated joints and wrenches of thrusters, N and N m. Without them, `steps` (default: the scene's) without
+    /// control. It begins where the simulator does unless given a `state`, or `q` (q_size,) and `v` (v_size,). Ctrl-C ends it.
+    #[pyo3(signature = (controls=None, *, steps=None, state=None, q=None, v=None))]
+    fn rollout(
+        slf: &Bound<'_, Self>,
+        controls: Option<&Bound<'_, PyAny>>,
+        steps: Option<usize>,
+        state: Option<&Bound<'_, State>>,
+        q: Option<&Bound<'_, PyAny>>,
+        v: Option<&Bound<'_, PyAny>>,
+    ) -> PyResult<Rollout> {
+        let me = slf.get();
+        let start = me.begin(state, q, v)?;
+        let matrix = me.matrix("rollout: controls", controls, steps)?;
+        let inner = me.inner.clone();
+        let made = long(slf.py(), move |wish| {
+            let controls = Controls::from_matrix(&inner, matrix)?;
+            inner.rollout_from(&start.state(&inner)?, &controls, |_| wish.go_on())
+        })?;
+        Ok(Rollout::new(slf, made))
+    }
+
+    /// Runs many controls, (batch, steps, control_size), on all cores: the same rollouts, to the bit, as one after the other.
+    /// `q` (batch, q_size) and `v` (batch, v_size) are where each begins, if given.
+    #[pyo3(signature = (controls, *, q=None, v=None))]
+    fn rollout_batch(
+        slf: &Bound<'_, Self>,
+        controls: &Bound<'_, PyAny>,
+        q: Option<&Bound<'_, PyAny>>,
+        v: Option<&Bound<'_, PyAny>>,
+    ) -> PyResult<Vec<Rollout>> {
+        let me = slf.get();
+        let n = me.controls_size();
+        let found = array(
+            "rollout_batch: controls",
+            controls,
+            &[Dim::Any("batch"), Dim::Any("steps"), Dim::Is(n)],
+        )?;
+        let (batch, steps) = (found.shape[0], found.shape[1]);
+        let (q0, v0) = me.inner.start();
+        let each = |place: &str, given: Option<&Bound<'_, PyAny>>, default: &DVector<f64>| {
+            let Some(given) = given else {
+                return Ok(vec![default.clone(); batch]);
+            };
+            let found = array(place, given, &[Dim::Is(batch), Dim::Is(default.len())])?;
+            let rows =
+                (0..batch).map(|b| &found.values[b * default.len()..(b + 1) * default.len()]);
+            PyResult::Ok(rows.map(DVector::from_column_slice).collect())
+        };
+        let starts = match (q, v) {
+            (None, None) => vec![Start::Scene; batch],
+            _ => {
+                let q = each("rollout_batch: q", q, q0)?;
+                let v = each("rollout_batch: v", v, v0)?;
+                q.into_iter()
+                    .zip(v)
+                    .map(|(q, v)| Start::From(q, v))
+                    .collect()
+            }
+        };
+        let size = n * steps;
+        let runs: Vec<(Start, DMatrix<f64>)> = starts
+            .into_iter()
+            .enumerate()
+            .map(|(b, start)| {
+                let values = &found.values[b * size..(b + 1) * size];
+                (start, DMatrix::from_column_slice(n, steps, values))
+            })
+            .collect();
+        let inner = me.inner.clone();
+        let made = long(slf.py(), move |wish| {
+            let one = |(start, matrix): (Start, DMatrix<f64>)| {
+                let controls = Controls::from_matrix(&inner, matrix)?;
+                inner.rollout_from(&start.state(&inner)?, &controls, |_| wish.go_on())
+            };
+            runs.into_par_iter()
+                .map(one)
+                .collect::<hydrograd::Result<Vec<_>>>()
+        })?;
+        Ok(made
+            .into_iter()
+            .map(|rollout| Rollout::new(slf, rollout))
+            .collect())
+    }
+
+    /// The state at coordinates `q` (q_size,) and generalised velocity `v` (v_size,) after `step` steps; what is None is
+    /// where the simulator starts. `mode` is what the scene's controller remembers, `held` (bodies,) whose joints it held in the
+    /// step that led here, by default none.
+    #[pyo3(signature = (q=None, v=None, *, step=0, mode=0, held=None))]
+    fn state(
+        slf: &Bound<'_, Self>,
+        q: Option<&Bound<'_, PyAny>>,
+        v: Option<&Bound<'_, PyAny>>,
+        step: usize,
+        mode: usize,
+        held: Option<Vec<bool>>,
+    ) -> PyResult<State> {
+        let me = slf.get();
+        let bodies = me.inner.system().len();
+        let held = held.unwrap_or_default();
+        if ![0, bodies].contains(&held.len()) {
+            return Err(input(
+                "state: held",
+                format!("{} numbers", held.len()),
+                format!("must be {bodies}, one a body"),
+            ));
+        }
+        let (q0, v0) = me.inner.start();
+        let (q, v) = (row_or("state: q", q, q0)?, row_or("state: v", v, v0)?);
+        let made = short(slf.py(), || me.inner.state(step, &q, &v))?;
+        let state = dynamics::State { held, mode, ..made };
+        Ok(State {
+            simulator: slf.clone().unbind(),
+            state,
+            velocity: v,
+        })
+    }
+
+    /// One step from a state with the controls `u` (control_size,), N and N m: the next state, and the record that has the
+    /// step's derivatives. The steps of a rollout, to the bit.
+    #[pyo3(signature = (state, u=None))]
+    fn step(
+        slf: &Bound<'_, Self>,
+        state: &Bound<'_, State>,
+        u: Option<&Bound<'_, PyAny>>,
+    ) -> PyResult<(State, Record)> {
+        let me = slf.get();
+        let n = me.controls_size();
+        let control = match u {
+            Some(u) => array("step: u", u, &[Dim::Is(n)])?.values.into(),
+            None => DVector::zeros(n),
+        };
+        let from = &state.get().state;
+        let (state, record) = short(slf.py(), || me.inner.step(from, &control))?;
+        let next = State {
+            simulator: slf.clone().unbind(),
+            state,
+            velocity: record.rollout().samples()[1].v.clone(),
+        };
+        Ok((next, Record(Arc::new(record))))
+    }
+
+    /// Added mass of the bodies in the water at the start, (6 n, 6 n), world axes: per body three rows of force per acceleration of
+    /// its origin, then three of torque per angular acceleration; kg, kg m, kg m².
+    fn added_mass<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyArrayDyn<f64>>> {
+        let inner = self.inner.clone();
+        let made = long(py, move |_| inner.added_mass())?;
+        array::matrix(py, &made.matrix)
+    }
+
+    /// The same with other physical parameters, by name as in `parameters`; what isn't named stays. It shares what was
+    /// prepared, so it costs next to nothing.
+    fn with_parameters(&self, changes: HashMap<String, f64>) -> PyResult<Self> {
+        self.changed(|inner| {
+            let mut parameters = inner.parameters().clone();
+            for (name, value) in &changes {
+                parameters.set(name, *value)?;
+            }
+            inner.set_parameters(parameters)
+        })
+    }
+
+    /// The same with another start: coordinates `q` (q_size,) and generalised velocity `v` (v_size,).
+    #[pyo3(signature = (q=None, v=None))]
+    fn with_start(
+        &self,
+        q: Option<&Bound<'_, PyAny>>,
+        v: Option<&Bound<'_, PyAny>>,
+    ) -> PyResult<Self> {
+        let (q0, v0) = self.inner.start();
+        let (q, v) = (
+            row_or("with_start: q", q, q0)?,
+            row_or("with_start: v", v, v0)?,
+        );
+        self.changed(|inner| inner.set_start(q, v))
+    }
+
+    /// The same with a controller of your own in place of the scene's: an object with `act(observation)`, which gives the controls
+    /// (control_size,), and, for gradients, `act_vjp`: see `hydrograd.Policy`. It is called once a step, and once a step of the
+    /// reverse sweep, with the interpreter's lock.
+    pub fn with_policy(&self, policy: &Bound<'_, PyAny>) -> PyResult<Self> {
+        let sizes = (self.controls_size(), self.v_size());
+        let controller = Controller::new(policy, sizes)?;
+        let mut out = self.changed(|inner| {
+            inner.set_policy(Box::new(controller));
+            Ok(())
+        })?;
+        out.policy = Some(policy.clone().unbind());
+        Ok(out)
+    }
+
+    /// The same with other gains of its controller, (gains,).
+    fn with_gains(&self, gains: &Bound<'_, PyAny>) -> PyResult<Self> {
+        if let Some(policy) = &self.policy {
+            let policy = policy.bind(gains.py());
+            return match policy.getattr_opt("with_gains")? {
+                Some(method) => self.with_policy(&method.call1((gains,))?),
+                None => Err(input(
+                    "with_gains",
+                    format!("a controller of type {}", policy.get_type().name()?),
+                    "must have a method with_gains(gains)",
+                )),
+            };
+        }
+        let gains = array::row("with_gains: gains", gains)?;
+        self.changed(|inner| set_gains(inner, &gains))
+    }
+
+    /// Its controller, if that is written in Python.
+    #[getter]
+    fn policy(&self, py: Python<'_>) -> Option<Py<PyAny>> {
+        self.policy.as_ref().map(|p| p.clone_ref(py))
+    }
+
+    /// Gains of its controller, (gains,); none without one.
+    #[getter]
+    fn gains<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyArrayDyn<f64>>> {
+        let gains = self.inner.policy().gains();
+        let n = gains.len();
+        array::to_python(py, gains, &[n])
+    }
+
+    /// The physical parameters by name: density, masses, inertias, drag and contact, SI units.
+    #[getter]
+    fn parameters<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyDict>> {
+        by_name(py, self.inner.parameters())
+    }
+
+    /// Coordinates at the start, (q_size,).
+    #[getter]
+    fn initial_q<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyArrayDyn<f64>>> {
+        let q = self.inner.start().0;
+        array::to_python(py, q.as_slice().to_vec(), &[q.len()])
+    }
+
+    /// Generalised velocity at the start, (v_size,).
+    #[getter]
+    fn initial_v<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyArrayDyn<f64>>> {
+        let v = self.inner.start().1;
+        array::to_python(py, v.as_slice().to_vec(), &[v.len()])
+    }
+
+    /// The scene that it was made from.
+    #[getter]
+    fn scene(&self) -> Scene {
+        Scene(self.scene.clone())
+    }
+
+    /// Time step, s.
+    #[getter]
+    fn dt(&self) -> f64 {
+        self.inner.time_step()
+    }
+
+    /// Number of controls a step.
+    #[getter]
+    fn control_size(&self) -> usize {
+        self.controls_size()
+    }
+
+    /// Number of joint coordinates q.
+    #[getter]
+    fn q_size(&self) -> usize {
+        self.inner.system().tree.coordinates()
+    }
+
+    /// Number of generalised velocities v.
+    #[getter]
+    fn v_size(&self) -> usize {
+        self.inner.system().tree.velocities()
+    }
+
+    /// The bodies' surfaces, as gaps are measured between them, each in its body's frame: vertices (n, 3) in m and faces (m, 3)
+    /// of vertex numbers; None for a body without a shape.
+    fn meshes<'py>(&self, py: Python<'py>) -> PyResult<Vec<Option<Triangles<'py>>>> {
+        let inner = self.inner.clone();
+        let made = long(py, move |_| inner.meshes())?;
+        let meshes = made.iter();
+        meshes
+            .map(|mesh| mesh.as_ref().map(|m| triangles(py, m)).transpose())
+            .collect()
+    }
+
+    /// Names of the bodies, in order.
+    #[getter]
+    fn body_names(&self) -> Vec<String> {
+        self.inner.names()
+    }
+
+    /// Names of the entries of q.
+    #[getter]
+    fn q_names(&self) -> Vec<String> {
+        self.scene.coordinate_labels()
+    }
+
+    /// Names of the entries of v.
+    #[getter]
+    fn v_names(&self) -> Vec<String> {
+        self.scene.velocity_labels()
+    }
+
+    /// The fidelity in use: what was asked for, or what "auto" chose.
+    #[getter]
+    fn fidelity(&self) -> &'static str {
+        self.inner.fidelity().into()
+    }
+
+    /// What computes the coupling: "cpu" or "gpu".
+    #[getter]
+    fn backend(&self) -> &'static str {
+        self.inner.backend().backend_used.into()
+    }
+
+    /// The integrator.
+    #[getter]
+    fn integrator(&self) -> &'static str {
+        self.inner.choices().integrator.into()
+    }
+
+    /// What should be known about the scene, with names and numbers.
+    #[getter]
+    fn warnings(&self) -> Vec<String> {
+        self.inner.warnings().to_vec()
+    }
+
+    fn __repr__(&self) -> String {
+        format!(
+            "Simulator(bodies={:?}, dt={:?} s, fidelity={:?}, integrator={:?})",
+            self.inner.names(),
+            self.dt(),
+            self.fidelity(),
+            self.integrator()
+        )
+    }
+
+    fn __reduce__<'py>(&self, py: Python<'py>) -> PyResult<(Bound<'py, PyAny>, Parts)> {
+        let make = py.import("hydrograd._hydrograd")?.getattr("_simulator")?;
+        let choices = serde_json::to_string(self.inner.choices()).map_err(|e| {
+            input(
+                "simulator: choices",
+                e,
+                "must be numbers that JSON can hold",
+            )
+        })?;
+        let (q, v) = self.inner.start();
+        let list = |x: &DVector<f64>| x.as_slice().to_vec();
+        let policy = self.policy(py);
+        let gains = match policy {
+            Some(_) => Vec::new(),
+            None => self.inner.policy().gains(),
+        };
+        let start = (list(q), list(v), gains);
+        let parameters = self.inner.parameters().to_vec();
+        let scene = self.scene.to_toml().or_raise()?;
+        Ok((
+            make,
+            (
+                scene,
+                choices,
+                self.cache.clone(),
+                parameters,
+                start,
+                policy,
+            ),
+        ))
+    }
+}

@@ -180,3 +180,55 @@ def test_jacobians_of_a_step(sim, controls):
         return after(start, v, u)
 
     close(a[plain][:, np.r_[0:3, 6:9]], columns(placed, q[at]))
+
+
+def test_observables_by_name(sim, controls, seeds):
+    rollout = sim.rollout(controls)
+    assert np.array_equal(rollout.observe("positions"), rollout.positions)
+    assert np.array_equal(rollout.observe("rotations"), rollout.rotations)
+    assert np.array_equal(rollout.observe("velocities"), rollout.velocities)
+    assert np.array_equal(rollout.observe("energy"), rollout.kinetic_energy + rollout.potential_energy)
+    seed = np.random.default_rng(3).normal(size=rollout.positions.shape)
+    one, other = rollout.vjp(positions=seed), rollout.vjp(observables={"positions": seed})
+    assert np.array_equal(one.controls, other.controls)
+
+    spin = rollout.observe("angular_momentum")
+    assert spin.shape == rollout.positions.shape
+    goal = hg.objective.final_observable("angular_momentum", 4, 0.0)
+    assert rollout.value(goal) == spin[-1, 1, 1] ** 2
+    seed = np.zeros(spin.shape)
+    seed[-1, 1, 1] = 2 * spin[-1, 1, 1]
+    found = rollout.vjp(observables={"angular_momentum": seed}).controls
+    close(found, slopes(lambda u: sim.rollout(u).observe("angular_momentum")[-1, 1, 1] ** 2, controls, 1e-4))
+
+    with pytest.raises(hg.InputError, match="angular_momentum"):
+        rollout.observe("spin")
+    with pytest.raises(hg.UnsupportedError, match="no transpose"):
+        rollout.vjp(observables={"energy": np.zeros(len(rollout))})
+    with pytest.raises(hg.InputError, match="angular_momentum"):
+        rollout.vjp(observables={"angular_momentum": np.zeros(3)})
+
+
+def test_springs_and_screws():
+    scene = hg.Scene(fluid=hg.Fluid(density=0.0), gravity=(0, 0, -9.81), time_step=0.01, steps=20)
+    nut = hg.Body(mass=2.0, inertia=(0.2, 0.2, 0.3), name="nut", joint=hg.screw((0, 0, 1), 0.5))
+    assert repr(hg.screw((0, 0, 1), 0.5)) == "screw((0.0, 0.0, 1.0), 0.5)"
+    scene.add(nut)
+    scene.add_force("spring", body="nut", at=np.array([0.1, 0, 0]), to_at=(0, 0, 1), stiffness=5, damping=0.1)
+    sim = hg.Simulator(scene, fidelity="isolated")
+    assert sim.q_names == ["nut.angle"]
+    seed = np.ones((21, 1))
+    found = sim.rollout().vjp(v=seed).parameters
+    for name, step in (("spring 1.stiffness", 1e-3), ("spring 1.damping", 1e-4)):
+
+        def value(x):
+            return sim.with_parameters({name: x}).rollout().v.sum()
+
+        base = sim.parameters[name]
+        slope = (value(base + step) - value(base - step)) / (2 * step)
+        assert found[name] == pytest.approx(slope, rel=1e-6), name
+    assert hg.Scene.from_toml(scene.to_toml()) == scene
+    with pytest.raises(hg.InputError, match="lenght"):
+        scene.add_force("spring", body="nut", stiffness=1.0, lenght=2.0)
+    with pytest.raises(hg.InputError, match="screw: axis"):
+        hg.screw((0, 0), 0.1)

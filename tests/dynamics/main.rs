@@ -6,6 +6,7 @@ mod grasp;
 mod growth;
 mod invariants;
 mod mechanisms;
+mod observables;
 #[cfg(feature = "opt")]
 mod optimize;
 mod resume;

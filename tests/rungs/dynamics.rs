@@ -5,13 +5,14 @@ use super::multibody::tree_displacement;
 use super::tools::{Group, all, groups, vector_along, wavy};
 use hydrograd::adjoint::check::{Outcome, Rung};
 use hydrograd::dynamics::{
-    Drive, Input, Integrator, Linearisation, Owner, Parameters, State, StateBar, StateTangent,
-    StepBar, Stepper, System,
+    Drive, Input, Integrator, Linearisation, Owner, Parameters, Range, State, StateBar,
+    StateTangent, StepBar, Stepper, System,
 };
 use hydrograd::scene::{Body, Drag, DragPart, Fluid, Joint, Motion, Plane, Scene, Shape, Spring};
 use hydrograd::simulate::{Pd, PdAxis};
-use hydrograd::{Settings, Simulator};
-use nalgebra::DVector;
+use hydrograd::{Controls, Settings, Simulator};
+use nalgebra::{DMatrix, DVector};
+use std::ops::ControlFlow;
 use std::sync::OnceLock;
 
 pub fn rungs() -> Vec<Rung> {
@@ -36,6 +37,7 @@ pub fn rungs() -> Vec<Rung> {
         "dynamics::integrator::velocity_euler::Adjoint::vjp" => |c| step(Integrator::VelocityEuler, c),
         "dynamics::integrator::record::LinearisedStep::jvp" => |c| all(INTEGRATORS.map(|i| step_jvp(i, c))),
         "simulate::record::Record::jvp" => record_jvp,
+        "simulate::observable::angular_momentum::AngularMomentum::vjp" => angular_momentum,
     ]
 }
 
@@ -578,6 +580,54 @@ fn step_jvp(integrator: Integrator, c: f64) -> Outcome {
     vector_along(value, (c * DVector::from_vec(all)).as_slice())
 }
 
+/// The usual point, driven joints with the velocity of their motions in the simulator's step number [`STEP`].
+fn moving_point() -> Point {
+    let mut p = point();
+    let time = simulator().time_step() * STEP as f64;
+    for (link, drive) in system().tree.links().iter().zip(&system().drives) {
+        if let Drive::Motion(motions) = drive {
+            for (i, motion) in link.v.clone().zip(motions) {
+                p.v[i] = motion.rate(time);
+            }
+        }
+    }
+    p
+}
+
+/// Read at a state by itself: through its momentum, which the state carries, and directly.
+fn angular_momentum(c: f64) -> Outcome {
+    const NAME: &str = "angular_momentum";
+    let run = |p: &Point| {
+        let mut simulator = simulator().clone();
+        let mut parameters = p.parameters.clone();
+        for entry in p.parameters.table() {
+            if matches!(entry.declared.range, Range::Zero(_)) {
+                parameters.set(&entry.name, 0.0).unwrap();
+            }
+        }
+        simulator.set_parameters(parameters).unwrap();
+        let start = simulator.state(STEP, &p.q, &p.v).unwrap();
+        let none = Controls::zeros(&simulator, 0);
+        let rollout = simulator.rollout_from(&start, &none, |_| ControlFlow::Continue(()));
+        rollout.unwrap()
+    };
+    let p = moving_point();
+    let base = run(&p);
+    let bar = wavy(3 * system().len(), 5.1, 1.0);
+    let mut seed = base.zero_cotangents();
+    let column = DMatrix::from_column_slice(bar.len(), 1, bar.as_slice());
+    seed.observables.insert(NAME.into(), column);
+    let g = base.vjp(&seed).unwrap();
+    let value = |p: &Point| run(p).observe(NAME).unwrap().column(0).dot(&bar);
+    let bar = Bar {
+        q: g.initial.q,
+        v: g.initial.v,
+        u: DVector::zeros(p.u.len()),
+        parameters: g.parameters,
+    };
+    check(false, &value, &p, &bar, c)
+}
+
 /// The same of a simulator's step, in q and v, with a controller.
 fn record_jvp(c: f64) -> Outcome {
     let mut simulator = simulator().clone();
@@ -596,7 +646,7 @@ fn record_jvp(c: f64) -> Outcome {
         velocities: nv,
         axes: axes.collect(),
     }));
-    let p = point();
+    let p = moving_point();
     let u = wavy(nu, 1.8, 3.0);
     let make = |q: &DVector<f64>, v: &DVector<f64>, u: &DVector<f64>| {
         let start = simulator.state(STEP, q, v).unwrap();

@@ -1,7 +1,7 @@
 //! Contact of a scene: which surfaces may touch, at which gap, and how stiffly.
 
 use crate::adjoint::lie::Pose;
-use crate::contact::{ContactPair, Contacts, Geometry};
+use crate::contact::{ContactPair, ContactShape, Contacts};
 use crate::dynamics::{self, ContactModel, Integrator, Regularisation};
 use crate::geometry::Other;
 use crate::scene::{Body, Contact, Scene, Shape};
@@ -48,7 +48,7 @@ pub(super) fn assemble(p: Parts) -> Result<(ContactModel, dynamics::Contact)> {
     let mut shapes = Vec::with_capacity(p.scene.bodies.len());
     for (body, surface) in p.scene.bodies.iter().zip(p.surfaces) {
         shapes.push(match (&body.shape, surface) {
-            (Some(shape), Some(surface)) => Some(geometry(body, shape, surface)?),
+            (Some(shape), Some(surface)) => Some(contact_shape(body, shape, surface)?),
             _ => None,
         });
     }
@@ -63,7 +63,7 @@ pub(super) fn assemble(p: Parts) -> Result<(ContactModel, dynamics::Contact)> {
     let moving = |b: &usize| !p.scene.is_static(*b);
     let bodies = || (0..p.scene.bodies.len()).filter(moving);
     let size = bodies()
-        .filter_map(|b| shapes.shape(b).map(Geometry::radius))
+        .filter_map(|b| shapes.shape(b).map(ContactShape::radius))
         .reduce(f64::min)
         .unwrap_or(1.0);
     let gaps = (shapes.pairs().iter())
@@ -105,11 +105,11 @@ pub(super) fn assemble(p: Parts) -> Result<(ContactModel, dynamics::Contact)> {
 }
 
 /// Shape of a body: by its formula, or a mesh that is convex.
-fn geometry(body: &Body, shape: &Shape, surface: &Surface) -> Result<Geometry> {
+fn contact_shape(body: &Body, shape: &Shape, surface: &Surface) -> Result<ContactShape> {
     let made = match shape {
         // Already placed in its body.
-        mesh if mesh.is_mesh() => Geometry::of_mesh(&surface.mesh, Pose::identity()),
-        _ => Geometry::of_shape(shape, pose(&body.shape_at), Path::new("")),
+        mesh if mesh.is_mesh() => ContactShape::of_mesh(&surface.mesh, Pose::identity()),
+        _ => ContactShape::of_shape(shape, pose(&body.shape_at), Path::new("")),
     };
     made.map_err(|e| Error::Unsupported {
         what: format!("contact of body {:?}", body.name),

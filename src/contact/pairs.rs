@@ -1,16 +1,18 @@
-//! The pairs of surfaces that may touch.
+//! The pairs of surfaces that may come in contact.
 
-use super::geometry::{ContactPoint, Geometry, against_wall, between};
+use super::gaps::{against_wall, between};
+use super::point::ContactPoint;
+use super::shape::ContactShape;
 use crate::Result;
 use crate::adjoint::lie::Pose;
 use crate::geometry::{HalfSpace, Other, Wall};
 
-/// Two surfaces that may touch.
+/// Two surfaces that may come in contact.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct ContactPair {
     /// The body that normals point to.
     pub first: usize,
-    /// What it may touch.
+    /// What it may come in contact with.
     pub second: Other,
 }
 
@@ -24,10 +26,10 @@ impl ContactPair {
     }
 }
 
-/// Shapes of the bodies of a scene, its walls, and which of them may touch.
+/// Shapes of the bodies of a scene, its walls, and which of them may come in contact.
 #[derive(Clone, Debug)]
 pub struct Contacts {
-    shapes: Vec<Option<Geometry>>,
+    shapes: Vec<Option<ContactShape>>,
     walls: Vec<HalfSpace>,
     pairs: Vec<ContactPair>,
 }
@@ -41,7 +43,7 @@ impl Contacts {
     /// # Errors
     /// A wall without a normal.
     pub fn new(
-        shapes: Vec<Option<Geometry>>,
+        shapes: Vec<Option<ContactShape>>,
         walls: &[Wall],
         pairs: &[ContactPair],
     ) -> Result<Self> {
@@ -54,13 +56,13 @@ impl Contacts {
         })
     }
 
-    /// The pairs that may touch.
+    /// The pairs that may come in contact.
     pub fn pairs(&self) -> &[ContactPair] {
         &self.pairs
     }
 
     /// Shape of body `b`, if it has one.
-    pub fn shape(&self, b: usize) -> Option<&Geometry> {
+    pub fn shape(&self, b: usize) -> Option<&ContactShape> {
         self.shapes[b].as_ref()
     }
 

@@ -32,7 +32,7 @@ impl TriMesh {
     /// # Errors
     /// [`Error::Mesh`] with the first problem that [`check_parts`] calls an error: the mesh is empty, has
     /// an index out of range, a vertex that isn't finite, a face without area or given twice, an
-    /// edge without exactly two faces, a face turned against its neighbours, a vertex whose faces fold back
+    /// edge without exactly two faces, a face oriented against its neighbours, a vertex whose faces fold back
     /// on each other, an inward orientation, or several separate pieces.
     pub fn new(
         name: impl Into<String>,

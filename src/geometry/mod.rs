@@ -20,6 +20,8 @@ mod image;
 mod interior;
 mod mass;
 mod mesh;
+#[cfg(test)]
+mod parry;
 mod points;
 mod refine;
 mod remesh;

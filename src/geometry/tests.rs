@@ -9,12 +9,12 @@ fn vector(random: &mut Samples) -> Vec3 {
     Vec3::from(random.vector(1.0))
 }
 
-fn turned(w: [f64; 3], x: [f64; 3]) -> Pose {
+pub(super) fn turned(w: [f64; 3], x: [f64; 3]) -> Pose {
     Pose::new(exp_matrix(&Vec3::from(w)), Vec3::from(x))
 }
 
 /// 192 faces.
-fn cuboid(size: [f64; 3]) -> TriMesh {
+pub(super) fn cuboid(size: [f64; 3]) -> TriMesh {
     let corner = |k: usize| Vec3::from_fn(|i, _| size[i] * (((k >> i) & 1) as f64 - 0.5));
     let sides = [
         [0, 2, 3, 1],
@@ -32,7 +32,7 @@ fn cuboid(size: [f64; 3]) -> TriMesh {
 }
 
 /// The unit ball: a cube's faces on it.
-fn ball() -> TriMesh {
+pub(super) fn ball() -> TriMesh {
     let cube = cuboid([1.0; 3]);
     let vertices = cube.vertices().iter().map(|x| x.normalize()).collect();
     TriMesh::new("ball", vertices, cube.faces().to_vec()).unwrap()

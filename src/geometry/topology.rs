@@ -1,4 +1,4 @@
-//! Which faces meet at which edges, and which way they turn.
+//! Which faces share which edges, and how they are oriented.
 
 /// One passage of a face through an edge.
 #[derive(Clone, Copy, Debug)]
@@ -49,16 +49,16 @@ impl Edges {
 pub(crate) struct Component {
     /// Its faces, ascending.
     pub faces: Vec<usize>,
-    /// The faces turned against the majority, ascending. Not looked for where more than two
-    /// faces meet at an edge: there, no turn is right.
+    /// The faces oriented against the majority, ascending. Not looked for where more than two
+    /// faces share an edge: there, no orientation is right.
     pub flipped: Vec<usize>,
-    /// No choice of turns makes the faces agree.
+    /// No choice of orientations makes the faces agree.
     pub one_sided: bool,
     /// Every edge has exactly two faces.
     pub closed: bool,
 }
 
-/// Splits faces (numbers below `count`) into connected components and compares their turns.
+/// Splits faces (numbers below `count`) into connected components and compares their orientations.
 pub(crate) fn components(
     count: usize,
     present: impl Iterator<Item = usize>,
@@ -82,23 +82,23 @@ pub(crate) fn components(
         }
     }
 
-    let mut turned: Vec<Option<bool>> = vec![None; count];
+    let mut reversed: Vec<Option<bool>> = vec![None; count];
     let mut found = Vec::new();
     for seed in present {
-        if turned[seed].is_some() {
+        if reversed[seed].is_some() {
             continue;
         }
-        turned[seed] = Some(false);
+        reversed[seed] = Some(false);
         let (mut faces, mut one_sided) = (vec![seed], false);
         let mut next = 0;
         while next < faces.len() {
             let face = faces[next];
             next += 1;
             for &(other, clash) in &neighbours[face] {
-                let expected = turned[face].unwrap_or(false) ^ clash;
-                match turned[other] {
+                let expected = reversed[face].unwrap_or(false) ^ clash;
+                match reversed[other] {
                     None => {
-                        turned[other] = Some(expected);
+                        reversed[other] = Some(expected);
                         faces.push(other);
                     }
                     Some(is) => one_sided |= is != expected,
@@ -106,13 +106,13 @@ pub(crate) fn components(
             }
         }
         faces.sort_unstable();
-        let against = faces.iter().filter(|&&f| turned[f] == Some(true)).count();
+        let against = faces.iter().filter(|&&f| reversed[f] == Some(true)).count();
         let minority = 2 * against <= faces.len();
         let manifold = faces.iter().all(|&f| !crowded[f]);
         let flipped = faces
             .iter()
             .copied()
-            .filter(|&f| manifold && turned[f] == Some(minority))
+            .filter(|&f| manifold && reversed[f] == Some(minority))
             .collect();
         found.push(Component {
             closed: faces.iter().all(|&f| !open[f]),

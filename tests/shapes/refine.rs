@@ -224,7 +224,7 @@ fn a_mesh_from_a_file_is_refined_on_its_own_faces() {
     assert!((volume - 1.0 / 6.0).abs() < 1e-15);
     // For contact it is the tetrahedron that it was.
     let pose = hydrograd::adjoint::lie::Pose::identity();
-    let of = |m| hydrograd::contact::geometry::Geometry::of_mesh(m, pose).unwrap();
+    let of = |m| hydrograd::contact::ContactShape::of_mesh(m, pose).unwrap();
     assert!((of(&fine).radius() - of(&base).radius()).abs() < 1e-15);
 }
 

@@ -10,7 +10,7 @@ pub mod lamb;
 mod sphere;
 
 use crate::adjoint::lie::{Mat6, Pose, Vec3, skew};
-use crate::boundary::Response;
+use crate::boundary::response::Response;
 use crate::{Error, Result};
 use confocal::{Confocal, Place};
 use faer::Mat;
@@ -112,12 +112,12 @@ impl ExactBoundary {
 
 /// Twist about the shape's origin, in its frame, of a twist about the body's origin, in its frame.
 fn twist_in_shape(pose: &Pose) -> Mat6 {
-    let turn = pose.rotation.transpose();
+    let rotation = pose.rotation.transpose();
     let mut out = Mat6::zeros();
-    out.fixed_view_mut::<3, 3>(0, 0).copy_from(&turn);
-    out.fixed_view_mut::<3, 3>(3, 3).copy_from(&turn);
+    out.fixed_view_mut::<3, 3>(0, 0).copy_from(&rotation);
+    out.fixed_view_mut::<3, 3>(3, 3).copy_from(&rotation);
     // u + ω × t
-    let lever = -turn * skew(&pose.translation);
+    let lever = -rotation * skew(&pose.translation);
     out.fixed_view_mut::<3, 3>(0, 3).copy_from(&lever);
     out
 }

@@ -12,7 +12,7 @@
 //! 1.2 h is where one source per vertex resolves the flux through a face without the
 //! equations becoming ill-conditioned; 0.7 keeps sources of opposite sides apart.
 //!
-//! At an edge or corner (the surface turns by more than 55°) the flow on one side can't be made
+//! At an edge or corner (the normal turns by more than 55°) the flow on one side can't be made
 //! by sources that serve the other side as well, so a vertex gets one source per smooth
 //! side, below a point moved inwards on that side. A depth given by the user puts one source
 //! under each vertex and checks it against edge length and thickness.
@@ -30,7 +30,7 @@ use rayon::prelude::*;
 const EDGES: f64 = 1.2;
 /// Largest depth in radii of the inner tangent ball.
 const BALL: f64 = 0.7;
-/// Turn of the surface, rad, from which an edge is sharp.
+/// Angle between the normals, rad, from which an edge is sharp.
 const SHARP: f64 = 0.96;
 /// Where a side's source at a sharp edge is: this part of the way from the vertex to the middle of
 /// the side's faces around it.

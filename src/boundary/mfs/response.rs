@@ -4,7 +4,7 @@ use super::{BodyBoundary, Method};
 use crate::Result;
 use crate::adjoint::kernel::{Sources, Write, flux_fill, normal_fill};
 use crate::adjoint::lie::{Mat6, Vec3};
-use crate::boundary::Response;
+use crate::boundary::response::Response;
 use faer::linalg::matmul::matmul;
 use faer::{Accum, Mat, MatRef, Par};
 

@@ -4,7 +4,7 @@ use super::richardson::richardson_of_ratio;
 use super::{PanelBoundary, Richardson, richardson};
 use crate::Result;
 use crate::adjoint::lie::{Mat6, Vec3, Vec6};
-use crate::boundary::Response;
+use crate::boundary::response::Response;
 use faer::Mat;
 
 /// The answer of a fine mesh and, times a factor, its difference from that of a coarse one: see

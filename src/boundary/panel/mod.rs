@@ -58,7 +58,7 @@ pub struct PanelBoundary {
     pub condition: f64,
     /// What the user should know, each with the body's name and its numbers.
     pub warnings: Vec<String>,
-    /// Length of the edges at which the surface turns by more than 55°, m.
+    /// Length of the edges at which the normal turns by more than 55°, m.
     sharp_edges: f64,
     panels: Panels,
     lu: Lu,

@@ -3,7 +3,7 @@
 use super::PanelBoundary;
 use crate::Result;
 use crate::adjoint::lie::{Mat6, Vec3};
-use crate::boundary::Response;
+use crate::boundary::response::Response;
 use faer::{Mat, MatRef};
 
 impl Response for PanelBoundary {

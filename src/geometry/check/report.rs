@@ -33,7 +33,7 @@ pub enum Kind {
     NonManifoldEdge,
     /// An edge with one face.
     OpenEdge,
-    /// A face turned against its neighbours.
+    /// A face oriented against its neighbours.
     Orientation,
     /// A surface with one side only.
     OneSided,

@@ -282,7 +282,7 @@ impl<'a> Checker<'a> {
         }
     }
 
-    /// Edges, turns and pieces; returns the number of pieces.
+    /// Edges, orientations and pieces; returns the number of pieces.
     fn connections(&mut self) -> usize {
         let edges = topology::edges(self.connected.iter().map(|&f| (f, self.faces[f])));
         let complete = self.indexed.len() == self.faces.len();
@@ -291,7 +291,7 @@ impl<'a> Checker<'a> {
         }
         self.edges_with(&edges, Kind::NonManifoldEdge);
         let pieces = topology::components(self.faces.len(), self.connected.iter().copied(), &edges);
-        self.turns(&pieces);
+        self.orientations(&pieces);
         self.insides(&pieces);
         if let [_, second, ..] = pieces.as_slice() {
             let f = second.faces[0];
@@ -350,7 +350,7 @@ impl<'a> Checker<'a> {
         );
     }
 
-    fn turns(&mut self, pieces: &[Component]) {
+    fn orientations(&mut self, pieces: &[Component]) {
         let mut flipped = Vec::new();
         let mut one_sided = Vec::new();
         for piece in pieces {

@@ -13,7 +13,7 @@ use std::f64::consts::{PI, TAU};
 
 /// Size of triangles at a sharp edge, as a part of that at the middle of a side.
 const EDGE: f64 = 0.6;
-/// Turn of the profile, rad, from which a corner is a sharp edge of the prism.
+/// Angle between sides of the profile, rad, from which a corner is a sharp edge of the prism.
 const SHARP: f64 = 0.5;
 /// Longest cells beside a narrow side, in its widths.
 const STRETCH: f64 = 3.0;
@@ -111,7 +111,7 @@ impl Solid {
         let perimeter: f64 = widths.iter().sum();
         Self {
             sharp: (0..n)
-                .map(|k| turn(&edge(k + n - 1), &edge(k)) > SHARP)
+                .map(|k| angle(&edge(k + n - 1), &edge(k)) > SHARP)
                 .collect(),
             inradius: 2.0 * signed_area(&corners) / perimeter,
             widths,
@@ -324,11 +324,11 @@ fn divide(length: f64, size: impl Fn(f64) -> f64) -> Vec<f64> {
 }
 
 /// Angle from one direction to the next, rad, −π to π.
-fn turn(a: &Point, b: &Point) -> f64 {
+fn angle(a: &Point, b: &Point) -> f64 {
     a.perp(b).atan2(a.dot(b))
 }
 
-/// Least turn of a corner, rad, and least part that an edge is of the longest.
+/// Least angle of a corner, rad, and least part that an edge is of the longest.
 const LEAST: f64 = 1e-9;
 
 /// Whether a profile can be: finite corners of a convex polygon without crossings, in either
@@ -371,32 +371,32 @@ pub(in crate::shape) fn check_profile(profile: &[[f64; 2]], place: &str) -> Resu
         let remedy = format!("it is the same as profile[{k}]: give each corner once");
         return corner(next, remedy);
     }
-    let turns: Vec<f64> = (0..n).map(|k| turn(&edge(k + n - 1), &edge(k))).collect();
-    if let Some(k) = turns.iter().position(|t| t.abs() <= LEAST) {
+    let angles: Vec<f64> = (0..n).map(|k| angle(&edge(k + n - 1), &edge(k))).collect();
+    if let Some(k) = angles.iter().position(|t| t.abs() <= LEAST) {
         let remedy = "it lies on the line between its neighbours: leave it out";
         return corner(k, remedy.into());
     }
-    if let Some(k) = turns.iter().position(|t| PI - t.abs() <= LEAST) {
+    if let Some(k) = angles.iter().position(|t| PI - t.abs() <= LEAST) {
         let remedy = "the profile turns back on itself there: give it an area";
         return corner(k, remedy.into());
     }
     // The way that most corners turn is right; the others are dents.
-    let left = turns.iter().filter(|t| **t > 0.0).count();
+    let left = angles.iter().filter(|t| **t > 0.0).count();
     let way = if 2 * left == n {
-        turns.iter().sum::<f64>().signum()
+        angles.iter().sum::<f64>().signum()
     } else if 2 * left > n {
         1.0
     } else {
         -1.0
     };
-    if let Some(k) = turns.iter().position(|t| t * way < 0.0) {
+    if let Some(k) = angles.iter().position(|t| t * way < 0.0) {
         let remedy = "the profile bends inwards or crosses itself there, and must be convex: correct \
              the corner, or build the body from several convex ones";
         return corner(k, remedy.into());
     }
     // Once around and no more; the first corner at which it has gone farther.
     let mut sum = 0.0;
-    for (k, t) in turns.iter().enumerate() {
+    for (k, t) in angles.iter().enumerate() {
         sum += t.abs();
         if sum > TAU + 1e-6 {
             let remedy = "by this corner the profile has gone around more than once, so it crosses \

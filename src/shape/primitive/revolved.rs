@@ -2,7 +2,7 @@
 //!
 //! Ends: ring k (from the pole) has s·k vertices, so triangles stay near-equilateral down to the
 //! pole and no fan of slivers appears; s = 6 suits a flat disc, s = 4 a hemisphere. Sides: an
-//! even number of bands between rings that are turned by half a step in turn.
+//! even number of bands between rings that are rotated by half a step one after the other.
 
 use super::layout::{Parts, misfit};
 use hydrograd_adjoint::lie::Vec3;
@@ -82,8 +82,8 @@ fn revolve(
     let mut vertices = Vec::new();
     let mut faces = Vec::new();
     let around = sectors * rings;
-    let direction = |turn: f64| {
-        let (sin, cos) = (TAU * turn).sin_cos();
+    let direction = |revolution: f64| {
+        let (sin, cos) = (TAU * revolution).sin_cos();
         Vec3::new(cos, sin, 0.0)
     };
 
@@ -92,8 +92,8 @@ fn revolve(
         let z = length * (j as f64 - (bands / 2) as f64) / bands as f64;
         let shift = if j % 2 == 0 { 0.0 } else { 0.5 };
         for i in 0..around {
-            let turn = (i as f64 + shift) / around as f64;
-            vertices.push(radius * direction(turn) + Vec3::new(0.0, 0.0, z));
+            let revolution = (i as f64 + shift) / around as f64;
+            vertices.push(radius * direction(revolution) + Vec3::new(0.0, 0.0, z));
         }
     }
     for j in 0..bands {
@@ -113,8 +113,8 @@ fn revolve(
     for top in [false, true] {
         let up = if top { 1.0 } else { -1.0 };
         let rim = if top { bands * around } else { 0 };
-        let mut push = |r: f64, h: f64, turn: f64| {
-            vertices.push(r * direction(turn) + Vec3::new(0.0, 0.0, up * (length / 2.0 + h)));
+        let mut push = |r: f64, h: f64, revolution: f64| {
+            vertices.push(r * direction(revolution) + Vec3::new(0.0, 0.0, up * (length / 2.0 + h)));
             vertices.len() - 1
         };
         // First vertex of each ring; the last ring is the rim of the side.

@@ -58,9 +58,9 @@ fn meshes_are_taken_by_their_flat_faces_and_refused_if_not_convex() {
     let shape = Shape::cuboid([0.3, 0.2, 0.4]);
     let mesh = build(&shape, Path::new("."), Some(400)).unwrap();
     let offset = turned([0.2, 0.5, -0.3], [0.1, 0.2, 0.3]);
-    let from_mesh = Geometry::of_mesh(&mesh, offset).unwrap();
-    let exact = Geometry::of_shape(&shape, offset, Path::new(".")).unwrap();
-    let wall = |g: &Geometry| {
+    let from_mesh = ContactShape::of_mesh(&mesh, offset).unwrap();
+    let exact = ContactShape::of_shape(&shape, offset, Path::new(".")).unwrap();
+    let wall = |g: &ContactShape| {
         let mut heights: Vec<f64> = against_wall(
             g,
             &HalfSpace::new(&Vec3::zeros(), &Vec3::new(0.2, 0.5, 1.0)).unwrap(),
@@ -79,7 +79,7 @@ fn meshes_are_taken_by_their_flat_faces_and_refused_if_not_convex() {
     assert!(ours.iter().zip(&theirs).all(|(x, y)| (x - y).abs() < 1e-14));
 
     let round = build(&Shape::sphere(0.1), Path::new("."), None).unwrap();
-    let round = Geometry::of_mesh(&round, Pose::identity()).unwrap();
+    let round = ContactShape::of_mesh(&round, Pose::identity()).unwrap();
     let points = between(&round, &exact, &Pose::identity(), &Pose::identity(), 0.01).unwrap();
     assert!(points.iter().all(is_finite));
 
@@ -93,7 +93,7 @@ fn meshes_are_taken_by_their_flat_faces_and_refused_if_not_convex() {
         })
         .collect();
     let dented = TriMesh::new("dented", vertices, mesh.faces().to_vec()).unwrap();
-    let error = Geometry::of_mesh(&dented, Pose::identity()).unwrap_err();
+    let error = ContactShape::of_mesh(&dented, Pose::identity()).unwrap_err();
     let said = error.to_string();
     assert!(matches!(error, Error::Unsupported { .. }), "{said}");
     assert!(

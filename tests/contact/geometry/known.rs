@@ -17,7 +17,7 @@ fn balls_and_walls_have_known_gaps() {
             .is_empty()
     );
 
-    let floor = |g: &Geometry, pose: &Pose| {
+    let floor = |g: &ContactShape, pose: &Pose| {
         let plane = HalfSpace::new(&Vec3::zeros(), &(2.0 * Vec3::z())).unwrap();
         against_wall(g, &plane, pose, 0.1).unwrap()
     };
@@ -95,7 +95,7 @@ fn boxes_lie_on_boxes_at_their_corners_and_crossings() {
 fn an_ellipsoid_meets_faces_edges_and_corners_of_a_prism_as_its_distance_says() {
     let (coin, prism) = (plain(&Shape::ellipsoid([0.2, 0.05, 0.2])), plain(&wedge()));
     let rest = Pose::identity();
-    let on = |g: &Geometry, pose: &Pose| {
+    let on = |g: &ContactShape, pose: &Pose| {
         let points = between(g, &prism, pose, &rest, 0.05).unwrap();
         assert_eq!(points.len(), 1, "{points:#?}");
         points[0].clone()

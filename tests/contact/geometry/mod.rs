@@ -9,7 +9,7 @@ mod smooth;
 
 use hydrograd::adjoint::lie::{Mat3, Pose, Vec3, Vec6, exp_matrix, point_velocity};
 use hydrograd::adjoint::sample::Samples;
-use hydrograd::contact::geometry::{ContactPoint, Geometry, against_wall, between};
+use hydrograd::contact::{ContactPoint, ContactShape, against_wall, between};
 use hydrograd::geometry::HalfSpace;
 use hydrograd::shape::{TriMesh, build};
 use hydrograd::{Error, Shape};
@@ -52,12 +52,12 @@ fn cylinder() -> Shape {
     Shape::cylinder(0.15, 0.3)
 }
 
-fn plain(shape: &Shape) -> Geometry {
-    Geometry::of_shape(shape, Pose::identity(), Path::new(".")).unwrap()
+fn plain(shape: &Shape) -> ContactShape {
+    ContactShape::of_shape(shape, Pose::identity(), Path::new(".")).unwrap()
 }
 
-fn offset(shape: &Shape, offset: Pose) -> Geometry {
-    Geometry::of_shape(shape, offset, Path::new(".")).unwrap()
+fn offset(shape: &Shape, offset: Pose) -> ContactShape {
+    ContactShape::of_shape(shape, offset, Path::new(".")).unwrap()
 }
 
 fn at(x: f64, y: f64, z: f64) -> Pose {
@@ -102,7 +102,7 @@ fn every_kind() -> Vec<Shape> {
 }
 
 /// Moves `a` along `away` from where the centres meet until the smallest gap is `gap`.
-fn approach(a: &Geometry, b: &Geometry, from: &Pose, rest: &Pose, away: &Vec3, gap: f64) -> Pose {
+fn approach(a: &ContactShape, b: &ContactShape, from: &Pose, rest: &Pose, away: &Vec3, gap: f64) -> Pose {
     let meet = b.ball_at(rest).center - a.ball_at(from).center + from.translation;
     let moved = |t: f64| Pose::new(from.rotation, meet + t * away);
     let (mut low, mut high) = (0.0, 2.0 * (a.radius() + b.radius()) + 2.0);

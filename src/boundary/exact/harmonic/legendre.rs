@@ -14,7 +14,7 @@ pub(super) struct Legendre {
     u: f64,
     s: f64,
     /// cos mφ and sin mφ, with the norm's 1/√π or 1/√(2π).
-    turns: Vec<[f64; 2]>,
+    azimuthal: Vec<[f64; 2]>,
     /// P̄_n^m of the degree reached and of the one before.
     now: Vec<f64>,
     before: Vec<f64>,
@@ -44,18 +44,21 @@ impl Legendre {
     pub fn new([u, v, w]: [f64; 3], most: usize) -> Self {
         let s = v.hypot(w);
         let (cos, sin) = if s > 0.0 { (v / s, w / s) } else { (1.0, 0.0) };
-        let mut turns = vec![[(0.5 / PI).sqrt(), 0.0]];
-        let mut turn = [1.0 / PI.sqrt(), 0.0];
+        let mut azimuthal = vec![[(0.5 / PI).sqrt(), 0.0]];
+        let mut multiple = [1.0 / PI.sqrt(), 0.0];
         for _ in 0..most {
-            turn = [turn[0] * cos - turn[1] * sin, turn[0] * sin + turn[1] * cos];
-            turns.push(turn);
+            multiple = [
+                multiple[0] * cos - multiple[1] * sin,
+                multiple[0] * sin + multiple[1] * cos,
+            ];
+            azimuthal.push(multiple);
         }
         let mut now = vec![0.0; most + 1];
         now[0] = 0.5f64.sqrt();
         Self {
             u,
             s,
-            turns,
+            azimuthal,
             now,
             before: vec![0.0; most + 1],
             degree: 0,
@@ -79,7 +82,7 @@ impl Legendre {
 
     /// Y_{nm} of the degree reached.
     pub fn value(&self, m: usize, sine: bool) -> f64 {
-        self.now[m] * self.turns[m][usize::from(sine)]
+        self.now[m] * self.azimuthal[m][usize::from(sine)]
     }
 }
 

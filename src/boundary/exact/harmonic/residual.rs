@@ -19,12 +19,12 @@ pub(super) fn octant(count: usize) -> Vec<Vec3> {
     const PLASTIC: f64 = 1.324_717_957_244_746;
     let spread = (0..count).map(|k| {
         let k = k as f64 + 0.5;
-        let (u, turn) = (
+        let (u, azimuth) = (
             (k / PLASTIC) % 1.0,
             FRAC_PI_2 * ((k / (PLASTIC * PLASTIC)) % 1.0),
         );
         let s = (1.0 - u * u).sqrt();
-        Vec3::new(s * turn.cos(), s * turn.sin(), u)
+        Vec3::new(s * azimuth.cos(), s * azimuth.sin(), u)
     });
     [Vec3::x(), Vec3::y(), Vec3::z()]
         .into_iter()
@@ -100,8 +100,8 @@ fn around(centre: &Vec3, width: f64) -> Vec<(Vec3, f64)> {
         let angle = width * (k * s).sinh();
         let slope = width * k * (k * s).cosh() / RINGS as f64;
         for i in 0..AROUND {
-            let turn = TAU * (i as f64 + 0.5 * (ring % 2) as f64 + 0.25) / AROUND as f64;
-            let d = centre * angle.cos() + (u * turn.cos() + w * turn.sin()) * angle.sin();
+            let azimuth = TAU * (i as f64 + 0.5 * (ring % 2) as f64 + 0.25) / AROUND as f64;
+            let d = centre * angle.cos() + (u * azimuth.cos() + w * azimuth.sin()) * angle.sin();
             out.push((d, angle.sin() * slope * TAU / AROUND as f64));
         }
     }

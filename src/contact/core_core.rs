@@ -4,11 +4,12 @@
 //! gap n · u, nearest points at s = −u · (e_B × n)/(n · c) and t = −u · (e_A × n)/(n · c).
 
 use super::core::{Core, Edge};
-use super::point::{ContactPoint, Rows3, Slopes, across, carry, turn};
+use super::motion::{Rows3, across, carry, rotate};
+use super::point::{ContactPoint, Slopes};
 use hydrograd_adjoint::lie::{Pose, Vec3, Vec6, skew};
 
-/// Sine of the angle between two edges below which they don't touch across one another; the weight
-/// grows from there to 1 at three times this. Nearly parallel edges touch with their corners.
+/// Sine of the angle between two edges below which they have no contact point across one another; the
+/// weight grows from there to 1 at three times this. Nearly parallel edges have theirs at their corners.
 pub const PARALLEL: f64 = 0.02;
 /// Share of the shorter edge over which a crossing fades out towards an end; at least as long as
 /// the overlap is deep, for less than that from the end the corner is the way out.
@@ -17,7 +18,7 @@ const END: f64 = 0.02;
 /// the crossing has faded out.
 const LEAVE: f64 = 0.05;
 /// Share of the thinner body's thickness at which an overlap of edges has faded out (from half of
-/// it): deeper ones are of far sides, not of those that touch.
+/// it): deeper ones are of far sides, not of those in contact.
 const DEPTH: f64 = 0.5;
 
 /// All points with a gap below `reach`.
@@ -94,12 +95,6 @@ fn placed(a: &Core, a_at: &Pose, b: &Core, b_at: &Pose, beside: f64) -> Vec<Edge
     a.edges.iter().filter(near).map(place).collect()
 }
 
-impl Edge {
-    fn middle(&self) -> Vec3 {
-        self.from + 0.5 * self.length * self.along
-    }
-}
-
 /// A weight with its slope; a product of such.
 struct Weight {
     value: f64,
@@ -148,8 +143,8 @@ fn crossing(a: &Edge, b: &Edge, radii: [f64; 2], depth: f64) -> Option<ContactPo
     }
 
     // With dc = (ω × e_A) × e_B: dn = P dc (n · c)⁻¹, d(n · c) = n · dc.
-    let a_turn = turn(&a.along);
-    let cross_slope = -skew(&b.along) * a_turn;
+    let a_rotation = rotate(&a.along);
+    let cross_slope = -skew(&b.along) * a_rotation;
     let along_slope = cross_slope.tr_mul(&normal);
     let normal_slope = across(&normal) * cross_slope / along;
     let start = carry(&a.from);
@@ -157,7 +152,7 @@ fn crossing(a: &Edge, b: &Edge, radii: [f64; 2], depth: f64) -> Option<ContactPo
         -(start.tr_mul(&b_side) + normal_slope.tr_mul(&u.cross(&b.along)) + s * along_slope)
             / along;
     let t_slope = -(start.tr_mul(&a_side)
-        + a_turn.tr_mul(&normal.cross(&u))
+        + a_rotation.tr_mul(&normal.cross(&u))
         + normal_slope.tr_mul(&u.cross(&a.along))
         + t * along_slope)
         / along;
@@ -181,7 +176,7 @@ fn crossing(a: &Edge, b: &Edge, radii: [f64; 2], depth: f64) -> Option<ContactPo
         weight.fade(x / width, &((slope - x / width * width_slope) / width));
     }
     for d in a.inward.iter().flatten() {
-        let slope = normal_slope.tr_mul(d) + turn(d).tr_mul(&normal);
+        let slope = normal_slope.tr_mul(d) + rotate(d).tr_mul(&normal);
         weight.fade(1.0 + normal.dot(d) / LEAVE, &(slope / LEAVE));
     }
     for d in b.inward.iter().flatten() {

@@ -1,11 +1,8 @@
 //! The point of a contact and how it moves.
 
 use super::field::Field;
-use hydrograd_adjoint::lie::{Mat3, Vec3, Vec6, skew};
-use nalgebra::SMatrix;
-
-/// Slope of a three-vector along a spatial displacement (m/m, then m/rad; or 1/m, 1/rad).
-pub type Rows3 = SMatrix<f64, 3, 6>;
+use super::motion::{Rows3, carry, rotate};
+use hydrograd_adjoint::lie::{Vec3, Vec6};
 
 /// One place where two surfaces are near.
 #[derive(Clone, Debug, PartialEq)]
@@ -38,29 +35,6 @@ pub struct Slopes {
     pub normal: Rows3,
     /// Of the position: m/m, m/rad.
     pub position: Rows3,
-}
-
-/// Velocity of the material point at `x` along a spatial displacement, `u + ω × x`.
-pub(super) fn carry(x: &Vec3) -> Rows3 {
-    columns(&Mat3::identity(), &-skew(x))
-}
-
-/// Turning of a direction `v` that moves with the body, `ω × v`.
-pub(super) fn turn(v: &Vec3) -> Rows3 {
-    columns(&Mat3::zeros(), &-skew(v))
-}
-
-/// From the parts along translation and rotation.
-pub(super) fn columns(translation: &Mat3, rotation: &Mat3) -> Rows3 {
-    let mut out = Rows3::zeros();
-    out.fixed_columns_mut::<3>(0).copy_from(translation);
-    out.fixed_columns_mut::<3>(3).copy_from(rotation);
-    out
-}
-
-/// `I − n nᵀ`.
-pub(super) fn across(n: &Vec3) -> Mat3 {
-    Mat3::identity() - n * n.transpose()
 }
 
 impl ContactPoint {
@@ -99,7 +73,7 @@ impl ContactPoint {
             slopes: Slopes {
                 gap: -self.slopes.gap,
                 weight: -self.slopes.weight,
-                normal: self.slopes.normal - turn(&self.normal),
+                normal: self.slopes.normal - rotate(&self.normal),
                 position: carry(&self.position) - self.slopes.position,
             },
         }

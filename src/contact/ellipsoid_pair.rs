@@ -9,9 +9,9 @@
 //! J. W. Perram, M. S. Wertheim, "Statistical mechanics of hard ellipsoids I", J. Comput. Phys. 58
 //! (1985) 409: the largest of λ(1−λ) dᵀ ((1−λ) Σ_A + λ Σ_B)⁻¹ d and its common normal.
 
-use super::ellipsoid::{Ellipsoid, advance};
-use super::field::perpendicular;
-use super::point::{ContactPoint, Slopes, columns};
+use super::ellipsoid::Ellipsoid;
+use super::motion::{advance, columns, perpendicular};
+use super::point::{ContactPoint, Slopes};
 use crate::error::{Error, Result};
 use hydrograd_adjoint::lie::{Mat3, Pose, Vec3, Vec6, skew};
 use nalgebra::{Matrix2, Matrix3x2, SymmetricEigen, Vector2};
@@ -86,21 +86,21 @@ pub(super) fn contact(
         }
         let mut risen = None;
         for halving in 0..50 {
-            let turned = (normal + basis * step * 0.5f64.powi(halving)).normalize();
-            let there = height(&turned);
+            let tilted = (normal + basis * step * 0.5f64.powi(halving)).normalize();
+            let there = height(&tilted);
             if there.value > at.value {
-                risen = Some((turned, there));
+                risen = Some((tilted, there));
                 break;
             }
             // A step so small that f can't tell: Newton's own residual decides.
-            let tangent = tangents(&turned).tr_mul(&there.gradient).norm() / size;
+            let tangent = tangents(&tilted).tr_mul(&there.gradient).norm() / size;
             if length < 1e-6 && least > 0.0 && tangent < residual {
-                risen = Some((turned, there));
+                risen = Some((tilted, there));
                 break;
             }
         }
         match risen {
-            Some((turned, there)) => (normal, at) = (turned, there),
+            Some((tilted, there)) => (normal, at) = (tilted, there),
             None => break,
         }
     }
@@ -129,9 +129,9 @@ fn point(normal: &Vec3, at: &Height, size: f64) -> ContactPoint {
         inverse += direction * direction.transpose() / value.max(FLOOR * size);
     }
     let carried = columns(&Mat3::identity(), &(-skew(a) - spread_a * skew(normal)));
-    let turning = basis * inverse * basis.transpose() * carried;
-    let first = carried - spread_a * turning;
-    let second = spread_b * turning;
+    let normal_slope = basis * inverse * basis.transpose() * carried;
+    let first = carried - spread_a * normal_slope;
+    let second = spread_b * normal_slope;
     ContactPoint {
         gap: at.value,
         weight: 1.0,
@@ -140,7 +140,7 @@ fn point(normal: &Vec3, at: &Height, size: f64) -> ContactPoint {
         slopes: Slopes {
             gap: advance(normal, a),
             weight: Vec6::zeros(),
-            normal: turning,
+            normal: normal_slope,
             position: 0.5 * (first + second),
         },
     }

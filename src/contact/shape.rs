@@ -1,4 +1,4 @@
-//! What a body is for contact.
+//! The contact shape of a body.
 
 use super::core::Core;
 use super::ellipsoid::Ellipsoid;
@@ -17,8 +17,8 @@ pub const CYLINDER_SIDES: usize = 48;
 /// What a body is for contact: a ball, a capsule, an ellipsoid or a convex polyhedron, placed in
 /// the body's frame.
 #[derive(Clone, Debug)]
-pub struct Geometry {
-    pub(super) form: Form,
+pub struct ContactShape {
+    pub(super) solid: Solid,
     /// Frame of the shape to frame of the body.
     pub(super) offset: Pose,
     /// A ball around it, frame of the shape.
@@ -26,12 +26,12 @@ pub struct Geometry {
 }
 
 #[derive(Clone, Debug)]
-pub(super) enum Form {
+pub(super) enum Solid {
     Ellipsoid(Ellipsoid),
     Core(Core),
 }
 
-impl Geometry {
+impl ContactShape {
     /// That of a shape with the pose `offset` in its body (shape to body). Spheres, capsules and
     /// ellipsoids are exact, whatever number of faces the shape asks for; a cylinder is a
     /// polyhedron of [`CYLINDER_SIDES`] sides. Mesh files are relative to `base_dir`.
@@ -42,20 +42,20 @@ impl Geometry {
     pub fn of_shape(shape: &Shape, offset: Pose, base_dir: &Path) -> Result<Self> {
         let name = shape::shape_name(shape);
         shape::validate(shape, &name)?;
-        let form = match shape {
-            Shape::Sphere { radius, .. } => Form::Core(Core::ball(*radius)),
-            Shape::Capsule { radius, length, .. } => Form::Core(Core::capsule(*radius, *length)),
-            Shape::Ellipsoid { semi_axes, .. } => Form::Ellipsoid(Ellipsoid {
+        let solid = match shape {
+            Shape::Sphere { radius, .. } => Solid::Core(Core::ball(*radius)),
+            Shape::Capsule { radius, length, .. } => Solid::Core(Core::capsule(*radius, *length)),
+            Shape::Ellipsoid { semi_axes, .. } => Solid::Ellipsoid(Ellipsoid {
                 semi_axes: Vec3::from(*semi_axes),
             }),
             Shape::Box { size, .. } => {
                 let [x, y, z] = size.map(|l| 0.5 * l);
                 let profile = [[-y, -z], [y, -z], [y, z], [-y, z]];
-                Form::Core(extrude(&name, &profile, x, along_x)?)
+                Solid::Core(extrude(&name, &profile, x, along_x)?)
             }
             Shape::Prism {
                 profile, length, ..
-            } => Form::Core(extrude(&name, &corners_of(profile), 0.5 * length, along_x)?),
+            } => Solid::Core(extrude(&name, &corners_of(profile), 0.5 * length, along_x)?),
             Shape::Cylinder { radius, length, .. } => {
                 let rim = (0..CYLINDER_SIDES).map(|k| {
                     let (sin, cos) = (TAU * k as f64 / CYLINDER_SIDES as f64).sin_cos();
@@ -63,13 +63,13 @@ impl Geometry {
                 });
                 let rim: Vec<_> = rim.collect();
                 let along_z = |z: f64, [x, y]: [f64; 2]| Vec3::new(x, y, z);
-                Form::Core(extrude(&name, &rim, 0.5 * length, along_z)?)
+                Solid::Core(extrude(&name, &rim, 0.5 * length, along_z)?)
             }
             Shape::Mesh { .. } | Shape::Triangles { .. } => {
                 return Self::of_mesh(&shape::build(shape, base_dir, None)?, offset);
             }
         };
-        Ok(Self::new(form, offset))
+        Ok(Self::new(solid, offset))
     }
 
     /// That of a convex mesh with the pose `offset` in its body (mesh to body). Triangles that lie
@@ -82,16 +82,16 @@ impl Geometry {
     pub fn of_mesh(mesh: &TriMesh, offset: Pose) -> Result<Self> {
         let (corners, loops) = facets(mesh)?;
         let core = Core::polyhedron(mesh.name(), corners, &loops)?;
-        Ok(Self::new(Form::Core(core), offset))
+        Ok(Self::new(Solid::Core(core), offset))
     }
 
-    fn new(form: Form, offset: Pose) -> Self {
-        let ball = match &form {
-            Form::Ellipsoid(e) => Ball {
+    fn new(solid: Solid, offset: Pose) -> Self {
+        let ball = match &solid {
+            Solid::Ellipsoid(e) => Ball {
                 center: Vec3::zeros(),
                 radius: e.semi_axes.max(),
             },
-            Form::Core(core) => {
+            Solid::Core(core) => {
                 let ball = Ball::around(core.corners.iter());
                 Ball {
                     radius: ball.radius + core.radius,
@@ -99,7 +99,11 @@ impl Geometry {
                 }
             }
         };
-        Self { form, offset, ball }
+        Self {
+            solid,
+            offset,
+            ball,
+        }
     }
 
     /// A ball around the body, world frame, for the pose of the body.

@@ -17,7 +17,7 @@ const MOST: usize = 20_000;
 /// outside.
 ///
 /// # Errors
-/// As [`Geometry::of_mesh`](super::Geometry::of_mesh).
+/// As [`ContactShape::of_mesh`](super::ContactShape::of_mesh).
 pub(super) fn facets(mesh: &TriMesh) -> Result<(Vec<Vec3>, Vec<Vec<usize>>)> {
     let count = mesh.faces().len();
     if count > MOST {

@@ -1,7 +1,8 @@
 //! Corners, edges and faces, with a radius about them: balls, capsules and convex polyhedra.
 
 use super::field::Field;
-use super::point::{ContactPoint, carry};
+use super::motion::carry;
+use super::point::ContactPoint;
 use crate::error::{Error, Result};
 use crate::geometry::HalfSpace;
 use hydrograd_adjoint::lie::{Pose, Vec3};
@@ -54,6 +55,12 @@ impl Face {
         self.sides
             .iter()
             .all(|(from, inward)| (p - from).dot(inward) >= -slack)
+    }
+}
+
+impl Edge {
+    pub fn middle(&self) -> Vec3 {
+        self.from + 0.5 * self.length * self.along
     }
 }
 

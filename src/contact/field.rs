@@ -1,6 +1,6 @@
 //! Signed distance of a point, with its gradient and second derivative.
 
-use super::point::across;
+use super::motion::{across, perpendicular};
 use hydrograd_adjoint::lie::{Mat3, Vec3};
 
 /// Signed distance from a surface at a point.
@@ -50,9 +50,4 @@ impl Field {
             hessian: rotation * self.hessian * rotation.transpose(),
         }
     }
-}
-
-/// A unit vector across a unit vector.
-pub(super) fn perpendicular(axis: &Vec3) -> Vec3 {
-    axis.cross(&Vec3::ith(axis.iamin(), 1.0)).normalize()
 }

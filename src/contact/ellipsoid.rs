@@ -5,9 +5,10 @@
 //! scalar equation for the nearest point and the bracket of its root.
 
 use super::field::Field;
-use super::point::{ContactPoint, Rows3, across, carry, columns};
+use super::motion::{Rows3, across, carry, columns};
+use super::point::ContactPoint;
 use crate::geometry::HalfSpace;
-use hydrograd_adjoint::lie::{Mat3, Pose, Vec3, Vec6, skew};
+use hydrograd_adjoint::lie::{Mat3, Pose, Vec3, skew};
 
 /// Rounds of Newton's method; from where it starts it takes about six.
 const ROUNDS: usize = 100;
@@ -192,9 +193,4 @@ impl Support {
     pub fn motion(&self, normal: &Vec3) -> Rows3 {
         carry(&self.point) - columns(&Mat3::zeros(), &(self.spread * skew(normal)))
     }
-}
-
-/// The row `normal · (u + ω × x)`.
-pub(super) fn advance(normal: &Vec3, x: &Vec3) -> Vec6 {
-    carry(x).tr_mul(normal)
 }

@@ -10,7 +10,8 @@
 
 use super::core::{Core, Face};
 use super::ellipsoid::{Ellipsoid, Lowest};
-use super::point::{ContactPoint, Rows3, carry, turn};
+use super::motion::{Rows3, carry, rotate};
+use super::point::ContactPoint;
 use crate::geometry::HalfSpace;
 use hydrograd_adjoint::lie::{Pose, Vec3};
 
@@ -110,11 +111,11 @@ pub(super) fn contact(
 /// zero: eᵀ H (dp + e ds) + n · (ω × e) = 0. `still` is the point at `x` without sliding.
 fn sliding(still: &ContactPoint, x: &Vec3, along: &Vec3) -> Rows3 {
     let carried = carry(x);
-    let turned = still.slopes.normal.tr_mul(along) + turn(along).tr_mul(&still.normal);
+    let rotated = still.slopes.normal.tr_mul(along) + rotate(along).tr_mul(&still.normal);
     // H e from its columns: along the translation the normal's slope is H.
     let curvature = along.dot(&(still.slopes.normal.fixed_columns::<3>(0) * along));
     if curvature > 0.0 {
-        carried - along * (turned / curvature).transpose()
+        carried - along * (rotated / curvature).transpose()
     } else {
         carried
     }

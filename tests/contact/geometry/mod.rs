@@ -102,7 +102,14 @@ fn every_kind() -> Vec<Shape> {
 }
 
 /// Moves `a` along `away` from where the centres meet until the smallest gap is `gap`.
-fn approach(a: &ContactShape, b: &ContactShape, from: &Pose, rest: &Pose, away: &Vec3, gap: f64) -> Pose {
+fn approach(
+    a: &ContactShape,
+    b: &ContactShape,
+    from: &Pose,
+    rest: &Pose,
+    away: &Vec3,
+    gap: f64,
+) -> Pose {
     let meet = b.ball_at(rest).center - a.ball_at(from).center + from.translation;
     let moved = |t: f64| Pose::new(from.rotation, meet + t * away);
     let (mut low, mut high) = (0.0, 2.0 * (a.radius() + b.radius()) + 2.0);

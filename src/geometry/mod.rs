@@ -20,9 +20,9 @@ mod image;
 mod interior;
 mod mass;
 mod mesh;
-#[cfg(test)]
-mod parry;
 mod points;
+#[cfg(test)]
+mod queries;
 mod refine;
 mod remesh;
 mod sharp;

@@ -1,14 +1,16 @@
 //! Scene files: TOML text to [`Scene`] and back, with errors that name line, key and remedy.
 //!
-//! The keys are those of the structs in [`crate::scene`], so what is known is asked of serde: its
-//! own errors carry the list of keys or kinds that would have fitted.
+//! The keys are those of the structs in [`crate::scene`], so what is known is asked of serde: it tells [`problem::Problem`]
+//! which keys or kinds would have fitted, and `serde_path_to_error` where.
 
 use std::io;
 use std::path::{Path, PathBuf};
 
+use serde_path_to_error::Segment;
 use toml::Spanned;
 use toml::de::{DeTable, DeValue};
 
+use super::problem::{Problem, Reader};
 use super::{Scene, Shape};
 use crate::{Error, Result};
 
@@ -123,7 +125,16 @@ fn parse(text: &str, folder: &Path) -> std::result::Result<Scene, String> {
                 .into(),
         );
     }
-    let mut scene: Scene = toml::from_str(text).map_err(|e| explain(text, &e))?;
+    let line = |at: usize| line_of(&text.as_bytes()[..at.min(text.len())]);
+    let broken = |e: toml::de::Error| {
+        let here = line(e.span().map_or(0, |s| s.start));
+        format!("line {here}: {}; this is not TOML yet", e.message())
+    };
+    let values: toml::Table = toml::from_str(text).map_err(broken)?;
+    let mut scene = read(values.clone()).map_err(|(path, problem)| match DeTable::parse(text) {
+        Ok(document) => explain(document.get_ref(), &values, path, &problem, line),
+        Err(error) => broken(error),
+    })?;
     for body in &mut scene.bodies {
         if let Some(Shape::Mesh { path, .. }) = &mut body.shape {
             *path = folder.join(&*path);
@@ -139,91 +150,82 @@ enum Step {
     Index(usize),
 }
 
-/// Line, place, problem and remedy of a failed reading.
-fn explain(text: &str, error: &toml::de::Error) -> String {
-    let message = error.message();
-    let span = error.span().unwrap_or(0..0);
-    let line = |at: usize| line_of(&text.as_bytes()[..at.min(text.len())]);
-    let here = line(span.start);
-    let (Ok(document), Ok(values)) = (DeTable::parse(text), toml::from_str(text)) else {
-        return format!("line {here}: {message}; this is not TOML yet");
-    };
-    let values: toml::Table = values;
-
-    // Errors inside a table with a `kind` carry the table's span; the rest that of key or value.
-    let mut path = Vec::new();
-    find_span(document.get_ref(), &span, &mut path);
-    let table = table_at(document.get_ref(), &path);
-    let names = quoted(message);
-    let asked = names.first().copied().unwrap_or_default();
-
-    if message.starts_with("unknown field") {
-        let at = match table.and_then(|t| key_start(t, asked)) {
-            Some(start) => line(start),
-            None => {
-                path.pop();
-                here
-            }
+/// The scene of these values, or where they don't fit and why.
+fn read(values: toml::Table) -> std::result::Result<Scene, (Vec<Step>, Problem)> {
+    let read = serde_path_to_error::deserialize(Reader(toml::Value::Table(values)));
+    read.map_err(|e: serde_path_to_error::Error<Problem>| {
+        let step = |segment: &Segment| match segment {
+            Segment::Map { key } => Some(Step::Key(key.clone())),
+            Segment::Seq { index } => Some(Step::Index(*index)),
+            Segment::Enum { .. } | Segment::Unknown => None,
         };
-        return format!(
-            "line {at}: {} has no key `{asked}`; {}",
-            place(&path, &values),
-            suggestion(asked, &names[1..], "keys")
-        );
-    }
-    if message.starts_with("unknown variant") {
-        let mut at = here;
-        if let Some(table) = table {
-            let kind = table.get("kind").and_then(|k| k.get_ref().as_str());
-            let key = if kind == Some(asked) {
-                Some("kind".to_owned())
-            } else {
-                culprit(&values, &path, table)
-            };
-            if let Some(key) = key {
-                at = key_start(table, &key).map_or(here, line);
-                path.push(Step::Key(key));
-            }
+        let path = e.path().iter().filter_map(step).collect();
+        (path, e.into_inner())
+    })
+}
+
+/// Line, place, problem and remedy of values that don't fit.
+fn explain(
+    document: &DeTable<'_>,
+    values: &toml::Table,
+    mut path: Vec<Step>,
+    problem: &Problem,
+    line: impl Fn(usize) -> usize,
+) -> String {
+    if let Problem::UnknownKey { key, .. } = problem {
+        // The path ends with the key itself where the table is that of a struct.
+        let inside = table_at(values, &path).is_some_and(|t| t.contains_key(key));
+        if !inside {
+            path.pop();
         }
-        return format!(
-            "line {at}: {}: `{asked}` is not known; {}",
-            place(&path, &values),
-            suggestion(asked, &names[1..], "choices")
-        );
     }
-    if message.starts_with("missing field") {
-        let choices = if asked == "kind" {
-            kinds(&values, &path)
-        } else {
-            String::new()
-        };
-        return format!(
-            "line {here}: {} lacks the key `{asked}`; add `{asked} = …`{choices}",
-            place(&path, &values)
-        );
+    // Tables with a `kind` are read at once: the path ends at them, whatever in them is wrong.
+    if let Some(table) = table_at(values, &path) {
+        match problem {
+            Problem::UnknownChoice { name, .. } if kind(table) == Some(name) => {
+                path.push(Step::Key("kind".into()));
+            }
+            Problem::UnknownChoice { .. } | Problem::Other(_) => {
+                path.extend(culprit(values, &path, table, problem).map(Step::Key));
+            }
+            Problem::UnknownKey { .. } | Problem::Missing { .. } => {}
+        }
     }
-    let mut at = here;
-    if let Some(table) = table
-        && let Some(key) = culprit(&values, &path, table)
-    {
-        at = key_start(table, &key).map_or(here, line);
-        path.push(Step::Key(key));
+    let of = place(&path, values);
+    match problem {
+        Problem::UnknownKey { key, known } => {
+            path.push(Step::Key(key.clone()));
+            let at = line(start(document, &path));
+            let what = suggestion(key, known, "keys");
+            format!("line {at}: {of} has no key `{key}`; {what}")
+        }
+        Problem::UnknownChoice { name, known } => {
+            let at = line(start(document, &path));
+            let what = suggestion(name, known, "choices");
+            format!("line {at}: {of}: `{name}` is not known; {what}")
+        }
+        Problem::Missing { key } => {
+            let at = line(start(document, &path));
+            let choices = match *key {
+                "kind" => kinds(values, &path),
+                _ => String::new(),
+            };
+            format!("line {at}: {of} lacks the key `{key}`; add `{key} = …`{choices}")
+        }
+        Problem::Other(message) => {
+            let at = line(start(document, &path));
+            format!("line {at}: {of}: {}", plain_words(message))
+        }
     }
-    format!(
-        "line {at}: {}: {}",
-        place(&path, &values),
-        plain_words(message)
-    )
+}
+
+fn kind(table: &toml::Table) -> Option<&str> {
+    table.get("kind").and_then(toml::Value::as_str)
 }
 
 /// Number of the line that follows this text's last character, from 1.
 fn line_of(before: &[u8]) -> usize {
     before.iter().filter(|&&b| b == b'\n').count() + 1
-}
-
-/// What stands between backticks, in order.
-fn quoted(message: &str) -> Vec<&str> {
-    message.split('`').skip(1).step_by(2).collect()
 }
 
 fn suggestion(asked: &str, known: &[&str], noun: &str) -> String {
@@ -235,56 +237,40 @@ fn suggestion(asked: &str, known: &[&str], noun: &str) -> String {
     }
 }
 
-/// Path to the key or value with exactly this span.
-fn find_span(table: &DeTable<'_>, span: &std::ops::Range<usize>, path: &mut Vec<Step>) -> bool {
-    for (key, value) in table.iter() {
-        path.push(Step::Key(key.get_ref().to_string()));
-        if key.span() == *span || find_in_value(value, span, path) {
-            return true;
-        }
-        path.pop();
+/// Where in the text the key, or the element of a list, at this path begins: the nearest that there is.
+fn start(document: &DeTable<'_>, path: &[Step]) -> usize {
+    let (mut at, mut table, mut value): (_, _, Option<&Spanned<DeValue<'_>>>) =
+        (0, Some(document), None);
+    for step in path {
+        let next = match step {
+            Step::Key(key) => table.and_then(|t| {
+                let (k, v) = t.iter().find(|(k, _)| k.get_ref() == key)?;
+                Some((k.span().start, v))
+            }),
+            Step::Index(i) => value.and_then(|v| {
+                let v = v.get_ref().as_array()?.get(*i)?;
+                Some((v.span().start, v))
+            }),
+        };
+        let Some((begin, found)) = next else { break };
+        (at, value) = (begin, Some(found));
+        table = found.get_ref().as_table();
     }
-    false
+    at
 }
 
-fn find_in_value(
-    value: &Spanned<DeValue<'_>>,
-    span: &std::ops::Range<usize>,
-    path: &mut Vec<Step>,
-) -> bool {
-    // Inside first: an array of tables has the span of its first header, as its first table has.
-    let inside = match value.get_ref() {
-        DeValue::Table(table) => find_span(table, span, path),
-        DeValue::Array(items) => items.iter().enumerate().any(|(i, item)| {
-            path.push(Step::Index(i));
-            let found = find_in_value(item, span, path);
-            if !found {
-                path.pop();
-            }
-            found
-        }),
-        _ => false,
-    };
-    inside || value.span() == *span
-}
-
-fn table_at<'a, 'i>(root: &'a DeTable<'i>, path: &[Step]) -> Option<&'a DeTable<'i>> {
+fn table_at<'a>(root: &'a toml::Table, path: &[Step]) -> Option<&'a toml::Table> {
     let Some((Step::Key(first), rest)) = path.split_first() else {
         return Some(root);
     };
-    let mut value = root.get(first.as_str())?.get_ref();
+    let mut value = root.get(first)?;
     for step in rest {
         value = match step {
-            Step::Key(key) => value.as_table()?.get(key.as_str())?.get_ref(),
-            Step::Index(i) => value.get(*i)?.get_ref(),
+            Step::Key(key) => value.get(key.as_str())?,
+            Step::Index(i) => value.get(*i)?,
         };
     }
     value.as_table()
-}
-
-fn key_start(table: &DeTable<'_>, name: &str) -> Option<usize> {
-    let mut keys = table.keys();
-    keys.find(|k| k.get_ref() == name).map(|k| k.span().start)
 }
 
 fn table_at_mut<'a>(root: &'a mut toml::Table, path: &[Step]) -> Option<&'a mut toml::Table> {
@@ -301,35 +287,38 @@ fn table_at_mut<'a>(root: &'a mut toml::Table, path: &[Step]) -> Option<&'a mut 
     value.as_table_mut()
 }
 
-fn message_of(values: toml::Table) -> Option<String> {
-    let read: std::result::Result<Scene, _> = values.try_into();
-    read.err().map(|e| e.message().to_owned())
+/// The problem with the table at this path changed.
+fn problem_with(
+    values: &toml::Table,
+    path: &[Step],
+    change: impl FnOnce(&mut toml::Table),
+) -> Option<Problem> {
+    let mut changed = values.clone();
+    change(table_at_mut(&mut changed, path)?);
+    read(changed).err().map(|(_, problem)| problem)
 }
 
-/// The key of this table whose value can't be read: the one without which the complaint changes.
-fn culprit(values: &toml::Table, path: &[Step], table: &DeTable<'_>) -> Option<String> {
-    let complaint = message_of(values.clone());
-    let mut keys = table.keys().map(|k| k.get_ref().to_string());
-    keys.find(|key| {
-        let mut without = values.clone();
-        let Some(at) = table_at_mut(&mut without, path) else {
-            return false;
-        };
-        at.remove(key);
-        key != "kind" && message_of(without) != complaint
-    })
+/// The key of this table whose value can't be read: the one without which the problem changes.
+fn culprit(
+    values: &toml::Table,
+    path: &[Step],
+    table: &toml::Table,
+    problem: &Problem,
+) -> Option<String> {
+    kind(table)?;
+    let mut keys = table.keys().filter(|k| *k != "kind");
+    let without = |key: &&String| {
+        let then = problem_with(values, path, |t| drop(t.remove(*key)));
+        then.as_ref() != Some(problem)
+    };
+    keys.find(without).cloned()
 }
 
-/// The kinds that this table could have, from the complaint about one that can't be.
+/// The kinds that this table could have, from the problem with one that can't be.
 fn kinds(values: &toml::Table, path: &[Step]) -> String {
-    let mut with = values.clone();
-    if let Some(at) = table_at_mut(&mut with, path) {
-        at.insert("kind".into(), "?".into());
-    }
-    match message_of(with) {
-        Some(m) if m.starts_with("unknown variant `?`") => {
-            format!(", one of {}", quoted(&m)[1..].join(", "))
-        }
+    let wrong = |t: &mut toml::Table| drop(t.insert("kind".into(), "?".into()));
+    match problem_with(values, path, wrong) {
+        Some(Problem::UnknownChoice { known, .. }) => format!(", one of {}", known.join(", ")),
         _ => String::new(),
     }
 }

@@ -9,6 +9,7 @@ mod file;
 mod force;
 mod joint;
 mod motion;
+mod problem;
 mod validate;
 
 pub use crate::geometry::{Refinement, Wall, WallSurface};

@@ -37,7 +37,6 @@ const LAYERS: [(&str, &[&str]); 20] = [
             "adjoint",
             "boundary",
             "coupling",
-            "dynamics",
             "gpu",
             "geometry",
             "multibody",
@@ -67,6 +66,7 @@ const LAYERS: [(&str, &[&str]); 20] = [
         &[
             "adjoint",
             "assembly",
+            "boundary",
             "contact",
             "coupling",
             "dynamics",

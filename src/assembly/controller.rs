@@ -1,121 +1,79 @@
-//! The controller that a scene names.
+//! The controller that a scene names. Whether it fits the scene, [`Scene::validate`] has checked.
 
 use crate::dynamics::System;
 use crate::policy::{
     Constant, OpenLoop, Pd, PdAxis, Playback, Policy, PushThenLock, SpeedStages, Stage,
 };
-use crate::scene::{self, Controller, Scene};
+use crate::scene::{Controller, Scene};
 use crate::{Error, Result};
 
 /// The scene's controller.
 pub(super) fn policy(scene: &Scene, system: &System) -> Result<Box<dyn Policy>> {
-    let count = |name: &str, n: usize| {
-        if n == system.controls {
-            return Ok(());
-        }
-        Err(Error::input(
-            format!("controller.{name}"),
-            format!("{n} numbers"),
-            format!("must be {} numbers, one per control", system.controls),
-        ))
+    let controls = system.controls;
+    let body = |name: &String| {
+        let found = system.bodies.iter().position(|b| b.name == *name);
+        found.ok_or_else(|| Error::input("controller", name, "must be the name of a body"))
     };
-    Ok(match &scene.controller {
+    Ok(match scene.controller.clone() {
         None => Box::new(OpenLoop),
-        Some(Controller::Constant { control }) => {
-            count("control", control.len())?;
-            Box::new(Constant {
-                control: control.clone(),
-            })
-        }
+        Some(Controller::Constant { control }) => Box::new(Constant { control }),
         Some(Controller::Pd {
             target,
             stiffness,
             damping,
         }) => {
-            count("target", target.len())?;
-            count("stiffness", stiffness.len())?;
-            count("damping", damping.len())?;
-            let mut axes = Vec::new();
-            for (body, link) in system.bodies.iter().zip(system.tree.links()) {
-                let Some(at) = body.joint_control else {
-                    continue;
-                };
-                for k in 0..link.v.len() {
-                    axes.push(PdAxis {
-                        control: at + k,
-                        q: link.q.start + k,
-                        v: link.v.start + k,
-                        target: target[at + k],
-                        stiffness: stiffness[at + k],
-                        damping: damping[at + k],
-                    });
-                }
-            }
+            let joints = system.bodies.iter().zip(system.tree.links());
+            let driven = joints.filter_map(|(body, link)| Some((body.joint_control?, link)));
+            let axes = driven.flat_map(|(at, link)| {
+                (0..link.v.len()).map(move |k| (at + k, link.q.start + k, link.v.start + k))
+            });
+            let axis = |(control, q, v): (usize, usize, usize)| PdAxis {
+                control,
+                q,
+                v,
+                target: target[control],
+                stiffness: stiffness[control],
+                damping: damping[control],
+            };
             Box::new(Pd {
-                controls: system.controls,
+                controls,
                 velocities: system.tree.velocities(),
-                axes,
+                axes: axes.map(axis).collect(),
             })
         }
         Some(Controller::PushThenLock {
-            body,
+            body: name,
             force,
             stop_at,
         }) => {
-            let b = system.bodies.iter().position(|x| x.name == *body);
-            let found = b.and_then(|b| Some((b, system.bodies[b].joint_control?)));
-            let Some((b, control)) = found else {
-                return Err(Error::input(
-                    "controller.body",
-                    body,
-                    "must be the name of a body with an actuated one-coordinate joint",
-                ));
-            };
+            let b = body(&name)?;
             Box::new(PushThenLock {
-                controls: system.controls,
+                controls,
                 bodies: system.len(),
                 body: b,
-                control,
+                control: system.bodies[b].joint_control.unwrap_or_default(),
                 q: system.tree.links()[b].q.start,
-                force: *force,
-                stop_at: *stop_at,
-                from_above: *force < 0.0,
+                force,
+                stop_at,
+                from_above: force < 0.0,
             })
         }
         Some(Controller::SpeedStages { bodies, stages }) => {
-            let mut watch = Vec::with_capacity(bodies.len());
-            for name in bodies {
-                let b = system.bodies.iter().position(|x| x.name == *name);
-                let link = b.map(|b| &system.tree.links()[b]);
-                let Some(link) = link.filter(|l| l.v.len() == 1) else {
-                    return Err(Error::input(
-                        "controller.bodies",
-                        name,
-                        "must be names of bodies with a one-coordinate joint",
-                    ));
-                };
-                watch.push(link.v.start);
-            }
-            for (k, stage) in stages.iter().enumerate() {
-                count(&format!("stages[{k}].control"), stage.control.len())?;
-            }
-            let of = |s: &scene::SpeedStage| Stage {
-                until: s.until,
-                control: s.control.clone(),
-            };
+            let start = |name| Ok(system.tree.links()[body(name)?].v.start);
             Box::new(SpeedStages {
-                watch,
-                stages: stages.iter().map(of).collect(),
+                watch: bodies.iter().map(start).collect::<Result<_>>()?,
+                stages: stages
+                    .into_iter()
+                    .map(|s| Stage {
+                        until: s.until,
+                        control: s.control,
+                    })
+                    .collect(),
             })
         }
-        Some(Controller::Playback { control }) => {
-            for (n, step) in control.iter().enumerate() {
-                count(&format!("control[{n}]"), step.len())?;
-            }
-            Box::new(Playback {
-                controls: system.controls,
-                steps: control.clone(),
-            })
-        }
+        Some(Controller::Playback { control }) => Box::new(Playback {
+            controls,
+            steps: control,
+        }),
     })
 }

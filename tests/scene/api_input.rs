@@ -2,7 +2,8 @@
 
 use crate::support::example;
 use hydrograd::dynamics::Integrator;
-use hydrograd::simulate::{Action, ActionBar, Observation, Policy};
+use hydrograd::scene::Preset;
+use hydrograd::simulate::{Action, ActionBar, Method, Observation, Policy};
 use hydrograd::{Controls, Error, Fidelity, Result, Settings, Simulator, objective};
 use nalgebra::DVector;
 
@@ -276,4 +277,31 @@ fn runs_too_long_to_be_kept_are_refused() {
         .unwrap_err()
         .to_string();
     assert!(message.contains("steps"), "{message}");
+}
+
+/// What a scene says counts for whoever simulates it, unless other settings are asked for.
+#[test]
+fn a_scenes_own_choices_count() {
+    let mut scene = example("kirchhoff_ellipsoid");
+    scene.preset = Preset::Paper;
+    scene.time_step = 0.02;
+    scene.set_faces(80);
+    let asked = Settings::default().fidelity(Fidelity::Isolated);
+    let simulator = Simulator::new(&scene, asked.clone()).unwrap();
+    assert_eq!(simulator.choices().integrator, Integrator::VelocityEuler);
+    assert_eq!(simulator.choices().water.method, Method::MfsFace);
+    assert_eq!((simulator.time_step(), simulator.faces()), (0.02, 80));
+    let other = Settings {
+        preset: Some(Preset::Default),
+        ..asked
+    };
+    let simulator = Simulator::new(&scene, other.time_step(0.01).faces(320)).unwrap();
+    assert_eq!(simulator.choices().integrator, Integrator::default());
+    assert_eq!(simulator.choices().water.method, Method::Auto);
+    let surface = simulator.meshes().unwrap()[0]
+        .as_ref()
+        .unwrap()
+        .faces()
+        .len();
+    assert_eq!((simulator.time_step(), surface), (0.01, 320));
 }

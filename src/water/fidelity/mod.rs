@@ -66,3 +66,16 @@ impl Fidelity {
         self.kind().knobs()
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::Fidelity;
+    use strum::VariantArray;
+
+    #[test]
+    fn names_are_those_of_the_list() {
+        for fidelity in Fidelity::VARIANTS {
+            assert_eq!(fidelity.kind().name(), fidelity.to_string());
+        }
+    }
+}

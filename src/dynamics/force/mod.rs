@@ -1,8 +1,8 @@
 //! Forces on bodies and joints that don't come from the water's kinetic energy, one file each.
 //!
 //! A force adds spatial wrenches (moment about the world's origin) on bodies, and generalised forces of joints (user
-//! coordinates), at a configuration and a velocity; the balance of momenta ([`super::balance`]) knows forces by this trait alone.
-//! To add one: a file with the type, its declared parameters and its `assemble`, and its line in [`FORCES`].
+//! coordinates), at a configuration and a velocity; the balance of momenta knows forces by this trait alone.
+//! To add one: a file with the type, its declared parameters and its `assemble`, and its line in `FORCES`.
 
 mod actuation;
 mod buoyancy;
@@ -20,8 +20,11 @@ use crate::scene::{DragPart, Scene};
 use nalgebra::DVector;
 use std::sync::Arc;
 
-/// How each force is made from a scene; `None` where a scene has none of its kind. The order is that in which they are added up.
-const FORCES: &[fn(&Parts, &mut Declarations) -> Option<Box<dyn ForceModel>>] = &[
+/// Makes a force from a scene, and declares its parameters; `None` where a scene has none of its kind.
+type Assemble = fn(&Parts, &mut Declarations) -> Option<Box<dyn ForceModel>>;
+
+/// All kinds of forces, in the order in which they are added up.
+const FORCES: &[Assemble] = &[
     gravity::assemble,
     buoyancy::assemble,
     linear_drag::assemble,

@@ -251,6 +251,7 @@ impl Rollout {
     /// (N + 1, bodies, 3), `controls`, what the loss has of them directly, (N, control_size); `observables` has
     /// cotangents of others by name, each in the shape that `observe` gives. What is None is zero. Ctrl-C ends it.
     #[pyo3(signature = (*, positions=None, rotations=None, q=None, v=None, controls=None, observables=None))]
+    #[expect(clippy::too_many_arguments, reason = "one per keyword")]
     fn vjp<'py>(
         &self,
         py: Python<'py>,

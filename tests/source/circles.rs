@@ -78,11 +78,9 @@ const STRICT: [&str; 8] = [
 
 /// Folders that still have circles.
 const STILL: &[&str] = &[
-    "src/cli/tradeoff",
     "src/contact/geometry",
     "src/gpu",
     "src/gpu/full",
-    "src/water",
     "adjoint/src",
 ];
 

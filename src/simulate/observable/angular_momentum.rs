@@ -1,6 +1,6 @@
 //! Angular momentum of each body by itself, without the water, about its centre of mass: L = R I Rᵀ ω, world axes.
 
-use super::{Observable, Observed, ObservedBars, Reading, Transpose, by_body};
+use super::entry::{Observable, Observed, ObservedBars, Reading, Transpose, by_body};
 use crate::adjoint::lie::{Mat3, Vec3, Vec6, angular, six};
 use crate::dynamics::{Parameters, System};
 use crate::scene::Scene;

@@ -1,6 +1,6 @@
 //! Energies of all bodies and the water.
 
-use super::{Observable, Reading};
+use super::entry::{Observable, Reading};
 use crate::dynamics::System;
 use crate::scene::Scene;
 

@@ -1,6 +1,6 @@
 //! The smallest gap.
 
-use super::{Observable, Reading};
+use super::entry::{Observable, Reading};
 use crate::dynamics::System;
 use crate::scene::Scene;
 

@@ -1,6 +1,6 @@
 //! Joint coordinates and generalised velocities.
 
-use super::{Observable, Observed, ObservedBars, Reading, Transpose};
+use super::entry::{Observable, Observed, ObservedBars, Reading, Transpose};
 use crate::dynamics::System;
 use crate::scene::Scene;
 

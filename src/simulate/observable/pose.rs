@@ -1,6 +1,6 @@
 //! Positions and rotations of the bodies.
 
-use super::{Observable, Observed, ObservedBars, Reading, Transpose, by_body};
+use super::entry::{Observable, Observed, ObservedBars, Reading, Transpose, by_body};
 use crate::adjoint::lie::{Vec3, point_wrench};
 use crate::dynamics::System;
 use crate::scene::Scene;

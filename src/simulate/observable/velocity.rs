@@ -1,6 +1,6 @@
 //! Velocities of the bodies.
 
-use super::{Observable, Reading, by_body};
+use super::entry::{Observable, Reading, by_body};
 use crate::adjoint::lie::{angular, point_velocity};
 use crate::dynamics::System;
 use crate::scene::Scene;

@@ -7,7 +7,7 @@
 //! it. Lengths are in metres, in the frame of the shape or body.
 //!
 //! - [`MassProperties`], [`Faces`], [`Ball`]: volume, inertia, face geometry, bounding balls.
-//! - `sharp`, `remesh`, [`refine`]: sharp edges, meshes with more or fewer faces, everywhere or in regions.
+//! - `sharp`, `remesh`, [`refine()`]: sharp edges, meshes with more or fewer faces, everywhere or in regions.
 //! - [`Gaps`]: signed distances between placed meshes, walls and points; `interior`: rays, inner
 //!   tangent balls and winding numbers of one mesh.
 //! - [`Wall`], [`HalfSpace`], [`Image`]: plane walls and the mirror images that they make.

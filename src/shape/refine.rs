@@ -27,7 +27,7 @@ impl From<&Shape> for ExactSurface {
     }
 }
 
-/// As [`geometry::refine`], for a mesh of a shape: new vertices lie on the shape's own surface where that is
+/// As [`geometry::refine()`], for a mesh of a shape: new vertices lie on the shape's own surface where that is
 /// curved.
 ///
 /// # Errors

@@ -5,6 +5,7 @@ pub mod contact;
 #[doc(hidden)]
 pub mod count;
 pub mod drag;
+mod draw;
 pub mod kernel;
 pub mod lie;
 mod registry;

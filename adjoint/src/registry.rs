@@ -3,9 +3,9 @@
 use crate::check::{Outcome, Rung, dot, outcome};
 use crate::contact::{Law, PointState, contact_force, contact_force_jvp, contact_force_vjp};
 use crate::drag::{Element, Part, quadratic_drag, quadratic_drag_jvp, quadratic_drag_vjp};
+use crate::draw::numbers;
 use crate::lie::{Mat6, Vec3, Vec6, exp_jacobian_inverse, exp_jacobian_inverse_vjp};
 use crate::rigid::{spatial_inertia, spatial_inertia_vjp};
-use crate::sample;
 use crate::solve::{Definite, Fitted, Moved, least_squares, least_squares_jvp};
 use nalgebra::{DMatrix, DVector};
 
@@ -54,14 +54,6 @@ pub fn rungs() -> Vec<Rung> {
         },
     ]);
     out
-}
-
-/// Numbers between −`size` and `size` of which all checks are made.
-pub(crate) fn numbers(seed: u64, count: usize, size: f64) -> Vec<f64> {
-    let drawn = sample::numbers(seed, count, size);
-    #[cfg(test)]
-    tests::DRAWN.with_borrow_mut(|all| all.push(drawn.clone()));
-    drawn
 }
 
 fn array<const N: usize>(seed: u64, size: f64) -> [f64; N] {
@@ -373,13 +365,8 @@ fn least_squares_jvp_check(corruption: f64) -> Outcome {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::draw::DRAWN;
     use crate::sample::span;
-    use std::cell::RefCell;
-
-    thread_local! {
-        /// What the checks of this thread drew.
-        pub static DRAWN: RefCell<Vec<Vec<f64>>> = const { RefCell::new(Vec::new()) };
-    }
 
     #[test]
     fn every_rung_passes_and_fails_when_corrupted() {

@@ -1,11 +1,11 @@
 //! Numbers in the device's memory.
 
-use super::context::{Context, Counters};
+use super::context::Context;
+use super::pool::Pool;
 use super::source::Arithmetic;
 use crate::{Error, Result};
-use std::collections::HashMap;
+use std::sync::Arc;
 use std::sync::atomic::Ordering;
-use std::sync::{Arc, Mutex};
 
 /// An array in the device's memory. Clones are the same array; calls hold one, so that nothing is used again
 /// before what was to be done with it has been started.
@@ -18,35 +18,9 @@ struct Held {
     pool: Arc<Pool>,
 }
 
-/// Memory to be used again, by size: every evaluation asks for the same sizes, and fresh memory has to be
-/// made and filled with zeros.
-#[derive(Default)]
-pub(super) struct Pool {
-    free: Mutex<HashMap<u64, Vec<wgpu::Buffer>>>,
-    pub counters: Arc<Counters>,
-}
-
-impl Pool {
-    fn take(&self, bytes: u64) -> Option<wgpu::Buffer> {
-        self.free.lock().ok()?.get_mut(&bytes)?.pop()
-    }
-
-    /// Gives everything that isn't in use back to the device.
-    fn drain(&self) {
-        if let Ok(mut free) = self.free.lock() {
-            for (bytes, buffers) in free.drain() {
-                self.counters.free(bytes * buffers.len() as u64);
-            }
-        }
-    }
-}
-
 impl Drop for Held {
     fn drop(&mut self) {
-        match self.pool.free.lock() {
-            Ok(mut free) => free.entry(self.bytes).or_default().push(self.raw.clone()),
-            Err(_) => self.pool.counters.free(self.bytes),
-        }
+        self.pool.put(self.bytes, self.raw.clone());
     }
 }
 

@@ -1,7 +1,7 @@
 //! The device: what it is, its limits, its faults, its counters.
 
-use super::buffer::Pool;
-use super::kernel::Kernel;
+use super::pipeline::Kernel;
+use super::pool::Pool;
 use super::source::{Arithmetic, Constant};
 use crate::{Error, Result};
 use std::collections::HashMap;
@@ -57,26 +57,6 @@ pub struct Counts {
     pub memory: u64,
     /// The most there were at once.
     pub peak_memory: u64,
-}
-
-#[derive(Debug, Default)]
-pub(super) struct Counters {
-    pub dispatches: AtomicU64,
-    pub read_backs: AtomicU64,
-    pub bytes_back: AtomicU64,
-    pub memory: AtomicU64,
-    pub peak: AtomicU64,
-}
-
-impl Counters {
-    pub fn allocate(&self, bytes: u64) {
-        let now = self.memory.fetch_add(bytes, Ordering::Relaxed) + bytes;
-        self.peak.fetch_max(now, Ordering::Relaxed);
-    }
-
-    pub fn free(&self, bytes: u64) {
-        self.memory.fetch_sub(bytes, Ordering::Relaxed);
-    }
 }
 
 type Key = (
@@ -153,11 +133,11 @@ pub fn adapters() -> Vec<Adapter> {
 }
 
 impl Context {
-    /// Opens an adapter.
+    /// Opens an adapter, without a trial of its arithmetic.
     ///
     /// # Errors
     /// [`Error::Device`] if there is none, none of that name, or its limits are too small.
-    pub fn new(options: &Options) -> Result<Arc<Self>> {
+    pub(super) fn open(options: &Options) -> Result<Arc<Self>> {
         let found = find(options)?;
         let adapter = describe(&found);
         let failed = |what: String, remedy: &str| Error::Device {
@@ -229,7 +209,7 @@ impl Context {
             usage: wgpu::BufferUsages::UNIFORM,
             mapped_at_creation: false,
         });
-        let context = Arc::new(Self {
+        Ok(Arc::new(Self {
             nothing,
             device,
             queue,
@@ -239,11 +219,7 @@ impl Context {
             pool: Arc::default(),
             kernels: Mutex::default(),
             fault,
-        });
-        if fine == Arithmetic::TwoFloat {
-            super::trial::two_float(&context)?;
-        }
-        Ok(context)
+        }))
     }
 
     /// The adapter.
@@ -300,7 +276,14 @@ impl Context {
         if let Some(kernel) = self.kernels.lock().map_err(|_| lost())?.get(&key) {
             return Ok(kernel.clone());
         }
-        let kernel = Arc::new(Kernel::new(self, shader, entry, arithmetic, constants)?);
+        let kernel = Arc::new(Kernel::new(
+            &self.device,
+            |what| self.failure(what),
+            shader,
+            entry,
+            arithmetic,
+            constants,
+        )?);
         self.kernels
             .lock()
             .map_err(|_| lost())?

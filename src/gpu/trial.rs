@@ -1,19 +1,35 @@
-//! Whether an adapter's compiler keeps the order of sums that two-float arithmetic stands on.
+//! Opening a device, and whether its compiler keeps the order of sums that two-float arithmetic stands on.
 
-use super::context::Context;
+use super::context::{Context, Options};
 use super::kernel::Batch;
 use super::products;
 use super::source::Arithmetic;
 use crate::Result;
+use std::sync::Arc;
 
 /// Digits that must be there.
 const ACCURACY: f64 = 1e-12;
+
+impl Context {
+    /// Opens an adapter.
+    ///
+    /// # Errors
+    /// [`crate::Error::Device`] if there is none, none of that name, its limits are too small, or its compiler spoils the
+    /// arithmetic that it is to use.
+    pub fn new(options: &Options) -> Result<Arc<Self>> {
+        let context = Self::open(options)?;
+        if context.fine() == Arithmetic::TwoFloat {
+            two_float(&context)?;
+        }
+        Ok(context)
+    }
+}
 
 /// Tries two-float numbers on a sum whose digits single precision loses.
 ///
 /// # Errors
 /// An adapter that reorders.
-pub(super) fn two_float(context: &Context) -> Result<()> {
+fn two_float(context: &Context) -> Result<()> {
     let arithmetic = Arithmetic::TwoFloat;
     let x: Vec<f64> = (0..64)
         .map(|i| 1.0 + f64::from(i) * 1.23456789e-9)

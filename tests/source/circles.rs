@@ -76,25 +76,12 @@ const STRICT: [&str; 8] = [
     "python/src",
 ];
 
-/// Folders that still have circles.
-const STILL: &[&str] = &[
-    "src/contact/geometry",
-    "src/gpu",
-    "src/gpu/full",
-    "adjoint/src",
-];
-
 #[test]
 fn no_folder_has_import_circles() {
     let mut wrong = Vec::new();
-    let mut still: BTreeSet<&str> = STILL.iter().copied().collect();
     for source in ["src", "adjoint/src", "python/src"] {
         for (folder, text) in found(source) {
-            let known = STILL.iter().find(|s| folder == Path::new(s));
-            match known {
-                Some(known) => drop(still.remove(known)),
-                None => wrong.push(format!("in {}: {text}", folder.display())),
-            }
+            wrong.push(format!("in {}: {text}", folder.display()));
         }
     }
     assert!(
@@ -103,7 +90,6 @@ fn no_folder_has_import_circles() {
         wrong.len(),
         wrong.join("\n")
     );
-    println!("no circles any more: {still:?}");
 }
 
 #[test]

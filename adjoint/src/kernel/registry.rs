@@ -6,8 +6,8 @@ use super::{
     potential_vjp,
 };
 use crate::check::{Outcome, Rung, outcome};
+use crate::draw::numbers;
 use crate::lie::Vec3;
-use crate::registry::numbers;
 
 /// Columns of the checks.
 const K: usize = 2;

@@ -22,9 +22,6 @@ use crate::{Error, Result};
 use nalgebra::DMatrix;
 use std::sync::Arc;
 
-/// Most columns of one pass over the pairs.
-const WIDE: usize = 12;
-
 /// The backend of [`crate::coupling::full::Full`] on a device.
 pub struct Gpu {
     name: String,

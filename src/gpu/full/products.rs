@@ -1,6 +1,5 @@
 //! Products with K and P of any number of columns, in passes.
 
-use super::WIDE;
 use crate::Result;
 use crate::gpu::apply::apply;
 use crate::gpu::apply_jvp::apply_jvp;
@@ -12,6 +11,9 @@ use crate::gpu::kernel::Call;
 use crate::gpu::share::passes;
 use crate::gpu::source::Arithmetic;
 use crate::gpu::sum::{Base, Slice, Sum, sum};
+
+/// Most columns of one pass over the pairs.
+pub(super) const WIDE: usize = 12;
 
 /// Which product.
 #[derive(Clone, Copy)]

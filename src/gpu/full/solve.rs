@@ -1,7 +1,6 @@
 //! `(KᵀK + D²) X = G` on the device (Eq. 20 and 21): conjugate gradients in single precision, refined.
 
-use super::WIDE;
-use super::products::{Product, once};
+use super::products::{Product, WIDE, once};
 use crate::coupling::full::{Preconditioner, Reached};
 use crate::gpu::buffer::Buffer;
 use crate::gpu::cgls::{Iterates, cgls};

@@ -8,7 +8,7 @@
 //! not fit into memory, is left out, with the reason.
 
 use hydrograd::adjoint::lie::{Pose, Vec3, Vec6};
-use hydrograd::boundary::{BodyBoundary, Settings as BodySettings};
+use hydrograd::boundary::{BodyBoundary, MfsSettings as BodySettings};
 use hydrograd::coupling::full::{Cpu, Full, MfsBody, Model, SolveSettings};
 use hydrograd::coupling::{Direction, Exclusions, Linearise};
 use hydrograd::dynamics::Integrator;

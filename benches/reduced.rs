@@ -451,7 +451,7 @@ fn spheres(quick: bool) -> hydrograd::Result<Vec<Curve>> {
 
 fn sphere(mesh: &hydrograd::TriMesh, rank: usize, gap: f64) -> hydrograd::Result<Arc<ReducedBody>> {
     let response = ExactBoundary::new("sphere", [1.0; 3], &Pose::identity(), gap)?;
-    let settings = compress::Settings {
+    let settings = compress::CompressSettings {
         rank: Some(rank),
         tolerance: 1e-8,
         resolved_gap: Some(gap),

@@ -10,7 +10,7 @@ mod common;
 
 use common::support::example;
 use common::{Effort, arguments, peak_memory, step_times};
-use hydrograd::coupling::full::{Preconditioner, Solver};
+use hydrograd::coupling::full::{FullSolver, Preconditioner};
 use hydrograd::dynamics::Integrator;
 use hydrograd::scene::{Preset, Scene};
 use hydrograd::{Fidelity, Settings, Simulator};
@@ -68,7 +68,7 @@ fn main() {
         let with = |solver, preconditioner| base.solver(solver).preconditioner(preconditioner);
         let jacobi = Settings {
             max_iterations: Some(5_000),
-            ..with(Solver::Cgls, Preconditioner::Jacobi)
+            ..with(FullSolver::Cgls, Preconditioner::Jacobi)
         };
         let one_evaluation = |s: &Settings| s.integrator(Integrator::MomentumEuler);
         let rows = [
@@ -85,7 +85,7 @@ fn main() {
             ("preset paper", Settings::preset(Preset::Paper), 2, 1),
             (
                 "momentum Euler, dense QR",
-                one_evaluation(&with(Solver::Qr, Preconditioner::None)),
+                one_evaluation(&with(FullSolver::Qr, Preconditioner::None)),
                 1,
                 1,
             ),

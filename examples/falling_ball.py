@@ -1,7 +1,7 @@
 """The falling ball with coupled water and without, side by side.
 
 A heavy sphere is driven down beside a coin that lies flat above the sea floor. With the fidelity `full` the water that
-the sphere pushes away turns the coin before anything touches it; with `isolated` the coin never hears of the sphere.
+the sphere pushes away turns the coin before anything touches it; with `isolated` the coin is never moved by the sphere.
 
     python examples/falling_ball.py [--faces N] [--steps N] [--out FILE] [--json]
 

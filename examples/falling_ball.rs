@@ -2,7 +2,7 @@
 //!
 //! A heavy sphere is driven down beside a coin that lies flat above the sea floor. With the fidelity
 //! `full` the water that the sphere pushes away turns the coin before anything touches it; with
-//! `isolated` the coin never hears of the sphere.
+//! `isolated` the coin is never moved by the sphere.
 //!
 //! ```text
 //! cargo run --release --example falling_ball -- [--faces N] [--steps N] [--out FILE.svg] [--json]

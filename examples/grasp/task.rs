@@ -217,7 +217,7 @@ impl Task {
     }
 
     /// Forces that hold the coin, from `x`: by a descent to a good approach, and by one of the whole trajectory from there. Iterations are those
-    /// of both; `say` hears of every one.
+    /// of both; `say` is called with every one.
     pub fn find(&self, x: &[f64], say: impl Fn(&str, &OptimizeProgress)) -> Result<Optimum> {
         let reached = minimise(|x| self.approach(x), x, &REACHING, |p| say("approach", p))?;
         let held = minimise(|x| self.hold(x), &reached.x, &HOLDING, |p| say("hold", p))?;

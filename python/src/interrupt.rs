@@ -78,12 +78,12 @@ pub fn long<T: Send + 'static>(
     // The receiver moves in and out of each wait, for it isn't shared.
     let mut receive = receive;
     loop {
-        let (back, heard) = py.detach(move || {
-            let heard = receive.recv_timeout(PATIENCE);
-            (receive, heard)
+        let (back, received) = py.detach(move || {
+            let received = receive.recv_timeout(PATIENCE);
+            (receive, received)
         });
         receive = back;
-        match heard {
+        match received {
             Ok(Ok(done)) => return done.or_raise(),
             Ok(Err(panic)) => return Err(internal(said(panic.as_ref()))),
             Err(RecvTimeoutError::Timeout) => {

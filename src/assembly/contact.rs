@@ -19,7 +19,7 @@ const ROOM: f64 = 1.25;
 const SKIN: f64 = 0.01;
 
 /// What contact is made from.
-pub(super) struct Parts<'a> {
+pub(super) struct ContactParts<'a> {
     pub scene: &'a Scene,
     pub given: &'a Contact,
     pub time_step: f64,
@@ -44,7 +44,7 @@ pub(super) fn check_integrator(scene: &Scene, integrator: Integrator) -> Result<
     })
 }
 
-pub(super) fn assemble(p: Parts) -> Result<(ContactModel, dynamics::Contact)> {
+pub(super) fn assemble(p: ContactParts) -> Result<(ContactModel, dynamics::ContactParameters)> {
     let mut shapes = Vec::with_capacity(p.scene.bodies.len());
     for (body, surface) in p.scene.bodies.iter().zip(p.surfaces) {
         shapes.push(match (&body.shape, surface) {
@@ -96,7 +96,7 @@ pub(super) fn assemble(p: Parts) -> Result<(ContactModel, dynamics::Contact)> {
             horizon: dt,
         },
     };
-    let parameters = dynamics::Contact {
+    let parameters = dynamics::ContactParameters {
         stiffness,
         dissipation: p.given.dissipation,
         friction: p.given.friction,
@@ -119,7 +119,7 @@ fn contact_shape(body: &Body, shape: &Shape, surface: &Surface) -> Result<Contac
 }
 
 /// The gap that the coupling resolves between a pair, m.
-fn resolved(p: &Parts, pair: &ContactPair) -> f64 {
+fn resolved(p: &ContactParts, pair: &ContactPair) -> f64 {
     let of = |b: usize| {
         let edge = p.surfaces[b].as_ref().map_or(0.0, Surface::mean_edge);
         (p.water.fidelity).resolved_gap(p.water.resolved[b], edge)

@@ -2,7 +2,7 @@
 
 use crate::dynamics::System;
 use crate::policy::{
-    Constant, OpenLoop, Pd, PdAxis, Playback, Policy, PushThenLock, SpeedStages, Stage,
+    Constant, OpenLoop, Pd, PdAxis, Playback, Policy, PushThenLock, SpeedStage, SpeedStages,
 };
 use crate::scene::{Controller, Scene};
 use crate::{Error, Result};
@@ -64,7 +64,7 @@ pub(super) fn policy(scene: &Scene, system: &System) -> Result<Box<dyn Policy>> 
                 watch: bodies.iter().map(start).collect::<Result<_>>()?,
                 stages: stages
                     .into_iter()
-                    .map(|s| Stage {
+                    .map(|s| SpeedStage {
                         until: s.until,
                         control: s.control,
                     })

@@ -142,7 +142,7 @@ pub(crate) fn assemble(
         })
         .collect();
     let clearance = Clearance::new(scene, &surfaces, &tree)?;
-    let parts = force::Parts {
+    let parts = force::ForceParts {
         scene,
         tree: &tree,
         bodies: &bodies,
@@ -169,7 +169,7 @@ pub(crate) fn assemble(
     let water = water::prepare(scene, &choices.water, in_water, &poses, clearance, folder)?;
     system.coupling = water.coupling.clone();
     if let Some(given) = &scene.contact {
-        let made = contact::assemble(contact::Parts {
+        let made = contact::assemble(contact::ContactParts {
             scene,
             given,
             time_step: dt,

@@ -13,7 +13,7 @@ pub mod panel;
 mod response;
 
 pub use exact::ExactBoundary;
-pub use mfs::{BodyBoundary, Depth, Method, Readout, RowScaling, Settings, depth, readout};
+pub use mfs::{BodyBoundary, Depth, Method, MfsSettings, Readout, RowScaling, depth, readout};
 pub(crate) use mfs::{solve_upper, solve_upper_transpose};
 pub use panel::PanelBoundary;
 pub use response::Response;

@@ -8,7 +8,7 @@ use super::backend::Compute;
 use super::list::choice;
 use crate::Result;
 use crate::boundary::{Depth, RowScaling};
-use crate::coupling::full::{Preconditioner, Solver};
+use crate::coupling::full::{FullSolver, Preconditioner};
 use crate::dynamics::Integrator;
 use crate::scene::{Preset, Scene};
 use crate::simulate::{Fidelity, Method, Settings, Simulator};
@@ -53,8 +53,8 @@ pub(super) struct Water {
     #[arg(long, value_name = "TOL", value_parser = tolerance, allow_negative_numbers = true)]
     pub tolerance: Option<f64>,
     /// Solver of the coupled system [default: cgls].
-    #[arg(long, value_parser = choice::<Solver>())]
-    pub solver: Option<Solver>,
+    #[arg(long, value_parser = choice::<FullSolver>())]
+    pub solver: Option<FullSolver>,
     /// Preconditioner of the coupled system [default: factors].
     #[arg(long, value_parser = choice::<Preconditioner>())]
     pub preconditioner: Option<Preconditioner>,

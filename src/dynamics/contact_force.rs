@@ -5,7 +5,7 @@
 //! that is implicit in it solves contact implicitly, against the mass matrix with its fluid part.
 
 use super::{
-    Contact, ContactForce, Dual, Evaluation, ForceCotangents, JointLimit, PairContact, Parameters,
+    ContactParameters, ContactForce, Dual, Evaluation, ForceCotangents, JointLimit, PairContact, Parameters,
     System,
 };
 use crate::Result;
@@ -185,7 +185,7 @@ impl Evaluation<'_> {
             // Both u and the virtual velocity are taken at the point.
             let position = own.velocity.cross(&angular(&twist)) + force.cross(&angular(&virt));
             t.displacement_vjp(&own, &position, &mut bar.pose);
-            out.parameters.add_contact(Contact {
+            out.parameters.add_contact(ContactParameters {
                 stiffness: own.stiffness,
                 dissipation: own.dissipation,
                 friction: own.friction,

@@ -25,6 +25,6 @@ pub use integrator::{
 pub use limit::JointLimit;
 pub use linearisation::Linearisation;
 pub use parameters::{
-    Contact, Declarations, Declared, Entry, Owner, Parameter, Parameters, Range, Typical,
+    ContactParameters, Declarations, Declared, Entry, Owner, Parameter, Parameters, Range, Typical,
 };
 pub use system::{Drive, System};

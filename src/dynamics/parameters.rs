@@ -233,7 +233,7 @@ impl Declarations {
 
 /// Parameters of contact.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
-pub struct Contact {
+pub struct ContactParameters {
     /// Stiffness of each point, N/m.
     pub stiffness: f64,
     /// Dissipation of Hunt and Crossley, s/m.
@@ -375,9 +375,9 @@ impl Parameters {
     }
 
     /// Parameters of contact.
-    pub fn contact(&self) -> Contact {
+    pub fn contact(&self) -> ContactParameters {
         let [stiffness, dissipation, friction] = self.table.contact.map(|i| self[i]);
-        Contact {
+        ContactParameters {
             stiffness,
             dissipation,
             friction,
@@ -385,7 +385,7 @@ impl Parameters {
     }
 
     /// Adds to the parameters of contact.
-    pub fn add_contact(&mut self, more: Contact) {
+    pub fn add_contact(&mut self, more: ContactParameters) {
         let more = [more.stiffness, more.dissipation, more.friction];
         for (i, x) in self.table.contact.into_iter().zip(more) {
             self[i] += x;

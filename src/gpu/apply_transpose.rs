@@ -2,7 +2,7 @@
 
 use super::buffer::Buffer;
 use super::context::Context;
-use super::geometry::Placed;
+use super::geometry::PlacedSystem;
 use super::kernel::Call;
 use super::pass::{Pass, Side, pass};
 use super::source::Arithmetic;
@@ -13,7 +13,7 @@ use crate::Result;
 pub(super) fn apply_transpose(
     context: &Context,
     arithmetic: Arithmetic,
-    placed: &Placed,
+    placed: &PlacedSystem,
     potential: bool,
     y: Slice,
     out: (&Buffer, usize),

@@ -3,7 +3,7 @@
 use super::buffer::Buffer;
 use super::context::Context;
 use super::kernel::Call;
-use super::points::Placed;
+use super::points::PlacedPoints;
 use super::source::Constant;
 use super::sum::Slice;
 use crate::Result;
@@ -20,7 +20,7 @@ pub(super) fn compiled(columns: usize) -> Constant {
 /// `G x` of some columns, as shares `[share][point][columns]` to be summed.
 pub(super) fn coulomb(
     context: &Context,
-    placed: &Placed,
+    placed: &PlacedPoints,
     (x, stride, offset): Slice,
     (out, columns): (&Buffer, usize),
     gate: &Buffer,

@@ -3,7 +3,7 @@
 use super::buffer::Buffer;
 use super::context::Context;
 use super::kernel::Call;
-use super::points::{Motion, Placed};
+use super::points::{Motion, PlacedPoints};
 use super::source::Constant;
 use crate::Result;
 
@@ -11,7 +11,7 @@ use crate::Result;
 /// `[share][point][F, D, δF, δD][columns]` to be summed.
 pub(super) fn coulomb_hvp(
     context: &Context,
-    placed: &Placed,
+    placed: &PlacedPoints,
     motion: &Motion,
     (x, dx): (&Buffer, &Buffer),
     (out, columns): (&Buffer, usize),

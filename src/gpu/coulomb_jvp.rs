@@ -4,7 +4,7 @@ use super::buffer::Buffer;
 use super::context::Context;
 use super::coulomb::compiled;
 use super::kernel::Call;
-use super::points::{Motion, Placed};
+use super::points::{Motion, PlacedPoints};
 use super::source::Constant;
 use super::sum::Slice;
 use crate::Result;
@@ -12,7 +12,7 @@ use crate::Result;
 /// `δG x` of some columns, as shares `[share][point][columns]` to be summed.
 pub(super) fn coulomb_jvp(
     context: &Context,
-    placed: &Placed,
+    placed: &PlacedPoints,
     motion: &Motion,
     (x, stride, offset): Slice,
     (out, columns): (&Buffer, usize),

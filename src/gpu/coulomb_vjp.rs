@@ -4,7 +4,7 @@ use super::buffer::Buffer;
 use super::context::Context;
 use super::coulomb::compiled;
 use super::kernel::Call;
-use super::points::Placed;
+use super::points::PlacedPoints;
 use super::source::Constant;
 use super::sum::Slice;
 use crate::Result;
@@ -12,7 +12,7 @@ use crate::Result;
 /// The pulls of some columns of charges, as shares `[share][point][F, D][columns]` to be summed.
 pub(super) fn coulomb_vjp(
     context: &Context,
-    placed: &Placed,
+    placed: &PlacedPoints,
     (x, stride, offset): Slice,
     (out, columns): (&Buffer, usize),
 ) -> Result<Call> {

@@ -2,13 +2,13 @@
 
 use super::buffer::Buffer;
 use super::context::Context;
-use super::geometry::Placed;
+use super::geometry::PlacedSystem;
 use super::kernel::Call;
 use super::source::Arithmetic;
 use crate::Result;
 
 /// `scaling_j = 1/√(Σ_i K_ij² + D_j²)` in single precision.
-pub(super) fn diagonal(context: &Context, placed: &Placed, scaling: &Buffer) -> Result<Call> {
+pub(super) fn diagonal(context: &Context, placed: &PlacedSystem, scaling: &Buffer) -> Result<Call> {
     let arithmetic = Arithmetic::Single;
     let kernel = context.kernel("diagonal", "main", arithmetic, &[])?;
     let mut buffers = placed.buffers(arithmetic);

@@ -2,7 +2,7 @@
 
 use super::buffer::Buffer;
 use super::context::Context;
-use super::geometry::Placed;
+use super::geometry::PlacedSystem;
 use super::kernel::Call;
 use super::source::{Arithmetic, Constant};
 use crate::Result;
@@ -11,7 +11,7 @@ use crate::Result;
 /// `[share][source][columns]` to be summed.
 pub(super) fn factor(
     context: &Context,
-    placed: &Placed,
+    placed: &PlacedSystem,
     transpose: bool,
     (x, out, columns): (&Buffer, &Buffer, usize),
     gate: &Buffer,

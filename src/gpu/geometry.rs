@@ -104,7 +104,7 @@ pub(super) struct Surfaces {
 }
 
 /// The system at given poses.
-pub(super) struct Placed {
+pub(super) struct PlacedSystem {
     pub geometry: Arc<Geometry>,
     /// The scene's middle, m.
     pub middle: Vec3,
@@ -420,7 +420,7 @@ fn tasks(
     (pairs, tasks, ranges)
 }
 
-impl Placed {
+impl PlacedSystem {
     /// The variables of `pairs.wgsl`.
     pub fn buffers(&self, arithmetic: Arithmetic) -> Vec<(&'static str, Bound<'_>)> {
         let surfaces = if arithmetic == Arithmetic::Single {

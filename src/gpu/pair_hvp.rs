@@ -1,7 +1,7 @@
 //! `shaders/pair_hvp.wgsl`: the tangent of [`pair_vjp`](super::pair_vjp), mirrored.
 
 use super::buffer::Buffer;
-use super::geometry::Placed;
+use super::geometry::PlacedSystem;
 use super::kernel::{Call, groups};
 use super::source::{Arithmetic, Constant};
 use crate::Result;
@@ -11,7 +11,7 @@ use std::ops::Range;
 /// `[face][μ, r, β, δμ, δr]`, right ones `[source][a, λ, δa, δλ]`.
 pub(super) fn pair_hvp(
     arithmetic: Arithmetic,
-    placed: &Placed,
+    placed: &PlacedSystem,
     (left, right): (&Buffer, &Buffer),
     columns: usize,
     motions: &Buffer,

@@ -1,7 +1,7 @@
 //! `shaders/pair_vjp.wgsl`: derivatives of energies, as wrenches on pairs of bodies.
 
 use super::buffer::Buffer;
-use super::geometry::Placed;
+use super::geometry::PlacedSystem;
 use super::kernel::{Call, groups};
 use super::source::{Arithmetic, Constant};
 use crate::Result;
@@ -11,7 +11,7 @@ use std::ops::Range;
 /// `[face][μ, r, β]`, right ones `[source][a, λ]`.
 pub(super) fn pair_vjp(
     arithmetic: Arithmetic,
-    placed: &Placed,
+    placed: &PlacedSystem,
     (left, right): (&Buffer, &Buffer),
     columns: usize,
     (first, width): (usize, usize),

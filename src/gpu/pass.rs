@@ -2,7 +2,7 @@
 
 use super::buffer::Buffer;
 use super::context::Context;
-use super::geometry::Placed;
+use super::geometry::PlacedSystem;
 use super::kernel::{Bound, Call};
 use super::source::{Arithmetic, Constant};
 use super::sum::Slice;
@@ -31,7 +31,7 @@ pub(super) struct Pass<'a> {
 pub(super) fn pass(
     context: &Context,
     arithmetic: Arithmetic,
-    placed: &Placed,
+    placed: &PlacedSystem,
     what: &Pass,
     (x, stride, offset): Slice,
     (out, columns): (&Buffer, usize),

@@ -1,7 +1,7 @@
 //! Surfaces at the bodies' poses, with what goes with them.
 
 use super::diagonal::diagonal;
-use super::geometry::{Geometry, Placed, Surfaces};
+use super::geometry::{Geometry, PlacedSystem, Surfaces};
 use super::kernel::Batch;
 use super::place::place;
 use super::source::Arithmetic;
@@ -9,7 +9,7 @@ use crate::Result;
 use crate::adjoint::lie::{Mat3, Pose, Vec3};
 use std::sync::Arc;
 
-impl Placed {
+impl PlacedSystem {
     /// Places all bodies.
     ///
     /// # Errors

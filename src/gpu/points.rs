@@ -78,7 +78,7 @@ pub(super) struct Compressed {
 }
 
 /// The bodies' points at given poses.
-pub(super) struct Placed {
+pub(super) struct PlacedPoints {
     pub model: Arc<Compressed>,
     pub poses: Vec<Pose>,
     /// The scene's middle, m.
@@ -223,7 +223,7 @@ struct Apart {
     weight: [f64; 3],
 }
 
-impl Placed {
+impl PlacedPoints {
     /// Places all bodies.
     ///
     /// # Errors

@@ -3,7 +3,7 @@
 use super::buffer::Buffer;
 use super::context::Context;
 use super::kernel::Call;
-use super::points::{Motion, Placed};
+use super::points::{Motion, PlacedPoints};
 use super::source::Constant;
 use crate::Result;
 
@@ -23,7 +23,7 @@ pub(super) struct Side<'a> {
 /// over 4π.
 pub(super) fn wrench(
     context: &Context,
-    placed: &Placed,
+    placed: &PlacedPoints,
     (left, right): (Side, Side),
     motion: Option<&Motion>,
     out: &Buffer,

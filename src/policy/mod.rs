@@ -8,7 +8,7 @@ mod stages;
 pub use pd::{Pd, PdAxis};
 pub use playback::Playback;
 pub use push::PushThenLock;
-pub use stages::{SpeedStages, Stage};
+pub use stages::{SpeedStage, SpeedStages};
 
 use crate::{Error, Result};
 use nalgebra::DVector;

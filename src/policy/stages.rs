@@ -6,7 +6,7 @@ use nalgebra::DVector;
 
 /// Controls until a speed is reached.
 #[derive(Clone, Debug, PartialEq)]
-pub struct Stage {
+pub struct SpeedStage {
     /// Speed that ends it, m/s or rad/s.
     pub until: f64,
     /// Controls, N or N m.
@@ -21,7 +21,7 @@ pub struct SpeedStages {
     /// Velocities in v that are watched.
     pub watch: Vec<usize>,
     /// Stages in their order.
-    pub stages: Vec<Stage>,
+    pub stages: Vec<SpeedStage>,
 }
 
 impl SpeedStages {

@@ -254,7 +254,7 @@ pub fn gradcheck(
     gradcheck_with(simulator, settings, |_, _| {})
 }
 
-/// As [`gradcheck`]; `progress` hears how many directions are done, and of how many.
+/// As [`gradcheck`]; `progress` is called with the number of directions done and that of all.
 ///
 /// # Errors
 /// A rollout that fails.

@@ -34,7 +34,7 @@ pub use simulator::{AddedMass, Simulator};
 pub use crate::assembly::Choices;
 pub use crate::policy::{
     Action, ActionBar, Constant, Observation, OpenLoop, Pd, PdAxis, Playback, Policy, PushThenLock,
-    SpeedStages, Stage,
+    SpeedStage, SpeedStages,
 };
 pub use crate::water::{
     AdapterName, Arithmetic, Backend, BackendReport, DeviceReport, Discretisation, ErrorEstimate,

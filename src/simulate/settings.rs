@@ -2,7 +2,7 @@
 
 use crate::assembly::Choices;
 use crate::boundary::{Depth, Readout, RowScaling};
-use crate::coupling::full::{Preconditioner, Solver};
+use crate::coupling::full::{FullSolver, Preconditioner};
 use crate::dynamics::Integrator;
 use crate::scene::{Preset, Scene};
 use crate::water::{Backend, Fidelity, GpuSettings, Method};
@@ -35,7 +35,7 @@ pub struct Settings {
     pub damping: Option<f64>,
     /// Solver of the coupled system (fidelity `full`).
     #[serde(skip_serializing_if = "Option::is_none")]
-    pub solver: Option<Solver>,
+    pub solver: Option<FullSolver>,
     /// Its preconditioner.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub preconditioner: Option<Preconditioner>,
@@ -170,7 +170,7 @@ impl Settings {
     }
 
     /// With another solver of the coupled system (`full`).
-    pub fn solver(&self, solver: Solver) -> Self {
+    pub fn solver(&self, solver: FullSolver) -> Self {
         Self {
             solver: Some(solver),
             ..self.clone()

@@ -144,14 +144,14 @@ pub(super) fn end_error(
     if !excursion.any() {
         return None;
     }
-    let (i, j) = meeting(path, reference)?;
+    let (i, j) = crossing(path, reference)?;
     let q = Weights::far(&weights.q, &path.q[i], &reference.q[j]) / excursion.q;
     let v = Weights::far(&weights.v, &path.v[i], &reference.v[j]) / excursion.v;
     Some(larger(q, v)).filter(|x| x.is_finite())
 }
 
 /// Numbers of the last states at equal times.
-fn meeting(path: &Path, reference: &Path) -> Option<(usize, usize)> {
+fn crossing(path: &Path, reference: &Path) -> Option<(usize, usize)> {
     let last = reference.q.len() - 1;
     let from = path.q.len() / 2;
     (from..path.q.len()).rev().find_map(|i| {
@@ -178,13 +178,13 @@ mod tests {
     #[test]
     fn paths_meet_at_the_last_common_time() {
         let reference = path(0.25, 48);
-        assert_eq!(meeting(&path(1.0, 12), &reference), Some((12, 48)));
-        assert_eq!(meeting(&path(5.0, 2), &reference), Some((2, 40)));
-        assert_eq!(meeting(&path(0.125, 96), &reference), Some((96, 48)));
-        assert_eq!(meeting(&path(0.3, 40), &reference), Some((40, 48)));
-        assert_eq!(meeting(&path(0.7, 17), &reference), Some((15, 42)));
-        assert_eq!(meeting(&path(0.251, 47), &reference), None);
-        assert_eq!(meeting(&path(9.0, 1), &reference), Some((1, 36)));
+        assert_eq!(crossing(&path(1.0, 12), &reference), Some((12, 48)));
+        assert_eq!(crossing(&path(5.0, 2), &reference), Some((2, 40)));
+        assert_eq!(crossing(&path(0.125, 96), &reference), Some((96, 48)));
+        assert_eq!(crossing(&path(0.3, 40), &reference), Some((40, 48)));
+        assert_eq!(crossing(&path(0.7, 17), &reference), Some((15, 42)));
+        assert_eq!(crossing(&path(0.251, 47), &reference), None);
+        assert_eq!(crossing(&path(9.0, 1), &reference), Some((1, 36)));
     }
 
     #[test]

@@ -36,9 +36,9 @@ impl WaterChoices {
             Preset::Paper => Self {
                 method: Method::MfsFace,
                 numerics: Numerics {
-                    mfs: boundary::Settings {
+                    mfs: boundary::MfsSettings {
                         rows: boundary::RowScaling::Unscaled,
-                        ..boundary::Settings::plain(boundary::Method::MfsFace, Depth::Auto)
+                        ..boundary::MfsSettings::plain(boundary::Method::MfsFace, Depth::Auto)
                     },
                     ..Numerics::default()
                 },

@@ -10,11 +10,11 @@ use serde::{Deserialize, Serialize};
 #[serde(deny_unknown_fields)]
 pub struct Numerics {
     /// Fundamental solutions, where they are used. Where the sources are is the body method's choice, not this one's.
-    pub mfs: boundary::Settings,
+    pub mfs: boundary::MfsSettings,
     /// Coupled solve with the fidelity `full`.
     pub solve: SolveSettings,
     /// Compression with the fidelity `reduced`.
-    pub compress: compress::Settings,
+    pub compress: compress::CompressSettings,
     /// Error of M_f, relative to √(M_ii M_jj), that the fidelity `auto` aims at.
     pub accuracy: f64,
 }
@@ -22,9 +22,9 @@ pub struct Numerics {
 impl Default for Numerics {
     fn default() -> Self {
         Self {
-            mfs: boundary::Settings::default(),
+            mfs: boundary::MfsSettings::default(),
             solve: SolveSettings::default(),
-            compress: compress::Settings::default(),
+            compress: compress::CompressSettings::default(),
             accuracy: 0.01,
         }
     }

@@ -92,17 +92,17 @@ fn the_best_point_is_what_was_found() {
 
 #[test]
 fn every_iteration_is_heard_of() {
-    let mut heard: Vec<OptimizeProgress> = Vec::new();
+    let mut reports: Vec<OptimizeProgress> = Vec::new();
     let settings = OptimizeSettings::default();
-    let found = minimise(rosenbrock, &[-1.2, 1.0], &settings, |p| heard.push(*p)).unwrap();
-    let numbers: Vec<usize> = heard.iter().map(|p| p.iteration).collect();
+    let found = minimise(rosenbrock, &[-1.2, 1.0], &settings, |p| reports.push(*p)).unwrap();
+    let numbers: Vec<usize> = reports.iter().map(|p| p.iteration).collect();
     assert_eq!(numbers, (1..=found.iterations).collect::<Vec<_>>());
     assert!(
-        heard
+        reports
             .windows(2)
             .all(|w| w[1].cost <= w[0].cost && w[1].evaluations >= w[0].evaluations)
     );
-    let last = heard[heard.len() - 1];
+    let last = reports[reports.len() - 1];
     assert_eq!(
         (last.cost, last.evaluations),
         (found.cost, found.evaluations)

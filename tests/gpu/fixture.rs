@@ -3,7 +3,7 @@
 use crate::support::mesh;
 use hydrograd::adjoint::lie::{Pose, Vec3, Vec6, exp_matrix};
 use hydrograd::adjoint::sample;
-use hydrograd::boundary::{BodyBoundary, Method, Settings};
+use hydrograd::boundary::{BodyBoundary, Method, MfsSettings};
 use hydrograd::coupling::Exclusions;
 use hydrograd::coupling::full::{Full, MfsBody, Model, Preconditioner, SolveSettings};
 use hydrograd::gpu::full::Gpu;
@@ -43,9 +43,9 @@ pub fn two_float() -> &'static Arc<Context> {
 
 pub fn body(shape: &Shape, faces: usize, method: Method) -> Arc<MfsBody> {
     let mesh = mesh(shape, faces);
-    let settings = Settings {
+    let settings = MfsSettings {
         method,
-        ..Settings::default()
+        ..MfsSettings::default()
     };
     let b = BodyBoundary::new("b", &mesh, &settings).unwrap();
     Arc::new(MfsBody::new(Arc::new(b)))

@@ -2,7 +2,7 @@
 
 use super::fixture::*;
 use hydrograd::adjoint::lie::{Pose, Vec3, exp_matrix};
-use hydrograd::boundary::{BodyBoundary, Readout, Settings};
+use hydrograd::boundary::{BodyBoundary, MfsSettings, Readout};
 use hydrograd::coupling::full::{Cpu, Full, MfsBody, Model, Preconditioner, SolveSettings};
 use hydrograd::coupling::{Coupling, Direction, Exclusions, Linearise};
 use hydrograd::gpu::full::Gpu;
@@ -13,9 +13,9 @@ use std::sync::Arc;
 
 fn bodies(factored: [bool; 3]) -> Vec<Arc<MfsBody>> {
     // Without the body's own residual flux both read the same potential out.
-    let settings = Settings {
+    let settings = MfsSettings {
         readout: Readout::Centre,
-        ..Settings::default()
+        ..MfsSettings::default()
     };
     let of = |k: usize, shape: &Shape| {
         let mesh = shape::build(shape, Path::new("."), Some(80)).unwrap();
@@ -89,7 +89,7 @@ fn lattice(n: usize) -> Vec<Pose> {
 #[test]
 fn derivatives_of_many_pairs_go_in_batches() {
     let mesh = shape::build(&Shape::ellipsoid([0.5, 0.3, 0.4]), Path::new("."), Some(20)).unwrap();
-    let boundary = BodyBoundary::new("b", &mesh, &Settings::default()).unwrap();
+    let boundary = BodyBoundary::new("b", &mesh, &MfsSettings::default()).unwrap();
     let body = Arc::new(MfsBody::new(Arc::new(boundary)));
     let poses = lattice(4);
     let settings = SolveSettings {

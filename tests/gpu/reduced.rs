@@ -3,7 +3,7 @@
 use super::fixture::*;
 use hydrograd::Error;
 use hydrograd::adjoint::lie::{Pose, Vec3, exp_matrix};
-use hydrograd::boundary::{BodyBoundary, Settings};
+use hydrograd::boundary::{BodyBoundary, MfsSettings};
 use hydrograd::coupling::reduced::{Cutoff, Reduced, ReducedBody, compress};
 use hydrograd::coupling::{Coupling, Direction, Exclusions, Linearise, Linearised};
 use hydrograd::gpu::reduced::GpuReduced;
@@ -16,10 +16,10 @@ use std::sync::{Arc, OnceLock};
 
 fn compressed(shape: &Shape, rank: usize) -> Arc<ReducedBody> {
     let mesh = shape::build(shape, Path::new("."), Some(320)).unwrap();
-    let b = BodyBoundary::new("b", &mesh, &Settings::default()).unwrap();
-    let settings = compress::Settings {
+    let b = BodyBoundary::new("b", &mesh, &MfsSettings::default()).unwrap();
+    let settings = compress::CompressSettings {
         rank: Some(rank),
-        ..compress::Settings::default()
+        ..compress::CompressSettings::default()
     };
     Arc::new(compress::compress("b", &mesh, &b, &settings).unwrap())
 }

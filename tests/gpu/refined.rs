@@ -3,7 +3,7 @@
 use super::fixture::*;
 use hydrograd::Error;
 use hydrograd::boundary::Method;
-use hydrograd::coupling::full::{Preconditioner, Solver};
+use hydrograd::coupling::full::{FullSolver, Preconditioner};
 use hydrograd::coupling::{Coupling, Exclusions, Linearise};
 use hydrograd::gpu::Arithmetic;
 use hydrograd::gpu::full::{Gpu, Probe};
@@ -75,7 +75,7 @@ fn too_few_iterations_are_an_error() {
 #[test]
 fn solvers_that_need_a_matrix_are_refused() {
     let mut settings = tight(Preconditioner::Factors);
-    settings.solver = Solver::Qr;
+    settings.solver = FullSolver::Qr;
     let model = model(Method::MfsVertex, &[], Exclusions::none(), settings);
     let message = Gpu::new(context(), &model)
         .err()

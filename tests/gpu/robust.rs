@@ -2,7 +2,7 @@
 
 use super::fixture::context;
 use super::trajectory::{STEPS, falling_ball, simulator};
-use hydrograd::coupling::full::Solver;
+use hydrograd::coupling::full::FullSolver;
 use hydrograd::gpu::{Context, Options};
 use hydrograd::simulate::Method;
 use hydrograd::simulate::{Action, ActionBar, Backend, GpuSettings, Observation, Policy};
@@ -98,7 +98,7 @@ fn what_the_gpu_has_no_part_in_runs_on_the_cpu_or_is_refused() {
 
     // A fallback is for devices that fail, not for what isn't offered.
     let wanted = settings().gpu(with_fallback());
-    let dense = wanted.solver(Solver::Qr);
+    let dense = wanted.solver(FullSolver::Qr);
     for (settings, word) in [(wanted.method(Method::Panel), "panel"), (dense, "Qr")] {
         let found = error(settings);
         assert!(matches!(found, Error::Unsupported { .. }), "{found:?}");

@@ -4,8 +4,8 @@
 use super::tools::{all, along, vector_along, wavy};
 use hydrograd::adjoint::check::{Outcome, Rung};
 use hydrograd::adjoint::lie::{Mat6, Pose, Vec3, Vec6, cross_motion, exp_matrix};
-use hydrograd::boundary::{BodyBoundary, Method, Settings};
-use hydrograd::coupling::full::{Full, MfsBody, SolveSettings, Solver};
+use hydrograd::boundary::{BodyBoundary, Method, MfsSettings};
+use hydrograd::coupling::full::{Full, FullSolver, MfsBody, SolveSettings};
 use hydrograd::coupling::reduced::{Cutoff, Reduced, compress};
 use hydrograd::coupling::{Direction, Exclusions, Isolated, Linearise};
 use hydrograd::geometry::Image;
@@ -49,24 +49,24 @@ const SIDE: Wall = Wall {
     normal: [1.0, 0.0, -0.1],
 };
 
-fn body(shape: Shape, method: Method, solver: Solver) -> Arc<MfsBody> {
+fn body(shape: Shape, method: Method, solver: FullSolver) -> Arc<MfsBody> {
     let mesh = shape::build(&shape, Path::new("."), Some(80)).unwrap();
-    let mut settings = Settings {
+    let mut settings = MfsSettings {
         method,
-        ..Settings::default()
+        ..MfsSettings::default()
     };
-    if solver == Solver::Gmres {
+    if solver == FullSolver::Gmres {
         settings.damping = 0.0;
     }
     let b = BodyBoundary::new("b", &mesh, &settings).unwrap();
     Arc::new(MfsBody::new(Arc::new(b)))
 }
 
-fn full(method: Method, solver: Solver, walls: &[Wall]) -> Full {
+fn full(method: Method, solver: FullSolver, walls: &[Wall]) -> Full {
     without(Exclusions::none(), method, solver, walls)
 }
 
-fn without(excluded: Exclusions, method: Method, solver: Solver, walls: &[Wall]) -> Full {
+fn without(excluded: Exclusions, method: Method, solver: FullSolver, walls: &[Wall]) -> Full {
     let bodies = vec![
         body(Shape::sphere(0.5), method, solver),
         body(Shape::ellipsoid([0.6, 0.3, 0.4]), method, solver),
@@ -83,14 +83,14 @@ fn without(excluded: Exclusions, method: Method, solver: Solver, walls: &[Wall])
 /// that feel each other's images alone.
 fn systems() -> Vec<Full> {
     vec![
-        full(Method::MfsVertex, Solver::Cgls, &[]),
-        full(Method::MfsVertex, Solver::Qr, &[WALL, SIDE]),
-        full(Method::MfsFace, Solver::Cgls, &[WALL]),
-        full(Method::MfsFace, Solver::Gmres, &[]),
+        full(Method::MfsVertex, FullSolver::Cgls, &[]),
+        full(Method::MfsVertex, FullSolver::Qr, &[WALL, SIDE]),
+        full(Method::MfsFace, FullSolver::Cgls, &[WALL]),
+        full(Method::MfsFace, FullSolver::Gmres, &[]),
         without(
             Exclusions::new([(0, 1)]),
             Method::MfsVertex,
-            Solver::Cgls,
+            FullSolver::Cgls,
             &[WALL],
         ),
     ]
@@ -101,10 +101,10 @@ fn systems() -> Vec<Full> {
 fn reduced_systems() -> Vec<Reduced> {
     let compressed = |shape: Shape| {
         let mesh = shape::build(&shape, Path::new("."), Some(320)).unwrap();
-        let b = BodyBoundary::new("b", &mesh, &Settings::default()).unwrap();
-        let settings = compress::Settings {
+        let b = BodyBoundary::new("b", &mesh, &MfsSettings::default()).unwrap();
+        let settings = compress::CompressSettings {
             rank: Some(20),
-            ..compress::Settings::default()
+            ..compress::CompressSettings::default()
         };
         Arc::new(compress::compress("b", &mesh, &b, &settings).unwrap())
     };

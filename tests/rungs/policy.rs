@@ -4,8 +4,8 @@ use super::tools::{Group, all, groups, wavy};
 use hydrograd::adjoint::check::{Outcome, Rung};
 use hydrograd::scene::{Body, Controller, Fluid, Joint, Scene, Shape};
 use hydrograd::simulate::{
-    Constant, Knots, Observation, OpenLoop, Pd, PdAxis, Playback, Policy, PushThenLock,
-    SpeedStages, Stage,
+    Constant, Knots, Observation, OpenLoop, Pd, PdAxis, Playback, Policy, PushThenLock, SpeedStage,
+    SpeedStages,
 };
 use hydrograd::{Controls, Fidelity, Settings, Simulator};
 use nalgebra::{DMatrix, DVector};
@@ -140,7 +140,7 @@ fn push_then_lock(c: f64) -> Outcome {
 fn speed_stages(c: f64) -> Outcome {
     let v = wavy(3, 1.5, 1.0);
     let fastest = v[0].abs().max(v[2].abs());
-    let stage = |until: f64, control: [f64; 2]| Stage {
+    let stage = |until: f64, control: [f64; 2]| SpeedStage {
         until,
         control: control.to_vec(),
     };

@@ -9,21 +9,21 @@ use crate::support::reference::{
 use crate::support::{mesh, scaled_error};
 use hydrograd::Error;
 use hydrograd::adjoint::lie::{Mat3, Mat6, Pose, Vec3, Vec6, exp_matrix, skew};
-use hydrograd::boundary::{BodyBoundary, Method, Settings};
-use hydrograd::coupling::full::{Full, MfsBody, Preconditioner, SolveSettings, Solver};
+use hydrograd::boundary::{BodyBoundary, Method, MfsSettings};
+use hydrograd::coupling::full::{Full, FullSolver, MfsBody, Preconditioner, SolveSettings};
 use hydrograd::coupling::{Coupling, CouplingReport, Direction, Exclusions, Isolated, Linearise};
 use hydrograd::scene::{Shape, Wall};
 use nalgebra::{DMatrix, DVector};
 use std::sync::{Arc, LazyLock};
 
-fn submerged(semi_axes: [f64; 3], faces: usize, settings: &Settings) -> Arc<MfsBody> {
+fn submerged(semi_axes: [f64; 3], faces: usize, settings: &MfsSettings) -> Arc<MfsBody> {
     let mesh = mesh(&Shape::ellipsoid(semi_axes), faces);
     let b = BodyBoundary::new("body", &mesh, settings).unwrap();
     Arc::new(MfsBody::new(Arc::new(b)))
 }
 
 fn ellipsoid(semi_axes: [f64; 3], faces: usize) -> Arc<MfsBody> {
-    submerged(semi_axes, faces, &Settings::default())
+    submerged(semi_axes, faces, &MfsSettings::default())
 }
 
 /// Unit sphere and coin, 1280 faces.
@@ -385,11 +385,11 @@ fn iterative_solvers_agree_with_dense_factorisation() {
         };
         matrix(&full(&bodies, &[], settings), &uneven_poses())
     };
-    let (reference, direct) = solve(Solver::Qr, Preconditioner::Factors, 1e-8);
+    let (reference, direct) = solve(FullSolver::Qr, Preconditioner::Factors, 1e-8);
     assert_eq!(direct.iterations, 0);
     println!("preconditioner, tolerance | scaled error against QR | iterations");
     for tolerance in [1e-3, 1e-5, 1e-8, 1e-11] {
-        let (m, report) = solve(Solver::Cgls, Preconditioner::Factors, tolerance);
+        let (m, report) = solve(FullSolver::Cgls, Preconditioner::Factors, tolerance);
         let error = scaled_error(&m, &reference);
         println!(
             "factors {tolerance:e} | {error:.1e} | {}",
@@ -401,7 +401,7 @@ fn iterative_solvers_agree_with_dense_factorisation() {
         assert!(error > 1e-4 * tolerance, "{tolerance:e}: {error:e}");
     }
     for preconditioner in [Preconditioner::Jacobi, Preconditioner::None] {
-        let (m, report) = solve(Solver::Cgls, preconditioner, 1e-8);
+        let (m, report) = solve(FullSolver::Cgls, preconditioner, 1e-8);
         let error = scaled_error(&m, &reference);
         println!(
             "{preconditioner:?} 1e-8 | {error:.1e} | {}",
@@ -413,10 +413,10 @@ fn iterative_solvers_agree_with_dense_factorisation() {
 
 #[test]
 fn solvers_of_the_square_system_agree() {
-    let settings = Settings {
+    let settings = MfsSettings {
         method: Method::MfsFace,
         damping: 0.0,
-        ..Settings::default()
+        ..MfsSettings::default()
     };
     let bodies = [
         submerged([1.0, 0.8, 0.9], 320, &settings),
@@ -431,11 +431,11 @@ fn solvers_of_the_square_system_agree() {
         };
         matrix(&full(&bodies, &[], settings), &uneven_poses())
     };
-    let (reference, _) = solve(Solver::Qr, Preconditioner::Factors, 1e-8);
+    let (reference, _) = solve(FullSolver::Qr, Preconditioner::Factors, 1e-8);
     for (solver, preconditioner, limit) in [
-        (Solver::Gmres, Preconditioner::Factors, 3e-10),
-        (Solver::Gmres, Preconditioner::Jacobi, 1e-8),
-        (Solver::Cgls, Preconditioner::Factors, 3e-10),
+        (FullSolver::Gmres, Preconditioner::Factors, 3e-10),
+        (FullSolver::Gmres, Preconditioner::Jacobi, 1e-8),
+        (FullSolver::Cgls, Preconditioner::Factors, 3e-10),
     ] {
         let (m, report) = solve(solver, preconditioner, 1e-10);
         let error = scaled_error(&m, &reference);
@@ -665,7 +665,7 @@ fn bodies_in_another_order_or_frame_give_the_same() {
     };
     let mesh = mesh(&shape, 320);
     let moved = mesh.transformed(&Pose::new(Mat3::identity(), shift));
-    let b = BodyBoundary::new("b", &moved, &Settings::default()).unwrap();
+    let b = BodyBoundary::new("b", &moved, &MfsSettings::default()).unwrap();
     let shifted = Arc::new(MfsBody::new(Arc::new(b)));
     let mut placed = poses.clone();
     placed[1].translation = poses[1].apply(&-shift);
@@ -757,7 +757,7 @@ fn coupling_of_first() -> DMatrix<f64> {
 
 #[test]
 fn nothing_that_moves_costs_nothing() {
-    for solver in [Solver::Cgls, Solver::Qr] {
+    for solver in [FullSolver::Cgls, FullSolver::Qr] {
         for preconditioner in [Preconditioner::Factors, Preconditioner::Jacobi] {
             let settings = SolveSettings {
                 solver,
@@ -839,7 +839,7 @@ fn settings_without_meaning_are_refused() {
         ));
     }
     let gmres = SolveSettings {
-        solver: Solver::Gmres,
+        solver: FullSolver::Gmres,
         ..tight()
     };
     let error = refused(&[], gmres).unwrap();

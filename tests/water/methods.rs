@@ -4,7 +4,7 @@ use crate::support::bodies::mapped;
 use crate::support::mesh;
 use crate::support::reference::lamb;
 use hydrograd::adjoint::lie::{Mat6, Vec3, skew};
-use hydrograd::boundary::{BodyBoundary, PanelBoundary, Settings};
+use hydrograd::boundary::{BodyBoundary, MfsSettings, PanelBoundary};
 use hydrograd::scene::Shape;
 use hydrograd::{Error, TriMesh};
 
@@ -26,7 +26,7 @@ struct Solved {
 fn solve(method: Method, mesh: &TriMesh) -> Solved {
     match method {
         Mfs => {
-            let b = BodyBoundary::new("body", mesh, &Settings::default()).unwrap();
+            let b = BodyBoundary::new("body", mesh, &MfsSettings::default()).unwrap();
             Solved {
                 added_mass: b.added_mass,
                 condition: b.condition,

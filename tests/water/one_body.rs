@@ -3,7 +3,7 @@
 use crate::support::mesh;
 use crate::support::reference::lamb;
 use hydrograd::adjoint::lie::{Mat6, Vec3};
-use hydrograd::boundary::{BodyBoundary, Depth, Method, Readout, RowScaling, Settings};
+use hydrograd::boundary::{BodyBoundary, Depth, Method, MfsSettings, Readout, RowScaling};
 use hydrograd::scene::Shape;
 use hydrograd::{Error, TriMesh};
 
@@ -11,7 +11,7 @@ fn ellipsoid(semi_axes: [f64; 3], faces: usize) -> TriMesh {
     mesh(&Shape::ellipsoid(semi_axes), faces)
 }
 
-fn build(mesh: &TriMesh, settings: &Settings) -> BodyBoundary {
+fn build(mesh: &TriMesh, settings: &MfsSettings) -> BodyBoundary {
     BodyBoundary::new("body", mesh, settings).unwrap()
 }
 
@@ -31,7 +31,7 @@ fn worst(errors: &[f64]) -> f64 {
 fn errors_fall_with_the_square_of_the_edge() {
     let semi_axes = [1.0, 0.25, 1.0];
     let error = |faces| {
-        let b = build(&ellipsoid(semi_axes, faces), &Settings::default());
+        let b = build(&ellipsoid(semi_axes, faces), &MfsSettings::default());
         worst(&errors(&b.added_mass, &lamb(semi_axes)))
     };
     assert!(error(1280) < 0.4 * error(320));
@@ -45,7 +45,7 @@ fn published_equations_at_fixed_depths() {
     let vertex = [(0.02, -3.02), (0.05, -1.12), (0.1, -0.37), (0.2, -0.29)];
     for (method, figures) in [(Method::MfsFace, face), (Method::MfsVertex, vertex)] {
         for (depth, percent) in figures {
-            let b = build(&sphere, &Settings::plain(method, Depth::Fixed(depth)));
+            let b = build(&sphere, &MfsSettings::plain(method, Depth::Fixed(depth)));
             let e = errors(&b.added_mass, &exact)[0];
             assert!(
                 (e - percent).abs() < 0.02 + 0.005 * percent.abs(),
@@ -59,7 +59,7 @@ fn published_equations_at_fixed_depths() {
 fn a_fixed_depth_is_checked() {
     let coin = ellipsoid([1.0, 0.2, 1.0], 320);
     let at = |d| {
-        let settings = Settings {
+        let settings = MfsSettings {
             depth: Depth::Fixed(d),
             ..Default::default()
         };
@@ -87,7 +87,7 @@ fn a_fixed_depth_is_checked() {
 fn sharp_edges_converge() {
     // By extrapolation of a panel method: cube 0.638; plate 0.520 across.
     let cube = Shape::cuboid([1.0; 3]);
-    let b = build(&mesh(&cube, 1280), &Settings::default());
+    let b = build(&mesh(&cube, 1280), &MfsSettings::default());
     assert!(
         (b.added_mass[(0, 0)] / 0.638 - 1.0).abs() < 0.02,
         "{}",
@@ -97,7 +97,7 @@ fn sharp_edges_converge() {
         size: [1.0, 0.1, 1.0],
         faces: None,
     };
-    let b = build(&mesh(&plate, 1280), &Settings::default());
+    let b = build(&mesh(&plate, 1280), &MfsSettings::default());
     assert!(
         (b.added_mass[(1, 1)] / 0.520 - 1.0).abs() < 0.04,
         "{}",
@@ -108,7 +108,7 @@ fn sharp_edges_converge() {
         length: 1.8,
         faces: None,
     };
-    let b = build(&mesh(&column, 1280), &Settings::default());
+    let b = build(&mesh(&column, 1280), &MfsSettings::default());
     assert!(
         (b.added_mass[(0, 0)] / 0.0194 - 1.0).abs() < 0.02,
         "{}",
@@ -135,7 +135,7 @@ fn coarsest_meshes_give_positive_matrices_or_an_error() {
             for rows in [RowScaling::Scaled, RowScaling::Unscaled] {
                 for readout in [Readout::Corrected, Readout::Centre] {
                     for damping in [0.0, 3e-3] {
-                        let settings = Settings {
+                        let settings = MfsSettings {
                             method,
                             rows,
                             readout,
@@ -162,7 +162,7 @@ fn coarsest_meshes_give_positive_matrices_or_an_error() {
 
 #[test]
 fn the_factor_is_that_of_the_damped_equations() {
-    let b = build(&ellipsoid([1.0, 0.5, 0.7], 80), &Settings::default());
+    let b = build(&ellipsoid([1.0, 0.5, 0.7], 80), &MfsSettings::default());
     let (k, r) = (b.flux_matrix(), b.factor());
     let (normal, square) = (k.transpose() * k, r.transpose() * r);
     let size = normal.norm_max();
@@ -185,13 +185,13 @@ fn the_factor_is_that_of_the_damped_equations() {
 #[test]
 fn settings_that_cannot_be_are_errors() {
     let sphere = ellipsoid([1.0; 3], 80);
-    let settings = Settings {
+    let settings = MfsSettings {
         damping: f64::NAN,
         ..Default::default()
     };
     assert!(BodyBoundary::new("bad", &sphere, &settings).is_err());
     // Sources outside, past the other side.
-    let settings = Settings {
+    let settings = MfsSettings {
         depth: Depth::Fixed(3.0),
         ..Default::default()
     };
@@ -202,9 +202,9 @@ fn settings_that_cannot_be_are_errors() {
 #[test]
 fn settings_read_from_toml() {
     let text = "method = \"mfs-face\"\ndepth = { fixed = 0.02 }\nrows = \"unscaled\"";
-    let s: Settings = toml::from_str(text).unwrap();
+    let s: MfsSettings = toml::from_str(text).unwrap();
     assert_eq!(s.method, Method::MfsFace);
     assert_eq!(s.depth, Depth::Fixed(0.02));
     assert_eq!(s.rows, RowScaling::Unscaled);
-    assert_eq!(s.damping, Settings::default().damping);
+    assert_eq!(s.damping, MfsSettings::default().damping);
 }

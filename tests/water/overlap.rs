@@ -4,7 +4,7 @@ use crate::support::says;
 use hydrograd::adjoint::kernel::{Sources, Write};
 use hydrograd::adjoint::lie::{Pose, Vec3, Vec6, exp_matrix};
 use hydrograd::boundary::{self, BodyBoundary};
-use hydrograd::coupling::full::{Full, MfsBody, SolveSettings, Solver};
+use hydrograd::coupling::full::{Full, FullSolver, MfsBody, SolveSettings};
 use hydrograd::coupling::{Coupling, Exclusions};
 use hydrograd::geometry::Image;
 use hydrograd::scene::{Body, Controller, Fluid, Joint, Plane, Scene, Shape, Wall};
@@ -334,7 +334,7 @@ fn excluded_pairs_do_not_feel_each_other_and_feel_all_else() {
     .into_iter()
     .map(|shape| {
         let mesh = shape::build(&shape, Path::new("."), Some(80)).unwrap();
-        let b = BodyBoundary::new("b", &mesh, &boundary::Settings::default());
+        let b = BodyBoundary::new("b", &mesh, &boundary::MfsSettings::default());
         Arc::new(MfsBody::new(Arc::new(b.unwrap())))
     })
     .collect();
@@ -366,7 +366,7 @@ fn excluded_pairs_do_not_feel_each_other_and_feel_all_else() {
     };
 
     // Two alone: each has its own added mass, and nothing between them.
-    let m = matrix(&coupling(2, &[], Solver::Cgls), &poses[..2]);
+    let m = matrix(&coupling(2, &[], FullSolver::Cgls), &poses[..2]);
     for (b, body) in bodies[..2].iter().enumerate() {
         let own = body.boundary.added_mass;
         let error = (m.fixed_view::<6, 6>(6 * b, 6 * b) - own).amax();
@@ -377,7 +377,7 @@ fn excluded_pairs_do_not_feel_each_other_and_feel_all_else() {
     // With a third, and with a wall, which throw their flow back at each other.
     for (n, walls) in [(3, vec![]), (2, vec![wall]), (3, vec![wall])] {
         let exact = written_out(&bodies[..n], &walls, &[(0, 1)], &poses[..n]);
-        for solver in [Solver::Cgls, Solver::Qr] {
+        for solver in [FullSolver::Cgls, FullSolver::Qr] {
             let coupled = coupling(n, &walls, solver);
             // Matrices that served another evaluation are used again.
             let mut other = poses[..n].to_vec();

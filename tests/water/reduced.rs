@@ -15,7 +15,7 @@ use std::sync::Arc;
 fn sphere(rank: Option<usize>, tolerance: f64, gap: f64) -> Arc<ReducedBody> {
     let mesh = mesh(&Shape::sphere(1.0), 1280);
     let response = ExactBoundary::new("sphere", [1.0; 3], &Pose::identity(), gap).unwrap();
-    let settings = compress::Settings {
+    let settings = compress::CompressSettings {
         rank,
         tolerance,
         resolved_gap: Some(gap),
@@ -112,7 +112,7 @@ fn the_matrix_is_symmetric_to_rounding() {
     let panel = |shape: Shape| {
         let mesh = mesh(&shape, 320);
         let response = PanelBoundary::new("box", &mesh).unwrap();
-        let settings = compress::Settings::default();
+        let settings = compress::CompressSettings::default();
         Arc::new(compress::compress("box", &mesh, &response, &settings).unwrap())
     };
     let wall = Wall::rigid([0.0, 0.0, -2.0], [0.0, 0.2, 1.0]);

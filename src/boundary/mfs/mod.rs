@@ -31,7 +31,7 @@ use crate::{Error, Result};
 use faer::{Mat, MatMut, MatRef};
 
 pub(crate) use factor::{solve_upper, solve_upper_transpose};
-pub use settings::{Depth, Method, Readout, RowScaling, Settings};
+pub use settings::{Depth, Method, MfsSettings, Readout, RowScaling};
 
 /// Condition number above which results lose digits that matter.
 const ILL_CONDITIONED: f64 = 1e8;
@@ -43,7 +43,7 @@ pub struct BodyBoundary {
     /// Name, for messages.
     pub name: String,
     /// What it was made with.
-    pub settings: Settings,
+    pub settings: MfsSettings,
     /// Geometry of the faces.
     pub faces: Faces,
     /// Source points s_j, m, body frame.
@@ -93,7 +93,7 @@ impl BodyBoundary {
     ///
     /// # Errors
     /// Settings out of range, and a mesh that doesn't resolve the body.
-    pub fn new(name: &str, mesh: &TriMesh, settings: &Settings) -> Result<Self> {
+    pub fn new(name: &str, mesh: &TriMesh, settings: &MfsSettings) -> Result<Self> {
         let mut out = Self::lay_out(name, mesh, settings)?;
         out.solve_alone()?;
         Ok(out)
@@ -106,7 +106,7 @@ impl BodyBoundary {
     ///
     /// # Errors
     /// As [`BodyBoundary::new`].
-    pub fn unfactored(name: &str, mesh: &TriMesh, settings: &Settings) -> Result<Self> {
+    pub fn unfactored(name: &str, mesh: &TriMesh, settings: &MfsSettings) -> Result<Self> {
         let mut out = Self::lay_out(name, mesh, settings)?;
         if settings.damping > 0.0 {
             let (method, sources) = (settings.method, &out.sources);
@@ -124,7 +124,7 @@ impl BodyBoundary {
     }
 
     /// All that needs no solve; no damping yet.
-    fn lay_out(name: &str, mesh: &TriMesh, settings: &Settings) -> Result<Self> {
+    fn lay_out(name: &str, mesh: &TriMesh, settings: &MfsSettings) -> Result<Self> {
         let surface = Interior::new(mesh);
         let depth::Placement {
             sources,

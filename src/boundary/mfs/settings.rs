@@ -6,7 +6,7 @@ use strum::{EnumMessage, EnumString, IntoStaticStr, VariantArray};
 /// Discretisation of one body's surface.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(default, deny_unknown_fields, rename_all = "kebab-case")]
-pub struct Settings {
+pub struct MfsSettings {
     /// Where the sources are and what a row says.
     pub method: Method,
     /// How far inside the surface the sources are.
@@ -21,7 +21,7 @@ pub struct Settings {
     pub damping: f64,
 }
 
-impl Default for Settings {
+impl Default for MfsSettings {
     fn default() -> Self {
         Self {
             method: Method::default(),
@@ -33,7 +33,7 @@ impl Default for Settings {
     }
 }
 
-impl Settings {
+impl MfsSettings {
     /// No damping, and the potential read at face centres: the equations as published.
     pub fn plain(method: Method, depth: Depth) -> Self {
         Self {

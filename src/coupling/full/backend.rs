@@ -2,7 +2,7 @@
 //!
 //! In the notation of the [fidelity](super): for k columns of body-frame twists x̄ a backend solves for
 //! a, λ, r, μ and keeps them where it likes; what leaves it is small (momenta, energies, wrenches), but
-//! for [`Response::strengths`].
+//! for [`SystemResponse::strengths`].
 
 use crate::Result;
 use crate::adjoint::lie::{Pose, Vec6};
@@ -11,7 +11,7 @@ use crate::solver::Columns;
 use nalgebra::DMatrix;
 
 /// What runs the pair work and the solves of the coupled system.
-pub trait Backend: Send + Sync {
+pub trait SystemBackend: Send + Sync {
     /// Name, for reports: `cpu`, or what the adapter calls itself.
     fn name(&self) -> &str;
 
@@ -20,14 +20,18 @@ pub trait Backend: Send + Sync {
     ///
     /// # Errors
     /// A solve that misses its tolerance, or a device that fails.
-    fn respond(&self, poses: &[Pose], twists: &DMatrix<f64>) -> Result<Box<dyn Response + '_>>;
+    fn respond(
+        &self,
+        poses: &[Pose],
+        twists: &DMatrix<f64>,
+    ) -> Result<Box<dyn SystemResponse + '_>>;
 }
 
 /// The water's solution to k columns of twists at given poses: a, λ, r, μ, wherever they lie.
 ///
-/// Bodies that none of the columns given to [`Backend::respond`] moves have no impulses, there and in
-/// all that comes from it by [`Response::directions`].
-pub trait Response: Send + Sync {
+/// Bodies that none of the columns given to [`SystemBackend::respond`] moves have no impulses, there and in
+/// all that comes from it by [`SystemResponse::directions`].
+pub trait SystemResponse: Send + Sync {
     /// What its solves reached.
     fn reached(&self) -> Reached;
 
@@ -57,7 +61,7 @@ pub trait Response: Send + Sync {
     ///
     /// # Errors
     /// A solve that misses its tolerance, or a device that fails.
-    fn directions(&self, directions: &[Direction]) -> Result<Box<dyn Response + '_>>;
+    fn directions(&self, directions: &[Direction]) -> Result<Box<dyn SystemResponse + '_>>;
 
     /// The tangent of the energy of the first with the last column (which are one if there is one)
     /// along the displacement z, a spatial twist a body.

@@ -1,6 +1,6 @@
 //! One evaluation of the coupled system, and its derivatives: what a backend's solution means.
 
-use super::{Full, Model, Response};
+use super::{Full, Model, SystemResponse};
 use crate::Result;
 use crate::adjoint::lie::{Pose, Vec6};
 use crate::coupling::settings::asymmetry;
@@ -13,7 +13,7 @@ use nalgebra::{DMatrix, DVector};
 pub(super) struct Solved<'a> {
     pub model: &'a Model,
     /// Solution to the basis.
-    pub response: Box<dyn Response + 'a>,
+    pub response: Box<dyn SystemResponse + 'a>,
     pub value: Momenta,
 }
 

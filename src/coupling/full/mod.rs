@@ -23,7 +23,7 @@
 //!
 //! which is Eq. 21 done once, transposed, with the least-squares residual terms that Eq. 21 drops.
 //!
-//! What the system consists of is the [`Model`]; a [`Backend`] computes with it, here [`Cpu`].
+//! What the system consists of is the [`Model`]; a [`SystemBackend`] computes with it, here [`Cpu`].
 
 mod backend;
 mod body;
@@ -34,11 +34,11 @@ mod linearised;
 mod model;
 mod settings;
 
-pub use backend::{Backend, Reached, Response};
+pub use backend::{Reached, SystemBackend, SystemResponse};
 pub use body::MfsBody;
 pub use cpu::Cpu;
 pub use model::Model;
-pub use settings::{Preconditioner, SolveSettings, Solver};
+pub use settings::{FullSolver, Preconditioner, SolveSettings};
 
 use super::{Coupling, Exclusions, Linearise, Linearised, Momenta};
 use crate::Result;
@@ -51,7 +51,7 @@ use std::sync::Arc;
 /// All bodies coupled through one boundary integral system.
 pub struct Full {
     model: Arc<Model>,
-    backend: Box<dyn Backend>,
+    backend: Box<dyn SystemBackend>,
 }
 
 impl Full {
@@ -71,7 +71,7 @@ impl Full {
     }
 
     /// On a backend made for the same model.
-    pub fn on(model: Arc<Model>, backend: Box<dyn Backend>) -> Self {
+    pub fn on(model: Arc<Model>, backend: Box<dyn SystemBackend>) -> Self {
         Self { model, backend }
     }
 
@@ -81,7 +81,7 @@ impl Full {
     }
 
     /// What computes it.
-    pub fn backend(&self) -> &dyn Backend {
+    pub fn backend(&self) -> &dyn SystemBackend {
         self.backend.as_ref()
     }
 

@@ -25,7 +25,7 @@ use strum::{EnumMessage, EnumString, IntoStaticStr, VariantArray};
 )]
 #[serde(rename_all = "kebab-case")]
 #[strum(serialize_all = "kebab-case")]
-pub enum Solver {
+pub enum FullSolver {
     /// Conjugate gradients on the least-squares problem (Eq. 20).
     #[default]
     Cgls,
@@ -67,7 +67,7 @@ pub enum Preconditioner {
 #[serde(deny_unknown_fields, default)]
 pub struct SolveSettings {
     /// The solver.
-    pub solver: Solver,
+    pub solver: FullSolver,
     /// Its preconditioner.
     pub preconditioner: Preconditioner,
     /// Relative residual at which it stops: ‖R⁻ᵀ(g − KᵀKx)‖ ≤ tolerance ‖R⁻ᵀg‖ for CGLS,
@@ -80,7 +80,7 @@ pub struct SolveSettings {
 impl Default for SolveSettings {
     fn default() -> Self {
         Self {
-            solver: Solver::default(),
+            solver: FullSolver::default(),
             preconditioner: Preconditioner::default(),
             tolerance: 1e-8,
             max_iterations: 2000,
@@ -92,7 +92,7 @@ impl SolveSettings {
     pub(super) fn validate(&self, bodies: &[Arc<MfsBody>]) -> Result<()> {
         check_limits(self.tolerance, self.max_iterations)?;
         let square = |b: &Arc<MfsBody>| b.boundary.settings.method == Method::MfsFace;
-        if self.solver == Solver::Gmres
+        if self.solver == FullSolver::Gmres
             && let Some(body) = bodies.iter().find(|b| !square(b))
         {
             return Err(Error::Unsupported {
@@ -102,7 +102,7 @@ impl SolveSettings {
             });
         }
         let damped = |b: &Arc<MfsBody>| b.boundary.settings.damping != 0.0;
-        if self.solver == Solver::Gmres
+        if self.solver == FullSolver::Gmres
             && let Some(body) = bodies.iter().find(|b| damped(b))
         {
             return Err(Error::input(

@@ -34,7 +34,7 @@ use std::sync::Arc;
 /// How the coupled panel system is solved.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "kebab-case")]
-pub enum Solver {
+pub enum PanelSolver {
     /// GMRES, preconditioned by each body's own factors. Stores the blocks between different bodies
     /// (and those with images), 8 bytes an entry.
     #[default]
@@ -48,7 +48,7 @@ pub enum Solver {
 #[serde(deny_unknown_fields, default)]
 pub struct SolveSettings {
     /// The solver.
-    pub solver: Solver,
+    pub solver: PanelSolver,
     /// Relative residual ‖b − A x‖ ≤ tolerance ‖b‖ at which GMRES stops.
     pub tolerance: f64,
     /// Iterations after which it gives up with an error.
@@ -58,7 +58,7 @@ pub struct SolveSettings {
 impl Default for SolveSettings {
     fn default() -> Self {
         Self {
-            solver: Solver::default(),
+            solver: PanelSolver::default(),
             tolerance: 1e-8,
             max_iterations: 500,
         }

@@ -1,6 +1,6 @@
 //! The matrix between panels at given poses, and its solves.
 
-use super::{PanelCoupled, Solver};
+use super::{PanelCoupled, PanelSolver};
 use crate::adjoint::kernel::Write;
 use crate::adjoint::lie::{Pose, Vec3};
 use crate::geometry::Image;
@@ -58,15 +58,15 @@ pub(super) fn seen_from(
 }
 
 impl<'a> System<'a> {
-    /// Assembles A, and factors it where the solver is [`Solver::Lu`].
+    /// Assembles A, and factors it where the solver is [`PanelSolver::Lu`].
     ///
     /// # Errors
     /// Bodies inside each other, or behind a wall.
     pub fn new(coupled: &'a PanelCoupled, poses: &[Pose]) -> Result<Self> {
         check_walls(coupled, poses)?;
         let matrix = match coupled.settings.solver {
-            Solver::Gmres => Matrix::Blocks(blocks(coupled, poses)?),
-            Solver::Lu => Matrix::Factored(dense(coupled, poses)?),
+            PanelSolver::Gmres => Matrix::Blocks(blocks(coupled, poses)?),
+            PanelSolver::Lu => Matrix::Factored(dense(coupled, poses)?),
         };
         Ok(Self { coupled, matrix })
     }

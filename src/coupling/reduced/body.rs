@@ -12,9 +12,9 @@ use serde::{Deserialize, Serialize};
 /// Held fixed in a flow with potential ψ, the body solutions with the strengths `L Lᵀ ψ(x̄)` at its
 /// points x̄; moved with the twist ν it solutions with `Ū ν`; α makes the potential `Σ α_j/|x − x̄_j|`.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
-#[serde(try_from = "Parts", into = "Parts")]
+#[serde(try_from = "CompressedParts", into = "CompressedParts")]
 pub struct ReducedBody {
-    parts: Parts,
+    parts: CompressedParts,
     /// [L, Ū], points × (modes + 6).
     basis: DMatrix<f64>,
     /// The points as targets of the potential kernel.
@@ -24,7 +24,7 @@ pub struct ReducedBody {
 /// What a compressed body consists of.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
-pub struct Parts {
+pub struct CompressedParts {
     /// Name, for messages.
     pub name: String,
     /// x̄, m.
@@ -77,7 +77,7 @@ impl ReducedBody {
     ///
     /// # Errors
     /// Sizes that don't fit together, numbers that aren't finite.
-    pub fn new(parts: Parts) -> Result<Self> {
+    pub fn new(parts: CompressedParts) -> Result<Self> {
         let r = parts.points.len();
         let sizes = [parts.modes.nrows(), parts.strengths.nrows()];
         let bad = |what: &str, value: String, right: &str| {
@@ -144,7 +144,7 @@ impl ReducedBody {
     }
 
     /// What it consists of.
-    pub fn parts(&self) -> &Parts {
+    pub fn parts(&self) -> &CompressedParts {
         &self.parts
     }
 
@@ -168,15 +168,15 @@ impl ReducedBody {
     }
 }
 
-impl TryFrom<Parts> for ReducedBody {
+impl TryFrom<CompressedParts> for ReducedBody {
     type Error = Error;
 
-    fn try_from(parts: Parts) -> Result<Self> {
+    fn try_from(parts: CompressedParts) -> Result<Self> {
         Self::new(parts)
     }
 }
 
-impl From<ReducedBody> for Parts {
+impl From<ReducedBody> for CompressedParts {
     fn from(body: ReducedBody) -> Self {
         body.parts
     }

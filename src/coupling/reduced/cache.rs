@@ -6,7 +6,7 @@
 //! renamed, so that a writer that is killed leaves nothing half done.
 
 use super::ReducedBody;
-use super::compress::Settings;
+use super::compress::CompressSettings;
 use crate::geometry::TriMesh;
 use crate::{Error, Result};
 use serde::Serialize;
@@ -34,7 +34,7 @@ pub struct Key([u8; 32]);
 impl Key {
     /// Digest of a mesh in the body's frame, of what else the one-body `method` depends on, and of the
     /// compression's settings.
-    pub fn new(mesh: &TriMesh, method: &impl Serialize, settings: &Settings) -> Self {
+    pub fn new(mesh: &TriMesh, method: &impl Serialize, settings: &CompressSettings) -> Self {
         let mut digest = Sha256::new();
         digest.update(FORMAT);
         for x in mesh.vertices().iter().flat_map(|v| v.iter()) {

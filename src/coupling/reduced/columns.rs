@@ -1,7 +1,7 @@
 //! First derivatives of the energy of one direction with every column of the basis.
 
 use super::linearised::{Fields, ReducedLinearised};
-use super::link::Placed;
+use super::link::PlacedSkeletons;
 use super::views::{FLUX, vector};
 use crate::adjoint::kernel::potential_vjp;
 use crate::adjoint::lie::{Vec3, Vec6, six};
@@ -12,7 +12,7 @@ impl ReducedLinearised<'_> {
     fn fields(&self) -> &[Fields] {
         self.fields.get_or_init(|| {
             let columns = self.alpha.ncols();
-            let one = |placed: &Placed| {
+            let one = |placed: &PlacedSkeletons| {
                 let (t, s) = (self.range(placed.link.target), &placed.pair.points);
                 let own = self.alpha.rows(t.start, t.len()).transpose();
                 let targets = self.reduced.bodies[placed.link.target].targets();

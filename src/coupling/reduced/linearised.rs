@@ -2,7 +2,7 @@
 
 use super::Reduced;
 use super::factor::Factor;
-use super::link::{Link, Placed};
+use super::link::{Link, PlacedSkeletons};
 use super::views::{FLUX, interleave, vector, view, view_mut};
 use crate::Result;
 use crate::adjoint::kernel::potential_vjp;
@@ -26,7 +26,7 @@ const PULL: usize = 1;
 pub(super) struct ReducedLinearised<'a> {
     pub reduced: &'a Reduced,
     pub poses: Vec<Pose>,
-    pub placed: Vec<Placed<'a>>,
+    pub placed: Vec<PlacedSkeletons<'a>>,
     /// Of I − LᵀGL.
     factor: Factor,
     /// LᵀGŪ, modes × 6 bodies.
@@ -52,7 +52,7 @@ pub(super) struct Fields {
 }
 
 /// Solution to one combination of twists.
-pub(super) struct Response {
+pub(super) struct ReducedResponse {
     twists: DVector<f64>,
     a: DVector<f64>,
     /// α, all points.
@@ -149,9 +149,9 @@ impl<'a> ReducedLinearised<'a> {
     }
 
     /// Solution to a direction: a combination of what is there, or one more back-substitution.
-    pub fn respond(&self, x: Direction) -> Response {
+    pub fn respond(&self, x: Direction) -> ReducedResponse {
         match x {
-            Direction::Basis(c) => Response {
+            Direction::Basis(c) => ReducedResponse {
                 twists: &self.basis * c,
                 a: &self.a * c,
                 alpha: &self.alpha * c,
@@ -160,7 +160,7 @@ impl<'a> ReducedLinearised<'a> {
                 let twists = DMatrix::from_column_slice(x.len(), 1, x.as_slice());
                 let mut a = &self.solution * &twists;
                 self.factor.solve_in_place(&mut a);
-                Response {
+                ReducedResponse {
                     alpha: self.charges(&twists, &a).column(0).into_owned(),
                     a: a.column(0).into_owned(),
                     twists: x.clone(),
@@ -169,7 +169,7 @@ impl<'a> ReducedLinearised<'a> {
         }
     }
 
-    pub fn impulse(&self, x: &Response) -> DVector<f64> {
+    pub fn impulse(&self, x: &ReducedResponse) -> DVector<f64> {
         let column = |v: &DVector<f64>| DMatrix::from_column_slice(v.len(), 1, v.as_slice());
         let out = self.impulses(&column(&x.twists), &column(&x.a));
         out.column(0).into_owned()
@@ -197,7 +197,7 @@ impl<'a> ReducedLinearised<'a> {
 
     /// 4π α_xᵀ δG α_y: the Coulomb forces among the charges, as a wrench on each body.
     fn pull_back(&self, x: &[f64], y: &[f64]) -> Vec<Vec6> {
-        let one = |placed: &Placed| -> Vec6 {
+        let one = |placed: &PlacedSkeletons| -> Vec6 {
             let link = placed.link;
             let (t, s) = (self.range(link.target), self.range(link.source));
             // Equal charges need one field.
@@ -239,7 +239,7 @@ impl<'a> ReducedLinearised<'a> {
     }
 
     /// `[j][k]: Σ_i bar[i][k] P_ij`.
-    pub fn sums(&self, placed: &Placed, bar: &[f64], columns: usize) -> Vec<f64> {
+    pub fn sums(&self, placed: &PlacedSkeletons, bar: &[f64], columns: usize) -> Vec<f64> {
         let mut out = vec![0.0; columns * placed.pair.points.len()];
         let targets = self.reduced.bodies[placed.link.target].targets();
         crate::adjoint::kernel::potential_sum(targets, &placed.pair.points, bar, columns, &mut out);
@@ -248,7 +248,7 @@ impl<'a> ReducedLinearised<'a> {
 }
 
 /// [L, Ū]ᵀ P [L, Ū] of a link: (modes + 6) × (modes + 6).
-fn block(reduced: &Reduced, placed: &Placed) -> Mat<f64> {
+fn block(reduced: &Reduced, placed: &PlacedSkeletons) -> Mat<f64> {
     let link = placed.link;
     let (target, source) = (&reduced.bodies[link.target], &reduced.bodies[link.source]);
     let p = placed.potentials(&reduced.bodies);

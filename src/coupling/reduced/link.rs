@@ -25,7 +25,7 @@ pub struct Link {
 }
 
 /// A link at given poses.
-pub(super) struct Placed<'a> {
+pub(super) struct PlacedSkeletons<'a> {
     pub link: &'a Link,
     pub pair: Pair,
     /// The source body's centre in the target's frame, less the target's.
@@ -91,11 +91,15 @@ impl Link {
     }
 
     /// The link at the poses, unless it has faded out.
-    pub(super) fn place(&self, bodies: &[Arc<ReducedBody>], poses: &[Pose]) -> Option<Placed<'_>> {
+    pub(super) fn place(
+        &self,
+        bodies: &[Arc<ReducedBody>],
+        poses: &[Pose],
+    ) -> Option<PlacedSkeletons<'_>> {
         let parts = |b: usize| bodies[b].parts();
         let (t, s) = (self.target, self.source);
         let (centre, between, weight) = self.reach(bodies, poses);
-        (weight[0] > 0.0).then(|| Placed {
+        (weight[0] > 0.0).then(|| PlacedSkeletons {
             link: self,
             pair: Pair::new(
                 (t, &poses[t]),
@@ -110,7 +114,7 @@ impl Link {
     }
 }
 
-impl Placed<'_> {
+impl PlacedSkeletons<'_> {
     /// P, target points × source points, row-major.
     pub fn potentials(&self, bodies: &[Arc<ReducedBody>]) -> Vec<f64> {
         let targets = bodies[self.link.target].targets();

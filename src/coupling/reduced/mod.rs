@@ -30,7 +30,7 @@ mod second;
 mod system;
 mod views;
 
-pub use body::{Fit, Parts, ReducedBody};
+pub use body::{CompressedParts, Fit, ReducedBody};
 pub use cutoff::Cutoff;
 pub use link::Link;
 pub use system::Reduced;

@@ -1,6 +1,6 @@
 //! What an evaluation must not have come to, whatever computed it.
 
-use super::{Parts, Reduced};
+use super::{CompressedParts, Reduced};
 use crate::adjoint::lie::{Mat6, Pose, Vec3};
 use crate::{Error, Result};
 use nalgebra::DMatrix;
@@ -84,7 +84,7 @@ fn closest(reduced: &Reduced, poses: &[Pose], quantity: &str, value: f64) -> Err
 
 /// What a body's own added mass is below zero by, scaled by the water displaced: the one-body method's
 /// error in a spin that moves no water, and no matter of gaps.
-fn deficit(p: &Parts) -> f64 {
+fn deficit(p: &CompressedParts) -> f64 {
     let mass = p.volume.max(p.added_mass.fixed_view::<3, 3>(0, 0).trace());
     let arm = p.radius + p.centre.norm();
     let scale = |i: usize| mass.sqrt() * if i < 3 { 1.0 } else { arm };

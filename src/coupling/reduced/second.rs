@@ -1,7 +1,7 @@
 //! Second derivatives along one displacement: the tangent of the first.
 
-use super::linearised::{ReducedLinearised, Response};
-use super::link::Placed;
+use super::linearised::{ReducedLinearised, ReducedResponse};
+use super::link::PlacedSkeletons;
 use super::views::{FLUX, interleave, vector};
 use crate::adjoint::kernel::{potential_hvp, potential_jvp, potential_vjp};
 use crate::adjoint::lie::{Vec3, Vec6, angular, linear, six};
@@ -22,7 +22,7 @@ pub(super) struct Moved {
 }
 
 impl ReducedLinearised<'_> {
-    fn moved(&self, placed: &Placed, z: &[Vec6]) -> Moved {
+    fn moved(&self, placed: &PlacedSkeletons, z: &[Vec6]) -> Moved {
         let pose = &self.poses[placed.link.target];
         let relative = placed.pair.image.twist(&z[placed.link.source]) - z[placed.link.target];
         let local = pose.twist_to_body(&relative);
@@ -47,7 +47,7 @@ impl ReducedLinearised<'_> {
         z: &[Vec6],
     ) -> (DMatrix<f64>, Vec<(Moved, Vec<f64>)>) {
         let k = alpha.len();
-        let one = |placed: &Placed| {
+        let one = |placed: &PlacedSkeletons| {
             let link = placed.link;
             let (t, s) = (self.range(link.target), self.range(link.source));
             let moved = self.moved(placed, z);
@@ -126,7 +126,7 @@ impl ReducedLinearised<'_> {
         let (psi, seen) = self.tangent_potentials(&alpha, z);
         let (dalpha, dmomenta) = self.tangent_solution(&psi);
         let links: Vec<_> = self.placed.iter().zip(&seen).collect();
-        let one = |(placed, seen): &(&Placed, &(Moved, Vec<f64>))| {
+        let one = |(placed, seen): &(&PlacedSkeletons, &(Moved, Vec<f64>))| {
             self.link_tangent(placed, seen, &responses, &dalpha)
         };
         let parts = self.reduced.over(&links, TANGENT, one);
@@ -150,9 +150,9 @@ impl ReducedLinearised<'_> {
     /// Wrench on the sources of a link and its tangent, in the target's frame.
     fn link_tangent(
         &self,
-        placed: &Placed,
+        placed: &PlacedSkeletons,
         (moved, field): &(Moved, Vec<f64>),
-        responses: &[Response],
+        responses: &[ReducedResponse],
         dalpha: &DMatrix<f64>,
     ) -> (Vec6, Vec6) {
         let (n, last) = (responses.len(), responses.len() - 1);

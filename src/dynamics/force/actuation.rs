@@ -1,13 +1,13 @@
 //! Actuated joints: controls are their generalised forces, in the user's coordinates.
 
-use super::{ForceModel, LoadBars, Loads, Moving, Parts, Velocity};
+use super::{ForceModel, ForceParts, LoadBars, Loads, Moving, Velocity};
 use crate::dynamics::Declarations;
 use std::ops::Range;
 
 /// Velocities of each actuated joint, with the first of its controls.
 struct Actuation(Vec<(Range<usize>, usize)>);
 
-pub(super) fn assemble(parts: &Parts, _: &mut Declarations) -> Option<Box<dyn ForceModel>> {
+pub(super) fn assemble(parts: &ForceParts, _: &mut Declarations) -> Option<Box<dyn ForceModel>> {
     let each = parts.bodies.iter().zip(parts.tree.links());
     let joints: Vec<_> = each
         .filter_map(|(body, link)| Some((link.v.clone(), body.joint_control?)))

@@ -1,6 +1,6 @@
 //! Buoyancy: −ρ V g at the centroid of the displaced volume.
 
-use super::{ForceModel, LoadBars, Loads, Moving, Parts, Place, Velocity};
+use super::{ForceModel, ForceParts, LoadBars, Loads, Moving, Place, Velocity};
 use crate::adjoint::lie::{Vec3, angular, point_velocity, point_wrench};
 use crate::dynamics::Declarations;
 
@@ -19,7 +19,7 @@ struct Displaced {
     centroid: Vec3,
 }
 
-pub(super) fn assemble(parts: &Parts, _: &mut Declarations) -> Option<Box<dyn ForceModel>> {
+pub(super) fn assemble(parts: &ForceParts, _: &mut Declarations) -> Option<Box<dyn ForceModel>> {
     let lift = -Vec3::from(parts.scene.gravity);
     let each = parts.bodies.iter().enumerate();
     let bodies: Vec<Displaced> = each

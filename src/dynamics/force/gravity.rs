@@ -1,6 +1,6 @@
 //! Weight of the bodies' masses: m g at the centre of mass.
 
-use super::{ForceModel, LoadBars, Loads, Moving, Parts, Place, Velocity};
+use super::{ForceModel, ForceParts, LoadBars, Loads, Moving, Place, Velocity};
 use crate::adjoint::lie::{Vec3, angular, point_velocity, point_wrench};
 use crate::dynamics::Declarations;
 
@@ -11,7 +11,7 @@ struct Gravity {
     centers: Vec<Vec3>,
 }
 
-pub(super) fn assemble(parts: &Parts, _: &mut Declarations) -> Option<Box<dyn ForceModel>> {
+pub(super) fn assemble(parts: &ForceParts, _: &mut Declarations) -> Option<Box<dyn ForceModel>> {
     let acceleration = Vec3::from(parts.scene.gravity);
     let centers = parts.bodies.iter().map(|b| b.center_of_mass).collect();
     (acceleration != Vec3::zeros()).then(|| {

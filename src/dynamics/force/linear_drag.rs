@@ -1,6 +1,6 @@
 //! Drag linear in the velocity through the water (Eq. 22): −c R ν in the body's frame, summed over its surface.
 
-use super::{ForceModel, LoadBars, Loads, Moving, Parts, Velocity, drag_part};
+use super::{ForceModel, ForceParts, LoadBars, Loads, Moving, Velocity, drag_part};
 use crate::adjoint::drag;
 use crate::adjoint::lie::{Mat6, cross_force};
 use crate::dynamics::parameters::{Declarations, Declared, Owner, Parameter};
@@ -19,7 +19,7 @@ struct Dragged {
 }
 
 pub(super) fn assemble(
-    parts: &Parts,
+    parts: &ForceParts,
     parameters: &mut Declarations,
 ) -> Option<Box<dyn ForceModel>> {
     let mut bodies = Vec::new();

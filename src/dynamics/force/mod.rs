@@ -21,7 +21,7 @@ use nalgebra::DVector;
 use std::sync::Arc;
 
 /// Makes a force from a scene, and declares its parameters; `None` where a scene has none of its kind.
-type Assemble = fn(&Parts, &mut Declarations) -> Option<Box<dyn ForceModel>>;
+type Assemble = fn(&ForceParts, &mut Declarations) -> Option<Box<dyn ForceModel>>;
 
 /// All kinds of forces, in the order in which they are added up.
 const FORCES: &[Assemble] = &[
@@ -35,7 +35,7 @@ const FORCES: &[Assemble] = &[
 ];
 
 /// What forces are made from.
-pub struct Parts<'a> {
+pub struct ForceParts<'a> {
     /// The scene.
     pub scene: &'a Scene,
     /// Its joints.
@@ -47,7 +47,7 @@ pub struct Parts<'a> {
 }
 
 /// All forces of a scene.
-pub fn assemble(parts: &Parts, parameters: &mut Declarations) -> Arc<[Box<dyn ForceModel>]> {
+pub fn assemble(parts: &ForceParts, parameters: &mut Declarations) -> Arc<[Box<dyn ForceModel>]> {
     let made = FORCES.iter().filter_map(|make| make(parts, parameters));
     made.collect()
 }

@@ -1,6 +1,6 @@
 //! Drag quadratic in the velocity through the water: −½ ρ c Σ ΔA |w| w, summed over the body's surface.
 
-use super::{ForceModel, LoadBars, Loads, Moving, Parts, Velocity, drag_part};
+use super::{ForceModel, ForceParts, LoadBars, Loads, Moving, Velocity, drag_part};
 use crate::adjoint::drag::{Element, Part, quadratic_drag, quadratic_drag_jvp, quadratic_drag_vjp};
 use crate::adjoint::lie::cross_force;
 use crate::dynamics::parameters::{Declarations, Declared, Owner, Parameter, Range};
@@ -23,7 +23,7 @@ struct Dragged {
 }
 
 pub(super) fn assemble(
-    parts: &Parts,
+    parts: &ForceParts,
     parameters: &mut Declarations,
 ) -> Option<Box<dyn ForceModel>> {
     let mut bodies = Vec::new();

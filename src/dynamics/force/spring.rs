@@ -3,7 +3,7 @@
 //! With d from the first end to the second, n = d/|d| and u = ḋ, the tension is T = k (|d| − L) + c n·u; T n acts on the first
 //! body, −T n on the second. Where the ends meet there is no direction, and nothing acts.
 
-use super::{ForceModel, LoadBars, Loads, Moving, Parts, Place, Velocity};
+use super::{ForceModel, ForceParts, LoadBars, Loads, Moving, Place, Velocity};
 use crate::adjoint::lie::{Vec3, Vec6, angular, point_velocity, point_wrench};
 use crate::dynamics::parameters::{Declarations, Declared, Owner, Parameter};
 use crate::scene::Force;
@@ -44,7 +44,7 @@ struct Stretched {
 }
 
 pub(super) fn assemble(
-    parts: &Parts,
+    parts: &ForceParts,
     parameters: &mut Declarations,
 ) -> Option<Box<dyn ForceModel>> {
     let scene = parts.scene;

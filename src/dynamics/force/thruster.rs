@@ -1,13 +1,13 @@
 //! Thrusters: a control wrench on a body, force and moment (world axes) about its origin.
 
-use super::{ForceModel, LoadBars, Loads, Moving, Parts, Velocity};
+use super::{ForceModel, ForceParts, LoadBars, Loads, Moving, Velocity};
 use crate::adjoint::lie::{angular, linear, point_velocity, point_wrench};
 use crate::dynamics::Declarations;
 
 /// Bodies, each with the first of its six controls.
 struct Thrusters(Vec<(usize, usize)>);
 
-pub(super) fn assemble(parts: &Parts, _: &mut Declarations) -> Option<Box<dyn ForceModel>> {
+pub(super) fn assemble(parts: &ForceParts, _: &mut Declarations) -> Option<Box<dyn ForceModel>> {
     let each = parts.bodies.iter().enumerate();
     let thrusters: Vec<_> = each.filter_map(|(b, d)| Some((b, d.thruster?))).collect();
     (!thrusters.is_empty()).then(|| Box::new(Thrusters(thrusters)) as Box<dyn ForceModel>)

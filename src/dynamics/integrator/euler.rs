@@ -24,7 +24,7 @@ use nalgebra::{DMatrix, DVector, Dyn, LU};
 const ITERATIONS: usize = 40;
 
 /// A converged stage.
-pub(super) struct Stage {
+pub(super) struct ImplicitStage {
     /// Its velocity.
     pub v: DVector<f64>,
     /// f(q, v, u) there.
@@ -74,7 +74,7 @@ pub(super) fn solve_stage(
     hat: &DVector<f64>,
     rule: Rule,
     guess: &DVector<f64>,
-) -> Result<Stage> {
+) -> Result<ImplicitStage> {
     let (split, control) = (start.split, &start.input.control);
     let tree = &e.system.tree;
     let mut v = &split.driven + split.put(&split.take(guess));
@@ -103,7 +103,7 @@ pub(super) fn solve_stage(
         let converged = residual == 0.0 || (residual <= 1e-13 && residual >= 0.25 * previous);
         let at_last = iteration + 1 == ITERATIONS && residual <= 1e-11;
         if converged || at_last {
-            return Ok(Stage { v, force });
+            return Ok(ImplicitStage { v, force });
         }
         if !residual.is_finite() {
             break;

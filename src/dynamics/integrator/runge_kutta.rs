@@ -38,7 +38,7 @@ pub(super) struct Forces {
     all: Vec<DVector<f64>>,
 }
 
-struct Stage<'a> {
+struct RungeKuttaStage<'a> {
     /// The first stage has none: it is the step's own.
     own: Option<Linearisation<'a>>,
     split: Split,
@@ -51,7 +51,7 @@ struct Stage<'a> {
     force: DVector<f64>,
 }
 
-impl<'a> Stage<'a> {
+impl<'a> RungeKuttaStage<'a> {
     fn at<'s>(&'s self, start: &Start<'s, 'a>) -> &'s Linearisation<'a> {
         self.own.as_ref().unwrap_or(start.e)
     }
@@ -63,11 +63,11 @@ fn stages<'a>(
     tableau: &Tableau,
     momentum: &DVector<f64>,
     force: impl Fn(usize, &Linearisation, &DVector<f64>) -> Result<DVector<f64>>,
-) -> Result<Vec<Stage<'a>>> {
+) -> Result<Vec<RungeKuttaStage<'a>>> {
     let (s, state) = (start.stepper, start.state);
     let tree = &s.system.tree;
     let nv = tree.velocities();
-    let mut out: Vec<Stage> = Vec::with_capacity(tableau.nodes.len());
+    let mut out: Vec<RungeKuttaStage> = Vec::with_capacity(tableau.nodes.len());
     for (i, node) in tableau.nodes.iter().enumerate() {
         let t = s.time(state) + node * s.dt;
         let split = s.split(&start.input.hold, When::At(t));
@@ -95,7 +95,7 @@ fn stages<'a>(
         };
         let chart_rate = tree.chart_rate(&xi, &v);
         let force = force(i, at, &v)?;
-        out.push(Stage {
+        out.push(RungeKuttaStage {
             own,
             split,
             xi,
@@ -129,7 +129,7 @@ pub(super) fn step(start: &Start, tableau: &'static Tableau) -> Result<(State, F
 /// What the transpose of a step needs.
 pub(super) struct Adjoint<'a> {
     tableau: &'static Tableau,
-    stages: Vec<Stage<'a>>,
+    stages: Vec<RungeKuttaStage<'a>>,
     /// Chart coordinates after the step.
     xi: DVector<f64>,
 }

@@ -15,9 +15,9 @@ mod solve;
 pub use probe::{PairWrenches, Probe};
 
 use super::context::{Context, Options};
-use super::geometry::{Geometry, Placed};
+use super::geometry::{Geometry, PlacedSystem};
 use crate::adjoint::lie::Pose;
-use crate::coupling::full::{Backend, Model, Response, Solver};
+use crate::coupling::full::{FullSolver, Model, SystemBackend, SystemResponse};
 use crate::{Error, Result};
 use nalgebra::DMatrix;
 use std::sync::Arc;
@@ -34,7 +34,7 @@ impl Gpu {
     /// # Errors
     /// A solver that isn't there on the device, a device that fails, or too little memory.
     pub fn new(context: &Arc<Context>, model: &Arc<Model>) -> Result<Self> {
-        if model.settings.solver != Solver::Cgls {
+        if model.settings.solver != FullSolver::Cgls {
             return Err(Error::Unsupported {
                 what: format!(
                     "the solver {:?} with the backend gpu",
@@ -64,13 +64,17 @@ impl Gpu {
     }
 }
 
-impl Backend for Gpu {
+impl SystemBackend for Gpu {
     fn name(&self) -> &str {
         &self.name
     }
 
-    fn respond(&self, poses: &[Pose], twists: &DMatrix<f64>) -> Result<Box<dyn Response + '_>> {
-        let placed = Arc::new(Placed::new(&self.geometry, poses)?);
+    fn respond(
+        &self,
+        poses: &[Pose],
+        twists: &DMatrix<f64>,
+    ) -> Result<Box<dyn SystemResponse + '_>> {
+        let placed = Arc::new(PlacedSystem::new(&self.geometry, poses)?);
         let moving = (0..poses.len())
             .map(|b| twists.rows(6 * b, 6).iter().any(|x| *x != 0.0))
             .collect();

@@ -2,7 +2,7 @@
 
 use crate::Result;
 use crate::gpu::buffer::Buffer;
-use crate::gpu::geometry::{PairBatch, Placed};
+use crate::gpu::geometry::{PairBatch, PlacedSystem};
 use crate::gpu::kernel::Call;
 use crate::gpu::pair_hvp::pair_hvp;
 use crate::gpu::pair_vjp::pair_vjp;
@@ -21,7 +21,7 @@ pub(super) type Wrenches = (Vec<Call>, Buffer, usize);
 
 /// `[pair][width][columns][6]` for the columns `first..first + width` on the left.
 pub(super) fn pairs_vjp(
-    placed: &Placed,
+    placed: &PlacedSystem,
     arithmetic: Arithmetic,
     of: &Densities,
     (first, width): (usize, usize),
@@ -46,7 +46,7 @@ pub(super) fn pairs_vjp(
 
 /// `[pair][columns][columns][12]`: wrenches and their tangents.
 pub(super) fn pairs_hvp(
-    placed: &Placed,
+    placed: &PlacedSystem,
     arithmetic: Arithmetic,
     of: &Densities,
     motions: &Buffer,
@@ -70,7 +70,7 @@ pub(super) fn pairs_hvp(
 }
 
 fn summed(
-    placed: &Placed,
+    placed: &PlacedSystem,
     arithmetic: Arithmetic,
     elements: usize,
     part: impl Fn(&PairBatch, &Buffer) -> Result<Call>,

@@ -10,7 +10,7 @@ use crate::adjoint::lie::{Pose, Vec3, Vec6, six};
 use crate::coupling::full::Reached;
 use crate::gpu::buffer::Buffer;
 use crate::gpu::context::Context;
-use crate::gpu::geometry::Placed;
+use crate::gpu::geometry::PlacedSystem;
 use crate::gpu::kernel::Batch;
 use crate::gpu::source::Arithmetic;
 use crate::solver::Columns;
@@ -19,7 +19,7 @@ use std::time::Instant;
 
 /// The coupled system at given poses, kernel by kernel.
 pub struct Probe {
-    placed: Arc<Placed>,
+    placed: Arc<PlacedSystem>,
 }
 
 /// A wrench on the sources of a pair and its tangent, for every pair of columns.
@@ -44,7 +44,7 @@ impl Probe {
     /// A device that fails.
     pub fn new(gpu: &Gpu, poses: &[Pose]) -> Result<Self> {
         Ok(Self {
-            placed: Arc::new(Placed::new(&gpu.geometry, poses)?),
+            placed: Arc::new(PlacedSystem::new(&gpu.geometry, poses)?),
         })
     }
 

@@ -6,7 +6,7 @@ use crate::gpu::apply_jvp::apply_jvp;
 use crate::gpu::apply_transpose::apply_transpose;
 use crate::gpu::apply_transpose_jvp::apply_transpose_jvp;
 use crate::gpu::buffer::Buffer;
-use crate::gpu::geometry::Placed;
+use crate::gpu::geometry::PlacedSystem;
 use crate::gpu::kernel::Call;
 use crate::gpu::share::passes;
 use crate::gpu::source::Arithmetic;
@@ -61,7 +61,7 @@ impl<'a> To<'a> {
 
 /// The calls of a product of `columns` columns of `x`, with the memory that they use.
 pub(super) fn product<'a>(
-    placed: &Placed,
+    placed: &PlacedSystem,
     arithmetic: Arithmetic,
     what: Product,
     (x, stride, offset): Slice,
@@ -118,7 +118,7 @@ pub(super) fn product<'a>(
 
 /// One pass of a product, as shares.
 pub(super) fn once(
-    placed: &Placed,
+    placed: &PlacedSystem,
     arithmetic: Arithmetic,
     what: Product,
     x: Slice,

@@ -4,11 +4,11 @@ use super::pairs::{Densities, pairs_vjp};
 use super::products::{Product, To, product};
 use super::solve::Solves;
 use crate::adjoint::lie::Vec6;
-use crate::coupling::full::{Reached, Response};
+use crate::coupling::full::{Reached, SystemResponse};
 use crate::coupling::{Direction, PairTensor, Tangent};
 use crate::gpu::buffer::Buffer;
 use crate::gpu::combine::combine;
-use crate::gpu::geometry::{Geometry, Placed};
+use crate::gpu::geometry::{Geometry, PlacedSystem};
 use crate::gpu::impulse::impulse;
 use crate::gpu::kernel::{Batch, Call};
 use crate::gpu::products::{Task, products};
@@ -25,7 +25,7 @@ const LEFT: usize = 4;
 
 /// a, λ, r, μ of some columns, on the device.
 pub(super) struct Solution {
-    pub placed: Arc<Placed>,
+    pub placed: Arc<PlacedSystem>,
     /// Bodies that the columns first given move.
     moving: Arc<Vec<bool>>,
     twists: DMatrix<f64>,
@@ -50,7 +50,7 @@ struct Followed {
 }
 
 /// A wrench about the scene's middle in the device's units as a spatial wrench.
-pub(super) fn spatial(placed: &Placed, w: &[f64], scale: f64) -> Vec6 {
+pub(super) fn spatial(placed: &PlacedSystem, w: &[f64], scale: f64) -> Vec6 {
     units::spatial(placed.geometry.length, &placed.middle, w, scale)
 }
 
@@ -74,7 +74,7 @@ pub(super) fn impulses(
 impl Solution {
     /// Solves for columns of twists.
     pub fn solve(
-        placed: Arc<Placed>,
+        placed: Arc<PlacedSystem>,
         moving: Arc<Vec<bool>>,
         twists: &DMatrix<f64>,
     ) -> Result<Self> {
@@ -303,7 +303,7 @@ impl Solution {
     }
 }
 
-impl Response for Solution {
+impl SystemResponse for Solution {
     fn reached(&self) -> Reached {
         self.reached
     }
@@ -375,7 +375,7 @@ impl Response for Solution {
         Ok(PairTensor::new(k, wrenches))
     }
 
-    fn directions(&self, directions: &[Direction]) -> Result<Box<dyn Response + '_>> {
+    fn directions(&self, directions: &[Direction]) -> Result<Box<dyn SystemResponse + '_>> {
         let n = directions.len();
         let mut coefficients = DMatrix::zeros(self.columns, n);
         let mut twists = DMatrix::zeros(self.twists.nrows(), n);

@@ -8,13 +8,13 @@ use crate::Result;
 use crate::adjoint::lie::{Vec6, angular, cross_force, linear};
 use crate::coupling::Tangent;
 use crate::gpu::buffer::Buffer;
-use crate::gpu::geometry::Placed;
+use crate::gpu::geometry::PlacedSystem;
 use crate::gpu::impulse::impulse;
 use crate::gpu::kernel::Batch;
 use crate::gpu::sum::{Base, Slice, Sum, sum};
 
 /// Twists of all images of all bodies, then of the bodies as they see, about the scene's middle.
-pub(super) fn motions(placed: &Placed, z: &[Vec6]) -> Vec<f64> {
+pub(super) fn motions(placed: &PlacedSystem, z: &[Vec6]) -> Vec<f64> {
     let geometry = &placed.geometry;
     let mut out = Vec::new();
     let mut add = |z: &Vec6| {

@@ -5,7 +5,7 @@ use crate::coupling::full::{Preconditioner, Reached};
 use crate::gpu::buffer::Buffer;
 use crate::gpu::cgls::{Iterates, cgls};
 use crate::gpu::factor::factor;
-use crate::gpu::geometry::Placed;
+use crate::gpu::geometry::PlacedSystem;
 use crate::gpu::kernel::{Batch, Call};
 use crate::gpu::refine::{Cycle, Refined, refine};
 use crate::gpu::share::passes;
@@ -42,7 +42,7 @@ pub(super) struct Solves {
 }
 
 impl Solve {
-    fn new(placed: &Placed, g: Slice, x: Slice, columns: usize) -> Result<Self> {
+    fn new(placed: &PlacedSystem, g: Slice, x: Slice, columns: usize) -> Result<Self> {
         let geometry = &placed.geometry;
         let (context, sizes) = (&geometry.context, &geometry.sizes);
         let (fine, single) = (context.fine(), Arithmetic::Single);
@@ -227,7 +227,7 @@ impl Solves {
     ///
     /// # Errors
     /// A device that fails, or has too little memory.
-    pub fn new(placed: &Placed, g: Slice, x: Slice, columns: usize) -> Result<Self> {
+    pub fn new(placed: &PlacedSystem, g: Slice, x: Slice, columns: usize) -> Result<Self> {
         let all = passes(columns, WIDE)
             .filter(|(_, width)| *width > 0)
             .map(|(first, width)| {
@@ -298,7 +298,7 @@ impl Solves {
     /// [`Error::Solver`] with what was reached.
     pub fn reached(
         &self,
-        placed: &Placed,
+        placed: &PlacedSystem,
         bytes: &[Vec<u8>],
         what: &str,
         last: bool,
@@ -333,7 +333,7 @@ impl Solves {
     ///
     /// # Errors
     /// A tolerance that isn't reached, or a device that fails.
-    pub fn finish(&self, placed: &Placed, what: &str) -> Result<Reached> {
+    pub fn finish(&self, placed: &PlacedSystem, what: &str) -> Result<Reached> {
         let context = &placed.geometry.context;
         let most = placed.geometry.model.settings.max_iterations;
         let (mut iterations, mut granted) = (self.few, 0);

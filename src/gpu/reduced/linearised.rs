@@ -8,7 +8,7 @@ use crate::coupling::{
 };
 use crate::gpu::buffer::Buffer;
 use crate::gpu::combine::combine;
-use crate::gpu::points::Placed;
+use crate::gpu::points::PlacedPoints;
 use crate::gpu::units;
 use nalgebra::{DMatrix, DVector};
 use std::sync::Arc;
@@ -40,7 +40,7 @@ enum Derivative {
 }
 
 impl Solved {
-    pub fn new(placed: Arc<Placed>, tolerance: f64, basis: &DMatrix<f64>) -> Result<Self> {
+    pub fn new(placed: Arc<PlacedPoints>, tolerance: f64, basis: &DMatrix<f64>) -> Result<Self> {
         let solution = Solution::solve(placed, basis, tolerance, true)?;
         let (reduced, reached) = (&solution.placed.model.reduced, &solution.reached);
         let poses: &[Pose] = &solution.placed.poses;

@@ -16,7 +16,7 @@ mod solution;
 mod solve;
 
 use super::context::Context;
-use super::points::{Compressed, Placed};
+use super::points::{Compressed, PlacedPoints};
 use crate::adjoint::lie::Pose;
 use crate::coupling::reduced::Reduced;
 use crate::coupling::{Coupling, Linearise, Linearised, Momenta};
@@ -89,7 +89,7 @@ impl Coupling for GpuReduced {
     }
 
     fn evaluate(&self, poses: &[Pose], basis: &DMatrix<f64>) -> Result<Momenta> {
-        let placed = Arc::new(Placed::new(&self.model, poses)?);
+        let placed = Arc::new(PlacedPoints::new(&self.model, poses)?);
         Ok(Solved::new(placed, self.tolerance, basis)?.value())
     }
 
@@ -100,7 +100,7 @@ impl Coupling for GpuReduced {
 
 impl Linearise for GpuReduced {
     fn linearise(&self, poses: &[Pose], basis: &DMatrix<f64>) -> Result<Box<dyn Linearised + '_>> {
-        let placed = Arc::new(Placed::new(&self.model, poses)?);
+        let placed = Arc::new(PlacedPoints::new(&self.model, poses)?);
         let solved = Solved::new(placed, self.tolerance, basis)?;
         Ok(Box::new(solved.linearise()?))
     }

@@ -6,7 +6,7 @@ use crate::gpu::coulomb::coulomb;
 use crate::gpu::coulomb_jvp::coulomb_jvp;
 use crate::gpu::coulomb_vjp::coulomb_vjp;
 use crate::gpu::kernel::Call;
-use crate::gpu::points::{Motion, Placed};
+use crate::gpu::points::{Motion, PlacedPoints};
 use crate::gpu::share::passes;
 use crate::gpu::sum::{Base, Slice, Sum, sum};
 
@@ -28,7 +28,7 @@ pub(super) enum Product<'a> {
 
 /// `out = product · x`; a product with G is skipped where no column of `gate` goes on.
 pub(super) fn product(
-    placed: &Placed,
+    placed: &PlacedPoints,
     what: Product,
     (x, stride, offset): Slice,
     columns: usize,

@@ -9,7 +9,7 @@ use crate::gpu::blocks::{Blocks, Part, blocks};
 use crate::gpu::buffer::Buffer;
 use crate::gpu::combine::combine;
 use crate::gpu::kernel::{Batch, Call};
-use crate::gpu::points::{Compressed, Placed};
+use crate::gpu::points::{Compressed, PlacedPoints};
 use crate::gpu::sum::{Base, Slice, Sum, sum};
 use crate::gpu::units::{scaled, size, spatial};
 use crate::gpu::wrench::{Side, wrench};
@@ -22,7 +22,7 @@ pub(super) const FLUX: f64 = 4.0 * PI;
 
 /// α of some columns, on the device.
 pub(super) struct Solution {
-    pub placed: Arc<Placed>,
+    pub placed: Arc<PlacedPoints>,
     pub twists: DMatrix<f64>,
     /// What each column is in units of: on the device all are about 1.
     pub scale: Vec<f64>,
@@ -55,7 +55,7 @@ impl Solution {
     /// # Errors
     /// A system that isn't positive definite or not solved, or a device that fails.
     pub fn solve(
-        placed: Arc<Placed>,
+        placed: Arc<PlacedPoints>,
         twists: &DMatrix<f64>,
         tolerance: f64,
         probing: bool,

@@ -5,7 +5,7 @@ use crate::gpu::blocks::{Blocks, Part, blocks};
 use crate::gpu::buffer::Buffer;
 use crate::gpu::conjugate::{Directions, Limits, Steps, conjugate};
 use crate::gpu::kernel::{Batch, Call};
-use crate::gpu::points::Placed;
+use crate::gpu::points::PlacedPoints;
 use crate::gpu::sum::Base;
 use crate::{Error, Result};
 use nalgebra::DMatrix;
@@ -41,7 +41,7 @@ impl Solve {
     /// # Errors
     /// A device that fails, or has too little memory.
     pub fn new(
-        placed: &Placed,
+        placed: &PlacedPoints,
         (given, solution): (&Buffer, &Buffer),
         columns: usize,
         tolerance: f64,
@@ -107,7 +107,7 @@ impl Solve {
     }
 
     /// What tells how each column stands, to be read beside other results: bytes of each array.
-    pub fn report(&self, placed: &Placed) -> [(&Buffer, usize); 3] {
+    pub fn report(&self, placed: &PlacedPoints) -> [(&Buffer, usize); 3] {
         let size = placed.model.context.fine().size();
         let d = &self.directions;
         [
@@ -121,7 +121,7 @@ impl Solve {
     ///
     /// # Errors
     /// A system that isn't positive definite, or that took too many iterations.
-    pub fn reached(&self, placed: &Placed, bytes: &[Vec<u8>]) -> Result<Option<Reached>> {
+    pub fn reached(&self, placed: &PlacedPoints, bytes: &[Vec<u8>]) -> Result<Option<Reached>> {
         let model = &placed.model;
         let counts: Vec<u32> = bytes[0]
             .chunks_exact(4)
@@ -164,7 +164,7 @@ impl Solve {
     ///
     /// # Errors
     /// As [`Solve::reached`], or a device that fails.
-    pub fn finish(&self, placed: &Placed) -> Result<(Reached, Vec<Vec<u8>>)> {
+    pub fn finish(&self, placed: &PlacedPoints) -> Result<(Reached, Vec<Vec<u8>>)> {
         let context = &placed.model.context;
         let mut iterations = FEW;
         loop {
@@ -184,7 +184,7 @@ impl Solve {
     ///
     /// # Errors
     /// One that isn't positive definite.
-    pub fn condition(&self, placed: &Placed, bytes: &[Vec<u8>], probe: usize) -> Result<f64> {
+    pub fn condition(&self, placed: &PlacedPoints, bytes: &[Vec<u8>], probe: usize) -> Result<f64> {
         let fine = placed.model.context.fine();
         let at = 16 * probe;
         let mut four = [0; 4];

@@ -7,7 +7,7 @@
 //! starts with.
 
 use super::full::Full;
-use super::kind::{FidelityKind, Knob, Parts, Plan, Planned, Start};
+use super::kind::{ErrorParts, FidelityKind, Knob, Plan, Planned, Start};
 use super::reduced::Reduced;
 use crate::adjoint::lie::Vec3;
 use crate::boundary::exact::lamb;
@@ -88,7 +88,7 @@ impl FidelityKind for Auto {
         Full.gap_warning(gap, place, time, hint)
     }
 
-    fn error(&self, parts: &Parts) -> Option<f64> {
+    fn error(&self, parts: &ErrorParts) -> Option<f64> {
         Reduced.error(parts)
     }
 }
@@ -154,7 +154,7 @@ fn plan(start: &Start, aim: f64) -> Result<Planned> {
         }
         let coarsest = COARSEST * compress::default_gap(properties.volume, mesh.surface_area());
         let gap = (ROOM * smallest).clamp(finest, coarsest);
-        out.plan.compress.push(compress::Settings {
+        out.plan.compress.push(compress::CompressSettings {
             rank: None,
             tolerance: COMPRESSION * aim,
             resolved_gap: Some(gap),

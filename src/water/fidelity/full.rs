@@ -1,6 +1,6 @@
 //! All bodies solved together, at the resolution of their meshes.
 
-use super::kind::{FidelityKind, Knob, Parts, Plan, Planned, Start};
+use super::kind::{ErrorParts, FidelityKind, Knob, Plan, Planned, Start};
 use crate::Result;
 use crate::geometry::Gap;
 use crate::water::device::Device;
@@ -69,7 +69,7 @@ impl FidelityKind for Full {
         })
     }
 
-    fn error(&self, parts: &Parts) -> Option<f64> {
+    fn error(&self, parts: &ErrorParts) -> Option<f64> {
         let residual = (RESIDUAL * parts.residual.unwrap_or(0.0)).min(1.0);
         Some(parts.bodies.max(residual))
     }

@@ -1,6 +1,6 @@
 //! Each body alone.
 
-use super::kind::{FidelityKind, Knob, Parts, Plan, Planned, Start};
+use super::kind::{ErrorParts, FidelityKind, Knob, Plan, Planned, Start};
 use crate::Result;
 use crate::adjoint::lie::Mat6;
 use crate::coupling;
@@ -142,7 +142,7 @@ impl FidelityKind for Isolated {
         })
     }
 
-    fn error(&self, parts: &Parts) -> Option<f64> {
+    fn error(&self, parts: &ErrorParts) -> Option<f64> {
         Some(parts.bodies + parts.coupling?)
     }
 }

@@ -26,7 +26,7 @@ pub enum Knob {
 #[derive(Clone, Debug, Default)]
 pub(crate) struct Plan {
     /// Per body.
-    pub compress: Vec<compress::Settings>,
+    pub compress: Vec<compress::CompressSettings>,
     /// Per pair of bodies, equal for a body and its images.
     pub cutoffs: Vec<((usize, usize), Cutoff)>,
 }
@@ -59,7 +59,7 @@ pub(crate) struct Start<'a> {
 }
 
 /// Parts of the error of an added mass; see [`crate::simulate::ErrorEstimate`].
-pub(crate) struct Parts {
+pub(crate) struct ErrorParts {
     /// Of the bodies themselves: from other meshes and from asymmetry.
     pub bodies: f64,
     pub residual: Option<f64>,
@@ -135,5 +135,5 @@ pub(crate) trait FidelityKind: Send + Sync {
     fn gap_warning(&self, gap: &Gap, place: &str, time: &str, hint: &str) -> Option<String>;
 
     /// The error of the added mass from its parts, without the solver's; `None` where one that it needs is missing.
-    fn error(&self, parts: &Parts) -> Option<f64>;
+    fn error(&self, parts: &ErrorParts) -> Option<f64>;
 }

@@ -1,6 +1,6 @@
 //! All bodies coupled, each compressed to a few sources.
 
-use super::kind::{FidelityKind, Knob, Parts, Plan, Planned, Start};
+use super::kind::{ErrorParts, FidelityKind, Knob, Plan, Planned, Start};
 use crate::adjoint::lie::Pose;
 use crate::boundary::Response;
 use crate::coupling::reduced::{self, ReducedBody, cache, compress};
@@ -90,7 +90,7 @@ impl FidelityKind for Reduced {
         None
     }
 
-    fn error(&self, parts: &Parts) -> Option<f64> {
+    fn error(&self, parts: &ErrorParts) -> Option<f64> {
         Some(parts.bodies + parts.residual?)
     }
 }
@@ -206,7 +206,7 @@ fn compressed(
     body: &SubmergedBody,
     method: &'static dyn BodyMethod,
     numerics: &Numerics,
-    chosen: &compress::Settings,
+    chosen: &compress::CompressSettings,
     folder: Option<&Path>,
 ) -> Result<Arc<ReducedBody>> {
     chosen.validate()?;
@@ -238,7 +238,7 @@ fn compressed(
     let gap = gap.unwrap_or_else(|| {
         compress::default_gap(mesh.mass_properties().volume, mesh.surface_area())
     });
-    let chosen = compress::Settings {
+    let chosen = compress::CompressSettings {
         resolved_gap: Some(gap),
         ..*chosen
     };

@@ -3,7 +3,7 @@
 use super::kind::BodyMethod;
 use crate::Result;
 use crate::boundary::{self, BodyBoundary, Response};
-use crate::coupling::full::{MfsBody, Model, Solver};
+use crate::coupling::full::{FullSolver, MfsBody, Model};
 use crate::water::device::Device;
 use crate::water::numerics::Numerics;
 use crate::water::submerged::{Around, Discretisation, Made, SubmergedBody, once, shared};
@@ -13,8 +13,8 @@ use std::sync::Arc;
 pub(super) struct Mfs(pub boundary::Method);
 
 impl Mfs {
-    fn settings(&self, numerics: &Numerics) -> boundary::Settings {
-        boundary::Settings {
+    fn settings(&self, numerics: &Numerics) -> boundary::MfsSettings {
+        boundary::MfsSettings {
             method: self.0,
             ..numerics.mfs
         }
@@ -61,7 +61,7 @@ impl BodyMethod for Mfs {
         device: &mut Device,
     ) -> Result<Made> {
         let mut settings = self.settings(numerics);
-        if numerics.solve.solver == Solver::Gmres {
+        if numerics.solve.solver == FullSolver::Gmres {
             // GMRES solves the square system as it is; damping belongs to least squares.
             settings.damping = 0.0;
         }

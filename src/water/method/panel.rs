@@ -3,7 +3,7 @@
 use super::kind::BodyMethod;
 use crate::boundary::panel::Extrapolated;
 use crate::boundary::{PanelBoundary, Response};
-use crate::coupling::full::Solver;
+use crate::coupling::full::FullSolver;
 use crate::coupling::panel::{self, PanelCoupled};
 use crate::water::device::Device;
 use crate::water::numerics::Numerics;
@@ -54,8 +54,8 @@ impl BodyMethod for Panel {
         let made = shared(bodies, |body, mesh| PanelBoundary::new(body.name, mesh))?;
         let solve = panel::SolveSettings {
             solver: match numerics.solve.solver {
-                Solver::Qr => panel::Solver::Lu,
-                Solver::Cgls | Solver::Gmres => panel::Solver::Gmres,
+                FullSolver::Qr => panel::PanelSolver::Lu,
+                FullSolver::Cgls | FullSolver::Gmres => panel::PanelSolver::Gmres,
             },
             tolerance: numerics.solve.tolerance,
             ..panel::SolveSettings::default()

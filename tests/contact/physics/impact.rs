@@ -249,7 +249,7 @@ fn added_mass_lengthens_the_impact() {
 }
 
 /// Two equal balls on one line, of which the first moves.
-fn meeting(stiffness: f64, dt: f64) -> Simulator {
+fn collision(stiffness: f64, dt: f64) -> Simulator {
     let mut scene = touching(0.0);
     scene.gravity = [0.0; 3];
     scene.time_step = dt;
@@ -296,7 +296,7 @@ fn velocities_and_their_derivatives_change_places() {
         // Four times as stiff: half as long in contact, and a step a quarter as long takes half as much of that.
         let (stiffness, dt) = (1e4 * 4_f64.powi(k), 2e-3 / 4_f64.powi(k));
         let steps = (0.2 / dt).round() as usize;
-        let mut simulator = meeting(stiffness, dt);
+        let mut simulator = collision(stiffness, dt);
         let end = end_velocity(&simulator, steps);
         assert!((end.sum() - 1.0).abs() < 1e-12, "{end}");
         let found = jacobian(&simulator, steps);

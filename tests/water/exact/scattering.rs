@@ -4,7 +4,7 @@ use super::{exact, longest, surface};
 use crate::support::bodies::off_ellipsoid;
 use hydrograd::Error;
 use hydrograd::adjoint::lie::{Vec3, Vec6};
-use hydrograd::boundary::{BodyBoundary, Response, Settings};
+use hydrograd::boundary::{BodyBoundary, MfsSettings, Response};
 use hydrograd::scene::Shape;
 use std::f64::consts::PI;
 use std::path::Path;
@@ -234,7 +234,7 @@ fn meshes_scatter_nearly_the_same() {
             faces: None,
         };
         let mesh = hydrograd::shape::build(&shape, Path::new("."), Some(1280)).unwrap();
-        let mesh = BodyBoundary::new("body", &mesh, &Settings::default()).unwrap();
+        let mesh = BodyBoundary::new("body", &mesh, &MfsSettings::default()).unwrap();
         let body = exact("body", semi_axes, 0.3);
         let points = off_ellipsoid(semi_axes, 0.4, 40);
         for (a, b) in [

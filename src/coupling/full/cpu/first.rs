@@ -1,14 +1,14 @@
 //! First derivatives with the bodies' displacement.
 
 use super::gradient_at;
-use super::placed::{Placed, Solution, body_twists};
+use super::placed::{PlacedBodies, Solution, body_twists};
 use crate::adjoint::lie::Vec6;
 use crate::coupling::PairTensor;
 use crate::coupling::pair::{Pair, wrench};
 use crate::solver::{Columns, transposed_product};
 use nalgebra::DMatrix;
 
-impl Placed<'_> {
+impl PlacedBodies<'_> {
     /// ∇_g E of all pairs of columns by products of matrices, for many columns.
     pub fn tensor(&self, solution: &Solution) -> PairTensor {
         let k = solution.columns();
@@ -87,7 +87,7 @@ impl Placed<'_> {
     }
 
     /// ∇_g E of all pairs of columns by plain sums, which for one or two columns cost less than
-    /// setting up the products of [`Placed::tensor`].
+    /// setting up the products of [`PlacedBodies::tensor`].
     pub fn few(&self, solution: &Solution) -> PairTensor {
         let k = solution.columns();
         let combinations: Vec<(usize, usize)> =

@@ -6,7 +6,7 @@ mod response;
 mod second;
 mod system;
 
-use super::{Backend, Model, Response};
+use super::{Model, SystemBackend, SystemResponse};
 use crate::adjoint::lie::{Pose, Vec3};
 use crate::{Error, Result};
 use nalgebra::DMatrix;
@@ -43,12 +43,16 @@ impl Cpu {
     }
 }
 
-impl Backend for Cpu {
+impl SystemBackend for Cpu {
     fn name(&self) -> &str {
         "cpu"
     }
 
-    fn respond(&self, poses: &[Pose], twists: &DMatrix<f64>) -> Result<Box<dyn Response + '_>> {
+    fn respond(
+        &self,
+        poses: &[Pose],
+        twists: &DMatrix<f64>,
+    ) -> Result<Box<dyn SystemResponse + '_>> {
         Ok(Box::new(response::CoupledSolution::new(
             self, poses, twists,
         )?))

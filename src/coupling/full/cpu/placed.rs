@@ -11,7 +11,7 @@ use crate::solver::Columns;
 use nalgebra::{DMatrix, DVector};
 
 /// The system at given poses.
-pub(super) struct Placed<'a> {
+pub(super) struct PlacedBodies<'a> {
     pub model: &'a Model,
     pub poses: Vec<Pose>,
     pub pairs: Vec<Pair>,
@@ -30,7 +30,7 @@ pub(super) struct Solution {
     pub reached: Reached,
 }
 
-impl<'a> Placed<'a> {
+impl<'a> PlacedBodies<'a> {
     /// For twists that move the same bodies as these, or fewer.
     pub fn new(cpu: &'a Cpu, poses: &[Pose], twists: &DMatrix<f64>) -> Self {
         let model = &*cpu.model;

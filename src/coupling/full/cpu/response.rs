@@ -1,8 +1,8 @@
 //! Answers to columns of twists.
 
-use super::super::{Reached, Response};
+use super::super::{Reached, SystemResponse};
 use super::Cpu;
-use super::placed::{Placed, Solution};
+use super::placed::{PlacedBodies, Solution};
 use crate::adjoint::lie::{Pose, Vec6};
 use crate::coupling::{Direction, PairTensor, Tangent};
 use crate::solver::Columns;
@@ -12,7 +12,7 @@ use std::sync::Arc;
 
 /// Solution of the system at given poses, in memory.
 pub(super) struct CoupledSolution<'a> {
-    placed: Arc<Placed<'a>>,
+    placed: Arc<PlacedBodies<'a>>,
     solution: Solution,
     /// Whether these are directions, of which there are few, and not the columns of a basis.
     few: bool,
@@ -21,7 +21,7 @@ pub(super) struct CoupledSolution<'a> {
 impl<'a> CoupledSolution<'a> {
     /// Solves for columns of body-frame twists at the given poses.
     pub fn new(cpu: &'a Cpu, poses: &[Pose], twists: &DMatrix<f64>) -> Result<Self> {
-        let placed = Placed::new(cpu, poses, twists);
+        let placed = PlacedBodies::new(cpu, poses, twists);
         Ok(Self {
             solution: placed.solve(twists.clone())?,
             placed: Arc::new(placed),
@@ -30,7 +30,7 @@ impl<'a> CoupledSolution<'a> {
     }
 }
 
-impl Response for CoupledSolution<'_> {
+impl SystemResponse for CoupledSolution<'_> {
     fn reached(&self) -> Reached {
         self.solution.reached
     }
@@ -61,7 +61,7 @@ impl Response for CoupledSolution<'_> {
         })
     }
 
-    fn directions(&self, directions: &[Direction]) -> Result<Box<dyn Response + '_>> {
+    fn directions(&self, directions: &[Direction]) -> Result<Box<dyn SystemResponse + '_>> {
         let parts = directions.iter().map(|direction| match direction {
             Direction::Basis(c) => Ok(self.solution.combine(c)),
             Direction::Twist(x) => {

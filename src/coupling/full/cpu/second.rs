@@ -2,7 +2,7 @@
 
 use super::super::body::unit_twists;
 use super::gradient_at;
-use super::placed::{Placed, Solution, body_twists};
+use super::placed::{PlacedBodies, Solution, body_twists};
 use super::system::Solved;
 use crate::Result;
 use crate::adjoint::lie::{Vec3, Vec6, six};
@@ -21,7 +21,7 @@ struct PairFields {
     readout: Vec<f64>,
 }
 
-impl Placed<'_> {
+impl PlacedBodies<'_> {
     /// The tangent along z of the energy of the first with the last of one or two columns.
     pub fn second(&self, solution: &Solution, z: &[Vec6]) -> Result<Tangent> {
         let n = solution.columns();

@@ -1,6 +1,6 @@
 //! The assembled matrix at given poses, and its solves.
 
-use super::super::{MfsBody, Preconditioner, Reached, Solver};
+use super::super::{FullSolver, MfsBody, Preconditioner, Reached};
 use super::Cpu;
 use crate::adjoint::kernel::Write;
 use crate::adjoint::solve::{Fitted, Moved, Operator, least_squares, least_squares_jvp};
@@ -87,7 +87,7 @@ impl<'a> System<'a> {
             qr: None,
         };
         let settings = &model.settings;
-        if settings.solver == Solver::Qr {
+        if settings.solver == FullSolver::Qr {
             // [K; D], so that KᵀK + D² = RᵀR.
             let stacked = Mat::from_fn(rows + columns, columns, |i, j| {
                 if i < rows {
@@ -250,7 +250,7 @@ impl<'a> System<'a> {
 
     /// Solves for a and λ from `F x̄` and `Pᵀ B x̄`.
     pub fn respond(&self, f: &Columns, g: &Columns) -> Result<(Solved, Reached)> {
-        if self.cpu.model.settings.solver == Solver::Gmres {
+        if self.cpu.model.settings.solver == FullSolver::Gmres {
             let a = self.square_solve(f, false, "coupled system (Eq. 18)")?;
             let mu = self.square_solve(g, true, "transposed coupled system")?;
             return Ok(square(a, mu));
@@ -261,7 +261,7 @@ impl<'a> System<'a> {
 
     /// Tangents of the solutions.
     pub fn respond_jvp(&self, moved: &Moved<Columns>) -> Result<(Solved, Reached)> {
-        if self.cpu.model.settings.solver == Solver::Gmres {
+        if self.cpu.model.settings.solver == FullSolver::Gmres {
             let mut right = moved.a.clone();
             right.data.iter_mut().for_each(|x| *x = -*x);
             let a = self.square_solve(&right, false, "tangent of the coupled system (Eq. 21)")?;

@@ -23,7 +23,7 @@ mod modes;
 mod pursuit;
 mod samples;
 
-use super::{Fit, Parts, ReducedBody};
+use super::{CompressedParts, Fit, ReducedBody};
 use crate::adjoint::lie::Vec3;
 use crate::boundary::Response;
 use crate::geometry::{Ball, Interior, TriMesh};
@@ -64,7 +64,7 @@ const CHECK: usize = 6;
 /// How a body is compressed.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(default, deny_unknown_fields)]
-pub struct Settings {
+pub struct CompressSettings {
     /// Number of points, as far as the body has room for them; by default as many as `tolerance`
     /// needs.
     pub rank: Option<usize>,
@@ -76,7 +76,7 @@ pub struct Settings {
     pub resolved_gap: Option<f64>,
 }
 
-impl Default for Settings {
+impl Default for CompressSettings {
     fn default() -> Self {
         Self {
             rank: None,
@@ -86,7 +86,7 @@ impl Default for Settings {
     }
 }
 
-impl Settings {
+impl CompressSettings {
     /// Checks the values.
     ///
     /// # Errors
@@ -147,7 +147,7 @@ pub fn compress(
     name: &str,
     mesh: &TriMesh,
     response: &dyn Response,
-    settings: &Settings,
+    settings: &CompressSettings,
 ) -> Result<ReducedBody> {
     settings.validate()?;
     let surface = Interior::new(mesh);
@@ -243,7 +243,7 @@ pub fn compress(
     let solution = &there * &modes;
     let scattered = relative(&(&solution * solution.transpose()), &scattered);
     let dense = |m: &Mat<f64>| DMatrix::from_fn(m.nrows(), m.ncols(), |i, j| m[(i, j)]);
-    ReducedBody::new(Parts {
+    ReducedBody::new(CompressedParts {
         name: name.to_string(),
         modes: dense(&modes),
         strengths: dense(&strengths),

@@ -16,8 +16,7 @@ use common::support::{felt_error, mesh};
 use hydrograd::adjoint::lie::{Mat6, Pose};
 use hydrograd::boundary::panel::richardson;
 use hydrograd::boundary::{
-    BodyBoundary, Depth, ExactBoundary, Method, PanelBoundary, Response, RowScaling,
-    Settings as MfsSettings,
+    BodyBoundary, Depth, ExactBoundary, Method, MfsSettings, PanelBoundary, Response, RowScaling,
 };
 use hydrograd::coupling::full::{MfsBody, Preconditioner};
 use hydrograd::scene::{Scene, Shape};

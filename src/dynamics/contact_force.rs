@@ -5,8 +5,8 @@
 //! that is implicit in it solves contact implicitly, against the mass matrix with its fluid part.
 
 use super::{
-    ContactParameters, ContactForce, Dual, Evaluation, ForceCotangents, JointLimit, PairContact, Parameters,
-    System,
+    ContactForce, ContactParameters, Dual, Evaluation, ForceCotangents, JointLimit, PairContact,
+    Parameters, System,
 };
 use crate::Result;
 use crate::adjoint::contact::{contact_force, contact_force_jvp, contact_force_vjp};

@@ -55,7 +55,7 @@ impl<'a> Trajectory<'a> {
     /// The smallest gap at a state, whose bodies must keep apart; not asked for where it has no effect.
     fn gap(&self, state: &State) -> Result<Option<Gap>> {
         let system = self.stepper.system;
-        if self.fidelity == Fidelity::Isolated {
+        if !self.fidelity.coupled() {
             return Ok(None);
         }
         let poses = system.tree.kinematics(&state.q).poses;

@@ -85,7 +85,7 @@ pub(crate) fn assemble(
         return Err(Error::input(
             "settings: time_step",
             dt,
-            "must be positive and finite, in s",
+            "give a time above zero, in s",
         ));
     }
     contact::check_integrator(scene, choices.integrator)?;

@@ -14,13 +14,17 @@ use nalgebra::Matrix3;
 /// Distance of consecutive counters, 2⁶⁴ over the golden ratio.
 const STEP: u64 = 0x9e37_79b9_7f4a_7c15;
 
-/// The number of a counter, uniform in [−1, 1).
-pub fn number(counter: u64) -> f64 {
+/// The 64 bits of a counter.
+pub fn bits(counter: u64) -> u64 {
     let mut z = counter.wrapping_add(STEP);
     z = (z ^ (z >> 30)).wrapping_mul(0xbf58_476d_1ce4_e5b9);
     z = (z ^ (z >> 27)).wrapping_mul(0x94d0_49bb_1331_11eb);
-    z ^= z >> 31;
-    (z >> 11) as f64 / (1_u64 << 52) as f64 - 1.0
+    z ^ (z >> 31)
+}
+
+/// The number of a counter, uniform in [−1, 1).
+pub fn number(counter: u64) -> f64 {
+    (bits(counter) >> 11) as f64 / (1_u64 << 52) as f64 - 1.0
 }
 
 /// The first `count` numbers of a seed, uniform in [−`size`, `size`).

@@ -61,7 +61,7 @@ fn orthonormal(a: &Mat<f64>) -> Mat<f64> {
 
 /// A fixed number between −1 and 1.
 fn noise(i: usize, j: usize) -> f64 {
-    sample::number((i as u64) << 32 | j as u64)
+    sample::bits((i as u64) << 32 | j as u64) as f64 / (u64::MAX / 2) as f64 - 1.0
 }
 
 #[cfg(test)]

@@ -611,7 +611,14 @@ fn angular_momentum(c: f64) -> Outcome {
         let rollout = simulator.rollout_from(&start, &none, |_| ControlFlow::Continue(()));
         rollout.unwrap()
     };
-    let p = moving_point();
+    // Differences go to both sides: values that are zero would become negative.
+    let mut p = moving_point();
+    for (name, value) in p.parameters.names().iter().zip(p.parameters.to_vec()) {
+        let range = &p.parameters.table()[p.parameters.position(name)].declared.range;
+        if value == 0.0 && matches!(range, Range::NotNegative) {
+            p.parameters.set(name, 0.1).unwrap();
+        }
+    }
     let base = run(&p);
     let bar = wavy(3 * system().len(), 5.1, 1.0);
     let mut seed = base.zero_cotangents();

@@ -279,9 +279,9 @@ fn values_only() {
     assert!(c.differentiable().is_none());
     // A system of it has values, and the first that needs more says why there is none.
     let scene = Scene::from_toml(
-        "name = \"pair\"\nsteps = 1\ntime_step = 0.1\n\n\
-         [[body]]\nname = \"a\"\nshape = { type = \"sphere\", radius = 1.0 }\ndensity = 1000.0\n\n\
-         [[body]]\nname = \"b\"\nshape = { type = \"sphere\", radius = 1.0 }\ndensity = 1000.0\nposition = [0.0, 0.0, 3.0]\n",
+        "name = \"pair\"\nsteps = 1\ntime_step = 0.1\nfluid = { density = 1000.0 }\n\n\
+         [[bodies]]\nname = \"a\"\nshape = { kind = \"sphere\", radius = 1.0 }\ndensity = 1000.0\n\n\
+         [[bodies]]\nname = \"b\"\nshape = { kind = \"sphere\", radius = 1.0 }\ndensity = 1000.0\nplacement = { position = [0.0, 0.0, 3.0] }\n",
         "",
     )
     .unwrap();

@@ -1,32 +1,13 @@
-//! What lies inside a closed mesh: containment, inner tangent balls, and how thick the body is.
+//! What lies inside a closed mesh: winding numbers, inner tangent balls, and how thick the body is.
 //!
-//! Source points of the boundary methods come from these queries, and where those are decides the last digits of
-//! everything after, so that a query that finds another face or another rounding would be noticed.
-//!
-//! # By the library and by our own code
-//! Containment is that of `parry3d-f64` (the sign by the pseudonormal of the nearest feature), which agrees with the
-//! winding number at every point tested that lies 10⁻⁹ of the body's size or farther from its surface, above faces,
-//! edges and vertices of boxes, plates of 10⁻² and 10⁻⁴ of their width, a wedge and a ball, and is logarithmic in the
-//! faces where the winding number is linear. A point nearer than [`SURFACE`] counts as on the surface.
-//!
-//! Rays are our own. Where both find a face the distances agree to 10⁻¹² of the thickness, but the library's triangles
-//! have no rim: of 2794 rays from the vertices and face centres of the same bodies against the normal it misses 22,
-//! all of them towards an edge or a vertex of the far side, as is the rule on symmetric meshes. A ray that is missed
-//! would move a source to another depth. Gaps are our own too (see [`super::gap`]): the distances of two meshes are
-//! needed to rounding, and their depths, which the library doesn't give.
-//!
-//! The figures are printed by `cargo test --lib geometry::queries -- --nocapture`.
+//! All of these look at every face. Source points of the boundary methods come from them, and where those
+//! are decides the last digits of everything after, so that a query that finds another face or another
+//! rounding would be noticed.
 
 use super::faces::Faces;
 use super::mesh::TriMesh;
 use super::points::winding_number;
 use hydrograd_adjoint::lie::Vec3;
-use parry3d_f64::math::Vector;
-use parry3d_f64::query::PointQuery;
-use parry3d_f64::shape::{TriMesh as Solid, TriMeshFlags};
-
-/// Distance over the radius of the bounding ball below which a point is on the surface.
-const SURFACE: f64 = 1e-12;
 
 /// A mesh with the geometry of its faces and its normals.
 pub(crate) struct Interior<'a> {
@@ -34,10 +15,6 @@ pub(crate) struct Interior<'a> {
     pub faces: Faces,
     /// Angle-weighted unit normals at the vertices.
     pub vertex_normals: Vec<Vec3>,
-    /// The library's mesh. It refuses only meshes without faces, which there are none of.
-    solid: Option<Solid>,
-    /// Distance below which a point is on the surface, m.
-    surface: f64,
 }
 
 impl<'a> Interior<'a> {
@@ -46,8 +23,6 @@ impl<'a> Interior<'a> {
             mesh,
             faces: Faces::of(mesh),
             vertex_normals: mesh.vertex_normals(),
-            solid: solid(mesh),
-            surface: SURFACE * mesh.bounding_ball().radius,
         }
     }
 
@@ -56,13 +31,9 @@ impl<'a> Interior<'a> {
         winding_number(self.faces.corners.iter(), x)
     }
 
-    /// Whether `x` is strictly inside. A point on the surface is not.
+    /// Whether `x` is strictly inside. A point on an edge or vertex is not.
     pub fn contains(&self, x: &Vec3) -> bool {
-        let x = vector(x);
-        self.solid.as_ref().is_some_and(|solid| {
-            let nearest = solid.project_local_point(x, false);
-            nearest.is_inside && (nearest.point - x).length() > self.surface
-        })
+        (self.winding(x) - 1.0).abs() < 1e-6
     }
 
     /// Radius of the largest ball inside the body that touches the surface at `x` with outward normal
@@ -110,14 +81,4 @@ impl<'a> Interior<'a> {
         }
         nearest
     }
-}
-
-fn vector(x: &Vec3) -> Vector {
-    Vector::new(x.x, x.y, x.z)
-}
-
-fn solid(mesh: &TriMesh) -> Option<Solid> {
-    let vertices = mesh.vertices().iter().map(vector).collect();
-    let faces = mesh.faces().iter().map(|f| f.map(|v| v as u32)).collect();
-    Solid::with_flags(vertices, faces, TriMeshFlags::ORIENTED).ok()
 }

@@ -20,9 +20,9 @@ mod image;
 mod interior;
 mod mass;
 mod mesh;
-mod points;
 #[cfg(test)]
-mod queries;
+mod parry;
+mod points;
 mod refine;
 mod remesh;
 mod sharp;

@@ -123,7 +123,7 @@ pub(super) fn around(surface: &Interior, offset: f64, spacing: f64) -> Vec<Vec3>
         .par_iter()
         .map(|p| {
             let near = |s: &Sample| (p - s.point).norm_squared() < (0.8 * offset).powi(2);
-            !samples.iter().any(near) && !surface.contains(p)
+            !samples.iter().any(near) && surface.winding(p) < 0.5
         })
         .collect();
     let kept = points.into_iter().zip(keep).filter(|(_, k)| *k);

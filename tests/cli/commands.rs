@@ -608,7 +608,11 @@ fn the_backend_is_in_every_summary() {
     let unused = ["--adapter", "llvmpipe", "--faces", "80", "--steps", "1"];
     let report = json(&[&["run", &ball][..], &unused].concat());
     assert!(report["warnings"].to_string().contains("no effect"));
-    fails(&["run", &ball, "--adapter", ""], 2, &["part of the adapter's name"]);
+    fails(
+        &["run", &ball, "--adapter", ""],
+        2,
+        &["part of the adapter's name"],
+    );
     fails(
         &["run", &ball, "--backend", "gup"],
         2,

@@ -613,11 +613,11 @@ fn angular_momentum(c: f64) -> Outcome {
     };
     // Differences go to both sides: values that are zero would become negative.
     let mut p = moving_point();
-    for (name, value) in p.parameters.names().iter().zip(p.parameters.to_vec()) {
-        let range = &p.parameters.table()[p.parameters.position(name)].declared.range;
-        if value == 0.0 && matches!(range, Range::NotNegative) {
-            p.parameters.set(name, 0.1).unwrap();
-        }
+    let entries = p.parameters.table().iter().zip(p.parameters.to_vec());
+    let zero = entries.filter(|(e, x)| *x == 0.0 && matches!(e.declared.range, Range::NotNegative));
+    let names: Vec<String> = zero.map(|(e, _)| e.name.clone()).collect();
+    for name in &names {
+        p.parameters.set(name, 0.1).unwrap();
     }
     let base = run(&p);
     let bar = wavy(3 * system().len(), 5.1, 1.0);

@@ -312,7 +312,7 @@ fn vectors_of_every_check_span_space() {
             })
             .collect();
         // A policy without actions has no derivative.
-        if vectors.is_empty() || name == "simulate::policy::OpenLoop::act_vjp" {
+        if vectors.is_empty() || name == "policy::OpenLoop::act_vjp" {
             continue;
         }
         let span = adjoint::sample::span(vectors.iter().copied());

@@ -25,9 +25,12 @@ use nalgebra::{DMatrix, DVector};
 use std::sync::Arc;
 use std::time::Instant;
 
+/// A section's name, and what prints it.
+type Section = (&'static str, fn() -> Result<()>);
+
 fn main() -> Result<()> {
     let arguments = arguments();
-    let sections: [(&str, fn() -> Result<()>); 5] = [
+    let sections: [Section; 5] = [
         ("mfs", mfs),
         ("panel", panel),
         ("harmonics", harmonics),

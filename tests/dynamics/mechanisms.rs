@@ -157,7 +157,7 @@ fn springs_that_can_not_be_are_refused() {
             scene.add(dry(name, Joint::Free));
         }
         scene.add_force(spring.into());
-        says(&scene.validate().unwrap_err().to_string(), words);
+        says(scene.validate().unwrap_err().to_string(), words);
     };
     let good = || Spring::new("a").stiffness(1.0);
     refused(Spring::new("c"), &["forces[0].body", "\"c\"", "a, b"]);

@@ -107,21 +107,21 @@ fn what_has_no_transpose_or_no_name_is_refused() {
     seed.observables
         .insert("energy".into(), DMatrix::zeros(1, 201));
     says(
-        &rollout.vjp(&seed).unwrap_err(),
+        rollout.vjp(&seed).unwrap_err(),
         &["energy", "no transpose", "angular_momentum"],
     );
     let mut seed = rollout.zero_cotangents();
     seed.observables
         .insert("angular_momentum".into(), DMatrix::zeros(3, 200));
     says(
-        &rollout.vjp(&seed).unwrap_err(),
+        rollout.vjp(&seed).unwrap_err(),
         &["angular_momentum", "(3, 201)"],
     );
     let goal = objective::final_observable("rotations", 0, 0.0, 1.0);
     says(
-        &rollout.value(&goal).unwrap_err(),
+        rollout.value(&goal).unwrap_err(),
         &["rotations", "independent"],
     );
     let goal = objective::final_observable("angular_momentum", 3, 0.0, 1.0);
-    says(&rollout.value(&goal).unwrap_err(), &["entry", "under 3"]);
+    says(rollout.value(&goal).unwrap_err(), &["entry", "under 3"]);
 }

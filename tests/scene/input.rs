@@ -13,7 +13,7 @@ fn text(body: &str, rest: &str) -> String {
 
 #[track_caller]
 fn unread(text: &str, words: &[&str]) {
-    says(&Scene::from_toml(text, "").unwrap_err().to_string(), words);
+    says(Scene::from_toml(text, "").unwrap_err().to_string(), words);
 }
 
 #[test]
@@ -283,7 +283,7 @@ fn files_that_are_no_scenes() {
     let folder = tempfile::tempdir().unwrap();
     let unread = |name: &str, words: &[&str]| {
         says(
-            &Scene::load(folder.path().join(name))
+            Scene::load(folder.path().join(name))
                 .unwrap_err()
                 .to_string(),
             words,
@@ -311,7 +311,7 @@ fn files_that_are_no_scenes() {
 fn mangled_scenes_never_panic() {
     let judge = |text: &str| match Scene::from_toml(text, "") {
         Ok(scene) => drop(scene.validate()),
-        Err(error) => says(&error.to_string(), &["line "]),
+        Err(error) => says(error.to_string(), &["line "]),
     };
     for name in ["falling_ball", "fish"] {
         let text = std::fs::read_to_string(example_path(name)).unwrap();

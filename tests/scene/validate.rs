@@ -30,7 +30,7 @@ fn refused(change: impl FnOnce(&mut Scene), words: &[&str]) {
     let mut scene = good();
     scene.validate().unwrap();
     change(&mut scene);
-    says(&scene.validate().unwrap_err().to_string(), words);
+    says(scene.validate().unwrap_err().to_string(), words);
 }
 
 #[test]

@@ -187,7 +187,7 @@ fn declared_links_may_not_lie_within_each_other() {
         .err()
         .unwrap();
     says(
-        &error.to_string(),
+        error.to_string(),
         &["t = 0.", "part of its volume", "limit 5.000000e-1"],
     );
 }
@@ -214,7 +214,7 @@ fn the_overlapping_parent_is_the_nearest_with_a_shape() {
     assert_eq!(run(&scene), Vec::<String>::new());
     scene.bodies[2].overlaps_parent = false;
     says(
-        &refused(&scene),
+        refused(&scene),
         &["`overlaps_parent = true` for body \"lower\""],
     );
 
@@ -226,7 +226,7 @@ fn the_overlapping_parent_is_the_nearest_with_a_shape() {
     assert_eq!(run(&hull), Vec::<String>::new());
     hull.bodies[1].overlaps_parent = false;
     says(
-        &refused(&hull),
+        refused(&hull),
         &["overlap", "`overlaps_parent = true` for body \"lower\""],
     );
 }

@@ -72,7 +72,7 @@ pub struct LinearisedStep<'s, 'a> {
 
 enum Adjoint<'s, 'a> {
     MomentumEuler(euler::Adjoint<'s>),
-    Midpoint(midpoint::Adjoint<'s, 'a>),
+    Midpoint(Box<midpoint::Adjoint<'s, 'a>>),
     RungeKutta(runge_kutta::Adjoint<'a>),
     VelocityEuler(velocity_euler::Adjoint<'s>),
 }
@@ -163,7 +163,7 @@ impl<'a> Stepper<'a> {
         };
         let adjoint = match &record.stages {
             Stages::MomentumEuler(v) => Adjoint::MomentumEuler(euler::Adjoint::new(&start, v)?),
-            Stages::Midpoint(v) => Adjoint::Midpoint(midpoint::Adjoint::new(&start, v)?),
+            Stages::Midpoint(v) => Adjoint::Midpoint(Box::new(midpoint::Adjoint::new(&start, v)?)),
             Stages::RungeKutta(f) => Adjoint::RungeKutta(runge_kutta::Adjoint::new(&start, f)?),
             Stages::VelocityEuler(v) => {
                 Adjoint::VelocityEuler(velocity_euler::Adjoint::new(&start, v)?)

@@ -59,8 +59,8 @@
 //! | F̄ | `twist_rows`: the scaled rows' right-hand side per body twist | F × 6 |
 //! | P, B̄ | `1/r` at the readout points, `readout_flux` | F × N, F × 6 |
 //! | r, λ, μ | residual `F x̄ − K a`, adjoint strengths, `K λ` | F × k, N × k, F × k |
-//! | X(q) | [`Joint::frame_velocity`](crate::multibody::Joint::frame_velocity) | per joint |
-//! | ⊕ | [`Joint::integrate`](crate::multibody::Joint::integrate) | |
+//! | X(q) | [`JointModel::frame_velocity`](crate::multibody::JointModel::frame_velocity) | per joint |
+//! | ⊕ | [`JointModel::integrate`](crate::multibody::JointModel::integrate) | |
 //!
 //! The paper uses K_f for both a matrix (`1/r`, our P) and the fluid's energy, and writes ∇ above K for
 //! the matrix of normal velocities (our K).
@@ -70,7 +70,7 @@
 //! | equation | what | where |
 //! |---|---|---|
 //! | 1, 2 | Lagrangian and its equations of motion | [`crate::dynamics`] |
-//! | 3, 4 | semi-implicit Euler in velocity | [`Integrator::VelocityEuler`](crate::dynamics::Integrator::VelocityEuler), [`Evaluation::inertial_force`](crate::dynamics::Evaluation::inertial_force) |
+//! | 3, 4 | semi-implicit Euler in velocity | [`Integrator::VelocityEuler`](crate::dynamics::Integrator::VelocityEuler), [`Linearisation::inertial_force`](crate::dynamics::Linearisation::inertial_force) |
 //! | 5 | rate of a rotation vector to angular velocity | [`exp_jacobian`](crate::adjoint::lie::exp_jacobian) |
 //! | 6 | kinetic energy of a rigid body | [`spatial_inertia`](crate::adjoint::rigid::spatial_inertia) |
 //! | 7–9 | potential and added mass of one body | [`BodyBoundary`](crate::boundary::BodyBoundary) |
@@ -80,7 +80,7 @@
 //! | 17, 18 | sources under faces, velocity at centres | [`Method::MfsFace`](crate::boundary::Method::MfsFace) |
 //! | 19 | energy by potential and flux at centres | [`Readout`](crate::boundary::Readout) |
 //! | 20 | normal equations | [`cgls`](crate::solver::cgls) |
-//! | 21 | derivative of the solution | [`Record::vjp`](crate::coupling::Record::vjp), [`Record::hvp`](crate::coupling::Record::hvp): transposed, with the residual terms of least squares |
+//! | 21 | derivative of the solution | [`Linearised::vjp`](crate::coupling::Linearised::vjp), [`Linearised::hvp`](crate::coupling::Linearised::hvp): transposed, with the residual terms of least squares |
 //! | 22 | drag along the surface | [`resistance`](crate::adjoint::drag::resistance) |
 //!
 //! The default departs from these: sources under vertices and flux rows instead of 17–18, an energy of

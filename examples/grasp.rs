@@ -117,7 +117,7 @@ fn main() -> Result<(), Box<dyn Error>> {
     }
 
     let replayable = playback(&scene, &task.controls(&found.x)?);
-    let mut files: Vec<PathBuf> = Recording::of(&scene, &optimised)
+    let mut files: Vec<PathBuf> = Recording::of(&scene, &optimised)?
         .write(&options.out)?
         .into();
     let text = options.out.join("grasp_caught.toml");

@@ -1,5 +1,8 @@
 #![doc = include_str!("../README.md")]
 
+#[macro_use]
+mod choices;
+
 mod assembly;
 pub mod boundary;
 #[cfg(feature = "cli")]

@@ -317,7 +317,7 @@ impl Rollout {
     /// Columns by name, one row a state: time, each coordinate and velocity, energy, momentum and smallest gap, SI units;
     /// `pandas.DataFrame(rollout.to_dict())` is a table.
     fn to_dict<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyDict>> {
-        let recording = Recording::of(&self.simulator.get().scene, &self.inner);
+        let recording = Recording::of(&self.simulator.get().scene, &self.inner).or_raise()?;
         let out = PyDict::new(py);
         let n = recording.time.len();
         let column = |values: Vec<f64>| array::to_python(py, values, &[n]);

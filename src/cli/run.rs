@@ -116,7 +116,7 @@ fn simulate(
         warnings: [simulator.warnings(), &rollout.warnings()].concat(),
         files: Vec::new(),
     };
-    Ok((report, Recording::of(scene, &rollout)))
+    Ok((report, Recording::of(scene, &rollout)?))
 }
 
 impl fmt::Display for RunReport {

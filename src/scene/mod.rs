@@ -20,7 +20,6 @@ pub use contact::Contact;
 pub use force::{Force, Spring};
 
 use serde::{Deserialize, Serialize};
-use strum::{EnumMessage, EnumString, IntoStaticStr, VariantArray};
 
 /// Everything that a simulation starts from.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
@@ -60,29 +59,15 @@ pub struct Scene {
     pub controller: Option<Controller>,
 }
 
-/// A family of choices.
-#[derive(
-    Clone,
-    Copy,
-    Debug,
-    Default,
-    PartialEq,
-    Eq,
-    Serialize,
-    Deserialize,
-    EnumMessage,
-    EnumString,
-    IntoStaticStr,
-    VariantArray,
-)]
-#[serde(rename_all = "kebab-case")]
-#[strum(serialize_all = "kebab-case")]
-pub enum Preset {
-    /// hydrograd's own.
-    #[default]
-    Default,
-    /// The paper's: face sources, rows not scaled, potential read at face centres, semi-implicit Euler in velocity.
-    Paper,
+choices! {
+    /// A family of choices.
+    pub enum Preset {
+        /// hydrograd's own.
+        #[default]
+        Default,
+        /// The paper's: face sources, rows not scaled, potential read at face centres, semi-implicit Euler in velocity.
+        Paper,
+    }
 }
 
 /// The fluid around the bodies.

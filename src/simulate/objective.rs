@@ -163,7 +163,8 @@ fn tangent_of(rollout: &Rollout, index: usize) -> Option<usize> {
 /// An entry of an observable at the end; a name that none has was refused before.
 fn last_entry(rollout: &Rollout, name: &str, entry: usize) -> f64 {
     let at = rollout.states().len() - 1;
-    observable(name).map_or(f64::NAN, |o| o.value(&rollout.reading(at))[entry])
+    let value = observable(name).and_then(|o| o.value(&rollout.reading(at)));
+    value.map_or(f64::NAN, |x| x[entry])
 }
 
 impl Objective for Sum {

@@ -43,31 +43,39 @@ pub struct Recorded {
 
 impl Recording {
     /// Every state of a rollout of a scene: coordinates, velocities, energy, momentum and the smallest gap.
-    pub fn of(scene: &Scene, rollout: &Rollout) -> Self {
+    ///
+    /// # Errors
+    /// A value that can't be found ([`Observable::value`]).
+    pub fn of(scene: &Scene, rollout: &Rollout) -> Result<Self> {
         let of = |name: &&str| OBSERVABLES.iter().find(|o| o.name() == *name);
         Self::with(scene, rollout, RECORDED.iter().filter_map(of).copied())
     }
 
     /// The same with these observables.
+    ///
+    /// # Errors
+    /// As [`Recording::of`].
     pub fn with(
         scene: &Scene,
         rollout: &Rollout,
         observables: impl IntoIterator<Item = &'static dyn Observable>,
-    ) -> Self {
-        let record = |o: &'static dyn Observable| Recorded {
-            name: o.name(),
-            labels: o.labels(scene),
-            scalar: o.shape(rollout.simulator().system()).is_empty(),
-            values: (0..rollout.states().len())
-                .map(|n| o.value(&rollout.reading(n)))
-                .collect(),
+    ) -> Result<Self> {
+        let states = 0..rollout.states().len();
+        let record = |o: &'static dyn Observable| {
+            let values = states.clone().map(|n| o.value(&rollout.reading(n)));
+            Ok(Recorded {
+                name: o.name(),
+                labels: o.labels(scene),
+                scalar: o.shape(rollout.simulator().system()).is_empty(),
+                values: values.collect::<Result<_>>()?,
+            })
         };
-        Self {
+        Ok(Self {
             scene: scene.name.clone(),
             dt: rollout.simulator().time_step(),
             time: rollout.samples().iter().map(|s| s.time).collect(),
-            observables: observables.into_iter().map(record).collect(),
-        }
+            observables: (observables.into_iter().map(record)).collect::<Result<_>>()?,
+        })
     }
 
     /// Names of the columns after time, each with its place: observable and entry.

@@ -1,6 +1,6 @@
 //! A trajectory, and its gradient.
 
-use super::observable::{Observable, Reading, observable, transpose, velocity};
+use super::observable::{Reading, observable, transpose, velocity};
 use super::trajectory::Seed;
 use super::{Cotangents, Gradient, Initial, Sample, Simulator};
 use crate::adjoint::lie::Vec6;
@@ -82,22 +82,23 @@ impl Rollout {
     /// Velocities of the bodies at states 0 … N, 6·bodies × (N + 1), world axes: a body's rows are the velocity of its
     /// origin, m/s, and its angular velocity, rad/s.
     pub fn velocities(&self) -> DMatrix<f64> {
-        self.all(&velocity::Velocities)
+        let rows = 6 * self.simulator.system().len();
+        let states = self.states().len();
+        let values = (0..states).flat_map(|n| velocity::velocities(&self.reading(n)));
+        DMatrix::from_iterator(rows, states, values)
     }
 
     /// An observable ([`super::observable`]) at states 0 … N by its name, one column each.
     ///
     /// # Errors
-    /// A name that no observable has.
+    /// A name that no observable has; a value that can't be found ([`Observable::value`]).
     pub fn observe(&self, name: &str) -> Result<DMatrix<f64>> {
-        Ok(self.all(observable(name)?))
-    }
-
-    fn all(&self, observable: &dyn Observable) -> DMatrix<f64> {
+        let observable = observable(name)?;
         let rows: usize = observable.shape(self.simulator.system()).iter().product();
         let states = self.states().len();
-        let values = (0..states).flat_map(|n| observable.value(&self.reading(n)));
-        DMatrix::from_iterator(rows, states, values)
+        let values = (0..states).map(|n| observable.value(&self.reading(n)));
+        let values = values.collect::<Result<Vec<_>>>()?;
+        Ok(DMatrix::from_iterator(rows, states, values.concat()))
     }
 
     /// State `n`, as observables read it.
@@ -107,6 +108,10 @@ impl Rollout {
             parameters: self.simulator.parameters(),
             sample: &self.samples()[n],
             gap: Box::new(move || self.gaps()[n]),
+            contacts: Box::new(move || {
+                n.checked_sub(1)
+                    .map_or(Ok(Vec::new()), |n| self.contacts(n, 0.0))
+            }),
         }
     }
 

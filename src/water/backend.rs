@@ -4,59 +4,30 @@ use crate::{Error, Result};
 use serde::{Deserialize, Serialize};
 use std::fmt;
 use std::str::FromStr;
-use strum::{EnumMessage, EnumString, IntoStaticStr, VariantArray};
 
-/// What computes the coupling, whatever the fidelity.
-#[derive(
-    Clone,
-    Copy,
-    Debug,
-    Default,
-    PartialEq,
-    Eq,
-    Serialize,
-    Deserialize,
-    EnumMessage,
-    EnumString,
-    IntoStaticStr,
-    VariantArray,
-)]
-#[serde(rename_all = "kebab-case")]
-#[strum(serialize_all = "kebab-case")]
-pub enum Backend {
-    /// The processor, in double precision.
-    #[default]
-    Cpu,
-    /// A GPU, in builds with the feature gpu; `hydrograd gpu-info` lists them. The fidelity `isolated` has nothing to compute
-    /// there and stays on the CPU.
-    Gpu,
+choices! {
+    /// What computes the coupling, whatever the fidelity.
+    pub enum Backend {
+        /// The processor, in double precision.
+        #[default]
+        Cpu,
+        /// A GPU, in builds with the feature gpu; `hydrograd gpu-info` lists them. The fidelity `isolated` has nothing to compute
+        /// there and stays on the CPU.
+        Gpu,
+    }
 }
 
-/// Arithmetic of residuals and derivatives on the GPU.
-#[derive(
-    Clone,
-    Copy,
-    Debug,
-    Default,
-    PartialEq,
-    Eq,
-    Serialize,
-    Deserialize,
-    EnumMessage,
-    EnumString,
-    IntoStaticStr,
-    VariantArray,
-)]
-#[serde(rename_all = "kebab-case")]
-#[strum(serialize_all = "kebab-case")]
-pub enum Arithmetic {
-    /// `double` where the GPU has it, `two-float` otherwise.
-    #[default]
-    Auto,
-    /// Double precision.
-    Double,
-    /// Sums of two single-precision numbers, about 14 digits.
-    TwoFloat,
+choices! {
+    /// Arithmetic of residuals and derivatives on the GPU.
+    pub enum Arithmetic {
+        /// `double` where the GPU has it, `two-float` otherwise.
+        #[default]
+        Auto,
+        /// Double precision.
+        Double,
+        /// Sums of two single-precision numbers, about 14 digits.
+        TwoFloat,
+    }
 }
 
 /// Choices of the backend `gpu`.

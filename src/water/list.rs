@@ -8,26 +8,17 @@ macro_rules! listed {
             $($(#[$variant_meta:meta])* $variant:ident => $object:expr,)*
         }
     ) => {
-        $(#[$meta])*
-        #[derive(
-            Clone,
-            Copy,
-            Debug,
-            Default,
-            PartialEq,
-            Eq,
-            serde::Serialize,
-            serde::Deserialize,
-            strum::Display,
-            strum::EnumMessage,
-            strum::EnumString,
-            strum::IntoStaticStr,
-            strum::VariantArray,
-        )]
-        #[serde(rename_all = "kebab-case")]
-        #[strum(serialize_all = "kebab-case")]
-        pub enum $name {
-            $($(#[$variant_meta])* $variant,)*
+        choices! {
+            $(#[$meta])*
+            pub enum $name {
+                $($(#[$variant_meta])* $variant,)*
+            }
+        }
+
+        impl std::fmt::Display for $name {
+            fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+                f.write_str(self.into())
+            }
         }
 
         impl $name {

@@ -51,7 +51,7 @@ fn every_observable_has_a_label_and_a_value_for_every_entry() {
         assert_eq!(rollout.observe(o.name()).unwrap().shape(), (rows, 201));
         assert!(!o.unit().is_empty());
     }
-    let all = Recording::with(&scene, &rollout, OBSERVABLES.iter().copied());
+    let all = Recording::with(&scene, &rollout, OBSERVABLES.iter().copied()).unwrap();
     let columns: Vec<&str> = all.columns().map(|(name, _, _)| name).collect();
     for name in [
         "plate.qw",

@@ -8,8 +8,10 @@ use std::path::Path;
 /// `Error` and `Result` alone.
 ///
 /// `adjoint::lie` gives vectors and poses to everyone; the modules marked `adjoint` use the ladder too.
-const LAYERS: [(&str, &[&str]); 20] = [
+const LAYERS: [(&str, &[&str]); 21] = [
     ("error", &[]),
+    // What enums that users choose from can do.
+    ("choices", &[]),
     ("special", &[]),
     // Closed meshes and walls, and what is asked of them.
     ("geometry", &["adjoint"]),

@@ -1,7 +1,6 @@
 //! What a user may choose about the discretisation of one body.
 
 use serde::{Deserialize, Serialize};
-use strum::{EnumMessage, EnumString, IntoStaticStr, VariantArray};
 
 /// Discretisation of one body's surface.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
@@ -70,30 +69,16 @@ pub enum Depth {
     Fixed(f64),
 }
 
-/// Norm in which the rows are fitted.
-#[derive(
-    Clone,
-    Copy,
-    Debug,
-    Default,
-    PartialEq,
-    Eq,
-    Serialize,
-    Deserialize,
-    EnumMessage,
-    EnumString,
-    IntoStaticStr,
-    VariantArray,
-)]
-#[serde(rename_all = "kebab-case")]
-#[strum(serialize_all = "kebab-case")]
-pub enum RowScaling {
-    /// The L² norm of the normal velocity: small and large faces, and small and large bodies, count alike.
-    #[default]
-    Scaled,
-    /// Plain least squares of the flux (vertex sources) or of the normal velocity (face sources); ruins small bodies beside
-    /// large ones.
-    Unscaled,
+choices! {
+    /// Norm in which the rows are fitted.
+    pub enum RowScaling {
+        /// The L² norm of the normal velocity: small and large faces, and small and large bodies, count alike.
+        #[default]
+        Scaled,
+        /// Plain least squares of the flux (vertex sources) or of the normal velocity (face sources); ruins small bodies beside
+        /// large ones.
+        Unscaled,
+    }
 }
 
 /// How the energy is read from the strengths.

@@ -6,60 +6,31 @@ use crate::coupling::settings::check_limits;
 use crate::{Error, Result};
 use serde::{Deserialize, Serialize};
 use std::sync::Arc;
-use strum::{EnumMessage, EnumString, IntoStaticStr, VariantArray};
 
-/// How the coupled system is solved.
-#[derive(
-    Clone,
-    Copy,
-    Debug,
-    Default,
-    PartialEq,
-    Eq,
-    Serialize,
-    Deserialize,
-    EnumMessage,
-    EnumString,
-    IntoStaticStr,
-    VariantArray,
-)]
-#[serde(rename_all = "kebab-case")]
-#[strum(serialize_all = "kebab-case")]
-pub enum FullSolver {
-    /// Conjugate gradients on the least-squares problem (Eq. 20).
-    #[default]
-    Cgls,
-    /// A dense factorisation, as a reference: QR, or LU with the method panel.
-    Qr,
-    /// GMRES; for the square systems of `mfs-face` (Eq. 18, and its transpose) and `panel` only.
-    Gmres,
+choices! {
+    /// How the coupled system is solved.
+    pub enum FullSolver {
+        /// Conjugate gradients on the least-squares problem (Eq. 20).
+        #[default]
+        Cgls,
+        /// A dense factorisation, as a reference: QR, or LU with the method panel.
+        Qr,
+        /// GMRES; for the square systems of `mfs-face` (Eq. 18, and its transpose) and `panel` only.
+        Gmres,
+    }
 }
 
-/// Right preconditioner of the iterative solvers.
-#[derive(
-    Clone,
-    Copy,
-    Debug,
-    Default,
-    PartialEq,
-    Eq,
-    Serialize,
-    Deserialize,
-    EnumMessage,
-    EnumString,
-    IntoStaticStr,
-    VariantArray,
-)]
-#[serde(rename_all = "kebab-case")]
-#[strum(serialize_all = "kebab-case")]
-pub enum Preconditioner {
-    /// Each body's own factorisation, made once.
-    #[default]
-    Factors,
-    /// The diagonal (column norms).
-    Jacobi,
-    /// None.
-    None,
+choices! {
+    /// Right preconditioner of the iterative solvers.
+    pub enum Preconditioner {
+        /// Each body's own factorisation, made once.
+        #[default]
+        Factors,
+        /// The diagonal (column norms).
+        Jacobi,
+        /// None.
+        None,
+    }
 }
 
 /// Settings of the coupled solve.

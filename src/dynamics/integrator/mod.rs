@@ -29,39 +29,23 @@ pub use record::{LinearisedStep, StepJacobians, StepRecord};
 use super::{Drive, Evaluation, ForceCotangents, Linearisation, Parameters, System};
 use crate::Result;
 use nalgebra::DVector;
-use serde::{Deserialize, Serialize};
-use strum::{EnumMessage, EnumString, IntoStaticStr, VariantArray};
 
-/// How time is stepped. The default is the cheapest that keeps the energy error of every example scene under 1 %
-/// (`docs/integrators.md`).
-#[derive(
-    Clone,
-    Copy,
-    Debug,
-    Default,
-    PartialEq,
-    Eq,
-    Serialize,
-    Deserialize,
-    EnumMessage,
-    EnumString,
-    IntoStaticStr,
-    VariantArray,
-)]
-#[serde(rename_all = "kebab-case")]
-#[strum(serialize_all = "kebab-case")]
-pub enum Integrator {
-    /// Symplectic Euler in momentum, implicit in p at fixed q: first order, one evaluation a step.
-    MomentumEuler,
-    /// Implicit midpoint in momentum: second order, symmetric, energy bounded.
-    Midpoint,
-    /// Explicit midpoint rule in momentum: second order, two evaluations.
-    #[default]
-    Rk2,
-    /// Classical Runge–Kutta in momentum: fourth order, four evaluations.
-    Rk4,
-    /// Semi-implicit Euler in velocity (the paper's Eq. 3–4): first order.
-    VelocityEuler,
+choices! {
+    /// How time is stepped. The default is the cheapest that keeps the energy error of every example scene under 1 %
+    /// (`docs/integrators.md`).
+    pub enum Integrator {
+        /// Symplectic Euler in momentum, implicit in p at fixed q: first order, one evaluation a step.
+        MomentumEuler,
+        /// Implicit midpoint in momentum: second order, symmetric, energy bounded.
+        Midpoint,
+        /// Explicit midpoint rule in momentum: second order, two evaluations.
+        #[default]
+        Rk2,
+        /// Classical Runge–Kutta in momentum: fourth order, four evaluations.
+        Rk4,
+        /// Semi-implicit Euler in velocity (the paper's Eq. 3–4): first order.
+        VelocityEuler,
+    }
 }
 
 impl Integrator {

@@ -1,6 +1,7 @@
 //! Angular momentum of each body by itself, without the water, about its centre of mass: L = R I Rᵀ ω, world axes.
 
 use super::entry::{Observable, Observed, ObservedBars, Reading, Transpose, by_body};
+use crate::Result;
 use crate::adjoint::lie::{Mat3, Vec3, Vec6, angular, six};
 use crate::dynamics::{Parameters, System};
 use crate::scene::Scene;
@@ -31,14 +32,14 @@ impl Observable for AngularMomentum {
         by_body(scene, &names.each_ref().map(String::as_str))
     }
 
-    fn value(&self, at: &Reading) -> Vec<f64> {
+    fn value(&self, at: &Reading) -> Result<Vec<f64>> {
         let (tree, sample) = (&at.system.tree, at.sample);
         let twists = tree.twists(&tree.kinematics(&sample.q), &sample.v);
         let of = |(b, twist): (usize, &Vec6)| {
             let r = &sample.poses[b].rotation;
             <[f64; 3]>::from(r * (inertia(at.parameters, b) * r.tr_mul(&angular(twist))))
         };
-        twists.iter().enumerate().flat_map(of).collect()
+        Ok(twists.iter().enumerate().flat_map(of).collect())
     }
 
     fn transpose(&self) -> Option<&dyn Transpose> {

@@ -1,6 +1,7 @@
 //! Energies of all bodies and the water.
 
 use super::entry::{Observable, Reading};
+use crate::Result;
 use crate::dynamics::System;
 use crate::scene::Scene;
 
@@ -32,8 +33,8 @@ macro_rules! energy {
                 vec![$name.into()]
             }
 
-            fn value(&self, at: &Reading) -> Vec<f64> {
-                vec![$of(at.sample)]
+            fn value(&self, at: &Reading) -> Result<Vec<f64>> {
+                Ok(vec![$of(at.sample)])
             }
         }
     };

@@ -1,8 +1,9 @@
 //! What an entry gives, and what it reads.
 
 use super::super::Sample;
+use crate::Result;
 use crate::adjoint::lie::Vec6;
-use crate::dynamics::{Parameters, System};
+use crate::dynamics::{ContactForce, Parameters, System};
 use crate::geometry::Gap;
 use crate::multibody::Kinematics;
 use crate::scene::Scene;
@@ -23,7 +24,10 @@ pub trait Observable: Sync {
     fn labels(&self, scene: &Scene) -> Vec<String>;
 
     /// Its value at a state, last index fastest.
-    fn value(&self, at: &Reading) -> Vec<f64>;
+    ///
+    /// # Errors
+    /// What it can't be found without fails.
+    fn value(&self, at: &Reading) -> Result<Vec<f64>>;
 
     /// Its transpose, where there is one.
     fn transpose(&self) -> Option<&dyn Transpose> {
@@ -50,6 +54,8 @@ pub struct Reading<'a> {
     pub sample: &'a Sample,
     /// Gives the smallest gap, if there is anything to meet; it may have to be measured.
     pub gap: Box<dyn Fn() -> Option<Gap> + 'a>,
+    /// Finds the contacts of the step that ended there; none at the start.
+    pub contacts: Box<dyn Fn() -> Result<Vec<ContactForce>> + 'a>,
 }
 
 /// A state, as transposes of observables see it.

@@ -1,6 +1,7 @@
 //! The smallest gap.
 
 use super::entry::{Observable, Reading};
+use crate::Result;
 use crate::dynamics::System;
 use crate::scene::Scene;
 
@@ -24,7 +25,7 @@ impl Observable for SmallestGap {
         vec!["min_gap".into()]
     }
 
-    fn value(&self, at: &Reading) -> Vec<f64> {
-        vec![(at.gap)().map_or(f64::NAN, |g| g.distance)]
+    fn value(&self, at: &Reading) -> Result<Vec<f64>> {
+        Ok(vec![(at.gap)().map_or(f64::NAN, |g| g.distance)])
     }
 }

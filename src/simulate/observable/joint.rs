@@ -1,6 +1,7 @@
 //! Joint coordinates and generalised velocities.
 
 use super::entry::{Observable, Observed, ObservedBars, Reading, Transpose};
+use crate::Result;
 use crate::dynamics::System;
 use crate::scene::Scene;
 
@@ -23,8 +24,8 @@ impl Observable for Coordinates {
         scene.coordinate_labels()
     }
 
-    fn value(&self, at: &Reading) -> Vec<f64> {
-        at.sample.q.as_slice().to_vec()
+    fn value(&self, at: &Reading) -> Result<Vec<f64>> {
+        Ok(at.sample.q.as_slice().to_vec())
     }
 
     fn transpose(&self) -> Option<&dyn Transpose> {
@@ -63,8 +64,8 @@ impl Observable for Velocities {
         scene.velocity_labels()
     }
 
-    fn value(&self, at: &Reading) -> Vec<f64> {
-        at.sample.v.as_slice().to_vec()
+    fn value(&self, at: &Reading) -> Result<Vec<f64>> {
+        Ok(at.sample.v.as_slice().to_vec())
     }
 
     fn transpose(&self) -> Option<&dyn Transpose> {

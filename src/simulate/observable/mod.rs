@@ -4,6 +4,7 @@
 //! its line in [`OBSERVABLES`].
 
 mod angular_momentum;
+mod contact;
 mod energy;
 mod entry;
 mod gap;
@@ -29,6 +30,7 @@ pub const OBSERVABLES: &[&dyn Observable] = &[
     &momentum::Momentum,
     &angular_momentum::AngularMomentum,
     &gap::SmallestGap,
+    &contact::Forces,
 ];
 
 /// The observable of this name.

@@ -1,6 +1,7 @@
 //! Momentum of all bodies and the water.
 
 use super::entry::{Observable, Reading};
+use crate::Result;
 use crate::dynamics::System;
 use crate::scene::Scene;
 
@@ -25,7 +26,7 @@ impl Observable for Momentum {
         [of("momentum"), of("angular_momentum")].concat()
     }
 
-    fn value(&self, at: &Reading) -> Vec<f64> {
-        at.sample.momentum.as_slice().to_vec()
+    fn value(&self, at: &Reading) -> Result<Vec<f64>> {
+        Ok(at.sample.momentum.as_slice().to_vec())
     }
 }

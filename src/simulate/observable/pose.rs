@@ -1,6 +1,7 @@
 //! Positions and rotations of the bodies.
 
 use super::entry::{Observable, Observed, ObservedBars, Reading, Transpose, by_body};
+use crate::Result;
 use crate::adjoint::lie::{Vec3, point_wrench};
 use crate::dynamics::System;
 use crate::scene::Scene;
@@ -24,11 +25,11 @@ impl Observable for Positions {
         by_body(scene, &["position_x", "position_y", "position_z"])
     }
 
-    fn value(&self, at: &Reading) -> Vec<f64> {
+    fn value(&self, at: &Reading) -> Result<Vec<f64>> {
         let poses = at.sample.poses.iter();
-        poses
+        Ok(poses
             .flat_map(|p| <[f64; 3]>::from(p.translation))
-            .collect()
+            .collect())
     }
 
     fn transpose(&self) -> Option<&dyn Transpose> {
@@ -71,11 +72,11 @@ impl Observable for Rotations {
         by_body(scene, &names.each_ref().map(String::as_str))
     }
 
-    fn value(&self, at: &Reading) -> Vec<f64> {
+    fn value(&self, at: &Reading) -> Result<Vec<f64>> {
         let poses = at.sample.poses.iter();
-        poses
+        Ok(poses
             .flat_map(|p| p.rotation.transpose().as_slice().to_vec())
-            .collect()
+            .collect())
     }
 
     fn transpose(&self) -> Option<&dyn Transpose> {

@@ -174,6 +174,22 @@ fn converges(
 }
 
 #[test]
+fn the_observed_contact_force_is_what_changes_the_momentum() {
+    let scene = ball(0.0, 0.0, 1e-3);
+    let rollout = run(&isolated(&scene), 300);
+    let forces = rollout.observe("contact_forces").unwrap();
+    assert_eq!(forces.shape(), (3, 301));
+    let largest = forces.row(2).max();
+    assert!(largest > 10.0 * MASS * GRAVITY, "{largest}");
+    for n in 0..300 {
+        let [before, after] = [n, n + 1].map(|n| rollout.samples()[n].v[0]);
+        let force = MASS * ((after - before) / 1e-3 + GRAVITY);
+        assert!((forces[(2, n + 1)] - force).abs() < 1e-6 * largest, "{n}");
+    }
+    assert_eq!(forces.column(0).norm(), 0.0);
+}
+
+#[test]
 fn a_landing_converges_to_its_equation_in_vacuum() {
     for dissipation in [0.0, 0.3] {
         converges("vacuum", Fidelity::Isolated, 0.0, dissipation, &|_| MASS);

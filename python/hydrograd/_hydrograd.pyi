@@ -15,6 +15,7 @@ __version__: str
 _Array = NDArray[np.float64]
 _Path = str | os.PathLike[str]
 _Part = Literal["tangential", "normal", "total"]
+_Backend = Literal["cpu", "gpu"]
 _Fidelity = Literal["isolated", "reduced", "auto", "full"]
 _Method = Literal["auto", "exact", "panel", "mfs-vertex", "mfs-face"]
 _Integrator = Literal["momentum-euler", "midpoint", "rk2", "rk4", "velocity-euler"]
@@ -221,7 +222,7 @@ class Simulator:
         rank: int | None = None,
         resolved_gap: float | None = None,
         cache: _Path | None = None,
-        backend: Literal["cpu", "gpu"] | None = None,
+        backend: _Backend | None = None,
     ) -> Simulator: ...
     def rollout(
         self,

@@ -6,6 +6,8 @@ import inspect
 import pathlib
 import re
 
+import pytest
+
 import hydrograd as hg
 from hydrograd import _hydrograd
 
@@ -36,6 +38,21 @@ def test_every_name_has_a_stub_and_every_stub_a_name():
         value = getattr(_hydrograd, name)
         if inspect.isclass(value) and not issubclass(value, Exception):
             assert public(members) == public(vars(value)), name
+
+
+def test_options_of_the_stubs_are_those_of_the_program():
+    """Every option that takes a name takes the same names in the stubs; a wrong one's error lists them."""
+    lists = {
+        node.targets[0].id: ast.literal_eval(node.value.slice)
+        for node in ast.parse(STUBS.read_text()).body
+        if isinstance(node, ast.Assign) and isinstance(node.value, ast.Subscript) and node.value.value.id == "Literal"
+    }
+    keywords = {"fidelity": "_Fidelity", "method": "_Method", "integrator": "_Integrator", "backend": "_Backend"}
+    for keyword, name in keywords.items():
+        with pytest.raises(hg.InputError, match="must be one of") as error:
+            hg.Simulator(hg.Scene(), **{keyword: "?"})
+        listed = str(error.value).split("must be one of ")[1]
+        assert tuple(re.findall('"([^"]+)"', listed)) == lists[name], keyword
 
 
 def test_keywords_are_those_of_the_stubs():

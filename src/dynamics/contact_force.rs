@@ -15,8 +15,8 @@ use crate::multibody::{Cotangents, Virtual};
 use nalgebra::{DMatrix, DVector};
 
 impl System {
-    /// Contacts of bodies at `q` that end a step with the velocity `v`: all places where surfaces are no more than `slack` (m) farther apart than
-    /// the gap at which they touch, and what presses there, if anything does.
+    /// Contacts of bodies at `q` that end a step with the velocity `v`: all places where something presses, or where surfaces are no more
+    /// than `slack` (m) farther apart than the gap at which they touch.
     ///
     /// # Errors
     /// A signed distance that can't be found.
@@ -30,10 +30,7 @@ impl System {
         let kinematics = self.tree.kinematics(q);
         let twists = self.tree.twists(&kinematics, v);
         let contact_points = self.contact_points(parameters, &kinematics.poses)?;
-        let near = contact_points
-            .iter()
-            .filter(|t| t.point.gap <= t.law.gap + slack.max(t.law.width));
-        let acting = near.map(|t| ContactForce {
+        let found = contact_points.iter().map(|t| ContactForce {
             first: t.first,
             second: t.second,
             gap: t.point.gap,
@@ -41,7 +38,11 @@ impl System {
             normal: t.point.normal.into(),
             force: contact_force(&t.law, &t.point_state(&twists)).into(),
         });
-        Ok(acting.collect())
+        // The law looks ahead by a step: what closes fast is pressed before it is near.
+        let near = contact_points.iter().zip(found).filter(|(t, c)| {
+            t.point.gap <= t.law.gap + slack.max(t.law.width) || c.force != [0.0; 3]
+        });
+        Ok(near.map(|(_, c)| c).collect())
     }
 
     /// All places where surfaces are near.

@@ -173,8 +173,8 @@ impl Rollout {
         })
     }
 
-    /// Contacts during step `n`, between the states n and n + 1: where surfaces are no more than `slack` (m) farther apart than the gap at which
-    /// they touch, and what presses there; none where there is no such step.
+    /// Contacts during step `n`, between the states n and n + 1: where something presses, or surfaces are no more than `slack` (m) farther
+    /// apart than the gap at which they touch; none where there is no such step.
     ///
     /// # Errors
     /// A signed distance that can't be found.

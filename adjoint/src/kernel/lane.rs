@@ -20,6 +20,8 @@ pub(super) trait Lane:
     fn neg_mul_add(self, b: Self, c: Self) -> Self;
     /// Square root.
     fn sqrt(self) -> Self;
+    /// Inverse hyperbolic tangent, of numbers from 0 to 1; the largest number below 1 for 1.
+    fn artanh(self) -> Self;
     /// Angle of the point (x, y) = (`x`, `self`), in (−π, π].
     fn atan2(self, x: Self) -> Self;
 }
@@ -41,6 +43,10 @@ impl Lane for f64 {
     #[inline(always)]
     fn sqrt(self) -> Self {
         f64::sqrt(self)
+    }
+    #[inline(always)]
+    fn artanh(self) -> Self {
+        f64::atanh(self.min(1.0 - f64::EPSILON))
     }
     #[inline(always)]
     fn atan2(self, x: Self) -> Self {
@@ -129,6 +135,9 @@ const ATAN: [f64; 11] = [
     -0.019174543572021332,
 ];
 
+/// Up to here 14 terms of the series of artanh have all digits.
+const SERIES: f64 = 0.25;
+
 /// tan π/8.
 const TAN_PI_8: f64 = std::f64::consts::SQRT_2 - 1.0;
 
@@ -148,6 +157,29 @@ impl<S: Simd> Lane for Lanes<S> {
     #[inline(always)]
     fn sqrt(self) -> Self {
         Self::new(self.simd, self.simd.sqrt_f64s(self.v))
+    }
+    /// The series where all numbers are small, which the edges of distant triangles are; else one number after the other.
+    #[inline(always)]
+    fn artanh(self) -> Self {
+        let simd = self.simd;
+        let mut numbers = [self.v];
+        let numbers: &mut [f64] = pulp::bytemuck::cast_slice_mut(&mut numbers);
+        let mut small = true;
+        for t in numbers.iter() {
+            small &= *t <= SERIES;
+        }
+        if small {
+            let u = self * self;
+            let mut sum = self.like(1.0 / 27.0);
+            for k in (0..13).rev() {
+                sum = sum.mul_add(u, self.like(1.0 / f64::from(2 * k + 1)));
+            }
+            return self * sum;
+        }
+        for t in numbers.iter_mut() {
+            *t = t.artanh();
+        }
+        Self::new(simd, S::as_simd_f64s(numbers).0[0])
     }
     /// One division: the quotient of the smaller by the larger, rotated by π/4 where it is large, then a
     /// polynomial. Relative error about 2e-16, also for a tiny `self` and for `x ≤ 0`.

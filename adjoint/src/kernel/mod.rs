@@ -7,6 +7,7 @@
 //! |---|---|---|
 //! | [`flux`](mod@flux) | [`Triangles`] | `w_i ∫ n·r/r³ dA = w_i Ω_i(s)`, the solid angle |
 //! | [`normal`](mod@normal) | [`Points`] | `w_i n_i·r/r³` |
+//! | [`single`](mod@single) | [`Triangles`] | `w_i ∫ 1/r dA`, the potential of a panel of constant density |
 //! | [`potential`](mod@potential) | [`Points`] | `1/r` (no row weight) |
 //!
 //! with `r = x − s`. Targets do not move in the frame of their body, and sources are given in that frame, so every
@@ -15,7 +16,7 @@
 //! | rung | sum |
 //! |---|---|
 //! | `*_fill` | `K_ij`, row-major |
-//! | `potential_sum` | `out[j][k] += Σ_i K_ij bar[i][k]` |
+//! | `potential_sum`, `single_sum` | `out[j][k] += Σ_i K_ij bar[i][k]` |
 //! | `*_jvp` | `out[i][k] += Σ_j (∇K_ij · d_j) a[j][k]`, the tangent of `K a` when source `j` moves by `d_j` |
 //! | `*_vjp` | `out[j][k] += Σ_i bar[i][k] ∇K_ij`, a 3-vector per source and column |
 //! | `*_hvp` | `out[j][k] += Σ_i bar[i][k] ∇∇K_ij d_j`, the tangent of `*_vjp` |
@@ -38,6 +39,7 @@ pub mod normal;
 mod point;
 pub mod potential;
 mod registry;
+pub mod single;
 mod source;
 mod sum;
 mod target;
@@ -56,6 +58,9 @@ pub use potential::{
     potential_jvp, potential_sum, potential_vjp,
 };
 pub use registry::rungs;
+pub use single::{
+    single, single_gradient, single_hessian_product, single_hvp, single_jvp, single_sum, single_vjp,
+};
 pub use source::Sources;
 pub use target::{Points, Triangles};
 

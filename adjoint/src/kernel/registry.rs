@@ -3,7 +3,7 @@
 use super::{
     Points, Sources, Triangles, Write, flux_fill, flux_hvp, flux_jvp, flux_vjp, normal_fill,
     normal_hvp, normal_jvp, normal_vjp, potential_fill, potential_hvp, potential_jvp,
-    potential_vjp,
+    potential_vjp, single, single_hvp, single_jvp, single_vjp,
 };
 use crate::check::{Outcome, Rung, outcome};
 use crate::draw::numbers;
@@ -34,6 +34,11 @@ pub fn rungs() -> Vec<Rung> {
         "kernel::normal::normal_hvp" => |c| tangent(
             |s, bar, out| normal_vjp(&points(), s, bar, K, out),
             |d, bar, out| normal_hvp(&points(), &sources(&start()), d, bar, K, out), c),
+        "kernel::single::single_jvp" => |c| forward(single_matrix, |d, a, out| single_jvp(&surface(), &sources(&start()), d, a, K, out), c),
+        "kernel::single::single_vjp" => |c| gradient(single_matrix, |bar, out| single_vjp(&surface(), &sources(&start()), bar, K, out), c),
+        "kernel::single::single_hvp" => |c| tangent(
+            |s, bar, out| single_vjp(&surface(), s, bar, K, out),
+            |d, bar, out| single_hvp(&surface(), &sources(&start()), d, bar, K, out), c),
         "kernel::potential::potential_jvp" => |c| forward(potential_matrix, |d, a, out| potential_jvp(&points(), &sources(&start()), d, a, K, out), c),
         "kernel::potential::potential_vjp" => |c| gradient(potential_matrix, |bar, out| potential_vjp(&points(), &sources(&start()), bar, K, out), c),
         "kernel::potential::potential_hvp" => |c| tangent(
@@ -122,6 +127,13 @@ fn flux_matrix(s: &Sources) -> Vec<f64> {
     let mut out = vec![0.0; t.len() * s.len()];
     flux_fill(&t, s, Write::Set, &mut out, s.len(), 0);
     out
+}
+
+fn single_matrix(s: &Sources) -> Vec<f64> {
+    let t = surface();
+    let entry = |i: usize, j: usize| single(&t.corners(i), t.weights()[i], &s.point(j));
+    let rows = (0..t.len()).flat_map(|i| (0..s.len()).map(move |j| (i, j)));
+    rows.map(|(i, j)| entry(i, j)).collect()
 }
 
 fn normal_matrix(s: &Sources) -> Vec<f64> {

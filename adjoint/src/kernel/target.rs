@@ -1,5 +1,6 @@
 //! Elements of a body's surface, fixed in the body's frame.
 
+use super::single::Panel;
 use super::sum::TILE;
 use crate::lie::Vec3;
 use std::collections::HashMap;
@@ -120,6 +121,8 @@ pub struct Triangles {
     pub(super) faces: Vec<Tile<Face>>,
     pub(super) edges: Vec<Tile<Edge>>,
     pub(super) sides: Vec<Sides>,
+    /// One a face.
+    pub(super) panels: Vec<Panel>,
 }
 
 /// Faces of one tile.
@@ -159,6 +162,9 @@ impl Triangles {
                 table.finish(items)
             })
             .collect();
+        let panels = faces.iter().zip(&weights);
+        let panels = panels.map(|(f, w)| Panel::new(f.map(|v| vertices[v]), *w));
+        let panels = panels.collect();
         let (ends, sides) = edges(faces);
         let edge_tiles = ends
             .chunks(TILE)
@@ -187,6 +193,7 @@ impl Triangles {
             faces: face_tiles,
             edges: edge_tiles,
             sides,
+            panels,
         }
     }
 

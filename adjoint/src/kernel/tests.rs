@@ -5,6 +5,7 @@ use super::lane::Lane;
 use super::normal::Normal;
 use super::point::PointKernel;
 use super::potential::Potential;
+use super::single::Panel;
 use super::*;
 use crate::check::{dot, dot_product_gap};
 use crate::lie::Vec3;
@@ -30,6 +31,9 @@ impl Lane for HyperDual64 {
     }
     fn sqrt(self) -> Self {
         DualNum::sqrt(&self)
+    }
+    fn artanh(self) -> Self {
+        DualNum::atanh(&self)
     }
     fn atan2(self, x: Self) -> Self {
         DualNum::atan2(&self, x)
@@ -74,6 +78,10 @@ fn gradients_and_hessians_agree_with_dual_numbers() {
         let size = g.norm().max(1e-3);
         assert!((flux_gradient(&corners, w, &s) - g).norm() < 1e-9 * size);
         assert!((flux_hessian_product(&corners, w, &s, &d) - h).norm() < 1e-8 * h.norm().max(1e-3));
+
+        let (g, h) = derivatives(|s| Panel::new(corners, w).value_of(s), &s, &d);
+        assert!((single_gradient(&corners, w, &s) - g).norm() < 1e-11 * g.norm());
+        assert!((single_hessian_product(&corners, w, &s, &d) - h).norm() < 1e-9 * h.norm());
 
         let (x, n) = (vector(&mut random), vector(&mut random).normalize());
         let lanes = |v: &Vec3, s: [HyperDual64; 3]| [0, 1, 2].map(|c| s[c].like(v[c]));
@@ -264,7 +272,13 @@ fn sums_against_scalars(bands: usize, count: usize, k: usize, size: f64) -> f64 
     let flux_g = |i: usize, j: usize| flux_gradient(&t.corners(i), w[i], &s.point(j));
     let normal_g = |i: usize, j: usize| normal_gradient(&x[i], &nn[i], w[i], &s.point(j));
     worst = worst.max(transposed(&|o| flux_vjp(&t, &s, &bar, k, o), &flux_g));
+    let single_g = |i: usize, j: usize| single_gradient(&t.corners(i), w[i], &s.point(j));
     worst = worst.max(transposed(&|o| normal_vjp(&p, &s, &bar, k, o), &normal_g));
+    worst = worst.max(transposed(&|o| single_vjp(&t, &s, &bar, k, o), &single_g));
+    worst = worst.max(transposed(
+        &|o| single_hvp(&t, &s, &d, &bar, k, o),
+        &|i, j| single_hessian_product(&t.corners(i), w[i], &s.point(j), &d[j]),
+    ));
     worst = worst.max(transposed(
         &|o| potential_vjp(&p, &s, &bar, k, o),
         &|i, j| potential_gradient(&x[i], &s.point(j)),
@@ -287,6 +301,12 @@ fn sums_against_scalars(bands: usize, count: usize, k: usize, size: f64) -> f64 
         plain[m] += bar[i * k + m % k] * potential(&x[i], &s.point(m / k));
     }
     worst = worst.max(gap(&out, &plain));
+    let (mut out, mut plain) = (vec![0.0; count * k], vec![0.0; count * k]);
+    single_sum(&t, &s, &bar, k, &mut out);
+    for (i, m) in (0..n).flat_map(|i| (0..count * k).map(move |m| (i, m))) {
+        plain[m] += bar[i * k + m % k] * single(&t.corners(i), w[i], &s.point(m / k));
+    }
+    worst = worst.max(gap(&out, &plain));
 
     // Sums over sources.
     let forward = |sum: &dyn Fn(&mut [f64]), g: Gradient| {
@@ -303,6 +323,7 @@ fn sums_against_scalars(bands: usize, count: usize, k: usize, size: f64) -> f64 
         gap(&out, &plain)
     };
     worst = worst.max(forward(&|o| flux_jvp(&t, &s, &d, &a, k, o), &flux_g));
+    worst = worst.max(forward(&|o| single_jvp(&t, &s, &d, &a, k, o), &single_g));
     worst.max(forward(&|o| normal_jvp(&p, &s, &d, &a, k, o), &normal_g))
 }
 
@@ -369,6 +390,10 @@ fn everything() -> Vec<f64> {
     add(rows, &|o| normal_jvp(&p, &s, &d, &a, k, o));
     add(vectors, &|o| flux_vjp(&t, &s, &bar, k, o));
     add(vectors, &|o| normal_vjp(&p, &s, &bar, k, o));
+    add(rows, &|o| single_jvp(&t, &s, &d, &a, k, o));
+    add(vectors, &|o| single_vjp(&t, &s, &bar, k, o));
+    add(vectors, &|o| single_hvp(&t, &s, &d, &bar, k, o));
+    add(count * k, &|o| single_sum(&t, &s, &bar, k, o));
     add(vectors, &|o| potential_vjp(&p, &s, &bar, k, o));
     add(vectors, &|o| flux_hvp(&t, &s, &d, &bar, k, o));
     add(vectors, &|o| normal_hvp(&p, &s, &d, &bar, k, o));
@@ -444,7 +469,32 @@ fn forward_and_transposed_sums_are_transposes_and_hessians_symmetric() {
         &|o| normal_vjp(&p, &s, &bar, k, o),
         &|d, o| normal_hvp(&p, &s, d, &bar, k, o),
     );
+    check(
+        Some(&|o| single_jvp(&t, &s, &d, &a, k, o)),
+        &|o| single_vjp(&t, &s, &bar, k, o),
+        &|d, o| single_hvp(&t, &s, d, &bar, k, o),
+    );
     check(None, &|o| potential_vjp(&p, &s, &bar, k, o), &|d, o| {
         potential_hvp(&p, &s, d, &bar, k, o)
     });
+}
+
+/// Against the potential of the triangle's points, and the value known for a square seen from above its centre.
+#[test]
+fn the_single_layer_has_known_values() {
+    let square = [[0.0, 0.0], [1.0, 0.0], [1.0, 1.0], [0.0, 1.0]];
+    let at = |k: usize| Vec3::new(square[k][0], square[k][1], 0.0);
+    for height in [0.0, 1e-6, 0.3, 4.0, 300.0] {
+        let s = Vec3::new(0.5, 0.5, height);
+        let found: f64 = [[0, 1, 2], [0, 2, 3]]
+            .map(|f| single(&f.map(at), 1.0, &s))
+            .iter()
+            .sum();
+        // ∫ 1/r over the square, by quarters.
+        let root = (0.5_f64 + height * height).sqrt();
+        let log = 4.0 * ((root + 0.5) / (root - 0.5)).ln() * 0.5;
+        let angle = 4.0 * (0.25_f64).atan2(height * root);
+        let exact = log - height * angle;
+        assert!((found / exact - 1.0).abs() < 1e-11, "{height}: {found} {exact}");
+    }
 }

@@ -26,6 +26,8 @@ mod jvp;
 mod value;
 mod vjp;
 
+pub(super) use value::solid_angle;
+pub(super) use vjp::edge_gradient;
 pub use hvp::{flux_hessian_product, flux_hvp};
 pub use jvp::flux_jvp;
 #[cfg(test)]

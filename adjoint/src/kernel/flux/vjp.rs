@@ -10,7 +10,7 @@ use pulp::Simd;
 
 /// Edge term `g_ab = c (r_a × e)`, from `r_a`, the edge `e = b − a`, its square and the lengths.
 #[inline(always)]
-pub(super) fn edge_gradient<T: Lane>(ra: V3<T>, e: V3<T>, e2: T, la: T, lb: T) -> V3<T> {
+pub(in crate::kernel) fn edge_gradient<T: Lane>(ra: V3<T>, e: V3<T>, e2: T, la: T, lb: T) -> V3<T> {
     let sum = la + lb;
     let c = (sum + sum) / (la * lb * sum.mul_add(sum, -e2));
     scale(c, cross(ra, e))

@@ -2,7 +2,7 @@
 //!
 //! `cargo bench --bench step [-- SCENE] [--quick]`. Prints one row per scene and configuration: seconds per forward step (all
 //! derivatives that a step needs included), gradient of the rollout as a ratio to its forward pass, peak
-//! memory of the process so far, and iterations; beside the default the other integrators, a looser tolerance, the
+//! memory of the process so far, and iterations; beside the default coupled panels, the other integrators, a looser tolerance, the
 //! paper's choices, a dense QR, Jacobi preconditioning and `isolated`.
 
 #[allow(dead_code)]
@@ -13,6 +13,7 @@ use common::{Effort, arguments, peak_memory, step_times};
 use hydrograd::coupling::full::{FullSolver, Preconditioner};
 use hydrograd::dynamics::Integrator;
 use hydrograd::scene::{Preset, Scene};
+use hydrograd::simulate::Method;
 use hydrograd::{Fidelity, Settings, Simulator};
 use std::time::Instant;
 
@@ -73,6 +74,7 @@ fn main() {
         let one_evaluation = |s: &Settings| s.integrator(Integrator::MomentumEuler);
         let rows = [
             ("default", base.clone(), 5, 5),
+            ("panels", base.method(Method::Panel), 5, 5),
             ("momentum Euler", one_evaluation(&base), 5, 5),
             (
                 "momentum Euler, tolerance 1e-6",
@@ -94,7 +96,7 @@ fn main() {
         ];
         for (configuration, settings, steps, repeat) in rows {
             let quick = arguments.iter().any(|a| a == "--quick");
-            if quick && configuration != "default" {
+            if quick && !["default", "panels"].contains(&configuration) {
                 continue;
             }
             let r = match measure(&scene, configuration, settings, steps, repeat) {

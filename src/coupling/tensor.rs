@@ -1,6 +1,8 @@
 //! The first derivative of E on the basis, as a tensor.
 
-use crate::adjoint::lie::Vec6;
+use super::pair::Pair;
+use crate::adjoint::lie::{Pose, Vec6};
+use crate::solver::Columns;
 use nalgebra::{DMatrix, DVector};
 
 /// ∇_g E for all pairs of basis columns.
@@ -21,6 +23,27 @@ impl PairTensor {
     /// All zero.
     pub fn zeros(bodies: usize, columns: usize) -> Self {
         Self::new(columns, vec![DMatrix::zeros(6, columns * columns); bodies])
+    }
+
+    /// Adds the derivatives of one pair, from `raw`: rows 6·x + component of the wrench on its points that column x makes with column y, in
+    /// the target's frame.
+    pub(super) fn add(&mut self, pair: &Pair, pose: &Pose, raw: &Columns) {
+        let k = self.columns;
+        for x in 0..k {
+            for y in 0..=x {
+                let w = Vec6::from_fn(|c, _| 0.5 * (raw.at(6 * x + c, y) + raw.at(6 * y + c, x)));
+                let world = pose.wrench_to_world(&w);
+                let back = pair.image.twist_vjp(&world);
+                for (b, w) in [(pair.source, back), (pair.target, -world)] {
+                    let mut column = self.wrenches[b].fixed_view_mut::<6, 1>(0, x * k + y);
+                    column += w;
+                    if x != y {
+                        let mut column = self.wrenches[b].fixed_view_mut::<6, 1>(0, y * k + x);
+                        column += w;
+                    }
+                }
+            }
+        }
     }
 
     /// ∇_g E(x, y): a spatial wrench on each body.

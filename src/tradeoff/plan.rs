@@ -88,7 +88,6 @@ impl Plan<'_> {
     fn base(&self, fidelity: Fidelity) -> Configuration {
         let own = Settings::default().fidelity(fidelity).resolve(self.scene);
         let given = self.settings;
-        // The coupled system is one of fundamental solutions.
         let fits = |m: &&Method| fidelity.solves_alone() || m.steps_together();
         let method = given.methods.iter().find(fits).copied();
         let accuracy = given.accuracies.first().copied();

@@ -4,10 +4,11 @@
 use super::tools::{all, along, vector_along, wavy};
 use hydrograd::adjoint::check::{Outcome, Rung};
 use hydrograd::adjoint::lie::{Mat6, Pose, Vec3, Vec6, cross_motion, exp_matrix};
-use hydrograd::boundary::{BodyBoundary, Method, MfsSettings};
+use hydrograd::boundary::{BodyBoundary, Method, MfsSettings, PanelBoundary};
 use hydrograd::coupling::full::{Full, FullSolver, MfsBody, SolveSettings};
+use hydrograd::coupling::panel::{self, PanelSolver};
 use hydrograd::coupling::reduced::{Cutoff, Reduced, compress};
-use hydrograd::coupling::{Direction, Exclusions, Isolated, Linearise};
+use hydrograd::coupling::{Direction, Exclusions, Isolated, Linearise, PanelCoupled};
 use hydrograd::geometry::Image;
 use hydrograd::scene::{Shape, Wall, WallSurface};
 use hydrograd::shape;
@@ -31,6 +32,10 @@ pub fn rungs() -> Vec<Rung> {
         "coupling::full::linearised::FullLinearised::gradient_along" => |c| all(systems().iter().map(|s| gradient_along(s, c))),
         "coupling::full::linearised::FullLinearised::vjp" => |c| all(systems().iter().map(|s| vjp(s, c))),
         "coupling::full::linearised::FullLinearised::hvp" => |c| all(systems().iter().map(|s| hvp(s, c))),
+        "coupling::panel::linearised::PanelLinearised::gradient" => |c| all(panel_systems().iter().map(|s| gradient(s, c))),
+        "coupling::panel::linearised::PanelLinearised::gradient_along" => |c| all(panel_systems().iter().map(|s| gradient_along(s, c))),
+        "coupling::panel::linearised::PanelLinearised::vjp" => |c| all(panel_systems().iter().map(|s| vjp(s, c))),
+        "coupling::panel::linearised::PanelLinearised::hvp" => |c| all(panel_systems().iter().map(|s| hvp(s, c))),
         "coupling::reduced::linearised::ReducedLinearised::gradient" => |c| all(reduced_systems().iter().map(|s| gradient(s, c))),
         "coupling::reduced::linearised::ReducedLinearised::gradient_along" => |c| all(reduced_systems().iter().map(|s| gradient_along(s, c))),
         "coupling::reduced::linearised::ReducedLinearised::vjp" => |c| all(reduced_systems().iter().map(|s| vjp(s, c))),
@@ -93,6 +98,38 @@ fn systems() -> Vec<Full> {
             FullSolver::Cgls,
             &[WALL],
         ),
+    ]
+}
+
+/// Panels with both solvers, without walls, with rigid ones and a free surface; and two bodies that feel each other's images
+/// alone. A box's faces are flat, and its edges sharp.
+fn panel_systems() -> Vec<PanelCoupled> {
+    let panels = |shape: Shape| {
+        let mesh = shape::build(&shape, Path::new("."), Some(80)).unwrap();
+        Arc::new(PanelBoundary::new("b", &mesh).unwrap())
+    };
+    let bodies = [
+        panels(Shape::cuboid([0.5, 0.4, 0.6])),
+        panels(Shape::ellipsoid([0.6, 0.3, 0.4])),
+    ];
+    let of = |solver: PanelSolver, walls: &[Wall], excluded: Exclusions| {
+        let settings = panel::SolveSettings {
+            solver,
+            tolerance: 1e-13,
+            ..panel::SolveSettings::default()
+        };
+        let coupled = PanelCoupled::new(bodies.to_vec(), walls, settings).unwrap();
+        coupled.excluding(excluded).unwrap()
+    };
+    let free = Wall {
+        surface: WallSurface::Free,
+        ..SIDE
+    };
+    vec![
+        of(PanelSolver::Gmres, &[], Exclusions::none()),
+        of(PanelSolver::Lu, &[WALL, SIDE], Exclusions::none()),
+        of(PanelSolver::Gmres, &[WALL, free], Exclusions::none()),
+        of(PanelSolver::Gmres, &[WALL], Exclusions::new([(0, 1)])),
     ]
 }
 
@@ -328,7 +365,10 @@ fn second_derivatives_commute_up_to_the_bracket() {
     let reduced = reduced_systems()
         .into_iter()
         .map(|s| Box::new(s) as Box<dyn Linearise>);
-    for s in full.chain(reduced) {
+    let panels = panel_systems()
+        .into_iter()
+        .map(|s| Box::new(s) as Box<dyn Linearise>);
+    for s in full.chain(reduced).chain(panels) {
         let k = case();
         let other = field(1.9);
         let record = s.linearise(&poses(), &k.basis).unwrap();

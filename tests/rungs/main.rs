@@ -91,6 +91,7 @@ const THROUGH: &[(&str, &str)] = &[
         "coupling::full::cpu::response::CoupledSolution::gradient",
         FULL_VJP,
     ),
+    ("coupling::panel::first::PlacedPanels::gradient", PANEL_VJP),
     // Each joint's maps, through the model that all joints share.
     (
         "multibody::joint::JointMotion::frame_velocity_vjp",
@@ -229,6 +230,7 @@ const FRAME_VELOCITY: &str = "multibody::joint::model::JointModel::frame_velocit
 const FRAME_BIAS: &str = "multibody::joint::model::JointModel::frame_bias_vjp";
 const FORCE_JVP: &str = "dynamics::balance::Linearisation::force_jvp";
 const FULL_VJP: &str = "coupling::full::linearised::FullLinearised::vjp";
+const PANEL_VJP: &str = "coupling::panel::linearised::PanelLinearised::vjp";
 const FULL_HVP: &str = "coupling::full::linearised::FullLinearised::hvp";
 
 #[test]

@@ -495,6 +495,9 @@ fn the_single_layer_has_known_values() {
         let log = 4.0 * ((root + 0.5) / (root - 0.5)).ln() * 0.5;
         let angle = 4.0 * (0.25_f64).atan2(height * root);
         let exact = log - height * angle;
-        assert!((found / exact - 1.0).abs() < 1e-11, "{height}: {found} {exact}");
+        assert!(
+            (found / exact - 1.0).abs() < 1e-11,
+            "{height}: {found} {exact}"
+        );
     }
 }

@@ -31,8 +31,6 @@ use std::f64::consts::PI;
 const LANES: usize = 8;
 /// Points of one task: the same whatever the number of threads.
 const BLOCK: usize = 64;
-/// Partial sums over points that are added one by one.
-const GROUPS: usize = 16;
 /// |e|/(l + l') up to which the series of the logarithm has all its digits.
 const FAR: f64 = 0.25;
 
@@ -98,6 +96,11 @@ impl Panels {
             edges,
             panels,
         }
+    }
+
+    /// The triangles, row weights 1/4π.
+    pub fn triangles(&self) -> &Triangles {
+        &self.triangles
     }
 
     /// Number of panels.
@@ -172,56 +175,6 @@ impl Panels {
                 }
             }
         }
-    }
-
-    /// S q and Sᵀ μ, S of all panels at `points`: points × columns and panels × columns, row-major.
-    /// `q` is panels × columns, `mu` points × columns.
-    pub fn single_layer_both(
-        &self,
-        points: &[Vec3],
-        q: MatRef<f64>,
-        mu: MatRef<f64>,
-    ) -> (Vec<f64>, Vec<f64>) {
-        let (n, columns) = (self.len(), q.ncols());
-        let mut there = vec![0.0; points.len() * columns];
-        let mut back = vec![0.0; n * columns];
-        if columns == 0 || points.is_empty() {
-            return (there, back);
-        }
-        // Whole blocks to a group; the groups' sums are added in their order.
-        let group = points.len().div_ceil(GROUPS).next_multiple_of(BLOCK);
-        let parts: Vec<Vec<f64>> = there
-            .par_chunks_mut(group * columns)
-            .zip(points.par_chunks(group))
-            .enumerate()
-            .map(|(g, (there, points))| {
-                let mut part = vec![0.0; n * columns];
-                let blocks = there
-                    .chunks_mut(BLOCK * columns)
-                    .zip(points.chunks(BLOCK))
-                    .enumerate();
-                for (b, (there, points)) in blocks {
-                    let rows = points.len();
-                    let mut omega = vec![0.0; n * rows];
-                    self.double_layer(points, Write::Set, &mut omega, rows, 0);
-                    let mut s = vec![0.0; n * rows];
-                    self.single_layer(points, &omega, &mut s);
-                    let s = MatRef::from_column_major_slice(&s, rows, n);
-                    let there = MatMut::from_row_major_slice_mut(there, rows, columns);
-                    matmul(there, Accum::Replace, s, q, 1.0, Par::Seq);
-                    let mu = mu.subrows(g * group + b * BLOCK, rows);
-                    let part = MatMut::from_row_major_slice_mut(&mut part, n, columns);
-                    matmul(part, Accum::Add, s.transpose(), mu, 1.0, Par::Seq);
-                }
-                part
-            })
-            .collect();
-        for part in &parts {
-            for (b, p) in back.iter_mut().zip(part) {
-                *b += p;
-            }
-        }
-        (there, back)
     }
 
     /// `S single − Ω/4π double` at `points`, row-major points × columns: the potential outside of

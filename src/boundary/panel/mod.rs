@@ -66,6 +66,8 @@ pub struct PanelBoundary {
     normal_velocity: Mat<f64>,
     /// φ, potential of each panel per unit twist, panels × 6.
     potential: Mat<f64>,
+    /// S q, single layer of the normal velocities at the centroids per unit twist, panels × 6.
+    single_layer: Mat<f64>,
 }
 
 impl PanelBoundary {
@@ -86,7 +88,8 @@ impl PanelBoundary {
         let lu = Lu::new(matrix, n);
         let normal_velocity = Mat::from_fn(n, 6, |i, k| faces.twist_flux(i)[k] / faces.areas[i]);
         let right = panels.potential(&faces.centres, Some(normal_velocity.as_ref()), None);
-        let mut potential = Mat::from_fn(n, 6, |i, k| right[6 * i + k]);
+        let single_layer = Mat::from_fn(n, 6, |i, k| right[6 * i + k]);
+        let mut potential = single_layer.clone();
         lu.solve(potential.as_mut());
         let mut raw = Mat6::zeros();
         for i in 0..n {
@@ -133,6 +136,7 @@ impl PanelBoundary {
             lu,
             normal_velocity,
             potential,
+            single_layer,
             faces,
         })
     }
@@ -140,6 +144,16 @@ impl PanelBoundary {
     /// The panels as layers, body frame.
     pub(crate) fn panels(&self) -> &Panels {
         &self.panels
+    }
+
+    /// Normal velocities per unit twist, panels × 6.
+    pub(crate) fn normal_velocity(&self) -> &Mat<f64> {
+        &self.normal_velocity
+    }
+
+    /// Their single layer at the centroids, panels × 6.
+    pub(crate) fn single_layer(&self) -> &Mat<f64> {
+        &self.single_layer
     }
 
     /// Factors of ½I + Ω/4π.

@@ -1,4 +1,4 @@
-//! All bodies in one panel system: the reference that the other fidelities are measured against.
+//! All bodies in one panel system, with all derivatives.
 //!
 //! The unknowns are the potentials of all panels ([`crate::boundary::panel`]). Walls mirror the flow,
 //! so an image body has the potentials and normal velocities of the body itself (of opposite
@@ -9,18 +9,23 @@
 //! A φ = S q,   A = ½ I + Σ_images s Ω/4π,   S = Σ_images s S_image
 //! E(x, y) = sym( (D F x)ᵀ A⁻¹ S F y )
 //! M̄ x̄ = ½ { Fᵀ D φ + Fᵀ Sᵀ μ },   Aᵀ μ = D F x̄
+//! δE(x, y) = ½ [ μ_xᵀ (δS q_y − δA φ_y) + μ_yᵀ (δS q_x − δA φ_x) ]
 //! ```
 //!
-//! A body's own block of A doesn't change: its factors, made once, precondition the iteration. Values
-//! alone are offered: no derivatives. Bodies and images that come closer than about half an edge
-//! length lose accuracy.
+//! E is symmetrised, and its derivatives are exactly those of the symmetrised E. They cost no further solve on the basis; the tangent
+//! takes two, `A δφ = δS q − δA φ` and `Aᵀ δμ = −δAᵀ μ`. A body's own block of A doesn't change with the poses: its factors, made
+//! once, precondition the iteration. All other entries depend on the position of a panel's centroid in the frame of another
+//! body alone. Bodies and images that come closer than about half an edge length lose accuracy.
 
+mod first;
+mod linearised;
+mod placed;
+mod second;
 mod system;
-mod value;
 
 use super::Exclusions;
 use super::settings::check_limits;
-use super::{Coupling, Momenta};
+use super::{Coupling, Linearise, Linearised, Momenta};
 use crate::Result;
 use crate::adjoint::lie::Pose;
 use crate::boundary::PanelBoundary;
@@ -140,6 +145,18 @@ impl Coupling for PanelCoupled {
     /// A solve that misses its tolerance, bodies that overlap or reach through a wall. Overlap is
     /// noticed where a panel's centroid is inside another body.
     fn evaluate(&self, poses: &[Pose], basis: &DMatrix<f64>) -> Result<Momenta> {
-        value::momenta(self, poses, basis)
+        Ok(linearised::Solved::new(self, poses, basis)?.value)
+    }
+
+    fn differentiable(&self) -> Option<&dyn Linearise> {
+        Some(self)
+    }
+}
+
+impl Linearise for PanelCoupled {
+    fn linearise(&self, poses: &[Pose], basis: &DMatrix<f64>) -> Result<Box<dyn Linearised + '_>> {
+        Ok(Box::new(
+            linearised::Solved::new(self, poses, basis)?.linearise(),
+        ))
     }
 }

@@ -21,7 +21,7 @@ listed! {
         Auto => auto::Auto,
         /// Closed forms, for spheres and ellipsoids by formula.
         Exact => exact::Exact,
-        /// Direct boundary elements: no sources inside. With the fidelity `full` values only, no motion.
+        /// Direct boundary elements: no sources inside, and right in narrow gaps.
         Panel => panel::Panel,
         /// A source under each vertex, exact flux through each face, least squares.
         MfsVertex => mfs::Mfs(boundary::Method::MfsVertex),

@@ -27,6 +27,10 @@ impl BodyMethod for Panel {
         true
     }
 
+    fn steps_together(&self) -> bool {
+        true
+    }
+
     fn made_from(&self, body: &SubmergedBody, _: &Numerics) -> serde_json::Value {
         let coarse = body.coarse.map(|c| c.mesh.faces().len());
         serde_json::json!(["panel", coarse])
@@ -84,7 +88,7 @@ impl BodyMethod for Panel {
     fn check_gpu(&self) -> Result<()> {
         Err(Error::Unsupported {
             what: "the method panel with the fidelity full and the backend gpu".into(),
-            why: "coupled panels are the reference, on the CPU alone".into(),
+            why: "coupled panels are computed on the CPU alone".into(),
             instead: "use the backend cpu, or the method mfs-vertex".into(),
         })
     }

@@ -26,13 +26,13 @@ mod jvp;
 mod value;
 mod vjp;
 
-pub(super) use value::solid_angle;
-pub(super) use vjp::edge_gradient;
 pub use hvp::{flux_hessian_product, flux_hvp};
 pub use jvp::flux_jvp;
+pub(super) use value::solid_angle;
 #[cfg(test)]
 pub(super) use value::solid_angle_of as value_of_corners;
 pub use value::{flux, flux_fill};
+pub(super) use vjp::edge_gradient;
 pub use vjp::{flux_gradient, flux_vjp};
 
 use super::lane::{Lane, V3};

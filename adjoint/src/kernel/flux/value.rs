@@ -11,7 +11,12 @@ use pulp::{Simd, WithSimd};
 /// Solid angle Ω from `2A n`, the corner `r_0 = v_0 − s`, the lengths `l_c` and the halved squares
 /// of the edges 01, 12, 20.
 #[inline(always)]
-pub(in crate::kernel) fn solid_angle<T: Lane>(double_area: V3<T>, r0: V3<T>, l: V3<T>, half_e2: V3<T>) -> T {
+pub(in crate::kernel) fn solid_angle<T: Lane>(
+    double_area: V3<T>,
+    r0: V3<T>,
+    l: V3<T>,
+    half_e2: V3<T>,
+) -> T {
     let half = l[0].like(0.5);
     let [h0, h1, h2] = [half * l[0] * l[0], half * l[1] * l[1], half * l[2] * l[2]];
     // r·r' = ½(l² + l'² − e²)

@@ -11,31 +11,15 @@ use nalgebra::DMatrix;
 impl PlacedBodies<'_> {
     /// ∇_g E of all pairs of columns by products of matrices, for many columns.
     pub fn tensor(&self, solution: &Solution) -> PairTensor {
-        let k = solution.columns();
-        let mut wrenches = vec![DMatrix::zeros(6, k * k); self.model.bodies.len()];
+        let mut out = PairTensor::zeros(self.model.bodies.len(), solution.columns());
         for pair in &self.pairs {
-            let raw = self.pair_tensor(pair, solution);
-            let pose = &self.poses[pair.target];
-            for x in 0..k {
-                for y in 0..=x {
-                    let w =
-                        Vec6::from_fn(|c, _| 0.5 * (raw.at(6 * x + c, y) + raw.at(6 * y + c, x)));
-                    let world = pose.wrench_to_world(&w);
-                    let back = pair.image.twist_vjp(&world);
-                    let mut add = |b: usize, w: &Vec6| {
-                        let mut column = wrenches[b].fixed_view_mut::<6, 1>(0, x * k + y);
-                        column += w;
-                        if x != y {
-                            let mut column = wrenches[b].fixed_view_mut::<6, 1>(0, y * k + x);
-                            column += w;
-                        }
-                    };
-                    add(pair.source, &back);
-                    add(pair.target, &-world);
-                }
-            }
+            out.add(
+                pair,
+                &self.poses[pair.target],
+                &self.pair_tensor(pair, solution),
+            );
         }
-        PairTensor::new(k, wrenches)
+        out
     }
 
     /// Σ_j arm_j { (∇P_x − ∇μ_x) a_y + ∇r_x λ_y }, rows 6·x + component, columns y, in the target's frame.

@@ -1,0 +1,167 @@
+//! Second derivatives along one displacement: the tangent of the first.
+
+use super::placed::{PlacedPanels, Solution, field_at};
+use crate::Result;
+use crate::adjoint::kernel::{flux_hvp, flux_jvp, flux_vjp, single_hvp, single_jvp};
+use crate::adjoint::lie::{Vec3, Vec6, six};
+use crate::coupling::Tangent;
+use crate::coupling::pair::Pair;
+use crate::solver::Columns;
+use nalgebra::DVector;
+
+/// What the first pass over a pair leaves to the second.
+struct PairFields {
+    displacement: Vec<Vec3>,
+    /// ∇(S q − Ω/4π φ) at the points, `[point][column][3]`.
+    fields: Vec<f64>,
+}
+
+/// Tangents of φ and μ.
+struct Moved {
+    phi: Columns,
+    mu: Columns,
+}
+
+impl PlacedPanels<'_> {
+    /// The tangent along z of the energy of the first with the last of one or two columns:
+    /// A δφ = δS q − δA φ, Aᵀ δμ = −δAᵀ μ.
+    ///
+    /// # Errors
+    /// A solve that misses its tolerance.
+    pub fn second(&self, solution: &Solution, z: &[Vec6]) -> Result<Tangent> {
+        let n = solution.twists.ncols();
+        let bodies = self.coupled.bodies.len();
+        let mut right = Columns::zeros(self.coupled.rows(), n);
+        let mut transposed = Columns::zeros(self.coupled.rows(), n);
+        // δSᵀ μ
+        let mut back = Columns::zeros(self.coupled.rows(), n);
+        let mut first = Vec::with_capacity(self.pairs.len());
+        for pair in &self.pairs {
+            let displacement = pair.displacements(&self.poses[pair.target], z);
+            let fields = self.fields(pair, solution);
+            let (panels, points) = self.ranges(pair);
+            for (i, d) in displacement.iter().enumerate() {
+                for k in 0..n {
+                    let rate = d.dot(&field_at(&fields, n, i, k));
+                    right.data[(points.start + i) * n + k] += rate;
+                }
+            }
+            let triangles = self.coupled.bodies[pair.target].panels().triangles();
+            let signed = |sign: f64| -> Vec<f64> {
+                let mu = solution.mu.slice(points.start, points.end);
+                mu.iter().map(|m| sign * pair.image.sign * m).collect()
+            };
+            let (s, d) = (&pair.points, &displacement);
+            let out = transposed.slice_mut(panels.start, panels.end);
+            flux_jvp(triangles, s, d, &signed(-1.0), n, out);
+            let out = back.slice_mut(panels.start, panels.end);
+            single_jvp(triangles, s, d, &signed(1.0), n, out);
+            first.push(PairFields {
+                displacement,
+                fields,
+            });
+        }
+        let moved = Moved {
+            phi: self.system.solve(&right, false)?.x,
+            mu: self.system.solve(&transposed, true)?.x,
+        };
+        let momentum = |k: usize| -> DVector<f64> {
+            let mut h = self.impulse(&moved.phi.column(k), &moved.mu.column(k));
+            for (b, body) in self.coupled.bodies.iter().enumerate() {
+                let mut part = Vec6::zeros();
+                for (i, at) in self.coupled.faces[b].clone().enumerate() {
+                    part += body.faces.twist_flux(i) * (back.at(at, k) / body.faces.areas[i]);
+                }
+                let mut rows = h.fixed_rows_mut::<6>(6 * b);
+                rows += 0.5 * part;
+            }
+            h
+        };
+        let mut gradient = vec![Vec6::zeros(); bodies];
+        let mut wrench = vec![Vec6::zeros(); bodies];
+        for (pair, first) in self.pairs.iter().zip(&first) {
+            let (w, dw) = self.pair_tangent(pair, first, solution, &moved);
+            let pose = &self.poses[pair.target];
+            pair.apply(pose, &w, &mut gradient);
+            pair.apply_jvp(pose, &w, &dw, &z[pair.target], &mut wrench);
+        }
+        Ok(Tangent {
+            momentum_x: momentum(0),
+            momentum_y: momentum(n - 1),
+            gradient,
+            wrench,
+        })
+    }
+
+    /// Wrench on the points of a pair and its tangent, in the frame of the panels.
+    fn pair_tangent(
+        &self,
+        pair: &Pair,
+        first: &PairFields,
+        solution: &Solution,
+        moved: &Moved,
+    ) -> (Vec6, Vec6) {
+        let n = solution.twists.ncols();
+        let (panels, points) = self.ranges(pair);
+        let triangles = self.coupled.bodies[pair.target].panels().triangles();
+        let d = &first.displacement;
+        let sign = pair.image.sign;
+        let signed = |sign: f64, x: &[f64]| -> Vec<f64> { x.iter().map(|x| sign * x).collect() };
+        let q = self.normal_velocity(pair.target, &solution.twists);
+        let phi = solution.phi.slice(panels.start, panels.end);
+        let dphi = moved.phi.slice(panels.start, panels.end);
+        let mut dfields = vec![0.0; first.fields.len()];
+        if q.data.iter().any(|q| *q != 0.0) {
+            single_hvp(
+                triangles,
+                &pair.points,
+                d,
+                &signed(sign, &q.data),
+                n,
+                &mut dfields,
+            );
+        }
+        flux_hvp(
+            triangles,
+            &pair.points,
+            d,
+            &signed(-sign, phi),
+            n,
+            &mut dfields,
+        );
+        flux_vjp(
+            triangles,
+            &pair.points,
+            &signed(-sign, dphi),
+            n,
+            &mut dfields,
+        );
+        // (x, y, weight) of the symmetrised form.
+        let terms: &[(usize, usize, f64)] = match n {
+            1 => &[(0, 0, 1.0)],
+            _ => &[(0, 1, 0.5), (1, 0, 0.5)],
+        };
+        let (mut w, mut dw) = (Vec6::zeros(), Vec6::zeros());
+        for (i, s) in pair.positions.iter().enumerate() {
+            let (mut f, mut df) = (Vec3::zeros(), Vec3::zeros());
+            let at = points.start + i;
+            for &(x, y, weight) in terms {
+                let (field, dfield) = (
+                    field_at(&first.fields, n, i, y),
+                    field_at(&dfields, n, i, y),
+                );
+                f += weight * solution.mu.at(at, x) * field;
+                df += weight * (moved.mu.at(at, x) * field + solution.mu.at(at, x) * dfield);
+            }
+            w += six(&f, &s.cross(&f));
+            dw += six(&df, &(d[i].cross(&f) + s.cross(&df)));
+        }
+        (w, dw)
+    }
+
+    /// Rows of a pair's panels, and of its points.
+    fn ranges(&self, pair: &Pair) -> (std::ops::Range<usize>, std::ops::Range<usize>) {
+        let faces = &self.coupled.faces;
+        (faces[pair.target].clone(), faces[pair.source].clone())
+    }
+}

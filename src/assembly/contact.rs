@@ -122,7 +122,7 @@ fn contact_shape(body: &Body, shape: &Shape, surface: &Surface) -> Result<Contac
 fn resolved(p: &ContactParts, pair: &ContactPair) -> f64 {
     let of = |b: usize| {
         let edge = p.surfaces[b].as_ref().map_or(0.0, Surface::mean_edge);
-        (p.water.fidelity).resolved_gap(p.water.resolved[b], edge)
+        (p.water.fidelity.kind()).resolved_gap(p.water.resolved[b], edge)
     };
     match pair.second {
         Other::Body(b) => of(pair.first).max(of(b)),

@@ -8,10 +8,9 @@ use std::time::Instant;
 use clap::Args;
 use serde::Serialize;
 
-use super::choices::ChoicesReport;
 use super::input;
 use super::options::Water;
-use super::output::{Output, write_warnings};
+use super::output::{ChoicesReport, Output, write_warnings};
 use crate::Result;
 use crate::scene::{Scene, Shape};
 use crate::simulate::ErrorEstimate;
@@ -93,10 +92,8 @@ fn added_mass(scene: &Scene, arguments: &Arguments) -> Result<AddedMassReport> {
     let simulator = arguments.water.simulator(scene, settings)?;
     let found = simulator.added_mass()?;
     let seconds = start.elapsed().as_secs_f64();
-    let error_estimate = match arguments.estimate {
-        true => Some(simulator.error_estimate()?),
-        false => None,
-    };
+    let error_estimate = arguments.estimate.then(|| simulator.error_estimate());
+    let error_estimate = error_estimate.transpose()?;
     let bodies = &simulator.system().bodies;
     let in_water = bodies.iter().filter(|b| b.submerged.is_some());
     let mut warnings = simulator.warnings().to_vec();

@@ -4,7 +4,7 @@ use std::process::ExitCode;
 
 use clap::Args;
 
-use super::backend::Adapter;
+use super::options::Adapter;
 use super::output::Output;
 use crate::Result;
 
@@ -18,7 +18,7 @@ pub(super) struct Arguments {
 #[cfg(feature = "gpu")]
 pub(super) fn main(arguments: &Arguments, output: Output) -> Result<ExitCode> {
     let adapters = crate::gpu::adapters();
-    let opened = crate::gpu::Context::new(&(&arguments.adapter.settings()).into());
+    let opened = crate::gpu::Context::new(&(&arguments.adapter.settings(false)).into());
     if adapters.is_empty() {
         // Its error says what to install.
         opened?;

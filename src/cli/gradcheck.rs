@@ -7,10 +7,9 @@ use std::process::ExitCode;
 use clap::Args;
 use serde::Serialize;
 
-use super::choices::ChoicesReport;
 use super::input;
 use super::options::{Time, Water, positive};
-use super::output::{Output, write_warnings};
+use super::output::{ChoicesReport, Output, write_warnings};
 use super::progress::ProgressBar;
 use crate::Result;
 use crate::scene::Scene;
@@ -115,10 +114,8 @@ fn check(scene: &Scene, arguments: &Arguments, progress: &ProgressBar) -> Result
         },
         |done, all| progress.set_of(done, all),
     )?;
-    let growth = match arguments.no_growth {
-        true => None,
-        false => Some(growth(&simulator, steps)?),
-    };
+    let growth = (!arguments.no_growth).then(|| growth(&simulator, steps));
+    let growth = growth.transpose()?;
     let warnings = simulator.warnings().to_vec();
     let choices = ChoicesReport::new(&simulator);
     let tolerance = simulator.choices().water.numerics.solve.tolerance;
@@ -152,17 +149,27 @@ impl fmt::Display for CheckReport {
             "{}: {} steps, {} ({}, {}); relative error of the gradient against central differences",
             self.scene, self.steps, choices.fidelity, choices.method, choices.integrator
         )?;
-        match self.rel_error_controls {
-            Some(error) => writeln!(f, "  controls      {error:.2e}")?,
-            None => writeln!(f, "  controls      none in this scene")?,
-        }
-        match self.rel_error_initial {
-            Some(error) => writeln!(f, "  initial state {error:.2e}")?,
-            None => writeln!(f, "  initial state can't be varied in this scene")?,
-        }
-        match self.rel_error_parameters {
-            Some(error) => writeln!(f, "  parameters    {error:.2e}")?,
-            None => writeln!(f, "  parameters    none in this scene")?,
+        for (what, error, none) in [
+            (
+                "controls",
+                self.rel_error_controls,
+                "     none in this scene",
+            ),
+            (
+                "initial state",
+                self.rel_error_initial,
+                "can't be varied in this scene",
+            ),
+            (
+                "parameters",
+                self.rel_error_parameters,
+                "   none in this scene",
+            ),
+        ] {
+            match error {
+                Some(error) => writeln!(f, "  {what:<13} {error:.2e}")?,
+                None => writeln!(f, "  {what} {none}")?,
+            }
         }
         writeln!(
             f,

@@ -37,30 +37,24 @@ pub(super) fn scene_or_shape(
         scene.add(Body::new(shape).named(name).density(density));
         scene
     };
-    let mut scene = match (file, shape) {
-        (_, Some(shape)) => alone(shape.clone(), shape.kind()),
-        (Some(path), None) => {
-            let extension = path.extension().unwrap_or_default().to_string_lossy();
-            let stem = path.file_stem().unwrap_or_default().to_string_lossy();
-            match extension.to_ascii_lowercase().as_str() {
-                "toml" => Scene::load(path)?,
-                "obj" | "stl" | "ply" => alone(Shape::mesh(path), &stem),
-                _ => {
-                    return Err(Error::input(
-                        path.display().to_string(),
-                        format!("a name that ends in {extension:?}"),
-                        "give a scene (.toml), a mesh (.obj, .stl, .ply), or a shape by --shape, \
-                         e.g. --shape sphere:0.5",
-                    ));
-                }
+    let mut scene = if let Some(shape) = shape {
+        alone(shape.clone(), shape.kind())
+    } else {
+        // The command line asks for one of the two.
+        let path = file.unwrap_or(Path::new(""));
+        let extension = path.extension().unwrap_or_default().to_string_lossy();
+        let stem = path.file_stem().unwrap_or_default().to_string_lossy();
+        match extension.to_ascii_lowercase().as_str() {
+            "toml" => Scene::load(path)?,
+            "obj" | "stl" | "ply" => alone(Shape::mesh(path), &stem),
+            _ => {
+                return Err(Error::input(
+                    path.display().to_string(),
+                    format!("a name that ends in {extension:?}"),
+                    "give a scene (.toml), a mesh (.obj, .stl, .ply), or a shape by --shape, \
+                     e.g. --shape sphere:0.5",
+                ));
             }
-        }
-        (None, None) => {
-            return Err(Error::input(
-                "added-mass",
-                "nothing",
-                "give a scene, a mesh or --shape",
-            ));
         }
     };
     if let Some(density) = density {

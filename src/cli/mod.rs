@@ -5,13 +5,10 @@
 //! `{"error": …}`. Exit codes: 0 done, 1 failed, 2 wrong usage.
 
 mod added_mass;
-mod backend;
 mod check_mesh;
-mod choices;
 mod gpu_info;
 mod gradcheck;
 mod input;
-mod list;
 mod options;
 mod output;
 mod progress;

@@ -1,17 +1,19 @@
 //! Flags that several commands share.
 
 use clap::Args;
-use serde::Serialize;
+use clap::builder::{PossibleValue, PossibleValuesParser, TypedValueParser};
 use std::path::PathBuf;
+use std::str::FromStr;
+use strum::{EnumMessage, VariantArray};
 
-use super::backend::Compute;
-use super::list::choice;
 use crate::Result;
 use crate::boundary::{Depth, RowScaling};
 use crate::coupling::full::{FullSolver, Preconditioner};
 use crate::dynamics::Integrator;
 use crate::scene::{Preset, Scene};
-use crate::simulate::{Fidelity, Method, Settings, Simulator};
+use crate::simulate::{
+    AdapterName, Arithmetic, Backend, Fidelity, GpuSettings, Method, Settings, Simulator,
+};
 
 /// What the water is solved with; whatever isn't given follows the preset.
 #[derive(Clone, Debug, Args)]
@@ -58,8 +60,35 @@ pub(super) struct Water {
     /// Preconditioner of the coupled system [default: factors].
     #[arg(long, value_parser = choice::<Preconditioner>())]
     pub preconditioner: Option<Preconditioner>,
+    /// What computes the coupling.
+    #[arg(long, value_parser = choice::<Backend>(), default_value = "cpu")]
+    pub backend: Backend,
     #[command(flatten)]
-    pub compute: Compute,
+    pub adapter: Adapter,
+    /// Use the CPU where the GPU can't be opened, and say so.
+    #[arg(long)]
+    pub gpu_fallback: bool,
+}
+
+/// Which GPU, and how.
+#[derive(Clone, Debug, Args)]
+pub(super) struct Adapter {
+    /// Part of the GPU's name, in any case [default: the fastest there is].
+    #[arg(long, value_name = "NAME")]
+    pub adapter: Option<AdapterName>,
+    /// Arithmetic of residuals and derivatives on the GPU.
+    #[arg(long, value_parser = choice::<Arithmetic>(), default_value = "auto")]
+    pub gpu_arithmetic: Arithmetic,
+}
+
+impl Adapter {
+    pub fn settings(&self, fallback: bool) -> GpuSettings {
+        GpuSettings {
+            adapter: self.adapter.clone(),
+            arithmetic: self.gpu_arithmetic,
+            fallback,
+        }
+    }
 }
 
 /// How time is stepped.
@@ -92,8 +121,8 @@ impl Water {
             resolved_gap: self.resolved_gap,
             accuracy: self.accuracy,
             faces: self.faces,
-            backend: Some(self.compute.backend),
-            gpu: Some(self.compute.settings()),
+            backend: Some(self.backend),
+            gpu: Some(self.adapter.settings(self.gpu_fallback)),
             ..Settings::default()
         }
     }
@@ -118,30 +147,39 @@ impl Time {
 
 /// A whole number above zero.
 pub(super) fn positive(text: &str) -> std::result::Result<usize, String> {
-    match text.parse() {
-        Ok(0) | Err(_) => Err("give a whole number above zero".into()),
-        Ok(n) => Ok(n),
-    }
+    let above = text.parse().ok().filter(|n| *n > 0);
+    above.ok_or_else(|| "give a whole number above zero".into())
+}
+
+fn number(text: &str, below: f64, expected: &str) -> std::result::Result<f64, String> {
+    let inside = |x: &f64| *x > 0.0 && *x < below;
+    let found = text.parse().ok().filter(inside);
+    found.ok_or_else(|| expected.into())
 }
 
 fn length(text: &str) -> std::result::Result<f64, String> {
-    match text.parse() {
-        Ok(x) if x > 0.0 && f64::is_finite(x) => Ok(x),
-        _ => Err("give a length above zero, in m".into()),
-    }
+    number(text, f64::INFINITY, "give a length above zero, in m")
+}
+
+/// A time above zero.
+pub(super) fn seconds(text: &str) -> std::result::Result<f64, String> {
+    number(text, f64::INFINITY, "give a time above zero, in s")
 }
 
 pub(super) fn tolerance(text: &str) -> std::result::Result<f64, String> {
-    match text.parse() {
-        Ok(x) if x > 0.0 && x < 1.0 => Ok(x),
-        _ => Err("give a number between 0 and 1, e.g. 1e-8".into()),
-    }
+    number(text, 1.0, "give a number between 0 and 1, e.g. 1e-8")
 }
 
-/// The name of a choice as it stands on the command line.
-pub(super) fn name(choice: impl Serialize) -> String {
-    match serde_json::to_value(choice) {
-        Ok(serde_json::Value::String(name)) => name,
-        _ => String::new(),
-    }
+/// Parser of a choice from a list: names and help come from the list itself.
+pub(super) fn choice<T>() -> impl TypedValueParser<Value = T>
+where
+    T: VariantArray + EnumMessage + FromStr<Err: std::error::Error + Send + Sync>,
+    T: Into<&'static str> + Copy + Send + Sync + 'static,
+{
+    let possible = T::VARIANTS.iter().map(|of| {
+        let help = of.get_documentation().unwrap_or_default();
+        let words: Vec<&str> = help.split_whitespace().collect();
+        PossibleValue::new((*of).into()).help(words.join(" ").trim_end_matches('.').to_string())
+    });
+    PossibleValuesParser::new(possible).try_map(|name| name.parse())
 }

@@ -6,6 +6,7 @@ use std::io::Write;
 use serde::Serialize;
 
 use crate::Error;
+use crate::simulate::{BackendReport, Simulator};
 
 /// Where results go.
 #[derive(Clone, Copy, Debug)]
@@ -74,4 +75,32 @@ pub(super) fn write_warnings(
     warnings
         .iter()
         .try_for_each(|warning| write!(f, "\nwarning: {warning}"))
+}
+
+/// By what a scene was simulated.
+#[derive(Clone, Debug, Serialize)]
+pub(super) struct ChoicesReport {
+    pub fidelity: &'static str,
+    /// What `auto` came to; the fidelity itself otherwise.
+    pub fidelity_used: &'static str,
+    /// What `auto` chose for each body and pair, and why.
+    pub chosen: Vec<String>,
+    #[serde(flatten)]
+    pub backend: BackendReport,
+    pub method: &'static str,
+    pub integrator: &'static str,
+}
+
+impl ChoicesReport {
+    pub fn new(simulator: &Simulator) -> Self {
+        let choices = simulator.choices();
+        Self {
+            fidelity: choices.water.fidelity.into(),
+            fidelity_used: simulator.fidelity().into(),
+            chosen: simulator.reasons().to_vec(),
+            backend: simulator.backend(),
+            method: choices.water.method_used().into(),
+            integrator: choices.integrator.into(),
+        }
+    }
 }

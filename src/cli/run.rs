@@ -8,10 +8,9 @@ use std::time::Instant;
 use clap::Args;
 use serde::Serialize;
 
-use super::choices::ChoicesReport;
 use super::input;
 use super::options::{Time, Water};
-use super::output::{Output, or_dash, peak_memory_mb, write_warnings};
+use super::output::{ChoicesReport, Output, or_dash, peak_memory_mb, write_warnings};
 use super::progress::ProgressBar;
 use crate::Result;
 use crate::scene::Scene;
@@ -123,7 +122,7 @@ impl fmt::Display for RunReport {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         let choices = &self.choices;
         let used = match choices.fidelity_used == choices.fidelity {
-            true => choices.fidelity.clone(),
+            true => choices.fidelity.to_string(),
             false => format!("{}: {}", choices.fidelity, choices.fidelity_used),
         };
         writeln!(

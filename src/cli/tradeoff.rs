@@ -10,8 +10,7 @@ use std::process::ExitCode;
 use clap::Args;
 
 use super::input;
-use super::list::choice;
-use super::options::{positive, tolerance};
+use super::options::{choice, positive, seconds, tolerance};
 use super::output::Output;
 use super::progress::ProgressBar;
 use crate::Result;
@@ -75,14 +74,6 @@ pub(super) struct Arguments {
     /// Picture to write, an SVG [default: none is written].
     #[arg(long, value_name = "FILE.svg")]
     plot: Option<PathBuf>,
-}
-
-/// A time above zero.
-fn seconds(text: &str) -> std::result::Result<f64, String> {
-    match text.parse() {
-        Ok(x) if x > 0.0 && f64::is_finite(x) => Ok(x),
-        _ => Err("give a time above zero, in s".into()),
-    }
 }
 
 impl Arguments {

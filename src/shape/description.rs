@@ -4,8 +4,9 @@ use serde::{Deserialize, Serialize};
 use std::path::PathBuf;
 
 /// A closed surface, by formula or from a file.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, strum::IntoStaticStr)]
 #[serde(tag = "kind", rename_all = "kebab-case", deny_unknown_fields)]
+#[strum(serialize_all = "kebab-case")]
 pub enum Shape {
     /// Sphere, a subdivided icosahedron.
     Sphere {
@@ -164,15 +165,19 @@ impl Shape {
 
     /// The shape's name in a scene file.
     pub fn kind(&self) -> &'static str {
+        self.into()
+    }
+
+    /// The target number of faces that it asks for.
+    pub(crate) fn asked_faces(&self) -> Option<usize> {
         match self {
-            Self::Sphere { .. } => "sphere",
-            Self::Ellipsoid { .. } => "ellipsoid",
-            Self::Box { .. } => "box",
-            Self::Cylinder { .. } => "cylinder",
-            Self::Capsule { .. } => "capsule",
-            Self::Prism { .. } => "prism",
-            Self::Mesh { .. } => "mesh",
-            Self::Triangles { .. } => "triangles",
+            Self::Sphere { faces, .. }
+            | Self::Ellipsoid { faces, .. }
+            | Self::Box { faces, .. }
+            | Self::Cylinder { faces, .. }
+            | Self::Capsule { faces, .. }
+            | Self::Prism { faces, .. } => *faces,
+            Self::Mesh { .. } | Self::Triangles { .. } => None,
         }
     }
 

@@ -5,10 +5,11 @@ use crate::simulate::{Fidelity, Method, Settings};
 use serde::Serialize;
 
 /// What was varied to come to a configuration.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum Family {
     /// Nothing: what the others are varied around.
+    #[default]
     Base,
     /// The method by which a body alone is solved.
     Method,
@@ -29,7 +30,7 @@ pub enum Family {
 }
 
 /// One way to simulate a scene. What makes no difference with its fidelity is `None`.
-#[derive(Clone, Copy, Debug, PartialEq, Serialize)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize)]
 pub struct Configuration {
     /// What was varied to come here.
     pub family: Family,
@@ -51,48 +52,41 @@ pub struct Configuration {
     pub time_step: f64,
 }
 
-/// The name of a choice, as in files and on the command line.
-pub(super) fn name(choice: impl Serialize) -> String {
-    match serde_json::to_value(choice) {
-        Ok(serde_json::Value::String(name)) => name,
-        _ => String::new(),
+/// A number with three digits.
+pub(crate) fn three_digits(x: f64) -> String {
+    match x {
+        0.0 => "0".into(),
+        x if (1e-3..1e5).contains(&x) => {
+            let digits = (2 - x.log10().floor() as i32).max(0) as usize;
+            format!("{x:.digits$}")
+        }
+        x => format!("{x:.2e}"),
     }
 }
 
-/// A time step as people write it.
-pub(super) fn seconds(x: f64) -> String {
-    let digits = (2 - x.log10().floor() as i32).max(0) as usize;
-    match (1e-3..1e5).contains(&x) {
-        true if digits > 0 => {
-            let text = format!("{x:.digits$}");
-            text.trim_end_matches('0').trim_end_matches('.').into()
-        }
-        true => format!("{x:.0}"),
-        false => format!("{x:.2e}"),
+/// The same without zeros at its end: a time as people write it.
+pub(crate) fn short(x: f64) -> String {
+    let digits = three_digits(x);
+    match digits.contains('.') && !digits.contains('e') {
+        true => digits.trim_end_matches('0').trim_end_matches('.').into(),
+        false => digits,
     }
 }
 
 impl Configuration {
     /// The settings of a simulator.
     pub fn settings(&self) -> Settings {
-        let mut out = Settings::default()
-            .fidelity(self.fidelity)
-            .method(self.method)
-            .integrator(self.integrator)
-            .time_step(self.time_step);
-        if let Some(faces) = self.faces_per_body {
-            out = out.faces(faces);
+        Settings {
+            fidelity: Some(self.fidelity),
+            method: Some(self.method),
+            integrator: Some(self.integrator),
+            time_step: Some(self.time_step),
+            faces: self.faces_per_body,
+            rank: self.rank,
+            accuracy: self.accuracy,
+            tolerance: self.tolerance,
+            ..Settings::default()
         }
-        if let Some(rank) = self.rank {
-            out = out.rank(rank);
-        }
-        if let Some(accuracy) = self.accuracy {
-            out = out.accuracy(accuracy);
-        }
-        if let Some(tolerance) = self.tolerance {
-            out = out.tolerance(tolerance);
-        }
-        out
     }
 
     /// Whether both have the same M_f: only the way through time differs.
@@ -113,19 +107,13 @@ impl Configuration {
 
     /// In words.
     pub fn label(&self) -> String {
-        let mut out = format!("{} ({})", name(self.fidelity), name(self.method));
-        if let Some(faces) = self.faces_per_body {
-            out += &format!(", {faces} faces a body");
-        }
-        if let Some(rank) = self.rank {
-            out += &format!(", rank {rank}");
-        }
-        if let Some(accuracy) = self.accuracy {
-            out += &format!(", accuracy {accuracy:.0e}");
-        }
-        if let Some(tolerance) = self.tolerance {
-            out += &format!(", tolerance {tolerance:.0e}");
-        }
-        out + &format!(", {}, {} s", name(self.integrator), seconds(self.time_step))
+        let mut out = format!("{} ({})", self.fidelity, self.method);
+        let faces = self.faces_per_body.map(|n| format!(", {n} faces a body"));
+        let rank = self.rank.map(|n| format!(", rank {n}"));
+        let accuracy = self.accuracy.map(|x| format!(", accuracy {x:.0e}"));
+        let tolerance = self.tolerance.map(|x| format!(", tolerance {x:.0e}"));
+        out.extend([faces, rank, accuracy, tolerance].into_iter().flatten());
+        let integrator: &str = self.integrator.into();
+        out + &format!(", {integrator}, {} s", short(self.time_step))
     }
 }

@@ -33,6 +33,8 @@ mod shapes;
 mod start;
 
 pub use configuration::{Configuration, Family};
+#[cfg(feature = "cli")]
+pub(crate) use configuration::{short, three_digits};
 pub use progress::{TradeoffProgress, TradeoffStage};
 pub use row::{ReferenceQuantity, TradeoffReference, TradeoffRow};
 pub use settings::TradeoffSettings;

@@ -7,7 +7,7 @@ use super::shapes::{ClosedForms, closed_forms, has_faces};
 use crate::coupling::full::SolveSettings;
 use crate::dynamics::Integrator;
 use crate::scene::Scene;
-use crate::simulate::{Fidelity, Knob, Method, Settings};
+use crate::simulate::{Fidelity, Knob, Method, Numerics, Settings};
 use strum::VariantArray;
 
 const FACES: [usize; 3] = [80, 320, 1280];
@@ -48,47 +48,56 @@ struct Plan<'a> {
     out: Vec<Configuration>,
 }
 
+const AIMS: [Family; 3] = [Family::Rank, Family::Accuracy, Family::Tolerance];
+
 impl Plan<'_> {
     fn one_by_one(&mut self, bases: &[Configuration]) {
         for base in bases {
-            self.add(Family::Method, self.methods(*base));
+            self.vary(Family::Method, *base);
             if let Some(meshed) = self.with_mesh(*base) {
-                self.add(Family::Faces, self.faces(meshed));
+                self.vary(Family::Faces, meshed);
             }
-            for (family, configurations) in self.aims(*base) {
-                self.add(family, configurations);
+            for family in AIMS {
+                self.vary(family, *base);
             }
         }
         let reduced = bases.iter().find(|b| b.fidelity == Fidelity::Reduced);
         if let Some(base) = reduced.or(bases.last()) {
-            self.add(Family::Integrator, self.integrators(*base));
-            self.add(Family::TimeStep, self.time_steps(*base));
+            self.vary(Family::Integrator, *base);
+            self.vary(Family::TimeStep, *base);
         }
     }
 
     fn product(&mut self, bases: &[Configuration]) {
-        type More<'a> = &'a dyn Fn(Configuration) -> Vec<Configuration>;
         for base in bases {
-            let vary = |all: Vec<Configuration>, more: More| {
-                let varied = |c: Configuration| std::iter::once(c).chain(more(c));
-                all.into_iter().flat_map(varied).collect::<Vec<_>>()
-            };
-            let mut all = vary(vec![*base], &|c| self.methods(c));
-            all = vary(all, &|c| self.faces(c));
-            all = vary(all, &|c| {
-                self.aims(c).into_iter().flat_map(|(_, c)| c).collect()
-            });
-            all = vary(all, &|c| self.integrators(c));
-            all = vary(all, &|c| self.time_steps(c));
+            let mut all = vec![*base];
+            for families in [
+                &[Family::Method][..],
+                &[Family::Faces],
+                &AIMS,
+                &[Family::Integrator],
+                &[Family::TimeStep],
+            ] {
+                let plan = &*self;
+                let more = |c| families.iter().flat_map(move |f| plan.varied(*f, c));
+                all = all
+                    .into_iter()
+                    .flat_map(|c| std::iter::once(c).chain(more(c)))
+                    .collect();
+            }
             self.add(Family::Product, all);
         }
+    }
+
+    fn vary(&mut self, family: Family, base: Configuration) {
+        self.add(family, self.varied(family, base));
     }
 
     /// What the other configurations of a fidelity are varied around.
     fn base(&self, fidelity: Fidelity) -> Configuration {
         let own = Settings::default().fidelity(fidelity).resolve(self.scene);
         let given = self.settings;
-        let fits = |m: &&Method| fidelity.solves_alone() || m.steps_together();
+        let fits = |m: &&Method| fidelity.kind().solves_alone() || m.kind().steps_together();
         let method = given.methods.iter().find(fits).copied();
         let accuracy = given.accuracies.first().copied();
         let time_step = given.time_steps.first().copied();
@@ -105,37 +114,73 @@ impl Plan<'_> {
         })
     }
 
-    fn methods(&self, base: Configuration) -> Vec<Configuration> {
-        let varied = |m: &&Method| match base.fidelity.solves_alone() {
-            true => **m != Method::Exact,
-            false => m.steps_together() && m.together() == **m,
-        };
-        let own: Vec<Method> = match base.fidelity.chooses() {
-            true => Vec::new(),
-            false => Method::VARIANTS.iter().filter(varied).copied().collect(),
-        };
-        let of = |method| Configuration { method, ..base };
-        let methods = or_default(&self.settings.methods, &own);
-        methods.into_iter().map(of).collect()
-    }
-
-    fn faces(&self, base: Configuration) -> Vec<Configuration> {
-        let own: &[usize] = match base.fidelity.chooses() {
-            true => &[],
-            false => &FACES,
-        };
-        let of = |faces| Configuration {
-            faces_per_body: Some(faces),
+    /// The base with each value of what a family varies; none if its fidelity doesn't look at that.
+    fn varied(&self, family: Family, base: Configuration) -> Vec<Configuration> {
+        fn each<T: Clone>(
+            given: &[T],
+            own: &[T],
+            of: impl Fn(T) -> Configuration,
+        ) -> Vec<Configuration> {
+            or_default(given, own).into_iter().map(of).collect()
+        }
+        let (given, fidelity) = (self.settings, base.fidelity);
+        let has = |knob| fidelity.knobs().contains(&knob);
+        let aim = |rank, accuracy, tolerance| Configuration {
+            rank,
+            accuracy,
+            tolerance,
             ..base
         };
-        let faces = or_default(&self.settings.faces, own);
-        faces.into_iter().map(of).collect()
+        match family {
+            Family::Method => {
+                let fits = |m: &&Method| match fidelity.kind().solves_alone() {
+                    true => !fidelity.kind().chooses() && **m != Method::Exact,
+                    false => m.kind().steps_together() && m.together() == **m,
+                };
+                let own: Vec<Method> = Method::VARIANTS.iter().filter(fits).copied().collect();
+                each(&given.methods, &own, |method| Configuration {
+                    method,
+                    ..base
+                })
+            }
+            Family::Faces => {
+                let own: &[usize] = if fidelity.kind().chooses() {
+                    &[]
+                } else {
+                    &FACES
+                };
+                each(&given.faces, own, |faces| Configuration {
+                    faces_per_body: Some(faces),
+                    ..base
+                })
+            }
+            Family::Rank if has(Knob::Rank) => {
+                each(&given.ranks, &RANKS, |r| aim(Some(r), None, None))
+            }
+            Family::Accuracy if has(Knob::Accuracy) => {
+                each(&given.accuracies, &ACCURACIES, |a| aim(None, Some(a), None))
+            }
+            Family::Tolerance if has(Knob::Tolerance) => {
+                each(&given.tolerances, &TOLERANCES, |t| aim(None, None, Some(t)))
+            }
+            Family::Integrator => each(&given.integrators, Integrator::VARIANTS, |integrator| {
+                Configuration { integrator, ..base }
+            }),
+            Family::TimeStep => {
+                let own = TIME_STEPS.map(|x| x * self.scene.time_step);
+                each(&given.time_steps, &own, |time_step| Configuration {
+                    time_step,
+                    ..base
+                })
+            }
+            _ => Vec::new(),
+        }
     }
 
     /// The base with a method whose solution depends on the mesh.
     fn with_mesh(&self, base: Configuration) -> Option<Configuration> {
         let meshed = |c: &Configuration| {
-            let exact = c.fidelity.solves_alone() && c.method.by_formula();
+            let exact = c.fidelity.kind().solves_alone() && c.method.kind().by_formula();
             !exact || self.closed_forms != ClosedForms::All
         };
         let methods = or_default(&self.settings.methods, &[Method::Panel]);
@@ -143,52 +188,6 @@ impl Plan<'_> {
             .into_iter()
             .map(|method| Configuration { method, ..base });
         std::iter::once(base).chain(others).find(meshed)
-    }
-
-    /// What one fidelity alone can vary.
-    fn aims(&self, base: Configuration) -> Vec<(Family, Vec<Configuration>)> {
-        let aim = |rank, accuracy, tolerance| Configuration {
-            rank,
-            accuracy,
-            tolerance,
-            ..base
-        };
-        let ranks = or_default(&self.settings.ranks, &RANKS).into_iter();
-        let accuracies = or_default(&self.settings.accuracies, &ACCURACIES).into_iter();
-        let tolerances = or_default(&self.settings.tolerances, &TOLERANCES).into_iter();
-        let all: [(Knob, Family, Vec<Configuration>); 3] = [
-            (
-                Knob::Rank,
-                Family::Rank,
-                ranks.map(|r| aim(Some(r), None, None)).collect(),
-            ),
-            (
-                Knob::Accuracy,
-                Family::Accuracy,
-                accuracies.map(|a| aim(None, Some(a), None)).collect(),
-            ),
-            (
-                Knob::Tolerance,
-                Family::Tolerance,
-                tolerances.map(|t| aim(None, None, Some(t))).collect(),
-            ),
-        ];
-        let has = |knob: &Knob| base.fidelity.knobs().contains(knob);
-        let own = all.into_iter().filter(|(knob, ..)| has(knob));
-        own.map(|(_, family, varied)| (family, varied)).collect()
-    }
-
-    fn integrators(&self, base: Configuration) -> Vec<Configuration> {
-        let of = |integrator| Configuration { integrator, ..base };
-        let all = or_default(&self.settings.integrators, Integrator::VARIANTS);
-        all.into_iter().map(of).collect()
-    }
-
-    fn time_steps(&self, base: Configuration) -> Vec<Configuration> {
-        let of = |time_step| Configuration { time_step, ..base };
-        let own = TIME_STEPS.map(|x| x * self.scene.time_step);
-        let all = or_default(&self.settings.time_steps, &own);
-        all.into_iter().map(of).collect()
     }
 
     fn add(&mut self, family: Family, configurations: impl IntoIterator<Item = Configuration>) {
@@ -205,13 +204,17 @@ impl Plan<'_> {
     fn normalised(&self, mut c: Configuration) -> Configuration {
         let has = |knob| c.fidelity.knobs().contains(&knob);
         c.rank = c.rank.filter(|_| has(Knob::Rank));
-        let own_accuracy = c.fidelity.own_accuracy().filter(|_| c.rank.is_none());
+        let own_accuracy = c
+            .fidelity
+            .kind()
+            .aim(&Numerics::default())
+            .filter(|_| c.rank.is_none());
         c.accuracy = own_accuracy.map(|own| c.accuracy.unwrap_or(own));
         let own_tolerance = SolveSettings::default().tolerance;
         c.tolerance = has(Knob::Tolerance).then(|| c.tolerance.unwrap_or(own_tolerance));
         c.method = match (c.method, self.closed_forms) {
-            (method, _) if c.fidelity.chooses() => method,
-            (method, _) if !c.fidelity.solves_alone() => method.together(),
+            (method, _) if c.fidelity.kind().chooses() => method,
+            (method, _) if !c.fidelity.kind().solves_alone() => method.together(),
             (Method::Auto, ClosedForms::All) => Method::Exact,
             (Method::Auto, ClosedForms::None) => Method::Panel,
             (method, _) => method,

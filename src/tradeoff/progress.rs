@@ -69,26 +69,24 @@ impl<'a> Watch<'a> {
     /// Whether to go on, in the middle of a part.
     pub fn poll(&mut self) -> ControlFlow<()> {
         self.stopped |= (self.progress)(self.now).is_break();
-        match self.stopped {
-            true => ControlFlow::Break(()),
-            false => ControlFlow::Continue(()),
+        if self.stopped {
+            return ControlFlow::Break(());
         }
+        ControlFlow::Continue(())
     }
 
     /// # Errors
     /// [`Error::Stopped`] once the progress broke.
     pub fn check(&mut self) -> Result<()> {
-        match self.poll() {
-            ControlFlow::Continue(()) => Ok(()),
-            ControlFlow::Break(()) => {
-                let TradeoffProgress { done, stage, .. } = self.now;
-                let part = match stage {
-                    TradeoffStage::Reference => "simulations of the reference",
-                    TradeoffStage::Configurations => "configurations",
-                };
-                let what = format!("the comparison, after {done} {part}");
-                Err(Error::Stopped { what })
-            }
+        if self.poll().is_continue() {
+            return Ok(());
         }
+        let TradeoffProgress { done, stage, .. } = self.now;
+        let part = match stage {
+            TradeoffStage::Reference => "simulations of the reference",
+            TradeoffStage::Configurations => "configurations",
+        };
+        let what = format!("the comparison, after {done} {part}");
+        Err(Error::Stopped { what })
     }
 }

@@ -68,7 +68,7 @@ impl TradeoffReference {
 }
 
 /// One configuration with its time and its errors. Errors are relative to the reference; `None` where there is no number.
-#[derive(Clone, Debug, Serialize)]
+#[derive(Clone, Debug, Default, Serialize)]
 pub struct TradeoffRow {
     /// What was simulated.
     #[serde(flatten)]
@@ -122,25 +122,7 @@ impl TradeoffRow {
         Self {
             fidelity_used: configuration.fidelity,
             configuration,
-            faces: None,
-            unknowns: None,
-            points: None,
-            ms_per_step: None,
-            ms_per_gradient_step: None,
-            ms_per_simulated_second: None,
-            added_mass_rel_error: None,
-            acceleration_rel_error: None,
-            end_state_rel_error: None,
-            setup_seconds: None,
-            timed_steps: None,
-            timed_repetitions: None,
-            below_reference: false,
-            acceleration_below_reference: false,
-            end_state_below_reference: false,
-            pareto: false,
-            pareto_end_state: false,
-            note: None,
-            error: None,
+            ..Self::default()
         }
     }
 
@@ -177,8 +159,7 @@ impl TradeoffRow {
 /// Fills in what follows from the measured numbers.
 pub(super) fn conclude(rows: &mut [TradeoffRow], reference: &TradeoffReference) {
     let below = |error: Option<f64>, quantity: Option<&ReferenceQuantity>| {
-        let estimate = quantity.and_then(|q| q.error_estimate);
-        let pair = error.zip(estimate);
+        let pair = error.zip(quantity.and_then(|q| q.error_estimate));
         pair.is_some_and(|(error, estimate)| error < estimate)
     };
     for row in rows.iter_mut() {
@@ -190,14 +171,12 @@ pub(super) fn conclude(rows: &mut [TradeoffRow], reference: &TradeoffReference) 
         row.end_state_below_reference =
             below(row.end_state_rel_error, reference.end_state.as_ref());
     }
-    let points = |of: &dyn Fn(&TradeoffRow) -> Option<(f64, f64)>| {
-        front(&rows.iter().map(of).collect::<Vec<_>>())
-    };
-    let marked = points(&|r| {
-        r.by_added_mass(reference)
-            .filter(|_| r.steps_like(&rows[0]))
-    });
-    let ends = points(&|r| r.by_end_state(reference));
+    let like = |r: &TradeoffRow| r.steps_like(&rows[0]);
+    let added = rows.iter();
+    let added = added.map(|r| r.by_added_mass(reference).filter(|_| like(r)));
+    let marked = front(&added.collect::<Vec<_>>());
+    let ends = rows.iter().map(|r| r.by_end_state(reference));
+    let ends = front(&ends.collect::<Vec<_>>());
     for ((row, marked), end) in rows.iter_mut().zip(marked).zip(ends) {
         (row.pareto, row.pareto_end_state) = (marked, end);
     }
@@ -218,22 +197,15 @@ fn front(points: &[Option<(f64, f64)>]) -> Vec<bool> {
 
 #[cfg(test)]
 mod tests {
-    use super::super::Family;
     use super::*;
     use crate::dynamics::Integrator;
-    use crate::simulate::Method;
 
     fn row(ms: Option<f64>, error: Option<f64>, integrator: Integrator) -> TradeoffRow {
         let configuration = Configuration {
-            family: Family::Base,
             fidelity: Fidelity::Reduced,
-            method: Method::Auto,
-            faces_per_body: None,
-            rank: None,
-            accuracy: None,
-            tolerance: None,
             integrator,
             time_step: 0.01,
+            ..Configuration::default()
         };
         TradeoffRow {
             ms_per_step: ms,

@@ -39,43 +39,29 @@ pub struct TradeoffSettings {
 impl TradeoffSettings {
     /// Checks the values.
     pub(super) fn validate(&self) -> Result<()> {
-        let check =
-            |name: &str, values: &[f64], right: fn(f64) -> bool, expected: &str| match values
-                .iter()
-                .find(|x| !right(**x))
-            {
-                None => Ok(()),
-                Some(x) => Err(Error::input(
-                    format!("tradeoff settings: {name}"),
-                    x,
-                    expected,
-                )),
-            };
-        let counts = [
-            ("faces", self.faces.as_slice()),
-            ("ranks", self.ranks.as_slice()),
-            ("steps", self.steps.as_slice()),
-            ("reference_faces", self.reference_faces.as_slice()),
+        let numbers = |counts: &[usize]| counts.iter().map(|n| *n as f64).collect();
+        let count = (f64::INFINITY, "must be above zero");
+        let part = (1.0, "must be between 0 and 1");
+        let time = (f64::INFINITY, "must be above zero and finite, in s");
+        let fields: [(&str, Vec<f64>, (f64, &str)); 8] = [
+            ("faces", numbers(&self.faces), count),
+            ("ranks", numbers(&self.ranks), count),
+            ("steps", numbers(self.steps.as_slice()), count),
+            (
+                "reference_faces",
+                numbers(self.reference_faces.as_slice()),
+                count,
+            ),
+            ("accuracies", self.accuracies.clone(), part),
+            ("tolerances", self.tolerances.clone(), part),
+            ("time_steps", self.time_steps.clone(), time),
+            ("budget", self.budget.as_slice().to_vec(), time),
         ];
-        for (name, values) in counts {
-            let values: Vec<f64> = values.iter().map(|n| *n as f64).collect();
-            check(name, &values, |n| n > 0.0, "must be above zero")?;
-        }
-        let errors = [
-            ("accuracies", &self.accuracies),
-            ("tolerances", &self.tolerances),
-        ];
-        for (name, values) in errors {
-            let right = |x| x > 0.0 && x < 1.0;
-            check(name, values, right, "must be between 0 and 1")?;
-        }
-        let times = [
-            ("time_steps", self.time_steps.as_slice()),
-            ("budget", self.budget.as_slice()),
-        ];
-        for (name, values) in times {
-            let right = |x: f64| x > 0.0 && x.is_finite();
-            check(name, values, right, "must be above zero and finite, in s")?;
+        for (name, values, (below, expected)) in fields {
+            if let Some(x) = values.into_iter().find(|x| !(*x > 0.0 && *x < below)) {
+                let place = format!("tradeoff settings: {name}");
+                return Err(Error::input(place, x, expected));
+            }
         }
         Ok(())
     }

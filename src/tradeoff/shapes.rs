@@ -24,27 +24,17 @@ pub(super) fn shapes(scene: &Scene) -> impl Iterator<Item = &Shape> {
     scene.bodies.iter().filter_map(|b| b.shape.as_ref())
 }
 
-/// Number of faces that a shape by formula is given; none for meshes, whose number can't be chosen.
-fn faces(shape: &Shape) -> Option<usize> {
-    match shape {
-        Shape::Sphere { faces, .. }
-        | Shape::Ellipsoid { faces, .. }
-        | Shape::Box { faces, .. }
-        | Shape::Cylinder { faces, .. }
-        | Shape::Capsule { faces, .. }
-        | Shape::Prism { faces, .. } => Some(faces.unwrap_or(DEFAULT_FACES)),
-        Shape::Mesh { .. } | Shape::Triangles { .. } => None,
-    }
-}
-
 /// Whether a shape's number of faces can be chosen.
 pub(super) fn refinable(shape: &Shape) -> bool {
-    faces(shape).is_some()
+    !shape.is_mesh()
 }
 
 /// Whether the scene itself has so many faces on every shape by formula.
 pub(super) fn has_faces(scene: &Scene, number: usize) -> bool {
-    shapes(scene).filter_map(faces).all(|n| n == number)
+    let asked = shapes(scene).filter(|s| refinable(s));
+    asked
+        .map(|s| s.asked_faces().unwrap_or(DEFAULT_FACES))
+        .all(|n| n == number)
 }
 
 /// Whether a shape by formula has sharp edges.

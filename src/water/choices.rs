@@ -49,7 +49,7 @@ impl WaterChoices {
 
     /// The body method that the fidelity makes of the one asked for.
     pub fn method_used(&self) -> Method {
-        match self.fidelity.solves_alone() {
+        match self.fidelity.kind().solves_alone() {
             true => self.method,
             false => self.method.together(),
         }
@@ -57,7 +57,7 @@ impl WaterChoices {
 
     /// What is asked of surfaces.
     pub(crate) fn meshing(&self) -> Meshing {
-        let (alone, method) = (self.fidelity.solves_alone(), self.method.kind());
+        let (alone, method) = (self.fidelity.kind().solves_alone(), self.method.kind());
         Meshing {
             faces: self.faces,
             by_formula: alone && method.by_formula(),

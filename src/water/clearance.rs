@@ -179,19 +179,14 @@ impl Clearance {
         resolved: &[f64],
     ) -> Option<String> {
         let coarsest = resolved.iter().copied().fold(0.0, f64::max);
-        // Of a gap to a wall, the image is twice as far away.
-        let judge = |gap: &Gap| match gap.second {
-            Other::Body(b) => (gap.distance, resolved[gap.first].max(resolved[b])),
-            Other::Wall(_) => (2.0 * gap.distance, resolved[gap.first]),
-        };
         let mut worst: Option<(f64, f64, Gap, f64)> = None;
         for (time, poses, smallest) in states {
             if smallest.distance >= coarsest {
                 continue;
             }
             for gap in self.moving.all(poses) {
-                let (seen, limit) = judge(&gap);
-                let ratio = seen / limit;
+                let limit = gap.largest(resolved);
+                let ratio = gap.image_distance() / limit;
                 if limit > 0.0 && ratio < 1.0 && worst.is_none_or(|w| ratio < w.0) {
                     worst = Some((ratio, time, gap, limit));
                 }

@@ -5,7 +5,7 @@ use super::clearance::Clearance;
 use super::device::Device;
 use super::fidelity::Fidelity;
 use super::fidelity::kind::{Plan, Planned, Start};
-use super::submerged::{Around, Discretisation, SubmergedBody};
+use super::submerged::{Discretisation, Problem, SubmergedBody};
 use crate::Result;
 use crate::adjoint::lie::Pose;
 use crate::coupling::Coupling;
@@ -53,20 +53,19 @@ pub(crate) fn prepare(
     clearance: Clearance,
     folder: Option<&Path>,
 ) -> Result<Prepared> {
-    let planned = plan(scene, choices, poses, &clearance, &submerged, &numbers)?;
-    let (fidelity, method) = (planned.fidelity, choices.method.kind());
-    let mut warnings = choices.without_effect();
-    let around = Around::new(scene, &numbers, folder);
-    let mut device = Device::open(choices.backend, &choices.gpu, || fidelity.idle_gpu(method))?;
-    let numerics = &choices.numerics;
-    let made = fidelity.couple(
-        &submerged,
-        &around,
-        method,
-        numerics,
-        &planned.plan,
-        &mut device,
+    let problem = Problem::new(scene, &numbers, &submerged, &choices.numerics, folder);
+    let (fidelity, planned) = plan(
+        scene,
+        choices.fidelity,
+        poses,
+        &clearance,
+        &problem,
+        &numbers,
     )?;
+    let (kind, method) = (fidelity.kind(), choices.method.kind());
+    let mut warnings = choices.without_effect();
+    let mut device = Device::open(choices.backend, &choices.gpu, || kind.idle_gpu(method))?;
+    let made = kind.couple(&problem, method, &planned.plan, &mut device)?;
     warnings.extend(device.warning());
     warnings.extend(made.warnings);
     let mut resolved = vec![0.0; scene.bodies.len()];
@@ -76,8 +75,8 @@ pub(crate) fn prepare(
     Ok(Prepared {
         bodies: numbers,
         coupling: made.coupling.into(),
-        faces: made.faces,
-        fidelity: fidelity.name().parse().unwrap_or(choices.fidelity),
+        faces: made.bodies.iter().map(|d| d.faces).sum(),
+        fidelity,
         discretisation: made.bodies,
         resolved,
         plan: planned.plan,
@@ -89,44 +88,44 @@ pub(crate) fn prepare(
     })
 }
 
-/// The fidelity to use, and what it makes of the scene.
+/// The fidelity to use, and what is chosen for the scene.
 fn plan(
     scene: &Scene,
-    choices: &WaterChoices,
+    fidelity: Fidelity,
     all: &[Pose],
     clearance: &Clearance,
-    submerged: &[SubmergedBody],
+    problem: &Problem,
     numbers: &[usize],
-) -> Result<Planned> {
-    let fidelity = choices.fidelity.kind();
-    if scene.fluid.density <= 0.0 {
-        return Ok(Planned::plain(fidelity));
+) -> Result<(Fidelity, Planned)> {
+    if scene.fluid.density <= 0.0 || !fidelity.kind().chooses() {
+        return Ok((fidelity, Planned::default()));
     }
     let poses: Vec<Pose> = numbers.iter().map(|b| all[*b]).collect();
     let number = |b: usize| numbers.iter().position(|w| *w == b);
-    let gaps = || {
-        let all = [&clearance.moving, &clearance.rigid].map(|g| g.all(all));
-        let gap = |gap: Gap| {
-            let second = match gap.second {
-                Other::Body(b) => Other::Body(number(b)?),
-                wall => wall,
-            };
-            let first = number(gap.first)?;
-            Some(Gap {
-                first,
-                second,
-                ..gap
-            })
+    let gaps = [&clearance.moving, &clearance.rigid].into_iter();
+    let gaps = gaps.flat_map(|g| g.all(all)).filter_map(|gap| {
+        let second = match gap.second {
+            Other::Body(b) => Other::Body(number(b)?),
+            wall => wall,
         };
-        all.into_iter().flatten().filter_map(gap).collect()
-    };
+        Some(Gap {
+            first: number(gap.first)?,
+            second,
+            ..gap
+        })
+    });
     let start = Start {
-        bodies: submerged,
+        bodies: problem.bodies,
         poses: &poses,
-        gaps: &gaps,
-        walls: &scene.walls,
+        gaps: gaps.collect(),
+        walls: problem.walls,
     };
-    fidelity.plan(&start, &choices.numerics)
+    let planned = fidelity.kind().plan(&start, problem.numerics)?;
+    let used = match planned.together {
+        true => Fidelity::Full,
+        false => Fidelity::Reduced,
+    };
+    Ok((used, planned))
 }
 
 /// Unit twists along world axes about each body's origin, in body frames: rotated, not shifted.

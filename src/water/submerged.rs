@@ -1,5 +1,6 @@
 //! The bodies in the water, what is around them, and what was made of them.
 
+use super::numerics::Numerics;
 use super::surface::{Coarse, Surface, pose, semi_axes};
 use crate::adjoint::lie::{Mat6, Pose};
 use crate::coupling::{Coupling, Exclusions};
@@ -24,11 +25,13 @@ pub(crate) struct SubmergedBody<'a> {
     pub added_mass: Option<Mat6>,
 }
 
-/// What is around the bodies in the water.
-pub(crate) struct Around<'a> {
+/// The bodies in the water, what is around them, and the numbers to solve them by.
+pub(crate) struct Problem<'a> {
+    pub bodies: &'a [SubmergedBody<'a>],
     pub walls: &'a [Wall],
-    /// Pairs that don't feel each other, by their numbers among the bodies in the water.
+    /// Pairs that don't feel each other, by their numbers among `bodies`.
     pub excluded: Exclusions,
+    pub numerics: &'a Numerics,
     /// Where compressed bodies are kept.
     pub folder: Option<&'a Path>,
 }
@@ -36,8 +39,6 @@ pub(crate) struct Around<'a> {
 /// What was made of the bodies.
 pub(crate) struct Made {
     pub coupling: Box<dyn Coupling>,
-    /// Faces of all surfaces that were discretised.
-    pub faces: usize,
     /// What each body became.
     pub bodies: Vec<Discretisation>,
     pub warnings: Vec<String>,
@@ -92,17 +93,34 @@ impl<'a> SubmergedBody<'a> {
     }
 }
 
-impl<'a> Around<'a> {
-    /// Of the bodies in the water, which have these numbers in the scene.
-    pub fn new(scene: &'a Scene, numbers: &[usize], folder: Option<&'a Path>) -> Self {
+impl<'a> Problem<'a> {
+    /// Of bodies of a scene, which have these numbers there.
+    pub fn new(
+        scene: &'a Scene,
+        numbers: &[usize],
+        bodies: &'a [SubmergedBody],
+        numerics: &'a Numerics,
+        folder: Option<&'a Path>,
+    ) -> Self {
         let number = |b: usize| numbers.iter().position(|w| *w == b);
         let declared = scene.overlapping().into_iter();
         let pairs = declared.filter_map(|(a, b)| Some((number(a)?, number(b)?)));
         Self {
+            bodies,
             walls: &scene.walls,
             excluded: Exclusions::new(pairs),
+            numerics,
             folder,
         }
+    }
+
+    /// What each body became, with its name.
+    pub fn named(&self, made: impl IntoIterator<Item = Discretisation>) -> Vec<Discretisation> {
+        let named = |(d, body): (Discretisation, &SubmergedBody)| Discretisation {
+            body: body.name.to_string(),
+            ..d
+        };
+        made.into_iter().zip(self.bodies).map(named).collect()
     }
 }
 
@@ -141,14 +159,13 @@ fn moves(scene: &Scene, tree: &Tree, b: usize) -> bool {
 /// One value per body; bodies with equal surfaces share one.
 pub(crate) fn shared<T>(
     bodies: &[SubmergedBody],
-    make: impl Fn(&SubmergedBody, &TriMesh) -> Result<T>,
+    make: impl Fn(&SubmergedBody) -> Result<T>,
 ) -> Result<Vec<Arc<T>>> {
     let mut out: Vec<Arc<T>> = Vec::with_capacity(bodies.len());
     for (b, body) in bodies.iter().enumerate() {
-        let mesh = body.surface("full")?;
         out.push(match (0..b).find(|a| bodies[*a].equal(body)) {
             Some(a) => out[a].clone(),
-            None => Arc::new(make(body, mesh)?),
+            None => Arc::new(make(body)?),
         });
     }
     Ok(out)

@@ -6,9 +6,8 @@ use std::path::Path;
 use plotters::coord::Shift;
 use plotters::prelude::*;
 
-use super::table::short;
-use crate::cli::options::name;
-use crate::tradeoff::{Tradeoff, TradeoffReference, TradeoffRow};
+use crate::simulate::{Fidelity, Method};
+use crate::tradeoff::{Tradeoff, TradeoffReference, TradeoffRow, short};
 use crate::{Error, Result};
 
 const WIDTH: u32 = 860;
@@ -80,10 +79,8 @@ fn charts(found: &Tradeoff) -> Vec<Chart<'_>> {
     type Point = fn(&TradeoffRow, &TradeoffReference) -> Option<(f64, f64)>;
     let points = |of: Point, which: &dyn Fn(&TradeoffRow) -> bool| {
         let rows = found.rows.iter().filter(|r| which(r));
-        let found = rows.filter_map(|r| Some((r, of(r, reference)?)));
-        found
-            .map(|(r, (x, y))| (r, (x, y.max(FLOOR))))
-            .collect::<Vec<_>>()
+        let point = |r| of(r, reference).map(|(x, y)| (r, (x, y.max(FLOOR))));
+        rows.filter_map(point).collect::<Vec<_>>()
     };
     let first = found.rows.first();
     let alike = |r: &TradeoffRow| first.is_some_and(|f| r.steps_like(f));
@@ -96,7 +93,7 @@ fn charts(found: &Tradeoff) -> Vec<Chart<'_>> {
         estimate: reference.added_mass.error_estimate,
     }];
     if let Some(first) = first {
-        let integrator = name(first.configuration.integrator);
+        let integrator: &str = first.configuration.integrator.into();
         out[0].title += &format!(" (steps by {integrator})");
     }
     if let Some(end_state) = &reference.end_state {
@@ -177,11 +174,17 @@ impl Chart<'_> {
             .draw()?;
         let (across, down) = panel.get_pixel_range();
         let corner = (across.start, down.start);
-        let mut entries = Vec::new();
+        let mut entries: Vec<(Sign, String)> = Vec::new();
         if let Some(estimate) = self.estimate.filter(|e| *e >= FLOOR) {
             let line = [(left, estimate), (right, estimate)];
             chart.draw_series(DashedLineSeries::new(line, 5, 5, DASHED.into()))?;
-            entries.push((Sign::Dashes, "error of the reference".to_string()));
+            let dashes = |area: &Panel, (x, y): Pixel| -> Drawn {
+                for k in [-9, -1, 7] {
+                    area.draw(&PathElement::new([(x + k, y), (x + k + 4, y)], DASHED))?;
+                }
+                Ok(())
+            };
+            entries.push((Box::new(dashes), "error of the reference".into()));
         }
         let mut front: Vec<(f64, f64)> = (self.points.iter())
             .filter(|(row, _)| (self.on_front)(row))
@@ -190,126 +193,69 @@ impl Chart<'_> {
         front.sort_by(|a, b| a.0.total_cmp(&b.0).then(b.1.total_cmp(&a.1)));
         if !front.is_empty() {
             chart.draw_series(LineSeries::new(front, FRONT))?;
-            entries.push((Sign::Line, "Pareto front".to_string()));
+            let line = |area: &Panel, (x, y): Pixel| -> Drawn {
+                Ok(area.draw(&PathElement::new([(x - 9, y), (x + 9, y)], FRONT))?)
+            };
+            entries.push((Box::new(line), "Pareto front".into()));
         }
-        for (fidelity, method) in self.families() {
-            let look = Look::new(&fidelity, &method);
-            let of = |row: &TradeoffRow| family(row) == (fidelity.clone(), method.clone());
-            let points = self.points.iter().filter(|(row, _)| of(row));
-            for (row, at) in points {
-                let (x, y) = chart.backend_coord(at);
-                look.draw(&panel, (x - corner.0, y - corner.1), (self.on_front)(row))?;
+        let family = |row: &TradeoffRow| (row.configuration.fidelity, row.configuration.method);
+        let mut drawn = Vec::new();
+        for family_of in self.points.iter().map(|(row, _)| family(row)) {
+            if drawn.contains(&family_of) {
+                continue;
             }
-            entries.push((Sign::Point(look), format!("{fidelity}, {method}")));
+            drawn.push(family_of);
+            for (row, at) in self.points.iter().filter(|p| family(p.0) == family_of) {
+                let (x, y) = chart.backend_coord(at);
+                let at = (x - corner.0, y - corner.1);
+                mark(&panel, at, family_of, (self.on_front)(row))?;
+            }
+            let sign = move |area: &Panel, at: Pixel| mark(area, at, family_of, true);
+            entries.push((Box::new(sign), format!("{}, {}", family_of.0, family_of.1)));
         }
         for (i, (sign, text)) in entries.into_iter().enumerate() {
             let at = (14, 52 + 20 * i as i32);
-            sign.draw(&legend, at)?;
+            sign(&legend, at)?;
             legend.draw(&Text::new(text, (at.0 + 18, at.1 - 4), ("sans-serif", 13)))?;
         }
         Ok(())
     }
-
-    /// Fidelities and methods that occur, in the order of the rows.
-    fn families(&self) -> Vec<(String, String)> {
-        let mut out = Vec::new();
-        for (row, _) in &self.points {
-            let family = family(row);
-            if !out.contains(&family) {
-                out.push(family);
-            }
-        }
-        out
-    }
 }
 
-fn family(row: &TradeoffRow) -> (String, String) {
-    let c = &row.configuration;
-    (name(c.fidelity), name(c.method))
-}
+type Pixel = (i32, i32);
 
 /// What stands in the legend beside a text.
-enum Sign {
-    Dashes,
-    Line,
-    Point(Look),
-}
-
-impl Sign {
-    fn draw(&self, area: &Panel, at: (i32, i32)) -> Drawn {
-        let line = [(at.0 - 9, at.1), (at.0 + 9, at.1)];
-        match self {
-            Sign::Dashes => {
-                for x in [-9, -1, 7] {
-                    let dash = [(at.0 + x, at.1), (at.0 + x + 4, at.1)];
-                    area.draw(&PathElement::new(dash, DASHED))?;
-                }
-            }
-            Sign::Line => area.draw(&PathElement::new(line, FRONT))?,
-            Sign::Point(look) => look.draw(area, at, true)?,
-        }
-        Ok(())
-    }
-}
+type Sign = Box<dyn Fn(&Panel, Pixel) -> Drawn>;
 
 const DASHED: RGBAColor = RGBAColor(0, 0, 0, 0.6);
 const FRONT: RGBAColor = RGBAColor(0, 0, 0, 0.8);
 
-/// Colour by fidelity, marker by method: told apart without colours too.
-#[derive(Clone, Copy)]
-struct Look {
-    color: RGBColor,
-    marker: Marker,
-}
-
-#[derive(Clone, Copy)]
-enum Marker {
-    Circle,
-    Square,
-    Triangle,
-    Cross,
-    Diamond,
-}
-
-impl Look {
-    fn new(fidelity: &str, method: &str) -> Self {
-        Self {
-            color: match fidelity {
-                "isolated" => RGBColor(110, 110, 110),
-                "reduced" => RGBColor(0, 100, 190),
-                "auto" => RGBColor(0, 145, 90),
-                _ => RGBColor(200, 60, 20),
-            },
-            marker: match method {
-                "exact" => Marker::Circle,
-                "panel" => Marker::Square,
-                "mfs-vertex" => Marker::Triangle,
-                "mfs-face" => Marker::Cross,
-                _ => Marker::Diamond,
-            },
+/// A marker at a pixel, filled if it is on the front: colour by fidelity, form by method, told apart without
+/// colours too.
+fn mark(area: &Panel, (x, y): Pixel, of: (Fidelity, Method), filled: bool) -> Drawn {
+    let color = match of.0 {
+        Fidelity::Isolated => RGBColor(110, 110, 110),
+        Fidelity::Reduced => RGBColor(0, 100, 190),
+        Fidelity::Auto => RGBColor(0, 145, 90),
+        Fidelity::Full => RGBColor(200, 60, 20),
+    };
+    let style = color.stroke_width(if filled { 2 } else { 1 });
+    let corners = match of.1 {
+        Method::Exact => {
+            let style = if filled { style.filled() } else { style };
+            return Ok(area.draw(&Circle::new((x, y), 4, style))?);
         }
+        Method::MfsFace => return Ok(area.draw(&Cross::new((x, y), 4, style))?),
+        Method::Panel => vec![(-4, -4), (4, -4), (4, 4), (-4, 4)],
+        Method::MfsVertex => vec![(0, -5), (5, 4), (-5, 4)],
+        Method::Auto => vec![(0, -5), (5, 0), (0, 5), (-5, 0)],
+    };
+    let mut corners: Vec<_> = corners.into_iter().map(|c| (x + c.0, y + c.1)).collect();
+    if filled {
+        return Ok(area.draw(&Polygon::new(corners, color))?);
     }
-
-    /// A marker at a pixel, filled if it is on the front.
-    fn draw(self, area: &Panel, (x, y): (i32, i32), filled: bool) -> Drawn {
-        let style = self.color.stroke_width(if filled { 2 } else { 1 });
-        let corners = match self.marker {
-            Marker::Circle => {
-                let style = if filled { style.filled() } else { style };
-                return Ok(area.draw(&Circle::new((x, y), 4, style))?);
-            }
-            Marker::Cross => return Ok(area.draw(&Cross::new((x, y), 4, style))?),
-            Marker::Square => vec![(-4, -4), (4, -4), (4, 4), (-4, 4)],
-            Marker::Triangle => vec![(0, -5), (5, 4), (-5, 4)],
-            Marker::Diamond => vec![(0, -5), (5, 0), (0, 5), (-5, 0)],
-        };
-        let mut corners: Vec<_> = corners.into_iter().map(|c| (x + c.0, y + c.1)).collect();
-        if filled {
-            return Ok(area.draw(&Polygon::new(corners, self.color))?);
-        }
-        corners.push(corners[0]);
-        Ok(area.draw(&PathElement::new(corners, style))?)
-    }
+    corners.push(corners[0]);
+    Ok(area.draw(&PathElement::new(corners, style))?)
 }
 
 #[cfg(test)]

@@ -5,9 +5,10 @@ use std::path::PathBuf;
 
 use serde::Serialize;
 
-use crate::cli::options::name;
 use crate::cli::output::write_warnings;
-use crate::tradeoff::{ReferenceQuantity, Tradeoff, TradeoffReference, TradeoffRow};
+use crate::tradeoff::{
+    ReferenceQuantity, Tradeoff, TradeoffReference, TradeoffRow, short, three_digits,
+};
 
 /// The whole comparison, and what was written.
 #[derive(Debug, Serialize)]
@@ -26,18 +27,17 @@ struct Fronts {
     pareto_end_state: &'static str,
 }
 
-const FRONTS: Fronts = Fronts {
-    pareto: "no other row that steps through time as the first one does (integrator, time_step) is \
-             at most as slow (ms_per_step) and at most as wrong (added_mass_rel_error), and better \
-             in one; errors below the reference's own count as that",
-    pareto_end_state: "the same of all rows with ms_per_simulated_second and end_state_rel_error",
-};
-
 impl TradeoffReport {
     pub fn new(found: Tradeoff, files: Vec<PathBuf>) -> Self {
+        let fronts = Fronts {
+            pareto: "no other row that steps through time as the first one does (integrator, time_step) is \
+                     at most as slow (ms_per_step) and at most as wrong (added_mass_rel_error), and better \
+                     in one; errors below the reference's own count as that",
+            pareto_end_state: "the same of all rows with ms_per_simulated_second and end_state_rel_error",
+        };
         Self {
             found,
-            fronts: FRONTS,
+            fronts,
             files,
         }
     }
@@ -45,24 +45,7 @@ impl TradeoffReport {
 
 /// Three digits, or a dash.
 fn number(x: Option<f64>) -> String {
-    match x {
-        None => "-".into(),
-        Some(0.0) => "0".into(),
-        Some(x) if (1e-3..1e5).contains(&x) => {
-            let digits = (2 - x.log10().floor() as i32).max(0) as usize;
-            format!("{x:.digits$}")
-        }
-        Some(x) => format!("{x:.2e}"),
-    }
-}
-
-/// The same without zeros at its end.
-pub(super) fn short(x: f64) -> String {
-    let digits = number(Some(x));
-    match digits.contains('.') && !digits.contains('e') {
-        true => digits.trim_end_matches('0').trim_end_matches('.').into(),
-        false => digits,
-    }
+    x.map_or_else(|| "-".into(), three_digits)
 }
 
 fn error(x: Option<f64>, below: bool, quantity: Option<&ReferenceQuantity>) -> String {
@@ -89,13 +72,13 @@ fn cells(row: &TradeoffRow, reference: &TradeoffReference) -> [String; 15] {
     let c = &row.configuration;
     [
         mark(row.pareto, "*") + &mark(row.pareto_end_state, "+"),
-        name(c.fidelity),
-        name(c.method),
+        c.fidelity.to_string(),
+        c.method.to_string(),
         count(row.faces),
         count(row.unknowns),
         count(row.points),
         aim(row),
-        name(c.integrator),
+        <&str>::from(c.integrator).into(),
         short(c.time_step),
         number(row.ms_per_step),
         number(row.ms_per_gradient_step),
@@ -210,10 +193,8 @@ impl fmt::Display for TradeoffReport {
         )?;
         if !found.left_out.is_empty() {
             write!(f, "\nleft out for the budget of {} s:", found.budget)?;
-            let listed = found.left_out.iter().take(LISTED);
-            listed
-                .into_iter()
-                .try_for_each(|label| write!(f, "\n  {label}"))?;
+            let mut listed = found.left_out.iter().take(LISTED);
+            listed.try_for_each(|label| write!(f, "\n  {label}"))?;
             if let Some(more @ 1..) = found.left_out.len().checked_sub(LISTED) {
                 write!(f, "\n  and {more} more (all with --json)")?;
             }

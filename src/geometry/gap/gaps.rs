@@ -25,6 +25,29 @@ pub struct Gap {
     pub edge: f64,
 }
 
+impl Gap {
+    /// Whether it is one of body `b`'s.
+    pub(crate) fn touches(&self, b: usize) -> bool {
+        self.first == b || self.second == Other::Body(b)
+    }
+
+    /// The distance to the other body, or to the body's own image behind the wall, m.
+    pub(crate) fn image_distance(&self) -> f64 {
+        match self.second {
+            Other::Body(_) => self.distance,
+            Other::Wall(_) => 2.0 * self.distance,
+        }
+    }
+
+    /// The largest of `values`, which are one per body, of the bodies that it is between.
+    pub(crate) fn largest(&self, values: &[f64]) -> f64 {
+        match self.second {
+            Other::Body(b) => values[self.first].max(values[b]),
+            Other::Wall(_) => values[self.first],
+        }
+    }
+}
+
 /// Signed distance of a point from a surface or a wall.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Distance {

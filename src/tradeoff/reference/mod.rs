@@ -73,13 +73,8 @@ impl Reference {
         };
         let moving = simulations.as_ref().map(|s| &s.best.start);
         let best = panels.as_ref().map(|p| &p.best).or(moving);
-        let Some(best) = best.cloned() else {
-            return Err(Error::input(
-                "reference",
-                "none",
-                "panels or compressed bodies",
-            ));
-        };
+        let none = || Error::input("reference", "none", "panels or compressed bodies");
+        let best = best.cloned().ok_or_else(none)?;
         let significant = significant(&best.added_mass, &best.mass);
         let difference =
             |a: &Start, b: &Start| matrix_error(&a.added_mass, &b.added_mass, &significant);
@@ -168,7 +163,7 @@ impl Reference {
             error_estimate: estimate(&extra),
         });
         if excursion.any() {
-            let dt = super::configuration::seconds(simulations.best.path.time_step);
+            let dt = super::configuration::short(simulations.best.path.time_step);
             let error = |a: &Path, b: &Path| end_error(a, b, &weights, &excursion);
             self.description.end_state = Some(ReferenceQuantity {
                 what: format!("{by}; rk4 with steps of {dt} s"),

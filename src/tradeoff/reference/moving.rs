@@ -3,7 +3,7 @@
 
 use super::levels::{Limits, climb};
 use crate::dynamics::Integrator;
-use crate::geometry::Other;
+use crate::geometry::Gap;
 use crate::scene::{Preset, Scene};
 use crate::simulate::{Fidelity, Method, Settings, Simulator};
 use crate::tradeoff::progress::Watch;
@@ -86,16 +86,12 @@ impl Simulations {
                 }
             }
         }
-        match Self::by(scene, Way::Full, limits, until, watch)? {
-            Some(found) => Ok(found.because(why)),
-            None => Err(Error::input("reference: levels", 0, "at least one")),
-        }
+        let found = Self::by(scene, Way::Full, limits, until, watch)?.map(|s| s.because(why));
+        found.ok_or_else(|| Error::input("reference: levels", 0, "at least one"))
     }
 
     fn because(mut self, why: Option<String>) -> Self {
-        if let Some(why) = why {
-            self.description += &format!(" ({why})");
-        }
+        self.description.extend(why.map(|why| format!(" ({why})")));
         self
     }
 
@@ -136,9 +132,7 @@ impl Simulations {
         let early = until - left.mul_f64(FOR_MESHES);
         let mut found = vec![rough];
         found.extend(climb(better, 1, GROWTH, early, &mut run)?);
-        let Some(best) = found.pop() else {
-            return Ok(None);
-        };
+        let best = found.swap_remove(found.len() - 1);
         let mut out = Self {
             description: best.level.describe(scene),
             pairs: found.pop().map(|c| (c, best.clone())).into_iter().collect(),
@@ -177,10 +171,10 @@ impl Simulations {
 
     /// Sum over the pairs of their differences; none without pairs.
     pub fn estimate(&self, of: impl Fn(&Simulation, &Simulation) -> Option<f64>) -> Option<f64> {
-        let differences: Option<Vec<f64>> = self.pairs.iter().map(|(a, b)| of(a, b)).collect();
+        let differences = self.pairs.iter().map(|(a, b)| of(a, b));
         differences
-            .filter(|d| !d.is_empty())
-            .map(|d| d.iter().sum())
+            .sum::<Option<f64>>()
+            .filter(|_| !self.pairs.is_empty())
     }
 }
 
@@ -254,14 +248,8 @@ fn gaps(simulator: &Simulator, path: &Path) -> Vec<(f64, f64)> {
     let poses = ends.map(|q| simulator.system().tree.kinematics(q).poses);
     let all: Vec<_> = poses.flat_map(|p| simulator.gaps().all(&p)).collect();
     let nearest = |b: usize| {
-        let near = all
-            .iter()
-            .filter(|g| g.first == b || g.second == Other::Body(b));
-        let seen = near.map(|g| match g.second {
-            Other::Body(_) => g.distance,
-            Other::Wall(_) => 2.0 * g.distance,
-        });
-        seen.fold(f64::INFINITY, f64::min)
+        let near = all.iter().filter(|g| g.touches(b));
+        near.map(Gap::image_distance).fold(f64::INFINITY, f64::min)
     };
     let compressed = simulator.discretisation().iter().filter_map(|d| {
         let b = names.iter().position(|n| *n == d.body)?;

@@ -2,20 +2,21 @@
 
 use crate::Result;
 use crate::adjoint::lie::Pose;
-use crate::boundary::Response;
 use crate::coupling::{Coupling, CouplingReport};
-use crate::geometry::{Gap, Other};
+use crate::geometry::Gap;
 use crate::multibody::Tree;
 use crate::scene::{Scene, WallSurface};
 use crate::water::choices::{WaterChoices, surfaces};
 use crate::water::device::Device;
+use crate::water::fidelity::kind::Plan;
 use crate::water::fidelity::{Fidelity, compressed_all, responses};
 use crate::water::method::Method;
+use crate::water::method::kind::for_body;
+use crate::water::numerics::Numerics;
 use crate::water::prepared::{Prepared, world_axes};
-use crate::water::submerged::{Around, SubmergedBody, in_water};
+use crate::water::submerged::{Problem, SubmergedBody, in_water};
 use crate::water::surface::{Meshing, Surface, surface};
 use nalgebra::DMatrix;
-use std::sync::Arc;
 
 /// A direction that hardly moves water (a round body's spin) counts as this part of the water
 /// displaced.
@@ -121,7 +122,7 @@ impl<'a> Case<'a> {
     pub fn meshed(&self) -> Vec<usize> {
         let method = self.subject.choices.method.kind();
         let alone = self.fidelity.kind().solves_alone();
-        let formula = |w: &SubmergedBody| method.for_body(w).is_ok_and(|m| m.by_formula());
+        let formula = |w: &SubmergedBody| for_body(method, w).is_ok_and(|m| m.by_formula());
         let submerged = self.submerged(&self.surfaces);
         let pairs = self.bodies.iter().zip(&submerged);
         let used = pairs
@@ -161,9 +162,10 @@ impl<'a> Case<'a> {
         in_water(self.scene(), surfaces, self.subject.tree, coupled).1
     }
 
-    fn around(&self) -> Around<'_> {
+    fn problem<'b>(&'b self, bodies: &'b [SubmergedBody]) -> Problem<'b> {
         let folder = self.subject.water.folder.as_deref();
-        Around::new(self.scene(), &self.bodies, folder)
+        let numerics = &self.subject.choices.numerics;
+        Problem::new(self.scene(), &self.bodies, bodies, numerics, folder)
     }
 
     /// The added mass with these surfaces; where bodies are compressed, what [`Reduced`] is off if
@@ -175,12 +177,9 @@ impl<'a> Case<'a> {
         if self.correction.is_some() {
             return self.correction(&submerged);
         }
-        let choices = self.subject.choices;
         let made = self.fidelity.kind().couple(
-            &submerged,
-            &self.around(),
-            choices.method.kind(),
-            &choices.numerics,
+            &self.problem(&submerged),
+            self.subject.choices.method.kind(),
             &self.subject.water.plan,
             &mut self.subject.water.device.clone(),
         )?;
@@ -194,14 +193,12 @@ impl<'a> Case<'a> {
 
     /// What the compressed bodies' added mass is off if they answer as `bodies` do.
     fn correction(&self, bodies: &[SubmergedBody]) -> Result<DMatrix<f64>> {
-        let choices = self.subject.choices;
-        let (method, numerics) = (choices.method.kind(), &choices.numerics);
-        let plan = &self.subject.water.plan;
+        let method = self.subject.choices.method.kind();
         let own = self.submerged(&self.surfaces);
-        let coupling = compressed_all(&own, &self.around(), method, numerics, plan)?;
+        let coupling = compressed_all(&self.problem(&own), method, &self.subject.water.plan)?;
         let made = coupling.reduced_bodies().iter();
         let gaps: Vec<f64> = made.map(|b| b.parts().fit.resolved_gap).collect();
-        let responses: Vec<Arc<dyn Response>> = responses(bodies, method, numerics, &gaps)?;
+        let responses = responses(&self.problem(bodies), method, &gaps)?;
         coupling.correction(&self.poses, &self.turn, &responses)
     }
 
@@ -219,10 +216,7 @@ impl<'a> Case<'a> {
     /// order takes them for: the root of what the gap lacks.
     fn narrowness(&self) -> f64 {
         let resolved = &self.subject.water.resolved;
-        let lacks = |gap: Gap| match gap.second {
-            Other::Body(b) => resolved[gap.first].max(resolved[b]) / gap.distance,
-            Other::Wall(_) => resolved[gap.first] / (2.0 * gap.distance),
-        };
+        let lacks = |gap: Gap| gap.largest(resolved) / gap.image_distance();
         let clearance = &self.subject.water.clearance;
         let gaps = [&clearance.moving, &clearance.rigid].into_iter();
         let all = gaps.flat_map(|g| g.all(self.subject.poses));
@@ -242,11 +236,6 @@ impl<'a> Case<'a> {
 
     fn left_out(&self) -> Result<DMatrix<f64>> {
         let scene = self.scene();
-        let panel = Meshing {
-            faces: None,
-            by_formula: false,
-            pairs: false,
-        };
         let mut surfaces = Vec::with_capacity(scene.bodies.len());
         for (body, own) in scene.bodies.iter().zip(&self.surfaces) {
             let few = |s: &Surface| s.mesh.faces().len() <= COUPLING_FACES;
@@ -257,22 +246,16 @@ impl<'a> Case<'a> {
                 }
                 (own, _) => {
                     // Refined regions keep their share of the faces.
-                    let fewer = own
-                        .as_ref()
-                        .map_or(1.0, |s| COUPLING_FACES as f64 / s.mesh.faces().len() as f64);
-                    let base = own.as_ref().map_or(COUPLING_FACES, |s| {
-                        (s.base as f64 * fewer).round().max(1.0) as usize
+                    let (fewer, base) = own.as_ref().map_or((1.0, COUPLING_FACES), |s| {
+                        let fewer = COUPLING_FACES as f64 / s.mesh.faces().len() as f64;
+                        (fewer, (s.base as f64 * fewer).round().max(1.0) as usize)
                     });
-                    let edges = 1.0 / fewer.sqrt();
-                    surface(
-                        body,
-                        Meshing {
-                            faces: Some(base),
-                            ..panel
-                        },
-                        edges,
-                    )?
-                    .map(|s| s.mesh)
+                    let meshing = Meshing {
+                        faces: Some(base),
+                        by_formula: false,
+                        pairs: false,
+                    };
+                    surface(body, meshing, 1.0 / fewer.sqrt())?.map(|s| s.mesh)
                 }
             };
             surfaces.push(mesh.map(Surface::of_mesh));
@@ -290,16 +273,11 @@ impl<'a> Case<'a> {
         } else {
             Fidelity::Full
         };
-        let around = Around::new(scene, &numbers, None);
+        let numerics = Numerics::default();
+        let problem = Problem::new(scene, &numbers, &submerged, &numerics, None);
         let solve = |fidelity: Fidelity| -> Result<DMatrix<f64>> {
-            let made = fidelity.kind().couple(
-                &submerged,
-                &around,
-                Method::Panel.kind(),
-                &Default::default(),
-                &Default::default(),
-                &mut Device::default(),
-            )?;
+            let (kind, method, plan) = (fidelity.kind(), Method::Panel.kind(), Plan::default());
+            let made = kind.couple(&problem, method, &plan, &mut Device::default())?;
             Ok(evaluate(made.coupling.as_ref(), &poses, &turn)?.0)
         };
         let difference = solve(fidelity)? - solve(Fidelity::Isolated)?;

@@ -12,11 +12,11 @@ use super::reduced::Reduced;
 use crate::adjoint::lie::Vec3;
 use crate::boundary::exact::lamb;
 use crate::coupling::reduced::{Cutoff, compress};
-use crate::geometry::{Gap, MassProperties, Other, WallSurface};
+use crate::geometry::{Gap, MassProperties, WallSurface};
 use crate::water::device::Device;
 use crate::water::method::kind::BodyMethod;
 use crate::water::numerics::Numerics;
-use crate::water::submerged::{Around, Made, SubmergedBody};
+use crate::water::submerged::{Made, Problem};
 use crate::{Error, Result};
 use std::f64::consts::PI;
 
@@ -43,10 +43,6 @@ const REFUSED: f64 = 0.1;
 pub(super) struct Auto;
 
 impl FidelityKind for Auto {
-    fn name(&self) -> &'static str {
-        "auto"
-    }
-
     fn knobs(&self) -> &'static [Knob] {
         &[Knob::Accuracy]
     }
@@ -70,14 +66,12 @@ impl FidelityKind for Auto {
     // A fidelity that chooses is in use itself only without water.
     fn couple(
         &self,
-        bodies: &[SubmergedBody],
-        around: &Around,
+        problem: &Problem,
         method: &'static dyn BodyMethod,
-        numerics: &Numerics,
         plan: &Plan,
         device: &mut Device,
     ) -> Result<Made> {
-        Reduced.couple(bodies, around, method, numerics, plan, device)
+        Reduced.couple(problem, method, plan, device)
     }
 
     fn resolved_gap(&self, compressed: f64, edge: f64) -> f64 {
@@ -100,8 +94,7 @@ fn plan(start: &Start, aim: f64) -> Result<Planned> {
         poses,
         gaps,
         walls,
-    } = *start;
-    let gaps = gaps();
+    } = start;
     if !(aim > 0.0 && aim < 1.0) {
         return Err(Error::input(
             "settings: accuracy",
@@ -109,8 +102,7 @@ fn plan(start: &Start, aim: f64) -> Result<Planned> {
             "a number between 0 and 1, such as 0.01",
         ));
     }
-    let mut out = Planned::plain(&Reduced);
-    let mut together = false;
+    let mut out = Planned::default();
     let mut strengths = Vec::with_capacity(bodies.len());
     for (b, body) in bodies.iter().enumerate() {
         let Some(mesh) = body.mesh else {
@@ -125,15 +117,9 @@ fn plan(start: &Start, aim: f64) -> Result<Planned> {
             strength(&properties)?,
             poses[b].apply(&mesh.bounding_ball().center),
         ));
-        let near = |g: &&Gap| g.first == b || g.second == Other::Body(b);
-        let seen = |g: &Gap| match g.second {
-            Other::Body(_) => g.distance,
-            Other::Wall(_) => 2.0 * g.distance,
-        };
-        let (smallest, edge) = gaps
-            .iter()
-            .filter(near)
-            .map(|g| (seen(g), g.edge))
+        let near = gaps.iter().filter(|g| g.touches(b));
+        let (smallest, edge) = near
+            .map(|g| (g.image_distance(), g.edge))
             .min_by(|a, b| a.0.total_cmp(&b.0))
             .unwrap_or((f64::INFINITY, 0.0));
         let finest = compress::finest_gap(mesh.surface_area());
@@ -141,7 +127,7 @@ fn plan(start: &Start, aim: f64) -> Result<Planned> {
         if smallest < HOPELESS * finest && rigid {
             let full = smallest > EDGES * edge || smallest < REFUSED * finest;
             let so = if full {
-                together = true;
+                out.together = true;
                 "all bodies are solved together (full)"
             } else {
                 "neither does full with such edges; use more faces and full for accurate forces there"
@@ -160,8 +146,8 @@ fn plan(start: &Start, aim: f64) -> Result<Planned> {
             resolved_gap: Some(gap),
         });
     }
-    if together {
-        (out.fidelity, out.plan) = (&Full, Plan::default());
+    if out.together {
+        out.plan = Plan::default();
         return Ok(out);
     }
     for (b, body) in bodies.iter().enumerate() {

@@ -1,12 +1,11 @@
 //! All bodies solved together, at the resolution of their meshes.
 
-use super::kind::{ErrorParts, FidelityKind, Knob, Plan, Planned, Start};
+use super::kind::{ErrorParts, FidelityKind, Knob, Plan};
 use crate::Result;
 use crate::geometry::Gap;
 use crate::water::device::Device;
 use crate::water::method::kind::BodyMethod;
-use crate::water::numerics::Numerics;
-use crate::water::submerged::{Around, Made, SubmergedBody};
+use crate::water::submerged::{Made, Problem};
 
 /// Gaps narrower than this many edges aren't resolved. A sphere near a wall: at 0.3 edges the gap
 /// adds 1 % to the error of its added mass with 320 faces (0.1 % with 5120), and the force along
@@ -20,10 +19,6 @@ const RESIDUAL: f64 = 0.25;
 pub(super) struct Full;
 
 impl FidelityKind for Full {
-    fn name(&self) -> &'static str {
-        "full"
-    }
-
     fn knobs(&self) -> &'static [Knob] {
         &[Knob::Tolerance]
     }
@@ -32,20 +27,14 @@ impl FidelityKind for Full {
         false
     }
 
-    fn plan(&self, _: &Start, _: &Numerics) -> Result<Planned> {
-        Ok(Planned::plain(&Full))
-    }
-
     fn couple(
         &self,
-        bodies: &[SubmergedBody],
-        around: &Around,
+        problem: &Problem,
         method: &'static dyn BodyMethod,
-        numerics: &Numerics,
         _: &Plan,
         device: &mut Device,
     ) -> Result<Made> {
-        method.couple(bodies, around, numerics, device)
+        method.couple(problem, device)
     }
 
     fn idle_gpu(&self, method: &dyn BodyMethod) -> Result<Option<&'static str>> {

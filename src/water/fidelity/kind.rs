@@ -7,7 +7,7 @@ use crate::geometry::{Gap, Wall};
 use crate::water::device::Device;
 use crate::water::method::kind::BodyMethod;
 use crate::water::numerics::Numerics;
-use crate::water::submerged::{Around, Made, SubmergedBody};
+use crate::water::submerged::{Made, Problem, SubmergedBody};
 
 /// Choices that only some fidelities look at.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -31,22 +31,13 @@ pub(crate) struct Plan {
     pub cutoffs: Vec<((usize, usize), Cutoff)>,
 }
 
-/// The fidelity to use, what each body and pair gets, and why.
+/// What a fidelity chooses for a scene, and why.
+#[derive(Default)]
 pub(crate) struct Planned {
-    pub fidelity: &'static dyn FidelityKind,
+    /// Whether all bodies are solved together (`full`), or each is compressed (`reduced`).
+    pub together: bool,
     pub plan: Plan,
     pub reasons: Vec<String>,
-}
-
-impl Planned {
-    /// A fidelity with what the settings say.
-    pub fn plain(fidelity: &'static dyn FidelityKind) -> Self {
-        Self {
-            fidelity,
-            plan: Plan::default(),
-            reasons: Vec::new(),
-        }
-    }
 }
 
 /// The bodies in the water at the start.
@@ -54,7 +45,7 @@ pub(crate) struct Start<'a> {
     pub bodies: &'a [SubmergedBody<'a>],
     pub poses: &'a [Pose],
     /// Gaps between them and to the walls, by their numbers among `bodies`.
-    pub gaps: &'a dyn Fn() -> Vec<Gap>,
+    pub gaps: Vec<Gap>,
     pub walls: &'a [Wall],
 }
 
@@ -68,9 +59,6 @@ pub(crate) struct ErrorParts {
 
 /// A model of how the bodies feel each other.
 pub(crate) trait FidelityKind: Send + Sync {
-    /// Its name.
-    fn name(&self) -> &'static str;
-
     /// The choices that it alone, or with others, looks at.
     fn knobs(&self) -> &'static [Knob];
 
@@ -84,7 +72,7 @@ pub(crate) trait FidelityKind: Send + Sync {
         true
     }
 
-    /// Whether it chooses another for a scene.
+    /// Whether it chooses `full` or `reduced` for a scene.
     fn chooses(&self) -> bool {
         false
     }
@@ -99,22 +87,22 @@ pub(crate) trait FidelityKind: Send + Sync {
         false
     }
 
-    /// What is used for a scene: itself, unless it chooses.
+    /// What it chooses for a scene, if it does.
     ///
     /// # Errors
     /// An accuracy out of range, or bodies that no choice is known for.
-    fn plan(&self, start: &Start, numerics: &Numerics) -> Result<Planned>;
+    fn plan(&self, _: &Start, _: &Numerics) -> Result<Planned> {
+        Ok(Planned::default())
+    }
 
-    /// The coupling of `bodies`.
+    /// The coupling of the bodies.
     ///
     /// # Errors
     /// Bodies without a shape where one is needed, or whatever the discretisation reports.
     fn couple(
         &self,
-        bodies: &[SubmergedBody],
-        around: &Around,
+        problem: &Problem,
         method: &'static dyn BodyMethod,
-        numerics: &Numerics,
         plan: &Plan,
         device: &mut Device,
     ) -> Result<Made>;

@@ -9,7 +9,6 @@ pub(super) mod kind;
 mod reduced;
 
 use super::list::listed;
-use super::numerics::Numerics;
 use kind::FidelityKind;
 
 pub use kind::Knob;
@@ -36,46 +35,8 @@ impl Fidelity {
         self.kind().coupled()
     }
 
-    /// Whether each body is solved alone, by its own method, before it is coupled.
-    pub(crate) fn solves_alone(self) -> bool {
-        self.kind().solves_alone()
-    }
-
-    /// Whether it chooses another for a scene.
-    pub(crate) fn chooses(self) -> bool {
-        self.kind().chooses()
-    }
-
-    /// The error that it aims at by itself, if it does.
-    pub(crate) fn own_accuracy(self) -> Option<f64> {
-        self.kind().aim(&Numerics::default())
-    }
-
-    /// Whether bodies are compressed: gaps then count against what they resolve.
-    pub(crate) fn compresses(self) -> bool {
-        self.kind().compresses()
-    }
-
-    /// The gap that it resolves where compressed bodies resolve `compressed` and the mesh has edges of `edge`, m.
-    pub(crate) fn resolved_gap(self, compressed: f64, edge: f64) -> f64 {
-        self.kind().resolved_gap(compressed, edge)
-    }
-
     /// The choices that it looks at, of those that not all do.
     pub fn knobs(self) -> &'static [Knob] {
         self.kind().knobs()
-    }
-}
-
-#[cfg(test)]
-mod tests {
-    use super::Fidelity;
-    use strum::VariantArray;
-
-    #[test]
-    fn names_are_those_of_the_list() {
-        for fidelity in Fidelity::VARIANTS {
-            assert_eq!(fidelity.kind().name(), fidelity.to_string());
-        }
     }
 }

@@ -1,14 +1,14 @@
 //! All bodies coupled, each compressed to a few sources.
 
-use super::kind::{ErrorParts, FidelityKind, Knob, Plan, Planned, Start};
+use super::kind::{ErrorParts, FidelityKind, Knob, Plan};
 use crate::adjoint::lie::Pose;
 use crate::boundary::Response;
 use crate::coupling::reduced::{self, ReducedBody, cache, compress};
 use crate::geometry::{Gap, TriMesh};
 use crate::water::device::Device;
-use crate::water::method::kind::BodyMethod;
+use crate::water::method::kind::{BodyMethod, for_body};
 use crate::water::numerics::Numerics;
-use crate::water::submerged::{Around, Discretisation, Made, SubmergedBody};
+use crate::water::submerged::{Discretisation, Made, Problem, SubmergedBody};
 use crate::water::surface::Coarse;
 use crate::{Error, Result};
 use std::path::Path;
@@ -18,10 +18,6 @@ use std::sync::Arc;
 pub(super) struct Reduced;
 
 impl FidelityKind for Reduced {
-    fn name(&self) -> &'static str {
-        "reduced"
-    }
-
     fn knobs(&self) -> &'static [Knob] {
         &[Knob::Rank, Knob::ResolvedGap, Knob::Accuracy]
     }
@@ -34,49 +30,34 @@ impl FidelityKind for Reduced {
         true
     }
 
-    fn plan(&self, _: &Start, _: &Numerics) -> Result<Planned> {
-        Ok(Planned::plain(&Reduced))
-    }
-
     fn couple(
         &self,
-        bodies: &[SubmergedBody],
-        around: &Around,
+        problem: &Problem,
         method: &'static dyn BodyMethod,
-        numerics: &Numerics,
         plan: &Plan,
         device: &mut Device,
     ) -> Result<Made> {
-        let coupling = compressed_all(bodies, around, method, numerics, plan)?;
-        let made = coupling.reduced_bodies();
-        let label = |body: &SubmergedBody| Ok(method.for_body(body)?.label());
-        let labels = bodies.iter().map(label).collect::<Result<Vec<_>>>()?;
+        let coupling = compressed_all(problem, method, plan)?;
+        let (bodies, made) = (problem.bodies, coupling.reduced_bodies());
+        let mut as_made = Vec::with_capacity(made.len());
+        for (m, body) in made.iter().zip(bodies) {
+            let fit = &m.parts().fit;
+            as_made.push(Discretisation {
+                method: for_body(method, body)?.label(),
+                faces: body.mesh.map_or(0, |m| m.faces().len()),
+                unknowns: m.modes(),
+                points: m.points(),
+                resolved_gap: Some(fit.resolved_gap),
+                asymmetry: fit.body_asymmetry,
+                added_mass_error: fit.body_error,
+                radiated_error: fit.radiated,
+                scattered_error: fit.scattered,
+                ..Discretisation::default()
+            });
+        }
         Ok(Made {
-            faces: bodies
-                .iter()
-                .filter_map(|b| Some(b.mesh?.faces().len()))
-                .sum(),
-            warnings: warnings(bodies, made, numerics, plan),
-            bodies: made
-                .iter()
-                .zip(bodies)
-                .zip(&labels)
-                .map(|((m, body), method)| {
-                    let fit = &m.parts().fit;
-                    Discretisation {
-                        body: body.name.to_string(),
-                        method,
-                        faces: body.mesh.map_or(0, |m| m.faces().len()),
-                        unknowns: m.modes(),
-                        points: m.points(),
-                        resolved_gap: Some(fit.resolved_gap),
-                        asymmetry: fit.body_asymmetry,
-                        added_mass_error: fit.body_error,
-                        radiated_error: fit.radiated,
-                        scattered_error: fit.scattered,
-                    }
-                })
-                .collect(),
+            warnings: warnings(problem, made, plan),
+            bodies: problem.named(as_made),
             coupling: device.reduced(coupling)?,
         })
     }
@@ -97,17 +78,16 @@ impl FidelityKind for Reduced {
 
 /// All bodies compressed and coupled.
 pub(in crate::water) fn compressed_all(
-    bodies: &[SubmergedBody],
-    around: &Around,
+    problem: &Problem,
     method: &'static dyn BodyMethod,
-    numerics: &Numerics,
     plan: &Plan,
 ) -> Result<reduced::Reduced> {
+    let bodies = problem.bodies;
     let mut made: Vec<Arc<ReducedBody>> = Vec::with_capacity(bodies.len());
     for (b, body) in bodies.iter().enumerate() {
-        let method = method.for_body(body)?;
-        let chosen = plan.compress.get(b).copied().unwrap_or(numerics.compress);
-        made.push(compressed(body, method, numerics, &chosen, around.folder)?);
+        let (method, numerics) = (for_body(method, body)?, problem.numerics);
+        let chosen = plan.compress.get(b).unwrap_or(&numerics.compress);
+        made.push(compressed(body, method, numerics, chosen, problem.folder)?);
     }
     let cutoff = |a: usize, b: usize| {
         let pair = (a.min(b), a.max(b));
@@ -115,28 +95,25 @@ pub(in crate::water) fn compressed_all(
         found.map(|(_, cutoff)| *cutoff)
     };
     let names = bodies.iter().map(|b| b.name.to_string());
-    Ok(reduced::Reduced::new(made, around.walls, cutoff)?
-        .excluding(&around.excluded)?
+    Ok(reduced::Reduced::new(made, problem.walls, cutoff)?
+        .excluding(&problem.excluded)?
         .named(names))
 }
 
 /// What each body answers by its own method; bodies that are equal share one. Sources as near as
 /// `gaps` (m, one a body) are resolved where the method has to know.
 pub(in crate::water) fn responses(
-    bodies: &[SubmergedBody],
+    problem: &Problem,
     method: &'static dyn BodyMethod,
-    numerics: &Numerics,
     gaps: &[f64],
 ) -> Result<Vec<Arc<dyn Response>>> {
+    let bodies = problem.bodies;
     let mut out: Vec<Arc<dyn Response>> = Vec::with_capacity(bodies.len());
     for (b, body) in bodies.iter().enumerate() {
         let same = |a: &usize| bodies[*a].equal(body) && gaps[*a] == gaps[b];
         out.push(match (0..b).find(same) {
             Some(a) => out[a].clone(),
-            None => {
-                let method = method.for_body(body)?;
-                Arc::from(method.response(body, numerics, gaps[b])?)
-            }
+            None => Arc::from(for_body(method, body)?.response(body, problem.numerics, gaps[b])?),
         });
     }
     Ok(out)
@@ -147,31 +124,17 @@ pub(in crate::water) fn responses(
 const MISSED: f64 = 0.6;
 
 /// What the user should know of compressed bodies.
-fn warnings(
-    bodies: &[SubmergedBody],
-    made: &[Arc<ReducedBody>],
-    numerics: &Numerics,
-    plan: &Plan,
-) -> Vec<String> {
-    let mut out = Vec::new();
+fn warnings(problem: &Problem, made: &[Arc<ReducedBody>], plan: &Plan) -> Vec<String> {
+    let (bodies, mut out) = (problem.bodies, Vec::new());
     for (b, (body, made)) in bodies.iter().zip(made).enumerate() {
         if bodies[..b].iter().any(|a| a.equal(body)) {
             continue;
         }
         let parts = made.parts();
         let size = parts.radius;
-        out.extend(
-            parts
-                .fit
-                .warnings
-                .iter()
-                .map(|w| format!("{w} (lengths of this message in units of {size:.3e} m)")),
-        );
-        let asked = plan
-            .compress
-            .get(b)
-            .unwrap_or(&numerics.compress)
-            .resolved_gap;
+        let said = parts.fit.warnings.iter();
+        out.extend(said.map(|w| format!("{w} (lengths of this message in units of {size:.3e} m)")));
+        let asked = plan.compress.get(b).unwrap_or(&problem.numerics.compress);
         let got = parts.fit.resolved_gap;
         let missed = parts.fit.scattered.max(parts.fit.radiated);
         if missed > MISSED {
@@ -183,7 +146,7 @@ fn warnings(
                 100.0 * missed
             ));
         }
-        if let Some(asked) = asked.filter(|a| *a < 0.98 * got) {
+        if let Some(asked) = asked.resolved_gap.filter(|a| *a < 0.98 * got) {
             out.push(format!(
                 "body {:?}: gaps under {got:.3e} m aren't resolved by its compressed sources, for all \
                  that {asked:.3e} m were asked for: its surface is too large; use a plane wall for a \

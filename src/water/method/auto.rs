@@ -9,7 +9,7 @@ use crate::boundary::{Method, Response};
 use crate::geometry::TriMesh;
 use crate::water::device::Device;
 use crate::water::numerics::Numerics;
-use crate::water::submerged::{Around, Made, SubmergedBody};
+use crate::water::submerged::{Made, Problem, SubmergedBody};
 use std::borrow::Cow;
 
 /// Closed forms where there is one, else panels; vertex sources where all bodies are solved together.
@@ -29,8 +29,8 @@ impl BodyMethod for Auto {
         "auto"
     }
 
-    fn for_body(&self, body: &SubmergedBody) -> Result<&'static dyn BodyMethod> {
-        Ok(self.of(body))
+    fn leaves_to(&self, body: &SubmergedBody) -> Result<Option<&'static dyn BodyMethod>> {
+        Ok(Some(self.of(body)))
     }
 
     fn by_formula(&self) -> bool {
@@ -62,13 +62,7 @@ impl BodyMethod for Auto {
         self.of(body).response(body, numerics, gap)
     }
 
-    fn couple(
-        &self,
-        bodies: &[SubmergedBody],
-        around: &Around,
-        numerics: &Numerics,
-        device: &mut Device,
-    ) -> Result<Made> {
-        Mfs(Method::MfsVertex).couple(bodies, around, numerics, device)
+    fn couple(&self, problem: &Problem, device: &mut Device) -> Result<Made> {
+        Mfs(Method::MfsVertex).couple(problem, device)
     }
 }

@@ -7,7 +7,7 @@ use crate::scene::Shape;
 use crate::shape;
 use crate::water::device::Device;
 use crate::water::numerics::Numerics;
-use crate::water::submerged::{Around, Made, SubmergedBody};
+use crate::water::submerged::{Made, Problem, SubmergedBody};
 use crate::{Error, Result};
 use std::borrow::Cow;
 use std::path::Path;
@@ -32,11 +32,9 @@ impl BodyMethod for Exact {
         "exact"
     }
 
-    fn for_body(&self, body: &SubmergedBody) -> Result<&'static dyn BodyMethod> {
-        match body.ellipsoid {
-            Some(_) => Ok(&Exact),
-            None => Err(no_formula(body)),
-        }
+    fn leaves_to(&self, body: &SubmergedBody) -> Result<Option<&'static dyn BodyMethod>> {
+        let known = body.ellipsoid.is_some();
+        known.then_some(None).ok_or_else(|| no_formula(body))
     }
 
     fn by_formula(&self) -> bool {
@@ -63,13 +61,7 @@ impl BodyMethod for Exact {
         Ok(Box::new(ExactBoundary::new(body.name, *axes, pose, gap)?))
     }
 
-    fn couple(
-        &self,
-        _: &[SubmergedBody],
-        _: &Around,
-        _: &Numerics,
-        _: &mut Device,
-    ) -> Result<Made> {
+    fn couple(&self, _: &Problem, _: &mut Device) -> Result<Made> {
         Err(Error::Unsupported {
             what: "the method exact with the fidelity full".into(),
             why: "closed forms are of single bodies".into(),

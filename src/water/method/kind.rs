@@ -5,7 +5,7 @@ use crate::boundary::Response;
 use crate::geometry::TriMesh;
 use crate::water::device::Device;
 use crate::water::numerics::Numerics;
-use crate::water::submerged::{Around, Made, SubmergedBody};
+use crate::water::submerged::{Made, Problem, SubmergedBody};
 use std::borrow::Cow;
 
 /// A way to solve one body in unbounded fluid, and, where it has one, its coupled system of all bodies.
@@ -13,11 +13,13 @@ pub(crate) trait BodyMethod: Send + Sync {
     /// Its name in reports of single bodies.
     fn label(&self) -> &'static str;
 
-    /// The method for this body: itself, or another that it leaves the body to.
+    /// Another method that it leaves this body to.
     ///
     /// # Errors
     /// A body that it can't solve.
-    fn for_body(&self, body: &SubmergedBody) -> Result<&'static dyn BodyMethod>;
+    fn leaves_to(&self, _: &SubmergedBody) -> Result<Option<&'static dyn BodyMethod>> {
+        Ok(None)
+    }
 
     /// Whether it solves ellipsoids by formula, whatever their mesh.
     fn by_formula(&self) -> bool {
@@ -55,13 +57,7 @@ pub(crate) trait BodyMethod: Send + Sync {
     ///
     /// # Errors
     /// A method that solves single bodies only, or whatever the discretisation reports.
-    fn couple(
-        &self,
-        bodies: &[SubmergedBody],
-        around: &Around,
-        numerics: &Numerics,
-        device: &mut Device,
-    ) -> Result<Made>;
+    fn couple(&self, problem: &Problem, device: &mut Device) -> Result<Made>;
 
     /// Whether motion can be computed with all bodies solved together.
     fn steps_together(&self) -> bool {
@@ -75,4 +71,15 @@ pub(crate) trait BodyMethod: Send + Sync {
     fn check_gpu(&self) -> Result<()> {
         Ok(())
     }
+}
+
+/// The method for a body where `method` is asked for: itself, or the one that it leaves the body to.
+///
+/// # Errors
+/// A body that it can't solve.
+pub(crate) fn for_body(
+    method: &'static dyn BodyMethod,
+    body: &SubmergedBody,
+) -> Result<&'static dyn BodyMethod> {
+    Ok(method.leaves_to(body)?.unwrap_or(method))
 }

@@ -6,7 +6,7 @@ use crate::boundary::{self, BodyBoundary, Response};
 use crate::coupling::full::{FullSolver, MfsBody, Model};
 use crate::water::device::Device;
 use crate::water::numerics::Numerics;
-use crate::water::submerged::{Around, Discretisation, Made, SubmergedBody, once, shared};
+use crate::water::submerged::{Discretisation, Made, Problem, SubmergedBody, once, shared};
 use std::sync::Arc;
 
 /// Sources under vertices or faces.
@@ -24,13 +24,6 @@ impl Mfs {
 impl BodyMethod for Mfs {
     fn label(&self) -> &'static str {
         "mfs"
-    }
-
-    fn for_body(&self, _: &SubmergedBody) -> Result<&'static dyn BodyMethod> {
-        Ok(match self.0 {
-            boundary::Method::MfsVertex => &Mfs(boundary::Method::MfsVertex),
-            boundary::Method::MfsFace => &Mfs(boundary::Method::MfsFace),
-        })
     }
 
     fn steps_together(&self) -> bool {
@@ -53,19 +46,14 @@ impl BodyMethod for Mfs {
         Ok(Box::new(made))
     }
 
-    fn couple(
-        &self,
-        bodies: &[SubmergedBody],
-        around: &Around,
-        numerics: &Numerics,
-        device: &mut Device,
-    ) -> Result<Made> {
-        let mut settings = self.settings(numerics);
-        if numerics.solve.solver == FullSolver::Gmres {
+    fn couple(&self, problem: &Problem, device: &mut Device) -> Result<Made> {
+        let mut settings = self.settings(problem.numerics);
+        if problem.numerics.solve.solver == FullSolver::Gmres {
             // GMRES solves the square system as it is; damping belongs to least squares.
             settings.damping = 0.0;
         }
-        let made = shared(bodies, |body, mesh| {
+        let made = shared(problem.bodies, |body| {
+            let mesh = body.surface("full")?;
             let make = if device.factors(mesh.faces().len()) {
                 BodyBoundary::new
             } else {
@@ -75,25 +63,19 @@ impl BodyMethod for Mfs {
             Ok(MfsBody::new(Arc::new(boundary)))
         })?;
         Ok(Made {
-            faces: made.iter().map(|m| m.faces()).sum(),
             warnings: once(&made, |m| &m.boundary.warnings),
-            bodies: made
-                .iter()
-                .zip(bodies)
-                .map(|(m, body)| Discretisation {
-                    body: body.name.to_string(),
-                    method: self.label(),
-                    faces: m.faces(),
-                    unknowns: m.sources(),
-                    asymmetry: m.boundary.asymmetry,
-                    ..Discretisation::default()
-                })
-                .collect(),
+            bodies: problem.named(made.iter().map(|m| Discretisation {
+                method: self.label(),
+                faces: m.faces(),
+                unknowns: m.sources(),
+                asymmetry: m.boundary.asymmetry,
+                ..Discretisation::default()
+            })),
             coupling: Box::new(device.full(Model::new(
                 made,
-                around.walls,
-                around.excluded.clone(),
-                numerics.solve,
+                problem.walls,
+                problem.excluded.clone(),
+                problem.numerics.solve,
             )?)?),
         })
     }

@@ -31,16 +31,6 @@ listed! {
 }
 
 impl Method {
-    /// Whether it solves ellipsoids by formula.
-    pub(crate) fn by_formula(self) -> bool {
-        self.kind().by_formula()
-    }
-
-    /// Whether motion can be computed with all bodies solved together by it.
-    pub(crate) fn steps_together(self) -> bool {
-        self.kind().steps_together()
-    }
-
     /// The method by which all bodies are solved together (fidelity `full`) where this one is asked for.
     pub fn together(self) -> Self {
         match self {

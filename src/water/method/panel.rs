@@ -7,7 +7,7 @@ use crate::coupling::full::FullSolver;
 use crate::coupling::panel::{self, PanelCoupled};
 use crate::water::device::Device;
 use crate::water::numerics::Numerics;
-use crate::water::submerged::{Around, Discretisation, Made, SubmergedBody, once, shared};
+use crate::water::submerged::{Discretisation, Made, Problem, SubmergedBody, once, shared};
 use crate::water::surface::Coarse;
 use crate::{Error, Result};
 
@@ -17,10 +17,6 @@ pub(super) struct Panel;
 impl BodyMethod for Panel {
     fn label(&self) -> &'static str {
         "panel"
-    }
-
-    fn for_body(&self, _: &SubmergedBody) -> Result<&'static dyn BodyMethod> {
-        Ok(&Panel)
     }
 
     fn extrapolates(&self) -> bool {
@@ -48,39 +44,31 @@ impl BodyMethod for Panel {
         })
     }
 
-    fn couple(
-        &self,
-        bodies: &[SubmergedBody],
-        around: &Around,
-        numerics: &Numerics,
-        _: &mut Device,
-    ) -> Result<Made> {
-        let made = shared(bodies, |body, mesh| PanelBoundary::new(body.name, mesh))?;
+    fn couple(&self, problem: &Problem, _: &mut Device) -> Result<Made> {
+        let made = shared(problem.bodies, |body| {
+            PanelBoundary::new(body.name, body.surface("full")?)
+        })?;
+        let asked = &problem.numerics.solve;
         let solve = panel::SolveSettings {
-            solver: match numerics.solve.solver {
+            solver: match asked.solver {
                 FullSolver::Qr => panel::PanelSolver::Lu,
                 FullSolver::Cgls | FullSolver::Gmres => panel::PanelSolver::Gmres,
             },
-            tolerance: numerics.solve.tolerance,
+            tolerance: asked.tolerance,
             ..panel::SolveSettings::default()
         };
         Ok(Made {
-            faces: made.iter().map(|m| m.faces.len()).sum(),
             warnings: once(&made, |m| &m.warnings),
-            bodies: made
-                .iter()
-                .zip(bodies)
-                .map(|(m, body)| Discretisation {
-                    body: body.name.to_string(),
-                    method: self.label(),
-                    faces: m.faces.len(),
-                    unknowns: m.faces.len(),
-                    asymmetry: m.asymmetry,
-                    ..Discretisation::default()
-                })
-                .collect(),
+            bodies: problem.named(made.iter().map(|m| Discretisation {
+                method: self.label(),
+                faces: m.faces.len(),
+                unknowns: m.faces.len(),
+                asymmetry: m.asymmetry,
+                ..Discretisation::default()
+            })),
             coupling: Box::new(
-                PanelCoupled::new(made, around.walls, solve)?.excluding(around.excluded.clone())?,
+                PanelCoupled::new(made, problem.walls, solve)?
+                    .excluding(problem.excluded.clone())?,
             ),
         })
     }

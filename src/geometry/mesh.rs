@@ -193,16 +193,22 @@ impl TriMesh {
     /// [`Error::Input`] unless `factor` is finite and positive; [`Error::Mesh`] if the result
     /// leaves the range of double precision and so fails the check.
     pub fn scaled(&self, factor: f64) -> Result<Self> {
-        if !(factor.is_finite() && factor > 0.0) {
-            return Err(Error::input(
-                format!("mesh {}: scale", self.name),
-                factor,
-                "give a finite, positive factor (0.001 for a file in millimetres)",
-            ));
-        }
+        check_scale(&format!("mesh {}", self.name), factor)?;
         let vertices = self.vertices.iter().map(|x| x * factor).collect();
         Self::new(self.name.clone(), vertices, self.faces.clone())
     }
+}
+
+/// Refuses a factor that lengths can't be multiplied by. `place` begins the message.
+pub(crate) fn check_scale(place: &str, factor: f64) -> Result<()> {
+    if factor.is_finite() && factor > 0.0 {
+        return Ok(());
+    }
+    Err(Error::input(
+        format!("{place}: scale"),
+        factor,
+        "give a finite, positive factor (0.001 for a file in millimetres)",
+    ))
 }
 
 #[cfg(test)]

@@ -42,6 +42,7 @@ pub use gap::{Distance, Gap, Gaps, Other, Share, overlap_error};
 pub use image::Image;
 pub(crate) use interior::Interior;
 pub use mass::MassProperties;
+pub(crate) use mesh::check_scale;
 pub use mesh::{Edge, TriMesh};
 pub(crate) use points::bounds;
 pub use refine::{ExactSurface, MAX_ADDED_FACES, Refinement, refine, validate_refinements};

@@ -4,7 +4,7 @@ use super::mesh::TriMesh;
 use super::points::area_vector;
 use crate::error::Result;
 use hydrograd_adjoint::lie::{Mat3, Vec3};
-use std::cmp::Ordering;
+use std::cmp::Reverse;
 use std::collections::{BinaryHeap, HashMap};
 
 /// Distance along the surface counts as this part of the distance from it: on flat ground edges come
@@ -52,7 +52,7 @@ impl TriMesh {
 }
 
 /// Weighted sum of squared distances from planes, `xᵀ a x + 2 b·x + c`.
-#[derive(Clone, Copy)]
+#[derive(Clone, Copy, Default)]
 struct Quadric {
     a: Mat3,
     b: Vec3,
@@ -61,15 +61,6 @@ struct Quadric {
 }
 
 impl Quadric {
-    fn zero() -> Self {
-        Self {
-            a: Mat3::zeros(),
-            b: Vec3::zeros(),
-            c: 0.0,
-            weight: 0.0,
-        }
-    }
-
     fn plane(corners: &[Vec3; 3]) -> Self {
         let area = area_vector(corners);
         let weight = area.norm();
@@ -104,36 +95,9 @@ impl Quadric {
     }
 }
 
-/// An edge that may be collapsed.
-struct Candidate {
-    cost: f64,
-    ends: [usize; 2],
-    /// How often its ends had moved.
-    moved: [u32; 2],
-    place: Vec3,
-}
-
-impl Ord for Candidate {
-    /// The cheapest is the greatest; ties by number.
-    fn cmp(&self, other: &Self) -> Ordering {
-        let cost = other.cost.total_cmp(&self.cost);
-        cost.then_with(|| other.ends.cmp(&self.ends))
-    }
-}
-
-impl PartialOrd for Candidate {
-    fn partial_cmp(&self, other: &Self) -> Option<Ordering> {
-        Some(self.cmp(other))
-    }
-}
-
-impl PartialEq for Candidate {
-    fn eq(&self, other: &Self) -> bool {
-        self.cmp(other) == Ordering::Equal
-    }
-}
-
-impl Eq for Candidate {}
+/// An edge that may be collapsed: the cost (bits of positive numbers sort as the numbers do), its ends, the
+/// smaller number first, and how often these had moved. The cheapest is the greatest.
+type Candidate = Reverse<(u64, [usize; 2], [u32; 2])>;
 
 /// A surface that loses faces.
 struct Collapse {
@@ -158,7 +122,7 @@ impl Collapse {
             .map(|v| (v - middle) / size)
             .collect();
         let mut around = vec![Vec::new(); vertices.len()];
-        let mut quadrics = vec![Quadric::zero(); vertices.len()];
+        let mut quadrics = vec![Quadric::default(); vertices.len()];
         for (f, face) in mesh.faces().iter().enumerate() {
             let plane = Quadric::plane(&face.map(|v| vertices[v]));
             for v in face {
@@ -184,25 +148,31 @@ impl Collapse {
     }
 
     fn consider(&mut self, ends: [usize; 2]) {
-        let [a, b] = [ends[0].min(ends[1]), ends[0].max(ends[1])];
+        let ends = [ends[0].min(ends[1]), ends[0].max(ends[1])];
+        let (_, cost) = self.best(ends);
+        let moved = ends.map(|v| self.moved[v]);
+        self.queue.push(Reverse((cost.to_bits(), ends, moved)));
+    }
+
+    /// The place that an edge goes to, and what that costs.
+    fn best(&self, [a, b]: [usize; 2]) -> (Vec3, f64) {
         let mut quadric = self.quadrics[a];
         quadric.add(&self.quadrics[b]);
-        let (place, cost) = quadric.best(&self.vertices[a], &self.vertices[b]);
-        self.queue.push(Candidate {
-            cost,
-            ends: [a, b],
-            moved: [self.moved[a], self.moved[b]],
-            place,
-        });
+        quadric.best(&self.vertices[a], &self.vertices[b])
     }
 
     fn reduce(&mut self, target: usize) {
         while self.left > target.max(4) {
-            let Some(next) = self.queue.pop() else { return };
-            let [a, b] = next.ends;
-            let current = [self.moved[a], self.moved[b]] == next.moved;
-            if current && self.joined(a, b) && self.may_collapse(a, b, &next.place) {
-                self.collapse(a, b, next.place);
+            let Some(Reverse((_, ends, moved))) = self.queue.pop() else {
+                return;
+            };
+            let [a, b] = ends;
+            if ends.map(|v| self.moved[v]) != moved || !self.joined(a, b) {
+                continue;
+            }
+            let (place, _) = self.best(ends);
+            if self.may_collapse(a, b, &place) {
+                self.collapse(a, b, place);
             }
         }
     }

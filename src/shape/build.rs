@@ -1,7 +1,6 @@
 //! Shapes into meshes.
 
-use super::description::Shape;
-use super::limits::DEFAULT_FACES;
+use super::description::{DEFAULT_FACES, Shape};
 use super::primitive::{cuboid, prism, revolved, sphere};
 use super::text::shape_name;
 use super::validate::{check_faces, validate};
@@ -20,29 +19,20 @@ use std::path::Path;
 pub fn build(shape: &Shape, base_dir: &Path, faces_override: Option<usize>) -> Result<TriMesh> {
     let name = shape_name(shape);
     validate(shape, &name)?;
-    let target = |faces: &Option<usize>| faces_override.or(*faces).unwrap_or(DEFAULT_FACES);
+    let target = faces_override.or(shape.asked_faces());
+    let target = target.unwrap_or(DEFAULT_FACES);
     if let Some(faces) = faces_override {
         check_faces(&name, faces)?;
     }
     let (vertices, faces) = match shape {
-        Shape::Sphere { radius, faces } => sphere::ellipsoid([*radius; 3], target(faces)),
-        Shape::Ellipsoid { semi_axes, faces } => sphere::ellipsoid(*semi_axes, target(faces)),
-        Shape::Box { size, faces } => cuboid::cuboid(*size, target(faces)),
-        Shape::Cylinder {
-            radius,
-            length,
-            faces,
-        } => revolved::cylinder(*radius, *length, target(faces)),
-        Shape::Capsule {
-            radius,
-            length,
-            faces,
-        } => revolved::capsule(*radius, *length, target(faces)),
+        Shape::Sphere { radius, .. } => sphere::ellipsoid([*radius; 3], target),
+        Shape::Ellipsoid { semi_axes, .. } => sphere::ellipsoid(*semi_axes, target),
+        Shape::Box { size, .. } => cuboid::cuboid(*size, target),
+        Shape::Cylinder { radius, length, .. } => revolved::cylinder(*radius, *length, target),
+        Shape::Capsule { radius, length, .. } => revolved::capsule(*radius, *length, target),
         Shape::Prism {
-            profile,
-            length,
-            faces,
-        } => prism::prism(profile, *length, target(faces)),
+            profile, length, ..
+        } => prism::prism(profile, *length, target),
         Shape::Mesh { path, scale } => return read(&base_dir.join(path), *scale),
         Shape::Triangles { vertices, faces } => (
             vertices.iter().map(|v| Vec3::from(*v)).collect(),

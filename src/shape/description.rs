@@ -3,6 +3,11 @@
 use serde::{Deserialize, Serialize};
 use std::path::PathBuf;
 
+/// Faces of a shape that doesn't ask for a number: four times refined icosahedron for spheres.
+pub const DEFAULT_FACES: usize = 1280;
+/// Most faces that a shape may ask for.
+pub const MAX_FACES: usize = 4_000_000;
+
 /// A closed surface, by formula or from a file.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize, strum::IntoStaticStr)]
 #[serde(tag = "kind", rename_all = "kebab-case", deny_unknown_fields)]

@@ -7,7 +7,6 @@ mod build;
 mod description;
 #[cfg(feature = "meshio")]
 pub mod file;
-mod limits;
 mod mass;
 mod primitive;
 mod refine;
@@ -19,8 +18,7 @@ pub use crate::geometry::{
     Severity, TriMesh, check_parts, validate_refinements,
 };
 pub use build::build;
-pub use description::Shape;
-pub use limits::{DEFAULT_FACES, MAX_FACES};
+pub use description::{DEFAULT_FACES, MAX_FACES, Shape};
 pub use refine::refine;
 pub use text::{parse_shape, shape_name};
 pub use validate::validate;

@@ -4,31 +4,23 @@ use super::description::Shape;
 use super::validate::validate;
 use crate::error::{Error, Result};
 
-/// Name, how many numbers (zero: see [`counted`]), and how they are written.
-const FORMS: [(&str, usize, &str); 6] = [
-    ("sphere", 1, "sphere:RADIUS"),
-    ("ellipsoid", 3, "ellipsoid:A,B,C (semi-axes)"),
-    ("box", 3, "box:A,B,C (edge lengths)"),
-    ("cylinder", 2, "cylinder:RADIUS,LENGTH"),
+/// Name, how many numbers, and how they are written.
+const FORMS: [(&str, &str, &str); 6] = [
+    ("sphere", "1 number(s)", "sphere:RADIUS"),
+    ("ellipsoid", "3 number(s)", "ellipsoid:A,B,C (semi-axes)"),
+    ("box", "3 number(s)", "box:A,B,C (edge lengths)"),
+    ("cylinder", "2 number(s)", "cylinder:RADIUS,LENGTH"),
     (
         "capsule",
-        2,
+        "2 number(s)",
         "capsule:RADIUS,LENGTH (of the cylindrical part)",
     ),
     (
         "prism",
-        0,
+        "7 or more, an odd number of",
         "prism:LENGTH,Y1,Z1,Y2,Z2,Y3,Z3,… (convex profile, length along x)",
     ),
 ];
-
-/// Whether a form of so many numbers takes `given`; a prism takes its length and three corners or more.
-fn counted(form: usize, given: usize) -> bool {
-    match form {
-        0 => given >= 7 && given % 2 == 1,
-        _ => given == form,
-    }
-}
 
 /// A shape from its short form, lengths in m: `sphere:R`, `ellipsoid:A,B,C` (semi-axes),
 /// `box:A,B,C` (edge lengths), `cylinder:R,L`, `capsule:R,L` (both along z; a capsule's L is
@@ -52,52 +44,24 @@ pub fn parse_shape(text: &str) -> Result<Shape> {
         };
         return Err(Error::input("shape", format!("{text:?}"), hint));
     };
-    let values = numbers
-        .split(',')
-        .map(|n| n.trim().parse::<f64>())
-        .collect::<std::result::Result<Vec<_>, _>>()
-        .ok()
-        .filter(|v| counted(*count, v.len()))
-        .ok_or_else(|| {
-            let count = match count {
-                0 => "7 or more, an odd number of".to_owned(),
-                n => format!("{n} number(s)"),
-            };
-            Error::input(
-                "shape",
-                format!("{text:?}"),
-                format!("write {form}, {count} in metres"),
-            )
-        })?;
-    let faces = None;
-    let shape = match kind.as_str() {
-        "sphere" => Shape::Sphere {
-            radius: values[0],
-            faces,
-        },
-        "ellipsoid" => Shape::Ellipsoid {
-            semi_axes: [values[0], values[1], values[2]],
-            faces,
-        },
-        "box" => Shape::Box {
-            size: [values[0], values[1], values[2]],
-            faces,
-        },
-        "cylinder" => Shape::Cylinder {
-            radius: values[0],
-            length: values[1],
-            faces,
-        },
-        "capsule" => Shape::Capsule {
-            radius: values[0],
-            length: values[1],
-            faces,
-        },
-        _ => Shape::Prism {
-            length: values[0],
-            profile: values[1..].chunks_exact(2).map(|p| [p[0], p[1]]).collect(),
-            faces,
-        },
+    let values = numbers.split(',').map(|n| n.trim().parse::<f64>().ok());
+    let values: Option<Vec<f64>> = values.collect();
+    let shape = match (kind.as_str(), values.as_deref()) {
+        ("sphere", Some(&[radius])) => Shape::sphere(radius),
+        ("ellipsoid", Some(&[a, b, c])) => Shape::ellipsoid([a, b, c]),
+        ("box", Some(&[a, b, c])) => Shape::cuboid([a, b, c]),
+        ("cylinder", Some(&[radius, length])) => Shape::cylinder(radius, length),
+        ("capsule", Some(&[radius, length])) => Shape::capsule(radius, length),
+        ("prism", Some([length, corners @ ..]))
+            if corners.len() >= 6 && corners.len().is_multiple_of(2) =>
+        {
+            let corners = corners.chunks_exact(2).map(|p| [p[0], p[1]]);
+            Shape::prism(corners.collect::<Vec<_>>(), *length)
+        }
+        _ => {
+            let expected = format!("write {form}, {count} in metres");
+            return Err(Error::input("shape", format!("{text:?}"), expected));
+        }
     };
     validate(&shape, text)?;
     Ok(shape)
@@ -105,24 +69,19 @@ pub fn parse_shape(text: &str) -> Result<Shape> {
 
 /// The short form of a shape (m), or the path of a mesh file: the name of its mesh.
 pub fn shape_name(shape: &Shape) -> String {
-    match shape {
-        Shape::Sphere { radius, .. } => format!("sphere:{radius:?}"),
-        Shape::Ellipsoid {
-            semi_axes: [a, b, c],
-            ..
-        } => format!("ellipsoid:{a:?},{b:?},{c:?}"),
-        Shape::Box {
-            size: [a, b, c], ..
-        } => format!("box:{a:?},{b:?},{c:?}"),
-        Shape::Cylinder { radius, length, .. } => format!("cylinder:{radius:?},{length:?}"),
-        Shape::Capsule { radius, length, .. } => format!("capsule:{radius:?},{length:?}"),
+    let numbers = match shape {
+        Shape::Sphere { radius, .. } => vec![*radius],
+        Shape::Ellipsoid { semi_axes, .. } => semi_axes.to_vec(),
+        Shape::Box { size, .. } => size.to_vec(),
+        Shape::Cylinder { radius, length, .. } | Shape::Capsule { radius, length, .. } => {
+            vec![*radius, *length]
+        }
         Shape::Prism {
             profile, length, ..
-        } => {
-            let corners = profile.iter().map(|[y, z]| format!(",{y:?},{z:?}"));
-            format!("prism:{length:?}{}", corners.collect::<String>())
-        }
-        Shape::Mesh { path, .. } => path.display().to_string(),
-        Shape::Triangles { faces, .. } => format!("of {} triangles", faces.len()),
-    }
+        } => [&[*length], profile.as_flattened()].concat(),
+        Shape::Mesh { path, .. } => return path.display().to_string(),
+        Shape::Triangles { faces, .. } => return format!("of {} triangles", faces.len()),
+    };
+    let numbers: Vec<String> = numbers.iter().map(|x| format!("{x:?}")).collect();
+    format!("{}:{}", shape.kind(), numbers.join(","))
 }

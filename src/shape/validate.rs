@@ -1,9 +1,9 @@
 //! Parameters of shapes that can't be.
 
-use super::description::Shape;
-use super::limits::{DEFAULT_FACES, MAX_FACES};
+use super::description::{DEFAULT_FACES, MAX_FACES, Shape};
 use super::primitive::prism;
 use crate::error::{Error, Result};
+use crate::geometry::check_scale;
 
 /// Whether a shape's parameters can be: lengths finite and positive, faces in range. `place`
 /// begins the message: the body's or the shape's name.
@@ -25,32 +25,18 @@ pub fn validate(shape: &Shape, place: &str) -> Result<()> {
     let lengths = |field: &str, values: &[f64; 3]| -> Result<()> {
         (0..3).try_for_each(|i| length(&format!("{field}[{i}]"), values[i]))
     };
-    let asked = match shape {
-        Shape::Sphere { radius, faces } => {
-            length("radius", *radius)?;
-            faces
-        }
-        Shape::Ellipsoid { semi_axes, faces } => {
-            lengths("semi_axes", semi_axes)?;
-            faces
-        }
-        Shape::Box { size, faces } => {
-            lengths("size", size)?;
-            faces
-        }
+    match shape {
+        Shape::Sphere { radius, .. } => length("radius", *radius)?,
+        Shape::Ellipsoid { semi_axes, .. } => lengths("semi_axes", semi_axes)?,
+        Shape::Box { size, .. } => lengths("size", size)?,
         Shape::Cylinder {
-            radius,
-            length: l,
-            faces,
+            radius, length: l, ..
         } => {
             length("radius", *radius)?;
             length("length", *l)?;
-            faces
         }
         Shape::Capsule {
-            radius,
-            length: l,
-            faces,
+            radius, length: l, ..
         } => {
             length("radius", *radius)?;
             if *l == 0.0 {
@@ -61,30 +47,18 @@ pub fn validate(shape: &Shape, place: &str) -> Result<()> {
                 ));
             }
             length("length", *l)?;
-            faces
         }
         Shape::Prism {
-            profile,
-            length: l,
-            faces,
+            profile, length: l, ..
         } => {
             prism::check_profile(profile, place)?;
             length("length", *l)?;
-            faces
         }
-        Shape::Mesh { scale, .. } => {
-            if !(scale.is_finite() && *scale > 0.0) {
-                return Err(Error::input(
-                    format!("{place}: scale"),
-                    scale,
-                    "give a finite, positive factor (0.001 for a file in millimetres)",
-                ));
-            }
-            &None
-        }
+        Shape::Mesh { scale, .. } => check_scale(place, *scale)?,
         // What is wrong with it, its mesh tells.
-        Shape::Triangles { .. } => &None,
-    };
+        Shape::Triangles { .. } => {}
+    }
+    let asked = shape.asked_faces();
     asked.map_or(Ok(()), |faces| check_faces(place, faces))
 }
 

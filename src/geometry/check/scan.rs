@@ -1,6 +1,6 @@
 //! The passes over a mesh that fill a report.
 
-use super::report::{Finding, Kind, MeshReport, Severity, counted, number};
+use super::{Finding, Kind, MeshReport, Severity, counted, number};
 use crate::geometry::points::{area_vector, bounds, signed_volume, vertex_normal_sums};
 use crate::geometry::topology::{self, Component, Edges};
 use crate::geometry::weld;
@@ -35,13 +35,10 @@ pub fn check_parts(name: &str, vertices: &[Vec3], faces: &[[usize; 3]]) -> MeshR
     checker.vertices_alone();
 
     let mut findings = checker.findings;
-    findings.sort_by_key(|f| (f.severity == Severity::Warning, f.kind));
+    findings.sort_by_key(|f| f.kind);
     let usable = findings.iter().all(|f| f.severity == Severity::Warning);
-    let all: Vec<_> = checker
-        .finite
-        .iter()
-        .map(|&f| corners(vertices, faces[f]))
-        .collect();
+    let finite = checker.finite.iter();
+    let all: Vec<_> = finite.map(|&f| corners(vertices, faces[f])).collect();
     MeshReport {
         name: name.to_owned(),
         vertices: vertices.len(),
@@ -64,6 +61,9 @@ fn corners(vertices: &[Vec3], face: [usize; 3]) -> [Vec3; 3] {
     face.map(|v| vertices[v])
 }
 
+/// How many, the first face, and where.
+type Found = (usize, Option<usize>, Option<Vec3>);
+
 struct Checker<'a> {
     vertices: &'a [Vec3],
     faces: &'a [[usize; 3]],
@@ -84,11 +84,8 @@ impl<'a> Checker<'a> {
         let indexed: Vec<usize> = (0..faces.len())
             .filter(|&f| faces[f].iter().all(|&v| v < vertices.len()))
             .collect();
-        let finite: Vec<usize> = indexed
-            .iter()
-            .copied()
-            .filter(|&f| faces[f].iter().all(|&v| is_finite(v)))
-            .collect();
+        let mut finite = indexed.clone();
+        finite.retain(|&f| faces[f].iter().all(|&v| is_finite(v)));
         // The size of what the faces span: a stray vertex far away is not part of the body.
         let bounds = bounds(finite.iter().flat_map(|&f| faces[f]).map(|v| &vertices[v]));
         Self {
@@ -114,20 +111,11 @@ impl<'a> Checker<'a> {
             .then(|| c.iter().map(|&v| self.vertices[v] / 3.0).sum())
     }
 
-    #[allow(clippy::too_many_arguments)]
-    fn report(
-        &mut self,
-        kind: Kind,
-        severity: Severity,
-        count: usize,
-        face: Option<usize>,
-        position: Option<Vec3>,
-        problem: String,
-        remedy: &str,
-    ) {
+    fn report(&mut self, kind: Kind, found: Found, problem: String, remedy: &str) {
+        let (count, face, position) = found;
         self.findings.push(Finding {
             kind,
-            severity,
+            severity: kind.severity(),
             count,
             face,
             position: position.map(Into::into),
@@ -136,40 +124,22 @@ impl<'a> Checker<'a> {
         });
     }
 
-    /// An error of some faces, of which the first is shown.
+    /// Some faces, of which the first is shown.
     fn report_faces(&mut self, kind: Kind, found: &[usize], problem: String, remedy: &str) {
         if let Some(&first) = found.first() {
-            let place = self.centroid(first);
-            self.report(
-                kind,
-                Severity::Error,
-                found.len(),
-                Some(first),
-                place,
-                problem,
-                remedy,
-            );
+            let found = (found.len(), Some(first), self.centroid(first));
+            self.report(kind, found, problem, remedy);
         }
     }
 
     fn indices_and_numbers(&mut self) {
-        if self.faces.is_empty() || self.vertices.is_empty() {
-            let what = if self.faces.is_empty() {
-                "faces"
-            } else {
-                "vertices"
-            };
-            self.report(
-                Kind::Empty,
-                Severity::Error,
-                1,
-                None,
-                None,
-                format!("the mesh has no {what}"),
-                "give a closed surface of triangles",
-            );
-        }
         let count = self.vertices.len();
+        let parts = [("faces", self.faces.len()), ("vertices", count)];
+        if let Some((what, _)) = parts.iter().find(|(_, n)| *n == 0) {
+            let problem = format!("the mesh has no {what}");
+            let remedy = "give a closed surface of triangles";
+            self.report(Kind::Empty, (1, None, None), problem, remedy);
+        }
         let wrong: Vec<usize> = (0..self.faces.len())
             .filter(|&f| self.faces[f].iter().any(|&v| v >= count))
             .collect();
@@ -187,20 +157,20 @@ impl<'a> Checker<'a> {
             .filter(|&v| !is_usable(&self.vertices[v]))
             .collect();
         if let Some(&first) = bad.first() {
-            let face = (0..self.faces.len()).find(|&f| self.faces[f].contains(&first));
-            self.report(
-                Kind::NotFinite,
-                Severity::Error,
-                bad.len(),
-                face,
-                Some(self.vertices[first]),
-                format!(
-                    "{} coordinates that are NaN, infinite or over {FARTHEST:.0e} m, the first is vertex {first}",
-                    counted(bad.len(), "vertex has", "vertices have")
-                ),
-                "export the mesh again; coordinates must be finite numbers, in metres",
+            let problem = format!(
+                "{} coordinates that are NaN, infinite or over {FARTHEST:.0e} m, the first is vertex {first}",
+                counted(bad.len(), "vertex has", "vertices have")
             );
+            let remedy = "export the mesh again; coordinates must be finite numbers, in metres";
+            self.report(Kind::NotFinite, self.at_vertex(&bad), problem, remedy);
         }
+    }
+
+    /// Some vertices, of which the first is shown.
+    fn at_vertex(&self, found: &[usize]) -> Found {
+        let first = found[0];
+        let face = self.faces.iter().position(|f| f.contains(&first));
+        (found.len(), face, Some(self.vertices[first]))
     }
 
     fn duplicate_faces(&mut self) {
@@ -238,7 +208,7 @@ impl<'a> Checker<'a> {
     fn shapes(&mut self) {
         let diameter = self.diameter();
         let mut flat = Vec::new();
-        let mut long = Vec::new();
+        let mut long = 0;
         let mut worst = (0.0, 0);
         for &f in &self.finite {
             let [a, b, c] = corners(self.vertices, self.faces[f]);
@@ -254,9 +224,7 @@ impl<'a> Checker<'a> {
                 continue;
             }
             let aspect = longest * sides.iter().sum::<f64>() / (4.0 * 3f64.sqrt() * area);
-            if aspect > LONG_FACE {
-                long.push(f);
-            }
+            long += usize::from(aspect > LONG_FACE);
             if aspect > worst.0 {
                 worst = (aspect, f);
             }
@@ -265,20 +233,15 @@ impl<'a> Checker<'a> {
         let remedy = "collapse the shortest edge of each, and merge vertices at the same place";
         self.report_faces(Kind::ZeroArea, &flat, problem, remedy);
         self.worst_aspect = worst.0;
-        if !long.is_empty() {
-            self.report(
-                Kind::Aspect,
-                Severity::Warning,
-                long.len(),
-                Some(worst.1),
-                self.centroid(worst.1),
-                format!(
-                    "{} an aspect ratio over {LONG_FACE}, the worst {:.3e}",
-                    counted(long.len(), "face has", "faces have"),
-                    worst.0
-                ),
-                "remesh with faces nearer to equilateral, or with more of them",
+        if long > 0 {
+            let found = (long, Some(worst.1), self.centroid(worst.1));
+            let problem = format!(
+                "{} an aspect ratio over {LONG_FACE}, the worst {:.3e}",
+                counted(long, "face has", "faces have"),
+                worst.0
             );
+            let remedy = "remesh with faces nearer to equilateral, or with more of them";
+            self.report(Kind::Aspect, found, problem, remedy);
         }
     }
 
@@ -295,39 +258,31 @@ impl<'a> Checker<'a> {
         self.insides(&pieces);
         if let [_, second, ..] = pieces.as_slice() {
             let f = second.faces[0];
-            self.report(
-                Kind::Components,
-                Severity::Error,
-                pieces.len(),
-                Some(f),
-                self.centroid(f),
-                format!(
-                    "{} separate pieces that share no edge; the second begins here",
-                    pieces.len()
-                ),
-                "give each piece a body of its own (joint = fixed holds them together), join the \
-                 pieces into one surface, or delete what is inside; merge vertices if they touch",
+            let found = (pieces.len(), Some(f), self.centroid(f));
+            let problem = format!(
+                "{} separate pieces that share no edge; the second begins here",
+                pieces.len()
             );
+            let remedy = "give each piece a body of its own (joint = fixed holds them together), join the \
+                          pieces into one surface, or delete what is inside; merge vertices if they touch";
+            self.report(Kind::Components, found, problem, remedy);
         }
         pieces.len()
     }
 
     fn edges_with(&mut self, edges: &Edges, kind: Kind) {
         let is_open = kind == Kind::OpenEdge;
-        let mut count = 0;
-        let mut first: Option<topology::EdgeUse> = None;
-        for uses in edges.groups() {
-            if (is_open && uses.len() == 1) || (!is_open && uses.len() > 2) {
-                count += 1;
-                if first.is_none_or(|u| uses[0].face < u.face) {
-                    first = Some(uses[0]);
-                }
-            }
-        }
+        let wrong = |uses: &&[topology::EdgeUse]| match is_open {
+            true => uses.len() == 1,
+            false => uses.len() > 2,
+        };
+        let wrong: Vec<_> = edges.groups().filter(wrong).map(|uses| uses[0]).collect();
+        // Of equals the first.
+        let first = wrong.iter().min_by_key(|u| u.face);
         let Some(edge) = first else { return };
         let [a, b] = edge.directed();
         let middle = self.vertices[a] * 0.5 + self.vertices[b] * 0.5;
-        let what = counted(count, "edge", "edges");
+        let what = counted(wrong.len(), "edge", "edges");
         let (problem, remedy) = if is_open {
             (
                 format!("{what} with one face only (a hole), the first from vertex {a} to {b}"),
@@ -339,15 +294,8 @@ impl<'a> Checker<'a> {
                 "delete inner walls, and split surfaces that touch along an edge",
             )
         };
-        self.report(
-            kind,
-            Severity::Error,
-            count,
-            Some(edge.face),
-            Some(middle),
-            problem,
-            remedy,
-        );
+        let found = (wrong.len(), Some(edge.face), Some(middle));
+        self.report(kind, found, problem, remedy);
     }
 
     fn orientations(&mut self, pieces: &[Component]) {
@@ -381,16 +329,12 @@ impl<'a> Checker<'a> {
             if !piece.closed || piece.one_sided || !piece.flipped.is_empty() {
                 continue;
             }
-            let all: Vec<_> = piece
-                .faces
-                .iter()
+            let faces = piece.faces.iter();
+            let all: Vec<_> = faces
                 .map(|&f| corners(self.vertices, self.faces[f]))
                 .collect();
-            if all
-                .iter()
-                .flatten()
-                .any(|p| p.iter().any(|x| !x.is_finite()))
-            {
+            let mut numbers = all.iter().flatten().flat_map(|p| p.iter());
+            if numbers.any(|x| !x.is_finite()) {
                 continue;
             }
             let volume = signed_volume(&all);
@@ -418,71 +362,54 @@ impl<'a> Checker<'a> {
 
     /// Vertices without a normal; looked for only where all else is right.
     fn folds(&mut self) {
-        let is_error = |f: &Finding| f.severity == Severity::Error;
-        if self.findings.iter().any(is_error) {
+        if self.findings.iter().any(|f| f.severity == Severity::Error) {
             return;
         }
         let sums = vertex_normal_sums(self.vertices, self.faces);
-        let mut used = vec![None; sums.len()];
-        for (f, face) in self.faces.iter().enumerate().rev() {
-            face.iter().for_each(|&v| used[v] = Some(f));
-        }
-        let folded = |v: &usize| used[*v].is_some() && sums[*v].norm() <= FOLDED;
+        let used = self.used();
+        let folded = |v: &usize| used[*v] && sums[*v].norm() <= FOLDED;
         let folded: Vec<usize> = (0..sums.len()).filter(folded).collect();
         if let Some(&v) = folded.first() {
-            self.report(
-                Kind::FoldedVertex,
-                Severity::Error,
-                folded.len(),
-                used[v],
-                Some(self.vertices[v]),
-                format!(
-                    "{} faces that fold back on each other, the first is vertex {v}",
-                    counted(folded.len(), "vertex has", "vertices have")
-                ),
-                "mend the surface there, or split what touches in a point only",
+            let problem = format!(
+                "{} faces that fold back on each other, the first is vertex {v}",
+                counted(folded.len(), "vertex has", "vertices have")
             );
+            let remedy = "mend the surface there, or split what touches in a point only";
+            self.report(Kind::FoldedVertex, self.at_vertex(&folded), problem, remedy);
         }
+    }
+
+    /// Whether a face uses each vertex.
+    fn used(&self) -> Vec<bool> {
+        let mut used = vec![false; self.vertices.len()];
+        let corners = self.indexed.iter().flat_map(|&f| self.faces[f]);
+        corners.for_each(|v| used[v] = true);
+        used
     }
 
     fn vertices_alone(&mut self) {
         let same = weld::representatives(self.vertices, SAME_PLACE * self.diameter());
         let copies: Vec<usize> = (0..same.len()).filter(|&v| same[v] != v).collect();
         if let Some(&v) = copies.first() {
-            self.report(
-                Kind::DuplicateVertex,
-                Severity::Warning,
-                copies.len(),
-                self.faces.iter().position(|f| f.contains(&v)),
-                Some(self.vertices[v]),
-                format!(
-                    "{} at the place of another, the first is vertex {v} (at vertex {})",
-                    counted(copies.len(), "vertex is", "vertices are"),
-                    same[v]
-                ),
-                "merge vertices at the same place",
+            let problem = format!(
+                "{} at the place of another, the first is vertex {v} (at vertex {})",
+                counted(copies.len(), "vertex is", "vertices are"),
+                same[v]
             );
+            let found = self.at_vertex(&copies);
+            let remedy = "merge vertices at the same place";
+            self.report(Kind::DuplicateVertex, found, problem, remedy);
         }
-        let mut used = vec![false; self.vertices.len()];
-        for &f in &self.indexed {
-            for v in self.faces[f] {
-                used[v] = true;
-            }
-        }
+        let used = self.used();
         let unused: Vec<usize> = (0..used.len()).filter(|&v| !used[v]).collect();
         if let Some(&v) = unused.first() {
-            self.report(
-                Kind::UnreferencedVertex,
-                Severity::Warning,
-                unused.len(),
-                None,
-                Some(self.vertices[v]),
-                format!(
-                    "{} not used by any face, the first is vertex {v}",
-                    counted(unused.len(), "vertex is", "vertices are")
-                ),
-                "delete loose vertices; they have no effect",
+            let problem = format!(
+                "{} not used by any face, the first is vertex {v}",
+                counted(unused.len(), "vertex is", "vertices are")
             );
+            let remedy = "delete loose vertices; they have no effect";
+            let found = (unused.len(), None, Some(self.vertices[v]));
+            self.report(Kind::UnreferencedVertex, found, problem, remedy);
         }
     }
 }

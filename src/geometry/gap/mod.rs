@@ -6,11 +6,263 @@
 //! shift that separates the two, measured at vertices, face centres, points well inside and along
 //! crossing edges.
 
-mod gaps;
-mod overlap;
 mod pair;
 mod share;
 
-pub use gaps::{Distance, Gap, Gaps, Other};
-pub use overlap::overlap_error;
 pub use share::Share;
+
+use crate::error::{Error, Result};
+use crate::geometry::ball::Ball;
+use crate::geometry::mesh::TriMesh;
+use crate::geometry::tree::MeshTree;
+use crate::geometry::wall::{HalfSpace, Wall};
+use hydrograd_adjoint::lie::{Pose, Vec3};
+use pair::{Between, Pair};
+use std::cmp::Reverse;
+use std::collections::{BTreeSet, BinaryHeap};
+
+/// Smallest distance between two surfaces, or a surface and a wall.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Gap {
+    /// m; 0 touching; negative overlapping. Against a wall, minus the depth of the deepest
+    /// vertex behind it. Between bodies, minus an estimate: the deepest point found of either
+    /// inside the other, so that no shift shorter than this separates them.
+    pub distance: f64,
+    /// Number of the body.
+    pub first: usize,
+    /// What it is near.
+    pub second: Other,
+    /// Mean edge length near the closest points, m: the longer one of the two surfaces.
+    pub edge: f64,
+}
+
+impl Gap {
+    /// Whether it is one of body `b`'s.
+    pub(crate) fn touches(&self, b: usize) -> bool {
+        self.first == b || self.second == Other::Body(b)
+    }
+
+    /// The distance to the other body, or to the body's own image behind the wall, m.
+    pub(crate) fn image_distance(&self) -> f64 {
+        match self.second {
+            Other::Body(_) => self.distance,
+            Other::Wall(_) => 2.0 * self.distance,
+        }
+    }
+
+    /// The largest of `values`, which are one per body, of the bodies that it is between.
+    pub(crate) fn largest(&self, values: &[f64]) -> f64 {
+        match self.second {
+            Other::Body(b) => values[self.first].max(values[b]),
+            Other::Wall(_) => values[self.first],
+        }
+    }
+}
+
+/// Signed distance of a point from a surface or a wall.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Distance {
+    /// m; negative inside a body or behind a wall.
+    pub distance: f64,
+    /// From what.
+    pub from: Other,
+    /// Mean edge length near the closest point, m; zero at a wall.
+    pub edge: f64,
+}
+
+/// What a body is near.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Other {
+    /// Another body, by its number.
+    Body(usize),
+    /// A wall, by its number.
+    Wall(usize),
+}
+
+/// The surfaces and walls of a scene, ready to be asked for gaps.
+#[derive(Clone, Debug)]
+pub struct Gaps {
+    trees: Vec<Option<MeshTree>>,
+    walls: Vec<HalfSpace>,
+    pairs: Vec<(usize, Other)>,
+}
+
+impl Gaps {
+    /// `meshes` in body frames, none for a body without surface. Pairs of bodies in `ignore`,
+    /// in either order, are left out: those that never move relative to one another.
+    ///
+    /// # Errors
+    /// [`Error::Input`] if a wall has no normal or `ignore` names a body that doesn't exist.
+    pub fn new(
+        meshes: &[Option<&TriMesh>],
+        walls: &[Wall],
+        ignore: &[(usize, usize)],
+    ) -> Result<Self> {
+        let count = meshes.len();
+        if let Some((a, b)) = ignore.iter().find(|(a, b)| *a.max(b) >= count) {
+            return Err(Error::input(
+                "gaps: ignored pair",
+                format!("({a}, {b})"),
+                format!("bodies are counted from 0 and there are {count}"),
+            ));
+        }
+        let tree = |mesh: &Option<&TriMesh>| mesh.map(MeshTree::new);
+        let trees: Vec<Option<MeshTree>> = meshes.iter().map(tree).collect();
+        let walls = Wall::half_spaces(walls)?;
+        let ignored: BTreeSet<(usize, usize)> =
+            ignore.iter().map(|&(a, b)| (a.min(b), a.max(b))).collect();
+        let submerged: Vec<usize> = (0..count).filter(|&i| trees[i].is_some()).collect();
+        let mut pairs = Vec::new();
+        for (k, &i) in submerged.iter().enumerate() {
+            let others = submerged[k + 1..]
+                .iter()
+                .filter(|&&j| !ignored.contains(&(i, j)));
+            pairs.extend(others.map(|&j| (i, Other::Body(j))));
+            pairs.extend((0..walls.len()).map(|w| (i, Other::Wall(w))));
+        }
+        Ok(Self {
+            trees,
+            walls,
+            pairs,
+        })
+    }
+
+    /// The pairs that are looked at: a body, and another or a wall.
+    pub fn pairs(&self) -> &[(usize, Other)] {
+        &self.pairs
+    }
+
+    /// Smallest gap of all pairs, one pose per mesh; none when there is no pair. Of pairs
+    /// equally near to rounding, always the same one. Pairs with a pose that is missing or isn't
+    /// finite are passed over.
+    pub fn smallest(&self, poses: &[Pose]) -> Option<Gap> {
+        let placed = |(tree, pose): (&Option<MeshTree>, &Pose)| {
+            tree.as_ref().map(|t| t.ball.transformed(pose))
+        };
+        let balls: Vec<Option<Ball>> = self.trees.iter().zip(poses).map(placed).collect();
+        // Nearest first by the balls around them. Bits of numbers ≥ 0 sort as the numbers do.
+        let mut waiting: BinaryHeap<Reverse<(u64, usize)>> = self
+            .pairs
+            .iter()
+            .enumerate()
+            .filter_map(|(k, &pair)| {
+                let bound = self.bound(&balls, pair)?;
+                Some(Reverse((bound.max(0.0).to_bits(), k)))
+            })
+            .collect();
+        let mut best: Option<Gap> = None;
+        while let Some(Reverse((bits, k))) = waiting.pop() {
+            let bound = f64::from_bits(bits);
+            let limit = best.map_or(f64::INFINITY, |gap| gap.distance);
+            if bound > 0.0 && bound >= limit {
+                break;
+            }
+            if let Some(gap) = self.gap(self.pairs[k], poses, limit) {
+                best = Some(gap);
+            }
+        }
+        best
+    }
+
+    /// Every pair's gap: bodies in order, for each the later bodies and then the walls. Pairs
+    /// with a pose that is missing or isn't finite are passed over.
+    pub fn all(&self, poses: &[Pose]) -> Vec<Gap> {
+        self.pairs
+            .iter()
+            .filter_map(|&pair| self.gap(pair, poses, f64::INFINITY))
+            .collect()
+    }
+
+    /// A lower bound of a gap that isn't negative, from balls around the bodies.
+    fn bound(&self, balls: &[Option<Ball>], (i, other): (usize, Other)) -> Option<f64> {
+        let ball = (*balls.get(i)?)?;
+        let bound = match other {
+            Other::Body(j) => ball.distance(&(*balls.get(j)?)?),
+            Other::Wall(w) => self.walls[w].height(&ball.center) - ball.radius,
+        };
+        // Room for rounding.
+        let slack = 1e-14 * (ball.center.norm() + ball.radius + bound.abs());
+        bound.is_finite().then_some(bound - slack)
+    }
+
+    /// A pair's gap if it is below `limit`.
+    fn gap(&self, (first, second): (usize, Other), poses: &[Pose], limit: f64) -> Option<Gap> {
+        let placed = |i: usize| Some((self.trees.get(i)?.as_ref()?, poses.get(i)?));
+        let (tree, pose) = placed(first)?;
+        let Between { distance, edge } = match second {
+            Other::Body(j) => Pair::new((tree, pose), placed(j)?)?.between(limit)?,
+            Other::Wall(w) => {
+                let (distance, edge) = tree.height(pose, &self.walls[w]);
+                Between { distance, edge }
+            }
+        };
+        (distance.is_finite() && distance < limit).then_some(Gap {
+            distance,
+            first,
+            second,
+            edge,
+        })
+    }
+
+    /// Distances of a point (world frame) from every surface, one pose per mesh, and then from every wall. A pose that is missing or
+    /// isn't finite is passed over.
+    pub fn distances<'a>(
+        &'a self,
+        point: &'a Vec3,
+        poses: &'a [Pose],
+    ) -> impl Iterator<Item = Distance> + 'a {
+        let placed = self.trees.iter().zip(poses).enumerate();
+        let bodies = placed.filter_map(|(body, (tree, pose))| {
+            let tree = tree.as_ref()?;
+            let (distance, face) = tree.signed(&pose.apply_inverse(point))?;
+            Some(Distance {
+                distance,
+                from: Other::Body(body),
+                edge: tree.edge_at_face(face),
+            })
+        });
+        let walls = self.walls.iter().enumerate();
+        bodies.chain(walls.map(move |(number, wall)| Distance {
+            distance: wall.height(point),
+            from: Other::Wall(number),
+            edge: 0.0,
+        }))
+    }
+}
+
+/// The error of a gap that isn't positive: names both, says how deep and how to mend it.
+/// `names` are those of the bodies; a body without name is called by its number.
+pub fn overlap_error(gap: &Gap, names: &[impl AsRef<str>]) -> Error {
+    let body = |i: usize| match names.get(i) {
+        Some(name) => format!("body {:?}", name.as_ref()),
+        None => format!("body {i}"),
+    };
+    let (first, depth, edge) = (body(gap.first), -gap.distance, gap.edge);
+    let (place, remedy) = match gap.second {
+        Other::Body(j) if depth > 0.0 => (
+            format!("{first} and {}", body(j)),
+            format!("they overlap: move them apart by at least {depth:.6e} m"),
+        ),
+        Other::Wall(w) if depth > 0.0 => (
+            format!("{first} and wall {w}"),
+            format!(
+                "it reaches through the wall: move it into the fluid by at least {depth:.6e} m"
+            ),
+        ),
+        Other::Body(j) => (
+            format!("{first} and {}", body(j)),
+            format!("they are too near: move them apart; edges there are {edge:.3e} m long"),
+        ),
+        Other::Wall(w) => (
+            format!("{first} and wall {w}"),
+            format!("it is too near: move it into the fluid; edges there are {edge:.3e} m long"),
+        ),
+    };
+    Error::Unresolved {
+        place,
+        quantity: "gap in m".into(),
+        value: gap.distance,
+        limit: 0.0,
+        remedy,
+    }
+}

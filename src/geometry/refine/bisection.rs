@@ -14,38 +14,23 @@
 use super::exact::ExactSurface;
 use crate::geometry::mesh::TriMesh;
 use hydrograd_adjoint::lie::Vec3;
-use std::cmp::Ordering;
 use std::collections::HashMap;
 
 /// An edge with its length, ordered by it. Equal lengths are told apart by the vertices: a strict order, or
 /// paths of ever longer edges might run in circles.
-#[derive(Clone, Copy, Debug)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
 pub(super) struct EdgeLength {
-    pub squared: f64,
+    /// Bits of positive numbers sort as the numbers do.
+    squared: u64,
     /// The smaller number first.
     pub ends: [usize; 2],
 }
 
-impl Ord for EdgeLength {
-    fn cmp(&self, other: &Self) -> Ordering {
-        let length = self.squared.total_cmp(&other.squared);
-        length.then_with(|| self.ends.cmp(&other.ends))
+impl EdgeLength {
+    pub fn squared(&self) -> f64 {
+        f64::from_bits(self.squared)
     }
 }
-
-impl PartialOrd for EdgeLength {
-    fn partial_cmp(&self, other: &Self) -> Option<Ordering> {
-        Some(self.cmp(other))
-    }
-}
-
-impl PartialEq for EdgeLength {
-    fn eq(&self, other: &Self) -> bool {
-        self.cmp(other) == Ordering::Equal
-    }
-}
-
-impl Eq for EdgeLength {}
 
 /// A closed mesh whose triangles can be split.
 pub(super) struct Bisection {
@@ -87,7 +72,9 @@ impl Bisection {
     pub fn longest(&self, f: usize) -> EdgeLength {
         let [a, b, c] = self.faces[f];
         let edge = |a: usize, b: usize| EdgeLength {
-            squared: (self.vertices[b] - self.vertices[a]).norm_squared(),
+            squared: (self.vertices[b] - self.vertices[a])
+                .norm_squared()
+                .to_bits(),
             ends: [a.min(b), a.max(b)],
         };
         edge(a, b).max(edge(b, c)).max(edge(c, a))

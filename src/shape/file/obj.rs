@@ -1,8 +1,7 @@
 //! Wavefront OBJ: vertex positions and faces; groups, materials, normals and textures are
 //! passed over.
 
-use super::polygon;
-use super::raw::{Parsed, Raw, brief};
+use super::{Parsed, Raw, brief};
 use crate::error::{Error, Result};
 use crate::geometry::TriMesh;
 use hydrograd_adjoint::lie::Vec3;
@@ -28,12 +27,9 @@ pub(super) fn parse(bytes: &[u8]) -> Parsed {
     let Some(model) = model else {
         return Ok(Raw::default());
     };
+    let vertices = model.positions.chunks_exact(3);
     let mut raw = Raw {
-        vertices: model
-            .positions
-            .chunks_exact(3)
-            .map(Vec3::from_column_slice)
-            .collect(),
+        vertices: vertices.map(Vec3::from_column_slice).collect(),
         ..Raw::default()
     };
     let corners: Vec<usize> = model.indices.iter().map(|&i| i as usize).collect();
@@ -48,20 +44,8 @@ pub(super) fn parse(bytes: &[u8]) -> Parsed {
             .split_at_checked(arity as usize)
             .ok_or("the faces can't be understood; export it again")?;
         rest = tail;
-        match face {
-            [a, b, c] => raw.faces.push([*a, *b, *c]),
-            _ if face.len() > polygon::MAX_CORNERS => {
-                return Err(format!(
-                    "a polygon with {} corners (at most {}); export triangles",
-                    face.len(),
-                    polygon::MAX_CORNERS
-                ));
-            }
-            _ => {
-                raw.repairs.polygons_split += 1;
-                raw.faces.extend(polygon::triangles(face, &raw.vertices));
-            }
-        }
+        raw.add_face(face)
+            .map_err(|e| format!("a polygon with {e}"))?;
     }
     Ok(raw)
 }

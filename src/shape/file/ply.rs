@@ -1,7 +1,6 @@
 //! PLY, text and binary: the elements `vertex` (x, y, z) and `face` (`vertex_indices`).
 
-use super::polygon;
-use super::raw::{Parsed, Raw, brief};
+use super::{Parsed, Raw, brief};
 use hydrograd_adjoint::lie::Vec3;
 use ply_rs_bw::parser::{Parser, Reader};
 use ply_rs_bw::ply::{
@@ -98,26 +97,14 @@ pub(super) fn parse(bytes: &[u8]) -> Parsed {
             .map(usize::try_from)
             .collect::<std::result::Result<Vec<_>, _>>()
             .map_err(|_| format!("face {i} has a negative vertex number; count from 0"))?;
-        match corners.len() {
-            0..=2 => {
-                return Err(format!(
-                    "face {i} has {} corners; delete faces with fewer than three",
-                    corners.len()
-                ));
-            }
-            3 => raw.faces.push([corners[0], corners[1], corners[2]]),
-            n if n > polygon::MAX_CORNERS => {
-                return Err(format!(
-                    "face {i} has {n} corners (at most {}); export triangles",
-                    polygon::MAX_CORNERS
-                ));
-            }
-            _ => {
-                raw.repairs.polygons_split += 1;
-                raw.faces
-                    .extend(polygon::triangles(&corners, &raw.vertices));
-            }
+        if corners.len() < 3 {
+            return Err(format!(
+                "face {i} has {} corners; delete faces with fewer than three",
+                corners.len()
+            ));
         }
+        raw.add_face(&corners)
+            .map_err(|e| format!("face {i} has {e}"))?;
     }
     Ok(raw)
 }

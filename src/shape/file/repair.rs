@@ -1,6 +1,6 @@
 //! Merging of vertices that a file holds several times.
 
-use super::raw::Raw;
+use super::Raw;
 use crate::geometry::{bounds, topology, weld};
 
 /// Distance over diameter within which vertices are merged if that closes the surface: single
@@ -41,16 +41,14 @@ pub(super) fn mend(raw: Raw, always: bool) -> Raw {
     near
 }
 
+fn is_proper([a, b, c]: &[usize; 3]) -> bool {
+    a != b && b != c && c != a
+}
+
 fn open_edges(faces: &[[usize; 3]]) -> usize {
-    let proper = faces
-        .iter()
-        .copied()
-        .enumerate()
-        .filter(|(_, [a, b, c])| a != b && b != c && c != a);
-    topology::edges(proper)
-        .groups()
-        .filter(|uses| uses.len() == 1)
-        .count()
+    let proper = faces.iter().copied().enumerate();
+    let edges = topology::edges(proper.filter(|(_, f)| is_proper(f)));
+    edges.groups().filter(|uses| uses.len() == 1).count()
 }
 
 /// The mesh with vertices within `tolerance` merged and faces that collapsed left out; the
@@ -67,19 +65,13 @@ fn merge(raw: &Raw, tolerance: f64) -> (Raw, usize, usize) {
             number[first[v]]
         };
     }
-    let faces: Vec<_> = raw
-        .faces
-        .iter()
-        .map(|face| face.map(|v| number[v]))
-        .filter(|[a, b, c]| a != b && b != c && c != a)
-        .collect();
-    let merged = raw.vertices.len() - vertices.len();
-    let collapsed = raw.faces.len() - faces.len();
-    let repairs = raw.repairs;
-    let raw = Raw {
+    let faces = raw.faces.iter().map(|face| face.map(|v| number[v]));
+    let out = Raw {
         vertices,
-        faces,
-        repairs,
+        faces: faces.filter(is_proper).collect(),
+        repairs: raw.repairs,
     };
-    (raw, merged, collapsed)
+    let merged = raw.vertices.len() - out.vertices.len();
+    let collapsed = raw.faces.len() - out.faces.len();
+    (out, merged, collapsed)
 }

@@ -1,7 +1,7 @@
 //! STL, text and binary. Coordinates are in single precision, and each face has vertices of its
 //! own: they are merged afterwards.
 
-use super::raw::{Parsed, Raw, brief};
+use super::{Parsed, Raw, brief};
 use hydrograd_adjoint::lie::Vec3;
 use std::io::Cursor;
 
@@ -29,33 +29,27 @@ pub(super) fn parse(bytes: &[u8]) -> Parsed {
             )
         })?
     } else {
-        match (declared, needed) {
-            (Some(n), Some(needed)) if needed > bytes.len() => {
-                return Err(format!(
-                    "not a complete binary STL: it declares {n} faces, which take {needed} bytes, \
-                     and has {}; export it again",
-                    bytes.len()
-                ));
-            }
-            (None, _) => {
-                return Err(format!(
-                    "{} bytes are too few for an STL file; export it again",
-                    bytes.len()
-                ));
-            }
-            _ => {}
+        let length = bytes.len();
+        let Some((n, needed)) = declared.zip(needed) else {
+            return Err(format!(
+                "{length} bytes are too few for an STL file; export it again"
+            ));
+        };
+        if needed > length {
+            return Err(format!(
+                "not a complete binary STL: it declares {n} faces, which take {needed} bytes, \
+                 and has {length}; export it again"
+            ));
         }
         // A header that looks like text would be taken for it.
         let mut binary = bytes.to_vec();
         binary[..80].fill(b' ');
         stl_io::read_stl(&mut Cursor::new(binary)).map_err(|e| format!("{e}; export it again"))?
     };
+    let vertices = mesh.vertices.iter();
+    let vertices = vertices.map(|v| Vec3::from(v.0.map(f64::from)));
     Ok(Raw {
-        vertices: mesh
-            .vertices
-            .iter()
-            .map(|v| Vec3::from(v.0.map(f64::from)))
-            .collect(),
+        vertices: vertices.collect(),
         faces: mesh.faces.iter().map(|f| f.vertices).collect(),
         ..Raw::default()
     })

@@ -1,6 +1,6 @@
 //! Boxes: a grid on each side, somewhat finer towards the edges, where the flow is sharp.
 
-use super::layout::{Parts, misfit};
+use super::{Parts, misfit};
 use hydrograd_adjoint::lie::Vec3;
 use std::collections::HashMap;
 

@@ -4,10 +4,10 @@
 //! divided first, so that neighbouring sides agree on them. Triangles are somewhat smaller at sharp
 //! edges, as on a box, and where the profile has edges shorter than the rest.
 
-use super::layout::Parts;
+use super::Parts;
 use super::planar::{Planar, Point};
 use crate::error::{Error, Result};
-use crate::shape::limits::MAX_FACES;
+use crate::shape::description::MAX_FACES;
 use hydrograd_adjoint::lie::Vec3;
 use std::f64::consts::{PI, TAU};
 
@@ -93,6 +93,12 @@ struct Solid {
     /// profile.
     inradius: f64,
 }
+
+/// Numbers of the vertices along a line, with their distances from its start.
+type Line = Vec<(usize, f64)>;
+
+/// Where a distance along a line is: x, and (y, z).
+type Place<'a> = &'a dyn Fn(f64) -> (f64, Point);
 
 /// Where a point of the surface is.
 #[derive(Clone, Copy)]
@@ -193,30 +199,29 @@ impl Solid {
         // the distances along.
         let top: Vec<usize> = self.corners.iter().map(|p| push(half, *p)).collect();
         let bottom: Vec<usize> = self.corners.iter().map(|p| push(0.0, *p)).collect();
-        let mut line = |k: usize, x: f64, ends: [usize; 2]| -> Vec<(usize, f64)> {
-            let cuts = divide(self.widths[k], |u| at(k, u, x));
-            let inner = cuts.into_iter().map(|u| (push(x, self.along(k, u)), u));
+        let mut line = |ends: [usize; 2], length: f64, size: &dyn Fn(f64) -> f64, place: Place| {
             let mut out = vec![(ends[0], 0.0)];
-            out.extend(inner);
-            out.push((ends[1], self.widths[k]));
+            for u in divide(length, size) {
+                let (x, p) = place(u);
+                out.push((push(x, p), u));
+            }
+            out.push((ends[1], length));
             out
         };
-        let tops: Vec<_> = (0..n)
-            .map(|k| line(k, half, [top[k], top[self.next(k)]]))
-            .collect();
-        let bottoms: Vec<_> = (0..n)
-            .map(|k| line(k, 0.0, [bottom[k], bottom[self.next(k)]]))
-            .collect();
-        let rails: Vec<Vec<(usize, f64)>> = (0..n)
-            .map(|k| {
-                let cuts = divide(half, |x| at(k, 0.0, x));
-                let inner = cuts.into_iter().map(|x| (push(x, self.corners[k]), x));
-                let mut out = vec![(bottom[k], 0.0)];
-                out.extend(inner);
-                out.push((top[k], half));
-                out
-            })
-            .collect();
+        let mut around = |x: f64, ends: &[usize]| -> Vec<Line> {
+            let side = |k: usize| {
+                let (ends, width) = ([ends[k], ends[self.next(k)]], self.widths[k]);
+                line(ends, width, &|u| at(k, u, x), &|u| (x, self.along(k, u)))
+            };
+            (0..n).map(side).collect()
+        };
+        let tops = around(half, &top);
+        let bottoms = around(0.0, &bottom);
+        let rail = |k: usize| {
+            let ends = [bottom[k], top[k]];
+            line(ends, half, &|x| at(k, 0.0, x), &|x| (x, self.corners[k]))
+        };
+        let rails: Vec<Line> = (0..n).map(rail).collect();
 
         let mut faces: Vec<[usize; 3]> = Vec::new();
         let mut fill = |vertices: &mut Vec<Vec3>,
@@ -250,24 +255,14 @@ impl Solid {
         });
         for k in 0..n {
             let width = self.widths[k];
-            let flat = |line: &[(usize, f64)], x: f64| -> Vec<(usize, Point)> {
-                line.iter().map(|&(v, u)| (v, Point::new(u, x))).collect()
-            };
-            let rail = |k: usize, u: f64| -> Vec<(usize, Point)> {
-                rails[k]
-                    .iter()
-                    .map(|&(v, x)| (v, Point::new(u, x)))
-                    .collect()
-            };
-            let reversed = |mut chain: Vec<(usize, Point)>| {
-                chain.reverse();
-                chain
-            };
+            let flat = |&(v, u): &(usize, f64), x: f64| (v, Point::new(u, x));
+            let rail = |&(v, x): &(usize, f64), u: f64| (v, Point::new(u, x));
+            let next = &rails[self.next(k)];
             let chains = vec![
-                flat(&bottoms[k], 0.0),
-                rail(self.next(k), width),
-                reversed(flat(&tops[k], half)),
-                reversed(rail(k, 0.0)),
+                bottoms[k].iter().map(|p| flat(p, 0.0)).collect(),
+                next.iter().map(|p| rail(p, width)).collect(),
+                tops[k].iter().rev().map(|p| flat(p, half)).collect(),
+                rails[k].iter().rev().map(|p| rail(p, 0.0)).collect(),
             ];
             fill(&mut vertices, Side::Edge(k), chains, &|p| {
                 let q = self.along(k, p.x);

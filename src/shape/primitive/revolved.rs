@@ -4,7 +4,7 @@
 //! pole and no fan of slivers appears; s = 6 suits a flat disc, s = 4 a hemisphere. Sides: an
 //! even number of bands between rings that are rotated by half a step one after the other.
 
-use super::layout::{Parts, misfit};
+use super::{Parts, misfit};
 use hydrograd_adjoint::lie::Vec3;
 use std::f64::consts::{FRAC_PI_2, TAU};
 

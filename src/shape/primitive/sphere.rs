@@ -1,7 +1,7 @@
 //! Spheres and ellipsoids: subdivided icosahedra.
 
-use super::layout::Parts;
-use crate::shape::limits::MAX_FACES;
+use super::Parts;
+use crate::shape::description::MAX_FACES;
 use hydrograd_adjoint::lie::Vec3;
 use std::collections::HashMap;
 

@@ -149,28 +149,22 @@ impl fmt::Display for CheckReport {
             "{}: {} steps, {} ({}, {}); relative error of the gradient against central differences",
             self.scene, self.steps, choices.fidelity, choices.method, choices.integrator
         )?;
-        for (what, error, none) in [
-            (
-                "controls",
-                self.rel_error_controls,
-                "     none in this scene",
-            ),
-            (
-                "initial state",
-                self.rel_error_initial,
-                "can't be varied in this scene",
-            ),
-            (
-                "parameters",
-                self.rel_error_parameters,
-                "   none in this scene",
-            ),
-        ] {
-            match error {
-                Some(error) => writeln!(f, "  {what:<13} {error:.2e}")?,
-                None => writeln!(f, "  {what} {none}")?,
-            }
-        }
+        let mut line = |what: &str, error: Option<f64>, none: &str| match error {
+            Some(error) => writeln!(f, "  {what:<13} {error:.2e}"),
+            None => writeln!(f, "  {what}{none}"),
+        };
+        let immovable = " can't be varied in this scene";
+        line(
+            "controls",
+            self.rel_error_controls,
+            "      none in this scene",
+        )?;
+        line("initial state", self.rel_error_initial, immovable)?;
+        line(
+            "parameters",
+            self.rel_error_parameters,
+            "    none in this scene",
+        )?;
         writeln!(
             f,
             "  {}: the largest is {:.2e}, the limit {LIMIT:.0e}; solved to {:.0e}",

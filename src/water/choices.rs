@@ -4,7 +4,7 @@ use super::backend::{Backend, GpuSettings};
 use super::fidelity::Fidelity;
 use super::method::Method;
 use super::numerics::Numerics;
-use super::surface::{Meshing, Surface, meshed};
+use super::surface::{Meshing, Surface, surface};
 use crate::Result;
 use crate::boundary::{self, Depth};
 use crate::scene::{Preset, Scene};
@@ -93,5 +93,6 @@ impl WaterChoices {
 /// # Errors
 /// A mesh that can't be read, or a shape that can't be meshed.
 pub(crate) fn surfaces(scene: &Scene, choices: &WaterChoices) -> Result<Vec<Option<Surface>>> {
-    meshed(scene, choices.meshing())
+    let (meshing, bodies) = (choices.meshing(), scene.bodies.iter());
+    bodies.map(|body| surface(body, meshing, 1.0)).collect()
 }

@@ -76,7 +76,7 @@ impl Clearance {
             if let Some(gap) = gaps.smallest(poses)
                 && overlaps(&gap)
             {
-                let mut error = overlap_error(&gap, &self.names());
+                let mut error = overlap_error(&gap, &self.names);
                 if let Error::Unresolved { remedy, .. } = &mut error {
                     remedy.push_str(&self.hint(&gap));
                 }
@@ -156,10 +156,6 @@ impl Clearance {
              the two then don't feel each other through the water",
             self.names[b]
         )
-    }
-
-    fn names(&self) -> Vec<&str> {
-        self.names.iter().map(String::as_str).collect()
     }
 
     /// Names of both.

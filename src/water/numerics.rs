@@ -1,8 +1,8 @@
-//! Numbers that methods and fidelities work with.
+//! Numbers that methods and fidelities work with, and what is chosen for each body.
 
 use crate::boundary;
 use crate::coupling::full::SolveSettings;
-use crate::coupling::reduced::compress;
+use crate::coupling::reduced::{Cutoff, compress};
 use serde::{Deserialize, Serialize};
 
 /// Discretisation, solve and compression.
@@ -28,4 +28,13 @@ impl Default for Numerics {
             accuracy: 0.01,
         }
     }
+}
+
+/// What is chosen for each body and pair; empty: what the settings say.
+#[derive(Clone, Debug, Default)]
+pub(crate) struct Plan {
+    /// Per body.
+    pub compress: Vec<compress::CompressSettings>,
+    /// Per pair of bodies, equal for a body and its images.
+    pub cutoffs: Vec<((usize, usize), Cutoff)>,
 }

@@ -4,8 +4,10 @@ use super::choices::WaterChoices;
 use super::clearance::Clearance;
 use super::device::Device;
 use super::fidelity::Fidelity;
-use super::fidelity::kind::{Plan, Planned, Start};
-use super::submerged::{Discretisation, Problem, SubmergedBody};
+use super::fidelity::kind::{Planned, Start};
+use super::method::kind::Problem;
+use super::numerics::Plan;
+use super::submerged::{Discretisation, SubmergedBody};
 use crate::Result;
 use crate::adjoint::lie::Pose;
 use crate::coupling::Coupling;
@@ -53,7 +55,8 @@ pub(crate) fn prepare(
     clearance: Clearance,
     folder: Option<&Path>,
 ) -> Result<Prepared> {
-    let problem = Problem::new(scene, &numbers, &submerged, &choices.numerics, folder);
+    let method = choices.method.kind();
+    let mut problem = Problem::new(scene, &numbers, &submerged, method, &choices.numerics);
     let (fidelity, planned) = plan(
         scene,
         choices.fidelity,
@@ -62,10 +65,12 @@ pub(crate) fn prepare(
         &problem,
         &numbers,
     )?;
-    let (kind, method) = (fidelity.kind(), choices.method.kind());
+    (problem.plan, problem.folder) = (&planned.plan, folder);
     let mut warnings = choices.without_effect();
-    let mut device = Device::open(choices.backend, &choices.gpu, || kind.idle_gpu(method))?;
-    let made = kind.couple(&problem, method, &planned.plan, &mut device)?;
+    let mut device = Device::open(choices.backend, &choices.gpu, || {
+        fidelity.kind().idle_gpu(method)
+    })?;
+    let made = fidelity.kind().couple(&problem, &mut device)?;
     warnings.extend(device.warning());
     warnings.extend(made.warnings);
     let mut resolved = vec![0.0; scene.bodies.len()];

@@ -1,15 +1,13 @@
 //! The bodies in the water, what is around them, and what was made of them.
 
-use super::numerics::Numerics;
 use super::surface::{Coarse, Surface, pose, semi_axes};
 use crate::adjoint::lie::{Mat6, Pose};
-use crate::coupling::{Coupling, Exclusions};
-use crate::geometry::{TriMesh, Wall};
+use crate::coupling::Coupling;
+use crate::geometry::TriMesh;
 use crate::multibody::Tree;
 use crate::scene::Scene;
 use crate::{Error, Result};
 use serde::Serialize;
-use std::path::Path;
 use std::sync::Arc;
 
 /// A body that the water sees.
@@ -23,17 +21,6 @@ pub(crate) struct SubmergedBody<'a> {
     pub coarse: Option<&'a Coarse>,
     /// Given added mass at unit density.
     pub added_mass: Option<Mat6>,
-}
-
-/// The bodies in the water, what is around them, and the numbers to solve them by.
-pub(crate) struct Problem<'a> {
-    pub bodies: &'a [SubmergedBody<'a>],
-    pub walls: &'a [Wall],
-    /// Pairs that don't feel each other, by their numbers among `bodies`.
-    pub excluded: Exclusions,
-    pub numerics: &'a Numerics,
-    /// Where compressed bodies are kept.
-    pub folder: Option<&'a Path>,
 }
 
 /// What was made of the bodies.
@@ -90,37 +77,6 @@ impl<'a> SubmergedBody<'a> {
                 (None, None) => true,
                 _ => false,
             }
-    }
-}
-
-impl<'a> Problem<'a> {
-    /// Of bodies of a scene, which have these numbers there.
-    pub fn new(
-        scene: &'a Scene,
-        numbers: &[usize],
-        bodies: &'a [SubmergedBody],
-        numerics: &'a Numerics,
-        folder: Option<&'a Path>,
-    ) -> Self {
-        let number = |b: usize| numbers.iter().position(|w| *w == b);
-        let declared = scene.overlapping().into_iter();
-        let pairs = declared.filter_map(|(a, b)| Some((number(a)?, number(b)?)));
-        Self {
-            bodies,
-            walls: &scene.walls,
-            excluded: Exclusions::new(pairs),
-            numerics,
-            folder,
-        }
-    }
-
-    /// What each body became, with its name.
-    pub fn named(&self, made: impl IntoIterator<Item = Discretisation>) -> Vec<Discretisation> {
-        let named = |(d, body): (Discretisation, &SubmergedBody)| Discretisation {
-            body: body.name.to_string(),
-            ..d
-        };
-        made.into_iter().zip(self.bodies).map(named).collect()
     }
 }
 

@@ -3,7 +3,7 @@
 use crate::Result;
 use crate::adjoint::lie::{Pose, Vec3, exp_matrix};
 use crate::geometry::{Gap, MassProperties, TriMesh};
-use crate::scene::{Body, Placement, Refinement, Scene, Shape};
+use crate::scene::{Body, Placement, Refinement, Shape};
 use crate::shape;
 use std::path::Path;
 
@@ -106,27 +106,17 @@ pub(crate) fn surface(body: &Body, meshing: Meshing, edges: f64) -> Result<Optio
         None
     };
     // Where the water sees the shape itself and not a mesh of it, so do gravity and buoyancy.
-    let formula = if closed || coarse.is_some() {
-        MassProperties::by_formula(shape)?
-    } else {
-        None
+    let formula = match closed || coarse.is_some() {
+        true => MassProperties::by_formula(shape)?,
+        false => None,
     };
-    let properties = match &formula {
-        Some(p) => p.transformed(&at),
-        None => mesh.mass_properties(),
-    };
+    let properties = formula.map_or_else(|| mesh.mass_properties(), |p| p.transformed(&at));
     Ok(Some(Surface {
         properties,
         mesh,
         base,
         coarse,
     }))
-}
-
-/// The surfaces of all bodies of a scene; none for a body without a shape.
-pub(super) fn meshed(scene: &Scene, meshing: Meshing) -> Result<Vec<Option<Surface>>> {
-    let bodies = scene.bodies.iter();
-    bodies.map(|body| surface(body, meshing, 1.0)).collect()
 }
 
 /// Depth in edges up to which surfaces count as touching: rounding.

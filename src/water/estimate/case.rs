@@ -8,13 +8,12 @@ use crate::multibody::Tree;
 use crate::scene::{Scene, WallSurface};
 use crate::water::choices::{WaterChoices, surfaces};
 use crate::water::device::Device;
-use crate::water::fidelity::kind::Plan;
 use crate::water::fidelity::{Fidelity, compressed_all, responses};
 use crate::water::method::Method;
-use crate::water::method::kind::for_body;
+use crate::water::method::kind::Problem;
 use crate::water::numerics::Numerics;
 use crate::water::prepared::{Prepared, world_axes};
-use crate::water::submerged::{Problem, SubmergedBody, in_water};
+use crate::water::submerged::{SubmergedBody, in_water};
 use crate::water::surface::{Meshing, Surface, surface};
 use nalgebra::DMatrix;
 
@@ -120,10 +119,10 @@ impl<'a> Case<'a> {
 
     /// The bodies whose answers come from their meshes, by their numbers in the scene.
     pub fn meshed(&self) -> Vec<usize> {
-        let method = self.subject.choices.method.kind();
         let alone = self.fidelity.kind().solves_alone();
-        let formula = |w: &SubmergedBody| for_body(method, w).is_ok_and(|m| m.by_formula());
         let submerged = self.submerged(&self.surfaces);
+        let problem = self.problem(&submerged);
+        let formula = |w| problem.method_for(w).is_ok_and(|m| m.by_formula());
         let pairs = self.bodies.iter().zip(&submerged);
         let used = pairs
             .filter(|(_, w)| w.mesh.is_some() && w.added_mass.is_none() && !(alone && formula(w)));
@@ -163,9 +162,13 @@ impl<'a> Case<'a> {
     }
 
     fn problem<'b>(&'b self, bodies: &'b [SubmergedBody]) -> Problem<'b> {
-        let folder = self.subject.water.folder.as_deref();
-        let numerics = &self.subject.choices.numerics;
-        Problem::new(self.scene(), &self.bodies, bodies, numerics, folder)
+        let Subject { choices, water, .. } = self.subject;
+        let (method, numerics) = (choices.method.kind(), &choices.numerics);
+        Problem {
+            plan: &water.plan,
+            folder: water.folder.as_deref(),
+            ..Problem::new(self.scene(), &self.bodies, bodies, method, numerics)
+        }
     }
 
     /// The added mass with these surfaces; where bodies are compressed, what [`Reduced`] is off if
@@ -177,12 +180,9 @@ impl<'a> Case<'a> {
         if self.correction.is_some() {
             return self.correction(&submerged);
         }
-        let made = self.fidelity.kind().couple(
-            &self.problem(&submerged),
-            self.subject.choices.method.kind(),
-            &self.subject.water.plan,
-            &mut self.subject.water.device.clone(),
-        )?;
+        let mut device = self.subject.water.device.clone();
+        let problem = self.problem(&submerged);
+        let made = self.fidelity.kind().couple(&problem, &mut device)?;
         Ok(evaluate(made.coupling.as_ref(), &self.poses, &self.turn)?.0)
     }
 
@@ -193,12 +193,11 @@ impl<'a> Case<'a> {
 
     /// What the compressed bodies' added mass is off if they answer as `bodies` do.
     fn correction(&self, bodies: &[SubmergedBody]) -> Result<DMatrix<f64>> {
-        let method = self.subject.choices.method.kind();
         let own = self.submerged(&self.surfaces);
-        let coupling = compressed_all(&self.problem(&own), method, &self.subject.water.plan)?;
+        let coupling = compressed_all(&self.problem(&own))?;
         let made = coupling.reduced_bodies().iter();
         let gaps: Vec<f64> = made.map(|b| b.parts().fit.resolved_gap).collect();
-        let responses = responses(&self.problem(bodies), method, &gaps)?;
+        let responses = responses(&self.problem(bodies), &gaps)?;
         coupling.correction(&self.poses, &self.turn, &responses)
     }
 
@@ -274,10 +273,10 @@ impl<'a> Case<'a> {
             Fidelity::Full
         };
         let numerics = Numerics::default();
-        let problem = Problem::new(scene, &numbers, &submerged, &numerics, None);
+        let method = Method::Panel.kind();
+        let problem = Problem::new(scene, &numbers, &submerged, method, &numerics);
         let solve = |fidelity: Fidelity| -> Result<DMatrix<f64>> {
-            let (kind, method, plan) = (fidelity.kind(), Method::Panel.kind(), Plan::default());
-            let made = kind.couple(&problem, method, &plan, &mut Device::default())?;
+            let made = fidelity.kind().couple(&problem, &mut Device::default())?;
             Ok(evaluate(made.coupling.as_ref(), &poses, &turn)?.0)
         };
         let difference = solve(fidelity)? - solve(Fidelity::Isolated)?;

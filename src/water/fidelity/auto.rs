@@ -7,16 +7,16 @@
 //! starts with.
 
 use super::full::Full;
-use super::kind::{ErrorParts, FidelityKind, Knob, Plan, Planned, Start};
+use super::kind::{ErrorParts, FidelityKind, Knob, Planned, Start};
 use super::reduced::Reduced;
 use crate::adjoint::lie::Vec3;
 use crate::boundary::exact::lamb;
 use crate::coupling::reduced::{Cutoff, compress};
 use crate::geometry::{Gap, MassProperties, WallSurface};
 use crate::water::device::Device;
-use crate::water::method::kind::BodyMethod;
-use crate::water::numerics::Numerics;
-use crate::water::submerged::{Made, Problem};
+use crate::water::method::kind::Problem;
+use crate::water::numerics::{Numerics, Plan};
+use crate::water::submerged::Made;
 use crate::{Error, Result};
 use std::f64::consts::PI;
 
@@ -64,14 +64,8 @@ impl FidelityKind for Auto {
     }
 
     // A fidelity that chooses is in use itself only without water.
-    fn couple(
-        &self,
-        problem: &Problem,
-        method: &'static dyn BodyMethod,
-        plan: &Plan,
-        device: &mut Device,
-    ) -> Result<Made> {
-        Reduced.couple(problem, method, plan, device)
+    fn couple(&self, problem: &Problem, device: &mut Device) -> Result<Made> {
+        Reduced.couple(problem, device)
     }
 
     fn resolved_gap(&self, compressed: f64, edge: f64) -> f64 {

@@ -1,11 +1,11 @@
 //! All bodies solved together, at the resolution of their meshes.
 
-use super::kind::{ErrorParts, FidelityKind, Knob, Plan};
+use super::kind::{ErrorParts, FidelityKind, Knob};
 use crate::Result;
 use crate::geometry::Gap;
 use crate::water::device::Device;
-use crate::water::method::kind::BodyMethod;
-use crate::water::submerged::{Made, Problem};
+use crate::water::method::kind::{BodyMethod, Problem};
+use crate::water::submerged::Made;
 
 /// Gaps narrower than this many edges aren't resolved. A sphere near a wall: at 0.3 edges the gap
 /// adds 1 % to the error of its added mass with 320 faces (0.1 % with 5120), and the force along
@@ -27,14 +27,8 @@ impl FidelityKind for Full {
         false
     }
 
-    fn couple(
-        &self,
-        problem: &Problem,
-        method: &'static dyn BodyMethod,
-        _: &Plan,
-        device: &mut Device,
-    ) -> Result<Made> {
-        method.couple(problem, device)
+    fn couple(&self, problem: &Problem, device: &mut Device) -> Result<Made> {
+        problem.method.couple(problem, device)
     }
 
     fn idle_gpu(&self, method: &dyn BodyMethod) -> Result<Option<&'static str>> {

@@ -1,14 +1,13 @@
 //! Each body alone.
 
-use super::kind::{ErrorParts, FidelityKind, Knob, Plan};
+use super::kind::{ErrorParts, FidelityKind, Knob};
 use crate::Result;
 use crate::adjoint::lie::Mat6;
 use crate::coupling;
 use crate::geometry::Gap;
 use crate::water::device::Device;
-use crate::water::method::kind::{BodyMethod, for_body};
-use crate::water::numerics::Numerics;
-use crate::water::submerged::{Discretisation, Made, Problem, SubmergedBody, once, shared};
+use crate::water::method::kind::{BodyMethod, Problem};
+use crate::water::submerged::{Discretisation, Made, SubmergedBody, once, shared};
 use crate::water::surface::overlaps;
 
 /// Each body's own constant added mass.
@@ -22,11 +21,7 @@ struct Own {
 }
 
 impl Own {
-    fn new(
-        body: &SubmergedBody,
-        method: &'static dyn BodyMethod,
-        numerics: &Numerics,
-    ) -> Result<Self> {
+    fn new(problem: &Problem, body: &SubmergedBody) -> Result<Self> {
         if let Some(added_mass) = body.added_mass {
             return Ok(Self {
                 added_mass,
@@ -37,14 +32,14 @@ impl Own {
                 warnings: Vec::new(),
             });
         }
-        let method = for_body(method, body)?;
+        let method = problem.method_for(body)?;
         let faces = match method.by_formula() {
             true => 0,
             false => body.surface("isolated")?.faces().len(),
         };
         // Nothing is near: the flow around it isn't asked for.
         let far = body.mesh.map_or(1.0, |m| m.surface_area().sqrt());
-        let response = method.response(body, numerics, far)?;
+        let response = method.response(body, problem.numerics, far)?;
         Ok(Self {
             added_mass: response.added_mass(),
             as_made: Discretisation {
@@ -68,13 +63,7 @@ impl FidelityKind for Isolated {
         false
     }
 
-    fn couple(
-        &self,
-        problem: &Problem,
-        method: &'static dyn BodyMethod,
-        _: &Plan,
-        _: &mut Device,
-    ) -> Result<Made> {
+    fn couple(&self, problem: &Problem, _: &mut Device) -> Result<Made> {
         let mut warnings = Vec::new();
         if !problem.walls.is_empty() {
             warnings.push(format!(
@@ -82,7 +71,7 @@ impl FidelityKind for Isolated {
                 problem.walls.len()
             ));
         }
-        let made = shared(problem.bodies, |b| Own::new(b, method, problem.numerics))?;
+        let made = shared(problem.bodies, |b| Own::new(problem, b))?;
         warnings.extend(once(&made, |m| &m.warnings));
         Ok(Made {
             bodies: problem.named(made.iter().map(|m| m.as_made.clone())),

@@ -2,12 +2,11 @@
 
 use crate::Result;
 use crate::adjoint::lie::Pose;
-use crate::coupling::reduced::{Cutoff, compress};
 use crate::geometry::{Gap, Wall};
 use crate::water::device::Device;
-use crate::water::method::kind::BodyMethod;
-use crate::water::numerics::Numerics;
-use crate::water::submerged::{Made, Problem, SubmergedBody};
+use crate::water::method::kind::{BodyMethod, Problem};
+use crate::water::numerics::{Numerics, Plan};
+use crate::water::submerged::{Made, SubmergedBody};
 
 /// Choices that only some fidelities look at.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -20,15 +19,6 @@ pub enum Knob {
     Accuracy,
     /// Residual at which the coupled solve stops.
     Tolerance,
-}
-
-/// What is chosen for each body and pair; empty: what the settings say.
-#[derive(Clone, Debug, Default)]
-pub(crate) struct Plan {
-    /// Per body.
-    pub compress: Vec<compress::CompressSettings>,
-    /// Per pair of bodies, equal for a body and its images.
-    pub cutoffs: Vec<((usize, usize), Cutoff)>,
 }
 
 /// What a fidelity chooses for a scene, and why.
@@ -99,13 +89,7 @@ pub(crate) trait FidelityKind: Send + Sync {
     ///
     /// # Errors
     /// Bodies without a shape where one is needed, or whatever the discretisation reports.
-    fn couple(
-        &self,
-        problem: &Problem,
-        method: &'static dyn BodyMethod,
-        plan: &Plan,
-        device: &mut Device,
-    ) -> Result<Made>;
+    fn couple(&self, problem: &Problem, device: &mut Device) -> Result<Made>;
 
     /// Whether a GPU has something to compute with this method; if not, why.
     ///

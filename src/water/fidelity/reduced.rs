@@ -1,17 +1,16 @@
 //! All bodies coupled, each compressed to a few sources.
 
-use super::kind::{ErrorParts, FidelityKind, Knob, Plan};
+use super::kind::{ErrorParts, FidelityKind, Knob};
 use crate::adjoint::lie::Pose;
 use crate::boundary::Response;
 use crate::coupling::reduced::{self, ReducedBody, cache, compress};
 use crate::geometry::{Gap, TriMesh};
 use crate::water::device::Device;
-use crate::water::method::kind::{BodyMethod, for_body};
+use crate::water::method::kind::{BodyMethod, Problem};
 use crate::water::numerics::Numerics;
-use crate::water::submerged::{Discretisation, Made, Problem, SubmergedBody};
+use crate::water::submerged::{Discretisation, Made, SubmergedBody};
 use crate::water::surface::Coarse;
 use crate::{Error, Result};
-use std::path::Path;
 use std::sync::Arc;
 
 /// Multiple scattering between a few sources a body, walls as images.
@@ -30,20 +29,14 @@ impl FidelityKind for Reduced {
         true
     }
 
-    fn couple(
-        &self,
-        problem: &Problem,
-        method: &'static dyn BodyMethod,
-        plan: &Plan,
-        device: &mut Device,
-    ) -> Result<Made> {
-        let coupling = compressed_all(problem, method, plan)?;
+    fn couple(&self, problem: &Problem, device: &mut Device) -> Result<Made> {
+        let coupling = compressed_all(problem)?;
         let (bodies, made) = (problem.bodies, coupling.reduced_bodies());
         let mut as_made = Vec::with_capacity(made.len());
         for (m, body) in made.iter().zip(bodies) {
             let fit = &m.parts().fit;
             as_made.push(Discretisation {
-                method: for_body(method, body)?.label(),
+                method: problem.method_for(body)?.label(),
                 faces: body.mesh.map_or(0, |m| m.faces().len()),
                 unknowns: m.modes(),
                 points: m.points(),
@@ -56,7 +49,7 @@ impl FidelityKind for Reduced {
             });
         }
         Ok(Made {
-            warnings: warnings(problem, made, plan),
+            warnings: warnings(problem, made),
             bodies: problem.named(as_made),
             coupling: device.reduced(coupling)?,
         })
@@ -77,17 +70,12 @@ impl FidelityKind for Reduced {
 }
 
 /// All bodies compressed and coupled.
-pub(in crate::water) fn compressed_all(
-    problem: &Problem,
-    method: &'static dyn BodyMethod,
-    plan: &Plan,
-) -> Result<reduced::Reduced> {
-    let bodies = problem.bodies;
+pub(in crate::water) fn compressed_all(problem: &Problem) -> Result<reduced::Reduced> {
+    let (bodies, plan) = (problem.bodies, problem.plan);
     let mut made: Vec<Arc<ReducedBody>> = Vec::with_capacity(bodies.len());
     for (b, body) in bodies.iter().enumerate() {
-        let (method, numerics) = (for_body(method, body)?, problem.numerics);
-        let chosen = plan.compress.get(b).unwrap_or(&numerics.compress);
-        made.push(compressed(body, method, numerics, chosen, problem.folder)?);
+        let method = problem.method_for(body)?;
+        made.push(compressed(problem, body, method, problem.chosen(b))?);
     }
     let cutoff = |a: usize, b: usize| {
         let pair = (a.min(b), a.max(b));
@@ -104,7 +92,6 @@ pub(in crate::water) fn compressed_all(
 /// `gaps` (m, one a body) are resolved where the method has to know.
 pub(in crate::water) fn responses(
     problem: &Problem,
-    method: &'static dyn BodyMethod,
     gaps: &[f64],
 ) -> Result<Vec<Arc<dyn Response>>> {
     let bodies = problem.bodies;
@@ -113,7 +100,10 @@ pub(in crate::water) fn responses(
         let same = |a: &usize| bodies[*a].equal(body) && gaps[*a] == gaps[b];
         out.push(match (0..b).find(same) {
             Some(a) => out[a].clone(),
-            None => Arc::from(for_body(method, body)?.response(body, problem.numerics, gaps[b])?),
+            None => {
+                let method = problem.method_for(body)?;
+                Arc::from(method.response(body, problem.numerics, gaps[b])?)
+            }
         });
     }
     Ok(out)
@@ -124,7 +114,7 @@ pub(in crate::water) fn responses(
 const MISSED: f64 = 0.6;
 
 /// What the user should know of compressed bodies.
-fn warnings(problem: &Problem, made: &[Arc<ReducedBody>], plan: &Plan) -> Vec<String> {
+fn warnings(problem: &Problem, made: &[Arc<ReducedBody>]) -> Vec<String> {
     let (bodies, mut out) = (problem.bodies, Vec::new());
     for (b, (body, made)) in bodies.iter().zip(made).enumerate() {
         if bodies[..b].iter().any(|a| a.equal(body)) {
@@ -134,7 +124,6 @@ fn warnings(problem: &Problem, made: &[Arc<ReducedBody>], plan: &Plan) -> Vec<St
         let size = parts.radius;
         let said = parts.fit.warnings.iter();
         out.extend(said.map(|w| format!("{w} (lengths of this message in units of {size:.3e} m)")));
-        let asked = plan.compress.get(b).unwrap_or(&problem.numerics.compress);
         let got = parts.fit.resolved_gap;
         let missed = parts.fit.scattered.max(parts.fit.radiated);
         if missed > MISSED {
@@ -146,7 +135,7 @@ fn warnings(problem: &Problem, made: &[Arc<ReducedBody>], plan: &Plan) -> Vec<St
                 100.0 * missed
             ));
         }
-        if let Some(asked) = asked.resolved_gap.filter(|a| *a < 0.98 * got) {
+        if let Some(asked) = problem.chosen(b).resolved_gap.filter(|a| *a < 0.98 * got) {
             out.push(format!(
                 "body {:?}: gaps under {got:.3e} m aren't resolved by its compressed sources, for all \
                  that {asked:.3e} m were asked for: its surface is too large; use a plane wall for a \
@@ -166,11 +155,10 @@ const GRID: f64 = (1u64 << 30) as f64;
 /// It is computed in units of its own size, with lengths rounded to [`GRID`]: bodies of the same
 /// shape share it whatever their size, to the last bit.
 fn compressed(
+    problem: &Problem,
     body: &SubmergedBody,
     method: &'static dyn BodyMethod,
-    numerics: &Numerics,
     chosen: &compress::CompressSettings,
-    folder: Option<&Path>,
 ) -> Result<Arc<ReducedBody>> {
     chosen.validate()?;
     let mesh = method.layout(body)?;
@@ -205,11 +193,11 @@ fn compressed(
         resolved_gap: Some(gap),
         ..*chosen
     };
-    let made_from = method.made_from(&own, numerics);
+    let made_from = method.made_from(&own, problem.numerics);
     let key = cache::Key::new(&mesh, &made_from, &chosen);
-    let found = cache::fetch(key, folder, || {
+    let found = cache::fetch(key, problem.folder, || {
         let finest = compress::finest_gap(mesh.surface_area());
-        let response = method.response(&own, numerics, gap.max(finest))?;
+        let response = method.response(&own, problem.numerics, gap.max(finest))?;
         compress::compress(body.name, &mesh, response.as_ref(), &chosen)
     });
     let found = found.map_err(|e| e.in_units_of(size))?;

@@ -1,16 +1,14 @@
 //! The most accurate method that costs nothing at run time.
 
 use super::exact::Exact;
-use super::kind::BodyMethod;
+use super::kind::{BodyMethod, Problem, Solved};
 use super::mfs::Mfs;
 use super::panel::Panel;
 use crate::Result;
-use crate::boundary::{Method, Response};
-use crate::geometry::TriMesh;
+use crate::boundary::Method;
 use crate::water::device::Device;
 use crate::water::numerics::Numerics;
-use crate::water::submerged::{Made, Problem, SubmergedBody};
-use std::borrow::Cow;
+use crate::water::submerged::{Made, SubmergedBody};
 
 /// Closed forms where there is one, else panels; vertex sources where all bodies are solved together.
 pub(super) struct Auto;
@@ -45,20 +43,11 @@ impl BodyMethod for Auto {
         true
     }
 
-    fn layout<'a>(&self, body: &SubmergedBody<'a>) -> Result<Cow<'a, TriMesh>> {
-        self.of(body).layout(body)
-    }
-
     fn made_from(&self, body: &SubmergedBody, numerics: &Numerics) -> serde_json::Value {
         self.of(body).made_from(body, numerics)
     }
 
-    fn response(
-        &self,
-        body: &SubmergedBody,
-        numerics: &Numerics,
-        gap: f64,
-    ) -> Result<Box<dyn Response>> {
+    fn response(&self, body: &SubmergedBody, numerics: &Numerics, gap: f64) -> Solved {
         self.of(body).response(body, numerics, gap)
     }
 

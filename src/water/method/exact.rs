@@ -1,13 +1,13 @@
 //! Closed forms of spheres and ellipsoids.
 
-use super::kind::BodyMethod;
-use crate::boundary::{ExactBoundary, Response};
+use super::kind::{BodyMethod, Problem, Solved};
+use crate::boundary::ExactBoundary;
 use crate::geometry::TriMesh;
 use crate::scene::Shape;
 use crate::shape;
 use crate::water::device::Device;
 use crate::water::numerics::Numerics;
-use crate::water::submerged::{Made, Problem, SubmergedBody};
+use crate::water::submerged::{Made, SubmergedBody};
 use crate::{Error, Result};
 use std::borrow::Cow;
 use std::path::Path;
@@ -56,7 +56,7 @@ impl BodyMethod for Exact {
         serde_json::json!(["exact", formula])
     }
 
-    fn response(&self, body: &SubmergedBody, _: &Numerics, gap: f64) -> Result<Box<dyn Response>> {
+    fn response(&self, body: &SubmergedBody, _: &Numerics, gap: f64) -> Solved {
         let (axes, pose) = body.ellipsoid.as_ref().ok_or_else(|| no_formula(body))?;
         Ok(Box::new(ExactBoundary::new(body.name, *axes, pose, gap)?))
     }

@@ -2,11 +2,18 @@
 
 use crate::Result;
 use crate::boundary::Response;
-use crate::geometry::TriMesh;
+use crate::coupling::Exclusions;
+use crate::coupling::reduced::compress::CompressSettings;
+use crate::geometry::{TriMesh, Wall};
+use crate::scene::Scene;
 use crate::water::device::Device;
-use crate::water::numerics::Numerics;
-use crate::water::submerged::{Made, Problem, SubmergedBody};
+use crate::water::numerics::{Numerics, Plan};
+use crate::water::submerged::{Discretisation, Made, SubmergedBody};
 use std::borrow::Cow;
+use std::path::Path;
+
+/// A body alone, solved.
+pub(crate) type Solved = Result<Box<dyn Response>>;
 
 /// A way to solve one body in unbounded fluid, and, where it has one, its coupled system of all bodies.
 pub(crate) trait BodyMethod: Send + Sync {
@@ -46,12 +53,7 @@ pub(crate) trait BodyMethod: Send + Sync {
     ///
     /// # Errors
     /// A body without a shape, or one that can't be solved on its mesh.
-    fn response(
-        &self,
-        body: &SubmergedBody,
-        numerics: &Numerics,
-        gap: f64,
-    ) -> Result<Box<dyn Response>>;
+    fn response(&self, body: &SubmergedBody, numerics: &Numerics, gap: f64) -> Solved;
 
     /// All bodies solved together (fidelity full).
     ///
@@ -73,13 +75,68 @@ pub(crate) trait BodyMethod: Send + Sync {
     }
 }
 
-/// The method for a body where `method` is asked for: itself, or the one that it leaves the body to.
-///
-/// # Errors
-/// A body that it can't solve.
-pub(crate) fn for_body(
-    method: &'static dyn BodyMethod,
-    body: &SubmergedBody,
-) -> Result<&'static dyn BodyMethod> {
-    Ok(method.leaves_to(body)?.unwrap_or(method))
+/// The bodies in the water, what is around them, and how they are solved.
+pub(crate) struct Problem<'a> {
+    pub bodies: &'a [SubmergedBody<'a>],
+    pub walls: &'a [Wall],
+    /// Pairs that don't feel each other, by their numbers among `bodies`.
+    pub excluded: Exclusions,
+    /// The method that is asked for.
+    pub method: &'static dyn BodyMethod,
+    pub numerics: &'a Numerics,
+    pub plan: &'a Plan,
+    /// Where compressed bodies are kept.
+    pub folder: Option<&'a Path>,
 }
+
+impl<'a> Problem<'a> {
+    /// Of bodies of a scene, which have these numbers there, without a plan.
+    pub fn new(
+        scene: &'a Scene,
+        numbers: &[usize],
+        bodies: &'a [SubmergedBody],
+        method: &'static dyn BodyMethod,
+        numerics: &'a Numerics,
+    ) -> Self {
+        let number = |b: usize| numbers.iter().position(|w| *w == b);
+        let declared = scene.overlapping().into_iter();
+        let pairs = declared.filter_map(|(a, b)| Some((number(a)?, number(b)?)));
+        Self {
+            bodies,
+            walls: &scene.walls,
+            excluded: Exclusions::new(pairs),
+            method,
+            numerics,
+            plan: &NO_PLAN,
+            folder: None,
+        }
+    }
+
+    /// The method for a body: the one asked for, or another that it leaves the body to.
+    ///
+    /// # Errors
+    /// A body that it can't solve.
+    pub fn method_for(&self, body: &SubmergedBody) -> Result<&'static dyn BodyMethod> {
+        Ok(self.method.leaves_to(body)?.unwrap_or(self.method))
+    }
+
+    /// How body `b` is compressed.
+    pub fn chosen(&self, b: usize) -> &CompressSettings {
+        let planned = self.plan.compress.get(b);
+        planned.unwrap_or(&self.numerics.compress)
+    }
+
+    /// What each body became, with its name.
+    pub fn named(&self, made: impl IntoIterator<Item = Discretisation>) -> Vec<Discretisation> {
+        let named = |(d, body): (Discretisation, &SubmergedBody)| Discretisation {
+            body: body.name.to_string(),
+            ..d
+        };
+        made.into_iter().zip(self.bodies).map(named).collect()
+    }
+}
+
+static NO_PLAN: Plan = Plan {
+    compress: Vec::new(),
+    cutoffs: Vec::new(),
+};

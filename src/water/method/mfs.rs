@@ -1,12 +1,12 @@
 //! Fundamental solutions: sources inside the surface.
 
-use super::kind::BodyMethod;
+use super::kind::{BodyMethod, Problem, Solved};
 use crate::Result;
-use crate::boundary::{self, BodyBoundary, Response};
+use crate::boundary::{self, BodyBoundary};
 use crate::coupling::full::{FullSolver, MfsBody, Model};
 use crate::water::device::Device;
 use crate::water::numerics::Numerics;
-use crate::water::submerged::{Discretisation, Made, Problem, SubmergedBody, once, shared};
+use crate::water::submerged::{Discretisation, Made, SubmergedBody, once, shared};
 use std::sync::Arc;
 
 /// Sources under vertices or faces.
@@ -34,12 +34,7 @@ impl BodyMethod for Mfs {
         serde_json::json!(["mfs", self.settings(numerics)])
     }
 
-    fn response(
-        &self,
-        body: &SubmergedBody,
-        numerics: &Numerics,
-        _: f64,
-    ) -> Result<Box<dyn Response>> {
+    fn response(&self, body: &SubmergedBody, numerics: &Numerics, _: f64) -> Solved {
         let mesh = body.surface("reduced")?;
         let settings = self.settings(numerics);
         let made = BodyBoundary::new(body.name, mesh, &settings)?;

@@ -1,13 +1,13 @@
 //! Direct boundary elements.
 
-use super::kind::BodyMethod;
+use super::kind::{BodyMethod, Problem, Solved};
+use crate::boundary::PanelBoundary;
 use crate::boundary::panel::Extrapolated;
-use crate::boundary::{PanelBoundary, Response};
 use crate::coupling::full::FullSolver;
 use crate::coupling::panel::{self, PanelCoupled};
 use crate::water::device::Device;
 use crate::water::numerics::Numerics;
-use crate::water::submerged::{Discretisation, Made, Problem, SubmergedBody, once, shared};
+use crate::water::submerged::{Discretisation, Made, SubmergedBody, once, shared};
 use crate::water::surface::Coarse;
 use crate::{Error, Result};
 
@@ -32,7 +32,7 @@ impl BodyMethod for Panel {
         serde_json::json!(["panel", coarse])
     }
 
-    fn response(&self, body: &SubmergedBody, _: &Numerics, _: f64) -> Result<Box<dyn Response>> {
+    fn response(&self, body: &SubmergedBody, _: &Numerics, _: f64) -> Solved {
         let mesh = body.surface("reduced")?;
         let fine = PanelBoundary::new(body.name, mesh)?;
         Ok(match body.coarse {

@@ -10,7 +10,7 @@ use serde::Serialize;
 use super::input;
 use super::options::{Time, Water, positive};
 use super::output::{ChoicesReport, Output, write_warnings};
-use super::progress::ProgressBar;
+use super::progress;
 use crate::Result;
 use crate::scene::Scene;
 use crate::simulate::gradcheck::{self, gradcheck_with};
@@ -84,8 +84,9 @@ pub(super) struct CheckReport {
 
 pub(super) fn main(arguments: &Arguments, output: Output) -> Result<ExitCode> {
     let scene = input::scene(&arguments.scene, arguments.time.steps)?;
-    let progress = ProgressBar::new("directions", 3 * arguments.directions);
-    let report = check(&scene, arguments, &progress)?;
+    let progress = progress::bar("directions", 3 * arguments.directions);
+    let done = |done, all| progress::set(&progress, done, all);
+    let report = check(&scene, arguments, done)?;
     drop(progress);
     output.result(&report);
     Ok(if report.ok {
@@ -96,7 +97,11 @@ pub(super) fn main(arguments: &Arguments, output: Output) -> Result<ExitCode> {
 }
 
 /// The check at a tight tolerance, then the times at the usual one.
-fn check(scene: &Scene, arguments: &Arguments, progress: &ProgressBar) -> Result<CheckReport> {
+fn check(
+    scene: &Scene,
+    arguments: &Arguments,
+    done: impl FnMut(usize, usize),
+) -> Result<CheckReport> {
     let usual = arguments.time.choose(arguments.water.settings());
     let tight = match arguments.water.tolerance {
         Some(_) => usual.clone(),
@@ -112,7 +117,7 @@ fn check(scene: &Scene, arguments: &Arguments, progress: &ProgressBar) -> Result
             seed: arguments.seed,
             timings: 0,
         },
-        |done, all| progress.set_of(done, all),
+        done,
     )?;
     let growth = (!arguments.no_growth).then(|| growth(&simulator, steps));
     let growth = growth.transpose()?;

@@ -11,7 +11,7 @@ use serde::Serialize;
 use super::input;
 use super::options::{Time, Water};
 use super::output::{ChoicesReport, Output, or_dash, peak_memory_mb, write_warnings};
-use super::progress::ProgressBar;
+use super::progress;
 use crate::Result;
 use crate::scene::Scene;
 use crate::simulate::{Controls, Recording};
@@ -69,8 +69,9 @@ pub(super) fn main(arguments: &Arguments, output: Output) -> Result<ExitCode> {
     if let Some(folder) = &arguments.out {
         Recording::prepare(folder)?;
     }
-    let progress = ProgressBar::new("steps", scene.steps);
-    let (mut report, recording) = simulate(&scene, arguments, &progress)?;
+    let progress = progress::bar("steps", scene.steps);
+    let done = |done| progress::set(&progress, done, scene.steps);
+    let (mut report, recording) = simulate(&scene, arguments, done)?;
     drop(progress);
     if let Some(folder) = &arguments.out {
         report.files = recording.write(folder)?.into();
@@ -83,14 +84,14 @@ pub(super) fn main(arguments: &Arguments, output: Output) -> Result<ExitCode> {
 fn simulate(
     scene: &Scene,
     arguments: &Arguments,
-    progress: &ProgressBar,
+    done: impl FnMut(usize) + Send,
 ) -> Result<(RunReport, Recording)> {
     let start = Instant::now();
     let settings = arguments.time.choose(arguments.water.settings());
     let simulator = arguments.water.simulator(scene, settings)?;
     let setup_seconds = start.elapsed().as_secs_f64();
     let controls = Controls::zeros(&simulator, scene.steps);
-    let rollout = simulator.rollout_with(&controls, |done| progress.set(done))?;
+    let rollout = simulator.rollout_with(&controls, done)?;
     let seconds = start.elapsed().as_secs_f64();
     let summary = rollout.summary();
     let last = &rollout.samples()[rollout.steps()];

@@ -12,7 +12,7 @@ use clap::Args;
 use super::input;
 use super::options::{choice, positive, seconds, tolerance};
 use super::output::Output;
-use super::progress::ProgressBar;
+use super::progress;
 use crate::Result;
 use crate::dynamics::Integrator;
 use crate::simulate::{Fidelity, Method};
@@ -108,10 +108,10 @@ pub(super) fn main(arguments: &Arguments, output: Output) -> Result<ExitCode> {
             TradeoffStage::Configurations => "configurations",
         };
         if bar.as_ref().is_none_or(|(of, _)| *of != what) {
-            bar = Some((what, ProgressBar::new(what, now.all)));
+            bar = Some((what, progress::bar(what, now.all)));
         }
         if let Some((_, bar)) = &bar {
-            bar.set_of(now.done, now.all);
+            progress::set(bar, now.done, now.all);
         }
         ControlFlow::Continue(())
     })?;

@@ -1,8 +1,7 @@
 //! The closed triangle mesh and the geometry of its faces.
 
-use super::ball::Ball;
 use super::check::{Kind, MeshReport, check_parts};
-use super::points::{area_vector, bounds, vertex_normal_sums};
+use super::points::{Ball, area_vector, bounds, vertex_normal_sums};
 use super::topology;
 use crate::error::{Error, Result};
 use hydrograd_adjoint::lie::{Pose, Vec3};

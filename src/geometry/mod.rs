@@ -12,7 +12,6 @@
 //!   tangent balls and winding numbers of one mesh.
 //! - [`Wall`], [`HalfSpace`], [`Image`]: plane walls and the mirror images that they make.
 
-mod ball;
 mod check;
 mod faces;
 mod gap;
@@ -34,7 +33,6 @@ mod triangle;
 mod wall;
 pub(crate) mod weld;
 
-pub use ball::Ball;
 pub use check::{Finding, Kind, MeshReport, Severity, check_parts};
 pub use faces::Faces;
 pub(crate) use faces::equilateral_edge;
@@ -44,6 +42,7 @@ pub(crate) use interior::Interior;
 pub use mass::MassProperties;
 pub(crate) use mesh::check_scale;
 pub use mesh::{Edge, TriMesh};
+pub use points::Ball;
 pub(crate) use points::bounds;
 pub use refine::{ExactSurface, MAX_ADDED_FACES, Refinement, refine, validate_refinements};
 pub use wall::{HalfSpace, Wall, WallSurface};

@@ -1,8 +1,7 @@
 //! One mesh, ready to be asked for closest points: its faces in a tree of boxes, and its normals.
 
-use super::ball::Ball;
 use super::mesh::TriMesh;
-use super::points::{bounds, winding_number};
+use super::points::{Ball, bounds, winding_number};
 use super::triangle::{Feature, Triangle};
 use super::wall::HalfSpace;
 use hydrograd_adjoint::lie::{Pose, Vec3};
@@ -75,11 +74,8 @@ impl MeshTree {
 
     /// Mean edge length around a face, m.
     pub fn edge_at_face(&self, face: usize) -> f64 {
-        self.corners[face]
-            .iter()
-            .map(|&v| self.edge_at_vertex[v])
-            .sum::<f64>()
-            / 3.0
+        let edges = self.corners[face].map(|v| self.edge_at_vertex[v]);
+        edges.iter().sum::<f64>() / 3.0
     }
 
     /// Centroid of a face.
@@ -88,25 +84,30 @@ impl MeshTree {
         a + ((b - a) + (c - a)) / 3.0
     }
 
-    /// Whether a point can be inside at all.
-    pub fn boxed(&self, p: &Vec3) -> bool {
-        self.nodes[0].distance_squared(p) <= 0.0
-    }
-
     /// Depth of a point inside the surface if it is above `floor` ≥ 0.
     pub fn depth_above(&self, p: &Vec3, floor: f64) -> Option<f64> {
-        if !self.boxed(p) {
+        if self.nodes[0].distance_squared(p) > 0.0 {
             return None;
         }
         let stop = floor * floor;
-        let mut best = Nearest::none(p);
-        self.nearest(0, p, stop, &mut best);
+        let best = self.nearest(p, stop);
         (best.square > stop && best.square.is_finite() && self.inside(p, &best))
             .then(|| best.square.sqrt())
     }
 
     /// Closest point to `p`; given up once it is nearer than the root of `stop`.
-    fn nearest(&self, node: usize, p: &Vec3, stop: f64, best: &mut Nearest) {
+    fn nearest(&self, p: &Vec3, stop: f64) -> Nearest {
+        let mut best = Nearest {
+            square: f64::INFINITY,
+            point: *p,
+            face: 0,
+            feature: Feature::Face,
+        };
+        self.descend(0, p, stop, &mut best);
+        best
+    }
+
+    fn descend(&self, node: usize, p: &Vec3, stop: f64, best: &mut Nearest) {
         let Node { faces, second, .. } = &self.nodes[node];
         let Some(second) = *second else {
             for face in faces.clone() {
@@ -129,7 +130,7 @@ impl MeshTree {
         }
         for (bound, child) in children {
             if bound < best.square && best.square > stop {
-                self.nearest(child, p, stop, best);
+                self.descend(child, p, stop, best);
             }
         }
     }
@@ -186,15 +187,13 @@ impl MeshTree {
 
     /// Closest point to `p` and its face.
     pub fn closest(&self, p: &Vec3) -> (Vec3, usize) {
-        let mut best = Nearest::none(p);
-        self.nearest(0, p, 0.0, &mut best);
+        let best = self.nearest(p, 0.0);
         (best.point, best.face)
     }
 
     /// Distance of a point, negative inside, and the closest face; none if the point isn't finite.
     pub fn signed(&self, p: &Vec3) -> Option<(f64, usize)> {
-        let mut best = Nearest::none(p);
-        self.nearest(0, p, 0.0, &mut best);
+        let best = self.nearest(p, 0.0);
         let distance = best.square.sqrt();
         let inside = distance > 0.0 && self.inside(p, &best);
         let signed = if inside { -distance } else { distance };
@@ -221,12 +220,13 @@ impl MeshTree {
                 continue;
             }
             if let Some(second) = n.second {
-                let (near, far) = (node + 1, second);
-                if self.nodes[near].center.dot(along) <= self.nodes[far].center.dot(along) {
-                    stack.extend([far, near]);
+                let (first, at) = (node + 1, |n: usize| self.nodes[n].center.dot(along));
+                let near = at(first) <= at(second);
+                stack.extend(if near {
+                    [second, first]
                 } else {
-                    stack.extend([near, far]);
-                }
+                    [first, second]
+                });
                 continue;
             }
             for f in n.faces.clone() {
@@ -250,31 +250,18 @@ struct Nearest {
     feature: Feature,
 }
 
-impl Nearest {
-    fn none(p: &Vec3) -> Self {
-        Self {
-            square: f64::INFINITY,
-            point: *p,
-            face: 0,
-            feature: Feature::Face,
-        }
-    }
-}
-
 /// Whether the segment from `from` along `along` meets a box.
 fn segment_meets(from: &Vec3, along: &Vec3, node: &Node) -> bool {
     let middle = from + along * 0.5 - node.center;
     let half = along.abs() * 0.5;
     let apart = (0..3).any(|i| middle[i].abs() > half[i] + node.half[i]);
-    if apart {
-        return false;
-    }
-    (0..3).all(|i| {
-        let (j, k) = ((i + 1) % 3, (i + 2) % 3);
-        let offset = (middle[j] * along[k] - middle[k] * along[j]).abs() * 0.5;
-        let room = half[j] * node.half[k] + half[k] * node.half[j];
-        offset <= room * (1.0 + 1e-9)
-    })
+    !apart
+        && (0..3).all(|i| {
+            let (j, k) = ((i + 1) % 3, (i + 2) % 3);
+            let offset = (middle[j] * along[k] - middle[k] * along[j]).abs() * 0.5;
+            let room = half[j] * node.half[k] + half[k] * node.half[j];
+            offset <= room * (1.0 + 1e-9)
+        })
 }
 
 /// Builds the tree over `order`, whose first element is number `start`, and returns its root.

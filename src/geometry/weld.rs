@@ -6,54 +6,36 @@ use std::collections::HashMap;
 /// For each vertex the first vertex at its place: bit for bit if `tolerance` is zero, else within
 /// that distance (m). Vertices that aren't finite stay alone.
 pub(crate) fn representatives(vertices: &[Vec3], tolerance: f64) -> Vec<usize> {
-    if tolerance > 0.0 {
-        return near(vertices, tolerance);
-    }
     let mut first: HashMap<[u64; 3], usize> = HashMap::with_capacity(vertices.len());
-    vertices
-        .iter()
-        .enumerate()
-        .map(|(i, p)| {
-            if !p.iter().all(|x| x.is_finite()) {
-                return i;
-            }
+    let mut grid: HashMap<[i64; 3], Vec<usize>> = HashMap::new();
+    let cell = |p: &Vec3| [p.x, p.y, p.z].map(|x| (x / (2.0 * tolerance)).floor() as i64);
+    let representative = |(i, p): (usize, &Vec3)| {
+        if !p.iter().all(|x| x.is_finite()) {
+            return i;
+        }
+        if tolerance <= 0.0 {
             // Adding zero turns −0 into 0.
             let key = [p.x, p.y, p.z].map(|x| (x + 0.0).to_bits());
-            *first.entry(key).or_insert(i)
-        })
-        .collect()
-}
-
-fn near(vertices: &[Vec3], tolerance: f64) -> Vec<usize> {
-    let cell = |p: &Vec3| [p.x, p.y, p.z].map(|x| (x / (2.0 * tolerance)).floor() as i64);
-    let mut grid: HashMap<[i64; 3], Vec<usize>> = HashMap::with_capacity(vertices.len());
-    vertices
-        .iter()
-        .enumerate()
-        .map(|(i, p)| {
-            if !p.iter().all(|x| x.is_finite()) {
-                return i;
-            }
-            // A ball of this radius reaches at most two cells in each direction.
-            let low = cell(&p.add_scalar(-tolerance));
-            let high = cell(&p.add_scalar(tolerance));
-            for x in low[0]..=high[0] {
-                for y in low[1]..=high[1] {
-                    for z in low[2]..=high[2] {
-                        let same = grid.get(&[x, y, z]).and_then(|list| {
-                            list.iter()
-                                .find(|&&j| (vertices[j] - p).norm() <= tolerance)
-                        });
-                        if let Some(&j) = same {
-                            return j;
-                        }
+            return *first.entry(key).or_insert(i);
+        }
+        // A ball of this radius reaches at most two cells in each direction.
+        let low = cell(&p.add_scalar(-tolerance));
+        let high = cell(&p.add_scalar(tolerance));
+        for x in low[0]..=high[0] {
+            for y in low[1]..=high[1] {
+                for z in low[2]..=high[2] {
+                    let near = |j: &&usize| (vertices[**j] - p).norm() <= tolerance;
+                    let same = grid.get(&[x, y, z]).and_then(|list| list.iter().find(near));
+                    if let Some(&j) = same {
+                        return j;
                     }
                 }
             }
-            grid.entry(cell(p)).or_default().push(i);
-            i
-        })
-        .collect()
+        }
+        grid.entry(cell(p)).or_default().push(i);
+        i
+    };
+    vertices.iter().enumerate().map(representative).collect()
 }
 
 #[cfg(test)]

@@ -19,9 +19,6 @@ pub(super) struct Start {
 
 impl Start {
     /// M_f and M alone.
-    ///
-    /// # Errors
-    /// Whatever the coupling reports.
     pub fn values(simulator: &Simulator) -> Result<Self> {
         let (system, parameters) = (simulator.system(), simulator.parameters());
         let (q, _) = simulator.start();
@@ -39,9 +36,6 @@ impl Start {
     }
 
     /// The same with the forces on it: the scene's own, and those that its velocity makes.
-    ///
-    /// # Errors
-    /// Whatever the coupling reports, and a method without derivatives.
     pub fn with_forces(self, simulator: &Simulator) -> Result<Self> {
         let (q, v) = simulator.start();
         let system = simulator.system();

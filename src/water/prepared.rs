@@ -137,11 +137,10 @@ fn plan(
 pub(crate) fn world_axes(poses: &[Pose]) -> DMatrix<f64> {
     let n = 6 * poses.len();
     let mut axes = DMatrix::zeros(n, n);
-    for (w, pose) in poses.iter().enumerate() {
-        for half in 0..2 {
-            axes.fixed_view_mut::<3, 3>(6 * w + 3 * half, 6 * w + 3 * half)
-                .copy_from(&pose.rotation.transpose());
-        }
+    for half in 0..2 * poses.len() {
+        let axis = poses[half / 2].rotation.transpose();
+        axes.fixed_view_mut::<3, 3>(3 * half, 3 * half)
+            .copy_from(&axis);
     }
     axes
 }

@@ -1,7 +1,7 @@
 //! The bodies in the water, what is around them, and what was made of them.
 
 use super::surface::{Coarse, Surface, pose, semi_axes};
-use crate::adjoint::lie::{Mat6, Pose};
+use crate::adjoint::lie::{Mat6, Pose, Vec3};
 use crate::coupling::Coupling;
 use crate::geometry::TriMesh;
 use crate::multibody::Tree;
@@ -68,15 +68,12 @@ impl<'a> SubmergedBody<'a> {
 
     /// Whether both have the same surface in their own frames.
     pub fn equal(&self, other: &SubmergedBody) -> bool {
-        let same =
-            |a: &TriMesh, b: &TriMesh| a.vertices() == b.vertices() && a.faces() == b.faces();
+        fn parts<'b>(body: &SubmergedBody<'b>) -> Option<(&'b [Vec3], &'b [[usize; 3]])> {
+            body.mesh.map(|m| (m.vertices(), m.faces()))
+        }
         self.added_mass == other.added_mass
             && self.ellipsoid == other.ellipsoid
-            && match (self.mesh, other.mesh) {
-                (Some(a), Some(b)) => same(a, b),
-                (None, None) => true,
-                _ => false,
-            }
+            && parts(self) == parts(other)
     }
 }
 

@@ -66,61 +66,50 @@ fn aim(row: &TradeoffRow) -> String {
     }
 }
 
-fn cells(row: &TradeoffRow, reference: &TradeoffReference) -> [String; 15] {
-    let count = |n: Option<usize>| n.map_or_else(|| "-".into(), |n| n.to_string());
-    let mark = |on: bool, mark: &str| if on { mark.to_string() } else { String::new() };
-    let c = &row.configuration;
-    [
-        mark(row.pareto, "*") + &mark(row.pareto_end_state, "+"),
-        c.fidelity.to_string(),
-        c.method.to_string(),
-        count(row.faces),
-        count(row.unknowns),
-        count(row.points),
-        aim(row),
-        <&str>::from(c.integrator).into(),
-        short(c.time_step),
-        number(row.ms_per_step),
-        number(row.ms_per_gradient_step),
-        error(
-            row.added_mass_rel_error,
-            row.below_reference,
-            Some(&reference.added_mass),
-        ),
-        error(
-            row.acceleration_rel_error,
-            row.acceleration_below_reference,
-            reference.acceleration.as_ref(),
-        ),
-        error(
-            row.end_state_rel_error,
-            row.end_state_below_reference,
-            reference.end_state.as_ref(),
-        ),
-        number(row.setup_seconds),
-    ]
+fn count(n: Option<usize>) -> String {
+    n.map_or_else(|| "-".into(), |n| n.to_string())
 }
+
+fn mark(row: &TradeoffRow) -> String {
+    let marks = [(row.pareto, "*"), (row.pareto_end_state, "+")];
+    let marks = marks.iter().filter(|(on, _)| *on);
+    marks.map(|(_, mark)| *mark).collect()
+}
+
+/// What stands over a column, and in it.
+type Column = (&'static str, fn(&TradeoffRow, &TradeoffReference) -> String);
+
+const COLUMNS: [Column; 15] = [
+    ("", |r, _| mark(r)),
+    ("fidelity", |r, _| r.configuration.fidelity.to_string()),
+    ("method", |r, _| r.configuration.method.to_string()),
+    ("faces", |r, _| count(r.faces)),
+    ("unknowns", |r, _| count(r.unknowns)),
+    ("points", |r, _| count(r.points)),
+    ("set by", |r, _| aim(r)),
+    ("integrator", |r, _| {
+        <&str>::from(r.configuration.integrator).into()
+    }),
+    ("dt, s", |r, _| short(r.configuration.time_step)),
+    ("ms/step", |r, _| number(r.ms_per_step)),
+    ("ms/gradient", |r, _| number(r.ms_per_gradient_step)),
+    ("M_f", |r, of| {
+        let below = r.below_reference;
+        error(r.added_mass_rel_error, below, Some(&of.added_mass))
+    }),
+    ("acceleration", |r, of| {
+        let below = r.acceleration_below_reference;
+        error(r.acceleration_rel_error, below, of.acceleration.as_ref())
+    }),
+    ("end state", |r, of| {
+        let below = r.end_state_below_reference;
+        error(r.end_state_rel_error, below, of.end_state.as_ref())
+    }),
+    ("setup, s", |r, _| number(r.setup_seconds)),
+];
 
 /// Configurations left out that people are told by name.
 const LISTED: usize = 12;
-
-const HEAD: [&str; 15] = [
-    "",
-    "fidelity",
-    "method",
-    "faces",
-    "unknowns",
-    "points",
-    "set by",
-    "integrator",
-    "dt, s",
-    "ms/step",
-    "ms/gradient",
-    "M_f",
-    "acceleration",
-    "end state",
-    "setup, s",
-];
 
 fn quantity(quantity: &ReferenceQuantity) -> String {
     match quantity.error_estimate {
@@ -160,13 +149,14 @@ impl fmt::Display for TradeoffReport {
             writeln!(f, "  {note}")?;
         }
         writeln!(f)?;
-        let rows: Vec<_> = found.rows.iter().map(|r| cells(r, reference)).collect();
-        let width = |k: usize| {
-            let cells = rows.iter().map(|r| r[k].chars().count());
-            cells.fold(HEAD[k].chars().count(), usize::max)
-        };
-        let widths: [usize; 15] = std::array::from_fn(width);
-        let mut line = |cells: [&str; 15], end: &str| {
+        let cells = |r| COLUMNS.map(|(_, cell)| cell(r, reference));
+        let rows: Vec<_> = found.rows.iter().map(cells).collect();
+        let head = COLUMNS.map(|(head, _)| head.to_string());
+        let widths: [usize; 15] = std::array::from_fn(|k| {
+            let cells = rows.iter().chain([&head]).map(|r| r[k].chars().count());
+            cells.fold(0, usize::max)
+        });
+        let mut line = |cells: &[String; 15], end: &str| {
             for (k, (cell, width)) in cells.iter().zip(widths).enumerate() {
                 // Words to the left, numbers to the right.
                 match k {
@@ -176,11 +166,11 @@ impl fmt::Display for TradeoffReport {
             }
             writeln!(f, "{end}")
         };
-        line(HEAD, "")?;
+        line(&head, "")?;
         for (row, cells) in found.rows.iter().zip(&rows) {
             let said = [&row.error, &row.note].map(|s| s.as_deref());
             let said: Vec<&str> = said.into_iter().flatten().collect();
-            line(cells.each_ref().map(String::as_str), &said.join("; "))?;
+            line(cells, &said.join("; "))?;
         }
         writeln!(
             f,

@@ -229,13 +229,11 @@ impl Solid {
                         chains: Vec<Vec<(usize, Point)>>,
                         place: &dyn Fn(&Point) -> Vec3| {
             let (mut ids, mut points, mut corners) = (Vec::new(), Vec::new(), Vec::new());
-            for mut chain in chains {
+            for chain in chains {
                 corners.push(points.len());
-                chain.pop();
-                for (id, p) in chain {
-                    ids.push(id);
-                    points.push(p);
-                }
+                let open = &chain[..chain.len() - 1];
+                ids.extend(open.iter().map(|c| c.0));
+                points.extend(open.iter().map(|c| c.1));
             }
             let count = points.len();
             let planar = Planar::new(points, &corners, |p| self.size(side, p, size));

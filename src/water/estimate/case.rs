@@ -42,7 +42,7 @@ pub(crate) struct Case<'a> {
     pub subject: Subject<'a>,
     pub fidelity: Fidelity,
     /// The bodies of the matrix, by their numbers in the scene.
-    bodies: Vec<usize>,
+    bodies: &'a [usize],
     poses: Vec<Pose>,
     turn: DMatrix<f64>,
     /// Unit density, world axes.
@@ -78,7 +78,7 @@ impl<'a> Case<'a> {
             water,
             ..
         } = subject;
-        let bodies = water.bodies.clone();
+        let bodies = water.bodies.as_slice();
         let poses: Vec<Pose> = bodies.iter().map(|b| subject.poses[*b]).collect();
         let surfaces = surfaces(scene, choices)?;
         let turn = world_axes(&poses);
@@ -87,12 +87,8 @@ impl<'a> Case<'a> {
             .map(|i| {
                 let surface = surfaces[bodies[i / 6]].as_ref();
                 let volume = surface.map_or(0.0, |s| s.properties.volume);
-                let squared = if i % 6 < 3 {
-                    1.0
-                } else {
-                    volume.cbrt().powi(2)
-                };
-                matrix[(i, i)].max(LEAST * volume * squared)
+                let length = if i % 6 < 3 { 1.0 } else { volume.cbrt() };
+                matrix[(i, i)].max(LEAST * volume * length.powi(2))
             })
             .collect();
         let mut out = Self {
@@ -167,7 +163,7 @@ impl<'a> Case<'a> {
         Problem {
             plan: &water.plan,
             folder: water.folder.as_deref(),
-            ..Problem::new(self.scene(), &self.bodies, bodies, method, numerics)
+            ..Problem::new(self.scene(), self.bodies, bodies, method, numerics)
         }
     }
 
@@ -266,11 +262,10 @@ impl<'a> Case<'a> {
         }
         let poses: Vec<Pose> = numbers.iter().map(|b| self.subject.poses[*b]).collect();
         let turn = world_axes(&poses);
-        let free = scene.walls.iter().any(|w| w.surface == WallSurface::Free);
-        let fidelity = if free {
-            Fidelity::Reduced
-        } else {
-            Fidelity::Full
+        let mut surfaces = scene.walls.iter().map(|w| w.surface);
+        let fidelity = match surfaces.any(|s| s == WallSurface::Free) {
+            true => Fidelity::Reduced,
+            false => Fidelity::Full,
         };
         let numerics = Numerics::default();
         let method = Method::Panel.kind();

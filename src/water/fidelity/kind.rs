@@ -86,15 +86,9 @@ pub(crate) trait FidelityKind: Send + Sync {
     }
 
     /// The coupling of the bodies.
-    ///
-    /// # Errors
-    /// Bodies without a shape where one is needed, or whatever the discretisation reports.
     fn couple(&self, problem: &Problem, device: &mut Device) -> Result<Made>;
 
     /// Whether a GPU has something to compute with this method; if not, why.
-    ///
-    /// # Errors
-    /// A method whose coupling is computed on the CPU alone.
     fn idle_gpu(&self, _: &dyn BodyMethod) -> Result<Option<&'static str>> {
         Ok(None)
     }

@@ -20,10 +20,7 @@ pub(crate) trait BodyMethod: Send + Sync {
     /// Its name in reports of single bodies.
     fn label(&self) -> &'static str;
 
-    /// Another method that it leaves this body to.
-    ///
-    /// # Errors
-    /// A body that it can't solve.
+    /// Another method that it leaves this body to; refuses one that it can't solve.
     fn leaves_to(&self, _: &SubmergedBody) -> Result<Option<&'static dyn BodyMethod>> {
         Ok(None)
     }
@@ -39,9 +36,6 @@ pub(crate) trait BodyMethod: Send + Sync {
     }
 
     /// The surface around which it is compressed, in the body's frame.
-    ///
-    /// # Errors
-    /// A body without a shape.
     fn layout<'a>(&self, body: &SubmergedBody<'a>) -> Result<Cow<'a, TriMesh>> {
         Ok(Cow::Borrowed(body.surface("reduced")?))
     }
@@ -50,9 +44,6 @@ pub(crate) trait BodyMethod: Send + Sync {
     fn made_from(&self, body: &SubmergedBody, numerics: &Numerics) -> serde_json::Value;
 
     /// The body alone, resolved for sources as near as `gap`, m.
-    ///
-    /// # Errors
-    /// A body without a shape, or one that can't be solved on its mesh.
     fn response(&self, body: &SubmergedBody, numerics: &Numerics, gap: f64) -> Solved;
 
     /// All bodies solved together (fidelity full).
@@ -66,10 +57,7 @@ pub(crate) trait BodyMethod: Send + Sync {
         false
     }
 
-    /// Refuses the GPU for all bodies solved together.
-    ///
-    /// # Errors
-    /// A method whose coupled system is solved on the CPU alone.
+    /// Refuses the GPU for all bodies solved together where that is done on the CPU alone.
     fn check_gpu(&self) -> Result<()> {
         Ok(())
     }
@@ -113,9 +101,6 @@ impl<'a> Problem<'a> {
     }
 
     /// The method for a body: the one asked for, or another that it leaves the body to.
-    ///
-    /// # Errors
-    /// A body that it can't solve.
     pub fn method_for(&self, body: &SubmergedBody) -> Result<&'static dyn BodyMethod> {
         Ok(self.method.leaves_to(body)?.unwrap_or(self.method))
     }

@@ -1,19 +1,18 @@
 //! `hydrograd added-mass`: the water's inertia as the bodies feel it.
 
 use std::fmt;
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 use std::process::ExitCode;
 use std::time::Instant;
 
 use clap::Args;
 use serde::Serialize;
 
-use super::input;
 use super::options::Water;
 use super::output::{ChoicesReport, Output, write_warnings};
-use crate::Result;
-use crate::scene::{Scene, Shape};
+use crate::scene::{Body, Fluid, Scene, Shape};
 use crate::simulate::ErrorEstimate;
+use crate::{Error, Result};
 
 #[derive(Debug, Args)]
 pub(super) struct Arguments {
@@ -43,6 +42,44 @@ struct Source {
     /// prism:LENGTH,Y1,Z1,Y2,Z2,Y3,Z3,… (length along x, corners of the convex profile).
     #[arg(long, value_name = "SHAPE", value_parser = crate::shape::parse_shape)]
     shape: Option<Shape>,
+}
+
+impl Source {
+    /// What is asked about, as a scene; `density` replaces the water's.
+    fn scene(&self, density: Option<f64>) -> Result<Scene> {
+        let alone = |shape: Shape, name: &str| {
+            let mut scene = Scene::new(Fluid::fresh_water());
+            let density = scene.fluid.density;
+            scene.name = name.into();
+            scene.add(Body::new(shape).named(name).density(density));
+            scene
+        };
+        let mut scene = if let Some(shape) = &self.shape {
+            alone(shape.clone(), shape.kind())
+        } else {
+            // The command line asks for one of the two.
+            let path = self.file.as_deref().unwrap_or(Path::new(""));
+            let extension = path.extension().unwrap_or_default().to_string_lossy();
+            let stem = path.file_stem().unwrap_or_default().to_string_lossy();
+            match extension.to_ascii_lowercase().as_str() {
+                "toml" => Scene::load(path)?,
+                "obj" | "stl" | "ply" => alone(Shape::mesh(path), &stem),
+                _ => {
+                    return Err(Error::input(
+                        path.display().to_string(),
+                        format!("a name that ends in {extension:?}"),
+                        "give a scene (.toml), a mesh (.obj, .stl, .ply), or a shape by --shape, \
+                     e.g. --shape sphere:0.5",
+                    ));
+                }
+            }
+        };
+        if let Some(density) = density {
+            scene.fluid.density = density;
+        }
+        scene.validate()?;
+        Ok(scene)
+    }
 }
 
 /// The added mass of all bodies. SI units.
@@ -76,11 +113,7 @@ pub(super) struct AddedMassReport {
 }
 
 pub(super) fn main(arguments: &Arguments, output: Output) -> Result<ExitCode> {
-    let scene = input::scene_or_shape(
-        arguments.source.file.as_deref(),
-        arguments.source.shape.as_ref(),
-        arguments.density,
-    )?;
+    let scene = arguments.source.scene(arguments.density)?;
     output.result(&added_mass(&scene, arguments)?);
     Ok(ExitCode::SUCCESS)
 }

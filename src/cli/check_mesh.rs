@@ -77,26 +77,20 @@ mod report {
     impl fmt::Display for MeshFileReport {
         fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
             write!(f, "{}", self.mesh)?;
-            for (count, what) in [
-                (self.repairs.polygons_split, "polygons split into triangles"),
-                (
-                    self.repairs.merged_same,
-                    "vertices merged with one at the same place",
-                ),
-                (
-                    self.repairs.merged_near,
-                    "vertices merged with one very near",
-                ),
-                (
-                    self.repairs.collapsed,
-                    "faces without area left out after merging",
-                ),
-            ] {
-                if count > 0 {
-                    write!(f, "\n  mended in reading: {count} {what}")?;
-                }
-            }
-            Ok(())
+            let mut mended = |count: usize, what: &str| match count {
+                0 => Ok(()),
+                _ => write!(f, "\n  mended in reading: {count} {what}"),
+            };
+            let Repairs {
+                polygons_split,
+                merged_same,
+                merged_near,
+                collapsed,
+            } = self.repairs;
+            mended(polygons_split, "polygons split into triangles")?;
+            mended(merged_same, "vertices merged with one at the same place")?;
+            mended(merged_near, "vertices merged with one very near")?;
+            mended(collapsed, "faces without area left out after merging")
         }
     }
 }

@@ -1,14 +1,12 @@
 //! `hydrograd gradcheck`: the reverse sweep against finite differences.
 
 use std::fmt;
-use std::path::PathBuf;
 use std::process::ExitCode;
 
 use clap::Args;
 use serde::Serialize;
 
-use super::input;
-use super::options::{Time, Water, positive};
+use super::options::{Simulation, positive};
 use super::output::{ChoicesReport, Output, write_warnings};
 use super::progress;
 use crate::Result;
@@ -30,13 +28,8 @@ const TIMINGS: usize = 5;
                   Exit code 1 if an error is above 1e-6."
 )]
 pub(super) struct Arguments {
-    /// The scene file.
-    #[arg(value_name = "SCENE.toml")]
-    scene: PathBuf,
     #[command(flatten)]
-    water: Water,
-    #[command(flatten)]
-    time: Time,
+    simulation: Simulation,
     /// Random directions for each of controls, initial state and parameters.
     #[arg(long, value_name = "N", default_value_t = 3, value_parser = positive)]
     directions: usize,
@@ -83,7 +76,7 @@ pub(super) struct CheckReport {
 }
 
 pub(super) fn main(arguments: &Arguments, output: Output) -> Result<ExitCode> {
-    let scene = input::scene(&arguments.scene, arguments.time.steps)?;
+    let scene = arguments.simulation.scene()?;
     let progress = progress::bar("directions", 3 * arguments.directions);
     let done = |done, all| progress::set(&progress, done, all);
     let report = check(&scene, arguments, done)?;
@@ -102,13 +95,14 @@ fn check(
     arguments: &Arguments,
     done: impl FnMut(usize, usize),
 ) -> Result<CheckReport> {
-    let usual = arguments.time.choose(arguments.water.settings());
-    let tight = match arguments.water.tolerance {
+    let Simulation { water, .. } = &arguments.simulation;
+    let usual = arguments.simulation.settings();
+    let tight = match water.tolerance {
         Some(_) => usual.clone(),
         None => usual.tolerance(TOLERANCE),
     };
     let steps = scene.steps;
-    let mut simulator = arguments.water.simulator(scene, tight)?;
+    let mut simulator = water.simulator(scene, tight)?;
     let found = gradcheck_with(
         &mut simulator,
         &gradcheck::GradcheckSettings {
@@ -125,7 +119,7 @@ fn check(
     let choices = ChoicesReport::new(&simulator);
     let tolerance = simulator.choices().water.numerics.solve.tolerance;
     drop(simulator);
-    let times = gradcheck::timings(&arguments.water.simulator(scene, usual)?, steps, TIMINGS)?;
+    let times = gradcheck::timings(&water.simulator(scene, usual)?, steps, TIMINGS)?;
     Ok(CheckReport {
         scene: scene.name.clone(),
         choices,

@@ -8,7 +8,6 @@ mod added_mass;
 mod check_mesh;
 mod gpu_info;
 mod gradcheck;
-mod input;
 mod options;
 mod output;
 mod progress;

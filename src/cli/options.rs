@@ -2,7 +2,7 @@
 
 use clap::Args;
 use clap::builder::{PossibleValue, PossibleValuesParser, TypedValueParser};
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 use std::str::FromStr;
 use strum::{EnumMessage, VariantArray};
 
@@ -91,18 +91,42 @@ impl Adapter {
     }
 }
 
-/// How time is stepped.
-#[derive(Clone, Debug, Args)]
-pub(super) struct Time {
+/// A scene, and how it is simulated.
+#[derive(Debug, Args)]
+pub(super) struct Simulation {
+    /// The scene file.
+    #[arg(value_name = "SCENE.toml")]
+    scene: PathBuf,
+    #[command(flatten)]
+    pub water: Water,
     /// Number of steps [default: the scene's own].
     #[arg(long, value_name = "N", allow_negative_numbers = true)]
-    pub steps: Option<usize>,
+    steps: Option<usize>,
     /// Time step in s [default: the scene's own].
     #[arg(long, value_name = "DT", allow_negative_numbers = true)]
-    pub time_step: Option<f64>,
+    time_step: Option<f64>,
     /// How a step is taken [default: rk2, momentum-euler with contact; velocity-euler with the preset paper].
     #[arg(long, value_parser = choice::<Integrator>())]
-    pub integrator: Option<Integrator>,
+    integrator: Option<Integrator>,
+}
+
+impl Simulation {
+    /// The scene, with so many steps if that is asked for, checked.
+    pub fn scene(&self) -> Result<Scene> {
+        let mut scene = load(&self.scene)?;
+        scene.steps = self.steps.unwrap_or(scene.steps);
+        scene.validate()?;
+        Ok(scene)
+    }
+
+    /// What was given.
+    pub fn settings(&self) -> Settings {
+        Settings {
+            time_step: self.time_step,
+            integrator: self.integrator,
+            ..self.water.settings()
+        }
+    }
 }
 
 impl Water {
@@ -136,13 +160,14 @@ impl Water {
     }
 }
 
-impl Time {
-    /// The settings with what was given put in.
-    pub fn choose(&self, mut settings: Settings) -> Settings {
-        settings.time_step = self.time_step;
-        settings.integrator = self.integrator;
-        settings
+/// The scene of a file; one without a name is called as the file.
+pub(super) fn load(path: &Path) -> Result<Scene> {
+    let mut scene = Scene::load(path)?;
+    if scene.name.is_empty() {
+        let stem = path.file_stem().unwrap_or_default();
+        scene.name = stem.to_string_lossy().into_owned();
     }
+    Ok(scene)
 }
 
 /// A whole number above zero.

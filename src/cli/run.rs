@@ -8,8 +8,7 @@ use std::time::Instant;
 use clap::Args;
 use serde::Serialize;
 
-use super::input;
-use super::options::{Time, Water};
+use super::options::Simulation;
 use super::output::{ChoicesReport, Output, or_dash, peak_memory_mb, write_warnings};
 use super::progress;
 use crate::Result;
@@ -18,13 +17,8 @@ use crate::simulate::{Controls, Recording};
 
 #[derive(Debug, Args)]
 pub(super) struct Arguments {
-    /// The scene file.
-    #[arg(value_name = "SCENE.toml")]
-    scene: PathBuf,
     #[command(flatten)]
-    water: Water,
-    #[command(flatten)]
-    time: Time,
+    simulation: Simulation,
     /// Folder for trajectory.csv and trajectory.json: time, q, v, energy, momentum, smallest gap
     /// [default: none are written].
     #[arg(long, value_name = "DIR")]
@@ -65,7 +59,7 @@ pub(super) struct RunReport {
 }
 
 pub(super) fn main(arguments: &Arguments, output: Output) -> Result<ExitCode> {
-    let scene = input::scene(&arguments.scene, arguments.time.steps)?;
+    let scene = arguments.simulation.scene()?;
     if let Some(folder) = &arguments.out {
         Recording::prepare(folder)?;
     }
@@ -87,8 +81,8 @@ fn simulate(
     done: impl FnMut(usize) + Send,
 ) -> Result<(RunReport, Recording)> {
     let start = Instant::now();
-    let settings = arguments.time.choose(arguments.water.settings());
-    let simulator = arguments.water.simulator(scene, settings)?;
+    let Simulation { water, .. } = &arguments.simulation;
+    let simulator = water.simulator(scene, arguments.simulation.settings())?;
     let setup_seconds = start.elapsed().as_secs_f64();
     let controls = Controls::zeros(&simulator, scene.steps);
     let rollout = simulator.rollout_with(&controls, done)?;

@@ -9,8 +9,7 @@ use std::process::ExitCode;
 
 use clap::Args;
 
-use super::input;
-use super::options::{choice, positive, seconds, tolerance};
+use super::options::{choice, load, positive, seconds, tolerance};
 use super::output::Output;
 use super::progress;
 use crate::Result;
@@ -96,7 +95,7 @@ impl Arguments {
 }
 
 pub(super) fn main(arguments: &Arguments, output: Output) -> Result<ExitCode> {
-    let scene = input::load(&arguments.scene)?;
+    let scene = load(&arguments.scene)?;
     scene.validate()?;
     if let Some(file) = &arguments.plot {
         plot::prepare(file)?;

@@ -9,6 +9,10 @@ fn vector(random: &mut Samples) -> Vec3 {
     Vec3::from(random.vector(1.0))
 }
 
+fn corners(random: &mut Samples) -> [Vec3; 3] {
+    [(); 3].map(|()| vector(random))
+}
+
 pub(super) fn turned(w: [f64; 3], x: [f64; 3]) -> Pose {
     Pose::new(exp_matrix(&Vec3::from(w)), Vec3::from(x))
 }
@@ -44,19 +48,8 @@ fn triangles_against_alternating_projections() {
     let mut disjoint = 0;
     for _ in 0..300 {
         let shift = vector(&mut random) * 2.0;
-        let a = Triangle::new([
-            vector(&mut random),
-            vector(&mut random),
-            vector(&mut random),
-        ]);
-        let b = Triangle::new(
-            [
-                vector(&mut random),
-                vector(&mut random),
-                vector(&mut random),
-            ]
-            .map(|x| x + shift),
-        );
+        let a = Triangle::new(corners(&mut random));
+        let b = Triangle::new(corners(&mut random).map(|x| x + shift));
         let found = a.distance_squared(&b, f64::INFINITY).unwrap().sqrt();
         let mut p = a.corners[0];
         let mut q = p;
@@ -78,11 +71,7 @@ fn triangles_against_alternating_projections() {
 fn closest_point_of_a_triangle_is_no_farther_than_any_other() {
     let mut random = Samples::new(3);
     for _ in 0..200 {
-        let t = Triangle::new([
-            vector(&mut random),
-            vector(&mut random),
-            vector(&mut random),
-        ]);
+        let t = Triangle::new(corners(&mut random));
         let p = vector(&mut random) * 2.0;
         let (closest, _) = t.closest(&p);
         let [a, b, c] = t.corners;

@@ -128,8 +128,8 @@ fn time(
         (most.div_ceil(4), 1),
     ];
     let fits = choices.into_iter().find(|(n, r)| cost(*n, *r) <= allowance);
-    let Some((steps, least)) = fits.or((cost(1, 1) <= 2.0 * allowance).then_some((1, 1))) else {
-        let needed = cost(1, 1);
+    let needed = cost(1, 1);
+    let Some((steps, least)) = fits.or((needed <= 2.0 * allowance).then_some((1, 1))) else {
         row.add_note(format!(
             "no gradient: its {needed:.1} s are too long for the budget"
         ));

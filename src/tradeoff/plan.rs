@@ -29,8 +29,8 @@ pub(super) fn plan(scene: &Scene, settings: &TradeoffSettings) -> Vec<Configurat
         out: Vec::new(),
     };
     let bases: Vec<Configuration> = or_default(&settings.fidelities, Fidelity::VARIANTS)
-        .into_iter()
-        .map(|fidelity| plan.base(fidelity))
+        .iter()
+        .map(|fidelity| plan.base(*fidelity))
         .collect();
     plan.add(Family::Base, bases.iter().copied());
     if settings.full_product {
@@ -71,13 +71,8 @@ impl Plan<'_> {
     fn product(&mut self, bases: &[Configuration]) {
         for base in bases {
             let mut all = vec![*base];
-            for families in [
-                &[Family::Method][..],
-                &[Family::Faces],
-                &AIMS,
-                &[Family::Integrator],
-                &[Family::TimeStep],
-            ] {
+            use Family::{Faces, Integrator, Method, TimeStep};
+            for families in [&[Method][..], &[Faces], &AIMS, &[Integrator], &[TimeStep]] {
                 let plan = &*self;
                 let more = |c| families.iter().flat_map(move |f| plan.varied(*f, c));
                 all = all
@@ -116,62 +111,55 @@ impl Plan<'_> {
 
     /// The base with each value of what a family varies; none if its fidelity doesn't look at that.
     fn varied(&self, family: Family, base: Configuration) -> Vec<Configuration> {
-        fn each<T: Clone>(
-            given: &[T],
-            own: &[T],
-            of: impl Fn(T) -> Configuration,
+        fn each<T: Copy>(
+            base: Configuration,
+            (given, own): (&[T], &[T]),
+            set: fn(&mut Configuration, T),
         ) -> Vec<Configuration> {
-            or_default(given, own).into_iter().map(of).collect()
+            let with = |value: &T| {
+                let mut out = base;
+                set(&mut out, *value);
+                out
+            };
+            or_default(given, own).iter().map(with).collect()
         }
-        let (given, fidelity) = (self.settings, base.fidelity);
+        let (given, fidelity) = (self.settings, base.fidelity.kind());
         let has = |knob| fidelity.knobs().contains(&knob);
-        let aim = |rank, accuracy, tolerance| Configuration {
-            rank,
-            accuracy,
-            tolerance,
-            ..base
-        };
         match family {
             Family::Method => {
-                let fits = |m: &&Method| match fidelity.kind().solves_alone() {
-                    true => !fidelity.kind().chooses() && **m != Method::Exact,
+                let fits = |m: &&Method| match fidelity.solves_alone() {
+                    true => !fidelity.chooses() && **m != Method::Exact,
                     false => m.kind().steps_together() && m.together() == **m,
                 };
                 let own: Vec<Method> = Method::VARIANTS.iter().filter(fits).copied().collect();
-                each(&given.methods, &own, |method| Configuration {
-                    method,
-                    ..base
-                })
+                each(base, (&given.methods, &own), |c, method| c.method = method)
             }
             Family::Faces => {
-                let own: &[usize] = if fidelity.kind().chooses() {
-                    &[]
-                } else {
-                    &FACES
-                };
-                each(&given.faces, own, |faces| Configuration {
-                    faces_per_body: Some(faces),
-                    ..base
+                let own = if fidelity.chooses() { 0 } else { FACES.len() };
+                each(base, (&given.faces, &FACES[..own]), |c, n| {
+                    c.faces_per_body = Some(n);
                 })
             }
-            Family::Rank if has(Knob::Rank) => {
-                each(&given.ranks, &RANKS, |r| aim(Some(r), None, None))
-            }
+            Family::Rank if has(Knob::Rank) => each(base, (&given.ranks, &RANKS), |c, n| {
+                (c.rank, c.accuracy, c.tolerance) = (Some(n), None, None);
+            }),
             Family::Accuracy if has(Knob::Accuracy) => {
-                each(&given.accuracies, &ACCURACIES, |a| aim(None, Some(a), None))
+                each(base, (&given.accuracies, &ACCURACIES), |c, x| {
+                    (c.rank, c.accuracy, c.tolerance) = (None, Some(x), None);
+                })
             }
             Family::Tolerance if has(Knob::Tolerance) => {
-                each(&given.tolerances, &TOLERANCES, |t| aim(None, None, Some(t)))
+                each(base, (&given.tolerances, &TOLERANCES), |c, x| {
+                    (c.rank, c.accuracy, c.tolerance) = (None, None, Some(x));
+                })
             }
-            Family::Integrator => each(&given.integrators, Integrator::VARIANTS, |integrator| {
-                Configuration { integrator, ..base }
-            }),
+            Family::Integrator => {
+                let all = (given.integrators.as_slice(), Integrator::VARIANTS);
+                each(base, all, |c, integrator| c.integrator = integrator)
+            }
             Family::TimeStep => {
                 let own = TIME_STEPS.map(|x| x * self.scene.time_step);
-                each(&given.time_steps, &own, |time_step| Configuration {
-                    time_step,
-                    ..base
-                })
+                each(base, (&given.time_steps, &own), |c, dt| c.time_step = dt)
             }
             _ => Vec::new(),
         }
@@ -184,9 +172,8 @@ impl Plan<'_> {
             !exact || self.closed_forms != ClosedForms::All
         };
         let methods = or_default(&self.settings.methods, &[Method::Panel]);
-        let others = methods
-            .into_iter()
-            .map(|method| Configuration { method, ..base });
+        let others = methods.iter();
+        let others = others.map(|m| Configuration { method: *m, ..base });
         std::iter::once(base).chain(others).find(meshed)
     }
 
@@ -204,11 +191,8 @@ impl Plan<'_> {
     fn normalised(&self, mut c: Configuration) -> Configuration {
         let has = |knob| c.fidelity.knobs().contains(&knob);
         c.rank = c.rank.filter(|_| has(Knob::Rank));
-        let own_accuracy = c
-            .fidelity
-            .kind()
-            .aim(&Numerics::default())
-            .filter(|_| c.rank.is_none());
+        let own_accuracy = c.fidelity.kind().aim(&Numerics::default());
+        let own_accuracy = own_accuracy.filter(|_| c.rank.is_none());
         c.accuracy = own_accuracy.map(|own| c.accuracy.unwrap_or(own));
         let own_tolerance = SolveSettings::default().tolerance;
         c.tolerance = has(Knob::Tolerance).then(|| c.tolerance.unwrap_or(own_tolerance));
@@ -224,11 +208,8 @@ impl Plan<'_> {
     }
 }
 
-fn or_default<T: Clone>(given: &[T], default: &[T]) -> Vec<T> {
-    match given {
-        [] => default.to_vec(),
-        given => given.to_vec(),
-    }
+fn or_default<'a, T>(given: &'a [T], default: &'a [T]) -> &'a [T] {
+    if given.is_empty() { default } else { given }
 }
 
 /// The order in which configurations are measured, so that what the budget has no time for matters

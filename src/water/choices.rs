@@ -73,17 +73,17 @@ impl WaterChoices {
             out.push("the settings of the GPU have no effect with the backend cpu".into());
         }
         let compress = &self.numerics.compress;
-        let given = [
+        for (name, knob, given) in [
             ("rank", Rank, compress.rank.is_some()),
             ("resolved_gap", ResolvedGap, compress.resolved_gap.is_some()),
-        ];
-        let unused = |(_, knob, given): &&_| *given && !self.fidelity.knobs().contains(knob);
-        out.extend(given.iter().filter(unused).map(|(name, ..)| {
-            format!(
-                "the setting {name} has no effect with the fidelity {}: only reduced takes it",
-                self.fidelity
-            )
-        }));
+        ] {
+            if given && !self.fidelity.knobs().contains(&knob) {
+                out.push(format!(
+                    "the setting {name} has no effect with the fidelity {}: only reduced takes it",
+                    self.fidelity
+                ));
+            }
+        }
         out
     }
 }

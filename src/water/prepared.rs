@@ -4,7 +4,7 @@ use super::choices::WaterChoices;
 use super::clearance::Clearance;
 use super::device::Device;
 use super::fidelity::Fidelity;
-use super::fidelity::kind::{Planned, Start};
+use super::fidelity::kind::Planned;
 use super::method::kind::Problem;
 use super::numerics::Plan;
 use super::submerged::{Discretisation, SubmergedBody};
@@ -119,13 +119,8 @@ fn plan(
             ..gap
         })
     });
-    let start = Start {
-        bodies: problem.bodies,
-        poses: &poses,
-        gaps: gaps.collect(),
-        walls: problem.walls,
-    };
-    let planned = fidelity.kind().plan(&start, problem.numerics)?;
+    let gaps: Vec<Gap> = gaps.collect();
+    let planned = fidelity.kind().plan(problem, &poses, &gaps)?;
     let used = match planned.together {
         true => Fidelity::Full,
         false => Fidelity::Reduced,

@@ -157,9 +157,9 @@ impl<'a> Checker<'a> {
             .filter(|&v| !is_usable(&self.vertices[v]))
             .collect();
         if let Some(&first) = bad.first() {
+            let n = counted(bad.len(), "vertex has", "vertices have");
             let problem = format!(
-                "{} coordinates that are NaN, infinite or over {FARTHEST:.0e} m, the first is vertex {first}",
-                counted(bad.len(), "vertex has", "vertices have")
+                "{n} coordinates that are NaN, infinite or over {FARTHEST:.0e} m, the first is vertex {first}"
             );
             let remedy = "export the mesh again; coordinates must be finite numbers, in metres";
             self.report(Kind::NotFinite, self.at_vertex(&bad), problem, remedy);
@@ -195,10 +195,9 @@ impl<'a> Checker<'a> {
             }
         }
         if let Some(original) = original {
-            let problem = format!(
-                "{} the corners of another face (face {original} for the first)",
-                counted(copies.len(), "face repeats", "faces repeat")
-            );
+            let n = counted(copies.len(), "face repeats", "faces repeat");
+            let problem =
+                format!("{n} the corners of another face (face {original} for the first)");
             let remedy = "delete the copies; a thin plate needs two surfaces at a distance";
             self.report_faces(Kind::DuplicateFace, &copies, problem, remedy);
         }
@@ -235,9 +234,9 @@ impl<'a> Checker<'a> {
         self.worst_aspect = worst.0;
         if long > 0 {
             let found = (long, Some(worst.1), self.centroid(worst.1));
+            let n = counted(long, "face has", "faces have");
             let problem = format!(
-                "{} an aspect ratio over {LONG_FACE}, the worst {:.3e}",
-                counted(long, "face has", "faces have"),
+                "{n} an aspect ratio over {LONG_FACE}, the worst {:.3e}",
                 worst.0
             );
             let remedy = "remesh with faces nearer to equilateral, or with more of them";
@@ -309,10 +308,8 @@ impl<'a> Checker<'a> {
             }
         }
         flipped.sort_unstable();
-        let problem = format!(
-            "{} against the neighbours",
-            counted(flipped.len(), "face is turned", "faces are turned")
-        );
+        let n = counted(flipped.len(), "face is turned", "faces are turned");
+        let problem = format!("{n} against the neighbours");
         let remedy = "reverse the order of their corners (recalculate normals outward)";
         self.report_faces(Kind::Orientation, &flipped, problem, remedy);
         let remedy = "it can't bound a volume; model the body as a solid";
@@ -350,9 +347,9 @@ impl<'a> Checker<'a> {
         let problem = "the surface is closed but encloses no volume".to_owned();
         let remedy = "give the body a thickness";
         self.report_faces(Kind::NoVolume, &flat, problem, remedy);
+        let n = counted(inward.len(), "closed piece", "closed pieces");
         let problem = format!(
-            "{} with normals pointing inward (volume {} m³)",
-            counted(inward.len(), "closed piece", "closed pieces"),
+            "{n} with normals pointing inward (volume {} m³)",
             number(inverted)
         );
         let remedy = "reverse the order of the corners of its faces (flip normals); delete it if \
@@ -370,10 +367,9 @@ impl<'a> Checker<'a> {
         let folded = |v: &usize| used[*v] && sums[*v].norm() <= FOLDED;
         let folded: Vec<usize> = (0..sums.len()).filter(folded).collect();
         if let Some(&v) = folded.first() {
-            let problem = format!(
-                "{} faces that fold back on each other, the first is vertex {v}",
-                counted(folded.len(), "vertex has", "vertices have")
-            );
+            let n = counted(folded.len(), "vertex has", "vertices have");
+            let problem =
+                format!("{n} faces that fold back on each other, the first is vertex {v}");
             let remedy = "mend the surface there, or split what touches in a point only";
             self.report(Kind::FoldedVertex, self.at_vertex(&folded), problem, remedy);
         }
@@ -391,9 +387,9 @@ impl<'a> Checker<'a> {
         let same = weld::representatives(self.vertices, SAME_PLACE * self.diameter());
         let copies: Vec<usize> = (0..same.len()).filter(|&v| same[v] != v).collect();
         if let Some(&v) = copies.first() {
+            let n = counted(copies.len(), "vertex is", "vertices are");
             let problem = format!(
-                "{} at the place of another, the first is vertex {v} (at vertex {})",
-                counted(copies.len(), "vertex is", "vertices are"),
+                "{n} at the place of another, the first is vertex {v} (at vertex {})",
                 same[v]
             );
             let found = self.at_vertex(&copies);
@@ -403,10 +399,8 @@ impl<'a> Checker<'a> {
         let used = self.used();
         let unused: Vec<usize> = (0..used.len()).filter(|&v| !used[v]).collect();
         if let Some(&v) = unused.first() {
-            let problem = format!(
-                "{} not used by any face, the first is vertex {v}",
-                counted(unused.len(), "vertex is", "vertices are")
-            );
+            let n = counted(unused.len(), "vertex is", "vertices are");
+            let problem = format!("{n} not used by any face, the first is vertex {v}");
             let remedy = "delete loose vertices; they have no effect";
             let found = (unused.len(), None, Some(self.vertices[v]));
             self.report(Kind::UnreferencedVertex, found, problem, remedy);

@@ -76,11 +76,7 @@ fn statements(text: &str) -> Vec<(usize, String)> {
 fn load<'a>(
     lines: impl Iterator<Item = &'a str>,
 ) -> std::result::Result<Option<tobj::Mesh>, tobj::LoadError> {
-    let mut text = String::new();
-    for line in lines {
-        text.push_str(line);
-        text.push('\n');
-    }
+    let text: String = lines.flat_map(|line| [line, "\n"]).collect();
     let options = tobj::LoadOptions {
         ignore_points: true,
         ignore_lines: true,

@@ -3,11 +3,8 @@
 //! M_f comes from coupled panels ([`panels`]), accelerations and trajectories from compressed bodies
 //! ([`moving`]), for panels have no derivatives.
 
-mod levels;
 mod moving;
 mod panels;
-
-pub(super) use levels::Limits;
 
 use super::compare::{
     Excursion, Weights, end_error, matrix_error, norm, significant, vector_error,
@@ -28,6 +25,44 @@ use std::time::{Duration, Instant};
 const VAGUE: f64 = 0.3;
 /// Nor does one that changes the velocity over the horizon by less than this part.
 const NEGLIGIBLE: f64 = 1e-9;
+
+/// How long the reference may take, and what is asked of it.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Limits {
+    /// s
+    pub seconds: f64,
+    /// Finest faces per body; then time doesn't limit the resolutions.
+    pub faces: Option<usize>,
+    /// Steps of the scene's own length over which trajectories are compared.
+    pub steps: usize,
+}
+
+/// Runs levels one after another while the next, expected to take `growth` times as long, ends in time;
+/// at least `least` of them. An error ends the climb, and counts if nothing was found before.
+fn climb<L, T>(
+    levels: impl IntoIterator<Item = L>,
+    least: usize,
+    growth: f64,
+    until: Instant,
+    mut run: impl FnMut(L) -> Result<T>,
+) -> Result<Vec<T>> {
+    let mut out = Vec::new();
+    let mut last = 0.0;
+    for level in levels {
+        let now = Instant::now();
+        let left = until.saturating_duration_since(now).as_secs_f64();
+        if out.len() >= least && growth * last > left {
+            break;
+        }
+        match run(level) {
+            Ok(found) => out.push(found),
+            Err(error) if out.is_empty() => return Err(error),
+            Err(_) => break,
+        }
+        last = now.elapsed().as_secs_f64();
+    }
+    Ok(out)
+}
 
 /// The reference of a scene.
 pub(super) struct Reference {
@@ -267,5 +302,18 @@ mod tests {
         assert!(check(&scene).is_ok());
         scene.bodies[0].locked = true;
         assert!(refused(&scene).contains("joints"));
+    }
+
+    #[test]
+    fn climbs_stop_at_the_time_and_at_errors() {
+        let now = Instant::now();
+        let run = |n: usize| match n {
+            3 => Err(Error::input("level", n, "less")),
+            n => Ok(n),
+        };
+        assert_eq!(climb(0..3, 1, 0.0, now, run).unwrap(), [0, 1, 2]);
+        assert_eq!(climb(0..3, 2, 1e12, now, run).unwrap(), [0, 1]);
+        assert_eq!(climb(0..9, 9, 1.0, now, run).unwrap(), [0, 1, 2]);
+        assert!(climb(3..9, 1, 1.0, now, run).is_err());
     }
 }

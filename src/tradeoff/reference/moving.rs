@@ -1,7 +1,7 @@
 //! Accelerations and trajectories by compressed bodies with growing accuracy and shrinking time
 //! steps; by the coupled system where gaps are too small to compress the bodies.
 
-use super::levels::{Limits, climb};
+use super::{Limits, climb};
 use crate::dynamics::Integrator;
 use crate::geometry::Gap;
 use crate::scene::{Preset, Scene};
@@ -205,6 +205,7 @@ impl Simulation {
             .integrator(Integrator::Rk4)
             .time_step(scene.time_step / level.parts as f64)
             .faces(level.faces);
+        settings.resolved_gap = level.gap;
         settings = match level.way {
             Way::Full => settings.fidelity(Fidelity::Full).tolerance(TOLERANCE),
             Way::Reduced(method) => settings
@@ -212,9 +213,6 @@ impl Simulation {
                 .method(method)
                 .accuracy(level.accuracy),
         };
-        if let Some(gap) = level.gap {
-            settings = settings.resolved_gap(gap);
-        }
         let simulator = Simulator::new(scene, settings)?;
         let start = Start::values(&simulator)?.with_forces(&simulator)?;
         let path = Path::new(&simulator, steps * level.parts, watch)?;

@@ -9,7 +9,7 @@
 //! and three give two such values, whose difference is the estimate of the error. With sharp edges the order is that of the
 //! leading part alone: the estimate is then no less than what p = 1 would have changed.
 
-use super::levels::{Limits, climb};
+use super::{Limits, climb};
 use crate::Result;
 use crate::scene::{Preset, Scene};
 use crate::simulate::{Fidelity, Method, Settings, Simulator};

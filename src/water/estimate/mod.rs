@@ -19,7 +19,6 @@
 mod case;
 mod levels;
 
-use super::fidelity::kind::ErrorParts;
 use crate::Result;
 use case::Case;
 use serde::Serialize;
@@ -78,11 +77,8 @@ impl Subject<'_> {
         let own = self.water.discretisation.iter().map(|d| d.asymmetry);
         let asymmetry = own.fold(case.report.asymmetry, f64::max);
         let total = extrapolation.filter(|_| known).and_then(|extrapolation| {
-            let together = fidelity.kind().error(&ErrorParts {
-                bodies: extrapolation.max(asymmetry),
-                residual,
-                coupling,
-            })?;
+            let bodies = extrapolation.max(asymmetry);
+            let together = fidelity.kind().error(bodies, residual, coupling)?;
             Some(SAFETY * together + case.report.residual)
         });
         Ok(ErrorEstimate {

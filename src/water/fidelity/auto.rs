@@ -7,9 +7,9 @@
 //! starts with.
 
 use super::full::Full;
-use super::kind::{ErrorParts, FidelityKind, Knob, Planned, Start};
+use super::kind::{FidelityKind, Knob, Planned};
 use super::reduced::Reduced;
-use crate::adjoint::lie::Vec3;
+use crate::adjoint::lie::{Pose, Vec3};
 use crate::boundary::exact::lamb;
 use crate::coupling::reduced::{Cutoff, compress};
 use crate::geometry::{Gap, MassProperties, WallSurface};
@@ -59,8 +59,8 @@ impl FidelityKind for Auto {
         true
     }
 
-    fn plan(&self, start: &Start, numerics: &Numerics) -> Result<Planned> {
-        plan(start, numerics.accuracy)
+    fn plan(&self, problem: &Problem, poses: &[Pose], gaps: &[Gap]) -> Result<Planned> {
+        plan(problem, poses, gaps)
     }
 
     // A fidelity that chooses is in use itself only without water.
@@ -76,19 +76,14 @@ impl FidelityKind for Auto {
         Full.gap_warning(gap, place, time, hint)
     }
 
-    fn error(&self, parts: &ErrorParts) -> Option<f64> {
-        Reduced.error(parts)
+    fn error(&self, bodies: f64, residual: Option<f64>, coupling: Option<f64>) -> Option<f64> {
+        Reduced.error(bodies, residual, coupling)
     }
 }
 
-/// Chooses for the bodies at the start, for an error of the coupling of `aim`.
-fn plan(start: &Start, aim: f64) -> Result<Planned> {
-    let Start {
-        bodies,
-        poses,
-        gaps,
-        walls,
-    } = start;
+/// Chooses for the bodies at the start, for an error of the coupling of the accuracy that is aimed at.
+fn plan(problem: &Problem, poses: &[Pose], gaps: &[Gap]) -> Result<Planned> {
+    let (bodies, walls, aim) = (problem.bodies, problem.walls, problem.numerics.accuracy);
     if !(aim > 0.0 && aim < 1.0) {
         return Err(Error::input(
             "settings: accuracy",

@@ -1,6 +1,6 @@
 //! All bodies solved together, at the resolution of their meshes.
 
-use super::kind::{ErrorParts, FidelityKind, Knob};
+use super::kind::{FidelityKind, Knob};
 use crate::Result;
 use crate::geometry::Gap;
 use crate::water::device::Device;
@@ -52,8 +52,8 @@ impl FidelityKind for Full {
         })
     }
 
-    fn error(&self, parts: &ErrorParts) -> Option<f64> {
-        let residual = (RESIDUAL * parts.residual.unwrap_or(0.0)).min(1.0);
-        Some(parts.bodies.max(residual))
+    fn error(&self, bodies: f64, residual: Option<f64>, _: Option<f64>) -> Option<f64> {
+        let residual = (RESIDUAL * residual.unwrap_or(0.0)).min(1.0);
+        Some(bodies.max(residual))
     }
 }

@@ -1,6 +1,6 @@
 //! Each body alone.
 
-use super::kind::{ErrorParts, FidelityKind, Knob};
+use super::kind::{FidelityKind, Knob};
 use crate::Result;
 use crate::adjoint::lie::Mat6;
 use crate::coupling;
@@ -102,7 +102,7 @@ impl FidelityKind for Isolated {
         })
     }
 
-    fn error(&self, parts: &ErrorParts) -> Option<f64> {
-        Some(parts.bodies + parts.coupling?)
+    fn error(&self, bodies: f64, _: Option<f64>, coupling: Option<f64>) -> Option<f64> {
+        Some(bodies + coupling?)
     }
 }

@@ -2,11 +2,11 @@
 
 use crate::Result;
 use crate::adjoint::lie::Pose;
-use crate::geometry::{Gap, Wall};
+use crate::geometry::Gap;
 use crate::water::device::Device;
 use crate::water::method::kind::{BodyMethod, Problem};
 use crate::water::numerics::{Numerics, Plan};
-use crate::water::submerged::{Made, SubmergedBody};
+use crate::water::submerged::Made;
 
 /// Choices that only some fidelities look at.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -28,23 +28,6 @@ pub(crate) struct Planned {
     pub together: bool,
     pub plan: Plan,
     pub reasons: Vec<String>,
-}
-
-/// The bodies in the water at the start.
-pub(crate) struct Start<'a> {
-    pub bodies: &'a [SubmergedBody<'a>],
-    pub poses: &'a [Pose],
-    /// Gaps between them and to the walls, by their numbers among `bodies`.
-    pub gaps: Vec<Gap>,
-    pub walls: &'a [Wall],
-}
-
-/// Parts of the error of an added mass; see [`crate::simulate::ErrorEstimate`].
-pub(crate) struct ErrorParts {
-    /// Of the bodies themselves: from other meshes and from asymmetry.
-    pub bodies: f64,
-    pub residual: Option<f64>,
-    pub coupling: Option<f64>,
 }
 
 /// A model of how the bodies feel each other.
@@ -77,11 +60,11 @@ pub(crate) trait FidelityKind: Send + Sync {
         false
     }
 
-    /// What it chooses for a scene, if it does.
+    /// What it chooses for bodies that start at `poses` with these `gaps` between them and to the walls, if it does.
     ///
     /// # Errors
     /// An accuracy out of range, or bodies that no choice is known for.
-    fn plan(&self, _: &Start, _: &Numerics) -> Result<Planned> {
+    fn plan(&self, _: &Problem, _: &[Pose], _: &[Gap]) -> Result<Planned> {
         Ok(Planned::default())
     }
 
@@ -100,6 +83,7 @@ pub(crate) trait FidelityKind: Send + Sync {
     /// declared to overlap.
     fn gap_warning(&self, gap: &Gap, place: &str, time: &str, hint: &str) -> Option<String>;
 
-    /// The error of the added mass from its parts, without the solver's; `None` where one that it needs is missing.
-    fn error(&self, parts: &ErrorParts) -> Option<f64>;
+    /// The error of the added mass, without the solver's, from that of the `bodies` themselves (from other meshes and from
+    /// asymmetry) and the other parts of [`crate::simulate::ErrorEstimate`]; `None` where one that it needs is missing.
+    fn error(&self, bodies: f64, residual: Option<f64>, coupling: Option<f64>) -> Option<f64>;
 }

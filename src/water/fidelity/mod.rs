@@ -8,7 +8,6 @@ mod isolated;
 pub(super) mod kind;
 mod reduced;
 
-use super::list::listed;
 use kind::FidelityKind;
 
 pub use kind::Knob;

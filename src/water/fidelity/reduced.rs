@@ -1,6 +1,6 @@
 //! All bodies coupled, each compressed to a few sources.
 
-use super::kind::{ErrorParts, FidelityKind, Knob};
+use super::kind::{FidelityKind, Knob};
 use crate::adjoint::lie::Pose;
 use crate::boundary::Response;
 use crate::coupling::reduced::{self, ReducedBody, cache, compress};
@@ -64,8 +64,8 @@ impl FidelityKind for Reduced {
         None
     }
 
-    fn error(&self, parts: &ErrorParts) -> Option<f64> {
-        Some(parts.bodies + parts.residual?)
+    fn error(&self, bodies: f64, residual: Option<f64>, _: Option<f64>) -> Option<f64> {
+        Some(bodies + residual?)
     }
 }
 

@@ -8,7 +8,6 @@ pub(super) mod kind;
 mod mfs;
 mod panel;
 
-use super::list::listed;
 use crate::boundary;
 use kind::BodyMethod;
 

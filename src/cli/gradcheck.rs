@@ -7,8 +7,7 @@ use clap::Args;
 use serde::Serialize;
 
 use super::options::{Simulation, positive};
-use super::output::{ChoicesReport, Output, write_warnings};
-use super::progress;
+use super::output::{ChoicesReport, Output, progress_bar, set_progress, write_warnings};
 use crate::Result;
 use crate::scene::Scene;
 use crate::simulate::gradcheck::{self, gradcheck_with};
@@ -77,8 +76,8 @@ pub(super) struct CheckReport {
 
 pub(super) fn main(arguments: &Arguments, output: Output) -> Result<ExitCode> {
     let scene = arguments.simulation.scene()?;
-    let progress = progress::bar("directions", 3 * arguments.directions);
-    let done = |done, all| progress::set(&progress, done, all);
+    let progress = progress_bar("directions", 3 * arguments.directions);
+    let done = |done, all| set_progress(&progress, done, all);
     let report = check(&scene, arguments, done)?;
     drop(progress);
     output.result(&report);

@@ -10,7 +10,6 @@ mod gpu_info;
 mod gradcheck;
 mod options;
 mod output;
-mod progress;
 mod run;
 mod tradeoff;
 

@@ -1,8 +1,9 @@
 //! What the commands print.
 
 use std::fmt::Display;
-use std::io::Write;
+use std::io::{IsTerminal, Write};
 
+use indicatif::{ProgressBar, ProgressFinish, ProgressStyle};
 use serde::Serialize;
 
 use crate::Error;
@@ -75,6 +76,26 @@ pub(super) fn write_warnings(
     warnings
         .iter()
         .try_for_each(|warning| write!(f, "\nwarning: {warning}"))
+}
+
+/// A bar on standard error over `steps` steps of some work; hidden unless standard error is a terminal.
+pub(super) fn progress_bar(what: &'static str, steps: usize) -> ProgressBar {
+    if !std::io::stderr().is_terminal() {
+        return ProgressBar::hidden();
+    }
+    let bar = ProgressBar::new(steps as u64).with_message(what);
+    let style =
+        ProgressStyle::with_template("{msg} {wide_bar} {pos}/{len}  {elapsed} passed, {eta} to go");
+    if let Ok(style) = style {
+        bar.set_style(style);
+    }
+    bar.with_finish(ProgressFinish::AndClear)
+}
+
+/// So many steps are done of so many.
+pub(super) fn set_progress(bar: &ProgressBar, done: usize, all: usize) {
+    bar.set_length(all as u64);
+    bar.set_position(done as u64);
 }
 
 /// By what a scene was simulated.

@@ -9,8 +9,9 @@ use clap::Args;
 use serde::Serialize;
 
 use super::options::Simulation;
-use super::output::{ChoicesReport, Output, or_dash, peak_memory_mb, write_warnings};
-use super::progress;
+use super::output::{
+    ChoicesReport, Output, or_dash, peak_memory_mb, progress_bar, set_progress, write_warnings,
+};
 use crate::Result;
 use crate::scene::Scene;
 use crate::simulate::{Controls, Recording};
@@ -63,8 +64,8 @@ pub(super) fn main(arguments: &Arguments, output: Output) -> Result<ExitCode> {
     if let Some(folder) = &arguments.out {
         Recording::prepare(folder)?;
     }
-    let progress = progress::bar("steps", scene.steps);
-    let done = |done| progress::set(&progress, done, scene.steps);
+    let progress = progress_bar("steps", scene.steps);
+    let done = |done| set_progress(&progress, done, scene.steps);
     let (mut report, recording) = simulate(&scene, arguments, done)?;
     drop(progress);
     if let Some(folder) = &arguments.out {

@@ -10,8 +10,7 @@ use std::process::ExitCode;
 use clap::Args;
 
 use super::options::{choice, load, positive, seconds, tolerance};
-use super::output::Output;
-use super::progress;
+use super::output::{Output, progress_bar, set_progress};
 use crate::Result;
 use crate::dynamics::Integrator;
 use crate::simulate::{Fidelity, Method};
@@ -107,10 +106,10 @@ pub(super) fn main(arguments: &Arguments, output: Output) -> Result<ExitCode> {
             TradeoffStage::Configurations => "configurations",
         };
         if bar.as_ref().is_none_or(|(of, _)| *of != what) {
-            bar = Some((what, progress::bar(what, now.all)));
+            bar = Some((what, progress_bar(what, now.all)));
         }
         if let Some((_, bar)) = &bar {
-            progress::set(bar, now.done, now.all);
+            set_progress(bar, now.done, now.all);
         }
         ControlFlow::Continue(())
     })?;

@@ -51,102 +51,86 @@ fn larger(a: f64, b: f64) -> f64 {
     if a.is_nan() || a > b { a } else { b }
 }
 
-/// Makes lengths of coordinates and velocities: angles times a length of the scene, and none of what
-/// is given.
+/// What makes lengths of coordinates and velocities, angles times a length of the scene and none of what is
+/// given; and how far a path goes by it.
 #[derive(Clone, Debug)]
-pub(super) struct Weights {
-    q: DVector<f64>,
-    v: DVector<f64>,
-}
-
-impl Weights {
-    /// For the joints that have `free` velocities.
-    pub fn new(simulator: &Simulator, free: &[usize]) -> Self {
-        let system = simulator.system();
-        let volume = system.bodies.iter().map(|b| b.volume).fold(0.0, f64::max);
-        let length = if volume > 0.0 { volume.cbrt() } else { 1.0 };
-        let tree = &system.tree;
-        let mut out = Self {
-            q: DVector::zeros(tree.coordinates()),
-            v: DVector::zeros(tree.velocities()),
-        };
-        for link in tree.links() {
-            if !link.v.clone().all(|i| free.contains(&i)) {
-                continue;
-            }
-            for (i, axis) in link.v.clone().zip(link.joint.basis()) {
-                let angular = axis.fixed_rows::<3>(3).norm() > 0.0;
-                out.v[i] = if angular { length } else { 1.0 };
-            }
-            // Quaternions, which come last, change by half an angle.
-            let quaternion = link.q.len() > link.v.len();
-            let rotation = link.q.end - if quaternion { 4 } else { 0 };
-            for (k, i) in link.q.clone().enumerate() {
-                out.q[i] = match (quaternion, i >= rotation) {
-                    (true, true) => 2.0 * length,
-                    (true, false) => 1.0,
-                    (false, _) => out.v[link.v.start + k],
-                };
-            }
-        }
-        out
-    }
-
-    fn far(weights: &DVector<f64>, a: &DVector<f64>, b: &DVector<f64>) -> f64 {
-        weights.component_mul(&(a - b)).norm()
-    }
-}
-
-/// How far a path goes.
-#[derive(Clone, Copy, Debug)]
 pub(super) struct Excursion {
-    q: f64,
-    v: f64,
+    weights: [DVector<f64>; 2],
+    /// Largest distances of coordinates and velocities from the start.
+    farthest: [f64; 2],
 }
 
 /// Of the largest velocity: a smaller change of it counts as none, and errors are relative to the
 /// velocity itself.
 const STEADY: f64 = 1e-6;
 
+fn distance(weights: &DVector<f64>, a: &DVector<f64>, b: &DVector<f64>) -> f64 {
+    weights.component_mul(&(a - b)).norm()
+}
+
 impl Excursion {
-    /// Largest distances from the start.
-    pub fn new(path: &Path, weights: &Weights) -> Self {
+    /// Of a path whose joints with `free` velocities count.
+    pub fn new(simulator: &Simulator, free: &[usize], path: &Path) -> Self {
+        let system = simulator.system();
+        let volume = system.bodies.iter().map(|b| b.volume).fold(0.0, f64::max);
+        let length = if volume > 0.0 { volume.cbrt() } else { 1.0 };
+        let tree = &system.tree;
+        let mut q = DVector::zeros(tree.coordinates());
+        let mut v = DVector::zeros(tree.velocities());
+        for link in tree.links() {
+            if !link.v.clone().all(|i| free.contains(&i)) {
+                continue;
+            }
+            for (i, axis) in link.v.clone().zip(link.joint.basis()) {
+                let angular = axis.fixed_rows::<3>(3).norm() > 0.0;
+                v[i] = if angular { length } else { 1.0 };
+            }
+            // Quaternions, which come last, change by half an angle.
+            let quaternion = link.q.len() > link.v.len();
+            let rotation = link.q.end - if quaternion { 4 } else { 0 };
+            for (k, i) in link.q.clone().enumerate() {
+                q[i] = match (quaternion, i >= rotation) {
+                    (true, true) => 2.0 * length,
+                    (true, false) => 1.0,
+                    (false, _) => v[link.v.start + k],
+                };
+            }
+        }
+        Self::of(path, [q, v])
+    }
+
+    fn of(path: &Path, weights: [DVector<f64>; 2]) -> Self {
         let largest = |w: &DVector<f64>, x: &[DVector<f64>], from: &DVector<f64>| {
-            let far = x.iter().map(|x| Weights::far(w, x, from));
+            let far = x.iter().map(|x| distance(w, x, from));
             far.fold(0.0, f64::max)
         };
-        let fastest = largest(&weights.v, &path.v, &(0.0 * &path.v[0]));
-        let change = largest(&weights.v, &path.v, &path.v[0]);
-        Self {
-            q: largest(&weights.q, &path.q, &path.q[0]),
-            v: if change > STEADY * fastest {
-                change
-            } else {
-                fastest
-            },
-        }
+        let [q, v] = &weights;
+        let fastest = largest(v, &path.v, &(0.0 * &path.v[0]));
+        let change = largest(v, &path.v, &path.v[0]);
+        let steady = change <= STEADY * fastest;
+        let farthest = [
+            largest(q, &path.q, &path.q[0]),
+            if steady { fastest } else { change },
+        ];
+        Self { weights, farthest }
     }
 
     /// Whether anything moves.
     pub fn any(&self) -> bool {
-        self.q > 0.0 && self.v > 0.0
+        self.farthest.iter().all(|x| *x > 0.0)
     }
 }
 
 /// Difference of two paths at the last time that both meet, no earlier than half of what `reference`
 /// covers: the larger of that in q and that in v, each relative to the excursion.
-pub(super) fn end_error(
-    path: &Path,
-    reference: &Path,
-    weights: &Weights,
-    excursion: &Excursion,
-) -> Option<f64> {
+pub(super) fn end_error(path: &Path, reference: &Path, excursion: &Excursion) -> Option<f64> {
     if !excursion.any() {
         return None;
     }
     let (i, j) = crossing(path, reference)?;
-    let q = Weights::far(&weights.q, &path.q[i], &reference.q[j]) / excursion.q;
-    let v = Weights::far(&weights.v, &path.v[i], &reference.v[j]) / excursion.v;
+    let ([q, v], [far_q, far_v]) = (&excursion.weights, excursion.farthest);
+    let q = distance(q, &path.q[i], &reference.q[j]) / far_q;
+    let v = distance(v, &path.v[i], &reference.v[j]) / far_v;
     Some(larger(q, v)).filter(|x| x.is_finite())
 }
 
@@ -189,25 +173,22 @@ mod tests {
 
     #[test]
     fn end_errors_are_relative_to_the_way_gone() {
-        let ones = Weights {
-            q: DVector::from_element(1, 1.0),
-            v: DVector::from_element(1, 1.0),
-        };
+        let ones = || [(); 2].map(|()| DVector::from_element(1, 1.0));
         let reference = path(0.1, 20);
-        let excursion = Excursion::new(&reference, &ones);
+        let excursion = Excursion::of(&reference, ones());
         let mut near = path(0.2, 10);
         near.q[10][0] += 0.02;
-        let error = end_error(&near, &reference, &ones, &excursion).unwrap();
+        let error = end_error(&near, &reference, &excursion).unwrap();
         assert!((error - 0.01).abs() < 1e-12, "{error}");
         near.v[10][0] = f64::NAN;
-        assert_eq!(end_error(&near, &reference, &ones, &excursion), None);
+        assert_eq!(end_error(&near, &reference, &excursion), None);
         let still = Path {
             q: vec![DVector::zeros(1); 21],
             v: vec![DVector::zeros(1); 21],
             ..reference
         };
-        let excursion = Excursion::new(&still, &ones);
-        assert_eq!(end_error(&still, &still, &ones, &excursion), None);
+        let excursion = Excursion::of(&still, ones());
+        assert_eq!(end_error(&still, &still, &excursion), None);
     }
 
     #[test]

@@ -18,7 +18,7 @@ use {
 pub(crate) struct Device {
     asked: Backend,
     /// Why it isn't what was asked for.
-    reason: Option<String>,
+    pub reason: Option<String>,
     #[cfg(feature = "gpu")]
     fallback: bool,
     #[cfg(feature = "gpu")]
@@ -118,11 +118,6 @@ impl Device {
         self.reason = Some(fallen_back(&error));
         self.context = None;
         Ok(())
-    }
-
-    /// What the user should know.
-    pub fn warning(&self) -> Option<String> {
-        self.reason.clone()
     }
 
     /// The open GPU.

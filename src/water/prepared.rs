@@ -71,7 +71,7 @@ pub(crate) fn prepare(
         fidelity.kind().idle_gpu(method)
     })?;
     let made = fidelity.kind().couple(&problem, &mut device)?;
-    warnings.extend(device.warning());
+    warnings.extend(device.reason.clone());
     warnings.extend(made.warnings);
     let mut resolved = vec![0.0; scene.bodies.len()];
     for (b, d) in numbers.iter().zip(&made.bodies) {

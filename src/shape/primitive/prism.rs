@@ -9,6 +9,7 @@ use super::planar::{Planar, Point};
 use crate::error::{Error, Result};
 use crate::shape::description::MAX_FACES;
 use hydrograd_adjoint::lie::Vec3;
+use std::cmp::Ordering;
 use std::f64::consts::{PI, TAU};
 
 /// Size of triangles at a sharp edge, as a part of that at the middle of a side.
@@ -72,12 +73,9 @@ const STEP: f64 = 0.01;
 const CLOSE: f64 = 0.004;
 
 fn signed_area(corners: &[Point]) -> f64 {
-    let next = corners.iter().cycle().skip(1);
     let origin = corners[0];
-    let parts = corners
-        .iter()
-        .zip(next)
-        .map(|(a, b)| (a - origin).perp(&(b - origin)));
+    let sides = corners.iter().zip(corners.iter().cycle().skip(1));
+    let parts = sides.map(|(a, b)| (a - origin).perp(&(b - origin)));
     parts.sum::<f64>() / 2.0
 }
 
@@ -283,11 +281,10 @@ fn mirror(mut vertices: Vec<Vec3>, mut faces: Vec<[usize; 3]>) -> Parts {
             vertices.len() - 1
         })
         .collect();
-    let mirrored: Vec<_> = faces
-        .iter()
-        .map(|[a, b, c]| [image[*a], image[*c], image[*b]])
-        .collect();
-    faces.extend(mirrored);
+    for f in 0..faces.len() {
+        let [a, b, c] = faces[f].map(|v| image[v]);
+        faces.push([a, c, b]);
+    }
     (vertices, faces)
 }
 
@@ -330,7 +327,7 @@ const LEAST: f64 = 1e-9;
 /// # Errors
 /// [`Error::Input`] naming the corner.
 pub(in crate::shape) fn check_profile(profile: &[[f64; 2]], place: &str) -> Result<()> {
-    let corner = |k: usize, remedy: String| {
+    let corner = |k: usize, remedy: &str| {
         let place = format!("{place}: profile[{k}]");
         Err(Error::input(place, format!("{:?}", profile[k]), remedy))
     };
@@ -344,48 +341,41 @@ pub(in crate::shape) fn check_profile(profile: &[[f64; 2]], place: &str) -> Resu
     }
     let sized = |x: f64| x.is_finite() && x.abs() <= 1e30;
     if let Some(k) = profile.iter().position(|p| !p.iter().all(|x| sized(*x))) {
-        return corner(k, "give finite coordinates [y, z] in metres".into());
+        return corner(k, "give finite coordinates [y, z] in metres");
     }
-    let largest = profile
-        .iter()
-        .flatten()
-        .fold(0.0_f64, |m, x| m.max(x.abs()));
+    let all = profile.iter().flatten();
+    let largest = all.fold(0.0_f64, |m, x| m.max(x.abs()));
     if largest < 1e-30 {
-        return corner(
-            0,
-            "all corners are at the origin: give them in metres".into(),
-        );
+        return corner(0, "all corners are at the origin: give them in metres");
     }
     let corners: Vec<Point> = profile.iter().map(|p| Point::from(*p) / largest).collect();
     let edge = |k: usize| corners[(k + 1) % n] - corners[k % n];
     let longest = (0..n).map(|k| edge(k).norm()).fold(0.0, f64::max);
     if let Some(k) = (0..n).find(|&k| edge(k).norm() <= LEAST * longest) {
-        let next = (k + 1) % n;
         let remedy = format!("it is the same as profile[{k}]: give each corner once");
-        return corner(next, remedy);
+        return corner((k + 1) % n, &remedy);
     }
     let angles: Vec<f64> = (0..n).map(|k| angle(&edge(k + n - 1), &edge(k))).collect();
     if let Some(k) = angles.iter().position(|t| t.abs() <= LEAST) {
-        let remedy = "it lies on the line between its neighbours: leave it out";
-        return corner(k, remedy.into());
+        return corner(
+            k,
+            "it lies on the line between its neighbours: leave it out",
+        );
     }
     if let Some(k) = angles.iter().position(|t| PI - t.abs() <= LEAST) {
-        let remedy = "the profile turns back on itself there: give it an area";
-        return corner(k, remedy.into());
+        return corner(k, "the profile turns back on itself there: give it an area");
     }
     // The way that most corners turn is right; the others are dents.
     let left = angles.iter().filter(|t| **t > 0.0).count();
-    let way = if 2 * left == n {
-        angles.iter().sum::<f64>().signum()
-    } else if 2 * left > n {
-        1.0
-    } else {
-        -1.0
+    let way = match (2 * left).cmp(&n) {
+        Ordering::Equal => angles.iter().sum::<f64>().signum(),
+        Ordering::Greater => 1.0,
+        Ordering::Less => -1.0,
     };
     if let Some(k) = angles.iter().position(|t| t * way < 0.0) {
         let remedy = "the profile bends inwards or crosses itself there, and must be convex: correct \
              the corner, or build the body from several convex ones";
-        return corner(k, remedy.into());
+        return corner(k, remedy);
     }
     // Once around and no more; the first corner at which it has gone farther.
     let mut sum = 0.0;
@@ -394,7 +384,7 @@ pub(in crate::shape) fn check_profile(profile: &[[f64; 2]], place: &str) -> Resu
         if sum > TAU + 1e-6 {
             let remedy = "by this corner the profile has gone around more than once, so it crosses \
                  itself: give the corners in their order around it";
-            return corner(k, remedy.into());
+            return corner(k, remedy);
         }
     }
     Ok(())

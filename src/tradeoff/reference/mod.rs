@@ -6,9 +6,7 @@
 mod moving;
 mod panels;
 
-use super::compare::{
-    Excursion, Weights, end_error, matrix_error, norm, significant, vector_error,
-};
+use super::compare::{Excursion, end_error, matrix_error, norm, significant, vector_error};
 use super::progress::Watch;
 use super::row::{ReferenceQuantity, TradeoffReference};
 use super::start::{Path, Start, free};
@@ -81,7 +79,6 @@ struct Motion {
     /// Force beside the scene's own for which the accelerations are compared.
     extra: DVector<f64>,
     acceleration: DVector<f64>,
-    weights: Weights,
     excursion: Excursion,
 }
 
@@ -160,8 +157,7 @@ impl Reference {
         let simulator = isolated(scene)?;
         let start = &simulations.best.start;
         let free = free(&simulator)?;
-        let weights = Weights::new(&simulator, &free);
-        let excursion = Excursion::new(&simulations.best.path, &weights);
+        let excursion = Excursion::new(&simulator, &free, &simulations.best.path);
         let mass = start.mass.clone();
         // Whether the scene's own forces accelerate anything at the start.
         let rate = norm(&simulator.start().1.select_rows(&free), &mass) / self.horizon();
@@ -199,7 +195,7 @@ impl Reference {
         });
         if excursion.any() {
             let dt = super::configuration::short(simulations.best.path.time_step);
-            let error = |a: &Path, b: &Path| end_error(a, b, &weights, &excursion);
+            let error = |a: &Path, b: &Path| end_error(a, b, &excursion);
             self.description.end_state = Some(ReferenceQuantity {
                 what: format!("{by}; rk4 with steps of {dt} s"),
                 error_estimate: simulations.estimate(|a, b| error(&a.path, &b.path)),
@@ -213,7 +209,6 @@ impl Reference {
             path: simulations.best.path,
             extra,
             acceleration,
-            weights,
             excursion,
         });
         Ok(())
@@ -244,7 +239,7 @@ impl Reference {
     /// Error of a trajectory's end.
     pub fn end_error(&self, path: &Path) -> Option<f64> {
         let motion = self.motion.as_ref()?;
-        end_error(path, &motion.path, &motion.weights, &motion.excursion)
+        end_error(path, &motion.path, &motion.excursion)
     }
 }
 

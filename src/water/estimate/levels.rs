@@ -77,6 +77,8 @@ pub(crate) fn extrapolate(case: &Case, missing: &mut Vec<String>) -> (Vec<Level>
     (levels, error)
 }
 
+type Surfaces = [Option<Surface>];
+
 /// Bodies whose meshes change together.
 struct Group<'a> {
     case: &'a Case<'a>,
@@ -97,30 +99,24 @@ impl Group<'_> {
             }
         }
         if pairs == 0 {
-            return self.worst(&case.surfaces, case.own(), &factors, false);
+            return self.worst(&case.surfaces, case.own(), &factors);
         }
         // The single mesh's error bounds that of the pair, whose own may tell more.
         let known = case.value(&single);
         let known = known.map_err(|e| self.reasons.push(e.to_string())).ok()?;
-        let plain = self.worst(&single, &known, &factors, false);
+        let plain = self.worst(&single, &known, &factors);
         if factors[0] > 1.0 {
             return plain;
         }
-        let pair = self.worst(&case.surfaces, case.own(), &[0.5], true);
+        let pair = self.worst(&case.surfaces, case.own(), &[0.5]);
         plain.into_iter().chain(pair).reduce(f64::min)
     }
 
     /// The largest error that the levels tell of `from`, whose added mass is `known`.
-    fn worst(
-        &mut self,
-        from: &[Option<Surface>],
-        known: &DMatrix<f64>,
-        factors: &[f64],
-        pairs: bool,
-    ) -> Option<f64> {
+    fn worst(&mut self, from: &Surfaces, known: &DMatrix<f64>, factors: &[f64]) -> Option<f64> {
         let mut worst: Option<f64> = None;
         for factor in factors {
-            match self.level(from, known, *factor, pairs) {
+            match self.level(from, known, *factor) {
                 Ok(Some(level)) => {
                     worst = Some(level.error.max(worst.unwrap_or(0.0)));
                     self.levels.push(level);
@@ -135,14 +131,10 @@ impl Group<'_> {
     }
 
     /// With `factor` times the faces; `None` where meshes can't have that.
-    fn level(
-        &self,
-        from: &[Option<Surface>],
-        known: &DMatrix<f64>,
-        factor: f64,
-        pairs: bool,
-    ) -> Result<Option<Level>> {
+    fn level(&self, from: &Surfaces, known: &DMatrix<f64>, factor: f64) -> Result<Option<Level>> {
         let case = self.case;
+        let paired = |b: &usize| from[*b].as_ref().is_some_and(|s| s.coarse.is_some());
+        let pairs = self.bodies.iter().any(paired);
         let (mut ratio, mut order, mut total) = (f64::INFINITY, f64::INFINITY, 0);
         let mut surfaces = from.to_vec();
         for b in &self.bodies {

@@ -59,7 +59,7 @@
 //! | F̄ | `twist_rows`: the scaled rows' right-hand side per body twist | F × 6 |
 //! | P, B̄ | `1/r` at the readout points, `readout_flux` | F × N, F × 6 |
 //! | r, λ, μ | residual `F x̄ − K a`, adjoint strengths, `K λ` | F × k, N × k, F × k |
-//! | X(q) | [`JointModel::frame_velocity`](crate::multibody::JointModel::frame_velocity) | per joint |
+//! | X(q) | [`JointMotion::frame_velocity`](crate::multibody::JointMotion::frame_velocity) | per joint |
 //! | ⊕ | [`JointModel::integrate`](crate::multibody::JointModel::integrate) | |
 //!
 //! The paper uses K_f for both a matrix (`1/r`, our P) and the fluid's energy, and writes ∇ above K for

@@ -2,7 +2,7 @@
 
 use crate::adjoint::lie::Pose;
 use crate::contact::{ContactPair, ContactShape, Contacts};
-use crate::dynamics::{self, ContactModel, Integrator, Regularisation};
+use crate::dynamics::{self, ContactModel, Integrator, Parameters, Regularisation};
 use crate::geometry::Other;
 use crate::scene::{Body, Contact, Scene, Shape};
 use crate::water::{Prepared, Surface, pose};
@@ -25,7 +25,7 @@ pub(super) struct ContactParts<'a> {
     pub time_step: f64,
     pub water: &'a Prepared,
     pub surfaces: &'a [Option<Surface>],
-    pub mass: &'a [f64],
+    pub parameters: &'a Parameters,
 }
 
 /// Refuses contact with an integrator that doesn't solve it.
@@ -74,7 +74,7 @@ pub(super) fn assemble(p: ContactParts) -> Result<(ContactModel, dynamics::Conta
         })
         .collect();
     let dt = p.time_step;
-    let heaviest = bodies().map(|b| p.mass[b]).fold(0.0, f64::max);
+    let heaviest = bodies().map(|b| p.parameters.mass(b)).fold(0.0, f64::max);
     let stiffness = p
         .given
         .stiffness

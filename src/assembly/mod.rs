@@ -99,18 +99,14 @@ pub(crate) fn assemble(
     }));
     let surfaces = water::surfaces(scene, &choices.water)?;
     let in_water = water::in_water(scene, &surfaces, &tree, choices.water.fidelity.coupled());
-    let names = scene.bodies.iter().map(|b| b.name.clone()).collect();
-    let mut declared = Declarations::new(names);
-    declared.set_density(scene.fluid.density);
     let mut bodies = Vec::with_capacity(scene.bodies.len());
     let mut faces = Vec::with_capacity(scene.bodies.len());
-    let mut masses = Vec::with_capacity(scene.bodies.len());
+    let mut inertias = Vec::with_capacity(scene.bodies.len());
     let mut controls = 0;
     for (b, body) in scene.bodies.iter().enumerate() {
         let surface = surfaces[b].as_ref();
         let (mass, center, inertia) = inertia(body, surface);
-        declared.set_inertia(b, mass, &inertia);
-        masses.push(mass);
+        inertias.push((body.name.clone(), mass, inertia));
         faces.push(surface.map_or(Vec::new(), |s| elements(&s.mesh)));
         let mut data = BodyData {
             name: body.name.clone(),
@@ -148,6 +144,7 @@ pub(crate) fn assemble(
         bodies: &bodies,
         surfaces: &faces,
     };
+    let mut declared = Declarations::new(scene.fluid.density, inertias);
     let forces = force::assemble(&parts, &mut declared);
     let mut parameters = declared.finish();
     let mut system = System {
@@ -175,7 +172,7 @@ pub(crate) fn assemble(
             time_step: dt,
             water: &water,
             surfaces: &surfaces,
-            mass: &masses,
+            parameters: &parameters,
         })?;
         system.contact = Some(made.0);
         parameters.add_contact(made.1);

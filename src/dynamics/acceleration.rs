@@ -67,7 +67,7 @@ impl Linearisation<'_> {
             let along = water.linearised.gradient_along(&direction, &twist)?;
             out -= rho * along.rows(0, v.len());
         }
-        Ok(out + tree.project(&self.kinematics, wrenches) + joints)
+        Ok(out + tree.project(&self.kinematics.columns, wrenches) + joints)
     }
 
     /// Transpose of [`Linearisation::inertial_force`]: the gradient of its product with `w`.

@@ -102,8 +102,8 @@ impl Evaluation<'_> {
         let tree = &self.system.tree;
         let wrenches = self.contact_wrenches(&tree.twists(&self.kinematics, v));
         let mut out = match dual {
-            Dual::User => tree.project(&self.kinematics, wrenches),
-            Dual::Frame => tree.project_frame(&self.kinematics, wrenches),
+            Dual::User => tree.project(&self.kinematics.columns, wrenches),
+            Dual::Frame => tree.project(&self.kinematics.frame_columns, wrenches),
         };
         for (limit, [lower, upper]) in self.stops(v) {
             out[limit.v] += lower + upper;
@@ -121,7 +121,7 @@ impl Evaluation<'_> {
             if force != Vec3::zeros() {
                 let mut wrenches = vec![Vec6::zeros(); self.system.len()];
                 t.exchange(&point_wrench(&t.point.position, &force), &mut wrenches);
-                out += tree.project(&self.kinematics, wrenches).abs();
+                out += tree.project(&self.kinematics.columns, wrenches).abs();
             }
         }
         for (limit, [lower, upper]) in self.stops(v) {
@@ -141,7 +141,7 @@ impl Evaluation<'_> {
             let force = contact_force_jvp(&t.law, &t.point_state(&twists), &du);
             t.exchange(&point_wrench(&t.point.position, &force), &mut out);
         }
-        let mut out = tree.project(&self.kinematics, out);
+        let mut out = tree.project(&self.kinematics.columns, out);
         for l in &self.system.limits {
             out[l.v] += l.forces_jvp(self.q[l.q], v[l.v], dv[l.v]);
         }

@@ -10,7 +10,7 @@ use std::ops::{Index, IndexMut};
 use std::sync::Arc;
 
 /// What a parameter belongs to: the first part of its name, and its place in the order of all of them.
-#[derive(Clone, Debug, PartialEq, Eq, PartialOrd, Ord)]
+#[derive(Clone, Debug, PartialEq, Eq)]
 pub enum Owner {
     /// The fluid.
     Fluid,
@@ -96,13 +96,6 @@ pub struct Entry {
     pub declared: Declared,
 }
 
-/// Parameters of a body's inertia.
-#[derive(Clone, Copy, Debug)]
-struct Inertial {
-    mass: Parameter,
-    inertia: [Parameter; 6],
-}
-
 /// All parameters of a system.
 #[derive(Clone, Debug)]
 pub struct ParameterTable {
@@ -110,9 +103,7 @@ pub struct ParameterTable {
     entries: Vec<Entry>,
     /// Place of each parameter in that order, by its number of declaration.
     places: Vec<usize>,
-    density: Parameter,
-    bodies: Vec<Inertial>,
-    contact: [Parameter; 3],
+    bodies: usize,
 }
 
 /// A table in the making, with the values that it starts from.
@@ -121,12 +112,26 @@ pub struct Declarations {
     bodies: Vec<String>,
     /// Entries with their values, in the order of declaration.
     made: Vec<(Entry, f64)>,
-    density: Parameter,
-    inertial: Vec<Inertial>,
-    contact: [Parameter; 3],
 }
 
-const DENSITY: Declared = Declared::new("density", "kg/m³");
+/// The fluid's density: declared before all others.
+pub(super) const DENSITY: Parameter = Parameter(0);
+
+/// Mass of body `b`: after the density come the bodies, each with its mass and its inertia.
+pub(super) fn mass(b: usize) -> Parameter {
+    Parameter(1 + (1 + INERTIA.len()) * b)
+}
+
+fn inertia(b: usize) -> [Parameter; 6] {
+    std::array::from_fn(|k| Parameter(mass(b).0 + 1 + k))
+}
+
+/// Parameters of contact of so many bodies: after theirs.
+fn contact(bodies: usize) -> [Parameter; 3] {
+    std::array::from_fn(|k| Parameter(mass(bodies).0 + k))
+}
+
+const FLUID: Declared = Declared::new("density", "kg/m³");
 const MASS: Declared = Declared::new("mass", "kg");
 const CONTACT: [Declared; 3] = [
     Declared::new("stiffness", "N/m"),
@@ -152,40 +157,23 @@ const INERTIA: [Declared; 6] = {
 };
 
 impl Declarations {
-    /// Density, masses, inertias and contact of bodies of these names, all zero.
-    pub fn new(bodies: Vec<String>) -> Self {
-        let none = Parameter(0);
+    /// Density (kg/m³) and bodies: name, mass (kg), inertia (xx, yy, zz, xy, xz, yz, kg m²); those of contact are zero.
+    pub fn new(density: f64, bodies: Vec<(String, f64, [f64; 6])>) -> Self {
         let mut out = Self {
-            inertial: Vec::with_capacity(bodies.len()),
-            bodies,
+            bodies: bodies.iter().map(|b| b.0.clone()).collect(),
             made: Vec::new(),
-            density: none,
-            contact: [none; 3],
         };
-        out.density = out.declare(Owner::Fluid, DENSITY, 0.0);
-        for b in 0..out.bodies.len() {
-            let inertial = Inertial {
-                mass: out.declare(Owner::Body(b), MASS, 0.0),
-                inertia: INERTIA.map(|i| out.declare(Owner::Body(b), i, 0.0)),
-            };
-            out.inertial.push(inertial);
+        out.declare(Owner::Fluid, FLUID, density);
+        for (b, (_, mass, inertia)) in bodies.into_iter().enumerate() {
+            out.declare(Owner::Body(b), MASS, mass);
+            for (declared, value) in INERTIA.into_iter().zip(inertia) {
+                out.declare(Owner::Body(b), declared, value);
+            }
         }
-        out.contact = CONTACT.map(|c| out.declare(Owner::Named("contact".into()), c, 0.0));
+        for declared in CONTACT {
+            out.declare(Owner::Named("contact".into()), declared, 0.0);
+        }
         out
-    }
-
-    /// Sets the fluid's density, kg/m³.
-    pub fn set_density(&mut self, density: f64) {
-        self.made[self.density.0].1 = density;
-    }
-
-    /// Sets mass (kg) and inertia (xx, yy, zz, xy, xz, yz, kg m²) of body `b`.
-    pub fn set_inertia(&mut self, b: usize, mass: f64, inertia: &[f64; 6]) {
-        let at = self.inertial[b];
-        self.made[at.mass.0].1 = mass;
-        for (i, x) in at.inertia.iter().zip(inertia) {
-            self.made[i.0].1 = *x;
-        }
     }
 
     /// Adds a parameter with its value.
@@ -222,9 +210,7 @@ impl Declarations {
             table: Arc::new(ParameterTable {
                 entries,
                 places,
-                density: self.density,
-                bodies: self.inertial,
-                contact: self.contact,
+                bodies: self.bodies.len(),
             }),
             values,
         }
@@ -341,42 +327,39 @@ impl Parameters {
 
     /// Density of the fluid, kg/m³.
     pub fn density(&self) -> f64 {
-        self[self.table.density]
+        self[DENSITY]
     }
 
     /// The same, to be changed.
     pub fn density_mut(&mut self) -> &mut f64 {
-        let at = self.table.density;
-        &mut self[at]
+        &mut self[DENSITY]
     }
 
     /// Mass of body `b`, kg.
     pub fn mass(&self, b: usize) -> f64 {
-        self[self.table.bodies[b].mass]
+        self[mass(b)]
     }
 
     /// The same, to be changed.
     pub fn mass_mut(&mut self, b: usize) -> &mut f64 {
-        let at = self.table.bodies[b].mass;
-        &mut self[at]
+        &mut self[mass(b)]
     }
 
     /// Inertia of body `b` about its centre of mass, body axes: xx, yy, zz, xy, xz, yz, kg m².
     pub fn inertia(&self, b: usize) -> [f64; 6] {
-        self.table.bodies[b].inertia.map(|i| self[i])
+        inertia(b).map(|i| self[i])
     }
 
     /// Adds to the inertia of body `b`.
     pub fn add_inertia(&mut self, b: usize, more: &[f64; 6]) {
-        let at = self.table.bodies[b].inertia;
-        for (i, x) in at.into_iter().zip(more) {
+        for (i, x) in inertia(b).into_iter().zip(more) {
             self[i] += x;
         }
     }
 
     /// Parameters of contact.
     pub fn contact(&self) -> ContactParameters {
-        let [stiffness, dissipation, friction] = self.table.contact.map(|i| self[i]);
+        let [stiffness, dissipation, friction] = contact(self.table.bodies).map(|i| self[i]);
         ContactParameters {
             stiffness,
             dissipation,
@@ -387,7 +370,7 @@ impl Parameters {
     /// Adds to the parameters of contact.
     pub fn add_contact(&mut self, more: ContactParameters) {
         let more = [more.stiffness, more.dissipation, more.friction];
-        for (i, x) in self.table.contact.into_iter().zip(more) {
+        for (i, x) in contact(self.table.bodies).into_iter().zip(more) {
             self[i] += x;
         }
     }

@@ -20,6 +20,18 @@ pub struct Link {
     pub v: Range<usize>,
 }
 
+impl Link {
+    /// Its part of joint coordinates.
+    pub fn of_q<'x>(&self, q: &'x DVector<f64>) -> &'x [f64] {
+        &q.as_slice()[self.q.clone()]
+    }
+
+    /// Its part of a vector with an entry per velocity.
+    pub fn of_v<'x>(&self, x: &'x DVector<f64>) -> &'x [f64] {
+        &x.as_slice()[self.v.clone()]
+    }
+}
+
 /// A forest of bodies, parents before children.
 #[derive(Clone, Debug)]
 pub struct Tree {
@@ -60,9 +72,9 @@ pub struct Fields {
     /// Rate C of V at constant v.
     pub bias: Vec<Vec6>,
     /// v̂ and ẑ, kept for the reverse.
-    frame_velocity: Vec<f64>,
-    frame_virtual: Vec<f64>,
-    frame_bias: Vec<f64>,
+    frame_velocity: DVector<f64>,
+    frame_virtual: DVector<f64>,
+    frame_bias: DVector<f64>,
 }
 
 /// Cotangents of [`Fields`] and of the poses (spatial wrenches).
@@ -153,6 +165,20 @@ impl Tree {
         false
     }
 
+    /// Vectors from the parts that each joint has in them.
+    pub fn joints<const N: usize>(
+        &self,
+        part: impl Fn(&Link) -> [Vec<f64>; N],
+    ) -> [DVector<f64>; N] {
+        let mut out = [const { Vec::new() }; N];
+        for l in &self.links {
+            for (out, part) in out.iter_mut().zip(part(l)) {
+                out.extend(part);
+            }
+        }
+        out.map(DVector::from_vec)
+    }
+
     /// Applies a per-joint map from slices of q and of a velocity-sized vector.
     pub fn per_joint(
         &self,
@@ -160,16 +186,8 @@ impl Tree {
         x: &DVector<f64>,
         map: impl Fn(&JointModel, &[f64], &[f64]) -> Vec<f64>,
     ) -> DVector<f64> {
-        let mut out = Vec::with_capacity(self.velocities);
-        for l in &self.links {
-            let part = map(
-                &l.joint,
-                &q.as_slice()[l.q.clone()],
-                &x.as_slice()[l.v.clone()],
-            );
-            out.extend(part);
-        }
-        DVector::from_vec(out)
+        let [out] = self.joints(|l| [map(&l.joint, l.of_q(q), l.of_v(x))]);
+        out
     }
 
     /// `q ⊕ xi` for all joints.
@@ -183,24 +201,14 @@ impl Tree {
         xi: &DVector<f64>,
         bar: &DVector<f64>,
     ) -> (DVector<f64>, DVector<f64>) {
-        self.pairwise(|l| {
-            let r = l.v.clone();
-            l.joint
-                .integrate_vjp(&xi.as_slice()[r.clone()], &bar.as_slice()[r])
-        })
+        self.joints(|l| l.joint.integrate_vjp(l.of_v(xi), l.of_v(bar)).into())
+            .into()
     }
 
     /// Rates of the chart coordinates at generalised velocity `v`.
     pub fn chart_rate(&self, xi: &DVector<f64>, v: &DVector<f64>) -> DVector<f64> {
-        let mut out = Vec::with_capacity(self.velocities);
-        for l in &self.links {
-            let r = l.v.clone();
-            out.extend(
-                l.joint
-                    .chart_rate(&xi.as_slice()[r.clone()], &v.as_slice()[r]),
-            );
-        }
-        DVector::from_vec(out)
+        let [out] = self.joints(|l| [l.joint.chart_rate(l.of_v(xi), l.of_v(v))]);
+        out
     }
 
     /// Cotangents of `(xi, v)` of [`Tree::chart_rate`].
@@ -210,14 +218,8 @@ impl Tree {
         v: &DVector<f64>,
         bar: &DVector<f64>,
     ) -> (DVector<f64>, DVector<f64>) {
-        self.pairwise(|l| {
-            let r = l.v.clone();
-            l.joint.chart_rate_vjp(
-                &xi.as_slice()[r.clone()],
-                &v.as_slice()[r.clone()],
-                &bar.as_slice()[r],
-            )
-        })
+        let of = |l: &Link| l.joint.chart_rate_vjp(l.of_v(xi), l.of_v(v), l.of_v(bar));
+        self.joints(|l| of(l).into()).into()
     }
 
     /// Momentum conjugate to the chart coordinates `xi` around `q`, from frame momentum.
@@ -227,16 +229,9 @@ impl Tree {
         xi: &DVector<f64>,
         hat: &DVector<f64>,
     ) -> DVector<f64> {
-        let mut out = Vec::with_capacity(self.velocities);
-        for l in &self.links {
-            let r = l.v.clone();
-            out.extend(l.joint.chart_momentum(
-                &q.as_slice()[l.q.clone()],
-                &xi.as_slice()[r.clone()],
-                &hat.as_slice()[r],
-            ));
-        }
-        DVector::from_vec(out)
+        let of = |l: &Link| l.joint.chart_momentum(l.of_q(q), l.of_v(xi), l.of_v(hat));
+        let [out] = self.joints(|l| [of(l)]);
+        out
     }
 
     /// Cotangents of `(q, xi, p̂)` of [`Tree::chart_momentum`].
@@ -247,33 +242,10 @@ impl Tree {
         hat: &DVector<f64>,
         z: &DVector<f64>,
     ) -> [DVector<f64>; 3] {
-        let mut out = [Vec::new(), Vec::new(), Vec::new()];
-        for l in &self.links {
-            let r = l.v.clone();
-            let parts = l.joint.chart_momentum_vjp(
-                &q.as_slice()[l.q.clone()],
-                &xi.as_slice()[r.clone()],
-                &hat.as_slice()[r.clone()],
-                &z.as_slice()[r],
-            );
-            for (out, part) in out.iter_mut().zip(parts) {
-                out.extend(part);
-            }
-        }
-        out.map(DVector::from_vec)
-    }
-
-    fn pairwise(
-        &self,
-        map: impl Fn(&Link) -> (Vec<f64>, Vec<f64>),
-    ) -> (DVector<f64>, DVector<f64>) {
-        let (mut a, mut b) = (Vec::new(), Vec::new());
-        for l in &self.links {
-            let (x, y) = map(l);
-            a.extend(x);
-            b.extend(y);
-        }
-        (DVector::from_vec(a), DVector::from_vec(b))
+        self.joints(|l| {
+            let (q, xi, hat, z) = (l.of_q(q), l.of_v(xi), l.of_v(hat), l.of_v(z));
+            l.joint.chart_momentum_vjp(q, xi, hat, z)
+        })
     }
 
     /// Poses and columns at `q`.
@@ -286,13 +258,9 @@ impl Tree {
                 Some(p) => poses[p].compose(&l.placement),
                 None => l.placement,
             };
-            let qj = &q.as_slice()[l.q.clone()];
-            let own: Vec<Vec6> = l
-                .joint
-                .basis()
-                .iter()
-                .map(|b| frame.twist_to_world(b))
-                .collect();
+            let qj = l.of_q(q);
+            let basis = l.joint.basis();
+            let own: Vec<Vec6> = basis.iter().map(|b| frame.twist_to_world(b)).collect();
             for k in 0..own.len() {
                 let mut unit = vec![0.0; own.len()];
                 unit[k] = 1.0;
@@ -314,14 +282,9 @@ impl Tree {
         let mut out: Vec<Vec6> = Vec::with_capacity(self.links.len());
         for l in &self.links {
             let base = l.parent.map_or(Vec6::zeros(), |p| out[p]);
-            out.push(base + self.combine(&kinematics.columns, l, v.as_slice()));
+            out.push(base + combine(&kinematics.columns, l, v));
         }
         out
-    }
-
-    /// Sum of a body's joint columns with the given coefficients.
-    fn combine(&self, columns: &[Vec6], link: &Link, x: &[f64]) -> Vec6 {
-        link.v.clone().map(|k| columns[k] * x[k]).sum()
     }
 
     /// Adds each body's six-vector to its parent's, leaves first: the composite over subtrees.
@@ -335,28 +298,13 @@ impl Tree {
         field
     }
 
-    /// Projects spatial wrenches on the user columns: `Sᵀ` composite.
-    pub fn project(&self, kinematics: &Kinematics, wrenches: Vec<Vec6>) -> DVector<f64> {
+    /// Projects spatial wrenches on columns, one per velocity: columnsᵀ composite. On the user columns it gives forces dual to user
+    /// velocities, on the frame columns those dual to frame velocities.
+    pub fn project(&self, columns: &[Vec6], wrenches: Vec<Vec6>) -> DVector<f64> {
         let composite = self.composite(wrenches);
-        let mut out = DVector::zeros(self.velocities);
-        for (l, f) in self.links.iter().zip(&composite) {
-            for k in l.v.clone() {
-                out[k] = kinematics.columns[k].dot(f);
-            }
-        }
-        out
-    }
-
-    /// The same on the frame columns: forces dual to frame velocities.
-    pub fn project_frame(&self, kinematics: &Kinematics, wrenches: Vec<Vec6>) -> DVector<f64> {
-        let composite = self.composite(wrenches);
-        let mut out = DVector::zeros(self.velocities);
-        for (l, f) in self.links.iter().zip(&composite) {
-            for k in l.v.clone() {
-                out[k] = kinematics.frame_columns[k].dot(f);
-            }
-        }
-        out
+        let of = |(l, f): (&Link, &Vec6)| l.v.clone().map(|k| columns[k].dot(f)).collect();
+        let parts: Vec<Vec<f64>> = self.links.iter().zip(&composite).map(of).collect();
+        DVector::from_vec(parts.concat())
     }
 
     /// Spatial twists of all bodies as columns of a 6B × nv matrix.
@@ -384,24 +332,21 @@ impl Tree {
         z: Virtual,
     ) -> Fields {
         let hat = |x: &DVector<f64>| self.per_joint(q, x, |j, q, x| j.frame_velocity(q, x));
-        let frame_velocity = hat(v);
-        let frame_virtual = match z {
-            Virtual::Frame(z) => z.clone(),
-            Virtual::User(z) => hat(z),
-        };
-        let frame_bias = self.per_joint(q, v, |j, _, v| j.frame_bias(v));
         let n = self.links.len();
         let mut f = Fields {
             twist: Vec::with_capacity(n),
             virtual_twist: Vec::with_capacity(n),
             turning: Vec::with_capacity(n),
             bias: Vec::with_capacity(n),
-            frame_velocity: frame_velocity.as_slice().to_vec(),
-            frame_virtual: frame_virtual.as_slice().to_vec(),
-            frame_bias: frame_bias.as_slice().to_vec(),
+            frame_bias: self.per_joint(q, v, |j, _, v| j.frame_bias(v)),
+            frame_velocity: hat(v),
+            frame_virtual: match z {
+                Virtual::Frame(z) => z.clone(),
+                Virtual::User(z) => hat(z),
+            },
         };
         for l in &self.links {
-            let [sv, sz, sb] = self.own(kinematics, l, &f);
+            let [sv, sz, sb] = own(kinematics, l, &f);
             let zero = Vec6::zeros();
             let (v, z, d, c) = l.parent.map_or((zero, zero, zero, zero), |p| {
                 (f.twist[p], f.virtual_twist[p], f.turning[p], f.bias[p])
@@ -412,12 +357,6 @@ impl Tree {
             f.virtual_twist.push(z + sz);
         }
         f
-    }
-
-    /// The joint's own contributions `Ŝ v̂`, `Ŝ ẑ`, `Ŝ (Ẋ v)`.
-    fn own(&self, kinematics: &Kinematics, l: &Link, f: &Fields) -> [Vec6; 3] {
-        let columns = &kinematics.frame_columns;
-        [&f.frame_velocity, &f.frame_virtual, &f.frame_bias].map(|x| self.combine(columns, l, x))
     }
 
     /// Transpose of [`Tree::fields`]: tangent cotangents of `(q, v)` from cotangents of the fields
@@ -435,7 +374,7 @@ impl Tree {
         let mut v_bar = DVector::zeros(self.velocities);
         for b in (0..self.links.len()).rev() {
             let l = &self.links[b];
-            let [sv, sz, sb] = self.own(kinematics, l, fields);
+            let [sv, sz, sb] = own(kinematics, l, fields);
             let parent_twist = l.parent.map_or(Vec6::zeros(), |p| fields.twist[p]);
             let (twist, virt, turning, bias) = (
                 bar.twist[b],
@@ -452,23 +391,15 @@ impl Tree {
                     .collect()
             };
             let (hat_v, hat_z, hat_b) = (dot(&sv_bar), dot(&sz_bar), dot(&bias));
-            let vj = &v.as_slice()[l.v.clone()];
-            let mut own_q = vec![0.0; l.v.len()];
-            let mut own_v = vec![0.0; l.v.len()];
-            let add = |out: &mut Vec<f64>, x: Vec<f64>| {
-                for (o, x) in out.iter_mut().zip(x) {
-                    *o += x;
-                }
+            let own_q = l.joint.frame_velocity_vjp(l.of_v(v), &hat_v);
+            let more_q = match z {
+                Virtual::User(z) => l.joint.frame_velocity_vjp(l.of_v(z), &hat_z),
+                Virtual::Frame(_) => vec![0.0; l.v.len()],
             };
-            add(&mut own_q, l.joint.frame_velocity_vjp(vj, &hat_v));
-            if let Virtual::User(z) = z {
-                let zj = &z.as_slice()[l.v.clone()];
-                add(&mut own_q, l.joint.frame_velocity_vjp(zj, &hat_z));
-            }
-            add(&mut own_v, l.joint.frame_bias_vjp(vj, &hat_b));
+            let own_v = l.joint.frame_bias_vjp(l.of_v(v), &hat_b);
             // X is its own q's; S = Ŝ X already holds it.
             for (k, i) in l.v.clone().enumerate() {
-                q_bar[i] = own_q[k] + kinematics.columns[i].dot(&bar.pose[b]);
+                q_bar[i] = own_q[k] + more_q[k] + kinematics.columns[i].dot(&bar.pose[b]);
                 v_bar[i] = own_v[k] + kinematics.columns[i].dot(&sv_bar);
             }
             if let Some(p) = l.parent {
@@ -485,4 +416,15 @@ impl Tree {
         }
         (q_bar, v_bar)
     }
+}
+
+/// Sum of a body's joint columns with the given coefficients.
+fn combine(columns: &[Vec6], link: &Link, x: &DVector<f64>) -> Vec6 {
+    link.v.clone().map(|k| columns[k] * x[k]).sum()
+}
+
+/// The joint's own contributions `Ŝ v̂`, `Ŝ ẑ`, `Ŝ (Ẋ v)`.
+fn own(kinematics: &Kinematics, l: &Link, f: &Fields) -> [Vec6; 3] {
+    let columns = &kinematics.frame_columns;
+    [&f.frame_velocity, &f.frame_virtual, &f.frame_bias].map(|x| combine(columns, l, x))
 }

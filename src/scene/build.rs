@@ -15,6 +15,21 @@ use super::{
     Body, Drag, Fluid, Initial, Joint, Motion, Placement, Preset, Refinement, Scene, Shape, Wall,
 };
 
+/// Methods that give the same with one thing set, each `name(arguments) => field = value`.
+macro_rules! setters {
+    ($type:ident { $($(#[$about:meta])* $name:ident($($x:ident: $of:ty),*) => $($field:ident).+ = $value:expr;)* }) => {
+        impl $type {
+            $(
+                $(#[$about])*
+                pub fn $name(mut self, $($x: $of),*) -> Self {
+                    self.$($field).+ = $value;
+                    self
+                }
+            )*
+        }
+    };
+}
+
 /// A body of a scene, by its place in [`Scene::bodies`].
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, PartialOrd, Ord)]
 pub struct BodyId(pub usize);
@@ -109,83 +124,7 @@ impl Body {
 
     /// A free body without a surface; the water doesn't see it unless it's given an added mass.
     pub fn dry() -> Self {
-        Self {
-            name: String::new(),
-            shape: None,
-            shape_at: Placement::default(),
-            refine: Vec::new(),
-            mass: None,
-            density: None,
-            center_of_mass: None,
-            inertia: None,
-            added_mass: None,
-            parent: None,
-            overlaps_parent: false,
-            placement: Placement::default(),
-            joint: Joint::Free,
-            motion: None,
-            locked: false,
-            limits: None,
-            limit_stiffness: None,
-            actuated: false,
-            thruster: false,
-            drag: None,
-        }
-    }
-
-    /// Name, unique in the scene.
-    pub fn named(mut self, name: impl Into<String>) -> Self {
-        self.name = name.into();
-        self
-    }
-
-    /// Density, kg/m³, from which mass and inertia follow.
-    pub fn density(mut self, density: f64) -> Self {
-        self.density = Some(density);
-        self
-    }
-
-    /// Mass, kg.
-    pub fn mass(mut self, mass: f64) -> Self {
-        self.mass = Some(mass);
-        self
-    }
-
-    /// Inertia about the centre of mass, body axes, kg m²: `[xx, yy, zz]` or
-    /// `[xx, yy, zz, xy, xz, yz]`.
-    pub fn inertia(mut self, inertia: impl Into<Vec<f64>>) -> Self {
-        self.inertia = Some(inertia.into());
-        self
-    }
-
-    /// Centre of mass in the body's frame, m.
-    pub fn center_of_mass(mut self, center: [f64; 3]) -> Self {
-        self.center_of_mass = Some(center);
-        self
-    }
-
-    /// The body's own added mass at unit density of the fluid, about its origin, body axes.
-    pub fn added_mass(mut self, rows: [[f64; 6]; 6]) -> Self {
-        self.added_mass = Some(rows.iter().map(|row| row.to_vec()).collect());
-        self
-    }
-
-    /// Position of the joint's frame in the parent's frame, m: where the body is at q = 0.
-    pub fn at(mut self, position: [f64; 3]) -> Self {
-        self.placement.position = position;
-        self
-    }
-
-    /// Rotation of the joint's frame in the parent's frame: axis times angle, rad.
-    pub fn rotated(mut self, rotation: [f64; 3]) -> Self {
-        self.placement.rotation = rotation;
-        self
-    }
-
-    /// Pose of the shape in the body's frame: translation, m, and rotation vector, rad.
-    pub fn shape_at(mut self, position: [f64; 3], rotation: [f64; 3]) -> Self {
-        self.shape_at = Placement::new(position, rotation);
-        self
+        Self::default()
     }
 
     /// Makes faces that touch a ball (body's frame; center and radius in m) smaller, until no edge is longer
@@ -199,69 +138,51 @@ impl Body {
         self
     }
 
-    /// How the body moves against its parent; [`Joint::Free`] if never called.
-    pub fn joint(mut self, joint: Joint) -> Self {
-        self.joint = joint;
-        self
-    }
-
     /// Fixes the body to its parent, or to the world.
     pub fn fixed(self) -> Self {
         self.joint(Joint::Fixed)
     }
+}
 
+setters! { Body {
+    /// Name, unique in the scene.
+    named(name: impl Into<String>) => name = name.into();
+    /// Density, kg/m³, from which mass and inertia follow.
+    density(density: f64) => density = Some(density);
+    /// Mass, kg.
+    mass(mass: f64) => mass = Some(mass);
+    /// Inertia about the centre of mass, body axes, kg m²: `[xx, yy, zz]` or
+    /// `[xx, yy, zz, xy, xz, yz]`.
+    inertia(inertia: impl Into<Vec<f64>>) => inertia = Some(inertia.into());
+    /// Centre of mass in the body's frame, m.
+    center_of_mass(center: [f64; 3]) => center_of_mass = Some(center);
+    /// The body's own added mass at unit density of the fluid, about its origin, body axes.
+    added_mass(rows: [[f64; 6]; 6]) => added_mass = Some(rows.iter().map(|row| row.to_vec()).collect());
+    /// Position of the joint's frame in the parent's frame, m: where the body is at q = 0.
+    at(position: [f64; 3]) => placement.position = position;
+    /// Rotation of the joint's frame in the parent's frame: axis times angle, rad.
+    rotated(rotation: [f64; 3]) => placement.rotation = rotation;
+    /// Pose of the shape in the body's frame: translation, m, and rotation vector, rad.
+    shape_at(position: [f64; 3], rotation: [f64; 3]) => shape_at = Placement::new(position, rotation);
+    /// How the body moves against its parent; [`Joint::Free`] if never called.
+    joint(joint: Joint) => joint = joint;
     /// Name of the body that carries this one; add that one first.
-    pub fn child_of(mut self, parent: impl Into<String>) -> Self {
-        self.parent = Some(parent.into());
-        self
-    }
-
+    child_of(parent: impl Into<String>) => parent = Some(parent.into());
     /// Lets the surface touch or overlap that of the body that carries it; the two then don't feel
     /// each other through the water.
-    pub fn overlaps_parent(mut self) -> Self {
-        self.overlaps_parent = true;
-        self
-    }
-
+    overlaps_parent() => overlaps_parent = true;
     /// Drives the joint by a given motion, one per coordinate.
-    pub fn driven(mut self, motion: impl Into<Vec<Motion>>) -> Self {
-        self.motion = Some(motion.into());
-        self
-    }
-
+    driven(motion: impl Into<Vec<Motion>>) => motion = Some(motion.into());
     /// Holds the joint where it starts.
-    pub fn locked(mut self) -> Self {
-        self.locked = true;
-        self
-    }
-
+    locked() => locked = true;
     /// Stops a prismatic or revolute joint at the ends of a range `[lower, upper]`, m or rad.
-    pub fn limits(mut self, range: [f64; 2]) -> Self {
-        self.limits = Some(range);
-        self
-    }
-
+    limits(range: [f64; 2]) => limits = Some(range);
     /// Stiffness of the stops at the limits, N/m or N m/rad.
-    pub fn limit_stiffness(mut self, stiffness: f64) -> Self {
-        self.limit_stiffness = Some(stiffness);
-        self
-    }
-
+    limit_stiffness(stiffness: f64) => limit_stiffness = Some(stiffness);
     /// Makes the joint's generalised forces controls.
-    pub fn actuated(mut self) -> Self {
-        self.actuated = true;
-        self
-    }
-
+    actuated() => actuated = true;
     /// Makes a wrench on the body (world axes, about its origin; N, N m) a control.
-    pub fn thruster(mut self) -> Self {
-        self.thruster = true;
-        self
-    }
-
+    thruster() => thruster = true;
     /// Drag on the body's surface.
-    pub fn drag(mut self, drag: Drag) -> Self {
-        self.drag = Some(drag);
-        self
-    }
-}
+    drag(drag: Drag) => drag = Some(drag);
+} }

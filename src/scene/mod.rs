@@ -3,6 +3,7 @@
 //! SI units throughout. Frames: a body's pose in the world is
 //! `parent pose ∘ placement ∘ joint motion`; the body's origin is where its joint acts.
 
+#[macro_use]
 mod build;
 mod contact;
 mod file;
@@ -94,7 +95,7 @@ pub struct Placement {
 }
 
 /// One rigid body with the joint that carries it.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Body {
     /// Name, unique in the scene.

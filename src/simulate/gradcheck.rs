@@ -3,7 +3,7 @@
 use super::{Controls, Cotangents, Rollout, Sample, Simulator};
 use crate::adjoint::lie::Vec3;
 use crate::adjoint::sample::Samples;
-use crate::dynamics::{Drive, Parameters};
+use crate::dynamics::Drive;
 use crate::{Error, Result};
 use nalgebra::{DMatrix, DVector};
 use serde::Serialize;
@@ -93,9 +93,7 @@ struct Scales {
 }
 
 /// A random functional of the trajectory: markers on the bodies and velocities, at the middle and the end.
-struct Probe {
-    readings: Vec<Reading>,
-}
+struct Probe([Reading; 2]);
 
 /// What is read at one state: a marker on each body along a direction, and velocities.
 struct Reading {
@@ -119,45 +117,34 @@ impl Probe {
                 .map(|b| f * Vec3::from(v.fixed_rows::<3>(3 * b)))
                 .collect()
         };
-        let readings = [steps / 2, steps].map(|state| Reading {
+        Self([steps / 2, steps].map(|state| Reading {
             state,
             arms: points(&vector(3 * bodies), scale.length),
             directions: points(&vector(3 * bodies), 1.0 / scale.length),
             velocity: vector(velocities).component_div(&scale.velocity),
-        });
-        Self {
-            readings: readings.into(),
-        }
+        }))
     }
 
-    fn value(&self, samples: &[Sample]) -> f64 {
-        let mut out = 0.0;
-        for r in &self.readings {
-            let s = &samples[r.state];
-            for (b, pose) in s.poses.iter().enumerate() {
-                out += r.directions[b].dot(&pose.apply(&r.arms[b]));
-            }
-            out += r.velocity.dot(&s.v);
-        }
-        out
+    fn value(&self, rollout: &Rollout) -> f64 {
+        self.total(rollout.samples(), |x| x)
     }
 
-    /// Sum of the absolute values of the terms of [`Probe::value`].
-    fn size(&self, samples: &[Sample]) -> f64 {
+    /// Sum of the terms, each with its factors as `of` makes them.
+    fn total(&self, samples: &[Sample], of: fn(f64) -> f64) -> f64 {
         let mut out = 0.0;
-        for r in &self.readings {
+        for r in &self.0 {
             let s = &samples[r.state];
             for (b, pose) in s.poses.iter().enumerate() {
-                out += r.directions[b].abs().dot(&pose.apply(&r.arms[b]).abs());
+                out += r.directions[b].map(of).dot(&pose.apply(&r.arms[b]).map(of));
             }
-            out += r.velocity.abs().dot(&s.v.abs());
+            out += r.velocity.map(of).dot(&s.v.map(of));
         }
         out
     }
 
     fn cotangents(&self, rollout: &Rollout) -> Cotangents {
         let mut out = rollout.zero_cotangents();
-        for r in &self.readings {
+        for r in &self.0 {
             for (b, pose) in rollout.samples()[r.state].poses.iter().enumerate() {
                 let turn = (pose.rotation * r.arms[b]).cross(&r.directions[b]);
                 for k in 0..3 {
@@ -279,7 +266,7 @@ pub fn gradcheck_with(
     let nv = simulator.system().tree.velocities();
     let probe = Probe::new(simulator, &scale, steps, &mut vector);
     let gradient = rollout.vjp(&probe.cotangents(&rollout))?;
-    let size = probe.size(rollout.samples());
+    let size = probe.total(rollout.samples(), f64::abs);
     drop(rollout);
 
     let step_sizes = vec![1e-2, 1e-3, 1e-4, 1e-5];
@@ -294,34 +281,31 @@ pub fn gradcheck_with(
     ];
     let all = settings.directions * groups.iter().filter(|g| **g).count();
     let mut directions = Vec::new();
+    let mut add = |group, adjoint, value: &mut dyn FnMut(f64) -> Result<f64>| -> Result<()> {
+        directions.push(measure(group, adjoint, &step_sizes, value)?);
+        progress(directions.len(), all);
+        Ok(())
+    };
+    let value = |simulator: &Simulator| Ok(probe.value(&simulator.rollout(&zero)?));
     for _ in 0..settings.directions {
         let controls = simulator.system().controls;
         if controls > 0 {
-            let mut d = DMatrix::from_vec(
-                controls,
-                steps,
-                vector(controls * steps).as_slice().to_vec(),
-            );
+            let random = vector(controls * steps);
+            let mut d = DMatrix::from_column_slice(controls, steps, random.as_slice());
             for (mut row, f) in d.row_iter_mut().zip(&scale.force) {
                 row *= *f;
             }
-            let adjoint = gradient.controls.dot(&d);
-            directions.push(measure("controls", adjoint, &step_sizes, |h| {
+            add("controls", gradient.controls.dot(&d), &mut |h| {
                 let c = Controls::from_matrix(simulator, h * &d)?;
-                Ok(probe.value(simulator.rollout(&c)?.samples()))
-            })?);
-            progress(directions.len(), all);
+                Ok(probe.value(&simulator.rollout(&c)?))
+            })?;
         }
         let (mut dq, mut dv) = (
             vector(nv).component_mul(&scale.displacement) * 0.1,
             vector(nv).component_mul(&scale.velocity) * 0.3,
         );
-        for (drive, link) in simulator
-            .system()
-            .drives
-            .iter()
-            .zip(simulator.system().tree.links())
-        {
+        let system = simulator.system();
+        for (drive, link) in system.drives.iter().zip(system.tree.links()) {
             for i in link.v.clone() {
                 if *drive != Drive::Free {
                     dv[i] = 0.0;
@@ -333,45 +317,41 @@ pub fn gradcheck_with(
         }
         let adjoint = gradient.initial.q.dot(&dq) + gradient.initial.v.dot(&dv);
         if nv > 0 {
-            directions.push(measure("initial", adjoint, &step_sizes, |h| {
+            add("initial", adjoint, &mut |h| {
                 let q = simulator.system().tree.integrate(&q0, &(h * &dq));
                 simulator.set_start(q, &v0 + h * &dv)?;
-                let value = probe.value(simulator.rollout(&zero)?.samples());
+                let value = value(simulator)?;
                 simulator.set_start(q0.clone(), v0.clone())?;
                 Ok(value)
-            })?);
-            progress(directions.len(), all);
+            })?;
         }
-        let d = parameter_direction(&parameters, &vector(parameters.to_vec().len()), &scale);
-        let base = parameters.to_vec();
-        let adjoint = dot(&gradient.parameters.to_vec(), &d);
-        directions.push(measure("parameters", adjoint, &step_sizes, |h| {
-            let values: Vec<f64> = base.iter().zip(&d).map(|(x, d)| x + h * d).collect();
-            if let Some(p) = parameters.with_values(&values) {
+        // A part of each value, or a size of its own where the value is zero.
+        let sizes = DVector::from_vec(parameters.sizes(scale.velocity.max(), scale.length));
+        let d = (0.3 * &sizes).component_mul(&vector(sizes.len()));
+        let base = DVector::from_vec(parameters.to_vec());
+        let adjoint = dot(&gradient.parameters.to_vec(), d.as_slice());
+        add("parameters", adjoint, &mut |h| {
+            if let Some(p) = parameters.with_values((&base + h * &d).as_slice()) {
                 simulator.replace_parameters(p);
             }
-            let value = simulator.rollout(&zero).map(|r| probe.value(r.samples()));
+            let value = value(simulator);
             simulator.replace_parameters(parameters.clone());
             value
-        })?);
-        progress(directions.len(), all);
+        })?;
         if gains.iter().any(|g| *g != 0.0) {
-            let d: Vec<f64> = vector(gains.len())
-                .iter()
-                .zip(&gains)
-                .map(|(r, g)| r * g)
-                .collect();
-            let adjoint = dot(&gradient.gains, &d);
-            directions.push(measure("gains", adjoint, &step_sizes, |h| {
-                let moved: Vec<f64> = gains.iter().zip(&d).map(|(g, d)| g + h * d).collect();
-                let policy = simulator.policy().with_gains(&moved)?;
-                simulator.set_policy(policy);
-                let value = simulator.rollout(&zero).map(|r| probe.value(r.samples()));
-                let policy = simulator.policy().with_gains(&gains)?;
+            let gains = DVector::from_column_slice(&gains);
+            let d = vector(gains.len()).component_mul(&gains);
+            let adjoint = dot(&gradient.gains, d.as_slice());
+            add("gains", adjoint, &mut |h| {
+                let moved = simulator
+                    .policy()
+                    .with_gains((&gains + h * &d).as_slice())?;
+                simulator.set_policy(moved);
+                let value = value(simulator);
+                let policy = simulator.policy().with_gains(gains.as_slice())?;
                 simulator.set_policy(policy);
                 value
-            })?);
-            progress(directions.len(), all);
+            })?;
         }
     }
     let times = match settings.timings {
@@ -421,20 +401,11 @@ fn dot(a: &[f64], b: &[f64]) -> f64 {
     a.iter().zip(b).map(|(a, b)| a * b).sum()
 }
 
-/// A direction in parameter space: a part of each value, or a size of its own where the value is zero.
-fn parameter_direction(p: &Parameters, random: &DVector<f64>, scale: &Scales) -> Vec<f64> {
-    p.sizes(scale.velocity.max(), scale.length)
-        .iter()
-        .zip(random.iter())
-        .map(|(v, r)| 0.3 * v * r)
-        .collect()
-}
-
 fn measure(
     group: &'static str,
     adjoint: f64,
     step_sizes: &[f64],
-    mut value: impl FnMut(f64) -> Result<f64>,
+    value: &mut dyn FnMut(f64) -> Result<f64>,
 ) -> Result<Direction> {
     let mut differences = Vec::with_capacity(step_sizes.len());
     for h in step_sizes {

@@ -5,7 +5,7 @@ use super::{Cotangents, Gradient, Rollout};
 use crate::scene::BodyId;
 use crate::{Error, Result};
 use nalgebra::DMatrix;
-use std::ops::Add;
+use std::ops::{Add, Range};
 
 /// A scalar function of a rollout.
 pub trait Objective {
@@ -48,31 +48,28 @@ impl Rollout {
 #[derive(Clone, Debug, Default)]
 pub struct Sum(Vec<Term>);
 
+/// `weight` times the squared distance of some numbers from `target`: at the end, or its mean over all states.
 #[derive(Clone, Debug)]
-enum Term {
-    Position {
-        body: usize,
-        target: [f64; 3],
-        weight: f64,
-        last_only: bool,
-    },
-    Velocity {
-        index: usize,
-        target: f64,
-        weight: f64,
-    },
-    Coordinate {
-        index: usize,
-        target: f64,
-        weight: f64,
-    },
-    Observable {
-        name: String,
-        entry: usize,
-        target: f64,
-        weight: f64,
-    },
-    Effort(f64),
+struct Term {
+    of: Of,
+    target: Vec<f64>,
+    weight: f64,
+    last_only: bool,
+}
+
+/// Numbers of a term, as many as its target has.
+#[derive(Clone, Debug)]
+enum Of {
+    /// Position of a body.
+    Body(usize),
+    /// Of v, from this index.
+    Velocity(usize),
+    /// Of q.
+    Coordinate(usize),
+    /// Of an observable by its name.
+    Observable(String, usize),
+    /// All open-loop controls, against zero.
+    Controls,
 }
 
 impl Add for Sum {
@@ -84,70 +81,52 @@ impl Add for Sum {
     }
 }
 
-/// Squared distance (m²) of a body's origin from `target` (m, world) at the end.
-pub fn final_position(body: BodyId, target: [f64; 3]) -> Sum {
-    Sum(vec![Term::Position {
-        body: body.0,
-        target,
-        weight: 1.0,
+fn at_end(of: Of, target: &[f64], weight: f64) -> Sum {
+    Sum(vec![Term {
+        of,
+        target: target.into(),
+        weight,
         last_only: true,
     }])
 }
 
+/// Squared distance (m²) of a body's origin from `target` (m, world) at the end.
+pub fn final_position(body: BodyId, target: [f64; 3]) -> Sum {
+    at_end(Of::Body(body.0), &target, 1.0)
+}
+
 /// Mean squared distance (m²) of a body's origin from `target` over all states.
 pub fn mean_position(body: BodyId, target: [f64; 3]) -> Sum {
-    Sum(vec![Term::Position {
-        body: body.0,
-        target,
-        weight: 1.0,
-        last_only: false,
-    }])
+    let mut out = final_position(body, target);
+    out.0[0].last_only = false;
+    out
 }
 
 /// `weight · (q_i − target)²` at the end, for a coordinate of a prismatic, revolute or planar joint.
 pub fn final_coordinate(index: usize, target: f64, weight: f64) -> Sum {
-    Sum(vec![Term::Coordinate {
-        index,
-        target,
-        weight,
-    }])
+    at_end(Of::Coordinate(index), &[target], weight)
 }
 
 /// `weight · (v_i − target)²` at the end.
 pub fn final_velocity(index: usize, target: f64, weight: f64) -> Sum {
-    Sum(vec![Term::Velocity {
-        index,
-        target,
-        weight,
-    }])
+    at_end(Of::Velocity(index), &[target], weight)
 }
 
 /// `weight · (x − target)²` at the end, x an entry of an observable that has a transpose ([`super::observable`]), by its name.
 pub fn final_observable(name: impl Into<String>, entry: usize, target: f64, weight: f64) -> Sum {
-    Sum(vec![Term::Observable {
-        name: name.into(),
-        entry,
-        target,
-        weight,
-    }])
+    at_end(Of::Observable(name.into(), entry), &[target], weight)
 }
 
 /// `weight` times the sum of squared open-loop controls.
 pub fn effort(weight: f64) -> Sum {
-    Sum(vec![Term::Effort(weight)])
+    at_end(Of::Controls, &[], weight)
 }
 
 impl Sum {
     /// All terms times `factor`.
     pub fn scaled(mut self, factor: f64) -> Self {
         for term in &mut self.0 {
-            match term {
-                Term::Position { weight, .. }
-                | Term::Velocity { weight, .. }
-                | Term::Coordinate { weight, .. }
-                | Term::Observable { weight, .. }
-                | Term::Effort(weight) => *weight *= factor,
-            }
+            term.weight *= factor;
         }
         self
     }
@@ -160,11 +139,27 @@ fn tangent_of(rollout: &Rollout, index: usize) -> Option<usize> {
     (link.q.len() == link.v.len()).then(|| link.v.start + index - link.q.start)
 }
 
-/// An entry of an observable at the end; a name that none has was refused before.
-fn last_entry(rollout: &Rollout, name: &str, entry: usize) -> f64 {
-    let at = rollout.states().len() - 1;
-    let value = observable(name).and_then(|o| o.value(&rollout.reading(at)));
-    value.map_or(f64::NAN, |x| x[entry])
+impl Term {
+    /// States at which it is taken.
+    fn states(&self, rollout: &Rollout) -> Range<usize> {
+        let end = rollout.states().len();
+        if self.last_only { end - 1..end } else { 0..end }
+    }
+
+    /// What its numbers miss the target by at state `n`; a name that no observable has was refused before.
+    fn misses(&self, rollout: &Rollout, n: usize) -> Vec<f64> {
+        let (name, from) = match &self.of {
+            Of::Body(body) => ("positions", 3 * body),
+            Of::Velocity(index) => ("v", *index),
+            Of::Coordinate(index) => ("q", *index),
+            Of::Observable(name, entry) => (name.as_str(), *entry),
+            Of::Controls => return Vec::new(),
+        };
+        let value = observable(name).and_then(|o| o.value(&rollout.reading(n)));
+        let miss =
+            |(k, goal): (usize, &f64)| value.as_ref().map_or(f64::NAN, |x| x[from + k]) - goal;
+        self.target.iter().enumerate().map(miss).collect()
+    }
 }
 
 impl Objective for Sum {
@@ -181,13 +176,8 @@ impl Objective for Sum {
             ))
         };
         for term in &self.0 {
-            let numbers = match *term {
-                Term::Observable {
-                    ref name,
-                    entry,
-                    target,
-                    weight,
-                } => {
+            match &term.of {
+                Of::Observable(name, entry) => {
                     // Entries of the value and of its cotangent must be the same ones.
                     let rows: usize = observable(name)?.shape(system).iter().product();
                     if transpose(name)?.tangents(system) != rows {
@@ -197,33 +187,13 @@ impl Objective for Sum {
                             "must have a value whose entries are independent, without quaternions or rotation matrices",
                         ));
                     }
-                    below("entry", entry, rows)?;
-                    [target, weight, 0.0, 0.0]
+                    below("entry", *entry, rows)?;
                 }
-                Term::Position {
-                    body,
-                    target,
-                    weight,
-                    ..
-                } => {
-                    below("body", body, system.len())?;
-                    [target[0], target[1], target[2], weight]
-                }
-                Term::Velocity {
-                    index,
-                    target,
-                    weight,
-                } => {
-                    below("velocity", index, system.tree.velocities())?;
-                    [target, weight, 0.0, 0.0]
-                }
-                Term::Coordinate {
-                    index,
-                    target,
-                    weight,
-                } => {
-                    below("coordinate", index, system.tree.coordinates())?;
-                    if tangent_of(rollout, index).is_none() {
+                Of::Body(body) => below("body", *body, system.len())?,
+                Of::Velocity(index) => below("velocity", *index, system.tree.velocities())?,
+                Of::Coordinate(index) => {
+                    below("coordinate", *index, system.tree.coordinates())?;
+                    if tangent_of(rollout, *index).is_none() {
                         return Err(Error::input(
                             "objective: coordinate",
                             index,
@@ -231,11 +201,11 @@ impl Objective for Sum {
                              have no targets of their own: use a body's position",
                         ));
                     }
-                    [target, weight, 0.0, 0.0]
                 }
-                Term::Effort(weight) => [weight, 0.0, 0.0, 0.0],
-            };
-            if let Some(bad) = numbers.iter().find(|x| !x.is_finite()) {
+                Of::Controls => {}
+            }
+            let mut numbers = term.target.iter().chain([&term.weight]);
+            if let Some(bad) = numbers.find(|x| !x.is_finite()) {
                 return Err(Error::input(
                     "objective: target or weight",
                     bad,
@@ -247,99 +217,47 @@ impl Objective for Sum {
     }
 
     fn value(&self, rollout: &Rollout) -> f64 {
-        let samples = rollout.samples();
-        let last = &samples[samples.len() - 1];
-        let of = |term: &Term| match *term {
-            Term::Position {
-                body,
-                target,
-                weight,
-                last_only,
-            } => {
-                let miss = |s: &super::Sample| {
-                    (s.poses[body].translation - nalgebra::Vector3::from(target)).norm_squared()
-                };
-                if last_only {
-                    weight * miss(last)
-                } else {
-                    weight * samples.iter().map(miss).sum::<f64>() / samples.len() as f64
-                }
+        let of = |term: &Term| {
+            if let Of::Controls = term.of {
+                return term.weight * rollout.controls().norm_squared();
             }
-            Term::Velocity {
-                index,
-                target,
-                weight,
-            } => weight * (last.v[index] - target).powi(2),
-            Term::Coordinate {
-                index,
-                target,
-                weight,
-            } => weight * (last.q[index] - target).powi(2),
-            Term::Observable {
-                ref name,
-                entry,
-                target,
-                weight,
-            } => weight * (last_entry(rollout, name, entry) - target).powi(2),
-            Term::Effort(weight) => weight * rollout.controls().norm_squared(),
+            let states = term.states(rollout);
+            let count = states.len() as f64;
+            let squares = |n| term.misses(rollout, n).iter().map(|x| x * x).sum::<f64>();
+            term.weight * states.map(squares).sum::<f64>() / count
         };
         self.0.iter().map(of).sum()
     }
 
     fn cotangents(&self, rollout: &Rollout) -> Cotangents {
         let mut out = rollout.zero_cotangents();
-        let samples = rollout.samples();
-        let end = samples.len() - 1;
+        let columns = rollout.states().len();
         for term in &self.0 {
-            match *term {
-                Term::Position {
-                    body,
-                    target,
-                    weight,
-                    last_only,
-                } => {
-                    let (range, scale) = if last_only {
-                        (end..end + 1, weight)
-                    } else {
-                        (0..end + 1, weight / samples.len() as f64)
-                    };
-                    for n in range {
-                        for (k, goal) in target.iter().enumerate() {
-                            let miss = samples[n].poses[body].translation[k] - goal;
-                            out.positions[(3 * body + k, n)] += 2.0 * scale * miss;
-                        }
-                    }
-                }
-                Term::Velocity {
-                    index,
-                    target,
-                    weight,
-                } => out.v[(index, end)] += 2.0 * weight * (samples[end].v[index] - target),
-                Term::Coordinate {
-                    index,
-                    target,
-                    weight,
-                } => {
-                    if let Some(i) = tangent_of(rollout, index) {
-                        out.q[(i, end)] += 2.0 * weight * (samples[end].q[index] - target);
-                    }
-                }
-                Term::Observable {
-                    ref name,
-                    entry,
-                    target,
-                    weight,
-                } => {
-                    let rows = observable(name).map_or(0, |o| {
-                        let system = rollout.simulator().system();
-                        o.shape(system).iter().product::<usize>()
-                    });
+            let (bars, from) = match &term.of {
+                Of::Body(body) => (&mut out.positions, 3 * body),
+                Of::Velocity(index) => (&mut out.v, *index),
+                Of::Coordinate(index) => match tangent_of(rollout, *index) {
+                    Some(index) => (&mut out.q, index),
+                    None => continue,
+                },
+                Of::Observable(name, entry) => {
+                    let system = rollout.simulator().system();
+                    let rows = transpose(name).map_or(0, |t| t.tangents(system));
                     let bars = out.observables.entry(name.clone());
-                    let bars = bars.or_insert_with(|| DMatrix::zeros(rows, end + 1));
-                    let miss = last_entry(rollout, name, entry) - target;
-                    bars[(entry, end)] += 2.0 * weight * miss;
+                    let bars = bars.or_insert_with(|| DMatrix::zeros(rows, columns));
+                    (bars, *entry)
                 }
-                Term::Effort(weight) => out.controls += 2.0 * weight * rollout.controls(),
+                Of::Controls => {
+                    out.controls += 2.0 * term.weight * rollout.controls();
+                    continue;
+                }
+            };
+            let states = term.states(rollout);
+            let scale = term.weight / states.len() as f64;
+            for n in states {
+                for (k, miss) in term.misses(rollout, n).into_iter().enumerate() {
+                    bars[(from + k, n)] += 2.0 * scale * miss;
+                }
             }
         }
         out

@@ -8,69 +8,76 @@ use crate::scene::{Preset, Scene};
 use crate::water::{Backend, Fidelity, GpuSettings, Method};
 use serde::{Deserialize, Serialize};
 
-/// What is asked for, over what the scene and its preset say: `None` leaves a choice to them.
-#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
-#[serde(default, deny_unknown_fields)]
-pub struct Settings {
-    /// Choices to start from; `None`: the scene's preset.
-    #[serde(skip_serializing_if = "Option::is_none")]
-    pub preset: Option<Preset>,
+/// Declares what may be asked for beside a preset: each a field, and a method that gives other settings with it.
+macro_rules! settings {
+    ($($(#[$about:meta])* $name:ident: $type:ty,)*) => {
+        /// What is asked for, over what the scene and its preset say: `None` leaves a choice to them.
+        #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
+        #[serde(default, deny_unknown_fields)]
+        pub struct Settings {
+            /// Choices to start from; `None`: the scene's preset.
+            #[serde(skip_serializing_if = "Option::is_none")]
+            pub preset: Option<Preset>,
+            $(
+                $(#[$about])*
+                #[serde(skip_serializing_if = "Option::is_none")]
+                pub $name: Option<$type>,
+            )*
+        }
+
+        impl Settings {
+            $(
+                $(#[$about])*
+                pub fn $name(&self, $name: $type) -> Self {
+                    Self {
+                        $name: Some($name),
+                        ..self.clone()
+                    }
+                }
+            )*
+        }
+    };
+}
+
+settings! {
     /// How much of the coupling is modelled.
-    #[serde(skip_serializing_if = "Option::is_none")]
-    pub fidelity: Option<Fidelity>,
+    fidelity: Fidelity,
     /// Method by which each body alone is solved.
-    #[serde(skip_serializing_if = "Option::is_none")]
-    pub method: Option<Method>,
+    method: Method,
     /// How far inside the surface the sources of fundamental solutions are.
-    #[serde(skip_serializing_if = "Option::is_none")]
-    pub depth: Option<Depth>,
+    depth: Depth,
     /// Norm in which the rows of fundamental solutions are fitted.
-    #[serde(skip_serializing_if = "Option::is_none")]
-    pub rows: Option<RowScaling>,
+    rows: RowScaling,
     /// How the energy is read from the strengths of fundamental solutions.
-    #[serde(skip_serializing_if = "Option::is_none")]
-    pub readout: Option<Readout>,
+    readout: Readout,
     /// Weight of those strengths in the least squares.
-    #[serde(skip_serializing_if = "Option::is_none")]
-    pub damping: Option<f64>,
+    damping: f64,
     /// Solver of the coupled system (fidelity `full`).
-    #[serde(skip_serializing_if = "Option::is_none")]
-    pub solver: Option<FullSolver>,
+    solver: FullSolver,
     /// Its preconditioner.
-    #[serde(skip_serializing_if = "Option::is_none")]
-    pub preconditioner: Option<Preconditioner>,
+    preconditioner: Preconditioner,
     /// Relative residual at which it stops.
-    #[serde(skip_serializing_if = "Option::is_none")]
-    pub tolerance: Option<f64>,
+    tolerance: f64,
     /// Iterations after which it gives up with an error.
-    #[serde(skip_serializing_if = "Option::is_none")]
-    pub max_iterations: Option<usize>,
+    max_iterations: usize,
     /// Points of each compressed body (fidelity `reduced`).
-    #[serde(skip_serializing_if = "Option::is_none")]
-    pub rank: Option<usize>,
+    rank: usize,
     /// Smallest gap that compressed bodies resolve, m (fidelity `reduced`).
-    #[serde(skip_serializing_if = "Option::is_none")]
-    pub resolved_gap: Option<f64>,
+    resolved_gap: f64,
     /// Error of M_f, relative to √(M_ii M_jj), that the fidelities `reduced` (added to that of the bodies themselves) and `auto`
     /// aim at.
-    #[serde(skip_serializing_if = "Option::is_none")]
-    pub accuracy: Option<f64>,
+    accuracy: f64,
     /// Time integrator. `None`: the preset's; for a scene with contact, if that doesn't solve contact,
     /// [`Integrator::MomentumEuler`].
-    #[serde(skip_serializing_if = "Option::is_none")]
-    pub integrator: Option<Integrator>,
+    integrator: Integrator,
     /// Time step, s; `None`: the scene's.
-    #[serde(skip_serializing_if = "Option::is_none")]
-    pub time_step: Option<f64>,
+    time_step: f64,
     /// Faces per body of shapes by formula; `None`: what each shape says.
-    #[serde(skip_serializing_if = "Option::is_none")]
-    pub faces: Option<usize>,
+    faces: usize,
     /// What computes the coupling.
-    #[serde(skip_serializing_if = "Option::is_none")]
-    pub backend: Option<Backend>,
+    backend: Backend,
     /// Choices of [`Backend::Gpu`].
-    #[serde(skip_serializing_if = "Option::is_none")]
-    pub gpu: Option<GpuSettings>,
+    gpu: GpuSettings,
 }
 
 /// Puts what is asked for over what there is.
@@ -127,109 +134,5 @@ impl Settings {
         over(&mut choices.integrator, &self.integrator);
         over(&mut choices.time_step, &self.time_step);
         choices
-    }
-
-    /// With another time step, s.
-    pub fn time_step(&self, dt: f64) -> Self {
-        Self {
-            time_step: Some(dt),
-            ..self.clone()
-        }
-    }
-
-    /// With another fidelity.
-    pub fn fidelity(&self, fidelity: Fidelity) -> Self {
-        Self {
-            fidelity: Some(fidelity),
-            ..self.clone()
-        }
-    }
-
-    /// With another integrator.
-    pub fn integrator(&self, integrator: Integrator) -> Self {
-        Self {
-            integrator: Some(integrator),
-            ..self.clone()
-        }
-    }
-
-    /// With another number of faces per body, for shapes by formula.
-    pub fn faces(&self, faces: usize) -> Self {
-        Self {
-            faces: Some(faces),
-            ..self.clone()
-        }
-    }
-
-    /// With another method for single bodies.
-    pub fn method(&self, method: Method) -> Self {
-        Self {
-            method: Some(method),
-            ..self.clone()
-        }
-    }
-
-    /// With another solver of the coupled system (`full`).
-    pub fn solver(&self, solver: FullSolver) -> Self {
-        Self {
-            solver: Some(solver),
-            ..self.clone()
-        }
-    }
-
-    /// With another preconditioner of the coupled system (`full`).
-    pub fn preconditioner(&self, preconditioner: Preconditioner) -> Self {
-        Self {
-            preconditioner: Some(preconditioner),
-            ..self.clone()
-        }
-    }
-
-    /// With another number of points a body (`reduced`).
-    pub fn rank(&self, rank: usize) -> Self {
-        Self {
-            rank: Some(rank),
-            ..self.clone()
-        }
-    }
-
-    /// With another smallest gap that is resolved (`reduced`), m.
-    pub fn resolved_gap(&self, gap: f64) -> Self {
-        Self {
-            resolved_gap: Some(gap),
-            ..self.clone()
-        }
-    }
-
-    /// With another error of M_f to aim at (`reduced` and `auto`).
-    pub fn accuracy(&self, error: f64) -> Self {
-        Self {
-            accuracy: Some(error),
-            ..self.clone()
-        }
-    }
-
-    /// With another backend.
-    pub fn backend(&self, backend: Backend) -> Self {
-        Self {
-            backend: Some(backend),
-            ..self.clone()
-        }
-    }
-
-    /// With other choices of the GPU.
-    pub fn gpu(&self, gpu: GpuSettings) -> Self {
-        Self {
-            gpu: Some(gpu),
-            ..self.clone()
-        }
-    }
-
-    /// With another residual at which the iterative solves of the fidelity `full` stop.
-    pub fn tolerance(&self, tolerance: f64) -> Self {
-        Self {
-            tolerance: Some(tolerance),
-            ..self.clone()
-        }
     }
 }

@@ -261,7 +261,7 @@ fn observables_vjp(
         observable.vjp(&at, seed.as_slice(), &mut out);
     }
     if on.twist.iter().all(|t| *t == Vec6::zeros()) {
-        bar.state.q += tree.project(kinematics, on.pose);
+        bar.state.q += tree.project(&kinematics.columns, on.pose);
         return;
     }
     let zero = DVector::zeros(v.len());

@@ -15,12 +15,12 @@ pub fn rungs() -> Vec<Rung> {
         };
     }
     rungs![
-        "dynamics::force::gravity::Gravity::vjp" => |c| vjp("gravity", c),
-        "dynamics::force::buoyancy::Buoyancy::vjp" => |c| vjp("buoyancy", c),
-        "dynamics::force::linear_drag::LinearDrag::jvp" => |c| jvp("linear drag", c),
-        "dynamics::force::linear_drag::LinearDrag::vjp" => |c| vjp("linear drag", c),
-        "dynamics::force::quadratic_drag::QuadraticDrag::jvp" => |c| jvp("quadratic drag", c),
-        "dynamics::force::quadratic_drag::QuadraticDrag::vjp" => |c| vjp("quadratic drag", c),
+        "dynamics::force::weight::Weight::vjp" => |c| vjp("gravity", c),
+        "dynamics::force::weight::Weight::vjp" => |c| vjp("buoyancy", c),
+        "dynamics::force::drag::Drag::jvp" => |c| jvp("linear drag", c),
+        "dynamics::force::drag::Drag::vjp" => |c| vjp("linear drag", c),
+        "dynamics::force::drag::Drag::jvp" => |c| jvp("quadratic drag", c),
+        "dynamics::force::drag::Drag::vjp" => |c| vjp("quadratic drag", c),
         "dynamics::force::thruster::Thrusters::vjp" => |c| vjp("thruster", c),
         "dynamics::force::actuation::Actuation::vjp" => |c| vjp("actuation", c),
         "dynamics::force::spring::Springs::jvp" => |c| jvp("spring", c),

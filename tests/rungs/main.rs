@@ -92,11 +92,7 @@ const THROUGH: &[(&str, &str)] = &[
         FULL_VJP,
     ),
     ("coupling::panel::first::PlacedPanels::gradient", PANEL_VJP),
-    // Each joint's maps, through the model that all joints share.
-    (
-        "multibody::joint::JointMotion::frame_velocity_vjp",
-        FRAME_VELOCITY,
-    ),
+    // Each joint's maps, through those that all joints share.
     (
         "multibody::joint::planar::Planar::frame_velocity_vjp",
         FRAME_VELOCITY,
@@ -105,7 +101,6 @@ const THROUGH: &[(&str, &str)] = &[
         "multibody::joint::free::Free::frame_velocity_vjp",
         FRAME_VELOCITY,
     ),
-    ("multibody::joint::JointMotion::frame_bias_vjp", FRAME_BIAS),
     (
         "multibody::joint::planar::Planar::frame_bias_vjp",
         FRAME_BIAS,
@@ -125,10 +120,15 @@ const THROUGH: &[(&str, &str)] = &[
         "dynamics::balance::Linearisation::force_vjp",
     ),
     // Forces that don't depend on the velocity: nothing that 1 % could be wrong with.
-    ("dynamics::force::gravity::Gravity::jvp", FORCE_JVP),
-    ("dynamics::force::buoyancy::Buoyancy::jvp", FORCE_JVP),
-    ("dynamics::force::thruster::Thrusters::jvp", FORCE_JVP),
-    ("dynamics::force::actuation::Actuation::jvp", FORCE_JVP),
+    ("dynamics::force::ForceModel::jvp", FORCE_JVP),
+    (
+        "dynamics::force::drag::Law::jvp",
+        "dynamics::force::drag::Drag::jvp",
+    ),
+    (
+        "dynamics::force::drag::Law::vjp",
+        "dynamics::force::drag::Drag::vjp",
+    ),
     (
         "dynamics::balance::rigid_parameters_vjp",
         "dynamics::momentum::Linearisation::momentum_vjp",
@@ -226,8 +226,8 @@ const THROUGH: &[(&str, &str)] = &[
 /// What hands over a derivative that its caller gave.
 const PASSED_ON: &[&str] = &["optimize::descent::Shared::gradient"];
 
-const FRAME_VELOCITY: &str = "multibody::joint::model::JointModel::frame_velocity_vjp";
-const FRAME_BIAS: &str = "multibody::joint::model::JointModel::frame_bias_vjp";
+const FRAME_VELOCITY: &str = "multibody::joint::JointMotion::frame_velocity_vjp";
+const FRAME_BIAS: &str = "multibody::joint::JointMotion::frame_bias_vjp";
 const FORCE_JVP: &str = "dynamics::balance::Linearisation::force_jvp";
 const FULL_VJP: &str = "coupling::full::linearised::FullLinearised::vjp";
 const PANEL_VJP: &str = "coupling::panel::linearised::PanelLinearised::vjp";

@@ -15,8 +15,8 @@ pub fn rungs() -> Vec<Rung> {
     rungs![
         "multibody::joint::model::JointModel::integrate_vjp" => joint_integrate,
         "multibody::joint::model::JointModel::chart_rate_vjp" => joint_chart_rate,
-        "multibody::joint::model::JointModel::frame_velocity_vjp" => joint_frame_velocity,
-        "multibody::joint::model::JointModel::frame_bias_vjp" => joint_frame_bias,
+        "multibody::joint::JointMotion::frame_velocity_vjp" => joint_frame_velocity,
+        "multibody::joint::JointMotion::frame_bias_vjp" => joint_frame_bias,
         "multibody::tree::Tree::integrate_vjp" => tree_integrate,
         "multibody::tree::Tree::chart_rate_vjp" => tree_chart_rate,
         "multibody::joint::model::JointModel::chart_momentum_vjp" => |c| all(joints().iter().map(|j| chart_momentum(&Tree::new([(None, Pose::identity(), j.clone())]), c))),
@@ -56,7 +56,7 @@ pub fn displacement(joint: &JointModel, base: &[f64], q: &[f64]) -> Vec<f64> {
         (of(b) * of(a).inverse()).scaled_axis().as_slice().to_vec()
     };
     let plain = |n: usize| -> Vec<f64> { (0..n).map(|k| q[k] - base[k]).collect() };
-    match joint.motion().quaternion_at() {
+    match joint.quaternion_at() {
         Some(at) => {
             let mut out = plain(at);
             out.extend(turn(&base[at..], &q[at..]));
@@ -115,7 +115,7 @@ fn joint_chart_rate(c: f64) -> Outcome {
         let (bar, d) = (wavy(n, 2.0, 1.0), wavy(n, 3.3, 0.3));
         let (xi_bar, v_bar) = j.chart_rate_vjp(xi.as_slice(), v.as_slice(), bar.as_slice());
         let scalar = |xi: &[f64], v: &[f64]| dot(bar.as_slice(), &j.chart_rate(xi, v));
-        let turns = j.motion().quaternion_at().is_some();
+        let turns = j.quaternion_at().is_some();
         let by_v = along(
             |h| scalar(xi.as_slice(), &moved(v.as_slice(), h, &d)),
             c * dot(&v_bar, d.as_slice()),
@@ -137,7 +137,7 @@ fn joint_chart_rate(c: f64) -> Outcome {
 
 /// Joints with a configuration-dependent velocity map.
 fn turning_joints() -> Vec<JointModel> {
-    let turning = |j: &JointModel| ["planar", "free"].contains(&j.motion().kind());
+    let turning = |j: &JointModel| ["planar", "free"].contains(&j.kind());
     let (some, others): (Vec<_>, Vec<_>) = joints().into_iter().partition(turning);
     for j in others {
         let v = wavy(j.velocities(), 0.4, 1.0);

@@ -28,8 +28,6 @@ impl ForceModel for Actuation {
         }
     }
 
-    fn jvp(&self, _: &Moving, _: &Velocity, _: &mut Loads) {}
-
     fn vjp(&self, _: &Moving, z: &Velocity, bar: &mut LoadBars) {
         for (v, control) in &self.0 {
             for (k, i) in v.clone().enumerate() {

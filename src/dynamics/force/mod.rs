@@ -1,22 +1,20 @@
-//! Forces on bodies and joints that don't come from the water's kinetic energy, one file each.
+//! Forces on bodies and joints that don't come from the water's kinetic energy, a file for each kind.
 //!
 //! A force adds spatial wrenches (moment about the world's origin) on bodies, and generalised forces of joints (user
 //! coordinates), at a configuration and a velocity; the balance of momenta knows forces by this trait alone.
 //! To add one: a file with the type, its declared parameters and its `assemble`, and its line in `FORCES`.
 
 mod actuation;
-mod buoyancy;
-mod gravity;
-mod linear_drag;
-mod quadratic_drag;
+mod drag;
 mod spring;
 mod thruster;
+mod weight;
 
 use super::{BodyData, Declarations, Parameters};
-use crate::adjoint::drag::{Element, Part};
+use crate::adjoint::drag::Element;
 use crate::adjoint::lie::{Pose, Vec3, Vec6, six};
 use crate::multibody::Tree;
-use crate::scene::{DragPart, Scene};
+use crate::scene::Scene;
 use nalgebra::DVector;
 use std::sync::Arc;
 
@@ -25,10 +23,10 @@ type Assemble = fn(&ForceParts, &mut Declarations) -> Option<Box<dyn ForceModel>
 
 /// All kinds of forces, in the order in which they are added up.
 const FORCES: &[Assemble] = &[
-    gravity::assemble,
-    buoyancy::assemble,
-    linear_drag::assemble,
-    quadratic_drag::assemble,
+    weight::gravity,
+    weight::buoyancy,
+    drag::linear,
+    drag::quadratic,
     thruster::assemble,
     actuation::assemble,
     spring::assemble,
@@ -137,7 +135,7 @@ pub trait ForceModel: Send + Sync {
     fn add(&self, at: &Moving, out: &mut Loads);
 
     /// Adds the tangent of [`ForceModel::add`] along a change of the velocity; nothing where it doesn't depend on it.
-    fn jvp(&self, at: &Moving, change: &Velocity, out: &mut Loads);
+    fn jvp(&self, _at: &Moving, _change: &Velocity, _out: &mut Loads) {}
 
     /// Adds the transpose of [`ForceModel::add`] in all its arguments: the gradient of its power on the velocity `z`.
     fn vjp(&self, at: &Moving, z: &Velocity, bar: &mut LoadBars);
@@ -145,14 +143,5 @@ pub trait ForceModel: Send + Sync {
     /// Potential energy, J, of a force that has one.
     fn potential_energy(&self, _place: &Place) -> f64 {
         0.0
-    }
-}
-
-/// A scene's name for which part of a surface's velocity drags.
-fn drag_part(part: DragPart) -> Part {
-    match part {
-        DragPart::Tangential => Part::Tangential,
-        DragPart::Normal => Part::Normal,
-        DragPart::Total => Part::Total,
     }
 }

@@ -27,8 +27,6 @@ impl ForceModel for Thrusters {
         }
     }
 
-    fn jvp(&self, _: &Moving, _: &Velocity, _: &mut Loads) {}
-
     fn vjp(&self, at: &Moving, z: &Velocity, bar: &mut LoadBars) {
         for &(b, control) in &self.0 {
             let w = at.control.fixed_rows::<6>(control).into_owned();

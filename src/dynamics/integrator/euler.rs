@@ -12,6 +12,7 @@
 //! the converged stage, with the transpose of the same matrix.
 
 use super::contact::{self, ContactVelocities};
+use super::record::{Stages, Transposed};
 use super::split::Split;
 use super::start::Start;
 use super::{State, StateBar, StepBar, Stepper};
@@ -140,14 +141,14 @@ fn rule(s: &Stepper) -> Rule {
     }
 }
 
-pub(super) fn step(start: &Start) -> Result<(State, ContactVelocities)> {
+pub(super) fn step(start: &Start) -> Result<(State, Stages)> {
     let (s, e) = (start.stepper, start.e);
     let p = start.momentum();
     let stage = solve_stage(start, e, &p, rule(s), start.v)?;
     let y = &p + s.dt * &stage.force;
     let (velocities, y) = contact::press(start, stage.v, y)?;
     let q = start.advance(&velocities.after);
-    Ok((start.next_state(q, y), velocities))
+    Ok((start.next_state(q, y), Stages::Contact(velocities)))
 }
 
 /// What the transpose of a step needs.
@@ -169,9 +170,10 @@ impl<'s> Adjoint<'s> {
             reached,
         })
     }
+}
 
-    /// Transpose of [`step`].
-    pub fn vjp(&self, start: &Start, next_bar: &StateBar) -> Result<StepBar> {
+impl<'a> Transposed<'a> for Adjoint<'_> {
+    fn vjp(&self, start: &Start<'_, 'a>, next_bar: &StateBar) -> Result<StepBar> {
         let (s, e, split) = (start.stepper, start.e, start.split);
         let ContactVelocities { before, after } = self.contact.velocities;
         let mut bar = StepBar::zeros(e);

@@ -12,6 +12,7 @@
 
 use super::contact::{self, ContactVelocities};
 use super::euler::{AdjointStage, Rule, solve_stage};
+use super::record::{Stages, Transposed};
 use super::start::Start;
 use super::{State, StateBar, StepBar, Stepper};
 use crate::dynamics::Linearisation;
@@ -51,7 +52,7 @@ fn change(e: &Linearisation, a: &DVector<f64>, b: &DVector<f64>) -> f64 {
     if step == 0.0 { 0.0 } else { step / size }
 }
 
-pub(super) fn step(start: &Start) -> Result<(State, ContactVelocities)> {
+pub(super) fn step(start: &Start) -> Result<(State, Stages)> {
     let (s, split) = (start.stepper, start.split);
     let p = start.momentum();
     let mut stage = &split.driven + split.put(&split.take(start.v));
@@ -66,7 +67,7 @@ pub(super) fn step(start: &Start) -> Result<(State, ContactVelocities)> {
             let y = &p + s.dt * next.force;
             let (velocities, y) = contact::press(start, stage, y)?;
             let q = start.advance(&velocities.after);
-            return Ok((start.next_state(q, y), velocities));
+            return Ok((start.next_state(q, y), Stages::Contact(velocities)));
         }
         previous = moved;
     }
@@ -121,9 +122,10 @@ impl<'s, 'a> Adjoint<'s, 'a> {
         start.split.forget_moved(&mut bar.state.q);
         Ok(bar)
     }
+}
 
-    /// Transpose of [`step`].
-    pub fn vjp(&self, start: &Start, next_bar: &StateBar) -> Result<StepBar> {
+impl<'a> Transposed<'a> for Adjoint<'_, 'a> {
+    fn vjp(&self, start: &Start<'_, 'a>, next_bar: &StateBar) -> Result<StepBar> {
         let (s, split, m) = (start.stepper, start.split, &self.middle);
         let ContactVelocities { before, after } = self.contact.velocities;
         let h = 0.5 * s.dt;

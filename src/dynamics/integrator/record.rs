@@ -24,11 +24,16 @@ pub struct StepRecord {
 
 /// What is kept of a step's stages.
 #[derive(Clone, Debug)]
-enum Stages {
-    MomentumEuler(ContactVelocities),
-    Midpoint(ContactVelocities),
+pub(super) enum Stages {
+    /// Of integrators that solve contact.
+    Contact(ContactVelocities),
     RungeKutta(runge_kutta::Forces),
-    VelocityEuler(ContactVelocities),
+}
+
+/// What the transpose of a step needs beside its start.
+pub(super) trait Transposed<'a>: Send + Sync {
+    /// Transpose of the step.
+    fn vjp(&self, start: &Start<'_, 'a>, next_bar: &StateBar) -> Result<StepBar>;
 }
 
 impl StepRecord {
@@ -50,7 +55,7 @@ impl StepRecord {
     /// Velocities before and after contact; none of integrators that don't solve it.
     pub fn contact_velocities(&self) -> Option<&ContactVelocities> {
         match &self.stages {
-            Stages::MomentumEuler(v) | Stages::Midpoint(v) | Stages::VelocityEuler(v) => Some(v),
+            Stages::Contact(v) => Some(v),
             Stages::RungeKutta(_) => None,
         }
     }
@@ -58,6 +63,22 @@ impl StepRecord {
     /// The velocity with which contacts act during the step.
     pub fn contact_velocity(&self) -> &DVector<f64> {
         self.contact_velocities().map_or(&self.v, |v| &v.after)
+    }
+
+    fn start<'s, 'a>(
+        &'s self,
+        stepper: &'s Stepper<'a>,
+        e: &'s Linearisation<'a>,
+        split: &'s Split,
+    ) -> Start<'s, 'a> {
+        Start {
+            stepper,
+            e,
+            state: &self.state,
+            v: &self.v,
+            input: &self.input,
+            split,
+        }
     }
 }
 
@@ -67,14 +88,7 @@ pub struct LinearisedStep<'s, 'a> {
     record: &'s StepRecord,
     e: Linearisation<'a>,
     split: Split,
-    adjoint: Adjoint<'s, 'a>,
-}
-
-enum Adjoint<'s, 'a> {
-    MomentumEuler(euler::Adjoint<'s>),
-    Midpoint(Box<midpoint::Adjoint<'s, 'a>>),
-    RungeKutta(runge_kutta::Adjoint<'a>),
-    VelocityEuler(velocity_euler::Adjoint<'s>),
+    adjoint: Box<dyn Transposed<'a> + 's>,
 }
 
 /// Derivatives of the state after a step, q in its tangent space and then y.
@@ -109,26 +123,11 @@ impl<'a> Stepper<'a> {
             split: &split,
         };
         let (next, stages) = match self.integrator {
-            Integrator::MomentumEuler => {
-                let (next, velocities) = euler::step(&start)?;
-                (next, Stages::MomentumEuler(velocities))
-            }
-            Integrator::Midpoint => {
-                let (next, velocities) = midpoint::step(&start)?;
-                (next, Stages::Midpoint(velocities))
-            }
-            Integrator::Rk2 => {
-                let (next, forces) = runge_kutta::step(&start, &runge_kutta::SECOND)?;
-                (next, Stages::RungeKutta(forces))
-            }
-            Integrator::Rk4 => {
-                let (next, forces) = runge_kutta::step(&start, &runge_kutta::FOURTH)?;
-                (next, Stages::RungeKutta(forces))
-            }
-            Integrator::VelocityEuler => {
-                let (next, velocities) = velocity_euler::step(&start)?;
-                (next, Stages::VelocityEuler(velocities))
-            }
+            Integrator::MomentumEuler => euler::step(&start)?,
+            Integrator::Midpoint => midpoint::step(&start)?,
+            Integrator::Rk2 => runge_kutta::step(&start, &runge_kutta::SECOND)?,
+            Integrator::Rk4 => runge_kutta::step(&start, &runge_kutta::FOURTH)?,
+            Integrator::VelocityEuler => velocity_euler::step(&start)?,
         };
         let record = StepRecord {
             state: state.clone(),
@@ -145,7 +144,10 @@ impl<'a> Stepper<'a> {
     ///
     /// # Errors
     /// As [`Stepper::linearise`], and as the step itself.
-    pub fn linearise_step<'s>(&self, record: &'s StepRecord) -> Result<LinearisedStep<'s, 'a>> {
+    pub fn linearise_step<'s>(&self, record: &'s StepRecord) -> Result<LinearisedStep<'s, 'a>>
+    where
+        'a: 's,
+    {
         let stepper = Stepper {
             integrator: record.integrator,
             dt: record.dt,
@@ -153,21 +155,16 @@ impl<'a> Stepper<'a> {
         };
         let e = stepper.linearise(&record.state.q)?;
         let split = stepper.split_of_step(&record.state, &record.input);
-        let start = Start {
-            stepper: &stepper,
-            e: &e,
-            state: &record.state,
-            v: &record.v,
-            input: &record.input,
-            split: &split,
-        };
-        let adjoint = match &record.stages {
-            Stages::MomentumEuler(v) => Adjoint::MomentumEuler(euler::Adjoint::new(&start, v)?),
-            Stages::Midpoint(v) => Adjoint::Midpoint(Box::new(midpoint::Adjoint::new(&start, v)?)),
-            Stages::RungeKutta(f) => Adjoint::RungeKutta(runge_kutta::Adjoint::new(&start, f)?),
-            Stages::VelocityEuler(v) => {
-                Adjoint::VelocityEuler(velocity_euler::Adjoint::new(&start, v)?)
+        let start = record.start(&stepper, &e, &split);
+        let adjoint: Box<dyn Transposed<'a> + 's> = match (&record.stages, record.integrator) {
+            (Stages::RungeKutta(f), _) => Box::new(runge_kutta::Adjoint::new(&start, f)?),
+            (Stages::Contact(v), Integrator::Midpoint) => {
+                Box::new(midpoint::Adjoint::new(&start, v)?)
             }
+            (Stages::Contact(v), Integrator::VelocityEuler) => {
+                Box::new(velocity_euler::Adjoint::new(&start, v)?)
+            }
+            (Stages::Contact(v), _) => Box::new(euler::Adjoint::new(&start, v)?),
         };
         Ok(LinearisedStep {
             stepper,
@@ -196,20 +193,8 @@ impl<'a> LinearisedStep<'_, 'a> {
     /// # Errors
     /// A solve that misses its tolerance.
     pub fn vjp(&self, next_bar: &StateBar) -> Result<StepBar> {
-        let start = Start {
-            stepper: &self.stepper,
-            e: &self.e,
-            state: &self.record.state,
-            v: &self.record.v,
-            input: &self.record.input,
-            split: &self.split,
-        };
-        match &self.adjoint {
-            Adjoint::MomentumEuler(adjoint) => adjoint.vjp(&start, next_bar),
-            Adjoint::Midpoint(adjoint) => adjoint.vjp(&start, next_bar),
-            Adjoint::RungeKutta(adjoint) => adjoint.vjp(&start, next_bar),
-            Adjoint::VelocityEuler(adjoint) => adjoint.vjp(&start, next_bar),
-        }
+        let start = self.record.start(&self.stepper, &self.e, &self.split);
+        self.adjoint.vjp(&start, next_bar)
     }
 
     /// The same with the velocity read out at the state: all that the next state's cotangent is worth at the state itself.

@@ -5,6 +5,7 @@
 //! the inverse left Jacobian times the angular velocity, so the order isn't lost on the group.
 
 use super::readout;
+use super::record::{Stages, Transposed};
 use super::split::{Split, When};
 use super::start::Start;
 use super::{State, StateBar, StepBar};
@@ -30,6 +31,21 @@ pub(super) const FOURTH: Tableau = Tableau {
     nodes: &[0.0, 0.5, 0.5, 1.0],
     weights: &[1.0 / 6.0, 1.0 / 3.0, 1.0 / 3.0, 1.0 / 6.0],
 };
+
+impl Tableau {
+    /// What a step of length `dt` comes to, from where it starts and the rates of the stages.
+    fn sum<'r>(
+        &self,
+        dt: f64,
+        mut from: DVector<f64>,
+        rates: impl Iterator<Item = &'r DVector<f64>>,
+    ) -> DVector<f64> {
+        for (rate, weight) in rates.zip(self.weights) {
+            from += *weight * dt * rate;
+        }
+        from
+    }
+}
 
 /// What is kept of a step: its method, and the forces of all stages from which others start.
 #[derive(Clone, Debug)]
@@ -109,21 +125,18 @@ fn stages<'a>(
     Ok(out)
 }
 
-pub(super) fn step(start: &Start, tableau: &'static Tableau) -> Result<(State, Forces)> {
+pub(super) fn step(start: &Start, tableau: &'static Tableau) -> Result<(State, Stages)> {
     let dt = start.stepper.dt;
     let momentum = start.momentum();
     let control = &start.input.control;
     let stages = stages(start, tableau, &momentum, |_, e, v| e.force(v, control))?;
-    let mut xi = DVector::zeros(start.v.len());
-    let mut y = momentum;
-    for (stage, weight) in stages.iter().zip(tableau.weights) {
-        xi += *weight * dt * &stage.chart_rate;
-        y += *weight * dt * &stage.force;
-    }
+    let zero = DVector::zeros(start.v.len());
+    let xi = tableau.sum(dt, zero, stages.iter().map(|s| &s.chart_rate));
+    let y = tableau.sum(dt, momentum, stages.iter().map(|s| &s.force));
     let next = start.next_state(start.arrive(&xi), y);
     let mut all: Vec<DVector<f64>> = stages.into_iter().map(|stage| stage.force).collect();
     all.pop();
-    Ok((next, Forces { tableau, all }))
+    Ok((next, Stages::RungeKutta(Forces { tableau, all })))
 }
 
 /// What the transpose of a step needs.
@@ -143,19 +156,17 @@ impl<'a> Adjoint<'a> {
             Ok(forces.all.get(i).cloned().unwrap_or(DVector::zeros(nv)))
         };
         let stages = stages(start, tableau, &start.momentum(), force)?;
-        let mut xi = DVector::zeros(nv);
-        for (stage, weight) in stages.iter().zip(tableau.weights) {
-            xi += *weight * dt * &stage.chart_rate;
-        }
+        let rates = stages.iter().map(|s| &s.chart_rate);
         Ok(Self {
             tableau,
+            xi: tableau.sum(dt, DVector::zeros(nv), rates),
             stages,
-            xi,
         })
     }
+}
 
-    /// Transpose of [`step`].
-    pub fn vjp(&self, start: &Start<'_, 'a>, next_bar: &StateBar) -> Result<StepBar> {
+impl<'a> Transposed<'a> for Adjoint<'a> {
+    fn vjp(&self, start: &Start<'_, 'a>, next_bar: &StateBar) -> Result<StepBar> {
         let (tree, dt) = (&start.stepper.system.tree, start.stepper.dt);
         let mut bar = StepBar::zeros(start.e);
         let (q_direct, xi_bar) = start.arrive_vjp(&self.xi, &next_bar.q);

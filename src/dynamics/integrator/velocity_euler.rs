@@ -3,6 +3,7 @@
 //! With contact, v⁺ is what [`contact::solve`] makes of that velocity at q.
 
 use super::contact::{self, ContactVelocities};
+use super::record::{Stages, Transposed};
 use super::start::Start;
 use super::{State, StateBar, StepBar, readout};
 use crate::Result;
@@ -23,14 +24,14 @@ fn acceleration(start: &Start) -> Result<(DVector<f64>, Definite)> {
     Ok((driven + split.put(&free), factor))
 }
 
-pub(super) fn step(start: &Start) -> Result<(State, ContactVelocities)> {
+pub(super) fn step(start: &Start) -> Result<(State, Stages)> {
     let (s, split) = (start.stepper, start.split);
     let (a, _) = acceleration(start)?;
     let before = &split.driven + split.put(&split.take(&(start.v + s.dt * a)));
     let after = contact::solve(start, &before)?;
     let q = start.advance(&after);
     let next = start.next_state(q, after.clone());
-    Ok((next, ContactVelocities { before, after }))
+    Ok((next, Stages::Contact(ContactVelocities { before, after })))
 }
 
 /// What the transpose of a step needs.
@@ -50,9 +51,10 @@ impl<'s> Adjoint<'s> {
             factor,
         })
     }
+}
 
-    /// Transpose of [`step`].
-    pub fn vjp(&self, start: &Start, next_bar: &StateBar) -> Result<StepBar> {
+impl<'a> Transposed<'a> for Adjoint<'_> {
+    fn vjp(&self, start: &Start<'_, 'a>, next_bar: &StateBar) -> Result<StepBar> {
         let (s, e, split) = (start.stepper, start.e, start.split);
         let mut bar = StepBar::zeros(e);
         let after = &self.contact.velocities.after;

@@ -1,21 +1,20 @@
-//! Joints, one file each.
+//! Joints, one file each; those with an axis share one.
 //!
 //! To add one: a file with its type and [`JointMotion`], and its entry in the list below, from which its variant of
 //! [`Joint`], its keys in scene files and its place everywhere else follow.
 
+mod axial;
 mod fixed;
 mod free;
 mod model;
 mod planar;
-mod prismatic;
-mod revolute;
-mod screw;
 mod spherical;
 
 pub use model::JointModel;
 pub use planar::Plane;
 
-use crate::adjoint::lie::{Pose, Vec3, Vec6};
+use crate::adjoint::lie::{Pose, Vec6};
+use axial::{Axial, Axis};
 use serde::{Deserialize, Serialize};
 use std::fmt;
 
@@ -71,19 +70,19 @@ joints! {
     Prismatic {
         /// Direction in the joint's frame; need not be of unit length.
         axis: [f64; 3]
-    } => prismatic::Prismatic::new(axis);
+    } => Axial::Prismatic(Axis::new(axis));
     /// About an axis: q, v in rad, rad/s.
     Revolute {
         /// Direction in the joint's frame.
         axis: [f64; 3]
-    } => revolute::Revolute::new(axis);
+    } => Axial::Revolute(Axis::new(axis));
     /// About an axis with an advance along it, as a nut on its thread: q, v in rad, rad/s.
     Screw {
         /// Direction in the joint's frame; need not be of unit length.
         axis: [f64; 3],
         /// Advance along the axis in one revolution, m; negative for a left-handed thread.
         pitch: f64
-    } => screw::Screw::new(axis, pitch);
+    } => Axial::Screw(Axis::new(axis), pitch);
     /// In a plane of the joint's frame: two translations, then the rotation about its normal.
     Planar {
         /// The plane.
@@ -110,7 +109,7 @@ impl Joint {
 
     /// The joint's name in a scene file.
     pub fn kind(&self) -> &'static str {
-        self.model().motion().kind()
+        self.model().kind()
     }
 
     /// Whether q has unit quaternions, so that v is not its rate.
@@ -120,17 +119,17 @@ impl Joint {
 
     /// Index of the quaternion's w in the joint's q.
     pub(crate) fn quaternion_at(&self) -> Option<usize> {
-        self.model().motion().quaternion_at()
+        self.model().quaternion_at()
     }
 
     /// Short names of the coordinates q, for tables.
     pub fn coordinate_labels(&self) -> &'static [&'static str] {
-        self.model().motion().coordinate_labels()
+        self.model().coordinate_labels()
     }
 
     /// Short names of the generalised velocities v, for tables.
     pub fn velocity_labels(&self) -> &'static [&'static str] {
-        self.model().motion().velocity_labels()
+        self.model().velocity_labels()
     }
 
     /// Coordinates of the joint at its origin: zero, with identity quaternions.
@@ -140,7 +139,7 @@ impl Joint {
 
     /// What is wrong with it, if anything is.
     pub(crate) fn refused(&self) -> Option<Refused> {
-        self.model().motion().refused()
+        self.model().refused()
     }
 }
 
@@ -205,7 +204,8 @@ pub trait JointMotion: fmt::Debug + Send + Sync + 'static {
         p.to_vec()
     }
 
-    /// Gradient of `v̂̄ · X(q) v` over the tangent space of q.
+    /// Gradient of `v̂̄ · X(q) v` over the tangent space of q. That of `v̂ᵀ X⁻ᵀ p` (see [`JointMotion::frame_momentum`]) is its
+    /// negative with `X⁻¹ v̂` as velocity and `X⁻ᵀ p` as cotangent.
     fn frame_velocity_vjp(&self, v: &[f64], _hat_bar: &[f64]) -> Vec<f64> {
         vec![0.0; v.len()]
     }
@@ -218,36 +218,5 @@ pub trait JointMotion: fmt::Debug + Send + Sync + 'static {
     /// Cotangent of `v` of [`JointMotion::frame_bias`].
     fn frame_bias_vjp(&self, v: &[f64], _bar: &[f64]) -> Vec<f64> {
         vec![0.0; v.len()]
-    }
-}
-
-/// An axis as it was given, and of unit length.
-#[derive(Clone, Copy, Debug)]
-struct Axis {
-    given: [f64; 3],
-    unit: Vec3,
-}
-
-impl Axis {
-    fn new(given: [f64; 3]) -> Self {
-        Self {
-            given,
-            unit: Vec3::from(given).normalize(),
-        }
-    }
-
-    fn refused(&self) -> Option<Refused> {
-        let remedy = if self.given.iter().any(|x| !x.is_finite()) {
-            "give finite numbers"
-        } else if self.given == [0.0; 3] {
-            "give a direction, e.g. [0, 0, 1]; its length doesn't matter"
-        } else {
-            return None;
-        };
-        Some(Refused {
-            field: "axis",
-            given: format!("{:?}", self.given),
-            remedy,
-        })
     }
 }

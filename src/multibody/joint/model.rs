@@ -9,11 +9,12 @@
 //! `X` differs from the identity where translation and rotation are coordinates of one joint: for planar and free joints.
 
 use super::JointMotion;
-use crate::adjoint::lie::{self, Mat3, Pose, Vec3, Vec6};
+use crate::adjoint::lie::{self, Mat3, Vec3};
 use nalgebra::{Quaternion, UnitQuaternion};
+use std::ops::Deref;
 use std::sync::Arc;
 
-/// A joint that moves. Clones share it.
+/// A joint that moves: what all joints do with their own [`JointMotion`]. Clones share it.
 #[derive(Clone, Debug)]
 pub struct JointModel(Arc<dyn JointMotion>);
 
@@ -25,39 +26,37 @@ pub(super) fn vec3(x: &[f64]) -> Vec3 {
     Vec3::new(x[0], x[1], x[2])
 }
 
+impl Deref for JointModel {
+    type Target = dyn JointMotion;
+
+    fn deref(&self) -> &Self::Target {
+        self.0.as_ref()
+    }
+}
+
 impl JointModel {
     /// A joint with these motions.
     pub fn new(motion: impl JointMotion) -> Self {
         Self(Arc::new(motion))
     }
 
-    /// Its motions.
-    pub fn motion(&self) -> &dyn JointMotion {
-        self.0.as_ref()
-    }
-
     /// Number of coordinates q.
     pub fn coordinates(&self) -> usize {
-        self.0.coordinate_labels().len()
+        self.coordinate_labels().len()
     }
 
     /// Number of generalised velocities v.
     pub fn velocities(&self) -> usize {
-        self.0.velocity_labels().len()
+        self.velocity_labels().len()
     }
 
     /// Coordinates of no motion: zero, with an identity quaternion.
     pub fn origin(&self) -> Vec<f64> {
         let mut q = vec![0.0; self.coordinates()];
-        if let Some(w) = self.0.quaternion_at() {
+        if let Some(w) = self.quaternion_at() {
             q[w] = 1.0;
         }
         q
-    }
-
-    /// Basis of the joint's twists about its frame's origin, constant.
-    pub fn basis(&self) -> Vec<Vec6> {
-        self.0.basis()
     }
 
     /// Whether it lets the body move anyhow.
@@ -65,17 +64,12 @@ impl JointModel {
         self.velocities() == 6
     }
 
-    /// Pose of the body in the joint's frame at coordinates `q`.
-    pub fn pose(&self, q: &[f64]) -> Pose {
-        self.0.pose(q)
-    }
-
     /// Coordinates after a finite tangent displacement: plain ones add, rotations are multiplied by
     /// `exp` on the left, in the joint's frame.
     pub fn integrate(&self, q: &[f64], xi: &[f64]) -> Vec<f64> {
         let add =
             |q: &[f64], xi: &[f64]| -> Vec<f64> { q.iter().zip(xi).map(|(q, x)| q + x).collect() };
-        let Some(at) = self.0.quaternion_at() else {
+        let Some(at) = self.quaternion_at() else {
             return add(q, xi);
         };
         let mut out = add(&q[..at], &xi[..at]);
@@ -109,7 +103,7 @@ impl JointModel {
         self.rotate(xi, &mut v_bar, |theta| {
             lie::exp_jacobian_inverse(theta).transpose()
         });
-        if let Some(at) = self.0.quaternion_at() {
+        if let Some(at) = self.quaternion_at() {
             let part = |x: &[f64]| vec3(&x[at..at + 3]);
             let x = lie::exp_jacobian_inverse_vjp(&part(xi), &part(v), &part(bar));
             xi_bar[at..at + 3].copy_from_slice(x.as_slice());
@@ -117,29 +111,9 @@ impl JointModel {
         (xi_bar, v_bar)
     }
 
-    /// Frame velocity `v̂ = X(q) v`.
-    pub fn frame_velocity(&self, q: &[f64], v: &[f64]) -> Vec<f64> {
-        self.0.frame_velocity(q, v)
-    }
-
-    /// `v = X(q)⁻¹ v̂`.
-    pub fn frame_velocity_inverse(&self, q: &[f64], hat: &[f64]) -> Vec<f64> {
-        self.0.frame_velocity_inverse(q, hat)
-    }
-
-    /// Generalised momentum or force `p = X(q)ᵀ p̂`.
-    pub fn frame_momentum_transpose(&self, q: &[f64], hat: &[f64]) -> Vec<f64> {
-        self.0.frame_momentum_transpose(q, hat)
-    }
-
-    /// Frame momentum or force `p̂ = X(q)⁻ᵀ p`.
-    pub fn frame_momentum(&self, q: &[f64], p: &[f64]) -> Vec<f64> {
-        self.0.frame_momentum(q, p)
-    }
-
     /// Applies a 3 × 3 matrix of the rotation vector in `xi` to the angular part of `x`.
     fn rotate(&self, xi: &[f64], x: &mut [f64], map: impl Fn(&Vec3) -> Mat3) {
-        if let Some(at) = self.0.quaternion_at() {
+        if let Some(at) = self.quaternion_at() {
             let y = map(&vec3(&xi[at..at + 3])) * vec3(&x[at..at + 3]);
             x[at..at + 3].copy_from_slice(y.as_slice());
         }
@@ -166,7 +140,7 @@ impl JointModel {
         // X depends on translations only, which add.
         let q_bar = self.frame_velocity_vjp(&rotated, hat);
         let mut xi_bar = q_bar.clone();
-        if let Some(at) = self.0.quaternion_at() {
+        if let Some(at) = self.quaternion_at() {
             // dJ = −J d(J⁻¹) J.
             let conjugate = self.chart_momentum(q, xi, hat);
             let part = |x: &[f64]| vec3(&x[at..at + 3]);
@@ -176,22 +150,5 @@ impl JointModel {
             }
         }
         [q_bar, xi_bar, self.frame_velocity(&next, &rotated)]
-    }
-
-    /// Tangent cotangent of `q` from `v̂̄` of [`JointModel::frame_velocity`]: the gradient of
-    /// `v̂̄ · X(q) v`. The gradient of `v̂ᵀ X⁻ᵀ p` (see [`JointModel::frame_momentum`]) is its negative with
-    /// `X⁻¹ v̂` as velocity and `X⁻ᵀ p` as cotangent.
-    pub fn frame_velocity_vjp(&self, v: &[f64], hat_bar: &[f64]) -> Vec<f64> {
-        self.0.frame_velocity_vjp(v, hat_bar)
-    }
-
-    /// Rate of the frame velocity at constant `v`: `Ẋ v` along `v` itself.
-    pub fn frame_bias(&self, v: &[f64]) -> Vec<f64> {
-        self.0.frame_bias(v)
-    }
-
-    /// Cotangent of `v` of [`JointModel::frame_bias`].
-    pub fn frame_bias_vjp(&self, v: &[f64], bar: &[f64]) -> Vec<f64> {
-        self.0.frame_bias_vjp(v, bar)
     }
 }

@@ -53,18 +53,6 @@ impl Spring {
         }
     }
 
-    /// Name, unique in the scene.
-    pub fn named(mut self, name: impl Into<String>) -> Self {
-        self.name = Some(name.into());
-        self
-    }
-
-    /// First end in its body's frame, m.
-    pub fn at(mut self, point: [f64; 3]) -> Self {
-        self.at = point;
-        self
-    }
-
     /// Second end at a point (m, its frame) of a body.
     pub fn to(mut self, body: impl Into<String>, point: [f64; 3]) -> Self {
         (self.to, self.to_at) = (Some(body.into()), point);
@@ -76,25 +64,20 @@ impl Spring {
         (self.to, self.to_at) = (None, point);
         self
     }
-
-    /// Stiffness, N/m.
-    pub fn stiffness(mut self, stiffness: f64) -> Self {
-        self.stiffness = stiffness;
-        self
-    }
-
-    /// Length at which it doesn't pull, m.
-    pub fn rest_length(mut self, length: f64) -> Self {
-        self.rest_length = length;
-        self
-    }
-
-    /// Damping, N s/m.
-    pub fn damping(mut self, damping: f64) -> Self {
-        self.damping = damping;
-        self
-    }
 }
+
+setters! { Spring {
+    /// Name, unique in the scene.
+    named(name: impl Into<String>) => name = Some(name.into());
+    /// First end in its body's frame, m.
+    at(point: [f64; 3]) => at = point;
+    /// Stiffness, N/m.
+    stiffness(stiffness: f64) => stiffness = stiffness;
+    /// Length at which it doesn't pull, m.
+    rest_length(length: f64) => rest_length = length;
+    /// Damping, N s/m.
+    damping(damping: f64) => damping = damping;
+} }
 
 impl From<Spring> for Force {
     fn from(spring: Spring) -> Self {

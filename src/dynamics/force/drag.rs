@@ -1,0 +1,194 @@
+//! Drag by the velocity through the water, summed over a body's surface: linear, −c R ν in the body's frame (Eq. 22), and quadratic,
+//! −½ ρ c Σ ΔA |w| w.
+
+use super::{ForceModel, ForceParts, LoadBars, Loads, Moving, Velocity};
+use crate::adjoint::drag::{
+    Element, Part, quadratic_drag, quadratic_drag_jvp, quadratic_drag_vjp, resistance,
+};
+use crate::adjoint::lie::{Mat6, Pose, Vec6, cross_force};
+use crate::dynamics::Parameters;
+use crate::dynamics::parameters::{DENSITY, Declarations, Declared, Owner, Parameter, Range};
+use crate::scene::DragPart;
+
+/// Of νρ of Eq. 22; at zero a change is measured by the water's momentum through a thousandth of the surface.
+const LINEAR: Declared = Declared::new("drag.linear", "kg/(m² s)")
+    .size(|value, typical| value.max(1e-3 * typical.density * typical.speed));
+/// c, per area of the surface.
+const QUADRATIC: Declared = Declared::new("drag.quadratic", "1");
+/// The same of a body whose surface isn't kept.
+const NONE: Declared = QUADRATIC.range(Range::Zero(
+    "must be 0 for a body whose scene gives no drag; give it `drag` there, zero if need be",
+));
+
+struct Drag {
+    name: &'static str,
+    bodies: Vec<Dragged>,
+}
+
+struct Dragged {
+    body: usize,
+    coefficient: Parameter,
+    law: Law,
+}
+
+/// What drags at unit coefficient, body frame.
+enum Law {
+    Linear(Box<Mat6>),
+    /// At unit density.
+    Quadratic(Vec<Element>, Part),
+}
+
+pub(super) fn linear(
+    parts: &ForceParts,
+    parameters: &mut Declarations,
+) -> Option<Box<dyn ForceModel>> {
+    let mut bodies = Vec::new();
+    for (body, surface) in parts.surfaces.iter().enumerate() {
+        let given = parts.scene.bodies[body].drag.unwrap_or_default();
+        let value = if surface.is_empty() {
+            0.0
+        } else {
+            given.linear
+        };
+        let coefficient = parameters.declare(Owner::Body(body), LINEAR, value);
+        // Also at zero coefficient: the derivative with respect to it isn't zero.
+        if !surface.is_empty() {
+            let law = Law::Linear(Box::new(resistance(surface, part(given.part))));
+            bodies.push(Dragged {
+                body,
+                coefficient,
+                law,
+            });
+        }
+    }
+    assemble("linear drag", bodies)
+}
+
+pub(super) fn quadratic(
+    parts: &ForceParts,
+    parameters: &mut Declarations,
+) -> Option<Box<dyn ForceModel>> {
+    let mut bodies = Vec::new();
+    for (body, surface) in parts.surfaces.iter().enumerate() {
+        let owner = Owner::Body(body);
+        match parts.scene.bodies[body].drag {
+            Some(given) if !surface.is_empty() => bodies.push(Dragged {
+                body,
+                coefficient: parameters.declare(owner, QUADRATIC, given.quadratic),
+                law: Law::Quadratic(surface.clone(), part(given.quadratic_part)),
+            }),
+            _ => {
+                parameters.declare(owner, NONE, 0.0);
+            }
+        }
+    }
+    assemble("quadratic drag", bodies)
+}
+
+fn assemble(name: &'static str, bodies: Vec<Dragged>) -> Option<Box<dyn ForceModel>> {
+    (!bodies.is_empty()).then(|| Box::new(Drag { name, bodies }) as Box<dyn ForceModel>)
+}
+
+/// A scene's name for which part of a surface's velocity drags.
+fn part(part: DragPart) -> Part {
+    match part {
+        DragPart::Tangential => Part::Tangential,
+        DragPart::Normal => Part::Normal,
+        DragPart::Total => Part::Total,
+    }
+}
+
+impl Law {
+    fn wrench(&self, nu: &Vec6) -> Vec6 {
+        match self {
+            Self::Linear(resistance) => -(**resistance * nu),
+            Self::Quadratic(surface, part) => quadratic_drag(surface, *part, nu),
+        }
+    }
+
+    fn jvp(&self, nu: &Vec6, dnu: &Vec6) -> Vec6 {
+        match self {
+            Self::Linear(resistance) => -(**resistance * dnu),
+            Self::Quadratic(surface, part) => quadratic_drag_jvp(surface, *part, nu, dnu),
+        }
+    }
+
+    fn vjp(&self, nu: &Vec6, bar: &Vec6) -> Vec6 {
+        match self {
+            Self::Linear(resistance) => -(**resistance * bar),
+            Self::Quadratic(surface, part) => quadratic_drag_vjp(surface, *part, nu, bar),
+        }
+    }
+}
+
+impl Dragged {
+    /// What multiplies the law.
+    fn scale(&self, parameters: &Parameters) -> f64 {
+        match self.law {
+            Law::Linear(_) => parameters[self.coefficient],
+            Law::Quadratic(..) => parameters.density() * parameters[self.coefficient],
+        }
+    }
+}
+
+impl Drag {
+    /// Adds a wrench at unit coefficient, body frame, on each body, from its pose and its velocity through the water.
+    fn spread(
+        &self,
+        at: &Moving,
+        out: &mut Loads,
+        wrench: impl Fn(&Dragged, &Pose, &Vec6) -> Vec6,
+    ) {
+        for d in &self.bodies {
+            let scale = d.scale(at.place.parameters);
+            if scale != 0.0 {
+                let pose = &at.place.poses[d.body];
+                let nu = pose.twist_to_body(&at.relative(d.body));
+                out.wrenches[d.body] += pose.wrench_to_world(&(scale * wrench(d, pose, &nu)));
+            }
+        }
+    }
+}
+
+impl ForceModel for Drag {
+    fn name(&self) -> &'static str {
+        self.name
+    }
+
+    fn add(&self, at: &Moving, out: &mut Loads) {
+        self.spread(at, out, |d, _, nu| d.law.wrench(nu));
+    }
+
+    fn jvp(&self, at: &Moving, change: &Velocity, out: &mut Loads) {
+        self.spread(at, out, |d, pose, nu| {
+            d.law.jvp(nu, &pose.twist_to_body(&change.twists[d.body]))
+        });
+    }
+
+    fn vjp(&self, at: &Moving, z: &Velocity, bar: &mut LoadBars) {
+        let parameters = at.place.parameters;
+        for d in &self.bodies {
+            let b = d.body;
+            let pose = &at.place.poses[b];
+            let (relative, virt) = (at.relative(b), &z.twists[b]);
+            let (nu, zeta) = (pose.twist_to_body(&relative), pose.twist_to_body(virt));
+            let unit = d.law.wrench(&nu);
+            let power = zeta.dot(&unit);
+            match d.law {
+                Law::Linear(_) => bar.parameters[d.coefficient] += power,
+                Law::Quadratic(..) => {
+                    bar.parameters[d.coefficient] += parameters.density() * power;
+                    bar.parameters[DENSITY] += parameters[d.coefficient] * power;
+                }
+            }
+            let scale = d.scale(parameters);
+            if scale != 0.0 {
+                // The rotation of the frame acts on both twists.
+                let wrench = pose.wrench_to_world(&(scale * unit));
+                let nu_bar = pose.wrench_to_world(&(scale * d.law.vjp(&nu, &zeta)));
+                bar.twist[b] += nu_bar;
+                bar.pose[b] -= cross_force(&relative, &nu_bar) + cross_force(virt, &wrench);
+            }
+        }
+    }
+}

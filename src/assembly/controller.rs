@@ -5,16 +5,12 @@ use crate::policy::{
     Constant, OpenLoop, Pd, PdAxis, Playback, Policy, PushThenLock, SpeedStage, SpeedStages,
 };
 use crate::scene::{Controller, Scene};
-use crate::{Error, Result};
 
 /// The scene's controller.
-pub(super) fn policy(scene: &Scene, system: &System) -> Result<Box<dyn Policy>> {
+pub(super) fn policy(scene: &Scene, system: &System) -> Box<dyn Policy> {
     let controls = system.controls;
-    let body = |name: &String| {
-        let found = system.bodies.iter().position(|b| b.name == *name);
-        found.ok_or_else(|| Error::input("controller", name, "must be the name of a body"))
-    };
-    Ok(match scene.controller.clone() {
+    let body = |name: &String| scene.body(name).map_or(0, |b| b.0);
+    match scene.controller.clone() {
         None => Box::new(OpenLoop),
         Some(Controller::Constant { control }) => Box::new(Constant { control }),
         Some(Controller::Pd {
@@ -46,7 +42,7 @@ pub(super) fn policy(scene: &Scene, system: &System) -> Result<Box<dyn Policy>> 
             force,
             stop_at,
         }) => {
-            let b = body(&name)?;
+            let b = body(&name);
             Box::new(PushThenLock {
                 controls,
                 bodies: system.len(),
@@ -59,9 +55,9 @@ pub(super) fn policy(scene: &Scene, system: &System) -> Result<Box<dyn Policy>> 
             })
         }
         Some(Controller::SpeedStages { bodies, stages }) => {
-            let start = |name| Ok(system.tree.links()[body(name)?].v.start);
+            let start = |name| system.tree.links()[body(name)].v.start;
             Box::new(SpeedStages {
-                watch: bodies.iter().map(start).collect::<Result<_>>()?,
+                watch: bodies.iter().map(start).collect(),
                 stages: stages
                     .into_iter()
                     .map(|s| SpeedStage {
@@ -75,5 +71,5 @@ pub(super) fn policy(scene: &Scene, system: &System) -> Result<Box<dyn Policy>> 
             controls,
             steps: control,
         }),
-    })
+    }
 }

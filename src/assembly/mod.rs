@@ -43,23 +43,13 @@ fn inertia(body: &Body, surface: Option<&Surface>) -> (f64, Vec3, [f64; 6]) {
         .center_of_mass
         .map(Vec3::from)
         .unwrap_or_else(|| properties.map_or(Vec3::zeros(), |p| p.centroid));
-    let six = match &body.inertia {
-        Some(i) if i.len() == 6 => std::array::from_fn(|k| i[k]),
-        Some(i) => std::array::from_fn(|k| if k < 3 { i[k] } else { 0.0 }),
-        None => match properties {
-            Some(p) => {
-                let i = p.inertia * (mass / p.volume);
-                [
-                    i[(0, 0)],
-                    i[(1, 1)],
-                    i[(2, 2)],
-                    i[(0, 1)],
-                    i[(0, 2)],
-                    i[(1, 2)],
-                ]
-            }
-            None => [0.0; 6],
-        },
+    let six = match (&body.inertia, properties) {
+        (Some(given), _) => std::array::from_fn(|k| given.get(k).copied().unwrap_or(0.0)),
+        (None, Some(p)) => {
+            let i = p.inertia * (mass / p.volume);
+            [(0, 0), (1, 1), (2, 2), (0, 1), (0, 2), (1, 2)].map(|at| i[at])
+        }
+        (None, None) => [0.0; 6],
     };
     (mass, center, six)
 }
@@ -89,7 +79,7 @@ pub(crate) fn assemble(
         ));
     }
     contact::check_integrator(scene, choices.integrator)?;
-    let index = |name: &String| scene.bodies.iter().position(|b| b.name == *name);
+    let index = |name: &String| Some(scene.body(name)?.0);
     let tree = Tree::new(scene.bodies.iter().map(|b| {
         (
             b.parent.as_ref().and_then(index),
@@ -108,25 +98,20 @@ pub(crate) fn assemble(
         let (mass, center, inertia) = inertia(body, surface);
         inertias.push((body.name.clone(), mass, inertia));
         faces.push(surface.map_or(Vec::new(), |s| elements(&s.mesh)));
-        let mut data = BodyData {
+        let mut first = |taken: bool, count: usize| {
+            let at = controls;
+            controls += if taken { count } else { 0 };
+            taken.then_some(at)
+        };
+        bodies.push(BodyData {
             name: body.name.clone(),
             center_of_mass: center,
             volume: surface.map_or(0.0, |s| s.properties.volume),
             centroid: surface.map_or(center, |s| s.properties.centroid),
-            submerged: None,
-            joint_control: None,
-            thruster: None,
-        };
-        data.submerged = in_water.0.iter().position(|w| *w == b);
-        if body.actuated {
-            data.joint_control = Some(controls);
-            controls += tree.links()[b].v.len();
-        }
-        if body.thruster {
-            data.thruster = Some(controls);
-            controls += 6;
-        }
-        bodies.push(data);
+            submerged: in_water.0.iter().position(|w| *w == b),
+            joint_control: first(body.actuated, tree.links()[b].v.len()),
+            thruster: first(body.thruster, 6),
+        });
     }
     let drives: Vec<Drive> = scene
         .bodies
@@ -180,7 +165,7 @@ pub(crate) fn assemble(
     system.limits = limits::assemble(scene, dt, &system, &parameters, &q)?;
     let v = start_velocity(scene, choices, &system, &parameters, &q)?;
     Ok(Assembled {
-        policy: controller::policy(scene, &system)?.into(),
+        policy: controller::policy(scene, &system).into(),
         system,
         parameters,
         q,

@@ -22,16 +22,11 @@ impl Evaluation<'_> {
     /// C − U × V of every submerged body, zero for dry ones.
     fn fluid_bias(&self, fields: &Fields) -> Vec<Vec6> {
         let current = self.current_twist();
-        let of = |b: usize| fields.bias[b] - cross_motion(&current, &fields.twist[b]);
-        (0..self.system.len())
-            .map(|b| {
-                if self.system.bodies[b].submerged.is_some() {
-                    of(b)
-                } else {
-                    Vec6::zeros()
-                }
-            })
-            .collect()
+        let mut out = vec![Vec6::zeros(); self.system.len()];
+        for (b, _) in self.system.submerged() {
+            out[b] = fields.bias[b] - cross_motion(&current, &fields.twist[b]);
+        }
+        out
     }
 }
 
@@ -147,20 +142,8 @@ impl Linearisation<'_> {
             .map(|b| cross_motion(&relative[b], &fields.virtual_twist[b]))
             .collect();
         let bias = self.fluid_bias(fields);
-        let zero = vec![Vec6::zeros(); n];
-        let respond = |field: &[Vec6], other| -> Result<(Vec<Vec6>, Vec<Vec6>)> {
-            let submerged = self.submerged_twists(field);
-            if submerged.iter().all(|x| *x == 0.0) {
-                return Ok((zero.clone(), zero.clone()));
-            }
-            let pullback = fluid.vjp(Direction::Twist(&submerged), other)?;
-            Ok((
-                self.submerged_impulses(&pullback.momentum_x),
-                self.from_submerged(&pullback.wrench),
-            ))
-        };
-        let (momenta_carried, pair_carried) = respond(&carried, through)?;
-        let (momenta_bias, pair_bias) = respond(&bias, virt)?;
+        let (momenta_carried, pair_carried) = self.respond(water, &carried, through)?;
+        let (momenta_bias, pair_bias) = self.respond(water, &bias, virt)?;
         let along_virtual = fluid.hvp(
             through,
             through,
@@ -174,10 +157,7 @@ impl Linearisation<'_> {
         let wrench_twist = self.from_submerged(&along_twist.wrench);
         let pose_force = self.half_from_submerged(&along_virtual.gradient);
         let pair = self.from_submerged(&along_twist.gradient);
-        for b in 0..n {
-            if self.system.bodies[b].submerged.is_none() {
-                continue;
-            }
+        for (b, _) in self.system.submerged() {
             let (v_rel, w_b, twist) = (&relative[b], &fields.virtual_twist[b], &fields.twist[b]);
             let h = &momenta[b];
             *out.parameters.density_mut() += carried[b].dot(h) - w_b.dot(&momenta_bias[b])

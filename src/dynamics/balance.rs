@@ -13,12 +13,13 @@
 //! kept to round-off by any integrator that is linear in f.
 
 use super::force::{LoadBars, Loads, Moving, Place, Velocity};
+use super::linearisation::Water;
 use super::{Evaluation, Linearisation, Parameters};
 use crate::Result;
 use crate::adjoint::lie::{Vec6, cross_force, cross_motion, six};
 use crate::adjoint::rigid;
 use crate::coupling::Direction;
-use crate::multibody::{Cotangents, Virtual};
+use crate::multibody::{Cotangents, Link, Virtual};
 use nalgebra::{DMatrix, DVector, Matrix6};
 
 /// Cotangents of configuration, velocity, control and parameters.
@@ -138,13 +139,6 @@ impl Evaluation<'_> {
         forces.map(|f| f.potential_energy(&self.place())).sum()
     }
 
-    /// Joint forces in frame coordinates, X⁻ᵀ τ.
-    fn frame_joint_forces(&self, tau: &DVector<f64>) -> DVector<f64> {
-        self.system
-            .tree
-            .per_joint(&self.q, tau, |j, q, p| j.frame_momentum(q, p))
-    }
-
     /// Projects momenta and their rates on the rotating frame columns.
     fn project_frame(&self, twists: &[Vec6], momenta: Vec<Vec6>, rates: Vec<Vec6>) -> DVector<f64> {
         let tree = &self.system.tree;
@@ -163,16 +157,8 @@ impl Evaluation<'_> {
 
     /// Gradient over q of `p̂ᵀ X(q) v`, joint by joint.
     pub(super) fn frame_velocity_vjp(&self, v: &DVector<f64>, hat: &DVector<f64>) -> DVector<f64> {
-        let mut out = DVector::zeros(v.len());
-        for l in self.system.tree.links() {
-            let r = l.v.clone();
-            let part = l
-                .joint
-                .frame_velocity_vjp(&v.as_slice()[r.clone()], &hat.as_slice()[r.clone()]);
-            for (k, x) in r.zip(part) {
-                out[k] = x;
-            }
-        }
+        let part = |l: &Link| l.joint.frame_velocity_vjp(l.of_v(v), l.of_v(hat));
+        let [out] = self.system.tree.joints(|l| [part(l)]);
         out
     }
 }
@@ -188,6 +174,26 @@ impl Linearisation<'_> {
         })
     }
 
+    /// Momenta of all bodies, and the wrenches that change them, as the water moved by the submerged bodies' `field` answers in the
+    /// direction `other`.
+    pub(super) fn respond(
+        &self,
+        water: &Water,
+        field: &[Vec6],
+        other: Direction,
+    ) -> Result<(Vec<Vec6>, Vec<Vec6>)> {
+        let submerged = self.submerged_twists(field);
+        if submerged.iter().all(|x| *x == 0.0) {
+            let zero = vec![Vec6::zeros(); field.len()];
+            return Ok((zero.clone(), zero));
+        }
+        let pullback = (water.linearised).vjp(Direction::Twist(&submerged), other)?;
+        Ok((
+            self.submerged_impulses(&pullback.momentum_x),
+            self.from_submerged(&pullback.wrench),
+        ))
+    }
+
     /// f(q, v, u).
     ///
     /// # Errors
@@ -200,16 +206,13 @@ impl Linearisation<'_> {
         let fluid = self.fluid_momenta(&direction);
         let pose_force = self.pose_force(&direction)?;
         let current = self.current_twist();
-        let mut momenta = Vec::with_capacity(twists.len());
-        let Loads {
-            wrenches: mut rates,
-            joints,
-        } = self.loads(&twists, v, control);
-        for (b, twist) in twists.iter().enumerate() {
-            momenta.push(self.rigid_momentum(b, twist) + rho * fluid[b]);
-            rates[b] += rho * (pose_force[b] + cross_force(&current, &fluid[b]));
+        let mut loads = self.loads(&twists, v, control);
+        for (b, rate) in loads.wrenches.iter_mut().enumerate() {
+            *rate += rho * (pose_force[b] + cross_force(&current, &fluid[b]));
         }
-        Ok(self.project_frame(&twists, momenta, rates) + self.frame_joint_forces(&joints))
+        let momenta = self.with_rigid(&twists, &fluid);
+        let out = self.project_frame(&twists, momenta, loads.wrenches);
+        Ok(out + self.frame_dual(&loads.joints))
     }
 
     /// Tangent of [`Linearisation::force`] along `dv` at fixed q and u, with the change of the fluid's pose force on the
@@ -225,41 +228,34 @@ impl Linearisation<'_> {
         let rho = self.parameters.density();
         let twists = tree.twists(&self.kinematics, v);
         let dtwists = tree.twists(&self.kinematics, dv);
-        let direction = self.through_water(v);
-        let ddirection = self.virtual_direction(dv);
-        let fluid = self.fluid_momenta(&direction);
-        let dfluid = self.fluid_momenta(&ddirection);
+        let fluid = self.fluid_momenta(&self.through_water(v));
+        let dfluid = self.fluid_momenta(&self.virtual_direction(dv));
         let dpose_force = match self.acting() {
             Some(_) => self.from_submerged(dpose_force),
             None => vec![Vec6::zeros(); self.system.len()],
         };
         let current = self.current_twist();
-        let (mut momenta, mut dmomenta) = (vec![], vec![]);
         let mut dloads = Loads::zeros(twists.len(), v.len());
-        let (at, change) = (
-            self.moving(&twists, v, control),
-            Velocity {
-                twists: &dtwists,
-                v: dv,
-            },
-        );
+        let at = self.moving(&twists, v, control);
+        let change = Velocity {
+            twists: &dtwists,
+            v: dv,
+        };
         for force in self.system.forces.iter() {
             force.jvp(&at, &change, &mut dloads);
         }
-        let Loads {
-            wrenches: mut drates,
-            joints,
-        } = dloads;
-        for (b, dtwist) in dtwists.iter().enumerate() {
-            momenta.push(self.rigid_momentum(b, &twists[b]) + rho * fluid[b]);
-            dmomenta.push(self.rigid_momentum(b, dtwist) + rho * dfluid[b]);
-            drates[b] += rho * (dpose_force[b] + cross_force(&current, &dfluid[b]));
+        for (b, drate) in dloads.wrenches.iter_mut().enumerate() {
+            *drate += rho * (dpose_force[b] + cross_force(&current, &dfluid[b]));
         }
-        let out = self.project_frame(&twists, dmomenta, drates)
+        let (momenta, dmomenta) = (
+            self.with_rigid(&twists, &fluid),
+            self.with_rigid(&dtwists, &dfluid),
+        );
+        let out = self.project_frame(&twists, dmomenta, dloads.wrenches)
             + self.project_frame(&dtwists, momenta, vec![Vec6::zeros(); twists.len()]);
-        match joints.iter().all(|x| *x == 0.0) {
+        match dloads.joints.iter().all(|x| *x == 0.0) {
             true => out,
-            false => out + self.frame_joint_forces(&joints),
+            false => out + self.frame_dual(&dloads.joints),
         }
     }
 
@@ -279,8 +275,7 @@ impl Linearisation<'_> {
         };
         let mut out = DMatrix::zeros(n, n);
         for (k, changed) in changed.iter().enumerate().take(n) {
-            let mut unit = DVector::zeros(n);
-            unit[k] = 1.0;
+            let unit = DVector::from_fn(n, |i, _| f64::from(i == k));
             out.set_column(k, &self.force_jvp(v, control, &unit, changed));
         }
         Ok(out)
@@ -316,7 +311,7 @@ impl Linearisation<'_> {
         }
         // Z · wrenches + ẑᵀ X⁻ᵀ τ.
         let loads = self.loads(&fields.twist, v, control);
-        let tau_bar = tree.per_joint(&self.q, z, |j, q, z| j.frame_velocity_inverse(q, z));
+        let tau_bar = self.frame_velocity_inverse(z);
         for (bar, wrench) in bar.virtual_twist.iter_mut().zip(&loads.wrenches) {
             *bar += wrench;
         }
@@ -325,7 +320,7 @@ impl Linearisation<'_> {
             v: &tau_bar,
         };
         self.loads_vjp(&fields.twist, v, control, &power, &mut bar, &mut out);
-        out.q -= self.frame_velocity_vjp(&tau_bar, &self.frame_joint_forces(&loads.joints));
+        out.q -= self.frame_velocity_vjp(&tau_bar, &self.frame_dual(&loads.joints));
         if let Some(water) = self.water()? {
             let direction = self.through_water(v);
             let through = Direction::Basis(&direction);
@@ -336,27 +331,14 @@ impl Linearisation<'_> {
             let carried: Vec<Vec6> = (0..n)
                 .map(|b| fields.turning[b] - cross_motion(&current, &fields.virtual_twist[b]))
                 .collect();
-            let submerged_carried = self.submerged_twists(&carried);
-            let (momenta_carried, pair) = if submerged_carried.iter().any(|x| *x != 0.0) {
-                let carried = Direction::Twist(&submerged_carried);
-                let pullback = water.linearised.vjp(carried, through)?;
-                (
-                    self.submerged_impulses(&pullback.momentum_x),
-                    self.from_submerged(&pullback.wrench),
-                )
-            } else {
-                (vec![Vec6::zeros(); n], vec![Vec6::zeros(); n])
-            };
+            let (momenta_carried, pair) = self.respond(water, &carried, through)?;
             // ½ D_g E(v, v)[Z].
             let virt = self.submerged_field(&fields.virtual_twist);
             let tangent = water.linearised.hvp(through, through, &virt)?;
             let impulse = self.submerged_impulses(&tangent.momentum_x);
             let wrench = self.from_submerged(&tangent.wrench);
             let pose_force = self.half_from_submerged(&tangent.gradient);
-            for b in 0..n {
-                if self.system.bodies[b].submerged.is_none() {
-                    continue;
-                }
+            for (b, _) in self.system.submerged() {
                 let relative = self.relative(&fields.twist[b]);
                 let virt = &fields.virtual_twist[b];
                 let rate = pose_force[b] + cross_force(&current, &momenta[b]);

@@ -74,12 +74,11 @@ impl System {
 }
 
 impl Evaluation<'_> {
-    /// Spatial contact wrenches on all bodies moving with the spatial `twists`.
-    fn contact_wrenches(&self, twists: &[Vec6]) -> Vec<Vec6> {
+    /// Spatial wrenches on all bodies of forces at the places where surfaces are near.
+    fn exchanged(&self, force: impl Fn(&PairContact) -> Vec3) -> Vec<Vec6> {
         let mut out = vec![Vec6::zeros(); self.system.len()];
         for t in &self.contact_points {
-            let force = contact_force(&t.law, &t.point_state(twists));
-            t.exchange(&point_wrench(&t.point.position, &force), &mut out);
+            t.exchange(&point_wrench(&t.point.position, &force(t)), &mut out);
         }
         out
     }
@@ -100,11 +99,13 @@ impl Evaluation<'_> {
     /// Generalised forces of contact at the velocity `v`.
     pub fn contact_force(&self, v: &DVector<f64>, dual: Dual) -> DVector<f64> {
         let tree = &self.system.tree;
-        let wrenches = self.contact_wrenches(&tree.twists(&self.kinematics, v));
-        let mut out = match dual {
-            Dual::User => tree.project(&self.kinematics.columns, wrenches),
-            Dual::Frame => tree.project(&self.kinematics.frame_columns, wrenches),
+        let twists = tree.twists(&self.kinematics, v);
+        let wrenches = self.exchanged(|t| contact_force(&t.law, &t.point_state(&twists)));
+        let columns = match dual {
+            Dual::User => &self.kinematics.columns,
+            Dual::Frame => &self.kinematics.frame_columns,
         };
+        let mut out = tree.project(columns, wrenches);
         for (limit, [lower, upper]) in self.stops(v) {
             out[limit.v] += lower + upper;
         }
@@ -135,13 +136,11 @@ impl Evaluation<'_> {
         let tree = &self.system.tree;
         let twists = tree.twists(&self.kinematics, v);
         let dtwists = tree.twists(&self.kinematics, dv);
-        let mut out = vec![Vec6::zeros(); self.system.len()];
-        for t in &self.contact_points {
+        let wrenches = self.exchanged(|t| {
             let du = point_velocity(&t.relative(&dtwists), &t.point.position);
-            let force = contact_force_jvp(&t.law, &t.point_state(&twists), &du);
-            t.exchange(&point_wrench(&t.point.position, &force), &mut out);
-        }
-        let mut out = tree.project(&self.kinematics.columns, out);
+            contact_force_jvp(&t.law, &t.point_state(&twists), &du)
+        });
+        let mut out = tree.project(&self.kinematics.columns, wrenches);
         for l in &self.system.limits {
             out[l.v] += l.forces_jvp(self.q[l.q], v[l.v], dv[l.v]);
         }
@@ -153,8 +152,7 @@ impl Evaluation<'_> {
         let n = v.len();
         let mut out = DMatrix::zeros(n, n);
         for k in 0..n {
-            let mut unit = DVector::zeros(n);
-            unit[k] = 1.0;
+            let unit = DVector::from_fn(n, |i, _| f64::from(i == k));
             out.set_column(k, &self.contact_force_jvp(v, &unit));
         }
         out

@@ -89,8 +89,7 @@ impl System {
         let mut twists = DMatrix::zeros(6 * self.coupling.bodies(), columns);
         let mut poses = Vec::with_capacity(self.coupling.bodies());
         let rest = six(&-self.current, &Vec3::zeros());
-        for (b, body) in self.bodies.iter().enumerate() {
-            let Some(w) = body.submerged else { continue };
+        for (b, w) in self.submerged() {
             let pose = &kinematics.poses[b];
             poses.push(*pose);
             for k in 0..columns {
@@ -107,6 +106,16 @@ impl System {
         Basis { poses, twists }
     }
 
+    /// Spatial six-vectors of the submerged bodies, in each body's frame as twists, stacked.
+    pub fn submerged_twists(&self, kinematics: &Kinematics, field: &[Vec6]) -> DVector<f64> {
+        let mut out = DVector::zeros(6 * self.coupling.bodies());
+        for (b, w) in self.submerged() {
+            let twist = kinematics.poses[b].twist_to_body(&field[b]);
+            out.fixed_rows_mut::<6>(6 * w).copy_from(&twist);
+        }
+        out
+    }
+
     /// Spatial momenta of all bodies from the body-frame impulses of those in the water; zeros without water.
     pub(super) fn spatial_momenta(
         &self,
@@ -116,8 +125,7 @@ impl System {
         let columns = self.columns();
         let mut out = vec![DMatrix::zeros(6, columns); self.len()];
         let Some(impulses) = impulses else { return out };
-        for (b, body) in self.bodies.iter().enumerate() {
-            let Some(w) = body.submerged else { continue };
+        for (b, w) in self.submerged() {
             for k in 0..columns {
                 let h = impulses.fixed_view::<6, 1>(6 * w, k).into_owned();
                 out[b].set_column(k, &kinematics.poses[b].wrench_to_world(&h));
@@ -230,38 +238,29 @@ impl<'a> Evaluation<'a> {
 
     /// Spatial six-vectors of the submerged bodies, in each body's frame as twists, stacked.
     pub fn submerged_twists(&self, field: &[Vec6]) -> DVector<f64> {
-        let mut out = DVector::zeros(6 * self.system.coupling.bodies());
-        for (b, body) in self.system.bodies.iter().enumerate() {
-            if let Some(w) = body.submerged {
-                out.fixed_rows_mut::<6>(6 * w)
-                    .copy_from(&self.kinematics.poses[b].twist_to_body(&field[b]));
-            }
-        }
-        out
+        self.system.submerged_twists(&self.kinematics, field)
     }
 
     /// A field of the submerged bodies.
     pub fn submerged_field(&self, field: &[Vec6]) -> Vec<Vec6> {
-        let submerged = self.system.bodies.iter().zip(field);
-        submerged
-            .filter_map(|(body, f)| body.submerged.map(|_| *f))
-            .collect()
+        self.system.submerged().map(|(b, _)| field[b]).collect()
     }
 
     /// The submerged bodies' field on all bodies, zero elsewhere.
     pub fn from_submerged(&self, field: &[Vec6]) -> Vec<Vec6> {
-        let of = |w: Option<usize>| w.map_or(Vec6::zeros(), |w| field[w]);
-        self.system.bodies.iter().map(|b| of(b.submerged)).collect()
+        let mut out = vec![Vec6::zeros(); self.system.len()];
+        for (b, w) in self.system.submerged() {
+            out[b] = field[w];
+        }
+        out
     }
 
     /// Body-frame impulses of the submerged bodies (stacked) as spatial momenta of all bodies.
     pub fn submerged_impulses(&self, impulses: &DVector<f64>) -> Vec<Vec6> {
         let mut out = vec![Vec6::zeros(); self.system.len()];
-        for (b, body) in self.system.bodies.iter().enumerate() {
-            if let Some(w) = body.submerged {
-                let h = impulses.fixed_rows::<6>(6 * w).into_owned();
-                out[b] = self.kinematics.poses[b].wrench_to_world(&h);
-            }
+        for (b, w) in self.system.submerged() {
+            let h = impulses.fixed_rows::<6>(6 * w).into_owned();
+            out[b] = self.kinematics.poses[b].wrench_to_world(&h);
         }
         out
     }
@@ -269,9 +268,14 @@ impl<'a> Evaluation<'a> {
     /// Total spatial momenta of the bodies, rigid and fluid, at velocity `v`.
     pub fn momenta(&self, v: &DVector<f64>) -> Vec<Vec6> {
         let twists = self.system.tree.twists(&self.kinematics, v);
-        let fluid = self.fluid_momenta(&self.through_water(v));
+        self.with_rigid(&twists, &self.fluid_momenta(&self.through_water(v)))
+    }
+
+    /// Momenta of bodies with these spatial twists, with the fluid's from those at unit density.
+    pub(super) fn with_rigid(&self, twists: &[Vec6], fluid: &[Vec6]) -> Vec<Vec6> {
+        let rho = self.parameters.density();
         (0..self.system.len())
-            .map(|b| self.rigid_momentum(b, &twists[b]) + self.parameters.density() * fluid[b])
+            .map(|b| self.rigid_momentum(b, &twists[b]) + rho * fluid[b])
             .collect()
     }
 

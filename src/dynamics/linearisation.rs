@@ -4,6 +4,7 @@ use super::evaluation::combined;
 use super::{Evaluation, Parameters, System};
 use crate::adjoint::lie::Vec6;
 use crate::coupling::{Linearise, Linearised};
+use crate::multibody::Kinematics;
 use crate::{Error, Result};
 use nalgebra::{DMatrix, DVector};
 use std::ops::Deref;
@@ -61,24 +62,29 @@ impl System {
         q: &DVector<f64>,
     ) -> Result<Linearisation<'a>> {
         let kinematics = self.kinematics(q)?;
-        let coupling = self.differentiable()?;
-        let water = OnceLock::new();
-        let (momenta, report) = if self.in_water(parameters) {
-            let basis = self.basis(&kinematics);
-            let linearised = coupling.linearise(&basis.poses, &basis.twists)?;
-            let columns = self.spatial_momenta(&kinematics, Some(linearised.momenta()));
-            let found = (columns.clone(), linearised.report().clone());
-            let _ = water.set(Water {
-                linearised,
-                columns,
-            });
-            found
-        } else {
-            (self.spatial_momenta(&kinematics, None), Default::default())
+        self.differentiable()?;
+        let water = match self.in_water(parameters) {
+            true => Some(self.water(&kinematics)?),
+            false => None,
         };
+        let momenta = match &water {
+            Some(water) => water.columns.clone(),
+            None => self.spatial_momenta(&kinematics, None),
+        };
+        let report =
+            (water.as_ref()).map_or_else(Default::default, |w| w.linearised.report().clone());
         Ok(Linearisation {
             evaluation: Evaluation::new(self, parameters, q, kinematics, momenta, report),
-            water,
+            water: water.map_or_else(OnceLock::new, OnceLock::from),
+        })
+    }
+
+    fn water(&self, kinematics: &Kinematics) -> Result<Water<'_>> {
+        let basis = self.basis(kinematics);
+        let linearised = (self.differentiable()?).linearise(&basis.poses, &basis.twists)?;
+        Ok(Water {
+            columns: self.spatial_momenta(kinematics, Some(linearised.momenta())),
+            linearised,
         })
     }
 
@@ -117,15 +123,8 @@ impl<'a> Linearisation<'a> {
     pub(super) fn water(&self) -> Result<Option<&Water<'a>>> {
         let system = self.system;
         if self.water.get().is_none() && system.coupling.bodies() > 0 {
-            let basis = system.basis(&self.kinematics);
-            let coupling = system.differentiable()?;
-            let linearised = coupling.linearise(&basis.poses, &basis.twists)?;
-            let columns = system.spatial_momenta(&self.kinematics, Some(linearised.momenta()));
             // Another thread's is the same.
-            let _ = self.water.set(Water {
-                linearised,
-                columns,
-            });
+            let _ = self.water.set(system.water(&self.kinematics)?);
         }
         Ok(self.water.get())
     }

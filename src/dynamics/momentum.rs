@@ -15,24 +15,27 @@ impl Evaluation<'_> {
 
     /// The same in frame coordinates, X⁻ᵀ p.
     pub fn frame_momentum(&self, v: &DVector<f64>) -> DVector<f64> {
-        let p = self.momentum(v);
-        self.system
-            .tree
-            .per_joint(&self.q, &p, |j, q, p| j.frame_momentum(q, p))
+        self.frame_dual(&self.momentum(v))
+    }
+
+    /// X⁻ᵀ p: momenta or forces of joints in frame coordinates.
+    pub(super) fn frame_dual(&self, p: &DVector<f64>) -> DVector<f64> {
+        (self.system.tree).per_joint(&self.q, p, |j, q, p| j.frame_momentum(q, p))
     }
 
     /// p = Xᵀ p̂.
     pub fn user_momentum(&self, hat: &DVector<f64>) -> DVector<f64> {
-        self.system
-            .tree
-            .per_joint(&self.q, hat, |j, q, p| j.frame_momentum_transpose(q, p))
+        (self.system.tree).per_joint(&self.q, hat, |j, q, p| j.frame_momentum_transpose(q, p))
     }
 
     /// X w.
     pub fn frame_velocity(&self, w: &DVector<f64>) -> DVector<f64> {
-        self.system
-            .tree
-            .per_joint(&self.q, w, |j, q, w| j.frame_velocity(q, w))
+        (self.system.tree).per_joint(&self.q, w, |j, q, w| j.frame_velocity(q, w))
+    }
+
+    /// X⁻¹ w.
+    pub(super) fn frame_velocity_inverse(&self, w: &DVector<f64>) -> DVector<f64> {
+        (self.system.tree).per_joint(&self.q, w, |j, q, w| j.frame_velocity_inverse(q, w))
     }
 }
 
@@ -83,10 +86,7 @@ impl Linearisation<'_> {
                 (water.momenta(&direction), water.momenta(&virtual_direction));
             let pair = water.linearised.gradient(&virtual_direction, &direction)?;
             let pair = self.from_submerged(&pair);
-            for b in 0..self.system.len() {
-                if self.system.bodies[b].submerged.is_none() {
-                    continue;
-                }
+            for (b, _) in self.system.submerged() {
                 let relative = fields.twist[b] - current;
                 let virt = &fields.virtual_twist[b];
                 *out.parameters.density_mut() += virt.dot(&momenta[b]);

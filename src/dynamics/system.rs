@@ -54,6 +54,12 @@ impl System {
         self.bodies.is_empty()
     }
 
+    /// The bodies in the water, each with its number among those that the coupling knows.
+    pub fn submerged(&self) -> impl Iterator<Item = (usize, usize)> {
+        let each = self.bodies.iter().enumerate();
+        each.filter_map(|(b, body)| Some((b, body.submerged?)))
+    }
+
     /// Whether the water moves past bodies at rest.
     pub fn has_current(&self) -> bool {
         self.current != Vec3::zeros()

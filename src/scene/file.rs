@@ -7,8 +7,8 @@ use std::io;
 use std::path::{Path, PathBuf};
 
 use serde_path_to_error::Segment;
-use toml::Spanned;
 use toml::de::{DeTable, DeValue};
+use toml::{Spanned, Value};
 
 use super::problem::{Problem, Reader};
 use super::{Scene, Shape};
@@ -130,7 +130,7 @@ fn parse(text: &str, folder: &Path) -> std::result::Result<Scene, String> {
         let here = line(e.span().map_or(0, |s| s.start));
         format!("line {here}: {}; this is not TOML yet", e.message())
     };
-    let values: toml::Table = toml::from_str(text).map_err(broken)?;
+    let values = toml::from_str(text).map(Value::Table).map_err(broken)?;
     let mut scene = read(values.clone()).map_err(|(path, problem)| match DeTable::parse(text) {
         Ok(document) => explain(document.get_ref(), &values, path, &problem, line),
         Err(error) => broken(error),
@@ -151,8 +151,8 @@ enum Step {
 }
 
 /// The scene of these values, or where they don't fit and why.
-fn read(values: toml::Table) -> std::result::Result<Scene, (Vec<Step>, Problem)> {
-    let read = serde_path_to_error::deserialize(Reader(toml::Value::Table(values)));
+fn read(values: Value) -> std::result::Result<Scene, (Vec<Step>, Problem)> {
+    let read = serde_path_to_error::deserialize(Reader(values));
     read.map_err(|e: serde_path_to_error::Error<Problem>| {
         let step = |segment: &Segment| match segment {
             Segment::Map { key } => Some(Step::Key(key.clone())),
@@ -167,7 +167,7 @@ fn read(values: toml::Table) -> std::result::Result<Scene, (Vec<Step>, Problem)>
 /// Line, place, problem and remedy of values that don't fit.
 fn explain(
     document: &DeTable<'_>,
-    values: &toml::Table,
+    values: &Value,
     mut path: Vec<Step>,
     problem: &Problem,
     line: impl Fn(usize) -> usize,
@@ -220,7 +220,7 @@ fn explain(
 }
 
 fn kind(table: &toml::Table) -> Option<&str> {
-    table.get("kind").and_then(toml::Value::as_str)
+    table.get("kind").and_then(Value::as_str)
 }
 
 /// Number of the line that follows this text's last character, from 1.
@@ -259,37 +259,25 @@ fn start(document: &DeTable<'_>, path: &[Step]) -> usize {
     at
 }
 
-fn table_at<'a>(root: &'a toml::Table, path: &[Step]) -> Option<&'a toml::Table> {
-    let Some((Step::Key(first), rest)) = path.split_first() else {
-        return Some(root);
+fn table_at<'a>(root: &'a Value, path: &[Step]) -> Option<&'a toml::Table> {
+    let into = |value: &'a Value, step: &Step| match step {
+        Step::Key(key) => value.get(key),
+        Step::Index(i) => value.get(*i),
     };
-    let mut value = root.get(first)?;
-    for step in rest {
-        value = match step {
-            Step::Key(key) => value.get(key.as_str())?,
-            Step::Index(i) => value.get(*i)?,
-        };
-    }
-    value.as_table()
+    path.iter().try_fold(root, into)?.as_table()
 }
 
-fn table_at_mut<'a>(root: &'a mut toml::Table, path: &[Step]) -> Option<&'a mut toml::Table> {
-    let Some((Step::Key(first), rest)) = path.split_first() else {
-        return Some(root);
+fn table_at_mut<'a>(root: &'a mut Value, path: &[Step]) -> Option<&'a mut toml::Table> {
+    let into = |value: &'a mut Value, step: &Step| match step {
+        Step::Key(key) => value.get_mut(key),
+        Step::Index(i) => value.get_mut(*i),
     };
-    let mut value = root.get_mut(first)?;
-    for step in rest {
-        value = match step {
-            Step::Key(key) => value.get_mut(key.as_str())?,
-            Step::Index(i) => value.get_mut(*i)?,
-        };
-    }
-    value.as_table_mut()
+    path.iter().try_fold(root, into)?.as_table_mut()
 }
 
 /// The problem with the table at this path changed.
 fn problem_with(
-    values: &toml::Table,
+    values: &Value,
     path: &[Step],
     change: impl FnOnce(&mut toml::Table),
 ) -> Option<Problem> {
@@ -300,7 +288,7 @@ fn problem_with(
 
 /// The key of this table whose value can't be read: the one without which the problem changes.
 fn culprit(
-    values: &toml::Table,
+    values: &Value,
     path: &[Step],
     table: &toml::Table,
     problem: &Problem,
@@ -315,7 +303,7 @@ fn culprit(
 }
 
 /// The kinds that this table could have, from the problem with one that can't be.
-fn kinds(values: &toml::Table, path: &[Step]) -> String {
+fn kinds(values: &Value, path: &[Step]) -> String {
     let wrong = |t: &mut toml::Table| drop(t.insert("kind".into(), "?".into()));
     match problem_with(values, path, wrong) {
         Some(Problem::UnknownChoice { known, .. }) => format!(", one of {}", known.join(", ")),
@@ -324,7 +312,7 @@ fn kinds(values: &toml::Table, path: &[Step]) -> String {
 }
 
 /// `body "coin": shape.radius` or `fluid.density`.
-fn place(path: &[Step], values: &toml::Table) -> String {
+fn place(path: &[Step], values: &Value) -> String {
     let (head, rest) = match path {
         [Step::Key(bodies), Step::Index(i), rest @ ..] if bodies == "bodies" => {
             let body = values.get("bodies").and_then(|b| b.get(*i));

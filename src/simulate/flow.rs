@@ -1,7 +1,7 @@
 //! The water's velocity around the bodies.
 
 use super::{Rollout, Sample, Simulator};
-use crate::adjoint::lie::{Pose, Vec3, six};
+use crate::adjoint::lie::{Pose, Vec3, Vec6, six};
 use crate::geometry::Other;
 use crate::{Error, Result};
 use nalgebra::DVector;
@@ -35,14 +35,9 @@ impl Simulator {
         }
         let still = six(&system.current, &Vec3::zeros());
         let twists = system.tree.twists(&kinematics, v);
-        let submerged = |b: &usize| system.bodies[*b].submerged.is_some();
-        let seen: Vec<usize> = (0..system.len()).filter(submerged).collect();
-        let poses: Vec<Pose> = seen.iter().map(|b| kinematics.poses[*b]).collect();
-        let mut through = DVector::zeros(6 * seen.len());
-        for (i, b) in seen.iter().enumerate() {
-            let twist = kinematics.poses[*b].twist_to_body(&(twists[*b] - still));
-            through.fixed_rows_mut::<6>(6 * i).copy_from(&twist);
-        }
+        let through: Vec<Vec6> = twists.iter().map(|t| t - still).collect();
+        let through = system.submerged_twists(&kinematics, &through);
+        let poses: Vec<Pose> = (system.submerged().map(|(b, _)| kinematics.poses[b])).collect();
         let made = system.coupling.velocity(&poses, &through, points)?;
         Ok(made.into_iter().map(|u| u + system.current).collect())
     }

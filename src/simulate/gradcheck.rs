@@ -3,7 +3,6 @@
 use super::{Controls, Cotangents, Rollout, Sample, Simulator};
 use crate::adjoint::lie::Vec3;
 use crate::adjoint::sample::Samples;
-use crate::dynamics::Drive;
 use crate::{Error, Result};
 use nalgebra::{DMatrix, DVector};
 use serde::Serialize;
@@ -267,6 +266,7 @@ pub fn gradcheck_with(
     let probe = Probe::new(simulator, &scale, steps, &mut vector);
     let gradient = rollout.vjp(&probe.cotangents(&rollout))?;
     let size = probe.total(rollout.samples(), f64::abs);
+    let split = simulator.stepper().split_at(&rollout.states()[0]);
     drop(rollout);
 
     let step_sizes = vec![1e-2, 1e-3, 1e-4, 1e-5];
@@ -304,17 +304,8 @@ pub fn gradcheck_with(
             vector(nv).component_mul(&scale.displacement) * 0.1,
             vector(nv).component_mul(&scale.velocity) * 0.3,
         );
-        let system = simulator.system();
-        for (drive, link) in system.drives.iter().zip(system.tree.links()) {
-            for i in link.v.clone() {
-                if *drive != Drive::Free {
-                    dv[i] = 0.0;
-                }
-                if matches!(drive, Drive::Motion(_)) {
-                    dq[i] = 0.0;
-                }
-            }
-        }
+        split.forget_moved(&mut dq);
+        split.forget_driven(&mut dv);
         let adjoint = gradient.initial.q.dot(&dq) + gradient.initial.v.dot(&dv);
         if nv > 0 {
             add("initial", adjoint, &mut |h| {

@@ -14,7 +14,7 @@
 use super::gradcheck::unit_displacements;
 use super::trajectory::{ControlledStep, Seed, Trajectory};
 use super::{Controls, Sample, Simulator};
-use crate::dynamics::{Drive, Linearisation, State, StateBar, StepBar};
+use crate::dynamics::{Linearisation, State, StateBar, StepBar};
 use crate::{Error, Result};
 use nalgebra::{DMatrix, DVector};
 use rayon::prelude::*;
@@ -151,37 +151,16 @@ fn largest(a: &DMatrix<f64>) -> f64 {
 }
 
 /// A matrix from its rows, which are found side by side.
-fn rows(
-    n: usize,
-    row: impl Fn(&DVector<f64>, &DVector<f64>) -> Result<(DVector<f64>, DVector<f64>)> + Sync,
-) -> Result<DMatrix<f64>> {
-    let found: Result<Vec<_>> = (0..2 * n)
-        .into_par_iter()
-        .map(|i| {
-            let mut unit = [DVector::zeros(n), DVector::zeros(n)];
-            unit[i / n][i % n] = 1.0;
-            row(&unit[0], &unit[1])
-        })
-        .collect();
-    let mut out = DMatrix::zeros(2 * n, 2 * n);
-    for (i, (q, y)) in found?.iter().enumerate() {
-        out.view_mut((i, 0), (1, n)).copy_from(&q.transpose());
-        out.view_mut((i, n), (1, n)).copy_from(&y.transpose());
-    }
-    Ok(out)
+fn rows(n: usize, row: impl Fn(StateBar) -> Result<StateBar> + Sync) -> Result<DMatrix<f64>> {
+    let each = (0..2 * n).into_par_iter();
+    let found: Result<Vec<_>> = each.map(|i| row(StateBar::unit(n, i))).collect();
+    Ok(StateBar::stacked(n, &found?))
 }
 
 /// B: rows are cotangents of the state before the step.
 fn through(step: &ControlledStep, nv: usize) -> Result<DMatrix<f64>> {
     let zero = Seed::zeros(nv);
-    rows(nv, |q, y| {
-        let next_bar = StateBar {
-            q: q.clone(),
-            y: y.clone(),
-        };
-        let (bar, _) = step.vjp(&next_bar, &zero)?;
-        Ok((bar.q, bar.y))
-    })
+    rows(nv, |next_bar| Ok(step.vjp(&next_bar, &zero)?.0))
 }
 
 /// T: what (q, v) are in (q, y).
@@ -191,10 +170,11 @@ fn to_velocity(
     state: &State,
     sample: &Sample,
 ) -> Result<DMatrix<f64>> {
-    rows(state.y.len(), |q, v| {
+    rows(state.y.len(), |StateBar { q, y: v }| {
         let mut bar = StepBar::zeros(e);
-        t.stepper.velocity_vjp(e, state, &sample.v, v, &mut bar)?;
-        Ok((bar.state.q + q, bar.state.y))
+        t.stepper.velocity_vjp(e, state, &sample.v, &v, &mut bar)?;
+        bar.state.q += q;
+        Ok(bar.state)
     })
 }
 
@@ -205,41 +185,15 @@ fn from_velocity(
     state: &State,
     sample: &Sample,
 ) -> Result<DMatrix<f64>> {
-    let given = given(t, state);
-    rows(state.y.len(), |q, y| {
+    // What no change of the state can move.
+    let split = t.stepper.split_at(state);
+    rows(state.y.len(), |StateBar { q, mut y }| {
         let mut bar = StepBar::zeros(e);
-        let y = DVector::from_fn(y.len(), |i, _| if given[i].velocity { 0.0 } else { y[i] });
+        split.forget_driven(&mut y);
         t.stepper.conserved_vjp(e, &sample.v, &y, &mut bar)?;
         let (mut q, mut v) = (bar.state.q + q, bar.v);
-        for (i, given) in given.iter().enumerate() {
-            if given.coordinate {
-                q[i] = 0.0;
-            }
-            if given.velocity {
-                v[i] = 0.0;
-            }
-        }
-        Ok((q, v))
+        split.forget_moved(&mut q);
+        split.forget_driven(&mut v);
+        Ok(StateBar { q, y: v })
     })
-}
-
-/// What of a joint's coordinate no change of the state can move.
-#[derive(Clone, Copy)]
-struct Given {
-    coordinate: bool,
-    velocity: bool,
-}
-
-fn given(t: &Trajectory, state: &State) -> Vec<Given> {
-    let system = t.stepper.system;
-    let mut out = Vec::with_capacity(state.y.len());
-    for (b, (drive, link)) in system.drives.iter().zip(system.tree.links()).enumerate() {
-        let held = state.held.get(b).copied().unwrap_or(false);
-        let given = Given {
-            coordinate: matches!(drive, Drive::Motion(_)),
-            velocity: held || *drive != Drive::Free,
-        };
-        out.extend(link.v.clone().map(|_| given));
-    }
-    out
 }

@@ -4,7 +4,7 @@ use super::Rollout;
 use super::trajectory::Seed;
 use crate::Result;
 use crate::dynamics::{Linearisation, StateBar, StepBar};
-use nalgebra::{DMatrix, DVector};
+use nalgebra::DMatrix;
 use rayon::prelude::*;
 
 /// Derivatives of the last state x_N of a rollout, x = (q, v) with the coordinates in their tangent space.
@@ -54,9 +54,10 @@ impl Rollout {
                 trajectory
                     .stepper
                     .conserved_vjp(e, &self.initial_velocity, &row.y, &mut bar)?;
-                Ok((bar.state.q, bar.v))
+                let StateBar { q, .. } = bar.state;
+                Ok(StateBar { q, y: bar.v })
             });
-            each.collect::<Result<Vec<(DVector<f64>, DVector<f64>)>>>()
+            each.collect::<Result<Vec<StateBar>>>()
         };
         let mut found = None;
         for (n, record) in self.tape.records().iter().enumerate().rev() {
@@ -78,11 +79,7 @@ impl Rollout {
             Some(found) => found,
             None => begin(&end, &rows)?,
         };
-        let mut state = DMatrix::zeros(2 * nv, 2 * nv);
-        for (i, (q, v)) in found.iter().enumerate() {
-            state.view_mut((i, 0), (1, nv)).copy_from(&q.transpose());
-            state.view_mut((i, nv), (1, nv)).copy_from(&v.transpose());
-        }
+        let state = StateBar::stacked(nv, &found);
         Ok(Jacobians { state, controls })
     }
 }

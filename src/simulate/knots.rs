@@ -76,6 +76,18 @@ impl Knots {
         ))
     }
 
+    fn check_shape(&self, what: &str, controls: &DMatrix<f64>) -> Result<()> {
+        let right = (self.limits.len(), self.steps);
+        if controls.shape() == right {
+            return Ok(());
+        }
+        Err(Error::input(
+            what,
+            format!("{:?}", controls.shape()),
+            format!("must have the shape {right:?}"),
+        ))
+    }
+
     /// The controls of x.
     ///
     /// # Errors
@@ -100,13 +112,7 @@ impl Knots {
     pub fn controls_vjp(&self, x: &[f64], controls_bar: &DMatrix<f64>) -> Result<Vec<f64>> {
         self.check(x)?;
         let m = self.limits.len();
-        if controls_bar.shape() != (m, self.steps) {
-            return Err(Error::input(
-                "knots: cotangent of the controls",
-                format!("{:?}", controls_bar.shape()),
-                format!("must have the shape {:?}", (m, self.steps)),
-            ));
-        }
+        self.check_shape("knots: cotangent of the controls", controls_bar)?;
         let mut bar = vec![0.0; x.len()];
         for n in 0..self.steps {
             let (k, part) = self.place(n);
@@ -127,13 +133,7 @@ impl Knots {
     /// Controls of another shape.
     pub fn through(&self, controls: &Controls) -> Result<Vec<f64>> {
         let m = self.limits.len();
-        if controls.matrix().shape() != (m, self.steps) {
-            return Err(Error::input(
-                "knots: controls",
-                format!("{:?}", controls.matrix().shape()),
-                format!("must have the shape {:?}", (m, self.steps)),
-            ));
-        }
+        self.check_shape("knots: controls", controls.matrix())?;
         let last = (self.steps - 1) as f64 / (self.knots - 1) as f64;
         Ok((0..self.len())
             .map(|i| {

@@ -69,14 +69,16 @@ impl Rollout {
 
     /// Coordinates, nq × (N + 1).
     pub fn q(&self) -> DMatrix<f64> {
-        let columns: Vec<_> = self.samples().iter().map(|s| s.q.clone()).collect();
-        DMatrix::from_columns(&columns)
+        self.columns(|s| s.q.clone())
     }
 
     /// Generalised velocities, nv × (N + 1).
     pub fn v(&self) -> DMatrix<f64> {
-        let columns: Vec<_> = self.samples().iter().map(|s| s.v.clone()).collect();
-        DMatrix::from_columns(&columns)
+        self.columns(|s| s.v.clone())
+    }
+
+    fn columns(&self, of: impl Fn(&Sample) -> DVector<f64>) -> DMatrix<f64> {
+        DMatrix::from_columns(&self.samples().iter().map(of).collect::<Vec<_>>())
     }
 
     /// Velocities of the bodies at states 0 … N, 6·bodies × (N + 1), world axes: a body's rows are the velocity of its

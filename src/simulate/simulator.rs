@@ -20,7 +20,6 @@ pub struct Simulator {
     pub(super) scene: Arc<Scene>,
     pub(super) assembled: Arc<Assembled>,
     choices: Choices,
-    steps: usize,
 }
 
 /// Added mass of all bodies in the water at one configuration.
@@ -65,7 +64,6 @@ impl Simulator {
             scene: Arc::new(scene.clone()),
             assembled: Arc::new(assembled),
             choices,
-            steps: scene.steps,
         };
         out.initial()?;
         Ok(out)
@@ -98,7 +96,7 @@ impl Simulator {
 
     /// Steps that the scene asks for.
     pub fn steps(&self) -> usize {
-        self.steps
+        self.scene.steps
     }
 
     /// Number of faces of all bodies in the water.
@@ -182,11 +180,8 @@ impl Simulator {
 
     /// Names of the bodies.
     pub fn names(&self) -> Vec<String> {
-        self.system()
-            .bodies
-            .iter()
-            .map(|b| b.name.clone())
-            .collect()
+        let bodies = self.system().bodies.iter();
+        bodies.map(|b| b.name.clone()).collect()
     }
 
     /// Initial coordinates and velocity.
@@ -217,14 +212,11 @@ impl Simulator {
             }
         }
         for (body, link) in self.system().bodies.iter().zip(tree.links()) {
-            let from = link.q.end.saturating_sub(4);
-            let turn = link.q.len() >= 4;
-            let norm = q.as_slice()[from..link.q.end]
-                .iter()
-                .map(|x| x * x)
-                .sum::<f64>()
-                .sqrt();
-            if turn && (norm - 1.0).abs() > 1e-6 {
+            let Some(w) = link.joint.quaternion_at() else {
+                continue;
+            };
+            let norm = link.of_q(q)[w..].iter().map(|x| x * x).sum::<f64>().sqrt();
+            if (norm - 1.0).abs() > 1e-6 {
                 return Err(Error::input(
                     format!(
                         "initial q of body \"{}\": quaternion (w, x, y, z)",
@@ -320,15 +312,14 @@ impl Simulator {
     /// Whatever the coupling reports.
     pub fn added_mass(&self) -> Result<AddedMass> {
         let system = self.system();
-        let (submerged, poses) = self.in_water();
+        let kinematics = system.tree.kinematics(&self.assembled.q);
+        let in_water = || system.submerged().map(|(b, _)| b);
+        let poses: Vec<Pose> = in_water().map(|b| kinematics.poses[b]).collect();
         let turn = world_axes(&poses);
         let record = system.coupling.evaluate(&poses, &turn)?;
         let m = turn.tr_mul(record.momenta()) * self.parameters().density();
         Ok(AddedMass {
-            bodies: submerged
-                .iter()
-                .map(|b| system.bodies[*b].name.clone())
-                .collect(),
+            bodies: in_water().map(|b| system.bodies[b].name.clone()).collect(),
             matrix: 0.5 * (&m + m.transpose()),
             report: record.report().clone(),
         })
@@ -363,15 +354,5 @@ impl Simulator {
     pub fn meshes(&self) -> Result<Vec<Option<TriMesh>>> {
         let surfaces = surfaces(&self.scene, &self.choices.water)?.into_iter();
         Ok(surfaces.map(|s| s.map(|s| s.mesh)).collect())
-    }
-
-    /// The bodies in the water, by their numbers in the scene, and their poses at the start.
-    fn in_water(&self) -> (Vec<usize>, Vec<Pose>) {
-        let system = self.system();
-        let kinematics = system.tree.kinematics(&self.assembled.q);
-        (0..system.len())
-            .filter(|b| system.bodies[*b].submerged.is_some())
-            .map(|b| (b, kinematics.poses[b]))
-            .unzip()
     }
 }

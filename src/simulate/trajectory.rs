@@ -1,7 +1,7 @@
 //! A rollout as steps with transposes: controller, integrator and observations together.
 
 use super::observable::{Observed, ObservedBars, Transpose};
-use super::{Fidelity, Observation, Policy, Sample, Simulator};
+use super::{Observation, Sample, Simulator};
 use crate::adjoint::lie::Vec6;
 use crate::adjoint::step::Step;
 use crate::dynamics::{
@@ -10,16 +10,13 @@ use crate::dynamics::{
 };
 use crate::geometry::Gap;
 use crate::multibody::{Cotangents, Virtual};
-use crate::water::Clearance;
 use crate::{Error, Result};
 use nalgebra::{DMatrix, DVector};
 
 /// Everything that a rollout's steps need.
 pub(super) struct Trajectory<'a> {
     pub stepper: Stepper<'a>,
-    pub policy: &'a dyn Policy,
-    pub clearance: &'a Clearance,
-    pub fidelity: Fidelity,
+    pub simulator: &'a Simulator,
     pub controls: &'a DMatrix<f64>,
 }
 
@@ -43,9 +40,7 @@ impl Simulator {
     pub(super) fn trajectory<'a>(&'a self, controls: &'a DMatrix<f64>) -> Trajectory<'a> {
         Trajectory {
             stepper: self.stepper(),
-            policy: self.policy(),
-            clearance: self.clearance(),
-            fidelity: self.felt(),
+            simulator: self,
             controls,
         }
     }
@@ -54,12 +49,11 @@ impl Simulator {
 impl<'a> Trajectory<'a> {
     /// The smallest gap at a state, whose bodies must keep apart; not asked for where it has no effect.
     fn gap(&self, state: &State) -> Result<Option<Gap>> {
-        let system = self.stepper.system;
-        if !self.fidelity.coupled() {
+        if !self.simulator.felt().coupled() {
             return Ok(None);
         }
-        let poses = system.tree.kinematics(&state.q).poses;
-        self.clearance.keep_apart(&poses)
+        let poses = self.stepper.system.tree.kinematics(&state.q).poses;
+        self.simulator.clearance().keep_apart(&poses)
     }
 
     fn observe(&self, e: &Evaluation, state: &State, gap: Option<Gap>) -> Result<Sample> {
@@ -93,9 +87,8 @@ impl<'a> Trajectory<'a> {
 
     /// What acts during a step, and the controller's next mode.
     fn input(&self, index: usize, state: &State, sample: &Sample) -> Result<(Input, usize)> {
-        let action = self
-            .policy
-            .act(&observation(state, &sample.v, sample.time))?;
+        let seen = observation(state, &sample.v, sample.time);
+        let action = self.simulator.policy().act(&seen)?;
         let mode = action.mode;
         expect_length("hold", action.hold.len(), self.stepper.system.len(), "body")?;
         let mut control = self.controls.column(index).into_owned();
@@ -187,14 +180,7 @@ impl<'a> ControlledStep<'_, 'a> {
             let e = self.step.linearisation();
             self.trajectory
                 .observe_vjp(e, record.state(), record.velocity(), seed, &mut bar)?;
-            Ok((
-                bar.state,
-                Partial {
-                    control: bar.control,
-                    parameters: bar.parameters,
-                    gains,
-                },
-            ))
+            Ok(parted(bar, gains))
         };
         run().map_err(|e: Error| e.at_time(self.trajectory.stepper.time(record.state())))
     }
@@ -205,11 +191,12 @@ impl<'a> ControlledStep<'_, 'a> {
         let mut bar = self.step.vjp(next_bar)?;
         let state = record.state();
         let seen = observation(state, record.velocity(), t.stepper.time(state));
-        let action = t.policy.act_vjp(&seen, &bar.control)?;
+        let policy = t.simulator.policy();
+        let action = policy.act_vjp(&seen, &bar.control)?;
         let velocities = t.stepper.system.tree.velocities();
         expect_length("cotangent of q", action.q.len(), velocities, "velocity")?;
         expect_length("cotangent of v", action.v.len(), velocities, "velocity")?;
-        let gains = t.policy.gains().len();
+        let gains = policy.gains().len();
         expect_length("cotangent of the gains", action.gains.len(), gains, "gain")?;
         if !action.q.is_empty() {
             bar.state.q += DVector::from_vec(action.q);
@@ -269,6 +256,16 @@ fn observables_vjp(
     let (q, more) = tree.reverse(kinematics, v, Virtual::User(&zero), &fields, on);
     bar.state.q += q;
     *v_bar += more;
+}
+
+/// Cotangents of a state, and of all else; that of the velocity has been carried on.
+fn parted(bar: StepBar, gains: Vec<f64>) -> (StateBar, Partial) {
+    let partial = Partial {
+        control: bar.control,
+        parameters: bar.parameters,
+        gains,
+    };
+    (bar.state, partial)
 }
 
 /// What the controller sees at a state.
@@ -347,13 +344,6 @@ impl Step for Trajectory<'_> {
         let e = self.stepper.linearise(&state.q);
         let e = e.map_err(|e| e.at_time(sample.time))?;
         let bar = self.seed_vjp(&e, state, &sample.v, seed)?;
-        Ok((
-            bar.state,
-            Partial {
-                control: DVector::zeros(0),
-                parameters: bar.parameters,
-                gains: Vec::new(),
-            },
-        ))
+        Ok(parted(bar, Vec::new()))
     }
 }

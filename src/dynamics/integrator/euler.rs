@@ -58,8 +58,7 @@ fn stage_matrix(
         let mut target = m.column_mut(k);
         target -= rule.h * column;
         if rule.reach != 0.0 {
-            let mut unit = DVector::zeros(v.len());
-            unit[k] = 1.0;
+            let unit = DVector::from_fn(v.len(), |i, _| f64::from(i == k));
             let [_, along, _] = tree.chart_momentum_vjp(&e.q, &xi, reached, &unit);
             let mut target = m.row_mut(k);
             target -= rule.reach * along.transpose();

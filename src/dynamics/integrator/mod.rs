@@ -28,7 +28,7 @@ pub use record::{LinearisedStep, StepJacobians, StepRecord};
 
 use super::{Drive, Evaluation, ForceCotangents, Linearisation, Parameters, System};
 use crate::Result;
-use nalgebra::DVector;
+use nalgebra::{DMatrix, DVector};
 
 choices! {
     /// How time is stepped. The default is the cheapest that keeps the energy error of every example scene under 1 %
@@ -110,6 +110,14 @@ impl StateBar {
             q: entry(0),
             y: entry(nv),
         }
+    }
+
+    /// Such cotangents as rows of a matrix.
+    pub(crate) fn stacked(nv: usize, rows: &[Self]) -> DMatrix<f64> {
+        DMatrix::from_fn(rows.len(), 2 * nv, |i, j| match j < nv {
+            true => rows[i].q[j],
+            false => rows[i].y[j - nv],
+        })
     }
 }
 

@@ -92,11 +92,7 @@ impl Stepper<'_> {
     /// # Errors
     /// A mass matrix that isn't positive definite.
     pub fn velocity_of_momentum(&self, e: &Evaluation, p: &DVector<f64>) -> Result<DVector<f64>> {
-        let hat = e
-            .system
-            .tree
-            .per_joint(&e.q, p, |j, q, p| j.frame_momentum(q, p));
-        solve(e, &self.split(&[], When::At(0.0)), &hat)
+        solve(e, &self.split(&[], When::At(0.0)), &e.frame_dual(p))
     }
 
     /// The conserved variable y that belongs to velocity `v` at `e`.
@@ -124,10 +120,7 @@ impl Stepper<'_> {
             bar.v += y_bar;
             return Ok(());
         }
-        let w = e
-            .system
-            .tree
-            .per_joint(&e.q, y_bar, |j, q, z| j.frame_velocity_inverse(q, z));
+        let w = e.frame_velocity_inverse(y_bar);
         let m = e.momentum_vjp(v, &w)?;
         bar.v += &m.v;
         bar.add(1.0, &m);

@@ -216,19 +216,15 @@ impl<'a> LinearisedStep<'_, 'a> {
     /// As there.
     pub fn jacobians(&self) -> Result<StepJacobians> {
         let nv = self.record.v.len();
-        let bars: Result<Vec<StepBar>> = (0..2 * nv)
-            .into_par_iter()
-            .map(|row| self.state_vjp(&StateBar::unit(nv, row)))
-            .collect();
-        let bars = bars?;
+        let rows = (0..2 * nv).into_par_iter();
+        let bars = rows.map(|row| self.state_vjp(&StateBar::unit(nv, row)));
+        let bars = bars.collect::<Result<Vec<StepBar>>>()?;
+        let control = |i: usize, j: usize| bars[i].control[j];
+        let control = DMatrix::from_fn(2 * nv, self.record.input.control.len(), control);
+        let states: Vec<StateBar> = bars.into_iter().map(|bar| bar.state).collect();
         Ok(StepJacobians {
-            state: DMatrix::from_fn(2 * nv, 2 * nv, |i, j| {
-                let bar = &bars[i].state;
-                if j < nv { bar.q[j] } else { bar.y[j - nv] }
-            }),
-            control: DMatrix::from_fn(2 * nv, self.record.input.control.len(), |i, j| {
-                bars[i].control[j]
-            }),
+            state: StateBar::stacked(nv, &states),
+            control,
         })
     }
 

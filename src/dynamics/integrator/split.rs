@@ -6,7 +6,7 @@ use nalgebra::{DMatrix, DVector};
 
 /// Which velocities are free, and the values of the others.
 #[derive(Clone, Debug)]
-pub(super) struct Split {
+pub(crate) struct Split {
     /// Indices of free velocities.
     pub free: Vec<usize>,
     /// Full-length velocity with driven values set and zeros elsewhere.
@@ -98,7 +98,7 @@ impl Stepper<'_> {
     }
 
     /// Velocities as they are split at a state.
-    pub(super) fn split_at(&self, state: &State) -> Split {
+    pub(crate) fn split_at(&self, state: &State) -> Split {
         self.split(&state.held, When::At(self.time(state)))
     }
 }

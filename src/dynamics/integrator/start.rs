@@ -82,10 +82,7 @@ impl Start<'_, '_> {
                 }
             }
             // p̂ = X⁻ᵀ p(q, v), the gradient of fresh_bar · p̂.
-            let w = e
-                .system
-                .tree
-                .per_joint(&e.q, &fresh_bar, |j, q, z| j.frame_velocity_inverse(q, z));
+            let w = e.frame_velocity_inverse(&fresh_bar);
             let m = e.momentum_vjp(v, &w)?;
             bar.v += &m.v;
             bar.state.q += &m.q - e.frame_velocity_vjp(&w, &e.frame_momentum(v));

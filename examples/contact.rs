@@ -42,7 +42,11 @@ fn gaps() -> Result<()> {
     );
     let scene = ball(1000.0, 3000.0, RADIUS + 0.2);
     let usual = simulator(&scene, Fidelity::Reduced)?;
-    let default = usual.system().contact.as_ref().map_or(0.0, |c| c.gaps[0]);
+    let default = usual
+        .system()
+        .contact
+        .as_ref()
+        .map_or(0.0, |c| c.laws[0].gap);
     for factor in [0.25, 0.5, 1.0, 2.0] {
         let mut scene = scene.clone();
         scene.contact.get_or_insert_default().gap = Some(factor * default);
@@ -152,7 +156,7 @@ fn sliding() -> Result<()> {
             scene.initial.v = vec![2.0, 0.0, 0.0, 0.0, 0.0, 0.0];
             simulator(&scene, Fidelity::Isolated)
         };
-        let gap = (block(0.01)?.system().contact.as_ref()).map_or(0.0, |c| c.gaps[0]);
+        let gap = (block(0.01)?.system().contact.as_ref()).map_or(0.0, |c| c.laws[0].gap);
         // From where it will ride: nearer, it would be thrown up.
         let simulator = block(gap + 0.5 * 2.0 * dt)?;
         let n = (0.05 / dt).round() as usize;

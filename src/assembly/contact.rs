@@ -1,8 +1,9 @@
 //! Contact of a scene: which surfaces may touch, at which gap, and how stiffly.
 
+use crate::adjoint::contact::Law;
 use crate::adjoint::lie::Pose;
 use crate::contact::{ContactPair, ContactShape, Contacts};
-use crate::dynamics::{self, ContactModel, Integrator, Parameters, Regularisation};
+use crate::dynamics::{self, ContactModel, Integrator, Parameters};
 use crate::geometry::Other;
 use crate::scene::{Body, Contact, Scene, Shape};
 use crate::water::{Prepared, Surface, pose};
@@ -17,16 +18,6 @@ const WIDTH: f64 = 0.004;
 const ROOM: f64 = 1.25;
 /// The same where the water isn't solved, of the smallest body's radius: distances are smooth outside a body only.
 const SKIN: f64 = 0.01;
-
-/// What contact is made from.
-pub(super) struct ContactParts<'a> {
-    pub scene: &'a Scene,
-    pub given: &'a Contact,
-    pub time_step: f64,
-    pub water: &'a Prepared,
-    pub surfaces: &'a [Option<Surface>],
-    pub parameters: &'a Parameters,
-}
 
 /// Refuses contact with an integrator that doesn't solve it.
 pub(super) fn check_integrator(scene: &Scene, integrator: Integrator) -> Result<()> {
@@ -44,41 +35,38 @@ pub(super) fn check_integrator(scene: &Scene, integrator: Integrator) -> Result<
     })
 }
 
-pub(super) fn assemble(p: ContactParts) -> Result<(ContactModel, dynamics::ContactParameters)> {
-    let mut shapes = Vec::with_capacity(p.scene.bodies.len());
-    for (body, surface) in p.scene.bodies.iter().zip(p.surfaces) {
+/// Contact as `given`, of bodies with these surfaces, at steps of `dt` s.
+pub(super) fn assemble(
+    scene: &Scene,
+    given: &Contact,
+    dt: f64,
+    water: &Prepared,
+    surfaces: &[Option<Surface>],
+    parameters: &Parameters,
+) -> Result<(ContactModel, dynamics::ContactParameters)> {
+    let mut shapes = Vec::with_capacity(scene.bodies.len());
+    for (body, surface) in scene.bodies.iter().zip(surfaces) {
         shapes.push(match (&body.shape, surface) {
             (Some(shape), Some(surface)) => Some(contact_shape(body, shape, surface)?),
             _ => None,
         });
     }
     let neighbours = |a: usize, b: usize| {
-        p.scene.submerged_parent(a) == Some(b) || p.scene.submerged_parent(b) == Some(a)
+        scene.submerged_parent(a) == Some(b) || scene.submerged_parent(b) == Some(a)
     };
-    let pairs: Vec<ContactPair> = (p.water.clearance.moving.pairs().iter())
+    let pairs: Vec<ContactPair> = (water.clearance.moving.pairs().iter())
         .filter(|(a, other)| !matches!(other, Other::Body(b) if neighbours(*a, *b)))
         .map(|&(first, second)| ContactPair { first, second })
         .collect();
-    let shapes = Contacts::new(shapes, &p.scene.walls, &pairs)?;
-    let moving = |b: &usize| !p.scene.is_static(*b);
-    let bodies = || (0..p.scene.bodies.len()).filter(moving);
+    let shapes = Contacts::new(shapes, &scene.walls, &pairs)?;
+    let moving = |b: &usize| !scene.is_static(*b);
+    let bodies = || (0..scene.bodies.len()).filter(moving);
     let size = bodies()
         .filter_map(|b| shapes.shape(b).map(ContactShape::radius))
         .reduce(f64::min)
         .unwrap_or(1.0);
-    let gaps = (shapes.pairs().iter())
-        .map(|pair| {
-            p.given
-                .gap
-                .unwrap_or((ROOM * resolved(&p, pair)).max(SKIN * size))
-        })
-        .collect();
-    let dt = p.time_step;
-    let heaviest = bodies().map(|b| p.parameters.mass(b)).fold(0.0, f64::max);
-    let stiffness = p
-        .given
-        .stiffness
-        .unwrap_or(STIFFNESS * heaviest / (dt * dt));
+    let heaviest = bodies().map(|b| parameters.mass(b)).fold(0.0, f64::max);
+    let stiffness = (given.stiffness).unwrap_or(STIFFNESS * heaviest / (dt * dt));
     if stiffness <= 0.0 {
         return Err(Error::input(
             "contact.stiffness",
@@ -86,22 +74,24 @@ pub(super) fn assemble(p: ContactParts) -> Result<(ContactModel, dynamics::Conta
             "no moving body has mass to take a default from: give a stiffness, N/m",
         ));
     }
-    let width = p.given.width.unwrap_or(WIDTH * size);
-    let model = ContactModel {
-        shapes,
-        gaps,
-        regularisation: Regularisation {
-            stiction_speed: p.given.stiction_speed,
-            width,
-            horizon: dt,
-        },
-    };
-    let parameters = dynamics::ContactParameters {
+    let width = given.width.unwrap_or(WIDTH * size);
+    let gap = |pair: &ContactPair| (ROOM * resolved(water, surfaces, pair)).max(SKIN * size);
+    let law = |pair: &ContactPair| Law {
         stiffness,
-        dissipation: p.given.dissipation,
-        friction: p.given.friction,
+        dissipation: given.dissipation,
+        friction: given.friction,
+        stiction_speed: given.stiction_speed,
+        gap: given.gap.unwrap_or_else(|| gap(pair)),
+        width,
+        horizon: dt,
     };
-    Ok((model, parameters))
+    let laws = shapes.pairs().iter().map(law).collect();
+    let found = dynamics::ContactParameters {
+        stiffness,
+        dissipation: given.dissipation,
+        friction: given.friction,
+    };
+    Ok((ContactModel { shapes, laws }, found))
 }
 
 /// Shape of a body: by its formula, or a mesh that is convex.
@@ -119,10 +109,10 @@ fn contact_shape(body: &Body, shape: &Shape, surface: &Surface) -> Result<Contac
 }
 
 /// The gap that the coupling resolves between a pair, m.
-fn resolved(p: &ContactParts, pair: &ContactPair) -> f64 {
+fn resolved(water: &Prepared, surfaces: &[Option<Surface>], pair: &ContactPair) -> f64 {
     let of = |b: usize| {
-        let edge = p.surfaces[b].as_ref().map_or(0.0, Surface::mean_edge);
-        (p.water.fidelity.kind()).resolved_gap(p.water.resolved[b], edge)
+        let edge = surfaces[b].as_ref().map_or(0.0, Surface::mean_edge);
+        (water.fidelity.kind()).resolved_gap(water.resolved[b], edge)
     };
     match pair.second {
         Other::Body(b) => of(pair.first).max(of(b)),

@@ -143,7 +143,11 @@ pub(crate) fn assemble(
         limits: Vec::new(),
         tree,
     };
-    let q = start_coordinates(scene, choices, &system, &parameters);
+    let mut q = match scene.initial.q.is_empty() {
+        true => system.tree.origin(),
+        false => DVector::from_vec(scene.initial.q.clone()),
+    };
+    stepper(choices, &system, &parameters).place_motions(&mut q, 0.0);
     let poses = system.tree.kinematics(&q).poses;
     if choices.water.fidelity.coupled() && scene.fluid.density > 0.0 {
         clearance.refuse_start(&poses)?;
@@ -151,14 +155,7 @@ pub(crate) fn assemble(
     let water = water::prepare(scene, &choices.water, in_water, &poses, clearance, folder)?;
     system.coupling = water.coupling.clone();
     if let Some(given) = &scene.contact {
-        let made = contact::assemble(contact::ContactParts {
-            scene,
-            given,
-            time_step: dt,
-            water: &water,
-            surfaces: &surfaces,
-            parameters: &parameters,
-        })?;
+        let made = contact::assemble(scene, given, dt, &water, &surfaces, &parameters)?;
         system.contact = Some(made.0);
         parameters.add_contact(made.1);
     }
@@ -172,22 +169,6 @@ pub(crate) fn assemble(
         v,
         water,
     })
-}
-
-/// Initial coordinates.
-fn start_coordinates(
-    scene: &Scene,
-    choices: &Choices,
-    system: &System,
-    parameters: &Parameters,
-) -> DVector<f64> {
-    let mut q = if scene.initial.q.is_empty() {
-        system.tree.origin()
-    } else {
-        DVector::from_vec(scene.initial.q.clone())
-    };
-    stepper(choices, system, parameters).place_motions(&mut q, 0.0);
-    q
 }
 
 fn stepper<'a>(choices: &Choices, system: &'a System, parameters: &'a Parameters) -> Stepper<'a> {

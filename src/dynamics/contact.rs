@@ -6,26 +6,13 @@ use crate::adjoint::lie::{Vec3, Vec6, point_velocity, point_wrench, six};
 use crate::contact::{ContactPoint, Contacts};
 use serde::Serialize;
 
-/// Constants of all contacts that no trajectory is differentiated with respect to.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Regularisation {
-    /// Speed below which friction holds with creep, m/s.
-    pub stiction_speed: f64,
-    /// Half the width over which the force sets in, m.
-    pub width: f64,
-    /// How far ahead the gap is foreseen, s: to the end of the step.
-    pub horizon: f64,
-}
-
 /// Which surfaces may touch, and how.
 #[derive(Clone)]
 pub struct ContactModel {
     /// Their shapes.
     pub shapes: Contacts,
-    /// Gap at which the surfaces of a pair are taken to touch, m, in the order of [`Contacts::pairs`].
-    pub gaps: Vec<f64>,
-    /// What smooths the law.
-    pub regularisation: Regularisation,
+    /// Law of each pair, in the order of [`Contacts::pairs`]; stiffness, dissipation and friction are parameters and stand there.
+    pub laws: Vec<Law>,
 }
 
 /// A place where two surfaces are near at a configuration.
@@ -48,10 +35,7 @@ impl ContactModel {
             stiffness: contact.stiffness,
             dissipation: contact.dissipation,
             friction: contact.friction,
-            stiction_speed: self.regularisation.stiction_speed,
-            gap: self.gaps[pair],
-            width: self.regularisation.width,
-            horizon: self.regularisation.horizon,
+            ..self.laws[pair]
         }
     }
 }

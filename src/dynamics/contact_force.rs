@@ -46,9 +46,6 @@ impl System {
     }
 
     /// All places where surfaces are near.
-    ///
-    /// # Errors
-    /// A signed distance that can't be found.
     pub(super) fn contact_points(
         &self,
         parameters: &Parameters,

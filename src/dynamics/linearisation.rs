@@ -117,9 +117,6 @@ impl<'a> Linearisation<'a> {
     }
 
     /// The water whose density is a parameter, whether it acts or not; none where no body is in it.
-    ///
-    /// # Errors
-    /// What the coupling reports, at zero density.
     pub(super) fn water(&self) -> Result<Option<&Water<'a>>> {
         let system = self.system;
         if self.water.get().is_none() && system.coupling.bodies() > 0 {

@@ -2,7 +2,6 @@
 
 mod acceleration;
 mod balance;
-mod body;
 mod contact;
 mod contact_force;
 mod evaluation;
@@ -15,8 +14,7 @@ mod parameters;
 mod system;
 
 pub use balance::ForceCotangents;
-pub use body::BodyData;
-pub use contact::{ContactForce, ContactModel, Dual, PairContact, Regularisation};
+pub use contact::{ContactForce, ContactModel, Dual, PairContact};
 pub use evaluation::Evaluation;
 pub use integrator::{
     ContactVelocities, Input, Integrator, LinearisedStep, State, StateBar, StateTangent, StepBar,
@@ -27,4 +25,4 @@ pub use linearisation::Linearisation;
 pub use parameters::{
     ContactParameters, Declarations, Declared, Entry, Owner, Parameter, Parameters, Range, Typical,
 };
-pub use system::{Drive, System};
+pub use system::{BodyData, Drive, System};

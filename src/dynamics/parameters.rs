@@ -414,24 +414,20 @@ impl Parameters {
 
     /// Sizes of changes that say something, in the order of [`Parameters::to_vec`].
     pub fn sizes(&self, speed: f64, length: f64) -> Vec<f64> {
-        let moment = |owner: &Owner| match owner {
-            Owner::Body(b) => self.inertia(*b)[0..3].iter().copied().fold(0.0, f64::max),
-            _ => 0.0,
-        };
         let size = |(entry, value): (&Entry, &f64)| {
+            let moment = match entry.owner {
+                Owner::Body(b) => self.inertia(b)[0..3].iter().copied().fold(0.0, f64::max),
+                _ => 0.0,
+            };
             let typical = Typical {
                 density: self.density(),
                 speed,
                 length,
-                moment: moment(&entry.owner),
+                moment,
             };
             (entry.declared.size)(*value, &typical)
         };
-        self.table
-            .entries
-            .iter()
-            .zip(&self.values)
-            .map(size)
-            .collect()
+        let each = self.table.entries.iter().zip(&self.values);
+        each.map(size).collect()
     }
 }

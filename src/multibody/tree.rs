@@ -36,8 +36,6 @@ impl Link {
 #[derive(Clone, Debug)]
 pub struct Tree {
     links: Vec<Link>,
-    coordinates: usize,
-    velocities: usize,
 }
 
 /// Poses and joint columns at one configuration.
@@ -112,12 +110,11 @@ impl Tree {
     /// # Panics
     /// If a parent doesn't come before its child; scenes are validated before they come here.
     pub fn new(bodies: impl IntoIterator<Item = (Option<usize>, Pose, JointModel)>) -> Self {
-        let (mut nq, mut nv) = (0, 0);
-        let mut links = Vec::new();
+        let mut links: Vec<Link> = Vec::new();
         for (index, (parent, placement, joint)) in bodies.into_iter().enumerate() {
             assert!(parent.is_none_or(|p| p < index), "parents come first");
+            let (nq, nv) = links.last().map_or((0, 0), |l| (l.q.end, l.v.end));
             let (q, v) = (nq..nq + joint.coordinates(), nv..nv + joint.velocities());
-            (nq, nv) = (q.end, v.end);
             links.push(Link {
                 parent,
                 placement,
@@ -126,11 +123,7 @@ impl Tree {
                 v,
             });
         }
-        Self {
-            links,
-            coordinates: nq,
-            velocities: nv,
-        }
+        Self { links }
     }
 
     /// The bodies with their joints.
@@ -140,12 +133,12 @@ impl Tree {
 
     /// Length of q.
     pub fn coordinates(&self) -> usize {
-        self.coordinates
+        self.links.last().map_or(0, |l| l.q.end)
     }
 
     /// Length of v.
     pub fn velocities(&self) -> usize {
-        self.velocities
+        self.links.last().map_or(0, |l| l.v.end)
     }
 
     /// Coordinates with every joint at its origin.
@@ -155,14 +148,7 @@ impl Tree {
 
     /// Whether body `b` moves when the joint of body `a` does.
     pub fn carries(&self, a: usize, b: usize) -> bool {
-        let mut at = Some(b);
-        while let Some(x) = at {
-            if x == a {
-                return true;
-            }
-            at = self.links[x].parent;
-        }
-        false
+        std::iter::successors(Some(b), |&x| self.links[x].parent).any(|x| x == a)
     }
 
     /// Vectors from the parts that each joint has in them.
@@ -251,8 +237,8 @@ impl Tree {
     /// Poses and columns at `q`.
     pub fn kinematics(&self, q: &DVector<f64>) -> Kinematics {
         let mut poses: Vec<Pose> = Vec::with_capacity(self.links.len());
-        let mut frame_columns = Vec::with_capacity(self.velocities);
-        let mut columns = Vec::with_capacity(self.velocities);
+        let mut frame_columns = Vec::with_capacity(self.velocities());
+        let mut columns = Vec::with_capacity(self.velocities());
         for l in &self.links {
             let frame = match l.parent {
                 Some(p) => poses[p].compose(&l.placement),
@@ -309,7 +295,7 @@ impl Tree {
 
     /// Spatial twists of all bodies as columns of a 6B × nv matrix.
     pub fn jacobian(&self, kinematics: &Kinematics) -> DMatrix<f64> {
-        let mut out = DMatrix::zeros(6 * self.links.len(), self.velocities);
+        let mut out = DMatrix::zeros(6 * self.links.len(), self.velocities());
         for (a, l) in self.links.iter().enumerate() {
             for b in a..self.links.len() {
                 if self.carries(a, b) {
@@ -370,8 +356,8 @@ impl Tree {
         fields: &Fields,
         mut bar: Cotangents,
     ) -> (DVector<f64>, DVector<f64>) {
-        let mut q_bar = DVector::zeros(self.velocities);
-        let mut v_bar = DVector::zeros(self.velocities);
+        let mut q_bar = DVector::zeros(self.velocities());
+        let mut v_bar = DVector::zeros(self.velocities());
         for b in (0..self.links.len()).rev() {
             let l = &self.links[b];
             let [sv, sz, sb] = own(kinematics, l, fields);

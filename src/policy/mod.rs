@@ -39,6 +39,16 @@ pub struct Action {
     pub mode: usize,
 }
 
+impl Action {
+    /// These controls alone.
+    fn control(control: Vec<f64>) -> Self {
+        Self {
+            control,
+            ..Self::default()
+        }
+    }
+}
+
 /// Cotangents of [`Policy::act`]'s inputs.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct ActionBar {
@@ -48,6 +58,16 @@ pub struct ActionBar {
     pub v: Vec<f64>,
     /// Cotangent of the gains.
     pub gains: Vec<f64>,
+}
+
+impl ActionBar {
+    /// Of a controller that sees nothing.
+    fn gains(gains: Vec<f64>) -> Self {
+        Self {
+            gains,
+            ..Self::default()
+        }
+    }
 }
 
 /// A controller. A pure function of what it observes, so that a rollout can be replayed; what it must remember
@@ -121,17 +141,11 @@ pub struct Constant {
 
 impl Policy for Constant {
     fn act(&self, _: &Observation) -> Result<Action> {
-        Ok(Action {
-            control: self.control.clone(),
-            ..Action::default()
-        })
+        Ok(Action::control(self.control.clone()))
     }
 
     fn act_vjp(&self, _: &Observation, control_bar: &DVector<f64>) -> Result<ActionBar> {
-        Ok(ActionBar {
-            gains: control_bar.as_slice().to_vec(),
-            ..ActionBar::default()
-        })
+        Ok(ActionBar::gains(control_bar.as_slice().to_vec()))
     }
 
     fn gains(&self) -> Vec<f64> {

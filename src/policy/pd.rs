@@ -40,10 +40,7 @@ impl Policy for Pd {
             control[a.control] +=
                 a.stiffness * (a.target - observed.q[a.q]) - a.damping * observed.v[a.v];
         }
-        Ok(Action {
-            control,
-            ..Action::default()
-        })
+        Ok(Action::control(control))
     }
 
     fn act_vjp(&self, observed: &Observation, control_bar: &DVector<f64>) -> Result<ActionBar> {

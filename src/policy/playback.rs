@@ -15,10 +15,8 @@ pub struct Playback {
 
 impl Policy for Playback {
     fn act(&self, observed: &Observation) -> Result<Action> {
-        Ok(Action {
-            control: self.steps.get(observed.step).cloned().unwrap_or_default(),
-            ..Action::default()
-        })
+        let control = self.steps.get(observed.step).cloned();
+        Ok(Action::control(control.unwrap_or_default()))
     }
 
     fn act_vjp(&self, observed: &Observation, control_bar: &DVector<f64>) -> Result<ActionBar> {
@@ -27,10 +25,7 @@ impl Policy for Playback {
             let from = self.controls * observed.step;
             gains[from..from + self.controls].copy_from_slice(control_bar.as_slice());
         }
-        Ok(ActionBar {
-            gains,
-            ..ActionBar::default()
-        })
+        Ok(ActionBar::gains(gains))
     }
 
     fn gains(&self) -> Vec<f64> {

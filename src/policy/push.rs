@@ -49,10 +49,7 @@ impl Policy for PushThenLock {
         }
         let mut control = vec![0.0; self.controls];
         control[self.control] = self.force;
-        Ok(Action {
-            control,
-            ..Action::default()
-        })
+        Ok(Action::control(control))
     }
 
     fn act_vjp(&self, observed: &Observation, control_bar: &DVector<f64>) -> Result<ActionBar> {
@@ -61,10 +58,7 @@ impl Policy for PushThenLock {
         } else {
             control_bar[self.control]
         };
-        Ok(ActionBar {
-            gains: vec![gain],
-            ..ActionBar::default()
-        })
+        Ok(ActionBar::gains(vec![gain]))
     }
 
     fn gains(&self) -> Vec<f64> {

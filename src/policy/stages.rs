@@ -54,10 +54,7 @@ impl Policy for SpeedStages {
             let bar = (0..s.control.len()).map(move |i| (k == acting, i));
             bar.map(|(acts, i)| if acts { control_bar[i] } else { 0.0 })
         });
-        Ok(ActionBar {
-            gains: gains.collect(),
-            ..ActionBar::default()
-        })
+        Ok(ActionBar::gains(gains.collect()))
     }
 
     fn gains(&self) -> Vec<f64> {

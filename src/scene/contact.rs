@@ -10,7 +10,6 @@ use serde::{Deserialize, Serialize};
 pub struct Contact {
     /// Stiffness of each point of contact, N/m. Default: ten times the heaviest moving body's mass over the square of the time
     /// step, which is near rigid at that step.
-    #[serde(skip_serializing_if = "Option::is_none")]
     pub stiffness: Option<f64>,
     /// Dissipation d of Hunt and Crossley, s/m: surfaces that part faster than 1/d don't press.
     pub dissipation: f64,
@@ -19,11 +18,9 @@ pub struct Contact {
     /// Gap at which surfaces are taken to touch, m. Default: a quarter more than the coupling of the water resolves, so that the
     /// water between them stays resolved when a body lands; at least a hundredth of the smallest moving body's radius, because
     /// distances are smooth only outside a body.
-    #[serde(skip_serializing_if = "Option::is_none")]
     pub gap: Option<f64>,
     /// Half the width over which the force sets in, m; nothing acts at a larger distance than it beyond `gap`. Default: 0.4 % of
     /// the smallest moving body's radius.
-    #[serde(skip_serializing_if = "Option::is_none")]
     pub width: Option<f64>,
     /// Speed below which friction holds with creep, m/s.
     pub stiction_speed: f64,

@@ -192,31 +192,28 @@ fn explain(
         }
     }
     let of = place(&path, values);
-    match problem {
+    let message = match problem {
         Problem::UnknownKey { key, known } => {
             path.push(Step::Key(key.clone()));
-            let at = line(start(document, &path));
-            let what = suggestion(key, known, "keys");
-            format!("line {at}: {of} has no key `{key}`; {what}")
+            format!(
+                "{of} has no key `{key}`; {}",
+                suggestion(key, known, "keys")
+            )
         }
         Problem::UnknownChoice { name, known } => {
-            let at = line(start(document, &path));
             let what = suggestion(name, known, "choices");
-            format!("line {at}: {of}: `{name}` is not known; {what}")
+            format!("{of}: `{name}` is not known; {what}")
         }
         Problem::Missing { key } => {
-            let at = line(start(document, &path));
             let choices = match *key {
                 "kind" => kinds(values, &path),
                 _ => String::new(),
             };
-            format!("line {at}: {of} lacks the key `{key}`; add `{key} = …`{choices}")
+            format!("{of} lacks the key `{key}`; add `{key} = …`{choices}")
         }
-        Problem::Other(message) => {
-            let at = line(start(document, &path));
-            format!("line {at}: {of}: {}", plain_words(message))
-        }
-    }
+        Problem::Other(message) => format!("{of}: {}", plain_words(message)),
+    };
+    format!("line {}: {message}", line(start(document, &path)))
 }
 
 fn kind(table: &toml::Table) -> Option<&str> {

@@ -45,7 +45,6 @@ pub struct Scene {
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub walls: Vec<Wall>,
     /// How surfaces touch; without it bodies may not.
-    #[serde(default, skip_serializing_if = "Option::is_none")]
     pub contact: Option<Contact>,
     /// The bodies, parents before children.
     pub bodies: Vec<Body>,
@@ -56,7 +55,6 @@ pub struct Scene {
     #[serde(default, skip_serializing_if = "is_default")]
     pub initial: Initial,
     /// What drives the actuated joints.
-    #[serde(default, skip_serializing_if = "Option::is_none")]
     pub controller: Option<Controller>,
 }
 
@@ -101,7 +99,6 @@ pub struct Body {
     /// Name, unique in the scene.
     pub name: String,
     /// Surface that the water sees. A body without one is dry unless `added_mass` is given.
-    #[serde(default, skip_serializing_if = "Option::is_none")]
     pub shape: Option<Shape>,
     /// Pose of the shape in the body's frame.
     #[serde(default, skip_serializing_if = "is_default")]
@@ -111,24 +108,18 @@ pub struct Body {
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub refine: Vec<Refinement>,
     /// Mass, kg. Give this or `density`; a body fixed to the world needs neither.
-    #[serde(default, skip_serializing_if = "Option::is_none")]
     pub mass: Option<f64>,
     /// Density, kg/m³, from which mass and inertia follow with the shape's volume.
-    #[serde(default, skip_serializing_if = "Option::is_none")]
     pub density: Option<f64>,
     /// Centre of mass in the body's frame, m; default: the shape's centroid.
-    #[serde(default, skip_serializing_if = "Option::is_none")]
     pub center_of_mass: Option<[f64; 3]>,
     /// Inertia about the centre of mass, body axes, kg m²: xx, yy, zz or xx, yy, zz, xy, xz, yz.
     /// Default: that of the shape filled evenly with `mass`.
-    #[serde(default, skip_serializing_if = "Option::is_none")]
     pub inertia: Option<Vec<f64>>,
     /// The body's own added mass at unit density of the fluid, about its origin, body axes, 6 × 6
     /// rows (linear, then angular; m³, m⁴, m⁵): used by `isolated` instead of computing it.
-    #[serde(default, skip_serializing_if = "Option::is_none")]
     pub added_mass: Option<Vec<Vec<f64>>>,
     /// Name of the parent body; default: the world.
-    #[serde(default, skip_serializing_if = "Option::is_none")]
     pub parent: Option<String>,
     /// Whether the body's surface touches or overlaps that of the nearest body with a shape that
     /// carries it. The two then don't feel each other through the water, and may share up to half of
@@ -142,7 +133,6 @@ pub struct Body {
     #[serde(default)]
     pub joint: Joint,
     /// A given motion of the joint's coordinates, one per coordinate; the joint is then driven.
-    #[serde(default, skip_serializing_if = "Option::is_none")]
     pub motion: Option<Vec<Motion>>,
     /// Holds the joint where it starts.
     #[serde(default, skip_serializing_if = "is_default")]
@@ -150,12 +140,10 @@ pub struct Body {
     /// Range of a prismatic or revolute joint's coordinate, lower and upper end, m or rad: at either a stop pushes back, by
     /// the law of contact, without friction. It may start anywhere from one to the other. While a controller holds the joint its
     /// stops have nothing to do.
-    #[serde(default, skip_serializing_if = "Option::is_none")]
     pub limits: Option<[f64; 2]>,
     /// Stiffness of the stops at `limits`, N/m or N m/rad. Default: ten times the inertia that the joint's coordinate has at the
     /// start, the water's and that of all bodies it carries included, over the square of the time step, which is near rigid at that
     /// step. The force sets in over ± a thousandth of the range around a limit.
-    #[serde(default, skip_serializing_if = "Option::is_none")]
     pub limit_stiffness: Option<f64>,
     /// Whether the joint's generalised forces are controls.
     #[serde(default, skip_serializing_if = "is_default")]
@@ -164,7 +152,6 @@ pub struct Body {
     #[serde(default, skip_serializing_if = "is_default")]
     pub thruster: bool,
     /// Drag on the body's surface.
-    #[serde(default, skip_serializing_if = "Option::is_none")]
     pub drag: Option<Drag>,
 }
 

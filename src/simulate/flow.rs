@@ -2,20 +2,13 @@
 
 use super::{Rollout, Sample, Simulator};
 use crate::adjoint::lie::{Pose, Vec3, Vec6, six};
-use crate::geometry::Other;
+use crate::geometry::{Distance, Other};
 use crate::{Error, Result};
 use nalgebra::DVector;
 
 /// Distance from a surface, in edges of its mesh, from which on the flow is shown. Sources lie within the bodies, one under each
 /// vertex; nearer than this the flow between the places that were fitted isn't what it should be.
 pub const FLOW_EDGES: f64 = 0.5;
-
-/// What is too near to a point.
-struct Obstacle {
-    from: Other,
-    distance: f64,
-    limit: f64,
-}
 
 impl Simulator {
     fn flow(&self, q: &DVector<f64>, v: &DVector<f64>, points: &[Vec3]) -> Result<Vec<Vec3>> {
@@ -42,32 +35,25 @@ impl Simulator {
         Ok(made.into_iter().map(|u| u + system.current).collect())
     }
 
-    fn obstacle(&self, point: &Vec3, poses: &[Pose]) -> Option<Obstacle> {
+    /// What is too near to a point.
+    fn obstacle(&self, point: &Vec3, poses: &[Pose]) -> Option<Distance> {
         let mut distances = self.gaps().distances(point, poses);
-        let found = distances.find(|d| d.distance < FLOW_EDGES * d.edge)?;
-        Some(Obstacle {
-            from: found.from,
-            distance: found.distance,
-            limit: FLOW_EDGES * found.edge,
-        })
+        distances.find(|d| d.distance < FLOW_EDGES * d.edge)
     }
 
-    fn too_near(&self, number: usize, point: &Vec3, obstacle: &Obstacle) -> Error {
-        let what = match obstacle.from {
-            Other::Body(b) => format!("body {:?}", self.system().bodies[b].name),
-            Other::Wall(w) => format!("wall {w}"),
-        };
-        let remedy = match obstacle.from {
-            Other::Body(_) => {
-                "it lies within the body or too near to its surface for the mesh: leave it out, or use more faces"
-            }
-            Other::Wall(_) => "it lies behind the wall: leave it out",
+    fn too_near(&self, number: usize, point: &Vec3, obstacle: &Distance) -> Error {
+        let (what, remedy) = match obstacle.from {
+            Other::Body(b) => (
+                format!("body {:?}", self.system().bodies[b].name),
+                "it lies within the body or too near to its surface for the mesh: leave it out, or use more faces",
+            ),
+            Other::Wall(w) => (format!("wall {w}"), "it lies behind the wall: leave it out"),
         };
         Error::Unresolved {
             place: format!("flow: points[{number}] at {:?} m: {what}", point.as_slice()),
             quantity: "distance in m".into(),
             value: obstacle.distance,
-            limit: obstacle.limit,
+            limit: FLOW_EDGES * obstacle.edge,
             remedy: remedy.into(),
         }
     }

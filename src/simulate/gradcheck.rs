@@ -221,10 +221,10 @@ pub fn timings(simulator: &Simulator, steps: usize, repetitions: usize) -> Resul
             "must both be at least 1",
         ));
     }
-    let zero = Controls::zeros(simulator, steps);
-    let scale = scales(simulator, &simulator.rollout(&zero)?, steps)?;
     let mut random = Samples::new(1);
     let vector = |n: usize| DVector::from_fn(n, |_, _| random.number());
+    let zero = Controls::zeros(simulator, steps);
+    let scale = scales(simulator, &simulator.rollout(&zero)?, steps)?;
     let probe = Probe::new(simulator, &scale, steps, vector);
     time(simulator, &zero, &probe, repetitions)
 }

@@ -34,6 +34,14 @@ pub struct Peak {
     pub time: f64,
 }
 
+impl Peak {
+    fn raise(&mut self, factor: f64, step: usize, time: f64) {
+        if factor > self.factor {
+            *self = Self { factor, step, time };
+        }
+    }
+}
+
 /// How a trajectory magnifies changes of its state.
 #[derive(Clone, Debug, Serialize)]
 pub struct Growth {
@@ -119,13 +127,7 @@ pub fn growth(simulator: &Simulator, steps: usize) -> Result<Growth> {
             }
         }
         let factor = largest(&a);
-        if factor > out.largest_step.factor {
-            out.largest_step = Peak {
-                factor,
-                step: n,
-                time: samples[n].time,
-            };
-        }
+        out.largest_step.raise(factor, n, samples[n].time);
         product = a * product;
         let norm = product.amax();
         if norm > 0.0 {
@@ -134,13 +136,7 @@ pub fn growth(simulator: &Simulator, steps: usize) -> Result<Growth> {
         }
         let so_far = (size + largest(&product).ln()).exp().min(f64::MAX);
         out.course.push(so_far);
-        if so_far > out.peak.factor {
-            out.peak = Peak {
-                factor: so_far,
-                step: n + 1,
-                time: samples[n + 1].time,
-            };
-        }
+        out.peak.raise(so_far, n + 1, samples[n + 1].time);
         out.total = so_far;
     }
     Ok(out)

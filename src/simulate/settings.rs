@@ -8,9 +8,10 @@ use crate::scene::{Preset, Scene};
 use crate::water::{Backend, Fidelity, GpuSettings, Method};
 use serde::{Deserialize, Serialize};
 
-/// Declares what may be asked for beside a preset: each a field, and a method that gives other settings with it.
+/// Declares what may be asked for beside a preset, with its places in [`Choices`]: each a field, and a method that gives other
+/// settings with it.
 macro_rules! settings {
-    ($($(#[$about:meta])* $name:ident: $type:ty,)*) => {
+    ($($(#[$about:meta])* $name:ident: $type:ty => $($($place:ident).+),+;)*) => {
         /// What is asked for, over what the scene and its preset say: `None` leaves a choice to them.
         #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
         #[serde(default, deny_unknown_fields)]
@@ -35,56 +36,59 @@ macro_rules! settings {
                     }
                 }
             )*
+
+            /// Choices with what these settings ask for put over them; the preset isn't looked at.
+            pub fn over(&self, mut choices: Choices) -> Choices {
+                $(
+                    if let Some(asked) = &self.$name {
+                        $(choices.$($place).+ = asked.clone().into();)+
+                    }
+                )*
+                choices
+            }
         }
     };
 }
 
 settings! {
     /// How much of the coupling is modelled.
-    fidelity: Fidelity,
+    fidelity: Fidelity => water.fidelity;
     /// Method by which each body alone is solved.
-    method: Method,
+    method: Method => water.method;
     /// How far inside the surface the sources of fundamental solutions are.
-    depth: Depth,
+    depth: Depth => water.numerics.mfs.depth;
     /// Norm in which the rows of fundamental solutions are fitted.
-    rows: RowScaling,
+    rows: RowScaling => water.numerics.mfs.rows;
     /// How the energy is read from the strengths of fundamental solutions.
-    readout: Readout,
+    readout: Readout => water.numerics.mfs.readout;
     /// Weight of those strengths in the least squares.
-    damping: f64,
+    damping: f64 => water.numerics.mfs.damping;
     /// Solver of the coupled system (fidelity `full`).
-    solver: FullSolver,
+    solver: FullSolver => water.numerics.solve.solver;
     /// Its preconditioner.
-    preconditioner: Preconditioner,
+    preconditioner: Preconditioner => water.numerics.solve.preconditioner;
     /// Relative residual at which it stops.
-    tolerance: f64,
+    tolerance: f64 => water.numerics.solve.tolerance;
     /// Iterations after which it gives up with an error.
-    max_iterations: usize,
+    max_iterations: usize => water.numerics.solve.max_iterations;
     /// Points of each compressed body (fidelity `reduced`).
-    rank: usize,
+    rank: usize => water.numerics.compress.rank;
     /// Smallest gap that compressed bodies resolve, m (fidelity `reduced`).
-    resolved_gap: f64,
+    resolved_gap: f64 => water.numerics.compress.resolved_gap;
     /// Error of M_f, relative to √(M_ii M_jj), that the fidelities `reduced` (added to that of the bodies themselves) and `auto`
     /// aim at.
-    accuracy: f64,
+    accuracy: f64 => water.numerics.compress.tolerance, water.numerics.accuracy;
     /// Time integrator. `None`: the preset's; for a scene with contact, if that doesn't solve contact,
     /// [`Integrator::MomentumEuler`].
-    integrator: Integrator,
+    integrator: Integrator => integrator;
     /// Time step, s; `None`: the scene's.
-    time_step: f64,
+    time_step: f64 => time_step;
     /// Faces per body of shapes by formula; `None`: what each shape says.
-    faces: usize,
+    faces: usize => water.faces;
     /// What computes the coupling.
-    backend: Backend,
+    backend: Backend => water.backend;
     /// Choices of [`Backend::Gpu`].
-    gpu: GpuSettings,
-}
-
-/// Puts what is asked for over what there is.
-fn over<T: Clone>(place: &mut T, asked: &Option<T>) {
-    if let Some(asked) = asked {
-        *place = asked.clone();
-    }
+    gpu: GpuSettings => water.gpu;
 }
 
 impl Settings {
@@ -107,32 +111,5 @@ impl Settings {
             base.integrator = Integrator::MomentumEuler;
         }
         self.over(base)
-    }
-
-    /// Choices with what these settings ask for put over them; the preset isn't looked at.
-    pub fn over(&self, mut choices: Choices) -> Choices {
-        let water = &mut choices.water;
-        over(&mut water.fidelity, &self.fidelity);
-        over(&mut water.method, &self.method);
-        over(&mut water.backend, &self.backend);
-        over(&mut water.gpu, &self.gpu);
-        water.faces = self.faces.or(water.faces);
-        let numerics = &mut water.numerics;
-        over(&mut numerics.mfs.depth, &self.depth);
-        over(&mut numerics.mfs.rows, &self.rows);
-        over(&mut numerics.mfs.readout, &self.readout);
-        over(&mut numerics.mfs.damping, &self.damping);
-        over(&mut numerics.solve.solver, &self.solver);
-        over(&mut numerics.solve.preconditioner, &self.preconditioner);
-        over(&mut numerics.solve.tolerance, &self.tolerance);
-        over(&mut numerics.solve.max_iterations, &self.max_iterations);
-        over(&mut numerics.compress.tolerance, &self.accuracy);
-        over(&mut numerics.accuracy, &self.accuracy);
-        let compress = &mut numerics.compress;
-        compress.rank = self.rank.or(compress.rank);
-        compress.resolved_gap = self.resolved_gap.or(compress.resolved_gap);
-        over(&mut choices.integrator, &self.integrator);
-        over(&mut choices.time_step, &self.time_step);
-        choices
     }
 }

@@ -131,9 +131,6 @@ impl<'a> Trajectory<'a> {
     }
 
     /// A step with its controller, and what all its derivatives share.
-    ///
-    /// # Errors
-    /// As [`Stepper::linearise_step`].
     pub(super) fn linearise<'t>(
         &'t self,
         record: &'t StepRecord,

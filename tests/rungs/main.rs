@@ -151,10 +151,6 @@ const THROUGH: &[(&str, &str)] = &[
         "dynamics::integrator::readout::Stepper::velocity_vjp",
     ),
     (
-        "dynamics::integrator::midpoint::Adjoint::configuration_vjp",
-        "dynamics::integrator::midpoint::Adjoint::vjp",
-    ),
-    (
         "dynamics::integrator::start::Start::advance_vjp",
         "dynamics::integrator::euler::Adjoint::vjp",
     ),

@@ -10,9 +10,10 @@
 //! # References
 //! A. Castro et al., "An Unconstrained Convex Formulation of Compliant Contact", 2022.
 
-use super::StepBar;
-use super::split::Split;
+use super::record::Stages;
+use super::split::{Split, share};
 use super::start::Start;
+use super::{State, StateBar, StepBar};
 use crate::adjoint::solve::Definite;
 use crate::dynamics::{Dual, Evaluation};
 use crate::{Error, Result};
@@ -65,22 +66,14 @@ pub(super) fn solve(start: &Start, before: &DVector<f64>) -> Result<DVector<f64>
     if split.free.is_empty() || !e.presses(before) {
         return Ok(before.clone());
     }
-    let scale = split
-        .block(&e.mass_matrix)
-        .diagonal()
-        .map(|d| 1.0 / d.max(f64::MIN_POSITIVE).sqrt());
-    let sized = |p: &DVector<f64>| split.take(p).component_mul(&scale).norm();
+    let sized = split.sizes(&e.mass_matrix);
     let summands = e.mass_matrix.abs();
     let least = sized(&(&summands * before.abs()));
     let at = |v: DVector<f64>| {
         let imbalance = &e.mass_matrix * (&v - before) - dt * e.contact_force(&v, Dual::User);
         let size = sized(&(&summands * v.abs())).max(least);
         let size = size.max(dt * sized(&e.contact_effort(&v)));
-        let residual = if size > 0.0 {
-            sized(&imbalance) / size
-        } else {
-            0.0
-        };
+        let residual = share(sized(&imbalance), size);
         Trial {
             v,
             imbalance,
@@ -142,18 +135,19 @@ fn search(now: Trial, step: &DVector<f64>, at: &dyn Fn(DVector<f64>) -> Trial) -
     best
 }
 
-/// Velocities with the frame momenta after contact, from the velocity and the momenta before it.
+/// The end of a step from the velocity and the frame momenta before contact: the state there, and both velocities.
 pub(super) fn press(
     start: &Start,
     before: DVector<f64>,
     hat: DVector<f64>,
-) -> Result<(ContactVelocities, DVector<f64>)> {
+) -> Result<(State, Stages)> {
     let after = solve(start, &before)?;
     let hat = match start.e.presses(&before) {
         true => hat + start.stepper.dt * start.e.contact_force(&after, Dual::Frame),
         false => hat,
     };
-    Ok((ContactVelocities { before, after }, hat))
+    let next = start.next_state(start.advance(&after), hat);
+    Ok((next, Stages::Contact(ContactVelocities { before, after })))
 }
 
 /// What the transposes of [`solve`] and [`press`] need.
@@ -173,9 +167,6 @@ enum Pressed {
 
 impl<'s> Adjoint<'s> {
     /// At a step's velocities before and after contact.
-    ///
-    /// # Errors
-    /// A Hessian that isn't positive definite.
     pub fn new(start: &Start, velocities: &'s ContactVelocities) -> Result<Self> {
         let (e, split) = (start.e, start.split);
         let pressed = if !e.presses(&velocities.before) {
@@ -219,22 +210,23 @@ impl<'s> Adjoint<'s> {
         Ok(before_bar)
     }
 
-    /// Transpose of [`press`]: from the cotangents of velocity and momenta after contact to that of the velocity before (that of
-    /// the momenta stays what it is); the rest is added to `bar`.
+    /// Transpose of [`press`]: cotangents of the velocity and of the momenta before contact; the rest is added to `bar`.
     pub fn press_vjp(
         &self,
         start: &Start,
-        after_bar: &DVector<f64>,
-        hat_bar: &DVector<f64>,
+        next_bar: &StateBar,
         bar: &mut StepBar,
-    ) -> Result<DVector<f64>> {
+    ) -> Result<(DVector<f64>, DVector<f64>)> {
+        let (dt, after) = (start.stepper.dt, &self.velocities.after);
+        let (q_bar, after_bar) = start.advance_vjp(after, &next_bar.q);
+        bar.state.q += q_bar;
+        let hat_bar = start.next_momentum_bar(next_bar);
         if matches!(self.pressed, Pressed::No) {
-            return Ok(after_bar.clone());
+            return Ok((after_bar, hat_bar));
         }
-        let dt = start.stepper.dt;
-        let after = &self.velocities.after;
-        let pressed = start.e.contact_force_vjp(after, hat_bar, Dual::Frame);
+        let pressed = start.e.contact_force_vjp(after, &hat_bar, Dual::Frame);
         bar.add(dt, &pressed);
-        self.solve_vjp(start, &(after_bar + dt * &pressed.v), bar)
+        let before_bar = self.solve_vjp(start, &(after_bar + dt * &pressed.v), bar)?;
+        Ok((before_bar, hat_bar))
     }
 }

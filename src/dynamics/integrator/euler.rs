@@ -13,7 +13,7 @@
 
 use super::contact::{self, ContactVelocities};
 use super::record::{Stages, Transposed};
-use super::split::Split;
+use super::split::{Split, share};
 use super::start::Start;
 use super::{State, StateBar, StepBar, Stepper};
 use crate::adjoint::lie::angular;
@@ -78,11 +78,7 @@ pub(super) fn solve_stage(
     let (split, control) = (start.split, &start.input.control);
     let tree = &e.system.tree;
     let mut v = &split.driven + split.put(&split.take(guess));
-    let scale = split
-        .block(&e.mass_matrix)
-        .diagonal()
-        .map(|d| 1.0 / d.max(f64::MIN_POSITIVE).sqrt());
-    let sized = |p: &DVector<f64>| split.take(p).component_mul(&scale).norm();
+    let sized = split.sizes(&e.mass_matrix);
     // Against the sum of what M v adds up, so that a total momentum of zero is no target for relative errors.
     let summands = e.mass_matrix.abs();
     let least = sized(&e.user_momentum(hat)).max(sized(&e.rest_momentum));
@@ -94,11 +90,7 @@ pub(super) fn solve_stage(
         let target = tree.chart_momentum(&e.q, &(rule.reach * &v), &reached);
         let defect = e.momentum(&v) - &target;
         let size = sized(&(&summands * v.abs())).max(sized(&target)).max(least);
-        residual = if size > 0.0 {
-            sized(&defect) / size
-        } else {
-            0.0
-        };
+        residual = share(sized(&defect), size);
         // Stop where rounding ends the quadratic convergence.
         let converged = residual == 0.0 || (residual <= 1e-13 && residual >= 0.25 * previous);
         let at_last = iteration + 1 == ITERATIONS && residual <= 1e-11;
@@ -145,9 +137,7 @@ pub(super) fn step(start: &Start) -> Result<(State, Stages)> {
     let p = start.momentum();
     let stage = solve_stage(start, e, &p, rule(s), start.v)?;
     let y = &p + s.dt * &stage.force;
-    let (velocities, y) = contact::press(start, stage.v, y)?;
-    let q = start.advance(&velocities.after);
-    Ok((start.next_state(q, y), Stages::Contact(velocities)))
+    contact::press(start, stage.v, y)
 }
 
 /// What the transpose of a step needs.
@@ -174,12 +164,9 @@ impl<'s> Adjoint<'s> {
 impl<'a> Transposed<'a> for Adjoint<'_> {
     fn vjp(&self, start: &Start<'_, 'a>, next_bar: &StateBar) -> Result<StepBar> {
         let (s, e, split) = (start.stepper, start.e, start.split);
-        let ContactVelocities { before, after } = self.contact.velocities;
+        let before = &self.contact.velocities.before;
         let mut bar = StepBar::zeros(e);
-        let (q_bar, after_bar) = start.advance_vjp(after, &next_bar.q);
-        bar.state.q += q_bar;
-        let z = start.next_momentum_bar(next_bar);
-        let mut v_bar = self.contact.press_vjp(start, &after_bar, &z, &mut bar)?;
+        let (mut v_bar, z) = self.contact.press_vjp(start, next_bar, &mut bar)?;
         // v̄ of p̂⁺ through f; only the transpose of ∂f/∂v is needed here.
         v_bar += s.dt * self.stage.rates.tr_mul(&z);
         let w = self.stage.solve(split, &v_bar)?;
@@ -205,9 +192,6 @@ pub(super) struct AdjointStage {
 
 impl AdjointStage {
     /// Of a step's stage at `e`, with velocity v and momentum p̂ + h f.
-    ///
-    /// # Errors
-    /// A coupling that fails.
     pub fn new(
         start: &Start,
         e: &Linearisation,

@@ -13,6 +13,7 @@
 use super::contact::{self, ContactVelocities};
 use super::euler::{AdjointStage, Rule, solve_stage};
 use super::record::{Stages, Transposed};
+use super::split::share;
 use super::start::Start;
 use super::{State, StateBar, StepBar, Stepper};
 use crate::dynamics::Linearisation;
@@ -65,9 +66,7 @@ pub(super) fn step(start: &Start) -> Result<(State, Stages)> {
         // Down at rounding, or at the coupled solve's own tolerance, changes are noise: stop when they no longer halve.
         if moved <= TOLERANCE || (moved <= noise(&m) && moved > 0.5 * previous) {
             let y = &p + s.dt * next.force;
-            let (velocities, y) = contact::press(start, stage, y)?;
-            let q = start.advance(&velocities.after);
-            return Ok((start.next_state(q, y), Stages::Contact(velocities)));
+            return contact::press(start, stage, y);
         }
         previous = moved;
     }
@@ -105,35 +104,15 @@ impl<'s, 'a> Adjoint<'s, 'a> {
             reached,
         })
     }
-
-    /// Gradient over q_m of `−wᵀ{M v + p_rest − Xᵀ(p̂ + h f)} + zᵀ Δt f` and the rest of the cotangents;
-    /// z_total = Δt z + h X w.
-    fn configuration_vjp(
-        &self,
-        start: &Start,
-        w: &DVector<f64>,
-        z_total: &DVector<f64>,
-    ) -> Result<StepBar> {
-        let (m, stage) = (&self.middle, &self.contact.velocities.before);
-        let mut bar = StepBar::zeros(m);
-        bar.add(1.0, &m.force_vjp(stage, &start.input.control, z_total)?);
-        bar.add(-1.0, &m.momentum_vjp(stage, w)?);
-        bar.state.q += m.frame_velocity_vjp(w, &self.reached);
-        start.split.forget_moved(&mut bar.state.q);
-        Ok(bar)
-    }
 }
 
 impl<'a> Transposed<'a> for Adjoint<'_, 'a> {
     fn vjp(&self, start: &Start<'_, 'a>, next_bar: &StateBar) -> Result<StepBar> {
         let (s, split, m) = (start.stepper, start.split, &self.middle);
-        let ContactVelocities { before, after } = self.contact.velocities;
+        let before = &self.contact.velocities.before;
         let h = 0.5 * s.dt;
         let mut bar = StepBar::zeros(start.e);
-        let (q_bar, after_bar) = start.advance_vjp(after, &next_bar.q);
-        bar.state.q += q_bar;
-        let z = start.next_momentum_bar(next_bar);
-        let v_bar_next = self.contact.press_vjp(start, &after_bar, &z, &mut bar)?;
+        let (v_bar_next, z) = self.contact.press_vjp(start, next_bar, &mut bar)?;
         let v_bar_force = s.dt * self.stage.rates.tr_mul(&z);
         let fixed = v_bar_next + v_bar_force;
         // v̄ = fixed + (∂q_m/∂v)ᵀ q̄_m(w), w = J⁻ᵀ v̄.
@@ -142,15 +121,16 @@ impl<'a> Transposed<'a> for Adjoint<'_, 'a> {
         for _ in 0..ITERATIONS {
             let w = self.stage.solve(split, &v_bar)?;
             let z_total = s.dt * &z + h * m.frame_velocity(&w);
-            let inner = self.configuration_vjp(start, &w, &z_total)?;
+            // Gradient over q_m of −wᵀ{M v + p_rest − Xᵀ(p̂ + h f)} + zᵀ Δt f, and the rest of the cotangents.
+            let mut inner = StepBar::zeros(m);
+            let control = &start.input.control;
+            inner.add(1.0, &m.force_vjp(before, control, &z_total)?);
+            inner.add(-1.0, &m.momentum_vjp(before, &w)?);
+            inner.state.q += m.frame_velocity_vjp(&w, &self.reached);
+            split.forget_moved(&mut inner.state.q);
             let (q_start, xi) = s.system.tree.integrate_vjp(&(h * before), &inner.state.q);
             let next = &fixed + h * xi;
-            let size = next.norm();
-            let moved = if size > 0.0 {
-                (&next - &v_bar).norm() / size
-            } else {
-                0.0
-            };
+            let moved = share((&next - &v_bar).norm(), next.norm());
             if moved <= 1e-13 || (moved <= 10.0 * noise(m) && moved > 0.5 * previous) {
                 bar.state.q += q_start;
                 bar.control += inner.control;

@@ -39,21 +39,31 @@ impl Split {
 
     /// Zeroes the entries whose value doesn't depend on the state: given motions.
     pub fn forget_moved(&self, x: &mut DVector<f64>) {
-        for (x, moved) in x.iter_mut().zip(&self.moved) {
-            if *moved {
-                *x = 0.0;
-            }
-        }
+        forget(&self.moved, x);
     }
 
     /// Zeroes driven entries.
     pub fn forget_driven(&self, x: &mut DVector<f64>) {
-        for (x, driven) in x.iter_mut().zip(&self.is_driven) {
-            if *driven {
-                *x = 0.0;
-            }
-        }
+        forget(&self.is_driven, x);
     }
+
+    /// Sizes of free momenta, each weighed by the square root of its inertia.
+    pub fn sizes(&self, mass_matrix: &DMatrix<f64>) -> impl Fn(&DVector<f64>) -> f64 {
+        let inertia = self.block(mass_matrix).diagonal();
+        let scale = inertia.map(|d| 1.0 / d.max(f64::MIN_POSITIVE).sqrt());
+        move |p| self.take(p).component_mul(&scale).norm()
+    }
+}
+
+fn forget(entries: &[bool], x: &mut DVector<f64>) {
+    for (x, _) in x.iter_mut().zip(entries).filter(|(_, gone)| **gone) {
+        *x = 0.0;
+    }
+}
+
+/// A part of a size; zero of nothing.
+pub(super) fn share(part: f64, size: f64) -> f64 {
+    if size > 0.0 { part / size } else { 0.0 }
 }
 
 /// When a given motion's velocity is wanted.

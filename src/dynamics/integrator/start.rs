@@ -45,11 +45,10 @@ impl Start<'_, '_> {
     }
 
     /// Velocities whose joints were held before and are free in this step.
-    fn released(&self) -> Vec<bool> {
-        let before = self.stepper.split_at(self.state);
-        (0..self.v.len())
-            .map(|i| before.is_driven[i] && !self.split.is_driven[i])
-            .collect()
+    fn released(&self) -> Vec<usize> {
+        let before = self.stepper.split_at(self.state).is_driven;
+        let free = (0..before.len()).filter(|&i| before[i] && !self.split.is_driven[i]);
+        free.collect()
     }
 
     /// Momenta at the start of a step: those of joints that were held and now are free again
@@ -57,13 +56,9 @@ impl Start<'_, '_> {
     pub fn momentum(&self) -> DVector<f64> {
         let released = self.released();
         let mut p = self.state.y.clone();
-        if released.iter().any(|r| *r) {
+        if !released.is_empty() {
             let fresh = self.e.frame_momentum(self.v);
-            for (i, r) in released.iter().enumerate() {
-                if *r {
-                    p[i] = fresh[i];
-                }
-            }
+            released.iter().for_each(|&i| p[i] = fresh[i]);
         }
         p
     }
@@ -73,13 +68,10 @@ impl Start<'_, '_> {
         let (e, v) = (self.e, self.v);
         let released = self.released();
         let mut kept = p_bar.clone();
-        if released.iter().any(|r| *r) {
+        if !released.is_empty() {
             let mut fresh_bar = DVector::zeros(p_bar.len());
-            for (i, r) in released.iter().enumerate() {
-                if *r {
-                    fresh_bar[i] = p_bar[i];
-                    kept[i] = 0.0;
-                }
+            for i in released {
+                fresh_bar[i] = std::mem::take(&mut kept[i]);
             }
             // p̂ = X⁻ᵀ p(q, v), the gradient of fresh_bar · p̂.
             let w = e.frame_velocity_inverse(&fresh_bar);

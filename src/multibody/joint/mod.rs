@@ -114,12 +114,7 @@ impl Joint {
 
     /// Whether q has unit quaternions, so that v is not its rate.
     pub fn has_quaternion(&self) -> bool {
-        self.quaternion_at().is_some()
-    }
-
-    /// Index of the quaternion's w in the joint's q.
-    pub(crate) fn quaternion_at(&self) -> Option<usize> {
-        self.model().quaternion_at()
+        self.model().quaternion_at().is_some()
     }
 
     /// Short names of the coordinates q, for tables.
@@ -135,11 +130,6 @@ impl Joint {
     /// Coordinates of the joint at its origin: zero, with identity quaternions.
     pub fn origin(&self) -> Vec<f64> {
         self.model().origin()
-    }
-
-    /// What is wrong with it, if anything is.
-    pub(crate) fn refused(&self) -> Option<Refused> {
-        self.model().refused()
     }
 }
 

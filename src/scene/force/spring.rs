@@ -21,7 +21,6 @@ use serde::{Deserialize, Serialize};
 #[serde(deny_unknown_fields)]
 pub struct Spring {
     /// Name, unique in the scene; default: "spring" and its number among the forces.
-    #[serde(default, skip_serializing_if = "is_default")]
     pub name: Option<String>,
     /// Name of the body at its first end.
     pub body: String,
@@ -29,7 +28,6 @@ pub struct Spring {
     #[serde(default, skip_serializing_if = "is_default")]
     pub at: [f64; 3],
     /// Name of the body at its second end; default: the world.
-    #[serde(default, skip_serializing_if = "is_default")]
     pub to: Option<String>,
     /// Second end in that body's frame, or in the world, m.
     #[serde(default, skip_serializing_if = "is_default")]
@@ -111,11 +109,14 @@ impl ForceData for Spring {
                 number(place(field), x, true, "give finite numbers, in m")?;
             }
         }
-        let remedy = "give zero or more, in N/m";
-        number(place("stiffness"), self.stiffness, false, remedy)?;
-        let remedy = "give zero or more, in m";
-        number(place("rest_length"), self.rest_length, false, remedy)?;
-        let remedy = "give zero or more, in N s/m";
-        number(place("damping"), self.damping, false, remedy)
+        let numbers = [
+            ("stiffness", self.stiffness, "N/m"),
+            ("rest_length", self.rest_length, "m"),
+            ("damping", self.damping, "N s/m"),
+        ];
+        numbers.into_iter().try_for_each(|(field, x, unit)| {
+            let remedy = format!("give zero or more, in {unit}");
+            number(place(field), x, false, &remedy)
+        })
     }
 }

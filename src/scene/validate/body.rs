@@ -2,7 +2,7 @@
 
 use nalgebra::{Matrix3, Matrix6};
 
-use super::{finite, limits, list, place};
+use super::{bounded, finite, limits, list, place};
 use crate::scene::{Body, Motion, Scene, Shape};
 use crate::{Error, Result};
 
@@ -87,14 +87,8 @@ fn check_shape(body: &Body) -> Result<()> {
 fn check_mass(body: &Body, is_static: bool) -> Result<()> {
     for (field, value) in [("mass", body.mass), ("density", body.density)] {
         let Some(value) = value else { continue };
-        finite(&place(body, field), &[value])?;
-        if value < 0.0 {
-            return Err(Error::input(
-                place(body, field),
-                value,
-                "give zero (a massless link) or more",
-            ));
-        }
+        let remedy = "give zero (a massless link) or more";
+        bounded(&place(body, field), value, true, remedy)?;
     }
     if let Some(center) = &body.center_of_mass {
         finite(&place(body, "center_of_mass"), center)?;
@@ -231,7 +225,7 @@ fn check_added_mass(body: &Body, rows: &[Vec<f64>]) -> Result<()> {
 
 fn check_joint(body: &Body) -> Result<()> {
     let joint = &body.joint;
-    if let Some(bad) = joint.refused() {
+    if let Some(bad) = joint.model().refused() {
         let field = format!("joint.{}", bad.field);
         return Err(Error::input(place(body, &field), bad.given, bad.remedy));
     }
@@ -324,14 +318,8 @@ fn check_drag(body: &Body) -> Result<()> {
     }
     for (field, value) in [("linear", drag.linear), ("quadratic", drag.quadratic)] {
         let place = place(body, &format!("drag.{field}"));
-        finite(&place, &[value])?;
-        if value < 0.0 {
-            return Err(Error::input(
-                place,
-                value,
-                "give zero or more; a negative drag would push the body on",
-            ));
-        }
+        let remedy = "give zero or more; a negative drag would push the body on";
+        bounded(&place, value, true, remedy)?;
     }
     Ok(())
 }

@@ -1,8 +1,8 @@
 //! Contact.
 
 use super::super::Scene;
-use super::finite;
-use crate::{Error, Result};
+use super::bounded;
+use crate::Result;
 
 pub(super) fn check(scene: &Scene) -> Result<()> {
     let Some(contact) = &scene.contact else {
@@ -18,15 +18,11 @@ pub(super) fn check(scene: &Scene) -> Result<()> {
     ];
     for (name, value, positive) in given {
         let Some(value) = value else { continue };
-        let place = format!("contact.{name}");
-        finite(&place, &[value])?;
-        if value < 0.0 || (positive && value == 0.0) {
-            let right = match positive {
-                true => "must be positive",
-                false => "must not be negative",
-            };
-            return Err(Error::input(place, value, right));
-        }
+        let right = match positive {
+            true => "must be positive",
+            false => "must not be negative",
+        };
+        bounded(&format!("contact.{name}"), value, !positive, right)?;
     }
     Ok(())
 }

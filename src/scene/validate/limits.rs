@@ -1,20 +1,14 @@
 //! Limits of joints.
 
-use super::{finite, list, place};
+use super::{bounded, finite, list, place};
 use crate::scene::Body;
 use crate::{Error, Result};
 
 pub(super) fn check(body: &Body) -> Result<()> {
     if let Some(stiffness) = body.limit_stiffness {
         let place = place(body, "limit_stiffness");
-        finite(&place, &[stiffness])?;
-        if stiffness <= 0.0 {
-            return Err(Error::input(
-                place,
-                stiffness,
-                "give a stiffness above zero, N/m or N m/rad, or leave it out for one that is near rigid",
-            ));
-        }
+        let remedy = "give a stiffness above zero, N/m or N m/rad, or leave it out for one that is near rigid";
+        bounded(&place, stiffness, false, remedy)?;
         if body.limits.is_none() {
             return Err(Error::input(
                 place,

@@ -151,34 +151,34 @@ impl Scene {
         Ok(())
     }
 
+    fn parent(&self, body: &Body) -> Result<Option<usize>> {
+        let Some(name) = &body.parent else {
+            return Ok(None);
+        };
+        if let Some(parent) = self.body(name) {
+            return Ok(Some(parent.0));
+        }
+        let names = || self.bodies.iter().map(|b| b.name.as_str());
+        let remedy = match nearest(name, names()) {
+            Some(near) => format!("no body has that name; did you mean {near:?}?"),
+            None => format!(
+                "no body has that name; the bodies are {}",
+                names().collect::<Vec<_>>().join(", ")
+            ),
+        };
+        Err(Error::input(
+            place(body, "parent"),
+            format!("{name:?}"),
+            format!("{remedy} (leave `parent` out for the world)"),
+        ))
+    }
+
     /// Parents exist, stand before their children, and no body carries itself.
     fn check_tree(&self) -> Result<()> {
-        let mut parents = Vec::with_capacity(self.bodies.len());
-        for body in &self.bodies {
-            let Some(name) = &body.parent else {
-                parents.push(None);
-                continue;
-            };
-            let Some(parent) = self.body(name) else {
-                let names = || self.bodies.iter().map(|b| b.name.as_str());
-                let remedy = match nearest(name, names()) {
-                    Some(near) => format!("no body has that name; did you mean {near:?}?"),
-                    None => format!(
-                        "no body has that name; the bodies are {}",
-                        names().collect::<Vec<_>>().join(", ")
-                    ),
-                };
-                return Err(Error::input(
-                    place(body, "parent"),
-                    format!("{name:?}"),
-                    format!("{remedy} (leave `parent` out for the world)"),
-                ));
-            };
-            parents.push(Some(parent.0));
-        }
+        let each = self.bodies.iter().map(|body| self.parent(body));
+        let parents = each.collect::<Result<Vec<_>>>()?;
         for (i, body) in self.bodies.iter().enumerate() {
-            let chain = chain(i, &parents);
-            if let Some(cycle) = chain {
+            if let Some(cycle) = chain(i, &parents) {
                 let names: Vec<_> = cycle.iter().map(|&b| self.name(b)).collect();
                 return Err(Error::input(
                     place(body, "parent"),
@@ -218,19 +218,10 @@ const PARALLEL: f64 = 1e-9;
 
 /// The circle of parents that goes through body `i`, if there is one.
 fn chain(i: usize, parents: &[Option<usize>]) -> Option<Vec<usize>> {
-    let mut path = vec![i];
-    let mut at = i;
-    while let Some(parent) = parents[at] {
-        path.push(parent);
-        if parent == i {
-            return Some(path);
-        }
-        if path.len() > parents.len() {
-            return None;
-        }
-        at = parent;
-    }
-    None
+    let path = std::iter::successors(Some(i), |&at| parents[at]).take(parents.len() + 1);
+    let path: Vec<usize> = path.collect();
+    let back = path[1..].iter().position(|&parent| parent == i)?;
+    Some(path[..back + 2].to_vec())
 }
 
 fn depth(i: usize, parents: &[Option<usize>]) -> usize {
@@ -247,6 +238,15 @@ fn finite(place: &str, values: &[f64]) -> Result<()> {
         None => Ok(()),
         Some(bad) if values.len() == 1 => Err(Error::input(place, bad, "give a finite number")),
         Some(_) => Err(Error::input(place, list(values), "give finite numbers")),
+    }
+}
+
+/// Refuses what isn't finite, or is negative, or zero if it may not be.
+fn bounded(place: &str, value: f64, zero: bool, remedy: &str) -> Result<()> {
+    finite(place, &[value])?;
+    match value > 0.0 || (zero && value == 0.0) {
+        true => Ok(()),
+        false => Err(Error::input(place, value, remedy)),
     }
 }
 

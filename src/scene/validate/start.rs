@@ -25,14 +25,13 @@ pub(super) fn check(scene: &Scene) -> Result<()> {
             check_quaternion(body, nq, &initial.q[nq..nq + dq])?;
             check_driven(body, nq, "q", &initial.q[nq..nq + dq], |m| m.value(0.0))?;
         }
-        if !initial.v.is_empty() {
-            check_driven(body, nv, "v", &initial.v[nv..nv + dv], |m| m.rate(0.0))?;
-            check_locked(body, nv, "v", &initial.v[nv..nv + dv])?;
-        }
-        if !initial.momentum.is_empty() {
-            let given = &initial.momentum[nv..nv + dv];
-            check_driven(body, nv, "momentum", given, |_| 0.0)?;
-            check_locked(body, nv, "momentum", given)?;
+        for (field, values) in [("v", &initial.v), ("momentum", &initial.momentum)] {
+            if !values.is_empty() {
+                let given = &values[nv..nv + dv];
+                let rate = |m: &Motion| if field == "v" { m.rate(0.0) } else { 0.0 };
+                check_driven(body, nv, field, given, rate)?;
+                check_locked(body, nv, field, given)?;
+            }
         }
         nq += dq;
         nv += dv;
@@ -72,7 +71,7 @@ fn check_length(
 }
 
 fn check_quaternion(body: &Body, first: usize, q: &[f64]) -> Result<()> {
-    let Some(w) = body.joint.quaternion_at() else {
+    let Some(w) = body.joint.model().quaternion_at() else {
         return Ok(());
     };
     let quaternion = &q[w..w + 4];

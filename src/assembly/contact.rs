@@ -3,7 +3,7 @@
 use crate::adjoint::contact::Law;
 use crate::adjoint::lie::Pose;
 use crate::contact::{ContactPair, ContactShape, Contacts};
-use crate::dynamics::{self, ContactModel, Integrator, Parameters};
+use crate::dynamics::{ContactModel, Integrator, Parameters};
 use crate::geometry::Other;
 use crate::scene::{Body, Contact, Scene, Shape};
 use crate::water::{Prepared, Surface, pose};
@@ -35,15 +35,15 @@ pub(super) fn check_integrator(scene: &Scene, integrator: Integrator) -> Result<
     })
 }
 
-/// Contact as `given`, of bodies with these surfaces, at steps of `dt` s.
+/// Contact as `given`, of bodies with these surfaces, at steps of `dt` s; its parameters are set.
 pub(super) fn assemble(
     scene: &Scene,
     given: &Contact,
     dt: f64,
     water: &Prepared,
     surfaces: &[Option<Surface>],
-    parameters: &Parameters,
-) -> Result<(ContactModel, dynamics::ContactParameters)> {
+    parameters: &mut Parameters,
+) -> Result<ContactModel> {
     let mut shapes = Vec::with_capacity(scene.bodies.len());
     for (body, surface) in scene.bodies.iter().zip(surfaces) {
         shapes.push(match (&body.shape, surface) {
@@ -86,12 +86,8 @@ pub(super) fn assemble(
         horizon: dt,
     };
     let laws = shapes.pairs().iter().map(law).collect();
-    let found = dynamics::ContactParameters {
-        stiffness,
-        dissipation: given.dissipation,
-        friction: given.friction,
-    };
-    Ok((ContactModel { shapes, laws }, found))
+    parameters.add_contact([stiffness, given.dissipation, given.friction]);
+    Ok(ContactModel { shapes, laws })
 }
 
 /// Shape of a body: by its formula, or a mesh that is convex.

@@ -155,9 +155,8 @@ pub(crate) fn assemble(
     let water = water::prepare(scene, &choices.water, in_water, &poses, clearance, folder)?;
     system.coupling = water.coupling.clone();
     if let Some(given) = &scene.contact {
-        let made = contact::assemble(scene, given, dt, &water, &surfaces, &parameters)?;
-        system.contact = Some(made.0);
-        parameters.add_contact(made.1);
+        let made = contact::assemble(scene, given, dt, &water, &surfaces, &mut parameters)?;
+        system.contact = Some(made);
     }
     system.limits = limits::assemble(scene, dt, &system, &parameters, &q)?;
     let v = start_velocity(scene, choices, &system, &parameters, &q)?;

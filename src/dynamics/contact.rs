@@ -30,11 +30,11 @@ pub struct PairContact {
 
 impl ContactModel {
     pub(super) fn law(&self, pair: usize, parameters: &Parameters) -> Law {
-        let contact = parameters.contact();
+        let [stiffness, dissipation, friction] = parameters.contact();
         Law {
-            stiffness: contact.stiffness,
-            dissipation: contact.dissipation,
-            friction: contact.friction,
+            stiffness,
+            dissipation,
+            friction,
             ..self.laws[pair]
         }
     }

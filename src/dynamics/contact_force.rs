@@ -5,8 +5,7 @@
 //! that is implicit in it solves contact implicitly, against the mass matrix with its fluid part.
 
 use super::{
-    ContactForce, ContactParameters, Dual, Evaluation, ForceCotangents, JointLimit, PairContact,
-    Parameters, System,
+    ContactForce, Dual, Evaluation, ForceCotangents, JointLimit, PairContact, Parameters, System,
 };
 use crate::Result;
 use crate::adjoint::contact::{contact_force, contact_force_jvp, contact_force_vjp};
@@ -181,11 +180,8 @@ impl Evaluation<'_> {
             // Both u and the virtual velocity are taken at the point.
             let position = own.velocity.cross(&angular(&twist)) + force.cross(&angular(&virt));
             t.displacement_vjp(&own, &position, &mut bar.pose);
-            out.parameters.add_contact(ContactParameters {
-                stiffness: own.stiffness,
-                dissipation: own.dissipation,
-                friction: own.friction,
-            });
+            let law = [own.stiffness, own.dissipation, own.friction];
+            out.parameters.add_contact(law);
         }
         let (q_bar, v_bar) = tree.reverse(&self.kinematics, v, virtual_velocity, &fields, bar);
         out.q += q_bar;

@@ -22,7 +22,5 @@ pub use integrator::{
 };
 pub use limit::JointLimit;
 pub use linearisation::Linearisation;
-pub use parameters::{
-    ContactParameters, Declarations, Declared, Entry, Owner, Parameter, Parameters, Range, Typical,
-};
+pub use parameters::{Declarations, Declared, Entry, Owner, Parameter, Parameters, Range, Typical};
 pub use system::{BodyData, Drive, System};

@@ -217,17 +217,6 @@ impl Declarations {
     }
 }
 
-/// Parameters of contact.
-#[derive(Clone, Copy, Debug, Default, PartialEq)]
-pub struct ContactParameters {
-    /// Stiffness of each point, N/m.
-    pub stiffness: f64,
-    /// Dissipation of Hunt and Crossley, s/m.
-    pub dissipation: f64,
-    /// Friction coefficient.
-    pub friction: f64,
-}
-
 /// Values of all parameters of a system, or their cotangents. Clones share the table.
 #[derive(Clone)]
 pub struct Parameters {
@@ -357,19 +346,13 @@ impl Parameters {
         }
     }
 
-    /// Parameters of contact.
-    pub fn contact(&self) -> ContactParameters {
-        let [stiffness, dissipation, friction] = contact(self.table.bodies).map(|i| self[i]);
-        ContactParameters {
-            stiffness,
-            dissipation,
-            friction,
-        }
+    /// Parameters of contact: stiffness of each point (N/m), dissipation of Hunt and Crossley (s/m), friction coefficient.
+    pub fn contact(&self) -> [f64; 3] {
+        contact(self.table.bodies).map(|i| self[i])
     }
 
     /// Adds to the parameters of contact.
-    pub fn add_contact(&mut self, more: ContactParameters) {
-        let more = [more.stiffness, more.dissipation, more.friction];
+    pub fn add_contact(&mut self, more: [f64; 3]) {
         for (i, x) in contact(self.table.bodies).into_iter().zip(more) {
             self[i] += x;
         }

@@ -357,7 +357,9 @@ pub fn gradcheck_with(
         let largest = group.iter().map(|d| d.adjoint.abs()).fold(0.0, f64::max);
         let limit = (NEGLIGIBLE * largest).max(ROUNDING * size);
         let errors = group.iter().map(|d| {
-            if negligible(d, limit) {
+            let smallest = (d.differences.iter()).fold(f64::INFINITY, |m, x| m.min(x.abs()));
+            // What isn't a number is not under it.
+            if d.adjoint.abs() <= limit && smallest <= limit {
                 0.0
             } else {
                 d.rel_errors.iter().copied().fold(f64::INFINITY, f64::min)
@@ -376,16 +378,6 @@ pub fn gradcheck_with(
         step_sizes,
         directions,
     })
-}
-
-/// Whether adjoint and differences are both under the limit of what is rounding. What isn't a
-/// number is not.
-fn negligible(d: &Direction, limit: f64) -> bool {
-    let smallest = d
-        .differences
-        .iter()
-        .fold(f64::INFINITY, |m, x| m.min(x.abs()));
-    d.adjoint.abs() <= limit && smallest <= limit
 }
 
 fn dot(a: &[f64], b: &[f64]) -> f64 {

@@ -3,7 +3,7 @@
 use super::Rollout;
 use super::trajectory::Seed;
 use crate::Result;
-use crate::dynamics::{Linearisation, StateBar, StepBar};
+use crate::dynamics::{StateBar, StepBar};
 use nalgebra::DMatrix;
 use rayon::prelude::*;
 
@@ -46,20 +46,7 @@ impl Rollout {
             })
             .collect::<Result<Vec<StateBar>>>()?;
         let mut controls = DMatrix::zeros(2 * nv, nu * steps);
-        // y₀ = y(q₀, v₀).
-        let begin = |e: &Linearisation, rows: &[StateBar]| {
-            let each = rows.par_iter().map(|row| {
-                let mut bar = StepBar::zeros(e);
-                bar.state.q = row.q.clone();
-                trajectory
-                    .stepper
-                    .conserved_vjp(e, &self.initial_velocity, &row.y, &mut bar)?;
-                let StateBar { q, .. } = bar.state;
-                Ok(StateBar { q, y: bar.v })
-            });
-            each.collect::<Result<Vec<StateBar>>>()
-        };
-        let mut found = None;
+        let mut first = None;
         for (n, record) in self.tape.records().iter().enumerate().rev() {
             let step = trajectory.linearise(record)?;
             let before = rows.par_iter().map(|row| step.vjp(row, &zero));
@@ -71,14 +58,19 @@ impl Rollout {
                 }
                 rows.push(state);
             }
-            if n == 0 {
-                found = Some(begin(step.linearisation(), &rows)?);
-            }
+            first = Some(step);
         }
-        let found = match found {
-            Some(found) => found,
-            None => begin(&end, &rows)?,
+        // y₀ = y(q₀, v₀).
+        let e = first.as_ref().map_or(&end, |step| step.linearisation());
+        let start = |row: &StateBar| {
+            let mut bar = StepBar::zeros(e);
+            bar.state.q = row.q.clone();
+            let (stepper, v) = (&trajectory.stepper, &self.initial_velocity);
+            stepper.conserved_vjp(e, v, &row.y, &mut bar)?;
+            let StateBar { q, .. } = bar.state;
+            Ok(StateBar { q, y: bar.v })
         };
+        let found = rows.par_iter().map(start).collect::<Result<Vec<_>>>()?;
         let state = StateBar::stacked(nv, &found);
         Ok(Jacobians { state, controls })
     }

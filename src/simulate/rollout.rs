@@ -129,17 +129,15 @@ impl Rollout {
         let scale = samples
             .iter()
             .fold(Vec6::zeros(), |m, s| m.sup(&s.largest_momentum));
-        let (linear, angular) = (
-            scale.fixed_rows::<3>(0).max(),
-            scale.fixed_rows::<3>(3).max(),
-        );
         let mut drift = 0.0_f64;
         for s in samples {
             let d = (s.momentum - first.momentum).abs();
-            let relative = |change: f64, scale: f64| if scale > 0.0 { change / scale } else { 0.0 };
-            drift = drift
-                .max(relative(d.fixed_rows::<3>(0).max(), linear))
-                .max(relative(d.fixed_rows::<3>(3).max(), angular));
+            for part in [0, 3] {
+                let size = scale.fixed_rows::<3>(part).max();
+                if size > 0.0 {
+                    drift = drift.max(d.fixed_rows::<3>(part).max() / size);
+                }
+            }
         }
         Summary {
             steps: self.steps(),

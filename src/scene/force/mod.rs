@@ -16,26 +16,6 @@ pub enum Force {
     Spring(Spring),
 }
 
-impl Force {
-    fn data(&self) -> &dyn ForceData {
-        match self {
-            Force::Spring(spring) => spring,
-        }
-    }
-}
-
-/// What every kind of force says about itself.
-trait ForceData {
-    /// Its kind, as in a scene file.
-    fn kind(&self) -> &'static str;
-
-    /// Its name, if it was given one.
-    fn name(&self) -> Option<&str>;
-
-    /// Checks all that doesn't need the meshes; `place` names a field.
-    fn check(&self, scene: &Scene, place: &dyn Fn(&str) -> String) -> Result<()>;
-}
-
 impl Scene {
     /// Adds a force between bodies.
     pub fn add_force(&mut self, force: Force) {
@@ -44,9 +24,9 @@ impl Scene {
 
     /// Name of force number `index`, which its parameters begin with: its own, or its kind and number, counted from 1.
     pub fn force_name(&self, index: usize) -> String {
-        let data = self.forces[index].data();
-        let counted = || format!("{} {}", data.kind(), index + 1);
-        data.name().map_or_else(counted, str::to_owned)
+        let Force::Spring(spring) = &self.forces[index];
+        let counted = || format!("spring {}", index + 1);
+        spring.name.clone().unwrap_or_else(counted)
     }
 
     /// Checks the forces, once the bodies are known to be right.
@@ -64,7 +44,8 @@ impl Scene {
                 ));
             }
             taken.push(name);
-            force.data().check(self, &place)?;
+            let Force::Spring(spring) = force;
+            spring.check(self, &place)?;
         }
         Ok(())
     }

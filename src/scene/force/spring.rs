@@ -1,7 +1,7 @@
 //! Linear springs with dampers.
 
 use super::super::is_default;
-use super::{Force, ForceData, Scene, number};
+use super::{Force, Scene, number};
 use crate::{Error, Result};
 use serde::{Deserialize, Serialize};
 
@@ -83,16 +83,9 @@ impl From<Spring> for Force {
     }
 }
 
-impl ForceData for Spring {
-    fn kind(&self) -> &'static str {
-        "spring"
-    }
-
-    fn name(&self) -> Option<&str> {
-        self.name.as_deref()
-    }
-
-    fn check(&self, scene: &Scene, place: &dyn Fn(&str) -> String) -> Result<()> {
+impl Spring {
+    /// Checks all that doesn't need the meshes; `place` names a field.
+    pub(super) fn check(&self, scene: &Scene, place: &dyn Fn(&str) -> String) -> Result<()> {
         scene.named_body(&self.body, place("body"))?;
         if let Some(to) = &self.to {
             scene.named_body(to, place("to"))?;

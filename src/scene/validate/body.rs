@@ -240,15 +240,13 @@ fn check_joint(body: &Body) -> Result<()> {
             "a fixed joint takes no force; take `actuated` away or give the body a joint",
         ));
     }
-    if body.actuated && body.is_prescribed() {
-        let how = if body.locked { "locked" } else { "driven" };
+    if let (true, Some((how, key))) = (body.actuated, limits::prescribed(body)) {
         return Err(Error::input(
             place(body, "actuated"),
             true,
             format!(
                 "the joint is {how}, so its force is a result and can't be a control; take \
-                 `actuated` or `{}` away",
-                if body.locked { "locked" } else { "motion" }
+                 `actuated` or `{key}` away"
             ),
         ));
     }

@@ -36,11 +36,7 @@ pub(super) fn check(body: &Body) -> Result<()> {
             "only joints with one coordinate (such as prismatic and revolute ones) have limits; build the motion from several of them",
         ));
     }
-    if body.is_prescribed() {
-        let (how, key) = match body.locked {
-            true => ("locked", "locked"),
-            false => ("driven", "motion"),
-        };
+    if let Some((how, key)) = prescribed(body) {
         return Err(Error::input(
             place,
             list(&[lower, upper]),
@@ -48,6 +44,14 @@ pub(super) fn check(body: &Body) -> Result<()> {
         ));
     }
     Ok(())
+}
+
+/// How a joint is kept from moving by itself, and the key that says so; none if it isn't.
+pub(super) fn prescribed(body: &Body) -> Option<(&'static str, &'static str)> {
+    body.is_prescribed().then_some(match body.locked {
+        true => ("locked", "locked"),
+        false => ("driven", "motion"),
+    })
 }
 
 /// A joint must start within its limits; `given` is its coordinate, number `first` of all, if the scene says.

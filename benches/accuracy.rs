@@ -18,7 +18,7 @@ use hydrograd::boundary::panel::richardson;
 use hydrograd::boundary::{
     BodyBoundary, Depth, ExactBoundary, Method, MfsSettings, PanelBoundary, Response, RowScaling,
 };
-use hydrograd::coupling::full::{MfsBody, Preconditioner};
+use hydrograd::coupling::full::Preconditioner;
 use hydrograd::scene::{Scene, Shape};
 use hydrograd::{Fidelity, Result, Settings, Simulator, simulate};
 use nalgebra::{DMatrix, DVector};
@@ -189,10 +189,10 @@ fn harmonics() -> Result<()> {
 }
 
 /// A unit sphere and a coin of 1280 faces each.
-fn sphere_and_coin(settings: &MfsSettings) -> Result<[Arc<MfsBody>; 2]> {
+fn sphere_and_coin(settings: &MfsSettings) -> Result<[Arc<BodyBoundary>; 2]> {
     let body = |axes| {
         let body = sources(axes, 1280, settings)?;
-        Ok(Arc::new(MfsBody::new(Arc::new(body))))
+        Ok(Arc::new(body))
     };
     Ok([body([1.0; 3])?, body([1.0, 0.2, 1.0])?])
 }

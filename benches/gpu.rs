@@ -9,7 +9,7 @@
 
 use hydrograd::adjoint::lie::{Pose, Vec3, Vec6};
 use hydrograd::boundary::{BodyBoundary, MfsSettings as BodySettings};
-use hydrograd::coupling::full::{Cpu, Full, MfsBody, Model, SolveSettings};
+use hydrograd::coupling::full::{Cpu, Full, Model, SolveSettings};
 use hydrograd::coupling::{Direction, Exclusions, Linearise};
 use hydrograd::dynamics::Integrator;
 use hydrograd::gpu::full::{Gpu, Probe};
@@ -145,7 +145,7 @@ fn scenes(budget: &Budget) -> hydrograd::Result<()> {
 fn lattice(count: usize) -> hydrograd::Result<(Arc<Model>, Vec<Pose>)> {
     let mesh = shape::build(&Shape::sphere(0.5), Path::new("."), Some(FACES))?;
     let boundary = BodyBoundary::new("ball", &mesh, &BodySettings::default())?;
-    let body = Arc::new(MfsBody::new(Arc::new(boundary)));
+    let body = Arc::new(boundary);
     let settings = SolveSettings {
         tolerance: 1e-6,
         ..SolveSettings::default()

@@ -1,7 +1,7 @@
 //! A body and the points of another body's image, whose relative placement changes.
 
 use crate::adjoint::kernel::Sources;
-use crate::adjoint::lie::{Pose, Vec3, Vec6, angular, cross_force, linear, six};
+use crate::adjoint::lie::{Pose, Vec3, Vec6, cross_force, point_velocity, point_wrench};
 use crate::geometry::Image;
 
 /// One pair at given poses.
@@ -43,14 +43,17 @@ impl Pair {
     pub fn displacements(&self, pose: &Pose, z: &[Vec6]) -> Vec<Vec3> {
         let relative = self.image.twist(&z[self.source]) - z[self.target];
         let local = pose.twist_to_body(&relative);
-        let (u, w) = (linear(&local), angular(&local));
-        self.positions.iter().map(|s| u + w.cross(s)).collect()
+        let velocity = |s| point_velocity(&local, s);
+        self.positions.iter().map(velocity).collect()
     }
 
     /// Adds a wrench on the sources (given in the target's frame) to both bodies, as spatial wrenches.
     pub fn apply(&self, pose: &Pose, wrench: &Vec6, out: &mut [Vec6]) {
-        let world = pose.wrench_to_world(wrench);
-        out[self.source] += self.image.twist_vjp(&world);
+        self.apply_world(&pose.wrench_to_world(wrench), out);
+    }
+
+    fn apply_world(&self, world: &Vec6, out: &mut [Vec6]) {
+        out[self.source] += self.image.twist_vjp(world);
         out[self.target] -= world;
     }
 
@@ -64,18 +67,18 @@ impl Pair {
         out: &mut [Vec6],
     ) {
         let world = cross_force(z, &pose.wrench_to_world(wrench)) + pose.wrench_to_world(dwrench);
-        out[self.source] += self.image.twist_vjp(&world);
-        out[self.target] -= world;
+        self.apply_world(&world, out);
     }
 }
 
 /// Wrench about the origin of forces at points: Σ (f, s × f).
 pub(super) fn wrench(positions: &[Vec3], force: impl Fn(usize) -> Vec3) -> Vec6 {
-    let (mut total, mut moment) = (Vec3::zeros(), Vec3::zeros());
-    for (j, s) in positions.iter().enumerate() {
-        let f = force(j);
-        total += f;
-        moment += s.cross(&f);
-    }
-    six(&total, &moment)
+    let wrenches = positions.iter().enumerate();
+    wrenches.map(|(j, s)| point_wrench(s, &force(j))).sum()
+}
+
+/// Three-vector `k` of row `j` in a `[j][columns][3]` array.
+#[inline]
+pub(super) fn vector(g: &[f64], columns: usize, j: usize, k: usize) -> Vec3 {
+    Vec3::from_column_slice(&g[3 * (j * columns + k)..][..3])
 }

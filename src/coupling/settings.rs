@@ -1,7 +1,46 @@
-//! What the coupled systems share: limits of their solvers, and the measure of their symmetry.
+//! What the coupled systems share: ranges of their bodies, limits of their solvers, and the measure of
+//! their symmetry.
 
+use crate::solver::Outcome;
 use crate::{Error, Result};
 use nalgebra::DMatrix;
+use std::ops::Range;
+
+/// Consecutive ranges of these lengths.
+pub(super) fn ranges(lengths: impl Iterator<Item = usize>) -> Vec<Range<usize>> {
+    let mut at = 0;
+    let range = |n| {
+        at += n;
+        at - n..at
+    };
+    lengths.map(range).collect()
+}
+
+/// Where consecutive ranges end.
+pub(super) fn end(ranges: &[Range<usize>]) -> usize {
+    ranges.last().map_or(0, |r| r.end)
+}
+
+/// An outcome that met the tolerance; the residual of a recurrence may stall a little above at round-off.
+pub(super) fn converged(
+    outcome: Outcome,
+    tolerance: f64,
+    what: impl FnOnce() -> String,
+    instead: &str,
+) -> Result<Outcome> {
+    if outcome.residual <= tolerance.max(1e-13) * 1.001 {
+        return Ok(outcome);
+    }
+    Err(Error::Solver {
+        what: what(),
+        iterations: outcome.iterations,
+        residual: outcome.residual,
+        tolerance,
+        remedy: format!(
+            "raise the tolerance, refine the meshes where bodies are close, or use the {instead}"
+        ),
+    })
+}
 
 /// Whether an iterative solver can work with these.
 pub(super) fn check_limits(tolerance: f64, max_iterations: usize) -> Result<()> {

@@ -27,22 +27,23 @@ impl PairTensor {
 
     /// Adds the derivatives of one pair, from `raw`: rows 6·x + component of the wrench on its points that column x makes with column y, in
     /// the target's frame.
-    pub(super) fn add(&mut self, pair: &Pair, pose: &Pose, raw: &Columns) {
-        let k = self.columns;
-        for x in 0..k {
+    pub(super) fn add_pair(&mut self, pair: &Pair, pose: &Pose, raw: &Columns) {
+        for x in 0..self.columns {
             for y in 0..=x {
                 let w = Vec6::from_fn(|c, _| 0.5 * (raw.at(6 * x + c, y) + raw.at(6 * y + c, x)));
                 let world = pose.wrench_to_world(&w);
-                let back = pair.image.twist_vjp(&world);
-                for (b, w) in [(pair.source, back), (pair.target, -world)] {
-                    let mut column = self.wrenches[b].fixed_view_mut::<6, 1>(0, x * k + y);
-                    column += w;
-                    if x != y {
-                        let mut column = self.wrenches[b].fixed_view_mut::<6, 1>(0, y * k + x);
-                        column += w;
-                    }
-                }
+                self.add(pair.source, (x, y), &pair.image.twist_vjp(&world));
+                self.add(pair.target, (x, y), &-world);
             }
+        }
+    }
+
+    /// Adds to the wrench of a body in E(e_x, e_y), and in E(e_y, e_x) where that is another.
+    pub fn add(&mut self, body: usize, (x, y): (usize, usize), wrench: &Vec6) {
+        let k = self.columns;
+        for (x, y) in [(x, y), (y, x)].into_iter().take(1 + usize::from(x != y)) {
+            let mut column = self.wrenches[body].fixed_view_mut::<6, 1>(0, x * k + y);
+            column += wrench;
         }
     }
 

@@ -161,7 +161,7 @@ impl Geometry {
     /// A device that fails, or has too little memory.
     pub fn new(context: &Arc<Context>, model: &Arc<Model>) -> Result<Self> {
         let fine = context.fine();
-        let (all, of) = shapes(model.bodies.iter().map(|b| &b.boundary));
+        let (all, of) = shapes(model.bodies.iter());
         let length = all
             .iter()
             .flat_map(|b| b.faces.corners.iter().flatten())
@@ -210,7 +210,7 @@ impl Geometry {
                 source_table.extend((0..6).map(|k| p[k] * of(k) / (length * length)));
             }
         }
-        let method = |b: usize| match model.bodies[b].boundary.settings.method {
+        let method = |b: usize| match model.bodies[b].settings.method {
             Method::MfsVertex => 0,
             Method::MfsFace => 1,
         };
@@ -244,7 +244,7 @@ impl Geometry {
         let damping: Vec<f64> = model
             .bodies
             .iter()
-            .flat_map(|b| b.boundary.damping.iter().map(|d| (d / weight).powi(2)))
+            .flat_map(|b| b.damping.iter().map(|d| (d / weight).powi(2)))
             .collect();
 
         let (factors, layout, diagonal) = factors(context, model, &all, &of, weight);

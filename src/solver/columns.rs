@@ -2,6 +2,7 @@
 
 use crate::adjoint::solve::Columnwise;
 use faer::{MatMut, MatRef};
+use std::ops::Range;
 
 /// Row-major `[row][column]` array with few columns.
 #[derive(Clone, Debug, PartialEq)]
@@ -26,13 +27,12 @@ impl Columns {
 
     /// From a function of (row, column).
     pub fn from_fn(rows: usize, columns: usize, f: impl Fn(usize, usize) -> f64) -> Self {
-        let mut out = Self::zeros(rows, columns);
-        for i in 0..rows {
-            for k in 0..columns {
-                out.data[i * columns + k] = f(i, k);
-            }
+        let at = (0..rows).flat_map(|i| (0..columns).map(move |k| (i, k)));
+        Self {
+            rows,
+            columns,
+            data: at.map(|(i, k)| f(i, k)).collect(),
         }
-        out
     }
 
     /// Entry.
@@ -57,28 +57,36 @@ impl Columns {
         MatMut::from_row_major_slice_mut(&mut self.data, self.rows, self.columns)
     }
 
-    /// Rows `from..to`.
-    pub fn slice(&self, from: usize, to: usize) -> &[f64] {
-        &self.data[from * self.columns..to * self.columns]
+    /// Some rows.
+    pub fn slice(&self, rows: &Range<usize>) -> &[f64] {
+        &self.data[rows.start * self.columns..rows.end * self.columns]
     }
 
-    /// Rows `from..to` to be written.
-    pub fn slice_mut(&mut self, from: usize, to: usize) -> &mut [f64] {
-        &mut self.data[from * self.columns..to * self.columns]
+    /// Some rows, to be written.
+    pub fn slice_mut(&mut self, rows: &Range<usize>) -> &mut [f64] {
+        &mut self.data[rows.start * self.columns..rows.end * self.columns]
+    }
+
+    /// Some rows on their own.
+    pub fn part(&self, rows: &Range<usize>) -> Self {
+        Self {
+            rows: rows.len(),
+            columns: self.columns,
+            data: self.slice(rows).to_vec(),
+        }
+    }
+
+    /// `self += other`.
+    pub fn add(&mut self, other: &Self) {
+        let pairs = self.data.iter_mut().zip(&other.data);
+        pairs.for_each(|(a, b)| *a += b);
     }
 
     /// Combination of the columns.
     pub fn combine(&self, coefficients: &[f64]) -> Vec<f64> {
         debug_assert_eq!(coefficients.len(), self.columns);
-        (0..self.rows)
-            .map(|i| {
-                self.row(i)
-                    .iter()
-                    .zip(coefficients)
-                    .map(|(a, b)| a * b)
-                    .sum()
-            })
-            .collect()
+        let products = |i| self.row(i).iter().zip(coefficients).map(|(a, b)| a * b);
+        (0..self.rows).map(|i| products(i).sum()).collect()
     }
 
     /// One column.
@@ -109,14 +117,9 @@ impl Columns {
         if n == 0 {
             return;
         }
-        for (a, b) in self
-            .data
-            .chunks_exact_mut(n)
-            .zip(other.data.chunks_exact(n))
-        {
-            for k in 0..n {
-                a[k] += b[k] * scale[k];
-            }
+        for (i, b) in other.data.chunks_exact(n).enumerate() {
+            let row = self.data[i * n..].iter_mut().zip(b).zip(scale);
+            row.for_each(|((a, b), s)| *a += b * s);
         }
     }
 }

@@ -1,6 +1,6 @@
 //! Dense LU with partial pivoting, in the memory of the matrix, parallel over fixed groups of columns.
 
-use super::{condition, count, largest_eigenvalue, product, transposed_product};
+use super::{CALLS, condition, largest_eigenvalue, product, transposed_product};
 use faer::dyn_stack::{MemBuffer, MemStack};
 use faer::linalg::lu::partial_pivoting::{factor, solve};
 use faer::linalg::matmul::matmul;
@@ -27,7 +27,7 @@ impl Lu {
     /// Factors the `size` × `size` matrix in `data` (column-major), which it takes over. A singular
     /// matrix has the condition number infinity and no use.
     pub fn new(mut data: Vec<f64>, size: usize) -> Self {
-        count::call();
+        CALLS.add(1);
         assert_eq!(data.len(), size * size, "a square matrix");
         // The memory of A by columns is that of Aᵀ by rows.
         let largest = largest_eigenvalue(size, |x| {
@@ -55,11 +55,6 @@ impl Lu {
         out
     }
 
-    /// Number of rows.
-    pub fn size(&self) -> usize {
-        self.size
-    }
-
     /// Ratio of the largest singular value to the smallest, estimated from below by a few steps of
     /// Lanczos on AᵀA and on its inverse.
     pub fn condition(&self) -> f64 {
@@ -75,7 +70,7 @@ impl Lu {
 
     /// `x ← A⁻¹ x`, x size × columns.
     pub fn solve(&self, x: MatMut<'_, f64>) {
-        count::call();
+        CALLS.add(1);
         let (lu, rows) = self.factors();
         let scratch = solve::solve_in_place_scratch::<usize, f64>(self.size, x.ncols(), Par::Seq);
         let mut memory = MemBuffer::new(scratch);
@@ -85,7 +80,7 @@ impl Lu {
 
     /// `x ← A⁻ᵀ x`.
     pub fn solve_transpose(&self, x: MatMut<'_, f64>) {
-        count::call();
+        CALLS.add(1);
         let (lu, rows) = self.factors();
         let scratch =
             solve::solve_transpose_in_place_scratch::<usize, f64>(self.size, x.ncols(), Par::Seq);

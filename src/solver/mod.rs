@@ -6,7 +6,6 @@
 
 mod cgls;
 mod columns;
-mod count;
 mod eigenvalue;
 mod gmres;
 mod lu;
@@ -14,9 +13,14 @@ mod product;
 
 pub use cgls::{Outcome, cgls};
 pub use columns::Columns;
-#[doc(hidden)]
-pub use count::CALLS;
 pub(crate) use eigenvalue::{condition, largest_eigenvalue};
 pub use gmres::gmres;
 pub use lu::Lu;
 pub use product::{normal_product, product, transposed_product};
+
+use crate::adjoint::count::Counter;
+
+/// Calls of this module's solvers and products ([`cgls`], [`gmres`](gmres()), [`product`](product()) and its
+/// kin, [`Lu`]) in this process.
+#[doc(hidden)]
+pub static CALLS: Counter = Counter::new();

@@ -3,7 +3,7 @@
 //! With few columns a general matrix product spends its time packing the large factor; here tiles of rows are
 //! used twice, for `K x` and for `Kᵀ y`, while they are in cache.
 
-use super::{Columns, count};
+use super::{CALLS, Columns};
 use pulp::{Arch, Simd, WithSimd};
 use rayon::prelude::*;
 
@@ -162,24 +162,7 @@ fn updates<S: Simd, const N: usize>(
 
 /// Column-major copy.
 fn by_columns(x: &Columns) -> Vec<f64> {
-    let mut out = vec![0.0; x.data.len()];
-    for (i, row) in x.data.chunks_exact(x.columns).enumerate() {
-        for (c, v) in row.iter().enumerate() {
-            out[c * x.rows + i] = *v;
-        }
-    }
-    out
-}
-
-/// Sum of the groups' column-major parts, in their order, as row-major columns.
-fn total(parts: &[Vec<f64>], rows: usize, columns: usize) -> Columns {
-    let mut out = Columns::zeros(rows, columns);
-    for i in 0..rows {
-        for c in 0..columns {
-            out.data[i * columns + c] = parts.iter().map(|p| p[c * rows + i]).sum();
-        }
-    }
-    out
+    (0..x.columns).flat_map(|c| x.column(c)).collect()
 }
 
 /// Rows of each group: a multiple of the tile.
@@ -189,7 +172,7 @@ fn group_rows(rows: usize) -> usize {
 
 /// `K x`, K row-major rows × x.rows.
 pub fn product(k: &[f64], rows: usize, x: &Columns) -> Columns {
-    count::call();
+    CALLS.add(1);
     let n = x.columns;
     let mut out = Columns::zeros(rows, n);
     if n == 0 || rows == 0 || x.rows == 0 {
@@ -212,58 +195,53 @@ pub fn product(k: &[f64], rows: usize, x: &Columns) -> Columns {
     out
 }
 
-/// `Kᵀ y`, K row-major y.rows × columns.
-pub fn transposed_product(k: &[f64], columns: usize, y: &Columns) -> Columns {
-    count::call();
-    let n = y.columns;
-    if n == 0 || y.rows == 0 || columns == 0 {
-        return Columns::zeros(columns, n);
+/// `Σ Kᵀ middle` over groups of rows of K (rows × stride), `middle` of each from its number and rows;
+/// made of K x first where x is given by columns.
+fn transposed(
+    k: &[f64],
+    [rows, stride, n]: [usize; 3],
+    x: &[f64],
+    middle: impl Fn(usize, usize) -> Vec<f64> + Sync,
+) -> Columns {
+    CALLS.add(1);
+    if n == 0 || rows == 0 || stride == 0 {
+        return Columns::zeros(stride, n);
     }
-    let size = group_rows(y.rows);
+    let size = group_rows(rows);
     let parts: Vec<Vec<f64>> = k
-        .par_chunks(size * columns)
-        .zip(y.data.par_chunks(size * n))
-        .map(|(k, middle)| {
-            let mut out = vec![0.0; columns * n];
+        .par_chunks(size * stride)
+        .enumerate()
+        .map(|(group, k)| {
+            let mut out = vec![0.0; stride * n];
             Arch::new().dispatch(Tiles {
                 k,
-                stride: columns,
+                stride,
                 columns: n,
-                x: &[],
-                middle: &mut middle.to_vec(),
+                x,
+                middle: &mut middle(group * size, k.len() / stride),
                 out: &mut out,
             });
             out
         })
         .collect();
-    total(&parts, columns, n)
+    // Column by column, the groups in their order.
+    Columns::from_fn(stride, n, |i, c| {
+        parts.iter().map(|p| p[c * stride + i]).sum()
+    })
+}
+
+/// `Kᵀ y`, K row-major y.rows × columns.
+pub fn transposed_product(k: &[f64], columns: usize, y: &Columns) -> Columns {
+    transposed(k, [y.rows, columns, y.columns], &[], |from, rows| {
+        y.slice(&(from..from + rows)).to_vec()
+    })
 }
 
 /// `Kᵀ (K x)` with K read once, K row-major rows × x.rows.
 pub fn normal_product(k: &[f64], rows: usize, x: &Columns) -> Columns {
-    count::call();
-    let n = x.columns;
-    if n == 0 || rows == 0 || x.rows == 0 {
-        return Columns::zeros(x.rows, n);
-    }
-    let columns = by_columns(x);
-    let size = group_rows(rows);
-    let parts: Vec<Vec<f64>> = k
-        .par_chunks(size * x.rows)
-        .map(|k| {
-            let mut out = vec![0.0; x.rows * n];
-            Arch::new().dispatch(Tiles {
-                k,
-                stride: x.rows,
-                columns: n,
-                x: &columns,
-                middle: &mut vec![0.0; k.len() / x.rows * n],
-                out: &mut out,
-            });
-            out
-        })
-        .collect();
-    total(&parts, x.rows, n)
+    transposed(k, [rows, x.rows, x.columns], &by_columns(x), |_, rows| {
+        vec![0.0; rows * x.columns]
+    })
 }
 
 #[cfg(test)]

@@ -88,7 +88,7 @@ impl Device {
             match Gpu::new(context, &model) {
                 Ok(gpu) => return Ok(Full::on(model, Box::new(gpu))),
                 // The CPU has no use for bodies without a factor: the device's error is the one that tells.
-                Err(error) if model.bodies.iter().any(|b| !b.boundary.factored()) => {
+                Err(error) if model.bodies.iter().any(|b| !b.factored()) => {
                     return Err(error);
                 }
                 Err(error) => self.leave(error)?,

@@ -5,7 +5,7 @@ use hydrograd::adjoint::lie::{Pose, Vec3, Vec6, exp_matrix};
 use hydrograd::adjoint::sample;
 use hydrograd::boundary::{BodyBoundary, Method, MfsSettings};
 use hydrograd::coupling::Exclusions;
-use hydrograd::coupling::full::{Full, MfsBody, Model, Preconditioner, SolveSettings};
+use hydrograd::coupling::full::{Full, Model, Preconditioner, SolveSettings};
 use hydrograd::gpu::full::Gpu;
 use hydrograd::gpu::{Arithmetic, Context, Options};
 use hydrograd::scene::{Shape, Wall, WallSurface};
@@ -41,14 +41,14 @@ pub fn two_float() -> &'static Arc<Context> {
     CONTEXT.get_or_init(|| Context::new(&options).expect("a GPU, or a driver that stands for one"))
 }
 
-pub fn body(shape: &Shape, faces: usize, method: Method) -> Arc<MfsBody> {
+pub fn body(shape: &Shape, faces: usize, method: Method) -> Arc<BodyBoundary> {
     let mesh = mesh(shape, faces);
     let settings = MfsSettings {
         method,
         ..MfsSettings::default()
     };
     let b = BodyBoundary::new("b", &mesh, &settings).unwrap();
-    Arc::new(MfsBody::new(Arc::new(b)))
+    Arc::new(b)
 }
 
 /// Three bodies, two of one shape, none of whose sizes is a multiple of a block.

@@ -33,7 +33,7 @@ struct Entry {
 /// Every pair.
 fn entries(model: &Model, poses: &[Pose], z: &[Vec6], mut each: impl FnMut(Entry)) {
     for (t, target) in model.bodies.iter().enumerate() {
-        let (b, pose) = (&target.boundary, &poses[t]);
+        let (b, pose) = (target, &poses[t]);
         for (number, image) in model.images.iter().enumerate() {
             for (c, source) in model.bodies.iter().enumerate() {
                 if number == 0 && model.excluded.contains(t, c) {
@@ -41,7 +41,7 @@ fn entries(model: &Model, poses: &[Pose], z: &[Vec6], mut each: impl FnMut(Entry
                 }
                 let (linear_part, shift) = image.placement(&poses[c]);
                 let motion = image.twist(&z[c]) - z[t];
-                for (j, s) in source.boundary.sources.iter().enumerate() {
+                for (j, s) in source.sources.iter().enumerate() {
                     let at = linear_part * s + shift;
                     let d = linear(&motion) + angular(&motion).cross(&at);
                     let (s, ds) = (pose.apply_inverse(&at), pose.rotation.tr_mul(&d));
@@ -258,7 +258,7 @@ pub fn solves() {
             let a = context.fine();
             let kx = probe.apply(a, false, &x).unwrap();
             let mut back = probe.apply_transpose(a, false, &kx).unwrap();
-            let damping = model.bodies.iter().flat_map(|b| &b.boundary.damping);
+            let damping = model.bodies.iter().flat_map(|b| &b.damping);
             for (j, d) in damping.enumerate() {
                 for k in 0..4 {
                     back.data[j * 4 + k] += d * d * x.at(j, k);

@@ -3,7 +3,7 @@
 use super::fixture::*;
 use hydrograd::adjoint::lie::{Pose, Vec3, exp_matrix};
 use hydrograd::boundary::{BodyBoundary, MfsSettings, Readout};
-use hydrograd::coupling::full::{Cpu, Full, MfsBody, Model, Preconditioner, SolveSettings};
+use hydrograd::coupling::full::{Cpu, Full, Model, Preconditioner, SolveSettings};
 use hydrograd::coupling::{Coupling, Direction, Exclusions, Linearise};
 use hydrograd::gpu::full::Gpu;
 use hydrograd::scene::Shape;
@@ -11,7 +11,7 @@ use hydrograd::shape;
 use std::path::Path;
 use std::sync::Arc;
 
-fn bodies(factored: [bool; 3]) -> Vec<Arc<MfsBody>> {
+fn bodies(factored: [bool; 3]) -> Vec<Arc<BodyBoundary>> {
     // Without the body's own residual flux both read the same potential out.
     let settings = MfsSettings {
         readout: Readout::Centre,
@@ -24,7 +24,7 @@ fn bodies(factored: [bool; 3]) -> Vec<Arc<MfsBody>> {
         } else {
             BodyBoundary::unfactored("b", &mesh, &settings)
         };
-        Arc::new(MfsBody::new(Arc::new(made.unwrap())))
+        Arc::new(made.unwrap())
     };
     vec![
         of(0, &Shape::sphere(0.5)),
@@ -90,7 +90,7 @@ fn lattice(n: usize) -> Vec<Pose> {
 fn derivatives_of_many_pairs_go_in_batches() {
     let mesh = shape::build(&Shape::ellipsoid([0.5, 0.3, 0.4]), Path::new("."), Some(20)).unwrap();
     let boundary = BodyBoundary::new("b", &mesh, &MfsSettings::default()).unwrap();
-    let body = Arc::new(MfsBody::new(Arc::new(boundary)));
+    let body = Arc::new(boundary);
     let poses = lattice(4);
     let settings = SolveSettings {
         tolerance: 1e-10,

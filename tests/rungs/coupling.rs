@@ -5,7 +5,7 @@ use super::tools::{all, along, vector_along, wavy};
 use hydrograd::adjoint::check::{Outcome, Rung};
 use hydrograd::adjoint::lie::{Mat6, Pose, Vec3, Vec6, cross_motion, exp_matrix};
 use hydrograd::boundary::{BodyBoundary, Method, MfsSettings, PanelBoundary};
-use hydrograd::coupling::full::{Full, FullSolver, MfsBody, SolveSettings};
+use hydrograd::coupling::full::{Full, FullSolver, SolveSettings};
 use hydrograd::coupling::panel::{self, PanelSolver};
 use hydrograd::coupling::reduced::{Cutoff, Reduced, compress};
 use hydrograd::coupling::{Direction, Exclusions, Isolated, Linearise, PanelCoupled};
@@ -54,7 +54,7 @@ const SIDE: Wall = Wall {
     normal: [1.0, 0.0, -0.1],
 };
 
-fn body(shape: Shape, method: Method, solver: FullSolver) -> Arc<MfsBody> {
+fn body(shape: Shape, method: Method, solver: FullSolver) -> Arc<BodyBoundary> {
     let mesh = shape::build(&shape, Path::new("."), Some(80)).unwrap();
     let mut settings = MfsSettings {
         method,
@@ -64,7 +64,7 @@ fn body(shape: Shape, method: Method, solver: FullSolver) -> Arc<MfsBody> {
         settings.damping = 0.0;
     }
     let b = BodyBoundary::new("b", &mesh, &settings).unwrap();
-    Arc::new(MfsBody::new(Arc::new(b)))
+    Arc::new(b)
 }
 
 fn full(method: Method, solver: FullSolver, walls: &[Wall]) -> Full {
@@ -118,8 +118,7 @@ fn panel_systems() -> Vec<PanelCoupled> {
             tolerance: 1e-13,
             ..panel::SolveSettings::default()
         };
-        let coupled = PanelCoupled::new(bodies.to_vec(), walls, settings).unwrap();
-        coupled.excluding(excluded).unwrap()
+        PanelCoupled::new(bodies.to_vec(), walls, excluded, settings).unwrap()
     };
     let free = Wall {
         surface: WallSurface::Free,

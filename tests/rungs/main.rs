@@ -80,17 +80,20 @@ const ON_DEVICE: &[(&str, &str)] = &[
 /// Helpers and declarations that are checked through a registered rung: (helper, rung).
 const THROUGH: &[(&str, &str)] = &[
     // Kernels behind a body's rows, and the pieces of the coupled record.
-    ("coupling::full::body::MfsBody::jvp", FULL_HVP),
-    ("coupling::full::body::MfsBody::vjp", FULL_VJP),
-    ("coupling::full::body::MfsBody::hvp", FULL_HVP),
-    ("coupling::full::body::MfsBody::potential_vjp", FULL_VJP),
-    ("coupling::full::body::MfsBody::potential_hvp", FULL_HVP),
-    ("coupling::pair::Pair::apply_jvp", FULL_HVP),
-    ("coupling::full::cpu::system::System::respond_jvp", FULL_HVP),
+    ("boundary::mfs::assemble::BodyBoundary::jvp", FULL_HVP),
+    ("boundary::mfs::assemble::BodyBoundary::vjp", FULL_VJP),
+    ("boundary::mfs::assemble::BodyBoundary::hvp", FULL_HVP),
     (
-        "coupling::full::cpu::response::CoupledSolution::gradient",
+        "boundary::mfs::assemble::BodyBoundary::potential_vjp",
         FULL_VJP,
     ),
+    (
+        "boundary::mfs::assemble::BodyBoundary::potential_hvp",
+        FULL_HVP,
+    ),
+    ("coupling::pair::Pair::apply_jvp", FULL_HVP),
+    ("coupling::full::cpu::system::System::respond_jvp", FULL_HVP),
+    ("coupling::full::cpu::CoupledSolution::gradient", FULL_VJP),
     ("coupling::panel::first::PlacedPanels::gradient", PANEL_VJP),
     // Each joint's maps, through those that all joints share.
     (

@@ -2,7 +2,8 @@
 
 use hydrograd::TriMesh;
 use hydrograd::adjoint::lie::{Mat3, Pose, Vec3};
-use hydrograd::coupling::full::{Full, MfsBody, Preconditioner, SolveSettings};
+use hydrograd::boundary::BodyBoundary;
+use hydrograd::coupling::full::{Full, Preconditioner, SolveSettings};
 use hydrograd::coupling::{Coupling, Exclusions};
 use hydrograd::scene::{Body, Fluid, Joint, Scene, Shape};
 use nalgebra::DMatrix;
@@ -91,7 +92,7 @@ pub fn off_ellipsoid(semi_axes: [f64; 3], gap: f64, count: usize) -> Vec<Vec3> {
 /// Iterations of CGLS for two bodies at unit density, the second one `gap` above the first: a unit sphere and a coin of
 /// thickness 0.4 flat side on, all twelve twists, cold start.
 pub fn coin_iterations(
-    bodies: &[Arc<MfsBody>],
+    bodies: &[Arc<BodyBoundary>],
     gap: f64,
     preconditioner: Preconditioner,
     tolerance: f64,

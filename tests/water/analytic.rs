@@ -10,28 +10,28 @@ use crate::support::{mesh, scaled_error};
 use hydrograd::Error;
 use hydrograd::adjoint::lie::{Mat3, Mat6, Pose, Vec3, Vec6, exp_matrix, skew};
 use hydrograd::boundary::{BodyBoundary, Method, MfsSettings};
-use hydrograd::coupling::full::{Full, FullSolver, MfsBody, Preconditioner, SolveSettings};
+use hydrograd::coupling::full::{Full, FullSolver, Preconditioner, SolveSettings};
 use hydrograd::coupling::{Coupling, CouplingReport, Direction, Exclusions, Isolated, Linearise};
 use hydrograd::scene::{Shape, Wall};
 use nalgebra::{DMatrix, DVector};
 use std::sync::{Arc, LazyLock};
 
-fn submerged(semi_axes: [f64; 3], faces: usize, settings: &MfsSettings) -> Arc<MfsBody> {
+fn submerged(semi_axes: [f64; 3], faces: usize, settings: &MfsSettings) -> Arc<BodyBoundary> {
     let mesh = mesh(&Shape::ellipsoid(semi_axes), faces);
     let b = BodyBoundary::new("body", &mesh, settings).unwrap();
-    Arc::new(MfsBody::new(Arc::new(b)))
+    Arc::new(b)
 }
 
-fn ellipsoid(semi_axes: [f64; 3], faces: usize) -> Arc<MfsBody> {
+fn ellipsoid(semi_axes: [f64; 3], faces: usize) -> Arc<BodyBoundary> {
     submerged(semi_axes, faces, &MfsSettings::default())
 }
 
 /// Unit sphere and coin, 1280 faces.
-static SPHERE: LazyLock<Arc<MfsBody>> = LazyLock::new(|| ellipsoid([1.0; 3], 1280));
-static COIN: LazyLock<Arc<MfsBody>> = LazyLock::new(|| ellipsoid([1.0, 0.2, 1.0], 1280));
+static SPHERE: LazyLock<Arc<BodyBoundary>> = LazyLock::new(|| ellipsoid([1.0; 3], 1280));
+static COIN: LazyLock<Arc<BodyBoundary>> = LazyLock::new(|| ellipsoid([1.0, 0.2, 1.0], 1280));
 
 /// Two bodies without symmetry of revolution, so that every twist moves fluid.
-fn uneven(faces: usize) -> Vec<Arc<MfsBody>> {
+fn uneven(faces: usize) -> Vec<Arc<BodyBoundary>> {
     vec![
         ellipsoid([1.0, 0.8, 0.9], faces),
         ellipsoid([0.5, 0.8, 0.3], faces),
@@ -52,7 +52,7 @@ fn uneven_poses() -> Vec<Pose> {
     ]
 }
 
-fn full(bodies: &[Arc<MfsBody>], walls: &[Wall], settings: SolveSettings) -> Full {
+fn full(bodies: &[Arc<BodyBoundary>], walls: &[Wall], settings: SolveSettings) -> Full {
     Full::new(bodies.to_vec(), walls, Exclusions::none(), settings).unwrap()
 }
 
@@ -130,7 +130,7 @@ fn sphere_and_ellipsoids_alone() {
 fn one_body_alone_is_the_isolated_one() {
     for semi_axes in [[1.0, 0.8, 0.9], [1.0, 0.1, 0.7]] {
         let body = ellipsoid(semi_axes, 320);
-        let reference = body.boundary.added_mass;
+        let reference = body.added_mass;
         let (m, report) = matrix(&full(&[body], &[], tight()), &uneven_poses()[..1]);
         let reference = DMatrix::from_fn(6, 6, |i, j| reference[(i, j)]);
         let error = scaled_error(&m, &reference);
@@ -146,7 +146,7 @@ fn one_body_alone_is_the_isolated_one() {
 // Two spheres
 
 /// Translations of two spheres at the distance d along z, for three orientations of the meshes.
-fn two_sphere_matrices(bodies: &[Arc<MfsBody>], d: f64) -> [DMatrix<f64>; 3] {
+fn two_sphere_matrices(bodies: &[Arc<BodyBoundary>], d: f64) -> [DMatrix<f64>; 3] {
     let coupling = full(bodies, &[], SolveSettings::default());
     let (near, far) = (orientations(&Vec3::z()), orientations(&-Vec3::z()));
     std::array::from_fn(|k| {
@@ -320,7 +320,7 @@ fn a_sphere_near_a_wall() {
 
 /// M̄ of one body in front of walls from the explicit mirror images: all of them move as mirrors do, and
 /// each has the same share of the energy.
-fn explicit_images(body: &Arc<MfsBody>, pose: &Pose, mirrors: &[[f64; 3]]) -> DMatrix<f64> {
+fn explicit_images(body: &Arc<BodyBoundary>, pose: &Pose, mirrors: &[[f64; 3]]) -> DMatrix<f64> {
     let n = mirrors.len();
     let mut poses = Vec::new();
     let mut basis = DMatrix::zeros(6 * n, 6);
@@ -611,7 +611,7 @@ fn millimetres_and_kilometres_agree() {
 #[test]
 fn far_bodies_are_isolated_ones() {
     let sphere = ellipsoid([1.0; 3], 320);
-    let own = sphere.boundary.added_mass;
+    let own = sphere.added_mass;
     let isolated = Isolated::new(vec![own, own]);
     let at = |d: f64| {
         let poses = [
@@ -626,7 +626,7 @@ fn far_bodies_are_isolated_ones() {
     };
     // Two dipoles of moment p, the added mass and that of the displaced water: −p²/(2π c³) along,
     // p²/(4π c³) across.
-    let moment = sphere.boundary.faces.volume() + own[(0, 0)];
+    let moment = sphere.faces.volume() + own[(0, 0)];
     let unit = moment * moment / (4.0 * std::f64::consts::PI);
     let mut last = None;
     for d in [25.5, 51.0, 102.0] {
@@ -666,7 +666,7 @@ fn bodies_in_another_order_or_frame_give_the_same() {
     let mesh = mesh(&shape, 320);
     let moved = mesh.transformed(&Pose::new(Mat3::identity(), shift));
     let b = BodyBoundary::new("b", &moved, &MfsSettings::default()).unwrap();
-    let shifted = Arc::new(MfsBody::new(Arc::new(b)));
+    let shifted = Arc::new(b);
     let mut placed = poses.clone();
     placed[1].translation = poses[1].apply(&-shift);
     let other = matrix(&full(&[bodies[0].clone(), shifted], &[], tight()), &placed).0;

@@ -4,7 +4,7 @@ use crate::support::says;
 use hydrograd::adjoint::kernel::{Sources, Write};
 use hydrograd::adjoint::lie::{Pose, Vec3, Vec6, exp_matrix};
 use hydrograd::boundary::{self, BodyBoundary};
-use hydrograd::coupling::full::{Full, FullSolver, MfsBody, SolveSettings};
+use hydrograd::coupling::full::{Full, FullSolver, SolveSettings};
 use hydrograd::coupling::{Coupling, Exclusions};
 use hydrograd::geometry::Image;
 use hydrograd::scene::{Body, Controller, Fluid, Joint, Plane, Scene, Shape, Wall};
@@ -251,20 +251,20 @@ fn matrix(coupling: &dyn Coupling, poses: &[Pose]) -> DMatrix<f64> {
 /// The coupled equations written out, in dense matrices: own blocks, and between bodies that feel each
 /// other (for all images but the body itself) the kernels; between excluded ones those of images alone.
 fn written_out(
-    bodies: &[Arc<MfsBody>],
+    bodies: &[Arc<BodyBoundary>],
     walls: &[Wall],
     excluded: &[(usize, usize)],
     poses: &[Pose],
 ) -> DMatrix<f64> {
     let images = Image::of_walls(walls).unwrap();
-    let starts = |size: &dyn Fn(&MfsBody) -> usize| {
+    let starts = |size: &dyn Fn(&BodyBoundary) -> usize| {
         let mut at = vec![0];
         for b in bodies {
             at.push(at[at.len() - 1] + size(b));
         }
         at
     };
-    let (rows, columns) = (starts(&|b| b.faces()), starts(&|b| b.sources()));
+    let (rows, columns) = (starts(&|b| b.faces.len()), starts(&|b| b.sources.len()));
     let n = bodies.len();
     let mut k = DMatrix::zeros(rows[n], columns[n]);
     let mut f = DMatrix::zeros(rows[n], 6 * n);
@@ -272,8 +272,8 @@ fn written_out(
     let mut damping = DMatrix::zeros(columns[n], columns[n]);
     let units: [Vec6; 6] = std::array::from_fn(|i| Vec6::ith(i, 1.0));
     for (b, body) in bodies.iter().enumerate() {
-        let own = &body.boundary;
-        for (i, row) in own.flux_rows.chunks_exact(body.sources()).enumerate() {
+        let own = body;
+        for (i, row) in own.flux_rows.chunks_exact(body.sources.len()).enumerate() {
             for (j, x) in row.iter().enumerate() {
                 k[(rows[b] + i, columns[b] + j)] = *x;
             }
@@ -293,7 +293,6 @@ fn written_out(
                 }
                 let (turn, shift) = image.placement(&poses[c]);
                 let seen: Vec<Vec3> = other
-                    .boundary
                     .sources
                     .iter()
                     .map(|s| {
@@ -303,12 +302,12 @@ fn written_out(
                     })
                     .collect();
                 let seen = Sources::new(&seen);
-                let width = other.sources();
-                let mut block = vec![0.0; body.faces() * width];
+                let width = other.sources.len();
+                let mut block = vec![0.0; body.faces.len() * width];
                 body.fill(&seen, Write::Set, &mut block, width, 0);
                 let readout = body.potential(&seen, &body.readout_rows(&units), 6);
                 for j in 0..width {
-                    for i in 0..body.faces() {
+                    for i in 0..body.faces.len() {
                         k[(rows[b] + i, columns[c] + j)] += block[i * width + j];
                     }
                     for i in 0..6 {
@@ -326,7 +325,7 @@ fn written_out(
 
 #[test]
 fn excluded_pairs_do_not_feel_each_other_and_feel_all_else() {
-    let bodies: Vec<Arc<MfsBody>> = [
+    let bodies: Vec<Arc<BodyBoundary>> = [
         Shape::sphere(0.5),
         Shape::ellipsoid([0.6, 0.3, 0.4]),
         Shape::cuboid([0.3, 0.5, 0.4]),
@@ -335,7 +334,7 @@ fn excluded_pairs_do_not_feel_each_other_and_feel_all_else() {
     .map(|shape| {
         let mesh = shape::build(&shape, Path::new("."), Some(80)).unwrap();
         let b = BodyBoundary::new("b", &mesh, &boundary::MfsSettings::default());
-        Arc::new(MfsBody::new(Arc::new(b.unwrap())))
+        Arc::new(b.unwrap())
     })
     .collect();
     // The first two overlap by some 0.2.
@@ -368,7 +367,7 @@ fn excluded_pairs_do_not_feel_each_other_and_feel_all_else() {
     // Two alone: each has its own added mass, and nothing between them.
     let m = matrix(&coupling(2, &[], FullSolver::Cgls), &poses[..2]);
     for (b, body) in bodies[..2].iter().enumerate() {
-        let own = body.boundary.added_mass;
+        let own = body.added_mass;
         let error = (m.fixed_view::<6, 6>(6 * b, 6 * b) - own).amax();
         assert!(error < 1e-10 * own.amax(), "{error}");
         assert_eq!(m.fixed_view::<6, 6>(6 * b, 6 - 6 * b).amax(), 0.0);

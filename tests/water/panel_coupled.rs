@@ -6,7 +6,7 @@ use hydrograd::adjoint::lie::{Mat3, Pose, Vec3, exp_matrix};
 use hydrograd::boundary::PanelBoundary;
 use hydrograd::boundary::panel::MOST_FACES;
 use hydrograd::coupling::panel::{PanelSolver, SolveSettings};
-use hydrograd::coupling::{Coupling, Linearise, PanelCoupled};
+use hydrograd::coupling::{Coupling, Exclusions, Linearise, PanelCoupled};
 use hydrograd::scene::{Body, Fluid, Scene, Shape, Wall, WallSurface};
 use hydrograd::simulate::gradcheck;
 use hydrograd::simulate::{Fidelity, Method, Settings, Simulator};
@@ -50,7 +50,7 @@ fn momenta(
         tolerance: 1e-10,
         ..SolveSettings::default()
     };
-    let c = PanelCoupled::new(bodies.to_vec(), walls, settings)?;
+    let c = PanelCoupled::new(bodies.to_vec(), walls, Exclusions::none(), settings)?;
     let n = 6 * bodies.len();
     let record = c.evaluate(poses, &DMatrix::identity(n, n))?;
     assert_eq!(record.report().iterations == 0, solver == PanelSolver::Lu);
@@ -238,14 +238,14 @@ fn alone_or_moved_together_nothing_changes() {
     );
     // No iteration is needed for one body; its own value comes back.
     let settings = SolveSettings::default();
-    let c = PanelCoupled::new(vec![coin.clone()], &[], settings).unwrap();
+    let c = PanelCoupled::new(vec![coin.clone()], &[], Exclusions::none(), settings).unwrap();
     let m = c.evaluate(&[pose], &DMatrix::identity(6, 6)).unwrap();
     let own = DMatrix::from_column_slice(6, 6, coin.added_mass.as_slice());
     assert!((m.momenta() - &own).abs().max() < 1e-12);
     assert!((alone.unwrap() - own).abs().max() < 1e-12);
     // A few columns of the basis, and a body that no column moves.
     let pair = vec![coin.clone(), coin];
-    let c = PanelCoupled::new(pair.clone(), &[], settings).unwrap();
+    let c = PanelCoupled::new(pair.clone(), &[], Exclusions::none(), settings).unwrap();
     let poses = [pose, pose.compose(&at(0.9))];
     let full = c.evaluate(&poses, &DMatrix::identity(12, 12)).unwrap();
     let basis = DMatrix::from_fn(12, 2, |i, k| {
@@ -276,7 +276,8 @@ fn a_disc_over_a_wall() {
     let disc = mesh(&Shape::cylinder(1.0, 0.25), 1280);
     let disc = Arc::new(PanelBoundary::new("disc", &disc).unwrap());
     let floor = [wall(0.0, WallSurface::Rigid)];
-    let c = PanelCoupled::new(vec![disc], &floor, SolveSettings::default()).unwrap();
+    let c = PanelCoupled::new(vec![disc], &floor, Exclusions::none(), SolveSettings::default());
+    let c = c.unwrap();
     let up = DMatrix::from_fn(6, 1, |i, _| if i == 2 { 1.0 } else { 0.0 });
     let one = DVector::from_element(1, 1.0);
     let mass = |gap: f64| c.evaluate(&[at(gap + 0.125)], &up).unwrap().momenta()[(2, 0)];
@@ -357,7 +358,7 @@ fn overlaps_and_impossible_settings_are_errors() {
             );
         }
     }
-    let new = |settings| PanelCoupled::new(vec![ball.clone()], &[], settings);
+    let new = |settings| PanelCoupled::new(vec![ball.clone()], &[], Exclusions::none(), settings);
     for tolerance in [0.0, -1.0, 1.0, f64::NAN] {
         let settings = SolveSettings {
             tolerance,
@@ -371,7 +372,7 @@ fn overlaps_and_impossible_settings_are_errors() {
     };
     assert!(matches!(new(settings), Err(Error::Input { .. })));
     let many = vec![ball.clone(); MOST_FACES / ball.faces.len() + 1];
-    let error = PanelCoupled::new(many, &[], SolveSettings::default())
+    let error = PanelCoupled::new(many, &[], Exclusions::none(), SolveSettings::default())
         .err()
         .unwrap();
     assert!(matches!(error, Error::Unsupported { .. }), "{error}");
@@ -381,7 +382,7 @@ fn overlaps_and_impossible_settings_are_errors() {
         tolerance: 1e-12,
         ..SolveSettings::default()
     };
-    let c = PanelCoupled::new(vec![ball; 2], &[], settings).unwrap();
+    let c = PanelCoupled::new(vec![ball; 2], &[], Exclusions::none(), settings).unwrap();
     let error = c.evaluate(&[at(0.0), at(2.1)], &DMatrix::identity(12, 12));
     assert!(matches!(error, Err(Error::Solver { iterations: 1, .. })));
     // Poses for fewer bodies.

@@ -10,7 +10,7 @@ pub mod lamb;
 mod sphere;
 
 use crate::adjoint::lie::{Mat6, Pose, Vec3, skew};
-use crate::boundary::response::Response;
+use crate::boundary::Response;
 use crate::{Error, Result};
 use confocal::{Confocal, Place};
 use faer::Mat;
@@ -186,10 +186,6 @@ impl Response for ExactBoundary {
 
     fn asymmetry(&self) -> f64 {
         0.0
-    }
-
-    fn condition(&self) -> f64 {
-        1.0
     }
 
     fn warnings(&self) -> &[String] {

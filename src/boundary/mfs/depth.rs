@@ -42,16 +42,6 @@ const HOPELESS: f64 = 0.1;
 /// The same below which nothing of it is right.
 const REFUSED: f64 = 0.04;
 
-/// Sources with their depths.
-pub(crate) struct Placement {
-    /// Source points, m.
-    pub sources: Vec<Vec3>,
-    /// Distance of each from its point of the surface, m.
-    pub depths: Vec<f64>,
-    /// What the user should know.
-    pub warnings: Vec<String>,
-}
-
 /// A point of the surface that gets a source, with its local scales in m.
 struct Site {
     point: Vec3,
@@ -132,14 +122,14 @@ fn face_sites(surface: &Interior) -> Vec<Site> {
         .collect()
 }
 
-/// Places the sources. Those that an automatic depth left outside a coarse surface, where points
-/// don't show all of it, are moved towards it.
+/// The sources, m, and what the user should know of them. Those that an automatic depth left outside a
+/// coarse surface, where points don't show all of it, are moved towards it.
 pub(crate) fn place(
     name: &str,
     surface: &Interior,
     method: Method,
     depth: Depth,
-) -> Result<Placement> {
+) -> Result<(Vec<Vec3>, Vec<String>)> {
     let sites = match method {
         Method::MfsVertex => vertex_sites(surface, depth == Depth::Auto),
         Method::MfsFace => face_sites(surface),
@@ -210,11 +200,7 @@ pub(crate) fn place(
         .map(|(s, d)| s.point - s.normal * *d)
         .collect();
     check_inside(name, surface, &sources)?;
-    Ok(Placement {
-        sources,
-        depths,
-        warnings,
-    })
+    Ok((sources, warnings))
 }
 
 /// A user's own depth against what the mesh allows.

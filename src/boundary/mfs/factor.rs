@@ -1,8 +1,7 @@
 //! Thin QR factorisation of one body's flux matrix, deterministic and sequential.
 
 use crate::solver::{self, largest_eigenvalue};
-use faer::dyn_stack::{MemBuffer, MemStack};
-use faer::linalg::qr::no_pivoting::{factor, solve};
+use faer::linalg::solvers::SolveLstsq;
 use faer::linalg::triangular_solve;
 use faer::{Mat, MatMut, MatRef, Par};
 
@@ -58,47 +57,13 @@ fn damped(k: MatRef<f64>, rhs: MatRef<f64>, damping: f64) -> Factored {
 }
 
 fn attempt(k: MatRef<f64>, rhs: MatRef<f64>) -> Factored {
-    let (m, n) = k.shape();
-    let par = Par::Seq;
-    let block = factor::recommended_block_size::<f64>(m, n);
-    let mut qr = k.to_owned();
-    let mut coeff = Mat::zeros(block, n);
-    let mut memory = MemBuffer::new(factor::qr_in_place_scratch::<f64>(
-        m,
-        n,
-        block,
-        par,
-        Default::default(),
-    ));
-    factor::qr_in_place(
-        qr.as_mut(),
-        coeff.as_mut(),
-        par,
-        MemStack::new(&mut memory),
-        Default::default(),
-    );
-    let r = Mat::from_fn(n, n, |i, j| if i <= j { qr[(i, j)] } else { 0.0 });
-    let mut x = rhs.to_owned();
-    let mut memory = MemBuffer::new(solve::solve_lstsq_in_place_scratch::<f64>(
-        m,
-        n,
-        block,
-        rhs.ncols(),
-        par,
-    ));
-    solve::solve_lstsq_in_place(
-        qr.as_ref(),
-        coeff.as_ref(),
-        r.as_ref(),
-        x.as_mut(),
-        par,
-        MemStack::new(&mut memory),
-    );
+    let qr = k.qr();
+    let r = qr.thin_R();
     Factored {
-        condition: condition(r.as_ref()),
-        solution: x.subrows(0, n).to_owned(),
-        r,
-        damping: vec![0.0; n],
+        condition: condition(r),
+        solution: qr.solve_lstsq(rhs),
+        r: r.to_owned(),
+        damping: vec![0.0; k.ncols()],
         singular: false,
     }
 }

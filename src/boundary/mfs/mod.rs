@@ -20,10 +20,9 @@ mod assemble;
 pub mod depth;
 mod factor;
 pub mod readout;
-mod response;
 mod settings;
 
-use super::asymmetry::asymmetry;
+use super::{Response, asymmetry, potentials};
 use crate::adjoint::kernel::{Points, Triangles};
 use crate::adjoint::lie::{Mat6, Vec3, Vec6};
 use crate::geometry::{Faces, Interior, TriMesh};
@@ -48,8 +47,6 @@ pub struct BodyBoundary {
     pub faces: Faces,
     /// Source points s_j, m, body frame.
     pub sources: Vec<Vec3>,
-    /// Distance of each source from its point of the surface, m.
-    pub depths: Vec<f64>,
     /// w_i: a row is w_i · flux ([`Method::MfsVertex`]) or w_i · normal velocity at the centre
     /// ([`Method::MfsFace`]).
     pub row_weights: Vec<f64>,
@@ -109,8 +106,7 @@ impl BodyBoundary {
     pub fn unfactored(name: &str, mesh: &TriMesh, settings: &MfsSettings) -> Result<Self> {
         let mut out = Self::lay_out(name, mesh, settings)?;
         if settings.damping > 0.0 {
-            let (method, sources) = (settings.method, &out.sources);
-            let norms = assemble::column_norms(method, &out.triangles, &out.points, sources);
+            let norms = out.column_norms();
             out.damping = norms.iter().map(|n| settings.damping * n).collect();
         }
         let rule = readout::points(&out.faces, &out.sources, settings.readout);
@@ -126,11 +122,7 @@ impl BodyBoundary {
     /// All that needs no solve; no damping yet.
     fn lay_out(name: &str, mesh: &TriMesh, settings: &MfsSettings) -> Result<Self> {
         let surface = Interior::new(mesh);
-        let depth::Placement {
-            sources,
-            depths,
-            warnings,
-        } = depth::place(name, &surface, settings.method, settings.depth)?;
+        let (sources, warnings) = depth::place(name, &surface, settings.method, settings.depth)?;
         let damping = settings.damping;
         if !(damping.is_finite() && damping >= 0.0) {
             return Err(Error::input(
@@ -154,7 +146,6 @@ impl BodyBoundary {
             twist_flux,
             row_weights,
             sources,
-            depths,
             warnings,
             faces,
             flux_rows: Vec::new(),
@@ -170,9 +161,8 @@ impl BodyBoundary {
 
     /// The body alone in the water: its factor, strengths and added mass.
     fn solve_alone(&mut self) -> Result<()> {
-        let (method, faces) = (self.settings.method, &self.faces);
-        let (name, sources) = (&self.name, &self.sources);
-        self.flux_rows = assemble::flux_matrix(method, &self.triangles, &self.points, sources);
+        self.flux_rows = self.rows_of(&self.sources);
+        let (name, faces, sources) = (&self.name, &self.faces, &self.sources);
         let k = MatRef::from_row_major_slice(&self.flux_rows, faces.len(), sources.len());
         let rhs = Mat::from_fn(faces.len(), 6, |i, j| self.twist_rows[i][j]);
         let factored = factor::solve(k, rhs.as_ref(), self.settings.damping);
@@ -196,7 +186,7 @@ impl BodyBoundary {
             Readout::Centre => self.twist_flux.clone(),
             Readout::Corrected => (0..faces.len())
                 .map(|i| {
-                    let per_row = match method {
+                    let per_row = match self.settings.method {
                         Method::MfsVertex => 1.0 / self.row_weights[i],
                         Method::MfsFace => faces.areas[i] / self.row_weights[i],
                     };
@@ -274,5 +264,34 @@ impl BodyBoundary {
     /// `x ← R⁻ᵀ x`, x sources × columns.
     pub fn solve_factor_transpose(&self, x: MatMut<'_, f64>) {
         factor::solve_upper_transpose(self.r.as_ref(), x);
+    }
+}
+
+impl Response for BodyBoundary {
+    fn added_mass(&self) -> Mat6 {
+        self.added_mass
+    }
+
+    fn radiated(&self, points: &[Vec3]) -> Result<Mat<f64>> {
+        let alpha = Mat::from_fn(self.sources.len(), 6, |j, k| self.strengths[j][k]);
+        Ok(potentials(points, &self.sources) * alpha)
+    }
+
+    fn scattered(&self, sources: &[Vec3], points: &[Vec3]) -> Result<Mat<f64>> {
+        let rows = self.rows_of(sources);
+        let rows = MatRef::from_row_major_slice(&rows, self.faces.len(), sources.len());
+        // (KᵀK + D²) α = −Kᵀ k(y)
+        let mut alpha = -(self.flux_matrix().transpose() * rows);
+        self.solve_factor_transpose(alpha.as_mut());
+        self.solve_factor(alpha.as_mut());
+        Ok(potentials(points, &self.sources) * alpha)
+    }
+
+    fn asymmetry(&self) -> f64 {
+        self.asymmetry
+    }
+
+    fn warnings(&self) -> &[String] {
+        &self.warnings
     }
 }

@@ -19,21 +19,18 @@
 //! J. L. Hess, A. M. O. Smith, Prog. Aerosp. Sci. 8 (1967) 1–138 (panels); L. Morino, C.-C. Kuo, AIAA
 //! J. 12 (1974) 191–197 (the direct form).
 
-mod extrapolated;
 mod layers;
-mod response;
 pub mod richardson;
 
-use super::asymmetry::asymmetry;
+use super::{Response, asymmetry, potentials};
 use crate::adjoint::kernel::Write;
-use crate::adjoint::lie::{Mat6, Vec6};
+use crate::adjoint::lie::{Mat6, Vec3, Vec6};
 use crate::geometry::{Faces, TriMesh};
 use crate::solver::Lu;
 use crate::{Error, Result};
-pub use extrapolated::Extrapolated;
-use faer::Mat;
+use faer::{Mat, MatRef};
 pub(crate) use layers::Panels;
-pub use richardson::{Richardson, richardson};
+pub use richardson::{Extrapolated, Richardson, richardson};
 
 /// Most faces of one system: its matrix takes 8·faces² bytes, 3.2 GB here.
 pub const MOST_FACES: usize = 20_000;
@@ -178,4 +175,35 @@ pub(crate) fn check_size(what: &str, faces: usize) -> Result<()> {
              bodies, to 1–3 % with sharp edges"
                 .into(),
     })
+}
+
+impl Response for PanelBoundary {
+    fn added_mass(&self) -> Mat6 {
+        self.added_mass
+    }
+
+    fn radiated(&self, points: &[Vec3]) -> Result<Mat<f64>> {
+        let (q, phi) = (self.normal_velocity.as_ref(), self.potential.as_ref());
+        let out = self.panels.potential(points, Some(q), Some(phi));
+        Ok(MatRef::from_row_major_slice(&out, points.len(), 6).to_owned())
+    }
+
+    /// The total potential is solved for: with no normal velocity on the body it answers
+    /// `(½I + Ω/4π) φ_t = φ_inc`, and the incoming flow, harmonic inside, drops out of Green's
+    /// identity for the rest, `φ_s(x) = −Σ Ω_j(x)/4π φ_t,j`. No single layer is needed, and the
+    /// error is smaller than with `(½I + Ω/4π) φ_s = S ∂φ_inc/∂n`.
+    fn scattered(&self, sources: &[Vec3], points: &[Vec3]) -> Result<Mat<f64>> {
+        let mut total = potentials(&self.faces.centres, sources);
+        self.lu.solve(total.as_mut());
+        let out = self.panels.potential(points, None, Some(total.as_ref()));
+        Ok(MatRef::from_row_major_slice(&out, points.len(), sources.len()).to_owned())
+    }
+
+    fn asymmetry(&self) -> f64 {
+        self.asymmetry
+    }
+
+    fn warnings(&self) -> &[String] {
+        &self.warnings
+    }
 }

@@ -9,7 +9,7 @@
 use super::linearised::Solved;
 use crate::Result;
 use crate::adjoint::kernel::{Points, Sources, Triangles, Write, flux_fill, potential_fill};
-use crate::adjoint::lie::{Pose, Vec3, Vec6, six};
+use crate::adjoint::lie::{Pose, Vec3, Vec6, point_wrench};
 use crate::solver::{Columns, product};
 use nalgebra::DMatrix;
 
@@ -25,19 +25,13 @@ impl Solved<'_> {
         let k = basis.ncols();
         let mut energy = DMatrix::<f64>::zeros(k, k);
         for (b, body) in self.model.bodies.iter().enumerate() {
-            let boundary = &body.boundary;
-            let mut fields = vec![(
-                Sources::new(&boundary.sources),
-                part(&a, &self.model.sources[b]),
-            )];
+            let strengths = |b: usize| a.part(&self.model.sources[b]);
+            let mut fields = vec![(Sources::new(&body.sources), strengths(b))];
             for pair in pairs.iter().filter(|p| p.target == b) {
-                fields.push((
-                    pair.points.clone(),
-                    part(&a, &self.model.sources[pair.source]),
-                ));
+                fields.push((pair.points.clone(), strengths(pair.source)));
             }
             let twists = basis.rows(6 * b, 6);
-            for corners in boundary.faces.corners.chunks(FACES) {
+            for corners in body.faces.corners.chunks(FACES) {
                 let quarters = Quarters::new(corners);
                 let n = quarters.triangles.len();
                 let (mut potential, mut flux) = (Columns::zeros(n, k), Columns::zeros(n, k));
@@ -46,9 +40,9 @@ impl Solved<'_> {
                     let mut matrix = vec![0.0; n * width];
                     let set = Write::Set;
                     potential_fill(&quarters.middles, sources, set, &mut matrix, width, 0);
-                    add(&mut potential, &product(&matrix, n, strengths));
+                    potential.add(&product(&matrix, n, strengths));
                     flux_fill(&quarters.triangles, sources, set, &mut matrix, width, 0);
-                    add(&mut flux, &product(&matrix, n, strengths));
+                    flux.add(&product(&matrix, n, strengths));
                 }
                 let asked = DMatrix::from_fn(n, 6, |i, c| quarters.asked[i][c]) * twists;
                 let left = DMatrix::from_fn(n, k, |i, c| 2.0 * asked[(i, c)] - flux.at(i, c));
@@ -88,7 +82,7 @@ impl Quarters {
         let asked = (0..triangles.len())
             .map(|i| {
                 let n = triangles.normal(i) * triangles.area(i);
-                six(&n, &middles[i].cross(&n))
+                point_wrench(&middles[i], &n)
             })
             .collect();
         Self {
@@ -97,20 +91,4 @@ impl Quarters {
             asked,
         }
     }
-}
-
-/// Rows of a body.
-fn part(a: &Columns, range: &std::ops::Range<usize>) -> Columns {
-    Columns {
-        rows: range.len(),
-        columns: a.columns,
-        data: a.slice(range.start, range.end).to_vec(),
-    }
-}
-
-fn add(out: &mut Columns, part: &Columns) {
-    out.data
-        .iter_mut()
-        .zip(&part.data)
-        .for_each(|(o, p)| *o += p);
 }

@@ -19,15 +19,15 @@ pub(super) struct Solved<'a> {
 
 /// [`Full`] with its derivatives.
 pub(super) struct FullLinearised<'a> {
-    solved: Solved<'a>,
-    gradient: PairTensor,
+    pub solved: Solved<'a>,
+    pub gradient: PairTensor,
 }
 
 impl<'a> Solved<'a> {
     pub fn new(full: &'a Full, poses: &[Pose], basis: &DMatrix<f64>) -> Result<Self> {
         let model = full.model();
         let response = full.backend().respond(poses, basis)?;
-        let volume = |b: usize| model.bodies[b].boundary.faces.volume();
+        let volume = |b: usize| model.bodies[b].faces.volume();
         let reached = response.reached();
         let report = CouplingReport {
             iterations: reached.iterations,
@@ -39,17 +39,6 @@ impl<'a> Solved<'a> {
             value: Momenta::new(response.momenta()?, report),
             model,
             response,
-        })
-    }
-
-    pub fn linearise(self) -> Result<FullLinearised<'a>> {
-        let gradient = match self.value.momenta().ncols() {
-            0 => PairTensor::zeros(self.model.bodies.len(), 0),
-            _ => self.response.gradient()?,
-        };
-        Ok(FullLinearised {
-            solved: self,
-            gradient,
         })
     }
 }

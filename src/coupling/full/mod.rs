@@ -26,26 +26,25 @@
 //! What the system consists of is the [`Model`]; a [`SystemBackend`] computes with it, here [`Cpu`].
 
 mod backend;
-mod body;
 mod check;
 mod cpu;
-mod flow;
 mod linearised;
 mod model;
 mod settings;
 
 pub use backend::{Reached, SystemBackend, SystemResponse};
-pub use body::MfsBody;
 pub use cpu::Cpu;
 pub use model::Model;
 pub use settings::{FullSolver, Preconditioner, SolveSettings};
 
-use super::{Coupling, Exclusions, Linearise, Linearised, Momenta};
+use super::{Coupling, Exclusions, Linearise, Linearised, Momenta, PairTensor};
 use crate::Result;
 use crate::adjoint::lie::{Pose, Vec3};
+use crate::boundary::BodyBoundary;
 use crate::geometry::Wall;
-use linearised::Solved;
+use linearised::{FullLinearised, Solved};
 use nalgebra::{DMatrix, DVector};
+use rayon::prelude::*;
 use std::sync::Arc;
 
 /// All bodies coupled through one boundary integral system.
@@ -61,7 +60,7 @@ impl Full {
     /// # Errors
     /// As [`Model::new`] and [`Cpu::new`].
     pub fn new(
-        bodies: Vec<Arc<MfsBody>>,
+        bodies: Vec<Arc<BodyBoundary>>,
         walls: &[Wall],
         excluded: Exclusions,
         settings: SolveSettings,
@@ -117,19 +116,45 @@ impl Coupling for Full {
         Ok(Some(solved.residual(poses, basis)?))
     }
 
+    /// With strengths a of all bodies' sources and those of their images (s_j, of the same strength behind
+    /// rigid walls), `u(x) = −∇φ = Σ_j a_j (x − s_j) / |x − s_j|³`. Bodies that don't feel each other are
+    /// solved as if the other weren't there; the flow is the sum of theirs.
     fn velocity(
         &self,
         poses: &[Pose],
         twists: &DVector<f64>,
         points: &[Vec3],
     ) -> Result<Vec<Vec3>> {
-        flow::velocity(self, poses, twists, points)
+        let model = self.model();
+        let column = DMatrix::from_column_slice(twists.len(), 1, twists.as_slice());
+        let strengths = self.backend.respond(poses, &column)?.strengths()?;
+        let mut sources: Vec<(Vec3, f64)> = Vec::new();
+        for image in &model.images {
+            for ((body, range), pose) in model.bodies.iter().zip(&model.sources).zip(poses) {
+                let (rotation, shift) = image.placement(pose);
+                let placed = body.sources.iter().map(|s| rotation * s + shift);
+                sources.extend(placed.zip(strengths.slice(range).iter().copied()));
+            }
+        }
+        let at = |x: &Vec3| -> Vec3 {
+            let of = |(s, a): &(Vec3, f64)| {
+                let r = x - s;
+                let square = r.norm_squared();
+                r * (a / (square * square.sqrt()))
+            };
+            sources.iter().map(of).sum()
+        };
+        Ok(points.par_iter().map(at).collect())
     }
 }
 
 impl Linearise for Full {
     fn linearise(&self, poses: &[Pose], basis: &DMatrix<f64>) -> Result<Box<dyn Linearised + '_>> {
         let solved = Solved::new(self, poses, basis)?;
-        Ok(Box::new(solved.linearise()?))
+        let gradient = match basis.ncols() {
+            0 => PairTensor::zeros(self.model.bodies.len(), 0),
+            _ => solved.response.gradient()?,
+        };
+        Ok(Box::new(FullLinearised { solved, gradient }))
     }
 }

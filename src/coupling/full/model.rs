@@ -1,19 +1,20 @@
 //! What the coupled system consists of.
 
-use super::{MfsBody, SolveSettings};
+use super::SolveSettings;
 use crate::Result;
 use crate::adjoint::lie::Pose;
+use crate::boundary::BodyBoundary;
 use crate::coupling::Exclusions;
 use crate::coupling::pair::Pair;
-use crate::geometry::Image;
-use crate::geometry::Wall;
+use crate::coupling::settings::{end, ranges};
+use crate::geometry::{Image, Wall};
 use std::ops::Range;
 use std::sync::Arc;
 
 /// What the coupled system consists of, whoever solves it: all that doesn't change with the poses.
 pub struct Model {
     /// The bodies, each in its own frame; those of equal shape share one.
-    pub bodies: Vec<Arc<MfsBody>>,
+    pub bodies: Vec<Arc<BodyBoundary>>,
     /// Images that the walls make, in the world frame; the identity first.
     pub images: Vec<Image>,
     /// Pairs of bodies that don't feel each other but by images.
@@ -34,27 +35,16 @@ impl Model {
     /// Walls that don't close under reflection, pairs of bodies that don't exist, or settings out of
     /// range.
     pub fn new(
-        bodies: Vec<Arc<MfsBody>>,
+        bodies: Vec<Arc<BodyBoundary>>,
         walls: &[Wall],
         excluded: Exclusions,
         settings: SolveSettings,
     ) -> Result<Self> {
         settings.validate(&bodies)?;
         excluded.check(bodies.len())?;
-        let ranges = |size: &dyn Fn(&MfsBody) -> usize| {
-            let mut at = 0;
-            bodies
-                .iter()
-                .map(|b| {
-                    let from = at;
-                    at += size(b);
-                    from..at
-                })
-                .collect::<Vec<_>>()
-        };
         Ok(Self {
-            faces: ranges(&|b| b.faces()),
-            sources: ranges(&|b| b.sources()),
+            faces: ranges(bodies.iter().map(|b| b.faces.len())),
+            sources: ranges(bodies.iter().map(|b| b.sources.len())),
             images: Image::of_rigid_walls(walls, "the fidelity full")?,
             excluded,
             bodies,
@@ -64,12 +54,12 @@ impl Model {
 
     /// Number of rows of K: the faces of all bodies.
     pub fn rows(&self) -> usize {
-        self.faces.last().map_or(0, |r| r.end)
+        end(&self.faces)
     }
 
     /// Number of columns of K: the sources of all bodies.
     pub fn columns(&self) -> usize {
-        self.sources.last().map_or(0, |r| r.end)
+        end(&self.sources)
     }
 
     /// The pairs of (target body, source body's image) whose placement changes: all but each body with
@@ -83,7 +73,7 @@ impl Model {
                     if apart && image.is_identity() {
                         continue;
                     }
-                    let own = &self.bodies[source].boundary.sources;
+                    let own = &self.bodies[source].sources;
                     let (at, from) = ((target, &poses[target]), (source, &poses[source]));
                     out.push(Pair::new(at, from, image, own));
                 }

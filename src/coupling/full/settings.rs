@@ -1,7 +1,6 @@
 //! How the coupled system is solved, whoever solves it.
 
-use super::MfsBody;
-use crate::boundary::Method;
+use crate::boundary::{BodyBoundary, Method};
 use crate::coupling::settings::check_limits;
 use crate::{Error, Result};
 use serde::{Deserialize, Serialize};
@@ -60,28 +59,25 @@ impl Default for SolveSettings {
 }
 
 impl SolveSettings {
-    pub(super) fn validate(&self, bodies: &[Arc<MfsBody>]) -> Result<()> {
+    pub(super) fn validate(&self, bodies: &[Arc<BodyBoundary>]) -> Result<()> {
         check_limits(self.tolerance, self.max_iterations)?;
-        let square = |b: &Arc<MfsBody>| b.boundary.settings.method == Method::MfsFace;
-        if self.solver == FullSolver::Gmres
-            && let Some(body) = bodies.iter().find(|b| !square(b))
-        {
+        if self.solver != FullSolver::Gmres {
+            return Ok(());
+        }
+        if let Some(body) = bodies.iter().find(|b| b.settings.method != Method::MfsFace) {
             return Err(Error::Unsupported {
-                what: format!("GMRES for body \"{}\"", body.boundary.name),
+                what: format!("GMRES for body \"{}\"", body.name),
                 why: "its system isn't square (vertex sources, a row per face)".into(),
                 instead: "use --method mfs-face, or the solver cgls".into(),
             });
         }
-        let damped = |b: &Arc<MfsBody>| b.boundary.settings.damping != 0.0;
-        if self.solver == FullSolver::Gmres
-            && let Some(body) = bodies.iter().find(|b| damped(b))
-        {
-            return Err(Error::input(
-                format!("body \"{}\": damping", body.boundary.name),
-                body.boundary.settings.damping,
+        match bodies.iter().find(|b| b.settings.damping != 0.0) {
+            None => Ok(()),
+            Some(body) => Err(Error::input(
+                format!("body \"{}\": damping", body.name),
+                body.settings.damping,
                 "must be 0 for GMRES, which solves the square system as it is",
-            ));
+            )),
         }
-        Ok(())
     }
 }

@@ -23,9 +23,8 @@ mod placed;
 mod second;
 mod system;
 
-use super::Exclusions;
-use super::settings::check_limits;
-use super::{Coupling, Linearise, Linearised, Momenta};
+use super::settings::{check_limits, end, ranges};
+use super::{Coupling, Exclusions, Linearise, Linearised, Momenta};
 use crate::Result;
 use crate::adjoint::lie::Pose;
 use crate::boundary::PanelBoundary;
@@ -81,50 +80,35 @@ pub struct PanelCoupled {
 }
 
 impl PanelCoupled {
-    /// From the bodies, the walls (one, or mutually perpendicular ones) and the solver's settings.
+    /// From the bodies, the walls (one, or mutually perpendicular ones), the pairs of bodies that don't feel
+    /// each other, and the solver's settings.
     ///
     /// # Errors
-    /// Walls that don't close under reflection, settings out of range, and more than
-    /// [`MOST_FACES`](crate::boundary::panel::MOST_FACES) faces in all.
+    /// Walls that don't close under reflection, pairs of bodies that don't exist, settings out of range, and
+    /// more than [`MOST_FACES`](crate::boundary::panel::MOST_FACES) faces in all.
     pub fn new(
         bodies: Vec<Arc<PanelBoundary>>,
         walls: &[Wall],
+        excluded: Exclusions,
         settings: SolveSettings,
     ) -> Result<Self> {
         check_limits(settings.tolerance, settings.max_iterations)?;
-        let mut at = 0;
-        let faces: Vec<Range<usize>> = bodies
-            .iter()
-            .map(|b| {
-                let from = at;
-                at += b.faces.len();
-                from..at
-            })
-            .collect();
-        check_size(&format!("{} bodies", bodies.len()), at)?;
+        let faces = ranges(bodies.iter().map(|b| b.faces.len()));
+        check_size(&format!("{} bodies", bodies.len()), end(&faces))?;
+        excluded.check(bodies.len())?;
         Ok(Self {
             images: Image::of_walls(walls)?,
             walls: Wall::half_spaces(walls)?,
             bodies,
             settings,
             faces,
-            excluded: Exclusions::none(),
+            excluded,
         })
-    }
-
-    /// The same, without the flow between these pairs of bodies.
-    ///
-    /// # Errors
-    /// A pair that names a body that doesn't exist.
-    pub fn excluding(mut self, pairs: Exclusions) -> Result<Self> {
-        pairs.check(self.bodies.len())?;
-        self.excluded = pairs;
-        Ok(self)
     }
 
     /// Number of panels of all bodies.
     fn rows(&self) -> usize {
-        self.faces.last().map_or(0, |r| r.end)
+        end(&self.faces)
     }
 }
 

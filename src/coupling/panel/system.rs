@@ -3,8 +3,9 @@
 use super::{PanelCoupled, PanelSolver};
 use crate::adjoint::kernel::Write;
 use crate::adjoint::lie::{Pose, Vec3};
+use crate::coupling::settings::converged;
 use crate::geometry::Image;
-use crate::solver::{Columns, Lu, gmres, product, transposed_product};
+use crate::solver::{Columns, Lu, Outcome, gmres, product, transposed_product};
 use crate::{Error, Result};
 use faer::MatMut;
 use rayon::prelude::*;
@@ -23,6 +24,13 @@ struct Block {
     data: Vec<f64>,
 }
 
+/// The bodies at given poses.
+#[derive(Clone, Copy)]
+pub(super) struct Placed<'a> {
+    pub coupled: &'a PanelCoupled,
+    pub poses: &'a [Pose],
+}
+
 /// A = ½I + Ω/4π at given poses.
 pub(super) struct System<'a> {
     coupled: &'a PanelCoupled,
@@ -35,38 +43,17 @@ enum Matrix {
     Factored(Lu),
 }
 
-/// Solution, iterations of the slowest column, and largest relative residual.
-pub(super) struct Solved {
-    pub x: Columns,
-    pub iterations: usize,
-    pub residual: f64,
-}
-
-/// Centroids of body `target` in the frame of body `source`, mirrored.
-pub(super) fn seen_from(
-    coupled: &PanelCoupled,
-    poses: &[Pose],
-    image: &Image,
-    source: usize,
-    target: usize,
-) -> Vec<Vec3> {
-    let (turn, shift) = image.placement(&poses[source]);
-    let centres = coupled.bodies[target].faces.centres.iter();
-    centres
-        .map(|c| turn.tr_mul(&(poses[target].apply(c) - shift)))
-        .collect()
-}
-
 impl<'a> System<'a> {
     /// Assembles A, and factors it where the solver is [`PanelSolver::Lu`].
     ///
     /// # Errors
     /// Bodies inside each other, or behind a wall.
-    pub fn new(coupled: &'a PanelCoupled, poses: &[Pose]) -> Result<Self> {
-        check_walls(coupled, poses)?;
+    pub fn new(placed: Placed<'a>) -> Result<Self> {
+        placed.check_walls()?;
+        let coupled = placed.coupled;
         let matrix = match coupled.settings.solver {
-            PanelSolver::Gmres => Matrix::Blocks(blocks(coupled, poses)?),
-            PanelSolver::Lu => Matrix::Factored(dense(coupled, poses)?),
+            PanelSolver::Gmres => Matrix::Blocks(placed.blocks()?),
+            PanelSolver::Lu => Matrix::Factored(placed.dense()?),
         };
         Ok(Self { coupled, matrix })
     }
@@ -83,17 +70,13 @@ impl<'a> System<'a> {
     ///
     /// # Errors
     /// A solve that misses its tolerance.
-    pub fn solve(&self, b: &Columns, transpose: bool) -> Result<Solved> {
-        let settings = &self.coupled.settings;
+    pub fn solve(&self, b: &Columns, transpose: bool) -> Result<Outcome> {
+        let (settings, rows) = (&self.coupled.settings, self.coupled.rows());
         let blocks = match &self.matrix {
             Matrix::Factored(lu) => {
                 let mut x = b.clone();
-                if transpose {
-                    lu.solve_transpose(x.as_mat_mut());
-                } else {
-                    lu.solve(x.as_mat_mut());
-                }
-                return Ok(Solved {
+                solve_factored(lu, x.as_mat_mut(), transpose);
+                return Ok(Outcome {
                     x,
                     iterations: 0,
                     residual: 0.0,
@@ -104,8 +87,7 @@ impl<'a> System<'a> {
         // With A = D + O, D the bodies' own blocks: (I + O D⁻¹) y = b, x = D⁻¹ y.
         let outcome = gmres(
             |y| {
-                let mut out = y.clone();
-                let mut x = y.clone();
+                let (mut out, mut x) = (y.clone(), y.clone());
                 self.own_solve(&mut x, transpose);
                 self.add_blocks(blocks, &x, transpose, &mut out);
                 out
@@ -116,25 +98,10 @@ impl<'a> System<'a> {
             settings.max_iterations,
             RESTART,
         );
-        if outcome.residual.is_nan() || outcome.residual > 1.001 * settings.tolerance.max(1e-13) {
-            return Err(Error::Solver {
-                what: format!("the coupled panel system ({} panels)", self.coupled.rows()),
-                iterations: outcome.iterations,
-                residual: outcome.residual,
-                tolerance: settings.tolerance,
-                remedy:
-                    "raise the tolerance, refine the meshes where bodies are close, or use the \
-                         solver lu"
-                        .into(),
-            });
-        }
-        let mut x = outcome.x;
-        self.own_solve(&mut x, transpose);
-        Ok(Solved {
-            x,
-            iterations: outcome.iterations,
-            residual: outcome.residual,
-        })
+        let what = || format!("the coupled panel system ({rows} panels)");
+        let mut outcome = converged(outcome, settings.tolerance, what, "solver lu")?;
+        self.own_solve(&mut outcome.x, transpose);
+        Ok(outcome)
     }
 
     /// `x ← D⁻¹ x`, or its transpose.
@@ -148,13 +115,9 @@ impl<'a> System<'a> {
             parts.push((body, part));
             rest = other;
         }
-        parts.into_par_iter().for_each(|(body, part)| {
-            if transpose {
-                body.lu().solve_transpose(part);
-            } else {
-                body.lu().solve(part);
-            }
-        });
+        parts
+            .into_par_iter()
+            .for_each(|(body, part)| solve_factored(body.lu(), part, transpose));
     }
 
     /// `out += O x`, or its transpose.
@@ -162,175 +125,179 @@ impl<'a> System<'a> {
         let faces = &self.coupled.faces;
         for block in blocks {
             let (panels, points) = (&faces[block.source], &faces[block.target]);
-            let (from, to) = match transpose {
-                false => (panels, points),
-                true => (points, panels),
+            let (to, part) = match transpose {
+                false => {
+                    let part = x.part(panels);
+                    (points, transposed_product(&block.data, points.len(), &part))
+                }
+                true => (panels, product(&block.data, panels.len(), &x.part(points))),
             };
-            let part = Columns {
-                rows: from.len(),
-                columns: x.columns,
-                data: x.slice(from.start, from.end).to_vec(),
-            };
-            let part = match transpose {
-                false => transposed_product(&block.data, points.len(), &part),
-                true => product(&block.data, panels.len(), &part),
-            };
-            let out = out.slice_mut(to.start, to.end);
+            let out = out.slice_mut(to);
             out.iter_mut().zip(&part.data).for_each(|(o, p)| *o += p);
         }
     }
 }
 
-/// Blocks of A between different bodies, and those that images make.
-fn blocks(coupled: &PanelCoupled, poses: &[Pose]) -> Result<Vec<Block>> {
-    let count = coupled.bodies.len();
-    let mut out = Vec::new();
-    for source in 0..count {
-        for target in 0..count {
-            if source == target && coupled.images.len() == 1 {
-                continue;
-            }
-            let columns = coupled.faces[target].len();
-            let mut data = vec![0.0; coupled.faces[source].len() * columns];
-            fill(coupled, poses, source, target, &mut data, columns, 0)?;
-            out.push(Block {
-                source,
-                target,
-                data,
-            });
-        }
-    }
-    Ok(out)
-}
-
-/// All of A, factored.
-fn dense(coupled: &PanelCoupled, poses: &[Pose]) -> Result<Lu> {
-    let n = coupled.rows();
-    // By panels and points: A by columns.
-    let mut matrix = vec![0.0; n * n];
-    for (source, panels) in coupled.faces.iter().enumerate() {
-        let out = &mut matrix[panels.start * n..panels.end * n];
-        for (target, points) in coupled.faces.iter().enumerate() {
-            fill(coupled, poses, source, target, out, n, points.start)?;
-        }
-        // Together with the blocks of images, so added to what is there.
-        let body = &coupled.bodies[source];
-        let centres = &body.faces.centres;
-        let layers = body.panels();
-        let image_diagonal: Vec<f64> = (0..panels.len())
-            .map(|i| out[i * n + panels.start + i])
-            .collect();
-        layers.double_layer(centres, Write::Add, out, n, panels.start);
-        for (i, d) in image_diagonal.iter().enumerate() {
-            out[i * n + panels.start + i] = 0.5 + d;
-        }
-    }
-    Ok(Lu::new(matrix, n))
-}
-
-/// Adds Ω/4π of a body's panels and of their images at the panels of another (only of the images at
-/// its own), into `out[panel · stride + column + point]`.
-fn fill(
-    coupled: &PanelCoupled,
-    poses: &[Pose],
-    source: usize,
-    target: usize,
-    out: &mut [f64],
-    stride: usize,
-    column: usize,
-) -> Result<()> {
-    let layers = coupled.bodies[source].panels();
-    let points = coupled.faces[target].len();
-    for image in &coupled.images {
-        let apart = source != target && !coupled.excluded.contains(source, target);
-        if image.is_identity() && !apart {
-            continue;
-        }
-        let seen = seen_from(coupled, poses, image, source, target);
-        // Images in free surfaces have the opposite sign, and the kernel only adds.
-        let negate = |out: &mut [f64]| {
-            for row in out.chunks_mut(stride) {
-                let row = &mut row[column..column + points];
-                row.iter_mut().for_each(|x| *x = -*x);
-            }
-        };
-        if image.sign < 0.0 {
-            negate(out);
-        }
-        layers.double_layer(&seen, Write::Add, out, stride, column);
-        if image.sign < 0.0 {
-            negate(out);
-        }
-    }
-    let mut filled = vec![0.0; points];
-    for row in out.chunks(stride) {
-        for (f, x) in filled.iter_mut().zip(&row[column..column + points]) {
-            *f += x;
-        }
-    }
-    // Also where it isn't a number.
-    match filled.iter().position(|f| f.is_nan() || f.abs() >= INSIDE) {
-        None => Ok(()),
-        Some(i) => Err(overlap(coupled, poses, source, target, i, filled[i])),
+fn solve_factored(lu: &Lu, x: MatMut<'_, f64>, transpose: bool) {
+    match transpose {
+        true => lu.solve_transpose(x),
+        false => lu.solve(x),
     }
 }
 
-fn overlap(
-    coupled: &PanelCoupled,
-    poses: &[Pose],
-    source: usize,
-    target: usize,
-    face: usize,
-    filled: f64,
-) -> Error {
-    let (a, b) = (&coupled.bodies[target], &coupled.bodies[source]);
-    let x = poses[target].apply(&a.faces.centres[face]);
-    let (place, quantity, remedy) = if source == target {
-        (
-            format!("body \"{}\" and its mirror image", a.name),
-            "its image",
-            "it reaches through a wall: move it into the fluid",
-        )
-    } else {
-        (
-            format!("body \"{}\" and body \"{}\"", a.name, b.name),
-            "the second",
-            "they overlap: move them apart",
-        )
-    };
-    Error::Unresolved {
-        place,
-        quantity: format!(
-            "share of the solid angle that {quantity} fills, seen from face {face} of the first at \
-             {:?}",
-            x.as_slice()
-        ),
-        value: filled,
-        limit: INSIDE,
-        remedy: remedy.into(),
+impl Placed<'_> {
+    /// Centroids of body `target` in the frame of body `source`, mirrored.
+    pub fn seen_from(&self, image: &Image, source: usize, target: usize) -> Vec<Vec3> {
+        let (turn, shift) = image.placement(&self.poses[source]);
+        let centres = self.coupled.bodies[target].faces.centres.iter();
+        centres
+            .map(|c| turn.tr_mul(&(self.poses[target].apply(c) - shift)))
+            .collect()
     }
-}
 
-/// Every body must be on the fluid's side of every wall.
-fn check_walls(coupled: &PanelCoupled, poses: &[Pose]) -> Result<()> {
-    for (body, pose) in coupled.bodies.iter().zip(poses) {
-        for (w, wall) in coupled.walls.iter().enumerate() {
-            let corners = body.faces.corners.iter().flatten();
-            let height = |c: &Vec3| wall.height(&pose.apply(c));
-            let lowest = corners.map(height).fold(f64::INFINITY, f64::min);
-            if lowest < 0.0 {
-                return Err(Error::Unresolved {
-                    place: format!("body \"{}\" and wall {w}", body.name),
-                    quantity: "gap in m".into(),
-                    value: lowest,
-                    limit: 0.0,
-                    remedy: format!(
-                        "it reaches through the wall: move it into the fluid by at least {:.6e} m",
-                        -lowest
-                    ),
+    /// Blocks of A between different bodies, and those that images make.
+    fn blocks(&self) -> Result<Vec<Block>> {
+        let coupled = self.coupled;
+        let count = coupled.bodies.len();
+        let mut out = Vec::new();
+        for source in 0..count {
+            for target in 0..count {
+                if source == target && coupled.images.len() == 1 {
+                    continue;
+                }
+                let columns = coupled.faces[target].len();
+                let mut data = vec![0.0; coupled.faces[source].len() * columns];
+                self.fill(source, target, &mut data, columns, 0)?;
+                out.push(Block {
+                    source,
+                    target,
+                    data,
                 });
             }
         }
+        Ok(out)
     }
-    Ok(())
+
+    /// All of A, factored.
+    fn dense(&self) -> Result<Lu> {
+        let coupled = self.coupled;
+        let n = coupled.rows();
+        // By panels and points: A by columns.
+        let mut matrix = vec![0.0; n * n];
+        for (source, panels) in coupled.faces.iter().enumerate() {
+            let out = &mut matrix[panels.start * n..panels.end * n];
+            for (target, points) in coupled.faces.iter().enumerate() {
+                self.fill(source, target, out, n, points.start)?;
+            }
+            // Together with the blocks of images, so added to what is there.
+            let body = &coupled.bodies[source];
+            let centres = &body.faces.centres;
+            let layers = body.panels();
+            let image_diagonal: Vec<f64> = (0..panels.len())
+                .map(|i| out[i * n + panels.start + i])
+                .collect();
+            layers.double_layer(centres, Write::Add, out, n, panels.start);
+            for (i, d) in image_diagonal.iter().enumerate() {
+                out[i * n + panels.start + i] = 0.5 + d;
+            }
+        }
+        Ok(Lu::new(matrix, n))
+    }
+
+    /// Adds Ω/4π of a body's panels and of their images at the panels of another (only of the images at
+    /// its own), into `out[panel · stride + column + point]`.
+    fn fill(
+        &self,
+        source: usize,
+        target: usize,
+        out: &mut [f64],
+        stride: usize,
+        column: usize,
+    ) -> Result<()> {
+        let coupled = self.coupled;
+        let layers = coupled.bodies[source].panels();
+        let points = coupled.faces[target].len();
+        for image in &coupled.images {
+            let apart = source != target && !coupled.excluded.contains(source, target);
+            if image.is_identity() && !apart {
+                continue;
+            }
+            let seen = self.seen_from(image, source, target);
+            // Images in free surfaces have the opposite sign, and the kernel only adds.
+            let signed = |out: &mut [f64]| {
+                for row in out.chunks_mut(stride) {
+                    let row = &mut row[column..column + points];
+                    row.iter_mut().for_each(|x| *x *= image.sign);
+                }
+            };
+            signed(out);
+            layers.double_layer(&seen, Write::Add, out, stride, column);
+            signed(out);
+        }
+        let mut filled = vec![0.0; points];
+        for row in out.chunks(stride) {
+            for (f, x) in filled.iter_mut().zip(&row[column..column + points]) {
+                *f += x;
+            }
+        }
+        // Also where it isn't a number.
+        match filled.iter().position(|f| f.is_nan() || f.abs() >= INSIDE) {
+            None => Ok(()),
+            Some(i) => Err(self.overlap(source, target, i, filled[i])),
+        }
+    }
+
+    fn overlap(&self, source: usize, target: usize, face: usize, filled: f64) -> Error {
+        let bodies = &self.coupled.bodies;
+        let (a, b) = (&bodies[target], &bodies[source]);
+        let x = self.poses[target].apply(&a.faces.centres[face]);
+        let (place, quantity, remedy) = if source == target {
+            (
+                format!("body \"{}\" and its mirror image", a.name),
+                "its image",
+                "it reaches through a wall: move it into the fluid",
+            )
+        } else {
+            (
+                format!("body \"{}\" and body \"{}\"", a.name, b.name),
+                "the second",
+                "they overlap: move them apart",
+            )
+        };
+        Error::Unresolved {
+            place,
+            quantity: format!(
+                "share of the solid angle that {quantity} fills, seen from face {face} of the first at \
+             {:?}",
+                x.as_slice()
+            ),
+            value: filled,
+            limit: INSIDE,
+            remedy: remedy.into(),
+        }
+    }
+
+    /// Every body must be on the fluid's side of every wall.
+    fn check_walls(&self) -> Result<()> {
+        for (body, pose) in self.coupled.bodies.iter().zip(self.poses) {
+            for (w, wall) in self.coupled.walls.iter().enumerate() {
+                let corners = body.faces.corners.iter().flatten();
+                let height = |c: &Vec3| wall.height(&pose.apply(c));
+                let lowest = corners.map(height).fold(f64::INFINITY, f64::min);
+                if lowest < 0.0 {
+                    return Err(Error::Unresolved {
+                        place: format!("body \"{}\" and wall {w}", body.name),
+                        quantity: "gap in m".into(),
+                        value: lowest,
+                        limit: 0.0,
+                        remedy: format!(
+                            "it reaches through the wall: move it into the fluid by at least {:.6e} m",
+                            -lowest
+                        ),
+                    });
+                }
+            }
+        }
+        Ok(())
+    }
 }

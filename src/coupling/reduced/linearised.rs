@@ -1,19 +1,19 @@
 //! One evaluation of the reduced coupling: value and first derivative. What a value costs is all that the derivatives need.
 
 use super::Reduced;
-use super::factor::Factor;
 use super::link::{Link, PlacedSkeletons};
-use super::views::{FLUX, interleave, vector, view, view_mut};
+use super::views::{FLUX, interleave, view, view_mut};
 use crate::Result;
-use crate::adjoint::kernel::potential_vjp;
-use crate::adjoint::lie::{Pose, Vec6, six};
-use crate::coupling::pair::wrench;
+use crate::adjoint::kernel::{Points, potential_sum, potential_vjp};
+use crate::adjoint::lie::{Pose, Vec3, Vec6, point_wrench};
+use crate::coupling::pair::{vector, wrench};
 use crate::coupling::{
     Coupling, CouplingReport, Direction, Linearise, Linearised, Momenta, Pullback, Tangent,
 };
 use faer::linalg::matmul::matmul;
+use faer::linalg::solvers::{Llt, Solve};
 use faer::reborrow::ReborrowMut;
-use faer::{Accum, Mat, MatRef, Par};
+use faer::{Accum, Mat, MatRef, Par, Side};
 use nalgebra::{DMatrix, DVector};
 use std::sync::OnceLock;
 
@@ -28,7 +28,7 @@ pub(super) struct ReducedLinearised<'a> {
     pub poses: Vec<Pose>,
     pub placed: Vec<PlacedSkeletons<'a>>,
     /// Of I − LᵀGL.
-    factor: Factor,
+    factor: Llt<f64>,
     /// LᵀGŪ, modes × 6 bodies.
     solution: DMatrix<f64>,
     /// ŪᵀGŪ, 6 bodies × 6 bodies.
@@ -40,15 +40,15 @@ pub(super) struct ReducedLinearised<'a> {
     pub alpha: DMatrix<f64>,
     momenta: DMatrix<f64>,
     /// Made when first asked for.
-    pub fields: OnceLock<Vec<Fields>>,
+    fields: OnceLock<Vec<Fields>>,
     report: CouplingReport,
 }
 
 /// ∇ of the potentials at a link's source points that the targets' charges make, one for each column of the
 /// basis, `[j][k][3]`; and where the link fades those potentials, `[j][k]`.
-pub(super) struct Fields {
-    pub field: Vec<f64>,
-    pub sums: Vec<f64>,
+struct Fields {
+    field: Vec<f64>,
+    sums: Vec<f64>,
 }
 
 /// Solution to one combination of twists.
@@ -75,26 +75,19 @@ impl<'a> ReducedLinearised<'a> {
         let mut solution = DMatrix::zeros(n, w);
         let mut direct = DMatrix::zeros(w, w);
         for (placed, block) in placed.iter().zip(&blocks) {
-            let link = placed.link;
-            let factor = link.factor * placed.weight[0];
-            scatter(reduced, link.target, link.source, factor, block.as_ref(), {
-                (&mut system, &mut solution, &mut direct)
-            });
-            scatter(
-                reduced,
-                link.source,
-                link.target,
-                factor,
-                block.transpose(),
-                (&mut system, &mut solution, &mut direct),
-            );
+            let (t, s) = (placed.link.target, placed.link.source);
+            let factor = placed.link.factor * placed.weight[0];
+            for (ends, block) in [((t, s), block.as_ref()), ((s, t), block.transpose())] {
+                let into = (&mut system, &mut solution, &mut direct);
+                scatter(reduced, ends, factor, block, into);
+            }
         }
-        let Some(factor) = Factor::new(system) else {
+        let Ok(factor) = view(&system).llt(Side::Lower) else {
             return Err(reduced.indefinite(poses, 0.0));
         };
         let mut out = Self {
             report: CouplingReport {
-                condition: factor.condition(),
+                condition: condition(&factor),
                 ..CouplingReport::default()
             },
             reduced,
@@ -109,7 +102,7 @@ impl<'a> ReducedLinearised<'a> {
             momenta: DMatrix::zeros(0, 0),
             fields: OnceLock::new(),
         };
-        out.factor.solve_in_place(&mut out.a);
+        out.factor.solve_in_place(view_mut(&mut out.a));
         out.alpha = out.charges(basis, &out.a);
         out.momenta = out.impulses(basis, &out.a);
         reduced.check_solution(poses, &out.basis, &out.momenta, out.report.condition)?;
@@ -159,7 +152,7 @@ impl<'a> ReducedLinearised<'a> {
             Direction::Twist(x) => {
                 let twists = DMatrix::from_column_slice(x.len(), 1, x.as_slice());
                 let mut a = &self.solution * &twists;
-                self.factor.solve_in_place(&mut a);
+                self.factor.solve_in_place(view_mut(&mut a));
                 ReducedResponse {
                     alpha: self.charges(&twists, &a).column(0).into_owned(),
                     a: a.column(0).into_owned(),
@@ -189,7 +182,7 @@ impl<'a> ReducedLinearised<'a> {
             a.rows_mut(at, m).copy_from(&projected.rows(0, m));
             direct.rows_mut(6 * b, 6).copy_from(&projected.rows(m, 6));
         }
-        self.factor.solve_in_place(&mut a);
+        self.factor.solve_in_place(view_mut(&mut a));
         let still = DMatrix::zeros(6 * self.reduced.bodies.len(), k);
         let alpha = self.charges(&still, &a);
         (alpha, FLUX * (direct + self.solution.tr_mul(&a)))
@@ -207,8 +200,8 @@ impl<'a> ReducedLinearised<'a> {
             let n = s.len();
             let (x, y) = (&x[s.clone()], &y[s]);
             let mut field = vec![0.0; 3 * columns * n];
-            let targets = self.reduced.bodies[link.target].targets();
-            potential_vjp(targets, &placed.pair.points, &bar, columns, &mut field);
+            let (targets, sources) = (self.targets(placed), &placed.pair.points);
+            potential_vjp(targets, sources, &bar, columns, &mut field);
             let strength = FLUX * link.factor;
             let last = columns - 1;
             let mut total = wrench(&placed.pair.positions, |j| {
@@ -220,7 +213,7 @@ impl<'a> ReducedLinearised<'a> {
                 let of = |j: usize| p[columns * j] * y[j] + p[columns * j + last] * x[j];
                 let energy: f64 = (0..n).map(of).sum();
                 let force = placed.between.normalize() * (strength * placed.weight[1] * energy);
-                total += six(&force, &placed.centre.cross(&force));
+                total += point_wrench(&placed.centre, &force);
             }
             total
         };
@@ -233,6 +226,65 @@ impl<'a> ReducedLinearised<'a> {
         out
     }
 
+    fn fields(&self) -> &[Fields] {
+        self.fields.get_or_init(|| {
+            let columns = self.alpha.ncols();
+            let one = |placed: &PlacedSkeletons| {
+                let (t, s) = (self.range(placed.link.target), &placed.pair.points);
+                let own = self.alpha.rows(t.start, t.len()).transpose();
+                let mut field = vec![0.0; 3 * columns * s.len()];
+                potential_vjp(self.targets(placed), s, own.as_slice(), columns, &mut field);
+                let sums = match placed.fading() {
+                    true => self.sums(placed, own.as_slice(), columns),
+                    false => Vec::new(),
+                };
+                Fields { field, sums }
+            };
+            self.placed.iter().map(one).collect()
+        })
+    }
+
+    /// ∇_g E(x, e_k) for every column e_k of the basis: spatial wrenches on the bodies.
+    fn pull_back_columns(&self, x: &DVector<f64>) -> Vec<Vec<Vec6>> {
+        let (columns, bodies) = (x.len(), self.reduced.bodies.len());
+        let mut out = vec![vec![Vec6::zeros(); bodies]; columns];
+        for (placed, f) in self.placed.iter().zip(self.fields()) {
+            let link = placed.link;
+            let s = self.range(link.source);
+            let charges = self.alpha.rows(s.start, s.len());
+            let along: DVector<f64> = charges * x;
+            let at = |j: usize, k: usize| vector(&f.field, columns, j, k);
+            let seen: Vec<Vec3> = (0..s.len())
+                .map(|j| (0..columns).map(|k| at(j, k) * x[k]).sum())
+                .collect();
+            let strength = FLUX * link.factor;
+            for (k, out) in out.iter_mut().enumerate() {
+                let mut total = wrench(&placed.pair.positions, |j| {
+                    let force = seen[j] * charges[(j, k)] + at(j, k) * along[j];
+                    strength * placed.weight[0] * force
+                });
+                if placed.fading() {
+                    let p = |j: usize, k: usize| f.sums[columns * j + k];
+                    let of = |j: usize| {
+                        let own: f64 = (0..columns).map(|m| p(j, m) * x[m]).sum();
+                        own * charges[(j, k)] + p(j, k) * along[j]
+                    };
+                    let energy: f64 = (0..s.len()).map(of).sum();
+                    let slope = strength * placed.weight[1] * energy;
+                    let force = placed.between.normalize() * slope;
+                    total += point_wrench(&placed.centre, &force);
+                }
+                placed.pair.apply(&self.poses[link.target], &total, out);
+            }
+        }
+        out
+    }
+
+    /// The points of a link's target as the kernels see them.
+    pub fn targets(&self, placed: &PlacedSkeletons) -> &Points {
+        self.reduced.bodies[placed.link.target].targets()
+    }
+
     /// Points of body `b`.
     pub fn range(&self, b: usize) -> std::ops::Range<usize> {
         self.reduced.points[b].clone()
@@ -241,8 +293,8 @@ impl<'a> ReducedLinearised<'a> {
     /// `[j][k]: Σ_i bar[i][k] P_ij`.
     pub fn sums(&self, placed: &PlacedSkeletons, bar: &[f64], columns: usize) -> Vec<f64> {
         let mut out = vec![0.0; columns * placed.pair.points.len()];
-        let targets = self.reduced.bodies[placed.link.target].targets();
-        crate::adjoint::kernel::potential_sum(targets, &placed.pair.points, bar, columns, &mut out);
+        let (targets, sources) = (self.targets(placed), &placed.pair.points);
+        potential_sum(targets, sources, bar, columns, &mut out);
         out
     }
 }
@@ -255,46 +307,31 @@ fn block(reduced: &Reduced, placed: &PlacedSkeletons) -> Mat<f64> {
     let p = MatRef::from_row_major_slice(&p, target.points(), source.points());
     let (left, right) = (view(target.basis()), view(source.basis()));
     let (m, n) = (left.ncols(), right.ncols());
-    let mut out = Mat::zeros(m, n);
     // The cheaper order of the two products.
     if target.points() * n <= source.points() * m {
-        let mut half = Mat::zeros(target.points(), n);
-        matmul(half.as_mut(), Accum::Replace, p, right, 1.0, Par::Seq);
-        matmul(
-            out.as_mut(),
-            Accum::Replace,
-            left.transpose(),
-            half.as_ref(),
-            1.0,
-            Par::Seq,
-        );
+        left.transpose() * (p * right)
     } else {
-        let mut half = Mat::zeros(m, source.points());
-        matmul(
-            half.as_mut(),
-            Accum::Replace,
-            left.transpose(),
-            p,
-            1.0,
-            Par::Seq,
-        );
-        matmul(
-            out.as_mut(),
-            Accum::Replace,
-            half.as_ref(),
-            right,
-            1.0,
-            Par::Seq,
-        );
+        (left.transpose() * p) * right
     }
-    out
+}
+
+/// (largest / smallest pivot)²: the condition number, from below.
+fn condition(factor: &Llt<f64>) -> f64 {
+    let pivots = factor.L().diagonal().column_vector().iter();
+    let (low, high) = pivots.fold((f64::INFINITY, 0.0_f64), |(low, high), x| {
+        (low.min(*x), high.max(*x))
+    });
+    if high > 0.0 {
+        (high / low).powi(2)
+    } else {
+        1.0
+    }
 }
 
 /// Adds a block into I − LᵀGL, LᵀGŪ and ŪᵀGŪ.
 fn scatter(
     reduced: &Reduced,
-    target: usize,
-    source: usize,
+    (target, source): (usize, usize),
     factor: f64,
     block: MatRef<f64>,
     (system, solution, direct): (&mut DMatrix<f64>, &mut DMatrix<f64>, &mut DMatrix<f64>),

@@ -19,10 +19,8 @@
 mod body;
 pub mod cache;
 mod check;
-mod columns;
 pub mod compress;
 mod cutoff;
-mod factor;
 mod linearised;
 mod link;
 mod resolved;

@@ -2,9 +2,10 @@
 
 use super::linearised::{ReducedLinearised, ReducedResponse};
 use super::link::PlacedSkeletons;
-use super::views::{FLUX, interleave, vector};
+use super::views::{FLUX, interleave};
 use crate::adjoint::kernel::{potential_hvp, potential_jvp, potential_vjp};
-use crate::adjoint::lie::{Vec3, Vec6, angular, linear, six};
+use crate::adjoint::lie::{Vec3, Vec6, point_velocity, point_wrench, six};
+use crate::coupling::pair::vector;
 use crate::coupling::{Direction, Tangent};
 use nalgebra::{DMatrix, DVector};
 
@@ -26,7 +27,7 @@ impl ReducedLinearised<'_> {
         let pose = &self.poses[placed.link.target];
         let relative = placed.pair.image.twist(&z[placed.link.source]) - z[placed.link.target];
         let local = pose.twist_to_body(&relative);
-        let centre = linear(&local) + angular(&local).cross(&placed.centre);
+        let centre = point_velocity(&local, &placed.centre);
         let rate = if placed.fading() {
             placed.between.normalize().dot(&centre)
         } else {
@@ -56,19 +57,12 @@ impl ReducedLinearised<'_> {
                 interleave(&columns)
             };
             let (at_target, at_source) = (part(&t), part(&s));
-            let body = &self.reduced.bodies[link.target];
-            let points = &placed.pair.points;
+            let (targets, points) = (self.targets(placed), &placed.pair.points);
             let mut on_target = vec![0.0; k * t.len()];
-            potential_jvp(
-                body.targets(),
-                points,
-                &moved.points,
-                &at_source,
-                k,
-                &mut on_target,
-            );
+            let d = &moved.points;
+            potential_jvp(targets, points, d, &at_source, k, &mut on_target);
             let mut field = vec![0.0; 3 * k * s.len()];
-            potential_vjp(body.targets(), points, &at_target, k, &mut field);
+            potential_vjp(targets, points, &at_target, k, &mut field);
             let mut on_source: Vec<f64> = (0..s.len())
                 .flat_map(|j| (0..k).map(move |c| (j, c)))
                 .map(|(j, c)| moved.points[j].dot(&vector(&field, k, j, c)))
@@ -112,15 +106,8 @@ impl ReducedLinearised<'_> {
     }
 
     pub(super) fn second(&self, x: Direction, y: Direction, z: &[Vec6]) -> Tangent {
-        let same = match (&x, &y) {
-            (Direction::Basis(a), Direction::Basis(b)) => a == b,
-            (Direction::Twist(a), Direction::Twist(b)) => a == b,
-            _ => false,
-        };
-        let mut responses = vec![self.respond(x)];
-        if !same {
-            responses.push(self.respond(y));
-        }
+        let directions = Direction::distinct(x, y);
+        let responses: Vec<_> = directions.into_iter().map(|x| self.respond(x)).collect();
         let n = responses.len();
         let alpha: Vec<&[f64]> = responses.iter().map(|r| r.alpha.as_slice()).collect();
         let (psi, seen) = self.tangent_potentials(&alpha, z);
@@ -169,18 +156,13 @@ impl ReducedLinearised<'_> {
         let at_source: Vec<_> = (0..n).map(|k| column(k, &s)).collect();
         let values: Vec<&[f64]> = at_target.iter().map(|c| c.0.as_slice()).collect();
         let changes: Vec<&[f64]> = at_target.iter().map(|c| c.1.as_slice()).collect();
-        let sums = if placed.fading() {
-            self.sums(
-                placed,
-                &interleave(&[&values[..], &changes].concat()),
-                2 * n,
-            )
-        } else {
-            Vec::new()
+        let both = [&values[..], &changes].concat();
+        let sums = match placed.fading() {
+            true => self.sums(placed, &interleave(&both), 2 * n),
+            false => Vec::new(),
         };
         let (values, changes) = (interleave(&values), interleave(&changes));
-        let targets = self.reduced.bodies[link.target].targets();
-        let points = &placed.pair.points;
+        let (targets, points) = (self.targets(placed), &placed.pair.points);
         // ∇ of the potentials of δx.., added to the tangent of that of x..
         let mut bent = vec![0.0; 3 * n * s.len()];
         potential_vjp(targets, points, &changes, n, &mut bent);
@@ -204,7 +186,7 @@ impl ReducedLinearised<'_> {
             }
             denergy += f.dot(&moved.points[j]);
             let (force, dforce) = (weight * f, weight * df + slope * moved.rate * f);
-            w += six(&force, &at.cross(&force));
+            w += point_wrench(at, &force);
             dw += six(
                 &dforce,
                 &(moved.points[j].cross(&force) + at.cross(&dforce)),
@@ -216,7 +198,7 @@ impl ReducedLinearised<'_> {
             let de = (moved.centre - e * moved.rate) / distance;
             let force = slope * energy * e;
             let dforce = (bend * moved.rate * energy + slope * denergy) * e + slope * energy * de;
-            w += six(&force, &placed.centre.cross(&force));
+            w += point_wrench(&placed.centre, &force);
             dw += six(
                 &dforce,
                 &(moved.centre.cross(&force) + placed.centre.cross(&dforce)),

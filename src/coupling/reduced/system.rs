@@ -3,6 +3,7 @@
 use super::{Cutoff, Link, ReducedBody};
 use crate::Result;
 use crate::coupling::Exclusions;
+use crate::coupling::settings::{end, ranges};
 use crate::geometry::{Image, Wall};
 use rayon::prelude::*;
 use std::ops::Range;
@@ -34,20 +35,10 @@ impl Reduced {
         walls: &[Wall],
         cutoff: impl Fn(usize, usize) -> Option<Cutoff>,
     ) -> Result<Self> {
-        let ranges = |size: &dyn Fn(&ReducedBody) -> usize| {
-            let mut at = 0;
-            let range = |b: &Arc<ReducedBody>| {
-                let from = at;
-                at += size(b);
-                from..at
-            };
-            bodies.iter().map(range).collect::<Vec<_>>()
-        };
-        let (points, modes) = (ranges(&|b| b.points()), ranges(&|b| b.modes()));
         let links = Link::all(bodies.len(), &Image::of_walls(walls)?, cutoff);
         Ok(Self {
-            points,
-            modes,
+            points: ranges(bodies.iter().map(|b| b.points())),
+            modes: ranges(bodies.iter().map(|b| b.modes())),
             links,
             names: bodies.iter().map(|b| b.parts().name.clone()).collect(),
             bodies,
@@ -99,10 +90,10 @@ impl Reduced {
     }
 
     pub(super) fn point_count(&self) -> usize {
-        self.points.last().map_or(0, |r| r.end)
+        end(&self.points)
     }
 
     pub(super) fn mode_count(&self) -> usize {
-        self.modes.last().map_or(0, |r| r.end)
+        end(&self.modes)
     }
 }

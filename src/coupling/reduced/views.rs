@@ -1,12 +1,12 @@
 //! Matrices and interleaved columns as the kernels see them.
 
-use crate::adjoint::lie::Vec3;
 use faer::{MatMut, MatRef};
 use nalgebra::DMatrix;
 use std::f64::consts::PI;
 
 /// 4π: a source of strength α makes the flux 4πα.
 pub(super) const FLUX: f64 = 4.0 * PI;
+
 /// A nalgebra matrix as faer sees it.
 pub(super) fn view(m: &DMatrix<f64>) -> MatRef<'_, f64> {
     MatRef::from_column_major_slice(m.as_slice(), m.nrows(), m.ncols())
@@ -23,11 +23,4 @@ pub(super) fn interleave(columns: &[&[f64]]) -> Vec<f64> {
     (0..rows)
         .flat_map(|i| columns.iter().map(move |c| c[i]))
         .collect()
-}
-
-/// Three-vector `k` of row `j` in a `[j][columns][3]` array.
-#[inline]
-pub(super) fn vector(g: &[f64], columns: usize, j: usize, k: usize) -> Vec3 {
-    let at = 3 * (j * columns + k);
-    Vec3::new(g[at], g[at + 1], g[at + 2])
 }

@@ -343,7 +343,7 @@ impl SystemResponse for Solution {
         let place: Vec<(usize, usize, usize)> = (shares.iter().enumerate())
             .flat_map(|(p, (_, width))| (0..*width).map(move |x| (p, x, *width)))
             .collect();
-        let mut wrenches = vec![DMatrix::zeros(6, k * k); bodies];
+        let mut out = PairTensor::zeros(bodies, k);
         for (number, pair) in geometry.pairs.iter().enumerate() {
             let raw = |x: usize, y: usize| {
                 let (share, x_there, width) = place[x];
@@ -358,21 +358,12 @@ impl SystemResponse for Solution {
             for x in 0..k {
                 for y in 0..=x {
                     let world = 0.5 * (raw(x, y) + raw(y, x));
-                    let back = image.twist_vjp(&world);
-                    let mut add = |b: usize, w: &Vec6| {
-                        let mut column = wrenches[b].fixed_view_mut::<6, 1>(0, x * k + y);
-                        column += w;
-                        if x != y {
-                            let mut column = wrenches[b].fixed_view_mut::<6, 1>(0, y * k + x);
-                            column += w;
-                        }
-                    };
-                    add(pair.source, &back);
-                    add(pair.target, &-world);
+                    out.add(pair.source, (x, y), &image.twist_vjp(&world));
+                    out.add(pair.target, (x, y), &-world);
                 }
             }
         }
-        Ok(PairTensor::new(k, wrenches))
+        Ok(out)
     }
 
     fn directions(&self, directions: &[Direction]) -> Result<Box<dyn SystemResponse + '_>> {

@@ -2,12 +2,11 @@
 
 use super::kind::{BodyMethod, Problem, Solved};
 use crate::Result;
-use crate::boundary::{self, BodyBoundary};
-use crate::coupling::full::{FullSolver, MfsBody, Model};
+use crate::boundary::{self, BodyBoundary, Response};
+use crate::coupling::full::{FullSolver, Model};
 use crate::water::device::Device;
 use crate::water::numerics::Numerics;
 use crate::water::submerged::{Discretisation, Made, SubmergedBody, once, shared};
-use std::sync::Arc;
 
 /// Sources under vertices or faces.
 pub(super) struct Mfs(pub boundary::Method);
@@ -54,16 +53,15 @@ impl BodyMethod for Mfs {
             } else {
                 BodyBoundary::unfactored
             };
-            let boundary = make(body.name, mesh, &settings)?;
-            Ok(MfsBody::new(Arc::new(boundary)))
+            make(body.name, mesh, &settings)
         })?;
         Ok(Made {
-            warnings: once(&made, |m| &m.boundary.warnings),
+            warnings: once(&made, |m| &m.warnings),
             bodies: problem.named(made.iter().map(|m| Discretisation {
                 method: self.label(),
-                faces: m.faces(),
-                unknowns: m.sources(),
-                asymmetry: m.boundary.asymmetry,
+                faces: m.faces.len(),
+                unknowns: m.sources.len(),
+                asymmetry: m.asymmetry,
                 ..Discretisation::default()
             })),
             coupling: Box::new(device.full(Model::new(

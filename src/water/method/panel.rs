@@ -66,10 +66,12 @@ impl BodyMethod for Panel {
                 asymmetry: m.asymmetry,
                 ..Discretisation::default()
             })),
-            coupling: Box::new(
-                PanelCoupled::new(made, problem.walls, solve)?
-                    .excluding(problem.excluded.clone())?,
-            ),
+            coupling: Box::new(PanelCoupled::new(
+                made,
+                problem.walls,
+                problem.excluded.clone(),
+                solve,
+            )?),
         })
     }
 

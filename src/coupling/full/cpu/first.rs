@@ -1,19 +1,18 @@
 //! First derivatives with the bodies' displacement.
 
-use super::gradient_at;
-use super::placed::{PlacedBodies, Solution, body_twists};
-use crate::adjoint::lie::Vec6;
+use super::placed::{PlacedBodies, Solution, beside, body_twists};
+use super::system::Solved;
+use crate::adjoint::lie::{Vec6, point_wrench};
 use crate::coupling::PairTensor;
-use crate::coupling::pair::{Pair, wrench};
+use crate::coupling::pair::{Pair, vector, wrench};
 use crate::solver::{Columns, transposed_product};
-use nalgebra::DMatrix;
 
 impl PlacedBodies<'_> {
     /// ∇_g E of all pairs of columns by products of matrices, for many columns.
     pub fn tensor(&self, solution: &Solution) -> PairTensor {
         let mut out = PairTensor::zeros(self.model.bodies.len(), solution.columns());
         for pair in &self.pairs {
-            out.add(
+            out.add_pair(
                 pair,
                 &self.poses[pair.target],
                 &self.pair_tensor(pair, solution),
@@ -29,16 +28,8 @@ impl PlacedBodies<'_> {
         let twists = body_twists(&solution.twists, pair.target);
         let active: Vec<usize> = (0..k).filter(|x| twists[*x] != Vec6::zeros()).collect();
         let own: Vec<Vec6> = active.iter().map(|x| twists[*x]).collect();
-        let faces = &self.model.faces[pair.target];
-        let (mu, r) = (
-            solution.mu.slice(faces.start, faces.end),
-            solution.r.slice(faces.start, faces.end),
-        );
-        let mut bar = Vec::with_capacity(2 * mu.len());
-        for (m, r) in mu.chunks_exact(k).zip(r.chunks_exact(k)) {
-            bar.extend_from_slice(m);
-            bar.extend_from_slice(r);
-        }
+        let Solved { a, lambda, r, mu } = &solution.solved;
+        let bar = beside(mu, r, &self.model.faces[pair.target]);
         let fields = body.vjp(&pair.points, &bar, 2 * k);
         let potential = body.potential_vjp(&pair.points, &body.readout_rows(&own), own.len());
         let sources = pair.positions.len();
@@ -46,27 +37,19 @@ impl PlacedBodies<'_> {
         let mut residual = vec![0.0; sources * 6 * k];
         for (j, s) in pair.positions.iter().enumerate() {
             for x in 0..k {
-                let mut q = -gradient_at(&fields, 2 * k, j, x);
+                let mut q = -vector(&fields, 2 * k, j, x);
                 if let Some(at) = active.iter().position(|i| *i == x) {
-                    q += gradient_at(&potential, own.len(), j, at);
+                    q += vector(&potential, own.len(), j, at);
                 }
-                let rho = gradient_at(&fields, 2 * k, j, k + x);
+                let rho = vector(&fields, 2 * k, j, k + x);
                 let at = (j * k + x) * 6;
-                charge[at..at + 3].copy_from_slice(q.as_slice());
-                charge[at + 3..at + 6].copy_from_slice(s.cross(&q).as_slice());
-                residual[at..at + 3].copy_from_slice(rho.as_slice());
-                residual[at + 3..at + 6].copy_from_slice(s.cross(&rho).as_slice());
+                charge[at..at + 6].copy_from_slice(point_wrench(s, &q).as_slice());
+                residual[at..at + 6].copy_from_slice(point_wrench(s, &rho).as_slice());
             }
         }
         let range = &self.model.sources[pair.source];
-        let part = |x: &Columns| Columns {
-            rows: sources,
-            columns: k,
-            data: x.slice(range.start, range.end).to_vec(),
-        };
-        let mut out = transposed_product(&charge, 6 * k, &part(&solution.a));
-        let rest = transposed_product(&residual, 6 * k, &part(&solution.lambda));
-        out.add_scaled(&rest, &vec![1.0; k]);
+        let mut out = transposed_product(&charge, 6 * k, &a.part(range));
+        out.add(&transposed_product(&residual, 6 * k, &lambda.part(range)));
         out
     }
 
@@ -78,15 +61,11 @@ impl PlacedBodies<'_> {
             (0..k).flat_map(|x| (x..k).map(move |y| (x, y))).collect();
         let bodies = self.model.bodies.len();
         let mut sums = vec![vec![Vec6::zeros(); bodies]; combinations.len()];
-        let (a, lambda) = (&solution.a, &solution.lambda);
+        let Solved { a, lambda, r, mu } = &solution.solved;
         for pair in &self.pairs {
             let t = pair.target;
             let body = &self.model.bodies[t];
-            let faces = self.model.faces[t].clone();
-            let (mu, r) = (&solution.mu, &solution.r);
-            let bar: Vec<f64> = faces
-                .flat_map(|i| mu.row(i).iter().chain(r.row(i)).copied())
-                .collect();
+            let bar = beside(mu, r, &self.model.faces[t]);
             let fields = body.vjp(&pair.points, &bar, 2 * k);
             let rows = body.readout_rows(&body_twists(&solution.twists, t));
             let potential = body.potential_vjp(&pair.points, &rows, k);
@@ -94,8 +73,8 @@ impl PlacedBodies<'_> {
             for ((x, y), out) in combinations.iter().copied().zip(&mut sums) {
                 let w = wrench(&pair.positions, |j| {
                     let (g, p) = (
-                        |k2| gradient_at(&fields, 2 * k, j, k2),
-                        |k1| gradient_at(&potential, k, j, k1),
+                        |k2| vector(&fields, 2 * k, j, k2),
+                        |k1| vector(&potential, k, j, k1),
                     );
                     let s = at + j;
                     0.5 * ((p(x) - g(x)) * a.at(s, y)
@@ -106,13 +85,12 @@ impl PlacedBodies<'_> {
                 pair.apply(&self.poses[t], &w, out);
             }
         }
-        let mut wrenches = vec![DMatrix::zeros(6, k * k); bodies];
-        for ((x, y), sums) in combinations.into_iter().zip(&sums) {
-            for (out, w) in wrenches.iter_mut().zip(sums) {
-                out.set_column(x * k + y, w);
-                out.set_column(y * k + x, w);
+        let mut out = PairTensor::zeros(bodies, k);
+        for (at, sums) in combinations.into_iter().zip(&sums) {
+            for (b, w) in sums.iter().enumerate() {
+                out.add(b, at, w);
             }
         }
-        PairTensor::new(k, wrenches)
+        out
     }
 }

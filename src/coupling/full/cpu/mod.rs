@@ -2,14 +2,16 @@
 
 mod first;
 mod placed;
-mod response;
 mod second;
 mod system;
 
-use super::{Model, SystemBackend, SystemResponse};
-use crate::adjoint::lie::{Pose, Vec3};
+use super::{Model, Reached, SystemBackend, SystemResponse};
+use crate::adjoint::lie::{Pose, Vec6};
+use crate::coupling::{Direction, PairTensor, Tangent};
+use crate::solver::Columns;
 use crate::{Error, Result};
 use nalgebra::DMatrix;
+use placed::{PlacedBodies, Solution};
 use std::sync::{Arc, Mutex};
 
 /// The backend that every machine has.
@@ -25,12 +27,12 @@ impl Cpu {
     /// # Errors
     /// A body that was never factored: this backend stores its matrix.
     pub fn new(model: Arc<Model>) -> Result<Self> {
-        if let Some(body) = model.bodies.iter().find(|b| !b.boundary.factored()) {
+        if let Some(body) = model.bodies.iter().find(|b| !b.factored()) {
             return Err(Error::Unsupported {
                 what: format!(
                     "body \"{}\" with {} faces on the backend cpu",
-                    body.boundary.name,
-                    body.faces()
+                    body.name,
+                    body.faces.len()
                 ),
                 why: "its matrix wasn't made, and this backend needs it".into(),
                 instead: "use the backend gpu, or fewer faces".into(),
@@ -53,15 +55,77 @@ impl SystemBackend for Cpu {
         poses: &[Pose],
         twists: &DMatrix<f64>,
     ) -> Result<Box<dyn SystemResponse + '_>> {
-        Ok(Box::new(response::CoupledSolution::new(
-            self, poses, twists,
-        )?))
+        let placed = PlacedBodies::new(self, poses, twists);
+        Ok(Box::new(CoupledSolution {
+            solution: placed.solve(twists.clone())?,
+            placed: Arc::new(placed),
+            few: false,
+        }))
     }
 }
 
-/// Three-vector `k` of row `j` in a `[j][columns][3]` array.
-#[inline]
-fn gradient_at(g: &[f64], columns: usize, j: usize, k: usize) -> Vec3 {
-    let at = 3 * (j * columns + k);
-    Vec3::new(g[at], g[at + 1], g[at + 2])
+/// Solution of the system at given poses, in memory.
+struct CoupledSolution<'a> {
+    placed: Arc<PlacedBodies<'a>>,
+    solution: Solution,
+    /// Whether these are directions, of which there are few, and not the columns of a basis.
+    few: bool,
+}
+
+impl SystemResponse for CoupledSolution<'_> {
+    fn reached(&self) -> Reached {
+        self.solution.reached
+    }
+
+    fn momenta(&self) -> Result<DMatrix<f64>> {
+        let Solution { twists, solved, .. } = &self.solution;
+        let mut out = DMatrix::zeros(twists.nrows(), twists.ncols());
+        for (k, mut column) in out.column_iter_mut().enumerate() {
+            column.copy_from(&self.placed.impulse(solved, k));
+        }
+        Ok(out)
+    }
+
+    fn energies(&self) -> Result<DMatrix<f64>> {
+        let (k, a) = (self.solution.columns(), &self.solution.solved.a);
+        let g = self.placed.source_side(&self.solution.twists);
+        Ok(DMatrix::from_fn(k, k, |i, j| {
+            (0..g.rows).map(|s| g.at(s, i) * a.at(s, j)).sum::<f64>()
+        }))
+    }
+
+    fn gradient(&self) -> Result<PairTensor> {
+        Ok(if self.few {
+            self.placed.few(&self.solution)
+        } else {
+            self.placed.tensor(&self.solution)
+        })
+    }
+
+    fn directions(&self, directions: &[Direction]) -> Result<Box<dyn SystemResponse + '_>> {
+        let parts = directions.iter().map(|direction| match direction {
+            Direction::Basis(c) => Ok(self.solution.combine(c)),
+            Direction::Twist(x) => {
+                let twists = DMatrix::from_column_slice(x.len(), 1, x.as_slice());
+                self.placed.solve(twists)
+            }
+        });
+        let parts = parts.collect::<Result<Vec<_>>>()?;
+        Ok(Box::new(Self {
+            placed: self.placed.clone(),
+            solution: Solution::beside(&parts),
+            few: true,
+        }))
+    }
+
+    fn tangent(&self, z: &[Vec6]) -> Result<Tangent> {
+        match self.solution.columns() {
+            1 | 2 => self.placed.second(&self.solution, z),
+            k => Err(Error::input("tangent: columns", k, "must be 1 or 2")),
+        }
+    }
+
+    fn strengths(&self) -> Result<Columns> {
+        Ok(self.solution.solved.a.clone())
+    }
 }

@@ -1,14 +1,16 @@
 //! The coupled system at given poses: what all solutions there share.
 
-use super::super::body::unit_twists;
 use super::super::{Model, Reached};
 use super::Cpu;
 use super::system::{Solved, System};
 use crate::Result;
 use crate::adjoint::lie::{Pose, Vec6};
+use crate::boundary::BodyBoundary;
 use crate::coupling::pair::Pair;
 use crate::solver::Columns;
 use nalgebra::{DMatrix, DVector};
+use std::ops::Range;
+use std::sync::Arc;
 
 /// The system at given poses.
 pub(super) struct PlacedBodies<'a> {
@@ -23,10 +25,7 @@ pub(super) struct PlacedBodies<'a> {
 /// Twists, 6·bodies × k, and what they make.
 pub(super) struct Solution {
     pub twists: DMatrix<f64>,
-    pub a: Columns,
-    pub lambda: Columns,
-    pub mu: Columns,
-    pub r: Columns,
+    pub solved: Solved,
     pub reached: Reached,
 }
 
@@ -35,12 +34,11 @@ impl<'a> PlacedBodies<'a> {
     pub fn new(cpu: &'a Cpu, poses: &[Pose], twists: &DMatrix<f64>) -> Self {
         let model = &*cpu.model;
         let pairs = model.pairs(poses);
-        let moving: Vec<bool> = (0..model.bodies.len()).map(|b| moves(twists, b)).collect();
         Self {
             model,
             poses: poses.to_vec(),
             system: System::new(cpu, &pairs),
-            readout: readouts(model, &pairs, &moving),
+            readout: readouts(model, &pairs, twists),
             pairs,
         }
     }
@@ -55,7 +53,7 @@ impl<'a> PlacedBodies<'a> {
             let twists = body_twists(twists, b);
             for j in 0..out.rows {
                 let row = Vec6::from_row_slice(readout.row(j));
-                for (x, twist) in out.slice_mut(j, j + 1).iter_mut().zip(&twists) {
+                for (x, twist) in out.slice_mut(&(j..j + 1)).iter_mut().zip(&twists) {
                     *x += row.dot(twist);
                 }
             }
@@ -68,9 +66,8 @@ impl<'a> PlacedBodies<'a> {
         let mut out = Columns::zeros(self.model.rows(), twists.ncols());
         for (b, body) in self.model.bodies.iter().enumerate() {
             if moves(twists, b) {
-                let range = &self.model.faces[b];
-                out.slice_mut(range.start, range.end)
-                    .copy_from_slice(&body.twist_rows(&body_twists(twists, b)));
+                let rows = body.twist_rows(&body_twists(twists, b));
+                out.slice_mut(&self.model.faces[b]).copy_from_slice(&rows);
             }
         }
         out
@@ -79,20 +76,18 @@ impl<'a> PlacedBodies<'a> {
     /// Solves for columns of twists.
     pub fn solve(&self, twists: DMatrix<f64>) -> Result<Solution> {
         let (f, g) = (self.face_side(&twists), self.source_side(&twists));
-        let (Solved { a, lambda, r, mu }, reached) = self.system.respond(&f, &g)?;
+        let (solved, reached) = self.system.respond(&f, &g)?;
         Ok(Solution {
             twists,
-            a,
-            lambda,
-            mu,
-            r,
+            solved,
             reached,
         })
     }
 
     /// ½ {B₆ᵀ P a + F₆ᵀ μ} of one column: body-frame impulses of all bodies, zero for those without a
     /// readout.
-    pub fn impulse(&self, a: &[f64], mu: &[f64]) -> DVector<f64> {
+    pub fn impulse(&self, solved: &Solved, column: usize) -> DVector<f64> {
+        let (a, mu) = (solved.a.column(column), solved.mu.column(column));
         let mut out = DVector::zeros(6 * self.model.bodies.len());
         for (b, body) in self.model.bodies.iter().enumerate() {
             let Some(readout) = &self.readout[b] else {
@@ -103,7 +98,7 @@ impl<'a> PlacedBodies<'a> {
                 h += Vec6::from_row_slice(readout.row(j)) * *strength;
             }
             let range = self.model.faces[b].clone();
-            for (row, m) in body.boundary.twist_rows.iter().zip(&mu[range]) {
+            for (row, m) in body.twist_rows.iter().zip(&mu[range]) {
                 h += row * *m;
             }
             out.fixed_rows_mut::<6>(6 * b).copy_from(&(0.5 * h));
@@ -121,44 +116,48 @@ impl Solution {
     /// One column from coefficients on those there are.
     pub fn combine(&self, coefficients: &DVector<f64>) -> Self {
         let c = coefficients.as_slice();
-        let combined = |x: &Columns| Columns {
-            rows: x.rows,
-            columns: 1,
-            data: x.combine(c),
-        };
         let twists = &self.twists * coefficients;
         Self {
             twists: DMatrix::from_column_slice(twists.len(), 1, twists.as_slice()),
-            a: combined(&self.a),
-            lambda: combined(&self.lambda),
-            mu: combined(&self.mu),
-            r: combined(&self.r),
+            solved: each(|part| Columns::from_columns(&[&part(&self.solved).combine(c)])),
             reached: self.reached,
         }
     }
 
     /// Single columns side by side.
     pub fn beside(parts: &[Self]) -> Self {
-        let all = |part: fn(&Self) -> &Columns| {
-            let columns: Vec<&[f64]> = parts.iter().map(|p| part(p).data.as_slice()).collect();
-            Columns::from_columns(&columns)
-        };
         let rows = parts.first().map_or(0, |p| p.twists.nrows());
         let reached = parts.iter().map(|p| p.reached);
         Self {
             twists: DMatrix::from_fn(rows, parts.len(), |i, k| parts[k].twists[(i, 0)]),
-            a: all(|p| &p.a),
-            lambda: all(|p| &p.lambda),
-            mu: all(|p| &p.mu),
-            r: all(|p| &p.r),
+            solved: each(|part| {
+                let columns = parts.iter().map(|p| part(&p.solved).data.as_slice());
+                Columns::from_columns(&columns.collect::<Vec<_>>())
+            }),
             reached: reached.fold(Reached::default(), Reached::worst),
         }
+    }
+}
+
+/// All four from the same of others.
+fn each(make: impl Fn(fn(&Solved) -> &Columns) -> Columns) -> Solved {
+    Solved {
+        a: make(|s| &s.a),
+        lambda: make(|s| &s.lambda),
+        r: make(|s| &s.r),
+        mu: make(|s| &s.mu),
     }
 }
 
 /// Whether any column moves body `b`.
 fn moves(twists: &DMatrix<f64>, b: usize) -> bool {
     twists.rows(6 * b, 6).iter().any(|x| *x != 0.0)
+}
+
+/// μ, then r, of the faces of a body, `[face][μ.., r..]`.
+pub(super) fn beside(mu: &Columns, r: &Columns, faces: &Range<usize>) -> Vec<f64> {
+    let rows = faces.clone().map(|i| mu.row(i).iter().chain(r.row(i)));
+    rows.flatten().copied().collect()
 }
 
 /// Twists of body `b` in the columns of a stacked matrix.
@@ -169,30 +168,29 @@ pub(super) fn body_twists(twists: &DMatrix<f64>, b: usize) -> Vec<Vec6> {
 }
 
 /// Pᵀ B₆ of each moving body over all sources: its own block and every image that its faces see.
-fn readouts(model: &Model, pairs: &[Pair], moving: &[bool]) -> Vec<Option<Columns>> {
-    let units = unit_twists();
-    let mut out: Vec<Option<Columns>> = moving
-        .iter()
-        .map(|m| m.then(|| Columns::zeros(model.columns(), 6)))
-        .collect();
-    for (b, body) in model.bodies.iter().enumerate() {
-        if let Some(columns) = &mut out[b] {
-            let own = columns.slice_mut(model.sources[b].start, model.sources[b].end);
-            for (row, p) in own.chunks_exact_mut(6).zip(&body.boundary.readout) {
-                row.copy_from_slice(p.as_slice());
-            }
-        }
-    }
+fn readouts(model: &Model, pairs: &[Pair], twists: &DMatrix<f64>) -> Vec<Option<Columns>> {
+    let own = |(b, body): (usize, &Arc<BodyBoundary>)| {
+        moves(twists, b).then(|| {
+            let mut columns = Columns::zeros(model.columns(), 6);
+            let rows = columns.slice_mut(&model.sources[b]).chunks_exact_mut(6);
+            rows.zip(&body.readout)
+                .for_each(|(row, p)| row.copy_from_slice(p.as_slice()));
+            columns
+        })
+    };
+    let mut out: Vec<_> = model.bodies.iter().enumerate().map(own).collect();
     for pair in pairs {
         let body = &model.bodies[pair.target];
         if let Some(columns) = &mut out[pair.target] {
-            let part = body.potential(&pair.points, &body.readout_rows(&units), 6);
-            let range = &model.sources[pair.source];
-            let target = columns.slice_mut(range.start, range.end);
-            for (t, p) in target.iter_mut().zip(part) {
-                *t += p;
-            }
+            let part = body.potential(&pair.points, &body.readout_rows(&unit_twists()), 6);
+            let target = columns.slice_mut(&model.sources[pair.source]);
+            target.iter_mut().zip(part).for_each(|(t, p)| *t += p);
         }
     }
     out
+}
+
+/// The six unit twists.
+pub(super) fn unit_twists() -> [Vec6; 6] {
+    std::array::from_fn(|k| Vec6::ith(k, 1.0))
 }

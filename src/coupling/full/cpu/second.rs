@@ -1,14 +1,12 @@
 //! Second derivatives along one displacement: the tangent of the first.
 
-use super::super::body::unit_twists;
-use super::gradient_at;
-use super::placed::{PlacedBodies, Solution, body_twists};
+use super::placed::{PlacedBodies, Solution, beside, body_twists, unit_twists};
 use super::system::Solved;
 use crate::Result;
-use crate::adjoint::lie::{Vec3, Vec6, six};
+use crate::adjoint::lie::{Vec3, Vec6, point_wrench, six};
 use crate::adjoint::solve::{Columnwise, Moved};
 use crate::coupling::Tangent;
-use crate::coupling::pair::Pair;
+use crate::coupling::pair::{Pair, vector};
 use crate::solver::Columns;
 use nalgebra::DVector;
 
@@ -25,8 +23,8 @@ impl PlacedBodies<'_> {
     /// The tangent along z of the energy of the first with the last of one or two columns.
     pub fn second(&self, solution: &Solution, z: &[Vec6]) -> Result<Tangent> {
         let n = solution.columns();
-        let right = solution.a.beside(&solution.lambda);
-        let left = solution.mu.beside(&solution.r);
+        let Solved { a, lambda, r, mu } = &solution.solved;
+        let (right, left) = (a.beside(lambda), mu.beside(r));
         let bodies = self.model.bodies.len();
 
         let mut dk = Columns::zeros(self.model.rows(), 2 * n);
@@ -42,11 +40,11 @@ impl PlacedBodies<'_> {
             body.jvp(
                 &pair.points,
                 &d,
-                right.slice(sources.start, sources.end),
+                right.slice(sources),
                 2 * n,
-                dk.slice_mut(faces.start, faces.end),
+                dk.slice_mut(faces),
             );
-            let fields = body.vjp(&pair.points, left.slice(faces.start, faces.end), 2 * n);
+            let fields = body.vjp(&pair.points, left.slice(faces), 2 * n);
             let mut readout = vec![0.0; 3 * n * d.len()];
             let units = unit_twists();
             let twists = body_twists(&solution.twists, pair.target);
@@ -57,14 +55,14 @@ impl PlacedBodies<'_> {
             for (j, dj) in d.iter().enumerate() {
                 let s = sources.start + j;
                 for (k, twist) in twists.iter().enumerate() {
-                    dkr.data[s * n + k] += dj.dot(&gradient_at(&fields, 2 * n, j, n + k));
-                    dg.data[s * n + k] -= dj.dot(&gradient_at(&fields, 2 * n, j, k));
+                    dkr.data[s * n + k] += dj.dot(&vector(&fields, 2 * n, j, n + k));
+                    dg.data[s * n + k] -= dj.dot(&vector(&fields, 2 * n, j, k));
                     if six_fields.is_empty() {
                         continue;
                     }
                     let mut field = Vec3::zeros();
                     for (m, part) in impulse[pair.target][k].iter_mut().enumerate() {
-                        let g = gradient_at(&six_fields, 6, j, m);
+                        let g = vector(&six_fields, 6, j, m);
                         field += g * twist[m];
                         *part += dj.dot(&g) * right.at(s, k);
                     }
@@ -89,7 +87,7 @@ impl PlacedBodies<'_> {
 
         let momenta: Vec<DVector<f64>> = (0..n)
             .map(|k| {
-                let mut h = self.impulse(&tangent.a.column(k), &tangent.mu.column(k));
+                let mut h = self.impulse(&tangent, k);
                 for (b, parts) in impulse.iter().enumerate() {
                     let mut rows = h.fixed_rows_mut::<6>(6 * b);
                     rows += 0.5 * parts[k];
@@ -130,17 +128,11 @@ impl PlacedBodies<'_> {
     ) -> (Vec6, Vec6) {
         let n = solution.columns();
         let body = &self.model.bodies[pair.target];
-        let faces = self.model.faces[pair.target].clone();
+        let faces = &self.model.faces[pair.target];
         let d = &first.displacement;
-        let moved: Vec<f64> = faces
-            .clone()
-            .flat_map(|i| {
-                let (mu, r) = (tangent.mu.row(i), tangent.r.row(i));
-                mu.iter().chain(r).copied().collect::<Vec<_>>()
-            })
-            .collect();
+        let moved = beside(&tangent.mu, &tangent.r, faces);
         let dfields = body.vjp(&pair.points, &moved, 2 * n);
-        let bent = body.hvp(&pair.points, d, left.slice(faces.start, faces.end), 2 * n);
+        let bent = body.hvp(&pair.points, d, left.slice(faces), 2 * n);
         let twists = body_twists(&solution.twists, pair.target);
         let bent_readout = body.potential_hvp(&pair.points, d, &body.readout_rows(&twists), n);
         let at = self.model.sources[pair.source].start;
@@ -155,21 +147,22 @@ impl PlacedBodies<'_> {
             let (mut f, mut df) = (Vec3::zeros(), Vec3::zeros());
             let source = at + j;
             for &(x, y, weight) in terms {
-                let charge =
-                    gradient_at(&first.readout, n, j, x) - gradient_at(&first.fields, 2 * n, j, x);
-                let residual = gradient_at(&first.fields, 2 * n, j, n + x);
-                let dcharge = gradient_at(&bent_readout, n, j, x)
-                    - gradient_at(&bent, 2 * n, j, x)
-                    - gradient_at(&dfields, 2 * n, j, x);
-                let dresidual =
-                    gradient_at(&bent, 2 * n, j, n + x) + gradient_at(&dfields, 2 * n, j, n + x);
-                let (a, lambda) = (solution.a.at(source, y), solution.lambda.at(source, y));
+                let charge = vector(&first.readout, n, j, x) - vector(&first.fields, 2 * n, j, x);
+                let residual = vector(&first.fields, 2 * n, j, n + x);
+                let dcharge = vector(&bent_readout, n, j, x)
+                    - vector(&bent, 2 * n, j, x)
+                    - vector(&dfields, 2 * n, j, x);
+                let dresidual = vector(&bent, 2 * n, j, n + x) + vector(&dfields, 2 * n, j, n + x);
+                let (a, lambda) = (
+                    solution.solved.a.at(source, y),
+                    solution.solved.lambda.at(source, y),
+                );
                 let (da, dlambda) = (tangent.a.at(source, y), tangent.lambda.at(source, y));
                 f += weight * (charge * a + residual * lambda);
                 df +=
                     weight * (dcharge * a + charge * da + dresidual * lambda + residual * dlambda);
             }
-            w += six(&f, &s.cross(&f));
+            w += point_wrench(s, &f);
             dw += six(&df, &(d[j].cross(&f) + s.cross(&df)));
         }
         (w, dw)

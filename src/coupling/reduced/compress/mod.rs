@@ -343,7 +343,7 @@ fn candidates(surface: &Interior, gap: f64, radius: f64) -> Vec<Vec3> {
             out.extend(samples::inside(surface, depth, spacing, TANGENT));
             depth *= 2.0;
         }
-        let out = samples::thin(out, 1e-3 * gap);
+        let out = samples::thin(out, 1e-3 * gap, |p| *p);
         if out.len() <= MOST_CANDIDATES {
             return out;
         }

@@ -1,9 +1,7 @@
 //! The largest modes of a symmetric matrix.
 
 use crate::adjoint::sample;
-use faer::linalg::matmul::matmul;
-use faer::linalg::solvers::Qr;
-use faer::{Accum, Mat, MatRef, Par, Side};
+use faer::{Mat, Side};
 
 /// Columns that the search starts with, and how many more it tries at a time.
 const START: usize = 64;
@@ -27,10 +25,10 @@ pub(super) fn largest(a: &Mat<f64>, cut: f64) -> Option<Modes> {
     loop {
         let mut space = Mat::from_fn(n, k, noise);
         for _ in 0..POWERS {
-            space = times(a.as_ref(), orthonormal(&space).as_ref());
+            space = a * orthonormal(&space);
         }
         let q = orthonormal(&space);
-        let small = times(q.transpose(), times(a.as_ref(), q.as_ref()).as_ref());
+        let small = q.transpose() * (a * &q);
         let small = Mat::from_fn(k, k, |i, j| 0.5 * (small[(i, j)] + small[(j, i)]));
         let eigen = small.self_adjoint_eigen(Side::Lower).ok()?;
         let value = |i: usize| eigen.S()[i];
@@ -41,7 +39,7 @@ pub(super) fn largest(a: &Mat<f64>, cut: f64) -> Option<Modes> {
             let vectors = Mat::from_fn(k, kept.len(), |i, j| eigen.U()[(i, kept[j])]);
             return Some(Modes {
                 values: kept.iter().map(|i| value(*i)).collect(),
-                vectors: times(q.as_ref(), vectors.as_ref()),
+                vectors: &q * vectors,
                 lowest: value(0).min(0.0),
             });
         }
@@ -49,14 +47,8 @@ pub(super) fn largest(a: &Mat<f64>, cut: f64) -> Option<Modes> {
     }
 }
 
-fn times(a: MatRef<f64>, b: MatRef<f64>) -> Mat<f64> {
-    let mut out = Mat::zeros(a.nrows(), b.ncols());
-    matmul(out.as_mut(), Accum::Replace, a, b, 1.0, Par::Seq);
-    out
-}
-
 fn orthonormal(a: &Mat<f64>) -> Mat<f64> {
-    Qr::new(a.as_ref()).compute_thin_Q()
+    a.qr().compute_thin_Q()
 }
 
 /// A fixed number between −1 and 1.

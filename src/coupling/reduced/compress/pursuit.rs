@@ -1,8 +1,7 @@
 //! Choice of columns that explain given targets best.
 
-use faer::linalg::matmul::matmul;
-use faer::linalg::solvers::{Qr, SolveLstsq};
-use faer::{Accum, Mat, MatRef, Par};
+use faer::Mat;
+use faer::linalg::solvers::SolveLstsq;
 use rayon::prelude::*;
 
 /// Part of a column, squared, that the others must leave of it for it to be worth choosing: what
@@ -17,8 +16,8 @@ const FLOOR: f64 = 1e-9;
 pub(super) fn pursuit(a: &Mat<f64>, targets: &Mat<f64>, tolerance: f64, most: usize) -> Vec<usize> {
     let n = a.ncols();
     let most = most.min(a.nrows()).min(n);
-    let gram = product(a.as_ref(), a.as_ref());
-    let along = product(targets.as_ref(), a.as_ref());
+    let gram = a.transpose() * a;
+    let along = targets.transpose() * a;
     let mut along: Vec<Vec<f64>> = (0..n).map(|j| along.col_as_slice(j).to_vec()).collect();
     let mut left: Vec<f64> = (0..n).map(|j| gram[(j, j)]).collect();
     let floor: Vec<f64> = left.iter().map(|g| FLOOR * g).collect();
@@ -61,23 +60,9 @@ pub(super) fn pursuit(a: &Mat<f64>, targets: &Mat<f64>, tolerance: f64, most: us
     chosen
 }
 
-/// `aᵀ b`.
-fn product(a: MatRef<f64>, b: MatRef<f64>) -> Mat<f64> {
-    let mut out = Mat::zeros(a.ncols(), b.ncols());
-    matmul(
-        out.as_mut(),
-        Accum::Replace,
-        a.transpose(),
-        b,
-        1.0,
-        Par::Seq,
-    );
-    out
-}
-
 /// Least-squares solution of `a x ≈ b`.
 pub(super) fn least_squares(a: &Mat<f64>, b: &Mat<f64>) -> Mat<f64> {
-    Qr::new(a.as_ref()).solve_lstsq(b)
+    a.qr().solve_lstsq(b)
 }
 
 #[cfg(test)]

@@ -86,28 +86,26 @@ pub(super) fn surface_points(surface: &Interior, spacing: f64) -> Vec<Sample> {
     out
 }
 
-/// Keeps points that are at least `spacing` apart, first come first kept.
-pub(super) fn thin(points: impl IntoIterator<Item = Vec3>, spacing: f64) -> Vec<Vec3> {
+/// Keeps what is at least `spacing` apart, first come first kept; `place` says where.
+pub(super) fn thin<T>(
+    items: impl IntoIterator<Item = T>,
+    spacing: f64,
+    place: impl Fn(&T) -> Vec3,
+) -> Vec<T> {
     let cell = |p: &Vec3| [0, 1, 2].map(|k| (p[k] / spacing).floor() as i64);
     let mut grid: HashMap<[i64; 3], Vec<Vec3>> = HashMap::new();
     let mut out = Vec::new();
-    for p in points {
+    for item in items {
+        let p = place(&item);
         let at = cell(&p);
-        let mut free = true;
-        'near: for i in -1..=1 {
-            for j in -1..=1 {
-                for k in -1..=1 {
-                    let near = grid.get(&[at[0] + i, at[1] + j, at[2] + k]);
-                    if near.is_some_and(|n| n.iter().any(|q| (p - q).norm() < spacing)) {
-                        free = false;
-                        break 'near;
-                    }
-                }
-            }
-        }
-        if free {
+        let near = |n: usize| {
+            let beside = [n / 9, n / 3 % 3, n % 3].map(|i| i as i64 - 1);
+            let there = grid.get(&[0, 1, 2].map(|k| at[k] + beside[k]));
+            there.is_some_and(|n| n.iter().any(|q| (p - q).norm() < spacing))
+        };
+        if !(0..27).any(near) {
             grid.entry(at).or_default().push(p);
-            out.push(p);
+            out.push(item);
         }
     }
     out
@@ -117,7 +115,7 @@ pub(super) fn thin(points: impl IntoIterator<Item = Vec3>, spacing: f64) -> Vec<
 pub(super) fn around(surface: &Interior, offset: f64, spacing: f64) -> Vec<Vec3> {
     let samples = surface_points(surface, 0.5 * spacing);
     let moved = samples.iter().map(|s| s.point + s.normal * offset);
-    let points = thin(moved, spacing);
+    let points = thin(moved, spacing, |p| *p);
     // Where the surface is hollow, a point along the normal can come near another part of it.
     let keep: Vec<bool> = points
         .par_iter()
@@ -133,10 +131,8 @@ pub(super) fn around(surface: &Interior, offset: f64, spacing: f64) -> Vec<Vec3>
 /// Points inside the surface, `depth` deep or as deep as the body allows there, `spacing` apart
 /// relative to their depth.
 pub(super) fn inside(surface: &Interior, depth: f64, spacing: f64, tangent: f64) -> Vec<Vec3> {
-    let samples = thin_samples(
-        surface_points(surface, 0.7 * spacing * depth),
-        spacing * depth,
-    );
+    let all = surface_points(surface, 0.7 * spacing * depth);
+    let samples = thin(all, spacing * depth, |s| s.point);
     let moved: Vec<Option<(Vec3, f64)>> = samples
         .par_iter()
         .map(|s| {
@@ -152,12 +148,4 @@ pub(super) fn inside(surface: &Interior, depth: f64, spacing: f64, tangent: f64)
     let mut points: Vec<(Vec3, f64)> = moved.into_iter().flatten().collect();
     points.sort_by(|a, b| b.1.total_cmp(&a.1));
     points.into_iter().map(|(p, _)| p).collect()
-}
-
-fn thin_samples(samples: Vec<Sample>, spacing: f64) -> Vec<Sample> {
-    let kept = thin(samples.iter().map(|s| s.point), spacing);
-    let mut kept = kept.into_iter().peekable();
-    let mut out = samples;
-    out.retain(|s| kept.next_if(|p| *p == s.point).is_some());
-    out
 }

@@ -1,8 +1,6 @@
 //! Corners, edges and faces, with a radius about them: balls, capsules and convex polyhedra.
 
-use super::field::Field;
-use super::motion::carry;
-use super::point::ContactPoint;
+use super::point::{ContactPoint, Field, carry};
 use crate::error::{Error, Result};
 use crate::geometry::HalfSpace;
 use hydrograd_adjoint::lie::{Pose, Vec3};
@@ -67,33 +65,35 @@ impl Edge {
 impl Core {
     /// A ball about the origin.
     pub fn ball(radius: f64) -> Self {
-        Self {
-            corners: vec![Vec3::zeros()],
-            spokes: vec![Vec::new()],
-            edges: Vec::new(),
-            faces: Vec::new(),
-            radius,
-            thickness: f64::INFINITY,
-            bounds: [Vec3::zeros(); 2],
-        }
+        Self::bare(vec![Vec3::zeros()], vec![Vec::new()], Vec::new(), radius)
     }
 
     /// A capsule along z with `length` between the centres of its ends.
     pub fn capsule(radius: f64, length: f64) -> Self {
         let end = Vec3::new(0.0, 0.0, 0.5 * length);
+        let edge = Edge {
+            from: -end,
+            along: Vec3::z(),
+            length,
+            inward: None,
+        };
+        let spokes = vec![vec![Vec3::z()], vec![-Vec3::z()]];
+        Self::bare(vec![-end, end], spokes, vec![edge], radius)
+    }
+
+    /// Without faces.
+    fn bare(corners: Vec<Vec3>, spokes: Vec<Vec<Vec3>>, edges: Vec<Edge>, radius: f64) -> Self {
         Self {
-            corners: vec![-end, end],
-            spokes: vec![vec![Vec3::z()], vec![-Vec3::z()]],
-            edges: vec![Edge {
-                from: -end,
-                along: Vec3::z(),
-                length,
-                inward: None,
-            }],
+            bounds: [
+                corners.iter().fold(corners[0], |low, c| low.inf(c)),
+                corners.iter().fold(corners[0], |high, c| high.sup(c)),
+            ],
+            corners,
+            spokes,
+            edges,
             faces: Vec::new(),
             radius,
             thickness: f64::INFINITY,
-            bounds: [-end, end],
         }
     }
 
@@ -154,16 +154,10 @@ impl Core {
             f.offset - lowest.fold(f64::INFINITY, f64::min)
         };
         let thickness = faces.iter().map(width).fold(f64::INFINITY, f64::min);
-        let low = corners.iter().fold(corners[0], |l, c| l.inf(c));
-        let high = corners.iter().fold(corners[0], |h, c| h.sup(c));
         Ok(Self {
-            corners,
-            spokes,
-            edges,
             faces,
-            radius: 0.0,
             thickness,
-            bounds: [low, high],
+            ..Self::bare(corners, spokes, edges, 0.0)
         })
     }
 
@@ -186,11 +180,8 @@ impl Core {
         }
         let least = ROUNDING * self.diameter().max(p.amax());
         let heights = self.faces.iter().map(|f| (f.normal.dot(p) - f.offset, f));
-        let highest = heights
-            .clone()
-            .fold(None, |best: Option<(f64, &Face)>, (h, f)| {
-                Some(best.filter(|b| b.0 >= h).unwrap_or((h, f)))
-            });
+        let highest = heights.clone();
+        let highest = highest.reduce(|best, next| if best.0 >= next.0 { best } else { next });
         if let Some((height, face)) = highest {
             if height > limit {
                 return None;

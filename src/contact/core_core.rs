@@ -4,8 +4,7 @@
 //! gap n · u, nearest points at s = −u · (e_B × n)/(n · c) and t = −u · (e_A × n)/(n · c).
 
 use super::core::{Core, Edge};
-use super::motion::{Rows3, across, carry, rotate};
-use super::point::{ContactPoint, Slopes};
+use super::point::{ContactPoint, Rows3, Slopes, across, carry, rotate};
 use hydrograd_adjoint::lie::{Pose, Vec3, Vec6, skew};
 
 /// Sine of the angle between two edges below which they have no contact point across one another; the

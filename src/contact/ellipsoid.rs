@@ -4,9 +4,7 @@
 //! D. Eberly, "Distance from a point to an ellipse, an ellipsoid, or a hyperellipsoid" (2013): the
 //! scalar equation for the nearest point and the bracket of its root.
 
-use super::field::Field;
-use super::motion::{Rows3, across, carry, columns};
-use super::point::ContactPoint;
+use super::point::{ContactPoint, Field, Rows3, across, carry, columns};
 use crate::geometry::HalfSpace;
 use hydrograd_adjoint::lie::{Mat3, Pose, Vec3, skew};
 
@@ -37,15 +35,10 @@ pub(super) enum Lowest {
 }
 
 impl Ellipsoid {
-    /// `R D² Rᵀ`.
-    fn squares(&self, at: &Pose) -> Mat3 {
-        let squares = self.semi_axes.component_mul(&self.semi_axes);
-        at.rotation * Mat3::from_diagonal(&squares) * at.rotation.transpose()
-    }
-
     /// `c + Σ m/h` with h = √(mᵀ Σ m) and Σ = R D² Rᵀ, for a unit vector m.
     pub fn support(&self, at: &Pose, direction: &Vec3) -> Support {
-        let squares = self.squares(at);
+        let squares = Mat3::from_diagonal(&self.semi_axes.component_mul(&self.semi_axes));
+        let squares = at.rotation * squares * at.rotation.transpose();
         let across = squares * direction;
         let height = across.dot(direction).sqrt();
         Support {

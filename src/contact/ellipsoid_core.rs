@@ -10,8 +10,7 @@
 
 use super::core::{Core, Face};
 use super::ellipsoid::{Ellipsoid, Lowest};
-use super::motion::{Rows3, carry, rotate};
-use super::point::ContactPoint;
+use super::point::{ContactPoint, Rows3, carry, rotate};
 use crate::geometry::HalfSpace;
 use hydrograd_adjoint::lie::{Pose, Vec3};
 

@@ -10,8 +10,7 @@
 //! (1985) 409: the largest of λ(1−λ) dᵀ ((1−λ) Σ_A + λ Σ_B)⁻¹ d and its common normal.
 
 use super::ellipsoid::Ellipsoid;
-use super::motion::{advance, columns, perpendicular};
-use super::point::{ContactPoint, Slopes};
+use super::point::{ContactPoint, Slopes, carry, columns, perpendicular};
 use crate::error::{Error, Result};
 use hydrograd_adjoint::lie::{Mat3, Pose, Vec3, Vec6, skew};
 use nalgebra::{Matrix2, Matrix3x2, SymmetricEigen, Vector2};
@@ -138,7 +137,7 @@ fn point(normal: &Vec3, at: &Height, size: f64) -> ContactPoint {
         normal: *normal,
         position: 0.5 * (a + b),
         slopes: Slopes {
-            gap: advance(normal, a),
+            gap: carry(a).tr_mul(normal),
             weight: Vec6::zeros(),
             normal: normal_slope,
             position: 0.5 * (first + second),

@@ -27,8 +27,8 @@ pub(super) fn facets(mesh: &TriMesh) -> Result<(Vec<Vec3>, Vec<Vec<usize>>)> {
             format!("give its convex hull with at most {MOST} triangles"),
         ));
     }
-    let groups = flat_groups(mesh);
-    check_convex(mesh, &groups)?;
+    let (groups, count) = flat_groups(mesh);
+    check_convex(mesh, &groups, count)?;
     // A corner has three faces or more about it; the others lie within a face or a straight edge.
     let mut about = vec![BTreeSet::new(); mesh.vertices().len()];
     for (f, face) in mesh.faces().iter().enumerate() {
@@ -38,18 +38,12 @@ pub(super) fn facets(mesh: &TriMesh) -> Result<(Vec<Vec3>, Vec<Vec<usize>>)> {
     }
     let kept: Vec<usize> = (0..about.len()).filter(|&v| about[v].len() > 2).collect();
     let numbers: BTreeMap<usize, usize> = kept.iter().enumerate().map(|(k, &v)| (v, k)).collect();
-    let count = groups.iter().max().map_or(0, |g| g + 1);
-    let loops = (0..count)
-        .map(|g| {
-            let border = border(mesh, &groups, g)?;
-            let corners: Vec<usize> = border
-                .iter()
-                .filter_map(|v| numbers.get(v).copied())
-                .collect();
-            (corners.len() > 2).then_some(corners)
-        })
-        .collect::<Option<Vec<_>>>();
-    let Some(loops) = loops else {
+    let face = |g| {
+        let border = border(mesh, &groups, g)?;
+        let corners = border.iter().filter_map(|v| numbers.get(v).copied());
+        Some(corners.collect::<Vec<usize>>()).filter(|c| c.len() > 2)
+    };
+    let Some(loops) = (0..count).map(face).collect() else {
         return Err(Error::Mesh {
             name: mesh.name().into(),
             problem: "triangles in one plane don't make a face with one border".into(),
@@ -61,8 +55,9 @@ pub(super) fn facets(mesh: &TriMesh) -> Result<(Vec<Vec3>, Vec<Vec<usize>>)> {
     Ok((corners, loops))
 }
 
-/// The number of the flat face that each triangle belongs to: grown from the largest triangles.
-fn flat_groups(mesh: &TriMesh) -> Vec<usize> {
+/// The number of the flat face that each triangle belongs to, grown from the largest triangles, and how many
+/// there are.
+fn flat_groups(mesh: &TriMesh) -> (Vec<usize>, usize) {
     const NONE: usize = usize::MAX;
     let slack = FLAT * mesh.diameter();
     let mut neighbors = vec![Vec::new(); mesh.faces().len()];
@@ -96,13 +91,12 @@ fn flat_groups(mesh: &TriMesh) -> Vec<usize> {
         }
         count += 1;
     }
-    groups
+    (groups, count)
 }
 
 /// # Errors
 /// [`Error::Unsupported`] if a vertex lies outside a face, with the farthest.
-fn check_convex(mesh: &TriMesh, groups: &[usize]) -> Result<()> {
-    let count = groups.iter().max().map_or(0, |g| g + 1);
+fn check_convex(mesh: &TriMesh, groups: &[usize], count: usize) -> Result<()> {
     let mut areas = vec![Vec3::zeros(); count];
     let mut origins = vec![Vec3::zeros(); count];
     for (f, &g) in groups.iter().enumerate() {
@@ -138,28 +132,21 @@ fn check_convex(mesh: &TriMesh, groups: &[usize]) -> Result<()> {
 
 /// Vertices around a group of triangles; none if its border isn't one loop.
 fn border(mesh: &TriMesh, groups: &[usize], group: usize) -> Option<Vec<usize>> {
-    let members = mesh
-        .faces()
-        .iter()
-        .zip(groups)
-        .filter(|(_, g)| **g == group);
-    let mut sides = BTreeSet::new();
-    for (&[a, b, c], _) in members {
-        for side in [[a, b], [b, c], [c, a]] {
-            sides.insert(side);
-        }
-    }
-    let outer = sides.iter().filter(|[a, b]| !sides.contains(&[*b, *a]));
-    let outer: Vec<[usize; 2]> = outer.copied().collect();
-    let next: BTreeMap<usize, usize> = outer.iter().map(|&[a, b]| (a, b)).collect();
-    let first = outer.first()?[0];
+    let members = mesh.faces().iter().zip(groups);
+    let members = members.filter(|(_, g)| **g == group);
+    let sides = members.flat_map(|(&[a, b, c], _)| [[a, b], [b, c], [c, a]]);
+    let sides: BTreeSet<[usize; 2]> = sides.collect();
+    let outer = || sides.iter().filter(|[a, b]| !sides.contains(&[*b, *a]));
+    let next: BTreeMap<usize, usize> = outer().map(|&[a, b]| (a, b)).collect();
+    let count = outer().count();
+    let first = *next.first_key_value()?.0;
     let mut out = vec![first];
     let mut at = *next.get(&first)?;
-    while at != first && out.len() <= outer.len() {
+    while at != first && out.len() <= count {
         out.push(at);
         at = *next.get(&at)?;
     }
-    (out.len() == outer.len()).then_some(out)
+    (out.len() == count).then_some(out)
 }
 
 fn unsupported(mesh: &TriMesh, why: String, instead: String) -> Error {

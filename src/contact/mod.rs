@@ -29,16 +29,11 @@ mod ellipsoid;
 mod ellipsoid_core;
 mod ellipsoid_pair;
 mod facets;
-mod field;
-mod gaps;
-mod motion;
 mod pairs;
 mod point;
 mod shape;
 
 pub use core_core::PARALLEL;
-pub use gaps::{against_wall, between};
-pub use motion::Rows3;
-pub use pairs::{ContactPair, Contacts};
-pub use point::{ContactPoint, Slopes};
+pub use pairs::{ContactPair, Contacts, against_wall, between};
+pub use point::{ContactPoint, Rows3, Slopes};
 pub use shape::{CYLINDER_SIDES, ContactShape};

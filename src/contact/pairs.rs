@@ -1,11 +1,11 @@
-//! The pairs of surfaces that may come in contact.
+//! The pairs of surfaces that may come in contact, and the contact points of two bodies and of a body and a wall.
 
-use super::gaps::{against_wall, between};
 use super::point::ContactPoint;
-use super::shape::ContactShape;
-use crate::Result;
+use super::shape::{ContactShape, Solid};
+use super::{core_core, ellipsoid_core, ellipsoid_pair};
 use crate::adjoint::lie::Pose;
 use crate::geometry::{HalfSpace, Other, Wall};
+use crate::{Error, Result};
 
 /// Two surfaces that may come in contact.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -90,5 +90,90 @@ impl Contacts {
                 between(first, second, &poses[a], &poses[b], reach)
             }
         }
+    }
+}
+
+/// The places where two bodies are nearer than `reach` (m); poses are body to world. The order is
+/// always the same: corners of the first body, corners of the second, edges.
+///
+/// # Errors
+/// [`Error::Input`] if a pose or `reach` isn't finite; [`Error::Solver`] if the common normal of
+/// two ellipsoids isn't found, which needs one that lies deep in the other.
+pub fn between(
+    first: &ContactShape,
+    second: &ContactShape,
+    first_at: &Pose,
+    second_at: &Pose,
+    reach: f64,
+) -> Result<Vec<ContactPoint>> {
+    check(reach, &[first_at, second_at])?;
+    if first.ball_at(first_at).distance(&second.ball_at(second_at)) >= reach {
+        return Ok(Vec::new());
+    }
+    let (a_at, b_at) = (
+        first_at.compose(&first.offset),
+        second_at.compose(&second.offset),
+    );
+    let found = match (&first.solid, &second.solid) {
+        (Solid::Core(a), Solid::Core(b)) => {
+            return Ok(core_core::contacts(a, &a_at, b, &b_at, reach));
+        }
+        (Solid::Ellipsoid(a), Solid::Core(b)) => ellipsoid_core::contact(a, &a_at, b, &b_at, reach),
+        (Solid::Core(a), Solid::Ellipsoid(b)) => {
+            ellipsoid_core::contact(b, &b_at, a, &a_at, reach).map(|p| p.swapped())
+        }
+        (Solid::Ellipsoid(a), Solid::Ellipsoid(b)) => {
+            Some(ellipsoid_pair::contact(a, &a_at, b, &b_at)?).filter(|p| p.gap < reach)
+        }
+    };
+    Ok(found.into_iter().collect())
+}
+
+/// The places where a body is nearer than `reach` (m) to a wall, world frame; the wall counts as the second
+/// body. In the order of the corners.
+///
+/// # Errors
+/// [`Error::Input`] if the pose or `reach` isn't finite.
+pub fn against_wall(
+    shape: &ContactShape,
+    wall: &HalfSpace,
+    at: &Pose,
+    reach: f64,
+) -> Result<Vec<ContactPoint>> {
+    check(reach, &[at])?;
+    let ball = shape.ball_at(at);
+    if wall.height(&ball.center) - ball.radius >= reach {
+        return Ok(Vec::new());
+    }
+    let at = at.compose(&shape.offset);
+    let mut found = match &shape.solid {
+        Solid::Ellipsoid(ellipsoid) => vec![ellipsoid.against_plane(&at, wall)],
+        Solid::Core(core) => core.against_plane(&at, wall),
+    };
+    found.retain(|p| p.gap < reach);
+    Ok(found)
+}
+
+fn check(reach: f64, poses: &[&Pose]) -> Result<()> {
+    if !reach.is_finite() {
+        return Err(Error::input(
+            "contact: reach",
+            reach,
+            "give a finite length in metres",
+        ));
+    }
+    let finite = |g: &&Pose| {
+        g.rotation
+            .iter()
+            .chain(g.translation.iter())
+            .all(|x| x.is_finite())
+    };
+    match poses.iter().find(|g| !finite(g)) {
+        None => Ok(()),
+        Some(pose) => Err(Error::input(
+            "contact: pose",
+            format!("position {:?}", pose.translation.as_slice()),
+            "give finite poses; a smaller time step may keep them so",
+        )),
     }
 }

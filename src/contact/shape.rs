@@ -42,34 +42,35 @@ impl ContactShape {
     pub fn of_shape(shape: &Shape, offset: Pose, base_dir: &Path) -> Result<Self> {
         let name = shape::shape_name(shape);
         shape::validate(shape, &name)?;
-        let solid = match shape {
-            Shape::Sphere { radius, .. } => Solid::Core(Core::ball(*radius)),
-            Shape::Capsule { radius, length, .. } => Solid::Core(Core::capsule(*radius, *length)),
-            Shape::Ellipsoid { semi_axes, .. } => Solid::Ellipsoid(Ellipsoid {
-                semi_axes: Vec3::from(*semi_axes),
-            }),
+        let core = match shape {
+            Shape::Sphere { radius, .. } => Core::ball(*radius),
+            Shape::Capsule { radius, length, .. } => Core::capsule(*radius, *length),
+            Shape::Ellipsoid { semi_axes, .. } => {
+                let semi_axes = Vec3::from(*semi_axes);
+                let solid = Solid::Ellipsoid(Ellipsoid { semi_axes });
+                return Ok(Self::new(solid, offset));
+            }
             Shape::Box { size, .. } => {
                 let [x, y, z] = size.map(|l| 0.5 * l);
                 let profile = [[-y, -z], [y, -z], [y, z], [-y, z]];
-                Solid::Core(extrude(&name, &profile, x, along_x)?)
+                extrude(&name, &profile, x, along_x)?
             }
             Shape::Prism {
                 profile, length, ..
-            } => Solid::Core(extrude(&name, &corners_of(profile), 0.5 * length, along_x)?),
+            } => extrude(&name, &corners_of(profile), 0.5 * length, along_x)?,
             Shape::Cylinder { radius, length, .. } => {
-                let rim = (0..CYLINDER_SIDES).map(|k| {
+                let rim: [_; CYLINDER_SIDES] = std::array::from_fn(|k| {
                     let (sin, cos) = (TAU * k as f64 / CYLINDER_SIDES as f64).sin_cos();
                     [radius * cos, radius * sin]
                 });
-                let rim: Vec<_> = rim.collect();
                 let along_z = |z: f64, [x, y]: [f64; 2]| Vec3::new(x, y, z);
-                Solid::Core(extrude(&name, &rim, 0.5 * length, along_z)?)
+                extrude(&name, &rim, 0.5 * length, along_z)?
             }
             Shape::Mesh { .. } | Shape::Triangles { .. } => {
                 return Self::of_mesh(&shape::build(shape, base_dir, None)?, offset);
             }
         };
-        Ok(Self::new(solid, offset))
+        Ok(Self::new(Solid::Core(core), offset))
     }
 
     /// That of a convex mesh with the pose `offset` in its body (mesh to body). Triangles that lie

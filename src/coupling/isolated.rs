@@ -18,6 +18,16 @@ impl Isolated {
     pub fn new(added_mass: Vec<Mat6>) -> Self {
         Self { added_mass }
     }
+
+    /// Impulses of columns of twists.
+    fn impulses(&self, twists: &DMatrix<f64>) -> DMatrix<f64> {
+        let mut out = DMatrix::zeros(twists.nrows(), twists.ncols());
+        for (b, m) in self.added_mass.iter().enumerate() {
+            out.rows_mut(6 * b, 6)
+                .copy_from(&(m * twists.rows(6 * b, 6)));
+        }
+        out
+    }
 }
 
 impl Coupling for Isolated {
@@ -34,13 +44,10 @@ impl Coupling for Isolated {
     }
 
     fn evaluate(&self, _poses: &[Pose], basis: &DMatrix<f64>) -> Result<Momenta> {
-        let mut momenta = DMatrix::zeros(basis.nrows(), basis.ncols());
-        for (b, m) in self.added_mass.iter().enumerate() {
-            momenta
-                .rows_mut(6 * b, 6)
-                .copy_from(&(m * basis.rows(6 * b, 6)));
-        }
-        Ok(Momenta::new(momenta, CouplingReport::default()))
+        Ok(Momenta::new(
+            self.impulses(basis),
+            CouplingReport::default(),
+        ))
     }
 
     fn differentiable(&self) -> Option<&dyn Linearise> {
@@ -67,11 +74,8 @@ impl IsolatedLinearised<'_> {
         match x {
             Direction::Basis(c) => self.value.momenta() * c,
             Direction::Twist(x) => {
-                let mut out = DVector::zeros(x.len());
-                for (b, m) in self.coupling.added_mass.iter().enumerate() {
-                    out.rows_mut(6 * b, 6).copy_from(&(m * x.rows(6 * b, 6)));
-                }
-                out
+                let twists = DMatrix::from_column_slice(x.len(), 1, x.as_slice());
+                self.coupling.impulses(&twists).column(0).into_owned()
             }
         }
     }

@@ -6,7 +6,6 @@ use hydrograd::adjoint::check::{Outcome, Rung};
 use hydrograd::adjoint::lie::{Mat6, Pose, Vec3, Vec6, cross_motion, exp_matrix};
 use hydrograd::boundary::{BodyBoundary, Method, MfsSettings, PanelBoundary};
 use hydrograd::coupling::full::{Full, FullSolver, SolveSettings};
-use hydrograd::coupling::panel::{self, PanelSolver};
 use hydrograd::coupling::reduced::{Cutoff, Reduced, compress};
 use hydrograd::coupling::{Direction, Exclusions, Isolated, Linearise, PanelCoupled};
 use hydrograd::geometry::Image;
@@ -112,11 +111,11 @@ fn panel_systems() -> Vec<PanelCoupled> {
         panels(Shape::cuboid([0.5, 0.4, 0.6])),
         panels(Shape::ellipsoid([0.6, 0.3, 0.4])),
     ];
-    let of = |solver: PanelSolver, walls: &[Wall], excluded: Exclusions| {
-        let settings = panel::SolveSettings {
+    let of = |solver: FullSolver, walls: &[Wall], excluded: Exclusions| {
+        let settings = SolveSettings {
             solver,
             tolerance: 1e-13,
-            ..panel::SolveSettings::default()
+            ..SolveSettings::default()
         };
         PanelCoupled::new(bodies.to_vec(), walls, excluded, settings).unwrap()
     };
@@ -125,10 +124,10 @@ fn panel_systems() -> Vec<PanelCoupled> {
         ..SIDE
     };
     vec![
-        of(PanelSolver::Gmres, &[], Exclusions::none()),
-        of(PanelSolver::Lu, &[WALL, SIDE], Exclusions::none()),
-        of(PanelSolver::Gmres, &[WALL, free], Exclusions::none()),
-        of(PanelSolver::Gmres, &[WALL], Exclusions::new([(0, 1)])),
+        of(FullSolver::Gmres, &[], Exclusions::none()),
+        of(FullSolver::Qr, &[WALL, SIDE], Exclusions::none()),
+        of(FullSolver::Gmres, &[WALL, free], Exclusions::none()),
+        of(FullSolver::Gmres, &[WALL], Exclusions::new([(0, 1)])),
     ]
 }
 

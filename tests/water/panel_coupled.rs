@@ -5,7 +5,7 @@ use crate::support::reference::{TwoSpheres, equal_spheres, spheres_by_wall, uneq
 use hydrograd::adjoint::lie::{Mat3, Pose, Vec3, exp_matrix};
 use hydrograd::boundary::PanelBoundary;
 use hydrograd::boundary::panel::MOST_FACES;
-use hydrograd::coupling::panel::{PanelSolver, SolveSettings};
+use hydrograd::coupling::full::{FullSolver, SolveSettings};
 use hydrograd::coupling::{Coupling, Exclusions, Linearise, PanelCoupled};
 use hydrograd::scene::{Body, Fluid, Scene, Shape, Wall, WallSurface};
 use hydrograd::simulate::gradcheck;
@@ -42,7 +42,7 @@ fn at(z: f64) -> Pose {
 fn momenta(
     bodies: &[Arc<PanelBoundary>],
     walls: &[Wall],
-    solver: PanelSolver,
+    solver: FullSolver,
     poses: &[Pose],
 ) -> Result<DMatrix<f64>> {
     let settings = SolveSettings {
@@ -53,7 +53,7 @@ fn momenta(
     let c = PanelCoupled::new(bodies.to_vec(), walls, Exclusions::none(), settings)?;
     let n = 6 * bodies.len();
     let record = c.evaluate(poses, &DMatrix::identity(n, n))?;
-    assert_eq!(record.report().iterations == 0, solver == PanelSolver::Lu);
+    assert_eq!(record.report().iterations == 0, solver == FullSolver::Qr);
     assert!(record.report().asymmetry < 5e-3, "{:?}", record.report());
     let m = record.momenta().clone();
     assert!((&m - m.transpose()).abs().max() < 1e-7 * m.max());
@@ -74,11 +74,11 @@ fn two_spheres() {
     for (i, limit) in [(0, 0.009), (1, 0.007), (3, 0.0055)] {
         let (d, exact) = (table[i].distance, table[i].coefficients());
         let poses = [at(0.0), at(d)];
-        let iterative = momenta(&pair, &[], PanelSolver::Gmres, &poses).unwrap();
+        let iterative = momenta(&pair, &[], FullSolver::Gmres, &poses).unwrap();
         let error = worst(&iterative, &exact);
         assert!(error < limit, "{d}: {error}");
         if i == 1 {
-            let direct = momenta(&pair, &[], PanelSolver::Lu, &poses).unwrap();
+            let direct = momenta(&pair, &[], FullSolver::Qr, &poses).unwrap();
             let apart = (&iterative - &direct).abs().max() / direct.max();
             assert!(apart < 1e-8, "{apart:e}");
         }
@@ -89,7 +89,7 @@ fn two_spheres() {
         momenta(
             &[ball, small(n)],
             &[],
-            PanelSolver::Gmres,
+            FullSolver::Gmres,
             &[at(0.0), at(1.6)],
         )
         .unwrap()
@@ -118,16 +118,16 @@ fn a_sphere_by_a_wall() {
     for (i, limit) in [(0, 0.011), (1, 0.009), (3, 0.0065), (4, 0.006)] {
         let (h, across, along) = (table[i].height, table[i].across, table[i].along);
         let rigid = [wall(-0.7, WallSurface::Rigid)];
-        let m = momenta(&ball, &rigid, PanelSolver::Gmres, &[at(h - 0.7)]).unwrap();
+        let m = momenta(&ball, &rigid, FullSolver::Gmres, &[at(h - 0.7)]).unwrap();
         for (found, exact) in [(m[(2, 2)], across), (m[(0, 0)], along)] {
             assert!((found / exact - 1.0).abs() < limit, "{h}: {found} {exact}");
         }
-        let direct = momenta(&ball, &rigid, PanelSolver::Lu, &[at(h - 0.7)]).unwrap();
+        let direct = momenta(&ball, &rigid, FullSolver::Qr, &[at(h - 0.7)]).unwrap();
         assert!((m - direct).abs().max() < 1e-8);
     }
     // A free surface: the image moves along, two spheres 2.2 apart in step.
     let free = [wall(-0.7, WallSurface::Free)];
-    let m = momenta(&ball, &free, PanelSolver::Gmres, &[at(0.4)]).unwrap();
+    let m = momenta(&ball, &free, FullSolver::Gmres, &[at(0.4)]).unwrap();
     let step = &equal_spheres()[1];
     let across = step.along[0][0] + step.along[0][1];
     let along = step.across[0][0] - step.across[0][1];
@@ -156,7 +156,7 @@ fn walls_are_mirrored_bodies() {
         normal: [1.0, 0.0, 0.0],
     };
     let walls = [wall(-0.05, WallSurface::Rigid), side];
-    let with_walls = momenta(&bodies, &walls, PanelSolver::Gmres, &poses).unwrap();
+    let with_walls = momenta(&bodies, &walls, FullSolver::Gmres, &poses).unwrap();
     // In the world's frame: mirrored meshes are turned inside out.
     let mirror = |mesh: &Mesh, pose: &Pose, flip: [bool; 2]| -> Mesh {
         let place = |x: &Vec3| {
@@ -186,7 +186,7 @@ fn walls_are_mirrored_bodies() {
         .iter()
         .flat_map(|(mesh, pose)| flips.map(|f| named("image", &mirror(mesh, pose, f))))
         .collect();
-    let together = momenta(&all, &[], PanelSolver::Lu, &[Pose::identity(); 8]).unwrap();
+    let together = momenta(&all, &[], FullSolver::Qr, &[Pose::identity(); 8]).unwrap();
     // Spatial twists of the images: velocities mirrored, turns mirrored and reversed.
     let image = |x: &[f64], flip: [bool; 2]| -> [f64; 6] {
         let mut out: [f64; 6] = x.try_into().unwrap();
@@ -230,12 +230,7 @@ fn alone_or_moved_together_nothing_changes() {
         exp_matrix(&Vec3::new(0.4, 0.1, -0.3)),
         Vec3::new(0.7, 0.2, 0.6),
     );
-    let alone = momenta(
-        std::slice::from_ref(&coin),
-        &[],
-        PanelSolver::Gmres,
-        &[pose],
-    );
+    let alone = momenta(std::slice::from_ref(&coin), &[], FullSolver::Gmres, &[pose]);
     // No iteration is needed for one body; its own value comes back.
     let settings = SolveSettings::default();
     let c = PanelCoupled::new(vec![coin.clone()], &[], Exclusions::none(), settings).unwrap();
@@ -335,7 +330,7 @@ fn boxes_that_approach_are_differentiated() {
 fn overlaps_and_impossible_settings_are_errors() {
     let ball = named("ball", &ellipsoid([1.0; 3], 320));
     let coin = named("coin", &ellipsoid([0.3, 0.1, 0.3], 80));
-    for solver in [PanelSolver::Gmres, PanelSolver::Lu] {
+    for solver in [FullSolver::Gmres, FullSolver::Qr] {
         let pair = [ball.clone(), coin.clone()];
         // Crossing, wholly inside, nowhere.
         for x in [1.05, 0.0, f64::NAN] {
@@ -398,7 +393,7 @@ fn any_thread_count() {
             let b = named("coin", &ellipsoid([0.5, 0.2, 0.3], 500));
             let walls = [wall(-0.6, WallSurface::Rigid)];
             let poses = [at(0.0), at(0.7)];
-            [PanelSolver::Gmres, PanelSolver::Lu]
+            [FullSolver::Gmres, FullSolver::Qr]
                 .map(|s| momenta(&[b.clone(), b.clone()], &walls, s, &poses).unwrap())
         })
     };

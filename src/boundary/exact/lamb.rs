@@ -79,6 +79,14 @@ fn others(i: usize) -> (usize, usize) {
     ((i + 1) % 3, (i + 2) % 3)
 }
 
+/// A number for each axis, from it and the others after it.
+fn each(f: impl Fn(usize, usize, usize) -> f64) -> [f64; 3] {
+    [0, 1, 2].map(|i| {
+        let (j, k) = others(i);
+        f(i, j, k)
+    })
+}
+
 impl Lamb {
     /// `semi_axes` as checked by [`check`].
     pub fn new(semi_axes: [f64; 3]) -> Self {
@@ -86,21 +94,11 @@ impl Lamb {
         let axes = semi_axes.map(|a| a / scale);
         let squares = axes.map(|a| a * a);
         let product = 2.0 / 3.0 * axes[0] * axes[1] * axes[2];
-        let about = [0, 1, 2].map(others);
-        let alpha = [0, 1, 2].map(|i| {
-            let (j, k) = about[i];
-            product * r_d(squares[j], squares[k], squares[i])
-        });
-        let difference = [0, 1, 2].map(|i| {
-            let (j, k) = about[i];
-            (semi_axes[j] - semi_axes[k]) / scale * (axes[j] + axes[k])
-        });
-        let g = [0, 1, 2].map(|i| {
-            let (j, k) = about[i];
-            product * r_d_difference(squares[i], squares[j], squares[k])
-        });
-        let denominator = [0, 1, 2].map(|i| {
-            let (j, k) = about[i];
+        let alpha = each(|i, j, k| product * r_d(squares[j], squares[k], squares[i]));
+        let difference =
+            each(|_, j, k| (semi_axes[j] - semi_axes[k]) / scale * (axes[j] + axes[k]));
+        let g = each(|i, j, k| product * r_d_difference(squares[i], squares[j], squares[k]));
+        let denominator = each(|i, j, k| {
             let (long, short) = if axes[j] >= axes[k] { (j, k) } else { (k, j) };
             let (b, c) = (squares[long], squares[short]);
             if c > 0.5 * b {

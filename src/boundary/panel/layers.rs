@@ -122,8 +122,16 @@ impl Panels {
         flux_fill(&self.triangles, &points, write, out, stride, column);
     }
 
-    /// I/4π into `out[panel][point]`, from Ω/4π of the same points.
-    fn single_layer(&self, points: &[Vec3], double: &[f64], out: &mut [f64]) {
+    /// Ω/4π, `[panel][point]`.
+    fn solid_angles(&self, points: &[Vec3]) -> Vec<f64> {
+        let mut out = vec![0.0; self.len() * points.len()];
+        self.double_layer(points, Write::Set, &mut out, points.len(), 0);
+        out
+    }
+
+    /// I/4π, `[panel][point]`, from Ω/4π of the same points.
+    fn single_layer(&self, points: &[Vec3], double: &[f64]) -> Vec<f64> {
+        let mut out = vec![0.0; double.len()];
         let mut lengths = vec![[0.0; LANES]; self.vertices.len()];
         let mut logs = vec![[0.0; LANES]; self.edges.len()];
         for first in (0..points.len()).step_by(LANES) {
@@ -143,6 +151,7 @@ impl Panels {
                 }
             });
         }
+        out
     }
 
     #[inline(always)]
@@ -196,12 +205,10 @@ impl Panels {
             .zip(points.par_chunks(BLOCK))
             .for_each(|(out, points)| {
                 let rows = points.len();
-                let mut omega = vec![0.0; n * rows];
-                self.double_layer(points, Write::Set, &mut omega, rows, 0);
+                let omega = self.solid_angles(points);
                 let mut out = MatMut::from_row_major_slice_mut(out, rows, columns);
                 if let Some(q) = single {
-                    let mut s = vec![0.0; n * rows];
-                    self.single_layer(points, &omega, &mut s);
+                    let s = self.single_layer(points, &omega);
                     // By panels and points: the matrix points × panels by columns.
                     let s = MatRef::from_column_major_slice(&s, rows, n);
                     matmul(out.as_mut(), Accum::Replace, s, q, 1.0, Par::Seq);

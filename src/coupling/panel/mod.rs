@@ -23,6 +23,7 @@ mod placed;
 mod second;
 mod system;
 
+use super::full::SolveSettings;
 use super::settings::{check_limits, end, ranges};
 use super::{Coupling, Exclusions, Linearise, Linearised, Momenta};
 use crate::Result;
@@ -31,43 +32,8 @@ use crate::boundary::PanelBoundary;
 use crate::boundary::panel::check_size;
 use crate::geometry::{HalfSpace, Image, Wall};
 use nalgebra::DMatrix;
-use serde::{Deserialize, Serialize};
 use std::ops::Range;
 use std::sync::Arc;
-
-/// How the coupled panel system is solved.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
-#[serde(rename_all = "kebab-case")]
-pub enum PanelSolver {
-    /// GMRES, preconditioned by each body's own factors. Stores the blocks between different bodies
-    /// (and those with images), 8 bytes an entry.
-    #[default]
-    Gmres,
-    /// Dense LU of the whole matrix: 8·faces² bytes, and faces³ operations.
-    Lu,
-}
-
-/// Settings of the coupled panel solve.
-#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
-#[serde(deny_unknown_fields, default)]
-pub struct SolveSettings {
-    /// The solver.
-    pub solver: PanelSolver,
-    /// Relative residual ‖b − A x‖ ≤ tolerance ‖b‖ at which GMRES stops.
-    pub tolerance: f64,
-    /// Iterations after which it gives up with an error.
-    pub max_iterations: usize,
-}
-
-impl Default for SolveSettings {
-    fn default() -> Self {
-        Self {
-            solver: PanelSolver::default(),
-            tolerance: 1e-8,
-            max_iterations: 500,
-        }
-    }
-}
 
 /// All bodies coupled through one panel system, and plane walls by images.
 pub struct PanelCoupled {
@@ -81,7 +47,9 @@ pub struct PanelCoupled {
 
 impl PanelCoupled {
     /// From the bodies, the walls (one, or mutually perpendicular ones), the pairs of bodies that don't feel
-    /// each other, and the solver's settings.
+    /// each other, and the solver's settings. [`FullSolver::Qr`](super::full::FullSolver::Qr) factors the whole matrix by LU (8·faces²
+    /// bytes, and faces³ operations); the others stand for GMRES, preconditioned by each body's own factors,
+    /// which stores the blocks between different bodies and those with images.
     ///
     /// # Errors
     /// Walls that don't close under reflection, pairs of bodies that don't exist, settings out of range, and

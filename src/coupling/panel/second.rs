@@ -48,13 +48,13 @@ impl PlacedPanels<'_> {
             }
             let triangles = self.coupled.bodies[pair.target].panels().triangles();
             let signed = |sign: f64| -> Vec<f64> {
-                let mu = solution.mu.slice(points.start, points.end);
+                let mu = solution.mu.slice(&points);
                 mu.iter().map(|m| sign * pair.image.sign * m).collect()
             };
             let (s, d) = (&pair.points, &displacement);
-            let out = transposed.slice_mut(panels.start, panels.end);
+            let out = transposed.slice_mut(&panels);
             flux_jvp(triangles, s, d, &signed(-1.0), n, out);
-            let out = back.slice_mut(panels.start, panels.end);
+            let out = back.slice_mut(&panels);
             single_jvp(triangles, s, d, &signed(1.0), n, out);
             first.push(PairFields {
                 displacement,
@@ -108,8 +108,8 @@ impl PlacedPanels<'_> {
         let sign = pair.image.sign;
         let signed = |sign: f64, x: &[f64]| -> Vec<f64> { x.iter().map(|x| sign * x).collect() };
         let q = self.normal_velocity(pair.target, &solution.twists);
-        let phi = solution.phi.slice(panels.start, panels.end);
-        let dphi = moved.phi.slice(panels.start, panels.end);
+        let phi = solution.phi.slice(&panels);
+        let dphi = moved.phi.slice(&panels);
         let mut dfields = vec![0.0; first.fields.len()];
         if q.data.iter().any(|q| *q != 0.0) {
             single_hvp(

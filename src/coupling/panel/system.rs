@@ -1,8 +1,9 @@
 //! The matrix between panels at given poses, and its solves.
 
-use super::{PanelCoupled, PanelSolver};
+use super::PanelCoupled;
 use crate::adjoint::kernel::Write;
 use crate::adjoint::lie::{Pose, Vec3};
+use crate::coupling::full::FullSolver;
 use crate::coupling::settings::converged;
 use crate::geometry::Image;
 use crate::solver::{Columns, Lu, Outcome, gmres, product, transposed_product};
@@ -26,9 +27,9 @@ struct Block {
 
 /// The bodies at given poses.
 #[derive(Clone, Copy)]
-pub(super) struct Placed<'a> {
-    pub coupled: &'a PanelCoupled,
-    pub poses: &'a [Pose],
+struct Placed<'a> {
+    coupled: &'a PanelCoupled,
+    poses: &'a [Pose],
 }
 
 /// A = ½I + Ω/4π at given poses.
@@ -44,16 +45,16 @@ enum Matrix {
 }
 
 impl<'a> System<'a> {
-    /// Assembles A, and factors it where the solver is [`PanelSolver::Lu`].
+    /// Assembles A, and factors it where the solver is [`FullSolver::Qr`].
     ///
     /// # Errors
     /// Bodies inside each other, or behind a wall.
-    pub fn new(placed: Placed<'a>) -> Result<Self> {
+    pub fn new(coupled: &'a PanelCoupled, poses: &[Pose]) -> Result<Self> {
+        let placed = Placed { coupled, poses };
         placed.check_walls()?;
-        let coupled = placed.coupled;
         let matrix = match coupled.settings.solver {
-            PanelSolver::Gmres => Matrix::Blocks(placed.blocks()?),
-            PanelSolver::Lu => Matrix::Factored(placed.dense()?),
+            FullSolver::Qr => Matrix::Factored(placed.dense()?),
+            FullSolver::Cgls | FullSolver::Gmres => Matrix::Blocks(placed.blocks()?),
         };
         Ok(Self { coupled, matrix })
     }

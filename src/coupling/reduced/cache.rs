@@ -14,7 +14,7 @@ use sha2::{Digest, Sha256};
 use std::collections::HashMap;
 use std::io::Write;
 use std::path::{Path, PathBuf};
-use std::sync::{Arc, LazyLock, Mutex, PoisonError};
+use std::sync::{Arc, LazyLock, Mutex, MutexGuard, PoisonError};
 
 /// Changes whenever what is stored, or how it is computed, changes.
 const FORMAT: &str = concat!(
@@ -62,22 +62,19 @@ pub fn fetch(
     folder: Option<&Path>,
     make: impl FnOnce() -> Result<ReducedBody>,
 ) -> Result<Arc<ReducedBody>> {
-    let memory = || MEMORY.lock().unwrap_or_else(PoisonError::into_inner);
     let known = memory().get(&key).cloned();
-    let body = match (known, folder) {
-        (Some(body), None) => return Ok(body),
-        (Some(body), Some(_)) => body,
-        (None, Some(folder)) => match read(&path(folder, key)) {
-            Some(body) => Arc::new(body),
-            None => Arc::new(make()?),
-        },
-        (None, None) => Arc::new(make()?),
+    let file = folder.map(|folder| path(folder, key));
+    if let (Some(body), None) = (&known, &file) {
+        return Ok(body.clone());
+    }
+    let stored = file.as_deref().and_then(read).map(Arc::new);
+    let unwritten = file.filter(|_| stored.is_none());
+    let body = match known.or(stored) {
+        Some(body) => body,
+        None => Arc::new(make()?),
     };
-    if let Some(folder) = folder {
-        let path = path(folder, key);
-        if read(&path).is_none() {
-            write(folder, &path, &body)?;
-        }
+    if let (Some(folder), Some(file)) = (folder, unwritten) {
+        write(folder, &file, &body)?;
     }
     let mut memory = memory();
     if memory.len() >= MOST {
@@ -87,12 +84,13 @@ pub fn fetch(
     Ok(body)
 }
 
+fn memory() -> MutexGuard<'static, HashMap<Key, Arc<ReducedBody>>> {
+    MEMORY.lock().unwrap_or_else(PoisonError::into_inner)
+}
+
 /// Forgets the bodies kept in memory.
 pub fn forget() {
-    MEMORY
-        .lock()
-        .unwrap_or_else(PoisonError::into_inner)
-        .clear();
+    memory().clear();
 }
 
 /// The file of `key` in `folder`.

@@ -13,7 +13,7 @@
 
 use super::Reduced;
 use super::linearised::ReducedLinearised;
-use super::views::FLUX;
+use super::views::{FLUX, dense};
 use crate::Result;
 use crate::adjoint::kernel::{Points, Sources, Write, potential_fill};
 use crate::adjoint::lie::{Pose, Vec3};
@@ -45,10 +45,7 @@ impl Reduced {
             // Charges of the others, in this body's frame.
             let (mut places, mut rows, mut faded) = (Vec::new(), Vec::new(), Vec::new());
             for link in &self.links {
-                for (target, source) in link.ends() {
-                    if target != b {
-                        continue;
-                    }
+                for (_, source) in link.ends().filter(|(target, _)| *target == b) {
                     let weight = link.weight(&self.bodies, poses);
                     let points = &self.bodies[source].parts().points;
                     let (at, from) = ((b, &poses[b]), (source, &poses[source]));
@@ -65,11 +62,9 @@ impl Reduced {
             });
             let field = inverse_distances(&places, &parts.points);
             let seen = parts.modes.tr_mul(&field.tr_mul(&charges));
-            let answered = solution.scattered(&places, &places)?;
-            let answered = DMatrix::from_fn(places.len(), places.len(), |i, j| answered[(i, j)]);
+            let answered = dense(&solution.scattered(&places, &places)?);
             let scattered = charges.tr_mul(&(answered * &charges)) - seen.tr_mul(&seen);
-            let answered = solution.radiated(&places)?;
-            let answered = DMatrix::from_fn(places.len(), 6, |i, j| answered[(i, j)]);
+            let answered = dense(&solution.radiated(&places)?);
             let radiated = charges.tr_mul(&((answered - &field * &parts.strengths) * twists));
             let faint = DMatrix::from_fn(rows.len(), k, |i, c| faded[i] * charges[(i, c)]);
             let alpha = solved.alpha.rows(self.points[b].start, parts.points.len());

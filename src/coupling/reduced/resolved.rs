@@ -82,11 +82,16 @@ fn closest(reduced: &Reduced, poses: &[Pose], quantity: &str, value: f64) -> Err
     }
 }
 
+/// Volume of the water that a body moves, m³, and the reach of its turns, m.
+fn scales(p: &CompressedParts) -> (f64, f64) {
+    let linear = p.added_mass.fixed_view::<3, 3>(0, 0).trace();
+    (p.volume.max(linear), p.radius + p.centre.norm())
+}
+
 /// What a body's own added mass is below zero by, scaled by the water displaced: the one-body method's
 /// error in a spin that moves no water, and no matter of gaps.
 fn deficit(p: &CompressedParts) -> f64 {
-    let mass = p.volume.max(p.added_mass.fixed_view::<3, 3>(0, 0).trace());
-    let arm = p.radius + p.centre.norm();
+    let (mass, arm) = scales(p);
     let scale = |i: usize| mass.sqrt() * if i < 3 { 1.0 } else { arm };
     let scaled = Mat6::from_fn(|i, j| p.added_mass[(i, j)] / (scale(i) * scale(j)));
     (-scaled.symmetric_eigenvalues().min()).max(0.0)
@@ -101,11 +106,11 @@ fn check_energy(reduced: &Reduced, basis: &DMatrix<f64>, momenta: &DMatrix<f64>)
         .map(|i| {
             let bodies = reduced.bodies.iter().enumerate();
             let inertia = bodies.map(|(b, body)| {
-                let p = body.parts();
+                let (mass, arm) = scales(body.parts());
                 let twist = basis.fixed_view::<6, 1>(6 * b, i);
                 let (u, w) = (twist.fixed_rows::<3>(0), twist.fixed_rows::<3>(3));
-                let scale = u.norm() + (p.radius + p.centre.norm()) * w.norm();
-                p.volume.max(p.added_mass.fixed_view::<3, 3>(0, 0).trace()) * scale * scale
+                let scale = u.norm() + arm * w.norm();
+                mass * scale * scale
             });
             inertia.sum::<f64>()
         })

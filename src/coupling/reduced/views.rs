@@ -1,6 +1,6 @@
 //! Matrices and interleaved columns as the kernels see them.
 
-use faer::{MatMut, MatRef};
+use faer::{Mat, MatMut, MatRef};
 use nalgebra::DMatrix;
 use std::f64::consts::PI;
 
@@ -15,6 +15,11 @@ pub(super) fn view(m: &DMatrix<f64>) -> MatRef<'_, f64> {
 pub(super) fn view_mut(m: &mut DMatrix<f64>) -> MatMut<'_, f64> {
     let (r, c) = m.shape();
     MatMut::from_column_major_slice_mut(m.as_mut_slice(), r, c)
+}
+
+/// A faer matrix as nalgebra sees it.
+pub(super) fn dense(m: &Mat<f64>) -> DMatrix<f64> {
+    DMatrix::from_fn(m.nrows(), m.ncols(), |i, j| m[(i, j)])
 }
 
 /// Columns `k` and `k'` of two vectors beside each other, `[row][column]`.

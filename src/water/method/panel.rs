@@ -3,13 +3,16 @@
 use super::kind::{BodyMethod, Problem, Solved};
 use crate::boundary::PanelBoundary;
 use crate::boundary::panel::Extrapolated;
-use crate::coupling::full::FullSolver;
-use crate::coupling::panel::{self, PanelCoupled};
+use crate::coupling::PanelCoupled;
+use crate::coupling::full::SolveSettings;
 use crate::water::device::Device;
 use crate::water::numerics::Numerics;
 use crate::water::submerged::{Discretisation, Made, SubmergedBody, once, shared};
 use crate::water::surface::Coarse;
 use crate::{Error, Result};
+
+/// Iterations of the coupled panels after which they are given up.
+const MOST_ITERATIONS: usize = 500;
 
 /// Panels, of two meshes extrapolated where there are two.
 pub(super) struct Panel;
@@ -48,14 +51,9 @@ impl BodyMethod for Panel {
         let made = shared(problem.bodies, |body| {
             PanelBoundary::new(body.name, body.surface("full")?)
         })?;
-        let asked = &problem.numerics.solve;
-        let solve = panel::SolveSettings {
-            solver: match asked.solver {
-                FullSolver::Qr => panel::PanelSolver::Lu,
-                FullSolver::Cgls | FullSolver::Gmres => panel::PanelSolver::Gmres,
-            },
-            tolerance: asked.tolerance,
-            ..panel::SolveSettings::default()
+        let solve = SolveSettings {
+            max_iterations: MOST_ITERATIONS,
+            ..problem.numerics.solve
         };
         Ok(Made {
             warnings: once(&made, |m| &m.warnings),

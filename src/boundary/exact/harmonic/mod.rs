@@ -40,7 +40,7 @@ use legendre::Legendre;
 use radial::{Grid, Radial, Spot};
 use rayon::prelude::*;
 use std::f64::consts::PI;
-use top::Top;
+use top::{Class, Top};
 
 /// Highest degree.
 const MOST: usize = 256;
@@ -82,19 +82,9 @@ pub(super) struct Harmonics {
 struct Degree {
     recursion: Vec<[f64; 2]>,
     radials: Vec<Radial>,
-    classes: Vec<Class>,
+    /// With the radial part of each function.
+    classes: Vec<(Class, Vec<usize>)>,
     size: usize,
-}
-
-/// Functions of one class that are kept.
-#[derive(Clone, Debug)]
-struct Class {
-    sine: bool,
-    orders: Vec<usize>,
-    /// Orders × functions; none where each order is one.
-    vectors: Option<Mat<f64>>,
-    /// The radial part of each function.
-    radials: Vec<usize>,
 }
 
 /// A point on its way through the degrees.
@@ -193,12 +183,7 @@ impl Harmonics {
                     wanted.push((h, class.odd));
                 }
             }
-            classes.push(Class {
-                sine: class.sine,
-                orders: class.orders,
-                vectors: class.vectors,
-                radials,
-            });
+            classes.push((class, radials));
         }
         let radials: Vec<Radial> = wanted
             .into_par_iter()
@@ -207,7 +192,7 @@ impl Harmonics {
         let mut degree = Degree {
             recursion: legendre::recursion(n),
             radials,
-            size: classes.iter().map(|c| c.radials.len()).sum(),
+            size: classes.iter().map(|(_, r)| r.len()).sum(),
             classes,
         };
         let mut values = Mat::zeros(degree.size, samples.len());
@@ -246,8 +231,8 @@ impl Harmonics {
             probe.legendre.advance(&degree.recursion);
         }
         let mut from = 0;
-        for class in &degree.classes {
-            let size = class.radials.len();
+        for (class, radials) in &degree.classes {
+            let size = radials.len();
             let mut own = out.rb_mut().subrows_mut(from, size);
             from += size;
             let basis = Mat::from_fn(class.orders.len(), probes.len(), |i, j| {
@@ -266,7 +251,7 @@ impl Harmonics {
             for ((f, r), w) in factors.iter_mut().zip(&degree.radials).zip(&weights) {
                 *f = w * self.grid.value(r, &probe.spot);
             }
-            let radials = degree.classes.iter().flat_map(|c| &c.radials);
+            let radials = degree.classes.iter().flat_map(|(_, r)| r);
             for (x, r) in column.iter_mut().zip(radials) {
                 *x *= factors[*r];
             }
@@ -415,21 +400,19 @@ impl Degree {
     /// Leaves out the functions for which `wanted` is false, and radial parts that none needs.
     fn keep(&mut self, wanted: impl Fn(usize) -> bool) {
         let mut at = 0;
-        for class in &mut self.classes {
-            let kept: Vec<usize> = (0..class.radials.len())
-                .filter(|j| wanted(at + j))
-                .collect();
-            at += class.radials.len();
-            class.radials = kept.iter().map(|&j| class.radials[j]).collect();
+        for (class, radials) in &mut self.classes {
+            let kept: Vec<usize> = (0..radials.len()).filter(|j| wanted(at + j)).collect();
+            at += radials.len();
+            *radials = kept.iter().map(|&j| radials[j]).collect();
             match &mut class.vectors {
                 None => class.orders = kept.iter().map(|&j| class.orders[j]).collect(),
                 Some(v) => *v = Mat::from_fn(v.nrows(), kept.len(), |i, j| v[(i, kept[j])]),
             }
         }
-        self.classes.retain(|c| !c.radials.is_empty());
-        self.size = self.classes.iter().map(|c| c.radials.len()).sum();
+        self.classes.retain(|(_, r)| !r.is_empty());
+        self.size = self.classes.iter().map(|(_, r)| r.len()).sum();
         let mut used = vec![None; self.radials.len()];
-        for r in self.classes.iter().flat_map(|c| &c.radials) {
+        for r in self.classes.iter().flat_map(|(_, r)| r) {
             used[*r] = Some(0);
         }
         for (next, slot) in used.iter_mut().flatten().enumerate() {
@@ -438,7 +421,7 @@ impl Degree {
         let mut index = used.iter();
         self.radials
             .retain(|_| index.next().is_some_and(|u| u.is_some()));
-        for r in self.classes.iter_mut().flat_map(|c| &mut c.radials) {
+        for r in self.classes.iter_mut().flat_map(|(_, r)| r) {
             *r = used[*r].unwrap_or(0);
         }
     }

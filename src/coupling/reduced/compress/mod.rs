@@ -23,13 +23,13 @@ mod modes;
 mod pursuit;
 mod samples;
 
+use super::views::dense;
 use super::{CompressedParts, Fit, ReducedBody};
 use crate::adjoint::lie::Vec3;
 use crate::boundary::Response;
 use crate::geometry::{Ball, Interior, TriMesh};
 use crate::{Error, Result};
 use faer::Mat;
-use nalgebra::DMatrix;
 use serde::{Deserialize, Serialize};
 
 /// Proxies are this many times their distance from the surface apart.
@@ -120,20 +120,30 @@ impl CompressSettings {
 }
 
 /// Proxies with their distances from the surface.
+#[derive(Default)]
 struct Proxies {
     points: Vec<Vec3>,
     distances: Vec<f64>,
 }
 
 impl Proxies {
-    /// W Φ W.
-    fn both(&self, mut potentials: Mat<f64>) -> Mat<f64> {
+    /// W Φ_own: the body's own flow.
+    fn radiated(&self, response: &dyn Response) -> Result<Mat<f64>> {
+        let own = response.radiated(&self.points)?;
+        Ok(Mat::from_fn(own.nrows(), 6, |i, j| {
+            own[(i, j)] * self.distances[i]
+        }))
+    }
+
+    /// W Φ W: the scattered flow.
+    fn scattered(&self, response: &dyn Response) -> Result<Mat<f64>> {
+        let mut potentials = response.scattered(&self.points, &self.points)?;
         for (j, right) in self.distances.iter().enumerate() {
             for (i, left) in self.distances.iter().enumerate() {
                 potentials[(i, j)] *= left * right;
             }
         }
-        potentials
+        Ok(potentials)
     }
 }
 
@@ -180,28 +190,26 @@ pub fn compress(
         let closer = (fitted.points.len() as f64 / needed as f64).sqrt();
         (fitted, checked) = proxies(&surface, gap, radius, 0.9 * closer * SPACING);
     }
+    let none = |quantity: &str, remedy: String| Error::Unresolved {
+        place: format!("body {name:?}"),
+        quantity: quantity.into(),
+        value: 0.0,
+        limit: 1.0,
+        remedy,
+    };
     let candidates = candidates(&surface, gap, radius);
     let field = potentials_weighted(&fitted, &candidates);
     if candidates.is_empty() {
-        return Err(Error::Unresolved {
-            place: format!("body {name:?}"),
-            quantity: "points inside for its compressed sources".into(),
-            value: 0.0,
-            limit: 1.0,
-            remedy: format!("the mesh ({} faces) is too coarse", surface.faces.len()),
-        });
+        let remedy = format!("the mesh ({} faces) is too coarse", surface.faces.len());
+        return Err(none("points inside for its compressed sources", remedy));
     }
-    let own = response.radiated(&fitted.points)?;
-    let own = Mat::from_fn(own.nrows(), 6, |i, j| own[(i, j)] * fitted.distances[i]);
-    let mut scattered = fitted.both(response.scattered(&fitted.points, &fitted.points)?);
+    let own = fitted.radiated(response)?;
+    let mut scattered = fitted.scattered(response)?;
     let asymmetry = symmetrise(&mut scattered);
     let cut = MODES * settings.tolerance.sqrt();
-    let found = modes::largest(&scattered, cut).ok_or_else(|| Error::Unresolved {
-        place: format!("body {name:?}"),
-        quantity: "modes of its solution to the water that were found".into(),
-        value: 0.0,
-        limit: 1.0,
-        remedy: "use a more even mesh".into(),
+    let found = modes::largest(&scattered, cut).ok_or_else(|| {
+        let quantity = "modes of its solution to the water that were found";
+        none(quantity, "use a more even mesh".into())
     })?;
     drop(scattered);
     let top = found.values.first().copied().unwrap_or(0.0);
@@ -235,14 +243,10 @@ pub fn compress(
 
     // What the compressed body says at points that it was not fitted to.
     let there = potentials_weighted(&checked, &chosen);
-    let own = response.radiated(&checked.points)?;
-    let own = Mat::from_fn(own.nrows(), 6, |i, j| own[(i, j)] * checked.distances[i]);
-    let radiated = relative(&(&there * &strengths), &own);
-    let scattered = response.scattered(&checked.points, &checked.points)?;
-    let scattered = checked.both(scattered);
+    let radiated = relative(&(&there * &strengths), &checked.radiated(response)?);
+    let scattered = checked.scattered(response)?;
     let solution = &there * &modes;
     let scattered = relative(&(&solution * solution.transpose()), &scattered);
-    let dense = |m: &Mat<f64>| DMatrix::from_fn(m.nrows(), m.ncols(), |i, j| m[(i, j)]);
     ReducedBody::new(CompressedParts {
         name: name.to_string(),
         modes: dense(&modes),
@@ -300,21 +304,14 @@ fn relative(a: &Mat<f64>, b: &Mat<f64>) -> f64 {
 
 /// Proxies to fit to and others to check at, `spacing` times their distance from the surface apart.
 fn proxies(surface: &Interior, gap: f64, radius: f64, spacing: f64) -> (Proxies, Proxies) {
-    let empty = || Proxies {
-        points: Vec::new(),
-        distances: Vec::new(),
-    };
-    let (mut fitted, mut checked) = (empty(), empty());
+    let (mut fitted, mut checked) = (Proxies::default(), Proxies::default());
     let mut offset = gap;
     loop {
-        for (i, p) in samples::around(surface, offset, spacing * offset)
-            .into_iter()
-            .enumerate()
-        {
-            let to = if i % CHECK == CHECK - 1 {
-                &mut checked
-            } else {
-                &mut fitted
+        let around = samples::around(surface, offset, spacing * offset);
+        for (i, p) in around.into_iter().enumerate() {
+            let to = match i % CHECK == CHECK - 1 {
+                true => &mut checked,
+                false => &mut fitted,
             };
             to.points.push(p);
             to.distances.push(offset);

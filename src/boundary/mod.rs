@@ -42,7 +42,9 @@ pub trait Response: Send + Sync {
     fn scattered(&self, sources: &[Vec3], points: &[Vec3]) -> Result<Mat<f64>>;
 
     /// max |M_ij − M_ji| / √(M_ii M_jj) before symmetrising; 0 for methods that are symmetric.
-    fn asymmetry(&self) -> f64;
+    fn asymmetry(&self) -> f64 {
+        0.0
+    }
 
     /// Estimated relative error of the added mass, where two resolutions tell one.
     fn error(&self) -> Option<f64> {
@@ -80,12 +82,6 @@ fn scaled(difference: &Mat6, m: &Mat6, faces: &Faces) -> f64 {
         let displaced = if i < 3 { volume } else { volume * spread };
         m[(i, i)].max(0.01 * displaced)
     };
-    let mut worst = 0.0_f64;
-    for i in 0..6 {
-        for j in 0..6 {
-            let scale = (diagonal(i) * diagonal(j)).sqrt();
-            worst = worst.max(difference[(i, j)].abs() / scale);
-        }
-    }
-    worst
+    let part = |i, j| difference[(i, j)].abs() / (diagonal(i) * diagonal(j)).sqrt();
+    Mat6::from_fn(part).iter().copied().fold(0.0, f64::max)
 }

@@ -194,11 +194,7 @@ pub trait Linearised: Send + Sync {
     /// # Errors
     /// As there.
     fn gradient_columns(&self, x: &DVector<f64>) -> Result<Vec<Vec<Vec6>>> {
-        let unit = |i: usize| {
-            let mut e = DVector::zeros(x.len());
-            e[i] = 1.0;
-            e
-        };
+        let unit = |i: usize| DVector::from_fn(x.len(), |k, _| f64::from(k == i));
         (0..x.len()).map(|i| self.gradient(x, &unit(i))).collect()
     }
 

@@ -78,9 +78,8 @@ pub(super) fn asymmetry(
         });
         inertia.sum()
     };
-    let diagonal: Vec<f64> = (0..basis.ncols())
-        .map(|i| raw[(i, i)].abs().max(0.01 * displaced(i)))
-        .collect();
+    let diagonal = |i| raw[(i, i)].abs().max(0.01 * displaced(i));
+    let diagonal: Vec<f64> = (0..basis.ncols()).map(diagonal).collect();
     let mut worst = 0.0_f64;
     for i in 0..basis.ncols() {
         for j in 0..i {

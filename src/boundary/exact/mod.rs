@@ -1,13 +1,12 @@
 //! Spheres and ellipsoids by formula: no mesh.
 //!
 //! The added mass and the flow of the moving body are Lamb's ([`lamb`]). What the body adds to the flow
-//! of a source is an image in closed form for a sphere (`sphere`), a sum of ellipsoidal harmonics for
+//! of a source is an image in closed form for a sphere (`image`), a sum of ellipsoidal harmonics for
 //! others (`harmonic`): a scattering matrix that is diagonal, so nothing is solved.
 
 mod confocal;
 mod harmonic;
 pub mod lamb;
-mod sphere;
 
 use crate::adjoint::lie::{Mat6, Pose, Vec3, skew};
 use crate::boundary::Response;
@@ -180,15 +179,37 @@ impl Response for ExactBoundary {
         }
         let radius = self.semi_axes[0];
         Ok(Mat::from_fn(points.len(), sources.len(), |i, j| {
-            sphere::image(radius, &sources[j], &points[i])
+            image(radius, &sources[j], &points[i])
         }))
-    }
-
-    fn asymmetry(&self) -> f64 {
-        0.0
     }
 
     fn warnings(&self) -> &[String] {
         &self.warnings
     }
+}
+
+/// Potential at x of the flow that a sphere adds to a unit source at y; both outside, m. 1/m.
+///
+/// The source `1/|x − y|` outside a sphere of radius a around the origin has its image in the point
+/// y' = a² y/|y|², of strength a/|y|, and in a line of sinks of strength −1/a per length from the centre to
+/// y':
+///
+/// ```text
+/// φ = (a/|y|) / |x − y'| − (1/a) ∫₀^{|y'|} ds / |x − s y/|y||
+///   = Σ_l l/(l+1) a^{2l+1} P_l(cos γ) / (|x| |y|)^{l+1}
+/// ```
+///
+/// The line's potential is ln[(|x| + |x − y'| + |y'|) / (|x| + |x − y'| − |y'|)]: right in all directions.
+///
+/// # References
+/// P. Weiss, "On hydrodynamical images: arbitrary irrotational flow disturbed by a sphere", Proc. Camb.
+/// Phil. Soc. 40 (1944) 259–261.
+fn image(radius: f64, y: &Vec3, x: &Vec3) -> f64 {
+    let (far, near) = (y.norm(), x.norm());
+    let depth = radius * (radius / far);
+    let image = y * (depth / far);
+    let distance = (x - image).norm();
+    let sum = near + distance;
+    let line = (2.0 * depth / (sum - depth)).ln_1p();
+    (radius / far) / distance - line / radius
 }

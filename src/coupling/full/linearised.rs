@@ -61,7 +61,7 @@ impl Linearised for FullLinearised<'_> {
         let n = directions.len();
         let response = self.solved.response.directions(&directions)?;
         let momenta = response.momenta()?;
-        let unit = |i: usize| DVector::from_fn(n, |k, _| if k == i { 1.0 } else { 0.0 });
+        let unit = |i: usize| DVector::from_fn(n, |k, _| f64::from(k == i));
         Ok(Pullback {
             momentum_x: momenta.column(0).into_owned(),
             momentum_y: momenta.column(n - 1).into_owned(),

@@ -83,11 +83,6 @@ impl Full {
     pub fn backend(&self) -> &dyn SystemBackend {
         self.backend.as_ref()
     }
-
-    /// Number of rows.
-    pub fn rows(&self) -> usize {
-        self.model.rows()
-    }
 }
 
 impl Coupling for Full {

@@ -46,7 +46,7 @@ impl Reduced {
             let (mut places, mut rows, mut faded) = (Vec::new(), Vec::new(), Vec::new());
             for link in &self.links {
                 for (_, source) in link.ends().filter(|(target, _)| *target == b) {
-                    let weight = link.weight(&self.bodies, poses);
+                    let (_, _, [weight, ..]) = link.reach(&self.bodies, poses);
                     let points = &self.bodies[source].parts().points;
                     let (at, from) = ((b, &poses[b]), (source, &poses[source]));
                     places.extend(Pair::new(at, from, &link.image, points).positions);

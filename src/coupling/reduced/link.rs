@@ -64,7 +64,11 @@ impl Link {
 
     /// The source body's centre in the target's frame, the same less the target's, and the weight at
     /// that distance with two derivatives.
-    fn reach(&self, bodies: &[Arc<ReducedBody>], poses: &[Pose]) -> (Vec3, Vec3, [f64; 3]) {
+    pub(super) fn reach(
+        &self,
+        bodies: &[Arc<ReducedBody>],
+        poses: &[Pose],
+    ) -> (Vec3, Vec3, [f64; 3]) {
         let parts = |b: usize| bodies[b].parts();
         let (t, s) = (self.target, self.source);
         let (rotation, shift) = self.image.placement(&poses[s]);
@@ -75,11 +79,6 @@ impl Link {
             None => [1.0, 0.0, 0.0],
         };
         (centre, between, weight)
-    }
-
-    /// Weight at the poses.
-    pub(super) fn weight(&self, bodies: &[Arc<ReducedBody>], poses: &[Pose]) -> f64 {
-        self.reach(bodies, poses).2[0]
     }
 
     /// The bodies (target, source) that it couples, in both orders: one body and its image once.
@@ -96,17 +95,12 @@ impl Link {
         bodies: &[Arc<ReducedBody>],
         poses: &[Pose],
     ) -> Option<PlacedSkeletons<'_>> {
-        let parts = |b: usize| bodies[b].parts();
         let (t, s) = (self.target, self.source);
         let (centre, between, weight) = self.reach(bodies, poses);
+        let points = &bodies[s].parts().points;
         (weight[0] > 0.0).then(|| PlacedSkeletons {
             link: self,
-            pair: Pair::new(
-                (t, &poses[t]),
-                (s, &poses[s]),
-                &self.image,
-                &parts(s).points,
-            ),
+            pair: Pair::new((t, &poses[t]), (s, &poses[s]), &self.image, points),
             between,
             centre,
             weight,

@@ -25,10 +25,105 @@ mod linearised;
 mod link;
 mod resolved;
 mod second;
-mod system;
 mod views;
 
 pub use body::{CompressedParts, Fit, ReducedBody};
 pub use cutoff::Cutoff;
 pub use link::Link;
-pub use system::Reduced;
+
+use super::Exclusions;
+use super::settings::{end, ranges};
+use crate::Result;
+use crate::geometry::{Image, Wall};
+use rayon::prelude::*;
+use std::ops::Range;
+use std::sync::Arc;
+
+/// Coulomb forces that take as long as waking another thread, many times over (0.1 ms).
+const WORTH_WAKING: usize = 100_000;
+
+/// All bodies coupled through a few sources each.
+#[derive(Clone)]
+pub struct Reduced {
+    bodies: Vec<Arc<ReducedBody>>,
+    /// For messages: bodies of equal shape share what they are compressed to.
+    names: Vec<String>,
+    links: Vec<Link>,
+    points: Vec<Range<usize>>,
+    modes: Vec<Range<usize>>,
+}
+
+impl Reduced {
+    /// From the bodies and the walls (one, or mutually perpendicular ones). `cutoff` gives the
+    /// distances between which a pair of bodies fades out (equal indices: a body and its image),
+    /// `None` for a pair that is always coupled.
+    ///
+    /// # Errors
+    /// Walls that don't close under reflection.
+    pub fn new(
+        bodies: Vec<Arc<ReducedBody>>,
+        walls: &[Wall],
+        cutoff: impl Fn(usize, usize) -> Option<Cutoff>,
+    ) -> Result<Self> {
+        let links = Link::all(bodies.len(), &Image::of_walls(walls)?, cutoff);
+        Ok(Self {
+            points: ranges(bodies.iter().map(|b| b.points())),
+            modes: ranges(bodies.iter().map(|b| b.modes())),
+            links,
+            names: bodies.iter().map(|b| b.parts().name.clone()).collect(),
+            bodies,
+        })
+    }
+
+    /// The same, without the flow between these pairs of bodies.
+    ///
+    /// # Errors
+    /// A pair that names a body that doesn't exist.
+    pub fn excluding(mut self, pairs: &Exclusions) -> Result<Self> {
+        pairs.check(self.bodies.len())?;
+        let apart = |l: &Link| !l.image.is_identity() || !pairs.contains(l.target, l.source);
+        self.links.retain(apart);
+        Ok(self)
+    }
+
+    /// The same with names of the bodies, for messages; those beyond the bodies are dropped.
+    pub fn named(mut self, names: impl IntoIterator<Item = String>) -> Self {
+        let given = self.names.iter_mut().zip(names);
+        given.for_each(|(own, name)| *own = name);
+        self
+    }
+
+    /// The bodies.
+    pub fn reduced_bodies(&self) -> &[Arc<ReducedBody>] {
+        &self.bodies
+    }
+
+    /// The blocks of G that aren't zero, those below the diagonal left out.
+    pub fn links(&self) -> &[Link] {
+        &self.links
+    }
+
+    /// `f` of each item (a link's), in order; on several threads where the points are so many that it
+    /// pays to wake them. `work` per pair of points is relative to one Coulomb force.
+    fn over<'i, I: Sync, T: Send>(
+        &self,
+        items: &'i [I],
+        work: usize,
+        f: impl Fn(&'i I) -> T + Sync + Send,
+    ) -> Vec<T> {
+        let mean = self.point_count() / self.bodies.len().max(1);
+        if items.len() * mean * mean * work < WORTH_WAKING {
+            items.iter().map(f).collect()
+        } else {
+            items.par_iter().map(f).collect()
+        }
+    }
+
+    fn point_count(&self) -> usize {
+        end(&self.points)
+    }
+
+    fn mode_count(&self) -> usize {
+        end(&self.modes)
+    }
+}

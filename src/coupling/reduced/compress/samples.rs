@@ -21,6 +21,13 @@ pub(super) struct Sample {
 /// directions between the faces' normals.
 pub(super) fn surface_points(surface: &Interior, spacing: f64) -> Vec<Sample> {
     let mut out = Vec::new();
+    let mut add = |point: Vec3, normal: Vec3, face: usize| {
+        out.push(Sample {
+            point,
+            normal,
+            face,
+        });
+    };
     let normals = &surface.faces.normals;
     let smooth = |v: usize, f: usize| {
         let n = &surface.vertex_normals[v];
@@ -40,11 +47,7 @@ pub(super) fn surface_points(surface: &Interior, spacing: f64) -> Vec<Sample> {
         let point = surface.mesh.vertices()[v];
         let face = faces.iter().position(|t| t.contains(&v));
         if let Some(face) = face {
-            out.push(Sample {
-                point,
-                normal: *normal,
-                face,
-            });
+            add(point, *normal, face);
         }
     }
     for (face, _, Edge { vertices, faces }) in ridges {
@@ -52,12 +55,7 @@ pub(super) fn surface_points(surface: &Interior, spacing: f64) -> Vec<Sample> {
         let normal = (normals[faces[0]] + normals[faces[1]]).normalize();
         let n = ((b - a).norm() / spacing).ceil() as usize;
         for i in 1..n {
-            let point = a + (b - a) * (i as f64 / n as f64);
-            out.push(Sample {
-                point,
-                normal,
-                face,
-            });
+            add(a + (b - a) * (i as f64 / n as f64), normal, face);
         }
     }
     for (face, t) in faces.iter().enumerate() {
@@ -74,11 +72,8 @@ pub(super) fn surface_points(surface: &Interior, spacing: f64) -> Vec<Sample> {
                     }
                     let (u, v) = ((i as f64 + shift) / n as f64, (j as f64 + shift) / n as f64);
                     let w = 1.0 - u - v;
-                    out.push(Sample {
-                        point: c[0] * w + c[1] * u + c[2] * v,
-                        normal: (at[0] * w + at[1] * u + at[2] * v).normalize(),
-                        face,
-                    });
+                    let normal = (at[0] * w + at[1] * u + at[2] * v).normalize();
+                    add(c[0] * w + c[1] * u + c[2] * v, normal, face);
                 }
             }
         }

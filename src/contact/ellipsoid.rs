@@ -4,7 +4,7 @@
 //! D. Eberly, "Distance from a point to an ellipse, an ellipsoid, or a hyperellipsoid" (2013): the
 //! scalar equation for the nearest point and the bracket of its root.
 
-use super::point::{ContactPoint, Field, Rows3, across, carry, columns};
+use super::point::{ContactPoint, Field, across, carry, columns};
 use crate::geometry::HalfSpace;
 use hydrograd_adjoint::lie::{Mat3, Pose, Vec3, skew};
 
@@ -26,14 +26,6 @@ pub(super) struct Support {
     pub spread: Mat3,
 }
 
-/// Where a straight edge is lowest over an ellipsoid.
-pub(super) enum Lowest {
-    /// At its beginning or end.
-    End,
-    /// In between, this far from its beginning, m.
-    Inside(f64),
-}
-
 impl Ellipsoid {
     /// `c + Σ m/h` with h = √(mᵀ Σ m) and Σ = R D² Rᵀ, for a unit vector m.
     pub fn support(&self, at: &Pose, direction: &Vec3) -> Support {
@@ -52,8 +44,10 @@ impl Ellipsoid {
         let normal = &plane.normal;
         let support = self.support(at, &-normal);
         let field = Field::flat(plane.height(&support.point), *normal);
-        // The point slides along the surface, which the gap doesn't feel.
-        ContactPoint::probe(&support.point, &support.motion(normal), [0.0; 2], &field)
+        // Carried along, the point slides along the surface by C (ω × m), which the gap doesn't feel.
+        let sliding = columns(&Mat3::zeros(), &(support.spread * skew(normal)));
+        let motion = carry(&support.point) - sliding;
+        ContactPoint::probe(&support.point, &motion, [0.0; 2], &field)
     }
 
     /// Signed distance of a point, frame of the ellipsoid. On the symmetry planes inside, where two
@@ -138,22 +132,17 @@ impl Ellipsoid {
         (s, (start + s * step).norm())
     }
 
-    /// A lower bound of the distance of points so many radii from the centre as in
-    /// [`Self::approach`].
-    pub fn distance_bound(&self, radii: f64) -> f64 {
-        self.semi_axes.min() * (radii - 1.0)
-    }
-
-    /// Where the signed distance is least along an edge, frame of the ellipsoid. The distance from
-    /// a convex body is convex, so its slope along the edge has one root at most.
-    pub fn lowest(&self, from: &Vec3, along: &Vec3, length: f64) -> Lowest {
+    /// Where the signed distance is least along an edge, frame of the ellipsoid: how far from its beginning,
+    /// m; none at an end. The distance from a convex body is convex, so its slope along the edge has one root
+    /// at most.
+    pub fn lowest(&self, from: &Vec3, along: &Vec3, length: f64) -> Option<f64> {
         let slope = |s: f64| {
             let field = self.field(&(from + s * along));
             let curvature = along.dot(&(field.hessian * along));
             (field.gradient.dot(along), curvature)
         };
         if slope(0.0).0 >= 0.0 || slope(length).0 <= 0.0 {
-            return Lowest::End;
+            return None;
         }
         let (mut low, mut high) = (0.0, length);
         let mut s = self.approach(from, along, length).0;
@@ -176,14 +165,6 @@ impl Ellipsoid {
                 break;
             }
         }
-        Lowest::Inside(s)
-    }
-}
-
-impl Support {
-    /// Slope of the support point in the direction −`normal`, at rest, along a displacement of the
-    /// body: carried along, and sliding by `C (ω × m)` against it.
-    pub fn motion(&self, normal: &Vec3) -> Rows3 {
-        carry(&self.point) - columns(&Mat3::zeros(), &(self.spread * skew(normal)))
+        Some(s)
     }
 }

@@ -9,7 +9,7 @@
 //! same point with the same normal, outside and for overlaps less deep than the ellipsoid is curved.
 
 use super::core::{Core, Face};
-use super::ellipsoid::{Ellipsoid, Lowest};
+use super::ellipsoid::Ellipsoid;
 use super::point::{ContactPoint, Rows3, carry, rotate};
 use crate::geometry::HalfSpace;
 use hydrograd_adjoint::lie::{Pose, Vec3};
@@ -51,7 +51,8 @@ pub(super) fn contact(
         return best.filter(|b| b.gap < reach);
     }
     let to_ellipsoid = ellipsoid_at.inverse().compose(core_at);
-    let near = |radii: f64| ellipsoid.distance_bound(radii) - core.radius < reach;
+    // A point so many radii from the centre is at least that far away.
+    let near = |radii: f64| ellipsoid.semi_axes.min() * (radii - 1.0) - core.radius < reach;
     let seen = |x: &Vec3, motion: &Rows3| {
         let field = ellipsoid.field(&ellipsoid_at.apply_inverse(x));
         let field = field.rotated(&ellipsoid_at.rotation);
@@ -78,7 +79,7 @@ pub(super) fn contact(
             if near(radii) == beyond {
                 continue;
             }
-            let Lowest::Inside(s) = ellipsoid.lowest(&from, &along, edge.length) else {
+            let Some(s) = ellipsoid.lowest(&from, &along, edge.length) else {
                 continue;
             };
             let x = core_at.apply(&(edge.from + s * edge.along));

@@ -65,7 +65,7 @@ shaders! {
     "blocks" => "coupling/reduced/linearised.rs::charges",
     "cgls" => "solver/cgls.rs::cgls",
     "combine" => "solver/columns.rs::combine",
-    "conjugate" => "coupling/reduced/factor.rs::solve_in_place",
+    "conjugate" => "coupling/reduced/linearised.rs::respond",
     "coulomb" => "coupling/reduced/link.rs::potentials",
     "coulomb_hvp" => "coupling/reduced/second.rs::link_tangent",
     "coulomb_jvp" => "coupling/reduced/second.rs::tangent_potentials",
@@ -79,7 +79,7 @@ shaders! {
     "products" => "solver/columns.rs::dots",
     "reduce" => "solver/columns.rs::add_scaled",
     "refine" => "solver/cgls.rs::cgls",
-    "rows" => "coupling/full/body.rs::twist_rows",
+    "rows" => "boundary/mfs/assemble.rs::twist_rows",
     "sum" => "solver/columns.rs::add_scaled",
     "wrench" => "coupling/pair.rs::wrench",
 }

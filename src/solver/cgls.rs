@@ -50,12 +50,9 @@ pub fn cgls(
         let curvature = p.dots(&q);
         let mut alpha = vec![0.0; n];
         for k in 0..n {
+            active[k] &= curvature[k] > 0.0;
             if active[k] {
-                if curvature[k] > 0.0 {
-                    alpha[k] = gamma[k] / curvature[k];
-                } else {
-                    active[k] = false;
-                }
+                alpha[k] = gamma[k] / curvature[k];
             }
         }
         x.add_scaled(&direction, &alpha);
@@ -71,15 +68,9 @@ pub fn cgls(
                 }
             }
         }
-        for i in 0..p.rows {
-            for k in 0..n {
-                let at = i * n + k;
-                p.data[at] = if active[k] {
-                    s.data[at] + beta[k] * p.data[at]
-                } else {
-                    0.0
-                };
-            }
+        for (at, (p, s)) in p.data.iter_mut().zip(&s.data).enumerate() {
+            let k = at % n;
+            *p = if active[k] { s + beta[k] * *p } else { 0.0 };
         }
     }
     let relative = |k: usize| {

@@ -56,10 +56,8 @@ pub struct BodyBoundary {
     pub points: Points,
     /// F̄, faces × 6: the row that a unit twist asks for; `F_i(ν) = twist_rows[i] · ν`.
     pub twist_rows: Vec<Vec6>,
-    /// Flux ∫ n·(u + ω × x) dA of a unit twist through each face, faces × 6, m³/s.
-    pub twist_flux: Vec<Vec6>,
-    /// B̄, faces × 6: flux that weighs the potential at each face's centre, m³/s. `twist_flux` plus the
-    /// body's own residual flux with [`Readout::Corrected`], `twist_flux` with [`Readout::Centre`].
+    /// B̄, faces × 6: flux that weighs the potential at each face's centre, m³/s. That of a unit twist
+    /// ([`Faces::twist_flux`]), with [`Readout::Corrected`] plus the body's own residual flux.
     pub readout_flux: Vec<Vec6>,
     /// K, row-major faces × sources: the row that a unit source makes. See
     /// [`BodyBoundary::flux_matrix`].
@@ -134,16 +132,14 @@ impl BodyBoundary {
         let faces = surface.faces;
         let method = settings.method;
         let row_weights = assemble::row_weights(&faces, method, settings.rows);
-        let twist_flux: Vec<Vec6> = (0..faces.len()).map(|i| faces.twist_flux(i)).collect();
         Ok(Self {
             name: name.to_string(),
             settings: *settings,
             twist_rows: assemble::twist_rows(&faces, method, &row_weights),
             triangles: Triangles::new(mesh.vertices(), mesh.faces(), row_weights.clone()),
             points: Points::new(&faces.centres, &faces.normals, row_weights.clone()),
-            readout_flux: twist_flux.clone(),
+            readout_flux: (0..faces.len()).map(|i| faces.twist_flux(i)).collect(),
             damping: vec![0.0; sources.len()],
-            twist_flux,
             row_weights,
             sources,
             warnings,
@@ -183,14 +179,14 @@ impl BodyBoundary {
             }
         });
         let readout_flux: Vec<Vec6> = match self.settings.readout {
-            Readout::Centre => self.twist_flux.clone(),
+            Readout::Centre => self.readout_flux.clone(),
             Readout::Corrected => (0..faces.len())
                 .map(|i| {
                     let per_row = match self.settings.method {
                         Method::MfsVertex => 1.0 / self.row_weights[i],
                         Method::MfsFace => faces.areas[i] / self.row_weights[i],
                     };
-                    self.twist_flux[i] + Vec6::from_fn(|j, _| left[(i, j)] * per_row)
+                    self.readout_flux[i] + Vec6::from_fn(|j, _| left[(i, j)] * per_row)
                 })
                 .collect(),
         };

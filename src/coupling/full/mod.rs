@@ -26,7 +26,6 @@
 //! What the system consists of is the [`Model`]; a [`SystemBackend`] computes with it, here [`Cpu`].
 
 mod backend;
-mod check;
 mod cpu;
 mod linearised;
 mod model;

@@ -20,7 +20,6 @@ mod body;
 pub mod cache;
 mod check;
 pub mod compress;
-mod cutoff;
 mod linearised;
 mod link;
 mod resolved;
@@ -28,8 +27,7 @@ mod second;
 mod views;
 
 pub use body::{CompressedParts, Fit, ReducedBody};
-pub use cutoff::Cutoff;
-pub use link::Link;
+pub use link::{Cutoff, Link};
 
 use super::Exclusions;
 use super::settings::{end, ranges};

@@ -112,15 +112,11 @@ pub(super) fn around(surface: &Interior, offset: f64, spacing: f64) -> Vec<Vec3>
     let moved = samples.iter().map(|s| s.point + s.normal * offset);
     let points = thin(moved, spacing, |p| *p);
     // Where the surface is hollow, a point along the normal can come near another part of it.
-    let keep: Vec<bool> = points
-        .par_iter()
-        .map(|p| {
-            let near = |s: &Sample| (p - s.point).norm_squared() < (0.8 * offset).powi(2);
-            !samples.iter().any(near) && surface.winding(p) < 0.5
-        })
-        .collect();
-    let kept = points.into_iter().zip(keep).filter(|(_, k)| *k);
-    kept.map(|(p, _)| p).collect()
+    let free = |p: &Vec3| {
+        let near = |s: &Sample| (p - s.point).norm_squared() < (0.8 * offset).powi(2);
+        !samples.iter().any(near) && surface.winding(p) < 0.5
+    };
+    points.into_par_iter().filter(free).collect()
 }
 
 /// Points inside the surface, `depth` deep or as deep as the body allows there, `spacing` apart
@@ -128,9 +124,9 @@ pub(super) fn around(surface: &Interior, offset: f64, spacing: f64) -> Vec<Vec3>
 pub(super) fn inside(surface: &Interior, depth: f64, spacing: f64, tangent: f64) -> Vec<Vec3> {
     let all = surface_points(surface, 0.7 * spacing * depth);
     let samples = thin(all, spacing * depth, |s| s.point);
-    let moved: Vec<Option<(Vec3, f64)>> = samples
+    let mut points: Vec<(Vec3, f64)> = samples
         .par_iter()
-        .map(|s| {
+        .filter_map(|s| {
             let start = s.point - s.normal * (1e-9 * depth);
             let thickness = surface.ray(&start, &-s.normal, usize::MAX, s.face)?;
             let ball = surface.tangent_ball(&s.point, &s.normal, thickness);
@@ -140,7 +136,6 @@ pub(super) fn inside(surface: &Interior, depth: f64, spacing: f64, tangent: f64)
         })
         .collect();
     // The shallowest of them where the body is thin lie closer together.
-    let mut points: Vec<(Vec3, f64)> = moved.into_iter().flatten().collect();
     points.sort_by(|a, b| b.1.total_cmp(&a.1));
     points.into_iter().map(|(p, _)| p).collect()
 }

@@ -5,7 +5,7 @@
 //! uses: gate
 //! constants: COLUMNS TRANSPOSE
 
-struct Counts { face_blocks: u32, sources: u32, shares: u32, pad: u32 }
+struct Task { face_blocks: u32, sources: u32, shares: u32, pad: u32 }
 
 @group(0) @binding(0) var<storage, read> blocks: array<vec4<u32>>;    // as in pairs.wgsl
 @group(0) @binding(1) var<storage, read> factors: array<real>;        // [shape]: n × n, row-major
@@ -13,7 +13,7 @@ struct Counts { face_blocks: u32, sources: u32, shares: u32, pad: u32 }
 @group(0) @binding(3) var<storage, read> scaling: array<real>;        // [source]: 1/√diagonal
 @group(0) @binding(4) var<storage, read> x: array<real>;              // [source][COLUMNS]
 @group(0) @binding(5) var<storage, read_write> out: array<real>;      // [share][source][COLUMNS]
-@group(0) @binding(6) var<uniform> counts: Counts;
+@group(0) @binding(6) var<uniform> task: Task;
 
 const BLOCK: u32 = 64u;
 const WIDTH: u32 = 16u;
@@ -30,10 +30,10 @@ fn main(
     if idle() {
         return;
     }
-    let own = blocks[counts.face_blocks + group.x];
+    let own = blocks[task.face_blocks + group.x];
     let place = places[own.x];
     let i = own.y + lane;
-    let to = (group.y * counts.sources + i) * COLUMNS;
+    let to = (group.y * task.sources + i) * COLUMNS;
     if place.w != DENSE {
         if lane < own.z {
             for (var k = 0u; k < COLUMNS; k++) {
@@ -58,8 +58,8 @@ fn main(
         start = 0u;
         end = base_row + own.z;
     }
-    let first = start + group.y * (end - start) / counts.shares;
-    let last = start + (group.y + 1u) * (end - start) / counts.shares;
+    let first = start + group.y * (end - start) / task.shares;
+    let last = start + (group.y + 1u) * (end - start) / task.shares;
     for (var j = first; j < last; j += WIDTH) {
         let width = min(WIDTH, last - j);
         workgroupBarrier();

@@ -9,13 +9,14 @@
 //! uses: vector flux normal potential pairs tile motion
 //! constants: LEFT
 
-struct Share { first_task: u32, tasks: u32, pad0: u32, pad1: u32 }
+// Columns, and the first, which is 0; as in pair_vjp.wgsl.
+struct Task { columns: u32, first: u32, first_task: u32, tasks: u32 }
 
 @group(1) @binding(0) var<storage, read> left: array<real>;       // [face][5·LEFT]: μ, r, β, δμ, δr
 @group(1) @binding(1) var<storage, read> right: array<real>;      // [source][4·LEFT]: a, λ, δa, δλ
 @group(1) @binding(2) var<storage, read> tasks: array<vec4<u32>>; // as in pair_vjp.wgsl
 @group(1) @binding(4) var<storage, read_write> out: array<real>;  // [task of this call][LEFT][LEFT][12]
-@group(1) @binding(5) var<uniform> share: Share;
+@group(1) @binding(5) var<uniform> task: Task;
 
 var<workgroup> densities: array<real, BLOCK * 5u * LEFT>;
 var<workgroup> parts: array<real, BLOCK * 12u>;
@@ -33,10 +34,10 @@ fn main(
     @builtin(local_invocation_index) lane: u32,
 ) {
     let number = group.y * groups.x + group.x;
-    if number >= share.tasks {
+    if number >= task.tasks {
         return;
     }
-    let mine = tasks[share.first_task + number];
+    let mine = tasks[task.first_task + number];
     let own = blocks[sizes.face_blocks + mine.x];
     let j = own.y + min(lane, own.z - 1u);
     let s = source_at(mine.y, j);

@@ -11,13 +11,13 @@
 //! uses: vector flux normal potential pairs tile
 //! constants: LEFT
 
-struct Columns { columns: u32, first: u32, first_task: u32, tasks: u32 }
+struct Task { columns: u32, first: u32, first_task: u32, tasks: u32 }
 
 @group(1) @binding(0) var<storage, read> left: array<real>;       // [face][3·columns]: μ, r, β
 @group(1) @binding(1) var<storage, read> right: array<real>;      // [source][2·columns]: a, λ
 @group(1) @binding(2) var<storage, read> tasks: array<vec4<u32>>; // source block, image, first and last block of faces
 @group(1) @binding(3) var<storage, read_write> out: array<real>;  // [task of this call][LEFT][columns][6]
-@group(1) @binding(4) var<uniform> task: Columns;
+@group(1) @binding(4) var<uniform> task: Task;
 
 var<workgroup> densities: array<real, BLOCK * 3u * LEFT>;
 var<workgroup> forces: array<real, BLOCK * 12u>;

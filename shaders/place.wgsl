@@ -7,7 +7,7 @@
 
 const FACE: u32 = 13u;
 
-struct Counts { faces: u32, sources: u32, bodies: u32, images: u32 }
+struct Task { faces: u32, sources: u32, bodies: u32, images: u32 }
 
 @group(0) @binding(0) var<storage, read> shape_faces: array<real>;        // [shape's face][13], body frame
 @group(0) @binding(1) var<storage, read> shape_sources: array<real>;      // [shape's source][3]
@@ -18,7 +18,7 @@ struct Counts { faces: u32, sources: u32, bodies: u32, images: u32 }
 @group(0) @binding(6) var<storage, read_write> faces_single: array<f32>;
 @group(0) @binding(7) var<storage, read_write> sources: array<real>;
 @group(0) @binding(8) var<storage, read_write> sources_single: array<f32>;
-@group(0) @binding(9) var<uniform> counts: Counts;
+@group(0) @binding(9) var<uniform> task: Task;
 
 fn rotated(p: u32, v: V3) -> V3 {
     let k = 12u * p;
@@ -50,7 +50,7 @@ fn put_face(at: u32, v: V3) {
 @compute @workgroup_size(64)
 fn place_faces(@builtin(global_invocation_id) id: vec3<u32>, @builtin(num_workgroups) groups: vec3<u32>) {
     let i = id.y * groups.x * 64u + id.x;
-    if i >= counts.faces {
+    if i >= task.faces {
         return;
     }
     let body = face_map[i].x;
@@ -66,15 +66,15 @@ fn place_faces(@builtin(global_invocation_id) id: vec3<u32>, @builtin(num_workgr
 @compute @workgroup_size(64)
 fn place_sources(@builtin(global_invocation_id) id: vec3<u32>, @builtin(num_workgroups) groups: vec3<u32>) {
     let j = id.y * groups.x * 64u + id.x;
-    if j >= counts.sources {
+    if j >= task.sources {
         return;
     }
     let begin_at = source_map[j].y * 3u;
     let own = V3(shape_sources[begin_at], shape_sources[begin_at + 1u], shape_sources[begin_at + 2u]);
     let at = moved(source_map[j].x, own);
-    for (var image = 0u; image < counts.images; image++) {
-        let v = moved(counts.bodies + image, at);
-        let to = 3u * (image * counts.sources + j);
+    for (var image = 0u; image < task.images; image++) {
+        let v = moved(task.bodies + image, at);
+        let to = 3u * (image * task.sources + j);
         sources[to] = v.x;
         sources[to + 1u] = v.y;
         sources[to + 2u] = v.z;

@@ -10,7 +10,8 @@
 //! uses: vector displaced
 //! constants: FADING TANGENT
 
-struct Sizes { points: u32, bodies: u32, left: u32, right: u32 }
+struct Sizes { points: u32, bodies: u32, images: u32, blocks: u32 }
+struct Task { left: u32, right: u32, pad0: u32, pad1: u32 }
 
 @group(0) @binding(0) var<storage, read> points: array<real>;          // [image][point][3]
 @group(0) @binding(1) var<storage, read> bodies: array<vec4<u32>>;     // first point, points, first mode, modes
@@ -23,18 +24,19 @@ struct Sizes { points: u32, bodies: u32, left: u32, right: u32 }
 @group(1) @binding(4) var<storage, read> change_left: array<real>;     // [point][left]: δα
 @group(1) @binding(5) var<storage, read> change_right: array<real>;    // [point][right]
 @group(1) @binding(6) var<storage, read_write> out: array<real>;       // [body][left][right][6 or 12]
+@group(1) @binding(7) var<uniform> task: Task;
 
 var<workgroup> parts: array<real, 768>;
 
 // Vector `v` of a point's pulls.
 fn left_at(i: u32, width: u32, v: u32, k: u32) -> V3 {
-    let at = (i * width + 3u * v) * sizes.left + k;
-    return V3(pull_left[at], pull_left[at + sizes.left], pull_left[at + 2u * sizes.left]);
+    let at = (i * width + 3u * v) * task.left + k;
+    return V3(pull_left[at], pull_left[at + task.left], pull_left[at + 2u * task.left]);
 }
 
 fn right_at(i: u32, width: u32, v: u32, k: u32) -> V3 {
-    let at = (i * width + 3u * v) * sizes.right + k;
-    return V3(pull_right[at], pull_right[at + sizes.right], pull_right[at + 2u * sizes.right]);
+    let at = (i * width + 3u * v) * task.right + k;
+    return V3(pull_right[at], pull_right[at + task.right], pull_right[at + 2u * task.right]);
 }
 
 fn put(lane: u32, at: u32, v: V3) {
@@ -66,8 +68,8 @@ fn main(
     var dmoment = v_zero();
     for (var l = lane; l < body.y; l += 64u) {
         let i = body.x + l;
-        let ax = alpha_left[i * sizes.left + x];
-        let ay = alpha_right[i * sizes.right + y];
+        let ax = alpha_left[i * task.left + x];
+        let ay = alpha_right[i * task.right + y];
         for (var v = 0u; v < vectors; v++) {
             var at = V3(points[3u * i], points[3u * i + 1u], points[3u * i + 2u]);
             if v == 1u {
@@ -79,8 +81,8 @@ fn main(
             force = v_add(force, f);
             moment = v_add(moment, v_cross(at, f));
             if TANGENT {
-                let dax = change_left[i * sizes.left + x];
-                let day = change_right[i * sizes.right + y];
+                let dax = change_left[i * task.left + x];
+                let day = change_right[i * task.right + y];
                 let dpx = left_at(i, width, vectors + v, x);
                 let dpy = right_at(i, width, vectors + v, y);
                 var df = v_fused(dax, py, v_scale(day, px));
@@ -105,6 +107,6 @@ fn main(
         for (var l = 0u; l < 64u; l++) {
             sum = add(sum, parts[12u * l + lane]);
         }
-        out[((group.x * sizes.left + x) * sizes.right + y) * count + lane] = sum;
+        out[((group.x * task.left + x) * task.right + y) * count + lane] = sum;
     }
 }

@@ -5,7 +5,6 @@ use super::pool::Pool;
 use super::source::Arithmetic;
 use crate::{Error, Result};
 use std::sync::Arc;
-use std::sync::atomic::Ordering;
 
 /// An array in the device's memory. Clones are the same array; calls hold one, so that nothing is used again
 /// before what was to be done with it has been started.
@@ -15,12 +14,15 @@ pub(super) struct Buffer(Arc<Held>);
 struct Held {
     raw: wgpu::Buffer,
     bytes: u64,
-    pool: Arc<Pool>,
+    /// Where it goes when it is no longer in use; nowhere with the settings of a call.
+    pool: Option<Arc<Pool>>,
 }
 
 impl Drop for Held {
     fn drop(&mut self) {
-        self.pool.put(self.bytes, self.raw.clone());
+        if let Some(pool) = &self.pool {
+            pool.put(self.bytes, self.raw.clone());
+        }
     }
 }
 
@@ -28,6 +30,15 @@ impl Buffer {
     pub fn raw(&self) -> &wgpu::Buffer {
         &self.0.raw
     }
+}
+
+/// Beginnings of arrays, read back.
+type Bytes = Vec<Vec<u8>>;
+
+/// Whole numbers from their bytes.
+pub(super) fn words(bytes: &[u8]) -> Vec<u32> {
+    let word = bytemuck::pod_read_unaligned;
+    bytes.chunks_exact(4).map(word).collect()
 }
 
 impl Arithmetic {
@@ -39,48 +50,29 @@ impl Arithmetic {
         }
     }
 
-    fn encode(self, x: f64) -> [u8; 8] {
+    /// Bytes of numbers.
+    fn bytes(self, values: &[f64]) -> Vec<u8> {
+        let two = |x: f64| [x as f32, (x - f64::from(x as f32)) as f32];
+        let single = |x: &f64| (*x as f32).to_ne_bytes();
         match self {
-            Self::Single => {
-                let mut out = [0; 8];
-                out[..4].copy_from_slice(&(x as f32).to_le_bytes());
-                out
-            }
-            Self::Double => x.to_le_bytes(),
+            Self::Single => values.iter().flat_map(single).collect(),
+            Self::Double => bytemuck::cast_slice(values).to_vec(),
             Self::TwoFloat => {
-                let high = x as f32;
-                let low = (x - f64::from(high)) as f32;
-                let mut out = [0; 8];
-                out[..4].copy_from_slice(&high.to_le_bytes());
-                out[4..].copy_from_slice(&low.to_le_bytes());
-                out
+                let halves = values.iter().flat_map(|x| two(*x));
+                halves.flat_map(f32::to_ne_bytes).collect()
             }
         }
     }
 
     /// Numbers from their bytes.
     pub(super) fn numbers(self, bytes: &[u8]) -> Vec<f64> {
-        bytes
-            .chunks_exact(self.size())
-            .map(|c| self.decode(c))
-            .collect()
-    }
-
-    fn decode(self, bytes: &[u8]) -> f64 {
-        let single = |at: usize| {
-            let mut four = [0; 4];
-            four.copy_from_slice(&bytes[at..at + 4]);
-            f64::from(f32::from_le_bytes(four))
+        let single = |bytes: &[u8]| f64::from(bytemuck::pod_read_unaligned::<f32>(bytes));
+        let number = |c: &[u8]| match self {
+            Self::Single => single(c),
+            Self::Double => bytemuck::pod_read_unaligned(c),
+            Self::TwoFloat => single(&c[..4]) + single(&c[4..]),
         };
-        match self {
-            Self::Single => single(0),
-            Self::Double => {
-                let mut eight = [0; 8];
-                eight.copy_from_slice(&bytes[..8]);
-                f64::from_le_bytes(eight)
-            }
-            Self::TwoFloat => single(0) + single(4),
-        }
+        bytes.chunks_exact(self.size()).map(number).collect()
     }
 }
 
@@ -97,12 +89,12 @@ impl Context {
             remedy: "use fewer faces or bodies, the preconditioner jacobi, or the backend cpu"
                 .into(),
         };
-        let most = self.largest_binding();
+        let most = self.adapter().largest_binding;
         if bytes > most {
             return Err(failed(format!("a shader sees at most {most}")));
         }
         let of = |raw| {
-            let pool = self.pool.clone();
+            let pool = Some(self.pool.clone());
             Buffer(Arc::new(Held { raw, bytes, pool }))
         };
         if let Some(raw) = self.pool.take(bytes) {
@@ -130,7 +122,7 @@ impl Context {
             }
         };
         self.check()?;
-        self.pool.counters.allocate(bytes);
+        self.pool.count(|c| c.memory += bytes);
         Ok(of(raw))
     }
 
@@ -175,7 +167,8 @@ impl Context {
         values: &[f64],
     ) -> Result<Buffer> {
         let out = self.reals(label, arithmetic, values.len())?;
-        self.write(&out, arithmetic, values);
+        let bytes = arithmetic.bytes(values);
+        self.queue.write_buffer(out.raw(), 0, &bytes);
         Ok(out)
     }
 
@@ -188,57 +181,40 @@ impl Context {
         // Shaders see the padding, too.
         let mut words = words.to_vec();
         words.resize((out.0.bytes / 4) as usize, 0);
-        self.write_words(&out, &words);
+        let bytes = bytemuck::cast_slice(&words);
+        self.queue.write_buffer(out.raw(), 0, bytes);
         Ok(out)
     }
 
-    /// Overwrites the beginning of an array.
-    pub(super) fn write(&self, to: &Buffer, arithmetic: Arithmetic, values: &[f64]) {
-        let size = arithmetic.size();
-        let bytes: Vec<u8> = values
-            .iter()
-            .flat_map(|x| arithmetic.encode(*x).into_iter().take(size))
-            .collect();
-        if !bytes.is_empty() {
-            self.queue.write_buffer(to.raw(), 0, &bytes);
-        }
-    }
-
-    /// Overwrites the beginning of an array of whole numbers.
-    pub(super) fn write_words(&self, to: &Buffer, words: &[u32]) {
-        if !words.is_empty() {
-            self.queue
-                .write_buffer(to.raw(), 0, bytemuck::cast_slice(words));
-        }
-    }
-
-    /// The settings of one call: words, floats as their bits.
-    pub(super) fn uniform(&self, words: &[u32]) -> wgpu::Buffer {
-        let mut words = words.to_vec();
+    /// The settings of a call: words, floats as their bits.
+    pub(super) fn uniform(&self, words: &[usize]) -> Buffer {
+        let mut words: Vec<u32> = words.iter().map(|n| *n as u32).collect();
         words.resize(words.len().next_multiple_of(4), 0);
+        let bytes = 4 * words.len() as u64;
         let raw = self.device.create_buffer(&wgpu::BufferDescriptor {
             label: Some("settings"),
-            size: 4 * words.len() as u64,
+            size: bytes,
             usage: wgpu::BufferUsages::UNIFORM | wgpu::BufferUsages::COPY_DST,
             mapped_at_creation: false,
         });
-        self.queue
-            .write_buffer(&raw, 0, bytemuck::cast_slice(&words));
-        raw
+        let all = bytemuck::cast_slice(&words);
+        self.queue.write_buffer(&raw, 0, all);
+        let pool = None;
+        Buffer(Arc::new(Held { raw, bytes, pool }))
     }
 
     /// Waits for the beginnings of some arrays, so many bytes of each: one read-back.
     ///
     /// # Errors
     /// A fault of the device.
-    pub(super) fn read_bytes(&self, parts: &[(&Buffer, usize)]) -> Result<Vec<Vec<u8>>> {
+    pub(super) fn read_bytes(&self, parts: &[(&Buffer, usize)]) -> Result<Bytes> {
         let padded = |n: usize| n.next_multiple_of(16) as u64;
         let total: u64 = parts.iter().map(|(_, n)| padded(*n)).sum();
         if total == 0 {
             return Ok(parts.iter().map(|_| Vec::new()).collect());
         }
         self.check()?;
-        let most = self.largest_buffer();
+        let most = self.limits.max_buffer_size;
         if total > most {
             return Err(self.failure(format!(
                 "{total} bytes are to be read back at once, and a buffer holds at most {most}"
@@ -257,13 +233,8 @@ impl Context {
         let mut encoder = self.device.create_command_encoder(&Default::default());
         let mut at = 0;
         for (buffer, n) in parts {
-            encoder.copy_buffer_to_buffer(
-                buffer.raw(),
-                0,
-                &staging,
-                at,
-                padded(*n).min(buffer.0.bytes),
-            );
+            let size = padded(*n).min(buffer.0.bytes);
+            encoder.copy_buffer_to_buffer(buffer.raw(), 0, &staging, at, size);
             at += padded(*n);
         }
         self.queue.submit([encoder.finish()]);
@@ -275,28 +246,21 @@ impl Context {
         let waited = self.device.poll(wgpu::PollType::wait_indefinitely());
         self.check()?;
         waited.map_err(|e| self.failure(format!("waiting for it failed: {e}")))?;
-        match receive.recv() {
-            Ok(Ok(())) => {}
-            Ok(Err(e)) => return Err(self.failure(format!("reading back failed: {e}"))),
-            Err(e) => return Err(self.failure(format!("reading back failed: {e}"))),
-        }
-        let view = staging
-            .get_mapped_range(..)
-            .map_err(|e| self.failure(format!("reading back failed: {e}")))?;
+        let failed = |e: String| self.failure(format!("reading back failed: {e}"));
+        let mapped = receive.recv().map_err(|e| failed(e.to_string()))?;
+        mapped.map_err(|e| failed(e.to_string()))?;
+        let view = staging.get_mapped_range(..);
+        let view = view.map_err(|e| failed(e.to_string()))?;
         let mut at = 0;
         let mut out = Vec::with_capacity(parts.len());
         for (_, n) in parts {
             out.push(view[at..at + n].to_vec());
             at += padded(*n) as usize;
         }
-        self.pool
-            .counters
-            .read_backs
-            .fetch_add(1, Ordering::Relaxed);
-        self.pool
-            .counters
-            .bytes_back
-            .fetch_add(total, Ordering::Relaxed);
+        self.pool.count(|c| {
+            c.read_backs += 1;
+            c.bytes_back += total;
+        });
         Ok(out)
     }
 
@@ -309,9 +273,27 @@ impl Context {
         arithmetic: Arithmetic,
         parts: &[(&Buffer, usize)],
     ) -> Result<Vec<Vec<f64>>> {
+        Ok(self.read_beside(arithmetic, parts, &[])?.0)
+    }
+
+    /// As [`Context::read`], with so many bytes of other arrays.
+    ///
+    /// # Errors
+    /// As there.
+    pub(super) fn read_beside(
+        &self,
+        arithmetic: Arithmetic,
+        parts: &[(&Buffer, usize)],
+        others: &[(&Buffer, usize)],
+    ) -> Result<(Vec<Vec<f64>>, Bytes)> {
         let size = arithmetic.size();
-        let sized: Vec<(&Buffer, usize)> = parts.iter().map(|(b, n)| (*b, n * size)).collect();
-        let bytes = self.read_bytes(&sized)?;
-        Ok(bytes.iter().map(|b| arithmetic.numbers(b)).collect())
+        let mut all: Vec<(&Buffer, usize)> = parts.iter().map(|(b, n)| (*b, n * size)).collect();
+        all.extend(others);
+        let mut bytes = self.read_bytes(&all)?;
+        let others = bytes.split_off(parts.len());
+        Ok((
+            bytes.iter().map(|b| arithmetic.numbers(b)).collect(),
+            others,
+        ))
     }
 }

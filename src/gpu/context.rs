@@ -1,17 +1,16 @@
 //! The device: what it is, its limits, its faults, its counters.
 
 use super::pipeline::Kernel;
-use super::pool::Pool;
+use super::pool::{Counts, Pool};
 use super::source::{Arithmetic, Constant};
 use crate::{Error, Result};
 use std::collections::HashMap;
-use std::sync::atomic::{AtomicU64, Ordering};
-use std::sync::{Arc, Mutex};
+use std::sync::{Arc, Mutex, OnceLock, PoisonError};
 
 /// Storage buffers that the largest shader binds.
 const STORAGE_BUFFERS: u32 = 12;
 /// Bytes of workgroup memory that the largest shader takes.
-pub(super) const WORKGROUP_BYTES: u32 = 20 << 10;
+const WORKGROUP_BYTES: u32 = 20 << 10;
 /// Threads of the largest workgroup.
 const THREADS: u32 = 256;
 
@@ -44,27 +43,14 @@ pub struct Adapter {
     pub lacks: Option<String>,
 }
 
-/// What was done on a device since it was opened.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
-pub struct Counts {
-    /// Calls of shaders, those included that had nothing to do.
-    pub dispatches: u64,
-    /// Times that the host waited for numbers.
-    pub read_backs: u64,
-    /// Bytes that came back.
-    pub bytes_back: u64,
-    /// Bytes of arrays in the device's memory now, those kept to be used again included.
-    pub memory: u64,
-    /// The most there were at once.
-    pub peak_memory: u64,
-}
-
 type Key = (
     &'static str,
-    String,
+    &'static str,
     Arithmetic,
     Vec<(&'static str, Constant)>,
 );
+
+type Fault = Arc<OnceLock<String>>;
 
 /// An open device.
 pub struct Context {
@@ -72,12 +58,11 @@ pub struct Context {
     pub(super) queue: wgpu::Queue,
     adapter: Adapter,
     fine: Arithmetic,
-    limits: wgpu::Limits,
+    pub(super) limits: wgpu::Limits,
     pub(super) pool: Arc<Pool>,
     kernels: Mutex<HashMap<Key, Arc<Kernel>>>,
-    fault: Arc<Mutex<Option<String>>>,
-    /// Zero, for shaders whose compiler mustn't know it.
-    pub(super) nothing: wgpu::Buffer,
+    /// The first that the device reported.
+    fault: Fault,
 }
 
 fn instance() -> wgpu::Instance {
@@ -184,33 +169,19 @@ impl Context {
         });
         let (device, queue) = pollster::block_on(asked)
             .map_err(|e| failed(e.to_string(), "update its driver, or use the backend cpu"))?;
-        let fault = Arc::new(Mutex::new(None));
-        let keep = |fault: &Arc<Mutex<Option<String>>>| {
-            let fault = fault.clone();
-            move |what: String| {
-                if let Ok(mut fault) = fault.lock() {
-                    fault.get_or_insert(what);
-                }
-            }
-        };
-        let lost = keep(&fault);
+        let fault = Arc::new(OnceLock::new());
+        let lost: Fault = fault.clone();
         device.set_device_lost_callback(move |reason, message| {
             // Its own end is no loss.
             if reason != wgpu::DeviceLostReason::Destroyed {
-                lost(format!("the device was lost: {message}"));
+                lost.get_or_init(|| format!("the device was lost: {message}"));
             }
         });
-        let uncaptured = keep(&fault);
-        device.on_uncaptured_error(Arc::new(move |e: wgpu::Error| uncaptured(e.to_string())));
-        // Fresh memory is zero.
-        let nothing = device.create_buffer(&wgpu::BufferDescriptor {
-            label: Some("nothing"),
-            size: 16,
-            usage: wgpu::BufferUsages::UNIFORM,
-            mapped_at_creation: false,
-        });
+        let uncaptured: Fault = fault.clone();
+        device.on_uncaptured_error(Arc::new(move |e: wgpu::Error| {
+            uncaptured.get_or_init(|| e.to_string());
+        }));
         Ok(Arc::new(Self {
-            nothing,
             device,
             queue,
             adapter,
@@ -234,46 +205,20 @@ impl Context {
 
     /// What was done so far.
     pub fn counts(&self) -> Counts {
-        let c = &self.pool.counters;
-        let of = |x: &AtomicU64| x.load(Ordering::Relaxed);
-        Counts {
-            dispatches: of(&c.dispatches),
-            read_backs: of(&c.read_backs),
-            bytes_back: of(&c.bytes_back),
-            memory: of(&c.memory),
-            peak_memory: of(&c.peak),
-        }
-    }
-
-    /// Largest buffer that a shader can see, bytes.
-    pub fn largest_binding(&self) -> u64 {
-        self.limits
-            .max_storage_buffer_binding_size
-            .min(self.limits.max_buffer_size)
-    }
-
-    /// Largest buffer, bytes.
-    pub(super) fn largest_buffer(&self) -> u64 {
-        self.limits.max_buffer_size
-    }
-
-    /// Most workgroups along one dimension of a dispatch.
-    pub(super) fn most_groups(&self) -> u32 {
-        self.limits.max_compute_workgroups_per_dimension
+        self.pool.count(|_| {})
     }
 
     /// The entry of a shader in an arithmetic, compiled once.
     pub(super) fn kernel(
         &self,
         shader: &'static str,
-        entry: &str,
+        entry: &'static str,
         arithmetic: Arithmetic,
         constants: &[(&'static str, Constant)],
     ) -> Result<Arc<Kernel>> {
-        let key = (shader, entry.to_string(), arithmetic, constants.to_vec());
-        let lost =
-            || self.failure("a thread of this program ended while it held the shaders".into());
-        if let Some(kernel) = self.kernels.lock().map_err(|_| lost())?.get(&key) {
+        let key = (shader, entry, arithmetic, constants.to_vec());
+        let kernels = || self.kernels.lock().unwrap_or_else(PoisonError::into_inner);
+        if let Some(kernel) = kernels().get(&key) {
             return Ok(kernel.clone());
         }
         let kernel = Arc::new(Kernel::new(
@@ -284,10 +229,7 @@ impl Context {
             arithmetic,
             constants,
         )?);
-        self.kernels
-            .lock()
-            .map_err(|_| lost())?
-            .insert(key, kernel.clone());
+        kernels().insert(key, kernel.clone());
         Ok(kernel)
     }
 
@@ -305,29 +247,27 @@ impl Context {
     /// # Errors
     /// That fault.
     pub fn check(&self) -> Result<()> {
-        let fault = self.fault.lock().map_or(None, |f| f.clone());
-        fault.map_or(Ok(()), |what| Err(self.failure(what)))
+        match self.fault.get() {
+            Some(what) => Err(self.failure(what.clone())),
+            None => Ok(()),
+        }
     }
 
     /// As if the device had been lost, for tests of what follows.
     pub fn lose(&self) {
         self.device.destroy();
-        if let Ok(mut fault) = self.fault.lock() {
-            fault.get_or_insert("the device was lost".into());
-        }
+        self.fault.get_or_init(|| "the device was lost".into());
     }
 }
 
 fn find(options: &Options) -> Result<wgpu::Adapter> {
     let instance = instance();
-    let none = |what: String, adapter: &str| {
-        Error::Device {
+    let none = |what: String, adapter: &str| Error::Device {
         adapter: adapter.into(),
         what,
-        remedy: "install a Vulkan, Metal or Direct3D 12 driver (a software one does: Debian's mesa-vulkan-drivers), or use the \
-                 backend cpu"
+        remedy: "install a Vulkan, Metal or Direct3D 12 driver (a software one does: \
+                 Debian's mesa-vulkan-drivers), or use the backend cpu"
             .into(),
-    }
     };
     let Some(wanted) = &options.adapter else {
         let asked = instance.request_adapter(&wgpu::RequestAdapterOptions {
@@ -337,18 +277,15 @@ fn find(options: &Options) -> Result<wgpu::Adapter> {
         return pollster::block_on(asked).map_err(|e| none(e.to_string(), "any"));
     };
     let all = pollster::block_on(instance.enumerate_adapters(wgpu::Backends::all()));
-    let names: Vec<String> = all.iter().map(|a| a.get_info().name).collect();
-    let matches = |name: &String| name.to_lowercase().contains(&wanted.to_lowercase());
-    match names.iter().position(matches) {
-        Some(i) => Ok(all
-            .into_iter()
-            .nth(i)
-            .ok_or_else(|| none("it is gone".into(), wanted))?),
-        None => Err(none(
+    let name = |a: &wgpu::Adapter| a.get_info().name;
+    let matches = |a: &&wgpu::Adapter| name(a).to_lowercase().contains(&wanted.to_lowercase());
+    all.iter().find(matches).cloned().ok_or_else(|| {
+        let names: Vec<String> = all.iter().map(name).collect();
+        none(
             format!("there is none of this name among {names:?}"),
             wanted,
-        )),
-    }
+        )
+    })
 }
 
 #[cfg(test)]

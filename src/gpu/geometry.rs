@@ -6,11 +6,10 @@
 
 use super::buffer::Buffer;
 use super::context::Context;
-use super::kernel::Bound;
-use super::share::shapes;
+use super::kernel::Table;
 use super::source::Arithmetic;
 use crate::Result;
-use crate::adjoint::lie::Vec3;
+use crate::adjoint::lie::{Vec3, Vec6};
 use crate::boundary::{BodyBoundary, Method};
 use crate::coupling::full::{Model, Preconditioner};
 use faer::Mat;
@@ -61,6 +60,16 @@ pub(super) struct PairBatch {
     pub tasks: Range<usize>,
 }
 
+/// A table of rows per shape.
+pub(super) struct Rows {
+    /// `[shape's row][width]`.
+    pub table: Buffer,
+    pub width: usize,
+    /// `[row]`: body, shape's row.
+    pub map: Buffer,
+    pub rows: usize,
+}
+
 /// All that doesn't change with the poses.
 pub(super) struct Geometry {
     pub context: Arc<Context>,
@@ -71,36 +80,20 @@ pub(super) struct Geometry {
     pub weight: f64,
     pub sizes: Sizes,
     pub pairs: Vec<DevicePair>,
-    pub shape_faces: Buffer,
-    pub shape_sources: Buffer,
-    pub face_map: Buffer,
-    pub source_map: Buffer,
-    pub blocks: Buffer,
-    pub relations: Buffer,
-    sizes_uniform: wgpu::Buffer,
-    pub face_table: Buffer,
-    pub source_table: Buffer,
-    pub bodies: Buffer,
-    pub shapes: Buffer,
+    /// What the shaders share.
+    pub table: Table,
+    /// What twists ask for on the faces (F̄, then B̄), and read out of the sources.
+    pub face_rows: Rows,
+    pub source_rows: Rows,
     /// D², fine and single.
     pub damping: Buffer,
     pub damping_single: Buffer,
-    pub factors: Buffer,
-    pub layout: Buffer,
     /// Whether some body has no factor here and takes the diagonal.
     pub diagonal: bool,
-    pub tasks: Buffer,
-    pub ranges: Buffer,
     /// Tasks of every pair, as `ranges` has them.
     pair_tasks: Vec<Range<usize>>,
     /// Always one: what isn't part of a solve goes on.
     pub open: Buffer,
-}
-
-/// Faces and sources where they are, in one arithmetic.
-pub(super) struct Surfaces {
-    pub faces: Buffer,
-    pub sources: Buffer,
 }
 
 /// The system at given poses.
@@ -108,10 +101,25 @@ pub(super) struct PlacedSystem {
     pub geometry: Arc<Geometry>,
     /// The scene's middle, m.
     pub middle: Vec3,
-    pub fine: Surfaces,
-    pub single: Surfaces,
-    /// The diagonal preconditioner.
-    pub scaling: Buffer,
+    /// The geometry's table with faces and sources where they are, in both arithmetics.
+    pub fine: Table,
+    pub single: Table,
+}
+
+/// Distinct shapes, and which one each body has.
+pub(super) fn shapes<'a, T: 'a>(
+    bodies: impl Iterator<Item = &'a Arc<T>>,
+) -> (Vec<Arc<T>>, Vec<usize>) {
+    let mut all: Vec<Arc<T>> = Vec::new();
+    let of = bodies.map(|body| {
+        let same = |b: &Arc<T>| Arc::ptr_eq(b, body);
+        all.iter().position(same).unwrap_or_else(|| {
+            all.push(body.clone());
+            all.len() - 1
+        })
+    });
+    let of = of.collect();
+    (all, of)
 }
 
 /// Where each begins, and the end.
@@ -178,8 +186,12 @@ impl Geometry {
         let face_starts = starts(all.iter().map(|b| b.faces.len()));
         let source_starts = starts(all.iter().map(|b| b.sources.len()));
 
-        let mut shape_faces = Vec::new();
-        let mut face_table = Vec::new();
+        let scaled = |row: &Vec6, unit: f64| -> Vec<f64> {
+            let of = |k: usize| if k < 3 { length } else { 1.0 };
+            (0..6).map(|k| row[k] * of(k) / unit).collect()
+        };
+        let (mut shape_faces, mut face_table) = (Vec::new(), Vec::new());
+        let (mut shape_sources, mut source_table) = (Vec::new(), Vec::new());
         for b in &all {
             let unit = row_unit(b);
             for i in 0..b.faces.len() {
@@ -193,21 +205,12 @@ impl Geometry {
                 };
                 shape_faces.extend(m.iter());
                 shape_faces.push(b.row_weights[i] * unit / weight);
-                let scaled = |row: &crate::adjoint::lie::Vec6, unit: f64| -> Vec<f64> {
-                    let of = |k: usize| if k < 3 { length } else { 1.0 };
-                    (0..6).map(|k| row[k] * of(k) / unit).collect()
-                };
                 face_table.extend(scaled(&b.twist_rows[i], weight * length.powi(3)));
                 face_table.extend(scaled(&b.readout_flux[i], length.powi(3)));
             }
-        }
-        let mut shape_sources = Vec::new();
-        let mut source_table = Vec::new();
-        for b in &all {
             for (s, p) in b.sources.iter().zip(&b.readout) {
                 shape_sources.extend((s / length).iter());
-                let of = |k: usize| if k < 3 { length } else { 1.0 };
-                source_table.extend((0..6).map(|k| p[k] * of(k) / (length * length)));
+                source_table.extend(scaled(p, length * length));
             }
         }
         let method = |b: usize| match model.bodies[b].settings.method {
@@ -224,12 +227,7 @@ impl Geometry {
             face_blocks: face_blocks.len(),
             source_blocks: source_blocks.len(),
         };
-        let all_blocks: Vec<u32> = face_blocks
-            .iter()
-            .chain(&source_blocks)
-            .flatten()
-            .copied()
-            .collect();
+        let all_blocks = [&face_blocks[..], &source_blocks[..]].concat().concat();
         let n = sizes.bodies;
         let mut relations = vec![0; n * n];
         for t in 0..n {
@@ -271,31 +269,55 @@ impl Geometry {
             0,
             0,
         ];
+        let reals = |label, values: &[f64]| context.upload(label, fine, values);
+        let whole = |label, words: &[u32]| context.upload_words(label, words);
+        let face_rows = Rows {
+            table: reals("rows of the faces", &face_table)?,
+            width: 12,
+            map: whole("map of the faces", &map(&model.faces, &of, &face_starts))?,
+            rows: sizes.faces,
+        };
+        let source_map = map(&model.sources, &of, &source_starts);
+        let source_rows = Rows {
+            table: reals("readout of the sources", &source_table)?,
+            width: 6,
+            map: whole("map of the sources", &source_map)?,
+            rows: sizes.sources,
+        };
+        let damping_single = context.upload("damping", Arithmetic::Single, &damping)?;
+        let factors = context.upload("factors", Arithmetic::Single, &factors)?;
+        let open = whole("open", &[1])?;
+        let table = vec![
+            ("sizes", context.uniform(&words)),
+            ("shape_faces", reals("faces of the shapes", &shape_faces)?),
+            (
+                "shape_sources",
+                reals("sources of the shapes", &shape_sources)?,
+            ),
+            ("face_map", face_rows.map.clone()),
+            ("source_map", source_rows.map.clone()),
+            ("blocks", whole("blocks", &all_blocks)?),
+            ("relations", whole("relations", &relations)?),
+            ("face_table", face_rows.table.clone()),
+            ("source_table", source_rows.table.clone()),
+            ("bodies", whole("bodies", &bodies)?),
+            ("shapes", whole("shapes", &shape_of)?),
+            ("damping", damping_single.clone()),
+            ("factors", factors),
+            ("places", whole("layout of the factors", &layout)?),
+            ("tasks", whole("tasks", &tasks)?),
+            ("ranges", whole("ranges of the tasks", &ranges)?),
+            ("going", open.clone()),
+        ];
         Ok(Self {
-            sizes_uniform: context.uniform(&words.map(|n| n as u32)),
-            shape_faces: context.upload("faces of the shapes", fine, &shape_faces)?,
-            shape_sources: context.upload("sources of the shapes", fine, &shape_sources)?,
-            face_map: context
-                .upload_words("map of the faces", &map(&model.faces, &of, &face_starts))?,
-            source_map: context.upload_words(
-                "map of the sources",
-                &map(&model.sources, &of, &source_starts),
-            )?,
-            blocks: context.upload_words("blocks", &all_blocks)?,
-            relations: context.upload_words("relations", &relations)?,
-            face_table: context.upload("rows of the faces", fine, &face_table)?,
-            source_table: context.upload("readout of the sources", fine, &source_table)?,
-            bodies: context.upload_words("bodies", &bodies)?,
-            shapes: context.upload_words("shapes", &shape_of)?,
-            damping: context.upload("damping", fine, &damping)?,
-            damping_single: context.upload("damping", Arithmetic::Single, &damping)?,
-            factors: context.upload("factors", Arithmetic::Single, &factors)?,
-            layout: context.upload_words("layout of the factors", &layout)?,
+            table,
+            face_rows,
+            source_rows,
+            damping: reals("damping", &damping)?,
+            damping_single,
             diagonal,
-            tasks: context.upload_words("tasks", &tasks)?,
-            ranges: context.upload_words("ranges of the tasks", &ranges)?,
+            open,
             pair_tasks,
-            open: context.upload_words("open", &[1])?,
             context: context.clone(),
             model: model.clone(),
             length,
@@ -320,7 +342,7 @@ impl Geometry {
 
     /// The pairs in batches, where each task leaves so many bytes.
     pub fn batches(&self, bytes: usize) -> Vec<PairBatch> {
-        let largest = LARGEST_BATCH.min(self.context.largest_binding() as usize);
+        let largest = LARGEST_BATCH.min(self.context.adapter().largest_binding as usize);
         let most = (BATCH.max(BUSY * bytes).min(largest) / bytes.max(1)).max(1);
         let mut out: Vec<PairBatch> = Vec::new();
         for (number, tasks) in self.pair_tasks.iter().enumerate() {
@@ -347,7 +369,7 @@ fn factors(
     of: &[usize],
     weight: f64,
 ) -> (Vec<f64>, Vec<u32>, bool) {
-    let room = (context.largest_binding() / 4) as usize;
+    let room = (context.adapter().largest_binding / 4) as usize;
     let mut values = Vec::new();
     let mut at: Vec<Option<usize>> = vec![None; all.len()];
     if model.settings.preconditioner == Preconditioner::Factors {
@@ -418,23 +440,4 @@ fn tasks(
         }
     }
     (pairs, tasks, ranges)
-}
-
-impl PlacedSystem {
-    /// The variables of `pairs.wgsl`.
-    pub fn buffers(&self, arithmetic: Arithmetic) -> Vec<(&'static str, Bound<'_>)> {
-        let surfaces = if arithmetic == Arithmetic::Single {
-            &self.single
-        } else {
-            &self.fine
-        };
-        let geometry = &self.geometry;
-        vec![
-            ("faces", (&surfaces.faces).into()),
-            ("sources", (&surfaces.sources).into()),
-            ("blocks", (&geometry.blocks).into()),
-            ("relations", (&geometry.relations).into()),
-            ("sizes", (&geometry.sizes_uniform).into()),
-        ]
-    }
 }

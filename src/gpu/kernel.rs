@@ -3,12 +3,18 @@
 use super::buffer::Buffer;
 use super::context::Context;
 use super::pipeline::Kernel;
+use super::source::{Arithmetic, Constant};
 use crate::Result;
 use std::sync::Arc;
-use std::sync::atomic::Ordering;
 
 /// Calls of one submission: systems reset a card that works too long on one.
 const AT_ONCE: usize = 64;
+
+/// An array by the shaders' own name for it.
+type Entry<T> = (&'static str, T);
+
+/// Arrays that a family of shaders shares.
+pub(super) type Table = Vec<Entry<Buffer>>;
 
 /// A kernel with its buffers and its number of workgroups.
 pub(super) struct Call {
@@ -18,114 +24,76 @@ pub(super) struct Call {
     _held: Vec<Buffer>,
 }
 
-/// What is to be done on the device, in order.
-#[derive(Default)]
-pub(super) struct Batch<'a> {
-    calls: Vec<&'a Call>,
-}
-
-/// What stands in a variable.
-pub(super) enum Bound<'a> {
-    Buffer(&'a Buffer),
-    Uniform(&'a wgpu::Buffer),
-}
-
-impl<'a> From<&'a Buffer> for Bound<'a> {
-    fn from(b: &'a Buffer) -> Self {
-        Self::Buffer(b)
-    }
-}
-
-impl<'a> From<&'a wgpu::Buffer> for Bound<'a> {
-    fn from(b: &'a wgpu::Buffer) -> Self {
-        Self::Uniform(b)
-    }
-}
-
 impl Context {
-    /// A call of a kernel with these buffers, by the shader's own names for them.
+    /// A call of a shader's entry: what is fixed when it is compiled, the words of its `task`, and its buffers by
+    /// the shader's own names for them, those of the call itself before the table's.
     pub(super) fn call(
         &self,
-        kernel: &Arc<Kernel>,
-        buffers: &[(&str, Bound)],
+        (shader, entry, arithmetic): (&'static str, &'static str, Arithmetic),
+        constants: &[(&'static str, Constant)],
+        task: &[usize],
+        (table, own): (&[Entry<Buffer>], &[Entry<&Buffer>]),
         count: [u32; 3],
     ) -> Result<Call> {
+        let kernel = self.kernel(shader, entry, arithmetic, constants)?;
         let wrong = |what: String| self.failure(format!("{}: {what}", kernel.name));
-        let most = self.most_groups();
+        let most = self.limits.max_compute_workgroups_per_dimension;
         if count.iter().any(|n| *n > most) {
             return Err(wrong(format!(
                 "{count:?} workgroups are more than {most} along one dimension"
             )));
         }
-        let mut entries: Vec<Vec<wgpu::BindGroupEntry>> =
-            kernel.layouts.iter().map(|_| Vec::new()).collect();
-        for b in &kernel.bindings {
-            let resource = match buffers.iter().find(|(name, _)| *name == b.name) {
-                Some((_, Bound::Buffer(buffer))) => buffer.raw().as_entire_binding(),
-                Some((_, Bound::Uniform(buffer))) => buffer.as_entire_binding(),
-                None if b.name == "nothing" => self.nothing.as_entire_binding(),
-                None => return Err(wrong(format!("no buffer for {}", b.name))),
-            };
+        let bound = |name: &str| match name {
+            "task" => Ok(self.uniform(task)),
+            // Zero, for shaders whose compiler mustn't know it.
+            "nothing" => Ok(self.uniform(&[0])),
+            _ => {
+                let of_call = own.iter().copied();
+                let of_table = table.iter().map(|(name, buffer)| (*name, buffer));
+                let found = of_call.chain(of_table).find(|(n, _)| *n == name);
+                let missing = || wrong(format!("no buffer for {name}"));
+                found.map(|(_, buffer)| buffer.clone()).ok_or_else(missing)
+            }
+        };
+        let bindings = kernel.bindings.iter();
+        let held: Vec<Buffer> = bindings.map(|b| bound(&b.name)).collect::<Result<_>>()?;
+        let mut entries: Vec<Vec<_>> = kernel.layouts.iter().map(|_| Vec::new()).collect();
+        for (b, buffer) in kernel.bindings.iter().zip(&held) {
             entries[b.group as usize].push(wgpu::BindGroupEntry {
                 binding: b.binding,
-                resource,
+                resource: buffer.raw().as_entire_binding(),
             });
         }
         let guard = self.device.push_error_scope(wgpu::ErrorFilter::Validation);
-        let groups = kernel
-            .layouts
-            .iter()
-            .zip(&entries)
-            .map(|(layout, entries)| {
-                self.device.create_bind_group(&wgpu::BindGroupDescriptor {
-                    label: Some(&kernel.name),
-                    layout,
-                    entries,
-                })
+        let bind = |(layout, entries): (_, &Vec<_>)| {
+            self.device.create_bind_group(&wgpu::BindGroupDescriptor {
+                label: Some(&kernel.name),
+                layout,
+                entries,
             })
-            .collect();
+        };
+        let groups = kernel.layouts.iter().zip(&entries).map(bind).collect();
         if let Some(e) = pollster::block_on(guard.pop()) {
             return Err(wrong(e.to_string()));
         }
-        let held = buffers.iter().filter_map(|(_, bound)| match bound {
-            Bound::Buffer(buffer) => Some((*buffer).clone()),
-            Bound::Uniform(_) => None,
-        });
         Ok(Call {
-            kernel: kernel.clone(),
+            kernel,
             groups,
             count,
-            _held: held.collect(),
+            _held: held,
         })
     }
 
-    /// Starts everything of a batch, in order; returns at once.
+    /// Starts calls, in order; returns at once.
     ///
     /// # Errors
     /// A fault of the device.
-    pub(super) fn submit(&self, batch: &Batch) -> Result<()> {
-        batch.calls.chunks(AT_ONCE).for_each(|c| self.start(c));
-        self.check()
-    }
-
-    /// As [`Context::submit`], of calls in groups.
-    ///
-    /// # Errors
-    /// As there.
-    pub(super) fn run(&self, groups: &[&[Call]]) -> Result<()> {
-        let mut batch = Batch::default();
-        groups.iter().for_each(|calls| batch.extend(*calls));
-        self.submit(&batch)
-    }
-
-    fn start(&self, calls: &[&Call]) {
-        let mut encoder = self.device.create_command_encoder(&Default::default());
-        {
+    pub(super) fn submit<'a>(&self, calls: impl IntoIterator<Item = &'a Call>) -> Result<()> {
+        let calls: Vec<&Call> = calls.into_iter().collect();
+        for calls in calls.chunks(AT_ONCE) {
+            let mut encoder = self.device.create_command_encoder(&Default::default());
             let mut pass = encoder.begin_compute_pass(&Default::default());
-            for call in calls {
-                if call.count.contains(&0) {
-                    continue;
-                }
+            for call in calls.iter().filter(|c| !c.count.contains(&0)) {
                 pass.set_pipeline(&call.kernel.pipeline);
                 for (i, group) in call.groups.iter().enumerate() {
                     pass.set_bind_group(i as u32, group, &[]);
@@ -133,23 +101,11 @@ impl Context {
                 let [x, y, z] = call.count;
                 pass.dispatch_workgroups(x, y, z);
             }
+            drop(pass);
+            self.pool.count(|c| c.dispatches += calls.len() as u64);
+            self.queue.submit([encoder.finish()]);
         }
-        let count = calls.len() as u64;
-        self.pool
-            .counters
-            .dispatches
-            .fetch_add(count, Ordering::Relaxed);
-        self.queue.submit([encoder.finish()]);
-    }
-}
-
-impl<'a> Batch<'a> {
-    pub fn push(&mut self, call: &'a Call) {
-        self.calls.push(call);
-    }
-
-    pub fn extend(&mut self, calls: impl IntoIterator<Item = &'a Call>) {
-        self.calls.extend(calls);
+        self.check()
     }
 }
 

@@ -1,12 +1,11 @@
-//! Surfaces at the bodies' poses, with what goes with them.
+//! Surfaces at the bodies' poses (`shaders/place.wgsl`), and the Jacobi preconditioner (`shaders/diagonal.wgsl`).
 
-use super::diagonal::diagonal;
-use super::geometry::{Geometry, PlacedSystem, Surfaces};
-use super::kernel::Batch;
-use super::place::place;
+use super::geometry::{Geometry, PlacedSystem};
+use super::kernel::{Table, threads};
 use super::source::Arithmetic;
+use super::units::placements;
 use crate::Result;
-use crate::adjoint::lie::{Mat3, Pose, Vec3};
+use crate::adjoint::lie::Pose;
 use std::sync::Arc;
 
 impl PlacedSystem {
@@ -15,48 +14,58 @@ impl PlacedSystem {
     /// # Errors
     /// A device that fails.
     pub fn new(geometry: &Arc<Geometry>, poses: &[Pose]) -> Result<Self> {
-        let context = &geometry.context;
-        let sizes = &geometry.sizes;
-        let length = geometry.length;
-        let sum: Vec3 = poses.iter().map(|p| p.translation).sum();
-        let middle = sum / poses.len().max(1) as f64;
-        let mut values = Vec::new();
-        let mut add = |linear: &Mat3, shift: &Vec3| {
-            for i in 0..3 {
-                values.extend(linear.row(i).iter());
-            }
-            values.extend(shift.iter());
-        };
-        for pose in poses {
-            add(&pose.rotation, &((pose.translation - middle) / length));
-        }
-        for image in &geometry.model.images {
-            let shift = image.linear * middle + image.shift - middle;
-            add(&image.linear, &(shift / length));
-        }
-        let surfaces = |arithmetic| -> Result<Surfaces> {
-            Ok(Surfaces {
-                faces: context.reals("faces", arithmetic, 13 * sizes.faces)?,
-                sources: context.reals("sources", arithmetic, 3 * sizes.images * sizes.sources)?,
-            })
+        let (context, sizes) = (&geometry.context, &geometry.sizes);
+        let (fine, single) = (context.fine(), Arithmetic::Single);
+        let (middle, values) = placements(poses, &geometry.model.images, geometry.length);
+        let poses = context.upload("poses", fine, &values)?;
+        let scaling = context.upload("scaling", single, &vec![1.0; sizes.sources])?;
+        let table = |arithmetic| -> Result<Table> {
+            let sources = 3 * sizes.images * sizes.sources;
+            let placed = [
+                (
+                    "faces",
+                    context.reals("faces", arithmetic, 13 * sizes.faces)?,
+                ),
+                ("sources", context.reals("sources", arithmetic, sources)?),
+                ("scaling", scaling.clone()),
+            ];
+            Ok(placed.into_iter().chain(geometry.table.clone()).collect())
         };
         let out = Self {
             geometry: geometry.clone(),
             middle,
-            fine: surfaces(context.fine())?,
-            single: surfaces(Arithmetic::Single)?,
-            scaling: context.upload("scaling", Arithmetic::Single, &vec![1.0; sizes.sources])?,
+            fine: table(fine)?,
+            single: table(single)?,
         };
-        let poses = context.upload("poses", context.fine(), &values)?;
-        let calls = place(context, geometry, &poses, &out.fine, &out.single)?;
-        let mut batch = Batch::default();
-        batch.extend(&calls);
-        let scaling = geometry
-            .diagonal
-            .then(|| diagonal(context, &out, &out.scaling));
-        let scaling = scaling.transpose()?;
-        batch.extend(&scaling);
-        context.submit(&batch)?;
+        let own = [
+            ("poses", &poses),
+            ("faces_single", &out.single[0].1),
+            ("sources_single", &out.single[1].1),
+        ];
+        let words = [sizes.faces, sizes.sources, sizes.bodies, sizes.images];
+        let of = |entry, count| {
+            let (shader, buffers) = (("place", entry, fine), (&out.fine[..], &own[..]));
+            context.call(shader, &[], &words, buffers, threads(count))
+        };
+        let mut calls = vec![
+            of("place_faces", sizes.faces)?,
+            of("place_sources", sizes.sources)?,
+        ];
+        if geometry.diagonal {
+            // scaling_j = 1/√(Σ_i K_ij² + D_j²).
+            let shader = ("diagonal", "main", single);
+            let count = [sizes.source_blocks as u32, 1, 1];
+            calls.push(context.call(shader, &[], &[], (&out.single, &[]), count)?);
+        }
+        context.submit(&calls)?;
         Ok(out)
+    }
+
+    /// The variables of `pairs.wgsl`, and all else that the shaders share.
+    pub fn table(&self, arithmetic: Arithmetic) -> &Table {
+        match arithmetic {
+            Arithmetic::Single => &self.single,
+            _ => &self.fine,
+        }
     }
 }

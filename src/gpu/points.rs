@@ -6,12 +6,13 @@
 
 use super::buffer::Buffer;
 use super::context::Context;
-use super::kernel::{Batch, Bound};
-use super::place::place_points;
-use super::share::shapes;
+use super::geometry::shapes;
+use super::kernel::{Table, threads};
+use super::source::Arithmetic;
+use super::units::{motions, placements};
 use crate::Result;
 use crate::adjoint::lie::{Pose, Vec3, Vec6, angular, linear};
-use crate::coupling::reduced::{Reduced, ReducedBody};
+use crate::coupling::reduced::{Link, Reduced, ReducedBody};
 use crate::geometry::Image;
 use std::sync::Arc;
 
@@ -55,24 +56,8 @@ pub(super) struct Compressed {
     images: Vec<Image>,
     /// Whether weights of pairs change with the poses.
     pub fading: bool,
-    shape_points: Buffer,
-    /// `[point]`: body, shape's point.
-    map: Buffer,
-    /// `[point]`: body.
-    pub owners: Buffer,
-    /// `[mode]`: body.
-    pub mode_owners: Buffer,
-    /// Of sources: body, first, count.
-    blocks: Buffer,
-    /// `[body]`: first point, points, first mode, modes.
-    pub bodies: Buffer,
-    /// [L, Ū] of every shape.
-    pub table: Buffer,
-    /// `[body]`: where its shape's block begins.
-    pub shapes: Buffer,
-    /// Sign times weight where no pair fades.
-    weights: Option<Arc<Buffer>>,
-    sizes_uniform: wgpu::Buffer,
+    /// What the shaders share.
+    pub table: Table,
     /// Always one: what isn't part of a solve goes on.
     pub open: Buffer,
 }
@@ -83,18 +68,9 @@ pub(super) struct PlacedPoints {
     pub poses: Vec<Pose>,
     /// The scene's middle, m.
     pub middle: Vec3,
-    /// `[image][point][3]`.
-    pub points: Buffer,
-    weights: Arc<Buffer>,
-    /// w' e of the pairs, and the bodies' centres.
-    slopes: Buffer,
-    pub centres: Buffer,
-}
-
-/// A displacement of the bodies.
-pub(super) struct Motion {
-    motions: Buffer,
-    rates: Buffer,
+    /// The model's table with the points where they are, `[image][point][3]`, the weights of pairs, w' e of the pairs and
+    /// the bodies' centres.
+    pub table: Table,
 }
 
 /// Largest distance of a point from its body's origin.
@@ -161,18 +137,28 @@ impl Compressed {
         let fading = reduced.links().iter().any(|l| l.cutoff.is_some());
         let words = [sizes.points, sizes.bodies, sizes.images, sizes.blocks];
         let table_starts: Vec<u32> = of.iter().map(|s| starts[*s].1 as u32).collect();
+        let reals = |label, values: &[f64]| context.upload(label, fine, values);
+        let whole = |label, words: &[u32]| context.upload_words(label, words);
+        let open = whole("open", &[1])?;
+        let table = vec![
+            ("sizes", context.uniform(&words)),
+            (
+                "shape_sources",
+                reals("points of the shapes", &shape_points)?,
+            ),
+            // `[point]`: body, shape's point.
+            ("source_map", whole("map of the points", &map)?),
+            ("owners", whole("bodies of the points", &owners)?),
+            ("mode_owners", whole("bodies of the modes", &mode_owners)?),
+            ("blocks", whole("blocks", &blocks)?),
+            ("bodies", whole("bodies", &bodies)?),
+            // [L, Ū] of every shape, and where each body's begins.
+            ("table", reals("modes and strengths", &table)?),
+            ("shapes", whole("shapes", &table_starts)?),
+        ];
         let mut out = Self {
-            sizes_uniform: context.uniform(&words.map(|n| n as u32)),
-            shape_points: context.upload("points of the shapes", fine, &shape_points)?,
-            map: context.upload_words("map of the points", &map)?,
-            owners: context.upload_words("bodies of the points", &owners)?,
-            mode_owners: context.upload_words("bodies of the modes", &mode_owners)?,
-            blocks: context.upload_words("blocks", &blocks)?,
-            bodies: context.upload_words("bodies", &bodies)?,
-            table: context.upload("modes and strengths", fine, &table)?,
-            shapes: context.upload_words("shapes", &table_starts)?,
-            weights: None,
-            open: context.upload_words("open", &[1])?,
+            table,
+            open,
             context: context.clone(),
             reduced: reduced.clone(),
             length,
@@ -181,46 +167,34 @@ impl Compressed {
             fading,
         };
         if !fading {
-            let values = out.over_links(1, |_, _, image, _| [image.sign, 0.0, 0.0, 0.0]);
-            out.weights = Some(Arc::new(context.upload("weights", fine, &values)?));
+            // Sign times weight.
+            let values = out.over_links(|_, _, link| [link.image.sign]);
+            let weights = context.upload("weights", fine, &values)?;
+            out.table.push(("weights", weights));
         }
         Ok(out)
     }
 
-    /// Numbers a shape has for every (image, target, source), zero where neither sees the other: the first
-    /// `width` of what `f` of target, source, image and the link's number gives.
-    fn over_links(
-        &self,
-        width: usize,
-        f: impl Fn(usize, usize, &Image, usize) -> [f64; 4],
-    ) -> Vec<f64> {
+    /// Numbers a shader has for every (image, target, source), `f` of target, source and their link: zero where neither
+    /// sees the other.
+    fn over_links<const N: usize>(&self, f: impl Fn(usize, usize, &Link) -> [f64; N]) -> Vec<f64> {
         let n = self.sizes.bodies;
-        let mut out = vec![0.0; self.images.len() * n * n * width];
-        for (number, link) in self.reduced.links().iter().enumerate() {
+        let mut out = vec![[0.0; N]; self.images.len() * n * n];
+        for link in self.reduced.links() {
             let Some(g) = self.images.iter().position(|i| *i == link.image) else {
                 continue;
             };
             for (t, s) in [(link.target, link.source), (link.source, link.target)] {
-                let at = width * ((g * n + t) * n + s);
-                out[at..at + width].copy_from_slice(&f(t, s, &link.image, number)[..width]);
+                out[(g * n + t) * n + s] = f(t, s, link);
             }
         }
-        out
+        out.concat()
     }
 
     /// Vectors of a point's pulls in numbers: F, or F and D.
     pub fn pull(&self) -> usize {
         if self.fading { 6 } else { 3 }
     }
-}
-
-/// How far apart two bodies' centres are, and how that changes.
-struct Apart {
-    /// From the source's (image's) centre to the target's, of length 1.
-    e: Vec3,
-    distance: f64,
-    /// Weight with two derivatives.
-    weight: [f64; 3],
 }
 
 impl PlacedPoints {
@@ -231,62 +205,50 @@ impl PlacedPoints {
     pub fn new(model: &Arc<Compressed>, poses: &[Pose]) -> Result<Self> {
         let (context, sizes, length) = (&model.context, &model.sizes, model.length);
         let fine = context.fine();
-        let sum: Vec3 = poses.iter().map(|p| p.translation).sum();
-        let middle = sum / poses.len().max(1) as f64;
-        let mut values = Vec::new();
-        for pose in poses {
-            for i in 0..3 {
-                values.extend(pose.rotation.row(i).iter());
-            }
-            values.extend(((pose.translation - middle) / length).iter());
-        }
-        for image in &model.images {
-            for i in 0..3 {
-                values.extend(image.linear.row(i).iter());
-            }
-            let shift = image.linear * middle + image.shift - middle;
-            values.extend((shift / length).iter());
-        }
-        let points = context.reals("points", fine, 3 * sizes.images * sizes.points)?;
-        let uploaded = context.upload("poses", fine, &values)?;
-        let counts = [0, sizes.points, sizes.bodies, sizes.images];
-        let call = place_points(
-            context,
-            (&model.shape_points, &model.map, &uploaded),
-            &points,
-            counts,
-        )?;
-        let mut batch = Batch::default();
-        batch.push(&call);
-        context.submit(&batch)?;
+        let (middle, values) = placements(poses, &model.images, length);
+        let count = 3 * sizes.images * sizes.points;
+        let points = context.reals("points", fine, count)?;
+        // The entry writes both arithmetics.
+        let single = context.reals("points", Arithmetic::Single, count)?;
+        let own = [
+            ("poses", &context.upload("poses", fine, &values)?),
+            ("sources", &points),
+            ("sources_single", &single),
+        ];
+        let words = [0, sizes.points, sizes.bodies, sizes.images];
+        let shader = ("place", "place_sources", fine);
+        let (all, threads) = ((&model.table[..], &own[..]), threads(sizes.points));
+        let call = context.call(shader, &[], &words, all, threads)?;
+        context.submit([&call])?;
         let mut out = Self {
             model: model.clone(),
             poses: poses.to_vec(),
             middle,
-            points,
-            weights: Arc::new(context.bytes("weights", 16)?),
-            slopes: context.bytes("slopes", 16)?,
-            centres: context.bytes("centres", 16)?,
+            table: model.table.clone(),
         };
-        if let Some(weights) = &model.weights {
-            out.weights = weights.clone();
-            return Ok(out);
+        // A displacement isn't read without one, but the variable may still be bound.
+        let motions = ("motions", points.clone());
+        out.table.extend([("points", points), motions]);
+        let (mut slopes, mut centres) = (Vec::new(), Vec::new());
+        if model.fading {
+            let weights = model.over_links(|t, s, link| {
+                let (_, _, [weight, ..]) = out.apart(t, s, link);
+                [link.image.sign * weight]
+            });
+            slopes = model.over_links(|t, s, link| {
+                let (e, _, [_, slope, _]) = out.apart(t, s, link);
+                (e * (link.image.sign * slope * length)).data.0[0]
+            });
+            centres = (0..poses.len())
+                .flat_map(|b| ((out.centre(b) - middle) / length).data.0[0])
+                .collect();
+            let weights = context.upload("weights", fine, &weights)?;
+            out.table.push(("weights", weights));
         }
-        let weights = model.over_links(1, |t, s, image, link| {
-            let weight = out.apart(t, s, image, link).weight[0];
-            [image.sign * weight, 0.0, 0.0, 0.0]
-        });
-        let slopes = model.over_links(3, |t, s, image, link| {
-            let apart = out.apart(t, s, image, link);
-            let v = apart.e * (image.sign * apart.weight[1] * length);
-            [v.x, v.y, v.z, 0.0]
-        });
-        let centres: Vec<f64> = (0..poses.len())
-            .flat_map(|b| ((out.centre(b) - middle) / length).data.0[0])
-            .collect();
-        out.weights = Arc::new(context.upload("weights", fine, &weights)?);
-        out.slopes = context.upload("slopes", fine, &slopes)?;
-        out.centres = context.upload("centres", fine, &centres)?;
+        out.table.extend([
+            ("slopes", context.upload("slopes", fine, &slopes)?),
+            ("centres", context.upload("centres", fine, &centres)?),
+        ]);
         Ok(out)
     }
 
@@ -296,10 +258,12 @@ impl PlacedPoints {
         self.poses[b].apply(&body.parts().centre)
     }
 
-    fn apart(&self, t: usize, s: usize, image: &Image, link: usize) -> Apart {
-        let between = self.centre(t) - (image.linear * self.centre(s) + image.shift);
+    /// The direction from the source's (image's) centre to the target's, their distance, and the weight with two
+    /// derivatives.
+    fn apart(&self, t: usize, s: usize, link: &Link) -> (Vec3, f64, [f64; 3]) {
+        let between = self.centre(t) - (link.image.linear * self.centre(s) + link.image.shift);
         let distance = between.norm();
-        let weight = match &self.model.reduced.links()[link].cutoff {
+        let weight = match &link.cutoff {
             Some(cutoff) => cutoff.weight(distance),
             None => [1.0, 0.0, 0.0],
         };
@@ -309,38 +273,24 @@ impl PlacedPoints {
         } else {
             Vec3::zeros()
         };
-        Apart {
-            e,
-            distance,
-            weight,
-        }
+        (e, distance, weight)
     }
 
-    /// The displacement by spatial twists `z`.
+    /// The table as the bodies are displaced by spatial twists `z`.
     ///
     /// # Errors
     /// A device that fails.
-    pub fn motion(&self, z: &[Vec6]) -> Result<Motion> {
+    pub fn displaced(&self, z: &[Vec6]) -> Result<Table> {
         let model = &self.model;
         let (context, length) = (&model.context, model.length);
-        let fine = context.fine();
-        let mut values = Vec::new();
-        for image in &model.images {
-            for z in z {
-                let z = image.twist(z);
-                let u = (linear(&z) + angular(&z).cross(&self.middle)) / length;
-                values.extend(u.iter());
-                values.extend(angular(&z).iter());
-            }
-        }
+        let images = model.images.iter();
+        let seen = images.flat_map(|image| z.iter().map(|z| image.twist(z)));
+        let values = motions(seen, &self.middle, length);
         let rates = if model.fading {
             let moved = |z: &Vec6, at: &Vec3| linear(z) + angular(z).cross(at);
-            let of = |t: usize, s: usize, image: &Image, link: usize| {
-                let Apart {
-                    e,
-                    distance,
-                    weight: [_, slope, bend],
-                } = self.apart(t, s, image, link);
+            let of = |t: usize, s: usize, link: &Link| {
+                let (e, distance, [_, slope, bend]) = self.apart(t, s, link);
+                let image = &link.image;
                 if slope == 0.0 && bend == 0.0 {
                     return [0.0; 4];
                 }
@@ -351,37 +301,15 @@ impl PlacedPoints {
                 let v = (e * (bend * rate) + turn * slope) * (image.sign * length);
                 [image.sign * slope * rate, v.x, v.y, v.z]
             };
-            model.over_links(4, of)
+            model.over_links(of)
         } else {
             Vec::new()
         };
-        Ok(Motion {
-            motions: context.upload("motions", fine, &values)?,
-            rates: context.upload("rates", fine, &rates)?,
-        })
-    }
-
-    /// The variables of `points.wgsl`, `slopes.wgsl`, and with a motion of `displaced.wgsl`, `shifts.wgsl`.
-    pub fn buffers<'a>(&'a self, motion: Option<&'a Motion>) -> Vec<(&'static str, Bound<'a>)> {
-        let model = &self.model;
-        let mut out: Vec<(&'static str, Bound<'a>)> = vec![
-            ("points", (&self.points).into()),
-            ("blocks", (&model.blocks).into()),
-            ("owners", (&model.owners).into()),
-            ("weights", (&*self.weights).into()),
-            ("slopes", (&self.slopes).into()),
-            ("sizes", (&model.sizes_uniform).into()),
+        let of = |label, values: &[f64]| context.upload(label, context.fine(), values);
+        let own = [
+            ("motions", of("motions", &values)?),
+            ("rates", of("rates", &rates)?),
         ];
-        if let Some(motion) = motion {
-            out.push(("motions", (&motion.motions).into()));
-            out.push(("rates", (&motion.rates).into()));
-        }
-        out
-    }
-
-    /// Workgroups and shares of a product with G.
-    pub fn groups(&self) -> [u32; 3] {
-        let sizes = &self.model.sizes;
-        [sizes.groups() as u32, sizes.shares() as u32, 1]
+        Ok(own.into_iter().chain(self.table.clone()).collect())
     }
 }

@@ -1,27 +1,21 @@
 //! The device's memory as a whole, and counts of what was done.
 
 use std::collections::HashMap;
-use std::sync::atomic::{AtomicU64, Ordering};
-use std::sync::{Arc, Mutex};
+use std::sync::{Mutex, MutexGuard, PoisonError};
 
-#[derive(Debug, Default)]
-pub(super) struct Counters {
-    pub dispatches: AtomicU64,
-    pub read_backs: AtomicU64,
-    pub bytes_back: AtomicU64,
-    pub memory: AtomicU64,
-    pub peak: AtomicU64,
-}
-
-impl Counters {
-    pub fn allocate(&self, bytes: u64) {
-        let now = self.memory.fetch_add(bytes, Ordering::Relaxed) + bytes;
-        self.peak.fetch_max(now, Ordering::Relaxed);
-    }
-
-    pub fn free(&self, bytes: u64) {
-        self.memory.fetch_sub(bytes, Ordering::Relaxed);
-    }
+/// What was done on a device since it was opened.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct Counts {
+    /// Calls of shaders, those included that had nothing to do.
+    pub dispatches: u64,
+    /// Times that the host waited for numbers.
+    pub read_backs: u64,
+    /// Bytes that came back.
+    pub bytes_back: u64,
+    /// Bytes of arrays in the device's memory now, those kept to be used again included.
+    pub memory: u64,
+    /// The most there were at once.
+    pub peak_memory: u64,
 }
 
 /// Memory to be used again, by size: every evaluation asks for the same sizes, and fresh memory has to be
@@ -29,28 +23,35 @@ impl Counters {
 #[derive(Default)]
 pub(super) struct Pool {
     free: Mutex<HashMap<u64, Vec<wgpu::Buffer>>>,
-    pub counters: Arc<Counters>,
+    counts: Mutex<Counts>,
 }
 
 impl Pool {
+    fn free(&self) -> MutexGuard<'_, HashMap<u64, Vec<wgpu::Buffer>>> {
+        self.free.lock().unwrap_or_else(PoisonError::into_inner)
+    }
+
     pub fn take(&self, bytes: u64) -> Option<wgpu::Buffer> {
-        self.free.lock().ok()?.get_mut(&bytes)?.pop()
+        self.free().get_mut(&bytes)?.pop()
     }
 
     /// Takes memory back that is no longer in use.
     pub fn put(&self, bytes: u64, raw: wgpu::Buffer) {
-        match self.free.lock() {
-            Ok(mut free) => free.entry(bytes).or_default().push(raw),
-            Err(_) => self.counters.free(bytes),
-        }
+        self.free().entry(bytes).or_default().push(raw);
     }
 
     /// Gives everything that isn't in use back to the device.
     pub fn drain(&self) {
-        if let Ok(mut free) = self.free.lock() {
-            for (bytes, buffers) in free.drain() {
-                self.counters.free(bytes * buffers.len() as u64);
-            }
+        for (bytes, buffers) in self.free().drain() {
+            self.count(|c| c.memory -= bytes * buffers.len() as u64);
         }
+    }
+
+    /// Counts something, and tells what there is then.
+    pub fn count(&self, change: impl FnOnce(&mut Counts)) -> Counts {
+        let mut counts = self.counts.lock().unwrap_or_else(PoisonError::into_inner);
+        change(&mut counts);
+        counts.peak_memory = counts.peak_memory.max(counts.memory);
+        *counts
     }
 }

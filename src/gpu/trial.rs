@@ -1,8 +1,7 @@
 //! Opening a device, and whether its compiler keeps the order of sums that two-float arithmetic stands on.
 
+use super::columns::products;
 use super::context::{Context, Options};
-use super::kernel::Batch;
-use super::products;
 use super::source::Arithmetic;
 use crate::Result;
 use std::sync::Arc;
@@ -39,16 +38,8 @@ fn two_float(context: &Context) -> Result<()> {
     let g = context.upload("trial", arithmetic, &x)?;
     let a = context.upload("trial", arithmetic, &y)?;
     let out = context.reals("trial", arithmetic, 1)?;
-    let task = products::Task {
-        rows: 64,
-        g: (1, 0),
-        a: (1, 0),
-        columns: 1,
-    };
-    let call = products::products(context, arithmetic, &g, &a, &out, &task)?;
-    let mut batch = Batch::default();
-    batch.push(&call);
-    context.submit(&batch)?;
+    let call = products(context, 64, ((&g, 1, 0), (&a, 1, 0)), (&out, 1))?;
+    context.submit([&call])?;
     let got = context.read(arithmetic, &[(&out, 1)])?[0][0];
     let error = (got - exact).abs() / exact;
     if error <= ACCURACY {

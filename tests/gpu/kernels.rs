@@ -10,7 +10,7 @@ use hydrograd::boundary::Method;
 use hydrograd::coupling::Exclusions;
 use hydrograd::coupling::full::{Model, Preconditioner};
 use hydrograd::gpu::Arithmetic;
-use hydrograd::gpu::full::{Gpu, PairWrenches, Probe};
+use hydrograd::gpu::full::{Gpu, Probe};
 use hydrograd::solver::Columns;
 use std::sync::Arc;
 
@@ -139,6 +139,22 @@ fn close(what: &str, arithmetic: Arithmetic, got: &[f64], right: &[f64], limit: 
     );
 }
 
+/// A product in SI units: K or P (`potential`), or their transposes, or their tangents along z.
+fn product(
+    probe: &Probe,
+    arithmetic: Arithmetic,
+    (potential, transpose): (bool, bool),
+    z: Option<&[Vec6]>,
+    x: &Columns,
+) -> Columns {
+    let (length, weight, _) = probe.units();
+    let unit = if potential { 1.0 / length } else { weight };
+    let which = (potential, transpose);
+    let mut out = probe.product(arithmetic, which, z, x).unwrap();
+    out.data.iter_mut().for_each(|v| *v *= unit);
+    out
+}
+
 /// K x, P x, Kᵀ y, Pᵀ y and their tangents, of five columns.
 pub fn products() {
     for model in models() {
@@ -162,30 +178,58 @@ pub fn products() {
         each_arithmetic(&model, |probe, a, limit| {
             for (v, potential) in [false, true].into_iter().enumerate() {
                 let of = |name: &str| format!("{} {name}", if potential { "P" } else { "K" });
-                let got = probe.apply(a, potential, &x).unwrap();
-                close(&of("apply"), a, &got.data, &right[v], limit);
-                let got = probe.apply_transpose(a, potential, &y).unwrap();
-                close(&of("apply_transpose"), a, &got.data, &back[v], limit);
-                let got = probe.apply_jvp(a, potential, &z, &x).unwrap();
-                close(&of("apply_jvp"), a, &got.data, &right[2 + v], limit);
-                let got = probe.apply_transpose_jvp(a, potential, &z, &y).unwrap();
-                close(
-                    &of("apply_transpose_jvp"),
-                    a,
-                    &got.data,
-                    &back[2 + v],
-                    limit,
-                );
+                for (transpose, x, right) in [(false, &x, &right), (true, &y, &back)] {
+                    let name = if transpose {
+                        "apply_transpose"
+                    } else {
+                        "apply"
+                    };
+                    let which = (potential, transpose);
+                    let got = product(probe, a, which, None, x);
+                    close(&of(name), a, &got.data, &right[v], limit);
+                    let got = product(probe, a, which, Some(&z), x);
+                    let name = format!("{name}_jvp");
+                    close(&of(&name), a, &got.data, &right[2 + v], limit);
+                }
             }
         });
     }
 }
 
-/// The wrenches of all pairs, and their tangents, beside each other.
-fn numbers(pairs: &[PairWrenches]) -> (Vec<f64>, Vec<f64>) {
-    let wrenches: Vec<Vec6> = pairs.iter().flat_map(|p| p.wrenches.clone()).collect();
-    let tangents: Vec<Vec6> = pairs.iter().flat_map(|p| p.tangents.clone()).collect();
-    (flat(&wrenches), flat(&tangents))
+/// Bodies and image of every pair, its wrenches and their tangents.
+type Wrenches = (Vec<[usize; 3]>, Vec<Vec6>, Vec<Vec6>);
+
+/// The wrenches of all pairs in SI units, and their tangents with a displacement z.
+fn wrenches(
+    probe: &Probe,
+    arithmetic: Arithmetic,
+    z: Option<&[Vec6]>,
+    left: &Columns,
+    right: &Columns,
+) -> Wrenches {
+    let (length, weight, middle) = probe.units();
+    let blocks = if z.is_some() { 5 } else { 3 };
+    // Densities of boundary rows in the unit of the potential's.
+    let left = Columns::from_fn(left.rows, left.columns, |i, c| {
+        let potential = c / (left.columns / blocks) == 2;
+        left.at(i, c) * if potential { 1.0 } else { weight * length }
+    });
+    let (pairs, values) = probe.wrenches(arithmetic, z, (&left, right)).unwrap();
+    let unit = 1.0 / (length * length);
+    let spatial = |w: &[f64]| {
+        let force = Vec3::new(w[0], w[1], w[2]) * unit;
+        let moment = Vec3::new(w[3], w[4], w[5]) * (unit * length);
+        six(&force, &(moment + middle.cross(&force)))
+    };
+    let all: Vec<Vec6> = values.chunks(6).map(spatial).collect();
+    match z {
+        None => (pairs, all, Vec::new()),
+        Some(_) => (
+            pairs,
+            all.iter().step_by(2).copied().collect(),
+            all.iter().skip(1).step_by(2).copied().collect(),
+        ),
+    }
 }
 
 /// Wrenches and their tangents of two columns.
@@ -219,9 +263,9 @@ pub fn derivatives() {
                 }
             }
         });
-        let values = |pairs: &[PairWrenches], tangent: bool| -> Vec<f64> {
-            let of = |p: &PairWrenches| {
-                let sum = &sums[(p.target * images + p.image) * bodies + p.source];
+        let values = |pairs: &[[usize; 3]], tangent: bool| -> Vec<f64> {
+            let of = |[target, source, image]: &[usize; 3]| {
+                let sum = &sums[(target * images + image) * bodies + source];
                 sum.iter()
                     .map(|s| if tangent { s.1 } else { s.0 })
                     .collect::<Vec<_>>()
@@ -230,15 +274,13 @@ pub fn derivatives() {
         };
         let part = |c: &Columns, n: usize| Columns::from_fn(c.rows, n, |i, k| c.at(i, k));
         each_arithmetic(&model, |probe, a, limit| {
-            let first = probe
-                .pair_vjp(a, &part(&left, 3 * n), &part(&right, 2 * n))
-                .unwrap();
-            let (got, _) = numbers(&first);
-            close("pair_vjp", a, &got, &values(&first, false), limit);
-            let second = probe.pair_hvp(a, &z, &left, &right).unwrap();
-            let (got, tangents) = numbers(&second);
-            close("pair_hvp, first", a, &got, &values(&second, false), limit);
-            close("pair_hvp", a, &tangents, &values(&second, true), limit);
+            let (first, second) = (part(&left, 3 * n), part(&right, 2 * n));
+            let (pairs, got, _) = wrenches(probe, a, None, &first, &second);
+            close("pair_vjp", a, &flat(&got), &values(&pairs, false), limit);
+            let (pairs, got, tangents) = wrenches(probe, a, Some(&z), &left, &right);
+            let (first, second) = (values(&pairs, false), values(&pairs, true));
+            close("pair_hvp, first", a, &flat(&got), &first, limit);
+            close("pair_hvp", a, &flat(&tangents), &second, limit);
         });
     }
 }
@@ -254,10 +296,12 @@ pub fn solves() {
             let gpu = Gpu::new(context, &model).unwrap();
             let probe = Probe::new(&gpu, &poses()).unwrap();
             // KᵀK x + D² x is made in the fine arithmetic, apart from the solve.
-            let (x, reached) = probe.normal_solve(&g).unwrap();
+            let (mut x, reached) = probe.normal_solve(&g).unwrap();
+            let weight = probe.units().1;
+            x.data.iter_mut().for_each(|v| *v /= weight * weight);
             let a = context.fine();
-            let kx = probe.apply(a, false, &x).unwrap();
-            let mut back = probe.apply_transpose(a, false, &kx).unwrap();
+            let kx = product(&probe, a, (false, false), None, &x);
+            let mut back = product(&probe, a, (false, true), None, &kx);
             let damping = model.bodies.iter().flat_map(|b| &b.damping);
             for (j, d) in damping.enumerate() {
                 for k in 0..4 {

@@ -39,26 +39,7 @@ fn registered() -> Vec<(String, Rung)> {
 
 /// Rungs on a GPU, each with the shader whose comparison in tests/gpu holds it against its twin on the CPU.
 const ON_DEVICE: &[(&str, &str)] = &[
-    ("gpu::apply_jvp::apply_jvp", "apply_jvp"),
-    (
-        "gpu::apply_transpose_jvp::apply_transpose_jvp",
-        "apply_transpose_jvp",
-    ),
-    ("gpu::pair_hvp::pair_hvp", "pair_hvp"),
-    ("gpu::pair_vjp::pair_vjp", "pair_vjp"),
-    ("gpu::full::probe::Probe::apply_jvp", "apply_jvp"),
-    (
-        "gpu::full::probe::Probe::apply_transpose_jvp",
-        "apply_transpose_jvp",
-    ),
-    ("gpu::full::pairs::pairs_hvp", "pair_hvp"),
-    ("gpu::full::pairs::pairs_vjp", "pair_vjp"),
-    ("gpu::full::probe::Probe::pair_hvp", "pair_hvp"),
-    ("gpu::full::probe::Probe::pair_vjp", "pair_vjp"),
     ("gpu::full::response::Solution::gradient", "pair_vjp"),
-    ("gpu::coulomb_jvp::coulomb_jvp", "coulomb_jvp"),
-    ("gpu::coulomb_vjp::coulomb_vjp", "coulomb_vjp"),
-    ("gpu::coulomb_hvp::coulomb_hvp", "coulomb_hvp"),
     (
         "gpu::reduced::linearised::GpuLinearised::gradient",
         "coulomb_vjp",

@@ -10,7 +10,7 @@ impl PlacedPanels<'_> {
     pub fn gradient(&self, solution: &Solution) -> PairTensor {
         let mut out = PairTensor::zeros(self.coupled.bodies.len(), solution.twists.ncols());
         for pair in &self.pairs {
-            out.add(
+            out.add_pair(
                 pair,
                 &self.poses[pair.target],
                 &self.pair_tensor(pair, solution),

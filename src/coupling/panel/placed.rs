@@ -211,7 +211,7 @@ fn readouts(coupled: &PanelCoupled, pairs: &[Pair]) -> Vec<Columns> {
         .collect();
     for (b, body) in coupled.bodies.iter().enumerate() {
         let own = &coupled.faces[b];
-        let own = out[b].slice_mut(&own);
+        let own = out[b].slice_mut(own);
         for (n, x) in own.iter_mut().enumerate() {
             *x = body.single_layer()[(n / 6, n % 6)];
         }
@@ -224,7 +224,7 @@ fn readouts(coupled: &PanelCoupled, pairs: &[Pair]) -> Vec<Columns> {
             .map(|n| sign * q[(n / 6, n % 6)])
             .collect();
         let points = &coupled.faces[pair.source];
-        let out = out[pair.target].slice_mut(&points);
+        let out = out[pair.target].slice_mut(points);
         single_sum(body.panels().triangles(), &pair.points, &q, 6, out);
     }
     out

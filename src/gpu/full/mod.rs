@@ -6,13 +6,14 @@
 mod pairs;
 mod probe;
 mod products;
+mod refined;
 mod response;
 mod second;
 mod solve;
 
 // For tests and benches alone.
 #[doc(hidden)]
-pub use probe::{PairWrenches, Probe};
+pub use probe::Probe;
 
 use super::context::{Context, Options};
 use super::geometry::{Geometry, PlacedSystem};

@@ -1,98 +1,63 @@
-//! Wrenches on pairs of bodies: a derivative by tasks, then summed by pair, in batches that the memory holds.
+//! Wrenches on pairs of bodies: a derivative by tasks (`shaders/pair_*.wgsl`), then summed by pair
+//! (`shaders/reduce.wgsl`), in batches that the memory holds.
 
 use crate::Result;
 use crate::gpu::buffer::Buffer;
-use crate::gpu::geometry::{PairBatch, PlacedSystem};
-use crate::gpu::kernel::Call;
-use crate::gpu::pair_hvp::pair_hvp;
-use crate::gpu::pair_vjp::pair_vjp;
-use crate::gpu::reduce::reduce;
-use crate::gpu::source::Arithmetic;
+use crate::gpu::geometry::PlacedSystem;
+use crate::gpu::kernel::{Call, groups, threads};
+use crate::gpu::source::{Arithmetic, Constant};
 
-/// Densities on the left, by face, and on the right, by source, of so many columns.
+/// Densities of so many columns, and the columns that are taken on the left.
 pub(super) struct Densities<'a> {
+    /// By face: `[μ, r, β]`, with motions `[μ, r, β, δμ, δr]`.
     pub left: &'a Buffer,
+    /// By source: `[a, λ]`, with motions `[a, λ, δa, δλ]`.
     pub right: &'a Buffer,
     pub columns: usize,
+    /// First, and how many: all with motions.
+    pub taken: (usize, usize),
+    /// Of whose displacement the tangents are wanted too.
+    pub motions: Option<&'a Buffer>,
 }
 
-/// Calls, what they leave, and how many numbers that is.
-pub(super) type Wrenches = (Vec<Call>, Buffer, usize);
-
-/// `[pair][width][columns][6]` for the columns `first..first + width` on the left.
-pub(super) fn pairs_vjp(
+/// Calls, what they leave, and how many numbers that is: `[pair][taken][columns][6]`, with motions `[12]`: wrenches,
+/// then their tangents.
+pub(super) fn wrenches(
     placed: &PlacedSystem,
     arithmetic: Arithmetic,
     of: &Densities,
-    (first, width): (usize, usize),
-) -> Result<Wrenches> {
-    summed(
-        placed,
-        arithmetic,
-        width * of.columns * 6,
-        |batch, parts| {
-            pair_vjp(
-                arithmetic,
-                placed,
-                (of.left, of.right),
-                of.columns,
-                (first, width),
-                &batch.tasks,
-                parts,
-            )
-        },
-    )
-}
-
-/// `[pair][columns][columns][12]`: wrenches and their tangents.
-pub(super) fn pairs_hvp(
-    placed: &PlacedSystem,
-    arithmetic: Arithmetic,
-    of: &Densities,
-    motions: &Buffer,
-) -> Result<Wrenches> {
-    summed(
-        placed,
-        arithmetic,
-        of.columns * of.columns * 12,
-        |batch, parts| {
-            pair_hvp(
-                arithmetic,
-                placed,
-                (of.left, of.right),
-                of.columns,
-                motions,
-                &batch.tasks,
-                parts,
-            )
-        },
-    )
-}
-
-fn summed(
-    placed: &PlacedSystem,
-    arithmetic: Arithmetic,
-    elements: usize,
-    part: impl Fn(&PairBatch, &Buffer) -> Result<Call>,
-) -> Result<Wrenches> {
+) -> Result<(Vec<Call>, Buffer, usize)> {
     let geometry = &placed.geometry;
-    let context = &geometry.context;
+    let (context, table) = (&geometry.context, placed.table(arithmetic));
+    let (first, width) = of.taken;
+    let (shader, numbers) = match of.motions {
+        None => ("pair_vjp", 6),
+        Some(_) => ("pair_hvp", 12),
+    };
+    let elements = width * of.columns * numbers;
     let count = geometry.pairs.len() * elements;
     let out = context.reals("wrenches", arithmetic, count)?;
     let batches = geometry.batches(elements * arithmetic.size());
     let widest = batches.iter().map(|b| b.tasks.len()).max().unwrap_or(0);
     let parts = context.reals("tasks of a derivative", arithmetic, widest * elements)?;
+    let mut buffers = vec![("left", of.left), ("right", of.right), ("out", &parts)];
+    buffers.extend(of.motions.map(|motions| ("motions", motions)));
     let mut calls = Vec::new();
     for batch in &batches {
-        calls.push(part(batch, &parts)?);
-        calls.push(reduce(
-            context,
-            arithmetic,
-            &parts,
-            &geometry.ranges,
-            batch,
-            elements,
-            &out,
+        let (pairs, tasks) = (batch.pairs.len(), batch.tasks.len());
+        calls.push(context.call(
+            (shader, "main", arithmetic),
+            &[("LEFT", Constant::Number(width as u32))],
+            &[of.columns, first, batch.tasks.start, tasks],
+            (table, &buffers),
+            groups(tasks),
+        )?);
+        calls.push(context.call(
+            ("reduce", "main", arithmetic),
+            &[],
+            &[pairs, elements, batch.pairs.start, batch.tasks.start],
+            (table, &[("parts", &parts), ("out", &out)]),
+            threads(pairs * elements),
         )?);
     }
     Ok((calls, out, count))

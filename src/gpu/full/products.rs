@@ -1,48 +1,69 @@
-//! Products with K and P of any number of columns, in passes.
+//! Products with K and P of any number of columns, in passes (`shaders/apply*.wgsl`).
 
 use crate::Result;
-use crate::gpu::apply::apply;
-use crate::gpu::apply_jvp::apply_jvp;
-use crate::gpu::apply_transpose::apply_transpose;
-use crate::gpu::apply_transpose_jvp::apply_transpose_jvp;
 use crate::gpu::buffer::Buffer;
-use crate::gpu::geometry::PlacedSystem;
+use crate::gpu::columns::{Base, Slice, Sum, passes};
+use crate::gpu::geometry::{PlacedSystem, Sizes};
 use crate::gpu::kernel::Call;
-use crate::gpu::share::passes;
-use crate::gpu::source::Arithmetic;
-use crate::gpu::sum::{Base, Slice, Sum, sum};
+use crate::gpu::source::{Arithmetic, Constant};
 
 /// Most columns of one pass over the pairs.
 pub(super) const WIDE: usize = 12;
 
-/// Which product.
+/// Which product: with K, or P.
 #[derive(Clone, Copy)]
-pub(super) enum Product<'a> {
-    /// Sources to faces: K, or P.
-    Forward { potential: bool },
-    /// Faces to sources: Kᵀ, or Pᵀ.
-    Transpose { potential: bool },
-    /// δK, or δP, for these motions.
-    ForwardTangent {
-        potential: bool,
-        motions: &'a Buffer,
-    },
-    /// δKᵀ, or δPᵀ.
-    TransposeTangent {
-        potential: bool,
-        motions: &'a Buffer,
-    },
+pub(super) struct Product<'a> {
+    potential: bool,
+    /// Faces to sources: Kᵀ, Pᵀ.
+    transpose: bool,
+    /// δK, δP for these motions.
+    motions: Option<&'a Buffer>,
 }
 
-/// Where some columns of a product go: `out[to..] = scale · product[from..from + count] (+ out)`.
+impl<'a> Product<'a> {
+    /// Sources to faces: K, or P.
+    pub const fn forward(potential: bool) -> Self {
+        Self {
+            potential,
+            transpose: false,
+            motions: None,
+        }
+    }
+
+    /// Faces to sources: Kᵀ, or Pᵀ.
+    pub const fn back(potential: bool) -> Self {
+        Self {
+            transpose: true,
+            ..Self::forward(potential)
+        }
+    }
+
+    /// Its tangent for these motions.
+    pub fn tangent(self, motions: &'a Buffer) -> Self {
+        Self {
+            motions: Some(motions),
+            ..self
+        }
+    }
+
+    /// Rows of the result, workgroups that make them, and shares that each cuts its work into.
+    pub fn sizes(&self, sizes: &Sizes) -> (usize, usize, usize) {
+        let (rows, own, other) = if self.transpose {
+            (sizes.sources, sizes.source_blocks, sizes.face_blocks)
+        } else {
+            (sizes.faces, sizes.face_blocks, sizes.source_blocks)
+        };
+        (rows, own, sizes.shares(own, other))
+    }
+}
+
+/// Where some columns of a product go: `out[to..] = scale · product[from..from + count] + base`.
 pub(super) struct To<'a> {
     pub from: usize,
     pub count: usize,
     pub out: Slice<'a>,
     pub scale: f32,
-    pub base: Option<Slice<'a>>,
-    /// Whether it is added to what is there.
-    pub accumulate: bool,
+    pub base: Base<'a>,
 }
 
 impl<'a> To<'a> {
@@ -53,8 +74,7 @@ impl<'a> To<'a> {
             count,
             out,
             scale: 1.0,
-            base: None,
-            accumulate: false,
+            base: Base::Nothing,
         }
     }
 }
@@ -69,26 +89,14 @@ pub(super) fn product<'a>(
     to: &[To<'a>],
 ) -> Result<Vec<Call>> {
     let geometry = &placed.geometry;
-    let (context, sizes) = (&geometry.context, &geometry.sizes);
-    let (rows, own, other) = match what {
-        Product::Forward { .. } | Product::ForwardTangent { .. } => {
-            (sizes.faces, sizes.face_blocks, sizes.source_blocks)
-        }
-        _ => (sizes.sources, sizes.source_blocks, sizes.face_blocks),
-    };
-    let shares = sizes.shares(own, other);
+    let context = &geometry.context;
+    let (rows, _, shares) = what.sizes(&geometry.sizes);
     let mut calls = Vec::new();
     for (first, width) in passes(columns, WIDE) {
         let parts = context.reals("shares of a product", arithmetic, shares * rows * width)?;
         let x = (x, stride, offset + first);
-        calls.push(once(
-            placed,
-            arithmetic,
-            what,
-            x,
-            (&parts, width),
-            &geometry.open,
-        )?);
+        let out = (&parts, width);
+        calls.push(once(placed, arithmetic, what, x, out, &geometry.open)?);
         for t in to {
             // The columns of this pass that go there.
             let (from, end) = (t.from.max(first), (t.from + t.count).min(first + width));
@@ -96,48 +104,50 @@ pub(super) fn product<'a>(
                 continue;
             }
             let shifted = |(b, s, o): Slice<'a>| (b, s, o + from - t.from);
-            let base = match (t.base, t.accumulate) {
-                (Some(base), _) => Base::Other(shifted(base)),
-                (None, true) => Base::Out,
-                (None, false) => Base::Nothing,
-            };
             let task = Sum {
-                rows,
-                columns: end - from,
-                parts: (&parts, shares, width, from - first),
+                taken: (width, from - first),
                 scale: t.scale,
-                base,
-                damped: None,
-                out: shifted(t.out),
+                base: match t.base {
+                    Base::Other(base) => Base::Other(shifted(base)),
+                    base => base,
+                },
+                ..Sum::new((rows, end - from), (&parts, shares), shifted(t.out))
             };
-            calls.push(sum(context, arithmetic, &task, &geometry.open)?);
+            calls.push(task.call(context, arithmetic, &geometry.open)?);
         }
     }
     Ok(calls)
 }
 
-/// One pass of a product, as shares.
+/// One pass of a product, as shares `[share][row][columns]` to be summed; a product that is no tangent is skipped
+/// where no column of `gate` goes on.
 pub(super) fn once(
     placed: &PlacedSystem,
     arithmetic: Arithmetic,
     what: Product,
-    x: Slice,
-    out: (&Buffer, usize),
+    (x, stride, offset): Slice,
+    (out, columns): (&Buffer, usize),
     gate: &Buffer,
 ) -> Result<Call> {
-    let context = &placed.geometry.context;
-    match what {
-        Product::Forward { potential } => {
-            apply(context, arithmetic, placed, potential, x, out, gate)
-        }
-        Product::Transpose { potential } => {
-            apply_transpose(context, arithmetic, placed, potential, x, out, gate)
-        }
-        Product::ForwardTangent { potential, motions } => {
-            apply_jvp(context, arithmetic, placed, potential, x, out, motions)
-        }
-        Product::TransposeTangent { potential, motions } => {
-            apply_transpose_jvp(context, arithmetic, placed, potential, x, out, motions)
-        }
-    }
+    let shader = match (what.transpose, what.motions) {
+        (false, None) => "apply",
+        (true, None) => "apply_transpose",
+        (false, Some(_)) => "apply_jvp",
+        (true, Some(_)) => "apply_transpose_jvp",
+    };
+    let constants = [
+        ("COLUMNS", Constant::Number(columns as u32)),
+        ("POTENTIAL", Constant::Flag(what.potential)),
+    ];
+    let (_, own, shares) = what.sizes(&placed.geometry.sizes);
+    let name = if what.transpose { "y" } else { "x" };
+    let mut buffers = vec![(name, x), ("out", out), ("going", gate)];
+    buffers.extend(what.motions.map(|motions| ("motions", motions)));
+    placed.geometry.context.call(
+        (shader, "main", arithmetic),
+        &constants,
+        &[shares, stride, offset, 0],
+        (placed.table(arithmetic), &buffers),
+        [own as u32, shares as u32, 1],
+    )
 }

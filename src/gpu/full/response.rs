@@ -1,20 +1,17 @@
 //! The water's solution, on the device: value and first derivative.
 
-use super::pairs::{Densities, pairs_vjp};
+use super::pairs::{Densities, wrenches};
 use super::products::{Product, To, product};
 use super::solve::Solves;
 use crate::adjoint::lie::Vec6;
 use crate::coupling::full::{Reached, SystemResponse};
 use crate::coupling::{Direction, PairTensor, Tangent};
 use crate::gpu::buffer::Buffer;
-use crate::gpu::combine::combine;
-use crate::gpu::geometry::{Geometry, PlacedSystem};
-use crate::gpu::impulse::impulse;
-use crate::gpu::kernel::{Batch, Call};
-use crate::gpu::products::{Task, products};
-use crate::gpu::rows::{Table, rows};
-use crate::gpu::share::passes;
-use crate::gpu::units::{self, scaled, size};
+use crate::gpu::columns::{Base, Slice, combine, passes, products};
+use crate::gpu::context::Context;
+use crate::gpu::geometry::{Geometry, PlacedSystem, Rows};
+use crate::gpu::kernel::{Call, threads};
+use crate::gpu::units::{self, Twists};
 use crate::solver::Columns;
 use crate::{Error, Result};
 use nalgebra::DMatrix;
@@ -28,9 +25,7 @@ pub(super) struct Solution {
     pub placed: Arc<PlacedSystem>,
     /// Bodies that the columns first given move.
     moving: Arc<Vec<bool>>,
-    twists: DMatrix<f64>,
-    /// What each column is in units of: on the device all are about 1.
-    pub scale: Vec<f64>,
+    pub twists: Twists,
     pub columns: usize,
     /// X = [a, λ], `[source][2·columns]`.
     pub strengths: Buffer,
@@ -41,34 +36,55 @@ pub(super) struct Solution {
     reached: Reached,
 }
 
-/// What follows from X.
-struct Followed {
-    momenta: DMatrix<f64>,
-    energies: DMatrix<f64>,
-    /// How the solves stand.
-    states: Vec<Vec<u8>>,
-}
-
 /// A wrench about the scene's middle in the device's units as a spatial wrench.
 pub(super) fn spatial(placed: &PlacedSystem, w: &[f64], scale: f64) -> Vec6 {
     units::spatial(placed.geometry.length, &placed.middle, w, scale)
 }
 
-/// Body-frame impulses from the device's `[body][6][columns]`.
-pub(super) fn impulses(
+/// `out (+)= table · twists`, twists `[body][6][columns]` (`shaders/rows.wgsl`): what twists ask for on every face, or
+/// read out of every source.
+fn rows(
+    context: &Context,
+    (table, first): (&Rows, usize),
+    (twists, columns): (&Buffer, usize),
+    (out, stride, offset): Slice,
+    accumulate: bool,
+) -> Result<Call> {
+    let words = [
+        table.rows,
+        columns,
+        table.width,
+        first,
+        stride,
+        offset,
+        usize::from(accumulate),
+        0,
+    ];
+    let buffers = [
+        ("table", &table.table),
+        ("map", &table.map),
+        ("twists", twists),
+        ("out", out),
+    ];
+    let shader = ("rows", "main", context.fine());
+    let count = threads(table.rows * columns);
+    context.call(shader, &[], &words, (&[], &buffers), count)
+}
+
+/// `out[body][6][columns] = ½ {B̄ᵀφ + F̄ᵀμ + ρᵀa}` of every body, φ `[face][columns]` (`shaders/impulse.wgsl`).
+pub(super) fn impulse(
     geometry: &Geometry,
-    moving: &[bool],
-    values: &[f64],
-    scale: &[f64],
-) -> DMatrix<f64> {
-    let k = scale.len();
-    DMatrix::from_fn(6 * moving.len(), k, |i, c| {
-        if !moving[i / 6] {
-            return 0.0;
-        }
-        let power = if i % 6 < 3 { 4 } else { 5 };
-        values[i * k + c] * scale[c] * geometry.length.powi(power)
-    })
+    phi: &Buffer,
+    mu: Slice,
+    a: Slice,
+    (out, columns): (&Buffer, usize),
+) -> Result<Call> {
+    let shader = ("impulse", "main", geometry.context.fine());
+    let words = [columns, columns, mu.1, mu.2, a.1, a.2, 0, 0];
+    let buffers = [("phi", phi), ("mu", mu.0), ("a", a.0), ("out", out)];
+    let count = [geometry.sizes.bodies as u32, columns as u32, 1];
+    let all = (&geometry.table[..], &buffers[..]);
+    geometry.context.call(shader, &[], &words, all, count)
 }
 
 impl Solution {
@@ -83,145 +99,73 @@ impl Solution {
         let fine = context.fine();
         let k = twists.ncols();
         let n = sizes.sources;
-        let scale: Vec<f64> = (0..k).map(|c| size(twists, c, geometry.length)).collect();
-        let values = scaled(twists, &scale, geometry.length);
-        let device_twists = context.upload("twists", fine, &values)?;
-        let densities = context.reals("densities", fine, sizes.faces * 3 * k)?;
-        let strengths = context.zeros("strengths", fine, n * 2 * k)?;
+        let twists = Twists::new(twists.clone(), geometry.length);
+        let given = (&twists.upload(context)?, k);
         let g = context.reals("right-hand sides", fine, n * 2 * k)?;
         let mut out = Self {
             moving,
-            twists: twists.clone(),
-            scale,
             columns: k,
-            strengths,
-            densities,
-            momenta: DMatrix::zeros(twists.nrows(), k),
+            densities: context.reals("densities", fine, sizes.faces * 3 * k)?,
+            strengths: context.zeros("strengths", fine, n * 2 * k)?,
+            momenta: DMatrix::zeros(6 * sizes.bodies, k),
             energies: DMatrix::zeros(k, k),
             reached: Reached::default(),
             placed: placed.clone(),
+            twists,
         };
         if k == 0 || n == 0 {
             return Ok(out);
         }
-        let table = |first| Table {
-            values: &geometry.face_table,
-            width: 12,
-            first,
-            map: &geometry.face_map,
-            rows: sizes.faces,
-        };
-        let own = Table {
-            values: &geometry.source_table,
-            width: 6,
-            first: 0,
-            map: &geometry.source_map,
-            rows: n,
-        };
-        let given = (&device_twists, k);
+        let (faces, sources) = (&geometry.face_rows, &geometry.source_rows);
         let at = |block: usize| (&out.densities, 3 * k, block * k);
-        let asked = [
-            rows(context, fine, &table(0), given, at(1), false)?,
-            rows(context, fine, &table(6), given, at(2), false)?,
-        ];
-        let back = |potential| Product::Transpose { potential };
-        let gathered = product(
-            &placed,
-            fine,
-            back(false),
-            at(1),
-            k,
-            &[To::plain(k, (&g, 2 * k, 0))],
-        )?;
-        let read = product(
-            &placed,
-            fine,
-            back(true),
-            at(2),
-            k,
-            &[To::plain(k, (&g, 2 * k, k))],
-        )?;
-        let added = [rows(context, fine, &own, given, (&g, 2 * k, k), true)?];
-        context.run(&[&asked, &gathered, &read, &added])?;
+        let half = |block: usize| (&g, 2 * k, block * k);
+        let asked = || rows(context, (faces, 0), given, at(1), false);
+        let mut calls = vec![asked()?];
+        calls.push(rows(context, (faces, 6), given, at(2), false)?);
+        for (block, potential) in [false, true].into_iter().enumerate() {
+            let (back, to) = (Product::back(potential), To::plain(k, half(block)));
+            calls.extend(product(&placed, fine, back, at(1 + block), k, &[to])?);
+        }
+        calls.push(rows(context, (sources, 0), given, half(1), true)?);
+        context.submit(&calls)?;
 
-        let solves = Solves::new(&placed, (&g, 2 * k, 0), (&out.strengths, 2 * k, 0), 2 * k)?;
-        let mut batch = Batch::default();
-        solves.begin(&mut batch);
-        context.submit(&batch)?;
-        // Most solves end within the first batch: what follows from them is read together with how they
-        // stand.
+        // r and μ from X, then momenta and energies.
+        let x = (&out.strengths, 2 * k, 0);
         let what = "coupled system (Eq. 20)";
-        let mut found = out.follow(&g, Some(&solves))?;
-        let reached = match solves.reached(&placed, &found.states, what, false)? {
-            Some(reached) => reached,
-            None => {
-                let reached = solves.finish(&placed, what)?;
-                // r was made of an unfinished solution: again from F x̄.
-                let again = rows(context, fine, &table(0), given, at(1), false)?;
-                context.run(&[&[again]])?;
-                found = out.follow(&g, None)?;
-                reached
-            }
-        };
-        out.reached = reached;
-        (out.momenta, out.energies) = (found.momenta, found.energies);
-        Ok(out)
-    }
-
-    /// r and μ from X, then momenta and energies, and how the solves stand; `g` are the right-hand sides.
-    fn follow(&self, g: &Buffer, solves: Option<&Solves>) -> Result<Followed> {
-        let (placed, k) = (self.placed.clone(), self.columns);
-        let geometry = &placed.geometry;
-        let (context, fine) = (&geometry.context, geometry.context.fine());
+        let solves = Solves::new(&placed, what, half(0), x, 2 * k)?;
         let residual = To {
             scale: -1.0,
-            accumulate: true,
-            ..To::plain(k, (&self.densities, 3 * k, k))
+            base: Base::Out,
+            ..To::plain(k, at(1))
         };
         let mu = To {
             from: k,
-            ..To::plain(k, (&self.densities, 3 * k, 0))
+            ..To::plain(k, at(0))
         };
-        let forward = Product::Forward { potential: false };
-        let x = (&self.strengths, 2 * k, 0);
-        let image = product(&placed, fine, forward, x, 2 * k, &[residual, mu])?;
-        let (impulses_of, momenta) = self.impulse_calls()?;
+        let forward = Product::forward(false);
+        let mut follow = product(&placed, fine, forward, x, 2 * k, &[residual, mu])?;
+        let (calls, momenta) = out.impulse_calls()?;
+        follow.extend(calls);
         let energies = context.reals("energies", fine, k * k)?;
-        let task = Task {
-            rows: geometry.sizes.sources,
-            g: (2 * k, k),
-            a: (2 * k, 0),
-            columns: k,
-        };
-        let dots = [products(
-            context,
-            fine,
-            g,
-            &self.strengths,
-            &energies,
-            &task,
-        )?];
-        context.run(&[&image, &impulses_of, &dots])?;
-        let count = 6 * geometry.sizes.bodies * k;
-        let mut wanted = vec![
-            (&momenta, count * fine.size()),
-            (&energies, k * k * fine.size()),
-        ];
-        wanted.extend(solves.iter().flat_map(|s| s.report()));
-        let mut bytes = context.read_bytes(&wanted)?;
-        let states = bytes.split_off(2);
-        let values = fine.numbers(&bytes[0]);
-        let momenta = impulses(geometry, &self.moving, &values, &self.scale);
-        let e = fine.numbers(&bytes[1]);
+        follow.push(products(context, n, (half(1), x), (&energies, k))?);
+        let wanted = [(&momenta, 6 * sizes.bodies * k), (&energies, k * k)];
+        // r made of an unfinished solution has to be made again from F x̄.
+        let (reached, values) = solves.run(&[asked()?], &follow, &wanted)?;
+        out.reached = reached;
+        out.momenta = out.impulses(&values[0]);
+        let (e, scale) = (&values[1], &out.twists.scale);
         let l5 = geometry.length.powi(5);
-        let energies = DMatrix::from_fn(k, k, |x, y| {
-            e[x * k + y] * self.scale[x] * self.scale[y] * l5
-        });
-        Ok(Followed {
-            momenta,
-            energies,
-            states,
-        })
+        out.energies = DMatrix::from_fn(k, k, |x, y| e[x * k + y] * scale[x] * scale[y] * l5);
+        Ok(out)
+    }
+
+    /// Body-frame impulses of the bodies that move, from the device's.
+    pub fn impulses(&self, values: &[f64]) -> DMatrix<f64> {
+        let mut out = self.twists.impulses(values, 1.0);
+        for b in (0..self.moving.len()).filter(|b| !self.moving[*b]) {
+            out.rows_mut(6 * b, 6).fill(0.0);
+        }
+        out
     }
 
     /// φ = P a and the impulses: the calls, and where the impulses will be.
@@ -231,18 +175,10 @@ impl Solution {
         let (context, fine) = (&geometry.context, geometry.context.fine());
         let phi = context.reals("potentials", fine, geometry.sizes.faces * k)?;
         let out = context.reals("momenta", fine, 6 * geometry.sizes.bodies * k)?;
-        let forward = Product::Forward { potential: true };
-        let a = (&self.strengths, 2 * k, 0);
-        let mut calls = product(
-            &self.placed,
-            fine,
-            forward,
-            a,
-            k,
-            &[To::plain(k, (&phi, k, 0))],
-        )?;
+        let (a, to) = ((&self.strengths, 2 * k, 0), To::plain(k, (&phi, k, 0)));
+        let mut calls = product(&self.placed, fine, Product::forward(true), a, k, &[to])?;
         let mu = (&self.densities, 3 * k, 0);
-        calls.push(impulse(context, geometry, &phi, mu, a, (&out, k))?);
+        calls.push(impulse(geometry, &phi, mu, a, (&out, k))?);
         Ok((calls, out))
     }
 
@@ -252,11 +188,7 @@ impl Solution {
         let (context, sizes) = (&geometry.context, &geometry.sizes);
         let fine = context.fine();
         let n = coefficients.ncols();
-        let twists = &self.twists * coefficients;
-        let scale: Vec<f64> = (0..n).map(|c| size(&twists, c, geometry.length)).collect();
-        let units = DMatrix::from_fn(self.columns, n, |k, c| {
-            coefficients[(k, c)] * self.scale[k] / scale[c]
-        });
+        let (twists, units) = self.twists.combined(coefficients);
         let mut out = Self {
             placed: self.placed.clone(),
             moving: self.moving.clone(),
@@ -267,39 +199,21 @@ impl Solution {
             momenta: DMatrix::zeros(6 * sizes.bodies, n),
             energies: coefficients.tr_mul(&self.energies) * coefficients,
             reached: self.reached,
-            scale,
         };
         if n == 0 || self.columns == 0 {
             return Ok(out);
         }
-        let combined = [
-            combine(
-                context,
-                fine,
-                &self.strengths,
-                &units,
-                &out.strengths,
-                (sizes.sources, 2),
-            )?,
-            combine(
-                context,
-                fine,
-                &self.densities,
-                &units,
-                &out.densities,
-                (sizes.faces, 3),
-            )?,
+        let of = |x, out, sizes| combine(context, x, &units, out, sizes);
+        let mut calls = vec![
+            of(&self.strengths, &out.strengths, (sizes.sources, 2))?,
+            of(&self.densities, &out.densities, (sizes.faces, 3))?,
         ];
-        let (calls, momenta) = out.impulse_calls()?;
-        context.run(&[&combined, &calls])?;
+        let (last, momenta) = out.impulse_calls()?;
+        calls.extend(last);
+        context.submit(&calls)?;
         let values = context.read(fine, &[(&momenta, 6 * sizes.bodies * n)])?;
-        out.momenta = impulses(geometry, &self.moving, &values[0], &out.scale);
+        out.momenta = out.impulses(&values[0]);
         Ok(out)
-    }
-
-    /// Bodies that the columns first given move.
-    pub fn moving(&self) -> &[bool] {
-        &self.moving
     }
 }
 
@@ -326,16 +240,18 @@ impl SystemResponse for Solution {
             return Ok(PairTensor::zeros(bodies, k));
         }
         // W(x, y) of every pair, x in passes.
-        let of = Densities {
-            left: &self.densities,
-            right: &self.strengths,
-            columns: k,
-        };
         let shares: Vec<(usize, usize)> = passes(k, LEFT).collect();
         let mut outs = Vec::new();
         for share in &shares {
-            let (calls, out, count) = pairs_vjp(placed, fine, &of, *share)?;
-            context.run(&[&calls])?;
+            let of = Densities {
+                left: &self.densities,
+                right: &self.strengths,
+                columns: k,
+                taken: *share,
+                motions: None,
+            };
+            let (calls, out, count) = wrenches(placed, fine, &of)?;
+            context.submit(&calls)?;
             outs.push((out, count));
         }
         let wanted: Vec<(&Buffer, usize)> = outs.iter().map(|(out, n)| (out, *n)).collect();
@@ -351,7 +267,7 @@ impl SystemResponse for Solution {
                 spatial(
                     placed,
                     &values[share][at..at + 6],
-                    self.scale[x] * self.scale[y],
+                    self.twists.scale[x] * self.twists.scale[y],
                 )
             };
             let image = &geometry.model.images[pair.image];
@@ -367,27 +283,10 @@ impl SystemResponse for Solution {
     }
 
     fn directions(&self, directions: &[Direction]) -> Result<Box<dyn SystemResponse + '_>> {
-        let n = directions.len();
-        let mut coefficients = DMatrix::zeros(self.columns, n);
-        let mut twists = DMatrix::zeros(self.twists.nrows(), n);
-        let mut combined = true;
-        for (k, direction) in directions.iter().enumerate() {
-            match direction {
-                Direction::Basis(c) => {
-                    coefficients.set_column(k, c);
-                    twists.set_column(k, &(&self.twists * *c));
-                }
-                Direction::Twist(x) => {
-                    combined = false;
-                    twists.set_column(k, x);
-                }
-            }
-        }
-        let solution = if combined {
-            self.combination(&coefficients)?
-        } else {
+        let solution = match self.twists.along(directions) {
+            Ok(coefficients) => self.combination(&coefficients)?,
             // One more column costs a solve little: the kernels are evaluated once for all.
-            Self::solve(self.placed.clone(), self.moving.clone(), &twists)?
+            Err(twists) => Self::solve(self.placed.clone(), self.moving.clone(), &twists)?,
         };
         Ok(Box::new(solution))
     }
@@ -410,7 +309,7 @@ impl SystemResponse for Solution {
         let values = context.read(context.fine(), &[(&self.strengths, n * 2 * k)])?;
         let l3 = geometry.length.powi(3);
         Ok(Columns::from_fn(n, k, |j, c| {
-            values[0][j * 2 * k + c] * self.scale[c] * l3
+            values[0][j * 2 * k + c] * self.twists.scale[c] * l3
         }))
     }
 }

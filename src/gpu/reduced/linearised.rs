@@ -7,7 +7,7 @@ use crate::coupling::{
     CouplingReport, Direction, Linearised, Momenta, PairTensor, Pullback, Tangent,
 };
 use crate::gpu::buffer::Buffer;
-use crate::gpu::combine::combine;
+use crate::gpu::columns::combine;
 use crate::gpu::points::PlacedPoints;
 use crate::gpu::units;
 use nalgebra::{DMatrix, DVector};
@@ -25,9 +25,7 @@ pub(super) struct Solved {
 
 /// The same with its derivatives.
 pub(super) struct GpuLinearised {
-    solution: Solution,
-    tolerance: f64,
-    report: CouplingReport,
+    solved: Solved,
     derivative: Derivative,
 }
 
@@ -71,9 +69,7 @@ impl Solved {
             _ => Derivative::Pulls(solution.pulls()?),
         };
         Ok(GpuLinearised {
-            solution: self.solution,
-            tolerance: self.tolerance,
-            report: self.report,
+            solved: self,
             derivative,
         })
     }
@@ -81,29 +77,28 @@ impl Solved {
 
 impl GpuLinearised {
     fn bodies(&self) -> usize {
-        self.solution.placed.model.sizes.bodies
+        self.solved.solution.placed.model.sizes.bodies
     }
 
     /// Columns on the basis and what they pull with.
     fn along(&self, pulls: &Buffer, x: &DVector<f64>) -> Result<(Solution, Buffer)> {
         let coefficients = DMatrix::from_column_slice(x.len(), 1, x.as_slice());
-        let one = self.solution.combination(&coefficients)?;
+        let (one, units) = self.solved.solution.combination(&coefficients)?;
         let model = &one.placed.model;
         let context = &model.context;
         let rows = (model.sizes.points, model.pull());
         let out = context.reals("pulls", context.fine(), rows.0 * rows.1)?;
-        let units = self.solution.units(&coefficients, &one.scale);
-        let call = combine(context, context.fine(), pulls, &units, &out, rows)?;
-        context.run(&[&[call]])?;
+        let call = combine(context, pulls, &units, &out, rows)?;
+        context.submit([&call])?;
         Ok((one, out))
     }
 
     /// ∇_g E(x, e_i) of every column, `[column][body]`.
     fn columns(&self, pulls: &Buffer, x: &DVector<f64>) -> Result<Vec<Vec<Vec6>>> {
         let (one, own) = self.along(pulls, x)?;
-        let found = self.solution.wrenches(pulls, (&one, &own))?;
+        let found = self.solved.solution.wrenches(pulls, (&one, &own))?;
         let of = |k: usize| (0..self.bodies()).map(|b| found[b][k]).collect();
-        Ok((0..self.solution.columns).map(of).collect())
+        Ok((0..self.solved.solution.columns).map(of).collect())
     }
 
     /// ∇_g E(x, y).
@@ -114,32 +109,19 @@ impl GpuLinearised {
 
     /// The solutions to directions: combinations of what is there, or another solve.
     fn solutions(&self, directions: &[Direction]) -> Result<Solution> {
-        let n = directions.len();
-        let mut coefficients = DMatrix::zeros(self.solution.columns, n);
-        let mut twists = DMatrix::zeros(self.solution.twists.nrows(), n);
-        let mut combined = true;
-        for (k, direction) in directions.iter().enumerate() {
-            match direction {
-                Direction::Basis(c) => {
-                    coefficients.set_column(k, c);
-                    twists.set_column(k, &(&self.solution.twists * *c));
-                }
-                Direction::Twist(x) => {
-                    combined = false;
-                    twists.set_column(k, x);
-                }
+        match self.solved.solution.twists.along(directions) {
+            Ok(coefficients) => Ok(self.solved.solution.combination(&coefficients)?.0),
+            Err(twists) => {
+                let placed = self.solved.solution.placed.clone();
+                Solution::solve(placed, &twists, self.solved.tolerance, false)
             }
         }
-        if combined {
-            return self.solution.combination(&coefficients);
-        }
-        Solution::solve(self.solution.placed.clone(), &twists, self.tolerance, false)
     }
 }
 
 impl Linearised for GpuLinearised {
     fn momenta(&self) -> &DMatrix<f64> {
-        &self.solution.momenta
+        &self.solved.solution.momenta
     }
 
     fn gradient(&self, x: &DVector<f64>, y: &DVector<f64>) -> Result<Vec<Vec6>> {
@@ -183,10 +165,10 @@ impl Linearised for GpuLinearised {
     fn hvp(&self, x: Direction, y: Direction, z: &[Vec6]) -> Result<Tangent> {
         let solution = self.solutions(&Direction::distinct(x, y))?;
         let length = solution.placed.model.length;
-        units::along(z, length, |z| solution.second(z, self.tolerance))
+        units::along(z, length, |z| solution.second(z, self.solved.tolerance))
     }
 
     fn report(&self) -> &CouplingReport {
-        &self.report
+        &self.solved.report
     }
 }

@@ -1,14 +1,12 @@
-//! Products with G, and what is summed with it, of any number of columns in passes.
+//! Products with G, and what is summed with it, of any number of columns in passes (`shaders/coulomb*.wgsl`); products
+//! with the bodies' dense blocks [L, Ū] (`shaders/blocks.wgsl`).
 
 use crate::Result;
 use crate::gpu::buffer::Buffer;
-use crate::gpu::coulomb::coulomb;
-use crate::gpu::coulomb_jvp::coulomb_jvp;
-use crate::gpu::coulomb_vjp::coulomb_vjp;
-use crate::gpu::kernel::Call;
-use crate::gpu::points::{Motion, PlacedPoints};
-use crate::gpu::share::passes;
-use crate::gpu::sum::{Base, Slice, Sum, sum};
+use crate::gpu::columns::{Base, Slice, Sum, passes};
+use crate::gpu::kernel::{Call, Table, threads};
+use crate::gpu::points::{Compressed, PlacedPoints};
+use crate::gpu::source::Constant;
 
 /// Most columns of one pass of potentials.
 const WIDE: usize = 12;
@@ -20,10 +18,21 @@ const NARROW: usize = 6;
 pub(super) enum Product<'a> {
     /// G x.
     Potential,
-    /// δG x.
-    Tangent(&'a Motion),
+    /// δG x of displaced points.
+    Tangent(&'a Table),
     /// The pulls, `[point][F, D][columns]`.
     Pull,
+    /// The pulls and their tangents, `[point][F, D, δF, δD][columns]`, of displaced points and charges that change by δx;
+    /// at most two columns, all there are.
+    PullTangent(&'a Table, &'a Buffer),
+}
+
+/// Columns of a pass, as a shader is compiled for them: few different ones.
+fn compiled(columns: usize) -> Constant {
+    Constant::Number(match columns {
+        0..=2 => columns,
+        _ => columns.next_multiple_of(2),
+    } as u32)
 }
 
 /// `out = product · x`; a product with G is skipped where no column of `gate` goes on.
@@ -36,35 +45,117 @@ pub(super) fn product(
     gate: &Buffer,
 ) -> Result<Vec<Call>> {
     let model = &placed.model;
-    let (context, sizes) = (&model.context, &model.sizes);
-    let fine = context.fine();
-    let (rows, most) = match what {
-        Product::Pull => (sizes.points * model.pull(), NARROW),
-        _ => (sizes.points, WIDE),
+    let (context, fine) = (&model.context, model.context.fine());
+    let (points, pull) = (model.sizes.points, model.pull());
+    let (shader, table, rows, most) = match what {
+        Product::Potential => ("coulomb", &placed.table, points, WIDE),
+        Product::Tangent(table) => ("coulomb_jvp", table, points, WIDE),
+        Product::Pull => ("coulomb_vjp", &placed.table, points * pull, NARROW),
+        Product::PullTangent(table, _) => ("coulomb_hvp", table, points * 2 * pull, NARROW),
     };
-    let shares = sizes.shares();
+    let shares = model.sizes.shares();
     let widest = columns.min(most);
     // Passes follow one another: they can share it.
     let parts = context.reals("shares of a product", fine, shares * rows * widest)?;
+    let mut buffers = vec![("x", x), ("out", &parts), ("going", gate)];
+    if let Product::PullTangent(_, dx) = what {
+        buffers.push(("dx", dx));
+    }
     let mut calls = Vec::new();
     for (first, width) in passes(columns, most).filter(|(_, width)| *width > 0) {
-        let x = (x, stride, offset + first);
-        let to = (&parts, width);
-        calls.push(match what {
-            Product::Potential => coulomb(context, placed, x, to, gate)?,
-            Product::Tangent(motion) => coulomb_jvp(context, placed, motion, x, to)?,
-            Product::Pull => coulomb_vjp(context, placed, x, to)?,
-        });
-        let task = Sum {
-            rows,
-            columns: width,
-            parts: (&parts, shares, width, 0),
-            scale: 1.0,
-            base: Base::Nothing,
-            damped: None,
-            out: (out, out_stride, out_offset + first),
-        };
-        calls.push(sum(context, fine, &task, gate)?);
+        let constants = [
+            ("COLUMNS", compiled(width)),
+            ("FADING", Constant::Flag(model.fading)),
+        ];
+        calls.push(context.call(
+            (shader, "main", fine),
+            &constants,
+            &[shares, width, stride, offset + first],
+            (table, &buffers),
+            [model.sizes.groups() as u32, shares as u32, 1],
+        )?);
+        let out = (out, out_stride, out_offset + first);
+        let task = Sum::new((rows, width), (&parts, shares), out);
+        calls.push(task.call(context, fine, gate)?);
     }
     Ok(calls)
+}
+
+/// Which part of a block.
+#[derive(Clone, Copy, PartialEq, Eq)]
+pub(super) enum Part {
+    /// L: by modes of all bodies.
+    Modes,
+    /// Ū: by six components of every body's twist.
+    Strengths,
+}
+
+/// `out = base + scale · block · x`, or with the block's transpose.
+pub(super) struct Blocks<'a> {
+    pub entry: &'static str,
+    pub part: Part,
+    pub columns: usize,
+    pub x: Slice<'a>,
+    pub out: Slice<'a>,
+    pub scale: f32,
+    pub base: Base<'a>,
+}
+
+impl<'a> Blocks<'a> {
+    /// From coefficients to points: `out = L x` or `Ū x`.
+    pub fn expand(part: Part, columns: usize, x: Slice<'a>, out: Slice<'a>) -> Self {
+        Self {
+            entry: "expand",
+            part,
+            columns,
+            x,
+            out,
+            scale: 1.0,
+            base: Base::Nothing,
+        }
+    }
+
+    /// From points to coefficients: `out = Lᵀ x` or `Ūᵀ x`.
+    pub fn project(part: Part, columns: usize, x: Slice<'a>, out: Slice<'a>) -> Self {
+        Self {
+            entry: "project",
+            ..Self::expand(part, columns, x, out)
+        }
+    }
+
+    /// The call; skipped where no column of `gate` goes on.
+    pub fn call(&self, model: &Compressed, gate: &Buffer) -> Result<Call> {
+        let sizes = &model.sizes;
+        let rows = match (self.entry, self.part) {
+            ("expand", _) => sizes.points,
+            (_, Part::Modes) => sizes.modes,
+            (_, Part::Strengths) => 6 * sizes.bodies,
+        };
+        let (x, out) = (self.x, self.out);
+        let (base, kind) = self.base.bound(x.0);
+        let words = [
+            rows,
+            self.columns,
+            x.1,
+            x.2,
+            out.1,
+            out.2,
+            base.1,
+            base.2,
+            usize::from(self.part == Part::Strengths),
+            kind,
+            self.scale.to_bits() as usize,
+            0,
+        ];
+        let buffers = [
+            ("x", x.0),
+            ("base", base.0),
+            ("out", out.0),
+            ("going", gate),
+        ];
+        let shader = ("blocks", self.entry, model.context.fine());
+        let count = threads(rows * self.columns);
+        let all = (&model.table[..], &buffers[..]);
+        model.context.call(shader, &[], &words, all, count)
+    }
 }

@@ -1,17 +1,13 @@
 //! The tangent along one displacement, on the device.
 
-use super::products::{Product, product};
-use super::solution::{FLUX, Solution, expand, impulses, project};
+use super::products::{Blocks, Part, Product, product};
+use super::solution::{FLUX, Side, Solution, wrench};
 use super::solve::Solve;
 use crate::Result;
 use crate::adjoint::lie::Vec6;
 use crate::coupling::Tangent;
-use crate::gpu::blocks::Part;
-use crate::gpu::coulomb_hvp::coulomb_hvp;
-use crate::gpu::kernel::Batch;
-use crate::gpu::sum::{Base, Sum, sum};
+use crate::gpu::columns::{Base, Sum};
 use crate::gpu::units::spatial;
-use crate::gpu::wrench::{Side, wrench};
 
 impl Solution {
     /// As the CPU's: the tangent of the first column's energy with the last; one column or two.
@@ -23,7 +19,7 @@ impl Solution {
         let model = &placed.model;
         let (context, sizes) = (&model.context, &model.sizes);
         let fine = context.fine();
-        let motion = placed.motion(z)?;
+        let displaced = placed.displaced(z)?;
         let reals = |label, count| context.reals(label, fine, count);
         let psi = reals("δG α", sizes.points * n)?;
         let total = reals("δG α + G δα", sizes.points * n)?;
@@ -36,60 +32,26 @@ impl Solution {
 
         // (I − LᵀGL) δa = Lᵀ δG α, δα = L δa.
         let alpha = whole(&self.alpha);
-        let tangent = Product::Tangent(&motion);
-        let moved = product(placed, tangent, alpha, n, whole(&psi), open)?;
-        let asked = [project(model, Part::Modes, n, whole(&psi), whole(&given))?];
+        let modes = Part::Modes;
+        let tangent = Product::Tangent(&displaced);
+        let mut before = product(placed, tangent, alpha, n, whole(&psi), open)?;
+        before.push(Blocks::project(modes, n, whole(&psi), whole(&given)).call(model, open)?);
         let solve = Solve::new(placed, (&given, &da), n, tolerance, None)?;
-        let mut last = vec![expand(
-            model,
-            Part::Modes,
-            n,
-            whole(&da),
-            whole(&dalpha),
-            Base::Nothing,
-        )?];
+        let (da, change, sum) = (whole(&da), whole(&dalpha), whole(&total));
+        let mut last = vec![Blocks::expand(modes, n, da, change).call(model, open)?];
         // Ūᵀ (δG α + G δα).
-        last.extend(product(
-            placed,
-            Product::Potential,
-            whole(&dalpha),
-            n,
-            whole(&total),
-            open,
-        )?);
+        last.extend(product(placed, Product::Potential, change, n, sum, open)?);
         let task = Sum {
-            rows: sizes.points,
-            columns: n,
-            parts: (&psi, 1, n, 0),
-            scale: 1.0,
             base: Base::Out,
-            damped: None,
-            out: whole(&total),
+            ..Sum::new((sizes.points, n), (&psi, 1), sum)
         };
-        last.push(sum(context, fine, &task, open)?);
-        last.push(project(
-            model,
-            Part::Strengths,
-            n,
-            whole(&total),
-            whole(&momenta),
-        )?);
+        last.push(task.call(context, fine, open)?);
+        let read = Blocks::project(Part::Strengths, n, sum, whole(&momenta));
+        last.push(read.call(model, open)?);
         // Pulls, their tangents, and wrenches.
-        let (shares, rows) = (sizes.shares(), sizes.points * 2 * model.pull());
-        let parts = reals("shares of the pulls", shares * rows * n)?;
-        let pulls = reals("pulls", rows * n)?;
-        let charges = (&self.alpha, &dalpha);
-        last.push(coulomb_hvp(context, placed, &motion, charges, (&parts, n))?);
-        let task = Sum {
-            rows,
-            columns: n,
-            parts: (&parts, shares, n, 0),
-            scale: 1.0,
-            base: Base::Nothing,
-            damped: None,
-            out: whole(&pulls),
-        };
-        last.push(sum(context, fine, &task, open)?);
+        let pulls = reals("pulls", sizes.points * 2 * model.pull() * n)?;
+        let both = Product::PullTangent(&displaced, &dalpha);
+        last.extend(product(placed, both, alpha, n, whole(&pulls), open)?);
         let count = sizes.bodies * n * n * 12;
         let wrenches = reals("wrenches", count)?;
         let side = Side {
@@ -98,36 +60,13 @@ impl Solution {
             change: &dalpha,
             columns: n,
         };
-        last.push(wrench(
-            context,
-            placed,
-            (side, side),
-            Some(&motion),
-            &wrenches,
-        )?);
+        last.push(wrench(placed, (side, side), Some(&displaced), &wrenches)?);
 
-        let mut batch = Batch::default();
-        batch.extend(&moved);
-        batch.extend(&asked);
-        solve.begin(&mut batch);
-        batch.extend(&last);
-        context.submit(&batch)?;
-        let impulse_count = 6 * sizes.bodies * n;
-        let mut wanted = vec![
-            (&momenta, impulse_count * fine.size()),
-            (&wrenches, count * fine.size()),
-        ];
-        wanted.extend(solve.report(placed));
-        let mut bytes = context.read_bytes(&wanted)?;
-        let states = bytes.split_off(2);
-        let mut found: Vec<Vec<f64>> = bytes.iter().map(|b| fine.numbers(b)).collect();
-        if solve.reached(placed, &states)?.is_none() {
-            solve.finish(placed)?;
-            context.run(&[&last])?;
-            found = context.read(fine, &[(&momenta, impulse_count), (&wrenches, count)])?;
-        }
-        let momenta = impulses(model, &found[0], &self.scale);
-        let unit = FLUX * self.scale[0] * self.scale[n - 1];
+        let wanted = [(&momenta, 6 * sizes.bodies * n), (&wrenches, count)];
+        let follow: Vec<_> = last.iter().collect();
+        let (_, found) = solve.run(before.iter().collect(), &follow, &wanted)?;
+        let momenta = self.twists.impulses(&found[0], FLUX);
+        let unit = FLUX * self.twists.scale[0] * self.twists.scale[n - 1];
         let of = |b: usize, part: usize| {
             // The first column with the last.
             let at = ((b * n) * n + n - 1) * 12 + 6 * part;

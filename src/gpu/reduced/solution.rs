@@ -1,18 +1,16 @@
 //! The bodies' solution to columns of twists: charges and momenta, what they pull with, and wrenches.
 
-use super::products::{Product, product};
+use super::products::{Blocks, Part, Product, product};
 use super::solve::{Reached, Solve};
 use crate::Result;
 use crate::adjoint::lie::Vec6;
 use crate::coupling::PairTensor;
-use crate::gpu::blocks::{Blocks, Part, blocks};
 use crate::gpu::buffer::Buffer;
-use crate::gpu::combine::combine;
-use crate::gpu::kernel::{Batch, Call};
-use crate::gpu::points::{Compressed, PlacedPoints};
-use crate::gpu::sum::{Base, Slice, Sum, sum};
-use crate::gpu::units::{scaled, size, spatial};
-use crate::gpu::wrench::{Side, wrench};
+use crate::gpu::columns::{Base, Sum, combine};
+use crate::gpu::kernel::{Call, Table};
+use crate::gpu::points::PlacedPoints;
+use crate::gpu::source::Constant;
+use crate::gpu::units::{Twists, spatial};
 use nalgebra::DMatrix;
 use std::f64::consts::PI;
 use std::sync::Arc;
@@ -23,9 +21,7 @@ pub(super) const FLUX: f64 = 4.0 * PI;
 /// α of some columns, on the device.
 pub(super) struct Solution {
     pub placed: Arc<PlacedPoints>,
-    pub twists: DMatrix<f64>,
-    /// What each column is in units of: on the device all are about 1.
-    pub scale: Vec<f64>,
+    pub twists: Twists,
     pub columns: usize,
     /// `[point][columns]`.
     pub alpha: Buffer,
@@ -40,13 +36,48 @@ fn probe(count: usize) -> Vec<f64> {
     (0..count).map(of).collect()
 }
 
-/// Body-frame impulses from the device's `[body][6][columns]`, over 4π there.
-pub(super) fn impulses(model: &Compressed, values: &[f64], scale: &[f64]) -> DMatrix<f64> {
-    let k = scale.len();
-    DMatrix::from_fn(6 * model.sizes.bodies, k, |i, c| {
-        let power = if i % 6 < 3 { 4 } else { 5 };
-        FLUX * values[i * k + c] * scale[c] * model.length.powi(power)
-    })
+/// Columns of charges, and their pulls.
+#[derive(Clone, Copy)]
+pub(super) struct Side<'a> {
+    /// `[point][columns]`.
+    pub alpha: &'a Buffer,
+    /// `[point][F, D][columns]`, displaced `[point][F, D, δF, δD][columns]`.
+    pub pull: &'a Buffer,
+    /// δα, read where displaced alone.
+    pub change: &'a Buffer,
+    pub columns: usize,
+}
+
+/// `out[body][left][right][6]`, displaced `[12]`: wrenches about the scene's middle, then their tangents, over 4π
+/// (`shaders/wrench.wgsl`).
+pub(super) fn wrench(
+    placed: &PlacedPoints,
+    (left, right): (Side, Side),
+    displaced: Option<&Table>,
+    out: &Buffer,
+) -> Result<Call> {
+    let model = &placed.model;
+    let constants = [
+        ("FADING", Constant::Flag(model.fading)),
+        ("TANGENT", Constant::Flag(displaced.is_some())),
+    ];
+    let buffers = [
+        ("alpha_left", left.alpha),
+        ("pull_left", left.pull),
+        ("change_left", left.change),
+        ("alpha_right", right.alpha),
+        ("pull_right", right.pull),
+        ("change_right", right.change),
+        ("out", out),
+    ];
+    let count = [model.sizes.bodies, left.columns, right.columns].map(|n| n as u32);
+    model.context.call(
+        ("wrench", "main", model.context.fine()),
+        &constants,
+        &[left.columns, right.columns, 0, 0],
+        (displaced.unwrap_or(&placed.table), &buffers),
+        count,
+    )
 }
 
 impl Solution {
@@ -65,9 +96,8 @@ impl Solution {
         let fine = context.fine();
         let k = twists.ncols();
         let all = k + usize::from(probing);
-        let scale: Vec<f64> = (0..k).map(|c| size(twists, c, model.length)).collect();
-        let device_twists =
-            context.upload("twists", fine, &scaled(twists, &scale, model.length))?;
+        let twists = Twists::new(twists.clone(), model.length);
+        let given_twists = twists.upload(context)?;
         let alpha = context.reals("charges", fine, sizes.points * k)?;
         let psi = context.reals("potentials", fine, sizes.points * k)?;
         let given = context.reals("right-hand sides", fine, sizes.modes * all)?;
@@ -75,141 +105,73 @@ impl Solution {
         let momenta = context.reals("momenta", fine, 6 * sizes.bodies * k)?;
         let open = &model.open;
         let whole = |b| (b, k, 0);
-        let moved = [expand(
-            &model,
-            Part::Strengths,
-            k,
-            whole(&device_twists),
-            whole(&alpha),
-            Base::Nothing,
-        )?];
-        let gathered = product(
-            &placed,
-            Product::Potential,
-            whole(&alpha),
-            k,
-            whole(&psi),
-            open,
-        )?;
-        let mut asked = vec![project(
-            &model,
-            Part::Modes,
-            k,
-            whole(&psi),
-            (&given, all, 0),
-        )?];
+        let strengths = Blocks::expand(Part::Strengths, k, whole(&given_twists), whole(&alpha));
+        let moved = strengths.call(&model, open)?;
+        let (x, y) = (whole(&alpha), whole(&psi));
+        let gathered = product(&placed, Product::Potential, x, k, y, open)?;
+        let asked = Blocks::project(Part::Modes, k, y, (&given, all, 0)).call(&model, open)?;
+        let mut before = vec![&moved];
+        before.extend(&gathered);
+        before.push(&asked);
         let numbers = context.upload("probe", fine, &probe(sizes.modes))?;
-        if probing {
-            let task = Sum {
-                rows: sizes.modes,
-                columns: 1,
-                parts: (&numbers, 1, 1, 0),
-                scale: 1.0,
-                base: Base::Nothing,
-                damped: None,
-                out: (&given, all, k),
-            };
-            asked.push(sum(context, fine, &task, open)?);
-        }
+        let probed = Sum::new((sizes.modes, 1), (&numbers, 1), (&given, all, k));
+        let probed = probing.then(|| probed.call(context, fine, open));
+        let probed = probed.transpose()?;
+        before.extend(&probed);
         let solve = Solve::new(&placed, (&given, &a), all, tolerance, probing.then_some(k))?;
         // What follows from a: α = Ū x̄ + L a and Ūᵀ G α.
-        let added = [expand(
-            &model,
-            Part::Modes,
-            k,
-            (&a, all, 0),
-            whole(&alpha),
-            Base::Out,
-        )?];
-        let read = [project(
-            &model,
-            Part::Strengths,
-            k,
-            whole(&psi),
-            whole(&momenta),
-        )?];
-        let follow = |batch: &mut Batch<'_>| -> Result<()> {
-            context.submit(batch)?;
-            context.run(&[&moved, &added, &gathered, &read])
+        let added = Blocks {
+            base: Base::Out,
+            ..Blocks::expand(Part::Modes, k, (&a, all, 0), x)
         };
-        let mut batch = Batch::default();
-        for calls in [&moved[..], &gathered, &asked] {
-            batch.extend(calls);
-        }
-        solve.begin(&mut batch);
-        follow(&mut batch)?;
-        // Most solves end within the first batch: what follows is read together with how they stand.
-        let count = 6 * sizes.bodies * k;
-        let mut wanted = vec![(&momenta, count * fine.size())];
-        wanted.extend(solve.report(&placed));
-        let mut bytes = context.read_bytes(&wanted)?;
-        let mut states = bytes.split_off(1);
-        let mut values = fine.numbers(&bytes[0]);
-        let mut reached = match solve.reached(&placed, &states)? {
-            Some(reached) => reached,
-            None => {
-                let (reached, last) = solve.finish(&placed)?;
-                states = last;
-                follow(&mut Batch::default())?;
-                values = context.read(fine, &[(&momenta, count)])?.swap_remove(0);
-                reached
-            }
-        };
-        if probing {
-            reached.condition = solve.condition(&placed, &states, k)?;
-        }
-        let mut momenta = impulses(&model, &values, &scale);
+        let added = added.call(&model, open)?;
+        let read = Blocks::project(Part::Strengths, k, y, whole(&momenta)).call(&model, open)?;
+        let mut follow = vec![&moved, &added];
+        follow.extend(&gathered);
+        follow.push(&read);
+        let wanted = [(&momenta, 6 * sizes.bodies * k)];
+        let (reached, values) = solve.run(before, &follow, &wanted)?;
+        let mut momenta = twists.impulses(&values[0], FLUX);
         for (b, body) in model.reduced.reduced_bodies().iter().enumerate() {
             let mut rows = momenta.rows_mut(6 * b, 6);
-            rows += body.parts().added_mass * twists.rows(6 * b, 6);
+            rows += body.parts().added_mass * twists.all.rows(6 * b, 6);
         }
         Ok(Self {
-            twists: twists.clone(),
+            twists,
             columns: k,
-            scale,
             alpha,
             momenta,
             reached,
-            placed,
+            placed: placed.clone(),
         })
     }
 
-    /// Combinations of the columns, coefficients columns × n.
+    /// Combinations of the columns, coefficients columns × n, and the coefficients between both's units.
     ///
     /// # Errors
     /// A device that fails.
-    pub fn combination(&self, coefficients: &DMatrix<f64>) -> Result<Self> {
+    pub fn combination(&self, coefficients: &DMatrix<f64>) -> Result<(Self, DMatrix<f64>)> {
         let model = &self.placed.model;
         let (context, n) = (&model.context, coefficients.ncols());
-        let twists = &self.twists * coefficients;
-        let scale: Vec<f64> = (0..n).map(|c| size(&twists, c, model.length)).collect();
+        let (twists, units) = self.twists.combined(coefficients);
         let alpha = context.reals("charges", context.fine(), model.sizes.points * n)?;
-        let units = self.units(coefficients, &scale);
         let call = combine(
             context,
-            context.fine(),
             &self.alpha,
             &units,
             &alpha,
             (model.sizes.points, 1),
         )?;
-        context.run(&[&[call]])?;
-        Ok(Self {
+        context.submit([&call])?;
+        let out = Self {
             placed: self.placed.clone(),
             momenta: &self.momenta * coefficients,
             reached: self.reached,
             columns: n,
             twists,
-            scale,
             alpha,
-        })
-    }
-
-    /// Coefficients between the columns' units and others.
-    pub fn units(&self, coefficients: &DMatrix<f64>, scale: &[f64]) -> DMatrix<f64> {
-        DMatrix::from_fn(self.columns, scale.len(), |k, c| {
-            coefficients[(k, c)] * self.scale[k] / scale[c]
-        })
+        };
+        Ok((out, units))
     }
 
     /// What every column's charges pull with, `[point][F, D][columns]`.
@@ -219,21 +181,11 @@ impl Solution {
     pub fn pulls(&self) -> Result<Buffer> {
         let model = &self.placed.model;
         let (context, k) = (&model.context, self.columns);
-        let out = context.reals(
-            "pulls",
-            context.fine(),
-            model.sizes.points * model.pull() * k,
-        )?;
-        let alpha = (&self.alpha, k, 0);
-        let calls = product(
-            &self.placed,
-            Product::Pull,
-            alpha,
-            k,
-            (&out, k, 0),
-            &model.open,
-        )?;
-        context.run(&[&calls])?;
+        let count = model.sizes.points * model.pull() * k;
+        let out = context.reals("pulls", context.fine(), count)?;
+        let (x, y) = ((&self.alpha, k, 0), (&out, k, 0));
+        let calls = product(&self.placed, Product::Pull, x, k, y, &model.open)?;
+        context.submit(&calls)?;
         Ok(out)
     }
 
@@ -257,12 +209,12 @@ impl Solution {
         let count = model.sizes.bodies * n * m * 6;
         let out = context.reals("wrenches", fine, count)?;
         let sides = (self.side(pulls), other.0.side(other.1));
-        let call = wrench(context, &self.placed, sides, None, &out)?;
-        context.run(&[&[call]])?;
+        let call = wrench(&self.placed, sides, None, &out)?;
+        context.submit([&call])?;
         let values = context.read(fine, &[(&out, count)])?.swap_remove(0);
         let of = |b: usize, x: usize, y: usize| {
             let at = ((b * n + x) * m + y) * 6;
-            let unit = FLUX * self.scale[x] * other.0.scale[y];
+            let unit = FLUX * self.twists.scale[x] * other.0.twists.scale[y];
             spatial(model.length, &self.placed.middle, &values[at..at + 6], unit)
         };
         let pairs = |b: usize| {
@@ -286,43 +238,4 @@ impl Solution {
         };
         Ok(PairTensor::new(k, all.iter().map(of).collect()))
     }
-}
-
-/// `out = L x` or `Ū x` (+ base).
-pub(super) fn expand(
-    model: &Compressed,
-    part: Part,
-    columns: usize,
-    x: Slice,
-    out: Slice,
-    base: Base,
-) -> Result<Call> {
-    let task = Blocks {
-        part,
-        columns,
-        x,
-        out,
-        scale: 1.0,
-        base,
-    };
-    blocks(&model.context, model, true, &task, &model.open)
-}
-
-/// `out = Lᵀ x` or `Ūᵀ x`.
-pub(super) fn project(
-    model: &Compressed,
-    part: Part,
-    columns: usize,
-    x: Slice,
-    out: Slice,
-) -> Result<Call> {
-    let task = Blocks {
-        part,
-        columns,
-        x,
-        out,
-        scale: 1.0,
-        base: Base::Nothing,
-    };
-    blocks(&model.context, model, false, &task, &model.open)
 }

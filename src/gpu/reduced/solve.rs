@@ -1,12 +1,10 @@
-//! `(I − LᵀGL) a = b` on the device, by conjugate gradients.
+//! `(I − LᵀGL) a = b` on the device, by conjugate gradients in the fine arithmetic (`shaders/conjugate.wgsl`).
 
-use super::products::{Product, product};
-use crate::gpu::blocks::{Blocks, Part, blocks};
-use crate::gpu::buffer::Buffer;
-use crate::gpu::conjugate::{Directions, Limits, Steps, conjugate};
-use crate::gpu::kernel::{Batch, Call};
+use super::products::{Blocks, Part, Product, product};
+use crate::gpu::buffer::{Buffer, words};
+use crate::gpu::columns::Base;
+use crate::gpu::kernel::{Call, threads};
 use crate::gpu::points::PlacedPoints;
-use crate::gpu::sum::Base;
 use crate::{Error, Result};
 use nalgebra::DMatrix;
 
@@ -16,13 +14,22 @@ const FEW: usize = 12;
 const MOST: usize = 1000;
 
 /// The solve of some columns.
-pub(super) struct Solve {
+pub(super) struct Solve<'a> {
+    placed: &'a PlacedPoints,
     columns: usize,
     tolerance: f64,
-    directions: Directions,
-    steps: Steps,
-    /// q = p − LᵀG L p.
-    apply: Vec<Call>,
+    /// The column whose coefficients are kept.
+    probe: Option<usize>,
+    /// `[column][4]`: iterations, whether a direction had no positive curvature, whether it is unfinished.
+    counts: Buffer,
+    /// `[column][2]`: the residual squared, the least quotient p·Ap/p·p.
+    state: Buffer,
+    /// `[iteration][2]`: α and β of the probe.
+    history: Buffer,
+    opening: [Call; 2],
+    /// q = p − LᵀG L p, and the step.
+    iteration: Vec<Call>,
+    last: Call,
 }
 
 /// How far a solve came.
@@ -35,13 +42,13 @@ pub(super) struct Reached {
     pub condition: f64,
 }
 
-impl Solve {
+impl<'a> Solve<'a> {
     /// Of `given` into `solution`, both modes × columns; `probe` is the column that tells of the condition number.
     ///
     /// # Errors
     /// A device that fails, or has too little memory.
     pub fn new(
-        placed: &PlacedPoints,
+        placed: &'a PlacedPoints,
         (given, solution): (&Buffer, &Buffer),
         columns: usize,
         tolerance: f64,
@@ -50,70 +57,118 @@ impl Solve {
         let model = &placed.model;
         let (context, sizes) = (&model.context, &model.sizes);
         let fine = context.fine();
-        let directions = Directions::new(context, sizes.modes, columns, MOST)?;
-        let limits = Limits {
-            tolerance,
-            most: MOST,
-            probe,
+        let rows = sizes.modes;
+        let reals = |label, count| context.reals(label, fine, count);
+        let (p, q) = (reals("p", rows * columns)?, reals("q", rows * columns)?);
+        let counts = context.bytes("counts", 16 * columns)?;
+        let state = reals("state", 2 * columns)?;
+        let history = reals("history", 2 * MOST)?;
+        let going = context.upload_words("going", &vec![0; columns])?;
+        let buffers = [
+            ("given", given),
+            ("solution", solution),
+            ("r", &reals("r", rows * columns)?),
+            ("p", &p),
+            ("q", &q),
+            ("x", &reals("x", rows * columns)?),
+            // `[column][4]`: γ, α, β, the right-hand side's norm.
+            ("scalars", &reals("scalars", 4 * columns)?),
+            ("counts", &counts),
+            ("state", &state),
+            ("history", &history),
+            ("going", &going),
+        ];
+        let end = (tolerance.powi(2) as f32).to_bits() as usize;
+        let words = [rows, columns, probe.unwrap_or(columns), MOST, end, 0, 0, 0];
+        let of = |entry, count| {
+            let shader = ("conjugate", entry, fine);
+            context.call(shader, &[], &words, (&[], &buffers), count)
         };
-        let rows = (sizes.modes, columns);
-        let steps = conjugate(context, &directions, (given, solution), rows, &limits)?;
-        let charges = context.reals("charges", fine, sizes.points * columns)?;
-        let psi = context.reals("potentials", fine, sizes.points * columns)?;
-        let whole = |b| (b, columns, 0);
-        let expand = Blocks {
-            part: Part::Modes,
-            columns,
-            x: whole(&directions.p),
-            out: whole(&charges),
-            scale: 1.0,
-            base: Base::Nothing,
-        };
+        let each = [columns as u32, 1, 1];
+        let all = threads(rows * columns);
+
+        let charges = reals("charges", sizes.points * columns)?;
+        let psi = reals("potentials", sizes.points * columns)?;
+        let [x, y, p, q] = [&charges, &psi, &p, &q].map(|b| (b, columns, 0));
         let project = Blocks {
-            part: Part::Modes,
-            columns,
-            x: whole(&psi),
-            out: whole(&directions.q),
             scale: -1.0,
-            base: Base::Other(whole(&directions.p)),
+            base: Base::Other(p),
+            ..Blocks::project(Part::Modes, columns, y, q)
         };
-        let gate = &directions.going;
-        let mut apply = vec![blocks(context, model, true, &expand, gate)?];
+        let expand = Blocks::expand(Part::Modes, columns, p, x);
+        let mut iteration = vec![expand.call(model, &going)?];
         let potential = Product::Potential;
-        let (x, out) = (whole(&charges), whole(&psi));
-        apply.extend(product(placed, potential, x, columns, out, gate)?);
-        apply.push(blocks(context, model, false, &project, gate)?);
+        iteration.extend(product(placed, potential, x, columns, y, &going)?);
+        iteration.extend([
+            project.call(model, &going)?,
+            of("curvature", each)?,
+            of("advance", all)?,
+            of("measure", each)?,
+            of("turn", all)?,
+        ]);
         Ok(Self {
+            placed,
             columns,
             tolerance,
-            steps,
-            apply,
-            directions,
+            probe,
+            opening: [of("begin", each)?, of("start", all)?],
+            iteration,
+            last: of("finish", all)?,
+            counts,
+            state,
+            history,
         })
     }
 
-    fn iterate<'a>(&'a self, batch: &mut Batch<'a>, iterations: usize) {
+    fn iterate<'b>(&'b self, batch: &mut Vec<&'b Call>, iterations: usize) {
         for _ in 0..iterations {
-            batch.extend(&self.apply);
-            batch.extend(&self.steps.iteration);
+            batch.extend(&self.iteration);
         }
-        batch.push(&self.steps.finish);
+        batch.push(&self.last);
     }
 
-    /// What does for most systems.
-    pub fn begin<'a>(&'a self, batch: &mut Batch<'a>) {
-        batch.extend(&self.steps.opening);
-        self.iterate(batch, FEW);
+    /// Solves after some calls, starts what follows, and reads: the beginnings of some arrays of real numbers, so many
+    /// of each.
+    ///
+    /// # Errors
+    /// A system that isn't positive definite or not solved, or a device that fails.
+    pub fn run<'b>(
+        &'b self,
+        mut batch: Vec<&'b Call>,
+        follow: &[&'b Call],
+        wanted: &[(&Buffer, usize)],
+    ) -> Result<(Reached, Vec<Vec<f64>>)> {
+        let context = &self.placed.model.context;
+        let fine = context.fine();
+        batch.extend(&self.opening);
+        self.iterate(&mut batch, FEW);
+        batch.extend(follow);
+        context.submit(batch)?;
+        // Most solves end within the first batch: what follows is read together with how they stand.
+        let (mut values, mut states) = context.read_beside(fine, wanted, &self.report())?;
+        let mut reached = match self.reached(&states)? {
+            Some(reached) => reached,
+            None => {
+                let (reached, last) = self.finish()?;
+                states = last;
+                context.submit(follow.iter().copied())?;
+                values = context.read(fine, wanted)?;
+                reached
+            }
+        };
+        if let Some(probe) = self.probe {
+            reached.condition = self.condition(&states, probe)?;
+        }
+        Ok((reached, values))
     }
 
-    /// What tells how each column stands, to be read beside other results: bytes of each array.
-    pub fn report(&self, placed: &PlacedPoints) -> [(&Buffer, usize); 3] {
-        let size = placed.model.context.fine().size();
-        let d = &self.directions;
+    /// What tells how each column stands: bytes of each array.
+    fn report(&self) -> [(&Buffer, usize); 3] {
+        let size = self.placed.model.context.fine().size();
         [
-            (&d.counts, 16 * self.columns),
-            (&d.state, 2 * self.columns * size),
-            (&d.history, 2 * MOST * size),
+            (&self.counts, 16 * self.columns),
+            (&self.state, 2 * self.columns * size),
+            (&self.history, 2 * MOST * size),
         ]
     }
 
@@ -121,17 +176,16 @@ impl Solve {
     ///
     /// # Errors
     /// A system that isn't positive definite, or that took too many iterations.
-    pub fn reached(&self, placed: &PlacedPoints, bytes: &[Vec<u8>]) -> Result<Option<Reached>> {
-        let model = &placed.model;
-        let counts: Vec<u32> = bytes[0]
-            .chunks_exact(4)
-            .map(|c| u32::from_le_bytes([c[0], c[1], c[2], c[3]]))
-            .collect();
+    fn reached(&self, bytes: &[Vec<u8>]) -> Result<Option<Reached>> {
+        let model = &self.placed.model;
+        let counts = words(&bytes[0]);
         let fine = model.context.fine();
         let state = fine.numbers(&bytes[1]);
         let column = |k: usize, which: usize| counts[4 * k + which] as usize;
         if let Some(k) = (0..self.columns).find(|k| column(*k, 1) != 0) {
-            return Err(model.reduced.indefinite(&placed.poses, state[2 * k + 1]));
+            return Err(model
+                .reduced
+                .indefinite(&self.placed.poses, state[2 * k + 1]));
         }
         let mut reached = Reached::default();
         for k in 0..self.columns {
@@ -164,16 +218,16 @@ impl Solve {
     ///
     /// # Errors
     /// As [`Solve::reached`], or a device that fails.
-    pub fn finish(&self, placed: &PlacedPoints) -> Result<(Reached, Vec<Vec<u8>>)> {
-        let context = &placed.model.context;
+    fn finish(&self) -> Result<(Reached, Vec<Vec<u8>>)> {
+        let context = &self.placed.model.context;
         let mut iterations = FEW;
         loop {
             iterations = (2 * iterations).min(MOST);
-            let mut batch = Batch::default();
+            let mut batch = Vec::new();
             self.iterate(&mut batch, iterations);
-            context.submit(&batch)?;
-            let bytes = context.read_bytes(&self.report(placed))?;
-            if let Some(reached) = self.reached(placed, &bytes)? {
+            context.submit(batch)?;
+            let bytes = context.read_bytes(&self.report())?;
+            if let Some(reached) = self.reached(&bytes)? {
                 return Ok((reached, bytes));
             }
         }
@@ -184,12 +238,10 @@ impl Solve {
     ///
     /// # Errors
     /// One that isn't positive definite.
-    pub fn condition(&self, placed: &PlacedPoints, bytes: &[Vec<u8>], probe: usize) -> Result<f64> {
-        let fine = placed.model.context.fine();
-        let at = 16 * probe;
-        let mut four = [0; 4];
-        four.copy_from_slice(&bytes[0][at..at + 4]);
-        let steps = (u32::from_le_bytes(four) as usize).min(MOST);
+    fn condition(&self, bytes: &[Vec<u8>], probe: usize) -> Result<f64> {
+        let model = &self.placed.model;
+        let fine = model.context.fine();
+        let steps = (words(&bytes[0])[4 * probe] as usize).min(MOST);
         let history = fine.numbers(&bytes[2]);
         let (alpha, beta) = (|j: usize| history[2 * j], |j: usize| history[2 * j + 1]);
         let mut lanczos = DMatrix::zeros(steps, steps);
@@ -210,7 +262,7 @@ impl Solve {
         if low > 0.0 {
             Ok(high / low)
         } else {
-            Err(placed.model.reduced.indefinite(&placed.poses, low))
+            Err(model.reduced.indefinite(&self.placed.poses, low))
         }
     }
 }

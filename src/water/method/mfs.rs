@@ -2,7 +2,7 @@
 
 use super::kind::{BodyMethod, Problem, Solved};
 use crate::Result;
-use crate::boundary::{self, BodyBoundary, Response};
+use crate::boundary::{self, BodyBoundary};
 use crate::coupling::full::{FullSolver, Model};
 use crate::water::device::Device;
 use crate::water::numerics::Numerics;

@@ -14,13 +14,13 @@ const PATIENCE: Duration = Duration::from_millis(50);
 
 /// Whether work should go on.
 #[derive(Clone, Default)]
-pub struct Wish {
+pub struct Interrupt {
     stop: Arc<AtomicBool>,
 }
 
-impl Wish {
+impl Interrupt {
     /// For the progress of a rollout.
-    pub fn go_on(&self) -> ControlFlow<()> {
+    pub fn check(&self) -> ControlFlow<()> {
         match self.stop.load(Ordering::Relaxed) {
             true => ControlFlow::Break(()),
             false => ControlFlow::Continue(()),
@@ -57,16 +57,16 @@ fn said(panic: &(dyn std::any::Any + Send)) -> &str {
 /// to itself: the exception doesn't wait for it.
 pub fn long<T: Send + 'static>(
     py: Python<'_>,
-    work: impl FnOnce(&Wish) -> hydrograd::Result<T> + Send + 'static,
+    work: impl FnOnce(&Interrupt) -> hydrograd::Result<T> + Send + 'static,
 ) -> PyResult<T> {
     not_forked()?;
-    let wish = Wish::default();
+    let interrupt = Interrupt::default();
     // A controller that simulates is called by a thread that the simulation waits for: it can't wait for another.
     if rayon::current_thread_index().is_some() {
-        return finish(py, || work(&wish));
+        return finish(py, || work(&interrupt));
     }
     let (send, receive) = sync_channel(1);
-    let theirs = wish.clone();
+    let theirs = interrupt.clone();
     let thread = std::thread::Builder::new()
         .name("hydrograd".into())
         .spawn(move || {
@@ -88,7 +88,7 @@ pub fn long<T: Send + 'static>(
             Ok(Err(panic)) => return Err(internal(said(panic.as_ref()))),
             Err(RecvTimeoutError::Timeout) => {
                 if let Err(stop) = py.check_signals() {
-                    wish.stop.store(true, Ordering::Relaxed);
+                    interrupt.stop.store(true, Ordering::Relaxed);
                     return Err(stop);
                 }
             }

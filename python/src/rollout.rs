@@ -239,9 +239,9 @@ impl Rollout {
         use hydrograd::simulate::Objective as _;
         let objective = objective.0.clone();
         let rollout = self.inner.clone();
-        let made = long(py, move |wish| {
+        let made = long(py, move |interrupt| {
             objective.check(&rollout)?;
-            rollout.vjp_with(&objective.cotangents(&rollout), |_| wish.go_on())
+            rollout.vjp_with(&objective.cotangents(&rollout), |_| interrupt.check())
         })?;
         gradient::of_rollout(py, &made)
     }
@@ -310,7 +310,9 @@ impl Rollout {
             seed.observables.insert(name, columns);
         }
         let rollout = self.inner.clone();
-        let made = long(py, move |wish| rollout.vjp_with(&seed, |_| wish.go_on()))?;
+        let made = long(py, move |interrupt| {
+            rollout.vjp_with(&seed, |_| interrupt.check())
+        })?;
         gradient::of_rollout(py, &made)
     }
 

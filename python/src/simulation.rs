@@ -130,9 +130,9 @@ impl Simulator {
         let start = me.begin(state, q, v)?;
         let matrix = me.matrix("rollout: controls", controls, steps)?;
         let inner = me.inner.clone();
-        let made = long(slf.py(), move |wish| {
+        let made = long(slf.py(), move |interrupt| {
             let controls = Controls::from_matrix(&inner, matrix)?;
-            inner.rollout_from(&start.state(&inner)?, &controls, |_| wish.go_on())
+            inner.rollout_from(&start.state(&inner)?, &controls, |_| interrupt.check())
         })?;
         Ok(Rollout::new(slf, made))
     }
@@ -185,10 +185,10 @@ impl Simulator {
             })
             .collect();
         let inner = me.inner.clone();
-        let made = long(slf.py(), move |wish| {
+        let made = long(slf.py(), move |interrupt| {
             let one = |(start, matrix): (Start, DMatrix<f64>)| {
                 let controls = Controls::from_matrix(&inner, matrix)?;
-                inner.rollout_from(&start.state(&inner)?, &controls, |_| wish.go_on())
+                inner.rollout_from(&start.state(&inner)?, &controls, |_| interrupt.check())
             };
             runs.into_par_iter()
                 .map(one)

@@ -65,8 +65,8 @@ pub fn tradeoff<'py>(
         budget: Some(budget),
     };
     let scene = scene.0.clone();
-    let text = long(py, move |wish| {
-        let found = measure(&scene, &settings, |_| wish.go_on())?;
+    let text = long(py, move |interrupt| {
+        let found = measure(&scene, &settings, |_| interrupt.check())?;
         Ok(serde_json::to_string(&found))
     })?;
     let text = text.map_err(|e| internal(&e.to_string()))?;

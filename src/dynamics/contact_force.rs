@@ -80,8 +80,8 @@ impl Evaluation<'_> {
     }
 
     /// Whether any force acts in contact at the velocity `v`; where none does, none changes with v either.
-    pub(super) fn presses(&self, v: &DVector<f64>) -> bool {
-        if self.stops(v).any(|(_, forces)| forces != [0.0; 2]) {
+    pub(super) fn contact_acts(&self, v: &DVector<f64>) -> bool {
+        if self.limit_forces(v).any(|(_, forces)| forces != [0.0; 2]) {
             return true;
         }
         if self.contact_points.is_empty() {
@@ -102,7 +102,7 @@ impl Evaluation<'_> {
             Dual::Frame => &self.kinematics.frame_columns,
         };
         let mut out = tree.project(columns, wrenches);
-        for (limit, [lower, upper]) in self.stops(v) {
+        for (limit, [lower, upper]) in self.limit_forces(v) {
             out[limit.v] += lower + upper;
         }
         out
@@ -121,7 +121,7 @@ impl Evaluation<'_> {
                 out += tree.project(&self.kinematics.columns, wrenches).abs();
             }
         }
-        for (limit, [lower, upper]) in self.stops(v) {
+        for (limit, [lower, upper]) in self.limit_forces(v) {
             out[limit.v] += lower.abs() + upper.abs();
         }
         out
@@ -196,7 +196,10 @@ impl Evaluation<'_> {
     }
 
     /// Each limit with the forces of its stops at the velocity `v`.
-    pub(super) fn stops(&self, v: &DVector<f64>) -> impl Iterator<Item = (&JointLimit, [f64; 2])> {
+    pub(super) fn limit_forces(
+        &self,
+        v: &DVector<f64>,
+    ) -> impl Iterator<Item = (&JointLimit, [f64; 2])> {
         let each = self.system.limits.iter();
         each.map(|l| (l, l.forces(self.q[l.q], v[l.v])))
     }

@@ -164,7 +164,7 @@ impl Rollout {
     pub fn gaps(&self) -> &[Option<Gap>] {
         self.gaps.get_or_init(|| {
             let samples = self.samples().iter();
-            match self.simulator.felt().coupled() {
+            match self.simulator.fidelity_acting().coupled() {
                 false => samples
                     .map(|s| self.simulator.gaps().smallest(&s.poses))
                     .collect(),

@@ -241,7 +241,7 @@ impl Simulator {
     }
 
     /// The fidelity that matters: without water bodies don't feel each other.
-    pub(super) fn felt(&self) -> Fidelity {
+    pub(super) fn fidelity_acting(&self) -> Fidelity {
         if self.parameters().density() > 0.0 {
             self.assembled.water.fidelity
         } else {
@@ -299,7 +299,7 @@ impl Simulator {
         smallest: Option<(f64, Gap)>,
         states: impl Iterator<Item = (f64, &'s [Pose], Gap)>,
     ) -> Option<String> {
-        let fidelity = self.felt();
+        let fidelity = self.fidelity_acting();
         let clearance = self.clearance();
         let warning = smallest.and_then(|(time, gap)| clearance.warning(time, &gap, fidelity));
         let unresolved = || clearance.unresolved(states, &self.assembled.water.resolved);

@@ -49,7 +49,7 @@ impl Simulator {
 impl<'a> Trajectory<'a> {
     /// The smallest gap at a state, whose bodies must keep apart; not asked for where it has no effect.
     fn gap(&self, state: &State) -> Result<Option<Gap>> {
-        if !self.simulator.felt().coupled() {
+        if !self.simulator.fidelity_acting().coupled() {
             return Ok(None);
         }
         let poses = self.stepper.system.tree.kinematics(&state.q).poses;

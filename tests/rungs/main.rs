@@ -97,7 +97,7 @@ const THROUGH: &[(&str, &str)] = &[
     ),
     (
         "dynamics::integrator::contact::Adjoint::solve_vjp",
-        "dynamics::integrator::contact::Adjoint::press_vjp",
+        "dynamics::integrator::contact::Adjoint::apply_vjp",
     ),
     (
         "dynamics::balance::Evaluation::loads_vjp",

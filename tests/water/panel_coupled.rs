@@ -271,7 +271,12 @@ fn a_disc_over_a_wall() {
     let disc = mesh(&Shape::cylinder(1.0, 0.25), 1280);
     let disc = Arc::new(PanelBoundary::new("disc", &disc).unwrap());
     let floor = [wall(0.0, WallSurface::Rigid)];
-    let c = PanelCoupled::new(vec![disc], &floor, Exclusions::none(), SolveSettings::default());
+    let c = PanelCoupled::new(
+        vec![disc],
+        &floor,
+        Exclusions::none(),
+        SolveSettings::default(),
+    );
     let c = c.unwrap();
     let up = DMatrix::from_fn(6, 1, |i, _| if i == 2 { 1.0 } else { 0.0 });
     let one = DVector::from_element(1, 1.0);

@@ -93,8 +93,8 @@ impl Panel {
     pub fn value_of<T: Lane>(&self, s: V3<T>) -> T {
         let (r, l) = self.seen(s);
         let mut value = -(dot(constant(l[0], &self.normal), r[0]) * self.angle(r[0], l));
-        for c in 0..3 {
-            let distance = dot(constant(l[0], &self.outward[c]), r[c]);
+        for (c, r) in r.into_iter().enumerate() {
+            let distance = dot(constant(l[0], &self.outward[c]), r);
             value = distance.mul_add(self.logarithm(c, l), value);
         }
         value

@@ -36,7 +36,7 @@ impl PlacedPanels<'_> {
         let mu = Columns {
             rows: range.len(),
             columns: k,
-            data: solution.mu.slice(&range).to_vec(),
+            data: solution.mu.slice(range).to_vec(),
         };
         transposed_product(&arms, 6 * k, &mu)
     }

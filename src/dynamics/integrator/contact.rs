@@ -63,7 +63,7 @@ fn hessian(e: &Evaluation, split: &Split, v: &DVector<f64>, dt: f64) -> Result<D
 pub(super) fn solve(start: &Start, before: &DVector<f64>) -> Result<DVector<f64>> {
     let (e, split, dt) = (start.e, start.split, start.stepper.dt);
     // At no force v* is the least of the convex problem.
-    if split.free.is_empty() || !e.presses(before) {
+    if split.free.is_empty() || !e.contact_acts(before) {
         return Ok(before.clone());
     }
     let sized = split.sizes(&e.mass_matrix);
@@ -136,13 +136,13 @@ fn search(now: Trial, step: &DVector<f64>, at: &dyn Fn(DVector<f64>) -> Trial) -
 }
 
 /// The end of a step from the velocity and the frame momenta before contact: the state there, and both velocities.
-pub(super) fn press(
+pub(super) fn apply(
     start: &Start,
     before: DVector<f64>,
     hat: DVector<f64>,
 ) -> Result<(State, Stages)> {
     let after = solve(start, &before)?;
-    let hat = match start.e.presses(&before) {
+    let hat = match start.e.contact_acts(&before) {
         true => hat + start.stepper.dt * start.e.contact_force(&after, Dual::Frame),
         false => hat,
     };
@@ -150,13 +150,13 @@ pub(super) fn press(
     Ok((next, Stages::Contact(ContactVelocities { before, after })))
 }
 
-/// What the transposes of [`solve`] and [`press`] need.
+/// What the transposes of [`solve`] and [`apply`] need.
 pub(super) struct Adjoint<'s> {
     pub velocities: &'s ContactVelocities,
-    pressed: Pressed,
+    acting: Acting,
 }
 
-enum Pressed {
+enum Acting {
     /// Nothing presses.
     No,
     /// Something does, but every velocity is driven.
@@ -169,17 +169,14 @@ impl<'s> Adjoint<'s> {
     /// At a step's velocities before and after contact.
     pub fn new(start: &Start, velocities: &'s ContactVelocities) -> Result<Self> {
         let (e, split) = (start.e, start.split);
-        let pressed = if !e.presses(&velocities.before) {
-            Pressed::No
+        let acting = if !e.contact_acts(&velocities.before) {
+            Acting::No
         } else if split.free.is_empty() {
-            Pressed::Driven
+            Acting::Driven
         } else {
-            Pressed::Solved(hessian(e, split, &velocities.after, start.stepper.dt)?)
+            Acting::Solved(hessian(e, split, &velocities.after, start.stepper.dt)?)
         };
-        Ok(Self {
-            velocities,
-            pressed,
-        })
+        Ok(Self { velocities, acting })
     }
 
     /// Transpose of [`solve`]: from the cotangent of the velocity after contact to that of the one before; the rest is added to
@@ -190,7 +187,7 @@ impl<'s> Adjoint<'s> {
         after_bar: &DVector<f64>,
         bar: &mut StepBar,
     ) -> Result<DVector<f64>> {
-        let Pressed::Solved(hessian) = &self.pressed else {
+        let Acting::Solved(hessian) = &self.acting else {
             return Ok(after_bar.clone());
         };
         let (e, split) = (start.e, start.split);
@@ -210,8 +207,8 @@ impl<'s> Adjoint<'s> {
         Ok(before_bar)
     }
 
-    /// Transpose of [`press`]: cotangents of the velocity and of the momenta before contact; the rest is added to `bar`.
-    pub fn press_vjp(
+    /// Transpose of [`apply`]: cotangents of the velocity and of the momenta before contact; the rest is added to `bar`.
+    pub fn apply_vjp(
         &self,
         start: &Start,
         next_bar: &StateBar,
@@ -221,7 +218,7 @@ impl<'s> Adjoint<'s> {
         let (q_bar, after_bar) = start.advance_vjp(after, &next_bar.q);
         bar.state.q += q_bar;
         let hat_bar = start.next_momentum_bar(next_bar);
-        if matches!(self.pressed, Pressed::No) {
+        if matches!(self.acting, Acting::No) {
             return Ok((after_bar, hat_bar));
         }
         let pressed = start.e.contact_force_vjp(after, &hat_bar, Dual::Frame);

@@ -137,7 +137,7 @@ pub(super) fn step(start: &Start) -> Result<(State, Stages)> {
     let p = start.momentum();
     let stage = solve_stage(start, e, &p, rule(s), start.v)?;
     let y = &p + s.dt * &stage.force;
-    contact::press(start, stage.v, y)
+    contact::apply(start, stage.v, y)
 }
 
 /// What the transpose of a step needs.
@@ -166,7 +166,7 @@ impl<'a> Transposed<'a> for Adjoint<'_> {
         let (s, e, split) = (start.stepper, start.e, start.split);
         let before = &self.contact.velocities.before;
         let mut bar = StepBar::zeros(e);
-        let (mut v_bar, z) = self.contact.press_vjp(start, next_bar, &mut bar)?;
+        let (mut v_bar, z) = self.contact.apply_vjp(start, next_bar, &mut bar)?;
         // v̄ of p̂⁺ through f; only the transpose of ∂f/∂v is needed here.
         v_bar += s.dt * self.stage.rates.tr_mul(&z);
         let w = self.stage.solve(split, &v_bar)?;

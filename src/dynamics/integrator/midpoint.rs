@@ -66,7 +66,7 @@ pub(super) fn step(start: &Start) -> Result<(State, Stages)> {
         // Down at rounding, or at the coupled solve's own tolerance, changes are noise: stop when they no longer halve.
         if moved <= TOLERANCE || (moved <= noise(&m) && moved > 0.5 * previous) {
             let y = &p + s.dt * next.force;
-            return contact::press(start, stage, y);
+            return contact::apply(start, stage, y);
         }
         previous = moved;
     }
@@ -112,7 +112,7 @@ impl<'a> Transposed<'a> for Adjoint<'_, 'a> {
         let before = &self.contact.velocities.before;
         let h = 0.5 * s.dt;
         let mut bar = StepBar::zeros(start.e);
-        let (v_bar_next, z) = self.contact.press_vjp(start, next_bar, &mut bar)?;
+        let (v_bar_next, z) = self.contact.apply_vjp(start, next_bar, &mut bar)?;
         let v_bar_force = s.dt * self.stage.rates.tr_mul(&z);
         let fixed = v_bar_next + v_bar_force;
         // v̄ = fixed + (∂q_m/∂v)ᵀ q̄_m(w), w = J⁻ᵀ v̄.

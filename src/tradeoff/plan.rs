@@ -304,7 +304,7 @@ mod tests {
     fn first_values_are_the_base() {
         let settings = TradeoffSettings {
             fidelities: vec![Fidelity::Reduced, Fidelity::Full],
-            methods: vec![Method::Panel, Method::MfsFace],
+            methods: vec![Method::Exact, Method::MfsFace],
             faces: vec![320, 80],
             ranks: vec![20, 40],
             tolerances: vec![1e-6],
@@ -314,17 +314,17 @@ mod tests {
         };
         let plan = plan(&scene(&[Shape::sphere(1.0)]), &settings);
         let reduced = plan[0];
-        assert_eq!(reduced.method, Method::Panel);
+        assert_eq!(reduced.method, Method::Exact);
         assert_eq!(reduced.faces_per_body, Some(320));
         assert_eq!((reduced.rank, reduced.accuracy), (Some(20), None));
         assert_eq!(reduced.time_step, 0.02);
-        // Full takes the first method that it can step with; panels follow as a row of their own.
+        // Full takes the first method that it can step with; what it can't follows as a row of its own.
         let full = plan[1];
         assert_eq!(full.method, Method::MfsFace);
         assert_eq!(full.tolerance, Some(1e-6));
         let methods = of(&plan, Fidelity::Full, Family::Method);
         assert_eq!(methods.len(), 1);
-        assert_eq!(methods[0].method, Method::Panel);
+        assert_eq!(methods[0].method, Method::Exact);
         let steps = of(&plan, Fidelity::Reduced, Family::TimeStep);
         assert_eq!(steps.len(), 1);
         assert!(!steps[0].steps_like(&reduced) && steps[0].couples_like(&reduced));

@@ -157,7 +157,9 @@ fn two_spheres_compared() {
     // What can't run is a row that says so, with what could be had.
     let panels = find("full", "panel");
     assert!(panels[0]["error"].is_null());
-    assert!(error(panels[0]) < 0.02 && number(panels[0], "ms_per_step") > 0.0);
+    // What meshes of 80 faces lack of the spheres, and no extrapolation.
+    assert!((0.06..0.1).contains(&error(panels[0])));
+    assert!(number(panels[0], "ms_per_step") > 0.0);
     let impossible = find("full", "exact");
     assert!(
         impossible[0]["error"]

@@ -240,10 +240,9 @@ fn velocities_are_those_of_origins() {
     let found = rollout.velocities();
     assert_eq!(found.shape(), (12, 2));
     // The rail's speed, and the free joint's own six at a frame that isn't turned.
-    assert_eq!(
-        found.view((0, 0), (6, 1)).into_owned().as_slice(),
-        [v[0], 0.0, 0.0, 0.0, 0.0, 0.0]
-    );
+    // Both are read from the momenta, so up to rounding.
+    assert!((found[(0, 0)] - v[0]).abs() < 1e-15);
+    assert_eq!(found.view((1, 0), (5, 1)).norm(), 0.0);
     for i in 0..6 {
         assert!((found[(6 + i, 0)] - v[1 + i]).abs() < 1e-12);
     }

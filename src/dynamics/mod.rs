@@ -2,6 +2,7 @@
 
 mod acceleration;
 mod balance;
+mod body;
 mod contact;
 mod contact_force;
 mod evaluation;
@@ -14,6 +15,7 @@ mod parameters;
 mod system;
 
 pub use balance::ForceCotangents;
+pub use body::BodyData;
 pub use contact::{ContactForce, ContactModel, Dual, PairContact};
 pub use evaluation::Evaluation;
 pub use integrator::{
@@ -23,4 +25,4 @@ pub use integrator::{
 pub use limit::JointLimit;
 pub use linearisation::Linearisation;
 pub use parameters::{Declarations, Declared, Entry, Owner, Parameter, Parameters, Range, Typical};
-pub use system::{BodyData, Drive, System};
+pub use system::{Drive, System};

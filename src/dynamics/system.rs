@@ -1,31 +1,12 @@
 //! A system: the tree, its bodies' constants, and the coupling through the water.
 
 use super::force::ForceModel;
-use super::{ContactModel, JointLimit};
+use super::{BodyData, ContactModel, JointLimit};
 use crate::adjoint::lie::Vec3;
 use crate::coupling::Coupling;
 use crate::multibody::Tree;
 use crate::scene::Motion;
 use std::sync::Arc;
-
-/// Constants of one body.
-#[derive(Clone, Debug)]
-pub struct BodyData {
-    /// Name, for messages.
-    pub name: String,
-    /// Centre of mass in the body's frame, m.
-    pub center_of_mass: Vec3,
-    /// Displaced volume, m³.
-    pub volume: f64,
-    /// Its centroid in the body's frame, m.
-    pub centroid: Vec3,
-    /// Index among the bodies that the coupling knows.
-    pub submerged: Option<usize>,
-    /// First control of the joint's generalised forces.
-    pub joint_control: Option<usize>,
-    /// First control of the wrench on the body.
-    pub thruster: Option<usize>,
-}
 
 /// What moves a joint.
 #[derive(Clone, Debug, PartialEq)]

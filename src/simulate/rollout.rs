@@ -93,7 +93,7 @@ impl Rollout {
     /// An observable ([`super::observable`]) at states 0 … N by its name, one column each.
     ///
     /// # Errors
-    /// A name that no observable has; a value that can't be found ([`Observable::value`]).
+    /// A name that no observable has; a value that can't be found ([`Observable::value`](super::observable::Observable::value)).
     pub fn observe(&self, name: &str) -> Result<DMatrix<f64>> {
         let observable = observable(name)?;
         let rows: usize = observable.shape(self.simulator.system()).iter().product();

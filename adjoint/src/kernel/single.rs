@@ -22,46 +22,12 @@ use super::flux::edge_gradient;
 use super::flux::solid_angle;
 use super::lane::{Lane, Lanes, V3, dot, scale, scale_add, sub};
 use super::sum::{Scratch, TILE, Terms, forward, length, transposed};
+use super::target::Panel;
 use super::{Sources, Triangles};
 use crate::lie::Vec3;
 use pulp::Simd;
 
-/// What the layer of a triangle needs of it.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub(super) struct Panel {
-    corners: [Vec3; 3],
-    /// Twice the area times the unit normal, m².
-    double_area: Vec3,
-    /// Halved squares of the edges 01, 12, 20, m².
-    half_squares: Vec3,
-    /// Edges 01, 12, 20, m.
-    along: [Vec3; 3],
-    /// Their lengths, m.
-    lengths: Vec3,
-    /// Unit normal times the weight.
-    normal: Vec3,
-    /// m_ab of the edges times the weight.
-    outward: [Vec3; 3],
-}
-
 impl Panel {
-    /// From corners, counter-clockwise seen from outside, and row weight.
-    pub fn new(corners: [Vec3; 3], weight: f64) -> Self {
-        let [a, b, c] = corners;
-        let along = [b - a, c - b, a - c];
-        let double_area = along[0].cross(&(c - a));
-        let normal = double_area.normalize();
-        Self {
-            corners,
-            double_area,
-            half_squares: Vec3::from(along.map(|e| 0.5 * e.norm_squared())),
-            along,
-            lengths: Vec3::from(along.map(|e| e.norm())),
-            normal: weight * normal,
-            outward: along.map(|e| weight * e.cross(&normal).normalize()),
-        }
-    }
-
     /// The corners from `s` with their distances.
     #[inline(always)]
     fn seen<T: Lane>(&self, s: V3<T>) -> ([V3<T>; 3], V3<T>) {

@@ -5,7 +5,7 @@ use super::lane::Lane;
 use super::normal::Normal;
 use super::point::PointKernel;
 use super::potential::Potential;
-use super::single::Panel;
+use super::target::Panel;
 use super::*;
 use crate::check::{dot, dot_product_gap};
 use crate::lie::Vec3;

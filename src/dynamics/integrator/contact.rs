@@ -10,8 +10,8 @@
 //! # References
 //! A. Castro et al., "An Unconstrained Convex Formulation of Compliant Contact", 2022.
 
-use super::record::Stages;
 use super::split::{Split, share};
+use super::stages::{ContactVelocities, Stages};
 use super::start::Start;
 use super::{State, StateBar, StepBar};
 use crate::adjoint::solve::Definite;
@@ -29,15 +29,6 @@ const ENOUGH: f64 = 1e-9;
 const TRIALS: usize = 60;
 /// Part of the slope at its start that a search may leave.
 const LEFT: f64 = 0.3;
-
-/// Velocities of a step that solves contact at its end.
-#[derive(Clone, Debug, PartialEq)]
-pub struct ContactVelocities {
-    /// With which the step would end without contact.
-    pub before: DVector<f64>,
-    /// By which it moves, and with which contacts act.
-    pub after: DVector<f64>,
-}
 
 /// A velocity with its imbalance M (v − v*) − Δt g.
 struct Trial {

@@ -11,9 +11,9 @@
 //! The stage is solved by Newton's method with exact derivatives; its adjoint is the implicit function theorem at
 //! the converged stage, with the transpose of the same matrix.
 
-use super::contact::{self, ContactVelocities};
-use super::record::{Stages, Transposed};
+use super::contact;
 use super::split::{Split, share};
+use super::stages::{ContactVelocities, Stages, Transposed};
 use super::start::Start;
 use super::{State, StateBar, StepBar, Stepper};
 use crate::adjoint::lie::angular;

@@ -10,10 +10,10 @@
 //! weight reads −½ g Δt at the states, between which its mean velocity v_s is zero. q_m still is on the way that
 //! contact hasn't stopped: bodies about to touch may overlap there by half of what they approach in a step.
 
-use super::contact::{self, ContactVelocities};
+use super::contact;
 use super::euler::{AdjointStage, Rule, solve_stage};
-use super::record::{Stages, Transposed};
 use super::split::share;
+use super::stages::{ContactVelocities, Stages, Transposed};
 use super::start::Start;
 use super::{State, StateBar, StepBar, Stepper};
 use crate::dynamics::Linearisation;

@@ -20,11 +20,12 @@ mod readout;
 mod record;
 mod runge_kutta;
 mod split;
+mod stages;
 mod start;
 mod velocity_euler;
 
-pub use contact::ContactVelocities;
 pub use record::{LinearisedStep, StepJacobians, StepRecord};
+pub use stages::ContactVelocities;
 
 use super::{Drive, Evaluation, ForceCotangents, Linearisation, Parameters, System};
 use crate::Result;

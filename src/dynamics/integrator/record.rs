@@ -1,7 +1,7 @@
 //! What a step leaves behind, and its derivatives.
 
-use super::contact::ContactVelocities;
 use super::split::Split;
+use super::stages::{ContactVelocities, Stages, Transposed};
 use super::start::Start;
 use super::{Input, Integrator, State, StateBar, StateTangent, StepBar, Stepper};
 use super::{euler, midpoint, runge_kutta, velocity_euler};
@@ -20,20 +20,6 @@ pub struct StepRecord {
     integrator: Integrator,
     dt: f64,
     stages: Stages,
-}
-
-/// What is kept of a step's stages.
-#[derive(Clone, Debug)]
-pub(super) enum Stages {
-    /// Of integrators that solve contact.
-    Contact(ContactVelocities),
-    RungeKutta(runge_kutta::Forces),
-}
-
-/// What the transpose of a step needs beside its start.
-pub(super) trait Transposed<'a>: Send + Sync {
-    /// Transpose of the step.
-    fn vjp(&self, start: &Start<'_, 'a>, next_bar: &StateBar) -> Result<StepBar>;
 }
 
 impl StepRecord {

@@ -5,20 +5,13 @@
 //! the inverse left Jacobian times the angular velocity, so the order isn't lost on the group.
 
 use super::readout;
-use super::record::{Stages, Transposed};
 use super::split::{Split, When};
+use super::stages::{Forces, Stages, Tableau, Transposed};
 use super::start::Start;
 use super::{State, StateBar, StepBar};
 use crate::Result;
 use crate::dynamics::Linearisation;
 use nalgebra::DVector;
-
-/// Nodes and weights of a method; stage i starts from stage i − 1 over `nodes[i]` of the step.
-#[derive(Debug)]
-pub(super) struct Tableau {
-    nodes: &'static [f64],
-    weights: &'static [f64],
-}
 
 /// The explicit midpoint rule.
 pub(super) const SECOND: Tableau = Tableau {
@@ -31,28 +24,6 @@ pub(super) const FOURTH: Tableau = Tableau {
     nodes: &[0.0, 0.5, 0.5, 1.0],
     weights: &[1.0 / 6.0, 1.0 / 3.0, 1.0 / 3.0, 1.0 / 6.0],
 };
-
-impl Tableau {
-    /// What a step of length `dt` comes to, from where it starts and the rates of the stages.
-    fn sum<'r>(
-        &self,
-        dt: f64,
-        mut from: DVector<f64>,
-        rates: impl Iterator<Item = &'r DVector<f64>>,
-    ) -> DVector<f64> {
-        for (rate, weight) in rates.zip(self.weights) {
-            from += *weight * dt * rate;
-        }
-        from
-    }
-}
-
-/// What is kept of a step: its method, and the forces of all stages from which others start.
-#[derive(Clone, Debug)]
-pub(super) struct Forces {
-    tableau: &'static Tableau,
-    all: Vec<DVector<f64>>,
-}
 
 struct RungeKuttaStage<'a> {
     /// The first stage has none: it is the step's own.

@@ -2,8 +2,8 @@
 //!
 //! With contact, v⁺ is what [`contact::solve`] makes of that velocity at q.
 
-use super::contact::{self, ContactVelocities};
-use super::record::{Stages, Transposed};
+use super::contact;
+use super::stages::{ContactVelocities, Stages, Transposed};
 use super::start::Start;
 use super::{State, StateBar, StepBar, readout};
 use crate::Result;

@@ -1,0 +1,22 @@
+//! Constants of one body.
+
+use crate::adjoint::lie::Vec3;
+
+/// Constants of one body.
+#[derive(Clone, Debug)]
+pub struct BodyData {
+    /// Name, for messages.
+    pub name: String,
+    /// Centre of mass in the body's frame, m.
+    pub center_of_mass: Vec3,
+    /// Displaced volume, m³.
+    pub volume: f64,
+    /// Its centroid in the body's frame, m.
+    pub centroid: Vec3,
+    /// Index among the bodies that the coupling knows.
+    pub submerged: Option<usize>,
+    /// First control of the joint's generalised forces.
+    pub joint_control: Option<usize>,
+    /// First control of the wrench on the body.
+    pub thruster: Option<usize>,
+}

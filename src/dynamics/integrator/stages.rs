@@ -1,0 +1,58 @@
+//! What is kept of a step's stages, and what the transpose of a step is asked for.
+
+use super::start::Start;
+use super::{StateBar, StepBar};
+use crate::Result;
+use nalgebra::DVector;
+
+/// Velocities of a step that solves contact at its end.
+#[derive(Clone, Debug, PartialEq)]
+pub struct ContactVelocities {
+    /// With which the step would end without contact.
+    pub before: DVector<f64>,
+    /// By which it moves, and with which contacts act.
+    pub after: DVector<f64>,
+}
+
+/// Nodes and weights of a method; stage i starts from stage i − 1 over `nodes[i]` of the step.
+#[derive(Debug)]
+pub(super) struct Tableau {
+    pub nodes: &'static [f64],
+    pub weights: &'static [f64],
+}
+
+impl Tableau {
+    /// What a step of length `dt` comes to, from where it starts and the rates of the stages.
+    pub fn sum<'r>(
+        &self,
+        dt: f64,
+        mut from: DVector<f64>,
+        rates: impl Iterator<Item = &'r DVector<f64>>,
+    ) -> DVector<f64> {
+        for (rate, weight) in rates.zip(self.weights) {
+            from += *weight * dt * rate;
+        }
+        from
+    }
+}
+
+/// What is kept of a step: its method, and the forces of all stages from which others start.
+#[derive(Clone, Debug)]
+pub(super) struct Forces {
+    pub tableau: &'static Tableau,
+    pub all: Vec<DVector<f64>>,
+}
+
+/// What is kept of a step's stages.
+#[derive(Clone, Debug)]
+pub(super) enum Stages {
+    /// Of integrators that solve contact.
+    Contact(ContactVelocities),
+    RungeKutta(Forces),
+}
+
+/// What the transpose of a step needs beside its start.
+pub(super) trait Transposed<'a>: Send + Sync {
+    /// Transpose of the step.
+    fn vjp(&self, start: &Start<'_, 'a>, next_bar: &StateBar) -> Result<StepBar>;
+}

@@ -5,6 +5,7 @@
 //! doesn't depend on the number of threads either.
 
 mod cgls;
+mod cholesky;
 mod columns;
 mod eigenvalue;
 mod gmres;
@@ -12,6 +13,7 @@ mod lu;
 mod product;
 
 pub use cgls::{Outcome, cgls};
+pub use cholesky::Cholesky;
 pub use columns::Columns;
 pub(crate) use eigenvalue::{condition, largest_eigenvalue};
 pub use gmres::gmres;
@@ -21,6 +23,6 @@ pub use product::{normal_product, product, transposed_product};
 use crate::adjoint::count::Counter;
 
 /// Calls of this module's solvers and products ([`cgls`], [`gmres`](gmres()), [`product`](product()) and its
-/// kin, [`Lu`]) in this process.
+/// kin, [`Cholesky`], [`Lu`]) in this process.
 #[doc(hidden)]
 pub static CALLS: Counter = Counter::new();

@@ -10,10 +10,10 @@ use crate::coupling::pair::{vector, wrench};
 use crate::coupling::{
     Coupling, CouplingReport, Direction, Linearise, Linearised, Momenta, Pullback, Tangent,
 };
+use crate::solver::Cholesky;
 use faer::linalg::matmul::matmul;
-use faer::linalg::solvers::{Llt, Solve};
 use faer::reborrow::ReborrowMut;
-use faer::{Accum, Mat, MatRef, Par, Side};
+use faer::{Accum, Mat, MatRef, Par};
 use nalgebra::{DMatrix, DVector};
 use std::sync::OnceLock;
 
@@ -28,7 +28,7 @@ pub(super) struct ReducedLinearised<'a> {
     pub poses: Vec<Pose>,
     pub placed: Vec<PlacedSkeletons<'a>>,
     /// Of I − LᵀGL.
-    factor: Llt<f64>,
+    factor: Cholesky,
     /// LᵀGŪ, modes × 6 bodies.
     solution: DMatrix<f64>,
     /// ŪᵀGŪ, 6 bodies × 6 bodies.
@@ -82,12 +82,12 @@ impl<'a> ReducedLinearised<'a> {
                 scatter(reduced, ends, factor, block, into);
             }
         }
-        let Ok(factor) = view(&system).llt(Side::Lower) else {
+        let Some(factor) = Cholesky::new(system.data.into(), n) else {
             return Err(reduced.indefinite(poses, 0.0));
         };
         let mut out = Self {
             report: CouplingReport {
-                condition: condition(&factor),
+                condition: factor.condition(),
                 ..CouplingReport::default()
             },
             reduced,
@@ -102,7 +102,7 @@ impl<'a> ReducedLinearised<'a> {
             momenta: DMatrix::zeros(0, 0),
             fields: OnceLock::new(),
         };
-        out.factor.solve_in_place(view_mut(&mut out.a));
+        out.factor.solve(view_mut(&mut out.a));
         out.alpha = out.charges(basis, &out.a);
         out.momenta = out.impulses(basis, &out.a);
         reduced.check_solution(poses, &out.basis, &out.momenta, out.report.condition)?;
@@ -152,7 +152,7 @@ impl<'a> ReducedLinearised<'a> {
             Direction::Twist(x) => {
                 let twists = DMatrix::from_column_slice(x.len(), 1, x.as_slice());
                 let mut a = &self.solution * &twists;
-                self.factor.solve_in_place(view_mut(&mut a));
+                self.factor.solve(view_mut(&mut a));
                 ReducedResponse {
                     alpha: self.charges(&twists, &a).column(0).into_owned(),
                     a: a.column(0).into_owned(),
@@ -182,7 +182,7 @@ impl<'a> ReducedLinearised<'a> {
             a.rows_mut(at, m).copy_from(&projected.rows(0, m));
             direct.rows_mut(6 * b, 6).copy_from(&projected.rows(m, 6));
         }
-        self.factor.solve_in_place(view_mut(&mut a));
+        self.factor.solve(view_mut(&mut a));
         let still = DMatrix::zeros(6 * self.reduced.bodies.len(), k);
         let alpha = self.charges(&still, &a);
         (alpha, FLUX * (direct + self.solution.tr_mul(&a)))
@@ -312,19 +312,6 @@ fn block(reduced: &Reduced, placed: &PlacedSkeletons) -> Mat<f64> {
         left.transpose() * (p * right)
     } else {
         (left.transpose() * p) * right
-    }
-}
-
-/// (largest / smallest pivot)²: the condition number, from below.
-fn condition(factor: &Llt<f64>) -> f64 {
-    let pivots = factor.L().diagonal().column_vector().iter();
-    let (low, high) = pivots.fold((f64::INFINITY, 0.0_f64), |(low, high), x| {
-        (low.min(*x), high.max(*x))
-    });
-    if high > 0.0 {
-        (high / low).powi(2)
-    } else {
-        1.0
     }
 }
 

@@ -22,12 +22,14 @@ mod isolated;
 mod pair;
 pub mod panel;
 pub mod reduced;
+mod response;
 mod settings;
 mod tensor;
 
 pub use exclude::Exclusions;
 pub use isolated::Isolated;
 pub use panel::PanelCoupled;
+pub use response::{CoupledResponse, Reached};
 pub use tensor::PairTensor;
 
 use crate::adjoint::lie::{Pose, Vec3, Vec6};

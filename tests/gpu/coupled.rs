@@ -186,7 +186,7 @@ pub fn combinations() {
                 some.energies().unwrap(),
                 some.momenta().unwrap(),
             ];
-            let strengths = [response.strengths().unwrap(), some.strengths().unwrap()];
+            let strengths = [response.densities().unwrap(), some.densities().unwrap()];
             numbers
                 .iter()
                 .map(|m| m.as_slice().to_vec())

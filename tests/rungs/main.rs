@@ -75,7 +75,9 @@ const THROUGH: &[(&str, &str)] = &[
     ("coupling::pair::Pair::apply_jvp", FULL_HVP),
     ("coupling::full::cpu::system::System::respond_jvp", FULL_HVP),
     ("coupling::full::cpu::CoupledSolution::gradient", FULL_VJP),
-    ("coupling::panel::first::PlacedPanels::gradient", PANEL_VJP),
+    ("coupling::panel::first::PlacedPanels::gradient", FULL_VJP),
+    ("coupling::panel::placed::PanelSolution::gradient", FULL_VJP),
+    ("coupling::response::CoupledResponse::gradient", FULL_VJP),
     // Each joint's maps, through those that all joints share.
     (
         "multibody::joint::planar::Planar::frame_velocity_vjp",
@@ -209,9 +211,8 @@ const PASSED_ON: &[&str] = &["optimize::descent::Shared::gradient"];
 const FRAME_VELOCITY: &str = "multibody::joint::JointMotion::frame_velocity_vjp";
 const FRAME_BIAS: &str = "multibody::joint::JointMotion::frame_bias_vjp";
 const FORCE_JVP: &str = "dynamics::balance::Linearisation::force_jvp";
-const FULL_VJP: &str = "coupling::full::linearised::FullLinearised::vjp";
-const PANEL_VJP: &str = "coupling::panel::linearised::PanelLinearised::vjp";
-const FULL_HVP: &str = "coupling::full::linearised::FullLinearised::hvp";
+const FULL_VJP: &str = "coupling::response::ResponseLinearised::vjp";
+const FULL_HVP: &str = "coupling::response::ResponseLinearised::hvp";
 
 #[test]
 fn every_rung_in_the_source_is_registered() {

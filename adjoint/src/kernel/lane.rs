@@ -24,6 +24,10 @@ pub(super) trait Lane:
     fn artanh(self) -> Self;
     /// Angle of the point (x, y) = (`x`, `self`), in (−π, π].
     fn atan2(self, x: Self) -> Self;
+    /// The nearest number from 0 to 1.
+    fn clamp_unit(self) -> Self;
+    /// Whether a number in any lane is below `bound`.
+    fn any_below(self, bound: f64) -> bool;
 }
 
 impl Lane for f64 {
@@ -51,6 +55,14 @@ impl Lane for f64 {
     #[inline(always)]
     fn atan2(self, x: Self) -> Self {
         f64::atan2(self, x)
+    }
+    #[inline(always)]
+    fn clamp_unit(self) -> Self {
+        self.clamp(0.0, 1.0)
+    }
+    #[inline(always)]
+    fn any_below(self, bound: f64) -> bool {
+        self < bound
     }
 }
 
@@ -220,6 +232,17 @@ impl<S: Simd> Lane for Lanes<S> {
         // The sign of y; the angle is positive here.
         let sign = simd.and_f64s(self.v, self.like(-0.0).v);
         Self::new(simd, simd.or_f64s(angle.v, sign))
+    }
+    #[inline(always)]
+    fn clamp_unit(self) -> Self {
+        let simd = self.simd;
+        let above = simd.max_f64s(self.v, self.like(0.0).v);
+        Self::new(simd, simd.min_f64s(above, self.like(1.0).v))
+    }
+    #[inline(always)]
+    fn any_below(self, bound: f64) -> bool {
+        let below = self.simd.less_than_f64s(self.v, self.like(bound).v);
+        self.simd.first_true_m64s(below) < S::F64_LANES
     }
 }
 

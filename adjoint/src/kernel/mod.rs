@@ -6,6 +6,7 @@
 //! | kernel | targets | `K_ij` |
 //! |---|---|---|
 //! | [`flux`](mod@flux) | [`Triangles`] | `w_i ∫ n·r/r³ dA = w_i Ω_i(s)`, the solid angle |
+//! | [`double`](mod@double) | [`Triangles`] | the same, by multipoles far from a triangle |
 //! | [`normal`](mod@normal) | [`Points`] | `w_i n_i·r/r³` |
 //! | [`single`](mod@single) | [`Triangles`] | `w_i ∫ 1/r dA`, the potential of a panel of constant density |
 //! | [`potential`](mod@potential) | [`Points`] | `1/r` (no row weight) |
@@ -33,9 +34,11 @@
 //! Results do not depend on the number of threads, to the last bit. They may differ in round-off
 //! between processors of different vector width.
 
+pub mod double;
 pub mod flux;
 mod lane;
 pub mod normal;
+mod panel;
 mod point;
 pub mod potential;
 mod registry;
@@ -46,6 +49,7 @@ mod target;
 #[cfg(test)]
 mod tests;
 
+pub use double::{double_fill, double_hvp, double_jvp, double_vjp};
 pub use flux::{
     flux, flux_fill, flux_gradient, flux_hessian_product, flux_hvp, flux_jvp, flux_vjp,
 };

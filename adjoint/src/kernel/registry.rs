@@ -1,9 +1,9 @@
 //! The rungs of the kernels and their checks.
 
 use super::{
-    Points, Sources, Triangles, Write, flux_fill, flux_hvp, flux_jvp, flux_vjp, normal_fill,
-    normal_hvp, normal_jvp, normal_vjp, potential_fill, potential_hvp, potential_jvp,
-    potential_vjp, single, single_hvp, single_jvp, single_vjp,
+    Points, Sources, Triangles, Write, double_fill, double_hvp, double_jvp, double_vjp, flux_fill,
+    flux_hvp, flux_jvp, flux_vjp, normal_fill, normal_hvp, normal_jvp, normal_vjp, potential_fill,
+    potential_hvp, potential_jvp, potential_vjp, single_hvp, single_jvp, single_sum, single_vjp,
 };
 use crate::check::{Outcome, Rung, outcome};
 use crate::draw::numbers;
@@ -26,22 +26,27 @@ pub fn rungs() -> Vec<Rung> {
     rungs![
         "kernel::flux::flux_jvp" => |c| forward(flux_matrix, |d, a, out| flux_jvp(&surface(), &sources(&start()), d, a, K, out), c),
         "kernel::flux::flux_vjp" => |c| gradient(flux_matrix, |bar, out| flux_vjp(&surface(), &sources(&start()), bar, K, out), c),
-        "kernel::flux::flux_hvp" => |c| tangent(
+        "kernel::flux::flux_hvp" => |c| tangent(points().len(),
             |s, bar, out| flux_vjp(&surface(), s, bar, K, out),
             |d, bar, out| flux_hvp(&surface(), &sources(&start()), d, bar, K, out), c),
         "kernel::normal::normal_jvp" => |c| forward(normal_matrix, |d, a, out| normal_jvp(&points(), &sources(&start()), d, a, K, out), c),
         "kernel::normal::normal_vjp" => |c| gradient(normal_matrix, |bar, out| normal_vjp(&points(), &sources(&start()), bar, K, out), c),
-        "kernel::normal::normal_hvp" => |c| tangent(
+        "kernel::normal::normal_hvp" => |c| tangent(points().len(),
             |s, bar, out| normal_vjp(&points(), s, bar, K, out),
             |d, bar, out| normal_hvp(&points(), &sources(&start()), d, bar, K, out), c),
-        "kernel::single::single_jvp" => |c| forward(single_matrix, |d, a, out| single_jvp(&surface(), &sources(&start()), d, a, K, out), c),
-        "kernel::single::single_vjp" => |c| gradient(single_matrix, |bar, out| single_vjp(&surface(), &sources(&start()), bar, K, out), c),
-        "kernel::single::single_hvp" => |c| tangent(
-            |s, bar, out| single_vjp(&surface(), s, bar, K, out),
-            |d, bar, out| single_hvp(&surface(), &sources(&start()), d, bar, K, out), c),
+        "kernel::double::double_jvp" => |c| forward(double_matrix, |d, a, out| double_jvp(&panels(), &sources(&start()), d, a, K, out), c),
+        "kernel::double::double_vjp" => |c| gradient(double_matrix, |bar, out| double_vjp(&panels(), &sources(&start()), bar, K, out), c),
+        "kernel::double::double_hvp" => |c| tangent(panels().len(),
+            |s, bar, out| double_vjp(&panels(), s, bar, K, out),
+            |d, bar, out| double_hvp(&panels(), &sources(&start()), d, bar, K, out), c),
+        "kernel::single::single_jvp" => |c| forward(single_matrix, |d, a, out| single_jvp(&panels(), &sources(&start()), d, a, K, out), c),
+        "kernel::single::single_vjp" => |c| gradient(single_matrix, |bar, out| single_vjp(&panels(), &sources(&start()), bar, K, out), c),
+        "kernel::single::single_hvp" => |c| tangent(panels().len(),
+            |s, bar, out| single_vjp(&panels(), s, bar, K, out),
+            |d, bar, out| single_hvp(&panels(), &sources(&start()), d, bar, K, out), c),
         "kernel::potential::potential_jvp" => |c| forward(potential_matrix, |d, a, out| potential_jvp(&points(), &sources(&start()), d, a, K, out), c),
         "kernel::potential::potential_vjp" => |c| gradient(potential_matrix, |bar, out| potential_vjp(&points(), &sources(&start()), bar, K, out), c),
-        "kernel::potential::potential_hvp" => |c| tangent(
+        "kernel::potential::potential_hvp" => |c| tangent(points().len(),
             |s, bar, out| potential_vjp(&points(), s, bar, K, out),
             |d, bar, out| potential_hvp(&points(), &sources(&start()), d, bar, K, out), c),
     ]
@@ -105,12 +110,13 @@ fn gradient(
 
 /// `_vjp` against `_hvp`.
 fn tangent(
+    rows: usize,
     vjp: fn(&Sources, &[f64], &mut [f64]),
     hvp: fn(&[Vec3], &[f64], &mut [f64]),
     corruption: f64,
 ) -> Outcome {
     let (x, dx) = (start(), numbers(3, 3 * N, 0.3));
-    let bar = numbers(5, points().len() * K, 1.0);
+    let bar = numbers(5, rows * K, 1.0);
     let value = |x: &[f64]| {
         let mut out = vec![0.0; N * K * 3];
         vjp(&sources(x), &bar, &mut out);
@@ -129,11 +135,22 @@ fn flux_matrix(s: &Sources) -> Vec<f64> {
     out
 }
 
+fn double_matrix(s: &Sources) -> Vec<f64> {
+    let t = panels();
+    let mut out = vec![0.0; t.len() * s.len()];
+    double_fill(&t, s, Write::Set, &mut out, s.len(), 0);
+    out
+}
+
 fn single_matrix(s: &Sources) -> Vec<f64> {
-    let t = surface();
-    let entry = |i: usize, j: usize| single(&t.corners(i), t.weights()[i], &s.point(j));
-    let rows = (0..t.len()).flat_map(|i| (0..s.len()).map(move |j| (i, j)));
-    rows.map(|(i, j)| entry(i, j)).collect()
+    let t = panels();
+    let mut rows = vec![0.0; t.len() * s.len()];
+    for (i, row) in rows.chunks_mut(s.len()).enumerate() {
+        let mut unit = vec![0.0; t.len()];
+        unit[i] = 1.0;
+        single_sum(&t, s, &unit, 1, row);
+    }
+    rows
 }
 
 fn normal_matrix(s: &Sources) -> Vec<f64> {
@@ -152,6 +169,24 @@ fn potential_matrix(s: &Sources) -> Vec<f64> {
 
 /// Octahedron of unequal axes with row weights.
 fn surface() -> Triangles {
+    let (vertices, faces) = octahedron();
+    let weights = (0..8).map(|i| 0.8 + 0.1 * i as f64).collect();
+    Triangles::new(&vertices, &faces, weights)
+}
+
+/// The octahedron and a small one, which is farther in its own size: some of its faces are near, some far, some between.
+fn panels() -> Triangles {
+    let (mut vertices, mut faces) = octahedron();
+    let small = vertices
+        .iter()
+        .map(|v| 0.17 * v + Vec3::new(0.5, -0.7, 0.6));
+    vertices = small.chain(vertices.iter().copied()).collect();
+    faces.extend(faces.clone().iter().map(|f| f.map(|v| v + 6)));
+    let weights = (0..16).map(|i| 0.8 + 0.1 * i as f64).collect();
+    Triangles::new(&vertices, &faces, weights)
+}
+
+fn octahedron() -> (Vec<Vec3>, Vec<[usize; 3]>) {
     let vertices = [
         Vec3::new(1.0, 0.1, 0.0),
         Vec3::new(0.0, 1.3, 0.1),
@@ -170,8 +205,7 @@ fn surface() -> Triangles {
         [3, 2, 5],
         [0, 3, 5],
     ];
-    let weights = (0..8).map(|i| 0.8 + 0.1 * i as f64).collect();
-    Triangles::new(&vertices, &faces, weights)
+    (vertices.to_vec(), faces.to_vec())
 }
 
 /// Centroids of [`surface`].

@@ -11,6 +11,8 @@
 //!
 //! The derivatives of the logarithms and of the solid angle Ω ([`flux`](mod@super::flux)) cancel in the gradient.
 //!
+//! Far from a triangle the sums take two terms of its multipole series, blended smoothly ([`panel`](super::panel)).
+//!
 //! A point in the plane of a triangle and within it has the mean of the values on both sides; on an edge nothing is finite but
 //! the value.
 //!
@@ -18,30 +20,20 @@
 //! D. R. Wilton et al., "Potential integrals for uniform and linear source distributions on polygonal and polyhedral
 //! domains", IEEE Trans. Antennas Propag. 32 (1984) 276–281, Eq. 5.
 
-use super::flux::edge_gradient;
-use super::flux::solid_angle;
-use super::lane::{Lane, Lanes, V3, dot, scale, scale_add, sub};
-use super::sum::{Scratch, TILE, Terms, forward, length, transposed};
-use super::target::Panel;
+use super::flux::{edge_gradient, solid_angle};
+use super::lane::{Lane, V3, dot, scale, scale_add};
+use super::panel::{Gradients, Layer, Multipoles, Panel, Tangents, Values, constant};
+use super::sum::{forward, transposed};
 use super::{Sources, Triangles};
 use crate::lie::Vec3;
-use pulp::Simd;
+
+/// The single layer.
+#[derive(Clone, Copy)]
+pub(super) struct Single;
 
 impl Panel {
-    /// The corners from `s` with their distances.
     #[inline(always)]
-    fn seen<T: Lane>(&self, s: V3<T>) -> ([V3<T>; 3], V3<T>) {
-        let [a, b, c] = &self.corners;
-        let r = [
-            sub(constant(s[0], a), s),
-            sub(constant(s[0], b), s),
-            sub(constant(s[0], c), s),
-        ];
-        (r, [length(r[0]), length(r[1]), length(r[2])])
-    }
-
-    #[inline(always)]
-    fn angle<T: Lane>(&self, r0: V3<T>, l: V3<T>) -> T {
+    pub fn angle<T: Lane>(&self, r0: V3<T>, l: V3<T>) -> T {
         let (area, half) = (&self.double_area, &self.half_squares);
         solid_angle(constant(l[0], area), r0, l, constant(l[0], half))
     }
@@ -53,35 +45,34 @@ impl Panel {
         let half = t.artanh();
         half + half
     }
+}
 
-    /// `w I`.
+impl Layer for Single {
     #[inline(always)]
-    pub fn value_of<T: Lane>(&self, s: V3<T>) -> T {
-        let (r, l) = self.seen(s);
-        let mut value = -(dot(constant(l[0], &self.normal), r[0]) * self.angle(r[0], l));
+    fn near<T: Lane>(panel: &Panel, s: V3<T>) -> T {
+        let (r, l) = panel.seen(s);
+        let mut value = -(dot(constant(l[0], &panel.normal), r[0]) * panel.angle(r[0], l));
         for (c, r) in r.into_iter().enumerate() {
-            let distance = dot(constant(l[0], &self.outward[c]), r);
-            value = distance.mul_add(self.logarithm(c, l), value);
+            let distance = dot(constant(l[0], &panel.outward[c]), r);
+            value = distance.mul_add(panel.logarithm(c, l), value);
         }
         value
     }
 
-    /// `w ∇_s I`.
     #[inline(always)]
-    fn gradient_of<T: Lane>(&self, s: V3<T>) -> V3<T> {
-        let (r, l) = self.seen(s);
-        let mut out = scale(self.angle(r[0], l), constant(l[0], &self.normal));
+    fn near_gradient<T: Lane>(panel: &Panel, s: V3<T>) -> V3<T> {
+        let (r, l) = panel.seen(s);
+        let mut out = scale(panel.angle(r[0], l), constant(l[0], &panel.normal));
         for c in 0..3 {
-            let outward = constant(l[0], &self.outward[c]);
-            out = scale_add(-self.logarithm(c, l), outward, out);
+            let outward = constant(l[0], &panel.outward[c]);
+            out = scale_add(-panel.logarithm(c, l), outward, out);
         }
         out
     }
 
-    /// `w ∇∇I d`.
     #[inline(always)]
-    fn hessian_product_of<T: Lane>(&self, s: V3<T>, d: V3<T>) -> V3<T> {
-        let (r, l) = self.seen(s);
+    fn near_hessian_product<T: Lane>(panel: &Panel, s: V3<T>, d: V3<T>) -> V3<T> {
+        let (r, l) = panel.seen(s);
         let slopes = [
             dot(r[0], d) / l[0],
             dot(r[1], d) / l[1],
@@ -91,38 +82,47 @@ impl Panel {
         let mut out = [turned; 3];
         for c in 0..3 {
             let next = (c + 1) % 3;
-            let squared = l[0].like(2.0 * self.half_squares[c]);
-            let along = constant(l[0], &self.along[c]);
+            let squared = l[0].like(2.0 * panel.half_squares[c]);
+            let along = constant(l[0], &panel.along[c]);
             turned = turned + dot(edge_gradient(r[c], along, squared, l[c], l[next]), d);
             let sum = l[c] + l[next];
-            let rate = l[0].like(2.0 * self.lengths[c]) / sum.mul_add(sum, -squared);
+            let rate = l[0].like(2.0 * panel.lengths[c]) / sum.mul_add(sum, -squared);
             let rate = rate * (slopes[c] + slopes[next]);
-            out = scale_add(-rate, constant(l[0], &self.outward[c]), out);
+            out = scale_add(-rate, constant(l[0], &panel.outward[c]), out);
         }
-        scale_add(turned, constant(l[0], &self.normal), out)
+        scale_add(turned, constant(l[0], &panel.normal), out)
+    }
+
+    #[inline(always)]
+    fn far<T: Lane>(panel: &Panel, far: &Multipoles<T>) -> T {
+        panel.charge(far) * far.value()
+    }
+
+    #[inline(always)]
+    fn far_gradient<T: Lane>(panel: &Panel, far: &Multipoles<T>) -> V3<T> {
+        scale(panel.charge(far), far.gradient())
+    }
+
+    #[inline(always)]
+    fn far_hessian_product<T: Lane>(panel: &Panel, far: &Multipoles<T>, d: V3<T>) -> V3<T> {
+        scale(panel.charge(far), far.hessian_product(d))
     }
 }
 
-/// A constant vector as lanes.
-#[inline(always)]
-fn constant<T: Lane>(x: T, v: &Vec3) -> V3<T> {
-    [x.like(v.x), x.like(v.y), x.like(v.z)]
-}
-
-/// `weight · ∫ 1/|x − s| dA` over the triangle, m for weight 1.
+/// `weight · ∫ 1/|x − s| dA` over the triangle, m for weight 1: the near form.
 pub fn single(corners: &[Vec3; 3], weight: f64, s: &Vec3) -> f64 {
-    Panel::new(*corners, weight).value_of([s.x, s.y, s.z])
+    Single::near(&Panel::new(*corners, weight), [s.x, s.y, s.z])
 }
 
 /// Gradient of [`single`](single()) in `s`.
 pub fn single_gradient(corners: &[Vec3; 3], weight: f64, s: &Vec3) -> Vec3 {
-    Vec3::from(Panel::new(*corners, weight).gradient_of([s.x, s.y, s.z]))
+    Single::near_gradient(&Panel::new(*corners, weight), [s.x, s.y, s.z]).into()
 }
 
 /// Hessian of [`single`](single()) in `s`, times `d`.
 pub fn single_hessian_product(corners: &[Vec3; 3], weight: f64, s: &Vec3, d: &Vec3) -> Vec3 {
     let panel = Panel::new(*corners, weight);
-    Vec3::from(panel.hessian_product_of([s.x, s.y, s.z], [d.x, d.y, d.z]))
+    Single::near_hessian_product(&panel, [s.x, s.y, s.z], [d.x, d.y, d.z]).into()
 }
 
 /// `out[j][k] += Σ_i bar[i][k] K_ij`; `bar` is `[target][k]`, `out` is `[source][k]`.
@@ -133,7 +133,7 @@ pub fn single_sum(
     columns: usize,
     out: &mut [f64],
 ) {
-    transposed(Values(targets), sources, None, bar, columns, out);
+    transposed(Values(targets, Single), sources, None, bar, columns, out);
 }
 
 /// `out[i][k] += Σ_j (∇K_ij · d_j) a[j][k]`; `a` is `[source][k]`, `out` is `[target][k]`.
@@ -145,7 +145,7 @@ pub fn single_jvp(
     columns: usize,
     out: &mut [f64],
 ) {
-    forward(Gradients(targets), sources, d, a, columns, out);
+    forward(Gradients(targets, Single), sources, d, a, columns, out);
 }
 
 /// `out[j][k] += Σ_i bar[i][k] ∇K_ij`; `bar` is `[target][k]`, `out` is `[source][k][3]`.
@@ -156,7 +156,7 @@ pub fn single_vjp(
     columns: usize,
     out: &mut [f64],
 ) {
-    transposed(Gradients(targets), sources, None, bar, columns, out);
+    transposed(Gradients(targets, Single), sources, None, bar, columns, out);
 }
 
 /// `out[j][k] += Σ_i bar[i][k] ∇∇K_ij d_j`; `bar` is `[target][k]`, `out` is `[source][k][3]`.
@@ -168,49 +168,12 @@ pub fn single_hvp(
     columns: usize,
     out: &mut [f64],
 ) {
-    transposed(Tangents(targets), sources, Some(d), bar, columns, out);
+    transposed(
+        Tangents(targets, Single),
+        sources,
+        Some(d),
+        bar,
+        columns,
+        out,
+    );
 }
-
-/// Values of a surface's panels.
-#[derive(Clone, Copy)]
-struct Values<'a>(&'a Triangles);
-
-/// Gradients of a surface's panels.
-#[derive(Clone, Copy)]
-struct Gradients<'a>(&'a Triangles);
-
-/// Tangents of a surface's gradients.
-#[derive(Clone, Copy)]
-struct Tangents<'a>(&'a Triangles);
-
-macro_rules! terms {
-    ($type:ident, $components:literal, |$panel:ident, $s:ident, $d:ident| $value:expr) => {
-        impl Terms<$components> for $type<'_> {
-            fn len(self) -> usize {
-                self.0.len()
-            }
-
-            #[inline(always)]
-            fn evaluate<S: Simd>(
-                self,
-                _: S,
-                tile: usize,
-                $s: V3<Lanes<S>>,
-                $d: V3<Lanes<S>>,
-                _: &mut Scratch<S>,
-                out: &mut [[S::f64s; $components]; TILE],
-            ) {
-                for (out, $panel) in out.iter_mut().zip(&self.0.panels[tile * TILE..]) {
-                    let value: [Lanes<S>; $components] = $value;
-                    for (out, value) in out.iter_mut().zip(&value) {
-                        *out = value.v;
-                    }
-                }
-            }
-        }
-    };
-}
-
-terms!(Values, 1, |panel, s, _d| [panel.value_of(s)]);
-terms!(Gradients, 3, |panel, s, _d| panel.gradient_of(s));
-terms!(Tangents, 3, |panel, s, d| panel.hessian_product_of(s, d));

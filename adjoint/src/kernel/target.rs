@@ -1,5 +1,6 @@
 //! Elements of a body's surface, fixed in the body's frame.
 
+use super::panel::Panel;
 use super::sum::TILE;
 use crate::lie::Vec3;
 use std::collections::HashMap;
@@ -100,43 +101,6 @@ pub(super) struct Face {
     pub half_squares: Vec3,
     /// Row weight.
     pub weight: f64,
-}
-
-/// What the layer of a triangle needs of it.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub(super) struct Panel {
-    pub corners: [Vec3; 3],
-    /// Twice the area times the unit normal, m².
-    pub double_area: Vec3,
-    /// Halved squares of the edges 01, 12, 20, m².
-    pub half_squares: Vec3,
-    /// Edges 01, 12, 20, m.
-    pub along: [Vec3; 3],
-    /// Their lengths, m.
-    pub lengths: Vec3,
-    /// Unit normal times the weight.
-    pub normal: Vec3,
-    /// m_ab of the edges times the weight.
-    pub outward: [Vec3; 3],
-}
-
-impl Panel {
-    /// From corners, counter-clockwise seen from outside, and row weight.
-    pub fn new(corners: [Vec3; 3], weight: f64) -> Self {
-        let [a, b, c] = corners;
-        let along = [b - a, c - b, a - c];
-        let double_area = along[0].cross(&(c - a));
-        let normal = double_area.normalize();
-        Self {
-            corners,
-            double_area,
-            half_squares: Vec3::from(along.map(|e| 0.5 * e.norm_squared())),
-            along,
-            lengths: Vec3::from(along.map(|e| e.norm())),
-            normal: weight * normal,
-            outward: along.map(|e| weight * e.cross(&normal).normalize()),
-        }
-    }
 }
 
 /// Some consecutive faces or edges and the vertices they meet, so that the distances of a source

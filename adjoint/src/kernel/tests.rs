@@ -1,11 +1,13 @@
 //! The scalar formulas against dual numbers and known values; the sums against the scalar formulas.
 
+use super::double::Double;
 use super::flux::value_of_corners;
 use super::lane::Lane;
 use super::normal::Normal;
+use super::panel::{Layer, Panel};
 use super::point::PointKernel;
 use super::potential::Potential;
-use super::target::Panel;
+use super::single::Single;
 use super::*;
 use crate::check::{dot, dot_product_gap};
 use crate::lie::Vec3;
@@ -37,6 +39,16 @@ impl Lane for HyperDual64 {
     }
     fn atan2(self, x: Self) -> Self {
         DualNum::atan2(&self, x)
+    }
+    fn clamp_unit(self) -> Self {
+        match self.re {
+            x if x <= 0.0 => Self::from(0.0),
+            x if x >= 1.0 => Self::from(1.0),
+            _ => self,
+        }
+    }
+    fn any_below(self, bound: f64) -> bool {
+        self.re < bound
     }
 }
 
@@ -79,7 +91,7 @@ fn gradients_and_hessians_agree_with_dual_numbers() {
         assert!((flux_gradient(&corners, w, &s) - g).norm() < 1e-9 * size);
         assert!((flux_hessian_product(&corners, w, &s, &d) - h).norm() < 1e-8 * h.norm().max(1e-3));
 
-        let (g, h) = derivatives(|s| Panel::new(corners, w).value_of(s), &s, &d);
+        let (g, h) = derivatives(|s| Single::near(&Panel::new(corners, w), s), &s, &d);
         assert!((single_gradient(&corners, w, &s) - g).norm() < 1e-11 * g.norm());
         assert!((single_hessian_product(&corners, w, &s, &d) - h).norm() < 1e-9 * h.norm());
 
@@ -93,6 +105,69 @@ fn gradients_and_hessians_agree_with_dual_numbers() {
         close(&potential_gradient(&x, &s), &g);
         close(&potential_hessian_product(&x, &s, &d), &h);
     }
+}
+
+/// A triangle with its circumscribed radius about the centroid.
+fn triangle(random: &mut Samples) -> (Panel, Vec3, f64) {
+    let corners = [(); 3].map(|()| vector(random));
+    let centre = (corners[0] + corners[1] + corners[2]) / 3.0;
+    let radius = corners
+        .map(|v| (v - centre).norm())
+        .into_iter()
+        .fold(0.0, f64::max);
+    (Panel::new(corners, 1.7), centre, radius)
+}
+
+fn layer_agrees_with_dual_numbers<L: Layer>() {
+    let mut random = Samples::new(4);
+    let mut worst = [0.0_f64; 2];
+    for n in 0..400 {
+        let (panel, centre, radius) = triangle(&mut random);
+        // Within, between and beyond the two reaches.
+        let away = (3.0 + 0.02 * n as f64) * radius;
+        let (s, d) = (
+            centre + away * vector(&mut random).normalize(),
+            vector(&mut random),
+        );
+        let lanes = |v: &Vec3| [v.x, v.y, v.z];
+        let (g, h) = derivatives(|s| panel.value::<L, _>(s), &s, &d);
+        let gradient = Vec3::from(panel.gradient::<L, _>(lanes(&s)));
+        let product = Vec3::from(panel.hessian_product::<L, _>(lanes(&s), lanes(&d)));
+        worst[0] = worst[0].max((gradient - g).norm() / g.norm());
+        worst[1] = worst[1].max((product - h).norm() / h.norm());
+    }
+    println!("gradient {:e}, Hessian {:e}", worst[0], worst[1]);
+    assert!(worst[0] < 1e-11 && worst[1] < 1e-9, "{worst:?}");
+}
+
+#[test]
+fn blended_layers_agree_with_dual_numbers() {
+    layer_agrees_with_dual_numbers::<Single>();
+    layer_agrees_with_dual_numbers::<Double>();
+}
+
+/// The multipoles against the closed form where they set in, relative to the largest that a layer has at the distance.
+fn far_error<L: Layer>(size: impl Fn(f64, f64) -> f64) -> f64 {
+    let mut random = Samples::new(6);
+    let mut worst = 0.0_f64;
+    for _ in 0..2000 {
+        let (panel, centre, radius) = triangle(&mut random);
+        let away = panel::NEAR * radius;
+        let s = centre + away * vector(&mut random).normalize();
+        let s = [s.x, s.y, s.z];
+        let far = panel.far_value::<L>(s);
+        let area = 0.5 * panel.double_area.norm();
+        worst = worst.max((far - L::near(&panel, s)).abs() / (1.7 * area * size(away, radius)));
+    }
+    worst
+}
+
+#[test]
+fn multipoles_are_near_the_closed_form() {
+    let single = far_error::<Single>(|r, _| 1.0 / r);
+    let double = far_error::<Double>(|r, _| 1.0 / (r * r));
+    println!("single {single:e}, double {double:e}");
+    assert!(single < 6e-4 && double < 2e-3, "{single:e} {double:e}");
 }
 
 /// Values in 60-digit arithmetic: before, far behind, and close to the triangle on either side.
@@ -272,13 +347,27 @@ fn sums_against_scalars(bands: usize, count: usize, k: usize, size: f64) -> f64 
     let flux_g = |i: usize, j: usize| flux_gradient(&t.corners(i), w[i], &s.point(j));
     let normal_g = |i: usize, j: usize| normal_gradient(&x[i], &nn[i], w[i], &s.point(j));
     worst = worst.max(transposed(&|o| flux_vjp(&t, &s, &bar, k, o), &flux_g));
-    let single_g = |i: usize, j: usize| single_gradient(&t.corners(i), w[i], &s.point(j));
+    let at = |j: usize| [s.x[j], s.y[j], s.z[j]];
+    let along = |j: usize| [d[j].x, d[j].y, d[j].z];
+    let single_g = |i: usize, j: usize| t.panels[i].gradient::<Single, _>(at(j)).into();
+    let double_g = |i: usize, j: usize| t.panels[i].gradient::<Double, _>(at(j)).into();
     worst = worst.max(transposed(&|o| normal_vjp(&p, &s, &bar, k, o), &normal_g));
     worst = worst.max(transposed(&|o| single_vjp(&t, &s, &bar, k, o), &single_g));
     worst = worst.max(transposed(
         &|o| single_hvp(&t, &s, &d, &bar, k, o),
-        &|i, j| single_hessian_product(&t.corners(i), w[i], &s.point(j), &d[j]),
+        &|i, j| (t.panels[i].hessian_product::<Single, _>(at(j), along(j))).into(),
     ));
+    worst = worst.max(transposed(&|o| double_vjp(&t, &s, &bar, k, o), &double_g));
+    worst = worst.max(transposed(
+        &|o| double_hvp(&t, &s, &d, &bar, k, o),
+        &|i, j| (t.panels[i].hessian_product::<Double, _>(at(j), along(j))).into(),
+    ));
+    let (mut filled, mut plain) = (vec![0.0; n * count], Vec::new());
+    double_fill(&t, &s, Write::Add, &mut filled, count, 0);
+    for (i, j) in (0..n).flat_map(|i| (0..count).map(move |j| (i, j))) {
+        plain.push(t.panels[i].value::<Double, f64>(at(j)));
+    }
+    worst = worst.max(gap(&filled, &plain));
     worst = worst.max(transposed(
         &|o| potential_vjp(&p, &s, &bar, k, o),
         &|i, j| potential_gradient(&x[i], &s.point(j)),
@@ -304,7 +393,7 @@ fn sums_against_scalars(bands: usize, count: usize, k: usize, size: f64) -> f64 
     let (mut out, mut plain) = (vec![0.0; count * k], vec![0.0; count * k]);
     single_sum(&t, &s, &bar, k, &mut out);
     for (i, m) in (0..n).flat_map(|i| (0..count * k).map(move |m| (i, m))) {
-        plain[m] += bar[i * k + m % k] * single(&t.corners(i), w[i], &s.point(m / k));
+        plain[m] += bar[i * k + m % k] * t.panels[i].value::<Single, f64>(at(m / k));
     }
     worst = worst.max(gap(&out, &plain));
 
@@ -324,6 +413,7 @@ fn sums_against_scalars(bands: usize, count: usize, k: usize, size: f64) -> f64 
     };
     worst = worst.max(forward(&|o| flux_jvp(&t, &s, &d, &a, k, o), &flux_g));
     worst = worst.max(forward(&|o| single_jvp(&t, &s, &d, &a, k, o), &single_g));
+    worst = worst.max(forward(&|o| double_jvp(&t, &s, &d, &a, k, o), &double_g));
     worst.max(forward(&|o| normal_jvp(&p, &s, &d, &a, k, o), &normal_g))
 }
 
@@ -390,6 +480,12 @@ fn everything() -> Vec<f64> {
     add(rows, &|o| normal_jvp(&p, &s, &d, &a, k, o));
     add(vectors, &|o| flux_vjp(&t, &s, &bar, k, o));
     add(vectors, &|o| normal_vjp(&p, &s, &bar, k, o));
+    add(t.len() * count, &|o| {
+        double_fill(&t, &s, Write::Add, o, count, 0)
+    });
+    add(rows, &|o| double_jvp(&t, &s, &d, &a, k, o));
+    add(vectors, &|o| double_vjp(&t, &s, &bar, k, o));
+    add(vectors, &|o| double_hvp(&t, &s, &d, &bar, k, o));
     add(rows, &|o| single_jvp(&t, &s, &d, &a, k, o));
     add(vectors, &|o| single_vjp(&t, &s, &bar, k, o));
     add(vectors, &|o| single_hvp(&t, &s, &d, &bar, k, o));
@@ -468,6 +564,11 @@ fn forward_and_transposed_sums_are_transposes_and_hessians_symmetric() {
         Some(&|o| normal_jvp(&p, &s, &d, &a, k, o)),
         &|o| normal_vjp(&p, &s, &bar, k, o),
         &|d, o| normal_hvp(&p, &s, d, &bar, k, o),
+    );
+    check(
+        Some(&|o| double_jvp(&t, &s, &d, &a, k, o)),
+        &|o| double_vjp(&t, &s, &bar, k, o),
+        &|d, o| double_hvp(&t, &s, d, &bar, k, o),
     );
     check(
         Some(&|o| single_jvp(&t, &s, &d, &a, k, o)),

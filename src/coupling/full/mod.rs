@@ -27,21 +27,21 @@
 
 mod backend;
 mod cpu;
-mod linearised;
 mod model;
+mod residual;
 mod settings;
 
-pub use backend::{Reached, SystemBackend, SystemResponse};
+pub use backend::SystemBackend;
 pub use cpu::Cpu;
 pub use model::Model;
 pub use settings::{FullSolver, Preconditioner, SolveSettings};
 
-use super::{Coupling, Exclusions, Linearise, Linearised, Momenta, PairTensor};
+use super::response::{CoupledResponse, Solved};
+use super::{Coupling, Exclusions, Linearise, Linearised, Momenta};
 use crate::Result;
 use crate::adjoint::lie::{Pose, Vec3};
 use crate::boundary::BodyBoundary;
 use crate::geometry::Wall;
-use linearised::{FullLinearised, Solved};
 use nalgebra::{DMatrix, DVector};
 use rayon::prelude::*;
 use std::sync::Arc;
@@ -82,6 +82,15 @@ impl Full {
     pub fn backend(&self) -> &dyn SystemBackend {
         self.backend.as_ref()
     }
+
+    fn solved(
+        &self,
+        poses: &[Pose],
+        basis: &DMatrix<f64>,
+    ) -> Result<Solved<dyn CoupledResponse + '_>> {
+        let volume = |b: usize| self.model.bodies[b].faces.volume();
+        Solved::new(self.backend.respond(poses, basis)?, basis, volume, 0.0)
+    }
 }
 
 impl Coupling for Full {
@@ -98,7 +107,7 @@ impl Coupling for Full {
     }
 
     fn evaluate(&self, poses: &[Pose], basis: &DMatrix<f64>) -> Result<Momenta> {
-        Ok(Solved::new(self, poses, basis)?.value)
+        Ok(self.solved(poses, basis)?.value)
     }
 
     fn differentiable(&self) -> Option<&dyn Linearise> {
@@ -106,8 +115,13 @@ impl Coupling for Full {
     }
 
     fn residual(&self, poses: &[Pose], basis: &DMatrix<f64>) -> Result<Option<DMatrix<f64>>> {
-        let solved = Solved::new(self, poses, basis)?;
-        Ok(Some(solved.residual(poses, basis)?))
+        let solved = self.solved(poses, basis)?;
+        Ok(Some(residual::residual(
+            &self.model,
+            &solved,
+            poses,
+            basis,
+        )?))
     }
 
     /// With strengths a of all bodies' sources and those of their images (s_j, of the same strength behind
@@ -121,7 +135,7 @@ impl Coupling for Full {
     ) -> Result<Vec<Vec3>> {
         let model = self.model();
         let column = DMatrix::from_column_slice(twists.len(), 1, twists.as_slice());
-        let strengths = self.backend.respond(poses, &column)?.strengths()?;
+        let strengths = self.backend.respond(poses, &column)?.densities()?;
         let mut sources: Vec<(Vec3, f64)> = Vec::new();
         for image in &model.images {
             for ((body, range), pose) in model.bodies.iter().zip(&model.sources).zip(poses) {
@@ -144,11 +158,6 @@ impl Coupling for Full {
 
 impl Linearise for Full {
     fn linearise(&self, poses: &[Pose], basis: &DMatrix<f64>) -> Result<Box<dyn Linearised + '_>> {
-        let solved = Solved::new(self, poses, basis)?;
-        let gradient = match basis.ncols() {
-            0 => PairTensor::zeros(self.model.bodies.len(), 0),
-            _ => solved.response.gradient()?,
-        };
-        Ok(Box::new(FullLinearised { solved, gradient }))
+        Ok(Box::new(self.solved(poses, basis)?.linearise()?))
     }
 }

@@ -15,23 +15,24 @@
 //! E is symmetrised, and its derivatives are exactly those of the symmetrised E. They cost no further solve on the basis; the tangent
 //! takes two, `A δφ = δS q − δA φ` and `Aᵀ δμ = −δAᵀ μ`. A body's own block of A doesn't change with the poses: its factors, made
 //! once, precondition the iteration. All other entries depend on the position of a panel's centroid in the frame of another
-//! body alone. Bodies and images that come closer than about half an edge length lose accuracy.
+//! body alone; seen from afar they are multipoles ([`double`](mod@crate::adjoint::kernel::double)). Bodies and images that come closer than about half an edge length lose accuracy.
 
 mod first;
-mod linearised;
 mod placed;
 mod second;
 mod system;
 
 use super::full::SolveSettings;
+use super::response::Solved;
 use super::settings::{check_limits, end, ranges};
 use super::{Coupling, Exclusions, Linearise, Linearised, Momenta};
-use crate::Result;
 use crate::adjoint::lie::Pose;
 use crate::boundary::PanelBoundary;
 use crate::boundary::panel::check_size;
 use crate::geometry::{HalfSpace, Image, Wall};
+use crate::{Error, Result};
 use nalgebra::DMatrix;
+use placed::{PanelSolution, PlacedPanels};
 use std::ops::Range;
 use std::sync::Arc;
 
@@ -78,6 +79,32 @@ impl PanelCoupled {
     fn rows(&self) -> usize {
         end(&self.faces)
     }
+
+    fn solved(&self, poses: &[Pose], basis: &DMatrix<f64>) -> Result<Solved<PanelSolution<'_>>> {
+        let bodies = self.bodies.len();
+        if poses.len() != bodies || basis.nrows() != 6 * bodies {
+            return Err(Error::input(
+                "coupled panel method: poses and basis",
+                format!("{} poses, {} rows", poses.len(), basis.nrows()),
+                format!("one pose and six rows for each of the {bodies} bodies"),
+            ));
+        }
+        let placed = Arc::new(PlacedPanels::new(self, poses, basis)?);
+        let condition = placed.system.condition();
+        let response = Box::new(PanelSolution::new(placed, basis.clone())?);
+        let volume = |b: usize| self.bodies[b].faces.volume();
+        let solved = Solved::new(response, basis, volume, condition)?;
+        if solved.value.momenta().iter().any(|x| !x.is_finite()) {
+            return Err(Error::Solver {
+                what: format!("the coupled panel system ({} panels)", self.rows()),
+                iterations: solved.value.report().iterations,
+                residual: f64::NAN,
+                tolerance: self.settings.tolerance,
+                remedy: "check the poses: the impulses aren't finite".into(),
+            });
+        }
+        Ok(solved)
+    }
 }
 
 impl Coupling for PanelCoupled {
@@ -97,7 +124,7 @@ impl Coupling for PanelCoupled {
     /// A solve that misses its tolerance, bodies that overlap or reach through a wall. Overlap is
     /// noticed where a panel's centroid is inside another body.
     fn evaluate(&self, poses: &[Pose], basis: &DMatrix<f64>) -> Result<Momenta> {
-        Ok(linearised::Solved::new(self, poses, basis)?.value)
+        Ok(self.solved(poses, basis)?.value)
     }
 
     fn differentiable(&self) -> Option<&dyn Linearise> {
@@ -107,8 +134,6 @@ impl Coupling for PanelCoupled {
 
 impl Linearise for PanelCoupled {
     fn linearise(&self, poses: &[Pose], basis: &DMatrix<f64>) -> Result<Box<dyn Linearised + '_>> {
-        Ok(Box::new(
-            linearised::Solved::new(self, poses, basis)?.linearise(),
-        ))
+        Ok(Box::new(self.solved(poses, basis)?.linearise()?))
     }
 }

@@ -2,13 +2,16 @@
 
 use super::PanelCoupled;
 use super::system::System;
-use crate::Result;
-use crate::adjoint::kernel::{flux_vjp, single_sum, single_vjp};
-use crate::adjoint::lie::{Pose, Vec3, Vec6};
-use crate::coupling::full::Reached;
+use crate::adjoint::kernel::{double_vjp, single_sum, single_vjp};
+use crate::adjoint::lie::{Pose, Vec6};
 use crate::coupling::pair::Pair;
+use crate::coupling::response::{self, body_twists, moves};
+use crate::coupling::{CoupledResponse, Direction, PairTensor, Reached, Tangent};
 use crate::solver::Columns;
+use crate::{Error, Result};
 use nalgebra::{DMatrix, DVector};
+use std::ops::Range;
+use std::sync::Arc;
 
 /// The system at given poses.
 pub(super) struct PlacedPanels<'a> {
@@ -17,99 +20,96 @@ pub(super) struct PlacedPanels<'a> {
     /// Panels of the target, points of the source: all whose relative placement changes.
     pub pairs: Vec<Pair>,
     pub system: System<'a>,
-    /// S F of each body's unit twists, at all points.
-    pub readout: Vec<Columns>,
+    /// S F of the unit twists of each body that the first twists move, at all points.
+    readout: Vec<Option<Columns>>,
 }
 
 /// Twists, 6·bodies × k, and the water's solution.
-pub(super) struct Solution {
+pub(super) struct PanelSolution<'a> {
+    pub placed: Arc<PlacedPanels<'a>>,
     pub twists: DMatrix<f64>,
     /// Potentials φ of the panels.
     pub phi: Columns,
     /// Adjoint densities μ.
     pub mu: Columns,
-    pub reached: Reached,
+    reached: Reached,
 }
 
 impl<'a> PlacedPanels<'a> {
+    /// For twists that move the same bodies as these, or fewer.
+    ///
     /// # Errors
     /// Bodies inside each other, or behind a wall.
-    pub fn new(coupled: &'a PanelCoupled, poses: &[Pose]) -> Result<Self> {
+    pub fn new(coupled: &'a PanelCoupled, poses: &[Pose], twists: &DMatrix<f64>) -> Result<Self> {
         let system = System::new(coupled, poses)?;
         let pairs = pairs(coupled, poses);
         Ok(Self {
             coupled,
             poses: poses.to_vec(),
-            readout: readouts(coupled, &pairs),
+            readout: readouts(coupled, &pairs, twists),
             pairs,
             system,
         })
     }
 
     /// D F x̄ of columns of twists: fluxes through the panels.
-    pub fn flux(&self, twists: &DMatrix<f64>) -> Columns {
+    fn flux(&self, twists: &DMatrix<f64>) -> Columns {
         let mut out = Columns::zeros(self.coupled.rows(), twists.ncols());
         for (b, body) in self.coupled.bodies.iter().enumerate() {
+            let twists = body_twists(twists, b);
             for (i, at) in self.coupled.faces[b].clone().enumerate() {
-                let row = body.faces.twist_flux(i);
-                for k in 0..out.columns {
-                    out.data[at * out.columns + k] = row.dot(&twist(twists, b, k));
-                }
+                let (row, out) = (body.faces.twist_flux(i), out.slice_mut(&(at..at + 1)));
+                out.iter_mut()
+                    .zip(&twists)
+                    .for_each(|(o, t)| *o = row.dot(t));
             }
         }
         out
     }
 
-    /// F x̄ of the panels of one body: normal velocities.
-    pub fn normal_velocity(&self, b: usize, twists: &DMatrix<f64>) -> Columns {
-        let faces = &self.coupled.bodies[b].faces;
-        Columns::from_fn(faces.len(), twists.ncols(), |i, k| {
-            faces.twist_flux(i).dot(&twist(twists, b, k)) / faces.areas[i]
-        })
+    /// F x̄ of the panels of one body: normal velocities, `[panel][column]`; none where it rests.
+    pub fn normal_velocity(&self, b: usize, twists: &DMatrix<f64>) -> Option<Vec<f64>> {
+        if !moves(twists, b) {
+            return None;
+        }
+        let (faces, twists) = (&self.coupled.bodies[b].faces, body_twists(twists, b));
+        let rows = (0..faces.len()).map(|i| (faces.twist_flux(i), faces.areas[i]));
+        let velocities = rows.flat_map(|(row, area)| twists.iter().map(move |t| row.dot(t) / area));
+        Some(velocities.collect())
     }
 
-    /// Solves for columns of twists.
-    ///
-    /// # Errors
-    /// A solve that misses its tolerance.
-    pub fn solve(&self, twists: DMatrix<f64>) -> Result<Solution> {
-        let mut right = Columns::zeros(self.coupled.rows(), twists.ncols());
+    /// S F x̄ at all points.
+    fn right(&self, twists: &DMatrix<f64>) -> Columns {
+        let mut out = Columns::zeros(self.coupled.rows(), twists.ncols());
         for (b, readout) in self.readout.iter().enumerate() {
-            for k in 0..right.columns {
-                let twist = twist(&twists, b, k);
-                if twist == Vec6::zeros() {
-                    continue;
-                }
-                for i in 0..right.rows {
-                    let row = Vec6::from_row_slice(readout.row(i));
-                    right.data[i * right.columns + k] += row.dot(&twist);
-                }
+            let Some(readout) = readout.as_ref().filter(|_| moves(twists, b)) else {
+                continue;
+            };
+            let twists = body_twists(twists, b);
+            for i in 0..out.rows {
+                let row = Vec6::from_row_slice(readout.row(i));
+                let out = out.slice_mut(&(i..i + 1));
+                out.iter_mut()
+                    .zip(&twists)
+                    .for_each(|(o, t)| *o += row.dot(t));
             }
         }
-        let mu = self.system.solve(&self.flux(&twists), true)?;
-        let phi = self.system.solve(&right, false)?;
-        let reached = [&mu, &phi].map(|s| Reached {
-            iterations: s.iterations,
-            residual: s.residual,
-        });
-        Ok(Solution {
-            twists,
-            phi: phi.x,
-            mu: mu.x,
-            reached: reached[0].worst(reached[1]),
-        })
+        out
     }
 
-    /// ½ Fᵀ {D φ + Sᵀ μ} of one column: body-frame impulses of all bodies.
+    /// ½ Fᵀ {D φ + Sᵀ μ} of one column: body-frame impulses of all bodies, zero for those without a readout.
     pub fn impulse(&self, phi: &[f64], mu: &[f64]) -> DVector<f64> {
         let mut out = DVector::zeros(6 * self.coupled.bodies.len());
         for (b, body) in self.coupled.bodies.iter().enumerate() {
+            let Some(readout) = &self.readout[b] else {
+                continue;
+            };
             let mut h = Vec6::zeros();
             for (i, at) in self.coupled.faces[b].clone().enumerate() {
                 h += body.faces.twist_flux(i) * phi[at];
             }
             for (i, m) in mu.iter().enumerate() {
-                h += Vec6::from_row_slice(self.readout[b].row(i)) * *m;
+                h += Vec6::from_row_slice(readout.row(i)) * *m;
             }
             out.fixed_rows_mut::<6>(6 * b).copy_from(&(0.5 * h));
         }
@@ -118,39 +118,59 @@ impl<'a> PlacedPanels<'a> {
 
     /// ∇(S q − Ω/4π φ) of a pair's panels at its points, `[point][column][3]`, image's sign included: minus the velocity that they
     /// make there.
-    pub fn fields(&self, pair: &Pair, solution: &Solution) -> Vec<f64> {
+    pub fn fields(&self, pair: &Pair, solution: &PanelSolution) -> Vec<f64> {
         let k = solution.twists.ncols();
-        let body = &self.coupled.bodies[pair.target];
-        let triangles = body.panels().triangles();
-        let range = self.coupled.faces[pair.target].clone();
+        let sign = pair.image.sign;
+        let triangles = self.coupled.bodies[pair.target].panels().triangles();
         let mut out = vec![0.0; 3 * k * pair.positions.len()];
-        let q = self.normal_velocity(pair.target, &solution.twists);
-        if q.data.iter().any(|q| *q != 0.0) {
-            single_vjp(triangles, &pair.points, &q.data, k, &mut out);
+        if let Some(q) = self.normal_velocity(pair.target, &solution.twists) {
+            single_vjp(triangles, &pair.points, &scaled(sign, &q), k, &mut out);
         }
-        let phi: Vec<f64> = (solution.phi.slice(&range).iter())
-            .map(|phi| -phi)
-            .collect();
-        flux_vjp(triangles, &pair.points, &phi, k, &mut out);
-        if pair.image.sign < 0.0 {
-            out.iter_mut().for_each(|x| *x = -*x);
-        }
+        let phi = solution.phi.slice(&self.coupled.faces[pair.target]);
+        double_vjp(triangles, &pair.points, &scaled(-sign, phi), k, &mut out);
         out
+    }
+
+    /// Rows of a pair's panels, and of its points.
+    pub fn ranges(&self, pair: &Pair) -> (Range<usize>, Range<usize>) {
+        let faces = &self.coupled.faces;
+        (faces[pair.target].clone(), faces[pair.source].clone())
+    }
+
+    /// Whether impulses of body `b` are asked for.
+    pub fn reads(&self, b: usize) -> bool {
+        self.readout[b].is_some()
     }
 }
 
-impl Solution {
+impl<'a> PanelSolution<'a> {
+    /// Solves for columns of twists.
+    ///
+    /// # Errors
+    /// A solve that misses its tolerance.
+    pub fn new(placed: Arc<PlacedPanels<'a>>, twists: DMatrix<f64>) -> Result<Self> {
+        let mu = placed.system.solve(&placed.flux(&twists), true)?;
+        let phi = placed.system.solve(&placed.right(&twists), false)?;
+        let [from_mu, from_phi] = [&mu, &phi].map(|s| Reached {
+            iterations: s.iterations,
+            residual: s.residual,
+        });
+        Ok(Self {
+            placed,
+            twists,
+            phi: phi.x,
+            mu: mu.x,
+            reached: from_mu.worst(from_phi),
+        })
+    }
+
     /// One column from coefficients on those there are.
-    pub fn combine(&self, coefficients: &DVector<f64>) -> Self {
+    fn combine(&self, coefficients: &DVector<f64>) -> Self {
         let c = coefficients.as_slice();
-        let combined = |x: &Columns| Columns {
-            rows: x.rows,
-            columns: 1,
-            data: x.combine(c),
-        };
-        let twists = &self.twists * coefficients;
+        let combined = |x: &Columns| Columns::from_columns(&[&x.combine(c)]);
         Self {
-            twists: DMatrix::from_column_slice(twists.len(), 1, twists.as_slice()),
+            placed: self.placed.clone(),
+            twists: response::combined(&self.twists, coefficients),
             phi: combined(&self.phi),
             mu: combined(&self.mu),
             reached: self.reached,
@@ -158,15 +178,15 @@ impl Solution {
     }
 
     /// Single columns side by side.
-    pub fn beside(parts: &[Self]) -> Self {
+    fn beside(&self, parts: &[Self]) -> Self {
         let all = |part: fn(&Self) -> &Columns| {
             let columns: Vec<&[f64]> = parts.iter().map(|p| part(p).data.as_slice()).collect();
             Columns::from_columns(&columns)
         };
-        let rows = parts.first().map_or(0, |p| p.twists.nrows());
         let reached = parts.iter().map(|p| p.reached);
         Self {
-            twists: DMatrix::from_fn(rows, parts.len(), |i, k| parts[k].twists[(i, 0)]),
+            placed: self.placed.clone(),
+            twists: response::beside(parts.iter().map(|p| &p.twists)),
             phi: all(|p| &p.phi),
             mu: all(|p| &p.mu),
             reached: reached.fold(Reached::default(), Reached::worst),
@@ -174,16 +194,59 @@ impl Solution {
     }
 }
 
-/// Twist of body `b` in a column.
-fn twist(twists: &DMatrix<f64>, b: usize, k: usize) -> Vec6 {
-    twists.fixed_view::<6, 1>(6 * b, k).into_owned()
+impl CoupledResponse for PanelSolution<'_> {
+    fn reached(&self) -> Reached {
+        self.reached
+    }
+
+    fn momenta(&self) -> Result<DMatrix<f64>> {
+        let columns = (0..self.twists.ncols())
+            .map(|k| (self.placed).impulse(&self.phi.column(k), &self.mu.column(k)));
+        let mut out = DMatrix::zeros(self.twists.nrows(), self.twists.ncols());
+        for (k, column) in columns.enumerate() {
+            out.set_column(k, &column);
+        }
+        Ok(out)
+    }
+
+    fn energies(&self) -> Result<DMatrix<f64>> {
+        let (k, flux) = (self.twists.ncols(), self.placed.flux(&self.twists));
+        Ok(DMatrix::from_fn(k, k, |i, j| {
+            let products = (0..flux.rows).map(|s| flux.at(s, i) * self.phi.at(s, j));
+            products.sum::<f64>()
+        }))
+    }
+
+    fn gradient(&self) -> Result<PairTensor> {
+        Ok(self.placed.gradient(self))
+    }
+
+    fn directions(&self, directions: &[Direction]) -> Result<Box<dyn CoupledResponse + '_>> {
+        let parts = directions.iter().map(|direction| match direction {
+            Direction::Basis(c) => Ok(self.combine(c)),
+            Direction::Twist(x) => {
+                let twists = DMatrix::from_column_slice(x.len(), 1, x.as_slice());
+                Self::new(self.placed.clone(), twists)
+            }
+        });
+        Ok(Box::new(self.beside(&parts.collect::<Result<Vec<_>>>()?)))
+    }
+
+    fn tangent(&self, z: &[Vec6]) -> Result<Tangent> {
+        match self.twists.ncols() {
+            1 | 2 => self.placed.second(self, z),
+            k => Err(Error::input("tangent: columns", k, "must be 1 or 2")),
+        }
+    }
+
+    fn densities(&self) -> Result<Columns> {
+        Ok(self.phi.clone())
+    }
 }
 
-/// Three-vector of point `i` and column `k` of `columns`.
-#[inline]
-pub(super) fn field_at(fields: &[f64], columns: usize, i: usize, k: usize) -> Vec3 {
-    let at = 3 * (i * columns + k);
-    Vec3::new(fields[at], fields[at + 1], fields[at + 2])
+/// All numbers times one.
+pub(super) fn scaled(factor: f64, x: &[f64]) -> Vec<f64> {
+    x.iter().map(|x| factor * x).collect()
 }
 
 /// All but each body with its own points and with those of bodies that it doesn't feel; images count always.
@@ -205,26 +268,27 @@ fn pairs(coupled: &PanelCoupled, poses: &[Pose]) -> Vec<Pair> {
     out
 }
 
-fn readouts(coupled: &PanelCoupled, pairs: &[Pair]) -> Vec<Columns> {
-    let mut out: Vec<Columns> = (coupled.bodies.iter())
-        .map(|_| Columns::zeros(coupled.rows(), 6))
-        .collect();
-    for (b, body) in coupled.bodies.iter().enumerate() {
-        let own = &coupled.faces[b];
-        let own = out[b].slice_mut(own);
-        for (n, x) in own.iter_mut().enumerate() {
-            *x = body.single_layer()[(n / 6, n % 6)];
-        }
-    }
+fn readouts(coupled: &PanelCoupled, pairs: &[Pair], twists: &DMatrix<f64>) -> Vec<Option<Columns>> {
+    let own = |(b, body): (usize, &Arc<crate::boundary::PanelBoundary>)| {
+        moves(twists, b).then(|| {
+            let mut columns = Columns::zeros(coupled.rows(), 6);
+            let rows = columns.slice_mut(&coupled.faces[b]).iter_mut().enumerate();
+            rows.for_each(|(n, x)| *x = body.single_layer()[(n / 6, n % 6)]);
+            columns
+        })
+    };
+    let mut out: Vec<_> = coupled.bodies.iter().enumerate().map(own).collect();
     for pair in pairs {
+        let Some(columns) = &mut out[pair.target] else {
+            continue;
+        };
         let body = &coupled.bodies[pair.target];
         let q = body.normal_velocity();
         let sign = pair.image.sign;
         let q: Vec<f64> = (0..6 * q.nrows())
             .map(|n| sign * q[(n / 6, n % 6)])
             .collect();
-        let points = &coupled.faces[pair.source];
-        let out = out[pair.target].slice_mut(points);
+        let out = columns.slice_mut(&coupled.faces[pair.source]);
         single_sum(body.panels().triangles(), &pair.points, &q, 6, out);
     }
     out

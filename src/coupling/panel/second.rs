@@ -1,11 +1,12 @@
 //! Second derivatives along one displacement: the tangent of the first.
 
-use super::placed::{PlacedPanels, Solution, field_at};
+use super::placed::{PanelSolution, PlacedPanels, scaled};
 use crate::Result;
-use crate::adjoint::kernel::{flux_hvp, flux_jvp, flux_vjp, single_hvp, single_jvp};
-use crate::adjoint::lie::{Vec3, Vec6, six};
+use crate::adjoint::kernel::{double_hvp, double_jvp, double_vjp, single_hvp, single_jvp};
+use crate::adjoint::lie::{Vec3, Vec6, point_wrench, six};
 use crate::coupling::Tangent;
-use crate::coupling::pair::Pair;
+use crate::coupling::pair::{Pair, vector};
+use crate::coupling::response::symmetrised;
 use crate::solver::Columns;
 use nalgebra::DVector;
 
@@ -28,7 +29,7 @@ impl PlacedPanels<'_> {
     ///
     /// # Errors
     /// A solve that misses its tolerance.
-    pub fn second(&self, solution: &Solution, z: &[Vec6]) -> Result<Tangent> {
+    pub fn second(&self, solution: &PanelSolution, z: &[Vec6]) -> Result<Tangent> {
         let n = solution.twists.ncols();
         let bodies = self.coupled.bodies.len();
         let mut right = Columns::zeros(self.coupled.rows(), n);
@@ -42,20 +43,19 @@ impl PlacedPanels<'_> {
             let (panels, points) = self.ranges(pair);
             for (i, d) in displacement.iter().enumerate() {
                 for k in 0..n {
-                    let rate = d.dot(&field_at(&fields, n, i, k));
+                    let rate = d.dot(&vector(&fields, n, i, k));
                     right.data[(points.start + i) * n + k] += rate;
                 }
             }
             let triangles = self.coupled.bodies[pair.target].panels().triangles();
-            let signed = |sign: f64| -> Vec<f64> {
-                let mu = solution.mu.slice(&points);
-                mu.iter().map(|m| sign * pair.image.sign * m).collect()
-            };
-            let (s, d) = (&pair.points, &displacement);
+            let (s, d, sign) = (&pair.points, &displacement, pair.image.sign);
+            let mu = solution.mu.slice(&points);
             let out = transposed.slice_mut(&panels);
-            flux_jvp(triangles, s, d, &signed(-1.0), n, out);
-            let out = back.slice_mut(&panels);
-            single_jvp(triangles, s, d, &signed(1.0), n, out);
+            double_jvp(triangles, s, d, &scaled(-sign, mu), n, out);
+            if self.reads(pair.target) {
+                let out = back.slice_mut(&panels);
+                single_jvp(triangles, s, d, &scaled(sign, mu), n, out);
+            }
             first.push(PairFields {
                 displacement,
                 fields,
@@ -68,6 +68,9 @@ impl PlacedPanels<'_> {
         let momentum = |k: usize| -> DVector<f64> {
             let mut h = self.impulse(&moved.phi.column(k), &moved.mu.column(k));
             for (b, body) in self.coupled.bodies.iter().enumerate() {
+                if !self.reads(b) {
+                    continue;
+                }
                 let mut part = Vec6::zeros();
                 for (i, at) in self.coupled.faces[b].clone().enumerate() {
                     part += body.faces.twist_flux(i) * (back.at(at, k) / body.faces.areas[i]);
@@ -98,7 +101,7 @@ impl PlacedPanels<'_> {
         &self,
         pair: &Pair,
         first: &PairFields,
-        solution: &Solution,
+        solution: &PanelSolution,
         moved: &Moved,
     ) -> (Vec6, Vec6) {
         let n = solution.twists.ncols();
@@ -106,62 +109,27 @@ impl PlacedPanels<'_> {
         let triangles = self.coupled.bodies[pair.target].panels().triangles();
         let d = &first.displacement;
         let sign = pair.image.sign;
-        let signed = |sign: f64, x: &[f64]| -> Vec<f64> { x.iter().map(|x| sign * x).collect() };
-        let q = self.normal_velocity(pair.target, &solution.twists);
-        let phi = solution.phi.slice(&panels);
-        let dphi = moved.phi.slice(&panels);
         let mut dfields = vec![0.0; first.fields.len()];
-        if q.data.iter().any(|q| *q != 0.0) {
-            single_hvp(
-                triangles,
-                &pair.points,
-                d,
-                &signed(sign, &q.data),
-                n,
-                &mut dfields,
-            );
+        if let Some(q) = self.normal_velocity(pair.target, &solution.twists) {
+            let q = scaled(sign, &q);
+            single_hvp(triangles, &pair.points, d, &q, n, &mut dfields);
         }
-        flux_hvp(
-            triangles,
-            &pair.points,
-            d,
-            &signed(-sign, phi),
-            n,
-            &mut dfields,
-        );
-        flux_vjp(
-            triangles,
-            &pair.points,
-            &signed(-sign, dphi),
-            n,
-            &mut dfields,
-        );
-        // (x, y, weight) of the symmetrised form.
-        let terms: &[(usize, usize, f64)] = match n {
-            1 => &[(0, 0, 1.0)],
-            _ => &[(0, 1, 0.5), (1, 0, 0.5)],
-        };
+        let phi = scaled(-sign, solution.phi.slice(&panels));
+        double_hvp(triangles, &pair.points, d, &phi, n, &mut dfields);
+        let dphi = scaled(-sign, moved.phi.slice(&panels));
+        double_vjp(triangles, &pair.points, &dphi, n, &mut dfields);
         let (mut w, mut dw) = (Vec6::zeros(), Vec6::zeros());
         for (i, s) in pair.positions.iter().enumerate() {
             let (mut f, mut df) = (Vec3::zeros(), Vec3::zeros());
             let at = points.start + i;
-            for &(x, y, weight) in terms {
-                let (field, dfield) = (
-                    field_at(&first.fields, n, i, y),
-                    field_at(&dfields, n, i, y),
-                );
+            for &(x, y, weight) in symmetrised(n) {
+                let (field, dfield) = (vector(&first.fields, n, i, y), vector(&dfields, n, i, y));
                 f += weight * solution.mu.at(at, x) * field;
                 df += weight * (moved.mu.at(at, x) * field + solution.mu.at(at, x) * dfield);
             }
-            w += six(&f, &s.cross(&f));
+            w += point_wrench(s, &f);
             dw += six(&df, &(d[i].cross(&f) + s.cross(&df)));
         }
         (w, dw)
-    }
-
-    /// Rows of a pair's panels, and of its points.
-    fn ranges(&self, pair: &Pair) -> (std::ops::Range<usize>, std::ops::Range<usize>) {
-        let faces = &self.coupled.faces;
-        (faces[pair.target].clone(), faces[pair.source].clone())
     }
 }

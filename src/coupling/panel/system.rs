@@ -1,7 +1,7 @@
 //! The matrix between panels at given poses, and its solves.
 
 use super::PanelCoupled;
-use crate::adjoint::kernel::Write;
+use crate::adjoint::kernel::{Sources, Write, double_fill};
 use crate::adjoint::lie::{Pose, Vec3};
 use crate::coupling::full::FullSolver;
 use crate::coupling::settings::converged;
@@ -216,7 +216,7 @@ impl Placed<'_> {
         column: usize,
     ) -> Result<()> {
         let coupled = self.coupled;
-        let layers = coupled.bodies[source].panels();
+        let triangles = coupled.bodies[source].panels().triangles();
         let points = coupled.faces[target].len();
         for image in &coupled.images {
             let apart = source != target && !coupled.excluded.contains(source, target);
@@ -232,7 +232,8 @@ impl Placed<'_> {
                 }
             };
             signed(out);
-            layers.double_layer(&seen, Write::Add, out, stride, column);
+            let seen = Sources::new(&seen);
+            double_fill(triangles, &seen, Write::Add, out, stride, column);
             signed(out);
         }
         let mut filled = vec![0.0; points];

@@ -18,7 +18,8 @@ pub use probe::Probe;
 use super::context::{Context, Options};
 use super::geometry::{Geometry, PlacedSystem};
 use crate::adjoint::lie::Pose;
-use crate::coupling::full::{FullSolver, Model, SystemBackend, SystemResponse};
+use crate::coupling::CoupledResponse;
+use crate::coupling::full::{FullSolver, Model, SystemBackend};
 use crate::{Error, Result};
 use nalgebra::DMatrix;
 use std::sync::Arc;
@@ -74,7 +75,7 @@ impl SystemBackend for Gpu {
         &self,
         poses: &[Pose],
         twists: &DMatrix<f64>,
-    ) -> Result<Box<dyn SystemResponse + '_>> {
+    ) -> Result<Box<dyn CoupledResponse + '_>> {
         let placed = Arc::new(PlacedSystem::new(&self.geometry, poses)?);
         let moving = (0..poses.len())
             .map(|b| twists.rows(6 * b, 6).iter().any(|x| *x != 0.0))

@@ -7,7 +7,7 @@ use super::second::motions;
 use super::solve::Solves;
 use crate::Result;
 use crate::adjoint::lie::{Pose, Vec3, Vec6};
-use crate::coupling::full::Reached;
+use crate::coupling::Reached;
 use crate::gpu::buffer::Buffer;
 use crate::gpu::context::Context;
 use crate::gpu::geometry::PlacedSystem;

@@ -4,8 +4,7 @@ use super::pairs::{Densities, wrenches};
 use super::products::{Product, To, product};
 use super::solve::Solves;
 use crate::adjoint::lie::Vec6;
-use crate::coupling::full::{Reached, SystemResponse};
-use crate::coupling::{Direction, PairTensor, Tangent};
+use crate::coupling::{CoupledResponse, Direction, PairTensor, Reached, Tangent};
 use crate::gpu::buffer::Buffer;
 use crate::gpu::columns::{Base, Slice, combine, passes, products};
 use crate::gpu::context::Context;
@@ -217,7 +216,7 @@ impl Solution {
     }
 }
 
-impl SystemResponse for Solution {
+impl CoupledResponse for Solution {
     fn reached(&self) -> Reached {
         self.reached
     }
@@ -282,7 +281,7 @@ impl SystemResponse for Solution {
         Ok(out)
     }
 
-    fn directions(&self, directions: &[Direction]) -> Result<Box<dyn SystemResponse + '_>> {
+    fn directions(&self, directions: &[Direction]) -> Result<Box<dyn CoupledResponse + '_>> {
         let solution = match self.twists.along(directions) {
             Ok(coefficients) => self.combination(&coefficients)?,
             // One more column costs a solve little: the kernels are evaluated once for all.
@@ -302,7 +301,7 @@ impl SystemResponse for Solution {
         units::along(z, self.placed.geometry.length, |z| self.second(z))
     }
 
-    fn strengths(&self) -> Result<Columns> {
+    fn densities(&self) -> Result<Columns> {
         let (k, n) = (self.columns, self.placed.geometry.sizes.sources);
         let geometry = &self.placed.geometry;
         let context = &geometry.context;

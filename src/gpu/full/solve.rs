@@ -2,7 +2,8 @@
 
 use super::products::{Product, WIDE, once};
 use super::refined::{Iterates, factor};
-use crate::coupling::full::{Preconditioner, Reached};
+use crate::coupling::Reached;
+use crate::coupling::full::Preconditioner;
 use crate::gpu::buffer::{Buffer, words};
 use crate::gpu::columns::{Base, Slice, Sum, passes};
 use crate::gpu::geometry::PlacedSystem;

@@ -13,7 +13,7 @@ use pulp::Simd;
 /// `δc = 2 (δS − S (δP Q + P δQ)/(P Q))/(P Q)`, `δP = δl_a l_b + l_a δl_b`, `δQ = 2 S δS`, and
 /// `δr_a = −d`.
 #[inline(always)]
-pub(super) fn edge_gradient_tangent<T: Lane>(
+pub(in crate::kernel) fn edge_gradient_tangent<T: Lane>(
     ra: V3<T>,
     e: V3<T>,
     e2: T,

@@ -26,6 +26,7 @@ mod jvp;
 mod value;
 mod vjp;
 
+pub(super) use hvp::edge_gradient_tangent;
 pub use hvp::{flux_hessian_product, flux_hvp};
 pub use jvp::flux_jvp;
 pub(super) use value::solid_angle;

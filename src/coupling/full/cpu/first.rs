@@ -1,10 +1,11 @@
 //! First derivatives with the bodies' displacement.
 
-use super::placed::{PlacedBodies, Solution, beside, body_twists};
+use super::placed::{PlacedBodies, Solution, beside};
 use super::system::Solved;
 use crate::adjoint::lie::{Vec6, point_wrench};
 use crate::coupling::PairTensor;
 use crate::coupling::pair::{Pair, vector, wrench};
+use crate::coupling::response::body_twists;
 use crate::solver::{Columns, transposed_product};
 
 impl PlacedBodies<'_> {

@@ -5,9 +5,9 @@ mod placed;
 mod second;
 mod system;
 
-use super::{Model, Reached, SystemBackend, SystemResponse};
+use super::{Model, SystemBackend};
 use crate::adjoint::lie::{Pose, Vec6};
-use crate::coupling::{Direction, PairTensor, Tangent};
+use crate::coupling::{CoupledResponse, Direction, PairTensor, Reached, Tangent};
 use crate::solver::Columns;
 use crate::{Error, Result};
 use nalgebra::DMatrix;
@@ -54,7 +54,7 @@ impl SystemBackend for Cpu {
         &self,
         poses: &[Pose],
         twists: &DMatrix<f64>,
-    ) -> Result<Box<dyn SystemResponse + '_>> {
+    ) -> Result<Box<dyn CoupledResponse + '_>> {
         let placed = PlacedBodies::new(self, poses, twists);
         Ok(Box::new(CoupledSolution {
             solution: placed.solve(twists.clone())?,
@@ -72,7 +72,7 @@ struct CoupledSolution<'a> {
     few: bool,
 }
 
-impl SystemResponse for CoupledSolution<'_> {
+impl CoupledResponse for CoupledSolution<'_> {
     fn reached(&self) -> Reached {
         self.solution.reached
     }
@@ -102,7 +102,7 @@ impl SystemResponse for CoupledSolution<'_> {
         })
     }
 
-    fn directions(&self, directions: &[Direction]) -> Result<Box<dyn SystemResponse + '_>> {
+    fn directions(&self, directions: &[Direction]) -> Result<Box<dyn CoupledResponse + '_>> {
         let parts = directions.iter().map(|direction| match direction {
             Direction::Basis(c) => Ok(self.solution.combine(c)),
             Direction::Twist(x) => {
@@ -125,7 +125,7 @@ impl SystemResponse for CoupledSolution<'_> {
         }
     }
 
-    fn strengths(&self) -> Result<Columns> {
+    fn densities(&self) -> Result<Columns> {
         Ok(self.solution.solved.a.clone())
     }
 }

@@ -1,12 +1,14 @@
 //! The coupled system at given poses: what all solutions there share.
 
-use super::super::{Model, Reached};
+use super::super::Model;
 use super::Cpu;
 use super::system::{Solved, System};
 use crate::Result;
 use crate::adjoint::lie::{Pose, Vec6};
 use crate::boundary::BodyBoundary;
+use crate::coupling::Reached;
 use crate::coupling::pair::Pair;
+use crate::coupling::response::{self, body_twists, moves};
 use crate::solver::Columns;
 use nalgebra::{DMatrix, DVector};
 use std::ops::Range;
@@ -116,9 +118,8 @@ impl Solution {
     /// One column from coefficients on those there are.
     pub fn combine(&self, coefficients: &DVector<f64>) -> Self {
         let c = coefficients.as_slice();
-        let twists = &self.twists * coefficients;
         Self {
-            twists: DMatrix::from_column_slice(twists.len(), 1, twists.as_slice()),
+            twists: response::combined(&self.twists, coefficients),
             solved: each(|part| Columns::from_columns(&[&part(&self.solved).combine(c)])),
             reached: self.reached,
         }
@@ -126,10 +127,9 @@ impl Solution {
 
     /// Single columns side by side.
     pub fn beside(parts: &[Self]) -> Self {
-        let rows = parts.first().map_or(0, |p| p.twists.nrows());
         let reached = parts.iter().map(|p| p.reached);
         Self {
-            twists: DMatrix::from_fn(rows, parts.len(), |i, k| parts[k].twists[(i, 0)]),
+            twists: response::beside(parts.iter().map(|p| &p.twists)),
             solved: each(|part| {
                 let columns = parts.iter().map(|p| part(&p.solved).data.as_slice());
                 Columns::from_columns(&columns.collect::<Vec<_>>())
@@ -149,22 +149,10 @@ fn each(make: impl Fn(fn(&Solved) -> &Columns) -> Columns) -> Solved {
     }
 }
 
-/// Whether any column moves body `b`.
-fn moves(twists: &DMatrix<f64>, b: usize) -> bool {
-    twists.rows(6 * b, 6).iter().any(|x| *x != 0.0)
-}
-
 /// μ, then r, of the faces of a body, `[face][μ.., r..]`.
 pub(super) fn beside(mu: &Columns, r: &Columns, faces: &Range<usize>) -> Vec<f64> {
     let rows = faces.clone().map(|i| mu.row(i).iter().chain(r.row(i)));
     rows.flatten().copied().collect()
-}
-
-/// Twists of body `b` in the columns of a stacked matrix.
-pub(super) fn body_twists(twists: &DMatrix<f64>, b: usize) -> Vec<Vec6> {
-    (0..twists.ncols())
-        .map(|k| twists.fixed_view::<6, 1>(6 * b, k).into_owned())
-        .collect()
 }
 
 /// Pᵀ B₆ of each moving body over all sources: its own block and every image that its faces see.

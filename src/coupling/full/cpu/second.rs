@@ -1,12 +1,13 @@
 //! Second derivatives along one displacement: the tangent of the first.
 
-use super::placed::{PlacedBodies, Solution, beside, body_twists, unit_twists};
+use super::placed::{PlacedBodies, Solution, beside, unit_twists};
 use super::system::Solved;
 use crate::Result;
 use crate::adjoint::lie::{Vec3, Vec6, point_wrench, six};
 use crate::adjoint::solve::{Columnwise, Moved};
 use crate::coupling::Tangent;
 use crate::coupling::pair::{Pair, vector};
+use crate::coupling::response::{body_twists, symmetrised};
 use crate::solver::Columns;
 use nalgebra::DVector;
 
@@ -136,17 +137,11 @@ impl PlacedBodies<'_> {
         let twists = body_twists(&solution.twists, pair.target);
         let bent_readout = body.potential_hvp(&pair.points, d, &body.readout_rows(&twists), n);
         let at = self.model.sources[pair.source].start;
-        // (x, y, weight) of the symmetrised form.
-        let terms: &[(usize, usize, f64)] = if n == 1 {
-            &[(0, 0, 1.0)]
-        } else {
-            &[(0, 1, 0.5), (1, 0, 0.5)]
-        };
         let (mut w, mut dw) = (Vec6::zeros(), Vec6::zeros());
         for (j, s) in pair.positions.iter().enumerate() {
             let (mut f, mut df) = (Vec3::zeros(), Vec3::zeros());
             let source = at + j;
-            for &(x, y, weight) in terms {
+            for &(x, y, weight) in symmetrised(n) {
                 let charge = vector(&first.readout, n, j, x) - vector(&first.fields, 2 * n, j, x);
                 let residual = vector(&first.fields, 2 * n, j, n + x);
                 let dcharge = vector(&bent_readout, n, j, x)

@@ -1,11 +1,12 @@
 //! The assembled matrix at given poses, and its solves.
 
-use super::super::{FullSolver, Preconditioner, Reached};
+use super::super::{FullSolver, Preconditioner};
 use super::Cpu;
 use crate::Result;
 use crate::adjoint::kernel::Write;
 use crate::adjoint::solve::{Fitted, Moved, Operator, least_squares, least_squares_jvp};
 use crate::boundary::{BodyBoundary, solve_upper, solve_upper_transpose};
+use crate::coupling::Reached;
 use crate::coupling::pair::Pair;
 use crate::coupling::settings::converged;
 use crate::solver::{Columns, Outcome, cgls, gmres, normal_product, product, transposed_product};

@@ -78,6 +78,17 @@ impl MeshTree {
         edges.iter().sum::<f64>() / 3.0
     }
 
+    /// Number of faces.
+    pub fn len(&self) -> usize {
+        self.triangles.len()
+    }
+
+    /// Area of a face, m².
+    pub fn area(&self, face: usize) -> f64 {
+        let [a, b, c] = self.triangles[face].corners;
+        0.5 * (b - a).cross(&(c - a)).norm()
+    }
+
     /// Centroid of a face.
     pub fn centroid(&self, face: usize) -> Vec3 {
         let [a, b, c] = self.triangles[face].corners;

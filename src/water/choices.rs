@@ -61,7 +61,7 @@ impl WaterChoices {
         Meshing {
             faces: self.faces,
             by_formula: alone && method.by_formula(),
-            pairs: alone && method.extrapolates(),
+            pairs: self.method_used().kind().extrapolates(),
         }
     }
 

@@ -8,9 +8,15 @@ use crate::geometry::{Gap, Gaps, Other, Share, overlap_error};
 use crate::multibody::Tree;
 use crate::scene::Scene;
 use crate::{Error, Result};
+use std::f64::consts::PI;
 
 /// Largest part of a body's volume that may lie inside a larger one that it is declared to overlap.
 const MOST_SHARED: f64 = 0.5;
+/// Part of the edges under which sources inside the bodies don't resolve a gap at all.
+const BY_SOURCES: f64 = 0.5;
+/// Energy of the film in a gap, in the energy of the water that the smaller body displaces, from which it matters to both. Between
+/// round bodies it stays under a hundredth.
+const FILM: f64 = 0.3;
 
 /// The gaps of a scene's bodies, from their surfaces in body frames.
 #[derive(Clone)]
@@ -28,6 +34,10 @@ pub(crate) struct Clearance {
     names: Vec<String>,
     /// Whether the scene has contact.
     contact: bool,
+    /// Volumes of the bodies, m³.
+    volumes: Vec<f64>,
+    /// Whether the flow is made by sources inside the bodies, which no flat gap is resolved by.
+    pub by_sources: bool,
 }
 
 impl Clearance {
@@ -67,6 +77,11 @@ impl Clearance {
             parents: (0..bodies).map(|b| scene.submerged_parent(b)).collect(),
             names: scene.bodies.iter().map(|b| b.name.clone()).collect(),
             contact: scene.contact.is_some(),
+            volumes: surfaces
+                .iter()
+                .map(|s| s.as_ref().map_or(0.0, |s| s.properties.volume))
+                .collect(),
+            by_sources: false,
         })
     }
 
@@ -84,6 +99,37 @@ impl Clearance {
             }
         }
         self.refuse_depth(poses)
+    }
+
+    /// Refuses flat gaps that sources inside the bodies don't resolve: what they give there is smaller than the truth by a factor and
+    /// has slopes of the wrong sign. In a gap h over an area A the water flows along it as a film, of the energy ½ ρ A² U²/(8π h)
+    /// where it is round.
+    pub fn refuse_film(&self, smallest: Option<&Gap>, poses: &[Pose]) -> Result<()> {
+        let narrow = |gap: &Gap| gap.distance < BY_SOURCES * gap.edge;
+        if !self.by_sources || !smallest.is_some_and(narrow) {
+            return Ok(());
+        }
+        for gap in self.moving.all(poses).iter().filter(|gap| narrow(gap)) {
+            let own = self.volumes[gap.first];
+            let volume = match gap.second {
+                Other::Body(b) => own.min(self.volumes[b]),
+                Other::Wall(_) => own,
+            };
+            let area = self.moving.parallel_area(gap, poses);
+            if area.powi(2) > FILM * 8.0 * PI * gap.distance * volume {
+                return Err(Error::Unresolved {
+                    place: self.place(gap),
+                    quantity: "flat gap in m".into(),
+                    value: gap.distance,
+                    limit: BY_SOURCES * gap.edge,
+                    remedy: format!(
+                        "over {area:.3e} m² the water between them is a film, which fundamental solutions don't resolve under half an edge: \
+                         use the method panel, or more faces, or end the run before"
+                    ),
+                });
+            }
+        }
+        Ok(())
     }
 
     /// The smallest gap at these poses; stops a run when bodies get into one another or into a wall.
@@ -111,6 +157,7 @@ impl Clearance {
                 },
             });
         }
+        self.refuse_film(smallest.as_ref(), poses)?;
         self.refuse_depth(poses)?;
         Ok(smallest)
     }

@@ -52,7 +52,7 @@ pub(crate) fn prepare(
     choices: &WaterChoices,
     (numbers, submerged): (Vec<usize>, Vec<SubmergedBody>),
     poses: &[Pose],
-    clearance: Clearance,
+    mut clearance: Clearance,
     folder: Option<&Path>,
 ) -> Result<Prepared> {
     let method = choices.method.kind();
@@ -66,6 +66,8 @@ pub(crate) fn prepare(
         &numbers,
     )?;
     (problem.plan, problem.folder) = (&planned.plan, folder);
+    clearance.by_sources = !fidelity.kind().solves_alone() && method.by_sources();
+    clearance.refuse_film(clearance.moving.smallest(poses).as_ref(), poses)?;
     let mut warnings = choices.without_effect();
     let mut device = Device::open(choices.backend, &choices.gpu, || {
         fidelity.kind().idle_gpu(method)

@@ -123,7 +123,8 @@ fn panel_systems() -> Vec<PanelCoupled> {
         of(FullSolver::Gmres, &[], Exclusions::none()),
         of(FullSolver::Qr, &[WALL, SIDE], Exclusions::none()),
         of(FullSolver::Gmres, &[WALL, free], Exclusions::none()),
-        of(FullSolver::Gmres, &[WALL], Exclusions::new([(0, 1)])),
+        of(FullSolver::Gmres, &[WALL], Exclusions::new([(0, 1)]))
+            .with_added_mass(&[Some(Mat6::identity()), None]),
     ]
 }
 

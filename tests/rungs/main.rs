@@ -78,6 +78,14 @@ const THROUGH: &[(&str, &str)] = &[
     ("coupling::panel::first::PlacedPanels::gradient", FULL_VJP),
     ("coupling::panel::placed::PanelSolution::gradient", FULL_VJP),
     ("coupling::response::CoupledResponse::gradient", FULL_VJP),
+    (
+        "adjoint::kernel::panel::Multipoles::gradient",
+        "adjoint::kernel::single::single_vjp",
+    ),
+    (
+        "adjoint::kernel::panel::Panel::gradient",
+        "adjoint::kernel::double::double_vjp",
+    ),
     // Each joint's maps, through those that all joints share.
     (
         "multibody::joint::planar::Planar::frame_velocity_vjp",

@@ -5,7 +5,8 @@
 
 use super::flux::edge_gradient;
 use super::lane::{Lane, Lanes, V3, dot, scale, scale_add};
-use super::panel::{Gradients, Layer, Multipoles, Panel, Tangents, constant};
+use super::layer::{Gradients, Tangents};
+use super::panel::{Layer, Multipoles, Panel, constant};
 use super::sum::{dispatch, fill, forward, load, put, transposed};
 use super::target::FACES;
 use super::{Sources, Triangles, Write};

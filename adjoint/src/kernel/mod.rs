@@ -37,6 +37,7 @@
 pub mod double;
 pub mod flux;
 mod lane;
+mod layer;
 pub mod normal;
 mod panel;
 mod point;

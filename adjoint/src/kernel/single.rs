@@ -22,7 +22,8 @@
 
 use super::flux::{edge_gradient, solid_angle};
 use super::lane::{Lane, V3, dot, scale, scale_add};
-use super::panel::{Gradients, Layer, Multipoles, Panel, Tangents, Values, constant};
+use super::layer::{Gradients, Tangents, Values};
+use super::panel::{Layer, Multipoles, Panel, constant};
 use super::sum::{forward, transposed};
 use super::{Sources, Triangles};
 use crate::lie::Vec3;

@@ -42,6 +42,20 @@ pub struct Richardson {
     pub ratio: f64,
 }
 
+impl Richardson {
+    /// As [`richardson()`], with a given ratio of the edges where the numbers of faces don't tell it, and without negative energy.
+    pub(crate) fn of(
+        fine: &PanelBoundary,
+        coarse: &PanelBoundary,
+        ratio: Option<f64>,
+    ) -> Result<Self> {
+        let ratio = ratio.unwrap_or_else(|| edge(coarse) / edge(fine));
+        let mut found = richardson_of_ratio(fine, coarse, ratio)?;
+        found.added_mass = positive(&found.added_mass, fine.faces.volume());
+        Ok(found)
+    }
+}
+
 /// Extrapolates the added mass of two meshes of one shape.
 ///
 /// # Errors
@@ -102,13 +116,10 @@ impl Extrapolated {
     /// # Errors
     /// Meshes that don't differ enough.
     pub fn new(fine: PanelBoundary, coarse: PanelBoundary, ratio: Option<f64>) -> Result<Self> {
-        let ratio = ratio.unwrap_or_else(|| edge(&coarse) / edge(&fine));
-        let mut found = richardson_of_ratio(&fine, &coarse, ratio)?;
-        found.added_mass = positive(&found.added_mass, fine.faces.volume());
         Ok(Self {
+            found: Richardson::of(&fine, &coarse, ratio)?,
             fine,
             coarse,
-            found,
         })
     }
 

@@ -12,6 +12,10 @@
 //! δE(x, y) = ½ [ μ_xᵀ (δS q_y − δA φ_y) + μ_yᵀ (δS q_x − δA φ_x) ]
 //! ```
 //!
+//! Where a body's added mass in unbounded fluid is known better than its own panels tell it (by formula, or extrapolated from two
+//! meshes), the difference is added to its block of M̄ ([`PanelCoupled::with_added_mass`]): in the body's frame it is constant,
+//! so no derivative changes, and what is left is the error of the coupling alone.
+//!
 //! E is symmetrised, and its derivatives are exactly those of the symmetrised E. They cost no further solve on the basis; the tangent
 //! takes two, `A δφ = δS q − δA φ` and `Aᵀ δμ = −δAᵀ μ`. A body's own block of A doesn't change with the poses: its factors, made
 //! once, precondition the iteration. All other entries depend on the position of a panel's centroid in the frame of another
@@ -26,7 +30,7 @@ use super::full::SolveSettings;
 use super::response::Solved;
 use super::settings::{check_limits, end, ranges};
 use super::{Coupling, Exclusions, Linearise, Linearised, Momenta};
-use crate::adjoint::lie::Pose;
+use crate::adjoint::lie::{Mat6, Pose};
 use crate::boundary::PanelBoundary;
 use crate::boundary::panel::check_size;
 use crate::geometry::{HalfSpace, Image, Wall};
@@ -44,6 +48,8 @@ pub struct PanelCoupled {
     settings: SolveSettings,
     faces: Vec<Range<usize>>,
     excluded: Exclusions,
+    /// What each body's own panels lack of its added mass, body frame.
+    lacking: Vec<Mat6>,
 }
 
 impl PanelCoupled {
@@ -68,11 +74,21 @@ impl PanelCoupled {
         Ok(Self {
             images: Image::of_walls(walls)?,
             walls: Wall::half_spaces(walls)?,
+            lacking: vec![Mat6::zeros(); bodies.len()],
             bodies,
             settings,
             faces,
             excluded,
         })
+    }
+
+    /// With the added mass of each body in unbounded fluid (about the body's origin, density 1), where it is known better than its
+    /// panels tell it.
+    pub fn with_added_mass(mut self, known: &[Option<Mat6>]) -> Self {
+        for ((lacking, body), known) in self.lacking.iter_mut().zip(&self.bodies).zip(known) {
+            *lacking = known.map_or_else(Mat6::zeros, |known| known - body.added_mass);
+        }
+        self
     }
 
     /// Number of panels of all bodies.

@@ -97,6 +97,16 @@ impl<'a> PlacedPanels<'a> {
         out
     }
 
+    /// What the bodies' own panels lack of their impulses, 6·bodies × k.
+    fn lacking(&self, twists: &DMatrix<f64>) -> DMatrix<f64> {
+        let mut out = twists.clone();
+        for (b, lacking) in self.coupled.lacking.iter().enumerate() {
+            let own = lacking * twists.rows(6 * b, 6);
+            out.rows_mut(6 * b, 6).copy_from(&own);
+        }
+        out
+    }
+
     /// ½ Fᵀ {D φ + Sᵀ μ} of one column: body-frame impulses of all bodies, zero for those without a readout.
     pub fn impulse(&self, phi: &[f64], mu: &[f64]) -> DVector<f64> {
         let mut out = DVector::zeros(6 * self.coupled.bodies.len());
@@ -206,14 +216,15 @@ impl CoupledResponse for PanelSolution<'_> {
         for (k, column) in columns.enumerate() {
             out.set_column(k, &column);
         }
-        Ok(out)
+        Ok(out + self.placed.lacking(&self.twists))
     }
 
     fn energies(&self) -> Result<DMatrix<f64>> {
         let (k, flux) = (self.twists.ncols(), self.placed.flux(&self.twists));
+        let lacking = self.twists.tr_mul(&self.placed.lacking(&self.twists));
         Ok(DMatrix::from_fn(k, k, |i, j| {
             let products = (0..flux.rows).map(|s| flux.at(s, i) * self.phi.at(s, j));
-            products.sum::<f64>()
+            lacking[(i, j)] + products.sum::<f64>()
         }))
     }
 

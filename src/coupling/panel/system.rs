@@ -226,6 +226,9 @@ impl Placed<'_> {
             let seen = self.seen_from(image, source, target);
             // Images in free surfaces have the opposite sign, and the kernel only adds.
             let signed = |out: &mut [f64]| {
+                if image.sign > 0.0 {
+                    return;
+                }
                 for row in out.chunks_mut(stride) {
                     let row = &mut row[column..column + points];
                     row.iter_mut().for_each(|x| *x *= image.sign);

@@ -6,6 +6,7 @@
 //! shift that separates the two, measured at vertices, face centres, points well inside and along
 //! crossing edges.
 
+mod film;
 mod pair;
 
 use crate::error::{Error, Result};

@@ -43,6 +43,10 @@ impl BodyMethod for Auto {
         true
     }
 
+    fn by_sources(&self) -> bool {
+        true
+    }
+
     fn made_from(&self, body: &SubmergedBody, numerics: &Numerics) -> serde_json::Value {
         self.of(body).made_from(body, numerics)
     }

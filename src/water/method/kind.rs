@@ -57,6 +57,11 @@ pub(crate) trait BodyMethod: Send + Sync {
         false
     }
 
+    /// Whether all bodies solved together are made of sources inside them.
+    fn by_sources(&self) -> bool {
+        false
+    }
+
     /// Refuses the GPU for all bodies solved together where that is done on the CPU alone.
     fn check_gpu(&self) -> Result<()> {
         Ok(())

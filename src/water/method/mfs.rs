@@ -29,6 +29,10 @@ impl BodyMethod for Mfs {
         true
     }
 
+    fn by_sources(&self) -> bool {
+        true
+    }
+
     fn made_from(&self, _: &SubmergedBody, numerics: &Numerics) -> serde_json::Value {
         serde_json::json!(["mfs", self.settings(numerics)])
     }

@@ -2,7 +2,7 @@
 
 use super::kind::{BodyMethod, Problem, Solved};
 use crate::boundary::PanelBoundary;
-use crate::boundary::panel::Extrapolated;
+use crate::boundary::panel::{Extrapolated, Richardson};
 use crate::coupling::PanelCoupled;
 use crate::coupling::full::SolveSettings;
 use crate::water::device::Device;
@@ -51,25 +51,33 @@ impl BodyMethod for Panel {
         let made = shared(problem.bodies, |body| {
             PanelBoundary::new(body.name, body.surface("full")?)
         })?;
+        let known = made.iter().zip(problem.bodies).map(|(fine, body)| {
+            let Some(Coarse { mesh, ratio }) = body.coarse else {
+                return Ok(None);
+            };
+            let coarse = PanelBoundary::new(body.name, mesh)?;
+            Ok(Some(Richardson::of(fine, &coarse, *ratio)?))
+        });
+        let known = known.collect::<Result<Vec<_>>>()?;
+        let own: Vec<_> = known.iter().map(|k| k.map(|k| k.added_mass)).collect();
         let solve = SolveSettings {
             max_iterations: MOST_ITERATIONS,
             ..problem.numerics.solve
         };
         Ok(Made {
             warnings: once(&made, |m| &m.warnings),
-            bodies: problem.named(made.iter().map(|m| Discretisation {
+            bodies: problem.named(made.iter().zip(&known).map(|(m, known)| Discretisation {
                 method: self.label(),
                 faces: m.faces.len(),
                 unknowns: m.faces.len(),
                 asymmetry: m.asymmetry,
+                added_mass_error: known.map(|k| k.error),
                 ..Discretisation::default()
             })),
-            coupling: Box::new(PanelCoupled::new(
-                made,
-                problem.walls,
-                problem.excluded.clone(),
-                solve,
-            )?),
+            coupling: Box::new(
+                PanelCoupled::new(made, problem.walls, problem.excluded.clone(), solve)?
+                    .with_added_mass(&own),
+            ),
         })
     }
 

@@ -38,6 +38,8 @@ pub(crate) struct Clearance {
     volumes: Vec<f64>,
     /// Whether the flow is made by sources inside the bodies, which no flat gap is resolved by.
     pub by_sources: bool,
+    /// The narrowest gap that is resolved, in edges.
+    pub resolved_edges: f64,
 }
 
 impl Clearance {
@@ -82,6 +84,7 @@ impl Clearance {
                 .map(|s| s.as_ref().map_or(0.0, |s| s.properties.volume))
                 .collect(),
             by_sources: false,
+            resolved_edges: 0.0,
         })
     }
 
@@ -186,7 +189,7 @@ impl Clearance {
     /// What the smallest gap of a run means.
     pub fn warning(&self, time: f64, gap: &Gap, fidelity: Fidelity) -> Option<String> {
         let (time, place, hint) = (readable(time), self.place(gap), self.hint(gap));
-        (fidelity.kind()).gap_warning(gap, &place, &time.to_string(), &hint)
+        (fidelity.kind()).gap_warning(gap, self.resolved_edges, &place, &time.to_string(), &hint)
     }
 
     /// How bodies of which one carries the other may be declared to overlap.

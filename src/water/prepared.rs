@@ -1,11 +1,13 @@
 //! The water of a scene, ready to be evaluated.
 
+use super::backend::Backend;
 use super::choices::WaterChoices;
 use super::clearance::Clearance;
 use super::device::Device;
 use super::fidelity::Fidelity;
 use super::fidelity::kind::Planned;
-use super::method::kind::Problem;
+use super::method::Method;
+use super::method::kind::{BodyMethod, Problem};
 use super::numerics::Plan;
 use super::submerged::{Discretisation, SubmergedBody};
 use crate::Result;
@@ -26,6 +28,8 @@ pub(crate) struct Prepared {
     pub faces: usize,
     /// The fidelity in use.
     pub fidelity: Fidelity,
+    /// The body method in use.
+    pub method: &'static dyn BodyMethod,
     /// What each body in the water became.
     pub discretisation: Vec<Discretisation>,
     /// Smallest gap that the discretisation of each body of the scene resolves, m; zero where it isn't limited but by
@@ -55,8 +59,14 @@ pub(crate) fn prepare(
     mut clearance: Clearance,
     folder: Option<&Path>,
 ) -> Result<Prepared> {
-    let method = choices.method.kind();
+    // Where compression can't resolve the gaps of a scene, panels do, flat ones too. On a GPU there are none.
+    let together = match (choices.method, choices.backend) {
+        (Method::Auto, Backend::Cpu) => Method::Panel.kind(),
+        (method, _) => method.kind(),
+    };
+    let mut method = choices.method.kind();
     let mut problem = Problem::new(scene, &numbers, &submerged, method, &choices.numerics);
+    problem.together = together;
     let (fidelity, planned) = plan(
         scene,
         choices.fidelity,
@@ -65,8 +75,13 @@ pub(crate) fn prepare(
         &problem,
         &numbers,
     )?;
+    if planned.together {
+        method = together;
+        problem.method = together;
+    }
     (problem.plan, problem.folder) = (&planned.plan, folder);
     clearance.by_sources = !fidelity.kind().solves_alone() && method.by_sources();
+    clearance.resolved_edges = method.resolved_edges();
     clearance.refuse_film(clearance.moving.smallest(poses).as_ref(), poses)?;
     let mut warnings = choices.without_effect();
     let mut device = Device::open(choices.backend, &choices.gpu, || {
@@ -84,6 +99,7 @@ pub(crate) fn prepare(
         coupling: made.coupling.into(),
         faces: made.bodies.iter().map(|d| d.faces).sum(),
         fidelity,
+        method,
         discretisation: made.bodies,
         resolved,
         plan: planned.plan,

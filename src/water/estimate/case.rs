@@ -159,7 +159,7 @@ impl<'a> Case<'a> {
 
     fn problem<'b>(&'b self, bodies: &'b [SubmergedBody]) -> Problem<'b> {
         let Subject { choices, water, .. } = self.subject;
-        let (method, numerics) = (choices.method.kind(), &choices.numerics);
+        let (method, numerics) = (water.method, &choices.numerics);
         Problem {
             plan: &water.plan,
             folder: water.folder.as_deref(),

@@ -12,11 +12,11 @@ use super::reduced::Reduced;
 use crate::adjoint::lie::{Pose, Vec3};
 use crate::boundary::exact::lamb;
 use crate::coupling::reduced::{Cutoff, compress};
-use crate::geometry::{Gap, MassProperties, WallSurface};
+use crate::geometry::{Gap, MassProperties, Other, WallSurface};
 use crate::water::device::Device;
 use crate::water::method::kind::Problem;
 use crate::water::numerics::{Numerics, Plan};
-use crate::water::submerged::Made;
+use crate::water::submerged::{Made, SubmergedBody};
 use crate::{Error, Result};
 use std::f64::consts::PI;
 
@@ -34,8 +34,10 @@ const ROOM: f64 = 0.6;
 const COARSEST: f64 = 2.0;
 /// Gaps under this part of the finest that compression resolves are left to the fidelity `Full`, if it does better there:
 const HOPELESS: f64 = 0.5;
-/// its forces hold down to this part of the edges, and compressed sources are the better answer below.
-const EDGES: f64 = 1.0 / 3.0;
+/// its forces hold down to this part of what it resolves, and compressed sources are the better answer below.
+const EDGES: f64 = 2.0 / 3.0;
+/// Faces with edges longer than this part of the radius of the smaller body at a gap don't see its flow.
+const COARSE: f64 = 0.5;
 /// Under this part of the finest gap compressed sources may refuse: `Full` answers, and warns.
 const REFUSED: f64 = 0.1;
 
@@ -72,8 +74,15 @@ impl FidelityKind for Auto {
         Full.resolved_gap(compressed, edge)
     }
 
-    fn gap_warning(&self, gap: &Gap, place: &str, time: &str, hint: &str) -> Option<String> {
-        Full.gap_warning(gap, place, time, hint)
+    fn gap_warning(
+        &self,
+        gap: &Gap,
+        edges: f64,
+        place: &str,
+        time: &str,
+        hint: &str,
+    ) -> Option<String> {
+        Full.gap_warning(gap, edges, place, time, hint)
     }
 
     fn error(&self, bodies: f64, residual: Option<f64>, coupling: Option<f64>) -> Option<f64> {
@@ -107,14 +116,15 @@ fn plan(problem: &Problem, poses: &[Pose], gaps: &[Gap]) -> Result<Planned> {
             poses[b].apply(&mesh.bounding_ball().center),
         ));
         let near = gaps.iter().filter(|g| g.touches(b));
-        let (smallest, edge) = near
-            .map(|g| (g.image_distance(), g.edge))
-            .min_by(|a, b| a.0.total_cmp(&b.0))
-            .unwrap_or((f64::INFINITY, 0.0));
+        let nearest = near.min_by(|a, b| a.image_distance().total_cmp(&b.image_distance()));
+        let (smallest, edge) =
+            nearest.map_or((f64::INFINITY, 0.0), |g| (g.image_distance(), g.edge));
         let finest = compress::finest_gap(mesh.surface_area());
         let rigid = walls.iter().all(|w| w.surface == WallSurface::Rigid);
         if smallest < HOPELESS * finest && rigid {
-            let full = smallest > EDGES * edge || smallest < REFUSED * finest;
+            let resolved = EDGES * problem.together.resolved_edges() * edge;
+            let coarse = nearest.is_some_and(|g| edge > COARSE * smaller(bodies, g));
+            let full = (smallest > resolved && !coarse) || smallest < REFUSED * finest;
             let so = if full {
                 out.together = true;
                 "all bodies are solved together (full)"
@@ -167,6 +177,19 @@ fn plan(problem: &Problem, poses: &[Pose], gaps: &[Gap]) -> Result<Planned> {
         }
     }
     Ok(out)
+}
+
+/// Radius of the ball around the smaller of the bodies at a gap, m.
+fn smaller(bodies: &[SubmergedBody], gap: &Gap) -> f64 {
+    let radius = |b: usize| {
+        bodies[b]
+            .mesh
+            .map_or(f64::INFINITY, |m| m.bounding_ball().radius)
+    };
+    match gap.second {
+        Other::Body(b) => radius(gap.first).min(radius(b)),
+        Other::Wall(_) => radius(gap.first),
+    }
 }
 
 /// Largest `(V + M)/√M` over the axes of the ellipsoid with the same volume and inertia.

@@ -7,10 +7,8 @@ use crate::water::device::Device;
 use crate::water::method::kind::{BodyMethod, Problem};
 use crate::water::submerged::Made;
 
-/// Gaps narrower than this many edges aren't resolved. A sphere near a wall: at 0.3 edges the gap
-/// adds 1 % to the error of its added mass with 320 faces (0.1 % with 5120), and the force along
-/// the gap is 7 % too small between 0.3 and 0.8 edges (320), 3 % between 0.2 and 0.7 (1280).
-const RESOLVED: f64 = 0.5;
+/// Gaps narrower than this many edges are left to contact.
+const CONTACT: f64 = 0.5;
 
 /// What the residual is worth in the error: near a source it is large, and of the first order where the error is of the second.
 const RESIDUAL: f64 = 0.25;
@@ -36,13 +34,20 @@ impl FidelityKind for Full {
     }
 
     fn resolved_gap(&self, _: f64, edge: f64) -> f64 {
-        RESOLVED * edge
+        CONTACT * edge
     }
 
-    fn gap_warning(&self, gap: &Gap, place: &str, time: &str, hint: &str) -> Option<String> {
-        (gap.distance < RESOLVED * gap.edge).then(|| {
+    fn gap_warning(
+        &self,
+        gap: &Gap,
+        edges: f64,
+        place: &str,
+        time: &str,
+        hint: &str,
+    ) -> Option<String> {
+        (gap.distance < edges * gap.edge).then(|| {
             format!(
-                "{place}: the smallest gap, {:.3e} m at t = {time} s, is narrower than half \
+                "{place}: the smallest gap, {:.3e} m at t = {time} s, is narrower than {edges} of \
                  the edges there ({:.3e} m): forces across it may be off by several percent \
                  and more; use more faces, refine the bodies there (`refine`), or end the run \
                  before{hint}",

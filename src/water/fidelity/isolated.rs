@@ -92,7 +92,14 @@ impl FidelityKind for Isolated {
         0.0
     }
 
-    fn gap_warning(&self, gap: &Gap, place: &str, time: &str, hint: &str) -> Option<String> {
+    fn gap_warning(
+        &self,
+        gap: &Gap,
+        _: f64,
+        place: &str,
+        time: &str,
+        hint: &str,
+    ) -> Option<String> {
         overlaps(gap).then(|| {
             format!(
                 "{place} overlap, most at t = {time} s by {:.3e} m; nothing keeps them apart \

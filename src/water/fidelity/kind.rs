@@ -79,9 +79,16 @@ pub(crate) trait FidelityKind: Send + Sync {
     /// The gap that it resolves where compressed bodies resolve `compressed` and the mesh has edges of `edge`, m.
     fn resolved_gap(&self, compressed: f64, edge: f64) -> f64;
 
-    /// What the user should know of the smallest gap of a run, `place` and `time` in words; `hint` is how the two bodies may be
+    /// What the user should know of the smallest gap of a run, where the method resolves `edges` of an edge, `place` and `time` in words; `hint` is how the two bodies may be
     /// declared to overlap.
-    fn gap_warning(&self, gap: &Gap, place: &str, time: &str, hint: &str) -> Option<String>;
+    fn gap_warning(
+        &self,
+        gap: &Gap,
+        edges: f64,
+        place: &str,
+        time: &str,
+        hint: &str,
+    ) -> Option<String>;
 
     /// The error of the added mass, without the solver's, from that of the `bodies` themselves (from other meshes and from
     /// asymmetry) and the other parts of [`crate::simulate::ErrorEstimate`]; `None` where one that it needs is missing.

@@ -60,7 +60,7 @@ impl FidelityKind for Reduced {
     }
 
     // Said pair by pair: what is resolved differs between bodies.
-    fn gap_warning(&self, _: &Gap, _: &str, _: &str, _: &str) -> Option<String> {
+    fn gap_warning(&self, _: &Gap, _: f64, _: &str, _: &str, _: &str) -> Option<String> {
         None
     }
 

@@ -12,6 +12,11 @@ use crate::water::submerged::{Discretisation, Made, SubmergedBody};
 use std::borrow::Cow;
 use std::path::Path;
 
+/// Gaps narrower than this many edges aren't resolved by sources inside the bodies. A sphere near a wall: at 0.3 edges the gap
+/// adds 1 % to the error of its added mass with 320 faces (0.1 % with 5120), and the force along
+/// the gap is 7 % too small between 0.3 and 0.8 edges (320), 3 % between 0.2 and 0.7 (1280).
+const RESOLVED: f64 = 0.5;
+
 /// A body alone, solved.
 pub(crate) type Solved = Result<Box<dyn Response>>;
 
@@ -57,6 +62,11 @@ pub(crate) trait BodyMethod: Send + Sync {
         false
     }
 
+    /// The narrowest gap that all bodies solved together resolve, in edges.
+    fn resolved_edges(&self) -> f64 {
+        RESOLVED
+    }
+
     /// Whether all bodies solved together are made of sources inside them.
     fn by_sources(&self) -> bool {
         false
@@ -76,6 +86,8 @@ pub(crate) struct Problem<'a> {
     pub excluded: Exclusions,
     /// The method that is asked for.
     pub method: &'static dyn BodyMethod,
+    /// The method for all bodies together that the fidelity auto may fall back on.
+    pub together: &'static dyn BodyMethod,
     pub numerics: &'a Numerics,
     pub plan: &'a Plan,
     /// Where compressed bodies are kept.
@@ -99,6 +111,7 @@ impl<'a> Problem<'a> {
             walls: &scene.walls,
             excluded: Exclusions::new(pairs),
             method,
+            together: method,
             numerics,
             plan: &NO_PLAN,
             folder: None,

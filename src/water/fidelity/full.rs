@@ -45,9 +45,13 @@ impl FidelityKind for Full {
         time: &str,
         hint: &str,
     ) -> Option<String> {
+        let part = match edges {
+            0.5 => "half".into(),
+            _ => format!("{edges} of"),
+        };
         (gap.distance < edges * gap.edge).then(|| {
             format!(
-                "{place}: the smallest gap, {:.3e} m at t = {time} s, is narrower than {edges} of \
+                "{place}: the smallest gap, {:.3e} m at t = {time} s, is narrower than {part} \
                  the edges there ({:.3e} m): forces across it may be off by several percent \
                  and more; use more faces, refine the bodies there (`refine`), or end the run \
                  before{hint}",

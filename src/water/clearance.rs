@@ -12,7 +12,7 @@ use crate::{Error, Result};
 /// Largest part of a body's volume that may lie inside a larger one that it is declared to overlap.
 const MOST_SHARED: f64 = 0.5;
 
-/// The gaps of a scene's bodies, from their surfaces in body frames.
+/// The gaps of a scene's bodies, from their surfaces in body frames: those of shapes by formula exact, others of meshes.
 #[derive(Clone)]
 pub(crate) struct Clearance {
     /// Between pairs that move relative to one another and aren't declared to overlap, and to the
@@ -60,9 +60,12 @@ impl Clearance {
             }
         }
         let but = |others: &[(usize, usize)]| [others, &declared].concat();
+        let solids: Vec<_> = surfaces.iter().map(|s| s.as_ref()?.solid.clone()).collect();
+        let rigid_gaps = Gaps::new(&meshes, &[], &but(&moving))?;
+        let moving_gaps = Gaps::new(&meshes, &scene.walls, &but(&rigid))?;
         Ok(Self {
-            rigid: Gaps::new(&meshes, &[], &but(&moving))?,
-            moving: Gaps::new(&meshes, &scene.walls, &but(&rigid))?,
+            rigid: rigid_gaps.by_formula(solids.clone())?,
+            moving: moving_gaps.by_formula(solids)?,
             declared: shares,
             parents: (0..bodies).map(|b| scene.submerged_parent(b)).collect(),
             names: scene.bodies.iter().map(|b| b.name.clone()).collect(),

@@ -113,7 +113,11 @@ fn approach(
 ) -> Pose {
     let meet = b.ball_at(rest).center - a.ball_at(from).center + from.translation;
     let moved = |t: f64| Pose::new(from.rotation, meet + t * away);
-    let is_apart = |t: f64| smallest(&between(a, b, &moved(t), rest, 10.0).unwrap()) > gap;
+    // Half faded points too: where a cylinder stands nearly flat none is full.
+    let is_apart = |t: f64| {
+        let points = between(a, b, &moved(t), rest, 10.0).unwrap();
+        points.iter().all(|p| p.gap > gap || p.weight < 0.5)
+    };
     let mut high = 2.0 * (a.radius() + b.radius()) + 2.0;
     // Deep in one another, where points have faded, bodies may look apart.
     let step = high / 200.0;

@@ -3,22 +3,25 @@
 //! Edges e_A, e_B with u = a₀ − b₀ between their beginnings: c = e_A × e_B, common normal n = ±c/|c|,
 //! gap n · u, nearest points at s = −u · (e_B × n)/(n · c) and t = −u · (e_A × n)/(n · c).
 
-use super::core::{Core, Edge};
-use super::point::{ContactPoint, Rows3, Slopes, across, carry, rotate};
-use hydrograd_adjoint::lie::{Pose, Vec3, Vec6, skew};
+use super::point::{ContactPoint, Rows3, Slopes, carry, rotate};
+use super::weight::Weight;
+use crate::geometry::convex::{Core, Edge, Field, across};
+use hydrograd_adjoint::lie::{Pose, Vec3, skew};
 
 /// Sine of the angle between two edges below which they have no contact point across one another; the
 /// weight grows from there to 1 at three times this. Nearly parallel edges have theirs at their corners.
 pub const PARALLEL: f64 = 0.02;
 /// Share of the shorter edge over which a crossing fades out towards an end; at least as long as
 /// the overlap is deep, for less than that from the end the corner is the way out.
-const END: f64 = 0.02;
+pub(super) const END: f64 = 0.02;
 /// Sine of the angle by which the common normal may leave the normals of an edge's faces before
 /// the crossing has faded out.
-const LEAVE: f64 = 0.05;
+pub(super) const LEAVE: f64 = 0.05;
 /// Share of the thinner body's thickness at which an overlap of edges has faded out (from half of
 /// it): deeper ones are of far sides, not of those in contact.
-const DEPTH: f64 = 0.5;
+pub(super) const DEPTH: f64 = 0.5;
+/// Share of that depth over which it fades out.
+pub(super) const DEPTH_RAMP: f64 = 0.5;
 
 /// All points with a gap below `reach`.
 pub(super) fn contacts(
@@ -30,10 +33,16 @@ pub(super) fn contacts(
 ) -> Vec<ContactPoint> {
     let mut out = Vec::new();
     if a.is_ball() || !b.is_ball() {
-        corners(a, a_at, b, b_at, reach, |p| out.push(p));
+        let limit = reach + a.radius + b.radius;
+        let field = |y: &Vec3| b.field(y, limit);
+        corners(a, a_at, (&field, b.radius), b_at, reach, |p| out.push(p));
     }
     if !a.is_ball() {
-        corners(b, b_at, a, a_at, reach, |p| out.push(p.swapped()));
+        let limit = reach + b.radius + a.radius;
+        let field = |y: &Vec3| a.field(y, limit);
+        corners(b, b_at, (&field, a.radius), a_at, reach, |p| {
+            out.push(p.swapped())
+        });
     }
     let beside = reach + a.radius + b.radius;
     let ours = placed(a, a_at, b, b_at, beside);
@@ -46,25 +55,29 @@ pub(super) fn contacts(
                 continue;
             }
             let radii = [a.radius, b.radius];
-            out.extend(crossing(first, second, radii, depth).filter(|p| p.gap < reach));
+            let found = crossing(first, second, radii, 0.0, depth);
+            out.extend(found.filter(|p| p.gap < reach));
         }
     }
     out
 }
 
-/// Corners of `a`, which moves, against `b`.
-fn corners(
+/// Signed distances of points, where they are looked at.
+type Distances<'a> = &'a dyn Fn(&Vec3) -> Option<Field>;
+
+/// Corners of `a`, which moves, against a body with a signed distance in its own frame and a radius about that.
+pub(super) fn corners(
     a: &Core,
     a_at: &Pose,
-    b: &Core,
+    (field, radius): (Distances, f64),
     b_at: &Pose,
     reach: f64,
     mut found: impl FnMut(ContactPoint),
 ) {
     let to_b = b_at.inverse().compose(a_at);
-    let radii = [a.radius, b.radius];
+    let radii = [a.radius, radius];
     for corner in &a.corners {
-        let Some(field) = b.field(&to_b.apply(corner), reach + a.radius + b.radius) else {
+        let Some(field) = field(&to_b.apply(corner)) else {
             continue;
         };
         let x = a_at.apply(corner);
@@ -85,36 +98,20 @@ fn placed(a: &Core, a_at: &Pose, b: &Core, b_at: &Pose, beside: f64) -> Vec<Edge
         let apart = (low - from.sup(&to)).sup(&(from.inf(&to) - high));
         apart.max() <= beside
     };
-    let place = |edge: &Edge| Edge {
-        from: a_at.apply(&edge.from),
-        along: a_at.rotation * edge.along,
-        length: edge.length,
-        inward: edge.inward.map(|v| v.map(|d| a_at.rotation * d)),
-    };
-    a.edges.iter().filter(near).map(place).collect()
+    let near = a.edges.iter().filter(near);
+    near.map(|edge| edge.placed(a_at)).collect()
 }
 
-/// A weight with its slope; a product of such.
-struct Weight {
-    value: f64,
-    slope: Vec6,
-}
-
-impl Weight {
-    /// Times 0 for x ≤ 0, 1 for x ≥ 1, 3x² − 2x³ in between.
-    fn fade(&mut self, x: f64, slope: &Vec6) {
-        if x < 1.0 {
-            let x = x.max(0.0);
-            let step = x * x * (3.0 - 2.0 * x);
-            self.slope = self.slope * step + self.value * 6.0 * x * (1.0 - x) * slope;
-            self.value *= step;
-        }
-    }
-}
-
-/// Where edge `a`, which moves, crosses edge `b`; none where that has faded out. `depth` is that
-/// at which an overlap of the cores has faded out, infinite for cores without inside.
-fn crossing(a: &Edge, b: &Edge, radii: [f64; 2], depth: f64) -> Option<ContactPoint> {
+/// Where edge `a`, which moves, crosses edge `b`; none where that has faded out. `shell` is what of the radii belongs to
+/// cylinders with these axes: they begin there, other cores at their edges. `depth` is that
+/// at which an overlap of the two has faded out, infinite for those without inside.
+pub(super) fn crossing(
+    a: &Edge,
+    b: &Edge,
+    radii: [f64; 2],
+    shell: f64,
+    depth: f64,
+) -> Option<ContactPoint> {
     let cross = a.along.cross(&b.along);
     let sine = cross.norm();
     if sine <= PARALLEL {
@@ -135,9 +132,10 @@ fn crossing(a: &Edge, b: &Edge, radii: [f64; 2], depth: f64) -> Option<ContactPo
     let along = sign * sine;
     let (b_side, a_side) = (b.along.cross(&normal), a.along.cross(&normal));
     let (s, t) = (-u.dot(&b_side) / along, -u.dot(&a_side) / along);
+    let above = apart - shell;
     // Outside the edges, or overlapping too deep: weight zero.
     let ends = [s, a.length - s, t, b.length - t];
-    if ends.iter().any(|&x| x <= 0.0) || apart <= -depth {
+    if ends.iter().any(|&x| x <= 0.0) || above <= -depth {
         return None;
     }
 
@@ -158,17 +156,14 @@ fn crossing(a: &Edge, b: &Edge, radii: [f64; 2], depth: f64) -> Option<ContactPo
     let [a_point, b_point] = [a.from + s * a.along, b.from + t * b.along];
     let gap_slope = carry(&a_point).tr_mul(&normal);
 
-    let mut weight = Weight {
-        value: 1.0,
-        slope: Vec6::zeros(),
-    };
+    let mut weight = Weight::full();
     let ramp = 2.0 * PARALLEL;
     weight.fade((sine - PARALLEL) / ramp, &(sign / ramp * along_slope));
     if depth.is_finite() {
-        let ramp = 0.5 * depth;
-        weight.fade((apart + depth) / ramp, &(gap_slope / ramp));
+        let ramp = DEPTH_RAMP * depth;
+        weight.fade((above + depth) / ramp, &(gap_slope / ramp));
     }
-    let deep = apart.min(0.0);
+    let deep = above.min(0.0);
     let width = (END * a.length.min(b.length)).hypot(deep);
     let width_slope = deep / width * gap_slope;
     for (x, slope) in ends.iter().zip([s_slope, -s_slope, t_slope, -t_slope]) {

@@ -1,9 +1,10 @@
 //! The pairs of surfaces that may come in contact, and the contact points of two bodies and of a body and a wall.
 
 use super::point::ContactPoint;
-use super::shape::{ContactShape, Solid};
-use super::{core_core, ellipsoid_core, ellipsoid_pair};
+use super::shape::ContactShape;
+use super::{core_core, cylinder, cylinder_pair, plane, round_core, round_pair};
 use crate::adjoint::lie::Pose;
+use crate::geometry::convex::Form;
 use crate::geometry::{HalfSpace, Other, Wall};
 use crate::{Error, Result};
 
@@ -94,7 +95,7 @@ impl Contacts {
 }
 
 /// The places where two bodies are nearer than `reach` (m); poses are body to world. The order is
-/// always the same: corners of the first body, corners of the second, edges.
+/// always the same: corners and rims of the first body, those of the second, edges.
 ///
 /// # Errors
 /// [`Error::Input`] if a pose or `reach` isn't finite; [`Error::Solver`] if the common normal of
@@ -111,26 +112,42 @@ pub fn between(
         return Ok(Vec::new());
     }
     let (a_at, b_at) = (
-        first_at.compose(&first.offset),
-        second_at.compose(&second.offset),
+        first_at.compose(&first.solid.offset),
+        second_at.compose(&second.solid.offset),
     );
-    let found = match (&first.solid, &second.solid) {
-        (Solid::Core(a), Solid::Core(b)) => {
+    let swapped = |found: Vec<ContactPoint>| found.into_iter().map(ContactPoint::swapped).collect();
+    let found = match (&first.solid.form, &second.solid.form) {
+        (Form::Core(a), Form::Core(b)) => {
             return Ok(core_core::contacts(a, &a_at, b, &b_at, reach));
         }
-        (Solid::Ellipsoid(a), Solid::Core(b)) => ellipsoid_core::contact(a, &a_at, b, &b_at, reach),
-        (Solid::Core(a), Solid::Ellipsoid(b)) => {
-            ellipsoid_core::contact(b, &b_at, a, &a_at, reach).map(|p| p.swapped())
+        (Form::Cylinder(a), Form::Core(b)) => {
+            return Ok(cylinder::contacts(a, &a_at, b, &b_at, reach));
         }
-        (Solid::Ellipsoid(a), Solid::Ellipsoid(b)) => {
-            Some(ellipsoid_pair::contact(a, &a_at, b, &b_at)?).filter(|p| p.gap < reach)
+        (Form::Core(a), Form::Cylinder(b)) => {
+            return Ok(swapped(cylinder::contacts(b, &b_at, a, &a_at, reach)));
+        }
+        (Form::Cylinder(a), Form::Cylinder(b)) => {
+            return Ok(cylinder_pair::contacts(a, &a_at, b, &b_at, reach));
+        }
+        (Form::Ellipsoid(a), Form::Cylinder(b)) => {
+            cylinder_pair::ellipsoid(a, &a_at, b, &b_at, reach)
+        }
+        (Form::Cylinder(a), Form::Ellipsoid(b)) => {
+            cylinder_pair::ellipsoid(b, &b_at, a, &a_at, reach).map(ContactPoint::swapped)
+        }
+        (Form::Ellipsoid(a), Form::Core(b)) => round_core::contact(a, &a_at, b, &b_at, reach),
+        (Form::Core(a), Form::Ellipsoid(b)) => {
+            round_core::contact(b, &b_at, a, &a_at, reach).map(ContactPoint::swapped)
+        }
+        (Form::Ellipsoid(a), Form::Ellipsoid(b)) => {
+            Some(round_pair::ellipsoids(a, &a_at, b, &b_at)?).filter(|p| p.gap < reach)
         }
     };
     Ok(found.into_iter().collect())
 }
 
 /// The places where a body is nearer than `reach` (m) to a wall, world frame; the wall counts as the second
-/// body. In the order of the corners.
+/// body. In the order of the corners; of a cylinder, the lowest point of either rim and then those that stay in place.
 ///
 /// # Errors
 /// [`Error::Input`] if the pose or `reach` isn't finite.
@@ -145,10 +162,11 @@ pub fn against_wall(
     if wall.height(&ball.center) - ball.radius >= reach {
         return Ok(Vec::new());
     }
-    let at = at.compose(&shape.offset);
-    let mut found = match &shape.solid {
-        Solid::Ellipsoid(ellipsoid) => vec![ellipsoid.against_plane(&at, wall)],
-        Solid::Core(core) => core.against_plane(&at, wall),
+    let at = at.compose(&shape.solid.offset);
+    let mut found = match &shape.solid.form {
+        Form::Ellipsoid(ellipsoid) => vec![plane::lowest(ellipsoid, &at, wall)],
+        Form::Cylinder(cylinder) => cylinder::against_plane(cylinder, &at, wall),
+        Form::Core(core) => plane::corners(core, &at, wall),
     };
     found.retain(|p| p.gap < reach);
     Ok(found)

@@ -1,6 +1,6 @@
-//! The point of a contact and how it moves: how points and directions do along a spatial displacement, and
-//! the signed distance of a point, with its gradient and second derivative.
+//! The point of a contact and how it moves: how points and directions do along a spatial displacement.
 
+use crate::geometry::convex::Field;
 use hydrograd_adjoint::lie::{Mat3, Vec3, Vec6, skew};
 use nalgebra::SMatrix;
 
@@ -80,55 +80,6 @@ impl ContactPoint {
     }
 }
 
-/// Signed distance from a surface at a point.
-#[derive(Clone, Copy, Debug)]
-pub(super) struct Field {
-    /// m; negative inside.
-    pub distance: f64,
-    /// Unit vector away from the surface.
-    pub gradient: Vec3,
-    /// Second derivative, 1/m.
-    pub hessian: Mat3,
-}
-
-impl Field {
-    /// Over a face.
-    pub fn flat(distance: f64, normal: Vec3) -> Self {
-        Self {
-            distance,
-            gradient: normal,
-            hessian: Mat3::zeros(),
-        }
-    }
-
-    /// About an edge along the unit vector `axis`, or a corner; `offset` leads from the nearest
-    /// point there to the point asked for. Nearer than `least`, where the offset has no direction
-    /// beyond rounding, one direction is taken for all.
-    pub fn round(offset: Vec3, axis: Option<&Vec3>, least: f64) -> Self {
-        let distance = offset.norm();
-        if distance <= least {
-            let gradient = axis.map_or(Vec3::x(), perpendicular);
-            return Self::flat(distance, gradient);
-        }
-        let gradient = offset / distance;
-        let along = axis.map_or(Mat3::zeros(), |a| a * a.transpose());
-        Self {
-            distance,
-            gradient,
-            hessian: (across(&gradient) - along) / distance,
-        }
-    }
-
-    /// The same in a frame that `rotation` leads to.
-    pub fn rotated(&self, rotation: &Mat3) -> Self {
-        Self {
-            distance: self.distance,
-            gradient: rotation * self.gradient,
-            hessian: rotation * self.hessian * rotation.transpose(),
-        }
-    }
-}
-
 /// Slope of a three-vector along a spatial displacement (m/m, then m/rad; or 1/m, 1/rad).
 pub type Rows3 = SMatrix<f64, 3, 6>;
 
@@ -148,14 +99,4 @@ pub(super) fn columns(translation: &Mat3, rotation: &Mat3) -> Rows3 {
     out.fixed_columns_mut::<3>(0).copy_from(translation);
     out.fixed_columns_mut::<3>(3).copy_from(rotation);
     out
-}
-
-/// `I − n nᵀ`.
-pub(super) fn across(n: &Vec3) -> Mat3 {
-    Mat3::identity() - n * n.transpose()
-}
-
-/// A unit vector across a unit vector.
-pub(super) fn perpendicular(axis: &Vec3) -> Vec3 {
-    axis.cross(&Vec3::ith(axis.iamin(), 1.0)).normalize()
 }

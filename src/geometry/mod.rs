@@ -8,11 +8,14 @@
 //!
 //! - [`MassProperties`], [`Faces`], [`Ball`]: volume, inertia, face geometry, bounding balls.
 //! - `sharp`, `remesh`, [`refine()`]: sharp edges, meshes with more or fewer faces, everywhere or in regions.
-//! - [`Gaps`]: signed distances between placed meshes, walls and points; `interior`: rays, inner
+//! - `convex`: ellipsoids, cylinders and convex hulls with a radius: outermost points, distances; [`Solid`] is one, placed
+//!   in its body.
+//! - [`Gaps`]: signed distances between placed solids and meshes, walls and points; `interior`: rays, inner
 //!   tangent balls and winding numbers of one mesh.
 //! - [`Wall`], [`HalfSpace`], [`Image`]: plane walls and the mirror images that they make.
 
 mod check;
+pub(crate) mod convex;
 mod faces;
 mod gap;
 mod image;
@@ -34,6 +37,7 @@ mod wall;
 pub(crate) mod weld;
 
 pub use check::{Finding, Kind, MeshReport, Severity, check_parts};
+pub use convex::Solid;
 pub use faces::Faces;
 pub(crate) use faces::equilateral_edge;
 pub use gap::{Distance, Gap, Gaps, Other, Share, overlap_error};

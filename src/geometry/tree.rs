@@ -89,6 +89,11 @@ impl MeshTree {
         0.5 * (b - a).cross(&(c - a)).norm()
     }
 
+    /// Mean edge length around the face closest to a point, m.
+    pub fn edge_near(&self, p: &Vec3) -> f64 {
+        self.edge_at_face(self.nearest(p, 0.0).face)
+    }
+
     /// Centroid of a face.
     pub fn centroid(&self, face: usize) -> Vec3 {
         let [a, b, c] = self.triangles[face].corners;

@@ -346,7 +346,7 @@ impl Simulator {
         subject.error_estimate()
     }
 
-    /// The bodies' surfaces, each in its body's frame, as gaps are measured between them; none for a body without a shape.
+    /// The bodies' surfaces, each in its body's frame, as the water sees them; none for a body without a shape.
     /// Shapes are meshed anew, the same way.
     ///
     /// # Errors

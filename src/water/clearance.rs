@@ -18,7 +18,7 @@ const BY_SOURCES: f64 = 0.5;
 /// round bodies it stays under a hundredth.
 const FILM: f64 = 0.3;
 
-/// The gaps of a scene's bodies, from their surfaces in body frames.
+/// The gaps of a scene's bodies, from their surfaces in body frames: those of shapes by formula exact, others of meshes.
 #[derive(Clone)]
 pub(crate) struct Clearance {
     /// Between pairs that move relative to one another and aren't declared to overlap, and to the
@@ -72,9 +72,12 @@ impl Clearance {
             }
         }
         let but = |others: &[(usize, usize)]| [others, &declared].concat();
+        let solids: Vec<_> = surfaces.iter().map(|s| s.as_ref()?.solid.clone()).collect();
+        let rigid_gaps = Gaps::new(&meshes, &[], &but(&moving))?;
+        let moving_gaps = Gaps::new(&meshes, &scene.walls, &but(&rigid))?;
         Ok(Self {
-            rigid: Gaps::new(&meshes, &[], &but(&moving))?,
-            moving: Gaps::new(&meshes, &scene.walls, &but(&rigid))?,
+            rigid: rigid_gaps.by_formula(solids.clone())?,
+            moving: moving_gaps.by_formula(solids)?,
             declared: shares,
             parents: (0..bodies).map(|b| scene.submerged_parent(b)).collect(),
             names: scene.bodies.iter().map(|b| b.name.clone()).collect(),

@@ -2,7 +2,7 @@
 
 use crate::Result;
 use crate::adjoint::lie::{Pose, Vec3, exp_matrix};
-use crate::geometry::{Gap, MassProperties, TriMesh};
+use crate::geometry::{Gap, MassProperties, Solid, TriMesh};
 use crate::scene::{Body, Placement, Refinement, Shape};
 use crate::shape;
 use std::path::Path;
@@ -21,6 +21,8 @@ pub(crate) struct Surface {
     /// A mesh of about a quarter of the faces, of a shape by formula with flat parts or edges.
     pub coarse: Option<Coarse>,
     pub properties: MassProperties,
+    /// The exact surface, of a shape by formula.
+    pub solid: Option<Solid>,
 }
 
 /// A coarser mesh of a shape.
@@ -44,6 +46,7 @@ impl Surface {
             properties: mesh.mass_properties(),
             base: mesh.faces().len(),
             coarse: None,
+            solid: None,
             mesh,
         }
     }
@@ -116,6 +119,7 @@ pub(crate) fn surface(body: &Body, meshing: Meshing, edges: f64) -> Result<Optio
         mesh,
         base,
         coarse,
+        solid: shape::solid(shape, at)?,
     }))
 }
 

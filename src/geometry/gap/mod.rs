@@ -1,8 +1,11 @@
 //! Smallest gaps between placed surfaces, and between surfaces and walls.
 //!
-//! A [`Gaps`] is built once per scene and asked at every step. Distances between surfaces that
-//! don't overlap are those of the triangle meshes themselves, to rounding. Overlap is found
-//! where surfaces cross and where one lies inside the other; its depth is a lower bound of the
+//! A [`Gaps`] is built once per scene and asked at every step. Between two bodies by formula, and from such a body to a
+//! wall, distances are those of the shapes themselves, to rounding; an overlap is the shortest shift found that parts
+//! the two.
+//!
+//! Where a body is a mesh, the distances to it are those of the triangle meshes of both, to rounding. Overlap is found
+//! there where surfaces cross and where one lies inside the other; its depth is a lower bound of the
 //! shift that separates the two, measured at vertices, face centres, points well inside and along
 //! crossing edges.
 
@@ -10,6 +13,7 @@ mod film;
 mod pair;
 
 use crate::error::{Error, Result};
+use crate::geometry::convex::Solid;
 use crate::geometry::mesh::TriMesh;
 use crate::geometry::points::Ball;
 use crate::geometry::tree::MeshTree;
@@ -23,14 +27,15 @@ use std::collections::{BTreeSet, BinaryHeap};
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Gap {
     /// m; 0 touching; negative overlapping. Against a wall, minus the depth of the deepest
-    /// vertex behind it. Between bodies, minus an estimate: the deepest point found of either
+    /// point behind it. Between bodies by formula, minus the shortest shift found that separates them. Where one is a
+    /// mesh, minus an estimate: the deepest point found of either
     /// inside the other, so that no shift shorter than this separates them.
     pub distance: f64,
     /// Number of the body.
     pub first: usize,
     /// What it is near.
     pub second: Other,
-    /// Mean edge length near the closest points, m: the longer one of the two surfaces.
+    /// Mean edge length of the meshes near the closest points, m: the longer one of the two surfaces.
     pub edge: f64,
 }
 
@@ -81,6 +86,8 @@ pub enum Other {
 #[derive(Clone, Debug)]
 pub struct Gaps {
     trees: Vec<Option<MeshTree>>,
+    /// What the meshes stand for, of bodies by formula.
+    solids: Vec<Option<Solid>>,
     walls: Vec<HalfSpace>,
     pairs: Vec<(usize, Other)>,
 }
@@ -119,10 +126,28 @@ impl Gaps {
             pairs.extend((0..walls.len()).map(|w| (i, Other::Wall(w))));
         }
         Ok(Self {
+            solids: vec![None; count],
             trees,
             walls,
             pairs,
         })
+    }
+
+    /// With the exact shapes of bodies by formula, one for each mesh, in the same frames; none for a body that its
+    /// mesh stands for itself.
+    ///
+    /// # Errors
+    /// [`Error::Input`] if their number isn't that of the meshes.
+    pub fn by_formula(mut self, solids: Vec<Option<Solid>>) -> Result<Self> {
+        if solids.len() != self.trees.len() {
+            return Err(Error::input(
+                "gaps: shapes by formula",
+                solids.len(),
+                format!("give one, or none, for each of {} meshes", self.trees.len()),
+            ));
+        }
+        self.solids = solids;
+        Ok(self)
     }
 
     /// The pairs that are looked at: a body, and another or a wall.
@@ -134,10 +159,13 @@ impl Gaps {
     /// equally near to rounding, always the same one. Pairs with a pose that is missing or isn't
     /// finite are passed over.
     pub fn smallest(&self, poses: &[Pose]) -> Option<Gap> {
-        let placed = |(tree, pose): (&Option<MeshTree>, &Pose)| {
-            tree.as_ref().map(|t| t.ball.transformed(pose))
+        let placed = |(i, pose): (usize, &Pose)| {
+            let tree = self.trees.get(i)?.as_ref()?;
+            // Meshes lie within the shapes that they stand for.
+            let ball = self.solids[i].as_ref().map_or(tree.ball, Solid::ball);
+            Some(ball.transformed(pose))
         };
-        let balls: Vec<Option<Ball>> = self.trees.iter().zip(poses).map(placed).collect();
+        let balls: Vec<Option<Ball>> = poses.iter().enumerate().map(placed).collect();
         // Nearest first by the balls around them. Bits of numbers ≥ 0 sort as the numbers do.
         let mut waiting: BinaryHeap<Reverse<(u64, usize)>> = self
             .pairs
@@ -186,13 +214,38 @@ impl Gaps {
     /// A pair's gap if it is below `limit`.
     fn gap(&self, (first, second): (usize, Other), poses: &[Pose], limit: f64) -> Option<Gap> {
         let placed = |i: usize| Some((self.trees.get(i)?.as_ref()?, poses.get(i)?));
+        let solid = |i: usize| self.solids.get(i)?.as_ref();
         let (tree, pose) = placed(first)?;
         let Between { distance, edge } = match second {
-            Other::Body(j) => Pair::new((tree, pose), placed(j)?)?.between(limit)?,
-            Other::Wall(w) => {
-                let (distance, edge) = tree.height(pose, &self.walls[w]);
-                Between { distance, edge }
+            Other::Body(j) => {
+                let (other, other_pose) = placed(j)?;
+                match (solid(first), solid(j)) {
+                    (Some(a), Some(b)) => {
+                        let found = a.between(pose, b, other_pose)?;
+                        let [x, y] = &found.points;
+                        let edge = || tree.edge_near(x).max(other.edge_near(y));
+                        let below = found.distance < limit;
+                        Between {
+                            distance: found.distance,
+                            edge: if below { edge() } else { 0.0 },
+                        }
+                    }
+                    _ => Pair::new((tree, pose), (other, other_pose))?.between(limit)?,
+                }
             }
+            Other::Wall(w) => match solid(first) {
+                Some(a) => {
+                    let (distance, lowest) = a.height(pose, &self.walls[w]);
+                    Between {
+                        distance,
+                        edge: tree.edge_near(&lowest),
+                    }
+                }
+                None => {
+                    let (distance, edge) = tree.height(pose, &self.walls[w]);
+                    Between { distance, edge }
+                }
+            },
         };
         (distance.is_finite() && distance < limit).then_some(Gap {
             distance,
@@ -212,9 +265,11 @@ impl Gaps {
         let placed = self.trees.iter().zip(poses).enumerate();
         let bodies = placed.filter_map(|(body, (tree, pose))| {
             let tree = tree.as_ref()?;
-            let (distance, face) = tree.signed(&pose.apply_inverse(point))?;
+            let there = pose.apply_inverse(point);
+            let (meshed, face) = tree.signed(&there)?;
+            let exact = self.solids[body].as_ref().map(|s| s.distance(&there));
             Some(Distance {
-                distance,
+                distance: exact.unwrap_or(meshed),
                 from: Other::Body(body),
                 edge: tree.edge_at_face(face),
             })

@@ -29,7 +29,11 @@ fn swapping_and_moving_both_bodies_change_nothing() {
             let motion = draw.pose();
             let (p2, r2) = (motion.compose(&pose), motion.compose(&rest));
             let moved = between(&a, &b, &p2, &r2, 0.05).unwrap();
-            assert_eq!(here.len(), moved.len());
+            assert_eq!(
+                here.len(),
+                moved.len(),
+                "{first:?} {second:?} {here:#?} {moved:#?}"
+            );
             for (p, q) in here.iter().zip(&moved) {
                 assert!((p.gap - q.gap).abs() < 1e-12);
                 assert!((p.weight - q.weight).abs() < 1e-12);

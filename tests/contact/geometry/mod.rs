@@ -1,5 +1,6 @@
 //! Contact points: known answers, slopes against differences, symmetry, agreement with GJK.
 
+mod cylinder;
 mod extremes;
 mod gjk;
 mod invariance;
@@ -101,7 +102,7 @@ fn every_kind() -> Vec<Shape> {
     ]
 }
 
-/// Moves `a` along `away` from where the centres meet until the smallest gap is `gap`.
+/// Moves `a` along `away`, from afar towards where the centres meet, until the smallest gap is `gap`.
 fn approach(
     a: &ContactShape,
     b: &ContactShape,
@@ -112,11 +113,21 @@ fn approach(
 ) -> Pose {
     let meet = b.ball_at(rest).center - a.ball_at(from).center + from.translation;
     let moved = |t: f64| Pose::new(from.rotation, meet + t * away);
-    let (mut low, mut high) = (0.0, 2.0 * (a.radius() + b.radius()) + 2.0);
+    // Half faded points too: where a cylinder stands nearly flat none is full.
+    let is_apart = |t: f64| {
+        let points = between(a, b, &moved(t), rest, 10.0).unwrap();
+        points.iter().all(|p| p.gap > gap || p.weight < 0.5)
+    };
+    let mut high = 2.0 * (a.radius() + b.radius()) + 2.0;
+    // Deep in one another, where points have faded, bodies may look apart.
+    let step = high / 200.0;
+    let mut low = high;
+    while low > 0.0 && is_apart(low) {
+        (high, low) = (low, low - step);
+    }
     for _ in 0..60 {
         let t = 0.5 * (low + high);
-        let points = between(a, b, &moved(t), rest, 10.0).unwrap();
-        if smallest(&points) > gap {
+        if is_apart(t) {
             high = t;
         } else {
             low = t;

@@ -4,7 +4,7 @@ use super::*;
 
 /// Largest relative error of all slopes against central differences, at the best step for each
 /// quantity; none if the points aren't the same on both sides.
-fn slope_error(evaluate: impl Fn(&Pose) -> Vec<ContactPoint>, pose: &Pose) -> f64 {
+pub(super) fn slope_error(evaluate: impl Fn(&Pose) -> Vec<ContactPoint>, pose: &Pose) -> f64 {
     let here = evaluate(pose);
     let mut worst: f64 = 0.0;
     for k in 0..6 {
@@ -48,7 +48,7 @@ fn slopes_of_every_pair_agree_with_differences() {
     let (mut points, mut faded) = (0, 0);
     for first in &kinds {
         for second in &kinds {
-            for gap in [0.02, 1e-3, -4e-3] {
+            for gap in [0.02, 1e-3, -4e-3, 0.01, 3e-3, -1e-3] {
                 let a = offset(first, draw.pose());
                 let b = offset(second, draw.pose());
                 let (from, rest) = (draw.pose(), draw.pose());

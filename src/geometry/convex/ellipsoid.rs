@@ -4,31 +4,36 @@
 //! D. Eberly, "Distance from a point to an ellipse, an ellipsoid, or a hyperellipsoid" (2013): the
 //! scalar equation for the nearest point and the bracket of its root.
 
-use super::point::{ContactPoint, Field, across, carry, columns};
-use crate::geometry::HalfSpace;
-use hydrograd_adjoint::lie::{Mat3, Pose, Vec3, skew};
-
-/// Rounds of Newton's method; from where it starts it takes about six.
-const ROUNDS: usize = 100;
+use super::field::{Field, across};
+use super::round::{Approach, ROUNDS, Round, Support};
+use hydrograd_adjoint::lie::{Mat3, Pose, Vec3};
 
 /// An ellipsoid along the axes of its frame.
 #[derive(Clone, Copy, Debug)]
-pub(super) struct Ellipsoid {
+pub(crate) struct Ellipsoid {
     /// m.
     pub semi_axes: Vec3,
 }
 
-/// Outermost point in a direction.
-pub(super) struct Support {
-    /// World frame, m.
-    pub point: Vec3,
-    /// Its slope along the direction, taken at unit length, m: symmetric, zero along the direction.
-    pub spread: Mat3,
+impl Ellipsoid {
+    /// The outermost point in a direction of any length, frame of the ellipsoid.
+    pub fn outermost(&self, direction: &Vec3) -> Vec3 {
+        // Over its largest component first: squares of small lengths may leave double precision.
+        let flat = self.semi_axes.component_mul(direction);
+        let flat = flat / flat.amax();
+        let out = self.semi_axes.component_mul(&(flat / flat.norm()));
+        match out.iter().all(|x| x.is_finite()) {
+            true => out,
+            false => Vec3::new(self.semi_axes.x, 0.0, 0.0),
+        }
+    }
 }
 
-impl Ellipsoid {
+impl Round for Ellipsoid {
+    const HAS_INSIDE: bool = true;
+
     /// `c + Σ m/h` with h = √(mᵀ Σ m) and Σ = R D² Rᵀ, for a unit vector m.
-    pub fn support(&self, at: &Pose, direction: &Vec3) -> Support {
+    fn support(&self, at: &Pose, direction: &Vec3) -> Support {
         let squares = Mat3::from_diagonal(&self.semi_axes.component_mul(&self.semi_axes));
         let squares = at.rotation * squares * at.rotation.transpose();
         let across = squares * direction;
@@ -39,23 +44,12 @@ impl Ellipsoid {
         }
     }
 
-    /// The lowest point over a plane at rest.
-    pub fn against_plane(&self, at: &Pose, plane: &HalfSpace) -> ContactPoint {
-        let normal = &plane.normal;
-        let support = self.support(at, &-normal);
-        let field = Field::flat(plane.height(&support.point), *normal);
-        // Carried along, the point slides along the surface by C (ω × m), which the gap doesn't feel.
-        let sliding = columns(&Mat3::zeros(), &(support.spread * skew(normal)));
-        let motion = carry(&support.point) - sliding;
-        ContactPoint::probe(&support.point, &motion, [0.0; 2], &field)
-    }
-
     /// Signed distance of a point, frame of the ellipsoid. On the symmetry planes inside, where two
     /// points of the surface are equally near, the one on the positive side is taken.
     ///
     /// The nearest point is xᵢ = aᵢ² yᵢ/(aᵢ² + t) with Σ (xᵢ/aᵢ)² = 1. The sum falls and is convex
     /// in t, so that Newton's method from the left of the root climbs to it.
-    pub fn field(&self, y: &Vec3) -> Field {
+    fn field(&self, y: &Vec3) -> Field {
         let a = &self.semi_axes;
         let least = a.imin();
         // τ = t + a_min²: no cancellation near the pole.
@@ -123,48 +117,21 @@ impl Ellipsoid {
         }
     }
 
-    /// Where an edge comes nearest in the frame in which the ellipsoid is the unit ball: along the
-    /// edge (m), and how many radii from the centre.
-    pub fn approach(&self, from: &Vec3, along: &Vec3, length: f64) -> (f64, f64) {
+    /// Where an edge comes nearest in the frame in which the ellipsoid is the unit ball.
+    fn approach(&self, from: &Vec3, along: &Vec3, length: f64) -> Approach {
         let start = from.component_div(&self.semi_axes);
         let step = along.component_div(&self.semi_axes);
-        let s = (-start.dot(&step) / step.norm_squared()).clamp(0.0, length);
-        (s, (start + s * step).norm())
+        let at = (-start.dot(&step) / step.norm_squared()).clamp(0.0, length);
+        let radii = (start + at * step).norm();
+        Approach {
+            at,
+            least: self.semi_axes.min() * (radii - 1.0),
+            pierced: radii < 1.0,
+        }
     }
 
-    /// Where the signed distance is least along an edge, frame of the ellipsoid: how far from its beginning,
-    /// m; none at an end. The distance from a convex body is convex, so its slope along the edge has one root
-    /// at most.
-    pub fn lowest(&self, from: &Vec3, along: &Vec3, length: f64) -> Option<f64> {
-        let slope = |s: f64| {
-            let field = self.field(&(from + s * along));
-            let curvature = along.dot(&(field.hessian * along));
-            (field.gradient.dot(along), curvature)
-        };
-        if slope(0.0).0 >= 0.0 || slope(length).0 <= 0.0 {
-            return None;
-        }
-        let (mut low, mut high) = (0.0, length);
-        let mut s = self.approach(from, along, length).0;
-        for _ in 0..ROUNDS {
-            let (value, curvature) = slope(s);
-            if value > 0.0 {
-                high = s;
-            } else {
-                low = s;
-            }
-            let newton = s - value / curvature;
-            let next = if newton >= low && newton <= high {
-                newton
-            } else {
-                0.5 * (low + high)
-            };
-            let step = (next - s).abs();
-            s = next;
-            if step <= 1e-15 * length {
-                break;
-            }
-        }
-        Some(s)
+    /// A point so many radii from the centre is at least that far away.
+    fn least(&self, x: &Vec3) -> f64 {
+        self.semi_axes.min() * (x.component_div(&self.semi_axes).norm() - 1.0)
     }
 }

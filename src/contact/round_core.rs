@@ -1,4 +1,4 @@
-//! An ellipsoid and a core: the one point of their common normal.
+//! An ellipsoid or a disc, and a core: the one point of their common normal.
 //!
 //! With n from the core to the ellipsoid, the signed distance of two convex bodies is the largest
 //! of f(n) = n · (x_E − x_C) over unit n, with the support points of the two along −n and n. Over
@@ -7,21 +7,24 @@
 //! lowest over the ellipsoid in between its ends with n between the normals of its faces, or at a
 //! corner with n in the cone of its faces' normals. Where one hands over to the next they are the
 //! same point with the same normal, outside and for overlaps less deep than the ellipsoid is curved.
+//!
+//! A disc is an ellipsoid without height. Where the normal is its axis, it has no outermost point of its own, and whoever
+//! asks must look at that.
 
-use super::core::{Core, Face};
-use super::ellipsoid::Ellipsoid;
+use super::plane;
 use super::point::{ContactPoint, Rows3, carry, rotate};
 use crate::geometry::HalfSpace;
+use crate::geometry::convex::{Core, Edge, Face, Round};
 use hydrograd_adjoint::lie::{Pose, Vec3};
 
 /// Room for rounding where a feature hands over to the next.
-const SLACK: f64 = 1e-9;
+pub(super) const SLACK: f64 = 1e-9;
 
-/// The point of contact if its gap is below `reach`; the ellipsoid is the first body. Deep inside,
+/// The point of contact if its gap is below `reach`; the ellipsoid or disc is the first body. Deep inside,
 /// where no feature has a common normal, it is that of the face with the least overlap.
-pub(super) fn contact(
-    ellipsoid: &Ellipsoid,
-    ellipsoid_at: &Pose,
+pub(super) fn contact<R: Round>(
+    round: &R,
+    round_at: &Pose,
     core: &Core,
     core_at: &Pose,
     reach: f64,
@@ -39,9 +42,11 @@ pub(super) fn contact(
             point: core_at.apply(&(face.offset * face.normal)),
             normal,
         };
-        let found = ellipsoid.against_plane(ellipsoid_at, &plane);
+        let found = plane::lowest(round, round_at, &plane);
         let foot = core_at.apply_inverse(&found.position);
-        if face.is_below(&foot, SLACK * core.diameter()) {
+        if face.is_below(&foot, SLACK * core.diameter())
+            && (R::HAS_INSIDE || found.gap >= 0.0 || within(core, core_at, &found))
+        {
             take(&mut best, found.clone());
         }
         take(&mut highest, found);
@@ -50,17 +55,11 @@ pub(super) fn contact(
     if best.as_ref().is_some_and(|b| b.gap >= 0.0) {
         return best.filter(|b| b.gap < reach);
     }
-    let to_ellipsoid = ellipsoid_at.inverse().compose(core_at);
-    // A point so many radii from the centre is at least that far away.
-    let near = |radii: f64| ellipsoid.semi_axes.min() * (radii - 1.0) - core.radius < reach;
-    let seen = |x: &Vec3, motion: &Rows3| {
-        let field = ellipsoid.field(&ellipsoid_at.apply_inverse(x));
-        let field = field.rotated(&ellipsoid_at.rotation);
-        ContactPoint::probe(x, motion, [core.radius, 0.0], &field)
-    };
+    let to_round = round_at.inverse().compose(core_at);
+    let near = |least: f64| least - core.radius < reach;
     let inward =
         |found: &ContactPoint, d: &Vec3| found.normal.dot(&(core_at.rotation * d)) >= -SLACK;
-    let center = to_ellipsoid.apply_inverse(&Vec3::zeros());
+    let center = to_round.apply_inverse(&Vec3::zeros());
     let behind = |f: &Face| f.normal.dot(&center) < f.offset;
     let mut pierced = !core.faces.is_empty() && core.faces.iter().all(behind);
     // Features beyond the reach are looked at only where what was found overlaps: a face on the far side does for a body that is
@@ -70,41 +69,76 @@ pub(super) fn contact(
             break;
         }
         for edge in &core.edges {
-            let (from, along) = (
-                to_ellipsoid.apply(&edge.from),
-                to_ellipsoid.rotation * edge.along,
-            );
-            let (_, radii) = ellipsoid.approach(&from, &along, edge.length);
-            pierced |= radii < 1.0;
-            if near(radii) == beyond {
+            let (from, along) = (to_round.apply(&edge.from), to_round.rotation * edge.along);
+            let approach = round.approach(&from, &along, edge.length);
+            pierced |= approach.pierced;
+            if near(approach.least) == beyond {
                 continue;
             }
-            let Some(s) = ellipsoid.lowest(&from, &along, edge.length) else {
+            let on = on_edge(round, round_at, edge, core_at, core.radius);
+            let Some((still, moving)) = on else {
                 continue;
             };
-            let x = core_at.apply(&(edge.from + s * edge.along));
-            let along = core_at.rotation * edge.along;
-            let still = seen(&x, &carry(&x));
             if edge.inward.iter().flatten().all(|d| inward(&still, d)) {
-                take(&mut best, seen(&x, &sliding(&still, &x, &along)).swapped());
+                take(&mut best, moving.swapped());
             }
         }
         for (corner, spokes) in core.corners.iter().zip(&core.spokes) {
-            let there = to_ellipsoid.apply(corner);
-            if near(there.component_div(&ellipsoid.semi_axes).norm()) == beyond {
+            if near(round.least(&to_round.apply(corner))) == beyond {
                 continue;
             }
             let x = core_at.apply(corner);
-            let found = seen(&x, &carry(&x));
+            let found = seen(round, round_at, &x, &carry(&x), core.radius);
             if spokes.iter().all(|d| inward(&found, d)) {
                 take(&mut best, found.swapped());
             }
         }
     }
-    if best.is_none() && pierced {
+    if best.is_none() && pierced && R::HAS_INSIDE {
         best = highest;
     }
     best.filter(|b| b.gap < reach)
+}
+
+/// Whether the first body's point of a contact lies within a core: not beyond it, under a face that it is far below.
+fn within(core: &Core, core_at: &Pose, found: &ContactPoint) -> bool {
+    let x = core_at.apply_inverse(&(found.position + 0.5 * found.gap * found.normal));
+    let slack = SLACK * core.diameter();
+    core.faces
+        .iter()
+        .all(|f| f.normal.dot(&x) <= f.offset + slack)
+}
+
+/// A point of a core with this radius, which moves by `motion`, seen from an ellipsoid or a disc.
+fn seen(
+    round: &impl Round,
+    round_at: &Pose,
+    x: &Vec3,
+    motion: &Rows3,
+    radius: f64,
+) -> ContactPoint {
+    let field = round.field(&round_at.apply_inverse(x));
+    let field = field.rotated(&round_at.rotation);
+    ContactPoint::probe(x, motion, [radius, 0.0], &field)
+}
+
+/// Where an edge, the first body, with a radius about it is lowest over an ellipsoid or a disc: carried along at its
+/// place on the edge, and sliding along that; none at an end.
+pub(super) fn on_edge(
+    round: &impl Round,
+    round_at: &Pose,
+    edge: &Edge,
+    edge_at: &Pose,
+    radius: f64,
+) -> Option<(ContactPoint, ContactPoint)> {
+    let to_round = round_at.inverse().compose(edge_at);
+    let (from, along) = (to_round.apply(&edge.from), to_round.rotation * edge.along);
+    let s = round.lowest(&from, &along, edge.length)?;
+    let x = edge_at.apply(&(edge.from + s * edge.along));
+    let along = edge_at.rotation * edge.along;
+    let still = seen(round, round_at, &x, &carry(&x), radius);
+    let moving = seen(round, round_at, &x, &sliding(&still, &x, &along), radius);
+    Some((still, moving))
 }
 
 /// Motion of the lowest point of an edge: carried along, and sliding by ds so that n · e stays

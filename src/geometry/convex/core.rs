@@ -1,8 +1,7 @@
 //! Corners, edges and faces, with a radius about them: balls, capsules and convex polyhedra.
 
-use super::point::{ContactPoint, Field, carry};
+use super::field::Field;
 use crate::error::{Error, Result};
-use crate::geometry::HalfSpace;
 use hydrograd_adjoint::lie::{Pose, Vec3};
 use std::collections::BTreeMap;
 
@@ -11,7 +10,7 @@ const ROUNDING: f64 = 1e-13;
 
 /// A convex hull with a radius about it, frame of the shape, m.
 #[derive(Clone, Debug)]
-pub(super) struct Core {
+pub(crate) struct Core {
     pub corners: Vec<Vec3>,
     /// Unit vectors along the edges that leave each corner.
     pub spokes: Vec<Vec<Vec3>>,
@@ -26,7 +25,7 @@ pub(super) struct Core {
 
 /// A straight edge.
 #[derive(Clone, Debug)]
-pub(super) struct Edge {
+pub(crate) struct Edge {
     pub from: Vec3,
     /// Unit vector.
     pub along: Vec3,
@@ -37,7 +36,7 @@ pub(super) struct Edge {
 
 /// A plane convex face.
 #[derive(Clone, Debug)]
-pub(super) struct Face {
+pub(crate) struct Face {
     /// Outward unit normal.
     pub normal: Vec3,
     /// The plane is `normal · x = offset`.
@@ -57,6 +56,16 @@ impl Face {
 }
 
 impl Edge {
+    /// The edge in the frame that `at` leads to.
+    pub fn placed(&self, at: &Pose) -> Self {
+        Self {
+            from: at.apply(&self.from),
+            along: at.rotation * self.along,
+            length: self.length,
+            inward: self.inward.map(|v| v.map(|d| at.rotation * d)),
+        }
+    }
+
     pub fn middle(&self) -> Vec3 {
         self.from + 0.5 * self.length * self.along
     }
@@ -232,13 +241,11 @@ impl Core {
         Field::round(best.1, best.2, least)
     }
 
-    /// All corners against a wall, world frame.
-    pub fn against_plane(&self, at: &Pose, wall: &HalfSpace) -> Vec<ContactPoint> {
-        let contact = |corner: &Vec3| {
-            let x = at.apply(corner);
-            let field = Field::flat(wall.height(&x), wall.normal);
-            ContactPoint::probe(&x, &carry(&x), [self.radius, 0.0], &field)
-        };
-        self.corners.iter().map(contact).collect()
+    /// The outermost corner in a direction of any length.
+    pub fn outermost(&self, direction: &Vec3) -> Vec3 {
+        let height = |c: &&Vec3| direction.dot(c);
+        let corners = self.corners.iter();
+        let outermost = corners.reduce(|a, b| if height(&a) >= height(&b) { a } else { b });
+        outermost.copied().unwrap_or_default()
     }
 }

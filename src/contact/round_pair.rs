@@ -1,17 +1,18 @@
-//! Two ellipsoids: their common normal.
+//! Two ellipsoids or discs: their common normal.
 //!
 //! The signed distance is the largest of f(n) = n · d − h_A(n) − h_B(n) over unit n, with d from
 //! the second centre to the first and h = √(nᵀ Σ n) the support functions: apart, the distance;
-//! overlapping, minus the shift that parts them. Newton's method on the sphere climbs f from the
-//! normal at which the two would touch if scaled alike.
+//! overlapping, minus the shift that parts them. Newton's method on the sphere climbs f, for ellipsoids from the
+//! normal at which the two would touch if scaled alike. The axis of a disc, along which its outermost points are many, isn't
+//! found.
 //!
 //! # References
 //! J. W. Perram, M. S. Wertheim, "Statistical mechanics of hard ellipsoids I", J. Comput. Phys. 58
 //! (1985) 409: the largest of λ(1−λ) dᵀ ((1−λ) Σ_A + λ Σ_B)⁻¹ d and its common normal.
 
-use super::ellipsoid::Ellipsoid;
-use super::point::{ContactPoint, Slopes, carry, columns, perpendicular};
+use super::point::{ContactPoint, Slopes, carry, columns};
 use crate::error::{Error, Result};
+use crate::geometry::convex::{Ellipsoid, Round, perpendicular};
 use hydrograd_adjoint::lie::{Mat3, Pose, Vec3, Vec6, skew};
 use nalgebra::{Matrix2, Matrix3x2, SymmetricEigen, Vector2};
 
@@ -34,17 +35,31 @@ struct Height {
     spreads: [Mat3; 2],
 }
 
-/// The point of contact, however far.
+/// The point of contact of two ellipsoids, however far.
 ///
 /// # Errors
 /// [`Error::Solver`] if the common normal isn't found.
-pub(super) fn contact(
+pub(super) fn ellipsoids(
     first: &Ellipsoid,
     first_at: &Pose,
     second: &Ellipsoid,
     second_at: &Pose,
 ) -> Result<ContactPoint> {
     let size = first.semi_axes.max() + second.semi_axes.max();
+    let normal = start(first, first_at, second, second_at);
+    contact((first, first_at), (second, second_at), size, normal)
+}
+
+/// The point of contact of two bodies of this size together (m), with a normal near `normal`.
+///
+/// # Errors
+/// [`Error::Solver`] if the common normal isn't found.
+pub(super) fn contact(
+    (first, first_at): (&impl Round, &Pose),
+    (second, second_at): (&impl Round, &Pose),
+    size: f64,
+    mut normal: Vec3,
+) -> Result<ContactPoint> {
     let height = |n: &Vec3| {
         let a = first.support(first_at, &-n);
         let b = second.support(second_at, n);
@@ -56,7 +71,6 @@ pub(super) fn contact(
             spreads: [a.spread, b.spread],
         }
     };
-    let mut normal = start(first, first_at, second, second_at);
     let mut at = height(&normal);
     let mut residual = f64::INFINITY;
     let mut rounds = 0;

@@ -1,0 +1,34 @@
+//! Weights by which points of contact come and go.
+
+use hydrograd_adjoint::lie::Vec6;
+
+/// A weight with its slope; a product of such.
+pub(super) struct Weight {
+    pub value: f64,
+    pub slope: Vec6,
+}
+
+impl Weight {
+    /// One.
+    pub fn full() -> Self {
+        Self {
+            value: 1.0,
+            slope: Vec6::zeros(),
+        }
+    }
+
+    /// Times 0 for x ≤ 0, 1 for x ≥ 1, 3x² − 2x³ in between.
+    pub fn fade(&mut self, x: f64, slope: &Vec6) {
+        if x < 1.0 {
+            let x = x.max(0.0);
+            let step = x * x * (3.0 - 2.0 * x);
+            self.slope = self.slope * step + self.value * 6.0 * x * (1.0 - x) * slope;
+            self.value *= step;
+        }
+    }
+
+    /// Times what is left: 1 for x ≤ 0, 0 for x ≥ 1.
+    pub fn fade_out(&mut self, x: f64, slope: &Vec6) {
+        self.fade(1.0 - x, &-slope);
+    }
+}

@@ -75,7 +75,7 @@ pub struct ContactBar {
 const DAMPED: f64 = 0.1;
 
 /// Positive part of `x`, smoothed over ± `width`, with its derivative: once continuously differentiable.
-fn positive(x: f64, width: f64) -> (f64, f64) {
+pub fn positive(x: f64, width: f64) -> (f64, f64) {
     if x <= -width {
         (0.0, 0.0)
     } else if x >= width {

@@ -87,7 +87,11 @@ pub(super) fn assemble(
     };
     let laws = shapes.pairs().iter().map(law).collect();
     parameters.add_contact([stiffness, given.dissipation, given.friction]);
-    Ok(ContactModel { shapes, laws })
+    Ok(ContactModel {
+        shapes,
+        laws,
+        rigid: given.stiffness.is_none(),
+    })
 }
 
 /// Shape of a body: by its formula, or a mesh that is convex.

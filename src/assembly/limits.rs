@@ -39,6 +39,7 @@ pub(super) fn assemble(
             q: link.q.start,
             v: link.v.start,
             range,
+            rigid: asked(b).is_none(),
             law: Law {
                 stiffness,
                 dissipation: 0.0,

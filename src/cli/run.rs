@@ -52,6 +52,10 @@ pub(super) struct RunReport {
     pub momentum_drift: f64,
     /// Smallest gap of the whole run, m; null where there is nothing to meet.
     pub min_gap: Option<f64>,
+    /// Steps that were cut into pieces, being too long for what moved in them.
+    pub cut_steps: usize,
+    /// Most pieces of a step; one where none was cut.
+    pub most_pieces: usize,
     pub final_q: Vec<f64>,
     pub final_v: Vec<f64>,
     pub warnings: Vec<String>,
@@ -106,6 +110,8 @@ fn simulate(
         energy_final: summary.energy_final,
         momentum_drift: summary.momentum_drift,
         min_gap: summary.min_gap,
+        cut_steps: summary.cut_steps,
+        most_pieces: summary.most_pieces,
         final_q: last.q.as_slice().to_vec(),
         final_v: last.v.as_slice().to_vec(),
         warnings: [simulator.warnings(), &rollout.warnings()].concat(),
@@ -154,6 +160,13 @@ impl fmt::Display for RunReport {
             self.momentum_drift
         )?;
         writeln!(f, "  smallest gap   {}", or_dash(self.min_gap, "m"))?;
+        if self.cut_steps > 0 {
+            writeln!(
+                f,
+                "  steps   {} of {} cut into pieces, at most {}",
+                self.cut_steps, self.steps, self.most_pieces
+            )?;
+        }
         writeln!(f, "  final q {:?}", self.final_q)?;
         write!(f, "  final v {:?}", self.final_v)?;
         for file in &self.files {

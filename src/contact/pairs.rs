@@ -3,7 +3,7 @@
 use super::point::ContactPoint;
 use super::shape::ContactShape;
 use super::{core_core, cylinder, cylinder_pair, plane, round_core, round_pair};
-use crate::adjoint::lie::Pose;
+use crate::adjoint::lie::{Pose, Vec6, angular, point_velocity};
 use crate::geometry::convex::Form;
 use crate::geometry::{HalfSpace, Other, Wall};
 use crate::{Error, Result};
@@ -73,24 +73,108 @@ impl Contacts {
     /// # Errors
     /// A signed distance that can't be found.
     pub fn points(&self, k: usize, poses: &[Pose], distance: f64) -> Result<Vec<ContactPoint>> {
-        let pair = &self.pairs[k];
-        let (a, first) = (pair.first, &self.shapes[pair.first]);
-        let Some(first) = first else {
-            return Ok(Vec::new());
-        };
-        match pair.second {
-            Other::Wall(w) => {
-                let reach = distance + AHEAD * first.radius();
-                against_wall(first, &self.walls[w], &poses[a], reach)
-            }
-            Other::Body(b) => {
-                let Some(second) = &self.shapes[b] else {
-                    return Ok(Vec::new());
-                };
-                let reach = distance + AHEAD * first.radius().min(second.radius());
+        self.points_within(k, poses, distance + self.ahead(k))
+    }
+
+    /// The same, of all places with a gap under `reach` (m) and no others.
+    ///
+    /// # Errors
+    /// As [`Contacts::points`].
+    pub fn points_within(&self, k: usize, poses: &[Pose], reach: f64) -> Result<Vec<ContactPoint>> {
+        let a = self.pairs[k].first;
+        match self.solids(k) {
+            Some((first, Partner::Wall(wall))) => against_wall(first, wall, &poses[a], reach),
+            Some((first, Partner::Body(b, second))) => {
                 between(first, second, &poses[a], &poses[b], reach)
             }
+            None => Ok(Vec::new()),
         }
+    }
+
+    /// How far beyond the distance asked for [`Contacts::points`] looks, m.
+    pub fn ahead(&self, k: usize) -> f64 {
+        match self.solids(k) {
+            Some((first, Partner::Wall(_))) => AHEAD * first.radius(),
+            Some((first, Partner::Body(_, second))) => AHEAD * first.radius().min(second.radius()),
+            None => 0.0,
+        }
+    }
+
+    /// How deep the surfaces of pair `k` may overlap before the way out may lead through the other side, m: half the thickness of the
+    /// thinner body, or the least radius of those that are round. Of a wall, that of its body, which could be deeper.
+    pub fn halfway(&self, k: usize) -> f64 {
+        match self.solids(k) {
+            Some((first, Partner::Wall(_))) => half_thickness(first).1,
+            Some((first, Partner::Body(_, second))) => {
+                match (half_thickness(first), half_thickness(second)) {
+                    ((true, a), (false, _)) => a,
+                    ((false, _), (true, b)) => b,
+                    ((_, a), (_, b)) => a.min(b),
+                }
+            }
+            None => f64::INFINITY,
+        }
+    }
+
+    /// The speed at which the surfaces of pair `k` come nearer at most, m/s, of bodies at `poses` with these spatial twists: that of
+    /// their middles, and what either adds by turning; not negative.
+    pub fn closing(&self, k: usize, poses: &[Pose], twists: &[Vec6]) -> f64 {
+        let a = self.pairs[k].first;
+        let middle = |shape: &ContactShape, b: usize| {
+            let center = shape.ball_at(&poses[b]).center;
+            let turning = angular(&twists[b]).norm() * lever(shape);
+            (point_velocity(&twists[b], &center), turning)
+        };
+        let speed = match self.solids(k) {
+            Some((first, Partner::Wall(wall))) => {
+                let (velocity, turning) = middle(first, a);
+                turning - wall.normal.dot(&velocity)
+            }
+            Some((first, Partner::Body(b, second))) => {
+                let (u, own) = middle(first, a);
+                let (v, other) = middle(second, b);
+                (u - v).norm() + own + other
+            }
+            None => 0.0,
+        };
+        speed.max(0.0)
+    }
+
+    /// The shapes of pair `k`.
+    fn solids(&self, k: usize) -> Option<(&ContactShape, Partner<'_>)> {
+        let pair = &self.pairs[k];
+        let first = self.shapes[pair.first].as_ref()?;
+        let second = match pair.second {
+            Other::Wall(w) => Partner::Wall(&self.walls[w]),
+            Other::Body(b) => Partner::Body(b, self.shapes[b].as_ref()?),
+        };
+        Some((first, second))
+    }
+}
+
+/// What a body is paired with.
+enum Partner<'s> {
+    Wall(&'s HalfSpace),
+    /// With its number.
+    Body(usize, &'s ContactShape),
+}
+
+/// Whether a body is round, and half of its thickness where it is thinnest, m.
+fn half_thickness(shape: &ContactShape) -> (bool, f64) {
+    match &shape.solid.form {
+        Form::Ellipsoid(ellipsoid) => (true, ellipsoid.semi_axes.min()),
+        Form::Core(core) if core.faces.is_empty() => (true, core.radius),
+        Form::Core(core) => (false, 0.5 * core.thickness),
+        Form::Cylinder(cylinder) => (false, cylinder.radius.min(cylinder.half)),
+    }
+}
+
+/// How far its surface moves, at most, along its own normal as a body turns about its middle by a radian, m.
+fn lever(shape: &ContactShape) -> f64 {
+    match &shape.solid.form {
+        Form::Ellipsoid(ellipsoid) => ellipsoid.semi_axes.max() - ellipsoid.semi_axes.min(),
+        Form::Core(core) => shape.radius() - core.radius,
+        Form::Cylinder(_) => shape.radius(),
     }
 }
 

@@ -1,7 +1,7 @@
 //! Contact among bodies and with walls: which surfaces may touch, by which law, and where they are near.
 
 use super::Parameters;
-use crate::adjoint::contact::{ContactBar, Law, PointState};
+use crate::adjoint::contact::{ContactBar, Law, PointState, positive};
 use crate::adjoint::lie::{Vec3, Vec6, point_velocity, point_wrench, six};
 use crate::contact::{ContactPoint, Contacts};
 use serde::Serialize;
@@ -13,6 +13,8 @@ pub struct ContactModel {
     pub shapes: Contacts,
     /// Law of each pair, in the order of [`Contacts::pairs`]; stiffness, dissipation and friction are parameters and stand there.
     pub laws: Vec<Law>,
+    /// Whether the stiffness is near rigid at the time step, so that it rises where a step is cut; one that was given stays what it is.
+    pub rigid: bool,
 }
 
 /// A place where two surfaces are near at a configuration.
@@ -24,8 +26,20 @@ pub struct PairContact {
     pub second: Option<usize>,
     /// Its law.
     pub law: Law,
+    /// The law's stiffness over the parameter's: the square of its sharpness.
+    pub scale: f64,
     /// Where, with its derivatives.
     pub point: ContactPoint,
+}
+
+/// A law that is as stiff in the `n`-th part of a step as it was in the whole, and foresees no further than that part.
+pub(super) fn sharpened(law: Law, n: usize) -> Law {
+    let n = n as f64;
+    Law {
+        stiffness: law.stiffness * n * n,
+        horizon: law.horizon / n,
+        ..law
+    }
 }
 
 impl ContactModel {
@@ -63,10 +77,22 @@ impl PairContact {
         field[self.first] - self.second.map_or(Vec6::zeros(), |b| field[b])
     }
 
+    /// The gap that the law is asked with, and its slope. A sharper law stops what comes, but presses on what is in already as hard as
+    /// before, or it would throw it out: of a depth d below g₀ it is asked with d over the square of its sharpness.
+    pub(super) fn eased_gap(&self) -> (f64, f64) {
+        let gap = self.point.gap;
+        if self.scale == 1.0 {
+            return (gap, 1.0);
+        }
+        let share = 1.0 - 1.0 / self.scale;
+        let (depth, slope) = positive(self.law.gap - gap, self.law.width);
+        (gap + share * depth, 1.0 - share * slope)
+    }
+
     pub(super) fn point_state(&self, twists: &[Vec6]) -> PointState {
         let p = &self.point;
         PointState {
-            gap: p.gap,
+            gap: self.eased_gap().0,
             weight: p.weight,
             normal: p.normal,
             velocity: point_velocity(&self.relative(twists), &p.position),

@@ -4,68 +4,81 @@
 //! Points, normals and gaps belong to the configuration; the velocity is the argument of the force, so that an integrator
 //! that is implicit in it solves contact implicitly, against the mass matrix with its fluid part.
 
+use super::contact::sharpened;
 use super::{
     ContactForce, Dual, Evaluation, ForceCotangents, JointLimit, PairContact, Parameters, System,
 };
 use crate::Result;
 use crate::adjoint::contact::{contact_force, contact_force_jvp, contact_force_vjp};
 use crate::adjoint::lie::{Pose, Vec3, Vec6, angular, point_velocity, point_wrench};
+use crate::contact::ContactPoint;
 use crate::multibody::{Cotangents, Virtual};
 use nalgebra::{DMatrix, DVector};
 
-impl System {
-    /// Contacts of bodies at `q` that end a step with the velocity `v`: all places where something presses, or where surfaces are no more
-    /// than `slack` (m) farther apart than the gap at which they touch.
-    ///
-    /// # Errors
-    /// A signed distance that can't be found.
-    pub fn contact_forces(
-        &self,
-        parameters: &Parameters,
-        q: &DVector<f64>,
-        v: &DVector<f64>,
-        slack: f64,
-    ) -> Result<Vec<ContactForce>> {
-        let kinematics = self.tree.kinematics(q);
-        let twists = self.tree.twists(&kinematics, v);
-        let contact_points = self.contact_points(parameters, &kinematics.poses)?;
-        let found = contact_points.iter().map(|t| ContactForce {
-            first: t.first,
-            second: t.second,
-            gap: t.point.gap,
-            position: t.point.position.into(),
-            normal: t.point.normal.into(),
-            force: contact_force(&t.law, &t.point_state(&twists)).into(),
-        });
-        // The law looks ahead by a step: what closes fast is pressed before it is near.
-        let near = contact_points.iter().zip(found).filter(|(t, c)| {
-            t.point.gap <= t.law.gap + slack.max(t.law.width) || c.force != [0.0; 3]
-        });
-        Ok(near.map(|(_, c)| c).collect())
-    }
+/// Contacts at places where surfaces are near, of bodies that end a step with these twists: all where something presses, or where
+/// surfaces are no more than `slack` (m) farther apart than the gap at which they touch.
+pub(super) fn contact_forces(
+    contact_points: &[PairContact],
+    twists: &[Vec6],
+    slack: f64,
+) -> Vec<ContactForce> {
+    let found = contact_points.iter().map(|t| ContactForce {
+        first: t.first,
+        second: t.second,
+        gap: t.point.gap,
+        position: t.point.position.into(),
+        normal: t.point.normal.into(),
+        force: contact_force(&t.law, &t.point_state(twists)).into(),
+    });
+    // The law looks ahead by a step: what closes fast is pressed before it is near.
+    let near = contact_points
+        .iter()
+        .zip(found)
+        .filter(|(t, c)| t.point.gap <= t.law.gap + slack.max(t.law.width) || c.force != [0.0; 3]);
+    near.map(|(_, c)| c).collect()
+}
 
+impl System {
     /// All places where surfaces are near.
     pub(super) fn contact_points(
         &self,
         parameters: &Parameters,
         poses: &[Pose],
     ) -> Result<Vec<PairContact>> {
+        let pairs = self.contact.as_ref().map_or(0, |m| m.laws.len());
         let mut out = Vec::new();
-        let Some(model) = &self.contact else {
-            return Ok(out);
-        };
-        for (k, pair) in model.shapes.pairs().iter().enumerate() {
-            let law = model.law(k, parameters);
-            for point in model.shapes.points(k, poses, law.gap + law.width)? {
-                out.push(PairContact {
-                    first: pair.first,
-                    second: pair.second_body(),
-                    law,
-                    point,
-                });
-            }
+        for k in 0..pairs {
+            out.extend(self.pair_points(parameters, poses, k, 1, 0.0)?);
         }
         Ok(out)
+    }
+
+    /// Those of pair `k`, whose law is sharpened `sharpness` times; as far as `travel` (m) beyond where it sets in, if that is farther than
+    /// one always looks.
+    pub(super) fn pair_points(
+        &self,
+        parameters: &Parameters,
+        poses: &[Pose],
+        k: usize,
+        sharpness: usize,
+        travel: f64,
+    ) -> Result<Vec<PairContact>> {
+        let Some(model) = &self.contact else {
+            return Ok(Vec::new());
+        };
+        let pair = &model.shapes.pairs()[k];
+        let law = model.law(k, parameters);
+        let onset = law.gap + law.width;
+        let reach = onset + model.shapes.ahead(k).max(travel);
+        let found = model.shapes.points_within(k, poses, reach)?;
+        let place = |point: ContactPoint| PairContact {
+            first: pair.first,
+            second: pair.second_body(),
+            law: sharpened(law, sharpness),
+            scale: (sharpness * sharpness) as f64,
+            point,
+        };
+        Ok(found.into_iter().map(place).collect())
     }
 }
 
@@ -137,7 +150,7 @@ impl Evaluation<'_> {
             contact_force_jvp(&t.law, &t.point_state(&twists), &du)
         });
         let mut out = tree.project(&self.kinematics.columns, wrenches);
-        for l in &self.system.limits {
+        for l in &self.limits {
             out[l.v] += l.forces_jvp(self.q[l.q], v[l.v], dv[l.v]);
         }
         out
@@ -175,19 +188,20 @@ impl Evaluation<'_> {
             let (twist, virt) = (t.relative(&fields.twist), t.relative(&fields.virtual_twist));
             let force = contact_force(&t.law, &point_state);
             t.exchange(&point_wrench(x, &force), &mut bar.virtual_twist);
-            let own = contact_force_vjp(&t.law, &point_state, &point_velocity(&virt, x));
+            let mut own = contact_force_vjp(&t.law, &point_state, &point_velocity(&virt, x));
+            own.gap *= t.eased_gap().1;
             t.exchange(&point_wrench(x, &own.velocity), &mut bar.twist);
             // Both u and the virtual velocity are taken at the point.
             let position = own.velocity.cross(&angular(&twist)) + force.cross(&angular(&virt));
             t.displacement_vjp(&own, &position, &mut bar.pose);
-            let law = [own.stiffness, own.dissipation, own.friction];
+            let law = [t.scale * own.stiffness, own.dissipation, own.friction];
             out.parameters.add_contact(law);
         }
         let (q_bar, v_bar) = tree.reverse(&self.kinematics, v, virtual_velocity, &fields, bar);
         out.q += q_bar;
         out.v += v_bar;
         // The tangent of q is indexed as v.
-        for l in &self.system.limits {
+        for l in &self.limits {
             let [q_bar, v_bar] = l.forces_vjp(self.q[l.q], v[l.v], z[l.v]);
             out.q[l.v] += q_bar;
             out.v[l.v] += v_bar;
@@ -200,7 +214,7 @@ impl Evaluation<'_> {
         &self,
         v: &DVector<f64>,
     ) -> impl Iterator<Item = (&JointLimit, [f64; 2])> {
-        let each = self.system.limits.iter();
+        let each = self.limits.iter();
         each.map(|l| (l, l.forces(self.q[l.q], v[l.v])))
     }
 }

@@ -1,6 +1,6 @@
 //! Everything that depends on the configuration alone: kinematics, momenta per unit velocity, mass matrix.
 
-use super::{PairContact, Parameters, System};
+use super::{JointLimit, PairContact, Parameters, System};
 use crate::adjoint::lie::{Mat6, Pose, Vec3, Vec6, six};
 use crate::adjoint::rigid;
 use crate::coupling::CouplingReport;
@@ -9,6 +9,7 @@ use crate::{Error, Result};
 use nalgebra::{DMatrix, DVector};
 
 /// The system at one configuration: values alone. What has derivatives too is a [`Linearisation`](super::Linearisation).
+#[derive(Clone)]
 pub struct Evaluation<'a> {
     /// The system.
     pub system: &'a System,
@@ -22,6 +23,8 @@ pub struct Evaluation<'a> {
     pub rigid: Vec<Mat6>,
     /// Places where surfaces are near.
     pub contact_points: Vec<PairContact>,
+    /// Limits of joints, with the laws of their stops.
+    pub limits: Vec<JointLimit>,
     /// Spatial fluid momentum of each body at unit density per basis column (6 × k each).
     fluid_momenta: Vec<DMatrix<f64>>,
     /// M(q) = M_r + Jᵀ M_f J, user coordinates.
@@ -187,6 +190,7 @@ impl<'a> Evaluation<'a> {
             parameters,
             q: q.clone(),
             contact_points: Vec::new(),
+            limits: system.limits.clone(),
             kinematics,
             rigid,
             fluid_momenta,

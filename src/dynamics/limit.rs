@@ -4,6 +4,7 @@
 //! [`contact_force`] of a point that moves along its normal. The coordinate's rate is its velocity in the user's coordinates and
 //! in the frame's (X = 1 for a joint with one coordinate), and so the force is the same in both.
 
+use super::contact::sharpened;
 use crate::adjoint::contact::{
     Law, PointState, contact_force, contact_force_jvp, contact_force_vjp,
 };
@@ -20,9 +21,29 @@ pub struct JointLimit {
     pub range: [f64; 2],
     /// Law of the stops: lengths in m or rad, forces in N or N m.
     pub law: Law,
+    /// Whether its stiffness is near rigid at the time step, so that it rises where a step is cut; one that was given stays what it is.
+    pub rigid: bool,
 }
 
 impl JointLimit {
+    /// Its range's length, m or rad.
+    pub fn room(&self) -> f64 {
+        self.range[1] - self.range[0]
+    }
+
+    /// How far the coordinate `q` is past either end, m or rad; negative within the range.
+    pub fn past(&self, q: f64) -> f64 {
+        (self.range[0] - q).max(q - self.range[1])
+    }
+
+    /// The same with a law that is as stiff in the `n`-th part of a step as it was in the whole.
+    pub(super) fn sharpened(&self, n: usize) -> Self {
+        Self {
+            law: sharpened(self.law, n),
+            ..self.clone()
+        }
+    }
+
     /// The point_state with either stop at the coordinate `q` and its rate `v`, with the sign of the force's direction.
     fn point_states(&self, q: f64, v: f64) -> [(f64, PointState); 2] {
         let [lower, upper] = self.range;

@@ -20,7 +20,7 @@ pub use contact::{ContactForce, ContactModel, Dual, PairContact};
 pub use evaluation::Evaluation;
 pub use integrator::{
     ContactVelocities, Input, Integrator, LinearisedStep, State, StateBar, StateTangent, StepBar,
-    StepJacobians, StepRecord, Stepper,
+    StepJacobians, StepRecord, Stepper, Stops,
 };
 pub use limit::JointLimit;
 pub use linearisation::Linearisation;

@@ -6,6 +6,7 @@ use super::{Cotangents, Gradient, Initial, Sample, Simulator};
 use crate::adjoint::lie::Vec6;
 use crate::adjoint::step::{self, Tape};
 use crate::dynamics::{ContactForce, Drive, State, StepBar, StepRecord};
+use crate::error::readable;
 use crate::geometry::Gap;
 use crate::{Error, Result};
 use nalgebra::{DMatrix, DVector};
@@ -44,6 +45,10 @@ pub struct Summary {
     pub asymmetry: f64,
     /// Smallest gap between bodies or to a wall, m; none where there is nothing to meet.
     pub min_gap: Option<f64>,
+    /// Steps that were cut into pieces, being too long for what moved in them.
+    pub cut_steps: usize,
+    /// Most pieces of a step; one where none was cut.
+    pub most_pieces: usize,
 }
 
 impl Rollout {
@@ -139,6 +144,7 @@ impl Rollout {
                 }
             }
         }
+        let pieces = self.pieces();
         Summary {
             steps: self.steps(),
             energy_initial: first.energy(),
@@ -154,6 +160,8 @@ impl Rollout {
                 .map(|s| s.report.asymmetry)
                 .fold(0.0, f64::max),
             min_gap: self.nearest().map(|(_, gap)| gap.distance),
+            cut_steps: pieces.iter().filter(|n| **n > 1).count(),
+            most_pieces: pieces.iter().fold(1, |most, n| most.max(*n)),
         }
     }
 
@@ -173,8 +181,14 @@ impl Rollout {
         })
     }
 
+    /// Number of pieces in which each step was made: one where it wasn't cut ([`Stepper::step`](crate::dynamics::Stepper::step)).
+    pub fn pieces(&self) -> Vec<usize> {
+        self.tape.records().iter().map(StepRecord::pieces).collect()
+    }
+
     /// Contacts during step `n`, between the states n and n + 1: where something presses, or surfaces are no more than `slack` (m) farther
-    /// apart than the gap at which they touch; none where there is no such step.
+    /// apart than the gap at which they touch; none where there is no such step. In a step of several pieces each acts for its part of
+    /// the step, and its force is the mean over the step.
     ///
     /// # Errors
     /// A signed distance that can't be found.
@@ -182,12 +196,7 @@ impl Rollout {
         let Some(record) = self.tape.records().get(n) else {
             return Ok(Vec::new());
         };
-        let (simulator, q, v) = (
-            &self.simulator,
-            &record.state().q,
-            record.contact_velocity(),
-        );
-        (simulator.system()).contact_forces(simulator.parameters(), q, v, slack)
+        self.simulator.stepper().contact_forces(record, slack)
     }
 
     /// Time and size of the smallest gap of the whole trajectory.
@@ -203,7 +212,46 @@ impl Rollout {
         let samples = self.samples().iter();
         let states = samples.filter_map(|s| Some((s.time, s.poses.as_slice(), s.gap?)));
         let warning = self.simulator.gap_warning(self.nearest(), states);
-        warning.into_iter().chain(self.energy_warning()).collect()
+        let all = warning.into_iter().chain(self.energy_warning());
+        all.chain(self.passing_warning()).collect()
+    }
+
+    /// What was gone deep into in spite of all pieces.
+    fn passing_warning(&self) -> Option<String> {
+        let system = self.simulator.system();
+        let mut passing = self
+            .tape
+            .records()
+            .iter()
+            .filter(|r| !r.passed().is_empty());
+        let first = passing.next()?;
+        let name = |b: usize| format!("body {:?}", system.bodies[b].name);
+        let model = system.contact.as_ref();
+        let pair = model.and_then(|m| m.shapes.pairs().get(*first.passed().pairs.first()?));
+        let limit = first
+            .passed()
+            .limits
+            .first()
+            .and_then(|k| system.limits.get(*k));
+        let what = match (pair, limit) {
+            (Some(pair), _) => {
+                let other = pair.second_body().map_or("a wall".into(), name);
+                format!("{} goes deep into {other}", name(pair.first))
+            }
+            (None, Some(limit)) => {
+                let links = system.tree.links();
+                let b = links.iter().position(|l| l.v.contains(&limit.v))?;
+                format!("the joint of {} gets past its limit", name(b))
+            }
+            (None, None) => return None,
+        };
+        let (dt, time) = (self.simulator.time_step(), first.state().step);
+        Some(format!(
+            "{what} in the step at t = {} s, though it was cut into {} pieces, and so in {} steps more: take a smaller time step than {dt} s",
+            readable(time as f64 * dt),
+            first.pieces(),
+            passing.count(),
+        ))
     }
 
     /// Energy that grows though nothing does work: the step is too long.

@@ -229,6 +229,8 @@ fn run_summarises_and_writes_the_trajectory() {
                 "energy_final",
                 "momentum_drift",
                 "min_gap",
+                "cut_steps",
+                "most_pieces",
             ],
         );
         assert_eq!(first["fidelity"], fidelity);

@@ -4,7 +4,9 @@ mod drops;
 mod geometry;
 mod integrators;
 mod joints;
+mod passing;
 mod physics;
+mod pieces;
 mod tools;
 
 #[path = "../support/mod.rs"]

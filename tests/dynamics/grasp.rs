@@ -7,7 +7,10 @@ mod hold;
 #[path = "../../examples/grasp/task.rs"]
 mod task;
 
-use hydrograd::Fidelity;
+use hydrograd::adjoint::sample::Samples;
+use hydrograd::simulate::OpenLoop;
+use hydrograd::{Controls, Error, Fidelity};
+use nalgebra::{DMatrix, DVector};
 use task::Task;
 
 #[test]
@@ -51,4 +54,79 @@ fn gradients_of_the_costs() {
         println!("{along:.6e} and {difference:.6e}: {error:.1e}");
         assert!(error <= 1e-5, "{along} is not {difference}");
     }
+}
+
+/// Grasps with random forces: none fails, whatever closes on what.
+fn random_grasps(count: usize, seed: u64) {
+    let scene = task::load().unwrap();
+    let mut simulator = task::simulator(&scene, Fidelity::Reduced).unwrap();
+    simulator.set_policy(Box::new(OpenLoop));
+    let (q, v) = (simulator.start().0.clone(), simulator.start().1.clone());
+    let mut random = Samples::new(seed);
+    let (mut failed, mut cut, mut most, mut past) = (Vec::new(), 0, 1, 0.0_f64);
+    let (mut nearest, mut warned) = (f64::INFINITY, 0);
+    let mut unresolved = Vec::new();
+    for grasp in 0..count {
+        // Column, and fingers that close and now and then open, each for a while; the coin somewhere between them.
+        let mut forces = DMatrix::zeros(3, scene.steps);
+        for n in 0..scene.steps {
+            let before = (n > 0 && n % 40 != 0).then(|| forces.column(n - 1).into_owned());
+            let mut next = || random.between(-500.0, 2000.0);
+            let drawn =
+                before.unwrap_or_else(|| DVector::from_vec(vec![next() - 750.0, next(), -next()]));
+            forces.set_column(n, &drawn);
+        }
+        let mut start = q.clone();
+        start[hold::COIN_Y] += random.between(-0.4, 0.2);
+        start[hold::COIN_Z] += random.between(-0.1, 0.1);
+        start[hold::COIN_TURN] += random.between(-1.0, 1.0);
+        simulator.set_start(start, v.clone()).unwrap();
+        let controls = Controls::from_matrix(&simulator, forces).unwrap();
+        let rollout = match simulator.rollout(&controls) {
+            Ok(rollout) => rollout,
+            // Where it can't be trusted the coupling says so; no number of pieces could help.
+            Err(error @ Error::Unresolved { .. }) if error.to_string().contains("coupling of") => {
+                unresolved.push(format!("grasp {grasp}: {error}"));
+                continue;
+            }
+            Err(error) => {
+                failed.push(format!("grasp {grasp}: {error}"));
+                continue;
+            }
+        };
+        let summary = rollout.summary();
+        cut += summary.cut_steps;
+        most = most.max(summary.most_pieces);
+        nearest = nearest.min(summary.min_gap.unwrap());
+        warned += usize::from(rollout.warnings().iter().any(|w| w.contains("pieces")));
+        for sample in rollout.samples() {
+            assert!(sample.q.iter().chain(&sample.v).all(|x| x.is_finite()));
+            for limit in &rollout.simulator().system().limits {
+                past = past.max(limit.past(sample.q[limit.q]) / limit.room());
+            }
+        }
+    }
+    println!(
+        "{count} grasps: {} fail, {} more in the coupling; {cut} steps cut, into at most {most}; {past:.4} of a range past a limit; smallest gap {:.1} mm; \
+         {warned} go deep",
+        failed.len(),
+        unresolved.len(),
+        1e3 * nearest
+    );
+    assert!(failed.is_empty(), "{}", failed.join("\n"));
+    let most = count / 20;
+    assert!(unresolved.len() <= most, "{}", unresolved.join("\n"));
+    assert!(past < 0.06, "{past}");
+    assert_eq!(warned, 0);
+}
+
+#[test]
+fn random_grasps_never_fail() {
+    random_grasps(8, 1);
+}
+
+#[test]
+#[ignore = "minutes"]
+fn a_hundred_random_grasps_never_fail() {
+    random_grasps(100, 2);
 }

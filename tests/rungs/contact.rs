@@ -58,6 +58,7 @@ fn limit() -> JointLimit {
         q: 0,
         v: 0,
         range: [-0.1, 0.1],
+        rigid: true,
         law: Law {
             stiffness: 3e3,
             dissipation: 0.2,

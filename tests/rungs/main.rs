@@ -153,6 +153,10 @@ const THROUGH: &[(&str, &str)] = &[
         "dynamics::integrator::euler::Adjoint::vjp",
     ),
     (
+        "dynamics::integrator::record::Part::vjp",
+        "dynamics::integrator::euler::Adjoint::vjp",
+    ),
+    (
         "dynamics::integrator::record::LinearisedStep::vjp",
         "dynamics::integrator::euler::Adjoint::vjp",
     ),

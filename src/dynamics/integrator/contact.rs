@@ -52,7 +52,7 @@ fn hessian(e: &Evaluation, split: &Split, v: &DVector<f64>, dt: f64) -> Result<D
 
 /// The velocity after contact, from the one before it; the same bits where nothing presses.
 pub(super) fn solve(start: &Start, before: &DVector<f64>) -> Result<DVector<f64>> {
-    let (e, split, dt) = (start.e, start.split, start.stepper.dt);
+    let (e, split, dt) = (start.near, start.split, start.stepper.dt);
     // At no force v* is the least of the convex problem.
     if split.free.is_empty() || !e.contact_acts(before) {
         return Ok(before.clone());
@@ -133,8 +133,8 @@ pub(super) fn apply(
     hat: DVector<f64>,
 ) -> Result<(State, Stages)> {
     let after = solve(start, &before)?;
-    let hat = match start.e.contact_acts(&before) {
-        true => hat + start.stepper.dt * start.e.contact_force(&after, Dual::Frame),
+    let hat = match start.near.contact_acts(&before) {
+        true => hat + start.stepper.dt * start.near.contact_force(&after, Dual::Frame),
         false => hat,
     };
     let next = start.next_state(start.advance(&after), hat);
@@ -159,7 +159,7 @@ enum Acting {
 impl<'s> Adjoint<'s> {
     /// At a step's velocities before and after contact.
     pub fn new(start: &Start, velocities: &'s ContactVelocities) -> Result<Self> {
-        let (e, split) = (start.e, start.split);
+        let (e, split) = (start.near, start.split);
         let acting = if !e.contact_acts(&velocities.before) {
             Acting::No
         } else if split.free.is_empty() {
@@ -181,12 +181,12 @@ impl<'s> Adjoint<'s> {
         let Acting::Solved(hessian) = &self.acting else {
             return Ok(after_bar.clone());
         };
-        let (e, split) = (start.e, start.split);
+        let (e, near, split) = (start.e, start.near, start.split);
         let ContactVelocities { before, after } = self.velocities;
         let w = split.put(&hessian.solve_vjp(&split.take(after_bar)));
         bar.add(
             start.stepper.dt,
-            &e.contact_force_vjp(after, &w, Dual::User),
+            &near.contact_force_vjp(after, &w, Dual::User),
         );
         bar.add(-1.0, &e.mass_vjp(&(after - before), &w)?);
         // Driven velocities are what they are.
@@ -212,7 +212,7 @@ impl<'s> Adjoint<'s> {
         if matches!(self.acting, Acting::No) {
             return Ok((after_bar, hat_bar));
         }
-        let pressed = start.e.contact_force_vjp(after, &hat_bar, Dual::Frame);
+        let pressed = start.near.contact_force_vjp(after, &hat_bar, Dual::Frame);
         bar.add(dt, &pressed);
         let before_bar = self.solve_vjp(start, &(after_bar + dt * &pressed.v), bar)?;
         Ok((before_bar, hat_bar))

@@ -8,10 +8,11 @@
 //! coordinates ξ = Δt v around q, and JᵀXᵀ (the derivative of spatial displacements at q⁺ with respect to ξ) carries p̂⁺
 //! there. With Xᵀ at q instead, a free body's momenta would stay and its pose be stepped by explicit Euler.
 //!
-//! The stage is solved by Newton's method with exact derivatives; its adjoint is the implicit function theorem at
+//! The stage is solved by Newton's method with exact derivatives, safeguarded; its adjoint is the implicit function theorem at
 //! the converged stage, with the transpose of the same matrix.
 
 use super::contact;
+use super::plan::{Halt, MOST};
 use super::split::{Split, share};
 use super::stages::{ContactVelocities, Stages, Transposed};
 use super::start::Start;
@@ -23,6 +24,12 @@ use nalgebra::{DMatrix, DVector, Dyn, LU};
 
 /// Most Newton iterations of a stage; quadratic convergence needs four or five.
 const ITERATIONS: usize = 40;
+/// Residual that is accepted at the last iteration, and below which none is asked to fall.
+const ENOUGH: f64 = 1e-11;
+/// Shortest part of Newton's step.
+const SHORTEST: f64 = 1.0 / 4096.0;
+/// Largest part by which the inertia may change in the time of a stage.
+const CHANGE: f64 = 0.25;
 
 /// A converged stage.
 pub(super) struct ImplicitStage {
@@ -67,47 +74,132 @@ fn stage_matrix(
     split.block(&m)
 }
 
-/// Solves a stage of a step at `e` on the free rows, from the momentum at the step's start and a guess of its velocity.
+/// How many times too long a step is for its implicit stage; none where it isn't.
+///
+/// With W = h ∂f/∂v on the free rows, the stage's matrix is M − W but for what turning adds, and κ the largest eigenvalue of
+/// M^-½ ½(W + Wᵀ) M^-½: the part by which the inertia M changes in the time h of what moves, less what damps. In one coordinate it is
+/// h v M′/M, and there is no solution from κ = ½ on. Up to ¼ a factor of ¼ M − ½(W + Wᵀ) is all that it takes, n³/3 operations.
+fn excess(
+    e: &Linearisation,
+    split: &Split,
+    v: &DVector<f64>,
+    rates: &DMatrix<f64>,
+    rule: Rule,
+) -> Option<usize> {
+    if rates.iter().all(|x| *x == 0.0) {
+        return None;
+    }
+    let xi = rule.reach * v;
+    let mut grown = rates.clone();
+    for mut column in grown.column_iter_mut() {
+        let here = e
+            .system
+            .tree
+            .chart_momentum(&e.q, &xi, &column.clone_owned());
+        column.copy_from(&(rule.h * here));
+    }
+    let grown = split.block(&grown);
+    let grown = 0.5 * (&grown + grown.transpose());
+    let m = split.block(&e.mass_matrix);
+    if grown.is_empty() || (CHANGE * &m - &grown).cholesky().is_some() {
+        return None;
+    }
+    let lower = m.cholesky()?.unpack();
+    let half = lower.solve_lower_triangular(&grown)?;
+    let scaled = lower.solve_lower_triangular(&half.transpose())?;
+    let change = match scaled.iter().all(|x| x.is_finite()) {
+        true => (0.5 * (&scaled + scaled.transpose()))
+            .symmetric_eigenvalues()
+            .max(),
+        false => f64::INFINITY,
+    };
+    Some((change / CHANGE).ceil().clamp(2.0, MOST as f64) as usize)
+}
+
+/// A velocity that a stage may have, with what is left of its equation.
+struct Trial {
+    v: DVector<f64>,
+    force: DVector<f64>,
+    /// p̂ + h f.
+    reached: DVector<f64>,
+    defect: DVector<f64>,
+    /// The defect's size.
+    merit: f64,
+    /// The same relative to what is balanced.
+    residual: f64,
+}
+
+/// Solves a stage of a step at `e` on the free rows, from the momentum at the step's start and a guess of its velocity: Newton's
+/// method, whose steps are halved until the defect falls.
 pub(super) fn solve_stage(
     start: &Start,
     e: &Linearisation,
     hat: &DVector<f64>,
     rule: Rule,
     guess: &DVector<f64>,
-) -> Result<ImplicitStage> {
+) -> std::result::Result<ImplicitStage, Halt> {
     let (split, control) = (start.split, &start.input.control);
     let tree = &e.system.tree;
-    let mut v = &split.driven + split.put(&split.take(guess));
     let sized = split.sizes(&e.mass_matrix);
     // Against the sum of what M v adds up, so that a total momentum of zero is no target for relative errors.
     let summands = e.mass_matrix.abs();
     let least = sized(&e.user_momentum(hat)).max(sized(&e.rest_momentum));
-    let mut previous = f64::INFINITY;
-    let mut residual = f64::INFINITY;
-    for iteration in 0..ITERATIONS {
+    let at = |v: DVector<f64>| -> Result<Trial> {
         let force = e.force(&v, control)?;
         let reached = hat + rule.h * &force;
         let target = tree.chart_momentum(&e.q, &(rule.reach * &v), &reached);
         let defect = e.momentum(&v) - &target;
         let size = sized(&(&summands * v.abs())).max(sized(&target)).max(least);
-        residual = share(sized(&defect), size);
+        let merit = sized(&defect);
+        let residual = share(merit, size);
+        Ok(Trial {
+            v,
+            force,
+            reached,
+            defect,
+            merit,
+            residual,
+        })
+    };
+    let mut now = at(split.complete(guess))?;
+    let mut previous = f64::INFINITY;
+    'newton: for iteration in 0..ITERATIONS {
+        let residual = now.residual;
         // Stop where rounding ends the quadratic convergence.
         let converged = residual == 0.0 || (residual <= 1e-13 && residual >= 0.25 * previous);
-        let at_last = iteration + 1 == ITERATIONS && residual <= 1e-11;
+        let at_last = iteration + 1 == ITERATIONS && residual <= ENOUGH;
         if converged || at_last {
+            let Trial { v, force, .. } = now;
             return Ok(ImplicitStage { v, force });
         }
-        if !residual.is_finite() {
+        if !residual.is_finite() || iteration + 1 == ITERATIONS {
             break;
         }
         previous = residual;
-        let rates = e.force_velocity_jacobian(&v, control)?;
-        let matrix = stage_matrix(e, split, &v, &rates, &reached, rule);
-        let Some(step) = matrix.lu().solve(&split.take(&defect)) else {
+        let rates = e.force_velocity_jacobian(&now.v, control)?;
+        if iteration == 0
+            && start.plan.may_cut()
+            && let Some(times) = excess(e, split, &now.v, &rates, rule)
+        {
+            return Err(Halt::TooLong(times));
+        }
+        let matrix = stage_matrix(e, split, &now.v, &rates, &now.reached, rule);
+        let Some(step) = matrix.lu().solve(&split.take(&now.defect)) else {
             break;
         };
-        v -= split.put(&step);
+        let step = split.put(&step);
+        let mut next = at(&now.v - &step)?;
+        let mut length = 1.0;
+        while !(next.merit < now.merit || next.residual <= ENOUGH) {
+            length *= 0.5;
+            if length < SHORTEST {
+                break 'newton;
+            }
+            next = at(&now.v - length * &step)?;
+        }
+        now = next;
     }
+    let residual = now.residual;
     let twists = tree.twists(&e.kinematics, guess);
     let turning = (twists.iter())
         .map(|t| angular(t).norm())
@@ -122,7 +214,8 @@ pub(super) fn solve_stage(
              in it)",
             turning * rule.reach.max(2.0 * (rule.h - rule.reach))
         ),
-    })
+    }
+    .into())
 }
 
 fn rule(s: &Stepper) -> Rule {
@@ -132,12 +225,12 @@ fn rule(s: &Stepper) -> Rule {
     }
 }
 
-pub(super) fn step(start: &Start) -> Result<(State, Stages)> {
+pub(super) fn step(start: &Start) -> std::result::Result<(State, Stages), Halt> {
     let (s, e) = (start.stepper, start.e);
     let p = start.momentum();
     let stage = solve_stage(start, e, &p, rule(s), start.v)?;
     let y = &p + s.dt * &stage.force;
-    contact::apply(start, stage.v, y)
+    Ok(contact::apply(start, stage.v, y)?)
 }
 
 /// What the transpose of a step needs.

@@ -12,6 +12,7 @@
 
 use super::contact;
 use super::euler::{AdjointStage, Rule, solve_stage};
+use super::plan::Halt;
 use super::split::share;
 use super::stages::{ContactVelocities, Stages, Transposed};
 use super::start::Start;
@@ -53,10 +54,10 @@ fn change(e: &Linearisation, a: &DVector<f64>, b: &DVector<f64>) -> f64 {
     if step == 0.0 { 0.0 } else { step / size }
 }
 
-pub(super) fn step(start: &Start) -> Result<(State, Stages)> {
+pub(super) fn step(start: &Start) -> std::result::Result<(State, Stages), Halt> {
     let (s, split) = (start.stepper, start.split);
     let p = start.momentum();
-    let mut stage = &split.driven + split.put(&split.take(start.v));
+    let mut stage = split.complete(start.v);
     let mut previous = f64::INFINITY;
     for _ in 0..ITERATIONS {
         let m = middle(start, &stage)?;
@@ -66,7 +67,7 @@ pub(super) fn step(start: &Start) -> Result<(State, Stages)> {
         // Down at rounding, or at the coupled solve's own tolerance, changes are noise: stop when they no longer halve.
         if moved <= TOLERANCE || (moved <= noise(&m) && moved > 0.5 * previous) {
             let y = &p + s.dt * next.force;
-            return contact::apply(start, stage, y);
+            return Ok(contact::apply(start, stage, y)?);
         }
         previous = moved;
     }
@@ -79,7 +80,8 @@ pub(super) fn step(start: &Start) -> Result<(State, Stages)> {
             "the midpoint's fixed point doesn't contract: take a smaller time step, or tighten \
                  the coupling's tolerance"
                 .into(),
-    })
+    }
+    .into())
 }
 
 /// What the transpose of a step needs.

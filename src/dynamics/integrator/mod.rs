@@ -13,9 +13,12 @@
 //! Joints that are driven (locked, held by the controller, or given a motion) have known
 //! velocities v_d; the others follow from rows f of the momentum balance (p_f = M_ff v_f + M_fd v_d).
 
+mod ahead;
 mod contact;
 mod euler;
 mod midpoint;
+mod pieces;
+mod plan;
 mod readout;
 mod record;
 mod runge_kutta;
@@ -24,6 +27,7 @@ mod stages;
 mod start;
 mod velocity_euler;
 
+pub use plan::Stops;
 pub use record::{LinearisedStep, StepJacobians, StepRecord};
 pub use stages::ContactVelocities;
 

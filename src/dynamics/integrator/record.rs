@@ -1,12 +1,16 @@
 //! What a step leaves behind, and its derivatives.
+//!
+//! A step may have been cut into equal pieces, each a step of its own with the same control and the same joints held; its derivatives go
+//! through them in reverse, their number held fixed.
 
+use super::plan::{Plan, Stops};
 use super::split::Split;
 use super::stages::{ContactVelocities, Stages, Transposed};
 use super::start::Start;
 use super::{Input, Integrator, State, StateBar, StateTangent, StepBar, Stepper};
 use super::{euler, midpoint, runge_kutta, velocity_euler};
 use crate::Result;
-use crate::dynamics::Linearisation;
+use crate::dynamics::{Evaluation, Linearisation};
 use nalgebra::{DMatrix, DVector};
 use rayon::prelude::*;
 
@@ -14,12 +18,25 @@ use rayon::prelude::*;
 /// key to the step's derivatives ([`Stepper::linearise_step`]), which needn't iterate again.
 #[derive(Clone, Debug)]
 pub struct StepRecord {
-    state: State,
-    v: DVector<f64>,
-    input: Input,
-    integrator: Integrator,
-    dt: f64,
-    stages: Stages,
+    pub(super) state: State,
+    pub(super) v: DVector<f64>,
+    pub(super) input: Input,
+    pub(super) integrator: Integrator,
+    pub(super) dt: f64,
+    pub(super) plan: Plan,
+    /// Of the step, or of its first piece.
+    pub(super) stages: Stages,
+    pub(super) later: Vec<LaterPiece>,
+    pub(super) passed: Stops,
+}
+
+/// A piece of a step after its first.
+#[derive(Clone, Debug)]
+pub(super) struct LaterPiece {
+    /// Where it starts, steps counted in pieces.
+    pub state: State,
+    pub v: DVector<f64>,
+    pub stages: Stages,
 }
 
 impl StepRecord {
@@ -38,41 +55,48 @@ impl StepRecord {
         &self.input
     }
 
-    /// Velocities before and after contact; none of integrators that don't solve it.
+    /// Number of equal pieces in which it was made; one where it wasn't cut.
+    pub fn pieces(&self) -> usize {
+        self.plan.pieces
+    }
+
+    /// What it went deep into, or past a joint's limit, in as many pieces as there may be.
+    pub fn passed(&self) -> &Stops {
+        &self.passed
+    }
+
+    /// Velocities before and after contact, of a step in pieces those of the first; none of integrators that don't solve it.
     pub fn contact_velocities(&self) -> Option<&ContactVelocities> {
-        match &self.stages {
-            Stages::Contact(v) => Some(v),
-            Stages::RungeKutta(_) => None,
-        }
+        self.stages.contact_velocities()
     }
 
-    /// The velocity with which contacts act during the step.
-    pub fn contact_velocity(&self) -> &DVector<f64> {
-        self.contact_velocities().map_or(&self.v, |v| &v.after)
-    }
-
-    fn start<'s, 'a>(
-        &'s self,
-        stepper: &'s Stepper<'a>,
-        e: &'s Linearisation<'a>,
-        split: &'s Split,
-    ) -> Start<'s, 'a> {
-        Start {
-            stepper,
-            e,
-            state: &self.state,
-            v: &self.v,
-            input: &self.input,
-            split,
-        }
+    /// The pieces: each one's start with steps counted in pieces, the velocity read out there, and its stages.
+    pub(super) fn parts(&self) -> impl Iterator<Item = (State, &DVector<f64>, &Stages)> {
+        let first = State {
+            step: self.plan.pieces * self.state.step,
+            ..self.state.clone()
+        };
+        let later = self.later.iter();
+        let later = later.map(|piece| (piece.state.clone(), &piece.v, &piece.stages));
+        std::iter::once((first, &self.v, &self.stages)).chain(later)
     }
 }
 
-/// A step made again at its start, with what all its derivatives share: one evaluation, and the factored stages.
+/// A step made again at its start, with what all its derivatives share: for each piece an evaluation and the factored stages.
 pub struct LinearisedStep<'s, 'a> {
+    record: &'s StepRecord,
+    first: Part<'s, 'a>,
+    later: Vec<Part<'s, 'a>>,
+}
+
+/// A piece of a step, or the whole, made again.
+struct Part<'s, 'a> {
     stepper: Stepper<'a>,
     record: &'s StepRecord,
+    state: State,
+    v: &'s DVector<f64>,
     e: Linearisation<'a>,
+    near: Option<Evaluation<'a>>,
     split: Split,
     adjoint: Box<dyn Transposed<'a> + 's>,
 }
@@ -87,43 +111,13 @@ pub struct StepJacobians {
 }
 
 impl<'a> Stepper<'a> {
-    /// One step from `state`, at which `e` was evaluated and where the velocity is `v`
-    /// ([`Stepper::velocity`]).
-    ///
-    /// # Errors
-    /// A solve that misses its tolerance or a step too long for its implicit stage.
-    pub fn step(
-        &self,
-        e: &Linearisation<'a>,
-        state: &State,
-        v: &DVector<f64>,
-        input: &Input,
-    ) -> Result<(State, StepRecord)> {
-        let split = self.split_of_step(state, input);
-        let start = Start {
-            stepper: self,
-            e,
-            state,
-            v,
-            input,
-            split: &split,
-        };
-        let (next, stages) = match self.integrator {
-            Integrator::MomentumEuler => euler::step(&start)?,
-            Integrator::Midpoint => midpoint::step(&start)?,
-            Integrator::Rk2 => runge_kutta::step(&start, &runge_kutta::SECOND)?,
-            Integrator::Rk4 => runge_kutta::step(&start, &runge_kutta::FOURTH)?,
-            Integrator::VelocityEuler => velocity_euler::step(&start)?,
-        };
-        let record = StepRecord {
-            state: state.clone(),
-            v: v.clone(),
-            input: input.clone(),
-            integrator: self.integrator,
-            dt: self.dt,
-            stages,
-        };
-        Ok((next, record))
+    /// The same for the pieces of a step.
+    pub(super) fn of_pieces(&self, record: &StepRecord) -> Self {
+        Self {
+            integrator: record.integrator,
+            dt: record.dt / record.plan.pieces as f64,
+            ..*self
+        }
     }
 
     /// A step with what its derivatives share.
@@ -134,38 +128,83 @@ impl<'a> Stepper<'a> {
     where
         'a: 's,
     {
-        let stepper = Stepper {
-            integrator: record.integrator,
-            dt: record.dt,
-            ..*self
+        let stepper = self.of_pieces(record);
+        let part = |(state, v, stages): (State, &'s DVector<f64>, &'s Stages)| {
+            let e = stepper.linearise(&state.q)?;
+            let split = stepper.split_of_step(&state, &record.input);
+            let near = stepper.near(&e, &split.complete(v), &record.plan)?;
+            let start = Start {
+                stepper: &stepper,
+                e: &e,
+                near: near.as_ref().unwrap_or(&e),
+                plan: &record.plan,
+                state: &state,
+                v,
+                input: &record.input,
+                split: &split,
+            };
+            let adjoint: Box<dyn Transposed<'a> + 's> = match (stages, record.integrator) {
+                (Stages::RungeKutta(f), _) => Box::new(runge_kutta::Adjoint::new(&start, f)?),
+                (Stages::Contact(v), Integrator::Midpoint) => {
+                    Box::new(midpoint::Adjoint::new(&start, v)?)
+                }
+                (Stages::Contact(v), Integrator::VelocityEuler) => {
+                    Box::new(velocity_euler::Adjoint::new(&start, v)?)
+                }
+                (Stages::Contact(v), _) => Box::new(euler::Adjoint::new(&start, v)?),
+            };
+            Ok(Part {
+                stepper,
+                record,
+                state,
+                v,
+                e,
+                near,
+                split,
+                adjoint,
+            })
         };
-        let e = stepper.linearise(&record.state.q)?;
-        let split = stepper.split_of_step(&record.state, &record.input);
-        let start = record.start(&stepper, &e, &split);
-        let adjoint: Box<dyn Transposed<'a> + 's> = match (&record.stages, record.integrator) {
-            (Stages::RungeKutta(f), _) => Box::new(runge_kutta::Adjoint::new(&start, f)?),
-            (Stages::Contact(v), Integrator::Midpoint) => {
-                Box::new(midpoint::Adjoint::new(&start, v)?)
-            }
-            (Stages::Contact(v), Integrator::VelocityEuler) => {
-                Box::new(velocity_euler::Adjoint::new(&start, v)?)
-            }
-            (Stages::Contact(v), _) => Box::new(euler::Adjoint::new(&start, v)?),
+        let mut parts = record.parts();
+        let first = match parts.next() {
+            Some(first) => part(first)?,
+            None => part((record.state.clone(), &record.v, &record.stages))?,
         };
         Ok(LinearisedStep {
-            stepper,
             record,
-            adjoint,
-            e,
-            split,
+            first,
+            later: parts.map(part).collect::<Result<_>>()?,
         })
+    }
+}
+
+impl<'a> Part<'_, 'a> {
+    /// Transpose of the piece.
+    fn vjp(&self, next_bar: &StateBar) -> Result<StepBar> {
+        let start = Start {
+            stepper: &self.stepper,
+            e: &self.e,
+            near: self.near.as_ref().unwrap_or(&self.e),
+            plan: &self.record.plan,
+            state: &self.state,
+            v: self.v,
+            input: &self.record.input,
+            split: &self.split,
+        };
+        self.adjoint.vjp(&start, next_bar)
+    }
+
+    /// Carries the cotangent of the velocity read out at its state on to the state.
+    fn carry(&self, bar: &mut StepBar) -> Result<()> {
+        let v_bar = std::mem::replace(&mut bar.v, DVector::zeros(self.v.len()));
+        self.stepper
+            .velocity_vjp(&self.e, &self.state, self.v, &v_bar, bar)
     }
 }
 
 impl<'a> LinearisedStep<'_, 'a> {
     /// The system at the state before the step.
     pub fn linearisation(&self) -> &Linearisation<'a> {
-        &self.e
+        &self.first.e
     }
 
     /// What the step left behind.
@@ -179,8 +218,13 @@ impl<'a> LinearisedStep<'_, 'a> {
     /// # Errors
     /// A solve that misses its tolerance.
     pub fn vjp(&self, next_bar: &StateBar) -> Result<StepBar> {
-        let start = self.record.start(&self.stepper, &self.e, &self.split);
-        self.adjoint.vjp(&start, next_bar)
+        let mut after: Option<StepBar> = None;
+        for part in self.later.iter().rev() {
+            let mut bar = through(part, after, next_bar)?;
+            part.carry(&mut bar)?;
+            after = Some(bar);
+        }
+        through(&self.first, after, next_bar)
     }
 
     /// The same with the velocity read out at the state: all that the next state's cotangent is worth at the state itself.
@@ -189,10 +233,7 @@ impl<'a> LinearisedStep<'_, 'a> {
     /// As [`LinearisedStep::vjp`].
     pub fn state_vjp(&self, next_bar: &StateBar) -> Result<StepBar> {
         let mut bar = self.vjp(next_bar)?;
-        let v_bar = std::mem::replace(&mut bar.v, DVector::zeros(next_bar.q.len()));
-        let record = self.record;
-        self.stepper
-            .velocity_vjp(&self.e, &record.state, &record.v, &v_bar, &mut bar)?;
+        self.first.carry(&mut bar)?;
         Ok(bar)
     }
 
@@ -229,4 +270,15 @@ impl<'a> LinearisedStep<'_, 'a> {
             y: out.rows(nv, nv).into_owned(),
         })
     }
+}
+
+/// Transpose of a piece, from what the pieces after it came to, or of the last one from the cotangent of the next state.
+fn through(part: &Part, after: Option<StepBar>, next_bar: &StateBar) -> Result<StepBar> {
+    let Some(after) = after else {
+        return part.vjp(next_bar);
+    };
+    let mut bar = part.vjp(&after.state)?;
+    bar.control += after.control;
+    bar.parameters.add(&after.parameters);
+    Ok(bar)
 }

@@ -32,6 +32,11 @@ impl Split {
         out
     }
 
+    /// A velocity with the driven entries as they are in the step.
+    pub fn complete(&self, v: &DVector<f64>) -> DVector<f64> {
+        &self.driven + self.put(&self.take(v))
+    }
+
     /// Free rows and columns.
     pub fn block(&self, m: &DMatrix<f64>) -> DMatrix<f64> {
         m.select_rows(&self.free).select_columns(&self.free)

@@ -51,6 +51,16 @@ pub(super) enum Stages {
     RungeKutta(Forces),
 }
 
+impl Stages {
+    /// Velocities before and after contact; none of integrators that don't solve it.
+    pub fn contact_velocities(&self) -> Option<&ContactVelocities> {
+        match self {
+            Self::Contact(velocities) => Some(velocities),
+            Self::RungeKutta(_) => None,
+        }
+    }
+}
+
 /// What the transpose of a step needs beside its start.
 pub(super) trait Transposed<'a>: Send + Sync {
     /// Transpose of the step.

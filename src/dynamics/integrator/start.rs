@@ -1,9 +1,10 @@
 //! Where a step starts: what steps and their transposes have in common, whatever the integrator.
 
+use super::plan::Plan;
 use super::split::{Split, When};
 use super::{Input, Integrator, State, StateBar, StepBar, Stepper};
 use crate::Result;
-use crate::dynamics::Linearisation;
+use crate::dynamics::{Evaluation, Linearisation};
 use nalgebra::DVector;
 
 /// The start of a step.
@@ -12,6 +13,10 @@ pub(super) struct Start<'s, 'a> {
     pub stepper: &'s Stepper<'a>,
     /// At the state's configuration.
     pub e: &'s Linearisation<'a>,
+    /// The same with the contacts that this step sees.
+    pub near: &'s Evaluation<'a>,
+    /// How the step is cut of which this is a piece, or the whole.
+    pub plan: &'s Plan,
     pub state: &'s State,
     /// Velocity read out at the state.
     pub v: &'s DVector<f64>,
@@ -36,9 +41,14 @@ impl Start<'_, '_> {
     /// Message of a stage that failed.
     pub fn stage_name(&self) -> String {
         let (s, state) = (self.stepper, self.state);
+        let n = self.plan.pieces;
+        let piece = match n {
+            1 => String::new(),
+            _ => format!(", piece {} of {n}", state.step % n + 1),
+        };
         format!(
-            "implicit stage of step {} (t = {} s, Δt = {} s)",
-            state.step,
+            "implicit stage of step {}{piece} (t = {} s, Δt = {} s)",
+            state.step / n,
             s.time(state),
             s.dt
         )

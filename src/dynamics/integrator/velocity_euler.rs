@@ -27,7 +27,7 @@ fn acceleration(start: &Start) -> Result<(DVector<f64>, Definite)> {
 pub(super) fn step(start: &Start) -> Result<(State, Stages)> {
     let (s, split) = (start.stepper, start.split);
     let (a, _) = acceleration(start)?;
-    let before = &split.driven + split.put(&split.take(&(start.v + s.dt * a)));
+    let before = split.complete(&(start.v + s.dt * a));
     let after = contact::solve(start, &before)?;
     let q = start.advance(&after);
     let next = start.next_state(q, after.clone());

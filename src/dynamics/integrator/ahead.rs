@@ -1,0 +1,239 @@
+//! What a step meets on its way: how far surfaces are looked for, into how many pieces a fast step is cut, and whether anything was
+//! passed through.
+//!
+//! The law of contact foresees a gap φ as φ + τ z, along straight lines and flat surfaces. That is exact for what closes slowly against
+//! the sizes of the bodies. For what doesn't, the time of impact is found by conservative advancement: the bodies go on at their
+//! velocity by the time that their gap takes to close at least, and again. A pair that would meet within a step so fast
+//! that it came halfway through the thinner body asks for so many pieces that it doesn't, and has a law as stiff as that of a step of
+//! a piece's length.
+
+use super::Stepper;
+use super::plan::{MOST, Plan, Stops};
+use crate::Result;
+use crate::adjoint::lie::{Pose, Vec6, point_velocity};
+use crate::contact::Contacts;
+use crate::dynamics::{ContactModel, Evaluation, PairContact, System};
+use crate::multibody::Kinematics;
+use nalgebra::DVector;
+
+/// Room for a change of speed on the way.
+const ROOM: f64 = 1.25;
+/// Part of half the thickness at which surfaces count as met.
+const MET: f64 = 0.05;
+/// Part of half the thickness that a piece may go past where surfaces meet.
+const DEEP: f64 = 0.5;
+/// Part of a joint's range that a piece may come nearer to its end by.
+const SHARE: f64 = 0.25;
+/// Part of the range that it may end past it.
+const PAST: f64 = 0.05;
+/// Most advancements along one way; a pair that takes more counts as met.
+const ADVANCES: usize = 500;
+/// Weight below which a place is about to be taken over by others.
+const FULL: f64 = 0.5;
+
+/// The way of the bodies from `q` at the velocity `v`.
+struct Way<'s> {
+    system: &'s System,
+    q: &'s DVector<f64>,
+    v: &'s DVector<f64>,
+}
+
+/// Where two surfaces meet on their way: the speed at which they close there along their normal, m/s.
+struct Meeting {
+    speed: f64,
+}
+
+impl Way<'_> {
+    /// Poses and spatial twists after the time `t`.
+    fn at(&self, t: f64) -> (Vec<Pose>, Vec<Vec6>) {
+        let tree = &self.system.tree;
+        let there = tree.kinematics(&tree.integrate(self.q, &(t * self.v)));
+        let twists = tree.twists(&there, self.v);
+        (there.poses, twists)
+    }
+
+    /// Where the surfaces of pair `k` first come as near as `target` (m) within the time `horizon`, by conservative advancement.
+    fn meeting(
+        &self,
+        model: &ContactModel,
+        k: usize,
+        horizon: f64,
+        target: f64,
+    ) -> Result<Option<Meeting>> {
+        let shapes = &model.shapes;
+        let near = target + MET * shapes.halfway(k);
+        let mut time = 0.0;
+        for _ in 0..ADVANCES {
+            let (poses, twists) = self.at(time);
+            let closing = ROOM * shapes.closing(k, &poses, &twists);
+            let reach = near + closing * (horizon - time);
+            let mut points = shapes.points_within(k, &poses, reach)?;
+            points.retain(|p| p.weight >= FULL);
+            let gap = points.iter().map(|p| p.gap).fold(f64::INFINITY, f64::min);
+            if gap == f64::INFINITY {
+                return Ok(None);
+            }
+            if gap <= near {
+                let met = points.iter().filter(|p| p.gap <= near);
+                let speed = met.map(|p| {
+                    let twist = relative(shapes, k, &twists);
+                    -p.normal.dot(&point_velocity(&twist, &p.position))
+                });
+                let speed = speed.fold(0.0, f64::max);
+                return Ok(Some(Meeting { speed }));
+            }
+            // Nothing closes: it stays as it is.
+            if closing <= 0.0 {
+                return Ok(None);
+            }
+            time += (gap - target) / closing;
+            if time >= horizon {
+                return Ok(None);
+            }
+        }
+        let (poses, twists) = self.at(time);
+        let speed = shapes.closing(k, &poses, &twists);
+        Ok(Some(Meeting { speed }))
+    }
+}
+
+fn relative(shapes: &Contacts, k: usize, twists: &[Vec6]) -> Vec6 {
+    let pair = &shapes.pairs()[k];
+    let second = pair.second_body();
+    twists[pair.first] - second.map_or(Vec6::zeros(), |b| twists[b])
+}
+
+/// A number of pieces in which each does `share` at most of what a step does.
+fn pieces(share: f64) -> usize {
+    // One of what isn't a number: that is said elsewhere.
+    share.ceil().max(1.0).min(MOST as f64) as usize
+}
+
+impl Stepper<'_> {
+    /// How the step from `e` at the velocity `v` is cut, as far as contact and limits know beforehand.
+    pub(super) fn foreseen(&self, e: &Evaluation, v: &DVector<f64>) -> Result<Plan> {
+        let mut plan = Plan::whole();
+        let (system, dt) = (self.system, self.dt);
+        if let Some(model) = &system.contact {
+            let way = Way { system, q: &e.q, v };
+            let twists = system.tree.twists(&e.kinematics, v);
+            for (k, law) in model.laws.iter().enumerate() {
+                let shapes = &model.shapes;
+                let halfway = shapes.halfway(k);
+                if shapes.closing(k, &e.kinematics.poses, &twists) * dt <= halfway {
+                    continue;
+                }
+                let met = way.meeting(model, k, dt, law.gap + law.width)?;
+                let wanted = met.map_or(1, |m| pieces(m.speed * dt / halfway));
+                plan.pieces = plan.pieces.max(wanted);
+                if wanted > 1 && model.rigid {
+                    plan.sharp.pairs.push(k);
+                }
+            }
+        }
+        for (k, limit) in e.limits.iter().enumerate() {
+            let (q, v) = (e.q[limit.q], v[limit.v]);
+            let wanted = pieces(dt * v.abs() / (SHARE * limit.room()));
+            if wanted > 1 && limit.past(q + dt * v) > 0.0 {
+                plan.pieces = plan.pieces.max(wanted);
+                if limit.rigid {
+                    plan.sharp.limits.push(k);
+                }
+            }
+        }
+        Ok(plan)
+    }
+
+    /// Places where surfaces are near, as a piece of a step sees them that starts at `q` with the velocity `v`; none where it sees what
+    /// every step does. What closes fast, and will meet, is seen from as far as it comes within its law's horizon.
+    pub(super) fn seen(
+        &self,
+        kinematics: &Kinematics,
+        q: &DVector<f64>,
+        v: &DVector<f64>,
+        plan: &Plan,
+    ) -> Result<Option<Vec<PairContact>>> {
+        let system = self.system;
+        let Some(model) = &system.contact else {
+            return Ok(None);
+        };
+        let twists = system.tree.twists(kinematics, v);
+        let mut travels = Vec::with_capacity(model.laws.len());
+        for (k, law) in model.laws.iter().enumerate() {
+            let horizon = law.horizon / plan.of_pair(k) as f64;
+            let closing = model.shapes.closing(k, &kinematics.poses, &twists);
+            let travel = ROOM * closing * horizon;
+            let way = Way { system, q, v };
+            let far = closing * horizon > model.shapes.ahead(k)
+                && (way.meeting(model, k, horizon, law.gap + law.width)?).is_some();
+            travels.push(if far { travel } else { 0.0 });
+        }
+        let as_ever = |k: usize| travels[k] == 0.0 && plan.of_pair(k) == 1;
+        if (0..travels.len()).all(as_ever) {
+            return Ok(None);
+        }
+        let mut out = Vec::new();
+        for (k, travel) in travels.iter().enumerate() {
+            let (poses, n) = (&kinematics.poses, plan.of_pair(k));
+            out.extend(system.pair_points(self.parameters, poses, k, n, *travel)?);
+        }
+        Ok(Some(out))
+    }
+
+    /// `e` with the contacts and limits that a piece of a step sees; none where they are those of `e`.
+    pub(super) fn near<'e>(
+        &self,
+        e: &Evaluation<'e>,
+        v: &DVector<f64>,
+        plan: &Plan,
+    ) -> Result<Option<Evaluation<'e>>> {
+        let points = self.seen(&e.kinematics, &e.q, v, plan)?;
+        let sharp = plan.pieces > 1 && !plan.sharp.limits.is_empty();
+        if points.is_none() && !sharp {
+            return Ok(None);
+        }
+        let mut out = e.clone();
+        if let Some(points) = points {
+            out.contact_points = points;
+        }
+        for (k, limit) in out.limits.iter_mut().enumerate() {
+            *limit = limit.sharpened(plan.of_limit(k));
+        }
+        Ok(Some(out))
+    }
+
+    /// What is passed by a step from `e` that moves by `v`: surfaces that get so deep that they might come out on the other side, and
+    /// joints that get past their limit by a part of their range. Where the stiffness was given, that is as it was asked for.
+    pub(super) fn passed(&self, e: &Evaluation, v: &DVector<f64>) -> Stops {
+        let mut out = Stops::default();
+        let (system, dt) = (self.system, self.dt);
+        if let Some(model) = system.contact.as_ref().filter(|m| m.rigid) {
+            let way = Way { system, q: &e.q, v };
+            let twists = system.tree.twists(&e.kinematics, v);
+            for k in 0..model.laws.len() {
+                let shapes = &model.shapes;
+                let deep = DEEP * shapes.halfway(k);
+                if shapes.closing(k, &e.kinematics.poses, &twists) * dt <= deep {
+                    continue;
+                }
+                // What is in already is pressed there, and didn't come that deep in this step.
+                let poses = &e.kinematics.poses;
+                let pressed = shapes.points_within(k, poses, -0.5 * deep);
+                if pressed.is_ok_and(|points| points.iter().any(|p| p.weight >= FULL)) {
+                    continue;
+                }
+                // Where no distance is found bodies are deep in one another.
+                if !matches!(way.meeting(model, k, dt, -deep), Ok(None)) {
+                    out.pairs.push(k);
+                }
+            }
+        }
+        for (k, limit) in e.limits.iter().enumerate() {
+            let [before, after] = [0.0, dt].map(|t| limit.past(e.q[limit.q] + t * v[limit.v]));
+            if limit.rigid && after > PAST * limit.room() && after > before {
+                out.limits.push(k);
+            }
+        }
+        out
+    }
+}

@@ -1,0 +1,94 @@
+//! Into how many pieces a step is cut, and why one was given up.
+
+use crate::Error;
+
+/// Most pieces of a step.
+pub(super) const MOST: usize = 64;
+
+/// Pairs of surfaces and limits of joints, by their numbers.
+#[derive(Clone, Debug, Default, PartialEq, Eq)]
+pub struct Stops {
+    /// Of [`Contacts::pairs`](crate::contact::Contacts::pairs), ascending.
+    pub pairs: Vec<usize>,
+    /// Of [`System::limits`](crate::dynamics::System::limits), ascending.
+    pub limits: Vec<usize>,
+}
+
+impl Stops {
+    /// Whether there is none.
+    pub fn is_empty(&self) -> bool {
+        self.pairs.is_empty() && self.limits.is_empty()
+    }
+
+    /// Adds others.
+    pub(super) fn add(&mut self, other: &Self) {
+        for (to, from) in [
+            (&mut self.pairs, &other.pairs),
+            (&mut self.limits, &other.limits),
+        ] {
+            to.extend(from);
+            to.sort_unstable();
+            to.dedup();
+        }
+    }
+}
+
+/// How a step is cut.
+#[derive(Clone, Debug, PartialEq)]
+pub(super) struct Plan {
+    /// Number of pieces; one is the step as it is.
+    pub pieces: usize,
+    /// What presses as stiffly in a piece as it would in a whole step of that length.
+    pub sharp: Stops,
+}
+
+impl Plan {
+    /// A step as it is.
+    pub fn whole() -> Self {
+        Self {
+            pieces: 1,
+            sharp: Stops::default(),
+        }
+    }
+
+    /// Whether more pieces may be asked for.
+    pub fn may_cut(&self) -> bool {
+        self.pieces < MOST
+    }
+
+    /// Asks for `times` as many pieces.
+    pub fn cut(&mut self, times: usize) {
+        self.pieces = self.pieces.saturating_mul(times).min(MOST);
+    }
+
+    /// How much sharper the law of a pair of surfaces is than in the whole step.
+    pub fn of_pair(&self, pair: usize) -> usize {
+        self.of(&self.sharp.pairs, pair)
+    }
+
+    /// The same of a joint's limit.
+    pub fn of_limit(&self, limit: usize) -> usize {
+        self.of(&self.sharp.limits, limit)
+    }
+
+    fn of(&self, sharp: &[usize], number: usize) -> usize {
+        match sharp.binary_search(&number) {
+            Ok(_) => self.pieces,
+            Err(_) => 1,
+        }
+    }
+}
+
+/// Why a step, or a piece of one, isn't made.
+pub(super) enum Halt {
+    /// It is so many times too long for its implicit stage.
+    TooLong(usize),
+    /// It failed.
+    Failed(Error),
+}
+
+impl From<Error> for Halt {
+    fn from(error: Error) -> Self {
+        Self::Failed(error)
+    }
+}

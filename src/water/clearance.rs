@@ -17,6 +17,8 @@ const BY_SOURCES: f64 = 0.5;
 /// Energy of the film in a gap, in the energy of the water that the smaller body displaces, from which it matters to both. Between
 /// round bodies it stays under a hundredth.
 const FILM: f64 = 0.3;
+/// A gap is thin where it is less than this part of the radius of a disc with the area over which the surfaces are parallel.
+const THIN: f64 = 0.15;
 
 /// The gaps of a scene's bodies, from their surfaces in body frames: those of shapes by formula exact, others of meshes.
 #[derive(Clone)]
@@ -122,7 +124,8 @@ impl Clearance {
                 Other::Wall(_) => own,
             };
             let area = self.moving.parallel_area(gap, poses);
-            if area.powi(2) > FILM * 8.0 * PI * gap.distance * volume {
+            let thin = gap.distance < THIN * (area / PI).sqrt();
+            if thin && area.powi(2) > FILM * 8.0 * PI * gap.distance * volume {
                 return Err(Error::Unresolved {
                     place: self.place(gap),
                     quantity: "flat gap in m".into(),

@@ -59,9 +59,11 @@ pub(crate) fn prepare(
     mut clearance: Clearance,
     folder: Option<&Path>,
 ) -> Result<Prepared> {
-    // Where compression can't resolve the gaps of a scene, panels do, flat ones too. On a GPU there are none.
+    // Where compression can't resolve the gaps of a scene, panels do, flat ones too. Between round bodies sources inside them are the
+    // better of both (two spheres at a gap of 0.05 R: 0.6 % for 0.8 %), and on a GPU there are no panels.
+    let round = submerged.iter().all(|b| b.ellipsoid.is_some());
     let together = match (choices.method, choices.backend) {
-        (Method::Auto, Backend::Cpu) => Method::Panel.kind(),
+        (Method::Auto, Backend::Cpu) if !round => Method::Panel.kind(),
         (method, _) => method.kind(),
     };
     let mut method = choices.method.kind();

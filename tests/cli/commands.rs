@@ -397,7 +397,7 @@ fn added_mass_with_an_estimate_of_its_error() {
     // Only when asked for; and for people.
     assert!(json(&asked).get("error_estimate").is_none());
     let plain = hydrograd(&[&asked[..], &["--estimate"]].concat());
-    assert!(text(&plain.stdout).contains("estimated error 3.1e-2"));
+    assert!(text(&plain.stdout).contains("estimated error 1.0e-3"));
     let floor = scene("falling_ball");
     let alone = ["added-mass", &floor, "--fidelity", "isolated", "--estimate"];
     let report = json(&[&alone[..], &["--faces", "320"]].concat());

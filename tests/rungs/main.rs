@@ -77,7 +77,6 @@ const THROUGH: &[(&str, &str)] = &[
     ("coupling::full::cpu::CoupledSolution::gradient", FULL_VJP),
     ("coupling::panel::first::PlacedPanels::gradient", FULL_VJP),
     ("coupling::panel::placed::PanelSolution::gradient", FULL_VJP),
-    ("coupling::response::CoupledResponse::gradient", FULL_VJP),
     (
         "adjoint::kernel::panel::Multipoles::gradient",
         "adjoint::kernel::single::single_vjp",

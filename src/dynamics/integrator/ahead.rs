@@ -67,6 +67,10 @@ impl Way<'_> {
             let (poses, twists) = self.at(time);
             let closing = ROOM * shapes.closing(k, &poses, &twists);
             let reach = near + closing * (horizon - time);
+            // Of speeds out of range nothing is foreseen: the stage refuses them.
+            if !reach.is_finite() {
+                return Ok(None);
+            }
             let mut points = shapes.points_within(k, &poses, reach)?;
             points.retain(|p| p.weight >= FULL);
             let gap = points.iter().map(|p| p.gap).fold(f64::INFINITY, f64::min);

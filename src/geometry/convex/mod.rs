@@ -206,12 +206,6 @@ impl Solid {
             self.offset.apply(&(lowest + self.form.radius() * down)),
         )
     }
-
-    /// Signed distance of a point, frame of the body, m.
-    pub(super) fn distance(&self, point: &Vec3) -> f64 {
-        let y = self.offset.apply_inverse(point);
-        self.form.field(&y).distance - self.form.radius()
-    }
 }
 
 /// The unit vector from the second of two ellipsoids or discs to the first where they are nearest, world frame; none if

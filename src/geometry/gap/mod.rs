@@ -255,7 +255,7 @@ impl Gaps {
         })
     }
 
-    /// Distances of a point (world frame) from every surface, one pose per mesh, and then from every wall. A pose that is missing or
+    /// Distances of a point (world frame) from every surface's mesh, around which flows are made, one pose per mesh, and then from every wall. A pose that is missing or
     /// isn't finite is passed over.
     pub fn distances<'a>(
         &'a self,
@@ -265,11 +265,9 @@ impl Gaps {
         let placed = self.trees.iter().zip(poses).enumerate();
         let bodies = placed.filter_map(|(body, (tree, pose))| {
             let tree = tree.as_ref()?;
-            let there = pose.apply_inverse(point);
-            let (meshed, face) = tree.signed(&there)?;
-            let exact = self.solids[body].as_ref().map(|s| s.distance(&there));
+            let (distance, face) = tree.signed(&pose.apply_inverse(point))?;
             Some(Distance {
-                distance: exact.unwrap_or(meshed),
+                distance,
                 from: Other::Body(body),
                 edge: tree.edge_at_face(face),
             })

@@ -192,11 +192,11 @@ fn a_mesh_keeps_both_meshes() {
             .to_string()
             .contains("gaps: shapes by formula")
     );
-    // A point's distance is that of the formula.
+    // A point's distance is that of the mesh, which lies inside.
     let x = Vec3::new(1.9, 0.3, 0.2);
     let exact = (x - poses[0].translation).norm() - 0.5;
     let found = mixed.distances(&x, &poses).next().unwrap().distance;
-    assert!((found - exact).abs() < 1e-15);
+    assert!(found >= exact && found < exact + 0.05, "{found} {exact}");
 }
 
 #[test]

@@ -8,7 +8,7 @@
 mod common;
 
 use common::reference::reference;
-use common::support::scaled_error;
+use common::support::felt_error;
 use common::{Effort, added_mass, arguments, step_times};
 use hydrograd::scene::{Placement, Shape};
 use hydrograd::{Body, Fidelity, Fluid, Joint, Scene, Settings, Simulator};
@@ -104,7 +104,7 @@ impl Measured {
         let times = step_times(&simulator, effort)?;
         Ok(Self {
             unknowns: simulator.unknowns(),
-            error: scaled_error(&added_mass(&simulator)?, right),
+            error: felt_error(&added_mass(&simulator)?, right),
             times: [times.forward, times.gradient],
         })
     }

@@ -1,7 +1,7 @@
 //! Coupled panels on two meshes, extrapolated: what the errors of added mass are measured against.
 
 use super::added_mass;
-use super::support::scaled_error;
+use super::support::felt_error;
 use hydrograd::scene::Scene;
 use hydrograd::simulate::Method;
 use hydrograd::{Fidelity, Settings, Shape, Simulator};
@@ -28,7 +28,7 @@ pub fn reference(scene: &Scene, meshes: [f64; 2], order: f64) -> hydrograd::Resu
     let gain = (faces as f64 / fewer as f64).powf(order / 2.0) - 1.0;
     let matrix = &fine + (&fine - coarse) / gain;
     Ok(Reference {
-        rest: scaled_error(&fine, &matrix),
+        rest: felt_error(&fine, &matrix),
         matrix,
         faces,
     })

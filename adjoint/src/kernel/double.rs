@@ -1,5 +1,5 @@
 //! Flux of a point source through flat triangles, as their double layer: [`flux`](mod@super::flux) near a triangle, two terms of
-//! its multipole series far from it, blended smoothly ([`panel`](super::panel)).
+//! its multipole series far from it, blended smoothly (`kernel::panel`).
 //!
 //! Where all is near, `flux` is the cheaper one: its sums go over edges, each of which serves two triangles.
 

@@ -11,7 +11,7 @@
 //!
 //! The derivatives of the logarithms and of the solid angle Ω ([`flux`](mod@super::flux)) cancel in the gradient.
 //!
-//! Far from a triangle the sums take two terms of its multipole series, blended smoothly ([`panel`](super::panel)).
+//! Far from a triangle the sums take two terms of its multipole series, blended smoothly (`kernel::panel`).
 //!
 //! A point in the plane of a triangle and within it has the mean of the values on both sides; on an edge nothing is finite but
 //! the value.

@@ -1,18 +1,26 @@
-//! Compliant contact with friction at one point: a convex potential of the relative velocity.
+//! Compliant contact with friction at one point: a convex potential of the relative velocity and spin.
 //!
-//! With the outward normal n (from the second body to the first), the relative velocity u at the point, its parts
-//! v_n = n·u and v_t = u − n v_n, friction μ regularised over the speed v_s, and the horizon τ over which the gap is foreseen:
+//! With the outward normal n (from the second body to the first), the relative velocity u at the point and the relative angular
+//! velocity ω, their parts v_n = n·u and v_t = u − n v_n, ω_n = n·ω and ω_t = ω − n ω_n, friction μ regularised over the speed v_s,
+//! torsional and rolling friction μ_t and μ_r (lengths) regularised over the angular speed ω_s, and the horizon τ over which the
+//! gap is foreseen:
 //!
 //! ```text
-//! σ = √(|v_t|² + v_s²)                    z = v_n − μ (σ − v_s)
+//! σ = √(|v_t|² + v_s²)      σ_t = √(ω_n² + ω_s²)      σ_r = √(|ω_t|² + ω_s²)
+//! S = μ (σ − v_s) + μ_t (σ_t − ω_s) + μ_r (σ_r − ω_s)
+//! z = v_n − S + r − s(r − S)
 //! N = weight · k · s(g₀ − φ − τ z) · s_d(1 − d z)
-//! F = N (n − μ v_t/σ)   on the first body, −F on the second
+//! F = N ∂z/∂u = N (n − μ v_t/σ)       T = N ∂z/∂ω = −N (μ_t n ω_n/σ_t + μ_r ω_t/σ_r)       on the first body, −F and −T on the second
 //! ```
 //!
 //! s is the positive part, smoothed over ± the width: zero below −width, so that nothing acts at a distance beyond it. N falls as
-//! z grows, so F = −∂P(z)/∂u of a potential P that is convex in u, and an implicit step in the end-of-step velocity is a convex
-//! problem. |F_t| ≤ μ N at any speed. As in other convex models of friction, sliding acts as an approach: at the sliding
-//! speed v the surfaces ride τ μ v apart.
+//! z grows, and z is concave in u and ω, so F and T are the slopes −∂P(z) of a potential P that is convex in both, and an implicit
+//! step in the end-of-step velocity is a convex problem. |F_t| ≤ μ N, |T_n| ≤ μ_t N and |T_t| ≤ μ_r N at any speed.
+//!
+//! By S alone sliding would act as an approach, and surfaces that slide at v would ride τ μ v apart. What slides on is known
+//! beforehand: r is a constant of the step, the S of the velocity before contact less what stopping the approach there may
+//! cost ([`SPENT`], [`HARD`]), where that is positive. What comes to less slip than r after all has no more than that taken off (s of r − S, by
+//! which F_t and T fade there), so that a gap is never foreseen to open by slipping less.
 //!
 //! # References
 //! A. Castro et al., "An Unconstrained Convex Formulation of Compliant Contact", 2022, and "A Theory of Irrotational Contact
@@ -29,14 +37,29 @@ pub struct Law {
     pub dissipation: f64,
     /// μ.
     pub friction: f64,
+    /// μ_t, m: torque against spinning about the normal, per normal force.
+    pub torsional_friction: f64,
+    /// μ_r, m: torque against rolling, about axes across the normal, per normal force.
+    pub rolling_friction: f64,
     /// v_s, m/s: friction holds with creep below about this speed.
     pub stiction_speed: f64,
+    /// ω_s, rad/s: the same of torsional and rolling friction.
+    pub stiction_spin: f64,
     /// g₀, m: the gap at which the surfaces are taken to touch.
     pub gap: f64,
     /// Half the width over which the force sets in, m.
     pub width: f64,
     /// τ, s: how far ahead the gap is foreseen.
     pub horizon: f64,
+}
+
+/// How the first body moves against the second at a point.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct Rates {
+    /// u, m/s: velocity of the first body there less the second's.
+    pub velocity: Vec3,
+    /// ω, rad/s: angular velocity of the first body less the second's.
+    pub spin: Vec3,
 }
 
 /// State of a contact point.
@@ -48,8 +71,19 @@ pub struct PointState {
     pub weight: f64,
     /// n, unit, from the second body to the first.
     pub normal: Vec3,
-    /// u, m/s: velocity of the first body there less the second's.
-    pub velocity: Vec3,
+    /// Motion at which the force is asked for.
+    pub rates: Rates,
+    /// Motion with which the step would end without contact.
+    pub before: Rates,
+}
+
+/// What a contact does to the first body.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct Push {
+    /// F, N, at the point.
+    pub force: Vec3,
+    /// T, N m.
+    pub torque: Vec3,
 }
 
 /// Cotangents of a contact's arguments.
@@ -61,18 +95,29 @@ pub struct ContactBar {
     pub weight: f64,
     /// Of the normal, free in all three directions.
     pub normal: Vec3,
-    /// Of the relative velocity.
-    pub velocity: Vec3,
+    /// Of the relative motion.
+    pub rates: Rates,
+    /// Of the motion before contact.
+    pub before: Rates,
     /// Of the stiffness.
     pub stiffness: f64,
     /// Of the dissipation.
     pub dissipation: f64,
     /// Of the friction coefficient.
     pub friction: f64,
+    /// Of torsional friction.
+    pub torsional_friction: f64,
+    /// Of rolling friction.
+    pub rolling_friction: f64,
 }
 
 /// Width of the smoothed positive part of 1 − d z.
 const DAMPED: f64 = 0.1;
+/// How much of S, over μ² times the approach before contact, a step may cost in which contact stops the approach: at most the
+/// inverse mass at a point across the normal over that along it, 3.5 for a ball.
+pub const SPENT: f64 = 4.0;
+/// The same over μ times what of the approach is faster than the gap at which surfaces touch a step: in an impact nothing lasts.
+pub const HARD: f64 = 20.0;
 
 /// Positive part of `x`, smoothed over ± `width`, with its derivative: once continuously differentiable.
 pub fn positive(x: f64, width: f64) -> (f64, f64) {
@@ -86,35 +131,163 @@ pub fn positive(x: f64, width: f64) -> (f64, f64) {
     }
 }
 
-/// What value and derivatives share.
-struct Parts {
+/// Second derivative of [`positive`].
+fn positive_bend(x: f64, width: f64) -> f64 {
+    match x.abs() < width {
+        true => 0.5 / width,
+        false => 0.0,
+    }
+}
+
+/// Motion at a point in its parts, and what of it rubs.
+struct Slip {
+    /// v_n.
+    normal_speed: f64,
+    /// v_t.
     tangential: Vec3,
     /// σ.
     speed: f64,
+    /// ω_n.
+    twist: f64,
+    /// σ_t.
+    twist_speed: f64,
+    /// ω_t.
+    roll: Vec3,
+    /// σ_r.
+    roll_speed: f64,
+    /// S.
+    total: f64,
+}
+
+/// Cotangents of a [`Slip`].
+#[derive(Default)]
+struct SlipBar {
+    normal_speed: f64,
+    tangential: Vec3,
+    twist: f64,
+    roll: Vec3,
+    total: f64,
+}
+
+/// (I − a aᵀ)/s for a = x/s: the derivative of x/√(|x|² + s₀²).
+fn turning(x: &Vec3, speed: f64) -> Mat3 {
+    let along = x / speed;
+    (Mat3::identity() - along * along.transpose()) / speed
+}
+
+impl Slip {
+    fn new(law: &Law, normal: &Vec3, rates: &Rates) -> Self {
+        let normal_speed = normal.dot(&rates.velocity);
+        let tangential = rates.velocity - normal * normal_speed;
+        let speed = tangential.norm_squared() + law.stiction_speed * law.stiction_speed;
+        let speed = speed.sqrt();
+        let twist = normal.dot(&rates.spin);
+        let roll = rates.spin - normal * twist;
+        let still = law.stiction_spin;
+        let twist_speed = (twist * twist + still * still).sqrt();
+        let roll_speed = (roll.norm_squared() + still * still).sqrt();
+        Self {
+            total: law.friction * (speed - law.stiction_speed)
+                + law.torsional_friction * (twist_speed - still)
+                + law.rolling_friction * (roll_speed - still),
+            normal_speed,
+            tangential,
+            speed,
+            twist,
+            twist_speed,
+            roll,
+            roll_speed,
+        }
+    }
+
+    /// Transpose of [`Slip::new`]: adds to `out` what belongs to the normal and the law, and gives the cotangent of the motion.
+    fn vjp(
+        &self,
+        law: &Law,
+        (normal, rates): (&Vec3, &Rates),
+        bar: &SlipBar,
+        out: &mut ContactBar,
+    ) -> Rates {
+        let total = bar.total;
+        let t_bar = bar.tangential + self.tangential * (law.friction * total / self.speed);
+        let twist = law.torsional_friction * total / self.twist_speed;
+        let twist_bar = bar.twist + self.twist * twist;
+        let roll = law.rolling_friction * total / self.roll_speed;
+        let roll_bar = bar.roll + self.roll * roll;
+        out.friction += total * (self.speed - law.stiction_speed);
+        out.torsional_friction += total * (self.twist_speed - law.stiction_spin);
+        out.rolling_friction += total * (self.roll_speed - law.stiction_spin);
+        // v_n = n·u, v_t = u − n v_n; the spin alike.
+        let along = bar.normal_speed - normal.dot(&t_bar);
+        let about = twist_bar - normal.dot(&roll_bar);
+        out.normal += rates.velocity * along - t_bar * self.normal_speed + rates.spin * about
+            - roll_bar * self.twist;
+        Rates {
+            velocity: t_bar + normal * along,
+            spin: roll_bar + normal * about,
+        }
+    }
+}
+
+/// What value and derivatives share.
+struct Parts {
+    slip: Slip,
+    /// That of the motion before contact.
+    first: Slip,
+    /// The approach before contact, and its derivative along −v_n.
+    closing: (f64, f64),
+    /// What of that is faster than a gap g₀ a step, and its derivative.
+    hit: (f64, f64),
+    /// r and its derivative.
+    lasting: (f64, f64),
+    /// Part of a change of S that z feels, and its derivative along S.
+    felt: (f64, f64),
     /// z.
     approach: f64,
     /// s and its derivative.
     depth: (f64, f64),
     /// s_d and its derivative.
     damping: (f64, f64),
-    /// n − μ v_t/σ.
-    direction: Vec3,
+    /// ∂S/∂u = μ v_t/σ and ∂S/∂ω.
+    rubs: Push,
+    /// ∂z/∂u and ∂z/∂ω.
+    direction: Push,
 }
 
 impl Parts {
     fn new(law: &Law, m: &PointState) -> Self {
-        let normal_speed = m.normal.dot(&m.velocity);
-        let tangential = m.velocity - m.normal * normal_speed;
-        let speed = tangential.norm_squared() + law.stiction_speed * law.stiction_speed;
-        let speed = speed.sqrt();
-        let approach = normal_speed - law.friction * (speed - law.stiction_speed);
+        let slip = Slip::new(law, &m.normal, &m.rates);
+        let first = Slip::new(law, &m.normal, &m.before);
+        let still = law.stiction_speed;
+        let closing = positive(-first.normal_speed, still);
+        let hit = positive(closing.0 - law.gap / law.horizon, still);
+        let cost = law.friction * (SPENT * law.friction * closing.0 + HARD * hit.0);
+        let lasting = positive(first.total - cost - still, still);
+        let less = lasting.0 - slip.total - still;
+        let spared = positive(less, still);
+        let felt = (1.0 - spared.1, positive_bend(less, still));
+        let approach = slip.normal_speed - slip.total + lasting.0 - spared.0;
+        let about = m.normal * (law.torsional_friction * slip.twist / slip.twist_speed);
+        let across = slip.roll * (law.rolling_friction / slip.roll_speed);
+        let rubs = Push {
+            force: slip.tangential * (law.friction / slip.speed),
+            torque: about + across,
+        };
         Self {
-            tangential,
-            speed,
             approach,
             depth: positive(law.gap - m.gap - law.horizon * approach, law.width),
             damping: positive(1.0 - law.dissipation * approach, DAMPED),
-            direction: m.normal - tangential * (law.friction / speed),
+            direction: Push {
+                force: m.normal - rubs.force * felt.0,
+                torque: -rubs.torque * felt.0,
+            },
+            rubs,
+            felt,
+            slip,
+            first,
+            closing,
+            hit,
+            lasting,
         }
     }
 
@@ -130,84 +303,128 @@ impl Parts {
                 + law.dissipation * self.depth.0 * self.damping.1)
     }
 
-    /// ∂(v_t/σ)/∂v_t within the tangent plane, all three directions.
-    fn direction_slope(&self) -> Mat3 {
-        let along = self.tangential / self.speed;
-        (Mat3::identity() - along * along.transpose()) / self.speed
+    /// ∂(ω_n/σ_t)/∂ω_n.
+    fn twist_slope(&self, law: &Law) -> f64 {
+        law.stiction_spin * law.stiction_spin / self.slip.twist_speed.powi(3)
     }
 }
 
-/// F on the first body, N.
-pub fn contact_force(law: &Law, m: &PointState) -> Vec3 {
+/// F and T on the first body.
+pub fn contact_force(law: &Law, m: &PointState) -> Push {
     let p = Parts::new(law, m);
-    p.direction * (m.weight * p.normal_force(law))
+    let force = m.weight * p.normal_force(law);
+    Push {
+        force: p.direction.force * force,
+        torque: p.direction.torque * force,
+    }
 }
 
-/// ∂F/∂u: symmetric and negative semi-definite, −∂²P/∂u².
-pub fn contact_damping(law: &Law, m: &PointState) -> Mat3 {
+/// Tangent of [`contact_force`] along a change of the motion: −∂²P times it, symmetric and negative semi-definite.
+pub fn contact_force_jvp(law: &Law, m: &PointState, along: &Rates) -> Push {
     let p = Parts::new(law, m);
-    let plane = Mat3::identity() - m.normal * m.normal.transpose();
-    let e = &p.direction;
-    let along = p.slope(law) * e * e.transpose();
-    let across = p.normal_force(law) * law.friction * (plane * p.direction_slope() * plane);
-    m.weight * (along - across)
-}
-
-/// Tangent of [`contact_force`] along a change of the velocity.
-pub fn contact_force_jvp(law: &Law, m: &PointState, velocity: &Vec3) -> Vec3 {
-    contact_damping(law, m) * velocity
+    let (n, e) = (&m.normal, &p.direction);
+    let across = |x: &Vec3| x - n * n.dot(x);
+    let [slope, force] = [p.slope(law), p.normal_force(law)].map(|x| m.weight * x);
+    let normal = slope * (e.force.dot(&along.velocity) + e.torque.dot(&along.spin));
+    let slid = turning(&p.slip.tangential, p.slip.speed) * across(&along.velocity);
+    let rolled = turning(&p.slip.roll, p.slip.roll_speed) * across(&along.spin);
+    let twisted = n * (p.twist_slope(law) * n.dot(&along.spin));
+    let rubs = &p.rubs;
+    let more = rubs.force.dot(&along.velocity) + rubs.torque.dot(&along.spin);
+    let (bent, rubbed) = (force * p.felt.1 * more, force * p.felt.0);
+    Push {
+        force: e.force * normal - across(&slid) * (rubbed * law.friction) - rubs.force * bent,
+        torque: e.torque * normal
+            - twisted * (rubbed * law.torsional_friction)
+            - across(&rolled) * (rubbed * law.rolling_friction)
+            - rubs.torque * bent,
+    }
 }
 
 /// Transpose of [`contact_force`] in all its arguments.
-pub fn contact_force_vjp(law: &Law, m: &PointState, bar: &Vec3) -> ContactBar {
+pub fn contact_force_vjp(law: &Law, m: &PointState, bar: &Push) -> ContactBar {
     let p = Parts::new(law, m);
     let force = p.normal_force(law);
-    let (n, u) = (&m.normal, &m.velocity);
-    let along = p.direction.dot(bar);
-    // F = weight N e: cotangents of N, of e, and through them of z, s, s_d and v_t.
+    let slip = &p.slip;
+    let along = p.direction.force.dot(&bar.force) + p.direction.torque.dot(&bar.torque);
+    // F = weight N e: cotangents of N, of e, and through them of z, s and s_d.
     let force_bar = m.weight * along;
-    let e_bar = bar * (m.weight * force);
+    let e_bar = bar.force * (m.weight * force);
+    let spin_bar = bar.torque * (m.weight * force);
+    let felt_bar = -p.rubs.force.dot(&e_bar) - p.rubs.torque.dot(&spin_bar);
+    // Of what rubs, less the sign.
+    let (slid_bar, t_bar) = (e_bar * p.felt.0, spin_bar * p.felt.0);
     let depth_bar = force_bar * law.stiffness * p.damping.0 * p.depth.1;
     let damping_bar = force_bar * law.stiffness * p.depth.0 * p.damping.1;
     let z_bar = -law.horizon * depth_bar - law.dissipation * damping_bar;
-    let t = p.tangential;
-    let t_bar =
-        -law.friction * (p.direction_slope() * e_bar) - t * (law.friction * z_bar / p.speed);
-    // v_n = n·u, v_t = u − n v_n.
-    let normal_speed_bar = z_bar - n.dot(&t_bar);
-    ContactBar {
+    let about = slip.twist / slip.twist_speed;
+    let rolled = slip.roll / slip.roll_speed;
+    let total_bar = p.felt.1 * felt_bar - p.felt.0 * z_bar;
+    let lasting_bar = -total_bar * p.lasting.1;
+    // Of the cost: μ (SPENT μ a + HARD h(a)).
+    let (a, hit, friction) = (p.closing, p.hit, law.friction);
+    let cost_slope = friction * (SPENT * friction + HARD * hit.1);
+    let cost_of_friction = 2.0 * SPENT * friction * a.0 + HARD * hit.0;
+    let mut out = ContactBar {
         gap: -depth_bar,
         weight: along * force,
-        normal: e_bar - t_bar * n.dot(u) + u * normal_speed_bar,
-        velocity: t_bar + n * normal_speed_bar,
+        normal: e_bar - t_bar * (law.torsional_friction * about),
         stiffness: force_bar * p.depth.0 * p.damping.0,
         dissipation: -p.approach * damping_bar,
-        friction: -t.dot(&e_bar) / p.speed - z_bar * (p.speed - law.stiction_speed),
-    }
+        friction: -slip.tangential.dot(&slid_bar) / slip.speed - lasting_bar * cost_of_friction,
+        torsional_friction: -about * m.normal.dot(&t_bar),
+        rolling_friction: -rolled.dot(&t_bar),
+        ..ContactBar::default()
+    };
+    let own = SlipBar {
+        normal_speed: z_bar,
+        tangential: -law.friction * (turning(&slip.tangential, slip.speed) * slid_bar),
+        twist: -law.torsional_friction * p.twist_slope(law) * m.normal.dot(&t_bar),
+        roll: -law.rolling_friction * (turning(&slip.roll, slip.roll_speed) * t_bar),
+        total: total_bar,
+    };
+    out.rates = slip.vjp(law, (&m.normal, &m.rates), &own, &mut out);
+    let first = SlipBar {
+        normal_speed: lasting_bar * cost_slope * a.1,
+        total: lasting_bar,
+        ..SlipBar::default()
+    };
+    out.before = p.first.vjp(law, (&m.normal, &m.before), &first, &mut out);
+    out
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::lie::Mat6;
 
     fn law() -> Law {
         Law {
             stiffness: 2e4,
             dissipation: 0.7,
             friction: 0.65,
+            torsional_friction: 0.03,
+            rolling_friction: 0.02,
             stiction_speed: 1e-3,
+            stiction_spin: 0.02,
             gap: 2e-3,
             width: 1e-4,
             horizon: 0.01,
         }
     }
 
+    /// With a spin that goes with the velocity, and a motion before contact.
     fn point_state(gap: f64, velocity: Vec3) -> PointState {
+        let spin = Vec3::new(3.0 * velocity.y, -velocity.z, 2.0 * velocity.x);
         PointState {
             gap,
             weight: 1.0,
             normal: Vec3::new(0.36, -0.48, 0.8),
-            velocity,
+            rates: Rates { velocity, spin },
+            before: Rates {
+                velocity: 1.3 * velocity,
+                spin,
+            },
         }
     }
 
@@ -219,17 +436,22 @@ mod tests {
             let x = f64::from(k);
             let velocity = Vec3::new((7.1 * x).sin(), (3.3 * x).cos(), (1.7 * x).sin());
             let m = point_state(law.gap + 0.01 * (0.37 * x).sin(), velocity);
-            let f = contact_force(&law, &m);
+            let Push { force: f, torque } = contact_force(&law, &m);
             let normal = f.dot(&m.normal);
             let tangential = f - m.normal * normal;
             assert!(normal >= 0.0 && tangential.norm() <= law.friction * normal * (1.0 + 1e-12));
-            assert!(tangential.dot(&m.velocity) <= 0.0);
+            assert!(tangential.dot(&m.rates.velocity) <= 0.0);
+            let about = torque.dot(&m.normal);
+            let across = (torque - m.normal * about).norm();
+            assert!(about.abs() <= law.torsional_friction * normal * (1.0 + 1e-12));
+            assert!(across <= law.rolling_friction * normal * (1.0 + 1e-12));
+            assert!(torque.dot(&m.rates.spin) <= 0.0);
             let known = Parts::new(&law, &m).normal_force(&law);
             assert!((normal - known).abs() <= 1e-12 * normal);
             let foreseen = law.gap - m.gap - law.horizon * Parts::new(&law, &m).approach;
             assert_eq!(
                 normal > 0.0,
-                foreseen > -law.width && m.velocity.norm() < 1e3 && {
+                foreseen > -law.width && m.rates.velocity.norm() < 1e3 && {
                     1.0 - law.dissipation * Parts::new(&law, &m).approach > -DAMPED
                 }
             );
@@ -242,7 +464,20 @@ mod tests {
         for k in 0..200 {
             let x = f64::from(k);
             let velocity = 1e-3 * Vec3::new((7.1 * x).sin(), (3.3 * x).cos(), (1.7 * x).sin());
-            let d = contact_damping(&law, &point_state(1.99e-3, velocity));
+            let m = point_state(1.99e-3, velocity);
+            let d = Mat6::from_fn(|i, j| {
+                let unit = |k: usize| f64::from(k == j);
+                let along = Rates {
+                    velocity: Vec3::new(unit(0), unit(1), unit(2)),
+                    spin: Vec3::new(unit(3), unit(4), unit(5)),
+                };
+                let push = contact_force_jvp(&law, &m, &along);
+                if i < 3 {
+                    push.force[i]
+                } else {
+                    push.torque[i - 3]
+                }
+            });
             assert!((d - d.transpose()).norm() <= 1e-12 * d.norm());
             assert!(d.symmetric_eigenvalues().max() <= 1e-12 * d.norm());
         }
@@ -254,22 +489,31 @@ mod tests {
         let law = law();
         for gap in [law.gap, law.gap + law.width, law.gap - law.width, 0.0] {
             let m = point_state(gap, Vec3::zeros());
-            let bar = contact_force_vjp(&law, &m, &Vec3::new(1.0, 2.0, 3.0));
+            let bar = Push {
+                force: Vec3::new(1.0, 2.0, 3.0),
+                torque: Vec3::new(3.0, 1.0, 2.0),
+            };
+            let bar = contact_force_vjp(&law, &m, &bar);
             let all = [
                 bar.gap,
                 bar.weight,
                 bar.stiffness,
                 bar.dissipation,
                 bar.friction,
+                bar.torsional_friction,
+                bar.rolling_friction,
             ];
             assert!(all.iter().all(|x| x.is_finite()));
             assert!(
                 bar.normal
                     .iter()
-                    .chain(bar.velocity.iter())
+                    .chain(bar.rates.velocity.iter())
+                    .chain(bar.rates.spin.iter())
+                    .chain(bar.before.velocity.iter())
                     .all(|x| x.is_finite())
             );
-            assert!(contact_force(&law, &m).iter().all(|x| x.is_finite()));
+            let push = contact_force(&law, &m);
+            assert!(push.force.iter().chain(&push.torque).all(|x| x.is_finite()));
         }
     }
 }

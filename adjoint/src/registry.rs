@@ -1,7 +1,9 @@
 //! Every derivative rung of this crate with its check.
 
 use crate::check::{Outcome, Rung, dot, outcome};
-use crate::contact::{Law, PointState, contact_force, contact_force_jvp, contact_force_vjp};
+use crate::contact::{
+    Law, PointState, Push, Rates, contact_force, contact_force_jvp, contact_force_vjp,
+};
 use crate::drag::{Element, Part, quadratic_drag, quadratic_drag_jvp, quadratic_drag_vjp};
 use crate::draw::numbers;
 use crate::lie::{Mat6, Vec3, Vec6, exp_jacobian_inverse, exp_jacobian_inverse_vjp};
@@ -206,12 +208,47 @@ const CONTACTS: [[f64; 11]; 4] = [
     [-0.08, 0.5, 0.0, 0.6, 0.8, 0.1, 0.9, 2.2, 3e3, 0.5, 0.2],
 ];
 
+/// How the body turns, moves and turns before contact, and torsional and rolling friction: of each of [`CONTACTS`].
+const TURNING: [[f64; 11]; 5] = [
+    [0.3, -0.7, 0.4, 1.5, -0.3, 0.2, 0.2, 0.9, -0.5, 0.03, 0.05],
+    [
+        -0.02, 0.01, 0.03, 0.6, 0.9, -0.4, -0.1, 0.05, 0.2, 0.1, 0.02,
+    ],
+    [0.0, 0.0, 0.0, 2.0, -1.5, -0.1, 0.0, 0.0, 0.0, 0.04, 0.01],
+    [0.1, 0.2, -0.1, 0.42, 0.31, 0.1, 0.3, 0.1, -0.1, 0.02, 0.03],
+    // Before the first of those it closes by about its gap a step, and slides fast.
+    [
+        0.3, -0.7, 0.4, 3.717, 4.303, -1.616, 0.0, 0.0, 0.0, 0.03, 0.05,
+    ],
+];
+
+/// Numbers of a contact: those of [`CONTACTS`], then of [`TURNING`].
+const NUMBERS: usize = 22;
+
+fn contacts() -> Vec<[f64; NUMBERS]> {
+    let joined = |(x, y): ([f64; 11], [f64; 11])| {
+        std::array::from_fn(|i| if i < 11 { x[i] } else { y[i - 11] })
+    };
+    let each = CONTACTS
+        .into_iter()
+        .flat_map(|x| TURNING.map(|y| (x, y)))
+        .map(joined);
+    each.collect()
+}
+
+fn three(x: &[f64]) -> Vec3 {
+    Vec3::from_column_slice(&x[..3])
+}
+
 fn contact(x: &[f64]) -> (Law, PointState) {
     let law = Law {
         stiffness: x[8],
         dissipation: x[9],
         friction: x[10],
+        torsional_friction: x[20],
+        rolling_friction: x[21],
         stiction_speed: 0.05,
+        stiction_spin: 0.2,
         gap: 0.02,
         width: 5e-3,
         horizon: 0.01,
@@ -219,62 +256,84 @@ fn contact(x: &[f64]) -> (Law, PointState) {
     let point_state = PointState {
         gap: x[0],
         weight: x[1],
-        normal: Vec3::new(x[2], x[3], x[4]),
-        velocity: Vec3::new(x[5], x[6], x[7]),
+        normal: three(&x[2..]),
+        rates: Rates {
+            velocity: three(&x[5..]),
+            spin: three(&x[11..]),
+        },
+        before: Rates {
+            velocity: three(&x[14..]),
+            spin: three(&x[17..]),
+        },
     };
     (law, point_state)
 }
 
+fn pushed(push: &Push) -> Vec<f64> {
+    push.force.iter().chain(&push.torque).copied().collect()
+}
+
 fn contact_force_jvp_check(corruption: f64) -> Outcome {
-    all(CONTACTS.into_iter().flat_map(|x| {
+    all(contacts().into_iter().flat_map(|x| {
         let (law, point_state) = contact(&x);
-        let at = point_state.velocity;
+        let at = point_state.rates;
         let value = |u: &[f64]| {
-            let point_state = PointState {
-                velocity: Vec3::from_column_slice(u),
-                ..point_state
+            let rates = Rates {
+                velocity: three(u),
+                spin: three(&u[3..]),
             };
-            contact_force(&law, &point_state).as_slice().to_vec()
+            pushed(&contact_force(
+                &law,
+                &PointState {
+                    rates,
+                    ..point_state
+                },
+            ))
         };
-        let along = |du: [f64; 3]| {
-            let jvp = corruption * contact_force_jvp(&law, &point_state, &Vec3::from(du));
-            outcome(value, &[at.x, at.y, at.z], &du, jvp.as_slice(), TOLERANCE)
+        let along = |d: [f64; 6]| {
+            let rates = Rates {
+                velocity: three(&d),
+                spin: three(&d[3..]),
+            };
+            let jvp = pushed(&contact_force_jvp(&law, &point_state, &rates));
+            let jvp: Vec<f64> = jvp.iter().map(|x| corruption * x).collect();
+            let (u, w) = (at.velocity, at.spin);
+            let start = [u.x, u.y, u.z, w.x, w.y, w.z];
+            outcome(value, &start, &d, &jvp, TOLERANCE)
         };
-        (70..75)
+        (70..78)
             .map(|seed| along(array(seed, 0.01)))
             .collect::<Vec<_>>()
     }))
 }
 
 fn contact_force_vjp_check(corruption: f64) -> Outcome {
-    all(CONTACTS.map(|x| {
+    all(contacts().into_iter().map(|x| {
         let (law, point_state) = contact(&x);
         // In units of each argument's own size.
-        let size = [0.01, 0.1, 0.1, 0.1, 0.1, 0.01, 0.01, 0.01, 1e3, 0.1, 0.1];
+        let mut size = [0.01; NUMBERS];
+        size[1..5].fill(0.1);
+        size[8..11].copy_from_slice(&[1e3, 0.1, 0.1]);
         let value = |y: &[f64]| {
-            let row: [f64; 11] = std::array::from_fn(|i| x[i] + size[i] * y[i]);
+            let row: [f64; NUMBERS] = std::array::from_fn(|i| x[i] + size[i] * y[i]);
             let (law, point_state) = contact(&row);
-            contact_force(&law, &point_state).as_slice().to_vec()
+            pushed(&contact_force(&law, &point_state))
         };
         let bars = |bar: &[f64]| {
-            let b = contact_force_vjp(&law, &point_state, &Vec3::from_column_slice(bar));
-            let (n, u) = (b.normal, b.velocity);
-            let bars = [
-                b.gap,
-                b.weight,
-                n.x,
-                n.y,
-                n.z,
-                u.x,
-                u.y,
-                u.z,
-                b.stiffness,
-                b.dissipation,
-                b.friction,
-            ];
+            let bar = Push {
+                force: three(bar),
+                torque: three(&bar[3..]),
+            };
+            let b = contact_force_vjp(&law, &point_state, &bar);
+            let mut bars = vec![b.gap, b.weight];
+            bars.extend(b.normal.iter().chain(&b.rates.velocity));
+            bars.extend([b.stiffness, b.dissipation, b.friction]);
+            bars.extend(b.rates.spin.iter().chain(&b.before.velocity));
+            bars.extend(&b.before.spin);
+            bars.extend([b.torsional_friction, b.rolling_friction]);
             bars.iter().zip(size).map(|(b, size)| b * size).collect()
         };
-        transposed::<11>(value, &[0.0; 11], bars, corruption)
+        transposed::<NUMBERS>(value, &[0.0; NUMBERS], bars, corruption)
     }))
 }
 

@@ -52,6 +52,8 @@ class Contact:
         stiffness: float | None = None,
         dissipation: float = 0.5,
         friction: float = 0.5,
+        torsional_friction: float = 0.0,
+        rolling_friction: float = 0.0,
         gap: float | None = None,
         width: float | None = None,
         stiction_speed: float = 1e-3,
@@ -137,6 +139,9 @@ class Body:
         refine: Sequence[tuple[ArrayLike, float, float]] = ...,
         added_mass: ArrayLike | None = None,
         overlaps_parent: bool = False,
+        collision: Sequence[
+            Shape | tuple[Shape, ArrayLike] | tuple[Shape, ArrayLike, ArrayLike]
+        ] = (),
     ) -> Body: ...
     @property
     def name(self) -> str: ...

@@ -4,7 +4,7 @@ use crate::array::{self, Dim, fixed, or_zeros, row};
 use crate::error::input;
 use crate::joint::{Joint, Motion};
 use crate::shape::Shape;
-use hydrograd::scene::{self, DragPart, Placement, Refinement};
+use hydrograd::scene::{self, CollisionPiece, DragPart, Placement, Refinement};
 use pyo3::prelude::*;
 
 /// Drag per area of a body's surface: `linear` in kg/(m² s), `quadratic` dimensionless (½ρc|w|w); the parts of the local
@@ -52,7 +52,8 @@ impl Drag {
 /// number, or the world. `actuated` makes the joint's forces controls (N, N m; a free joint has six), `thruster` a wrench on
 /// the body in world axes. `locked` holds the joint, `motion` (one per coordinate) drives it, `limits` (m or rad) stop it.
 /// `shape_position` and `shape_rotation` place the shape in the body; `refine` lists balls (center, radius, edge), m,
-/// where its faces are made smaller. `added_mass` (6, 6) replaces the body's own at unit density, with `isolated`.
+/// where its faces are made smaller. `collision` lists the convex pieces that the body is for contact instead of its shape, each
+/// a shape, (shape, position) or (shape, position, rotation) in the body's frame. `added_mass` (6, 6) replaces the body's own at unit density, with `isolated`.
 #[pyclass(frozen, eq, module = "hydrograd")]
 #[derive(Clone, PartialEq)]
 pub struct Body {
@@ -71,6 +72,33 @@ enum Parent {
 #[derive(FromPyObject)]
 struct Ball<'py>(Bound<'py, PyAny>, f64, f64);
 
+/// A convex piece for contact: its shape, and where it is.
+#[derive(FromPyObject)]
+enum Piece<'py> {
+    Turned(PyRef<'py, Shape>, Bound<'py, PyAny>, Bound<'py, PyAny>),
+    Placed(PyRef<'py, Shape>, Bound<'py, PyAny>),
+    #[pyo3(transparent)]
+    Bare(PyRef<'py, Shape>),
+}
+
+impl Piece<'_> {
+    fn made(&self, place: &str) -> PyResult<CollisionPiece> {
+        let (shape, position, rotation) = match self {
+            Self::Turned(shape, position, rotation) => (shape, Some(position), Some(rotation)),
+            Self::Placed(shape, position) => (shape, Some(position), None),
+            Self::Bare(shape) => (shape, None, None),
+        };
+        let at = Placement::new(
+            or_zeros(&format!("{place}: position"), position)?,
+            or_zeros(&format!("{place}: rotation"), rotation)?,
+        );
+        Ok(CollisionPiece {
+            shape: shape.0.clone(),
+            at,
+        })
+    }
+}
+
 #[pymethods]
 impl Body {
     #[new]
@@ -78,7 +106,7 @@ impl Body {
         shape=None, *, name=String::new(), density=None, mass=None, inertia=None, center_of_mass=None, position=None,
         rotation=None, joint=None, parent=None, actuated=false, thruster=false, locked=false, motion=None, limits=None,
         limit_stiffness=None, drag=None, shape_position=None, shape_rotation=None, refine=Vec::new(), added_mass=None,
-        overlaps_parent=false
+        overlaps_parent=false, collision=Vec::new()
     ))]
     #[expect(
         clippy::too_many_arguments,
@@ -107,6 +135,7 @@ impl Body {
         refine: Vec<Ball<'_>>,
         added_mass: Option<&Bound<'_, PyAny>>,
         overlaps_parent: bool,
+        collision: Vec<Piece<'_>>,
     ) -> PyResult<Self> {
         let at = |field: &str| {
             if name.is_empty() {
@@ -133,6 +162,8 @@ impl Body {
                 edge: *edge,
             })
         });
+        let collision = collision.iter().enumerate();
+        let collision = collision.map(|(k, piece)| piece.made(&at(&format!("collision[{k}]"))));
         let optional = |field: &str, given: Option<&Bound<'_, PyAny>>| {
             given.map(|g| fixed(&at(field), g)).transpose()
         };
@@ -148,6 +179,7 @@ impl Body {
                 or_zeros(&at("shape_rotation"), shape_rotation)?,
             ),
             refine: refine.collect::<PyResult<_>>()?,
+            collision: collision.collect::<PyResult<_>>()?,
             mass,
             density,
             center_of_mass: optional("center_of_mass", center_of_mass)?,

@@ -54,7 +54,7 @@ impl Fluid {
 }
 
 /// Contact between convex bodies and with walls: `stiffness` in N/m, `dissipation` in s/m, the coefficient of `friction`,
-/// the `gap` at which surfaces touch and half the `width` over which the force sets in, in m, and the `stiction_speed`
+/// `torsional_friction` against spinning and `rolling_friction` (torque over normal force, m), the `gap` at which surfaces touch and half the `width` over which the force sets in, in m, and the `stiction_speed`
 /// in m/s. What is None is chosen for the scene.
 #[pyclass(frozen, eq, module = "hydrograd")]
 #[derive(Clone, PartialEq)]
@@ -63,11 +63,20 @@ pub struct Contact(pub scene::Contact);
 #[pymethods]
 impl Contact {
     #[new]
-    #[pyo3(signature = (*, stiffness=None, dissipation=0.5, friction=0.5, gap=None, width=None, stiction_speed=1e-3))]
+    #[pyo3(signature = (
+        *, stiffness=None, dissipation=0.5, friction=0.5, torsional_friction=0.0, rolling_friction=0.0, gap=None, width=None,
+        stiction_speed=1e-3
+    ))]
+    #[expect(
+        clippy::too_many_arguments,
+        reason = "one per keyword of the constructor"
+    )]
     fn new(
         stiffness: Option<f64>,
         dissipation: f64,
         friction: f64,
+        torsional_friction: f64,
+        rolling_friction: f64,
         gap: Option<f64>,
         width: Option<f64>,
         stiction_speed: f64,
@@ -76,6 +85,8 @@ impl Contact {
             stiffness,
             dissipation,
             friction,
+            torsional_friction,
+            rolling_friction,
             gap,
             width,
             stiction_speed,

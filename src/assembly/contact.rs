@@ -1,7 +1,7 @@
 //! Contact of a scene: which surfaces may touch, at which gap, and how stiffly.
 
 use crate::adjoint::contact::Law;
-use crate::adjoint::lie::Pose;
+use crate::adjoint::lie::{Pose, Vec3};
 use crate::contact::{ContactPair, ContactShape, Contacts};
 use crate::dynamics::{ContactModel, Integrator, Parameters};
 use crate::geometry::Other;
@@ -18,6 +18,9 @@ const WIDTH: f64 = 0.004;
 const ROOM: f64 = 1.25;
 /// The same where the water isn't solved, of the smallest body's radius: distances are smooth outside a body only.
 const SKIN: f64 = 0.01;
+
+/// How far a piece for contact may reach out of its body's bounds, in their diagonal.
+const OUTSIDE: f64 = 0.05;
 
 /// Refuses contact with an integrator that doesn't solve it.
 pub(super) fn check_integrator(scene: &Scene, integrator: Integrator) -> Result<()> {
@@ -47,8 +50,9 @@ pub(super) fn assemble(
     let mut shapes = Vec::with_capacity(scene.bodies.len());
     for (body, surface) in scene.bodies.iter().zip(surfaces) {
         shapes.push(match (&body.shape, surface) {
-            (Some(shape), Some(surface)) => Some(contact_shape(body, shape, surface)?),
-            _ => None,
+            (Some(_), Some(surface)) if !body.collision.is_empty() => pieces(body, surface)?,
+            (Some(shape), Some(surface)) => vec![contact_shape(body, shape, surface)?],
+            _ => Vec::new(),
         });
     }
     let neighbours = |a: usize, b: usize| {
@@ -62,7 +66,7 @@ pub(super) fn assemble(
     let moving = |b: &usize| !scene.is_static(*b);
     let bodies = || (0..scene.bodies.len()).filter(moving);
     let size = bodies()
-        .filter_map(|b| shapes.shape(b).map(ContactShape::radius))
+        .filter_map(|b| shapes.radius(b))
         .reduce(f64::min)
         .unwrap_or(1.0);
     let heaviest = bodies().map(|b| parameters.mass(b)).fold(0.0, f64::max);
@@ -76,17 +80,32 @@ pub(super) fn assemble(
     }
     let width = given.width.unwrap_or(WIDTH * size);
     let gap = |pair: &ContactPair| (ROOM * resolved(water, surfaces, pair)).max(SKIN * size);
+    let spin = |pair: &ContactPair| {
+        let both = [Some(pair.first), pair.second_body()];
+        let radii = both.into_iter().flatten().filter_map(|b| shapes.radius(b));
+        let least = radii.fold(f64::INFINITY, f64::min);
+        given.stiction_speed / least
+    };
     let law = |pair: &ContactPair| Law {
         stiffness,
         dissipation: given.dissipation,
         friction: given.friction,
+        torsional_friction: given.torsional_friction,
+        rolling_friction: given.rolling_friction,
         stiction_speed: given.stiction_speed,
+        stiction_spin: spin(pair),
         gap: given.gap.unwrap_or_else(|| gap(pair)),
         width,
         horizon: dt,
     };
     let laws = shapes.pairs().iter().map(law).collect();
-    parameters.add_contact([stiffness, given.dissipation, given.friction]);
+    parameters.add_contact([
+        stiffness,
+        given.dissipation,
+        given.friction,
+        given.torsional_friction,
+        given.rolling_friction,
+    ]);
     Ok(ContactModel {
         shapes,
         laws,
@@ -104,8 +123,43 @@ fn contact_shape(body: &Body, shape: &Shape, surface: &Surface) -> Result<Contac
     made.map_err(|e| Error::Unsupported {
         what: format!("contact of body {:?}", body.name),
         why: e.to_string(),
-        instead: "give it a convex shape, or convex bodies fixed to it".into(),
+        instead: "give it a convex shape, or convex pieces for contact: `collision = [{ shape = …, at = … }, …]`"
+            .into(),
     })
+}
+
+/// The convex pieces that a body is for contact, which must lie about where its surface is.
+fn pieces(body: &Body, surface: &Surface) -> Result<Vec<ContactShape>> {
+    let vertices = surface.mesh.vertices();
+    let start = [Vec3::repeat(f64::INFINITY), Vec3::repeat(f64::NEG_INFINITY)];
+    let [low, high] = (vertices.iter()).fold(start, |[low, high], x| [low.inf(x), high.sup(x)]);
+    let room = Vec3::repeat(OUTSIDE * (high - low).norm());
+    let mut out = Vec::with_capacity(body.collision.len());
+    for (k, piece) in body.collision.iter().enumerate() {
+        let place = format!("body {:?}: collision[{k}]", body.name);
+        let made = ContactShape::of_shape(&piece.shape, pose(&piece.at), Path::new(""));
+        let made = made.map_err(|e| Error::Unsupported {
+            what: place.clone(),
+            why: e.to_string(),
+            instead: "give a convex shape, or several".into(),
+        })?;
+        let [from, to] = made.bounds();
+        let beyond = (low - room - from).sup(&(to - high - room));
+        if beyond.max() > 0.0 {
+            let range = |[a, b]: [Vec3; 2]| format!("{:?} to {:?} m", a.as_slice(), b.as_slice());
+            return Err(Error::input(
+                place,
+                format!("reaches from {}", range([from, to])),
+                format!(
+                    "must lie where the body's shape is, from {} (give or take {OUTSIDE} of the diagonal), since the water sees that one: \
+                     `at` places a piece in the body's frame",
+                    range([low, high])
+                ),
+            ));
+        }
+        out.push(made);
+    }
+    Ok(out)
 }
 
 /// The gap that the coupling resolves between a pair, m.

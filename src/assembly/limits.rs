@@ -44,8 +44,11 @@ pub(super) fn assemble(
                 stiffness,
                 dissipation: 0.0,
                 friction: 0.0,
+                torsional_friction: 0.0,
+                rolling_friction: 0.0,
                 // Without friction any speed will do.
                 stiction_speed: 1.0,
+                stiction_spin: 1.0,
                 gap: 0.0,
                 width: WIDTH * (range[1] - range[0]),
                 horizon: dt,

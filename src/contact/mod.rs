@@ -1,6 +1,6 @@
 //! Where convex bodies and walls are near one another: signed gaps with their first derivatives.
 //!
-//! A body is one of three things ([`crate::geometry::Solid`]): an *ellipsoid*, a *cylinder*, or a *core*, the convex hull of its
+//! A concave body is several convex pieces, each of which is looked at by itself. A convex body or piece is one of three things ([`crate::geometry::Solid`]): an *ellipsoid*, a *cylinder*, or a *core*, the convex hull of its
 //! corners, with a radius about it: a ball is a corner, a capsule an edge, a box a polyhedron of radius zero.
 //!
 //! - An ellipsoid and anything else: one point, that of their common normal, which

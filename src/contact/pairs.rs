@@ -3,7 +3,7 @@
 use super::point::ContactPoint;
 use super::shape::ContactShape;
 use super::{core_core, cylinder, cylinder_pair, plane, round_core, round_pair};
-use crate::adjoint::lie::{Pose, Vec6, angular, point_velocity};
+use crate::adjoint::lie::{Pose, Vec3, Vec6, angular, point_velocity};
 use crate::geometry::convex::Form;
 use crate::geometry::{HalfSpace, Other, Wall};
 use crate::{Error, Result};
@@ -30,41 +30,64 @@ impl ContactPair {
 /// Shapes of the bodies of a scene, its walls, and which of them may come in contact.
 #[derive(Clone, Debug)]
 pub struct Contacts {
-    shapes: Vec<Option<ContactShape>>,
+    /// Of each body its convex pieces; of a convex one itself.
+    shapes: Vec<Vec<ContactShape>>,
     walls: Vec<HalfSpace>,
     pairs: Vec<ContactPair>,
+    /// Of each pair the number of the first body's piece, and of the second's.
+    parts: Vec<[usize; 2]>,
 }
 
 /// Points are kept up to this part of the smaller body's radius beyond the distance asked for: what may close in a step.
 const AHEAD: f64 = 0.5;
 
 impl Contacts {
-    /// From the bodies' shapes (none for a body without surface) and the walls; pairs of which one has no surface are dropped.
+    /// From the convex pieces of each body (one of a convex body, none of a body without surface), the walls, and which bodies may
+    /// come in contact with what; each piece then may with each.
     ///
     /// # Errors
     /// A wall without a normal.
     pub fn new(
-        shapes: Vec<Option<ContactShape>>,
+        shapes: Vec<Vec<ContactShape>>,
         walls: &[Wall],
         pairs: &[ContactPair],
     ) -> Result<Self> {
-        let solid = |b: usize| shapes[b].is_some();
-        let whole = |p: &ContactPair| solid(p.first) && p.second_body().is_none_or(solid);
+        let mut all = Vec::new();
+        for pair in pairs {
+            let others = pair.second_body().map_or(1, |b| shapes[b].len());
+            let firsts = 0..shapes[pair.first].len();
+            all.extend(firsts.flat_map(|i| (0..others).map(move |j| (*pair, [i, j]))));
+        }
+        let (pairs, parts) = all.into_iter().unzip();
         Ok(Self {
-            pairs: pairs.iter().copied().filter(whole).collect(),
+            pairs,
+            parts,
             walls: Wall::half_spaces(walls)?,
             shapes,
         })
     }
 
-    /// The pairs that may come in contact.
+    /// The pairs that may come in contact: of bodies in pieces each piece by itself, and so the same bodies several times.
     pub fn pairs(&self) -> &[ContactPair] {
         &self.pairs
     }
 
-    /// Shape of body `b`, if it has one.
-    pub fn shape(&self, b: usize) -> Option<&ContactShape> {
-        self.shapes[b].as_ref()
+    /// Convex pieces of body `b`: itself, if it is convex.
+    pub fn pieces(&self, b: usize) -> &[ContactShape] {
+        &self.shapes[b]
+    }
+
+    /// Radius of body `b`, m: of the ball around it, or, of several pieces, half the diagonal of their bounds; none without surface.
+    pub fn radius(&self, b: usize) -> Option<f64> {
+        match self.pieces(b) {
+            [] => None,
+            [whole] => Some(whole.radius()),
+            pieces => {
+                let joined = |x: [Vec3; 2], y: [Vec3; 2]| [x[0].inf(&y[0]), x[1].sup(&y[1])];
+                let bounds = pieces.iter().map(ContactShape::bounds).reduce(joined);
+                bounds.map(|[low, high]| 0.5 * (high - low).norm())
+            }
+        }
     }
 
     /// Where the surfaces of pair `k` are near, the bodies being at `poses`; all places with a gap under `distance` (m) and some beyond,
@@ -142,11 +165,11 @@ impl Contacts {
 
     /// The shapes of pair `k`.
     fn solids(&self, k: usize) -> Option<(&ContactShape, Partner<'_>)> {
-        let pair = &self.pairs[k];
-        let first = self.shapes[pair.first].as_ref()?;
+        let (pair, [i, j]) = (&self.pairs[k], self.parts[k]);
+        let first = self.shapes[pair.first].get(i)?;
         let second = match pair.second {
             Other::Wall(w) => Partner::Wall(&self.walls[w]),
-            Other::Body(b) => Partner::Body(b, self.shapes[b].as_ref()?),
+            Other::Body(b) => Partner::Body(b, self.shapes[b].get(j)?),
         };
         Some((first, second))
     }

@@ -1,14 +1,14 @@
-//! The contact shape of a body.
+//! The contact shape of a body, or of a convex piece of it.
 
 use super::facets::facets;
 use crate::error::Result;
 use crate::geometry::convex::{Core, Form};
 use crate::geometry::{Ball, Solid, TriMesh};
 use crate::shape::{self, Shape};
-use hydrograd_adjoint::lie::Pose;
+use hydrograd_adjoint::lie::{Pose, Vec3};
 use std::path::Path;
 
-/// What a body is for contact: a ball, a capsule, an ellipsoid, a cylinder or a convex polyhedron, placed in
+/// What a body, or a piece of one, is for contact: a ball, a capsule, an ellipsoid, a cylinder or a convex polyhedron, placed in
 /// the body's frame.
 #[derive(Clone, Debug)]
 pub struct ContactShape {
@@ -54,6 +54,11 @@ impl ContactShape {
     /// A ball around the body, world frame, for the pose of the body.
     pub fn ball_at(&self, pose: &Pose) -> Ball {
         self.ball.transformed(pose)
+    }
+
+    /// Smallest and largest coordinates, frame of the body, m.
+    pub fn bounds(&self) -> [Vec3; 2] {
+        self.solid.bounds()
     }
 
     /// Radius of the ball around the body, m.

@@ -1,8 +1,8 @@
 //! Contact among bodies and with walls: which surfaces may touch, by which law, and where they are near.
 
 use super::Parameters;
-use crate::adjoint::contact::{ContactBar, Law, PointState, positive};
-use crate::adjoint::lie::{Vec3, Vec6, point_velocity, point_wrench, six};
+use crate::adjoint::contact::{ContactBar, Law, PointState, Rates, positive};
+use crate::adjoint::lie::{Vec3, Vec6, angular, point_velocity, point_wrench, six};
 use crate::contact::{ContactPoint, Contacts};
 use serde::Serialize;
 
@@ -11,7 +11,7 @@ use serde::Serialize;
 pub struct ContactModel {
     /// Their shapes.
     pub shapes: Contacts,
-    /// Law of each pair, in the order of [`Contacts::pairs`]; stiffness, dissipation and friction are parameters and stand there.
+    /// Law of each pair, in the order of [`Contacts::pairs`]; stiffness, dissipation and frictions are parameters and stand there.
     pub laws: Vec<Law>,
     /// Whether the stiffness is near rigid at the time step, so that it rises where a step is cut; one that was given stays what it is.
     pub rigid: bool,
@@ -44,11 +44,19 @@ pub(super) fn sharpened(law: Law, n: usize) -> Law {
 
 impl ContactModel {
     pub(super) fn law(&self, pair: usize, parameters: &Parameters) -> Law {
-        let [stiffness, dissipation, friction] = parameters.contact();
+        let [
+            stiffness,
+            dissipation,
+            friction,
+            torsional_friction,
+            rolling_friction,
+        ] = parameters.contact();
         Law {
             stiffness,
             dissipation,
             friction,
+            torsional_friction,
+            rolling_friction,
             ..self.laws[pair]
         }
     }
@@ -69,6 +77,8 @@ pub struct ContactForce {
     pub normal: [f64; 3],
     /// Force on the first body, N, world frame.
     pub force: [f64; 3],
+    /// Torque on the first body beside the force's own, N m, world frame: of torsional and rolling friction.
+    pub torque: [f64; 3],
 }
 
 impl PairContact {
@@ -89,13 +99,29 @@ impl PairContact {
         (gap + share * depth, 1.0 - share * slope)
     }
 
-    pub(super) fn point_state(&self, twists: &[Vec6]) -> PointState {
+    /// How the first body moves against the second at the point.
+    pub(super) fn rates(&self, twists: &[Vec6]) -> Rates {
+        let twist = self.relative(twists);
+        Rates {
+            velocity: point_velocity(&twist, &self.point.position),
+            spin: angular(&twist),
+        }
+    }
+
+    /// Wrench of a push at the point, and by that cotangent of a twist from one of [`PairContact::rates`].
+    pub(super) fn wrench(&self, force: &Vec3, torque: &Vec3) -> Vec6 {
+        point_wrench(&self.point.position, force) + six(&Vec3::zeros(), torque)
+    }
+
+    /// Where bodies move with these spatial twists, and would without contact with those `before`.
+    pub(super) fn point_state(&self, twists: &[Vec6], before: &[Vec6]) -> PointState {
         let p = &self.point;
         PointState {
             gap: self.eased_gap().0,
             weight: p.weight,
             normal: p.normal,
-            velocity: point_velocity(&self.relative(twists), &p.position),
+            rates: self.rates(twists),
+            before: self.rates(before),
         }
     }
 

@@ -2,33 +2,39 @@
 //! [`crate::adjoint::contact`] at every point where surfaces are near.
 //!
 //! Points, normals and gaps belong to the configuration; the velocity is the argument of the force, so that an integrator
-//! that is implicit in it solves contact implicitly, against the mass matrix with its fluid part.
+//! that is implicit in it solves contact implicitly, against the mass matrix with its fluid part. The velocity before contact is a
+//! constant of that: it says what slides on.
 
 use super::contact::sharpened;
 use super::{
     ContactForce, Dual, Evaluation, ForceCotangents, JointLimit, PairContact, Parameters, System,
 };
 use crate::Result;
-use crate::adjoint::contact::{contact_force, contact_force_jvp, contact_force_vjp};
-use crate::adjoint::lie::{Pose, Vec3, Vec6, angular, point_velocity, point_wrench};
+use crate::adjoint::contact::{Push, contact_force, contact_force_jvp, contact_force_vjp};
+use crate::adjoint::lie::{Pose, Vec6, angular, point_velocity};
 use crate::contact::ContactPoint;
 use crate::multibody::{Cotangents, Virtual};
 use nalgebra::{DMatrix, DVector};
 
-/// Contacts at places where surfaces are near, of bodies that end a step with these twists: all where something presses, or where
+/// Contacts at places where surfaces are near, of bodies that end a step with these twists, and without contact would with those
+/// `before`: all where something presses, or where
 /// surfaces are no more than `slack` (m) farther apart than the gap at which they touch.
 pub(super) fn contact_forces(
     contact_points: &[PairContact],
-    twists: &[Vec6],
+    [before, twists]: [&[Vec6]; 2],
     slack: f64,
 ) -> Vec<ContactForce> {
-    let found = contact_points.iter().map(|t| ContactForce {
-        first: t.first,
-        second: t.second,
-        gap: t.point.gap,
-        position: t.point.position.into(),
-        normal: t.point.normal.into(),
-        force: contact_force(&t.law, &t.point_state(twists)).into(),
+    let found = contact_points.iter().map(|t| {
+        let push = contact_force(&t.law, &t.point_state(twists, before));
+        ContactForce {
+            first: t.first,
+            second: t.second,
+            gap: t.point.gap,
+            position: t.point.position.into(),
+            normal: t.point.normal.into(),
+            force: push.force.into(),
+            torque: push.torque.into(),
+        }
     });
     // The law looks ahead by a step: what closes fast is pressed before it is near.
     let near = contact_points
@@ -84,15 +90,20 @@ impl System {
 
 impl Evaluation<'_> {
     /// Spatial wrenches on all bodies of forces at the places where surfaces are near.
-    fn exchanged(&self, force: impl Fn(&PairContact) -> Vec3) -> Vec<Vec6> {
+    fn exchanged(&self, push: impl Fn(&PairContact) -> Push) -> Vec<Vec6> {
         let mut out = vec![Vec6::zeros(); self.system.len()];
         for t in &self.contact_points {
-            t.exchange(&point_wrench(&t.point.position, &force(t)), &mut out);
+            let Push { force, torque } = push(t);
+            t.exchange(&t.wrench(&force, &torque), &mut out);
         }
         out
     }
 
-    /// Whether any force acts in contact at the velocity `v`; where none does, none changes with v either.
+    fn twists(&self, v: &DVector<f64>) -> Vec<Vec6> {
+        self.system.tree.twists(&self.kinematics, v)
+    }
+
+    /// Whether any force acts in contact at the velocity `v` before it; where none does, none changes with v either.
     pub(super) fn contact_acts(&self, v: &DVector<f64>) -> bool {
         if self.limit_forces(v).any(|(_, forces)| forces != [0.0; 2]) {
             return true;
@@ -100,16 +111,22 @@ impl Evaluation<'_> {
         if self.contact_points.is_empty() {
             return false;
         }
-        let twists = self.system.tree.twists(&self.kinematics, v);
-        let at = |t: &PairContact| contact_force(&t.law, &t.point_state(&twists)) != Vec3::zeros();
-        self.contact_points.iter().any(at)
+        let twists = self.twists(v);
+        let push = |t: &PairContact| contact_force(&t.law, &t.point_state(&twists, &twists));
+        let acts = |t: &PairContact| push(t) != Push::default();
+        self.contact_points.iter().any(acts)
     }
 
-    /// Generalised forces of contact at the velocity `v`.
-    pub fn contact_force(&self, v: &DVector<f64>, dual: Dual) -> DVector<f64> {
+    /// Generalised forces of contact at the velocity `v`, in a step that would end with the velocity `before` without them.
+    pub fn contact_force(
+        &self,
+        v: &DVector<f64>,
+        before: &DVector<f64>,
+        dual: Dual,
+    ) -> DVector<f64> {
         let tree = &self.system.tree;
-        let twists = tree.twists(&self.kinematics, v);
-        let wrenches = self.exchanged(|t| contact_force(&t.law, &t.point_state(&twists)));
+        let [twists, first] = [v, before].map(|v| self.twists(v));
+        let wrenches = self.exchanged(|t| contact_force(&t.law, &t.point_state(&twists, &first)));
         let columns = match dual {
             Dual::User => &self.kinematics.columns,
             Dual::Frame => &self.kinematics.frame_columns,
@@ -122,15 +139,15 @@ impl Evaluation<'_> {
     }
 
     /// Sizes of the generalised forces of contact, without what cancels among them: what their rounding is relative to.
-    pub(super) fn contact_effort(&self, v: &DVector<f64>) -> DVector<f64> {
+    pub(super) fn contact_effort(&self, v: &DVector<f64>, before: &DVector<f64>) -> DVector<f64> {
         let tree = &self.system.tree;
-        let twists = tree.twists(&self.kinematics, v);
+        let [twists, first] = [v, before].map(|v| self.twists(v));
         let mut out = DVector::zeros(v.len());
         for t in &self.contact_points {
-            let force = contact_force(&t.law, &t.point_state(&twists));
-            if force != Vec3::zeros() {
+            let push = contact_force(&t.law, &t.point_state(&twists, &first));
+            if push != Push::default() {
                 let mut wrenches = vec![Vec6::zeros(); self.system.len()];
-                t.exchange(&point_wrench(&t.point.position, &force), &mut wrenches);
+                t.exchange(&t.wrench(&push.force, &push.torque), &mut wrenches);
                 out += tree.project(&self.kinematics.columns, wrenches).abs();
             }
         }
@@ -141,14 +158,18 @@ impl Evaluation<'_> {
     }
 
     /// Tangent of [`Evaluation::contact_force`] (the user's coordinates) along `dv`.
-    pub fn contact_force_jvp(&self, v: &DVector<f64>, dv: &DVector<f64>) -> DVector<f64> {
-        let tree = &self.system.tree;
-        let twists = tree.twists(&self.kinematics, v);
-        let dtwists = tree.twists(&self.kinematics, dv);
+    pub fn contact_force_jvp(
+        &self,
+        v: &DVector<f64>,
+        before: &DVector<f64>,
+        dv: &DVector<f64>,
+    ) -> DVector<f64> {
+        let [twists, first, along] = [v, before, dv].map(|v| self.twists(v));
         let wrenches = self.exchanged(|t| {
-            let du = point_velocity(&t.relative(&dtwists), &t.point.position);
-            contact_force_jvp(&t.law, &t.point_state(&twists), &du)
+            let point_state = t.point_state(&twists, &first);
+            contact_force_jvp(&t.law, &point_state, &t.rates(&along))
         });
+        let tree = &self.system.tree;
         let mut out = tree.project(&self.kinematics.columns, wrenches);
         for l in &self.limits {
             out[l.v] += l.forces_jvp(self.q[l.q], v[l.v], dv[l.v]);
@@ -157,23 +178,25 @@ impl Evaluation<'_> {
     }
 
     /// ∂g/∂v in the user's coordinates, column by column: symmetric, negative semi-definite.
-    pub(super) fn contact_jacobian(&self, v: &DVector<f64>) -> DMatrix<f64> {
+    pub(super) fn contact_jacobian(&self, v: &DVector<f64>, before: &DVector<f64>) -> DMatrix<f64> {
         let n = v.len();
         let mut out = DMatrix::zeros(n, n);
         for k in 0..n {
             let unit = DVector::from_fn(n, |i, _| f64::from(i == k));
-            out.set_column(k, &self.contact_force_jvp(v, &unit));
+            out.set_column(k, &self.contact_force_jvp(v, before, &unit));
         }
         out
     }
 
-    /// Transpose of [`Evaluation::contact_force`]: the gradient of zᵀ g over q, v and the parameters.
+    /// Transpose of [`Evaluation::contact_force`]: the gradient of zᵀ g over q, v and the parameters, and that over the velocity before
+    /// contact.
     pub fn contact_force_vjp(
         &self,
         v: &DVector<f64>,
+        before: &DVector<f64>,
         z: &DVector<f64>,
         dual: Dual,
-    ) -> ForceCotangents {
+    ) -> (ForceCotangents, DVector<f64>) {
         let tree = &self.system.tree;
         let virtual_velocity = match dual {
             Dual::User => Virtual::User(z),
@@ -181,22 +204,46 @@ impl Evaluation<'_> {
         };
         let fields = tree.fields(&self.kinematics, &self.q, v, virtual_velocity);
         let mut bar = Cotangents::zeros(self.system.len());
+        let still = DVector::zeros(v.len());
+        let free = tree.fields(&self.kinematics, &self.q, before, Virtual::User(&still));
+        let mut free_bar = Cotangents::zeros(self.system.len());
         let mut out = ForceCotangents::zeros(self);
         for t in &self.contact_points {
             let x = &t.point.position;
-            let point_state = t.point_state(&fields.twist);
-            let (twist, virt) = (t.relative(&fields.twist), t.relative(&fields.virtual_twist));
-            let force = contact_force(&t.law, &point_state);
-            t.exchange(&point_wrench(x, &force), &mut bar.virtual_twist);
-            let mut own = contact_force_vjp(&t.law, &point_state, &point_velocity(&virt, x));
+            let point_state = t.point_state(&fields.twist, &free.twist);
+            let virt = t.relative(&fields.virtual_twist);
+            let push = contact_force(&t.law, &point_state);
+            t.exchange(&t.wrench(&push.force, &push.torque), &mut bar.virtual_twist);
+            let virtual_push = Push {
+                force: point_velocity(&virt, x),
+                torque: angular(&virt),
+            };
+            let mut own = contact_force_vjp(&t.law, &point_state, &virtual_push);
             own.gap *= t.eased_gap().1;
-            t.exchange(&point_wrench(x, &own.velocity), &mut bar.twist);
-            // Both u and the virtual velocity are taken at the point.
-            let position = own.velocity.cross(&angular(&twist)) + force.cross(&angular(&virt));
+            let (rates, first) = (own.rates, own.before);
+            t.exchange(&t.wrench(&rates.velocity, &rates.spin), &mut bar.twist);
+            t.exchange(&t.wrench(&first.velocity, &first.spin), &mut free_bar.twist);
+            // Both velocities and the virtual one are taken at the point.
+            let position = rates.velocity.cross(&point_state.rates.spin)
+                + push.force.cross(&virtual_push.torque)
+                + first.velocity.cross(&point_state.before.spin);
             t.displacement_vjp(&own, &position, &mut bar.pose);
-            let law = [t.scale * own.stiffness, own.dissipation, own.friction];
-            out.parameters.add_contact(law);
+            out.parameters.add_contact([
+                t.scale * own.stiffness,
+                own.dissipation,
+                own.friction,
+                own.torsional_friction,
+                own.rolling_friction,
+            ]);
         }
+        let (q_bar, before_bar) = tree.reverse(
+            &self.kinematics,
+            before,
+            Virtual::User(&still),
+            &free,
+            free_bar,
+        );
+        out.q += q_bar;
         let (q_bar, v_bar) = tree.reverse(&self.kinematics, v, virtual_velocity, &fields, bar);
         out.q += q_bar;
         out.v += v_bar;
@@ -206,7 +253,7 @@ impl Evaluation<'_> {
             out.q[l.v] += q_bar;
             out.v[l.v] += v_bar;
         }
-        out
+        (out, before_bar)
     }
 
     /// Each limit with the forces of its stops at the velocity `v`.

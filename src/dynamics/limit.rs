@@ -6,7 +6,7 @@
 
 use super::contact::sharpened;
 use crate::adjoint::contact::{
-    Law, PointState, contact_force, contact_force_jvp, contact_force_vjp,
+    Law, PointState, Push, Rates, contact_force, contact_force_jvp, contact_force_vjp,
 };
 use crate::adjoint::lie::Vec3;
 
@@ -23,6 +23,14 @@ pub struct JointLimit {
     pub law: Law,
     /// Whether its stiffness is near rigid at the time step, so that it rises where a step is cut; one that was given stays what it is.
     pub rigid: bool,
+}
+
+/// Motion along the normal, which is x.
+fn along(speed: f64) -> Rates {
+    Rates {
+        velocity: Vec3::x() * speed,
+        ..Rates::default()
+    }
 }
 
 impl JointLimit {
@@ -52,7 +60,9 @@ impl JointLimit {
                 gap,
                 weight: 1.0,
                 normal: Vec3::x(),
-                velocity: Vec3::x() * (sign * v),
+                rates: along(sign * v),
+                // Without friction it says nothing.
+                before: Rates::default(),
             };
             (sign, point_state)
         })
@@ -61,14 +71,13 @@ impl JointLimit {
     /// Generalised forces of the lower and the upper stop, N or N m: not negative, not positive.
     pub fn forces(&self, q: f64, v: f64) -> [f64; 2] {
         self.point_states(q, v)
-            .map(|(sign, m)| sign * contact_force(&self.law, &m).x)
+            .map(|(sign, m)| sign * contact_force(&self.law, &m).force.x)
     }
 
     /// Tangent of the sum of [`JointLimit::forces`] along `dv`.
     pub fn forces_jvp(&self, q: f64, v: f64, dv: f64) -> f64 {
-        let along = |sign: f64| Vec3::x() * (sign * dv);
         self.point_states(q, v)
-            .map(|(sign, m)| sign * contact_force_jvp(&self.law, &m, &along(sign)).x)
+            .map(|(sign, m)| sign * contact_force_jvp(&self.law, &m, &along(sign * dv)).force.x)
             .iter()
             .sum()
     }
@@ -77,9 +86,13 @@ impl JointLimit {
     pub fn forces_vjp(&self, q: f64, v: f64, bar: f64) -> [f64; 2] {
         let mut out = [0.0; 2];
         for (sign, m) in self.point_states(q, v) {
-            let own = contact_force_vjp(&self.law, &m, &(Vec3::x() * (sign * bar)));
+            let push = Push {
+                force: Vec3::x() * (sign * bar),
+                ..Push::default()
+            };
+            let own = contact_force_vjp(&self.law, &m, &push);
             out[0] += sign * own.gap;
-            out[1] += sign * own.velocity.x;
+            out[1] += sign * own.rates.velocity.x;
         }
         out
     }

@@ -127,16 +127,18 @@ fn inertia(b: usize) -> [Parameter; 6] {
 }
 
 /// Parameters of contact of so many bodies: after theirs.
-fn contact(bodies: usize) -> [Parameter; 3] {
+fn contact(bodies: usize) -> [Parameter; CONTACT.len()] {
     std::array::from_fn(|k| Parameter(mass(bodies).0 + k))
 }
 
 const FLUID: Declared = Declared::new("density", "kg/m³");
 const MASS: Declared = Declared::new("mass", "kg");
-const CONTACT: [Declared; 3] = [
+const CONTACT: [Declared; 5] = [
     Declared::new("stiffness", "N/m"),
     Declared::new("dissipation", "s/m"),
     Declared::new("friction", "1"),
+    Declared::new("torsional_friction", "m"),
+    Declared::new("rolling_friction", "m"),
 ];
 
 /// Moments, then products.
@@ -346,13 +348,14 @@ impl Parameters {
         }
     }
 
-    /// Parameters of contact: stiffness of each point (N/m), dissipation of Hunt and Crossley (s/m), friction coefficient.
-    pub fn contact(&self) -> [f64; 3] {
+    /// Parameters of contact: stiffness of each point (N/m), dissipation of Hunt and Crossley (s/m), friction coefficient, torsional
+    /// and rolling friction (m).
+    pub fn contact(&self) -> [f64; 5] {
         contact(self.table.bodies).map(|i| self[i])
     }
 
     /// Adds to the parameters of contact.
-    pub fn add_contact(&mut self, more: [f64; 3]) {
+    pub fn add_contact(&mut self, more: [f64; 5]) {
         for (i, x) in contact(self.table.bodies).into_iter().zip(more) {
             self[i] += x;
         }

@@ -12,7 +12,8 @@
 //! ```
 
 use super::{
-    Body, Drag, Fluid, Initial, Joint, Motion, Placement, Preset, Refinement, Scene, Shape, Wall,
+    Body, CollisionPiece, Drag, Fluid, Initial, Joint, Motion, Placement, Preset, Refinement,
+    Scene, Shape, Wall,
 };
 
 /// Methods that give the same with one thing set, each `name(arguments) => field = value`.
@@ -135,6 +136,14 @@ impl Body {
             radius,
             edge,
         });
+        self
+    }
+
+    /// Adds a convex piece that the body is for contact instead of its shape, at a position (m) and with a rotation vector (rad) in the
+    /// body's frame. Call it again for more pieces.
+    pub fn collision_piece(mut self, shape: Shape, position: [f64; 3], rotation: [f64; 3]) -> Self {
+        let at = Placement::new(position, rotation);
+        self.collision.push(CollisionPiece { shape, at });
         self
     }
 

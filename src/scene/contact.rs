@@ -1,6 +1,6 @@
 //! How surfaces touch.
 
-use super::Scene;
+use super::{Placement, Scene, Shape, is_default};
 use serde::{Deserialize, Serialize};
 
 /// Contact between bodies, and between bodies and walls. A scene that has it (`[contact]`, all keys of which may be left out)
@@ -15,6 +15,12 @@ pub struct Contact {
     pub dissipation: f64,
     /// Friction coefficient.
     pub friction: f64,
+    /// Torsional friction, m: the torque against spinning about the normal, per normal force. Of a patch of contact with radius a that
+    /// presses evenly it is ⅔ `friction` a. Default: 0.
+    pub torsional_friction: f64,
+    /// Rolling friction, m: the torque against rolling, about axes across the normal, per normal force: a ball of radius r that rolls on
+    /// a slope less steep than this over r comes to rest. Default: 0.
+    pub rolling_friction: f64,
     /// Gap at which surfaces are taken to touch, m. Default: a quarter more than the coupling of the water resolves, so that the
     /// water between them stays resolved when a body lands; at least a hundredth of the smallest moving body's radius, because
     /// distances are smooth only outside a body.
@@ -22,8 +28,19 @@ pub struct Contact {
     /// Half the width over which the force sets in, m; nothing acts at a larger distance than it beyond `gap`. Default: 0.4 % of
     /// the smallest moving body's radius.
     pub width: Option<f64>,
-    /// Speed below which friction holds with creep, m/s.
+    /// Speed below which friction holds with creep, m/s; over the smaller body's radius, rad/s, that of torsional and rolling friction.
     pub stiction_speed: f64,
+}
+
+/// A convex piece of a body, for contact.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct CollisionPiece {
+    /// What it is: by a formula, or a convex mesh.
+    pub shape: Shape,
+    /// Its pose in the body's frame.
+    #[serde(default, skip_serializing_if = "is_default")]
+    pub at: Placement,
 }
 
 impl Default for Contact {
@@ -32,6 +49,8 @@ impl Default for Contact {
             stiffness: None,
             dissipation: 0.5,
             friction: 0.5,
+            torsional_friction: 0.0,
+            rolling_friction: 0.0,
             gap: None,
             width: None,
             stiction_speed: 1e-3,

@@ -136,8 +136,11 @@ fn parse(text: &str, folder: &Path) -> std::result::Result<Scene, String> {
         Err(error) => broken(error),
     })?;
     for body in &mut scene.bodies {
-        if let Some(Shape::Mesh { path, .. }) = &mut body.shape {
-            *path = folder.join(&*path);
+        let pieces = body.collision.iter_mut().map(|piece| &mut piece.shape);
+        for shape in body.shape.iter_mut().chain(pieces) {
+            if let Shape::Mesh { path, .. } = shape {
+                *path = folder.join(&*path);
+            }
         }
     }
     Ok(scene)

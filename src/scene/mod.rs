@@ -17,7 +17,7 @@ pub use crate::geometry::{Refinement, Wall, WallSurface};
 pub use crate::multibody::{Joint, Plane};
 pub use crate::shape::Shape;
 pub use build::BodyId;
-pub use contact::Contact;
+pub use contact::{CollisionPiece, Contact};
 pub use force::{Force, Spring};
 
 use serde::{Deserialize, Serialize};
@@ -103,6 +103,10 @@ pub struct Body {
     /// Pose of the shape in the body's frame.
     #[serde(default, skip_serializing_if = "is_default")]
     pub shape_at: Placement,
+    /// Convex pieces that the body is for contact, instead of its shape: a concave body is a union of such. The water sees
+    /// `shape` all the same.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub collision: Vec<CollisionPiece>,
     /// Regions where the faces of the shape are made smaller: where the body comes near others. Elsewhere the
     /// mesh stays as its number of faces makes it.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]

@@ -125,6 +125,8 @@ fn constants_are_checked_by_name() {
     for (key, value) in [
         ("stiffness", "-1.0"),
         ("friction", "-0.1"),
+        ("torsional_friction", "-0.1"),
+        ("rolling_friction", "inf"),
         ("gap", "nan"),
         ("width", "0.0"),
     ] {
@@ -247,7 +249,7 @@ fn dropped(scene: &Scene, duration: f64) -> hydrograd::Result<Dropped> {
         );
         out.kinetic = out.kinetic.max(sample.kinetic_energy / first);
         for (b, lost) in lost.iter_mut().enumerate() {
-            let radius = model.shapes.shape(b).unwrap().radius();
+            let radius = model.shapes.radius(b).unwrap();
             let turn = sample.v.fixed_rows::<3>(6 * b + 3).norm() * dt;
             let moved = sample.v.fixed_rows::<3>(6 * b).norm() * dt;
             out.turn = out.turn.max(turn);

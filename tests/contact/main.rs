@@ -4,9 +4,12 @@ mod drops;
 mod geometry;
 mod integrators;
 mod joints;
+mod parts;
 mod passing;
 mod physics;
 mod pieces;
+mod resistance;
+mod standard;
 mod tools;
 
 #[path = "../support/mod.rs"]

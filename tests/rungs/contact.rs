@@ -63,7 +63,10 @@ fn limit() -> JointLimit {
             stiffness: 3e3,
             dissipation: 0.2,
             friction: 0.0,
+            torsional_friction: 0.0,
+            rolling_friction: 0.0,
             stiction_speed: 1.0,
+            stiction_spin: 1.0,
             gap: 0.0,
             width: 2e-4,
             horizon: 0.01,
@@ -115,6 +118,8 @@ fn scene() -> Scene {
         stiffness: Some(3e3),
         dissipation: 0.4,
         friction: 0.6,
+        torsional_friction: 0.03,
+        rolling_friction: 0.02,
         gap: Some(0.02),
         width: Some(5e-3),
         stiction_speed: 0.05,
@@ -173,6 +178,8 @@ fn system() -> &'static System {
 struct Point {
     q: DVector<f64>,
     v: DVector<f64>,
+    /// The velocity before contact, of forces by themselves.
+    before: DVector<f64>,
     parameters: Parameters,
 }
 
@@ -182,6 +189,7 @@ fn point() -> Point {
     (v[n - 2], v[n - 1]) = (0.25, -0.3);
     Point {
         q: simulator().start().0.clone(),
+        before: 1.5 * &v + wavy(n, 0.9, 0.2),
         v,
         parameters: simulator().parameters().clone(),
     }
@@ -197,6 +205,7 @@ fn check(
     at: &Point,
     q: &DVector<f64>,
     v: &DVector<f64>,
+    before: Option<&DVector<f64>>,
     parameters: &Parameters,
     c: f64,
 ) -> Outcome {
@@ -224,14 +233,31 @@ fn check(
                 value(&Point { v, ..at.clone() })
             }),
         });
+        if let Some(bar) = before {
+            let dv = only(wavy(n, 4.1, 0.1));
+            list.push(Group {
+                name: "before",
+                slope: bar.dot(&dv),
+                value: Box::new(move |h| {
+                    let before = &at.before + h * &dv;
+                    value(&Point {
+                        before,
+                        ..at.clone()
+                    })
+                }),
+            });
+        }
     }
     let all = at.parameters.to_vec();
     let bars = parameters.to_vec();
-    for (k, name) in ["stiffness", "dissipation", "friction"]
-        .into_iter()
-        .enumerate()
-    {
-        let i = all.len() - 3 + k;
+    for name in [
+        "contact.stiffness",
+        "contact.dissipation",
+        "contact.friction",
+        "contact.torsional_friction",
+        "contact.rolling_friction",
+    ] {
+        let i = parameters.names().position(|n| n == name).unwrap();
         let step = 0.1 * all[i];
         list.push(Group {
             name,
@@ -261,13 +287,13 @@ fn jvp(c: f64) -> Outcome {
         .collect();
     assert!(pairs.len() >= 6, "{pairs:?}");
     let n = p.v.len();
-    let pressed = e.contact_force(&p.v, Dual::User);
+    let pressed = e.contact_force(&p.v, &p.before, Dual::User);
     assert!(pressed[n - 2] < 0.0 && pressed[n - 1] > 0.0);
     let dv = wavy(p.v.len(), 3.1, 0.1);
-    let tangent = c * e.contact_force_jvp(&p.v, &dv);
+    let tangent = c * e.contact_force_jvp(&p.v, &p.before, &dv);
     vector_along(
         |h| {
-            e.contact_force(&(&p.v + h * &dv), Dual::User)
+            e.contact_force(&(&p.v + h * &dv), &p.before, Dual::User)
                 .as_slice()
                 .to_vec()
         },
@@ -279,9 +305,15 @@ fn force_vjp(c: f64) -> Outcome {
     let p = point();
     let z = wavy(p.v.len(), 5.1, 1.0);
     all([Dual::User, Dual::Frame].map(|dual| {
-        let b = evaluate(&p.parameters, &p.q).contact_force_vjp(&p.v, &z, dual);
-        let value = |p: &Point| z.dot(&evaluate(&p.parameters, &p.q).contact_force(&p.v, dual));
-        check(&value, &p, &b.q, &b.v, &b.parameters, c)
+        let e = evaluate(&p.parameters, &p.q);
+        let (b, before) = e.contact_force_vjp(&p.v, &p.before, &z, dual);
+        // Something slides on.
+        assert!(before.norm() > 1e-3 * b.v.norm());
+        let value = |p: &Point| {
+            let e = evaluate(&p.parameters, &p.q);
+            z.dot(&e.contact_force(&p.v, &p.before, dual))
+        };
+        check(&value, &p, &b.q, &b.v, Some(&before), &b.parameters, c)
     }))
 }
 
@@ -336,5 +368,5 @@ fn step_vjp(integrator: Integrator, c: f64) -> Outcome {
     let pressed = &velocities.after - &velocities.before;
     assert!(pressed.norm() > 1e-3 * velocities.before.norm());
     let b = s.linearise_step(&record).unwrap().state_vjp(&bar).unwrap();
-    check(&value, &p, &b.state.q, &b.state.y, &b.parameters, c)
+    check(&value, &p, &b.state.q, &b.state.y, None, &b.parameters, c)
 }

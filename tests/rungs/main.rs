@@ -99,6 +99,10 @@ const THROUGH: &[(&str, &str)] = &[
         FRAME_BIAS,
     ),
     ("multibody::joint::free::Free::frame_bias_vjp", FRAME_BIAS),
+    (
+        "adjoint::contact::Slip::vjp",
+        "adjoint::contact::contact_force_vjp",
+    ),
     // Pieces of the equations of motion.
     (
         "dynamics::contact::PairContact::displacement_vjp",

@@ -124,6 +124,17 @@ impl Form {
 }
 
 impl Solid {
+    /// Smallest and largest coordinates, frame of the body, m.
+    pub(crate) fn bounds(&self) -> [Vec3; 2] {
+        let reach = |direction: Vec3| {
+            let own = self.offset.rotation.tr_mul(&direction);
+            let outermost = self.offset.apply(&self.form.outermost(&own));
+            direction.dot(&outermost) + self.form.radius()
+        };
+        let side = |sign: f64| Vec3::from_fn(|i, _| sign * reach(Vec3::ith(i, sign)));
+        [side(-1.0), side(1.0)]
+    }
+
     /// A ball around it, frame of the body.
     pub(crate) fn ball(&self) -> Ball {
         self.form.ball().transformed(&self.offset)

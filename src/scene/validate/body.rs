@@ -19,6 +19,7 @@ pub(super) fn check(scene: &Scene, index: usize) -> Result<()> {
         )?;
     }
     check_shape(body)?;
+    check_collision(body)?;
     check_mass(body, scene.is_static(index))?;
     if let Some(rows) = &body.added_mass {
         check_added_mass(body, rows)?;
@@ -72,16 +73,39 @@ fn check_shape(body: &Body) -> Result<()> {
         }
         return Ok(());
     };
+    check_surface(body, shape, "shape")
+}
+
+fn check_surface(body: &Body, shape: &Shape, field: &str) -> Result<()> {
     if let Shape::Mesh { path, .. } = shape
         && path.as_os_str().is_empty()
     {
         return Err(Error::input(
-            place(body, "shape.path"),
+            place(body, &format!("{field}.path")),
             "nothing",
             "give the path of an OBJ, STL or PLY file",
         ));
     }
-    crate::shape::validate(shape, &place(body, "shape"))
+    crate::shape::validate(shape, &place(body, field))
+}
+
+/// The convex pieces that the body is for contact; whether they are convex and where the body is shows once they are made.
+fn check_collision(body: &Body) -> Result<()> {
+    if body.shape.is_none() && !body.collision.is_empty() {
+        return Err(Error::input(
+            place(body, "collision"),
+            format!("{} pieces without a shape", body.collision.len()),
+            "they stand for the body's shape in contact: add the shape, or take the pieces away",
+        ));
+    }
+    for (k, piece) in body.collision.iter().enumerate() {
+        let field = format!("collision[{k}]");
+        let at = |name: &str| place(body, &format!("{field}.at.{name}"));
+        finite(&at("position"), &piece.at.position)?;
+        finite(&at("rotation"), &piece.at.rotation)?;
+        check_surface(body, &piece.shape, &format!("{field}.shape"))?;
+    }
+    Ok(())
 }
 
 fn check_mass(body: &Body, is_static: bool) -> Result<()> {

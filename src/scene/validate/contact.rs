@@ -12,6 +12,12 @@ pub(super) fn check(scene: &Scene) -> Result<()> {
         ("stiffness", contact.stiffness, true),
         ("dissipation", Some(contact.dissipation), false),
         ("friction", Some(contact.friction), false),
+        (
+            "torsional_friction",
+            Some(contact.torsional_friction),
+            false,
+        ),
+        ("rolling_friction", Some(contact.rolling_friction), false),
         ("gap", contact.gap, false),
         ("width", contact.width, true),
         ("stiction_speed", Some(contact.stiction_speed), true),

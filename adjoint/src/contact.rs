@@ -8,19 +8,15 @@
 //! ```text
 //! σ = √(|v_t|² + v_s²)      σ_t = √(ω_n² + ω_s²)      σ_r = √(|ω_t|² + ω_s²)
 //! S = μ (σ − v_s) + μ_t (σ_t − ω_s) + μ_r (σ_r − ω_s)
-//! z = v_n − S + r − s(r − S)
+//! z = v_n − S
 //! N = weight · k · s(g₀ − φ − τ z) · s_d(1 − d z)
 //! F = N ∂z/∂u = N (n − μ v_t/σ)       T = N ∂z/∂ω = −N (μ_t n ω_n/σ_t + μ_r ω_t/σ_r)       on the first body, −F and −T on the second
 //! ```
 //!
 //! s is the positive part, smoothed over ± the width: zero below −width, so that nothing acts at a distance beyond it. N falls as
 //! z grows, and z is concave in u and ω, so F and T are the slopes −∂P(z) of a potential P that is convex in both, and an implicit
-//! step in the end-of-step velocity is a convex problem. |F_t| ≤ μ N, |T_n| ≤ μ_t N and |T_t| ≤ μ_r N at any speed.
-//!
-//! By S alone sliding would act as an approach, and surfaces that slide at v would ride τ μ v apart. What slides on is known
-//! beforehand: r is a constant of the step, the S of the velocity before contact less what stopping the approach there may
-//! cost ([`SPENT`], [`HARD`]), where that is positive. What comes to less slip than r after all has no more than that taken off (s of r − S, by
-//! which F_t and T fade there), so that a gap is never foreseen to open by slipping less.
+//! step in the end-of-step velocity is a convex problem. |F_t| ≤ μ N, |T_n| ≤ μ_t N and |T_t| ≤ μ_r N at any speed. As in other
+//! convex models of friction, sliding acts as an approach: at the sliding speed v the surfaces ride τ μ v apart.
 //!
 //! # References
 //! A. Castro et al., "An Unconstrained Convex Formulation of Compliant Contact", 2022, and "A Theory of Irrotational Contact
@@ -71,10 +67,8 @@ pub struct PointState {
     pub weight: f64,
     /// n, unit, from the second body to the first.
     pub normal: Vec3,
-    /// Motion at which the force is asked for.
+    /// How the first body moves against the second there.
     pub rates: Rates,
-    /// Motion with which the step would end without contact.
-    pub before: Rates,
 }
 
 /// What a contact does to the first body.
@@ -97,8 +91,6 @@ pub struct ContactBar {
     pub normal: Vec3,
     /// Of the relative motion.
     pub rates: Rates,
-    /// Of the motion before contact.
-    pub before: Rates,
     /// Of the stiffness.
     pub stiffness: f64,
     /// Of the dissipation.
@@ -113,11 +105,6 @@ pub struct ContactBar {
 
 /// Width of the smoothed positive part of 1 − d z.
 const DAMPED: f64 = 0.1;
-/// How much of S, over μ² times the approach before contact, a step may cost in which contact stops the approach: at most the
-/// inverse mass at a point across the normal over that along it, 3.5 for a ball.
-pub const SPENT: f64 = 4.0;
-/// The same over μ times what of the approach is faster than the gap at which surfaces touch a step: in an impact nothing lasts.
-pub const HARD: f64 = 20.0;
 
 /// Positive part of `x`, smoothed over ± `width`, with its derivative: once continuously differentiable.
 pub fn positive(x: f64, width: f64) -> (f64, f64) {
@@ -128,14 +115,6 @@ pub fn positive(x: f64, width: f64) -> (f64, f64) {
     } else {
         let t = x + width;
         (t * t / (4.0 * width), t / (2.0 * width))
-    }
-}
-
-/// Second derivative of [`positive`].
-fn positive_bend(x: f64, width: f64) -> f64 {
-    match x.abs() < width {
-        true => 0.5 / width,
-        false => 0.0,
     }
 }
 
@@ -160,7 +139,6 @@ struct Slip {
 }
 
 /// Cotangents of a [`Slip`].
-#[derive(Default)]
 struct SlipBar {
     normal_speed: f64,
     tangential: Vec3,
@@ -232,24 +210,12 @@ impl Slip {
 /// What value and derivatives share.
 struct Parts {
     slip: Slip,
-    /// That of the motion before contact.
-    first: Slip,
-    /// The approach before contact, and its derivative along −v_n.
-    closing: (f64, f64),
-    /// What of that is faster than a gap g₀ a step, and its derivative.
-    hit: (f64, f64),
-    /// r and its derivative.
-    lasting: (f64, f64),
-    /// Part of a change of S that z feels, and its derivative along S.
-    felt: (f64, f64),
     /// z.
     approach: f64,
     /// s and its derivative.
     depth: (f64, f64),
     /// s_d and its derivative.
     damping: (f64, f64),
-    /// ∂S/∂u = μ v_t/σ and ∂S/∂ω.
-    rubs: Push,
     /// ∂z/∂u and ∂z/∂ω.
     direction: Push,
 }
@@ -257,37 +223,18 @@ struct Parts {
 impl Parts {
     fn new(law: &Law, m: &PointState) -> Self {
         let slip = Slip::new(law, &m.normal, &m.rates);
-        let first = Slip::new(law, &m.normal, &m.before);
-        let still = law.stiction_speed;
-        let closing = positive(-first.normal_speed, still);
-        let hit = positive(closing.0 - law.gap / law.horizon, still);
-        let cost = law.friction * (SPENT * law.friction * closing.0 + HARD * hit.0);
-        let lasting = positive(first.total - cost - still, still);
-        let less = lasting.0 - slip.total - still;
-        let spared = positive(less, still);
-        let felt = (1.0 - spared.1, positive_bend(less, still));
-        let approach = slip.normal_speed - slip.total + lasting.0 - spared.0;
+        let approach = slip.normal_speed - slip.total;
         let about = m.normal * (law.torsional_friction * slip.twist / slip.twist_speed);
         let across = slip.roll * (law.rolling_friction / slip.roll_speed);
-        let rubs = Push {
-            force: slip.tangential * (law.friction / slip.speed),
-            torque: about + across,
-        };
         Self {
             approach,
             depth: positive(law.gap - m.gap - law.horizon * approach, law.width),
             damping: positive(1.0 - law.dissipation * approach, DAMPED),
             direction: Push {
-                force: m.normal - rubs.force * felt.0,
-                torque: -rubs.torque * felt.0,
+                force: m.normal - slip.tangential * (law.friction / slip.speed),
+                torque: -(about + across),
             },
-            rubs,
-            felt,
             slip,
-            first,
-            closing,
-            hit,
-            lasting,
         }
     }
 
@@ -329,15 +276,11 @@ pub fn contact_force_jvp(law: &Law, m: &PointState, along: &Rates) -> Push {
     let slid = turning(&p.slip.tangential, p.slip.speed) * across(&along.velocity);
     let rolled = turning(&p.slip.roll, p.slip.roll_speed) * across(&along.spin);
     let twisted = n * (p.twist_slope(law) * n.dot(&along.spin));
-    let rubs = &p.rubs;
-    let more = rubs.force.dot(&along.velocity) + rubs.torque.dot(&along.spin);
-    let (bent, rubbed) = (force * p.felt.1 * more, force * p.felt.0);
     Push {
-        force: e.force * normal - across(&slid) * (rubbed * law.friction) - rubs.force * bent,
+        force: e.force * normal - across(&slid) * (force * law.friction),
         torque: e.torque * normal
-            - twisted * (rubbed * law.torsional_friction)
-            - across(&rolled) * (rubbed * law.rolling_friction)
-            - rubs.torque * bent,
+            - twisted * (force * law.torsional_friction)
+            - across(&rolled) * (force * law.rolling_friction),
     }
 }
 
@@ -349,47 +292,31 @@ pub fn contact_force_vjp(law: &Law, m: &PointState, bar: &Push) -> ContactBar {
     let along = p.direction.force.dot(&bar.force) + p.direction.torque.dot(&bar.torque);
     // F = weight N e: cotangents of N, of e, and through them of z, s and s_d.
     let force_bar = m.weight * along;
-    let e_bar = bar.force * (m.weight * force);
-    let spin_bar = bar.torque * (m.weight * force);
-    let felt_bar = -p.rubs.force.dot(&e_bar) - p.rubs.torque.dot(&spin_bar);
-    // Of what rubs, less the sign.
-    let (slid_bar, t_bar) = (e_bar * p.felt.0, spin_bar * p.felt.0);
+    let [e_bar, t_bar] = [bar.force, bar.torque].map(|bar| bar * (m.weight * force));
     let depth_bar = force_bar * law.stiffness * p.damping.0 * p.depth.1;
     let damping_bar = force_bar * law.stiffness * p.depth.0 * p.damping.1;
     let z_bar = -law.horizon * depth_bar - law.dissipation * damping_bar;
     let about = slip.twist / slip.twist_speed;
     let rolled = slip.roll / slip.roll_speed;
-    let total_bar = p.felt.1 * felt_bar - p.felt.0 * z_bar;
-    let lasting_bar = -total_bar * p.lasting.1;
-    // Of the cost: μ (SPENT μ a + HARD h(a)).
-    let (a, hit, friction) = (p.closing, p.hit, law.friction);
-    let cost_slope = friction * (SPENT * friction + HARD * hit.1);
-    let cost_of_friction = 2.0 * SPENT * friction * a.0 + HARD * hit.0;
     let mut out = ContactBar {
         gap: -depth_bar,
         weight: along * force,
         normal: e_bar - t_bar * (law.torsional_friction * about),
         stiffness: force_bar * p.depth.0 * p.damping.0,
         dissipation: -p.approach * damping_bar,
-        friction: -slip.tangential.dot(&slid_bar) / slip.speed - lasting_bar * cost_of_friction,
+        friction: -slip.tangential.dot(&e_bar) / slip.speed,
         torsional_friction: -about * m.normal.dot(&t_bar),
         rolling_friction: -rolled.dot(&t_bar),
         ..ContactBar::default()
     };
     let own = SlipBar {
         normal_speed: z_bar,
-        tangential: -law.friction * (turning(&slip.tangential, slip.speed) * slid_bar),
+        tangential: -law.friction * (turning(&slip.tangential, slip.speed) * e_bar),
         twist: -law.torsional_friction * p.twist_slope(law) * m.normal.dot(&t_bar),
         roll: -law.rolling_friction * (turning(&slip.roll, slip.roll_speed) * t_bar),
-        total: total_bar,
+        total: -z_bar,
     };
     out.rates = slip.vjp(law, (&m.normal, &m.rates), &own, &mut out);
-    let first = SlipBar {
-        normal_speed: lasting_bar * cost_slope * a.1,
-        total: lasting_bar,
-        ..SlipBar::default()
-    };
-    out.before = p.first.vjp(law, (&m.normal, &m.before), &first, &mut out);
     out
 }
 
@@ -413,7 +340,7 @@ mod tests {
         }
     }
 
-    /// With a spin that goes with the velocity, and a motion before contact.
+    /// With a spin that goes with the velocity.
     fn point_state(gap: f64, velocity: Vec3) -> PointState {
         let spin = Vec3::new(3.0 * velocity.y, -velocity.z, 2.0 * velocity.x);
         PointState {
@@ -421,10 +348,6 @@ mod tests {
             weight: 1.0,
             normal: Vec3::new(0.36, -0.48, 0.8),
             rates: Rates { velocity, spin },
-            before: Rates {
-                velocity: 1.3 * velocity,
-                spin,
-            },
         }
     }
 
@@ -509,7 +432,6 @@ mod tests {
                     .iter()
                     .chain(bar.rates.velocity.iter())
                     .chain(bar.rates.spin.iter())
-                    .chain(bar.before.velocity.iter())
                     .all(|x| x.is_finite())
             );
             let push = contact_force(&law, &m);

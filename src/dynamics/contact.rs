@@ -113,15 +113,14 @@ impl PairContact {
         point_wrench(&self.point.position, force) + six(&Vec3::zeros(), torque)
     }
 
-    /// Where bodies move with these spatial twists, and would without contact with those `before`.
-    pub(super) fn point_state(&self, twists: &[Vec6], before: &[Vec6]) -> PointState {
+    /// Where bodies move with these spatial twists.
+    pub(super) fn point_state(&self, twists: &[Vec6]) -> PointState {
         let p = &self.point;
         PointState {
             gap: self.eased_gap().0,
             weight: p.weight,
             normal: p.normal,
             rates: self.rates(twists),
-            before: self.rates(before),
         }
     }
 

@@ -2,8 +2,7 @@
 //! [`crate::adjoint::contact`] at every point where surfaces are near.
 //!
 //! Points, normals and gaps belong to the configuration; the velocity is the argument of the force, so that an integrator
-//! that is implicit in it solves contact implicitly, against the mass matrix with its fluid part. The velocity before contact is a
-//! constant of that: it says what slides on.
+//! that is implicit in it solves contact implicitly, against the mass matrix with its fluid part.
 
 use super::contact::sharpened;
 use super::{
@@ -16,16 +15,15 @@ use crate::contact::ContactPoint;
 use crate::multibody::{Cotangents, Virtual};
 use nalgebra::{DMatrix, DVector};
 
-/// Contacts at places where surfaces are near, of bodies that end a step with these twists, and without contact would with those
-/// `before`: all where something presses, or where
+/// Contacts at places where surfaces are near, of bodies that end a step with these twists: all where something presses, or where
 /// surfaces are no more than `slack` (m) farther apart than the gap at which they touch.
 pub(super) fn contact_forces(
     contact_points: &[PairContact],
-    [before, twists]: [&[Vec6]; 2],
+    twists: &[Vec6],
     slack: f64,
 ) -> Vec<ContactForce> {
     let found = contact_points.iter().map(|t| {
-        let push = contact_force(&t.law, &t.point_state(twists, before));
+        let push = contact_force(&t.law, &t.point_state(twists));
         ContactForce {
             first: t.first,
             second: t.second,
@@ -103,7 +101,7 @@ impl Evaluation<'_> {
         self.system.tree.twists(&self.kinematics, v)
     }
 
-    /// Whether any force acts in contact at the velocity `v` before it; where none does, none changes with v either.
+    /// Whether any force acts in contact at the velocity `v`; where none does, none changes with v either.
     pub(super) fn contact_acts(&self, v: &DVector<f64>) -> bool {
         if self.limit_forces(v).any(|(_, forces)| forces != [0.0; 2]) {
             return true;
@@ -112,21 +110,16 @@ impl Evaluation<'_> {
             return false;
         }
         let twists = self.twists(v);
-        let push = |t: &PairContact| contact_force(&t.law, &t.point_state(&twists, &twists));
+        let push = |t: &PairContact| contact_force(&t.law, &t.point_state(&twists));
         let acts = |t: &PairContact| push(t) != Push::default();
         self.contact_points.iter().any(acts)
     }
 
-    /// Generalised forces of contact at the velocity `v`, in a step that would end with the velocity `before` without them.
-    pub fn contact_force(
-        &self,
-        v: &DVector<f64>,
-        before: &DVector<f64>,
-        dual: Dual,
-    ) -> DVector<f64> {
+    /// Generalised forces of contact at the velocity `v`.
+    pub fn contact_force(&self, v: &DVector<f64>, dual: Dual) -> DVector<f64> {
         let tree = &self.system.tree;
-        let [twists, first] = [v, before].map(|v| self.twists(v));
-        let wrenches = self.exchanged(|t| contact_force(&t.law, &t.point_state(&twists, &first)));
+        let twists = self.twists(v);
+        let wrenches = self.exchanged(|t| contact_force(&t.law, &t.point_state(&twists)));
         let columns = match dual {
             Dual::User => &self.kinematics.columns,
             Dual::Frame => &self.kinematics.frame_columns,
@@ -139,12 +132,12 @@ impl Evaluation<'_> {
     }
 
     /// Sizes of the generalised forces of contact, without what cancels among them: what their rounding is relative to.
-    pub(super) fn contact_effort(&self, v: &DVector<f64>, before: &DVector<f64>) -> DVector<f64> {
+    pub(super) fn contact_effort(&self, v: &DVector<f64>) -> DVector<f64> {
         let tree = &self.system.tree;
-        let [twists, first] = [v, before].map(|v| self.twists(v));
+        let twists = self.twists(v);
         let mut out = DVector::zeros(v.len());
         for t in &self.contact_points {
-            let push = contact_force(&t.law, &t.point_state(&twists, &first));
+            let push = contact_force(&t.law, &t.point_state(&twists));
             if push != Push::default() {
                 let mut wrenches = vec![Vec6::zeros(); self.system.len()];
                 t.exchange(&t.wrench(&push.force, &push.torque), &mut wrenches);
@@ -158,15 +151,10 @@ impl Evaluation<'_> {
     }
 
     /// Tangent of [`Evaluation::contact_force`] (the user's coordinates) along `dv`.
-    pub fn contact_force_jvp(
-        &self,
-        v: &DVector<f64>,
-        before: &DVector<f64>,
-        dv: &DVector<f64>,
-    ) -> DVector<f64> {
-        let [twists, first, along] = [v, before, dv].map(|v| self.twists(v));
+    pub fn contact_force_jvp(&self, v: &DVector<f64>, dv: &DVector<f64>) -> DVector<f64> {
+        let [twists, along] = [v, dv].map(|v| self.twists(v));
         let wrenches = self.exchanged(|t| {
-            let point_state = t.point_state(&twists, &first);
+            let point_state = t.point_state(&twists);
             contact_force_jvp(&t.law, &point_state, &t.rates(&along))
         });
         let tree = &self.system.tree;
@@ -178,25 +166,23 @@ impl Evaluation<'_> {
     }
 
     /// ∂g/∂v in the user's coordinates, column by column: symmetric, negative semi-definite.
-    pub(super) fn contact_jacobian(&self, v: &DVector<f64>, before: &DVector<f64>) -> DMatrix<f64> {
+    pub(super) fn contact_jacobian(&self, v: &DVector<f64>) -> DMatrix<f64> {
         let n = v.len();
         let mut out = DMatrix::zeros(n, n);
         for k in 0..n {
             let unit = DVector::from_fn(n, |i, _| f64::from(i == k));
-            out.set_column(k, &self.contact_force_jvp(v, before, &unit));
+            out.set_column(k, &self.contact_force_jvp(v, &unit));
         }
         out
     }
 
-    /// Transpose of [`Evaluation::contact_force`]: the gradient of zᵀ g over q, v and the parameters, and that over the velocity before
-    /// contact.
+    /// Transpose of [`Evaluation::contact_force`]: the gradient of zᵀ g over q, v and the parameters.
     pub fn contact_force_vjp(
         &self,
         v: &DVector<f64>,
-        before: &DVector<f64>,
         z: &DVector<f64>,
         dual: Dual,
-    ) -> (ForceCotangents, DVector<f64>) {
+    ) -> ForceCotangents {
         let tree = &self.system.tree;
         let virtual_velocity = match dual {
             Dual::User => Virtual::User(z),
@@ -204,13 +190,10 @@ impl Evaluation<'_> {
         };
         let fields = tree.fields(&self.kinematics, &self.q, v, virtual_velocity);
         let mut bar = Cotangents::zeros(self.system.len());
-        let still = DVector::zeros(v.len());
-        let free = tree.fields(&self.kinematics, &self.q, before, Virtual::User(&still));
-        let mut free_bar = Cotangents::zeros(self.system.len());
         let mut out = ForceCotangents::zeros(self);
         for t in &self.contact_points {
             let x = &t.point.position;
-            let point_state = t.point_state(&fields.twist, &free.twist);
+            let point_state = t.point_state(&fields.twist);
             let virt = t.relative(&fields.virtual_twist);
             let push = contact_force(&t.law, &point_state);
             t.exchange(&t.wrench(&push.force, &push.torque), &mut bar.virtual_twist);
@@ -220,13 +203,11 @@ impl Evaluation<'_> {
             };
             let mut own = contact_force_vjp(&t.law, &point_state, &virtual_push);
             own.gap *= t.eased_gap().1;
-            let (rates, first) = (own.rates, own.before);
+            let rates = own.rates;
             t.exchange(&t.wrench(&rates.velocity, &rates.spin), &mut bar.twist);
-            t.exchange(&t.wrench(&first.velocity, &first.spin), &mut free_bar.twist);
             // Both velocities and the virtual one are taken at the point.
             let position = rates.velocity.cross(&point_state.rates.spin)
-                + push.force.cross(&virtual_push.torque)
-                + first.velocity.cross(&point_state.before.spin);
+                + push.force.cross(&virtual_push.torque);
             t.displacement_vjp(&own, &position, &mut bar.pose);
             out.parameters.add_contact([
                 t.scale * own.stiffness,
@@ -236,14 +217,6 @@ impl Evaluation<'_> {
                 own.rolling_friction,
             ]);
         }
-        let (q_bar, before_bar) = tree.reverse(
-            &self.kinematics,
-            before,
-            Virtual::User(&still),
-            &free,
-            free_bar,
-        );
-        out.q += q_bar;
         let (q_bar, v_bar) = tree.reverse(&self.kinematics, v, virtual_velocity, &fields, bar);
         out.q += q_bar;
         out.v += v_bar;
@@ -253,7 +226,7 @@ impl Evaluation<'_> {
             out.q[l.v] += q_bar;
             out.v[l.v] += v_bar;
         }
-        (out, before_bar)
+        out
     }
 
     /// Each limit with the forces of its stops at the velocity `v`.

@@ -61,8 +61,6 @@ impl JointLimit {
                 weight: 1.0,
                 normal: Vec3::x(),
                 rates: along(sign * v),
-                // Without friction it says nothing.
-                before: Rates::default(),
             };
             (sign, point_state)
         })

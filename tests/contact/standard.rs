@@ -96,31 +96,23 @@ fn a_block_slides_to_rest() {
         (2.0, 0.5, 0.01),
         (3.0, 0.5, 0.01),
         (2.0, 0.5, 0.0025),
-        (2.0, 1.0, 0.0025),
     ] {
         let mut scene = above_floor(0.0);
         scene.time_step = dt;
         contact(&mut scene).friction = friction;
-        let size = [0.5, 0.5, 0.1];
-        let rest = 0.05 + resting_gap(size, dt, 0.0);
+        let gap = 0.01 * 0.5 * (0.5_f64 * 0.5 + 0.5 * 0.5 + 0.1 * 0.1).sqrt();
         scene.add(
-            Body::new(Shape::cuboid(size))
+            Body::new(Shape::cuboid([0.5, 0.5, 0.1]))
                 .density(1000.0)
-                .at([0.0, 0.0, rest]),
+                .at([0.0, 0.0, 0.05 + gap]),
         );
         scene.initial.v = vec![speed, 0.0, 0.0, 0.0, 0.0, 0.0];
         let stops = speed / (friction * GRAVITY);
         let steps = (1.2 * stops / dt) as usize;
         let rollout = run(&simulator(&scene), steps);
-        let samples = rollout.samples();
-        let highest = samples.iter().map(|s| s.poses[0].translation.z);
-        let rides = highest.fold(0.0, f64::max) - rest;
-        let end = samples[steps].poses[0].translation.x;
+        let end = rollout.samples()[steps].poses[0].translation.x;
         let exact = speed * speed / (2.0 * friction * GRAVITY);
-        println!(
-            "Δt {dt} s, {speed} m/s, μ {friction}: rides {:.2} mm high",
-            1e3 * rides
-        );
+        println!("Δt {dt} s, {speed} m/s, μ {friction}:");
         // Euler's method takes the speed after each step: half a step less of the start's.
         within("slides to rest, m", end + 0.5 * speed * dt, exact, 0.01);
     }
@@ -210,25 +202,5 @@ fn a_coin_spins_to_rest() {
         let moved = rollout.samples()[steps].poses[0].translation.xy().norm();
         println!("the coin moves aside by {moved:.1e} m");
         assert!(moved < 1e-4);
-    }
-}
-
-/// What slides keeps its height, at any speed and step.
-#[test]
-fn a_sliding_block_stays_down() {
-    let slope = 0.9_f64;
-    for dt in [0.01, 0.0025] {
-        let size = [0.3, 0.3, 0.1];
-        let rest = 0.05 + resting_gap(size, dt, slope);
-        let mut scene = on_slope(slope, rest, Shape::cuboid(size));
-        scene.time_step = dt;
-        let steps = (0.6 / dt) as usize;
-        let rollout = run(&simulator(&scene), steps);
-        let p = rollout.samples()[steps].poses[0].translation;
-        let angle = slope.atan();
-        let height = p.x * angle.sin() + p.z * angle.cos() - rest;
-        let speed = rollout.samples()[steps].v[0];
-        println!("Δt {dt} s, {speed:.2} m/s: {:.2} mm high", 1e3 * height);
-        assert!(height.abs() < 10.0 * dt * dt, "{height}");
     }
 }

@@ -178,8 +178,6 @@ fn system() -> &'static System {
 struct Point {
     q: DVector<f64>,
     v: DVector<f64>,
-    /// The velocity before contact, of forces by themselves.
-    before: DVector<f64>,
     parameters: Parameters,
 }
 
@@ -189,7 +187,6 @@ fn point() -> Point {
     (v[n - 2], v[n - 1]) = (0.25, -0.3);
     Point {
         q: simulator().start().0.clone(),
-        before: 1.5 * &v + wavy(n, 0.9, 0.2),
         v,
         parameters: simulator().parameters().clone(),
     }
@@ -205,7 +202,6 @@ fn check(
     at: &Point,
     q: &DVector<f64>,
     v: &DVector<f64>,
-    before: Option<&DVector<f64>>,
     parameters: &Parameters,
     c: f64,
 ) -> Outcome {
@@ -233,20 +229,6 @@ fn check(
                 value(&Point { v, ..at.clone() })
             }),
         });
-        if let Some(bar) = before {
-            let dv = only(wavy(n, 4.1, 0.1));
-            list.push(Group {
-                name: "before",
-                slope: bar.dot(&dv),
-                value: Box::new(move |h| {
-                    let before = &at.before + h * &dv;
-                    value(&Point {
-                        before,
-                        ..at.clone()
-                    })
-                }),
-            });
-        }
     }
     let all = at.parameters.to_vec();
     let bars = parameters.to_vec();
@@ -287,13 +269,13 @@ fn jvp(c: f64) -> Outcome {
         .collect();
     assert!(pairs.len() >= 6, "{pairs:?}");
     let n = p.v.len();
-    let pressed = e.contact_force(&p.v, &p.before, Dual::User);
+    let pressed = e.contact_force(&p.v, Dual::User);
     assert!(pressed[n - 2] < 0.0 && pressed[n - 1] > 0.0);
     let dv = wavy(p.v.len(), 3.1, 0.1);
-    let tangent = c * e.contact_force_jvp(&p.v, &p.before, &dv);
+    let tangent = c * e.contact_force_jvp(&p.v, &dv);
     vector_along(
         |h| {
-            e.contact_force(&(&p.v + h * &dv), &p.before, Dual::User)
+            e.contact_force(&(&p.v + h * &dv), Dual::User)
                 .as_slice()
                 .to_vec()
         },
@@ -306,14 +288,12 @@ fn force_vjp(c: f64) -> Outcome {
     let z = wavy(p.v.len(), 5.1, 1.0);
     all([Dual::User, Dual::Frame].map(|dual| {
         let e = evaluate(&p.parameters, &p.q);
-        let (b, before) = e.contact_force_vjp(&p.v, &p.before, &z, dual);
-        // Something slides on.
-        assert!(before.norm() > 1e-3 * b.v.norm());
+        let b = e.contact_force_vjp(&p.v, &z, dual);
         let value = |p: &Point| {
             let e = evaluate(&p.parameters, &p.q);
-            z.dot(&e.contact_force(&p.v, &p.before, dual))
+            z.dot(&e.contact_force(&p.v, dual))
         };
-        check(&value, &p, &b.q, &b.v, Some(&before), &b.parameters, c)
+        check(&value, &p, &b.q, &b.v, &b.parameters, c)
     }))
 }
 
@@ -368,5 +348,5 @@ fn step_vjp(integrator: Integrator, c: f64) -> Outcome {
     let pressed = &velocities.after - &velocities.before;
     assert!(pressed.norm() > 1e-3 * velocities.before.norm());
     let b = s.linearise_step(&record).unwrap().state_vjp(&bar).unwrap();
-    check(&value, &p, &b.state.q, &b.state.y, None, &b.parameters, c)
+    check(&value, &p, &b.state.q, &b.state.y, &b.parameters, c)
 }

@@ -37,15 +37,9 @@ struct Trial {
     residual: f64,
 }
 
-/// The Hessian M + Δt Jᵀ G J on the free rows, factored, at the velocity `v` in a step from `before`.
-fn hessian(
-    e: &Evaluation,
-    split: &Split,
-    v: &DVector<f64>,
-    before: &DVector<f64>,
-    dt: f64,
-) -> Result<Definite> {
-    let m = &e.mass_matrix - dt * e.contact_jacobian(v, before);
+/// The Hessian M + Δt Jᵀ G J on the free rows, factored.
+fn hessian(e: &Evaluation, split: &Split, v: &DVector<f64>, dt: f64) -> Result<Definite> {
+    let m = &e.mass_matrix - dt * e.contact_jacobian(v);
     let m: DMatrix<f64> = 0.5 * (&m + m.transpose());
     Definite::new(split.block(&m)).ok_or_else(|| Error::Solver {
         what: "contact".into(),
@@ -67,10 +61,9 @@ pub(super) fn solve(start: &Start, before: &DVector<f64>) -> Result<DVector<f64>
     let summands = e.mass_matrix.abs();
     let least = sized(&(&summands * before.abs()));
     let at = |v: DVector<f64>| {
-        let pressed = e.contact_force(&v, before, Dual::User);
-        let imbalance = &e.mass_matrix * (&v - before) - dt * pressed;
+        let imbalance = &e.mass_matrix * (&v - before) - dt * e.contact_force(&v, Dual::User);
         let size = sized(&(&summands * v.abs())).max(least);
-        let size = size.max(dt * sized(&e.contact_effort(&v, before)));
+        let size = size.max(dt * sized(&e.contact_effort(&v)));
         let residual = share(sized(&imbalance), size);
         Trial {
             v,
@@ -90,7 +83,7 @@ pub(super) fn solve(start: &Start, before: &DVector<f64>) -> Result<DVector<f64>
             break;
         }
         previous = now.residual;
-        let step = hessian(e, split, &now.v, before, dt)?.solve(&split.take(&now.imbalance));
+        let step = hessian(e, split, &now.v, dt)?.solve(&split.take(&now.imbalance));
         let step = split.put(&step);
         now = search(now, &step, &at);
     }
@@ -141,7 +134,7 @@ pub(super) fn apply(
 ) -> Result<(State, Stages)> {
     let after = solve(start, &before)?;
     let hat = match start.near.contact_acts(&before) {
-        true => hat + start.stepper.dt * start.near.contact_force(&after, &before, Dual::Frame),
+        true => hat + start.stepper.dt * start.near.contact_force(&after, Dual::Frame),
         false => hat,
     };
     let next = start.next_state(start.advance(&after), hat);
@@ -172,8 +165,7 @@ impl<'s> Adjoint<'s> {
         } else if split.free.is_empty() {
             Acting::Driven
         } else {
-            let ContactVelocities { before, after } = velocities;
-            Acting::Solved(hessian(e, split, after, before, start.stepper.dt)?)
+            Acting::Solved(hessian(e, split, &velocities.after, start.stepper.dt)?)
         };
         Ok(Self { velocities, acting })
     }
@@ -192,9 +184,10 @@ impl<'s> Adjoint<'s> {
         let (e, near, split) = (start.e, start.near, start.split);
         let ContactVelocities { before, after } = self.velocities;
         let w = split.put(&hessian.solve_vjp(&split.take(after_bar)));
-        let dt = start.stepper.dt;
-        let (pressed, lasting) = near.contact_force_vjp(after, before, &w, Dual::User);
-        bar.add(dt, &pressed);
+        bar.add(
+            start.stepper.dt,
+            &near.contact_force_vjp(after, &w, Dual::User),
+        );
         bar.add(-1.0, &e.mass_vjp(&(after - before), &w)?);
         // Driven velocities are what they are.
         let mut before_bar = after_bar.clone();
@@ -202,7 +195,7 @@ impl<'s> Adjoint<'s> {
         for &i in &split.free {
             before_bar[i] = moved[i];
         }
-        Ok(before_bar + dt * lasting)
+        Ok(before_bar)
     }
 
     /// Transpose of [`apply`]: cotangents of the velocity and of the momenta before contact; the rest is added to `bar`.
@@ -219,11 +212,9 @@ impl<'s> Adjoint<'s> {
         if matches!(self.acting, Acting::No) {
             return Ok((after_bar, hat_bar));
         }
-        let before = &self.velocities.before;
-        let (pressed, lasting) =
-            (start.near).contact_force_vjp(after, before, &hat_bar, Dual::Frame);
+        let pressed = start.near.contact_force_vjp(after, &hat_bar, Dual::Frame);
         bar.add(dt, &pressed);
         let before_bar = self.solve_vjp(start, &(after_bar + dt * &pressed.v), bar)?;
-        Ok((before_bar + dt * lasting, hat_bar))
+        Ok((before_bar, hat_bar))
     }
 }

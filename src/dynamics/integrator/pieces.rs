@@ -166,11 +166,9 @@ impl<'a> Stepper<'a> {
                 Some(points) => points,
                 None => system.contact_points(self.parameters, &kinematics.poses)?,
             };
-            let acting = stages.contact_velocities();
-            let [before, after] = acting
-                .map_or([v, v], |v| [&v.before, &v.after])
-                .map(|v| system.tree.twists(&kinematics, v));
-            let mut found = contact_forces(&points, [&before, &after], slack);
+            let acting = stages.contact_velocities().map_or(v, |v| &v.after);
+            let twists = system.tree.twists(&kinematics, acting);
+            let mut found = contact_forces(&points, &twists, slack);
             if record.pieces() > 1 {
                 let forces =
                     (found.iter_mut()).flat_map(|c| c.force.iter_mut().chain(&mut c.torque));

@@ -78,7 +78,7 @@ fn exchanges(simulator: &Simulator, steps: usize) -> Vec<Exchange> {
         let kinetic = |v: &DVector<f64>| 0.5 * v.dot(&(&e.mass_matrix * v));
         out.push(Exchange {
             gained: kinetic(&after) - kinetic(&before),
-            released: released(&e, &before, &after),
+            released: released(&e, &after),
             stored: elastic(&e),
             kinetic: kinetic(&before).max(kinetic(&after)),
         });

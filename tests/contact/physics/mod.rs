@@ -7,7 +7,6 @@ mod smooth;
 
 use super::tools::{RAIL, above_floor, contact, touching};
 use crate::support::{self, GRAVITY, run};
-use hydrograd::adjoint::contact::{HARD, SPENT, positive};
 use hydrograd::adjoint::lie::{Vec6, point_velocity};
 use hydrograd::adjoint::sample::Samples;
 use hydrograd::dynamics::{Evaluation, Input, Integrator, Linearisation, State, Stepper};
@@ -58,29 +57,17 @@ fn elastic(e: &Evaluation) -> f64 {
     e.contact_points.iter().map(of).sum()
 }
 
-/// What the contacts give up, by their law, between the configuration and what is foreseen with the velocity v in a step that would
-/// end with `before`, J.
-fn released(e: &Evaluation, before: &DVector<f64>, v: &DVector<f64>) -> f64 {
-    let [first, twists] = [before, v].map(|v| e.system.tree.twists(&e.kinematics, v));
+/// What the contacts give up, by their law, between the configuration and what is foreseen with the velocity v, J.
+fn released(e: &Evaluation, v: &DVector<f64>) -> f64 {
+    let twists = e.system.tree.twists(&e.kinematics, v);
     let mut out = 0.0;
     for t in &e.contact_points {
-        let still = t.law.stiction_speed;
-        // Along the normal, and the slip.
-        let parts = |twists: &[Vec6]| {
-            let relative: Vec6 = twists[t.first] - t.second.map_or(Vec6::zeros(), |b| twists[b]);
-            let u = point_velocity(&relative, &t.point.position);
-            let along = u.dot(&t.point.normal);
-            let across = (u - along * t.point.normal).norm_squared();
-            (along, (across + still * still).sqrt() - still)
-        };
-        let ((falls, slid), (along, slip)) = (parts(&first), parts(&twists));
-        let friction = t.law.friction;
-        let closing = positive(-falls, still).0;
-        let hit = positive(closing - t.law.gap / t.law.horizon, still).0;
-        let cost = friction * (SPENT * friction * closing + HARD * hit);
-        let lasting = positive(friction * slid - cost - still, still).0;
-        let spared = positive(lasting - friction * slip - still, still).0;
-        let approach = along - friction * slip + lasting - spared;
+        let relative: Vec6 = twists[t.first] - t.second.map_or(Vec6::zeros(), |b| twists[b]);
+        let u = point_velocity(&relative, &t.point.position);
+        let along = u.dot(&t.point.normal);
+        let across = (u - along * t.point.normal).norm_squared();
+        let slip = (across + t.law.stiction_speed.powi(2)).sqrt() - t.law.stiction_speed;
+        let approach = along - t.law.friction * slip;
         let x = t.law.gap - t.point.gap;
         let given =
             compressed(x, t.law.width) - compressed(x - t.law.horizon * approach, t.law.width);

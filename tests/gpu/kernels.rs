@@ -294,7 +294,7 @@ pub fn solves() {
             Preconditioner::Factors => {
                 model(Method::MfsVertex, &[WALL], Exclusions::none(), settings)
             }
-            Preconditioner::Jacobi => small(&[WALL], settings),
+            _ => small(&[WALL], settings),
         };
         let poses = &poses()[..model.bodies.len()];
         let g = columns(model.columns(), 4, 5.5);

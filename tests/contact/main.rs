@@ -7,6 +7,7 @@ mod joints;
 mod passing;
 mod physics;
 mod pieces;
+mod standard;
 mod tools;
 
 #[path = "../support/mod.rs"]

@@ -81,9 +81,8 @@ pub trait Coupling: Send + Sync {
     ) -> Result<Vec<Vec3>> {
         Err(Error::Unsupported {
             what: "the water's velocity with this fidelity or method".into(),
-            why: "only the sources of all bodies, solved together, give it up to the surfaces"
-                .into(),
-            instead: "use the fidelity full with the method mfs-vertex or mfs-face".into(),
+            why: "only all bodies' meshes, solved together, give it up to the surfaces".into(),
+            instead: "use the fidelity full".into(),
         })
     }
 }

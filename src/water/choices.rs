@@ -34,6 +34,7 @@ impl WaterChoices {
         match preset {
             Preset::Default => Self::default(),
             Preset::Paper => Self {
+                fidelity: Fidelity::Full,
                 method: Method::MfsFace,
                 numerics: Numerics {
                     mfs: boundary::MfsSettings {

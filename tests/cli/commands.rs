@@ -287,6 +287,16 @@ fn settings_reach_the_simulator() {
         (&mixed["method"], &mixed["integrator"]),
         (&"mfs-face".into(), &"rk4".into())
     );
+    let default = json(&base);
+    assert_eq!(
+        (
+            &default["fidelity"],
+            &default["fidelity_used"],
+            &default["method"]
+        ),
+        (&"auto".into(), &"reduced".into(), &"auto".into())
+    );
+    let base = [&base[..], &["--fidelity", "full"]].concat();
     let plain = json(&base);
     assert_eq!(
         (&plain["method"], &plain["integrator"]),
@@ -455,6 +465,8 @@ fn gradcheck_passes_and_tells_its_cost() {
         "80",
         "--steps",
         "2",
+        "--fidelity",
+        "full",
         "--tolerance",
         "0.1",
         "--json",

@@ -335,7 +335,13 @@ fn gradients_isolated() {
 
 #[test]
 fn gradients_coupled() {
-    gradients(Fidelity::Full, 3, TREES);
+    gradients(Fidelity::Reduced, 3, TREES);
+    // What an integrator makes of a coupling doesn't depend on which it is: all bodies solved together take long.
+    for (tree, integrator) in TREES.zip(INTEGRATORS.into_iter().cycle()) {
+        let scene = scene(tree);
+        let chosen = settings(Fidelity::Full).integrator(integrator);
+        check(&mut Simulator::new(&scene, chosen).unwrap(), &scene.name, 3);
+    }
 }
 
 /// Pushes always, holds one body's joint during some steps, then lets it go.
@@ -401,7 +407,7 @@ fn gradients_through_hold_and_release() {
     }
     for integrator in INTEGRATORS {
         check(
-            &mut held(0, 1, Fidelity::Full, integrator),
+            &mut held(0, 1, Fidelity::Reduced, integrator),
             "tree 0, body 1 held",
             5,
         );

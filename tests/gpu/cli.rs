@@ -71,7 +71,7 @@ fn other_commands_run_on_the_gpu() {
         "--faces",
         "20",
         "--steps",
-        "2",
+        "1",
         "--directions",
         "1",
         "--no-growth",

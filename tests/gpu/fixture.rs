@@ -67,6 +67,15 @@ pub fn model(
     Arc::new(Model::new(bodies, walls, excluded, settings).unwrap())
 }
 
+/// Two bodies: without factors, solves of more take minutes on a software driver.
+pub fn small(walls: &[Wall], settings: SolveSettings) -> Arc<Model> {
+    let bodies = vec![
+        body(&Shape::sphere(0.5), 20, Method::MfsVertex),
+        body(&Shape::ellipsoid([0.6, 0.3, 0.4]), 80, Method::MfsVertex),
+    ];
+    Arc::new(Model::new(bodies, walls, Exclusions::none(), settings).unwrap())
+}
+
 pub fn tight(preconditioner: Preconditioner) -> SolveSettings {
     SolveSettings {
         preconditioner,
@@ -75,7 +84,7 @@ pub fn tight(preconditioner: Preconditioner) -> SolveSettings {
     }
 }
 
-/// Poses above both walls.
+/// Poses above both walls, of three bodies.
 pub fn poses() -> Vec<Pose> {
     let at = |w: [f64; 3], t: [f64; 3]| Pose::new(exp_matrix(&Vec3::from(w)), Vec3::from(t));
     vec![

@@ -97,7 +97,7 @@ fn what_the_gpu_has_no_part_in_runs_on_the_cpu_or_is_refused() {
     assert!(warnings.contains("nothing to compute"), "{warnings}");
 
     // A fallback is for devices that fail, not for what isn't offered.
-    let wanted = settings().gpu(with_fallback());
+    let wanted = settings().fidelity(Fidelity::Full).gpu(with_fallback());
     let dense = wanted.solver(FullSolver::Qr);
     for (settings, word) in [(wanted.method(Method::Panel), "panel"), (dense, "Qr")] {
         let found = error(settings);
@@ -172,7 +172,7 @@ fn a_device_lost_before_the_gradient_is_an_error_with_its_time() {
     simulator.context().unwrap().lose();
     let goal = objective::final_coordinate(1, 0.7, 1.0);
     let found = rollout.gradient(&goal).err().unwrap();
-    says(&found, &["lost", "t = 0.06 s"]);
+    says(&found, &["lost", "t = 0.04 s"]);
 }
 
 #[test]

@@ -70,7 +70,7 @@ fn settings_out_of_place_are_told() {
             .warnings()
             .join("\n")
     };
-    let full = Settings::default().faces(80);
+    let full = Settings::default().faces(80).fidelity(Fidelity::Full);
     assert!(warned(full.rank(10)).contains("rank has no effect with the fidelity full"));
     let reduced = full.fidelity(Fidelity::Reduced);
     assert!(warned(reduced.rank(2)).contains("compressed sources leave"));
@@ -85,7 +85,7 @@ fn settings_out_of_place_are_told() {
     assert!(refused(reduced.resolved_gap(1e9)).contains("radii of the body"));
     let mut plate = Scene::new(Fluid::fresh_water());
     plate.add(Body::new(Shape::cuboid([1.0, 0.003, 1.0])).density(1000.0));
-    let thin = Simulator::new(&plate, Settings::default())
+    let thin = Simulator::new(&plate, Settings::default().fidelity(Fidelity::Full))
         .map(|_| ())
         .unwrap_err()
         .to_string();

@@ -275,7 +275,7 @@ fn settings_out_of_range_are_refused_by_name() {
     }
     let mut free = scene();
     free.walls[0].surface = WallSurface::Free;
-    let said = Simulator::new(&free, Settings::default())
+    let said = Simulator::new(&free, Settings::default().fidelity(Fidelity::Full))
         .err()
         .unwrap()
         .to_string();

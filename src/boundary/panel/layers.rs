@@ -55,6 +55,8 @@ pub(crate) struct Panels {
     /// Row weights 1/4π.
     triangles: Triangles,
     vertices: Vec<Vec3>,
+    /// Numbers of each panel's vertices.
+    corners: Vec<[u32; 3]>,
     /// Ends and length of each edge.
     edges: Vec<([u32; 2], f64)>,
     panels: Vec<Panel>,
@@ -93,6 +95,7 @@ impl Panels {
         Self {
             triangles: Triangles::new(vertices, faces, vec![0.25 / PI; faces.len()]),
             vertices: vertices.to_vec(),
+            corners: faces.iter().map(|f| f.map(|v| v as u32)).collect(),
             edges,
             panels,
         }
@@ -101,6 +104,16 @@ impl Panels {
     /// The triangles, row weights 1/4π.
     pub fn triangles(&self) -> &Triangles {
         &self.triangles
+    }
+
+    /// Vertices, m.
+    pub fn vertices(&self) -> &[Vec3] {
+        &self.vertices
+    }
+
+    /// Numbers of each panel's vertices.
+    pub fn corners(&self) -> &[[u32; 3]] {
+        &self.corners
     }
 
     /// Number of panels.

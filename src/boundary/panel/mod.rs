@@ -21,6 +21,7 @@
 
 mod layers;
 pub mod richardson;
+mod sheet;
 
 use super::{Response, asymmetry, potentials};
 use crate::adjoint::kernel::Write;

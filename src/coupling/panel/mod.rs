@@ -30,12 +30,12 @@ use super::full::SolveSettings;
 use super::response::Solved;
 use super::settings::{check_limits, end, ranges};
 use super::{Coupling, Exclusions, Linearise, Linearised, Momenta};
-use crate::adjoint::lie::{Mat6, Pose};
+use crate::adjoint::lie::{Mat6, Pose, Vec3};
 use crate::boundary::PanelBoundary;
 use crate::boundary::panel::check_size;
 use crate::geometry::{HalfSpace, Image, Wall};
 use crate::{Error, Result};
-use nalgebra::DMatrix;
+use nalgebra::{DMatrix, DVector};
 use placed::{PanelSolution, PlacedPanels};
 use std::ops::Range;
 use std::sync::Arc;
@@ -145,6 +145,34 @@ impl Coupling for PanelCoupled {
 
     fn differentiable(&self) -> Option<&dyn Linearise> {
         Some(self)
+    }
+
+    /// Sheets of vorticity and sources on all bodies and their images ([`crate::boundary::panel`]). Bodies that don't feel each
+    /// other are solved as if the other weren't there; the flow is the sum of theirs.
+    fn velocity(
+        &self,
+        poses: &[Pose],
+        twists: &DVector<f64>,
+        points: &[Vec3],
+    ) -> Result<Vec<Vec3>> {
+        let column = DMatrix::from_column_slice(twists.len(), 1, twists.as_slice());
+        let placed = PlacedPanels::new(self, poses, &column)?;
+        let phi = placed.potentials(&column)?.x;
+        let mut out = vec![Vec3::zeros(); points.len()];
+        for (b, body) in self.bodies.iter().enumerate() {
+            let resting = || vec![0.0; body.faces.len()];
+            let q = placed.normal_velocity(b, &column).unwrap_or_else(resting);
+            for image in &self.images {
+                let (rotation, shift) = image.placement(&poses[b]);
+                let seen: Vec<Vec3> = (points.iter())
+                    .map(|x| rotation.tr_mul(&(x - shift)))
+                    .collect();
+                let made = body.velocity(&q, phi.slice(&self.faces[b]), &seen);
+                let turned = made.iter().map(|u| image.sign * (rotation * u));
+                out.iter_mut().zip(turned).for_each(|(o, u)| *o += u);
+            }
+        }
+        Ok(out)
     }
 }
 

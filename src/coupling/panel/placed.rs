@@ -7,7 +7,7 @@ use crate::adjoint::lie::{Pose, Vec6};
 use crate::coupling::pair::Pair;
 use crate::coupling::response::{self, body_twists, moves};
 use crate::coupling::{CoupledResponse, Direction, PairTensor, Reached, Tangent};
-use crate::solver::Columns;
+use crate::solver::{Columns, Outcome};
 use crate::{Error, Result};
 use nalgebra::{DMatrix, DVector};
 use std::ops::Range;
@@ -50,6 +50,14 @@ impl<'a> PlacedPanels<'a> {
             pairs,
             system,
         })
+    }
+
+    /// Potentials of the panels for columns of twists.
+    ///
+    /// # Errors
+    /// A solve that misses its tolerance.
+    pub fn potentials(&self, twists: &DMatrix<f64>) -> Result<Outcome> {
+        self.system.solve(&self.right(twists), false)
     }
 
     /// D F x̄ of columns of twists: fluxes through the panels.
@@ -160,7 +168,7 @@ impl<'a> PanelSolution<'a> {
     /// A solve that misses its tolerance.
     pub fn new(placed: Arc<PlacedPanels<'a>>, twists: DMatrix<f64>) -> Result<Self> {
         let mu = placed.system.solve(&placed.flux(&twists), true)?;
-        let phi = placed.system.solve(&placed.right(&twists), false)?;
+        let phi = placed.potentials(&twists)?;
         let [from_mu, from_phi] = [&mu, &phi].map(|s| Reached {
             iterations: s.iterations,
             residual: s.residual,

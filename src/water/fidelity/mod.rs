@@ -21,9 +21,9 @@ listed! {
         /// All bodies coupled, each compressed to a few sources; walls as images.
         Reduced => reduced::Reduced,
         /// `reduced`, with what each body and pair needs chosen for the scene; `full` where that can't resolve it.
+        #[default]
         Auto => auto::Auto,
         /// All bodies coupled, at the resolution of their meshes (Eq. 18–20); walls as images.
-        #[default]
         Full => full::Full,
     }
 }

@@ -133,6 +133,8 @@ fn a_ball_stops_at_the_arm_of_a_bracket() {
 fn gradients_through_pieces() {
     let mut soft = peg();
     contact(&mut soft).stiffness = Some(2e4);
+    // Not upright: of a box that lands flat all corners touch at once, where the force has a second derivative on one side alone.
+    soft.bodies[1].placement.rotation = [0.03, -0.02, 0.1];
     for (name, scene, steps) in [("peg", soft, 25), ("ball", ball(), 30)] {
         check_gradient(name, &mut made(&scene), steps, 3, 1e-5);
     }

@@ -232,3 +232,31 @@ def test_springs_and_screws():
         scene.add_force("spring", body="nut", stiffness=1.0, lenght=2.0)
     with pytest.raises(hg.InputError, match="screw: axis"):
         hg.screw((0, 0), 0.1)
+
+
+def test_pieces_and_torsional_friction():
+    radius, torsional = 0.1, 0.002
+    contact = hg.Contact(torsional_friction=torsional, rolling_friction=1e-3)
+    scene = hg.Scene(fluid=hg.Fluid(density=0.0), gravity=(0, 0, -9.81), contact=contact, time_step=0.01, steps=40)
+    scene.add_wall((0, 0, 0), (0, 0, 1))
+    # Of two balls one lies within the other: what touches is the outer.
+    pieces = [hg.sphere(radius), (hg.sphere(0.05), (0, 0, 0.02)), (hg.sphere(0.05), (0, 0, 0.02), (0.1, 0, 0))]
+    ball = hg.Body(hg.sphere(radius), name="ball", density=1000.0, position=(0, 0, 1.01 * radius), collision=pieces)
+    scene.add(ball)
+    assert hg.Scene.from_toml(scene.to_toml()) == scene
+    sim = hg.Simulator(scene, fidelity="isolated").with_start(v=np.array([0, 0, 0, 0, 0, 5.0]))
+    spin = sim.rollout().v[:, 5]
+    slows = (spin[10] - spin[40]) / 0.3
+    assert slows == pytest.approx(torsional * 9.81 / (0.4 * radius**2), rel=1e-3)
+    seed = np.zeros((41, 6))
+    seed[-1, 5] = 1.0
+    name = "contact.torsional_friction"
+    found = sim.rollout().vjp(v=seed).parameters[name]
+
+    def value(x):
+        return sim.with_parameters({name: x}).rollout().v[-1, 5]
+
+    slope = (value(torsional + 1e-6) - value(torsional - 1e-6)) / 2e-6
+    assert found == pytest.approx(slope, rel=1e-6)
+    with pytest.raises(hg.InputError, match=r"ball.*collision\[0\].*position"):
+        hg.Body(hg.sphere(radius), name="ball", collision=[(hg.sphere(0.05), (0, 0))])

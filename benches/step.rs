@@ -2,7 +2,7 @@
 //!
 //! `cargo bench --bench step [-- SCENE] [--quick]`. Prints one row per scene and configuration: seconds per forward step (all
 //! derivatives that a step needs included), gradient of the rollout as a ratio to its forward pass, peak
-//! memory of the process so far, and iterations; beside the default coupled panels, the other integrators, a looser tolerance, the
+//! memory of the process so far, and iterations; beside `full` as it is by default coupled panels, the other integrators, a looser tolerance, the
 //! paper's choices, a dense QR, Jacobi preconditioning and `isolated`.
 
 #[allow(dead_code)]
@@ -65,7 +65,7 @@ fn main() {
             continue;
         }
         let scene = example(name);
-        let base = Settings::default();
+        let base = Settings::default().fidelity(Fidelity::Full);
         let with = |solver, preconditioner| base.solver(solver).preconditioner(preconditioner);
         let jacobi = Settings {
             max_iterations: Some(5_000),
@@ -73,7 +73,7 @@ fn main() {
         };
         let one_evaluation = |s: &Settings| s.integrator(Integrator::MomentumEuler);
         let rows = [
-            ("default", base.clone(), 5, 5),
+            ("full", base.clone(), 5, 5),
             ("panels", base.method(Method::Panel), 5, 5),
             ("momentum Euler", one_evaluation(&base), 5, 5),
             (
@@ -96,7 +96,7 @@ fn main() {
         ];
         for (configuration, settings, steps, repeat) in rows {
             let quick = arguments.iter().any(|a| a == "--quick");
-            if quick && !["default", "panels"].contains(&configuration) {
+            if quick && !["full", "panels"].contains(&configuration) {
                 continue;
             }
             let r = match measure(&scene, configuration, settings, steps, repeat) {

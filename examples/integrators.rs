@@ -103,7 +103,7 @@ fn pushed(faces: usize) -> Result<()> {
     let mut scene = scene("falling_ball")?;
     scene.steps = 150;
     let title = format!("{}, {} steps", scene.name, scene.steps);
-    let settings = Settings::default().faces(faces);
+    let settings = Settings::default().fidelity(Fidelity::Full).faces(faces);
     let fine = settings
         .integrator(Integrator::Midpoint)
         .time_step(scene.time_step / RATIO as f64);
@@ -126,6 +126,7 @@ fn orders() -> Result<()> {
     let scene = scene("coins")?;
     let end = |integrator, steps: usize| {
         let settings = Settings::default()
+            .fidelity(Fidelity::Full)
             .integrator(integrator)
             .tolerance(1e-13)
             .time_step(0.16 / steps as f64);

@@ -110,7 +110,7 @@ fn rolling_resistance_holds_a_ball_on_a_slope() {
     within("slope of rolling", 0.5 * (low + high), exact, 0.01);
 }
 
-/// A ball, an ellipsoid and a box that land, spin, roll and slide on a floor and on one another.
+/// A ball, an ellipsoid and a box that land, spin, roll and slide on a floor.
 #[test]
 fn gradients_through_torsional_and_rolling_friction() {
     for integrator in CONTACT_INTEGRATORS {

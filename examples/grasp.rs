@@ -8,17 +8,23 @@
 //! where the coin lies well between the fingers before they touch it; from there the whole trajectory, to a coin that is held.
 //!
 //! ```text
+//! cargo run --release --example grasp -- --random N [--seed S] [--json]
 //! cargo run --release --example grasp -- [--json] [--out FOLDER] [--replay full] [--rival-seeds N] [--rival-cap N] [--no-rival]
 //! ```
 //!
 //! Into the folder go the found trajectory as CSV and JSON, the scene with the found forces as its controller (`grasp_caught.toml`, to be run
 //! again with any fidelity), and a picture. `--replay full` runs it with the coupled equations of all bodies on meshes fine enough for the
 //! gap; the rival is CMA-ES with the same cost, start and knots.
+//!
+//! `--random N` catches N coins that nobody tuned for ([`random`]): coin, friction and fingers are drawn by a seed, the settings are those of
+//! [`hydrograd::optimize::grasp`] for all.
 
 #[path = "grasp/hold.rs"]
 mod hold;
 #[path = "grasp/plot.rs"]
 mod plot;
+#[path = "grasp/random.rs"]
+mod random;
 #[path = "grasp/replay.rs"]
 mod replay;
 #[path = "grasp/rival.rs"]
@@ -45,6 +51,9 @@ struct Options {
     seeds: usize,
     /// Most simulations of a rival; none: eleven times those of the descent.
     cap: Option<usize>,
+    /// Random grasps instead.
+    random: Option<usize>,
+    seed: u64,
 }
 
 #[derive(Serialize)]
@@ -87,6 +96,9 @@ struct Report {
 
 fn main() -> Result<(), Box<dyn Error>> {
     let options = options()?;
+    if let Some(count) = options.random {
+        return several(count, &options);
+    }
     Recording::prepare(&options.out)?;
     let start = Instant::now();
     let scene = task::load()?;
@@ -161,6 +173,21 @@ fn main() -> Result<(), Box<dyn Error>> {
     match options.json {
         true => println!("{}", serde_json::to_string(&report)?),
         false => print(&report, &optimised),
+    }
+    Ok(())
+}
+
+/// Grasps that are drawn by a seed.
+fn several(count: usize, options: &Options) -> Result<(), Box<dyn Error>> {
+    let start = Instant::now();
+    let found = random::run(&task::load()?, count, options.seed)?;
+    let caught = found.iter().filter(|o| o.caught).count();
+    match options.json {
+        true => println!("{}", serde_json::to_string(&found)?),
+        false => println!(
+            "{caught} of {count} caught, {:.0} s",
+            start.elapsed().as_secs_f64()
+        ),
     }
     Ok(())
 }
@@ -245,6 +272,8 @@ fn options() -> Result<Options, String> {
         rival: true,
         seeds: 5,
         cap: None,
+        random: None,
+        seed: 1,
     };
     let mut arguments = std::env::args().skip(1);
     while let Some(name) = arguments.next() {
@@ -258,11 +287,13 @@ fn options() -> Result<Options, String> {
                 other => return Err(format!("--replay {other}: expected full")),
             },
             "--no-rival" => out.rival = false,
+            "--random" => out.random = Some(number(value()?)?),
+            "--seed" => out.seed = number(value()?)? as u64,
             "--rival-seeds" => out.seeds = number(value()?)?,
             "--rival-cap" => out.cap = Some(number(value()?)?),
             _ => {
                 return Err(format!(
-                    "{name}: expected --json, --out, --replay, --rival-seeds, --rival-cap or --no-rival"
+                    "{name}: expected --random, --seed, --json, --out, --replay, --rival-seeds, --rival-cap or --no-rival"
                 ));
             }
         }

@@ -54,6 +54,13 @@ impl Samples {
         low + 0.5 * (high - low) * (self.number() + 1.0)
     }
 
+    /// The next number of a standard normal distribution, by the transformation of Box and Muller.
+    pub fn normal(&mut self) -> f64 {
+        // In (0, 1], so that the logarithm is finite.
+        let radius = (-2.0 * (1.0 - self.between(0.0, 1.0)).ln()).sqrt();
+        radius * (std::f64::consts::PI * self.number()).cos()
+    }
+
     /// One of 0, …, `count` − 1.
     pub fn below(&mut self, count: usize) -> usize {
         (0.5 * (self.number() + 1.0) * count as f64) as usize

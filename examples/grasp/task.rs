@@ -11,7 +11,7 @@ use std::path::Path;
 use std::time::Instant;
 
 /// Largest force on the column and on each finger, N.
-const LIMITS: [f64; 3] = [500.0; 3];
+pub const LIMITS: [f64; 3] = [500.0; 3];
 /// Knots of the controls, a quarter of a second apart.
 const KNOTS: usize = 11;
 /// Steps of the approach: until shortly before the fingers touch the coin.

@@ -354,6 +354,12 @@ impl Parameters {
         contact(self.table.bodies).map(|i| self[i])
     }
 
+    /// Divides the stiffness of contact.
+    pub fn soften_contact(&mut self, factor: f64) {
+        let [stiffness, ..] = contact(self.table.bodies);
+        self[stiffness] /= factor;
+    }
+
     /// Adds to the parameters of contact.
     pub fn add_contact(&mut self, more: [f64; 5]) {
         for (i, x) in contact(self.table.bodies).into_iter().zip(more) {

@@ -123,7 +123,7 @@ fn clipped(mut gradient: Vector, longest: f64) -> Vector {
 }
 
 /// Refuses what isn't a number, and gradients of another length than the point has.
-fn checked(result: Result<(f64, Vector)>, length: usize) -> Result<(f64, Vector)> {
+pub(super) fn checked(result: Result<(f64, Vector)>, length: usize) -> Result<(f64, Vector)> {
     let (cost, gradient) = result?;
     if gradient.len() != length {
         return Err(Error::input(

@@ -7,13 +7,22 @@
 //! The descent is L-BFGS with the line search of Moré and Thuente, from the crate `argmin`. A trial whose simulation fails
 //! (bodies driven into one another, a step too long) doesn't end it: the search is turned back towards the best point so far.
 //!
+//! Through contact a trajectory's own gradient may say little: [`smoothed`] averages it over a neighbourhood, [`continuation`] descends softer contact first, and
+//! [`grasp()`] is a recipe of these, pushes and an evolution strategy with which a gripper catches what it hasn't seen.
+//!
 //! # References
 //! J. Nocedal, "Updating Quasi-Newton Matrices with Limited Storage", 1980; J. Moré and D. Thuente, "Line Search Algorithms with
 //! Guaranteed Sufficient Decrease", 1994.
 
+mod continuation;
 mod descent;
+mod grasp;
+mod smoothed;
 
+pub use continuation::continuation;
 pub use descent::minimise;
+pub use grasp::{Finger, Grasp, GraspCost, GraspSettings, GraspStage, GraspTask, grasp};
+pub use smoothed::{Estimate, Smoothed, Smoothing, smoothed};
 
 use crate::simulate::{Controls, Objective, Simulator};
 use crate::{Error, Result};

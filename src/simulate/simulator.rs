@@ -173,6 +173,24 @@ impl Simulator {
         Ok(())
     }
 
+    /// The same with contact that sets in over `factor` times its width, with a stiffness `factor` times smaller: what a descent starts on,
+    /// and hardens ([`crate::optimize::continuation`]). Nothing changes where nothing touches.
+    ///
+    /// # Errors
+    /// A factor that isn't a positive number.
+    pub fn soften_contact(&mut self, factor: f64) -> Result<()> {
+        if !(factor > 0.0 && factor.is_finite()) {
+            let expected = "must be a positive number";
+            return Err(Error::input("softening of contact", factor, expected));
+        }
+        let assembled = Arc::make_mut(&mut self.assembled);
+        if let Some(contact) = &mut assembled.system.contact {
+            contact.laws.iter_mut().for_each(|law| law.width *= factor);
+            assembled.parameters.soften_contact(factor);
+        }
+        Ok(())
+    }
+
     /// Replaces the parameters unchecked: differences step across zero.
     pub(super) fn replace_parameters(&mut self, parameters: Parameters) {
         Arc::make_mut(&mut self.assembled).parameters = parameters;

@@ -11,6 +11,8 @@ mod observables;
 mod optimize;
 mod resume;
 mod rollout_gradient;
+#[cfg(feature = "opt")]
+mod smoothing;
 mod trees;
 
 #[path = "../support/mod.rs"]

@@ -37,7 +37,8 @@ pub fn rungs() -> Vec<Rung> {
         "dynamics::integrator::velocity_euler::Adjoint::vjp" => |c| step(Integrator::VelocityEuler, c),
         "dynamics::integrator::record::LinearisedStep::jvp" => |c| all(INTEGRATORS.map(|i| step_jvp(i, c))),
         "simulate::record::Record::jvp" => record_jvp,
-        "simulate::observable::angular_momentum::AngularMomentum::vjp" => angular_momentum,
+        "simulate::observable::angular_momentum::AngularMomentum::vjp" => |c| observed("angular_momentum", c),
+        "simulate::observable::velocity::Velocities::vjp" => |c| observed("velocities", c),
     ]
 }
 
@@ -594,9 +595,8 @@ fn moving_point() -> Point {
     p
 }
 
-/// Read at a state by itself: through its momentum, which the state carries, and directly.
-fn angular_momentum(c: f64) -> Outcome {
-    const NAME: &str = "angular_momentum";
+/// An observable, read at a state by itself: through its momentum, which the state carries, and directly.
+fn observed(name: &str, c: f64) -> Outcome {
     let run = |p: &Point| {
         let mut simulator = simulator().clone();
         let mut parameters = p.parameters.clone();
@@ -620,12 +620,12 @@ fn angular_momentum(c: f64) -> Outcome {
         p.parameters.set(name, 0.1).unwrap();
     }
     let base = run(&p);
-    let bar = wavy(3 * system().len(), 5.1, 1.0);
+    let bar = wavy(base.observe(name).unwrap().nrows(), 5.1, 1.0);
     let mut seed = base.zero_cotangents();
     let column = DMatrix::from_column_slice(bar.len(), 1, bar.as_slice());
-    seed.observables.insert(NAME.into(), column);
+    seed.observables.insert(name.into(), column);
     let g = base.vjp(&seed).unwrap();
-    let value = |p: &Point| run(p).observe(NAME).unwrap().column(0).dot(&bar);
+    let value = |p: &Point| run(p).observe(name).unwrap().column(0).dot(&bar);
     let bar = Bar {
         q: g.initial.q,
         v: g.initial.v,

@@ -1,8 +1,8 @@
 //! Velocities of the bodies.
 
-use super::entry::{Observable, Reading, by_body};
+use super::entry::{Observable, Observed, ObservedBars, Reading, Transpose, by_body};
 use crate::Result;
-use crate::adjoint::lie::{angular, point_velocity};
+use crate::adjoint::lie::{Vec3, angular, point_velocity, point_wrench, six};
 use crate::dynamics::System;
 use crate::scene::Scene;
 
@@ -30,6 +30,28 @@ impl Observable for Velocities {
 
     fn value(&self, at: &Reading) -> Result<Vec<f64>> {
         Ok(velocities(at))
+    }
+
+    fn transpose(&self) -> Option<&dyn Transpose> {
+        Some(self)
+    }
+}
+
+impl Transpose for Velocities {
+    fn tangents(&self, system: &System) -> usize {
+        6 * system.len()
+    }
+
+    fn vjp(&self, at: &Observed, bar: &[f64], out: &mut ObservedBars) {
+        for (b, bar) in bar.chunks_exact(6).enumerate() {
+            let (bar, rates) = bar.split_at(3);
+            let (bar, rates) = (Vec3::from_column_slice(bar), Vec3::from_column_slice(rates));
+            let origin = at.kinematics.poses[b].translation;
+            out.twist[b] += point_wrench(&origin, &bar) + six(&Vec3::zeros(), &rates);
+            // At a given twist the origin's velocity is V + ω × x.
+            let moved = bar.cross(&angular(&at.twists[b]));
+            out.pose[b] += point_wrench(&origin, &moved);
+        }
     }
 }
 

@@ -71,6 +71,12 @@ fn _rollout<'py>(
     simulator.call_method("rollout", (controls,), Some(&options))
 }
 
+/// Runs the command line; its exit code. It is the process's own: Ctrl-C ends it as it does any program.
+#[pyfunction]
+fn _command(py: Python<'_>, arguments: Vec<std::ffi::OsString>) -> u8 {
+    py.detach(|| hydrograd::cli::run(arguments) as u8)
+}
+
 /// Rigid bodies in water, simulated and differentiated; the compiled part of `hydrograd`.
 #[pymodule]
 fn _hydrograd(m: &Bound<'_, PyModule>) -> PyResult<()> {
@@ -95,5 +101,6 @@ fn _hydrograd(m: &Bound<'_, PyModule>) -> PyResult<()> {
     m.add_function(wrap_pyfunction!(_state, m)?)?;
     m.add_function(wrap_pyfunction!(_rollout, m)?)?;
     m.add_function(wrap_pyfunction!(tradeoff::tradeoff, m)?)?;
+    m.add_function(wrap_pyfunction!(_command, m)?)?;
     objective::register(m)
 }

@@ -2,12 +2,12 @@
 
 use std::fmt;
 use std::path::{Path, PathBuf};
-use std::process::ExitCode;
 use std::time::Instant;
 
 use clap::Args;
 use serde::Serialize;
 
+use super::exit::Exit;
 use super::options::Water;
 use super::output::{ChoicesReport, Output, write_warnings};
 use crate::scene::{Body, Fluid, Scene, Shape};
@@ -112,10 +112,10 @@ pub(super) struct AddedMassReport {
     pub error_estimate: Option<ErrorEstimate>,
 }
 
-pub(super) fn main(arguments: &Arguments, output: Output) -> Result<ExitCode> {
+pub(super) fn main(arguments: &Arguments, output: Output) -> Result<Exit> {
     let scene = arguments.source.scene(arguments.density)?;
     output.result(&added_mass(&scene, arguments)?);
-    Ok(ExitCode::SUCCESS)
+    Ok(Exit::Done)
 }
 
 /// M_f of all bodies at the scene's start.

@@ -1,10 +1,10 @@
 //! `hydrograd check-mesh`: whether a mesh can be simulated.
 
 use std::path::PathBuf;
-use std::process::ExitCode;
 
 use clap::Args;
 
+use super::exit::Exit;
 use super::output::Output;
 use crate::Result;
 
@@ -25,7 +25,7 @@ pub(super) struct Arguments {
 
 /// Prints the report, good or bad; a bad mesh is a failure of the command as well.
 #[cfg(feature = "meshio")]
-pub(super) fn main(arguments: &Arguments, output: Output) -> Result<ExitCode> {
+pub(super) fn main(arguments: &Arguments, output: Output) -> Result<Exit> {
     let mesh = crate::shape::file::read_unchecked(&arguments.file, arguments.scale)?;
     let report = mesh.check();
     let error = report.clone().into_result().err();
@@ -36,14 +36,14 @@ pub(super) fn main(arguments: &Arguments, output: Output) -> Result<ExitCode> {
         mesh: report,
     });
     let Some(error) = error else {
-        return Ok(ExitCode::SUCCESS);
+        return Ok(Exit::Done);
     };
     output.error_for_people(&error);
-    Ok(ExitCode::FAILURE)
+    Ok(Exit::Failed)
 }
 
 #[cfg(not(feature = "meshio"))]
-pub(super) fn main(arguments: &Arguments, _output: Output) -> Result<ExitCode> {
+pub(super) fn main(arguments: &Arguments, _output: Output) -> Result<Exit> {
     Err(crate::Error::Unsupported {
         what: format!("reading {}", arguments.file.display()),
         why: "this build leaves out mesh files".into(),

@@ -1,9 +1,8 @@
 //! `hydrograd gpu-info`: the GPUs of this machine, and which one would be used.
 
-use std::process::ExitCode;
-
 use clap::Args;
 
+use super::exit::Exit;
 use super::options::Adapter;
 use super::output::Output;
 use crate::Result;
@@ -16,24 +15,24 @@ pub(super) struct Arguments {
 
 /// Lists every adapter. One that can't be used as asked is a failure of the command as well.
 #[cfg(feature = "gpu")]
-pub(super) fn main(arguments: &Arguments, output: Output) -> Result<ExitCode> {
+pub(super) fn main(arguments: &Arguments, output: Output) -> Result<Exit> {
     let adapters = crate::gpu::adapters();
     let opened = crate::gpu::Context::new(&(&arguments.adapter.settings(false)).into());
     if adapters.is_empty() {
         // Its error says what to install.
         opened?;
-        return Ok(ExitCode::SUCCESS);
+        return Ok(Exit::Done);
     }
     output.result(&report::AdaptersReport::new(&adapters, &opened));
     let Err(error) = opened else {
-        return Ok(ExitCode::SUCCESS);
+        return Ok(Exit::Done);
     };
     output.error_for_people(&error);
-    Ok(ExitCode::FAILURE)
+    Ok(Exit::Failed)
 }
 
 #[cfg(not(feature = "gpu"))]
-pub(super) fn main(_: &Arguments, _: Output) -> Result<ExitCode> {
+pub(super) fn main(_: &Arguments, _: Output) -> Result<Exit> {
     Err(crate::water::backend::not_built())
 }
 

@@ -1,11 +1,11 @@
 //! `hydrograd gradcheck`: the reverse sweep against finite differences.
 
 use std::fmt;
-use std::process::ExitCode;
 
 use clap::Args;
 use serde::Serialize;
 
+use super::exit::Exit;
 use super::options::{Simulation, positive};
 use super::output::{ChoicesReport, Output, progress_bar, set_progress, write_warnings};
 use crate::Result;
@@ -74,18 +74,14 @@ pub(super) struct CheckReport {
     pub warnings: Vec<String>,
 }
 
-pub(super) fn main(arguments: &Arguments, output: Output) -> Result<ExitCode> {
+pub(super) fn main(arguments: &Arguments, output: Output) -> Result<Exit> {
     let scene = arguments.simulation.scene()?;
     let progress = progress_bar("directions", 3 * arguments.directions);
     let done = |done, all| set_progress(&progress, done, all);
     let report = check(&scene, arguments, done)?;
     drop(progress);
     output.result(&report);
-    Ok(if report.ok {
-        ExitCode::SUCCESS
-    } else {
-        ExitCode::FAILURE
-    })
+    Ok(if report.ok { Exit::Done } else { Exit::Failed })
 }
 
 /// The check at a tight tolerance, then the times at the usual one.

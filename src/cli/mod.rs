@@ -6,6 +6,7 @@
 
 mod added_mass;
 mod check_mesh;
+mod exit;
 mod gpu_info;
 mod gradcheck;
 mod options;
@@ -13,10 +14,12 @@ mod output;
 mod run;
 mod tradeoff;
 
+use std::ffi::OsString;
 use std::process::ExitCode;
 
 use clap::{Parser, Subcommand};
 
+pub use exit::Exit;
 use output::Output;
 
 /// Rigid bodies that feel each other through the water: simulation and exact gradients.
@@ -53,18 +56,24 @@ enum Command {
 
 /// Runs the command line of this process.
 pub fn main() -> ExitCode {
-    let cli = match Cli::try_parse() {
+    run(std::env::args_os().collect()).into()
+}
+
+/// Runs a command line; the first argument is the program's name.
+pub fn run(arguments: Vec<OsString>) -> Exit {
+    let asked_json = arguments.iter().any(|a| a == "--json");
+    let cli = match Cli::try_parse_from(arguments) {
         Ok(cli) => cli,
         Err(error) => {
             // Help and version come this way too; they belong on standard output.
             let wrong = error.use_stderr();
             if error.print().is_err() || !wrong {
-                return ExitCode::from(if wrong { 2 } else { 0 });
+                return if wrong { Exit::Usage } else { Exit::Done };
             }
-            if std::env::args_os().any(|a| a == "--json") {
+            if asked_json {
                 output::print_error_object(error.to_string().trim());
             }
-            return ExitCode::from(2);
+            return Exit::Usage;
         }
     };
     let output = Output { json: cli.json };
@@ -78,7 +87,7 @@ pub fn main() -> ExitCode {
     };
     done.unwrap_or_else(|error| {
         output.error(&error);
-        ExitCode::FAILURE
+        Exit::Failed
     })
 }
 

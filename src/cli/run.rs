@@ -2,12 +2,12 @@
 
 use std::fmt;
 use std::path::PathBuf;
-use std::process::ExitCode;
 use std::time::Instant;
 
 use clap::Args;
 use serde::Serialize;
 
+use super::exit::Exit;
 use super::options::Simulation;
 use super::output::{
     ChoicesReport, Output, or_dash, peak_memory_mb, progress_bar, set_progress, write_warnings,
@@ -63,7 +63,7 @@ pub(super) struct RunReport {
     pub files: Vec<PathBuf>,
 }
 
-pub(super) fn main(arguments: &Arguments, output: Output) -> Result<ExitCode> {
+pub(super) fn main(arguments: &Arguments, output: Output) -> Result<Exit> {
     let scene = arguments.simulation.scene()?;
     if let Some(folder) = &arguments.out {
         Recording::prepare(folder)?;
@@ -76,7 +76,7 @@ pub(super) fn main(arguments: &Arguments, output: Output) -> Result<ExitCode> {
         report.files = recording.write(folder)?.into();
     }
     output.result(&report);
-    Ok(ExitCode::SUCCESS)
+    Ok(Exit::Done)
 }
 
 /// Makes the scene ready, runs `scene.steps` steps, and gathers report and trajectory.

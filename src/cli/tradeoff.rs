@@ -5,10 +5,10 @@ mod table;
 
 use std::ops::ControlFlow;
 use std::path::PathBuf;
-use std::process::ExitCode;
 
 use clap::Args;
 
+use super::exit::Exit;
 use super::options::{choice, load, positive, seconds, tolerance};
 use super::output::{Output, progress_bar, set_progress};
 use crate::Result;
@@ -93,7 +93,7 @@ impl Arguments {
     }
 }
 
-pub(super) fn main(arguments: &Arguments, output: Output) -> Result<ExitCode> {
+pub(super) fn main(arguments: &Arguments, output: Output) -> Result<Exit> {
     let scene = load(&arguments.scene)?;
     scene.validate()?;
     if let Some(file) = &arguments.plot {
@@ -122,7 +122,7 @@ pub(super) fn main(arguments: &Arguments, output: Output) -> Result<ExitCode> {
     let measured = found.rows.iter().any(|r| r.added_mass_rel_error.is_some());
     output.result(&TradeoffReport::new(found, files));
     Ok(match measured {
-        true => ExitCode::SUCCESS,
-        false => ExitCode::FAILURE,
+        true => Exit::Done,
+        false => Exit::Failed,
     })
 }

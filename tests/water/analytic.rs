@@ -455,14 +455,17 @@ fn iterations(gap: f64, preconditioner: Preconditioner, tolerance: f64) -> usize
 
 #[test]
 fn few_iterations_with_the_bodies_factors() {
-    println!("gap | factors 1e-3, 1e-8 | Jacobi 1e-3");
+    println!("gap | factors 1e-3, 1e-8");
     for (gap, limit) in [(1.0, 8), (0.2, 12), (0.1, 16), (0.02, 28)] {
         let [loose, tight] = [1e-3, 1e-8].map(|t| iterations(gap, Preconditioner::Factors, t));
-        let jacobi = iterations(gap, Preconditioner::Jacobi, 1e-3);
-        println!("{gap} | {loose}, {tight} | {jacobi}");
+        println!("{gap} | {loose}, {tight}");
         assert!(tight <= limit, "gap {gap}: {tight}");
         assert!(loose <= limit * 2 / 3, "gap {gap}: {loose}");
-        assert!(jacobi > 15 * tight, "gap {gap}: Jacobi {jacobi}");
+        // Its many iterations take long.
+        if gap == 0.1 {
+            let jacobi = iterations(gap, Preconditioner::Jacobi, 1e-3);
+            assert!(jacobi > 15 * tight, "gap {gap}: Jacobi {jacobi}");
+        }
     }
 }
 

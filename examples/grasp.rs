@@ -8,7 +8,7 @@
 //! where the coin lies well between the fingers before they touch it; from there the whole trajectory, to a coin that is held.
 //!
 //! ```text
-//! cargo run --release --example grasp -- --random N [--seed S] [--json]
+//! cargo run --release --example grasp -- --random N [--gripper sliding|hinged] [--seed S] [--json]
 //! cargo run --release --example grasp -- [--json] [--out FOLDER] [--replay full] [--rival-seeds N] [--rival-cap N] [--no-rival]
 //! ```
 //!
@@ -23,7 +23,7 @@
 mod hold;
 #[path = "grasp/plot.rs"]
 mod plot;
-#[path = "grasp/random.rs"]
+#[path = "grasp/random/mod.rs"]
 mod random;
 #[path = "grasp/replay.rs"]
 mod replay;
@@ -53,6 +53,7 @@ struct Options {
     cap: Option<usize>,
     /// Random grasps instead.
     random: Option<usize>,
+    gripper: random::Gripper,
     seed: u64,
 }
 
@@ -180,7 +181,7 @@ fn main() -> Result<(), Box<dyn Error>> {
 /// Grasps that are drawn by a seed.
 fn several(count: usize, options: &Options) -> Result<(), Box<dyn Error>> {
     let start = Instant::now();
-    let found = random::run(&task::load()?, count, options.seed)?;
+    let found = random::run(options.gripper, count, options.seed)?;
     let caught = found.iter().filter(|o| o.caught).count();
     match options.json {
         true => println!("{}", serde_json::to_string(&found)?),
@@ -273,6 +274,7 @@ fn options() -> Result<Options, String> {
         seeds: 5,
         cap: None,
         random: None,
+        gripper: random::Gripper::Sliding,
         seed: 1,
     };
     let mut arguments = std::env::args().skip(1);
@@ -288,12 +290,17 @@ fn options() -> Result<Options, String> {
             },
             "--no-rival" => out.rival = false,
             "--random" => out.random = Some(number(value()?)?),
+            "--gripper" => {
+                let name = value()?;
+                out.gripper = random::Gripper::named(&name)
+                    .ok_or(format!("--gripper {name}: expected sliding or hinged"))?;
+            }
             "--seed" => out.seed = number(value()?)? as u64,
             "--rival-seeds" => out.seeds = number(value()?)?,
             "--rival-cap" => out.cap = Some(number(value()?)?),
             _ => {
                 return Err(format!(
-                    "{name}: expected --random, --seed, --json, --out, --replay, --rival-seeds, --rival-cap or --no-rival"
+                    "{name}: expected --random, --gripper, --seed, --json, --out, --replay, --rival-seeds, --rival-cap or --no-rival"
                 ));
             }
         }

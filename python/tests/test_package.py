@@ -3,8 +3,11 @@
 import ast
 import dataclasses
 import inspect
+import json
 import pathlib
 import re
+import subprocess
+import sys
 
 import pytest
 
@@ -38,6 +41,22 @@ def test_every_name_has_a_stub_and_every_stub_a_name():
         value = getattr(_hydrograd, name)
         if inspect.isclass(value) and not issubclass(value, Exception):
             assert public(members) == public(vars(value)), name
+
+
+def test_the_command_runs_and_says_how_it_ended():
+    """The whole command line is tested from Rust; here that it is there, passes its arguments on and gives its exit code."""
+
+    def run(*arguments):
+        return subprocess.run([sys.executable, "-m", "hydrograd", *arguments], capture_output=True, text=True, check=False)
+
+    assert run("--version").stdout == f"hydrograd {hg.__version__}\n"
+    shape = run("added-mass", "--shape", "sphere:1", "--density", "1", "--json")
+    first = json.loads(shape.stdout)
+    assert shape.returncode == 0 and not first.get("error")
+    unknown = run("rum")
+    assert unknown.returncode == 2 and "rum" in unknown.stderr
+    missing = run("run", "nowhere.toml")
+    assert missing.returncode == 1 and "nowhere.toml" in missing.stderr
 
 
 def test_options_of_the_stubs_are_those_of_the_program():

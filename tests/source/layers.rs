@@ -88,7 +88,7 @@ const LAYERS: [(&str, &[&str]); 21] = [
         ],
     ),
     // Descent stands on what a user sees.
-    ("optimize", &["simulate"]),
+    ("optimize", &["adjoint", "simulate"]),
     // The facade names what it shows; the command line stands on the facade.
     (
         "lib",
@@ -104,10 +104,11 @@ const LAYERS: [(&str, &[&str]); 21] = [
 ];
 
 /// Modules of which only the named parts may be used.
-const ONLY: [(&str, &str, &[&str]); 3] = [
+const ONLY: [(&str, &str, &[&str]); 4] = [
     ("shape", "adjoint", &["lie"]),
     ("contact", "adjoint", &["lie"]),
     ("multibody", "adjoint", &["lie"]),
+    ("optimize", "adjoint", &["lie", "sample"]),
 ];
 
 /// Paths `from::a::b` in the text, as the segments after `from`; a group `from::{a::c, b}` gives one

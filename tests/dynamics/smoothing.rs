@@ -1,7 +1,8 @@
 //! Smoothed gradients, continuation, and the recipe for grasps.
 
-use crate::support::says;
+use crate::support::{self, says};
 use hydrograd::adjoint::sample::numbers;
+use hydrograd::dynamics::Integrator;
 use hydrograd::optimize::{
     Finger, GraspSettings, GraspTask, OptimizeSettings, Smoothing, continuation, grasp, smoothed,
 };
@@ -320,6 +321,15 @@ fn tasks_that_do_not_fit_are_refused() {
     says(
         grasp(&simulator, &task, &wrong, |_, _| {}).unwrap_err(),
         &["softness", "end in 1"],
+    );
+    let cost = task.hold_cost(&simulator).unwrap();
+    let mut other = Scene::new(Fluid::none());
+    other.add(Body::dry().mass(1.0).inertia([1.0; 3]));
+    let other = support::simulator(&other, Fidelity::Isolated, Integrator::MomentumEuler);
+    let rollout = other.rollout(&Controls::zeros(&other, 2)).unwrap();
+    says(
+        rollout.value(&cost).unwrap_err(),
+        &["1 bodies and 0 controls", "made for"],
     );
     let mut softer = simulator.clone();
     says(

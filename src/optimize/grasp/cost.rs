@@ -12,9 +12,9 @@
 //! ```
 
 use super::task::{GraspTask, Grip};
-use crate::Result;
 use crate::adjoint::lie::{Pose, Vec3, Vec6, angular, linear};
 use crate::simulate::{Cotangents, Objective, Rollout, Simulator};
+use crate::{Error, Result};
 use nalgebra::DMatrix;
 use std::sync::Arc;
 
@@ -224,6 +224,24 @@ fn velocities(rollout: &Rollout) -> Option<DMatrix<f64>> {
 }
 
 impl Objective for GraspCost {
+    fn check(&self, rollout: &Rollout) -> Result<()> {
+        let (bodies, controls) = (rollout.samples()[0].poses.len(), rollout.controls().nrows());
+        let most = self
+            .grip
+            .fingers
+            .iter()
+            .map(|(f, _)| *f)
+            .fold(self.grip.object, usize::max);
+        if most >= bodies || controls != self.grip.limits.len() {
+            return Err(Error::input(
+                "cost of a grasp",
+                format!("a rollout of {bodies} bodies and {controls} controls"),
+                "must be one of the scene that the cost was made for",
+            ));
+        }
+        rollout.observe("velocities").map(|_| ())
+    }
+
     fn value(&self, rollout: &Rollout) -> f64 {
         let Some(velocities) = velocities(rollout) else {
             return f64::NAN;

@@ -53,7 +53,7 @@ impl Default for GraspSettings {
     fn default() -> Self {
         Self {
             knots: 11,
-            pushes: 32,
+            pushes: 48,
             starts: 3,
             evaluations: 12,
             softness: vec![4.0, 1.0],

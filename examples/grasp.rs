@@ -182,7 +182,7 @@ fn main() -> Result<(), Box<dyn Error>> {
 fn several(count: usize, options: &Options) -> Result<(), Box<dyn Error>> {
     let start = Instant::now();
     let found = random::run(options.gripper, count, options.seed)?;
-    let caught = found.iter().filter(|o| o.caught).count();
+    let caught = found.iter().filter(|o| o.found.caught).count();
     match options.json {
         true => println!("{}", serde_json::to_string(&found)?),
         false => println!(

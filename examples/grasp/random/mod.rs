@@ -4,7 +4,7 @@ mod hinged;
 mod sliding;
 
 use hydrograd::adjoint::sample::Samples;
-use hydrograd::optimize::{Grasp, GraspSettings, GraspStage, GraspTask, grasp};
+use hydrograd::optimize::{Grasp, GraspSettings, GraspTask, grasp};
 use hydrograd::simulate::Fidelity;
 use hydrograd::{Result, Scene, Settings, Simulator};
 use serde::Serialize;
@@ -75,17 +75,8 @@ pub struct Task {
 #[derive(Clone, Debug, Serialize)]
 pub struct Outcome {
     pub drawn: Drawn,
-    pub caught: bool,
-    /// Since when it is held at the end, s.
-    pub held_since: Option<f64>,
-    pub cost: f64,
-    /// What found it: a push, a descent, a search.
-    pub stage: GraspStage,
-    /// Of the pushes, how many caught the coin.
-    pub pushes_caught: usize,
-    pub simulations: usize,
-    pub gradients: usize,
-    pub failures: usize,
+    #[serde(flatten)]
+    pub found: Grasp,
     /// From the scene to the found forces, s.
     pub seconds: f64,
 }
@@ -95,22 +86,10 @@ fn one(drawn: Task) -> Result<Outcome> {
     let start = Instant::now();
     let settings = Settings::default().fidelity(Fidelity::Reduced);
     let simulator = Simulator::new(&drawn.scene, settings)?;
-    let found: Grasp = grasp(
-        &simulator,
-        &drawn.task,
-        &GraspSettings::default(),
-        |_, _| {},
-    )?;
+    let settings = GraspSettings::default();
     Ok(Outcome {
         drawn: drawn.drawn,
-        caught: found.caught,
-        held_since: found.held_since,
-        cost: found.cost,
-        stage: found.stage,
-        pushes_caught: found.pushes_caught,
-        simulations: found.simulations,
-        gradients: found.gradients,
-        failures: found.failures,
+        found: grasp(&simulator, &drawn.task, &settings, |_, _| {})?,
         seconds: start.elapsed().as_secs_f64(),
     })
 }
@@ -122,16 +101,17 @@ pub fn run(gripper: Gripper, count: usize, seed: u64) -> Result<Vec<Outcome>> {
     (0..count)
         .map(|i| {
             let outcome = one(gripper.draw(&scene, &mut random)?)?;
+            let found = &outcome.found;
             eprintln!(
                 "grasp {}: {} by {:?}, cost {:.3}, {} of the pushes, {} simulations, {} gradients, {} failed, {:.1} s",
                 i + 1,
-                if outcome.caught { "caught" } else { "lost" },
-                outcome.stage,
-                outcome.cost,
-                outcome.pushes_caught,
-                outcome.simulations,
-                outcome.gradients,
-                outcome.failures,
+                if found.caught { "caught" } else { "lost" },
+                found.stage,
+                found.cost,
+                found.pushes_caught,
+                found.simulations,
+                found.gradients,
+                found.failures,
                 outcome.seconds
             );
             Ok(outcome)

@@ -23,6 +23,7 @@ use crate::{Error, Result};
 pub use cost::GraspCost;
 use nalgebra::DMatrix;
 use rayon::prelude::*;
+use serde::Serialize;
 use std::sync::Arc;
 use std::sync::atomic::{AtomicUsize, Ordering};
 use task::Grip;
@@ -65,9 +66,10 @@ impl Default for GraspSettings {
 }
 
 /// What it came to: the best grasp that was seen.
-#[derive(Clone, Debug)]
+#[derive(Clone, Debug, Serialize)]
 pub struct Grasp {
-    /// The controls.
+    /// The controls; not part of a report.
+    #[serde(skip)]
     pub controls: Controls,
     /// Whether they hold the object for as long as was asked.
     pub caught: bool,

@@ -91,7 +91,7 @@ pub struct Smoothed {
 impl Smoothed {
     /// Both estimates, each weighted by the inverse of the other's total variance; that of order zero alone where they differ by more than three standard deviations of
     /// their difference, which is what jumps do.
-    pub fn gradient(&self) -> Vec<f64> {
+    pub fn mixed(&self) -> Vec<f64> {
         let (first, zeroth) = (self.first.total(), self.zeroth.total());
         let sides = || self.first.gradient.iter().zip(&self.zeroth.gradient);
         let apart: f64 = sides().map(|(a, b)| (a - b).powi(2)).sum();

@@ -1,6 +1,6 @@
 //! Torsional and rolling friction against closed forms, and their gradients.
 
-use super::tools::{above_floor, above_slope, contact};
+use super::tools::{above_floor, contact, on_slope, threshold, within};
 use crate::support::{CONTACT_INTEGRATORS, GRAVITY, check_gradient, run, simulator};
 use hydrograd::dynamics::Integrator;
 use hydrograd::scene::{Body, Scene, Shape};
@@ -18,16 +18,6 @@ fn on_floor(shape: Shape, height: f64) -> Scene {
     let body = Body::new(shape).density(1000.0);
     scene.add(body.at([0.0, 0.0, height + gap]));
     scene
-}
-
-#[track_caller]
-fn within(what: &str, found: f64, exact: f64, limit: f64) {
-    let error = (found - exact).abs() / exact.abs();
-    println!(
-        "{what}: {found:.5}, exact {exact:.5}, error {:.2} %",
-        100.0 * error
-    );
-    assert!(error <= limit, "{what}: {found} is not {exact}");
 }
 
 /// On its lowest point: α = μ_t N/I, to rest; without torsional friction it never stops.
@@ -86,28 +76,14 @@ fn rolling_resistance_holds_a_ball_on_a_slope() {
     let rolling = 0.01;
     let exact = rolling / RADIUS;
     let rolls = |slope: f64| {
-        let mut scene = above_slope(slope, 0.0);
+        let mut scene = on_slope(slope, 1.01 * RADIUS, Shape::sphere(RADIUS));
         contact(&mut scene).rolling_friction = rolling;
-        let (angle, above) = (slope.atan(), 1.01 * RADIUS);
-        scene.add(Body::new(Shape::sphere(RADIUS)).density(1000.0).at([
-            above * angle.sin(),
-            0.0,
-            above * angle.cos(),
-        ]));
         let rollout = run(&made(&scene), 400);
         let at = |n: usize| rollout.samples()[n].poses[0].translation;
         (at(400) - at(300)).norm() > 0.01
     };
-    let (mut low, mut high) = (0.8 * exact, 1.2 * exact);
-    assert!(!rolls(low) && rolls(high));
-    while high - low > 1e-3 * exact {
-        let middle = 0.5 * (low + high);
-        match rolls(middle) {
-            true => high = middle,
-            false => low = middle,
-        }
-    }
-    within("slope of rolling", 0.5 * (low + high), exact, 0.01);
+    let found = threshold(rolls, [0.8 * exact, 1.2 * exact], 1e-3 * exact);
+    within("slope of rolling", found, exact, 0.01);
 }
 
 /// A ball, an ellipsoid and a box that land, spin, roll and slide on a floor.

@@ -1,6 +1,6 @@
 //! Standard cases against closed forms: slopes, rolling, sliding to rest, tipping, a stack, a coin.
 
-use super::tools::{above_floor, above_slope, contact};
+use super::tools::{above_floor, contact, on_slope, threshold, within};
 use crate::support::{self, GRAVITY, run};
 use hydrograd::adjoint::lie::Vec3;
 use hydrograd::dynamics::Integrator;
@@ -11,34 +11,11 @@ fn simulator(scene: &Scene) -> Simulator {
     support::simulator(scene, Fidelity::Isolated, Integrator::MomentumEuler)
 }
 
-/// A body at the height `above` over a slope, turned with it.
-fn on_slope(slope: f64, above: f64, shape: Shape) -> Scene {
-    let mut scene = above_slope(slope, 0.0);
-    let angle = slope.atan();
-    scene.add(
-        Body::new(shape)
-            .density(1000.0)
-            .at([above * angle.sin(), 0.0, above * angle.cos()])
-            .rotated([0.0, angle, 0.0]),
-    );
-    scene
-}
-
 /// How far down the slope a body is after `n` steps, m.
 fn along(rollout: &Rollout, slope: f64, n: usize) -> f64 {
     let p = rollout.samples()[n].poses[0].translation;
     let angle = slope.atan();
     p.x * angle.cos() - p.z * angle.sin()
-}
-
-/// Printed, and held to its limit.
-fn within(what: &str, found: f64, exact: f64, limit: f64) {
-    let error = (found - exact).abs() / exact.abs();
-    println!(
-        "{what}: {found:.5}, exact {exact:.5}, error {:.2} %",
-        100.0 * error
-    );
-    assert!(error <= limit, "{what}: {found} is not {exact}");
 }
 
 /// The gap at which a box of this size rests flat on its four corners, m, by the law at its default stiffness: on a slope.
@@ -63,16 +40,8 @@ fn slope_threshold() {
             // It creeps at less than ten times the stiction speed.
             along(&rollout, slope, 400) - along(&rollout, slope, 300) > 0.01
         };
-        let (mut low, mut high) = (0.9 * friction, 1.1 * friction);
-        assert!(!slides(low) && slides(high));
-        while high - low > 1e-3 * friction {
-            let middle = 0.5 * (low + high);
-            match slides(middle) {
-                true => high = middle,
-                false => low = middle,
-            }
-        }
-        within("slope of slipping", 0.5 * (low + high), friction, 0.01);
+        let found = threshold(slides, [0.9 * friction, 1.1 * friction], 1e-3 * friction);
+        within("slope of slipping", found, friction, 0.01);
     }
 }
 
@@ -143,16 +112,8 @@ fn a_box_tips_over_its_edge() {
         let up = rollout.samples()[150].poses[0].rotation[(2, 2)];
         up < 0.5
     };
-    let (mut low, mut high) = (0.9 * exact, 1.1 * exact);
-    assert!(!falls(low) && falls(high));
-    while high - low > 1e-4 {
-        let middle = 0.5 * (low + high);
-        match falls(middle) {
-            true => high = middle,
-            false => low = middle,
-        }
-    }
-    within("tipping angle, rad", 0.5 * (low + high), exact, 0.005);
+    let found = threshold(falls, [0.9 * exact, 1.1 * exact], 1e-4);
+    within("tipping angle, rad", found, exact, 0.005);
 }
 
 #[test]

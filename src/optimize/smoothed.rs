@@ -89,7 +89,7 @@ pub struct Smoothed {
 }
 
 impl Smoothed {
-    /// Both estimates, each weighted by the inverse of the other's total variance; that of order zero alone where they differ by more than three standard deviations of
+    /// Both estimates, each weighted by the inverse of its total variance; that of order zero alone where they differ by more than three standard deviations of
     /// their difference, which is what jumps do.
     pub fn mixed(&self) -> Vec<f64> {
         let (first, zeroth) = (self.first.total(), self.zeroth.total());

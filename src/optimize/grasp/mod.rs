@@ -151,7 +151,7 @@ impl Attempt {
             x: x.to_vec(),
             cost: rollout.value(&self.hold())?,
             held_since,
-            caught: self.grip.caught(rollout)?,
+            caught: self.grip.caught(rollout, held_since),
             stage,
         })
     }

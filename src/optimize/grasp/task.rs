@@ -190,11 +190,10 @@ impl Grip {
         Ok(since)
     }
 
-    /// Whether the object was held for as long as is asked.
-    pub fn caught(&self, rollout: &Rollout) -> Result<bool> {
+    /// Whether an object that has been held since then, at the end of a rollout, was held for as long as is asked.
+    pub fn caught(&self, rollout: &Rollout, held_since: Option<f64>) -> bool {
         let end = rollout.samples()[rollout.steps()].time;
-        let since = self.held_since(rollout)?;
-        Ok(since.is_some_and(|t| end - t >= self.hold - 1e-9))
+        held_since.is_some_and(|t| end - t >= self.hold - 1e-9)
     }
 
     /// Time of the first contact of a finger with the object, s.

@@ -48,10 +48,14 @@ fn ellipsoids() -> Scene {
 
 #[test]
 fn momentum_is_kept_to_rounding() {
-    let scene = ellipsoids();
     let full = MOMENTUM_FORMS.map(|i| (Fidelity::Full, i));
     let reduced = MOMENTUM_FORMS.map(|i| (Fidelity::Reduced, i));
     for (fidelity, integrator) in full.into_iter().chain(reduced) {
+        let mut scene = ellipsoids();
+        if fidelity == Fidelity::Full {
+            // Kept at any resolution.
+            scene.set_faces(20);
+        }
         let simulator = simulator(&scene, fidelity, integrator);
         let rollout = simulator
             .rollout(&Controls::zeros(&simulator, 1000))
@@ -175,10 +179,11 @@ fn linked() -> Scene {
 
 #[test]
 fn integrators_converge_at_their_orders() {
-    let scene = linked();
-    for fidelity in [Fidelity::Full, Fidelity::Reduced] {
-        orders(&scene, fidelity);
-    }
+    let mut scene = linked();
+    orders(&scene, Fidelity::Reduced);
+    // The order is that of time: any mesh does where all bodies are solved together.
+    scene.set_faces(20);
+    orders(&scene, Fidelity::Full);
 }
 
 fn orders(scene: &Scene, fidelity: Fidelity) {

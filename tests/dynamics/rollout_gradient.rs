@@ -18,7 +18,7 @@ const FIDELITIES: [Fidelity; 4] = [
 
 fn check(scene: &Scene, fidelity: Fidelity, integrator: Integrator, steps: usize, faces: usize) {
     // Long rollouts along one direction of each group, short ones along two.
-    let directions = if steps > 50 { 1 } else { 2 };
+    let directions = if steps > 20 { 1 } else { 2 };
     // Derivatives are exact at any resolution.
     let faces = if fidelity == Fidelity::Full {
         faces.min(40)
@@ -81,7 +81,10 @@ fn coins() {
 fn falling_ball() {
     for integrator in INTEGRATORS {
         for fidelity in FIDELITIES {
-            check(&example("falling_ball"), fidelity, integrator, 8, 80);
+            // What `auto` steps with here is `reduced`; every integrator has it in `a_pair_that_comes_and_goes`.
+            if fidelity != Fidelity::Auto || integrator == Integrator::MomentumEuler {
+                check(&example("falling_ball"), fidelity, integrator, 8, 80);
+            }
         }
     }
 }
@@ -90,12 +93,14 @@ fn falling_ball() {
 fn falling_ball_for_many_steps() {
     for integrator in INTEGRATORS {
         for fidelity in FIDELITIES {
-            // What `auto` steps with here is `reduced`; `full` takes minutes with integrators that evaluate it often.
+            // What `auto` steps with here is `reduced`; `full` takes minutes with integrators that evaluate it often. What an integrator
+            // makes of many steps doesn't depend on the coupling: of a coupled pair every integrator but the default takes fewer.
             let steps = match (fidelity, integrator) {
                 (Fidelity::Auto, _) => continue,
                 (Fidelity::Full, Integrator::MomentumEuler) => 20,
                 (Fidelity::Full, _) => continue,
-                _ => 100,
+                (Fidelity::Reduced, Integrator::MomentumEuler) | (Fidelity::Isolated, _) => 100,
+                _ => 40,
             };
             check(&example("falling_ball"), fidelity, integrator, steps, 20);
         }

@@ -156,8 +156,7 @@ pub(crate) fn not_built() -> Error {
     Error::Unsupported {
         what: "the backend gpu".into(),
         why: "this build is without the feature gpu".into(),
-        instead: "build with it (cargo build --release --features gpu; the Python package: pip install . \
-                  --config-settings=build-args='--features gpu'), or use the backend cpu"
+        instead: "build with it (cargo build --release --features gpu; the Python package has it), or use the backend cpu"
             .into(),
     }
 }

@@ -577,10 +577,8 @@ fn bad_starts_are_refused() {
 
 /// Without the feature the GPU's flags are there and say what to build.
 #[test]
+#[cfg(not(feature = "gpu"))]
 fn a_build_without_the_gpu_says_how_to_get_it() {
-    if crate::support::command::has_gpu() {
-        return;
-    }
     let ball = scene("falling_ball");
     let small = ["--faces", "80", "--backend", "gpu"];
     let words = [

@@ -6,7 +6,7 @@ use hydrograd::simulate::Backend;
 use hydrograd::{Controls, Fidelity, Gradient, Rollout, Scene, Settings, Simulator};
 use nalgebra::DMatrix;
 
-pub const STEPS: usize = 4;
+pub const STEPS: usize = 3;
 
 /// The falling ball: a sphere, a coin and the image of a wall, on small meshes.
 pub fn falling_ball() -> Scene {

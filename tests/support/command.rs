@@ -3,18 +3,8 @@
 use serde_json::Value;
 use std::process::{Command, Output};
 
-/// Names another program to test than the one that was built with the tests: the command of the Python package, which is built without a GPU.
-const OTHER: &str = "HYDROGRAD_COMMAND";
-
-/// Whether the program was built with the feature `gpu`.
-#[allow(dead_code)]
-pub fn has_gpu() -> bool {
-    cfg!(feature = "gpu") && std::env::var_os(OTHER).is_none()
-}
-
 pub fn command(arguments: &[&str]) -> Command {
-    let built = env!("CARGO_BIN_EXE_hydrograd").into();
-    let mut command = Command::new(std::env::var_os(OTHER).unwrap_or(built));
+    let mut command = Command::new(env!("CARGO_BIN_EXE_hydrograd"));
     command.args(arguments);
     command
 }

@@ -456,7 +456,7 @@ fn sphere(mesh: &hydrograd::TriMesh, rank: usize, gap: f64) -> hydrograd::Result
         tolerance: 1e-8,
         resolved_gap: Some(gap),
     };
-    let body = compress::compress("sphere", mesh, &response, &settings)?;
+    let body = compress::compress("sphere", mesh, &response, &settings, &[])?;
     Ok(Arc::new(body))
 }
 

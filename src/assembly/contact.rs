@@ -166,7 +166,7 @@ fn pieces(body: &Body, surface: &Surface) -> Result<Vec<ContactShape>> {
 fn resolved(water: &Prepared, surfaces: &[Option<Surface>], pair: &ContactPair) -> f64 {
     let of = |b: usize| {
         let edge = surfaces[b].as_ref().map_or(0.0, Surface::mean_edge);
-        (water.fidelity.kind()).resolved_gap(water.resolved[b], edge)
+        (water.fidelity.kind()).resolved_gap(water.resolved[b].everywhere, edge)
     };
     match pair.second {
         Other::Body(b) => of(pair.first).max(of(b)),

@@ -1,6 +1,7 @@
 //! How near the bodies are to one another and to the walls, and what that means for the flow.
 
 use super::fidelity::Fidelity;
+use super::resolved::{Resolved, narrowest};
 use super::surface::{Surface, overlaps};
 use crate::adjoint::lie::Pose;
 use crate::error::readable;
@@ -224,22 +225,23 @@ impl Clearance {
     }
 
     /// The gap that is smallest against what compressed bodies resolve, if it isn't resolved. `states`
-    /// are times, poses and smallest gaps; `resolved` the smallest gap (m) of each body.
+    /// are times, poses and smallest gaps; `resolved` what each body resolves.
     pub fn unresolved<'a>(
         &self,
         states: impl Iterator<Item = (f64, &'a [Pose], Gap)>,
-        resolved: &[f64],
+        resolved: &[Resolved],
     ) -> Option<String> {
-        let coarsest = resolved.iter().copied().fold(0.0, f64::max);
+        let coarsest = resolved.iter().map(|r| r.everywhere).fold(0.0, f64::max);
         let mut worst: Option<(f64, f64, Gap, f64)> = None;
         for (time, poses, smallest) in states {
             if smallest.distance >= coarsest {
                 continue;
             }
             for gap in self.moving.all(poses) {
-                let limit = gap.largest(resolved);
-                let ratio = gap.image_distance() / limit;
-                if limit > 0.0 && ratio < 1.0 && worst.is_none_or(|w| ratio < w.0) {
+                if let Some((ratio, limit)) = narrowest(&self.moving, &gap, poses, resolved)
+                    && ratio < 1.0
+                    && worst.is_none_or(|w| ratio < w.0)
+                {
                     worst = Some((ratio, time, gap, limit));
                 }
             }

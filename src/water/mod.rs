@@ -42,6 +42,7 @@ mod fidelity;
 mod method;
 mod numerics;
 mod prepared;
+mod resolved;
 mod submerged;
 mod surface;
 

@@ -9,6 +9,7 @@ use super::fidelity::kind::Planned;
 use super::method::Method;
 use super::method::kind::{BodyMethod, Problem};
 use super::numerics::Plan;
+use super::resolved::Resolved;
 use super::submerged::{Discretisation, SubmergedBody};
 use crate::Result;
 use crate::adjoint::lie::Pose;
@@ -34,7 +35,7 @@ pub(crate) struct Prepared {
     pub discretisation: Vec<Discretisation>,
     /// Smallest gap that the discretisation of each body of the scene resolves, m; zero where it isn't limited but by
     /// its mesh.
-    pub resolved: Vec<f64>,
+    pub resolved: Vec<Resolved>,
     /// What was chosen for each body and pair.
     pub plan: Plan,
     /// What was chosen, and why.
@@ -92,9 +93,12 @@ pub(crate) fn prepare(
     let made = fidelity.kind().couple(&problem, &mut device)?;
     warnings.extend(device.reason.clone());
     warnings.extend(made.warnings);
-    let mut resolved = vec![0.0; scene.bodies.len()];
+    let mut resolved = vec![Resolved::default(); scene.bodies.len()];
     for (b, d) in numbers.iter().zip(&made.bodies) {
-        resolved[*b] = d.resolved_gap.unwrap_or(0.0);
+        resolved[*b] = Resolved {
+            everywhere: d.resolved_gap.unwrap_or(0.0),
+            regions: d.resolved_regions.clone(),
+        };
     }
     Ok(Prepared {
         bodies: numbers,

@@ -3,12 +3,16 @@
 use super::surface::{Coarse, Surface, pose, semi_axes};
 use crate::adjoint::lie::{Mat6, Pose, Vec3};
 use crate::coupling::Coupling;
-use crate::geometry::TriMesh;
+use crate::coupling::reduced::compress::Region;
+use crate::geometry::{Refinement, TriMesh};
 use crate::multibody::Tree;
 use crate::scene::Scene;
 use crate::{Error, Result};
 use serde::Serialize;
 use std::sync::Arc;
+
+/// Smallest gap that is resolved within a region of refined faces, in the longest edges that it allows; they are 0.6 of that on average.
+const GAP: f64 = 0.5;
 
 /// A body that the water sees.
 pub(crate) struct SubmergedBody<'a> {
@@ -21,6 +25,8 @@ pub(crate) struct SubmergedBody<'a> {
     pub coarse: Option<&'a Coarse>,
     /// Given added mass at unit density.
     pub added_mass: Option<Mat6>,
+    /// Where smaller gaps matter than elsewhere.
+    pub regions: Vec<Region>,
 }
 
 /// What was made of the bodies.
@@ -46,6 +52,9 @@ pub struct Discretisation {
     pub points: usize,
     /// Smallest gap that its compression resolves, m.
     pub resolved_gap: Option<f64>,
+    /// Regions of the surface in which its compression resolves smaller ones.
+    #[serde(skip_serializing_if = "Vec::is_empty")]
+    pub resolved_regions: Vec<Region>,
     /// Asymmetry of its own added mass before symmetrising.
     pub asymmetry: f64,
     /// Estimated error of its own added mass, where two meshes tell one.
@@ -72,6 +81,7 @@ impl<'a> SubmergedBody<'a> {
             body.mesh.map(|m| (m.vertices(), m.faces()))
         }
         self.added_mass == other.added_mass
+            && self.regions == other.regions
             && self.ellipsoid == other.ellipsoid
             && parts(self) == parts(other)
     }
@@ -98,10 +108,20 @@ pub(crate) fn in_water<'a>(
             added_mass: given
                 .filter(|_| !coupled)
                 .map(|rows| Mat6::from_fn(|i, j| rows[i][j])),
+            regions: body.refine.iter().map(region).collect(),
         })
     };
     let numbers = (0..scene.bodies.len()).filter(seen);
     numbers.filter_map(|b| Some((b, submerged(b)?))).unzip()
+}
+
+/// What `refine` asks of compressed sources: that gaps as wide as its faces are resolved.
+fn region(refined: &Refinement) -> Region {
+    Region {
+        center: refined.center.into(),
+        radius: refined.radius,
+        gap: GAP * refined.edge,
+    }
 }
 
 /// Whether anything moves body `b`.

@@ -21,7 +21,7 @@ fn compressed(shape: &Shape, rank: usize) -> Arc<ReducedBody> {
         rank: Some(rank),
         ..compress::CompressSettings::default()
     };
-    Arc::new(compress::compress("b", &mesh, &b, &settings).unwrap())
+    Arc::new(compress::compress("b", &mesh, &b, &settings, &[]).unwrap())
 }
 
 /// Two shapes, one of more points than a block.

@@ -138,7 +138,7 @@ fn reduced_systems() -> Vec<Reduced> {
             rank: Some(20),
             ..compress::CompressSettings::default()
         };
-        Arc::new(compress::compress("b", &mesh, &b, &settings).unwrap())
+        Arc::new(compress::compress("b", &mesh, &b, &settings, &[]).unwrap())
     };
     let bodies = [
         compressed(Shape::sphere(0.4)),

@@ -20,7 +20,7 @@ fn sphere(rank: Option<usize>, tolerance: f64, gap: f64) -> Arc<ReducedBody> {
         tolerance,
         resolved_gap: Some(gap),
     };
-    Arc::new(compress::compress("sphere", &mesh, &response, &settings).unwrap())
+    Arc::new(compress::compress("sphere", &mesh, &response, &settings, &[]).unwrap())
 }
 
 fn at(x: f64, y: f64, z: f64) -> Pose {
@@ -113,7 +113,7 @@ fn the_matrix_is_symmetric_to_rounding() {
         let mesh = mesh(&shape, 320);
         let response = PanelBoundary::new("box", &mesh).unwrap();
         let settings = compress::CompressSettings::default();
-        Arc::new(compress::compress("box", &mesh, &response, &settings).unwrap())
+        Arc::new(compress::compress("box", &mesh, &response, &settings, &[]).unwrap())
     };
     let wall = Wall::rigid([0.0, 0.0, -2.0], [0.0, 0.2, 1.0]);
     let bodies = vec![

@@ -1,5 +1,6 @@
 //! One body as the reduced coupling sees it.
 
+use super::compress::Region;
 use crate::adjoint::kernel::Points;
 use crate::adjoint::lie::{Mat6, Vec3};
 use crate::{Error, Result};
@@ -51,6 +52,8 @@ pub struct CompressedParts {
 pub struct Fit {
     /// Smallest distance from the surface at which its solutions were fitted, m.
     pub resolved_gap: f64,
+    /// Regions in which it is smaller.
+    pub regions: Vec<Region>,
     /// Points on the surfaces around the body at which it was fitted.
     pub proxies: usize,
     /// max |Φ_ij − Φ_ji| / max |Φ| of the scattered potentials at the proxies, before symmetrising.
@@ -70,6 +73,14 @@ pub struct Fit {
     pub body_error: Option<f64>,
     /// What the user should know, each with the body's name and its numbers.
     pub warnings: Vec<String>,
+}
+
+impl Fit {
+    /// The smallest gap that is resolved anywhere, m.
+    pub fn finest(&self) -> f64 {
+        let regions = self.regions.iter().map(|r| r.gap);
+        regions.fold(self.resolved_gap, f64::min)
+    }
 }
 
 impl ReducedBody {
@@ -140,6 +151,8 @@ impl ReducedBody {
         parts.radius *= factor;
         parts.volume *= factor.powi(3);
         parts.fit.resolved_gap *= factor;
+        let regions = parts.fit.regions.iter();
+        parts.fit.regions = regions.map(|r| r.scaled(factor)).collect();
         Self::new(parts)
     }
 

@@ -6,7 +6,7 @@
 //! renamed, so that a writer that is killed leaves nothing half done.
 
 use super::ReducedBody;
-use super::compress::CompressSettings;
+use super::compress::{CompressSettings, Region};
 use crate::geometry::TriMesh;
 use crate::{Error, Result};
 use serde::Serialize;
@@ -20,7 +20,7 @@ use std::sync::{Arc, LazyLock, Mutex, MutexGuard, PoisonError};
 const FORMAT: &str = concat!(
     "hydrograd-compressed-body ",
     env!("CARGO_PKG_VERSION"),
-    " 1"
+    " 2"
 );
 /// Bodies kept in memory.
 const MOST: usize = 256;
@@ -33,8 +33,13 @@ pub struct Key([u8; 32]);
 
 impl Key {
     /// Digest of a mesh in the body's frame, of what else the one-body `method` depends on, and of the
-    /// compression's settings.
-    pub fn new(mesh: &TriMesh, method: &impl Serialize, settings: &CompressSettings) -> Self {
+    /// compression's settings and regions.
+    pub fn new(
+        mesh: &TriMesh,
+        method: &impl Serialize,
+        settings: &CompressSettings,
+        regions: &[Region],
+    ) -> Self {
         let mut digest = Sha256::new();
         digest.update(FORMAT);
         for x in mesh.vertices().iter().flat_map(|v| v.iter()) {
@@ -44,7 +49,7 @@ impl Key {
             digest.update((*i as u64).to_le_bytes());
         }
         // Settings are plain data: they always serialise.
-        digest.update(serde_json::to_vec(&(method, settings)).unwrap_or_default());
+        digest.update(serde_json::to_vec(&(method, settings, regions)).unwrap_or_default());
         Self(digest.finalize().into())
     }
 

@@ -24,9 +24,39 @@ impl Gaps {
     }
 
     fn facing(&self, body: usize, other: Other, gap: f64, poses: &[Pose]) -> f64 {
+        let Some(Some(tree)) = self.trees.get(body) else {
+            return 0.0;
+        };
+        let near = self.faces_within(body, other, (1.0 + PARALLEL) * gap, poses);
+        near.iter().map(|(f, _)| tree.area(*f)).sum()
+    }
+
+    /// Centroids (body frame) of a body's faces that are no farther from the other than `limit` (m), and how far each is.
+    pub(crate) fn centroids_within(
+        &self,
+        body: usize,
+        other: Other,
+        limit: f64,
+        poses: &[Pose],
+    ) -> Vec<(Vec3, f64)> {
+        let Some(Some(tree)) = self.trees.get(body) else {
+            return Vec::new();
+        };
+        let near = self.faces_within(body, other, limit, poses).into_iter();
+        near.map(|(f, distance)| (tree.centroid(f), distance))
+            .collect()
+    }
+
+    fn faces_within(
+        &self,
+        body: usize,
+        other: Other,
+        limit: f64,
+        poses: &[Pose],
+    ) -> Vec<(usize, f64)> {
         let placed = |i: usize| Some((self.trees.get(i)?.as_ref()?, poses.get(i)?));
         let Some((tree, pose)) = placed(body) else {
-            return 0.0;
+            return Vec::new();
         };
         let distance = |x: &Vec3| match other {
             Other::Wall(w) => self.walls[w].height(x),
@@ -35,7 +65,10 @@ impl Gaps {
                 (tree.closest(&x).0 - x).norm()
             }),
         };
-        let near = |f: &usize| distance(&pose.apply(&tree.centroid(*f))) <= (1.0 + PARALLEL) * gap;
-        (0..tree.len()).filter(near).map(|f| tree.area(f)).sum()
+        let of = |f: usize| (f, distance(&pose.apply(&tree.centroid(f))));
+        (0..tree.len())
+            .map(of)
+            .filter(|(_, d)| *d <= limit)
+            .collect()
     }
 }

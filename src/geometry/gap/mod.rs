@@ -53,12 +53,13 @@ impl Gap {
         }
     }
 
-    /// The largest of `values`, which are one per body, of the bodies that it is between.
-    pub(crate) fn largest(&self, values: &[f64]) -> f64 {
-        match self.second {
-            Other::Body(b) => values[self.first].max(values[b]),
-            Other::Wall(_) => values[self.first],
-        }
+    /// The bodies that it is between, each with what it is near.
+    pub(crate) fn sides(&self) -> impl Iterator<Item = (usize, Other)> {
+        let back = match self.second {
+            Other::Body(b) => Some((b, Other::Body(self.first))),
+            Other::Wall(_) => None,
+        };
+        [(self.first, self.second)].into_iter().chain(back)
     }
 }
 

@@ -3,7 +3,7 @@
 use crate::Result;
 use crate::adjoint::lie::Pose;
 use crate::coupling::{Coupling, CouplingReport};
-use crate::geometry::Gap;
+use crate::geometry::Gaps;
 use crate::multibody::Tree;
 use crate::scene::{Scene, WallSurface};
 use crate::water::choices::{WaterChoices, surfaces};
@@ -13,6 +13,7 @@ use crate::water::method::Method;
 use crate::water::method::kind::Problem;
 use crate::water::numerics::Numerics;
 use crate::water::prepared::{Prepared, world_axes};
+use crate::water::resolved::narrowest;
 use crate::water::submerged::{SubmergedBody, in_water};
 use crate::water::surface::{Meshing, Surface, surface};
 use nalgebra::DMatrix;
@@ -192,7 +193,7 @@ impl<'a> Case<'a> {
         let own = self.submerged(&self.surfaces);
         let coupling = compressed_all(&self.problem(&own))?;
         let made = coupling.reduced_bodies().iter();
-        let gaps: Vec<f64> = made.map(|b| b.parts().fit.resolved_gap).collect();
+        let gaps: Vec<f64> = made.map(|b| b.parts().fit.finest()).collect();
         let responses = responses(&self.problem(bodies), &gaps)?;
         coupling.correction(&self.poses, &self.turn, &responses)
     }
@@ -211,11 +212,19 @@ impl<'a> Case<'a> {
     /// order takes them for: the root of what the gap lacks.
     fn narrowness(&self) -> f64 {
         let resolved = &self.subject.water.resolved;
-        let lacks = |gap: Gap| gap.largest(resolved) / gap.image_distance();
         let clearance = &self.subject.water.clearance;
-        let gaps = [&clearance.moving, &clearance.rigid].into_iter();
-        let all = gaps.flat_map(|g| g.all(self.subject.poses));
-        all.map(lacks).fold(1.0, f64::max).sqrt().min(NARROWEST)
+        let poses = self.subject.poses;
+        let lacks = |gaps: &Gaps| {
+            let all = gaps.all(poses).into_iter();
+            let ratios = all.filter_map(|gap| narrowest(gaps, &gap, poses, resolved));
+            ratios.map(|(ratio, _)| 1.0 / ratio).fold(1.0, f64::max)
+        };
+        [&clearance.moving, &clearance.rigid]
+            .map(lacks)
+            .into_iter()
+            .fold(1.0, f64::max)
+            .sqrt()
+            .min(NARROWEST)
     }
 
     /// The coupling that the fidelity `Isolated` leaves out.

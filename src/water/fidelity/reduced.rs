@@ -3,6 +3,7 @@
 use super::kind::{FidelityKind, Knob};
 use crate::adjoint::lie::Pose;
 use crate::boundary::Response;
+use crate::coupling::reduced::compress::Region;
 use crate::coupling::reduced::{self, ReducedBody, cache, compress};
 use crate::geometry::{Gap, TriMesh};
 use crate::water::device::Device;
@@ -41,6 +42,7 @@ impl FidelityKind for Reduced {
                 unknowns: m.modes(),
                 points: m.points(),
                 resolved_gap: Some(fit.resolved_gap),
+                resolved_regions: fit.regions.clone(),
                 asymmetry: fit.body_asymmetry,
                 added_mass_error: fit.body_error,
                 radiated_error: fit.radiated,
@@ -184,6 +186,7 @@ fn compressed(
         ellipsoid,
         coarse: coarse.as_ref(),
         added_mass: None,
+        regions: Vec::new(),
     };
     let gap = chosen.resolved_gap.map(round);
     let gap = gap.unwrap_or_else(|| {
@@ -194,11 +197,19 @@ fn compressed(
         ..*chosen
     };
     let made_from = method.made_from(&own, problem.numerics);
-    let key = cache::Key::new(&mesh, &made_from, &chosen);
+    let regions: Vec<Region> = (body.regions.iter())
+        .map(|r| Region {
+            center: r.center.map(round),
+            radius: round(r.radius),
+            gap: round(r.gap),
+        })
+        .collect();
+    let key = cache::Key::new(&mesh, &made_from, &chosen, &regions);
     let found = cache::fetch(key, problem.folder, || {
-        let finest = compress::finest_gap(mesh.surface_area());
-        let response = method.response(&own, problem.numerics, gap.max(finest))?;
-        compress::compress(body.name, &mesh, response.as_ref(), &chosen)
+        let everywhere = gap.max(compress::finest_gap(mesh.surface_area()));
+        let finest = regions.iter().map(|r| r.gap).fold(everywhere, f64::min);
+        let response = method.response(&own, problem.numerics, finest)?;
+        compress::compress(body.name, &mesh, response.as_ref(), &chosen, &regions)
     });
     let found = found.map_err(|e| e.in_units_of(size))?;
     Ok(Arc::new(found.scaled(size)?))

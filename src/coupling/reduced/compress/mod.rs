@@ -16,11 +16,14 @@
 //! Φ is symmetric (reciprocity) and positive definite, for a rigid body solutions every flow; what the
 //! one-body method and the fit leave of asymmetry and of negative modes is reported.
 //!
+//! Where others come nearer than d, within a [`Region`], proxies and candidates go on at smaller distances.
+//!
 //! How tight the fit must be for an error `tolerance` of M̄_f was measured on pairs of spheres, thin
 //! ellipsoids and boxes at the resolved gap: the error goes with the square of the rests.
 
 mod modes;
 mod pursuit;
+mod region;
 mod samples;
 
 use super::views::dense;
@@ -30,6 +33,7 @@ use crate::boundary::Response;
 use crate::geometry::{Ball, Interior, TriMesh};
 use crate::{Error, Result};
 use faer::Mat;
+pub use region::Region;
 use serde::{Deserialize, Serialize};
 
 /// Proxies are this many times their distance from the surface apart.
@@ -127,6 +131,18 @@ struct Proxies {
 }
 
 impl Proxies {
+    /// Adds points at the distance `offset`, and one in [`CHECK`] of them to those that check the fit.
+    fn add(&mut self, checked: &mut Self, points: Vec<Vec3>, offset: f64) {
+        for (i, p) in points.into_iter().enumerate() {
+            let to = match i % CHECK == CHECK - 1 {
+                true => &mut *checked,
+                false => &mut *self,
+            };
+            to.points.push(p);
+            to.distances.push(offset);
+        }
+    }
+
     /// W Φ_own: the body's own flow.
     fn radiated(&self, response: &dyn Response) -> Result<Mat<f64>> {
         let own = response.radiated(&self.points)?;
@@ -149,7 +165,8 @@ impl Proxies {
 
 /// Compresses the body `name` with a mesh in its frame, whose flow `response` knows.
 ///
-/// A resolved gap below [`finest_gap`] is raised to it: see [`Fit::resolved_gap`].
+/// A resolved gap below [`finest_gap`] is raised to it: see [`Fit::resolved_gap`]. Within `regions` smaller gaps are resolved; one
+/// for which that would take too many proxies has its gap raised: see [`Fit::regions`].
 ///
 /// # Errors
 /// Settings out of range, and what the one-body method doesn't resolve.
@@ -158,6 +175,7 @@ pub fn compress(
     mesh: &TriMesh,
     response: &dyn Response,
     settings: &CompressSettings,
+    regions: &[Region],
 ) -> Result<ReducedBody> {
     settings.validate()?;
     let surface = Interior::new(mesh);
@@ -197,7 +215,14 @@ pub fn compress(
         limit: 1.0,
         remedy,
     };
-    let candidates = candidates(&surface, gap, radius);
+    let mut candidates = candidates(&surface, gap, radius);
+    let regions = region::add(
+        &surface,
+        gap,
+        regions,
+        (&mut fitted, &mut checked),
+        &mut candidates,
+    );
     let field = potentials_weighted(&fitted, &candidates);
     if candidates.is_empty() {
         let remedy = format!("the mesh ({} faces) is too coarse", surface.faces.len());
@@ -257,6 +282,7 @@ pub fn compress(
         volume: surface.faces.volume(),
         fit: Fit {
             resolved_gap: gap,
+            regions,
             proxies: fitted.points.len(),
             asymmetry,
             radiated,
@@ -307,15 +333,8 @@ fn proxies(surface: &Interior, gap: f64, radius: f64, spacing: f64) -> (Proxies,
     let (mut fitted, mut checked) = (Proxies::default(), Proxies::default());
     let mut offset = gap;
     loop {
-        let around = samples::around(surface, offset, spacing * offset);
-        for (i, p) in around.into_iter().enumerate() {
-            let to = match i % CHECK == CHECK - 1 {
-                true => &mut checked,
-                false => &mut fitted,
-            };
-            to.points.push(p);
-            to.distances.push(offset);
-        }
+        let around = samples::around(surface, offset, spacing * offset, None);
+        fitted.add(&mut checked, around, offset);
         if offset > 2.0 * radius {
             return (fitted, checked);
         }
@@ -337,7 +356,7 @@ fn candidates(surface: &Interior, gap: f64, radius: f64) -> Vec<Vec3> {
         let mut out = Vec::new();
         let mut depth = DEPTH * gap;
         while depth < radius {
-            out.extend(samples::inside(surface, depth, spacing, TANGENT));
+            out.extend(samples::inside(surface, depth, spacing, TANGENT, None));
             depth *= 2.0;
         }
         let out = samples::thin(out, 1e-3 * gap, |p| *p);

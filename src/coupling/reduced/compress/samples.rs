@@ -1,6 +1,7 @@
 //! Points around a body, at given distances from its surface, and inside it.
 
 use crate::adjoint::lie::Vec3;
+pub(super) use crate::geometry::Ball;
 use crate::geometry::{Edge, Interior};
 use rayon::prelude::*;
 use std::collections::HashMap;
@@ -106,10 +107,37 @@ pub(super) fn thin<T>(
     out
 }
 
-/// Points at `offset` from the surface, about `spacing` apart.
-pub(super) fn around(surface: &Interior, offset: f64, spacing: f64) -> Vec<Vec3> {
-    let samples = surface_points(surface, 0.5 * spacing);
+/// Area of the surface within a ball, m².
+pub(super) fn area_within(surface: &Interior, ball: &Ball) -> f64 {
+    /// Points across the ball at which it is asked.
+    const ACROSS: f64 = 40.0;
+    let spacing = 2.0 * ball.radius / ACROSS;
+    let mut counts = vec![(0_usize, 0_usize); surface.faces.len()];
+    for s in surface_points(surface, spacing) {
+        let (all, within) = &mut counts[s.face];
+        *all += 1;
+        *within += usize::from((s.point - ball.center).norm() <= ball.radius);
+    }
+    let part = |(f, (all, within)): (usize, &(usize, usize))| {
+        surface.faces.areas[f] * *within as f64 / (*all).max(1) as f64
+    };
+    counts.iter().enumerate().map(part).sum()
+}
+
+/// Points at `offset` from the surface, about `spacing` apart; all around or within a ball.
+pub(super) fn around(
+    surface: &Interior,
+    offset: f64,
+    spacing: f64,
+    ball: Option<&Ball>,
+) -> Vec<Vec3> {
+    let mut samples = surface_points(surface, 0.5 * spacing);
+    if let Some(ball) = ball {
+        samples.retain(|s| (s.point - ball.center).norm() <= ball.radius + 3.0 * offset);
+    }
+    let within = |p: &Vec3| ball.is_none_or(|b| (p - b.center).norm() <= b.radius);
     let moved = samples.iter().map(|s| s.point + s.normal * offset);
+    let moved = moved.filter(within);
     let points = thin(moved, spacing, |p| *p);
     // Where the surface is hollow, a point along the normal can come near another part of it.
     let free = |p: &Vec3| {
@@ -120,9 +148,18 @@ pub(super) fn around(surface: &Interior, offset: f64, spacing: f64) -> Vec<Vec3>
 }
 
 /// Points inside the surface, `depth` deep or as deep as the body allows there, `spacing` apart
-/// relative to their depth.
-pub(super) fn inside(surface: &Interior, depth: f64, spacing: f64, tangent: f64) -> Vec<Vec3> {
-    let all = surface_points(surface, 0.7 * spacing * depth);
+/// relative to their depth; all of them or those under the surface within a ball.
+pub(super) fn inside(
+    surface: &Interior,
+    depth: f64,
+    spacing: f64,
+    tangent: f64,
+    ball: Option<&Ball>,
+) -> Vec<Vec3> {
+    let mut all = surface_points(surface, 0.7 * spacing * depth);
+    if let Some(ball) = ball {
+        all.retain(|s| (s.point - ball.center).norm() <= ball.radius);
+    }
     let samples = thin(all, spacing * depth, |s| s.point);
     let mut points: Vec<(Vec3, f64)> = samples
         .par_iter()

@@ -102,19 +102,23 @@ fn main() -> Result<(), Box<dyn Error>> {
     }
     Recording::prepare(&options.out)?;
     let start = Instant::now();
-    let scene = task::load()?;
+    let plain = task::load()?;
+    let scene = task::refined(&plain);
 
-    let dry = task::simulator(&task::dry(&scene), Fidelity::Isolated)?;
+    let dry = task::simulator(&task::dry(&plain), Fidelity::Isolated)?;
     let naive_dry_caught = hold::caught(&task::run(&dry, scene.steps)?)?;
     let submerged = task::simulator(&scene, Fidelity::Reduced)?;
     let naive = task::run(&submerged, scene.steps)?;
     let naive_caught = hold::caught(&naive)?;
 
+    // Found with the faces of the scene, and polished with those that resolve the gaps of the grip.
+    let coarse = Task::new(&plain)?;
+    let x = coarse.through(&naive)?;
+    let coarsely = coarse.find(&x, say)?;
     let task = Task::new(&scene)?;
-    let x = task.through(&naive)?;
     let cost_naive = task.hold(&x)?.0;
-    let found = task.find(&x, say)?;
-    let spent = task.spent();
+    let found = task.polish(&coarsely.x, |p| say("resolved", p))?;
+    let spent = coarse.spent().and(&task.spent());
     let optimised = task.rollout(&found.x)?;
     let optimised_held_since = hold::held_since(&optimised)?;
     let optimised_caught = hold::caught(&optimised)?;
@@ -146,7 +150,7 @@ fn main() -> Result<(), Box<dyn Error>> {
     let simulations = equivalent(&spent);
     let cap = options.cap.unwrap_or((11.0 * simulations).ceil() as usize);
     let rival = match options.rival {
-        true => Some(rival::run(&scene, &x, found.cost, cap, options.seeds)?),
+        true => Some(rival::run(&plain, &x, coarsely.cost, cap, options.seeds)?),
         false => None,
     };
     let report = Report {
@@ -156,7 +160,7 @@ fn main() -> Result<(), Box<dyn Error>> {
         hand_tuned_held_since,
         optimised_caught,
         optimised_held_since,
-        iterations: found.iterations,
+        iterations: coarsely.iterations + found.iterations,
         simulations,
         rollouts: spent.gradients,
         seconds,
@@ -244,9 +248,8 @@ fn print(r: &Report, optimised: &Rollout) {
     );
     if let Some(replay) = &r.replay {
         println!(
-            "replayed with full, {} faces, edges near contact {:.3} m: {}",
+            "replayed with full, {} faces: {}",
             replay.faces,
-            replay.edge,
             word(replay.caught)
         );
     }

@@ -47,6 +47,28 @@ pub fn load() -> Result<Scene> {
     Scene::load(folder.join("grasp.toml"))
 }
 
+/// With faces small enough for the gaps between the coin and the fingers that hold it: what is compressed resolves half the longest
+/// edge, which is less than the gap of contact.
+pub fn refined(scene: &Scene) -> Scene {
+    // Where the coin comes near a finger, in the finger's frame, m.
+    const GRIP: [f64; 3] = [0.0, 1.27, 0.0];
+    const EDGE: f64 = 0.025;
+    let mut scene = scene.clone();
+    for body in &mut scene.bodies {
+        *body = match body.name.as_str() {
+            "finger 1" | "finger 2" => {
+                body.clone()
+                    .refine(GRIP, 0.25, EDGE)
+                    .refine(GRIP, 0.4, 3.0 * EDGE)
+            }
+            // All of it.
+            "coin" => body.clone().refine([0.0; 3], 0.3, EDGE),
+            _ => continue,
+        };
+    }
+    scene
+}
+
 /// As on dry land.
 pub fn dry(scene: &Scene) -> Scene {
     let mut dry = scene.clone();
@@ -115,6 +137,23 @@ pub struct Spent {
     pub seconds_per_simulation: f64,
     /// Time of a gradient, its simulation left out, s.
     pub seconds_per_gradient: f64,
+}
+
+impl Spent {
+    /// Together with another.
+    pub fn and(&self, other: &Self) -> Self {
+        let mean = |a: f64, n: f64, b: f64, m: f64| (a * n + b * m) / (n + m).max(1.0);
+        let (rollouts, more) = (self.simulations, other.simulations);
+        let (gradients, further) = (self.gradients, other.gradients);
+        let simulating = (self.seconds_per_simulation, other.seconds_per_simulation);
+        let differentiating = (self.seconds_per_gradient, other.seconds_per_gradient);
+        Self {
+            simulations: rollouts + more,
+            gradients: gradients + further,
+            seconds_per_simulation: mean(simulating.0, rollouts, simulating.1, more),
+            seconds_per_gradient: mean(differentiating.0, gradients, differentiating.1, further),
+        }
+    }
 }
 
 impl Task {
@@ -220,11 +259,16 @@ impl Task {
     /// of both; `say` is called with every one.
     pub fn find(&self, x: &[f64], say: impl Fn(&str, &OptimizeProgress)) -> Result<Optimum> {
         let reached = minimise(|x| self.approach(x), x, &REACHING, |p| say("approach", p))?;
-        let held = minimise(|x| self.hold(x), &reached.x, &HOLDING, |p| say("hold", p))?;
+        let held = self.polish(&reached.x, |p| say("hold", p))?;
         Ok(Optimum {
             iterations: reached.iterations + held.iterations,
             ..held
         })
+    }
+
+    /// A descent of the whole trajectory from forces that nearly hold the coin.
+    pub fn polish(&self, x: &[f64], say: impl Fn(&OptimizeProgress)) -> Result<Optimum> {
+        minimise(|x| self.hold(x), x, &HOLDING, say)
     }
 
     /// The same cost alone.

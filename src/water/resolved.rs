@@ -1,7 +1,7 @@
 //! What gaps compressed bodies resolve, and where.
 
 use crate::adjoint::lie::{Pose, Vec3};
-use crate::coupling::reduced::compress::Region;
+use crate::coupling::reduced::Region;
 use crate::geometry::{Gap, Gaps, Other};
 
 /// The smallest gap that a body resolves, m: zero where it isn't compressed.
@@ -42,8 +42,9 @@ pub(crate) fn narrowest(
         if own.regions.is_empty() || everywhere.0 >= 1.0 {
             return Some(everywhere);
         }
-        let faces = gaps.centroids_within(body, other, own.everywhere / image, poses);
-        // Centroids are farther than the surface itself.
+        // Centroids are farther than the surface itself, by up to about an edge.
+        let reach = own.everywhere / image + gap.edge;
+        let faces = gaps.centroids_within(body, other, reach, poses);
         let nearest = (faces.iter().map(|(_, d)| *d)).fold(f64::INFINITY, f64::min);
         let excess = (nearest - gap.distance).max(0.0);
         let ratios = faces.iter().map(|(centroid, distance)| {

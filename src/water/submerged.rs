@@ -3,7 +3,7 @@
 use super::surface::{Coarse, Surface, pose, semi_axes};
 use crate::adjoint::lie::{Mat6, Pose, Vec3};
 use crate::coupling::Coupling;
-use crate::coupling::reduced::compress::Region;
+use crate::coupling::reduced::Region;
 use crate::geometry::{Refinement, TriMesh};
 use crate::multibody::Tree;
 use crate::scene::Scene;

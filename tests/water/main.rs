@@ -6,6 +6,7 @@ mod estimate;
 mod exact;
 mod flow;
 mod methods;
+mod near;
 mod one_body;
 mod overlap;
 mod panel;

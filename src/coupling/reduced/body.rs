@@ -1,6 +1,6 @@
 //! One body as the reduced coupling sees it.
 
-use super::compress::Region;
+use super::region::Region;
 use crate::adjoint::kernel::Points;
 use crate::adjoint::lie::{Mat6, Vec3};
 use crate::{Error, Result};

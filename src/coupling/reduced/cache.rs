@@ -6,7 +6,8 @@
 //! renamed, so that a writer that is killed leaves nothing half done.
 
 use super::ReducedBody;
-use super::compress::{CompressSettings, Region};
+use super::compress::CompressSettings;
+use super::region::Region;
 use crate::geometry::TriMesh;
 use crate::{Error, Result};
 use serde::Serialize;

@@ -22,12 +22,14 @@ mod check;
 pub mod compress;
 mod linearised;
 mod link;
+mod region;
 mod resolved;
 mod second;
 mod views;
 
 pub use body::{CompressedParts, Fit, ReducedBody};
 pub use link::{Cutoff, Link};
+pub use region::Region;
 
 use super::Exclusions;
 use super::settings::{end, ranges};

@@ -27,7 +27,8 @@ pub struct Refinement {
     pub center: [f64; 3],
     /// Its radius, m.
     pub radius: f64,
-    /// Longest edge inside, m: a gap is resolved from about twice its width on.
+    /// Longest edge inside, m. Fundamental solutions resolve a gap from about twice its width on; compressed bodies resolve one of half
+    /// of it, to walls of a quarter.
     pub edge: f64,
 }
 

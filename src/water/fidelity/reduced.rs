@@ -3,8 +3,7 @@
 use super::kind::{FidelityKind, Knob};
 use crate::adjoint::lie::Pose;
 use crate::boundary::Response;
-use crate::coupling::reduced::compress::Region;
-use crate::coupling::reduced::{self, ReducedBody, cache, compress};
+use crate::coupling::reduced::{self, ReducedBody, Region, cache, compress};
 use crate::geometry::{Gap, TriMesh};
 use crate::water::device::Device;
 use crate::water::method::kind::{BodyMethod, Problem};
@@ -145,9 +144,31 @@ fn warnings(problem: &Problem, made: &[Arc<ReducedBody>]) -> Vec<String> {
                 body.name
             ));
         }
+        for asked in &body.regions {
+            let same = |r: &&Region| (r.center - asked.center).norm() < ASIDE * size;
+            let of = |r: &Region| (r.radius - asked.radius).abs() < ASIDE * size;
+            let got = parts.fit.regions.iter().filter(same).find(|r| of(r));
+            if let Some(got) = got.filter(|r| asked.gap < 0.98 * r.gap) {
+                out.push(format!(
+                    "body {:?}: within {:.3e} m of ({:.3e}, {:.3e}, {:.3e}), where `refine` asks for edges of {:.3e} m, gaps under {:.3e} m \
+                     aren't resolved by its compressed sources, for the ball is too large: a smaller one resolves {:.3e} m",
+                    body.name,
+                    asked.radius,
+                    asked.center.x,
+                    asked.center.y,
+                    asked.center.z,
+                    2.0 * asked.gap,
+                    got.gap,
+                    asked.gap
+                ));
+            }
+        }
     }
     out
 }
+
+/// Part of a body's size within which regions are the same: they are compressed in rounded lengths.
+const ASIDE: f64 = 1e-6;
 
 /// Steps of the grid, relative to the body's size, on which lengths are compared.
 const GRID: f64 = (1u64 << 30) as f64;

@@ -22,22 +22,21 @@
 //! ellipsoids and boxes at the resolved gap: the error goes with the square of the rests.
 
 mod modes;
+mod proxies;
 mod pursuit;
 mod region;
 mod samples;
 
 use super::views::dense;
-use super::{CompressedParts, Fit, ReducedBody};
+use super::{CompressedParts, Fit, ReducedBody, Region};
 use crate::adjoint::lie::Vec3;
 use crate::boundary::Response;
 use crate::geometry::{Ball, Interior, TriMesh};
 use crate::{Error, Result};
 use faer::Mat;
-pub use region::Region;
+use proxies::{CANDIDATES, DEPTH, Proxies, SPACING, TANGENT};
 use serde::{Deserialize, Serialize};
 
-/// Proxies are this many times their distance from the surface apart.
-const SPACING: f64 = 0.75;
 /// Most proxies at the smallest distance; a smaller gap isn't resolved on so large a body.
 const MOST_PROXIES: f64 = 900.0;
 /// Largest gap that is asked to be resolved, in radii of the body.
@@ -46,14 +45,8 @@ const FARTHEST: f64 = 10.0;
 const MOST_RANK: usize = 1000;
 /// About as many proxies are fitted at most, unless a rank needs more.
 const MOST_FITTED: usize = 1100;
-/// Depths of the candidates, relative to the distances of the proxies.
-const DEPTH: f64 = 0.6;
-/// Candidates are this many times their depth apart.
-const CANDIDATES: f64 = 1.0;
 /// Most candidates.
 const MOST_CANDIDATES: usize = 1200;
-/// Candidates stay inside this part of the inner tangent ball.
-const TANGENT: f64 = 0.7;
 /// Modes below this times the root of the tolerance, relative to the largest, are left out.
 const MODES: f64 = 0.3;
 /// Points are added until every mode and flow is met to this times the root of the tolerance.
@@ -62,8 +55,6 @@ const REST: f64 = 2.0;
 const OWN: f64 = 3.0;
 /// At least this many proxies are fitted for each point, or the fit says nothing between proxies.
 const FITTED: usize = 3;
-/// One proxy in this many is kept from the fit to check it.
-const CHECK: usize = 6;
 
 /// How a body is compressed.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
@@ -120,46 +111,6 @@ impl CompressSettings {
             )),
             _ => Ok(()),
         }
-    }
-}
-
-/// Proxies with their distances from the surface.
-#[derive(Default)]
-struct Proxies {
-    points: Vec<Vec3>,
-    distances: Vec<f64>,
-}
-
-impl Proxies {
-    /// Adds points at the distance `offset`, and one in [`CHECK`] of them to those that check the fit.
-    fn add(&mut self, checked: &mut Self, points: Vec<Vec3>, offset: f64) {
-        for (i, p) in points.into_iter().enumerate() {
-            let to = match i % CHECK == CHECK - 1 {
-                true => &mut *checked,
-                false => &mut *self,
-            };
-            to.points.push(p);
-            to.distances.push(offset);
-        }
-    }
-
-    /// W Φ_own: the body's own flow.
-    fn radiated(&self, response: &dyn Response) -> Result<Mat<f64>> {
-        let own = response.radiated(&self.points)?;
-        Ok(Mat::from_fn(own.nrows(), 6, |i, j| {
-            own[(i, j)] * self.distances[i]
-        }))
-    }
-
-    /// W Φ W: the scattered flow.
-    fn scattered(&self, response: &dyn Response) -> Result<Mat<f64>> {
-        let mut potentials = response.scattered(&self.points, &self.points)?;
-        for (j, right) in self.distances.iter().enumerate() {
-            for (i, left) in self.distances.iter().enumerate() {
-                potentials[(i, j)] *= left * right;
-            }
-        }
-        Ok(potentials)
     }
 }
 

@@ -1,45 +1,18 @@
-//! Regions of a body's surface near which smaller gaps are resolved than elsewhere.
+//! Proxies and candidates where smaller gaps are resolved than elsewhere.
 
+use super::proxies::{CANDIDATES, DEPTH, Proxies, SPACING, TANGENT};
 use super::samples::{self, Ball};
-use super::{CANDIDATES, DEPTH, Proxies, SPACING, TANGENT};
+
 use crate::adjoint::lie::Vec3;
+use crate::coupling::reduced::Region;
 use crate::geometry::Interior;
-use serde::{Deserialize, Serialize};
 
 /// Most proxies that a region may add; a smaller gap isn't resolved in so large a region.
-const MOST_ADDED: f64 = 3000.0;
+const MOST_ADDED: f64 = 4500.0;
 /// Proxies are added in this many parts of what the finest distance has, as distances double: 1 + 1/4 + 1/16 …
 const COARSER: f64 = 4.0 / 3.0;
 /// Candidates nearer to one another than this part of the gap are one.
 const SAME: f64 = 1e-3;
-
-/// A ball within which a body resolves a smaller gap to others than elsewhere.
-#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
-#[serde(deny_unknown_fields)]
-pub struct Region {
-    /// Its centre, m, in the body's frame.
-    pub center: Vec3,
-    /// Its radius, m.
-    pub radius: f64,
-    /// Smallest gap to other bodies (and half of that to walls) that is resolved, m.
-    pub gap: f64,
-}
-
-impl Region {
-    /// Whether a point (m, body's frame) lies in it.
-    pub fn contains(&self, point: &Vec3) -> bool {
-        (point - self.center).norm_squared() <= self.radius * self.radius
-    }
-
-    /// The same of a body that is larger by `factor`.
-    pub fn scaled(&self, factor: f64) -> Self {
-        Self {
-            center: self.center * factor,
-            radius: self.radius * factor,
-            gap: self.gap * factor,
-        }
-    }
-}
 
 /// Adds proxies and candidates within `regions` at the distances from the surface between `gap`, which is resolved everywhere, and each
 /// region's own. The regions as they are resolved: with gaps under `gap` only, none too small for its size.

@@ -2,7 +2,6 @@
 
 use super::proxies::{CANDIDATES, DEPTH, Proxies, SPACING, TANGENT};
 use super::samples::{self, Ball};
-
 use crate::adjoint::lie::Vec3;
 use crate::coupling::reduced::Region;
 use crate::geometry::Interior;

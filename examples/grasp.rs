@@ -88,7 +88,7 @@ struct Report {
     replay: Option<replay::Replay>,
     /// Median of what the rival needed for the same cost; a lower bound where `rival.at_least`.
     rival_simulations: Option<usize>,
-    /// Over the descent's.
+    /// Over the descent's with the same faces.
     rival_ratio: Option<f64>,
     rival: Option<rival::Rival>,
     warnings: Vec<String>,
@@ -148,7 +148,9 @@ fn main() -> Result<(), Box<dyn Error>> {
         false => None,
     };
     let simulations = equivalent(&spent);
-    let cap = options.cap.unwrap_or((11.0 * simulations).ceil() as usize);
+    // The rival has the scene's own faces, and the cost that the descent reached on them.
+    let compared = equivalent(&coarse.spent());
+    let cap = options.cap.unwrap_or((11.0 * compared).ceil() as usize);
     let rival = match options.rival {
         true => Some(rival::run(&plain, &x, coarsely.cost, cap, options.seeds)?),
         false => None,
@@ -170,7 +172,7 @@ fn main() -> Result<(), Box<dyn Error>> {
         cost_optimised: found.cost,
         replay,
         rival_simulations: rival.as_ref().map(|r| r.median),
-        rival_ratio: rival.as_ref().map(|r| r.median as f64 / simulations),
+        rival_ratio: rival.as_ref().map(|r| r.median as f64 / compared),
         rival,
         warnings: optimised.warnings(),
         files,

@@ -10,6 +10,8 @@ use std::cell::RefCell;
 type Vector = Vec<f64>;
 type Search = MoreThuenteLineSearch<Vector, Vector, f64>;
 type Iterate = IterState<Vector, Vector, (), (), (), f64>;
+/// A value with its gradient. Known by its signature alone, so that the search is compiled once for all functions.
+type Function<'a> = dyn FnMut(&[f64]) -> Result<(f64, Vector)> + 'a;
 
 /// Sufficient decrease and curvature of the line search.
 const WOLFE: (f64, f64) = (1e-4, 0.9);
@@ -28,8 +30,8 @@ struct Point {
 
 /// The function with what was seen of it. Costs and gradients are handed to the search divided by `scale`, so that its first step has the
 /// length that was asked for.
-struct Seen<F> {
-    function: F,
+struct Seen<'a> {
+    function: &'a mut Function<'a>,
     best: Point,
     last: Point,
     scale: f64,
@@ -39,7 +41,7 @@ struct Seen<F> {
     failures: usize,
 }
 
-impl<F: FnMut(&[f64]) -> Result<(f64, Vector)>> Seen<F> {
+impl Seen<'_> {
     /// Evaluates at `x`, unless that was the last point.
     fn at(&mut self, x: &[f64]) -> std::result::Result<&Point, argmin::core::Error> {
         if self.last.x != x {
@@ -84,9 +86,9 @@ impl<F: FnMut(&[f64]) -> Result<(f64, Vector)>> Seen<F> {
 }
 
 /// Shared with the search, which wants to own what it evaluates.
-struct Shared<'a, F>(&'a RefCell<Seen<F>>);
+struct Shared<'a, 'f>(&'a RefCell<Seen<'f>>);
 
-impl<F: FnMut(&[f64]) -> Result<(f64, Vector)>> CostFunction for Shared<'_, F> {
+impl CostFunction for Shared<'_, '_> {
     type Param = Vector;
     type Output = f64;
 
@@ -97,7 +99,7 @@ impl<F: FnMut(&[f64]) -> Result<(f64, Vector)>> CostFunction for Shared<'_, F> {
     }
 }
 
-impl<F: FnMut(&[f64]) -> Result<(f64, Vector)>> Gradient for Shared<'_, F> {
+impl Gradient for Shared<'_, '_> {
     type Param = Vector;
     type Gradient = Vector;
 
@@ -149,6 +151,15 @@ pub fn minimise(
     start: &[f64],
     settings: &OptimizeSettings,
     mut progress: impl FnMut(&OptimizeProgress),
+) -> Result<Optimum> {
+    descend(&mut function, start, settings, &mut progress)
+}
+
+fn descend(
+    function: &mut Function,
+    start: &[f64],
+    settings: &OptimizeSettings,
+    progress: &mut dyn FnMut(&OptimizeProgress),
 ) -> Result<Optimum> {
     settings.validate()?;
     if start.is_empty() {
@@ -230,8 +241,8 @@ pub fn minimise(
 }
 
 /// A search under way from the best point.
-struct Descent<'a, F> {
-    problem: Problem<Shared<'a, F>>,
+struct Descent<'a, 'f> {
+    problem: Problem<Shared<'a, 'f>>,
     solver: LBFGS<Search, Vector, Vector, f64>,
     state: Option<Iterate>,
 }
@@ -246,8 +257,8 @@ fn broken(error: &argmin::core::Error) -> Error {
     }
 }
 
-impl<'a, F: FnMut(&[f64]) -> Result<(f64, Vector)>> Descent<'a, F> {
-    fn new(seen: &'a RefCell<Seen<F>>, first_step: f64, memory: usize) -> Result<Self> {
+impl<'a, 'f> Descent<'a, 'f> {
+    fn new(seen: &'a RefCell<Seen<'f>>, first_step: f64, memory: usize) -> Result<Self> {
         let search = Search::new()
             .with_c(WOLFE.0, WOLFE.1)
             .and_then(|s| s.with_width_tolerance(WIDTH))

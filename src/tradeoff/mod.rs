@@ -35,6 +35,7 @@ mod start;
 pub use configuration::{Configuration, Family};
 #[cfg(feature = "cli")]
 pub(crate) use configuration::{short, three_digits};
+pub use plan::configurations;
 pub use progress::{TradeoffProgress, TradeoffStage};
 pub use row::{ReferenceQuantity, TradeoffReference, TradeoffRow};
 pub use settings::TradeoffSettings;
@@ -42,7 +43,7 @@ pub use settings::TradeoffSettings;
 use crate::Result;
 use crate::coupling::reduced::cache;
 use crate::scene::Scene;
-use plan::{expected, order, plan};
+use plan::{expected, order};
 use progress::Watch;
 use reference::{Limits, Reference};
 use row::conclude;
@@ -93,8 +94,7 @@ pub fn measure(
     settings: &TradeoffSettings,
     mut progress: impl FnMut(TradeoffProgress) -> ControlFlow<()> + Send,
 ) -> Result<Tradeoff> {
-    settings.validate()?;
-    scene.validate()?;
+    let configurations = configurations(scene, settings)?;
     let begin = Instant::now();
     let budget = settings.budget.unwrap_or(BUDGET);
     let left = || budget - begin.elapsed().as_secs_f64();
@@ -108,7 +108,6 @@ pub fn measure(
     // Bodies that the reference compressed would make setting up look cheaper than it is.
     cache::forget();
 
-    let configurations = plan(scene, settings);
     watch.configurations(configurations.len())?;
     let mut rows: Vec<Option<TradeoffRow>> = vec![None; configurations.len()];
     let mut warnings = Vec::new();

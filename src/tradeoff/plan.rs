@@ -4,10 +4,12 @@ use super::configuration::{Configuration, Family};
 use super::row::TradeoffRow;
 use super::settings::TradeoffSettings;
 use super::shapes::{ClosedForms, closed_forms, has_faces};
+use super::start::{free, isolated};
 use crate::coupling::full::SolveSettings;
 use crate::dynamics::Integrator;
 use crate::scene::Scene;
 use crate::simulate::{Fidelity, Knob, Method, Numerics, Settings};
+use crate::{Error, Result};
 use strum::VariantArray;
 
 const FACES: [usize; 3] = [80, 320, 1280];
@@ -20,8 +22,15 @@ const TIME_STEPS: [f64; 5] = [4.0, 2.0, 1.0, 0.5, 0.25];
 /// starting what can't end in time.
 const GROWTH: f64 = 2.5;
 
-/// The configurations to compare, each once; the bases of the fidelities first.
-pub(super) fn plan(scene: &Scene, settings: &TradeoffSettings) -> Vec<Configuration> {
+/// The configurations that [`super::measure`] compares, each once: one of each fidelity first, what the others are varied
+/// around.
+///
+/// # Errors
+/// Settings out of range; a scene that doesn't validate, without water, or where nothing can move.
+pub fn configurations(scene: &Scene, settings: &TradeoffSettings) -> Result<Vec<Configuration>> {
+    settings.validate()?;
+    scene.validate()?;
+    check(scene)?;
     let mut plan = Plan {
         scene,
         settings,
@@ -38,7 +47,26 @@ pub(super) fn plan(scene: &Scene, settings: &TradeoffSettings) -> Vec<Configurat
     } else {
         plan.one_by_one(&bases);
     }
-    plan.out
+    Ok(plan.out)
+}
+
+/// Refuses scenes in which there is nothing to compare.
+fn check(scene: &Scene) -> Result<()> {
+    if scene.fluid.density <= 0.0 {
+        return Err(Error::input(
+            "fluid.density",
+            scene.fluid.density,
+            "must be above zero: without water all fidelities are the same",
+        ));
+    }
+    if free(&isolated(scene)?)?.is_empty() {
+        return Err(Error::input(
+            "joints that forces move at the start",
+            0,
+            "give at least one body a joint that is neither locked, held nor driven",
+        ));
+    }
+    Ok(())
 }
 
 struct Plan<'a> {
@@ -247,118 +275,23 @@ pub(super) fn expected(configuration: &Configuration, rows: &[Option<TradeoffRow
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::scene::{Body, Fluid, Shape};
-
-    fn scene(shapes: &[Shape]) -> Scene {
-        let mut scene = Scene::new(Fluid::fresh_water());
-        for shape in shapes {
-            scene.add(Body::new(shape.clone()).density(998.0));
-        }
-        scene
-    }
-
-    fn of(plan: &[Configuration], fidelity: Fidelity, family: Family) -> Vec<Configuration> {
-        let fits = |c: &&Configuration| (c.fidelity, c.family) == (fidelity, family);
-        plan.iter().filter(fits).copied().collect()
-    }
-
-    #[test]
-    fn configurations_are_distinct_and_bases_come_first() {
-        for shapes in [
-            vec![Shape::sphere(1.0)],
-            vec![Shape::cuboid([1.0; 3])],
-            vec![Shape::sphere(1.0), Shape::cuboid([1.0; 3])],
-        ] {
-            let plan = plan(&scene(&shapes), &TradeoffSettings::default());
-            assert!(plan[..4].iter().all(|c| c.family == Family::Base));
-            assert!(plan[4..].iter().all(|c| c.family != Family::Base));
-            for (i, c) in plan.iter().enumerate() {
-                let label = c.label();
-                assert!(plan[..i].iter().all(|d| d.label() != label), "{label}");
-            }
-        }
-    }
-
-    #[test]
-    fn methods_without_a_difference_are_one() {
-        let methods = |shapes: &[Shape]| -> Vec<Method> {
-            let plan = plan(&scene(shapes), &TradeoffSettings::default());
-            let families = [Family::Base, Family::Method];
-            let reduced = families.map(|f| of(&plan, Fidelity::Reduced, f)).concat();
-            reduced.iter().map(|c| c.method).collect()
-        };
-        let sphere = Shape::sphere(1.0);
-        let cube = Shape::cuboid([1.0; 3]);
-        let all = [
-            Method::Exact,
-            Method::Panel,
-            Method::MfsVertex,
-            Method::MfsFace,
-        ];
-        assert_eq!(methods(std::slice::from_ref(&sphere)), all);
-        assert_eq!(methods(std::slice::from_ref(&cube)), all[1..]);
-        assert_eq!(methods(&[sphere, cube])[0], Method::Auto);
-    }
-
-    #[test]
-    fn first_values_are_the_base() {
-        let settings = TradeoffSettings {
-            fidelities: vec![Fidelity::Reduced, Fidelity::Full],
-            methods: vec![Method::Exact, Method::MfsFace],
-            faces: vec![320, 80],
-            ranks: vec![20, 40],
-            tolerances: vec![1e-6],
-            integrators: vec![Integrator::Rk4],
-            time_steps: vec![0.02, 0.01],
-            ..TradeoffSettings::default()
-        };
-        let plan = plan(&scene(&[Shape::sphere(1.0)]), &settings);
-        let reduced = plan[0];
-        assert_eq!(reduced.method, Method::Exact);
-        assert_eq!(reduced.faces_per_body, Some(320));
-        assert_eq!((reduced.rank, reduced.accuracy), (Some(20), None));
-        assert_eq!(reduced.time_step, 0.02);
-        // Full takes the first method that it can step with; what it can't follows as a row of its own.
-        let full = plan[1];
-        assert_eq!(full.method, Method::MfsFace);
-        assert_eq!(full.tolerance, Some(1e-6));
-        let methods = of(&plan, Fidelity::Full, Family::Method);
-        assert_eq!(methods.len(), 1);
-        assert_eq!(methods[0].method, Method::Exact);
-        let steps = of(&plan, Fidelity::Reduced, Family::TimeStep);
-        assert_eq!(steps.len(), 1);
-        assert!(!steps[0].steps_like(&reduced) && steps[0].couples_like(&reduced));
-        assert!(plan.iter().all(|c| c.integrator == Integrator::Rk4));
-    }
-
-    #[test]
-    fn product_has_every_combination_once() {
-        let settings = TradeoffSettings {
-            fidelities: vec![Fidelity::Reduced],
-            methods: vec![Method::Panel, Method::MfsVertex],
-            faces: vec![80, 320],
-            ranks: vec![20, 40],
-            accuracies: vec![1e-2],
-            integrators: vec![Integrator::Rk2, Integrator::Rk4],
-            time_steps: vec![0.01, 0.02, 0.04],
-            full_product: true,
-            ..TradeoffSettings::default()
-        };
-        let plan = plan(&scene(&[Shape::sphere(1.0)]), &settings);
-        assert_eq!(plan.len(), 2 * 2 * 3 * 2 * 3);
-    }
 
     #[test]
     fn cheap_configurations_come_first() {
-        let plan = plan(&scene(&[]), &TradeoffSettings::default());
-        let order = order(&plan);
-        assert!(order[..4].iter().all(|i| plan[*i].family == Family::Base));
-        let full = |i: &usize| plan[*i].fidelity == Fidelity::Full;
-        let rest = &order[4..];
-        let first = rest.iter().position(full).unwrap();
-        assert!(rest[first..].iter().all(full));
-        let mut sorted = order.clone();
-        sorted.sort_unstable();
-        assert!(sorted.iter().enumerate().all(|(i, n)| i == *n));
+        let of = |family, fidelity| Configuration {
+            family,
+            fidelity,
+            ..Configuration::default()
+        };
+        let (full, reduced) = (Fidelity::Full, Fidelity::Reduced);
+        let plan = [
+            of(Family::Base, full),
+            of(Family::Base, reduced),
+            of(Family::Method, full),
+            of(Family::Faces, reduced),
+            of(Family::Integrator, reduced),
+            of(Family::Faces, reduced),
+        ];
+        assert_eq!(order(&plan), [1, 0, 3, 4, 5, 2]);
     }
 }

@@ -3,7 +3,8 @@
 use super::progress::Watch;
 use crate::Result;
 use crate::dynamics::Drive;
-use crate::simulate::{Controls, Observation, Simulator};
+use crate::scene::{Preset, Scene};
+use crate::simulate::{Controls, Fidelity, Observation, Settings, Simulator};
 use nalgebra::{DMatrix, DVector};
 
 /// The scene at its start, over the velocities that forces decide.
@@ -120,4 +121,12 @@ impl Path {
             v: samples.iter().map(|s| s.v.clone()).collect(),
         })
     }
+}
+
+/// Each body in water of its own, on few faces: for what doesn't depend on the water.
+pub(super) fn isolated(scene: &Scene) -> Result<Simulator> {
+    let settings = Settings::preset(Preset::Default)
+        .fidelity(Fidelity::Isolated)
+        .faces(80);
+    Simulator::new(scene, settings)
 }

@@ -100,7 +100,7 @@ fn falling_ball_for_many_steps() {
                 (Fidelity::Full, Integrator::MomentumEuler) => 20,
                 (Fidelity::Full, _) => continue,
                 (Fidelity::Reduced, Integrator::MomentumEuler) | (Fidelity::Isolated, _) => 100,
-                _ => 40,
+                _ => 25,
             };
             check(&example("falling_ball"), fidelity, integrator, steps, 20);
         }

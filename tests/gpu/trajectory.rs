@@ -11,7 +11,7 @@ pub const STEPS: usize = 3;
 /// The falling ball: a sphere, a coin and the image of a wall, on small meshes.
 pub fn falling_ball() -> Scene {
     let mut scene = example("falling_ball");
-    scene.set_faces(80);
+    scene.set_faces(40);
     scene
 }
 

@@ -15,8 +15,9 @@ mod scan;
 mod tools;
 
 use hydrograd::adjoint;
-use hydrograd::adjoint::check::Rung;
+use hydrograd::adjoint::check::{Outcome, Rung};
 use std::collections::BTreeSet;
+use std::sync::LazyLock;
 
 /// Every checked rung, named by its path; those of the kernels' crate begin with `adjoint`.
 fn registered() -> Vec<(String, Rung)> {
@@ -271,11 +272,34 @@ fn every_rung_in_the_source_is_registered() {
     }
 }
 
+/// A rung with the outcome of its check, uncorrupted, and what that drew.
+struct Checked {
+    name: String,
+    rung: Rung,
+    right: Outcome,
+    drawn: Vec<Vec<f64>>,
+}
+
+static CHECKED: LazyLock<Vec<Checked>> = LazyLock::new(|| {
+    let checked = |(name, rung): (String, Rung)| {
+        let (right, drawn) = tools::drawn_by(|| (rung.check)(1.0));
+        Checked {
+            name,
+            rung,
+            right,
+            drawn,
+        }
+    };
+    registered().into_iter().map(checked).collect()
+});
+
 #[test]
 fn every_rung_is_right_and_fails_when_corrupted() {
     let mut wrong = Vec::new();
-    for (name, rung) in registered() {
-        let right = (rung.check)(1.0);
+    for Checked {
+        name, rung, right, ..
+    } in CHECKED.iter()
+    {
         println!("{:.1e} {:5.2} {name}", right.rel_error, right.order);
         if !right.passes() || right.tolerance > 1e-6 {
             wrong.push(format!("{name}: {right:?}"));
@@ -296,10 +320,7 @@ const SPANNED: f64 = 0.15;
 #[test]
 fn vectors_of_every_check_span_space() {
     let mut flat = Vec::new();
-    for (name, rung) in registered() {
-        let drawn = tools::drawn_by(|| {
-            (rung.check)(1.0);
-        });
+    for Checked { name, drawn, .. } in CHECKED.iter() {
         // Arrays of vectors, each of unit size.
         let vectors: Vec<[f64; 3]> = drawn
             .iter()
@@ -316,7 +337,7 @@ fn vectors_of_every_check_span_space() {
         let span = adjoint::sample::span(vectors.iter().copied());
         println!("{span:.2} {:4} {name}", vectors.len());
         if span < SPANNED {
-            flat.push(name);
+            flat.push(name.clone());
         }
     }
     assert!(flat.is_empty(), "{flat:#?}");

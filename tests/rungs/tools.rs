@@ -20,11 +20,11 @@ pub fn wavy(count: usize, phase: f64, size: f64) -> DVector<f64> {
     DVector::from_vec(drawn)
 }
 
-/// What `check` draws.
-pub fn drawn_by(check: impl FnOnce()) -> Vec<Vec<f64>> {
+/// What `check` gives, and what it draws.
+pub fn drawn_by(check: impl FnOnce() -> Outcome) -> (Outcome, Vec<Vec<f64>>) {
     DRAWN.take();
-    check();
-    DRAWN.take()
+    let outcome = check();
+    (outcome, DRAWN.take())
 }
 
 /// The worst of several checks.

@@ -3,6 +3,7 @@
 mod api_input;
 mod examples;
 mod input;
+mod tradeoff;
 mod validate;
 
 #[path = "../support/mod.rs"]

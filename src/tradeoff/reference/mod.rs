@@ -9,10 +9,9 @@ mod panels;
 use super::compare::{Excursion, end_error, matrix_error, norm, significant, vector_error};
 use super::progress::Watch;
 use super::row::{ReferenceQuantity, TradeoffReference};
-use super::start::{Path, Start, free};
+use super::start::{Path, Start, free, isolated};
 use crate::adjoint::sample;
-use crate::scene::{Preset, Scene};
-use crate::simulate::{Fidelity, Settings, Simulator};
+use crate::scene::Scene;
 use crate::{Error, Result};
 use moving::Simulations;
 use nalgebra::{DMatrix, DVector};
@@ -89,7 +88,6 @@ impl Reference {
     /// A scene without water or where nothing can move, what no method can solve, and the end that was asked for.
     pub fn new(scene: &Scene, limits: Limits, watch: &mut Watch) -> Result<Self> {
         let begin = Instant::now();
-        check(scene)?;
         let half = Duration::from_secs_f64(limits.seconds / 2.0);
         let panels = Panels::new(scene, &limits, begin + half, watch);
         watch.check()?;
@@ -243,32 +241,6 @@ impl Reference {
     }
 }
 
-fn isolated(scene: &Scene) -> Result<Simulator> {
-    let settings = Settings::preset(Preset::Default)
-        .fidelity(Fidelity::Isolated)
-        .faces(80);
-    Simulator::new(scene, settings)
-}
-
-/// Refuses scenes in which there is nothing to compare.
-fn check(scene: &Scene) -> Result<()> {
-    if scene.fluid.density <= 0.0 {
-        return Err(Error::input(
-            "fluid.density",
-            scene.fluid.density,
-            "must be above zero: without water all fidelities are the same",
-        ));
-    }
-    if free(&isolated(scene)?)?.is_empty() {
-        return Err(Error::input(
-            "joints that forces move at the start",
-            0,
-            "give at least one body a joint that is neither locked, held nor driven",
-        ));
-    }
-    Ok(())
-}
-
 fn noted<T>(found: Result<T>, what: &str, notes: &mut Vec<String>) -> Option<T> {
     found
         .map_err(|error| notes.push(format!("no reference from {what}: {error}")))
@@ -285,19 +257,6 @@ fn pseudo_random_force(mass: &DMatrix<f64>) -> DVector<f64> {
 #[cfg(test)]
 mod tests {
     use super::*;
-
-    #[test]
-    fn scenes_without_anything_to_compare_are_refused() {
-        use crate::scene::{Body, Fluid, Shape};
-        let mut scene = Scene::new(Fluid::none());
-        scene.add(Body::new(Shape::sphere(1.0)).density(998.0));
-        let refused = |scene: &Scene| check(scene).unwrap_err().to_string();
-        assert!(refused(&scene).contains("fluid.density"));
-        scene.fluid = Fluid::fresh_water();
-        assert!(check(&scene).is_ok());
-        scene.bodies[0].locked = true;
-        assert!(refused(&scene).contains("joints"));
-    }
 
     #[test]
     fn climbs_stop_at_the_time_and_at_errors() {

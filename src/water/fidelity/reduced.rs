@@ -139,16 +139,18 @@ fn warnings(problem: &Problem, made: &[Arc<ReducedBody>]) -> Vec<String> {
         if let Some(asked) = problem.chosen(b).resolved_gap.filter(|a| *a < 0.98 * got) {
             out.push(format!(
                 "body {:?}: gaps under {got:.3e} m aren't resolved by its compressed sources, for all \
-                 that {asked:.3e} m were asked for: its surface is too large; use a plane wall for a \
-                 floor, or the fidelity full",
+                 that {asked:.3e} m were asked for: its surface is too large; `refine` it where gaps close, use a \
+                 plane wall for a floor, or the fidelity full",
                 body.name
             ));
         }
         for asked in &body.regions {
             let same = |r: &&Region| (r.center - asked.center).norm() < ASIDE * size;
             let of = |r: &Region| (r.radius - asked.radius).abs() < ASIDE * size;
-            let got = parts.fit.regions.iter().filter(same).find(|r| of(r));
-            if let Some(got) = got.filter(|r| asked.gap < 0.98 * r.gap) {
+            let found = parts.fit.regions.iter().filter(same).find(|r| of(r));
+            // A ball that resolves no more than the rest of the body does is left out of the fit.
+            let got = found.map_or(got, |r| r.gap);
+            if asked.gap < 0.98 * got {
                 out.push(format!(
                     "body {:?}: within {:.3e} m of ({:.3e}, {:.3e}, {:.3e}), where `refine` asks for edges of {:.3e} m, gaps under {:.3e} m \
                      aren't resolved by its compressed sources, for the ball is too large: a smaller one resolves {:.3e} m",
@@ -158,7 +160,7 @@ fn warnings(problem: &Problem, made: &[Arc<ReducedBody>]) -> Vec<String> {
                     asked.center.y,
                     asked.center.z,
                     2.0 * asked.gap,
-                    got.gap,
+                    got,
                     asked.gap
                 ));
             }

@@ -331,8 +331,8 @@ impl Rollout {
         Ok(out)
     }
 
-    /// Figures of the whole trajectory: energies (J), drift of momentum (relative), iterations, smallest gap (m), steps that were cut
-    /// into pieces, and the most pieces of one.
+    /// Figures of the whole trajectory: energies (J), drift of momentum (relative), iterations, smallest gap (m), the largest gap
+    /// at which surfaces are taken to touch (m), steps that were cut into pieces, and the most pieces of one.
     fn summary<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyDict>> {
         let s = self.inner.summary();
         let out = PyDict::new(py);
@@ -343,6 +343,7 @@ impl Rollout {
         out.set_item("iterations", s.iterations)?;
         out.set_item("asymmetry", s.asymmetry)?;
         out.set_item("min_gap", s.min_gap)?;
+        out.set_item("contact_gap", s.contact_gap)?;
         out.set_item("cut_steps", s.cut_steps)?;
         out.set_item("most_pieces", s.most_pieces)?;
         Ok(out)

@@ -434,6 +434,24 @@ impl Simulator {
         self.inner.choices().integrator.into()
     }
 
+    /// The gaps at which surfaces are taken to touch, m, by pair of names: of two bodies, or of one and None for a wall. Empty where the scene
+    /// has no contact.
+    #[getter]
+    fn contact_gaps(&self) -> HashMap<(String, Option<String>), f64> {
+        let names = self.inner.names();
+        let gaps = self.inner.contact_gaps().into_iter();
+        gaps.map(|g| {
+            (
+                (
+                    names[g.first].to_string(),
+                    g.second.map(|b| names[b].to_string()),
+                ),
+                g.gap,
+            )
+        })
+        .collect()
+    }
+
     /// What should be known about the scene, with names and numbers.
     #[getter]
     fn warnings(&self) -> Vec<String> {

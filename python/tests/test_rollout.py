@@ -110,6 +110,10 @@ def test_chain_walls_contact_and_motion():
     rollout = sim.rollout(steps=3)
     assert rollout.q.shape == (4, 1 + 7 + 1 + 3)
     assert np.allclose(rollout.q[:, -1], 0.1 * rollout.time)
+    gaps = sim.contact_gaps
+    assert all(0.0 < gap < 2e-3 for gap in gaps.values())
+    assert ("crank", None) in gaps  # the wall
+    assert rollout.summary()["contact_gap"] == max(gaps.values())
 
 
 def test_meshes_from_arrays_objects_and_files(tmp_path):

@@ -19,6 +19,9 @@ const ROOM: f64 = 1.25;
 /// The same where the water isn't solved, of the smallest body's radius: distances are smooth outside a body only.
 const SKIN: f64 = 0.01;
 
+/// Of the size of the smaller body, a gap at which surfaces touch that the user is told of.
+const WIDE: f64 = 0.05;
+
 /// How far a piece for contact may reach out of its body's bounds, in their diagonal.
 const OUTSIDE: f64 = 0.05;
 
@@ -111,6 +114,32 @@ pub(super) fn assemble(
         laws,
         rigid: given.stiffness.is_none(),
     })
+}
+
+/// What the user should know of the gaps at which surfaces touch: the largest, as a part of a body, if that is no small part.
+pub(super) fn warning(scene: &Scene, given: &Contact, model: &ContactModel) -> Option<String> {
+    let gaps = model.gaps();
+    let wide = gaps.iter().filter(|g| g.part > WIDE);
+    let worst = wide.clone().max_by(|a, b| a.part.total_cmp(&b.part))?;
+    let name = |b: usize| format!("body {:?}", scene.bodies[b].name);
+    let other = worst.second.map_or("a wall".into(), name);
+    let more = match wide.count() - 1 {
+        0 => String::new(),
+        n => format!("; {n} more pairs are over {:.0} %", 100.0 * WIDE),
+    };
+    let why = match given.gap {
+        Some(_) => "as contact.gap says",
+        None => {
+            "since the coupling resolves no less: resolve more (`accuracy`, more faces), or give contact.gap, if forces of the water that \
+             aren't resolved will do"
+        }
+    };
+    Some(format!(
+        "{} and {other} touch at a gap of {:.3e} m, {:.0} % of the smaller one's size, {why}{more}",
+        name(worst.first),
+        worst.gap,
+        100.0 * worst.part
+    ))
 }
 
 /// Shape of a body: by its formula, or a mesh that is convex.

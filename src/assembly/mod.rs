@@ -152,10 +152,11 @@ pub(crate) fn assemble(
     if choices.water.fidelity.coupled() && scene.fluid.density > 0.0 {
         clearance.refuse_start(&poses)?;
     }
-    let water = water::prepare(scene, &choices.water, in_water, &poses, clearance, folder)?;
+    let mut water = water::prepare(scene, &choices.water, in_water, &poses, clearance, folder)?;
     system.coupling = water.coupling.clone();
     if let Some(given) = &scene.contact {
         let made = contact::assemble(scene, given, dt, &water, &surfaces, &mut parameters)?;
+        water.warnings.extend(contact::warning(scene, given, &made));
         system.contact = Some(made);
     }
     system.limits = limits::assemble(scene, dt, &system, &parameters, &q)?;

@@ -52,6 +52,8 @@ pub(super) struct RunReport {
     pub momentum_drift: f64,
     /// Smallest gap of the whole run, m; null where there is nothing to meet.
     pub min_gap: Option<f64>,
+    /// Largest gap at which surfaces are taken to touch, m; null where the scene has no contact.
+    pub contact_gap: Option<f64>,
     /// Steps that were cut into pieces, being too long for what moved in them.
     pub cut_steps: usize,
     /// Most pieces of a step; one where none was cut.
@@ -110,6 +112,7 @@ fn simulate(
         energy_final: summary.energy_final,
         momentum_drift: summary.momentum_drift,
         min_gap: summary.min_gap,
+        contact_gap: summary.contact_gap,
         cut_steps: summary.cut_steps,
         most_pieces: summary.most_pieces,
         final_q: last.q.as_slice().to_vec(),
@@ -160,6 +163,13 @@ impl fmt::Display for RunReport {
             self.momentum_drift
         )?;
         writeln!(f, "  smallest gap   {}", or_dash(self.min_gap, "m"))?;
+        if self.contact_gap.is_some() {
+            writeln!(
+                f,
+                "  surfaces touch at gaps of up to {}",
+                or_dash(self.contact_gap, "m")
+            )?;
+        }
         if self.cut_steps > 0 {
             writeln!(
                 f,

@@ -3,7 +3,7 @@
 use super::Parameters;
 use crate::adjoint::contact::{ContactBar, Law, PointState, Rates, positive};
 use crate::adjoint::lie::{Vec3, Vec6, angular, point_velocity, point_wrench, six};
-use crate::contact::{ContactPoint, Contacts};
+use crate::contact::{ContactPair, ContactPoint, Contacts};
 use serde::Serialize;
 
 /// Which surfaces may touch, and how.
@@ -15,6 +15,19 @@ pub struct ContactModel {
     pub laws: Vec<Law>,
     /// Whether the stiffness is near rigid at the time step, so that it rises where a step is cut; one that was given stays what it is.
     pub rigid: bool,
+}
+
+/// Gap at which the surfaces of a pair are taken to touch.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize)]
+pub struct ContactGap {
+    /// A body.
+    pub first: usize,
+    /// The other one; none for a wall.
+    pub second: Option<usize>,
+    /// m
+    pub gap: f64,
+    /// The same as a part of the size of the smaller body, the diameter of the ball around it.
+    pub part: f64,
 }
 
 /// A place where two surfaces are near at a configuration.
@@ -43,6 +56,30 @@ pub(super) fn sharpened(law: Law, n: usize) -> Law {
 }
 
 impl ContactModel {
+    /// The gap of each pair, in the order of [`Contacts::pairs`].
+    pub fn gaps(&self) -> Vec<ContactGap> {
+        let gap = |(pair, law): (&ContactPair, &Law)| {
+            let bodies = [Some(pair.first), pair.second_body()];
+            let radii = bodies
+                .into_iter()
+                .flatten()
+                .filter_map(|b| self.shapes.radius(b));
+            let smaller = radii.fold(f64::INFINITY, f64::min);
+            ContactGap {
+                first: pair.first,
+                second: pair.second_body(),
+                gap: law.gap,
+                part: law.gap / (2.0 * smaller),
+            }
+        };
+        self.shapes
+            .pairs()
+            .iter()
+            .zip(&self.laws)
+            .map(gap)
+            .collect()
+    }
+
     pub(super) fn law(&self, pair: usize, parameters: &Parameters) -> Law {
         let [
             stiffness,

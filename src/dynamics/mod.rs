@@ -16,7 +16,7 @@ mod system;
 
 pub use balance::ForceCotangents;
 pub use body::BodyData;
-pub use contact::{ContactForce, ContactModel, Dual, PairContact};
+pub use contact::{ContactForce, ContactGap, ContactModel, Dual, PairContact};
 pub use evaluation::Evaluation;
 pub use integrator::{
     ContactVelocities, Input, Integrator, LinearisedStep, State, StateBar, StateTangent, StepBar,

@@ -104,8 +104,8 @@ fn points_inside() {
             places.push(a + 0.1234 * (b - a));
         }
         let mut ways = mesh.vertex_normals();
-        ways.truncate(12);
-        ways.extend(inside.faces.normals.iter().take(12));
+        ways.truncate(4);
+        ways.extend(inside.faces.normals.iter().take(4));
         let (mut points, mut winding, mut normals, mut parry) = (0, 0, 0, 0);
         let mut worst: f64 = 0.0;
         for x in &places {
@@ -135,5 +135,7 @@ fn points_inside() {
              by parry {parry}; distances differ by {worst:.1e}",
             mesh.name()
         );
+        // Points nearer than rounding are anybody's guess.
+        assert!(normals <= parry && worst < 1e-12);
     }
 }

@@ -45,6 +45,8 @@ pub struct Summary {
     pub asymmetry: f64,
     /// Smallest gap between bodies or to a wall, m; none where there is nothing to meet.
     pub min_gap: Option<f64>,
+    /// Largest gap at which surfaces are taken to touch, m; none where the scene has no contact.
+    pub contact_gap: Option<f64>,
     /// Steps that were cut into pieces, being too long for what moved in them.
     pub cut_steps: usize,
     /// Most pieces of a step; one where none was cut.
@@ -160,6 +162,9 @@ impl Rollout {
                 .map(|s| s.report.asymmetry)
                 .fold(0.0, f64::max),
             min_gap: self.nearest().map(|(_, gap)| gap.distance),
+            contact_gap: (self.simulator.contact_gaps().iter())
+                .map(|g| g.gap)
+                .reduce(f64::max),
             cut_steps: pieces.iter().filter(|n| **n > 1).count(),
             most_pieces: pieces.iter().fold(1, |most, n| most.max(*n)),
         }

@@ -4,7 +4,7 @@ use super::{BackendReport, Discretisation, ErrorEstimate, Fidelity, Policy, Sett
 use crate::adjoint::lie::Pose;
 use crate::assembly::{self, Assembled, Choices};
 use crate::coupling::CouplingReport;
-use crate::dynamics::{Parameters, State, Stepper, System};
+use crate::dynamics::{ContactGap, ContactModel, Parameters, State, Stepper, System};
 use crate::geometry::{Gap, Gaps, TriMesh};
 use crate::scene::Scene;
 use crate::water::{Clearance, Subject, surfaces, world_axes};
@@ -112,6 +112,12 @@ impl Simulator {
     /// What each body in the water became.
     pub fn discretisation(&self) -> &[Discretisation] {
         &self.assembled.water.discretisation
+    }
+
+    /// The gaps at which surfaces are taken to touch; none where the scene has no contact.
+    pub fn contact_gaps(&self) -> Vec<ContactGap> {
+        let contact = self.system().contact.as_ref();
+        contact.map(ContactModel::gaps).unwrap_or_default()
     }
 
     /// The fidelity in use: what was asked for, or what `Auto` chose.

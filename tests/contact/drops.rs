@@ -1,9 +1,8 @@
 //! Bodies that fall, rest, meet and land in water: bounds, conservation, and many drops at random.
 
 use super::tools::{above_floor, contact, touching};
-use crate::support::{self, check_gradient, run};
-use hydrograd::adjoint::lie::{Vec3, exp_matrix};
-use hydrograd::adjoint::sample::Samples;
+use crate::support::falling::drops;
+use crate::support::{self, check_gradient, run, says};
 use hydrograd::dynamics::Integrator;
 use hydrograd::scene::{Body, Joint, Plane, Scene, Shape};
 use hydrograd::{Controls, Fidelity, Simulator};
@@ -120,6 +119,51 @@ fn a_ball_lands_in_water() {
     check_gradient("a ball in water", &mut simulator, 60, 1, 1e-5);
 }
 
+/// The gaps at which surfaces touch can be read, and one over a twentieth of a body is told.
+#[test]
+fn gaps_of_contact_are_told() {
+    let mut scene = above_floor(1000.0);
+    scene.add(
+        Body::new(Shape::sphere(0.1))
+            .density(3000.0)
+            .at([0.0, 0.0, 0.3]),
+    );
+    let of = |scene: &Scene, fidelity| {
+        let simulator = support::simulator(scene, fidelity, Integrator::MomentumEuler);
+        let [gap] = simulator.contact_gaps()[..] else {
+            panic!("one pair expected");
+        };
+        assert_eq!((gap.first, gap.second), (0, None));
+        assert!((gap.part - gap.gap / 0.2).abs() < 1e-12);
+        assert_eq!(run(&simulator, 1).summary().contact_gap, Some(gap.gap));
+        let told = |w: &&String| w.contains("touch at a gap");
+        (gap.gap, simulator.warnings().iter().find(told).cloned())
+    };
+    let (gap, told) = of(&scene, Fidelity::Isolated);
+    assert!(
+        (gap - 1e-3).abs() < 1e-12 && told.is_none(),
+        "{gap} {told:?}"
+    );
+    let (gap, told) = of(&scene, Fidelity::Reduced);
+    assert!(gap > 0.01, "{gap}");
+    says(
+        told.unwrap(),
+        &[
+            "body \"body 1\"",
+            "a wall",
+            "resolves no less",
+            "contact.gap",
+        ],
+    );
+    contact(&mut scene).gap = Some(0.02);
+    let (gap, told) = of(&scene, Fidelity::Isolated);
+    assert_eq!(gap, 0.02);
+    says(
+        told.unwrap(),
+        &["2.000e-2 m", "10 %", "as contact.gap says"],
+    );
+}
+
 #[test]
 fn constants_are_checked_by_name() {
     for (key, value) in [
@@ -142,61 +186,6 @@ fn constants_are_checked_by_name() {
             .to_string();
         assert!(said.contains(&format!("contact.{key}")), "{said}");
     }
-}
-
-/// Two of six kinds of convex shapes above a floor, turning; with `aimed`, the upper one is thrown at the lower one, and all pairs of
-/// kinds come up.
-fn drops(count: usize, dt: f64, aimed: bool) -> Vec<Scene> {
-    let mut random = Samples::new(1);
-    let mut next = |low, high| random.between(low, high);
-    let mut out = Vec::new();
-    for drop in 0..count {
-        let mut scene = above_floor(0.0);
-        scene.time_step = dt;
-        for k in 0..2 {
-            let mut size = || next(0.05, 0.15);
-            let apart = if aimed { 1 + drop / 6 } else { 3 };
-            let shape = match (drop + k * apart) % 6 {
-                0 => Shape::sphere(size()),
-                1 => Shape::ellipsoid([size(), size(), size()]),
-                2 => Shape::cuboid([2.0 * size(), 2.0 * size(), 2.0 * size()]),
-                3 => Shape::capsule(size(), 2.0 * size()),
-                4 => Shape::cylinder(size(), 2.0 * size()),
-                _ => Shape::prism(
-                    vec![[-size(), 0.0], [size(), 0.0], [0.3 * size(), size()]],
-                    2.0 * size(),
-                ),
-            };
-            let turn = [next(-1.5, 1.5), next(-1.5, 1.5), next(-1.5, 1.5)];
-            let place = [next(-0.03, 0.03), next(-0.03, 0.03), 0.3 + 0.45 * k as f64];
-            scene.add(
-                Body::new(shape.faces(80))
-                    .density(1000.0)
-                    .at(place)
-                    .rotated(turn),
-            );
-        }
-        scene.initial.v = (0..12)
-            .map(|i| {
-                if i % 6 < 3 {
-                    next(-1.0, 1.0)
-                } else {
-                    next(-5.0, 5.0)
-                }
-            })
-            .collect();
-        if aimed {
-            // Velocities are along the axes of the placement.
-            for (k, down) in [(0, 0.0), (1, 2.0)] {
-                let turned = exp_matrix(&Vec3::from(scene.bodies[k].placement.rotation));
-                let drift = 0.3 * Vec3::from_row_slice(&scene.initial.v[6 * k..6 * k + 3]);
-                let thrown = drift - down * turned.transpose() * Vec3::z();
-                scene.initial.v[6 * k..6 * k + 3].copy_from_slice(thrown.as_slice());
-            }
-        }
-        out.push(scene);
-    }
-    out
 }
 
 /// What came of a drop.

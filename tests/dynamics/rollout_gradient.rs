@@ -83,7 +83,7 @@ fn falling_ball() {
         for fidelity in FIDELITIES {
             // What `auto` steps with here is `reduced`; every integrator has it in `a_pair_that_comes_and_goes`.
             if fidelity != Fidelity::Auto || integrator == Integrator::MomentumEuler {
-                check(&example("falling_ball"), fidelity, integrator, 8, 80);
+                check(&example("falling_ball"), fidelity, integrator, 5, 80);
             }
         }
     }

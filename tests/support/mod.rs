@@ -4,6 +4,8 @@
 pub mod bodies;
 #[cfg(feature = "cli")]
 pub mod command;
+pub mod falling;
+pub mod grasps;
 pub mod reference;
 
 use hydrograd::adjoint::lie::Vec3;

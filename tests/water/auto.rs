@@ -35,13 +35,13 @@ fn bodies_that_are_near_get_more_sources_and_far_pairs_fade_out() {
     assert!(reasons.contains("coupled in full up to"), "{reasons}");
 }
 
-/// Between what compressed sources resolve and what they refuse, `full` is chosen where its edges resolve the gap.
+/// Under half of what compressed sources resolve `full` is chosen.
 #[test]
 fn gaps_that_compression_does_not_resolve() {
     for (gap, fidelity) in [
         (0.1, Fidelity::Reduced),
         (0.06, Fidelity::Full),
-        (0.03, Fidelity::Reduced),
+        (0.03, Fidelity::Full),
         (0.005, Fidelity::Full),
     ] {
         let simulator = auto(&balls(&[0.0, 2.0 + gap]));

@@ -32,10 +32,9 @@ const NEAR: f64 = 0.8;
 const ROOM: f64 = 0.6;
 /// Bodies that start apart may come near: they resolve this many times the gap that they would without a plan.
 const COARSEST: f64 = 2.0;
-/// Gaps under this part of the finest that compression resolves are left to the fidelity `Full`, if it does better there:
+/// Gaps under this part of the finest that compression resolves are left to the fidelity `Full`, whose forces are nearer there at all gaps and
+/// shapes that were measured (docs/accuracy-coupled.md).
 const HOPELESS: f64 = 0.5;
-/// its forces hold down to this part of what it resolves, and compressed sources are the better answer below.
-const EDGES: f64 = 2.0 / 3.0;
 /// Faces with edges longer than this part of the radius of the smaller body at a gap don't see its flow.
 const COARSE: f64 = 0.5;
 /// Under this part of the finest gap compressed sources may refuse: `Full` answers, and warns.
@@ -122,9 +121,8 @@ fn plan(problem: &Problem, poses: &[Pose], gaps: &[Gap]) -> Result<Planned> {
         let finest = compress::finest_gap(mesh.surface_area());
         let rigid = walls.iter().all(|w| w.surface == WallSurface::Rigid);
         if smallest < HOPELESS * finest && rigid {
-            let resolved = EDGES * problem.together.resolved_edges() * edge;
             let coarse = nearest.is_some_and(|g| edge > COARSE * smaller(bodies, g));
-            let full = (smallest > resolved && !coarse) || smallest < REFUSED * finest;
+            let full = !coarse || smallest < REFUSED * finest;
             let so = if full {
                 out.together = true;
                 "all bodies are solved together (full)"

@@ -1,0 +1,298 @@
+//! Contact at random: gradients of rollouts through it against differences, and grasps with random forces.
+//!
+//! `cargo bench --bench contact [-- SECTION …] [--count N]`, sections `gradients` (500 episodes) and `grasps` (1,000); both if none is named.
+
+#[allow(dead_code)]
+mod common;
+#[allow(dead_code)]
+#[path = "../examples/grasp/hold.rs"]
+mod hold;
+#[allow(dead_code)]
+#[path = "../examples/grasp/task.rs"]
+mod task;
+
+use common::arguments;
+use common::support::CONTACT_INTEGRATORS;
+use common::support::falling::drops;
+use common::support::grasps::RandomGrasp;
+use hydrograd::adjoint::sample::Samples;
+use hydrograd::dynamics::Integrator;
+use hydrograd::scene::Scene;
+use hydrograd::simulate::OpenLoop;
+use hydrograd::{Controls, Error, Fidelity, Result, Rollout, Settings, Simulator};
+use nalgebra::DVector;
+use rayon::prelude::*;
+use std::collections::BTreeSet;
+use std::time::Instant;
+
+fn main() {
+    let arguments = arguments();
+    let value = |name: &str| {
+        let at = arguments.iter().position(|a| a == name)?;
+        arguments.get(at + 1)?.parse::<usize>().ok()
+    };
+    let has = |name: &str| arguments.iter().any(|a| a == name);
+    let all = !has("gradients") && !has("grasps");
+    if all || has("gradients") {
+        gradients(value("--count").unwrap_or(500));
+    }
+    if all || has("grasps") {
+        grasps(value("--count").unwrap_or(1000));
+    }
+}
+
+/// Two bodies that fall on a floor and on one another, dry or each in water of its own.
+struct Episode {
+    scene: Scene,
+    integrator: Integrator,
+    seed: u64,
+}
+
+const TIME_STEP: f64 = 5e-3;
+/// By then both have landed.
+const STEPS: usize = 100;
+/// Steps of the differences, of the scale of their direction.
+const DIFFERENCES: [f64; 5] = [1e-4, 1e-5, 1e-6, 1e-7, 1e-8];
+/// Errors that the table counts.
+const LIMITS: [f64; 4] = [1e-3, 1e-4, 1e-5, 1e-6];
+
+/// What came of an episode.
+struct Compared {
+    /// Of the adjoint against the difference, of the larger of both.
+    error: f64,
+    /// Whether anything touched.
+    touched: bool,
+    /// Whether what touches, or into how many pieces steps are cut, is another at an end of the difference.
+    changed: bool,
+}
+
+fn episodes(count: usize) -> Vec<Episode> {
+    let mut thrown = drops(count, TIME_STEP, true).into_iter();
+    let mut fallen = drops(count, TIME_STEP, false).into_iter();
+    let episode = |k: usize| {
+        let pick = if k.is_multiple_of(2) {
+            &mut thrown
+        } else {
+            &mut fallen
+        };
+        let mut scene = pick.next()?;
+        if k % 4 >= 2 {
+            scene.fluid.density = 998.0;
+            for body in &mut scene.bodies {
+                body.density = Some(2700.0);
+            }
+        }
+        Some(Episode {
+            scene,
+            integrator: CONTACT_INTEGRATORS[k % CONTACT_INTEGRATORS.len()],
+            seed: k as u64,
+        })
+    };
+    (0..count).map_while(episode).collect()
+}
+
+/// Pairs, of two bodies or of one and a wall.
+type Pairs = BTreeSet<(usize, Option<usize>)>;
+
+/// How many pieces each step has, and which pairs touch in it.
+fn events(rollout: &Rollout) -> Result<(Vec<usize>, Vec<Pairs>)> {
+    let touching = |n: usize| {
+        let contacts = rollout.contacts(n, 0.0)?;
+        Ok(contacts.iter().map(|c| (c.first, c.second)).collect())
+    };
+    let touching: Result<Vec<_>> = (0..rollout.steps()).map(touching).collect();
+    Ok((rollout.pieces(), touching?))
+}
+
+fn compared(episode: &Episode) -> Result<Compared> {
+    let settings = Settings::default()
+        .fidelity(Fidelity::Isolated)
+        .integrator(episode.integrator);
+    let mut simulator = Simulator::new(&episode.scene, settings)?;
+    let none = Controls::zeros(&simulator, STEPS);
+    let mut random = Samples::new(episode.seed);
+    let nv = simulator.start().1.len();
+    let mut vector = |count: usize, size: f64| DVector::from_vec(random.numbers(count, size));
+    // Where bodies end (over a tenth of a metre), and how fast (over a metre per second, a radian per second).
+    let (markers, speeds) = (vector(6, 10.0), vector(nv, 1.0));
+    let (dq, dv) = (vector(nv, 0.1), vector(nv, 1.0));
+    let values = DVector::from_vec(simulator.parameters().to_vec());
+    let scaled = vector(values.len(), 0.3).component_mul(&values);
+    let (q, v) = (simulator.start().0.clone(), simulator.start().1.clone());
+    let parameters = simulator.parameters().clone();
+
+    let rollout = simulator.rollout(&none)?;
+    let before = events(&rollout)?;
+    let touched = before.1.iter().any(|pairs| !pairs.is_empty());
+    let mut cotangents = rollout.zero_cotangents();
+    cotangents.positions.set_column(STEPS, &markers);
+    cotangents.v.set_column(STEPS, &speeds);
+    let gradient = rollout.vjp(&cotangents)?;
+    let by_parameters = DVector::from_vec(gradient.parameters.to_vec());
+    let adjoint =
+        gradient.initial.q.dot(&dq) + gradient.initial.v.dot(&dv) + by_parameters.dot(&scaled);
+    drop(rollout);
+
+    let mut at = |h: f64| -> Result<(f64, bool)> {
+        let moved = simulator.system().tree.integrate(&q, &(h * &dq));
+        simulator.set_start(moved, &v + h * &dv)?;
+        let changed = (&values + h * &scaled).as_slice().to_vec();
+        let changed = parameters.with_values(&changed).expect("as many values");
+        simulator.set_parameters(changed)?;
+        let rollout = simulator.rollout(&none)?;
+        let end = &rollout.samples()[STEPS];
+        let places = end.poses.iter().zip(0..);
+        let places: f64 = places
+            .map(|(p, b)| p.translation.dot(&markers.fixed_rows::<3>(3 * b)))
+            .sum();
+        Ok((places + end.v.dot(&speeds), events(&rollout)? != before))
+    };
+    // Of fourth order; the two that agree best are believed, the finer one is taken.
+    let mut found = Vec::new();
+    for h in DIFFERENCES {
+        let ends = [at(h)?, at(-h)?, at(2.0 * h)?, at(-2.0 * h)?];
+        let slope = (8.0 * (ends[0].0 - ends[1].0) - (ends[2].0 - ends[3].0)) / (12.0 * h);
+        found.push((slope, ends.iter().any(|e| e.1)));
+    }
+    let apart = |w: &[(f64, bool)]| (w[0].0 - w[1].0).abs();
+    let best = found
+        .windows(2)
+        .min_by(|a, b| apart(a).total_cmp(&apart(b)));
+    let (slope, changed) = best.map_or(found[0], |w| w[1]);
+    Ok(Compared {
+        error: (adjoint - slope).abs() / adjoint.abs().max(slope.abs()),
+        touched,
+        changed,
+    })
+}
+
+fn gradients(count: usize) {
+    println!("\n### Gradients of {count} random episodes, {STEPS} steps of {TIME_STEP} s\n");
+    let begin = Instant::now();
+    let episodes = episodes(count);
+    let all: Vec<Result<Compared>> = episodes.par_iter().map(compared).collect();
+    let mut failed = 0;
+    for (k, error) in all
+        .iter()
+        .enumerate()
+        .filter_map(|(k, r)| Some((k, r.as_ref().err()?)))
+    {
+        println!("episode {k} fails: {error}");
+        failed += 1;
+    }
+    let ended: Vec<&Compared> = all.iter().flatten().collect();
+    let touched = ended.iter().filter(|c| c.touched).count();
+    let strange = ended.iter().filter(|c| !c.error.is_finite()).count();
+    println!("{failed} fail, {strange} aren't finite; bodies touch in {touched}\n");
+    println!(
+        "| events at the ends of the difference | episodes | median | 99 % | worst | ≤ 1e-3 | ≤ 1e-4 | ≤ 1e-5 | ≤ 1e-6 |"
+    );
+    println!("|---|---|---|---|---|---|---|---|---|");
+    for (name, changed) in [("as in the middle", false), ("others", true)] {
+        let mut errors: Vec<f64> = (ended.iter().filter(|c| c.changed == changed))
+            .map(|c| c.error)
+            .collect();
+        errors.sort_by(f64::total_cmp);
+        let Some(last) = errors.len().checked_sub(1) else {
+            println!("| {name} | 0 | | | | | | | |");
+            continue;
+        };
+        let quantile = |part: f64| errors[(part * last as f64).round() as usize];
+        let within = LIMITS.map(|limit| {
+            let held = errors.iter().filter(|e| **e <= limit).count();
+            format!("{:.1} %", 100.0 * held as f64 / errors.len() as f64)
+        });
+        println!(
+            "| {name} | {} | {:.1e} | {:.1e} | {:.1e} | {} |",
+            errors.len(),
+            quantile(0.5),
+            quantile(0.99),
+            quantile(1.0),
+            within.join(" | ")
+        );
+    }
+    println!("\n{:.0} s", begin.elapsed().as_secs_f64());
+}
+
+/// How a grasp ended.
+struct Closed {
+    nearest: f64,
+    past: f64,
+    cut: usize,
+    most: usize,
+    finite: bool,
+}
+
+fn closed(simulator: &Simulator, grasp: &RandomGrasp) -> Result<Closed> {
+    let mut simulator = simulator.clone();
+    let v = simulator.start().1.clone();
+    simulator.set_start(grasp.start.clone(), v)?;
+    let controls = Controls::from_matrix(&simulator, grasp.forces.clone())?;
+    let rollout = simulator.rollout(&controls)?;
+    let summary = rollout.summary();
+    let limits = &simulator.system().limits;
+    let past = |q: &DVector<f64>| {
+        let of = limits.iter().map(|l| l.past(q[l.q]) / l.room());
+        of.fold(0.0, f64::max)
+    };
+    let finite = |s: &hydrograd::simulate::Sample| s.q.iter().chain(&s.v).all(|x| x.is_finite());
+    Ok(Closed {
+        nearest: summary.min_gap.unwrap_or(f64::INFINITY),
+        past: rollout
+            .samples()
+            .iter()
+            .map(|s| past(&s.q))
+            .fold(0.0, f64::max),
+        cut: summary.cut_steps,
+        most: summary.most_pieces,
+        finite: rollout.samples().iter().all(finite),
+    })
+}
+
+/// Grasps of the example with random forces: what `reduced` refuses is run again by `auto`.
+fn grasps(count: usize) {
+    println!("\n### {count} grasps with random forces, steps of 0.01 s\n");
+    let begin = Instant::now();
+    let scene = task::load().expect("an example scene");
+    let simulator = |fidelity| {
+        let mut simulator = task::simulator(&scene, fidelity).expect("an example scene");
+        simulator.set_policy(Box::new(OpenLoop));
+        simulator
+    };
+    let (reduced, auto) = (simulator(Fidelity::Reduced), simulator(Fidelity::Auto));
+    let coin = [hold::COIN_Y, hold::COIN_Z, hold::COIN_TURN];
+    let mut random = Samples::new(3);
+    let draw = |_| RandomGrasp::draw(&mut random, reduced.start().0, coin, scene.steps);
+    let drawn: Vec<RandomGrasp> = (0..count).map(draw).collect();
+    let ends: Vec<Result<Closed>> = drawn.par_iter().map(|g| closed(&reduced, g)).collect();
+    let (mut failed, mut again) = (0, 0);
+    let mut held: Vec<Closed> = Vec::new();
+    for (k, (end, grasp)) in ends.into_iter().zip(&drawn).enumerate() {
+        let end = match end {
+            Err(Error::Unresolved { .. }) => {
+                again += 1;
+                closed(&auto, grasp)
+            }
+            end => end,
+        };
+        match end {
+            Ok(end) => held.push(end),
+            Err(error) => {
+                println!("grasp {k} fails: {error}");
+                failed += 1;
+            }
+        }
+    }
+    let most = |of: fn(&Closed) -> f64| held.iter().map(of).fold(0.0, f64::max);
+    let nearest = held.iter().map(|c| c.nearest).fold(f64::INFINITY, f64::min);
+    println!(
+        "{failed} fail; {again} are refused by `reduced` and run with `auto`; {} hold something that isn't finite; smallest gap {:.1} mm; at most {:.3} of a range \
+         past a limit; {} steps cut, into at most {} pieces; {:.0} s",
+        held.iter().filter(|c| !c.finite).count(),
+        1e3 * nearest,
+        most(|c| c.past),
+        held.iter().map(|c| c.cut).sum::<usize>(),
+        most(|c| c.most as f64),
+        begin.elapsed().as_secs_f64()
+    );
+}

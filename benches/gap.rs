@@ -1,0 +1,238 @@
+//! Bodies that come near one another: added mass along the gap, and its slope, by every fidelity against converged panels.
+//!
+//! `cargo bench --bench gap [-- CASE …] [--quick] [--plot]`: the cases whose names contain one of the words, or all. `--quick` with fewer gaps
+//! and a coarser reference; `--plot` writes the errors to docs/gap.svg as well. Gaps are in units of a radius or half a side; masses over the water's
+//! density, m³, slopes m².
+
+#[allow(dead_code)]
+mod common;
+
+use common::arguments;
+use hydrograd::adjoint::lie::{Vec3, exp_matrix};
+use hydrograd::scene::{Body, Fluid, Joint, Scene, Shape};
+use hydrograd::simulate::Method;
+use hydrograd::{Fidelity, Result, Settings, Simulator};
+use nalgebra::DVector;
+use plotters::prelude::*;
+use std::path::Path;
+use std::time::Instant;
+
+/// The first body over the second, or over a wall.
+struct Case {
+    name: &'static str,
+    shapes: Vec<Shape>,
+    /// Rotation vectors of the bodies.
+    turns: [[f64; 3]; 2],
+    /// Height of the first body's origin where the gap is closed, m.
+    closed: f64,
+    /// Gaps are in units of it, m.
+    size: f64,
+}
+
+const GAPS: [f64; 8] = [1.0, 0.5, 0.2, 0.1, 0.05, 0.025, 0.01, 0.001];
+const QUICK: [f64; 4] = [0.5, 0.1, 0.025, 0.001];
+/// Faces of a body.
+const FACES: usize = 1280;
+
+fn cases() -> Vec<Case> {
+    let flat = [[0.0; 3]; 2];
+    let case = |name, shapes: &[&Shape], turns, closed, size| Case {
+        name,
+        shapes: shapes.iter().map(|s| (*s).clone()).collect(),
+        turns,
+        closed,
+        size,
+    };
+    let (ball, disc) = (Shape::sphere(1.0), Shape::cylinder(1.0, 0.25));
+    let (brick, capsule) = (Shape::cuboid([1.0, 1.0, 0.5]), Shape::capsule(0.25, 1.0));
+    let thin = Shape::ellipsoid([1.0, 1.0, 0.25]);
+    let quarter = std::f64::consts::FRAC_PI_4;
+    let across = [[0.0, 2.0 * quarter, 0.0], [2.0 * quarter, 0.0, 0.0]];
+    let on_edge = [[quarter, 0.0, 0.0], [0.0; 3]];
+    vec![
+        case("sphere-sphere", &[&ball, &ball], flat, 2.0, 1.0),
+        case("sphere-wall", &[&ball], flat, 1.0, 1.0),
+        case("ellipsoid-wall", &[&thin], flat, 0.25, 1.0),
+        case("disc-wall", &[&disc], flat, 0.125, 1.0),
+        case("box-wall", &[&brick], flat, 0.25, 0.5),
+        case("box-box", &[&brick, &brick], flat, 0.5, 0.5),
+        case("edge-wall", &[&brick], on_edge, 0.75 / f64::sqrt(2.0), 0.5),
+        case("capsule-capsule", &[&capsule, &capsule], across, 0.5, 0.25),
+    ]
+}
+
+impl Case {
+    /// The first body on a rail along the gap, the second one fixed.
+    fn scene(&self, gap: f64) -> Scene {
+        let mut scene = Scene::new(Fluid {
+            density: 1.0,
+            current: [0.0; 3],
+        });
+        if self.shapes.len() == 1 {
+            scene.add_wall([0.0; 3], [0.0, 0.0, 1.0]);
+        }
+        for (b, shape) in self.shapes.iter().enumerate() {
+            let up = exp_matrix(&Vec3::from(self.turns[b])).transpose() * Vec3::z();
+            let (height, joint) = match b {
+                0 => (self.closed + gap, Joint::Prismatic { axis: up.into() }),
+                _ => (0.0, Joint::Fixed),
+            };
+            let body = Body::new(shape.clone()).density(1.0).joint(joint);
+            scene.add(body.at([0.0, 0.0, height]).rotated(self.turns[b]));
+        }
+        scene
+    }
+
+    /// Added mass of the first body along the gap, and its slope.
+    fn along(&self, gap: f64, settings: &Settings) -> Result<[f64; 2]> {
+        let simulator = Simulator::new(&self.scene(gap), settings.clone())?;
+        let (stepper, speed) = (simulator.stepper(), DVector::from_element(1, 1.0));
+        let found = stepper.linearise(simulator.start().0)?;
+        // M v̇ = −½ (dM/dq) v² along the one coordinate.
+        let force = found.inertial_force(&speed, &DVector::zeros(0))?;
+        let dry = simulator.parameters().mass(0);
+        Ok([found.mass_matrix[(0, 0)] - dry, -2.0 * force[0]])
+    }
+
+    /// The limit of ever more faces, and how far the finest are from it.
+    fn converged(&self, gap: f64, quick: bool) -> Result<([f64; 2], [f64; 2])> {
+        let finest = match (self.shapes.len(), quick) {
+            (1, false) => 5120,
+            (_, false) => 2880,
+            (_, true) => 720,
+        };
+        let coarse = self.along(gap, &panels(finest / 4))?;
+        let fine = self.along(gap, &panels(finest))?;
+        let limit = |k: usize| {
+            // The error falls with one over the number of faces, about.
+            let rest = (fine[k] - coarse[k]) / 3.0;
+            (fine[k] + rest, rest.abs())
+        };
+        let [m, slope] = [limit(0), limit(1)];
+        Ok(([m.0, slope.0], [m.1, slope.1]))
+    }
+}
+
+fn panels(faces: usize) -> Settings {
+    let full = Settings::default().fidelity(Fidelity::Full);
+    full.method(Method::Panel).faces(faces)
+}
+
+fn configurations() -> [(&'static str, Settings); 4] {
+    let of = |fidelity| Settings::default().fidelity(fidelity).faces(FACES);
+    let full = of(Fidelity::Full);
+    [
+        ("panels", panels(FACES)),
+        ("fundamental solutions", full.method(Method::MfsFace)),
+        ("reduced", of(Fidelity::Reduced)),
+        ("auto", of(Fidelity::Auto)),
+    ]
+}
+
+/// Errors of a case, for the picture: of each configuration, at each gap where it answers, of M and of its slope.
+struct Errors {
+    case: &'static str,
+    points: Vec<(usize, f64, [f64; 2])>,
+}
+
+fn main() -> std::result::Result<(), Box<dyn std::error::Error>> {
+    let (flags, words): (Vec<String>, Vec<String>) =
+        arguments().into_iter().partition(|a| a.starts_with("--"));
+    let has = |name: &str| flags.iter().any(|f| f == name);
+    let quick = has("--quick");
+    let gaps = if quick { &QUICK[..] } else { &GAPS[..] };
+    let chosen =
+        |case: &Case| words.is_empty() || words.iter().any(|w| case.name.contains(w.as_str()));
+    let begin = Instant::now();
+    let mut all = Vec::new();
+    for case in cases().iter().filter(|c| chosen(c)) {
+        let mut errors = Errors {
+            case: case.name,
+            points: Vec::new(),
+        };
+        let names = configurations().map(|c| c.0);
+        println!("\n### {}\n", case.name);
+        println!("| gap | M | dM/dgap | {} |", names.join(" | "));
+        println!("|{}", "---|".repeat(3 + names.len()));
+        for gap in gaps {
+            let (exact, unsure) = case.converged(gap * case.size, quick)?;
+            let percent = |k: usize| 100.0 * unsure[k] / exact[k].abs();
+            let cells =
+                configurations().map(|(_, settings)| case.along(gap * case.size, &settings));
+            let mut texts = Vec::new();
+            for (k, cell) in cells.iter().enumerate() {
+                texts.push(match cell {
+                    Ok(found) => {
+                        let off = [0, 1].map(|i| found[i] / exact[i] - 1.0);
+                        errors.points.push((k, *gap, off));
+                        format!("{:+.1}, {:+.1}", 100.0 * off[0], 100.0 * off[1])
+                    }
+                    Err(_) => "refused".into(),
+                });
+            }
+            println!(
+                "| {gap} | {:.4} (± {:.1} %) | {:.4} (± {:.1} %) | {} |",
+                exact[0],
+                percent(0),
+                exact[1],
+                percent(1),
+                texts.join(" | ")
+            );
+        }
+        all.push(errors);
+    }
+    println!("\n{:.0} s", begin.elapsed().as_secs_f64());
+    if has("--plot") {
+        let file = Path::new(env!("CARGO_MANIFEST_DIR")).join("docs/gap.svg");
+        plot(&file, &all)?;
+        println!("wrote {}", file.display());
+    }
+    Ok(())
+}
+
+/// The sizes of the slopes' errors over the gap, a chart a case.
+fn plot(file: &Path, all: &[Errors]) -> std::result::Result<(), Box<dyn std::error::Error>> {
+    const COLUMNS: usize = 4;
+    let rows = all.len().div_ceil(COLUMNS);
+    let area = SVGBackend::new(file, (1120, 260 * rows as u32)).into_drawing_area();
+    area.fill(&WHITE)?;
+    let colors = [BLACK, RED, BLUE, GREEN];
+    for (part, errors) in area.split_evenly((rows, COLUMNS)).iter().zip(all) {
+        let mut chart = ChartBuilder::on(part)
+            .margin(8)
+            .caption(errors.case, ("sans-serif", 14))
+            .x_label_area_size(28)
+            .y_label_area_size(48)
+            .build_cartesian_2d((0.0008..1.2).log_scale(), (1e-4..10.0).log_scale())?;
+        chart
+            .configure_mesh()
+            .x_labels(4)
+            .y_labels(6)
+            .x_desc("gap")
+            .y_desc("error of dM/dgap")
+            .y_label_formatter(&|y| format!("{y:.0e}"))
+            .light_line_style(TRANSPARENT)
+            .draw()?;
+        for (k, (name, color)) in configurations().iter().map(|c| c.0).zip(colors).enumerate() {
+            let mine = errors.points.iter().filter(|p| p.0 == k);
+            let points: Vec<(f64, f64)> = mine
+                .map(|(_, gap, off)| (*gap, off[1].abs().clamp(1e-4, 10.0)))
+                .collect();
+            let dots = points.iter().map(|p| Circle::new(*p, 2, color.filled()));
+            chart.draw_series(dots)?;
+            chart
+                .draw_series(LineSeries::new(points.clone(), color.stroke_width(1)))?
+                .label(name)
+                .legend(move |(x, y)| PathElement::new([(x, y), (x + 14, y)], color));
+        }
+        chart
+            .configure_series_labels()
+            .position(SeriesLabelPosition::UpperRight)
+            .label_font(("sans-serif", 10))
+            .border_style(BLACK.mix(0.2))
+            .background_style(WHITE.mix(0.8))
+            .draw()?;
+    }
+    area.present()?;
+    Ok(())
+}

@@ -1,0 +1,30 @@
+//! Grasps with random forces.
+
+use hydrograd::adjoint::sample::Samples;
+use nalgebra::{DMatrix, DVector};
+
+/// Where everything stands at the start, and the forces on the column and the two fingers in each step, N.
+pub struct RandomGrasp {
+    pub start: DVector<f64>,
+    pub forces: DMatrix<f64>,
+}
+
+impl RandomGrasp {
+    /// Column, and fingers that close and now and then open, each for a while; the coin, with these coordinates in `q` (across, up, rotation),
+    /// somewhere between them.
+    pub fn draw(random: &mut Samples, q: &DVector<f64>, coin: [usize; 3], steps: usize) -> Self {
+        let mut forces = DMatrix::zeros(3, steps);
+        for n in 0..steps {
+            let before = (n > 0 && n % 40 != 0).then(|| forces.column(n - 1).into_owned());
+            let mut next = || random.between(-500.0, 2000.0);
+            let drawn =
+                before.unwrap_or_else(|| DVector::from_vec(vec![next() - 750.0, next(), -next()]));
+            forces.set_column(n, &drawn);
+        }
+        let mut start = q.clone();
+        start[coin[0]] += random.between(-0.4, 0.2);
+        start[coin[1]] += random.between(-0.1, 0.1);
+        start[coin[2]] += random.between(-1.0, 1.0);
+        Self { start, forces }
+    }
+}

@@ -1,12 +1,8 @@
 //! Boxes: a grid on each side, somewhat finer towards the edges, where the flow is sharp.
 
-use super::{Parts, misfit};
+use super::{Parts, graded, misfit};
 use hydrograd_adjoint::lie::Vec3;
 use std::collections::HashMap;
-
-/// How much of the cosine spacing is mixed in: cells at an edge are half as wide as even ones,
-/// those in the middle 1.29 times.
-const GRADING: f64 = 0.5;
 
 /// A box with the given edge lengths (m) along x, y, z, centred at the origin, with about
 /// `target` faces (at least 12).
@@ -84,11 +80,10 @@ fn choose_cells(size: [f64; 3], target: f64) -> [usize; 3] {
 fn grid_lines(length: f64, n: usize) -> Vec<f64> {
     let line = |i: usize| {
         let t = (2 * i) as f64 / n as f64 - 1.0;
-        let cosine = (std::f64::consts::FRAC_PI_2 * t).sin();
         if i == 0 || i == n {
             return t.signum() * length / 2.0;
         }
-        length / 2.0 * ((1.0 - GRADING) * t + GRADING * cosine)
+        length / 2.0 * graded(t)
     };
     // The upper half mirrors the lower, bit for bit.
     let odd = |i: usize| if 2 * i > n { -line(n - i) } else { line(i) };

@@ -2,17 +2,22 @@
 //!
 //! Ends: ring k (from the pole) has s·k vertices, so triangles stay near-equilateral down to the
 //! pole and no fan of slivers appears; s = 6 suits a flat disc, s = 4 a hemisphere. Sides: an
-//! even number of bands between rings that are rotated by half a step one after the other.
+//! even number of bands between rings that are rotated by half a step one after the other. A short cylinder's rings and bands are
+//! finer towards its edges, as those of a box.
 
-use super::{Parts, misfit};
+use super::{Parts, graded, misfit};
 use hydrograd_adjoint::lie::Vec3;
 use std::f64::consts::{FRAC_PI_2, TAU};
+use std::ops::Range;
 
 /// A cylinder about z, centred at the origin (m), with about `target` faces (at least 36).
 pub(in crate::shape) fn cylinder(radius: f64, length: f64, target: usize) -> Parts {
     let (rings, bands) = choose(6, radius, length, 1.0, target as f64);
-    let end = |k: usize| (radius * k as f64 / rings as f64, 0.0);
-    revolve(6, rings, bands, radius, length, end)
+    // Along a long side the flow is even, and the ends are a small part.
+    let short = (bands as f64) < 2.0 * SHORT.end;
+    let along = |t: f64| if short { graded(t) } else { t };
+    let end = |k: usize| (radius * along(k as f64 / rings as f64), 0.0);
+    revolve(6, rings, bands, (radius, length), end, along)
 }
 
 /// A capsule about z, centred at the origin, with `length` between the hemispheres (m), and
@@ -26,11 +31,18 @@ pub(in crate::shape) fn capsule(radius: f64, length: f64, target: usize) -> Part
         let angle = FRAC_PI_2 * k as f64 / rings as f64;
         (radius * angle.sin(), radius * angle.cos())
     };
-    revolve(4, rings, bands, radius, length, end)
+    revolve(4, rings, bands, (radius, length), end, |t| t)
 }
 
 /// Loss of cross-section, as a part of it, that weighs as much as cells stretched e-fold.
 const LOSS: f64 = 0.02;
+
+/// Faces from which a mesh has a coarser one beside it, of half the rings and bands.
+const HALVED: f64 = 400.0;
+/// Pairs of bands for which half of an odd number isn't much like half. Sides that call for still less are of a thin body, to which they matter little.
+const SHORT: Range<f64> = 0.25..4.0;
+/// Rings from which half of an odd number is like half.
+const MANY: usize = 12;
 
 /// Rings of an end and bands of the side. `arc` is the length of the end's generatrix over the
 /// radius. A slender body gets cells stretched along it rather than a coarse polygon for its
@@ -48,13 +60,20 @@ fn choose(sectors: usize, radius: f64, length: f64, arc: f64, target: f64) -> (u
         // Area of the circle less that of the polygon in it, to leading order.
         let loss = (TAU / (s * m)).powi(2) / 6.0 / LOSS;
         let exact = (length / height / 2.0).max(1e-9);
-        for half in [exact.floor(), exact.ceil()] {
+        // Only where half of both makes a mesh do two meshes tell what the error of so short a side is.
+        let short = target >= HALVED && SHORT.contains(&exact);
+        if short && rings % 2 == 1 && rings < MANY {
+            continue;
+        }
+        let even = if short { 2.0 } else { 1.0 };
+        let whole = |half: f64| [(half / even).floor() * even, (half / even).ceil() * even];
+        for half in whole(exact) {
             // What meets the count, for the same reason.
             let counted = (target / (2.0 * s * m) - m) / 2.0;
-            for half in [half, counted.floor(), counted.ceil()] {
-                let half = half.max(1.0);
+            for half in [[half; 2], whole(counted)].concat() {
+                let half = half.max(even);
                 let faces = 2.0 * s * m * (m + 2.0 * half);
-                let stretch = if half == 1.0 && exact < 1.0 {
+                let stretch = if half == even && exact < even {
                     1.0
                 } else {
                     half / exact
@@ -70,14 +89,15 @@ fn choose(sectors: usize, radius: f64, length: f64, arc: f64, target: f64) -> (u
     best.1
 }
 
-/// The closed surface. `end(k)` gives radius and height above the side's end of ring k.
+/// The closed surface of a `(radius, length)`. `end(k)` gives radius and height above the side's end of ring k; `along` spaces the bands of
+/// the side over −1 … 1.
 fn revolve(
     sectors: usize,
     rings: usize,
     bands: usize,
-    radius: f64,
-    length: f64,
+    (radius, length): (f64, f64),
     end: impl Fn(usize) -> (f64, f64),
+    along: impl Fn(f64) -> f64,
 ) -> Parts {
     let mut vertices = Vec::new();
     let mut faces = Vec::new();
@@ -89,7 +109,8 @@ fn revolve(
 
     // Side, bottom to top; heights exactly odd about the middle.
     for j in 0..=bands {
-        let z = length * (j as f64 - (bands / 2) as f64) / bands as f64;
+        let half = (bands / 2) as f64;
+        let z = length / 2.0 * along((j as f64 - half) / half);
         let shift = if j % 2 == 0 { 0.0 } else { 0.5 };
         for i in 0..around {
             let revolution = (i as f64 + shift) / around as f64;

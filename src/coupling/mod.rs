@@ -28,7 +28,7 @@ mod tensor;
 
 pub use exclude::Exclusions;
 pub use isolated::Isolated;
-pub use panel::PanelCoupled;
+pub use panel::{ExtrapolatedPanels, PanelCoupled};
 pub use response::{CoupledResponse, Reached};
 pub use tensor::PairTensor;
 

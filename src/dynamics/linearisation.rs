@@ -96,9 +96,7 @@ impl System {
                 what: format!("a step with {}", self.coupling.name()),
                 why: "forces need derivatives of the water's energy, and it has values only, as a reference"
                     .into(),
-                instead: "use the coupled system of fundamental solutions (fidelity `full` with the method mfs-vertex \
-                          or mfs-face), which has all derivatives"
-                    .into(),
+                instead: "use the fidelity full, reduced or isolated, which have all derivatives".into(),
             })
     }
 }

@@ -2,7 +2,7 @@
 
 use super::fidelity::Fidelity;
 use super::resolved::{Resolved, narrowest};
-use super::surface::{Surface, overlaps};
+use super::surface::{Surface, overlaps, touches};
 use crate::adjoint::lie::Pose;
 use crate::error::readable;
 use crate::geometry::{Gap, Gaps, Other, Share, overlap_error};
@@ -17,7 +17,7 @@ const MOST_SHARED: f64 = 0.5;
 const BY_SOURCES: f64 = 0.5;
 /// Energy of the film in a gap, in the energy of the water that the smaller body displaces, from which it matters to both. Between
 /// round bodies it stays under a hundredth.
-const FILM: f64 = 0.3;
+pub(crate) const FILM: f64 = 0.3;
 /// A gap is thin where it is less than this part of the radius of a disc with the area over which the surfaces are parallel.
 const THIN: f64 = 0.15;
 
@@ -41,6 +41,8 @@ pub(crate) struct Clearance {
     volumes: Vec<f64>,
     /// Whether the flow is made by sources inside the bodies, which no flat gap is resolved by.
     pub by_sources: bool,
+    /// Whether the flow has a solution where bodies touch.
+    pub may_touch: bool,
     /// The narrowest gap that is resolved, in edges.
     pub resolved_edges: f64,
 }
@@ -90,6 +92,7 @@ impl Clearance {
                 .map(|s| s.as_ref().map_or(0.0, |s| s.properties.volume))
                 .collect(),
             by_sources: false,
+            may_touch: true,
             resolved_edges: 0.0,
         })
     }
@@ -110,23 +113,28 @@ impl Clearance {
         self.refuse_depth(poses)
     }
 
+    /// Area over which the surfaces at a gap of `gaps` are parallel, m², and the energy of the water that flows along it as a film, in that of the water
+    /// that the smaller body displaces: over a gap h and a round area A it is ½ ρ A² U²/(8π h).
+    pub fn film(&self, gaps: &Gaps, gap: &Gap, poses: &[Pose]) -> (f64, f64) {
+        let own = self.volumes[gap.first];
+        let volume = match gap.second {
+            Other::Body(b) => own.min(self.volumes[b]),
+            Other::Wall(_) => own,
+        };
+        let area = gaps.parallel_area(gap, poses);
+        (area, area.powi(2) / (8.0 * PI * gap.distance * volume))
+    }
+
     /// Refuses flat gaps that sources inside the bodies don't resolve: what they give there is smaller than the truth by a factor and
-    /// has slopes of the wrong sign. In a gap h over an area A the water flows along it as a film, of the energy ½ ρ A² U²/(8π h)
-    /// where it is round.
+    /// has slopes of the wrong sign.
     pub fn refuse_film(&self, smallest: Option<&Gap>, poses: &[Pose]) -> Result<()> {
         let narrow = |gap: &Gap| gap.distance < BY_SOURCES * gap.edge;
         if !self.by_sources || !smallest.is_some_and(narrow) {
             return Ok(());
         }
         for gap in self.moving.all(poses).iter().filter(|gap| narrow(gap)) {
-            let own = self.volumes[gap.first];
-            let volume = match gap.second {
-                Other::Body(b) => own.min(self.volumes[b]),
-                Other::Wall(_) => own,
-            };
-            let area = self.moving.parallel_area(gap, poses);
-            let thin = gap.distance < THIN * (area / PI).sqrt();
-            if thin && area.powi(2) > FILM * 8.0 * PI * gap.distance * volume {
+            let (area, energy) = self.film(&self.moving, gap, poses);
+            if energy > FILM && gap.distance < THIN * (area / PI).sqrt() {
                 return Err(Error::Unresolved {
                     place: self.place(gap),
                     quantity: "flat gap in m".into(),
@@ -140,6 +148,23 @@ impl Clearance {
             }
         }
         Ok(())
+    }
+
+    /// Refuses bodies that touch where that has no solution.
+    pub fn refuse_touch(&self, smallest: Option<&Gap>) -> Result<()> {
+        match smallest.filter(|gap| touches(gap) && !self.may_touch) {
+            None => Ok(()),
+            Some(gap) => Err(Error::Unresolved {
+                place: self.place(gap),
+                quantity: "gap in m".into(),
+                value: gap.distance,
+                limit: 0.0,
+                remedy: format!(
+                    "they touch, and coupled panels have no solution without water between: move them apart, or use the fidelity isolated{}",
+                    self.hint(gap)
+                ),
+            }),
+        }
     }
 
     /// The smallest gap at these poses; stops a run when bodies get into one another or into a wall.
@@ -168,6 +193,7 @@ impl Clearance {
             });
         }
         self.refuse_film(smallest.as_ref(), poses)?;
+        self.refuse_touch(smallest.as_ref())?;
         self.refuse_depth(poses)?;
         Ok(smallest)
     }

@@ -1,12 +1,10 @@
 //! The water of a scene, ready to be evaluated.
 
-use super::backend::Backend;
 use super::choices::WaterChoices;
 use super::clearance::Clearance;
 use super::device::Device;
 use super::fidelity::Fidelity;
-use super::fidelity::kind::Planned;
-use super::method::Method;
+use super::fidelity::kind::{Planned, StartGap};
 use super::method::kind::{BodyMethod, Problem};
 use super::numerics::Plan;
 use super::resolved::Resolved;
@@ -14,7 +12,7 @@ use super::submerged::{Discretisation, SubmergedBody};
 use crate::Result;
 use crate::adjoint::lie::Pose;
 use crate::coupling::Coupling;
-use crate::geometry::{Gap, Other};
+use crate::geometry::{Gap, Gaps, Other};
 use crate::scene::Scene;
 use nalgebra::DMatrix;
 use std::path::{Path, PathBuf};
@@ -60,14 +58,11 @@ pub(crate) fn prepare(
     mut clearance: Clearance,
     folder: Option<&Path>,
 ) -> Result<Prepared> {
-    // Where compression can't resolve the gaps of a scene, panels do, flat ones too. Between round bodies sources inside them are the
-    // better of both (two spheres at a gap of 0.05 R: 0.6 % for 0.8 %), and on a GPU there are no panels.
-    let round = submerged.iter().all(|b| b.ellipsoid.is_some());
-    let together = match (choices.method, choices.backend) {
-        (Method::Auto, Backend::Cpu) if !round => Method::Panel.kind(),
-        (method, _) => method.kind(),
+    let together = choices.method.together(choices.backend).kind();
+    let mut method = match choices.fidelity.kind().solves_alone() {
+        true => choices.method.kind(),
+        false => together,
     };
-    let mut method = choices.method.kind();
     let mut problem = Problem::new(scene, &numbers, &submerged, method, &choices.numerics);
     problem.together = together;
     let (fidelity, planned) = plan(
@@ -85,6 +80,11 @@ pub(crate) fn prepare(
     (problem.plan, problem.folder) = (&planned.plan, folder);
     clearance.by_sources = !fidelity.kind().solves_alone() && method.by_sources();
     clearance.resolved_edges = method.resolved_edges();
+    let touching = fidelity.kind().solves_alone() || method.may_touch();
+    clearance.may_touch = touching || scene.fluid.density <= 0.0;
+    for gaps in [&clearance.moving, &clearance.rigid] {
+        clearance.refuse_touch(gaps.smallest(poses).as_ref())?;
+    }
     clearance.refuse_film(clearance.moving.smallest(poses).as_ref(), poses)?;
     let mut warnings = choices.without_effect();
     let mut device = Device::open(choices.backend, &choices.gpu, || {
@@ -131,19 +131,29 @@ fn plan(
     }
     let poses: Vec<Pose> = numbers.iter().map(|b| all[*b]).collect();
     let number = |b: usize| numbers.iter().position(|w| *w == b);
-    let gaps = [&clearance.moving, &clearance.rigid].into_iter();
-    let gaps = gaps.flat_map(|g| g.all(all)).filter_map(|gap| {
+    let start = |gaps: &Gaps, gap: Gap| {
         let second = match gap.second {
             Other::Body(b) => Other::Body(number(b)?),
             wall => wall,
         };
-        Some(Gap {
-            first: number(gap.first)?,
-            second,
-            ..gap
+        let first = number(gap.first)?;
+        Some(StartGap {
+            film: clearance.film(gaps, &gap, all).1,
+            gap: Gap {
+                first,
+                second,
+                ..gap
+            },
         })
+    };
+    let start = &start;
+    let both = [&clearance.moving, &clearance.rigid].into_iter();
+    let gaps = both.flat_map(|gaps| {
+        gaps.all(all)
+            .into_iter()
+            .filter_map(move |g| start(gaps, g))
     });
-    let gaps: Vec<Gap> = gaps.collect();
+    let gaps: Vec<StartGap> = gaps.collect();
     let planned = fidelity.kind().plan(problem, &poses, &gaps)?;
     let used = match planned.together {
         true => Fidelity::Full,

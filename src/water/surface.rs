@@ -18,7 +18,7 @@ pub(crate) struct Surface {
     pub mesh: TriMesh,
     /// Its faces before regions of it were refined.
     pub base: usize,
-    /// A mesh of about a quarter of the faces, of a shape by formula with flat parts or edges.
+    /// A mesh of about a quarter of the faces, of a shape by formula.
     pub coarse: Option<Coarse>,
     pub properties: MassProperties,
     /// The exact surface, of a shape by formula.
@@ -59,7 +59,7 @@ pub(crate) struct Meshing {
     pub faces: Option<usize>,
     /// Whether ellipsoids are solved by formula.
     pub by_formula: bool,
-    /// Whether other shapes by formula get a second, coarser mesh.
+    /// Whether shapes by formula get a second, coarser mesh.
     pub pairs: bool,
 }
 
@@ -93,7 +93,7 @@ pub(crate) fn surface(body: &Body, meshing: Meshing, edges: f64) -> Result<Optio
     let base = mesh.faces().len();
     let mesh = refined(&mesh, edges)?;
     let closed = meshing.by_formula && semi_axes(shape).is_some();
-    let coarse = if meshing.pairs && !closed && !shape.is_mesh() {
+    let coarse = if meshing.pairs && !shape.is_mesh() {
         let quarter = (base / 4).max(12);
         let coarse = even(Some(quarter))?;
         let fewer = coarse.faces().len();
@@ -123,8 +123,13 @@ pub(crate) fn surface(body: &Body, meshing: Meshing, edges: f64) -> Result<Optio
     }))
 }
 
-/// Depth in edges up to which surfaces count as touching: rounding.
+/// Depth in edges up to which surfaces count as touching, and distance from which they don't: rounding.
 const TOUCHING: f64 = 1e-9;
+
+/// Whether surfaces touch, or cross.
+pub(crate) fn touches(gap: &Gap) -> bool {
+    gap.distance < TOUCHING * gap.edge
+}
 
 /// Whether surfaces cross.
 pub(crate) fn overlaps(gap: &Gap) -> bool {

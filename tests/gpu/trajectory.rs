@@ -2,7 +2,7 @@
 
 use super::fixture::{difference, wavy};
 use crate::support::example;
-use hydrograd::simulate::Backend;
+use hydrograd::simulate::{Backend, Method};
 use hydrograd::{Controls, Fidelity, Gradient, Rollout, Scene, Settings, Simulator};
 use nalgebra::DMatrix;
 
@@ -21,8 +21,14 @@ pub fn simulator(backend: Backend, tolerance: f64) -> Simulator {
 
 fn of(fidelity: Fidelity, backend: Backend, tolerance: f64) -> Simulator {
     let scene = falling_ball();
+    let method = match fidelity {
+        // What a GPU has.
+        Fidelity::Full => Method::MfsVertex,
+        _ => Method::Auto,
+    };
     let settings = Settings::default()
         .fidelity(fidelity)
+        .method(method)
         .backend(backend)
         .tolerance(tolerance);
     Simulator::new(&scene, settings).unwrap()

@@ -7,7 +7,9 @@ use hydrograd::adjoint::lie::{Mat6, Pose, Vec3, Vec6, cross_motion, exp_matrix};
 use hydrograd::boundary::{BodyBoundary, Method, MfsSettings, PanelBoundary};
 use hydrograd::coupling::full::{Full, FullSolver, SolveSettings};
 use hydrograd::coupling::reduced::{Cutoff, Reduced, compress};
-use hydrograd::coupling::{Direction, Exclusions, Isolated, Linearise, PanelCoupled};
+use hydrograd::coupling::{
+    Direction, Exclusions, ExtrapolatedPanels, Isolated, Linearise, PanelCoupled,
+};
 use hydrograd::geometry::Image;
 use hydrograd::scene::{Shape, Wall, WallSurface};
 use hydrograd::shape;
@@ -31,9 +33,13 @@ pub fn rungs() -> Vec<Rung> {
         "coupling::response::ResponseLinearised::gradient_along" => |c| all(systems().iter().map(|s| gradient_along(s, c)).chain(panel_systems().iter().map(|s| gradient_along(s, c)))),
         "coupling::response::ResponseLinearised::vjp" => |c| all(systems().iter().map(|s| vjp(s, c)).chain(panel_systems().iter().map(|s| vjp(s, c)))),
         "coupling::response::ResponseLinearised::hvp" => |c| all(systems().iter().map(|s| hvp(s, c)).chain(panel_systems().iter().map(|s| hvp(s, c)))),
+        "coupling::panel::extrapolated::ExtrapolatedLinearised::gradient" => |c| gradient(&extrapolated_panels(), c),
         "coupling::reduced::linearised::ReducedLinearised::gradient" => |c| all(reduced_systems().iter().map(|s| gradient(s, c))),
+        "coupling::panel::extrapolated::ExtrapolatedLinearised::gradient_along" => |c| gradient_along(&extrapolated_panels(), c),
         "coupling::reduced::linearised::ReducedLinearised::gradient_along" => |c| all(reduced_systems().iter().map(|s| gradient_along(s, c))),
+        "coupling::panel::extrapolated::ExtrapolatedLinearised::vjp" => |c| vjp(&extrapolated_panels(), c),
         "coupling::reduced::linearised::ReducedLinearised::vjp" => |c| all(reduced_systems().iter().map(|s| vjp(s, c))),
+        "coupling::panel::extrapolated::ExtrapolatedLinearised::hvp" => |c| hvp(&extrapolated_panels(), c),
         "coupling::reduced::linearised::ReducedLinearised::hvp" => |c| all(reduced_systems().iter().map(|s| hvp(s, c))),
     ]
 }
@@ -96,24 +102,45 @@ fn systems() -> Vec<Full> {
     ]
 }
 
+fn panels(faces: usize) -> Vec<Arc<PanelBoundary>> {
+    let of = |shape: Shape| {
+        let mesh = shape::build(&shape, Path::new("."), Some(faces)).unwrap();
+        Arc::new(PanelBoundary::new("b", &mesh).unwrap())
+    };
+    vec![
+        of(Shape::cuboid([0.5, 0.4, 0.6])),
+        of(Shape::ellipsoid([0.6, 0.3, 0.4])),
+    ]
+}
+
+fn coupled_panels(
+    bodies: Vec<Arc<PanelBoundary>>,
+    solver: FullSolver,
+    walls: &[Wall],
+    excluded: Exclusions,
+) -> PanelCoupled {
+    let settings = SolveSettings {
+        solver,
+        tolerance: 1e-13,
+        ..SolveSettings::default()
+    };
+    PanelCoupled::new(bodies, walls, excluded, settings).unwrap()
+}
+
+fn extrapolated_panels() -> ExtrapolatedPanels {
+    let of = |faces| {
+        let (bodies, gmres) = (panels(faces), FullSolver::Gmres);
+        coupled_panels(bodies, gmres, &[WALL], Exclusions::none())
+    };
+    ExtrapolatedPanels::new(of(80), of(20), 2.0).unwrap()
+}
+
 /// Panels with both solvers, without walls, with rigid ones and a free surface; and two bodies that feel each other's images
 /// alone. A box's faces are flat, and its edges sharp.
 fn panel_systems() -> Vec<PanelCoupled> {
-    let panels = |shape: Shape| {
-        let mesh = shape::build(&shape, Path::new("."), Some(80)).unwrap();
-        Arc::new(PanelBoundary::new("b", &mesh).unwrap())
-    };
-    let bodies = [
-        panels(Shape::cuboid([0.5, 0.4, 0.6])),
-        panels(Shape::ellipsoid([0.6, 0.3, 0.4])),
-    ];
+    let bodies = panels(80);
     let of = |solver: FullSolver, walls: &[Wall], excluded: Exclusions| {
-        let settings = SolveSettings {
-            solver,
-            tolerance: 1e-13,
-            ..SolveSettings::default()
-        };
-        PanelCoupled::new(bodies.to_vec(), walls, excluded, settings).unwrap()
+        coupled_panels(bodies.clone(), solver, walls, excluded)
     };
     let free = Wall {
         surface: WallSurface::Free,

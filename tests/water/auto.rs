@@ -2,6 +2,7 @@
 
 use crate::support::example;
 use hydrograd::scene::{Placement, Shape};
+use hydrograd::simulate::Method;
 use hydrograd::{Body, Fidelity, Fluid, Scene, Settings, Simulator};
 
 fn balls(places: &[f64]) -> Scene {
@@ -85,7 +86,8 @@ fn settings_out_of_place_are_told() {
     assert!(refused(reduced.resolved_gap(1e9)).contains("radii of the body"));
     let mut plate = Scene::new(Fluid::fresh_water());
     plate.add(Body::new(Shape::cuboid([1.0, 0.003, 1.0])).density(1000.0));
-    let thin = Simulator::new(&plate, Settings::default().fidelity(Fidelity::Full))
+    let sources = Settings::default().fidelity(Fidelity::Full);
+    let thin = Simulator::new(&plate, sources.method(Method::MfsVertex))
         .map(|_| ())
         .unwrap_err()
         .to_string();
@@ -114,7 +116,7 @@ fn a_disc_flat_over_a_wall_keeps_its_film() {
         assert!((m / converged - 1.0).abs() < limit, "gap {gap}: {m}");
         // By sources inside the disc it would be a fifth of that, with a force of the wrong sign.
         let sources = Settings::default().fidelity(Fidelity::Full);
-        let error = Simulator::new(&scene, sources)
+        let error = Simulator::new(&scene, sources.method(Method::MfsVertex))
             .err()
             .expect("a film")
             .to_string();

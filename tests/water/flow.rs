@@ -79,10 +79,10 @@ fn a_moving_sphere_makes_a_dipole() {
     for method in METHODS {
         let panels = method == Method::Panel;
         for (faces, away, by_sources, by_panels) in [
-            (320, 0.16, 0.03, 0.065),
-            (1280, 0.08, 0.01, 0.035),
-            (1280, 0.5, 0.008, 0.012),
-            (1280, 3.0, 0.007, 0.011),
+            (320, 0.16, 0.03, 0.03),
+            (1280, 0.08, 0.01, 0.025),
+            (1280, 0.5, 0.008, 8e-4),
+            (1280, 3.0, 0.007, 1e-4),
         ] {
             let most = if panels { by_panels } else { by_sources };
             let found = error(method, faces, away);
@@ -128,7 +128,7 @@ fn edges_are_harder() {
     println!("sources and panels: {:.2e}", apart.fold(0.0, f64::max));
     let sources =
         [(320, 0.08, 0.4), (1280, 0.01, 0.02)].map(|c| (Method::MfsVertex, &by_sources, c));
-    let panels = [(320, 0.025, 0.05), (1280, 0.004, 0.008)].map(|c| (Method::Panel, &by_panels, c));
+    let panels = [(320, 0.01, 0.03), (1280, 0.004, 0.009)].map(|c| (Method::Panel, &by_panels, c));
     for (method, right, (faces, typical, worst)) in sources.into_iter().chain(panels) {
         let made = flow(&simulator(&scene, faces, method), &points).unwrap();
         let pairs = made.iter().zip(right);

@@ -275,10 +275,8 @@ fn settings_out_of_range_are_refused_by_name() {
     }
     let mut free = scene();
     free.walls[0].surface = WallSurface::Free;
-    let said = Simulator::new(&free, Settings::default().fidelity(Fidelity::Full))
-        .err()
-        .unwrap()
-        .to_string();
+    let sources = (Settings::default().fidelity(Fidelity::Full)).method(Method::MfsVertex);
+    let said = Simulator::new(&free, sources).err().unwrap().to_string();
     assert!(
         said.contains("walls[0]") && said.contains("reduced"),
         "{said}"

@@ -51,8 +51,17 @@ impl Richardson {
     ) -> Result<Self> {
         let ratio = ratio.unwrap_or_else(|| edge(coarse) / edge(fine));
         let mut found = richardson_of_ratio(fine, coarse, ratio)?;
-        found.added_mass = positive(&found.added_mass, fine.faces.volume());
+        found.added_mass = positive(&found.added_mass, fine.faces.volume(), 0.0);
         Ok(found)
+    }
+
+    /// Added mass for a body whose coupling is extrapolated as well. About an axis of revolution faces move a little water that the shape doesn't;
+    /// a neighbour may take as much of that away as extrapolation does of the `coarse` mesh's, and no energy may become negative.
+    pub(crate) fn coupled(&self, coarse: &PanelBoundary) -> Mat6 {
+        let volume = coarse.faces.volume();
+        let least = (coarse.added_mass.component_div(&displaced(volume))).symmetric_eigenvalues();
+        let room = least.min().max(0.0) / (self.ratio * self.ratio - 1.0);
+        positive(&self.added_mass, volume, room)
     }
 }
 
@@ -134,20 +143,25 @@ impl Extrapolated {
     }
 }
 
-/// The nearest added mass without negative energy: about an axis of revolution extrapolation can leave
-/// a little. Compared in units of the water displaced, `volume` in m³.
-fn positive(m: &Mat6, volume: f64) -> Mat6 {
-    let displaced = Vec6::from_fn(|i, _| {
+/// The nearest added mass without energies under `least`: about an axis of revolution extrapolation can leave
+/// a little that is negative. Compared in units of the water displaced, `volume` in m³.
+fn positive(m: &Mat6, volume: f64, least: f64) -> Mat6 {
+    let units = displaced(volume);
+    let mut eigen = m.component_div(&units).symmetric_eigen();
+    if eigen.eigenvalues.min() >= least {
+        return *m;
+    }
+    eigen.eigenvalues.apply(|x| *x = x.max(least));
+    eigen.recompose().component_mul(&units)
+}
+
+/// Inertia of the water displaced, in mass and, roughly, in rotation: units of a 6 × 6 matrix.
+fn displaced(volume: f64) -> Mat6 {
+    let roots = Vec6::from_fn(|i, _| {
         let power = if i < 3 { 1.0 } else { 5.0 / 3.0 };
         volume.powf(0.5 * power)
     });
-    let units = Mat6::from_fn(|i, j| displaced[i] * displaced[j]);
-    let mut eigen = m.component_div(&units).symmetric_eigen();
-    if eigen.eigenvalues.min() >= 0.0 {
-        return *m;
-    }
-    eigen.eigenvalues.apply(|x| *x = x.max(0.0));
-    eigen.recompose().component_mul(&units)
+    roots * roots.transpose()
 }
 
 impl Response for Extrapolated {

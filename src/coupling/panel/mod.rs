@@ -21,10 +21,13 @@
 //! once, precondition the iteration. All other entries depend on the position of a panel's centroid in the frame of another
 //! body alone; seen from afar they are multipoles ([`double`](mod@crate::adjoint::kernel::double)). Bodies and images that come closer than about half an edge length lose accuracy.
 
+mod extrapolated;
 mod first;
 mod placed;
 mod second;
 mod system;
+
+pub use extrapolated::ExtrapolatedPanels;
 
 use super::full::SolveSettings;
 use super::response::Solved;

@@ -189,7 +189,7 @@ impl Level {
 
     fn describe(&self, scene: &Scene) -> String {
         let by = match (self.way, closed_forms(scene)) {
-            (Way::Full, _) => return "the coupled system (full, mfs-vertex)".into(),
+            (Way::Full, _) => return "the coupled system (full, panel)".into(),
             (Way::Reduced(Method::Panel), _) | (_, ClosedForms::None) => "panel",
             (_, ClosedForms::All) => "exact",
             (_, ClosedForms::Some) => "exact and panel",

@@ -7,12 +7,13 @@
 //! starts with.
 
 use super::full::Full;
-use super::kind::{FidelityKind, Knob, Planned};
+use super::kind::{FidelityKind, Knob, Planned, StartGap};
 use super::reduced::Reduced;
 use crate::adjoint::lie::{Pose, Vec3};
 use crate::boundary::exact::lamb;
 use crate::coupling::reduced::{Cutoff, compress};
 use crate::geometry::{Gap, MassProperties, Other, WallSurface};
+use crate::water::clearance::FILM;
 use crate::water::device::Device;
 use crate::water::method::kind::Problem;
 use crate::water::numerics::{Numerics, Plan};
@@ -35,8 +36,12 @@ const COARSEST: f64 = 2.0;
 /// Gaps under this part of the finest that compression resolves are left to the fidelity `Full`, whose forces are nearer there at all gaps and
 /// shapes that were measured (docs/accuracy-coupled.md).
 const HOPELESS: f64 = 0.5;
+/// The same where the film in a gap has more than an energy (that of [`StartGap::film`]): between flat parts, and such as are nearly so.
+const HOPELESS_FILM: [(f64, f64); 2] = [(FILM, 2.0), (0.01, 1.0)];
 /// Faces with edges longer than this part of the radius of the smaller body at a gap don't see its flow.
 const COARSE: f64 = 0.5;
+/// Under this many times the finest gap bodies are compressed no worse than `Reduced` does by default.
+const CLOSE: f64 = 6.0;
 /// Under this part of the finest gap compressed sources may refuse: `Full` answers, and warns.
 const REFUSED: f64 = 0.1;
 
@@ -60,7 +65,7 @@ impl FidelityKind for Auto {
         true
     }
 
-    fn plan(&self, problem: &Problem, poses: &[Pose], gaps: &[Gap]) -> Result<Planned> {
+    fn plan(&self, problem: &Problem, poses: &[Pose], gaps: &[StartGap]) -> Result<Planned> {
         plan(problem, poses, gaps)
     }
 
@@ -90,7 +95,7 @@ impl FidelityKind for Auto {
 }
 
 /// Chooses for the bodies at the start, for an error of the coupling of the accuracy that is aimed at.
-fn plan(problem: &Problem, poses: &[Pose], gaps: &[Gap]) -> Result<Planned> {
+fn plan(problem: &Problem, poses: &[Pose], gaps: &[StartGap]) -> Result<Planned> {
     let (bodies, walls, aim) = (problem.bodies, problem.walls, problem.numerics.accuracy);
     if !(aim > 0.0 && aim < 1.0) {
         return Err(Error::input(
@@ -114,13 +119,21 @@ fn plan(problem: &Problem, poses: &[Pose], gaps: &[Gap]) -> Result<Planned> {
             strength(&properties)?,
             poses[b].apply(&mesh.bounding_ball().center),
         ));
-        let near = gaps.iter().filter(|g| g.touches(b));
-        let nearest = near.min_by(|a, b| a.image_distance().total_cmp(&b.image_distance()));
+        let near = || gaps.iter().filter(|g| g.gap.touches(b));
+        let nearest = (near().map(|g| &g.gap))
+            .min_by(|a, b| a.image_distance().total_cmp(&b.image_distance()));
         let (smallest, edge) =
             nearest.map_or((f64::INFINITY, 0.0), |g| (g.image_distance(), g.edge));
         let finest = compress::finest_gap(mesh.surface_area());
+        // Who refines a body means its gaps to be resolved there.
+        let refined = body.regions.iter().map(|r| r.gap).fold(finest, f64::min);
+        let hopeless = near().any(|g| {
+            let film = HOPELESS_FILM.iter().find(|(film, _)| g.film > *film);
+            let part = film.map_or(HOPELESS, |(_, part)| *part);
+            g.gap.image_distance() < part * refined
+        });
         let rigid = walls.iter().all(|w| w.surface == WallSurface::Rigid);
-        if smallest < HOPELESS * finest && rigid {
+        if hopeless && rigid {
             let coarse = nearest.is_some_and(|g| edge > COARSE * smaller(bodies, g));
             let full = !coarse || smallest < REFUSED * finest;
             let so = if full {
@@ -137,9 +150,14 @@ fn plan(problem: &Problem, poses: &[Pose], gaps: &[Gap]) -> Result<Planned> {
         }
         let coarsest = COARSEST * compress::default_gap(properties.volume, mesh.surface_area());
         let gap = (ROOM * smallest).clamp(finest, coarsest);
+        // What compression leaves out is worth more the nearer the gap, in the force above all.
+        let tolerance = match smallest < CLOSE * finest {
+            true => (COMPRESSION * aim).min(compress::CompressSettings::default().tolerance),
+            false => COMPRESSION * aim,
+        };
         out.plan.compress.push(compress::CompressSettings {
             rank: None,
-            tolerance: COMPRESSION * aim,
+            tolerance,
             resolved_gap: Some(gap),
         });
     }

@@ -2,15 +2,13 @@
 
 use super::exact::Exact;
 use super::kind::{BodyMethod, Problem, Solved};
-use super::mfs::Mfs;
 use super::panel::Panel;
 use crate::Result;
-use crate::boundary::Method;
 use crate::water::device::Device;
 use crate::water::numerics::Numerics;
 use crate::water::submerged::{Made, SubmergedBody};
 
-/// Closed forms where there is one, else panels; vertex sources where all bodies are solved together.
+/// Closed forms where there is one, else panels. Bodies solved together have a method of their own (`Method::together`).
 pub(super) struct Auto;
 
 impl Auto {
@@ -43,10 +41,6 @@ impl BodyMethod for Auto {
         true
     }
 
-    fn by_sources(&self) -> bool {
-        true
-    }
-
     fn made_from(&self, body: &SubmergedBody, numerics: &Numerics) -> serde_json::Value {
         self.of(body).made_from(body, numerics)
     }
@@ -56,6 +50,6 @@ impl BodyMethod for Auto {
     }
 
     fn couple(&self, problem: &Problem, device: &mut Device) -> Result<Made> {
-        Mfs(Method::MfsVertex).couple(problem, device)
+        Panel.couple(problem, device)
     }
 }

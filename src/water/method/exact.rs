@@ -65,8 +65,7 @@ impl BodyMethod for Exact {
         Err(Error::Unsupported {
             what: "the method exact with the fidelity full".into(),
             why: "closed forms are of single bodies".into(),
-            instead: "use the fidelity reduced, which couples them, or the method mfs-vertex"
-                .into(),
+            instead: "use the fidelity reduced, which couples them, or the method panel".into(),
         })
     }
 }

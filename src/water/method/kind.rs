@@ -72,6 +72,11 @@ pub(crate) trait BodyMethod: Send + Sync {
         false
     }
 
+    /// Whether all bodies solved together may touch: whether a gap of nothing has a solution.
+    fn may_touch(&self) -> bool {
+        true
+    }
+
     /// Refuses the GPU for all bodies solved together where that is done on the CPU alone.
     fn check_gpu(&self) -> Result<()> {
         Ok(())

@@ -3,13 +3,14 @@
 use super::kind::{BodyMethod, Problem, Solved};
 use crate::boundary::PanelBoundary;
 use crate::boundary::panel::{Extrapolated, Richardson};
-use crate::coupling::PanelCoupled;
 use crate::coupling::full::SolveSettings;
+use crate::coupling::{Coupling, ExtrapolatedPanels, PanelCoupled};
 use crate::water::device::Device;
 use crate::water::numerics::Numerics;
 use crate::water::submerged::{Discretisation, Made, SubmergedBody, once, shared};
 use crate::water::surface::Coarse;
 use crate::{Error, Result};
+use std::sync::Arc;
 
 /// Iterations of the coupled panels after which they are given up.
 const MOST_ITERATIONS: usize = 500;
@@ -18,6 +19,30 @@ const RESOLVED: f64 = 0.1;
 
 /// Panels, of two meshes extrapolated where there are two.
 pub(super) struct Panel;
+
+/// A body's panels, on two meshes where there are two.
+struct Meshes {
+    fine: Arc<PanelBoundary>,
+    coarse: Option<Arc<PanelBoundary>>,
+    known: Option<Richardson>,
+}
+
+impl Meshes {
+    fn new(body: &SubmergedBody) -> Result<Self> {
+        let fine = PanelBoundary::new(body.name, body.surface("full")?)?;
+        let (mut coarse, mut known) = (None, None);
+        if let Some(Coarse { mesh, ratio }) = body.coarse {
+            let fewer = PanelBoundary::new(body.name, mesh)?;
+            known = Some(Richardson::of(&fine, &fewer, *ratio)?);
+            coarse = Some(Arc::new(fewer));
+        }
+        Ok(Self {
+            fine: Arc::new(fine),
+            coarse,
+            known,
+        })
+    }
+}
 
 impl BodyMethod for Panel {
     fn label(&self) -> &'static str {
@@ -50,41 +75,50 @@ impl BodyMethod for Panel {
     }
 
     fn couple(&self, problem: &Problem, _: &mut Device) -> Result<Made> {
-        let made = shared(problem.bodies, |body| {
-            PanelBoundary::new(body.name, body.surface("full")?)
-        })?;
-        let known = made.iter().zip(problem.bodies).map(|(fine, body)| {
-            let Some(Coarse { mesh, ratio }) = body.coarse else {
-                return Ok(None);
-            };
-            let coarse = PanelBoundary::new(body.name, mesh)?;
-            Ok(Some(Richardson::of(fine, &coarse, *ratio)?))
-        });
-        let known = known.collect::<Result<Vec<_>>>()?;
-        let own: Vec<_> = known.iter().map(|k| k.map(|k| k.added_mass)).collect();
+        let made = shared(problem.bodies, Meshes::new)?;
+        let own: Vec<_> = (made.iter())
+            .map(|m| Some(m.known?.coupled(m.coarse.as_ref()?)))
+            .collect();
         let solve = SolveSettings {
             max_iterations: MOST_ITERATIONS,
             ..problem.numerics.solve
         };
+        let coupled = |meshes: Vec<Arc<PanelBoundary>>| -> Result<PanelCoupled> {
+            let excluded = problem.excluded.clone();
+            Ok(PanelCoupled::new(meshes, problem.walls, excluded, solve)?.with_added_mass(&own))
+        };
+        let fine = coupled(made.iter().map(|m| m.fine.clone()).collect())?;
+        // Bodies with different ratios: the largest takes least away.
+        let ratios = made.iter().filter_map(|m| Some(m.known?.ratio));
+        let ratio = ratios.fold(0.0, f64::max);
+        let coupling: Box<dyn Coupling> = if ratio > 0.0 {
+            let meshes = made.iter().map(|m| m.coarse.as_ref().unwrap_or(&m.fine));
+            let coarse = coupled(meshes.cloned().collect())?;
+            Box::new(ExtrapolatedPanels::new(fine, coarse, ratio)?)
+        } else {
+            Box::new(fine)
+        };
         Ok(Made {
-            warnings: once(&made, |m| &m.warnings),
-            bodies: problem.named(made.iter().zip(&known).map(|(m, known)| Discretisation {
+            warnings: once(&made, |m| &m.fine.warnings),
+            bodies: problem.named(made.iter().map(|m| Discretisation {
                 method: self.label(),
-                faces: m.faces.len(),
-                unknowns: m.faces.len(),
-                asymmetry: m.asymmetry,
-                added_mass_error: known.map(|k| k.error),
+                faces: m.fine.faces.len(),
+                unknowns: m.fine.faces.len(),
+                asymmetry: m.fine.asymmetry,
+                added_mass_error: m.known.map(|known| known.error),
                 ..Discretisation::default()
             })),
-            coupling: Box::new(
-                PanelCoupled::new(made, problem.walls, problem.excluded.clone(), solve)?
-                    .with_added_mass(&own),
-            ),
+            coupling,
         })
     }
 
     fn resolved_edges(&self) -> f64 {
         RESOLVED
+    }
+
+    // Faces that lie in one another have no side to be seen from.
+    fn may_touch(&self) -> bool {
+        false
     }
 
     fn check_gpu(&self) -> Result<()> {

@@ -1,6 +1,7 @@
 //! How near the bodies are to one another and to the walls, and what that means for the flow.
 
 use super::fidelity::Fidelity;
+use super::fidelity::kind::FILM;
 use super::resolved::{Resolved, narrowest};
 use super::surface::{Surface, overlaps, touches};
 use crate::adjoint::lie::Pose;
@@ -15,9 +16,6 @@ use std::f64::consts::PI;
 const MOST_SHARED: f64 = 0.5;
 /// Part of the edges under which sources inside the bodies don't resolve a gap at all.
 const BY_SOURCES: f64 = 0.5;
-/// Energy of the film in a gap, in the energy of the water that the smaller body displaces, from which it matters to both. Between
-/// round bodies it stays under a hundredth.
-pub(crate) const FILM: f64 = 0.3;
 /// A gap is thin where it is less than this part of the radius of a disc with the area over which the surfaces are parallel.
 const THIN: f64 = 0.15;
 

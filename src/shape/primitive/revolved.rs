@@ -2,8 +2,8 @@
 //!
 //! Ends: ring k (from the pole) has s·k vertices, so triangles stay near-equilateral down to the
 //! pole and no fan of slivers appears; s = 6 suits a flat disc, s = 4 a hemisphere. Sides: an
-//! even number of bands between rings that are rotated by half a step one after the other. A short cylinder's rings and bands are
-//! finer towards its edges, as those of a box.
+//! even number of bands between rings that are rotated by half a step one after the other. Rings and bands of a cylinder shorter
+//! than its radius are finer towards the edges, as those of a box.
 
 use super::{Parts, graded, misfit};
 use hydrograd_adjoint::lie::Vec3;
@@ -13,9 +13,9 @@ use std::ops::Range;
 /// A cylinder about z, centred at the origin (m), with about `target` faces (at least 36).
 pub(in crate::shape) fn cylinder(radius: f64, length: f64, target: usize) -> Parts {
     let (rings, bands) = choose(6, radius, length, 1.0, target as f64);
-    // Along a long side the flow is even, and the ends are a small part.
-    let short = (bands as f64) < 2.0 * SHORT.end;
-    let along = |t: f64| if short { graded(t) } else { t };
+    // Along a long side the flow is even, and the ends are a small part. By the shape alone: two meshes of one shape must be graded alike.
+    let thin = length < radius;
+    let along = |t: f64| if thin { graded(t) } else { t };
     let end = |k: usize| (radius * along(k as f64 / rings as f64), 0.0);
     revolve(6, rings, bands, (radius, length), end, along)
 }

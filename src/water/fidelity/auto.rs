@@ -7,13 +7,12 @@
 //! starts with.
 
 use super::full::Full;
-use super::kind::{FidelityKind, Knob, Planned, StartGap};
+use super::kind::{FILM, FidelityKind, Knob, Planned, StartGap};
 use super::reduced::Reduced;
 use crate::adjoint::lie::{Pose, Vec3};
 use crate::boundary::exact::lamb;
 use crate::coupling::reduced::{Cutoff, compress};
 use crate::geometry::{Gap, MassProperties, Other, WallSurface};
-use crate::water::clearance::FILM;
 use crate::water::device::Device;
 use crate::water::method::kind::Problem;
 use crate::water::numerics::{Numerics, Plan};

@@ -29,9 +29,9 @@ fn main() -> hydrograd::Result<()> {
     for (name, scene) in [("school", school()), ("boulders", boulders())] {
         // 320 and 720 faces a body, or 180 and 320.
         let meshes = if quick { [2.25, 4.0] } else { [4.0, 9.0] };
-        let right = reference(&scene, meshes, 2.0)?;
+        let right = reference(&scene, meshes)?;
         notes.push(format!(
-            "{name}: reference extrapolated from up to {} faces, {:.1e} from the finer mesh",
+            "{name}: reference of {} faces, {:.1e} from that of fewer",
             right.faces, right.rest
         ));
         let measure = |settings: Settings| Measured::new(&scene, settings, &right.matrix, quick);

@@ -1,9 +1,9 @@
 //! The paper's table of costs again: its own choices beside this program's defaults.
 //!
 //! `cargo bench --bench paper [-- SCENE …] [--quick]`. For each scene `preset = "paper"` (velocity form, fundamental
-//! solutions a face, Eq. 20; here in double precision) and the defaults of `full`, `reduced` and `auto`, each in a process of
+//! solutions a face, Eq. 20; here in double precision) and the defaults of `full` (also by fundamental solutions), `reduced` and `auto`, each in a process of
 //! its own: seconds a step, seconds a step with its gradient, peak memory, and the error of M_f at the start in generalised
-//! coordinates, max |ΔM_ij| / √(M_ii M_jj). The reference is the coupled panel method on two meshes, extrapolated; `--quick`
+//! coordinates, max |ΔM_ij| / √(M_ii M_jj). The reference is `full` by panels on finer meshes; `--quick`
 //! takes coarser ones and, unless scenes are
 //! named, the first two scenes.
 
@@ -18,8 +18,6 @@ use nalgebra::DMatrix;
 /// A scene of the paper's table.
 struct Row {
     scene: &'static str,
-    /// Order of the coupled panel method in the faces' size: sharp edges lower it.
-    order: f64,
     /// Seconds a frame on an RTX 3060 with an i7-11800H, single precision, as published.
     published: Option<f64>,
 }
@@ -27,32 +25,27 @@ struct Row {
 const ROWS: [Row; 5] = [
     Row {
         scene: "falling_ball_box",
-        order: 4.0 / 3.0,
         published: Some(0.310),
     },
     Row {
         scene: "falling_ball",
-        order: 2.0,
         published: None,
     },
     Row {
         scene: "grasp_open",
-        order: 4.0 / 3.0,
         published: Some(0.413),
     },
     Row {
         scene: "fish_near_tail",
-        order: 2.0,
         published: Some(0.819),
     },
     Row {
         scene: "clown_fish",
-        order: 2.0,
         published: Some(0.940),
     },
 ];
 
-/// Faces of the reference's two meshes relative to the scene's.
+/// Faces of the reference's two resolutions relative to the scene's.
 const MESHES: [f64; 2] = [1.0, 2.25];
 const QUICK_MESHES: [f64; 2] = [0.25, 0.5625];
 
@@ -81,17 +74,17 @@ fn main() {
             continue;
         };
         let meshes = if quick { QUICK_MESHES } else { MESHES };
-        let reference = reference(&scene, meshes, row.order);
+        let reference = reference(&scene, meshes);
         notes.push(match &reference {
             Ok(r) => format!(
-                "{}: reference extrapolated from up to {} faces, {:.1e} from the finer mesh",
+                "{}: reference of {} faces, {:.1e} from that of fewer",
                 scene.name, r.faces, r.rest
             ),
             Err(e) => format!("{}: no reference ({e})", scene.name),
         });
         let mut name = scene.name.as_str();
         let mut published = row.published.map_or("–".into(), |s| format!("{s:.3}"));
-        for configuration in ["paper", "full", "reduced", "auto"] {
+        for configuration in ["paper", "full mfs-vertex", "full", "reduced", "auto"] {
             print_row(
                 (name, row.scene, configuration),
                 reference.as_ref().ok(),

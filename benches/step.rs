@@ -2,8 +2,8 @@
 //!
 //! `cargo bench --bench step [-- SCENE] [--quick]`. Prints one row per scene and configuration: seconds per forward step (all
 //! derivatives that a step needs included), gradient of the rollout as a ratio to its forward pass, peak
-//! memory of the process so far, and iterations; beside `full` as it is by default coupled panels, the other integrators, a looser tolerance, the
-//! paper's choices, a dense QR, Jacobi preconditioning and `isolated`.
+//! memory of the process so far, and iterations; `full` by panels, as it is by default, and by fundamental solutions; of these the other integrators, a looser
+//! tolerance, a dense QR and Jacobi preconditioning; the paper's choices, and `isolated`.
 
 #[allow(dead_code)]
 mod common;
@@ -65,7 +65,8 @@ fn main() {
             continue;
         }
         let scene = example(name);
-        let base = Settings::default().fidelity(Fidelity::Full);
+        let full = Settings::default().fidelity(Fidelity::Full);
+        let base = full.method(Method::MfsVertex);
         let with = |solver, preconditioner| base.solver(solver).preconditioner(preconditioner);
         let jacobi = Settings {
             max_iterations: Some(5_000),
@@ -73,8 +74,8 @@ fn main() {
         };
         let one_evaluation = |s: &Settings| s.integrator(Integrator::MomentumEuler);
         let rows = [
-            ("full", base.clone(), 5, 5),
-            ("panels", base.method(Method::Panel), 5, 5),
+            ("full", full.clone(), 5, 5),
+            ("full, mfs-vertex", base.clone(), 5, 5),
             ("momentum Euler", one_evaluation(&base), 5, 5),
             (
                 "momentum Euler, tolerance 1e-6",
@@ -92,11 +93,16 @@ fn main() {
                 1,
             ),
             ("momentum Euler, Jacobi", one_evaluation(&jacobi), 1, 1),
-            ("isolated", base.fidelity(Fidelity::Isolated), 200, 5),
+            (
+                "isolated",
+                full.fidelity(Fidelity::Isolated).method(Method::Auto),
+                200,
+                5,
+            ),
         ];
         for (configuration, settings, steps, repeat) in rows {
             let quick = arguments.iter().any(|a| a == "--quick");
-            if quick && !["full", "panels"].contains(&configuration) {
+            if quick && !configuration.starts_with("full") {
                 continue;
             }
             let r = match measure(&scene, configuration, settings, steps, repeat) {

@@ -9,16 +9,18 @@
 //!
 //! ```text
 //! cargo run --release --example grasp -- --random N [--gripper sliding|hinged] [--seed S] [--json]
-//! cargo run --release --example grasp -- [--json] [--out FOLDER] [--replay full] [--rival-seeds N] [--rival-cap N] [--no-rival]
+//! cargo run --release --example grasp -- [--json] [--out FOLDER] [--check N] [--replay full] [--rival-seeds N] [--rival-cap N] [--no-rival]
 //! ```
 //!
 //! Into the folder go the found trajectory as CSV and JSON, the scene with the found forces as its controller (`grasp_caught.toml`, to be run
-//! again with any fidelity), and a picture. `--replay full` runs it with the coupled equations of all bodies on meshes fine enough for the
-//! gap; the rival is CMA-ES with the same cost, start and knots.
+//! again with any fidelity), and a picture. `--check N` compares the water's mass matrix at N of its states with that of coupled panels; `--replay full` runs it with the coupled equations of all
+//! bodies; both on meshes fine enough for the gap. The rival is CMA-ES with the same cost, start and knots.
 //!
 //! `--random N` catches N coins that nobody tuned for ([`random`]): coin, friction and fingers are drawn by a seed, the settings are those of
 //! [`hydrograd::optimize::grasp`] for all.
 
+#[path = "grasp/check.rs"]
+mod check;
 #[path = "grasp/hold.rs"]
 mod hold;
 #[path = "grasp/plot.rs"]
@@ -46,6 +48,8 @@ use task::{Spent, Task};
 struct Options {
     json: bool,
     out: PathBuf,
+    /// States of which the mass matrix is checked.
+    check: usize,
     replay: bool,
     rival: bool,
     seeds: usize,
@@ -84,6 +88,8 @@ struct Report {
     seconds_per_gradient: f64,
     cost_naive: f64,
     cost_optimised: f64,
+    /// The water's mass matrix beside that of coupled panels, with `--check`.
+    check: Vec<check::Compared>,
     /// The same trajectory with `full`; null without `--replay full`.
     replay: Option<replay::Replay>,
     /// Median of what the rival needed for the same cost; a lower bound where `rival.at_least`.
@@ -143,6 +149,10 @@ fn main() -> Result<(), Box<dyn Error>> {
     plot::draw(&picture, &[("naive", &naive), ("optimised", &optimised)])?;
     files.extend([text, picture]);
 
+    let check = match options.check {
+        0 => Vec::new(),
+        count => check::along(&scene, &optimised, count)?,
+    };
     let replay = match options.replay {
         true => Some(replay::full(&replayable)?),
         false => None,
@@ -170,6 +180,7 @@ fn main() -> Result<(), Box<dyn Error>> {
         seconds_per_gradient: spent.seconds_per_simulation + spent.seconds_per_gradient,
         cost_naive,
         cost_optimised: found.cost,
+        check,
         replay,
         rival_simulations: rival.as_ref().map(|r| r.median),
         rival_ratio: rival.as_ref().map(|r| r.median as f64 / compared),
@@ -248,6 +259,15 @@ fn print(r: &Report, optimised: &Rollout) {
         "{} iterations, {:.1} rollouts with gradients = {:.0} simulations, {:.1} s",
         r.iterations, r.rollouts, r.simulations, r.seconds
     );
+    for c in &r.check {
+        println!(
+            "t = {:.2} s, gap {:.1} mm: mass matrix of the water {:.2} % from coupled panels, the coin's {:.2} %",
+            c.time,
+            1e3 * c.gap,
+            1e2 * c.error,
+            1e2 * c.coin
+        );
+    }
     if let Some(replay) = &r.replay {
         println!(
             "replayed with full, {} faces: {}",
@@ -274,6 +294,7 @@ fn options() -> Result<Options, String> {
     let mut out = Options {
         json: false,
         out: "grasp".into(),
+        check: 0,
         replay: false,
         rival: true,
         seeds: 5,
@@ -293,6 +314,7 @@ fn options() -> Result<Options, String> {
                 "full" => out.replay = true,
                 other => return Err(format!("--replay {other}: expected full")),
             },
+            "--check" => out.check = number(value()?)?,
             "--no-rival" => out.rival = false,
             "--random" => out.random = Some(number(value()?)?),
             "--gripper" => {
@@ -305,7 +327,7 @@ fn options() -> Result<Options, String> {
             "--rival-cap" => out.cap = Some(number(value()?)?),
             _ => {
                 return Err(format!(
-                    "{name}: expected --random, --gripper, --seed, --json, --out, --replay, --rival-seeds, --rival-cap or --no-rival"
+                    "{name}: expected --random, --gripper, --seed, --json, --out, --check, --replay, --rival-seeds, --rival-cap or --no-rival"
                 ));
             }
         }

@@ -7,6 +7,7 @@ pub mod support;
 
 use hydrograd::coupling::reduced::cache;
 use hydrograd::scene::{Preset, Scene};
+use hydrograd::simulate::Method;
 use hydrograd::{Controls, Fidelity, Settings, Simulator, objective};
 use nalgebra::DMatrix;
 use serde::{Deserialize, Serialize};
@@ -58,11 +59,12 @@ pub fn scene(name: &str) -> Option<Scene> {
     Some(Scene::load(file).expect("an example scene"))
 }
 
-/// Settings by the name of a configuration: a fidelity, or `paper`.
+/// Settings by the name of a configuration: a fidelity, `full mfs-vertex`, or `paper`.
 pub fn settings(configuration: &str) -> Settings {
     let fidelity = match configuration {
         "paper" => return Settings::preset(Preset::Paper),
         "full" => Fidelity::Full,
+        "full mfs-vertex" => return settings("full").method(Method::MfsVertex),
         "reduced" => Fidelity::Reduced,
         "auto" => Fidelity::Auto,
         other => panic!("{other}: no configuration"),

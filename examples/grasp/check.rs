@@ -21,7 +21,7 @@ pub struct Compared {
     pub coin: f64,
 }
 
-/// Compares `count` states, evenly spread over the second half of the rollout, where gaps close, and one at the end.
+/// Compares `count` states, evenly spread over the rollout, the last one its end.
 pub fn along(scene: &Scene, rollout: &Rollout, count: usize) -> Result<Vec<Compared>> {
     let panels = task::simulator(scene, Fidelity::Full)?;
     let simulator = rollout.simulator();
@@ -30,7 +30,7 @@ pub fn along(scene: &Scene, rollout: &Rollout, count: usize) -> Result<Vec<Compa
     let own = tree.links()[coin].v.clone();
     let steps = rollout.steps();
     let state = |k: usize| -> Result<Compared> {
-        let n = steps - (count - 1 - k) * steps / (2 * count);
+        let n = steps * (k + 1) / count;
         let sample = &rollout.samples()[n];
         let found = added_mass(simulator, &sample.q)?;
         let right = added_mass(&panels, &sample.q)?;

@@ -157,6 +157,27 @@ impl Rollout {
         self.inner.warnings()
     }
 
+    /// The water across the smallest gap of the trajectory, beside that of coupled panels: a dictionary with `time` (s), `gap` (m), `bodies` (names; of
+    /// the second None for a wall), `added_mass` (along the gap, by this rollout and by panels, kg), `slope` (the same of its slope, kg/m),
+    /// `added_mass_error` and `force_error` (relative) and `faces` (of the panels). None where there is no gap, no water, and where the rollout is by coupled
+    /// panels already. It takes their setup and a solve.
+    fn check_gap<'py>(&self, py: Python<'py>) -> PyResult<Option<Bound<'py, PyDict>>> {
+        let inner = self.inner.clone();
+        let Some(check) = long(py, move |_| inner.check_gap())? else {
+            return Ok(None);
+        };
+        let out = PyDict::new(py);
+        out.set_item("added_mass_error", check.added_mass_error())?;
+        out.set_item("force_error", check.force_error())?;
+        out.set_item("time", check.time)?;
+        out.set_item("gap", check.gap)?;
+        out.set_item("bodies", check.bodies)?;
+        out.set_item("added_mass", check.added_mass)?;
+        out.set_item("slope", check.slope)?;
+        out.set_item("faces", check.faces)?;
+        Ok(Some(out))
+    }
+
     /// The state after `step` steps, from which a run may go on; negative numbers count from the end.
     #[pyo3(signature = (step=-1))]
     fn state(&self, py: Python<'_>, step: isize) -> PyResult<State> {

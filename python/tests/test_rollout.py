@@ -88,6 +88,19 @@ def test_a_run_goes_on_to_the_bit(sim, controls):
         first.state(5)
 
 
+def test_the_smallest_gap_is_compared_with_panels():
+    scene = hg.Scene(gravity=(0.0, 0.0, 0.0), time_step=0.01)
+    scene.add_wall((0.0, 0.0, 0.0), (0.0, 0.0, 1.0))
+    scene.add(hg.Body(hg.cylinder(1.0, 0.25), density=1000.0, position=(0.0, 0.0, 0.225)))
+    check = hg.Simulator(scene, fidelity="reduced", faces=320).rollout(steps=1).check_gap()
+    assert check["bodies"][1] is None and np.isclose(check["gap"], 0.1) and check["time"] == 0.0
+    run, panels = check["added_mass"]
+    assert np.isclose(check["added_mass_error"], run / panels - 1.0) and 0.01 < check["added_mass_error"] < 0.1
+    run, panels = check["slope"]
+    assert np.isclose(check["force_error"], run / panels - 1.0) and 0.1 < check["force_error"] < 0.6
+    assert hg.Simulator(scene, fidelity="full", faces=320).rollout(steps=1).check_gap() is None
+
+
 def test_scenes_in_files(tmp_path, sim):
     path = tmp_path / "two.toml"
     path.write_text(sim.scene.to_toml())

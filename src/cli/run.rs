@@ -13,8 +13,9 @@ use super::output::{
     ChoicesReport, Output, or_dash, peak_memory_mb, progress_bar, set_progress, write_warnings,
 };
 use crate::Result;
+use crate::error::readable;
 use crate::scene::Scene;
-use crate::simulate::{Controls, Recording};
+use crate::simulate::{Controls, GapCheck, Recording};
 
 #[derive(Debug, Args)]
 pub(super) struct Arguments {
@@ -24,6 +25,44 @@ pub(super) struct Arguments {
     /// [default: none are written].
     #[arg(long, value_name = "DIR")]
     out: Option<PathBuf>,
+    /// Compare the water across the smallest gap of the run with that of coupled panels: the error of the added mass and of the force there. Takes
+    /// their setup and a solve.
+    #[arg(long)]
+    check_gap: bool,
+}
+
+/// The smallest gap, by what ran and by coupled panels. SI units.
+#[derive(Clone, Debug, Serialize)]
+pub(super) struct GapReport {
+    pub time: f64,
+    pub gap: f64,
+    /// Names; of the second null for a wall.
+    pub bodies: (String, Option<String>),
+    /// Along the gap, by what ran and by panels, kg.
+    pub added_mass: [f64; 2],
+    /// Of the added mass, kg/m.
+    pub slope: [f64; 2],
+    /// Relative.
+    pub added_mass_error: f64,
+    /// Relative.
+    pub force_error: f64,
+    /// Of the panels.
+    pub faces: usize,
+}
+
+impl From<GapCheck> for GapReport {
+    fn from(check: GapCheck) -> Self {
+        Self {
+            added_mass_error: check.added_mass_error(),
+            force_error: check.force_error(),
+            time: check.time,
+            gap: check.gap,
+            bodies: check.bodies,
+            added_mass: check.added_mass,
+            slope: check.slope,
+            faces: check.faces,
+        }
+    }
 }
 
 /// Summary of a run. SI units.
@@ -52,6 +91,8 @@ pub(super) struct RunReport {
     pub momentum_drift: f64,
     /// Smallest gap of the whole run, m; null where there is nothing to meet.
     pub min_gap: Option<f64>,
+    /// What the smallest gap is worth, with `--check-gap`; null without, and where there is nothing to compare.
+    pub gap_check: Option<GapReport>,
     /// Largest gap at which surfaces are taken to touch, m; null where the scene has no contact.
     pub contact_gap: Option<f64>,
     /// Steps that were cut into pieces, being too long for what moved in them.
@@ -94,6 +135,10 @@ fn simulate(
     let controls = Controls::zeros(&simulator, scene.steps);
     let rollout = simulator.rollout_with(&controls, done)?;
     let seconds = start.elapsed().as_secs_f64();
+    let gap_check = match arguments.check_gap {
+        true => rollout.check_gap()?.map(GapReport::from),
+        false => None,
+    };
     let summary = rollout.summary();
     let last = &rollout.samples()[rollout.steps()];
     let report = RunReport {
@@ -112,6 +157,7 @@ fn simulate(
         energy_final: summary.energy_final,
         momentum_drift: summary.momentum_drift,
         min_gap: summary.min_gap,
+        gap_check,
         contact_gap: summary.contact_gap,
         cut_steps: summary.cut_steps,
         most_pieces: summary.most_pieces,
@@ -163,6 +209,16 @@ impl fmt::Display for RunReport {
             self.momentum_drift
         )?;
         writeln!(f, "  smallest gap   {}", or_dash(self.min_gap, "m"))?;
+        if let Some(check) = &self.gap_check {
+            writeln!(
+                f,
+                "  there, at t = {} s, against coupled panels ({} faces): added mass {:+.2} %, force {:+.2} %",
+                readable(check.time),
+                check.faces,
+                1e2 * check.added_mass_error,
+                1e2 * check.force_error
+            )?;
+        }
         if self.contact_gap.is_some() {
             writeln!(
                 f,

@@ -89,7 +89,7 @@ impl System {
     }
 
     /// The coupling with its derivatives.
-    fn differentiable(&self) -> Result<&dyn Linearise> {
+    pub(crate) fn differentiable(&self) -> Result<&dyn Linearise> {
         self.coupling
             .differentiable()
             .ok_or_else(|| Error::Unsupported {

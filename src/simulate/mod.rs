@@ -2,6 +2,7 @@
 
 mod controls;
 mod flow;
+mod gap_check;
 pub mod gradcheck;
 mod gradient;
 pub mod growth;
@@ -20,6 +21,7 @@ mod trajectory;
 
 pub use controls::Controls;
 pub use flow::FLOW_EDGES;
+pub use gap_check::GapCheck;
 pub use gradient::{Cotangents, Gradient, Initial};
 pub use jacobians::Jacobians;
 pub use knots::Knots;

@@ -277,7 +277,7 @@ impl Clearance {
         };
         Some(format!(
             "{}: the smallest gap, {:.3e} m at t = {} s, is {ratio:.2} of what their compressed sources \
-         resolve ({limit:.3e} m): forces across it may be off by several percent and more; use a \
+         resolve ({limit:.3e} m): forces across it may be off by several percent and more (`check_gap` measures by how much); use a \
          smaller resolved gap, or the fidelity full with more faces, or end the run before",
             self.place(&gap),
             gap.distance.max(0.0),

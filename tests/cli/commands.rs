@@ -314,6 +314,21 @@ fn settings_reach_the_simulator() {
 }
 
 #[test]
+fn the_smallest_gap_is_compared_with_panels() {
+    let ball = scene("falling_ball");
+    let run = ["run", &ball, "--faces", "80", "--steps", "2"];
+    assert!(json(&run)["gap_check"].is_null());
+    let checked = json(&[&run[..], &["--check-gap"]].concat());
+    let check = &checked["gap_check"];
+    assert_eq!(check["gap"], checked["min_gap"]);
+    for error in ["added_mass_error", "force_error"] {
+        assert!(check[error].as_f64().unwrap().abs() < 0.2, "{error}");
+    }
+    let plain = hydrograd(&[&run[..], &["--check-gap"]].concat());
+    assert!(text(&plain.stdout).contains("against coupled panels"));
+}
+
+#[test]
 fn added_mass_of_a_sphere() {
     let report = json(&["added-mass", "--shape", "sphere:1", "--density", "1000"]);
     numbers(

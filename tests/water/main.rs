@@ -5,6 +5,7 @@ mod auto;
 mod estimate;
 mod exact;
 mod flow;
+mod gap_check;
 mod methods;
 mod near;
 mod one_body;

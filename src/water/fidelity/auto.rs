@@ -28,15 +28,17 @@ const SHARE: f64 = 1.0 / 3.0;
 const SAFETY: f64 = 1.5;
 /// Where a pair begins to fade, of the distance where it is gone.
 const NEAR: f64 = 0.8;
-/// What is resolved, of the smallest gap at the start: bodies may come nearer.
+/// What is resolved, of the smallest gap at the start: bodies may come nearer. Where a film holds the energy ([`FILM`]), what compression leaves out
+/// weighs more.
 const ROOM: f64 = 0.6;
+const ROOM_FILM: f64 = 0.3;
 /// Bodies that start apart may come near: they resolve this many times the gap that they would without a plan.
 const COARSEST: f64 = 2.0;
 /// Gaps under this part of the finest that compression resolves are left to the fidelity `Full`, whose forces are nearer there at all gaps and
 /// shapes that were measured (docs/accuracy-coupled.md).
 const HOPELESS: f64 = 0.5;
 /// The same where the film in a gap has more than an energy (that of [`StartGap::film`]): between flat parts, and such as are nearly so.
-const HOPELESS_FILM: [(f64, f64); 2] = [(FILM, 2.0), (0.01, 1.0)];
+const HOPELESS_FILM: [(f64, f64); 2] = [(FILM, 3.0), (0.01, 1.0)];
 /// Faces with edges longer than this part of the radius of the smaller body at a gap don't see its flow.
 const COARSE: f64 = 0.5;
 /// Under this many times the finest gap bodies are compressed no worse than `Reduced` does by default.
@@ -148,7 +150,11 @@ fn plan(problem: &Problem, poses: &[Pose], gaps: &[StartGap]) -> Result<Planned>
             ));
         }
         let coarsest = COARSEST * compress::default_gap(properties.volume, mesh.surface_area());
-        let gap = (ROOM * smallest).clamp(finest, coarsest);
+        let room = match near().any(|g| g.film > FILM) {
+            true => ROOM_FILM,
+            false => ROOM,
+        };
+        let gap = (room * smallest).clamp(finest, coarsest);
         // What compression leaves out is worth more the nearer the gap, in the force above all.
         let tolerance = match smallest < CLOSE * finest {
             true => (COMPRESSION * aim).min(compress::CompressSettings::default().tolerance),

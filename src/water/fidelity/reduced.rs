@@ -139,8 +139,8 @@ fn warnings(problem: &Problem, made: &[Arc<ReducedBody>]) -> Vec<String> {
         if let Some(asked) = problem.chosen(b).resolved_gap.filter(|a| *a < 0.98 * got) {
             out.push(format!(
                 "body {:?}: gaps under {got:.3e} m aren't resolved by its compressed sources, for all \
-                 that {asked:.3e} m were asked for: its surface is too large; `refine` it where gaps close, use a \
-                 plane wall for a floor, or the fidelity full",
+                 that {asked:.3e} m were asked for: compression spreads no more points than that needs over a whole body; `refine` it where gaps \
+                 close, or use the fidelity full",
                 body.name
             ));
         }

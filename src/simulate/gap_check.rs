@@ -1,0 +1,141 @@
+//! What a trajectory's smallest gap is worth: the added mass across it and its slope, beside those of coupled panels.
+
+use super::{Fidelity, Method, Rollout, Simulator};
+use crate::Result;
+use crate::adjoint::lie::{Pose, Vec3, Vec6};
+use crate::geometry::{Gap, Other};
+use nalgebra::{DMatrix, DVector};
+
+/// Step of the differences that give a gap's direction, of the length of the edges there.
+const STEP: f64 = 1e-5;
+
+/// A rollout's smallest gap, by the fidelity that ran and by coupled panels ([`Rollout::check_gap`]).
+#[derive(Clone, Debug, PartialEq)]
+pub struct GapCheck {
+    /// When, s.
+    pub time: f64,
+    /// The smallest gap, m.
+    pub gap: f64,
+    /// Names of the bodies; of the second none for a wall. The first is the smaller one.
+    pub bodies: (String, Option<String>),
+    /// Added mass M of the first body, all others at rest, along the direction in which the gap opens: by the run, and by panels, kg.
+    pub added_mass: [f64; 2],
+    /// Its slope, by the run and by panels, kg/m: at a speed u across the gap the water's force is half of it times u².
+    pub slope: [f64; 2],
+    /// Faces of the panels.
+    pub faces: usize,
+}
+
+impl GapCheck {
+    /// Error of the added mass, relative to that of panels.
+    pub fn added_mass_error(&self) -> f64 {
+        self.added_mass[0] / self.added_mass[1] - 1.0
+    }
+
+    /// Error of the slope, and so of the force.
+    pub fn force_error(&self) -> f64 {
+        self.slope[0] / self.slope[1] - 1.0
+    }
+}
+
+impl Rollout {
+    /// Compares the water across the smallest gap of the trajectory with that of coupled panels (`full`, method `panel`, the scene's own faces),
+    /// which takes their setup and a solve. None where there is no gap, no water, and where the rollout is by coupled panels already.
+    ///
+    /// # Errors
+    /// Whatever coupled panels report: bodies that touch, and bodies whose added mass is given without a shape.
+    pub fn check_gap(&self) -> Result<Option<GapCheck>> {
+        let simulator = self.simulator();
+        let mut choices = simulator.choices().clone();
+        let by_panels = choices.water.method.together(choices.water.backend) == Method::Panel;
+        let Some((at, gap)) = self.narrowest() else {
+            return Ok(None);
+        };
+        let density = simulator.parameters().density();
+        if simulator.fidelity() == Fidelity::Full && by_panels || density == 0.0 {
+            return Ok(None);
+        }
+        let sample = &self.samples()[at];
+        let Some(across) = Across::new(simulator, &sample.poses, &gap) else {
+            return Ok(None);
+        };
+        choices.water.fidelity = Fidelity::Full;
+        choices.water.method = Method::Panel;
+        choices.water.backend = super::Backend::Cpu;
+        let panels = Simulator::with_choices(&simulator.scene, choices, None)?;
+        let name = |b: usize| simulator.system().bodies[b].name.clone();
+        let (by_run, by_panels) = (across.of(simulator)?, across.of(&panels)?);
+        Ok(Some(GapCheck {
+            time: sample.time,
+            gap: gap.distance,
+            bodies: (name(across.body), across.other.map(name)),
+            added_mass: [by_run.0, by_panels.0].map(|m| density * m),
+            slope: [by_run.1, by_panels.1].map(|m| density * m),
+            faces: panels.faces(),
+        }))
+    }
+
+    /// Number of the state with the smallest gap.
+    fn narrowest(&self) -> Option<(usize, Gap)> {
+        let gaps = self.gaps().iter().enumerate();
+        let found = gaps.filter_map(|(n, gap)| Some((n, (*gap)?)));
+        found.min_by(|(_, a), (_, b)| a.distance.total_cmp(&b.distance))
+    }
+}
+
+/// A displacement that opens a gap.
+struct Across<'a> {
+    poses: &'a [Pose],
+    body: usize,
+    other: Option<usize>,
+    /// Unit vector along which the body moves.
+    direction: Vec3,
+}
+
+impl<'a> Across<'a> {
+    /// None where no motion changes the gap.
+    fn new(simulator: &Simulator, poses: &'a [Pose], gap: &Gap) -> Option<Self> {
+        let volume = |b: usize| simulator.system().bodies[b].volume;
+        let (body, other) = match gap.second {
+            Other::Body(b) if volume(b) < volume(gap.first) => (b, Some(gap.first)),
+            Other::Body(b) => (gap.first, Some(b)),
+            Other::Wall(_) => (gap.first, None),
+        };
+        let step = STEP * gap.edge;
+        let distance = |shift: Vec3| {
+            let mut moved = poses.to_vec();
+            moved[body].translation += shift;
+            let all = simulator.gaps().all(&moved);
+            let same = all
+                .iter()
+                .find(|g| (g.first, g.second) == (gap.first, gap.second));
+            same.map_or(0.0, |g| g.distance)
+        };
+        let slope = |axis: usize| {
+            let shift = Vec3::ith(axis, step);
+            distance(shift) - distance(-shift)
+        };
+        Some(Self {
+            poses,
+            body,
+            other,
+            direction: Vec3::from_fn(|axis, _| slope(axis)).try_normalize(0.0)?,
+        })
+    }
+
+    /// Added mass of the body along it and its slope, density 1: m³, m².
+    fn of(&self, simulator: &Simulator) -> Result<(f64, f64)> {
+        let system = simulator.system();
+        let in_water: Vec<usize> = system.submerged().map(|(b, _)| b).collect();
+        let poses: Vec<Pose> = in_water.iter().map(|b| self.poses[*b]).collect();
+        let own = in_water.iter().position(|b| *b == self.body).unwrap_or(0);
+        let mut twist = DMatrix::zeros(6 * poses.len(), 1);
+        let along = self.poses[self.body].rotation.tr_mul(&self.direction);
+        twist.fixed_view_mut::<3, 1>(6 * own, 0).copy_from(&along);
+        let found = system.differentiable()?.linearise(&poses, &twist)?;
+        let one = DVector::from_element(1, 1.0);
+        let wrench: Vec6 = found.gradient(&one, &one)?[own];
+        let slope = wrench.fixed_rows::<3>(0).dot(&self.direction);
+        Ok((twist.dot(found.momenta()), slope))
+    }
+}

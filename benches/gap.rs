@@ -123,7 +123,7 @@ fn configurations() -> [(&'static str, Settings); 4] {
     let full = of(Fidelity::Full);
     [
         ("panels", panels(FACES)),
-        ("fundamental solutions", full.method(Method::MfsFace)),
+        ("fundamental solutions", full.method(Method::MfsVertex)),
         ("reduced", of(Fidelity::Reduced)),
         ("auto", of(Fidelity::Auto)),
     ]

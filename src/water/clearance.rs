@@ -14,10 +14,10 @@ use std::f64::consts::PI;
 
 /// Largest part of a body's volume that may lie inside a larger one that it is declared to overlap.
 const MOST_SHARED: f64 = 0.5;
-/// Part of the edges under which sources inside the bodies don't resolve a gap at all.
-const BY_SOURCES: f64 = 0.5;
+/// Edges under which sources inside the bodies don't resolve a flat gap at all: the force between boxes has the wrong sign there.
+const BY_SOURCES: f64 = 1.25;
 /// A gap is thin where it is less than this part of the radius of a disc with the area over which the surfaces are parallel.
-const THIN: f64 = 0.15;
+const THIN: f64 = 0.2;
 
 /// The gaps of a scene's bodies, from their surfaces in body frames: those of shapes by formula exact, others of meshes.
 #[derive(Clone)]
@@ -139,7 +139,7 @@ impl Clearance {
                     value: gap.distance,
                     limit: BY_SOURCES * gap.edge,
                     remedy: format!(
-                        "over {area:.3e} m² the water between them is a film, which fundamental solutions don't resolve under half an edge: \
+                        "over {area:.3e} m² the water between them is a film, which fundamental solutions don't resolve under 1¼ edges: \
                          use the method panel, or more faces, or end the run before"
                     ),
                 });

@@ -56,9 +56,11 @@ fn the_smallest_gap_is_checked_against_panels() {
     }
     assert!((0.01..0.1).contains(&check.added_mass_error()));
     assert!((0.1..0.6).contains(&check.force_error()));
-    // Sources are off by more at half a radius; nothing to compare where panels ran, and where there is no water.
+    // Sources lose a part of the force at half a radius; nothing to compare where panels ran, and where there is no water.
     let sources = settings(Fidelity::Full).method(Method::MfsVertex);
-    assert!(checked(&scene(0.5), &sources).unwrap().added_mass_error() < -0.2);
+    let lost = checked(&scene(0.5), &sources).unwrap();
+    println!("{lost:?}");
+    assert!(lost.force_error() < -0.1);
     assert_eq!(checked(&scene(gap), &settings(Fidelity::Full)), None);
     let mut dry = scene(gap);
     dry.fluid.density = 0.0;

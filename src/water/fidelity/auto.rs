@@ -38,7 +38,7 @@ const COARSEST: f64 = 2.0;
 /// shapes that were measured (docs/accuracy-coupled.md).
 const HOPELESS: f64 = 0.5;
 /// The same where the film in a gap has more than an energy (that of [`StartGap::film`]): between flat parts, and such as are nearly so.
-const HOPELESS_FILM: [(f64, f64); 2] = [(FILM, 3.0), (0.01, 1.0)];
+const HOPELESS_FILM: [(f64, f64); 2] = [(FILM, 2.0), (0.01, 1.0)];
 /// Faces with edges longer than this part of the radius of the smaller body at a gap don't see its flow.
 const COARSE: f64 = 0.5;
 /// Under this many times the finest gap bodies are compressed no worse than `Reduced` does by default.

@@ -31,23 +31,15 @@ pub(super) struct Arguments {
     check_gap: bool,
 }
 
-/// The smallest gap, by what ran and by coupled panels. SI units.
+/// The smallest gap, by what ran and by coupled panels.
 #[derive(Clone, Debug, Serialize)]
 pub(super) struct GapReport {
-    pub time: f64,
-    pub gap: f64,
-    /// Names; of the second null for a wall.
-    pub bodies: (String, Option<String>),
-    /// Along the gap, by what ran and by panels, kg.
-    pub added_mass: [f64; 2],
-    /// Of the added mass, kg/m.
-    pub slope: [f64; 2],
+    #[serde(flatten)]
+    pub check: GapCheck,
     /// Relative.
     pub added_mass_error: f64,
     /// Relative.
     pub force_error: f64,
-    /// Of the panels.
-    pub faces: usize,
 }
 
 impl From<GapCheck> for GapReport {
@@ -55,12 +47,7 @@ impl From<GapCheck> for GapReport {
         Self {
             added_mass_error: check.added_mass_error(),
             force_error: check.force_error(),
-            time: check.time,
-            gap: check.gap,
-            bodies: check.bodies,
-            added_mass: check.added_mass,
-            slope: check.slope,
-            faces: check.faces,
+            check,
         }
     }
 }
@@ -209,14 +196,14 @@ impl fmt::Display for RunReport {
             self.momentum_drift
         )?;
         writeln!(f, "  smallest gap   {}", or_dash(self.min_gap, "m"))?;
-        if let Some(check) = &self.gap_check {
+        if let Some(gap) = &self.gap_check {
             writeln!(
                 f,
                 "  there, at t = {} s, against coupled panels ({} faces): added mass {:+.2} %, force {:+.2} %",
-                readable(check.time),
-                check.faces,
-                1e2 * check.added_mass_error,
-                1e2 * check.force_error
+                readable(gap.check.time),
+                gap.check.faces,
+                1e2 * gap.added_mass_error,
+                1e2 * gap.force_error
             )?;
         }
         if self.contact_gap.is_some() {

@@ -5,12 +5,13 @@ use crate::Result;
 use crate::adjoint::lie::{Pose, Vec3, Vec6};
 use crate::geometry::{Gap, Other};
 use nalgebra::{DMatrix, DVector};
+use serde::Serialize;
 
 /// Step of the differences that give a gap's direction, of the length of the edges there.
 const STEP: f64 = 1e-5;
 
 /// A rollout's smallest gap, by the fidelity that ran and by coupled panels ([`Rollout::check_gap`]).
-#[derive(Clone, Debug, PartialEq)]
+#[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct GapCheck {
     /// When, s.
     pub time: f64,
@@ -48,7 +49,7 @@ impl Rollout {
         let simulator = self.simulator();
         let mut choices = simulator.choices().clone();
         let by_panels = choices.water.method.together(choices.water.backend) == Method::Panel;
-        let Some((at, gap)) = self.narrowest() else {
+        let Some((at, gap)) = self.nearest() else {
             return Ok(None);
         };
         let density = simulator.parameters().density();
@@ -73,13 +74,6 @@ impl Rollout {
             slope: [by_run.1, by_panels.1].map(|m| density * m),
             faces: panels.faces(),
         }))
-    }
-
-    /// Number of the state with the smallest gap.
-    fn narrowest(&self) -> Option<(usize, Gap)> {
-        let gaps = self.gaps().iter().enumerate();
-        let found = gaps.filter_map(|(n, gap)| Some((n, (*gap)?)));
-        found.min_by(|(_, a), (_, b)| a.distance.total_cmp(&b.distance))
     }
 }
 

@@ -204,11 +204,11 @@ impl Rollout {
         self.simulator.stepper().contact_forces(record, slack)
     }
 
-    /// Time and size of the smallest gap of the whole trajectory.
-    fn nearest(&self) -> Option<(f64, Gap)> {
-        let times = self.samples().iter().map(|s| s.time);
-        let gaps = times.zip(self.gaps()).filter_map(|(t, g)| Some((t, (*g)?)));
-        gaps.min_by(|(_, a), (_, b)| a.distance.total_cmp(&b.distance))
+    /// Number of the state with the smallest gap of the whole trajectory, and that gap.
+    pub(super) fn nearest(&self) -> Option<(usize, Gap)> {
+        let gaps = self.gaps().iter().enumerate();
+        let found = gaps.filter_map(|(n, gap)| Some((n, (*gap)?)));
+        found.min_by(|(_, a), (_, b)| a.distance.total_cmp(&b.distance))
     }
 
     /// What the user should know about this trajectory, with names and numbers: gaps that the
@@ -216,7 +216,8 @@ impl Rollout {
     pub fn warnings(&self) -> Vec<String> {
         let samples = self.samples().iter();
         let states = samples.filter_map(|s| Some((s.time, s.poses.as_slice(), s.gap?)));
-        let warning = self.simulator.gap_warning(self.nearest(), states);
+        let smallest = self.nearest().map(|(n, gap)| (self.samples()[n].time, gap));
+        let warning = self.simulator.gap_warning(smallest, states);
         let all = warning.into_iter().chain(self.energy_warning());
         all.chain(self.passing_warning()).collect()
     }

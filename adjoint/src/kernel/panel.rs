@@ -13,6 +13,7 @@
 //! gradient and Hessian here are those of K, not blends of theirs.
 
 use super::lane::{Lane, V3, dot, scale, scale_add, sub};
+use super::sum::length;
 use crate::lie::Vec3;
 
 /// Distances from the centroid, in circumscribed radii: below the closed form alone,
@@ -81,8 +82,14 @@ impl Panel {
     /// The corners from `s` with their distances.
     #[inline(always)]
     pub fn seen<T: Lane>(&self, s: V3<T>) -> ([V3<T>; 3], V3<T>) {
-        let r = self.corners.each_ref().map(|v| sub(constant(s[0], v), s));
-        (r, r.map(|r| dot(r, r).sqrt()))
+        // One by one: closures aren't compiled for the vectors' instructions.
+        let [a, b, c] = &self.corners;
+        let r = [
+            sub(constant(s[0], a), s),
+            sub(constant(s[0], b), s),
+            sub(constant(s[0], c), s),
+        ];
+        (r, [length(r[0]), length(r[1]), length(r[2])])
     }
 
     /// Charge of the single layer.
@@ -105,7 +112,8 @@ impl Panel {
 
     #[inline(always)]
     fn multipoles<T: Lane>(&self, r: V3<T>, squared: T) -> Multipoles<T> {
-        let [p, q] = self.spread.each_ref().map(|v| constant(squared, v));
+        let [p, q] = &self.spread;
+        let (p, q) = (constant(squared, p), constant(squared, q));
         let (along_p, along_q) = (dot(p, r), dot(q, r));
         let u = squared.like(1.0) / squared;
         Multipoles {

@@ -10,24 +10,20 @@ impl PlacedPanels<'_> {
     /// ∇_g E of all pairs of columns.
     pub fn gradient(&self, solution: &PanelSolution) -> PairTensor {
         let mut out = PairTensor::zeros(self.coupled.bodies.len(), solution.twists.ncols());
-        for pair in &self.pairs {
-            out.add_pair(
-                pair,
-                &self.poses[pair.target],
-                &self.pair_tensor(pair, solution),
-            );
+        for (pair, fields) in self.pairs.iter().zip(solution.fields()) {
+            let tensor = self.pair_tensor(pair, fields, solution);
+            out.add_pair(pair, &self.poses[pair.target], &tensor);
         }
         out
     }
 
     /// Σ_i arm_i ∇(S q_x − Ω/4π φ_x) μ_y, rows 6·x + component, columns y, in the frame of the panels.
-    fn pair_tensor(&self, pair: &Pair, solution: &PanelSolution) -> Columns {
+    fn pair_tensor(&self, pair: &Pair, fields: &[f64], solution: &PanelSolution) -> Columns {
         let k = solution.twists.ncols();
-        let fields = self.fields(pair, solution);
         let mut arms = Vec::with_capacity(pair.positions.len() * 6 * k);
         for (i, s) in pair.positions.iter().enumerate() {
             for x in 0..k {
-                arms.extend_from_slice(point_wrench(s, &vector(&fields, k, i, x)).as_slice());
+                arms.extend_from_slice(point_wrench(s, &vector(fields, k, i, x)).as_slice());
             }
         }
         let mu = solution.mu.part(&self.coupled.faces[pair.source]);

@@ -11,7 +11,7 @@ use crate::solver::{Columns, Outcome};
 use crate::{Error, Result};
 use nalgebra::{DMatrix, DVector};
 use std::ops::Range;
-use std::sync::Arc;
+use std::sync::{Arc, OnceLock};
 
 /// The system at given poses.
 pub(super) struct PlacedPanels<'a> {
@@ -33,6 +33,8 @@ pub(super) struct PanelSolution<'a> {
     /// Adjoint densities μ.
     pub mu: Columns,
     reached: Reached,
+    /// Of all pairs: ∇(S q − Ω/4π φ), once asked for.
+    fields: OnceLock<Vec<Vec<f64>>>,
 }
 
 impl<'a> PlacedPanels<'a> {
@@ -136,7 +138,7 @@ impl<'a> PlacedPanels<'a> {
 
     /// ∇(S q − Ω/4π φ) of a pair's panels at its points, `[point][column][3]`, image's sign included: minus the velocity that they
     /// make there.
-    pub fn fields(&self, pair: &Pair, solution: &PanelSolution) -> Vec<f64> {
+    fn fields(&self, pair: &Pair, solution: &PanelSolution) -> Vec<f64> {
         let k = solution.twists.ncols();
         let sign = pair.image.sign;
         let triangles = self.coupled.bodies[pair.target].panels().triangles();
@@ -179,6 +181,15 @@ impl<'a> PanelSolution<'a> {
             phi: phi.x,
             mu: mu.x,
             reached: from_mu.worst(from_phi),
+            fields: OnceLock::new(),
+        })
+    }
+
+    /// Of every pair: ∇(S q − Ω/4π φ) of its panels at its points, `[point][column][3]`.
+    pub fn fields(&self) -> &[Vec<f64>] {
+        self.fields.get_or_init(|| {
+            let pairs = self.placed.pairs.iter();
+            pairs.map(|pair| self.placed.fields(pair, self)).collect()
         })
     }
 
@@ -186,12 +197,25 @@ impl<'a> PanelSolution<'a> {
     fn combine(&self, coefficients: &DVector<f64>) -> Self {
         let c = coefficients.as_slice();
         let combined = |x: &Columns| Columns::from_columns(&[&x.combine(c)]);
+        let fields = OnceLock::new();
+        if let Some(found) = self.fields.get() {
+            let of_pair = |field: &Vec<f64>| {
+                let sum =
+                    |at: &[f64], i| c.iter().enumerate().map(|(k, c)| c * at[3 * k + i]).sum();
+                let points = field.chunks_exact(3 * c.len());
+                points
+                    .flat_map(|at| [0, 1, 2].map(|i| sum(at, i)))
+                    .collect()
+            };
+            fields.get_or_init(|| found.iter().map(of_pair).collect());
+        }
         Self {
             placed: self.placed.clone(),
             twists: response::combined(&self.twists, coefficients),
             phi: combined(&self.phi),
             mu: combined(&self.mu),
             reached: self.reached,
+            fields,
         }
     }
 
@@ -202,12 +226,26 @@ impl<'a> PanelSolution<'a> {
             Columns::from_columns(&columns)
         };
         let reached = parts.iter().map(|p| p.reached);
+        // Fields of new columns are then made alone, those of combinations are known.
+        let fields = OnceLock::new();
+        if parts.iter().any(|p| p.fields.get().is_some()) {
+            fields.get_or_init(|| {
+                let columns: Vec<&[Vec<f64>]> = parts.iter().map(Self::fields).collect();
+                let of_pair = |(n, pair): (usize, &Pair)| {
+                    let points = (0..pair.positions.len()).map(|i| 3 * i..3 * i + 3);
+                    let rows = points.flat_map(|at| columns.iter().map(move |c| &c[n][at.clone()]));
+                    rows.flatten().copied().collect()
+                };
+                self.placed.pairs.iter().enumerate().map(of_pair).collect()
+            });
+        }
         Self {
             placed: self.placed.clone(),
             twists: response::beside(parts.iter().map(|p| &p.twists)),
             phi: all(|p| &p.phi),
             mu: all(|p| &p.mu),
             reached: reached.fold(Reached::default(), Reached::worst),
+            fields,
         }
     }
 }

@@ -10,13 +10,6 @@ use crate::coupling::response::symmetrised;
 use crate::solver::Columns;
 use nalgebra::DVector;
 
-/// What the first pass over a pair leaves to the second.
-struct PairFields {
-    displacement: Vec<Vec3>,
-    /// ∇(S q − Ω/4π φ) at the points, `[point][column][3]`.
-    fields: Vec<f64>,
-}
-
 /// Tangents of φ and μ.
 struct Moved {
     phi: Columns,
@@ -36,19 +29,22 @@ impl PlacedPanels<'_> {
         let mut transposed = Columns::zeros(self.coupled.rows(), n);
         // δSᵀ μ
         let mut back = Columns::zeros(self.coupled.rows(), n);
-        let mut first = Vec::with_capacity(self.pairs.len());
-        for pair in &self.pairs {
-            let displacement = pair.displacements(&self.poses[pair.target], z);
-            let fields = self.fields(pair, solution);
+        let displacement = |pair: &Pair| pair.displacements(&self.poses[pair.target], z);
+        let displacements: Vec<Vec<Vec3>> = self.pairs.iter().map(displacement).collect();
+        let pairs = || {
+            let given = solution.fields().iter().zip(&displacements);
+            self.pairs.iter().zip(given)
+        };
+        for (pair, (fields, displacement)) in pairs() {
             let (panels, points) = self.ranges(pair);
             for (i, d) in displacement.iter().enumerate() {
                 for k in 0..n {
-                    let rate = d.dot(&vector(&fields, n, i, k));
+                    let rate = d.dot(&vector(fields, n, i, k));
                     right.data[(points.start + i) * n + k] += rate;
                 }
             }
             let triangles = self.coupled.bodies[pair.target].panels().triangles();
-            let (s, d, sign) = (&pair.points, &displacement, pair.image.sign);
+            let (s, d, sign) = (&pair.points, displacement, pair.image.sign);
             let mu = solution.mu.slice(&points);
             let out = transposed.slice_mut(&panels);
             double_jvp(triangles, s, d, &scaled(-sign, mu), n, out);
@@ -56,10 +52,6 @@ impl PlacedPanels<'_> {
                 let out = back.slice_mut(&panels);
                 single_jvp(triangles, s, d, &scaled(sign, mu), n, out);
             }
-            first.push(PairFields {
-                displacement,
-                fields,
-            });
         }
         let moved = Moved {
             phi: self.system.solve(&right, false)?.x,
@@ -82,8 +74,8 @@ impl PlacedPanels<'_> {
         };
         let mut gradient = vec![Vec6::zeros(); bodies];
         let mut wrench = vec![Vec6::zeros(); bodies];
-        for (pair, first) in self.pairs.iter().zip(&first) {
-            let (w, dw) = self.pair_tangent(pair, first, solution, &moved);
+        for (pair, given) in pairs() {
+            let (w, dw) = self.pair_tangent(pair, given, solution, &moved);
             let pose = &self.poses[pair.target];
             pair.apply(pose, &w, &mut gradient);
             pair.apply_jvp(pose, &w, &dw, &z[pair.target], &mut wrench);
@@ -96,20 +88,19 @@ impl PlacedPanels<'_> {
         })
     }
 
-    /// Wrench on the points of a pair and its tangent, in the frame of the panels.
+    /// Wrench on the points of a pair and its tangent, in the frame of the panels, from the fields and displacements there.
     fn pair_tangent(
         &self,
         pair: &Pair,
-        first: &PairFields,
+        (fields, d): (&Vec<f64>, &Vec<Vec3>),
         solution: &PanelSolution,
         moved: &Moved,
     ) -> (Vec6, Vec6) {
         let n = solution.twists.ncols();
         let (panels, points) = self.ranges(pair);
         let triangles = self.coupled.bodies[pair.target].panels().triangles();
-        let d = &first.displacement;
         let sign = pair.image.sign;
-        let mut dfields = vec![0.0; first.fields.len()];
+        let mut dfields = vec![0.0; fields.len()];
         if let Some(q) = self.normal_velocity(pair.target, &solution.twists) {
             let q = scaled(sign, &q);
             single_hvp(triangles, &pair.points, d, &q, n, &mut dfields);
@@ -123,7 +114,7 @@ impl PlacedPanels<'_> {
             let (mut f, mut df) = (Vec3::zeros(), Vec3::zeros());
             let at = points.start + i;
             for &(x, y, weight) in symmetrised(n) {
-                let (field, dfield) = (vector(&first.fields, n, i, y), vector(&dfields, n, i, y));
+                let (field, dfield) = (vector(fields, n, i, y), vector(&dfields, n, i, y));
                 f += weight * solution.mu.at(at, x) * field;
                 df += weight * (moved.mu.at(at, x) * field + solution.mu.at(at, x) * dfield);
             }

@@ -78,6 +78,21 @@ impl Lu {
         solve::solve_in_place(lu, lu, rows, x, Par::Seq, stack);
     }
 
+    /// A⁻¹, column-major.
+    pub fn inverse(&self) -> Vec<f64> {
+        let n = self.size;
+        let mut out = vec![0.0; n * n];
+        let groups = out.par_chunks_mut((BLOCK * n).max(1)).enumerate();
+        groups.for_each(|(group, columns)| {
+            for (k, column) in columns.chunks_exact_mut(n).enumerate() {
+                column[group * BLOCK + k] = 1.0;
+            }
+            let count = columns.len() / n;
+            self.solve(MatMut::from_column_major_slice_mut(columns, n, count));
+        });
+        out
+    }
+
     /// `x ← A⁻ᵀ x`.
     pub fn solve_transpose(&self, x: MatMut<'_, f64>) {
         CALLS.add(1);
@@ -171,6 +186,16 @@ mod tests {
             for (i, x) in x.data.iter().enumerate() {
                 assert!((y.data[i] - x).abs() < 1e-13 * lu.condition(), "{n}");
                 assert!((z.data[i] - x).abs() < 1e-13 * lu.condition(), "{n}");
+            }
+            // By rows these are those of the transposes.
+            let identity = product(
+                &lu.inverse(),
+                n,
+                &Columns::from_fn(n, n, |i, j| a[i * n + j]),
+            );
+            for (i, x) in identity.data.iter().enumerate() {
+                let one = f64::from(i / n == i % n);
+                assert!((x - one).abs() < 1e-13 * lu.condition(), "{n}");
             }
         }
     }

@@ -13,6 +13,8 @@ const TILE: usize = 16;
 const QUAD: usize = 4;
 /// Most columns in registers at once.
 const MOST: usize = 6;
+/// Vectors of Kᵀ y that share what they load of y.
+const PAIR: usize = 2;
 /// Partial results that are added one by one; fixes the order of the sum.
 const GROUPS: usize = 8;
 
@@ -136,20 +138,40 @@ fn updates<S: Simd, const N: usize>(
     let (whole, rest) = S::as_simd_f64s(&rows[..stride]);
     let vectors = whole.len();
     let lanes = (stride - rest.len()).checked_div(vectors).unwrap_or(1);
-    for j in 0..vectors {
-        let at = j * lanes;
-        let mut sum: [S::f64s; N] =
-            std::array::from_fn(|c| S::as_simd_f64s(&out[c][at..at + lanes]).0[0]);
-        for r in 0..count {
-            let k = S::as_simd_f64s(&rows[r * stride + at..r * stride + at + lanes]).0[0];
+    macro_rules! add {
+        ($from:expr, $vectors:expr) => {
+            let at = $from * lanes;
+            let size = $vectors * lanes;
+            let mut sum = [[simd.splat_f64s(0.0); $vectors]; N];
             for c in 0..N {
-                let m = simd.splat_f64s(middle[r * columns + first + c]);
-                sum[c] = simd.mul_add_e_f64s(k, m, sum[c]);
+                let out = S::as_simd_f64s(&out[c][at..at + size]).0;
+                for v in 0..$vectors {
+                    sum[c][v] = out[v];
+                }
             }
-        }
-        for c in 0..N {
-            S::as_mut_simd_f64s(&mut out[c][at..at + lanes]).0[0] = sum[c];
-        }
+            for r in 0..count {
+                let k = S::as_simd_f64s(&rows[r * stride + at..r * stride + at + size]).0;
+                for c in 0..N {
+                    let m = simd.splat_f64s(middle[r * columns + first + c]);
+                    for v in 0..$vectors {
+                        sum[c][v] = simd.mul_add_e_f64s(k[v], m, sum[c][v]);
+                    }
+                }
+            }
+            for c in 0..N {
+                let out = S::as_mut_simd_f64s(&mut out[c][at..at + size]).0;
+                for v in 0..$vectors {
+                    out[v] = sum[c][v];
+                }
+            }
+        };
+    }
+    let pairs = vectors / PAIR * PAIR;
+    for j in (0..pairs).step_by(PAIR) {
+        add!(j, PAIR);
+    }
+    for j in pairs..vectors {
+        add!(j, 1);
     }
     for j in vectors * lanes..stride {
         for r in 0..count {

@@ -27,11 +27,12 @@ use super::{Response, asymmetry, potentials};
 use crate::adjoint::kernel::Write;
 use crate::adjoint::lie::{Mat6, Vec3, Vec6};
 use crate::geometry::{Faces, TriMesh};
-use crate::solver::Lu;
+use crate::solver::{Columns, Lu, product, transposed_product};
 use crate::{Error, Result};
 use faer::{Mat, MatRef};
 pub(crate) use layers::Panels;
 pub use richardson::{Extrapolated, Richardson, richardson};
+use std::sync::OnceLock;
 
 /// Most faces of one system: its matrix takes 8·faces² bytes, 3.2 GB here.
 pub const MOST_FACES: usize = 20_000;
@@ -60,6 +61,8 @@ pub struct PanelBoundary {
     sharp_edges: f64,
     panels: Panels,
     lu: Lu,
+    /// Inverse of ½I + Ω/4π, column-major: made when a coupled system first asks for it.
+    inverse: OnceLock<Vec<f64>>,
     /// q, normal velocity of each panel per unit twist, panels × 6.
     normal_velocity: Mat<f64>,
     /// φ, potential of each panel per unit twist, panels × 6.
@@ -132,6 +135,7 @@ impl PanelBoundary {
             sharp_edges: mesh.sharp_edge_length(SHARP),
             panels,
             lu,
+            inverse: OnceLock::new(),
             normal_velocity,
             potential,
             single_layer,
@@ -154,9 +158,14 @@ impl PanelBoundary {
         &self.single_layer
     }
 
-    /// Factors of ½I + Ω/4π.
-    pub(crate) fn lu(&self) -> &Lu {
-        &self.lu
+    /// `(½I + Ω/4π)⁻¹ x`, or its transpose. By the inverse, as a product runs on all threads and triangular solves don't.
+    pub(crate) fn solve(&self, x: &Columns, transpose: bool) -> Columns {
+        let inverse = self.inverse.get_or_init(|| self.lu.inverse());
+        // The memory of a matrix by columns is that of its transpose by rows.
+        match transpose {
+            false => transposed_product(inverse, x.rows, x),
+            true => product(inverse, x.rows, x),
+        }
     }
 }
 

@@ -17,8 +17,8 @@
 //! so no derivative changes, and what is left is the error of the coupling alone.
 //!
 //! E is symmetrised, and its derivatives are exactly those of the symmetrised E. They cost no further solve on the basis; the tangent
-//! takes two, `A δφ = δS q − δA φ` and `Aᵀ δμ = −δAᵀ μ`. A body's own block of A doesn't change with the poses: its factors, made
-//! once, precondition the iteration. All other entries depend on the position of a panel's centroid in the frame of another
+//! takes two, `A δφ = δS q − δA φ` and `Aᵀ δμ = −δAᵀ μ`. A body's own block of A doesn't change with the poses: its inverse, made
+//! once, and the blocks by which bodies act on later ones precondition the iteration (block Gauss–Seidel). All other entries depend on the position of a panel's centroid in the frame of another
 //! body alone; seen from afar they are multipoles ([`double`](mod@crate::adjoint::kernel::double)). Bodies and images that come closer than about half an edge length lose accuracy.
 
 mod extrapolated;
@@ -41,7 +41,7 @@ use crate::{Error, Result};
 use nalgebra::{DMatrix, DVector};
 use placed::{PanelSolution, PlacedPanels};
 use std::ops::Range;
-use std::sync::Arc;
+use std::sync::{Arc, Mutex};
 
 /// All bodies coupled through one panel system, and plane walls by images.
 pub struct PanelCoupled {
@@ -53,12 +53,14 @@ pub struct PanelCoupled {
     excluded: Exclusions,
     /// What each body's own panels lack of its added mass, body frame.
     lacking: Vec<Mat6>,
+    /// Memory of blocks that no system uses any more: to ask the operating system for it again takes as long as filling it.
+    spare: Mutex<Vec<Vec<f64>>>,
 }
 
 impl PanelCoupled {
     /// From the bodies, the walls (one, or mutually perpendicular ones), the pairs of bodies that don't feel
     /// each other, and the solver's settings. [`FullSolver::Qr`](super::full::FullSolver::Qr) factors the whole matrix by LU (8·faces²
-    /// bytes, and faces³ operations); the others stand for GMRES, preconditioned by each body's own factors,
+    /// bytes, and faces³ operations); the others stand for GMRES, preconditioned by each body's own inverse,
     /// which stores the blocks between different bodies and those with images.
     ///
     /// # Errors
@@ -82,6 +84,7 @@ impl PanelCoupled {
             settings,
             faces,
             excluded,
+            spare: Mutex::new(Vec::new()),
         })
     }
 

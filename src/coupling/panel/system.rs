@@ -16,6 +16,8 @@ const RESTART: usize = 100;
 /// Share of the full solid angle that a body may fill, seen from a panel of another: 0 outside, ½ on
 /// its surface, 1 inside.
 const INSIDE: f64 = 0.25;
+/// Panels whose solid angles are added up by one task.
+const GROUP: usize = 128;
 
 /// Layers of one body at the panels of another, or of its images at its own.
 struct Block {
@@ -42,6 +44,16 @@ enum Matrix {
     /// All but each body's own block, which is known by its factors.
     Blocks(Vec<Block>),
     Factored(Lu),
+}
+
+impl Drop for System<'_> {
+    fn drop(&mut self) {
+        if let (Matrix::Blocks(blocks), Ok(mut spare)) =
+            (&mut self.matrix, self.coupled.spare.lock())
+        {
+            spare.extend(blocks.drain(..).map(|block| block.data));
+        }
+    }
 }
 
 impl<'a> System<'a> {
@@ -85,57 +97,48 @@ impl<'a> System<'a> {
             }
             Matrix::Blocks(blocks) => blocks,
         };
-        // With A = D + O, D the bodies' own blocks: (I + O D⁻¹) y = b, x = D⁻¹ y.
         let outcome = gmres(
-            |y| {
-                let (mut out, mut x) = (y.clone(), y.clone());
-                self.own_solve(&mut x, transpose);
-                self.add_blocks(blocks, &x, transpose, &mut out);
-                out
-            },
-            |_| (),
+            |v| self.sweep(blocks, v, transpose),
             b,
             settings.tolerance,
             settings.max_iterations,
             RESTART,
         );
         let what = || format!("the coupled panel system ({rows} panels)");
-        let mut outcome = converged(outcome, settings.tolerance, what, "solver lu")?;
-        self.own_solve(&mut outcome.x, transpose);
-        Ok(outcome)
+        converged(outcome, settings.tolerance, what, "solver lu")
     }
 
-    /// `x ← D⁻¹ x`, or its transpose.
-    fn own_solve(&self, x: &mut Columns, transpose: bool) {
-        let columns = x.columns;
-        let mut parts = Vec::new();
-        let mut rest = &mut x.data[..];
-        for (body, range) in self.coupled.bodies.iter().zip(&self.coupled.faces) {
-            let (part, other) = rest.split_at_mut(range.len() * columns);
-            let part = MatMut::from_row_major_slice_mut(part, range.len(), columns);
-            parts.push((body, part));
-            rest = other;
-        }
-        parts
-            .into_par_iter()
-            .for_each(|(body, part)| solve_factored(body.lu(), part, transpose));
-    }
-
-    /// `out += O x`, or its transpose.
-    fn add_blocks(&self, blocks: &[Block], x: &Columns, transpose: bool, out: &mut Columns) {
+    /// z = (D + L)⁻¹ v and A z, or the same of Aᵀ: D are the bodies' own blocks, L those by which they act on later ones, and what is
+    /// left of A acts on earlier ones, or on itself by images. Each block is used once: A z = v + (A − D − L) z.
+    fn sweep(&self, blocks: &[Block], v: &Columns, transpose: bool) -> [Columns; 2] {
         let faces = &self.coupled.faces;
-        for block in blocks {
-            let (panels, points) = (&faces[block.source], &faces[block.target]);
-            let (to, part) = match transpose {
-                false => {
-                    let part = x.part(panels);
-                    (points, transposed_product(&block.data, points.len(), &part))
+        // Rows of z are right-hand sides until their body's turn comes.
+        let (mut z, mut image) = (v.clone(), v.clone());
+        for (b, body) in self.coupled.bodies.iter().enumerate() {
+            let part = body.solve(&z.part(&faces[b]), transpose);
+            z.slice_mut(&faces[b]).copy_from_slice(&part.data);
+            for block in blocks {
+                let (from, to) = match transpose {
+                    false => (block.source, block.target),
+                    true => (block.target, block.source),
+                };
+                if from != b {
+                    continue;
                 }
-                true => (panels, product(&block.data, panels.len(), &x.part(points))),
-            };
-            let out = out.slice_mut(to);
-            out.iter_mut().zip(&part.data).for_each(|(o, p)| *o += p);
+                let rows = &faces[to];
+                let made = match transpose {
+                    false => transposed_product(&block.data, rows.len(), &part),
+                    true => product(&block.data, rows.len(), &part),
+                };
+                let (out, sign) = match to > b {
+                    true => (&mut z, -1.0),
+                    false => (&mut image, 1.0),
+                };
+                let out = out.slice_mut(rows).iter_mut();
+                out.zip(&made.data).for_each(|(o, m)| *o += sign * m);
+            }
         }
+        [z, image]
     }
 }
 
@@ -156,6 +159,22 @@ impl Placed<'_> {
             .collect()
     }
 
+    /// Images of body `source` that body `target` feels; of its own all but itself.
+    fn images(&self, source: usize, target: usize) -> impl Iterator<Item = &Image> {
+        let apart = source == target || self.coupled.excluded.contains(source, target);
+        let images = self.coupled.images.iter();
+        images.filter(move |image| !(apart && image.is_identity()))
+    }
+
+    /// So many numbers, of any values.
+    fn memory(&self, length: usize) -> Vec<f64> {
+        let used = self.coupled.spare.lock().ok().and_then(|mut spare| {
+            let at = spare.iter().position(|data| data.len() == length)?;
+            Some(spare.swap_remove(at))
+        });
+        used.unwrap_or_else(|| vec![0.0; length])
+    }
+
     /// Blocks of A between different bodies, and those that images make.
     fn blocks(&self) -> Result<Vec<Block>> {
         let coupled = self.coupled;
@@ -163,11 +182,11 @@ impl Placed<'_> {
         let mut out = Vec::new();
         for source in 0..count {
             for target in 0..count {
-                if source == target && coupled.images.len() == 1 {
+                if !self.images(source, target).any(|_| true) {
                     continue;
                 }
                 let columns = coupled.faces[target].len();
-                let mut data = vec![0.0; coupled.faces[source].len() * columns];
+                let mut data = self.memory(coupled.faces[source].len() * columns);
                 self.fill(source, target, &mut data, columns, 0)?;
                 out.push(Block {
                     source,
@@ -205,7 +224,7 @@ impl Placed<'_> {
         Ok(Lu::new(matrix, n))
     }
 
-    /// Adds Ω/4π of a body's panels and of their images at the panels of another (only of the images at
+    /// Writes Ω/4π of a body's panels and of their images at the panels of another (only of the images at
     /// its own), into `out[panel · stride + column + point]`.
     fn fill(
         &self,
@@ -218,11 +237,7 @@ impl Placed<'_> {
         let coupled = self.coupled;
         let triangles = coupled.bodies[source].panels().triangles();
         let points = coupled.faces[target].len();
-        for image in &coupled.images {
-            let apart = source != target && !coupled.excluded.contains(source, target);
-            if image.is_identity() && !apart {
-                continue;
-            }
+        for (n, image) in self.images(source, target).enumerate() {
             let seen = self.seen_from(image, source, target);
             // Images in free surfaces have the opposite sign, and the kernel only adds.
             let signed = |out: &mut [f64]| {
@@ -234,16 +249,27 @@ impl Placed<'_> {
                     row.iter_mut().for_each(|x| *x *= image.sign);
                 }
             };
-            signed(out);
-            let seen = Sources::new(&seen);
-            double_fill(triangles, &seen, Write::Add, out, stride, column);
+            let write = match n {
+                0 => Write::Set,
+                _ => Write::Add,
+            };
+            if write == Write::Add {
+                signed(out);
+            }
+            double_fill(triangles, &Sources::new(&seen), write, out, stride, column);
             signed(out);
         }
-        let mut filled = vec![0.0; points];
-        for row in out.chunks(stride) {
-            for (f, x) in filled.iter_mut().zip(&row[column..column + points]) {
-                *f += x;
+        let sums = out.par_chunks(stride * GROUP).map(|rows| {
+            let mut sum = vec![0.0; points];
+            for row in rows.chunks(stride) {
+                let row = sum.iter_mut().zip(&row[column..column + points]);
+                row.for_each(|(s, x)| *s += x);
             }
+            sum
+        });
+        let mut filled = vec![0.0; points];
+        for sum in sums.collect::<Vec<_>>() {
+            filled.iter_mut().zip(sum).for_each(|(f, s)| *f += s);
         }
         // Also where it isn't a number.
         match filled.iter().position(|f| f.is_nan() || f.abs() >= INSIDE) {

@@ -178,11 +178,15 @@ impl<'a> System<'a> {
     fn square_solve(&self, b: &Columns, transpose: bool, what: &str) -> Result<Outcome> {
         let settings = &self.cpu.model.settings;
         let outcome = gmres(
-            |x| match transpose {
-                true => self.apply_transpose(x),
-                false => self.apply(x),
+            |v| {
+                let mut z = v.clone();
+                self.precondition(&mut z, |b, x| solve_square(b, x, transpose));
+                let image = match transpose {
+                    true => self.apply_transpose(&z),
+                    false => self.apply(&z),
+                };
+                [z, image]
             },
-            |x| self.precondition(x, |b, x| solve_square(b, x, transpose)),
             b,
             settings.tolerance,
             settings.max_iterations,

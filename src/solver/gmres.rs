@@ -6,13 +6,14 @@ use super::{CALLS, Columns, Outcome};
 /// modified Gram–Schmidt and Givens rotations, restarted every `restart` iterations, until
 /// `‖b − A x‖ ≤ tolerance · ‖b‖`.
 ///
-/// `apply` takes v to `[M⁻¹ v, A M⁻¹ v]`, M the right preconditioner. Both are kept for every v: solution and residual are
+/// `apply` takes v and the numbers of its columns in b, ascending, to `[M⁻¹ v, A M⁻¹ v]`, M the right preconditioner; every column may
+/// have its own A and M. Both are kept for every v: solution and residual are
 /// combinations of them, at no further product with A. A column of zeros has the solution zero, at no iteration.
 ///
 /// # References
 /// Saad and Schultz, SIAM J. Sci. Stat. Comput. 7 (1986) 856.
 pub fn gmres(
-    apply: impl Fn(&Columns) -> [Columns; 2],
+    apply: impl Fn(&Columns, &[usize]) -> [Columns; 2],
     b: &Columns,
     tolerance: f64,
     max_iterations: usize,
@@ -42,7 +43,7 @@ pub fn gmres(
             .zip(norms(&r))
             .map(|(k, beta)| Space::new(beta, 0.5 * tolerance * size[*k], limit(*k)))
             .collect();
-        let [step, change] = arnoldi(&apply, r.clone(), &mut spaces);
+        let [step, change] = arnoldi(&apply, r.clone(), &active, &mut spaces);
         for (c, k) in active.iter().enumerate() {
             iterations[*k] += spaces[c].columns.len();
             for i in 0..b.rows {
@@ -151,8 +152,9 @@ struct Step {
 
 /// Builds every column's basis from its residual until all are done; the columns' best steps, and A times them.
 fn arnoldi(
-    apply: &impl Fn(&Columns) -> [Columns; 2],
+    apply: &impl Fn(&Columns, &[usize]) -> [Columns; 2],
     mut v: Columns,
+    active: &[usize],
     spaces: &mut [Space],
 ) -> [Columns; 2] {
     let all = v.columns;
@@ -162,7 +164,8 @@ fn arnoldi(
     let mut owners: Vec<usize> = (0..all).collect();
     let mut basis: Vec<Step> = Vec::new();
     loop {
-        let images = apply(&v);
+        let numbers: Vec<usize> = owners.iter().map(|c| active[*c]).collect();
+        let images = apply(&v, &numbers);
         let mut w = images[1].clone();
         basis.push(Step {
             v,
@@ -251,7 +254,7 @@ mod tests {
     fn columns_are_solved_together_as_alone() {
         let n = 60;
         let a = matrix(n);
-        let jacobi = |v: &Columns| {
+        let jacobi = |v: &Columns, _: &[usize]| {
             let z = Columns::from_fn(n, v.columns, |i, k| v.at(i, k) / a[i * n + i]);
             let image = product(&a, n, &z);
             [z, image]
@@ -291,13 +294,13 @@ mod tests {
     fn gives_up_and_says_so() {
         let n = 60;
         let a = matrix(n);
-        let apply = |v: &Columns| [v.clone(), product(&a, n, v)];
+        let apply = |v: &Columns, _: &[usize]| [v.clone(), product(&a, n, v)];
         let b = Columns::from_fn(n, 2, |i, k| (0.4 * (i * (k + 1)) as f64).cos());
         let short = gmres(apply, &b, 1e-11, 4, 100);
         assert_eq!(short.iterations, 4);
         assert!(short.residual > 1e-11 && short.residual < 1.0);
         // A singular matrix can't reach its right-hand side.
-        let nothing = |v: &Columns| [v.clone(), Columns::zeros(v.rows, v.columns)];
+        let nothing = |v: &Columns, _: &[usize]| [v.clone(), Columns::zeros(v.rows, v.columns)];
         let none = gmres(nothing, &b, 1e-11, 50, 100);
         assert_eq!(none.residual, 1.0);
         let wild = Columns::from_fn(n, 1, |_, _| f64::NAN);

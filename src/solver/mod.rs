@@ -18,7 +18,7 @@ pub use columns::Columns;
 pub(crate) use eigenvalue::{condition, largest_eigenvalue};
 pub use gmres::gmres;
 pub use lu::Lu;
-pub use product::{normal_product, product, transposed_product};
+pub use product::{both_products, normal_product, product, transposed_product};
 
 use crate::adjoint::count::Counter;
 

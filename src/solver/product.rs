@@ -6,6 +6,7 @@
 use super::{CALLS, Columns};
 use pulp::{Arch, Simd, WithSimd};
 use rayon::prelude::*;
+use std::ops::Range;
 
 /// Rows of a tile: a few thousand columns of it stay in the second-level cache.
 const TILE: usize = 16;
@@ -18,17 +19,18 @@ const PAIR: usize = 2;
 /// Partial results that are added one by one; fixes the order of the sum.
 const GROUPS: usize = 8;
 
-/// One group of rows: `middle = K x` (or given), `out += Kᵀ middle`.
+/// One group of rows: `made = K x`, `out += Kᵀ y`.
 struct Tiles<'a> {
     /// Rows of K in this group.
     k: &'a [f64],
     stride: usize,
-    columns: usize,
-    /// x, column by column; empty if `middle` is given.
+    /// x, column by column; empty if K x isn't wanted.
     x: &'a [f64],
     /// `[row][column]`.
-    middle: &'a mut [f64],
-    /// Kᵀ middle, column by column; empty if it isn't wanted.
+    made: &'a mut [f64],
+    /// y, `[row][column]`; none for K x.
+    y: Option<&'a [f64]>,
+    /// Kᵀ y, column by column; empty if it isn't wanted.
     out: &'a mut [f64],
 }
 
@@ -40,41 +42,50 @@ impl WithSimd for Tiles<'_> {
         let Self {
             k,
             stride,
-            columns,
             x,
-            middle,
+            made,
+            y,
             out,
         } = self;
-        let groups = columns.div_ceil(MOST);
-        let width = columns.div_ceil(groups);
-        for (rows, middle) in k
-            .chunks(TILE * stride)
-            .zip(middle.chunks_mut(TILE * columns))
-        {
-            for first in (0..columns).step_by(width) {
-                let count = width.min(columns - first);
-                macro_rules! group {
-                    ($($n:literal)*) => {
-                        match count {
-                            $($n => {
-                                if !x.is_empty() {
-                                    let x: [&[f64]; $n] =
-                                        std::array::from_fn(|c| &x[(first + c) * stride..][..stride]);
-                                    dots::<S, $n>(simd, rows, stride, &x, middle, columns, first);
-                                }
-                                if !out.is_empty() {
-                                    let part = &mut out[first * stride..(first + $n) * stride];
-                                    updates::<S, $n>(simd, rows, stride, middle, columns, first, part);
-                                }
-                            })*
-                            _ => unreachable!("at most MOST columns"),
-                        }
-                    };
+        let (n, m) = (x.len() / stride, out.len() / stride);
+        macro_rules! of_count {
+            ($count:expr, $task:ident($($argument:expr),*)) => {
+                match $count {
+                    1 => $task::<S, 1>($($argument),*),
+                    2 => $task::<S, 2>($($argument),*),
+                    3 => $task::<S, 3>($($argument),*),
+                    4 => $task::<S, 4>($($argument),*),
+                    5 => $task::<S, 5>($($argument),*),
+                    6 => $task::<S, 6>($($argument),*),
+                    _ => unreachable!("at most MOST columns"),
                 }
-                group!(1 2 3 4 5 6);
+            };
+        }
+        for (tile, rows) in k.chunks(TILE * stride).enumerate() {
+            let (from, count) = (tile * TILE, rows.len() / stride);
+            let made = &mut made[from * n..(from + count) * n];
+            for at in column_groups(n) {
+                let x = &x[at.start * stride..at.end * stride];
+                of_count!(at.len(), dots(simd, rows, stride, x, made, n, at.start));
+            }
+            let y = match y {
+                Some(y) => &y[from * m..(from + count) * m],
+                None => made,
+            };
+            for at in column_groups(m) {
+                let out = &mut out[at.start * stride..at.end * stride];
+                of_count!(at.len(), updates(simd, rows, stride, y, m, at.start, out));
             }
         }
     }
+}
+
+/// Even groups of at most [`MOST`] columns.
+#[inline(always)]
+fn column_groups(columns: usize) -> impl Iterator<Item = Range<usize>> {
+    let width = columns.div_ceil(columns.div_ceil(MOST).max(1)).max(1);
+    let group = move |first| first..columns.min(first + width);
+    (0..columns).step_by(width).map(group)
 }
 
 /// `middle[row][first + c] = rows[row] · x[c]`.
@@ -83,11 +94,12 @@ fn dots<S: Simd, const N: usize>(
     simd: S,
     rows: &[f64],
     stride: usize,
-    x: &[&[f64]; N],
+    x: &[f64],
     middle: &mut [f64],
     columns: usize,
     first: usize,
 ) {
+    let x: [&[f64]; N] = std::array::from_fn(|c| &x[c * stride..][..stride]);
     let heads: [&[S::f64s]; N] = std::array::from_fn(|c| S::as_simd_f64s(x[c]).0);
     let tails: [&[f64]; N] = std::array::from_fn(|c| S::as_simd_f64s(x[c]).1);
     let count = rows.len() / stride;
@@ -194,76 +206,62 @@ fn group_rows(rows: usize) -> usize {
 
 /// `K x`, K row-major rows × x.rows.
 pub fn product(k: &[f64], rows: usize, x: &Columns) -> Columns {
-    CALLS.add(1);
-    let n = x.columns;
-    let mut out = Columns::zeros(rows, n);
-    if n == 0 || rows == 0 || x.rows == 0 {
-        return out;
-    }
-    let columns = by_columns(x);
-    let size = group_rows(rows);
-    k.par_chunks(size * x.rows)
-        .zip(out.data.par_chunks_mut(size * n))
-        .for_each(|(k, middle)| {
-            Arch::new().dispatch(Tiles {
-                k,
-                stride: x.rows,
-                columns: n,
-                x: &columns,
-                middle,
-                out: &mut [],
-            });
-        });
-    out
-}
-
-/// `Σ Kᵀ middle` over groups of rows of K (rows × stride), `middle` of each from its number and rows;
-/// made of K x first where x is given by columns.
-fn transposed(
-    k: &[f64],
-    [rows, stride, n]: [usize; 3],
-    x: &[f64],
-    middle: impl Fn(usize, usize) -> Vec<f64> + Sync,
-) -> Columns {
-    CALLS.add(1);
-    if n == 0 || rows == 0 || stride == 0 {
-        return Columns::zeros(stride, n);
-    }
-    let size = group_rows(rows);
-    let parts: Vec<Vec<f64>> = k
-        .par_chunks(size * stride)
-        .enumerate()
-        .map(|(group, k)| {
-            let mut out = vec![0.0; stride * n];
-            Arch::new().dispatch(Tiles {
-                k,
-                stride,
-                columns: n,
-                x,
-                middle: &mut middle(group * size, k.len() / stride),
-                out: &mut out,
-            });
-            out
-        })
-        .collect();
-    // Column by column, the groups in their order.
-    Columns::from_fn(stride, n, |i, c| {
-        parts.iter().map(|p| p[c * stride + i]).sum()
-    })
+    let [made, _] = both_products(k, rows, x, &Columns::zeros(rows, 0));
+    made
 }
 
 /// `Kᵀ y`, K row-major y.rows × columns.
 pub fn transposed_product(k: &[f64], columns: usize, y: &Columns) -> Columns {
-    transposed(k, [y.rows, columns, y.columns], &[], |from, rows| {
-        y.slice(&(from..from + rows)).to_vec()
-    })
+    let [_, out] = both_products(k, y.rows, &Columns::zeros(columns, 0), y);
+    out
+}
+
+/// `K x` and `Kᵀ y` with K read once, K row-major rows × x.rows.
+pub fn both_products(k: &[f64], rows: usize, x: &Columns, y: &Columns) -> [Columns; 2] {
+    products(k, rows, x, Some(y))
 }
 
 /// `Kᵀ (K x)` with K read once, K row-major rows × x.rows.
 pub fn normal_product(k: &[f64], rows: usize, x: &Columns) -> Columns {
-    transposed(k, [rows, x.rows, x.columns], &by_columns(x), |_, rows| {
-        vec![0.0; rows * x.columns]
-    })
+    let [_, out] = products(k, rows, x, None);
+    out
+}
+
+/// `K x` and `Kᵀ y`, y = K x where none is given.
+fn products(k: &[f64], rows: usize, x: &Columns, y: Option<&Columns>) -> [Columns; 2] {
+    CALLS.add(1);
+    let (stride, n, m) = (x.rows, x.columns, y.unwrap_or(x).columns);
+    let mut made = Columns::zeros(rows, n);
+    if rows == 0 || stride == 0 || n + m == 0 {
+        return [made, Columns::zeros(stride, m)];
+    }
+    let columns = by_columns(x);
+    let size = group_rows(rows);
+    let mut rest = &mut made.data[..];
+    let mut tasks = Vec::with_capacity(GROUPS);
+    for (group, k) in k.chunks(size * stride).enumerate() {
+        let at = group * size..group * size + k.len() / stride;
+        let (made, other) = rest.split_at_mut(at.len() * n);
+        rest = other;
+        tasks.push((k, made, y.map(|y| y.slice(&at))));
+    }
+    let sums = tasks.into_par_iter().map(|(k, made, y)| {
+        let mut out = vec![0.0; stride * m];
+        Arch::new().dispatch(Tiles {
+            k,
+            stride,
+            x: &columns,
+            made,
+            y,
+            out: &mut out,
+        });
+        out
+    });
+    let parts: Vec<Vec<f64>> = sums.collect();
+    // Column by column, the groups in their order.
+    let sum = |i: usize, c: usize| parts.iter().map(|p| p[c * stride + i]).sum();
+    let out = Columns::from_fn(stride, m, sum);
+    [made, out]
 }
 
 #[cfg(test)]
@@ -299,6 +297,13 @@ mod tests {
                 close(&product(&k.data, rows, &x), &kx);
                 close(&transposed_product(&k.data, columns, &y), &transposed(&y));
                 close(&normal_product(&k.data, rows, &x), &transposed(&kx));
+                // The same bits in one sweep, with any number of columns of either.
+                for other in [0, 1, 4, 8] {
+                    let y = filled(rows, other, 0.9);
+                    let [made, out] = both_products(&k.data, rows, &x, &y);
+                    assert_eq!(made, product(&k.data, rows, &x));
+                    assert_eq!(out, transposed_product(&k.data, columns, &y));
+                }
             }
         }
     }

@@ -25,6 +25,7 @@ mod extrapolated;
 mod first;
 mod placed;
 mod second;
+mod sweep;
 mod system;
 
 pub use extrapolated::ExtrapolatedPanels;
@@ -163,7 +164,7 @@ impl Coupling for PanelCoupled {
     ) -> Result<Vec<Vec3>> {
         let column = DMatrix::from_column_slice(twists.len(), 1, twists.as_slice());
         let placed = PlacedPanels::new(self, poses, &column)?;
-        let phi = placed.potentials(&column)?.x;
+        let phi = placed.potentials(&column)?;
         let mut out = vec![Vec3::zeros(); points.len()];
         for (b, body) in self.bodies.iter().enumerate() {
             let resting = || vec![0.0; body.faces.len()];

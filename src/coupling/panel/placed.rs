@@ -7,7 +7,7 @@ use crate::adjoint::lie::{Pose, Vec6};
 use crate::coupling::pair::Pair;
 use crate::coupling::response::{self, body_twists, moves};
 use crate::coupling::{CoupledResponse, Direction, PairTensor, Reached, Tangent};
-use crate::solver::{Columns, Outcome};
+use crate::solver::Columns;
 use crate::{Error, Result};
 use nalgebra::{DMatrix, DVector};
 use std::ops::Range;
@@ -58,8 +58,10 @@ impl<'a> PlacedPanels<'a> {
     ///
     /// # Errors
     /// A solve that misses its tolerance.
-    pub fn potentials(&self, twists: &DMatrix<f64>) -> Result<Outcome> {
-        self.system.solve(&self.right(twists), false)
+    pub fn potentials(&self, twists: &DMatrix<f64>) -> Result<Columns> {
+        let none = Columns::zeros(self.coupled.rows(), 0);
+        let ([phi, _], _) = self.system.solve(&self.right(twists), &none)?;
+        Ok(phi)
     }
 
     /// D F x̄ of columns of twists: fluxes through the panels.
@@ -169,18 +171,14 @@ impl<'a> PanelSolution<'a> {
     /// # Errors
     /// A solve that misses its tolerance.
     pub fn new(placed: Arc<PlacedPanels<'a>>, twists: DMatrix<f64>) -> Result<Self> {
-        let mu = placed.system.solve(&placed.flux(&twists), true)?;
-        let phi = placed.potentials(&twists)?;
-        let [from_mu, from_phi] = [&mu, &phi].map(|s| Reached {
-            iterations: s.iterations,
-            residual: s.residual,
-        });
+        let (right, flux) = (placed.right(&twists), placed.flux(&twists));
+        let ([phi, mu], reached) = placed.system.solve(&right, &flux)?;
         Ok(Self {
             placed,
             twists,
-            phi: phi.x,
-            mu: mu.x,
-            reached: from_mu.worst(from_phi),
+            phi,
+            mu,
+            reached,
             fields: OnceLock::new(),
         })
     }

@@ -53,10 +53,8 @@ impl PlacedPanels<'_> {
                 single_jvp(triangles, s, d, &scaled(sign, mu), n, out);
             }
         }
-        let moved = Moved {
-            phi: self.system.solve(&right, false)?.x,
-            mu: self.system.solve(&transposed, true)?.x,
-        };
+        let ([phi, mu], _) = self.system.solve(&right, &transposed)?;
+        let moved = Moved { phi, mu };
         let momentum = |k: usize| -> DVector<f64> {
             let mut h = self.impulse(&moved.phi.column(k), &moved.mu.column(k));
             for (b, body) in self.coupled.bodies.iter().enumerate() {

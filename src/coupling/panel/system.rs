@@ -1,14 +1,16 @@
 //! The matrix between panels at given poses, and its solves.
 
 use super::PanelCoupled;
+use super::sweep::{Block, sweep};
 use crate::adjoint::kernel::{Sources, Write, double_fill};
 use crate::adjoint::lie::{Pose, Vec3};
+use crate::adjoint::solve::Columnwise;
+use crate::coupling::Reached;
 use crate::coupling::full::FullSolver;
 use crate::coupling::settings::converged;
 use crate::geometry::Image;
-use crate::solver::{Columns, Lu, Outcome, gmres, product, transposed_product};
+use crate::solver::{Columns, Lu, gmres};
 use crate::{Error, Result};
-use faer::MatMut;
 use rayon::prelude::*;
 
 /// GMRES iterations before a restart.
@@ -18,14 +20,6 @@ const RESTART: usize = 100;
 const INSIDE: f64 = 0.25;
 /// Panels whose solid angles are added up by one task.
 const GROUP: usize = 128;
-
-/// Layers of one body at the panels of another, or of its images at its own.
-struct Block {
-    source: usize,
-    target: usize,
-    /// Ω/4π, `[panel of source][panel of target]`.
-    data: Vec<f64>,
-}
 
 /// The bodies at given poses.
 #[derive(Clone, Copy)]
@@ -41,7 +35,7 @@ pub(super) struct System<'a> {
 }
 
 enum Matrix {
-    /// All but each body's own block, which is known by its factors.
+    /// All but each body's own block, whose inverse is known.
     Blocks(Vec<Block>),
     Factored(Lu),
 }
@@ -79,73 +73,39 @@ impl<'a> System<'a> {
         }
     }
 
-    /// Solves `A x = b`, or `Aᵀ x = b`.
+    /// x and y of `A x = right` and `Aᵀ y = turned`, together, so that each block is read once for both.
     ///
     /// # Errors
     /// A solve that misses its tolerance.
-    pub fn solve(&self, b: &Columns, transpose: bool) -> Result<Outcome> {
+    pub fn solve(&self, right: &Columns, turned: &Columns) -> Result<([Columns; 2], Reached)> {
         let (settings, rows) = (&self.coupled.settings, self.coupled.rows());
         let blocks = match &self.matrix {
             Matrix::Factored(lu) => {
-                let mut x = b.clone();
-                solve_factored(lu, x.as_mat_mut(), transpose);
-                return Ok(Outcome {
-                    x,
-                    iterations: 0,
-                    residual: 0.0,
-                });
+                let (mut x, mut y) = (right.clone(), turned.clone());
+                lu.solve(x.as_mat_mut());
+                lu.solve_transpose(y.as_mat_mut());
+                return Ok(([x, y], Reached::default()));
             }
             Matrix::Blocks(blocks) => blocks,
         };
         let outcome = gmres(
-            |v| self.sweep(blocks, v, transpose),
-            b,
+            |v, columns| {
+                let straight = columns.partition_point(|k| *k < right.columns);
+                sweep(self.coupled, blocks, v, straight)
+            },
+            &right.beside(turned),
             settings.tolerance,
             settings.max_iterations,
             RESTART,
         );
         let what = || format!("the coupled panel system ({rows} panels)");
-        converged(outcome, settings.tolerance, what, "solver lu")
-    }
-
-    /// z = (D + L)⁻¹ v and A z, or the same of Aᵀ: D are the bodies' own blocks, L those by which they act on later ones, and what is
-    /// left of A acts on earlier ones, or on itself by images. Each block is used once: A z = v + (A − D − L) z.
-    fn sweep(&self, blocks: &[Block], v: &Columns, transpose: bool) -> [Columns; 2] {
-        let faces = &self.coupled.faces;
-        // Rows of z are right-hand sides until their body's turn comes.
-        let (mut z, mut image) = (v.clone(), v.clone());
-        for (b, body) in self.coupled.bodies.iter().enumerate() {
-            let part = body.solve(&z.part(&faces[b]), transpose);
-            z.slice_mut(&faces[b]).copy_from_slice(&part.data);
-            for block in blocks {
-                let (from, to) = match transpose {
-                    false => (block.source, block.target),
-                    true => (block.target, block.source),
-                };
-                if from != b {
-                    continue;
-                }
-                let rows = &faces[to];
-                let made = match transpose {
-                    false => transposed_product(&block.data, rows.len(), &part),
-                    true => product(&block.data, rows.len(), &part),
-                };
-                let (out, sign) = match to > b {
-                    true => (&mut z, -1.0),
-                    false => (&mut image, 1.0),
-                };
-                let out = out.slice_mut(rows).iter_mut();
-                out.zip(&made.data).for_each(|(o, m)| *o += sign * m);
-            }
-        }
-        [z, image]
-    }
-}
-
-fn solve_factored(lu: &Lu, x: MatMut<'_, f64>, transpose: bool) {
-    match transpose {
-        true => lu.solve_transpose(x),
-        false => lu.solve(x),
+        let outcome = converged(outcome, settings.tolerance, what, "solver lu")?;
+        let (x, y) = outcome.x.split(right.columns);
+        let reached = Reached {
+            iterations: outcome.iterations,
+            residual: outcome.residual,
+        };
+        Ok(([x, y], reached))
     }
 }
 

@@ -178,7 +178,7 @@ impl<'a> System<'a> {
     fn square_solve(&self, b: &Columns, transpose: bool, what: &str) -> Result<Outcome> {
         let settings = &self.cpu.model.settings;
         let outcome = gmres(
-            |v| {
+            |v, _| {
                 let mut z = v.clone();
                 self.precondition(&mut z, |b, x| solve_square(b, x, transpose));
                 let image = match transpose {

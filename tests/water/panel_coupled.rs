@@ -6,7 +6,7 @@ use hydrograd::adjoint::lie::{Mat3, Mat6, Pose, Vec3, exp_matrix};
 use hydrograd::boundary::PanelBoundary;
 use hydrograd::boundary::panel::MOST_FACES;
 use hydrograd::coupling::full::{FullSolver, SolveSettings};
-use hydrograd::coupling::{Coupling, Exclusions, Linearise, PanelCoupled};
+use hydrograd::coupling::{Coupling, Direction, Exclusions, Linearise, PanelCoupled};
 use hydrograd::scene::{Body, Fluid, Scene, Shape, Wall, WallSurface};
 use hydrograd::simulate::gradcheck;
 use hydrograd::simulate::{Fidelity, Method, Settings, Simulator};
@@ -433,4 +433,57 @@ fn any_thread_count() {
         })
     };
     assert!(answers(1) == answers(2));
+}
+
+/// Sweeps over the blocks, in memory that was used before, give what the whole matrix does: for any number of bodies.
+#[test]
+fn chains_of_bodies() {
+    let ball = named("ball", &ellipsoid([0.5, 0.3, 0.4], 80));
+    let small = named("small", &ellipsoid([0.3, 0.3, 0.4], 48));
+    let walls = [wall(-0.7, WallSurface::Free)];
+    for count in 1..=5 {
+        let bodies: Vec<_> = (0..count).map(|b| [&ball, &small][b % 2].clone()).collect();
+        let n = 6 * count;
+        let basis = DMatrix::identity(n, n);
+        let coupled = |solver, walls: &[Wall]| {
+            let settings = SolveSettings {
+                solver,
+                tolerance: 1e-12,
+                ..SolveSettings::default()
+            };
+            let excluded = Exclusions::new((count > 2).then_some((0, 2)));
+            PanelCoupled::new(bodies.clone(), walls, excluded, settings).unwrap()
+        };
+        let poses = |gap: f64| -> Vec<Pose> { (0..count).map(|b| at(gap * b as f64)).collect() };
+        for walls in [&walls[..], &[]] {
+            let [blocks, dense] = [FullSolver::Gmres, FullSolver::Qr].map(|s| coupled(s, walls));
+            let z = DVector::from_fn(n, |i, _| (1.3 * i as f64).sin());
+            let z: Vec<_> = (0..count)
+                .map(|b| z.fixed_rows::<6>(6 * b).into())
+                .collect();
+            let all = |c: &PanelCoupled, gap| {
+                let found = c.linearise(&poses(gap), &basis).unwrap();
+                let x = DVector::from_fn(n, |i, _| (0.7 * i as f64).cos());
+                let y = DVector::from_fn(n, |i, _| x[n - 1 - i]);
+                let tangent = found
+                    .hvp(Direction::Twist(&x), Direction::Twist(&y), &z)
+                    .unwrap();
+                let wrench = tangent.wrench.iter().flat_map(|w| w.iter().copied());
+                (found.momenta().clone(), wrench.collect::<Vec<f64>>())
+            };
+            let first = all(&blocks, 0.95);
+            all(&blocks, 1.1);
+            assert!(all(&blocks, 0.95) == first);
+            let expected = all(&dense, 0.95);
+            let error = (&first.0 - &expected.0).abs().max() / expected.0.abs().max();
+            let size = expected.1.iter().fold(0.0, |m: f64, x| m.max(x.abs()));
+            let pairs = first.1.iter().zip(&expected.1);
+            let of_tangent =
+                pairs.fold(0.0, |m: f64, (a, b)| m.max((a - b).abs())) / size.max(1e-3);
+            assert!(
+                error < 1e-10 && of_tangent < 1e-9,
+                "{count}: {error:e} {of_tangent:e}"
+            );
+        }
+    }
 }

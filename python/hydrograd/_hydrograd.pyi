@@ -226,6 +226,7 @@ class Simulator:
         accuracy: float | None = None,
         rank: int | None = None,
         resolved_gap: float | None = None,
+        films: bool | None = None,
         cache: _Path | None = None,
         backend: _Backend | None = None,
     ) -> Simulator: ...

@@ -61,6 +61,8 @@ pub struct Keywords<'a> {
     pub rank: Option<usize>,
     /// Smallest gap resolved, m.
     pub resolved_gap: Option<f64>,
+    /// Whether gaps that compressed bodies don't resolve have films.
+    pub films: Option<bool>,
     /// What computes the coupling.
     pub backend: Option<&'a str>,
 }
@@ -78,6 +80,7 @@ impl Keywords<'_> {
             accuracy: positive("accuracy", self.accuracy)?,
             rank: self.rank,
             resolved_gap: positive("resolved_gap", self.resolved_gap)?,
+            films: self.films,
             backend: choice("backend", self.backend)?,
             ..Settings::default()
         })

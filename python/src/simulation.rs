@@ -76,7 +76,7 @@ impl Simulator {
     #[new]
     #[pyo3(signature = (
         scene, dt=None, *, fidelity=None, method=None, tolerance=None, integrator=None, faces=None, accuracy=None,
-        rank=None, resolved_gap=None, cache=None, backend=None
+        rank=None, resolved_gap=None, films=None, cache=None, backend=None
     ))]
     #[expect(
         clippy::too_many_arguments,
@@ -94,6 +94,7 @@ impl Simulator {
         accuracy: Option<f64>,
         rank: Option<usize>,
         resolved_gap: Option<f64>,
+        films: Option<bool>,
         cache: Option<PathBuf>,
         backend: Option<&str>,
     ) -> PyResult<Self> {
@@ -107,6 +108,7 @@ impl Simulator {
             accuracy,
             rank,
             resolved_gap,
+            films,
             backend,
         };
         let scene = scene.0.clone();

@@ -14,7 +14,7 @@ pub(super) struct Pair {
     pub image: Image,
     /// Source positions in the target's frame.
     pub points: Sources,
-    /// The same as vectors.
+    /// The same as vectors, where they aren't held off.
     pub positions: Vec<Vec3>,
 }
 
@@ -37,6 +37,12 @@ impl Pair {
             points: Sources::new(&positions),
             positions,
         }
+    }
+
+    /// Moves all sources as they are seen by `shift`, target's frame; their arms stay those of the bodies' own points.
+    pub fn hold_off(&mut self, shift: &Vec3) {
+        let moved: Vec<Vec3> = self.positions.iter().map(|s| s + shift).collect();
+        self.points = Sources::new(&moved);
     }
 
     /// Displacement of each source in the target's frame, relative to the target.

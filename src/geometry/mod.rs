@@ -22,6 +22,7 @@ mod image;
 mod interior;
 mod mass;
 mod mesh;
+mod opposite;
 #[cfg(test)]
 mod parry;
 mod points;
@@ -37,6 +38,7 @@ mod wall;
 pub(crate) mod weld;
 
 pub use check::{Finding, Kind, MeshReport, Severity, check_parts};
+pub(crate) use convex::Field;
 pub use convex::Solid;
 pub use faces::Faces;
 pub(crate) use faces::equilateral_edge;
@@ -46,6 +48,7 @@ pub(crate) use interior::Interior;
 pub use mass::MassProperties;
 pub(crate) use mesh::check_scale;
 pub use mesh::{Edge, TriMesh};
+pub(crate) use opposite::Opposite;
 pub use points::Ball;
 pub(crate) use points::bounds;
 pub use refine::{ExactSurface, MAX_ADDED_FACES, Refinement, refine, validate_refinements};

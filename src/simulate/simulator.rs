@@ -327,7 +327,8 @@ impl Simulator {
         let clearance = self.clearance();
         let warning = smallest.and_then(|(time, gap)| clearance.warning(time, &gap, fidelity));
         let unresolved = || clearance.unresolved(states, &self.assembled.water.resolved);
-        warning.or_else(|| fidelity.kind().compresses().then(unresolved).flatten())
+        let by_sources = fidelity.kind().compresses() && !clearance.films;
+        warning.or_else(|| by_sources.then(unresolved).flatten())
     }
 
     /// Added mass of all bodies in the water at the start.

@@ -303,7 +303,9 @@ impl Step for Trajectory<'_> {
             let e = self.stepper.linearise(&state.q)?;
             let mut sample = self.observe(&e, state, gap)?;
             let (input, mode) = self.input(index, state, &sample)?;
-            let (mut next, record) = self.stepper.step(&e, state, &sample.v, &input)?;
+            let step = self.stepper.step(&e, state, &sample.v, &input);
+            let clearance = self.simulator.clearance();
+            let (mut next, record) = step.map_err(|e| clearance.explain(e))?;
             next.mode = mode;
             sample.control = input.control;
             sample.hold = input.hold;

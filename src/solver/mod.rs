@@ -11,6 +11,7 @@ mod eigenvalue;
 mod gmres;
 mod lu;
 mod product;
+mod sparse;
 
 pub use cgls::{Outcome, cgls};
 pub use cholesky::Cholesky;
@@ -19,10 +20,11 @@ pub(crate) use eigenvalue::{condition, largest_eigenvalue};
 pub use gmres::gmres;
 pub use lu::Lu;
 pub use product::{both_products, normal_product, product, transposed_product};
+pub use sparse::SparseCholesky;
 
 use crate::adjoint::count::Counter;
 
 /// Calls of this module's solvers and products ([`cgls`], [`gmres`](gmres()), [`product`](product()) and its
-/// kin, [`Cholesky`], [`Lu`]) in this process.
+/// kin, [`Cholesky`], [`SparseCholesky`], [`Lu`]) in this process.
 #[doc(hidden)]
 pub static CALLS: Counter = Counter::new();

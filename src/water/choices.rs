@@ -68,7 +68,7 @@ impl WaterChoices {
 
     /// Choices that the backend or the fidelity doesn't look at.
     pub(crate) fn without_effect(&self) -> Vec<String> {
-        use super::fidelity::Knob::{Rank, ResolvedGap};
+        use super::fidelity::Knob::{Films, Rank, ResolvedGap};
         let mut out = Vec::new();
         if self.backend == Backend::Cpu && self.gpu != GpuSettings::default() {
             out.push("the settings of the GPU have no effect with the backend cpu".into());
@@ -77,10 +77,15 @@ impl WaterChoices {
         for (name, knob, given) in [
             ("rank", Rank, compress.rank.is_some()),
             ("resolved_gap", ResolvedGap, compress.resolved_gap.is_some()),
+            ("films", Films, self.numerics.films),
         ] {
             if given && !self.fidelity.knobs().contains(&knob) {
+                let who = match knob {
+                    Films => "only reduced and auto take it",
+                    _ => "only reduced takes it",
+                };
                 out.push(format!(
-                    "the setting {name} has no effect with the fidelity {}: only reduced takes it",
+                    "the setting {name} has no effect with the fidelity {}: {who}",
                     self.fidelity
                 ));
             }

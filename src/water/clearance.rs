@@ -12,6 +12,8 @@ use crate::scene::Scene;
 use crate::{Error, Result};
 use std::f64::consts::PI;
 
+/// What an error of a gap is about.
+const GAP: &str = "gap in m";
 /// Largest part of a body's volume that may lie inside a larger one that it is declared to overlap.
 const MOST_SHARED: f64 = 0.5;
 /// Edges under which sources inside the bodies don't resolve a flat gap at all: the force between boxes has the wrong sign there.
@@ -41,6 +43,8 @@ pub(crate) struct Clearance {
     pub by_sources: bool,
     /// Whether the flow has a solution where bodies touch.
     pub may_touch: bool,
+    /// Whether gaps that compressed bodies don't resolve have films.
+    pub films: bool,
     /// The narrowest gap that is resolved, in edges.
     pub resolved_edges: f64,
 }
@@ -91,6 +95,7 @@ impl Clearance {
                 .collect(),
             by_sources: false,
             may_touch: true,
+            films: false,
             resolved_edges: 0.0,
         })
     }
@@ -154,7 +159,7 @@ impl Clearance {
             None => Ok(()),
             Some(gap) => Err(Error::Unresolved {
                 place: self.place(gap),
-                quantity: "gap in m".into(),
+                quantity: GAP.into(),
                 value: gap.distance,
                 limit: 0.0,
                 remedy: format!(
@@ -171,29 +176,47 @@ impl Clearance {
         if let Some(gap) = smallest.as_ref().filter(|gap| overlaps(gap)) {
             return Err(Error::Unresolved {
                 place: self.place(gap),
-                quantity: "gap in m".into(),
+                quantity: GAP.into(),
                 value: gap.distance,
                 limit: 0.0,
-                remedy: match self.contact {
-                    true => format!(
-                        "they overlap by {:.3e} m, where the water can't be solved: raise \
-                         contact.stiffness or contact.gap, or take a smaller time step",
-                        -gap.distance
-                    ),
-                    false => format!(
-                        "they overlap by {:.3e} m, and the scene has no contact: give it a section \
-                         [contact], end the run earlier, keep them apart by the controls, or use \
-                         the fidelity isolated{}",
-                        -gap.distance,
-                        self.hint(gap)
-                    ),
-                },
+                remedy: self.part(-gap.distance, &self.hint(gap)),
             });
         }
         self.refuse_film(smallest.as_ref(), poses)?;
         self.refuse_touch(smallest.as_ref())?;
         self.refuse_depth(poses)?;
         Ok(smallest)
+    }
+
+    /// What to do about bodies that get into one another by `depth`, m.
+    fn part(&self, depth: f64, hint: &str) -> String {
+        match self.contact {
+            true => format!(
+                "they overlap by {depth:.3e} m, where the water can't be solved: raise \
+                 contact.stiffness or contact.gap, or take a smaller time step"
+            ),
+            false => format!(
+                "they overlap by {depth:.3e} m, and the scene has no contact: give it a section \
+                 [contact], end the run earlier, keep them apart by the controls, or use \
+                 the fidelity isolated{hint}"
+            ),
+        }
+    }
+
+    /// An error of a step within which bodies get into one another, with what to do about it here.
+    pub fn explain(&self, mut error: Error) -> Error {
+        if let Error::Unresolved {
+            quantity,
+            value,
+            remedy,
+            ..
+        } = &mut error
+            && quantity == GAP
+            && *value <= 0.0
+        {
+            *remedy = self.part(-*value, "");
+        }
+        error
     }
 
     /// Refuses bodies that lie too far inside one another though they may overlap.

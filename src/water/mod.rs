@@ -39,6 +39,8 @@ mod clearance;
 mod device;
 mod estimate;
 mod fidelity;
+#[cfg(test)]
+mod film_limits;
 mod method;
 mod numerics;
 mod prepared;

@@ -17,6 +17,8 @@ pub struct Numerics {
     pub compress: compress::CompressSettings,
     /// Error of M_f, relative to √(M_ii M_jj), that the fidelity `auto` aims at.
     pub accuracy: f64,
+    /// Whether gaps that compressed bodies don't resolve have films.
+    pub films: bool,
 }
 
 impl Default for Numerics {
@@ -26,6 +28,7 @@ impl Default for Numerics {
             solve: SolveSettings::default(),
             compress: compress::CompressSettings::default(),
             accuracy: 0.01,
+            films: false,
         }
     }
 }

@@ -4,7 +4,7 @@ use super::surface::{Coarse, Surface, pose, semi_axes};
 use crate::adjoint::lie::{Mat6, Pose, Vec3};
 use crate::coupling::Coupling;
 use crate::coupling::reduced::Region;
-use crate::geometry::{Refinement, TriMesh};
+use crate::geometry::{Refinement, Solid, TriMesh};
 use crate::multibody::Tree;
 use crate::scene::Scene;
 use crate::{Error, Result};
@@ -21,6 +21,8 @@ pub(crate) struct SubmergedBody<'a> {
     pub mesh: Option<&'a TriMesh>,
     /// The shape by formula and its pose in the body's frame, if it is an ellipsoid.
     pub ellipsoid: Option<([f64; 3], Pose)>,
+    /// The shape by formula as a convex body, where it is one.
+    pub solid: Option<&'a Solid>,
     /// A coarser mesh of the shape, where it is one by formula.
     pub coarse: Option<&'a Coarse>,
     /// Given added mass at unit density.
@@ -104,6 +106,7 @@ pub(crate) fn in_water<'a>(
             mesh: surface.map(|s| &s.mesh),
             ellipsoid: (body.shape.as_ref().and_then(semi_axes))
                 .map(|axes| (axes, pose(&body.shape_at))),
+            solid: surface.and_then(|s| s.solid.as_ref()),
             coarse: surface.and_then(|s| s.coarse.as_ref()),
             added_mass: given
                 .filter(|_| !coupled)

@@ -541,6 +541,8 @@ fn bodies_in_one_another_are_refused() {
     let near = file(&folder, "near.toml", &near);
     let report = json(&["run", &near, "--steps", "1"]);
     assert!(report["warnings"].to_string().contains("smallest gap"));
+    let report = json(&["run", &near, "--steps", "1", "--films"]);
+    assert!(report["warnings"].to_string().contains("films"));
 
     let inside = file(
         &folder,

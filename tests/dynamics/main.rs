@@ -1,6 +1,7 @@
 //! Motion: what it conserves, its gradients, how runs are resumed and ended, and descent on them.
 
 mod extremes;
+mod films;
 #[cfg(feature = "opt")]
 mod grasp;
 mod growth;

@@ -8,7 +8,7 @@ use hydrograd::boundary::{BodyBoundary, Method, MfsSettings, PanelBoundary};
 use hydrograd::coupling::full::{Full, FullSolver, SolveSettings};
 use hydrograd::coupling::reduced::{Cutoff, Reduced, compress};
 use hydrograd::coupling::{
-    Direction, Exclusions, ExtrapolatedPanels, Isolated, Linearise, PanelCoupled,
+    Coupling, Direction, Exclusions, ExtrapolatedPanels, Isolated, Linearise, PanelCoupled,
 };
 use hydrograd::geometry::Image;
 use hydrograd::scene::{Shape, Wall, WallSurface};
@@ -34,13 +34,13 @@ pub fn rungs() -> Vec<Rung> {
         "coupling::response::ResponseLinearised::vjp" => |c| all(systems().iter().map(|s| vjp(s, c)).chain(panel_systems().iter().map(|s| vjp(s, c)))),
         "coupling::response::ResponseLinearised::hvp" => |c| all(systems().iter().map(|s| hvp(s, c)).chain(panel_systems().iter().map(|s| hvp(s, c)))),
         "coupling::panel::extrapolated::ExtrapolatedLinearised::gradient" => |c| gradient(&extrapolated_panels(), c),
-        "coupling::reduced::linearised::ReducedLinearised::gradient" => |c| all(reduced_systems().iter().map(|s| gradient(s, c))),
+        "coupling::reduced::linearised::ReducedLinearised::gradient" => |c| all(reduced_systems().iter().chain(&film_systems()).map(|s| gradient(s, c))),
         "coupling::panel::extrapolated::ExtrapolatedLinearised::gradient_along" => |c| gradient_along(&extrapolated_panels(), c),
-        "coupling::reduced::linearised::ReducedLinearised::gradient_along" => |c| all(reduced_systems().iter().map(|s| gradient_along(s, c))),
+        "coupling::reduced::linearised::ReducedLinearised::gradient_along" => |c| all(reduced_systems().iter().chain(&film_systems()).map(|s| gradient_along(s, c))),
         "coupling::panel::extrapolated::ExtrapolatedLinearised::vjp" => |c| vjp(&extrapolated_panels(), c),
-        "coupling::reduced::linearised::ReducedLinearised::vjp" => |c| all(reduced_systems().iter().map(|s| vjp(s, c))),
+        "coupling::reduced::linearised::ReducedLinearised::vjp" => |c| all(reduced_systems().iter().chain(&film_systems()).map(|s| vjp(s, c))),
         "coupling::panel::extrapolated::ExtrapolatedLinearised::hvp" => |c| hvp(&extrapolated_panels(), c),
-        "coupling::reduced::linearised::ReducedLinearised::hvp" => |c| all(reduced_systems().iter().map(|s| hvp(s, c))),
+        "coupling::reduced::linearised::ReducedLinearised::hvp" => |c| all(reduced_systems().iter().chain(&film_systems()).map(|s| hvp(s, c))),
     ]
 }
 
@@ -185,6 +185,66 @@ fn reduced_systems() -> Vec<Reduced> {
         of(&[WALL, free], None),
         of(&[], fading(0.9, 1.6)),
         of(&[WALL], fading(0.8, 2.9)),
+    ]
+}
+
+/// Compressed bodies that come nearer than they resolve: to one another and to a wall, round ones and with edges, by formula and as meshes. The film
+/// is there: it is what they differ by from those without.
+fn film_systems() -> Vec<Reduced> {
+    const FLOOR: Wall = Wall {
+        point: [0.0, 0.0, 0.45],
+        ..WALL
+    };
+    let of = |shapes: [Shape; 2], walls: &[Wall], by_formula: bool| {
+        let built = shapes.map(|shape| {
+            let mesh = shape::build(&shape, Path::new("."), Some(320)).unwrap();
+            let b = BodyBoundary::new("b", &mesh, &MfsSettings::default()).unwrap();
+            let settings = compress::CompressSettings {
+                rank: Some(20),
+                ..compress::CompressSettings::default()
+            };
+            let body = compress::compress("b", &mesh, &b, &settings, &[]).unwrap();
+            let solid = shape::solid(&shape, Pose::identity()).unwrap();
+            (mesh, Arc::new(body), solid.filter(|_| by_formula))
+        });
+        let bodies = built.iter().map(|(_, body, _)| body.clone()).collect();
+        let plain = Reduced::new(bodies, walls, |_, _| None).unwrap();
+        let surfaces = built.iter().map(|(mesh, _, solid)| (mesh, solid.as_ref()));
+        let filmed = plain.clone();
+        let filmed = filmed
+            .with_films(&surfaces.collect::<Vec<_>>(), walls)
+            .unwrap();
+        let momenta = |s: &Reduced| {
+            s.evaluate(&poses(), &case().basis)
+                .unwrap()
+                .momenta()
+                .clone()
+        };
+        let there = (momenta(&plain) - momenta(&filmed)).amax();
+        assert!(there > 1e-5, "no film: {there:e}");
+        filmed
+    };
+    let egg = Shape::ellipsoid([0.65, 0.45, 0.5]);
+    let (block, can) = (
+        Shape::cuboid([0.83, 0.71, 0.77]),
+        Shape::cylinder(0.42, 0.83),
+    );
+    vec![
+        of([Shape::sphere(0.57), egg.clone()], &[], true),
+        of(
+            [Shape::sphere(0.5), Shape::ellipsoid([0.3, 0.2, 0.4])],
+            &[FLOOR],
+            true,
+        ),
+        of([block.clone(), can.clone()], &[], true),
+        of(
+            [
+                Shape::cylinder(0.425, 0.835),
+                Shape::cuboid([0.835, 0.715, 0.775]),
+            ],
+            &[],
+            false,
+        ),
     ]
 }
 

@@ -294,6 +294,8 @@ fn two_spheres() {
                 full().faces(720).method(Method::Panel),
                 reduced().method(Method::Panel).faces(320),
                 reduced().method(Method::MfsVertex).faces(320),
+                reduced().films(true),
+                reduced().films(true).method(Method::Panel).faces(320),
                 Settings::default().fidelity(Fidelity::Auto).accuracy(0.1),
             ],
         );
@@ -325,6 +327,8 @@ fn sphere_and_wall() {
                 reduced().method(Method::Panel).faces(320),
                 reduced().rank(20),
                 reduced().rank(80),
+                reduced().films(true),
+                reduced().films(true).method(Method::Panel).faces(320),
                 reduced().resolved_gap(0.5).rank(20),
                 reduced().accuracy(1e-3),
             ],

@@ -4,6 +4,7 @@ mod analytic;
 mod auto;
 mod estimate;
 mod exact;
+mod films;
 mod flow;
 mod gap_check;
 mod methods;

@@ -1,11 +1,12 @@
 //! One evaluation of the reduced coupling: value and first derivative. What a value costs is all that the derivatives need.
 
 use super::Reduced;
-use super::link::{Link, PlacedSkeletons};
+use super::link::{Apart, Link, PlacedSkeletons};
 use super::views::{FLUX, interleave, view, view_mut};
 use crate::Result;
 use crate::adjoint::kernel::{Points, potential_sum, potential_vjp};
-use crate::adjoint::lie::{Pose, Vec3, Vec6, point_wrench};
+use crate::adjoint::lie::{Pose, Vec3, Vec6, linear, point_wrench};
+use crate::coupling::film::PlacedFilm;
 use crate::coupling::pair::{vector, wrench};
 use crate::coupling::{
     Coupling, CouplingReport, Direction, Linearise, Linearised, Momenta, Pullback, Tangent,
@@ -27,6 +28,8 @@ pub(super) struct ReducedLinearised<'a> {
     pub reduced: &'a Reduced,
     pub poses: Vec<Pose>,
     pub placed: Vec<PlacedSkeletons<'a>>,
+    /// Of the gaps; none of those that are wide.
+    films: Vec<Option<PlacedFilm<'a>>>,
     /// Of I − LᵀGL.
     factor: Cholesky,
     /// LᵀGŪ, modes × 6 bodies.
@@ -53,7 +56,7 @@ struct Fields {
 
 /// Solution to one combination of twists.
 pub(super) struct ReducedResponse {
-    twists: DVector<f64>,
+    pub twists: DVector<f64>,
     a: DVector<f64>,
     /// α, all points.
     pub alpha: DVector<f64>,
@@ -61,8 +64,9 @@ pub(super) struct ReducedResponse {
 
 impl<'a> ReducedLinearised<'a> {
     pub fn new(reduced: &'a Reduced, poses: &[Pose], basis: &DMatrix<f64>) -> Result<Self> {
+        let films = reduced.placed_films(poses)?;
         let place = |link: &'a Link| {
-            let placed = link.place(&reduced.bodies, poses)?;
+            let placed = link.place(&reduced.bodies, poses, &films)?;
             let block = block(reduced, &placed);
             Some((placed, block))
         };
@@ -93,6 +97,7 @@ impl<'a> ReducedLinearised<'a> {
             reduced,
             poses: poses.to_vec(),
             placed,
+            films,
             factor,
             a: &solution * basis,
             solution,
@@ -138,6 +143,8 @@ impl<'a> ReducedLinearised<'a> {
             let mut rows = out.rows_mut(6 * b, 6);
             rows += body.parts().added_mass * twists.rows(6 * b, 6);
         }
+        let films = self.films.iter().flatten();
+        films.for_each(|film| film.add_impulses(twists, &mut out));
         out
     }
 
@@ -188,9 +195,33 @@ impl<'a> ReducedLinearised<'a> {
         (alpha, FLUX * (direct + self.solution.tr_mul(&a)))
     }
 
+    /// Films that are there.
+    pub fn films(&self) -> impl Iterator<Item = &PlacedFilm<'a>> {
+        self.films.iter().flatten()
+    }
+
+    /// What holds a link apart, if anything does.
+    pub fn apart<'p>(
+        &'p self,
+        placed: &'p PlacedSkeletons,
+    ) -> Option<(&'p Apart, &'p PlacedFilm<'a>)> {
+        let apart = placed.apart.as_ref()?;
+        Some((apart, self.films[apart.film].as_ref()?))
+    }
+
+    /// Adds the wrench of a link and of what holds it apart, of which the first part of the wrench is by forces on the points.
+    pub fn apply(&self, placed: &PlacedSkeletons, wrench: &Vec6, force: &Vec3, out: &mut [Vec6]) {
+        placed
+            .pair
+            .apply(&self.poses[placed.link.target], wrench, out);
+        if let Some((apart, film)) = self.apart(placed) {
+            film.apply(&apart.wrench(film, force), out);
+        }
+    }
+
     /// 4π α_xᵀ δG α_y: the Coulomb forces among the charges, as a wrench on each body.
     fn pull_back(&self, x: &[f64], y: &[f64]) -> Vec<Vec6> {
-        let one = |placed: &PlacedSkeletons| -> Vec6 {
+        let one = |placed: &PlacedSkeletons| -> (Vec6, Vec3) {
             let link = placed.link;
             let (t, s) = (self.range(link.target), self.range(link.source));
             // Equal charges need one field.
@@ -208,6 +239,7 @@ impl<'a> ReducedLinearised<'a> {
                 let at = |k| vector(&field, columns, j, k);
                 strength * placed.weight[0] * (at(0) * y[j] + at(last) * x[j])
             });
+            let force = linear(&total);
             if placed.fading() {
                 let p = self.sums(placed, &bar, columns);
                 let of = |j: usize| p[columns * j] * y[j] + p[columns * j + last] * x[j];
@@ -215,15 +247,19 @@ impl<'a> ReducedLinearised<'a> {
                 let force = placed.between.normalize() * (strength * placed.weight[1] * energy);
                 total += point_wrench(&placed.centre, &force);
             }
-            total
+            (total, force)
         };
         let wrenches = self.reduced.over(&self.placed, PULL, one);
         let mut out = vec![Vec6::zeros(); self.reduced.bodies.len()];
-        for (placed, wrench) in self.placed.iter().zip(&wrenches) {
-            let pose = &self.poses[placed.link.target];
-            placed.pair.apply(pose, wrench, &mut out);
+        for (placed, (wrench, force)) in self.placed.iter().zip(&wrenches) {
+            self.apply(placed, wrench, force, &mut out);
         }
         out
+    }
+
+    fn pull_back_films(&self, x: &DVector<f64>, y: &DVector<f64>, out: &mut [Vec6]) {
+        self.films()
+            .for_each(|film| film.apply(&film.wrench(x, y), out));
     }
 
     fn fields(&self) -> &[Fields] {
@@ -263,6 +299,7 @@ impl<'a> ReducedLinearised<'a> {
                     let force = seen[j] * charges[(j, k)] + at(j, k) * along[j];
                     strength * placed.weight[0] * force
                 });
+                let pushed = linear(&total);
                 if placed.fading() {
                     let p = |j: usize, k: usize| f.sums[columns * j + k];
                     let of = |j: usize| {
@@ -274,8 +311,14 @@ impl<'a> ReducedLinearised<'a> {
                     let force = placed.between.normalize() * slope;
                     total += point_wrench(&placed.centre, &force);
                 }
-                placed.pair.apply(&self.poses[link.target], &total, out);
+                self.apply(placed, &total, &pushed, out);
             }
+        }
+        let twists = &self.basis * x;
+        for film in self.films() {
+            let wrenches = film.wrenches(&twists, &self.basis);
+            let each = out.iter_mut().zip(&wrenches);
+            each.for_each(|(out, wrench)| film.apply(wrench, out));
         }
         out
     }
@@ -346,8 +389,10 @@ impl Linearised for ReducedLinearised<'_> {
     }
 
     fn gradient(&self, x: &DVector<f64>, y: &DVector<f64>) -> Result<Vec<Vec6>> {
-        let (x, y) = (&self.alpha * x, &self.alpha * y);
-        Ok(self.pull_back(x.as_slice(), y.as_slice()))
+        let (a, b) = (&self.alpha * x, &self.alpha * y);
+        let mut out = self.pull_back(a.as_slice(), b.as_slice());
+        self.pull_back_films(&(&self.basis * x), &(&self.basis * y), &mut out);
+        Ok(out)
     }
 
     fn gradient_columns(&self, x: &DVector<f64>) -> Result<Vec<Vec<Vec6>>> {
@@ -355,17 +400,27 @@ impl Linearised for ReducedLinearised<'_> {
     }
 
     fn gradient_along(&self, y: &DVector<f64>, z: &[Vec6]) -> Result<DVector<f64>> {
-        let y = &self.alpha * y;
-        let (psi, _) = self.tangent_potentials(&[y.as_slice()], z);
-        Ok(FLUX * self.alpha.tr_mul(&psi.column(0)))
+        let charges = &self.alpha * y;
+        let (psi, _) = self.tangent_potentials(&[charges.as_slice()], z);
+        let mut out = FLUX * self.alpha.tr_mul(&psi.column(0));
+        let twists = &self.basis * y;
+        for film in self.films() {
+            let along = film.displacement(z);
+            let wrenches = film.wrenches(&twists, &self.basis);
+            let each = out.iter_mut().zip(&wrenches);
+            each.for_each(|(out, wrench)| *out += wrench.dot(&along));
+        }
+        Ok(out)
     }
 
     fn vjp(&self, x: Direction, y: Direction) -> Result<Pullback> {
         let (x, y) = (self.respond(x), self.respond(y));
+        let mut wrench = self.pull_back(x.alpha.as_slice(), y.alpha.as_slice());
+        self.pull_back_films(&x.twists, &y.twists, &mut wrench);
         Ok(Pullback {
             momentum_x: self.impulse(&x),
             momentum_y: self.impulse(&y),
-            wrench: self.pull_back(x.alpha.as_slice(), y.alpha.as_slice()),
+            wrench,
         })
     }
 

@@ -13,6 +13,8 @@
 //! δ²E(x, y) = 4π [ α_xᵀ δδG α_y + δα_xᵀ δG α_y + α_xᵀ δG δα_y ]
 //! ```
 //!
+//! Where a gap is below what the sources resolve they are held apart, and the film in it has its own added mass ([`film`](crate::coupling::film)).
+//!
 //! `I − LᵀGL` is symmetric, and positive definite while the bodies are apart: a Cholesky
 //! factorisation that fails tells of a gap that the sources don't resolve.
 
@@ -20,6 +22,7 @@ mod body;
 pub mod cache;
 mod check;
 pub mod compress;
+mod films;
 mod linearised;
 mod link;
 mod region;
@@ -32,6 +35,7 @@ pub use link::{Cutoff, Link};
 pub use region::Region;
 
 use super::Exclusions;
+use super::film::{Film, Side};
 use super::settings::{end, ranges};
 use crate::Result;
 use crate::geometry::{Image, Wall};
@@ -49,6 +53,8 @@ pub struct Reduced {
     /// For messages: bodies of equal shape share what they are compressed to.
     names: Vec<String>,
     links: Vec<Link>,
+    /// Of gaps that the sources don't resolve.
+    films: Vec<Film>,
     points: Vec<Range<usize>>,
     modes: Vec<Range<usize>>,
 }
@@ -70,6 +76,7 @@ impl Reduced {
             points: ranges(bodies.iter().map(|b| b.points())),
             modes: ranges(bodies.iter().map(|b| b.modes())),
             links,
+            films: Vec::new(),
             names: bodies.iter().map(|b| b.parts().name.clone()).collect(),
             bodies,
         })
@@ -83,6 +90,10 @@ impl Reduced {
         pairs.check(self.bodies.len())?;
         let apart = |l: &Link| !l.image.is_identity() || !pairs.contains(l.target, l.source);
         self.links.retain(apart);
+        self.films.retain(|film| match film.other {
+            Side::Body(b) => !pairs.contains(film.body, b),
+            Side::Wall(_) => true,
+        });
         Ok(self)
     }
 

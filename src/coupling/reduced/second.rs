@@ -1,10 +1,11 @@
 //! Second derivatives along one displacement: the tangent of the first.
 
 use super::linearised::{ReducedLinearised, ReducedResponse};
-use super::link::PlacedSkeletons;
+use super::link::{Apart, PlacedSkeletons};
 use super::views::{FLUX, interleave};
 use crate::adjoint::kernel::{potential_hvp, potential_jvp, potential_vjp};
-use crate::adjoint::lie::{Vec3, Vec6, point_velocity, point_wrench, six};
+use crate::adjoint::lie::{Vec3, Vec6, linear, point_velocity, point_wrench, six};
+use crate::coupling::film::PlacedFilm;
 use crate::coupling::pair::vector;
 use crate::coupling::{Direction, Tangent};
 use nalgebra::{DMatrix, DVector};
@@ -14,8 +15,10 @@ const TANGENT: usize = 3;
 
 /// A link along a displacement.
 pub(super) struct Moved {
-    /// Of each source point, in the target's frame relative to the target, m.
+    /// Of each source point as it is seen, in the target's frame relative to the target, m.
     points: Vec<Vec3>,
+    /// Of the source body's own points.
+    arms: Vec<Vec3>,
     /// Of the source body's centre.
     centre: Vec3,
     /// Rate of the distance of the centres.
@@ -33,8 +36,13 @@ impl ReducedLinearised<'_> {
         } else {
             0.0
         };
+        let arms = placed.pair.displacements(pose, z);
+        let rate_of =
+            |(apart, film): (&Apart, &PlacedFilm)| apart.rate(film, &film.displacement(z));
+        let shift = self.apart(placed).map_or(Vec3::zeros(), rate_of);
         Moved {
-            points: placed.pair.displacements(pose, z),
+            points: arms.iter().map(|d| d + shift).collect(),
+            arms,
             centre,
             rate,
         }
@@ -119,29 +127,48 @@ impl ReducedLinearised<'_> {
         let parts = self.reduced.over(&links, TANGENT, one);
         let mut gradient = vec![Vec6::zeros(); self.reduced.bodies.len()];
         let mut wrench = gradient.clone();
-        for (placed, (w, dw)) in self.placed.iter().zip(&parts) {
+        for (placed, ([w, dw], [f, df])) in self.placed.iter().zip(&parts) {
             let t = placed.link.target;
             let pose = &self.poses[t];
-            placed.pair.apply(pose, w, &mut gradient);
+            self.apply(placed, w, f, &mut gradient);
             placed.pair.apply_jvp(pose, w, dw, &z[t], &mut wrench);
+            if let Some((apart, film)) = self.apart(placed) {
+                let along = film.displacement(z);
+                let (w, dw) = (
+                    apart.wrench(film, f),
+                    apart.wrench_tangent(film, [f, df], &along),
+                );
+                film.apply_tangent(&w, &dw, z, &mut wrench);
+            }
         }
-        let momentum = |k: usize| -> DVector<f64> { dmomenta.column(k).into_owned() };
+        let mut momenta: Vec<DVector<f64>> =
+            (0..n).map(|k| dmomenta.column(k).into_owned()).collect();
+        for film in self.films() {
+            let along = film.displacement(z);
+            let (x, y) = (&responses[0].twists, &responses[n - 1].twists);
+            let (w, dw) = film.wrench_tangent(x, y, &along);
+            film.apply(&w, &mut gradient);
+            film.apply_tangent(&w, &dw, z, &mut wrench);
+            for (momentum, response) in momenta.iter_mut().zip(&responses) {
+                film.add_impulse_tangent(&response.twists, &along, momentum);
+            }
+        }
         Tangent {
-            momentum_x: momentum(0),
-            momentum_y: momentum(n - 1),
+            momentum_x: momenta[0].clone(),
+            momentum_y: momenta.swap_remove(n - 1),
             gradient,
             wrench,
         }
     }
 
-    /// Wrench on the sources of a link and its tangent, in the target's frame.
+    /// Wrench on the sources of a link and its tangent, in the target's frame; and of the forces on its points alone.
     fn link_tangent(
         &self,
         placed: &PlacedSkeletons,
         (moved, field): &(Moved, Vec<f64>),
         responses: &[ReducedResponse],
         dalpha: &DMatrix<f64>,
-    ) -> (Vec6, Vec6) {
+    ) -> ([Vec6; 2], [Vec3; 2]) {
         let (n, last) = (responses.len(), responses.len() - 1);
         let link = placed.link;
         let (t, s) = (self.range(link.target), self.range(link.source));
@@ -187,11 +214,9 @@ impl ReducedLinearised<'_> {
             denergy += f.dot(&moved.points[j]);
             let (force, dforce) = (weight * f, weight * df + slope * moved.rate * f);
             w += point_wrench(at, &force);
-            dw += six(
-                &dforce,
-                &(moved.points[j].cross(&force) + at.cross(&dforce)),
-            );
+            dw += six(&dforce, &(moved.arms[j].cross(&force) + at.cross(&dforce)));
         }
+        let forces = [linear(&w), linear(&dw)];
         if placed.fading() {
             let distance = placed.between.norm();
             let e = placed.between / distance;
@@ -204,6 +229,6 @@ impl ReducedLinearised<'_> {
                 &(moved.centre.cross(&force) + placed.centre.cross(&dforce)),
             );
         }
-        (w, dw)
+        ([w, dw], forces)
     }
 }

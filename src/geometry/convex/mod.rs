@@ -66,7 +66,7 @@ impl Form {
     }
 
     /// Signed distance of a point, without the radius.
-    fn field(&self, y: &Vec3) -> Field {
+    pub(super) fn field(&self, y: &Vec3) -> Field {
         match self {
             Self::Ellipsoid(ellipsoid) => ellipsoid.field(y),
             Self::Cylinder(cylinder) => cylinder.field(y),
@@ -78,7 +78,7 @@ impl Form {
     }
 
     /// What is about it.
-    fn radius(&self) -> f64 {
+    pub(super) fn radius(&self) -> f64 {
         match self {
             Self::Core(core) => core.radius,
             Self::Ellipsoid(_) | Self::Cylinder(_) => 0.0,

@@ -6,6 +6,8 @@
 //! One more column, a fixed one with a part along every eigenvector, tells of a system that isn't positive
 //! definite and of its condition number, whatever the others ask for.
 //!
+//! Where gaps are so narrow that there are films in them, the CPU answers instead.
+//!
 //! With images their own inverses, G is symmetric over all points, and the force on a point is what both columns'
 //! charges pull with there: derivatives are a pass over G for the pulls, and sums over each body.
 
@@ -89,6 +91,9 @@ impl Coupling for GpuReduced {
     }
 
     fn evaluate(&self, poses: &[Pose], basis: &DMatrix<f64>) -> Result<Momenta> {
+        if self.reduced().narrow(poses)? {
+            return self.reduced().evaluate(poses, basis);
+        }
         let placed = Arc::new(PlacedPoints::new(&self.model, poses)?);
         Ok(Solved::new(placed, self.tolerance, basis)?.value())
     }
@@ -100,6 +105,9 @@ impl Coupling for GpuReduced {
 
 impl Linearise for GpuReduced {
     fn linearise(&self, poses: &[Pose], basis: &DMatrix<f64>) -> Result<Box<dyn Linearised + '_>> {
+        if self.reduced().narrow(poses)? {
+            return self.reduced().linearise(poses, basis);
+        }
         let placed = Arc::new(PlacedPoints::new(&self.model, poses)?);
         let solved = Solved::new(placed, self.tolerance, basis)?;
         Ok(Box::new(solved.linearise()?))

@@ -24,6 +24,8 @@ const LEAST: f64 = 0.01;
 /// Faces a body on which the coupling that `Isolated` leaves out is computed.
 const COUPLING_FACES: usize = 320;
 
+/// What a film's part of the added mass may be off, relative: most where it goes round a curved body, as it does for motions along the gap.
+const FILM: f64 = 0.2;
 /// Most that a gap which isn't resolved may weigh.
 const NARROWEST: f64 = 10.0;
 
@@ -53,6 +55,8 @@ pub(crate) struct Case<'a> {
     pub surfaces: Vec<Option<Surface>>,
     /// What compressed bodies are off from their own methods' answers.
     correction: Option<DMatrix<f64>>,
+    /// What films in narrow gaps add to the matrix.
+    films: DMatrix<f64>,
     pub report: CouplingReport,
 }
 
@@ -102,9 +106,13 @@ impl<'a> Case<'a> {
             diagonal,
             surfaces,
             correction: None,
+            films: DMatrix::zeros(0, 0),
             report,
         };
         if out.fidelity.kind().compresses() {
+            if choices.numerics.films {
+                out.films = out.films(&out.submerged(&out.surfaces))?;
+            }
             out.correction = Some(out.correction(&out.submerged(&out.surfaces))?);
         }
         Ok(out)
@@ -198,10 +206,17 @@ impl<'a> Case<'a> {
         coupling.correction(&self.poses, &self.turn, &responses)
     }
 
-    /// What is left at check points.
+    fn films(&self, bodies: &[SubmergedBody]) -> Result<DMatrix<f64>> {
+        let coupling = compressed_all(&self.problem(bodies))?;
+        let momenta = coupling.film_momenta(&self.poses, &self.turn)?;
+        Ok(symmetric(&self.turn.tr_mul(&momenta)))
+    }
+
+    /// What is left at check points, and what films may be off.
     pub fn residual(&self) -> Result<Option<f64>> {
         if let Some(own) = &self.correction {
-            return Ok(Some(self.size(own) * self.narrowness()));
+            let films = FILM * self.size(&self.films);
+            return Ok(Some(self.size(own) * self.narrowness() + films));
         }
         let coupling = &self.subject.water.coupling;
         let found = coupling.residual(&self.poses, &self.turn)?;

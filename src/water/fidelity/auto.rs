@@ -28,13 +28,13 @@ const SHARE: f64 = 1.0 / 3.0;
 const SAFETY: f64 = 1.5;
 /// Where a pair begins to fade, of the distance where it is gone.
 const NEAR: f64 = 0.8;
-/// What is resolved, of the smallest gap at the start: bodies may come nearer. Where a film holds the energy ([`FILM`]), what compression leaves out
-/// weighs more.
+/// What is resolved, of the smallest gap at the start: bodies may come nearer. Where a film holds the energy ([`FILM`]), and none is computed, what
+/// compression leaves out weighs more.
 const ROOM: f64 = 0.6;
 const ROOM_FILM: f64 = 0.3;
 /// Bodies that start apart may come near: they resolve this many times the gap that they would without a plan.
 const COARSEST: f64 = 2.0;
-/// Gaps under this part of the finest that compression resolves are left to the fidelity `Full`, whose forces are nearer there at all gaps and
+/// Without films, gaps under this part of the finest that compression resolves are left to the fidelity `Full`, whose forces are nearer there at all gaps and
 /// shapes that were measured (docs/accuracy-coupled.md).
 const HOPELESS: f64 = 0.5;
 /// The same where the film in a gap has more than an energy (that of [`StartGap::film`]): between flat parts, and such as are nearly so.
@@ -51,7 +51,7 @@ pub(super) struct Auto;
 
 impl FidelityKind for Auto {
     fn knobs(&self) -> &'static [Knob] {
-        &[Knob::Accuracy]
+        &[Knob::Accuracy, Knob::Films]
     }
 
     fn chooses(&self) -> bool {
@@ -128,11 +128,12 @@ fn plan(problem: &Problem, poses: &[Pose], gaps: &[StartGap]) -> Result<Planned>
         let finest = compress::finest_gap(mesh.surface_area());
         // Who refines a body means its gaps to be resolved there.
         let refined = body.regions.iter().map(|r| r.gap).fold(finest, f64::min);
-        let hopeless = near().any(|g| {
-            let film = HOPELESS_FILM.iter().find(|(film, _)| g.film > *film);
-            let part = film.map_or(HOPELESS, |(_, part)| *part);
-            g.gap.image_distance() < part * refined
-        });
+        let hopeless = !problem.films
+            && near().any(|g| {
+                let film = HOPELESS_FILM.iter().find(|(film, _)| g.film > *film);
+                let part = film.map_or(HOPELESS, |(_, part)| *part);
+                g.gap.image_distance() < part * refined
+            });
         let rigid = walls.iter().all(|w| w.surface == WallSurface::Rigid);
         if hopeless && rigid {
             let coarse = nearest.is_some_and(|g| edge > COARSE * smaller(bodies, g));
@@ -150,7 +151,7 @@ fn plan(problem: &Problem, poses: &[Pose], gaps: &[StartGap]) -> Result<Planned>
             ));
         }
         let coarsest = COARSEST * compress::default_gap(properties.volume, mesh.surface_area());
-        let room = match near().any(|g| g.film > FILM) {
+        let room = match !problem.films && near().any(|g| g.film > FILM) {
             true => ROOM_FILM,
             false => ROOM,
         };

@@ -15,6 +15,8 @@ pub enum Knob {
     Rank,
     /// Smallest gap that compressed bodies resolve.
     ResolvedGap,
+    /// Whether gaps that compressed bodies don't resolve have films.
+    Films,
     /// The error aimed at.
     Accuracy,
     /// Residual at which the coupled solve stops.

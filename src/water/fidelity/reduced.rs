@@ -18,7 +18,7 @@ pub(super) struct Reduced;
 
 impl FidelityKind for Reduced {
     fn knobs(&self) -> &'static [Knob] {
-        &[Knob::Rank, Knob::ResolvedGap, Knob::Accuracy]
+        &[Knob::Rank, Knob::ResolvedGap, Knob::Accuracy, Knob::Films]
     }
 
     fn aim(&self, numerics: &Numerics) -> Option<f64> {
@@ -60,9 +60,24 @@ impl FidelityKind for Reduced {
         compressed
     }
 
-    // Said pair by pair: what is resolved differs between bodies.
-    fn gap_warning(&self, _: &Gap, _: f64, _: &str, _: &str, _: &str) -> Option<String> {
-        None
+    // Without films it is said pair by pair: what is resolved differs between bodies.
+    fn gap_warning(
+        &self,
+        gap: &Gap,
+        edges: f64,
+        place: &str,
+        time: &str,
+        hint: &str,
+    ) -> Option<String> {
+        let resolved = edges * gap.edge;
+        (gap.distance < resolved).then(|| {
+            format!(
+                "{place}: the smallest gap, {:.3e} m at t = {time} s, is narrower than the films between the bodies resolve ({resolved:.3e} m, {edges} of the edges there): \
+                 forces across it may be off by several percent and more (`check_gap` measures by how much); use more faces, refine the bodies there (`refine`), or end \
+                 the run before{hint}",
+                gap.distance.max(0.0)
+            )
+        })
     }
 
     fn error(&self, bodies: f64, residual: Option<f64>, _: Option<f64>) -> Option<f64> {
@@ -84,9 +99,18 @@ pub(in crate::water) fn compressed_all(problem: &Problem) -> Result<reduced::Red
         found.map(|(_, cutoff)| *cutoff)
     };
     let names = bodies.iter().map(|b| b.name.to_string());
-    Ok(reduced::Reduced::new(made, problem.walls, cutoff)?
-        .excluding(&problem.excluded)?
-        .named(names))
+    let mut coupling = reduced::Reduced::new(made, problem.walls, cutoff)?.named(names);
+    if problem.films {
+        let mut surfaces = Vec::with_capacity(bodies.len());
+        for body in bodies {
+            // Finer faces in regions are for the sources; the film's potential is smooth.
+            let mesh = body.surface("the fidelity reduced")?;
+            let coarse = body.coarse.filter(|_| !body.regions.is_empty());
+            surfaces.push((coarse.map_or(mesh, |c| &c.mesh), body.solid));
+        }
+        coupling = coupling.with_films(&surfaces, problem.walls)?;
+    }
+    coupling.excluding(&problem.excluded)
 }
 
 /// What each body answers by its own method; bodies that are equal share one. Sources as near as
@@ -207,6 +231,7 @@ fn compressed(
         name: body.name,
         mesh: Some(&mesh),
         ellipsoid,
+        solid: None,
         coarse: coarse.as_ref(),
         added_mass: None,
         regions: Vec::new(),

@@ -1,0 +1,194 @@
+//! A film's thickness at given poses, and where it ends.
+
+use super::jet::{Displaced, Jet, Vector, add, distance, dot, real, scale};
+use super::surface::Element;
+use super::{FilmSurface, Width};
+use crate::adjoint::lie::Pose;
+use crate::geometry::{Field, Opposite};
+
+/// Power of the distances with which vertices count in a link's gap.
+const NEAREST: i32 = 6;
+/// Distances between which the flow in a film goes over into that around the bodies, in sizes of the first.
+const RIM: [f64; 2] = [0.5, 1.0];
+/// The same in cosines between the surface's normal and the way across: the sides of a block still lead the flow, its back doesn't.
+const BACK: [f64; 2] = [-0.1, -0.6];
+/// How well the rim leads the flow away.
+const OPENING: f64 = 20.0;
+/// The length β/sin β of an arc across a wedge of the angle β, in its height, by powers of sin² β: the series up to the third, and what is left at a right
+/// angle in the last.
+const ARC: [f64; 4] = [1.0, 1.0 / 6.0, 3.0 / 40.0, 5.0 / 112.0];
+const STEEP: i32 = 8;
+/// Of the series of √(1 − s), from s on: where the two stand at a right angle it is smooth, and a third too large.
+const COSINE: [f64; 3] = [-0.5, -1.0 / 8.0, -1.0 / 16.0];
+/// Largest square of a sine that elements may give to rounding and their own size.
+const STEEPEST: f64 = 1.2;
+
+/// A film between a surface and what is opposite.
+pub(super) struct Layer<D> {
+    /// How far the two are held apart for those that don't resolve the gap, and in which direction: from the first to the other, in the frame of each.
+    pub shift: [Vector<D>; 2],
+    /// Numbers of the vertices at which there is a potential.
+    pub active: Vec<usize>,
+    /// How well each leads into the open, m.
+    pub rim: Vec<D>,
+    /// Faces with one of them at least.
+    pub cells: Vec<Cell<D>>,
+}
+
+/// A face's part of a film.
+pub(super) struct Cell<D> {
+    pub face: usize,
+    /// Number of each corner among the active ones.
+    pub corners: [Option<usize>; 3],
+    /// m: as it is, and held apart.
+    pub thickness: [D; 2],
+    /// Unit normal of the other side as it is, also for what is held apart: the difference of both then has no negative energy.
+    pub facing: Vector<D>,
+}
+
+impl<D: Jet> Layer<D> {
+    /// With the pose of the surface in the frame of what is opposite; none where that is farther than `width` reaches. `Err` gives a distance that isn't
+    /// positive.
+    pub fn new(
+        surface: &FilmSurface,
+        opposite: &Opposite,
+        pose: &Pose,
+        width: &Width,
+    ) -> Result<Option<Self>, f64> {
+        let middle = opposite.field(&pose.apply(&surface.center));
+        if middle.distance - surface.radius > width.reach {
+            return Ok(None);
+        }
+        let placed = Displaced::<D>::new(pose);
+        let end = RIM[1] * surface.size;
+        let reals = surface.vertices.iter().map(|x| pose.apply(x));
+        let fields: Vec<Field> = reals.map(|p| opposite.field(&p)).collect();
+        let mut needed: Vec<bool> = fields.iter().map(|f| f.distance < end).collect();
+        let near = needed.clone();
+        for face in surface
+            .faces
+            .iter()
+            .filter(|f| f.corners.iter().any(|v| near[*v]))
+        {
+            face.corners.iter().for_each(|v| needed[*v] = true);
+        }
+        let points: Vec<Option<Vector<D>>> = (surface.vertices.iter().zip(&needed))
+            .map(|(x, needed)| needed.then(|| placed.apply(x)))
+            .collect();
+        let distances: Vec<Option<D>> = (points.iter().zip(&fields))
+            .map(|(p, field)| p.as_ref().map(|p| distance(field, p)))
+            .collect();
+        let lowest = fields
+            .iter()
+            .map(|f| f.distance)
+            .fold(f64::INFINITY, f64::min);
+        if lowest <= 0.0 {
+            return Err(lowest);
+        }
+        // The gap of the link, and the mean normal where it is smallest.
+        let (mut sum, mut gap, mut normal) = (D::from(0.0), D::from(0.0), [D::from(0.0); 3]);
+        for (v, d) in distances.iter().enumerate().filter(|(v, _)| near[*v]) {
+            let Some(d) = *d else { continue };
+            let fade = (-d / end + 1.0).powi(3);
+            let weight = (d / width.reach).powi(-NEAREST) * fade * surface.areas[v];
+            sum += weight;
+            gap += weight * d;
+            let n = &surface.normals[v];
+            (0..3).for_each(|i| normal[i] += weight * n[i]);
+        }
+        if sum.re() <= 0.0 {
+            return Ok(None);
+        }
+        let gap = gap / sum;
+        if gap.re() >= width.reach {
+            return Ok(None);
+        }
+        let normal = match opposite.wall_normal() {
+            Some(wall) => placed.rotate_inverse(&-wall),
+            None => normal.map(|x| x / sum),
+        };
+        let wider = (-gap / width.reach + 1.0).powi(3) * width.floor;
+        let own = scale(wider, &normal);
+        let other = placed.rotate(&own);
+        let back = other.map(|x| -x);
+        let apart: Vec<Option<D>> = (points.iter())
+            .map(|p| {
+                let p = add(p.as_ref()?, &back);
+                Some(distance(&opposite.field(&real(&p)), &p))
+            })
+            .collect();
+        let mut out = Self {
+            shift: [own, other],
+            active: Vec::new(),
+            rim: Vec::new(),
+            cells: Vec::new(),
+        };
+        let mut numbers: Vec<Option<usize>> = vec![None; points.len()];
+        for (v, d) in distances.iter().enumerate().filter(|(v, _)| near[*v]) {
+            let Some(d) = *d else { continue };
+            let start = RIM[0] * surface.size;
+            let outside = (d - start) / (end - start);
+            let facing = dot(&normal, &surface.normals[v]);
+            let behind = (facing - BACK[0]) / (BACK[1] - BACK[0]);
+            if outside.re() < 1.0 && behind.re() < 1.0 {
+                numbers[v] = Some(out.active.len());
+                out.active.push(v);
+                out.rim
+                    .push((opening(outside) + opening(behind)) * (OPENING * surface.areas[v]) / d);
+            }
+        }
+        for (f, face) in surface.faces.iter().enumerate() {
+            let corners = face.corners.map(|v| numbers[v]);
+            if corners.iter().all(Option::is_none) {
+                continue;
+            }
+            let of = |all: &[Option<D>]| face.corners.map(|v| all[v].unwrap_or(D::from(end)));
+            let [near, held] = [of(&distances), of(&apart)];
+            out.cells.push(Cell {
+                face: f,
+                corners,
+                thickness: [near, held].map(|d| thickness(&d, &face.slopes)),
+                facing: facing(&near, face),
+            });
+        }
+        Ok(Some(out))
+    }
+}
+
+/// t³/(1 − t)³ from 0 on.
+fn opening<D: Jet>(t: D) -> D {
+    if t.re() <= 0.0 {
+        return D::from(0.0);
+    }
+    (t / (-t + 1.0)).powi(3)
+}
+
+/// The length of the arc that meets both surfaces at right angles, of a face with these distances at its corners: 1/(mean of 1/length), which is what the flow
+/// across lines of equal thickness feels.
+fn thickness<D: Jet>(d: &[D; 3], slopes: &nalgebra::Matrix3<f64>) -> D {
+    let mut steep = D::from(0.0);
+    for i in 0..3 {
+        steep += d[i] * d[i] * slopes[(i, i)];
+        steep += d[i] * d[(i + 1) % 3] * (2.0 * slopes[(i, (i + 1) % 3)]);
+    }
+    if steep.re() > STEEPEST {
+        steep = D::from(STEEPEST);
+    }
+    let last = std::f64::consts::FRAC_PI_2 - ARC.iter().sum::<f64>();
+    let [a, b, c, e] = ARC;
+    let arc = steep * (steep * (steep * e + c) + b) + a + steep.powi(STEEP) * last;
+    let inverse: D = (0..3).map(|i| (d[i] + d[(i + 1) % 3]).recip()).sum();
+    arc * 1.5 / inverse
+}
+
+/// The other side's normal: its part along the face is what the distances do there. The arcs that meet both at right angles cut equal areas off both.
+fn facing<D: Jet>(d: &[D; 3], face: &Element) -> Vector<D> {
+    let along: Vector<D> = std::array::from_fn(|i| {
+        let g = &face.gradients;
+        d[0] * g[(i, 0)] + d[1] * g[(i, 1)] + d[2] * g[(i, 2)]
+    });
+    let square = along[0] * along[0] + along[1] * along[1] + along[2] * along[2];
+    let [a, b, c] = COSINE;
+    let cosine = square * (square * (square * c + b) + a) + 1.0;
+    std::array::from_fn(|i| along[i] - cosine * face.normal[i])
+}

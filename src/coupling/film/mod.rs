@@ -1,0 +1,69 @@
+//! Films: the water in a gap that is narrow against the bodies.
+//!
+//! In a thin gap the flow runs along it. With the potential ψ over the film, its thickness H, and what both surfaces push into it,
+//!
+//! ```text
+//! div(H ∇ψ) = −flux,      ψ = 0 in the open,      E = ½ ρ ∫ H |∇ψ|² dA = ½ ρ vᵀ K v,      K = bᵀ A⁻¹ b
+//! δ(vᵀ K v) = −ψᵀ δA ψ                                                     stationary: no adjoint solve
+//! ```
+//!
+//! where v are the twists of both bodies, each of which pushes along its own normals. It is solved on one body's own faces by linear elements, so that nothing is meshed at run time: a vertex is as
+//! far as the exact distance to what is opposite, H is the length of the arc that meets both surfaces at right angles, and what that distance does along a
+//! face says at which angle they stand. Along the side of a block over a wall H then is π/2 times the height, which is the flow into a quarter of the
+//! plane: rims need nothing of their own.
+//!
+//! A coupling that doesn't resolve a gap h is asked for one that is held apart, with the floor h₀ below the reach h_m,
+//!
+//! ```text
+//! h_f = h + h₀ (1 − h/h_m)³,      M(h) = M_coupling(h_f) + K(h) − K(h_f)
+//! ```
+//!
+//! twice continuously differentiable as the gap opens and closes. Derivatives are carried by dual numbers of the six components of one body's displacement against
+//! the other.
+
+mod jet;
+mod layer;
+mod placed;
+mod surface;
+
+pub(crate) use placed::PlacedFilm;
+pub(crate) use surface::FilmSurface;
+
+use crate::adjoint::lie::Pose;
+use crate::geometry::{Image, Opposite};
+use jet::Jet;
+use layer::Layer;
+use std::sync::Arc;
+
+/// The gap at which the coupling is asked at contact, and the one from which on it is asked as things are, m.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Width {
+    pub floor: f64,
+    pub reach: f64,
+}
+
+/// What is opposite.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(crate) enum Side {
+    /// A body, by its number in the coupling.
+    Body(usize),
+    /// A rigid wall, by the image that it makes.
+    Wall(Image),
+}
+
+/// The film between a body and another, or a wall.
+#[derive(Clone)]
+pub(crate) struct Film {
+    /// The body on whose faces it is solved.
+    pub body: usize,
+    pub other: Side,
+    pub surface: Arc<FilmSurface>,
+    pub opposite: Arc<Opposite>,
+    pub width: Width,
+}
+
+impl Film {
+    fn layer<D: Jet>(&self, relative: &Pose) -> Result<Option<Layer<D>>, f64> {
+        Layer::new(&self.surface, &self.opposite, relative, &self.width)
+    }
+}

@@ -1,0 +1,84 @@
+//! The side of a film that its potential is solved on.
+
+use crate::adjoint::lie::{Vec3, Vec6, point_wrench};
+use crate::geometry::TriMesh;
+use nalgebra::Matrix3;
+use std::f64::consts::PI;
+
+/// A body's surface as films see it, in the body's frame: linear elements on its faces.
+#[derive(Clone, Debug)]
+pub(crate) struct FilmSurface {
+    pub vertices: Vec<Vec3>,
+    /// Unit normals.
+    pub normals: Vec<Vec3>,
+    /// Share of the vertices in the area, m².
+    pub areas: Vec<f64>,
+    /// What a unit twist of the body pushes at each vertex: ∫ φ (n, x × n) dA; m², m³.
+    pub loads: Vec<Vec6>,
+    pub faces: Vec<Element>,
+    /// Of the ball of equal volume, m.
+    pub size: f64,
+    /// Area over that of the ball of equal volume.
+    pub flatness: f64,
+    /// A ball around the vertices.
+    pub center: Vec3,
+    pub radius: f64,
+}
+
+/// A face.
+#[derive(Clone, Debug)]
+pub(crate) struct Element {
+    pub corners: [usize; 3],
+    /// ∇φ_i · ∇φ_j, 1/m².
+    pub slopes: Matrix3<f64>,
+    /// ∇φ_i in the columns, 1/m.
+    pub gradients: Matrix3<f64>,
+    /// Unit normal.
+    pub normal: Vec3,
+    /// Where a force that is spread as φ_i acts.
+    pub arms: [Vec3; 3],
+    /// m².
+    pub area: f64,
+}
+
+impl FilmSurface {
+    pub fn new(mesh: &TriMesh) -> Self {
+        let count = mesh.vertices().len();
+        let (mut areas, mut loads) = (vec![0.0; count], vec![Vec6::zeros(); count]);
+        let mut faces = Vec::with_capacity(mesh.faces().len());
+        for (f, corners) in mesh.faces().iter().enumerate() {
+            let (points, area) = (mesh.corners(f), mesh.area(f));
+            let push = mesh.area_vector(f);
+            // Products of linear functions over a triangle: 1/6 on the diagonal, 1/12 beside it.
+            let arms = points.map(|x| (points.iter().sum::<Vec3>() + x) / 4.0);
+            for (v, at) in corners.iter().zip(&arms) {
+                areas[*v] += area / 3.0;
+                loads[*v] += point_wrench(at, &(push / 3.0));
+            }
+            let normal = push / area;
+            let slope = |i: usize| normal.cross(&(points[(i + 2) % 3] - points[(i + 1) % 3]));
+            let slopes = Matrix3::from_columns(&[0, 1, 2].map(slope)) / (2.0 * area);
+            faces.push(Element {
+                corners: *corners,
+                slopes: slopes.tr_mul(&slopes),
+                gradients: slopes,
+                normal,
+                arms,
+                area,
+            });
+        }
+        let ball = mesh.bounding_ball();
+        let size = (0.75 * mesh.mass_properties().volume / PI).cbrt();
+        Self {
+            flatness: mesh.surface_area() / (4.0 * PI * size.powi(2)),
+            vertices: mesh.vertices().to_vec(),
+            normals: mesh.vertex_normals(),
+            areas,
+            loads,
+            faces,
+            size,
+            center: ball.center,
+            radius: ball.radius,
+        }
+    }
+}

@@ -1,0 +1,125 @@
+//! Films in gaps that compressed bodies don't resolve: the setting `films`.
+
+use crate::support::reference::multipoles;
+use hydrograd::scene::{Body, Fluid, Scene, Shape};
+use hydrograd::simulate::Method;
+use hydrograd::{Fidelity, Settings, Simulator};
+
+fn films() -> Settings {
+    Settings::default().fidelity(Fidelity::Reduced).films(true)
+}
+
+fn unit_water() -> Fluid {
+    Fluid {
+        density: 1.0,
+        current: [0.0; 3],
+    }
+}
+
+/// The mass of either of two spheres and between them, along the gap and across, against multipoles; with `auto` as well.
+#[test]
+fn two_spheres_down_to_a_hundredth() {
+    for fidelity in [Fidelity::Reduced, Fidelity::Auto] {
+        for gap in [0.1, 0.05, 0.03, 0.01] {
+            let mut scene = Scene::new(unit_water());
+            for z in [0.0, 2.0 + gap] {
+                let ball = Shape::sphere(1.0).faces(1280);
+                scene.add(Body::new(ball).density(1.0).at([0.0, 0.0, z]));
+            }
+            let simulator = Simulator::new(&scene, films().fidelity(fidelity)).unwrap();
+            assert_eq!(simulator.fidelity(), Fidelity::Reduced);
+            let m = simulator.added_mass().unwrap().matrix;
+            let [along, along12, across, across12] = multipoles(2.0 + gap);
+            let exact = [
+                ((2, 2), along),
+                ((8, 8), along),
+                ((2, 8), along12),
+                ((0, 0), across),
+                ((0, 6), across12),
+            ];
+            for (at, exact) in exact {
+                let error = (m[at] - exact).abs() / along;
+                println!("{fidelity:?}, gap {gap}, {at:?}: {error:.1e}");
+                assert!(error < 0.025, "gap {gap}, {at:?}: {} for {exact}", m[at]);
+            }
+            assert_eq!(simulator.warnings().len(), 0, "{:?}", simulator.warnings());
+        }
+    }
+}
+
+/// A disc, radius 1 and thickness 0.25, flat over a wall: mass along the gap against coupled panels on finer and finer meshes, extrapolated. Without films it
+/// is off by 4 and 85 %, and refused from there on.
+#[test]
+fn a_disc_flat_over_a_wall() {
+    let converged = [
+        (0.1, 7.5498),
+        (0.05, 12.0564),
+        (0.025, 20.5964),
+        (0.01, 45.0379),
+    ];
+    for (gap, converged) in converged {
+        let mut scene = Scene::new(unit_water());
+        scene.add_wall([0.0; 3], [0.0, 0.0, 1.0]);
+        let disc = Shape::cylinder(1.0, 0.25).faces(1280);
+        scene.add(Body::new(disc).density(1.0).at([0.0, 0.0, 0.125 + gap]));
+        let mass = |settings: Settings| {
+            let simulator = Simulator::new(&scene, settings)?;
+            Ok::<_, hydrograd::Error>(simulator.added_mass()?.matrix[(2, 2)])
+        };
+        let error = mass(films()).unwrap() / converged - 1.0;
+        println!("gap {gap}: {error:+.4}");
+        assert!(error.abs() < 0.025, "gap {gap}: {error}");
+        if gap < 0.1 {
+            let without = mass(films().films(false));
+            assert!(without.map_or(true, |m| (m / converged - 1.0).abs() > 0.5));
+        }
+    }
+}
+
+/// A prism tilted over a plate: whole matrices against coupled panels, in which the film is nearer than what was without.
+#[test]
+fn a_tilted_prism_over_a_plate() {
+    let mut scene = Scene::new(unit_water());
+    let plate = Shape::cuboid([1.6, 1.6, 0.4]).faces(720);
+    let wedge = Shape::prism([[-0.3, -0.15], [0.3, -0.15], [0.2, 0.2], [-0.2, 0.2]], 0.7);
+    scene.add(Body::new(plate).named("plate").density(1.0));
+    let wedge = Body::new(wedge.faces(720)).named("wedge").density(1.0);
+    scene.add(
+        wedge
+            .at([0.1, 0.05, 0.2 + 0.15 + 0.04])
+            .rotated([0.04, 0.0, 0.0]),
+    );
+    let mass = |settings: Settings| {
+        let simulator = Simulator::new(&scene, settings).unwrap();
+        simulator.added_mass().unwrap().matrix
+    };
+    let panels = Settings::default().fidelity(Fidelity::Full);
+    let exact = mass(panels.method(Method::Panel));
+    let size = |i: usize, j: usize| (exact[(i, i)] * exact[(j, j)]).sqrt();
+    let off = |settings: Settings| {
+        let m = mass(settings);
+        let of = |i: usize| (0..12).map(move |j| (i, j));
+        let all = (0..12).flat_map(of);
+        all.map(|(i, j)| (m[(i, j)] - exact[(i, j)]).abs() / size(i, j))
+            .fold(0.0, f64::max)
+    };
+    let (with, without) = (off(films()), off(films().films(false)));
+    println!("with films {with:.3}, without {without:.3}");
+    assert!(with < 0.1 && with < without, "{with} {without}");
+}
+
+/// Where it has no effect, and where the gap is too narrow for the faces, that is said.
+#[test]
+fn what_films_do_not_do_is_said() {
+    let mut scene = Scene::new(unit_water());
+    for z in [0.0, 2.0005] {
+        let ball = Shape::sphere(1.0).faces(320);
+        scene.add(Body::new(ball).density(1.0).at([0.0, 0.0, z]));
+    }
+    let simulator = |settings| Simulator::new(&scene, settings).unwrap();
+    let said = simulator(films()).start_gap_warning().unwrap();
+    assert!(said.contains("films") && said.contains("body 2"), "{said}");
+    let isolated = simulator(films().fidelity(Fidelity::Isolated));
+    let warnings = isolated.warnings().join("\n");
+    assert!(warnings.contains("films has no effect"), "{warnings}");
+}

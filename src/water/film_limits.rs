@@ -100,7 +100,7 @@ fn the_slope_under_a_sphere_is_a_logarithm() {
     let film = over_wall(&Shape::sphere(1.0), 20_000, 0.1);
     let slope = |gap: f64| added(&film, &raised(1.0 + gap), 2).1;
     let (near, far) = (0.004, 0.016);
-    let exact = -PI * (far / near as f64).ln();
+    let exact = -PI * f64::ln(far / near);
     let found = slope(near) - slope(far);
     assert!((found / exact - 1.0).abs() < 0.12, "{found} for {exact}");
 }

@@ -59,25 +59,8 @@ impl<D: Jet> Layer<D> {
         if middle.distance - surface.radius > width.reach {
             return Ok(None);
         }
-        let placed = Displaced::<D>::new(pose);
-        let end = RIM[1] * surface.size;
         let reals = surface.vertices.iter().map(|x| pose.apply(x));
         let fields: Vec<Field> = reals.map(|p| opposite.field(&p)).collect();
-        let mut needed: Vec<bool> = fields.iter().map(|f| f.distance < end).collect();
-        let near = needed.clone();
-        for face in surface
-            .faces
-            .iter()
-            .filter(|f| f.corners.iter().any(|v| near[*v]))
-        {
-            face.corners.iter().for_each(|v| needed[*v] = true);
-        }
-        let points: Vec<Option<Vector<D>>> = (surface.vertices.iter().zip(&needed))
-            .map(|(x, needed)| needed.then(|| placed.apply(x)))
-            .collect();
-        let distances: Vec<Option<D>> = (points.iter().zip(&fields))
-            .map(|(p, field)| p.as_ref().map(|p| distance(field, p)))
-            .collect();
         let lowest = fields
             .iter()
             .map(|f| f.distance)
@@ -85,27 +68,32 @@ impl<D: Jet> Layer<D> {
         if lowest <= 0.0 {
             return Err(lowest);
         }
-        // The gap of the link, and the mean normal where it is smallest.
-        let (mut sum, mut gap, mut normal) = (D::from(0.0), D::from(0.0), [D::from(0.0); 3]);
-        for (v, d) in distances.iter().enumerate().filter(|(v, _)| near[*v]) {
-            let Some(d) = *d else { continue };
-            let fade = (-d / end + 1.0).powi(3);
-            let weight = (d / width.reach).powi(-NEAREST) * fade * surface.areas[v];
-            sum += weight;
-            gap += weight * d;
-            let n = &surface.normals[v];
-            (0..3).for_each(|i| normal[i] += weight * n[i]);
-        }
-        if sum.re() <= 0.0 {
+        // The link's gap is a mean.
+        if lowest >= width.reach {
             return Ok(None);
         }
-        let gap = gap / sum;
+        let placed = Displaced::<D>::new(pose);
+        let end = RIM[1] * surface.size;
+        let near: Vec<bool> = fields.iter().map(|f| f.distance < end).collect();
+        let mut needed = near.clone();
+        for face in &surface.faces {
+            if face.corners.iter().any(|v| near[*v]) {
+                face.corners.iter().for_each(|v| needed[*v] = true);
+            }
+        }
+        let points: Vec<Option<Vector<D>>> = (surface.vertices.iter().zip(&needed))
+            .map(|(x, needed)| needed.then(|| placed.apply(x)))
+            .collect();
+        let distances: Vec<Option<D>> = (points.iter().zip(&fields))
+            .map(|(p, field)| p.as_ref().map(|p| distance(field, p)))
+            .collect();
+        let (gap, mean) = nearest(surface, &distances, end, width.reach);
         if gap.re() >= width.reach {
             return Ok(None);
         }
         let normal = match opposite.wall_normal() {
             Some(wall) => placed.rotate_inverse(&-wall),
-            None => normal.map(|x| x / sum),
+            None => mean,
         };
         let wider = (-gap / width.reach + 1.0).powi(3) * width.floor;
         let own = scale(wider, &normal);
@@ -123,20 +111,7 @@ impl<D: Jet> Layer<D> {
             rim: Vec::new(),
             cells: Vec::new(),
         };
-        let mut numbers: Vec<Option<usize>> = vec![None; points.len()];
-        for (v, d) in distances.iter().enumerate().filter(|(v, _)| near[*v]) {
-            let Some(d) = *d else { continue };
-            let start = RIM[0] * surface.size;
-            let outside = (d - start) / (end - start);
-            let facing = dot(&normal, &surface.normals[v]);
-            let behind = (facing - BACK[0]) / (BACK[1] - BACK[0]);
-            if outside.re() < 1.0 && behind.re() < 1.0 {
-                numbers[v] = Some(out.active.len());
-                out.active.push(v);
-                out.rim
-                    .push((opening(outside) + opening(behind)) * (OPENING * surface.areas[v]) / d);
-            }
-        }
+        let numbers = out.bound(surface, &distances, &normal);
         for (f, face) in surface.faces.iter().enumerate() {
             let corners = face.corners.map(|v| numbers[v]);
             if corners.iter().all(Option::is_none) {
@@ -153,6 +128,55 @@ impl<D: Jet> Layer<D> {
         }
         Ok(Some(out))
     }
+
+    /// Where the film ends: which vertices have a potential, and how well each leads into the open. The number of each of the surface's among them.
+    fn bound(
+        &mut self,
+        surface: &FilmSurface,
+        distances: &[Option<D>],
+        normal: &Vector<D>,
+    ) -> Vec<Option<usize>> {
+        let [start, end] = RIM.map(|part| part * surface.size);
+        let mut numbers = vec![None; distances.len()];
+        for (v, d) in distances.iter().enumerate() {
+            let Some(d) = *d else { continue };
+            let outside = (d - start) / (end - start);
+            let facing = dot(normal, &surface.normals[v]);
+            let behind = (facing - BACK[0]) / (BACK[1] - BACK[0]);
+            if outside.re() < 1.0 && behind.re() < 1.0 {
+                numbers[v] = Some(self.active.len());
+                self.active.push(v);
+                let open = opening(outside) + opening(behind);
+                self.rim.push(open * (OPENING * surface.areas[v]) / d);
+            }
+        }
+        numbers
+    }
+}
+
+/// The gap of a link and this side's normal there: means over the vertices, of which the nearest count most, and those beyond `end` nothing.
+fn nearest<D: Jet>(
+    surface: &FilmSurface,
+    distances: &[Option<D>],
+    end: f64,
+    scale: f64,
+) -> (D, Vector<D>) {
+    let (mut sum, mut gap, mut normal) = (D::from(0.0), D::from(0.0), [D::from(0.0); 3]);
+    for (v, d) in distances.iter().enumerate() {
+        let Some(d) = d.filter(|d| d.re() < end) else {
+            continue;
+        };
+        let fade = (-d / end + 1.0).powi(3);
+        let weight = (d / scale).powi(-NEAREST) * fade * surface.areas[v];
+        sum += weight;
+        gap += weight * d;
+        let n = &surface.normals[v];
+        (0..3).for_each(|i| normal[i] += weight * n[i]);
+    }
+    if sum.re() <= 0.0 {
+        return (D::from(f64::INFINITY), normal);
+    }
+    (gap / sum, normal.map(|x| x / sum))
 }
 
 /// t³/(1 − t)³ from 0 on.

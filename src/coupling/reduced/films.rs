@@ -111,6 +111,7 @@ impl Reduced {
     ///
     /// # Errors
     /// Bodies that touch.
+    #[cfg(feature = "gpu")]
     pub(crate) fn narrow(&self, poses: &[Pose]) -> Result<bool> {
         Ok(self.placed_films(poses)?.iter().any(Option::is_some))
     }

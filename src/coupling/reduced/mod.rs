@@ -13,7 +13,7 @@
 //! δ²E(x, y) = 4π [ α_xᵀ δδG α_y + δα_xᵀ δG α_y + α_xᵀ δG δα_y ]
 //! ```
 //!
-//! Where a gap is below what the sources resolve they are held apart, and the film in it has its own added mass ([`film`](crate::coupling::film)).
+//! Where a gap is below what the sources resolve they are held apart, and the film in it has its own added mass ([`Reduced::with_films`]).
 //!
 //! `I − LᵀGL` is symmetric, and positive definite while the bodies are apart: a Cholesky
 //! factorisation that fails tells of a gap that the sources don't resolve.

@@ -27,7 +27,9 @@ const STEEPEST: f64 = 1.2;
 pub(super) struct Layer<D> {
     /// How far the two are held apart for those that don't resolve the gap, and in which direction: from the first to the other, in the frame of each.
     pub shift: [Vector<D>; 2],
-    /// Numbers of the vertices at which there is a potential.
+    /// Of each vertex of the surface, its number among those at which there is a potential.
+    pub numbers: Vec<Option<usize>>,
+    /// Those vertices.
     pub active: Vec<usize>,
     /// How well each leads into the open, m.
     pub rim: Vec<D>,
@@ -47,13 +49,14 @@ pub(super) struct Cell<D> {
 }
 
 impl<D: Jet> Layer<D> {
-    /// With the pose of the surface in the frame of what is opposite; none where that is farther than `width` reaches. `Err` gives a distance that isn't
+    /// With the pose of the surface in the frame of what is opposite, and the numbers of the vertices where another layer at that pose has decided; none where that is farther than `width` reaches. `Err` gives a distance that isn't
     /// positive.
     pub fn new(
         surface: &FilmSurface,
         opposite: &Opposite,
         pose: &Pose,
         width: &Width,
+        known: Option<&[Option<usize>]>,
     ) -> Result<Option<Self>, f64> {
         let middle = opposite.field(&pose.apply(&surface.center));
         if middle.distance - surface.radius > width.reach {
@@ -88,7 +91,7 @@ impl<D: Jet> Layer<D> {
             .map(|(p, field)| p.as_ref().map(|p| distance(field, p)))
             .collect();
         let (gap, mean) = nearest(surface, &distances, end, width.reach);
-        if gap.re() >= width.reach {
+        if known.is_none() && gap.re() >= width.reach {
             return Ok(None);
         }
         let normal = match opposite.wall_normal() {
@@ -107,11 +110,13 @@ impl<D: Jet> Layer<D> {
             .collect();
         let mut out = Self {
             shift: [own, other],
+            numbers: Vec::new(),
             active: Vec::new(),
             rim: Vec::new(),
             cells: Vec::new(),
         };
-        let numbers = out.bound(surface, &distances, &normal);
+        out.bound(surface, &distances, &normal, known);
+        let numbers = &out.numbers;
         for (f, face) in surface.faces.iter().enumerate() {
             let corners = face.corners.map(|v| numbers[v]);
             if corners.iter().all(Option::is_none) {
@@ -129,13 +134,14 @@ impl<D: Jet> Layer<D> {
         Ok(Some(out))
     }
 
-    /// Where the film ends: which vertices have a potential, and how well each leads into the open. The number of each of the surface's among them.
+    /// Where the film ends: which vertices have a potential, unless that is known, and how well each leads into the open.
     fn bound(
         &mut self,
         surface: &FilmSurface,
         distances: &[Option<D>],
         normal: &Vector<D>,
-    ) -> Vec<Option<usize>> {
+        known: Option<&[Option<usize>]>,
+    ) {
         let [start, end] = RIM.map(|part| part * surface.size);
         let mut numbers = vec![None; distances.len()];
         for (v, d) in distances.iter().enumerate() {
@@ -143,14 +149,15 @@ impl<D: Jet> Layer<D> {
             let outside = (d - start) / (end - start);
             let facing = dot(normal, &surface.normals[v]);
             let behind = (facing - BACK[0]) / (BACK[1] - BACK[0]);
-            if outside.re() < 1.0 && behind.re() < 1.0 {
+            let within = outside.re() < 1.0 && behind.re() < 1.0;
+            if known.map_or(within, |known| known[v].is_some()) {
                 numbers[v] = Some(self.active.len());
                 self.active.push(v);
                 let open = opening(outside) + opening(behind);
                 self.rim.push(open * (OPENING * surface.areas[v]) / d);
             }
         }
-        numbers
+        self.numbers = numbers;
     }
 }
 

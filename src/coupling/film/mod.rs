@@ -63,7 +63,11 @@ pub(crate) struct Film {
 }
 
 impl Film {
-    fn layer<D: Jet>(&self, relative: &Pose) -> Result<Option<Layer<D>>, f64> {
-        Layer::new(&self.surface, &self.opposite, relative, &self.width)
+    fn layer<D: Jet>(
+        &self,
+        relative: &Pose,
+        known: Option<&[Option<usize>]>,
+    ) -> Result<Option<Layer<D>>, f64> {
+        Layer::new(&self.surface, &self.opposite, relative, &self.width, known)
     }
 }

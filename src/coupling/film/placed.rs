@@ -24,6 +24,8 @@ pub(crate) struct PlacedFilm<'a> {
     pub shift: [Vec3; 2],
     /// At density 1.
     mass: Mass,
+    /// Of each vertex, its number among those at which there is a potential.
+    numbers: Vec<Option<usize>>,
     /// As it is, and held apart.
     solved: [Solved; 2],
     first: OnceLock<Derivatives>,
@@ -60,7 +62,7 @@ impl<'a> PlacedFilm<'a> {
             Side::Wall(_) => Pose::identity(),
         };
         let relative = frame.inverse().compose(&poses[film.body]);
-        let Some(layer) = film.layer::<f64>(&relative)? else {
+        let Some(layer) = film.layer::<f64>(&relative, None)? else {
             return Ok(None);
         };
         let solved = [0, 1].map(|k| film.solve(&layer, k));
@@ -77,6 +79,7 @@ impl<'a> PlacedFilm<'a> {
             frame,
             shift: layer.shift.map(Vec3::from),
             mass,
+            numbers: layer.numbers,
             solved: [near, apart],
             first: OnceLock::new(),
             second: OnceLock::new(),
@@ -84,8 +87,9 @@ impl<'a> PlacedFilm<'a> {
     }
 
     fn derivatives<D: Jet>(&self) -> Derivatives {
-        // The same decisions as for the value: the numbers are the same.
-        let layer = self.film.layer::<D>(&self.relative).ok().flatten();
+        // The same decisions as for the value, whatever rounding makes of them here.
+        let known = Some(self.numbers.as_slice());
+        let layer = self.film.layer::<D>(&self.relative, known).ok().flatten();
         let Some(layer) = layer else {
             return Derivatives::none();
         };

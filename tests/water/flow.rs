@@ -128,7 +128,7 @@ fn edges_are_harder() {
     println!("sources and panels: {:.2e}", apart.fold(0.0, f64::max));
     let sources =
         [(320, 0.08, 0.4), (1280, 0.01, 0.02)].map(|c| (Method::MfsVertex, &by_sources, c));
-    let panels = [(320, 0.025, 0.05), (1280, 0.004, 0.008)].map(|c| (Method::Panel, &by_panels, c));
+    let panels = [(320, 0.01, 0.03), (1280, 0.004, 0.009)].map(|c| (Method::Panel, &by_panels, c));
     for (method, right, (faces, typical, worst)) in sources.into_iter().chain(panels) {
         let made = flow(&simulator(&scene, faces, method), &points).unwrap();
         let pairs = made.iter().zip(right);

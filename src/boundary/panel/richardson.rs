@@ -19,8 +19,6 @@ use crate::boundary::{Response, scaled};
 use crate::{Error, Result};
 use faer::Mat;
 
-/// Order of the error in the edge length on a smooth body.
-const SMOOTH: f64 = 2.0;
 /// Least ratio of edge lengths from which two meshes say something.
 const RATIO: f64 = 1.2;
 /// Length of sharp edges, in square roots of the area, from which a body counts as sharp.
@@ -55,11 +53,6 @@ impl Richardson {
         let mut found = richardson_of_ratio(fine, coarse, ratio)?;
         found.added_mass = positive(&found.added_mass, fine.faces.volume(), 0.0);
         Ok(found)
-    }
-
-    /// Whether sharp edges lower the order.
-    pub(crate) fn is_sharp(&self) -> bool {
-        self.order < SMOOTH
     }
 
     /// Added mass for a body whose coupling is extrapolated as well. About an axis of revolution faces move a little water that the shape doesn't;
@@ -105,11 +98,7 @@ fn richardson_of_ratio(
     let step = fine.added_mass - coarse.added_mass;
     let size = edge(fine) * (fine.faces.len() as f64).sqrt();
     let sharp = fine.sharp_edges > SHARP * size && fine.sharp_edges > LASTS * coarse.sharp_edges;
-    let (order, cautious) = if sharp {
-        (4.0 / 3.0, 1.0)
-    } else {
-        (SMOOTH, 2.0)
-    };
+    let (order, cautious) = if sharp { (4.0 / 3.0, 1.0) } else { (2.0, 2.0) };
     let change = scaled(&step, &fine.added_mass, &fine.faces);
     let fine_error = change / (ratio.powf(cautious) - 1.0);
     Ok(Richardson {

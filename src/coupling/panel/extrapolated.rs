@@ -26,8 +26,6 @@ pub struct ExtrapolatedPanels {
     coarse: PanelCoupled,
     /// 1/(ρ² − 1).
     factor: f64,
-    /// Whether the flow itself is extrapolated.
-    smooth: bool,
 }
 
 impl ExtrapolatedPanels {
@@ -57,15 +55,7 @@ impl ExtrapolatedPanels {
             fine,
             coarse,
             factor: 1.0 / (ratio * ratio - 1.0),
-            smooth: true,
         })
-    }
-
-    /// For bodies with sharp edges: the energy is an integral over all faces, but the flow near an edge is off by a power of its own there, and is taken from the
-    /// fine panels alone.
-    pub fn with_sharp_edges(mut self) -> Self {
-        self.smooth = false;
-        self
     }
 
     fn report(&self, fine: &CouplingReport, coarse: &CouplingReport) -> CouplingReport {
@@ -119,7 +109,7 @@ impl Coupling for ExtrapolatedPanels {
         Some(self)
     }
 
-    /// Extrapolated as well between round bodies: their coarse faces lie inside the fine ones.
+    /// Extrapolated as well: the coarse faces of a round body lie inside the fine ones.
     fn velocity(
         &self,
         poses: &[Pose],
@@ -127,9 +117,6 @@ impl Coupling for ExtrapolatedPanels {
         points: &[Vec3],
     ) -> Result<Vec<Vec3>> {
         let fine = self.fine.velocity(poses, twists, points)?;
-        if !self.smooth {
-            return Ok(fine);
-        }
         let coarse = self.coarse.velocity(poses, twists, points)?;
         let pairs = fine.iter().zip(&coarse);
         Ok(pairs.map(|(f, c)| f + self.factor * (f - c)).collect())

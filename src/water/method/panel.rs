@@ -94,12 +94,7 @@ impl BodyMethod for Panel {
         let coupling: Box<dyn Coupling> = if ratio > 0.0 {
             let meshes = made.iter().map(|m| m.coarse.as_ref().unwrap_or(&m.fine));
             let coarse = coupled(meshes.cloned().collect())?;
-            let panels = ExtrapolatedPanels::new(fine, coarse, ratio)?;
-            let sharp = |m: &Meshes| m.known.is_some_and(|known| known.is_sharp());
-            Box::new(match made.iter().any(|m| sharp(m)) {
-                true => panels.with_sharp_edges(),
-                false => panels,
-            })
+            Box::new(ExtrapolatedPanels::new(fine, coarse, ratio)?)
         } else {
             Box::new(fine)
         };

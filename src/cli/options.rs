@@ -18,7 +18,7 @@ use crate::simulate::{
 /// What the water is solved with; whatever isn't given follows the preset.
 #[derive(Clone, Debug, Args)]
 pub(super) struct Water {
-    /// How much of the water's coupling is solved [default: full].
+    /// How much of the water's coupling is solved [default: auto; full with the preset paper].
     #[arg(long, value_parser = choice::<Fidelity>())]
     pub fidelity: Option<Fidelity>,
     /// How a body alone is solved [default: auto; mfs-face with the preset paper].

@@ -82,7 +82,7 @@ pub(crate) fn prepare(
     }
     (problem.plan, problem.folder) = (&planned.plan, folder);
     clearance.by_sources = !fidelity.kind().solves_alone() && method.by_sources();
-    clearance.films = problem.films && fidelity.kind().compresses();
+    clearance.films = choices.numerics.films && fidelity.kind().compresses();
     clearance.resolved_edges = match (clearance.films, fidelity.kind().compresses()) {
         (true, _) => FILM_EDGES,
         // What compressed bodies resolve isn't a matter of edges.

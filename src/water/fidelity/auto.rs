@@ -128,7 +128,7 @@ fn plan(problem: &Problem, poses: &[Pose], gaps: &[StartGap]) -> Result<Planned>
         let finest = compress::finest_gap(mesh.surface_area());
         // Who refines a body means its gaps to be resolved there.
         let refined = body.regions.iter().map(|r| r.gap).fold(finest, f64::min);
-        let hopeless = !problem.films
+        let hopeless = !problem.numerics.films
             && near().any(|g| {
                 let film = HOPELESS_FILM.iter().find(|(film, _)| g.film > *film);
                 let part = film.map_or(HOPELESS, |(_, part)| *part);
@@ -151,7 +151,7 @@ fn plan(problem: &Problem, poses: &[Pose], gaps: &[StartGap]) -> Result<Planned>
             ));
         }
         let coarsest = COARSEST * compress::default_gap(properties.volume, mesh.surface_area());
-        let room = match !problem.films && near().any(|g| g.film > FILM) {
+        let room = match !problem.numerics.films && near().any(|g| g.film > FILM) {
             true => ROOM_FILM,
             false => ROOM,
         };

@@ -100,7 +100,7 @@ pub(in crate::water) fn compressed_all(problem: &Problem) -> Result<reduced::Red
     };
     let names = bodies.iter().map(|b| b.name.to_string());
     let mut coupling = reduced::Reduced::new(made, problem.walls, cutoff)?.named(names);
-    if problem.films {
+    if problem.numerics.films {
         let mut surfaces = Vec::with_capacity(bodies.len());
         for body in bodies {
             // Finer faces in regions are for the sources; the film's potential is smooth.

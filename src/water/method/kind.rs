@@ -95,8 +95,6 @@ pub(crate) struct Problem<'a> {
     pub together: &'static dyn BodyMethod,
     pub numerics: &'a Numerics,
     pub plan: &'a Plan,
-    /// Whether gaps that compressed bodies don't resolve have films.
-    pub films: bool,
     /// Where compressed bodies are kept.
     pub folder: Option<&'a Path>,
 }
@@ -121,7 +119,6 @@ impl<'a> Problem<'a> {
             together: method,
             numerics,
             plan: &NO_PLAN,
-            films: numerics.films,
             folder: None,
         }
     }

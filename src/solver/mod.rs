@@ -20,7 +20,7 @@ pub(crate) use eigenvalue::{condition, largest_eigenvalue};
 pub use gmres::gmres;
 pub use lu::Lu;
 pub use product::{both_products, normal_product, product, transposed_product};
-pub use sparse::SparseCholesky;
+pub use sparse::{SparseCholesky, SparsePattern};
 
 use crate::adjoint::count::Counter;
 

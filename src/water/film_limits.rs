@@ -14,18 +14,14 @@ use std::sync::Arc;
 fn over_wall(shape: &Shape, faces: usize, floor: f64) -> Film {
     let mesh = shape::build(shape, Path::new("."), Some(faces)).unwrap();
     let wall = Wall::rigid([0.0; 3], [0.0, 0.0, 1.0]);
-    Film {
-        body: 0,
-        other: Side::Wall(Image::of_walls(&[wall]).unwrap()[1]),
-        surface: Arc::new(FilmSurface::new(&mesh)),
-        opposite: Arc::new(Opposite::of_wall(
-            HalfSpace::new(&Vec3::zeros(), &Vec3::z()).unwrap(),
-        )),
-        width: Width {
-            floor,
-            reach: 4.0 * floor,
-        },
-    }
+    let other = Side::Wall(Image::of_walls(&[wall]).unwrap()[1]);
+    let plane = HalfSpace::new(&Vec3::zeros(), &Vec3::z()).unwrap();
+    let between = (
+        Arc::new(FilmSurface::new(&mesh)),
+        Arc::new(Opposite::of_wall(plane)),
+    );
+    let reach = 4.0 * floor;
+    Film::new(0, other, between, Width { floor, reach })
 }
 
 /// What the film adds to the energy of a unit twist (component `k` in the body's frame, about its origin) at a pose, and its slope as the body rises.
@@ -36,7 +32,10 @@ fn added(film: &Film, pose: &Pose, k: usize) -> (f64, f64) {
     let mut out = DMatrix::zeros(6, 1);
     placed.add_impulses(&twists, &mut out);
     let x: DVector<f64> = twists.column(0).into_owned();
-    (out[(k, 0)], placed.wrench(&x, &x)[2])
+    (
+        out[(k, 0)],
+        placed.wrenches(&x, std::iter::once(x.clone()))[0][2],
+    )
 }
 
 fn raised(height: f64) -> Pose {

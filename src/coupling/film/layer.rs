@@ -1,19 +1,20 @@
-//! A film's thickness at given poses, and where it ends.
+//! A film's thickness at given poses, and where it ends. Its derivative is [`Layer::pull_back`].
 
-use super::jet::{Displaced, Jet, Vector, add, distance, dot, real, scale};
+use super::jet::{
+    Displaced, Distance, Jet, Vector, add, constant, dot, minus, product, real, scale, zero,
+};
 use super::surface::Element;
-use super::{FilmSurface, Width};
-use crate::adjoint::lie::Pose;
+use super::{Film, FilmSurface};
 use crate::geometry::{Field, Opposite};
 
 /// Power of the distances with which vertices count in a link's gap.
-const NEAREST: i32 = 6;
+pub(super) const NEAREST: i32 = 6;
 /// Distances between which the flow in a film goes over into that around the bodies, in sizes of the first.
 const RIM: [f64; 2] = [0.5, 1.0];
 /// The same in cosines between the surface's normal and the way across: the sides of a block still lead the flow, its back doesn't.
-const BACK: [f64; 2] = [-0.1, -0.6];
+pub(super) const BACK: [f64; 2] = [-0.1, -0.6];
 /// How well the rim leads the flow away.
-const OPENING: f64 = 20.0;
+pub(super) const OPENING: f64 = 20.0;
 /// The length β/sin β of an arc across a wedge of the angle β, in its height, by powers of sin² β: the series up to the third, and what is left at a right
 /// angle in the last.
 const ARC: [f64; 4] = [1.0, 1.0 / 6.0, 3.0 / 40.0, 5.0 / 112.0];
@@ -27,9 +28,11 @@ const STEEPEST: f64 = 1.2;
 pub(super) struct Layer<D> {
     /// How far the two are held apart for those that don't resolve the gap, and in which direction: from the first to the other, in the frame of each.
     pub shift: [Vector<D>; 2],
-    /// Of each vertex of the surface, its number among those at which there is a potential.
-    pub numbers: Vec<Option<usize>>,
-    /// Those vertices.
+    /// Of the link.
+    pub gap: Gap<D>,
+    /// Vertices of faces that are near.
+    pub spots: Vec<Spot<D>>,
+    /// Those at which there is a potential.
     pub active: Vec<usize>,
     /// How well each leads into the open, m.
     pub rim: Vec<D>,
@@ -37,10 +40,35 @@ pub(super) struct Layer<D> {
     pub cells: Vec<Cell<D>>,
 }
 
+/// Means over the vertices, of which the nearest count most.
+pub(super) struct Gap<D> {
+    /// m.
+    pub value: D,
+    /// This side's normal.
+    pub mean: Vector<D>,
+    /// The same, or opposite to that of the wall that is there.
+    pub normal: Vector<D>,
+    /// Sum of the weights.
+    pub sum: D,
+}
+
+/// A vertex.
+pub(super) struct Spot<D> {
+    pub vertex: usize,
+    /// In the frame of what is opposite.
+    pub point: Vector<D>,
+    /// As it is, and held apart.
+    pub distances: [Distance<D>; 2],
+    /// Among those at which there is a potential.
+    pub number: Option<usize>,
+}
+
 /// A face's part of a film.
 pub(super) struct Cell<D> {
     pub face: usize,
-    /// Number of each corner among the active ones.
+    /// The spots at its corners.
+    pub spots: [usize; 3],
+    /// Number of each corner among those with a potential.
     pub corners: [Option<usize>; 3],
     /// m: as it is, and held apart.
     pub thickness: [D; 2],
@@ -48,178 +76,282 @@ pub(super) struct Cell<D> {
     pub facing: Vector<D>,
 }
 
-impl<D: Jet> Layer<D> {
-    /// With the pose of the surface in the frame of what is opposite, and the numbers of the vertices where another layer at that pose has decided; none where that is farther than `width` reaches. `Err` gives a distance that isn't
-    /// positive.
-    pub fn new(
-        surface: &FilmSurface,
-        opposite: &Opposite,
-        pose: &Pose,
-        width: &Width,
-        known: Option<&[Option<usize>]>,
-    ) -> Result<Option<Self>, f64> {
-        let middle = opposite.field(&pose.apply(&surface.center));
-        if middle.distance - surface.radius > width.reach {
+/// The vertices of faces that are near, with their fields.
+pub(super) type Near = Vec<(usize, Field)>;
+
+/// Where films end.
+pub(super) fn ends(surface: &FilmSurface) -> [f64; 2] {
+    RIM.map(|part| part * surface.size)
+}
+
+impl Film {
+    /// The vertices that a film needs, of a surface with these points in the frame of what is opposite; none where that is farther than a film reaches. `Err`
+    /// gives a distance that isn't positive.
+    pub(super) fn near(&self, placed: &Displaced<f64>) -> Result<Option<Near>, f64> {
+        let (surface, opposite) = (&*self.surface, &*self.opposite);
+        let field = |v: usize| opposite.field(&real(&placed.apply(&surface.vertices[v])));
+        let middle = opposite.field(&real(&placed.apply(&surface.center)));
+        if middle.distance - surface.radius > self.width.reach {
             return Ok(None);
         }
-        let reals = surface.vertices.iter().map(|x| pose.apply(x));
-        let fields: Vec<Field> = reals.map(|p| opposite.field(&p)).collect();
-        let lowest = fields
-            .iter()
-            .map(|f| f.distance)
-            .fold(f64::INFINITY, f64::min);
+        let [_, end] = ends(surface);
+        let (mut fields, mut lowest) = (vec![None; surface.vertices.len()], f64::INFINITY);
+        for cluster in &surface.clusters {
+            let center = opposite.field(&real(&placed.apply(&cluster.center)));
+            if center.distance - cluster.radius > end.max(self.width.reach) {
+                continue;
+            }
+            for v in &cluster.vertices {
+                let field = field(*v);
+                lowest = lowest.min(field.distance);
+                fields[*v] = Some(field);
+            }
+        }
         if lowest <= 0.0 {
             return Err(lowest);
         }
         // The link's gap is a mean.
-        if lowest >= width.reach {
+        if lowest >= self.width.reach {
             return Ok(None);
         }
-        let placed = Displaced::<D>::new(pose);
-        let end = RIM[1] * surface.size;
-        let near: Vec<bool> = fields.iter().map(|f| f.distance < end).collect();
-        let mut needed = near.clone();
+        let near = |v: usize| fields[v].is_some_and(|f: Field| f.distance < end);
+        let mut needed: Vec<bool> = (0..fields.len()).map(near).collect();
         for face in &surface.faces {
-            if face.corners.iter().any(|v| near[*v]) {
+            if face.corners.iter().any(|v| near(*v)) {
                 face.corners.iter().for_each(|v| needed[*v] = true);
             }
         }
-        let points: Vec<Option<Vector<D>>> = (surface.vertices.iter().zip(&needed))
-            .map(|(x, needed)| needed.then(|| placed.apply(x)))
-            .collect();
-        let distances: Vec<Option<D>> = (points.iter().zip(&fields))
-            .map(|(p, field)| p.as_ref().map(|p| distance(field, p)))
-            .collect();
-        let (gap, mean) = nearest(surface, &distances, end, width.reach);
-        if known.is_none() && gap.re() >= width.reach {
-            return Ok(None);
-        }
-        let normal = match opposite.wall_normal() {
-            Some(wall) => placed.rotate_inverse(&-wall),
-            None => mean,
-        };
-        let wider = (-gap / width.reach + 1.0).powi(3) * width.floor;
-        let own = scale(wider, &normal);
-        let other = placed.rotate(&own);
-        let back = other.map(|x| -x);
-        let apart: Vec<Option<D>> = (points.iter())
-            .map(|p| {
-                let p = add(p.as_ref()?, &back);
-                Some(distance(&opposite.field(&real(&p)), &p))
+        let all = (0..fields.len()).filter(|v| needed[*v]);
+        let all = all.map(|v| (v, fields[v].unwrap_or_else(|| field(v))));
+        Ok(Some(all.collect()))
+    }
+}
+
+impl<D: Jet> Layer<D> {
+    /// Of a pose of the surface in the frame of what is opposite. With the layer at that pose there are potentials where it has them; else none where the gap is wide.
+    pub fn new(
+        film: &Film,
+        placed: &Displaced<D>,
+        near: &Near,
+        known: Option<&Layer<f64>>,
+    ) -> Option<Self> {
+        let (surface, opposite, width) = (&film.surface, &film.opposite, &film.width);
+        let mut spots: Vec<Spot<D>> = (near.iter())
+            .map(|(vertex, field)| {
+                let point = placed.apply(&surface.vertices[*vertex]);
+                let here = Distance::new(field, &point);
+                Spot {
+                    vertex: *vertex,
+                    point,
+                    distances: [here; 2],
+                    number: None,
+                }
             })
             .collect();
+        let gap = Gap::new(surface, opposite, placed, &spots, width.reach)?;
+        if known.is_none() && gap.value.re() >= width.reach {
+            return None;
+        }
+        let wider = (-gap.value / width.reach + 1.0).powi(3) * width.floor;
+        let own = scale(wider, &gap.normal);
+        let other = placed.rotate(&own);
+        for spot in &mut spots {
+            let at = add(&spot.point, &minus(&other));
+            spot.distances[1] = Distance::new(&opposite.field(&real(&at)), &at);
+        }
         let mut out = Self {
             shift: [own, other],
-            numbers: Vec::new(),
+            gap,
+            spots,
             active: Vec::new(),
             rim: Vec::new(),
             cells: Vec::new(),
         };
-        out.bound(surface, &distances, &normal, known);
-        let numbers = &out.numbers;
-        for (f, face) in surface.faces.iter().enumerate() {
-            let corners = face.corners.map(|v| numbers[v]);
-            if corners.iter().all(Option::is_none) {
-                continue;
-            }
-            let of = |all: &[Option<D>]| face.corners.map(|v| all[v].unwrap_or(D::from(end)));
-            let [near, held] = [of(&distances), of(&apart)];
-            out.cells.push(Cell {
-                face: f,
-                corners,
-                thickness: [near, held].map(|d| thickness(&d, &face.slopes)),
-                facing: facing(&near, face),
-            });
-        }
-        Ok(Some(out))
+        out.bound(surface, known);
+        out.fill(surface);
+        Some(out)
     }
 
     /// Where the film ends: which vertices have a potential, unless that is known, and how well each leads into the open.
-    fn bound(
-        &mut self,
-        surface: &FilmSurface,
-        distances: &[Option<D>],
-        normal: &Vector<D>,
-        known: Option<&[Option<usize>]>,
-    ) {
-        let [start, end] = RIM.map(|part| part * surface.size);
-        let mut numbers = vec![None; distances.len()];
-        for (v, d) in distances.iter().enumerate() {
-            let Some(d) = *d else { continue };
-            let outside = (d - start) / (end - start);
-            let facing = dot(normal, &surface.normals[v]);
-            let behind = (facing - BACK[0]) / (BACK[1] - BACK[0]);
-            let within = outside.re() < 1.0 && behind.re() < 1.0;
-            if known.map_or(within, |known| known[v].is_some()) {
-                numbers[v] = Some(self.active.len());
-                self.active.push(v);
-                let open = opening(outside) + opening(behind);
-                self.rim.push(open * (OPENING * surface.areas[v]) / d);
+    fn bound(&mut self, surface: &FilmSurface, known: Option<&Layer<f64>>) {
+        for s in 0..self.spots.len() {
+            let t = self.outside(surface, s);
+            let within = t.iter().all(|t| t.re() < 1.0);
+            if known.map_or(within, |known| known.spots[s].number.is_some()) {
+                let spot = &mut self.spots[s];
+                spot.number = Some(self.active.len());
+                self.active.push(s);
+                let area = surface.areas[spot.vertex];
+                let open = opening(t[0]) + opening(t[1]);
+                self.rim
+                    .push(open * (OPENING * area) / spot.distances[0].value);
             }
         }
-        self.numbers = numbers;
+    }
+
+    /// How far a spot is from where the film begins to end to where it has, by its distance and by where it faces.
+    pub(super) fn outside(&self, surface: &FilmSurface, spot: usize) -> [D; 2] {
+        let [start, end] = ends(surface);
+        let spot = &self.spots[spot];
+        let facing = dot(&self.gap.normal, &surface.normals[spot.vertex]);
+        [
+            (spot.distances[0].value - start) / (end - start),
+            (facing - BACK[0]) / (BACK[1] - BACK[0]),
+        ]
+    }
+
+    fn fill(&mut self, surface: &FilmSurface) {
+        let mut at = vec![None; surface.vertices.len()];
+        for (s, spot) in self.spots.iter().enumerate() {
+            at[spot.vertex] = Some(s);
+        }
+        for (f, face) in surface.faces.iter().enumerate() {
+            let [Some(a), Some(b), Some(c)] = face.corners.map(|v| at[v]) else {
+                continue;
+            };
+            let spots = [a, b, c];
+            let corners = spots.map(|s| self.spots[s].number);
+            if corners.iter().all(Option::is_none) {
+                continue;
+            }
+            let [near, held] = self.heights(&spots);
+            self.cells.push(Cell {
+                face: f,
+                spots,
+                corners,
+                thickness: [near, held].map(|d| thickness(&d, face)),
+                facing: facing(&near, face),
+            });
+        }
+    }
+
+    /// Distances at the corners of a face, as it is and held apart.
+    pub(super) fn heights(&self, spots: &[usize; 3]) -> [[D; 3]; 2] {
+        [0, 1].map(|which| spots.map(|s| self.spots[s].distances[which].value))
     }
 }
 
-/// The gap of a link and this side's normal there: means over the vertices, of which the nearest count most, and those beyond `end` nothing.
-fn nearest<D: Jet>(
-    surface: &FilmSurface,
-    distances: &[Option<D>],
-    end: f64,
-    scale: f64,
-) -> (D, Vector<D>) {
-    let (mut sum, mut gap, mut normal) = (D::from(0.0), D::from(0.0), [D::from(0.0); 3]);
-    for (v, d) in distances.iter().enumerate() {
-        let Some(d) = d.filter(|d| d.re() < end) else {
-            continue;
-        };
-        let fade = (-d / end + 1.0).powi(3);
-        let weight = (d / scale).powi(-NEAREST) * fade * surface.areas[v];
-        sum += weight;
-        gap += weight * d;
-        let n = &surface.normals[v];
-        (0..3).for_each(|i| normal[i] += weight * n[i]);
+impl<D: Jet> Gap<D> {
+    fn new(
+        surface: &FilmSurface,
+        opposite: &Opposite,
+        placed: &Displaced<D>,
+        spots: &[Spot<D>],
+        reach: f64,
+    ) -> Option<Self> {
+        let [_, end] = ends(surface);
+        let (mut sum, mut gap) = (D::from(0.0), D::from(0.0));
+        let mut mean = zero::<D>();
+        for spot in spots {
+            let d = spot.distances[0].value;
+            if let Some(weight) = weight(d, surface.areas[spot.vertex], end, reach) {
+                sum += weight;
+                gap += weight * d;
+                let n = &surface.normals[spot.vertex];
+                (0..3).for_each(|i| mean[i] += weight * n[i]);
+            }
+        }
+        let mean = mean.map(|x| x / sum);
+        (sum.re() > 0.0).then(|| Self {
+            value: gap / sum,
+            mean,
+            normal: match opposite.wall_normal() {
+                Some(wall) => placed.rotate_inverse(&constant(&-wall)),
+                None => mean,
+            },
+            sum,
+        })
     }
-    if sum.re() <= 0.0 {
-        return (D::from(f64::INFINITY), normal);
-    }
-    (gap / sum, normal.map(|x| x / sum))
+}
+
+/// How much a vertex at a distance counts in a link's gap; beyond `end` nothing.
+pub(super) fn weight<D: Jet>(d: D, area: f64, end: f64, scale: f64) -> Option<D> {
+    let fade = || (-d / end + 1.0).powi(3) * area;
+    (d.re() < end).then(|| (d / scale).powi(-NEAREST) * fade())
 }
 
 /// t³/(1 − t)³ from 0 on.
 fn opening<D: Jet>(t: D) -> D {
-    if t.re() <= 0.0 {
-        return D::from(0.0);
+    match t.re() <= 0.0 {
+        true => D::from(0.0),
+        false => (t / (-t + 1.0)).powi(3),
     }
-    (t / (-t + 1.0)).powi(3)
+}
+
+/// Its derivative.
+pub(super) fn opening_slope<D: Jet>(t: D) -> D {
+    match t.re() <= 0.0 {
+        true => D::from(0.0),
+        false => t * t * 3.0 / (-t + 1.0).powi(4),
+    }
 }
 
 /// The length of the arc that meets both surfaces at right angles, of a face with these distances at its corners: 1/(mean of 1/length), which is what the flow
 /// across lines of equal thickness feels.
-fn thickness<D: Jet>(d: &[D; 3], slopes: &nalgebra::Matrix3<f64>) -> D {
-    let mut steep = D::from(0.0);
-    for i in 0..3 {
-        steep += d[i] * d[i] * slopes[(i, i)];
-        steep += d[i] * d[(i + 1) % 3] * (2.0 * slopes[(i, (i + 1) % 3)]);
+fn thickness<D: Jet>(d: &[D; 3], face: &Element) -> D {
+    let [arc, _] = arc(steepness(d, face).0);
+    arc * 1.5 / pairs(d)
+}
+
+/// Its derivative.
+pub(super) fn thickness_slope<D: Jet>(d: &[D; 3], face: &Element) -> [D; 3] {
+    let (steep, slopes) = steepness(d, face);
+    let ([arc, slope], inverse) = (arc(steep), pairs(d));
+    std::array::from_fn(|i| {
+        let squares = (d[i] + d[(i + 1) % 3]).powi(-2) + (d[i] + d[(i + 2) % 3]).powi(-2);
+        (slope * slopes[i] + arc * squares / inverse) * 1.5 / inverse
+    })
+}
+
+/// |∇d|² on a face, and its derivative.
+fn steepness<D: Jet>(d: &[D; 3], face: &Element) -> (D, [D; 3]) {
+    let s = &face.slopes;
+    let along = [0, 1, 2].map(|i| d[0] * s[(i, 0)] + d[1] * s[(i, 1)] + d[2] * s[(i, 2)]);
+    let steep = product(d, &along);
+    match steep.re() > STEEPEST {
+        true => (D::from(STEEPEST), zero()),
+        false => (steep, along.map(|x| x * 2.0)),
     }
-    if steep.re() > STEEPEST {
-        steep = D::from(STEEPEST);
-    }
+}
+
+/// An arc's length in its height, and its derivative, of a square of a sine.
+fn arc<D: Jet>(steep: D) -> [D; 2] {
     let last = std::f64::consts::FRAC_PI_2 - ARC.iter().sum::<f64>();
     let [a, b, c, e] = ARC;
-    let arc = steep * (steep * (steep * e + c) + b) + a + steep.powi(STEEP) * last;
-    let inverse: D = (0..3).map(|i| (d[i] + d[(i + 1) % 3]).recip()).sum();
-    arc * 1.5 / inverse
+    let once = steep.powi(STEEP - 1) * last;
+    [
+        steep * (steep * (steep * e + c) + b) + a + steep * once,
+        steep * (steep * (3.0 * e) + 2.0 * c) + b + once * f64::from(STEEP),
+    ]
+}
+
+/// Sum of 1/(sum of two).
+fn pairs<D: Jet>(d: &[D; 3]) -> D {
+    (0..3).map(|i| (d[i] + d[(i + 1) % 3]).recip()).sum()
 }
 
 /// The other side's normal: its part along the face is what the distances do there. The arcs that meet both at right angles cut equal areas off both.
 fn facing<D: Jet>(d: &[D; 3], face: &Element) -> Vector<D> {
-    let along: Vector<D> = std::array::from_fn(|i| {
-        let g = &face.gradients;
-        d[0] * g[(i, 0)] + d[1] * g[(i, 1)] + d[2] * g[(i, 2)]
-    });
-    let square = along[0] * along[0] + along[1] * along[1] + along[2] * along[2];
+    let along = slope_of(d, face);
+    let square = product(&along, &along);
     let [a, b, c] = COSINE;
     let cosine = square * (square * (square * c + b) + a) + 1.0;
     std::array::from_fn(|i| along[i] - cosine * face.normal[i])
+}
+
+/// Its derivative along `bar`.
+pub(super) fn facing_slope<D: Jet>(d: &[D; 3], face: &Element, bar: &Vector<D>) -> [D; 3] {
+    let along = slope_of(d, face);
+    let square = product(&along, &along);
+    let [a, b, c] = COSINE;
+    let slope = square * (square * (3.0 * c) + 2.0 * b) + a;
+    let across = dot(bar, &face.normal) * slope * 2.0;
+    let bar: Vector<D> = std::array::from_fn(|i| bar[i] - across * along[i]);
+    [0, 1, 2].map(|k| dot(&bar, &face.gradients.column(k).into_owned()))
+}
+
+/// ∇d on a face.
+fn slope_of<D: Jet>(d: &[D; 3], face: &Element) -> Vector<D> {
+    let g = &face.gradients;
+    std::array::from_fn(|i| d[0] * g[(i, 0)] + d[1] * g[(i, 1)] + d[2] * g[(i, 2)])
 }

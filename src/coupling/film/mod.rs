@@ -18,22 +18,22 @@
 //! h_f = h + h₀ (1 − h/h_m)³,      M(h) = M_coupling(h_f) + K(h) − K(h_f)
 //! ```
 //!
-//! twice continuously differentiable as the gap opens and closes. Derivatives are carried by dual numbers of the six components of one body's displacement against
-//! the other.
+//! twice continuously differentiable as the gap opens and closes. The gradient is the reverse by hand ([`layer::Layer::pull_back`]); run on dual numbers along a
+//! displacement, forward and reverse give second derivatives.
 
+mod flow;
 mod jet;
 mod layer;
 mod placed;
+mod pull;
 mod surface;
 
-pub(crate) use placed::PlacedFilm;
+pub(crate) use placed::{MovingFilm, PlacedFilm};
 pub(crate) use surface::FilmSurface;
 
-use crate::adjoint::lie::Pose;
 use crate::geometry::{Image, Opposite};
-use jet::Jet;
-use layer::Layer;
-use std::sync::Arc;
+use crate::solver::SparsePattern;
+use std::sync::{Arc, Mutex};
 
 /// The gap at which the coupling is asked at contact, and the one from which on it is asked as things are, m.
 #[derive(Clone, Copy, Debug)]
@@ -60,14 +60,24 @@ pub(crate) struct Film {
     pub surface: Arc<FilmSurface>,
     pub opposite: Arc<Opposite>,
     pub width: Width,
+    /// Where the last system had entries, with the vertices that had potentials.
+    pattern: Arc<Mutex<Option<(Vec<usize>, Arc<SparsePattern>)>>>,
 }
 
 impl Film {
-    fn layer<D: Jet>(
-        &self,
-        relative: &Pose,
-        known: Option<&[Option<usize>]>,
-    ) -> Result<Option<Layer<D>>, f64> {
-        Layer::new(&self.surface, &self.opposite, relative, &self.width, known)
+    pub fn new(
+        body: usize,
+        other: Side,
+        (surface, opposite): (Arc<FilmSurface>, Arc<Opposite>),
+        width: Width,
+    ) -> Self {
+        Self {
+            body,
+            other,
+            surface,
+            opposite,
+            width,
+            pattern: Arc::default(),
+        }
     }
 }

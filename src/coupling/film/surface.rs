@@ -5,6 +5,9 @@ use crate::geometry::TriMesh;
 use nalgebra::Matrix3;
 use std::f64::consts::PI;
 
+/// Vertices in a [`Cluster`] at most.
+const TOGETHER: usize = 8;
+
 /// A body's surface as films see it, in the body's frame: linear elements on its faces.
 #[derive(Clone, Debug)]
 pub(crate) struct FilmSurface {
@@ -21,6 +24,16 @@ pub(crate) struct FilmSurface {
     /// Area over that of the ball of equal volume.
     pub flatness: f64,
     /// A ball around the vertices.
+    pub center: Vec3,
+    pub radius: f64,
+    pub clusters: Vec<Cluster>,
+}
+
+/// Vertices that lie together.
+#[derive(Clone, Debug)]
+pub(crate) struct Cluster {
+    pub vertices: Vec<usize>,
+    /// A ball around them.
     pub center: Vec3,
     pub radius: f64,
 }
@@ -79,6 +92,34 @@ impl FilmSurface {
             size,
             center: ball.center,
             radius: ball.radius,
+            clusters: clusters(mesh.vertices()),
         }
     }
+}
+
+/// The points in groups of [`TOGETHER`] at most, by halves across their longest side.
+fn clusters(points: &[Vec3]) -> Vec<Cluster> {
+    let (mut out, mut open) = (Vec::new(), vec![(0..points.len()).collect::<Vec<_>>()]);
+    while let Some(mut group) = open.pop() {
+        let Some(first) = group.first() else { continue };
+        let bounds = (points[*first], points[*first]);
+        let (low, high) = (group.iter()).fold(bounds, |(low, high), v| {
+            (low.inf(&points[*v]), high.sup(&points[*v]))
+        });
+        if group.len() > TOGETHER {
+            let axis = (high - low).imax();
+            group.sort_by(|a, b| points[*a][axis].total_cmp(&points[*b][axis]));
+            open.push(group.split_off(group.len() / 2));
+            open.push(group);
+            continue;
+        }
+        let center = (low + high) / 2.0;
+        let away = group.iter().map(|v| (points[*v] - center).norm());
+        out.push(Cluster {
+            radius: away.fold(0.0, f64::max),
+            center,
+            vertices: group,
+        });
+    }
+    out
 }

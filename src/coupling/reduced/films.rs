@@ -51,15 +51,10 @@ impl Reduced {
                 false => fit.finest(),
             }
         };
-        let film = |body: usize, other, opposite: &Arc<Opposite>, reach: f64| Film {
-            body,
-            other,
-            surface: sides[body].0.clone(),
-            opposite: opposite.clone(),
-            width: Width {
-                floor: FLOOR * reach,
-                reach,
-            },
+        let film = |body: usize, other, opposite: &Arc<Opposite>, reach: f64| {
+            let floor = FLOOR * reach;
+            let between = (sides[body].0.clone(), opposite.clone());
+            Film::new(body, other, between, Width { floor, reach })
         };
         let mut films = Vec::new();
         for (w, wall) in walls.iter().enumerate() {

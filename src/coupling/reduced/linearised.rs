@@ -6,7 +6,7 @@ use super::views::{FLUX, interleave, view, view_mut};
 use crate::Result;
 use crate::adjoint::kernel::{Points, potential_sum, potential_vjp};
 use crate::adjoint::lie::{Pose, Vec3, Vec6, linear, point_wrench};
-use crate::coupling::film::PlacedFilm;
+use crate::coupling::film::{MovingFilm, PlacedFilm};
 use crate::coupling::pair::{vector, wrench};
 use crate::coupling::{
     Coupling, CouplingReport, Direction, Linearise, Linearised, Momenta, Pullback, Tangent,
@@ -200,6 +200,12 @@ impl<'a> ReducedLinearised<'a> {
         self.films.iter().flatten()
     }
 
+    /// The films along displacements.
+    pub fn moving_films(&self, z: &[Vec6]) -> Vec<Option<MovingFilm<'_>>> {
+        let all = self.films.iter();
+        all.map(|film| film.as_ref()?.along(z)).collect()
+    }
+
     /// What holds a link apart, if anything does.
     pub fn apart<'p>(
         &'p self,
@@ -258,8 +264,11 @@ impl<'a> ReducedLinearised<'a> {
     }
 
     fn pull_back_films(&self, x: &DVector<f64>, y: &DVector<f64>, out: &mut [Vec6]) {
-        self.films()
-            .for_each(|film| film.apply(&film.wrench(x, y), out));
+        for film in self.films() {
+            for wrench in film.wrenches(x, std::iter::once(y.clone())) {
+                film.apply(&wrench, out);
+            }
+        }
     }
 
     fn fields(&self) -> &[Fields] {
@@ -316,7 +325,8 @@ impl<'a> ReducedLinearised<'a> {
         }
         let twists = &self.basis * x;
         for film in self.films() {
-            let wrenches = film.wrenches(&twists, &self.basis);
+            let columns = self.basis.column_iter().map(|c| c.into_owned());
+            let wrenches = film.wrenches(&twists, columns);
             let each = out.iter_mut().zip(&wrenches);
             each.for_each(|(out, wrench)| film.apply(wrench, out));
         }
@@ -401,16 +411,14 @@ impl Linearised for ReducedLinearised<'_> {
 
     fn gradient_along(&self, y: &DVector<f64>, z: &[Vec6]) -> Result<DVector<f64>> {
         let charges = &self.alpha * y;
-        let (psi, _) = self.tangent_potentials(&[charges.as_slice()], z);
-        let mut out = FLUX * self.alpha.tr_mul(&psi.column(0));
+        let films = self.moving_films(z);
+        let (psi, _) = self.tangent_potentials(&[charges.as_slice()], z, &films);
+        let mut rate = DVector::zeros(self.basis.nrows());
         let twists = &self.basis * y;
-        for film in self.films() {
-            let along = film.displacement(z);
-            let wrenches = film.wrenches(&twists, &self.basis);
-            let each = out.iter_mut().zip(&wrenches);
-            each.for_each(|(out, wrench)| *out += wrench.dot(&along));
+        for film in films.iter().flatten() {
+            film.add_impulse_rate(&twists, &mut rate);
         }
-        Ok(out)
+        Ok(FLUX * self.alpha.tr_mul(&psi.column(0)) + self.basis.tr_mul(&rate))
     }
 
     fn vjp(&self, x: Direction, y: Direction) -> Result<Pullback> {

@@ -3,7 +3,7 @@
 use super::ReducedBody;
 use crate::adjoint::kernel::{Write, potential_fill};
 use crate::adjoint::lie::{Pose, Vec3, Vec6};
-use crate::coupling::film::{PlacedFilm, Side};
+use crate::coupling::film::{MovingFilm, PlacedFilm, Side};
 use crate::coupling::pair::Pair;
 use crate::geometry::Image;
 use std::sync::Arc;
@@ -104,9 +104,9 @@ impl Apart {
         self.sign * film.shift[self.at]
     }
 
-    /// Its rate along a displacement of the film.
-    pub fn rate(&self, film: &PlacedFilm, displacement: &Vec6) -> Vec3 {
-        self.sign * film.shift_rate(self.at, displacement)
+    /// Its rate.
+    pub fn rate(&self, film: &MovingFilm) -> Vec3 {
+        self.sign * film.shift_rate(self.at)
     }
 
     /// What a force on all points together, target's frame, exerts by way of the shift, in the film's frame.
@@ -114,15 +114,9 @@ impl Apart {
         film.shift_wrench(self.at, &(self.sign * force))
     }
 
-    /// Its tangent.
-    pub fn wrench_tangent(
-        &self,
-        film: &PlacedFilm,
-        [force, dforce]: [&Vec3; 2],
-        along: &Vec6,
-    ) -> Vec6 {
-        let (force, dforce) = (self.sign * force, self.sign * dforce);
-        film.shift_wrench_tangent(self.at, &force, &dforce, along)
+    /// The same and its rate, of a force that changes.
+    pub fn wrench_and_rate(&self, film: &MovingFilm, [force, dforce]: [&Vec3; 2]) -> (Vec6, Vec6) {
+        film.shift_wrench(self.at, &(self.sign * force), &(self.sign * dforce))
     }
 }
 

@@ -5,7 +5,7 @@ use super::link::{Apart, PlacedSkeletons};
 use super::views::{FLUX, interleave};
 use crate::adjoint::kernel::{potential_hvp, potential_jvp, potential_vjp};
 use crate::adjoint::lie::{Vec3, Vec6, linear, point_velocity, point_wrench, six};
-use crate::coupling::film::PlacedFilm;
+use crate::coupling::film::MovingFilm;
 use crate::coupling::pair::vector;
 use crate::coupling::{Direction, Tangent};
 use nalgebra::{DMatrix, DVector};
@@ -25,8 +25,17 @@ pub(super) struct Moved {
     rate: f64,
 }
 
+/// What holds a link apart, if anything does.
+fn moving<'p>(
+    placed: &'p PlacedSkeletons,
+    films: &'p [Option<MovingFilm<'p>>],
+) -> Option<(&'p Apart, &'p MovingFilm<'p>)> {
+    let apart = placed.apart.as_ref()?;
+    Some((apart, films[apart.film].as_ref()?))
+}
+
 impl ReducedLinearised<'_> {
-    fn moved(&self, placed: &PlacedSkeletons, z: &[Vec6]) -> Moved {
+    fn moved(&self, placed: &PlacedSkeletons, z: &[Vec6], films: &[Option<MovingFilm>]) -> Moved {
         let pose = &self.poses[placed.link.target];
         let relative = placed.pair.image.twist(&z[placed.link.source]) - z[placed.link.target];
         let local = pose.twist_to_body(&relative);
@@ -37,9 +46,8 @@ impl ReducedLinearised<'_> {
             0.0
         };
         let arms = placed.pair.displacements(pose, z);
-        let rate_of =
-            |(apart, film): (&Apart, &PlacedFilm)| apart.rate(film, &film.displacement(z));
-        let shift = self.apart(placed).map_or(Vec3::zeros(), rate_of);
+        let held = moving(placed, films);
+        let shift = held.map_or(Vec3::zeros(), |(apart, film)| apart.rate(film));
         Moved {
             points: arms.iter().map(|d| d + shift).collect(),
             arms,
@@ -54,12 +62,13 @@ impl ReducedLinearised<'_> {
         &self,
         alpha: &[&[f64]],
         z: &[Vec6],
+        films: &[Option<MovingFilm>],
     ) -> (DMatrix<f64>, Vec<(Moved, Vec<f64>)>) {
         let k = alpha.len();
         let one = |placed: &PlacedSkeletons| {
             let link = placed.link;
             let (t, s) = (self.range(link.target), self.range(link.source));
-            let moved = self.moved(placed, z);
+            let moved = self.moved(placed, z, films);
             let part = |range: &std::ops::Range<usize>| {
                 let columns: Vec<&[f64]> = alpha.iter().map(|a| &a[range.clone()]).collect();
                 interleave(&columns)
@@ -118,7 +127,8 @@ impl ReducedLinearised<'_> {
         let responses: Vec<_> = directions.into_iter().map(|x| self.respond(x)).collect();
         let n = responses.len();
         let alpha: Vec<&[f64]> = responses.iter().map(|r| r.alpha.as_slice()).collect();
-        let (psi, seen) = self.tangent_potentials(&alpha, z);
+        let films = self.moving_films(z);
+        let (psi, seen) = self.tangent_potentials(&alpha, z, &films);
         let (dalpha, dmomenta) = self.tangent_solution(&psi);
         let links: Vec<_> = self.placed.iter().zip(&seen).collect();
         let one = |(placed, seen): &(&PlacedSkeletons, &(Moved, Vec<f64>))| {
@@ -132,25 +142,19 @@ impl ReducedLinearised<'_> {
             let pose = &self.poses[t];
             self.apply(placed, w, f, &mut gradient);
             placed.pair.apply_jvp(pose, w, dw, &z[t], &mut wrench);
-            if let Some((apart, film)) = self.apart(placed) {
-                let along = film.displacement(z);
-                let (w, dw) = (
-                    apart.wrench(film, f),
-                    apart.wrench_tangent(film, [f, df], &along),
-                );
-                film.apply_tangent(&w, &dw, z, &mut wrench);
+            if let Some((apart, film)) = moving(placed, &films) {
+                let (w, dw) = apart.wrench_and_rate(film, [f, df]);
+                film.apply_rate((&w, &dw), z, &mut wrench);
             }
         }
         let mut momenta: Vec<DVector<f64>> =
             (0..n).map(|k| dmomenta.column(k).into_owned()).collect();
-        for film in self.films() {
-            let along = film.displacement(z);
-            let (x, y) = (&responses[0].twists, &responses[n - 1].twists);
-            let (w, dw) = film.wrench_tangent(x, y, &along);
-            film.apply(&w, &mut gradient);
-            film.apply_tangent(&w, &dw, z, &mut wrench);
+        for film in films.iter().flatten() {
+            let (w, dw) = film.wrench(&responses[0].twists, &responses[n - 1].twists);
+            film.placed.apply(&w, &mut gradient);
+            film.apply_rate((&w, &dw), z, &mut wrench);
             for (momentum, response) in momenta.iter_mut().zip(&responses) {
-                film.add_impulse_tangent(&response.twists, &along, momentum);
+                film.add_impulse_rate(&response.twists, momentum);
             }
         }
         Tangent {

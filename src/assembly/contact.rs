@@ -3,7 +3,7 @@
 use crate::adjoint::contact::Law;
 use crate::adjoint::lie::{Pose, Vec3};
 use crate::contact::{ContactPair, ContactShape, Contacts};
-use crate::dynamics::{ContactModel, Integrator, Parameters};
+use crate::dynamics::{ContactGap, ContactModel, Integrator, Parameters};
 use crate::geometry::Other;
 use crate::scene::{Body, Contact, Scene, Shape};
 use crate::water::{Prepared, Surface, pose};
@@ -14,10 +14,10 @@ use std::path::Path;
 pub(super) const STIFFNESS: f64 = 10.0;
 /// Half the width over which the force sets in, of the smallest body's radius.
 const WIDTH: f64 = 0.004;
-/// Gap at which surfaces touch, of what the coupling resolves: a body that lands goes a little further.
-const ROOM: f64 = 1.25;
-/// The same where the water isn't solved, of the smallest body's radius: distances are smooth outside a body only.
+/// Gap at which surfaces touch, of the smallest body's radius: distances are smooth outside a body only.
 const SKIN: f64 = 0.01;
+/// The least, of what sources resolve, without which the flow has no sense: a body that lands goes a little further.
+const ROOM: f64 = 1.25;
 
 /// Of the size of the smaller body, a gap at which surfaces touch that the user is told of.
 const WIDE: f64 = 0.05;
@@ -116,13 +116,60 @@ pub(super) fn assemble(
     })
 }
 
-/// What the user should know of the gaps at which surfaces touch: the largest, as a part of a body, if that is no small part.
-pub(super) fn warning(scene: &Scene, given: &Contact, model: &ContactModel) -> Option<String> {
+/// What the user should know of the gaps at which surfaces touch, of bodies with these surfaces.
+pub(super) fn warnings(
+    scene: &Scene,
+    given: &Contact,
+    water: &Prepared,
+    surfaces: &[Option<Surface>],
+    model: &ContactModel,
+) -> Vec<String> {
+    let narrow = narrow(scene, water, surfaces, model);
+    wide(scene, given, model)
+        .into_iter()
+        .chain(narrow)
+        .collect()
+}
+
+/// The gap that is narrowest against what the coupling resolves, if it is under that.
+fn narrow(
+    scene: &Scene,
+    water: &Prepared,
+    surfaces: &[Option<Surface>],
+    model: &ContactModel,
+) -> Option<String> {
+    if scene.fluid.density <= 0.0 || !solves_thin(water) {
+        return None;
+    }
+    let edges = water.clearance.resolved_edges;
+    let least = |gap: &ContactGap| {
+        let both = [Some(gap.first), gap.second].into_iter().flatten();
+        let of = both.filter_map(|b| Some(surfaces[b].as_ref()?.mean_edge()));
+        edges * of.fold(0.0, f64::max)
+    };
+    let gaps = model.gaps();
+    let all = gaps.iter().map(|gap| (gap, least(gap)));
+    let under = all.filter(|(gap, least)| gap.gap < *least);
+    let (gap, least) = under.max_by(|a, b| (a.1 / a.0.gap).total_cmp(&(b.1 / b.0.gap)))?;
+    Some(format!(
+        "{} touch at a gap of {:.3e} m, less than the {least:.3e} m ({edges} of the faces' edges) down to which forces of the water are resolved: \
+         once they do, forces across it may be off by several percent and more (`check_gap` measures by how much); use more faces, or give a larger contact.gap",
+        between(scene, gap),
+        gap.gap
+    ))
+}
+
+fn between(scene: &Scene, gap: &ContactGap) -> String {
+    let name = |b: usize| format!("body {:?}", scene.bodies[b].name);
+    let other = gap.second.map_or("a wall".into(), name);
+    format!("{} and {other}", name(gap.first))
+}
+
+/// The largest gap, as a part of a body, if that is no small part.
+fn wide(scene: &Scene, given: &Contact, model: &ContactModel) -> Option<String> {
     let gaps = model.gaps();
     let wide = gaps.iter().filter(|g| g.part > WIDE);
     let worst = wide.clone().max_by(|a, b| a.part.total_cmp(&b.part))?;
-    let name = |b: usize| format!("body {:?}", scene.bodies[b].name);
-    let other = worst.second.map_or("a wall".into(), name);
     let more = match wide.count() - 1 {
         0 => String::new(),
         n => format!("; {n} more pairs are over {:.0} %", 100.0 * WIDE),
@@ -130,13 +177,13 @@ pub(super) fn warning(scene: &Scene, given: &Contact, model: &ContactModel) -> O
     let why = match given.gap {
         Some(_) => "as contact.gap says",
         None => {
-            "since the coupling resolves no less: resolve more (`accuracy`, more faces), or give contact.gap, if forces of the water that \
+            "since the coupling resolves no less: resolve more (`films`, `accuracy`, more faces), or give contact.gap, if forces of the water that \
              aren't resolved will do"
         }
     };
     Some(format!(
-        "{} and {other} touch at a gap of {:.3e} m, {:.0} % of the smaller one's size, {why}{more}",
-        name(worst.first),
+        "{} touch at a gap of {:.3e} m, {:.0} % of the smaller one's size, {why}{more}",
+        between(scene, worst),
         worst.gap,
         100.0 * worst.part
     ))
@@ -191,8 +238,17 @@ fn pieces(body: &Body, surface: &Surface) -> Result<Vec<ContactShape>> {
     Ok(out)
 }
 
-/// The gap that the coupling resolves between a pair, m.
+/// Whether the flow in a gap has sense however narrow it is.
+fn solves_thin(water: &Prepared) -> bool {
+    let kind = water.fidelity.kind();
+    kind.coupled() && (water.clearance.films || !(kind.compresses() || water.clearance.by_sources))
+}
+
+/// The gap between a pair below which the flow has no sense, m.
 fn resolved(water: &Prepared, surfaces: &[Option<Surface>], pair: &ContactPair) -> f64 {
+    if solves_thin(water) {
+        return 0.0;
+    }
     let of = |b: usize| {
         let edge = surfaces[b].as_ref().map_or(0.0, Surface::mean_edge);
         (water.fidelity.kind()).resolved_gap(water.resolved[b].everywhere, edge)

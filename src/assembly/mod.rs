@@ -156,7 +156,8 @@ pub(crate) fn assemble(
     system.coupling = water.coupling.clone();
     if let Some(given) = &scene.contact {
         let made = contact::assemble(scene, given, dt, &water, &surfaces, &mut parameters)?;
-        water.warnings.extend(contact::warning(scene, given, &made));
+        let told = contact::warnings(scene, given, &water, &surfaces, &made);
+        water.warnings.extend(told);
         system.contact = Some(made);
     }
     system.limits = limits::assemble(scene, dt, &system, &parameters, &q)?;

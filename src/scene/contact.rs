@@ -21,9 +21,9 @@ pub struct Contact {
     /// Rolling friction, m: the torque against rolling, about axes across the normal, per normal force: a ball of radius r that rolls on
     /// a slope less steep than this over r comes to rest. Default: 0.
     pub rolling_friction: f64,
-    /// Gap at which surfaces are taken to touch, m. Default: a quarter more than the coupling of the water resolves, so that the
-    /// water between them stays resolved when a body lands; at least a hundredth of the smallest moving body's radius, because
-    /// distances are smooth only outside a body.
+    /// Gap at which surfaces are taken to touch, m. Default: a hundredth of the smallest moving body's radius, because distances are smooth only
+    /// outside a body; where the water is made by sources (compressed bodies without films, fundamental solutions) at least a quarter more than
+    /// they resolve, so that it has a solution when a body lands.
     pub gap: Option<f64>,
     /// Half the width over which the force sets in, m; nothing acts at a larger distance than it beyond `gap`. Default: 0.4 % of
     /// the smallest moving body's radius.

@@ -5,7 +5,7 @@ use crate::support::falling::drops;
 use crate::support::{self, check_gradient, run, says};
 use hydrograd::dynamics::Integrator;
 use hydrograd::scene::{Body, Joint, Plane, Scene, Shape};
-use hydrograd::{Controls, Fidelity, Simulator};
+use hydrograd::{Controls, Fidelity, Settings, Simulator};
 use rayon::prelude::*;
 
 fn simulator(scene: &Scene) -> Simulator {
@@ -117,6 +117,37 @@ fn a_ball_lands_in_water() {
     assert!(rollout.warnings().is_empty(), "{:?}", rollout.warnings());
     drop(rollout);
     check_gradient("a ball in water", &mut simulator, 60, 1, 1e-5);
+}
+
+/// Where gaps have films, or panels, it is a hundredth of the body, and the same for all: the ball lands there, and can be differentiated.
+#[test]
+fn a_ball_lands_through_a_film() {
+    let mut scene = above_floor(1000.0);
+    scene.add(
+        Body::new(Shape::sphere(0.1).faces(1280))
+            .density(3000.0)
+            .at([0.0, 0.0, 0.2])
+            .joint(Joint::Planar { plane: Plane::Zx }),
+    );
+    let with = |fidelity| {
+        let settings = Settings::default().fidelity(fidelity);
+        let settings = settings.integrator(Integrator::MomentumEuler);
+        Simulator::new(&scene, settings.films(fidelity != Fidelity::Full)).unwrap()
+    };
+    for fidelity in [Fidelity::Reduced, Fidelity::Auto, Fidelity::Full] {
+        let simulator = with(fidelity);
+        assert_eq!(simulator.contact_gaps()[0].gap, 1e-3);
+        // A hundredth of the radius is less than these faces resolve to a percent.
+        let told = simulator.warnings().join("\n");
+        says(told, &["body 1", "1.000e-3 m", "faces' edges", "check_gap"]);
+    }
+    let mut simulator = with(Fidelity::Reduced);
+    let rollout = run(&simulator, 100);
+    let gap = rollout.samples()[100].poses[0].translation.z - 0.1;
+    println!("rests at {gap:.4e}");
+    assert!((gap - 1e-3).abs() < 3e-4, "{gap}");
+    drop(rollout);
+    check_gradient("a ball through a film", &mut simulator, 40, 1, 1e-5);
 }
 
 /// The gaps at which surfaces touch can be read, and one over a twentieth of a body is told.

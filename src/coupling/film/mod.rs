@@ -60,9 +60,11 @@ pub(crate) struct Film {
     pub surface: Arc<FilmSurface>,
     pub opposite: Arc<Opposite>,
     pub width: Width,
-    /// Where the last system had entries, with the vertices that had potentials.
-    pattern: Arc<Mutex<Option<(Vec<usize>, Arc<SparsePattern>)>>>,
+    pattern: Arc<Mutex<Option<LastPattern>>>,
 }
+
+/// The vertices that had potentials in the last system, and where it had entries.
+type LastPattern = (Vec<usize>, Arc<SparsePattern>);
 
 impl Film {
     pub fn new(

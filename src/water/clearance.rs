@@ -1,7 +1,6 @@
 //! How near the bodies are to one another and to the walls, and what that means for the flow.
 
 use super::fidelity::Fidelity;
-use super::fidelity::kind::FILM;
 use super::resolved::{Resolved, narrowest};
 use super::surface::{Surface, overlaps, touches};
 use crate::adjoint::lie::Pose;
@@ -16,10 +15,13 @@ use std::f64::consts::PI;
 const GAP: &str = "gap in m";
 /// Largest part of a body's volume that may lie inside a larger one that it is declared to overlap.
 const MOST_SHARED: f64 = 0.5;
-/// Edges under which sources inside the bodies don't resolve a flat gap at all: the force between boxes has the wrong sign there.
-const BY_SOURCES: f64 = 1.25;
+/// Edges under which sources inside the bodies don't resolve a flat gap at all: the force between boxes has the wrong sign there. The image in a wall is twice
+/// as far away as the wall.
+const BY_SOURCES: f64 = 3.5;
 /// A gap is thin where it is less than this part of the radius of a disc with the area over which the surfaces are parallel.
-const THIN: f64 = 0.2;
+const THIN: f64 = 0.4;
+/// Energy of the film in a gap, in that of the water that the smaller body displaces, from which sources that lose it are refused.
+const LOST: f64 = 0.2;
 
 /// The gaps of a scene's bodies, from their surfaces in body frames: those of shapes by formula exact, others of meshes.
 #[derive(Clone)]
@@ -131,20 +133,24 @@ impl Clearance {
     /// Refuses flat gaps that sources inside the bodies don't resolve: what they give there is smaller than the truth by a factor and
     /// has slopes of the wrong sign.
     pub fn refuse_film(&self, smallest: Option<&Gap>, poses: &[Pose]) -> Result<()> {
-        let narrow = |gap: &Gap| gap.distance < BY_SOURCES * gap.edge;
-        if !self.by_sources || !smallest.is_some_and(narrow) {
+        let limit = |gap: &Gap| match gap.second {
+            Other::Body(_) => BY_SOURCES * gap.edge,
+            Other::Wall(_) => 0.5 * BY_SOURCES * gap.edge,
+        };
+        if !self.by_sources || smallest.is_none() {
             return Ok(());
         }
-        for gap in self.moving.all(poses).iter().filter(|gap| narrow(gap)) {
+        let all = self.moving.all(poses);
+        for gap in all.iter().filter(|gap| gap.distance < limit(gap)) {
             let (area, energy) = self.film(&self.moving, gap, poses);
-            if energy > FILM && gap.distance < THIN * (area / PI).sqrt() {
+            if energy > LOST && gap.distance < THIN * (area / PI).sqrt() {
                 return Err(Error::Unresolved {
                     place: self.place(gap),
                     quantity: "flat gap in m".into(),
                     value: gap.distance,
-                    limit: BY_SOURCES * gap.edge,
+                    limit: limit(gap),
                     remedy: format!(
-                        "over {area:.3e} m² the water between them is a film, which fundamental solutions don't resolve under 1¼ edges: \
+                        "over {area:.3e} m² the water between them is a film, which fundamental solutions don't resolve under 3½ edges between bodies, 1¾ to a wall: \
                          use the method panel, or more faces, or end the run before"
                     ),
                 });

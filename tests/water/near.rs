@@ -89,3 +89,45 @@ fn where_it_is_resolved() {
     let said = warning(&beside).unwrap();
     assert!(said.contains("plate") && said.contains("coin"), "{said}");
 }
+
+/// A box over a box, and over a wall: fundamental solutions lose the water between them as it closes, and refuse before the force has the wrong sign.
+#[test]
+fn no_force_of_the_wrong_sign_between_flat_faces() {
+    for wall in [false, true] {
+        for gap in [0.3, 0.22, 0.18, 0.14, 0.1, 0.07, 0.05, 0.02] {
+            // As far from its image as from the other box.
+            let gap = if wall { 0.5 * gap } else { gap };
+            let along = |gap: f64| -> hydrograd::Result<f64> {
+                let mut scene = Scene::new(Fluid::fresh_water());
+                let brick = || Body::new(Shape::cuboid([1.0, 1.0, 0.5]).faces(1280)).density(998.0);
+                match wall {
+                    true => scene.add_wall([0.0; 3], [0.0, 0.0, 1.0]),
+                    false => _ = scene.add(brick().at([0.0, 0.0, -0.25])),
+                }
+                scene.add(brick().at([0.0, 0.0, 0.25 + gap]));
+                let settings = Settings::default().fidelity(Fidelity::Full);
+                let simulator = Simulator::new(&scene, settings.method(Method::MfsVertex))?;
+                let m = simulator.added_mass()?.matrix;
+                let last = m.nrows() - 4;
+                Ok(m[(last, last)] / 998.0)
+            };
+            let step = 0.02 * gap;
+            match (along(gap - step), along(gap + step)) {
+                (Ok(near), Ok(far)) => {
+                    let slope = (far - near) / (2.0 * step);
+                    println!("wall {wall}, gap {gap}: slope {slope:.4}");
+                    assert!(slope < 0.0, "wall {wall}, gap {gap}: {slope}");
+                    assert!(gap > 0.1, "wall {wall}, gap {gap}");
+                }
+                (near, far) => {
+                    let said = near.or(far).unwrap_err().to_string();
+                    println!("wall {wall}, gap {gap}: refused");
+                    assert!(
+                        said.contains("flat gap in m") && said.contains("edges"),
+                        "{said}"
+                    );
+                }
+            }
+        }
+    }
+}

@@ -132,14 +132,14 @@ impl Clearance {
 
     /// Refuses flat gaps that sources inside the bodies don't resolve: what they give there is smaller than the truth by a factor and
     /// has slopes of the wrong sign.
-    pub fn refuse_film(&self, smallest: Option<&Gap>, poses: &[Pose]) -> Result<()> {
+    pub fn refuse_film(&self, poses: &[Pose]) -> Result<()> {
+        if !self.by_sources {
+            return Ok(());
+        }
         let limit = |gap: &Gap| match gap.second {
             Other::Body(_) => BY_SOURCES * gap.edge,
             Other::Wall(_) => 0.5 * BY_SOURCES * gap.edge,
         };
-        if !self.by_sources || smallest.is_none() {
-            return Ok(());
-        }
         let all = self.moving.all(poses);
         for gap in all.iter().filter(|gap| gap.distance < limit(gap)) {
             let (area, energy) = self.film(&self.moving, gap, poses);
@@ -188,7 +188,7 @@ impl Clearance {
                 remedy: self.part(-gap.distance, &self.hint(gap)),
             });
         }
-        self.refuse_film(smallest.as_ref(), poses)?;
+        self.refuse_film(poses)?;
         self.refuse_touch(smallest.as_ref())?;
         self.refuse_depth(poses)?;
         Ok(smallest)

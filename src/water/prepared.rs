@@ -94,7 +94,7 @@ pub(crate) fn prepare(
     for gaps in [&clearance.moving, &clearance.rigid] {
         clearance.refuse_touch(gaps.smallest(poses).as_ref())?;
     }
-    clearance.refuse_film(clearance.moving.smallest(poses).as_ref(), poses)?;
+    clearance.refuse_film(poses)?;
     let mut warnings = choices.without_effect();
     let mut device = Device::open(choices.backend, &choices.gpu, || {
         fidelity.kind().idle_gpu(method)

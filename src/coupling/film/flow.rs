@@ -1,7 +1,8 @@
 //! The flow in a film at given poses: its potential, its momentum, and what thickness, rim and facing are to its energy.
 
 use super::Film;
-use super::jet::{Displaced, Jet, Screw, Vector, add, constant, cross, dot, parts, product, zero};
+use super::jet::{Displaced, Jet, Screw, Vector, add, constant, cross, cross_force, dot, parts};
+use super::jet::{product, screw, whole, zero};
 use super::layer::{Cell, Layer};
 use super::pull::Cotangents;
 use super::surface::Element;
@@ -23,10 +24,16 @@ pub(super) struct Solved {
 
 /// The flow for twists of both sides.
 pub(super) struct Flow<D> {
+    /// Of the other in its own frame.
+    other: Vec6,
     /// Of the first, and of the other in the frame of the first.
     twists: [Screw<D>; 2],
     /// At the active vertices, as the film is and held apart.
     potential: [Vec<D>; 2],
+    /// Their difference.
+    apart: Vec<D>,
+    /// Of both sides in the frame of the first, as the film is less that held apart.
+    pub impulses: [Screw<D>; 2],
     /// What the other's twist pushes in at the corners of each cell, per area of a corner's share and facing.
     speeds: Vec<[Vector<D>; 3]>,
 }
@@ -91,30 +98,34 @@ impl Film {
         out
     }
 
-    /// The flow for twists, with its rate along the layer's displacement.
+    /// The flow for body-frame twists, with its rate along the layer's displacement.
     pub(super) fn flow<D: Jet>(
         &self,
         layer: &Layer<D>,
+        placed: &Displaced<D>,
         solved: &[Solved; 2],
-        twists: [Screw<D>; 2],
+        [own, other]: [&Vec6; 2],
     ) -> Flow<D> {
+        let twists = [screw(own), placed.twist_to_body(other)];
         let values = SMatrix::<f64, TWISTS, 1>::from_fn(|i, _| twists[i / 6][i % 6].re());
         let (u, w) = parts(&twists[1]);
         let speed = |arm| add(&u, &cross(&w, &constant(arm)));
         let faces = layer.cells.iter().map(|c| &self.surface.faces[c.face]);
         let speeds = faces.map(|f: &Element| [0, 1, 2].map(|i| speed(&f.arms[i])));
         let mut out = Flow {
+            other: *other,
             twists,
+            apart: Vec::new(),
+            impulses: [[D::from(0.0); 6]; 2],
             speeds: speeds.collect(),
             potential: [0, 1].map(|k| {
                 let potential = &solved[k].potential * values;
                 potential.iter().map(|x| D::from(*x)).collect()
             }),
         };
-        if !D::MOVES {
-            return out;
-        }
-        for (which, solved) in solved.iter().enumerate() {
+        // A potential that doesn't move has no rate to be found.
+        let moving = if D::MOVES { &solved[..] } else { &[] };
+        for (which, solved) in moving.iter().enumerate() {
             let left = self.residual(layer, &out, which);
             let mut rates: Vec<f64> = left.iter().map(Jet::rate).collect();
             let n = rates.len();
@@ -123,6 +134,9 @@ impl Film {
                 *psi = D::moving(psi.re(), rate);
             }
         }
+        let [near, apart] = &out.potential;
+        out.apart = near.iter().zip(apart).map(|(a, b)| *a - *b).collect();
+        out.impulses = self.impulses(layer, &out.apart);
         out
     }
 
@@ -150,9 +164,8 @@ impl Film {
     }
 
     /// `bᵀψ` as the film is less that held apart: the impulses of both sides in the frame of the first.
-    pub(super) fn impulses<D: Jet>(&self, layer: &Layer<D>, flow: &Flow<D>) -> [Screw<D>; 2] {
+    fn impulses<D: Jet>(&self, layer: &Layer<D>, psi: &[D]) -> [Screw<D>; 2] {
         let mut own = [D::from(0.0); 6];
-        let psi = difference(flow);
         for (psi, spot) in psi.iter().zip(&layer.active) {
             let load = &self.surface.loads[layer.spots[*spot].vertex];
             (0..6).for_each(|i| own[i] += *psi * load[i]);
@@ -168,7 +181,7 @@ impl Film {
                 }
             }
         }
-        [own, super::jet::whole(&force, &torque)]
+        [own, whole(&force, &torque)]
     }
 
     /// Cotangents of `xᵀ K y`, as the film is less that held apart: −ψ_xᵀ δA ψ_y + ψ_xᵀ δb y + xᵀ δbᵀ ψ_y.
@@ -178,7 +191,6 @@ impl Film {
         x: &Flow<D>,
         y: &Flow<D>,
     ) -> Cotangents<D> {
-        let apart = [difference(x), difference(y)];
         let mut out = Cotangents {
             thickness: Vec::with_capacity(layer.cells.len()),
             facing: Vec::with_capacity(layer.cells.len()),
@@ -193,8 +205,8 @@ impl Film {
             let mut facing = zero();
             for (i, at) in cell.corners.iter().enumerate() {
                 if let Some(at) = at {
-                    for (psi, other) in apart.iter().zip([y, x]) {
-                        let share = psi[*at] * (element.area / 3.0);
+                    for (flow, other) in [(x, y), (y, x)] {
+                        let share = flow.apart[*at] * (element.area / 3.0);
                         (0..3).for_each(|k| facing[k] += share * other.speeds[c][i][k]);
                     }
                 }
@@ -215,14 +227,14 @@ impl Film {
         &self,
         layer: &Layer<D>,
         placed: &Displaced<D>,
-        flows: [&Flow<D>; 2],
-        others: [&Vec6; 2],
+        x: &Flow<D>,
+        y: &Flow<D>,
     ) -> Screw<D> {
-        let cotangents = self.cotangents(layer, flows[0], flows[1]);
+        let cotangents = self.cotangents(layer, x, y);
         let mut out = layer.pull_back(self, placed, Some(&cotangents), [zero(); 2]);
-        for (twist, flow) in others.iter().zip([flows[1], flows[0]]) {
-            let impulse = placed.wrench_to_world(&self.impulses(layer, flow)[1]);
-            let turned = super::jet::cross_force(&super::jet::screw(twist), &impulse);
+        for (flow, answer) in [(x, y), (y, x)] {
+            let impulse = placed.wrench_to_world(&answer.impulses[1]);
+            let turned = cross_force(&screw(&flow.other), &impulse);
             (0..6).for_each(|k| out[k] -= turned[k]);
         }
         out
@@ -244,12 +256,6 @@ fn lower<D>(cell: &Cell<D>, mut entry: impl FnMut(usize, usize, (usize, usize)))
 
 /// Of the film as it is, and held apart.
 const SIGNS: [f64; 2] = [1.0, -1.0];
-
-/// ψ as the film is less ψ held apart.
-fn difference<D: Jet>(flow: &Flow<D>) -> Vec<D> {
-    let [near, apart] = &flow.potential;
-    near.iter().zip(apart).map(|(a, b)| *a - *b).collect()
-}
 
 fn pushed<D: Jet>(load: &Vec6, twist: &Screw<D>) -> D {
     (0..6).map(|i| twist[i] * load[i]).sum()

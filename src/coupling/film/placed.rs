@@ -28,6 +28,9 @@ pub(crate) struct PlacedFilm<'a> {
     shift_wrenches: OnceLock<[SMatrix<f64, 6, 3>; 2]>,
 }
 
+/// The flow in a film along a displacement.
+pub(crate) struct MovingFlow(Flow<Dual64>);
+
 /// A film along a displacement.
 pub(crate) struct MovingFilm<'a> {
     pub placed: &'a PlacedFilm<'a>,
@@ -138,20 +141,13 @@ impl<'a> PlacedFilm<'a> {
         columns: impl Iterator<Item = DVector<f64>> + 'c,
     ) -> Vec<Vec6> {
         let still = self.still();
-        let flow = |x: &Twists| -> Flow<f64> {
-            let twists = [x.own.into(), still.twist_to_body(&x.other)];
-            self.film.flow(&self.layer, &self.solved, twists)
+        let flow = |x: &DVector<f64>| {
+            let Twists { own, other } = self.twists(x);
+            (self.film).flow(&self.layer, &still, &self.solved, [&own, &other])
         };
-        let x = self.twists(x);
-        let own = flow(&x);
+        let own = flow(x);
         columns
-            .map(|y| {
-                let y = self.twists(&y);
-                let flows = [&own, &flow(&y)];
-                let others = [&x.other, &y.other];
-                let wrench = self.film.wrench(&self.layer, &still, flows, others);
-                Vec6::from(wrench)
-            })
+            .map(|y| Vec6::from(self.film.wrench(&self.layer, &still, &own, &flow(&y))))
             .collect()
     }
 
@@ -181,32 +177,23 @@ impl MovingFilm<'_> {
         rates(&(self.layer).pull_back(self.placed.film, &self.frame, None, shift))
     }
 
-    fn flow(&self, x: &Twists) -> Flow<Dual64> {
-        let own: Screw<Dual64> = std::array::from_fn(|i| x.own[i].into());
-        let twists = [own, self.frame.twist_to_body(&x.other)];
-        self.placed
-            .film
-            .flow(&self.layer, &self.placed.solved, twists)
+    /// The flow for twists that stay as they are.
+    pub fn flow(&self, x: &DVector<f64>) -> MovingFlow {
+        let (placed, Twists { own, other }) = (self.placed, self.placed.twists(x));
+        let twists = [&own, &other];
+        MovingFlow((placed.film).flow(&self.layer, &self.frame, &placed.solved, twists))
     }
 
     /// ∇E(x, y) and its rate, frame of the other.
-    pub fn wrench(&self, x: &DVector<f64>, y: &DVector<f64>) -> (Vec6, Vec6) {
-        let [x, y] = [x, y].map(|x| self.placed.twists(x));
-        let flows = [&self.flow(&x), &self.flow(&y)];
-        let others = [&x.other, &y.other];
-        rates(
-            &self
-                .placed
-                .film
-                .wrench(&self.layer, &self.frame, flows, others),
-        )
+    pub fn wrench(&self, x: &MovingFlow, y: &MovingFlow) -> (Vec6, Vec6) {
+        let film = self.placed.film;
+        rates(&film.wrench(&self.layer, &self.frame, &x.0, &y.0))
     }
 
-    /// Adds the rate of the impulses of twists that stay as they are.
-    pub fn add_impulse_rate(&self, x: &DVector<f64>, out: &mut DVector<f64>) {
+    /// Adds the rate of the impulses of a flow.
+    pub fn add_impulse_rate(&self, x: &MovingFlow, out: &mut DVector<f64>) {
         let film = self.placed.film;
-        let flow = self.flow(&self.placed.twists(x));
-        let [own, other] = film.impulses(&self.layer, &flow);
+        let [own, other] = x.0.impulses;
         let mut add = |b: usize, wrench: &Screw<Dual64>| {
             let mut rows = out.fixed_rows_mut::<6>(6 * b);
             rows += rates(wrench).1;

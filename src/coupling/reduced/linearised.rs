@@ -416,7 +416,7 @@ impl Linearised for ReducedLinearised<'_> {
         let mut rate = DVector::zeros(self.basis.nrows());
         let twists = &self.basis * y;
         for film in films.iter().flatten() {
-            film.add_impulse_rate(&twists, &mut rate);
+            film.add_impulse_rate(&film.flow(&twists), &mut rate);
         }
         Ok(FLUX * self.alpha.tr_mul(&psi.column(0)) + self.basis.tr_mul(&rate))
     }

@@ -150,11 +150,12 @@ impl ReducedLinearised<'_> {
         let mut momenta: Vec<DVector<f64>> =
             (0..n).map(|k| dmomenta.column(k).into_owned()).collect();
         for film in films.iter().flatten() {
-            let (w, dw) = film.wrench(&responses[0].twists, &responses[n - 1].twists);
+            let flows: Vec<_> = responses.iter().map(|r| film.flow(&r.twists)).collect();
+            let (w, dw) = film.wrench(&flows[0], &flows[n - 1]);
             film.placed.apply(&w, &mut gradient);
             film.apply_rate((&w, &dw), z, &mut wrench);
-            for (momentum, response) in momenta.iter_mut().zip(&responses) {
-                film.add_impulse_rate(&response.twists, momentum);
+            for (momentum, flow) in momenta.iter_mut().zip(&flows) {
+                film.add_impulse_rate(flow, momentum);
             }
         }
         Tangent {

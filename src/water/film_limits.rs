@@ -34,7 +34,7 @@ fn added(film: &Film, pose: &Pose, k: usize) -> (f64, f64) {
     let x: DVector<f64> = twists.column(0).into_owned();
     (
         out[(k, 0)],
-        placed.wrenches(&x, std::iter::once(x.clone()))[0][2],
+        placed.wrenches(&x, std::slice::from_ref(&x))[0][2],
     )
 }
 

@@ -216,6 +216,10 @@ const THROUGH: &[(&str, &str)] = &[
     ),
     ("adjoint::step::reverse", "simulate::rollout::Rollout::vjp"),
     (
+        "coupling::film::pull::Layer::reverse",
+        "coupling::reduced::linearised::ReducedLinearised::gradient",
+    ),
+    (
         "simulate::objective::Rollout::gradient",
         "simulate::rollout::Rollout::vjp",
     ),

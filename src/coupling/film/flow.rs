@@ -4,7 +4,7 @@ use super::Film;
 use super::jet::{Displaced, Jet, Screw, Vector, add, constant, cross, cross_force, dot, parts};
 use super::jet::{product, screw, whole, zero};
 use super::layer::{Cell, Layer};
-use super::pull::Cotangents;
+use super::pull::{Cotangents, Reverse};
 use super::surface::Element;
 use crate::adjoint::lie::{Vec6, point_wrench};
 use crate::solver::{SparseCholesky, SparsePattern};
@@ -225,13 +225,12 @@ impl Film {
     /// The wrench on the first body, frame of the other, that the energy `xᵀ K y` exerts by way of the layer, and by the other's twists in the frame of the first.
     pub(super) fn wrench<D: Jet>(
         &self,
-        layer: &Layer<D>,
+        (layer, reverse): (&Layer<D>, &Reverse<D>),
         placed: &Displaced<D>,
         x: &Flow<D>,
         y: &Flow<D>,
     ) -> Screw<D> {
-        let cotangents = self.cotangents(layer, x, y);
-        let mut out = layer.pull_back(self, placed, Some(&cotangents), [zero(); 2]);
+        let mut out = reverse.pull(self, layer, &self.cotangents(layer, x, y));
         for (flow, answer) in [(x, y), (y, x)] {
             let impulse = placed.wrench_to_world(&answer.impulses[1]);
             let turned = cross_force(&screw(&flow.other), &impulse);

@@ -89,6 +89,11 @@ pub(super) fn scale<D: Jet>(factor: D, x: &Vector<D>) -> Vector<D> {
     x.map(|x| factor * x)
 }
 
+/// Adds a multiple of a screw.
+pub(super) fn add_scaled<D: Jet>(to: &mut Screw<D>, factor: D, x: &Screw<D>) {
+    (0..6).for_each(|i| to[i] += factor * x[i]);
+}
+
 pub(super) fn cross<D: Jet>(x: &Vector<D>, y: &Vector<D>) -> Vector<D> {
     std::array::from_fn(|i| {
         let (j, k) = ((i + 1) % 3, (i + 2) % 3);

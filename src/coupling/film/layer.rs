@@ -1,4 +1,4 @@
-//! A film's thickness at given poses, and where it ends. Its derivative is [`Layer::pull_back`].
+//! A film's thickness at given poses, and where it ends. Its derivative is [`Layer::reverse`].
 
 use super::jet::{
     Displaced, Distance, Jet, Vector, add, constant, dot, minus, product, real, scale, zero,
@@ -339,15 +339,17 @@ fn facing<D: Jet>(d: &[D; 3], face: &Element) -> Vector<D> {
     std::array::from_fn(|i| along[i] - cosine * face.normal[i])
 }
 
-/// Its derivative along `bar`.
-pub(super) fn facing_slope<D: Jet>(d: &[D; 3], face: &Element, bar: &Vector<D>) -> [D; 3] {
+/// Its derivative by each distance.
+pub(super) fn facing_slope<D: Jet>(d: &[D; 3], face: &Element) -> [Vector<D>; 3] {
     let along = slope_of(d, face);
     let square = product(&along, &along);
     let [a, b, c] = COSINE;
     let slope = square * (square * (3.0 * c) + 2.0 * b) + a;
-    let across = dot(bar, &face.normal) * slope * 2.0;
-    let bar: Vector<D> = std::array::from_fn(|i| bar[i] - across * along[i]);
-    [0, 1, 2].map(|k| dot(&bar, &face.gradients.column(k).into_owned()))
+    [0, 1, 2].map(|k| {
+        let gradient = face.gradients.column(k).into_owned();
+        let across = dot(&along, &gradient) * slope * 2.0;
+        std::array::from_fn(|i| -across * face.normal[i] + gradient[i])
+    })
 }
 
 /// ∇d on a face.

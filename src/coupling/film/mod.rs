@@ -18,7 +18,7 @@
 //! h_f = h + h₀ (1 − h/h_m)³,      M(h) = M_coupling(h_f) + K(h) − K(h_f)
 //! ```
 //!
-//! twice continuously differentiable as the gap opens and closes. The gradient is the reverse by hand ([`layer::Layer::pull_back`]); run on dual numbers along a
+//! twice continuously differentiable as the gap opens and closes. The gradient is the reverse by hand ([`layer::Layer::reverse`]); run on dual numbers along a
 //! displacement, forward and reverse give second derivatives.
 
 mod flow;

@@ -1,8 +1,9 @@
 //! A film at given poses: the added mass that it has beyond one that is held apart, with derivatives.
 
 use super::flow::{Flow, Solved, TWISTS};
-use super::jet::{Displaced, Screw, rates, zero};
+use super::jet::{Displaced, Screw, constant, rates};
 use super::layer::{Layer, Near};
+use super::pull::Reverse;
 use super::{Film, Side};
 use crate::adjoint::lie::{Pose, Vec3, Vec6, cross_force};
 use nalgebra::{DMatrix, DVector, SMatrix, SVector};
@@ -24,8 +25,8 @@ pub(crate) struct PlacedFilm<'a> {
     layer: Layer<f64>,
     /// As it is, and held apart.
     solved: [Solved; 2],
-    /// What unit forces exert by way of the shifts, of which each is in its own frame.
-    shift_wrenches: OnceLock<[SMatrix<f64, 6, 3>; 2]>,
+    /// Made when first asked for.
+    reverse: OnceLock<Reverse<f64>>,
 }
 
 /// The flow in a film along a displacement.
@@ -36,6 +37,7 @@ pub(crate) struct MovingFilm<'a> {
     pub placed: &'a PlacedFilm<'a>,
     frame: Displaced<'a, Dual64>,
     layer: Layer<Dual64>,
+    reverse: OnceLock<Reverse<Dual64>>,
 }
 
 impl<'a> PlacedFilm<'a> {
@@ -65,12 +67,16 @@ impl<'a> PlacedFilm<'a> {
             near,
             layer,
             solved,
-            shift_wrenches: OnceLock::new(),
+            reverse: OnceLock::new(),
         }))
     }
 
     fn still(&self) -> Displaced<'_, f64> {
         Displaced::new(&self.relative, &Vec6::zeros())
+    }
+
+    fn in_reverse(&self) -> &Reverse<f64> {
+        (self.reverse).get_or_init(|| self.layer.reverse(self.film, &self.still()))
     }
 
     fn twists(&self, x: &DVector<f64>) -> Twists {
@@ -118,37 +124,36 @@ impl<'a> PlacedFilm<'a> {
             placed: self,
             frame,
             layer,
+            reverse: OnceLock::new(),
         })
     }
 
     /// The wrench, frame of the other, that a force in the frame `at` (0: of the first) exerts by way of the shift.
     pub fn shift_wrench(&self, at: usize, force: &Vec3) -> Vec6 {
-        let unit = |at: usize, i: usize| {
-            let mut shift = [zero(); 2];
-            shift[at][i] = 1.0;
-            Vec6::from((self.layer).pull_back(self.film, &self.still(), None, shift))
-        };
-        let all = (self.shift_wrenches).get_or_init(|| {
-            [0, 1].map(|at| SMatrix::from_columns(&[0, 1, 2].map(|i| unit(at, i))))
-        });
-        all[at] * force
+        Vec6::from(self.in_reverse().pull_shift(at, &constant(force)))
     }
 
     /// ∇E(x, e) of several e, frame of the other.
-    pub fn wrenches<'c>(
-        &self,
-        x: &DVector<f64>,
-        columns: impl Iterator<Item = DVector<f64>> + 'c,
-    ) -> Vec<Vec6> {
+    pub fn wrenches(&self, x: &DVector<f64>, columns: &[DVector<f64>]) -> Vec<Vec6> {
         let still = self.still();
         let flow = |x: &DVector<f64>| {
             let Twists { own, other } = self.twists(x);
             (self.film).flow(&self.layer, &still, &self.solved, [&own, &other])
         };
-        let own = flow(x);
-        columns
-            .map(|y| Vec6::from(self.film.wrench(&self.layer, &still, &own, &flow(&y))))
+        let (own, how) = (flow(x), (&self.layer, self.in_reverse()));
+        (columns.iter())
+            .map(|y| match self.moves(y) {
+                true if y == x => Vec6::from(self.film.wrench(how, &still, &own, &own)),
+                true => Vec6::from(self.film.wrench(how, &still, &own, &flow(y))),
+                false => Vec6::zeros(),
+            })
             .collect()
+    }
+
+    /// Whether one of the two sides does.
+    fn moves(&self, x: &DVector<f64>) -> bool {
+        let Twists { own, other } = self.twists(x);
+        own != Vec6::zeros() || other != Vec6::zeros()
     }
 
     /// Adds a wrench in the frame of the other to both bodies, as spatial wrenches.
@@ -165,6 +170,10 @@ impl<'a> PlacedFilm<'a> {
 }
 
 impl MovingFilm<'_> {
+    fn in_reverse(&self) -> &Reverse<Dual64> {
+        (self.reverse).get_or_init(|| self.layer.reverse(self.placed.film, &self.frame))
+    }
+
     /// Rate of the shift in the frame `at` (0: of the first).
     pub fn shift_rate(&self, at: usize) -> Vec3 {
         Vec3::from(self.layer.shift[at].map(|x| x.eps))
@@ -172,9 +181,8 @@ impl MovingFilm<'_> {
 
     /// The wrench of [`PlacedFilm::shift_wrench`] and its rate, for a force that changes.
     pub fn shift_wrench(&self, at: usize, force: &Vec3, dforce: &Vec3) -> (Vec6, Vec6) {
-        let mut shift = [zero(); 2];
-        shift[at] = std::array::from_fn(|i| Dual64::new(force[i], dforce[i]));
-        rates(&(self.layer).pull_back(self.placed.film, &self.frame, None, shift))
+        let force = std::array::from_fn(|i| Dual64::new(force[i], dforce[i]));
+        rates(&self.in_reverse().pull_shift(at, &force))
     }
 
     /// The flow for twists that stay as they are.
@@ -187,7 +195,7 @@ impl MovingFilm<'_> {
     /// ∇E(x, y) and its rate, frame of the other.
     pub fn wrench(&self, x: &MovingFlow, y: &MovingFlow) -> (Vec6, Vec6) {
         let film = self.placed.film;
-        rates(&film.wrench(&self.layer, &self.frame, &x.0, &y.0))
+        rates(&film.wrench((&self.layer, self.in_reverse()), &self.frame, &x.0, &y.0))
     }
 
     /// Adds the rate of the impulses of a flow.

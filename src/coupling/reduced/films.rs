@@ -6,6 +6,7 @@ use crate::coupling::film::{Film, FilmSurface, PlacedFilm, Side, Width};
 use crate::geometry::{Image, Opposite, Solid, TriMesh, Wall, WallSurface};
 use crate::{Error, Result};
 use nalgebra::DMatrix;
+use rayon::prelude::*;
 use std::sync::Arc;
 
 /// The gap below which compressed sources are held apart, in what they resolve, times the area of a body over that of the ball of equal volume: flat bodies
@@ -84,7 +85,7 @@ impl Reduced {
     pub(super) fn placed_films(&self, poses: &[Pose]) -> Result<Vec<Option<PlacedFilm<'_>>>> {
         let place =
             |film| PlacedFilm::new(film, poses).map_err(|distance| self.touching(film, distance));
-        self.films.iter().map(place).collect()
+        self.films.par_iter().map(place).collect()
     }
 
     /// What films add to the impulses of body-frame twists, 6·bodies × columns, at density 1.

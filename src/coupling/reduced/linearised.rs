@@ -16,6 +16,7 @@ use faer::linalg::matmul::matmul;
 use faer::reborrow::ReborrowMut;
 use faer::{Accum, Mat, MatRef, Par};
 use nalgebra::{DMatrix, DVector};
+use rayon::prelude::*;
 use std::sync::OnceLock;
 
 /// Work of [`ReducedLinearised::new`] per pair of points, relative to that of its derivatives.
@@ -202,7 +203,7 @@ impl<'a> ReducedLinearised<'a> {
 
     /// The films along displacements.
     pub fn moving_films(&self, z: &[Vec6]) -> Vec<Option<MovingFilm<'_>>> {
-        let all = self.films.iter();
+        let all = self.films.par_iter();
         all.map(|film| film.as_ref()?.along(z)).collect()
     }
 
@@ -264,11 +265,21 @@ impl<'a> ReducedLinearised<'a> {
     }
 
     fn pull_back_films(&self, x: &DVector<f64>, y: &DVector<f64>, out: &mut [Vec6]) {
-        for film in self.films() {
-            for wrench in film.wrenches(x, std::iter::once(y.clone())) {
-                film.apply(&wrench, out);
-            }
+        for (film, wrenches) in self.film_wrenches(x, std::slice::from_ref(y)) {
+            (wrenches.iter()).for_each(|wrench| film.apply(wrench, out));
         }
+    }
+
+    /// [`PlacedFilm::wrenches`] of all films.
+    fn film_wrenches(
+        &self,
+        x: &DVector<f64>,
+        columns: &[DVector<f64>],
+    ) -> Vec<(&PlacedFilm<'a>, Vec<Vec6>)> {
+        let films: Vec<_> = self.films().collect();
+        let one = |film: &&'_ PlacedFilm<'a>| film.wrenches(x, columns);
+        let wrenches: Vec<_> = films.par_iter().map(one).collect();
+        films.into_iter().zip(wrenches).collect()
     }
 
     fn fields(&self) -> &[Fields] {
@@ -324,9 +335,8 @@ impl<'a> ReducedLinearised<'a> {
             }
         }
         let twists = &self.basis * x;
-        for film in self.films() {
-            let columns = self.basis.column_iter().map(|c| c.into_owned());
-            let wrenches = film.wrenches(&twists, columns);
+        let columns: Vec<_> = self.basis.column_iter().map(|c| c.into_owned()).collect();
+        for (film, wrenches) in self.film_wrenches(&twists, &columns) {
             let each = out.iter_mut().zip(&wrenches);
             each.for_each(|(out, wrench)| film.apply(wrench, out));
         }

@@ -36,7 +36,7 @@ mod task;
 
 use hydrograd::optimize::OptimizeProgress;
 use hydrograd::scene::Controller;
-use hydrograd::simulate::{Fidelity, Recording, Rollout};
+use hydrograd::simulate::{Recording, Rollout};
 use hydrograd::{Controls, Scene};
 use serde::Serialize;
 use std::error::Error;
@@ -111,17 +111,17 @@ fn main() -> Result<(), Box<dyn Error>> {
     let plain = task::load()?;
     let scene = task::refined(&plain);
 
-    let dry = task::simulator(&task::dry(&plain), Fidelity::Isolated)?;
+    let dry = task::simulator(&task::dry(&plain), task::CHEAP)?;
     let naive_dry_caught = hold::caught(&task::run(&dry, scene.steps)?)?;
-    let submerged = task::simulator(&scene, Fidelity::Reduced)?;
+    let submerged = task::simulator(&scene, task::RESOLVED)?;
     let naive = task::run(&submerged, scene.steps)?;
     let naive_caught = hold::caught(&naive)?;
 
     // Found with the faces of the scene, and polished with those that resolve the gaps of the grip.
-    let coarse = Task::new(&plain)?;
+    let coarse = Task::new(&plain, task::CHEAP)?;
     let x = coarse.through(&naive)?;
     let coarsely = coarse.find(&x, say)?;
-    let task = Task::new(&scene)?;
+    let task = Task::new(&scene, task::RESOLVED)?;
     let cost_naive = task.hold(&x)?.0;
     let found = task.polish(&coarsely.x, |p| say("resolved", p))?;
     let spent = coarse.spent().and(&task.spent());
@@ -133,7 +133,7 @@ fn main() -> Result<(), Box<dyn Error>> {
     let mut hand_tuned_caught = [false; 2];
     let mut hand_tuned_held_since = [None; 2];
     for (k, tuned) in task::hand_tuned(&scene).iter().enumerate() {
-        let simulator = task::simulator(tuned, Fidelity::Reduced)?;
+        let simulator = task::simulator(tuned, task::RESOLVED)?;
         let rollout = task::run(&simulator, scene.steps)?;
         hand_tuned_caught[k] = hold::caught(&rollout)?;
         hand_tuned_held_since[k] = hold::held_since(&rollout)?;

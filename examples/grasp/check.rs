@@ -1,7 +1,7 @@
 //! The water's inertia along the found trajectory, beside that of coupled panels on the same faces.
 
 use crate::task;
-use hydrograd::simulate::{Fidelity, Rollout};
+use hydrograd::simulate::Rollout;
 use hydrograd::{Result, Scene, Simulator};
 use nalgebra::{DMatrix, DVector};
 use serde::Serialize;
@@ -23,7 +23,7 @@ pub struct Compared {
 
 /// Compares `count` states, evenly spread over the rollout, the last one its end.
 pub fn along(scene: &Scene, rollout: &Rollout, count: usize) -> Result<Vec<Compared>> {
-    let panels = task::simulator(scene, Fidelity::Full)?;
+    let panels = task::simulator(scene, task::FULL)?;
     let simulator = rollout.simulator();
     let tree = &simulator.system().tree;
     let coin = scene.body("coin").map_or(0, |b| b.0);

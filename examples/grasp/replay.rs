@@ -2,7 +2,6 @@
 
 use crate::hold;
 use crate::task;
-use hydrograd::simulate::Fidelity;
 use hydrograd::{Result, Scene};
 use serde::Serialize;
 use std::time::Instant;
@@ -21,7 +20,7 @@ pub struct Replay {
 
 /// Runs a scene with its own controller.
 pub fn full(scene: &Scene) -> Result<Replay> {
-    let simulator = task::simulator(scene, Fidelity::Full)?;
+    let simulator = task::simulator(scene, task::FULL)?;
     let start = Instant::now();
     let rollout = task::run(&simulator, scene.steps)?;
     Ok(Replay {

@@ -1,6 +1,6 @@
 //! The rival that has no gradient: CMA-ES on the same cost of the same knots from the same start.
 
-use crate::task::Task;
+use crate::task::{CHEAP, Task};
 use cmaes::{CMAESOptions, DVector};
 use hydrograd::{Result, Scene};
 use serde::Serialize;
@@ -30,7 +30,7 @@ pub fn run(scene: &Scene, start: &[f64], target: f64, cap: usize, seeds: usize) 
     let next = AtomicUsize::new(0);
     let cores = std::thread::available_parallelism().map_or(1, usize::from);
     let worker = || -> Result<Vec<(usize, Option<usize>, f64)>> {
-        let task = Task::new(scene)?;
+        let task = Task::new(scene, CHEAP)?;
         let mut found = Vec::new();
         loop {
             let seed = next.fetch_add(1, Ordering::Relaxed);

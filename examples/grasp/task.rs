@@ -31,10 +31,10 @@ const REACHING: OptimizeSettings = OptimizeSettings {
 
 /// How often a descent of the hold goes on where the coin isn't held for long enough.
 const GOING_ON: usize = 3;
-/// Descent of the hold, to a cost at which the coin is held firmly.
+/// Descent of the hold in water that is resolved, to a cost at which the coin is held firmly.
 const HOLDING: OptimizeSettings = OptimizeSettings {
     iterations: 30,
-    evaluations: 40,
+    evaluations: 15,
     memory: 10,
     first_step: Some(0.3),
     gradient_tolerance: 1e-6,
@@ -43,6 +43,35 @@ const HOLDING: OptimizeSettings = OptimizeSettings {
     // Gradients through a collision that is about to happen otherwise are hundreds of times this, and say little.
     clip: Some(0.1),
 };
+/// The same in water that is only searched in: to where little is left to polish.
+const SEARCHING: OptimizeSettings = OptimizeSettings {
+    evaluations: 40,
+    target: Some(0.2),
+    ..HOLDING
+};
+
+/// The water that forces are searched in: compressed sources alone, at half the time of a step.
+pub const CHEAP: Water = Water {
+    fidelity: Fidelity::Reduced,
+    films: false,
+};
+/// The water that they are polished and judged in: films in the gaps that the sources don't resolve.
+pub const RESOLVED: Water = Water {
+    fidelity: Fidelity::Reduced,
+    films: true,
+};
+/// All bodies solved together.
+pub const FULL: Water = Water {
+    fidelity: Fidelity::Full,
+    films: false,
+};
+
+/// How the water is computed.
+#[derive(Clone, Copy)]
+pub struct Water {
+    fidelity: Fidelity,
+    films: bool,
+}
 
 pub fn load() -> Result<Scene> {
     let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("examples/scenes");
@@ -54,7 +83,7 @@ pub fn load() -> Result<Scene> {
 pub fn refined(scene: &Scene) -> Scene {
     // Where the coin comes near a finger, in the finger's frame, m.
     const GRIP: [f64; 3] = [0.0, 1.27, 0.0];
-    const EDGE: f64 = 0.024;
+    const EDGE: f64 = 0.036;
     let mut scene = scene.clone();
     for body in &mut scene.bodies {
         *body = match body.name.as_str() {
@@ -98,13 +127,13 @@ pub fn hand_tuned(scene: &Scene) -> [Scene; 2] {
     })
 }
 
-pub fn simulator(scene: &Scene, fidelity: Fidelity) -> Result<Simulator> {
-    let fidelity = if scene.fluid.density == 0.0 {
-        Fidelity::Isolated
-    } else {
-        fidelity
+pub fn simulator(scene: &Scene, water: Water) -> Result<Simulator> {
+    let settings = Settings::default();
+    let settings = match scene.fluid.density == 0.0 {
+        true => settings.fidelity(Fidelity::Isolated),
+        false => settings.fidelity(water.fidelity).films(water.films),
     };
-    Simulator::new(scene, Settings::default().fidelity(fidelity))
+    Simulator::new(scene, settings)
 }
 
 /// The scene's own controller.
@@ -159,8 +188,8 @@ impl Spent {
 }
 
 impl Task {
-    pub fn new(scene: &Scene) -> Result<Self> {
-        let mut simulator = simulator(scene, Fidelity::Reduced)?;
+    pub fn new(scene: &Scene, water: Water) -> Result<Self> {
+        let mut simulator = simulator(scene, water)?;
         simulator.set_policy(Box::new(OpenLoop));
         let steps = scene.steps;
         let gap = scene.contact.and_then(|c| c.gap).unwrap_or(0.0);
@@ -264,17 +293,27 @@ impl Task {
     /// of both; `say` is called with every one.
     pub fn find(&self, x: &[f64], say: impl Fn(&str, &OptimizeProgress)) -> Result<Optimum> {
         let reached = minimise(|x| self.approach(x), x, &REACHING, |p| say("approach", p))?;
-        let held = self.polish(&reached.x, |p| say("hold", p))?;
+        let held = self.descend_to(&SEARCHING, &reached.x, |p| say("hold", p))?;
         Ok(Optimum {
             iterations: reached.iterations + held.iterations,
             ..held
         })
     }
 
-    /// A descent of the whole trajectory from forces that nearly hold the coin. A cost tells how well it is held on the whole, not for how long:
-    /// what holds it for long enough is never given up for less cost, and as long as nothing does the descent goes on, to half the cost.
+    /// A descent from forces that nearly hold the coin to such that hold it firmly.
     pub fn polish(&self, x: &[f64], say: impl Fn(&OptimizeProgress)) -> Result<Optimum> {
-        let mut settings = HOLDING;
+        self.descend_to(&HOLDING, x, say)
+    }
+
+    /// A descent of the whole trajectory. A cost tells how well it is held on the whole, not for how long:
+    /// what holds it for long enough is never given up for less cost, and as long as nothing does the descent goes on, to half the cost.
+    fn descend_to(
+        &self,
+        settings: &OptimizeSettings,
+        x: &[f64],
+        say: impl Fn(&OptimizeProgress),
+    ) -> Result<Optimum> {
+        let mut settings = *settings;
         let best = RefCell::new(None);
         let cost = |x: &[f64]| self.hold_or_keep(x, &best);
         let mut found = minimise(cost, x, &settings, &say)?;

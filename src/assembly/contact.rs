@@ -113,6 +113,7 @@ pub(super) fn assemble(
         shapes,
         laws,
         rigid: given.stiffness.is_none(),
+        wet: scene.fluid.density > 0.0 && water.fidelity.kind().coupled(),
     })
 }
 

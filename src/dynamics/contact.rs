@@ -15,6 +15,8 @@ pub struct ContactModel {
     pub laws: Vec<Law>,
     /// Whether the stiffness is near rigid at the time step, so that it rises where a step is cut; one that was given stays what it is.
     pub rigid: bool,
+    /// Whether there is water between the surfaces, which has no flow where they meet.
+    pub wet: bool,
 }
 
 /// Gap at which the surfaces of a pair are taken to touch.

@@ -22,6 +22,8 @@ const ROOM: f64 = 1.25;
 const MET: f64 = 0.05;
 /// Part of half the thickness that a piece may go past where surfaces meet.
 const DEEP: f64 = 0.5;
+/// Part of the gap at which surfaces touch that a piece leaves, where there is water.
+const LEFT: f64 = 0.1;
 /// Part of a joint's range that a piece may come nearer to its end by.
 const SHARE: f64 = 0.25;
 /// Part of the range that it may end past it.
@@ -99,6 +101,16 @@ impl Way<'_> {
         let speed = shapes.closing(k, &poses, &twists);
         Ok(Some(Meeting { speed }))
     }
+}
+
+/// Whether next to nothing is left of the water between a pair after the time `t`; where there was as little before, but some still is, it is pressed there.
+fn closed(way: &Way, model: &ContactModel, k: usize, t: f64) -> bool {
+    let least = LEFT * model.laws[k].gap;
+    let under = |t: f64, gap: f64| {
+        let points = model.shapes.points_within(k, &way.at(t).0, gap);
+        points.is_ok_and(|points| points.iter().any(|p| p.weight >= FULL))
+    };
+    under(t, least) && (under(t, 0.0) || !under(0.0, least))
 }
 
 fn relative(shapes: &Contacts, k: usize, twists: &[Vec6]) -> Vec6 {
@@ -206,8 +218,8 @@ impl Stepper<'_> {
         Ok(Some(out))
     }
 
-    /// What is passed by a step from `e` that moves by `v`: surfaces that get so deep that they might come out on the other side, and
-    /// joints that get past their limit by a part of their range. Where the stiffness was given, that is as it was asked for.
+    /// What is passed by a step from `e` that moves by `v`: surfaces that get so deep that they might come out on the other side, or so near that there is no
+    /// water left between them, and joints that get past their limit by a part of their range. Where the stiffness was given, that is as it was asked for.
     pub(super) fn passed(&self, e: &Evaluation, v: &DVector<f64>) -> Stops {
         let mut out = Stops::default();
         let (system, dt) = (self.system, self.dt);
@@ -216,6 +228,10 @@ impl Stepper<'_> {
             let twists = system.tree.twists(&e.kinematics, v);
             for k in 0..model.laws.len() {
                 let shapes = &model.shapes;
+                if model.wet && closed(&way, model, k, dt) {
+                    out.pairs.push(k);
+                    continue;
+                }
                 let deep = DEEP * shapes.halfway(k);
                 if shapes.closing(k, &e.kinematics.poses, &twists) * dt <= deep {
                     continue;

@@ -118,16 +118,15 @@ fn panels(faces: usize) -> Settings {
     full.method(Method::Panel).faces(faces)
 }
 
-fn configurations() -> [(&'static str, Settings); 6] {
+fn configurations() -> [(&'static str, Settings); 5] {
     let of = |fidelity| Settings::default().fidelity(fidelity).faces(FACES);
     let full = of(Fidelity::Full);
     [
         ("panels", panels(FACES)),
         ("fundamental solutions", full.method(Method::MfsVertex)),
+        ("reduced, no films", of(Fidelity::Reduced).films(false)),
         ("reduced", of(Fidelity::Reduced)),
         ("auto", of(Fidelity::Auto)),
-        ("reduced, films", of(Fidelity::Reduced).films(true)),
-        ("auto, films", of(Fidelity::Auto).films(true)),
     ]
 }
 
@@ -198,7 +197,7 @@ fn plot(file: &Path, all: &[Errors]) -> std::result::Result<(), Box<dyn std::err
     let rows = all.len().div_ceil(COLUMNS);
     let area = SVGBackend::new(file, (1120, 260 * rows as u32)).into_drawing_area();
     area.fill(&WHITE)?;
-    let colors = [BLACK, RED, BLUE, GREEN, MAGENTA, CYAN];
+    let colors = [BLACK, RED, BLUE, MAGENTA, CYAN];
     for (part, errors) in area.split_evenly((rows, COLUMNS)).iter().zip(all) {
         let mut chart = ChartBuilder::on(part)
             .margin(8)

@@ -34,9 +34,9 @@ pub(super) struct Water {
     /// With `reduced` alone: smallest gap in m that compressed bodies resolve [default: from each body's size].
     #[arg(long, value_name = "GAP", value_parser = length, allow_negative_numbers = true)]
     pub resolved_gap: Option<f64>,
-    /// With `reduced` and `auto`: the water in gaps that compressed bodies don't resolve is added as films, down to contact.
+    /// With `reduced` and `auto`: leave the water in gaps that compressed bodies don't resolve to them, instead of adding it as films, down to contact.
     #[arg(long)]
-    pub films: bool,
+    pub no_films: bool,
     /// Folder that keeps compressed bodies for the next time.
     #[arg(long, value_name = "FOLDER")]
     pub cache: Option<PathBuf>,
@@ -147,7 +147,7 @@ impl Water {
             rank: self.rank,
             resolved_gap: self.resolved_gap,
             accuracy: self.accuracy,
-            films: self.films.then_some(true),
+            films: self.no_films.then_some(false),
             faces: self.faces,
             backend: Some(self.backend),
             gpu: Some(self.adapter.settings(self.gpu_fallback)),

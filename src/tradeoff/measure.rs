@@ -6,7 +6,7 @@ use super::reference::Reference;
 use super::row::TradeoffRow;
 use super::start::{Path, Start};
 use crate::scene::Scene;
-use crate::simulate::{Fidelity, Simulator, gradcheck};
+use crate::simulate::{Simulator, gradcheck};
 use crate::{Error, Result};
 use std::time::Instant;
 
@@ -102,10 +102,6 @@ fn describe(row: &mut TradeoffRow, simulator: &Simulator) {
     let points: usize = simulator.discretisation().iter().map(|d| d.points).sum();
     row.points = Some(points).filter(|p| *p > 0);
     row.fidelity_used = simulator.fidelity();
-    let changed = row.fidelity_used != row.configuration.fidelity;
-    if changed && row.fidelity_used == Fidelity::Full {
-        row.add_note("auto chose full: the gaps are too small for compressed bodies");
-    }
 }
 
 /// Medians over repeated rollouts, with and without gradient, as many as `allowance` s have room for.

@@ -77,7 +77,7 @@ impl WaterChoices {
         for (name, knob, given) in [
             ("rank", Rank, compress.rank.is_some()),
             ("resolved_gap", ResolvedGap, compress.resolved_gap.is_some()),
-            ("films", Films, self.numerics.films),
+            ("films", Films, !self.numerics.films),
         ] {
             if given && !self.fidelity.knobs().contains(&knob) {
                 let who = match knob {

@@ -17,7 +17,7 @@ pub struct Numerics {
     pub compress: compress::CompressSettings,
     /// Error of M_f, relative to √(M_ii M_jj), that the fidelity `auto` aims at.
     pub accuracy: f64,
-    /// Whether gaps that compressed bodies don't resolve have films.
+    /// Whether the water in gaps that compressed bodies don't resolve is a film, with the fidelities `reduced` and `auto`.
     pub films: bool,
 }
 
@@ -28,7 +28,7 @@ impl Default for Numerics {
             solve: SolveSettings::default(),
             compress: compress::CompressSettings::default(),
             accuracy: 0.01,
-            films: false,
+            films: true,
         }
     }
 }

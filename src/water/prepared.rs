@@ -4,7 +4,7 @@ use super::choices::WaterChoices;
 use super::clearance::Clearance;
 use super::device::Device;
 use super::fidelity::Fidelity;
-use super::fidelity::kind::{Planned, StartGap};
+use super::fidelity::kind::Planned;
 use super::method::kind::{BodyMethod, Problem};
 use super::numerics::Plan;
 use super::resolved::Resolved;
@@ -12,7 +12,7 @@ use super::submerged::{Discretisation, SubmergedBody};
 use crate::Result;
 use crate::adjoint::lie::Pose;
 use crate::coupling::Coupling;
-use crate::geometry::{Gap, Gaps, Other};
+use crate::geometry::{Gap, Other};
 use crate::scene::Scene;
 use nalgebra::DMatrix;
 use std::path::{Path, PathBuf};
@@ -61,13 +61,8 @@ pub(crate) fn prepare(
     mut clearance: Clearance,
     folder: Option<&Path>,
 ) -> Result<Prepared> {
-    let together = choices.method.together(choices.backend).kind();
-    let mut method = match choices.fidelity.kind().solves_alone() {
-        true => choices.method.kind(),
-        false => together,
-    };
+    let method = choices.method_used().kind();
     let mut problem = Problem::new(scene, &numbers, &submerged, method, &choices.numerics);
-    problem.together = together;
     let (fidelity, planned) = plan(
         scene,
         choices.fidelity,
@@ -76,10 +71,6 @@ pub(crate) fn prepare(
         &problem,
         &numbers,
     )?;
-    if planned.together {
-        method = together;
-        problem.method = together;
-    }
     (problem.plan, problem.folder) = (&planned.plan, folder);
     clearance.by_sources = !fidelity.kind().solves_alone() && method.by_sources();
     clearance.films = choices.numerics.films && fidelity.kind().compresses();
@@ -140,35 +131,23 @@ fn plan(
     }
     let poses: Vec<Pose> = numbers.iter().map(|b| all[*b]).collect();
     let number = |b: usize| numbers.iter().position(|w| *w == b);
-    let start = |gaps: &Gaps, gap: Gap| {
+    let in_water = |gap: Gap| {
         let second = match gap.second {
             Other::Body(b) => Other::Body(number(b)?),
             wall => wall,
         };
         let first = number(gap.first)?;
-        Some(StartGap {
-            film: clearance.film(gaps, &gap, all).1,
-            gap: Gap {
-                first,
-                second,
-                ..gap
-            },
+        Some(Gap {
+            first,
+            second,
+            ..gap
         })
     };
-    let start = &start;
     let both = [&clearance.moving, &clearance.rigid].into_iter();
-    let gaps = both.flat_map(|gaps| {
-        gaps.all(all)
-            .into_iter()
-            .filter_map(move |g| start(gaps, g))
-    });
-    let gaps: Vec<StartGap> = gaps.collect();
+    let gaps = both.flat_map(|gaps| gaps.all(all).into_iter().filter_map(in_water));
+    let gaps: Vec<Gap> = gaps.collect();
     let planned = fidelity.kind().plan(problem, &poses, &gaps)?;
-    let used = match planned.together {
-        true => Fidelity::Full,
-        false => Fidelity::Reduced,
-    };
-    Ok((used, planned))
+    Ok((Fidelity::Reduced, planned))
 }
 
 /// Unit twists along world axes about each body's origin, in body frames: rotated, not shifted.

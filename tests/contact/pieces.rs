@@ -86,6 +86,7 @@ fn closing(gap: f64, integrator: Integrator) -> Simulator {
     scene.initial.v = vec![-0.6 * gap / scene.time_step];
     let settings = Settings::default()
         .fidelity(Fidelity::Reduced)
+        .films(false)
         .integrator(integrator)
         .tolerance(1e-13);
     Simulator::new(&scene, settings).unwrap()

@@ -60,15 +60,15 @@ fn gaps_from_a_ten_thousandth_to_a_hundred_radii() {
             ]
             .concat();
             let resolved = simulator.discretisation()[0].resolved_gap.unwrap_or(0.0);
-            if gap < resolved {
+            // Films resolve gaps down to a tenth of an edge.
+            if gap < 0.01 {
                 let all = said.join("; ");
-                assert!(all.contains("resolve"), "gap {gap} of {resolved}: {all}");
+                assert!(all.contains("resolve"), "gap {gap}: {all}");
             }
             if gap >= 0.05 {
                 let [m11, m12, ..] = multipoles(2.0 + gap);
                 let error = (m[(2, 2)] - m11).abs().max((m[(2, 8)] - m12).abs()) / m11;
                 println!("{fidelity:?} gap {gap}, resolved {resolved:.3}: error {error:.1e}");
-                // All bodies solved together say themselves what their edges don't resolve.
                 let limit = if gap < resolved { 2e-2 } else { 6e-3 };
                 assert!(error < limit, "{gap}: {error:e}");
             }

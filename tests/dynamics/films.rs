@@ -8,7 +8,6 @@ use hydrograd::{Controls, Fidelity, Settings, Simulator};
 fn settings(integrator: Integrator) -> Settings {
     Settings::default()
         .fidelity(Fidelity::Reduced)
-        .films(true)
         .integrator(integrator)
 }
 

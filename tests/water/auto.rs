@@ -1,6 +1,6 @@
 //! What the fidelity `auto` chooses, and that it says so.
 
-use crate::support::example;
+use crate::support::says;
 use hydrograd::scene::{Placement, Shape};
 use hydrograd::simulate::Method;
 use hydrograd::{Body, Fidelity, Fluid, Scene, Settings, Simulator};
@@ -36,29 +36,22 @@ fn bodies_that_are_near_get_more_sources_and_far_pairs_fade_out() {
     assert!(reasons.contains("coupled in full up to"), "{reasons}");
 }
 
-/// Under half of what compressed sources resolve `full` is chosen.
+/// However narrow a gap, bodies stay compressed, and the water in it is a film. Who turns films off is told of gaps that the sources don't resolve.
 #[test]
 fn gaps_that_compression_does_not_resolve() {
-    for (gap, fidelity) in [
-        (0.1, Fidelity::Reduced),
-        (0.06, Fidelity::Full),
-        (0.03, Fidelity::Full),
-        (0.005, Fidelity::Full),
-    ] {
+    for gap in [0.1, 0.06, 0.03, 0.005] {
         let simulator = auto(&balls(&[0.0, 2.0 + gap]));
-        let reasons = simulator.reasons().join("\n");
-        assert_eq!(simulator.fidelity(), fidelity, "gap {gap}: {reasons}");
-        assert_eq!(reasons.contains("at best"), gap < 0.07, "{reasons}");
+        assert_eq!(simulator.fidelity(), Fidelity::Reduced, "gap {gap}");
+        let resolved = simulator.discretisation()[0].resolved_gap.unwrap();
+        let without = Settings::default().films(false);
+        let without = Simulator::new(&balls(&[0.0, 2.0 + gap]), without).unwrap();
+        assert_eq!(without.fidelity(), Fidelity::Reduced, "gap {gap}");
+        let said = without.start_gap_warning();
+        assert_eq!(said.is_some(), gap < resolved, "gap {gap}: {said:?}");
+        if let Some(said) = said {
+            says(said, &["compressed sources resolve", "body 1", "body 2"]);
+        }
     }
-}
-
-/// The floor's triangles are longer than the coin's gap: solving for them all would be slow and no better.
-#[test]
-fn a_floor_of_large_triangles_stays_compressed() {
-    let simulator = auto(&example("falling_ball_box"));
-    let reasons = simulator.reasons().join("\n");
-    assert_eq!(simulator.fidelity(), Fidelity::Reduced, "{reasons}");
-    assert!(reasons.contains("neither does full"), "{reasons}");
 }
 
 /// What can't be used or can't be right is said, and what would lose most of the added mass is refused.
@@ -97,7 +90,7 @@ fn settings_out_of_place_are_told() {
     );
 }
 
-/// A disc, radius 1 and thickness 0.25, flat over a wall: where compression doesn't resolve the gap the film is still there. Mass along
+/// A disc, radius 1 and thickness 0.25, flat over a wall: where compressed sources don't resolve the gap there is a film. Mass along
 /// the gap, against coupled panels on finer and finer meshes, extrapolated.
 #[test]
 fn a_disc_flat_over_a_wall_keeps_its_film() {
@@ -110,7 +103,7 @@ fn a_disc_flat_over_a_wall_keeps_its_film() {
         let disc = Shape::cylinder(1.0, 0.25).faces(1280);
         scene.add(Body::new(disc).density(1.0).at([0.0, 0.0, 0.125 + gap]));
         let simulator = auto(&scene);
-        assert_eq!(simulator.fidelity(), Fidelity::Full);
+        assert_eq!(simulator.fidelity(), Fidelity::Reduced);
         let m = simulator.added_mass().unwrap().matrix[(2, 2)];
         println!("gap {gap}: {m:.3}");
         assert!((m / converged - 1.0).abs() < limit, "gap {gap}: {m}");

@@ -1,4 +1,4 @@
-//! Films in gaps that compressed bodies don't resolve: the setting `films`.
+//! Films in gaps that compressed bodies don't resolve.
 
 use crate::support::reference::multipoles;
 use hydrograd::scene::{Body, Fluid, Scene, Shape};
@@ -6,7 +6,7 @@ use hydrograd::simulate::Method;
 use hydrograd::{Fidelity, Settings, Simulator};
 
 fn films() -> Settings {
-    Settings::default().fidelity(Fidelity::Reduced).films(true)
+    Settings::default().fidelity(Fidelity::Reduced)
 }
 
 fn unit_water() -> Fluid {
@@ -119,7 +119,7 @@ fn what_films_do_not_do_is_said() {
     let simulator = |settings| Simulator::new(&scene, settings).unwrap();
     let said = simulator(films()).start_gap_warning().unwrap();
     assert!(said.contains("films") && said.contains("body 2"), "{said}");
-    let isolated = simulator(films().fidelity(Fidelity::Isolated));
+    let isolated = simulator(films().films(false).fidelity(Fidelity::Isolated));
     let warnings = isolated.warnings().join("\n");
     assert!(warnings.contains("films has no effect"), "{warnings}");
 }

@@ -62,7 +62,7 @@ fn a_coin_near_a_plate() {
     };
     let [coarse, fine] = [0.04, 0.02].map(|edge| of(Some(edge), panels.clone()));
     let exact = &fine + (&fine - &coarse) / 3.0;
-    let reduced = Settings::default().fidelity(Fidelity::Reduced);
+    let reduced = Settings::default().fidelity(Fidelity::Reduced).films(false);
     let even = errors(&of(None, reduced.clone()), &exact);
     let near = errors(&of(Some(0.04), reduced), &exact);
     println!(
@@ -75,7 +75,7 @@ fn a_coin_near_a_plate() {
 #[test]
 fn where_it_is_resolved() {
     let warning = |scene: &Scene| {
-        let settings = Settings::default().fidelity(Fidelity::Reduced);
+        let settings = Settings::default().fidelity(Fidelity::Reduced).films(false);
         simulator(scene, settings).start_gap_warning()
     };
     assert!(warning(&scene(None)).is_some());

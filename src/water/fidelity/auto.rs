@@ -6,17 +6,16 @@
 //! coupling is below the aim fades out. What a body must resolve follows from the smallest gap that it
 //! starts with.
 
-use super::full::Full;
-use super::kind::{FILM, FidelityKind, Knob, Planned, StartGap};
+use super::kind::{FidelityKind, Knob, Planned};
 use super::reduced::Reduced;
 use crate::adjoint::lie::{Pose, Vec3};
 use crate::boundary::exact::lamb;
 use crate::coupling::reduced::{Cutoff, compress};
-use crate::geometry::{Gap, MassProperties, Other, WallSurface};
+use crate::geometry::{Gap, MassProperties};
 use crate::water::device::Device;
 use crate::water::method::kind::Problem;
-use crate::water::numerics::{Numerics, Plan};
-use crate::water::submerged::{Made, SubmergedBody};
+use crate::water::numerics::Numerics;
+use crate::water::submerged::Made;
 use crate::{Error, Result};
 use std::f64::consts::PI;
 
@@ -28,25 +27,13 @@ const SHARE: f64 = 1.0 / 3.0;
 const SAFETY: f64 = 1.5;
 /// Where a pair begins to fade, of the distance where it is gone.
 const NEAR: f64 = 0.8;
-/// What is resolved, of the smallest gap at the start: bodies may come nearer. Where a film holds the energy ([`FILM`]), and none is computed, what
-/// compression leaves out weighs more.
+/// What is resolved, of the smallest gap at the start: bodies may come nearer.
 const ROOM: f64 = 0.6;
-const ROOM_FILM: f64 = 0.3;
 /// Bodies that start apart may come near: they resolve this many times the gap that they would without a plan.
 const COARSEST: f64 = 2.0;
-/// Without films, gaps under this part of the finest that compression resolves are left to the fidelity `Full`, whose forces are nearer there at all gaps and
-/// shapes that were measured (docs/accuracy-coupled.md).
-const HOPELESS: f64 = 0.5;
-/// The same where the film in a gap has more than an energy (that of [`StartGap::film`]): between flat parts, and such as are nearly so.
-const HOPELESS_FILM: [(f64, f64); 2] = [(FILM, 2.0), (0.01, 1.0)];
-/// Faces with edges longer than this part of the radius of the smaller body at a gap don't see its flow.
-const COARSE: f64 = 0.5;
 /// Under this many times the finest gap bodies are compressed no worse than `Reduced` does by default.
 const CLOSE: f64 = 6.0;
-/// Under this part of the finest gap compressed sources may refuse: `Full` answers, and warns.
-const REFUSED: f64 = 0.1;
-
-/// `reduced`, or `full` where gaps are too small for that, with what each body and pair needs.
+/// `reduced`, with what each body and pair needs.
 pub(super) struct Auto;
 
 impl FidelityKind for Auto {
@@ -66,7 +53,7 @@ impl FidelityKind for Auto {
         true
     }
 
-    fn plan(&self, problem: &Problem, poses: &[Pose], gaps: &[StartGap]) -> Result<Planned> {
+    fn plan(&self, problem: &Problem, poses: &[Pose], gaps: &[Gap]) -> Result<Planned> {
         plan(problem, poses, gaps)
     }
 
@@ -76,7 +63,7 @@ impl FidelityKind for Auto {
     }
 
     fn resolved_gap(&self, compressed: f64, edge: f64) -> f64 {
-        Full.resolved_gap(compressed, edge)
+        Reduced.resolved_gap(compressed, edge)
     }
 
     fn gap_warning(
@@ -87,7 +74,7 @@ impl FidelityKind for Auto {
         time: &str,
         hint: &str,
     ) -> Option<String> {
-        Full.gap_warning(gap, edges, place, time, hint)
+        Reduced.gap_warning(gap, edges, place, time, hint)
     }
 
     fn error(&self, bodies: f64, residual: Option<f64>, coupling: Option<f64>) -> Option<f64> {
@@ -96,7 +83,7 @@ impl FidelityKind for Auto {
 }
 
 /// Chooses for the bodies at the start, for an error of the coupling of the accuracy that is aimed at.
-fn plan(problem: &Problem, poses: &[Pose], gaps: &[StartGap]) -> Result<Planned> {
+fn plan(problem: &Problem, poses: &[Pose], gaps: &[Gap]) -> Result<Planned> {
     let (bodies, walls, aim) = (problem.bodies, problem.walls, problem.numerics.accuracy);
     if !(aim > 0.0 && aim < 1.0) {
         return Err(Error::input(
@@ -120,42 +107,11 @@ fn plan(problem: &Problem, poses: &[Pose], gaps: &[StartGap]) -> Result<Planned>
             strength(&properties)?,
             poses[b].apply(&mesh.bounding_ball().center),
         ));
-        let near = || gaps.iter().filter(|g| g.gap.touches(b));
-        let nearest = (near().map(|g| &g.gap))
-            .min_by(|a, b| a.image_distance().total_cmp(&b.image_distance()));
-        let (smallest, edge) =
-            nearest.map_or((f64::INFINITY, 0.0), |g| (g.image_distance(), g.edge));
+        let near = gaps.iter().filter(|gap| gap.touches(b));
+        let smallest = near.map(Gap::image_distance).fold(f64::INFINITY, f64::min);
         let finest = compress::finest_gap(mesh.surface_area());
-        // Who refines a body means its gaps to be resolved there.
-        let refined = body.regions.iter().map(|r| r.gap).fold(finest, f64::min);
-        let hopeless = !problem.numerics.films
-            && near().any(|g| {
-                let film = HOPELESS_FILM.iter().find(|(film, _)| g.film > *film);
-                let part = film.map_or(HOPELESS, |(_, part)| *part);
-                g.gap.image_distance() < part * refined
-            });
-        let rigid = walls.iter().all(|w| w.surface == WallSurface::Rigid);
-        if hopeless && rigid {
-            let coarse = nearest.is_some_and(|g| edge > COARSE * smaller(bodies, g));
-            let full = !coarse || smallest < REFUSED * finest;
-            let so = if full {
-                out.together = true;
-                "all bodies are solved together (full)"
-            } else {
-                "neither does full with such edges; use more faces and full for accurate forces there"
-            };
-            out.reasons.push(format!(
-                "body {:?} starts {smallest:.3e} m from a neighbour (or its own mirror image) at edges of \
-                 {edge:.3e} m; its compressed sources resolve {finest:.3e} m at best: {so}",
-                body.name
-            ));
-        }
         let coarsest = COARSEST * compress::default_gap(properties.volume, mesh.surface_area());
-        let room = match !problem.numerics.films && near().any(|g| g.film > FILM) {
-            true => ROOM_FILM,
-            false => ROOM,
-        };
-        let gap = (room * smallest).clamp(finest, coarsest);
+        let gap = (ROOM * smallest).clamp(finest, coarsest);
         // What compression leaves out is worth more the nearer the gap, in the force above all.
         let tolerance = match smallest < CLOSE * finest {
             true => (COMPRESSION * aim).min(compress::CompressSettings::default().tolerance),
@@ -166,10 +122,6 @@ fn plan(problem: &Problem, poses: &[Pose], gaps: &[StartGap]) -> Result<Planned>
             tolerance,
             resolved_gap: Some(gap),
         });
-    }
-    if out.together {
-        out.plan = Plan::default();
-        return Ok(out);
     }
     for (b, body) in bodies.iter().enumerate() {
         let gap = out.plan.compress[b].resolved_gap.unwrap_or_default();
@@ -199,19 +151,6 @@ fn plan(problem: &Problem, poses: &[Pose], gaps: &[StartGap]) -> Result<Planned>
         }
     }
     Ok(out)
-}
-
-/// Radius of the ball around the smaller of the bodies at a gap, m.
-fn smaller(bodies: &[SubmergedBody], gap: &Gap) -> f64 {
-    let radius = |b: usize| {
-        bodies[b]
-            .mesh
-            .map_or(f64::INFINITY, |m| m.bounding_ball().radius)
-    };
-    match gap.second {
-        Other::Body(b) => radius(gap.first).min(radius(b)),
-        Other::Wall(_) => radius(gap.first),
-    }
 }
 
 /// Largest `(V + M)/√M` over the axes of the ellipsoid with the same volume and inertia.

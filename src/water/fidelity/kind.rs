@@ -26,22 +26,8 @@ pub enum Knob {
 /// What a fidelity chooses for a scene, and why.
 #[derive(Default)]
 pub(crate) struct Planned {
-    /// Whether all bodies are solved together (`full`), or each is compressed (`reduced`).
-    pub together: bool,
     pub plan: Plan,
     pub reasons: Vec<String>,
-}
-
-/// Energy of the film in a gap, in the energy of the water that the smaller body displaces, from which it matters to both. Between
-/// round bodies it stays under a hundredth.
-pub(crate) const FILM: f64 = 0.3;
-
-/// A gap between bodies at the start, or to a wall.
-pub(crate) struct StartGap {
-    /// By the numbers of the bodies in the water.
-    pub gap: Gap,
-    /// Energy of the film between parallel parts, in that of the water that the smaller body displaces.
-    pub film: f64,
 }
 
 /// A model of how the bodies feel each other.
@@ -59,7 +45,7 @@ pub(crate) trait FidelityKind: Send + Sync {
         true
     }
 
-    /// Whether it chooses `full` or `reduced` for a scene.
+    /// Whether it chooses for a scene what bodies resolve.
     fn chooses(&self) -> bool {
         false
     }
@@ -74,11 +60,11 @@ pub(crate) trait FidelityKind: Send + Sync {
         false
     }
 
-    /// What it chooses for bodies that start at `poses` with these `gaps` between them and to the walls, if it does.
+    /// What it chooses for bodies that start at `poses` with these `gaps` between them and to the walls, by their numbers in the water, if it does.
     ///
     /// # Errors
     /// An accuracy out of range, or bodies that no choice is known for.
-    fn plan(&self, _: &Problem, _: &[Pose], _: &[StartGap]) -> Result<Planned> {
+    fn plan(&self, _: &Problem, _: &[Pose], _: &[Gap]) -> Result<Planned> {
         Ok(Planned::default())
     }
 

@@ -20,7 +20,7 @@ listed! {
         Isolated => isolated::Isolated,
         /// All bodies coupled, each compressed to a few sources; walls as images.
         Reduced => reduced::Reduced,
-        /// `reduced`, with what each body and pair needs chosen for the scene; `full` where that can't resolve it.
+        /// `reduced`, with what each body and pair needs chosen for the scene.
         #[default]
         Auto => auto::Auto,
         /// All bodies coupled, at the resolution of their meshes (Eq. 18–20); walls as images.

@@ -91,8 +91,6 @@ pub(crate) struct Problem<'a> {
     pub excluded: Exclusions,
     /// The method that is asked for.
     pub method: &'static dyn BodyMethod,
-    /// The method for all bodies together that the fidelity auto may fall back on.
-    pub together: &'static dyn BodyMethod,
     pub numerics: &'a Numerics,
     pub plan: &'a Plan,
     /// Where compressed bodies are kept.
@@ -116,7 +114,6 @@ impl<'a> Problem<'a> {
             walls: &scene.walls,
             excluded: Exclusions::new(pairs),
             method,
-            together: method,
             numerics,
             plan: &NO_PLAN,
             folder: None,

@@ -19,7 +19,7 @@ use hydrograd::adjoint::sample::Samples;
 use hydrograd::dynamics::Integrator;
 use hydrograd::scene::Scene;
 use hydrograd::simulate::OpenLoop;
-use hydrograd::{Controls, Error, Fidelity, Result, Rollout, Settings, Simulator};
+use hydrograd::{Controls, Fidelity, Result, Rollout, Settings, Simulator};
 use nalgebra::DVector;
 use rayon::prelude::*;
 use std::collections::BTreeSet;
@@ -221,12 +221,14 @@ struct Closed {
     cut: usize,
     most: usize,
     finite: bool,
+    /// The most energy that it held beyond that of the start and what the forces had put in, and the most that it held, J.
+    gain: f64,
+    energy: f64,
 }
 
 fn closed(simulator: &Simulator, grasp: &RandomGrasp) -> Result<Closed> {
     let mut simulator = simulator.clone();
-    let v = simulator.start().1.clone();
-    simulator.set_start(grasp.start.clone(), v)?;
+    simulator.set_start(grasp.start.clone(), grasp.velocity.clone())?;
     let controls = Controls::from_matrix(&simulator, grasp.forces.clone())?;
     let rollout = simulator.rollout(&controls)?;
     let summary = rollout.summary();
@@ -235,64 +237,78 @@ fn closed(simulator: &Simulator, grasp: &RandomGrasp) -> Result<Closed> {
         let of = limits.iter().map(|l| l.past(q[l.q]) / l.room());
         of.fold(0.0, f64::max)
     };
+    let samples = rollout.samples();
     let finite = |s: &hydrograd::simulate::Sample| s.q.iter().chain(&s.v).all(|x| x.is_finite());
+    // Column and fingers slide: a force's work is that over the way of its joint, however the step was cut.
+    let (mut work, mut gain, mut energy) = (0.0, 0.0_f64, samples[0].energy());
+    for (n, pair) in samples.windows(2).enumerate() {
+        let forces = grasp.forces.column(n);
+        let way = |c: usize| pair[1].q[c] - pair[0].q[c];
+        work += (0..forces.len()).map(|c| forces[c] * way(c)).sum::<f64>();
+        gain = gain.max(pair[1].energy() - samples[0].energy() - work);
+        energy = energy.max(pair[1].energy());
+    }
     Ok(Closed {
         nearest: summary.min_gap.unwrap_or(f64::INFINITY),
-        past: rollout
-            .samples()
-            .iter()
-            .map(|s| past(&s.q))
-            .fold(0.0, f64::max),
+        past: samples.iter().map(|s| past(&s.q)).fold(0.0, f64::max),
         cut: summary.cut_steps,
         most: summary.most_pieces,
-        finite: rollout.samples().iter().all(finite),
+        finite: samples.iter().all(finite),
+        gain,
+        energy,
     })
 }
 
-/// Grasps of the example with random forces: what `reduced` refuses is run again by `auto`.
+/// Grasps of the example with random forces, and the same gripper thrown at the coin without any.
 fn grasps(count: usize) {
-    println!("\n### {count} grasps with random forces, steps of 0.01 s\n");
-    let begin = Instant::now();
+    println!(
+        "\n### {count} grasps with random forces, and as many thrown, steps of 0.01 s, `reduced` with films\n"
+    );
     let scene = task::load().expect("an example scene");
-    let simulator = |fidelity| {
-        let mut simulator = task::simulator(&scene, fidelity).expect("an example scene");
-        simulator.set_policy(Box::new(OpenLoop));
-        simulator
-    };
-    let (reduced, auto) = (simulator(Fidelity::Reduced), simulator(Fidelity::Auto));
+    let settings = Settings::default().fidelity(Fidelity::Reduced).films(true);
+    let mut simulator = Simulator::new(&scene, settings).expect("an example scene");
+    simulator.set_policy(Box::new(OpenLoop));
     let coin = [hold::COIN_Y, hold::COIN_Z, hold::COIN_TURN];
     let mut random = Samples::new(3);
-    let draw = |_| RandomGrasp::draw(&mut random, reduced.start().0, coin, scene.steps);
-    let drawn: Vec<RandomGrasp> = (0..count).map(draw).collect();
-    let ends: Vec<Result<Closed>> = drawn.par_iter().map(|g| closed(&reduced, g)).collect();
-    let (mut failed, mut again) = (0, 0);
-    let mut held: Vec<Closed> = Vec::new();
-    for (k, (end, grasp)) in ends.into_iter().zip(&drawn).enumerate() {
-        let end = match end {
-            Err(Error::Unresolved { .. }) => {
-                again += 1;
-                closed(&auto, grasp)
-            }
-            end => end,
-        };
-        match end {
-            Ok(end) => held.push(end),
-            Err(error) => {
-                println!("grasp {k} fails: {error}");
-                failed += 1;
-            }
-        }
+    let draw = |_| RandomGrasp::draw(&mut random, simulator.start().0, coin, scene.steps);
+    let forced: Vec<RandomGrasp> = (0..count).map(draw).collect();
+    let thrown = forced.iter().map(|g| g.thrown(&mut random, coin)).collect();
+    for (name, drawn) in [("with random forces", forced), ("thrown", thrown)] {
+        ended(name, &simulator, &drawn);
     }
-    let most = |of: fn(&Closed) -> f64| held.iter().map(of).fold(0.0, f64::max);
+}
+
+fn ended(name: &str, simulator: &Simulator, drawn: &[RandomGrasp]) {
+    let begin = Instant::now();
+    let of = |(k, grasp): (usize, &RandomGrasp)| {
+        let end = closed(simulator, grasp);
+        // As it comes: a thousand take long.
+        if let Err(error) = &end {
+            println!("{name}, grasp {k} fails: {error}");
+        }
+        end
+    };
+    let ends: Vec<Result<Closed>> = drawn.par_iter().enumerate().map(of).collect();
+    let held: Vec<&Closed> = ends.iter().flatten().collect();
+    let most = |of: fn(&Closed) -> f64| held.iter().map(|c| of(c)).fold(0.0, f64::max);
     let nearest = held.iter().map(|c| c.nearest).fold(f64::INFINITY, f64::min);
     println!(
-        "{failed} fail; {again} are refused by `reduced` and run with `auto`; {} hold something that isn't finite; smallest gap {:.1} mm; at most {:.3} of a range \
-         past a limit; {} steps cut, into at most {} pieces; {:.0} s",
+        "{name}: {} of {} fail; {} hold something that isn't finite; smallest gap {:.2} mm of {:.0}; at most {:.3} of a range past a limit; {} steps cut, into at most {} \
+         pieces; energy gain at most {:.1e} J, {:.1e} of the most that the grasp holds; {:.0} s",
+        ends.len() - held.len(),
+        ends.len(),
         held.iter().filter(|c| !c.finite).count(),
         1e3 * nearest,
+        1e3 * simulator
+            .contact_gaps()
+            .iter()
+            .map(|g| g.gap)
+            .fold(0.0, f64::max),
         most(|c| c.past),
         held.iter().map(|c| c.cut).sum::<usize>(),
         most(|c| c.most as f64),
+        most(|c| c.gain),
+        most(|c| c.gain / c.energy.max(f64::MIN_POSITIVE)),
         begin.elapsed().as_secs_f64()
     );
 }

@@ -8,7 +8,8 @@
 //! where the coin lies well between the fingers before they touch it; from there the whole trajectory, to a coin that is held.
 //!
 //! ```text
-//! cargo run --release --example grasp -- --random N [--gripper sliding|hinged] [--seed S] [--json]
+//! cargo run --release --example grasp -- --random N [--gripper sliding|hinged] [--seed S] [--rival] [--json]
+//! cargo run --release --example grasp -- --random N --descents [--gripper sliding|hinged] [--seed S] [--json]
 //! cargo run --release --example grasp -- [--json] [--out FOLDER] [--check N] [--replay full] [--rival-seeds N] [--rival-cap N] [--no-rival]
 //! ```
 //!
@@ -17,7 +18,8 @@
 //! bodies; both on meshes fine enough for the gap. The rival is CMA-ES with the same cost, start and knots.
 //!
 //! `--random N` catches N coins that nobody tuned for ([`random`]): coin, friction and fingers are drawn by a seed, the settings are those of
-//! [`hydrograd::optimize::grasp`] for all.
+//! [`hydrograd::optimize::grasp`] for all. With `--rival` CMA-ES then tries each of them with ten times the simulations, from the push in the middle
+//! of those that the recipe tries, until it catches; `--descents` compares plain, softened and smoothed descents from there instead.
 
 #[path = "grasp/check.rs"]
 mod check;
@@ -51,7 +53,10 @@ struct Options {
     /// States of which the mass matrix is checked.
     check: usize,
     replay: bool,
-    rival: bool,
+    /// Whether CMA-ES has a try; by default at the one grasp, not at random ones.
+    rival: Option<bool>,
+    /// Ways to descend on random grasps instead.
+    descents: bool,
     seeds: usize,
     /// Most simulations of a rival; none: eleven times those of the descent.
     cap: Option<usize>,
@@ -161,7 +166,7 @@ fn main() -> Result<(), Box<dyn Error>> {
     // The rival has the scene's own faces, and the cost that the descent reached on them.
     let compared = equivalent(&coarse.spent());
     let cap = options.cap.unwrap_or((11.0 * compared).ceil() as usize);
-    let rival = match options.rival {
+    let rival = match options.rival.unwrap_or(true) {
         true => Some(rival::run(&plain, &x, coarsely.cost, cap, options.seeds)?),
         false => None,
     };
@@ -197,16 +202,29 @@ fn main() -> Result<(), Box<dyn Error>> {
 
 /// Grasps that are drawn by a seed.
 fn several(count: usize, options: &Options) -> Result<(), Box<dyn Error>> {
-    let start = Instant::now();
-    let found = random::run(options.gripper, count, options.seed)?;
-    let caught = found.iter().filter(|o| o.found.caught).count();
-    match options.json {
-        true => println!("{}", serde_json::to_string(&found)?),
-        false => println!(
-            "{caught} of {count} caught, {:.0} s",
-            start.elapsed().as_secs_f64()
-        ),
+    if options.descents {
+        let found = random::descents::compare(options.gripper, count, options.seed)?;
+        match options.json {
+            true => println!("{}", serde_json::to_string(&found)?),
+            false => random::descents::print(&found),
+        }
+        return Ok(());
     }
+    let start = Instant::now();
+    let rival = options.rival.unwrap_or(false);
+    let found = random::run(options.gripper, count, options.seed, rival)?;
+    if options.json {
+        println!("{}", serde_json::to_string(&found)?);
+        return Ok(());
+    }
+    if rival {
+        random::print(&found);
+    }
+    let caught = found.iter().filter(|o| o.found.caught).count();
+    println!(
+        "{caught} of {count} caught, {:.0} s",
+        start.elapsed().as_secs_f64()
+    );
     Ok(())
 }
 
@@ -296,7 +314,8 @@ fn options() -> Result<Options, String> {
         out: "grasp".into(),
         check: 0,
         replay: false,
-        rival: true,
+        rival: None,
+        descents: false,
         seeds: 5,
         cap: None,
         random: None,
@@ -315,7 +334,9 @@ fn options() -> Result<Options, String> {
                 other => return Err(format!("--replay {other}: expected full")),
             },
             "--check" => out.check = number(value()?)?,
-            "--no-rival" => out.rival = false,
+            "--rival" => out.rival = Some(true),
+            "--no-rival" => out.rival = Some(false),
+            "--descents" => out.descents = true,
             "--random" => out.random = Some(number(value()?)?),
             "--gripper" => {
                 let name = value()?;
@@ -327,12 +348,15 @@ fn options() -> Result<Options, String> {
             "--rival-cap" => out.cap = Some(number(value()?)?),
             _ => {
                 return Err(format!(
-                    "{name}: expected --random, --gripper, --seed, --json, --out, --check, --replay, --rival-seeds, --rival-cap or --no-rival"
+                    "{name}: expected --random, --gripper, --seed, --rival, --descents, --json, --out, --check, --replay, --rival-seeds, --rival-cap or --no-rival"
                 ));
             }
         }
     }
-    if out.rival && out.seeds == 0 {
+    if out.descents && out.random.is_none() {
+        return Err("--descents compares random grasps: give --random N as well".into());
+    }
+    if out.rival != Some(false) && out.seeds == 0 {
         return Err("--rival-seeds must be at least 1".into());
     }
     Ok(out)

@@ -8,6 +8,8 @@ use std::sync::atomic::{AtomicBool, AtomicUsize, Ordering};
 
 /// How far a rival searches around the start at first, in units of x.
 const SPREAD: f64 = 0.3;
+/// A simulation that fails costs what nothing else does.
+pub const FAILED: f64 = 1e9;
 
 /// Outcome of all seeds.
 #[derive(Clone, Debug, Serialize)]
@@ -72,16 +74,34 @@ pub fn run(scene: &Scene, start: &[f64], target: f64, cap: usize, seeds: usize) 
 
 /// Simulations that one seed needed, if it got there, and the least cost that it saw.
 fn one(task: &Task, start: &[f64], target: f64, cap: usize, seed: u64) -> (Option<usize>, f64) {
+    let evaluate = |x: &[f64]| {
+        let cost = task.cost(x).unwrap_or(FAILED);
+        (cost, cost <= target)
+    };
+    search(evaluate, start, cap, seed)
+}
+
+/// CMA-ES on a function that gives its cost, and whether that is enough: evaluations until it is, if it is within `cap` of them, and the
+/// least cost that was seen.
+pub fn search(
+    mut evaluate: impl FnMut(&[f64]) -> (f64, bool),
+    start: &[f64],
+    cap: usize,
+    seed: u64,
+) -> (Option<usize>, f64) {
     let mut count = 0;
     let mut best = f64::INFINITY;
     let mut reached = None;
     let done = AtomicBool::new(false);
     let cost = |x: &DVector<f64>| {
+        // The rest of the generation.
+        if reached.is_some() || count == cap {
+            return FAILED;
+        }
         count += 1;
-        // A simulation that fails costs what nothing else does.
-        let cost = task.cost(x.as_slice()).unwrap_or(1e9);
+        let (cost, enough) = evaluate(x.as_slice());
         best = best.min(cost);
-        if cost <= target && reached.is_none() {
+        if enough {
             reached = Some(count);
             done.store(true, Ordering::Relaxed);
         }
@@ -97,5 +117,5 @@ fn one(task: &Task, start: &[f64], target: f64, cap: usize, seed: u64) -> (Optio
             }
         }
     }
-    (reached.filter(|n| *n <= cap), best)
+    (reached, best)
 }

@@ -36,6 +36,7 @@ pub fn continuation(
                 failures += found.failures;
                 x = found.x;
             }
+            Err(stop @ Error::Stopped { .. }) => return Err(stop),
             Err(_) => failures += 1,
         }
     }

@@ -39,6 +39,8 @@ struct Seen<'a> {
     evaluations: usize,
     most: usize,
     failures: usize,
+    /// That it is to end.
+    stopped: Option<Error>,
 }
 
 impl Seen<'_> {
@@ -55,6 +57,10 @@ impl Seen<'_> {
                     cost,
                     gradient: clipped(gradient, self.clip),
                 },
+                Err(stop @ Error::Stopped { .. }) => {
+                    self.stopped = Some(stop);
+                    return Err(argmin::core::Error::msg("stopped"));
+                }
                 Err(_) => {
                     self.failures += 1;
                     self.wall(x)
@@ -145,7 +151,7 @@ pub(super) fn checked(result: Result<(f64, Vector)>, length: usize) -> Result<(f
 ///
 /// # Errors
 /// Settings out of range, no numbers in `start`, a gradient of another length there, and whatever the function reports at `start`; failures at later trials
-/// turn the search back and are counted.
+/// turn the search back and are counted, but for [`Error::Stopped`], which ends it.
 pub fn minimise(
     mut function: impl FnMut(&[f64]) -> Result<(f64, Vec<f64>)>,
     start: &[f64],
@@ -190,6 +196,7 @@ fn descend(
         evaluations: 1,
         most: settings.evaluations,
         failures: 0,
+        stopped: None,
     });
     let mut iterations = 0;
     let mut restarted = false;
@@ -206,6 +213,9 @@ fn descend(
             break Stop::Budget;
         }
         let advanced = descent.advance();
+        if let Some(stop) = seen.borrow_mut().stopped.take() {
+            return Err(stop);
+        }
         iterations += 1;
         let after = seen.borrow().best.clone();
         progress(&OptimizeProgress {

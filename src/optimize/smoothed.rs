@@ -108,7 +108,7 @@ impl Smoothed {
 /// Averages a function and its gradient around `x`, on all cores; the result doesn't depend on their number.
 ///
 /// # Errors
-/// A spread that isn't positive, no directions, and the error of a sample if none of the directions could be evaluated.
+/// A spread that isn't positive, no directions, the error of a sample if none of the directions could be evaluated, and [`Error::Stopped`] of any sample.
 pub fn smoothed(
     function: impl Fn(&[f64]) -> Result<(f64, Vec<f64>)> + Sync,
     x: &[f64],
@@ -141,7 +141,13 @@ pub fn smoothed(
         let moved: Vec<f64> = ahead.map(|(x, e)| x + step * e).collect();
         checked(function(&moved), x.len())
     };
-    let found: Vec<_> = (0..2 * directions).into_par_iter().map(at).collect();
+    let mut found: Vec<_> = (0..2 * directions).into_par_iter().map(at).collect();
+    let stopped = |f: &Result<_>| matches!(f, Err(Error::Stopped { .. }));
+    if let Some(at) = found.iter().position(stopped)
+        && let Err(stop) = found.swap_remove(at)
+    {
+        return Err(stop);
+    }
     let failures = found.iter().filter(|f| f.is_err()).count();
     let mut whole = Vec::new();
     let mut broken = None;

@@ -4,12 +4,16 @@ use crate::support::{self, says};
 use hydrograd::adjoint::sample::numbers;
 use hydrograd::dynamics::Integrator;
 use hydrograd::optimize::{
-    Finger, GraspSettings, GraspTask, OptimizeSettings, Smoothing, continuation, grasp, smoothed,
+    Finger, GraspSettings, GraspStage, GraspTask, OptimizeSettings, Smoothing, continuation, grasp,
+    minimise, smoothed,
 };
 use hydrograd::scene::{Body, Contact, Fluid, Joint, Plane, Scene, Shape};
 use hydrograd::simulate::Knots;
 use hydrograd::{Controls, Error, Fidelity, Settings, Simulator};
+use std::cell::Cell;
+use std::ops::ControlFlow;
 use std::sync::Mutex;
+use std::sync::atomic::{AtomicUsize, Ordering};
 
 type Evaluated = hydrograd::Result<(f64, Vec<f64>)>;
 
@@ -260,6 +264,64 @@ fn costs_of_a_grasp_have_their_gradient() {
     }
 }
 
+fn on(_: GraspStage, _: bool) -> ControlFlow<()> {
+    ControlFlow::Continue(())
+}
+
+/// What asks to be stopped ends each of them, in the midst of pushes as of a descent.
+#[test]
+fn who_stops_them_is_heard() {
+    let (simulator, task) = pinch();
+    let steps = AtomicUsize::new(0);
+    let soon = |_: GraspStage, _: bool| match steps.fetch_add(1, Ordering::Relaxed) < 500 {
+        true => ControlFlow::Continue(()),
+        false => ControlFlow::Break(()),
+    };
+    let settings = GraspSettings::default();
+    let error = grasp(&simulator, &task, &settings, soon).unwrap_err();
+    assert!(matches!(error, Error::Stopped { .. }), "{error}");
+    let made = steps.into_inner();
+    assert!(made < 1000, "{made} steps");
+    let in_descent = |stage: GraspStage, _: bool| match stage {
+        GraspStage::Push => ControlFlow::Continue(()),
+        _ => ControlFlow::Break(()),
+    };
+    // So little is good enough that it is polished.
+    let settings = GraspSettings {
+        target: 0.0,
+        ..settings
+    };
+    let error = grasp(&simulator, &task, &settings, in_descent).unwrap_err();
+    assert!(matches!(error, Error::Stopped { .. }), "{error}");
+
+    let calls = Cell::new(0);
+    let stopping = |x: &[f64]| {
+        calls.set(calls.get() + 1);
+        match calls.get() {
+            3 => Err(Error::Stopped {
+                what: "a test".into(),
+            }),
+            _ => Ok((x[0].powi(4) + 1.0, vec![4.0 * x[0].powi(3)])),
+        }
+    };
+    let settings = OptimizeSettings::default();
+    let error = minimise(stopping, &[5.0], &settings, |_| {}).unwrap_err();
+    assert!(matches!(error, Error::Stopped { .. }), "{error}");
+    assert_eq!(calls.replace(0), 3);
+    let in_first = |_: f64, x: &[f64]| stopping(x);
+    let error = continuation(in_first, &[2.0, 1.0], &[5.0], &settings, |_, _| {}).unwrap_err();
+    assert!(matches!(error, Error::Stopped { .. }), "{error}");
+    assert_eq!(calls.get(), 3);
+    let half = |x: &[f64]| match x[0] > 0.0 {
+        true => Err(Error::Stopped {
+            what: "a test".into(),
+        }),
+        false => Ok((x[0], vec![1.0])),
+    };
+    let error = smoothed(half, &[0.0], &Smoothing::default()).unwrap_err();
+    assert!(matches!(error, Error::Stopped { .. }), "{error}");
+}
+
 #[test]
 fn a_drifting_ball_is_caught() {
     let (simulator, task) = pinch();
@@ -267,7 +329,7 @@ fn a_drifting_ball_is_caught() {
         pushes: 24,
         ..GraspSettings::default()
     };
-    let found = grasp(&simulator, &task, &settings, |_, _| {}).unwrap();
+    let found = grasp(&simulator, &task, &settings, on).unwrap();
     println!(
         "{:?}, cost {}, {} of 24 pushes",
         found.stage, found.cost, found.pushes_caught
@@ -280,7 +342,7 @@ fn a_drifting_ball_is_caught() {
     let idle = Controls::zeros(&simulator, 100);
     let idle = simulator.rollout(&idle).unwrap();
     assert_eq!(task.held_since(&idle).unwrap(), None);
-    let again = grasp(&simulator, &task, &settings, |_, _| {}).unwrap();
+    let again = grasp(&simulator, &task, &settings, on).unwrap();
     assert_eq!(found.controls, again.controls);
 }
 
@@ -291,10 +353,7 @@ fn tasks_that_do_not_fit_are_refused() {
     let fails = |change: &dyn Fn(&mut GraspTask), words: &[&str]| {
         let mut wrong = task.clone();
         change(&mut wrong);
-        says(
-            grasp(&simulator, &wrong, &settings, |_, _| {}).unwrap_err(),
-            words,
-        );
+        says(grasp(&simulator, &wrong, &settings, on).unwrap_err(), words);
     };
     fails(
         &|t| t.object = "bell".into(),
@@ -319,7 +378,7 @@ fn tasks_that_do_not_fit_are_refused() {
         ..settings
     };
     says(
-        grasp(&simulator, &task, &wrong, |_, _| {}).unwrap_err(),
+        grasp(&simulator, &task, &wrong, on).unwrap_err(),
         &["softness", "end in 1"],
     );
     let cost = task.hold_cost(&simulator).unwrap();

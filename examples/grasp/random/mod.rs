@@ -1,13 +1,17 @@
 //! Grasps that nobody tuned: object, fingers and friction drawn by a seed, one set of settings for all, with either gripper.
 
+pub mod descents;
 mod hinged;
+mod race;
 mod sliding;
+mod tried;
 
 use hydrograd::adjoint::sample::Samples;
 use hydrograd::optimize::{Grasp, GraspSettings, GraspTask, grasp};
-use hydrograd::simulate::Fidelity;
-use hydrograd::{Result, Scene, Settings, Simulator};
+use hydrograd::{Result, Scene};
+use rayon::prelude::*;
 use serde::Serialize;
+use std::ops::ControlFlow;
 use std::path::Path;
 use std::time::Instant;
 
@@ -79,42 +83,94 @@ pub struct Outcome {
     pub found: Grasp,
     /// From the scene to the found forces, s.
     pub seconds: f64,
+    /// CMA-ES on the same grasp, with `--rival`.
+    pub rival: Option<race::Raced>,
 }
 
 /// Finds one grasp.
-fn one(drawn: Task) -> Result<Outcome> {
+fn one(drawn: &Task) -> Result<Outcome> {
     let start = Instant::now();
-    let settings = Settings::default().fidelity(Fidelity::Reduced);
-    let simulator = Simulator::new(&drawn.scene, settings)?;
+    let simulator = tried::simulator(drawn)?;
     let settings = GraspSettings::default();
+    let on = |_, _| ControlFlow::Continue(());
     Ok(Outcome {
-        drawn: drawn.drawn,
-        found: grasp(&simulator, &drawn.task, &settings, |_, _| {})?,
+        drawn: drawn.drawn.clone(),
+        found: grasp(&simulator, &drawn.task, &settings, on)?,
         seconds: start.elapsed().as_secs_f64(),
+        rival: None,
     })
 }
 
-/// So many grasps, drawn by a seed.
-pub fn run(gripper: Gripper, count: usize, seed: u64) -> Result<Vec<Outcome>> {
+fn word(caught: bool) -> &'static str {
+    if caught { "caught" } else { "lost" }
+}
+
+/// So many grasps, drawn by a seed; with a rival, CMA-ES then tries each of them.
+pub fn run(gripper: Gripper, count: usize, seed: u64, rival: bool) -> Result<Vec<Outcome>> {
     let scene = gripper.scene()?;
     let mut random = Samples::new(seed);
-    (0..count)
-        .map(|i| {
-            let outcome = one(gripper.draw(&scene, &mut random)?)?;
-            let found = &outcome.found;
+    let drawn: Result<Vec<Task>> = (0..count)
+        .map(|_| gripper.draw(&scene, &mut random))
+        .collect();
+    let drawn = drawn?;
+    let mut outcomes = Vec::new();
+    for (i, task) in drawn.iter().enumerate() {
+        let outcome = one(task)?;
+        let found = &outcome.found;
+        eprintln!(
+            "grasp {}: {} by {:?}, cost {:.3}, {} of the pushes, {} simulations, {} gradients, {} failed, {:.1} s",
+            i + 1,
+            word(found.caught),
+            found.stage,
+            found.cost,
+            found.pushes_caught,
+            found.simulations,
+            found.gradients,
+            found.failures,
+            outcome.seconds
+        );
+        outcomes.push(outcome);
+    }
+    if rival {
+        let pairs = drawn.par_iter().zip(&mut outcomes).enumerate();
+        pairs.try_for_each(|(i, (task, outcome))| -> Result<()> {
+            let raced = race::race(task, outcome, seed)?;
             eprintln!(
-                "grasp {}: {} by {:?}, cost {:.3}, {} of the pushes, {} simulations, {} gradients, {} failed, {:.1} s",
+                "grasp {}: CMA-ES {} after {} simulations of {}, cost {:.3}",
                 i + 1,
-                if found.caught { "caught" } else { "lost" },
-                found.stage,
-                found.cost,
-                found.pushes_caught,
-                found.simulations,
-                found.gradients,
-                found.failures,
-                outcome.seconds
+                word(raced.caught),
+                raced.simulations,
+                raced.most,
+                raced.cost
             );
-            Ok(outcome)
-        })
-        .collect()
+            outcome.rival = Some(raced);
+            Ok(())
+        })?;
+    }
+    Ok(outcomes)
+}
+
+/// The table of recipe and rival.
+pub fn print(all: &[Outcome]) {
+    println!(
+        "| grasp | recipe | by | cost | simulations (gradients by their time) | CMA-ES | simulations | cost |"
+    );
+    println!("|---|---|---|---|---|---|---|---|");
+    for (i, outcome) in all.iter().enumerate() {
+        let Some(raced) = &outcome.rival else {
+            continue;
+        };
+        println!(
+            "| {} | {} | {:?} | {:.3} | {:.0} | {} | {} of {} | {:.3} |",
+            i + 1,
+            word(outcome.found.caught),
+            outcome.found.stage,
+            outcome.found.cost,
+            raced.recipe,
+            word(raced.caught),
+            raced.simulations,
+            raced.most,
+            raced.cost
+        );
+    }
 }

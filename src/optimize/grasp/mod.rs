@@ -18,14 +18,15 @@ pub use tried::GraspStage;
 
 use super::continuation;
 use super::{OptimizeSettings, minimise};
-use crate::simulate::{Controls, Knots, OpenLoop, Rollout, Simulator};
+use crate::simulate::{Controls, Knots, Objective, OpenLoop, Rollout, Simulator};
 use crate::{Error, Result};
 pub use cost::GraspCost;
 use nalgebra::DMatrix;
 use rayon::prelude::*;
 use serde::Serialize;
+use std::ops::ControlFlow;
 use std::sync::Arc;
-use std::sync::atomic::{AtomicUsize, Ordering};
+use std::sync::atomic::{AtomicBool, AtomicUsize, Ordering};
 use task::Grip;
 use tried::Tried;
 
@@ -89,11 +90,19 @@ pub struct Grasp {
     pub failures: usize,
 }
 
+/// Is told what is tried and whether something was caught so far, and may end it.
+type Progress<'a> = dyn Fn(GraspStage, bool) -> ControlFlow<()> + Sync + 'a;
+
 /// The task with what was spent on it.
-struct Attempt {
+struct Attempt<'a> {
     simulator: Simulator,
     grip: Arc<Grip>,
     knots: Knots,
+    progress: &'a Progress<'a>,
+    /// Whether anything was caught.
+    caught: AtomicBool,
+    /// Whether it was ended before it was done.
+    stopped: AtomicBool,
     simulations: AtomicUsize,
     gradients: AtomicUsize,
     failures: AtomicUsize,
@@ -104,8 +113,13 @@ const APPROACH: [f64; 2] = [0.75, 0.95];
 /// Cost of an approach that is good enough.
 const REACHED: f64 = 0.05;
 
-impl Attempt {
-    fn new(simulator: &Simulator, task: &GraspTask, settings: &GraspSettings) -> Result<Self> {
+impl<'a> Attempt<'a> {
+    fn new(
+        simulator: &Simulator,
+        task: &GraspTask,
+        settings: &GraspSettings,
+        progress: &'a Progress<'a>,
+    ) -> Result<Self> {
         let grip = Arc::new(Grip::new(simulator, task)?);
         let mut simulator = simulator.clone();
         simulator.set_policy(Box::new(OpenLoop));
@@ -114,6 +128,9 @@ impl Attempt {
             simulator,
             grip,
             knots,
+            progress,
+            caught: AtomicBool::new(false),
+            stopped: AtomicBool::new(false),
             simulations: AtomicUsize::new(0),
             gradients: AtomicUsize::new(0),
             failures: AtomicUsize::new(0),
@@ -128,11 +145,43 @@ impl Attempt {
         }
     }
 
-    fn run(&self, simulator: &Simulator, x: &[f64], steps: usize) -> Result<Rollout> {
+    /// Goes on, unless it is to end.
+    fn watch(&self, stage: GraspStage) -> ControlFlow<()> {
+        let on = match self.stopped.load(Ordering::Relaxed) {
+            true => ControlFlow::Break(()),
+            false => (self.progress)(stage, self.caught.load(Ordering::Relaxed)),
+        };
+        self.stopped.fetch_or(on.is_break(), Ordering::Relaxed);
+        on
+    }
+
+    /// # Errors
+    /// It was ended.
+    fn check(&self) -> Result<()> {
+        match self.stopped.load(Ordering::Relaxed) {
+            true => Err(Error::Stopped {
+                what: format!(
+                    "the grasp, after {} simulations",
+                    self.simulations.load(Ordering::Relaxed)
+                ),
+            }),
+            false => Ok(()),
+        }
+    }
+
+    fn run(
+        &self,
+        simulator: &Simulator,
+        x: &[f64],
+        steps: usize,
+        stage: GraspStage,
+    ) -> Result<Rollout> {
         self.simulations.fetch_add(1, Ordering::Relaxed);
         let all = self.knots.controls(simulator, x)?;
         let first = all.matrix().columns(0, steps).into_owned();
-        let made = simulator.rollout(&Controls::from_matrix(simulator, first)?);
+        let controls = Controls::from_matrix(simulator, first)?;
+        let start = simulator.initial()?;
+        let made = simulator.rollout_from(&start, &controls, |_| self.watch(stage));
         if made.is_err() {
             self.failures.fetch_add(1, Ordering::Relaxed);
         }
@@ -141,17 +190,20 @@ impl Attempt {
 
     /// Tries a point; none if its simulation fails.
     fn try_out(&self, x: &[f64], stage: GraspStage) -> Option<Tried> {
-        let rollout = self.run(&self.simulator, x, self.simulator.steps()).ok()?;
+        let steps = self.simulator.steps();
+        let rollout = self.run(&self.simulator, x, steps, stage).ok()?;
         self.judge(x, &rollout, stage).ok()
     }
 
     fn judge(&self, x: &[f64], rollout: &Rollout, stage: GraspStage) -> Result<Tried> {
         let held_since = self.grip.held_since(rollout)?;
+        let caught = self.grip.caught(rollout, held_since);
+        self.caught.fetch_or(caught, Ordering::Relaxed);
         Ok(Tried {
             x: x.to_vec(),
             cost: rollout.value(&self.hold())?,
             held_since,
-            caught: self.grip.caught(rollout, held_since),
+            caught,
             stage,
         })
     }
@@ -164,9 +216,11 @@ impl Attempt {
         goal: &GraspCost,
         steps: usize,
     ) -> Result<(f64, Vec<f64>, Rollout)> {
-        let rollout = self.run(simulator, x, steps)?;
+        let rollout = self.run(simulator, x, steps, GraspStage::Descent)?;
         self.gradients.fetch_add(1, Ordering::Relaxed);
-        let gradient = rollout.gradient(goal)?;
+        goal.check(&rollout)?;
+        let seed = goal.cotangents(&rollout);
+        let gradient = rollout.vjp_with(&seed, |_| self.watch(GraspStage::Descent))?;
         let mut controls = DMatrix::zeros(self.grip.limits.len(), simulator.steps());
         controls.columns_mut(0, steps).copy_from(&gradient.controls);
         let gradient = self.knots.controls_vjp(x, &controls)?;
@@ -175,7 +229,8 @@ impl Attempt {
 
     /// From a point to where the object lies well between the fingers shortly before they touch it.
     fn approach(&self, x: &[f64], settings: &OptimizeSettings) -> Result<Vec<f64>> {
-        let rollout = self.run(&self.simulator, x, self.simulator.steps())?;
+        let (whole, stage) = (self.simulator.steps(), GraspStage::Descent);
+        let rollout = self.run(&self.simulator, x, whole, stage)?;
         let touch = self.grip.first_touch(&rollout)?;
         let touch = touch.unwrap_or(0.6 * self.grip.duration);
         let steps = (APPROACH[1] * touch / self.simulator.time_step()) as usize;
@@ -240,18 +295,19 @@ impl Attempt {
 }
 
 /// Finds controls with which the gripper of a scene catches an object and holds it to the end of the run. The scene's own controller isn't used.
-/// The result doesn't depend on the number of threads; `progress` is called with what was tried and whether something was caught so far.
+/// The result doesn't depend on the number of threads; `progress` is called at each step of each simulation and gradient with what is tried and whether anything
+/// was caught so far, and may end it.
 ///
 /// # Errors
-/// A task that doesn't fit the scene, settings out of range, or a scene in which no push could be simulated.
+/// A task that doesn't fit the scene, settings out of range, a scene in which no push could be simulated, and [`Error::Stopped`] if `progress` breaks.
 pub fn grasp(
     simulator: &Simulator,
     task: &GraspTask,
     settings: &GraspSettings,
-    mut progress: impl FnMut(GraspStage, bool),
+    progress: impl Fn(GraspStage, bool) -> ControlFlow<()> + Sync,
 ) -> Result<Grasp> {
     settings.validate()?;
-    let attempt = Attempt::new(simulator, task, settings)?;
+    let attempt = Attempt::new(simulator, task, settings, &progress)?;
     let push = |i: usize| {
         let controls = pushes::push(&attempt.simulator, &attempt.grip, i)?;
         let x = attempt.knots.through(&controls)?;
@@ -261,6 +317,7 @@ pub fn grasp(
         (0..settings.pushes).into_par_iter().map(push).collect();
     let pushes: Result<Vec<Option<Tried>>> = pushes.into_iter().collect();
     let mut tried: Vec<Tried> = pushes?.into_iter().flatten().collect();
+    attempt.check()?;
     let caught = tried.iter().filter(|t| t.caught).count();
     tried.sort_by(|a, b| b.caught.cmp(&a.caught).then(a.cost.total_cmp(&b.cost)));
     let Some(mut best) = tried.first().cloned() else {
@@ -270,7 +327,6 @@ pub fn grasp(
             instead: "run the scene by itself, which says why".into(),
         });
     };
-    progress(GraspStage::Push, best.caught);
     let starts = if best.caught { 1 } else { settings.starts };
     let good = |best: &Tried| best.caught && best.cost <= settings.target;
     for start in tried.iter().take(starts) {
@@ -283,7 +339,7 @@ pub fn grasp(
         {
             best = found;
         }
-        progress(GraspStage::Descent, best.caught);
+        attempt.check()?;
         if best.caught {
             break;
         }
@@ -295,7 +351,7 @@ pub fn grasp(
         {
             best = found;
         }
-        progress(GraspStage::Descent, best.caught);
+        attempt.check()?;
     }
     if !best.caught && settings.search > 0 {
         let evaluate = |x: &[f64]| attempt.try_out(x, GraspStage::Search);
@@ -304,7 +360,7 @@ pub fn grasp(
         {
             best = found;
         }
-        progress(GraspStage::Search, best.caught);
+        attempt.check()?;
     }
     Ok(Grasp {
         controls: attempt.knots.controls(simulator, &best.x)?,

@@ -4,7 +4,7 @@
 //! then brake. Five numbers in [0, 1) say how, spread evenly by the additive sequence of the generalised golden ratio.
 
 use super::cost::GRIP;
-use super::task::Grip;
+use super::task::{GraspTask, Grip};
 use crate::Result;
 use crate::simulate::{Controls, Simulator};
 use nalgebra::DMatrix;
@@ -27,10 +27,25 @@ fn between([low, high]: [f64; 2], part: f64) -> f64 {
     low + (high - low) * part
 }
 
+impl GraspTask {
+    /// The push in the middle of those that [`super::grasp`] tries: it closes with half of the limits for a third of the run, and grips
+    /// at 0.6 of it; nothing else acts. What other ways to find a grasp may start from.
+    ///
+    /// # Errors
+    /// As [`GraspTask::hold_cost`].
+    pub fn middle_push(&self, simulator: &Simulator) -> Result<Controls> {
+        push_with(simulator, &Grip::new(simulator, self)?, [0.5; 5])
+    }
+}
+
 /// Push number `i`.
 pub(super) fn push(simulator: &Simulator, grip: &Grip, i: usize) -> Result<Controls> {
+    push_with(simulator, grip, spread(i))
+}
+
+fn push_with(simulator: &Simulator, grip: &Grip, numbers: [f64; 5]) -> Result<Controls> {
     let steps = simulator.steps();
-    let [strength, length, moment, follow, stop] = spread(i);
+    let [strength, length, moment, follow, stop] = numbers;
     let strength = between(CLOSING, strength);
     let pushing = between(PUSHING, length);
     let gripping = between(GRIPPING, moment).max(pushing);

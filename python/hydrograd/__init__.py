@@ -5,7 +5,7 @@ scalar of itself with respect to controls, initial state and physical parameters
 as their first index.
 """
 
-from hydrograd import objective
+from hydrograd import objective, optimize
 from hydrograd._added_mass import added_mass
 from hydrograd._contacts import ContactForces
 from hydrograd._gradient import Gradient, StepGradient
@@ -94,6 +94,7 @@ __all__ = [
     "free",
     "mesh",
     "objective",
+    "optimize",
     "planar",
     "prism",
     "prismatic",

@@ -1,5 +1,5 @@
 import os
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from typing import Any, Literal, Protocol, final
 
 import numpy as np
@@ -7,6 +7,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from hydrograd._contacts import ContactForces
 from hydrograd._gradient import Gradient, StepGradient
+from hydrograd._optimize import Grasp, Optimum, Smoothed
 from hydrograd._policy import Policy
 from hydrograd._tradeoff import Tradeoff
 
@@ -14,6 +15,8 @@ __version__: str
 
 _Array = NDArray[np.float64]
 _Path = str | os.PathLike[str]
+_Body = int | str
+_Evaluated = tuple[float, ArrayLike]
 _Part = Literal["tangential", "normal", "total"]
 _Backend = Literal["cpu", "gpu"]
 _Fidelity = Literal["isolated", "reduced", "auto", "full"]
@@ -258,6 +261,7 @@ class Simulator:
     def with_start(self, q: ArrayLike | None = None, v: ArrayLike | None = None) -> Simulator: ...
     def with_gains(self, gains: ArrayLike) -> Simulator: ...
     def with_policy(self, policy: Policy) -> Simulator: ...
+    def with_soft_contact(self, factor: float) -> Simulator: ...
     @property
     def policy(self) -> Policy | None: ...
     @property
@@ -393,6 +397,59 @@ def final_coordinate(index: int, target: float, weight: float = 1.0) -> Objectiv
 def final_velocity(index: int, target: float, weight: float = 1.0) -> Objective: ...
 def final_observable(name: str, entry: int, target: float, weight: float = 1.0) -> Objective: ...
 def effort(weight: float) -> Objective: ...
+
+def minimise(
+    function: Callable[[_Array], _Evaluated],
+    start: ArrayLike,
+    *,
+    iterations: int = 100,
+    evaluations: int = 1000,
+    memory: int = 10,
+    first_step: float | None = 0.1,
+    gradient_tolerance: float = 1e-6,
+    cost_tolerance: float = 1e-9,
+    target: float | None = None,
+    clip: float | None = None,
+) -> Optimum: ...
+def continuation(
+    function: Callable[[float, _Array], _Evaluated],
+    stages: ArrayLike,
+    start: ArrayLike,
+    *,
+    iterations: int = 100,
+    evaluations: int = 1000,
+    memory: int = 10,
+    first_step: float | None = 0.1,
+    gradient_tolerance: float = 1e-6,
+    cost_tolerance: float = 1e-9,
+    target: float | None = None,
+    clip: float | None = None,
+) -> Optimum: ...
+def smoothed(
+    function: Callable[[_Array], _Evaluated],
+    x: ArrayLike,
+    *,
+    spread: float = 0.05,
+    directions: int = 16,
+    seed: int = 1,
+) -> Smoothed: ...
+def grasp(
+    simulator: Simulator | Scene,
+    *,
+    object: _Body,
+    fingers: Sequence[tuple[_Body, ArrayLike]],
+    closing: ArrayLike,
+    limits: ArrayLike,
+    hold: float = 0.5,
+    knots: int | None = None,
+    pushes: int | None = None,
+    starts: int | None = None,
+    evaluations: int | None = None,
+    softness: Sequence[float] | None = None,
+    target: float | None = None,
+    search: int | None = None,
+    seed: int = 1,
+) -> Grasp: ...
 
 def tradeoff(
     scene: Scene,

@@ -10,6 +10,7 @@ mod interrupt;
 mod joint;
 mod mesh;
 mod objective;
+mod optimize;
 mod policy;
 mod prepare;
 mod rollout;
@@ -29,6 +30,7 @@ use std::path::PathBuf;
 
 /// Unpickles a simulator: prepares it again.
 #[pyfunction]
+#[expect(clippy::too_many_arguments, reason = "what a simulator consists of")]
 fn _simulator(
     py: Python<'_>,
     scene: &str,
@@ -37,8 +39,9 @@ fn _simulator(
     parameters: Vec<f64>,
     start: (Vec<f64>, Vec<f64>, Vec<f64>),
     policy: Option<Bound<'_, PyAny>>,
+    softness: f64,
 ) -> PyResult<Simulator> {
-    let made = prepare::rebuild(py, scene, settings, cache, &parameters, start)?;
+    let made = prepare::rebuild(py, scene, settings, cache, &parameters, start, softness)?;
     match policy {
         Some(policy) => made.with_policy(&policy),
         None => Ok(made),
@@ -102,5 +105,6 @@ fn _hydrograd(m: &Bound<'_, PyModule>) -> PyResult<()> {
     m.add_function(wrap_pyfunction!(_rollout, m)?)?;
     m.add_function(wrap_pyfunction!(tradeoff::tradeoff, m)?)?;
     m.add_function(wrap_pyfunction!(_command, m)?)?;
+    optimize::register(m)?;
     objective::register(m)
 }

@@ -26,10 +26,11 @@ pub fn build(
         scene,
         cache,
         policy: None,
+        softness: 1.0,
     })
 }
 
-/// Scene, choices, folder, parameters, initial q, v and gains, and the controller if it is written in Python.
+/// Scene, choices, folder, parameters, initial q, v and gains, the controller if it is written in Python, and the softness of contact.
 pub type Parts = (
     String,
     String,
@@ -37,6 +38,7 @@ pub type Parts = (
     Vec<f64>,
     (Vec<f64>, Vec<f64>, Vec<f64>),
     Option<Py<PyAny>>,
+    f64,
 );
 
 /// A simulator from what `__reduce__` gives.
@@ -47,6 +49,7 @@ pub fn rebuild(
     cache: Option<PathBuf>,
     parameters: &[f64],
     start: (Vec<f64>, Vec<f64>, Vec<f64>),
+    softness: f64,
 ) -> PyResult<Simulator> {
     let scene = hydrograd::Scene::from_toml(toml, "").or_raise()?;
     let choices = serde_json::from_str(choices).map_err(|e| {
@@ -56,7 +59,7 @@ pub fn rebuild(
             "must come from this version of hydrograd",
         )
     })?;
-    let out = build(py, scene, choices, cache)?;
+    let out = build(py, scene, choices, cache)?.softened(softness)?;
     out.changed(|inner| {
         if let Some(values) = inner.parameters().with_values(parameters) {
             inner.set_parameters(values)?;

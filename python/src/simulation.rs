@@ -308,6 +308,12 @@ impl Simulator {
         Ok(out)
     }
 
+    /// The same with contact that sets in over `factor` times its width, with a stiffness `factor` times smaller: what a descent starts on and
+    /// hardens (`hydrograd.optimize.continuation`). Nothing changes where nothing touches.
+    fn with_soft_contact(&self, factor: f64) -> PyResult<Self> {
+        self.softened(factor)
+    }
+
     /// The same with other gains of its controller, (gains,).
     fn with_gains(&self, gains: &Bound<'_, PyAny>) -> PyResult<Self> {
         if let Some(policy) = &self.policy {
@@ -498,6 +504,7 @@ impl Simulator {
                 parameters,
                 start,
                 policy,
+                self.softness,
             ),
         ))
     }

@@ -24,6 +24,8 @@ pub struct Simulator {
     pub cache: Option<PathBuf>,
     /// Its controller, if that is written in Python.
     pub policy: Option<Py<PyAny>>,
+    /// How many times softer its contact is than the scene's.
+    pub softness: f64,
 }
 
 impl Simulator {
@@ -39,7 +41,15 @@ impl Simulator {
             scene: self.scene.clone(),
             cache: self.cache.clone(),
             policy: Python::attach(|py| self.policy.as_ref().map(|p| p.clone_ref(py))),
+            softness: self.softness,
         })
+    }
+
+    /// With contact softer by a factor.
+    pub fn softened(&self, factor: f64) -> PyResult<Self> {
+        let mut out = self.changed(|inner| inner.soften_contact(factor))?;
+        out.softness *= factor;
+        Ok(out)
     }
 
     /// Number of controls a step.

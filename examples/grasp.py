@@ -9,8 +9,10 @@ stages, because a trajectory through a collision is a rugged thing to descend: f
 coin lies well between the fingers before they touch it; from there the whole trajectory, to a coin that is held.
 
     python examples/grasp.py [--out FILE] [--json] [--approach N] [--hold N]
+    python examples/grasp.py --random N [--seed S] [--pushes N] [--json]
 
-FILE is a picture of naive and found forces (PNG, SVG or PDF, by its ending).
+FILE is a picture of naive and found forces (PNG, SVG or PDF, by its ending). With --random N coins are caught that nobody
+tuned for, by hg.optimize.grasp: their size, thickness, density, tilt and place, and the friction, are drawn by a seed.
 """
 
 import argparse
@@ -218,13 +220,77 @@ def draw(file, curves):
     print(f"wrote {file}", file=sys.stderr)
 
 
+def draw_scene(random):
+    """The scene with another coin in it, in another place, and another friction."""
+    radius = random.uniform(0.14, 0.26)
+    half = radius * random.uniform(0.2, 0.4)
+    mass = random.uniform(1000.0, 2500.0) * 4.0 / 3.0 * np.pi * radius**2 * half
+    across, along = mass / 5.0 * (radius**2 + half**2), mass / 5.0 * 2.0 * radius**2
+    place = grasp.REACH - random.uniform(0.1, 0.3), random.uniform(-0.05, 0.05), random.uniform(-0.6, 0.6)
+    changes = {
+        "friction = 0.65": f"friction = {random.uniform(0.4, 0.9)}",
+        "semi_axes = [0.2, 0.05, 0.2]": f"semi_axes = [{radius}, {half}, {radius}]",
+        "mass = 10.776": f"mass = {mass}",
+        "inertia = [0.130, 0.236, 0.130]": f"inertia = [{across}, {along}, {across}]",
+        "q = [0.0, -0.4, 0.4, 1.4, 0.0, 0.4]": f"q = [0.0, -0.4, 0.4, {place[0]}, {place[1]}, {place[2]}]",
+    }
+    text = SCENE.read_text()
+    for old, new in changes.items():
+        assert text.count(old) == 1, old
+        text = text.replace(old, new)
+    return hg.Scene.from_toml(text)
+
+
+def catch_random(options):
+    """Grasps that are drawn by a seed, with one set of settings for all."""
+    random = np.random.default_rng(options.seed)
+    pad = (0.0, grasp.REACH - 0.3, 0.0)
+    reports = []
+    for k in range(options.random):
+        begun = time.perf_counter()
+        # Searched in cheap water: compressed sources alone.
+        sim = hg.Simulator(draw_scene(random), fidelity="reduced", films=False)
+        found = hg.optimize.grasp(
+            sim,
+            object="coin",
+            fingers=[("finger 1", pad), ("finger 2", pad)],
+            closing=(0.0, 1.0, -1.0),
+            limits=LIMIT,
+            pushes=options.pushes,
+        )
+        report = {
+            "caught": found.caught,
+            "held_since": found.held_since,  # s
+            "stage": found.stage,
+            "cost": found.cost,
+            "simulations": found.simulations,
+            "gradients": found.gradients,
+            "seconds": time.perf_counter() - begun,
+        }
+        reports.append(report)
+        if not options.json:
+            since = "" if found.held_since is None else f", held since {found.held_since:.2f} s"
+            word = "caught" if found.caught else "lost"
+            print(f"grasp {k + 1}: {word} by {found.stage}{since}, cost {found.cost:.3f}, {found.simulations} simulations")
+    if options.json:
+        print(json.dumps(reports))
+    else:
+        print(f"{sum(r['caught'] for r in reports)} of {options.random} caught")
+
+
 def main():
     parser = argparse.ArgumentParser(description=__doc__.split("\n")[0])
     parser.add_argument("--out", default="grasp.png", help="picture; default: %(default)s")
     parser.add_argument("--json", action="store_true", help="one JSON object on standard output")
     parser.add_argument("--approach", type=int, default=10, help="most iterations of the approach (%(default)s)")
     parser.add_argument("--hold", type=int, default=30, help="most iterations of the hold (%(default)s)")
+    parser.add_argument("--random", type=int, metavar="N", help="catch so many random coins instead")
+    parser.add_argument("--seed", type=int, default=1, help="of the random coins (%(default)s)")
+    parser.add_argument("--pushes", type=int, help="pushes tried for each of them (the recipe's own number)")
     options = parser.parse_args()
+    if options.random is not None:
+        catch_random(options)
+        return
     begun = time.perf_counter()
 
     text = SCENE.read_text()

@@ -55,6 +55,15 @@ def test_grasp(tmp_path):
     assert closing and float(closing[1]) < 13.0
 
 
+def test_a_random_grasp():
+    """The first of those that are drawn, with few pushes."""
+    command = [sys.executable, ROOT / "examples/grasp.py", "--random", 1, "--pushes", 6, "--json"]
+    done = subprocess.run(list(map(str, command)), capture_output=True, text=True)
+    assert done.returncode == 0, done.stderr
+    (found,) = json.loads(done.stdout)
+    assert found["simulations"] >= 6 and found["caught"], found
+
+
 def test_the_grasps_cost():
     """Its gradient is that of differences, and it knows a good place."""
     pytest.importorskip("scipy")

@@ -113,8 +113,9 @@ def test_everything_is_documented():
                 if dataclasses.is_dataclass(value):
                     continue  # data classes document their fields beside them
                 assert (getattr(value, member).__doc__ or "").strip(), f"{name}.{member}"
-    for name in hg.objective.__all__:
-        assert (getattr(hg.objective, name).__doc__ or "").strip(), name
+    for module in (hg.objective, hg.optimize):
+        for name in module.__all__:
+            assert (getattr(module, name).__doc__ or "").strip(), name
 
 
 def test_version_is_that_of_the_crate():

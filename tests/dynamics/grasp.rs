@@ -8,16 +8,16 @@ mod hold;
 mod task;
 
 use crate::support::grasps::RandomGrasp;
+use hydrograd::Controls;
 use hydrograd::adjoint::sample::Samples;
 use hydrograd::simulate::OpenLoop;
-use hydrograd::{Controls, Error, Fidelity};
 use task::Task;
 
 #[test]
 fn the_naive_push_catches_on_dry_land_and_loses_in_water() {
     let scene = task::load().unwrap();
     for (scene, caught) in [(task::dry(&scene), true), (scene, false)] {
-        let simulator = task::simulator(&scene, Fidelity::Reduced).unwrap();
+        let simulator = task::simulator(&scene, task::CHEAP).unwrap();
         let rollout = task::run(&simulator, scene.steps).unwrap();
         assert_eq!(hold::caught(&rollout).unwrap(), caught);
     }
@@ -26,9 +26,9 @@ fn the_naive_push_catches_on_dry_land_and_loses_in_water() {
 #[test]
 fn a_descent_finds_forces_that_catch_the_coin() {
     let scene = task::load().unwrap();
-    let simulator = task::simulator(&scene, Fidelity::Reduced).unwrap();
+    let simulator = task::simulator(&scene, task::CHEAP).unwrap();
     let naive = task::run(&simulator, scene.steps).unwrap();
-    let task = Task::new(&scene).unwrap();
+    let task = Task::new(&scene, task::CHEAP).unwrap();
     let start = task.through(&naive).unwrap();
     let before = task.cost(&start).unwrap();
     let found = task.find(&start, |_, _| {}).unwrap();
@@ -39,7 +39,7 @@ fn a_descent_finds_forces_that_catch_the_coin() {
 /// The costs' gradients over the knots, against differences: before the fingers touch the coin, and with the coin held.
 #[test]
 fn gradients_of_the_costs() {
-    let task = Task::new(&task::load().unwrap()).unwrap();
+    let task = Task::new(&task::load().unwrap(), task::CHEAP).unwrap();
     let wavy = |k: usize, scale: f64| scale * (1.3 * k as f64 + 0.7).sin();
     let x: Vec<f64> = (0..33).map(|k| wavy(k, 0.3)).collect();
     let d: Vec<f64> = (0..33).map(|k| wavy(2 * k, 1.0)).collect();
@@ -56,30 +56,24 @@ fn gradients_of_the_costs() {
     }
 }
 
-/// Grasps with random forces: none fails, whatever closes on what. A thousand: `cargo bench --bench contact -- grasps`.
+/// Grasps with random forces, gaps filled by films: none fails, in the coupling or otherwise, whatever closes on what. A thousand: `cargo bench --bench contact -- grasps`.
 #[test]
 fn random_grasps_never_fail() {
     let count = 8;
     let scene = task::load().unwrap();
-    let mut simulator = task::simulator(&scene, Fidelity::Reduced).unwrap();
+    let mut simulator = task::simulator(&scene, task::RESOLVED).unwrap();
     simulator.set_policy(Box::new(OpenLoop));
     let (q, v) = (simulator.start().0.clone(), simulator.start().1.clone());
     let mut random = Samples::new(1);
     let coin = [hold::COIN_Y, hold::COIN_Z, hold::COIN_TURN];
     let (mut failed, mut cut, mut most, mut past) = (Vec::new(), 0, 1, 0.0_f64);
     let (mut nearest, mut warned) = (f64::INFINITY, 0);
-    let mut unresolved = Vec::new();
     for grasp in 0..count {
         let drawn = RandomGrasp::draw(&mut random, &q, coin, scene.steps);
         simulator.set_start(drawn.start, v.clone()).unwrap();
         let controls = Controls::from_matrix(&simulator, drawn.forces).unwrap();
         let rollout = match simulator.rollout(&controls) {
             Ok(rollout) => rollout,
-            // Where it can't be trusted the coupling says so; no number of pieces could help.
-            Err(error @ Error::Unresolved { .. }) if error.to_string().contains("coupling of") => {
-                unresolved.push(format!("grasp {grasp}: {error}"));
-                continue;
-            }
             Err(error) => {
                 failed.push(format!("grasp {grasp}: {error}"));
                 continue;
@@ -98,15 +92,13 @@ fn random_grasps_never_fail() {
         }
     }
     println!(
-        "{count} grasps: {} fail, {} more in the coupling; {cut} steps cut, into at most {most}; {past:.4} of a range past a limit; smallest gap {:.1} mm; \
+        "{count} grasps: {} fail; {cut} steps cut, into at most {most}; {past:.4} of a range past a limit; smallest gap {:.1} mm; \
          {warned} go deep",
         failed.len(),
-        unresolved.len(),
         1e3 * nearest
     );
     assert!(failed.is_empty(), "{}", failed.join("\n"));
-    let most = count / 20;
-    assert!(unresolved.len() <= most, "{}", unresolved.join("\n"));
     assert!(past < 0.06, "{past}");
     assert_eq!(warned, 0);
+    assert!(nearest > 0.0, "{nearest}");
 }

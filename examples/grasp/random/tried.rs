@@ -20,9 +20,9 @@ pub struct Tried {
     rollout: Rollout,
 }
 
-/// As the recipe has it.
+/// In cheap water, as the recipe has it: compressed sources alone.
 pub fn simulator(drawn: &Task) -> Result<Simulator> {
-    let settings = Settings::default().fidelity(Fidelity::Reduced);
+    let settings = Settings::default().fidelity(Fidelity::Reduced).films(false);
     Simulator::new(&drawn.scene, settings)
 }
 

@@ -176,6 +176,7 @@ impl<'a> Attempt<'a> {
         steps: usize,
         stage: GraspStage,
     ) -> Result<Rollout> {
+        self.check()?;
         self.simulations.fetch_add(1, Ordering::Relaxed);
         let all = self.knots.controls(simulator, x)?;
         let first = all.matrix().columns(0, steps).into_owned();
@@ -309,6 +310,7 @@ pub fn grasp(
     settings.validate()?;
     let attempt = Attempt::new(simulator, task, settings, &progress)?;
     let push = |i: usize| {
+        attempt.check()?;
         let controls = pushes::push(&attempt.simulator, &attempt.grip, i)?;
         let x = attempt.knots.through(&controls)?;
         Ok(attempt.try_out(&x, GraspStage::Push))

@@ -20,6 +20,7 @@ mod exclude;
 pub(crate) mod film;
 pub mod full;
 mod isolated;
+pub mod lubrication;
 mod pair;
 pub mod panel;
 pub mod reduced;

@@ -41,6 +41,8 @@ mod estimate;
 mod fidelity;
 #[cfg(test)]
 mod film_limits;
+#[cfg(test)]
+mod lubrication_limits;
 mod method;
 mod numerics;
 mod prepared;

@@ -29,7 +29,7 @@ mod pull;
 mod surface;
 
 pub(crate) use placed::{MovingFilm, PlacedFilm};
-pub(crate) use surface::FilmSurface;
+pub(crate) use surface::{Cluster, FilmSurface, clusters};
 
 use crate::geometry::{Image, Opposite};
 use crate::solver::SparsePattern;

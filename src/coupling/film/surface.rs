@@ -98,7 +98,7 @@ impl FilmSurface {
 }
 
 /// The points in groups of [`TOGETHER`] at most, by halves across their longest side.
-fn clusters(points: &[Vec3]) -> Vec<Cluster> {
+pub(crate) fn clusters(points: &[Vec3]) -> Vec<Cluster> {
     let (mut out, mut open) = (Vec::new(), vec![(0..points.len()).collect::<Vec<_>>()]);
     while let Some(mut group) = open.pop() {
         let Some(first) = group.first() else { continue };

@@ -1,6 +1,6 @@
 import os
 from collections.abc import Callable, Mapping, Sequence
-from typing import Any, Literal, Protocol, final
+from typing import Any, Literal, Protocol, final, overload
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -180,6 +180,7 @@ class Scene:
     def add_wall(
         self, point: ArrayLike, normal: ArrayLike, surface: Literal["rigid", "free"] = "rigid"
     ) -> None: ...
+    @overload
     def add_force(
         self,
         kind: Literal["spring"],
@@ -191,6 +192,17 @@ class Scene:
         to_at: ArrayLike = ...,
         rest_length: float = 0.0,
         damping: float = 0.0,
+        name: str | None = None,
+    ) -> None: ...
+    @overload
+    def add_force(
+        self,
+        kind: Literal["lubrication"],
+        *,
+        roughness: float,
+        viscosity: float = 1.0016e-3,
+        bodies: Sequence[str] = ...,
+        reach: float | None = None,
         name: str | None = None,
     ) -> None: ...
     def set_initial(
@@ -364,6 +376,7 @@ class Rollout:
     @property
     def warnings(self) -> list[str]: ...
     def check_gap(self) -> dict[str, Any] | None: ...
+    def gap_flow(self) -> dict[str, Any] | None: ...
     def state(self, step: int = -1) -> State: ...
     def contacts(self, step: int, slack: float = 0.0) -> ContactForces: ...
     def flow(self, state: int, points: ArrayLike) -> _Array: ...

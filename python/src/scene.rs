@@ -114,7 +114,8 @@ impl Scene {
 
     /// Adds a force between bodies, by its kind and the keys that it has in a scene file, bodies by name. A "spring", with a damper
     /// beside it, joins the point `at` (m, body's frame) of `body` and `to_at` of the body `to` (default: of the world): `stiffness`
-    /// in N/m, `rest_length` in m, `damping` in N s/m.
+    /// in N/m, `rest_length` in m, `damping` in N s/m. "lubrication" is what viscous water does in thin gaps, between all surfaces or in the gaps of `bodies` (names):
+    /// their `roughness` in m, the `viscosity` in Pa s, and `reach` in m, the distance at which the pressure has fallen to that in the open.
     #[pyo3(signature = (kind, **fields))]
     fn add_force(
         &mut self,

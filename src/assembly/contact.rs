@@ -30,13 +30,18 @@ pub(super) fn check_integrator(scene: &Scene, integrator: Integrator) -> Result<
     if !scene.has_contact() || integrator.solves_contact() {
         return Ok(());
     }
-    let what = match (scene.contact, scene.limited().next()) {
-        (None, Some((b, _))) => format!("limits of body {:?}", scene.bodies[b].name),
+    let what = match (
+        scene.contact,
+        scene.limited().next(),
+        scene.lubrications().next(),
+    ) {
+        (None, Some((b, _)), _) => format!("limits of body {:?}", scene.bodies[b].name),
+        (None, None, Some((i, _))) => format!("{:?}", scene.force_name(i)),
         _ => "contact".into(),
     };
     Err(Error::Unsupported {
         what: format!("{what} with the integrator {integrator:?}"),
-        why: "contact and limits of joints are solved in the velocity that a step moves by, and this one has none".into(),
+        why: "contact, limits of joints and viscous water in gaps are solved in the velocity that a step moves by, and this one has none".into(),
         instead: "use the integrator momentum-euler, midpoint or velocity-euler".into(),
     })
 }

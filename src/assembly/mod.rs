@@ -4,6 +4,7 @@ mod choices;
 mod contact;
 mod controller;
 mod limits;
+mod lubrication;
 
 use crate::adjoint::drag::Element;
 use crate::adjoint::lie::Vec3;
@@ -20,6 +21,7 @@ use std::path::Path;
 use std::sync::Arc;
 
 pub use choices::Choices;
+pub(crate) use lubrication::bearing;
 
 /// A scene made ready.
 #[derive(Clone)]
@@ -128,6 +130,7 @@ pub(crate) fn assemble(
         tree: &tree,
         bodies: &bodies,
         surfaces: &faces,
+        lubricated: lubrication::lubricated(scene, &surfaces, &clearance)?,
     };
     let mut declared = Declarations::new(scene.fluid.density, inertias);
     let forces = force::assemble(&parts, &mut declared);

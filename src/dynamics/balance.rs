@@ -75,7 +75,7 @@ impl Evaluation<'_> {
     }
 
     /// Bodies and joints as forces see them.
-    fn moving<'b>(
+    pub(super) fn moving<'b>(
         &'b self,
         twists: &'b [Vec6],
         v: &'b DVector<f64>,
@@ -91,7 +91,7 @@ impl Evaluation<'_> {
     }
 
     /// The same without motion.
-    fn place(&self) -> Place<'_> {
+    pub(super) fn place(&self) -> Place<'_> {
         Place {
             poses: &self.kinematics.poses,
             q: &self.q,
@@ -99,11 +99,11 @@ impl Evaluation<'_> {
         }
     }
 
-    /// What all forces do to bodies that move with spatial `twists`.
+    /// What all forces do to bodies that move with spatial `twists`, but those that are solved with contact.
     pub(super) fn loads(&self, twists: &[Vec6], v: &DVector<f64>, control: &DVector<f64>) -> Loads {
         let at = self.moving(twists, v, control);
         let mut out = Loads::zeros(twists.len(), v.len());
-        for force in self.system.forces.iter() {
+        for force in self.system.smooth_forces() {
             force.add(&at, &mut out);
         }
         out
@@ -128,7 +128,7 @@ impl Evaluation<'_> {
             control: &mut out.control,
             parameters: &mut out.parameters,
         };
-        for force in self.system.forces.iter() {
+        for force in self.system.smooth_forces() {
             force.vjp(&at, z, &mut bars);
         }
     }
@@ -241,7 +241,7 @@ impl Linearisation<'_> {
             twists: &dtwists,
             v: dv,
         };
-        for force in self.system.forces.iter() {
+        for force in self.system.smooth_forces() {
             force.jvp(&at, &change, &mut dloads);
         }
         for (b, drate) in dloads.wrenches.iter_mut().enumerate() {

@@ -101,9 +101,9 @@ impl Evaluation<'_> {
         self.system.tree.twists(&self.kinematics, v)
     }
 
-    /// Whether any force acts in contact at the velocity `v`; where none does, none changes with v either.
+    /// Whether any force acts in contact at the velocity `v`, or any damper that is solved with it at some; where none does, none changes with v either.
     pub(super) fn contact_acts(&self, v: &DVector<f64>) -> bool {
-        if self.limit_forces(v).any(|(_, forces)| forces != [0.0; 2]) {
+        if self.damps() || self.limit_forces(v).any(|(_, forces)| forces != [0.0; 2]) {
             return true;
         }
         if self.contact_points.is_empty() {
@@ -115,11 +115,12 @@ impl Evaluation<'_> {
         self.contact_points.iter().any(acts)
     }
 
-    /// Generalised forces of contact at the velocity `v`.
+    /// Generalised forces of contact at the velocity `v`, with the dampers that are solved with it.
     pub fn contact_force(&self, v: &DVector<f64>, dual: Dual) -> DVector<f64> {
         let tree = &self.system.tree;
         let twists = self.twists(v);
-        let wrenches = self.exchanged(|t| contact_force(&t.law, &t.point_state(&twists)));
+        let mut wrenches = self.exchanged(|t| contact_force(&t.law, &t.point_state(&twists)));
+        self.add_damping(&twists, v, &mut wrenches);
         let columns = match dual {
             Dual::User => &self.kinematics.columns,
             Dual::Frame => &self.kinematics.frame_columns,
@@ -135,7 +136,7 @@ impl Evaluation<'_> {
     pub(super) fn contact_effort(&self, v: &DVector<f64>) -> DVector<f64> {
         let tree = &self.system.tree;
         let twists = self.twists(v);
-        let mut out = DVector::zeros(v.len());
+        let mut out = self.damping_effort(v);
         for t in &self.contact_points {
             let push = contact_force(&t.law, &t.point_state(&twists));
             if push != Push::default() {
@@ -153,10 +154,12 @@ impl Evaluation<'_> {
     /// Tangent of [`Evaluation::contact_force`] (the user's coordinates) along `dv`.
     pub fn contact_force_jvp(&self, v: &DVector<f64>, dv: &DVector<f64>) -> DVector<f64> {
         let [twists, along] = [v, dv].map(|v| self.twists(v));
-        let wrenches = self.exchanged(|t| {
+        let mut wrenches = self.exchanged(|t| {
             let point_state = t.point_state(&twists);
             contact_force_jvp(&t.law, &point_state, &t.rates(&along))
         });
+        // Dampers are linear.
+        self.add_damping(&along, dv, &mut wrenches);
         let tree = &self.system.tree;
         let mut out = tree.project(&self.kinematics.columns, wrenches);
         for l in &self.limits {
@@ -217,6 +220,7 @@ impl Evaluation<'_> {
                 own.rolling_friction,
             ]);
         }
+        self.damping_vjp(&fields, v, z, &mut bar, &mut out);
         let (q_bar, v_bar) = tree.reverse(&self.kinematics, v, virtual_velocity, &fields, bar);
         out.q += q_bar;
         out.v += v_bar;

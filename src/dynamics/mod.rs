@@ -5,6 +5,7 @@ mod balance;
 mod body;
 mod contact;
 mod contact_force;
+mod damping;
 mod evaluation;
 pub mod force;
 mod integrator;

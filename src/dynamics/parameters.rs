@@ -27,6 +27,8 @@ pub enum Range {
     Finite,
     /// Zero and above.
     NotNegative,
+    /// Above zero.
+    Positive,
     /// Zero alone; what would have to be done to change that.
     Zero(&'static str),
 }
@@ -394,6 +396,9 @@ impl Parameters {
                 Range::Zero(remedy) if *value != 0.0 => remedy,
                 Range::NotNegative if !(*value >= 0.0 && value.is_finite()) => {
                     "must be finite and not negative"
+                }
+                Range::Positive if !(*value > 0.0 && value.is_finite()) => {
+                    "must be finite and above zero"
                 }
                 Range::Finite if !value.is_finite() => "must be finite",
                 _ => continue,

@@ -59,6 +59,18 @@ impl System {
         each.filter_map(|(b, body)| Some((b, body.submerged?)))
     }
 
+    /// Forces that act in the course of a step.
+    pub(super) fn smooth_forces(&self) -> impl Iterator<Item = &dyn ForceModel> {
+        let all = self.forces.iter().map(AsRef::as_ref);
+        all.filter(|f: &&dyn ForceModel| !f.solved_with_contact())
+    }
+
+    /// Those that are solved with contact.
+    pub(super) fn dampers(&self) -> impl Iterator<Item = &dyn ForceModel> {
+        let all = self.forces.iter().map(AsRef::as_ref);
+        all.filter(|f: &&dyn ForceModel| f.solved_with_contact())
+    }
+
     /// Whether the water moves past bodies at rest.
     pub fn has_current(&self) -> bool {
         self.current != Vec3::zeros()

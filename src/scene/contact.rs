@@ -1,6 +1,6 @@
 //! How surfaces touch.
 
-use super::{Placement, Scene, Shape, is_default};
+use super::{Force, Lubrication, Placement, Scene, Shape, is_default};
 use serde::{Deserialize, Serialize};
 
 /// Contact between bodies, and between bodies and walls. A scene that has it (`[contact]`, all keys of which may be left out)
@@ -59,9 +59,21 @@ impl Default for Contact {
 }
 
 impl Scene {
-    /// Whether anything in it is stopped by touching: surfaces, or joints at their limits.
+    /// Whether anything in it is solved in the velocity that a step moves by: what is stopped by touching, surfaces or joints at their limits, and what
+    /// viscous water does in gaps.
     pub(crate) fn has_contact(&self) -> bool {
-        self.contact.is_some() || self.limited().next().is_some()
+        self.contact.is_some()
+            || self.limited().next().is_some()
+            || self.lubrications().next().is_some()
+    }
+
+    /// The forces of viscous water, each with its number among all.
+    pub(crate) fn lubrications(&self) -> impl Iterator<Item = (usize, &Lubrication)> {
+        let each = self.forces.iter().enumerate();
+        each.filter_map(|(i, force)| match force {
+            Force::Lubrication(lubrication) => Some((i, lubrication)),
+            Force::Spring(_) => None,
+        })
     }
 
     /// Bodies whose joints have limits, with these.

@@ -18,7 +18,7 @@ pub use crate::multibody::{Joint, Plane};
 pub use crate::shape::Shape;
 pub use build::BodyId;
 pub use contact::{CollisionPiece, Contact};
-pub use force::{Force, Spring};
+pub use force::{Force, Lubrication, Spring, WATER_VISCOSITY};
 
 use serde::{Deserialize, Serialize};
 

@@ -7,7 +7,7 @@ use hydrograd::dynamics::{
     Dual, Input, Integrator, JointLimit, Linearisation, Parameters, State, StateBar, Stepper,
     System,
 };
-use hydrograd::scene::{Body, Contact, Fluid, Joint, Scene, Shape};
+use hydrograd::scene::{Body, Contact, Fluid, Joint, Lubrication, Scene, Shape};
 use hydrograd::{Fidelity, Settings, Simulator};
 use nalgebra::DVector;
 use std::sync::OnceLock;
@@ -106,7 +106,7 @@ fn limit_vjp(c: f64) -> Outcome {
     }))
 }
 
-/// Every two neighbours overlap by millimetres, and the lower ones the wall; beside them an arm with both its joints at limits.
+/// Every two neighbours overlap by millimetres, and the lower ones the wall, with viscous water between; beside them an arm with both its joints at limits.
 fn scene() -> Scene {
     let mut scene = Scene::new(Fluid {
         density: 0.0,
@@ -138,6 +138,9 @@ fn scene() -> Scene {
                 .rotated([0.1, 0.2, 0.3]),
         );
     }
+    // As strong as contact is.
+    let oil = Lubrication::new(0.02).viscosity(3.0).reach(0.1);
+    scene.add_force(oil.named("oil").into());
     let arm = |mass: f64| {
         let body = Body::dry().mass(mass).inertia([0.2, 0.3, 0.4]);
         body.center_of_mass([0.2, 0.1, 0.3])
@@ -170,18 +173,18 @@ fn simulator() -> &'static Simulator {
     })
 }
 
-fn system() -> &'static System {
+pub fn system() -> &'static System {
     simulator().system()
 }
 
 #[derive(Clone)]
-struct Point {
-    q: DVector<f64>,
-    v: DVector<f64>,
-    parameters: Parameters,
+pub struct Point {
+    pub q: DVector<f64>,
+    pub v: DVector<f64>,
+    pub parameters: Parameters,
 }
 
-fn point() -> Point {
+pub fn point() -> Point {
     let n = system().tree.velocities();
     let mut v = wavy(n, 0.8, 0.3);
     (v[n - 2], v[n - 1]) = (0.25, -0.3);
@@ -196,7 +199,7 @@ fn evaluate<'a>(parameters: &'a Parameters, q: &DVector<f64>) -> Linearisation<'
     system().linearise(parameters, q).unwrap()
 }
 
-/// A scalar against its cotangents: every body's displacement and velocity, and every parameter of contact, apart.
+/// A scalar against its cotangents: every body's displacement and velocity, and every parameter of contact and of what is solved with it, apart.
 fn check(
     value: &dyn Fn(&Point) -> f64,
     at: &Point,
@@ -238,6 +241,8 @@ fn check(
         "contact.friction",
         "contact.torsional_friction",
         "contact.rolling_friction",
+        "oil.viscosity",
+        "oil.roughness",
     ] {
         let i = parameters.names().position(|n| n == name).unwrap();
         let step = 0.1 * all[i];

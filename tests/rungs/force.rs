@@ -1,11 +1,12 @@
 //! Rungs of every force by itself: bodies are displaced, and their twists changed, one by one, as no joint would let them.
 
-use super::dynamics::{directions, point, system};
+use super::contact;
+use super::dynamics::{self, directions};
 use super::tools::{Group, groups, vector_along, wavy};
 use hydrograd::adjoint::check::{Outcome, Rung};
 use hydrograd::adjoint::lie::{Pose, Vec6, angular, exp_matrix, linear};
-use hydrograd::dynamics::Parameters;
 use hydrograd::dynamics::force::{ForceModel, LoadBars, Loads, Moving, Place, Velocity};
+use hydrograd::dynamics::{Parameters, System};
 use nalgebra::DVector;
 
 pub fn rungs() -> Vec<Rung> {
@@ -25,12 +26,15 @@ pub fn rungs() -> Vec<Rung> {
         "dynamics::force::actuation::Actuation::vjp" => |c| vjp("actuation", c),
         "dynamics::force::spring::Springs::jvp" => |c| jvp("spring", c),
         "dynamics::force::spring::Springs::vjp" => |c| vjp("spring", c),
+        "dynamics::force::lubrication::Lubrication::jvp" => |c| jvp("lubrication", c),
+        "dynamics::force::lubrication::Lubrication::vjp" => |c| vjp("lubrication", c),
     ]
 }
 
 /// What a force is a function of.
 #[derive(Clone)]
 struct At {
+    system: &'static System,
     poses: Vec<Pose>,
     q: DVector<f64>,
     twists: Vec<Vec6>,
@@ -40,16 +44,32 @@ struct At {
 }
 
 impl At {
-    fn new() -> Self {
-        let (p, tree) = (point(), &system().tree);
-        let kinematics = tree.kinematics(&p.q);
+    /// Where the force of this name acts: what is solved with contact where bodies touch.
+    fn new(name: &str) -> Self {
+        if name == "lubrication" {
+            let (p, control) = (contact::point(), DVector::zeros(0));
+            return Self::at(contact::system(), p.q, p.v, control, p.parameters);
+        }
+        let p = dynamics::point();
+        Self::at(dynamics::system(), p.q, p.v, p.u, p.parameters)
+    }
+
+    fn at(
+        system: &'static System,
+        q: DVector<f64>,
+        v: DVector<f64>,
+        control: DVector<f64>,
+        parameters: Parameters,
+    ) -> Self {
+        let kinematics = system.tree.kinematics(&q);
         Self {
-            twists: tree.twists(&kinematics, &p.v),
+            system,
+            twists: system.tree.twists(&kinematics, &v),
             poses: kinematics.poses,
-            q: p.q,
-            v: p.v,
-            control: p.u,
-            parameters: p.parameters,
+            q,
+            v,
+            control,
+            parameters,
         }
     }
 
@@ -62,7 +82,7 @@ impl At {
             },
             twists: &self.twists,
             v: &self.v,
-            current: &system().current,
+            current: &self.system.current,
             control: &self.control,
         }
     }
@@ -74,16 +94,15 @@ impl At {
     }
 }
 
-fn force(name: &str) -> &'static dyn ForceModel {
-    let mut all = system().forces.iter();
+fn force(at: &At, name: &str) -> &'static dyn ForceModel {
+    let mut all = at.system.forces.iter();
     all.find(|f| f.name() == name)
         .expect("the scene has every force")
         .as_ref()
 }
 
-/// A six-vector for each body.
-fn field(phase: f64, size: f64) -> Vec<Vec6> {
-    let n = system().len();
+/// A six-vector for each of so many bodies.
+fn field(n: usize, phase: f64, size: f64) -> Vec<Vec6> {
     let all = wavy(6 * n, phase, size);
     (0..n)
         .map(|b| all.fixed_rows::<6>(6 * b).into_owned())
@@ -111,8 +130,9 @@ fn row(loads: &Loads) -> Vec<f64> {
 }
 
 fn jvp(name: &str, c: f64) -> Outcome {
-    let (force, at) = (force(name), At::new());
-    let (dtwists, dv) = (field(3.1, 0.2), wavy(at.v.len(), 3.7, 0.2));
+    let at = At::new(name);
+    let force = force(&at, name);
+    let (dtwists, dv) = (field(at.poses.len(), 3.1, 0.2), wavy(at.v.len(), 3.7, 0.2));
     let mut tangent = Loads::zeros(at.poses.len(), at.v.len());
     let change = Velocity {
         twists: &dtwists,
@@ -134,9 +154,10 @@ fn jvp(name: &str, c: f64) -> Outcome {
 }
 
 fn vjp(name: &str, c: f64) -> Outcome {
-    let (force, at) = (force(name), At::new());
+    let at = At::new(name);
+    let force = force(&at, name);
     let (n, nv) = (at.poses.len(), at.v.len());
-    let (z, z_joints) = (field(5.1, 1.0), wavy(nv, 5.7, 1.0));
+    let (z, z_joints) = (field(n, 5.1, 1.0), wavy(nv, 5.7, 1.0));
     let power = |at: &At| {
         let loads = at.loads(force);
         let wrenches: f64 = loads.wrenches.iter().zip(&z).map(|(w, z)| w.dot(z)).sum();
@@ -162,7 +183,7 @@ fn vjp(name: &str, c: f64) -> Outcome {
 
     let (at, power) = (&at, &power);
     let work = |field: &[Vec6], by: &[Vec6]| field.iter().zip(by).map(|(a, b)| a.dot(b)).sum();
-    let (dpose, dtwist) = (field(2.1, 0.05), field(3.1, 0.2));
+    let (dpose, dtwist) = (field(n, 2.1, 0.05), field(n, 3.1, 0.2));
     let (dq, dv) = (wavy(nv, 2.7, 0.05), wavy(nv, 3.7, 0.2));
     let du = wavy(at.control.len(), 4.1, 1.0);
     let mut list: Vec<Group> = vec![
@@ -192,7 +213,7 @@ fn vjp(name: &str, c: f64) -> Outcome {
             name: "q",
             slope: q.dot(&dq),
             value: Box::new(move |h| {
-                let q = system().tree.integrate(&at.q, &(h * &dq));
+                let q = at.system.tree.integrate(&at.q, &(h * &dq));
                 power(&At { q, ..at.clone() })
             }),
         },

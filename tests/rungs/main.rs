@@ -110,6 +110,14 @@ const THROUGH: &[(&str, &str)] = &[
         "dynamics::contact_force::Evaluation::contact_force_vjp",
     ),
     (
+        "dynamics::damping::Evaluation::damping_vjp",
+        "dynamics::contact_force::Evaluation::contact_force_vjp",
+    ),
+    (
+        "coupling::lubrication::pull::PlacedBearing::product_vjp",
+        "dynamics::force::lubrication::Lubrication::vjp",
+    ),
+    (
         "dynamics::integrator::contact::Adjoint::solve_vjp",
         "dynamics::integrator::contact::Adjoint::apply_vjp",
     ),

@@ -6,6 +6,7 @@
 
 mod actuation;
 mod drag;
+mod lubrication;
 mod spring;
 mod thruster;
 mod weight;
@@ -13,6 +14,7 @@ mod weight;
 use super::{BodyData, Declarations, Parameters};
 use crate::adjoint::drag::Element;
 use crate::adjoint::lie::{Pose, Vec3, Vec6, six};
+use crate::coupling::lubrication::Bearing;
 use crate::multibody::Tree;
 use crate::scene::Scene;
 use nalgebra::DVector;
@@ -30,6 +32,7 @@ const FORCES: &[Assemble] = &[
     thruster::assemble,
     actuation::assemble,
     spring::assemble,
+    lubrication::assemble,
 ];
 
 /// What forces are made from.
@@ -42,6 +45,20 @@ pub struct ForceParts<'a> {
     pub bodies: &'a [BodyData],
     /// Surface of each body that has one.
     pub surfaces: &'a [Vec<Element>],
+    /// Gaps that forces of viscous water act in.
+    pub lubricated: Vec<Lubricated>,
+}
+
+/// A gap that a force of viscous water acts in.
+pub struct Lubricated {
+    /// The force's number in the scene.
+    pub force: usize,
+    /// The body on whose surface it is solved.
+    pub first: usize,
+    /// The other one; none for a wall.
+    pub second: Option<usize>,
+    /// The two surfaces.
+    pub bearing: Bearing,
 }
 
 /// All forces of a scene.
@@ -139,6 +156,17 @@ pub trait ForceModel: Send + Sync {
 
     /// Adds the transpose of [`ForceModel::add`] in all its arguments: the gradient of its power on the velocity `z`.
     fn vjp(&self, at: &Moving, z: &Velocity, bar: &mut LoadBars);
+
+    /// Whether it is solved with contact, at the end of a step and in the velocity that the step moves by: a damper that is too stiff to act at any other. It is then
+    /// linear in the twists of the bodies, symmetric, takes energy away, and acts on bodies alone; integrators that don't solve contact refuse it.
+    fn solved_with_contact(&self) -> bool {
+        false
+    }
+
+    /// Whether it does anything there at some velocity; asked of those that are solved with contact.
+    fn acts(&self, _place: &Place) -> bool {
+        true
+    }
 
     /// Potential energy, J, of a force that has one.
     fn potential_energy(&self, _place: &Place) -> f64 {

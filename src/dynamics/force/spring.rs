@@ -51,7 +51,7 @@ pub(super) fn assemble(
     let body = |name: &String| scene.body(name).map(|b| b.0);
     let mut springs = Vec::new();
     for (i, force) in scene.forces.iter().enumerate() {
-        let Force::Spring(s) = force;
+        let Force::Spring(s) = force else { continue };
         let mut declare = |declared, value| {
             parameters.declare(Owner::Named(scene.force_name(i)), declared, value)
         };

@@ -1,7 +1,9 @@
 //! Forces between bodies as a scene gives them, one file each.
 
+mod lubrication;
 mod spring;
 
+pub use lubrication::{Lubrication, WATER_VISCOSITY};
 pub use spring::Spring;
 
 use super::{BodyId, Scene};
@@ -14,6 +16,8 @@ use serde::{Deserialize, Serialize};
 pub enum Force {
     /// Along the line between two points.
     Spring(Spring),
+    /// Viscous water in thin gaps.
+    Lubrication(Lubrication),
 }
 
 impl Scene {
@@ -24,9 +28,12 @@ impl Scene {
 
     /// Name of force number `index`, which its parameters begin with: its own, or its kind and number, counted from 1.
     pub fn force_name(&self, index: usize) -> String {
-        let Force::Spring(spring) = &self.forces[index];
-        let counted = || format!("spring {}", index + 1);
-        spring.name.clone().unwrap_or_else(counted)
+        let (kind, name) = match &self.forces[index] {
+            Force::Spring(spring) => ("spring", &spring.name),
+            Force::Lubrication(lubrication) => ("lubrication", &lubrication.name),
+        };
+        let counted = || format!("{kind} {}", index + 1);
+        name.clone().unwrap_or_else(counted)
     }
 
     /// Checks the forces, once the bodies are known to be right.
@@ -44,8 +51,10 @@ impl Scene {
                 ));
             }
             taken.push(name);
-            let Force::Spring(spring) = force;
-            spring.check(self, &place)?;
+            match force {
+                Force::Spring(spring) => spring.check(self, &place)?,
+                Force::Lubrication(lubrication) => lubrication.check(self, &place)?,
+            }
         }
         Ok(())
     }

@@ -1,0 +1,79 @@
+//! Forces that are solved with contact at the end of a step ([`ForceModel::solved_with_contact`]).
+
+use super::force::{ForceModel, LoadBars, Loads, Velocity};
+use super::{Evaluation, ForceCotangents};
+use crate::adjoint::lie::Vec6;
+use crate::multibody::{Cotangents, Fields};
+use nalgebra::DVector;
+
+impl Evaluation<'_> {
+    /// Whether any of them does anything at the configuration, at some velocity.
+    pub(super) fn damps(&self) -> bool {
+        let place = self.place();
+        self.system.dampers().any(|force| force.acts(&place))
+    }
+
+    fn dampers(&self, mut each: impl FnMut(&dyn ForceModel, &DVector<f64>)) {
+        let mut control = None;
+        for force in self.system.dampers() {
+            each(
+                force,
+                control.get_or_insert_with(|| DVector::zeros(self.system.controls)),
+            );
+        }
+    }
+
+    /// Adds what they do to bodies that move with spatial `twists` to their wrenches.
+    pub(super) fn add_damping(&self, twists: &[Vec6], v: &DVector<f64>, out: &mut [Vec6]) {
+        self.dampers(|force, control| {
+            let mut loads = Loads::zeros(twists.len(), v.len());
+            force.add(&self.moving(twists, v, control), &mut loads);
+            out.iter_mut()
+                .zip(&loads.wrenches)
+                .for_each(|(x, w)| *x += w);
+        });
+    }
+
+    /// Sizes of their generalised forces, without what cancels in them.
+    pub(super) fn damping_effort(&self, v: &DVector<f64>) -> DVector<f64> {
+        let tree = &self.system.tree;
+        let mut out = DVector::zeros(v.len());
+        self.dampers(|force, control| {
+            for k in (0..v.len()).filter(|k| v[*k] != 0.0) {
+                let part = DVector::from_fn(v.len(), |i, _| if i == k { v[k] } else { 0.0 });
+                let twists = tree.twists(&self.kinematics, &part);
+                let mut loads = Loads::zeros(twists.len(), v.len());
+                force.add(&self.moving(&twists, &part, control), &mut loads);
+                out += tree.project(&self.kinematics.columns, loads.wrenches).abs();
+            }
+        });
+        out
+    }
+
+    /// Transpose of [`Evaluation::add_damping`] projected: the gradient of the power on the velocity `z`, added to `bar` and `out`.
+    pub(super) fn damping_vjp(
+        &self,
+        fields: &Fields,
+        v: &DVector<f64>,
+        z: &DVector<f64>,
+        bar: &mut Cotangents,
+        out: &mut ForceCotangents,
+    ) {
+        self.add_damping(&fields.twist, v, &mut bar.virtual_twist);
+        let power = Velocity {
+            twists: &fields.virtual_twist,
+            v: z,
+        };
+        self.dampers(|force, control| {
+            let mut bars = LoadBars {
+                pose: &mut bar.pose,
+                twist: &mut bar.twist,
+                q: &mut out.q,
+                v: &mut out.v,
+                control: &mut out.control,
+                parameters: &mut out.parameters,
+            };
+            force.vjp(&self.moving(&fields.twist, v, control), &power, &mut bars);
+        });
+    }
+}

@@ -178,6 +178,28 @@ impl Rollout {
         Ok(Some(out))
     }
 
+    /// Which of inertia and viscosity rules the water in the smallest gap of the trajectory, whether or not viscous water acts there: a dictionary with `time`
+    /// (s), `gap` (m), `bodies` (names; of the second None for a wall), `speed` (the fastest that it closes or opens near its smallest, m/s), `viscosity` (kinematic,
+    /// m²/s), `film_reynolds` (h |ḣ|/ν), `viscous_over_inertial` (24 over that), `stokes` (inertia of the bodies over the viscous force, None where there is no
+    /// film) and `lubricated`. None where there is no gap, no water, and where surfaces overlap.
+    fn gap_flow<'py>(&self, py: Python<'py>) -> PyResult<Option<Bound<'py, PyDict>>> {
+        let inner = self.inner.clone();
+        let Some(flow) = long(py, move |_| inner.gap_flow())? else {
+            return Ok(None);
+        };
+        let out = PyDict::new(py);
+        out.set_item("time", flow.time)?;
+        out.set_item("gap", flow.gap)?;
+        out.set_item("bodies", flow.bodies)?;
+        out.set_item("speed", flow.speed)?;
+        out.set_item("viscosity", flow.viscosity)?;
+        out.set_item("film_reynolds", flow.film_reynolds)?;
+        out.set_item("viscous_over_inertial", flow.viscous_over_inertial)?;
+        out.set_item("stokes", flow.stokes)?;
+        out.set_item("lubricated", flow.lubricated)?;
+        Ok(Some(out))
+    }
+
     /// The state after `step` steps, from which a run may go on; negative numbers count from the end.
     #[pyo3(signature = (step=-1))]
     fn state(&self, py: Python<'_>, step: isize) -> PyResult<State> {

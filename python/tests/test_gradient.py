@@ -234,6 +234,39 @@ def test_springs_and_screws():
         hg.screw((0, 0), 0.1)
 
 
+def test_lubrication():
+    scene = hg.Scene(fluid=hg.Fluid(density=998.0), gravity=(0, 0, -9.81), time_step=0.01, steps=20)
+    scene.add_wall((0, 0, 0), (0, 0, 1))
+    scene.add(hg.Body(hg.sphere(0.05, faces=320), density=2000.0, name="ball", position=(0, 0, 0.052)))
+    dry = hg.Simulator(scene, fidelity="isolated", integrator="momentum-euler").rollout()
+    assert dry.gap_flow() is None or not dry.gap_flow()["lubricated"]
+    scene.add_force("lubrication", roughness=1e-4, viscosity=2.0, bodies=["ball"])
+    sim = hg.Simulator(scene, fidelity="isolated")
+    rollout = sim.rollout()
+    heights = rollout.positions[:, 0, 2] - 0.05
+    assert (heights > 0.0005).all() and (np.diff(heights) < 0.0).all()
+    flow = rollout.gap_flow()
+    assert flow["lubricated"] and flow["bodies"] == ("ball", None)
+    assert flow["film_reynolds"] == pytest.approx(flow["gap"] * flow["speed"] * 998.0 / 2.0)
+    assert flow["viscous_over_inertial"] == pytest.approx(24 / flow["film_reynolds"])
+    assert flow["stokes"] < 1.0
+    seed = np.zeros_like(rollout.positions)
+    seed[-1, 0, 2] = 1.0
+    found = rollout.vjp(positions=seed).parameters
+    for name in ("lubrication 1.viscosity", "lubrication 1.roughness"):
+        base = sim.parameters[name]
+        step = 1e-3 * base
+
+        def value(x, name=name):
+            return sim.with_parameters({name: x}).rollout().positions[-1, 0, 2]
+
+        slope = (value(base + step) - value(base - step)) / (2 * step)
+        assert found[name] == pytest.approx(slope, rel=1e-5), name
+    assert hg.Scene.from_toml(scene.to_toml()) == scene
+    with pytest.raises(hg.InputError, match="rougness"):
+        scene.add_force("lubrication", rougness=1e-4)
+
+
 def test_pieces_and_torsional_friction():
     radius, torsional = 0.1, 0.002
     contact = hg.Contact(torsional_friction=torsional, rolling_friction=1e-3)

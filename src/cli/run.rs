@@ -15,7 +15,7 @@ use super::output::{
 use crate::Result;
 use crate::error::readable;
 use crate::scene::Scene;
-use crate::simulate::{Controls, GapCheck, Recording};
+use crate::simulate::{Controls, GapCheck, GapFlow, Recording};
 
 #[derive(Debug, Args)]
 pub(super) struct Arguments {
@@ -80,6 +80,8 @@ pub(super) struct RunReport {
     pub min_gap: Option<f64>,
     /// What the smallest gap is worth, with `--check-gap`; null without, and where there is nothing to compare.
     pub gap_check: Option<GapReport>,
+    /// Which of inertia and viscosity rules the water in the smallest gap; null where there is none.
+    pub gap_flow: Option<GapFlow>,
     /// Largest gap at which surfaces are taken to touch, m; null where the scene has no contact.
     pub contact_gap: Option<f64>,
     /// Steps that were cut into pieces, being too long for what moved in them.
@@ -145,6 +147,7 @@ fn simulate(
         momentum_drift: summary.momentum_drift,
         min_gap: summary.min_gap,
         gap_check,
+        gap_flow: rollout.gap_flow()?,
         contact_gap: summary.contact_gap,
         cut_steps: summary.cut_steps,
         most_pieces: summary.most_pieces,
@@ -205,6 +208,20 @@ impl fmt::Display for RunReport {
                 1e2 * gap.added_mass_error,
                 1e2 * gap.force_error
             )?;
+        }
+        if let Some(flow) = &self.gap_flow {
+            write!(
+                f,
+                "  there, at up to {:.3e} m/s: film Reynolds number {:.3e}, viscous over inertial pressure {:.3e}",
+                flow.speed, flow.film_reynolds, flow.viscous_over_inertial
+            )?;
+            if let Some(stokes) = flow.stokes {
+                write!(f, ", Stokes number {stokes:.3e}")?;
+            }
+            match flow.advice() {
+                Some(advice) => writeln!(f, ": {advice}")?,
+                None => writeln!(f)?,
+            }
         }
         if self.contact_gap.is_some() {
             writeln!(

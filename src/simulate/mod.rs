@@ -3,6 +3,7 @@
 mod controls;
 mod flow;
 mod gap_check;
+mod gap_flow;
 pub mod gradcheck;
 mod gradient;
 pub mod growth;
@@ -22,6 +23,7 @@ mod trajectory;
 pub use controls::Controls;
 pub use flow::FLOW_EDGES;
 pub use gap_check::GapCheck;
+pub use gap_flow::GapFlow;
 pub use gradient::{Cotangents, Gradient, Initial};
 pub use jacobians::Jacobians;
 pub use knots::Knots;

@@ -6,6 +6,7 @@ mod films;
 mod grasp;
 mod growth;
 mod invariants;
+mod lubrication;
 mod mechanisms;
 mod observables;
 #[cfg(feature = "opt")]

@@ -1,6 +1,6 @@
 //! How surfaces touch.
 
-use super::{Force, Lubrication, Placement, Scene, Shape, is_default};
+use super::{Placement, Scene, Shape, is_default};
 use serde::{Deserialize, Serialize};
 
 /// Contact between bodies, and between bodies and walls. A scene that has it (`[contact]`, all keys of which may be left out)
@@ -65,15 +65,6 @@ impl Scene {
         self.contact.is_some()
             || self.limited().next().is_some()
             || self.lubrications().next().is_some()
-    }
-
-    /// The forces of viscous water, each with its number among all.
-    pub(crate) fn lubrications(&self) -> impl Iterator<Item = (usize, &Lubrication)> {
-        let each = self.forces.iter().enumerate();
-        each.filter_map(|(i, force)| match force {
-            Force::Lubrication(lubrication) => Some((i, lubrication)),
-            Force::Spring(_) => None,
-        })
     }
 
     /// Bodies whose joints have limits, with these.

@@ -36,6 +36,15 @@ impl Scene {
         name.clone().unwrap_or_else(counted)
     }
 
+    /// The forces of viscous water, each with its number among all.
+    pub(crate) fn lubrications(&self) -> impl Iterator<Item = (usize, &Lubrication)> {
+        let each = self.forces.iter().enumerate();
+        each.filter_map(|(i, force)| match force {
+            Force::Lubrication(lubrication) => Some((i, lubrication)),
+            Force::Spring(_) => None,
+        })
+    }
+
     /// Checks the forces, once the bodies are known to be right.
     pub(super) fn check_forces(&self) -> Result<()> {
         let mut taken: Vec<String> = ["fluid", "contact"].map(String::from).into();

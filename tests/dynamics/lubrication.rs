@@ -95,7 +95,9 @@ fn a_ball_lands_softly_at_any_step() {
         loses_energy(&rollout);
         let last = rollout.samples().last().unwrap();
         let height = last.poses[0].translation.z - 0.02;
-        assert!((0.0..3e-3).contains(&height), "{dt}: {height}");
+        // Contact of the default stiffness, ten times the mass over Δt², gives way by a tenth of what weight does in a step.
+        let sunk = 0.1 * GRAVITY * dt * dt;
+        assert!((-sunk..3e-3).contains(&height), "{dt}: {height}");
         assert!(last.v.norm() < 0.01, "{dt}: {}", last.v);
     }
 }

@@ -30,7 +30,7 @@ mod tensor;
 
 pub use exclude::Exclusions;
 pub use isolated::Isolated;
-pub use panel::{ExtrapolatedPanels, PanelCoupled};
+pub use panel::{ExtrapolatedPanels, PanelCoupled, PanelModel};
 pub use response::{CoupledResponse, Reached};
 pub use tensor::PairTensor;
 

@@ -158,9 +158,14 @@ impl PanelBoundary {
         &self.single_layer
     }
 
+    /// `(½I + Ω/4π)⁻¹`, column-major.
+    pub(crate) fn inverse(&self) -> &[f64] {
+        self.inverse.get_or_init(|| self.lu.inverse())
+    }
+
     /// `(½I + Ω/4π)⁻¹ x`, or its transpose. By the inverse, as a product runs on all threads and triangular solves don't.
     pub(crate) fn solve(&self, x: &Columns, transpose: bool) -> Columns {
-        let inverse = self.inverse.get_or_init(|| self.lu.inverse());
+        let inverse = self.inverse();
         // The memory of a matrix by columns is that of its transpose by rows.
         match transpose {
             false => transposed_product(inverse, x.rows, x),

@@ -23,43 +23,35 @@
 
 mod extrapolated;
 mod first;
+mod model;
 mod placed;
 mod second;
 mod sweep;
 mod system;
 
 pub use extrapolated::ExtrapolatedPanels;
+pub use model::PanelModel;
 
-use super::full::SolveSettings;
-use super::response::Solved;
-use super::settings::{check_limits, end, ranges};
+use super::full::{SolveSettings, SystemBackend};
+use super::response::{CoupledResponse, Solved};
 use super::{Coupling, Exclusions, Linearise, Linearised, Momenta};
 use crate::adjoint::lie::{Mat6, Pose, Vec3};
 use crate::boundary::PanelBoundary;
-use crate::boundary::panel::check_size;
-use crate::geometry::{HalfSpace, Image, Wall};
+use crate::geometry::Wall;
 use crate::{Error, Result};
 use nalgebra::{DMatrix, DVector};
 use placed::{PanelSolution, PlacedPanels};
-use std::ops::Range;
-use std::sync::{Arc, Mutex};
+use std::sync::Arc;
 
 /// All bodies coupled through one panel system, and plane walls by images.
 pub struct PanelCoupled {
-    bodies: Vec<Arc<PanelBoundary>>,
-    images: Vec<Image>,
-    walls: Vec<HalfSpace>,
-    settings: SolveSettings,
-    faces: Vec<Range<usize>>,
-    excluded: Exclusions,
-    /// What each body's own panels lack of its added mass, body frame.
-    lacking: Vec<Mat6>,
-    /// Memory of blocks that no system uses any more: to ask the operating system for it again takes as long as filling it.
-    spare: Mutex<Vec<Vec<f64>>>,
+    model: Arc<PanelModel>,
+    /// What computes impulses and their derivatives, if not the CPU.
+    backend: Option<Box<dyn SystemBackend>>,
 }
 
 impl PanelCoupled {
-    /// From the bodies, the walls (one, or mutually perpendicular ones), the pairs of bodies that don't feel
+    /// On the CPU, from the bodies, the walls (one, or mutually perpendicular ones), the pairs of bodies that don't feel
     /// each other, and the solver's settings. [`FullSolver::Qr`](super::full::FullSolver::Qr) factors the whole matrix by LU (8·faces²
     /// bytes, and faces³ operations); the others stand for GMRES, preconditioned by each body's own inverse,
     /// which stores the blocks between different bodies and those with images.
@@ -73,56 +65,64 @@ impl PanelCoupled {
         excluded: Exclusions,
         settings: SolveSettings,
     ) -> Result<Self> {
-        check_limits(settings.tolerance, settings.max_iterations)?;
-        let faces = ranges(bodies.iter().map(|b| b.faces.len()));
-        check_size(&format!("{} bodies", bodies.len()), end(&faces))?;
-        excluded.check(bodies.len())?;
         Ok(Self {
-            images: Image::of_walls(walls)?,
-            walls: Wall::half_spaces(walls)?,
-            lacking: vec![Mat6::zeros(); bodies.len()],
-            bodies,
-            settings,
-            faces,
-            excluded,
-            spare: Mutex::new(Vec::new()),
+            model: Arc::new(PanelModel::new(bodies, walls, excluded, settings)?),
+            backend: None,
         })
     }
 
     /// With the added mass of each body in unbounded fluid (about the body's origin, density 1), where it is known better than its
     /// panels tell it.
     pub fn with_added_mass(mut self, known: &[Option<Mat6>]) -> Self {
-        for ((lacking, body), known) in self.lacking.iter_mut().zip(&self.bodies).zip(known) {
-            *lacking = known.map_or_else(Mat6::zeros, |known| known - body.added_mass);
-        }
+        Arc::make_mut(&mut self.model).know(known);
         self
     }
 
-    /// Number of panels of all bodies.
-    fn rows(&self) -> usize {
-        end(&self.faces)
+    /// On a backend made for the same model; [`Coupling::velocity`] stays on the CPU.
+    pub fn on(self, backend: Box<dyn SystemBackend>) -> Self {
+        Self {
+            backend: Some(backend),
+            ..self
+        }
     }
 
-    fn solved(&self, poses: &[Pose], basis: &DMatrix<f64>) -> Result<Solved<PanelSolution<'_>>> {
-        let bodies = self.bodies.len();
-        if poses.len() != bodies || basis.nrows() != 6 * bodies {
-            return Err(Error::input(
-                "coupled panel method: poses and basis",
-                format!("{} poses, {} rows", poses.len(), basis.nrows()),
-                format!("one pose and six rows for each of the {bodies} bodies"),
-            ));
+    /// What the system consists of.
+    pub fn model(&self) -> &Arc<PanelModel> {
+        &self.model
+    }
+
+    /// The solution, and the condition number of a dense matrix.
+    fn respond(
+        &self,
+        poses: &[Pose],
+        basis: &DMatrix<f64>,
+    ) -> Result<(Box<dyn CoupledResponse + '_>, f64)> {
+        if let Some(backend) = &self.backend {
+            self.model.check_walls(poses)?;
+            return Ok((backend.respond(poses, basis)?, 0.0));
         }
-        let placed = Arc::new(PlacedPanels::new(self, poses, basis)?);
+        let placed = Arc::new(PlacedPanels::new(&self.model, poses, basis)?);
         let condition = placed.system.condition();
-        let response = Box::new(PanelSolution::new(placed, basis.clone())?);
-        let volume = |b: usize| self.bodies[b].faces.volume();
+        let solution = PanelSolution::new(placed, basis.clone())?;
+        Ok((Box::new(solution), condition))
+    }
+
+    fn solved(
+        &self,
+        poses: &[Pose],
+        basis: &DMatrix<f64>,
+    ) -> Result<Solved<dyn CoupledResponse + '_>> {
+        let model = self.model();
+        model.check_input(poses, basis)?;
+        let (response, condition) = self.respond(poses, basis)?;
+        let volume = |b: usize| model.bodies[b].faces.volume();
         let solved = Solved::new(response, basis, volume, condition)?;
         if solved.value.momenta().iter().any(|x| !x.is_finite()) {
             return Err(Error::Solver {
-                what: format!("the coupled panel system ({} panels)", self.rows()),
+                what: format!("the coupled panel system ({} panels)", model.rows()),
                 iterations: solved.value.report().iterations,
                 residual: f64::NAN,
-                tolerance: self.settings.tolerance,
+                tolerance: model.settings.tolerance,
                 remedy: "check the poses: the impulses aren't finite".into(),
             });
         }
@@ -136,11 +136,11 @@ impl Coupling for PanelCoupled {
     }
 
     fn bodies(&self) -> usize {
-        self.bodies.len()
+        self.model.bodies.len()
     }
 
     fn unknowns(&self) -> usize {
-        self.rows()
+        self.model.rows()
     }
 
     /// # Errors
@@ -162,19 +162,20 @@ impl Coupling for PanelCoupled {
         twists: &DVector<f64>,
         points: &[Vec3],
     ) -> Result<Vec<Vec3>> {
+        let model = self.model();
         let column = DMatrix::from_column_slice(twists.len(), 1, twists.as_slice());
-        let placed = PlacedPanels::new(self, poses, &column)?;
+        let placed = PlacedPanels::new(model, poses, &column)?;
         let phi = placed.potentials(&column)?;
         let mut out = vec![Vec3::zeros(); points.len()];
-        for (b, body) in self.bodies.iter().enumerate() {
+        for (b, body) in model.bodies.iter().enumerate() {
             let resting = || vec![0.0; body.faces.len()];
             let q = placed.normal_velocity(b, &column).unwrap_or_else(resting);
-            for image in &self.images {
+            for image in &model.images {
                 let (rotation, shift) = image.placement(&poses[b]);
                 let seen: Vec<Vec3> = (points.iter())
                     .map(|x| rotation.tr_mul(&(x - shift)))
                     .collect();
-                let made = body.velocity(&q, phi.slice(&self.faces[b]), &seen);
+                let made = body.velocity(&q, phi.slice(&model.faces[b]), &seen);
                 let turned = made.iter().map(|u| image.sign * (rotation * u));
                 out.iter_mut().zip(turned).for_each(|(o, u)| *o += u);
             }

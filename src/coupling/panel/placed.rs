@@ -1,6 +1,6 @@
 //! The coupled panels at given poses: what all solutions there share.
 
-use super::PanelCoupled;
+use super::PanelModel;
 use super::system::System;
 use crate::adjoint::kernel::{double_vjp, single_sum, single_vjp};
 use crate::adjoint::lie::{Pose, Vec6};
@@ -15,7 +15,7 @@ use std::sync::{Arc, OnceLock};
 
 /// The system at given poses.
 pub(super) struct PlacedPanels<'a> {
-    pub coupled: &'a PanelCoupled,
+    pub coupled: &'a PanelModel,
     pub poses: Vec<Pose>,
     /// Panels of the target, points of the source: all whose relative placement changes.
     pub pairs: Vec<Pair>,
@@ -42,7 +42,7 @@ impl<'a> PlacedPanels<'a> {
     ///
     /// # Errors
     /// Bodies inside each other, or behind a wall.
-    pub fn new(coupled: &'a PanelCoupled, poses: &[Pose], twists: &DMatrix<f64>) -> Result<Self> {
+    pub fn new(coupled: &'a PanelModel, poses: &[Pose], twists: &DMatrix<f64>) -> Result<Self> {
         let system = System::new(coupled, poses)?;
         let pairs = pairs(coupled, poses);
         Ok(Self {
@@ -105,16 +105,6 @@ impl<'a> PlacedPanels<'a> {
                     .zip(&twists)
                     .for_each(|(o, t)| *o += row.dot(t));
             }
-        }
-        out
-    }
-
-    /// What the bodies' own panels lack of their impulses, 6·bodies × k.
-    fn lacking(&self, twists: &DMatrix<f64>) -> DMatrix<f64> {
-        let mut out = twists.clone();
-        for (b, lacking) in self.coupled.lacking.iter().enumerate() {
-            let own = lacking * twists.rows(6 * b, 6);
-            out.rows_mut(6 * b, 6).copy_from(&own);
         }
         out
     }
@@ -260,12 +250,14 @@ impl CoupledResponse for PanelSolution<'_> {
         for (k, column) in columns.enumerate() {
             out.set_column(k, &column);
         }
-        Ok(out + self.placed.lacking(&self.twists))
+        Ok(out + self.placed.coupled.lacking(&self.twists))
     }
 
     fn energies(&self) -> Result<DMatrix<f64>> {
         let (k, flux) = (self.twists.ncols(), self.placed.flux(&self.twists));
-        let lacking = self.twists.tr_mul(&self.placed.lacking(&self.twists));
+        let lacking = self
+            .twists
+            .tr_mul(&self.placed.coupled.lacking(&self.twists));
         Ok(DMatrix::from_fn(k, k, |i, j| {
             let products = (0..flux.rows).map(|s| flux.at(s, i) * self.phi.at(s, j));
             lacking[(i, j)] + products.sum::<f64>()
@@ -305,7 +297,7 @@ pub(super) fn scaled(factor: f64, x: &[f64]) -> Vec<f64> {
 }
 
 /// All but each body with its own points and with those of bodies that it doesn't feel; images count always.
-fn pairs(coupled: &PanelCoupled, poses: &[Pose]) -> Vec<Pair> {
+fn pairs(coupled: &PanelModel, poses: &[Pose]) -> Vec<Pair> {
     let mut out = Vec::new();
     for target in 0..coupled.bodies.len() {
         for image in &coupled.images {
@@ -323,7 +315,7 @@ fn pairs(coupled: &PanelCoupled, poses: &[Pose]) -> Vec<Pair> {
     out
 }
 
-fn readouts(coupled: &PanelCoupled, pairs: &[Pair], twists: &DMatrix<f64>) -> Vec<Option<Columns>> {
+fn readouts(coupled: &PanelModel, pairs: &[Pair], twists: &DMatrix<f64>) -> Vec<Option<Columns>> {
     let own = |(b, body): (usize, &Arc<crate::boundary::PanelBoundary>)| {
         moves(twists, b).then(|| {
             let mut columns = Columns::zeros(coupled.rows(), 6);

@@ -10,7 +10,7 @@
 //! z goes from the first body to the last and y from the last to the first. A block needs z of the body that acts and y of the one acted
 //! on; where both are known before either product is needed, which is so for two blocks of three or more, it is read once for both.
 
-use super::PanelCoupled;
+use super::PanelModel;
 use crate::adjoint::solve::Columnwise;
 use crate::solver::{Columns, both_products};
 
@@ -38,7 +38,7 @@ impl Side {
     }
 
     /// Solves the own block of body `b`.
-    fn solve(&mut self, coupled: &PanelCoupled, b: usize, transpose: bool) {
+    fn solve(&mut self, coupled: &PanelModel, b: usize, transpose: bool) {
         let rows = &coupled.faces[b];
         let z = coupled.bodies[b].solve(&self.z.part(rows), transpose);
         self.z.slice_mut(rows).copy_from_slice(&z.data);
@@ -47,7 +47,7 @@ impl Side {
 
 /// `[z, A z]` of the first columns of v, as many as `straight`, and `[y, Aᵀ y]` of the others.
 pub(super) fn sweep(
-    coupled: &PanelCoupled,
+    coupled: &PanelModel,
     blocks: &[Block],
     v: &Columns,
     straight: usize,
@@ -77,7 +77,7 @@ pub(super) fn sweep(
 }
 
 /// What a block makes of z, and its transpose of y, where they are used: off right-hand sides that are still to be solved, or onto images.
-fn apply(coupled: &PanelCoupled, block: &Block, used: [bool; 2], sides: &mut [Side; 2]) {
+fn apply(coupled: &PanelModel, block: &Block, used: [bool; 2], sides: &mut [Side; 2]) {
     let (panels, points) = (&coupled.faces[block.source], &coupled.faces[block.target]);
     let known = |side: usize, rows| match used[side] {
         true => sides[side].z.part(rows),

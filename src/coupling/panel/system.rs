@@ -1,6 +1,6 @@
 //! The matrix between panels at given poses, and its solves.
 
-use super::PanelCoupled;
+use super::PanelModel;
 use super::sweep::{Block, sweep};
 use crate::adjoint::kernel::{Sources, Write, double_fill};
 use crate::adjoint::lie::{Pose, Vec3};
@@ -24,13 +24,13 @@ const GROUP: usize = 128;
 /// The bodies at given poses.
 #[derive(Clone, Copy)]
 struct Placed<'a> {
-    coupled: &'a PanelCoupled,
+    coupled: &'a PanelModel,
     poses: &'a [Pose],
 }
 
 /// A = ½I + Ω/4π at given poses.
 pub(super) struct System<'a> {
-    coupled: &'a PanelCoupled,
+    coupled: &'a PanelModel,
     matrix: Matrix,
 }
 
@@ -55,9 +55,9 @@ impl<'a> System<'a> {
     ///
     /// # Errors
     /// Bodies inside each other, or behind a wall.
-    pub fn new(coupled: &'a PanelCoupled, poses: &[Pose]) -> Result<Self> {
+    pub fn new(coupled: &'a PanelModel, poses: &[Pose]) -> Result<Self> {
         let placed = Placed { coupled, poses };
-        placed.check_walls()?;
+        coupled.check_walls(poses)?;
         let matrix = match coupled.settings.solver {
             FullSolver::Qr => Matrix::Factored(placed.dense()?),
             FullSolver::Cgls | FullSolver::Gmres => Matrix::Blocks(placed.blocks()?),
@@ -267,11 +267,16 @@ impl Placed<'_> {
             remedy: remedy.into(),
         }
     }
+}
 
+impl PanelModel {
     /// Every body must be on the fluid's side of every wall.
-    fn check_walls(&self) -> Result<()> {
-        for (body, pose) in self.coupled.bodies.iter().zip(self.poses) {
-            for (w, wall) in self.coupled.walls.iter().enumerate() {
+    ///
+    /// # Errors
+    /// One that isn't.
+    pub(super) fn check_walls(&self, poses: &[Pose]) -> Result<()> {
+        for (body, pose) in self.bodies.iter().zip(poses) {
+            for (w, wall) in self.walls.iter().enumerate() {
                 let corners = body.faces.corners.iter().flatten();
                 let height = |c: &Vec3| wall.height(&pose.apply(c));
                 let lowest = corners.map(height).fold(f64::INFINITY, f64::min);
@@ -290,5 +295,27 @@ impl Placed<'_> {
             }
         }
         Ok(())
+    }
+
+    /// Refuses bodies inside each other, from the share of the full solid angle that all others and all images fill, seen from every
+    /// panel. Where one is large the shares of single bodies tell which.
+    ///
+    /// # Errors
+    /// Bodies inside each other, or behind a wall.
+    pub fn check_filled(&self, poses: &[Pose], filled: &[f64]) -> Result<()> {
+        // What isn't a number isn't small either.
+        match filled.iter().all(|f| f.abs() < INSIDE) {
+            true => Ok(()),
+            false => self.check_apart(poses),
+        }
+    }
+
+    /// The same from the shares of single bodies.
+    ///
+    /// # Errors
+    /// As there.
+    pub fn check_apart(&self, poses: &[Pose]) -> Result<()> {
+        let coupled = self;
+        Placed { coupled, poses }.blocks().map(|_| ())
     }
 }

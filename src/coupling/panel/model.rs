@@ -1,0 +1,96 @@
+//! What the coupled panels consist of.
+
+use crate::adjoint::lie::{Mat6, Pose};
+use crate::boundary::PanelBoundary;
+use crate::boundary::panel::check_size;
+use crate::coupling::Exclusions;
+use crate::coupling::full::SolveSettings;
+use crate::coupling::settings::{check_limits, end, ranges};
+use crate::geometry::{HalfSpace, Image, Wall};
+use crate::{Error, Result};
+use nalgebra::DMatrix;
+use std::ops::Range;
+use std::sync::{Arc, Mutex};
+
+/// What the coupled panels consist of, whoever computes with them: all that doesn't change with the poses.
+#[derive(Clone)]
+pub struct PanelModel {
+    /// The bodies, each in its own frame; those of equal shape share one.
+    pub bodies: Vec<Arc<PanelBoundary>>,
+    /// Images that the walls make, in the world frame; the identity first.
+    pub images: Vec<Image>,
+    pub(super) walls: Vec<HalfSpace>,
+    /// How the system is solved.
+    pub settings: SolveSettings,
+    /// Panels of each body.
+    pub faces: Vec<Range<usize>>,
+    /// Pairs of bodies that don't feel each other but by images.
+    pub excluded: Exclusions,
+    /// What each body's own panels lack of its added mass, body frame.
+    lacking: Vec<Mat6>,
+    /// Memory of blocks that no system uses any more: to ask the operating system for it again takes as long as filling it.
+    pub(super) spare: Arc<Mutex<Vec<Vec<f64>>>>,
+}
+
+impl PanelModel {
+    /// As [`PanelCoupled::new`](super::PanelCoupled::new).
+    ///
+    /// # Errors
+    /// As there.
+    pub(super) fn new(
+        bodies: Vec<Arc<PanelBoundary>>,
+        walls: &[Wall],
+        excluded: Exclusions,
+        settings: SolveSettings,
+    ) -> Result<Self> {
+        check_limits(settings.tolerance, settings.max_iterations)?;
+        let faces = ranges(bodies.iter().map(|b| b.faces.len()));
+        check_size(&format!("{} bodies", bodies.len()), end(&faces))?;
+        excluded.check(bodies.len())?;
+        Ok(Self {
+            images: Image::of_walls(walls)?,
+            walls: Wall::half_spaces(walls)?,
+            lacking: vec![Mat6::zeros(); bodies.len()],
+            bodies,
+            settings,
+            faces,
+            excluded,
+            spare: Arc::default(),
+        })
+    }
+
+    /// Sets the added mass of each body in unbounded fluid where it is known.
+    pub(super) fn know(&mut self, known: &[Option<Mat6>]) {
+        for ((lacking, body), known) in self.lacking.iter_mut().zip(&self.bodies).zip(known) {
+            *lacking = known.map_or_else(Mat6::zeros, |known| known - body.added_mass);
+        }
+    }
+
+    /// Number of panels of all bodies.
+    pub fn rows(&self) -> usize {
+        end(&self.faces)
+    }
+
+    /// What the bodies' own panels lack of their impulses, 6·bodies × k, for twists.
+    pub fn lacking(&self, twists: &DMatrix<f64>) -> DMatrix<f64> {
+        let mut out = twists.clone();
+        for (b, lacking) in self.lacking.iter().enumerate() {
+            let own = lacking * twists.rows(6 * b, 6);
+            out.rows_mut(6 * b, 6).copy_from(&own);
+        }
+        out
+    }
+
+    /// Refuses poses and twists that aren't those of the bodies.
+    pub(super) fn check_input(&self, poses: &[Pose], basis: &DMatrix<f64>) -> Result<()> {
+        let bodies = self.bodies.len();
+        if poses.len() == bodies && basis.nrows() == 6 * bodies {
+            return Ok(());
+        }
+        Err(Error::input(
+            "coupled panel method: poses and basis",
+            format!("{} poses, {} rows", poses.len(), basis.nrows()),
+            format!("one pose and six rows for each of the {bodies} bodies"),
+        ))
+    }
+}

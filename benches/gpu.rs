@@ -221,7 +221,7 @@ fn rate(
     let (model, poses) = lattice(count)?;
     let gpu = Gpu::new(context, &model)?;
     let probe = Probe::new(&gpu, &poses)?;
-    let seconds = probe.time_apply(arithmetic, COLUMNS, repeat)?;
+    let seconds = probe.kernels().time_apply(arithmetic, COLUMNS, repeat)?;
     Ok((model.rows() * model.columns()) as f64 / seconds)
 }
 

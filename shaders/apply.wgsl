@@ -3,8 +3,8 @@
 // A workgroup takes one block of faces and one share of the blocks of sources; shares are added up by
 // sum.wgsl in a fixed order. Twins: coupling::full System::apply; adjoint kernel::{flux_fill, potential_fill}.
 
-//! uses: vector flux normal potential pairs gate
-//! constants: COLUMNS POTENTIAL
+//! uses: vector surface gate
+//! constants: COLUMNS POTENTIAL SURFACE
 
 struct Task { shares: u32, stride: u32, offset: u32, pad: u32 }
 
@@ -26,7 +26,6 @@ fn main(
     let own = blocks[group.x];
     let i = own.y + min(lane, own.z - 1u);
     let face = face_at(i);
-    let middle = centre(face);
     var sums: array<real, COLUMNS>;
     for (var k = 0u; k < COLUMNS; k++) {
         sums[k] = num(0.0);
@@ -54,13 +53,14 @@ fn main(
             }
             workgroupBarrier();
             if seen {
+                let seen_by = way(own.x, other.x, image, own.w);
                 for (var j = 0u; j < other.z; j++) {
                     let s = V3(points[3u * j], points[3u * j + 1u], points[3u * j + 2u]);
                     var entry = num(0.0);
                     if POTENTIAL {
-                        entry = potential(middle, s);
+                        entry = charge(face, seen_by, s);
                     } else {
-                        entry = row(face, own.w, s);
+                        entry = row(face, seen_by, s);
                     }
                     for (var k = 0u; k < COLUMNS; k++) {
                         sums[k] = add(sums[k], mul(entry, strengths[j * COLUMNS + k]));
@@ -73,7 +73,7 @@ fn main(
         for (var k = 0u; k < COLUMNS; k++) {
             var sum = sums[k];
             if !POTENTIAL {
-                sum = mul(face.weight, sum);
+                sum = mul(row_weight(i), sum);
             }
             out[(group.y * sizes.faces + i) * COLUMNS + k] = sum;
         }

@@ -2,8 +2,8 @@
 //
 // Twins: adjoint kernel::{flux_jvp, normal_jvp, potential_jvp}.
 
-//! uses: vector flux normal potential pairs motion
-//! constants: COLUMNS POTENTIAL
+//! uses: vector surface motion
+//! constants: COLUMNS POTENTIAL SURFACE
 
 struct Task { shares: u32, stride: u32, offset: u32, pad: u32 }
 
@@ -22,7 +22,6 @@ fn main(
     let own = blocks[group.x];
     let i = own.y + min(lane, own.z - 1u);
     let face = face_at(i);
-    let middle = centre(face);
     var sums: array<real, COLUMNS>;
     for (var k = 0u; k < COLUMNS; k++) {
         sums[k] = num(0.0);
@@ -46,13 +45,14 @@ fn main(
             workgroupBarrier();
             if seen {
                 let motion = relative_motion(own.x, other.x, image);
+                let seen_by = way(own.x, other.x, image, own.w);
                 for (var j = 0u; j < other.z; j++) {
                     let s = V3(points[3u * j], points[3u * j + 1u], points[3u * j + 2u]);
                     var slope = v_zero();
                     if POTENTIAL {
-                        slope = potential_gradient(middle, s);
+                        slope = charge_gradient(face, seen_by, s);
                     } else {
-                        slope = row_gradient(face, own.w, s);
+                        slope = row_gradient(face, seen_by, s);
                     }
                     let entry = v_dot(slope, displacement(motion, s));
                     for (var k = 0u; k < COLUMNS; k++) {
@@ -66,7 +66,7 @@ fn main(
         for (var k = 0u; k < COLUMNS; k++) {
             var sum = sums[k];
             if !POTENTIAL {
-                sum = mul(face.weight, sum);
+                sum = mul(row_weight(i), sum);
             }
             out[(group.y * sizes.faces + i) * COLUMNS + k] = sum;
         }

@@ -3,8 +3,8 @@
 // A workgroup takes one block of sources and one share of the blocks of faces. Twins: coupling::full
 // System::apply_transpose; adjoint kernel::potential_sum.
 
-//! uses: vector flux normal potential pairs tile gate
-//! constants: COLUMNS POTENTIAL
+//! uses: vector surface tile surface_tile gate
+//! constants: COLUMNS POTENTIAL SURFACE
 
 struct Task { shares: u32, stride: u32, offset: u32, pad: u32 }
 
@@ -39,7 +39,7 @@ fn main(
             for (var k = 0u; k < COLUMNS; k++) {
                 var weight = y[i * task.stride + task.offset + k];
                 if !POTENTIAL {
-                    weight = mul(faces[i * FACE + 12u], weight);
+                    weight = mul(row_weight(i), weight);
                 }
                 weights[lane * COLUMNS + k] = weight;
             }
@@ -56,13 +56,14 @@ fn main(
                 continue;
             }
             let s = source_at(image, j);
+            let seen_by = way(other.x, own.x, image, other.w);
             for (var i = 0u; i < other.z; i++) {
                 let face = tile_face(i);
                 var entry = num(0.0);
                 if POTENTIAL {
-                    entry = potential(centre(face), s);
+                    entry = charge(face, seen_by, s);
                 } else {
-                    entry = row(face, other.w, s);
+                    entry = row(face, seen_by, s);
                 }
                 for (var k = 0u; k < COLUMNS; k++) {
                     sums[k] = add(sums[k], mul(entry, weights[i * COLUMNS + k]));

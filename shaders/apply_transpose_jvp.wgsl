@@ -2,8 +2,8 @@
 //
 // Twins: adjoint kernel::{flux_vjp, normal_vjp, potential_vjp}, contracted with the displacement.
 
-//! uses: vector flux normal potential pairs tile motion
-//! constants: COLUMNS POTENTIAL
+//! uses: vector surface tile surface_tile motion
+//! constants: COLUMNS POTENTIAL SURFACE
 
 struct Task { shares: u32, stride: u32, offset: u32, pad: u32 }
 
@@ -35,7 +35,7 @@ fn main(
             for (var k = 0u; k < COLUMNS; k++) {
                 var weight = y[i * task.stride + task.offset + k];
                 if !POTENTIAL {
-                    weight = mul(faces[i * FACE + 12u], weight);
+                    weight = mul(row_weight(i), weight);
                 }
                 weights[lane * COLUMNS + k] = weight;
             }
@@ -46,14 +46,15 @@ fn main(
                 continue;
             }
             let s = source_at(image, j);
+            let seen_by = way(other.x, own.x, image, other.w);
             let d = displacement(relative_motion(other.x, own.x, image), s);
             for (var i = 0u; i < other.z; i++) {
                 let face = tile_face(i);
                 var slope = v_zero();
                 if POTENTIAL {
-                    slope = potential_gradient(centre(face), s);
+                    slope = charge_gradient(face, seen_by, s);
                 } else {
-                    slope = row_gradient(face, other.w, s);
+                    slope = row_gradient(face, seen_by, s);
                 }
                 let entry = v_dot(slope, d);
                 for (var k = 0u; k < COLUMNS; k++) {

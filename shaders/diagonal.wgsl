@@ -1,7 +1,7 @@
 // scaling_j = 1/√(Σ_i K_ij² + D_j²): the Jacobi preconditioner, images counted with their source. Twin:
 // the column norms of coupling::full's System.
 
-//! uses: vector flux normal potential pairs tile
+//! uses: vector flux normal potential pairs faces tile faces_tile
 //! constants:
 
 @group(1) @binding(0) var<storage, read> damping: array<real>;           // [source]: D²

@@ -1,6 +1,7 @@
-// out = R⁻¹ x of every body, or R⁻ᵀ x: the right preconditioner. R⁻¹ lies there as a dense upper triangle
+// out = R⁻¹ x of every body, or R⁻ᵀ x: the right preconditioner. R⁻¹ lies there as a dense upper triangle, or as a square,
 // for the bodies where it fits; the others have a diagonal. A workgroup makes 64 rows of one body from
-// tiles of R⁻¹ in its own memory, for one share of the columns of R⁻¹; sum.wgsl adds the shares up. Twin: boundary BodyBoundary::{solve_factor, solve_factor_transpose}.
+// tiles of R⁻¹ in its own memory, for one share of the columns of R⁻¹; sum.wgsl adds the shares up. Twins: boundary BodyBoundary::{solve_factor,
+// solve_factor_transpose}, PanelBoundary::solve.
 
 //! uses: gate
 //! constants: COLUMNS TRANSPOSE
@@ -17,7 +18,8 @@ struct Task { face_blocks: u32, sources: u32, shares: u32, pad: u32 }
 
 const BLOCK: u32 = 64u;
 const WIDTH: u32 = 16u;
-const DENSE: u32 = 1u;
+const DIAGONAL: u32 = 0u;
+const SQUARE: u32 = 2u;
 
 var<workgroup> tile: array<real, 1040>;
 var<workgroup> rows: array<real, WIDTH * COLUMNS>;
@@ -34,7 +36,7 @@ fn main(
     let place = places[own.x];
     let i = own.y + lane;
     let to = (group.y * task.sources + i) * COLUMNS;
-    if place.w != DENSE {
+    if place.w == DIAGONAL {
         if lane < own.z {
             for (var k = 0u; k < COLUMNS; k++) {
                 out[to + k] = num(0.0);
@@ -51,12 +53,15 @@ fn main(
     for (var k = 0u; k < COLUMNS; k++) {
         sums[k] = num(0.0);
     }
-    // Below the diagonal R⁻¹ is zero.
-    var start = base_row;
+    // Below the diagonal a triangle is zero.
+    var start = 0u;
     var end = n;
-    if TRANSPOSE {
-        start = 0u;
-        end = base_row + own.z;
+    if place.w != SQUARE {
+        if TRANSPOSE {
+            end = base_row + own.z;
+        } else {
+            start = base_row;
+        }
     }
     let first = start + group.y * (end - start) / task.shares;
     let last = start + (group.y + 1u) * (end - start) / task.shares;

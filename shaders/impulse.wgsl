@@ -1,5 +1,6 @@
 // Body-frame impulses h_b = ½ {Σ_i (B̄_i φ_i + F̄_i μ_i) + Σ_j ρ_j a_j}, φ = P a, ρ = PᵀB̄ of the body itself.
-// A workgroup sums one column of one body. Twin: coupling::full's impulse.
+// A workgroup sums one column of one body. Of panels B̄ are fluxes, F̄ normal velocities, μ stands for Sᵀμ and a for μ, and ρ is the
+// body's own S F̄. Twins: coupling::full's and coupling::panel's impulse.
 
 //! uses:
 //! constants:
@@ -7,12 +8,12 @@
 struct Task {
     columns: u32,
     phi_stride: u32,
+    phi_offset: u32,
     mu_stride: u32,
     mu_offset: u32,
     a_stride: u32,
     a_offset: u32,
-    pad0: u32,
-    pad1: u32,
+    pad: u32,
 }
 
 @group(0) @binding(0) var<storage, read> face_table: array<real>;      // [shape's face][12]: F̄, B̄
@@ -40,7 +41,7 @@ fn main(
         h[m] = num(0.0);
     }
     for (var i = lane; i < body.y; i += 64u) {
-        let f = phi[(body.x + i) * task.phi_stride + k];
+        let f = phi[(body.x + i) * task.phi_stride + task.phi_offset + k];
         let u = mu[(body.x + i) * task.mu_stride + task.mu_offset + k];
         let row = (shape.x + i) * 12u;
         for (var m = 0u; m < 6u; m++) {

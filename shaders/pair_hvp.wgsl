@@ -6,7 +6,7 @@
 //
 // Twins: coupling::full's pair_tangent; adjoint kernel::{flux_hvp, normal_hvp, potential_hvp}.
 
-//! uses: vector flux normal potential pairs tile motion
+//! uses: vector flux normal potential pairs faces tile faces_tile motion
 //! constants: LEFT
 
 // Columns, and the first, which is 0; as in pair_vjp.wgsl.

@@ -8,7 +8,7 @@
 // one image, and some blocks of faces of one body. Twins: coupling::full's pair_tensor; adjoint
 // kernel::{flux_vjp, normal_vjp, potential_vjp}.
 
-//! uses: vector flux normal potential pairs tile
+//! uses: vector flux normal potential pairs faces tile faces_tile
 //! constants: LEFT
 
 struct Task { columns: u32, first: u32, first_task: u32, tasks: u32 }

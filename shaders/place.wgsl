@@ -3,13 +3,14 @@
 // coupling::pair::Pair::new.
 
 //! uses: vector
-//! constants:
+//! constants: MOVED ROTATED SCALARS
 
-const FACE: u32 = 13u;
+// A face: points, then vectors, then numbers that don't change.
+const FACE: u32 = 3u * (MOVED + ROTATED) + SCALARS;
 
 struct Task { faces: u32, sources: u32, bodies: u32, images: u32 }
 
-@group(0) @binding(0) var<storage, read> shape_faces: array<real>;        // [shape's face][13], body frame
+@group(0) @binding(0) var<storage, read> shape_faces: array<real>;        // [shape's face][FACE], body frame
 @group(0) @binding(1) var<storage, read> shape_sources: array<real>;      // [shape's source][3]
 @group(0) @binding(2) var<storage, read> poses: array<real>;              // [body][12], then [image][12]
 @group(0) @binding(3) var<storage, read> face_map: array<vec2<u32>>;      // body, shape's face
@@ -55,12 +56,18 @@ fn place_faces(@builtin(global_invocation_id) id: vec3<u32>, @builtin(num_workgr
     }
     let body = face_map[i].x;
     let begin_at = face_map[i].y * FACE;
-    for (var c = 0u; c < 3u; c++) {
+    for (var c = 0u; c < MOVED; c++) {
         put_face(i * FACE + 3u * c, moved(body, shape_vector(begin_at + 3u * c)));
     }
-    put_face(i * FACE + 9u, rotated(body, shape_vector(begin_at + 9u)));
-    faces[i * FACE + 12u] = shape_faces[begin_at + 12u];
-    faces_single[i * FACE + 12u] = narrow(shape_faces[begin_at + 12u]);
+    for (var c = 0u; c < ROTATED; c++) {
+        let at = 3u * (MOVED + c);
+        put_face(i * FACE + at, rotated(body, shape_vector(begin_at + at)));
+    }
+    for (var c = 0u; c < SCALARS; c++) {
+        let at = 3u * (MOVED + ROTATED) + c;
+        faces[i * FACE + at] = shape_faces[begin_at + at];
+        faces_single[i * FACE + at] = narrow(shape_faces[begin_at + at]);
+    }
 }
 
 @compute @workgroup_size(64)

@@ -13,8 +13,10 @@ fn root(a: real) -> real { return sqrt(a); }
 fn negative(a: real) -> bool { return a < 0.0lf; }
 fn third() -> real { return 0.3333333333333333lf; }
 fn pi() -> real { return 3.141592653589793lf; }
+fn inverse_4pi() -> real { return 0.07957747154594767lf; }
 
 const HALVINGS: u32 = 3u;
+const SERIES: f32 = 0.02;
 
 fn arctan_series(z: real) -> real {
     return sub(1.0lf, mul(z, sub(0.3333333333333333lf, mul(z, sub(0.2lf, mul(z, sub(0.14285714285714285lf, mul(z, sub(0.1111111111111111lf, mul(z, sub(0.09090909090909091lf, mul(z, sub(0.07692307692307693lf, mul(z, sub(0.06666666666666667lf, mul(z, 0.058823529411764705lf))))))))))))))));

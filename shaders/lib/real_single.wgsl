@@ -17,11 +17,14 @@ fn root(a: real) -> real { return sqrt(a); }
 fn negative(a: real) -> bool { return a < 0.0; }
 fn third() -> real { return 0.33333334; }
 fn pi() -> real { return 3.1415927; }
+fn inverse_4pi() -> real { return 0.07957747; }
 
 // Halvings of an angle up to 45 degrees after which the series below has rounding error only.
 const HALVINGS: u32 = 1u;
 
-// arctan(t)/t as a series in t².
+// arctan(t)/t as a series in t²; artanh(t)/t with the sign of t² turned. Up to here it has rounding error only.
+const SERIES: f32 = 0.17;
+
 fn arctan_series(z: real) -> real {
     return sub(1.0, mul(z, sub(0.33333334, mul(z, sub(0.2, mul(z, sub(0.14285715, mul(z, sub(0.11111111, mul(z, sub(0.09090909, mul(z, sub(0.07692308, mul(z, 0.06666667))))))))))))));
 }

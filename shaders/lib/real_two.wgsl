@@ -78,8 +78,10 @@ fn root(a: real) -> real {
 fn negative(a: real) -> bool { return a.x < 0.0; }
 fn third() -> real { return vec2<f32>(0.33333334, -9.934108e-09); }
 fn pi() -> real { return vec2<f32>(3.1415927, -8.742278e-08); }
+fn inverse_4pi() -> real { return vec2<f32>(0.07957747, 3.210319e-09); }
 
 const HALVINGS: u32 = 3u;
+const SERIES: f32 = 0.02;
 
 fn arctan_series(z: real) -> real {
     return sub(vec2<f32>(1.0, 0.0), mul(z, sub(vec2<f32>(0.33333334, -9.934108e-09), mul(z, sub(vec2<f32>(0.2, -2.9802323e-09), mul(z, sub(vec2<f32>(0.14285715, -6.386212e-09), mul(z, sub(vec2<f32>(0.11111111, -8.278423e-10), mul(z, sub(vec2<f32>(0.09090909, -2.7093021e-09), mul(z, sub(vec2<f32>(0.07692308, -2.865608e-09), mul(z, sub(vec2<f32>(0.06666667, -3.4769376e-09), mul(z, vec2<f32>(0.05882353, -2.1913472e-10)))))))))))))))));

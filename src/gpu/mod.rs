@@ -12,17 +12,26 @@
 mod buffer;
 mod columns;
 mod context;
+mod factor;
 pub mod full;
-mod geometry;
 mod kernel;
+pub mod panel;
 mod pipeline;
 mod placed;
 mod points;
 mod pool;
+// For tests and benches alone.
+#[doc(hidden)]
+pub mod probe;
+mod products;
 pub mod reduced;
+mod refined;
+mod rows;
 pub mod source;
+mod surfaces;
 mod trial;
 mod units;
+mod wrenches;
 
 pub use context::{Adapter, Context, Options, adapters};
 pub use pool::Counts;

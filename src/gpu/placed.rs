@@ -1,38 +1,52 @@
-//! Surfaces at the bodies' poses (`shaders/place.wgsl`), and the Jacobi preconditioner (`shaders/diagonal.wgsl`).
+//! Surfaces at the bodies' poses (`shaders/place.wgsl`).
 
-use super::geometry::{Geometry, PlacedSystem};
+use super::buffer::Buffer;
 use super::kernel::{Table, threads};
 use super::source::Arithmetic;
-use super::units::placements;
+use super::surfaces::Surfaces;
+use super::units::{motions, placements};
 use crate::Result;
-use crate::adjoint::lie::Pose;
+use crate::adjoint::lie::{Pose, Vec3, Vec6};
 use std::sync::Arc;
 
-impl PlacedSystem {
-    /// Places all bodies.
+/// The bodies at given poses.
+pub(super) struct PlacedSurfaces {
+    pub surfaces: Arc<Surfaces>,
+    /// The scene's middle, m.
+    pub middle: Vec3,
+    /// The surfaces' table with faces and sources where they are, in both arithmetics.
+    fine: Table,
+    single: Table,
+}
+
+impl PlacedSurfaces {
+    /// Places all bodies; `own` are arrays of these poses that the shaders see as well.
     ///
     /// # Errors
     /// A device that fails.
-    pub fn new(geometry: &Arc<Geometry>, poses: &[Pose]) -> Result<Self> {
-        let (context, sizes) = (&geometry.context, &geometry.sizes);
+    pub fn new(
+        surfaces: &Arc<Surfaces>,
+        poses: &[Pose],
+        own: &[(&'static str, Buffer)],
+    ) -> Result<Self> {
+        let (context, sizes) = (&surfaces.context, &surfaces.sizes);
         let (fine, single) = (context.fine(), Arithmetic::Single);
-        let (middle, values) = placements(poses, &geometry.model.images, geometry.length);
+        let [points, vectors, numbers] = surfaces.surface.layout();
+        let face = 3 * (points + vectors) + numbers;
+        let (middle, values) = placements(poses, &surfaces.images, surfaces.length);
         let poses = context.upload("poses", fine, &values)?;
-        let scaling = context.upload("scaling", single, &vec![1.0; sizes.sources])?;
         let table = |arithmetic| -> Result<Table> {
             let sources = 3 * sizes.images * sizes.sources;
+            let faces = context.reals("faces", arithmetic, face * sizes.faces)?;
             let placed = [
-                (
-                    "faces",
-                    context.reals("faces", arithmetic, 13 * sizes.faces)?,
-                ),
+                ("faces", faces),
                 ("sources", context.reals("sources", arithmetic, sources)?),
-                ("scaling", scaling.clone()),
             ];
-            Ok(placed.into_iter().chain(geometry.table.clone()).collect())
+            let shared = own.iter().chain(&surfaces.table).cloned();
+            Ok(placed.into_iter().chain(shared).collect())
         };
         let out = Self {
-            geometry: geometry.clone(),
+            surfaces: surfaces.clone(),
             middle,
             fine: table(fine)?,
             single: table(single)?,
@@ -43,21 +57,15 @@ impl PlacedSystem {
             ("sources_single", &out.single[1].1),
         ];
         let words = [sizes.faces, sizes.sources, sizes.bodies, sizes.images];
+        let constants = surfaces.surface.constants();
         let of = |entry, count| {
             let (shader, buffers) = (("place", entry, fine), (&out.fine[..], &own[..]));
-            context.call(shader, &[], &words, buffers, threads(count))
+            context.call(shader, &constants, &words, buffers, threads(count))
         };
-        let mut calls = vec![
+        context.submit(&[
             of("place_faces", sizes.faces)?,
             of("place_sources", sizes.sources)?,
-        ];
-        if geometry.diagonal {
-            // scaling_j = 1/√(Σ_i K_ij² + D_j²).
-            let shader = ("diagonal", "main", single);
-            let count = [sizes.source_blocks as u32, 1, 1];
-            calls.push(context.call(shader, &[], &[], (&out.single, &[]), count)?);
-        }
-        context.submit(&calls)?;
+        ])?;
         Ok(out)
     }
 
@@ -67,5 +75,13 @@ impl PlacedSystem {
             Arithmetic::Single => &self.single,
             _ => &self.fine,
         }
+    }
+
+    /// Twists of all images of all bodies, then of the bodies as they see, about the scene's middle.
+    pub fn motions(&self, z: &[Vec6]) -> Vec<f64> {
+        let images = self.surfaces.images.iter();
+        let seen = images.flat_map(|image| z.iter().map(|z| image.twist(z)));
+        let all = seen.chain(z.iter().copied());
+        motions(all, &self.middle, self.surfaces.length)
     }
 }

@@ -6,9 +6,9 @@
 
 use super::buffer::Buffer;
 use super::context::Context;
-use super::geometry::shapes;
 use super::kernel::{Table, threads};
-use super::source::Arithmetic;
+use super::source::{Arithmetic, Surface};
+use super::surfaces::shapes;
 use super::units::{motions, placements};
 use crate::Result;
 use crate::adjoint::lie::{Pose, Vec3, Vec6, angular, linear};
@@ -218,7 +218,9 @@ impl PlacedPoints {
         let words = [0, sizes.points, sizes.bodies, sizes.images];
         let shader = ("place", "place_sources", fine);
         let (all, threads) = ((&model.table[..], &own[..]), threads(sizes.points));
-        let call = context.call(shader, &[], &words, all, threads)?;
+        // Points alone: what a face is doesn't matter.
+        let constants = Surface::Faces.constants();
+        let call = context.call(shader, &constants, &words, all, threads)?;
         context.submit([&call])?;
         let mut out = Self {
             model: model.clone(),

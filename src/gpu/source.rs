@@ -1,7 +1,7 @@
 //! The shaders' text: each is put together from an arithmetic, the pieces it names, and its constants.
 //!
 //! A shader says in a line `//! uses:` which files of `shaders/lib` it stands on, in order, and in a line
-//! `//! constants:` what is fixed when it is compiled (a number of columns, a variant). Loops over such a number are
+//! `//! constants:` what is fixed when it is compiled (a number of columns, a variant, the surface). Loops over such a number are
 //! written out: what they index by then stays in registers, whatever the driver's compiler makes of loops. Nothing here
 //! needs a device.
 
@@ -72,9 +72,12 @@ shaders! {
     "coulomb_vjp" => "coupling/reduced/linearised.rs::pull_back",
     "diagonal" => "coupling/full/cpu/system.rs::new",
     "factor" => "boundary/mfs/mod.rs::solve_factor",
+    "gmres" => "solver/gmres.rs::gmres",
     "impulse" => "coupling/full/cpu/placed.rs::impulse",
     "pair_hvp" => "coupling/full/cpu/second.rs::pair_tangent",
     "pair_vjp" => "coupling/full/cpu/first.rs::pair_tensor",
+    "panel_hvp" => "coupling/panel/second.rs::pair_tangent",
+    "panel_vjp" => "coupling/panel/first.rs::pair_tensor",
     "place" => "coupling/pair.rs::new",
     "products" => "solver/columns.rs::dots",
     "reduce" => "solver/columns.rs::add_scaled",
@@ -94,8 +97,8 @@ macro_rules! pieces {
 }
 
 pieces! {
-    "vector" "flux" "normal" "potential" "pairs" "tile" "motion" "gate" "gate_state"
-    "points" "slopes" "displaced" "shifts"
+    "vector" "flux" "normal" "potential" "layers" "pairs" "faces" "panels" "tile" "faces_tile" "panels_tile" "motion"
+    "gate" "gate_state" "points" "slopes" "displaced" "shifts"
 }
 
 /// What is fixed when a shader is compiled.
@@ -105,6 +108,46 @@ pub enum Constant {
     Number(u32),
     /// A variant.
     Flag(bool),
+    /// What the faces are: the pieces named `surface` and `surface_tile`.
+    Surface(Surface),
+}
+
+/// What the faces of a coupled system are.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
+pub enum Surface {
+    /// Rows of sources inside the bodies.
+    Faces,
+    /// Panels with single and double layers.
+    Panels,
+}
+
+impl Surface {
+    /// The pieces that stand for one of these names.
+    fn pieces(self, name: &str) -> Option<&'static [&'static str]> {
+        match (self, name) {
+            (Self::Faces, "surface") => Some(&["flux", "normal", "potential", "pairs", "faces"]),
+            (Self::Faces, "surface_tile") => Some(&["faces_tile"]),
+            (Self::Panels, "surface") => Some(&["flux", "layers", "pairs", "panels"]),
+            (Self::Panels, "surface_tile") => Some(&["panels_tile"]),
+            _ => None,
+        }
+    }
+
+    /// Points, vectors and other numbers of a face.
+    pub fn layout(self) -> [usize; 3] {
+        match self {
+            // Corners; m; weight.
+            Self::Faces => [3, 1, 1],
+            // Corners and centroid; m, p, q; charge, 1/|m|, trace, ρ².
+            Self::Panels => [4, 3, 4],
+        }
+    }
+
+    /// The same as the constants of a shader that places faces.
+    pub fn constants(self) -> [(&'static str, Constant); 3] {
+        let names = ["MOVED", "ROTATED", "SCALARS"];
+        std::array::from_fn(|k| (names[k], Constant::Number(self.layout()[k] as u32)))
+    }
 }
 
 /// The words after `//! key:`.
@@ -133,16 +176,22 @@ impl Shader {
         constants: &[(&str, Constant)],
     ) -> Option<String> {
         let mut out = arithmetic.text().to_string();
+        let mut surface = None;
         for name in self.constants() {
             let (_, value) = constants.iter().find(|(n, _)| *n == name)?;
-            out.push_str(&match value {
-                Constant::Number(n) => format!("\nconst {name}: u32 = {n}u;"),
-                Constant::Flag(f) => format!("\nconst {name}: bool = {f};"),
-            });
+            match value {
+                Constant::Number(n) => out.push_str(&format!("\nconst {name}: u32 = {n}u;")),
+                Constant::Flag(f) => out.push_str(&format!("\nconst {name}: bool = {f};")),
+                Constant::Surface(s) => surface = Some(*s),
+            }
         }
         for name in directive(self.text, "uses") {
-            out.push('\n');
-            out.push_str(PIECES.iter().find(|(n, _)| *n == name)?.1);
+            let one = [name];
+            let names = surface.and_then(|s| s.pieces(name)).unwrap_or(&one);
+            for name in names {
+                out.push('\n');
+                out.push_str(PIECES.iter().find(|(n, _)| n == name)?.1);
+            }
         }
         // Inner doc lines are read above; they are no comments that the language knows.
         let lines: Vec<&str> = (self.text.lines())

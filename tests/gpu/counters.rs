@@ -5,7 +5,7 @@
 
 use super::trajectory::falling_ball;
 use hydrograd::adjoint::count::PAIRS;
-use hydrograd::simulate::Backend;
+use hydrograd::simulate::{Backend, Method};
 use hydrograd::solver::CALLS;
 use hydrograd::{Controls, Fidelity, Settings, Simulator, objective};
 use std::process::Command;
@@ -50,19 +50,26 @@ fn count() {
     println!("cpu: {pairs} pairs, {calls} calls");
     assert!(pairs > 0 && calls > 0, "the counters count");
 
-    let read_backs = |tolerance: f64| {
-        let settings = settings.clone().backend(Backend::Gpu).tolerance(tolerance);
+    let read_backs = |method: Method, tolerance: f64| {
+        let settings = settings.clone().fidelity(Fidelity::Full).method(method);
+        let settings = settings.backend(Backend::Gpu).tolerance(tolerance);
         let simulator = Simulator::new(&scene, settings).unwrap();
         let counts = || simulator.context().unwrap().counts();
         let before = counts();
         let done = work(&simulator);
         let after = counts();
-        println!("{tolerance:e}: {after:?}");
+        println!("{method:?}, {tolerance:e}: {after:?}");
         assert_eq!(done, (0, 0), "pairs and calls of solvers on the CPU");
         assert!(after.dispatches > before.dispatches);
         after.read_backs - before.read_backs
     };
-    assert_eq!(read_backs(1e-4), read_backs(1e-9));
+    for method in [Method::MfsVertex, Method::Panel] {
+        assert_eq!(
+            read_backs(method, 1e-4),
+            read_backs(method, 1e-9),
+            "{method:?}"
+        );
+    }
 
     let settings = settings.fidelity(Fidelity::Reduced).backend(Backend::Gpu);
     let (pairs, calls) = work(&Simulator::new(&scene, settings).unwrap());

@@ -1,20 +1,26 @@
 //! The coupled system on the device against the CPU's: value, vjp, jvp and hvp.
 
 use super::fixture::*;
+use hydrograd::adjoint::lie::Pose;
 use hydrograd::boundary::Method;
 use hydrograd::coupling::full::{Full, Model, Preconditioner, SolveSettings};
 use hydrograd::coupling::{Direction, Exclusions, Linearise, Linearised};
 use hydrograd::gpu::Context;
-use nalgebra::DVector;
+use nalgebra::{DMatrix, DVector};
 use std::sync::Arc;
 
 /// Largest difference of each rung: value, gradient, along, vjp, momenta of the tangent, tangent.
 fn differences(context: &Arc<Context>, model: &Arc<Model>, columns: usize) -> [f64; 6] {
     let (cpu, gpu) = both(context, model);
     let n = model.bodies.len();
-    let (poses, basis) = (&poses()[..n], basis(n, columns, 0.3));
-    let a = cpu.linearise(poses, &basis).unwrap();
-    let b = gpu.linearise(poses, &basis).unwrap();
+    rungs([&cpu, &gpu], &poses()[..n], &basis(n, columns, 0.3))
+}
+
+/// The same of two couplings.
+pub fn rungs([cpu, gpu]: [&dyn Linearise; 2], poses: &[Pose], basis: &DMatrix<f64>) -> [f64; 6] {
+    let (n, columns) = (poses.len(), basis.ncols());
+    let a = cpu.linearise(poses, basis).unwrap();
+    let b = gpu.linearise(poses, basis).unwrap();
     println!("cpu {:?}\ngpu {:?}", a.report(), b.report());
     let x = DVector::from_vec(wavy(columns, 0.7));
     let y = DVector::from_vec(wavy(columns, 1.9));

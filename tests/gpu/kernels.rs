@@ -11,23 +11,24 @@ use hydrograd::coupling::Exclusions;
 use hydrograd::coupling::full::{Model, Preconditioner};
 use hydrograd::gpu::Arithmetic;
 use hydrograd::gpu::full::{Gpu, Probe};
+use hydrograd::gpu::probe::Kernels;
 use hydrograd::solver::Columns;
 use std::sync::Arc;
 
 /// A pair of a face and (the image of) a source, everything in the world frame.
-struct Entry {
-    target: usize,
-    source: usize,
-    image: usize,
-    face: usize,
-    column: usize,
+pub struct Entry {
+    pub target: usize,
+    pub source: usize,
+    pub image: usize,
+    pub face: usize,
+    pub column: usize,
     /// Position of the source.
-    at: Vec3,
+    pub at: Vec3,
     /// Its displacement relative to the face's body.
-    d: Vec3,
+    pub d: Vec3,
     /// Entries of K and P, their gradients and Hessian products; P is zero within a body.
-    k: (f64, Vec3, Vec3),
-    p: (f64, Vec3, Vec3),
+    pub k: (f64, Vec3, Vec3),
+    pub p: (f64, Vec3, Vec3),
 }
 
 /// Every pair.
@@ -99,7 +100,7 @@ fn models() -> [Arc<Model>; 2] {
     ]
 }
 
-fn columns(rows: usize, columns: usize, phase: f64) -> Columns {
+pub fn columns(rows: usize, columns: usize, phase: f64) -> Columns {
     Columns {
         rows,
         columns,
@@ -108,9 +109,10 @@ fn columns(rows: usize, columns: usize, phase: f64) -> Columns {
 }
 
 /// Largest accepted differences, relative to the largest number, in single precision and finer.
-const LIMITS: [(Arithmetic, f64); 2] = [(Arithmetic::Single, 1e-5), (Arithmetic::Double, 1e-12)];
+pub const LIMITS: [(Arithmetic, f64); 2] =
+    [(Arithmetic::Single, 1e-5), (Arithmetic::Double, 1e-12)];
 /// In two-float arithmetic.
-const TWO: f64 = 1e-11;
+pub const TWO: f64 = 1e-11;
 
 /// Each arithmetic with a backend that has it, and its limit.
 fn each_arithmetic(model: &Arc<Model>, mut check: impl FnMut(&Probe, Arithmetic, f64)) {
@@ -129,7 +131,7 @@ fn each_arithmetic(model: &Arc<Model>, mut check: impl FnMut(&Probe, Arithmetic,
     );
 }
 
-fn close(what: &str, arithmetic: Arithmetic, got: &[f64], right: &[f64], limit: f64) {
+pub fn close(what: &str, arithmetic: Arithmetic, got: &[f64], right: &[f64], limit: f64) {
     let found = difference(got, right);
     println!("{what} ({}): {found:.1e}", arithmetic.name());
     assert!(
@@ -150,21 +152,27 @@ fn product(
     let (length, weight, _) = probe.units();
     let unit = if potential { 1.0 / length } else { weight };
     let which = (potential, transpose);
-    let mut out = probe.product(arithmetic, which, z, x).unwrap();
+    let mut out = probe.kernels().product(arithmetic, which, z, x).unwrap();
     out.data.iter_mut().for_each(|v| *v *= unit);
     out
 }
 
-/// K x, P x, Kᵀ y, Pᵀ y and their tangents, of five columns.
-pub fn products() {
-    for model in models() {
+/// K x, P x, Kᵀ y, Pᵀ y and their tangents.
+pub struct Products {
+    pub x: Columns,
+    pub y: Columns,
+    right: Vec<Vec<f64>>,
+    back: Vec<Vec<f64>>,
+}
+
+impl Products {
+    /// Of five columns, from rows, sources and all pairs.
+    pub fn new(rows: usize, sources: usize, pairs: impl FnOnce(&mut dyn FnMut(Entry))) -> Self {
         let k = 5;
-        let (rows, sources) = (model.rows(), model.columns());
         let (x, y) = (columns(sources, k, 0.4), columns(rows, k, 1.7));
-        let z = displacement(model.bodies.len(), 0.9);
         let mut right = vec![vec![0.0; rows * k]; 4];
         let mut back = vec![vec![0.0; sources * k]; 4];
-        entries(&model, &poses(), &z, |e| {
+        pairs(&mut |e| {
             let own = e.target == e.source && e.image == 0;
             let slope = |g: &Vec3| if own { 0.0 } else { g.dot(&e.d) };
             let values = [e.k.0, e.p.0, slope(&e.k.1), slope(&e.p.1)];
@@ -175,23 +183,43 @@ pub fn products() {
                 }
             }
         });
-        each_arithmetic(&model, |probe, a, limit| {
-            for (v, potential) in [false, true].into_iter().enumerate() {
-                let of = |name: &str| format!("{} {name}", if potential { "P" } else { "K" });
-                for (transpose, x, right) in [(false, &x, &right), (true, &y, &back)] {
-                    let name = if transpose {
-                        "apply_transpose"
-                    } else {
-                        "apply"
-                    };
+        Self { x, y, right, back }
+    }
+
+    /// Holds the kernels' against them, in units of K and P, displaced by z for the tangents.
+    pub fn hold(&self, kernels: Kernels, a: Arithmetic, limit: f64, units: [f64; 2], z: &[Vec6]) {
+        for (v, potential) in [false, true].into_iter().enumerate() {
+            let of = |name: &str| format!("{} {name}", if potential { "P" } else { "K" });
+            let both = [(false, &self.x, &self.right), (true, &self.y, &self.back)];
+            for (transpose, x, right) in both {
+                let name = match transpose {
+                    true => "apply_transpose",
+                    false => "apply",
+                };
+                let got = |z: Option<&[Vec6]>| {
                     let which = (potential, transpose);
-                    let got = product(probe, a, which, None, x);
-                    close(&of(name), a, &got.data, &right[v], limit);
-                    let got = product(probe, a, which, Some(&z), x);
-                    let name = format!("{name}_jvp");
-                    close(&of(&name), a, &got.data, &right[2 + v], limit);
-                }
+                    let mut out = kernels.product(a, which, z, x).unwrap();
+                    out.data.iter_mut().for_each(|x| *x *= units[v]);
+                    out.data
+                };
+                close(&of(name), a, &got(None), &right[v], limit);
+                let name = format!("{name}_jvp");
+                close(&of(&name), a, &got(Some(z)), &right[2 + v], limit);
             }
+        }
+    }
+}
+
+/// K x, P x, Kᵀ y, Pᵀ y and their tangents.
+pub fn products() {
+    for model in models() {
+        let z = displacement(model.bodies.len(), 0.9);
+        let right = Products::new(model.rows(), model.columns(), |each| {
+            entries(&model, &poses(), &z, each);
+        });
+        each_arithmetic(&model, |probe, a, limit| {
+            let (length, weight, _) = probe.units();
+            right.hold(probe.kernels(), a, limit, [weight, 1.0 / length], &z);
         });
     }
 }
@@ -214,7 +242,10 @@ fn wrenches(
         let potential = c / (left.columns / blocks) == 2;
         left.at(i, c) * if potential { 1.0 } else { weight * length }
     });
-    let (pairs, values) = probe.wrenches(arithmetic, z, (&left, right)).unwrap();
+    let (pairs, values) = probe
+        .kernels()
+        .wrenches(arithmetic, z, (&left, right))
+        .unwrap();
     let unit = 1.0 / (length * length);
     let spatial = |w: &[f64]| {
         let force = Vec3::new(w[0], w[1], w[2]) * unit;

@@ -7,6 +7,7 @@ mod coupled;
 mod fixture;
 mod kernels;
 mod large;
+mod panels;
 mod reduced;
 mod refined;
 mod robust;
@@ -40,9 +41,12 @@ comparisons! {
     "coulomb_vjp" => reduced::rungs,
     "diagonal" => kernels::solves,
     "factor" => kernels::solves,
+    "gmres" => panels::solves,
     "impulse" => coupled::combinations,
     "pair_hvp" => kernels::derivatives,
     "pair_vjp" => kernels::derivatives,
+    "panel_hvp" => panels::derivatives,
+    "panel_vjp" => panels::derivatives,
     "place" => kernels::products,
     "products" => coupled::combinations,
     "reduce" => kernels::derivatives,

@@ -119,7 +119,10 @@ fn what_is_too_large_for_a_buffer_is_an_error_with_the_bytes() {
     }
     let columns = (most / 4) as usize / model.columns() + 1;
     let x = Columns::zeros(model.columns(), columns);
-    match probe.product(Arithmetic::Single, (false, false), None, &x) {
+    match probe
+        .kernels()
+        .product(Arithmetic::Single, (false, false), None, &x)
+    {
         Err(error @ Error::Device { .. }) => {
             let message = error.to_string();
             assert!(message.contains(&most.to_string()), "{message}");

@@ -6,7 +6,7 @@ mod source;
 
 use super::graph::sources;
 use naga::valid::{Capabilities, ValidationFlags, Validator};
-use source::{Arithmetic, Constant, SHADERS, Shader};
+use source::{Arithmetic, Constant, SHADERS, Shader, Surface};
 use std::collections::BTreeSet;
 use std::path::Path;
 
@@ -14,14 +14,23 @@ fn root() -> &'static Path {
     Path::new(env!("CARGO_MANIFEST_DIR"))
 }
 
+const SURFACES: [Surface; 2] = [Surface::Faces, Surface::Panels];
+
 /// Every setting of a shader's constants that differs in kind.
 fn settings(shader: &Shader) -> Vec<Vec<(&'static str, Constant)>> {
     let mut all = vec![Vec::new()];
     for name in shader.constants() {
         let values = match name {
             "COLUMNS" => vec![Constant::Number(1), Constant::Number(12)],
-            "LEFT" if shader.name == "pair_hvp" => vec![Constant::Number(1), Constant::Number(2)],
+            "LEFT" if shader.name.ends_with("_hvp") => {
+                vec![Constant::Number(1), Constant::Number(2)]
+            }
             "LEFT" => vec![Constant::Number(1), Constant::Number(4)],
+            "SURFACE" => SURFACES.map(Constant::Surface).to_vec(),
+            "MOVED" | "ROTATED" | "SCALARS" => {
+                let of = |s: Surface| s.constants().into_iter().find(|(n, _)| *n == name);
+                SURFACES.map(|s| of(s).unwrap().1).to_vec()
+            }
             _ => vec![Constant::Flag(false), Constant::Flag(true)],
         };
         all = all

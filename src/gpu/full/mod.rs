@@ -1,12 +1,10 @@
 //! The coupled system of [`crate::coupling::full`] on the device.
 //!
-//! In its notation, with everything scaled as `gpu::geometry` says: strengths `X = [a, λ]` by source,
+//! In its notation, with everything scaled as [`geometry`] says: strengths `X = [a, λ]` by source,
 //! densities `[μ, r, β]` by face, β = B x̄ and, to begin with, F x̄ where r will stand.
 
-mod pairs;
+mod geometry;
 mod probe;
-mod products;
-mod refined;
 mod response;
 mod second;
 mod solve;
@@ -16,11 +14,11 @@ mod solve;
 pub use probe::Probe;
 
 use super::context::{Context, Options};
-use super::geometry::{Geometry, PlacedSystem};
 use crate::adjoint::lie::Pose;
 use crate::coupling::CoupledResponse;
 use crate::coupling::full::{FullSolver, Model, SystemBackend};
 use crate::{Error, Result};
+use geometry::{Geometry, PlacedSystem};
 use nalgebra::DMatrix;
 use std::sync::Arc;
 
@@ -62,7 +60,7 @@ impl Gpu {
 
     /// The device.
     pub fn context(&self) -> &Arc<Context> {
-        &self.geometry.context
+        &self.geometry.surfaces.context
     }
 }
 

@@ -1,21 +1,15 @@
-//! The kernels one at a time, in the device's units: for comparisons and benchmarks.
+//! The coupled system at given poses, piece by piece, in the device's units: for comparisons and benchmarks.
 
 use super::Gpu;
-use super::pairs::{Densities, wrenches};
-use super::products::{Product, To, product};
-use super::second::motions;
-use super::solve::Solves;
+use super::geometry::PlacedSystem;
+use super::solve::solves;
 use crate::Result;
-use crate::adjoint::lie::{Pose, Vec3, Vec6};
+use crate::adjoint::lie::{Pose, Vec3};
 use crate::coupling::Reached;
-use crate::gpu::buffer::Buffer;
-use crate::gpu::context::Context;
-use crate::gpu::geometry::PlacedSystem;
-use crate::gpu::source::Arithmetic;
+use crate::gpu::probe::Kernels;
 use crate::solver::Columns;
-use std::time::Instant;
 
-/// The coupled system at given poses, kernel by kernel.
+/// The coupled system at given poses.
 pub struct Probe(PlacedSystem);
 
 impl Probe {
@@ -27,85 +21,16 @@ impl Probe {
         Ok(Self(PlacedSystem::new(&gpu.geometry, poses)?))
     }
 
+    /// Its kernels.
+    pub fn kernels(&self) -> Kernels<'_> {
+        Kernels::new(&self.0.surfaces)
+    }
+
     /// The scene's size L (m), the weight w and the middle (m): the device has `K = w K̂`, `P = P̂/L`, positions from
     /// the middle over L.
     pub fn units(&self) -> (f64, f64, Vec3) {
-        let geometry = &self.0.geometry;
-        (geometry.length, geometry.weight, self.0.middle)
-    }
-
-    fn context(&self) -> &Context {
-        &self.0.geometry.context
-    }
-
-    fn motions(&self, arithmetic: Arithmetic, z: Option<&[Vec6]>) -> Result<Option<Buffer>> {
-        let of = |z| {
-            self.context()
-                .upload("motions", arithmetic, &motions(&self.0, z))
-        };
-        z.map(of).transpose()
-    }
-
-    /// K̂ x, P̂ x (`potential`), or the same with their transposes, `[face or source][k]`; with the displacement z (a
-    /// spatial twist a body) their tangents.
-    ///
-    /// # Errors
-    /// A device that fails.
-    pub fn product(
-        &self,
-        arithmetic: Arithmetic,
-        (potential, transpose): (bool, bool),
-        z: Option<&[Vec6]>,
-        x: &Columns,
-    ) -> Result<Columns> {
-        let (context, k) = (self.context(), x.columns);
-        let motions = self.motions(arithmetic, z)?;
-        let mut what = match transpose {
-            false => Product::forward(potential),
-            true => Product::back(potential),
-        };
-        what = motions.as_ref().map_or(what, |m| what.tangent(m));
-        let (rows, ..) = what.sizes(&self.0.geometry.sizes);
-        let from = context.upload("probe", arithmetic, &x.data)?;
-        let out = context.reals("probe", arithmetic, rows * k)?;
-        let to = [To::plain(k, (&out, k, 0))];
-        context.submit(&product(&self.0, arithmetic, what, (&from, k, 0), k, &to)?)?;
-        Ok(Columns {
-            rows,
-            columns: k,
-            data: context
-                .read(arithmetic, &[(&out, rows * k)])?
-                .swap_remove(0),
-        })
-    }
-
-    /// Seconds of a product with K of so many columns: the mean of `repeat` in a row, nothing read back
-    /// between them.
-    ///
-    /// # Errors
-    /// A device that fails.
-    pub fn time_apply(&self, arithmetic: Arithmetic, columns: usize, repeat: usize) -> Result<f64> {
-        let (context, sizes) = (self.context(), &self.0.geometry.sizes);
-        let x = context.zeros("probe", arithmetic, sizes.sources * columns)?;
-        let out = context.reals("probe", arithmetic, sizes.faces * columns)?;
-        let (x, to) = ((&x, columns, 0), [To::plain(columns, (&out, columns, 0))]);
-        let what = Product::forward(false);
-        let calls = product(&self.0, arithmetic, what, x, columns, &to)?;
-        let time = |repeat: usize| -> Result<f64> {
-            let start = Instant::now();
-            for _ in 0..repeat {
-                context.submit(&calls)?;
-            }
-            context.read(arithmetic, &[(&out, 1)])?;
-            Ok(start.elapsed().as_secs_f64())
-        };
-        // What waiting costs, and the first start of a shader, are no part of it.
-        time(1)?;
-        let once = time(1)?;
-        Ok(match repeat {
-            0 | 1 => once,
-            n => (time(n)? - once).max(0.0) / (n - 1) as f64,
-        })
+        let (length, middle) = self.kernels().units();
+        (length, self.0.geometry.weight, middle)
     }
 
     /// Solves `(K̂ᵀK̂ + D̂²) x = g`, D = w D̂.
@@ -113,10 +38,10 @@ impl Probe {
     /// # Errors
     /// A tolerance that isn't reached, or a device that fails.
     pub fn normal_solve(&self, g: &Columns) -> Result<(Columns, Reached)> {
-        let (context, k) = (self.context(), g.columns);
+        let (context, k) = (&self.0.surfaces.surfaces.context, g.columns);
         let right = context.upload("probe", context.fine(), &g.data)?;
         let x = context.zeros("probe", context.fine(), g.rows * k)?;
-        let solves = Solves::new(&self.0, "solve", (&right, k, 0), (&x, k, 0), k)?;
+        let solves = solves(&self.0, "solve", (&right, k, 0), (&x, k, 0), k)?;
         let (reached, mut values) = solves.run(&[], &[], &[(&x, g.rows * k)])?;
         let out = Columns {
             rows: g.rows,
@@ -124,38 +49,5 @@ impl Probe {
             data: values.swap_remove(0),
         };
         Ok((out, reached))
-    }
-
-    /// `Σ_s (f, s × f)`, `f = Σ_i (β_x ∇P̂ − μ_x ∇K̂) a_y + r_x ∇K̂ λ_y`, for all columns x and y of
-    /// `left = [μ, r, β]` by face and `right = [a, λ]` by source: `[pair][x][y][6]`, after (target, source, image) of
-    /// every pair. With a displacement z its tangent beside it, `[12]`, `left = [μ, r, β, δμ, δr]` and
-    /// `right = [a, λ, δa, δλ]`.
-    ///
-    /// # Errors
-    /// A device that fails.
-    pub fn wrenches(
-        &self,
-        arithmetic: Arithmetic,
-        z: Option<&[Vec6]>,
-        (left, right): (&Columns, &Columns),
-    ) -> Result<(Vec<[usize; 3]>, Vec<f64>)> {
-        let context = self.context();
-        let columns = right.columns / if z.is_some() { 4 } else { 2 };
-        let motions = self.motions(arithmetic, z)?;
-        let of = Densities {
-            left: &context.upload("probe", arithmetic, &left.data)?,
-            right: &context.upload("probe", arithmetic, &right.data)?,
-            columns,
-            taken: (0, columns),
-            motions: motions.as_ref(),
-        };
-        let (calls, out, count) = wrenches(&self.0, arithmetic, &of)?;
-        context.submit(&calls)?;
-        let values = context.read(arithmetic, &[(&out, count)])?.swap_remove(0);
-        let pairs = self.0.geometry.pairs.iter();
-        Ok((
-            pairs.map(|p| [p.target, p.source, p.image]).collect(),
-            values,
-        ))
     }
 }

@@ -1,23 +1,20 @@
 //! The water's solution, on the device: value and first derivative.
 
-use super::pairs::{Densities, wrenches};
-use super::products::{Product, To, product};
-use super::solve::Solves;
+use super::geometry::PlacedSystem;
+use super::solve::solves;
 use crate::adjoint::lie::Vec6;
 use crate::coupling::{CoupledResponse, Direction, PairTensor, Reached, Tangent};
 use crate::gpu::buffer::Buffer;
-use crate::gpu::columns::{Base, Slice, combine, passes, products};
-use crate::gpu::context::Context;
-use crate::gpu::geometry::{Geometry, PlacedSystem, Rows};
-use crate::gpu::kernel::{Call, threads};
+use crate::gpu::columns::{Base, combine, products};
+use crate::gpu::kernel::Call;
+use crate::gpu::products::{Product, To, product};
+use crate::gpu::rows::{impulse, rows};
 use crate::gpu::units::{self, Twists};
+use crate::gpu::wrenches::tensor;
 use crate::solver::Columns;
 use crate::{Error, Result};
 use nalgebra::DMatrix;
 use std::sync::Arc;
-
-/// Columns on the left of one pass of a derivative.
-const LEFT: usize = 4;
 
 /// a, λ, r, μ of some columns, on the device.
 pub(super) struct Solution {
@@ -35,57 +32,6 @@ pub(super) struct Solution {
     reached: Reached,
 }
 
-/// A wrench about the scene's middle in the device's units as a spatial wrench.
-pub(super) fn spatial(placed: &PlacedSystem, w: &[f64], scale: f64) -> Vec6 {
-    units::spatial(placed.geometry.length, &placed.middle, w, scale)
-}
-
-/// `out (+)= table · twists`, twists `[body][6][columns]` (`shaders/rows.wgsl`): what twists ask for on every face, or
-/// read out of every source.
-fn rows(
-    context: &Context,
-    (table, first): (&Rows, usize),
-    (twists, columns): (&Buffer, usize),
-    (out, stride, offset): Slice,
-    accumulate: bool,
-) -> Result<Call> {
-    let words = [
-        table.rows,
-        columns,
-        table.width,
-        first,
-        stride,
-        offset,
-        usize::from(accumulate),
-        0,
-    ];
-    let buffers = [
-        ("table", &table.table),
-        ("map", &table.map),
-        ("twists", twists),
-        ("out", out),
-    ];
-    let shader = ("rows", "main", context.fine());
-    let count = threads(table.rows * columns);
-    context.call(shader, &[], &words, (&[], &buffers), count)
-}
-
-/// `out[body][6][columns] = ½ {B̄ᵀφ + F̄ᵀμ + ρᵀa}` of every body, φ `[face][columns]` (`shaders/impulse.wgsl`).
-pub(super) fn impulse(
-    geometry: &Geometry,
-    phi: &Buffer,
-    mu: Slice,
-    a: Slice,
-    (out, columns): (&Buffer, usize),
-) -> Result<Call> {
-    let shader = ("impulse", "main", geometry.context.fine());
-    let words = [columns, columns, mu.1, mu.2, a.1, a.2, 0, 0];
-    let buffers = [("phi", phi), ("mu", mu.0), ("a", a.0), ("out", out)];
-    let count = [geometry.sizes.bodies as u32, columns as u32, 1];
-    let all = (&geometry.table[..], &buffers[..]);
-    geometry.context.call(shader, &[], &words, all, count)
-}
-
 impl Solution {
     /// Solves for columns of twists.
     pub fn solve(
@@ -93,12 +39,12 @@ impl Solution {
         moving: Arc<Vec<bool>>,
         twists: &DMatrix<f64>,
     ) -> Result<Self> {
-        let geometry = placed.geometry.clone();
-        let (context, sizes) = (&geometry.context, &geometry.sizes);
+        let surfaces = placed.surfaces.surfaces.clone();
+        let (context, sizes) = (&surfaces.context, &surfaces.sizes);
         let fine = context.fine();
         let k = twists.ncols();
         let n = sizes.sources;
-        let twists = Twists::new(twists.clone(), geometry.length);
+        let twists = Twists::new(twists.clone(), surfaces.length);
         let given = (&twists.upload(context)?, k);
         let g = context.reals("right-hand sides", fine, n * 2 * k)?;
         let mut out = Self {
@@ -115,7 +61,7 @@ impl Solution {
         if k == 0 || n == 0 {
             return Ok(out);
         }
-        let (faces, sources) = (&geometry.face_rows, &geometry.source_rows);
+        let (faces, sources) = (&surfaces.face_rows, &surfaces.source_rows);
         let at = |block: usize| (&out.densities, 3 * k, block * k);
         let half = |block: usize| (&g, 2 * k, block * k);
         let asked = || rows(context, (faces, 0), given, at(1), false);
@@ -123,7 +69,14 @@ impl Solution {
         calls.push(rows(context, (faces, 6), given, at(2), false)?);
         for (block, potential) in [false, true].into_iter().enumerate() {
             let (back, to) = (Product::back(potential), To::plain(k, half(block)));
-            calls.extend(product(&placed, fine, back, at(1 + block), k, &[to])?);
+            calls.extend(product(
+                &placed.surfaces,
+                fine,
+                back,
+                at(1 + block),
+                k,
+                &[to],
+            )?);
         }
         calls.push(rows(context, (sources, 0), given, half(1), true)?);
         context.submit(&calls)?;
@@ -131,7 +84,7 @@ impl Solution {
         // r and μ from X, then momenta and energies.
         let x = (&out.strengths, 2 * k, 0);
         let what = "coupled system (Eq. 20)";
-        let solves = Solves::new(&placed, what, half(0), x, 2 * k)?;
+        let solves = solves(&placed, what, half(0), x, 2 * k)?;
         let residual = To {
             scale: -1.0,
             base: Base::Out,
@@ -142,7 +95,7 @@ impl Solution {
             ..To::plain(k, at(0))
         };
         let forward = Product::forward(false);
-        let mut follow = product(&placed, fine, forward, x, 2 * k, &[residual, mu])?;
+        let mut follow = product(&placed.surfaces, fine, forward, x, 2 * k, &[residual, mu])?;
         let (calls, momenta) = out.impulse_calls()?;
         follow.extend(calls);
         let energies = context.reals("energies", fine, k * k)?;
@@ -153,7 +106,7 @@ impl Solution {
         out.reached = reached;
         out.momenta = out.impulses(&values[0]);
         let (e, scale) = (&values[1], &out.twists.scale);
-        let l5 = geometry.length.powi(5);
+        let l5 = surfaces.length.powi(5);
         out.energies = DMatrix::from_fn(k, k, |x, y| e[x * k + y] * scale[x] * scale[y] * l5);
         Ok(out)
     }
@@ -170,21 +123,28 @@ impl Solution {
     /// φ = P a and the impulses: the calls, and where the impulses will be.
     fn impulse_calls(&self) -> Result<(Vec<Call>, Buffer)> {
         let k = self.columns;
-        let geometry = &self.placed.geometry;
-        let (context, fine) = (&geometry.context, geometry.context.fine());
-        let phi = context.reals("potentials", fine, geometry.sizes.faces * k)?;
-        let out = context.reals("momenta", fine, 6 * geometry.sizes.bodies * k)?;
+        let surfaces = &self.placed.surfaces.surfaces;
+        let (context, fine) = (&surfaces.context, surfaces.context.fine());
+        let phi = context.reals("potentials", fine, surfaces.sizes.faces * k)?;
+        let out = context.reals("momenta", fine, 6 * surfaces.sizes.bodies * k)?;
         let (a, to) = ((&self.strengths, 2 * k, 0), To::plain(k, (&phi, k, 0)));
-        let mut calls = product(&self.placed, fine, Product::forward(true), a, k, &[to])?;
+        let mut calls = product(
+            &self.placed.surfaces,
+            fine,
+            Product::forward(true),
+            a,
+            k,
+            &[to],
+        )?;
         let mu = (&self.densities, 3 * k, 0);
-        calls.push(impulse(geometry, &phi, mu, a, (&out, k))?);
+        calls.push(impulse(surfaces, (&phi, k, 0), mu, a, (&out, k))?);
         Ok((calls, out))
     }
 
     /// A combination of the columns, coefficients columns × n.
     fn combination(&self, coefficients: &DMatrix<f64>) -> Result<Self> {
-        let geometry = &self.placed.geometry;
-        let (context, sizes) = (&geometry.context, &geometry.sizes);
+        let surfaces = &self.placed.surfaces.surfaces;
+        let (context, sizes) = (&surfaces.context, &surfaces.sizes);
         let fine = context.fine();
         let n = coefficients.ncols();
         let (twists, units) = self.twists.combined(coefficients);
@@ -230,55 +190,8 @@ impl CoupledResponse for Solution {
     }
 
     fn gradient(&self) -> Result<PairTensor> {
-        let k = self.columns;
-        let placed = &self.placed;
-        let geometry = &placed.geometry;
-        let (context, fine) = (&geometry.context, geometry.context.fine());
-        let bodies = geometry.sizes.bodies;
-        if k == 0 || geometry.pairs.is_empty() {
-            return Ok(PairTensor::zeros(bodies, k));
-        }
-        // W(x, y) of every pair, x in passes.
-        let shares: Vec<(usize, usize)> = passes(k, LEFT).collect();
-        let mut outs = Vec::new();
-        for share in &shares {
-            let of = Densities {
-                left: &self.densities,
-                right: &self.strengths,
-                columns: k,
-                taken: *share,
-                motions: None,
-            };
-            let (calls, out, count) = wrenches(placed, fine, &of)?;
-            context.submit(&calls)?;
-            outs.push((out, count));
-        }
-        let wanted: Vec<(&Buffer, usize)> = outs.iter().map(|(out, n)| (out, *n)).collect();
-        let values = context.read(fine, &wanted)?;
-        let place: Vec<(usize, usize, usize)> = (shares.iter().enumerate())
-            .flat_map(|(p, (_, width))| (0..*width).map(move |x| (p, x, *width)))
-            .collect();
-        let mut out = PairTensor::zeros(bodies, k);
-        for (number, pair) in geometry.pairs.iter().enumerate() {
-            let raw = |x: usize, y: usize| {
-                let (share, x_there, width) = place[x];
-                let at = ((number * width + x_there) * k + y) * 6;
-                spatial(
-                    placed,
-                    &values[share][at..at + 6],
-                    self.twists.scale[x] * self.twists.scale[y],
-                )
-            };
-            let image = &geometry.model.images[pair.image];
-            for x in 0..k {
-                for y in 0..=x {
-                    let world = 0.5 * (raw(x, y) + raw(y, x));
-                    out.add(pair.source, (x, y), &image.twist_vjp(&world));
-                    out.add(pair.target, (x, y), &-world);
-                }
-            }
-        }
-        Ok(out)
+        let densities = [&self.densities, &self.strengths];
+        tensor(&self.placed.surfaces, densities, &self.twists.scale)
     }
 
     fn directions(&self, directions: &[Direction]) -> Result<Box<dyn CoupledResponse + '_>> {
@@ -298,15 +211,15 @@ impl CoupledResponse for Solution {
                 "must be 1 or 2",
             ));
         }
-        units::along(z, self.placed.geometry.length, |z| self.second(z))
+        units::along(z, self.placed.surfaces.surfaces.length, |z| self.second(z))
     }
 
     fn densities(&self) -> Result<Columns> {
-        let (k, n) = (self.columns, self.placed.geometry.sizes.sources);
-        let geometry = &self.placed.geometry;
-        let context = &geometry.context;
+        let surfaces = &self.placed.surfaces.surfaces;
+        let (k, n) = (self.columns, surfaces.sizes.sources);
+        let context = &surfaces.context;
         let values = context.read(context.fine(), &[(&self.strengths, n * 2 * k)])?;
-        let l3 = geometry.length.powi(3);
+        let l3 = surfaces.length.powi(3);
         Ok(Columns::from_fn(n, k, |j, c| {
             values[0][j * 2 * k + c] * self.twists.scale[c] * l3
         }))

@@ -1,37 +1,24 @@
 //! The tangent along one displacement, on the device: Eq. 21, and the second derivatives of the kernels.
 
-use super::pairs::{Densities, wrenches};
-use super::products::{Product, To, product};
-use super::response::{Solution, impulse, spatial};
-use super::solve::Solves;
+use super::response::Solution;
+use super::solve::solves;
 use crate::Result;
-use crate::adjoint::lie::{Vec6, cross_force};
+use crate::adjoint::lie::Vec6;
 use crate::coupling::Tangent;
 use crate::gpu::columns::{Base, Slice, Sum};
-use crate::gpu::geometry::PlacedSystem;
-use crate::gpu::units;
-
-/// Twists of all images of all bodies, then of the bodies as they see, about the scene's middle.
-pub(super) fn motions(placed: &PlacedSystem, z: &[Vec6]) -> Vec<f64> {
-    let geometry = &placed.geometry;
-    let images = geometry.model.images.iter();
-    let seen = images.flat_map(|image| z.iter().map(|z| image.twist(z)));
-    units::motions(
-        seen.chain(z.iter().copied()),
-        &placed.middle,
-        geometry.length,
-    )
-}
+use crate::gpu::products::{Product, To, product};
+use crate::gpu::rows::impulse;
+use crate::gpu::wrenches::{Densities, tangent, wrenches};
 
 impl Solution {
     /// As the CPU's: the tangent of the first column's energy with the last.
     pub(super) fn second(&self, z: &[Vec6]) -> Result<Tangent> {
-        let (placed, n) = (&self.placed, self.columns);
-        let geometry = &placed.geometry;
-        let (context, sizes) = (&geometry.context, &geometry.sizes);
+        let (placed, n) = (&self.placed.surfaces, self.columns);
+        let surfaces = &placed.surfaces;
+        let (context, sizes) = (&surfaces.context, &surfaces.sizes);
         let fine = context.fine();
         let (faces, sources) = (sizes.faces, sizes.sources);
-        let motion = context.upload("motions", fine, &motions(placed, z))?;
+        let motion = context.upload("motions", fine, &placed.motions(z))?;
 
         // [δK a, δK λ] and δP a by face.
         let dk = context.reals("δK X", fine, faces * 2 * n)?;
@@ -74,7 +61,7 @@ impl Solution {
 
         // What follows from the tangent of the strengths: momenta and wrenches.
         let what = "tangent of the coupled system (Eq. 21)";
-        let solves = Solves::new(placed, what, all(&g), all(&x), 2 * n)?;
+        let solves = solves(&self.placed, what, all(&g), all(&x), 2 * n)?;
         let left = context.reals("left densities", fine, faces * 5 * n)?;
         let right = context.reals("right densities", fine, sources * 4 * n)?;
         let phi = context.reals("δφ", fine, faces * n)?;
@@ -87,7 +74,7 @@ impl Solution {
                 scale,
                 ..Sum::new((rows, columns), (from.0, 1), out)
             };
-            task.call(context, fine, &geometry.open)
+            task.call(context, fine, &surfaces.open)
         };
         // [μ, r, β | δμ, δr] and [a, λ | δa, δλ]: δr = −δK a − K δa, δμ = δK λ + K δλ.
         let mut follow = vec![
@@ -114,7 +101,7 @@ impl Solution {
         let forward = Product::forward;
         follow.extend(of(forward(false), all(&x), 2 * n, &[residual, mu])?);
         follow.extend(of(forward(true), all(&x), n, &[potential])?);
-        let read = impulse(geometry, &phi, lefts(3), all(&x), (&momenta, n))?;
+        let read = impulse(surfaces, (&phi, n, 0), lefts(3), all(&x), (&momenta, n))?;
         follow.push(read);
         let of = Densities {
             left: &left,
@@ -127,39 +114,13 @@ impl Solution {
         follow.extend(pairs);
         let wanted = [(&momenta, 6 * sizes.bodies * n), (&wrenches, count)];
         let (_, values) = solves.run(&[], &follow, &wanted)?;
-        Ok(self.assemble(z, &values[0], &values[1]))
-    }
-
-    /// Both bodies' share of every pair's wrench.
-    fn assemble(&self, z: &[Vec6], momenta: &[f64], wrenches: &[f64]) -> Tangent {
-        let (placed, n) = (&self.placed, self.columns);
-        let geometry = &placed.geometry;
-        let momenta = self.impulses(momenta);
-        let mut gradient = vec![Vec6::zeros(); geometry.sizes.bodies];
-        let mut rate = gradient.clone();
-        let scale = &self.twists.scale;
-        let unit = scale[0] * scale[n - 1];
-        for (number, pair) in geometry.pairs.iter().enumerate() {
-            let at = |x: usize, y: usize, part: usize| {
-                let from = ((number * n + x) * n + y) * 12 + 6 * part;
-                spatial(placed, &wrenches[from..from + 6], unit)
-            };
-            // The symmetrised form.
-            let of = |part| 0.5 * (at(0, n - 1, part) + at(n - 1, 0, part));
-            let world = of(0);
-            // The pair's wrench turns with the faces that it was taken against.
-            let turned = of(1) + cross_force(&z[pair.target], &world);
-            let image = &geometry.model.images[pair.image];
-            gradient[pair.source] += image.twist_vjp(&world);
-            gradient[pair.target] -= world;
-            rate[pair.source] += image.twist_vjp(&turned);
-            rate[pair.target] -= turned;
-        }
-        Tangent {
-            momentum_x: momenta.column(0).into_owned(),
-            momentum_y: momenta.column(n - 1).into_owned(),
+        let impulses = self.impulses(&values[0]);
+        let [gradient, wrench] = tangent(placed, z, &values[1], &self.twists.scale);
+        Ok(Tangent {
+            momentum_x: impulses.column(0).into_owned(),
+            momentum_y: impulses.column(n - 1).into_owned(),
             gradient,
-            wrench: rate,
-        }
+            wrench,
+        })
     }
 }

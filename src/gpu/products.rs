@@ -1,16 +1,18 @@
-//! Products with K and P of any number of columns, in passes (`shaders/apply*.wgsl`).
+//! Products with K and P, or the double and single layers of panels, of any number of columns, in passes (`shaders/apply*.wgsl`).
 
+use super::buffer::Buffer;
+use super::columns::{Base, Slice, Sum, passes};
+use super::kernel::Call;
+use super::placed::PlacedSurfaces;
+use super::source::{Arithmetic, Constant};
+use super::surfaces::Sizes;
 use crate::Result;
-use crate::gpu::buffer::Buffer;
-use crate::gpu::columns::{Base, Slice, Sum, passes};
-use crate::gpu::geometry::{PlacedSystem, Sizes};
-use crate::gpu::kernel::Call;
-use crate::gpu::source::{Arithmetic, Constant};
 
 /// Most columns of one pass over the pairs.
 pub(super) const WIDE: usize = 12;
 
-/// Which product: with K, or P.
+/// Which product: with K, or P. Of panels K is A, the double layer with ½ of every panel itself, and P is S, the single layer between
+/// bodies; their sources are the centroids, so that both are transposed.
 #[derive(Clone, Copy)]
 pub(super) struct Product<'a> {
     potential: bool,
@@ -18,6 +20,8 @@ pub(super) struct Product<'a> {
     transpose: bool,
     /// δK, δP for these motions.
     motions: Option<&'a Buffer>,
+    /// Whether bodies don't see themselves but by images.
+    apart: bool,
 }
 
 impl<'a> Product<'a> {
@@ -27,6 +31,7 @@ impl<'a> Product<'a> {
             potential,
             transpose: false,
             motions: None,
+            apart: false,
         }
     }
 
@@ -42,6 +47,14 @@ impl<'a> Product<'a> {
     pub fn tangent(self, motions: &'a Buffer) -> Self {
         Self {
             motions: Some(motions),
+            ..self
+        }
+    }
+
+    /// Without what bodies see of themselves.
+    pub const fn apart(self) -> Self {
+        Self {
+            apart: true,
             ..self
         }
     }
@@ -81,22 +94,22 @@ impl<'a> To<'a> {
 
 /// The calls of a product of `columns` columns of `x`, with the memory that they use.
 pub(super) fn product<'a>(
-    placed: &PlacedSystem,
+    placed: &PlacedSurfaces,
     arithmetic: Arithmetic,
     what: Product,
     (x, stride, offset): Slice,
     columns: usize,
     to: &[To<'a>],
 ) -> Result<Vec<Call>> {
-    let geometry = &placed.geometry;
-    let context = &geometry.context;
-    let (rows, _, shares) = what.sizes(&geometry.sizes);
+    let surfaces = &placed.surfaces;
+    let context = &surfaces.context;
+    let (rows, _, shares) = what.sizes(&surfaces.sizes);
     let mut calls = Vec::new();
     for (first, width) in passes(columns, WIDE) {
         let parts = context.reals("shares of a product", arithmetic, shares * rows * width)?;
         let x = (x, stride, offset + first);
         let out = (&parts, width);
-        calls.push(once(placed, arithmetic, what, x, out, &geometry.open)?);
+        calls.push(once(placed, arithmetic, what, x, out, &surfaces.open)?);
         for t in to {
             // The columns of this pass that go there.
             let (from, end) = (t.from.max(first), (t.from + t.count).min(first + width));
@@ -113,7 +126,7 @@ pub(super) fn product<'a>(
                 },
                 ..Sum::new((rows, end - from), (&parts, shares), shifted(t.out))
             };
-            calls.push(task.call(context, arithmetic, &geometry.open)?);
+            calls.push(task.call(context, arithmetic, &surfaces.open)?);
         }
     }
     Ok(calls)
@@ -122,7 +135,7 @@ pub(super) fn product<'a>(
 /// One pass of a product, as shares `[share][row][columns]` to be summed; a product that is no tangent is skipped
 /// where no column of `gate` goes on.
 pub(super) fn once(
-    placed: &PlacedSystem,
+    placed: &PlacedSurfaces,
     arithmetic: Arithmetic,
     what: Product,
     (x, stride, offset): Slice,
@@ -138,12 +151,16 @@ pub(super) fn once(
     let constants = [
         ("COLUMNS", Constant::Number(columns as u32)),
         ("POTENTIAL", Constant::Flag(what.potential)),
+        ("SURFACE", Constant::Surface(placed.surfaces.surface)),
     ];
-    let (_, own, shares) = what.sizes(&placed.geometry.sizes);
+    let (_, own, shares) = what.sizes(&placed.surfaces.sizes);
     let name = if what.transpose { "y" } else { "x" };
     let mut buffers = vec![(name, x), ("out", out), ("going", gate)];
     buffers.extend(what.motions.map(|motions| ("motions", motions)));
-    placed.geometry.context.call(
+    if what.apart {
+        buffers.push(("relations", &placed.surfaces.apart));
+    }
+    placed.surfaces.context.call(
         (shader, "main", arithmetic),
         &constants,
         &[shares, stride, offset, 0],

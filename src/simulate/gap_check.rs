@@ -48,7 +48,7 @@ impl Rollout {
     pub fn check_gap(&self) -> Result<Option<GapCheck>> {
         let simulator = self.simulator();
         let mut choices = simulator.choices().clone();
-        let by_panels = choices.water.method.together(choices.water.backend) == Method::Panel;
+        let by_panels = choices.water.method.together() == Method::Panel;
         let Some((at, gap)) = self.nearest() else {
             return Ok(None);
         };

@@ -8,7 +8,7 @@ use super::start::{free, isolated};
 use crate::coupling::full::SolveSettings;
 use crate::dynamics::Integrator;
 use crate::scene::Scene;
-use crate::simulate::{Backend, Fidelity, Knob, Method, Numerics, Settings};
+use crate::simulate::{Fidelity, Knob, Method, Numerics, Settings};
 use crate::{Error, Result};
 use strum::VariantArray;
 
@@ -157,7 +157,7 @@ impl Plan<'_> {
             Family::Method => {
                 let fits = |m: &&Method| match fidelity.solves_alone() {
                     true => !fidelity.chooses() && **m != Method::Exact,
-                    false => m.kind().steps_together() && m.together(Backend::Cpu) == **m,
+                    false => m.kind().steps_together() && m.together() == **m,
                 };
                 let own: Vec<Method> = Method::VARIANTS.iter().filter(fits).copied().collect();
                 each(base, (&given.methods, &own), |c, method| c.method = method)
@@ -226,7 +226,7 @@ impl Plan<'_> {
         c.tolerance = has(Knob::Tolerance).then(|| c.tolerance.unwrap_or(own_tolerance));
         c.method = match (c.method, self.closed_forms) {
             (method, _) if c.fidelity.kind().chooses() => method,
-            (method, _) if !c.fidelity.kind().solves_alone() => method.together(Backend::Cpu),
+            (method, _) if !c.fidelity.kind().solves_alone() => method.together(),
             (Method::Auto, ClosedForms::All) => Method::Exact,
             (Method::Auto, ClosedForms::None) => Method::Panel,
             (method, _) => method,

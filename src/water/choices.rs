@@ -52,7 +52,7 @@ impl WaterChoices {
     pub fn method_used(&self) -> Method {
         match self.fidelity.kind().solves_alone() {
             true => self.method,
-            false => self.method.together(self.backend),
+            false => self.method.together(),
         }
     }
 

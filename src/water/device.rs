@@ -1,16 +1,16 @@
 //! What the couplings of a simulator are computed on: the CPU, or one open GPU that all of them share.
 
 use super::backend::{Backend, BackendReport, GpuSettings};
-use crate::coupling::Coupling;
 use crate::coupling::full::{Cpu, Full, Model};
 use crate::coupling::reduced::Reduced;
+use crate::coupling::{Coupling, PanelCoupled};
 use crate::{Error, Result};
 use std::sync::Arc;
 
 #[cfg(feature = "gpu")]
 use {
     super::backend::{Arithmetic, DeviceReport},
-    crate::gpu::{self, Context, full::Gpu, reduced::GpuReduced},
+    crate::gpu::{self, Context, full::Gpu, panel::GpuPanels, reduced::GpuReduced},
 };
 
 /// The CPU unless a GPU is open.
@@ -26,14 +26,14 @@ pub(crate) struct Device {
 }
 
 impl Device {
-    /// What is asked for; `idle` says why the scene leaves a GPU nothing to compute, if it does, or refuses it.
+    /// What is asked for; `idle` says why the scene leaves a GPU nothing to compute, if it does.
     ///
     /// # Errors
-    /// What `idle` refuses, and a GPU that can't be opened, unless the CPU may take over.
+    /// A GPU that can't be opened, unless the CPU may take over.
     pub fn open(
         asked: Backend,
         settings: &GpuSettings,
-        idle: impl FnOnce() -> Result<Option<&'static str>>,
+        idle: Option<&'static str>,
     ) -> Result<Self> {
         let mut out = Self {
             asked,
@@ -43,7 +43,7 @@ impl Device {
             return Ok(out);
         }
         if cfg!(feature = "gpu")
-            && let Some(reason) = idle()?
+            && let Some(reason) = idle
         {
             out.reason = Some(reason.into());
             return Ok(out);
@@ -95,6 +95,18 @@ impl Device {
             }
         }
         Ok(Full::on(model.clone(), Box::new(Cpu::new(model)?)))
+    }
+
+    /// Coupled panels here.
+    pub fn panels(&mut self, coupled: PanelCoupled) -> Result<PanelCoupled> {
+        #[cfg(feature = "gpu")]
+        if let Some(context) = &self.context {
+            match GpuPanels::new(context, coupled.model()) {
+                Ok(gpu) => return Ok(coupled.on(Box::new(gpu))),
+                Err(error) => self.leave(error)?,
+            }
+        }
+        Ok(coupled)
     }
 
     /// The fidelity `Reduced` here.

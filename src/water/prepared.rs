@@ -87,9 +87,8 @@ pub(crate) fn prepare(
     }
     clearance.refuse_film(poses)?;
     let mut warnings = choices.without_effect();
-    let mut device = Device::open(choices.backend, &choices.gpu, || {
-        fidelity.kind().idle_gpu(method)
-    })?;
+    let idle = fidelity.kind().idle_gpu();
+    let mut device = Device::open(choices.backend, &choices.gpu, idle)?;
     let made = fidelity.kind().couple(&problem, &mut device)?;
     warnings.extend(device.reason.clone());
     warnings.extend(made.warnings);

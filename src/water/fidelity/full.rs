@@ -4,7 +4,7 @@ use super::kind::{FidelityKind, Knob};
 use crate::Result;
 use crate::geometry::Gap;
 use crate::water::device::Device;
-use crate::water::method::kind::{BodyMethod, Problem};
+use crate::water::method::kind::Problem;
 use crate::water::submerged::Made;
 
 /// Gaps narrower than this many edges are left to contact.
@@ -27,10 +27,6 @@ impl FidelityKind for Full {
 
     fn couple(&self, problem: &Problem, device: &mut Device) -> Result<Made> {
         problem.method.couple(problem, device)
-    }
-
-    fn idle_gpu(&self, method: &dyn BodyMethod) -> Result<Option<&'static str>> {
-        method.check_gpu().map(|()| None)
     }
 
     fn resolved_gap(&self, _: f64, edge: f64) -> f64 {

@@ -6,7 +6,7 @@ use crate::adjoint::lie::Mat6;
 use crate::coupling;
 use crate::geometry::Gap;
 use crate::water::device::Device;
-use crate::water::method::kind::{BodyMethod, Problem};
+use crate::water::method::kind::Problem;
 use crate::water::submerged::{Discretisation, Made, SubmergedBody, once, shared};
 use crate::water::surface::overlaps;
 
@@ -82,10 +82,8 @@ impl FidelityKind for Isolated {
         })
     }
 
-    fn idle_gpu(&self, _: &dyn BodyMethod) -> Result<Option<&'static str>> {
-        Ok(Some(
-            "the fidelity isolated runs on the CPU: it has nothing to compute on the backend gpu",
-        ))
+    fn idle_gpu(&self) -> Option<&'static str> {
+        Some("the fidelity isolated runs on the CPU: it has nothing to compute on the backend gpu")
     }
 
     fn resolved_gap(&self, _: f64, _: f64) -> f64 {

@@ -4,7 +4,7 @@ use crate::Result;
 use crate::adjoint::lie::Pose;
 use crate::geometry::Gap;
 use crate::water::device::Device;
-use crate::water::method::kind::{BodyMethod, Problem};
+use crate::water::method::kind::Problem;
 use crate::water::numerics::{Numerics, Plan};
 use crate::water::submerged::Made;
 
@@ -71,9 +71,9 @@ pub(crate) trait FidelityKind: Send + Sync {
     /// The coupling of the bodies.
     fn couple(&self, problem: &Problem, device: &mut Device) -> Result<Made>;
 
-    /// Whether a GPU has something to compute with this method; if not, why.
-    fn idle_gpu(&self, _: &dyn BodyMethod) -> Result<Option<&'static str>> {
-        Ok(None)
+    /// Why a GPU has nothing to compute, if it hasn't.
+    fn idle_gpu(&self) -> Option<&'static str> {
+        None
     }
 
     /// The gap that it resolves where compressed bodies resolve `compressed` and the mesh has edges of `edge`, m.

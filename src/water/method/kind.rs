@@ -76,11 +76,6 @@ pub(crate) trait BodyMethod: Send + Sync {
     fn may_touch(&self) -> bool {
         true
     }
-
-    /// Refuses the GPU for all bodies solved together where that is done on the CPU alone.
-    fn check_gpu(&self) -> Result<()> {
-        Ok(())
-    }
 }
 
 /// The bodies in the water, what is around them, and how they are solved.

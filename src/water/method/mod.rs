@@ -9,14 +9,13 @@ mod mfs;
 mod panel;
 
 use crate::boundary;
-use crate::water::backend::Backend;
 use kind::BodyMethod;
 
 listed! {
     /// The method by which a body alone is solved.
     pub enum Method as BodyMethod {
         /// The most accurate that costs nothing at run time: `exact` where there is a formula, else `panel`; with the fidelity
-        /// `full` `panel`, and on a GPU, which has none, `mfs-vertex`.
+        /// `full` `panel`.
         #[default]
         Auto => auto::Auto,
         /// Closed forms, for spheres and ellipsoids by formula.
@@ -32,11 +31,10 @@ listed! {
 
 impl Method {
     /// The method by which all bodies are solved together (fidelity `full`) where this one is asked for.
-    pub fn together(self, backend: Backend) -> Self {
-        match (self, backend) {
-            (Self::Auto, Backend::Cpu) => Self::Panel,
-            (Self::Auto, Backend::Gpu) => Self::MfsVertex,
-            (method, _) => method,
+    pub fn together(self) -> Self {
+        match self {
+            Self::Auto => Self::Panel,
+            method => method,
         }
     }
 }

@@ -1,6 +1,7 @@
 //! Direct boundary elements.
 
 use super::kind::{BodyMethod, Problem, Solved};
+use crate::Result;
 use crate::boundary::PanelBoundary;
 use crate::boundary::panel::{Extrapolated, Richardson};
 use crate::coupling::full::SolveSettings;
@@ -9,7 +10,6 @@ use crate::water::device::Device;
 use crate::water::numerics::Numerics;
 use crate::water::submerged::{Discretisation, Made, SubmergedBody, once, shared};
 use crate::water::surface::Coarse;
-use crate::{Error, Result};
 use std::sync::Arc;
 
 /// Iterations of the coupled panels after which they are given up.
@@ -74,7 +74,7 @@ impl BodyMethod for Panel {
         })
     }
 
-    fn couple(&self, problem: &Problem, _: &mut Device) -> Result<Made> {
+    fn couple(&self, problem: &Problem, device: &mut Device) -> Result<Made> {
         let made = shared(problem.bodies, Meshes::new)?;
         let own: Vec<_> = (made.iter())
             .map(|m| Some(m.known?.coupled(m.coarse.as_ref()?)))
@@ -83,9 +83,10 @@ impl BodyMethod for Panel {
             max_iterations: MOST_ITERATIONS,
             ..problem.numerics.solve
         };
-        let coupled = |meshes: Vec<Arc<PanelBoundary>>| -> Result<PanelCoupled> {
+        let mut coupled = |meshes: Vec<Arc<PanelBoundary>>| -> Result<PanelCoupled> {
             let excluded = problem.excluded.clone();
-            Ok(PanelCoupled::new(meshes, problem.walls, excluded, solve)?.with_added_mass(&own))
+            let made = PanelCoupled::new(meshes, problem.walls, excluded, solve)?;
+            device.panels(made.with_added_mass(&own))
         };
         let fine = coupled(made.iter().map(|m| m.fine.clone()).collect())?;
         // Bodies with different ratios: the largest takes least away.
@@ -119,13 +120,5 @@ impl BodyMethod for Panel {
     // Faces that lie in one another have no side to be seen from.
     fn may_touch(&self) -> bool {
         false
-    }
-
-    fn check_gpu(&self) -> Result<()> {
-        Err(Error::Unsupported {
-            what: "the method panel with the fidelity full and the backend gpu".into(),
-            why: "coupled panels are computed on the CPU alone".into(),
-            instead: "use the backend cpu, or the method mfs-vertex".into(),
-        })
     }
 }

@@ -19,7 +19,8 @@ fn list(value: &serde_json::Value) -> Vec<f64> {
 #[test]
 fn a_run_on_the_gpu_is_the_cpus_and_says_what_it_ran_on() {
     let ball = scene("falling_ball");
-    let base = ["run", &ball, "--faces", "80", "--steps", "2"];
+    // Steps with films run on the CPU.
+    let base = ["run", &ball, "--faces", "80", "--steps", "2", "--no-films"];
     let cpu = json(&base);
     assert_eq!(
         (&cpu["backend"], &cpu["backend_used"]),

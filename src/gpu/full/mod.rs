@@ -1,6 +1,6 @@
 //! The coupled system of [`crate::coupling::full`] on the device.
 //!
-//! In its notation, with everything scaled as [`geometry`] says: strengths `X = [a, λ]` by source,
+//! In its notation, with everything scaled as `geometry` says: strengths `X = [a, λ]` by source,
 //! densities `[μ, r, β]` by face, β = B x̄ and, to begin with, F x̄ where r will stand.
 
 mod geometry;

@@ -1,7 +1,7 @@
 //! The coupled panels of [`crate::coupling::panel`] on the device.
 //!
 //! The CPU stores the blocks of A between bodies; here every entry is made where it is used. In the notation there: densities
-//! `[φ, q]` by panel, μ by centroid, everything scaled as [`geometry`] says. Panels are what faces are to fundamental solutions, and their
+//! `[φ, q]` by panel, μ by centroid, everything scaled as `geometry` says. Panels are what faces are to fundamental solutions, and their
 //! centroids what sources are: A and S, which go from panels to centroids, are transposes of what the shaders call K and P.
 //!
 //! The flow ([`crate::coupling::Coupling::velocity`]) stays on the CPU.

@@ -163,12 +163,9 @@ pub fn compare(gripper: Gripper, count: usize, seed: u64) -> Result<Vec<Compared
 pub fn print(all: &[Compared]) {
     println!("| descent | caught | median cost | lower than plain in |");
     println!("|---|---|---|---|");
-    let ways: [(&str, fn(&Compared) -> Ended); 3] = [
-        ("plain", |c| c.plain),
-        ("softened", |c| c.softened),
-        ("smoothed", |c| c.smoothed),
-    ];
-    for (name, of) in ways {
+    let ended = |c: &Compared| [c.plain, c.softened, c.smoothed];
+    for (k, name) in ["plain", "softened", "smoothed"].into_iter().enumerate() {
+        let of = |c: &Compared| ended(c)[k];
         let mut costs: Vec<f64> = all.iter().map(|c| of(c).cost).collect();
         costs.sort_by(f64::total_cmp);
         println!(

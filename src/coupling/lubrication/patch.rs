@@ -226,17 +226,12 @@ impl Cutter<'_> {
     /// Edges to halve: the longest ones of faces that are too large, and of those that have one of them.
     fn marked(&mut self, faces: &[[usize; 3]]) -> BTreeMap<[usize; 2], usize> {
         let mut marked = BTreeMap::new();
-        let mut mark = |cutter: &mut Self, face: &[usize; 3]| {
-            let edge = edge(face, cutter.longest(face).0);
-            let half = cutter.half(edge);
-            marked.insert(edge, half).is_none()
-        };
         for face in faces {
             if self.wanted(face) {
-                mark(self, face);
+                let edge = edge(face, self.longest(face).0);
+                marked.insert(edge, self.half(edge));
             }
         }
-        drop(mark);
         loop {
             let mut more = false;
             for face in faces {

@@ -23,11 +23,13 @@ struct Gap {
     bearing: Bearing,
     viscosity: Parameter,
     roughness: Parameter,
-    kept: Mutex<VecDeque<(Key, Option<Arc<PlacedBearing>>)>>,
+    kept: Mutex<VecDeque<Kept>>,
 }
 
 /// The pose of the first in the frame of the other, and the roughness.
 type Key = (Pose, f64);
+/// With what is there; none where the gap is open.
+type Kept = (Key, Option<Arc<PlacedBearing>>);
 
 /// A gap with water in it.
 struct Filled<'g> {
@@ -72,7 +74,7 @@ impl Gap {
             other.inverse().compose(own),
             place.parameters[self.roughness],
         );
-        let find = |kept: &VecDeque<(Key, Option<Arc<PlacedBearing>>)>| {
+        let find = |kept: &VecDeque<Kept>| {
             let found = kept.iter().find(|(at, _)| *at == key);
             found.map(|(_, placed)| placed.clone())
         };

@@ -253,7 +253,7 @@ fn wrong_values_are_refused() {
     let refused = |force: Lubrication, words: &[&str]| {
         let mut scene = over_floor(ball(), 0.1, 0.1, 1.0, 1e-5);
         scene.forces = vec![force.into()];
-        says(&scene.validate().unwrap_err(), words);
+        says(scene.validate().unwrap_err(), words);
     };
     refused(
         Lubrication::new(0.0),

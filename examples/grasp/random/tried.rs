@@ -20,15 +20,15 @@ pub struct Tried {
     rollout: Rollout,
 }
 
-/// In cheap water, as the recipe has it: compressed sources alone.
-pub fn simulator(drawn: &Task) -> Result<Simulator> {
-    let settings = Settings::default().fidelity(Fidelity::Reduced).films(false);
-    Simulator::new(&drawn.scene, settings)
+/// In water that is resolved down to contact, or in cheap water: compressed sources alone.
+pub fn simulator(drawn: &Task, resolved: bool) -> Result<Simulator> {
+    let settings = Settings::default().fidelity(Fidelity::Reduced);
+    Simulator::new(&drawn.scene, settings.films(resolved))
 }
 
 impl Function {
     pub fn new(drawn: &Task) -> Result<Self> {
-        let mut simulator = simulator(drawn)?;
+        let mut simulator = simulator(drawn, false)?;
         simulator.set_policy(Box::new(OpenLoop));
         let task = drawn.task.clone();
         let knots = GraspSettings::default().knots;

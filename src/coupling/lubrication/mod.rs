@@ -14,11 +14,11 @@
 //! surfaces has the part that the pressure's own flow exerts there. S is Couette's shear. C acts on the relative twist alone and is positive
 //! semi-definite: what it takes from one body it gives to the other, and it never makes energy.
 //!
-//! Surfaces touch at the tips of their roughness r: H = d + r at the distance d, and where they overlap H falls to r/2 ([`thickness`]), so that C is
+//! Surfaces touch at the tips of their roughness r: H = d + r at the distance d, and where they overlap H falls to r/2 (`thickness`), so that C is
 //! finite at contact.
 //!
-//! It is solved by elements on one body's own surface that follow 1/H² ([`element`]), whose faces are cut smaller, on the exact shape where there is one, until
-//! the thickness changes by a factor of about two within any ([`patch`]): a ball over a wall at a gap of a thousandth of its radius presses on a spot far smaller than a face. How faces are cut
+//! It is solved by elements on one body's own surface that follow 1/H² (`element`), whose faces are cut smaller, on the exact shape where there is one, until
+//! the thickness changes by a factor of about two within any (`patch`): a ball over a wall at a gap of a thousandth of its radius presses on a spot far smaller than a face. How faces are cut
 //! is a decision of the pose: derivatives keep it, and C jumps where it changes by what the discretisation is off there, which no
 //! energy comes from.
 //!

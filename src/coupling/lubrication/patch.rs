@@ -5,6 +5,7 @@ use super::thickness::thickness;
 use crate::adjoint::lie::{Pose, Vec3};
 use crate::geometry::Field;
 use std::collections::BTreeMap;
+use std::collections::btree_map::Entry;
 
 /// Largest ratio of the thicknesses within a face where they are least, and the power of the thickness with which more is allowed: the pressure is less there.
 const RATIO: f64 = 3.0;
@@ -237,9 +238,8 @@ impl Cutter<'_> {
             for face in faces {
                 if (0..3).any(|k| marked.contains_key(&edge(face, k))) {
                     let edge = edge(face, self.longest(face).0);
-                    if !marked.contains_key(&edge) {
-                        let half = self.half(edge);
-                        marked.insert(edge, half);
+                    if let Entry::Vacant(place) = marked.entry(edge) {
+                        place.insert(self.half(edge));
                         more = true;
                     }
                 }

@@ -1,7 +1,8 @@
 //! Bodies that come near one another: added mass along the gap, and its slope, by every fidelity against converged panels.
 //!
 //! `cargo bench --bench gap [-- CASE …] [--quick] [--plot]`: the cases whose names contain one of the words, or all. `--quick` with fewer gaps
-//! and a coarser reference; `--plot` writes the errors to docs/gap.svg as well. Gaps are in units of a radius or half a side; masses over the water's
+//! and a coarser reference; `--plot` writes the errors to docs/gap.svg as well. `--estimates` holds what runs estimate their errors to be against
+//! them, on these cases and on others; `--accuracy` varies that for a sphere over a wall. Gaps are in units of a radius or half a side; masses over the water's
 //! density, m³, slopes m².
 
 #[allow(dead_code)]
@@ -11,7 +12,7 @@ use common::arguments;
 use hydrograd::adjoint::lie::{Vec3, exp_matrix};
 use hydrograd::scene::{Body, Fluid, Joint, Scene, Shape};
 use hydrograd::simulate::Method;
-use hydrograd::{Fidelity, Result, Settings, Simulator};
+use hydrograd::{Controls, Fidelity, Result, Settings, Simulator};
 use nalgebra::DVector;
 use plotters::prelude::*;
 use std::path::Path;
@@ -94,11 +95,20 @@ impl Case {
         Ok([found.mass_matrix[(0, 0)] - dry, -2.0 * force[0]])
     }
 
+    /// What a run with these settings says of the gap: the estimated errors of both.
+    fn estimate(&self, gap: f64, settings: &Settings) -> Result<Option<[f64; 2]>> {
+        let simulator = Simulator::new(&self.scene(gap), settings.clone())?;
+        let rollout = simulator.rollout(&Controls::zeros(&simulator, 0))?;
+        let nearest = rollout.gap_report().nearest;
+        Ok(nearest.map(|near| [near.added_mass_error, near.force_error]))
+    }
+
     /// The limit of ever more faces, and how far the finest are from it.
     fn converged(&self, gap: f64, quick: bool) -> Result<([f64; 2], [f64; 2])> {
         let finest = match (self.shapes.len(), quick) {
             (1, false) => 5120,
             (_, false) => 2880,
+            (1, true) => 1280,
             (_, true) => 720,
         };
         let coarse = self.along(gap, &panels(finest / 4))?;
@@ -130,6 +140,134 @@ fn configurations() -> [(&'static str, Settings); 5] {
     ]
 }
 
+/// Cases that the estimates of errors weren't fitted to.
+fn held_out() -> Vec<Case> {
+    let flat = [[0.0; 3]; 2];
+    let case = |name, shapes: &[Shape], turns, closed, size| Case {
+        name,
+        shapes: shapes.to_vec(),
+        turns,
+        closed,
+        size,
+    };
+    let turned = |x: f64| [[x, 0.0, 0.0], [0.0; 3]];
+    let lying = turned(std::f64::consts::FRAC_PI_2);
+    let egg = Shape::ellipsoid([1.0, 0.7, 0.4]);
+    let tilted = f64::hypot(0.7 * 0.3_f64.sin(), 0.4 * 0.3_f64.cos());
+    let brick = Shape::cuboid([1.0, 0.6, 0.3]);
+    let low = 0.3 * 0.1_f64.sin() + 0.15 * 0.1_f64.cos();
+    let (large, small) = (Shape::sphere(1.0), Shape::sphere(0.4));
+    let long = Shape::ellipsoid([1.0, 0.5, 0.5]);
+    let disc = Shape::cylinder(1.0, 0.5);
+    let plate = Shape::cuboid([2.5, 2.5, 0.4]);
+    let rod = Shape::cylinder(0.4, 2.0);
+    let wedge = Shape::prism([[-0.5, -0.2], [0.5, -0.2], [0.3, 0.2], [-0.3, 0.2]], 0.8);
+    vec![
+        case("egg tilted over a wall", &[egg], turned(0.3), tilted, 0.4),
+        case(
+            "rod lying over a wall",
+            std::slice::from_ref(&rod),
+            lying,
+            0.4,
+            0.4,
+        ),
+        case("rod upright over a wall", &[rod], flat, 1.0, 0.4),
+        case("brick tilted over a wall", &[brick], turned(0.1), low, 0.3),
+        case(
+            "small sphere over a large one",
+            &[small, large],
+            flat,
+            1.4,
+            0.4,
+        ),
+        case("two long ellipsoids", &[long.clone(), long], flat, 1.0, 0.5),
+        case("disc over a plate", &[disc, plate], flat, 0.45, 1.0),
+        case("prism over a wall", &[wedge], flat, 0.2, 0.4),
+    ]
+}
+
+/// Holds the estimates of a run's errors against those: prints all, the least of estimate over error, and the median.
+fn estimates(cases: &[Case], gaps: &[f64], quick: bool) -> Result<()> {
+    let of = |fidelity| Settings::default().fidelity(fidelity).faces(FACES);
+    let configurations = [
+        ("reduced, no films", of(Fidelity::Reduced).films(false)),
+        ("reduced", of(Fidelity::Reduced)),
+        ("auto", of(Fidelity::Auto)),
+        ("panels", panels(FACES)),
+    ];
+    let mut ratios = vec![[Vec::new(), Vec::new()]; configurations.len()];
+    for case in cases {
+        for gap in gaps {
+            let gap = gap * case.size;
+            let (exact, unsure) = case.converged(gap, quick)?;
+            let mut line = format!("| {} | {gap:.4} |", case.name);
+            for ((_, settings), ratios) in configurations.iter().zip(&mut ratios) {
+                let found = case.along(gap, settings);
+                let (Ok(found), Ok(Some(said))) = (found, case.estimate(gap, settings)) else {
+                    line += " refused |";
+                    continue;
+                };
+                let off = [0, 1].map(|k| found[k] / exact[k] - 1.0);
+                for k in 0..2 {
+                    // Against nothing that the reference doesn't know better.
+                    let sure = (unsure[k] / exact[k]).abs();
+                    if off[k].abs() > (3.0 * sure).max([0.003, 0.01][k]) {
+                        ratios[k].push(said[k] / off[k].abs());
+                    }
+                }
+                let percent = |x: f64| 100.0 * x;
+                line += &format!(
+                    " {:+.1} ({:.1}), {:+.1} ({:.1}) |",
+                    percent(off[0]),
+                    percent(said[0]),
+                    percent(off[1]),
+                    percent(said[1])
+                );
+            }
+            println!("{line}");
+        }
+    }
+    for ((name, _), ratios) in configurations.iter().zip(&mut ratios) {
+        for (what, ratios) in ["M", "slope"].iter().zip(ratios) {
+            ratios.sort_by(f64::total_cmp);
+            let Some(least) = ratios.first() else {
+                continue;
+            };
+            let (median, count) = (ratios[ratios.len() / 2], ratios.len());
+            println!(
+                "{name}: {what}: estimate over error {least:.2} at least, {median:.2} at the median of {count}"
+            );
+        }
+    }
+    Ok(())
+}
+
+/// A sphere over a wall with `reduced` and `auto` at several accuracies: errors of M and of its slope, and what a run estimates that of the slope to be.
+fn accuracies() -> Result<()> {
+    println!("| gap | accuracy | reduced | auto |\n|---|---|---|---|");
+    let all = cases();
+    let Some(case) = all.iter().find(|case| case.name == "sphere-wall") else {
+        return Ok(());
+    };
+    for gap in [0.1, 0.05, 0.01] {
+        let (exact, _) = case.converged(gap, false)?;
+        for accuracy in [None, Some(1e-3), Some(1e-4)] {
+            let given = accuracy.map_or("default".into(), |a| format!("{a:.0e}"));
+            let mut line = format!("| {gap} | {given} |");
+            for fidelity in [Fidelity::Reduced, Fidelity::Auto] {
+                let mut settings = Settings::default().fidelity(fidelity).faces(FACES);
+                settings.accuracy = accuracy;
+                let found = case.along(gap, &settings)?;
+                let said = case.estimate(gap, &settings)?.map_or(f64::NAN, |e| e[1]);
+                let off = [0, 1].map(|k| 100.0 * (found[k] / exact[k] - 1.0));
+                line += &format!(" {:+.2}, {:+.1} ({:.1}) |", off[0], off[1], 100.0 * said);
+            }
+            println!("{line}");
+        }
+    }
+    Ok(())
+}
+
 /// Errors of a case, for the picture: of each configuration, at each gap where it answers, of M and of its slope.
 struct Errors {
     case: &'static str,
@@ -145,6 +283,19 @@ fn main() -> std::result::Result<(), Box<dyn std::error::Error>> {
     let chosen =
         |case: &Case| words.is_empty() || words.iter().any(|w| case.name.contains(w.as_str()));
     let begin = Instant::now();
+    if has("--accuracy") {
+        return Ok(accuracies()?);
+    }
+    if has("--estimates") {
+        let chosen: Vec<Case> = cases().into_iter().filter(|c| chosen(c)).collect();
+        println!(
+            "| case | gap, m | reduced, no films | reduced | auto | panels |\n|---|---|---|---|---|---|"
+        );
+        estimates(&chosen, gaps, quick)?;
+        estimates(&held_out(), &[0.3, 0.1, 0.03, 0.01, 0.003], true)?;
+        println!("\n{:.0} s", begin.elapsed().as_secs_f64());
+        return Ok(());
+    }
     let mut all = Vec::new();
     for case in cases().iter().filter(|c| chosen(c)) {
         let mut errors = Errors {

@@ -8,7 +8,7 @@ use crate::interrupt::{long, short};
 use crate::objective::Objective;
 use crate::simulator::Simulator;
 use crate::state::State;
-use hydrograd::simulate::{Cotangents, Recording, Sample, observable};
+use hydrograd::simulate::{Cotangents, GapReport, NearGap, Recording, Sample, observable};
 use nalgebra::DMatrix;
 use numpy::{PyArray1, PyArrayDyn};
 use pyo3::prelude::*;
@@ -374,7 +374,8 @@ impl Rollout {
         Ok(out)
     }
 
-    /// Figures of the whole trajectory: energies (J), drift of momentum (relative), iterations, smallest gap (m), the largest gap
+    /// Figures of the whole trajectory: energies (J), drift of momentum (relative), iterations, smallest gap (m), by what the water
+    /// across gaps is carried and how far off it is estimated to be (`gaps`), the largest gap
     /// at which surfaces are taken to touch (m), steps that were cut into pieces, and the most pieces of one.
     fn summary<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyDict>> {
         let s = self.inner.summary();
@@ -386,6 +387,7 @@ impl Rollout {
         out.set_item("iterations", s.iterations)?;
         out.set_item("asymmetry", s.asymmetry)?;
         out.set_item("min_gap", s.min_gap)?;
+        out.set_item("gaps", gaps(py, &s.gaps)?)?;
         out.set_item("contact_gap", s.contact_gap)?;
         out.set_item("cut_steps", s.cut_steps)?;
         out.set_item("most_pieces", s.most_pieces)?;
@@ -423,4 +425,29 @@ impl Rollout {
             ),
         ))
     }
+}
+
+/// What a summary says of gaps.
+fn gaps<'py>(py: Python<'py>, report: &GapReport) -> PyResult<Bound<'py, PyDict>> {
+    let near = |gap: &Option<NearGap>| -> PyResult<Option<Bound<'py, PyDict>>> {
+        let Some(gap) = gap else {
+            return Ok(None);
+        };
+        let out = PyDict::new(py);
+        out.set_item("time", gap.time)?;
+        out.set_item("gap", gap.gap)?;
+        out.set_item("bodies", gap.bodies.clone())?;
+        out.set_item("carried", gap.carried.to_string())?;
+        out.set_item("added_mass_error", gap.added_mass_error)?;
+        out.set_item("force_error", gap.force_error)?;
+        Ok(Some(out))
+    };
+    let out = PyDict::new(py);
+    out.set_item("nearest", near(&report.nearest)?)?;
+    out.set_item("worst", near(&report.worst)?)?;
+    out.set_item("changes", report.changes)?;
+    let changes = report.first_changes.iter();
+    let changes = changes.map(|c| (c.time, c.bodies.clone(), c.carried.to_string()));
+    out.set_item("first_changes", changes.collect::<Vec<_>>())?;
+    Ok(out)
 }

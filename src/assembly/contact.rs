@@ -159,7 +159,7 @@ fn narrow(
     let (gap, least) = under.max_by(|a, b| (a.1 / a.0.gap).total_cmp(&(b.1 / b.0.gap)))?;
     Some(format!(
         "{} touch at a gap of {:.3e} m, less than the {least:.3e} m ({edges} of the faces' edges) down to which forces of the water are resolved: \
-         once they do, forces across it may be off by several percent and more (`check_gap` measures by how much); use more faces, or give a larger contact.gap",
+         once they do, forces across it may be off by 10 % and more (estimated; `check_gap` measures by how much); use more faces, or give a larger contact.gap",
         between(scene, gap),
         gap.gap
     ))
@@ -257,7 +257,7 @@ fn resolved(water: &Prepared, surfaces: &[Option<Surface>], pair: &ContactPair) 
     }
     let of = |b: usize| {
         let edge = surfaces[b].as_ref().map_or(0.0, Surface::mean_edge);
-        (water.fidelity.kind()).resolved_gap(water.resolved[b].everywhere, edge)
+        (water.fidelity.kind()).resolved_gap(water.gap_model.resolved[b].everywhere, edge)
     };
     match pair.second {
         Other::Body(b) => of(pair.first).max(of(b)),

@@ -15,7 +15,7 @@ use super::output::{
 use crate::Result;
 use crate::error::readable;
 use crate::scene::Scene;
-use crate::simulate::{Controls, GapCheck, GapFlow, Recording};
+use crate::simulate::{Controls, GapCheck, GapFlow, GapReport as GapEstimates, NearGap, Recording};
 
 #[derive(Debug, Args)]
 pub(super) struct Arguments {
@@ -78,6 +78,8 @@ pub(super) struct RunReport {
     pub momentum_drift: f64,
     /// Smallest gap of the whole run, m; null where there is nothing to meet.
     pub min_gap: Option<f64>,
+    /// By what the water across gaps is carried, and its estimated errors: at the smallest gap, and where that of the force is largest; when films came and went.
+    pub gaps: GapEstimates,
     /// What the smallest gap is worth, with `--check-gap`; null without, and where there is nothing to compare.
     pub gap_check: Option<GapReport>,
     /// Which of inertia and viscosity rules the water in the smallest gap; null where there is none.
@@ -146,6 +148,7 @@ fn simulate(
         energy_final: summary.energy_final,
         momentum_drift: summary.momentum_drift,
         min_gap: summary.min_gap,
+        gaps: summary.gaps,
         gap_check,
         gap_flow: rollout.gap_flow()?,
         contact_gap: summary.contact_gap,
@@ -157,6 +160,21 @@ fn simulate(
         files: Vec::new(),
     };
     Ok((report, Recording::of(scene, &rollout)?))
+}
+
+/// A gap's estimated errors in words.
+fn estimated(place: &str, gap: &NearGap) -> String {
+    let (first, second) = &gap.bodies;
+    let second = second
+        .as_ref()
+        .map_or("a wall".into(), |b| format!("{b:?}"));
+    format!(
+        "{place}, {first:?} and {second} at t = {} s, the water is carried by {}: estimated error of the added mass {:.1} %, of the force {:.0} %",
+        readable(gap.time),
+        gap.carried.by(),
+        1e2 * gap.added_mass_error,
+        1e2 * gap.force_error
+    )
 }
 
 impl fmt::Display for RunReport {
@@ -199,6 +217,25 @@ impl fmt::Display for RunReport {
             self.momentum_drift
         )?;
         writeln!(f, "  smallest gap   {}", or_dash(self.min_gap, "m"))?;
+        let worst = self.gaps.worst.as_ref();
+        let nearest = self.gaps.nearest.as_ref();
+        if let Some(near) = nearest {
+            writeln!(f, "  {}", estimated("there", near))?;
+        }
+        if let Some(worst) =
+            worst.filter(|w| nearest.is_some_and(|n| n.force_error < w.force_error))
+        {
+            let place = format!("least certain at a gap of {:.3e} m", worst.gap);
+            writeln!(f, "  {}", estimated(&place, worst))?;
+        }
+        if self.gaps.changes > 0 {
+            writeln!(
+                f,
+                "  films come or go {} times, first at t = {} s",
+                self.gaps.changes,
+                readable(self.gaps.first_changes[0].time)
+            )?;
+        }
         if let Some(gap) = &self.gap_check {
             writeln!(
                 f,

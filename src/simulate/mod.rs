@@ -4,6 +4,8 @@ mod controls;
 mod flow;
 mod gap_check;
 mod gap_flow;
+mod gap_report;
+mod gaps;
 pub mod gradcheck;
 mod gradient;
 pub mod growth;
@@ -24,6 +26,7 @@ pub use controls::Controls;
 pub use flow::FLOW_EDGES;
 pub use gap_check::GapCheck;
 pub use gap_flow::GapFlow;
+pub use gap_report::{Change, GapReport, NearGap};
 pub use gradient::{Cotangents, Gradient, Initial};
 pub use jacobians::Jacobians;
 pub use knots::Knots;
@@ -41,6 +44,6 @@ pub use crate::policy::{
     SpeedStage, SpeedStages,
 };
 pub use crate::water::{
-    AdapterName, Arithmetic, Backend, BackendReport, DeviceReport, Discretisation, ErrorEstimate,
-    Fidelity, GpuSettings, Knob, Level, Method, Numerics, WaterChoices,
+    AdapterName, Arithmetic, Backend, BackendReport, Carried, DeviceReport, Discretisation,
+    ErrorEstimate, Fidelity, GapError, GpuSettings, Knob, Level, Method, Numerics, WaterChoices,
 };

@@ -13,7 +13,7 @@ use crate::scene::Scene;
 use crate::{Error, Result};
 
 /// What a recording holds unless told otherwise, in its order.
-const RECORDED: [&str; 5] = ["q", "v", "energy", "momentum", "min_gap"];
+const RECORDED: [&str; 6] = ["q", "v", "energy", "momentum", "min_gap", "gap_error"];
 
 /// What is written of a run: one row for the start and one after each step. SI units.
 #[derive(Clone, Debug)]
@@ -42,7 +42,7 @@ pub struct Recorded {
 }
 
 impl Recording {
-    /// Every state of a rollout of a scene: coordinates, velocities, energy, momentum and the smallest gap.
+    /// Every state of a rollout of a scene: coordinates, velocities, energy, momentum, the smallest gap and the estimated error across it.
     ///
     /// # Errors
     /// A value that can't be found ([`Observable::value`]).

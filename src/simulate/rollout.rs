@@ -2,7 +2,7 @@
 
 use super::observable::{Reading, observable, transpose, velocity};
 use super::trajectory::Seed;
-use super::{Cotangents, Gradient, Initial, Sample, Simulator};
+use super::{Cotangents, GapReport, Gradient, Initial, Sample, Simulator};
 use crate::adjoint::lie::Vec6;
 use crate::adjoint::step::{self, Tape};
 use crate::dynamics::{ContactForce, Drive, State, StepBar, StepRecord};
@@ -45,6 +45,8 @@ pub struct Summary {
     pub asymmetry: f64,
     /// Smallest gap between bodies or to a wall, m; none where there is nothing to meet.
     pub min_gap: Option<f64>,
+    /// By what the water across gaps is carried, and how far off it is estimated to be.
+    pub gaps: GapReport,
     /// Largest gap at which surfaces are taken to touch, m; none where the scene has no contact.
     pub contact_gap: Option<f64>,
     /// Steps that were cut into pieces, being too long for what moved in them.
@@ -117,6 +119,10 @@ impl Rollout {
             parameters: self.simulator.parameters(),
             sample: &self.samples()[n],
             gap: Box::new(move || self.gaps()[n]),
+            gap_error: Box::new(move || {
+                let gap = self.gaps()[n]?;
+                self.simulator.gap_error(&gap, &self.samples()[n].poses)
+            }),
             contacts: Box::new(move || {
                 n.checked_sub(1)
                     .map_or(Ok(Vec::new()), |n| self.contacts(n, 0.0))
@@ -162,6 +168,7 @@ impl Rollout {
                 .map(|s| s.report.asymmetry)
                 .fold(0.0, f64::max),
             min_gap: self.nearest().map(|(_, gap)| gap.distance),
+            gaps: self.gap_report(),
             contact_gap: (self.simulator.contact_gaps().iter())
                 .map(|g| g.gap)
                 .reduce(f64::max),

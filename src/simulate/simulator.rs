@@ -5,9 +5,9 @@ use crate::adjoint::lie::Pose;
 use crate::assembly::{self, Assembled, Choices};
 use crate::coupling::CouplingReport;
 use crate::dynamics::{ContactGap, ContactModel, Parameters, State, Stepper, System};
-use crate::geometry::{Gap, Gaps, TriMesh};
+use crate::geometry::{Gap, Gaps, Other, TriMesh};
 use crate::scene::Scene;
-use crate::water::{Clearance, Subject, surfaces, world_axes};
+use crate::water::{Clearance, GapError, Subject, surfaces, world_axes};
 use crate::{Error, Result};
 use nalgebra::{DMatrix, DVector};
 use std::path::Path;
@@ -324,11 +324,42 @@ impl Simulator {
         states: impl Iterator<Item = (f64, &'s [Pose], Gap)>,
     ) -> Option<String> {
         let fidelity = self.fidelity_acting();
-        let clearance = self.clearance();
-        let warning = smallest.and_then(|(time, gap)| clearance.warning(time, &gap, fidelity));
-        let unresolved = || clearance.unresolved(states, &self.assembled.water.resolved);
-        let by_sources = fidelity.kind().compresses() && !clearance.films;
-        warning.or_else(|| by_sources.then(unresolved).flatten())
+        let (clearance, model) = (self.clearance(), &self.assembled.water.gap_model);
+        if !fidelity.coupled() || model.carried.is_none() {
+            return smallest.and_then(|(time, gap)| clearance.warning(time, &gap, fidelity));
+        }
+        if fidelity.kind().compresses() && !clearance.films {
+            let error = |gap: &Gap, poses: &[Pose]| model.error(clearance, gap, poses);
+            return clearance.unresolved(states, &model.resolved, error);
+        }
+        let errors = states.filter_map(|(time, poses, gap)| {
+            let error = model.error(clearance, &gap, poses)?;
+            Some((time, gap, error))
+        });
+        let worst = errors.max_by(|a, b| a.2.force.total_cmp(&b.2.force));
+        worst.and_then(|(time, gap, error)| clearance.estimated(time, &gap, error))
+    }
+
+    /// The estimated error of the water across a gap at these poses of all bodies.
+    pub(super) fn gap_error(&self, gap: &Gap, poses: &[Pose]) -> Option<GapError> {
+        let coupled = self.fidelity_acting().coupled();
+        let model = &self.assembled.water.gap_model;
+        let error = || model.error(self.clearance(), gap, poses);
+        coupled.then(error).flatten()
+    }
+
+    /// The pairs that have films at these poses.
+    pub(super) fn films(&self, poses: &[Pose]) -> Vec<(usize, Other)> {
+        let model = &self.assembled.water.gap_model;
+        let gaps = self.gaps().all(poses);
+        let film = |gap: &&Gap| model.reach(gap).is_some_and(|reach| gap.distance < reach);
+        let pairs = gaps.iter().filter(film).map(|g| (g.first, g.second));
+        pairs.collect()
+    }
+
+    /// The widest gap that has a film, m; 0 where there is none.
+    pub(super) fn widest_film(&self) -> f64 {
+        self.assembled.water.gap_model.widest()
     }
 
     /// Added mass of all bodies in the water at the start.

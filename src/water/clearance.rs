@@ -1,6 +1,7 @@
 //! How near the bodies are to one another and to the walls, and what that means for the flow.
 
 use super::fidelity::Fidelity;
+use super::gap_error::GapError;
 use super::resolved::{Resolved, narrowest};
 use super::surface::{Surface, overlaps, touches};
 use crate::adjoint::lie::Pose;
@@ -20,6 +21,8 @@ const MOST_SHARED: f64 = 0.5;
 const BY_SOURCES: f64 = 3.5;
 /// A gap is thin where it is less than this part of the radius of a disc with the area over which the surfaces are parallel.
 const THIN: f64 = 0.4;
+/// Estimated error of the force across a gap that the user is told of.
+const TOLD: f64 = 0.15;
 /// Energy of the film in a gap, in that of the water that the smaller body displaces, from which sources that lose it are refused.
 const LOST: f64 = 0.2;
 
@@ -41,6 +44,8 @@ pub(crate) struct Clearance {
     contact: bool,
     /// Volumes of the bodies, m³.
     volumes: Vec<f64>,
+    /// Number of the walls.
+    pub walls: usize,
     /// Whether the flow is made by sources inside the bodies, which no flat gap is resolved by.
     pub by_sources: bool,
     /// Whether the flow has a solution where bodies touch.
@@ -95,6 +100,7 @@ impl Clearance {
                 .iter()
                 .map(|s| s.as_ref().map_or(0.0, |s| s.properties.volume))
                 .collect(),
+            walls: scene.walls.len(),
             by_sources: false,
             may_touch: true,
             films: false,
@@ -277,15 +283,53 @@ impl Clearance {
         }
     }
 
+    /// Radius of the ball as large as the smaller one of the bodies at a gap, m.
+    pub fn size(&self, gap: &Gap) -> f64 {
+        let volumes = gap.sides().map(|(b, _)| self.volumes[b]);
+        (0.75 / PI * volumes.fold(f64::INFINITY, f64::min)).cbrt()
+    }
+
+    /// That the force across the smallest gap at the start isn't as accurate as the added mass is aimed to be.
+    pub fn aimed(&self, gap: &Gap, error: GapError, aim: f64) -> String {
+        format!(
+            "{} start {:.3e} m apart, with {} between: the force across is estimated to be off by {:.1} %, the added mass along by {:.1} %, for {:.2} % aimed at",
+            self.place(gap),
+            gap.distance,
+            error.carried.by(),
+            100.0 * error.force,
+            100.0 * error.added_mass,
+            100.0 * aim
+        )
+    }
+
+    /// What the user should know of the water across a gap that is estimated to be so far off.
+    pub fn estimated(&self, time: f64, gap: &Gap, error: GapError) -> Option<String> {
+        (error.force > TOLD).then(|| {
+            format!(
+                "{}: the smallest gap, {:.3e} m at t = {} s, is narrower than is resolved with edges of {:.3e} m: the force of the water across it, by {}, may be off by \
+                 {:.0} %, the added mass along it by {:.1} % (estimated; `check_gap` measures it); use more faces, refine the bodies there (`refine`), or end the run before{}",
+                self.place(gap),
+                gap.distance.max(0.0),
+                readable(time),
+                gap.edge,
+                error.carried.by(),
+                100.0 * error.force,
+                100.0 * error.added_mass,
+                self.hint(gap)
+            )
+        })
+    }
+
     /// The gap that is smallest against what compressed bodies resolve, if it isn't resolved. `states`
-    /// are times, poses and smallest gaps; `resolved` what each body resolves.
+    /// are times, poses and smallest gaps; `resolved` what each body resolves, and `error` estimates that across a gap.
     pub fn unresolved<'a>(
         &self,
         states: impl Iterator<Item = (f64, &'a [Pose], Gap)>,
         resolved: &[Resolved],
+        error: impl Fn(&Gap, &[Pose]) -> Option<GapError>,
     ) -> Option<String> {
         let coarsest = resolved.iter().map(|r| r.everywhere).fold(0.0, f64::max);
-        let mut worst: Option<(f64, f64, Gap, f64)> = None;
+        let mut worst: Option<(f64, f64, Gap, f64, &[Pose])> = None;
         for (time, poses, smallest) in states {
             if smallest.distance >= coarsest {
                 continue;
@@ -295,22 +339,25 @@ impl Clearance {
                     && ratio < 1.0
                     && worst.is_none_or(|w| ratio < w.0)
                 {
-                    worst = Some((ratio, time, gap, limit));
+                    worst = Some((ratio, time, gap, limit, poses));
                 }
             }
         }
-        let (ratio, time, gap, limit) = worst?;
+        let (ratio, time, gap, limit, poses) = worst?;
+        let error = error(&gap, poses)?;
         let limit = match gap.second {
             Other::Body(_) => limit,
             Other::Wall(_) => 0.5 * limit,
         };
         Some(format!(
             "{}: the smallest gap, {:.3e} m at t = {} s, is {ratio:.2} of what their compressed sources \
-         resolve ({limit:.3e} m): forces across it may be off by several percent and more (`check_gap` measures by how much); use a \
-         smaller resolved gap, or the fidelity full with more faces, or end the run before",
+         resolve ({limit:.3e} m): the force across it may be off by {:.0} %, the added mass along it by {:.1} % (estimated; `check_gap` measures it); turn films on, or end the run \
+         before",
             self.place(&gap),
             gap.distance.max(0.0),
-            readable(time)
+            readable(time),
+            100.0 * error.force,
+            100.0 * error.added_mass
         ))
     }
 }

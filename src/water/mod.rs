@@ -41,6 +41,8 @@ mod estimate;
 mod fidelity;
 #[cfg(test)]
 mod film_limits;
+mod gap_error;
+mod gap_model;
 #[cfg(test)]
 mod lubrication_limits;
 mod method;
@@ -55,6 +57,7 @@ pub use choices::WaterChoices;
 pub(crate) use choices::surfaces;
 pub use estimate::{ErrorEstimate, Level};
 pub use fidelity::{Fidelity, Knob};
+pub use gap_error::{Carried, GapError};
 pub use method::Method;
 pub use numerics::Numerics;
 pub use submerged::Discretisation;

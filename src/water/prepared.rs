@@ -4,7 +4,8 @@ use super::choices::WaterChoices;
 use super::clearance::Clearance;
 use super::device::Device;
 use super::fidelity::Fidelity;
-use super::fidelity::kind::Planned;
+use super::fidelity::kind::{Planned, StartGap};
+use super::gap_model::GapModel;
 use super::method::kind::{BodyMethod, Problem};
 use super::numerics::Plan;
 use super::resolved::Resolved;
@@ -12,7 +13,8 @@ use super::submerged::{Discretisation, SubmergedBody};
 use crate::Result;
 use crate::adjoint::lie::Pose;
 use crate::coupling::Coupling;
-use crate::geometry::{Gap, Other};
+use crate::coupling::reduced::compress::CompressSettings;
+use crate::geometry::{Gap, Gaps, Other};
 use crate::scene::Scene;
 use nalgebra::DMatrix;
 use std::path::{Path, PathBuf};
@@ -31,9 +33,8 @@ pub(crate) struct Prepared {
     pub method: &'static dyn BodyMethod,
     /// What each body in the water became.
     pub discretisation: Vec<Discretisation>,
-    /// Smallest gap that the discretisation of each body of the scene resolves, m; zero where it isn't limited but by
-    /// its mesh.
-    pub resolved: Vec<Resolved>,
+    /// What estimates of the error across gaps need, with what each body resolves.
+    pub gap_model: GapModel,
     /// What was chosen for each body and pair.
     pub plan: Plan,
     /// What was chosen, and why.
@@ -48,6 +49,9 @@ pub(crate) struct Prepared {
 
 /// The narrowest gap that films resolve, in edges: the forces between round bodies are then 7 to 8 % off, between flat ones less.
 const FILM_EDGES: f64 = 0.1;
+
+/// What the flow that compression leaves out is worth in the added mass.
+const LEFT_OUT: f64 = 0.012;
 
 /// Couples the bodies of a scene, which start at `poses` (all bodies of the scene).
 ///
@@ -99,6 +103,31 @@ pub(crate) fn prepare(
             regions: d.resolved_regions.clone(),
         };
     }
+    let mut tolerances = vec![0.0; scene.bodies.len()];
+    for (k, (b, d)) in numbers.iter().zip(&made.bodies).enumerate() {
+        tolerances[*b] = tolerance(problem.chosen(k), d);
+    }
+    let in_scene = |(first, other, reach): &(usize, Other, f64)| {
+        let other = match other {
+            Other::Body(b) => Other::Body(numbers[*b]),
+            wall => *wall,
+        };
+        (numbers[*first], other, *reach)
+    };
+    let gap_model = GapModel {
+        carried: made.carried.filter(|_| scene.fluid.density > 0.0),
+        tolerances,
+        reaches: made.films.iter().map(in_scene).collect(),
+        resolved,
+    };
+    let mut reasons = planned.reasons;
+    if choices.fidelity.kind().chooses()
+        && let Some(gap) = clearance.moving.smallest(poses)
+        && let Some(error) = gap_model.error(&clearance, &gap, poses)
+        && error.force > choices.numerics.accuracy
+    {
+        reasons.push(clearance.aimed(&gap, error, choices.numerics.accuracy));
+    }
     Ok(Prepared {
         bodies: numbers,
         coupling: made.coupling.into(),
@@ -106,14 +135,22 @@ pub(crate) fn prepare(
         fidelity,
         method,
         discretisation: made.bodies,
-        resolved,
+        gap_model,
         plan: planned.plan,
-        reasons: planned.reasons,
+        reasons,
         device,
         clearance,
         warnings,
         folder: folder.map(Path::to_path_buf),
     })
+}
+
+/// The error of compression: what was aimed at, or by what is left where the number of points was given.
+fn tolerance(chosen: &CompressSettings, made: &Discretisation) -> f64 {
+    match chosen.rank {
+        Some(_) => (made.scattered_error * LEFT_OUT).max(chosen.tolerance.min(LEFT_OUT)),
+        None => chosen.tolerance,
+    }
 }
 
 /// The fidelity to use, and what is chosen for the scene.
@@ -130,21 +167,29 @@ fn plan(
     }
     let poses: Vec<Pose> = numbers.iter().map(|b| all[*b]).collect();
     let number = |b: usize| numbers.iter().position(|w| *w == b);
-    let in_water = |gap: Gap| {
+    let start = |gaps: &Gaps, gap: Gap| {
         let second = match gap.second {
             Other::Body(b) => Other::Body(number(b)?),
             wall => wall,
         };
         let first = number(gap.first)?;
-        Some(Gap {
-            first,
-            second,
-            ..gap
+        Some(StartGap {
+            film: clearance.film(gaps, &gap, all).1,
+            gap: Gap {
+                first,
+                second,
+                ..gap
+            },
         })
     };
+    let start = &start;
     let both = [&clearance.moving, &clearance.rigid].into_iter();
-    let gaps = both.flat_map(|gaps| gaps.all(all).into_iter().filter_map(in_water));
-    let gaps: Vec<Gap> = gaps.collect();
+    let gaps = both.flat_map(|gaps| {
+        gaps.all(all)
+            .into_iter()
+            .filter_map(move |g| start(gaps, g))
+    });
+    let gaps: Vec<StartGap> = gaps.collect();
     let planned = fidelity.kind().plan(problem, &poses, &gaps)?;
     Ok((Fidelity::Reduced, planned))
 }

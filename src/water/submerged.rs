@@ -1,10 +1,11 @@
 //! The bodies in the water, what is around them, and what was made of them.
 
+use super::gap_error::Carried;
 use super::surface::{Coarse, Surface, pose, semi_axes};
 use crate::adjoint::lie::{Mat6, Pose, Vec3};
 use crate::coupling::Coupling;
 use crate::coupling::reduced::Region;
-use crate::geometry::{Refinement, Solid, TriMesh};
+use crate::geometry::{Other, Refinement, Solid, TriMesh};
 use crate::multibody::Tree;
 use crate::scene::Scene;
 use crate::{Error, Result};
@@ -37,6 +38,10 @@ pub(crate) struct Made {
     /// What each body became.
     pub bodies: Vec<Discretisation>,
     pub warnings: Vec<String>,
+    /// By what the water in gaps is carried; none where nothing is known of its error.
+    pub carried: Option<Carried>,
+    /// Gaps from which on there are films, m, by the bodies' numbers in the water.
+    pub films: Vec<(usize, Other, f64)>,
 }
 
 /// How a body is seen by the coupling, and how well.

@@ -254,12 +254,19 @@ fn run_summarises_and_writes_the_trajectory() {
         let csv = std::fs::read_to_string(Path::new(&out).join("trajectory.csv")).unwrap();
         let rows: Vec<Vec<&str>> = csv.lines().map(|l| l.split(',').collect()).collect();
         assert_eq!(rows.len(), 8);
-        assert!(rows.iter().all(|r| r.len() == 1 + 4 + 4 + 1 + 6 + 1));
+        assert!(rows.iter().all(|r| r.len() == 1 + 4 + 4 + 1 + 6 + 1 + 2));
         assert!(
             rows[1..]
                 .iter()
-                .flatten()
+                .flat_map(|r| &r[..17])
                 .all(|x| x.parse::<f64>().is_ok_and(f64::is_finite))
+        );
+        // Errors are estimated where bodies are coupled.
+        let estimated = |r: &Vec<&str>| r[17..].iter().all(|x| x.parse::<f64>().is_ok());
+        assert!(
+            rows[1..]
+                .iter()
+                .all(|r| estimated(r) == (fidelity != "isolated"))
         );
 
         let second = json(&arguments);

@@ -212,7 +212,11 @@ fn film_systems() -> Vec<Reduced> {
         let surfaces = built.iter().map(|(mesh, _, solid)| (mesh, solid.as_ref()));
         let filmed = plain.clone();
         let filmed = filmed
-            .with_films(&surfaces.collect::<Vec<_>>(), walls)
+            .with_films(
+                &surfaces.collect::<Vec<_>>(),
+                &[compress::CompressSettings::default().tolerance; 2],
+                walls,
+            )
             .unwrap();
         let momenta = |s: &Reduced| {
             s.evaluate(&poses(), &case().basis)

@@ -7,6 +7,7 @@ mod exact;
 mod films;
 mod flow;
 mod gap_check;
+mod gap_error;
 mod methods;
 mod near;
 mod one_body;

@@ -1,9 +1,9 @@
 //! Which films there are, and from which gap on they carry what the sources don't resolve.
 
-use super::Reduced;
+use super::{Reduced, compress};
 use crate::adjoint::lie::Pose;
 use crate::coupling::film::{Film, FilmSurface, PlacedFilm, Side, Width};
-use crate::geometry::{Image, Opposite, Solid, TriMesh, Wall, WallSurface};
+use crate::geometry::{Image, Opposite, Other, Solid, TriMesh, Wall, WallSurface};
 use crate::{Error, Result};
 use nalgebra::DMatrix;
 use rayon::prelude::*;
@@ -12,27 +12,32 @@ use std::sync::Arc;
 /// The gap below which compressed sources are held apart, in what they resolve, times the area of a body over that of the ball of equal volume: flat bodies
 /// have less room for sources. Where regions resolve more it is what they resolve.
 const REACH: f64 = 1.4;
+/// Power of the compression's tolerance by which gaps narrow in which its sources are right.
+const FINER: f64 = 0.6;
 /// How far they are held apart at contact, in that.
 const FLOOR: f64 = 0.25;
 
 impl Reduced {
     /// The same with films in the gaps between bodies, and to rigid walls, that the sources don't resolve: from the surface of each body in its own frame, and its
-    /// shape by formula where it has one.
+    /// shape by formula where it has one, and the tolerance to which it was compressed.
     ///
     /// # Errors
-    /// [`Error::Input`] if there isn't one surface for each body, or for a wall without normal.
+    /// [`Error::Input`] if there isn't one surface and tolerance for each body, or for a wall without normal.
     pub fn with_films(
         mut self,
         surfaces: &[(&TriMesh, Option<&Solid>)],
+        tolerances: &[f64],
         walls: &[Wall],
     ) -> Result<Self> {
         let count = self.bodies.len();
-        if surfaces.len() != count {
-            return Err(Error::input(
-                "films: surfaces",
-                surfaces.len(),
-                format!("give one for each of {count} bodies"),
-            ));
+        for (what, given) in [
+            ("films: surfaces", surfaces.len()),
+            ("films: tolerances", tolerances.len()),
+        ] {
+            if given != count {
+                let expected = format!("give one for each of {count} bodies");
+                return Err(Error::input(what, given, expected));
+            }
         }
         let mut sides: Vec<(Arc<FilmSurface>, Arc<Opposite>)> = Vec::with_capacity(count);
         for (b, (mesh, solid)) in surfaces.iter().enumerate() {
@@ -47,10 +52,13 @@ impl Reduced {
         }
         let reach = |b: usize| {
             let fit = &self.bodies[b].parts().fit;
-            match fit.regions.is_empty() {
+            // Sources of a smaller tolerance are right in narrower gaps, and more than films are.
+            let finer = (tolerances[b] / compress::CompressSettings::default().tolerance).min(1.0);
+            let reach = match fit.regions.is_empty() {
                 true => REACH * sides[b].0.flatness * fit.resolved_gap,
                 false => fit.finest(),
-            }
+            };
+            reach * finer.powf(FINER)
         };
         let film = |body: usize, other, opposite: &Arc<Opposite>, reach: f64| {
             let floor = FLOOR * reach;
@@ -76,6 +84,25 @@ impl Reduced {
         }
         self.films = films;
         Ok(self)
+    }
+
+    /// The gap from which on each pair has a film, m: a body's number, and another's or a wall's.
+    ///
+    /// # Errors
+    /// A wall without normal.
+    pub(crate) fn film_reaches(&self, walls: &[Wall]) -> Result<Vec<(usize, Other, f64)>> {
+        let mut images = Vec::with_capacity(walls.len());
+        for wall in walls {
+            images.push(Image::of_walls(std::slice::from_ref(wall))?[1]);
+        }
+        let reach = |film: &Film| {
+            let other = match film.other {
+                Side::Body(b) => Other::Body(b),
+                Side::Wall(image) => Other::Wall(images.iter().position(|i| *i == image)?),
+            };
+            Some((film.body, other, film.width.reach))
+        };
+        Ok(self.films.iter().filter_map(reach).collect())
     }
 
     /// The films at the poses; none of gaps that are wide.

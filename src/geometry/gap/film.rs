@@ -24,10 +24,21 @@ impl Gaps {
     }
 
     fn facing(&self, body: usize, other: Other, gap: f64, poses: &[Pose]) -> f64 {
+        self.near(body, other, (1.0 + PARALLEL) * gap, poses)
+    }
+
+    /// The area of the faces of one of the bodies at a gap whose centres are no farther from the other than `limit` (m), m²; the larger one of both.
+    pub(crate) fn area_within(&self, gap: &Gap, limit: f64, poses: &[Pose]) -> f64 {
+        let sides = gap.sides();
+        let areas = sides.map(|(body, other)| self.near(body, other, limit, poses));
+        areas.fold(0.0, f64::max)
+    }
+
+    fn near(&self, body: usize, other: Other, limit: f64, poses: &[Pose]) -> f64 {
         let Some(Some(tree)) = self.trees.get(body) else {
             return 0.0;
         };
-        let near = self.faces_within(body, other, (1.0 + PARALLEL) * gap, poses);
+        let near = self.faces_within(body, other, limit, poses);
         near.iter().map(|(f, _)| tree.area(*f)).sum()
     }
 

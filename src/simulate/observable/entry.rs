@@ -1,6 +1,6 @@
 //! What an entry gives, and what it reads.
 
-use super::super::Sample;
+use super::super::{GapError, Sample};
 use crate::Result;
 use crate::adjoint::lie::Vec6;
 use crate::dynamics::{ContactForce, Parameters, System};
@@ -54,6 +54,8 @@ pub struct Reading<'a> {
     pub sample: &'a Sample,
     /// Gives the smallest gap, if there is anything to meet; it may have to be measured.
     pub gap: Box<dyn Fn() -> Option<Gap> + 'a>,
+    /// Estimates the error of the water across it, where one is known.
+    pub gap_error: Box<dyn Fn() -> Option<GapError> + 'a>,
     /// Finds the contacts of the step that ended there; none at the start.
     pub contacts: Box<dyn Fn() -> Result<Vec<ContactForce>> + 'a>,
 }

@@ -30,6 +30,7 @@ pub const OBSERVABLES: &[&dyn Observable] = &[
     &momentum::Momentum,
     &angular_momentum::AngularMomentum,
     &gap::SmallestGap,
+    &gap::Error,
     &contact::Forces,
 ];
 

@@ -226,7 +226,7 @@ impl<'a> Case<'a> {
     /// Where a gap is narrower than its compressed bodies resolve, their charges aren't what the first
     /// order takes them for: the root of what the gap lacks.
     fn narrowness(&self) -> f64 {
-        let resolved = &self.subject.water.resolved;
+        let resolved = &self.subject.water.gap_model.resolved;
         let clearance = &self.subject.water.clearance;
         let poses = self.subject.poses;
         let lacks = |gaps: &Gaps| {

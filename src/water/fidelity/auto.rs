@@ -6,7 +6,7 @@
 //! coupling is below the aim fades out. What a body must resolve follows from the smallest gap that it
 //! starts with.
 
-use super::kind::{FidelityKind, Knob, Planned};
+use super::kind::{FidelityKind, Knob, Planned, StartGap};
 use super::reduced::Reduced;
 use crate::adjoint::lie::{Pose, Vec3};
 use crate::boundary::exact::lamb;
@@ -29,6 +29,9 @@ const SAFETY: f64 = 1.5;
 const NEAR: f64 = 0.8;
 /// What is resolved, of the smallest gap at the start: bodies may come nearer.
 const ROOM: f64 = 0.6;
+/// The same where the water between flat parts has so much of the energy: there what compression leaves out weighs more.
+const ROOM_FLAT: f64 = 0.3;
+const FLAT: f64 = 0.05;
 /// Bodies that start apart may come near: they resolve this many times the gap that they would without a plan.
 const COARSEST: f64 = 2.0;
 /// Under this many times the finest gap bodies are compressed no worse than `Reduced` does by default.
@@ -53,7 +56,7 @@ impl FidelityKind for Auto {
         true
     }
 
-    fn plan(&self, problem: &Problem, poses: &[Pose], gaps: &[Gap]) -> Result<Planned> {
+    fn plan(&self, problem: &Problem, poses: &[Pose], gaps: &[StartGap]) -> Result<Planned> {
         plan(problem, poses, gaps)
     }
 
@@ -83,7 +86,7 @@ impl FidelityKind for Auto {
 }
 
 /// Chooses for the bodies at the start, for an error of the coupling of the accuracy that is aimed at.
-fn plan(problem: &Problem, poses: &[Pose], gaps: &[Gap]) -> Result<Planned> {
+fn plan(problem: &Problem, poses: &[Pose], gaps: &[StartGap]) -> Result<Planned> {
     let (bodies, walls, aim) = (problem.bodies, problem.walls, problem.numerics.accuracy);
     if !(aim > 0.0 && aim < 1.0) {
         return Err(Error::input(
@@ -107,11 +110,16 @@ fn plan(problem: &Problem, poses: &[Pose], gaps: &[Gap]) -> Result<Planned> {
             strength(&properties)?,
             poses[b].apply(&mesh.bounding_ball().center),
         ));
-        let near = gaps.iter().filter(|gap| gap.touches(b));
-        let smallest = near.map(Gap::image_distance).fold(f64::INFINITY, f64::min);
+        let near = || gaps.iter().filter(|start| start.gap.touches(b));
+        let distances = near().map(|start| start.gap.image_distance());
+        let smallest = distances.fold(f64::INFINITY, f64::min);
+        let room = match near().any(|start| start.film > FLAT) {
+            true => ROOM_FLAT,
+            false => ROOM,
+        };
         let finest = compress::finest_gap(mesh.surface_area());
         let coarsest = COARSEST * compress::default_gap(properties.volume, mesh.surface_area());
-        let gap = (ROOM * smallest).clamp(finest, coarsest);
+        let gap = (room * smallest).clamp(finest, coarsest);
         // What compression leaves out is worth more the nearer the gap, in the force above all.
         let tolerance = match smallest < CLOSE * finest {
             true => (COMPRESSION * aim).min(compress::CompressSettings::default().tolerance),

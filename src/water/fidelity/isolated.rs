@@ -74,6 +74,8 @@ impl FidelityKind for Isolated {
         let made = shared(problem.bodies, |b| Own::new(problem, b))?;
         warnings.extend(once(&made, |m| &m.warnings));
         Ok(Made {
+            carried: None,
+            films: Vec::new(),
             bodies: problem.named(made.iter().map(|m| m.as_made.clone())),
             coupling: Box::new(coupling::Isolated::new(
                 made.iter().map(|m| m.added_mass).collect(),

@@ -30,6 +30,14 @@ pub(crate) struct Planned {
     pub reasons: Vec<String>,
 }
 
+/// A gap between bodies at the start, or to a wall.
+pub(crate) struct StartGap {
+    /// By the numbers of the bodies in the water.
+    pub gap: Gap,
+    /// Energy of the film between parallel parts, in that of the water that the smaller body displaces.
+    pub film: f64,
+}
+
 /// A model of how the bodies feel each other.
 pub(crate) trait FidelityKind: Send + Sync {
     /// The choices that it alone, or with others, looks at.
@@ -60,11 +68,11 @@ pub(crate) trait FidelityKind: Send + Sync {
         false
     }
 
-    /// What it chooses for bodies that start at `poses` with these `gaps` between them and to the walls, by their numbers in the water, if it does.
+    /// What it chooses for bodies that start at `poses` with these `gaps` between them and to the walls, if it does.
     ///
     /// # Errors
     /// An accuracy out of range, or bodies that no choice is known for.
-    fn plan(&self, _: &Problem, _: &[Pose], _: &[Gap]) -> Result<Planned> {
+    fn plan(&self, _: &Problem, _: &[Pose], _: &[StartGap]) -> Result<Planned> {
         Ok(Planned::default())
     }
 

@@ -6,6 +6,7 @@ use crate::boundary::Response;
 use crate::coupling::reduced::{self, ReducedBody, Region, cache, compress};
 use crate::geometry::{Gap, TriMesh};
 use crate::water::device::Device;
+use crate::water::gap_error::Carried;
 use crate::water::method::kind::{BodyMethod, Problem};
 use crate::water::numerics::Numerics;
 use crate::water::submerged::{Discretisation, Made, SubmergedBody};
@@ -49,7 +50,10 @@ impl FidelityKind for Reduced {
                 ..Discretisation::default()
             });
         }
+        let films = coupling.film_reaches(problem.walls)?;
         Ok(Made {
+            carried: Some(Carried::Sources),
+            films,
             warnings: warnings(problem, made),
             bodies: problem.named(as_made),
             coupling: device.reduced(coupling)?,
@@ -60,24 +64,9 @@ impl FidelityKind for Reduced {
         compressed
     }
 
-    // Without films it is said pair by pair: what is resolved differs between bodies.
-    fn gap_warning(
-        &self,
-        gap: &Gap,
-        edges: f64,
-        place: &str,
-        time: &str,
-        hint: &str,
-    ) -> Option<String> {
-        let resolved = edges * gap.edge;
-        (gap.distance < resolved).then(|| {
-            format!(
-                "{place}: the smallest gap, {:.3e} m at t = {time} s, is narrower than the films between the bodies resolve ({resolved:.3e} m, {edges} of the edges there): \
-                 forces across it may be off by several percent and more (`check_gap` measures by how much); use more faces, refine the bodies there (`refine`), or end \
-                 the run before{hint}",
-                gap.distance.max(0.0)
-            )
-        })
+    // It is said by its estimated error.
+    fn gap_warning(&self, _: &Gap, _: f64, _: &str, _: &str, _: &str) -> Option<String> {
+        None
     }
 
     fn error(&self, bodies: f64, residual: Option<f64>, _: Option<f64>) -> Option<f64> {
@@ -108,7 +97,8 @@ pub(in crate::water) fn compressed_all(problem: &Problem) -> Result<reduced::Red
             let coarse = body.coarse.filter(|_| !body.regions.is_empty());
             surfaces.push((coarse.map_or(mesh, |c| &c.mesh), body.solid));
         }
-        coupling = coupling.with_films(&surfaces, problem.walls)?;
+        let tolerances: Vec<f64> = (0..bodies.len()).map(|b| problem.tolerance(b)).collect();
+        coupling = coupling.with_films(&surfaces, &tolerances, problem.walls)?;
     }
     coupling.excluding(&problem.excluded)
 }

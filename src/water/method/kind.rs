@@ -126,6 +126,13 @@ impl<'a> Problem<'a> {
         planned.unwrap_or(&self.numerics.compress)
     }
 
+    /// The tolerance of body `b`'s compression; where its number of points was given, the default.
+    pub fn tolerance(&self, b: usize) -> f64 {
+        let chosen = self.chosen(b);
+        let default = CompressSettings::default().tolerance;
+        chosen.rank.map_or(chosen.tolerance, |_| default)
+    }
+
     /// What each body became, with its name.
     pub fn named(&self, made: impl IntoIterator<Item = Discretisation>) -> Vec<Discretisation> {
         let named = |(d, body): (Discretisation, &SubmergedBody)| Discretisation {

@@ -60,6 +60,8 @@ impl BodyMethod for Mfs {
             make(body.name, mesh, &settings)
         })?;
         Ok(Made {
+            carried: None,
+            films: Vec::new(),
             warnings: once(&made, |m| &m.warnings),
             bodies: problem.named(made.iter().map(|m| Discretisation {
                 method: self.label(),

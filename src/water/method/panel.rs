@@ -7,6 +7,7 @@ use crate::boundary::panel::{Extrapolated, Richardson};
 use crate::coupling::full::SolveSettings;
 use crate::coupling::{Coupling, ExtrapolatedPanels, PanelCoupled};
 use crate::water::device::Device;
+use crate::water::gap_error::Carried;
 use crate::water::numerics::Numerics;
 use crate::water::submerged::{Discretisation, Made, SubmergedBody, once, shared};
 use crate::water::surface::Coarse;
@@ -100,6 +101,8 @@ impl BodyMethod for Panel {
             Box::new(fine)
         };
         Ok(Made {
+            carried: Some(Carried::Panels),
+            films: Vec::new(),
             warnings: once(&made, |m| &m.fine.warnings),
             bodies: problem.named(made.iter().map(|m| Discretisation {
                 method: self.label(),

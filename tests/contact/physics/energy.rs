@@ -1,8 +1,9 @@
 //! Energy through contact, over random scenes of two bodies and a floor.
 
 use super::{Samples, above_floor, contact, elastic, released, run, simulator, velocities};
+use hydrograd::dynamics::Integrator;
 use hydrograd::scene::{Body, Scene, Shape};
-use hydrograd::{Fidelity, Simulator};
+use hydrograd::{Fidelity, Settings, Simulator};
 use nalgebra::DVector;
 
 /// Two bodies that fall, turn and meet.
@@ -105,7 +106,11 @@ fn contact_gives_back_no_more_than_it_stored() {
         scenes.push((Fidelity::Reduced, scene));
     }
     for (k, (fidelity, scene)) in scenes.iter().enumerate() {
-        for x in exchanges(&simulator(scene, *fidelity), 160) {
+        // Without films surfaces touch at gaps so wide that no step is cut: what is stored is that of whole steps.
+        let settings = Settings::default().fidelity(*fidelity);
+        let settings = settings.films(*fidelity != Fidelity::Reduced);
+        let settings = settings.integrator(Integrator::MomentumEuler);
+        for x in exchanges(&Simulator::new(scene, settings).unwrap(), 160) {
             let rounding = 1e-11 * (x.kinetic + x.stored);
             assert!(
                 x.gained <= x.released + rounding,

@@ -1,0 +1,170 @@
+//! How far off the water across a gap is estimated to be, from what is known without solving anything.
+//!
+//! Three numbers tell most of it. With h the gap, e the length of the faces' edges there, R the radius of the relative curvature of both surfaces (from
+//! the area over which they are near; without end between flat ones) and r the gap that compressed sources resolve, as far as the image behind a wall:
+//!
+//! ```text
+//! q = h/r (2h/r to a wall), times (0.003/tolerance)^0.6       sources: the part of the force that they lose, or add between flat faces
+//! s = e²/(8 R h)                                              films and panels: how far the faces lie inside the surfaces, in the gap
+//! R over the radius of the ball of equal volume               round, or flat
+//! ```
+//!
+//! The constants are fitted to `cargo bench --bench gap` (docs/accuracy-coupled.md), whose truths they are not to fall under by more than a factor of three.
+
+use serde::Serialize;
+use strum::{Display, IntoStaticStr};
+
+/// By what the water across a gap is carried.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Display, IntoStaticStr)]
+#[serde(rename_all = "lowercase")]
+#[strum(serialize_all = "lowercase")]
+pub enum Carried {
+    /// Compressed sources, as they are.
+    Sources,
+    /// Compressed sources that are held apart, and a film in the gap.
+    Film,
+    /// Panels on the faces.
+    Panels,
+}
+
+impl Carried {
+    /// In words.
+    pub(crate) fn by(self) -> &'static str {
+        match self {
+            Self::Sources => "compressed sources",
+            Self::Film => "a film",
+            Self::Panels => "panels",
+        }
+    }
+}
+
+/// Estimated errors of the water across a gap.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize)]
+pub struct GapError {
+    /// By what it is carried.
+    pub carried: Carried,
+    /// Of the added mass along the gap, relative.
+    pub added_mass: f64,
+    /// Of its slope along the gap, and so of the force, relative.
+    pub force: f64,
+}
+
+/// What is known of a gap.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Across {
+    /// m.
+    pub gap: f64,
+    /// Edges of the faces there, m.
+    pub edge: f64,
+    /// Radius of the relative curvature, m.
+    pub curvature: f64,
+    /// Of the ball as large as the smaller body, m.
+    pub size: f64,
+    /// The gap, as far as the image behind a wall, over what compressed sources resolve.
+    pub ratio: f64,
+    /// Relative error that compression aims at.
+    pub tolerance: f64,
+    /// The gap from which on there is a film, m.
+    pub reach: Option<f64>,
+}
+
+/// Curvature of relative radius, in sizes: up to the first surfaces are round, from the second on flat.
+const FLAT: [f64; 2] = [1.5, 4.5];
+/// The tolerance at which what sources resolve was measured, and how their reach into gaps grows as it falls.
+const TOLERANCE: f64 = 0.003;
+const FINER: f64 = 0.6;
+/// What sources lose of the force at the gap that they resolve, and the powers of the ratio by which they do below and above it.
+const LOST: f64 = 0.085;
+const BELOW: f64 = -1.0;
+const ABOVE: f64 = -1.6;
+/// The same between flat surfaces, where they add to it.
+const ADDED: f64 = 0.3;
+const ADDED_BELOW: f64 = -2.5;
+const ADDED_ABOVE: f64 = -4.0;
+/// The relative curvature, in sizes, of which that is; it goes with it.
+const ADDED_AT: f64 = 7.0;
+/// Of the force, by bodies that are solved alone, however wide the gap is.
+const OWN: f64 = 0.005;
+/// Most that an estimate says.
+const MOST: f64 = 10.0;
+/// Of the force through a film between round and between flat surfaces, and how it grows as faces lie further inside.
+const FILM: [f64; 2] = [0.05, 0.04];
+const FACETS: f64 = 0.13;
+/// Of panels, and between flat surfaces what they add below a tenth of an edge.
+const PANELS: f64 = 0.01;
+const THIN: f64 = 0.08;
+/// Parts of the force's error in that of the added mass: of round surfaces, and what flat ones add to it in a film.
+const MASS: f64 = 0.1;
+const MASS_FLAT: f64 = 0.5;
+
+impl Across {
+    /// 0 between round surfaces, 1 between flat ones.
+    pub fn flatness(&self) -> f64 {
+        let [round, flat] = FLAT;
+        ((self.curvature / self.size - round) / (flat - round)).clamp(0.0, 1.0)
+    }
+
+    /// By sources as they are.
+    pub fn by_sources(&self) -> GapError {
+        let q = self.ratio * (TOLERANCE / self.tolerance).powf(FINER);
+        let lost = match q < 1.0 {
+            true => LOST * q.powf(BELOW),
+            false => LOST * q.powf(ABOVE),
+        };
+        let power = if q < 1.0 { ADDED_BELOW } else { ADDED_ABOVE };
+        let added = ADDED * self.curvature / self.size / ADDED_AT * q.powf(power);
+        let flat = self.flatness();
+        let own = OWN + self.tolerance;
+        let force = (own + (1.0 - flat) * lost / (1.0 + lost) + flat * added).min(MOST);
+        GapError {
+            carried: Carried::Sources,
+            added_mass: OWN + self.tolerance + MASS * force,
+            force,
+        }
+    }
+
+    /// How far the faces lie inside, in the gap.
+    fn inside(&self) -> f64 {
+        self.edge.powi(2) / (8.0 * self.curvature * self.gap)
+    }
+
+    /// By a film that has taken all over.
+    fn by_film(&self) -> GapError {
+        let flat = self.flatness();
+        let base = (1.0 - flat) * FILM[0] + flat * FILM[1];
+        let force = base + FACETS * (4.0 * self.inside()).ln_1p();
+        GapError {
+            carried: Carried::Film,
+            added_mass: OWN + self.tolerance + (MASS + MASS_FLAT * flat) * force,
+            force,
+        }
+    }
+
+    /// By what compressed bodies have there: a film, once the gap is so narrow, takes over soon, by 1 − (h/h_m)³.
+    pub fn compressed(&self) -> GapError {
+        let sources = self.by_sources();
+        let Some(reach) = self.reach.filter(|reach| self.gap < *reach) else {
+            return sources;
+        };
+        let (film, left) = (self.by_film(), (self.gap / reach).powi(3));
+        let mix = |film: f64, sources: f64| film + left * (sources - film);
+        GapError {
+            carried: Carried::Film,
+            added_mass: mix(film.added_mass, sources.added_mass),
+            force: mix(film.force, sources.force),
+        }
+    }
+
+    /// By panels.
+    pub fn by_panels(&self) -> GapError {
+        let flat = self.flatness();
+        let thin = 0.1 * self.edge / self.gap;
+        let force =
+            PANELS + FACETS * (2.0 * self.inside()).ln_1p() + flat * THIN * thin / (1.0 + thin);
+        GapError {
+            carried: Carried::Panels,
+            added_mass: OWN + (MASS + MASS_FLAT * flat) * force,
+            force,
+        }
+    }
+}

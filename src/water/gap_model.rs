@@ -1,0 +1,99 @@
+//! What is known of a scene's gaps, and the estimated error of the water across them.
+
+use super::clearance::Clearance;
+use super::gap_error::{Across, Carried, GapError};
+use super::resolved::{Resolved, narrowest};
+use crate::adjoint::lie::Pose;
+use crate::geometry::{Gap, Other};
+use std::f64::consts::PI;
+
+/// Of the added mass, what films in the corner of two walls lose where both gaps are closed, of flat bodies; and the part of that for round ones.
+const CORNER: f64 = 0.5;
+const ROUND_CORNER: f64 = 0.1;
+/// Distance beyond a gap within which surfaces count as near, in the larger of the gap and the edges there.
+const BEYOND: f64 = 0.2;
+/// Least of gaps and curvatures, in edges.
+const LEAST: f64 = 1e-6;
+
+/// What estimates need of a scene's water, by the numbers of its bodies.
+#[derive(Clone, Debug, Default)]
+pub(crate) struct GapModel {
+    /// By what the water is carried; none where nothing is known.
+    pub carried: Option<Carried>,
+    /// Relative error that compression aims at, per body.
+    pub tolerances: Vec<f64>,
+    /// The gaps from which on there are films, m.
+    pub reaches: Vec<(usize, Other, f64)>,
+    /// What compressed bodies resolve.
+    pub resolved: Vec<Resolved>,
+}
+
+impl GapModel {
+    /// The gap from which on a pair has a film, m.
+    pub fn reach(&self, gap: &Gap) -> Option<f64> {
+        let same = |(first, second, _): &&(usize, Other, f64)| {
+            (*first, *second) == (gap.first, gap.second)
+                || gap.second == Other::Body(*first) && *second == Other::Body(gap.first)
+        };
+        self.reaches.iter().find(same).map(|(_, _, reach)| *reach)
+    }
+
+    /// The widest gap that has a film, m; 0 where there is none.
+    pub fn widest(&self) -> f64 {
+        let films = self.reaches.iter().map(|(_, _, reach)| *reach);
+        films.fold(0.0, f64::max)
+    }
+
+    /// What is known of a gap at these poses.
+    pub fn across(&self, clearance: &Clearance, gap: &Gap, poses: &[Pose]) -> Across {
+        let gaps = &clearance.moving;
+        let distance = gap.distance.max(LEAST * gap.edge);
+        // Between round surfaces the area within a distance d more than the gap is 2πRd.
+        let beyond = BEYOND * distance.max(gap.edge);
+        let near = gaps.area_within(gap, distance + beyond, poses);
+        let (ratio, _) = narrowest(gaps, gap, poses, &self.resolved).unwrap_or((1.0, 0.0));
+        let tolerances = gap.sides().map(|(b, _)| self.tolerances.get(b));
+        Across {
+            gap: distance,
+            edge: gap.edge,
+            curvature: (near / (2.0 * PI * beyond)).max(LEAST * gap.edge),
+            size: clearance.size(gap),
+            ratio: ratio.max(LEAST),
+            tolerance: tolerances.flatten().fold(0.0, |a, b| b.max(a)),
+            reach: self.reach(gap),
+        }
+    }
+
+    /// The estimate at a gap; none with fidelities and methods that none is known for.
+    pub fn error(&self, clearance: &Clearance, gap: &Gap, poses: &[Pose]) -> Option<GapError> {
+        let across = self.across(clearance, gap, poses);
+        if self.carried? == Carried::Panels {
+            return Some(across.by_panels());
+        }
+        let mut error = across.compressed();
+        let corner = self.corner(clearance, gap, poses) * (ROUND_CORNER + across.flatness());
+        error.added_mass += CORNER * corner;
+        error.force += 2.0 * CORNER * corner;
+        Some(error)
+    }
+
+    /// How far a body's films at two walls are into the corner between them, where each takes the other's gap for the open.
+    fn corner(&self, clearance: &Clearance, gap: &Gap, poses: &[Pose]) -> f64 {
+        let into = |gap: &Gap| {
+            let reach = self.reach(gap).unwrap_or(0.0);
+            let part = (1.0 - gap.distance / reach).clamp(0.0, 1.0);
+            if reach > 0.0 { part.powi(3) } else { 0.0 }
+        };
+        let own = into(gap);
+        if own == 0.0 || clearance.walls < 2 || !matches!(gap.second, Other::Wall(_)) {
+            return 0.0;
+        }
+        let all = clearance.moving.all(poses);
+        let others = all.iter().filter(|other| {
+            other.first == gap.first
+                && other.second != gap.second
+                && matches!(other.second, Other::Wall(_))
+        });
+        own * others.map(into).fold(0.0, f64::max)
+    }
+}

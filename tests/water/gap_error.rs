@@ -1,0 +1,201 @@
+//! What runs estimate of the water across gaps, and that it goes on smoothly where a film takes over.
+
+use hydrograd::adjoint::lie::{Vec3, exp_matrix};
+use hydrograd::scene::{Body, Fluid, Joint, Scene, Shape};
+use hydrograd::simulate::{Carried, NearGap};
+use hydrograd::{Controls, Fidelity, Settings, Simulator};
+use nalgebra::DVector;
+use std::f64::consts::FRAC_PI_4;
+
+/// The first body over the second, or over a wall, on a rail along the gap.
+struct Case {
+    name: &'static str,
+    shapes: Vec<Shape>,
+    turns: [[f64; 3]; 2],
+    closed: f64,
+    size: f64,
+}
+
+const START: f64 = 0.3;
+
+fn cases() -> Vec<Case> {
+    let flat = [[0.0; 3]; 2];
+    let case = |name, shapes: &[&Shape], turns, closed, size| Case {
+        name,
+        shapes: shapes.iter().map(|s| (*s).clone().faces(720)).collect(),
+        turns,
+        closed,
+        size,
+    };
+    let (ball, disc) = (Shape::sphere(1.0), Shape::cylinder(1.0, 0.25));
+    let (brick, capsule) = (Shape::cuboid([1.0, 1.0, 0.5]), Shape::capsule(0.25, 1.0));
+    let thin = Shape::ellipsoid([1.0, 1.0, 0.25]);
+    let across = [[0.0, 2.0 * FRAC_PI_4, 0.0], [2.0 * FRAC_PI_4, 0.0, 0.0]];
+    let on_edge = [[FRAC_PI_4, 0.0, 0.0], [0.0; 3]];
+    vec![
+        case("sphere-sphere", &[&ball, &ball], flat, 2.0, 1.0),
+        case("sphere-wall", &[&ball], flat, 1.0, 1.0),
+        case("ellipsoid-wall", &[&thin], flat, 0.25, 1.0),
+        case("disc-wall", &[&disc], flat, 0.125, 1.0),
+        case("box-wall", &[&brick], flat, 0.25, 0.5),
+        case("box-box", &[&brick, &brick], flat, 0.5, 0.5),
+        case("edge-wall", &[&brick], on_edge, 0.75 / f64::sqrt(2.0), 0.5),
+        case("capsule-capsule", &[&capsule, &capsule], across, 0.5, 0.25),
+    ]
+}
+
+impl Case {
+    fn simulator(&self, settings: &Settings) -> Simulator {
+        let mut scene = Scene::new(Fluid {
+            density: 1.0,
+            current: [0.0; 3],
+        });
+        if self.shapes.len() == 1 {
+            scene.add_wall([0.0; 3], [0.0, 0.0, 1.0]);
+        }
+        for (b, shape) in self.shapes.iter().enumerate() {
+            let up = exp_matrix(&Vec3::from(self.turns[b])).transpose() * Vec3::z();
+            let (height, joint) = match b {
+                0 => {
+                    let axis = up.into();
+                    (self.closed + START * self.size, Joint::Prismatic { axis })
+                }
+                _ => (0.0, Joint::Fixed),
+            };
+            let body = Body::new(shape.clone()).density(1.0).joint(joint);
+            scene.add(body.at([0.0, 0.0, height]).rotated(self.turns[b]));
+        }
+        Simulator::new(&scene, settings.clone()).unwrap()
+    }
+
+    /// What a run says of a gap.
+    fn said(&self, simulator: &Simulator, gap: f64) -> NearGap {
+        let mut there = simulator.clone();
+        let q = DVector::from_element(1, gap - START * self.size);
+        there.set_start(q, DVector::zeros(1)).unwrap();
+        let rollout = there.rollout(&Controls::zeros(&there, 0)).unwrap();
+        let report = rollout.gap_report();
+        assert_eq!(report.nearest, report.worst);
+        let near = report.nearest.unwrap();
+        assert!((near.gap - gap).abs() < 1e-9 * self.size, "{}", self.name);
+        near
+    }
+
+    /// Added mass along the gap, and its slope.
+    fn along(&self, simulator: &Simulator, gap: f64) -> [f64; 2] {
+        let q = DVector::from_element(1, gap - START * self.size);
+        let stepper = simulator.stepper();
+        let found = stepper.linearise(&q).unwrap();
+        let speed = DVector::from_element(1, 1.0);
+        let force = found.inertial_force(&speed, &DVector::zeros(0)).unwrap();
+        let dry = simulator.parameters().mass(0);
+        [found.mass_matrix[(0, 0)] - dry, -2.0 * force[0]]
+    }
+}
+
+/// From a gap of one to a thousandth: what `auto` has there is estimated to be no worse than sources alone, but for 3 % where a film begins.
+#[test]
+fn what_auto_has_is_no_worse_than_sources_alone() {
+    let auto = Settings::default().fidelity(Fidelity::Auto);
+    for case in cases() {
+        let [with, without] = [auto.clone(), auto.films(false)].map(|s| case.simulator(&s));
+        let mut carried = Vec::new();
+        for k in 0..=18 {
+            let gap = 10f64.powf(-f64::from(k) / 6.0);
+            let near = case.said(&with, gap * case.size);
+            // There is no gap so narrow that nothing is said of it, but sources may refuse it.
+            let gap = gap * case.size;
+            let mut alone = without.clone();
+            let q = DVector::from_element(1, gap - START * case.size);
+            alone.set_start(q, DVector::zeros(1)).unwrap();
+            carried.push(near.carried);
+            let Ok(rollout) = alone.rollout(&Controls::zeros(&alone, 0)) else {
+                continue;
+            };
+            let by_sources = rollout.gap_report().nearest.unwrap();
+            assert_eq!(by_sources.carried, Carried::Sources);
+            println!(
+                "{} {gap:.4}: {} {:.3} {:.3}, sources {:.3} {:.3}",
+                case.name,
+                near.carried,
+                near.added_mass_error,
+                near.force_error,
+                by_sources.added_mass_error,
+                by_sources.force_error
+            );
+            assert!(
+                near.force_error <= by_sources.force_error + 0.03,
+                "{} {gap}: {near:?} {by_sources:?}",
+                case.name
+            );
+        }
+        // From sources to a film, and not back.
+        let films = carried.iter().position(|c| *c == Carried::Film).unwrap();
+        assert!(films > 0 && carried[films..].iter().all(|c| *c == Carried::Film));
+    }
+}
+
+/// Where a film takes over the added mass and its slope go on, and so does the estimate; a run says when.
+#[test]
+fn a_film_takes_over_smoothly() {
+    for case in cases() {
+        let simulator = case.simulator(&Settings::default().fidelity(Fidelity::Auto));
+        let [mut film, mut sources] = [1e-3, 1.0].map(|gap| gap * case.size);
+        while sources - film > 1e-6 * case.size {
+            let middle = 0.5 * (film + sources);
+            match case.said(&simulator, middle).carried {
+                Carried::Film => film = middle,
+                _ => sources = middle,
+            }
+        }
+        let [near, far] = [film, sources].map(|gap| case.along(&simulator, gap));
+        let jump = [0, 1].map(|k| (near[k] / far[k] - 1.0).abs());
+        let [a, b] = [film, sources].map(|gap| case.said(&simulator, gap).force_error);
+        println!(
+            "{}: at {film:.4}, {:.1e} {:.1e}, {a:.4} {b:.4}",
+            case.name, jump[0], jump[1]
+        );
+        assert!(jump[0] < 1e-5 && jump[1] < 1e-3, "{}: {jump:?}", case.name);
+        assert!((a - b).abs() < 1e-4, "{}: {a} {b}", case.name);
+    }
+}
+
+/// A ball that comes at a wall and goes again: a film comes once and goes once, and the trajectory has an estimate at every state.
+#[test]
+fn a_run_says_when_films_come_and_go() {
+    let mut scene = Scene::new(Fluid::fresh_water());
+    scene.add_wall([0.0; 3], [0.0, 0.0, 1.0]);
+    let rail = Joint::Prismatic {
+        axis: [0.0, 0.0, 1.0],
+    };
+    let spring = hydrograd::scene::Contact {
+        stiffness: Some(2e4),
+        gap: Some(0.02),
+        ..Default::default()
+    };
+    scene.contact = Some(spring);
+    let ball = Body::new(Shape::sphere(0.1).faces(320)).named("ball");
+    scene.add(ball.density(1000.0).at([0.0, 0.0, 0.2]).joint(rail));
+    scene.initial.v = vec![-0.5];
+    scene.time_step = 0.01;
+    let simulator = Simulator::new(&scene, Settings::default()).unwrap();
+    let rollout = simulator.rollout(&Controls::zeros(&simulator, 60)).unwrap();
+    let report = rollout.summary().gaps;
+    println!("{report:?}");
+    assert_eq!(report.changes, 2);
+    let [come, gone] = &report.first_changes[..] else {
+        panic!("{report:?}");
+    };
+    assert_eq!(
+        (come.carried, gone.carried),
+        (Carried::Film, Carried::Sources)
+    );
+    assert!(0.0 < come.time && come.time < gone.time);
+    assert_eq!(come.bodies, ("ball".into(), None));
+    let nearest = report.nearest.unwrap();
+    assert_eq!(Some(nearest.gap), rollout.summary().min_gap);
+    assert!(report.worst.unwrap().force_error >= nearest.force_error);
+    let errors = rollout.observe("gap_error").unwrap();
+    assert_eq!(errors.shape(), (2, 61));
+    assert!(errors.iter().all(|x| *x > 0.0 && *x < 1.0));
+}

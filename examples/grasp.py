@@ -296,10 +296,11 @@ def main():
     text = SCENE.read_text()
     dry = hg.Scene.from_toml(text.replace("density = 998.0", "density = 0.0"))
     naive_dry = hg.Simulator(dry, fidelity="isolated").rollout(steps=grasp.STEPS)
-    naive = hg.Simulator(hg.Scene.from_toml(text), fidelity="reduced").rollout(steps=grasp.STEPS)
+    naive = hg.Simulator(hg.Scene.from_toml(text), fidelity="reduced", films=False).rollout(steps=grasp.STEPS)
 
-    # The same scene without the controller: from here on the forces are open-loop.
-    sim = hg.Simulator(grasp.scene(), fidelity="reduced")
+    # The same scene without the controller: from here on the forces are open-loop. The water is the cheap one, of compressed sources alone, that the
+    # forces of grasp.rs are searched in.
+    sim = hg.Simulator(grasp.scene(), fidelity="reduced", films=False)
     knots = Knots(grasp.STEPS)
     rollouts = 0.0
 

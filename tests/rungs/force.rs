@@ -48,13 +48,13 @@ impl At {
     fn new(name: &str) -> Self {
         if name == "lubrication" {
             let (p, control) = (contact::point(), DVector::zeros(0));
-            return Self::at(contact::system(), p.q, p.v, control, p.parameters);
+            return Self::placed(contact::system(), p.q, p.v, control, p.parameters);
         }
         let p = dynamics::point();
-        Self::at(dynamics::system(), p.q, p.v, p.u, p.parameters)
+        Self::placed(dynamics::system(), p.q, p.v, p.u, p.parameters)
     }
 
-    fn at(
+    fn placed(
         system: &'static System,
         q: DVector<f64>,
         v: DVector<f64>,

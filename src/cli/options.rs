@@ -25,7 +25,7 @@ pub(super) struct Water {
     #[arg(long, value_parser = choice::<Method>())]
     pub method: Option<Method>,
     /// Error of the added mass that the fidelities `reduced` and `auto` aim at, relative
-    /// [default: 0.003 for reduced, which adds to that of the bodies themselves; 0.01 for auto].
+    /// [default: 0.003 for reduced, which adds to that of the bodies themselves; 0.01 for auto]. The force across gaps gets more accurate with it.
     #[arg(long, value_name = "ERROR", value_parser = tolerance, allow_negative_numbers = true)]
     pub accuracy: Option<f64>,
     /// With `reduced` alone: points of each compressed body, up to 1000 [default: as many as the accuracy needs].

@@ -83,7 +83,7 @@ fn a_refined_gap_is_one_that_full_resolves() {
         Simulator::new(&scene, full).unwrap().start_gap_warning()
     };
     let said = warning(None).unwrap();
-    assert!(said.contains("narrower than 0.1 of the edges"), "{said}");
+    assert!(said.contains("by panels, may be off by"), "{said}");
     assert!(said.contains("`refine`"), "{said}");
     assert_eq!(warning(Some((0.03, 2.0 * COIN_GAP))), None);
 }

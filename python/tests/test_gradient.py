@@ -255,13 +255,14 @@ def test_lubrication():
     found = rollout.vjp(positions=seed).parameters
     for name in ("lubrication 1.viscosity", "lubrication 1.roughness"):
         base = sim.parameters[name]
-        step = 1e-3 * base
+        # Small enough for the film's faces to be cut alike.
+        step = 1e-4 * base
 
         def value(x, name=name):
             return sim.with_parameters({name: x}).rollout().positions[-1, 0, 2]
 
         slope = (value(base + step) - value(base - step)) / (2 * step)
-        assert found[name] == pytest.approx(slope, rel=1e-5), name
+        assert found[name] == pytest.approx(slope, rel=1e-6), name
     assert hg.Scene.from_toml(scene.to_toml()) == scene
     with pytest.raises(hg.InputError, match="rougness"):
         scene.add_force("lubrication", rougness=1e-4)

@@ -2,13 +2,14 @@
 //!
 //! `cargo bench --bench gap [-- CASE …] [--quick] [--plot]`: the cases whose names contain one of the words, or all. `--quick` with fewer gaps
 //! and a coarser reference; `--plot` writes the errors to docs/gap.svg as well. `--estimates` holds what runs estimate their errors to be against
-//! them, on these cases and on others; `--accuracy` varies that for a sphere over a wall. Gaps are in units of a radius or half a side; masses over the water's
+//! them, on these cases and on others; `--accuracy` varies that for a sphere over a wall; `--time` has what films cost: evaluations and steps with them beside the same
+//! without, and far apart. Gaps are in units of a radius or half a side; masses over the water's
 //! density, m³, slopes m².
 
 #[allow(dead_code)]
 mod common;
 
-use common::arguments;
+use common::{Effort, arguments, settings, step_times};
 use hydrograd::adjoint::lie::{Vec3, exp_matrix};
 use hydrograd::scene::{Body, Fluid, Joint, Scene, Shape};
 use hydrograd::simulate::Method;
@@ -268,6 +269,101 @@ fn accuracies() -> Result<()> {
     Ok(())
 }
 
+/// The least seconds of each of several calls, which take turns.
+fn least<T>(rounds: usize, calls: &mut [&mut dyn FnMut() -> Result<T>]) -> Result<Vec<f64>> {
+    let mut out = vec![f64::INFINITY; calls.len()];
+    for _ in 0..rounds {
+        for (call, least) in calls.iter_mut().zip(&mut out) {
+            let begin = Instant::now();
+            std::hint::black_box(call()?);
+            *least = least.min(begin.elapsed().as_secs_f64());
+        }
+    }
+    Ok(out)
+}
+
+/// What films cost: evaluations of each case at a gap of 0.05, and steps of the grippers, beside the same without films; and of the case at a gap of 1, where there are none.
+fn times(cases: &[Case], words: &[String], quick: bool) -> Result<()> {
+    let rounds = if quick { 50 } else { 400 };
+    let reduced = Settings::default().fidelity(Fidelity::Reduced).faces(FACES);
+    println!(
+        "| case | value: far, no films, films (ms), films/far | with the force | step | with gradient |\n|---|---|---|---|---|"
+    );
+    for case in cases {
+        let configurations = [(1.0, true), (0.05, false), (0.05, true)];
+        let of = |(gap, films): (f64, bool)| {
+            Simulator::new(&case.scene(gap * case.size), reduced.films(films))
+        };
+        let simulators = configurations
+            .map(of)
+            .into_iter()
+            .collect::<Result<Vec<_>>>()?;
+        let (speed, none) = (DVector::from_element(1, 1.0), DVector::zeros(0));
+        let mut line = format!("| {} |", case.name);
+        let mut row = |seconds: &[f64]| {
+            let ms = |k: usize| 1e3 * seconds[k];
+            let times = seconds[2] / seconds[0];
+            line += &format!(" {:.3}, {:.3}, {:.3}, {times:.2} |", ms(0), ms(1), ms(2));
+        };
+        for force in [false, true] {
+            let mut calls: Vec<_> = (simulators.iter())
+                .map(|simulator| {
+                    let (speed, none) = (&speed, &none);
+                    move || {
+                        let found = simulator.stepper().linearise(simulator.start().0)?;
+                        match force {
+                            true => found.inertial_force(speed, none),
+                            false => Ok(found.mass_matrix.column(0).into_owned()),
+                        }
+                    }
+                })
+                .collect();
+            let mut calls: Vec<&mut dyn FnMut() -> Result<DVector<f64>>> =
+                calls.iter_mut().map(|call| call as _).collect();
+            row(&least(rounds, &mut calls)?);
+        }
+        let [mut forward, mut whole] = [vec![f64::INFINITY; 3], vec![f64::INFINITY; 3]];
+        for _ in 0..rounds / 10 {
+            for (k, simulator) in simulators.iter().enumerate() {
+                let effort = Effort {
+                    steps: 10,
+                    repeat: 1,
+                };
+                let found = step_times(simulator, effort)?;
+                forward[k] = forward[k].min(found.forward);
+                whole[k] = whole[k].min(found.gradient);
+            }
+        }
+        row(&forward);
+        row(&whole);
+        println!("{line}");
+    }
+    println!("\n| scene | step: no films, films (ms), ratio | with gradient |\n|---|---|---|");
+    let named = |name: &&str| words.is_empty() || words.iter().any(|w| name.contains(w.as_str()));
+    for name in ["grasp", "gripper"].into_iter().filter(named) {
+        let Some(scene) = common::scene(name) else {
+            continue;
+        };
+        let [mut forward, mut whole] = [[f64::INFINITY; 2]; 2];
+        let of = |films| Simulator::new(&scene, settings("reduced").films(films));
+        let simulators = [of(false)?, of(true)?];
+        for _ in 0..rounds / 50 {
+            for (k, simulator) in simulators.iter().enumerate() {
+                let effort = Effort {
+                    steps: scene.steps,
+                    repeat: 1,
+                };
+                let found = step_times(simulator, effort)?;
+                forward[k] = forward[k].min(found.forward);
+                whole[k] = whole[k].min(found.gradient);
+            }
+        }
+        let row = |s: [f64; 2]| format!("{:.3}, {:.3}, {:.2}", 1e3 * s[0], 1e3 * s[1], s[1] / s[0]);
+        println!("| {name} | {} | {} |", row(forward), row(whole));
+    }
+    Ok(())
+}
+
 /// Errors of a case, for the picture: of each configuration, at each gap where it answers, of M and of its slope.
 struct Errors {
     case: &'static str,
@@ -286,8 +382,17 @@ fn main() -> std::result::Result<(), Box<dyn std::error::Error>> {
     if has("--accuracy") {
         return Ok(accuracies()?);
     }
+    let picked = || {
+        cases()
+            .into_iter()
+            .filter(|c| chosen(c))
+            .collect::<Vec<Case>>()
+    };
+    if has("--time") {
+        return Ok(times(&picked(), &words, quick)?);
+    }
     if has("--estimates") {
-        let chosen: Vec<Case> = cases().into_iter().filter(|c| chosen(c)).collect();
+        let chosen = picked();
         println!(
             "| case | gap, m | reduced, no films | reduced | auto | panels |\n|---|---|---|---|---|---|"
         );

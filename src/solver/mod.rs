@@ -20,7 +20,7 @@ pub(crate) use eigenvalue::{condition, largest_eigenvalue};
 pub use gmres::gmres;
 pub use lu::Lu;
 pub use product::{both_products, normal_product, product, transposed_product};
-pub use sparse::{SparseCholesky, SparsePattern};
+pub use sparse::{SparseCholesky, SparsePattern, elimination_order};
 
 use crate::adjoint::count::Counter;
 

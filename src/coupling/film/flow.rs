@@ -1,25 +1,40 @@
 //! The flow in a film at given poses: its potential, its momentum, and what thickness, rim and facing are to its energy.
 
-use super::Film;
 use super::jet::{Displaced, Jet, Screw, Vector, add, constant, cross, cross_force, dot, parts};
-use super::jet::{product, screw, whole, zero};
+use super::jet::{product, scale, screw, whole, zero};
 use super::layer::{Cell, Layer};
 use super::pull::{Cotangents, Reverse};
 use super::surface::Element;
+use super::{Film, Side};
 use crate::adjoint::lie::{Vec6, point_wrench};
 use crate::solver::{SparseCholesky, SparsePattern};
-use faer::MatMut;
-use nalgebra::{DMatrix, SMatrix};
 use std::sync::{Arc, PoisonError};
 
-/// Components of the twists of both sides, frame of the first.
-pub(super) const TWISTS: usize = 12;
+/// What unit twists of both sides push, and the factors of what answers them.
+pub(super) struct System {
+    /// At the active vertices: ∫ φ (n, x × n) dA over each side.
+    pub loads: Vec<[Vec6; 2]>,
+    /// With the thickness as it is, and held apart.
+    factor: SparseCholesky<2>,
+}
 
-/// A film's potential for unit twists.
-pub(super) struct Solved {
-    factor: SparseCholesky,
-    /// Active vertices × [`TWISTS`].
-    pub potential: DMatrix<f64>,
+impl System {
+    /// div(H ∇ψ) = −flux for twists of both sides in the frame of the first.
+    pub fn potential(&self, twists: &[Vec6; 2]) -> Vec<[f64; 2]> {
+        let push = |load: &[Vec6; 2]| [load[0].dot(&twists[0]) + load[1].dot(&twists[1]); 2];
+        let mut out: Vec<[f64; 2]> = self.loads.iter().map(push).collect();
+        self.factor.solve(&mut out);
+        out
+    }
+
+    /// The impulses of both sides, frame of the first, of a potential as the film is less that held apart.
+    pub fn impulses(&self, apart: impl Iterator<Item = f64>) -> [Vec6; 2] {
+        let mut out = [Vec6::zeros(); 2];
+        for (psi, load) in apart.zip(&self.loads) {
+            (0..2).for_each(|side| out[side] += psi * load[side]);
+        }
+        out
+    }
 }
 
 /// The flow for twists of both sides.
@@ -29,13 +44,11 @@ pub(super) struct Flow<D> {
     /// Of the first, and of the other in the frame of the first.
     twists: [Screw<D>; 2],
     /// At the active vertices, as the film is and held apart.
-    potential: [Vec<D>; 2],
+    potential: Vec<[D; 2]>,
     /// Their difference.
     apart: Vec<D>,
     /// Of both sides in the frame of the first, as the film is less that held apart.
     pub impulses: [Screw<D>; 2],
-    /// What the other's twist pushes in at the corners of each cell, per area of a corner's share and facing.
-    speeds: Vec<[Vector<D>; 3]>,
 }
 
 impl Film {
@@ -54,109 +67,117 @@ impl Film {
         for cell in &layer.cells {
             lower(cell, |a, b, _| entries.push((a, b)));
         }
-        let pattern = Arc::new(SparsePattern::new(active.len(), &entries)?);
+        let mut number = vec![None; self.surface.vertices.len()];
+        for (k, vertex) in active.iter().enumerate() {
+            number[*vertex] = Some(k);
+        }
+        let order: Vec<usize> = (self.surface.order.iter())
+            .filter_map(|vertex| number[*vertex])
+            .collect();
+        let pattern = Arc::new(SparsePattern::new(&order, &entries)?);
         *last = Some((active, pattern.clone()));
         Some(pattern)
     }
 
-    /// div(H ∇ψ) = −flux with the thickness as it is, and held apart.
-    pub(super) fn solve(&self, layer: &Layer<f64>, loads: &DMatrix<f64>) -> Option<[Solved; 2]> {
-        let (n, pattern) = (layer.active.len(), self.pattern(layer)?);
-        let of = |which: usize| {
-            let mut values = layer.rim.clone();
-            for cell in &layer.cells {
-                let element = &self.surface.faces[cell.face];
-                let strength = element.area * cell.thickness[which];
-                lower(cell, |_, _, at| values.push(strength * element.slopes[at]));
-            }
-            let factor = pattern.factor(&values)?;
-            let mut potential = loads.clone();
-            let all = MatMut::from_column_major_slice_mut(potential.as_mut_slice(), n, TWISTS);
-            factor.solve(all);
-            Some(Solved { factor, potential })
-        };
-        Some([of(0)?, of(1)?])
+    /// The system of a layer; `None` where it isn't positive definite.
+    pub(super) fn system(&self, layer: &Layer<f64>) -> Option<System> {
+        let mut values: Vec<[f64; 2]> = layer.rim.iter().map(|rim| [*rim; 2]).collect();
+        for cell in &layer.cells {
+            let element = &self.surface.faces[cell.face];
+            let strength = cell.thickness.map(|t| element.area * t.value);
+            lower(cell, |_, _, at| {
+                values.push(strength.map(|s| s * element.slopes[at]));
+            });
+        }
+        Some(System {
+            loads: self.loads(layer),
+            factor: self.pattern(layer)?.factor(&values)?,
+        })
     }
 
-    /// What unit twists push at the active vertices: ∫ φ (n, x × n) dA over each side.
-    pub(super) fn loads(&self, layer: &Layer<f64>) -> DMatrix<f64> {
-        let mut out = DMatrix::zeros(layer.active.len(), TWISTS);
-        for (v, spot) in layer.active.iter().enumerate() {
-            let own = self.surface.loads[layer.spots[*spot].vertex].transpose();
-            out.fixed_view_mut::<1, 6>(v, 0).copy_from(&own);
+    fn loads(&self, layer: &Layer<f64>) -> Vec<[Vec6; 2]> {
+        let own = |spot: &usize| self.surface.loads[layer.spots[*spot].vertex];
+        let active = layer.active.iter();
+        let mut out: Vec<_> = active.map(|s| [own(s), Vec6::zeros()]).collect();
+        if self.faces_wall() {
+            return out;
         }
         for cell in &layer.cells {
             let element = &self.surface.faces[cell.face];
-            let push = element.area / 3.0 * nalgebra::Vector3::from(cell.facing);
+            let push = element.area / 3.0 * nalgebra::Vector3::from(cell.facing.normal);
             for (at, arm) in cell.corners.iter().zip(&element.arms) {
                 if let Some(at) = at {
-                    let mut row = out.fixed_view_mut::<1, 6>(*at, 6);
-                    row += point_wrench(arm, &push).transpose();
+                    out[*at][1] += point_wrench(arm, &push);
                 }
             }
         }
         out
     }
 
-    /// The flow for body-frame twists, with its rate along the layer's displacement.
+    /// A wall rests.
+    fn faces_wall(&self) -> bool {
+        matches!(self.other, Side::Wall(_))
+    }
+
+    /// The flow for body-frame twists with this potential, and with its rate along the layer's displacement.
     pub(super) fn flow<D: Jet>(
         &self,
-        layer: &Layer<D>,
-        placed: &Displaced<D>,
-        solved: &[Solved; 2],
+        (layer, placed): (&Layer<D>, &Displaced<D>),
+        (system, potential): (&System, &[[f64; 2]]),
         [own, other]: [&Vec6; 2],
     ) -> Flow<D> {
-        let twists = [screw(own), placed.twist_to_body(other)];
-        let values = SMatrix::<f64, TWISTS, 1>::from_fn(|i, _| twists[i / 6][i % 6].re());
-        let (u, w) = parts(&twists[1]);
-        let speed = |arm| add(&u, &cross(&w, &constant(arm)));
-        let faces = layer.cells.iter().map(|c| &self.surface.faces[c.face]);
-        let speeds = faces.map(|f: &Element| [0, 1, 2].map(|i| speed(&f.arms[i])));
         let mut out = Flow {
             other: *other,
-            twists,
+            twists: [screw(own), placed.twist_to_body(other)],
+            potential: potential.iter().map(|psi| psi.map(D::from)).collect(),
             apart: Vec::new(),
             impulses: [[D::from(0.0); 6]; 2],
-            speeds: speeds.collect(),
-            potential: [0, 1].map(|k| {
-                let potential = &solved[k].potential * values;
-                potential.iter().map(|x| D::from(*x)).collect()
-            }),
         };
         // A potential that doesn't move has no rate to be found.
-        let moving = if D::MOVES { &solved[..] } else { &[] };
-        for (which, solved) in moving.iter().enumerate() {
-            let left = self.residual(layer, &out, which);
-            let mut rates: Vec<f64> = left.iter().map(Jet::rate).collect();
-            let n = rates.len();
-            (solved.factor).solve(MatMut::from_column_major_slice_mut(&mut rates, n, 1));
-            for (psi, rate) in out.potential[which].iter_mut().zip(rates) {
-                *psi = D::moving(psi.re(), rate);
+        if D::MOVES {
+            let left = self.residual(layer, &out);
+            let mut rates: Vec<[f64; 2]> = left.iter().map(|x| x.map(|x| x.rate())).collect();
+            system.factor.solve(&mut rates);
+            for (psi, rate) in out.potential.iter_mut().zip(rates) {
+                *psi = [0, 1].map(|k| D::moving(psi[k].re(), rate[k]));
             }
         }
-        let [near, apart] = &out.potential;
-        out.apart = near.iter().zip(apart).map(|(a, b)| *a - *b).collect();
-        out.impulses = self.impulses(layer, &out.apart);
+        out.apart = out.potential.iter().map(|psi| psi[0] - psi[1]).collect();
+        out.impulses = match D::MOVES {
+            true => self.impulses(layer, &out.apart),
+            false => (system.impulses(out.apart.iter().map(|x| x.re()))).map(|x| screw(&x)),
+        };
         out
     }
 
     /// b − A ψ.
-    fn residual<D: Jet>(&self, layer: &Layer<D>, flow: &Flow<D>, which: usize) -> Vec<D> {
-        let psi = &flow.potential[which];
-        let of_rim = layer.rim.iter().zip(psi).map(|(rim, psi)| -*rim * *psi);
-        let mut out: Vec<D> = of_rim.collect();
-        for (out, spot) in out.iter_mut().zip(&layer.active) {
-            let load = &self.surface.loads[layer.spots[*spot].vertex];
-            *out += pushed(load, &flow.twists[0]);
-        }
-        for (cell, speeds) in layer.cells.iter().zip(&flow.speeds) {
+    fn residual<D: Jet>(&self, layer: &Layer<D>, flow: &Flow<D>) -> Vec<[D; 2]> {
+        let psi = &flow.potential;
+        let mut out: Vec<[D; 2]> = (layer.active.iter().zip(&layer.rim).zip(psi))
+            .map(|((spot, rim), psi)| {
+                let load = &self.surface.loads[layer.spots[*spot].vertex];
+                let push = pushed(load, &flow.twists[0]);
+                psi.map(|psi| push - *rim * psi)
+            })
+            .collect();
+        let (u, w) = parts(&flow.twists[1]);
+        let rests = self.faces_wall();
+        for cell in &layer.cells {
             let element = &self.surface.faces[cell.face];
-            let slope = slope_of(cell, element, psi);
+            let slopes = slopes_of(cell, element, psi);
+            let led = [0, 1].map(|k| scale(cell.thickness[k].value, &slopes[k]));
             for (i, at) in cell.corners.iter().enumerate() {
-                if let Some(at) = at {
-                    let led = dot(&slope, &element.gradients.column(i).into_owned());
-                    let push = product(&cell.facing, &speeds[i]) / 3.0;
-                    out[*at] += (push - cell.thickness[which] * led) * element.area;
+                let Some(at) = at else { continue };
+                let gradient = element.gradients.column(i).into_owned();
+                let push = match rests {
+                    true => D::from(0.0),
+                    false => {
+                        let speed = add(&u, &cross(&w, &constant(&element.arms[i])));
+                        product(&cell.facing.normal, &speed) / 3.0
+                    }
+                };
+                for (k, led) in led.iter().enumerate() {
+                    out[*at][k] += (push - dot(led, &gradient)) * element.area;
                 }
             }
         }
@@ -171,17 +192,30 @@ impl Film {
             (0..6).for_each(|i| own[i] += *psi * load[i]);
         }
         let (mut force, mut torque) = (zero(), zero());
-        for cell in &layer.cells {
-            let element = &self.surface.faces[cell.face];
-            for (at, arm) in cell.corners.iter().zip(&element.arms) {
-                if let Some(at) = at {
-                    let push = cell.facing.map(|n| n * psi[*at] * (element.area / 3.0));
-                    force = add(&force, &push);
-                    torque = add(&torque, &cross(&constant(arm), &push));
-                }
-            }
+        let cells = match self.faces_wall() {
+            true => &[],
+            false => &layer.cells[..],
+        };
+        for cell in cells {
+            let (sum, arm) = self.shares(cell, psi);
+            force = add(&force, &scale(sum, &cell.facing.normal));
+            torque = add(&torque, &cross(&arm, &cell.facing.normal));
         }
         [own, whole(&force, &torque)]
+    }
+
+    /// ∫ ψ dA over a cell, and ∫ x ψ dA.
+    fn shares<D: Jet>(&self, cell: &Cell<D>, psi: &[D]) -> (D, Vector<D>) {
+        let element = &self.surface.faces[cell.face];
+        let (mut sum, mut arm) = (D::from(0.0), zero());
+        for (at, x) in cell.corners.iter().zip(&element.arms) {
+            if let Some(at) = at {
+                let share = psi[*at] * (element.area / 3.0);
+                sum += share;
+                (0..3).for_each(|i| arm[i] += share * x[i]);
+            }
+        }
+        (sum, arm)
     }
 
     /// Cotangents of `xᵀ K y`, as the film is less that held apart: −ψ_xᵀ δA ψ_y + ψ_xᵀ δb y + xᵀ δbᵀ ψ_y.
@@ -191,34 +225,37 @@ impl Film {
         x: &Flow<D>,
         y: &Flow<D>,
     ) -> Cotangents<D> {
+        let (same, rests) = (std::ptr::eq(x, y), self.faces_wall());
         let mut out = Cotangents {
             thickness: Vec::with_capacity(layer.cells.len()),
-            facing: Vec::with_capacity(layer.cells.len()),
+            facing: Vec::with_capacity(if rests { 0 } else { layer.cells.len() }),
             rim: Vec::with_capacity(layer.rim.len()),
         };
-        for (c, cell) in layer.cells.iter().enumerate() {
+        for cell in &layer.cells {
             let element = &self.surface.faces[cell.face];
-            out.thickness.push([0, 1].map(|which| {
-                let slope = |flow: &Flow<D>| slope_of(cell, element, &flow.potential[which]);
-                product(&slope(x), &slope(y)) * (SIGNS[which] * -element.area)
-            }));
-            let mut facing = zero();
-            for (i, at) in cell.corners.iter().enumerate() {
-                if let Some(at) = at {
-                    for (flow, other) in [(x, y), (y, x)] {
-                        let share = flow.apart[*at] * (element.area / 3.0);
-                        (0..3).for_each(|k| facing[k] += share * other.speeds[c][i][k]);
-                    }
-                }
+            let by_x = slopes_of(cell, element, &x.potential);
+            let by_y = match same {
+                true => by_x,
+                false => slopes_of(cell, element, &y.potential),
+            };
+            let product = |k: usize| product(&by_x[k], &by_y[k]) * (SIGNS[k] * -element.area);
+            out.thickness.push([0, 1].map(product));
+            if rests {
+                continue;
             }
-            out.facing.push(facing);
+            let led = |flow: &Flow<D>, other: &Flow<D>| {
+                let (sum, arm) = self.shares(cell, &flow.apart);
+                let (u, w) = parts(&other.twists[1]);
+                add(&scale(sum, &u), &cross(&w, &arm))
+            };
+            let facing = led(x, y);
+            out.facing.push(match same {
+                true => facing.map(|x| x * 2.0),
+                false => add(&facing, &led(y, x)),
+            });
         }
-        out.rim = (0..layer.rim.len())
-            .map(|v| {
-                let of = |which: usize| x.potential[which][v] * y.potential[which][v];
-                of(1) - of(0)
-            })
-            .collect();
+        let rim = |(x, y): (&[D; 2], &[D; 2])| x[1] * y[1] - x[0] * y[0];
+        out.rim = x.potential.iter().zip(&y.potential).map(rim).collect();
         out
     }
 
@@ -260,12 +297,14 @@ fn pushed<D: Jet>(load: &Vec6, twist: &Screw<D>) -> D {
     (0..6).map(|i| twist[i] * load[i]).sum()
 }
 
-/// ∇ψ on a face.
-fn slope_of<D: Jet>(cell: &Cell<D>, element: &Element, psi: &[D]) -> Vector<D> {
-    let mut out = zero();
+/// ∇ψ on a face, as the film is and held apart.
+fn slopes_of<D: Jet>(cell: &Cell<D>, element: &Element, psi: &[[D; 2]]) -> [Vector<D>; 2] {
+    let mut out = [zero(); 2];
     for (k, at) in cell.corners.iter().enumerate() {
         if let Some(at) = at {
-            (0..3).for_each(|i| out[i] += psi[*at] * element.gradients[(i, k)]);
+            for (out, psi) in out.iter_mut().zip(&psi[*at]) {
+                (0..3).for_each(|i| out[i] += *psi * element.gradients[(i, k)]);
+            }
         }
     }
     out

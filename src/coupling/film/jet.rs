@@ -183,6 +183,12 @@ pub(super) struct Distance<D> {
 impl<D: Jet> Distance<D> {
     /// From the field at where the point is.
     pub fn new(field: &Field, at: &Vector<D>) -> Self {
+        if !D::MOVES {
+            return Self {
+                value: D::from(field.distance),
+                gradient: constant(&field.gradient),
+            };
+        }
         let from = real(at);
         let way: Vector<D> = std::array::from_fn(|i| at[i] - from[i]);
         let (g, h) = (&field.gradient, &field.hessian);

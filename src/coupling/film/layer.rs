@@ -18,7 +18,7 @@ pub(super) const OPENING: f64 = 20.0;
 /// The length β/sin β of an arc across a wedge of the angle β, in its height, by powers of sin² β: the series up to the third, and what is left at a right
 /// angle in the last.
 const ARC: [f64; 4] = [1.0, 1.0 / 6.0, 3.0 / 40.0, 5.0 / 112.0];
-const STEEP: i32 = 8;
+const STEEP: f64 = 8.0;
 /// Of the series of √(1 − s), from s on: where the two stand at a right angle it is smooth, and a third too large.
 const COSINE: [f64; 3] = [-0.5, -1.0 / 8.0, -1.0 / 16.0];
 /// Largest square of a sine that elements may give to rounding and their own size.
@@ -71,9 +71,27 @@ pub(super) struct Cell<D> {
     /// Number of each corner among those with a potential.
     pub corners: [Option<usize>; 3],
     /// m: as it is, and held apart.
-    pub thickness: [D; 2],
-    /// Unit normal of the other side as it is, also for what is held apart: the difference of both then has no negative energy.
-    pub facing: Vector<D>,
+    pub thickness: [Thickness<D>; 2],
+    /// Of the other side as it is, also for what is held apart: the difference of both then has no negative energy.
+    pub facing: Facing<D>,
+}
+
+/// A thickness, and its derivative by the distances at the corners.
+#[derive(Clone, Copy)]
+pub(super) struct Thickness<D> {
+    /// m.
+    pub value: D,
+    pub slopes: [D; 3],
+}
+
+/// Where the other side faces.
+pub(super) struct Facing<D> {
+    /// Its unit normal.
+    pub normal: Vector<D>,
+    /// ∇d along the face.
+    along: Vector<D>,
+    /// Derivative of the cosine between the two sides by its square.
+    bend: D,
 }
 
 /// The vertices of faces that are near, with their fields.
@@ -214,20 +232,16 @@ impl<D: Jet> Layer<D> {
             if corners.iter().all(Option::is_none) {
                 continue;
             }
-            let [near, held] = self.heights(&spots);
+            let heights = |which: usize| spots.map(|s| self.spots[s].distances[which].value);
+            let [near, held] = [0, 1].map(heights);
             self.cells.push(Cell {
                 face: f,
                 spots,
                 corners,
-                thickness: [near, held].map(|d| thickness(&d, face)),
-                facing: facing(&near, face),
+                thickness: [near, held].map(|d| Thickness::new(&d, face)),
+                facing: Facing::new(&near, face),
             });
         }
-    }
-
-    /// Distances at the corners of a face, as it is and held apart.
-    pub(super) fn heights(&self, spots: &[usize; 3]) -> [[D; 3]; 2] {
-        [0, 1].map(|which| spots.map(|s| self.spots[s].distances[which].value))
     }
 }
 
@@ -267,14 +281,23 @@ impl<D: Jet> Gap<D> {
 /// How much a vertex at a distance counts in a link's gap; beyond `end` nothing.
 pub(super) fn weight<D: Jet>(d: D, area: f64, end: f64, scale: f64) -> Option<D> {
     let fade = || (-d / end + 1.0).powi(3) * area;
-    (d.re() < end).then(|| (d / scale).powi(-NEAREST) * fade())
+    // To the power −NEAREST.
+    let near = || {
+        let once = d.recip() * scale;
+        let square = once * once;
+        square * square * square
+    };
+    (d.re() < end).then(|| near() * fade())
 }
 
 /// t³/(1 − t)³ from 0 on.
 fn opening<D: Jet>(t: D) -> D {
     match t.re() <= 0.0 {
         true => D::from(0.0),
-        false => (t / (-t + 1.0)).powi(3),
+        false => {
+            let part = t / (-t + 1.0);
+            part * part * part
+        }
     }
 }
 
@@ -282,25 +305,32 @@ fn opening<D: Jet>(t: D) -> D {
 pub(super) fn opening_slope<D: Jet>(t: D) -> D {
     match t.re() <= 0.0 {
         true => D::from(0.0),
-        false => t * t * 3.0 / (-t + 1.0).powi(4),
+        false => {
+            let square = (-t + 1.0) * (-t + 1.0);
+            t * t * 3.0 / (square * square)
+        }
     }
 }
 
-/// The length of the arc that meets both surfaces at right angles, of a face with these distances at its corners: 1/(mean of 1/length), which is what the flow
-/// across lines of equal thickness feels.
-fn thickness<D: Jet>(d: &[D; 3], face: &Element) -> D {
-    let [arc, _] = arc(steepness(d, face).0);
-    arc * 1.5 / pairs(d)
-}
-
-/// Its derivative.
-pub(super) fn thickness_slope<D: Jet>(d: &[D; 3], face: &Element) -> [D; 3] {
-    let (steep, slopes) = steepness(d, face);
-    let ([arc, slope], inverse) = (arc(steep), pairs(d));
-    std::array::from_fn(|i| {
-        let squares = (d[i] + d[(i + 1) % 3]).powi(-2) + (d[i] + d[(i + 2) % 3]).powi(-2);
-        (slope * slopes[i] + arc * squares / inverse) * 1.5 / inverse
-    })
+impl<D: Jet> Thickness<D> {
+    /// The length of the arc that meets both surfaces at right angles, of a face with these distances at its corners: 1/(mean of 1/length), which is what the flow
+    /// across lines of equal thickness feels.
+    fn new(d: &[D; 3], face: &Element) -> Self {
+        let (steep, slopes) = steepness(d, face);
+        let [arc, slope] = arc(steep);
+        // One over the sums of two.
+        let pairs: [D; 3] = std::array::from_fn(|i| (d[i] + d[(i + 1) % 3]).recip());
+        let mean = (pairs[0] + pairs[1] + pairs[2]).recip() * 1.5;
+        let squares = pairs.map(|x| x * x);
+        let value = arc * mean;
+        let narrower = value * mean / 1.5;
+        Self {
+            value,
+            slopes: std::array::from_fn(|i| {
+                slope * slopes[i] * mean + (squares[i] + squares[(i + 2) % 3]) * narrower
+            }),
+        }
+    }
 }
 
 /// |∇d|² on a face, and its derivative.
@@ -318,38 +348,35 @@ fn steepness<D: Jet>(d: &[D; 3], face: &Element) -> (D, [D; 3]) {
 fn arc<D: Jet>(steep: D) -> [D; 2] {
     let last = std::f64::consts::FRAC_PI_2 - ARC.iter().sum::<f64>();
     let [a, b, c, e] = ARC;
-    let once = steep.powi(STEEP - 1) * last;
+    let square = steep * steep;
+    // To the power STEEP − 1.
+    let once = square * square * square * steep * last;
     [
         steep * (steep * (steep * e + c) + b) + a + steep * once,
-        steep * (steep * (3.0 * e) + 2.0 * c) + b + once * f64::from(STEEP),
+        steep * (steep * (3.0 * e) + 2.0 * c) + b + once * STEEP,
     ]
 }
 
-/// Sum of 1/(sum of two).
-fn pairs<D: Jet>(d: &[D; 3]) -> D {
-    (0..3).map(|i| (d[i] + d[(i + 1) % 3]).recip()).sum()
-}
+impl<D: Jet> Facing<D> {
+    /// The other side's normal: its part along the face is what the distances do there. The arcs that meet both at right angles cut equal areas off both.
+    fn new(d: &[D; 3], face: &Element) -> Self {
+        let along = slope_of(d, face);
+        let square = product(&along, &along);
+        let [a, b, c] = COSINE;
+        let cosine = square * (square * (square * c + b) + a) + 1.0;
+        Self {
+            normal: std::array::from_fn(|i| along[i] - cosine * face.normal[i]),
+            along,
+            bend: square * (square * (3.0 * c) + 2.0 * b) + a,
+        }
+    }
 
-/// The other side's normal: its part along the face is what the distances do there. The arcs that meet both at right angles cut equal areas off both.
-fn facing<D: Jet>(d: &[D; 3], face: &Element) -> Vector<D> {
-    let along = slope_of(d, face);
-    let square = product(&along, &along);
-    let [a, b, c] = COSINE;
-    let cosine = square * (square * (square * c + b) + a) + 1.0;
-    std::array::from_fn(|i| along[i] - cosine * face.normal[i])
-}
-
-/// Its derivative by each distance.
-pub(super) fn facing_slope<D: Jet>(d: &[D; 3], face: &Element) -> [Vector<D>; 3] {
-    let along = slope_of(d, face);
-    let square = product(&along, &along);
-    let [a, b, c] = COSINE;
-    let slope = square * (square * (3.0 * c) + 2.0 * b) + a;
-    [0, 1, 2].map(|k| {
-        let gradient = face.gradients.column(k).into_owned();
-        let across = dot(&along, &gradient) * slope * 2.0;
-        std::array::from_fn(|i| -across * face.normal[i] + gradient[i])
-    })
+    /// The cotangents of the distances at the corners, from that of the normal.
+    pub fn pull(&self, bar: &Vector<D>, face: &Element) -> [D; 3] {
+        let across = dot(bar, &face.normal) * self.bend * -2.0;
+        let bar = add(bar, &scale(across, &self.along));
+        [0, 1, 2].map(|k| dot(&bar, &face.gradients.column(k).into_owned()))
+    }
 }
 
 /// ∇d on a face.

@@ -1,13 +1,14 @@
 //! A film at given poses: the added mass that it has beyond one that is held apart, with derivatives.
 
-use super::flow::{Flow, Solved, TWISTS};
+use super::flow::{Flow, System};
 use super::jet::{Displaced, Screw, constant, rates};
 use super::layer::{Layer, Near};
 use super::pull::Reverse;
 use super::{Film, Side};
 use crate::adjoint::lie::{Pose, Vec3, Vec6, cross_force};
-use nalgebra::{DMatrix, DVector, SMatrix, SVector};
+use nalgebra::{DMatrix, DVector};
 use num_dual::Dual64;
+use std::borrow::Cow;
 use std::sync::OnceLock;
 
 /// A film whose gap is below what others resolve.
@@ -19,14 +20,19 @@ pub(crate) struct PlacedFilm<'a> {
     frame: Pose,
     /// How far others are to hold the two apart, in the frame of each.
     pub shift: [Vec3; 2],
-    /// At density 1, over the twists of the first body and of the other, frame of the first.
-    mass: SMatrix<f64, TWISTS, TWISTS>,
     near: Near,
     layer: Layer<f64>,
-    /// As it is, and held apart.
-    solved: [Solved; 2],
+    system: System,
+    /// Of the twists that were asked for first.
+    solved: OnceLock<Vec<Solved>>,
     /// Made when first asked for.
     reverse: OnceLock<Reverse<f64>>,
+}
+
+/// The potential of twists of both sides, frame of the first, as the film is and held apart.
+struct Solved {
+    twists: [Vec6; 2],
+    potential: Vec<[f64; 2]>,
 }
 
 /// The flow in a film along a displacement.
@@ -55,18 +61,16 @@ impl<'a> PlacedFilm<'a> {
         let Some(layer) = Layer::new(film, &still, &near, None) else {
             return Ok(None);
         };
-        let loads = film.loads(&layer);
-        let solved = film.solve(&layer, &loads).ok_or(0.0)?;
-        let mass = loads.tr_mul(&(&solved[0].potential - &solved[1].potential));
+        let system = film.system(&layer).ok_or(0.0)?;
         Ok(Some(Self {
             film,
             relative,
             frame,
             shift: layer.shift.map(Vec3::from),
-            mass: SMatrix::from_fn(|i, j| 0.5 * (mass[(i, j)] + mass[(j, i)])),
             near,
             layer,
-            solved,
+            system,
+            solved: OnceLock::new(),
             reverse: OnceLock::new(),
         }))
     }
@@ -90,19 +94,49 @@ impl<'a> PlacedFilm<'a> {
         }
     }
 
+    /// In the frame of the first.
+    fn both(&self, x: &Twists) -> [Vec6; 2] {
+        [x.own, self.relative.twist_to_body(&x.other)]
+    }
+
+    fn solve(&self, twists: [Vec6; 2]) -> Solved {
+        Solved {
+            potential: self.system.potential(&twists),
+            twists,
+        }
+    }
+
+    /// The potential of a column's twists, if it was solved for, or else anew.
+    fn potential(&self, x: &Twists) -> Cow<'_, [[f64; 2]]> {
+        let twists = self.both(x);
+        let known = self.solved.get().and_then(|all| {
+            let found = all.iter().find(|solved| solved.twists == twists);
+            found.map(|solved| Cow::Borrowed(&solved.potential[..]))
+        });
+        known.unwrap_or_else(|| Cow::Owned(self.solve(twists).potential))
+    }
+
     /// Adds the impulses of the twists in the columns, body frames.
     pub fn add_impulses(&self, twists: &DMatrix<f64>, out: &mut DMatrix<f64>) {
-        for c in 0..twists.ncols() {
-            let x = self.twists(&twists.column(c).into_owned());
-            let other = self.relative.twist_to_body(&x.other);
-            let mut both = SVector::<f64, TWISTS>::zeros();
-            both.fixed_rows_mut::<6>(0).copy_from(&x.own);
-            both.fixed_rows_mut::<6>(6).copy_from(&other);
-            let impulses = self.mass * both;
-            let impulse: Vec6 = impulses.fixed_rows::<6>(0).into_owned();
-            let back: Vec6 = impulses.fixed_rows::<6>(6).into_owned();
+        let columns = twists.column_iter().map(|x| self.twists(&x.into_owned()));
+        let columns: Vec<(usize, Twists)> =
+            (columns.enumerate()).filter(|(_, x)| x.moves()).collect();
+        self.solved.get_or_init(|| {
+            let mut all: Vec<Solved> = Vec::with_capacity(columns.len());
+            for (_, x) in &columns {
+                let twists = self.both(x);
+                if all.iter().all(|solved| solved.twists != twists) {
+                    all.push(self.solve(twists));
+                }
+            }
+            all
+        });
+        for (c, x) in &columns {
+            let potential = self.potential(x);
+            let apart = potential.iter().map(|psi| psi[0] - psi[1]);
+            let [impulse, back] = self.system.impulses(apart);
             let mut add = |b: usize, wrench: &Vec6| {
-                let mut rows = out.fixed_view_mut::<6, 1>(6 * b, c);
+                let mut rows = out.fixed_view_mut::<6, 1>(6 * b, *c);
                 rows += wrench;
             };
             add(self.film.body, &impulse);
@@ -137,23 +171,19 @@ impl<'a> PlacedFilm<'a> {
     pub fn wrenches(&self, x: &DVector<f64>, columns: &[DVector<f64>]) -> Vec<Vec6> {
         let still = self.still();
         let flow = |x: &DVector<f64>| {
-            let Twists { own, other } = self.twists(x);
-            (self.film).flow(&self.layer, &still, &self.solved, [&own, &other])
+            let x = self.twists(x);
+            let potential = self.potential(&x);
+            let solved = (&self.system, &potential[..]);
+            (self.film).flow((&self.layer, &still), solved, [&x.own, &x.other])
         };
         let (own, how) = (flow(x), (&self.layer, self.in_reverse()));
         (columns.iter())
-            .map(|y| match self.moves(y) {
+            .map(|y| match self.twists(y).moves() {
                 true if y == x => Vec6::from(self.film.wrench(how, &still, &own, &own)),
                 true => Vec6::from(self.film.wrench(how, &still, &own, &flow(y))),
                 false => Vec6::zeros(),
             })
             .collect()
-    }
-
-    /// Whether one of the two sides does.
-    fn moves(&self, x: &DVector<f64>) -> bool {
-        let Twists { own, other } = self.twists(x);
-        own != Vec6::zeros() || other != Vec6::zeros()
     }
 
     /// Adds a wrench in the frame of the other to both bodies, as spatial wrenches.
@@ -187,9 +217,10 @@ impl MovingFilm<'_> {
 
     /// The flow for twists that stay as they are.
     pub fn flow(&self, x: &DVector<f64>) -> MovingFlow {
-        let (placed, Twists { own, other }) = (self.placed, self.placed.twists(x));
-        let twists = [&own, &other];
-        MovingFlow((placed.film).flow(&self.layer, &self.frame, &placed.solved, twists))
+        let (placed, x) = (self.placed, self.placed.twists(x));
+        let potential = placed.potential(&x);
+        let solved = (&placed.system, &potential[..]);
+        MovingFlow((placed.film).flow((&self.layer, &self.frame), solved, [&x.own, &x.other]))
     }
 
     /// ∇E(x, y) and its rate, frame of the other.
@@ -227,4 +258,11 @@ impl MovingFilm<'_> {
 struct Twists {
     own: Vec6,
     other: Vec6,
+}
+
+impl Twists {
+    /// Whether one of the two sides does.
+    fn moves(&self) -> bool {
+        self.own != Vec6::zeros() || self.other != Vec6::zeros()
+    }
 }

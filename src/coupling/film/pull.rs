@@ -1,17 +1,15 @@
 //! The reverse of [`Layer::new`]: what a film's thickness, its ends and its shift exert on the bodies.
 
 use super::Film;
-use super::jet::{Displaced, Jet, Screw, Vector, add, add_scaled, constant, cross};
-use super::jet::{product, scale, whole, zero};
-use super::layer::{
-    BACK, Layer, NEAREST, OPENING, ends, facing_slope, opening_slope, thickness_slope, weight,
-};
+use super::jet::{Displaced, Jet, Screw, Vector, add, add_scaled, constant, cross, scale};
+use super::jet::{whole, zero};
+use super::layer::{BACK, Layer, NEAREST, OPENING, ends, opening_slope, weight};
 
 /// Cotangents of what the flow in a film takes from a [`Layer`].
 pub(super) struct Cotangents<D> {
     /// Of the thickness of each cell, as it is and held apart.
     pub thickness: Vec<[D; 2]>,
-    /// Of each cell's facing.
+    /// Of each cell's facing; none where the other side rests.
     pub facing: Vec<Vector<D>>,
     /// Of each active vertex' rim.
     pub rim: Vec<D>,
@@ -19,32 +17,16 @@ pub(super) struct Cotangents<D> {
 
 /// [`Layer::new`] in reverse at one pose, for as many cotangents as are asked. Wrenches are those on the first body, in the frame of the other.
 pub(super) struct Reverse<D> {
-    /// Wrenches of the distances at each spot, as it is and held apart.
-    spots: Vec<[Screw<D>; 2]>,
     /// Of the gap's normal.
     normal: [Screw<D>; 3],
     /// Of the shifts, in the frame of each.
     shift: [[Screw<D>; 3]; 2],
-    cells: Vec<CellSlopes<D>>,
-    /// Of each active vertex, what its distance and where it faces do to its rim.
-    rim: Vec<[D; 2]>,
-}
-
-/// What the distances at the corners of a cell do.
-struct CellSlopes<D> {
-    /// To its thickness, as it is and held apart.
-    thickness: [[D; 3]; 2],
-    /// To its facing, corner by corner.
-    facing: [Vector<D>; 3],
 }
 
 impl<D: Jet> Layer<D> {
     /// What the layer is made of, in reverse.
     pub fn reverse(&self, film: &Film, placed: &Displaced<D>) -> Reverse<D> {
-        let near: Vec<Screw<D>> = (self.spots.iter())
-            .map(|spot| at_point(&spot.point, &spot.distances[0].gradient))
-            .collect();
-        let [gap, mean] = self.gap_wrenches(film, &near);
+        let (gap, mean) = self.gap_wrenches(film);
         let normal = match film.opposite.wall_normal() {
             Some(wall) => units().map(|unit| turn(&constant(wall), &placed.rotate(&unit))),
             None => mean,
@@ -52,7 +34,7 @@ impl<D: Jet> Layer<D> {
         let [wider, slope] = self.wider(film);
         let own: [Screw<D>; 3] = std::array::from_fn(|i| {
             let mut out = normal[i].map(|x| x * wider);
-            add_scaled(&mut out, slope * self.gap.normal[i], &gap[0]);
+            add_scaled(&mut out, slope * self.gap.normal[i], &gap);
             out
         });
         // The other's shift is the own one in its frame.
@@ -62,18 +44,9 @@ impl<D: Jet> Layer<D> {
             (0..3).for_each(|i| add_scaled(&mut out, back[i], &own[i]));
             out
         });
-        let held = self.spots.iter().map(|spot| {
-            let gradient = &spot.distances[1].gradient;
-            let mut out = at_point(&spot.point, gradient);
-            (0..3).for_each(|i| add_scaled(&mut out, -gradient[i], &other[i]));
-            out
-        });
         Reverse {
-            spots: near.iter().zip(held).map(|(a, b)| [*a, b]).collect(),
             normal,
             shift: [own, other],
-            cells: self.cell_slopes(film),
-            rim: self.rim_slopes(film),
         }
     }
 
@@ -87,55 +60,44 @@ impl<D: Jet> Layer<D> {
         ]
     }
 
-    fn cell_slopes(&self, film: &Film) -> Vec<CellSlopes<D>> {
-        let one = |cell: &super::layer::Cell<D>| {
-            let face = &film.surface.faces[cell.face];
-            let heights = self.heights(&cell.spots);
-            CellSlopes {
-                thickness: [0, 1].map(|which| thickness_slope(&heights[which], face)),
-                facing: facing_slope(&heights[0], face),
-            }
-        };
-        self.cells.iter().map(one).collect()
-    }
-
-    fn rim_slopes(&self, film: &Film) -> Vec<[D; 2]> {
+    /// What its distance and where it faces do to the rim of an active vertex.
+    fn rim_slopes(&self, film: &Film, number: usize) -> [D; 2] {
         let surface = &*film.surface;
         let [start, end] = ends(surface);
-        (self.active.iter().zip(&self.rim))
-            .map(|(s, rim)| {
-                let spot = &self.spots[*s];
-                let d = spot.distances[0].value;
-                let [outside, behind] = self.outside(surface, *s).map(opening_slope);
-                let strength = D::from(OPENING * surface.areas[spot.vertex]) / d;
-                [
-                    strength * outside / (end - start) - *rim / d,
-                    strength * behind / (BACK[1] - BACK[0]),
-                ]
-            })
-            .collect()
+        let (s, rim) = (self.active[number], self.rim[number]);
+        let spot = &self.spots[s];
+        let d = spot.distances[0].value;
+        let [outside, behind] = self.outside(surface, s).map(opening_slope);
+        let strength = D::from(OPENING * surface.areas[spot.vertex]) / d;
+        [
+            strength * outside / (end - start) - rim / d,
+            strength * behind / (BACK[1] - BACK[0]),
+        ]
     }
 
-    /// Wrenches of the gap (the first of the first) and of the mean normal.
-    fn gap_wrenches(&self, film: &Film, near: &[Screw<D>]) -> [[Screw<D>; 3]; 2] {
+    /// Wrenches of the gap, and of the mean normal where it isn't a wall's that counts.
+    fn gap_wrenches(&self, film: &Film) -> (Screw<D>, [Screw<D>; 3]) {
         let surface = &*film.surface;
         let [_, end] = ends(surface);
-        let mut gap = [[D::from(0.0); 6]; 3];
-        let mut mean = gap;
-        for (spot, screw) in self.spots.iter().zip(near) {
+        let wall = film.opposite.wall_normal().is_some();
+        let (mut gap, mut mean) = ([D::from(0.0); 6], [[D::from(0.0); 6]; 3]);
+        for spot in &self.spots {
             let d = spot.distances[0].value;
             let area = surface.areas[spot.vertex];
             if let Some(weight) = weight(d, area, end, film.width.reach) {
                 let weight = weight / self.gap.sum;
                 let rate = weight * (d.recip() * -f64::from(NEAREST) - (-d + end).recip() * 3.0);
-                add_scaled(&mut gap[0], (d - self.gap.value) * rate + weight, screw);
-                let normal = &surface.normals[spot.vertex];
-                for (i, mean) in mean.iter_mut().enumerate() {
-                    add_scaled(mean, (-self.gap.mean[i] + normal[i]) * rate, screw);
+                let screw = at_point(&spot.point, &spot.distances[0].gradient);
+                add_scaled(&mut gap, (d - self.gap.value) * rate + weight, &screw);
+                if !wall {
+                    let normal = &surface.normals[spot.vertex];
+                    for (i, mean) in mean.iter_mut().enumerate() {
+                        add_scaled(mean, (-self.gap.mean[i] + normal[i]) * rate, &screw);
+                    }
                 }
             }
         }
-        [gap, mean]
+        (gap, mean)
     }
 }
 
@@ -143,25 +105,41 @@ impl<D: Jet> Reverse<D> {
     /// The wrench of cotangents of the flow.
     pub fn pull(&self, film: &Film, layer: &Layer<D>, flow: &Cotangents<D>) -> Screw<D> {
         let mut bar = vec![[D::from(0.0); 2]; layer.spots.len()];
-        let mut normal = zero();
-        for (c, (cell, slopes)) in layer.cells.iter().zip(&self.cells).enumerate() {
+        for (c, cell) in layer.cells.iter().enumerate() {
+            let turned = match flow.facing.get(c) {
+                Some(bar) => cell.facing.pull(bar, &film.surface.faces[cell.face]),
+                None => zero(),
+            };
             let [near, held] = flow.thickness[c];
             for (k, s) in cell.spots.iter().enumerate() {
-                let turned = product(&flow.facing[c], &slopes.facing[k]);
-                bar[*s][0] += near * slopes.thickness[0][k] + turned;
-                bar[*s][1] += held * slopes.thickness[1][k];
+                bar[*s][0] += near * cell.thickness[0].slopes[k] + turned[k];
+                bar[*s][1] += held * cell.thickness[1].slopes[k];
             }
         }
-        for ((s, slopes), cotangent) in layer.active.iter().zip(&self.rim).zip(&flow.rim) {
-            bar[*s][0] += *cotangent * slopes[0];
-            let facing = constant(&film.surface.normals[layer.spots[*s].vertex]);
-            normal = add(&normal, &scale(*cotangent * slopes[1], &facing));
+        let mut normal = zero();
+        for (number, cotangent) in flow.rim.iter().enumerate() {
+            // Within the film there is no rim.
+            if layer.rim[number].re() != 0.0 {
+                let s = layer.active[number];
+                let slopes = layer.rim_slopes(film, number);
+                bar[s][0] += *cotangent * slopes[0];
+                let facing = constant(&film.surface.normals[layer.spots[s].vertex]);
+                normal = add(&normal, &scale(*cotangent * slopes[1], &facing));
+            }
         }
-        let mut out = [D::from(0.0); 6];
-        for (screws, bar) in self.spots.iter().zip(&bar) {
-            (0..2).for_each(|which| add_scaled(&mut out, bar[which], &screws[which]));
+        let (mut force, mut torque, mut held) = (zero(), zero(), zero());
+        for (spot, bar) in layer.spots.iter().zip(&bar) {
+            let [near, apart] = [0, 1].map(|k| scale(bar[k], &spot.distances[k].gradient));
+            let both = add(&near, &apart);
+            force = add(&force, &both);
+            torque = add(&torque, &cross(&spot.point, &both));
+            held = add(&held, &apart);
         }
-        (0..3).for_each(|i| add_scaled(&mut out, normal[i], &self.normal[i]));
+        let mut out = whole(&force, &torque);
+        for i in 0..3 {
+            add_scaled(&mut out, -held[i], &self.shift[1][i]);
+            add_scaled(&mut out, normal[i], &self.normal[i]);
+        }
         out
     }
 

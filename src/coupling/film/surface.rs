@@ -2,6 +2,7 @@
 
 use crate::adjoint::lie::{Vec3, Vec6, point_wrench};
 use crate::geometry::TriMesh;
+use crate::solver::elimination_order;
 use nalgebra::Matrix3;
 use std::f64::consts::PI;
 
@@ -27,6 +28,8 @@ pub(crate) struct FilmSurface {
     pub center: Vec3,
     pub radius: f64,
     pub clusters: Vec<Cluster>,
+    /// The vertices in an order of elimination, of all systems on some of them.
+    pub order: Vec<usize>,
 }
 
 /// Vertices that lie together.
@@ -80,6 +83,13 @@ impl FilmSurface {
                 area,
             });
         }
+        let edges = mesh
+            .faces()
+            .iter()
+            .flat_map(|&[a, b, c]| [(a, b), (b, c), (c, a)]);
+        let edges: Vec<_> = edges.collect();
+        // Corners of a mesh are among its vertices.
+        let order = elimination_order(count, &edges).unwrap_or_else(|| (0..count).collect());
         let ball = mesh.bounding_ball();
         let size = (0.75 * mesh.mass_properties().volume / PI).cbrt();
         Self {
@@ -93,6 +103,7 @@ impl FilmSurface {
             center: ball.center,
             radius: ball.radius,
             clusters: clusters(mesh.vertices()),
+            order,
         }
     }
 }

@@ -5,9 +5,9 @@ use super::element::{Cell, Point, fade, opening};
 use super::patch::Patch;
 use super::thickness::{Thickness, thickness};
 use crate::adjoint::lie::{Mat6, Pose, Vec3, Vec6, point_velocity, point_wrench};
-use crate::solver::SparsePattern;
-use faer::MatMut;
+use crate::solver::{SparsePattern, elimination_order};
 use nalgebra::{DMatrix, SMatrix};
+use std::sync::Arc;
 
 /// Parts of the reach between which the pressure goes over into that in the open.
 const RIM: [f64; 2] = [0.5, 1.0];
@@ -107,7 +107,7 @@ impl PlacedBearing {
         for layer in &self.layers {
             if let Some(at) = layer.number {
                 entries.push((at, at));
-                values.push(layer.leak()[0]);
+                values.push([layer.leak()[0]]);
             }
         }
         let mut loads = DMatrix::zeros(self.unknowns(), 6);
@@ -127,7 +127,7 @@ impl PlacedBearing {
                             && a >= b
                         {
                             entries.push((a, b));
-                            values.push(strength / 12.0 * rates[i].dot(&rates[j]));
+                            values.push([strength / 12.0 * rates[i].dot(&rates[j])]);
                         }
                     }
                 }
@@ -158,11 +158,13 @@ impl PlacedBearing {
                 }
             }
         }
-        let factor = SparsePattern::new(loads.nrows(), &entries)?.factor(&values)?;
-        self.pressure.copy_from(&loads);
-        let (n, columns) = self.pressure.shape();
-        let all = MatMut::from_column_major_slice_mut(self.pressure.as_mut_slice(), n, columns);
-        factor.solve(all);
+        let order = elimination_order(loads.nrows(), &entries)?;
+        let factor = Arc::new(SparsePattern::new(&order, &entries)?).factor(&values)?;
+        for (load, mut pressure) in loads.column_iter().zip(self.pressure.column_iter_mut()) {
+            let mut found: Vec<[f64; 1]> = load.iter().map(|x| [*x]).collect();
+            factor.solve(&mut found);
+            (pressure.iter_mut().zip(&found)).for_each(|(to, x)| *to = x[0]);
+        }
         let squeezed = loads.tr_mul(&self.pressure);
         let all = sheared + squeezed.fixed_view::<6, 6>(0, 0);
         self.damping = 0.5 * (all + all.transpose());

@@ -26,16 +26,14 @@ fn over_wall(shape: &Shape, faces: usize, floor: f64) -> Film {
 
 /// What the film adds to the energy of a unit twist (component `k` in the body's frame, about its origin) at a pose, and its slope as the body rises.
 fn added(film: &Film, pose: &Pose, k: usize) -> (f64, f64) {
-    let placed = PlacedFilm::new(film, &[*pose]).unwrap().expect("a film");
     let mut twists = DMatrix::zeros(6, 1);
     twists[(k, 0)] = 1.0;
+    let placed = PlacedFilm::new(film, &[*pose], &twists).unwrap();
+    let placed = placed.expect("a film");
     let mut out = DMatrix::zeros(6, 1);
     placed.add_impulses(&twists, &mut out);
     let x: DVector<f64> = twists.column(0).into_owned();
-    (
-        out[(k, 0)],
-        placed.wrenches(&x, std::slice::from_ref(&x))[0][2],
-    )
+    (out[(k, 0)], placed.wrench(&x, &x)[2])
 }
 
 fn raised(height: f64) -> Pose {
@@ -108,7 +106,8 @@ fn the_slope_under_a_sphere_is_a_logarithm() {
 #[test]
 fn there_is_no_film_far_away_nor_in_touch() {
     let film = over_wall(&Shape::sphere(1.0), 320, 0.05);
-    assert!(PlacedFilm::new(&film, &[raised(1.3)]).unwrap().is_none());
-    let behind = PlacedFilm::new(&film, &[raised(0.99)]).err().unwrap();
+    let placed = |height: f64| PlacedFilm::new(&film, &[raised(height)], &DMatrix::zeros(6, 0));
+    assert!(placed(1.3).unwrap().is_none());
+    let behind = placed(0.99).err().unwrap();
     assert!((-0.011..0.0).contains(&behind), "{behind}");
 }

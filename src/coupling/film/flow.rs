@@ -3,7 +3,7 @@
 use super::jet::{Displaced, Jet, Screw, Vector, add, constant, cross, cross_force, dot, parts};
 use super::jet::{product, scale, screw, whole, zero};
 use super::layer::{Cell, Layer};
-use super::pull::{Cotangents, Reverse};
+use super::pull::{Cotangents, Rates, Reverse};
 use super::surface::Element;
 use super::{Film, Side};
 use crate::adjoint::lie::{Vec6, point_wrench};
@@ -115,7 +115,7 @@ impl Film {
     }
 
     /// A wall rests.
-    fn faces_wall(&self) -> bool {
+    pub(super) fn faces_wall(&self) -> bool {
         matches!(self.other, Side::Wall(_))
     }
 
@@ -243,15 +243,11 @@ impl Film {
             if rests {
                 continue;
             }
-            let led = |flow: &Flow<D>, other: &Flow<D>| {
-                let (sum, arm) = self.shares(cell, &flow.apart);
-                let (u, w) = parts(&other.twists[1]);
-                add(&scale(sum, &u), &cross(&w, &arm))
-            };
-            let facing = led(x, y);
+            let by = |flow: &Flow<D>| self.shares(cell, &flow.apart);
+            let facing = led(&by(x), y);
             out.facing.push(match same {
                 true => facing.map(|x| x * 2.0),
-                false => add(&facing, &led(y, x)),
+                false => add(&facing, &led(&by(y), x)),
             });
         }
         let rim = |(x, y): (&[D; 2], &[D; 2])| x[1] * y[1] - x[0] * y[0];
@@ -268,13 +264,70 @@ impl Film {
         y: &Flow<D>,
     ) -> Screw<D> {
         let mut out = reverse.pull(self, layer, &self.cotangents(layer, x, y));
-        for (flow, answer) in [(x, y), (y, x)] {
-            let impulse = placed.wrench_to_world(&answer.impulses[1]);
-            let turned = cross_force(&screw(&flow.other), &impulse);
-            (0..6).for_each(|k| out[k] -= turned[k]);
+        let turned = turned(placed, x, y);
+        (0..6).for_each(|k| out[k] -= turned[k]);
+        out
+    }
+
+    /// The wrenches of [`Film::wrench`] of every two of the flows, those of one with all up to itself after one another.
+    pub(super) fn wrenches(
+        &self,
+        (layer, rates): (&Layer<f64>, &Rates),
+        placed: &Displaced<f64>,
+        flows: &[Flow<f64>],
+    ) -> Vec<Vec6> {
+        let pairs = || (0..flows.len()).flat_map(|x| (0..=x).map(move |y| (x, y)));
+        let of_turning = |(x, y): (usize, usize)| -Vec6::from(turned(placed, &flows[x], &flows[y]));
+        let mut out: Vec<Vec6> = pairs().map(of_turning).collect();
+        let (mut slopes, mut shares) = (Vec::new(), Vec::new());
+        for (c, cell) in layer.cells.iter().enumerate() {
+            let element = &self.surface.faces[cell.face];
+            slopes.clear();
+            slopes.extend(flows.iter().map(|f| slopes_of(cell, element, &f.potential)));
+            let thickness = [0, 1].map(|k| SIGNS[k] * -element.area * rates.thickness[c][k]);
+            for (out, (x, y)) in out.iter_mut().zip(pairs()) {
+                for (k, rate) in thickness.iter().enumerate() {
+                    *out += product(&slopes[x][k], &slopes[y][k]) * rate;
+                }
+            }
+            if let Some(rates) = rates.facing.get(c) {
+                shares.clear();
+                shares.extend(flows.iter().map(|f| self.shares(cell, &f.apart)));
+                for (out, (x, y)) in out.iter_mut().zip(pairs()) {
+                    let facing = add(&led(&shares[x], &flows[y]), &led(&shares[y], &flows[x]));
+                    for (bar, rate) in facing.iter().zip(rates) {
+                        *out += *bar * rate;
+                    }
+                }
+            }
+        }
+        // Within the film there is no rim.
+        let rims = (rates.rim.iter().enumerate()).filter(|(v, _)| layer.rim[*v] != 0.0);
+        for (v, rate) in rims {
+            for (out, (x, y)) in out.iter_mut().zip(pairs()) {
+                let (x, y) = (&flows[x].potential[v], &flows[y].potential[v]);
+                *out += (x[1] * y[1] - x[0] * y[0]) * rate;
+            }
         }
         out
     }
+}
+
+/// What a flow pushes with the twist of the other side of another, from its shares of a cell: the cotangent of the facing.
+fn led<D: Jet>((sum, arm): &(D, Vector<D>), other: &Flow<D>) -> Vector<D> {
+    let (u, w) = parts(&other.twists[1]);
+    add(&scale(*sum, &u), &cross(&w, arm))
+}
+
+/// What the other's twists, which turn in the frame of the first, take off the wrench of two flows.
+fn turned<D: Jet>(placed: &Displaced<D>, x: &Flow<D>, y: &Flow<D>) -> Screw<D> {
+    let mut out = [D::from(0.0); 6];
+    for (flow, answer) in [(x, y), (y, x)] {
+        let impulse = placed.wrench_to_world(&answer.impulses[1]);
+        let turned = cross_force(&screw(&flow.other), &impulse);
+        (0..6).for_each(|k| out[k] += turned[k]);
+    }
+    out
 }
 
 /// The entries that a cell has on the diagonal and below, with the corners that they belong to.

@@ -32,6 +32,8 @@ pub(super) struct Layer<D> {
     pub gap: Gap<D>,
     /// Vertices of faces that are near.
     pub spots: Vec<Spot<D>>,
+    /// The fields where these are held apart; none in a layer along a displacement.
+    held: Vec<Field>,
     /// Those at which there is a potential.
     pub active: Vec<usize>,
     /// How well each leads into the open, m.
@@ -173,14 +175,23 @@ impl<D: Jet> Layer<D> {
         let wider = (-gap.value / width.reach + 1.0).powi(3) * width.floor;
         let own = scale(wider, &gap.normal);
         let other = placed.rotate(&own);
-        for spot in &mut spots {
+        let mut held = Vec::with_capacity(if known.is_none() { spots.len() } else { 0 });
+        for (s, spot) in spots.iter_mut().enumerate() {
             let at = add(&spot.point, &minus(&other));
-            spot.distances[1] = Distance::new(&opposite.field(&real(&at)), &at);
+            let field = match known {
+                Some(known) => known.held[s],
+                None => {
+                    held.push(opposite.field(&real(&at)));
+                    held[s]
+                }
+            };
+            spot.distances[1] = Distance::new(&field, &at);
         }
         let mut out = Self {
             shift: [own, other],
             gap,
             spots,
+            held,
             active: Vec::new(),
             rim: Vec::new(),
             cells: Vec::new(),
@@ -376,6 +387,15 @@ impl<D: Jet> Facing<D> {
         let across = dot(bar, &face.normal) * self.bend * -2.0;
         let bar = add(bar, &scale(across, &self.along));
         [0, 1, 2].map(|k| dot(&bar, &face.gradients.column(k).into_owned()))
+    }
+
+    /// The normal's derivatives by the distances at the corners.
+    pub fn slopes(&self, face: &Element) -> [Vector<D>; 3] {
+        [0, 1, 2].map(|k| {
+            let gradient = face.gradients.column(k).into_owned();
+            let across = dot(&self.along, &gradient) * self.bend * 2.0;
+            std::array::from_fn(|i| -across * face.normal[i] + gradient[i])
+        })
     }
 }
 

@@ -23,8 +23,11 @@ pub(crate) struct PlacedFilm<'a> {
     near: Near,
     layer: Layer<f64>,
     system: System,
-    /// Of the twists that were asked for first.
-    solved: OnceLock<Vec<Solved>>,
+    /// Columns of the basis that move it, with the numbers of their potentials, which equal ones share.
+    columns: Vec<(usize, usize)>,
+    solved: Vec<Solved>,
+    /// Of every two of these. Made when first asked for.
+    wrenches: OnceLock<Vec<Vec6>>,
     /// Made when first asked for.
     reverse: OnceLock<Reverse<f64>>,
 }
@@ -32,6 +35,8 @@ pub(crate) struct PlacedFilm<'a> {
 /// The potential of twists of both sides, frame of the first, as the film is and held apart.
 struct Solved {
     twists: [Vec6; 2],
+    /// Of the other side, in its own frame.
+    other: Vec6,
     potential: Vec<[f64; 2]>,
 }
 
@@ -47,8 +52,8 @@ pub(crate) struct MovingFilm<'a> {
 }
 
 impl<'a> PlacedFilm<'a> {
-    /// None where the gap is wide. `Err`: a distance that isn't positive, or 0 where the film has no solution.
-    pub fn new(film: &'a Film, poses: &[Pose]) -> Result<Option<Self>, f64> {
+    /// For a basis of body-frame twists. None where the gap is wide. `Err`: a distance that isn't positive, or 0 where the film has no solution.
+    pub fn new(film: &'a Film, poses: &[Pose], basis: &DMatrix<f64>) -> Result<Option<Self>, f64> {
         let frame = match film.other {
             Side::Body(b) => poses[b],
             Side::Wall(_) => Pose::identity(),
@@ -62,7 +67,7 @@ impl<'a> PlacedFilm<'a> {
             return Ok(None);
         };
         let system = film.system(&layer).ok_or(0.0)?;
-        Ok(Some(Self {
+        let mut out = Self {
             film,
             relative,
             frame,
@@ -70,9 +75,24 @@ impl<'a> PlacedFilm<'a> {
             near,
             layer,
             system,
-            solved: OnceLock::new(),
+            columns: Vec::new(),
+            solved: Vec::new(),
+            wrenches: OnceLock::new(),
             reverse: OnceLock::new(),
-        }))
+        };
+        for (c, column) in basis.column_iter().enumerate() {
+            let x = out.twists(&column.into_owned());
+            if x.moves() {
+                let twists = out.both(&x);
+                let known = out.solved.iter().position(|known| known.twists == twists);
+                out.columns.push((c, known.unwrap_or(out.solved.len())));
+                if known.is_none() {
+                    let solved = out.solve(&x);
+                    out.solved.push(solved);
+                }
+            }
+        }
+        Ok(Some(out))
     }
 
     fn still(&self) -> Displaced<'_, f64> {
@@ -99,9 +119,11 @@ impl<'a> PlacedFilm<'a> {
         [x.own, self.relative.twist_to_body(&x.other)]
     }
 
-    fn solve(&self, twists: [Vec6; 2]) -> Solved {
+    fn solve(&self, x: &Twists) -> Solved {
+        let twists = self.both(x);
         Solved {
             potential: self.system.potential(&twists),
+            other: x.other,
             twists,
         }
     }
@@ -109,34 +131,25 @@ impl<'a> PlacedFilm<'a> {
     /// The potential of a column's twists, if it was solved for, or else anew.
     fn potential(&self, x: &Twists) -> Cow<'_, [[f64; 2]]> {
         let twists = self.both(x);
-        let known = self.solved.get().and_then(|all| {
-            let found = all.iter().find(|solved| solved.twists == twists);
-            found.map(|solved| Cow::Borrowed(&solved.potential[..]))
-        });
-        known.unwrap_or_else(|| Cow::Owned(self.solve(twists).potential))
+        let known = self.solved.iter().find(|known| known.twists == twists);
+        match known {
+            Some(known) => Cow::Borrowed(&known.potential),
+            None => Cow::Owned(self.system.potential(&twists)),
+        }
     }
 
     /// Adds the impulses of the twists in the columns, body frames.
     pub fn add_impulses(&self, twists: &DMatrix<f64>, out: &mut DMatrix<f64>) {
-        let columns = twists.column_iter().map(|x| self.twists(&x.into_owned()));
-        let columns: Vec<(usize, Twists)> =
-            (columns.enumerate()).filter(|(_, x)| x.moves()).collect();
-        self.solved.get_or_init(|| {
-            let mut all: Vec<Solved> = Vec::with_capacity(columns.len());
-            for (_, x) in &columns {
-                let twists = self.both(x);
-                if all.iter().all(|solved| solved.twists != twists) {
-                    all.push(self.solve(twists));
-                }
+        for (c, column) in twists.column_iter().enumerate() {
+            let x = self.twists(&column.into_owned());
+            if !x.moves() {
+                continue;
             }
-            all
-        });
-        for (c, x) in &columns {
-            let potential = self.potential(x);
+            let potential = self.potential(&x);
             let apart = potential.iter().map(|psi| psi[0] - psi[1]);
             let [impulse, back] = self.system.impulses(apart);
             let mut add = |b: usize, wrench: &Vec6| {
-                let mut rows = out.fixed_view_mut::<6, 1>(6 * b, *c);
+                let mut rows = out.fixed_view_mut::<6, 1>(6 * b, c);
                 rows += wrench;
             };
             add(self.film.body, &impulse);
@@ -167,23 +180,49 @@ impl<'a> PlacedFilm<'a> {
         Vec6::from(self.in_reverse().pull_shift(at, &constant(force)))
     }
 
-    /// ∇E(x, e) of several e, frame of the other.
-    pub fn wrenches(&self, x: &DVector<f64>, columns: &[DVector<f64>]) -> Vec<Vec6> {
-        let still = self.still();
-        let flow = |x: &DVector<f64>| {
-            let x = self.twists(x);
-            let potential = self.potential(&x);
-            let solved = (&self.system, &potential[..]);
-            (self.film).flow((&self.layer, &still), solved, [&x.own, &x.other])
+    fn flow(&self, x: &DVector<f64>) -> Flow<f64> {
+        let x = self.twists(x);
+        let solved = (&self.system, &self.potential(&x)[..]);
+        (self.film).flow((&self.layer, &self.still()), solved, [&x.own, &x.other])
+    }
+
+    /// ∇E(x, y), frame of the other.
+    pub fn wrench(&self, x: &DVector<f64>, y: &DVector<f64>) -> Vec6 {
+        if [x, y].iter().any(|x| !self.twists(x).moves()) {
+            return Vec6::zeros();
+        }
+        let (own, how) = (self.flow(x), (&self.layer, self.in_reverse()));
+        let other = (x != y).then(|| self.flow(y));
+        let pair = (&own, other.as_ref().unwrap_or(&own));
+        Vec6::from((self.film).wrench(how, &self.still(), pair.0, pair.1))
+    }
+
+    /// ∇E(x, e) of a combination x of the basis and every column e of it that moves, frame of the other.
+    pub fn column_wrenches(&self, x: &DVector<f64>) -> Vec<(usize, Vec6)> {
+        let all = self.wrenches.get_or_init(|| {
+            let rates = self.in_reverse().rates(self.film, &self.layer);
+            let (still, layer) = (self.still(), &self.layer);
+            let flow = |s: &Solved| {
+                let solved = (&self.system, &s.potential[..]);
+                (self.film).flow((layer, &still), solved, [&s.twists[0], &s.other])
+            };
+            let flows: Vec<_> = self.solved.iter().map(flow).collect();
+            self.film.wrenches((layer, &rates), &still, &flows)
+        });
+        let mut parts = vec![0.0; self.solved.len()];
+        for (column, number) in &self.columns {
+            parts[*number] += x[*column];
+        }
+        let of = |number: usize| -> Vec6 {
+            let pair = |other: usize| {
+                let (low, high) = (number.min(other), number.max(other));
+                all[high * (high + 1) / 2 + low]
+            };
+            let parts = parts.iter().enumerate();
+            parts.map(|(other, part)| *part * pair(other)).sum()
         };
-        let (own, how) = (flow(x), (&self.layer, self.in_reverse()));
-        (columns.iter())
-            .map(|y| match self.twists(y).moves() {
-                true if y == x => Vec6::from(self.film.wrench(how, &still, &own, &own)),
-                true => Vec6::from(self.film.wrench(how, &still, &own, &flow(y))),
-                false => Vec6::zeros(),
-            })
-            .collect()
+        let columns = self.columns.iter();
+        columns.map(|(c, number)| (*c, of(*number))).collect()
     }
 
     /// Adds a wrench in the frame of the other to both bodies, as spatial wrenches.

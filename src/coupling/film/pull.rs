@@ -4,6 +4,7 @@ use super::Film;
 use super::jet::{Displaced, Jet, Screw, Vector, add, add_scaled, constant, cross, scale};
 use super::jet::{whole, zero};
 use super::layer::{BACK, Layer, NEAREST, OPENING, ends, opening_slope, weight};
+use crate::adjoint::lie::Vec6;
 
 /// Cotangents of what the flow in a film takes from a [`Layer`].
 pub(super) struct Cotangents<D> {
@@ -21,6 +22,16 @@ pub(super) struct Reverse<D> {
     normal: [Screw<D>; 3],
     /// Of the shifts, in the frame of each.
     shift: [[Screw<D>; 3]; 2],
+}
+
+/// What displacements of the first body do to each part of a layer: rows of its Jacobian, as wrenches in the frame of the other.
+pub(super) struct Rates {
+    /// Of the thickness of each cell, as it is and held apart.
+    pub thickness: Vec<[Vec6; 2]>,
+    /// Of each cell's facing; none where the other side rests.
+    pub facing: Vec<[Vec6; 3]>,
+    /// Of each active vertex' rim.
+    pub rim: Vec<Vec6>,
 }
 
 impl<D: Jet> Layer<D> {
@@ -148,6 +159,55 @@ impl<D: Jet> Reverse<D> {
         let mut out = [D::from(0.0); 6];
         (0..3).for_each(|i| add_scaled(&mut out, bar[i], &self.shift[at][i]));
         out
+    }
+}
+
+impl Reverse<f64> {
+    /// [`Reverse::pull`] for all cotangents: worth it where many are asked for.
+    pub fn rates(&self, film: &Film, layer: &Layer<f64>) -> Rates {
+        let screws: Vec<[Vec6; 2]> = (layer.spots.iter())
+            .map(|spot| {
+                let of = |which: usize| at_point(&spot.point, &spot.distances[which].gradient);
+                let mut held = of(1);
+                for (slope, shift) in spot.distances[1].gradient.iter().zip(&self.shift[1]) {
+                    add_scaled(&mut held, -slope, shift);
+                }
+                [Vec6::from(of(0)), Vec6::from(held)]
+            })
+            .collect();
+        let thickness = layer.cells.iter().map(|cell| {
+            let of = |which: usize| {
+                let slopes = cell.spots.iter().zip(cell.thickness[which].slopes);
+                slopes.map(|(s, slope)| slope * screws[*s][which]).sum()
+            };
+            [of(0), of(1)]
+        });
+        let facing = layer.cells.iter().map(|cell| {
+            let slopes = cell.facing.slopes(&film.surface.faces[cell.face]);
+            let of = |i: usize| {
+                let corners = cell.spots.iter().zip(&slopes);
+                corners.map(|(s, slope)| slope[i] * screws[*s][0]).sum()
+            };
+            [of(0), of(1), of(2)]
+        });
+        let rim = layer.active.iter().enumerate().map(|(number, s)| {
+            if layer.rim[number] == 0.0 {
+                return Vec6::zeros();
+            }
+            let [near, behind] = layer.rim_slopes(film, number);
+            let normal = &film.surface.normals[layer.spots[*s].vertex];
+            let turned = normal.iter().zip(&self.normal);
+            let turned: Vec6 = turned.map(|(n, w)| *n * Vec6::from(*w)).sum();
+            near * screws[*s][0] + behind * turned
+        });
+        Rates {
+            thickness: thickness.collect(),
+            facing: match film.faces_wall() {
+                true => Vec::new(),
+                false => facing.collect(),
+            },
+            rim: rim.collect(),
+        }
     }
 }
 

@@ -105,13 +105,19 @@ impl Reduced {
         Ok(self.films.iter().filter_map(reach).collect())
     }
 
-    /// The films at the poses; none of gaps that are wide.
+    /// The films at the poses, for a basis of body-frame twists; none of gaps that are wide.
     ///
     /// # Errors
     /// Bodies that touch.
-    pub(super) fn placed_films(&self, poses: &[Pose]) -> Result<Vec<Option<PlacedFilm<'_>>>> {
-        let place =
-            |film| PlacedFilm::new(film, poses).map_err(|distance| self.touching(film, distance));
+    pub(super) fn placed_films(
+        &self,
+        poses: &[Pose],
+        basis: &DMatrix<f64>,
+    ) -> Result<Vec<Option<PlacedFilm<'_>>>> {
+        let place = |film| {
+            let placed = PlacedFilm::new(film, poses, basis);
+            placed.map_err(|distance| self.touching(film, distance))
+        };
         self.films.par_iter().map(place).collect()
     }
 
@@ -125,7 +131,7 @@ impl Reduced {
         twists: &DMatrix<f64>,
     ) -> Result<DMatrix<f64>> {
         let mut out = DMatrix::zeros(twists.nrows(), twists.ncols());
-        let films = self.placed_films(poses)?;
+        let films = self.placed_films(poses, twists)?;
         (films.iter().flatten()).for_each(|film| film.add_impulses(twists, &mut out));
         Ok(out)
     }
@@ -136,7 +142,9 @@ impl Reduced {
     /// Bodies that touch.
     #[cfg(feature = "gpu")]
     pub(crate) fn narrow(&self, poses: &[Pose]) -> Result<bool> {
-        Ok(self.placed_films(poses)?.iter().any(Option::is_some))
+        let none = DMatrix::zeros(6 * self.bodies.len(), 0);
+        let films = self.placed_films(poses, &none)?;
+        Ok(films.iter().any(Option::is_some))
     }
 
     fn touching(&self, film: &Film, value: f64) -> Error {

@@ -65,7 +65,7 @@ pub(super) struct ReducedResponse {
 
 impl<'a> ReducedLinearised<'a> {
     pub fn new(reduced: &'a Reduced, poses: &[Pose], basis: &DMatrix<f64>) -> Result<Self> {
-        let films = reduced.placed_films(poses)?;
+        let films = reduced.placed_films(poses, basis)?;
         let place = |link: &'a Link| {
             let placed = link.place(&reduced.bodies, poses, &films)?;
             let block = block(reduced, &placed);
@@ -265,21 +265,17 @@ impl<'a> ReducedLinearised<'a> {
     }
 
     fn pull_back_films(&self, x: &DVector<f64>, y: &DVector<f64>, out: &mut [Vec6]) {
-        for (film, wrenches) in self.film_wrenches(x, std::slice::from_ref(y)) {
-            (wrenches.iter()).for_each(|wrench| film.apply(wrench, out));
+        for (film, wrench) in self.each_film(|film| film.wrench(x, y)) {
+            film.apply(&wrench, out);
         }
     }
 
-    /// [`PlacedFilm::wrenches`] of all films.
-    fn film_wrenches(
+    fn each_film<T: Send>(
         &self,
-        x: &DVector<f64>,
-        columns: &[DVector<f64>],
-    ) -> Vec<(&PlacedFilm<'a>, Vec<Vec6>)> {
+        of: impl Fn(&PlacedFilm<'a>) -> T + Sync,
+    ) -> Vec<(&PlacedFilm<'a>, T)> {
         let films: Vec<_> = self.films().collect();
-        let one = |film: &&'_ PlacedFilm<'a>| film.wrenches(x, columns);
-        let wrenches: Vec<_> = films.par_iter().map(one).collect();
-        films.into_iter().zip(wrenches).collect()
+        films.into_par_iter().map(|film| (film, of(film))).collect()
     }
 
     fn fields(&self) -> &[Fields] {
@@ -334,11 +330,10 @@ impl<'a> ReducedLinearised<'a> {
                 self.apply(placed, &total, &pushed, out);
             }
         }
-        let twists = &self.basis * x;
-        let columns: Vec<_> = self.basis.column_iter().map(|c| c.into_owned()).collect();
-        for (film, wrenches) in self.film_wrenches(&twists, &columns) {
-            let each = out.iter_mut().zip(&wrenches);
-            each.for_each(|(out, wrench)| film.apply(wrench, out));
+        for (film, wrenches) in self.each_film(|film| film.column_wrenches(x)) {
+            for (column, wrench) in &wrenches {
+                film.apply(wrench, &mut out[*column]);
+            }
         }
         out
     }

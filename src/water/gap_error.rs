@@ -5,7 +5,7 @@
 //!
 //! ```text
 //! q = h/r (2h/r to a wall), times (0.003/tolerance)^0.6       sources: the part of the force that they lose, or add between flat faces
-//! s = e²/(8 R h)                                              films and panels: how far the faces lie inside the surfaces, in the gap
+//! s = e²/(8 R h)                                              films (of their own faces) and panels: how far the faces lie inside the surfaces, in the gap
 //! R over the radius of the ball of equal volume               round, or flat
 //! ```
 //!
@@ -54,8 +54,10 @@ pub struct GapError {
 pub(crate) struct Across {
     /// m.
     pub gap: f64,
-    /// Edges of the faces there, m.
+    /// Edges of the faces there, m: of the body with the longer ones.
     pub edge: f64,
+    /// Edges of the faces that a film has there, m.
+    pub film_edge: f64,
     /// Radius of the relative curvature, m.
     pub curvature: f64,
     /// Of the ball as large as the smaller body, m.
@@ -123,16 +125,16 @@ impl Across {
         }
     }
 
-    /// How far the faces lie inside, in the gap.
-    fn inside(&self) -> f64 {
-        self.edge.powi(2) / (8.0 * self.curvature * self.gap)
+    /// How far faces with such edges lie inside, in the gap; a fourth of the square of the edges over the width of the patch that the gap opens around.
+    fn inside(&self, edge: f64) -> f64 {
+        edge.powi(2) / (8.0 * self.curvature * self.gap)
     }
 
     /// By a film that has taken all over.
     fn by_film(&self) -> GapError {
         let flat = self.flatness();
         let base = (1.0 - flat) * FILM[0] + flat * FILM[1];
-        let force = base + FACETS * (4.0 * self.inside()).ln_1p();
+        let force = base + FACETS * (4.0 * self.inside(self.film_edge)).ln_1p();
         GapError {
             carried: Carried::Film,
             added_mass: OWN + self.tolerance + (MASS + MASS_FLAT * flat) * force,
@@ -159,8 +161,9 @@ impl Across {
     pub fn by_panels(&self) -> GapError {
         let flat = self.flatness();
         let thin = 0.1 * self.edge / self.gap;
-        let force =
-            PANELS + FACETS * (2.0 * self.inside()).ln_1p() + flat * THIN * thin / (1.0 + thin);
+        let force = PANELS
+            + FACETS * (2.0 * self.inside(self.edge)).ln_1p()
+            + flat * THIN * thin / (1.0 + thin);
         GapError {
             carried: Carried::Panels,
             added_mass: OWN + (MASS + MASS_FLAT * flat) * force,

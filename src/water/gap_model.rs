@@ -22,20 +22,25 @@ pub(crate) struct GapModel {
     pub carried: Option<Carried>,
     /// Relative error that compression aims at, per body.
     pub tolerances: Vec<f64>,
-    /// The gaps from which on there are films, m.
+    /// The gaps from which on there are films, m, the body first whose faces carry it.
     pub reaches: Vec<(usize, Other, f64)>,
     /// What compressed bodies resolve.
     pub resolved: Vec<Resolved>,
 }
 
 impl GapModel {
+    /// The gap from which on a pair has a film, m, and whether the faces of the gap's second body carry it.
+    fn film(&self, gap: &Gap) -> Option<(f64, bool)> {
+        self.reaches.iter().find_map(|(body, other, reach)| {
+            let own = (*body, *other) == (gap.first, gap.second);
+            let turned = gap.second == Other::Body(*body) && *other == Other::Body(gap.first);
+            (own || turned).then_some((*reach, turned))
+        })
+    }
+
     /// The gap from which on a pair has a film, m.
     pub fn reach(&self, gap: &Gap) -> Option<f64> {
-        let same = |(first, second, _): &&(usize, Other, f64)| {
-            (*first, *second) == (gap.first, gap.second)
-                || gap.second == Other::Body(*first) && *second == Other::Body(gap.first)
-        };
-        self.reaches.iter().find(same).map(|(_, _, reach)| *reach)
+        self.film(gap).map(|(reach, _)| reach)
     }
 
     /// The widest gap that has a film, m; 0 where there is none.
@@ -50,17 +55,21 @@ impl GapModel {
         let distance = gap.distance.max(LEAST * gap.edge);
         // Between round surfaces the area within a distance d more than the gap is 2πRd.
         let beyond = BEYOND * distance.max(gap.edge);
-        let near = gaps.area_within(gap, distance + beyond, poses);
+        let near = gaps.near_faces(gap, beyond, poses);
+        let area = near[0].area.max(near[1].area);
+        let film = self.film(gap);
+        let carries = film.and_then(|(_, second)| near[usize::from(second)].edge());
         let (ratio, _) = narrowest(gaps, gap, poses, &self.resolved).unwrap_or((1.0, 0.0));
         let tolerances = gap.sides().map(|(b, _)| self.tolerances.get(b));
         Across {
             gap: distance,
             edge: gap.edge,
-            curvature: (near / (2.0 * PI * beyond)).max(LEAST * gap.edge),
+            film_edge: carries.unwrap_or(gap.edge),
+            curvature: (area / (2.0 * PI * beyond)).max(LEAST * gap.edge),
             size: clearance.size(gap),
             ratio: ratio.max(LEAST),
             tolerance: tolerances.flatten().fold(0.0, |a, b| b.max(a)),
-            reach: self.reach(gap),
+            reach: film.map(|(reach, _)| reach),
         }
     }
 

@@ -5,6 +5,24 @@ use hydrograd_adjoint::lie::{Pose, Vec3};
 
 /// Part of the gap by which distances may exceed it where surfaces count as parallel.
 const PARALLEL: f64 = 0.2;
+/// How far faces are taken to lie inside their surface at most, in edges: a half for a circle's chord.
+const INSIDE: f64 = 0.5;
+
+/// Faces of a body near a gap.
+#[derive(Clone, Copy, Debug, Default)]
+pub(crate) struct NearFaces {
+    /// Of all of them, m².
+    pub area: f64,
+    count: usize,
+}
+
+impl NearFaces {
+    /// Edge of as many equilateral triangles of that area, m; none where no face is near.
+    pub fn edge(&self) -> Option<f64> {
+        let each = self.area / self.count as f64;
+        (self.count > 0).then(|| (4.0 / 3f64.sqrt() * each).sqrt())
+    }
+}
 
 impl Gaps {
     /// The area over which the surfaces of a gap are parallel: of the faces of one whose centres are no farther from the other than
@@ -27,11 +45,25 @@ impl Gaps {
         self.near(body, other, (1.0 + PARALLEL) * gap, poses)
     }
 
-    /// The area of the faces of one of the bodies at a gap whose centres are no farther from the other than `limit` (m), m²; the larger one of both.
-    pub(crate) fn area_within(&self, gap: &Gap, limit: f64, poses: &[Pose]) -> f64 {
-        let sides = gap.sides();
-        let areas = sides.map(|(body, other)| self.near(body, other, limit, poses));
-        areas.fold(0.0, f64::max)
+    /// The faces of both bodies at a gap whose centres are no farther from the other than `beyond` (m) more than the nearest of them, the body itself first.
+    /// Faces of round bodies lie inside, by more than a narrow gap where they are coarse: so the gap itself isn't what they are held to.
+    pub(crate) fn near_faces(&self, gap: &Gap, beyond: f64, poses: &[Pose]) -> [NearFaces; 2] {
+        let limit = gap.distance + beyond + INSIDE * gap.edge;
+        let mut out = [NearFaces::default(); 2];
+        for (near, (body, other)) in out.iter_mut().zip(gap.sides()) {
+            let Some(Some(tree)) = self.trees.get(body) else {
+                continue;
+            };
+            let faces = self.faces_within(body, other, limit, poses);
+            let nearest = faces
+                .iter()
+                .fold(f64::INFINITY, |least, (_, d)| least.min(*d));
+            for (f, _) in faces.iter().filter(|(_, d)| *d <= nearest + beyond) {
+                near.area += tree.area(*f);
+                near.count += 1;
+            }
+        }
+        out
     }
 
     fn near(&self, body: usize, other: Other, limit: f64, poses: &[Pose]) -> f64 {

@@ -11,6 +11,9 @@ use num_dual::Dual64;
 use std::borrow::Cow;
 use std::sync::OnceLock;
 
+/// Columns up to which all pairs of them cost no more than a few derivatives one by one.
+const FEW: usize = 6;
+
 /// A film whose gap is below what others resolve.
 pub(crate) struct PlacedFilm<'a> {
     pub film: &'a Film,
@@ -197,8 +200,33 @@ impl<'a> PlacedFilm<'a> {
         Vec6::from((self.film).wrench(how, &self.still(), pair.0, pair.1))
     }
 
+    /// ∇E(x, y) of combinations of the basis, frame of the other: from that of every two columns where few move it, which steps ask for anyway.
+    pub fn basis_wrench(&self, basis: &DMatrix<f64>, [x, y]: [&DVector<f64>; 2]) -> Vec6 {
+        if self.solved.len() > FEW {
+            return self.wrench(&(basis * x), &(basis * y));
+        }
+        let of_x = self.pulled(x);
+        self.parts(y).iter().zip(of_x).map(|(y, x)| *y * x).sum()
+    }
+
     /// ∇E(x, e) of a combination x of the basis and every column e of it that moves, frame of the other.
     pub fn column_wrenches(&self, x: &DVector<f64>) -> Vec<(usize, Vec6)> {
+        let all = self.pulled(x);
+        let columns = self.columns.iter();
+        columns.map(|(c, number)| (*c, all[*number])).collect()
+    }
+
+    /// How much of each potential there is in a combination of the basis.
+    fn parts(&self, x: &DVector<f64>) -> Vec<f64> {
+        let mut out = vec![0.0; self.solved.len()];
+        for (column, number) in &self.columns {
+            out[*number] += x[*column];
+        }
+        out
+    }
+
+    /// ∇E(x, e) of every e that was solved for.
+    fn pulled(&self, x: &DVector<f64>) -> Vec<Vec6> {
         let all = self.wrenches.get_or_init(|| {
             let rates = self.in_reverse().rates(self.film, &self.layer);
             let (still, layer) = (self.still(), &self.layer);
@@ -209,10 +237,7 @@ impl<'a> PlacedFilm<'a> {
             let flows: Vec<_> = self.solved.iter().map(flow).collect();
             self.film.wrenches((layer, &rates), &still, &flows)
         });
-        let mut parts = vec![0.0; self.solved.len()];
-        for (column, number) in &self.columns {
-            parts[*number] += x[*column];
-        }
+        let parts = self.parts(x);
         let of = |number: usize| -> Vec6 {
             let pair = |other: usize| {
                 let (low, high) = (number.min(other), number.max(other));
@@ -221,8 +246,7 @@ impl<'a> PlacedFilm<'a> {
             let parts = parts.iter().enumerate();
             parts.map(|(other, part)| *part * pair(other)).sum()
         };
-        let columns = self.columns.iter();
-        columns.map(|(c, number)| (*c, of(*number))).collect()
+        (0..parts.len()).map(of).collect()
     }
 
     /// Adds a wrench in the frame of the other to both bodies, as spatial wrenches.

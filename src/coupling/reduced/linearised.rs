@@ -406,7 +406,9 @@ impl Linearised for ReducedLinearised<'_> {
     fn gradient(&self, x: &DVector<f64>, y: &DVector<f64>) -> Result<Vec<Vec6>> {
         let (a, b) = (&self.alpha * x, &self.alpha * y);
         let mut out = self.pull_back(a.as_slice(), b.as_slice());
-        self.pull_back_films(&(&self.basis * x), &(&self.basis * y), &mut out);
+        for (film, wrench) in self.each_film(|film| film.basis_wrench(&self.basis, [x, y])) {
+            film.apply(&wrench, &mut out);
+        }
         Ok(out)
     }
 

@@ -33,6 +33,11 @@ impl Opposite {
         Self(Kind::Wall(wall))
     }
 
+    /// Whether it is known to be convex: a shape by formula, or a wall.
+    pub fn is_convex(&self) -> bool {
+        !matches!(self.0, Kind::Mesh(_))
+    }
+
     /// The wall's normal, if it is one.
     pub fn wall_normal(&self) -> Option<&Vec3> {
         match &self.0 {

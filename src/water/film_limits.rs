@@ -17,7 +17,7 @@ fn over_wall(shape: &Shape, faces: usize, floor: f64) -> Film {
     let other = Side::Wall(Image::of_walls(&[wall]).unwrap()[1]);
     let plane = HalfSpace::new(&Vec3::zeros(), &Vec3::z()).unwrap();
     let between = (
-        Arc::new(FilmSurface::new(&mesh)),
+        Arc::new(FilmSurface::new(&mesh, true)),
         Arc::new(Opposite::of_wall(plane)),
     );
     let reach = 4.0 * floor;

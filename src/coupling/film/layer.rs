@@ -1,17 +1,15 @@
 //! A film's thickness at given poses, and where it ends. Its derivative is [`Layer::reverse`].
 
+use super::Film;
 use super::jet::{
     Displaced, Distance, Jet, Vector, add, constant, dot, minus, product, real, scale, zero,
 };
 use super::surface::Element;
-use super::{Film, FilmSurface};
-use crate::geometry::{Field, Opposite};
+use crate::geometry::Field;
 
 /// Power of the distances with which vertices count in a link's gap.
 pub(super) const NEAREST: i32 = 6;
-/// Distances between which the flow in a film goes over into that around the bodies, in sizes of the first.
-const RIM: [f64; 2] = [0.5, 1.0];
-/// The same in cosines between the surface's normal and the way across: the sides of a block still lead the flow, its back doesn't.
+/// Cosines between the surface's normal and the way across, between which a film ends: the sides of a block still lead the flow, its back doesn't.
 pub(super) const BACK: [f64; 2] = [-0.1, -0.6];
 /// How well the rim leads the flow away.
 pub(super) const OPENING: f64 = 20.0;
@@ -99,11 +97,6 @@ pub(super) struct Facing<D> {
 /// The vertices of faces that are near, with their fields.
 pub(super) type Near = Vec<(usize, Field)>;
 
-/// Where films end.
-pub(super) fn ends(surface: &FilmSurface) -> [f64; 2] {
-    RIM.map(|part| part * surface.size)
-}
-
 impl Film {
     /// The vertices that a film needs, of a surface with these points in the frame of what is opposite; none where that is farther than a film reaches. `Err`
     /// gives a distance that isn't positive.
@@ -114,7 +107,7 @@ impl Film {
         if middle.distance - surface.radius > self.width.reach {
             return Ok(None);
         }
-        let [_, end] = ends(surface);
+        let [_, end] = self.rim;
         let (mut fields, mut lowest) = (vec![None; surface.vertices.len()], f64::INFINITY);
         for cluster in &surface.clusters {
             let center = opposite.field(&real(&placed.apply(&cluster.center)));
@@ -168,7 +161,7 @@ impl<D: Jet> Layer<D> {
                 }
             })
             .collect();
-        let gap = Gap::new(surface, opposite, placed, &spots, width.reach)?;
+        let gap = Gap::new(film, placed, &spots)?;
         if known.is_none() && gap.value.re() >= width.reach {
             return None;
         }
@@ -196,21 +189,21 @@ impl<D: Jet> Layer<D> {
             rim: Vec::new(),
             cells: Vec::new(),
         };
-        out.bound(surface, known);
-        out.fill(surface);
+        out.bound(film, known);
+        out.fill(film);
         Some(out)
     }
 
     /// Where the film ends: which vertices have a potential, unless that is known, and how well each leads into the open.
-    fn bound(&mut self, surface: &FilmSurface, known: Option<&Layer<f64>>) {
+    fn bound(&mut self, film: &Film, known: Option<&Layer<f64>>) {
         for s in 0..self.spots.len() {
-            let t = self.outside(surface, s);
+            let t = self.outside(film, s);
             let within = t.iter().all(|t| t.re() < 1.0);
             if known.map_or(within, |known| known.spots[s].number.is_some()) {
                 let spot = &mut self.spots[s];
                 spot.number = Some(self.active.len());
                 self.active.push(s);
-                let area = surface.areas[spot.vertex];
+                let area = film.surface.areas[spot.vertex];
                 let open = opening(t[0]) + opening(t[1]);
                 self.rim
                     .push(open * (OPENING * area) / spot.distances[0].value);
@@ -219,17 +212,18 @@ impl<D: Jet> Layer<D> {
     }
 
     /// How far a spot is from where the film begins to end to where it has, by its distance and by where it faces.
-    pub(super) fn outside(&self, surface: &FilmSurface, spot: usize) -> [D; 2] {
-        let [start, end] = ends(surface);
+    pub(super) fn outside(&self, film: &Film, spot: usize) -> [D; 2] {
+        let [start, end] = film.rim;
         let spot = &self.spots[spot];
-        let facing = dot(&self.gap.normal, &surface.normals[spot.vertex]);
+        let facing = dot(&self.gap.normal, &film.surface.normals[spot.vertex]);
         [
             (spot.distances[0].value - start) / (end - start),
             (facing - BACK[0]) / (BACK[1] - BACK[0]),
         ]
     }
 
-    fn fill(&mut self, surface: &FilmSurface) {
+    fn fill(&mut self, film: &Film) {
+        let surface = &*film.surface;
         let mut at = vec![None; surface.vertices.len()];
         for (s, spot) in self.spots.iter().enumerate() {
             at[spot.vertex] = Some(s);
@@ -249,7 +243,7 @@ impl<D: Jet> Layer<D> {
                 face: f,
                 spots,
                 corners,
-                thickness: [near, held].map(|d| Thickness::new(&d, face)),
+                thickness: [near, held].map(|d| Thickness::new(&d, face, film.bulge(face))),
                 facing: Facing::new(&near, face),
             });
         }
@@ -257,14 +251,8 @@ impl<D: Jet> Layer<D> {
 }
 
 impl<D: Jet> Gap<D> {
-    fn new(
-        surface: &FilmSurface,
-        opposite: &Opposite,
-        placed: &Displaced<D>,
-        spots: &[Spot<D>],
-        reach: f64,
-    ) -> Option<Self> {
-        let [_, end] = ends(surface);
+    fn new(film: &Film, placed: &Displaced<D>, spots: &[Spot<D>]) -> Option<Self> {
+        let (surface, reach, [_, end]) = (&film.surface, film.width.reach, film.rim);
         let (mut sum, mut gap) = (D::from(0.0), D::from(0.0));
         let mut mean = zero::<D>();
         for spot in spots {
@@ -280,7 +268,7 @@ impl<D: Jet> Gap<D> {
         (sum.re() > 0.0).then(|| Self {
             value: gap / sum,
             mean,
-            normal: match opposite.wall_normal() {
+            normal: match film.opposite.wall_normal() {
                 Some(wall) => placed.rotate_inverse(&constant(&-wall)),
                 None => mean,
             },
@@ -325,23 +313,31 @@ pub(super) fn opening_slope<D: Jet>(t: D) -> D {
 
 impl<D: Jet> Thickness<D> {
     /// The length of the arc that meets both surfaces at right angles, of a face with these distances at its corners: 1/(mean of 1/length), which is what the flow
-    /// across lines of equal thickness feels.
-    fn new(d: &[D; 3], face: &Element) -> Self {
+    /// across lines of equal thickness feels, by the middles of its edges, outside which the shape bulges.
+    fn new(d: &[D; 3], face: &Element, bulge: &[f64; 3]) -> Self {
         let (steep, slopes) = steepness(d, face);
         let [arc, slope] = arc(steep);
-        // One over the sums of two.
-        let pairs: [D; 3] = std::array::from_fn(|i| (d[i] + d[(i + 1) % 3]).recip());
-        let mean = (pairs[0] + pairs[1] + pairs[2]).recip() * 1.5;
-        let squares = pairs.map(|x| x * x);
+        let middles: [_; 3] = std::array::from_fn(|i| inverse(d[i] + d[(i + 1) % 3], bulge[i]));
+        let mean = (middles[0][0] + middles[1][0] + middles[2][0]).recip() * 1.5;
         let value = arc * mean;
         let narrower = value * mean / 1.5;
         Self {
             value,
             slopes: std::array::from_fn(|i| {
-                slope * slopes[i] * mean + (squares[i] + squares[(i + 2) % 3]) * narrower
+                slope * slopes[i] * mean - (middles[i][1] + middles[(i + 2) % 3][1]) * narrower
             }),
         }
     }
+}
+
+/// 1/(w − 2b) of a sum of two distances, w, where the surface bulges by b, and its derivative: (1 + t + 2t²)/w in t = 2b/w, as large at t = ½ and never without end.
+fn inverse<D: Jet>(w: D, bulge: f64) -> [D; 2] {
+    let once = w.recip();
+    let t = once * (2.0 * bulge);
+    [
+        (t * (t * 2.0 + 1.0) + 1.0) * once,
+        -(t * (t * 6.0 + 2.0) + 1.0) * once * once,
+    ]
 }
 
 /// |∇d|² on a face, and its derivative.

@@ -3,7 +3,7 @@
 use super::Film;
 use super::jet::{Displaced, Jet, Screw, Vector, add, add_scaled, constant, cross, scale};
 use super::jet::{whole, zero};
-use super::layer::{BACK, Layer, NEAREST, OPENING, ends, opening_slope, weight};
+use super::layer::{BACK, Layer, NEAREST, OPENING, opening_slope, weight};
 use crate::adjoint::lie::Vec6;
 
 /// Cotangents of what the flow in a film takes from a [`Layer`].
@@ -73,12 +73,11 @@ impl<D: Jet> Layer<D> {
 
     /// What its distance and where it faces do to the rim of an active vertex.
     fn rim_slopes(&self, film: &Film, number: usize) -> [D; 2] {
-        let surface = &*film.surface;
-        let [start, end] = ends(surface);
+        let (surface, [start, end]) = (&*film.surface, film.rim);
         let (s, rim) = (self.active[number], self.rim[number]);
         let spot = &self.spots[s];
         let d = spot.distances[0].value;
-        let [outside, behind] = self.outside(surface, s).map(opening_slope);
+        let [outside, behind] = self.outside(film, s).map(opening_slope);
         let strength = D::from(OPENING * surface.areas[spot.vertex]) / d;
         [
             strength * outside / (end - start) - rim / d,
@@ -88,8 +87,7 @@ impl<D: Jet> Layer<D> {
 
     /// Wrenches of the gap, and of the mean normal where it isn't a wall's that counts.
     fn gap_wrenches(&self, film: &Film) -> (Screw<D>, [Screw<D>; 3]) {
-        let surface = &*film.surface;
-        let [_, end] = ends(surface);
+        let (surface, [_, end]) = (&*film.surface, film.rim);
         let wall = film.opposite.wall_normal().is_some();
         let (mut gap, mut mean) = ([D::from(0.0); 6], [[D::from(0.0); 6]; 3]);
         for spot in &self.spots {

@@ -55,10 +55,16 @@ pub(crate) struct Element {
     pub arms: [Vec3; 3],
     /// m².
     pub area: f64,
+    /// How far the shape that the mesh stands for lies outside the middle of the edge from each corner to the next, m.
+    pub bulge: [f64; 3],
 }
 
+/// Cosine of the angle between faces up to which a mesh stands for a round surface there.
+const ROUND: f64 = 0.8;
+
 impl FilmSurface {
-    pub fn new(mesh: &TriMesh) -> Self {
+    /// Of a mesh that stands for itself, or for a shape by formula (`round`), which lies outside its edges where it is curved.
+    pub fn new(mesh: &TriMesh, round: bool) -> Self {
         let count = mesh.vertices().len();
         let (mut areas, mut loads) = (vec![0.0; count], vec![Vec6::zeros(); count]);
         let mut faces = Vec::with_capacity(mesh.faces().len());
@@ -81,6 +87,7 @@ impl FilmSurface {
                 normal,
                 arms,
                 area,
+                bulge: [0.0; 3],
             });
         }
         let edges = mesh
@@ -90,6 +97,9 @@ impl FilmSurface {
         let edges: Vec<_> = edges.collect();
         // Corners of a mesh are among its vertices.
         let order = elimination_order(count, &edges).unwrap_or_else(|| (0..count).collect());
+        if round {
+            bulge(mesh.vertices(), &mut faces);
+        }
         let ball = mesh.bounding_ball();
         let size = (0.75 * mesh.mass_properties().volume / PI).cbrt();
         Self {
@@ -105,6 +115,28 @@ impl FilmSurface {
             clusters: clusters(mesh.vertices()),
             order,
         }
+    }
+}
+
+/// Sets how far the shape lies outside the edges: an eighth of the edge times how far the normals at its ends, each the mean of the faces there that are nearly parallel, turn
+/// apart along it.
+fn bulge(vertices: &[Vec3], faces: &mut [Element]) {
+    let mut around = vec![Vec::new(); vertices.len()];
+    for face in faces.iter() {
+        for v in face.corners {
+            around[v].push((face.normal, face.area));
+        }
+    }
+    for face in faces {
+        let normals = face.corners.map(|v| {
+            let near = (around[v].iter()).filter(|(n, _)| n.dot(&face.normal) > ROUND);
+            near.map(|(n, area)| n * *area).sum::<Vec3>().normalize()
+        });
+        face.bulge = [0, 1, 2].map(|i| {
+            let j = (i + 1) % 3;
+            let edge = vertices[face.corners[j]] - vertices[face.corners[i]];
+            ((normals[j] - normals[i]).dot(&edge) / 8.0).max(0.0)
+        });
     }
 }
 

@@ -46,7 +46,10 @@ impl Reduced {
                 Some(a) => sides[a].clone(),
                 None => {
                     let opposite = Opposite::of_body(*solid, mesh);
-                    (Arc::new(FilmSurface::new(mesh)), Arc::new(opposite))
+                    (
+                        Arc::new(FilmSurface::new(mesh, solid.is_some())),
+                        Arc::new(opposite),
+                    )
                 }
             });
         }

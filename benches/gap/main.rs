@@ -1,13 +1,18 @@
-//! Bodies that come near one another: added mass along the gap, and its slope, by every fidelity against converged panels.
+//! Bodies that come near one another: added mass along the gap, and its slope, by every fidelity against references ([`references`]).
 //!
-//! `cargo bench --bench gap [-- CASE …] [--quick] [--plot]`: the cases whose names contain one of the words, or all. `--quick` with fewer gaps
-//! and a coarser reference; `--plot` writes the errors to docs/gap.svg as well. `--estimates` holds what runs estimate their errors to be against
+//! `cargo bench --bench gap [-- CASE …] [--quick] [--plot]`: the cases whose names contain one of the words, or all. `--quick` with fewer gaps;
+//! `--references` finds the references again; `--plot` writes the errors to docs/gap.svg as well. `--estimates` holds what runs estimate their errors to be against
 //! them, on these cases and on others; `--accuracy` varies that for a sphere over a wall; `--time` has what films cost: evaluations and steps with them beside the same
 //! without, and far apart. Gaps are in units of a radius or half a side; masses over the water's
 //! density, m³, slopes m².
 
 #[allow(dead_code)]
+#[path = "../common/mod.rs"]
 mod common;
+mod facets;
+mod kept;
+mod references;
+mod rings;
 
 use common::{Effort, arguments, settings, step_times};
 use hydrograd::adjoint::lie::{Vec3, exp_matrix};
@@ -16,6 +21,7 @@ use hydrograd::simulate::Method;
 use hydrograd::{Controls, Fidelity, Result, Settings, Simulator};
 use nalgebra::DVector;
 use plotters::prelude::*;
+use references::Reference;
 use std::path::Path;
 use std::time::Instant;
 
@@ -104,16 +110,14 @@ impl Case {
         Ok(nearest.map(|near| [near.added_mass_error, near.force_error]))
     }
 
-    /// The limit of ever more faces, and how far the finest are from it.
-    fn converged(&self, gap: f64, quick: bool) -> Result<([f64; 2], [f64; 2])> {
-        let finest = match (self.shapes.len(), quick) {
-            (1, false) => 5120,
-            (_, false) => 2880,
-            (1, true) => 1280,
-            (_, true) => 720,
-        };
-        let coarse = self.along(gap, &panels(finest / 4))?;
-        let fine = self.along(gap, &panels(finest))?;
+    /// M and its slope at a gap in the case's unit, and how far off they may be: the kept reference, or else of panels, the limit of ever more faces.
+    fn converged(&self, gap: f64) -> Result<([f64; 2], [f64; 2])> {
+        if let Some(Reference { values, unsure }) = references::of(self.name, gap) {
+            return Ok((values, [0, 1].map(|k| unsure[k] * values[k].abs())));
+        }
+        let finest = if self.shapes.len() == 1 { 1280 } else { 720 };
+        let coarse = self.along(gap * self.size, &panels(finest / 4))?;
+        let fine = self.along(gap * self.size, &panels(finest))?;
         let limit = |k: usize| {
             // The error falls with one over the number of faces, about.
             let rest = (fine[k] - coarse[k]) / 3.0;
@@ -188,7 +192,7 @@ fn held_out() -> Vec<Case> {
 }
 
 /// Holds the estimates of a run's errors against those: prints all, the least of estimate over error, and the median.
-fn estimates(cases: &[Case], gaps: &[f64], quick: bool) -> Result<()> {
+fn estimates(cases: &[Case], gaps: &[f64]) -> Result<()> {
     let of = |fidelity| Settings::default().fidelity(fidelity).faces(FACES);
     let configurations = [
         ("reduced, no films", of(Fidelity::Reduced).films(false)),
@@ -199,8 +203,8 @@ fn estimates(cases: &[Case], gaps: &[f64], quick: bool) -> Result<()> {
     let mut ratios = vec![[Vec::new(), Vec::new()]; configurations.len()];
     for case in cases {
         for gap in gaps {
+            let (exact, unsure) = case.converged(*gap)?;
             let gap = gap * case.size;
-            let (exact, unsure) = case.converged(gap, quick)?;
             let mut line = format!("| {} | {gap:.4} |", case.name);
             for ((_, settings), ratios) in configurations.iter().zip(&mut ratios) {
                 let found = case.along(gap, settings);
@@ -251,7 +255,7 @@ fn accuracies() -> Result<()> {
         return Ok(());
     };
     for gap in [0.1, 0.05, 0.01] {
-        let (exact, _) = case.converged(gap, false)?;
+        let (exact, _) = case.converged(gap)?;
         for accuracy in [None, Some(1e-3), Some(1e-4)] {
             let given = accuracy.map_or("default".into(), |a| format!("{a:.0e}"));
             let mut line = format!("| {gap} | {given} |");
@@ -379,6 +383,11 @@ fn main() -> std::result::Result<(), Box<dyn std::error::Error>> {
     let chosen =
         |case: &Case| words.is_empty() || words.iter().any(|w| case.name.contains(w.as_str()));
     let begin = Instant::now();
+    if has("--references") {
+        references::print(&words);
+        println!("\n{:.0} s", begin.elapsed().as_secs_f64());
+        return Ok(());
+    }
     if has("--accuracy") {
         return Ok(accuracies()?);
     }
@@ -396,8 +405,8 @@ fn main() -> std::result::Result<(), Box<dyn std::error::Error>> {
         println!(
             "| case | gap, m | reduced, no films | reduced | auto | panels |\n|---|---|---|---|---|---|"
         );
-        estimates(&chosen, gaps, quick)?;
-        estimates(&held_out(), &[0.3, 0.1, 0.03, 0.01, 0.003], true)?;
+        estimates(&chosen, gaps)?;
+        estimates(&held_out(), &[0.3, 0.1, 0.03, 0.01, 0.003])?;
         println!("\n{:.0} s", begin.elapsed().as_secs_f64());
         return Ok(());
     }
@@ -412,7 +421,7 @@ fn main() -> std::result::Result<(), Box<dyn std::error::Error>> {
         println!("| gap | M | dM/dgap | {} |", names.join(" | "));
         println!("|{}", "---|".repeat(3 + names.len()));
         for gap in gaps {
-            let (exact, unsure) = case.converged(gap * case.size, quick)?;
+            let (exact, unsure) = case.converged(*gap)?;
             let percent = |k: usize| 100.0 * unsure[k] / exact[k].abs();
             let cells =
                 configurations().map(|(_, settings)| case.along(gap * case.size, &settings));

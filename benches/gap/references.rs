@@ -3,8 +3,8 @@
 //! - Spheres: Lamb's series of images (Hydrodynamics §98), exact.
 //! - Bodies of revolution over a wall: [`super::rings`] with elements well under the gap, on two meshes.
 //! - Boxes, an edge, capsules: [`super::facets`] graded towards edges and the gap, on two meshes, extrapolated.
-//! - Flat faces of boxes at the narrowest gaps, where no facets could be as small as the gap: the film's limit and its rim (below), with what is left fitted to
-//!   facets at wider gaps.
+//! - Flat faces of boxes at the narrowest gaps, where facets as small as the gap would be too many: the film's limit and its rim ([`flat`]), with what is left
+//!   fitted to facets at wider gaps; two boxes by that of one over a wall ([`near_boxes`]).
 
 use super::facets::{self, Copy, Facet, graded, patch};
 use super::kept;
@@ -221,17 +221,17 @@ const SQUARE: f64 = 0.035_144_3;
 /// Gaps, m, over which what the film leaves is fitted.
 const FITTED: [f64; 3] = [0.05, 0.025, 0.0125];
 
-/// A face 1 × 1 at a gap g over another: M = 0.0351/g + `rim`·0.179 ln(1/g) + c₀ + c₁ g ln(1/g) + c₂ g, from M at the fitted gaps. The second term is what leaves at the rim
-/// (into a right angle over a wall: 1; over another block into twice that: ½). A disc's, which goes as this does, comes out right to 10⁻⁴ from 0.1, 0.05 and 0.025 R.
-fn flat(gap: f64, rim: f64, fitted: [f64; 3]) -> [f64; 2] {
-    let film = |g: f64| SQUARE / g - rim * SQUARE_RIM * g.ln();
+/// A box's face 1 × 1 at a gap g over a wall: M = 0.0351/g + 0.179 ln(1/g) + c₀ + c₁ g ln(1/g) + c₂ g, from M at the fitted gaps. The second term is what leaves at the rim into
+/// a right angle. A disc's, which goes as this does, comes out right to 10⁻⁴ from 0.1, 0.05 and 0.025 R.
+fn flat(gap: f64, fitted: [f64; 3]) -> [f64; 2] {
+    let film = |g: f64| SQUARE / g - SQUARE_RIM * g.ln();
     let left: [f64; 3] = [0, 1, 2].map(|k| fitted[k] - film(FITTED[k]));
     let terms = Mat3::from_fn(|i, j| {
         let g = FITTED[i];
         [1.0, -g * g.ln(), g][j]
     });
     let c = terms.try_inverse().expect("different gaps") * Vec3::from(left);
-    let slope = -SQUARE / (gap * gap) - rim * SQUARE_RIM / gap;
+    let slope = -SQUARE / (gap * gap) - SQUARE_RIM / gap;
     [
         film(gap) + c[0] - c[1] * gap * gap.ln() + c[2] * gap,
         slope - c[1] * (gap.ln() + 1.0) + c[2],
@@ -246,6 +246,18 @@ fn boxes(gap: f64, level: usize) -> [f64; 2] {
         [m, 0.5 * slope]
     };
     of_two([half(1.0), half(-1.0)])
+}
+
+/// The same at a gap (m) too narrow for facets: half of the box's over a wall at half the gap, and half of what both have that move together, which goes straight with the
+/// gap from M at 0.1 and 0.05 m on.
+fn near_boxes(gap: f64, [far, near]: [f64; 2]) -> [f64; 2] {
+    let rows = kept::of("box-wall").expect("kept");
+    let wall = |g: f64| flat(g, [3, 4, 5].map(|k: usize| rows[k][0]));
+    let together = |gap: f64, m: f64| 2.0 * m - wall(0.5 * gap)[0];
+    let (far, near) = (2.0 * far - rows[3][0], together(0.05, near));
+    let slope = (far - near) / 0.05;
+    let [m, of_wall] = wall(0.5 * gap);
+    of_two([[m, 0.5 * of_wall], [near + slope * (gap - 0.05), slope]])
 }
 
 /// A reference: M and dM/dgap, and how far each may be off, relative.
@@ -264,7 +276,7 @@ pub fn of(case: &str, gap: f64) -> Option<Reference> {
         });
     }
     let at = super::GAPS.iter().position(|g| *g == gap)?;
-    let (_, rows) = kept::KEPT.iter().find(|(name, _)| *name == case)?;
+    let rows = kept::of(case)?;
     let [m, slope, of_m, of_slope] = rows[at];
     Some(Reference {
         values: [m, slope],
@@ -281,23 +293,22 @@ pub fn print(words: &[String]) {
             continue;
         }
         println!("(\n    \"{name}\",\n    [");
-        let mut fitted = Vec::new();
+        let mut direct: Vec<[f64; 2]> = Vec::new();
         for gap in super::GAPS {
-            let all = match (name, gap < 0.02) {
+            let all = match name {
                 // Facets as small as the gap would be too many.
-                ("disc-wall by facets", true) => continue,
-                ("box-wall" | "box-box", true) => {
-                    let rim = if name == "box-wall" { 1.0 } else { 0.5 };
-                    let of = |k: usize| {
-                        let at = |n: usize| fitted[fitted.len() - 3 + n];
-                        let by: [[f64; 2]; 3] = [at(0), at(1), at(2)];
-                        flat(0.5 * gap, rim, by.map(|m| m[k]))
-                    };
-                    limit(of(1), of(0), fall)
+                "disc-wall by facets" if gap < 0.02 => continue,
+                "box-wall" if gap < 0.02 => {
+                    let by = |m: usize| flat(0.5 * gap, [3, 4, 5].map(|k: usize| direct[k][m]));
+                    by_both(by(1), by(0), fall)
+                }
+                "box-box" if gap < 0.1 => {
+                    let by = |m: usize| near_boxes(0.5 * gap, [2, 3].map(|k: usize| direct[k][m]));
+                    by_both(by(1), by(0), fall)
                 }
                 _ => {
                     let [coarse, fine] = levels.map(|level| found(gap, level));
-                    fitted.push([coarse[0], fine[0]]);
+                    direct.push([coarse[0], fine[0]]);
                     limit(fine, coarse, fall)
                 }
             };
@@ -312,6 +323,11 @@ pub fn print(words: &[String]) {
         }
         println!("    ],\n),");
     }
+}
+
+/// [`limit`] of what was fitted, which may be off by that as well.
+fn by_both(fine: [f64; 2], coarse: [f64; 2], fall: f64) -> [(f64, f64); 2] {
+    limit(fine, coarse, fall).map(|(x, rest)| (x, rest.max(1e-3 * x.abs())))
 }
 
 /// M and dM/dgap at a gap in the case's unit on meshes of a level; the levels, and the power by which the error falls.

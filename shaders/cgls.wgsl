@@ -1,7 +1,7 @@
 // Conjugate gradients on R⁻ᵀ (KᵀK + D²) R⁻¹, every column with its own coefficients: what isn't a product.
 // Twin: solver::cgls.
 
-//! uses: gate_state
+//! uses: gate_state total
 //! constants: COLUMNS
 
 struct Task { rows: u32, pad0: u32, pad1: u32, pad2: u32 }
@@ -14,20 +14,6 @@ struct Task { rows: u32, pad0: u32, pad1: u32, pad2: u32 }
 @group(0) @binding(5) var<storage, read_write> scalars: array<f32>;    // [column][4]: γ, α, β, γ to end at
 @group(0) @binding(6) var<storage, read_write> counts: array<u32>;     // [column][4]: iterations, …
 @group(0) @binding(7) var<uniform> task: Task;
-
-var<workgroup> parts: array<f32, 256>;
-
-fn total(lane: u32, own: f32) -> f32 {
-    parts[lane] = own;
-    workgroupBarrier();
-    for (var half = 128u; half > 0u; half /= 2u) {
-        if lane < half {
-            parts[lane] += parts[lane + half];
-        }
-        workgroupBarrier();
-    }
-    return parts[0];
-}
 
 // α = γ/(p·q).
 @compute @workgroup_size(256)

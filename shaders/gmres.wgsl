@@ -2,7 +2,7 @@
 // basis begins with the right-hand side, which refine.wgsl gives in units of its norm, and is orthogonalised by classical
 // Gram–Schmidt: a cycle gains a few digits only. Twin: solver::gmres.
 
-//! uses: gate_state
+//! uses: gate_state total
 //! constants: COLUMNS
 
 // `step`: vectors of the basis before the last one; `most`: the most that there are.
@@ -20,20 +20,6 @@ struct Task { rows: u32, step: u32, most: u32, pad: u32 }
 @group(0) @binding(9) var<storage, read_write> x: array<f32>;          // [row][COLUMNS]
 @group(0) @binding(10) var<storage, read_write> p: array<f32>;         // [row][COLUMNS]: the last vector
 @group(0) @binding(11) var<uniform> task: Task;
-
-var<workgroup> parts: array<f32, 256>;
-
-fn total(lane: u32, own: f32) -> f32 {
-    parts[lane] = own;
-    workgroupBarrier();
-    for (var half = 128u; half > 0u; half /= 2u) {
-        if lane < half {
-            parts[lane] += parts[lane + half];
-        }
-        workgroupBarrier();
-    }
-    return parts[0];
-}
 
 // The first vector of the basis.
 @compute @workgroup_size(64)

@@ -6,26 +6,13 @@
 //
 // Twins: coupling::full's pair_tangent; adjoint kernel::{flux_hvp, normal_hvp, potential_hvp}.
 
-//! uses: vector flux normal potential pairs faces tile faces_tile motion
+//! uses: vector flux normal potential pairs faces tile faces_tile motion wrenches
 //! constants: LEFT
-
-// Columns, and the first, which is 0; as in pair_vjp.wgsl.
-struct Task { columns: u32, first: u32, first_task: u32, tasks: u32 }
 
 @group(1) @binding(0) var<storage, read> left: array<real>;       // [face][5·LEFT]: μ, r, β, δμ, δr
 @group(1) @binding(1) var<storage, read> right: array<real>;      // [source][4·LEFT]: a, λ, δa, δλ
-@group(1) @binding(2) var<storage, read> tasks: array<vec4<u32>>; // as in pair_vjp.wgsl
-@group(1) @binding(4) var<storage, read_write> out: array<real>;  // [task of this call][LEFT][LEFT][12]
-@group(1) @binding(5) var<uniform> task: Task;
 
 var<workgroup> densities: array<real, BLOCK * 5u * LEFT>;
-var<workgroup> parts: array<real, BLOCK * 12u>;
-
-fn put(lane: u32, at: u32, v: V3) {
-    parts[12u * lane + at] = v.x;
-    parts[12u * lane + at + 1u] = v.y;
-    parts[12u * lane + at + 2u] = v.z;
-}
 
 @compute @workgroup_size(64)
 fn main(
@@ -103,19 +90,7 @@ fn main(
                 v_add(v_scale(a, dcharge[x]), v_scale(lambda, dresidual[x])),
                 v_add(v_scale(da, charge[x]), v_scale(dlambda, residual[x])),
             );
-            workgroupBarrier();
-            put(lane, 0u, f);
-            put(lane, 3u, v_cross(s, f));
-            put(lane, 6u, df);
-            put(lane, 9u, v_add(v_cross(d, f), v_cross(s, df)));
-            workgroupBarrier();
-            if lane < 12u {
-                var sum = num(0.0);
-                for (var l = 0u; l < own.z; l++) {
-                    sum = add(sum, parts[12u * l + lane]);
-                }
-                out[((number * LEFT + x) * LEFT + y) * 12u + lane] = sum;
-            }
+            leave(lane, own.z, ((number * LEFT + x) * LEFT + y) * 12u, s, d, f, df);
         }
     }
 }

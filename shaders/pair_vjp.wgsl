@@ -4,29 +4,16 @@
 //   W(x, y) = Σ_s (f, s × f),   f = q_x a_y + ρ_x λ_y                          over a block of sources
 //
 // about the scene's middle. Left densities (μ, r, β) and right densities (a, λ) are contracted with the
-// kernels' derivatives here; nothing of the size of a matrix is written. A task is one block of sources,
-// one image, and some blocks of faces of one body. Twins: coupling::full's pair_tensor; adjoint
-// kernel::{flux_vjp, normal_vjp, potential_vjp}.
+// kernels' derivatives here; nothing of the size of a matrix is written. Twins: coupling::full's pair_tensor;
+// adjoint kernel::{flux_vjp, normal_vjp, potential_vjp}.
 
-//! uses: vector flux normal potential pairs faces tile faces_tile
+//! uses: vector flux normal potential pairs faces tile faces_tile wrenches
 //! constants: LEFT
-
-struct Task { columns: u32, first: u32, first_task: u32, tasks: u32 }
 
 @group(1) @binding(0) var<storage, read> left: array<real>;       // [face][3·columns]: μ, r, β
 @group(1) @binding(1) var<storage, read> right: array<real>;      // [source][2·columns]: a, λ
-@group(1) @binding(2) var<storage, read> tasks: array<vec4<u32>>; // source block, image, first and last block of faces
-@group(1) @binding(3) var<storage, read_write> out: array<real>;  // [task of this call][LEFT][columns][6]
-@group(1) @binding(4) var<uniform> task: Task;
 
 var<workgroup> densities: array<real, BLOCK * 3u * LEFT>;
-var<workgroup> forces: array<real, BLOCK * 12u>;
-
-fn put(lane: u32, at: u32, v: V3) {
-    forces[12u * lane + at] = v.x;
-    forces[12u * lane + at + 1u] = v.y;
-    forces[12u * lane + at + 2u] = v.z;
-}
 
 @compute @workgroup_size(64)
 fn main(
@@ -90,8 +77,8 @@ fn main(
             var sum = num(0.0);
             for (var l = 0u; l < own.z; l++) {
                 let row = (own.y + l) * 2u * columns;
-                sum = add(sum, mul(forces[12u * l + c], right[row + y]));
-                sum = add(sum, mul(forces[12u * l + 6u + c], right[row + columns + y]));
+                sum = add(sum, mul(tile[12u * l + c], right[row + y]));
+                sum = add(sum, mul(tile[12u * l + 6u + c], right[row + columns + y]));
             }
             out[((number * LEFT + x) * columns + y) * 6u + c] = sum;
         }

@@ -6,26 +6,13 @@
 //
 // Twins: coupling::panel's pair_tangent; adjoint kernel::{single_hvp, double_hvp}.
 
-//! uses: vector flux layers pairs panels tile panels_tile motion
+//! uses: vector flux layers pairs panels tile panels_tile motion wrenches
 //! constants: LEFT
-
-// Columns, and the first, which is 0; as in pair_vjp.wgsl.
-struct Task { columns: u32, first: u32, first_task: u32, tasks: u32 }
 
 @group(1) @binding(0) var<storage, read> left: array<real>;       // [panel][3·LEFT]: φ, q, δφ
 @group(1) @binding(1) var<storage, read> right: array<real>;      // [centroid][2·LEFT]: μ, δμ
-@group(1) @binding(2) var<storage, read> tasks: array<vec4<u32>>; // as in panel_vjp.wgsl
-@group(1) @binding(4) var<storage, read_write> out: array<real>;  // [task of this call][LEFT][LEFT][12]
-@group(1) @binding(5) var<uniform> task: Task;
 
 var<workgroup> densities: array<real, BLOCK * 3u * LEFT>;
-
-// Once all panels are summed, their memory is that of the forces.
-fn put(lane: u32, at: u32, v: V3) {
-    tile[12u * lane + at] = v.x;
-    tile[12u * lane + at + 1u] = v.y;
-    tile[12u * lane + at + 2u] = v.z;
-}
 
 @compute @workgroup_size(64)
 fn main(
@@ -85,19 +72,7 @@ fn main(
             let dmu = right[j * 2u * LEFT + LEFT + y];
             let f = v_scale(mu, fields[x]);
             let df = v_fused(mu, dfields[x], v_scale(dmu, fields[x]));
-            workgroupBarrier();
-            put(lane, 0u, f);
-            put(lane, 3u, v_cross(s, f));
-            put(lane, 6u, df);
-            put(lane, 9u, v_add(v_cross(d, f), v_cross(s, df)));
-            workgroupBarrier();
-            if lane < 12u {
-                var sum = num(0.0);
-                for (var l = 0u; l < own.z; l++) {
-                    sum = add(sum, tile[12u * l + lane]);
-                }
-                out[((number * LEFT + x) * LEFT + y) * 12u + lane] = sum;
-            }
+            leave(lane, own.z, ((number * LEFT + x) * LEFT + y) * 12u, s, d, f, df);
         }
     }
 }

@@ -3,27 +3,15 @@
 //   F_x(s) = Σ_i { q_ix ∇S_i − φ_ix ∇D_i }             over the panels of one body
 //   W(x, y) = Σ_s (f, s × f),   f = F_x μ_y           over a block of centroids
 //
-// about the scene's middle; tasks as in pair_vjp.wgsl. Twins: coupling::panel's pair_tensor; adjoint kernel::{single_vjp, double_vjp}.
+// about the scene's middle. Twins: coupling::panel's pair_tensor; adjoint kernel::{single_vjp, double_vjp}.
 
-//! uses: vector flux layers pairs panels tile panels_tile
+//! uses: vector flux layers pairs panels tile panels_tile wrenches
 //! constants: LEFT
-
-struct Task { columns: u32, first: u32, first_task: u32, tasks: u32 }
 
 @group(1) @binding(0) var<storage, read> left: array<real>;       // [panel][2·columns]: φ, q
 @group(1) @binding(1) var<storage, read> right: array<real>;      // [centroid][columns]: μ
-@group(1) @binding(2) var<storage, read> tasks: array<vec4<u32>>; // block of centroids, image, first and last block of panels
-@group(1) @binding(3) var<storage, read_write> out: array<real>;  // [task of this call][LEFT][columns][6]
-@group(1) @binding(4) var<uniform> task: Task;
 
 var<workgroup> densities: array<real, BLOCK * 2u * LEFT>;
-
-// Once all panels are summed, their memory is that of the forces.
-fn put(lane: u32, at: u32, v: V3) {
-    tile[6u * lane + at] = v.x;
-    tile[6u * lane + at + 1u] = v.y;
-    tile[6u * lane + at + 2u] = v.z;
-}
 
 @compute @workgroup_size(64)
 fn main(
@@ -78,7 +66,7 @@ fn main(
             let c = at % 6u;
             var sum = num(0.0);
             for (var l = 0u; l < own.z; l++) {
-                sum = add(sum, mul(tile[6u * l + c], right[(own.y + l) * columns + y]));
+                sum = add(sum, mul(tile[12u * l + c], right[(own.y + l) * columns + y]));
             }
             out[((number * LEFT + x) * columns + y) * 6u + c] = sum;
         }

@@ -26,6 +26,7 @@ pub mod probe;
 mod products;
 pub mod reduced;
 mod refined;
+mod response;
 mod rows;
 pub mod source;
 mod surfaces;

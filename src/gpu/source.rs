@@ -98,7 +98,7 @@ macro_rules! pieces {
 
 pieces! {
     "vector" "flux" "normal" "potential" "layers" "pairs" "faces" "panels" "tile" "faces_tile" "panels_tile" "motion"
-    "gate" "gate_state" "points" "slopes" "displaced" "shifts"
+    "gate" "gate_state" "points" "slopes" "displaced" "shifts" "total" "wrenches"
 }
 
 /// What is fixed when a shader is compiled.

@@ -35,6 +35,9 @@ pub(super) struct PlacedSystem {
     pub surfaces: PlacedSurfaces,
 }
 
+/// [μ, r, β] by face, [a, λ] by source.
+pub(super) type Solution = crate::gpu::response::Solution<PlacedSystem>;
+
 /// R⁻¹ of a body, row-major, times `scale`.
 fn inverse(boundary: &BodyBoundary, scale: f64) -> Vec<f64> {
     let n = boundary.sources.len();

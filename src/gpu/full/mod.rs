@@ -18,7 +18,7 @@ use crate::adjoint::lie::Pose;
 use crate::coupling::CoupledResponse;
 use crate::coupling::full::{FullSolver, Model, SystemBackend};
 use crate::{Error, Result};
-use geometry::{Geometry, PlacedSystem};
+use geometry::{Geometry, PlacedSystem, Solution};
 use nalgebra::DMatrix;
 use std::sync::Arc;
 
@@ -74,14 +74,7 @@ impl SystemBackend for Gpu {
         poses: &[Pose],
         twists: &DMatrix<f64>,
     ) -> Result<Box<dyn CoupledResponse + '_>> {
-        let placed = Arc::new(PlacedSystem::new(&self.geometry, poses)?);
-        let moving = (0..poses.len())
-            .map(|b| twists.rows(6 * b, 6).iter().any(|x| *x != 0.0))
-            .collect();
-        Ok(Box::new(response::Solution::solve(
-            placed,
-            Arc::new(moving),
-            twists,
-        )?))
+        let placed = PlacedSystem::new(&self.geometry, poses)?;
+        Ok(Box::new(Solution::new(Arc::new(placed), twists)?))
     }
 }

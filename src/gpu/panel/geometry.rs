@@ -32,9 +32,13 @@ pub(super) struct Geometry {
 pub(super) struct PlacedPanels {
     pub geometry: Arc<Geometry>,
     pub surfaces: PlacedSurfaces,
+    pub poses: Vec<Pose>,
     /// Share of the full solid angle that all others and all images fill, seen from every centroid.
     pub filled: Buffer,
 }
+
+/// [φ, q] by panel, μ by centroid.
+pub(super) type Solution = crate::gpu::response::Solution<PlacedPanels>;
 
 /// A panel as `shaders/lib/panels.wgsl` has it.
 fn panel(corners: &[Vec3; 3]) -> impl Iterator<Item = f64> {
@@ -157,6 +161,7 @@ impl PlacedPanels {
         context.submit(&product(&surfaces, context.fine(), what, ones, 1, &[to])?)?;
         Ok(Self {
             geometry: geometry.clone(),
+            poses: poses.to_vec(),
             surfaces,
             filled,
         })

@@ -21,9 +21,8 @@ use crate::adjoint::lie::Pose;
 use crate::coupling::full::{FullSolver, SystemBackend};
 use crate::coupling::{CoupledResponse, PanelModel};
 use crate::{Error, Result};
-use geometry::{Geometry, PlacedPanels};
+use geometry::{Geometry, PlacedPanels, Solution};
 use nalgebra::DMatrix;
-use response::Solution;
 use std::sync::Arc;
 
 /// The backend of [`crate::coupling::PanelCoupled`] on a device.
@@ -75,18 +74,7 @@ impl SystemBackend for GpuPanels {
         poses: &[Pose],
         twists: &DMatrix<f64>,
     ) -> Result<Box<dyn CoupledResponse + '_>> {
-        let model = &self.geometry.model;
-        let placed = Arc::new(PlacedPanels::new(&self.geometry, poses)?);
-        let moving = (0..poses.len())
-            .map(|b| twists.rows(6 * b, 6).iter().any(|x| *x != 0.0))
-            .collect();
-        let solution = Solution::solve(placed, Arc::new(moving), twists);
-        if let Err(Error::Solver { .. }) = &solution {
-            // Bodies inside each other have no solution, and are the better thing to say.
-            model.check_apart(poses)?;
-        }
-        let (solution, filled) = solution?;
-        model.check_filled(poses, &filled)?;
-        Ok(Box::new(solution))
+        let placed = PlacedPanels::new(&self.geometry, poses)?;
+        Ok(Box::new(Solution::new(Arc::new(placed), twists)?))
     }
 }

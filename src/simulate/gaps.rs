@@ -8,8 +8,13 @@ const MOST: usize = 20;
 
 impl Rollout {
     /// The smallest gap and by what the water across it is carried, with estimates of its error, that with the largest error, and when films came and
-    /// went. Without estimates with the fidelity `isolated`, by fundamental solutions, and where there is no water. Nothing is solved for it.
+    /// went. Without estimates with the fidelity `isolated`, by fundamental solutions, and where there is no water. Nothing is solved for it; gaps are
+    /// looked through at the first call.
     pub fn gap_report(&self) -> GapReport {
+        self.report.get_or_init(|| self.made_report()).clone()
+    }
+
+    fn made_report(&self) -> GapReport {
         let simulator = &self.simulator;
         let near = |n: usize| {
             let (sample, gap) = (&self.samples()[n], self.gaps()[n]?);

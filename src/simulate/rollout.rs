@@ -25,6 +25,7 @@ pub struct Rollout {
     pub(super) tape: Tape<State, Sample, StepRecord>,
     pub(super) initial_velocity: DVector<f64>,
     pub(super) gaps: OnceLock<Vec<Option<Gap>>>,
+    pub(super) report: OnceLock<GapReport>,
 }
 
 /// Figures of a whole trajectory.

@@ -114,3 +114,4 @@ impl Simulator {
         })
     }
 }
+            report: Default::default(),

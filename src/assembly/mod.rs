@@ -18,7 +18,7 @@ use crate::water::{self, Clearance, Prepared, Surface, pose};
 use crate::{Error, Result};
 use nalgebra::DVector;
 use std::path::Path;
-use std::sync::Arc;
+use std::sync::{Arc, OnceLock};
 
 pub use choices::Choices;
 pub(crate) use lubrication::bearing;
@@ -32,6 +32,19 @@ pub(crate) struct Assembled {
     pub q: DVector<f64>,
     pub v: DVector<f64>,
     pub water: Prepared,
+    /// The bodies' surfaces, once someone asked for them.
+    pub surfaces: Arc<OnceLock<Vec<Option<Surface>>>>,
+}
+
+impl Assembled {
+    /// The bodies' surfaces, as the water sees them; shapes are meshed again at the first call.
+    pub fn surfaces(&self, scene: &Scene, choices: &Choices) -> Result<&[Option<Surface>]> {
+        if let Some(found) = self.surfaces.get() {
+            return Ok(found);
+        }
+        let made = water::surfaces(scene, &choices.water)?;
+        Ok(self.surfaces.get_or_init(|| made))
+    }
 }
 
 /// Mass, centre of mass and inertia of a body.
@@ -172,6 +185,7 @@ pub(crate) fn assemble(
         q,
         v,
         water,
+        surfaces: Default::default(),
     })
 }
 

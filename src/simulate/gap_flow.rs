@@ -8,7 +8,6 @@ use crate::coupling::lubrication::PlacedBearing;
 use crate::dynamics::Drive;
 use crate::geometry::{Gap, Other};
 use crate::scene::WATER_VISCOSITY;
-use crate::water;
 use nalgebra::{Cholesky, DVector, Dyn, Vector3};
 use serde::Serialize;
 
@@ -145,8 +144,8 @@ impl Film {
         roughness: f64,
     ) -> Result<Option<Self>> {
         let scene = &simulator.scene;
-        let surfaces = water::surfaces(scene, &simulator.choices().water)?;
-        let Some((first, second, bearing)) = bearing(scene, &surfaces, (gap.first, gap.second))?
+        let surfaces = simulator.assembled.surfaces(scene, simulator.choices())?;
+        let Some((first, second, bearing)) = bearing(scene, surfaces, (gap.first, gap.second))?
         else {
             return Ok(None);
         };

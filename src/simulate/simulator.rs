@@ -7,7 +7,7 @@ use crate::coupling::CouplingReport;
 use crate::dynamics::{ContactGap, ContactModel, Parameters, State, Stepper, System};
 use crate::geometry::{Gap, Gaps, Other, TriMesh};
 use crate::scene::Scene;
-use crate::water::{Clearance, GapError, Subject, surfaces, world_axes};
+use crate::water::{Clearance, GapError, Subject, Surface, world_axes};
 use crate::{Error, Result};
 use nalgebra::{DMatrix, DVector};
 use std::path::Path;
@@ -403,12 +403,13 @@ impl Simulator {
     }
 
     /// The bodies' surfaces, each in its body's frame, as the water sees them; none for a body without a shape.
-    /// Shapes are meshed anew, the same way.
+    /// Shapes are meshed again at the first call, the same way.
     ///
     /// # Errors
     /// A file of a mesh that can't be read any more.
     pub fn meshes(&self) -> Result<Vec<Option<TriMesh>>> {
-        let surfaces = surfaces(&self.scene, &self.choices.water)?.into_iter();
-        Ok(surfaces.map(|s| s.map(|s| s.mesh)).collect())
+        let surfaces = self.assembled.surfaces(&self.scene, &self.choices)?;
+        let mesh = |s: &Option<Surface>| s.as_ref().map(|s| s.mesh.clone());
+        Ok(surfaces.iter().map(mesh).collect())
     }
 }

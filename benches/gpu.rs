@@ -3,16 +3,17 @@
 //! `cargo bench --features gpu --bench gpu [-- --minutes M] [--peak TFLOPS]`, on whatever adapter there is. First the four scenes
 //! of the paper's size with the fidelity `full`: seconds a step (momentum Euler: one evaluation with its derivatives) and seconds
 //! a step with its gradient, on both. Then rows of spheres, one of which moves: one evaluation with its derivatives and one
-//! second derivative. Last, products with K alone: pairs of a face and a source a second, and what share that is of the card's
+//! second derivative, by fundamental solutions and by coupled panels. Last, products with K alone: pairs of a face and a source a second, and what share that is of the card's
 //! single-precision peak (`--peak`, or of a card known here). What wouldn't end within the minutes given (default 9), or
 //! not fit into memory, is left out, with the reason.
 
 use hydrograd::adjoint::lie::{Pose, Vec3, Vec6};
-use hydrograd::boundary::{BodyBoundary, MfsSettings as BodySettings};
+use hydrograd::boundary::{BodyBoundary, MfsSettings as BodySettings, PanelBoundary};
 use hydrograd::coupling::full::{Cpu, Full, Model, SolveSettings};
-use hydrograd::coupling::{Direction, Exclusions, Linearise};
+use hydrograd::coupling::{Direction, Exclusions, Linearise, PanelCoupled};
 use hydrograd::dynamics::Integrator;
 use hydrograd::gpu::full::{Gpu, Probe};
+use hydrograd::gpu::panel::GpuPanels;
 use hydrograd::gpu::{Arithmetic, Context, Options};
 use hydrograd::scene::Scene;
 use hydrograd::shape;
@@ -33,6 +34,9 @@ const SCENES: [&str; 4] = [
 const FACES: usize = 1280;
 /// Numbers of spheres: about 10⁴, 5·10⁴ and 10⁵ sources.
 const ROWS: [usize; 3] = [16, 78, 156];
+/// Spheres of this many panels, and numbers of them: 640 to 19,840 panels.
+const PANEL_FACES: usize = 320;
+const PANEL_ROWS: [usize; 4] = [2, 8, 27, 62];
 /// Operations of a pair, square roots and divisions counted once: solid angle, and two a column.
 const OPERATIONS: f64 = 105.0;
 /// Columns of the products that are timed alone.
@@ -151,18 +155,20 @@ fn lattice(count: usize) -> hydrograd::Result<(Arc<Model>, Vec<Pose>)> {
         ..SolveSettings::default()
     };
     let model = Model::new(vec![body; count], &[], Exclusions::none(), settings)?;
+    Ok((Arc::new(model), lattice_poses(count)))
+}
+
+fn lattice_poses(count: usize) -> Vec<Pose> {
     let side = (count as f64).cbrt().ceil() as usize;
-    let poses = (0..count)
-        .map(|i| {
-            let at = [i % side, i / side % side, i / side / side].map(|n| 1.25 * n as f64);
-            Pose::new(Matrix3::identity(), Vec3::from(at))
-        })
-        .collect();
-    Ok((Arc::new(model), poses))
+    let pose = |i: usize| {
+        let at = [i % side, i / side % side, i / side / side].map(|n| 1.25 * n as f64);
+        Pose::new(Matrix3::identity(), Vec3::from(at))
+    };
+    (0..count).map(pose).collect()
 }
 
 /// One evaluation with its derivatives, and one second derivative.
-fn evaluate(full: &Full, poses: &[Pose]) -> hydrograd::Result<()> {
+fn evaluate(full: &dyn Linearise, poses: &[Pose]) -> hydrograd::Result<()> {
     let bodies = poses.len();
     let mut basis = DMatrix::zeros(6 * bodies, 6);
     basis.rows_mut(0, 6).fill_with_identity();
@@ -205,6 +211,44 @@ fn rows(context: &Arc<Context>, budget: &Budget) -> hydrograd::Result<()> {
         result?;
         println!(
             "{start} {on_cpu:.3} | {on_gpu:.3} | {:.2} | {memory:.0} |",
+            on_cpu / on_gpu
+        );
+    }
+    Ok(())
+}
+
+/// The same by coupled panels.
+fn panels(context: &Arc<Context>, budget: &Budget) -> hydrograd::Result<()> {
+    println!("\n| spheres, by panels | panels | CPU, s | GPU, s | CPU/GPU | device, MB |");
+    println!("|---|---|---|---|---|---|");
+    let mesh = shape::build(&Shape::sphere(0.5), Path::new("."), Some(PANEL_FACES))?;
+    let body = Arc::new(PanelBoundary::new("ball", &mesh)?);
+    let settings = SolveSettings {
+        tolerance: 1e-6,
+        ..SolveSettings::default()
+    };
+    for count in PANEL_ROWS {
+        let bodies = || vec![body.clone(); count];
+        let make = || PanelCoupled::new(bodies(), &[], Exclusions::none(), settings.clone());
+        let (cpu, gpu) = (make()?, make()?);
+        let n = cpu.model().rows() as f64;
+        let start = format!("| {count} | {n} |");
+        if let Some(seconds) = budget.refuses(n * n, 2.0) {
+            println!("{start} left out: about {seconds:.0} s on this adapter |");
+            continue;
+        }
+        let backend = GpuPanels::new(context, gpu.model())?;
+        let gpu = gpu.on(Box::new(backend));
+        let poses = lattice_poses(count);
+        let mut result = Ok(());
+        let on_gpu = seconds(2, || result = evaluate(&gpu, &poses));
+        result?;
+        let memory = context.counts().peak_memory as f64 / 1e6;
+        let mut result = Ok(());
+        let on_cpu = seconds(1, || result = evaluate(&cpu, &poses));
+        result?;
+        println!(
+            "{start} {on_cpu:.3} | {on_gpu:.3} | {:.3} | {memory:.0} |",
             on_cpu / on_gpu
         );
     }
@@ -282,6 +326,7 @@ fn main() -> hydrograd::Result<()> {
     };
     products(&context, &budget)?;
     scenes(&budget)?;
+    panels(&context, &budget)?;
     rows(&context, &budget)?;
     println!("\n{:.0} s in all", start.elapsed().as_secs_f64());
     Ok(())

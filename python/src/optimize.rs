@@ -1,7 +1,7 @@
 //! Descents and the recipe for grasps.
 
 use crate::array::{self, Dim, array};
-use crate::error::input;
+use crate::error::{input, own};
 use crate::interrupt::{Interrupt, long};
 use crate::rollout::Rollout;
 use crate::scene::Scene;
@@ -22,12 +22,6 @@ fn class<'py>(py: Python<'py>, name: &str) -> PyResult<Bound<'py, PyAny>> {
 fn vector<'py>(py: Python<'py>, x: Vec<f64>) -> PyResult<Bound<'py, PyAny>> {
     let n = x.len();
     Ok(array::to_python(py, x, &[n])?.into_any())
-}
-
-/// Whether it is an `Error` of hydrograd's.
-fn own(py: Python<'_>, error: &PyErr) -> bool {
-    let class = py.import("hydrograd").and_then(|m| m.getattr("Error"));
-    class.is_ok_and(|class| error.is_instance(py, &class))
 }
 
 /// A function of Python that gives a cost and its gradient. An `Error` of hydrograd's is a failure of that point; any other exception ends what calls it.
@@ -130,89 +124,72 @@ fn found<'py>(py: Python<'py>, optimum: Optimum) -> PyResult<Bound<'py, PyAny>> 
     class(py, "Optimum")?.call1(parts)
 }
 
-/// Lowers a function from `start` (n,), by L-BFGS that takes failures and jumps: an `Optimum`. `function(x)` gives the cost and its gradient (n,). Where it
-/// raises an `hg.Error` (a rollout that fails) the search is turned back; any other exception ends it, and so does Ctrl-C.
-///
-/// `iterations` and `evaluations` are the most that are made, `memory` the pairs that are remembered, `first_step` the length of the first trial
-/// step in units of x (None: from the cost and its gradient). It ends once the gradient is shorter than `gradient_tolerance` of the first one, the cost falls
-/// by less than `cost_tolerance` of itself, or the cost is at most `target`. With `clip` gradients longer than that many times the first are shortened to it: where a
-/// trajectory is about to jump they are huge and say little.
-#[pyfunction]
-#[pyo3(signature = (
-    function, start, *, iterations=100, evaluations=1000, memory=10, first_step=Some(0.1), gradient_tolerance=1e-6, cost_tolerance=1e-9,
-    target=None, clip=None
-))]
-#[expect(clippy::too_many_arguments, reason = "one per keyword")]
-fn minimise<'py>(
-    py: Python<'py>,
-    function: &Bound<'py, PyAny>,
-    start: &Bound<'py, PyAny>,
-    iterations: usize,
-    evaluations: usize,
-    memory: usize,
-    first_step: Option<f64>,
-    gradient_tolerance: f64,
-    cost_tolerance: f64,
-    target: Option<f64>,
-    clip: Option<f64>,
-) -> PyResult<Bound<'py, PyAny>> {
-    let start = array::row("minimise: start", start)?;
-    let settings = OptimizeSettings {
-        iterations,
-        evaluations,
-        memory,
-        first_step,
-        gradient_tolerance,
-        cost_tolerance,
-        target,
-        clip,
+/// A descent of a function of Python, from arrays of one dimension: all have the same keywords.
+macro_rules! descent {
+    ($(#[$doc:meta])* $name:ident($($given:ident),*), $run:expr) => {
+        $(#[$doc])*
+        #[pyfunction]
+        #[pyo3(signature = (
+            function, $($given,)* *, iterations=100, evaluations=1000, memory=10, first_step=Some(0.1), gradient_tolerance=1e-6,
+            cost_tolerance=1e-9, target=None, clip=None
+        ))]
+        #[expect(clippy::too_many_arguments, reason = "one per keyword")]
+        fn $name<'py>(
+            py: Python<'py>,
+            function: &Bound<'py, PyAny>,
+            $($given: &Bound<'py, PyAny>,)*
+            iterations: usize,
+            evaluations: usize,
+            memory: usize,
+            first_step: Option<f64>,
+            gradient_tolerance: f64,
+            cost_tolerance: f64,
+            target: Option<f64>,
+            clip: Option<f64>,
+        ) -> PyResult<Bound<'py, PyAny>> {
+            $(let $given = array::row(concat!(stringify!($name), ": ", stringify!($given)), $given)?;)*
+            let settings = OptimizeSettings {
+                iterations,
+                evaluations,
+                memory,
+                first_step,
+                gradient_tolerance,
+                cost_tolerance,
+                target,
+                clip,
+            };
+            let made = calling(py, stringify!($name), function, move |function| {
+                let run = $run;
+                run(function, $(&$given,)* &settings)
+            })?;
+            found(py, made)
+        }
     };
-    let made = calling(py, "minimise", function, move |function| {
-        optimize::minimise(|x| function.call(None, x), &start, &settings, |_| {})
-    })?;
-    found(py, made)
 }
 
-/// Descends `function(stage, x)`, as `minimise` does, for each of `stages` in turn, each from where the one before ended: softnesses of contact
-/// (`Simulator.with_soft_contact`), say, that end in 1. The `Optimum` is that of the last stage, with the iterations, evaluations and failures of all; a stage
-/// whose start fails is passed over, unless it is the last. Keywords are those of `minimise`, for each stage.
-#[pyfunction]
-#[pyo3(signature = (
-    function, stages, start, *, iterations=100, evaluations=1000, memory=10, first_step=Some(0.1), gradient_tolerance=1e-6,
-    cost_tolerance=1e-9, target=None, clip=None
-))]
-#[expect(clippy::too_many_arguments, reason = "one per keyword")]
-fn continuation<'py>(
-    py: Python<'py>,
-    function: &Bound<'py, PyAny>,
-    stages: &Bound<'py, PyAny>,
-    start: &Bound<'py, PyAny>,
-    iterations: usize,
-    evaluations: usize,
-    memory: usize,
-    first_step: Option<f64>,
-    gradient_tolerance: f64,
-    cost_tolerance: f64,
-    target: Option<f64>,
-    clip: Option<f64>,
-) -> PyResult<Bound<'py, PyAny>> {
-    let stages = array::row("continuation: stages", stages)?;
-    let start = array::row("continuation: start", start)?;
-    let settings = OptimizeSettings {
-        iterations,
-        evaluations,
-        memory,
-        first_step,
-        gradient_tolerance,
-        cost_tolerance,
-        target,
-        clip,
-    };
-    let made = calling(py, "continuation", function, move |function| {
+descent! {
+    /// Lowers a function from `start` (n,), by L-BFGS that takes failures and jumps: an `Optimum`. `function(x)` gives the cost and its gradient (n,). Where it
+    /// raises an `hg.Error` (a rollout that fails) the search is turned back; any other exception ends it, and so does Ctrl-C.
+    ///
+    /// `iterations` and `evaluations` are the most that are made, `memory` the pairs that are remembered, `first_step` the length of the first trial
+    /// step in units of x (None: from the cost and its gradient). It ends once the gradient is shorter than `gradient_tolerance` of the first one, the cost falls
+    /// by less than `cost_tolerance` of itself, or the cost is at most `target`. With `clip` gradients longer than that many times the first are shortened to it: where a
+    /// trajectory is about to jump they are huge and say little.
+    minimise(start),
+    |function: &Function, start: &[f64], settings: &OptimizeSettings| {
+        optimize::minimise(|x| function.call(None, x), start, settings, |_| {})
+    }
+}
+
+descent! {
+    /// Descends `function(stage, x)`, as `minimise` does, for each of `stages` in turn, each from where the one before ended: softnesses of contact
+    /// (`Simulator.with_soft_contact`), say, that end in 1. The `Optimum` is that of the last stage, with the iterations, evaluations and failures of all; a stage
+    /// whose start fails is passed over, unless it is the last. Keywords are those of `minimise`, for each stage.
+    continuation(stages, start),
+    |function: &Function, stages: &[f64], start: &[f64], settings: &OptimizeSettings| {
         let of = |stage: f64, x: &[f64]| function.call(Some(stage), x);
-        optimize::continuation(of, &stages, &start, &settings, |_, _| {})
-    })?;
-    found(py, made)
+        optimize::continuation(of, stages, start, settings, |_, _| {})
+    }
 }
 
 /// A function's cost and gradient averaged over a neighbourhood of `x` (n,): a `Smoothed`. `function(x)` gives the cost and its gradient (n,), at

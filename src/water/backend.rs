@@ -93,6 +93,8 @@ pub struct BackendReport {
     pub backend_used: Backend,
     /// Why that isn't what was asked for; `None` where it is.
     pub backend_reason: Option<String>,
+    /// Whether steps with films in their gaps are computed on the CPU all the same.
+    pub films_on_cpu: bool,
     /// The GPU in use.
     pub device: Option<DeviceReport>,
 }
@@ -139,13 +141,17 @@ impl fmt::Display for BackendReport {
         };
         write!(
             f,
-            "gpu: {} ({}), {}; peak memory {:.1} MB, {} dispatches, {} read-backs",
+            "gpu: {} ({}), {}; peak memory {:.1} MB, {} dispatches, {} read-backs{}",
             d.adapter,
             d.interface,
             d.arithmetic,
             d.peak_memory as f64 / 1e6,
             d.dispatches,
-            d.read_backs
+            d.read_backs,
+            match self.films_on_cpu {
+                true => "; where gaps have films, the water is computed on the CPU",
+                false => "",
+            }
         )
     }
 }

@@ -19,6 +19,8 @@ pub(crate) struct Device {
     asked: Backend,
     /// Why it isn't what was asked for.
     pub reason: Option<String>,
+    /// Whether gaps may have films, which are computed on the CPU.
+    pub films: bool,
     #[cfg(feature = "gpu")]
     fallback: bool,
     #[cfg(feature = "gpu")]
@@ -163,6 +165,7 @@ impl Device {
                 None => Backend::Cpu,
             },
             backend_reason: self.reason.clone(),
+            films_on_cpu: device.is_some() && self.films,
             device,
         }
     }

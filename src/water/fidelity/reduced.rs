@@ -51,6 +51,7 @@ impl FidelityKind for Reduced {
             });
         }
         let films = coupling.film_reaches(problem.walls)?;
+        device.films = !films.is_empty();
         Ok(Made {
             carried: Some(Carried::Sources),
             films,

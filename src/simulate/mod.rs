@@ -1,6 +1,7 @@
 //! Simulations: settings, controllers, rollouts and their gradients.
 
 mod controls;
+mod finite;
 mod flow;
 mod gap_check;
 mod gap_flow;

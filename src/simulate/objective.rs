@@ -28,10 +28,20 @@ impl Rollout {
     /// Value of an objective.
     ///
     /// # Errors
-    /// An objective that doesn't fit the scene.
+    /// An objective that doesn't fit the scene, or whose value isn't finite.
     pub fn value(&self, objective: &dyn Objective) -> Result<f64> {
         objective.check(self)?;
-        Ok(objective.value(self))
+        let value = objective.value(self);
+        if !value.is_finite() {
+            return Err(Error::Unresolved {
+                place: "objective".into(),
+                quantity: "value".into(),
+                value,
+                limit: f64::MAX,
+                remedy: "it left what floating point holds: take smaller weights or targets".into(),
+            });
+        }
+        Ok(value)
     }
 
     /// Gradient of an objective, in one reverse sweep.

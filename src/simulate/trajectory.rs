@@ -1,7 +1,7 @@
 //! A rollout as steps with transposes: controller, integrator and observations together.
 
 use super::observable::{Observed, ObservedBars, Transpose};
-use super::{Observation, Sample, Simulator};
+use super::{Observation, Sample, Simulator, finite};
 use crate::adjoint::lie::Vec6;
 use crate::adjoint::step::Step;
 use crate::dynamics::{
@@ -49,6 +49,7 @@ impl Simulator {
 impl<'a> Trajectory<'a> {
     /// The smallest gap at a state, whose bodies must keep apart; not asked for where it has no effect.
     fn gap(&self, state: &State) -> Result<Option<Gap>> {
+        finite::state(&self.simulator.scene, state)?;
         if !self.simulator.fidelity_acting().coupled() {
             return Ok(None);
         }
@@ -58,18 +59,8 @@ impl<'a> Trajectory<'a> {
 
     fn observe(&self, e: &Evaluation, state: &State, gap: Option<Gap>) -> Result<Sample> {
         let v = self.stepper.velocity(e, state)?;
-        if let Some(bad) = v.iter().position(|x| !x.is_finite()) {
-            return Err(Error::Unresolved {
-                place: "simulation".into(),
-                quantity: format!("velocity v[{bad}]"),
-                value: v[bad],
-                limit: f64::MAX,
-                remedy: "the simulation left what floating point holds: take a smaller time step"
-                    .into(),
-            });
-        }
         let momenta = e.momenta(&v);
-        Ok(Sample {
+        let sample = Sample {
             time: self.stepper.time(state),
             q: state.q.clone(),
             kinetic_energy: e.kinetic_energy(&v),
@@ -82,7 +73,9 @@ impl<'a> Trajectory<'a> {
             control: DVector::zeros(0),
             hold: Vec::new(),
             v,
-        })
+        };
+        finite::sample(&self.simulator.scene, state.step, &sample)?;
+        Ok(sample)
     }
 
     /// What acts during a step, and the controller's next mode.
@@ -128,6 +121,34 @@ impl<'a> Trajectory<'a> {
             observables_vjp(e, v, &seed.observables, &mut v_bar, bar);
         }
         self.stepper.velocity_vjp(e, state, v, &v_bar, bar)
+    }
+
+    /// Cotangents of a state, and of all else, which must be finite; that of the velocity has been carried on.
+    fn finished(
+        &self,
+        state: &State,
+        bar: StepBar,
+        gains: Vec<f64>,
+    ) -> Result<(StateBar, Partial)> {
+        let partial = Partial {
+            control: bar.control,
+            parameters: bar.parameters,
+            gains,
+        };
+        let Partial {
+            control,
+            parameters,
+            gains,
+        } = &partial;
+        let scene = &self.simulator.scene;
+        finite::bars(scene, state.step, &bar.state, control, parameters, gains)?;
+        Ok((bar.state, partial))
+    }
+
+    /// An error of a step at a state, with the time, and with what it comes from.
+    fn explain(&self, error: Error, state: &State) -> Error {
+        let error = finite::blown_up(&self.simulator.scene, state, error);
+        error.at_time(self.stepper.time(state))
     }
 
     /// A step with its controller, and what all its derivatives share.
@@ -177,7 +198,7 @@ impl<'a> ControlledStep<'_, 'a> {
             let e = self.step.linearisation();
             self.trajectory
                 .observe_vjp(e, record.state(), record.velocity(), seed, &mut bar)?;
-            Ok(parted(bar, gains))
+            self.trajectory.finished(record.state(), bar, gains)
         };
         run().map_err(|e: Error| e.at_time(self.trajectory.stepper.time(record.state())))
     }
@@ -255,16 +276,6 @@ fn observables_vjp(
     *v_bar += more;
 }
 
-/// Cotangents of a state, and of all else; that of the velocity has been carried on.
-fn parted(bar: StepBar, gains: Vec<f64>) -> (StateBar, Partial) {
-    let partial = Partial {
-        control: bar.control,
-        parameters: bar.parameters,
-        gains,
-    };
-    (bar.state, partial)
-}
-
 /// What the controller sees at a state.
 fn observation<'a>(state: &'a State, v: &'a DVector<f64>, time: f64) -> Observation<'a> {
     Observation {
@@ -311,7 +322,7 @@ impl Step for Trajectory<'_> {
             sample.hold = input.hold;
             Ok((next, sample, record))
         };
-        run().map_err(|e: Error| e.at_time(self.stepper.time(state)))
+        run().map_err(|e: Error| self.explain(e, state))
     }
 
     fn last(&self, _index: usize, state: &State) -> Result<Sample> {
@@ -320,7 +331,7 @@ impl Step for Trajectory<'_> {
             let e = self.stepper.evaluate(&state.q)?;
             self.observe(&e, state, gap)
         };
-        run().map_err(|e: Error| e.at_time(self.stepper.time(state)))
+        run().map_err(|e: Error| self.explain(e, state))
     }
 
     fn step_vjp(
@@ -343,6 +354,7 @@ impl Step for Trajectory<'_> {
         let e = self.stepper.linearise(&state.q);
         let e = e.map_err(|e| e.at_time(sample.time))?;
         let bar = self.seed_vjp(&e, state, &sample.v, seed)?;
-        Ok(parted(bar, Vec::new()))
+        let parted = self.finished(state, bar, Vec::new());
+        parted.map_err(|e| e.at_time(sample.time))
     }
 }

@@ -3,6 +3,7 @@
 mod extremes;
 mod films;
 #[cfg(feature = "opt")]
+mod finite;
 mod grasp;
 mod growth;
 mod invariants;

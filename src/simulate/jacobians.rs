@@ -67,6 +67,7 @@ impl Rollout {
             bar.state.q = row.q.clone();
             let (stepper, v) = (&trajectory.stepper, &self.initial_velocity);
             stepper.conserved_vjp(e, v, &row.y, &mut bar)?;
+            self.simulator.forget_driven(&mut bar.state.q, &mut bar.v);
             let StateBar { q, .. } = bar.state;
             Ok(StateBar { q, y: bar.v })
         };

@@ -21,6 +21,7 @@ mod run;
 mod sample;
 mod settings;
 mod simulator;
+mod start;
 mod trajectory;
 
 pub use controls::Controls;

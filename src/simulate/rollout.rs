@@ -358,6 +358,7 @@ impl Rollout {
             .stepper
             .conserved_vjp(&e, &self.initial_velocity, &state_bar.y, &mut bar)?;
         parameters.add(&bar.parameters);
+        simulator.forget_driven(&mut bar.state.q, &mut bar.v);
         Ok(Gradient {
             controls,
             initial: Initial {

@@ -4,12 +4,12 @@ use super::{BackendReport, Discretisation, ErrorEstimate, Fidelity, Policy, Sett
 use crate::adjoint::lie::Pose;
 use crate::assembly::{self, Assembled, Choices};
 use crate::coupling::CouplingReport;
-use crate::dynamics::{ContactGap, ContactModel, Parameters, State, Stepper, System};
+use crate::dynamics::{ContactGap, ContactModel, Parameters, Stepper, System};
 use crate::geometry::{Gap, Gaps, Other, TriMesh};
 use crate::scene::Scene;
 use crate::water::{Clearance, GapError, Subject, Surface, world_axes};
 use crate::{Error, Result};
-use nalgebra::{DMatrix, DVector};
+use nalgebra::DMatrix;
 use std::path::Path;
 use std::sync::Arc;
 
@@ -19,7 +19,7 @@ use std::sync::Arc;
 pub struct Simulator {
     pub(super) scene: Arc<Scene>,
     pub(super) assembled: Arc<Assembled>,
-    choices: Choices,
+    pub(super) choices: Choices,
 }
 
 /// Added mass of all bodies in the water at one configuration.
@@ -44,10 +44,10 @@ impl Simulator {
     }
 
     /// As [`Simulator::new`], with a folder where compressed bodies (fidelities `Reduced` and `Auto`)
-    /// are kept from one program to the next; it is made if it isn't there.
+    /// are kept from one program to the next; it is made if it isn't there. One that can't be written is a warning.
     ///
     /// # Errors
-    /// As [`Simulator::new`], and a folder that can't be written.
+    /// As [`Simulator::new`].
     pub fn cached(scene: &Scene, settings: Settings, folder: &Path) -> Result<Self> {
         Self::with_choices(scene, settings.resolve(scene), Some(folder))
     }
@@ -208,52 +208,6 @@ impl Simulator {
         bodies.map(|b| b.name.clone()).collect()
     }
 
-    /// Initial coordinates and velocity.
-    pub fn start(&self) -> (&DVector<f64>, &DVector<f64>) {
-        (&self.assembled.q, &self.assembled.v)
-    }
-
-    /// Replaces the initial coordinates and velocity.
-    ///
-    /// # Errors
-    /// Wrong lengths or values that aren't finite.
-    pub fn set_start(&mut self, q: DVector<f64>, v: DVector<f64>) -> Result<()> {
-        self.check_start(&q, &v)?;
-        let assembled = Arc::make_mut(&mut self.assembled);
-        (assembled.q, assembled.v) = (q, v);
-        Ok(())
-    }
-
-    fn check_start(&self, q: &DVector<f64>, v: &DVector<f64>) -> Result<()> {
-        let tree = &self.system().tree;
-        for (name, x, n) in [("q", q, tree.coordinates()), ("v", v, tree.velocities())] {
-            if x.len() != n || x.iter().any(|x| !x.is_finite()) {
-                return Err(Error::input(
-                    format!("initial {name}"),
-                    format!("{:?}", x.as_slice()),
-                    format!("must be {n} finite numbers"),
-                ));
-            }
-        }
-        for (body, link) in self.system().bodies.iter().zip(tree.links()) {
-            let Some(w) = link.joint.quaternion_at() else {
-                continue;
-            };
-            let norm = link.of_q(q)[w..].iter().map(|x| x * x).sum::<f64>().sqrt();
-            if (norm - 1.0).abs() > 1e-6 {
-                return Err(Error::input(
-                    format!(
-                        "initial q of body \"{}\": quaternion (w, x, y, z)",
-                        body.name
-                    ),
-                    format!("length {norm}"),
-                    "must have length 1",
-                ));
-            }
-        }
-        Ok(())
-    }
-
     /// The integrator with this simulator's system.
     pub fn stepper(&self) -> Stepper<'_> {
         Stepper {
@@ -271,40 +225,6 @@ impl Simulator {
         } else {
             Fidelity::Isolated
         }
-    }
-
-    /// The initial state of the integrator.
-    ///
-    /// # Errors
-    /// An indefinite mass matrix, or whatever the coupling reports.
-    pub fn initial(&self) -> Result<State> {
-        self.state_unchecked(0, &self.assembled.q, &self.assembled.v)
-    }
-
-    fn state_unchecked(&self, step: usize, q: &DVector<f64>, v: &DVector<f64>) -> Result<State> {
-        let stepper = self.stepper();
-        let mut q = q.clone();
-        stepper.place_motions(&mut q, step as f64 * self.choices.time_step);
-        let e = self.system().evaluate(self.parameters(), &q)?;
-        let state = State {
-            step,
-            y: stepper.conserved(&e, v),
-            q,
-            held: Vec::new(),
-            mode: 0,
-        };
-        stepper.velocity(&e, &state)?;
-        Ok(state)
-    }
-
-    /// The integrator's state at coordinates `q` and generalised velocity `v` after `step` steps: where
-    /// [`Simulator::rollout_from`] may begin. Driven joints are taken to where their motion has them then.
-    ///
-    /// # Errors
-    /// Wrong lengths, values that aren't finite, quaternions not of length 1, or as [`Simulator::initial`].
-    pub fn state(&self, step: usize, q: &DVector<f64>, v: &DVector<f64>) -> Result<State> {
-        self.check_start(q, v)?;
-        self.state_unchecked(step, q, v)
     }
 
     /// What the user should know of the smallest gap at the start.

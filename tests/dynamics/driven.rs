@@ -1,0 +1,83 @@
+//! Joints that a motion drives: nobody else says where they are, and no gradient goes there.
+
+use crate::support::says;
+use hydrograd::dynamics::Integrator;
+use hydrograd::scene::{Body, Fluid, Joint, Motion, Scene, Shape};
+use hydrograd::{Controls, Settings, Simulator};
+use nalgebra::{DMatrix, DVector};
+
+const PHASE: f64 = 0.4;
+
+/// A slider on a rail that swings.
+fn swinging(integrator: Integrator) -> Simulator {
+    let mut scene = Scene::new(Fluid {
+        density: 0.0,
+        current: [0.0; 3],
+    });
+    let rail = |axis| Joint::Prismatic { axis };
+    let swing = Motion::Sine {
+        offset: 0.0,
+        amplitude: 0.2,
+        frequency: 3.0,
+        phase: PHASE,
+    };
+    scene.add(
+        Body::new(Shape::sphere(0.1))
+            .named("rail")
+            .density(1000.0)
+            .joint(Joint::Revolute {
+                axis: [0.0, 0.0, 1.0],
+            })
+            .driven([swing]),
+    );
+    scene.add(
+        Body::new(Shape::sphere(0.1))
+            .named("slider")
+            .density(1000.0)
+            .child_of("rail")
+            .at([0.5, 0.0, 0.0])
+            .joint(rail([1.0, 0.0, 0.0])),
+    );
+    scene.time_step = 0.01;
+    Simulator::new(&scene, Settings::default().integrator(integrator)).unwrap()
+}
+
+#[test]
+fn where_a_motion_has_a_joint_no_other_can() {
+    let mut simulator = swinging(Integrator::Rk2);
+    let at = |t: f64| 0.2 * (3.0 * t + PHASE).sin();
+    let q = |angle: f64| DVector::from_vec(vec![angle, 0.02]);
+    let v = |rate: f64| DVector::from_vec(vec![rate, 0.1]);
+    let error = simulator.set_start(q(0.3), v(0.0)).unwrap_err();
+    says(error, &["rail", "0.3", "driven", "0.077"]);
+    let error = simulator.state(7, &q(at(0.0)), &v(0.0)).unwrap_err();
+    says(error, &["rail", "driven", "t = 0.07 s"]);
+    let error = simulator.state(0, &q(0.0), &v(2.0)).unwrap_err();
+    says(error, &["initial v", "rail", "got 2"]);
+    // What is left to the motion, and what it says, are the same.
+    let free = simulator.state(7, &q(0.0), &v(0.0)).unwrap();
+    let same = simulator.state(7, &q(at(0.07)), &v(0.0)).unwrap();
+    assert!((free.q[0] - at(0.07)).abs() < 1e-15);
+    assert!((&free.y - &same.y).amax() < 1e-12);
+    simulator.set_start(q(0.0), v(0.0)).unwrap();
+    assert!((simulator.start().0[0] - at(0.0)).abs() < 1e-15);
+    assert!((simulator.start().1[0] - 0.6 * PHASE.cos()).abs() < 1e-15);
+}
+
+#[test]
+fn no_gradient_goes_to_where_a_driven_joint_starts() {
+    for integrator in [Integrator::MomentumEuler, Integrator::Rk2, Integrator::Rk4] {
+        let simulator = swinging(integrator);
+        let rollout = simulator.rollout(&Controls::zeros(&simulator, 5)).unwrap();
+        let mut seed = rollout.zero_cotangents();
+        seed.q = DMatrix::from_element(2, 6, 1.0);
+        seed.v = DMatrix::from_element(2, 6, 0.5);
+        let initial = rollout.vjp(&seed).unwrap().initial;
+        assert_eq!((initial.q[0], initial.v[0]), (0.0, 0.0));
+        assert!(initial.q[1] > 1.0 && initial.v[1] > 0.5, "{initial:?}");
+        let state = rollout.jacobians().unwrap().state;
+        assert_eq!(state.column(0).amax(), 0.0);
+        assert_eq!(state.column(2).amax(), 0.0);
+        assert!(state.column(1).amax() > 0.5);
+    }
+}

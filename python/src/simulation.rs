@@ -279,7 +279,8 @@ impl Simulator {
         })
     }
 
-    /// The same with another start: coordinates `q` (q_size,) and generalised velocity `v` (v_size,).
+    /// The same with another start: coordinates `q` (q_size,) and generalised velocity `v` (v_size,). Bodies must be apart there, as at any start; of a
+    /// joint that a motion drives both are what the motion says: 0, or that.
     #[pyo3(signature = (q=None, v=None))]
     fn with_start(
         &self,
@@ -460,10 +461,11 @@ impl Simulator {
         .collect()
     }
 
-    /// What should be known about the scene, with names and numbers.
+    /// What should be known about the scene and its start, with names and numbers.
     #[getter]
     fn warnings(&self) -> Vec<String> {
-        self.inner.warnings().to_vec()
+        let start = self.inner.start_gap_warning();
+        self.inner.warnings().iter().cloned().chain(start).collect()
     }
 
     fn __repr__(&self) -> String {

@@ -175,6 +175,10 @@ impl Simulator {
             ));
         }
         parameters.check()?;
+        if parameters.density() > 0.0 && self.parameters().density() <= 0.0 {
+            // Without water bodies may have been in one another.
+            self.check_apart(self.start().0, parameters.density())?;
+        }
         Arc::make_mut(&mut self.assembled).parameters = parameters;
         Ok(())
     }
@@ -285,9 +289,10 @@ impl Simulator {
     /// Added mass of all bodies in the water at the start.
     ///
     /// # Errors
-    /// Whatever the coupling reports.
+    /// Bodies in one another or in a wall, gaps that aren't resolved, and whatever the coupling reports.
     pub fn added_mass(&self) -> Result<AddedMass> {
         let system = self.system();
+        self.check_apart(self.start().0, self.parameters().density())?;
         let kinematics = system.tree.kinematics(&self.assembled.q);
         let in_water = || system.submerged().map(|(b, _)| b);
         let poses: Vec<Pose> = in_water().map(|b| kinematics.poses[b]).collect();

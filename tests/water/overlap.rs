@@ -52,6 +52,37 @@ fn refused(scene: &Scene) -> String {
     error.to_string()
 }
 
+/// Wherever a configuration is given, it is checked as that of a scene.
+#[test]
+fn every_way_to_a_start_is_checked() {
+    let mut scene = Scene::new(Fluid::fresh_water());
+    for (name, x) in [("left", 0.0), ("right", 3.0)] {
+        let body = Body::new(Shape::sphere(1.0).faces(320)).named(name);
+        scene.add(body.density(1000.0).at([x, 0.0, 0.0]));
+    }
+    for fidelity in [Fidelity::Reduced, Fidelity::Full] {
+        let settings = Settings::default().fidelity(fidelity);
+        let mut simulator = Simulator::new(&scene, settings).unwrap();
+        let (mut q, v) = (simulator.start().0.clone(), simulator.start().1.clone());
+        q[7] -= 2.0;
+        says(
+            simulator.set_start(q.clone(), v.clone()).unwrap_err(),
+            &["left", "right", "overlap"],
+        );
+        assert!(simulator.state(0, &q, &v).is_err());
+        // Without water they may be in one another, until there is some.
+        let mut dry = simulator.parameters().clone();
+        *dry.density_mut() = 0.0;
+        let wet = simulator.parameters().clone();
+        simulator.set_parameters(dry).unwrap();
+        simulator.set_start(q, v).unwrap();
+        says(
+            simulator.set_parameters(wet).unwrap_err(),
+            &["left", "right", "overlap"],
+        );
+    }
+}
+
 #[test]
 fn overlap_that_is_not_declared_is_refused_with_the_way_to_declare_it() {
     let message = refused(&linked(false));

@@ -133,6 +133,21 @@ impl Error {
         self
     }
 
+    /// The same, saying which part of a scene it is about.
+    pub(crate) fn of(mut self, place: &str) -> Self {
+        match &mut self {
+            Self::File { source, .. } => {
+                *source = std::io::Error::new(source.kind(), format!("{source} ({place})"));
+            }
+            Self::Parse { message: said, .. } => said.push_str(&format!(" ({place})")),
+            Self::Mesh { name: said, .. } | Self::Input { place: said, .. } => {
+                *said = format!("{place}: {said}");
+            }
+            _ => {}
+        }
+        self
+    }
+
     /// An [`Error::Input`] from its three parts.
     pub fn input(
         place: impl Into<String>,

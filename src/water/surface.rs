@@ -78,7 +78,13 @@ pub(crate) fn surface(body: &Body, meshing: Meshing, edges: f64) -> Result<Optio
         return Ok(None);
     };
     let at = pose(&body.shape_at);
-    let even = |faces: Option<usize>| shape::build(shape, Path::new(""), faces);
+    let even = |faces: Option<usize>| {
+        let made = shape::build(shape, Path::new(""), faces);
+        made.map_err(|e| match shape.is_mesh() {
+            true => e.of(&format!("body {:?}: shape", body.name)),
+            false => e,
+        })
+    };
     let refined = |base: &TriMesh, edges: f64| -> Result<TriMesh> {
         let regions = body.refine.iter().map(|r| Refinement {
             center: at.apply_inverse(&Vec3::from(r.center)).into(),

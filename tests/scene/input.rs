@@ -1,7 +1,7 @@
 //! Bad scene files: each gets an error that names the place and the remedy, and never a panic.
 
 use crate::support::{example_path, says};
-use hydrograd::Scene;
+use hydrograd::{Scene, Settings, Simulator};
 
 /// A scene file with one ball; `body` is added to the ball, `rest` after it.
 fn text(body: &str, rest: &str) -> String {
@@ -330,5 +330,24 @@ fn mangled_scenes_never_panic() {
                 ));
             }
         }
+    }
+}
+
+/// A mesh that can't be read, or is none, is told with its body and field.
+#[test]
+fn a_mesh_that_cannot_be_read_is_told_with_its_body() {
+    let folder = tempfile::tempdir().unwrap();
+    std::fs::create_dir(folder.path().join("folder.obj")).unwrap();
+    std::fs::write(folder.path().join("empty.stl"), b" ").unwrap();
+    let open = "v 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 3\n";
+    std::fs::write(folder.path().join("open.obj"), open).unwrap();
+    for name in ["folder.obj", "missing.ply", "empty.stl", "open.obj"] {
+        let text = format!(
+            "name = \"meshes\"\ntime_step = 0.01\nsteps = 1\n[fluid]\ndensity = 0.0\n[[bodies]]\nname = \"coin\"\ndensity = 1.0\n\
+             shape = {{ kind = \"mesh\", path = \"{name}\" }}\n"
+        );
+        let scene = Scene::from_toml(&text, folder.path()).unwrap();
+        let error = Simulator::new(&scene, Settings::default()).err().unwrap();
+        says(error, &["body \"coin\"", "shape", name]);
     }
 }

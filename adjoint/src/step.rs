@@ -100,23 +100,72 @@ pub fn forward<S: Step>(
     step: &S,
     initial: S::State,
     steps: usize,
-    mut progress: impl FnMut(usize) -> Result<(), S::Error>,
+    progress: impl FnMut(usize) -> Result<(), S::Error>,
 ) -> Result<TapeOf<S>, S::Error> {
+    let (mut tape, failed) = run(step, initial, steps, progress);
+    if let Some((_, error)) = failed {
+        return Err(error);
+    }
+    let last = step.last(steps, &tape.states[steps])?;
+    tape.observations.push(last);
+    Ok(tape)
+}
+
+/// A tape, and the step that ended it before its time with its error.
+pub type Ended<S> = (TapeOf<S>, Option<(usize, <S as Step>::Error)>);
+
+/// As [`forward`], as far as it comes: the tape ends at the last state that can be observed, and holds no observation where not even the first can.
+pub fn forward_as_far<S: Step>(
+    step: &S,
+    initial: S::State,
+    steps: usize,
+    progress: impl FnMut(usize) -> Result<(), S::Error>,
+) -> Ended<S> {
+    let (mut tape, mut failed) = run(step, initial, steps, progress);
+    loop {
+        let n = tape.records.len();
+        match step.last(n, &tape.states[n]) {
+            Ok(last) => tape.observations.push(last),
+            Err(error) => {
+                failed.get_or_insert((n, error));
+                if n > 0 {
+                    tape.states.pop();
+                    tape.records.pop();
+                    tape.observations.pop();
+                    continue;
+                }
+            }
+        }
+        return (tape, failed);
+    }
+}
+
+/// Steps until one fails; the last state isn't observed yet.
+fn run<S: Step>(
+    step: &S,
+    initial: S::State,
+    steps: usize,
+    mut progress: impl FnMut(usize) -> Result<(), S::Error>,
+) -> Ended<S> {
     let mut tape = Tape {
         states: vec![initial],
         observations: Vec::new(),
         records: Vec::new(),
     };
     for n in 0..steps {
-        let (next, observation, record) = step.step(n, &tape.states[n])?;
-        tape.states.push(next);
-        tape.observations.push(observation);
-        tape.records.push(record);
-        progress(n + 1)?;
+        match step.step(n, &tape.states[n]) {
+            Ok((next, observation, record)) => {
+                tape.states.push(next);
+                tape.observations.push(observation);
+                tape.records.push(record);
+            }
+            Err(error) => return (tape, Some((n, error))),
+        }
+        if let Err(error) = progress(n + 1) {
+            return (tape, Some((n + 1, error)));
+        }
     }
-    let last = step.last(steps, &tape.states[steps])?;
-    tape.observations.push(last);
-    Ok(tape)
+    (tape, None)
 }
 
 /// Cotangent of the initial state, and what every step yields.

@@ -10,6 +10,7 @@ from hydrograd._added_mass import added_mass
 from hydrograd._contacts import ContactForces
 from hydrograd._gradient import Gradient, StepGradient
 from hydrograd._hydrograd import (
+    BatchError,
     Body,
     Contact,
     DeviceError,
@@ -53,6 +54,7 @@ from hydrograd._tradeoff import Tradeoff, TradeoffQuantity, TradeoffReference, T
 from hydrograd._viewer import View, view
 
 __all__ = [
+    "BatchError",
     "Body",
     "Contact",
     "ContactForces",

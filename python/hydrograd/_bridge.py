@@ -16,7 +16,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from hydrograd._charts import Array, Charts, charts, cross
-from hydrograd._hydrograd import InputError, Record, Rollout, Simulator, State
+from hydrograd._hydrograd import BatchError, Error, InputError, Record, Rollout, Simulator, State
 
 Given = TypeVar("Given")
 Made = TypeVar("Made")
@@ -141,11 +141,32 @@ def finite(place: str, array: Array) -> None:
 
 
 def each(work: Callable[[Given], Made], given: Iterable[Given]) -> list[Made]:
-    """Does work that leaves the interpreter's lock on all cores; results in order."""
+    """Does work that leaves the interpreter's lock on all cores; results in order.
+
+    Where some fail, all are done all the same, and the `BatchError` has what they came to.
+    """
     listed = list(given)
     if len(listed) < 2:
         return [work(one) for one in listed]
-    return list(_pool(os.getpid()).map(work, listed))
+    running = [_pool(os.getpid()).submit(work, one) for one in listed]
+    members: list[Any] = []
+    errors: dict[int, Error] = {}
+    for b, future in enumerate(running):
+        try:
+            members.append(future.result())
+        except BatchError as error:
+            # A batch of one.
+            errors[b] = error.errors[0]
+            members += error.members
+        except Error as error:
+            errors[b] = error
+            members.append(None)
+    if errors:
+        b, first = next(iter(errors.items()))
+        failed = BatchError(f"{len(errors)} of {len(listed)} members failed, counted from 0; member {b}: {first}")
+        failed.errors, failed.members = errors, members
+        raise failed
+    return members
 
 
 @functools.lru_cache(maxsize=1)
@@ -159,7 +180,14 @@ def roll(physics: Physics, controls: Array, q: Array, v: Array, values: Array, g
     sims = physics.variants(values, gains)
     if len(sims) > 1 and all(sim is sims[0] for sim in sims):
         return sims[0].rollout_batch(controls, q=q, v=v)
-    return each(lambda b: sims[b].rollout(controls[b], q=q[b], v=v[b]), range(len(sims)))
+    if len(sims) == 1:
+        return [sims[0].rollout(controls[0], q=q[0], v=v[0])]
+
+    def one(b: int) -> Rollout:
+        this = slice(b, b + 1)
+        return sims[b].rollout_batch(controls[this], q=q[this], v=v[this])[0]
+
+    return each(one, range(len(sims)))
 
 
 def observe(physics: Physics, steps: int, rollouts: Sequence[Rollout]) -> Observed:

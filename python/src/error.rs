@@ -3,10 +3,10 @@
 use pyo3::exceptions::{PyException, PyOSError, PyValueError};
 use pyo3::prelude::*;
 use pyo3::sync::PyOnceLock;
-use pyo3::types::{PyTuple, PyType};
+use pyo3::types::{PyDict, PyTuple, PyType};
 
 /// Names of the exceptions, the built-in one that each also is, and what they say.
-const KINDS: [(&str, Option<Builtin>, &str); 8] = [
+const KINDS: [(&str, Option<Builtin>, &str); 9] = [
     (
         "InputError",
         Some(Builtin::Value),
@@ -41,6 +41,12 @@ const KINDS: [(&str, Option<Builtin>, &str); 8] = [
         "DeviceError",
         None,
         "A GPU that isn't there, can't do what is needed, or failed.",
+    ),
+    (
+        "BatchError",
+        None,
+        "Members of a batch that failed. `errors` has each one's error by its number, counted from 0, with its `step` and `time` (s) where they are \
+         known; `members` has all of the batch: what ran, of a rollout that failed as far as it came, and None where there is nothing.",
     ),
     (
         "InternalError",
@@ -88,7 +94,7 @@ fn class(
         Some(Builtin::Value) => PyTuple::new(py, [base.clone(), py.get_type::<PyValueError>()])?,
         Some(Builtin::Os) => PyTuple::new(py, [base.clone(), py.get_type::<PyOSError>()])?,
     };
-    let namespace = pyo3::types::PyDict::new(py);
+    let namespace = PyDict::new(py);
     namespace.set_item("__doc__", doc)?;
     namespace.set_item("__module__", "hydrograd")?;
     let made = py.get_type::<PyType>().call1((*name, bases, namespace))?;
@@ -128,6 +134,26 @@ pub fn exception(error: hydrograd::Error) -> PyErr {
         _ => "InternalError",
     };
     raise(name, error.to_string())
+}
+
+/// Whether it is an `Error` of hydrograd's.
+pub fn own(py: Python<'_>, error: &PyErr) -> bool {
+    base(py).is_ok_and(|class| error.is_instance(py, class))
+}
+
+/// A `BatchError`, from all members of a batch and the errors of those that failed, by number.
+pub fn batch<'py>(
+    py: Python<'py>,
+    message: String,
+    members: Bound<'py, PyAny>,
+    errors: Bound<'py, PyDict>,
+) -> PyErr {
+    let error = raise("BatchError", message);
+    let value = error.value(py);
+    let set = value
+        .setattr("members", members)
+        .and_then(|()| value.setattr("errors", errors));
+    set.map_or_else(|failed| failed, |()| error)
 }
 
 /// An `InputError`: what was given where, and what would be right.

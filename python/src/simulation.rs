@@ -1,7 +1,7 @@
 //! What simulators do: the methods of their class.
 
 use crate::array::{self, Dim, array};
-use crate::error::{OrRaise, input};
+use crate::error::{OrRaise, batch, exception, input, own};
 use crate::gradient::by_name;
 use crate::interrupt::{long, short};
 use crate::mesh::{Triangles, triangles};
@@ -12,6 +12,7 @@ use crate::scene::Scene;
 use crate::settings::{Keywords, row_or};
 use crate::simulator::Simulator;
 use crate::state::{Record, State};
+use hydrograd::simulate::Halted;
 use hydrograd::{Controls, dynamics};
 use nalgebra::{DMatrix, DVector};
 use numpy::PyArrayDyn;
@@ -69,6 +70,48 @@ impl Simulator {
             _ => Start::From(row_or("rollout: q", q, q0)?, row_or("rollout: v", v, v0)?),
         })
     }
+}
+
+/// The rollouts of a batch, if none failed.
+fn gathered(
+    of: &Bound<'_, Simulator>,
+    made: Vec<Result<hydrograd::simulate::Rollout, Box<Halted>>>,
+) -> PyResult<Vec<Rollout>> {
+    let (py, count) = (of.py(), made.len());
+    let errors = PyDict::new(py);
+    let mut first = None;
+    let mut rollouts = Vec::with_capacity(count);
+    for (b, one) in made.into_iter().enumerate() {
+        let halted = match one {
+            Ok(rollout) => {
+                rollouts.push(Some(Rollout::new(of, rollout)));
+                continue;
+            }
+            Err(halted) => *halted,
+        };
+        let error = exception(halted.error);
+        if !own(py, &error) {
+            return Err(error);
+        }
+        let value = error.value(py);
+        value.setattr("step", halted.step)?;
+        value.setattr("time", halted.time)?;
+        errors.set_item(b, value)?;
+        first.get_or_insert_with(|| {
+            let (step, time) = (halted.step, halted.time);
+            format!("member {b} in step {step}, from t = {time} s on: {value}")
+        });
+        rollouts.push(halted.rollout.map(|rollout| Rollout::new(of, rollout)));
+    }
+    let Some(first) = first else {
+        return Ok(rollouts.into_iter().flatten().collect());
+    };
+    let failed = errors.len();
+    let message = format!("{failed} of {count} members failed, counted from 0; {first}");
+    let members = rollouts.into_iter();
+    let members = members.map(|one| one.map(|one| Bound::new(py, one)).transpose());
+    let members = members.collect::<PyResult<Vec<_>>>()?;
+    Err(batch(py, message, members.into_pyobject(py)?, errors))
 }
 
 #[pymethods]
@@ -140,7 +183,7 @@ impl Simulator {
     }
 
     /// Runs many controls, (batch, steps, control_size), on all cores: the same rollouts, to the bit, as one after the other.
-    /// `q` (batch, q_size) and `v` (batch, v_size) are where each begins, if given.
+    /// `q` (batch, q_size) and `v` (batch, v_size) are where each begins, if given. Where some fail, the `BatchError` has what ran and each one's error.
     #[pyo3(signature = (controls, *, q=None, v=None))]
     fn rollout_batch(
         slf: &Bound<'_, Self>,
@@ -189,17 +232,21 @@ impl Simulator {
         let inner = me.inner.clone();
         let made = long(slf.py(), move |interrupt| {
             let one = |(start, matrix): (Start, DMatrix<f64>)| {
-                let controls = Controls::from_matrix(&inner, matrix)?;
-                inner.rollout_from(&start.state(&inner)?, &controls, |_| interrupt.check())
+                let unmade = |error| {
+                    Box::new(Halted {
+                        step: 0,
+                        time: 0.0,
+                        error,
+                        rollout: None,
+                    })
+                };
+                let controls = Controls::from_matrix(&inner, matrix).map_err(unmade)?;
+                let state = start.state(&inner).map_err(unmade)?;
+                inner.rollout_as_far(&state, &controls, |_| interrupt.check())
             };
-            runs.into_par_iter()
-                .map(one)
-                .collect::<hydrograd::Result<Vec<_>>>()
+            Ok(runs.into_par_iter().map(one).collect::<Vec<_>>())
         })?;
-        Ok(made
-            .into_iter()
-            .map(|rollout| Rollout::new(slf, rollout))
-            .collect())
+        gathered(slf, made)
     }
 
     /// The state at coordinates `q` (q_size,) and generalised velocity `v` (v_size,) after `step` steps; what is None is

@@ -12,7 +12,7 @@ import hydrograd as hg
 
 
 def test_one_tree():
-    kinds = ["Input", "Mesh", "File", "Solver", "Unresolved", "Unsupported", "Device", "Internal"]
+    kinds = ["Input", "Mesh", "File", "Solver", "Unresolved", "Unsupported", "Device", "Batch", "Internal"]
     for kind in kinds:
         assert issubclass(getattr(hg, kind + "Error"), hg.Error)
     assert issubclass(hg.InputError, ValueError) and issubclass(hg.FileError, OSError)

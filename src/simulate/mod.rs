@@ -36,6 +36,7 @@ pub use objective::Objective;
 pub use record::Record;
 pub use recording::{Recorded, Recording};
 pub use rollout::{Rollout, Summary};
+pub use run::Halted;
 pub use sample::Sample;
 pub use settings::Settings;
 pub use simulator::{AddedMass, Simulator};

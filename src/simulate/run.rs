@@ -10,6 +10,18 @@ use std::ops::ControlFlow;
 /// Most steps of one rollout: some kilobytes are kept for each.
 const MOST_STEPS: usize = 5_000_000;
 
+/// A rollout that ended before its time ([`Simulator::rollout_as_far`]).
+pub struct Halted {
+    /// The step that failed, counted as [`State::step`] is.
+    pub step: usize,
+    /// The time at its start, s.
+    pub time: f64,
+    /// Why.
+    pub error: Error,
+    /// What ran; none where not even the first state can be observed.
+    pub rollout: Option<Rollout>,
+}
+
 impl Simulator {
     /// Runs the scene's own controller with additional open-loop controls.
     ///
@@ -48,17 +60,57 @@ impl Simulator {
         controls: &Controls,
         progress: impl FnMut(usize) -> ControlFlow<()> + Send,
     ) -> Result<Rollout> {
-        let tree = &self.system().tree;
-        let sizes = [state.q.len(), state.y.len()];
-        let right = [tree.coordinates(), tree.velocities()];
-        if sizes != right {
-            return Err(Error::input(
-                "state: numbers of coordinates and velocities",
-                format!("{sizes:?}"),
-                format!("must be {right:?}, as the scene's"),
-            ));
-        }
+        self.check_sizes(state)?;
         self.run(state.clone(), None, controls, progress)
+    }
+
+    /// As [`Simulator::rollout_from`], but what ran before a step failed isn't lost.
+    ///
+    /// # Errors
+    /// As there: the error with its step, and the rollout up to there.
+    pub fn rollout_as_far(
+        &self,
+        state: &State,
+        controls: &Controls,
+        progress: impl FnMut(usize) -> ControlFlow<()> + Send,
+    ) -> std::result::Result<Rollout, Box<Halted>> {
+        let at = |error| Halted {
+            step: state.step,
+            time: state.step as f64 * self.time_step(),
+            error,
+            rollout: None,
+        };
+        self.check_sizes(state).map_err(|e| Box::new(at(e)))?;
+        let steps = self.check_controls(controls).map_err(|e| Box::new(at(e)))?;
+        let matrix = controls.matrix().clone();
+        let trajectory = self.trajectory(&matrix);
+        let ended = ended(progress, steps);
+        let (tape, failed) =
+            rayon::scope(|_| step::forward_as_far(&trajectory, state.clone(), steps, ended));
+        let rollout = tape
+            .observations()
+            .first()
+            .map(|s| s.v.clone())
+            .map(|v| Rollout {
+                simulator: self.clone(),
+                initial_velocity: v,
+                controls: matrix.columns(0, tape.records().len()).into_owned(),
+                tape,
+                gaps: Default::default(),
+                report: Default::default(),
+            });
+        match (failed, rollout) {
+            (None, Some(rollout)) => Ok(rollout),
+            (Some((made, error)), rollout) => Err(Box::new(Halted {
+                step: state.step + made,
+                time: (state.step + made) as f64 * self.time_step(),
+                rollout,
+                error,
+            })),
+            (None, None) => Err(Box::new(at(Error::Stopped {
+                what: "the rollout, before its first state".into(),
+            }))),
+        }
     }
 
     /// One step from a state with the controls `control`, to which the scene's own controller adds: the next state, and the record
@@ -73,14 +125,23 @@ impl Simulator {
         Ok((rollout.states()[1].clone(), Record::new(rollout)))
     }
 
-    fn run(
-        &self,
-        initial: State,
-        initial_velocity: Option<DVector<f64>>,
-        controls: &Controls,
-        mut progress: impl FnMut(usize) -> ControlFlow<()> + Send,
-    ) -> Result<Rollout> {
-        let matrix = controls.matrix().clone();
+    fn check_sizes(&self, state: &State) -> Result<()> {
+        let tree = &self.system().tree;
+        let sizes = [state.q.len(), state.y.len()];
+        let right = [tree.coordinates(), tree.velocities()];
+        if sizes != right {
+            return Err(Error::input(
+                "state: numbers of coordinates and velocities",
+                format!("{sizes:?}"),
+                format!("must be {right:?}, as the scene's"),
+            ));
+        }
+        Ok(())
+    }
+
+    /// Refuses controls of other sizes, and too many steps; the number of steps.
+    fn check_controls(&self, controls: &Controls) -> Result<usize> {
+        let matrix = controls.matrix();
         if matrix.nrows() != self.system().controls {
             return Err(Error::input(
                 "controls",
@@ -96,12 +157,19 @@ impl Simulator {
                 format!("must be at most {MOST_STEPS}: every state is kept; run in parts"),
             ));
         }
-        let ended = |done| match progress(done) {
-            ControlFlow::Continue(()) => Ok(()),
-            ControlFlow::Break(()) => Err(Error::Stopped {
-                what: format!("the rollout, after {done} of {steps} steps"),
-            }),
-        };
+        Ok(steps)
+    }
+
+    fn run(
+        &self,
+        initial: State,
+        initial_velocity: Option<DVector<f64>>,
+        controls: &Controls,
+        progress: impl FnMut(usize) -> ControlFlow<()> + Send,
+    ) -> Result<Rollout> {
+        let steps = self.check_controls(controls)?;
+        let matrix = controls.matrix().clone();
+        let ended = ended(progress, steps);
         let trajectory = self.trajectory(&matrix);
         // On a thread of the pool from first step to last: entering the pool costs as much as a small step's work.
         let tape = rayon::scope(|_| step::forward(&trajectory, initial, steps, ended))?;
@@ -110,8 +178,21 @@ impl Simulator {
             initial_velocity: initial_velocity.unwrap_or_else(|| tape.observations()[0].v.clone()),
             tape,
             gaps: Default::default(),
+            report: Default::default(),
             controls: matrix,
         })
     }
 }
-            report: Default::default(),
+
+/// Calls `progress` after each step, and ends the run where it breaks.
+fn ended(
+    mut progress: impl FnMut(usize) -> ControlFlow<()> + Send,
+    steps: usize,
+) -> impl FnMut(usize) -> Result<()> + Send {
+    move |done| match progress(done) {
+        ControlFlow::Continue(()) => Ok(()),
+        ControlFlow::Break(()) => Err(Error::Stopped {
+            what: format!("the rollout, after {done} of {steps} steps"),
+        }),
+    }
+}

@@ -1,5 +1,6 @@
 //! Runs from any state and runs that are ended early; the Jacobians and velocities of a rollout; meshes number by number.
 
+use crate::support::says;
 use hydrograd::dynamics::Integrator;
 use hydrograd::{Body, Controls, Error, Fidelity, Fluid, Joint, Scene, Settings, Shape, Simulator};
 use nalgebra::{DMatrix, DVector};
@@ -272,4 +273,41 @@ fn triangles_are_a_mesh() {
     let hole = Shape::triangles(vertices, &mesh.faces()[1..]);
     let error = hydrograd::shape::build(&hole, "".as_ref(), None).unwrap_err();
     assert!(matches!(error, Error::Mesh { .. }), "{error}");
+}
+
+/// What ran before a step failed isn't lost, and can be differentiated.
+#[test]
+fn a_run_that_fails_keeps_what_ran() {
+    let mut scene = Scene::new(Fluid::fresh_water());
+    for (name, x) in [("left", 0.0), ("right", 0.25)] {
+        let body = Body::new(Shape::sphere(0.1).faces(80)).named(name);
+        scene.add(body.density(1000.0).at([x, 0.0, 0.0]));
+    }
+    scene.time_step = 0.01;
+    scene.initial.v = vec![0.0; 12];
+    scene.initial.v[0] = 0.5;
+    scene.initial.v[6] = -0.5;
+    let settings = Settings::default().fidelity(Fidelity::Reduced).films(false);
+    let simulator = Simulator::new(&scene, settings).unwrap();
+    let controls = Controls::zeros(&simulator, 40);
+    let start = simulator.initial().unwrap();
+    let go = |_| std::ops::ControlFlow::Continue(());
+    let halted = simulator.rollout_as_far(&start, &controls, go);
+    let halted = halted.err().unwrap();
+    says(&halted.error, &["left", "right"]);
+    let ran = halted.rollout.unwrap();
+    assert!(halted.step > 2 && ran.steps() > 0 && ran.steps() <= halted.step);
+    assert!((halted.time - 0.01 * halted.step as f64).abs() < 1e-12);
+    let whole = simulator
+        .rollout(&Controls::zeros(&simulator, ran.steps()))
+        .unwrap();
+    assert_eq!(ran.q(), whole.q());
+    let mut seed = ran.zero_cotangents();
+    seed.q.fill(1.0);
+    assert_eq!(
+        ran.vjp(&seed).unwrap().initial,
+        whole.vjp(&seed).unwrap().initial
+    );
+    let error = simulator.rollout(&controls).err().unwrap();
+    assert_eq!(error.to_string(), halted.error.to_string());
 }

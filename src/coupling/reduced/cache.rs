@@ -1,8 +1,8 @@
 //! Compressed bodies kept: in memory, and on request in a folder.
 //!
-//! A body is found again by a digest of everything that it was made from. A file begins with a line
-//! that names format and digest of the rest; a file that doesn't match (another version, cut short,
-//! changed) counts as not there and is written anew. Files are written under another name and then
+//! A body is found again by a key, the digest of everything that it was made from. A file begins with a line
+//! that names format, key and digest of both and the rest; a file that doesn't match (another version or body, cut short,
+//! changed), isn't a plain file or is too large counts as not there and is written anew. Files are written under another name and then
 //! renamed, so that a writer that is killed leaves nothing half done.
 
 use super::ReducedBody;
@@ -13,7 +13,8 @@ use crate::{Error, Result};
 use serde::Serialize;
 use sha2::{Digest, Sha256};
 use std::collections::HashMap;
-use std::io::Write;
+use std::fs::File;
+use std::io::{Read, Write};
 use std::path::{Path, PathBuf};
 use std::sync::{Arc, LazyLock, Mutex, MutexGuard, PoisonError};
 
@@ -21,10 +22,12 @@ use std::sync::{Arc, LazyLock, Mutex, MutexGuard, PoisonError};
 const FORMAT: &str = concat!(
     "hydrograd-compressed-body ",
     env!("CARGO_PKG_VERSION"),
-    " 2"
+    " 3"
 );
 /// Bodies kept in memory.
 const MOST: usize = 256;
+/// Largest file that is read, bytes: some times that of a thousand points with all their modes.
+const LARGEST: u64 = 256 << 20;
 
 static MEMORY: LazyLock<Mutex<HashMap<Key, Arc<ReducedBody>>>> = LazyLock::new(Default::default);
 
@@ -59,35 +62,44 @@ impl Key {
     }
 }
 
-/// The body of `key`: from memory, else from `folder`, else from `make`; then kept in both.
+/// A body, and why it couldn't be kept in the folder, if it couldn't.
+pub type Fetched = (Arc<ReducedBody>, Option<String>);
+
+/// The body of `key`: from memory, else from `folder`, else from `make`; then kept in both, as far as the folder can be written.
 ///
 /// # Errors
-/// Whatever `make` reports, and a folder that can't be written.
+/// Whatever `make` reports.
 pub fn fetch(
     key: Key,
     folder: Option<&Path>,
     make: impl FnOnce() -> Result<ReducedBody>,
-) -> Result<Arc<ReducedBody>> {
+) -> Result<Fetched> {
     let known = memory().get(&key).cloned();
     let file = folder.map(|folder| path(folder, key));
     if let (Some(body), None) = (&known, &file) {
-        return Ok(body.clone());
+        return Ok((body.clone(), None));
     }
-    let stored = file.as_deref().and_then(read).map(Arc::new);
+    let stored = file.as_deref().and_then(|file| read(file, key));
+    let stored = stored.map(Arc::new);
     let unwritten = file.filter(|_| stored.is_none());
     let body = match known.or(stored) {
         Some(body) => body,
         None => Arc::new(make()?),
     };
-    if let (Some(folder), Some(file)) = (folder, unwritten) {
-        write(folder, &file, &body)?;
+    let mut warning = None;
+    if let (Some(folder), Some(file)) = (folder, unwritten)
+        && let Err(error) = write(folder, &file, key, &body)
+    {
+        warning = Some(format!(
+            "a compressed body isn't kept, and will be compressed again: {error}; give another folder, or make room there"
+        ));
     }
     let mut memory = memory();
     if memory.len() >= MOST {
         memory.clear();
     }
     memory.insert(key, body.clone());
-    Ok(body)
+    Ok((body, warning))
 }
 
 fn memory() -> MutexGuard<'static, HashMap<Key, Arc<ReducedBody>>> {
@@ -104,22 +116,36 @@ pub fn path(folder: &Path, key: Key) -> PathBuf {
     folder.join(format!("{}.body", key.hex()))
 }
 
-fn head(text: &[u8]) -> String {
-    let digest: [u8; 32] = Sha256::digest(text).into();
-    format!("{FORMAT} {}\n", Key(digest).hex())
+fn head(key: Key, text: &[u8]) -> String {
+    let mut digest = Sha256::new();
+    digest.update(key.0);
+    digest.update(text);
+    format!(
+        "{FORMAT} {} {}\n",
+        key.hex(),
+        Key(digest.finalize().into()).hex()
+    )
 }
 
-fn read(path: &Path) -> Option<ReducedBody> {
-    let bytes = std::fs::read(path).ok()?;
+/// What a file holds, if it is that of `key`.
+fn read(path: &Path, key: Key) -> Option<ReducedBody> {
+    // Opening a pipe waits for its writer, and a device has no end.
+    let plain = |m: std::fs::Metadata| m.is_file() && m.len() <= LARGEST;
+    if !std::fs::metadata(path).is_ok_and(plain) {
+        return None;
+    }
+    let mut bytes = Vec::new();
+    let file = File::open(path).ok()?;
+    file.take(LARGEST).read_to_end(&mut bytes).ok()?;
     let end = bytes.iter().position(|b| *b == b'\n')? + 1;
     let (first, rest) = bytes.split_at(end);
-    if first != head(rest).as_bytes() {
+    if first != head(key, rest).as_bytes() {
         return None;
     }
     serde_json::from_slice(rest).ok()
 }
 
-fn write(folder: &Path, path: &Path, body: &ReducedBody) -> Result<()> {
+fn write(folder: &Path, path: &Path, key: Key, body: &ReducedBody) -> Result<()> {
     let failed = |source: std::io::Error| Error::File {
         path: path.to_path_buf(),
         action: "write",
@@ -128,7 +154,8 @@ fn write(folder: &Path, path: &Path, body: &ReducedBody) -> Result<()> {
     std::fs::create_dir_all(folder).map_err(failed)?;
     let text = serde_json::to_vec(body).map_err(|e| failed(e.into()))?;
     let mut file = tempfile::NamedTempFile::new_in(folder).map_err(failed)?;
-    file.write_all(head(&text).as_bytes()).map_err(failed)?;
+    file.write_all(head(key, &text).as_bytes())
+        .map_err(failed)?;
     file.write_all(&text).map_err(failed)?;
     file.as_file().sync_all().map_err(failed)?;
     file.persist(path).map_err(|e| failed(e.error))?;

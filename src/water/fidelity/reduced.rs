@@ -31,7 +31,7 @@ impl FidelityKind for Reduced {
     }
 
     fn couple(&self, problem: &Problem, device: &mut Device) -> Result<Made> {
-        let coupling = compressed_all(problem)?;
+        let (coupling, unkept) = compressed(problem)?;
         let (bodies, made) = (problem.bodies, coupling.reduced_bodies());
         let mut as_made = Vec::with_capacity(made.len());
         for (m, body) in made.iter().zip(bodies) {
@@ -55,7 +55,7 @@ impl FidelityKind for Reduced {
         Ok(Made {
             carried: Some(Carried::Sources),
             films,
-            warnings: warnings(problem, made),
+            warnings: [warnings(problem, made), unkept].concat(),
             bodies: problem.named(as_made),
             coupling: device.reduced(coupling)?,
         })
@@ -77,11 +77,22 @@ impl FidelityKind for Reduced {
 
 /// All bodies compressed and coupled.
 pub(in crate::water) fn compressed_all(problem: &Problem) -> Result<reduced::Reduced> {
+    Ok(compressed(problem)?.0)
+}
+
+/// The same, with what the user should know of bodies that couldn't be kept.
+fn compressed(problem: &Problem) -> Result<(reduced::Reduced, Vec<String>)> {
     let (bodies, plan) = (problem.bodies, problem.plan);
     let mut made: Vec<Arc<ReducedBody>> = Vec::with_capacity(bodies.len());
+    let mut unkept: Vec<String> = Vec::new();
     for (b, body) in bodies.iter().enumerate() {
         let method = problem.method_for(body)?;
-        made.push(compressed(problem, body, method, problem.chosen(b))?);
+        let (body, warning) = compressed_body(problem, body, method, problem.chosen(b))?;
+        made.push(body);
+        // One folder, one reason.
+        if unkept.is_empty() {
+            unkept.extend(warning);
+        }
     }
     let cutoff = |a: usize, b: usize| {
         let pair = (a.min(b), a.max(b));
@@ -101,7 +112,7 @@ pub(in crate::water) fn compressed_all(problem: &Problem) -> Result<reduced::Red
         let tolerances: Vec<f64> = (0..bodies.len()).map(|b| problem.tolerance(b)).collect();
         coupling = coupling.with_films(&surfaces, &tolerances, problem.walls)?;
     }
-    coupling.excluding(&problem.excluded)
+    Ok((coupling.excluding(&problem.excluded)?, unkept))
 }
 
 /// What each body answers by its own method; bodies that are equal share one. Sources as near as
@@ -194,12 +205,12 @@ const GRID: f64 = (1u64 << 30) as f64;
 ///
 /// It is computed in units of its own size, with lengths rounded to [`GRID`]: bodies of the same
 /// shape share it whatever their size, to the last bit.
-fn compressed(
+fn compressed_body(
     problem: &Problem,
     body: &SubmergedBody,
     method: &'static dyn BodyMethod,
     chosen: &compress::CompressSettings,
-) -> Result<Arc<ReducedBody>> {
+) -> Result<cache::Fetched> {
     chosen.validate()?;
     let mesh = method.layout(body)?;
     let size = mesh.bounding_ball().radius;
@@ -250,6 +261,6 @@ fn compressed(
         let response = method.response(&own, problem.numerics, finest)?;
         compress::compress(body.name, &mesh, response.as_ref(), &chosen, &regions)
     });
-    let found = found.map_err(|e| e.in_units_of(size))?;
-    Ok(Arc::new(found.scaled(size)?))
+    let (found, warning) = found.map_err(|e| e.in_units_of(size))?;
+    Ok((Arc::new(found.scaled(size)?), warning))
 }

@@ -253,8 +253,90 @@ fn the_cache_gives_the_same_bits_and_survives_damage() {
     // A folder that can't be made is a warning that names it.
     let file = folder.path().join("file");
     std::fs::write(&file, b"").unwrap();
-    let error = Simulator::cached(&scene(), settings, &file.join("inside"));
-    assert!(error.err().unwrap().to_string().contains("inside"));
+    cache::forget();
+    let made = Simulator::cached(&scene(), settings.clone(), &file.join("inside")).unwrap();
+    let told = made.warnings().iter().filter(|w| w.contains("inside"));
+    assert_eq!(told.count(), 1, "{:?}", made.warnings());
+    assert_eq!(end(&made, 5), first);
+    // One body's file under the other's name is not taken for it.
+    std::fs::write(&paths[0], &kept[1]).unwrap();
+    std::fs::write(&paths[1], &kept[0]).unwrap();
+    cache::forget();
+    assert_eq!(run(), first);
+    for (file, bytes) in paths.iter().zip(&kept) {
+        assert!(&std::fs::read(file).unwrap() == bytes);
+    }
+}
+
+/// Pipes would be waited for, and devices never end: neither is opened.
+#[cfg(unix)]
+#[test]
+fn what_is_no_plain_file_is_not_read() {
+    let folder = tempfile::tempdir().unwrap();
+    let settings = reduced().accuracy(9e-3);
+    Simulator::cached(&scene(), settings.clone(), folder.path()).unwrap();
+    let all = std::fs::read_dir(folder.path()).unwrap();
+    let files: Vec<_> = all.map(|f| f.unwrap().path()).collect();
+    let made = |kind: usize| {
+        for file in &files {
+            std::fs::remove_file(file).unwrap();
+            match kind {
+                0 => {
+                    let made = std::process::Command::new("mkfifo").arg(file).status();
+                    assert!(made.unwrap().success());
+                }
+                1 => std::os::unix::fs::symlink("/dev/zero", file).unwrap(),
+                _ => std::fs::create_dir(file).unwrap(),
+            }
+        }
+        cache::forget();
+        Simulator::cached(&scene(), settings.clone(), folder.path()).unwrap()
+    };
+    for kind in 0..3 {
+        let told = made(kind).warnings().to_vec();
+        // Files are put in the place of pipes and links; a folder can't be replaced.
+        let unkept = told.iter().filter(|w| w.contains("isn't kept")).count();
+        assert_eq!(unkept, usize::from(kind == 2), "{told:?}");
+    }
+}
+
+/// An accuracy beyond what compression has room for is told with what is reached; one within isn't.
+#[test]
+fn accuracy_that_is_not_reached_is_told() {
+    for shape in [Shape::sphere(0.1), Shape::cuboid([0.2, 0.2, 0.1])] {
+        let mut scene = Scene::new(Fluid::fresh_water());
+        scene.add(Body::new(shape.clone()).named("one").density(1000.0));
+        scene.add(
+            Body::new(shape)
+                .named("two")
+                .density(1000.0)
+                .at([0.35, 0.0, 0.0]),
+        );
+        let mut last: Option<nalgebra::DMatrix<f64>> = None;
+        for accuracy in [3e-3, 1e-3, 1e-4, 1e-5, 1e-6, 1e-12] {
+            let simulator = Simulator::new(&scene, reduced().accuracy(accuracy)).unwrap();
+            let told = simulator
+                .warnings()
+                .iter()
+                .filter(|w| w.contains("accuracy"));
+            let told: Vec<&String> = told.collect();
+            let m = simulator.added_mass().unwrap().matrix;
+            let moved = last.map_or(0.0, |last| (&m - last).amax() / m.amax());
+            println!(
+                "{accuracy:e}: {} unknowns, moved {moved:.1e}, {told:?}",
+                simulator.unknowns()
+            );
+            if accuracy >= 1e-3 {
+                assert!(told.is_empty(), "{told:?}");
+            }
+            if accuracy <= 1e-6 {
+                assert_eq!(told.len(), 1, "{accuracy:e}");
+                let text = format!("{accuracy:.1e}");
+                says(told[0], &["one", "reach", &text]);
+            }
+            last = Some(m);
+        }
+    }
 }
 
 #[test]

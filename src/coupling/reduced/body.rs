@@ -56,6 +56,8 @@ pub struct Fit {
     pub regions: Vec<Region>,
     /// Points on the surfaces around the body at which it was fitted.
     pub proxies: usize,
+    /// The tolerance that the fit to them meets.
+    pub reached: f64,
     /// max |Φ_ij − Φ_ji| / max |Φ| of the scattered potentials at the proxies, before symmetrising.
     pub asymmetry: f64,
     /// Largest error of the body's own flow at check points not used in the fit, relative to its

@@ -140,6 +140,9 @@ pub(in crate::water) fn responses(
 /// quarter at the nearest points, worth 0.3 % of the added mass; beyond this it is several per cent.
 const MISSED: f64 = 0.6;
 
+/// How far, as a factor, compression may stay behind the accuracy that it aims at before the user is told.
+const SHORT: f64 = 2.0;
+
 /// What the user should know of compressed bodies.
 fn warnings(problem: &Problem, made: &[Arc<ReducedBody>]) -> Vec<String> {
     let (bodies, mut out) = (problem.bodies, Vec::new());
@@ -162,7 +165,18 @@ fn warnings(problem: &Problem, made: &[Arc<ReducedBody>]) -> Vec<String> {
                 100.0 * missed
             ));
         }
-        if let Some(asked) = problem.chosen(b).resolved_gap.filter(|a| *a < 0.98 * got) {
+        let chosen = problem.chosen(b);
+        let reached = parts.fit.reached;
+        if chosen.rank.is_none() && reached > SHORT * chosen.tolerance {
+            out.push(format!(
+                "body {:?}: its {} compressed sources reach an accuracy of {reached:.1e} at the smallest gap that they were fitted for, for {:.1e} asked \
+                 for: there is no room for more of them; use the fidelity full",
+                body.name,
+                parts.points.len(),
+                chosen.tolerance
+            ));
+        }
+        if let Some(asked) = chosen.resolved_gap.filter(|a| *a < 0.98 * got) {
             out.push(format!(
                 "body {:?}: gaps under {got:.3e} m aren't resolved by its compressed sources, for all \
                  that {asked:.3e} m were asked for: compression spreads no more points than that needs over a whole body; `refine` it where gaps \

@@ -209,7 +209,7 @@ pub fn compress(
         None => (REST * settings.tolerance.sqrt(), usize::MAX),
     };
     let most = most.min(fitted.points.len() / FITTED);
-    let columns = pursuit::pursuit(&field, &targets, rest, most);
+    let (columns, left) = pursuit::pursuit(&field, &targets, rest, most);
     let chosen: Vec<Vec3> = columns.iter().map(|j| candidates[*j]).collect();
     let field = Mat::from_fn(field.nrows(), columns.len(), |i, k| field[(i, columns[k])]);
     // No more modes than points.
@@ -235,6 +235,7 @@ pub fn compress(
             resolved_gap: gap,
             regions,
             proxies: fitted.points.len(),
+            reached: (left / REST).powi(2),
             asymmetry,
             radiated,
             scattered,

@@ -10,10 +10,15 @@ const FLOOR: f64 = 1e-9;
 
 /// Greedy choice of the columns of `a` that best explain `targets` (orthogonal matching pursuit with
 /// all targets at once): each step takes the column that lowers the sum of squares of the targets'
-/// rests most, until every rest is at most `tolerance` long, or `most` are chosen.
+/// rests most, until every rest is at most `tolerance` long, or `most` are chosen. With the length of the longest rest.
 ///
 /// Works on the products `AᵀA` and `AᵀT` alone, updated as in a Cholesky factorisation with pivoting.
-pub(super) fn pursuit(a: &Mat<f64>, targets: &Mat<f64>, tolerance: f64, most: usize) -> Vec<usize> {
+pub(super) fn pursuit(
+    a: &Mat<f64>,
+    targets: &Mat<f64>,
+    tolerance: f64,
+    most: usize,
+) -> (Vec<usize>, f64) {
     let n = a.ncols();
     let most = most.min(a.nrows()).min(n);
     let gram = a.transpose() * a;
@@ -57,7 +62,8 @@ pub(super) fn pursuit(a: &Mat<f64>, targets: &Mat<f64>, tolerance: f64, most: us
         chosen.push(best);
         rows.push(row);
     }
-    chosen
+    let longest = rests.iter().fold(0.0, |a: f64, b| a.max(*b));
+    (chosen, longest.sqrt())
 }
 
 /// Least-squares solution of `a x ≈ b`.
@@ -81,11 +87,12 @@ mod tests {
                 .map(|(n, j)| a[(i, *j)] * (1.0 + n as f64 - 2.5 * k as f64))
                 .sum::<f64>()
         });
-        let mut chosen = pursuit(&a, &targets, 1e-3, 40);
+        let (mut chosen, longest) = pursuit(&a, &targets, 1e-3, 40);
+        assert!(longest <= 1e-3, "{longest}");
         let picked = Mat::from_fn(60, chosen.len(), |i, k| a[(i, chosen[k])]);
         let rest = &targets - &picked * least_squares(&picked, &targets);
         assert!((0..2).all(|k| rest.col(k).norm_l2() <= 1.1e-3), "{rest:?}");
-        assert_eq!(pursuit(&a, &targets, 0.0, 2).len(), 2);
+        assert_eq!(pursuit(&a, &targets, 0.0, 2).0.len(), 2);
         chosen.sort_unstable();
         chosen.dedup();
         assert!(chosen.len() <= 12, "{chosen:?}");

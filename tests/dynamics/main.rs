@@ -3,8 +3,8 @@
 mod driven;
 mod extremes;
 mod films;
-#[cfg(feature = "opt")]
 mod finite;
+#[cfg(feature = "opt")]
 mod grasp;
 mod growth;
 mod invariants;

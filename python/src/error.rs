@@ -165,6 +165,26 @@ pub fn input(
     exception(hydrograd::Error::input(place, value, expected))
 }
 
+/// A count that was given: what can't be one is an `InputError`.
+pub fn count(given: &Bound<'_, PyAny>) -> PyResult<usize> {
+    given.extract::<usize>().map_err(|_| {
+        let shown = given.repr().map(|r| r.to_string()).unwrap_or_default();
+        input(
+            "a number of things",
+            shown,
+            "must be a whole number that isn't negative",
+        )
+    })
+}
+
+/// The same, or None.
+pub fn count_or_none(given: &Bound<'_, PyAny>) -> PyResult<Option<usize>> {
+    match given.is_none() {
+        true => Ok(None),
+        false => count(given).map(Some),
+    }
+}
+
 /// An `InternalError`: what a panic said.
 pub fn internal(message: &str) -> PyErr {
     raise(

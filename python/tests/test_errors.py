@@ -212,3 +212,16 @@ def test_other_threads_run_meanwhile(sim):
         time.sleep(0.001)
     thread.join()
     assert count > 10
+
+
+def test_counts_that_are_none(sim):
+    for call in (
+        lambda: sim.rollout(steps=-1),
+        lambda: sim.rollout(steps=2.5),
+        lambda: sim.rollout(steps=10**30),
+        lambda: sim.state(step=-1),
+        lambda: hg.Simulator(sim.scene, faces=-1),
+        lambda: hg.Simulator(sim.scene, rank=-3),
+    ):
+        with pytest.raises(hg.InputError, match="whole number that isn't negative"):
+            call()

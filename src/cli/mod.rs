@@ -85,10 +85,14 @@ pub fn run(arguments: Vec<OsString>) -> Exit {
         Command::CheckMesh(arguments) => check_mesh::main(&arguments, output),
         Command::GpuInfo(arguments) => gpu_info::main(&arguments, output),
     };
-    done.unwrap_or_else(|error| {
+    let done = done.unwrap_or_else(|error| {
         output.error(&error);
         Exit::Failed
-    })
+    });
+    match output::lost() {
+        true => Exit::Failed,
+        false => done,
+    }
 }
 
 #[cfg(test)]

@@ -1,7 +1,8 @@
 //! What the commands print.
 
 use std::fmt::Display;
-use std::io::{IsTerminal, Write};
+use std::io::{ErrorKind, IsTerminal, Write};
+use std::sync::atomic::{AtomicBool, Ordering};
 
 use indicatif::{ProgressBar, ProgressFinish, ProgressStyle};
 use serde::Serialize;
@@ -49,10 +50,26 @@ fn error_object(message: &str) -> String {
     serde_json::json!({ "error": message }).to_string()
 }
 
+/// Whether something that was to be printed is lost.
+static LOST: AtomicBool = AtomicBool::new(false);
+
+/// Whether something that was to be printed is lost: on a full disk, say.
+pub(super) fn lost() -> bool {
+    LOST.load(Ordering::Relaxed)
+}
+
 /// A reader that has gone away (`hydrograd … | head`) is no error.
 fn print_line(text: &str) {
     let mut out = std::io::stdout().lock();
-    let _ = writeln!(out, "{text}").and_then(|()| out.flush());
+    if let Err(error) = writeln!(out, "{text}").and_then(|()| out.flush())
+        && error.kind() != ErrorKind::BrokenPipe
+    {
+        LOST.store(true, Ordering::Relaxed);
+        let _ = writeln!(
+            std::io::stderr(),
+            "hydrograd: standard output: write failed: {error}"
+        );
+    }
 }
 
 /// Largest memory this process has held, MB (10⁶ bytes); `None` where the system doesn't tell.

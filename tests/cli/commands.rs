@@ -675,3 +675,18 @@ fn a_run_says_what_auto_chose() {
         &["auto: reduced", "chosen  body \"coin\" resolves gaps"],
     );
 }
+
+/// What can't be printed is no success.
+#[cfg(target_os = "linux")]
+#[test]
+fn a_result_that_is_lost_is_a_failure() {
+    let full = std::fs::OpenOptions::new()
+        .write(true)
+        .open("/dev/full")
+        .unwrap();
+    let arguments = ["added-mass", "--shape", "sphere:0.1", "--faces", "80"];
+    let mut command = crate::support::command::command(&arguments);
+    let done = command.stdout(full).output().unwrap();
+    assert_eq!(done.status.code(), Some(1));
+    assert!(text(&done.stderr).contains("standard output"));
+}

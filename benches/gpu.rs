@@ -229,7 +229,7 @@ fn panels(context: &Arc<Context>, budget: &Budget) -> hydrograd::Result<()> {
     };
     for count in PANEL_ROWS {
         let bodies = || vec![body.clone(); count];
-        let make = || PanelCoupled::new(bodies(), &[], Exclusions::none(), settings.clone());
+        let make = || PanelCoupled::new(bodies(), &[], Exclusions::none(), settings);
         let (cpu, gpu) = (make()?, make()?);
         let n = cpu.model().rows() as f64;
         let start = format!("| {count} | {n} |");

@@ -122,7 +122,7 @@ def test_settings(sim):
     for wrong in ({"dt": 0.0}, {"dt": float("nan")}, {"tolerance": -1.0}, {"fidelity": "most"}, {"integrator": "euler"}):
         with pytest.raises(hg.InputError, match="simulator"):
             hg.Simulator(scene, **wrong)
-    with pytest.raises(OverflowError):
+    with pytest.raises(hg.InputError, match="whole number"):
         hg.Simulator(scene, faces=-1)
     with pytest.raises(hg.InputError, match='must be one of "cpu", "gpu"'):
         hg.Simulator(scene, backend="tpu")

@@ -606,7 +606,8 @@ fn observed(name: &str, c: f64) -> Outcome {
             }
         }
         simulator.set_parameters(parameters).unwrap();
-        let start = simulator.state(STEP, &p.q, &p.v).unwrap();
+        let (q, v) = left_to_motions(&p.q, &p.v);
+        let start = simulator.state(STEP, &q, &v).unwrap();
         let none = Controls::zeros(&simulator, 0);
         let rollout = simulator.rollout_from(&start, &none, |_| ControlFlow::Continue(()));
         rollout.unwrap()
@@ -635,6 +636,20 @@ fn observed(name: &str, c: f64) -> Outcome {
     check(false, &value, &p, &bar, c)
 }
 
+/// Coordinates and velocities with those of driven joints left to their motions.
+fn left_to_motions(q: &DVector<f64>, v: &DVector<f64>) -> (DVector<f64>, DVector<f64>) {
+    let (mut q, mut v) = (q.clone(), v.clone());
+    for (drive, link) in system().drives.iter().zip(system().tree.links()) {
+        if matches!(drive, Drive::Motion(_)) {
+            link.q.clone().for_each(|i| q[i] = 0.0);
+        }
+        if !matches!(drive, Drive::Free) {
+            link.v.clone().for_each(|i| v[i] = 0.0);
+        }
+    }
+    (q, v)
+}
+
 /// The same of a simulator's step, in q and v, with a controller.
 fn record_jvp(c: f64) -> Outcome {
     let mut simulator = simulator().clone();
@@ -656,7 +671,8 @@ fn record_jvp(c: f64) -> Outcome {
     let p = moving_point();
     let u = wavy(nu, 1.8, 3.0);
     let make = |q: &DVector<f64>, v: &DVector<f64>, u: &DVector<f64>| {
-        let start = simulator.state(STEP, q, v).unwrap();
+        let (q, v) = left_to_motions(q, v);
+        let start = simulator.state(STEP, &q, &v).unwrap();
         let (_, record) = simulator.step(&start, u).unwrap();
         record
     };

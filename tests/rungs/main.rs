@@ -40,8 +40,7 @@ fn registered() -> Vec<(String, Rung)> {
 
 /// Rungs on a GPU, each with the shader whose comparison in tests/gpu holds it against its twin on the CPU.
 const ON_DEVICE: &[(&str, &str)] = &[
-    ("gpu::full::response::Solution::gradient", "pair_vjp"),
-    ("gpu::panel::response::Solution::gradient", "panel_vjp"),
+    ("gpu::response::Solution::gradient", "pair_vjp"),
     (
         "gpu::reduced::linearised::GpuLinearised::gradient",
         "coulomb_vjp",

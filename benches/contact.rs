@@ -1,6 +1,8 @@
 //! Contact at random: gradients of rollouts through it against differences, and grasps with random forces.
 //!
-//! `cargo bench --bench contact [-- SECTION …] [--count N]`, sections `gradients` (500 episodes) and `grasps` (1,000); both if none is named.
+//! `cargo bench --bench contact [-- SECTION …] [--count N] [--integrator NAME] [--parts N]`, sections `gradients` (500 episodes), `grasps` with
+//! random forces and `thrown` ones without (1,000); all if none is named. Grasps are stepped by the scene's step over `--parts`, with the integrator that a scene with contact gets or that
+//! of `--integrator`.
 
 #[allow(dead_code)]
 mod common;
@@ -20,7 +22,7 @@ use hydrograd::dynamics::Integrator;
 use hydrograd::scene::Scene;
 use hydrograd::simulate::OpenLoop;
 use hydrograd::{Controls, Fidelity, Result, Rollout, Settings, Simulator};
-use nalgebra::DVector;
+use nalgebra::{DMatrix, DVector};
 use rayon::prelude::*;
 use std::collections::BTreeSet;
 use std::time::Instant;
@@ -32,12 +34,17 @@ fn main() {
         arguments.get(at + 1)?.parse::<usize>().ok()
     };
     let has = |name: &str| arguments.iter().any(|a| a == name);
-    let all = !has("gradients") && !has("grasps");
+    let all = !["gradients", "grasps", "thrown"].iter().any(|s| has(s));
     if all || has("gradients") {
         gradients(value("--count").unwrap_or(500));
     }
-    if all || has("grasps") {
-        grasps(value("--count").unwrap_or(1000));
+    let kinds = ["grasps", "thrown"].map(|kind| all || has(kind));
+    if kinds.contains(&true) {
+        let name = arguments.iter().position(|a| a == "--integrator");
+        let name = name.and_then(|at| arguments.get(at + 1));
+        let integrator = name.map(|name| name.parse().expect("the name of an integrator"));
+        let parts = value("--parts").unwrap_or(1);
+        grasps(value("--count").unwrap_or(1000), kinds, integrator, parts);
     }
 }
 
@@ -224,12 +231,20 @@ struct Closed {
     /// The most energy that it held beyond that of the start and what the forces had put in, and the most that it held, J.
     gain: f64,
     energy: f64,
+    /// The most of that gain before anything pressed.
+    free: f64,
 }
 
-fn closed(simulator: &Simulator, grasp: &RandomGrasp) -> Result<Closed> {
+/// Steps of the simulator are the grasp's over `parts`.
+fn closed(simulator: &Simulator, grasp: &RandomGrasp, parts: usize) -> Result<Closed> {
     let mut simulator = simulator.clone();
     simulator.set_start(grasp.start.clone(), grasp.velocity.clone())?;
-    let controls = Controls::from_matrix(&simulator, grasp.forces.clone())?;
+    let forces = DMatrix::from_fn(
+        grasp.forces.nrows(),
+        parts * grasp.forces.ncols(),
+        |c, n| grasp.forces[(c, n / parts)],
+    );
+    let controls = Controls::from_matrix(&simulator, forces)?;
     let rollout = simulator.rollout(&controls)?;
     let summary = rollout.summary();
     let limits = &simulator.system().limits;
@@ -241,11 +256,17 @@ fn closed(simulator: &Simulator, grasp: &RandomGrasp) -> Result<Closed> {
     let finite = |s: &hydrograd::simulate::Sample| s.q.iter().chain(&s.v).all(|x| x.is_finite());
     // Column and fingers slide: a force's work is that over the way of its joint, however the step was cut.
     let (mut work, mut gain, mut energy) = (0.0, 0.0_f64, samples[0].energy());
+    let (mut free, mut pressed) = (0.0, false);
     for (n, pair) in samples.windows(2).enumerate() {
-        let forces = grasp.forces.column(n);
+        let forces = controls.matrix().column(n);
         let way = |c: usize| pair[1].q[c] - pair[0].q[c];
         work += (0..forces.len()).map(|c| forces[c] * way(c)).sum::<f64>();
         gain = gain.max(pair[1].energy() - samples[0].energy() - work);
+        let acts = |c: &hydrograd::dynamics::ContactForce| c.force != [0.0; 3];
+        pressed |= rollout.contacts(n, 0.0)?.iter().any(acts) || past(&pair[1].q) > 0.0;
+        if !pressed {
+            free = gain;
+        }
         energy = energy.max(pair[1].energy());
     }
     Ok(Closed {
@@ -256,16 +277,23 @@ fn closed(simulator: &Simulator, grasp: &RandomGrasp) -> Result<Closed> {
         finite: samples.iter().all(finite),
         gain,
         energy,
+        free,
     })
 }
 
 /// Grasps of the example with random forces, and the same gripper thrown at the coin without any.
-fn grasps(count: usize) {
-    println!(
-        "\n### {count} grasps with random forces, and as many thrown, steps of 0.01 s, `reduced` with films\n"
-    );
+fn grasps(count: usize, kinds: [bool; 2], integrator: Option<Integrator>, parts: usize) {
     let scene = task::load().expect("an example scene");
-    let settings = Settings::default().fidelity(Fidelity::Reduced).films(true);
+    let time_step = scene.time_step / parts as f64;
+    let settings = Settings {
+        integrator,
+        ..Settings::default().fidelity(Fidelity::Reduced).films(true)
+    };
+    let settings = settings.time_step(time_step);
+    println!(
+        "\n### {count} grasps, steps of {time_step} s, {}, `reduced` with films\n",
+        <&str>::from(settings.resolve(&scene).integrator)
+    );
     let mut simulator = Simulator::new(&scene, settings).expect("an example scene");
     simulator.set_policy(Box::new(OpenLoop));
     let coin = [hold::COIN_Y, hold::COIN_Z, hold::COIN_TURN];
@@ -273,15 +301,16 @@ fn grasps(count: usize) {
     let draw = |_| RandomGrasp::draw(&mut random, simulator.start().0, coin, scene.steps);
     let forced: Vec<RandomGrasp> = (0..count).map(draw).collect();
     let thrown = forced.iter().map(|g| g.thrown(&mut random, coin)).collect();
-    for (name, drawn) in [("with random forces", forced), ("thrown", thrown)] {
-        ended(name, &simulator, &drawn);
+    let both = [("with random forces", forced), ("thrown", thrown)];
+    for ((name, drawn), _) in both.into_iter().zip(kinds).filter(|(_, asked)| *asked) {
+        ended(name, &simulator, &drawn, parts);
     }
 }
 
-fn ended(name: &str, simulator: &Simulator, drawn: &[RandomGrasp]) {
+fn ended(name: &str, simulator: &Simulator, drawn: &[RandomGrasp], parts: usize) {
     let begin = Instant::now();
     let of = |(k, grasp): (usize, &RandomGrasp)| {
-        let end = closed(simulator, grasp);
+        let end = closed(simulator, grasp, parts);
         // As it comes: a thousand take long.
         if let Err(error) = &end {
             println!("{name}, grasp {k} fails: {error}");
@@ -294,7 +323,7 @@ fn ended(name: &str, simulator: &Simulator, drawn: &[RandomGrasp]) {
     let nearest = held.iter().map(|c| c.nearest).fold(f64::INFINITY, f64::min);
     println!(
         "{name}: {} of {} fail; {} hold something that isn't finite; smallest gap {:.2} mm of {:.0}; at most {:.3} of a range past a limit; {} steps cut, into at most {} \
-         pieces; energy gain at most {:.1e} J, {:.1e} of the most that the grasp holds; {:.0} s",
+         pieces; energy gain at most {:.1e} J, {:.1e} of the most that the grasp holds, before anything presses {:.1e}; {:.0} s",
         ends.len() - held.len(),
         ends.len(),
         held.iter().filter(|c| !c.finite).count(),
@@ -309,6 +338,7 @@ fn ended(name: &str, simulator: &Simulator, drawn: &[RandomGrasp]) {
         most(|c| c.most as f64),
         most(|c| c.gain),
         most(|c| c.gain / c.energy.max(f64::MIN_POSITIVE)),
+        most(|c| c.free / c.energy.max(f64::MIN_POSITIVE)),
         begin.elapsed().as_secs_f64()
     );
 }

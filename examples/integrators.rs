@@ -9,8 +9,9 @@ use hydrograd::{Controls, Fidelity, Result, Rollout, Settings, Simulator};
 use std::path::Path;
 use std::time::Instant;
 
-const INTEGRATORS: [(Integrator, &str); 5] = [
+const INTEGRATORS: [(Integrator, &str); 6] = [
     (Integrator::MomentumEuler, "momentum Euler"),
+    (Integrator::EnergyEuler, "energy Euler"),
     (Integrator::Midpoint, "midpoint"),
     (Integrator::Rk2, "RK2"),
     (Integrator::Rk4, "RK4"),

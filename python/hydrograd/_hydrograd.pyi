@@ -21,7 +21,7 @@ _Part = Literal["tangential", "normal", "total"]
 _Backend = Literal["cpu", "gpu"]
 _Fidelity = Literal["isolated", "reduced", "auto", "full"]
 _Method = Literal["auto", "exact", "panel", "mfs-vertex", "mfs-face"]
-_Integrator = Literal["momentum-euler", "midpoint", "rk2", "rk4", "velocity-euler"]
+_Integrator = Literal["momentum-euler", "energy-euler", "midpoint", "rk2", "rk4", "velocity-euler"]
 
 class _Mesh(Protocol):
     @property

@@ -9,7 +9,7 @@ use std::sync::Arc;
 ///
 /// `dt` is the time step, s (default: the scene's). `fidelity` says how much of the coupling through the water is
 /// computed: "isolated", "reduced", "auto" (the default) or "full"; `method` how each body alone is solved: "auto", "exact", "panel",
-/// "mfs-vertex" or "mfs-face". `integrator`: "momentum-euler", "midpoint", "rk2", "rk4" or "velocity-euler". `tolerance` is the
+/// "mfs-vertex" or "mfs-face". `integrator`: "momentum-euler", "energy-euler", "midpoint", "rk2", "rk4" or "velocity-euler". `tolerance` is the
 /// relative residual at which iterative solves stop ("full"), `faces` the number of triangles of shapes by formula.
 /// `accuracy` (relative), `rank` (points a body), `resolved_gap` (m) and `films` (False: the water in narrower gaps isn't added as films) belong to
 /// "reduced" and "auto", and `cache` is a

@@ -42,7 +42,7 @@ pub(super) fn check_integrator(scene: &Scene, integrator: Integrator) -> Result<
     Err(Error::Unsupported {
         what: format!("{what} with the integrator {integrator:?}"),
         why: "contact, limits of joints and viscous water in gaps are solved in the velocity that a step moves by, and this one has none".into(),
-        instead: "use the integrator momentum-euler, midpoint or velocity-euler".into(),
+        instead: "use the integrator momentum-euler, energy-euler, midpoint or velocity-euler".into(),
     })
 }
 

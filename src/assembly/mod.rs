@@ -9,14 +9,16 @@ mod lubrication;
 use crate::adjoint::drag::Element;
 use crate::adjoint::lie::Vec3;
 use crate::coupling::Isolated;
-use crate::dynamics::{BodyData, Declarations, Drive, Parameters, Stepper, System, force};
+use crate::dynamics::{
+    BodyData, Declarations, Drive, Parameters, Stepper, System, force, free_motions,
+};
 use crate::geometry::TriMesh;
 use crate::multibody::Tree;
 use crate::policy::Policy;
 use crate::scene::{Body, Scene};
 use crate::water::{self, Clearance, Prepared, Surface, pose};
 use crate::{Error, Result};
-use nalgebra::DVector;
+use nalgebra::{DMatrix, DVector};
 use std::path::Path;
 use std::sync::{Arc, OnceLock};
 
@@ -157,6 +159,7 @@ pub(crate) fn assemble(
         coupling: Arc::new(Isolated::new(Vec::new())),
         contact: None,
         limits: Vec::new(),
+        symmetric: DMatrix::zeros(0, 0),
         tree,
     };
     let mut q = match scene.initial.q.is_empty() {
@@ -176,6 +179,7 @@ pub(crate) fn assemble(
         water.warnings.extend(told);
         system.contact = Some(made);
     }
+    system.symmetric = symmetric(scene, choices, &system);
     system.limits = limits::assemble(scene, dt, &system, &parameters, &q)?;
     let v = start_velocity(scene, choices, &system, &parameters, &q)?;
     Ok(Assembled {
@@ -187,6 +191,26 @@ pub(crate) fn assemble(
         water,
         surfaces: Default::default(),
     })
+}
+
+/// Rigid motions that bodies in the same water, or each tree of joints outside of it, are free to make together.
+fn symmetric(scene: &Scene, choices: &Choices, system: &System) -> DMatrix<f64> {
+    let links = system.tree.links();
+    let coupled = choices.water.fidelity.coupled() && scene.fluid.density > 0.0;
+    let in_water = |root: usize| {
+        system
+            .submerged()
+            .any(|(b, _)| system.tree.carries(root, b))
+    };
+    let roots = (0..links.len()).filter(|b| links[*b].parent.is_none());
+    let (wet, apart): (Vec<usize>, Vec<usize>) = roots.partition(|b| coupled && in_water(*b));
+    let groups: Vec<Vec<usize>> = std::iter::once(wet)
+        .chain(apart.into_iter().map(|b| vec![b]))
+        .collect();
+    let walls: Vec<Vec3> = (scene.walls.iter())
+        .map(|w| Vec3::from(w.normal).normalize())
+        .collect();
+    free_motions(&system.tree, &system.drives, &groups, &walls)
 }
 
 fn stepper<'a>(choices: &Choices, system: &'a System, parameters: &'a Parameters) -> Stepper<'a> {

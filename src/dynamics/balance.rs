@@ -133,6 +133,37 @@ impl Evaluation<'_> {
         }
     }
 
+    /// Generalised forces of the same at the velocity `v`, user coordinates.
+    pub(super) fn user_loads(&self, v: &DVector<f64>, control: &DVector<f64>) -> DVector<f64> {
+        let tree = &self.system.tree;
+        let twists = tree.twists(&self.kinematics, v);
+        let Loads { wrenches, joints } = self.loads(&twists, v, control);
+        tree.project(&self.kinematics.columns, wrenches) + joints
+    }
+
+    /// Transpose of [`Evaluation::user_loads`]: the gradient of their power on the velocity `z`.
+    pub(super) fn user_loads_vjp(
+        &self,
+        v: &DVector<f64>,
+        control: &DVector<f64>,
+        z: &DVector<f64>,
+    ) -> ForceCotangents {
+        let tree = &self.system.tree;
+        let mut out = ForceCotangents::zeros(self);
+        let fields = tree.fields(&self.kinematics, &self.q, v, Virtual::User(z));
+        let mut bar = Cotangents::zeros(self.system.len());
+        bar.virtual_twist = self.loads(&fields.twist, v, control).wrenches;
+        let power = Velocity {
+            twists: &fields.virtual_twist,
+            v: z,
+        };
+        self.loads_vjp(&fields.twist, v, control, &power, &mut bar, &mut out);
+        let (q_bar, v_bar) = tree.reverse(&self.kinematics, v, Virtual::User(z), &fields, bar);
+        out.q += q_bar;
+        out.v += v_bar;
+        out
+    }
+
     /// Potential energy of all forces that have one, J.
     pub fn potential_energy(&self) -> f64 {
         let forces = self.system.forces.iter();

@@ -51,18 +51,28 @@ impl System {
         parameters: &'a Parameters,
         q: &DVector<f64>,
     ) -> Result<Evaluation<'a>> {
+        let mut e = self.evaluate_apart(parameters, q)?;
+        e.contact_points = self.contact_points(parameters, &e.kinematics.poses)?;
+        Ok(e)
+    }
+
+    /// [`System::evaluate`] without looking for places where surfaces are near.
+    pub(super) fn evaluate_apart<'a>(
+        &'a self,
+        parameters: &'a Parameters,
+        q: &DVector<f64>,
+    ) -> Result<Evaluation<'a>> {
         let kinematics = self.kinematics(q)?;
         let basis = self.basis(&kinematics);
         let solved = match self.in_water(parameters) {
             true => Some(self.coupling.evaluate(&basis.poses, &basis.twists)?),
             false => None,
         };
-        let momenta = solved.as_ref().map(|s| s.momenta());
-        let momenta = self.spatial_momenta(&kinematics, momenta);
+        let momenta = self.spatial_momenta(&kinematics, solved.as_ref().map(|s| s.momenta()));
         let report = solved.map_or_else(CouplingReport::default, |s| s.report().clone());
-        let mut e = Evaluation::new(self, parameters, q, kinematics, momenta, report);
-        e.contact_points = self.contact_points(parameters, &e.kinematics.poses)?;
-        Ok(e)
+        Ok(Evaluation::new(
+            self, parameters, q, kinematics, momenta, report,
+        ))
     }
 
     /// Whether any water acts on any body.

@@ -13,6 +13,7 @@ mod limit;
 mod linearisation;
 mod momentum;
 mod parameters;
+mod symmetry;
 mod system;
 
 pub use balance::ForceCotangents;
@@ -26,4 +27,5 @@ pub use integrator::{
 pub use limit::JointLimit;
 pub use linearisation::Linearisation;
 pub use parameters::{Declarations, Declared, Entry, Owner, Parameter, Parameters, Range, Typical};
+pub(crate) use symmetry::free_motions;
 pub use system::{Drive, System};

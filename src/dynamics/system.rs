@@ -6,6 +6,7 @@ use crate::adjoint::lie::Vec3;
 use crate::coupling::Coupling;
 use crate::multibody::Tree;
 use crate::scene::Motion;
+use nalgebra::DMatrix;
 use std::sync::Arc;
 
 /// What moves a joint.
@@ -40,6 +41,9 @@ pub struct System {
     pub contact: Option<ContactModel>,
     /// Limits of joints.
     pub limits: Vec<JointLimit>,
+    /// Frame velocities of rigid motions of all bodies, or of all that feel one another through the water, that no joint and no wall of the water stands
+    /// against: nv × k. The momentum along each is theirs to keep.
+    pub symmetric: DMatrix<f64>,
 }
 
 impl System {

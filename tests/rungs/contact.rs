@@ -13,8 +13,9 @@ use nalgebra::DVector;
 use std::sync::OnceLock;
 
 /// Those that solve contact.
-const INTEGRATORS: [Integrator; 3] = [
+const INTEGRATORS: [Integrator; 4] = [
     Integrator::MomentumEuler,
+    Integrator::EnergyEuler,
     Integrator::Midpoint,
     Integrator::VelocityEuler,
 ];

@@ -61,6 +61,15 @@ const ON_DEVICE: &[(&str, &str)] = &[
 
 /// Helpers and declarations that are checked through a registered rung: (helper, rung).
 const THROUGH: &[(&str, &str)] = &[
+    // What the correction of the energy consists of.
+    (
+        "dynamics::integrator::energy::Closure::inertia_vjp",
+        "dynamics::integrator::energy::Closure::vjp",
+    ),
+    (
+        "dynamics::balance::Evaluation::user_loads_vjp",
+        "dynamics::integrator::energy::Closure::vjp",
+    ),
     // Kernels behind a body's rows, and the pieces of the coupled record.
     ("boundary::mfs::assemble::BodyBoundary::jvp", FULL_HVP),
     ("boundary::mfs::assemble::BodyBoundary::vjp", FULL_VJP),

@@ -19,8 +19,9 @@ use std::path::{Path, PathBuf};
 /// Acceleration of gravity, m/s².
 pub const GRAVITY: f64 = 9.81;
 
-pub const INTEGRATORS: [Integrator; 5] = [
+pub const INTEGRATORS: [Integrator; 6] = [
     Integrator::MomentumEuler,
+    Integrator::EnergyEuler,
     Integrator::Midpoint,
     Integrator::Rk2,
     Integrator::Rk4,
@@ -28,8 +29,9 @@ pub const INTEGRATORS: [Integrator; 5] = [
 ];
 
 /// Those that solve contact and joint limits.
-pub const CONTACT_INTEGRATORS: [Integrator; 3] = [
+pub const CONTACT_INTEGRATORS: [Integrator; 4] = [
     Integrator::MomentumEuler,
+    Integrator::EnergyEuler,
     Integrator::Midpoint,
     Integrator::VelocityEuler,
 ];

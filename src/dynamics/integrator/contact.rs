@@ -133,12 +133,19 @@ pub(super) fn apply(
     hat: DVector<f64>,
 ) -> Result<(State, Stages)> {
     let after = solve(start, &before)?;
-    let hat = match start.near.contact_acts(&before) {
-        true => hat + start.stepper.dt * start.near.contact_force(&after, Dual::Frame),
+    let velocities = ContactVelocities { before, after };
+    let next = reached(start, &velocities, hat);
+    Ok((next, Stages::Contact(velocities)))
+}
+
+/// The state at the end, once contact is solved.
+pub(super) fn reached(start: &Start, velocities: &ContactVelocities, hat: DVector<f64>) -> State {
+    let ContactVelocities { before, after } = velocities;
+    let hat = match start.near.contact_acts(before) {
+        true => hat + start.stepper.dt * start.near.contact_force(after, Dual::Frame),
         false => hat,
     };
-    let next = start.next_state(start.advance(&after), hat);
-    Ok((next, Stages::Contact(ContactVelocities { before, after })))
+    start.next_state(start.advance(after), hat)
 }
 
 /// What the transposes of [`solve`] and [`apply`] need.
@@ -198,16 +205,21 @@ impl<'s> Adjoint<'s> {
         Ok(before_bar)
     }
 
-    /// Transpose of [`apply`]: cotangents of the velocity and of the momenta before contact; the rest is added to `bar`.
+    /// Transpose of [`apply`]: cotangents of the velocity and of the momenta before contact, with that of the velocity after it from elsewhere; the rest is added
+    /// to `bar`.
     pub fn apply_vjp(
         &self,
         start: &Start,
         next_bar: &StateBar,
+        own: Option<&DVector<f64>>,
         bar: &mut StepBar,
     ) -> Result<(DVector<f64>, DVector<f64>)> {
         let (dt, after) = (start.stepper.dt, &self.velocities.after);
-        let (q_bar, after_bar) = start.advance_vjp(after, &next_bar.q);
+        let (q_bar, mut after_bar) = start.advance_vjp(after, &next_bar.q);
         bar.state.q += q_bar;
+        if let Some(own) = own {
+            after_bar += own;
+        }
         let hat_bar = start.next_momentum_bar(next_bar);
         if matches!(self.acting, Acting::No) {
             return Ok((after_bar, hat_bar));

@@ -12,11 +12,12 @@
 //! the converged stage, with the transpose of the same matrix.
 
 use super::contact;
+use super::energy::{self, Closure};
 use super::plan::{Halt, MOST};
 use super::split::{Split, share};
 use super::stages::{ContactVelocities, Stages, Transposed};
 use super::start::Start;
-use super::{State, StateBar, StepBar, Stepper};
+use super::{Integrator, State, StateBar, StepBar, Stepper};
 use crate::adjoint::lie::angular;
 use crate::dynamics::Linearisation;
 use crate::{Error, Result};
@@ -233,20 +234,38 @@ pub(super) fn step(start: &Start) -> std::result::Result<(State, Stages), Halt> 
     Ok(contact::apply(start, stage.v, y)?)
 }
 
+/// The same, whose energy is closed.
+pub(super) fn closed_step(start: &Start) -> std::result::Result<(State, Stages), Halt> {
+    let (next, stages) = step(start)?;
+    match &stages {
+        Stages::Contact(velocities) => Ok((energy::close(start, velocities, next)?, stages)),
+        Stages::RungeKutta(_) => Ok((next, stages)),
+    }
+}
+
 /// What the transpose of a step needs.
-pub(super) struct Adjoint<'s> {
+pub(super) struct Adjoint<'s, 'a> {
     contact: contact::Adjoint<'s>,
     /// p̂ + Δt f.
     reached: DVector<f64>,
     stage: AdjointStage,
+    closure: Option<Closure<'a>>,
 }
 
-impl<'s> Adjoint<'s> {
-    pub fn new(start: &Start, velocities: &'s ContactVelocities) -> Result<Self> {
+impl<'s, 'a> Adjoint<'s, 'a> {
+    pub fn new(start: &Start<'_, 'a>, velocities: &'s ContactVelocities) -> Result<Self> {
         let (s, e) = (start.stepper, start.e);
         let force = e.force(&velocities.before, &start.input.control)?;
         let reached = start.momentum() + s.dt * force;
+        let closure = match s.integrator {
+            Integrator::EnergyEuler => {
+                let next = contact::reached(start, velocities, reached.clone());
+                Closure::new(start, velocities, &next)?
+            }
+            _ => None,
+        };
         Ok(Self {
+            closure,
             stage: AdjointStage::new(start, e, &velocities.before, &reached, rule(s))?,
             contact: contact::Adjoint::new(start, velocities)?,
             reached,
@@ -254,12 +273,22 @@ impl<'s> Adjoint<'s> {
     }
 }
 
-impl<'a> Transposed<'a> for Adjoint<'_> {
+impl<'a> Transposed<'a> for Adjoint<'_, 'a> {
     fn vjp(&self, start: &Start<'_, 'a>, next_bar: &StateBar) -> Result<StepBar> {
         let (s, e, split) = (start.stepper, start.e, start.split);
         let before = &self.contact.velocities.before;
         let mut bar = StepBar::zeros(e);
-        let (mut v_bar, z) = self.contact.apply_vjp(start, next_bar, &mut bar)?;
+        let (mut v_bar, z) = match &self.closure {
+            None => self.contact.apply_vjp(start, next_bar, None, &mut bar)?,
+            Some(closure) => {
+                let velocities = self.contact.velocities;
+                let own = closure.vjp(start, velocities, next_bar, &mut bar)?;
+                let [own_before, own_after] = own.velocities;
+                let after = Some(&own_after);
+                let (v_bar, z) = self.contact.apply_vjp(start, &own.next, after, &mut bar)?;
+                (v_bar + own_before, z)
+            }
+        };
         // v̄ of p̂⁺ through f; only the transpose of ∂f/∂v is needed here.
         v_bar += s.dt * self.stage.rates.tr_mul(&z);
         let w = self.stage.solve(split, &v_bar)?;

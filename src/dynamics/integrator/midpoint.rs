@@ -114,7 +114,7 @@ impl<'a> Transposed<'a> for Adjoint<'_, 'a> {
         let before = &self.contact.velocities.before;
         let h = 0.5 * s.dt;
         let mut bar = StepBar::zeros(start.e);
-        let (v_bar_next, z) = self.contact.apply_vjp(start, next_bar, &mut bar)?;
+        let (v_bar_next, z) = self.contact.apply_vjp(start, next_bar, None, &mut bar)?;
         let v_bar_force = s.dt * self.stage.rates.tr_mul(&z);
         let fixed = v_bar_next + v_bar_force;
         // v̄ = fixed + (∂q_m/∂v)ᵀ q̄_m(w), w = J⁻ᵀ v̄.

@@ -3,6 +3,7 @@
 //! | integrator | conserved variable y | order | cost per step |
 //! |---|---|---|---|
 //! | [`Integrator::MomentumEuler`] | frame momentum p̂ | 1, symplectic | 1 evaluation |
+//! | [`Integrator::EnergyEuler`] | frame momentum p̂ | 1, keeps energy | 1, and one of values |
 //! | [`Integrator::Midpoint`] | frame momentum p̂ | 2, symmetric | about 4 to 8 |
 //! | [`Integrator::Rk2`] | frame momentum p̂ | 2 | 2 |
 //! | [`Integrator::Rk4`] | frame momentum p̂ | 4 | 4 |
@@ -15,6 +16,7 @@
 
 mod ahead;
 mod contact;
+mod energy;
 mod euler;
 mod midpoint;
 mod pieces;
@@ -41,6 +43,8 @@ choices! {
     pub enum Integrator {
         /// Symplectic Euler in momentum, implicit in p at fixed q: first order, one evaluation a step.
         MomentumEuler,
+        /// The same, brought to the kinetic energy that it started with and the work of the forces: what it is worth where gaps close.
+        EnergyEuler,
         /// Implicit midpoint in momentum: second order, symmetric, energy bounded.
         Midpoint,
         /// Explicit midpoint rule in momentum: second order, two evaluations.

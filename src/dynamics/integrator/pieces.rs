@@ -134,6 +134,7 @@ impl<'a> Stepper<'a> {
         };
         let (next, stages) = match self.integrator {
             Integrator::MomentumEuler => euler::step(&start)?,
+            Integrator::EnergyEuler => euler::closed_step(&start)?,
             Integrator::Midpoint => midpoint::step(&start)?,
             Integrator::Rk2 => runge_kutta::step(&start, &runge_kutta::SECOND)?,
             Integrator::Rk4 => runge_kutta::step(&start, &runge_kutta::FOURTH)?,

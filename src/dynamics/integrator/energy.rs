@@ -1,0 +1,322 @@
+//! The end of a step brought to the kinetic energy that it should have: that at its start, and the work of the forces.
+//!
+//! Between two configurations the inertia changes, and what a step of first order makes of that gains or loses energy. With the state (q⁺, p̂*) that the
+//! step ends in, v* = M(q⁺)⁻¹ p*, and the velocities v₀ at its start, v before and v_s after contact, the defect is
+//!
+//! ```text
+//! δ = ½ v*ᵀ M(q⁺) v* − ½ v₀ᵀ M(q) v₀ − ½ Δt F(q, v)ᵀ (v₀ + v*) − ½ Δt g(q, v_s)ᵀ (v + v_s)
+//! ```
+//!
+//! F being all forces but the water's inertia, g those of contact. It is zero where the inertia stays what it is, whatever acts. It is taken out of e = v* − B ω, the motion
+//! but for the rigid one B ω of all bodies together that nothing in the water or the joints stands against ([`System::symmetric`](crate::dynamics::System)), which holds
+//! the momentum along B:
+//!
+//! ```text
+//! p̂⁺ = p̂* + (s − 1) X⁻ᵀ M(q⁺) e      s² = 1 − c(φ δ / ½ eᵀ M(q⁺) e)      (Bᵀ M B) ω = Bᵀ p*
+//! ```
+//!
+//! c is the identity up to ¼ and bounded by ½. φ = 1 / (1 + r) fades out where contact takes speed, by r = |v_s − v|²_M / (10⁻⁴ |v|²_M): an impact loses more than this accounts for.
+//!
+//! This is a projection on the energy (Hairer, Lubich, Wanner, "Geometric Numerical Integration", IV.4) in the one direction that keeps momenta.
+
+use super::stages::ContactVelocities;
+use super::start::Start;
+use super::{State, StateBar, StepBar, readout};
+use crate::adjoint::solve::Definite;
+use crate::dynamics::{Dual, Evaluation, Linearisation};
+use crate::{Error, Result};
+use nalgebra::{DMatrix, DVector};
+
+/// Part of the kinetic energy that contact takes at which the correction is halved.
+const FADE: f64 = 1e-4;
+/// Part of the energy of e up to which a defect is taken as it is.
+const WHOLE: f64 = 0.25;
+
+/// c and its derivative.
+fn bounded(x: f64) -> (f64, f64) {
+    if x.abs() <= WHOLE {
+        return (x, 1.0);
+    }
+    let over = ((x.abs() - WHOLE) / WHOLE).tanh();
+    (x.signum() * (WHOLE + WHOLE * over), 1.0 - over * over)
+}
+
+/// Whether a step is one that can be closed: in still water, of joints that nothing drives, and with some motion beside that of all bodies together.
+fn closes(start: &Start) -> bool {
+    let (s, split) = (start.stepper, start.split);
+    let driven = split.is_driven.iter().zip(split.driven.iter());
+    !s.system.has_current()
+        && s.system.symmetric.ncols() < split.free.len()
+        && !split.moved.contains(&true)
+        && driven.clone().all(|(_, v)| *v == 0.0)
+        && s.split_at(start.state).is_driven == split.is_driven
+}
+
+/// All that the correction consists of.
+struct Parts {
+    /// Velocity at the end, before the correction.
+    v: DVector<f64>,
+    /// Motion of all bodies together, user's coordinates.
+    together: DVector<f64>,
+    /// Bᵀ M B.
+    common: Option<Definite>,
+    /// M(q⁺) e in frame coordinates.
+    direction: DVector<f64>,
+    /// ½ eᵀ M e.
+    room: f64,
+    /// F, user's coordinates.
+    loads: DVector<f64>,
+    /// g.
+    contact: Option<DVector<f64>>,
+    /// Kinetic energy of the velocity before contact.
+    before: f64,
+    /// r and φ.
+    taken: f64,
+    fade: f64,
+    defect: f64,
+}
+
+impl Parts {
+    /// Of the step with these velocities that ends at `end` with the frame momenta `hat`; none where there is nothing to take energy from.
+    fn new(
+        start: &Start,
+        velocities: &ContactVelocities,
+        end: &Evaluation,
+        hat: &DVector<f64>,
+    ) -> Result<Option<Self>> {
+        let (s, e, near, split) = (start.stepper, start.e, start.near, start.split);
+        let ContactVelocities { before, after } = velocities;
+        let v = readout::solve(end, split, hat)?;
+        let energy = |m: &DMatrix<f64>, v: &DVector<f64>| 0.5 * v.dot(&(m * v));
+        let basis = &s.system.symmetric;
+        let (mut together, mut common, mut direction) =
+            (DVector::zeros(v.len()), None, hat.clone());
+        if basis.ncols() > 0 {
+            let user = columns(basis, |b| end.frame_velocity_inverse(b));
+            let momenta = &end.mass_matrix * &user;
+            let matrix = user.tr_mul(&momenta);
+            let matrix = Definite::new(0.5 * (&matrix + matrix.transpose())).ok_or_else(|| {
+                Error::Solver {
+                    what: start.stage_name(),
+                    iterations: 0,
+                    residual: f64::INFINITY,
+                    tolerance: 0.0,
+                    remedy: "the mass matrix isn't positive definite: take a smaller time step"
+                        .into(),
+                }
+            })?;
+            let omega = matrix.solve(&basis.tr_mul(hat));
+            together = &user * &omega;
+            direction -= end.frame_dual(&(momenta * omega));
+            common = Some(matrix);
+        }
+        let room = energy(&end.mass_matrix, &(&v - &together));
+        let kinetic = energy(&end.mass_matrix, &v);
+        if !(room > 1e-9 * kinetic) {
+            return Ok(None);
+        }
+        let loads = e.user_loads(before, &start.input.control);
+        let mut defect =
+            kinetic - energy(&e.mass_matrix, start.v) - 0.5 * s.dt * loads.dot(&(start.v + &v));
+        let contact = near
+            .contact_acts(before)
+            .then(|| near.contact_force(after, Dual::User));
+        let speed = energy(&e.mass_matrix, before);
+        let mut taken = 0.0;
+        if let Some(g) = &contact {
+            defect -= 0.5 * s.dt * g.dot(&(before + after));
+            let lost = energy(&e.mass_matrix, &(after - before));
+            taken = if lost > 0.0 {
+                lost / (FADE * speed)
+            } else {
+                0.0
+            };
+        }
+        Ok(Some(Self {
+            v,
+            together,
+            common,
+            direction,
+            room,
+            loads,
+            contact,
+            before: speed,
+            taken,
+            fade: 1.0 / (1.0 + taken),
+            defect,
+        }))
+    }
+
+    /// s − 1.
+    fn change(&self) -> f64 {
+        let taken = bounded(self.fade * self.defect / self.room).0;
+        (1.0 - taken).sqrt() - 1.0
+    }
+}
+
+/// A map of columns.
+fn columns(m: &DMatrix<f64>, map: impl Fn(&DVector<f64>) -> DVector<f64>) -> DMatrix<f64> {
+    let mapped: Vec<DVector<f64>> = m.column_iter().map(|c| map(&c.into_owned())).collect();
+    DMatrix::from_columns(&mapped)
+}
+
+/// The state after the correction of a step that ends in `next`.
+pub(super) fn close(
+    start: &Start,
+    velocities: &ContactVelocities,
+    mut next: State,
+) -> Result<State> {
+    if !closes(start) {
+        return Ok(next);
+    }
+    let s = start.stepper;
+    let end = s.system.evaluate_apart(s.parameters, &next.q)?;
+    if let Some(parts) = Parts::new(start, velocities, &end, &next.y)? {
+        let mut change = parts.change() * &parts.direction;
+        start.split.forget_driven(&mut change);
+        next.y += change;
+    }
+    Ok(next)
+}
+
+/// What the transpose of [`close`] needs.
+pub(super) struct Closure<'a> {
+    end: Linearisation<'a>,
+    hat: DVector<f64>,
+    parts: Parts,
+}
+
+/// Cotangents of what a correction was made from, beside those that are added to a step's own.
+pub(super) struct ClosureBar {
+    /// Of the state before the correction.
+    pub next: StateBar,
+    /// Of the velocities before and after contact.
+    pub velocities: [DVector<f64>; 2],
+}
+
+impl<'a> Closure<'a> {
+    /// Of a step that ends in `next` before the correction; none where there is none.
+    pub fn new(
+        start: &Start<'_, 'a>,
+        velocities: &ContactVelocities,
+        next: &State,
+    ) -> Result<Option<Self>> {
+        if !closes(start) {
+            return Ok(None);
+        }
+        let s = start.stepper;
+        let end = s.system.linearise_apart(s.parameters, &next.q)?;
+        let parts = Parts::new(start, velocities, &end, &next.y)?;
+        Ok(parts.map(|parts| Self {
+            end,
+            hat: next.y.clone(),
+            parts,
+        }))
+    }
+
+    /// Transpose of [`close`]: cotangents of the start, the control and the parameters are added to `bar`.
+    pub fn vjp(
+        &self,
+        start: &Start<'_, 'a>,
+        velocities: &ContactVelocities,
+        next_bar: &StateBar,
+        bar: &mut StepBar,
+    ) -> Result<ClosureBar> {
+        let (s, e, near, parts) = (start.stepper, start.e, start.near, &self.parts);
+        let ContactVelocities { before, after } = velocities;
+        let end = &self.end;
+        let m = &e.mass_matrix;
+        let nv = before.len();
+        let mut out = ClosureBar {
+            next: next_bar.clone(),
+            velocities: [DVector::zeros(nv), DVector::zeros(nv)],
+        };
+        let hat_bar = start.next_momentum_bar(next_bar);
+        // Of s − 1, and of the direction.
+        let change = parts.change();
+        let change_bar = hat_bar.dot(&parts.direction);
+        let direction_bar = change * hat_bar;
+        let slope = bounded(parts.fade * parts.defect / parts.room).1;
+        let ratio_bar = -0.5 * slope / (1.0 + change) * change_bar;
+        let defect_bar = parts.fade * ratio_bar / parts.room;
+        let fade_bar = parts.defect * ratio_bar / parts.room;
+        let room_bar = -parts.fade * parts.defect * ratio_bar / (parts.room * parts.room);
+
+        // The direction p̂* − M B ω, and ½ eᵀ M e = ½ v*ᵀ M v* − ½ ωᵀ Bᵀ M B ω.
+        let mut at_end = StepBar::zeros(end);
+        let mut hat_star_bar = direction_bar.clone();
+        let mut across = end.frame_velocity_inverse(&direction_bar);
+        let v_hat = end.frame_velocity(&parts.v);
+        hat_star_bar += (defect_bar + room_bar) * &v_hat;
+        self.inertia_vjp(
+            -0.5 * (defect_bar + room_bar),
+            &parts.v,
+            &parts.v,
+            &mut at_end,
+        )?;
+        if let Some(common) = &parts.common {
+            let basis = &s.system.symmetric;
+            let moved = end.frame_dual(&(&end.mass_matrix * &across));
+            let eta = common.solve(&basis.tr_mul(&moved));
+            let carried = basis * eta;
+            hat_star_bar -= &carried;
+            across -= end.frame_velocity_inverse(&carried);
+            self.inertia_vjp(-1.0, &across, &parts.together, &mut at_end)?;
+            hat_star_bar -= room_bar * end.frame_velocity(&parts.together);
+            let together = &parts.together;
+            self.inertia_vjp(0.5 * room_bar, together, together, &mut at_end)?;
+        }
+        // The work of the forces.
+        let half = 0.5 * s.dt;
+        let v_bar = -defect_bar * half * &parts.loads;
+        readout::solve_vjp(end, start.split, &self.hat, &parts.v, &v_bar, &mut at_end)?;
+        hat_star_bar += &at_end.state.y;
+        let along = half * (start.v + &parts.v);
+        let work = e.user_loads_vjp(before, &start.input.control, &along);
+        bar.add(-defect_bar, &work);
+        out.velocities[0] -= defect_bar * &work.v;
+        bar.v -= defect_bar * half * &parts.loads;
+        // The energy at the start.
+        bar.v -= defect_bar * (m * start.v);
+        bar.add(-0.5 * defect_bar, &e.mass_vjp(start.v, start.v)?);
+        if let Some(g) = &parts.contact {
+            let along = half * (before + after);
+            let work = near.contact_force_vjp(after, &along, Dual::User);
+            bar.add(-defect_bar, &work);
+            out.velocities[0] -= defect_bar * half * g;
+            out.velocities[1] -= defect_bar * (half * g + &work.v);
+            let taken_bar = -parts.fade * parts.fade * fade_bar;
+            if parts.taken > 0.0 {
+                let lost = after - before;
+                let lost_bar = taken_bar / (FADE * parts.before);
+                let before_bar = -parts.taken * taken_bar / parts.before;
+                let moved = lost_bar * (m * &lost);
+                out.velocities[0] += before_bar * (m * before) - &moved;
+                out.velocities[1] += moved;
+                bar.add(0.5 * lost_bar, &e.mass_vjp(&lost, &lost)?);
+                bar.add(0.5 * before_bar, &e.mass_vjp(before, before)?);
+            }
+        }
+        out.next.y += hat_star_bar;
+        out.next.q += at_end.state.q;
+        bar.parameters.add(&at_end.parameters);
+        Ok(out)
+    }
+
+    /// Adds the cotangents of `scale` x̂ᵀ M̂ ŷ at the end, M̂ = X⁻ᵀ M X⁻¹ being the inertia of frame velocities, x̂ and ŷ held; x and y are the user's.
+    fn inertia_vjp(
+        &self,
+        scale: f64,
+        x: &DVector<f64>,
+        y: &DVector<f64>,
+        out: &mut StepBar,
+    ) -> Result<()> {
+        let end = &self.end;
+        out.add(scale, &end.mass_vjp(y, x)?);
+        for (a, b) in [(x, y), (y, x)] {
+            let momentum = end.frame_dual(&(&end.mass_matrix * b));
+            out.state.q -= scale * end.frame_velocity_vjp(a, &momentum);
+        }
+        Ok(())
+    }
+}

@@ -112,7 +112,7 @@ impl Parts {
         }
         let room = energy(&end.mass_matrix, &(&v - &together));
         let kinetic = energy(&end.mass_matrix, &v);
-        if !(room > 1e-9 * kinetic) {
+        if room.is_nan() || room <= 1e-9 * kinetic {
             return Ok(None);
         }
         let loads = e.user_loads(before, &start.input.control);

@@ -178,6 +178,37 @@ fn a_tilted_prism_over_a_plate() {
     assert!(with < 0.1 && with < without, "{with} {without}");
 }
 
+/// A coin that comes near something larger: its mass has no jump, neither where a film sets in, which is where the coin's rim lets it, nor further on.
+#[test]
+fn nothing_jumps_as_a_film_sets_in() {
+    let mut scene = Scene::new(unit_water());
+    let plate = Shape::cuboid([1.6, 1.6, 0.8]).faces(320);
+    let coin = Shape::ellipsoid([0.2, 0.2, 0.05]).faces(320);
+    scene.add(Body::new(plate).density(1.0).joint(Joint::Fixed));
+    let up = Joint::Prismatic {
+        axis: [0.0, 0.0, 1.0],
+    };
+    let coin = Body::new(coin).density(1.0).joint(up);
+    scene.add(coin.at([0.3, 0.2, 0.6]).rotated([0.3, 0.0, 0.0]));
+    let mut simulator = Simulator::new(&scene, films()).unwrap();
+    const STEPS: usize = 400;
+    let mut masses = Vec::with_capacity(STEPS);
+    for k in 0..STEPS {
+        let q = 0.25 * (k as f64 / STEPS as f64) - 0.06;
+        let at = DVector::from_element(1, q);
+        simulator.set_start(at, DVector::zeros(1)).unwrap();
+        let m = simulator.added_mass().unwrap().matrix;
+        masses.push([m[(8, 8)], m[(2, 2)], m[(2, 8)]]);
+    }
+    for (c, name) in ["coin", "plate", "between"].iter().enumerate() {
+        let third = |w: &[[f64; 3]]| (w[3][c] - 3.0 * (w[2][c] - w[1][c]) - w[0][c]).abs();
+        let worst = masses.windows(4).map(third).fold(0.0, f64::max);
+        let most = masses.iter().fold(0.0_f64, |most, m| most.max(m[c].abs()));
+        println!("{name}: {:.1e} of {most:.3e}", worst / most);
+        assert!(worst < 1e-5 * most, "{name}: {worst} of {most}");
+    }
+}
+
 /// Where it has no effect, and where the gap is too narrow for the faces, that is said.
 #[test]
 fn what_films_do_not_do_is_said() {

@@ -88,12 +88,17 @@ impl Film {
             Side::Wall(_) => RIM_TO_WALL,
         };
         let rim = [start, 2.0 * start].map(|part| part * surface.size);
+        // Where nothing of it is film bodies aren't held apart, or they would be by a jump as the first of it is.
+        let narrower = (rim[1] / width.reach).min(1.0);
         Self {
             body,
             other,
             surface,
             opposite,
-            width,
+            width: Width {
+                floor: narrower * width.floor,
+                reach: narrower * width.reach,
+            },
             rim,
             pattern: Arc::default(),
         }

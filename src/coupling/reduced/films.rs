@@ -9,8 +9,8 @@ use nalgebra::DMatrix;
 use rayon::prelude::*;
 use std::sync::Arc;
 
-/// The gap below which compressed sources are held apart, in what they resolve, times the area of a body over that of the ball of equal volume: flat bodies
-/// have less room for sources. Where regions resolve more it is what they resolve.
+/// The gap below which compressed sources are held apart, in the least that they resolve, times the area of a body over that of the ball of equal volume: flat bodies
+/// have less room for sources.
 const REACH: f64 = 1.4;
 /// Power of the compression's tolerance by which gaps narrow in which its sources are right.
 const FINER: f64 = 0.6;
@@ -57,11 +57,7 @@ impl Reduced {
             let fit = &self.bodies[b].parts().fit;
             // Sources of a smaller tolerance are right in narrower gaps, and more than films are.
             let finer = (tolerances[b] / compress::CompressSettings::default().tolerance).min(1.0);
-            let reach = match fit.regions.is_empty() {
-                true => REACH * sides[b].0.flatness * fit.resolved_gap,
-                false => fit.finest(),
-            };
-            reach * finer.powf(FINER)
+            REACH * sides[b].0.flatness * fit.finest() * finer.powf(FINER)
         };
         let film = |body: usize, other, opposite: &Arc<Opposite>, reach: f64| {
             let floor = FLOOR * reach;

@@ -200,8 +200,12 @@ def test_steps_make_a_rollout_with_a_controller_that_remembers(on):
         assert np.allclose(on.numbers(state.q), on.numbers(right.q)[n + 1], rtol=1e-12, atol=1e-15)
         assert np.allclose(on.numbers(state.v), on.numbers(right.v)[n + 1], rtol=1e-12, atol=1e-15)
     assert state.step == 16 and held[0] == [False, False] and held[-1] == [True, False]
-    # Released from another step, the motion of time is another.
-    late = on.bridge.step(sim, state._replace(step=state.step + 20), controls[0])
+    # Released from another step, the motion of time is another: where it has its joint is left to it.
+    later = state._replace(step=state.step + 20)
+    with pytest.raises(hg.InputError, match="other.position: got .* its motion has"):
+        on.bridge.step(sim, later, controls[0])
+    q, v = (on.numbers(x) * [1.0, 0.0] for x in (state.q, state.v))
+    late = on.bridge.step(sim, later._replace(q=q, v=v), controls[0])
     assert np.abs(on.numbers(late.q) - on.numbers(on.bridge.step(sim, state, controls[0]).q)).max() > 1e-3
 
 

@@ -1,15 +1,14 @@
-//! Cholesky factors of sparse matrices.
-//!
-//! Several matrices with entries at the same places are factored together: what is looked up is looked up once. The factor L Lᵀ is made column by column, each from the
-//! columns before it that reach down to it.
-//!
-//! # References
-//! T. A. Davis, "Direct Methods for Sparse Linear Systems", SIAM 2006, chapter 4.
+//! Cholesky factors of sparse matrices, by faer, in an order of elimination that is given.
 
 use super::CALLS;
 use faer::dyn_stack::{MemBuffer, MemStack};
+use faer::perm::Perm;
 use faer::sparse::linalg::amd;
-use faer::sparse::{Pair, SymbolicSparseColMat};
+use faer::sparse::linalg::cholesky::{
+    LltRef, SymbolicCholesky, SymmetricOrdering, factorize_symbolic_cholesky,
+};
+use faer::sparse::{Argsort, Pair, SparseColMat, SymbolicSparseColMat};
+use faer::{Conj, MatMut, Par, Side};
 use std::sync::Arc;
 
 /// An order of a symmetric matrix' rows in which its factor fills little, by approximate minimum degree; `None` where an entry lies outside.
@@ -33,84 +32,34 @@ pub fn elimination_order(size: usize, entries: &[(usize, usize)]) -> Option<Vec<
 
 /// Where a sparse symmetric matrix has entries, and what its factor fills: made once for matrices that differ in their values.
 pub struct SparsePattern {
-    /// When each row is eliminated.
-    place: Vec<usize>,
-    /// Where the columns of the factor begin and end below the diagonal.
-    starts: Vec<usize>,
-    /// The rows there, column after column.
-    rows: Vec<u32>,
-    /// Of each column, where the columns before it have its row, and where these end.
-    reach: Vec<Vec<(u32, u32)>>,
-    /// Where each entry goes: the diagonal, and then what is below it.
-    slots: Vec<usize>,
+    matrix: SymbolicSparseColMat<usize>,
+    sorted: Argsort<usize>,
+    factor: SymbolicCholesky<usize>,
 }
 
 impl SparsePattern {
-    /// Of rows that are eliminated in this order. An entry (i, j) stands for (j, i) as well, and equal ones add up. `None` where one lies outside or `order` isn't
-    /// one of the rows.
+    /// Of rows that are eliminated in this order, and the entries at these rows and columns, of which those above the diagonal aren't read and equal ones add up. `None`
+    /// where one lies outside or `order` isn't one of the rows.
     pub fn new(order: &[usize], entries: &[(usize, usize)]) -> Option<Self> {
         let size = order.len();
-        let mut place = vec![usize::MAX; size];
+        let mut inverse = vec![usize::MAX; size];
         for (at, row) in order.iter().enumerate() {
-            *place.get_mut(*row)? = at;
+            *inverse.get_mut(*row)? = at;
         }
-        if place.contains(&usize::MAX) {
+        if inverse.contains(&usize::MAX) {
             return None;
         }
-        let mut below = vec![Vec::new(); size];
-        let mut placed = Vec::with_capacity(entries.len());
-        for &(i, j) in entries {
-            let (i, j) = (*place.get(i)?, *place.get(j)?);
-            let (row, column) = (i.max(j), i.min(j));
-            placed.push((row, column));
-            if row != column {
-                below[column].push(row as u32);
-            }
-        }
-        let (mut starts, mut rows) = (vec![0], Vec::<u32>::new());
-        let mut children = vec![Vec::new(); size];
-        let mut seen = vec![usize::MAX; size];
-        for column in 0..size {
-            let from = rows.len();
-            seen[column] = column;
-            let mut add = |row: u32, rows: &mut Vec<u32>| {
-                if std::mem::replace(&mut seen[row as usize], column) != column {
-                    rows.push(row);
-                }
-            };
-            below[column].iter().for_each(|row| add(*row, &mut rows));
-            for child in std::mem::take(&mut children[column]) {
-                for at in starts[child]..starts[child + 1] {
-                    add(rows[at], &mut rows);
-                }
-            }
-            rows[from..].sort_unstable();
-            if let Some(parent) = rows.get(from) {
-                children[*parent as usize].push(column);
-            }
-            starts.push(rows.len());
-        }
-        let mut reach = vec![Vec::new(); size];
-        for ends in starts.windows(2) {
-            for at in ends[0]..ends[1] {
-                reach[rows[at] as usize].push((at as u32, ends[1] as u32));
-            }
-        }
-        let slot = |(row, column): (usize, usize)| {
-            if row == column {
-                return Some(row);
-            }
-            let (from, to) = (starts[column], starts[column + 1]);
-            let at = rows[from..to].binary_search(&(row as u32)).ok()?;
-            Some(size + from + at)
-        };
-        let slots = placed.into_iter().map(slot).collect::<Option<_>>()?;
+        let order = Perm::new_checked(order.into(), inverse.into(), size);
+        let entries: Vec<_> = entries.iter().map(|&(i, j)| Pair::new(i, j)).collect();
+        let (matrix, sorted) =
+            SymbolicSparseColMat::try_new_from_indices(size, size, &entries).ok()?;
+        let order = SymmetricOrdering::Custom(order.as_ref());
+        let factor =
+            factorize_symbolic_cholesky(matrix.as_ref(), Side::Lower, order, Default::default());
         Some(Self {
-            place,
-            starts,
-            rows,
-            reach,
-            slots,
+            matrix,
+            sorted,
+            factor: factor.ok()?,
         })
     }
 
@@ -120,89 +69,56 @@ impl SparsePattern {
         values: &[[f64; N]],
     ) -> Option<SparseCholesky<N>> {
         CALLS.add(1);
-        let size = self.place.len();
-        let mut all = vec![[0.0; N]; size + self.rows.len()];
-        for (slot, values) in self.slots.iter().zip(values) {
-            (0..N).for_each(|k| all[*slot][k] += values[k]);
+        let factor = &self.factor;
+        let needed = factor.factorize_numeric_llt_scratch::<f64>(Par::Seq, Default::default());
+        let mut buffer = MemBuffer::new(needed);
+        let mut factors = std::array::from_fn(|_| vec![0.0; factor.len_val()]);
+        for (k, out) in factors.iter_mut().enumerate() {
+            let values: Vec<f64> = values.iter().map(|v| v[k]).collect();
+            let matrix = SparseColMat::new_from_argsort(self.matrix.clone(), &self.sorted, &values);
+            factor
+                .factorize_numeric_llt(
+                    out,
+                    matrix.ok()?.as_ref(),
+                    Side::Lower,
+                    Default::default(),
+                    Par::Seq,
+                    MemStack::new(&mut buffer),
+                    Default::default(),
+                )
+                .ok()?;
         }
-        let below = all.split_off(size);
-        let mut out = SparseCholesky {
+        Some(SparseCholesky {
             pattern: self.clone(),
-            inverse: all,
-            below,
-        };
-        // Where the column has each row.
-        let mut at = vec![0; size];
-        for column in 0..size {
-            let (from, to) = (self.starts[column], self.starts[column + 1]);
-            for (k, row) in self.rows[from..to].iter().enumerate() {
-                at[*row as usize] = k;
-            }
-            let (done, open) = out.below.split_at_mut(from);
-            let open = &mut open[..to - from];
-            let mut diagonal = out.inverse[column];
-            for &(first, end) in &self.reach[column] {
-                let (first, end) = (first as usize, end as usize);
-                let factor = done[first];
-                (0..N).for_each(|k| diagonal[k] -= factor[k] * factor[k]);
-                let further = &done[first + 1..end];
-                for (row, value) in self.rows[first + 1..end].iter().zip(further) {
-                    let target = &mut open[at[*row as usize]];
-                    (0..N).for_each(|k| target[k] -= factor[k] * value[k]);
-                }
-            }
-            if !diagonal.iter().all(|x| *x > 0.0 && x.is_finite()) {
-                return None;
-            }
-            let inverse = diagonal.map(|x| x.sqrt().recip());
-            out.inverse[column] = inverse;
-            for value in open {
-                (0..N).for_each(|k| value[k] *= inverse[k]);
-            }
-        }
-        Some(out)
+            factors,
+        })
     }
 }
 
 /// Factors of sparse symmetric positive definite matrices.
 pub struct SparseCholesky<const N: usize> {
     pattern: Arc<SparsePattern>,
-    /// One over what is on the diagonal.
-    inverse: Vec<[f64; N]>,
-    below: Vec<[f64; N]>,
+    factors: [Vec<f64>; N],
 }
 
 impl<const N: usize> SparseCholesky<N> {
     /// `x ← A⁻¹ x` of each matrix, a value a row.
     pub fn solve(&self, x: &mut [[f64; N]]) {
         CALLS.add(1);
-        let p = &*self.pattern;
-        let mut y = vec![[0.0; N]; x.len()];
-        for (value, place) in x.iter().zip(&p.place) {
-            y[*place] = *value;
-        }
-        let column = |column: usize| {
-            let range = p.starts[column]..p.starts[column + 1];
-            p.rows[range.clone()].iter().zip(&self.below[range])
-        };
-        for (at, inverse) in self.inverse.iter().enumerate() {
-            let found: [f64; N] = std::array::from_fn(|k| y[at][k] * inverse[k]);
-            y[at] = found;
-            for (row, value) in column(at) {
-                let target = &mut y[*row as usize];
-                (0..N).for_each(|k| target[k] -= value[k] * found[k]);
-            }
-        }
-        for (at, inverse) in self.inverse.iter().enumerate().rev() {
-            let mut left = y[at];
-            for (row, value) in column(at) {
-                let known = y[*row as usize];
-                (0..N).for_each(|k| left[k] -= value[k] * known[k]);
-            }
-            y[at] = std::array::from_fn(|k| left[k] * inverse[k]);
-        }
-        for (value, place) in x.iter_mut().zip(&p.place) {
-            *value = y[*place];
+        let symbolic = &self.pattern.factor;
+        let mut buffer = MemBuffer::new(symbolic.solve_in_place_scratch::<f64>(1, Par::Seq));
+        let mut column = vec![0.0; x.len()];
+        for (k, values) in self.factors.iter().enumerate() {
+            (column.iter_mut().zip(&*x)).for_each(|(to, from)| *to = from[k]);
+            let right = MatMut::from_column_major_slice_mut(&mut column, x.len(), 1);
+            let stack = MemStack::new(&mut buffer);
+            LltRef::new(symbolic, values).solve_in_place_with_conj(
+                Conj::No,
+                right,
+                Par::Seq,
+                stack,
+            );
+            (x.iter_mut().zip(&column)).for_each(|(to, from)| to[k] = *from);
         }
     }
 }
@@ -259,7 +175,7 @@ mod tests {
         let order = elimination_order(size, &entries).expect("inside");
         let plain: Vec<usize> = (0..size).collect();
         let patterns = [&order, &plain].map(|o| SparsePattern::new(o, &entries).expect("inside"));
-        assert!(patterns[0].rows.len() < patterns[1].rows.len());
+        assert!(patterns[0].factor.len_val() < patterns[1].factor.len_val());
         let right = DVector::from_fn(size, |_, _| random.number());
         for pattern in patterns {
             let factor = Arc::new(pattern).factor(&values).expect("definite");

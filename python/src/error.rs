@@ -165,24 +165,30 @@ pub fn input(
     exception(hydrograd::Error::input(place, value, expected))
 }
 
-/// A count that was given: what can't be one is an `InputError`.
-pub fn count(given: &Bound<'_, PyAny>) -> PyResult<usize> {
-    given.extract::<usize>().map_err(|_| {
-        let shown = given.repr().map(|r| r.to_string()).unwrap_or_default();
-        input(
-            "a number of things",
-            shown,
-            "must be a whole number that isn't negative",
-        )
-    })
-}
+/// Counts that are given by keyword: what can't be one is an `InputError` that names it.
+pub mod counts {
+    use super::input;
+    use pyo3::prelude::*;
 
-/// The same, or None.
-pub fn count_or_none(given: &Bound<'_, PyAny>) -> PyResult<Option<usize>> {
-    match given.is_none() {
-        true => Ok(None),
-        false => count(given).map(Some),
+    fn count(keyword: &str, given: &Bound<'_, PyAny>) -> PyResult<usize> {
+        given.extract::<usize>().map_err(|_| {
+            let shown = given.repr().map(|r| r.to_string()).unwrap_or_default();
+            input(keyword, shown, "must be a whole number that isn't negative")
+        })
     }
+
+    macro_rules! keywords {
+        (required: $($required:ident),*; optional: $($optional:ident),*) => {
+            $(pub fn $required(given: &Bound<'_, PyAny>) -> PyResult<usize> {
+                count(stringify!($required), given)
+            })*
+            $(pub fn $optional(given: &Bound<'_, PyAny>) -> PyResult<Option<usize>> {
+                let some = (!given.is_none()).then(|| count(stringify!($optional), given));
+                some.transpose()
+            })*
+        };
+    }
+    keywords!(required: step, mode; optional: faces, rank, steps);
 }
 
 /// An `InternalError`: what a panic said.

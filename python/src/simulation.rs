@@ -1,7 +1,7 @@
 //! What simulators do: the methods of their class.
 
 use crate::array::{self, Dim, array};
-use crate::error::{OrRaise, batch, count, count_or_none, exception, input, own};
+use crate::error::{OrRaise, batch, counts, exception, input, own};
 use crate::gradient::by_name;
 use crate::interrupt::{long, short};
 use crate::mesh::{Triangles, triangles};
@@ -133,9 +133,9 @@ impl Simulator {
         method: Option<&str>,
         tolerance: Option<f64>,
         integrator: Option<&str>,
-        #[pyo3(from_py_with = count_or_none)] faces: Option<usize>,
+        #[pyo3(from_py_with = counts::faces)] faces: Option<usize>,
         accuracy: Option<f64>,
-        #[pyo3(from_py_with = count_or_none)] rank: Option<usize>,
+        #[pyo3(from_py_with = counts::rank)] rank: Option<usize>,
         resolved_gap: Option<f64>,
         films: Option<bool>,
         cache: Option<PathBuf>,
@@ -166,7 +166,7 @@ impl Simulator {
     fn rollout(
         slf: &Bound<'_, Self>,
         controls: Option<&Bound<'_, PyAny>>,
-        #[pyo3(from_py_with = count_or_none)] steps: Option<usize>,
+        #[pyo3(from_py_with = counts::steps)] steps: Option<usize>,
         state: Option<&Bound<'_, State>>,
         q: Option<&Bound<'_, PyAny>>,
         v: Option<&Bound<'_, PyAny>>,
@@ -257,8 +257,8 @@ impl Simulator {
         slf: &Bound<'_, Self>,
         q: Option<&Bound<'_, PyAny>>,
         v: Option<&Bound<'_, PyAny>>,
-        #[pyo3(from_py_with = count)] step: usize,
-        #[pyo3(from_py_with = count)] mode: usize,
+        #[pyo3(from_py_with = counts::step)] step: usize,
+        #[pyo3(from_py_with = counts::mode)] mode: usize,
         held: Option<Vec<bool>>,
     ) -> PyResult<State> {
         let me = slf.get();

@@ -215,13 +215,13 @@ def test_other_threads_run_meanwhile(sim):
 
 
 def test_counts_that_are_none(sim):
-    for call in (
-        lambda: sim.rollout(steps=-1),
-        lambda: sim.rollout(steps=2.5),
-        lambda: sim.rollout(steps=10**30),
-        lambda: sim.state(step=-1),
-        lambda: hg.Simulator(sim.scene, faces=-1),
-        lambda: hg.Simulator(sim.scene, rank=-3),
+    for name, call in (
+        ("steps", lambda: sim.rollout(steps=-1)),
+        ("steps", lambda: sim.rollout(steps=2.5)),
+        ("steps", lambda: sim.rollout(steps=10**30)),
+        ("step", lambda: sim.state(step=-1)),
+        ("faces", lambda: hg.Simulator(sim.scene, faces=-1)),
+        ("rank", lambda: hg.Simulator(sim.scene, rank=-3)),
     ):
-        with pytest.raises(hg.InputError, match="whole number that isn't negative"):
+        with pytest.raises(hg.InputError, match=f"^{name}: .*whole number that isn't negative"):
             call()

@@ -215,6 +215,21 @@ fn spheres(gap: f64, wall: bool) -> [f64; 2] {
     of_two([of(2.0 + gap, 1.0), of(2.0 + gap, -1.0)])
 }
 
+/// The first of two spheres of these radii while the other rests, by the images of its dipole in the one and the other in turn.
+fn unequal([first, other]: [f64; 2], gap: f64) -> [f64; 2] {
+    along(gap, |h| {
+        let d = first + other + h;
+        let (mut at, mut strength, mut sum) = (0.0, 1.0_f64, 0.0);
+        while strength.abs() > 1e-14 {
+            let there = d - other * other / (d - at);
+            strength *= (first * other / ((d - at) * there)).powi(3);
+            at = first * first / there;
+            sum += strength;
+        }
+        2.0 / 3.0 * PI * first.powi(3) * (1.0 + 3.0 * sum)
+    })
+}
+
 /// ∮ (∂u/∂n)² over π/2, and ∫ u, of a square of side 1 with −Δu = 1 in it and 0 around it.
 const SQUARE_RIM: f64 = 0.178_99;
 const SQUARE: f64 = 0.035_144_3;
@@ -273,6 +288,12 @@ pub fn of(case: &str, gap: f64) -> Option<Reference> {
         return Some(Reference {
             values: spheres(gap, case == "sphere-wall"),
             unsure: [1e-9; 2],
+        });
+    }
+    if case == "small sphere over a large one" {
+        return Some(Reference {
+            values: unequal([0.4, 1.0], 0.4 * gap),
+            unsure: [1e-9, 2.0 * STEP * STEP],
         });
     }
     let at = super::GAPS.iter().position(|g| *g == gap)?;

@@ -89,12 +89,12 @@ const ADDED_AT: f64 = 7.0;
 const OWN: f64 = 0.005;
 /// Most that an estimate says.
 const MOST: f64 = 10.0;
-/// Of the force through a film between round and between flat surfaces, and how it grows as faces lie further inside.
+/// Of the force through a film between round and between flat surfaces.
 const FILM: [f64; 2] = [0.05, 0.04];
-const FILM_FACETS: f64 = 0.06;
-/// Of panels, how it grows so, and between flat surfaces what they add below a tenth of an edge.
+/// Of panels, and how it grows with both as faces lie further inside.
 const PANELS: f64 = 0.01;
 const FACETS: f64 = 0.13;
+/// What panels between flat surfaces add below a tenth of an edge.
 const THIN: f64 = 0.08;
 /// Parts of the force's error in that of the added mass: of round surfaces, and what flat ones add to it in a film.
 const MASS: f64 = 0.1;
@@ -135,7 +135,7 @@ impl Across {
     fn by_film(&self) -> GapError {
         let flat = self.flatness();
         let base = (1.0 - flat) * FILM[0] + flat * FILM[1];
-        let force = base + FILM_FACETS * (4.0 * self.inside(self.film_edge)).ln_1p();
+        let force = base + FACETS * (4.0 * self.inside(self.film_edge)).ln_1p();
         GapError {
             carried: Carried::Film,
             added_mass: OWN + self.tolerance + (MASS + MASS_FLAT * flat) * force,

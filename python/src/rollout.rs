@@ -383,7 +383,10 @@ impl Rollout {
         out.set_item("steps", s.steps)?;
         out.set_item("energy_initial", s.energy_initial)?;
         out.set_item("energy_final", s.energy_final)?;
+        out.set_item("energy_gain", s.energy_gain)?;
+        out.set_item("energy_loss", s.energy_loss)?;
         out.set_item("momentum_drift", s.momentum_drift)?;
+        out.set_item("momenta_kept", s.momenta_kept)?;
         out.set_item("iterations", s.iterations)?;
         out.set_item("asymmetry", s.asymmetry)?;
         out.set_item("min_gap", s.min_gap)?;

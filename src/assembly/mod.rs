@@ -5,12 +5,13 @@ mod contact;
 mod controller;
 mod limits;
 mod lubrication;
+mod symmetry;
 
 use crate::adjoint::drag::Element;
 use crate::adjoint::lie::Vec3;
 use crate::coupling::Isolated;
 use crate::dynamics::{
-    BodyData, Declarations, Drive, Parameters, Stepper, System, force, free_motions,
+    BodyData, Declarations, Drive, FreeMotions, Parameters, Stepper, System, force,
 };
 use crate::geometry::TriMesh;
 use crate::multibody::Tree;
@@ -34,6 +35,8 @@ pub(crate) struct Assembled {
     pub q: DVector<f64>,
     pub v: DVector<f64>,
     pub water: Prepared,
+    /// Rigid motions along which momentum is kept, at the parameters.
+    pub kept: FreeMotions,
     /// The bodies' surfaces, once someone asked for them.
     pub surfaces: Arc<OnceLock<Vec<Option<Surface>>>>,
 }
@@ -47,6 +50,17 @@ impl Assembled {
         let made = water::surfaces(scene, &choices.water)?;
         Ok(self.surfaces.get_or_init(|| made))
     }
+
+    /// Other parameters, of the same table.
+    pub fn set_parameters(&mut self, scene: &Scene, choices: &Choices, parameters: Parameters) {
+        self.kept = symmetry::kept(scene, coupled(scene, choices), &self.system, &parameters);
+        self.parameters = parameters;
+    }
+}
+
+/// Whether bodies in the water feel one another.
+fn coupled(scene: &Scene, choices: &Choices) -> bool {
+    choices.water.fidelity.coupled() && scene.fluid.density > 0.0
 }
 
 /// Mass, centre of mass and inertia of a body.
@@ -179,8 +193,10 @@ pub(crate) fn assemble(
         water.warnings.extend(told);
         system.contact = Some(made);
     }
-    system.symmetric = symmetric(scene, choices, &system);
     system.limits = limits::assemble(scene, dt, &system, &parameters, &q)?;
+    let coupled = coupled(scene, choices);
+    system.symmetric = symmetry::free(scene, coupled, &system);
+    let kept = symmetry::kept(scene, coupled, &system, &parameters);
     let v = start_velocity(scene, choices, &system, &parameters, &q)?;
     Ok(Assembled {
         policy: controller::policy(scene, &system).into(),
@@ -189,28 +205,9 @@ pub(crate) fn assemble(
         q,
         v,
         water,
+        kept,
         surfaces: Default::default(),
     })
-}
-
-/// Rigid motions that bodies in the same water, or each tree of joints outside of it, are free to make together.
-fn symmetric(scene: &Scene, choices: &Choices, system: &System) -> DMatrix<f64> {
-    let links = system.tree.links();
-    let coupled = choices.water.fidelity.coupled() && scene.fluid.density > 0.0;
-    let in_water = |root: usize| {
-        system
-            .submerged()
-            .any(|(b, _)| system.tree.carries(root, b))
-    };
-    let roots = (0..links.len()).filter(|b| links[*b].parent.is_none());
-    let (wet, apart): (Vec<usize>, Vec<usize>) = roots.partition(|b| coupled && in_water(*b));
-    let groups: Vec<Vec<usize>> = std::iter::once(wet)
-        .chain(apart.into_iter().map(|b| vec![b]))
-        .collect();
-    let walls: Vec<Vec3> = (scene.walls.iter())
-        .map(|w| Vec3::from(w.normal).normalize())
-        .collect();
-    free_motions(&system.tree, &system.drives, &groups, &walls)
 }
 
 fn stepper<'a>(choices: &Choices, system: &'a System, parameters: &'a Parameters) -> Stepper<'a> {

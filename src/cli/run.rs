@@ -73,9 +73,15 @@ pub(super) struct RunReport {
     pub peak_memory_mb: Option<f64>,
     pub energy_initial: f64,
     pub energy_final: f64,
-    /// Largest departure of the total momentum from its start, relative to the largest momentum of
-    /// a single body; linear and angular, the larger of both.
-    pub momentum_drift: f64,
+    /// How far the energy rises above that at the start, at most, J.
+    pub energy_gain: f64,
+    /// How far it falls below that, at most, J.
+    pub energy_loss: f64,
+    /// Largest change of the momentum along a motion in which nothing outside acts, relative to the largest momentum of a single body; null
+    /// where there is no such motion.
+    pub momentum_drift: Option<f64>,
+    /// Number of such motions.
+    pub momenta_kept: usize,
     /// Smallest gap of the whole run, m; null where there is nothing to meet.
     pub min_gap: Option<f64>,
     /// By what the water across gaps is carried, and its estimated errors: at the smallest gap, and where that of the force is largest; when films came and went.
@@ -146,7 +152,10 @@ fn simulate(
         peak_memory_mb: peak_memory_mb(),
         energy_initial: summary.energy_initial,
         energy_final: summary.energy_final,
+        energy_gain: summary.energy_gain,
+        energy_loss: summary.energy_loss,
         momentum_drift: summary.momentum_drift,
+        momenta_kept: summary.momenta_kept,
         min_gap: summary.min_gap,
         gaps: summary.gaps,
         gap_check,
@@ -208,14 +217,17 @@ impl fmt::Display for RunReport {
         )?;
         writeln!(
             f,
-            "  energy  {:.6e} J at the start, {:.6e} J at the end",
-            self.energy_initial, self.energy_final
+            "  energy  {:.6e} J at the start, {:.6e} J at the end; at most {:.2e} J above and {:.2e} J below the start",
+            self.energy_initial, self.energy_final, self.energy_gain, self.energy_loss
         )?;
-        writeln!(
-            f,
-            "  momentum changes by {:.2e} of the largest (by round-off where nothing outside acts)",
-            self.momentum_drift
-        )?;
+        match self.momentum_drift {
+            Some(drift) => writeln!(
+                f,
+                "  momentum changes by {drift:.2e} of the largest in the {} directions in which nothing outside acts",
+                self.momenta_kept
+            )?,
+            None => writeln!(f, "  momentum in every direction something outside acts")?,
+        }
         writeln!(f, "  smallest gap   {}", or_dash(self.min_gap, "m"))?;
         let worst = self.gaps.worst.as_ref();
         let nearest = self.gaps.nearest.as_ref();

@@ -27,5 +27,6 @@ pub use integrator::{
 pub use limit::JointLimit;
 pub use linearisation::Linearisation;
 pub use parameters::{Declarations, Declared, Entry, Owner, Parameter, Parameters, Range, Typical};
-pub(crate) use symmetry::free_motions;
+pub use symmetry::FreeMotions;
+pub(crate) use symmetry::{Group, free_motions, refuse, refuse_tilt};
 pub use system::{Drive, System};

@@ -1,9 +1,10 @@
-//! Rigid motions of bodies that water and joints can't tell from rest.
+//! Rigid motions of bodies that water, joints and forces can't tell from rest.
 //!
 //! Where all joints to the world that a group of bodies hangs on allow one and the same rigid motion, and no wall of the water stands in its way, it changes
-//! no kinetic energy, and the momentum along it stays where nothing else acts.
+//! no kinetic energy, and the momentum along it stays where nothing outside acts.
 
 use super::Drive;
+use super::force::Outside;
 use crate::adjoint::lie::{Mat6, Vec3, Vec6, six};
 use crate::multibody::{Link, Tree};
 use nalgebra::DMatrix;
@@ -11,9 +12,50 @@ use nalgebra::DMatrix;
 /// Part of the largest singular value below which one counts as zero.
 const ZERO: f64 = 1e-10;
 
-/// Spatial twists that all of these joints to the world allow and that move along walls with these unit normals: orthonormal columns, 6 × k.
-pub fn common_twists(roots: &[&Link], walls: &[Vec3]) -> DMatrix<f64> {
-    let mut refused = Mat6::zeros();
+/// Bodies that feel one another.
+pub struct Group {
+    /// The first body of each tree of joints.
+    pub roots: Vec<usize>,
+    /// Twists that something stands against ([`refuse`]).
+    pub refused: Mat6,
+}
+
+/// Rigid motions that are free.
+#[derive(Clone, Debug)]
+pub struct FreeMotions {
+    /// Frame velocities, velocities × motions.
+    pub velocities: DMatrix<f64>,
+    /// The spatial twist of each.
+    pub twists: Vec<Vec6>,
+}
+
+/// Twists that something outside stands against, as a matrix whose null space is what it leaves free.
+pub fn refuse(outside: Outside) -> Mat6 {
+    match outside {
+        Outside::Nothing => Mat6::zeros(),
+        // They slide across it and turn about it.
+        Outside::Along(n) => {
+            let n = n.normalize();
+            let along = six(&n, &Vec3::zeros());
+            along * along.transpose() + refuse_tilt(&n)
+        }
+        Outside::All => Mat6::identity(),
+    }
+}
+
+/// Turning, but about an axis.
+pub fn refuse_tilt(axis: &Vec3) -> Mat6 {
+    let n = axis.normalize();
+    let tilts = [Vec3::x(), Vec3::y(), Vec3::z()].map(|x| {
+        let tilt = six(&Vec3::zeros(), &(x - n * n.dot(&x)));
+        tilt * tilt.transpose()
+    });
+    tilts.into_iter().sum()
+}
+
+/// Spatial twists that all of these joints to the world allow and that nothing refuses: orthonormal.
+fn common_twists(roots: &[&Link], refused: &Mat6) -> Vec<Vec6> {
+    let mut refused = *refused;
     for root in roots {
         let basis = allowed(root);
         let kept = match basis.ncols() {
@@ -34,22 +76,12 @@ pub fn common_twists(roots: &[&Link], walls: &[Vec3]) -> DMatrix<f64> {
         };
         refused += Mat6::identity() - kept;
     }
-    for n in walls {
-        // It slides along the wall and turns about its normal.
-        let through = six(n, &Vec3::zeros());
-        refused += through * through.transpose();
-        for axis in [Vec3::x(), Vec3::y(), Vec3::z()] {
-            let tilt = six(&Vec3::zeros(), &(axis - n * n.dot(&axis)));
-            refused += tilt * tilt.transpose();
-        }
-    }
     let decomposed = refused.symmetric_eigen();
     let top = decomposed.eigenvalues.max().max(1.0);
-    let kept: Vec<Vec6> = (0..6)
+    (0..6)
         .filter(|&k| decomposed.eigenvalues[k].abs() <= ZERO * top)
         .map(|k| decomposed.eigenvectors.column(k).into_owned())
-        .collect();
-    DMatrix::from_fn(6, kept.len(), |i, j| kept[j][i])
+        .collect()
 }
 
 /// Spatial twists of a joint to the world, by its frame velocities.
@@ -62,35 +94,32 @@ fn allowed(root: &Link) -> DMatrix<f64> {
     DMatrix::from_fn(6, columns.len(), |i, j| columns[j][i])
 }
 
-/// Frame velocities of the motions that are free for each group of bodies, columns of nv × k; of the groups, lists of joints to the world, those with one that
-/// is driven have none. `walls` are those of the first group's water; the others feel none.
-pub fn free_motions(
-    tree: &Tree,
-    drives: &[Drive],
-    groups: &[Vec<usize>],
-    walls: &[Vec3],
-) -> DMatrix<f64> {
-    let mut columns: Vec<Vec<f64>> = Vec::new();
-    for (k, group) in groups.iter().enumerate() {
-        if group.is_empty() || group.iter().any(|b| drives[*b] != Drive::Free) {
+/// The motions that are free for each group of bodies; a group with a driven joint to the world has none.
+pub fn free_motions(tree: &Tree, drives: &[Drive], groups: &[Group]) -> FreeMotions {
+    let (mut columns, mut twists): (Vec<Vec<f64>>, Vec<Vec6>) = Default::default();
+    for Group { roots, refused } in groups {
+        if roots.is_empty() || roots.iter().any(|b| drives[*b] != Drive::Free) {
             continue;
         }
-        let roots: Vec<&Link> = group.iter().map(|b| &tree.links()[*b]).collect();
-        let twists = common_twists(&roots, if k == 0 { walls } else { &[] });
-        for twist in twists.column_iter() {
+        let roots: Vec<&Link> = roots.iter().map(|b| &tree.links()[*b]).collect();
+        for twist in common_twists(&roots, refused) {
             let mut column = vec![0.0; tree.velocities()];
             for root in &roots {
                 // Frame velocities of the twist: least squares, which is exact here.
                 let basis = allowed(root);
-                let solved = basis.svd(true, true).solve(&twist.into_owned(), ZERO);
-                if let Ok(hat) = solved {
+                let right = DMatrix::from_column_slice(6, 1, twist.as_slice());
+                if let Ok(hat) = basis.svd(true, true).solve(&right, ZERO) {
                     for (i, x) in root.v.clone().zip(hat.iter()) {
                         column[i] = *x;
                     }
                 }
             }
             columns.push(column);
+            twists.push(twist);
         }
     }
-    DMatrix::from_fn(tree.velocities(), columns.len(), |i, j| columns[j][i])
+    FreeMotions {
+        velocities: DMatrix::from_fn(tree.velocities(), columns.len(), |i, j| columns[j][i]),
+        twists,
+    }
 }

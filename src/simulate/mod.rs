@@ -22,6 +22,7 @@ mod sample;
 mod settings;
 mod simulator;
 mod start;
+mod summary;
 mod trajectory;
 
 pub use controls::Controls;
@@ -35,11 +36,12 @@ pub use knots::Knots;
 pub use objective::Objective;
 pub use record::Record;
 pub use recording::{Recorded, Recording};
-pub use rollout::{Rollout, Summary};
+pub use rollout::Rollout;
 pub use run::Halted;
 pub use sample::Sample;
 pub use settings::Settings;
 pub use simulator::{AddedMass, Simulator};
+pub use summary::Summary;
 
 pub use crate::assembly::Choices;
 pub use crate::policy::{

@@ -4,7 +4,7 @@ use super::{BackendReport, Discretisation, ErrorEstimate, Fidelity, Policy, Sett
 use crate::adjoint::lie::Pose;
 use crate::assembly::{self, Assembled, Choices};
 use crate::coupling::CouplingReport;
-use crate::dynamics::{ContactGap, ContactModel, Parameters, Stepper, System};
+use crate::dynamics::{ContactGap, ContactModel, FreeMotions, Parameters, Stepper, System};
 use crate::geometry::{Gap, Gaps, Other, TriMesh};
 use crate::scene::Scene;
 use crate::water::{Clearance, GapError, Subject, Surface, world_axes};
@@ -179,7 +179,8 @@ impl Simulator {
             // Without water bodies may have been in one another.
             self.check_apart(self.start().0, parameters.density())?;
         }
-        Arc::make_mut(&mut self.assembled).parameters = parameters;
+        let (scene, choices) = (self.scene.clone(), &self.choices);
+        Arc::make_mut(&mut self.assembled).set_parameters(&scene, choices, parameters);
         Ok(())
     }
 
@@ -204,6 +205,11 @@ impl Simulator {
     /// Replaces the parameters unchecked: differences step across zero.
     pub(super) fn replace_parameters(&mut self, parameters: Parameters) {
         Arc::make_mut(&mut self.assembled).parameters = parameters;
+    }
+
+    /// Rigid motions of bodies that feel one another, in which nothing outside acts: the momentum along each is kept.
+    pub fn kept(&self) -> &FreeMotions {
+        &self.assembled.kept
     }
 
     /// Names of the bodies.

@@ -67,6 +67,7 @@ impl<'a> Trajectory<'a> {
             potential_energy: e.potential_energy(),
             momentum: e.total_momentum(&v, &momenta),
             largest_momentum: momenta.iter().fold(Vec6::zeros(), |m, h| m.sup(&h.abs())),
+            kept_momentum: (self.simulator.kept().velocities).tr_mul(&e.frame_momentum(&v)),
             poses: e.kinematics.poses.clone(),
             report: e.report().clone(),
             gap,

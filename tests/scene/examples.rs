@@ -443,7 +443,8 @@ fn swim(scene: &Scene, fidelity: Fidelity) -> (Vec<f64>, f64, f64) {
         .unwrap();
     let summary = rollout.summary();
     let q = rollout.samples()[scene.steps].q.as_slice().to_vec();
-    (q, summary.min_gap.unwrap(), summary.momentum_drift)
+    let drift = summary.momentum_drift.unwrap_or_default();
+    (q, summary.min_gap.unwrap(), drift)
 }
 
 /// The tail's strokes push the swimmer out of its straight way.

@@ -1,7 +1,7 @@
 //! Actuated joints: controls are their generalised forces, in the user's coordinates.
 
-use super::{ForceModel, ForceParts, LoadBars, Loads, Moving, Velocity};
-use crate::dynamics::Declarations;
+use super::{ForceModel, ForceParts, LoadBars, Loads, Moving, Outside, Together, Velocity};
+use crate::dynamics::{Declarations, Parameters};
 use std::ops::Range;
 
 /// Velocities of each actuated joint, with the first of its controls.
@@ -34,5 +34,17 @@ impl ForceModel for Actuation {
                 bar.control[control + k] += z.v[i];
             }
         }
+    }
+
+    fn outside(&self, group: &Together, _: &Parameters) -> Outside {
+        let mut joints = self.0.iter().flat_map(|(v, _)| v.clone());
+        match joints.any(|i| group.hangs_on(i)) {
+            true => Outside::All,
+            false => Outside::Nothing,
+        }
+    }
+
+    fn conservative(&self, _: &Parameters) -> bool {
+        true
     }
 }

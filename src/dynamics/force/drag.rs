@@ -1,7 +1,7 @@
 //! Drag by the velocity through the water, summed over a body's surface: linear, −c R ν in the body's frame (Eq. 22), and quadratic,
 //! −½ ρ c Σ ΔA |w| w.
 
-use super::{ForceModel, ForceParts, LoadBars, Loads, Moving, Velocity};
+use super::{ForceModel, ForceParts, LoadBars, Loads, Moving, Outside, Together, Velocity};
 use crate::adjoint::drag::{
     Element, Part, quadratic_drag, quadratic_drag_jvp, quadratic_drag_vjp, resistance,
 };
@@ -190,5 +190,17 @@ impl ForceModel for Drag {
                 bar.pose[b] -= cross_force(&relative, &nu_bar) + cross_force(virt, &wrench);
             }
         }
+    }
+
+    fn outside(&self, group: &Together, parameters: &Parameters) -> Outside {
+        let acts = |d: &Dragged| group.holds(d.body) && parameters[d.coefficient] != 0.0;
+        match self.bodies.iter().any(acts) {
+            true => Outside::All,
+            false => Outside::Nothing,
+        }
+    }
+
+    fn conservative(&self, parameters: &Parameters) -> bool {
+        self.bodies.iter().all(|d| parameters[d.coefficient] == 0.0)
     }
 }

@@ -1,10 +1,12 @@
 //! Viscous water that is squeezed out between surfaces: W = −C(q) V on the one that moves with the twist V against the other
 //! ([`crate::coupling::lubrication`]), opposite on the other one. Solved with contact.
 
-use super::{ForceModel, ForceParts, LoadBars, Loads, Lubricated, Moving, Place, Velocity};
+use super::{
+    ForceModel, ForceParts, LoadBars, Loads, Lubricated, Moving, Outside, Place, Together, Velocity,
+};
 use crate::adjoint::lie::{Pose, Vec6, cross_force};
 use crate::coupling::lubrication::{Bearing, PlacedBearing};
-use crate::dynamics::parameters::{Declarations, Declared, Owner, Parameter, Range};
+use crate::dynamics::parameters::{Declarations, Declared, Owner, Parameter, Parameters, Range};
 use std::collections::VecDeque;
 use std::sync::{Arc, Mutex, PoisonError};
 
@@ -166,6 +168,15 @@ impl ForceModel for Lubrication {
                 bar.pose[b] -= cross_force(&film.relative(at.twists), &twist_bar)
                     + cross_force(&film.relative(z.twists), &wrench);
             }
+        }
+    }
+
+    fn outside(&self, group: &Together, _: &Parameters) -> Outside {
+        let mut each = self.0.iter();
+        let across = |g: &Gap| group.across(Some(g.first), g.second);
+        match each.all(|g| across(g) == Outside::Nothing) {
+            true => Outside::Nothing,
+            false => Outside::All,
         }
     }
 }

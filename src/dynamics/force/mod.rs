@@ -18,6 +18,7 @@ use crate::coupling::lubrication::Bearing;
 use crate::multibody::Tree;
 use crate::scene::Scene;
 use nalgebra::DVector;
+use std::ops::Range;
 use std::sync::Arc;
 
 /// Makes a force from a scene, and declares its parameters; `None` where a scene has none of its kind.
@@ -143,6 +144,45 @@ pub struct LoadBars<'a> {
     pub parameters: &'a mut Parameters,
 }
 
+/// Bodies that could make one rigid motion together.
+pub struct Together<'a> {
+    /// Whether each body is one of them.
+    pub bodies: &'a [bool],
+    /// Velocities of the joints to the world that they hang on.
+    pub roots: &'a [Range<usize>],
+}
+
+impl Together<'_> {
+    /// Whether the body is one of them.
+    pub fn holds(&self, b: usize) -> bool {
+        self.bodies[b]
+    }
+
+    /// Whether a velocity is that of a joint to the world that they hang on.
+    pub fn hangs_on(&self, v: usize) -> bool {
+        self.roots.iter().any(|root| root.contains(&v))
+    }
+
+    /// What a force between two bodies, or one and the world, knows of the world: all or nothing.
+    pub fn across(&self, first: Option<usize>, second: Option<usize>) -> Outside {
+        match [first, second].map(|b| b.is_some_and(|b| self.holds(b))) {
+            [true, true] | [false, false] => Outside::Nothing,
+            _ => Outside::All,
+        }
+    }
+}
+
+/// What a force knows of the world outside of bodies that move together, and so which momenta of theirs it changes.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum Outside {
+    /// Nothing: it acts between them, or not on them. It changes no momentum of theirs.
+    Nothing,
+    /// A direction: it changes neither momenta across it nor the angular momentum about it.
+    Along(Vec3),
+    /// Where they are, or how they move.
+    All,
+}
+
 /// A force, on any bodies and joints. It is a pure function of where they are, how they move, controls and parameters.
 pub trait ForceModel: Send + Sync {
     /// Its name, for messages and checks.
@@ -166,6 +206,16 @@ pub trait ForceModel: Send + Sync {
     /// Whether it does anything there at some velocity; asked of those that are solved with contact.
     fn acts(&self, _place: &Place) -> bool {
         true
+    }
+
+    /// What it knows of the world outside of bodies that move together, at these parameters.
+    fn outside(&self, _group: &Together, _parameters: &Parameters) -> Outside {
+        Outside::All
+    }
+
+    /// Whether it changes no energy but its own potential one, at these parameters and where nothing is controlled.
+    fn conservative(&self, _parameters: &Parameters) -> bool {
+        false
     }
 
     /// Potential energy, J, of a force that has one.

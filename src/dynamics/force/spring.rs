@@ -3,9 +3,9 @@
 //! With d from the first end to the second, n = d/|d| and u = ḋ, the tension is T = k (|d| − L) + c n·u; T n acts on the first
 //! body, −T n on the second. Where the ends meet there is no direction, and nothing acts.
 
-use super::{ForceModel, ForceParts, LoadBars, Loads, Moving, Place, Velocity};
+use super::{ForceModel, ForceParts, LoadBars, Loads, Moving, Outside, Place, Together, Velocity};
 use crate::adjoint::lie::{Vec3, Vec6, angular, point_velocity, point_wrench};
-use crate::dynamics::parameters::{Declarations, Declared, Owner, Parameter};
+use crate::dynamics::parameters::{Declarations, Declared, Owner, Parameter, Parameters};
 use crate::scene::Force;
 
 const STIFFNESS: Declared = Declared::new("stiffness", "N/m");
@@ -180,6 +180,19 @@ impl ForceModel for Springs {
                 own.add(point_wrench(&s.ends[end], &(sign * x_bar)), bar.pose);
             }
         }
+    }
+
+    fn outside(&self, group: &Together, _: &Parameters) -> Outside {
+        let mut each = self.0.iter();
+        let across = |s: &Spring| group.across(s.ends[0].body, s.ends[1].body);
+        match each.all(|s| across(s) == Outside::Nothing) {
+            true => Outside::Nothing,
+            false => Outside::All,
+        }
+    }
+
+    fn conservative(&self, parameters: &Parameters) -> bool {
+        self.0.iter().all(|s| parameters[s.damping] == 0.0)
     }
 
     fn potential_energy(&self, place: &Place) -> f64 {

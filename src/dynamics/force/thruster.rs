@@ -1,8 +1,8 @@
 //! Thrusters: a control wrench on a body, force and moment (world axes) about its origin.
 
-use super::{ForceModel, ForceParts, LoadBars, Loads, Moving, Velocity};
+use super::{ForceModel, ForceParts, LoadBars, Loads, Moving, Outside, Together, Velocity};
 use crate::adjoint::lie::{angular, linear, point_velocity, point_wrench};
-use crate::dynamics::Declarations;
+use crate::dynamics::{Declarations, Parameters};
 
 /// Bodies, each with the first of its six controls.
 struct Thrusters(Vec<(usize, usize)>);
@@ -39,5 +39,16 @@ impl ForceModel for Thrusters {
                 bar.control[control + 3 + k] += rotation[k];
             }
         }
+    }
+
+    fn outside(&self, group: &Together, _: &Parameters) -> Outside {
+        match self.0.iter().any(|(b, _)| group.holds(*b)) {
+            true => Outside::All,
+            false => Outside::Nothing,
+        }
+    }
+
+    fn conservative(&self, _: &Parameters) -> bool {
+        true
     }
 }

@@ -1,8 +1,8 @@
 //! Forces at points of bodies by gravity: weight, m g at the centre of mass, and buoyancy, −ρ V g at the centroid of the displaced volume.
 
-use super::{ForceModel, ForceParts, LoadBars, Loads, Moving, Place, Velocity};
+use super::{ForceModel, ForceParts, LoadBars, Loads, Moving, Outside, Place, Together, Velocity};
 use crate::adjoint::lie::{Vec3, angular, point_velocity, point_wrench};
-use crate::dynamics::parameters::{DENSITY, Declarations, Parameter, mass};
+use crate::dynamics::parameters::{DENSITY, Declarations, Parameter, Parameters, mass};
 
 struct Weight {
     name: &'static str,
@@ -87,6 +87,17 @@ impl ForceModel for Weight {
             bar.pose[p.body] += point_wrench(&x, &force.cross(&angular(virt)));
             bar.parameters[p.of] += p.volume * self.acceleration.dot(&point_velocity(virt, &x));
         }
+    }
+
+    fn outside(&self, group: &Together, _: &Parameters) -> Outside {
+        match self.parcels.iter().any(|p| group.holds(p.body)) {
+            true => Outside::Along(self.acceleration),
+            false => Outside::Nothing,
+        }
+    }
+
+    fn conservative(&self, _: &Parameters) -> bool {
+        true
     }
 
     fn potential_energy(&self, place: &Place) -> f64 {

@@ -1,0 +1,75 @@
+//! Which rigid motions of bodies that feel one another are free, and along which of them momentum is kept.
+
+use crate::adjoint::lie::{Mat6, Vec3};
+use crate::dynamics::force::{Outside, Together};
+use crate::dynamics::{FreeMotions, Group, Parameters, System, free_motions, refuse, refuse_tilt};
+use crate::scene::Scene;
+use nalgebra::DMatrix;
+
+/// Frame velocities of motions that neither joints nor walls of the water stand against.
+pub(super) fn free(scene: &Scene, coupled: bool, system: &System) -> DMatrix<f64> {
+    let groups = groups(scene, coupled, system);
+    free_motions(&system.tree, &system.drives, &groups).velocities
+}
+
+/// Those of them that nothing that acts at the parameters knows of either.
+pub(super) fn kept(
+    scene: &Scene,
+    coupled: bool,
+    system: &System,
+    parameters: &Parameters,
+) -> FreeMotions {
+    let mut groups = groups(scene, coupled, system);
+    for group in &mut groups {
+        group.refused += acting(system, parameters, &group.roots);
+    }
+    free_motions(&system.tree, &system.drives, &groups)
+}
+
+/// Bodies in the same water, and each tree of joints outside of it.
+fn groups(scene: &Scene, coupled: bool, system: &System) -> Vec<Group> {
+    let links = system.tree.links();
+    let in_water = |root: usize| {
+        system
+            .submerged()
+            .any(|(b, _)| system.tree.carries(root, b))
+    };
+    let roots = (0..links.len()).filter(|b| links[*b].parent.is_none());
+    let (wet, apart): (Vec<usize>, Vec<usize>) = roots.partition(|b| coupled && in_water(*b));
+    let walls = scene.walls.iter().map(|w| Vec3::from(w.normal));
+    let wet = Group {
+        roots: wet,
+        refused: walls.map(|n| refuse(Outside::Along(n))).sum(),
+    };
+    let apart = apart.into_iter().map(|b| Group {
+        roots: vec![b],
+        refused: Mat6::zeros(),
+    });
+    std::iter::once(wet).chain(apart).collect()
+}
+
+/// What acts on the bodies of these trees from outside.
+fn acting(system: &System, parameters: &Parameters, roots: &[usize]) -> Mat6 {
+    let links = system.tree.links();
+    let carried = |b: usize| roots.iter().any(|root| system.tree.carries(*root, b));
+    let bodies: Vec<bool> = (0..links.len()).map(carried).collect();
+    let roots: Vec<_> = roots.iter().map(|b| links[*b].v.clone()).collect();
+    let group = Together {
+        bodies: &bodies,
+        roots: &roots,
+    };
+    let forces = system.forces.iter();
+    let mut outside: Vec<Outside> = forces.map(|f| f.outside(&group, parameters)).collect();
+    if let Some(contact) = &system.contact {
+        let pairs = contact.shapes.pairs().iter();
+        outside.extend(pairs.map(|p| group.across(Some(p.first), p.second_body())));
+    }
+    if system.limits.iter().any(|limit| group.hangs_on(limit.v)) {
+        outside.push(Outside::All);
+    }
+    let mut refused: Mat6 = outside.into_iter().map(refuse).sum();
+    if system.has_current() {
+        refused += refuse_tilt(&system.current);
+    }
+    refused
+}

@@ -15,6 +15,7 @@ pub mod error;
 pub mod geometry;
 #[cfg(feature = "gpu")]
 pub mod gpu;
+mod memory;
 pub mod multibody;
 pub mod notation;
 #[cfg(feature = "opt")]

@@ -14,6 +14,7 @@ use crate::dynamics::{
     BodyData, Declarations, Drive, FreeMotions, Parameters, Stepper, System, force,
 };
 use crate::geometry::TriMesh;
+use crate::memory;
 use crate::multibody::Tree;
 use crate::policy::Policy;
 use crate::scene::{Body, Scene};
@@ -118,6 +119,13 @@ pub(crate) fn assemble(
             b.joint.model(),
         )
     }));
+    let (bodies, velocities) = (scene.bodies.len() as f64, tree.velocities() as f64);
+    // The mass matrix with its factor and that of the water, and what each velocity moves.
+    memory::fits(
+        &format!("a scene of {bodies} bodies with {velocities} velocities"),
+        memory::numbers(4.0 * velocities * velocities + 6.0 * bodies * velocities),
+        "use fewer bodies, or several scenes where they don't feel each other",
+    )?;
     let surfaces = water::surfaces(scene, &choices.water)?;
     let in_water = water::in_water(scene, &surfaces, &tree, choices.water.fidelity.coupled());
     let mut bodies = Vec::with_capacity(scene.bodies.len());

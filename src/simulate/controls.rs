@@ -1,6 +1,7 @@
 //! Open-loop controls of a rollout.
 
 use super::Simulator;
+use super::run::MOST_STEPS;
 use crate::{Error, Result};
 use nalgebra::DMatrix;
 
@@ -10,8 +11,9 @@ use nalgebra::DMatrix;
 pub struct Controls(DMatrix<f64>);
 
 impl Controls {
-    /// No control for `steps` steps.
+    /// No control for `steps` steps. More of them than a rollout takes are cut to one more than that, which it refuses.
     pub fn zeros(simulator: &Simulator, steps: usize) -> Self {
+        let steps = steps.min(MOST_STEPS + 1);
         Self(DMatrix::zeros(simulator.system().controls, steps))
     }
 

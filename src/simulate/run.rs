@@ -3,12 +3,16 @@
 use super::{Controls, Record, Rollout, Simulator};
 use crate::adjoint::step;
 use crate::dynamics::State;
+use crate::memory;
 use crate::{Error, Result};
 use nalgebra::{DMatrix, DVector};
 use std::ops::ControlFlow;
 
 /// Most steps of one rollout: some kilobytes are kept for each.
-const MOST_STEPS: usize = 5_000_000;
+pub(super) const MOST_STEPS: usize = 5_000_000;
+/// What is kept of a step, bytes, and of each body in it: 3.4 kB a step with four bodies of six velocities.
+const STEP_BYTES: f64 = 1500.0;
+const BODY_BYTES: f64 = 450.0;
 
 /// A rollout that ended before its time ([`Simulator::rollout_as_far`]).
 pub struct Halted {
@@ -153,10 +157,19 @@ impl Simulator {
         if steps > MOST_STEPS {
             return Err(Error::input(
                 "steps",
-                steps,
+                format!("more than {MOST_STEPS}"),
                 format!("must be at most {MOST_STEPS}: every state is kept; run in parts"),
             ));
         }
+        let system = self.system();
+        let size = STEP_BYTES
+            + BODY_BYTES * system.len() as f64
+            + memory::numbers(8.0 * system.tree.velocities() as f64);
+        memory::fits(
+            &format!("a rollout of {steps} steps"),
+            size * steps as f64,
+            "run in parts, each from the state in which the last one ended",
+        )?;
         Ok(steps)
     }
 

@@ -8,19 +8,27 @@ use std::path::Path;
 /// `Error` and `Result` alone.
 ///
 /// `adjoint::lie` gives vectors and poses to everyone; the modules marked `adjoint` use the ladder too.
-const LAYERS: [(&str, &[&str]); 21] = [
+const LAYERS: [(&str, &[&str]); 22] = [
     ("error", &[]),
     // What enums that users choose from can do.
     ("choices", &[]),
     ("special", &[]),
+    // What computations may take.
+    ("memory", &[]),
     // Closed meshes and walls, and what is asked of them.
     ("geometry", &["adjoint"]),
     ("shape", &["adjoint", "geometry", "special"]),
     ("multibody", &["adjoint"]),
     ("scene", &["geometry", "multibody", "shape"]),
     ("solver", &["adjoint"]),
-    ("boundary", &["adjoint", "geometry", "solver", "special"]),
-    ("coupling", &["adjoint", "boundary", "geometry", "solver"]),
+    (
+        "boundary",
+        &["adjoint", "geometry", "memory", "solver", "special"],
+    ),
+    (
+        "coupling",
+        &["adjoint", "boundary", "geometry", "memory", "solver"],
+    ),
     (
         "gpu",
         &["adjoint", "boundary", "coupling", "geometry", "solver"],
@@ -55,6 +63,7 @@ const LAYERS: [(&str, &[&str]); 21] = [
             "coupling",
             "dynamics",
             "geometry",
+            "memory",
             "multibody",
             "policy",
             "scene",
@@ -74,6 +83,7 @@ const LAYERS: [(&str, &[&str]); 21] = [
             "dynamics",
             "gpu",
             "geometry",
+            "memory",
             "multibody",
             "policy",
             "scene",

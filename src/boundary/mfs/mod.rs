@@ -26,6 +26,7 @@ use super::{Response, asymmetry, potentials};
 use crate::adjoint::kernel::{Points, Triangles};
 use crate::adjoint::lie::{Mat6, Vec3, Vec6};
 use crate::geometry::{Faces, Interior, TriMesh};
+use crate::memory;
 use crate::{Error, Result};
 use faer::{Mat, MatMut, MatRef};
 
@@ -90,6 +91,14 @@ impl BodyBoundary {
     /// Settings out of range, and a mesh that doesn't resolve the body.
     pub fn new(name: &str, mesh: &TriMesh, settings: &MfsSettings) -> Result<Self> {
         let mut out = Self::lay_out(name, mesh, settings)?;
+        let (faces, sources) = (out.faces.len() as f64, out.sources.len() as f64);
+        // The matrix, with its damping as it is factored, and the factor.
+        let numbers = faces * sources + 2.0 * (faces + sources) * sources + sources * sources;
+        memory::fits(
+            &format!("solving body \"{name}\" with {faces} faces by fundamental solutions"),
+            memory::numbers(numbers),
+            "use fewer faces, or the fidelity reduced with a coarser mesh",
+        )?;
         out.solve_alone()?;
         Ok(out)
     }

@@ -27,6 +27,7 @@ use super::{Response, asymmetry, potentials};
 use crate::adjoint::kernel::Write;
 use crate::adjoint::lie::{Mat6, Vec3, Vec6};
 use crate::geometry::{Faces, TriMesh};
+use crate::memory;
 use crate::solver::{Columns, Lu, product, transposed_product};
 use crate::{Error, Result};
 use faer::{Mat, MatRef};
@@ -38,6 +39,8 @@ use std::sync::OnceLock;
 pub const MOST_FACES: usize = 20_000;
 /// Turn of the surface, rad, from which an edge is sharp.
 const SHARP: f64 = 0.96;
+/// Thickness in edges under which motions along a plate aren't resolved: a disc's added mass edgewise is 4 % off at 0.057, 66 % at 0.027.
+const THIN: f64 = 0.05;
 /// Condition number above which results lose digits that matter.
 const ILL_CONDITIONED: f64 = 1e6;
 
@@ -126,6 +129,7 @@ impl PanelBoundary {
                  {ILL_CONDITIONED:.0e}; use more, and more even, faces"
             ));
         }
+        warnings.extend(too_thin(name, &faces));
         Ok(Self {
             name: name.to_string(),
             asymmetry: asymmetry(&raw, &faces),
@@ -174,10 +178,35 @@ impl PanelBoundary {
     }
 }
 
+/// Tells where a body is so thin for its faces that what moves along it, past its rim alone, isn't resolved.
+fn too_thin(name: &str, faces: &Faces) -> Option<String> {
+    let n = faces.len() as f64;
+    // Of a plate with this volume and area, and of equilateral faces.
+    let thickness = 2.0 * faces.volume() / faces.area();
+    let edge = (4.0 / 3f64.sqrt() * faces.area() / n).sqrt();
+    let part = thickness / edge;
+    (part < THIN).then(|| {
+        let needed = (n * (THIN / part).powi(2)).ceil();
+        let remedy = match needed <= MOST_FACES as f64 {
+            true => format!("{needed} faces resolve it"),
+            false => format!("that would take {needed:.1e} faces: make it thicker"),
+        };
+        format!(
+            "body \"{name}\": a thickness of {thickness:.2e} m is {part:.3} of its faces' edges: the added mass of motions along it, which is \
+             small, may be off by more than a tenth; {remedy}"
+        )
+    })
+}
+
 /// Refuses systems whose matrix would not fit.
 pub(crate) fn check_size(what: &str, faces: usize) -> Result<()> {
     if faces <= MOST_FACES {
-        return Ok(());
+        // The matrix, its factors and its inverse.
+        return memory::fits(
+            &format!("the panel method for {what} with {faces} faces"),
+            memory::numbers(3.0 * (faces as f64).powi(2)),
+            "use coarser meshes",
+        );
     }
     let gigabytes = 8e-9 * (faces as f64).powi(2);
     Err(Error::Unsupported {

@@ -45,7 +45,15 @@ fn choose_cells(size: [f64; 3], target: f64) -> [usize; 3] {
     // Scaled by the longest edge first: lengths may be as extreme as their type allows.
     let longest = a.max(b).max(c);
     let [a, b, c] = [a / longest, b / longest, c / longest];
-    let ideal = (4.0 * (a * b + b * c + c * a) / target).sqrt();
+    let mut ideal = (4.0 * (a * b + b * c + c * a) / target).sqrt();
+    // Where a side is thinner than a cell it takes one all the same: so many more of them that cells must be longer.
+    let least = |cell: f64| {
+        let cells = [a, b, c].map(|l| (l / cell).max(1.0));
+        4.0 * (cells[0] * cells[1] + cells[1] * cells[2] + cells[2] * cells[0])
+    };
+    while ideal < 1.0 && least(ideal) > 1.25 * target {
+        ideal *= 1.1;
+    }
     let mut best = (f64::INFINITY, [1; 3]);
     for step in -30..=30 {
         let cell = ideal * 1.01f64.powi(step);

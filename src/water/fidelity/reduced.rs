@@ -158,11 +158,14 @@ fn warnings(problem: &Problem, made: &[Arc<ReducedBody>]) -> Vec<String> {
         let missed = parts.fit.scattered.max(parts.fit.radiated);
         if missed > MISSED {
             out.push(format!(
-                "body {:?}: its {} compressed sources leave {:.0} % of its flow at the smallest gap that they \
+                "body {:?}: its {} compressed sources leave {} of its flow at the smallest gap that they \
                  were fitted for: use a higher rank, or the tolerance instead",
                 body.name,
                 parts.points.len(),
-                100.0 * missed
+                match missed < 1.0 {
+                    true => format!("{:.0} %", 100.0 * missed),
+                    false => "more than all".into(),
+                }
             ));
         }
         let chosen = problem.chosen(b);

@@ -5,9 +5,10 @@ mod placed;
 mod second;
 mod system;
 
-use super::{Model, SystemBackend};
+use super::{FullSolver, Model, SystemBackend};
 use crate::adjoint::lie::{Pose, Vec6};
 use crate::coupling::{CoupledResponse, Direction, PairTensor, Reached, Tangent};
+use crate::memory;
 use crate::solver::Columns;
 use crate::{Error, Result};
 use nalgebra::DMatrix;
@@ -38,6 +39,17 @@ impl Cpu {
                 instead: "use the backend gpu, or fewer faces".into(),
             });
         }
+        let (rows, columns) = (model.rows() as f64, model.columns() as f64);
+        // Matrices at two configurations, or one that is factored with its damping.
+        let numbers = match model.settings.solver {
+            FullSolver::Qr => rows * columns + 2.0 * (rows + columns) * columns,
+            _ => 2.0 * rows * columns,
+        };
+        memory::fits(
+            &format!("coupling bodies with {rows} faces by fundamental solutions"),
+            memory::numbers(numbers),
+            "use fewer faces, or the fidelity reduced",
+        )?;
         Ok(Self {
             model,
             spare: Mutex::new(Vec::new()),

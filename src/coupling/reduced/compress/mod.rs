@@ -26,6 +26,7 @@ mod proxies;
 mod pursuit;
 mod region;
 mod samples;
+mod sources;
 
 use super::views::dense;
 use super::{CompressedParts, Fit, ReducedBody, Region};
@@ -35,7 +36,9 @@ use crate::geometry::{Ball, Interior, TriMesh};
 use crate::{Error, Result};
 use faer::Mat;
 use proxies::{CANDIDATES, DEPTH, Proxies, SPACING, TANGENT};
+use samples::{Candidate, Layer};
 use serde::{Deserialize, Serialize};
+use sources::Sources;
 
 /// Most proxies at the smallest distance; a smaller gap isn't resolved on so large a body.
 const MOST_PROXIES: f64 = 900.0;
@@ -174,7 +177,8 @@ pub fn compress(
         (&mut fitted, &mut checked),
         &mut candidates,
     );
-    let field = potentials_weighted(&fitted, &candidates);
+    let sources = Sources::new(&candidates);
+    let field = sources.columns(&potentials_weighted(&fitted, &sources.points));
     if candidates.is_empty() {
         let remedy = format!("the mesh ({} faces) is too coarse", surface.faces.len());
         return Err(none("points inside for its compressed sources", remedy));
@@ -210,12 +214,13 @@ pub fn compress(
     };
     let most = most.min(fitted.points.len() / FITTED);
     let (columns, left) = pursuit::pursuit(&field, &targets, rest, most);
-    let chosen: Vec<Vec3> = columns.iter().map(|j| candidates[*j]).collect();
     let field = Mat::from_fn(field.nrows(), columns.len(), |i, k| field[(i, columns[k])]);
-    // No more modes than points.
-    let modes = modes.get(.., ..m.min(chosen.len())).to_owned();
+    // No more modes than columns.
+    let modes = modes.get(.., ..m.min(columns.len())).to_owned();
     let modes = pursuit::least_squares(&field, &modes);
     let strengths = pursuit::least_squares(&field, &own);
+    let (chosen, spread) = sources.chosen(&columns);
+    let (modes, strengths) = (&spread * modes, &spread * strengths);
 
     // What the compressed body says at points that it was not fitted to.
     let there = potentials_weighted(&checked, &chosen);
@@ -302,16 +307,22 @@ fn potentials_weighted(proxies: &Proxies, sources: &[Vec3]) -> Mat<f64> {
 }
 
 /// Points inside, at several depths.
-fn candidates(surface: &Interior, gap: f64, radius: f64) -> Vec<Vec3> {
+fn candidates(surface: &Interior, gap: f64, radius: f64) -> Vec<Candidate> {
     let mut spacing = CANDIDATES;
     loop {
         let mut out = Vec::new();
         let mut depth = DEPTH * gap;
         while depth < radius {
-            out.extend(samples::inside(surface, depth, spacing, TANGENT, None));
+            let layer = Layer {
+                depth,
+                spacing,
+                tangent: TANGENT,
+                plate: CANDIDATES * DEPTH * gap,
+            };
+            out.extend(samples::inside(surface, layer, None));
             depth *= 2.0;
         }
-        let out = samples::thin(out, 1e-3 * gap, |p| *p);
+        let out = samples::thin(out, 1e-3 * gap, |c| c.point);
         if out.len() <= MOST_CANDIDATES {
             return out;
         }

@@ -1,8 +1,7 @@
 //! Proxies and candidates where smaller gaps are resolved than elsewhere.
 
 use super::proxies::{CANDIDATES, DEPTH, Proxies, SPACING, TANGENT};
-use super::samples::{self, Ball};
-use crate::adjoint::lie::Vec3;
+use super::samples::{self, Ball, Candidate, Layer};
 use crate::coupling::reduced::Region;
 use crate::geometry::Interior;
 
@@ -20,7 +19,7 @@ pub(super) fn add(
     gap: f64,
     regions: &[Region],
     (fitted, checked): (&mut Proxies, &mut Proxies),
-    candidates: &mut Vec<Vec3>,
+    candidates: &mut Vec<Candidate>,
 ) -> Vec<Region> {
     let mut out = Vec::with_capacity(regions.len());
     for region in regions {
@@ -44,9 +43,13 @@ pub(super) fn add(
                 radius: ball.radius + offset,
                 ..ball
             };
-            let depth = DEPTH * offset;
-            let more = samples::inside(surface, depth, CANDIDATES, TANGENT, Some(&wider));
-            candidates.extend(more);
+            let layer = Layer {
+                depth: DEPTH * offset,
+                spacing: CANDIDATES,
+                tangent: TANGENT,
+                plate: CANDIDATES * DEPTH * own,
+            };
+            candidates.extend(samples::inside(surface, layer, Some(&wider)));
         }
         out.push(Region {
             gap: own,
@@ -55,7 +58,7 @@ pub(super) fn add(
     }
     let finest = out.iter().map(|r| r.gap).fold(gap, f64::min);
     if !out.is_empty() {
-        *candidates = samples::thin(std::mem::take(candidates), SAME * finest, |p| *p);
+        *candidates = samples::thin(std::mem::take(candidates), SAME * finest, |c| c.point);
     }
     out
 }

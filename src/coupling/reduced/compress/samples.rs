@@ -62,8 +62,15 @@ pub(super) fn surface_points(surface: &Interior, spacing: f64) -> Vec<Sample> {
     for (face, t) in faces.iter().enumerate() {
         let c = &surface.faces.corners[face];
         let longest = (0..3).map(|k| (c[(k + 1) % 3] - c[k]).norm());
-        let n = (longest.fold(0.0, f64::max) / spacing).ceil().max(1.0) as usize;
+        let longest = longest.fold(0.0, f64::max);
+        let n = (longest / spacing).ceil().max(1.0) as usize;
         let at = t.map(|v| smooth(v, face).unwrap_or(normals[face]));
+        if longest.powi(2) > SLIVER * surface.faces.areas[face] {
+            for (point, normal) in halved([c, &at], spacing) {
+                add(point, normal, face);
+            }
+            continue;
+        }
         for i in 0..n {
             for j in 0..n - i {
                 // Centroids of the upright and of the inverted small triangles.
@@ -78,6 +85,30 @@ pub(super) fn surface_points(surface: &Interior, spacing: f64) -> Vec<Sample> {
                 }
             }
         }
+    }
+    out
+}
+
+/// Square of the longest edge over the area from which a face is a sliver.
+const SLIVER: f64 = 40.0;
+
+/// Centroids, and normals there, of what halving the longest edges makes of a triangle (corners and their normals) until none is longer than `spacing`: in a
+/// sliver as many as its length asks for, not as its square.
+fn halved([corners, normals]: [&[Vec3; 3]; 2], spacing: f64) -> Vec<(Vec3, Vec3)> {
+    let mut out = Vec::new();
+    let mut left = vec![(*corners, *normals)];
+    while let Some((c, n)) = left.pop() {
+        let length = |k: usize| (c[(k + 1) % 3] - c[k]).norm();
+        let k = (1..3).fold(0, |k, i| if length(i) > length(k) { i } else { k });
+        if length(k) <= spacing {
+            let normal: Vec3 = n.iter().sum();
+            out.push((c.iter().sum::<Vec3>() / 3.0, normal.normalize()));
+            continue;
+        }
+        let (a, b, far) = (k, (k + 1) % 3, (k + 2) % 3);
+        let middle = [0.5 * (c[a] + c[b]), 0.5 * (n[a] + n[b])];
+        left.push(([c[a], middle[0], c[far]], [n[a], middle[1], n[far]]));
+        left.push(([middle[0], c[b], c[far]], [middle[1], n[b], n[far]]));
     }
     out
 }
@@ -147,29 +178,52 @@ pub(super) fn around(
     points.into_par_iter().filter(free).collect()
 }
 
-/// Points inside the surface, `depth` deep or as deep as the body allows there, `spacing` apart
-/// relative to their depth; all of them or those under the surface within a ball.
-pub(super) fn inside(
-    surface: &Interior,
-    depth: f64,
-    spacing: f64,
-    tangent: f64,
-    ball: Option<&Ball>,
-) -> Vec<Vec3> {
+/// A place for a source, and in a plate the one on its other side.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Candidate {
+    pub point: Vec3,
+    pub partner: Option<Vec3>,
+}
+
+/// How deep under the surface candidates lie, as the body allows, and how far apart relative to that.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Layer {
+    pub depth: f64,
+    pub spacing: f64,
+    /// At most this part of the ball that fits under the surface.
+    pub tangent: f64,
+    /// What is thinner is a plate.
+    pub plate: f64,
+}
+
+/// Points inside the surface; all of them or those under the surface within a ball.
+pub(super) fn inside(surface: &Interior, layer: Layer, ball: Option<&Ball>) -> Vec<Candidate> {
+    let Layer {
+        depth,
+        spacing,
+        tangent,
+        plate,
+    } = layer;
     let mut all = surface_points(surface, 0.7 * spacing * depth);
     if let Some(ball) = ball {
         all.retain(|s| (s.point - ball.center).norm() <= ball.radius);
     }
     let samples = thin(all, spacing * depth, |s| s.point);
-    let mut points: Vec<(Vec3, f64)> = samples
+    let mut points: Vec<(Candidate, f64)> = samples
         .par_iter()
         .filter_map(|s| {
             let start = s.point - s.normal * (1e-9 * depth);
             let thickness = surface.ray(&start, &-s.normal, usize::MAX, s.face)?;
             let ball = surface.tangent_ball(&s.point, &s.normal, thickness);
             let d = depth.min(tangent * ball);
-            let p = s.point - s.normal * d;
-            surface.contains(&p).then_some((p, d))
+            let point = s.point - s.normal * d;
+            // What moves across a plate draws in on one side what it gives off on the other.
+            let partner = (thickness < plate)
+                .then(|| s.point - s.normal * (thickness - d))
+                .filter(|p| surface.contains(p));
+            surface
+                .contains(&point)
+                .then_some((Candidate { point, partner }, d))
         })
         .collect();
     // The shallowest of them where the body is thin lie closer together.

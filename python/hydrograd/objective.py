@@ -1,4 +1,4 @@
-"""Scalars of a rollout, added with `+` and weighted with `*`, for `Rollout.value` and `Rollout.gradient`."""
+"""Scalars of a rollout, added with `+`, `-` and `sum`, and weighted with `*` and `/`, for `Rollout.value` and `Rollout.gradient`."""
 
 from hydrograd._hydrograd import (
     Objective,

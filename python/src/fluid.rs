@@ -94,6 +94,19 @@ impl Contact {
     }
 
     fn __repr__(&self) -> String {
-        format!("{:?}", self.0)
+        let c = &self.0;
+        let chosen = |value: Option<f64>| value.map_or("None".into(), |v| format!("{v:?}"));
+        format!(
+            "Contact(stiffness={}, dissipation={:?}, friction={:?}, torsional_friction={:?}, rolling_friction={:?}, gap={}, width={}, \
+             stiction_speed={:?})",
+            chosen(c.stiffness),
+            c.dissipation,
+            c.friction,
+            c.torsional_friction,
+            c.rolling_friction,
+            chosen(c.gap),
+            chosen(c.width),
+            c.stiction_speed
+        )
     }
 }

@@ -1,11 +1,11 @@
 //! Objectives: weighted sums of terms of a trajectory.
 
 use crate::array::fixed;
-use hydrograd::objective::{self, Sum};
-use hydrograd::scene::BodyId;
+use crate::error::input;
+use hydrograd::objective::{self, Sum, Which};
 use pyo3::prelude::*;
 
-/// A scalar of a rollout: made by the functions of `hydrograd.objective`, added with `+` and weighted with `*`.
+/// A scalar of a rollout: made by the functions of `hydrograd.objective`, added with `+`, `-` and `sum`, and weighted with `*` and `/`.
 #[pyclass(frozen, module = "hydrograd")]
 #[derive(Clone)]
 pub struct Objective(pub Sum);
@@ -14,6 +14,33 @@ pub struct Objective(pub Sum);
 impl Objective {
     fn __add__(&self, other: PyRef<'_, Self>) -> Self {
         Self(self.0.clone() + other.0.clone())
+    }
+
+    /// `sum` of objectives begins with 0.
+    fn __radd__(&self, other: f64) -> PyResult<Self> {
+        match other {
+            0.0 => Ok(self.clone()),
+            other => Err(input(
+                "objective: +",
+                other,
+                "must be another objective: a constant changes no gradient",
+            )),
+        }
+    }
+
+    fn __sub__(&self, other: PyRef<'_, Self>) -> Self {
+        Self(self.0.clone() - other.0.clone())
+    }
+
+    fn __neg__(&self) -> Self {
+        Self(-self.0.clone())
+    }
+
+    fn __truediv__(&self, divisor: f64) -> PyResult<Self> {
+        match divisor {
+            0.0 => Err(input("objective: /", divisor, "must not be zero")),
+            divisor => Ok(Self(self.0.clone().scaled(1.0 / divisor))),
+        }
     }
 
     fn __mul__(&self, factor: f64) -> Self {
@@ -29,18 +56,36 @@ impl Objective {
     }
 }
 
-/// Squared distance (m²) of the origin of body number `body` from `target` (m, world axes) at the end.
-#[pyfunction]
-fn final_position(body: usize, target: &Bound<'_, PyAny>) -> PyResult<Objective> {
-    let target = fixed("final_position: target", target)?;
-    Ok(Objective(objective::final_position(BodyId(body), target)))
+/// A body, by its number from 0 or by its name.
+fn which(name: &str, body: &Bound<'_, PyAny>) -> PyResult<Which> {
+    if let Ok(name) = body.extract::<String>() {
+        return Ok(Which::Named(name));
+    }
+    let number = body.extract::<usize>().map_err(|_| {
+        let expected = "must be a body's number, from 0, or its name";
+        input(format!("{name}: body"), body, expected)
+    })?;
+    Ok(Which::Number(number))
 }
 
-/// Mean squared distance (m²) of the origin of body number `body` from `target` (m, world axes) over all states.
+/// Squared distance (m²) of the origin of `body`, its number or its name, from `target` (m, world axes) at the end.
 #[pyfunction]
-fn mean_position(body: usize, target: &Bound<'_, PyAny>) -> PyResult<Objective> {
+fn final_position(body: &Bound<'_, PyAny>, target: &Bound<'_, PyAny>) -> PyResult<Objective> {
+    let target = fixed("final_position: target", target)?;
+    Ok(Objective(objective::final_position(
+        which("final_position", body)?,
+        target,
+    )))
+}
+
+/// Mean squared distance (m²) of the origin of `body`, its number or its name, from `target` (m, world axes) over all states.
+#[pyfunction]
+fn mean_position(body: &Bound<'_, PyAny>, target: &Bound<'_, PyAny>) -> PyResult<Objective> {
     let target = fixed("mean_position: target", target)?;
-    Ok(Objective(objective::mean_position(BodyId(body), target)))
+    Ok(Objective(objective::mean_position(
+        which("mean_position", body)?,
+        target,
+    )))
 }
 
 /// `weight · (q[index] − target)²` at the end, for a coordinate of a prismatic, revolute or planar joint (m or rad).

@@ -294,3 +294,26 @@ def test_pieces_and_torsional_friction():
     assert found == pytest.approx(slope, rel=1e-6)
     with pytest.raises(hg.InputError, match=r"ball.*collision\[0\].*position"):
         hg.Body(hg.sphere(radius), name="ball", collision=[(hg.sphere(0.05), (0, 0))])
+
+
+def test_objectives_are_added_subtracted_and_named(sim, controls):
+    rollout = sim.rollout(controls)
+    name = sim.names[1]
+    by_number = hg.objective.final_position(1, (0.1, 0.0, 0.0))
+    by_name = hg.objective.final_position(name, (0.1, 0.0, 0.0))
+    value = rollout.value(by_number)
+    assert rollout.value(by_name) == value
+    assert rollout.value(sum([by_number, by_name])) == pytest.approx(2 * value, rel=1e-14)
+    assert rollout.value(3 * by_name - by_number) == pytest.approx(2 * value, rel=1e-14)
+    assert rollout.value(-by_name / 2) == pytest.approx(-value / 2, rel=1e-14)
+    with pytest.raises(hg.InputError, match="must be one of"):
+        rollout.value(hg.objective.final_position("nobody", (0, 0, 0)))
+    with pytest.raises(hg.InputError, match="must not be zero"):
+        by_name / 0
+    with pytest.raises(hg.InputError, match="constant"):
+        1 + by_name
+
+
+def test_contact_says_how_it_is_made():
+    given = hg.Contact(gap=1e-3, friction=0.3)
+    assert eval(repr(given), {"Contact": hg.Contact}) == given

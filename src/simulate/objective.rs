@@ -5,7 +5,7 @@ use super::{Cotangents, Gradient, Rollout};
 use crate::scene::BodyId;
 use crate::{Error, Result};
 use nalgebra::DMatrix;
-use std::ops::{Add, Range};
+use std::ops::{Add, Neg, Range, Sub};
 
 /// A scalar function of a rollout.
 pub trait Objective {
@@ -54,7 +54,7 @@ impl Rollout {
     }
 }
 
-/// A weighted sum of the terms of this module; add terms with `+`.
+/// A weighted sum of the terms of this module; add and subtract terms with `+` and `-`.
 #[derive(Clone, Debug, Default)]
 pub struct Sum(Vec<Term>);
 
@@ -67,11 +67,49 @@ struct Term {
     last_only: bool,
 }
 
+/// A body of the scene, by its number or its name.
+#[derive(Clone, Debug, PartialEq)]
+pub enum Which {
+    /// Its number, from 0.
+    Number(usize),
+    /// Its name.
+    Named(String),
+}
+
+impl From<BodyId> for Which {
+    fn from(body: BodyId) -> Self {
+        Self::Number(body.0)
+    }
+}
+
+impl From<&str> for Which {
+    fn from(name: &str) -> Self {
+        Self::Named(name.into())
+    }
+}
+
+impl From<String> for Which {
+    fn from(name: String) -> Self {
+        Self::Named(name)
+    }
+}
+
+impl Which {
+    /// Its number; none where the scene has no such body.
+    fn number(&self, rollout: &Rollout) -> Option<usize> {
+        let bodies = &rollout.simulator().system().bodies;
+        match self {
+            Self::Number(body) => (*body < bodies.len()).then_some(*body),
+            Self::Named(name) => bodies.iter().position(|b| b.name == *name),
+        }
+    }
+}
+
 /// Numbers of a term, as many as its target has.
 #[derive(Clone, Debug)]
 enum Of {
     /// Position of a body.
-    Body(usize),
+    Body(Which),
     /// Of v, from this index.
     Velocity(usize),
     /// Of q.
@@ -91,6 +129,22 @@ impl Add for Sum {
     }
 }
 
+impl Neg for Sum {
+    type Output = Sum;
+
+    fn neg(self) -> Sum {
+        self.scaled(-1.0)
+    }
+}
+
+impl Sub for Sum {
+    type Output = Sum;
+
+    fn sub(self, other: Sum) -> Sum {
+        self + -other
+    }
+}
+
 fn at_end(of: Of, target: &[f64], weight: f64) -> Sum {
     Sum(vec![Term {
         of,
@@ -101,12 +155,12 @@ fn at_end(of: Of, target: &[f64], weight: f64) -> Sum {
 }
 
 /// Squared distance (m²) of a body's origin from `target` (m, world) at the end.
-pub fn final_position(body: BodyId, target: [f64; 3]) -> Sum {
-    at_end(Of::Body(body.0), &target, 1.0)
+pub fn final_position(body: impl Into<Which>, target: [f64; 3]) -> Sum {
+    at_end(Of::Body(body.into()), &target, 1.0)
 }
 
 /// Mean squared distance (m²) of a body's origin from `target` over all states.
-pub fn mean_position(body: BodyId, target: [f64; 3]) -> Sum {
+pub fn mean_position(body: impl Into<Which>, target: [f64; 3]) -> Sum {
     let mut out = final_position(body, target);
     out.0[0].last_only = false;
     out
@@ -159,7 +213,10 @@ impl Term {
     /// What its numbers miss the target by at state `n`; a name that no observable has was refused before.
     fn misses(&self, rollout: &Rollout, n: usize) -> Vec<f64> {
         let (name, from) = match &self.of {
-            Of::Body(body) => ("positions", 3 * body),
+            Of::Body(body) => match body.number(rollout) {
+                Some(body) => ("positions", 3 * body),
+                None => return vec![f64::NAN; self.target.len()],
+            },
             Of::Velocity(index) => ("v", *index),
             Of::Coordinate(index) => ("q", *index),
             Of::Observable(name, entry) => (name.as_str(), *entry),
@@ -199,7 +256,18 @@ impl Objective for Sum {
                     }
                     below("entry", *entry, rows)?;
                 }
-                Of::Body(body) => below("body", *body, system.len())?,
+                Of::Body(Which::Number(body)) => below("body", *body, system.len())?,
+                Of::Body(Which::Named(name)) => {
+                    let names: Vec<&str> = system.bodies.iter().map(|b| b.name.as_str()).collect();
+                    if !names.contains(&name.as_str()) {
+                        let expected = format!("must be one of {names:?}");
+                        return Err(Error::input(
+                            "objective: body",
+                            format!("{name:?}"),
+                            expected,
+                        ));
+                    }
+                }
                 Of::Velocity(index) => below("velocity", *index, system.tree.velocities())?,
                 Of::Coordinate(index) => {
                     below("coordinate", *index, system.tree.coordinates())?;
@@ -244,7 +312,10 @@ impl Objective for Sum {
         let columns = rollout.states().len();
         for term in &self.0 {
             let (bars, from) = match &term.of {
-                Of::Body(body) => (&mut out.positions, 3 * body),
+                Of::Body(body) => match body.number(rollout) {
+                    Some(body) => (&mut out.positions, 3 * body),
+                    None => continue,
+                },
                 Of::Velocity(index) => (&mut out.v, *index),
                 Of::Coordinate(index) => match tangent_of(rollout, *index) {
                     Some(index) => (&mut out.q, index),

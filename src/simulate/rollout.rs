@@ -156,7 +156,8 @@ impl Rollout {
         let warning = self.simulator.gap_warning(smallest, states);
         let all = (warning.into_iter())
             .chain(self.energy_warning())
-            .chain(self.loss_warning());
+            .chain(self.loss_warning())
+            .chain(self.rest_warning());
         all.chain(self.passing_warning()).collect()
     }
 

@@ -115,6 +115,30 @@ impl Rollout {
             .reduce(f64::max)
     }
 
+    /// A run in which nothing moves, of bodies that gravity would move.
+    pub(super) fn rest_warning(&self) -> Option<String> {
+        let (scene, system) = (&self.simulator.scene, self.simulator.system());
+        let moves = self.samples().iter().any(|s| s.v.iter().any(|v| *v != 0.0));
+        if self.steps() == 0 || moves || scene.gravity != [0.0; 3] {
+            return None;
+        }
+        let parameters = self.simulator.parameters();
+        let heavy = |b: &usize| {
+            let displaced = parameters.density() * system.bodies[*b].volume;
+            let free =
+                matches!(system.drives[*b], Drive::Free) && system.tree.links()[*b].v.len() > 0;
+            free && displaced > 0.0 && (parameters.mass(*b) - displaced).abs() > 0.01 * displaced
+        };
+        let first = (0..system.len()).find(heavy)?;
+        Some(format!(
+            "nothing moves: no force acts, and `gravity` is zero, which is its default; body {:?} of {} kg displaces {} kg of water: give the scene \
+             `gravity = [0, 0, -9.81]` if it has weight",
+            system.bodies[first].name,
+            readable(parameters.mass(first)),
+            readable(parameters.density() * system.bodies[first].volume)
+        ))
+    }
+
     /// Energy that is lost though nothing takes it.
     pub(super) fn loss_warning(&self) -> Option<String> {
         let system = self.simulator.system();

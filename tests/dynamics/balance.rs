@@ -133,3 +133,21 @@ fn a_hinge_keeps_the_angular_momentum_about_its_axis() {
     assert_eq!(summary.momenta_kept, 1);
     assert!(summary.momentum_drift.unwrap() < 1e-10);
 }
+
+/// Gravity is off unless it is asked for: a stone that stays where it is says so.
+#[test]
+fn a_dense_body_that_stays_is_told_of_gravity() {
+    let mut scene = heavy();
+    (scene.gravity, scene.initial.v) = ([0.0; 3], vec![]);
+    let told = run(&scene, isolated(), 5).warnings();
+    assert!(
+        told.len() == 1 && told[0].contains("gravity = [0, 0, -9.81]"),
+        "{told:?}"
+    );
+    // Not where it moves, nor where it would not fall.
+    scene.initial.v = vec![0.1, 0.0, 0.0, 0.0, 0.0, 0.0];
+    assert_eq!(run(&scene, isolated(), 5).warnings(), Vec::<String>::new());
+    scene.initial.v = vec![];
+    scene.bodies[0].density = Some(scene.fluid.density);
+    assert_eq!(run(&scene, isolated(), 5).warnings(), Vec::<String>::new());
+}

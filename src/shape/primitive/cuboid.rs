@@ -47,10 +47,7 @@ fn choose_cells(size: [f64; 3], target: f64) -> [usize; 3] {
     let [a, b, c] = [a / longest, b / longest, c / longest];
     let mut ideal = (4.0 * (a * b + b * c + c * a) / target).sqrt();
     // Where a side is thinner than a cell it takes one all the same: so many more of them that cells must be longer.
-    let least = |cell: f64| {
-        let cells = [a, b, c].map(|l| (l / cell).max(1.0));
-        4.0 * (cells[0] * cells[1] + cells[1] * cells[2] + cells[2] * cells[0])
-    };
+    let least = |cell: f64| face_count([a, b, c].map(|l| (l / cell).max(1.0) as usize)) as f64;
     while ideal < 1.0 && least(ideal) > 1.25 * target {
         ideal *= 1.1;
     }

@@ -6,7 +6,9 @@ use crate::contact::{
 };
 use crate::drag::{Element, Part, quadratic_drag, quadratic_drag_jvp, quadratic_drag_vjp};
 use crate::draw::numbers;
-use crate::lie::{Mat6, Vec3, Vec6, exp_jacobian_inverse, exp_jacobian_inverse_vjp};
+use crate::lie::{
+    Mat6, Vec3, Vec6, exp_jacobian_inverse, exp_jacobian_inverse_jvp, exp_jacobian_inverse_vjp,
+};
 use crate::rigid::{spatial_inertia, spatial_inertia_vjp};
 use crate::solve::{Definite, Fitted, Moved, least_squares, least_squares_jvp};
 use nalgebra::{DMatrix, DVector};
@@ -22,6 +24,10 @@ const PARTS: [Part; 3] = [Part::Tangential, Part::Normal, Part::Total];
 pub fn rungs() -> Vec<Rung> {
     let mut out = crate::kernel::rungs();
     out.extend([
+        Rung {
+            name: "lie::rotation::exp_jacobian_inverse_jvp",
+            check: exp_jacobian_inverse_jvp_check,
+        },
         Rung {
             name: "lie::rotation::exp_jacobian_inverse_vjp",
             check: exp_jacobian_inverse_check,
@@ -94,6 +100,19 @@ fn rotations() -> impl Iterator<Item = Vec3> {
     let axes = [10, 11, 12, 13].map(|seed| vector(seed).normalize());
     axes.into_iter()
         .flat_map(|axis| ANGLES.map(|angle| angle * axis))
+}
+
+fn exp_jacobian_inverse_jvp_check(corruption: f64) -> Outcome {
+    all((20..).zip(rotations()).map(|(seed, theta)| {
+        let (omega, along) = (vector(seed), 0.3 * vector(seed + 400));
+        let value = |x: &[f64]| {
+            let x = exp_jacobian_inverse(&Vec3::from_column_slice(x)) * omega;
+            x.as_slice().to_vec()
+        };
+        let jvp = corruption * exp_jacobian_inverse_jvp(&theta, &omega, &along);
+        let (start, along): ([f64; 3], [f64; 3]) = (theta.into(), along.into());
+        outcome(value, &start, &along, jvp.as_slice(), TOLERANCE)
+    }))
 }
 
 fn exp_jacobian_inverse_check(corruption: f64) -> Outcome {

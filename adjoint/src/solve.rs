@@ -27,6 +27,11 @@ impl Definite {
         self.0.solve(b)
     }
 
+    /// The same for several columns.
+    pub fn solve_columns(&self, b: &DMatrix<f64>) -> DMatrix<f64> {
+        self.0.solve(b)
+    }
+
     /// Cotangent `w = A⁻¹ x̄` of `b`; that of A is `−w xᵀ`.
     pub fn solve_vjp(&self, x_bar: &DVector<f64>) -> DVector<f64> {
         self.0.solve(x_bar)

@@ -341,7 +341,9 @@ impl Rollout {
             let place = format!("vjp: observables[{name:?}]");
             let system = self.inner.simulator().system();
             let found = observable::observable(&name).or_raise()?;
-            let rows = observable::transpose(&name).or_raise()?.tangents(system);
+            let rows = observable::differentiable(&name)
+                .or_raise()?
+                .tangents(system);
             let mut shape = found.shape(system);
             if shape.iter().product::<usize>() != rows {
                 // Cotangents live in the tangent space.

@@ -213,6 +213,38 @@ pub trait Linearised: Send + Sync {
     /// A solve that misses its tolerance.
     fn vjp(&self, x: Direction, y: Direction) -> Result<Pullback>;
 
+    /// M̄_f times further columns of body-frame twists (6·bodies × K), and ∇_g E of each with x, coefficients on the basis: [`Linearised::vjp`] of
+    /// every column.
+    ///
+    /// # Errors
+    /// As there.
+    fn respond(
+        &self,
+        twists: &DMatrix<f64>,
+        x: &DVector<f64>,
+    ) -> Result<(DMatrix<f64>, Vec<Vec<Vec6>>)> {
+        let mut momenta = DMatrix::zeros(twists.nrows(), twists.ncols());
+        let mut wrenches = vec![vec![Vec6::zeros(); twists.nrows() / 6]; twists.ncols()];
+        for (k, wrenches) in wrenches.iter_mut().enumerate() {
+            let twist = twists.column(k).into_owned();
+            if twist.iter().any(|x| *x != 0.0) {
+                let pullback = self.vjp(Direction::Twist(&twist), Direction::Basis(x))?;
+                momenta.set_column(k, &pullback.momentum_x);
+                *wrenches = pullback.wrench;
+            }
+        }
+        Ok((momenta, wrenches))
+    }
+
+    /// [`Linearised::hvp`] of x, coefficients on the basis, with itself along each displacement.
+    ///
+    /// # Errors
+    /// As there.
+    fn displaced(&self, x: &DVector<f64>, z: &[Vec<Vec6>]) -> Result<Vec<Tangent>> {
+        let through = Direction::Basis(x);
+        z.iter().map(|z| self.hvp(through, through, z)).collect()
+    }
+
     /// The tangent along the displacement Z (one spatial twist a body).
     ///
     /// # Errors

@@ -11,12 +11,14 @@
 
 use super::balance::rigid_parameters_vjp;
 use super::force::{Loads, Velocity};
-use super::{Evaluation, ForceCotangents, Linearisation};
+use super::slopes::unit;
+use super::{Evaluation, ForceCotangents, Linearisation, Slopes};
 use crate::Result;
 use crate::adjoint::lie::{Vec6, cross_force, cross_motion};
 use crate::coupling::Direction;
 use crate::multibody::{Cotangents, Fields, Virtual};
 use nalgebra::DVector;
+use rayon::prelude::*;
 
 impl Evaluation<'_> {
     /// C − U × V of every submerged body, zero for dry ones.
@@ -111,6 +113,22 @@ impl Linearisation<'_> {
         out.q += q_bar;
         out.v += v_bar;
         Ok(out)
+    }
+
+    /// Derivatives of the entries `entries` of [`Linearisation::inertial_force`]; the others have none.
+    ///
+    /// # Errors
+    /// As [`Linearisation::inertial_force_vjp`].
+    pub fn inertial_force_slopes(
+        &self,
+        v: &DVector<f64>,
+        control: &DVector<f64>,
+        entries: &[usize],
+    ) -> Result<Slopes> {
+        let row = |i: &usize| self.inertial_force_vjp(v, control, &unit(v.len(), *i));
+        let rows = entries.par_iter().map(row).collect::<Result<Vec<_>>>()?;
+        let zero = ForceCotangents::zeros(self);
+        Ok(Slopes::from_rows(v.len(), entries, &rows, &zero))
     }
 
     /// The fluid's part: gradient of

@@ -14,12 +14,13 @@
 
 use super::force::{LoadBars, Loads, Moving, Place, Velocity};
 use super::linearisation::Water;
-use super::{Evaluation, Linearisation, Parameters};
+use super::slopes::unit;
+use super::{Evaluation, Linearisation, Parameters, Slopes};
 use crate::Result;
 use crate::adjoint::lie::{Vec6, cross_force, cross_motion, six};
 use crate::adjoint::rigid;
 use crate::coupling::Direction;
-use crate::multibody::{Cotangents, Link, Virtual};
+use crate::multibody::{Cotangents, Fields, Link, Virtual};
 use nalgebra::{DMatrix, DVector, Matrix6};
 
 /// Cotangents of configuration, velocity, control and parameters.
@@ -119,17 +120,41 @@ impl Evaluation<'_> {
         bar: &mut Cotangents,
         out: &mut ForceCotangents,
     ) {
+        use std::slice::{from_mut, from_ref};
+        self.loads_vjps(
+            twists,
+            v,
+            control,
+            from_ref(z),
+            from_mut(bar),
+            from_mut(out),
+        );
+    }
+
+    /// The same for several velocities at once.
+    fn loads_vjps(
+        &self,
+        twists: &[Vec6],
+        v: &DVector<f64>,
+        control: &DVector<f64>,
+        z: &[Velocity],
+        bars: &mut [Cotangents],
+        out: &mut [ForceCotangents],
+    ) {
         let at = self.moving(twists, v, control);
-        let mut bars = LoadBars {
-            pose: &mut bar.pose,
-            twist: &mut bar.twist,
-            q: &mut out.q,
-            v: &mut out.v,
-            control: &mut out.control,
-            parameters: &mut out.parameters,
-        };
+        let bars = bars.iter_mut().zip(out);
+        let mut bars: Vec<LoadBars> = bars
+            .map(|(bar, out)| LoadBars {
+                pose: &mut bar.pose,
+                twist: &mut bar.twist,
+                q: &mut out.q,
+                v: &mut out.v,
+                control: &mut out.control,
+                parameters: &mut out.parameters,
+            })
+            .collect();
         for force in self.system.smooth_forces() {
-            force.vjp(&at, z, &mut bars);
+            force.vjps(&at, z, &mut bars);
         }
     }
 
@@ -183,6 +208,13 @@ impl Evaluation<'_> {
                 out[k] = self.kinematics.frame_columns[k].dot(&(rates[b] - carried));
             }
         }
+        out
+    }
+
+    /// Derivative of `X(q)ᵀ p̂` with respect to q, nv × nv.
+    pub(super) fn frame_momentum_slope(&self, hat: &DVector<f64>) -> DMatrix<f64> {
+        let row = |l: &Link, v: &[f64]| [l.joint.frame_velocity_vjp(v, l.of_v(hat))];
+        let [out] = self.system.tree.blocks(row);
         out
     }
 
@@ -322,50 +354,114 @@ impl Linearisation<'_> {
         control: &DVector<f64>,
         z: &DVector<f64>,
     ) -> Result<ForceCotangents> {
-        let tree = &self.system.tree;
-        let rho = self.parameters.density();
-        let mut out = ForceCotangents::zeros(self);
-        let fields = tree.fields(&self.kinematics, &self.q, v, Virtual::Frame(z));
-        let mut bar = Cotangents::zeros(self.system.len());
+        let mut all = self.force_vjps(v, control, std::slice::from_ref(z))?;
+        Ok(all.pop().unwrap_or_else(|| ForceCotangents::zeros(self)))
+    }
 
-        for b in 0..self.system.len() {
-            let (twist, turning) = (&fields.twist[b], &fields.turning[b]);
-            // D · h_r, with the rigid momentum h_r = I V constant in the body's frame.
-            let (h, h_turning) = (
-                self.rigid_momentum(b, twist),
-                self.rigid_momentum(b, turning),
-            );
-            bar.turning[b] += h;
-            bar.twist[b] += h_turning;
-            bar.pose[b] -= cross_force(twist, &h_turning) + cross_force(turning, &h);
-            rigid_parameters_vjp(self, b, turning, twist, &mut out.parameters);
-        }
-        // Z · wrenches + ẑᵀ X⁻ᵀ τ.
-        let loads = self.loads(&fields.twist, v, control);
-        let tau_bar = self.frame_velocity_inverse(z);
-        for (bar, wrench) in bar.virtual_twist.iter_mut().zip(&loads.wrenches) {
-            *bar += wrench;
-        }
-        let power = Velocity {
-            twists: &fields.virtual_twist,
-            v: &tau_bar,
+    /// Derivatives of the entries `entries` of [`Linearisation::force`]; the others have none.
+    ///
+    /// # Errors
+    /// As [`Linearisation::force_vjp`].
+    pub fn force_slopes(
+        &self,
+        v: &DVector<f64>,
+        control: &DVector<f64>,
+        entries: &[usize],
+    ) -> Result<Slopes> {
+        let units: Vec<_> = entries.iter().map(|i| unit(v.len(), *i)).collect();
+        let rows = self.force_vjps(v, control, &units)?;
+        let zero = ForceCotangents::zeros(self);
+        Ok(Slopes::from_rows(v.len(), entries, &rows, &zero))
+    }
+
+    /// The transpose for several ẑ at once.
+    fn force_vjps(
+        &self,
+        v: &DVector<f64>,
+        control: &DVector<f64>,
+        z: &[DVector<f64>],
+    ) -> Result<Vec<ForceCotangents>> {
+        let (tree, n) = (&self.system.tree, self.system.len());
+        let field = |z| tree.fields(&self.kinematics, &self.q, v, Virtual::Frame(z));
+        let fields: Vec<Fields> = z.iter().map(field).collect();
+        let Some(Fields { twist, .. }) = fields.first() else {
+            return Ok(Vec::new());
         };
-        self.loads_vjp(&fields.twist, v, control, &power, &mut bar, &mut out);
-        out.q -= self.frame_velocity_vjp(&tau_bar, &self.frame_dual(&loads.joints));
-        if let Some(water) = self.water()? {
-            let direction = self.through_water(v);
-            let through = Direction::Basis(&direction);
-            let momenta = water.momenta(&direction);
-            let current = self.current_twist();
-            let n = self.system.len();
-            // (D − U × Z) · h_f: one bilinear form with the direction D' = D − U × Z.
-            let carried: Vec<Vec6> = (0..n)
-                .map(|b| fields.turning[b] - cross_motion(&current, &fields.virtual_twist[b]))
-                .collect();
-            let (momenta_carried, pair) = self.respond(water, &carried, through)?;
-            // ½ D_g E(v, v)[Z].
-            let virt = self.submerged_field(&fields.virtual_twist);
-            let tangent = water.linearised.hvp(through, through, &virt)?;
+        let loads = self.loads(twist, v, control);
+        let mut out = vec![ForceCotangents::zeros(self); z.len()];
+        let mut bars = vec![Cotangents::zeros(n); z.len()];
+        for ((fields, bar), out) in fields.iter().zip(&mut bars).zip(&mut out) {
+            for (b, turning) in fields.turning.iter().enumerate() {
+                // D · h_r, with the rigid momentum h_r = I V constant in the body's frame.
+                let (h, h_turning) = (
+                    self.rigid_momentum(b, &twist[b]),
+                    self.rigid_momentum(b, turning),
+                );
+                bar.turning[b] += h;
+                bar.twist[b] += h_turning;
+                bar.pose[b] -= cross_force(&twist[b], &h_turning) + cross_force(turning, &h);
+                rigid_parameters_vjp(self, b, turning, &twist[b], &mut out.parameters);
+            }
+            // Z · wrenches + ẑᵀ X⁻ᵀ τ.
+            for (bar, wrench) in bar.virtual_twist.iter_mut().zip(&loads.wrenches) {
+                *bar += wrench;
+            }
+        }
+        let tau_bars: Vec<_> = z.iter().map(|z| self.frame_velocity_inverse(z)).collect();
+        let powers = fields.iter().zip(&tau_bars);
+        let powers: Vec<Velocity> = powers
+            .map(|(fields, v)| Velocity {
+                twists: &fields.virtual_twist,
+                v,
+            })
+            .collect();
+        self.loads_vjps(twist, v, control, &powers, &mut bars, &mut out);
+        let joints = self.frame_dual(&loads.joints);
+        for (out, tau_bar) in out.iter_mut().zip(&tau_bars) {
+            out.q -= self.frame_velocity_vjp(tau_bar, &joints);
+        }
+        self.fluid_force_vjps(v, &fields, &mut bars, &mut out)?;
+        for (((z, fields), bar), out) in z.iter().zip(&fields).zip(bars).zip(&mut out) {
+            let (q_bar, v_bar) = tree.reverse(&self.kinematics, v, Virtual::Frame(z), fields, bar);
+            out.q += q_bar;
+            out.v += v_bar;
+        }
+        Ok(out)
+    }
+
+    /// The fluid's part: the gradient of `ρ {(D − U × Z) · h_f + ½ D_g E(v, v)[Z]}` of each field.
+    fn fluid_force_vjps(
+        &self,
+        v: &DVector<f64>,
+        fields: &[Fields],
+        bars: &mut [Cotangents],
+        out: &mut [ForceCotangents],
+    ) -> Result<()> {
+        let Some(water) = self.water()? else {
+            return Ok(());
+        };
+        let rho = self.parameters.density();
+        let direction = self.through_water(v);
+        let momenta = water.momenta(&direction);
+        let current = self.current_twist();
+        // (D − U × Z) · h_f: one bilinear form with the direction D' = D − U × Z.
+        let carried = |fields: &Fields| -> Vec<Vec6> {
+            let both = fields.turning.iter().zip(&fields.virtual_twist);
+            both.map(|(d, z)| d - cross_motion(&current, z)).collect()
+        };
+        let carried: Vec<Vec<Vec6>> = fields.iter().map(carried).collect();
+        let columns = carried.iter().map(|field| self.submerged_twists(field));
+        let columns = DMatrix::from_columns(&columns.collect::<Vec<_>>());
+        let (impulses, pairs) = water.linearised.respond(&columns, &direction)?;
+        // ½ D_g E(v, v)[Z].
+        let virt = fields
+            .iter()
+            .map(|f| self.submerged_field(&f.virtual_twist));
+        let tangents = (water.linearised).displaced(&direction, &virt.collect::<Vec<_>>())?;
+        for (k, tangent) in tangents.iter().enumerate() {
+            let (fields, carried, bar) = (&fields[k], &carried[k], &mut bars[k]);
+            let momenta_carried = self.submerged_impulses(&impulses.column(k).into_owned());
+            let pair = self.from_submerged(&pairs[k]);
             let impulse = self.submerged_impulses(&tangent.momentum_x);
             let wrench = self.from_submerged(&tangent.wrench);
             let pose_force = self.half_from_submerged(&tangent.gradient);
@@ -373,7 +469,7 @@ impl Linearisation<'_> {
                 let relative = self.relative(&fields.twist[b]);
                 let virt = &fields.virtual_twist[b];
                 let rate = pose_force[b] + cross_force(&current, &momenta[b]);
-                *out.parameters.density_mut() +=
+                *out[k].parameters.density_mut() +=
                     fields.turning[b].dot(&momenta[b]) + virt.dot(&rate);
                 bar.turning[b] += rho * momenta[b];
                 bar.virtual_twist[b] += rho * rate;
@@ -385,9 +481,6 @@ impl Linearisation<'_> {
                         - cross_force(virt, &pose_force[b]));
             }
         }
-        let (q_bar, v_bar) = tree.reverse(&self.kinematics, v, Virtual::Frame(z), &fields, bar);
-        out.q += q_bar;
-        out.v += v_bar;
-        Ok(out)
+        Ok(())
     }
 }

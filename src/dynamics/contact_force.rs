@@ -5,8 +5,10 @@
 //! that is implicit in it solves contact implicitly, against the mass matrix with its fluid part.
 
 use super::contact::sharpened;
+use super::slopes::unit;
 use super::{
-    ContactForce, Dual, Evaluation, ForceCotangents, JointLimit, PairContact, Parameters, System,
+    ContactForce, Dual, Evaluation, ForceCotangents, JointLimit, PairContact, Parameters, Slopes,
+    System,
 };
 use crate::Result;
 use crate::adjoint::contact::{Push, contact_force, contact_force_jvp, contact_force_vjp};
@@ -231,6 +233,19 @@ impl Evaluation<'_> {
             out.v[l.v] += v_bar;
         }
         out
+    }
+
+    /// Derivatives of the entries `entries` of [`Evaluation::contact_force`]; the others have none.
+    pub(super) fn contact_force_slopes(
+        &self,
+        v: &DVector<f64>,
+        dual: Dual,
+        entries: &[usize],
+    ) -> Slopes {
+        let row = |i: &usize| self.contact_force_vjp(v, &unit(v.len(), *i), dual);
+        let rows: Vec<_> = entries.iter().map(row).collect();
+        let zero = ForceCotangents::zeros(self);
+        Slopes::from_rows(v.len(), entries, &rows, &zero)
     }
 
     /// Each limit with the forces of its stops at the velocity `v`.

@@ -13,6 +13,7 @@ mod limit;
 mod linearisation;
 mod momentum;
 mod parameters;
+mod slopes;
 mod symmetry;
 mod system;
 
@@ -21,12 +22,13 @@ pub use body::BodyData;
 pub use contact::{ContactForce, ContactGap, ContactModel, Dual, PairContact};
 pub use evaluation::Evaluation;
 pub use integrator::{
-    ContactVelocities, Input, Integrator, LinearisedStep, State, StateBar, StateTangent, StepBar,
-    StepJacobians, StepRecord, Stepper, Stops,
+    ContactVelocities, Input, Integrator, LinearisedStep, State, StateBar, StateTangents, StepBar,
+    StepRecord, Stepper, Stops,
 };
 pub use limit::JointLimit;
 pub use linearisation::Linearisation;
 pub use parameters::{Declarations, Declared, Entry, Owner, Parameter, Parameters, Range, Typical};
+pub use slopes::{InputTangents, Slopes};
 pub use symmetry::FreeMotions;
 pub(crate) use symmetry::{Group, free_motions, refuse, refuse_tilt};
 pub use system::{Drive, System};

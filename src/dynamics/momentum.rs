@@ -1,11 +1,12 @@
 //! Generalised momentum p = M(q) v + p_rest(q) and its transpose.
 
 use super::balance::rigid_parameters_vjp;
-use super::{Evaluation, ForceCotangents, Linearisation};
+use super::slopes::unit;
+use super::{Evaluation, ForceCotangents, Linearisation, Slopes};
 use crate::Result;
 use crate::adjoint::lie::{Vec6, cross_force};
 use crate::multibody::{Cotangents, Virtual};
-use nalgebra::DVector;
+use nalgebra::{DMatrix, DVector};
 
 impl Evaluation<'_> {
     /// Generalised momentum at velocity `v`, user coordinates (kg m/s, kg m²/s).
@@ -33,6 +34,11 @@ impl Evaluation<'_> {
         (self.system.tree).per_joint(&self.q, w, |j, q, w| j.frame_velocity(q, w))
     }
 
+    /// X, nv × nv.
+    pub(super) fn frame_matrix(&self) -> DMatrix<f64> {
+        self.system.tree.frame_matrix(&self.q)
+    }
+
     /// X⁻¹ w.
     pub(super) fn frame_velocity_inverse(&self, w: &DVector<f64>) -> DVector<f64> {
         (self.system.tree).per_joint(&self.q, w, |j, q, w| j.frame_velocity_inverse(q, w))
@@ -56,12 +62,85 @@ impl Linearisation<'_> {
         self.bilinear_vjp(v, w, &Vec6::zeros())
     }
 
+    /// Derivatives of the entries `entries` of `M(q) v + p_rest(q)`, the user's coordinates; the others have none.
+    ///
+    /// # Errors
+    /// As [`Linearisation::momentum_vjp`].
+    pub fn momentum_slopes(&self, v: &DVector<f64>, entries: &[usize]) -> Result<Slopes> {
+        self.bilinear_slopes(v, entries, &self.current_twist())
+    }
+
+    /// The same of `M(q) v`, without the current.
+    ///
+    /// # Errors
+    /// As [`Linearisation::mass_vjp`].
+    pub fn mass_slopes(&self, v: &DVector<f64>, entries: &[usize]) -> Result<Slopes> {
+        self.bilinear_slopes(v, entries, &Vec6::zeros())
+    }
+
+    fn bilinear_slopes(
+        &self,
+        v: &DVector<f64>,
+        entries: &[usize],
+        current: &Vec6,
+    ) -> Result<Slopes> {
+        let n = v.len();
+        let zero = ForceCotangents::zeros(self);
+        let rows: Vec<ForceCotangents> = match self.water()? {
+            Some(water) => {
+                let direction = self.direction(v, current);
+                let momenta = water.momenta(&direction);
+                // The first columns of the basis are the generalised velocities'.
+                let pairs = water.linearised.gradient_columns(&direction)?;
+                let row = |i: &usize| {
+                    let w = unit(n, *i);
+                    let momenta_virtual = water.momenta(&self.virtual_direction(&w));
+                    let carried = [&momenta, &momenta_virtual, &self.from_submerged(&pairs[*i])];
+                    self.bilinear_row(v, &w, current, Some(carried.map(Vec::as_slice)))
+                };
+                entries.iter().map(row).collect()
+            }
+            None => (entries.iter())
+                .map(|i| self.bilinear_row(v, &unit(n, *i), current, None))
+                .collect(),
+        };
+        Ok(Slopes::from_rows(n, entries, &rows, &zero))
+    }
+
+    /// Coefficients on the basis of a velocity through water that moves with the current, or that rests.
+    fn direction(&self, v: &DVector<f64>, current: &Vec6) -> DVector<f64> {
+        match *current == Vec6::zeros() {
+            true => self.virtual_direction(v),
+            false => self.through_water(v),
+        }
+    }
+
     fn bilinear_vjp(
         &self,
         v: &DVector<f64>,
         w: &DVector<f64>,
         current: &Vec6,
     ) -> Result<ForceCotangents> {
+        let Some(water) = self.water()? else {
+            return Ok(self.bilinear_row(v, w, current, None));
+        };
+        let (direction, virtual_direction) =
+            (self.direction(v, current), self.virtual_direction(w));
+        let (momenta, momenta_virtual) =
+            (water.momenta(&direction), water.momenta(&virtual_direction));
+        let pair = water.linearised.gradient(&virtual_direction, &direction)?;
+        let carried = [&momenta, &momenta_virtual, &self.from_submerged(&pair)];
+        Ok(self.bilinear_row(v, w, current, Some(carried.map(Vec::as_slice))))
+    }
+
+    /// With the water's momenta of both velocities, and the slopes of their energy.
+    fn bilinear_row(
+        &self,
+        v: &DVector<f64>,
+        w: &DVector<f64>,
+        current: &Vec6,
+        water: Option<[&[Vec6]; 3]>,
+    ) -> ForceCotangents {
         let tree = &self.system.tree;
         let rho = self.parameters.density();
         let mut out = ForceCotangents::zeros(self);
@@ -75,17 +154,7 @@ impl Linearisation<'_> {
             bar.pose[b] -= cross_force(twist, &h_virtual) + cross_force(virt, &h);
             rigid_parameters_vjp(self, b, virt, twist, &mut out.parameters);
         }
-        if let Some(water) = self.water()? {
-            let direction = if *current == Vec6::zeros() {
-                self.virtual_direction(v)
-            } else {
-                self.through_water(v)
-            };
-            let virtual_direction = self.virtual_direction(w);
-            let (momenta, momenta_virtual) =
-                (water.momenta(&direction), water.momenta(&virtual_direction));
-            let pair = water.linearised.gradient(&virtual_direction, &direction)?;
-            let pair = self.from_submerged(&pair);
+        if let Some([momenta, momenta_virtual, pair]) = water {
             for (b, _) in self.system.submerged() {
                 let relative = fields.twist[b] - current;
                 let virt = &fields.virtual_twist[b];
@@ -101,6 +170,6 @@ impl Linearisation<'_> {
         let (q_bar, v_bar) = tree.reverse(&self.kinematics, v, Virtual::User(w), &fields, bar);
         out.q += q_bar;
         out.v += v_bar;
-        Ok(out)
+        out
     }
 }

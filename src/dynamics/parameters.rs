@@ -273,6 +273,11 @@ impl Parameters {
         self.values.clone()
     }
 
+    /// The same, borrowed.
+    pub fn as_slice(&self) -> &[f64] {
+        &self.values
+    }
+
     /// Inverse of [`Parameters::to_vec`] with the same table; `None` if the length is wrong.
     pub fn with_values(&self, values: &[f64]) -> Option<Self> {
         (values.len() == self.values.len()).then(|| Self {
@@ -307,7 +312,11 @@ impl Parameters {
         Ok(())
     }
 
-    fn place(&self, name: &str) -> Result<usize> {
+    /// Where the value of this name stands in [`Parameters::to_vec`].
+    ///
+    /// # Errors
+    /// A name that isn't in the table.
+    pub fn place(&self, name: &str) -> Result<usize> {
         self.names().position(|n| n == name).ok_or_else(|| {
             let known: Vec<&str> = self.names().collect();
             Error::input(

@@ -1,7 +1,10 @@
 //! The kinematic tree and the reverse of its velocity fields.
 
 use super::JointModel;
-use crate::adjoint::lie::{Pose, Vec6, cross_force, cross_motion};
+use crate::adjoint::lie::{
+    Mat3, Pose, Vec3, Vec6, cross_force, cross_motion, exp_jacobian, exp_jacobian_inverse,
+    exp_jacobian_inverse_jvp, exp_matrix,
+};
 use nalgebra::{DMatrix, DVector};
 use std::ops::Range;
 
@@ -191,6 +194,29 @@ impl Tree {
             .into()
     }
 
+    /// Tangents of [`Tree::integrate`] along those of q and of xi, a column for each direction.
+    pub fn integrate_jvp(
+        &self,
+        xi: &DVector<f64>,
+        q: &DMatrix<f64>,
+        along: &DMatrix<f64>,
+    ) -> DMatrix<f64> {
+        let mut out = q + along;
+        for (rows, theta) in self.rotations(xi) {
+            let turned = exp_matrix(&theta) * q.fixed_rows::<3>(rows)
+                + exp_jacobian(&theta) * along.fixed_rows::<3>(rows);
+            out.fixed_rows_mut::<3>(rows).copy_from(&turned);
+        }
+        out
+    }
+
+    /// First rows of the angular velocities in v of joints with a quaternion, each with the rotation vector in `xi`.
+    fn rotations(&self, xi: &DVector<f64>) -> impl Iterator<Item = (usize, Vec3)> {
+        let rows = |l: &Link| Some(l.v.start + l.joint.quaternion_at()?);
+        let rows = self.links.iter().filter_map(rows);
+        rows.map(|rows| (rows, xi.fixed_rows::<3>(rows).into_owned()))
+    }
+
     /// Rates of the chart coordinates at generalised velocity `v`.
     pub fn chart_rate(&self, xi: &DVector<f64>, v: &DVector<f64>) -> DVector<f64> {
         let [out] = self.joints(|l| [l.joint.chart_rate(l.of_v(xi), l.of_v(v))]);
@@ -206,6 +232,67 @@ impl Tree {
     ) -> (DVector<f64>, DVector<f64>) {
         let of = |l: &Link| l.joint.chart_rate_vjp(l.of_v(xi), l.of_v(v), l.of_v(bar));
         self.joints(|l| of(l).into()).into()
+    }
+
+    /// Tangents of [`Tree::chart_rate`] along those of xi and of v, a column for each direction.
+    pub fn chart_rate_jvp(
+        &self,
+        xi: &DVector<f64>,
+        v: &DVector<f64>,
+        xi_along: &DMatrix<f64>,
+        along: &DMatrix<f64>,
+    ) -> DMatrix<f64> {
+        let mut out = along.clone();
+        for (rows, theta) in self.rotations(xi) {
+            let rate = v.fixed_rows::<3>(rows).into_owned();
+            let unit = |k| exp_jacobian_inverse_jvp(&theta, &rate, &Vec3::ith(k, 1.0));
+            let bent = Mat3::from_columns(&[unit(0), unit(1), unit(2)]);
+            let turned = exp_jacobian_inverse(&theta) * along.fixed_rows::<3>(rows)
+                + bent * xi_along.fixed_rows::<3>(rows);
+            out.fixed_rows_mut::<3>(rows).copy_from(&turned);
+        }
+        out
+    }
+
+    /// Derivatives of [`Tree::chart_momentum`] with respect to q, xi and p̂, nv × nv each: joint by joint, from the transposes of its entries.
+    pub fn chart_momentum_slopes(
+        &self,
+        q: &DVector<f64>,
+        xi: &DVector<f64>,
+        hat: &DVector<f64>,
+    ) -> [DMatrix<f64>; 3] {
+        self.blocks(|l, z| {
+            l.joint
+                .chart_momentum_vjp(l.of_q(q), l.of_v(xi), l.of_v(hat), z)
+        })
+    }
+
+    /// X(q) of all joints, nv × nv.
+    pub fn frame_matrix(&self, q: &DVector<f64>) -> DMatrix<f64> {
+        let [out] = self.blocks(|l, z| [l.joint.frame_momentum_transpose(l.of_q(q), z)]);
+        out
+    }
+
+    /// Matrices with a block for each joint on the diagonal, whose rows are what `row` makes of its unit vectors.
+    pub fn blocks<const N: usize>(
+        &self,
+        row: impl Fn(&Link, &[f64]) -> [Vec<f64>; N],
+    ) -> [DMatrix<f64>; N] {
+        let n = self.velocities();
+        let mut out = [const { () }; N].map(|()| DMatrix::zeros(n, n));
+        for l in &self.links {
+            let mut unit = vec![0.0; l.v.len()];
+            for k in 0..l.v.len() {
+                unit[k] = 1.0;
+                for (out, row) in out.iter_mut().zip(row(l, &unit)) {
+                    for (j, x) in l.v.clone().zip(row) {
+                        out[(l.v.start + k, j)] = x;
+                    }
+                }
+                unit[k] = 0.0;
+            }
+        }
+        out
     }
 
     /// Momentum conjugate to the chart coordinates `xi` around `q`, from frame momentum.
@@ -271,6 +358,38 @@ impl Tree {
             out.push(base + combine(&kinematics.columns, l, v));
         }
         out
+    }
+
+    /// Spatial displacements of all bodies along the tangent `dq`, and the tangents of their twists along it and `dv`.
+    pub fn twists_jvp(
+        &self,
+        kinematics: &Kinematics,
+        v: &DVector<f64>,
+        dq: &DVector<f64>,
+        dv: &DVector<f64>,
+    ) -> [Vec<Vec6>; 2] {
+        let displacements = self.twists(kinematics, dq);
+        let mut out: Vec<Vec6> = Vec::with_capacity(self.links.len());
+        for l in &self.links {
+            let (base, moved) = l.parent.map_or((Vec6::zeros(), Vec6::zeros()), |p| {
+                (out[p], displacements[p])
+            });
+            let own = combine(&kinematics.columns, l, v);
+            // dX v, entry by entry from the transpose.
+            let mut bent = Vec6::zeros();
+            let mut unit = vec![0.0; l.v.len()];
+            for (k, i) in l.v.clone().enumerate() {
+                unit[k] = 1.0;
+                let entry = l.joint.frame_velocity_vjp(l.of_v(v), &unit);
+                let along: f64 = entry.iter().zip(l.of_v(dq)).map(|(a, b)| a * b).sum();
+                bent += kinematics.frame_columns[i] * along;
+                unit[k] = 0.0;
+            }
+            // The columns move with the parent.
+            let carried = cross_motion(&moved, &own);
+            out.push(base + carried + bent + combine(&kinematics.columns, l, dv));
+        }
+        [displacements, out]
     }
 
     /// Adds each body's six-vector to its parent's, leaves first: the composite over subtrees.

@@ -4,7 +4,7 @@ use super::Sample;
 use crate::dynamics::{Parameters, State, StateBar};
 use crate::scene::Scene;
 use crate::{Error, Result};
-use nalgebra::DVector;
+use nalgebra::{DMatrix, DVector};
 
 /// The error of a number that isn't finite.
 fn left(place: String, quantity: String, value: f64, what: &str) -> Error {
@@ -116,6 +116,24 @@ pub(super) fn bars(
         let name = parameters.names().nth(i).unwrap_or_default();
         error(format!("parameter {name}"), x)
     })
+}
+
+/// Of the tangents of a state.
+pub(super) fn tangents(
+    scene: &Scene,
+    step: usize,
+    q: &DMatrix<f64>,
+    y: &DMatrix<f64>,
+) -> Result<()> {
+    for (what, tangents) in [("coordinate", q), ("momentum", y)] {
+        let rows = tangents.nrows();
+        each(tangents.iter(), |i, x| {
+            let label = &scene.velocity_labels()[i % rows];
+            let quantity = format!("tangent {} of the {what} of {label}", i / rows);
+            left(format!("step {step}"), quantity, x, "tangents")
+        })?;
+    }
+    Ok(())
 }
 
 /// A mass matrix of which rounding is all that is left: the run has blown up.

@@ -1,78 +1,149 @@
-//! The linearisation of a rollout: its last state against its first and its controls.
+//! Linearisations: of every step of a rollout, and of its last state against its first and its controls.
 
 use super::Rollout;
-use super::trajectory::Seed;
+use super::step_map::{BESIDE, Columns, StepMap};
 use crate::Result;
-use crate::dynamics::{StateBar, StepBar};
-use nalgebra::DMatrix;
+use crate::dynamics::State;
+use nalgebra::{DMatrix, DVector};
 use rayon::prelude::*;
+use std::ops::Range;
 
-/// Derivatives of the last state x_N of a rollout, x = (q, v) with the coordinates in their tangent space.
+/// Derivatives of a state x = (q, v), the coordinates in their tangent space.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Jacobians {
-    /// ∂x_N / ∂x₀, 2nv × 2nv.
+    /// With respect to the state before it, or to that at the start: 2nv × 2nv.
     pub state: DMatrix<f64>,
-    /// ∂x_N / ∂u, 2nv × (controls · N): the controls of the first step, then those of the second, …
+    /// With respect to the controls of the steps between, 2nv × (controls · steps): those of the first step, then those of the second, …
     pub controls: DMatrix<f64>,
+    /// With respect to the parameters that were asked for, in that order: 2nv × parameters.
+    pub parameters: DMatrix<f64>,
 }
 
 impl Rollout {
-    /// Jacobians of the last state, all rows in one reverse sweep: each step is evaluated, and its stages factored, once. Of a
-    /// rollout of one step, the A and B of x₁ ≈ A x₀ + B u. Each row is that of [`Rollout::vjp`], to the bit.
+    /// Jacobians of the last state. Of a rollout of one step, the A and B of x₁ ≈ A x₀ + B u. Each row is that of
+    /// [`Rollout::vjp`], to rounding.
     ///
     /// # Errors
     /// As [`Rollout::vjp`].
     pub fn jacobians(&self) -> Result<Jacobians> {
-        let system = self.simulator.system();
-        let (nv, nu) = (system.tree.velocities(), system.controls);
+        self.jacobians_with(&[])
+    }
+
+    /// The same with those of the parameters of these names.
+    ///
+    /// # Errors
+    /// As there, and a name that no parameter has.
+    pub fn jacobians_with(&self, parameters: &[&str]) -> Result<Jacobians> {
         let trajectory = self.simulator.trajectory(&self.controls);
-        let (states, steps) = (self.states(), self.steps());
-        let time = |n: usize| trajectory.stepper.time(&states[n]);
-        let at = |n: usize| {
-            let e = trajectory.stepper.linearise(&states[n].q);
-            e.map_err(|e| e.at_time(time(n)))
-        };
-        let zero = Seed::zeros(nv);
-        let end = at(steps)?;
-        let mut rows = (0..2 * nv)
-            .into_par_iter()
-            .map(|row| {
-                let StateBar { q, y: v } = StateBar::unit(nv, row);
-                let mut seed = Seed::zeros(nv);
-                (seed.q, seed.v) = (q, v);
-                let read = &self.samples()[steps].v;
-                let bar = trajectory.seed_vjp(&end, &states[steps], read, &seed)?;
-                Ok(bar.state)
-            })
-            .collect::<Result<Vec<StateBar>>>()?;
-        let mut controls = DMatrix::zeros(2 * nv, nu * steps);
-        let mut first = None;
-        for (n, record) in self.tape.records().iter().enumerate().rev() {
-            let step = trajectory.linearise(record)?;
-            let before = rows.par_iter().map(|row| step.vjp(row, &zero));
-            let before = before.collect::<Result<Vec<_>>>()?;
-            rows.clear();
-            for (i, (state, partial)) in before.into_iter().enumerate() {
-                for (k, u) in partial.control.iter().enumerate() {
-                    controls[(i, n * nu + k)] = *u;
-                }
-                rows.push(state);
+        let columns = self.map_columns(&trajectory, parameters)?;
+        let (states, samples, steps) = (self.states(), self.samples(), self.steps());
+        let nu = columns.of_controls().len();
+        let end = trajectory.at(&states[steps].q, samples[steps].time)?;
+        let velocity = columns.velocity(&trajectory, &end, &states[steps], &samples[steps].v)?;
+        let mut rows = Jacobians::of_end(&columns, &velocity);
+        rows.controls = DMatrix::zeros(rows.state.nrows(), nu * steps);
+        let mut to = steps;
+        while to > 0 {
+            let chunk = to.saturating_sub(BESIDE)..to;
+            let maps = self.step_maps(&trajectory, &columns, chunk.clone())?;
+            for (n, StepMap { next, .. }) in chunk.clone().zip(maps).rev() {
+                let range = |r: Range<usize>| next.columns_range(r);
+                let before = &rows.state * range(columns.state());
+                let control = &rows.state * range(columns.of_controls());
+                rows.parameters += &rows.state * range(columns.of_parameters());
+                rows.controls.columns_mut(n * nu, nu).copy_from(&control);
+                rows.state = before;
             }
-            first = Some(step);
+            to = chunk.start;
         }
         // y₀ = y(q₀, v₀).
-        let e = first.as_ref().map_or(&end, |step| step.linearisation());
-        let start = |row: &StateBar| {
-            let mut bar = StepBar::zeros(e);
-            bar.state.q = row.q.clone();
-            let (stepper, v) = (&trajectory.stepper, &self.initial_velocity);
-            stepper.conserved_vjp(e, v, &row.y, &mut bar)?;
-            self.simulator.forget_driven(&mut bar.state.q, &mut bar.v);
-            let StateBar { q, .. } = bar.state;
-            Ok(StateBar { q, y: bar.v })
-        };
-        let found = rows.par_iter().map(start).collect::<Result<Vec<_>>>()?;
-        let state = StateBar::stacked(nv, &found);
-        Ok(Jacobians { state, controls })
+        let e = trajectory.at(&states[0].q, samples[0].time)?;
+        let conserved = columns.conserved(&trajectory, &e, &self.initial_velocity)?;
+        rows.start(&columns, &conserved);
+        let nv = rows.state.nrows() / 2;
+        for mut row in rows.state.row_iter_mut() {
+            let part = |from: usize| DVector::from_fn(nv, |i, _| row[from + i]);
+            let (mut q, mut v) = (part(0), part(nv));
+            self.simulator.forget_driven(&mut q, &mut v);
+            for i in 0..nv {
+                (row[i], row[nv + i]) = (q[i], v[i]);
+            }
+        }
+        Ok(rows)
+    }
+
+    /// A and B of x_{n+1} ≈ A x_n + B u_n for every step, the controller's feedback included, and the derivatives with respect to the parameters of these
+    /// names at a given x_n. Steps are taken on all cores; the numbers don't depend on how many there are. What no change of the state can move
+    /// (coordinates of joints that a motion drives, velocities of all that are driven or held) has zero columns.
+    ///
+    /// # Errors
+    /// As [`Rollout::jacobians_with`].
+    pub fn step_jacobians(&self, parameters: &[&str]) -> Result<Vec<Jacobians>> {
+        let trajectory = self.simulator.trajectory(&self.controls);
+        let columns = self.map_columns(&trajectory, parameters)?;
+        let (states, samples, steps) = (self.states(), self.samples(), self.steps());
+        let each = (0..steps).into_par_iter().map(|n| {
+            let step = trajectory.linearise(&self.tape.records()[n])?;
+            let map = step.map(&columns)?;
+            let e = step.linearisation();
+            let conserved = columns.conserved(&trajectory, e, &samples[n].v)?;
+            Ok((map, conserved))
+        });
+        let made = each.collect::<Result<Vec<(StepMap, DMatrix<f64>)>>>()?;
+        let end = trajectory.at(&states[steps].q, samples[steps].time)?;
+        let last = columns.velocity(&trajectory, &end, &states[steps], &samples[steps].v)?;
+        let after = made.iter().skip(1).map(|(map, _)| &map.velocity);
+        let each = made.iter().zip(after.chain([&last])).zip(states);
+        let one =
+            |(((map, conserved), velocity), state): ((&(StepMap, _), &DMatrix<f64>), &State)| {
+                let end = Jacobians::of_end(&columns, velocity);
+                let range = |r: Range<usize>| map.next.columns_range(r);
+                let mut out = Jacobians {
+                    state: &end.state * range(columns.state()),
+                    controls: &end.state * range(columns.of_controls()),
+                    parameters: end.parameters + &end.state * range(columns.of_parameters()),
+                };
+                out.start(&columns, conserved);
+                let split = trajectory.stepper.split_at(state);
+                let nv = out.state.nrows() / 2;
+                for i in 0..nv {
+                    for (gone, column) in [(split.moved[i], i), (split.is_driven[i], nv + i)] {
+                        if gone {
+                            out.state.column_mut(column).fill(0.0);
+                        }
+                    }
+                }
+                out
+            };
+        Ok(each.map(one).collect())
+    }
+}
+
+impl Jacobians {
+    /// Those of (q, v) at a state with respect to (q, y) there, from the velocity's.
+    fn of_end(columns: &Columns, velocity: &DMatrix<f64>) -> Self {
+        let nv = velocity.nrows();
+        let mut state = DMatrix::zeros(2 * nv, 2 * nv);
+        state.view_mut((0, 0), (nv, nv)).fill_with_identity();
+        let own = velocity.columns_range(columns.state());
+        state.rows_mut(nv, nv).copy_from(&own);
+        let mut parameters = DMatrix::zeros(2 * nv, columns.of_parameters().len());
+        let own = velocity.columns_range(columns.of_parameters());
+        parameters.rows_mut(nv, nv).copy_from(&own);
+        Self {
+            state,
+            controls: DMatrix::zeros(2 * nv, 0),
+            parameters,
+        }
+    }
+
+    /// From derivatives with respect to (q, y) at the start to those with respect to (q, v), y(q, v) being given.
+    fn start(&mut self, columns: &Columns, conserved: &DMatrix<f64>) {
+        let nv = conserved.nrows();
+        let by_y = self.state.columns(nv, nv).into_owned();
+        let through = &by_y * conserved;
+        self.parameters += through.columns_range(columns.of_parameters());
+        self.state.columns_mut(nv, nv).fill(0.0);
+        self.state += through.columns_range(columns.state());
     }
 }

@@ -22,7 +22,9 @@ mod sample;
 mod settings;
 mod simulator;
 mod start;
+mod step_map;
 mod summary;
+mod tangents;
 mod trajectory;
 
 pub use controls::Controls;
@@ -42,6 +44,7 @@ pub use sample::Sample;
 pub use settings::Settings;
 pub use simulator::{AddedMass, Simulator};
 pub use summary::Summary;
+pub use tangents::{Displacement, Tangents, Variables};
 
 pub use crate::assembly::Choices;
 pub use crate::policy::{

@@ -1,6 +1,6 @@
 //! Scalars of a trajectory and their derivatives with respect to what is observed.
 
-use super::observable::{observable, transpose};
+use super::observable::{differentiable, observable};
 use super::{Cotangents, Gradient, Rollout};
 use crate::scene::BodyId;
 use crate::{Error, Result};
@@ -176,7 +176,7 @@ pub fn final_velocity(index: usize, target: f64, weight: f64) -> Sum {
     at_end(Of::Velocity(index), &[target], weight)
 }
 
-/// `weight · (x − target)²` at the end, x an entry of an observable that has a transpose ([`super::observable`]), by its name.
+/// `weight · (x − target)²` at the end, x an entry of an observable that has derivatives ([`super::observable`]), by its name.
 pub fn final_observable(name: impl Into<String>, entry: usize, target: f64, weight: f64) -> Sum {
     at_end(Of::Observable(name.into(), entry), &[target], weight)
 }
@@ -247,7 +247,7 @@ impl Objective for Sum {
                 Of::Observable(name, entry) => {
                     // Entries of the value and of its cotangent must be the same ones.
                     let rows: usize = observable(name)?.shape(system).iter().product();
-                    if transpose(name)?.tangents(system) != rows {
+                    if differentiable(name)?.tangents(system) != rows {
                         return Err(Error::input(
                             "objective: observable",
                             name,
@@ -323,7 +323,7 @@ impl Objective for Sum {
                 },
                 Of::Observable(name, entry) => {
                     let system = rollout.simulator().system();
-                    let rows = transpose(name).map_or(0, |t| t.tangents(system));
+                    let rows = differentiable(name).map_or(0, |t| t.tangents(system));
                     let bars = out.observables.entry(name.clone());
                     let bars = bars.or_insert_with(|| DMatrix::zeros(rows, columns));
                     (bars, *entry)

@@ -1,6 +1,6 @@
 //! A trajectory, and its gradient.
 
-use super::observable::{Reading, observable, transpose, velocity};
+use super::observable::{Reading, differentiable, observable, velocity};
 use super::trajectory::Seed;
 use super::{Cotangents, GapReport, Gradient, Initial, Sample, Simulator};
 use crate::adjoint::step::{self, Tape};
@@ -307,7 +307,7 @@ impl Rollout {
         let given = c.observables.iter().map(|(name, x)| (name.as_str(), x));
         let mut parts = Vec::new();
         for (name, x) in poses.into_iter().chain(given) {
-            parts.push((transpose(name)?, x));
+            parts.push((differentiable(name)?, x));
         }
         let seed = |n: usize| {
             let columns = parts.iter().map(|(o, x)| (*o, x.column(n)));
@@ -331,7 +331,7 @@ impl Rollout {
             ("controls", &c.controls, z.controls.shape()),
         ];
         for (name, x) in &c.observables {
-            let rows = transpose(name)?.tangents(self.simulator.system());
+            let rows = differentiable(name)?.tangents(self.simulator.system());
             parts.push((name, x, (rows, self.steps() + 1)));
         }
         for (name, given, right) in parts {

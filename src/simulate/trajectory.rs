@@ -1,6 +1,6 @@
 //! A rollout as steps with transposes: controller, integrator and observations together.
 
-use super::observable::{Observed, ObservedBars, Transpose};
+use super::observable::{Differentiable, Observed, ObservedBars};
 use super::{Observation, Sample, Simulator, finite};
 use crate::adjoint::lie::Vec6;
 use crate::adjoint::step::Step;
@@ -25,7 +25,7 @@ pub(super) struct Seed {
     pub q: DVector<f64>,
     pub v: DVector<f64>,
     /// Of other observables.
-    pub observables: Vec<(&'static dyn Transpose, DVector<f64>)>,
+    pub observables: Vec<(&'static dyn Differentiable, DVector<f64>)>,
 }
 
 /// What the transpose of one step yields beside the state's cotangent.
@@ -146,6 +146,11 @@ impl<'a> Trajectory<'a> {
         Ok((bar.state, partial))
     }
 
+    /// The system with its derivatives at a configuration of the trajectory; an error has the time.
+    pub fn at(&self, q: &DVector<f64>, time: f64) -> Result<Linearisation<'a>> {
+        self.stepper.linearise(q).map_err(|e| e.at_time(time))
+    }
+
     /// An error of a step at a state, with the time, and with what it comes from.
     fn explain(&self, error: Error, state: &State) -> Error {
         let error = finite::blown_up(&self.simulator.scene, state, error);
@@ -181,8 +186,8 @@ impl<'a> Trajectory<'a> {
 
 /// A step of a trajectory with its controller, linearised.
 pub(super) struct ControlledStep<'t, 'a> {
-    trajectory: &'t Trajectory<'a>,
-    step: LinearisedStep<'t, 'a>,
+    pub trajectory: &'t Trajectory<'a>,
+    pub step: LinearisedStep<'t, 'a>,
 }
 
 impl<'a> ControlledStep<'_, 'a> {
@@ -227,22 +232,11 @@ impl<'a> ControlledStep<'_, 'a> {
     }
 }
 
-impl Seed {
-    /// All zero.
-    pub fn zeros(velocities: usize) -> Self {
-        Self {
-            q: DVector::zeros(velocities),
-            v: DVector::zeros(velocities),
-            observables: Vec::new(),
-        }
-    }
-}
-
 /// Transposes of observables at a state with the velocity `v`, added to its cotangent and to those of q and the parameters.
 fn observables_vjp(
     e: &Linearisation,
     v: &DVector<f64>,
-    seeds: &[(&'static dyn Transpose, DVector<f64>)],
+    seeds: &[(&'static dyn Differentiable, DVector<f64>)],
     v_bar: &mut DVector<f64>,
     bar: &mut StepBar,
 ) {
@@ -278,7 +272,7 @@ fn observables_vjp(
 }
 
 /// What the controller sees at a state.
-fn observation<'a>(state: &'a State, v: &'a DVector<f64>, time: f64) -> Observation<'a> {
+pub(super) fn observation<'a>(state: &'a State, v: &'a DVector<f64>, time: f64) -> Observation<'a> {
     Observation {
         step: state.step,
         time,
@@ -289,7 +283,7 @@ fn observation<'a>(state: &'a State, v: &'a DVector<f64>, time: f64) -> Observat
 }
 
 /// A controller's list is empty or has one entry per item.
-fn expect_length(what: &str, given: usize, expected: usize, item: &str) -> Result<()> {
+pub(super) fn expect_length(what: &str, given: usize, expected: usize, item: &str) -> Result<()> {
     if given == 0 || given == expected {
         return Ok(());
     }
@@ -352,8 +346,7 @@ impl Step for Trajectory<'_> {
         sample: &Sample,
         seed: &Seed,
     ) -> Result<(StateBar, Partial)> {
-        let e = self.stepper.linearise(&state.q);
-        let e = e.map_err(|e| e.at_time(sample.time))?;
+        let e = self.at(&state.q, sample.time)?;
         let bar = self.seed_vjp(&e, state, &sample.v, seed)?;
         let parted = self.finished(state, bar, Vec::new());
         parted.map_err(|e| e.at_time(sample.time))

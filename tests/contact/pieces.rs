@@ -2,10 +2,10 @@
 
 use super::tools::{above_floor, contact, touching, under_gravity};
 use crate::support::{CONTACT_INTEGRATORS, check_gradient, simulator};
-use hydrograd::dynamics::{Input, Integrator, StateBar, StateTangent};
+use hydrograd::dynamics::{Input, InputTangents, Integrator, StateBar, StateTangents};
 use hydrograd::scene::{Body, Fluid, Joint, Scene, Shape};
 use hydrograd::{Controls, Fidelity, Settings, Simulator};
-use nalgebra::DVector;
+use nalgebra::{DMatrix, DVector};
 
 fn pieces(simulator: &Simulator, steps: usize) -> Vec<usize> {
     let rollout = simulator
@@ -124,15 +124,12 @@ fn tangent_and_transpose_of_a_step_in_pieces() {
         let tree = &simulator.system().tree;
         let nv = tree.velocities();
         let wave = |k: f64| DVector::from_fn(nv, |i, _| (k * i as f64 + k).sin());
-        let along = StateTangent {
-            q: 0.01 * wave(1.3),
-            y: 0.1 * wave(2.1),
-        };
+        let (dq, dy) = (0.01 * wave(1.3), 0.1 * wave(2.1));
         let du = DVector::from_fn(6, |i, _| (0.7 * i as f64).cos());
         let make = |h: f64| {
             let mut at = state.clone();
-            at.q = tree.integrate(&at.q, &(h * &along.q));
-            at.y += h * &along.y;
+            at.q = tree.integrate(&at.q, &(h * &dq));
+            at.y += h * &dy;
             let e = stepper.linearise(&at.q).unwrap();
             let v = stepper.velocity(&e, &at).unwrap();
             let input = Input {
@@ -144,7 +141,17 @@ fn tangent_and_transpose_of_a_step_in_pieces() {
         let (_, record) = make(0.0);
         assert!(record.pieces() > 1);
         let step = stepper.linearise_step(&record).unwrap();
-        let tangent = step.jvp(&along, &du).unwrap();
+        let column = |x: &DVector<f64>| DMatrix::from_column_slice(x.len(), 1, x.as_slice());
+        let along = StateTangents {
+            q: column(&dq),
+            y: column(&dy),
+        };
+        let inputs = InputTangents {
+            control: column(&du),
+            ..InputTangents::zeros(6, 1)
+        };
+        let dv = step.velocity_jvp(&along, &inputs).unwrap();
+        let tangent = step.jvp(&along, &dv, &inputs).unwrap();
         // Momenta, which need no chart.
         let h = 1e-6;
         let differences = (make(h).0.y - make(-h).0.y) / (2.0 * h);
@@ -156,9 +163,9 @@ fn tangent_and_transpose_of_a_step_in_pieces() {
             y: wave(0.9),
         };
         let back = step.state_vjp(&bar).unwrap();
-        let forth = bar.q.dot(&tangent.q) + bar.y.dot(&tangent.y);
-        let back = back.state.q.dot(&along.q) + back.state.y.dot(&along.y) + back.control.dot(&du);
-        assert!((forth - back).abs() < 1e-9 * forth.abs(), "{forth} {back}");
+        let forth = bar.q.dot(&tangent.q.column(0)) + bar.y.dot(&tangent.y.column(0));
+        let back = back.state.q.dot(&dq) + back.state.y.dot(&dy) + back.control.dot(&du);
+        assert!((forth - back).abs() < 1e-10 * forth.abs(), "{forth} {back}");
     }
 }
 

@@ -1,6 +1,7 @@
 //! Gradients of whole rollouts against central differences: every integrator, every fidelity,
 //! every kind of joint.
 
+use crate::support::forward::{self, check_forward};
 use crate::support::{INTEGRATORS, example};
 use hydrograd::dynamics::Integrator;
 use hydrograd::scene::{Body, BodyId, Fluid, Joint, Plane, Scene, Shape};
@@ -45,6 +46,8 @@ fn check(scene: &Scene, fidelity: Fidelity, integrator: Integrator, steps: usize
         "{} {fidelity:?} {integrator:?} {steps}: {:.1e}",
         scene.name, report.max_rel_error
     );
+    let what = format!("{} {fidelity:?} {integrator:?}", scene.name);
+    check_forward(&what, &simulator, steps.min(20), forward::LIMIT);
     assert!(
         report.max_rel_error <= 1e-6,
         "{} {fidelity:?} {integrator:?}: {:#?}",

@@ -13,7 +13,7 @@ use nalgebra::DVector;
 use std::sync::OnceLock;
 
 /// Those that solve contact.
-const INTEGRATORS: [Integrator; 4] = [
+pub const INTEGRATORS: [Integrator; 4] = [
     Integrator::MomentumEuler,
     Integrator::EnergyEuler,
     Integrator::Midpoint,
@@ -196,7 +196,7 @@ pub fn point() -> Point {
     }
 }
 
-fn evaluate<'a>(parameters: &'a Parameters, q: &DVector<f64>) -> Linearisation<'a> {
+pub fn evaluate<'a>(parameters: &'a Parameters, q: &DVector<f64>) -> Linearisation<'a> {
     system().linearise(parameters, q).unwrap()
 }
 
@@ -303,7 +303,7 @@ fn force_vjp(c: f64) -> Outcome {
     }))
 }
 
-fn stepper(parameters: &Parameters, integrator: Integrator) -> Stepper<'_> {
+pub fn stepper(parameters: &Parameters, integrator: Integrator) -> Stepper<'_> {
     Stepper {
         system: system(),
         parameters,

@@ -5,12 +5,12 @@ use super::multibody::tree_displacement;
 use super::tools::{Group, all, groups, vector_along, wavy};
 use hydrograd::adjoint::check::{Outcome, Rung};
 use hydrograd::dynamics::{
-    Drive, Input, Integrator, Linearisation, Owner, Parameters, Range, State, StateBar,
-    StateTangent, StepBar, Stepper, System,
+    Drive, Input, Integrator, Linearisation, Owner, Parameters, Range, State, StateBar, StepBar,
+    Stepper, System,
 };
 use hydrograd::scene::{Body, Drag, DragPart, Fluid, Joint, Motion, Plane, Scene, Shape, Spring};
 use hydrograd::simulate::{Pd, PdAxis};
-use hydrograd::{Controls, Settings, Simulator};
+use hydrograd::{Controls, Rollout, Settings, Simulator};
 use nalgebra::{DMatrix, DVector};
 use std::ops::ControlFlow;
 use std::sync::OnceLock;
@@ -36,7 +36,6 @@ pub fn rungs() -> Vec<Rung> {
         "dynamics::integrator::runge_kutta::Adjoint::vjp" =>
             |c| step(Integrator::Rk4, c).worst(step(Integrator::Rk2, c)),
         "dynamics::integrator::velocity_euler::Adjoint::vjp" => |c| step(Integrator::VelocityEuler, c),
-        "dynamics::integrator::record::LinearisedStep::jvp" => |c| all(INTEGRATORS.map(|i| step_jvp(i, c))),
         "simulate::record::Record::jvp" => record_jvp,
         "simulate::observable::angular_momentum::AngularMomentum::vjp" => |c| observed("angular_momentum", c),
         "simulate::observable::velocity::Velocities::vjp" => |c| observed("velocities", c),
@@ -44,7 +43,7 @@ pub fn rungs() -> Vec<Rung> {
 }
 
 /// A scene of every kind.
-fn scene() -> Scene {
+pub fn scene() -> Scene {
     let mut scene = Scene::new(Fluid {
         density: 998.0,
         current: [0.2, -0.1, 0.0],
@@ -138,7 +137,7 @@ fn scene() -> Scene {
     scene
 }
 
-fn simulator() -> &'static Simulator {
+pub fn simulator() -> &'static Simulator {
     static MADE: OnceLock<Simulator> = OnceLock::new();
     MADE.get_or_init(|| {
         Simulator::new(&scene(), Settings::default().tolerance(1e-13)).expect("the scene is right")
@@ -181,11 +180,11 @@ pub fn point() -> Point {
 }
 
 /// Length and number of the step in the checks.
-const DT: f64 = 0.02;
-const STEP: usize = 3;
+pub const DT: f64 = 0.02;
+pub const STEP: usize = 3;
 const TIME: f64 = DT * STEP as f64;
 
-fn stepper(parameters: &Parameters, integrator: Integrator) -> Stepper<'_> {
+pub fn stepper(parameters: &Parameters, integrator: Integrator) -> Stepper<'_> {
     Stepper {
         system: system(),
         parameters,
@@ -194,7 +193,7 @@ fn stepper(parameters: &Parameters, integrator: Integrator) -> Stepper<'_> {
     }
 }
 
-fn evaluate<'a>(parameters: &'a Parameters, q: &DVector<f64>) -> Linearisation<'a> {
+pub fn evaluate<'a>(parameters: &'a Parameters, q: &DVector<f64>) -> Linearisation<'a> {
     system().linearise(parameters, q).unwrap()
 }
 
@@ -384,12 +383,12 @@ fn inertial_force(c: f64) -> Outcome {
     check(true, &value, &p, &bar, c)
 }
 
-fn hold(names: &[&str]) -> Vec<bool> {
+pub fn hold(names: &[&str]) -> Vec<bool> {
     let bodies = system().bodies.iter();
     bodies.map(|b| names.contains(&b.name.as_str())).collect()
 }
 
-fn state(p: &Point, held: &[bool]) -> State {
+pub fn state(p: &Point, held: &[bool]) -> State {
     State {
         step: STEP,
         q: p.q.clone(),
@@ -400,7 +399,7 @@ fn state(p: &Point, held: &[bool]) -> State {
 }
 
 /// A point whose `v` is the conserved variable that belongs to the usual velocity.
-fn state_point(integrator: Integrator) -> Point {
+pub fn state_point(integrator: Integrator) -> Point {
     let p = point();
     let s = stepper(&p.parameters, integrator);
     let y = s.conserved(&evaluate(&p.parameters, &p.q), &p.v);
@@ -504,7 +503,7 @@ fn step_with(integrator: Integrator, before: &[&str], now: &[&str], c: f64) -> O
 }
 
 /// The same scene in still water, with no joint that is driven, and one that just presses on its limit.
-fn still() -> &'static Simulator {
+pub fn still() -> &'static Simulator {
     static MADE: OnceLock<Simulator> = OnceLock::new();
     MADE.get_or_init(|| {
         let mut scene = scene();
@@ -602,7 +601,7 @@ fn released(c: f64) -> Outcome {
     all(INTEGRATORS.map(|integrator| step_with(integrator, &["arm", "coin"], &["tail"], c)))
 }
 
-const INTEGRATORS: [Integrator; 6] = [
+pub const INTEGRATORS: [Integrator; 6] = [
     Integrator::MomentumEuler,
     Integrator::EnergyEuler,
     Integrator::Midpoint,
@@ -612,7 +611,7 @@ const INTEGRATORS: [Integrator; 6] = [
 ];
 
 /// A vector without the entries of joints with a given motion, which no change of a state moves.
-fn unmoved(mut d: DVector<f64>) -> DVector<f64> {
+pub fn unmoved(mut d: DVector<f64>) -> DVector<f64> {
     for (link, drive) in system().tree.links().iter().zip(&system().drives) {
         if matches!(drive, Drive::Motion(_)) {
             d.rows_mut(link.v.start, link.v.len()).fill(0.0);
@@ -621,59 +620,8 @@ fn unmoved(mut d: DVector<f64>) -> DVector<f64> {
     d
 }
 
-/// The tangent of a step against differences of it, and against its transpose.
-fn step_jvp(integrator: Integrator, c: f64) -> Outcome {
-    let p = state_point(integrator);
-    let s = stepper(&p.parameters, integrator);
-    let (n, tree) = (p.v.len(), &system().tree);
-    let make = |q: DVector<f64>, y: DVector<f64>, u: DVector<f64>| {
-        let at = state(
-            &Point {
-                q,
-                v: y,
-                ..p.clone()
-            },
-            &[],
-        );
-        let e = s.linearise(&at.q).unwrap();
-        let v = s.velocity(&e, &at).unwrap();
-        let input = Input {
-            control: u,
-            hold: Vec::new(),
-        };
-        s.step(&e, &at, &v, &input).unwrap()
-    };
-    let (base, record) = make(p.q.clone(), p.v.clone(), p.u.clone());
-    let along = StateTangent {
-        q: unmoved(wavy(n, 2.1, 0.05)),
-        y: wavy(n, 3.1, 0.2),
-    };
-    let du = wavy(p.u.len(), 4.1, 1.0);
-    let step = s.linearise_step(&record).unwrap();
-    let tangent = step.jvp(&along, &du).unwrap();
-    let bar = StateBar {
-        q: wavy(n, 5.1, 1.0),
-        y: wavy(n, 6.1, 1.0),
-    };
-    let back = step.state_vjp(&bar).unwrap();
-    let forth = bar.q.dot(&tangent.q) + bar.y.dot(&tangent.y);
-    let back = back.state.q.dot(&along.q) + back.state.y.dot(&along.y) + back.control.dot(&du);
-    assert!(
-        (forth - back).abs() <= 1e-9 * forth.abs(),
-        "{forth} is not {back}"
-    );
-    let value = |h: f64| {
-        let q = tree.integrate(&p.q, &(h * &along.q));
-        let next = make(q, &p.v + h * &along.y, &p.u + h * &du).0;
-        let moved = tree_displacement(tree, &base.q, &next.q);
-        moved.iter().chain(next.y.iter()).copied().collect()
-    };
-    let all: Vec<f64> = tangent.q.iter().chain(tangent.y.iter()).copied().collect();
-    vector_along(value, (c * DVector::from_vec(all)).as_slice())
-}
-
 /// The usual point, driven joints with the velocity of their motions in the simulator's step number [`STEP`].
-fn moving_point() -> Point {
+pub fn moving_point() -> Point {
     let mut p = point();
     let time = simulator().time_step() * STEP as f64;
     for (link, drive) in system().tree.links().iter().zip(&system().drives) {
@@ -686,24 +634,24 @@ fn moving_point() -> Point {
     p
 }
 
-/// An observable, read at a state by itself: through its momentum, which the state carries, and directly.
-fn observed(name: &str, c: f64) -> Outcome {
-    let run = |p: &Point| {
-        let mut simulator = simulator().clone();
-        let mut parameters = p.parameters.clone();
-        for entry in p.parameters.table() {
-            if matches!(entry.declared.range, Range::Zero(_)) {
-                parameters.set(&entry.name, 0.0).unwrap();
-            }
+/// The rollout of a simulator from a point's coordinates and velocity, with its parameters and these controls.
+pub fn run(mut simulator: Simulator, p: &Point, controls: &DMatrix<f64>) -> Rollout {
+    let mut parameters = p.parameters.clone();
+    for entry in p.parameters.table() {
+        if matches!(entry.declared.range, Range::Zero(_)) {
+            parameters.set(&entry.name, 0.0).unwrap();
         }
-        simulator.set_parameters(parameters).unwrap();
-        let (q, v) = left_to_motions(&p.q, &p.v);
-        let start = simulator.state(STEP, &q, &v).unwrap();
-        let none = Controls::zeros(&simulator, 0);
-        let rollout = simulator.rollout_from(&start, &none, |_| ControlFlow::Continue(()));
-        rollout.unwrap()
-    };
-    // Differences go to both sides: values that are zero would become negative.
+    }
+    simulator.set_parameters(parameters).unwrap();
+    let (q, v) = left_to_motions(&p.q, &p.v);
+    let start = simulator.state(STEP, &q, &v).unwrap();
+    let controls = Controls::from_matrix(&simulator, controls.clone()).unwrap();
+    let rollout = simulator.rollout_from(&start, &controls, |_| ControlFlow::Continue(()));
+    rollout.unwrap()
+}
+
+/// A moving point without parameters of zero: differences go to both sides, and they would become negative.
+pub fn observed_point() -> Point {
     let mut p = moving_point();
     let entries = p.parameters.table().iter().zip(p.parameters.to_vec());
     let zero = entries.filter(|(e, x)| *x == 0.0 && matches!(e.declared.range, Range::NotNegative));
@@ -711,6 +659,13 @@ fn observed(name: &str, c: f64) -> Outcome {
     for name in &names {
         p.parameters.set(name, 0.1).unwrap();
     }
+    p
+}
+
+/// An observable, read at a state by itself: through its momentum, which the state carries, and directly.
+fn observed(name: &str, c: f64) -> Outcome {
+    let run = |p: &Point| run(simulator().clone(), p, &DMatrix::zeros(p.u.len(), 0));
+    let p = observed_point();
     let base = run(&p);
     let bar = wavy(base.observe(name).unwrap().nrows(), 5.1, 1.0);
     let mut seed = base.zero_cotangents();
@@ -728,7 +683,7 @@ fn observed(name: &str, c: f64) -> Outcome {
 }
 
 /// Coordinates and velocities with those of driven joints left to their motions.
-fn left_to_motions(q: &DVector<f64>, v: &DVector<f64>) -> (DVector<f64>, DVector<f64>) {
+pub fn left_to_motions(q: &DVector<f64>, v: &DVector<f64>) -> (DVector<f64>, DVector<f64>) {
     let (mut q, mut v) = (q.clone(), v.clone());
     for (drive, link) in system().drives.iter().zip(system().tree.links()) {
         if matches!(drive, Drive::Motion(_)) {
@@ -741,9 +696,8 @@ fn left_to_motions(q: &DVector<f64>, v: &DVector<f64>) -> (DVector<f64>, DVector
     (q, v)
 }
 
-/// The same of a simulator's step, in q and v, with a controller.
-fn record_jvp(c: f64) -> Outcome {
-    let mut simulator = simulator().clone();
+/// Feedback from the last two coordinates to the first two controls.
+pub fn feedback() -> Pd {
     let tree = &system().tree;
     let (nq, nv, nu) = (tree.coordinates(), tree.velocities(), system().controls);
     let axes = (0..nu.min(2)).map(|k| PdAxis {
@@ -754,11 +708,19 @@ fn record_jvp(c: f64) -> Outcome {
         stiffness: 2.0,
         damping: 0.7,
     });
-    simulator.set_policy(Box::new(Pd {
+    Pd {
         controls: nu,
         velocities: nv,
         axes: axes.collect(),
-    }));
+    }
+}
+
+/// The tangent of a simulator's step, in q and v, with a controller.
+fn record_jvp(c: f64) -> Outcome {
+    let mut simulator = simulator().clone();
+    let tree = &system().tree;
+    let (nv, nu) = (tree.velocities(), system().controls);
+    simulator.set_policy(Box::new(feedback()));
     let p = moving_point();
     let u = wavy(nu, 1.8, 3.0);
     let make = |q: &DVector<f64>, v: &DVector<f64>, u: &DVector<f64>| {

@@ -9,6 +9,7 @@ mod contact;
 mod coupling;
 mod dynamics;
 mod force;
+mod forward;
 mod multibody;
 mod policy;
 mod scan;
@@ -31,6 +32,7 @@ fn registered() -> Vec<(String, Rung)> {
         coupling::rungs(),
         dynamics::rungs(),
         force::rungs(),
+        forward::rungs(),
         policy::rungs(),
     ] {
         out.extend(part.into_iter().map(|r| (r.name.to_string(), r)));
@@ -141,10 +143,6 @@ const THROUGH: &[(&str, &str)] = &[
         "dynamics::force::drag::Drag::jvp",
     ),
     (
-        "dynamics::force::drag::Law::vjp",
-        "dynamics::force::drag::Drag::vjp",
-    ),
-    (
         "dynamics::balance::rigid_parameters_vjp",
         "dynamics::momentum::Linearisation::momentum_vjp",
     ),
@@ -183,7 +181,56 @@ const THROUGH: &[(&str, &str)] = &[
     ),
     (
         "dynamics::integrator::record::LinearisedStep::state_vjp",
+        "dynamics::integrator::euler::Adjoint::vjp",
+    ),
+    // And of their tangents.
+    (
+        "dynamics::integrator::readout::solve_jvp",
+        "dynamics::integrator::readout::Stepper::velocity_jvp",
+    ),
+    (
+        "dynamics::integrator::start::Start::advance_jvp",
+        "dynamics::integrator::euler::Adjoint::jvp",
+    ),
+    (
+        "dynamics::integrator::start::Start::arrive_jvp",
+        "dynamics::integrator::euler::Adjoint::jvp",
+    ),
+    (
+        "dynamics::integrator::euler::AdjointStage::solve_jvp",
+        "dynamics::integrator::euler::Adjoint::jvp",
+    ),
+    (
+        "dynamics::integrator::contact::Adjoint::solve_jvp",
+        "dynamics::integrator::contact::Adjoint::apply_jvp",
+    ),
+    (
+        "dynamics::integrator::contact::Adjoint::velocity_jvp",
+        "dynamics::integrator::contact::Adjoint::apply_jvp",
+    ),
+    (
+        "dynamics::integrator::record::Part::jvp",
+        "dynamics::integrator::euler::Adjoint::jvp",
+    ),
+    (
+        "dynamics::integrator::record::Part::velocity_jvp",
+        "dynamics::integrator::readout::Stepper::velocity_jvp",
+    ),
+    (
         "dynamics::integrator::record::LinearisedStep::jvp",
+        "dynamics::integrator::euler::Adjoint::jvp",
+    ),
+    (
+        "dynamics::integrator::record::LinearisedStep::velocity_jvp",
+        "dynamics::integrator::readout::Stepper::velocity_jvp",
+    ),
+    (
+        "simulate::observable::joint::Coordinates::jvp",
+        "simulate::tangents::Rollout::jvp",
+    ),
+    (
+        "simulate::observable::joint::Velocities::jvp",
+        "simulate::tangents::Rollout::jvp",
     ),
     // Observables that any rollout's seeds begin with.
     (

@@ -179,7 +179,7 @@ fn joint_frame_bias(c: f64) -> Outcome {
 }
 
 /// Every kind of joint, on the world and on other bodies.
-fn tree() -> Tree {
+pub fn tree() -> Tree {
     let place = |x: f64| {
         Pose::new(
             exp_matrix(&Vec3::new(0.3 * x, -0.2, 0.5)),
@@ -200,7 +200,7 @@ fn tree() -> Tree {
     ])
 }
 
-fn start(tree: &Tree) -> DVector<f64> {
+pub fn start(tree: &Tree) -> DVector<f64> {
     tree.integrate(&tree.origin(), &wavy(tree.velocities(), 0.3, 0.6))
 }
 

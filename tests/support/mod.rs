@@ -5,6 +5,7 @@ pub mod bodies;
 #[cfg(feature = "cli")]
 pub mod command;
 pub mod falling;
+pub mod forward;
 pub mod grasps;
 pub mod reference;
 
@@ -68,7 +69,7 @@ pub fn run(simulator: &Simulator, steps: usize) -> Rollout {
     rollout
 }
 
-/// Holds the gradient of a rollout against differences along `directions` in each group of variables.
+/// Holds the gradient of a rollout against differences along `directions` in each group of variables, and forward mode against it.
 #[track_caller]
 pub fn check_gradient(
     what: &str,
@@ -85,6 +86,7 @@ pub fn check_gradient(
     };
     let report = gradcheck::gradcheck(simulator, &settings).unwrap();
     println!("{what}: {:.1e}", report.max_rel_error);
+    forward::check_forward(what, simulator, steps, forward::LIMIT);
     assert!(
         report.max_rel_error <= limit,
         "{what}: {:#?}",

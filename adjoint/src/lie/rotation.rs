@@ -99,11 +99,10 @@ pub fn exp_jacobian_inverse(theta: &Vec3) -> Mat3 {
     Mat3::identity() - 0.5 * k + c * k * k
 }
 
-/// Cotangent of `θ` from the cotangent of `exp_jacobian_inverse(θ) ω`.
-pub fn exp_jacobian_inverse_vjp(theta: &Vec3, omega: &Vec3, rate_bar: &Vec3) -> Vec3 {
-    let s = theta.norm_squared();
+/// Coefficient of `[θ]×²` in [`exp_jacobian_inverse`] as a function of `s = θ²`, with its derivative.
+fn inverse_coefficient(s: f64) -> (f64, f64) {
     let (a, b, _) = coefficients(s);
-    let (c, dc) = if s < SERIES {
+    if s < SERIES {
         (
             (1.0 + s / 60.0 * (1.0 + s / 42.0 * (1.0 + s / 40.0))) / 12.0,
             (1.0 + s / 21.0 * (1.0 + s * 3.0 / 80.0)) / 720.0,
@@ -112,7 +111,25 @@ pub fn exp_jacobian_inverse_vjp(theta: &Vec3, omega: &Vec3, rate_bar: &Vec3) -> 
         let (da, db) = coefficient_slopes(s);
         let c = (1.0 - a / (2.0 * b)) / s;
         (c, ((a * db - da * b) / (2.0 * b * b) - c) / s)
-    };
+    }
+}
+
+/// Tangent of `exp_jacobian_inverse(θ) ω` along `dtheta`.
+pub fn exp_jacobian_inverse_jvp(theta: &Vec3, omega: &Vec3, dtheta: &Vec3) -> Vec3 {
+    let s = theta.norm_squared();
+    let (c, dc) = inverse_coefficient(s);
+    let (t, w, d) = (theta, omega, dtheta);
+    // As in the transpose.
+    let twice = t * t.dot(w) - w * s;
+    -0.5 * d.cross(w)
+        + 2.0 * dc * t.dot(d) * twice
+        + c * (d * t.dot(w) + t * d.dot(w) - 2.0 * w * t.dot(d))
+}
+
+/// Cotangent of `θ` from the cotangent of `exp_jacobian_inverse(θ) ω`.
+pub fn exp_jacobian_inverse_vjp(theta: &Vec3, omega: &Vec3, rate_bar: &Vec3) -> Vec3 {
+    let s = theta.norm_squared();
+    let (c, dc) = inverse_coefficient(s);
     let (t, w, r) = (theta, omega, rate_bar);
     // −½ θ×ω, then c(s) θ×(θ×ω) with θ×(θ×ω) = θ(θ·ω) − ω s.
     let twice = t * t.dot(w) - w * s;

@@ -3,7 +3,7 @@
 
 use super::{ForceModel, ForceParts, LoadBars, Loads, Moving, Outside, Together, Velocity};
 use crate::adjoint::drag::{
-    Element, Part, quadratic_drag, quadratic_drag_jvp, quadratic_drag_vjp, resistance,
+    Element, Part, quadratic_drag, quadratic_drag_derivative, quadratic_drag_jvp, resistance,
 };
 use crate::adjoint::lie::{Mat6, Pose, Vec6, cross_force};
 use crate::dynamics::Parameters;
@@ -113,10 +113,11 @@ impl Law {
         }
     }
 
-    fn vjp(&self, nu: &Vec6, bar: &Vec6) -> Vec6 {
+    /// Derivative of [`Law::wrench`].
+    fn slope(&self, nu: &Vec6) -> Mat6 {
         match self {
-            Self::Linear(resistance) => -(**resistance * bar),
-            Self::Quadratic(surface, part) => quadratic_drag_vjp(surface, *part, nu, bar),
+            Self::Linear(resistance) => -**resistance,
+            Self::Quadratic(surface, part) => quadratic_drag_derivative(surface, *part, nu),
         }
     }
 }
@@ -166,28 +167,38 @@ impl ForceModel for Drag {
     }
 
     fn vjp(&self, at: &Moving, z: &Velocity, bar: &mut LoadBars) {
+        self.vjps(at, std::slice::from_ref(z), std::slice::from_mut(bar));
+    }
+
+    fn vjps(&self, at: &Moving, z: &[Velocity], bars: &mut [LoadBars]) {
         let parameters = at.place.parameters;
         for d in &self.bodies {
             let b = d.body;
             let pose = &at.place.poses[b];
-            let (relative, virt) = (at.relative(b), &z.twists[b]);
-            let (nu, zeta) = (pose.twist_to_body(&relative), pose.twist_to_body(virt));
+            let relative = at.relative(b);
+            let nu = pose.twist_to_body(&relative);
             let unit = d.law.wrench(&nu);
-            let power = zeta.dot(&unit);
-            match d.law {
-                Law::Linear(_) => bar.parameters[d.coefficient] += power,
-                Law::Quadratic(..) => {
-                    bar.parameters[d.coefficient] += parameters.density() * power;
-                    bar.parameters[DENSITY] += parameters[d.coefficient] * power;
-                }
-            }
             let scale = d.scale(parameters);
-            if scale != 0.0 {
-                // The rotation of the frame acts on both twists.
-                let wrench = pose.wrench_to_world(&(scale * unit));
-                let nu_bar = pose.wrench_to_world(&(scale * d.law.vjp(&nu, &zeta)));
-                bar.twist[b] += nu_bar;
-                bar.pose[b] -= cross_force(&relative, &nu_bar) + cross_force(virt, &wrench);
+            // The sums over the surface, once for all.
+            let slope = (scale != 0.0).then(|| d.law.slope(&nu));
+            for (z, bar) in z.iter().zip(bars.iter_mut()) {
+                let virt = &z.twists[b];
+                let zeta = pose.twist_to_body(virt);
+                let power = zeta.dot(&unit);
+                match d.law {
+                    Law::Linear(_) => bar.parameters[d.coefficient] += power,
+                    Law::Quadratic(..) => {
+                        bar.parameters[d.coefficient] += parameters.density() * power;
+                        bar.parameters[DENSITY] += parameters[d.coefficient] * power;
+                    }
+                }
+                if let Some(slope) = &slope {
+                    // The rotation of the frame acts on both twists.
+                    let wrench = pose.wrench_to_world(&(scale * unit));
+                    let nu_bar = pose.wrench_to_world(&(scale * slope.tr_mul(&zeta)));
+                    bar.twist[b] += nu_bar;
+                    bar.pose[b] -= cross_force(&relative, &nu_bar) + cross_force(virt, &wrench);
+                }
             }
         }
     }

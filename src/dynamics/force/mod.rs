@@ -197,6 +197,13 @@ pub trait ForceModel: Send + Sync {
     /// Adds the transpose of [`ForceModel::add`] in all its arguments: the gradient of its power on the velocity `z`.
     fn vjp(&self, at: &Moving, z: &Velocity, bar: &mut LoadBars);
 
+    /// [`ForceModel::vjp`] for several velocities at one motion; to be given where they share work.
+    fn vjps(&self, at: &Moving, z: &[Velocity], bars: &mut [LoadBars]) {
+        for (z, bar) in z.iter().zip(bars) {
+            self.vjp(at, z, bar);
+        }
+    }
+
     /// Whether it is solved with contact, at the end of a step and in the velocity that the step moves by: a damper that is too stiff to act at any other. It is then
     /// linear in the twists of the bodies, symmetric, takes energy away, and acts on bodies alone; integrators that don't solve contact refuse it.
     fn solved_with_contact(&self) -> bool {

@@ -13,7 +13,7 @@
 use super::split::{Split, share};
 use super::stages::{ContactVelocities, Stages};
 use super::start::Start;
-use super::{State, StateBar, StepBar};
+use super::{State, StateBar, StateTangents, StepBar, StepTangents};
 use crate::adjoint::solve::Definite;
 use crate::dynamics::{Dual, Evaluation};
 use crate::{Error, Result};
@@ -148,7 +148,7 @@ pub(super) fn reached(start: &Start, velocities: &ContactVelocities, hat: DVecto
     start.next_state(start.advance(after), hat)
 }
 
-/// What the transposes of [`solve`] and [`apply`] need.
+/// What the derivatives of [`solve`] and [`apply`] need.
 pub(super) struct Adjoint<'s> {
     pub velocities: &'s ContactVelocities,
     acting: Acting,
@@ -175,6 +175,70 @@ impl<'s> Adjoint<'s> {
             Acting::Solved(hessian(e, split, &velocities.after, start.stepper.dt)?)
         };
         Ok(Self { velocities, acting })
+    }
+
+    /// Tangents of [`solve`], from those of the velocity before contact.
+    fn solve_jvp(
+        &self,
+        start: &Start,
+        along: &StepTangents,
+        before: &DMatrix<f64>,
+    ) -> Result<DMatrix<f64>> {
+        let Acting::Solved(hessian) = &self.acting else {
+            return Ok(before.clone());
+        };
+        let (e, near, split) = (start.e, start.near, start.split);
+        let velocities = self.velocities;
+        let change = &velocities.after - &velocities.before;
+        let pressed = near.contact_force_slopes(&velocities.after, Dual::User, &split.free);
+        let inertia = e.mass_slopes(&change, &split.free)?;
+        let moved = &e.mass_matrix * before;
+        let right = moved + start.stepper.dt * pressed.along(along.q, None, along.inputs)
+            - inertia.along(along.q, None, along.inputs);
+        let mut after = before.clone();
+        let free = hessian.solve_columns(&split.take_rows(&right));
+        for (k, &i) in split.free.iter().enumerate() {
+            after.row_mut(i).copy_from(&free.row(k));
+        }
+        Ok(after)
+    }
+
+    /// Tangents of [`apply`], from those of the velocity and of the momenta before contact: of the state, and of the velocity after it.
+    pub fn apply_jvp(
+        &self,
+        start: &Start,
+        along: &StepTangents,
+        before: &DMatrix<f64>,
+        mut hat: DMatrix<f64>,
+    ) -> Result<(StateTangents, DMatrix<f64>)> {
+        let velocity = &self.velocities.after;
+        let after = self.solve_jvp(start, along, before)?;
+        if !matches!(self.acting, Acting::No) {
+            let entries = &start.split.free;
+            let pressed = start
+                .near
+                .contact_force_slopes(velocity, Dual::Frame, entries);
+            hat += start.stepper.dt * pressed.along(along.q, Some(&after), along.inputs);
+        }
+        let next = StateTangents {
+            q: start.advance_jvp(velocity, along.q, &after),
+            y: start.next_momenta(hat),
+        };
+        Ok((next, after))
+    }
+
+    /// Tangents of the velocity after contact alone, for integrators that carry it.
+    pub fn velocity_jvp(
+        &self,
+        start: &Start,
+        along: &StepTangents,
+        before: &DMatrix<f64>,
+    ) -> Result<StateTangents> {
+        let after = self.solve_jvp(start, along, before)?;
+        Ok(StateTangents {
+            q: start.advance_jvp(&self.velocities.after, along.q, &after),
+            y: after,
+        })
     }
 
     /// Transpose of [`solve`]: from the cotangent of the velocity after contact to that of the one before; the rest is added to

@@ -21,11 +21,13 @@
 
 use super::stages::ContactVelocities;
 use super::start::Start;
-use super::{State, StateBar, StepBar, readout};
+use super::{State, StateBar, StateTangents, StepBar, StepTangents, readout};
 use crate::adjoint::solve::Definite;
+use crate::dynamics::slopes::columns;
 use crate::dynamics::{Dual, Evaluation, Linearisation};
 use crate::{Error, Result};
 use nalgebra::{DMatrix, DVector};
+use rayon::prelude::*;
 
 /// Part of the kinetic energy that contact takes at which the correction is halved.
 const FADE: f64 = 1e-4;
@@ -154,12 +156,6 @@ impl Parts {
     }
 }
 
-/// A map of columns.
-fn columns(m: &DMatrix<f64>, map: impl Fn(&DVector<f64>) -> DVector<f64>) -> DMatrix<f64> {
-    let mapped: Vec<DVector<f64>> = m.column_iter().map(|c| map(&c.into_owned())).collect();
-    DMatrix::from_columns(&mapped)
-}
-
 /// The state after the correction of a step that ends in `next`.
 pub(super) fn close(
     start: &Start,
@@ -179,7 +175,7 @@ pub(super) fn close(
     Ok(next)
 }
 
-/// What the transpose of [`close`] needs.
+/// What the derivatives of [`close`] need.
 pub(super) struct Closure<'a> {
     end: Linearisation<'a>,
     hat: DVector<f64>,
@@ -212,6 +208,37 @@ impl<'a> Closure<'a> {
             hat: next.y.clone(),
             parts,
         }))
+    }
+
+    /// Tangents of the momenta that [`close`] ends with, from those of the state before it and of the velocities before and after contact: its
+    /// entries' transposes, which are as many as there are velocities.
+    pub fn jvp(
+        &self,
+        start: &Start<'_, 'a>,
+        velocities: &ContactVelocities,
+        along: &StepTangents,
+        next: &StateTangents,
+        [before, after]: [&DMatrix<f64>; 2],
+    ) -> Result<DMatrix<f64>> {
+        let nv = start.v.len();
+        let row = |i: &usize| {
+            let mut bar = StepBar::zeros(start.e);
+            let entry = StateBar::unit(nv, nv + i);
+            let own = self.vjp(start, velocities, &entry, &mut bar)?;
+            let [before_bar, after_bar] = &own.velocities;
+            Ok(bar.along(along)
+                + next.q.tr_mul(&own.next.q)
+                + next.y.tr_mul(&own.next.y)
+                + before.tr_mul(before_bar)
+                + after.tr_mul(after_bar))
+        };
+        let rows = start.split.free.par_iter().map(row);
+        let rows = rows.collect::<Result<Vec<_>>>()?;
+        let mut out = DMatrix::zeros(nv, next.y.ncols());
+        for (i, row) in start.split.free.iter().zip(rows) {
+            out.row_mut(*i).tr_copy_from(&row);
+        }
+        Ok(out)
     }
 
     /// Transpose of [`close`]: cotangents of the start, the control and the parameters are added to `bar`.

@@ -15,9 +15,9 @@ use super::contact;
 use super::energy::{self, Closure};
 use super::plan::{Halt, MOST};
 use super::split::{Split, share};
-use super::stages::{ContactVelocities, Stages, Transposed};
+use super::stages::{ContactVelocities, Stages, StepDerivatives};
 use super::start::Start;
-use super::{Integrator, State, StateBar, StepBar, Stepper};
+use super::{Integrator, State, StateBar, StateTangents, StepBar, StepTangents, Stepper};
 use crate::adjoint::lie::angular;
 use crate::dynamics::Linearisation;
 use crate::{Error, Result};
@@ -243,7 +243,7 @@ pub(super) fn closed_step(start: &Start) -> std::result::Result<(State, Stages),
     }
 }
 
-/// What the transpose of a step needs.
+/// What the derivatives of a step need.
 pub(super) struct Adjoint<'s, 'a> {
     contact: contact::Adjoint<'s>,
     /// p̂ + Δt f.
@@ -273,7 +273,28 @@ impl<'s, 'a> Adjoint<'s, 'a> {
     }
 }
 
-impl<'a> Transposed<'a> for Adjoint<'_, 'a> {
+impl<'a> StepDerivatives<'a> for Adjoint<'_, 'a> {
+    fn jvp(&self, start: &Start<'_, 'a>, along: &StepTangents) -> Result<StateTangents> {
+        let (s, e, split) = (start.stepper, start.e, start.split);
+        let (q, inputs) = (along.q, along.inputs);
+        let before = &self.contact.velocities.before;
+        let force = e.force_slopes(before, &start.input.control, &split.free)?;
+        let momentum = e.momentum_slopes(before, &split.free)?;
+        let tree = &e.system.tree;
+        let [by_q, _, by_hat] = tree.chart_momentum_slopes(&e.q, &(s.dt * before), &self.reached);
+        // p̂ + Δt f at a given velocity; the stage's matrix holds what the velocity does.
+        let held = start.momentum_jvp(along)? + s.dt * force.along(q, None, inputs);
+        let right = by_q * q + by_hat * &held - momentum.along(q, None, inputs);
+        let v = self.stage.solve_jvp(split, &right)?;
+        let hat = held + s.dt * (force.v * &v);
+        let (mut next, after) = self.contact.apply_jvp(start, along, &v, hat)?;
+        if let Some(closure) = &self.closure {
+            let velocities = self.contact.velocities;
+            next.y = closure.jvp(start, velocities, along, &next, [&v, &after])?;
+        }
+        Ok(next)
+    }
+
     fn vjp(&self, start: &Start<'_, 'a>, next_bar: &StateBar) -> Result<StepBar> {
         let (s, e, split) = (start.stepper, start.e, start.split);
         let before = &self.contact.velocities.before;
@@ -304,10 +325,12 @@ impl<'a> Transposed<'a> for Adjoint<'_, 'a> {
     }
 }
 
-/// What the transpose of a stage needs.
+/// What the derivatives of a stage need.
 pub(super) struct AdjointStage {
     /// ∂f/∂v.
     pub rates: DMatrix<f64>,
+    /// The stage matrix.
+    pub matrix: DMatrix<f64>,
     /// Factor of the transposed stage matrix.
     factor: LU<f64, Dyn, Dyn>,
 }
@@ -324,7 +347,16 @@ impl AdjointStage {
         let rates = e.force_velocity_jacobian(v, &start.input.control)?;
         let matrix = stage_matrix(e, start.split, v, &rates, reached, rule);
         let factor = matrix.transpose().lu();
-        Ok(Self { rates, factor })
+        Ok(Self {
+            rates,
+            matrix,
+            factor,
+        })
+    }
+
+    /// dv, zero on driven entries, with stage matrix · dv_f = right_f: the factor is of all columns.
+    fn solve_jvp(&self, split: &Split, right: &DMatrix<f64>) -> Result<DMatrix<f64>> {
+        solve_columns(self.matrix.clone(), split, right)
     }
 
     /// w_f with (stage matrix)ᵀ w_f = v̄_f, zero on driven entries.
@@ -332,16 +364,30 @@ impl AdjointStage {
         if split.free.is_empty() {
             return Ok(DVector::zeros(v_bar.len()));
         }
-        let solution = self
-            .factor
-            .solve(&split.take(v_bar))
-            .ok_or_else(|| Error::Solver {
-                what: "adjoint of an implicit stage".into(),
-                iterations: 0,
-                residual: f64::INFINITY,
-                tolerance: 0.0,
-                remedy: "the stage matrix is singular: take a smaller time step".into(),
-            })?;
-        Ok(split.put(&solution))
+        let solution = self.factor.solve(&split.take(v_bar));
+        Ok(split.put(&solution.ok_or_else(|| singular("adjoint"))?))
+    }
+}
+
+/// Columns dv, zero on driven rows, with `matrix` · dv_f = right_f.
+pub(super) fn solve_columns(
+    matrix: DMatrix<f64>,
+    split: &Split,
+    right: &DMatrix<f64>,
+) -> Result<DMatrix<f64>> {
+    if split.free.is_empty() {
+        return Ok(DMatrix::zeros(right.nrows(), right.ncols()));
+    }
+    let solution = matrix.lu().solve(&split.take_rows(right));
+    Ok(split.put_rows(&solution.ok_or_else(|| singular("tangent"))?))
+}
+
+fn singular(what: &str) -> Error {
+    Error::Solver {
+        what: format!("{what} of an implicit stage"),
+        iterations: 0,
+        residual: f64::INFINITY,
+        tolerance: 0.0,
+        remedy: "the stage matrix is singular: take a smaller time step".into(),
     }
 }

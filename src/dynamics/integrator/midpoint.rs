@@ -2,7 +2,8 @@
 //!
 //! q_m = q ⊕ ½Δt v, M(q_m) v + p_rest = Xᵀ(q_m) (p̂ + ½Δt f(q_m, v, u)), q⁺ = q ⊕ Δt v,
 //! p̂⁺ = p̂ + Δt f. The velocity is found by Newton at fixed q_m (cheap) inside a fixed point in
-//! q_m (one evaluation each); the adjoint iterates the transpose of the same splitting.
+//! q_m (one evaluation each); the adjoint iterates the transpose of the same splitting, the tangent solves for all
+//! directions at once.
 //!
 //! With contact, q⁺ = q ⊕ Δt v_s and p̂⁺ = p̂ + Δt f + Δt g(q, v_s), where v_s follows from v by
 //! [`contact::solve`] at q: the position is stepped implicitly, so contact is stable at any stiffness, and of
@@ -11,15 +12,15 @@
 //! contact hasn't stopped: bodies about to touch may overlap there by half of what they approach in a step.
 
 use super::contact;
-use super::euler::{AdjointStage, Rule, solve_stage};
+use super::euler::{AdjointStage, Rule, solve_columns, solve_stage};
 use super::plan::Halt;
 use super::split::share;
-use super::stages::{ContactVelocities, Stages, Transposed};
+use super::stages::{ContactVelocities, Stages, StepDerivatives};
 use super::start::Start;
-use super::{State, StateBar, StepBar, Stepper};
+use super::{State, StateBar, StateTangents, StepBar, StepTangents, Stepper};
 use crate::dynamics::Linearisation;
 use crate::{Error, Result};
-use nalgebra::DVector;
+use nalgebra::{DMatrix, DVector};
 
 /// Relative change of the velocity at which the fixed point in q_m ends.
 const TOLERANCE: f64 = 1e-14;
@@ -84,7 +85,7 @@ pub(super) fn step(start: &Start) -> std::result::Result<(State, Stages), Halt> 
     .into())
 }
 
-/// What the transpose of a step needs.
+/// What the derivatives of a step need.
 pub(super) struct Adjoint<'s, 'a> {
     contact: contact::Adjoint<'s>,
     /// The system in the middle of the step.
@@ -108,7 +109,38 @@ impl<'s, 'a> Adjoint<'s, 'a> {
     }
 }
 
-impl<'a> Transposed<'a> for Adjoint<'_, 'a> {
+impl<'a> StepDerivatives<'a> for Adjoint<'_, 'a> {
+    fn jvp(&self, start: &Start<'_, 'a>, along: &StepTangents) -> Result<StateTangents> {
+        let (s, split, m) = (start.stepper, start.split, &self.middle);
+        let (q, inputs, nv) = (along.q, along.inputs, start.v.len());
+        let before = &self.contact.velocities.before;
+        let h = 0.5 * s.dt;
+        let force = m.force_slopes(before, &start.input.control, &split.free)?;
+        let momentum = m.momentum_slopes(before, &split.free)?;
+        // q_m by q and by v.
+        let advance = |q: &DMatrix<f64>, v: &DMatrix<f64>| {
+            let mut out = s.system.tree.integrate_jvp(&(h * before), q, &(h * v));
+            split.forget_moved_rows(&mut out);
+            out
+        };
+        let (one, none) = (DMatrix::identity(nv, nv), DMatrix::zeros(nv, nv));
+        let by_v = advance(&none, &one);
+        let middle = advance(q, &DMatrix::zeros(nv, q.ncols()));
+        let frame = m.frame_matrix();
+        // Derivative of Xᵀ(p̂ + h f) − M v − p_rest over q_m, which moves with v as well.
+        let bent =
+            frame.tr_mul(&(h * &force.q)) + m.frame_momentum_slope(&self.reached) - &momentum.q;
+        let matrix = &self.stage.matrix - split.block(&(bent * &by_v));
+        let p = start.momentum_jvp(along)?;
+        let held = &p + h * force.along(&middle, None, inputs);
+        let right = frame.tr_mul(&held) + m.frame_momentum_slope(&self.reached) * &middle
+            - momentum.along(&middle, None, inputs);
+        let v = solve_columns(matrix, split, &right)?;
+        let middle = middle + by_v * &v;
+        let hat = p + s.dt * force.along(&middle, Some(&v), inputs);
+        Ok(self.contact.apply_jvp(start, along, &v, hat)?.0)
+    }
+
     fn vjp(&self, start: &Start<'_, 'a>, next_bar: &StateBar) -> Result<StepBar> {
         let (s, split, m) = (start.stepper, start.split, &self.middle);
         let before = &self.contact.velocities.before;

@@ -30,10 +30,10 @@ mod start;
 mod velocity_euler;
 
 pub use plan::Stops;
-pub use record::{LinearisedStep, StepJacobians, StepRecord};
+pub use record::{LinearisedStep, StepRecord};
 pub use stages::ContactVelocities;
 
-use super::{Drive, Evaluation, ForceCotangents, Linearisation, Parameters, System};
+use super::{Drive, Evaluation, ForceCotangents, InputTangents, Linearisation, Parameters, System};
 use crate::Result;
 use nalgebra::{DMatrix, DVector};
 
@@ -102,13 +102,13 @@ pub struct StateBar {
     pub y: DVector<f64>,
 }
 
-/// Tangent of a state.
+/// Tangents of a state, a column for each direction.
 #[derive(Clone, Debug, PartialEq)]
-pub struct StateTangent {
-    /// Of q, in its tangent space (length nv).
-    pub q: DVector<f64>,
-    /// Of y.
-    pub y: DVector<f64>,
+pub struct StateTangents {
+    /// Of q, in its tangent space: nv × K.
+    pub q: DMatrix<f64>,
+    /// Of y, nv × K.
+    pub y: DMatrix<f64>,
 }
 
 impl StateBar {
@@ -120,14 +120,16 @@ impl StateBar {
             y: entry(nv),
         }
     }
+}
 
-    /// Such cotangents as rows of a matrix.
-    pub(crate) fn stacked(nv: usize, rows: &[Self]) -> DMatrix<f64> {
-        DMatrix::from_fn(rows.len(), 2 * nv, |i, j| match j < nv {
-            true => rows[i].q[j],
-            false => rows[i].y[j - nv],
-        })
-    }
+/// Tangents of all that a step starts from, a column for each direction.
+pub(super) struct StepTangents<'t> {
+    /// Of the coordinates and of y.
+    pub q: &'t DMatrix<f64>,
+    pub y: &'t DMatrix<f64>,
+    /// Of the velocity read out at the state.
+    pub v: &'t DMatrix<f64>,
+    pub inputs: &'t InputTangents,
 }
 
 /// What one step needs beside the state: the system, its parameters, the scheme.
@@ -203,6 +205,15 @@ impl StepBar {
             control: DVector::zeros(e.system.controls),
             parameters: e.parameters.zeros(),
         }
+    }
+
+    /// Products with directions of all that a step starts from.
+    fn along(&self, at: &StepTangents) -> DVector<f64> {
+        at.q.tr_mul(&self.state.q)
+            + at.y.tr_mul(&self.state.y)
+            + at.v.tr_mul(&self.v)
+            + at.inputs.control.tr_mul(&self.control)
+            + at.inputs.of_parameters(&self.parameters)
     }
 
     /// Adds `scale` times the cotangents of a force or momentum (configuration, control, parameters; not v).

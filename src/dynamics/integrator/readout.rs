@@ -1,11 +1,12 @@
 //! The velocity at a state, v = M(q)⁻¹ (Xᵀ p̂ − p_rest), and its transpose.
 
 use super::split::{Split, When};
-use super::{State, StepBar, Stepper};
+use super::{State, StateTangents, StepBar, Stepper};
 use crate::adjoint::solve::{Definite, smallest_scaled_eigenvalue};
-use crate::dynamics::{Evaluation, Linearisation};
+use crate::dynamics::slopes::columns;
+use crate::dynamics::{Evaluation, InputTangents, Linearisation};
 use crate::{Error, Result};
-use nalgebra::DVector;
+use nalgebra::{DMatrix, DVector};
 
 /// The free block of the mass matrix, factored.
 pub(super) fn factor(e: &Evaluation, split: &Split) -> Result<Definite> {
@@ -35,6 +36,22 @@ pub(super) fn solve(e: &Evaluation, split: &Split, hat: &DVector<f64>) -> Result
     Ok(&split.driven + split.put(&factor.solve(&split.take(&right))))
 }
 
+/// Tangents of [`solve`] along those of q, p̂ and the parameters: M dv = Xᵀ dp̂ + d(Xᵀ) p̂ − d(M v + p_rest).
+pub(super) fn solve_jvp(
+    e: &Linearisation,
+    split: &Split,
+    hat: &DVector<f64>,
+    v: &DVector<f64>,
+    at: &StateTangents,
+    inputs: &InputTangents,
+) -> Result<DMatrix<f64>> {
+    let momentum = e.momentum_slopes(v, &split.free)?;
+    let right = e.frame_matrix().tr_mul(&at.y) + e.frame_momentum_slope(hat) * &at.q
+        - momentum.along(&at.q, None, inputs);
+    let free = factor(e, split)?.solve_columns(&split.take_rows(&right));
+    Ok(split.put_rows(&free))
+}
+
 /// Transpose of [`solve`], added to `bar` (y is p̂ here).
 pub(super) fn solve_vjp(
     e: &Linearisation,
@@ -62,6 +79,25 @@ impl Stepper<'_> {
             return Ok(&split.driven + split.put(&split.take(&state.y)));
         }
         solve(e, &split, &state.y)
+    }
+
+    /// Tangents of [`Stepper::velocity`] along those of the state and, of the inputs, the parameters.
+    ///
+    /// # Errors
+    /// As the value, or a solve of the coupling.
+    pub fn velocity_jvp(
+        &self,
+        e: &Linearisation,
+        state: &State,
+        v: &DVector<f64>,
+        at: &StateTangents,
+        inputs: &InputTangents,
+    ) -> Result<DMatrix<f64>> {
+        let split = self.split_at(state);
+        if self.integrator.carries_velocity() {
+            return Ok(split.put_rows(&split.take_rows(&at.y)));
+        }
+        solve_jvp(e, &split, &state.y, v, at, inputs)
     }
 
     /// Transpose of [`Stepper::velocity`]: adds to the cotangents of the state and parameters.
@@ -102,6 +138,27 @@ impl Stepper<'_> {
         } else {
             e.frame_momentum(v)
         }
+    }
+
+    /// Tangents of [`Stepper::conserved`] along those of q, of v and, of the inputs, the parameters: Xᵀ dp̂ = dp − d(Xᵀ) p̂.
+    ///
+    /// # Errors
+    /// A solve of the coupling.
+    pub fn conserved_jvp(
+        &self,
+        e: &Linearisation,
+        v: &DVector<f64>,
+        q: &DMatrix<f64>,
+        along: &DMatrix<f64>,
+        inputs: &InputTangents,
+    ) -> Result<DMatrix<f64>> {
+        if self.integrator.carries_velocity() {
+            return Ok(along.clone());
+        }
+        let all: Vec<usize> = (0..v.len()).collect();
+        let momentum = e.momentum_slopes(v, &all)?.along(q, Some(along), inputs);
+        let user = momentum - e.frame_momentum_slope(&e.frame_momentum(v)) * q;
+        Ok(columns(&user, |p| e.frame_dual(p)))
     }
 
     /// Transpose of [`Stepper::conserved`]: cotangents of q (added to `bar.state.q`) and of v

@@ -5,14 +5,13 @@
 
 use super::plan::{Plan, Stops};
 use super::split::Split;
-use super::stages::{ContactVelocities, Stages, Transposed};
+use super::stages::{ContactVelocities, Stages, StepDerivatives};
 use super::start::Start;
-use super::{Input, Integrator, State, StateBar, StateTangent, StepBar, Stepper};
+use super::{Input, Integrator, State, StateBar, StateTangents, StepBar, StepTangents, Stepper};
 use super::{euler, midpoint, runge_kutta, velocity_euler};
 use crate::Result;
-use crate::dynamics::{Evaluation, Linearisation};
+use crate::dynamics::{Evaluation, InputTangents, Linearisation};
 use nalgebra::{DMatrix, DVector};
-use rayon::prelude::*;
 
 /// What a step leaves behind: where it started, what acted, how it was made, and its converged stages. It is small, and the only
 /// key to the step's derivatives ([`Stepper::linearise_step`]), which needn't iterate again.
@@ -98,16 +97,7 @@ struct Part<'s, 'a> {
     e: Linearisation<'a>,
     near: Option<Evaluation<'a>>,
     split: Split,
-    adjoint: Box<dyn Transposed<'a> + 's>,
-}
-
-/// Derivatives of the state after a step, q in its tangent space and then y.
-#[derive(Clone, Debug, PartialEq)]
-pub struct StepJacobians {
-    /// With respect to the state before it, in the same coordinates: 2nv × 2nv.
-    pub state: DMatrix<f64>,
-    /// With respect to the controls, 2nv × controls.
-    pub control: DMatrix<f64>,
+    derivatives: Box<dyn StepDerivatives<'a> + 's>,
 }
 
 impl<'a> Stepper<'a> {
@@ -143,7 +133,7 @@ impl<'a> Stepper<'a> {
                 input: &record.input,
                 split: &split,
             };
-            let adjoint: Box<dyn Transposed<'a> + 's> = match (stages, record.integrator) {
+            let derivatives: Box<dyn StepDerivatives<'a> + 's> = match (stages, record.integrator) {
                 (Stages::RungeKutta(f), _) => Box::new(runge_kutta::Adjoint::new(&start, f)?),
                 (Stages::Contact(v), Integrator::Midpoint) => {
                     Box::new(midpoint::Adjoint::new(&start, v)?)
@@ -161,7 +151,7 @@ impl<'a> Stepper<'a> {
                 e,
                 near,
                 split,
-                adjoint,
+                derivatives,
             })
         };
         let mut parts = record.parts();
@@ -178,9 +168,8 @@ impl<'a> Stepper<'a> {
 }
 
 impl<'a> Part<'_, 'a> {
-    /// Transpose of the piece.
-    fn vjp(&self, next_bar: &StateBar) -> Result<StepBar> {
-        let start = Start {
+    fn start(&self) -> Start<'_, 'a> {
+        Start {
             stepper: &self.stepper,
             e: &self.e,
             near: self.near.as_ref().unwrap_or(&self.e),
@@ -189,8 +178,30 @@ impl<'a> Part<'_, 'a> {
             v: self.v,
             input: &self.record.input,
             split: &self.split,
-        };
-        self.adjoint.vjp(&start, next_bar)
+        }
+    }
+
+    /// Tangents of the piece.
+    fn jvp(
+        &self,
+        state: &StateTangents,
+        v: &DMatrix<f64>,
+        inputs: &InputTangents,
+    ) -> Result<StateTangents> {
+        let (q, y) = (&state.q, &state.y);
+        let along = StepTangents { q, y, v, inputs };
+        self.derivatives.jvp(&self.start(), &along)
+    }
+
+    /// Transpose of the piece.
+    fn vjp(&self, next_bar: &StateBar) -> Result<StepBar> {
+        self.derivatives.vjp(&self.start(), next_bar)
+    }
+
+    /// Tangents of the velocity read out at its state.
+    fn velocity_jvp(&self, state: &StateTangents, inputs: &InputTangents) -> Result<DMatrix<f64>> {
+        self.stepper
+            .velocity_jvp(&self.e, &self.state, self.v, state, inputs)
     }
 
     /// Carries the cotangent of the velocity read out at its state on to the state.
@@ -237,38 +248,37 @@ impl<'a> LinearisedStep<'_, 'a> {
         Ok(bar)
     }
 
-    /// Jacobians of the next state at fixed controller, row by row from [`LinearisedStep::state_vjp`].
+    /// Tangents of [`Stepper::step`] along displacements of the state (q in its tangent space, y), with those of the velocity that is read out there,
+    /// and of the inputs; many directions cost little more than one.
     ///
     /// # Errors
-    /// As there.
-    pub fn jacobians(&self) -> Result<StepJacobians> {
-        let nv = self.record.v.len();
-        let rows = (0..2 * nv).into_par_iter();
-        let bars = rows.map(|row| self.state_vjp(&StateBar::unit(nv, row)));
-        let bars = bars.collect::<Result<Vec<StepBar>>>()?;
-        let control = |i: usize, j: usize| bars[i].control[j];
-        let control = DMatrix::from_fn(2 * nv, self.record.input.control.len(), control);
-        let states: Vec<StateBar> = bars.into_iter().map(|bar| bar.state).collect();
-        Ok(StepJacobians {
-            state: StateBar::stacked(nv, &states),
-            control,
-        })
+    /// A solve that misses its tolerance.
+    pub fn jvp(
+        &self,
+        state: &StateTangents,
+        v: &DMatrix<f64>,
+        inputs: &InputTangents,
+    ) -> Result<StateTangents> {
+        let mut next = self.first.jvp(state, v, inputs)?;
+        for part in &self.later {
+            let v = part.velocity_jvp(&next, inputs)?;
+            next = part.jvp(&next, &v, inputs)?;
+        }
+        Ok(next)
     }
 
-    /// Tangent of the next state along displacements of the state (q in its tangent space, y) and of the control, by
-    /// [`LinearisedStep::jacobians`]: for several displacements at one step, take those.
+    /// Tangents of the velocity read out at the state, along displacements of that and of the parameters.
     ///
     /// # Errors
-    /// As there.
-    pub fn jvp(&self, state: &StateTangent, control: &DVector<f64>) -> Result<StateTangent> {
-        let nv = self.record.v.len();
-        let all = self.jacobians()?;
-        let stacked = DVector::from_iterator(2 * nv, state.q.iter().chain(state.y.iter()).copied());
-        let out = all.state * stacked + all.control * control;
-        Ok(StateTangent {
-            q: out.rows(0, nv).into_owned(),
-            y: out.rows(nv, nv).into_owned(),
-        })
+    /// As [`LinearisedStep::jvp`].
+    pub fn velocity_jvp(
+        &self,
+        state: &StateTangents,
+        inputs: &InputTangents,
+    ) -> Result<DMatrix<f64>> {
+        let s = &self.first;
+        s.stepper
+            .velocity_jvp(&s.e, &self.record.state, &self.record.v, state, inputs)
     }
 }
 

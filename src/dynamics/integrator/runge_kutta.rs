@@ -6,12 +6,12 @@
 
 use super::readout;
 use super::split::{Split, When};
-use super::stages::{Forces, Stages, Tableau, Transposed};
+use super::stages::{Forces, Stages, StepDerivatives, Tableau};
 use super::start::Start;
-use super::{State, StateBar, StepBar};
+use super::{State, StateBar, StateTangents, StepBar, StepTangents};
 use crate::Result;
 use crate::dynamics::Linearisation;
-use nalgebra::DVector;
+use nalgebra::{DMatrix, DVector};
 
 /// The explicit midpoint rule.
 pub(super) const SECOND: Tableau = Tableau {
@@ -110,7 +110,7 @@ pub(super) fn step(start: &Start, tableau: &'static Tableau) -> Result<(State, S
     Ok((next, Stages::RungeKutta(Forces { tableau, all })))
 }
 
-/// What the transpose of a step needs.
+/// What the derivatives of a step need.
 pub(super) struct Adjoint<'a> {
     tableau: &'static Tableau,
     stages: Vec<RungeKuttaStage<'a>>,
@@ -136,7 +136,43 @@ impl<'a> Adjoint<'a> {
     }
 }
 
-impl<'a> Transposed<'a> for Adjoint<'a> {
+impl<'a> StepDerivatives<'a> for Adjoint<'a> {
+    fn jvp(&self, start: &Start<'_, 'a>, along: &StepTangents) -> Result<StateTangents> {
+        let (tree, dt) = (&start.stepper.system.tree, start.stepper.dt);
+        let (inputs, control) = (along.inputs, &start.input.control);
+        let mut momentum = start.momentum_jvp(along)?;
+        start.split.forget_driven_rows(&mut momentum);
+        let mut xi = DMatrix::zeros(momentum.nrows(), momentum.ncols());
+        let mut y = momentum.clone();
+        let mut last: Option<[DMatrix<f64>; 2]> = None;
+        for (i, stage) in self.stages.iter().enumerate() {
+            let e = stage.at(start);
+            let h = self.tableau.nodes[i] * dt;
+            let (stage_xi, p) = match &last {
+                Some([rate, force]) => (h * rate, &momentum + h * force),
+                None => (xi.clone(), momentum.clone()),
+            };
+            let mut q = tree.integrate_jvp(&stage.xi, along.q, &stage_xi);
+            stage.split.forget_moved_rows(&mut q);
+            let at = StateTangents { q, y: p };
+            let v = match stage.read_out {
+                true => along.v.clone(),
+                false => readout::solve_jvp(e, &stage.split, &stage.p, &stage.v, &at, inputs)?,
+            };
+            let rate = tree.chart_rate_jvp(&stage.xi, &stage.v, &stage_xi, &v);
+            let force = e.force_slopes(&stage.v, control, &stage.split.free)?;
+            let force = force.along(&at.q, Some(&v), inputs);
+            let weight = self.tableau.weights[i] * dt;
+            xi += weight * &rate;
+            y += weight * &force;
+            last = Some([rate, force]);
+        }
+        Ok(StateTangents {
+            q: start.arrive_jvp(&self.xi, along.q, &xi),
+            y: start.next_momenta(y),
+        })
+    }
+
     fn vjp(&self, start: &Start<'_, 'a>, next_bar: &StateBar) -> Result<StepBar> {
         let (tree, dt) = (&start.stepper.system.tree, start.stepper.dt);
         let mut bar = StepBar::zeros(start.e);

@@ -44,12 +44,38 @@ impl Split {
 
     /// Zeroes the entries whose value doesn't depend on the state: given motions.
     pub fn forget_moved(&self, x: &mut DVector<f64>) {
-        forget(&self.moved, x);
+        forget(&self.moved, x.as_mut_slice());
     }
 
     /// Zeroes driven entries.
     pub fn forget_driven(&self, x: &mut DVector<f64>) {
-        forget(&self.is_driven, x);
+        forget(&self.is_driven, x.as_mut_slice());
+    }
+
+    /// Zeroes driven rows.
+    pub fn forget_driven_rows(&self, x: &mut DMatrix<f64>) {
+        x.column_iter_mut()
+            .for_each(|mut x| forget(&self.is_driven, x.as_mut_slice()));
+    }
+
+    /// Zeroes rows whose value doesn't depend on the state.
+    pub fn forget_moved_rows(&self, x: &mut DMatrix<f64>) {
+        x.column_iter_mut()
+            .for_each(|mut x| forget(&self.moved, x.as_mut_slice()));
+    }
+
+    /// Free rows of a matrix.
+    pub fn take_rows(&self, x: &DMatrix<f64>) -> DMatrix<f64> {
+        x.select_rows(&self.free)
+    }
+
+    /// Scatter of free rows into zeros.
+    pub fn put_rows(&self, x: &DMatrix<f64>) -> DMatrix<f64> {
+        let mut out = DMatrix::zeros(self.driven.len(), x.ncols());
+        for (k, &i) in self.free.iter().enumerate() {
+            out.row_mut(i).copy_from(&x.row(k));
+        }
+        out
     }
 
     /// Sizes of free momenta, each weighed by the square root of its inertia.
@@ -60,7 +86,7 @@ impl Split {
     }
 }
 
-fn forget(entries: &[bool], x: &mut DVector<f64>) {
+fn forget(entries: &[bool], x: &mut [f64]) {
     for (x, _) in x.iter_mut().zip(entries).filter(|(_, gone)| **gone) {
         *x = 0.0;
     }

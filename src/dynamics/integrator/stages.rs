@@ -1,7 +1,7 @@
-//! What is kept of a step's stages, and what the transpose of a step is asked for.
+//! What is kept of a step's stages, and what the derivatives of a step are asked for.
 
 use super::start::Start;
-use super::{StateBar, StepBar};
+use super::{StateBar, StateTangents, StepBar, StepTangents};
 use crate::Result;
 use nalgebra::DVector;
 
@@ -61,8 +61,11 @@ impl Stages {
     }
 }
 
-/// What the transpose of a step needs beside its start.
-pub(super) trait Transposed<'a>: Send + Sync {
+/// What a step's derivatives need beside its start.
+pub(super) trait StepDerivatives<'a>: Send + Sync {
+    /// Tangents of the state after the step.
+    fn jvp(&self, start: &Start<'_, 'a>, along: &StepTangents) -> Result<StateTangents>;
+
     /// Transpose of the step.
     fn vjp(&self, start: &Start<'_, 'a>, next_bar: &StateBar) -> Result<StepBar>;
 }

@@ -2,10 +2,11 @@
 
 use super::plan::Plan;
 use super::split::{Split, When};
-use super::{Input, Integrator, State, StateBar, StepBar, Stepper};
+use super::{Input, Integrator, State, StateBar, StepBar, StepTangents, Stepper};
 use crate::Result;
+use crate::dynamics::slopes::unit;
 use crate::dynamics::{Evaluation, Linearisation};
-use nalgebra::DVector;
+use nalgebra::{DMatrix, DVector};
 
 /// The start of a step.
 #[derive(Clone, Copy)]
@@ -73,6 +74,17 @@ impl Start<'_, '_> {
         p
     }
 
+    /// Tangents of [`Start::momentum`].
+    pub fn momentum_jvp(&self, along: &StepTangents) -> Result<DMatrix<f64>> {
+        let mut p = along.y.clone();
+        for i in self.released() {
+            let mut row = StepBar::zeros(self.e);
+            self.momentum_vjp(&unit(p.nrows(), i), &mut row)?;
+            p.row_mut(i).tr_copy_from(&row.along(along));
+        }
+        Ok(p)
+    }
+
     /// Transpose of [`Start::momentum`], added to `bar`.
     pub fn momentum_vjp(&self, p_bar: &DVector<f64>, bar: &mut StepBar) -> Result<()> {
         let (e, v) = (self.e, self.v);
@@ -107,6 +119,18 @@ impl Start<'_, '_> {
         q
     }
 
+    /// Tangents of [`Start::arrive`].
+    pub fn arrive_jvp(
+        &self,
+        xi: &DVector<f64>,
+        q: &DMatrix<f64>,
+        along: &DMatrix<f64>,
+    ) -> DMatrix<f64> {
+        let mut out = self.stepper.system.tree.integrate_jvp(xi, q, along);
+        self.split.forget_moved_rows(&mut out);
+        out
+    }
+
     /// Transpose of [`Start::arrive`]: cotangents of q and of the chart coordinates.
     pub fn arrive_vjp(
         &self,
@@ -116,6 +140,17 @@ impl Start<'_, '_> {
         let mut q_bar = q_bar.clone();
         self.split.forget_moved(&mut q_bar);
         self.stepper.system.tree.integrate_vjp(xi, &q_bar)
+    }
+
+    /// Tangents of [`Start::advance`].
+    pub fn advance_jvp(
+        &self,
+        v: &DVector<f64>,
+        q: &DMatrix<f64>,
+        along: &DMatrix<f64>,
+    ) -> DMatrix<f64> {
+        let dt = self.stepper.dt;
+        self.arrive_jvp(&(dt * v), q, &(dt * along))
     }
 
     /// Transpose of [`Start::advance`]: cotangents of q and of the velocity.
@@ -141,6 +176,12 @@ impl Start<'_, '_> {
             held: self.input.hold.clone(),
             mode: self.state.mode,
         }
+    }
+
+    /// Tangents of the momenta after the step, of which driven joints carry none.
+    pub fn next_momenta(&self, mut y: DMatrix<f64>) -> DMatrix<f64> {
+        self.split.forget_driven_rows(&mut y);
+        y
     }
 
     /// Cotangent of the momenta after the step, of which driven joints carry none.

@@ -3,9 +3,9 @@
 //! With contact, v⁺ is what [`contact::solve`] makes of that velocity at q.
 
 use super::contact;
-use super::stages::{ContactVelocities, Stages, Transposed};
+use super::stages::{ContactVelocities, Stages, StepDerivatives};
 use super::start::Start;
-use super::{State, StateBar, StepBar, readout};
+use super::{State, StateBar, StateTangents, StepBar, StepTangents, readout};
 use crate::Result;
 use crate::adjoint::solve::Definite;
 use nalgebra::DVector;
@@ -34,7 +34,7 @@ pub(super) fn step(start: &Start) -> Result<(State, Stages)> {
     Ok((next, Stages::Contact(ContactVelocities { before, after })))
 }
 
-/// What the transpose of a step needs.
+/// What the derivatives of a step need.
 pub(super) struct Adjoint<'s> {
     contact: contact::Adjoint<'s>,
     acceleration: DVector<f64>,
@@ -53,7 +53,26 @@ impl<'s> Adjoint<'s> {
     }
 }
 
-impl<'a> Transposed<'a> for Adjoint<'_> {
+impl<'a> StepDerivatives<'a> for Adjoint<'_> {
+    fn jvp(&self, start: &Start<'_, 'a>, along: &StepTangents) -> Result<StateTangents> {
+        let (s, e, split) = (start.stepper, start.e, start.split);
+        let (q, inputs) = (along.q, along.inputs);
+        let force = e.inertial_force_slopes(start.v, &start.input.control, &split.free)?;
+        let inertia = e.mass_slopes(&self.acceleration, &split.free)?;
+        // Driven velocities are reached from where they are.
+        let mut driven = -along.v / s.dt;
+        for &i in &split.free {
+            driven.row_mut(i).fill(0.0);
+        }
+        let right = force.along(q, Some(along.v), inputs)
+            - inertia.along(q, None, inputs)
+            - &e.mass_matrix * driven;
+        let gained = self.factor.solve_columns(&split.take_rows(&right));
+        let before = split.take_rows(along.v) + s.dt * gained;
+        self.contact
+            .velocity_jvp(start, along, &split.put_rows(&before))
+    }
+
     fn vjp(&self, start: &Start<'_, 'a>, next_bar: &StateBar) -> Result<StepBar> {
         let (s, e, split) = (start.stepper, start.e, start.split);
         let mut bar = StepBar::zeros(e);

@@ -1,6 +1,8 @@
 //! Angular momentum of each body by itself, without the water, about its centre of mass: L = R I Rᵀ ω, world axes.
 
-use super::entry::{Observable, Observed, ObservedBars, Reading, Transpose, by_body};
+use super::entry::{
+    Differentiable, Observable, Observed, ObservedBars, ObservedTangents, Reading, by_body,
+};
 use crate::Result;
 use crate::adjoint::lie::{Mat3, Vec3, Vec6, angular, six};
 use crate::dynamics::{Parameters, System};
@@ -42,14 +44,30 @@ impl Observable for AngularMomentum {
         Ok(twists.iter().enumerate().flat_map(of).collect())
     }
 
-    fn transpose(&self) -> Option<&dyn Transpose> {
+    fn differentiable(&self) -> Option<&dyn Differentiable> {
         Some(self)
     }
 }
 
-impl Transpose for AngularMomentum {
+impl Differentiable for AngularMomentum {
     fn tangents(&self, system: &System) -> usize {
         3 * system.len()
+    }
+
+    fn jvp(&self, at: &Observed, along: &ObservedTangents) -> Vec<f64> {
+        let of = |(b, twist): (usize, &Vec6)| {
+            let (r, i) = (&at.kinematics.poses[b].rotation, inertia(at.parameters, b));
+            let turned = angular(&along.displacement[b]);
+            let rate = angular(&at.twists[b]);
+            let world = |i: &Mat3, rate: &Vec3| r * (i * r.tr_mul(rate));
+            // The frame's rotation acts on both factors.
+            let changed = world(&i, &(angular(twist) - turned.cross(&rate)));
+            let by_inertia = along
+                .parameters
+                .map_or(Vec3::zeros(), |p| world(&inertia(p, b), &rate));
+            <[f64; 3]>::from(turned.cross(&world(&i, &rate)) + changed + by_inertia)
+        };
+        along.twist.iter().enumerate().flat_map(of).collect()
     }
 
     fn vjp(&self, at: &Observed, bar: &[f64], out: &mut ObservedBars) {

@@ -29,16 +29,19 @@ pub trait Observable: Sync {
     /// What it can't be found without fails.
     fn value(&self, at: &Reading) -> Result<Vec<f64>>;
 
-    /// Its transpose, where there is one.
-    fn transpose(&self) -> Option<&dyn Transpose> {
+    /// Its derivatives, where it has any.
+    fn differentiable(&self) -> Option<&dyn Differentiable> {
         None
     }
 }
 
-/// Transpose of an observable at one state.
-pub trait Transpose: Sync {
-    /// Number of entries of its cotangent: those of its tangent space.
+/// Derivatives of an observable at one state.
+pub trait Differentiable: Sync {
+    /// Number of entries of its tangents and cotangents: those of its tangent space.
     fn tangents(&self, system: &System) -> usize;
+
+    /// Its tangent as the state moves.
+    fn jvp(&self, at: &Observed, along: &ObservedTangents) -> Vec<f64>;
 
     /// Adds the gradient of `bar` · value.
     fn vjp(&self, at: &Observed, bar: &[f64], out: &mut ObservedBars);
@@ -60,7 +63,7 @@ pub struct Reading<'a> {
     pub contacts: Box<dyn Fn() -> Result<Vec<ContactForce>> + 'a>,
 }
 
-/// A state, as transposes of observables see it.
+/// A state, as derivatives of observables see it.
 pub struct Observed<'a> {
     /// The system.
     pub system: &'a System,
@@ -72,6 +75,20 @@ pub struct Observed<'a> {
     pub v: &'a DVector<f64>,
     /// Spatial twists of the bodies.
     pub twists: &'a [Vec6],
+}
+
+/// How a state moves in one direction.
+pub struct ObservedTangents<'a> {
+    /// Spatial displacements of the bodies.
+    pub displacement: &'a [Vec6],
+    /// Tangents of the spatial twists of the bodies.
+    pub twist: &'a [Vec6],
+    /// Of the coordinates, in their tangent space.
+    pub q: &'a [f64],
+    /// Of the generalised velocity.
+    pub v: &'a [f64],
+    /// Of the parameters; none where they stay.
+    pub parameters: Option<&'a Parameters>,
 }
 
 /// What a transpose adds to.

@@ -1,6 +1,6 @@
 //! Joint coordinates and generalised velocities.
 
-use super::entry::{Observable, Observed, ObservedBars, Reading, Transpose};
+use super::entry::{Differentiable, Observable, Observed, ObservedBars, ObservedTangents, Reading};
 use crate::Result;
 use crate::dynamics::System;
 use crate::scene::Scene;
@@ -28,14 +28,18 @@ impl Observable for Coordinates {
         Ok(at.sample.q.as_slice().to_vec())
     }
 
-    fn transpose(&self) -> Option<&dyn Transpose> {
+    fn differentiable(&self) -> Option<&dyn Differentiable> {
         Some(self)
     }
 }
 
-impl Transpose for Coordinates {
+impl Differentiable for Coordinates {
     fn tangents(&self, system: &System) -> usize {
         system.tree.velocities()
+    }
+
+    fn jvp(&self, _: &Observed, along: &ObservedTangents) -> Vec<f64> {
+        along.q.to_vec()
     }
 
     fn vjp(&self, _: &Observed, bar: &[f64], out: &mut ObservedBars) {
@@ -68,14 +72,18 @@ impl Observable for Velocities {
         Ok(at.sample.v.as_slice().to_vec())
     }
 
-    fn transpose(&self) -> Option<&dyn Transpose> {
+    fn differentiable(&self) -> Option<&dyn Differentiable> {
         Some(self)
     }
 }
 
-impl Transpose for Velocities {
+impl Differentiable for Velocities {
     fn tangents(&self, system: &System) -> usize {
         system.tree.velocities()
+    }
+
+    fn jvp(&self, _: &Observed, along: &ObservedTangents) -> Vec<f64> {
+        along.v.to_vec()
     }
 
     fn vjp(&self, _: &Observed, bar: &[f64], out: &mut ObservedBars) {

@@ -1,6 +1,6 @@
 //! What is observed of a rollout, one entry each: recordings, objectives and Python read it by name.
 //!
-//! To add one: a file with its type, its [`Observable`], and, if a cotangent of it can seed a reverse sweep, its [`Transpose`]; and
+//! To add one: a file with its type, its [`Observable`], and, if it has derivatives, its [`Differentiable`]; and
 //! its line in [`OBSERVABLES`].
 
 mod angular_momentum;
@@ -13,7 +13,7 @@ mod momentum;
 mod pose;
 pub(super) mod velocity;
 
-pub use entry::{Observable, Observed, ObservedBars, Reading, Transpose};
+pub use entry::{Differentiable, Observable, Observed, ObservedBars, ObservedTangents, Reading};
 
 use crate::{Error, Result};
 
@@ -50,17 +50,17 @@ pub fn observable(name: &str) -> Result<&'static dyn Observable> {
     })
 }
 
-/// The transpose of the observable of this name.
+/// The derivatives of the observable of this name.
 ///
 /// # Errors
-/// A name that none has, or an observable without a transpose.
-pub fn transpose(name: &str) -> Result<&'static dyn Transpose> {
-    observable(name)?.transpose().ok_or_else(|| {
-        let with = OBSERVABLES.iter().filter(|o| o.transpose().is_some());
+/// A name that none has, or an observable without derivatives.
+pub fn differentiable(name: &str) -> Result<&'static dyn Differentiable> {
+    observable(name)?.differentiable().ok_or_else(|| {
+        let with = OBSERVABLES.iter().filter(|o| o.differentiable().is_some());
         let names: Vec<&str> = with.map(|o| o.name()).collect();
         Error::Unsupported {
-            what: format!("a cotangent of the observable {name:?}"),
-            why: "it has no transpose".into(),
+            what: format!("a derivative of the observable {name:?}"),
+            why: "it has none".into(),
             instead: format!("take one of {names:?}"),
         }
     })

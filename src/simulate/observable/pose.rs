@@ -1,8 +1,10 @@
 //! Positions and rotations of the bodies.
 
-use super::entry::{Observable, Observed, ObservedBars, Reading, Transpose, by_body};
+use super::entry::{
+    Differentiable, Observable, Observed, ObservedBars, ObservedTangents, Reading, by_body,
+};
 use crate::Result;
-use crate::adjoint::lie::{Vec3, point_wrench};
+use crate::adjoint::lie::{Vec3, angular, point_velocity, point_wrench};
 use crate::dynamics::System;
 use crate::scene::Scene;
 
@@ -32,14 +34,21 @@ impl Observable for Positions {
             .collect())
     }
 
-    fn transpose(&self) -> Option<&dyn Transpose> {
+    fn differentiable(&self) -> Option<&dyn Differentiable> {
         Some(self)
     }
 }
 
-impl Transpose for Positions {
+impl Differentiable for Positions {
     fn tangents(&self, system: &System) -> usize {
         3 * system.len()
+    }
+
+    fn jvp(&self, at: &Observed, along: &ObservedTangents) -> Vec<f64> {
+        let bodies = at.kinematics.poses.iter().zip(along.displacement);
+        bodies
+            .flat_map(|(pose, z)| <[f64; 3]>::from(point_velocity(z, &pose.translation)))
+            .collect()
     }
 
     fn vjp(&self, at: &Observed, bar: &[f64], out: &mut ObservedBars) {
@@ -79,14 +88,19 @@ impl Observable for Rotations {
             .collect())
     }
 
-    fn transpose(&self) -> Option<&dyn Transpose> {
+    fn differentiable(&self) -> Option<&dyn Differentiable> {
         Some(self)
     }
 }
 
-impl Transpose for Rotations {
+impl Differentiable for Rotations {
     fn tangents(&self, system: &System) -> usize {
         3 * system.len()
+    }
+
+    fn jvp(&self, _: &Observed, along: &ObservedTangents) -> Vec<f64> {
+        let turned = along.displacement.iter();
+        turned.flat_map(|z| <[f64; 3]>::from(angular(z))).collect()
     }
 
     fn vjp(&self, _: &Observed, bar: &[f64], out: &mut ObservedBars) {

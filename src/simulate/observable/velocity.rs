@@ -1,8 +1,10 @@
 //! Velocities of the bodies.
 
-use super::entry::{Observable, Observed, ObservedBars, Reading, Transpose, by_body};
+use super::entry::{
+    Differentiable, Observable, Observed, ObservedBars, ObservedTangents, Reading, by_body,
+};
 use crate::Result;
-use crate::adjoint::lie::{Vec3, angular, point_velocity, point_wrench, six};
+use crate::adjoint::lie::{Vec3, Vec6, angular, point_velocity, point_wrench, six};
 use crate::dynamics::System;
 use crate::scene::Scene;
 
@@ -32,14 +34,26 @@ impl Observable for Velocities {
         Ok(velocities(at))
     }
 
-    fn transpose(&self) -> Option<&dyn Transpose> {
+    fn differentiable(&self) -> Option<&dyn Differentiable> {
         Some(self)
     }
 }
 
-impl Transpose for Velocities {
+impl Differentiable for Velocities {
     fn tangents(&self, system: &System) -> usize {
         6 * system.len()
+    }
+
+    fn jvp(&self, at: &Observed, along: &ObservedTangents) -> Vec<f64> {
+        let of = |(b, twist): (usize, &Vec6)| {
+            let origin = at.kinematics.poses[b].translation;
+            // At a given twist the origin's velocity is V + ω × x.
+            let moved = point_velocity(&along.displacement[b], &origin);
+            let rate = point_velocity(twist, &origin) + angular(&at.twists[b]).cross(&moved);
+            let rates: [f64; 3] = angular(twist).into();
+            <[f64; 3]>::from(rate).into_iter().chain(rates)
+        };
+        along.twist.iter().enumerate().flat_map(of).collect()
     }
 
     fn vjp(&self, at: &Observed, bar: &[f64], out: &mut ObservedBars) {

@@ -1,0 +1,453 @@
+//! Forward mode: how a trajectory moves as its start, its controls, its parameters and its controller's gains do.
+//!
+//! Every step is made a matrix ([`StepMap`](super::step_map::StepMap)), many steps side by side on all cores; then a direction costs a product with it.
+//! It is the derivative that [`Rollout::vjp`] is the transpose of.
+
+use super::observable::{Differentiable, Observed, ObservedTangents, differentiable};
+use super::step_map::{BESIDE, Columns};
+use super::{Initial, Rollout, finite};
+use crate::dynamics::Parameters;
+use crate::{Error, Result};
+use nalgebra::{DMatrix, DVector};
+use std::collections::BTreeMap;
+use std::ops::ControlFlow;
+
+/// A direction in which what a rollout depends on changes: the counterpart of a [`Gradient`](super::Gradient).
+#[derive(Clone, Debug)]
+pub struct Displacement {
+    /// Of the open-loop controls, controls × steps.
+    pub controls: DMatrix<f64>,
+    /// Of the initial state; what a motion drives doesn't take part.
+    pub initial: Initial,
+    /// Of the parameters.
+    pub parameters: Parameters,
+    /// Of the controller's gains.
+    pub gains: Vec<f64>,
+}
+
+/// How what a rollout observes changes along a direction: the counterpart of [`Cotangents`](super::Cotangents). Columns are states 0 … N.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Tangents {
+    /// Of q in its tangent space, nv × (N + 1).
+    pub q: DMatrix<f64>,
+    /// Of v, nv × (N + 1).
+    pub v: DMatrix<f64>,
+    /// Of the observables that were asked for, by name: their tangents × (N + 1).
+    pub observables: BTreeMap<String, DMatrix<f64>>,
+}
+
+/// With respect to what a Jacobian is taken; its columns come in this order.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct Variables {
+    /// The parameters of these names.
+    pub parameters: Vec<String>,
+    /// The initial coordinates in their tangent space.
+    pub initial_q: bool,
+    /// The initial velocity.
+    pub initial_v: bool,
+    /// The controller's gains.
+    pub gains: bool,
+    /// The open-loop controls: those of the first step, then those of the second, …
+    pub controls: bool,
+}
+
+/// Directions side by side, K of them.
+struct Directions<'a> {
+    /// nv × K.
+    q: DMatrix<f64>,
+    v: DMatrix<f64>,
+    /// Chosen parameters × K, with their places.
+    parameters: DMatrix<f64>,
+    places: Vec<usize>,
+    /// Gains × K.
+    gains: DMatrix<f64>,
+    /// Controls × K, at a step.
+    controls: Box<dyn Fn(usize) -> DMatrix<f64> + 'a>,
+}
+
+/// Tangents of one state along all directions.
+struct Moved<'a> {
+    state: usize,
+    q: &'a DMatrix<f64>,
+    v: &'a DMatrix<f64>,
+}
+
+impl Rollout {
+    /// A displacement of the right sizes for this rollout, all zero.
+    pub fn zero_displacement(&self) -> Displacement {
+        let nv = self.simulator.system().tree.velocities();
+        Displacement {
+            controls: DMatrix::zeros(self.controls.nrows(), self.steps()),
+            initial: Initial {
+                q: DVector::zeros(nv),
+                v: DVector::zeros(nv),
+            },
+            parameters: self.simulator.parameters().zeros(),
+            gains: vec![0.0; self.simulator.policy().gains().len()],
+        }
+    }
+
+    /// Tangents of the trajectory along each displacement, with those of the observables of these names. All displacements share the work of the steps.
+    ///
+    /// # Errors
+    /// Displacements of other sizes than [`Rollout::zero_displacement`] or not finite; a name that no observable with derivatives has; a solve that misses its
+    /// tolerance; tangents that leave floating point.
+    pub fn jvp(
+        &self,
+        displacements: &[Displacement],
+        observables: &[&str],
+    ) -> Result<Vec<Tangents>> {
+        self.jvp_with(displacements, observables, |_| ControlFlow::Continue(()))
+    }
+
+    /// As [`Rollout::jvp`]; `progress` is called with the number of steps gone through, and may end the sweep.
+    ///
+    /// # Errors
+    /// As there, and [`Error::Stopped`] if `progress` breaks.
+    pub fn jvp_with(
+        &self,
+        displacements: &[Displacement],
+        observables: &[&str],
+        progress: impl FnMut(usize) -> ControlFlow<()>,
+    ) -> Result<Vec<Tangents>> {
+        self.check_displacements(displacements)?;
+        let named = self.named(observables)?;
+        let states = self.steps() + 1;
+        let nv = self.simulator.system().tree.velocities();
+        let zero = |rows| DMatrix::zeros(rows, states);
+        let each = named
+            .iter()
+            .map(|(name, _, rows)| (name.clone(), zero(*rows)));
+        let empty = Tangents {
+            q: zero(nv),
+            v: zero(nv),
+            observables: each.collect(),
+        };
+        let mut out = vec![empty; displacements.len()];
+        let directions = self.directions_of(displacements);
+        let write = |at: &Moved| {
+            for (k, out) in out.iter_mut().enumerate() {
+                out.q.set_column(at.state, &at.q.column(k));
+                out.v.set_column(at.state, &at.v.column(k));
+            }
+            for (name, observable, _) in &named {
+                let seen = self.observed(*observable, &directions, at);
+                for (k, out) in out.iter_mut().enumerate() {
+                    if let Some(to) = out.observables.get_mut(name) {
+                        to.set_column(at.state, &seen.column(k));
+                    }
+                }
+            }
+            Ok(())
+        };
+        self.sweep(&directions, write, progress)?;
+        Ok(out)
+    }
+
+    /// Jacobian of observables ("q" and "v" among them) at the given states with respect to `variables`, one matrix for each name: its rows are the tangents at the
+    /// first of the states, then those at the second, …
+    ///
+    /// # Errors
+    /// As [`Rollout::jvp`], and a state that there isn't or a name that no parameter has.
+    pub fn jacobian(
+        &self,
+        variables: &Variables,
+        observables: &[&str],
+        states: &[usize],
+    ) -> Result<Vec<DMatrix<f64>>> {
+        self.jacobian_with(
+            variables,
+            observables,
+            states,
+            |_| ControlFlow::Continue(()),
+        )
+    }
+
+    /// As [`Rollout::jacobian`]; `progress` is called with the number of steps gone through, and may end the sweep.
+    ///
+    /// # Errors
+    /// As there, and [`Error::Stopped`] if `progress` breaks.
+    pub fn jacobian_with(
+        &self,
+        variables: &Variables,
+        observables: &[&str],
+        states: &[usize],
+        progress: impl FnMut(usize) -> ControlFlow<()>,
+    ) -> Result<Vec<DMatrix<f64>>> {
+        if let Some(bad) = states.iter().find(|n| **n > self.steps()) {
+            return Err(Error::input(
+                "jacobian: states",
+                bad,
+                format!("must be at most {}, the last state", self.steps()),
+            ));
+        }
+        let named = self.named(observables)?;
+        let directions = self.directions_to(variables)?;
+        let count = directions.q.ncols();
+        let zero = |rows: &usize| DMatrix::zeros(rows * states.len(), count);
+        let mut out: Vec<_> = named.iter().map(|(_, _, rows)| zero(rows)).collect();
+        let write = |at: &Moved| {
+            let here = states.iter().enumerate().filter(|(_, n)| **n == at.state);
+            let places: Vec<usize> = here.map(|(place, _)| place).collect();
+            for ((_, observable, rows), out) in named.iter().zip(&mut out) {
+                if !places.is_empty() {
+                    let seen = self.observed(*observable, &directions, at);
+                    for place in &places {
+                        out.rows_mut(place * rows, *rows).copy_from(&seen);
+                    }
+                }
+            }
+            Ok(())
+        };
+        self.sweep(&directions, write, progress)?;
+        Ok(out)
+    }
+
+    /// Observables with derivatives, each with the number of its tangents.
+    fn named(&self, names: &[&str]) -> Result<Vec<(String, &'static dyn Differentiable, usize)>> {
+        let of = |name: &&str| {
+            let found = differentiable(name)?;
+            let rows = found.tangents(self.simulator.system());
+            Ok(((*name).to_string(), found, rows))
+        };
+        names.iter().map(of).collect()
+    }
+
+    /// Goes through the trajectory along all directions; `each` sees every state.
+    fn sweep(
+        &self,
+        directions: &Directions,
+        mut each: impl FnMut(&Moved) -> Result<()>,
+        mut progress: impl FnMut(usize) -> ControlFlow<()>,
+    ) -> Result<()> {
+        let trajectory = self.simulator.trajectory(&self.controls);
+        let columns = Columns::new(&trajectory, directions.places.clone());
+        let (states, samples, steps) = (self.states(), self.samples(), self.steps());
+        let nv = directions.q.nrows();
+        let inputs = columns.of_chosen(&directions.parameters);
+        // y₀ = y(q₀, v₀).
+        let e = trajectory.at(&states[0].q, samples[0].time)?;
+        let (q, v) = (&directions.q, &directions.v);
+        let start = &self.initial_velocity;
+        let y = (trajectory.stepper).conserved_jvp(&e, start, q, v, &inputs)?;
+        let state = |along: &DMatrix<f64>, n: usize| {
+            let (q, y) = (
+                along.rows(0, nv).into_owned(),
+                along.rows(nv, nv).into_owned(),
+            );
+            finite::tangents(&self.simulator.scene, states[n].step, &q, &y)?;
+            Ok::<_, Error>(q)
+        };
+        let mut along = DMatrix::zeros(columns.of_gains().end, q.ncols());
+        along.rows_mut(0, nv).copy_from(q);
+        along.rows_mut(nv, nv).copy_from(&y);
+        let constant = [
+            (columns.of_parameters(), &directions.parameters),
+            (columns.of_gains(), &directions.gains),
+        ];
+        for (rows, tangents) in constant {
+            along.rows_range_mut(rows).copy_from(tangents);
+        }
+        let mut from = 0;
+        while from < steps {
+            let chunk = from..(from + BESIDE).min(steps);
+            let maps = self.step_maps(&trajectory, &columns, chunk.clone())?;
+            for (n, map) in chunk.clone().zip(maps) {
+                let controls = (directions.controls)(n);
+                along
+                    .rows_range_mut(columns.of_controls())
+                    .copy_from(&controls);
+                let (q, v) = (state(&along, n)?, map.velocity * &along);
+                each(&Moved {
+                    state: n,
+                    q: &q,
+                    v: &v,
+                })?;
+                let next = map.next * &along;
+                along.rows_range_mut(columns.state()).copy_from(&next);
+                if progress(n + 1).is_break() {
+                    return Err(Error::Stopped {
+                        what: format!("the tangents, {} of {steps} steps on", n + 1),
+                    });
+                }
+            }
+            from = chunk.end;
+        }
+        let q = state(&along, steps)?;
+        let y = along.rows(nv, nv).into_owned();
+        let e = trajectory.at(&states[steps].q, samples[steps].time)?;
+        let at = crate::dynamics::StateTangents { q, y };
+        let v = (trajectory.stepper).velocity_jvp(
+            &e,
+            &states[steps],
+            &samples[steps].v,
+            &at,
+            &inputs,
+        )?;
+        each(&Moved {
+            state: steps,
+            q: &at.q,
+            v: &v,
+        })
+    }
+
+    /// Tangents of an observable at a state, a column for each direction.
+    fn observed(
+        &self,
+        observable: &dyn Differentiable,
+        directions: &Directions,
+        at: &Moved,
+    ) -> DMatrix<f64> {
+        let (system, parameters) = (self.simulator.system(), self.simulator.parameters());
+        let (tree, sample) = (&system.tree, &self.samples()[at.state]);
+        let kinematics = tree.kinematics(&sample.q);
+        let here = Observed {
+            system,
+            parameters,
+            kinematics: &kinematics,
+            v: &sample.v,
+            twists: &tree.twists(&kinematics, &sample.v),
+        };
+        let mut out = DMatrix::zeros(observable.tangents(system), at.q.ncols());
+        for (k, mut out) in out.column_iter_mut().enumerate() {
+            let (q, v) = (at.q.column(k).into_owned(), at.v.column(k).into_owned());
+            let [displacement, twist] = tree.twists_jvp(&kinematics, &sample.v, &q, &v);
+            let changed = directions.parameters_of(k, parameters);
+            let along = ObservedTangents {
+                displacement: &displacement,
+                twist: &twist,
+                q: q.as_slice(),
+                v: v.as_slice(),
+                parameters: changed.as_ref(),
+            };
+            out.copy_from_slice(&observable.jvp(&here, &along));
+        }
+        out
+    }
+
+    /// Displacements side by side, without the parameters that none displacements.
+    fn directions_of<'a>(&self, displacements: &'a [Displacement]) -> Directions<'a> {
+        let count = displacements.len();
+        let nv = self.simulator.system().tree.velocities();
+        let start = displacements.iter().map(|c| {
+            let (mut q, mut v) = (c.initial.q.clone(), c.initial.v.clone());
+            self.simulator.forget_driven(&mut q, &mut v);
+            (q, v)
+        });
+        let start: Vec<_> = start.collect();
+        let moves = |i: &usize| {
+            displacements
+                .iter()
+                .any(|c| c.parameters.as_slice()[*i] != 0.0)
+        };
+        let all = self.simulator.parameters().as_slice().len();
+        let places: Vec<usize> = (0..all).filter(moves).collect();
+        let gains = self.simulator.policy().gains().len();
+        let nu = self.controls.nrows();
+        Directions {
+            q: DMatrix::from_fn(nv, count, |i, k| start[k].0[i]),
+            v: DMatrix::from_fn(nv, count, |i, k| start[k].1[i]),
+            parameters: DMatrix::from_fn(places.len(), count, |i, k| {
+                displacements[k].parameters.as_slice()[places[i]]
+            }),
+            places,
+            gains: DMatrix::from_fn(gains, count, |i, k| displacements[k].gains[i]),
+            controls: Box::new(move |n| {
+                DMatrix::from_fn(nu, count, |i, k| displacements[k].controls[(i, n)])
+            }),
+        }
+    }
+
+    /// A direction for each variable.
+    fn directions_to(&self, variables: &Variables) -> Result<Directions<'_>> {
+        let nv = self.simulator.system().tree.velocities();
+        let table = self.simulator.parameters();
+        let places = variables.parameters.iter().map(|name| table.place(name));
+        let places = places.collect::<Result<Vec<usize>>>()?;
+        let gains = self.simulator.policy().gains().len();
+        let (nu, steps) = (self.controls.nrows(), self.steps());
+        let part = |wanted: bool, size: usize| if wanted { size } else { 0 };
+        let parameters = 0..places.len();
+        let q = parameters.end..parameters.end + part(variables.initial_q, nv);
+        let v = q.end..q.end + part(variables.initial_v, nv);
+        let own_gains = v.end..v.end + part(variables.gains, gains);
+        let controls = own_gains.end..own_gains.end + part(variables.controls, nu * steps);
+        let count = controls.end;
+        let units = |rows: usize, range: &std::ops::Range<usize>| {
+            let mut out = DMatrix::zeros(rows, count);
+            out.columns_range_mut(range.clone()).fill_with_identity();
+            out
+        };
+        let (mut by_q, mut by_v) = (units(nv, &q), units(nv, &v));
+        for k in 0..count {
+            let (mut q, mut v) = (by_q.column(k).into_owned(), by_v.column(k).into_owned());
+            self.simulator.forget_driven(&mut q, &mut v);
+            by_q.set_column(k, &q);
+            by_v.set_column(k, &v);
+        }
+        Ok(Directions {
+            q: by_q,
+            v: by_v,
+            parameters: units(places.len(), &parameters),
+            places,
+            gains: units(gains, &own_gains),
+            controls: Box::new(move |n| {
+                let at = controls.start + n * nu;
+                let acts = |i: usize, k: usize| !controls.is_empty() && k == at + i;
+                DMatrix::from_fn(nu, count, |i, k| f64::from(acts(i, k)))
+            }),
+        })
+    }
+
+    fn check_displacements(&self, displacements: &[Displacement]) -> Result<()> {
+        let zero = self.zero_displacement();
+        for (k, given) in displacements.iter().enumerate() {
+            let refuse = |name: &str, given: String, right: String| {
+                Err(Error::input(
+                    format!("displacements[{k}].{name}"),
+                    given,
+                    right,
+                ))
+            };
+            if !given.parameters.same_table(&zero.parameters) {
+                let right = "must be those of this rollout's simulator";
+                return refuse("parameters", "another scene's".into(), right.into());
+            }
+            let column = |x: &[f64]| DMatrix::from_column_slice(x.len(), 1, x);
+            let parts = |c: &Displacement| {
+                [
+                    ("controls", c.controls.clone()),
+                    ("initial.q", column(c.initial.q.as_slice())),
+                    ("initial.v", column(c.initial.v.as_slice())),
+                    ("gains", column(&c.gains)),
+                    ("parameters", column(c.parameters.as_slice())),
+                ]
+            };
+            for ((name, given), (_, right)) in parts(given).into_iter().zip(parts(&zero)) {
+                if given.shape() != right.shape() {
+                    let right = format!("must have the shape {:?}", right.shape());
+                    return refuse(name, format!("{:?}", given.shape()), right);
+                }
+                if let Some(bad) = given.iter().find(|x| !x.is_finite()) {
+                    return refuse(name, bad.to_string(), "must be finite".into());
+                }
+            }
+        }
+        Ok(())
+    }
+}
+
+impl Directions<'_> {
+    /// Changes of the parameters along direction `k`; none where they stay.
+    fn parameters_of(&self, k: usize, at: &Parameters) -> Option<Parameters> {
+        let column = self.parameters.column(k);
+        if column.iter().all(|x| *x == 0.0) {
+            return None;
+        }
+        let mut values = vec![0.0; at.as_slice().len()];
+        for (place, x) in self.places.iter().zip(column.iter()) {
+            values[*place] += x;
+        }
+        at.with_values(&values)
+    }
+}

@@ -4,6 +4,8 @@
 //! derivatives that a step needs included), gradient of the rollout as a ratio to its forward pass, peak
 //! memory of the process so far, and iterations; `full` by panels, as it is by default, and by fundamental solutions; of these the other integrators, a looser
 //! tolerance, a dense QR and Jacobi preconditioning; the paper's choices, and `isolated`.
+//!
+//! `cargo bench --bench step -- forward [SCENE]`: linearisations and forward mode against steps, all in one run.
 
 #[allow(dead_code)]
 mod common;
@@ -12,9 +14,10 @@ use common::support::example;
 use common::{Effort, arguments, peak_memory, step_times};
 use hydrograd::coupling::full::{FullSolver, Preconditioner};
 use hydrograd::dynamics::Integrator;
-use hydrograd::scene::{Preset, Scene};
-use hydrograd::simulate::Method;
-use hydrograd::{Fidelity, Settings, Simulator};
+use hydrograd::scene::{Body, BodyId, Drag, Fluid, Joint, Preset, Scene, Shape};
+use hydrograd::simulate::{Method, Variables};
+use hydrograd::{Controls, Fidelity, Settings, Simulator, objective};
+use nalgebra::DVector;
 use std::time::Instant;
 
 struct Row {
@@ -53,8 +56,136 @@ fn measure(
     })
 }
 
+/// A single body with its own added mass, thrusters and both drags.
+fn vehicle() -> (Scene, Settings) {
+    let mut scene = Scene::new(Fluid::fresh_water());
+    scene.name = "vehicle".into();
+    let drag = Drag {
+        linear: 5.0,
+        quadratic: 0.3,
+        ..Drag::default()
+    };
+    let hull = Shape::ellipsoid([0.6, 0.15, 0.15]).faces(1280);
+    scene.add(Body::new(hull).density(1005.0).thruster().drag(drag));
+    scene.initial.v = vec![0.5, 0.1, 0.0, 0.05, 0.1, 0.2];
+    let settings = Settings::default().fidelity(Fidelity::Isolated);
+    (scene, settings)
+}
+
+fn falling_ball() -> (Scene, Settings) {
+    let settings = Settings::default().fidelity(Fidelity::Reduced);
+    (example("falling_ball"), settings)
+}
+
+/// Ten actuated links in a row, one after the other.
+fn chain() -> (Scene, Settings) {
+    let mut scene = Scene::new(Fluid::fresh_water());
+    scene.name = "chain".into();
+    let axis = [0.0, 0.0, 1.0];
+    for k in 0..10 {
+        let link = Body::new(Shape::ellipsoid([0.1, 0.03, 0.04]).faces(320)).density(1005.0);
+        let link = link.named(format!("link {k}")).actuated();
+        let link = link.drag(Drag {
+            linear: 5.0,
+            ..Drag::default()
+        });
+        scene.add(match k {
+            0 => link.joint(Joint::Revolute { axis }),
+            _ => {
+                let last = format!("link {}", k - 1);
+                let link = link.child_of(last).at([0.22, 0.0, 0.0]);
+                link.joint(Joint::Revolute { axis })
+            }
+        });
+    }
+    scene.initial.v = (0..10).map(|k| 0.3 * (1.3 * f64::from(k)).sin()).collect();
+    let settings = Settings::default().fidelity(Fidelity::Isolated);
+    (scene, settings)
+}
+
+/// Seconds of the fastest of some calls.
+fn fastest(
+    repeat: usize,
+    mut call: impl FnMut() -> hydrograd::Result<()>,
+) -> hydrograd::Result<f64> {
+    let mut best = f64::INFINITY;
+    for _ in 0..repeat {
+        let start = Instant::now();
+        call()?;
+        best = best.min(start.elapsed().as_secs_f64());
+    }
+    Ok(best)
+}
+
+/// Linearisations of single steps, and of a rollout of 300, against steps; a Jacobian of all positions by seven parameters against the forward run and sweeps.
+fn forward(scene: &Scene, settings: Settings) -> hydrograd::Result<()> {
+    let steps = 300;
+    let simulator = Simulator::new(scene, settings)?;
+    let none = Controls::zeros(&simulator, steps);
+    let start = simulator.initial()?;
+    let nu = simulator.system().controls;
+    let nv = simulator.system().tree.velocities();
+    let one = DVector::zeros(nu);
+    let step = fastest(200, || simulator.step(&start, &one).map(drop))?;
+    let record = simulator.step(&start, &one)?.1;
+    let jacobians = fastest(200, || record.jacobians().map(drop))?;
+    let run = fastest(5, || simulator.rollout(&none).map(drop))?;
+    let rollout = simulator.rollout(&none)?;
+    let all = fastest(5, || rollout.step_jacobians(&[]).map(drop))?;
+    let names: Vec<String> = simulator
+        .parameters()
+        .names()
+        .map(String::from)
+        .take(7)
+        .collect();
+    let variables = Variables {
+        parameters: names,
+        ..Variables::default()
+    };
+    let states: Vec<usize> = (1..=steps).collect();
+    let by_parameters = fastest(5, || {
+        rollout
+            .jacobian(&variables, &["positions"], &states)
+            .map(drop)
+    })?;
+    let goal = objective::final_position(BodyId(0), [0.0; 3]);
+    let sweep = fastest(3, || rollout.gradient(&goal).map(drop))?;
+    let rows = 3 * steps * simulator.system().len();
+    println!(
+        "| {} | {nv} | {nu} | {:.1} | {:.2} | {} | {:.2} | {:.2} | {rows} × 7 | {:.2} | {:.0} |",
+        scene.name,
+        1e6 * step,
+        jacobians / step,
+        2 * nv + nu,
+        1e6 * run / steps as f64,
+        all / run,
+        by_parameters / run,
+        rows as f64 * sweep / by_parameters,
+    );
+    Ok(())
+}
+
+fn forward_table(chosen: &[String]) {
+    println!(
+        "| scene | velocities | controls | step µs | Jacobians of a step / step | steps of one-sided differences | step of a rollout µs | \
+         all steps' Jacobians / rollout | Jacobian by parameters | that / rollout | its reverse sweeps / that |"
+    );
+    println!("|---|---|---|---|---|---|---|---|---|---|---|");
+    for (scene, settings) in [vehicle(), falling_ball(), chain()] {
+        if chosen.len() > 1 && !chosen.contains(&scene.name) {
+            continue;
+        }
+        if let Err(e) = forward(&scene, settings) {
+            println!("| {} | {e} |||||||||", scene.name);
+        }
+    }
+}
+
 fn main() {
     let arguments = arguments();
+    if arguments.iter().any(|a| a == "forward") {
+        return forward_table(&arguments);
+    }
     let chosen: Vec<&String> = arguments.iter().filter(|a| !a.starts_with("--")).collect();
     println!(
         "| scene | configuration | faces | unknowns | setup s | forward s/step | gradient/forward | iterations | peak MB |"

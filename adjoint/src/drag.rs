@@ -38,6 +38,15 @@ impl Part {
         }
     }
 
+    /// The projector as a multiple of 1 and one of nnᵀ.
+    fn weights(self) -> [f64; 2] {
+        match self {
+            Part::Tangential => [1.0, -1.0],
+            Part::Normal => [0.0, 1.0],
+            Part::Total => [1.0, 0.0],
+        }
+    }
+
     /// The projector times `s`.
     fn project(self, n: &Vec3, s: Vec3) -> Vec3 {
         match self {
@@ -87,24 +96,36 @@ pub fn quadratic_drag(surface: &[Element], part: Part, nu: &Vec6) -> Vec6 {
 /// semi-definite, and zero (not 0/0) for an element at rest.
 pub fn quadratic_drag_derivative(surface: &[Element], part: Part, nu: &Vec6) -> Mat6 {
     let (u, o) = (linear(nu), angular(nu));
-    let mut out = Mat6::zeros();
+    // Σ d, Σ d [x]× and Σ [x]× d [x]×, d = −½ ΔA d(|w| w)/dw Π.
+    let mut sums = [Mat3::zeros(); 3];
     for e in surface {
-        let projector = part.projector(&e.normal);
-        let w = projector * (u + o.cross(&e.center));
+        let (n, x) = (&e.normal, &e.center);
+        let w = part.project(n, u + o.cross(x));
         let speed = w.norm();
         if speed == 0.0 {
             continue;
         }
         // d(|w|w) = (|w| 1 + w wᵀ/|w|) Π; Π is a projector and w lies in its range.
-        let d = -0.5 * e.area * (projector * speed + (w / speed) * w.transpose());
-        let x = skew(&e.center);
-        let dx = d * x;
-        out.fixed_view_mut::<3, 3>(0, 0).add_assign_from(&d);
-        out.fixed_view_mut::<3, 3>(0, 3).add_assign_from(&-dx);
-        out.fixed_view_mut::<3, 3>(3, 0)
-            .add_assign_from(&-dx.transpose());
-        out.fixed_view_mut::<3, 3>(3, 3).add_assign_from(&-(x * dx));
+        let [same, across] = part.weights();
+        let scale = -0.5 * e.area;
+        let (along, by_normal) = (scale / speed * w, scale * speed * across * n);
+        let mut d = along * w.transpose() + by_normal * n.transpose();
+        for i in 0..3 {
+            d[(i, i)] += scale * speed * same;
+        }
+        // Rows of d [x]× are d's crossed with x, columns of [x]× y are crossed with x.
+        let rows = [0, 1, 2].map(|i| d.column(i).cross(x));
+        let dx = Mat3::from_columns(&rows).transpose();
+        sums[0] += d;
+        sums[1] += dx;
+        sums[2] += Mat3::from_columns(&[0, 1, 2].map(|i| x.cross(&dx.column(i))));
     }
+    let [d, dx, xdx] = sums;
+    let mut out = Mat6::zeros();
+    out.fixed_view_mut::<3, 3>(0, 0).copy_from(&d);
+    out.fixed_view_mut::<3, 3>(0, 3).copy_from(&-dx);
+    out.fixed_view_mut::<3, 3>(3, 0).copy_from(&-dx.transpose());
+    out.fixed_view_mut::<3, 3>(3, 3).copy_from(&-xdx);
     out
 }
 
@@ -116,20 +137,6 @@ pub fn quadratic_drag_jvp(surface: &[Element], part: Part, nu: &Vec6, dnu: &Vec6
 /// Cotangent of ν of [`quadratic_drag`].
 pub fn quadratic_drag_vjp(surface: &[Element], part: Part, nu: &Vec6, bar: &Vec6) -> Vec6 {
     quadratic_drag_derivative(surface, part, nu).tr_mul(bar)
-}
-
-/// `+=` on a fixed view.
-trait AddAssignFrom {
-    fn add_assign_from(&mut self, m: &Mat3);
-}
-
-impl<S> AddAssignFrom for nalgebra::Matrix<f64, nalgebra::U3, nalgebra::U3, S>
-where
-    S: nalgebra::StorageMut<f64, nalgebra::U3, nalgebra::U3>,
-{
-    fn add_assign_from(&mut self, m: &Mat3) {
-        *self += m;
-    }
 }
 
 #[cfg(test)]

@@ -102,6 +102,15 @@ impl Linearised for IsolatedLinearised<'_> {
         })
     }
 
+    fn respond(
+        &self,
+        twists: &DMatrix<f64>,
+        _x: &DVector<f64>,
+    ) -> Result<(DMatrix<f64>, Vec<Vec<Vec6>>)> {
+        let still = vec![vec![Vec6::zeros(); self.coupling.bodies()]; twists.ncols()];
+        Ok((self.coupling.impulses(twists), still))
+    }
+
     fn hvp(&self, _x: Direction, _y: Direction, z: &[Vec6]) -> Result<Tangent> {
         let zero = DVector::zeros(6 * self.coupling.bodies());
         Ok(Tangent {

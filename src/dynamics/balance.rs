@@ -382,21 +382,25 @@ impl Linearisation<'_> {
         z: &[DVector<f64>],
     ) -> Result<Vec<ForceCotangents>> {
         let (tree, n) = (&self.system.tree, self.system.len());
-        let field = |z| tree.fields(&self.kinematics, &self.q, v, Virtual::Frame(z));
-        let fields: Vec<Fields> = z.iter().map(field).collect();
-        let Some(Fields { twist, .. }) = fields.first() else {
+        let Some(first) = z.first() else {
             return Ok(Vec::new());
         };
+        let field = |z| Virtual::Frame(z);
+        let mut fields = vec![tree.fields(&self.kinematics, &self.q, v, field(first))];
+        for z in &z[1..] {
+            let next = tree.with_virtual(&self.kinematics, &self.q, &fields[0], field(z));
+            fields.push(next);
+        }
+        let twist = &fields[0].twist;
+        let momenta = twist.iter().enumerate();
+        let momenta: Vec<Vec6> = momenta.map(|(b, v)| self.rigid_momentum(b, v)).collect();
         let loads = self.loads(twist, v, control);
         let mut out = vec![ForceCotangents::zeros(self); z.len()];
         let mut bars = vec![Cotangents::zeros(n); z.len()];
         for ((fields, bar), out) in fields.iter().zip(&mut bars).zip(&mut out) {
             for (b, turning) in fields.turning.iter().enumerate() {
                 // D · h_r, with the rigid momentum h_r = I V constant in the body's frame.
-                let (h, h_turning) = (
-                    self.rigid_momentum(b, &twist[b]),
-                    self.rigid_momentum(b, turning),
-                );
+                let (h, h_turning) = (momenta[b], self.rigid_momentum(b, turning));
                 bar.turning[b] += h;
                 bar.twist[b] += h_turning;
                 bar.pose[b] -= cross_force(&twist[b], &h_turning) + cross_force(turning, &h);
@@ -460,25 +464,26 @@ impl Linearisation<'_> {
         let tangents = (water.linearised).displaced(&direction, &virt.collect::<Vec<_>>())?;
         for (k, tangent) in tangents.iter().enumerate() {
             let (fields, carried, bar) = (&fields[k], &carried[k], &mut bars[k]);
-            let momenta_carried = self.submerged_impulses(&impulses.column(k).into_owned());
-            let pair = self.from_submerged(&pairs[k]);
-            let impulse = self.submerged_impulses(&tangent.momentum_x);
-            let wrench = self.from_submerged(&tangent.wrench);
-            let pose_force = self.half_from_submerged(&tangent.gradient);
-            for (b, _) in self.system.submerged() {
+            for (b, w) in self.system.submerged() {
+                let pose = &self.kinematics.poses[b];
+                let carried_on = impulses.fixed_view::<6, 1>(6 * w, k).into_owned();
+                let momentum_carried = pose.wrench_to_world(&carried_on);
+                let impulse = tangent.momentum_x.fixed_rows::<6>(6 * w).into_owned();
+                let impulse = pose.wrench_to_world(&impulse);
+                let pose_force = 0.5 * tangent.gradient[w];
                 let relative = self.relative(&fields.twist[b]);
                 let virt = &fields.virtual_twist[b];
-                let rate = pose_force[b] + cross_force(&current, &momenta[b]);
+                let rate = pose_force + cross_force(&current, &momenta[b]);
                 *out[k].parameters.density_mut() +=
                     fields.turning[b].dot(&momenta[b]) + virt.dot(&rate);
                 bar.turning[b] += rho * momenta[b];
                 bar.virtual_twist[b] += rho * rate;
-                bar.twist[b] += rho * (momenta_carried[b] + impulse[b]);
+                bar.twist[b] += rho * (momentum_carried + impulse);
                 bar.pose[b] += rho
-                    * (pair[b] + 0.5 * wrench[b]
-                        - cross_force(&relative, &(momenta_carried[b] + impulse[b]))
+                    * (pairs[k][w] + 0.5 * tangent.wrench[w]
+                        - cross_force(&relative, &(momentum_carried + impulse))
                         - cross_force(&carried[b], &momenta[b])
-                        - cross_force(virt, &pose_force[b]));
+                        - cross_force(virt, &pose_force));
             }
         }
         Ok(())

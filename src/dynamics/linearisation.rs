@@ -29,6 +29,12 @@ impl Water<'_> {
     pub fn momenta(&self, direction: &DVector<f64>) -> Vec<Vec6> {
         combined(&self.columns, direction)
     }
+
+    /// Those of column `k` of the basis.
+    pub fn column(&self, k: usize) -> Vec<Vec6> {
+        let of = |m: &DMatrix<f64>| m.fixed_view::<6, 1>(0, k).into_owned();
+        self.columns.iter().map(of).collect()
+    }
 }
 
 impl<'a> Deref for Linearisation<'a> {

@@ -5,7 +5,7 @@ use super::slopes::unit;
 use super::{Evaluation, ForceCotangents, Linearisation, Slopes};
 use crate::Result;
 use crate::adjoint::lie::{Vec6, cross_force};
-use crate::multibody::{Cotangents, Virtual};
+use crate::multibody::{Cotangents, Fields, Virtual};
 use nalgebra::{DMatrix, DVector};
 
 impl Evaluation<'_> {
@@ -21,17 +21,17 @@ impl Evaluation<'_> {
 
     /// X⁻ᵀ p: momenta or forces of joints in frame coordinates.
     pub(super) fn frame_dual(&self, p: &DVector<f64>) -> DVector<f64> {
-        (self.system.tree).per_joint(&self.q, p, |j, q, p| j.frame_momentum(q, p))
+        (self.system.tree).per_frame(&self.q, p, |j, q, p| j.frame_momentum(q, p))
     }
 
     /// p = Xᵀ p̂.
     pub fn user_momentum(&self, hat: &DVector<f64>) -> DVector<f64> {
-        (self.system.tree).per_joint(&self.q, hat, |j, q, p| j.frame_momentum_transpose(q, p))
+        (self.system.tree).per_frame(&self.q, hat, |j, q, p| j.frame_momentum_transpose(q, p))
     }
 
     /// X w.
     pub fn frame_velocity(&self, w: &DVector<f64>) -> DVector<f64> {
-        (self.system.tree).per_joint(&self.q, w, |j, q, w| j.frame_velocity(q, w))
+        (self.system.tree).per_frame(&self.q, w, |j, q, w| j.frame_velocity(q, w))
     }
 
     /// X, nv × nv.
@@ -41,7 +41,7 @@ impl Evaluation<'_> {
 
     /// X⁻¹ w.
     pub(super) fn frame_velocity_inverse(&self, w: &DVector<f64>) -> DVector<f64> {
-        (self.system.tree).per_joint(&self.q, w, |j, q, w| j.frame_velocity_inverse(q, w))
+        (self.system.tree).per_frame(&self.q, w, |j, q, w| j.frame_velocity_inverse(q, w))
     }
 }
 
@@ -86,6 +86,7 @@ impl Linearisation<'_> {
     ) -> Result<Slopes> {
         let n = v.len();
         let zero = ForceCotangents::zeros(self);
+        let fields = self.still_fields(v);
         let rows: Vec<ForceCotangents> = match self.water()? {
             Some(water) => {
                 let direction = self.direction(v, current);
@@ -93,15 +94,20 @@ impl Linearisation<'_> {
                 // The first columns of the basis are the generalised velocities'.
                 let pairs = water.linearised.gradient_columns(&direction)?;
                 let row = |i: &usize| {
-                    let w = unit(n, *i);
-                    let momenta_virtual = water.momenta(&self.virtual_direction(&w));
+                    let momenta_virtual = water.column(*i);
                     let carried = [&momenta, &momenta_virtual, &self.from_submerged(&pairs[*i])];
-                    self.bilinear_row(v, &w, current, Some(carried.map(Vec::as_slice)))
+                    self.bilinear_row(
+                        &fields,
+                        v,
+                        &unit(n, *i),
+                        current,
+                        Some(carried.map(Vec::as_slice)),
+                    )
                 };
                 entries.iter().map(row).collect()
             }
             None => (entries.iter())
-                .map(|i| self.bilinear_row(v, &unit(n, *i), current, None))
+                .map(|i| self.bilinear_row(&fields, v, &unit(n, *i), current, None))
                 .collect(),
         };
         Ok(Slopes::from_rows(n, entries, &rows, &zero))
@@ -122,7 +128,7 @@ impl Linearisation<'_> {
         current: &Vec6,
     ) -> Result<ForceCotangents> {
         let Some(water) = self.water()? else {
-            return Ok(self.bilinear_row(v, w, current, None));
+            return Ok(self.bilinear_row(&self.still_fields(v), v, w, current, None));
         };
         let (direction, virtual_direction) =
             (self.direction(v, current), self.virtual_direction(w));
@@ -130,12 +136,20 @@ impl Linearisation<'_> {
             (water.momenta(&direction), water.momenta(&virtual_direction));
         let pair = water.linearised.gradient(&virtual_direction, &direction)?;
         let carried = [&momenta, &momenta_virtual, &self.from_submerged(&pair)];
-        Ok(self.bilinear_row(v, w, current, Some(carried.map(Vec::as_slice))))
+        let fields = self.still_fields(v);
+        Ok(self.bilinear_row(&fields, v, w, current, Some(carried.map(Vec::as_slice))))
+    }
+
+    /// Fields at the velocity `v`, without a virtual one.
+    fn still_fields(&self, v: &DVector<f64>) -> Fields {
+        let zero = DVector::zeros(v.len());
+        (self.system.tree).fields(&self.kinematics, &self.q, v, Virtual::Frame(&zero))
     }
 
     /// With the water's momenta of both velocities, and the slopes of their energy.
     fn bilinear_row(
         &self,
+        fields: &Fields,
         v: &DVector<f64>,
         w: &DVector<f64>,
         current: &Vec6,
@@ -144,7 +158,7 @@ impl Linearisation<'_> {
         let tree = &self.system.tree;
         let rho = self.parameters.density();
         let mut out = ForceCotangents::zeros(self);
-        let fields = tree.fields(&self.kinematics, &self.q, v, Virtual::User(w));
+        let fields = tree.with_virtual(&self.kinematics, &self.q, fields, Virtual::User(w));
         let mut bar = Cotangents::zeros(self.system.len());
         for b in 0..self.system.len() {
             let (twist, virt) = (&fields.twist[b], &fields.virtual_twist[b]);

@@ -179,6 +179,21 @@ impl Tree {
         out
     }
 
+    /// The same of a map that is the identity for joints without a frame map ([`JointMotion::has_frame_map`](super::JointMotion::has_frame_map)).
+    pub fn per_frame(
+        &self,
+        q: &DVector<f64>,
+        x: &DVector<f64>,
+        map: impl Fn(&JointModel, &[f64], &[f64]) -> Vec<f64>,
+    ) -> DVector<f64> {
+        let mut out = x.clone();
+        for l in self.links.iter().filter(|l| l.joint.has_frame_map()) {
+            let own = map(&l.joint, l.of_q(q), l.of_v(x));
+            out.as_mut_slice()[l.v.clone()].copy_from_slice(&own);
+        }
+        out
+    }
+
     /// `q ⊕ xi` for all joints.
     pub fn integrate(&self, q: &DVector<f64>, xi: &DVector<f64>) -> DVector<f64> {
         self.per_joint(q, xi, |j, q, x| j.integrate(q, x))
@@ -436,14 +451,19 @@ impl Tree {
         v: &DVector<f64>,
         z: Virtual,
     ) -> Fields {
-        let hat = |x: &DVector<f64>| self.per_joint(q, x, |j, q, x| j.frame_velocity(q, x));
+        let hat = |x: &DVector<f64>| self.per_frame(q, x, |j, q, x| j.frame_velocity(q, x));
         let n = self.links.len();
+        let mut frame_bias = DVector::zeros(v.len());
+        for l in self.links.iter().filter(|l| l.joint.has_frame_map()) {
+            let own = l.joint.frame_bias(l.of_v(v));
+            frame_bias.as_mut_slice()[l.v.clone()].copy_from_slice(&own);
+        }
         let mut f = Fields {
             twist: Vec::with_capacity(n),
             virtual_twist: Vec::with_capacity(n),
             turning: Vec::with_capacity(n),
             bias: Vec::with_capacity(n),
-            frame_bias: self.per_joint(q, v, |j, _, v| j.frame_bias(v)),
+            frame_bias,
             frame_velocity: hat(v),
             frame_virtual: match z {
                 Virtual::Frame(z) => z.clone(),
@@ -460,6 +480,31 @@ impl Tree {
             f.bias.push(c + cross_motion(&v, &sv) + sb);
             f.twist.push(v + sv);
             f.virtual_twist.push(z + sz);
+        }
+        f
+    }
+
+    /// The fields for another virtual velocity.
+    pub fn with_virtual(
+        &self,
+        kinematics: &Kinematics,
+        q: &DVector<f64>,
+        fields: &Fields,
+        z: Virtual,
+    ) -> Fields {
+        let mut f = fields.clone();
+        f.frame_virtual = match z {
+            Virtual::Frame(z) => z.clone(),
+            Virtual::User(z) => self.per_frame(q, z, |j, q, x| j.frame_velocity(q, x)),
+        };
+        for (b, l) in self.links.iter().enumerate() {
+            let sz = combine(&kinematics.frame_columns, l, &f.frame_virtual);
+            let zero = Vec6::zeros();
+            let (v, z, d) = l.parent.map_or((zero, zero, zero), |p| {
+                (f.twist[p], f.virtual_twist[p], f.turning[p])
+            });
+            f.turning[b] = d + cross_motion(&v, &sz);
+            f.virtual_twist[b] = z + sz;
         }
         f
     }
@@ -489,23 +534,29 @@ impl Tree {
             );
             let sv_bar = twist - cross_force(&parent_twist, &bias);
             let sz_bar = virt - cross_force(&parent_twist, &turning);
-            // Joint's own coordinates.
-            let dot = |f: &Vec6| -> Vec<f64> {
-                l.v.clone()
-                    .map(|k| kinematics.frame_columns[k].dot(f))
-                    .collect()
-            };
-            let (hat_v, hat_z, hat_b) = (dot(&sv_bar), dot(&sz_bar), dot(&bias));
-            let own_q = l.joint.frame_velocity_vjp(l.of_v(v), &hat_v);
-            let more_q = match z {
-                Virtual::User(z) => l.joint.frame_velocity_vjp(l.of_v(z), &hat_z),
-                Virtual::Frame(_) => vec![0.0; l.v.len()],
-            };
-            let own_v = l.joint.frame_bias_vjp(l.of_v(v), &hat_b);
             // X is its own q's; S = Ŝ X already holds it.
-            for (k, i) in l.v.clone().enumerate() {
-                q_bar[i] = own_q[k] + more_q[k] + kinematics.columns[i].dot(&bar.pose[b]);
-                v_bar[i] = own_v[k] + kinematics.columns[i].dot(&sv_bar);
+            for i in l.v.clone() {
+                q_bar[i] = kinematics.columns[i].dot(&bar.pose[b]);
+                v_bar[i] = kinematics.columns[i].dot(&sv_bar);
+            }
+            if l.joint.has_frame_map() {
+                let dot = |f: &Vec6| -> Vec<f64> {
+                    let columns = l.v.clone().map(|k| kinematics.frame_columns[k].dot(f));
+                    columns.collect()
+                };
+                let (hat_v, hat_z, hat_b) = (dot(&sv_bar), dot(&sz_bar), dot(&bias));
+                let own_q = l.joint.frame_velocity_vjp(l.of_v(v), &hat_v);
+                let own_v = l.joint.frame_bias_vjp(l.of_v(v), &hat_b);
+                for (k, i) in l.v.clone().enumerate() {
+                    q_bar[i] += own_q[k];
+                    v_bar[i] += own_v[k];
+                }
+                if let Virtual::User(z) = z {
+                    let more_q = l.joint.frame_velocity_vjp(l.of_v(z), &hat_z);
+                    for (k, i) in l.v.clone().enumerate() {
+                        q_bar[i] += more_q[k];
+                    }
+                }
             }
             if let Some(p) = l.parent {
                 bar.twist[p] += twist + cross_force(&sz, &turning) + cross_force(&sv, &bias);

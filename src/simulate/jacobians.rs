@@ -5,7 +5,6 @@ use super::step_map::{BESIDE, Columns, StepMap};
 use crate::Result;
 use crate::dynamics::State;
 use nalgebra::{DMatrix, DVector};
-use rayon::prelude::*;
 use std::ops::Range;
 
 /// Derivatives of a state x = (q, v), the coordinates in their tangent space.
@@ -39,26 +38,32 @@ impl Rollout {
         let (states, samples, steps) = (self.states(), self.samples(), self.steps());
         let nu = columns.of_controls().len();
         let end = trajectory.at(&states[steps].q, samples[steps].time)?;
-        let velocity = columns.velocity(&trajectory, &end, &states[steps], &samples[steps].v)?;
+        let v = &samples[steps].v;
+        let [velocity, mut conserved] = columns.readout(&trajectory, &end, &states[steps], v)?;
         let mut rows = Jacobians::of_end(&columns, &velocity);
         rows.controls = DMatrix::zeros(rows.state.nrows(), nu * steps);
         let mut to = steps;
         while to > 0 {
             let chunk = to.saturating_sub(BESIDE)..to;
             let maps = self.step_maps(&trajectory, &columns, chunk.clone())?;
-            for (n, StepMap { next, .. }) in chunk.clone().zip(maps).rev() {
+            for (n, map) in chunk.clone().zip(maps).rev() {
+                let next = &map.next;
                 let range = |r: Range<usize>| next.columns_range(r);
                 let before = &rows.state * range(columns.state());
                 let control = &rows.state * range(columns.of_controls());
                 rows.parameters += &rows.state * range(columns.of_parameters());
                 rows.controls.columns_mut(n * nu, nu).copy_from(&control);
                 rows.state = before;
+                conserved = map.conserved;
             }
             to = chunk.start;
         }
         // y₀ = y(q₀, v₀).
-        let e = trajectory.at(&states[0].q, samples[0].time)?;
-        let conserved = columns.conserved(&trajectory, &e, &self.initial_velocity)?;
+        if self.initial_velocity != samples[0].v {
+            let e = trajectory.at(&states[0].q, samples[0].time)?;
+            let v = &self.initial_velocity;
+            [_, conserved] = columns.readout(&trajectory, &e, &states[0], v)?;
+        }
         rows.start(&columns, &conserved);
         let nv = rows.state.nrows() / 2;
         for mut row in rows.state.row_iter_mut() {
@@ -82,39 +87,32 @@ impl Rollout {
         let trajectory = self.simulator.trajectory(&self.controls);
         let columns = self.map_columns(&trajectory, parameters)?;
         let (states, samples, steps) = (self.states(), self.samples(), self.steps());
-        let each = (0..steps).into_par_iter().map(|n| {
-            let step = trajectory.linearise(&self.tape.records()[n])?;
-            let map = step.map(&columns)?;
-            let e = step.linearisation();
-            let conserved = columns.conserved(&trajectory, e, &samples[n].v)?;
-            Ok((map, conserved))
-        });
-        let made = each.collect::<Result<Vec<(StepMap, DMatrix<f64>)>>>()?;
+        let made = self.step_maps(&trajectory, &columns, 0..steps)?;
         let end = trajectory.at(&states[steps].q, samples[steps].time)?;
-        let last = columns.velocity(&trajectory, &end, &states[steps], &samples[steps].v)?;
-        let after = made.iter().skip(1).map(|(map, _)| &map.velocity);
+        let v = &samples[steps].v;
+        let [last, _] = columns.readout(&trajectory, &end, &states[steps], v)?;
+        let after = made.iter().skip(1).map(|map| &map.velocity);
         let each = made.iter().zip(after.chain([&last])).zip(states);
-        let one =
-            |(((map, conserved), velocity), state): ((&(StepMap, _), &DMatrix<f64>), &State)| {
-                let end = Jacobians::of_end(&columns, velocity);
-                let range = |r: Range<usize>| map.next.columns_range(r);
-                let mut out = Jacobians {
-                    state: &end.state * range(columns.state()),
-                    controls: &end.state * range(columns.of_controls()),
-                    parameters: end.parameters + &end.state * range(columns.of_parameters()),
-                };
-                out.start(&columns, conserved);
-                let split = trajectory.stepper.split_at(state);
-                let nv = out.state.nrows() / 2;
-                for i in 0..nv {
-                    for (gone, column) in [(split.moved[i], i), (split.is_driven[i], nv + i)] {
-                        if gone {
-                            out.state.column_mut(column).fill(0.0);
-                        }
+        let one = |((map, velocity), state): ((&StepMap, &DMatrix<f64>), &State)| {
+            let end = Jacobians::of_end(&columns, velocity);
+            let range = |r: Range<usize>| map.next.columns_range(r);
+            let mut out = Jacobians {
+                state: &end.state * range(columns.state()),
+                controls: &end.state * range(columns.of_controls()),
+                parameters: end.parameters + &end.state * range(columns.of_parameters()),
+            };
+            out.start(&columns, &map.conserved);
+            let split = trajectory.stepper.split_at(state);
+            let nv = out.state.nrows() / 2;
+            for i in 0..nv {
+                for (gone, column) in [(split.moved[i], i), (split.is_driven[i], nv + i)] {
+                    if gone {
+                        out.state.column_mut(column).fill(0.0);
                     }
                 }
-                out
-            };
+            }
+            out
+        };
         Ok(each.map(one).collect())
     }
 }

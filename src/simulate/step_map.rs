@@ -26,6 +26,8 @@ pub(super) struct Columns {
 pub(super) struct StepMap {
     /// Of the velocity at its state, nv × K.
     pub velocity: DMatrix<f64>,
+    /// Of y at its state, q and v taking the place of q and y: nv × K.
+    pub conserved: DMatrix<f64>,
     /// Of q and y after it, 2nv × K.
     pub next: DMatrix<f64>,
 }
@@ -92,28 +94,24 @@ impl Columns {
         self.inputs(DMatrix::zeros(self.controls, chosen.ncols()), chosen)
     }
 
-    /// Derivatives of the velocity at a state without a step, as in [`StepMap::velocity`].
-    pub fn velocity(
+    /// Derivatives of the velocity at a state, as in [`StepMap::velocity`], and of y there, as in [`StepMap::conserved`].
+    pub fn readout(
         &self,
         t: &Trajectory,
         e: &Linearisation,
         state: &State,
         v: &DVector<f64>,
-    ) -> Result<DMatrix<f64>> {
-        let inputs = self.of_chosen(&self.units(self.of_parameters()));
-        (t.stepper).velocity_jvp(e, state, v, &self.unit_state(), &inputs)
-    }
-
-    /// Derivatives of y at a state with the velocity v, with respect to q, v and the rest: nv × K.
-    pub fn conserved(
-        &self,
-        t: &Trajectory,
-        e: &Linearisation,
-        v: &DVector<f64>,
-    ) -> Result<DMatrix<f64>> {
-        let inputs = self.of_chosen(&self.units(self.of_parameters()));
-        let StateTangents { q, y } = self.unit_state();
-        t.stepper.conserved_jvp(e, v, &q, &y, &inputs)
+    ) -> Result<[DMatrix<f64>; 2]> {
+        let (at, inputs) = (
+            self.unit_state(),
+            self.of_chosen(&self.units(self.of_parameters())),
+        );
+        let momentum = t.stepper.momentum_slopes(e, v)?;
+        let momentum = momentum.as_ref();
+        let velocity = (t.stepper).velocity_jvp(e, state, momentum, &at, &inputs)?;
+        let StateTangents { q, y } = &at;
+        let conserved = t.stepper.conserved_jvp(e, v, momentum, q, y, &inputs);
+        Ok([velocity, conserved])
     }
 
     fn unit_state(&self) -> StateTangents {
@@ -158,7 +156,8 @@ impl ControlledStep<'_, '_> {
         let chosen = columns.units(columns.of_parameters());
         let time = t.stepper.time(record.state());
         let run = || {
-            let velocity = (self.step).velocity_jvp(&at, &columns.of_chosen(&chosen))?;
+            let (e, v) = (self.step.linearisation(), record.velocity());
+            let [velocity, conserved] = columns.readout(t, e, record.state(), v)?;
             let mut control = columns.units(columns.of_controls());
             self.feed_back(columns, &at.q, &velocity, &mut control)?;
             let inputs = columns.inputs(control, &chosen);
@@ -166,7 +165,11 @@ impl ControlledStep<'_, '_> {
             let mut next = DMatrix::zeros(2 * q.nrows(), q.ncols());
             next.rows_mut(0, q.nrows()).copy_from(&q);
             next.rows_mut(q.nrows(), q.nrows()).copy_from(&y);
-            Ok(StepMap { velocity, next })
+            Ok(StepMap {
+                velocity,
+                conserved,
+                next,
+            })
         };
         run().map_err(|e: crate::Error| e.at_time(time))
     }

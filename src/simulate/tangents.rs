@@ -229,7 +229,9 @@ impl Rollout {
         let e = trajectory.at(&states[0].q, samples[0].time)?;
         let (q, v) = (&directions.q, &directions.v);
         let start = &self.initial_velocity;
-        let y = (trajectory.stepper).conserved_jvp(&e, start, q, v, &inputs)?;
+        let stepper = &trajectory.stepper;
+        let momentum = stepper.momentum_slopes(&e, start)?;
+        let y = stepper.conserved_jvp(&e, start, momentum.as_ref(), q, v, &inputs);
         let state = |along: &DMatrix<f64>, n: usize| {
             let (q, y) = (
                 along.rows(0, nv).into_owned(),
@@ -277,13 +279,8 @@ impl Rollout {
         let y = along.rows(nv, nv).into_owned();
         let e = trajectory.at(&states[steps].q, samples[steps].time)?;
         let at = crate::dynamics::StateTangents { q, y };
-        let v = (trajectory.stepper).velocity_jvp(
-            &e,
-            &states[steps],
-            &samples[steps].v,
-            &at,
-            &inputs,
-        )?;
+        let momentum = stepper.momentum_slopes(&e, &samples[steps].v)?;
+        let v = stepper.velocity_jvp(&e, &states[steps], momentum.as_ref(), &at, &inputs)?;
         each(&Moved {
             state: steps,
             q: &at.q,

@@ -191,11 +191,6 @@ pub(super) struct ControlledStep<'t, 'a> {
 }
 
 impl<'a> ControlledStep<'_, 'a> {
-    /// The system at the state before the step.
-    pub fn linearisation(&self) -> &Linearisation<'a> {
-        self.step.linearisation()
-    }
-
     /// Transpose of the step, its controller, and what is observed at its state.
     pub fn vjp(&self, next_bar: &StateBar, seed: &Seed) -> Result<(StateBar, Partial)> {
         let record = self.step.record();

@@ -99,7 +99,7 @@ fn cotangents_by_name_are_those_of_the_fields() {
 }
 
 #[test]
-fn what_has_no_transpose_or_no_name_is_refused() {
+fn what_has_no_derivatives_or_no_name_is_refused() {
     let (_, rollout) = tumbling();
     let error = rollout.observe("enery").unwrap_err();
     says(&error, &["\"enery\"", "angular_momentum"]);
@@ -108,7 +108,7 @@ fn what_has_no_transpose_or_no_name_is_refused() {
         .insert("energy".into(), DMatrix::zeros(1, 201));
     says(
         rollout.vjp(&seed).unwrap_err(),
-        &["energy", "no transpose", "angular_momentum"],
+        &["derivative", "energy", "has none", "angular_momentum"],
     );
     let mut seed = rollout.zero_cotangents();
     seed.observables

@@ -4,7 +4,7 @@ use super::split::{Split, When};
 use super::{State, StateTangents, StepBar, Stepper};
 use crate::adjoint::solve::{Definite, smallest_scaled_eigenvalue};
 use crate::dynamics::slopes::columns;
-use crate::dynamics::{Evaluation, InputTangents, Linearisation};
+use crate::dynamics::{Evaluation, InputTangents, Linearisation, Slopes};
 use crate::{Error, Result};
 use nalgebra::{DMatrix, DVector};
 
@@ -36,16 +36,15 @@ pub(super) fn solve(e: &Evaluation, split: &Split, hat: &DVector<f64>) -> Result
     Ok(&split.driven + split.put(&factor.solve(&split.take(&right))))
 }
 
-/// Tangents of [`solve`] along those of q, p̂ and the parameters: M dv = Xᵀ dp̂ + d(Xᵀ) p̂ − d(M v + p_rest).
+/// Tangents of [`solve`] along those of q, p̂ and the parameters, from the derivatives of M v + p_rest: M dv = Xᵀ dp̂ + d(Xᵀ) p̂ − d(M v + p_rest).
 pub(super) fn solve_jvp(
     e: &Linearisation,
     split: &Split,
     hat: &DVector<f64>,
-    v: &DVector<f64>,
+    momentum: &Slopes,
     at: &StateTangents,
     inputs: &InputTangents,
 ) -> Result<DMatrix<f64>> {
-    let momentum = e.momentum_slopes(v, &split.free)?;
     let right = e.frame_matrix().tr_mul(&at.y) + e.frame_momentum_slope(hat) * &at.q
         - momentum.along(&at.q, None, inputs);
     let free = factor(e, split)?.solve_columns(&split.take_rows(&right));
@@ -81,23 +80,36 @@ impl Stepper<'_> {
         solve(e, &split, &state.y)
     }
 
+    /// Derivatives of the momenta at the velocity `v`, for [`Stepper::velocity_jvp`] and [`Stepper::conserved_jvp`]; none for integrators that carry
+    /// the velocity.
+    ///
+    /// # Errors
+    /// A solve of the coupling.
+    pub fn momentum_slopes(&self, e: &Linearisation, v: &DVector<f64>) -> Result<Option<Slopes>> {
+        if self.integrator.carries_velocity() {
+            return Ok(None);
+        }
+        let all: Vec<usize> = (0..v.len()).collect();
+        e.momentum_slopes(v, &all).map(Some)
+    }
+
     /// Tangents of [`Stepper::velocity`] along those of the state and, of the inputs, the parameters.
     ///
     /// # Errors
-    /// As the value, or a solve of the coupling.
+    /// As the value.
     pub fn velocity_jvp(
         &self,
         e: &Linearisation,
         state: &State,
-        v: &DVector<f64>,
+        momentum: Option<&Slopes>,
         at: &StateTangents,
         inputs: &InputTangents,
     ) -> Result<DMatrix<f64>> {
         let split = self.split_at(state);
-        if self.integrator.carries_velocity() {
-            return Ok(split.put_rows(&split.take_rows(&at.y)));
+        match momentum {
+            None => Ok(split.put_rows(&split.take_rows(&at.y))),
+            Some(momentum) => solve_jvp(e, &split, &state.y, momentum, at, inputs),
         }
-        solve_jvp(e, &split, &state.y, v, at, inputs)
     }
 
     /// Transpose of [`Stepper::velocity`]: adds to the cotangents of the state and parameters.
@@ -141,24 +153,21 @@ impl Stepper<'_> {
     }
 
     /// Tangents of [`Stepper::conserved`] along those of q, of v and, of the inputs, the parameters: Xᵀ dp̂ = dp − d(Xᵀ) p̂.
-    ///
-    /// # Errors
-    /// A solve of the coupling.
     pub fn conserved_jvp(
         &self,
         e: &Linearisation,
         v: &DVector<f64>,
+        momentum: Option<&Slopes>,
         q: &DMatrix<f64>,
         along: &DMatrix<f64>,
         inputs: &InputTangents,
-    ) -> Result<DMatrix<f64>> {
-        if self.integrator.carries_velocity() {
-            return Ok(along.clone());
-        }
-        let all: Vec<usize> = (0..v.len()).collect();
-        let momentum = e.momentum_slopes(v, &all)?.along(q, Some(along), inputs);
-        let user = momentum - e.frame_momentum_slope(&e.frame_momentum(v)) * q;
-        Ok(columns(&user, |p| e.frame_dual(p)))
+    ) -> DMatrix<f64> {
+        let Some(momentum) = momentum else {
+            return along.clone();
+        };
+        let user = momentum.along(q, Some(along), inputs)
+            - e.frame_momentum_slope(&e.frame_momentum(v)) * q;
+        columns(&user, |p| e.frame_dual(p))
     }
 
     /// Transpose of [`Stepper::conserved`]: cotangents of q (added to `bar.state.q`) and of v

@@ -200,8 +200,9 @@ impl<'a> Part<'_, 'a> {
 
     /// Tangents of the velocity read out at its state.
     fn velocity_jvp(&self, state: &StateTangents, inputs: &InputTangents) -> Result<DMatrix<f64>> {
-        self.stepper
-            .velocity_jvp(&self.e, &self.state, self.v, state, inputs)
+        let (s, e) = (&self.stepper, &self.e);
+        let momentum = s.momentum_slopes(e, self.v)?;
+        s.velocity_jvp(e, &self.state, momentum.as_ref(), state, inputs)
     }
 
     /// Carries the cotangent of the velocity read out at its state on to the state.
@@ -276,9 +277,7 @@ impl<'a> LinearisedStep<'_, 'a> {
         state: &StateTangents,
         inputs: &InputTangents,
     ) -> Result<DMatrix<f64>> {
-        let s = &self.first;
-        s.stepper
-            .velocity_jvp(&s.e, &self.record.state, &self.record.v, state, inputs)
+        self.first.velocity_jvp(state, inputs)
     }
 }
 

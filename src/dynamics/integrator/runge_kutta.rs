@@ -157,7 +157,10 @@ impl<'a> StepDerivatives<'a> for Adjoint<'a> {
             let at = StateTangents { q, y: p };
             let v = match stage.read_out {
                 true => along.v.clone(),
-                false => readout::solve_jvp(e, &stage.split, &stage.p, &stage.v, &at, inputs)?,
+                false => {
+                    let momentum = e.momentum_slopes(&stage.v, &stage.split.free)?;
+                    readout::solve_jvp(e, &stage.split, &stage.p, &momentum, &at, inputs)?
+                }
             };
             let rate = tree.chart_rate_jvp(&stage.xi, &stage.v, &stage_xi, &v);
             let force = e.force_slopes(&stage.v, control, &stage.split.free)?;

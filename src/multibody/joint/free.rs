@@ -35,6 +35,10 @@ impl JointMotion for Free {
         Some(3)
     }
 
+    fn has_frame_map(&self) -> bool {
+        true
+    }
+
     fn frame_velocity(&self, q: &[f64], v: &[f64]) -> Vec<f64> {
         let lin = vec3(v) + vec3(q).cross(&vec3(&v[3..6]));
         vec![lin.x, lin.y, lin.z, v[3], v[4], v[5]]

@@ -174,6 +174,11 @@ pub trait JointMotion: fmt::Debug + Send + Sync + 'static {
         None
     }
 
+    /// Whether X(q) is anything but the identity.
+    fn has_frame_map(&self) -> bool {
+        false
+    }
+
     /// Frame velocity `v̂ = X(q) v`.
     fn frame_velocity(&self, _q: &[f64], v: &[f64]) -> Vec<f64> {
         v.to_vec()

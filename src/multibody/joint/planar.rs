@@ -75,6 +75,10 @@ impl JointMotion for Planar {
         )
     }
 
+    fn has_frame_map(&self) -> bool {
+        true
+    }
+
     fn frame_velocity(&self, q: &[f64], v: &[f64]) -> Vec<f64> {
         vec![v[0] + v[2] * q[1], v[1] - v[2] * q[0], v[2]]
     }

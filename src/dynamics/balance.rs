@@ -36,6 +36,34 @@ pub struct ForceCotangents {
     pub parameters: Parameters,
 }
 
+/// What is known of the ẑ of several transposes, and asked of them.
+#[derive(Clone, Copy)]
+enum Rows {
+    /// Any, with all cotangents.
+    Whole,
+    /// Unit vectors, which move the bodies behind one joint alone; those of the parameters perhaps.
+    Units { by_parameters: bool },
+}
+
+impl Rows {
+    fn units(by_parameters: bool) -> Self {
+        Self::Units { by_parameters }
+    }
+
+    fn by_parameters(self) -> bool {
+        match self {
+            Self::Whole => true,
+            Self::Units { by_parameters } => by_parameters,
+        }
+    }
+
+    /// Whether what body `b` has in them comes to nothing.
+    fn skips(self, fields: &Fields, b: usize) -> bool {
+        let still = fields.virtual_twist[b] == Vec6::zeros() && fields.turning[b] == Vec6::zeros();
+        matches!(self, Self::Units { .. }) && still
+    }
+}
+
 impl ForceCotangents {
     /// All zero.
     pub fn zeros(e: &Evaluation) -> Self {
@@ -121,17 +149,15 @@ impl Evaluation<'_> {
         out: &mut ForceCotangents,
     ) {
         use std::slice::{from_mut, from_ref};
-        self.loads_vjps(
-            twists,
-            v,
-            control,
-            from_ref(z),
-            from_mut(bar),
-            from_mut(out),
-        );
+        let (z, bar, out) = (from_ref(z), from_mut(bar), from_mut(out));
+        self.loads_vjps(twists, v, control, z, bar, out, true);
     }
 
-    /// The same for several velocities at once.
+    /// The same for several velocities at once; the parameters' cotangents only if they are asked for.
+    #[expect(
+        clippy::too_many_arguments,
+        reason = "a force's own, and where they go"
+    )]
     fn loads_vjps(
         &self,
         twists: &[Vec6],
@@ -140,6 +166,7 @@ impl Evaluation<'_> {
         z: &[Velocity],
         bars: &mut [Cotangents],
         out: &mut [ForceCotangents],
+        by_parameters: bool,
     ) {
         let at = self.moving(twists, v, control);
         let bars = bars.iter_mut().zip(out);
@@ -154,7 +181,7 @@ impl Evaluation<'_> {
             })
             .collect();
         for force in self.system.smooth_forces() {
-            force.vjps(&at, z, &mut bars);
+            force.vjps(&at, z, &mut bars, by_parameters);
         }
     }
 
@@ -354,11 +381,11 @@ impl Linearisation<'_> {
         control: &DVector<f64>,
         z: &DVector<f64>,
     ) -> Result<ForceCotangents> {
-        let mut all = self.force_vjps(v, control, std::slice::from_ref(z))?;
+        let mut all = self.force_vjps(v, control, std::slice::from_ref(z), Rows::Whole)?;
         Ok(all.pop().unwrap_or_else(|| ForceCotangents::zeros(self)))
     }
 
-    /// Derivatives of the entries `entries` of [`Linearisation::force`]; the others have none.
+    /// Derivatives of the entries `entries` of [`Linearisation::force`], those with respect to the parameters if they are asked for; the others have none.
     ///
     /// # Errors
     /// As [`Linearisation::force_vjp`].
@@ -367,9 +394,10 @@ impl Linearisation<'_> {
         v: &DVector<f64>,
         control: &DVector<f64>,
         entries: &[usize],
+        by_parameters: bool,
     ) -> Result<Slopes> {
         let units: Vec<_> = entries.iter().map(|i| unit(v.len(), *i)).collect();
-        let rows = self.force_vjps(v, control, &units)?;
+        let rows = self.force_vjps(v, control, &units, Rows::units(by_parameters))?;
         let zero = ForceCotangents::zeros(self);
         Ok(Slopes::from_rows(v.len(), entries, &rows, &zero))
     }
@@ -380,6 +408,7 @@ impl Linearisation<'_> {
         v: &DVector<f64>,
         control: &DVector<f64>,
         z: &[DVector<f64>],
+        rows: Rows,
     ) -> Result<Vec<ForceCotangents>> {
         let (tree, n) = (&self.system.tree, self.system.len());
         let Some(first) = z.first() else {
@@ -399,12 +428,17 @@ impl Linearisation<'_> {
         let mut bars = vec![Cotangents::zeros(n); z.len()];
         for ((fields, bar), out) in fields.iter().zip(&mut bars).zip(&mut out) {
             for (b, turning) in fields.turning.iter().enumerate() {
+                if rows.skips(fields, b) {
+                    continue;
+                }
                 // D · h_r, with the rigid momentum h_r = I V constant in the body's frame.
                 let (h, h_turning) = (momenta[b], self.rigid_momentum(b, turning));
                 bar.turning[b] += h;
                 bar.twist[b] += h_turning;
                 bar.pose[b] -= cross_force(&twist[b], &h_turning) + cross_force(turning, &h);
-                rigid_parameters_vjp(self, b, turning, &twist[b], &mut out.parameters);
+                if rows.by_parameters() {
+                    rigid_parameters_vjp(self, b, turning, &twist[b], &mut out.parameters);
+                }
             }
             // Z · wrenches + ẑᵀ X⁻ᵀ τ.
             for (bar, wrench) in bar.virtual_twist.iter_mut().zip(&loads.wrenches) {
@@ -419,12 +453,21 @@ impl Linearisation<'_> {
                 v,
             })
             .collect();
-        self.loads_vjps(twist, v, control, &powers, &mut bars, &mut out);
+        let by_parameters = rows.by_parameters();
+        self.loads_vjps(
+            twist,
+            v,
+            control,
+            &powers,
+            &mut bars,
+            &mut out,
+            by_parameters,
+        );
         let joints = self.frame_dual(&loads.joints);
         for (out, tau_bar) in out.iter_mut().zip(&tau_bars) {
             out.q -= self.frame_velocity_vjp(tau_bar, &joints);
         }
-        self.fluid_force_vjps(v, &fields, &mut bars, &mut out)?;
+        self.fluid_force_vjps(v, &fields, &mut bars, &mut out, rows)?;
         for (((z, fields), bar), out) in z.iter().zip(&fields).zip(bars).zip(&mut out) {
             let (q_bar, v_bar) = tree.reverse(&self.kinematics, v, Virtual::Frame(z), fields, bar);
             out.q += q_bar;
@@ -440,6 +483,7 @@ impl Linearisation<'_> {
         fields: &[Fields],
         bars: &mut [Cotangents],
         out: &mut [ForceCotangents],
+        rows: Rows,
     ) -> Result<()> {
         let Some(water) = self.water()? else {
             return Ok(());
@@ -465,6 +509,9 @@ impl Linearisation<'_> {
         for (k, tangent) in tangents.iter().enumerate() {
             let (fields, carried, bar) = (&fields[k], &carried[k], &mut bars[k]);
             for (b, w) in self.system.submerged() {
+                if rows.skips(fields, b) {
+                    continue;
+                }
                 let pose = &self.kinematics.poses[b];
                 let carried_on = impulses.fixed_view::<6, 1>(6 * w, k).into_owned();
                 let momentum_carried = pose.wrench_to_world(&carried_on);

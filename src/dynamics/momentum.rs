@@ -8,6 +8,23 @@ use crate::adjoint::lie::{Vec6, cross_force};
 use crate::multibody::{Cotangents, Fields, Virtual};
 use nalgebra::{DMatrix, DVector};
 
+/// Two velocities whose product with the inertia is differentiated: v with its fields, and w.
+struct Pair<'p> {
+    fields: &'p Fields,
+    v: &'p DVector<f64>,
+    w: DVector<f64>,
+    /// Whether w is a unit vector, which moves the bodies behind one joint alone.
+    is_unit: bool,
+    by_parameters: bool,
+}
+
+impl Pair<'_> {
+    /// Whether what a body has in it comes to nothing, from its virtual twist.
+    fn skips(&self, virt: &Vec6) -> bool {
+        self.is_unit && *virt == Vec6::zeros()
+    }
+}
+
 impl Evaluation<'_> {
     /// Generalised momentum at velocity `v`, user coordinates (kg m/s, kg m²/s).
     pub fn momentum(&self, v: &DVector<f64>) -> DVector<f64> {
@@ -62,20 +79,31 @@ impl Linearisation<'_> {
         self.bilinear_vjp(v, w, &Vec6::zeros())
     }
 
-    /// Derivatives of the entries `entries` of `M(q) v + p_rest(q)`, the user's coordinates; the others have none.
+    /// Derivatives of the entries `entries` of `M(q) v + p_rest(q)`, the user's coordinates, those with respect to the parameters if they are asked for; the
+    /// others have none.
     ///
     /// # Errors
     /// As [`Linearisation::momentum_vjp`].
-    pub fn momentum_slopes(&self, v: &DVector<f64>, entries: &[usize]) -> Result<Slopes> {
-        self.bilinear_slopes(v, entries, &self.current_twist())
+    pub fn momentum_slopes(
+        &self,
+        v: &DVector<f64>,
+        entries: &[usize],
+        by_parameters: bool,
+    ) -> Result<Slopes> {
+        self.bilinear_slopes(v, entries, &self.current_twist(), by_parameters)
     }
 
     /// The same of `M(q) v`, without the current.
     ///
     /// # Errors
     /// As [`Linearisation::mass_vjp`].
-    pub fn mass_slopes(&self, v: &DVector<f64>, entries: &[usize]) -> Result<Slopes> {
-        self.bilinear_slopes(v, entries, &Vec6::zeros())
+    pub fn mass_slopes(
+        &self,
+        v: &DVector<f64>,
+        entries: &[usize],
+        by_parameters: bool,
+    ) -> Result<Slopes> {
+        self.bilinear_slopes(v, entries, &Vec6::zeros(), by_parameters)
     }
 
     fn bilinear_slopes(
@@ -83,10 +111,18 @@ impl Linearisation<'_> {
         v: &DVector<f64>,
         entries: &[usize],
         current: &Vec6,
+        by_parameters: bool,
     ) -> Result<Slopes> {
         let n = v.len();
         let zero = ForceCotangents::zeros(self);
         let fields = self.still_fields(v);
+        let at = |i| Pair {
+            fields: &fields,
+            v,
+            w: unit(n, i),
+            is_unit: true,
+            by_parameters,
+        };
         let rows: Vec<ForceCotangents> = match self.water()? {
             Some(water) => {
                 let direction = self.direction(v, current);
@@ -96,18 +132,12 @@ impl Linearisation<'_> {
                 let row = |i: &usize| {
                     let momenta_virtual = water.column(*i);
                     let carried = [&momenta, &momenta_virtual, &self.from_submerged(&pairs[*i])];
-                    self.bilinear_row(
-                        &fields,
-                        v,
-                        &unit(n, *i),
-                        current,
-                        Some(carried.map(Vec::as_slice)),
-                    )
+                    self.bilinear_row(&at(*i), current, Some(carried.map(Vec::as_slice)))
                 };
                 entries.iter().map(row).collect()
             }
             None => (entries.iter())
-                .map(|i| self.bilinear_row(&fields, v, &unit(n, *i), current, None))
+                .map(|i| self.bilinear_row(&at(*i), current, None))
                 .collect(),
         };
         Ok(Slopes::from_rows(n, entries, &rows, &zero))
@@ -127,8 +157,15 @@ impl Linearisation<'_> {
         w: &DVector<f64>,
         current: &Vec6,
     ) -> Result<ForceCotangents> {
+        let at = Pair {
+            fields: &self.still_fields(v),
+            v,
+            w: w.clone(),
+            is_unit: false,
+            by_parameters: true,
+        };
         let Some(water) = self.water()? else {
-            return Ok(self.bilinear_row(&self.still_fields(v), v, w, current, None));
+            return Ok(self.bilinear_row(&at, current, None));
         };
         let (direction, virtual_direction) =
             (self.direction(v, current), self.virtual_direction(w));
@@ -136,8 +173,7 @@ impl Linearisation<'_> {
             (water.momenta(&direction), water.momenta(&virtual_direction));
         let pair = water.linearised.gradient(&virtual_direction, &direction)?;
         let carried = [&momenta, &momenta_virtual, &self.from_submerged(&pair)];
-        let fields = self.still_fields(v);
-        Ok(self.bilinear_row(&fields, v, w, current, Some(carried.map(Vec::as_slice))))
+        Ok(self.bilinear_row(&at, current, Some(carried.map(Vec::as_slice))))
     }
 
     /// Fields at the velocity `v`, without a virtual one.
@@ -149,12 +185,11 @@ impl Linearisation<'_> {
     /// With the water's momenta of both velocities, and the slopes of their energy.
     fn bilinear_row(
         &self,
-        fields: &Fields,
-        v: &DVector<f64>,
-        w: &DVector<f64>,
+        at: &Pair,
         current: &Vec6,
         water: Option<[&[Vec6]; 3]>,
     ) -> ForceCotangents {
+        let Pair { fields, v, w, .. } = at;
         let tree = &self.system.tree;
         let rho = self.parameters.density();
         let mut out = ForceCotangents::zeros(self);
@@ -162,16 +197,24 @@ impl Linearisation<'_> {
         let mut bar = Cotangents::zeros(self.system.len());
         for b in 0..self.system.len() {
             let (twist, virt) = (&fields.twist[b], &fields.virtual_twist[b]);
+            if at.skips(virt) {
+                continue;
+            }
             let (h, h_virtual) = (self.rigid_momentum(b, twist), self.rigid_momentum(b, virt));
             bar.virtual_twist[b] += h;
             bar.twist[b] += h_virtual;
             bar.pose[b] -= cross_force(twist, &h_virtual) + cross_force(virt, &h);
-            rigid_parameters_vjp(self, b, virt, twist, &mut out.parameters);
+            if at.by_parameters {
+                rigid_parameters_vjp(self, b, virt, twist, &mut out.parameters);
+            }
         }
         if let Some([momenta, momenta_virtual, pair]) = water {
             for (b, _) in self.system.submerged() {
                 let relative = fields.twist[b] - current;
                 let virt = &fields.virtual_twist[b];
+                if at.skips(virt) {
+                    continue;
+                }
                 *out.parameters.density_mut() += virt.dot(&momenta[b]);
                 bar.virtual_twist[b] += rho * momenta[b];
                 bar.twist[b] += rho * momenta_virtual[b];

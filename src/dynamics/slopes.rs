@@ -64,7 +64,7 @@ impl Slopes {
             out += &self.v * v;
         }
         out += &self.control * &inputs.control;
-        if inputs.parameters.nrows() > 0 {
+        if inputs.has_parameters() {
             out += &self.parameters * &inputs.parameters;
         }
         out
@@ -80,11 +80,16 @@ impl InputTangents {
         }
     }
 
+    /// Whether any parameter changes.
+    pub fn has_parameters(&self) -> bool {
+        self.parameters.nrows() > 0
+    }
+
     /// The parameters' part of a cotangent's products with the directions.
     pub(super) fn of_parameters(&self, bar: &Parameters) -> DVector<f64> {
-        match self.parameters.nrows() {
-            0 => DVector::zeros(self.parameters.ncols()),
-            _ => (self.parameters).tr_mul(&DVector::from_column_slice(bar.as_slice())),
+        match self.has_parameters() {
+            false => DVector::zeros(self.parameters.ncols()),
+            true => (self.parameters).tr_mul(&DVector::from_column_slice(bar.as_slice())),
         }
     }
 }

@@ -106,7 +106,7 @@ impl Columns {
             self.unit_state(),
             self.of_chosen(&self.units(self.of_parameters())),
         );
-        let momentum = t.stepper.momentum_slopes(e, v)?;
+        let momentum = t.stepper.momentum_slopes(e, v, inputs.has_parameters())?;
         let momentum = momentum.as_ref();
         let velocity = (t.stepper).velocity_jvp(e, state, momentum, &at, &inputs)?;
         let StateTangents { q, y } = &at;

@@ -230,7 +230,7 @@ impl Rollout {
         let (q, v) = (&directions.q, &directions.v);
         let start = &self.initial_velocity;
         let stepper = &trajectory.stepper;
-        let momentum = stepper.momentum_slopes(&e, start)?;
+        let momentum = stepper.momentum_slopes(&e, start, inputs.has_parameters())?;
         let y = stepper.conserved_jvp(&e, start, momentum.as_ref(), q, v, &inputs);
         let state = |along: &DMatrix<f64>, n: usize| {
             let (q, y) = (
@@ -279,7 +279,7 @@ impl Rollout {
         let y = along.rows(nv, nv).into_owned();
         let e = trajectory.at(&states[steps].q, samples[steps].time)?;
         let at = crate::dynamics::StateTangents { q, y };
-        let momentum = stepper.momentum_slopes(&e, &samples[steps].v)?;
+        let momentum = stepper.momentum_slopes(&e, &samples[steps].v, inputs.has_parameters())?;
         let v = stepper.velocity_jvp(&e, &states[steps], momentum.as_ref(), &at, &inputs)?;
         each(&Moved {
             state: steps,

@@ -179,7 +179,7 @@ fn velocity(c: f64) -> Outcome {
             let s = stepper(&p.parameters, integrator);
             let e = evaluate(&p.parameters, &p.q);
             let (at, inputs) = tangents(std::slice::from_ref(&along));
-            let momentum = s.momentum_slopes(&e, &read(&p)).unwrap();
+            let momentum = s.momentum_slopes(&e, &read(&p), true).unwrap();
             let found = s.velocity_jvp(&e, &state(&p, &held), momentum.as_ref(), &at, &inputs);
             vector_along(
                 |h| joined(&[&read(&along.at(&p, h))]),
@@ -201,7 +201,7 @@ fn conserved(c: f64) -> Outcome {
             let s = stepper(&p.parameters, integrator);
             let e = evaluate(&p.parameters, &p.q);
             let (at, inputs) = tangents(std::slice::from_ref(&along));
-            let momentum = s.momentum_slopes(&e, &p.v).unwrap();
+            let momentum = s.momentum_slopes(&e, &p.v, true).unwrap();
             let found = s.conserved_jvp(&e, &p.v, momentum.as_ref(), &at.q, &at.y, &inputs);
             vector_along(
                 |h| joined(&[&value(&along.at(&p, h))]),

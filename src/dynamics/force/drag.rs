@@ -167,18 +167,21 @@ impl ForceModel for Drag {
     }
 
     fn vjp(&self, at: &Moving, z: &Velocity, bar: &mut LoadBars) {
-        self.vjps(at, std::slice::from_ref(z), std::slice::from_mut(bar));
+        self.vjps(at, std::slice::from_ref(z), std::slice::from_mut(bar), true);
     }
 
-    fn vjps(&self, at: &Moving, z: &[Velocity], bars: &mut [LoadBars]) {
+    fn vjps(&self, at: &Moving, z: &[Velocity], bars: &mut [LoadBars], by_parameters: bool) {
         let parameters = at.place.parameters;
         for d in &self.bodies {
             let b = d.body;
             let pose = &at.place.poses[b];
+            let scale = d.scale(parameters);
+            if scale == 0.0 && !by_parameters {
+                continue;
+            }
             let relative = at.relative(b);
             let nu = pose.twist_to_body(&relative);
             let unit = d.law.wrench(&nu);
-            let scale = d.scale(parameters);
             // The sums over the surface, once for all.
             let slope = (scale != 0.0).then(|| d.law.slope(&nu));
             for (z, bar) in z.iter().zip(bars.iter_mut()) {

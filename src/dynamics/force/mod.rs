@@ -197,8 +197,8 @@ pub trait ForceModel: Send + Sync {
     /// Adds the transpose of [`ForceModel::add`] in all its arguments: the gradient of its power on the velocity `z`.
     fn vjp(&self, at: &Moving, z: &Velocity, bar: &mut LoadBars);
 
-    /// [`ForceModel::vjp`] for several velocities at one motion; to be given where they share work.
-    fn vjps(&self, at: &Moving, z: &[Velocity], bars: &mut [LoadBars]) {
+    /// [`ForceModel::vjp`] for several velocities at one motion, where nobody may ask for the cotangents of the parameters; to be given where they share work.
+    fn vjps(&self, at: &Moving, z: &[Velocity], bars: &mut [LoadBars], _by_parameters: bool) {
         for (z, bar) in z.iter().zip(bars) {
             self.vjp(at, z, bar);
         }

@@ -191,7 +191,7 @@ impl<'s> Adjoint<'s> {
         let velocities = self.velocities;
         let change = &velocities.after - &velocities.before;
         let pressed = near.contact_force_slopes(&velocities.after, Dual::User, &split.free);
-        let inertia = e.mass_slopes(&change, &split.free)?;
+        let inertia = e.mass_slopes(&change, &split.free, along.inputs.has_parameters())?;
         let moved = &e.mass_matrix * before;
         let right = moved + start.stepper.dt * pressed.along(along.q, None, along.inputs)
             - inertia.along(along.q, None, along.inputs);

@@ -278,8 +278,13 @@ impl<'a> StepDerivatives<'a> for Adjoint<'_, 'a> {
         let (s, e, split) = (start.stepper, start.e, start.split);
         let (q, inputs) = (along.q, along.inputs);
         let before = &self.contact.velocities.before;
-        let force = e.force_slopes(before, &start.input.control, &split.free)?;
-        let momentum = e.momentum_slopes(before, &split.free)?;
+        let force = e.force_slopes(
+            before,
+            &start.input.control,
+            &split.free,
+            inputs.has_parameters(),
+        )?;
+        let momentum = e.momentum_slopes(before, &split.free, inputs.has_parameters())?;
         let tree = &e.system.tree;
         let [by_q, _, by_hat] = tree.chart_momentum_slopes(&e.q, &(s.dt * before), &self.reached);
         // p̂ + Δt f at a given velocity; the stage's matrix holds what the velocity does.

@@ -115,8 +115,13 @@ impl<'a> StepDerivatives<'a> for Adjoint<'_, 'a> {
         let (q, inputs, nv) = (along.q, along.inputs, start.v.len());
         let before = &self.contact.velocities.before;
         let h = 0.5 * s.dt;
-        let force = m.force_slopes(before, &start.input.control, &split.free)?;
-        let momentum = m.momentum_slopes(before, &split.free)?;
+        let force = m.force_slopes(
+            before,
+            &start.input.control,
+            &split.free,
+            inputs.has_parameters(),
+        )?;
+        let momentum = m.momentum_slopes(before, &split.free, inputs.has_parameters())?;
         // q_m by q and by v.
         let advance = |q: &DMatrix<f64>, v: &DMatrix<f64>| {
             let mut out = s.system.tree.integrate_jvp(&(h * before), q, &(h * v));

@@ -80,17 +80,22 @@ impl Stepper<'_> {
         solve(e, &split, &state.y)
     }
 
-    /// Derivatives of the momenta at the velocity `v`, for [`Stepper::velocity_jvp`] and [`Stepper::conserved_jvp`]; none for integrators that carry
+    /// Derivatives of the momenta at the velocity `v`, those with respect to the parameters if they are asked for, for [`Stepper::velocity_jvp`] and [`Stepper::conserved_jvp`]; none for integrators that carry
     /// the velocity.
     ///
     /// # Errors
     /// A solve of the coupling.
-    pub fn momentum_slopes(&self, e: &Linearisation, v: &DVector<f64>) -> Result<Option<Slopes>> {
+    pub fn momentum_slopes(
+        &self,
+        e: &Linearisation,
+        v: &DVector<f64>,
+        by_parameters: bool,
+    ) -> Result<Option<Slopes>> {
         if self.integrator.carries_velocity() {
             return Ok(None);
         }
         let all: Vec<usize> = (0..v.len()).collect();
-        e.momentum_slopes(v, &all).map(Some)
+        e.momentum_slopes(v, &all, by_parameters).map(Some)
     }
 
     /// Tangents of [`Stepper::velocity`] along those of the state and, of the inputs, the parameters.

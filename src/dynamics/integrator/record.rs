@@ -201,7 +201,7 @@ impl<'a> Part<'_, 'a> {
     /// Tangents of the velocity read out at its state.
     fn velocity_jvp(&self, state: &StateTangents, inputs: &InputTangents) -> Result<DMatrix<f64>> {
         let (s, e) = (&self.stepper, &self.e);
-        let momentum = s.momentum_slopes(e, self.v)?;
+        let momentum = s.momentum_slopes(e, self.v, inputs.has_parameters())?;
         s.velocity_jvp(e, &self.state, momentum.as_ref(), state, inputs)
     }
 

@@ -158,12 +158,18 @@ impl<'a> StepDerivatives<'a> for Adjoint<'a> {
             let v = match stage.read_out {
                 true => along.v.clone(),
                 false => {
-                    let momentum = e.momentum_slopes(&stage.v, &stage.split.free)?;
+                    let momentum =
+                        e.momentum_slopes(&stage.v, &stage.split.free, inputs.has_parameters())?;
                     readout::solve_jvp(e, &stage.split, &stage.p, &momentum, &at, inputs)?
                 }
             };
             let rate = tree.chart_rate_jvp(&stage.xi, &stage.v, &stage_xi, &v);
-            let force = e.force_slopes(&stage.v, control, &stage.split.free)?;
+            let force = e.force_slopes(
+                &stage.v,
+                control,
+                &stage.split.free,
+                inputs.has_parameters(),
+            )?;
             let force = force.along(&at.q, Some(&v), inputs);
             let weight = self.tableau.weights[i] * dt;
             xi += weight * &rate;

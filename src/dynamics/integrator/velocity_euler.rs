@@ -58,7 +58,7 @@ impl<'a> StepDerivatives<'a> for Adjoint<'_> {
         let (s, e, split) = (start.stepper, start.e, start.split);
         let (q, inputs) = (along.q, along.inputs);
         let force = e.inertial_force_slopes(start.v, &start.input.control, &split.free)?;
-        let inertia = e.mass_slopes(&self.acceleration, &split.free)?;
+        let inertia = e.mass_slopes(&self.acceleration, &split.free, inputs.has_parameters())?;
         // Driven velocities are reached from where they are.
         let mut driven = -along.v / s.dt;
         for &i in &split.free {

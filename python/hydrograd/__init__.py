@@ -8,7 +8,7 @@ as their first index.
 from hydrograd import objective, optimize
 from hydrograd._added_mass import added_mass
 from hydrograd._contacts import ContactForces
-from hydrograd._gradient import Gradient, StepGradient
+from hydrograd._gradient import Gradient, StepGradient, Tangents
 from hydrograd._hydrograd import (
     BatchError,
     Body,
@@ -79,6 +79,7 @@ __all__ = [
     "SolverError",
     "State",
     "StepGradient",
+    "Tangents",
     "Tradeoff",
     "TradeoffQuantity",
     "TradeoffReference",

@@ -233,6 +233,62 @@ def pull(physics: Physics, rollouts: Sequence[Rollout], q: Array, lengths: Array
     return _stacked(physics, each(one, range(len(rollouts))), q, lengths)
 
 
+def push(physics: Physics, rollouts: Sequence[Rollout], q: Array, lengths: Array, along: Pulled) -> Observed:
+    """Tangents of rollouts that began at `q`, a row for each of `along`; rows of the same rollout share its work."""
+    chart, sim, rows = physics.charts, physics.sim, _together(rollouts)
+    turned = chart.turned(q, lengths, along.q)
+
+    def one(first: int) -> Observed:
+        rollout, of = rollouts[first], rows[first]
+        made = rollout.jvp(controls=along.controls[of], q=turned[of], v=along.v[of], **_named(physics, along, of))
+        columns = np.swapaxes(rollout.rotations, -1, -2)
+        spun = np.swapaxes(cross(made.rotations[..., None, :], columns), -1, -2)
+        return Observed(made.positions, spun, chart.moved(rollout.q, made.q), made.v)
+
+    batch, states = len(rollouts), rollouts[0].steps + 1
+    out = Observed(
+        np.empty((batch, states, physics.bodies, 3)),
+        np.empty((batch, states, physics.bodies, 3, 3)),
+        np.empty((batch, states, sim.q_size)),
+        np.empty((batch, states, sim.v_size)),
+    )
+    for of, made in zip(rows.values(), each(one, rows), strict=True):
+        for array, part in zip(seen(out), seen(made), strict=True):
+            array[of] = part
+    return out
+
+
+def push_step(
+    physics: Physics, records: Sequence[Record], q: Array, lengths: Array, after: Array, along: Pulled
+) -> tuple[Array, Array]:
+    """Tangents of q and v after steps from `q` to `after`, a row for each of `along`."""
+    turned, rows = physics.charts.turned(q, lengths, along.q), _together(records)
+
+    def one(first: int) -> tuple[Array, Array]:
+        of = rows[first]
+        return records[first].jvp(q=turned[of], v=along.v[of], u=along.controls[of], **_named(physics, along, of))
+
+    dq, dv = np.empty_like(after), np.empty_like(along.v)
+    for of, (q_part, v_part) in zip(rows.values(), each(one, rows), strict=True):
+        dq[of], dv[of] = physics.charts.moved(after[of], q_part), v_part
+    return dq, dv
+
+
+def _together(made: Sequence[object]) -> dict[int, list[int]]:
+    """Rows that are of one and the same, by the first of them."""
+    first: dict[int, int] = {}
+    rows: dict[int, list[int]] = {}
+    for b, one in enumerate(made):
+        rows.setdefault(first.setdefault(id(one), b), []).append(b)
+    return rows
+
+
+def _named(physics: Physics, along: Pulled, of: list[int]) -> dict[str, Any]:
+    """Tangents of parameters and gains, as `jvp` takes them."""
+    parameters = {name: along.values[of, i] for i, name in enumerate(physics.names)}
+    return {"parameters": parameters, "gains": along.gains[of] if along.gains.shape[1] else None}
+
+
 def _stacked(
     physics: Physics, made: Sequence[tuple[Array, Array, Array, list[float], Array]], q: Array, lengths: Array
 ) -> Pulled:

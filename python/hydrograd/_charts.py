@@ -85,6 +85,29 @@ class Charts:
         out[..., self.turn_v] = 0.5 * (w * b - a * u + cross(u, b))
         return out
 
+    def turned(self, q: Array, lengths: Array, dq: Array) -> Array:
+        """Tangents (batch, v_size) in the tangent space from those of the entries that `normalise` was given; the transpose of `entries`."""
+        if not len(self.turn_q):
+            return dq
+        out = np.zeros((len(q), self.v_size))
+        out[:, self.plain_v] = dq[:, self.plain_q]
+        turn, along = q[:, self.turn_q], dq[:, self.turn_q]
+        w, u, a, b = turn[..., :1], turn[..., 1:], along[..., :1], along[..., 1:]
+        out[:, self.turn_v] = 2.0 * (w * b - a * u + cross(u, b)) / lengths[..., None]
+        return out
+
+    def moved(self, q: Array, tangent: Array) -> Array:
+        """Tangents (…, q_size) of the entries of `q` from those (…, v_size) in the tangent space; the transpose of `tangent`."""
+        if not len(self.turn_q):
+            return tangent
+        out = np.zeros((*tangent.shape[:-1], q.shape[-1]))
+        out[..., self.plain_q] = tangent[..., self.plain_v]
+        turn, theta = q[..., self.turn_q], tangent[..., self.turn_v]
+        w, u = turn[..., :1], turn[..., 1:]
+        scalar = -np.sum(u * theta, axis=-1, keepdims=True)
+        out[..., self.turn_q] = 0.5 * np.concatenate([scalar, w * theta + cross(theta, u)], axis=-1)
+        return out
+
     def entries(self, q: Array, lengths: Array, bar: Array) -> Array:
         """Cotangents (batch, q_size) of the entries that `normalise` was given, from those in the tangent space.
 

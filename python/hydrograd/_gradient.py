@@ -1,4 +1,4 @@
-"""What a reverse sweep yields."""
+"""What a reverse sweep yields, and forward mode."""
 
 from __future__ import annotations
 
@@ -26,6 +26,22 @@ class Gradient:
     """Of the physical parameters, by name."""
     gains: NDArray[np.float64]
     """Of the gains of the scene's controller, (gains,)."""
+
+
+@dataclass(frozen=True, eq=False)
+class Tangents:
+    """How a rollout changes along a direction, or along many: then all arrays have one more index before the others."""
+
+    q: NDArray[np.float64]
+    """Of the coordinates in their tangent space, (N + 1, v_size): for a quaternion the rotation vector δθ, rad."""
+    v: NDArray[np.float64]
+    """Of the generalised velocities, (N + 1, v_size)."""
+    positions: NDArray[np.float64]
+    """Of the bodies' origins, (N + 1, bodies, 3), world axes."""
+    rotations: NDArray[np.float64]
+    """Of the bodies' rotations, (N + 1, bodies, 3): δθ of δR = δθ × R, rad, world axes."""
+    observables: dict[str, NDArray[np.float64]]
+    """Of the other observables that were asked for, by name, (N + 1, …)."""
 
 
 @dataclass(frozen=True, eq=False)

@@ -6,7 +6,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from hydrograd._contacts import ContactForces
-from hydrograd._gradient import Gradient, StepGradient
+from hydrograd._gradient import Gradient, StepGradient, Tangents
 from hydrograd._optimize import Grasp, Optimum, Smoothed
 from hydrograd._policy import Policy
 from hydrograd._tradeoff import Tradeoff
@@ -344,9 +344,18 @@ class Record:
         positions: ArrayLike | None = None,
         rotations: ArrayLike | None = None,
     ) -> StepGradient: ...
-    def jacobians(self) -> tuple[_Array, _Array]: ...
+    @overload
+    def jacobians(self, parameters: None = None) -> tuple[_Array, _Array]: ...
+    @overload
+    def jacobians(self, parameters: Sequence[str]) -> tuple[_Array, _Array, _Array]: ...
     def jvp(
-        self, *, q: ArrayLike | None = None, v: ArrayLike | None = None, u: ArrayLike | None = None
+        self,
+        *,
+        q: ArrayLike | None = None,
+        v: ArrayLike | None = None,
+        u: ArrayLike | None = None,
+        parameters: Mapping[str, ArrayLike] | None = None,
+        gains: ArrayLike | None = None,
     ) -> tuple[_Array, _Array]: ...
 
 @final
@@ -398,6 +407,31 @@ class Rollout:
         controls: ArrayLike | None = None,
         observables: Mapping[str, ArrayLike] | None = None,
     ) -> Gradient: ...
+    def jvp(
+        self,
+        *,
+        controls: ArrayLike | None = None,
+        q: ArrayLike | None = None,
+        v: ArrayLike | None = None,
+        parameters: Mapping[str, ArrayLike] | None = None,
+        gains: ArrayLike | None = None,
+        observables: Sequence[str] = ...,
+    ) -> Tangents: ...
+    def jacobian(
+        self,
+        parameters: Sequence[str] = ...,
+        *,
+        q: bool = False,
+        v: bool = False,
+        gains: bool = False,
+        controls: bool = False,
+        of: Sequence[str] | None = None,
+        states: Sequence[int] | None = None,
+    ) -> dict[str, _Array]: ...
+    @overload
+    def step_jacobians(self, parameters: None = None) -> tuple[_Array, _Array]: ...
+    @overload
+    def step_jacobians(self, parameters: Sequence[str]) -> tuple[_Array, _Array, _Array]: ...
     def to_dict(self) -> dict[str, _Array]: ...
     def summary(self) -> dict[str, Any]: ...
     def __len__(self) -> int: ...

@@ -20,6 +20,7 @@ mod shape;
 mod simulation;
 mod simulator;
 mod state;
+mod tangents;
 mod tradeoff;
 
 use numpy::PyArrayDyn;

@@ -8,11 +8,14 @@ use crate::interrupt::{long, short};
 use crate::objective::Objective;
 use crate::simulator::Simulator;
 use crate::state::State;
-use hydrograd::simulate::{Cotangents, GapReport, NearGap, Recording, Sample, observable};
+use crate::tangents::{self, Along};
+use hydrograd::simulate::{
+    Cotangents, GapReport, NearGap, Recording, Sample, Variables, observable,
+};
 use nalgebra::DMatrix;
 use numpy::{PyArray1, PyArrayDyn};
 use pyo3::prelude::*;
-use pyo3::types::PyDict;
+use pyo3::types::{PyDict, PyTuple};
 use std::sync::Arc;
 
 /// A trajectory of states 0 … N: the forward pass, and the only key to its gradient. Each access to an array makes a new one.
@@ -359,6 +362,69 @@ impl Rollout {
             rollout.vjp_with(&seed, |_| interrupt.check())
         })?;
         gradient::of_rollout(py, &made)
+    }
+
+    /// Tangents of the trajectory, the counterpart of `vjp`: how the states change along `controls` (N, control_size), `q` (v_size,) in the tangent space of the
+    /// initial coordinates, the initial `v` (v_size,), `parameters` by name, and `gains`; what is None stays. Each may have one more index before its own, for many
+    /// directions at once, which cost little more than one. `observables` names others whose tangents are wanted. A `Tangents`. Ctrl-C ends it.
+    #[pyo3(signature = (*, controls=None, q=None, v=None, parameters=None, gains=None, observables=vec![]))]
+    #[expect(clippy::too_many_arguments, reason = "one per keyword")]
+    fn jvp<'py>(
+        &self,
+        py: Python<'py>,
+        controls: Option<&Bound<'py, PyAny>>,
+        q: Option<&Bound<'py, PyAny>>,
+        v: Option<&Bound<'py, PyAny>>,
+        parameters: Option<&Bound<'py, PyDict>>,
+        gains: Option<&Bound<'py, PyAny>>,
+        observables: Vec<String>,
+    ) -> PyResult<Bound<'py, PyAny>> {
+        let along = Along {
+            controls,
+            q,
+            v,
+            parameters,
+            gains,
+        };
+        tangents::jvp(py, &self.inner, &along, observables)
+    }
+
+    /// Jacobians of the observables `of` ("q" in the tangent space of the coordinates, "rotations" as δθ) at `states` (all where None; negative numbers count from the end)
+    /// with respect to the `parameters` named, and where True the initial `q` (in its tangent space) and `v`, the `gains`, and the `controls` of all steps: by name an array
+    /// (states, …, columns) whose columns come in that order. It costs a few runs, whatever the number of columns. Ctrl-C ends it.
+    #[pyo3(signature = (parameters=vec![], *, q=false, v=false, gains=false, controls=false, of=None, states=None))]
+    #[expect(clippy::too_many_arguments, reason = "one per keyword")]
+    fn jacobian<'py>(
+        &self,
+        py: Python<'py>,
+        parameters: Vec<String>,
+        q: bool,
+        v: bool,
+        gains: bool,
+        controls: bool,
+        of: Option<Vec<String>>,
+        states: Option<Vec<isize>>,
+    ) -> PyResult<Bound<'py, PyDict>> {
+        let variables = Variables {
+            parameters,
+            initial_q: q,
+            initial_v: v,
+            gains,
+            controls,
+        };
+        let of = of.unwrap_or_else(|| vec!["q".into(), "v".into()]);
+        tangents::jacobian(py, &self.inner, variables, of, states)
+    }
+
+    /// Linearisations x_{n+1} ≈ A_n x_n + B_n u_n of all steps in x = (q, v), coordinates in their tangent space, the scene's controller included: A (N, 2 v_size, 2 v_size)
+    /// and B (N, 2 v_size, control_size); with `parameters` also the derivatives with respect to those named (N, 2 v_size, parameters). Steps are taken on all cores.
+    #[pyo3(signature = (parameters=None))]
+    fn step_jacobians<'py>(
+        &self,
+        py: Python<'py>,
+        parameters: Option<Vec<String>>,
+    ) -> PyResult<Bound<'py, PyTuple>> {
+        tangents::step_jacobians(py, &self.inner, parameters)
     }
 
     /// Columns by name, one row a state: time, each coordinate and velocity, energy, momentum and smallest gap, SI units;

@@ -2,12 +2,14 @@
 
 use crate::array::{self, Dim};
 use crate::gradient;
-use crate::interrupt::{long, short};
+use crate::interrupt::short;
 use crate::simulator::Simulator;
+use crate::tangents::{self, Along};
 use hydrograd::dynamics;
 use nalgebra::{DMatrix, DVector};
 use numpy::{PyArray1, PyArrayDyn};
 use pyo3::prelude::*;
+use pyo3::types::{PyDict, PyTuple};
 use std::sync::Arc;
 
 /// A state between two steps: made by `Simulator.state`, `Simulator.step` or `Rollout.state`.
@@ -184,48 +186,43 @@ impl Record {
     }
 
     /// The linearisation x₁ ≈ A x₀ + B u of the step in x = (q, v), coordinates in their tangent space: A (2 v_size, 2 v_size)
-    /// and B (2 v_size, control_size).
-    #[expect(clippy::type_complexity, reason = "two arrays")]
+    /// and B (2 v_size, control_size); with `parameters` also the derivatives with respect to those named (2 v_size, parameters).
+    #[pyo3(signature = (parameters=None))]
     fn jacobians<'py>(
         &self,
         py: Python<'py>,
-    ) -> PyResult<(Bound<'py, PyArrayDyn<f64>>, Bound<'py, PyArrayDyn<f64>>)> {
-        let record = self.0.clone();
-        let made = long(py, move |_| record.jacobians())?;
-        Ok((
-            array::matrix(py, &made.state)?,
-            array::matrix(py, &made.controls)?,
-        ))
+        parameters: Option<Vec<String>>,
+    ) -> PyResult<Bound<'py, PyTuple>> {
+        let (record, names) = (self.0.clone(), parameters.clone().unwrap_or_default());
+        let shapes = tangents::shapes(self.0.rollout(), names.len());
+        let made = short(py, move || {
+            let names: Vec<&str> = names.iter().map(String::as_str).collect();
+            record.rollout().jacobians_with(&names)
+        })?;
+        tangents::matrices(py, &[made], parameters.is_some(), false, shapes)
     }
 
     /// Tangent of the step: the changes (δq, δv) (v_size,) each of the state after it along `q` (v_size,) in the tangent space of the
-    /// coordinates and `v` (v_size,) of the state before it, and `u` (control_size,) of its controls; what is None is zero. It takes
-    /// `jacobians`: for several directions at one step, take those.
-    #[pyo3(signature = (*, q=None, v=None, u=None))]
-    #[expect(clippy::type_complexity, reason = "two arrays")]
+    /// coordinates and `v` (v_size,) of the state before it, `u` (control_size,) of its controls, `parameters` by name, and `gains`; what is None
+    /// is zero. Each may have one more index before its own, and so has the tangent then: many directions cost little more than one.
+    #[pyo3(signature = (*, q=None, v=None, u=None, parameters=None, gains=None))]
     fn jvp<'py>(
         &self,
         py: Python<'py>,
         q: Option<&Bound<'py, PyAny>>,
         v: Option<&Bound<'py, PyAny>>,
         u: Option<&Bound<'py, PyAny>>,
-    ) -> PyResult<(Bound<'py, PyArrayDyn<f64>>, Bound<'py, PyArrayDyn<f64>>)> {
-        let system = self.0.rollout().simulator().system();
-        let (nv, nu) = (system.tree.velocities(), system.controls);
-        let part = |place: &str, given: Option<&Bound<'py, PyAny>>, n: usize| match given {
-            Some(given) => Ok(array::array(place, given, &[Dim::Is(n)])?.values),
-            None => PyResult::Ok(vec![0.0; n]),
+        parameters: Option<&Bound<'py, PyDict>>,
+        gains: Option<&Bound<'py, PyAny>>,
+    ) -> PyResult<Bound<'py, PyTuple>> {
+        let along = Along {
+            controls: u,
+            q,
+            v,
+            parameters,
+            gains,
         };
-        let mut along = part("jvp: q", q, nv)?;
-        along.extend(part("jvp: v", v, nv)?);
-        let control = DVector::from_vec(part("jvp: u", u, nu)?);
-        let record = self.0.clone();
-        let made = long(py, move |_| record.jvp(&along.into(), &control))?;
-        let half = |from: usize| made.rows(from, nv).iter().copied().collect::<Vec<f64>>();
-        Ok((
-            array::to_python(py, half(0), &[nv])?,
-            array::to_python(py, half(nv), &[nv])?,
-        ))
+        tangents::of_step(py, &self.0, &along)
     }
 
     fn __repr__(&self) -> String {

@@ -1,7 +1,8 @@
-"""The functions of `hydrograd.jax` that JAX differentiates: calls of the host, and their transposes.
+"""The functions of `hydrograd.jax` that JAX differentiates: calls of the host, their tangents, and the transposes of those.
 
-A transpose needs the record of its forward pass, that can't travel through JAX. Calls must be pure, so the transpose
-runs the forward pass again unless its record is still at hand.
+A tangent is a call of the host too, linear in the tangents that it is given, and its transpose is what a gradient is made of: so both modes of
+differentiation work. Both need the record of the forward pass, that can't travel through JAX. Calls must be pure, so they
+run the forward pass again unless its record is still at hand.
 """
 
 from __future__ import annotations
@@ -18,12 +19,12 @@ import jax
 import jax.numpy as jnp
 import numpy as np
 from jax.extend.core import Primitive
-from jax.interpreters import batching, mlir
+from jax.interpreters import ad, batching, mlir
 from numpy.typing import NDArray
 
 from hydrograd import _bridge
 from hydrograd._bridge import Memory, Observed, Physics, Pulled, Stepped
-from hydrograd._hydrograd import Rollout
+from hydrograd._hydrograd import Rollout, UnsupportedError
 
 Array = jax.Array
 Kept = TypeVar("Kept")
@@ -114,18 +115,74 @@ def _lowered(ctx: Any, *operands: Any, host: Host, out: Any) -> Any:
 
 
 def _batched(arrays: Sequence[Any], axes: Sequence[int | None], *, host: Host, out: Any) -> Any:
-    # One call with all members, which run on all cores; arrays that are the same for all have 1 there.
-    size = next(array.shape[axis] for array, axis in zip(arrays, axes, strict=True) if axis is not None)
-    moved = [
-        jnp.expand_dims(array, 0) if axis is None else jnp.moveaxis(array, axis, 0)
-        for array, axis in zip(arrays, axes, strict=True)
-    ]
+    size, moved = _in_front(arrays, axes)
     results = host.call(moved, [((size, *shape), dtype) for shape, dtype in out])
     return results, [0] * len(results)
 
 
+def _in_front(arrays: Sequence[Any], axes: Sequence[int | None]) -> tuple[int, list[Any]]:
+    """The size of a batch, and the arrays with it in front: one call with all members, which run on all cores. Arrays that are the same for all have 1 there."""
+    size = next(array.shape[axis] for array, axis in zip(arrays, axes, strict=True) if axis is not None)
+    return size, [
+        jnp.expand_dims(array, 0) if axis is None else jnp.moveaxis(array, axis, 0)
+        for array, axis in zip(arrays, axes, strict=True)
+    ]
+
+
 mlir.register_lowering(host_call, _lowered)
 batching.primitive_batchers[host_call] = _batched
+
+
+# A call that is linear in the last of its arrays, `back` being its transpose: with the first `fixed` arrays as they are, and a cotangent for each result.
+linear_call = Primitive("hydrograd_linear")
+linear_call.multiple_results = True
+
+
+@linear_call.def_impl  # type: ignore[untyped-decorator]
+def _linear_now(*arrays: Array, host: Host, back: Host, fixed: int, out: Any) -> list[Array]:
+    return _now(*arrays, host=host, out=out)
+
+
+@linear_call.def_abstract_eval  # type: ignore[untyped-decorator]
+def _linear_shapes(*arrays: Any, host: Host, back: Host, fixed: int, out: Any) -> list[Any]:
+    return _shapes(*arrays, host=host, out=out)
+
+
+def _linear_lowered(ctx: Any, *operands: Any, host: Host, back: Host, fixed: int, out: Any) -> Any:
+    return _lowered(ctx, *operands, host=host, out=out)
+
+
+def _linear_batched(
+    arrays: Sequence[Any], axes: Sequence[int | None], *, host: Host, back: Host, fixed: int, out: Any
+) -> Any:
+    size, moved = _in_front(arrays, axes)
+    whole = [((size, *shape), dtype) for shape, dtype in out]
+    # A linear array has the size of the batch, for its cotangent will have.
+    moved[fixed:] = [jnp.broadcast_to(array, (size, *array.shape[1:])) for array in moved[fixed:]]
+    results = linear_call.bind(*moved, host=host, back=back, fixed=fixed, out=tuple(whole))  # type: ignore[no-untyped-call]
+    return results, [0] * len(results)
+
+
+def _linear_transposed(bars: Sequence[Any], *arrays: Any, host: Host, back: Host, fixed: int, out: Any) -> Any:
+    whole = [jnp.zeros(*shape) if type(bar) is ad.Zero else bar for bar, shape in zip(bars, out, strict=True)]
+    wanted = [array.aval if ad.is_undefined_primal(array) else None for array in arrays[fixed:]]
+    shapes = [(jnp.shape(a), a.dtype) if w is None else (w.shape, w.dtype) for a, w in zip(arrays[fixed:], wanted, strict=True)]
+    made = back.call((*arrays[:fixed], *whole), shapes)
+    return [None] * fixed + [None if w is None else part for w, part in zip(wanted, made, strict=True)]
+
+
+def _once(*_: Any, **__: Any) -> Any:
+    raise UnsupportedError(
+        "derivatives of derivatives of a rollout or step are not available: hydrograd has the first ones; take differences "
+        "of gradients"
+    )
+
+
+mlir.register_lowering(linear_call, _linear_lowered)
+batching.primitive_batchers[linear_call] = _linear_batched
+ad.primitive_transposes[linear_call] = _linear_transposed
+ad.primitive_jvps[linear_call] = _once
+ad.primitive_jvps[host_call] = _once
 
 
 # Dimensions of controls, q, v, values and gains without the batch's; then those of cotangents or of a state's memory.
@@ -133,23 +190,21 @@ ROLLOUT, OBSERVED = (2, 1, 1, 1, 1), (3, 4, 2, 2)
 STEP, MEMORY = (1, 1, 1, 1, 1), (0, 0, 1)
 
 
-@functools.partial(jax.custom_vjp, nondiff_argnums=(0,))
+@functools.partial(jax.custom_jvp, nondiff_argnums=(0,))
 def rollout(physics: Physics, *arrays: Array) -> tuple[Array, ...]:
     """Positions, rotations, q and v of rollouts of controls, q, v, values and gains with the same leading
     dimensions."""
     return Host(_roll, physics, ROLLOUT).call(arrays, _observed(physics, arrays))
 
 
-def _rollout_forward(physics: Physics, *arrays: Array) -> tuple[tuple[Array, ...], tuple[Array, ...]]:
-    return Host(_roll_and_keep, physics, ROLLOUT).call(arrays, _observed(physics, arrays)), arrays
-
-
-def _rollout_backward(physics: Physics, arrays: tuple[Array, ...], bars: tuple[Array, ...]) -> tuple[Array, ...]:
-    host = Host(_pull, physics, ROLLOUT + OBSERVED)
-    return host.call((*arrays, *bars), [(array.shape, array.dtype) for array in arrays])
-
-
-rollout.defvjp(_rollout_forward, _rollout_backward)
+@rollout.defjvp
+def _rollout_tangent(
+    physics: Physics, arrays: tuple[Array, ...], along: tuple[Array, ...]
+) -> tuple[tuple[Array, ...], tuple[Array, ...]]:
+    out = _observed(physics, arrays)
+    host, back = Host(_push, physics, ROLLOUT + ROLLOUT), Host(_pull, physics, ROLLOUT + OBSERVED)
+    moved = linear_call.bind(*arrays, *along, host=host, back=back, fixed=len(arrays), out=tuple(out))  # type: ignore[no-untyped-call]
+    return Host(_roll_and_keep, physics, ROLLOUT).call(arrays, out), tuple(moved)
 
 
 def _observed(physics: Physics, arrays: Sequence[Array]) -> list[tuple[tuple[int, ...], Any]]:
@@ -175,6 +230,22 @@ def _rolled(physics: Physics, flat: Sequence[NDArray[Any]]) -> list[Rollout]:
     return _bridge.roll(physics, controls, begin, v, values, gains)
 
 
+def _push(physics: Physics, flat: Sequence[NDArray[Any]]) -> Sequence[NDArray[Any]]:
+    began, first = _together(flat[:5])
+    rollouts = rollouts_kept.take(Memo.key(physics, began)) or _rolled(physics, began)
+    begin, lengths = physics.charts.normalise("rollout", began[1])
+    made = [rollouts[row] for row in first]
+    return _bridge.seen(_bridge.push(physics, made, begin[first], lengths[first], Pulled(*flat[5:])))
+
+
+def _together(arrays: Sequence[NDArray[Any]]) -> tuple[list[NDArray[Any]], list[int]]:
+    """Different members of a batch, and which of them each member is: those of one Jacobian are one."""
+    members: dict[Any, int] = {}
+    first = [members.setdefault(tuple(a[b].tobytes() for a in arrays), len(members)) for b in range(len(arrays[0]))]
+    kept = [first.index(row) for row in range(len(members))]
+    return [array[kept] for array in arrays], first
+
+
 def _pull(physics: Physics, flat: Sequence[NDArray[Any]]) -> Sequence[NDArray[Any]]:
     began, bar = flat[:5], Observed(*flat[5:])
     rollouts = rollouts_kept.take(Memo.key(physics, began)) or _rolled(physics, began)
@@ -182,26 +253,25 @@ def _pull(physics: Physics, flat: Sequence[NDArray[Any]]) -> Sequence[NDArray[An
     return _given(_bridge.pull(physics, rollouts, begin, lengths, bar), began[4])
 
 
-@functools.partial(jax.custom_vjp, nondiff_argnums=(0,))
+@functools.partial(jax.custom_jvp, nondiff_argnums=(0,))
 def step(physics: Physics, memory: tuple[Array, ...], *arrays: Array) -> tuple[Array, ...]:
     """q, v and memory one step after q and v with controls, values and gains; the same leading dimensions in all."""
     given = (*arrays, *memory)
     return Host(_advance, physics, STEP + MEMORY).call(given, _next(given))
 
 
-def _step_forward(
-    physics: Physics, memory: tuple[Array, ...], *arrays: Array
-) -> tuple[tuple[Array, ...], tuple[Array, ...]]:
+@step.defjvp
+def _step_tangent(
+    physics: Physics, primals: tuple[Any, ...], tangents: tuple[Any, ...]
+) -> tuple[tuple[Array, ...], tuple[Any, ...]]:
+    (memory, *arrays), (_, *along) = primals, tangents
     given = (*arrays, *memory)
-    return Host(_advance_and_keep, physics, STEP + MEMORY).call(given, _next(given)), given
-
-
-def _step_backward(physics: Physics, given: tuple[Array, ...], bars: tuple[Array, ...]) -> tuple[Array | None, ...]:
-    host = Host(_pull_step, physics, STEP + MEMORY + (1, 1))
-    return None, *host.call((*given, *bars[:2]), [(array.shape, array.dtype) for array in given[:5]])
-
-
-step.defvjp(_step_forward, _step_backward)
+    out = _next(given)
+    host, back = Host(_push_step, physics, STEP + MEMORY + STEP), Host(_pull_step, physics, STEP + MEMORY + (1, 1))
+    moved = linear_call.bind(*given, *along, host=host, back=back, fixed=len(given), out=tuple(out[:2]))  # type: ignore[no-untyped-call]
+    # Whole numbers have no tangents.
+    still = [np.zeros(shape, dtype=jax.dtypes.float0) for shape, _ in out[2:]]
+    return Host(_advance_and_keep, physics, STEP + MEMORY).call(given, out), (*moved, *still)
 
 
 def _next(given: Sequence[Array]) -> list[tuple[tuple[int, ...], Any]]:
@@ -224,6 +294,14 @@ def _advanced(physics: Physics, flat: Sequence[NDArray[Any]]) -> Stepped:
     controls, q, v, values, gains, *memory = flat
     begin, _ = physics.charts.normalise("step", q)
     return _bridge.advance(physics, begin, v, controls, values, gains, Memory(*memory))
+
+
+def _push_step(physics: Physics, flat: Sequence[NDArray[Any]]) -> Sequence[NDArray[Any]]:
+    began, first = _together(flat[:8])
+    after = steps_kept.take(Memo.key(physics, began)) or _advanced(physics, began)
+    begin, lengths = physics.charts.normalise("step", began[1])
+    records = [after.records[row] for row in first]
+    return _bridge.push_step(physics, records, begin[first], lengths[first], after.q[first], Pulled(*flat[8:]))
 
 
 def _pull_step(physics: Physics, flat: Sequence[NDArray[Any]]) -> Sequence[NDArray[Any]]:

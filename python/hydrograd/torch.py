@@ -25,9 +25,9 @@ except ImportError as error:
     raise ImportError("hydrograd.torch needs PyTorch: pip install torch") from error
 
 from hydrograd import _bridge
-from hydrograd._bridge import Memory, Observed, Physics, Pulled
+from hydrograd._bridge import Memory, Observed, Physics, Pulled, Stepped
 from hydrograd._charts import Array
-from hydrograd._hydrograd import InputError, Rollout, Simulator
+from hydrograd._hydrograd import InputError, Record, Rollout, Simulator, UnsupportedError
 
 __all__ = ["State", "Trajectory", "initial_state", "rollout", "step"]
 
@@ -89,9 +89,9 @@ def rollout(
         **_bridge.adjustable("rollout", sim, parameters, gains, _value),
     }
     lead, flat = _flat("rollout", physics, parts)
-    made = _Rollout.apply(physics, *flat)
-    positions, rotations, q_after, v_after = (part.reshape((*lead, *part.shape[1:])) for part in made[:4])
-    return Trajectory(positions, rotations, q_after, v_after, made[4])
+    rollouts: list[Rollout] = []
+    made = _Rollout.apply(physics, rollouts, *flat)
+    return Trajectory(*(part.reshape((*lead, *part.shape[1:])) for part in made), rollouts)
 
 
 def initial_state(sim: Simulator, q: Numbers | None = None, v: Numbers | None = None) -> State:
@@ -128,59 +128,204 @@ def step(
     }
     lead, flat = _flat("step", physics, parts)
     memory = _memory(state, lead, physics)
-    made = _Step.apply(physics, memory, *flat)
+    made = _Step.apply(physics, [], memory, *flat)
     return State(*(part.reshape((*lead, *part.shape[1:])) for part in made))
 
 
 class _Rollout(torch.autograd.Function):
-    """Rollouts of a flat batch."""
+    """Rollouts of a flat batch, that are put into the list `made`."""
 
     @staticmethod
-    def forward(ctx: Any, physics: Physics, *tensors: Tensor) -> tuple[Any, ...]:
-        controls, q, v, values, gains = (tensor.detach().numpy() for tensor in tensors)
-        begin, lengths = physics.charts.normalise("rollout", q)
-        rollouts = _bridge.roll(physics, controls, begin, v, values, gains)
+    def forward(physics: Physics, made: list[Rollout], *tensors: Tensor) -> tuple[Tensor, ...]:
+        controls, q, v, values, gains = _arrays(tensors)
+        begin, _ = physics.charts.normalise("rollout", q)
+        made[:] = _bridge.roll(physics, controls, begin, v, values, gains)
+        seen = _bridge.seen(_bridge.observe(physics, controls.shape[1], made))
+        return tuple(torch.from_numpy(part) for part in seen)
+
+    @staticmethod
+    def setup_context(ctx: Any, inputs: tuple[Any, ...], output: tuple[Tensor, ...]) -> None:
+        physics, made, *tensors = inputs
         ctx.set_materialize_grads(False)
-        if any(ctx.needs_input_grad):
-            ctx.kept = (physics, rollouts, begin, lengths)
-        seen = _bridge.seen(_bridge.observe(physics, controls.shape[1], rollouts))
-        return (*(torch.from_numpy(part) for part in seen), rollouts)
+        ctx.shapes = [tensor.shape for tensor in tensors]
+        ctx.linear = _RolloutMaps(physics, list(made), *physics.charts.normalise("rollout", _arrays(tensors)[1]))
+
+    @staticmethod
+    def jvp(ctx: Any, *along: Tensor | None) -> Any:
+        return _Push.apply(ctx.linear, *_filled(along[2:], ctx.shapes))
 
     @staticmethod
     @once_differentiable
     def backward(ctx: Any, *bars: Tensor | None) -> tuple[Tensor | None, ...]:
-        physics, rollouts, begin, lengths = ctx.kept
-        bar = Observed(*(None if part is None else part.numpy() for part in bars[:4]))
-        return None, *_wanted(ctx.needs_input_grad[1:], _bridge.pull(physics, rollouts, begin, lengths, bar))
+        pulled = _Pull.apply(ctx.linear, *bars)
+        return None, None, *_wanted(ctx.needs_input_grad[2:], pulled)
+
+    @staticmethod
+    def vmap(info: Any, dims: Sequence[int | None], physics: Physics, made: list[Rollout], *tensors: Tensor) -> Any:
+        given = _joined(info.batch_size, dims[2:], tensors)
+        return _parted(info.batch_size, _Rollout.apply(physics, made, *given))
 
 
 class _Step(torch.autograd.Function):
-    """One step of each state of a flat batch."""
+    """One step of each state of a flat batch; the list `made` gets what it leaves."""
 
     @staticmethod
-    def forward(ctx: Any, physics: Physics, memory: Memory, *tensors: Tensor) -> tuple[Tensor, ...]:
-        controls, q, v, values, gains = (tensor.detach().numpy() for tensor in tensors)
-        begin, lengths = physics.charts.normalise("step", q)
+    def forward(physics: Physics, made: list[Stepped], memory: Memory, *tensors: Tensor) -> tuple[Tensor, ...]:
+        controls, q, v, values, gains = _arrays(tensors)
+        begin, _ = physics.charts.normalise("step", q)
         after = _bridge.advance(physics, begin, v, controls, values, gains, memory)
+        # A copy: what leaves may be changed in place.
+        made[:] = [after._replace(q=after.q.copy())]
+        return tuple(torch.from_numpy(part) for part in (after.q, after.v, *after.memory))
+
+    @staticmethod
+    def setup_context(ctx: Any, inputs: tuple[Any, ...], output: tuple[Tensor, ...]) -> None:
+        physics, made, _, *tensors = inputs
         ctx.set_materialize_grads(False)
-        if any(ctx.needs_input_grad):
-            # A copy: what leaves may be changed in place.
-            ctx.kept = (physics, after.records, begin, lengths, after.q.copy())
-        remembered = [torch.from_numpy(part) for part in after.memory]
-        ctx.mark_non_differentiable(*remembered)
-        return (torch.from_numpy(after.q), torch.from_numpy(after.v), *remembered)
+        ctx.mark_non_differentiable(*output[2:])
+        ctx.shapes = [tensor.shape for tensor in tensors]
+        begin, lengths = physics.charts.normalise("step", _arrays(tensors)[1])
+        ctx.linear = _StepMaps(physics, made[0].records, begin, lengths, made[0].q)
+
+    @staticmethod
+    def jvp(ctx: Any, *along: Tensor | None) -> Any:
+        return (*_Push.apply(ctx.linear, *_filled(along[3:], ctx.shapes)), None, None, None)
 
     @staticmethod
     @once_differentiable
     def backward(ctx: Any, *bars: Tensor | None) -> tuple[Tensor | None, ...]:
-        physics, records, begin, lengths, end = ctx.kept
-        q_bar, v_bar = (None if part is None else part.numpy() for part in bars[:2])
-        pulled = _bridge.pull_step(physics, records, begin, lengths, end, q_bar, v_bar)
-        return None, None, *_wanted(ctx.needs_input_grad[2:], pulled)
+        pulled = _Pull.apply(ctx.linear, *bars[:2])
+        return None, None, None, *_wanted(ctx.needs_input_grad[3:], pulled)
+
+    @staticmethod
+    def vmap(
+        info: Any, dims: Sequence[Any], physics: Physics, made: list[Stepped], memory: Memory, *tensors: Tensor
+    ) -> Any:
+        size = info.batch_size
+        given = _joined(size, dims[3:], tensors)
+        all_memory = Memory(*(np.concatenate([part] * size) for part in memory))
+        return _parted(size, _Step.apply(physics, made, all_memory, *given))
 
 
-def _wanted(needed: Sequence[bool], pulled: Pulled) -> tuple[Tensor | None, ...]:
-    return tuple(torch.from_numpy(part) if need else None for need, part in zip(needed, pulled, strict=True))
+class _RolloutMaps(NamedTuple):
+    """Rollouts with where they began: their tangents and transposes, row by row of a flat batch."""
+
+    physics: Physics
+    made: list[Rollout]
+    begin: Array
+    lengths: Array
+
+    def repeated(self, times: int) -> _RolloutMaps:
+        """The same rows so many times, one after the other."""
+        begin, lengths = (np.concatenate([part] * times) for part in (self.begin, self.lengths))
+        return self._replace(made=self.made * times, begin=begin, lengths=lengths)
+
+    def push(self, along: Sequence[Array]) -> Sequence[Array]:
+        made = _bridge.push(self.physics, self.made, self.begin, self.lengths, Pulled(*along))
+        return _bridge.seen(made)
+
+    def pull(self, bars: Sequence[Array | None]) -> Pulled:
+        return _bridge.pull(self.physics, self.made, self.begin, self.lengths, Observed(*bars))
+
+
+class _StepMaps(NamedTuple):
+    """The same of steps."""
+
+    physics: Physics
+    made: list[Record]
+    begin: Array
+    lengths: Array
+    end: Array
+
+    def repeated(self, times: int) -> _StepMaps:
+        """The same rows so many times, one after the other."""
+        begin, lengths, end = (np.concatenate([part] * times) for part in (self.begin, self.lengths, self.end))
+        return self._replace(made=self.made * times, begin=begin, lengths=lengths, end=end)
+
+    def push(self, along: Sequence[Array]) -> Sequence[Array]:
+        return _bridge.push_step(self.physics, self.made, self.begin, self.lengths, self.end, Pulled(*along))
+
+    def pull(self, bars: Sequence[Array | None]) -> Pulled:
+        q_bar, v_bar = bars
+        return _bridge.pull_step(self.physics, self.made, self.begin, self.lengths, self.end, q_bar, v_bar)
+
+
+class _Linear(torch.autograd.Function):
+    """What both maps share: they are calls of their own, so that vmap sees them, and have no derivatives."""
+
+    @staticmethod
+    def setup_context(ctx: Any, inputs: tuple[Any, ...], output: tuple[Tensor, ...]) -> None:
+        pass
+
+    @staticmethod
+    def jvp(ctx: Any, *along: Tensor | None) -> Any:
+        raise UnsupportedError(_FIRST)
+
+    @staticmethod
+    def backward(ctx: Any, *bars: Tensor | None) -> Any:
+        raise UnsupportedError(_FIRST)
+
+
+_FIRST = (
+    "derivatives of derivatives of a rollout or step are not available: hydrograd has the first ones; take differences of "
+    "gradients"
+)
+
+
+class _Push(_Linear):
+    """Tangents along those of a flat batch."""
+
+    @staticmethod
+    def forward(linear: _RolloutMaps | _StepMaps, *along: Tensor) -> tuple[Tensor, ...]:
+        return tuple(torch.from_numpy(part) for part in linear.push(_arrays(along)))
+
+    @staticmethod
+    def vmap(info: Any, dims: Sequence[int | None], linear: _RolloutMaps | _StepMaps, *along: Tensor) -> Any:
+        given = _joined(info.batch_size, dims[1:], along)
+        return _parted(info.batch_size, _Push.apply(linear.repeated(info.batch_size), *given))
+
+
+class _Pull(_Linear):
+    """Cotangents of a flat batch pulled back; one that is None is zero."""
+
+    @staticmethod
+    def forward(linear: _RolloutMaps | _StepMaps, *bars: Tensor | None) -> tuple[Tensor, ...]:
+        given = [None if bar is None else bar.detach().numpy() for bar in bars]
+        return tuple(torch.from_numpy(part) for part in linear.pull(given))
+
+    @staticmethod
+    def vmap(info: Any, dims: Sequence[int | None], linear: _RolloutMaps | _StepMaps, *bars: Tensor | None) -> Any:
+        size = info.batch_size
+        given = [None if bar is None else _joined(size, [d], [bar])[0] for d, bar in zip(dims[1:], bars, strict=True)]
+        return _parted(size, _Pull.apply(linear.repeated(size), *given))
+
+
+def _arrays(tensors: Sequence[Tensor]) -> list[Array]:
+    return [tensor.detach().numpy() for tensor in tensors]
+
+
+def _filled(along: Sequence[Tensor | None], shapes: Sequence[torch.Size]) -> list[Tensor]:
+    """Zeros where nothing changes."""
+    zeros = (torch.zeros(shape, dtype=torch.float64) for shape in shapes)
+    return [zero if part is None else part for part, zero in zip(along, zeros, strict=True)]
+
+
+def _joined(size: int, dims: Sequence[int | None], tensors: Sequence[Tensor]) -> list[Tensor]:
+    """Flat batches that vmap has so many of, one after the other as one."""
+    front = [
+        tensor.expand(size, *tensor.shape) if dim is None else tensor.movedim(dim, 0)
+        for dim, tensor in zip(dims, tensors, strict=True)
+    ]
+    return [tensor.reshape(-1, *tensor.shape[2:]) for tensor in front]
+
+
+def _parted(size: int, tensors: Sequence[Tensor]) -> tuple[tuple[Tensor, ...], tuple[int, ...]]:
+    """The inverse, with where vmap's dimension is."""
+    return tuple(t.reshape(size, -1, *t.shape[1:]) for t in tensors), (0,) * len(tensors)
+
+
+def _wanted(needed: Sequence[bool], pulled: Sequence[Tensor]) -> tuple[Tensor | None, ...]:
+    return tuple(part if need else None for need, part in zip(needed, pulled, strict=True))
 
 
 def _tensor(place: str, given: Numbers) -> Tensor:

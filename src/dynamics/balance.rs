@@ -509,14 +509,16 @@ impl Linearisation<'_> {
         for (k, tangent) in tangents.iter().enumerate() {
             let (fields, carried, bar) = (&fields[k], &carried[k], &mut bars[k]);
             for (b, w) in self.system.submerged() {
-                if rows.skips(fields, b) {
-                    continue;
-                }
                 let pose = &self.kinematics.poses[b];
                 let carried_on = impulses.fixed_view::<6, 1>(6 * w, k).into_owned();
                 let momentum_carried = pose.wrench_to_world(&carried_on);
                 let impulse = tangent.momentum_x.fixed_rows::<6>(6 * w).into_owned();
                 let impulse = pose.wrench_to_world(&impulse);
+                // The water carries it to bodies behind other joints.
+                let answers = [carried_on, impulse, pairs[k][w], tangent.wrench[w]];
+                if rows.skips(fields, b) && answers == [Vec6::zeros(); 4] {
+                    continue;
+                }
                 let pose_force = 0.5 * tangent.gradient[w];
                 let relative = self.relative(&fields.twist[b]);
                 let virt = &fields.virtual_twist[b];

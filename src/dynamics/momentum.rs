@@ -212,7 +212,8 @@ impl Linearisation<'_> {
             for (b, _) in self.system.submerged() {
                 let relative = fields.twist[b] - current;
                 let virt = &fields.virtual_twist[b];
-                if at.skips(virt) {
+                // The water carries it to bodies behind other joints.
+                if at.skips(virt) && [momenta_virtual[b], pair[b]] == [Vec6::zeros(); 2] {
                     continue;
                 }
                 *out.parameters.density_mut() += virt.dot(&momenta[b]);

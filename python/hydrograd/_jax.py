@@ -203,8 +203,10 @@ def _rollout_tangent(
 ) -> tuple[tuple[Array, ...], tuple[Array, ...]]:
     out = _observed(physics, arrays)
     host, back = Host(_push, physics, ROLLOUT + ROLLOUT), Host(_pull, physics, ROLLOUT + OBSERVED)
+    # First what the tangent looks for.
+    made = Host(_roll_and_keep, physics, ROLLOUT).call(arrays, out)
     moved = linear_call.bind(*arrays, *along, host=host, back=back, fixed=len(arrays), out=tuple(out))  # type: ignore[no-untyped-call]
-    return Host(_roll_and_keep, physics, ROLLOUT).call(arrays, out), tuple(moved)
+    return made, tuple(moved)
 
 
 def _observed(physics: Physics, arrays: Sequence[Array]) -> list[tuple[tuple[int, ...], Any]]:
@@ -268,10 +270,11 @@ def _step_tangent(
     given = (*arrays, *memory)
     out = _next(given)
     host, back = Host(_push_step, physics, STEP + MEMORY + STEP), Host(_pull_step, physics, STEP + MEMORY + (1, 1))
+    made = Host(_advance_and_keep, physics, STEP + MEMORY).call(given, out)
     moved = linear_call.bind(*given, *along, host=host, back=back, fixed=len(given), out=tuple(out[:2]))  # type: ignore[no-untyped-call]
     # Whole numbers have no tangents.
     still = [np.zeros(shape, dtype=jax.dtypes.float0) for shape, _ in out[2:]]
-    return Host(_advance_and_keep, physics, STEP + MEMORY).call(given, out), (*moved, *still)
+    return made, (*moved, *still)
 
 
 def _next(given: Sequence[Array]) -> list[tuple[tuple[int, ...], Any]]:

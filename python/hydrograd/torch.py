@@ -316,12 +316,12 @@ def _joined(size: int, dims: Sequence[int | None], tensors: Sequence[Tensor]) ->
         tensor.expand(size, *tensor.shape) if dim is None else tensor.movedim(dim, 0)
         for dim, tensor in zip(dims, tensors, strict=True)
     ]
-    return [tensor.reshape(-1, *tensor.shape[2:]) for tensor in front]
+    return [tensor.reshape(size * tensor.shape[1], *tensor.shape[2:]) for tensor in front]
 
 
 def _parted(size: int, tensors: Sequence[Tensor]) -> tuple[tuple[Tensor, ...], tuple[int, ...]]:
     """The inverse, with where vmap's dimension is."""
-    return tuple(t.reshape(size, -1, *t.shape[1:]) for t in tensors), (0,) * len(tensors)
+    return tuple(t.reshape(size, len(t) // size, *t.shape[1:]) for t in tensors), (0,) * len(tensors)
 
 
 def _wanted(needed: Sequence[bool], pulled: Sequence[Tensor]) -> tuple[Tensor | None, ...]:

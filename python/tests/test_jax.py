@@ -156,12 +156,6 @@ def test_jit_without_controls():
     assert np.array_equal(made.q[1], sim.rollout(steps=5).q)
 
 
-def test_forward_mode_is_refused(coupled):
-    controls = jnp.asarray(coupled.controls)
-    with pytest.raises(TypeError, match="custom_vjp"):
-        jax.jvp(lambda u: hj.rollout(coupled.sim, u).q, (controls,), (controls,))
-
-
 def test_jit_is_compiled_once(coupled):
     traced = []
 

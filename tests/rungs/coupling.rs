@@ -483,3 +483,56 @@ fn second_derivatives_commute_up_to_the_bracket() {
         assert!((along - g).abs() < 1e-10 * g.abs(), "{along} {g}");
     }
 }
+
+/// Many directions at once are each by itself.
+#[test]
+fn many_directions_are_one_by_one() {
+    fn check(coupling: &impl Linearise, at: &[Pose], name: &str) {
+        let n = 6 * coupling.bodies();
+        let basis = DMatrix::from_column_slice(n, 3, wavy(3 * n, 0.4, 1.0).as_slice());
+        let made = coupling.linearise(at, &basis).unwrap();
+        let x = wavy(3, 1.4, 1.0);
+        let twists = DMatrix::from_column_slice(n, 4, wavy(4 * n, 2.4, 1.0).as_slice());
+        let near = |found: &[f64], right: &[f64], what: &str| {
+            let right = DVector::from_column_slice(right);
+            let error = (DVector::from_column_slice(found) - &right).norm();
+            assert!(error <= 1e-11 * right.norm(), "{name}, {what}: {error:e}");
+        };
+        let flat =
+            |field: &[Vec6]| -> Vec<f64> { field.iter().flat_map(|w| w.iter().copied()).collect() };
+        let (momenta, wrenches) = made.respond(&twists, &x).unwrap();
+        let fields: Vec<Vec<Vec6>> = (0..5)
+            .map(|k| {
+                let z = wavy(n, 3.4 + f64::from(k), 1.0);
+                z.as_slice().chunks(6).map(Vec6::from_row_slice).collect()
+            })
+            .collect();
+        for k in 0..4 {
+            let twist = twists.column(k).into_owned();
+            let alone = made
+                .vjp(Direction::Twist(&twist), Direction::Basis(&x))
+                .unwrap();
+            near(
+                momenta.column(k).into_owned().as_slice(),
+                alone.momentum_x.as_slice(),
+                "momenta",
+            );
+            near(&flat(&wrenches[k]), &flat(&alone.wrench), "wrenches");
+        }
+        let through = Direction::Basis(&x);
+        for (many, z) in made.displaced(&x, &fields).unwrap().iter().zip(&fields) {
+            let alone = made.hvp(through, through, z).unwrap();
+            near(
+                many.momentum_x.as_slice(),
+                alone.momentum_x.as_slice(),
+                "momenta along",
+            );
+            near(&flat(&many.wrench), &flat(&alone.wrench), "wrenches along");
+            near(&flat(&many.gradient), &flat(&alone.gradient), "gradient");
+        }
+    }
+    for s in reduced_systems().iter().chain(&film_systems()) {
+        check(s, &poses(), "reduced");
+    }
+    check(&isolated(), &poses(), "isolated");
+}

@@ -22,7 +22,7 @@ use std::sync::OnceLock;
 /// Work of [`ReducedLinearised::new`] per pair of points, relative to that of its derivatives.
 const FILL: usize = 8;
 /// Of [`ReducedLinearised::pull_back`].
-const PULL: usize = 1;
+pub(super) const PULL: usize = 1;
 
 /// [`Reduced`] solved for a basis.
 pub(super) struct ReducedLinearised<'a> {
@@ -32,12 +32,12 @@ pub(super) struct ReducedLinearised<'a> {
     /// Of the gaps; none of those that are wide.
     films: Vec<Option<PlacedFilm<'a>>>,
     /// Of I − LᵀGL.
-    factor: Cholesky,
+    pub factor: Cholesky,
     /// LᵀGŪ, modes × 6 bodies.
-    solution: DMatrix<f64>,
+    pub solution: DMatrix<f64>,
     /// ŪᵀGŪ, 6 bodies × 6 bodies.
     direct: DMatrix<f64>,
-    basis: DMatrix<f64>,
+    pub basis: DMatrix<f64>,
     /// a of the basis columns.
     a: DMatrix<f64>,
     /// α of the basis columns.
@@ -121,7 +121,7 @@ impl<'a> ReducedLinearised<'a> {
     }
 
     /// α = Ū x̄ + L a, column by column.
-    fn charges(&self, twists: &DMatrix<f64>, a: &DMatrix<f64>) -> DMatrix<f64> {
+    pub fn charges(&self, twists: &DMatrix<f64>, a: &DMatrix<f64>) -> DMatrix<f64> {
         let columns = twists.ncols();
         let mut out = DMatrix::zeros(self.reduced.point_count(), columns);
         let mut all = view_mut(&mut out);
@@ -138,7 +138,7 @@ impl<'a> ReducedLinearised<'a> {
     }
 
     /// M̄₀ x̄ + 4π (ŪᵀGŪ x̄ + ŪᵀGL a).
-    fn impulses(&self, twists: &DMatrix<f64>, a: &DMatrix<f64>) -> DMatrix<f64> {
+    pub fn impulses(&self, twists: &DMatrix<f64>, a: &DMatrix<f64>) -> DMatrix<f64> {
         let mut out = FLUX * (&self.direct * twists + self.solution.tr_mul(a));
         for (b, body) in self.reduced.bodies.iter().enumerate() {
             let mut rows = out.rows_mut(6 * b, 6);
@@ -264,7 +264,7 @@ impl<'a> ReducedLinearised<'a> {
         out
     }
 
-    fn pull_back_films(&self, x: &DVector<f64>, y: &DVector<f64>, out: &mut [Vec6]) {
+    pub fn pull_back_films(&self, x: &DVector<f64>, y: &DVector<f64>, out: &mut [Vec6]) {
         for (film, wrench) in self.each_film(|film| film.wrench(x, y)) {
             film.apply(&wrench, out);
         }
@@ -437,6 +437,26 @@ impl Linearised for ReducedLinearised<'_> {
             momentum_y: self.impulse(&y),
             wrench,
         })
+    }
+
+    fn respond(
+        &self,
+        twists: &DMatrix<f64>,
+        x: &DVector<f64>,
+    ) -> Result<(DMatrix<f64>, Vec<Vec<Vec6>>)> {
+        Ok(self.respond_many(twists, x))
+    }
+
+    fn displaced(&self, x: &DVector<f64>, z: &[Vec<Vec6>]) -> Result<Vec<Tangent>> {
+        // Of one displacement its own kernels are less work.
+        match z {
+            [z] => Ok(vec![self.second(
+                Direction::Basis(x),
+                Direction::Basis(x),
+                z,
+            )]),
+            _ => Ok(self.second_many(x, z)),
+        }
     }
 
     fn hvp(&self, x: Direction, y: Direction, z: &[Vec6]) -> Result<Tangent> {

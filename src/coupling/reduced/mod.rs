@@ -25,6 +25,7 @@ pub mod compress;
 mod films;
 mod linearised;
 mod link;
+mod many;
 mod region;
 mod resolved;
 mod second;

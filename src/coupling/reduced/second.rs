@@ -11,18 +11,22 @@ use crate::coupling::{Direction, Tangent};
 use nalgebra::{DMatrix, DVector};
 
 /// Work per pair of points, relative to that of the first derivative.
-const TANGENT: usize = 3;
+pub(super) const TANGENT: usize = 3;
 
 /// A link along a displacement.
 pub(super) struct Moved {
     /// Of each source point as it is seen, in the target's frame relative to the target, m.
-    points: Vec<Vec3>,
+    pub points: Vec<Vec3>,
     /// Of the source body's own points.
-    arms: Vec<Vec3>,
+    pub arms: Vec<Vec3>,
     /// Of the source body's centre.
-    centre: Vec3,
+    pub centre: Vec3,
     /// Rate of the distance of the centres.
-    rate: f64,
+    pub rate: f64,
+    /// Of the source body against the target, in the target's frame.
+    pub local: Vec6,
+    /// Velocity of the point at its origin, with that of what is held off.
+    pub shifted: Vec3,
 }
 
 /// What holds a link apart, if anything does.
@@ -35,7 +39,12 @@ fn moving<'p>(
 }
 
 impl ReducedLinearised<'_> {
-    fn moved(&self, placed: &PlacedSkeletons, z: &[Vec6], films: &[Option<MovingFilm>]) -> Moved {
+    pub(super) fn moved(
+        &self,
+        placed: &PlacedSkeletons,
+        z: &[Vec6],
+        films: &[Option<MovingFilm>],
+    ) -> Moved {
         let pose = &self.poses[placed.link.target];
         let relative = placed.pair.image.twist(&z[placed.link.source]) - z[placed.link.target];
         let local = pose.twist_to_body(&relative);
@@ -53,6 +62,8 @@ impl ReducedLinearised<'_> {
             arms,
             centre,
             rate,
+            local,
+            shifted: linear(&local) + shift,
         }
     }
 
@@ -135,22 +146,35 @@ impl ReducedLinearised<'_> {
             self.link_tangent(placed, seen, &responses, &dalpha)
         };
         let parts = self.reduced.over(&links, TANGENT, one);
+        let momenta = (0..n).map(|k| dmomenta.column(k).into_owned()).collect();
+        let twists: Vec<_> = responses.iter().map(|r| &r.twists).collect();
+        self.gathered(z, &films, &parts, &twists, momenta)
+    }
+
+    /// All links and films along one displacement, for one or two directions' twists.
+    pub(super) fn gathered(
+        &self,
+        z: &[Vec6],
+        films: &[Option<MovingFilm>],
+        links: &[([Vec6; 2], [Vec3; 2])],
+        twists: &[&DVector<f64>],
+        mut momenta: Vec<DVector<f64>>,
+    ) -> Tangent {
+        let n = twists.len();
         let mut gradient = vec![Vec6::zeros(); self.reduced.bodies.len()];
         let mut wrench = gradient.clone();
-        for (placed, ([w, dw], [f, df])) in self.placed.iter().zip(&parts) {
+        for (placed, ([w, dw], [f, df])) in self.placed.iter().zip(links) {
             let t = placed.link.target;
             let pose = &self.poses[t];
             self.apply(placed, w, f, &mut gradient);
             placed.pair.apply_jvp(pose, w, dw, &z[t], &mut wrench);
-            if let Some((apart, film)) = moving(placed, &films) {
+            if let Some((apart, film)) = moving(placed, films) {
                 let (w, dw) = apart.wrench_and_rate(film, [f, df]);
                 film.apply_rate((&w, &dw), z, &mut wrench);
             }
         }
-        let mut momenta: Vec<DVector<f64>> =
-            (0..n).map(|k| dmomenta.column(k).into_owned()).collect();
         for film in films.iter().flatten() {
-            let flows: Vec<_> = responses.iter().map(|r| film.flow(&r.twists)).collect();
+            let flows: Vec<_> = twists.iter().map(|x| film.flow(x)).collect();
             let (w, dw) = film.wrench(&flows[0], &flows[n - 1]);
             film.placed.apply(&w, &mut gradient);
             film.apply_rate((&w, &dw), z, &mut wrench);
@@ -199,39 +223,65 @@ impl ReducedLinearised<'_> {
         let mut bent = vec![0.0; 3 * n * s.len()];
         potential_vjp(targets, points, &changes, n, &mut bent);
         potential_hvp(targets, points, &moved.points, &values, n, &mut bent);
-        let strength = FLUX * link.factor;
-        let [weight, slope, bend] = placed.weight.map(|w| strength * w);
-        let (mut w, mut dw) = (Vec6::zeros(), Vec6::zeros());
-        let (mut energy, mut denergy) = (0.0, 0.0);
-        for (j, at) in placed.pair.positions.iter().enumerate() {
-            let (mut f, mut df) = (Vec3::zeros(), Vec3::zeros());
+        let of = |j: usize| {
+            let mut out = PointTangent::default();
             for (x, y) in [(0, last), (last, 0)] {
                 let (a, da) = (at_source[y].0[j], at_source[y].1[j]);
                 let e = vector(field, n, j, x);
-                f += e * a;
-                df += vector(&bent, n, j, x) * a + e * da;
+                out.force += e * a;
+                out.dforce += vector(&bent, n, j, x) * a + e * da;
                 if !sums.is_empty() {
                     let p = &sums[2 * n * j..2 * n * (j + 1)];
-                    energy += p[x] * a;
-                    denergy += p[n + x] * a + p[x] * da;
+                    out.energy += p[x] * a;
+                    out.denergy += p[n + x] * a + p[x] * da;
                 }
             }
-            denergy += f.dot(&moved.points[j]);
+            out
+        };
+        placed.pushed(moved, of)
+    }
+}
+
+/// Of one source point of a link: the force on it, the energy that its weight fades, and their rates.
+#[derive(Clone, Copy, Default)]
+pub(super) struct PointTangent {
+    pub force: Vec3,
+    pub dforce: Vec3,
+    pub energy: f64,
+    pub denergy: f64,
+}
+
+impl PlacedSkeletons<'_> {
+    /// Wrench on the sources and its tangent, in the target's frame; and of the forces on the points alone.
+    pub(super) fn pushed(
+        &self,
+        moved: &Moved,
+        of: impl Fn(usize) -> PointTangent,
+    ) -> ([Vec6; 2], [Vec3; 2]) {
+        let strength = FLUX * self.link.factor;
+        let [weight, slope, bend] = self.weight.map(|w| strength * w);
+        let (mut w, mut dw) = (Vec6::zeros(), Vec6::zeros());
+        let (mut energy, mut denergy) = (0.0, 0.0);
+        for (j, at) in self.pair.positions.iter().enumerate() {
+            let point = of(j);
+            let (f, df) = (point.force, point.dforce);
+            energy += point.energy;
+            denergy += point.denergy + f.dot(&moved.points[j]);
             let (force, dforce) = (weight * f, weight * df + slope * moved.rate * f);
             w += point_wrench(at, &force);
             dw += six(&dforce, &(moved.arms[j].cross(&force) + at.cross(&dforce)));
         }
         let forces = [linear(&w), linear(&dw)];
-        if placed.fading() {
-            let distance = placed.between.norm();
-            let e = placed.between / distance;
+        if self.fading() {
+            let distance = self.between.norm();
+            let e = self.between / distance;
             let de = (moved.centre - e * moved.rate) / distance;
             let force = slope * energy * e;
             let dforce = (bend * moved.rate * energy + slope * denergy) * e + slope * energy * de;
-            w += point_wrench(&placed.centre, &force);
+            w += point_wrench(&self.centre, &force);
             dw += six(
                 &dforce,
-                &(moved.centre.cross(&force) + placed.centre.cross(&dforce)),
+                &(moved.centre.cross(&force) + self.centre.cross(&dforce)),
             );
         }
         ([w, dw], forces)

@@ -90,7 +90,8 @@ def test_columns_of_jacobians_come_in_order(rollout):
     for column, direction in cases.items():
         right = rollout.jvp(**direction)
         for name in ("q", "v"):
-            assert np.allclose(found[name][..., column], getattr(right, name), rtol=1e-10, atol=1e-14)
+            exact = getattr(right, name)
+            assert np.allclose(found[name][..., column], exact, rtol=1e-10, atol=1e-11 * np.abs(exact).max())
     assert rollout.jacobian(["ball.mass"])["v"].shape == (steps + 1, nv, 1)
 
 
@@ -121,7 +122,7 @@ def test_one_step(coupled):
 def test_wrong_directions_are_named(rollout):
     with pytest.raises(hg.InputError, match=r"jvp: v: got an array of shape \(2, 3\)"):
         rollout.jvp(v=np.zeros((2, 3)))
-    with pytest.raises(hg.InputError, match="3 directions"):
+    with pytest.raises(hg.InputError, match="2 directions; must be 3"):
         rollout.jvp(v=np.zeros((2, 7)), q=np.zeros((3, 7)))
     with pytest.raises(hg.InputError, match="ball.weight"):
         rollout.jvp(parameters={"ball.weight": 1.0})

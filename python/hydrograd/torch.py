@@ -17,6 +17,7 @@ from collections.abc import Mapping, Sequence
 from typing import Any, NamedTuple
 
 import numpy as np
+from numpy.typing import NDArray
 
 try:
     import torch
@@ -25,7 +26,7 @@ except ImportError as error:
     raise ImportError("hydrograd.torch needs PyTorch: pip install torch") from error
 
 from hydrograd import _bridge
-from hydrograd._bridge import Memory, Observed, Physics, Pulled, Stepped
+from hydrograd._bridge import Memory, Observed, Physics, Pulled
 from hydrograd._charts import Array
 from hydrograd._hydrograd import InputError, Record, Rollout, Simulator, UnsupportedError
 
@@ -89,9 +90,9 @@ def rollout(
         **_bridge.adjustable("rollout", sim, parameters, gains, _value),
     }
     lead, flat = _flat("rollout", physics, parts)
-    rollouts: list[Rollout] = []
-    made = _Rollout.apply(physics, rollouts, *flat)
-    return Trajectory(*(part.reshape((*lead, *part.shape[1:])) for part in made), rollouts)
+    work = _Rolling(physics)
+    made = _Run.apply(work, *flat)
+    return Trajectory(*(part.reshape((*lead, *part.shape[1:])) for part in made), work.rollouts)
 
 
 def initial_state(sim: Simulator, q: Numbers | None = None, v: Numbers | None = None) -> State:
@@ -128,130 +129,143 @@ def step(
     }
     lead, flat = _flat("step", physics, parts)
     memory = _memory(state, lead, physics)
-    made = _Step.apply(physics, [], memory, *flat)
+    made = _Run.apply(_Stepping(physics), *flat, *memory)
     return State(*(part.reshape((*lead, *part.shape[1:])) for part in made))
 
 
-class _Rollout(torch.autograd.Function):
-    """Rollouts of a flat batch, that are put into the list `made`."""
+Key = tuple[bytes, ...]
 
-    @staticmethod
-    def forward(physics: Physics, made: list[Rollout], *tensors: Tensor) -> tuple[Tensor, ...]:
-        controls, q, v, values, gains = _arrays(tensors)
+
+class _Rolling:
+    """Rollouts of flat batches of controls, q, v, values and gains; what was run is kept, by all that it depends on."""
+
+    # Arrays that it is given, and those that it gives with derivatives.
+    given, differentiable = 5, 4
+
+    def __init__(self, physics: Physics) -> None:
+        self.physics = physics
+        self.rollouts: list[Rollout] = []
+        self._made: dict[Key, Rollout] = {}
+
+    def run(self, arrays: Sequence[Array]) -> Sequence[NDArray[Any]]:
+        """What is observed of the rollouts."""
+        physics, (controls, q, v, values, gains) = self.physics, arrays
         begin, _ = physics.charts.normalise("rollout", q)
-        made[:] = _bridge.roll(physics, controls, begin, v, values, gains)
-        seen = _bridge.seen(_bridge.observe(physics, controls.shape[1], made))
-        return tuple(torch.from_numpy(part) for part in seen)
+        self.rollouts = _bridge.roll(physics, controls, begin, v, values, gains)
+        self._made.update(zip(_keys(arrays), self.rollouts, strict=True))
+        return _bridge.seen(_bridge.observe(physics, controls.shape[1], self.rollouts))
 
-    @staticmethod
-    def setup_context(ctx: Any, inputs: tuple[Any, ...], output: tuple[Tensor, ...]) -> None:
-        physics, made, *tensors = inputs
-        ctx.set_materialize_grads(False)
-        ctx.shapes = [tensor.shape for tensor in tensors]
-        ctx.linear = _RolloutMaps(physics, list(made), *physics.charts.normalise("rollout", _arrays(tensors)[1]))
+    def _of(self, arrays: Sequence[Array]) -> tuple[list[Rollout], Array, Array]:
+        keys = _keys(arrays)
+        missing = [b for b, key in enumerate(keys) if key not in self._made]
+        if missing:
+            self.run([array[missing] for array in arrays])
+        return [self._made[key] for key in keys], *self.physics.charts.normalise("rollout", arrays[1])
 
-    @staticmethod
-    def jvp(ctx: Any, *along: Tensor | None) -> Any:
-        return _Push.apply(ctx.linear, *_filled(along[2:], ctx.shapes))
+    def push(self, arrays: Sequence[Array], along: Sequence[Array]) -> Sequence[Array]:
+        """Tangents of what is observed."""
+        return _bridge.seen(_bridge.push(self.physics, *self._of(arrays), Pulled(*along)))
 
-    @staticmethod
-    @once_differentiable
-    def backward(ctx: Any, *bars: Tensor | None) -> tuple[Tensor | None, ...]:
-        pulled = _Pull.apply(ctx.linear, *bars)
-        return None, None, *_wanted(ctx.needs_input_grad[2:], pulled)
-
-    @staticmethod
-    def vmap(info: Any, dims: Sequence[int | None], physics: Physics, made: list[Rollout], *tensors: Tensor) -> Any:
-        given = _joined(info.batch_size, dims[2:], tensors)
-        return _parted(info.batch_size, _Rollout.apply(physics, made, *given))
+    def pull(self, arrays: Sequence[Array], bars: Sequence[Array | None]) -> Pulled:
+        """Cotangents of what the rollouts begin with."""
+        return _bridge.pull(self.physics, *self._of(arrays), Observed(*bars))
 
 
-class _Step(torch.autograd.Function):
-    """One step of each state of a flat batch; the list `made` gets what it leaves."""
+class _Stepping:
+    """Single steps in the same way; the states' memory comes last."""
 
-    @staticmethod
-    def forward(physics: Physics, made: list[Stepped], memory: Memory, *tensors: Tensor) -> tuple[Tensor, ...]:
-        controls, q, v, values, gains = _arrays(tensors)
-        begin, _ = physics.charts.normalise("step", q)
-        after = _bridge.advance(physics, begin, v, controls, values, gains, memory)
+    given, differentiable = 8, 2
+
+    def __init__(self, physics: Physics) -> None:
+        self.physics = physics
+        self._made: dict[Key, tuple[Record, Array]] = {}
+
+    def run(self, arrays: Sequence[NDArray[Any]]) -> Sequence[NDArray[Any]]:
+        """q, v and memory after the steps."""
+        controls, q, v, values, gains, *memory = arrays
+        begin, _ = self.physics.charts.normalise("step", q)
+        after = _bridge.advance(self.physics, begin, v, controls, values, gains, Memory(*memory))
         # A copy: what leaves may be changed in place.
-        made[:] = [after._replace(q=after.q.copy())]
-        return tuple(torch.from_numpy(part) for part in (after.q, after.v, *after.memory))
+        made = zip(after.records, after.q.copy(), strict=True)
+        self._made.update(zip(_keys(arrays), made, strict=True))
+        return after.q, after.v, *after.memory
+
+    def _of(self, arrays: Sequence[NDArray[Any]]) -> tuple[list[Record], Array, Array, Array]:
+        keys = _keys(arrays)
+        missing = [b for b, key in enumerate(keys) if key not in self._made]
+        if missing:
+            self.run([array[missing] for array in arrays])
+        made = [self._made[key] for key in keys]
+        begin, lengths = self.physics.charts.normalise("step", arrays[1])
+        return [record for record, _ in made], begin, lengths, np.array([end for _, end in made])
+
+    def push(self, arrays: Sequence[NDArray[Any]], along: Sequence[Array]) -> Sequence[Array]:
+        """Tangents of q and v."""
+        return _bridge.push_step(self.physics, *self._of(arrays), Pulled(*along))
+
+    def pull(self, arrays: Sequence[NDArray[Any]], bars: Sequence[Array | None]) -> Pulled:
+        """Cotangents of what the steps begin with."""
+        q_bar, v_bar = bars
+        return _bridge.pull_step(self.physics, *self._of(arrays), q_bar, v_bar)
+
+
+Work = _Rolling | _Stepping
+
+
+def _keys(arrays: Sequence[NDArray[Any]]) -> list[Key]:
+    """All that each member of a flat batch depends on."""
+    return [tuple(array[b].tobytes() for array in arrays) for b in range(len(arrays[0]))]
+
+
+class _Run(torch.autograd.Function):
+    """Work on a flat batch."""
+
+    @staticmethod
+    def forward(work: Work, *tensors: Tensor) -> tuple[Tensor, ...]:
+        return tuple(torch.from_numpy(part) for part in work.run(_arrays(tensors)))
 
     @staticmethod
     def setup_context(ctx: Any, inputs: tuple[Any, ...], output: tuple[Tensor, ...]) -> None:
-        physics, made, _, *tensors = inputs
+        work, *tensors = inputs
         ctx.set_materialize_grads(False)
-        ctx.mark_non_differentiable(*output[2:])
-        ctx.shapes = [tensor.shape for tensor in tensors]
-        begin, lengths = physics.charts.normalise("step", _arrays(tensors)[1])
-        ctx.linear = _StepMaps(physics, made[0].records, begin, lengths, made[0].q)
+        ctx.mark_non_differentiable(*output[work.differentiable :])
+        ctx.work, ctx.began = work, None
+        try:
+            # Copies: what was given may be changed in place.
+            ctx.began = [torch.from_numpy(array.copy()) for array in _arrays(tensors)]
+        except RuntimeError:
+            # In transformations of torch.func only torch knows the numbers.
+            ctx.save_for_backward(*tensors)
+            ctx.save_for_forward(*tensors)
 
     @staticmethod
     def jvp(ctx: Any, *along: Tensor | None) -> Any:
-        return (*_Push.apply(ctx.linear, *_filled(along[3:], ctx.shapes)), None, None, None)
+        began = _began(ctx)
+        pairs = zip(began[:_LINEAR], along[1 : _LINEAR + 1], strict=True)
+        filled = [torch.zeros_like(x) if part is None else part for x, part in pairs]
+        still = (None,) * (3 if isinstance(ctx.work, _Stepping) else 0)
+        return (*_Push.apply(ctx.work, *began, *filled), *still)
 
     @staticmethod
     @once_differentiable
     def backward(ctx: Any, *bars: Tensor | None) -> tuple[Tensor | None, ...]:
-        pulled = _Pull.apply(ctx.linear, *bars[:2])
-        return None, None, None, *_wanted(ctx.needs_input_grad[3:], pulled)
+        pulled = _Pull.apply(ctx.work, *_began(ctx), *bars[: ctx.work.differentiable])
+        needed = ctx.needs_input_grad[1:]
+        still = (None,) * (len(needed) - _LINEAR)
+        return None, *(part if need else None for need, part in zip(needed, pulled, strict=False)), *still
 
     @staticmethod
-    def vmap(
-        info: Any, dims: Sequence[Any], physics: Physics, made: list[Stepped], memory: Memory, *tensors: Tensor
-    ) -> Any:
+    def vmap(info: Any, dims: Sequence[int | None], work: Work, *tensors: Tensor) -> Any:
         size = info.batch_size
-        given = _joined(size, dims[3:], tensors)
-        all_memory = Memory(*(np.concatenate([part] * size) for part in memory))
-        return _parted(size, _Step.apply(physics, made, all_memory, *given))
+        return _parted(size, _Run.apply(work, *_joined(size, dims[1:], tensors)))
 
 
-class _RolloutMaps(NamedTuple):
-    """Rollouts with where they began: their tangents and transposes, row by row of a flat batch."""
-
-    physics: Physics
-    made: list[Rollout]
-    begin: Array
-    lengths: Array
-
-    def repeated(self, times: int) -> _RolloutMaps:
-        """The same rows so many times, one after the other."""
-        begin, lengths = (np.concatenate([part] * times) for part in (self.begin, self.lengths))
-        return self._replace(made=self.made * times, begin=begin, lengths=lengths)
-
-    def push(self, along: Sequence[Array]) -> Sequence[Array]:
-        made = _bridge.push(self.physics, self.made, self.begin, self.lengths, Pulled(*along))
-        return _bridge.seen(made)
-
-    def pull(self, bars: Sequence[Array | None]) -> Pulled:
-        return _bridge.pull(self.physics, self.made, self.begin, self.lengths, Observed(*bars))
-
-
-class _StepMaps(NamedTuple):
-    """The same of steps."""
-
-    physics: Physics
-    made: list[Record]
-    begin: Array
-    lengths: Array
-    end: Array
-
-    def repeated(self, times: int) -> _StepMaps:
-        """The same rows so many times, one after the other."""
-        begin, lengths, end = (np.concatenate([part] * times) for part in (self.begin, self.lengths, self.end))
-        return self._replace(made=self.made * times, begin=begin, lengths=lengths, end=end)
-
-    def push(self, along: Sequence[Array]) -> Sequence[Array]:
-        return _bridge.push_step(self.physics, self.made, self.begin, self.lengths, self.end, Pulled(*along))
-
-    def pull(self, bars: Sequence[Array | None]) -> Pulled:
-        q_bar, v_bar = bars
-        return _bridge.pull_step(self.physics, self.made, self.begin, self.lengths, self.end, q_bar, v_bar)
+def _began(ctx: Any) -> Sequence[Tensor]:
+    return ctx.saved_tensors if ctx.began is None else ctx.began
 
 
 class _Linear(torch.autograd.Function):
-    """What both maps share: they are calls of their own, so that vmap sees them, and have no derivatives."""
+    """Tangents and transposes are calls of their own, so that vmap sees them; they have no derivatives."""
 
     @staticmethod
     def setup_context(ctx: Any, inputs: tuple[Any, ...], output: tuple[Tensor, ...]) -> None:
@@ -270,44 +284,42 @@ _FIRST = (
     "derivatives of derivatives of a rollout or step are not available: hydrograd has the first ones; take differences of "
     "gradients"
 )
+# Controls, q, v, values and gains have derivatives.
+_LINEAR = 5
 
 
 class _Push(_Linear):
-    """Tangents along those of a flat batch."""
+    """Tangents of work, from what it was given and the tangents of that."""
 
     @staticmethod
-    def forward(linear: _RolloutMaps | _StepMaps, *along: Tensor) -> tuple[Tensor, ...]:
-        return tuple(torch.from_numpy(part) for part in linear.push(_arrays(along)))
+    def forward(work: Work, *tensors: Tensor) -> tuple[Tensor, ...]:
+        arrays = _arrays(tensors)
+        return tuple(torch.from_numpy(part) for part in work.push(arrays[: work.given], arrays[work.given :]))
 
     @staticmethod
-    def vmap(info: Any, dims: Sequence[int | None], linear: _RolloutMaps | _StepMaps, *along: Tensor) -> Any:
-        given = _joined(info.batch_size, dims[1:], along)
-        return _parted(info.batch_size, _Push.apply(linear.repeated(info.batch_size), *given))
+    def vmap(info: Any, dims: Sequence[int | None], work: Work, *tensors: Tensor) -> Any:
+        size = info.batch_size
+        return _parted(size, _Push.apply(work, *_joined(size, dims[1:], tensors)))
 
 
 class _Pull(_Linear):
-    """Cotangents of a flat batch pulled back; one that is None is zero."""
+    """Cotangents of what work was given, from that and the cotangents of what it made; one that is None is zero."""
 
     @staticmethod
-    def forward(linear: _RolloutMaps | _StepMaps, *bars: Tensor | None) -> tuple[Tensor, ...]:
-        given = [None if bar is None else bar.detach().numpy() for bar in bars]
-        return tuple(torch.from_numpy(part) for part in linear.pull(given))
+    def forward(work: Work, *tensors: Tensor | None) -> tuple[Tensor, ...]:
+        arrays = [None if tensor is None else tensor.detach().numpy() for tensor in tensors]
+        began = [array for array in arrays[: work.given] if array is not None]
+        return tuple(torch.from_numpy(part) for part in work.pull(began, arrays[work.given :]))
 
     @staticmethod
-    def vmap(info: Any, dims: Sequence[int | None], linear: _RolloutMaps | _StepMaps, *bars: Tensor | None) -> Any:
+    def vmap(info: Any, dims: Sequence[int | None], work: Work, *tensors: Tensor | None) -> Any:
         size = info.batch_size
-        given = [None if bar is None else _joined(size, [d], [bar])[0] for d, bar in zip(dims[1:], bars, strict=True)]
-        return _parted(size, _Pull.apply(linear.repeated(size), *given))
+        given = [None if t is None else _joined(size, [d], [t])[0] for d, t in zip(dims[1:], tensors, strict=True)]
+        return _parted(size, _Pull.apply(work, *given))
 
 
 def _arrays(tensors: Sequence[Tensor]) -> list[Array]:
     return [tensor.detach().numpy() for tensor in tensors]
-
-
-def _filled(along: Sequence[Tensor | None], shapes: Sequence[torch.Size]) -> list[Tensor]:
-    """Zeros where nothing changes."""
-    zeros = (torch.zeros(shape, dtype=torch.float64) for shape in shapes)
-    return [zero if part is None else part for part, zero in zip(along, zeros, strict=True)]
 
 
 def _joined(size: int, dims: Sequence[int | None], tensors: Sequence[Tensor]) -> list[Tensor]:
@@ -322,10 +334,6 @@ def _joined(size: int, dims: Sequence[int | None], tensors: Sequence[Tensor]) ->
 def _parted(size: int, tensors: Sequence[Tensor]) -> tuple[tuple[Tensor, ...], tuple[int, ...]]:
     """The inverse, with where vmap's dimension is."""
     return tuple(t.reshape(size, len(t) // size, *t.shape[1:]) for t in tensors), (0,) * len(tensors)
-
-
-def _wanted(needed: Sequence[bool], pulled: Sequence[Tensor]) -> tuple[Tensor | None, ...]:
-    return tuple(part if need else None for need, part in zip(needed, pulled, strict=True))
 
 
 def _tensor(place: str, given: Numbers) -> Tensor:
@@ -344,7 +352,12 @@ def _tensor(place: str, given: Numbers) -> Tensor:
 def _value(place: str, given: Numbers) -> Tensor:
     """A tensor of finite numbers: values that a simulator is made anew with."""
     tensor = _tensor(place, given)
-    _bridge.finite(place, tensor.detach().numpy())
+    try:
+        numbers = tensor.detach().numpy()
+    except RuntimeError:
+        # What a transformation of torch.func goes through: the simulator itself looks at it.
+        return tensor
+    _bridge.finite(place, numbers)
     return tensor
 
 
@@ -365,19 +378,19 @@ def _flat(place: str, physics: Physics, parts: Parts) -> tuple[tuple[int, ...], 
     return lead, [*spread[:3], values, gains]
 
 
-def _memory(state: State, lead: tuple[int, ...], physics: Physics) -> Memory:
+def _memory(state: State, lead: tuple[int, ...], physics: Physics) -> list[Tensor]:
     def flat(name: str, given: Tensor | float, *inner: int) -> Any:
         tensor = torch.as_tensor(given)
         if tensor.is_floating_point() or tensor.is_complex():
             raise InputError(f"step: state.{name}: got dtype {tensor.dtype}; must be whole numbers")
         try:
-            return tensor.expand((*lead, *inner)).reshape((math.prod(lead), *inner)).numpy()
+            return tensor.expand((*lead, *inner)).reshape((math.prod(lead), *inner))
         except RuntimeError:
             wanted = (*lead, *inner)
             raise InputError(f"step: state.{name}: got shape {tuple(tensor.shape)}; must go with {wanted}") from None
 
-    return Memory(
-        flat("step", state.step).astype(np.int64),
-        flat("mode", state.mode).astype(np.int64),
-        flat("held", state.held, physics.bodies).astype(np.bool_),
-    )
+    return [
+        flat("step", state.step).to(torch.int64),
+        flat("mode", state.mode).to(torch.int64),
+        flat("held", state.held, physics.bodies).to(torch.bool),
+    ]

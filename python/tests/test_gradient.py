@@ -203,7 +203,7 @@ def test_observables_by_name(sim, controls, seeds):
 
     with pytest.raises(hg.InputError, match="angular_momentum"):
         rollout.observe("spin")
-    with pytest.raises(hg.UnsupportedError, match="no transpose"):
+    with pytest.raises(hg.UnsupportedError, match="derivative of the observable"):
         rollout.vjp(observables={"energy": np.zeros(len(rollout))})
     with pytest.raises(hg.InputError, match="angular_momentum"):
         rollout.vjp(observables={"angular_momentum": np.zeros(3)})

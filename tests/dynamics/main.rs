@@ -5,6 +5,7 @@ mod driven;
 mod extremes;
 mod films;
 mod finite;
+mod forward;
 #[cfg(feature = "opt")]
 mod grasp;
 mod growth;

@@ -294,7 +294,7 @@ impl Tree {
         row: impl Fn(&Link, &[f64]) -> [Vec<f64>; N],
     ) -> [DMatrix<f64>; N] {
         let n = self.velocities();
-        let mut out = [const { () }; N].map(|()| DMatrix::zeros(n, n));
+        let mut out: [DMatrix<f64>; N] = std::array::from_fn(|_| DMatrix::zeros(n, n));
         for l in &self.links {
             let mut unit = vec![0.0; l.v.len()];
             for k in 0..l.v.len() {

@@ -291,11 +291,8 @@ fn closed(c: f64) -> Outcome {
 fn pressed(integrator: Integrator, c: f64) -> Outcome {
     let mut p = contact::point();
     let (n, tree) = (p.v.len(), &contact::system().tree);
-    let conserved = |p: &contact::Point| {
-        let e = contact::evaluate(&p.parameters, &p.q);
-        contact::stepper(&p.parameters, integrator).conserved(&e, &p.v)
-    };
-    p.v = conserved(&p);
+    let e = contact::evaluate(&p.parameters, &p.q);
+    p.v = contact::stepper(&p.parameters, integrator).conserved(&e, &p.v);
     let make = |p: &contact::Point| {
         let s = contact::stepper(&p.parameters, integrator);
         let e = s.linearise(&p.q).unwrap();

@@ -15,26 +15,13 @@
 use super::force::{LoadBars, Loads, Moving, Place, Velocity};
 use super::linearisation::Water;
 use super::slopes::unit;
-use super::{Evaluation, Linearisation, Parameters, Slopes};
+use super::{Evaluation, ForceCotangents, Linearisation, Parameters, Slopes};
 use crate::Result;
 use crate::adjoint::lie::{Vec6, cross_force, cross_motion, six};
 use crate::adjoint::rigid;
 use crate::coupling::Direction;
 use crate::multibody::{Cotangents, Fields, Link, Virtual};
 use nalgebra::{DMatrix, DVector, Matrix6};
-
-/// Cotangents of configuration, velocity, control and parameters.
-#[derive(Clone, Debug)]
-pub struct ForceCotangents {
-    /// Tangent cotangent of q.
-    pub q: DVector<f64>,
-    /// Cotangent of v.
-    pub v: DVector<f64>,
-    /// Cotangent of the controls.
-    pub control: DVector<f64>,
-    /// Cotangents of the parameters.
-    pub parameters: Parameters,
-}
 
 /// What is known of the ẑ of several transposes, and asked of them.
 #[derive(Clone, Copy)]
@@ -61,19 +48,6 @@ impl Rows {
     fn skips(self, fields: &Fields, b: usize) -> bool {
         let still = fields.virtual_twist[b] == Vec6::zeros() && fields.turning[b] == Vec6::zeros();
         matches!(self, Self::Units { .. }) && still
-    }
-}
-
-impl ForceCotangents {
-    /// All zero.
-    pub fn zeros(e: &Evaluation) -> Self {
-        let nv = e.system.tree.velocities();
-        Self {
-            q: DVector::zeros(nv),
-            v: DVector::zeros(nv),
-            control: DVector::zeros(e.system.controls),
-            parameters: e.parameters.zeros(),
-        }
     }
 }
 

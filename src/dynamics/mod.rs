@@ -5,6 +5,7 @@ mod balance;
 mod body;
 mod contact;
 mod contact_force;
+mod cotangents;
 mod damping;
 mod evaluation;
 pub mod force;
@@ -17,9 +18,9 @@ mod slopes;
 mod symmetry;
 mod system;
 
-pub use balance::ForceCotangents;
 pub use body::BodyData;
 pub use contact::{ContactForce, ContactGap, ContactModel, Dual, PairContact};
+pub use cotangents::ForceCotangents;
 pub use evaluation::Evaluation;
 pub use integrator::{
     ContactVelocities, Input, Integrator, LinearisedStep, State, StateBar, StateTangents, StepBar,

@@ -246,48 +246,54 @@ impl Linearisation<'_> {
         Ok(out + self.frame_dual(&loads.joints))
     }
 
-    /// Tangent of [`Linearisation::force`] along `dv` at fixed q and u, with the change of the fluid's pose force on the
+    /// Tangents of [`Linearisation::force`] along `changes` of v at fixed q and u, each with the change of the fluid's pose force on the
     /// submerged bodies.
     fn force_jvp(
         &self,
         v: &DVector<f64>,
         control: &DVector<f64>,
-        dv: &DVector<f64>,
-        dpose_force: &[Vec6],
-    ) -> DVector<f64> {
+        changes: &[DVector<f64>],
+        dpose_forces: &[Vec<Vec6>],
+    ) -> Vec<DVector<f64>> {
         let tree = &self.system.tree;
         let rho = self.parameters.density();
         let twists = tree.twists(&self.kinematics, v);
-        let dtwists = tree.twists(&self.kinematics, dv);
         let fluid = self.fluid_momenta(&self.through_water(v));
-        let dfluid = self.fluid_momenta(&self.virtual_direction(dv));
-        let dpose_force = match self.acting() {
-            Some(_) => self.from_submerged(dpose_force),
-            None => vec![Vec6::zeros(); self.system.len()],
-        };
+        let momenta = self.with_rigid(&twists, &fluid);
         let current = self.current_twist();
-        let mut dloads = Loads::zeros(twists.len(), v.len());
+        let none = vec![Vec6::zeros(); twists.len()];
+        let along: Vec<Vec<Vec6>> = (changes.iter())
+            .map(|dv| tree.twists(&self.kinematics, dv))
+            .collect();
+        let velocities: Vec<Velocity> = (changes.iter().zip(&along))
+            .map(|(v, twists)| Velocity { twists, v })
+            .collect();
+        let mut dloads: Vec<Loads> = (changes.iter())
+            .map(|_| Loads::zeros(twists.len(), v.len()))
+            .collect();
         let at = self.moving(&twists, v, control);
-        let change = Velocity {
-            twists: &dtwists,
-            v: dv,
-        };
         for force in self.system.smooth_forces() {
-            force.jvp(&at, &change, &mut dloads);
+            force.jvps(&at, &velocities, &mut dloads);
         }
-        for (b, drate) in dloads.wrenches.iter_mut().enumerate() {
-            *drate += rho * (dpose_force[b] + cross_force(&current, &dfluid[b]));
-        }
-        let (momenta, dmomenta) = (
-            self.with_rigid(&twists, &fluid),
-            self.with_rigid(&dtwists, &dfluid),
-        );
-        let out = self.project_frame(&twists, dmomenta, dloads.wrenches)
-            + self.project_frame(&dtwists, momenta, vec![Vec6::zeros(); twists.len()]);
-        match dloads.joints.iter().all(|x| *x == 0.0) {
-            true => out,
-            false => out + self.frame_dual(&dloads.joints),
-        }
+        let each = changes.iter().zip(&along).zip(dloads).zip(dpose_forces);
+        each.map(|(((dv, dtwists), mut dloads), dpose_force)| {
+            let dfluid = self.fluid_momenta(&self.virtual_direction(dv));
+            let dpose_force = match self.acting() {
+                Some(_) => self.from_submerged(dpose_force),
+                None => none.clone(),
+            };
+            for (b, drate) in dloads.wrenches.iter_mut().enumerate() {
+                *drate += rho * (dpose_force[b] + cross_force(&current, &dfluid[b]));
+            }
+            let dmomenta = self.with_rigid(dtwists, &dfluid);
+            let out = self.project_frame(&twists, dmomenta, dloads.wrenches)
+                + self.project_frame(dtwists, momenta.clone(), none.clone());
+            match dloads.joints.iter().all(|x| *x == 0.0) {
+                true => out,
+                false => out + self.frame_dual(&dloads.joints),
+            }
+        })
+        .collect()
     }
 
     /// ∂f/∂v, column by column.
@@ -304,10 +310,15 @@ impl Linearisation<'_> {
             Some(water) => water.linearised.gradient_columns(&self.through_water(v))?,
             None => vec![Vec::new(); n],
         };
+        let unit = |k: usize| DVector::from_fn(n, |i, _| f64::from(i == k));
+        let units: Vec<DVector<f64>> = (0..n).map(unit).collect();
         let mut out = DMatrix::zeros(n, n);
-        for (k, changed) in changed.iter().enumerate().take(n) {
-            let unit = DVector::from_fn(n, |i, _| f64::from(i == k));
-            out.set_column(k, &self.force_jvp(v, control, &unit, changed));
+        for (k, column) in self
+            .force_jvp(v, control, &units, &changed)
+            .iter()
+            .enumerate()
+        {
+            out.set_column(k, column);
         }
         Ok(out)
     }

@@ -6,6 +6,7 @@ mod body;
 mod contact;
 mod contact_force;
 mod damping;
+mod drift;
 mod evaluation;
 pub mod force;
 mod integrator;
@@ -19,6 +20,7 @@ mod system;
 pub use balance::ForceCotangents;
 pub use body::BodyData;
 pub use contact::{ContactForce, ContactGap, ContactModel, Dual, PairContact};
+pub use drift::Drift;
 pub use evaluation::Evaluation;
 pub use integrator::{
     ContactVelocities, Input, Integrator, LinearisedStep, State, StateBar, StateTangent, StepBar,

@@ -5,6 +5,7 @@ mod driven;
 mod extremes;
 mod films;
 mod finite;
+mod galilean;
 #[cfg(feature = "opt")]
 mod grasp;
 mod growth;

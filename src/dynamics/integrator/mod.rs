@@ -21,6 +21,7 @@ mod euler;
 mod midpoint;
 mod pieces;
 mod plan;
+mod quasi;
 mod readout;
 mod record;
 mod runge_kutta;

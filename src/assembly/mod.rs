@@ -175,7 +175,7 @@ pub(crate) fn assemble(
     let current = Vec3::from(scene.fluid.current);
     let mut system = System {
         bodies,
-        drift: Drift::new(&tree, &drives, &current),
+        drift: Drift::new(&tree, |b| drives[b] == Drive::Free, &current),
         drives,
         forces,
         current,
@@ -197,6 +197,7 @@ pub(crate) fn assemble(
     }
     let mut water = water::prepare(scene, &choices.water, in_water, &poses, clearance, folder)?;
     system.coupling = water.coupling.clone();
+    water.reasons.extend(contact::stand_in(scene, choices));
     if let Some(given) = &scene.contact {
         let made = contact::assemble(scene, given, dt, &water, &surfaces, &mut parameters)?;
         let told = contact::warnings(scene, given, &water, &surfaces, &made);

@@ -10,7 +10,6 @@
 //! so that no step sees how fast all drift together. Frame momenta are taken about a point at rest; about one that drifts along they are, after the time τ,
 //! (1 − τ D) p̂', with D p̂ = W ×* p̂ on the coordinates of a joint to the world (of a free one: (0, W × P)). D² = 0.
 
-use super::Drive;
 use crate::adjoint::lie::{Vec3, Vec6, angular, cross_motion, linear, six};
 use crate::multibody::{Link, Tree};
 use nalgebra::{DMatrix, DVector};
@@ -33,8 +32,8 @@ pub struct Drift {
 }
 
 impl Drift {
-    /// Of a system in the current `current`, m/s.
-    pub fn new(tree: &Tree, drives: &[Drive], current: &Vec3) -> Self {
+    /// Of a tree in the current `current`, m/s; `is_free` says of which bodies nothing drives the joints.
+    pub fn new(tree: &Tree, is_free: impl Fn(usize) -> bool, current: &Vec3) -> Self {
         let links = tree.links();
         let mut out = Self {
             twists: vec![Vec6::zeros(); links.len()],
@@ -47,9 +46,9 @@ impl Drift {
                 out.twists[b] = out.twists[parent];
                 continue;
             }
-            let along = match &drives[b] {
-                Drive::Free => along(link, current),
-                Drive::Locked | Drive::Motion(_) => None,
+            let along = match is_free(b) {
+                true => along(link, current),
+                false => None,
             };
             let Some(Along { hat, twist, matrix }) = along else {
                 out.whole &= *current == Vec3::zeros();

@@ -14,6 +14,7 @@ mod limit;
 mod linearisation;
 mod momentum;
 mod parameters;
+mod stiffness;
 mod symmetry;
 mod system;
 
@@ -29,6 +30,7 @@ pub use integrator::{
 pub use limit::JointLimit;
 pub use linearisation::Linearisation;
 pub use parameters::{Declarations, Declared, Entry, Owner, Parameter, Parameters, Range, Typical};
+pub use stiffness::Damping;
 pub use symmetry::FreeMotions;
 pub(crate) use symmetry::{Group, free_motions, refuse, refuse_tilt};
 pub use system::{Drive, System};

@@ -15,6 +15,7 @@ mod mechanisms;
 mod observables;
 #[cfg(feature = "opt")]
 mod optimize;
+mod random;
 mod resume;
 mod rollout_gradient;
 #[cfg(feature = "opt")]

@@ -64,6 +64,16 @@ impl Integrator {
         self == Integrator::VelocityEuler
     }
 
+    /// Largest rate of damping times the time step at which it is stable, of integrators that take forces at the velocity before the step (explicitly): of a motion that
+    /// dies away at the rate λ a step leaves 1 − λΔt (velocity Euler), with ½(λΔt)² (RK2) or the series to the fourth order (RK4).
+    pub fn damping_limit(self) -> Option<f64> {
+        match self {
+            Integrator::VelocityEuler | Integrator::Rk2 => Some(2.0),
+            Integrator::Rk4 => Some(2.785),
+            Integrator::MomentumEuler | Integrator::EnergyEuler | Integrator::Midpoint => None,
+        }
+    }
+
     /// Whether it solves contact, and limits of joints, in the velocity by which a step moves.
     pub fn solves_contact(self) -> bool {
         !matches!(self, Integrator::Rk2 | Integrator::Rk4)

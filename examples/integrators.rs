@@ -210,7 +210,7 @@ fn long() -> Result<()> {
         ("two tied ellipsoids", tied(), Fidelity::Reduced),
     ] {
         let mut first = 0.0;
-        for (integrator, label) in INTEGRATORS {
+        'each: for (integrator, label) in INTEGRATORS {
             let settings = Settings::default().fidelity(fidelity).time_step(0.01);
             let simulator = Simulator::new(&scene, settings.integrator(integrator))?;
             let mut state = simulator.initial()?;
@@ -223,7 +223,7 @@ fn long() -> Result<()> {
                     Ok(rollout) => rollout,
                     Err(error) => {
                         println!("| {title} | {label} | {error} |||");
-                        break;
+                        continue 'each;
                     }
                 };
                 for s in rollout.samples() {

@@ -4,7 +4,7 @@
 //! |---|---|---|---|
 //! | [`Integrator::MomentumEuler`] | frame momentum p̂ | 1, symplectic | 1 evaluation |
 //! | [`Integrator::EnergyEuler`] | frame momentum p̂ | 1, keeps energy | 1, and one of values |
-//! | [`Integrator::Midpoint`] | frame momentum p̂ | 2, symmetric | about 4 to 8 |
+//! | [`Integrator::Midpoint`] | frame momentum p̂ | 2, symmetric | about 4 to 6 |
 //! | [`Integrator::Rk2`] | frame momentum p̂ | 2 | 2 |
 //! | [`Integrator::Rk4`] | frame momentum p̂ | 4 | 4 |
 //! | [`Integrator::VelocityEuler`] | velocity v | 1 | 1 |
@@ -39,7 +39,7 @@ use crate::Result;
 use nalgebra::{DMatrix, DVector};
 
 choices! {
-    /// How time is stepped. The default is the cheapest that keeps the energy error of every example scene under 1 %
+    /// How time is stepped. The default is the one that costs least for its accuracy
     /// (`docs/integrators.md`).
     pub enum Integrator {
         /// Symplectic Euler in momentum, implicit in p at fixed q: first order, one evaluation a step.
@@ -49,9 +49,9 @@ choices! {
         /// Implicit midpoint in momentum: second order, symmetric, energy bounded.
         Midpoint,
         /// Explicit midpoint rule in momentum: second order, two evaluations.
-        #[default]
         Rk2,
         /// Classical Runge–Kutta in momentum: fourth order, four evaluations.
+        #[default]
         Rk4,
         /// Semi-implicit Euler in velocity (the paper's Eq. 3–4): first order.
         VelocityEuler,

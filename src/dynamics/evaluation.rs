@@ -304,20 +304,22 @@ impl<'a> Evaluation<'a> {
     }
 
     /// Total momentum and angular momentum about the world origin of bodies and fluid at velocity `v`,
-    /// given the bodies' momenta there. A tree on a free joint that doesn't drift counts with its frame momentum, which M(q) v yields to
+    /// given the bodies' momenta there. A tree on a free joint counts with its frame momentum and what drifts besides, which M(q) v yields to
     /// round-off; the sum of the bodies' is as exact as the coupling's solve.
     pub fn total_momentum(&self, v: &DVector<f64>, momenta: &[Vec6]) -> Vec6 {
         let tree = &self.system.tree;
         let composite = tree.composite(momenta.to_vec());
         let hat = self.frame_momentum(v);
+        let drift = &self.system.drift;
+        let drifting = (0..self.system.len()).map(|b| self.rigid_momentum(b, drift.of(b)));
+        let drifting = tree.composite(drifting.collect());
         let mut total = Vec6::zeros();
         for (b, link) in tree.links().iter().enumerate() {
-            let resting = *self.system.drift.of(b) == Vec6::zeros();
-            total += match (link.parent, link.joint.is_free() && resting) {
+            total += match (link.parent, link.joint.is_free()) {
                 (Some(_), _) => Vec6::zeros(),
                 (None, true) => {
                     let own = hat.fixed_rows::<6>(link.v.start).into_owned();
-                    link.placement.wrench_to_world(&own)
+                    link.placement.wrench_to_world(&own) + drifting[b]
                 }
                 (None, false) => composite[b],
             };

@@ -259,7 +259,7 @@ pub(super) fn solve_stage<'a>(
         let factor = if iteration == 0 {
             let factor = equation.first_factor(&now)?;
             let at = |v| equation.at(v);
-            if let Some(found) = quasi::descend(split, &e.mass_matrix, &factor, &now, at) {
+            if let Some(found) = quasi::descend(split, &e.mass_matrix, &factor, &now, 0.0, at) {
                 return Ok(found.into());
             }
             factor

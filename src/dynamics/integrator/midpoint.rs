@@ -109,7 +109,15 @@ fn at_once(
         let m = middle(start, &v)?;
         Equation::new(start, &m, p, rule).at(v)
     };
-    Ok(quasi::descend(split, &m.mass_matrix, &factor, &first, at))
+    let mass_matrix = &m.mass_matrix;
+    Ok(quasi::descend(
+        split,
+        mass_matrix,
+        &factor,
+        &first,
+        noise(&m),
+        at,
+    ))
 }
 
 /// What the transpose of a step needs.

@@ -36,12 +36,14 @@ impl Trial {
     }
 }
 
-/// The solution from `first` on, `factor` being that of the stage's matrix about there; none where each step doesn't come much nearer.
+/// The solution from `first` on, `factor` being that of the stage's matrix about there; none where each step doesn't come much nearer, but for residuals under `noise`, of which
+/// nothing more can be told.
 pub(super) fn descend(
     split: &Split,
     mass_matrix: &DMatrix<f64>,
     factor: &LU<f64, Dyn, Dyn>,
     first: &Trial,
+    noise: f64,
     at: impl Fn(DVector<f64>) -> crate::Result<Trial>,
 ) -> Option<Trial> {
     // Steps made, each with its dual by the inertia.
@@ -53,7 +55,8 @@ pub(super) fn descend(
     for _ in 0..STEPS {
         let step = -&back;
         let now = at(&v + split.put(&step)).ok()?;
-        if now.converged(previous) {
+        let stalled = now.residual > 0.5 * previous;
+        if now.converged(previous) || (stalled && now.residual <= noise) {
             return Some(now);
         }
         if !(now.residual <= LEFT * previous) {

@@ -59,7 +59,8 @@ pub(super) fn descend(
         if now.converged(previous) || (stalled && now.residual <= noise) {
             return Some(now);
         }
-        if !(now.residual <= LEFT * previous) {
+        let nearer = now.residual <= LEFT * previous;
+        if !nearer {
             return None;
         }
         let dual = step.component_mul(&weight);
@@ -70,7 +71,8 @@ pub(super) fn descend(
         }
         // (I + u sᵀ) with u = −z / sᵀ(z + s), by which the new inverse brings z = H F to z sᵀs / sᵀ(z + s).
         let (size, ahead) = (dual.dot(&step), dual.dot(&step) + dual.dot(&back));
-        if !(ahead > LEFT * size) {
+        let sound = ahead > LEFT * size;
+        if !sound {
             return None;
         }
         improved.push(-&back / ahead);

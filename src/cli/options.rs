@@ -108,7 +108,7 @@ pub(super) struct Simulation {
     /// Time step in s [default: the scene's own].
     #[arg(long, value_name = "DT", allow_negative_numbers = true)]
     time_step: Option<f64>,
-    /// How a step is taken [default: rk2, momentum-euler with contact; velocity-euler with the preset paper].
+    /// How a step is taken [default: rk4, momentum-euler with contact; velocity-euler with the preset paper].
     #[arg(long, value_parser = choice::<Integrator>())]
     integrator: Option<Integrator>,
 }

@@ -6,6 +6,7 @@ mod body;
 mod contact;
 mod contact_force;
 mod damping;
+mod drift;
 mod evaluation;
 pub mod force;
 mod integrator;
@@ -13,12 +14,14 @@ mod limit;
 mod linearisation;
 mod momentum;
 mod parameters;
+mod stiffness;
 mod symmetry;
 mod system;
 
 pub use balance::ForceCotangents;
 pub use body::BodyData;
 pub use contact::{ContactForce, ContactGap, ContactModel, Dual, PairContact};
+pub use drift::Drift;
 pub use evaluation::Evaluation;
 pub use integrator::{
     ContactVelocities, Input, Integrator, LinearisedStep, State, StateBar, StateTangent, StepBar,
@@ -27,6 +30,7 @@ pub use integrator::{
 pub use limit::JointLimit;
 pub use linearisation::Linearisation;
 pub use parameters::{Declarations, Declared, Entry, Owner, Parameter, Parameters, Range, Typical};
+pub use stiffness::Damping;
 pub use symmetry::FreeMotions;
 pub(crate) use symmetry::{Group, free_motions, refuse, refuse_tilt};
 pub use system::{Drive, System};

@@ -8,9 +8,19 @@ use crate::multibody::{Cotangents, Virtual};
 use nalgebra::DVector;
 
 impl Evaluation<'_> {
-    /// Generalised momentum at velocity `v`, user coordinates (kg m/s, kg m²/s).
+    /// Generalised momentum at velocity `v`, user coordinates (kg m/s, kg m²/s); of what may drift with the water that relative to its drift
+    /// ([`Drift`](super::Drift)).
     pub fn momentum(&self, v: &DVector<f64>) -> DVector<f64> {
         &self.mass_matrix * v + &self.rest_momentum
+    }
+
+    /// What it lacks where bodies may drift: Σ Jᵀ I W, the momentum of the bodies' own masses that drift.
+    pub(super) fn drift_momentum(&self) -> DVector<f64> {
+        let drift = &self.system.drift;
+        let wrenches = (0..self.system.len())
+            .map(|b| self.rigid_momentum(b, drift.of(b)))
+            .collect();
+        self.system.tree.project(&self.kinematics.columns, wrenches)
     }
 
     /// The same in frame coordinates, X⁻ᵀ p.
@@ -45,7 +55,7 @@ impl Linearisation<'_> {
     /// # Errors
     /// A solve of the coupling that misses its tolerance.
     pub fn momentum_vjp(&self, v: &DVector<f64>, w: &DVector<f64>) -> Result<ForceCotangents> {
-        self.bilinear_vjp(v, w, &self.current_twist())
+        self.bilinear_vjp(v, w, Some(self.current_twist()))
     }
 
     /// Gradient of `wᵀ M(q) v`, without the current.
@@ -53,14 +63,14 @@ impl Linearisation<'_> {
     /// # Errors
     /// A solve of the coupling that misses its tolerance.
     pub fn mass_vjp(&self, v: &DVector<f64>, w: &DVector<f64>) -> Result<ForceCotangents> {
-        self.bilinear_vjp(v, w, &Vec6::zeros())
+        self.bilinear_vjp(v, w, None)
     }
 
     fn bilinear_vjp(
         &self,
         v: &DVector<f64>,
         w: &DVector<f64>,
-        current: &Vec6,
+        current: Option<Vec6>,
     ) -> Result<ForceCotangents> {
         let tree = &self.system.tree;
         let rho = self.parameters.density();
@@ -68,7 +78,8 @@ impl Linearisation<'_> {
         let fields = tree.fields(&self.kinematics, &self.q, v, Virtual::User(w));
         let mut bar = Cotangents::zeros(self.system.len());
         for b in 0..self.system.len() {
-            let (twist, virt) = (&fields.twist[b], &fields.virtual_twist[b]);
+            let drift = current.map_or(Vec6::zeros(), |_| *self.system.drift.of(b));
+            let (twist, virt) = (&(fields.twist[b] - drift), &fields.virtual_twist[b]);
             let (h, h_virtual) = (self.rigid_momentum(b, twist), self.rigid_momentum(b, virt));
             bar.virtual_twist[b] += h;
             bar.twist[b] += h_virtual;
@@ -76,11 +87,11 @@ impl Linearisation<'_> {
             rigid_parameters_vjp(self, b, virt, twist, &mut out.parameters);
         }
         if let Some(water) = self.water()? {
-            let direction = if *current == Vec6::zeros() {
-                self.virtual_direction(v)
-            } else {
-                self.through_water(v)
+            let direction = match current {
+                Some(_) => self.through_water(v),
+                None => self.virtual_direction(v),
             };
+            let current = current.unwrap_or_else(Vec6::zeros);
             let virtual_direction = self.virtual_direction(w);
             let (momenta, momenta_virtual) =
                 (water.momenta(&direction), water.momenta(&virtual_direction));

@@ -105,11 +105,13 @@ impl Settings {
     /// What these settings and a scene decide together.
     ///
     /// Contact is solved in the velocity that a step moves by: a scene with contact gets
-    /// [`Integrator::MomentumEuler`] where nobody chose an integrator and the preset's can't do that.
+    /// [`Integrator::MomentumEuler`] where nobody chose an integrator and the preset's can't do that, which
+    /// [`Simulator::reasons`](super::Simulator::reasons) says.
     pub fn resolve(&self, scene: &Scene) -> Choices {
         let preset = self.preset.unwrap_or(scene.preset);
         let mut base = Choices::preset(preset, scene.time_step);
-        if scene.has_contact() && !base.integrator.solves_contact() {
+        if scene.has_contact() && !base.integrator.solves_contact() && self.integrator.is_none() {
+            base.in_place_of = Some(base.integrator);
             base.integrator = Integrator::MomentumEuler;
         }
         self.over(base)

@@ -136,7 +136,7 @@ impl Simulator {
         self.assembled.water.device.context()
     }
 
-    /// What the fidelity `Auto` chose, and why; empty with others.
+    /// What the fidelity `Auto` chose, and why, and why an integrator stands in for the preset's ([`Settings::resolve`]).
     pub fn reasons(&self) -> &[String] {
         &self.assembled.water.reasons
     }

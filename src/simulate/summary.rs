@@ -1,6 +1,6 @@
 //! Figures of a whole trajectory, and what they say of the time step.
 
-use super::rollout::GAIN;
+use super::stability::GAIN;
 use super::{GapReport, Rollout};
 use crate::adjoint::lie::Vec6;
 use crate::dynamics::Drive;

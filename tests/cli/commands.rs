@@ -307,7 +307,7 @@ fn settings_reach_the_simulator() {
     let plain = json(&base);
     assert_eq!(
         (&plain["method"], &plain["integrator"]),
-        (&"panel".into(), &"rk2".into())
+        (&"panel".into(), &"rk4".into())
     );
     let direct = json(&[&base[..], &["--solver", "qr"]].concat());
     for (a, b) in list(&plain["final_q"]).iter().zip(list(&direct["final_q"])) {

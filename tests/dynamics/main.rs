@@ -5,6 +5,7 @@ mod driven;
 mod extremes;
 mod films;
 mod finite;
+mod galilean;
 #[cfg(feature = "opt")]
 mod grasp;
 mod growth;
@@ -14,6 +15,7 @@ mod mechanisms;
 mod observables;
 #[cfg(feature = "opt")]
 mod optimize;
+mod random;
 mod resume;
 mod rollout_gradient;
 #[cfg(feature = "opt")]

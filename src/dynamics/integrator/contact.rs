@@ -142,7 +142,11 @@ pub(super) fn apply(
 pub(super) fn reached(start: &Start, velocities: &ContactVelocities, hat: DVector<f64>) -> State {
     let ContactVelocities { before, after } = velocities;
     let hat = match start.near.contact_acts(before) {
-        true => hat + start.stepper.dt * start.near.contact_force(after, Dual::Frame),
+        true => {
+            // Where the momenta are taken drifts on during the step.
+            let (dt, drift) = (start.stepper.dt, &start.stepper.system.drift);
+            hat + drift.carry(dt, dt * start.near.contact_force(after, Dual::Frame))
+        }
         false => hat,
     };
     start.next_state(start.advance(after), hat)
@@ -224,7 +228,8 @@ impl<'s> Adjoint<'s> {
         if matches!(self.acting, Acting::No) {
             return Ok((after_bar, hat_bar));
         }
-        let pressed = start.near.contact_force_vjp(after, &hat_bar, Dual::Frame);
+        let impulse_bar = start.stepper.system.drift.carry_back(dt, hat_bar.clone());
+        let pressed = (start.near).contact_force_vjp(after, &impulse_bar, Dual::Frame);
         bar.add(dt, &pressed);
         let before_bar = self.solve_vjp(start, &(after_bar + dt * &pressed.v), bar)?;
         Ok((before_bar, hat_bar))

@@ -1,8 +1,10 @@
 //! Implicit midpoint in (q, p̂): second order and symmetric in time.
 //!
 //! q_m = q ⊕ ½Δt v, M(q_m) v + p_rest = Xᵀ(q_m) (p̂ + ½Δt f(q_m, v, u)), q⁺ = q ⊕ Δt v,
-//! p̂⁺ = p̂ + Δt f. The velocity is found by Newton at fixed q_m (cheap) inside a fixed point in
-//! q_m (one evaluation each); the adjoint iterates the transpose of the same splitting.
+//! p̂⁺ = p̂ + Δt f. In a current ½Δt f − ¼Δt² D f stands for ½Δt f: momenta in the middle are taken about a point that
+//! has drifted by then ([`crate::dynamics::Drift`]). The velocity is found by [`quasi::descend`] in v and q_m(v) at once, one evaluation a step; where that doesn't get there, by Newton at
+//! fixed q_m (cheap) inside a fixed point in
+//! q_m (one evaluation each); the adjoint iterates the transpose of that splitting.
 //!
 //! With contact, q⁺ = q ⊕ Δt v_s and p̂⁺ = p̂ + Δt f + Δt g(q, v_s), where v_s follows from v by
 //! [`contact::solve`] at q: the position is stepped implicitly, so contact is stable at any stiffness, and of
@@ -11,8 +13,9 @@
 //! contact hasn't stopped: bodies about to touch may overlap there by half of what they approach in a step.
 
 use super::contact;
-use super::euler::{AdjointStage, Rule, solve_stage};
+use super::euler::{AdjointStage, Equation, Rule, solve_stage};
 use super::plan::Halt;
+use super::quasi;
 use super::split::share;
 use super::stages::{ContactVelocities, Stages, Transposed};
 use super::start::Start;
@@ -58,6 +61,10 @@ pub(super) fn step(start: &Start) -> std::result::Result<(State, Stages), Halt> 
     let (s, split) = (start.stepper, start.split);
     let p = start.momentum();
     let mut stage = split.complete(start.v);
+    if let Some(found) = at_once(start, &p, &stage)? {
+        let y = &p + s.dt * found.force;
+        return Ok(contact::apply(start, found.v, y)?);
+    }
     let mut previous = f64::INFINITY;
     for _ in 0..ITERATIONS {
         let m = middle(start, &stage)?;
@@ -84,6 +91,35 @@ pub(super) fn step(start: &Start) -> std::result::Result<(State, Stages), Halt> 
     .into())
 }
 
+/// The stage from the guess `v`, if it gets there in v and q_m(v) at once.
+fn at_once(
+    start: &Start,
+    p: &DVector<f64>,
+    v: &DVector<f64>,
+) -> std::result::Result<Option<quasi::Trial>, Halt> {
+    let (split, rule) = (start.split, rule(start.stepper));
+    let m = middle(start, v)?;
+    let equation = Equation::new(start, &m, p, rule);
+    let first = equation.at(v.clone())?;
+    if first.converged(f64::INFINITY) {
+        return Ok(Some(first));
+    }
+    let factor = equation.first_factor(&first)?;
+    let at = |v: DVector<f64>| {
+        let m = middle(start, &v)?;
+        Equation::new(start, &m, p, rule).at(v)
+    };
+    let mass_matrix = &m.mass_matrix;
+    Ok(quasi::descend(
+        split,
+        mass_matrix,
+        &factor,
+        &first,
+        noise(&m),
+        at,
+    ))
+}
+
 /// What the transpose of a step needs.
 pub(super) struct Adjoint<'s, 'a> {
     contact: contact::Adjoint<'s>,
@@ -98,7 +134,8 @@ impl<'s, 'a> Adjoint<'s, 'a> {
     pub fn new(start: &Start<'_, 'a>, velocities: &'s ContactVelocities) -> Result<Self> {
         let (s, before) = (start.stepper, &velocities.before);
         let middle = middle(start, before)?;
-        let reached = start.momentum() + 0.5 * s.dt * middle.force(before, &start.input.control)?;
+        let force = middle.force(before, &start.input.control)?;
+        let reached = start.momentum() + rule(s).impulse(&middle, &force);
         Ok(Self {
             contact: contact::Adjoint::new(start, velocities)?,
             stage: AdjointStage::new(start, &middle, before, &reached, rule(s))?,
@@ -122,7 +159,7 @@ impl<'a> Transposed<'a> for Adjoint<'_, 'a> {
         let mut previous = f64::INFINITY;
         for _ in 0..ITERATIONS {
             let w = self.stage.solve(split, &v_bar)?;
-            let z_total = s.dt * &z + h * m.frame_velocity(&w);
+            let z_total = s.dt * &z + rule(s).impulse_back(m, &m.frame_velocity(&w));
             // Gradient over q_m of −wᵀ{M v + p_rest − Xᵀ(p̂ + h f)} + zᵀ Δt f, and the rest of the cotangents.
             let mut inner = StepBar::zeros(m);
             let control = &start.input.control;

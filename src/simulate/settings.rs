@@ -78,7 +78,8 @@ settings! {
     /// Error of M_f, relative to √(M_ii M_jj), that the fidelities `reduced` (added to that of the bodies themselves) and `auto`
     /// aim at.
     accuracy: f64 => water.numerics.compress.tolerance, water.numerics.accuracy;
-    /// Whether the water in gaps that compressed bodies don't resolve is added as films (fidelities `reduced` and `auto`; on unless turned off).
+    /// Whether the water in gaps that compressed bodies or panels don't resolve is added as films (fidelities `reduced`, `auto`, and `full` by panels; on
+    /// unless turned off).
     films: bool => water.numerics.films;
     /// Time integrator. `None`: the preset's; for a scene with contact, if that doesn't solve contact,
     /// [`Integrator::MomentumEuler`].

@@ -1,11 +1,11 @@
 //! Second derivatives along one displacement: the tangent of the first.
 
 use super::linearised::{ReducedLinearised, ReducedResponse};
-use super::link::{Apart, PlacedSkeletons};
+use super::link::PlacedSkeletons;
 use super::views::{FLUX, interleave};
 use crate::adjoint::kernel::{potential_hvp, potential_jvp, potential_vjp};
 use crate::adjoint::lie::{Vec3, Vec6, linear, point_velocity, point_wrench, six};
-use crate::coupling::film::MovingFilm;
+use crate::coupling::film::MovingFilms;
 use crate::coupling::pair::vector;
 use crate::coupling::{Direction, Tangent};
 use nalgebra::{DMatrix, DVector};
@@ -25,17 +25,8 @@ pub(super) struct Moved {
     rate: f64,
 }
 
-/// What holds a link apart, if anything does.
-fn moving<'p>(
-    placed: &'p PlacedSkeletons,
-    films: &'p [Option<MovingFilm<'p>>],
-) -> Option<(&'p Apart, &'p MovingFilm<'p>)> {
-    let apart = placed.apart.as_ref()?;
-    Some((apart, films[apart.film].as_ref()?))
-}
-
 impl ReducedLinearised<'_> {
-    fn moved(&self, placed: &PlacedSkeletons, z: &[Vec6], films: &[Option<MovingFilm>]) -> Moved {
+    fn moved(&self, placed: &PlacedSkeletons, z: &[Vec6], films: &MovingFilms) -> Moved {
         let pose = &self.poses[placed.link.target];
         let relative = placed.pair.image.twist(&z[placed.link.source]) - z[placed.link.target];
         let local = pose.twist_to_body(&relative);
@@ -46,7 +37,7 @@ impl ReducedLinearised<'_> {
             0.0
         };
         let arms = placed.pair.displacements(pose, z);
-        let held = moving(placed, films);
+        let held = placed.pair.moving(films);
         let shift = held.map_or(Vec3::zeros(), |(apart, film)| apart.rate(film));
         Moved {
             points: arms.iter().map(|d| d + shift).collect(),
@@ -62,7 +53,7 @@ impl ReducedLinearised<'_> {
         &self,
         alpha: &[&[f64]],
         z: &[Vec6],
-        films: &[Option<MovingFilm>],
+        films: &MovingFilms,
     ) -> (DMatrix<f64>, Vec<(Moved, Vec<f64>)>) {
         let k = alpha.len();
         let one = |placed: &PlacedSkeletons| {
@@ -127,7 +118,7 @@ impl ReducedLinearised<'_> {
         let responses: Vec<_> = directions.into_iter().map(|x| self.respond(x)).collect();
         let n = responses.len();
         let alpha: Vec<&[f64]> = responses.iter().map(|r| r.alpha.as_slice()).collect();
-        let films = self.moving_films(z);
+        let films = self.films.along(z);
         let (psi, seen) = self.tangent_potentials(&alpha, z, &films);
         let (dalpha, dmomenta) = self.tangent_solution(&psi);
         let links: Vec<_> = self.placed.iter().zip(&seen).collect();
@@ -142,22 +133,15 @@ impl ReducedLinearised<'_> {
             let pose = &self.poses[t];
             self.apply(placed, w, f, &mut gradient);
             placed.pair.apply_jvp(pose, w, dw, &z[t], &mut wrench);
-            if let Some((apart, film)) = moving(placed, &films) {
+            if let Some((apart, film)) = placed.pair.moving(&films) {
                 let (w, dw) = apart.wrench_and_rate(film, [f, df]);
                 film.apply_rate((&w, &dw), z, &mut wrench);
             }
         }
         let mut momenta: Vec<DVector<f64>> =
             (0..n).map(|k| dmomenta.column(k).into_owned()).collect();
-        for film in films.iter().flatten() {
-            let flows: Vec<_> = responses.iter().map(|r| film.flow(&r.twists)).collect();
-            let (w, dw) = film.wrench(&flows[0], &flows[n - 1]);
-            film.placed.apply(&w, &mut gradient);
-            film.apply_rate((&w, &dw), z, &mut wrench);
-            for (momentum, flow) in momenta.iter_mut().zip(&flows) {
-                film.add_impulse_rate(flow, momentum);
-            }
-        }
+        let twists: Vec<_> = responses.iter().map(|r| &r.twists).collect();
+        films.add_tangent(&twists, z, (&mut gradient, &mut wrench), &mut momenta);
         Tangent {
             momentum_x: momenta[0].clone(),
             momentum_y: momenta.swap_remove(n - 1),

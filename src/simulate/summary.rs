@@ -126,7 +126,7 @@ impl Rollout {
         let heavy = |b: &usize| {
             let displaced = parameters.density() * system.bodies[*b].volume;
             let free =
-                matches!(system.drives[*b], Drive::Free) && system.tree.links()[*b].v.len() > 0;
+                matches!(system.drives[*b], Drive::Free) && !system.tree.links()[*b].v.is_empty();
             free && displaced > 0.0 && (parameters.mass(*b) - displaced).abs() > 0.01 * displaced
         };
         let first = (0..system.len()).find(heavy)?;

@@ -204,6 +204,7 @@ fn main() {
         }
         let scene = example(name);
         let full = Settings::default().fidelity(Fidelity::Full);
+        let full = full.integrator(Integrator::Rk2);
         let base = full.method(Method::MfsVertex);
         let with = |solver, preconditioner| base.solver(solver).preconditioner(preconditioner);
         let jacobi = Settings {

@@ -1,9 +1,10 @@
 //! Prints the tables of `docs/integrators.md`: energy, momentum and cost of every integrator over the example
-//! scenes. `cargo run --release --example integrators [FACES [SCENE]]`, by default with 320 faces a body.
+//! scenes. `cargo run --release --example integrators [FACES [SCENE]]`, by default with 320 faces a body; `SCENE` may be `long`, for 10⁵ steps, or
+//! `cost`, for what an accuracy costs, which are printed by their names alone.
 
 use hydrograd::adjoint::lie::Vec6;
 use hydrograd::dynamics::Integrator;
-use hydrograd::scene::Scene;
+use hydrograd::scene::{Body, Drag, DragPart, Fluid, Joint, Scene, Shape, Spring};
 use hydrograd::simulate::Sample;
 use hydrograd::{Controls, Fidelity, Result, Rollout, Settings, Simulator};
 use std::path::Path;
@@ -154,10 +155,160 @@ fn orders() -> Result<()> {
     Ok(())
 }
 
+/// Two ellipsoids in each other's water, tied by a spring, tumbling.
+fn tied() -> Scene {
+    let mut scene = Scene::new(Fluid::fresh_water());
+    for (name, semi_axes, x, density) in [
+        ("long", [0.1, 0.06, 0.04], -0.15, 998.0),
+        ("flat", [0.08, 0.08, 0.05], 0.15, 1300.0),
+    ] {
+        let body = Body::new(Shape::ellipsoid(semi_axes).faces(80)).named(name);
+        scene.add(body.density(density).at([x, 0.02, 0.0]));
+    }
+    let spring = Spring::new("long").at([0.0, 0.03, 0.0]);
+    let spring = spring.to("flat", [0.0, -0.03, 0.02]).stiffness(10.0);
+    scene.add_force(spring.rest_length(0.3).into());
+    scene.initial.v = vec![
+        0.02, 0.03, -0.01, 0.5, -1.0, 0.8, -0.01, -0.02, 0.02, 1.0, 0.6, -0.7,
+    ];
+    scene
+}
+
+/// A vehicle with an arm and quadratic drag that sinks in a current, `isolated`.
+fn sinking() -> Scene {
+    let mut scene = Scene::new(Fluid::fresh_water());
+    scene.gravity = [0.0, 0.0, -9.81];
+    scene.fluid.current = [0.5, 0.0, 0.0];
+    let drag = Drag {
+        quadratic_part: DragPart::Total,
+        quadratic: 0.5,
+        ..Drag::default()
+    };
+    let oval = |x, y, z| Shape::ellipsoid([x, y, z]).faces(320);
+    let hull = Body::new(oval(0.4, 0.2, 0.15))
+        .named("hull")
+        .density(1200.0);
+    scene.add(hull.center_of_mass([0.02, 0.0, -0.03]).drag(drag));
+    let arm = Body::new(oval(0.25, 0.05, 0.05))
+        .child_of("hull")
+        .density(1500.0);
+    let arm = arm.at([0.4, 0.0, 0.0]).shape_at([0.25, 0.0, 0.0], [0.0; 3]);
+    let axis = [0.0, 1.0, 0.3];
+    scene.add(arm.joint(Joint::Revolute { axis }).drag(drag));
+    scene.initial.v = vec![1.0, 0.2, 0.0, 0.3, 1.0, -0.5, 1.5];
+    scene
+}
+
+/// Energy errors of 100,000 steps, at the scene's step of 0.01 s: at a tenth of them, and at all.
+fn long() -> Result<()> {
+    println!(
+        "| scene | integrator | energy error in 10,000 steps | in 100,000 | time |\n|---|---|---|---|---|"
+    );
+    let ellipsoid = scene("kirchhoff_ellipsoid")?;
+    for (title, scene, fidelity) in [
+        ("Kirchhoff ellipsoid", ellipsoid, Fidelity::Isolated),
+        ("two tied ellipsoids", tied(), Fidelity::Reduced),
+    ] {
+        let mut first = 0.0;
+        'each: for (integrator, label) in INTEGRATORS {
+            let settings = Settings::default().fidelity(fidelity).time_step(0.01);
+            let simulator = Simulator::new(&scene, settings.integrator(integrator))?;
+            let mut state = simulator.initial()?;
+            let (mut errors, mut largest, mut start) = ([0.0_f64; 2], 0.0_f64, None);
+            let clock = Instant::now();
+            for part in 0..100 {
+                let controls = Controls::zeros(&simulator, 1000);
+                let go = |_| std::ops::ControlFlow::Continue(());
+                let rollout = match simulator.rollout_from(&state, &controls, go) {
+                    Ok(rollout) => rollout,
+                    Err(error) => {
+                        println!("| {title} | {label} | {error} |||");
+                        continue 'each;
+                    }
+                };
+                for s in rollout.samples() {
+                    let start = *start.get_or_insert(s.energy());
+                    largest = largest.max(s.energy().abs());
+                    let error = (s.energy() - start).abs();
+                    errors[1] = errors[1].max(error);
+                    if part < 10 {
+                        errors[0] = errors[0].max(error);
+                    }
+                }
+                state = rollout.states()[1000].clone();
+            }
+            let seconds = clock.elapsed().as_secs_f64();
+            if first == 0.0 {
+                first = seconds;
+            }
+            println!(
+                "| {title} | {label} | {:.1e} | {:.1e} | {:.1} |",
+                errors[0] / largest,
+                errors[1] / largest,
+                seconds / first
+            );
+        }
+    }
+    Ok(())
+}
+
+/// What an accuracy costs: error of q after 2 s against RK4 at a sixteenth of the smallest step, and the time that the run takes, over steps.
+fn cost() -> Result<()> {
+    const TIME: f64 = 2.0;
+    println!(
+        "| scene | integrator | Δt, ms | error of q | µs a step | ms a run |\n|---|---|---|---|---|---|"
+    );
+    for (title, scene, fidelity) in [
+        ("sinking vehicle", sinking(), Fidelity::Isolated),
+        ("two tied ellipsoids", tied(), Fidelity::Reduced),
+    ] {
+        let run = |integrator, dt: f64, repeat: usize| {
+            let settings = Settings::default().fidelity(fidelity).tolerance(1e-12);
+            let settings = settings.integrator(integrator).time_step(dt);
+            let simulator = Simulator::new(&scene, settings)?;
+            let steps = (TIME / dt).round() as usize;
+            let controls = Controls::zeros(&simulator, steps);
+            let (mut least, mut q) = (f64::INFINITY, None);
+            for _ in 0..repeat {
+                let clock = Instant::now();
+                let rollout = simulator.rollout(&controls)?;
+                least = least.min(clock.elapsed().as_secs_f64());
+                q = Some(rollout.samples()[steps].q.clone());
+            }
+            Ok::<_, hydrograd::Error>((q, least, steps))
+        };
+        let (exact, ..) = run(Integrator::Rk4, 0.0025 / 8.0, 1)?;
+        for (integrator, label) in INTEGRATORS {
+            for dt in [0.04, 0.02, 0.01, 0.005, 0.0025] {
+                match run(integrator, dt, 3) {
+                    Ok((q, seconds, steps)) => {
+                        let error = q
+                            .zip(exact.clone())
+                            .map_or(f64::NAN, |(q, e)| (q - e).norm());
+                        println!(
+                            "| {title} | {label} | {:.1} | {error:.1e} | {:.1} | {:.2} |",
+                            1e3 * dt,
+                            1e6 * seconds / steps as f64,
+                            1e3 * seconds
+                        );
+                    }
+                    Err(error) => println!("| {title} | {label} | {:.1} | {error} |||", 1e3 * dt),
+                }
+            }
+        }
+    }
+    Ok(())
+}
+
 fn main() -> Result<()> {
     let mut arguments = std::env::args().skip(1);
     let faces = arguments.next().map_or(320, |f| f.parse().unwrap_or(320));
     let only = arguments.next();
+    match only.as_deref() {
+        Some("long") => return long(),
+        Some("cost") => return cost(),
+        _ => {}
+    }
     let wanted = |name: &str| only.as_deref().is_none_or(|o| o == name);
     println!(
         "| scene | integrator | energy error | momentum drift | time |\n|---|---|---|---|---|"

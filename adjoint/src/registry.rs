@@ -4,7 +4,7 @@ use crate::check::{Outcome, Rung, dot, outcome};
 use crate::contact::{
     Law, PointState, Push, Rates, contact_force, contact_force_jvp, contact_force_vjp,
 };
-use crate::drag::{Element, Part, quadratic_drag, quadratic_drag_jvp, quadratic_drag_vjp};
+use crate::drag::{Element, Part, Surface, quadratic_drag, quadratic_drag_jvp, quadratic_drag_vjp};
 use crate::draw::numbers;
 use crate::lie::{
     Mat6, Vec3, Vec6, exp_jacobian_inverse, exp_jacobian_inverse_jvp, exp_jacobian_inverse_vjp,
@@ -178,15 +178,15 @@ fn surface() -> Vec<Element> {
 const NU: [f64; 6] = [0.9, -0.8, 0.5, 0.4, 0.3, -0.2];
 
 fn quadratic_drag_jvp_check(corruption: f64) -> Outcome {
-    let surface = surface();
     all(PARTS.into_iter().flat_map(|part| {
+        let surface = Surface::new(&surface(), part);
         let value = |x: &[f64]| {
-            quadratic_drag(&surface, part, &Vec6::from_column_slice(x))
+            quadratic_drag(&surface, &Vec6::from_column_slice(x))
                 .as_slice()
                 .to_vec()
         };
         let along = |dnu: [f64; 6]| {
-            let jvp = quadratic_drag_jvp(&surface, part, &Vec6::from(NU), &Vec6::from(dnu));
+            let jvp = quadratic_drag_jvp(&surface, &Vec6::from(NU), &Vec6::from(dnu));
             outcome(value, &NU, &dnu, (corruption * jvp).as_slice(), TOLERANCE)
         };
         (60..68)
@@ -196,18 +196,18 @@ fn quadratic_drag_jvp_check(corruption: f64) -> Outcome {
 }
 
 fn quadratic_drag_vjp_check(corruption: f64) -> Outcome {
-    let surface = surface();
     all(PARTS.map(|part| {
+        let surface = Surface::new(&surface(), part);
         transposed::<6>(
             |x| {
-                quadratic_drag(&surface, part, &Vec6::from_column_slice(x))
+                quadratic_drag(&surface, &Vec6::from_column_slice(x))
                     .as_slice()
                     .to_vec()
             },
             &NU,
             |bar| {
                 let bar = Vec6::from_column_slice(bar);
-                quadratic_drag_vjp(&surface, part, &Vec6::from(NU), &bar)
+                quadratic_drag_vjp(&surface, &Vec6::from(NU), &bar)
                     .as_slice()
                     .to_vec()
             },

@@ -82,6 +82,15 @@ const KEPT: [(&str, [[f64; 4]; 8]); 6] = [
     ),
 ];
 
+/// A brick 1 × 0.6 × 0.3 tilted by 0.1 rad over a wall; one row for each of [`super::HELD_OUT`].
+pub const TILTED: [[f64; 4]; 5] = [
+    [0.378054, -1.179822, 4.2e-3, 7.2e-3],
+    [0.520128, -4.898593, 4.5e-3, 7.7e-3],
+    [0.701043, -16.219289, 5.0e-3, 8.6e-3],
+    [0.847141, -39.315827, 5.4e-3, 8.8e-3],
+    [0.968304, -93.549513, 5.7e-3, 8.8e-3],
+];
+
 /// The rows of a case.
 pub fn of(case: &str) -> Option<&'static [[f64; 4]; 8]> {
     let (_, rows) = KEPT.iter().find(|(name, _)| *name == case)?;

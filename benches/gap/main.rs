@@ -1,7 +1,7 @@
 //! Bodies that come near one another: added mass along the gap, and its slope, by every fidelity against references ([`references`]).
 //!
 //! `cargo bench --bench gap [-- CASE …] [--quick] [--plot]`: the cases whose names contain one of the words, or all. `--quick` with fewer gaps;
-//! `--references` finds the references again; `--plot` writes the errors to docs/gap.svg as well. `--estimates` holds what runs estimate their errors to be against
+//! `--references` finds the references again; `--plot` writes the errors to docs/gap.svg as well; `--faces=320` with other faces a body than 1280. `--estimates` holds what runs estimate their errors to be against
 //! them, on these cases and on others; `--accuracy` varies that for a sphere over a wall; `--time` has what films cost: evaluations and steps with them beside the same
 //! without, and far apart. Gaps are in units of a radius or half a side; masses over the water's
 //! density, m³, slopes m².
@@ -38,9 +38,16 @@ struct Case {
 }
 
 const GAPS: [f64; 8] = [1.0, 0.5, 0.2, 0.1, 0.05, 0.025, 0.01, 0.001];
+/// Of the cases that the estimates of errors weren't fitted to.
+const HELD_OUT: [f64; 5] = [0.3, 0.1, 0.03, 0.01, 0.003];
 const QUICK: [f64; 4] = [0.5, 0.1, 0.025, 0.001];
 /// Faces of a body.
-const FACES: usize = 1280;
+fn faces() -> usize {
+    let given = arguments()
+        .into_iter()
+        .find_map(|a| a.strip_prefix("--faces=")?.parse().ok());
+    given.unwrap_or(1280)
+}
 
 fn cases() -> Vec<Case> {
     let flat = [[0.0; 3]; 2];
@@ -115,9 +122,10 @@ impl Case {
         if let Some(Reference { values, unsure }) = references::of(self.name, gap) {
             return Ok((values, [0, 1].map(|k| unsure[k] * values[k].abs())));
         }
-        let finest = if self.shapes.len() == 1 { 1280 } else { 720 };
-        let coarse = self.along(gap * self.size, &panels(finest / 4))?;
-        let fine = self.along(gap * self.size, &panels(finest))?;
+        // Films aren't to be held against films.
+        let finest = if self.shapes.len() == 1 { 2880 } else { 1440 };
+        let of = |faces| self.along(gap * self.size, &panels(faces).films(false));
+        let (coarse, fine) = (of(finest / 4)?, of(finest)?);
         let limit = |k: usize| {
             // The error falls with one over the number of faces, about.
             let rest = (fine[k] - coarse[k]) / 3.0;
@@ -133,11 +141,12 @@ fn panels(faces: usize) -> Settings {
     full.method(Method::Panel).faces(faces)
 }
 
-fn configurations() -> [(&'static str, Settings); 5] {
-    let of = |fidelity| Settings::default().fidelity(fidelity).faces(FACES);
+fn configurations() -> [(&'static str, Settings); 6] {
+    let of = |fidelity| Settings::default().fidelity(fidelity).faces(faces());
     let full = of(Fidelity::Full);
     [
-        ("panels", panels(FACES)),
+        ("panels, no films", panels(faces()).films(false)),
+        ("panels", panels(faces())),
         ("fundamental solutions", full.method(Method::MfsVertex)),
         ("reduced, no films", of(Fidelity::Reduced).films(false)),
         ("reduced", of(Fidelity::Reduced)),
@@ -193,12 +202,13 @@ fn held_out() -> Vec<Case> {
 
 /// Holds the estimates of a run's errors against those: prints all, the least of estimate over error, and the median.
 fn estimates(cases: &[Case], gaps: &[f64]) -> Result<()> {
-    let of = |fidelity| Settings::default().fidelity(fidelity).faces(FACES);
+    let of = |fidelity| Settings::default().fidelity(fidelity).faces(faces());
     let configurations = [
         ("reduced, no films", of(Fidelity::Reduced).films(false)),
         ("reduced", of(Fidelity::Reduced)),
         ("auto", of(Fidelity::Auto)),
-        ("panels", panels(FACES)),
+        ("panels, no films", panels(faces()).films(false)),
+        ("panels", panels(faces())),
     ];
     let mut ratios = vec![[Vec::new(), Vec::new()]; configurations.len()];
     for case in cases {
@@ -260,7 +270,7 @@ fn accuracies() -> Result<()> {
             let given = accuracy.map_or("default".into(), |a| format!("{a:.0e}"));
             let mut line = format!("| {gap} | {given} |");
             for fidelity in [Fidelity::Reduced, Fidelity::Auto] {
-                let mut settings = Settings::default().fidelity(fidelity).faces(FACES);
+                let mut settings = Settings::default().fidelity(fidelity).faces(faces());
                 settings.accuracy = accuracy;
                 let found = case.along(gap, &settings)?;
                 let said = case.estimate(gap, &settings)?.map_or(f64::NAN, |e| e[1]);
@@ -286,17 +296,15 @@ fn least<T>(rounds: usize, calls: &mut [&mut dyn FnMut() -> Result<T>]) -> Resul
     Ok(out)
 }
 
-/// What films cost: evaluations of each case at a gap of 0.05, and steps of the grippers, beside the same without films; and of the case at a gap of 1, where there are none.
-fn times(cases: &[Case], words: &[String], quick: bool) -> Result<()> {
-    let rounds = if quick { 50 } else { 400 };
-    let reduced = Settings::default().fidelity(Fidelity::Reduced).faces(FACES);
+/// What films cost: evaluations of each case with `settings` at a gap where there are some, beside the same without films; and of the case at a gap of 1, where there are none.
+fn case_times(cases: &[Case], narrow: f64, settings: &Settings, rounds: usize) -> Result<()> {
     println!(
-        "| case | value: far, no films, films (ms), films/far | with the force | step | with gradient |\n|---|---|---|---|---|"
+        "\n| case | value: far, no films, films (ms), films/far | with the force | step | with gradient |\n|---|---|---|---|---|"
     );
     for case in cases {
-        let configurations = [(1.0, true), (0.05, false), (0.05, true)];
+        let configurations = [(1.0, true), (narrow, false), (narrow, true)];
         let of = |(gap, films): (f64, bool)| {
-            Simulator::new(&case.scene(gap * case.size), reduced.films(films))
+            Simulator::new(&case.scene(gap * case.size), settings.clone().films(films))
         };
         let simulators = configurations
             .map(of)
@@ -327,7 +335,7 @@ fn times(cases: &[Case], words: &[String], quick: bool) -> Result<()> {
             row(&least(rounds, &mut calls)?);
         }
         let [mut forward, mut whole] = [vec![f64::INFINITY; 3], vec![f64::INFINITY; 3]];
-        for _ in 0..rounds / 10 {
+        for _ in 0..rounds.div_ceil(10) {
             for (k, simulator) in simulators.iter().enumerate() {
                 let effort = Effort {
                     steps: 10,
@@ -342,6 +350,17 @@ fn times(cases: &[Case], words: &[String], quick: bool) -> Result<()> {
         row(&whole);
         println!("{line}");
     }
+    Ok(())
+}
+
+/// What films cost with `reduced` at a gap of 0.05 and with panels at one of 0.01, and steps of the grippers.
+fn times(cases: &[Case], words: &[String], quick: bool) -> Result<()> {
+    let rounds = if quick { 50 } else { 400 };
+    let reduced = Settings::default()
+        .fidelity(Fidelity::Reduced)
+        .faces(faces());
+    case_times(cases, 0.05, &reduced, rounds)?;
+    case_times(cases, 0.01, &panels(faces()), rounds / 10)?;
     println!("\n| scene | step: no films, films (ms), ratio | with gradient |\n|---|---|---|");
     let named = |name: &&str| words.is_empty() || words.iter().any(|w| name.contains(w.as_str()));
     for name in ["grasp", "gripper"].into_iter().filter(named) {
@@ -403,10 +422,10 @@ fn main() -> std::result::Result<(), Box<dyn std::error::Error>> {
     if has("--estimates") {
         let chosen = picked();
         println!(
-            "| case | gap, m | reduced, no films | reduced | auto | panels |\n|---|---|---|---|---|---|"
+            "| case | gap, m | reduced, no films | reduced | auto | panels, no films | panels |\n|---|---|---|---|---|---|---|"
         );
         estimates(&chosen, gaps)?;
-        estimates(&held_out(), &[0.3, 0.1, 0.03, 0.01, 0.003])?;
+        estimates(&held_out(), &HELD_OUT)?;
         println!("\n{:.0} s", begin.elapsed().as_secs_f64());
         return Ok(());
     }
@@ -462,7 +481,7 @@ fn plot(file: &Path, all: &[Errors]) -> std::result::Result<(), Box<dyn std::err
     let rows = all.len().div_ceil(COLUMNS);
     let area = SVGBackend::new(file, (1120, 260 * rows as u32)).into_drawing_area();
     area.fill(&WHITE)?;
-    let colors = [BLACK, RED, BLUE, MAGENTA, CYAN];
+    let colors = [GREEN, BLACK, RED, BLUE, MAGENTA, CYAN];
     for (part, errors) in area.split_evenly((rows, COLUMNS)).iter().zip(all) {
         let mut chart = ChartBuilder::on(part)
             .margin(8)

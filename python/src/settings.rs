@@ -61,7 +61,7 @@ pub struct Keywords<'a> {
     pub rank: Option<usize>,
     /// Smallest gap resolved, m.
     pub resolved_gap: Option<f64>,
-    /// Whether gaps that compressed bodies don't resolve have films: unless told not to.
+    /// Whether gaps that compressed bodies or panels don't resolve have films: unless told not to.
     pub films: Option<bool>,
     /// What computes the coupling.
     pub backend: Option<&'a str>,

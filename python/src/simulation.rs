@@ -490,6 +490,12 @@ impl Simulator {
         self.inner.choices().integrator.into()
     }
 
+    /// What was chosen, and why: by "auto", and of an integrator that stands in for the default, which doesn't solve contact.
+    #[getter]
+    fn reasons(&self) -> Vec<String> {
+        self.inner.reasons().to_vec()
+    }
+
     /// The gaps at which surfaces are taken to touch, m, by pair of names: of two bodies, or of one and None for a wall. Empty where the scene
     /// has no contact.
     #[getter]
@@ -512,6 +518,9 @@ impl Simulator {
     #[getter]
     fn warnings(&self) -> Vec<String> {
         let start = self.inner.start_gap_warning();
+        let start = start
+            .into_iter()
+            .chain(self.inner.start_stiffness_warning());
         self.inner.warnings().iter().cloned().chain(start).collect()
     }
 

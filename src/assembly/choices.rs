@@ -13,6 +13,9 @@ pub struct Choices {
     pub water: WaterChoices,
     /// How time is stepped.
     pub integrator: Integrator,
+    /// The preset's integrator, where another stands in for it because it doesn't solve contact.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub in_place_of: Option<Integrator>,
     /// Time step, s.
     pub time_step: f64,
 }
@@ -26,6 +29,7 @@ impl Choices {
                 Preset::Default => Integrator::default(),
                 Preset::Paper => Integrator::VelocityEuler,
             },
+            in_place_of: None,
             time_step,
         }
     }

@@ -1,5 +1,6 @@
 //! Contact of a scene: which surfaces may touch, at which gap, and how stiffly.
 
+use super::Choices;
 use crate::adjoint::contact::Law;
 use crate::adjoint::lie::{Pose, Vec3};
 use crate::contact::{ContactPair, ContactShape, Contacts};
@@ -30,7 +31,17 @@ pub(super) fn check_integrator(scene: &Scene, integrator: Integrator) -> Result<
     if !scene.has_contact() || integrator.solves_contact() {
         return Ok(());
     }
-    let what = match (
+    let what = solved(scene);
+    Err(Error::Unsupported {
+        what: format!("{what} with the integrator {integrator:?}"),
+        why: "contact, limits of joints and viscous water in gaps are solved in the velocity that a step moves by, and this one has none".into(),
+        instead: "use the integrator momentum-euler, energy-euler, midpoint or velocity-euler".into(),
+    })
+}
+
+/// What of a scene is solved with contact.
+fn solved(scene: &Scene) -> String {
+    match (
         scene.contact,
         scene.limited().next(),
         scene.lubrications().next(),
@@ -38,12 +49,16 @@ pub(super) fn check_integrator(scene: &Scene, integrator: Integrator) -> Result<
         (None, Some((b, _)), _) => format!("limits of body {:?}", scene.bodies[b].name),
         (None, None, Some((i, _))) => format!("{:?}", scene.force_name(i)),
         _ => "contact".into(),
-    };
-    Err(Error::Unsupported {
-        what: format!("{what} with the integrator {integrator:?}"),
-        why: "contact, limits of joints and viscous water in gaps are solved in the velocity that a step moves by, and this one has none".into(),
-        instead: "use the integrator momentum-euler, energy-euler, midpoint or velocity-euler".into(),
-    })
+    }
+}
+
+/// Why another integrator stands in for the preset's, where one does.
+pub(super) fn stand_in(scene: &Scene, choices: &Choices) -> Option<String> {
+    let [used, instead] = [choices.integrator, choices.in_place_of?].map(<&str>::from);
+    Some(format!(
+        "the integrator {used}, of first order, in place of {instead}: {} asks for one that solves contact; midpoint does, too, and is of second order where nothing presses",
+        solved(scene)
+    ))
 }
 
 /// Contact as `given`, of bodies with these surfaces, at steps of `dt` s; its parameters are set.

@@ -11,7 +11,7 @@ use crate::adjoint::drag::Element;
 use crate::adjoint::lie::Vec3;
 use crate::coupling::Isolated;
 use crate::dynamics::{
-    BodyData, Declarations, Drive, FreeMotions, Parameters, Stepper, System, force,
+    BodyData, Declarations, Drift, Drive, FreeMotions, Parameters, Stepper, System, force,
 };
 use crate::geometry::TriMesh;
 use crate::memory;
@@ -172,11 +172,13 @@ pub(crate) fn assemble(
     let mut declared = Declarations::new(scene.fluid.density, inertias);
     let forces = force::assemble(&parts, &mut declared);
     let mut parameters = declared.finish();
+    let current = Vec3::from(scene.fluid.current);
     let mut system = System {
         bodies,
+        drift: Drift::new(&tree, |b| drives[b] == Drive::Free, &current),
         drives,
         forces,
-        current: Vec3::from(scene.fluid.current),
+        current,
         controls,
         coupling: Arc::new(Isolated::new(Vec::new())),
         contact: None,
@@ -195,6 +197,7 @@ pub(crate) fn assemble(
     }
     let mut water = water::prepare(scene, &choices.water, in_water, &poses, clearance, folder)?;
     system.coupling = water.coupling.clone();
+    water.reasons.extend(contact::stand_in(scene, choices));
     if let Some(given) = &scene.contact {
         let made = contact::assemble(scene, given, dt, &water, &surfaces, &mut parameters)?;
         let told = contact::warnings(scene, given, &water, &surfaces, &made);

@@ -19,11 +19,23 @@ pub(super) fn kept(
     system: &System,
     parameters: &Parameters,
 ) -> FreeMotions {
-    let mut groups = groups(scene, coupled, system);
-    for group in &mut groups {
-        group.refused += acting(system, parameters, &group.roots);
+    let kept = |mut groups: Vec<Group>| {
+        for group in &mut groups {
+            group.refused += acting(system, parameters, &group.roots);
+        }
+        free_motions(&system.tree, &system.drives, &groups)
+    };
+    let groups = groups(scene, coupled, system);
+    // Springs and what touches act between groups: all of them together then keep what each alone doesn't.
+    let together = Group {
+        roots: groups.iter().flat_map(|g| g.roots.clone()).collect(),
+        refused: groups.iter().map(|g| g.refused).sum(),
+    };
+    let [apart, together] = [groups, vec![together]].map(kept);
+    match together.twists.len() > apart.twists.len() {
+        true => together,
+        false => apart,
     }
-    free_motions(&system.tree, &system.drives, &groups)
 }
 
 /// Bodies in the same water, and each tree of joints outside of it.

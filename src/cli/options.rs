@@ -34,7 +34,8 @@ pub(super) struct Water {
     /// With `reduced` alone: smallest gap in m that compressed bodies resolve [default: from each body's size].
     #[arg(long, value_name = "GAP", value_parser = length, allow_negative_numbers = true)]
     pub resolved_gap: Option<f64>,
-    /// With `reduced` and `auto`: leave the water in gaps that compressed bodies don't resolve to them, instead of adding it as films, down to contact.
+    /// With `reduced`, `auto`, and `full` by panels: leave the water in gaps that compressed bodies or panels don't resolve to them, instead of adding it as films,
+    /// down to contact.
     #[arg(long)]
     pub no_films: bool,
     /// Folder that keeps compressed bodies for the next time.
@@ -108,7 +109,7 @@ pub(super) struct Simulation {
     /// Time step in s [default: the scene's own].
     #[arg(long, value_name = "DT", allow_negative_numbers = true)]
     time_step: Option<f64>,
-    /// How a step is taken [default: rk2, momentum-euler with contact; velocity-euler with the preset paper].
+    /// How a step is taken [default: rk4, momentum-euler with contact; velocity-euler with the preset paper].
     #[arg(long, value_parser = choice::<Integrator>())]
     integrator: Option<Integrator>,
 }

@@ -30,7 +30,7 @@ mod tensor;
 
 pub use exclude::Exclusions;
 pub use isolated::Isolated;
-pub use panel::{ExtrapolatedPanels, PanelCoupled, PanelModel};
+pub use panel::{ExtrapolatedPanels, FilmedPanels, PanelCoupled, PanelModel};
 pub use response::{CoupledResponse, Reached};
 pub use tensor::PairTensor;
 
@@ -67,6 +67,19 @@ pub trait Coupling: Send + Sync {
     /// # Errors
     /// As [`Coupling::evaluate`].
     fn residual(&self, _poses: &[Pose], _basis: &DMatrix<f64>) -> Result<Option<DMatrix<f64>>> {
+        Ok(None)
+    }
+
+    /// What films in narrow gaps add to the impulses of body-frame twists, 6·bodies × columns, at density 1. `None` where there are no films whatever
+    /// the gaps.
+    ///
+    /// # Errors
+    /// Bodies that touch.
+    fn film_momenta(
+        &self,
+        _poses: &[Pose],
+        _twists: &DMatrix<f64>,
+    ) -> Result<Option<DMatrix<f64>>> {
         Ok(None)
     }
 

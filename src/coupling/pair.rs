@@ -2,6 +2,7 @@
 
 use crate::adjoint::kernel::Sources;
 use crate::adjoint::lie::{Pose, Vec3, Vec6, cross_force, point_velocity, point_wrench};
+use crate::coupling::film::{Apart, MovingFilm, MovingFilms, PlacedFilm, PlacedFilms};
 use crate::geometry::Image;
 
 /// One pair at given poses.
@@ -16,6 +17,8 @@ pub(super) struct Pair {
     pub points: Sources,
     /// The same as vectors, where they aren't held off.
     pub positions: Vec<Vec3>,
+    /// By how much they are.
+    apart: Option<Apart>,
 }
 
 impl Pair {
@@ -36,16 +39,37 @@ impl Pair {
             image: *image,
             points: Sources::new(&positions),
             positions,
+            apart: None,
         }
     }
 
-    /// Moves all sources as they are seen by `shift`, target's frame; their arms stay those of the bodies' own points.
-    pub fn hold_off(&mut self, shift: &Vec3) {
-        let moved: Vec<Vec3> = self.positions.iter().map(|s| s + shift).collect();
-        self.points = Sources::new(&moved);
+    /// The same with the sources as far off as a film holds them, if one does; their arms stay those of the bodies' own points.
+    pub fn held_off(mut self, films: &PlacedFilms) -> Self {
+        self.apart = films.apart(self.target, self.source, &self.image);
+        if let Some((apart, film)) = self.film(films) {
+            let shift = apart.shift(film);
+            let moved: Vec<Vec3> = self.positions.iter().map(|s| s + shift).collect();
+            self.points = Sources::new(&moved);
+        }
+        self
     }
 
-    /// Displacement of each source in the target's frame, relative to the target.
+    /// What holds the sources off, if anything does.
+    pub fn film<'f, 'a>(&self, films: &'f PlacedFilms<'a>) -> Option<(Apart, &'f PlacedFilm<'a>)> {
+        self.apart
+            .and_then(|apart| Some((apart, films.of(&apart)?)))
+    }
+
+    /// The same along a displacement.
+    pub fn moving<'f, 'a>(
+        &self,
+        films: &'f MovingFilms<'a>,
+    ) -> Option<(Apart, &'f MovingFilm<'a>)> {
+        self.apart
+            .and_then(|apart| Some((apart, films.of(&apart)?)))
+    }
+
+    /// Displacement of each source in the target's frame, relative to the target, where they aren't held off.
     pub fn displacements(&self, pose: &Pose, z: &[Vec6]) -> Vec<Vec3> {
         let relative = self.image.twist(&z[self.source]) - z[self.target];
         let local = pose.twist_to_body(&relative);

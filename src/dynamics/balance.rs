@@ -9,6 +9,8 @@
 //! ẑᵀ f = Σ_b Z_b · ḣ_b + D_b · h_b + ẑᵀ X⁻ᵀ τ
 //! ```
 //!
+//! Of what may drift with the water h_r is the momentum relative to its drift W, and W ×* h_r is part of ḣ_b ([`super::drift`]).
+//!
 //! For a joint to the world the second term vanishes, and with no external force the sum of momenta is
 //! kept to round-off by any integrator that is linear in f.
 
@@ -196,6 +198,16 @@ impl Evaluation<'_> {
         forces.map(|f| f.potential_energy(&self.place())).sum()
     }
 
+    /// Adds W ×* I (V − W), of bodies that move by `drifting` relative to W.
+    fn add_drift(&self, drifting: &[Vec6], rates: &mut [Vec6]) {
+        for (b, rate) in rates.iter_mut().enumerate() {
+            let drift = self.system.drift.of(b);
+            if *drift != Vec6::zeros() {
+                *rate += cross_force(drift, &self.rigid_momentum(b, &drifting[b]));
+            }
+        }
+    }
+
     /// Projects momenta and their rates on the rotating frame columns.
     fn project_frame(&self, twists: &[Vec6], momenta: Vec<Vec6>, rates: Vec<Vec6>) -> DVector<f64> {
         let tree = &self.system.tree;
@@ -271,56 +283,65 @@ impl Linearisation<'_> {
         let pose_force = self.pose_force(&direction)?;
         let current = self.current_twist();
         let mut loads = self.loads(&twists, v, control);
+        let drifting = self.drifting(&twists);
         for (b, rate) in loads.wrenches.iter_mut().enumerate() {
             *rate += rho * (pose_force[b] + cross_force(&current, &fluid[b]));
         }
-        let momenta = self.with_rigid(&twists, &fluid);
+        self.add_drift(&drifting, &mut loads.wrenches);
+        let momenta = self.with_rigid(&drifting, &fluid);
         let out = self.project_frame(&twists, momenta, loads.wrenches);
         Ok(out + self.frame_dual(&loads.joints))
     }
 
-    /// Tangent of [`Linearisation::force`] along `dv` at fixed q and u, with the change of the fluid's pose force on the
+    /// Tangents of [`Linearisation::force`] along `changes` of v at fixed q and u, each with the change of the fluid's pose force on the
     /// submerged bodies.
     fn force_jvp(
         &self,
         v: &DVector<f64>,
         control: &DVector<f64>,
-        dv: &DVector<f64>,
-        dpose_force: &[Vec6],
-    ) -> DVector<f64> {
+        changes: &[DVector<f64>],
+        dpose_forces: &[Vec<Vec6>],
+    ) -> Vec<DVector<f64>> {
         let tree = &self.system.tree;
         let rho = self.parameters.density();
         let twists = tree.twists(&self.kinematics, v);
-        let dtwists = tree.twists(&self.kinematics, dv);
         let fluid = self.fluid_momenta(&self.through_water(v));
-        let dfluid = self.fluid_momenta(&self.virtual_direction(dv));
-        let dpose_force = match self.acting() {
-            Some(_) => self.from_submerged(dpose_force),
-            None => vec![Vec6::zeros(); self.system.len()],
-        };
+        let momenta = self.with_rigid(&self.drifting(&twists), &fluid);
         let current = self.current_twist();
-        let mut dloads = Loads::zeros(twists.len(), v.len());
+        let none = vec![Vec6::zeros(); twists.len()];
+        let along: Vec<Vec<Vec6>> = (changes.iter())
+            .map(|dv| tree.twists(&self.kinematics, dv))
+            .collect();
+        let velocities: Vec<Velocity> = (changes.iter().zip(&along))
+            .map(|(v, twists)| Velocity { twists, v })
+            .collect();
+        let mut dloads: Vec<Loads> = (changes.iter())
+            .map(|_| Loads::zeros(twists.len(), v.len()))
+            .collect();
         let at = self.moving(&twists, v, control);
-        let change = Velocity {
-            twists: &dtwists,
-            v: dv,
-        };
         for force in self.system.smooth_forces() {
-            force.jvp(&at, &change, &mut dloads);
+            force.jvps(&at, &velocities, &mut dloads);
         }
-        for (b, drate) in dloads.wrenches.iter_mut().enumerate() {
-            *drate += rho * (dpose_force[b] + cross_force(&current, &dfluid[b]));
-        }
-        let (momenta, dmomenta) = (
-            self.with_rigid(&twists, &fluid),
-            self.with_rigid(&dtwists, &dfluid),
-        );
-        let out = self.project_frame(&twists, dmomenta, dloads.wrenches)
-            + self.project_frame(&dtwists, momenta, vec![Vec6::zeros(); twists.len()]);
-        match dloads.joints.iter().all(|x| *x == 0.0) {
-            true => out,
-            false => out + self.frame_dual(&dloads.joints),
-        }
+        let each = changes.iter().zip(&along).zip(dloads).zip(dpose_forces);
+        each.map(|(((dv, dtwists), mut dloads), dpose_force)| {
+            let dfluid = self.fluid_momenta(&self.virtual_direction(dv));
+            let dpose_force = match self.acting() {
+                Some(_) => self.from_submerged(dpose_force),
+                None => none.clone(),
+            };
+            for (b, drate) in dloads.wrenches.iter_mut().enumerate() {
+                *drate += rho * (dpose_force[b] + cross_force(&current, &dfluid[b]));
+            }
+            self.add_drift(dtwists, &mut dloads.wrenches);
+            let dmomenta = self.with_rigid(dtwists, &dfluid);
+            let out = self.project_frame(&twists, dmomenta, dloads.wrenches)
+                + self.project_frame(dtwists, momenta.clone(), none.clone());
+            match dloads.joints.iter().all(|x| *x == 0.0) {
+                true => out,
+                false => out + self.frame_dual(&dloads.joints),
+            }
+        })
+        .collect()
     }
 
     /// ∂f/∂v, column by column.
@@ -337,10 +358,15 @@ impl Linearisation<'_> {
             Some(water) => water.linearised.gradient_columns(&self.through_water(v))?,
             None => vec![Vec::new(); n],
         };
+        let unit = |k: usize| DVector::from_fn(n, |i, _| f64::from(i == k));
+        let units: Vec<DVector<f64>> = (0..n).map(unit).collect();
         let mut out = DMatrix::zeros(n, n);
-        for (k, changed) in changed.iter().enumerate().take(n) {
-            let unit = DVector::from_fn(n, |i, _| f64::from(i == k));
-            out.set_column(k, &self.force_jvp(v, control, &unit, changed));
+        for (k, column) in self
+            .force_jvp(v, control, &units, &changed)
+            .iter()
+            .enumerate()
+        {
+            out.set_column(k, column);
         }
         Ok(out)
     }
@@ -395,7 +421,8 @@ impl Linearisation<'_> {
             fields.push(next);
         }
         let twist = &fields[0].twist;
-        let momenta = twist.iter().enumerate();
+        let drifting = self.drifting(twist);
+        let momenta = drifting.iter().enumerate();
         let momenta: Vec<Vec6> = momenta.map(|(b, v)| self.rigid_momentum(b, v)).collect();
         let loads = self.loads(twist, v, control);
         let mut out = vec![ForceCotangents::zeros(self); z.len()];
@@ -405,13 +432,16 @@ impl Linearisation<'_> {
                 if rows.skips(fields, b) {
                     continue;
                 }
-                // D · h_r, with the rigid momentum h_r = I V constant in the body's frame.
+                // (D − W × Z) · h_r, with the rigid momentum h_r = I (V − W), I constant in the body's frame.
+                let (drift, relative) = (self.system.drift.of(b), &drifting[b]);
+                let turning = &(turning - cross_motion(drift, &fields.virtual_twist[b]));
                 let (h, h_turning) = (momenta[b], self.rigid_momentum(b, turning));
                 bar.turning[b] += h;
+                bar.virtual_twist[b] += cross_force(drift, &h);
                 bar.twist[b] += h_turning;
-                bar.pose[b] -= cross_force(&twist[b], &h_turning) + cross_force(turning, &h);
+                bar.pose[b] -= cross_force(relative, &h_turning) + cross_force(turning, &h);
                 if rows.by_parameters() {
-                    rigid_parameters_vjp(self, b, turning, &twist[b], &mut out.parameters);
+                    rigid_parameters_vjp(self, b, turning, relative, &mut out.parameters);
                 }
             }
             // Z · wrenches + ẑᵀ X⁻ᵀ τ.

@@ -29,7 +29,7 @@ pub struct Evaluation<'a> {
     fluid_momenta: Vec<DMatrix<f64>>,
     /// M(q) = M_r + Jᵀ M_f J, user coordinates.
     pub mass_matrix: DMatrix<f64>,
-    /// Generalised momentum at v = 0, from the current.
+    /// Generalised momentum at v = 0, from the current: of the water, and of the bodies relative to what may drift.
     pub rest_momentum: DVector<f64>,
     report: CouplingReport,
 }
@@ -192,6 +192,8 @@ impl<'a> Evaluation<'a> {
             mass_matrix += j.tr_mul(&momenta);
             if system.has_current() {
                 rest_momentum += parameters.density() * j.tr_mul(&fluid_momenta[b].column(nv));
+                let drift = pose.twist_to_body(system.drift.of(b));
+                rest_momentum -= j.tr_mul(&pose.wrench_to_world(&(rigid[b] * drift)));
             }
         }
         let mass_matrix = 0.5 * (&mass_matrix + mass_matrix.transpose());
@@ -279,6 +281,14 @@ impl<'a> Evaluation<'a> {
         out
     }
 
+    /// Twists of the bodies relative to what may drift with the water ([`Drift`](super::Drift)).
+    pub(super) fn drifting(&self, twists: &[Vec6]) -> Vec<Vec6> {
+        let drift = &self.system.drift;
+        (twists.iter().enumerate())
+            .map(|(b, twist)| twist - drift.of(b))
+            .collect()
+    }
+
     /// Total spatial momenta of the bodies, rigid and fluid, at velocity `v`.
     pub fn momenta(&self, v: &DVector<f64>) -> Vec<Vec6> {
         let twists = self.system.tree.twists(&self.kinematics, v);
@@ -294,19 +304,22 @@ impl<'a> Evaluation<'a> {
     }
 
     /// Total momentum and angular momentum about the world origin of bodies and fluid at velocity `v`,
-    /// given the bodies' momenta there. A tree on a free joint counts with its frame momentum, which M(q) v yields to
+    /// given the bodies' momenta there. A tree on a free joint counts with its frame momentum and what drifts besides, which M(q) v yields to
     /// round-off; the sum of the bodies' is as exact as the coupling's solve.
     pub fn total_momentum(&self, v: &DVector<f64>, momenta: &[Vec6]) -> Vec6 {
         let tree = &self.system.tree;
         let composite = tree.composite(momenta.to_vec());
         let hat = self.frame_momentum(v);
+        let drift = &self.system.drift;
+        let drifting = (0..self.system.len()).map(|b| self.rigid_momentum(b, drift.of(b)));
+        let drifting = tree.composite(drifting.collect());
         let mut total = Vec6::zeros();
         for (b, link) in tree.links().iter().enumerate() {
             total += match (link.parent, link.joint.is_free()) {
                 (Some(_), _) => Vec6::zeros(),
                 (None, true) => {
                     let own = hat.fixed_rows::<6>(link.v.start).into_owned();
-                    link.placement.wrench_to_world(&own)
+                    link.placement.wrench_to_world(&own) + drifting[b]
                 }
                 (None, false) => composite[b],
             };

@@ -7,6 +7,7 @@ mod contact;
 mod contact_force;
 mod cotangents;
 mod damping;
+mod drift;
 mod evaluation;
 pub mod force;
 mod integrator;
@@ -15,12 +16,14 @@ mod linearisation;
 mod momentum;
 mod parameters;
 mod slopes;
+mod stiffness;
 mod symmetry;
 mod system;
 
 pub use body::BodyData;
 pub use contact::{ContactForce, ContactGap, ContactModel, Dual, PairContact};
 pub use cotangents::ForceCotangents;
+pub use drift::Drift;
 pub use evaluation::Evaluation;
 pub use integrator::{
     ContactVelocities, Input, Integrator, LinearisedStep, State, StateBar, StateTangents, StepBar,
@@ -30,6 +33,7 @@ pub use limit::JointLimit;
 pub use linearisation::Linearisation;
 pub use parameters::{Declarations, Declared, Entry, Owner, Parameter, Parameters, Range, Typical};
 pub use slopes::{InputTangents, Slopes};
+pub use stiffness::Damping;
 pub use symmetry::FreeMotions;
 pub(crate) use symmetry::{Group, free_motions, refuse, refuse_tilt};
 pub use system::{Drive, System};

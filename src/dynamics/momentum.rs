@@ -26,9 +26,19 @@ impl Pair<'_> {
 }
 
 impl Evaluation<'_> {
-    /// Generalised momentum at velocity `v`, user coordinates (kg m/s, kg m²/s).
+    /// Generalised momentum at velocity `v`, user coordinates (kg m/s, kg m²/s); of what may drift with the water that relative to its drift
+    /// ([`Drift`](super::Drift)).
     pub fn momentum(&self, v: &DVector<f64>) -> DVector<f64> {
         &self.mass_matrix * v + &self.rest_momentum
+    }
+
+    /// What it lacks where bodies may drift: Σ Jᵀ I W, the momentum of the bodies' own masses that drift.
+    pub(super) fn drift_momentum(&self) -> DVector<f64> {
+        let drift = &self.system.drift;
+        let wrenches = (0..self.system.len())
+            .map(|b| self.rigid_momentum(b, drift.of(b)))
+            .collect();
+        self.system.tree.project(&self.kinematics.columns, wrenches)
     }
 
     /// The same in frame coordinates, X⁻ᵀ p.
@@ -68,7 +78,7 @@ impl Linearisation<'_> {
     /// # Errors
     /// A solve of the coupling that misses its tolerance.
     pub fn momentum_vjp(&self, v: &DVector<f64>, w: &DVector<f64>) -> Result<ForceCotangents> {
-        self.bilinear_vjp(v, w, &self.current_twist())
+        self.bilinear_vjp(v, w, Some(self.current_twist()))
     }
 
     /// Gradient of `wᵀ M(q) v`, without the current.
@@ -76,7 +86,7 @@ impl Linearisation<'_> {
     /// # Errors
     /// A solve of the coupling that misses its tolerance.
     pub fn mass_vjp(&self, v: &DVector<f64>, w: &DVector<f64>) -> Result<ForceCotangents> {
-        self.bilinear_vjp(v, w, &Vec6::zeros())
+        self.bilinear_vjp(v, w, None)
     }
 
     /// Derivatives of the entries `entries` of `M(q) v + p_rest(q)`, the user's coordinates, those with respect to the parameters if they are asked for; the
@@ -90,7 +100,7 @@ impl Linearisation<'_> {
         entries: &[usize],
         by_parameters: bool,
     ) -> Result<Slopes> {
-        self.bilinear_slopes(v, entries, &self.current_twist(), by_parameters)
+        self.bilinear_slopes(v, entries, Some(self.current_twist()), by_parameters)
     }
 
     /// The same of `M(q) v`, without the current.
@@ -103,14 +113,14 @@ impl Linearisation<'_> {
         entries: &[usize],
         by_parameters: bool,
     ) -> Result<Slopes> {
-        self.bilinear_slopes(v, entries, &Vec6::zeros(), by_parameters)
+        self.bilinear_slopes(v, entries, None, by_parameters)
     }
 
     fn bilinear_slopes(
         &self,
         v: &DVector<f64>,
         entries: &[usize],
-        current: &Vec6,
+        current: Option<Vec6>,
         by_parameters: bool,
     ) -> Result<Slopes> {
         let n = v.len();
@@ -143,11 +153,11 @@ impl Linearisation<'_> {
         Ok(Slopes::from_rows(n, entries, &rows, &zero))
     }
 
-    /// Coefficients on the basis of a velocity through water that moves with the current, or that rests.
-    fn direction(&self, v: &DVector<f64>, current: &Vec6) -> DVector<f64> {
-        match *current == Vec6::zeros() {
-            true => self.virtual_direction(v),
-            false => self.through_water(v),
+    /// Coefficients on the basis of a velocity through water that moves with the current, if there is one asked for, or that rests.
+    fn direction(&self, v: &DVector<f64>, current: Option<Vec6>) -> DVector<f64> {
+        match current {
+            Some(_) => self.through_water(v),
+            None => self.virtual_direction(v),
         }
     }
 
@@ -155,7 +165,7 @@ impl Linearisation<'_> {
         &self,
         v: &DVector<f64>,
         w: &DVector<f64>,
-        current: &Vec6,
+        current: Option<Vec6>,
     ) -> Result<ForceCotangents> {
         let at = Pair {
             fields: &self.still_fields(v),
@@ -186,7 +196,7 @@ impl Linearisation<'_> {
     fn bilinear_row(
         &self,
         at: &Pair,
-        current: &Vec6,
+        current: Option<Vec6>,
         water: Option<[&[Vec6]; 3]>,
     ) -> ForceCotangents {
         let Pair { fields, v, w, .. } = at;
@@ -196,10 +206,12 @@ impl Linearisation<'_> {
         let fields = tree.with_virtual(&self.kinematics, &self.q, fields, Virtual::User(w));
         let mut bar = Cotangents::zeros(self.system.len());
         for b in 0..self.system.len() {
-            let (twist, virt) = (&fields.twist[b], &fields.virtual_twist[b]);
+            let virt = &fields.virtual_twist[b];
             if at.skips(virt) {
                 continue;
             }
+            let drift = current.map_or(Vec6::zeros(), |_| *self.system.drift.of(b));
+            let twist = &(fields.twist[b] - drift);
             let (h, h_virtual) = (self.rigid_momentum(b, twist), self.rigid_momentum(b, virt));
             bar.virtual_twist[b] += h;
             bar.twist[b] += h_virtual;
@@ -209,6 +221,7 @@ impl Linearisation<'_> {
             }
         }
         if let Some([momenta, momenta_virtual, pair]) = water {
+            let current = current.unwrap_or_else(Vec6::zeros);
             for (b, _) in self.system.submerged() {
                 let relative = fields.twist[b] - current;
                 let virt = &fields.virtual_twist[b];

@@ -1,7 +1,7 @@
 //! A system: the tree, its bodies' constants, and the coupling through the water.
 
 use super::force::ForceModel;
-use super::{BodyData, ContactModel, JointLimit};
+use super::{BodyData, ContactModel, Drift, JointLimit};
 use crate::adjoint::lie::Vec3;
 use crate::coupling::Coupling;
 use crate::multibody::Tree;
@@ -33,6 +33,8 @@ pub struct System {
     pub forces: Arc<[Box<dyn ForceModel>]>,
     /// Uniform current, m/s.
     pub current: Vec3,
+    /// What it may carry along.
+    pub drift: Drift,
     /// Number of controls.
     pub controls: usize,
     /// The coupling; its bodies are those with `submerged` set, in order.

@@ -1,6 +1,6 @@
 //! What lies opposite a surface: how far a point is from it, with two derivatives.
 
-use super::convex::{Field, Solid};
+use super::convex::{Field, Form, Solid};
 use super::mesh::TriMesh;
 use super::tree::MeshTree;
 use super::triangle::Feature;
@@ -71,6 +71,23 @@ impl Opposite {
 }
 
 impl Solid {
+    /// Whether any of its surface is: of all but polyhedra.
+    pub(crate) fn is_curved(&self) -> bool {
+        match &self.form {
+            Form::Core(core) => core.radius > 0.0,
+            Form::Ellipsoid(_) | Form::Cylinder(_) => true,
+        }
+    }
+
+    /// Whether any of its surface is flat.
+    pub(crate) fn has_faces(&self) -> bool {
+        match &self.form {
+            Form::Core(core) => !core.faces.is_empty(),
+            Form::Ellipsoid(_) => false,
+            Form::Cylinder(_) => true,
+        }
+    }
+
     /// Signed distance of a point in the frame of the body.
     pub(crate) fn field(&self, p: &Vec3) -> Field {
         let own = self.form.field(&self.offset.apply_inverse(p));

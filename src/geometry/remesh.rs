@@ -34,6 +34,12 @@ impl TriMesh {
         Self::with_parts(self.name(), vertices, faces)
     }
 
+    /// The same faces with every vertex moved by a few parts of an edge.
+    pub(crate) fn moved(&self, to: impl Fn(&Vec3) -> Vec3) -> Self {
+        let vertices = self.vertices().iter().map(to).collect();
+        Self::with_parts(self.name(), vertices, self.faces().to_vec())
+    }
+
     /// Nearly the same surface with about `target` faces, or as few as it can lose without folding:
     /// edges are collapsed one after the other, where the surface moves least.
     ///

@@ -1,9 +1,11 @@
 //! Open-loop controls of a rollout.
 
 use super::Simulator;
-use super::run::MOST_STEPS;
 use crate::{Error, Result};
 use nalgebra::DMatrix;
+
+/// Most steps of one rollout: some kilobytes are kept for each.
+pub(super) const MOST_STEPS: usize = 5_000_000;
 
 /// One row per control, one column per step: generalised forces of actuated joints (N, N m) and wrenches of
 /// thrusters (N, N m; world axes, about the body's origin), in the order of the bodies.

@@ -40,7 +40,7 @@ impl GapCheck {
 }
 
 impl Rollout {
-    /// Compares the water across the smallest gap of the trajectory with that of coupled panels (`full`, method `panel`, the scene's own faces),
+    /// Compares the water across the smallest gap of the trajectory with that of coupled panels (`full`, method `panel`, the scene's own faces, with films),
     /// which takes their setup and a solve. None where there is no gap, no water, and where the rollout is by coupled panels already.
     ///
     /// # Errors
@@ -62,6 +62,7 @@ impl Rollout {
         };
         choices.water.fidelity = Fidelity::Full;
         choices.water.method = Method::Panel;
+        choices.water.numerics.films = true;
         choices.water.backend = super::Backend::Cpu;
         let panels = Simulator::with_choices(&simulator.scene, choices, None)?;
         let name = |b: usize| simulator.system().bodies[b].name.clone();

@@ -10,7 +10,7 @@ pub struct GapReport {
     pub nearest: Option<NearGap>,
     /// Of the smallest gaps of all states, the one with the largest estimated error of the force.
     pub worst: Option<NearGap>,
-    /// Number of times that a pair's water was taken over by a film or given back to the sources; films at the start count.
+    /// Number of times that a pair's water was taken over by a film or given back to the sources or panels; films at the start count.
     pub changes: usize,
     /// The first 20 of them.
     pub first_changes: Vec<Change>,

@@ -42,6 +42,7 @@ impl Rollout {
     /// When films come and go.
     fn changes(&self, out: &mut GapReport) {
         let widest = self.simulator.widest_film();
+        let without = self.simulator.carried_without_films();
         let mut before = Vec::new();
         for (sample, gap) in self.samples().iter().zip(self.gaps()) {
             let narrow = |gap: &Gap| gap.distance < widest;
@@ -52,7 +53,7 @@ impl Rollout {
             let come = now.iter().filter(|p| !before.contains(*p));
             let gone = before.iter().filter(|p| !now.contains(*p));
             let come = come.map(|pair| (pair, Carried::Film));
-            for (pair, carried) in come.chain(gone.map(|pair| (pair, Carried::Sources))) {
+            for (pair, carried) in come.chain(gone.map(|pair| (pair, without))) {
                 out.changes += 1;
                 if out.first_changes.len() < MOST {
                     out.first_changes.push(Change {

@@ -21,6 +21,7 @@ mod run;
 mod sample;
 mod settings;
 mod simulator;
+mod stability;
 mod start;
 mod step_map;
 mod summary;

@@ -4,17 +4,13 @@ use super::observable::{Reading, differentiable, observable, velocity};
 use super::trajectory::Seed;
 use super::{Cotangents, GapReport, Gradient, Initial, Sample, Simulator};
 use crate::adjoint::step::{self, Tape};
-use crate::dynamics::{ContactForce, Drive, State, StepBar, StepRecord};
+use crate::dynamics::{ContactForce, State, StepBar, StepRecord};
 use crate::error::readable;
 use crate::geometry::Gap;
 use crate::{Error, Result};
 use nalgebra::{DMatrix, DVector};
 use std::ops::ControlFlow;
 use std::sync::OnceLock;
-
-/// Share of the largest kinetic energy that may come from nowhere before a run warns. Every integrator but the paper's
-/// stays under 1.2 % on the example scenes.
-pub(super) const GAIN: f64 = 0.02;
 
 /// A trajectory: the forward pass, and the only key to its gradient. It holds what it needs of the simulator that made it.
 pub struct Rollout {
@@ -148,13 +144,15 @@ impl Rollout {
     }
 
     /// What the user should know about this trajectory, with names and numbers: gaps that the
-    /// meshes don't resolve, and bodies in one another with the fidelity `isolated`.
+    /// meshes don't resolve, and bodies in one another with the fidelity `isolated`; drag too stiff for an explicit integrator's step, and
+    /// energy that comes from nowhere.
     pub fn warnings(&self) -> Vec<String> {
         let samples = self.samples().iter();
         let states = samples.filter_map(|s| Some((s.time, s.poses.as_slice(), s.gap?)));
         let smallest = self.nearest().map(|(n, gap)| (self.samples()[n].time, gap));
         let warning = self.simulator.gap_warning(smallest, states);
         let all = (warning.into_iter())
+            .chain(self.stiffness_warning())
             .chain(self.energy_warning())
             .chain(self.loss_warning())
             .chain(self.rest_warning());
@@ -197,34 +195,6 @@ impl Rollout {
             first.pieces(),
             passing.count(),
         ))
-    }
-
-    /// Energy that grows though nothing does work: the step is too long.
-    fn energy_warning(&self) -> Option<String> {
-        let system = self.simulator.system();
-        let samples = self.samples();
-        let worked = system.has_current()
-            || system.drives.iter().any(|d| matches!(d, Drive::Motion(_)))
-            || samples.iter().any(|s| s.control.iter().any(|u| *u != 0.0));
-        if worked {
-            return None;
-        }
-        let first = samples[0].energy();
-        let kinetic = samples.iter().map(|s| s.kinetic_energy).fold(0.0, f64::max);
-        let worst = samples
-            .iter()
-            .max_by(|a, b| a.energy().total_cmp(&b.energy()))?;
-        let gained = worst.energy() - first;
-        (gained > GAIN * kinetic.max(f64::MIN_POSITIVE)).then(|| {
-            format!(
-                "the energy grows by {gained:.3e} J, {:.1} % of the largest kinetic energy, by \
-                 t = {} s, though nothing does work: the time step of {} s is too long for these velocities or \
-                 this drag; take a smaller one, or the integrator midpoint",
-                100.0 * gained / kinetic,
-                worst.time,
-                self.simulator.time_step()
-            )
-        })
     }
 
     /// Cotangents of the right sizes for this rollout, all zero.

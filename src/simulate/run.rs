@@ -1,5 +1,6 @@
 //! Running a simulator: rollouts and single steps.
 
+use super::controls::MOST_STEPS;
 use super::{Controls, Record, Rollout, Simulator};
 use crate::adjoint::step;
 use crate::dynamics::State;
@@ -8,8 +9,6 @@ use crate::{Error, Result};
 use nalgebra::{DMatrix, DVector};
 use std::ops::ControlFlow;
 
-/// Most steps of one rollout: some kilobytes are kept for each.
-pub(super) const MOST_STEPS: usize = 5_000_000;
 /// What is kept of a step, bytes, and of each body in it: 3.4 kB a step with four bodies of six velocities.
 const STEP_BYTES: f64 = 1500.0;
 const BODY_BYTES: f64 = 450.0;

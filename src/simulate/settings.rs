@@ -78,7 +78,8 @@ settings! {
     /// Error of M_f, relative to √(M_ii M_jj), that the fidelities `reduced` (added to that of the bodies themselves) and `auto`
     /// aim at.
     accuracy: f64 => water.numerics.compress.tolerance, water.numerics.accuracy;
-    /// Whether the water in gaps that compressed bodies don't resolve is added as films (fidelities `reduced` and `auto`; on unless turned off).
+    /// Whether the water in gaps that compressed bodies or panels don't resolve is added as films (fidelities `reduced`, `auto`, and `full` by panels; on
+    /// unless turned off).
     films: bool => water.numerics.films;
     /// Time integrator. `None`: the preset's; for a scene with contact, if that doesn't solve contact,
     /// [`Integrator::MomentumEuler`].
@@ -105,11 +106,13 @@ impl Settings {
     /// What these settings and a scene decide together.
     ///
     /// Contact is solved in the velocity that a step moves by: a scene with contact gets
-    /// [`Integrator::MomentumEuler`] where nobody chose an integrator and the preset's can't do that.
+    /// [`Integrator::MomentumEuler`] where nobody chose an integrator and the preset's can't do that, which
+    /// [`Simulator::reasons`](super::Simulator::reasons) says.
     pub fn resolve(&self, scene: &Scene) -> Choices {
         let preset = self.preset.unwrap_or(scene.preset);
         let mut base = Choices::preset(preset, scene.time_step);
-        if scene.has_contact() && !base.integrator.solves_contact() {
+        if scene.has_contact() && !base.integrator.solves_contact() && self.integrator.is_none() {
+            base.in_place_of = Some(base.integrator);
             base.integrator = Integrator::MomentumEuler;
         }
         self.over(base)

@@ -7,7 +7,7 @@ use crate::coupling::CouplingReport;
 use crate::dynamics::{ContactGap, ContactModel, FreeMotions, Parameters, Stepper, System};
 use crate::geometry::{Gap, Gaps, Other, TriMesh};
 use crate::scene::Scene;
-use crate::water::{Clearance, GapError, Subject, Surface, world_axes};
+use crate::water::{Carried, Clearance, GapError, Subject, Surface, world_axes};
 use crate::{Error, Result};
 use nalgebra::DMatrix;
 use std::path::Path;
@@ -136,7 +136,7 @@ impl Simulator {
         self.assembled.water.device.context()
     }
 
-    /// What the fidelity `Auto` chose, and why; empty with others.
+    /// What the fidelity `Auto` chose, and why, and why an integrator stands in for the preset's ([`Settings::resolve`]).
     pub fn reasons(&self) -> &[String] {
         &self.assembled.water.reasons
     }
@@ -285,6 +285,12 @@ impl Simulator {
         let film = |gap: &&Gap| model.reach(gap).is_some_and(|reach| gap.distance < reach);
         let pairs = gaps.iter().filter(film).map(|g| (g.first, g.second));
         pairs.collect()
+    }
+
+    /// By what the water is carried in gaps that have no film.
+    pub(super) fn carried_without_films(&self) -> Carried {
+        let model = &self.assembled.water.gap_model;
+        model.carried.unwrap_or(Carried::Sources)
     }
 
     /// The widest gap that has a film, m; 0 where there is none.

@@ -1,6 +1,6 @@
 //! Figures of a whole trajectory, and what they say of the time step.
 
-use super::rollout::GAIN;
+use super::stability::GAIN;
 use super::{GapReport, Rollout};
 use crate::adjoint::lie::Vec6;
 use crate::dynamics::Drive;
@@ -126,7 +126,7 @@ impl Rollout {
         let heavy = |b: &usize| {
             let displaced = parameters.density() * system.bodies[*b].volume;
             let free =
-                matches!(system.drives[*b], Drive::Free) && system.tree.links()[*b].v.len() > 0;
+                matches!(system.drives[*b], Drive::Free) && !system.tree.links()[*b].v.is_empty();
             free && displaced > 0.0 && (parameters.mass(*b) - displaced).abs() > 0.01 * displaced
         };
         let first = (0..system.len()).find(heavy)?;

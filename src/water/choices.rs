@@ -74,21 +74,29 @@ impl WaterChoices {
             out.push("the settings of the GPU have no effect with the backend cpu".into());
         }
         let compress = &self.numerics.compress;
+        let alone = self.fidelity.kind().solves_alone();
         for (name, knob, given) in [
             ("rank", Rank, compress.rank.is_some()),
             ("resolved_gap", ResolvedGap, compress.resolved_gap.is_some()),
             ("films", Films, !self.numerics.films),
         ] {
-            if given && !self.fidelity.knobs().contains(&knob) {
-                let who = match knob {
-                    Films => "only reduced and auto take it",
-                    _ => "only reduced takes it",
-                };
-                out.push(format!(
-                    "the setting {name} has no effect with the fidelity {}: {who}",
-                    self.fidelity
-                ));
+            if !given {
+                continue;
             }
+            let who = match knob {
+                Films => "only reduced, auto, and full by panels take it",
+                _ => "only reduced takes it",
+            };
+            let with = if !self.fidelity.knobs().contains(&knob) {
+                format!("the fidelity {}", self.fidelity)
+            } else if knob == Films && !(alone || self.method_used().kind().has_films()) {
+                format!("the method {}", self.method_used())
+            } else {
+                continue;
+            };
+            out.push(format!(
+                "the setting {name} has no effect with {with}: {who}"
+            ));
         }
         out
     }

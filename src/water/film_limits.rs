@@ -1,7 +1,7 @@
 //! Limits of thin films.
 
 use crate::adjoint::lie::{Pose, Vec3, exp_matrix};
-use crate::coupling::film::{Film, FilmSurface, PlacedFilm, Side, Width};
+use crate::coupling::film::{Film, FilmSurface, PlacedFilm, Shares, Side};
 use crate::geometry::{HalfSpace, Image, Opposite, Wall};
 use crate::scene::Shape;
 use crate::shape;
@@ -20,8 +20,13 @@ fn over_wall(shape: &Shape, faces: usize, floor: f64) -> Film {
         Arc::new(FilmSurface::new(&mesh, true)),
         Arc::new(Opposite::of_wall(plane)),
     );
-    let reach = 4.0 * floor;
-    Film::new(0, other, between, Width { floor, reach })
+    let shares = Shares {
+        floor: 0.25,
+        rim: 0.43,
+        rim_to_wall: 0.65,
+        in_corners: true,
+    };
+    Film::new(0, other, between, 4.0 * floor, &shares)
 }
 
 /// What the film adds to the energy of a unit twist (component `k` in the body's frame, about its origin) at a pose, and its slope as the body rises.

@@ -21,7 +21,7 @@ use strum::{Display, IntoStaticStr};
 pub enum Carried {
     /// Compressed sources, as they are.
     Sources,
-    /// Compressed sources that are held apart, and a film in the gap.
+    /// Compressed sources or panels that are held apart, and a film in the gap.
     Film,
     /// Panels on the faces.
     Panels,
@@ -91,6 +91,8 @@ const OWN: f64 = 0.005;
 const MOST: f64 = 10.0;
 /// Of the force through a film between round and between flat surfaces.
 const FILM: [f64; 2] = [0.05, 0.04];
+/// The same where panels are held apart, which are right in gaps that are narrower.
+const FILM_OF_PANELS: [f64; 2] = [0.04, 0.05];
 /// Of panels, and how it grows with both as faces lie further inside.
 const PANELS: f64 = 0.01;
 const FACETS: f64 = 0.13;
@@ -108,7 +110,7 @@ impl Across {
     }
 
     /// By sources as they are.
-    pub fn by_sources(&self) -> GapError {
+    fn by_sources(&self) -> GapError {
         let q = self.ratio * (TOLERANCE / self.tolerance).powf(FINER);
         let lost = match q < 1.0 {
             true => LOST * q.powf(BELOW),
@@ -131,10 +133,10 @@ impl Across {
         edge.powi(2) / (8.0 * self.curvature * self.gap)
     }
 
-    /// By a film that has taken all over.
-    fn by_film(&self) -> GapError {
+    /// By a film that has taken all over, of which so much is off between round and between flat surfaces.
+    fn by_film(&self, film: [f64; 2]) -> GapError {
         let flat = self.flatness();
-        let base = (1.0 - flat) * FILM[0] + flat * FILM[1];
+        let base = (1.0 - flat) * film[0] + flat * film[1];
         let force = base + FACETS * (4.0 * self.inside(self.film_edge)).ln_1p();
         GapError {
             carried: Carried::Film,
@@ -143,23 +145,32 @@ impl Across {
         }
     }
 
-    /// By what compressed bodies have there: a film, once the gap is so narrow, takes over soon, by 1 − (h/h_m)³.
-    pub fn compressed(&self) -> GapError {
-        let sources = self.by_sources();
+    /// By what there is without films, and one once the gap is so narrow: it takes over soon, by 1 − (h/h_m)³.
+    fn taken_over(&self, without: GapError, film: GapError) -> GapError {
         let Some(reach) = self.reach.filter(|reach| self.gap < *reach) else {
-            return sources;
+            return without;
         };
-        let (film, left) = (self.by_film(), (self.gap / reach).powi(3));
-        let mix = |film: f64, sources: f64| film + left * (sources - film);
+        let left = (self.gap / reach).powi(3);
+        let mix = |film: f64, without: f64| film + left * (without - film);
         GapError {
             carried: Carried::Film,
-            added_mass: mix(film.added_mass, sources.added_mass),
-            force: mix(film.force, sources.force),
+            added_mass: mix(film.added_mass, without.added_mass),
+            force: mix(film.force, without.force),
         }
     }
 
+    /// By what compressed bodies have there.
+    pub fn compressed(&self) -> GapError {
+        self.taken_over(self.by_sources(), self.by_film(FILM))
+    }
+
+    /// By what coupled panels have there.
+    pub fn coupled(&self) -> GapError {
+        self.taken_over(self.by_panels(), self.by_film(FILM_OF_PANELS))
+    }
+
     /// By panels.
-    pub fn by_panels(&self) -> GapError {
+    fn by_panels(&self) -> GapError {
         let flat = self.flatness();
         let thin = 0.1 * self.edge / self.gap;
         let force = PANELS

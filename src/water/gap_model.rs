@@ -4,6 +4,7 @@ use super::clearance::Clearance;
 use super::gap_error::{Across, Carried, GapError};
 use super::resolved::{Resolved, narrowest};
 use crate::adjoint::lie::Pose;
+use crate::coupling::film::Extent;
 use crate::geometry::{Gap, Other};
 use std::f64::consts::PI;
 
@@ -22,30 +23,31 @@ pub(crate) struct GapModel {
     pub carried: Option<Carried>,
     /// Relative error that compression aims at, per body.
     pub tolerances: Vec<f64>,
-    /// The gaps from which on there are films, m, the body first whose faces carry it.
-    pub reaches: Vec<(usize, Other, f64)>,
+    /// Where there may be films.
+    pub films: Vec<Extent>,
     /// What compressed bodies resolve.
     pub resolved: Vec<Resolved>,
 }
 
 impl GapModel {
-    /// The gap from which on a pair has a film, m, and whether the faces of the gap's second body carry it.
-    fn film(&self, gap: &Gap) -> Option<(f64, bool)> {
-        self.reaches.iter().find_map(|(body, other, reach)| {
-            let own = (*body, *other) == (gap.first, gap.second);
-            let turned = gap.second == Other::Body(*body) && *other == Other::Body(gap.first);
-            (own || turned).then_some((*reach, turned))
+    /// The film that a pair may have, and whether the faces of the gap's second body carry it.
+    fn film(&self, gap: &Gap) -> Option<(&Extent, bool)> {
+        self.films.iter().find_map(|film| {
+            let own = (film.body, film.other) == (gap.first, gap.second);
+            let turned =
+                gap.second == Other::Body(film.body) && film.other == Other::Body(gap.first);
+            (own || turned).then_some((film, turned))
         })
     }
 
     /// The gap from which on a pair has a film, m.
     pub fn reach(&self, gap: &Gap) -> Option<f64> {
-        self.film(gap).map(|(reach, _)| reach)
+        self.film(gap).map(|(film, _)| film.reach)
     }
 
     /// The widest gap that has a film, m; 0 where there is none.
     pub fn widest(&self) -> f64 {
-        let films = self.reaches.iter().map(|(_, _, reach)| *reach);
+        let films = self.films.iter().map(|film| film.reach);
         films.fold(0.0, f64::max)
     }
 
@@ -58,28 +60,31 @@ impl GapModel {
         let near = gaps.near_faces(gap, beyond, poses);
         let area = near[0].area.max(near[1].area);
         let film = self.film(gap);
-        let carries = film.and_then(|(_, second)| near[usize::from(second)].edge());
+        let film_edge = film.map_or(gap.edge, |(film, second)| {
+            let carries = near[usize::from(second)].edge();
+            film.finer * carries.unwrap_or(gap.edge)
+        });
         let (ratio, _) = narrowest(gaps, gap, poses, &self.resolved).unwrap_or((1.0, 0.0));
         let tolerances = gap.sides().map(|(b, _)| self.tolerances.get(b));
         Across {
             gap: distance,
             edge: gap.edge,
-            film_edge: carries.unwrap_or(gap.edge),
+            film_edge,
             curvature: (area / (2.0 * PI * beyond)).max(LEAST * gap.edge),
             size: clearance.size(gap),
             ratio: ratio.max(LEAST),
             tolerance: tolerances.flatten().fold(0.0, |a, b| b.max(a)),
-            reach: film.map(|(reach, _)| reach),
+            reach: film.map(|(film, _)| film.reach),
         }
     }
 
     /// The estimate at a gap; none with fidelities and methods that none is known for.
     pub fn error(&self, clearance: &Clearance, gap: &Gap, poses: &[Pose]) -> Option<GapError> {
         let across = self.across(clearance, gap, poses);
-        if self.carried? == Carried::Panels {
-            return Some(across.by_panels());
-        }
-        let mut error = across.compressed();
+        let mut error = match self.carried? {
+            Carried::Panels => across.coupled(),
+            Carried::Sources | Carried::Film => across.compressed(),
+        };
         let corner = self.corner(clearance, gap, poses) * (ROUND_CORNER + across.flatness());
         error.added_mass += CORNER * corner;
         error.force += 2.0 * CORNER * corner;

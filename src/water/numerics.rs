@@ -17,7 +17,7 @@ pub struct Numerics {
     pub compress: compress::CompressSettings,
     /// Error of M_f, relative to √(M_ii M_jj), that the fidelity `auto` aims at.
     pub accuracy: f64,
-    /// Whether the water in gaps that compressed bodies don't resolve is a film, with the fidelities `reduced` and `auto`.
+    /// Whether the water in gaps that aren't resolved is a film, with the fidelities `reduced` and `auto`, and with `full` by panels.
     pub films: bool,
 }
 

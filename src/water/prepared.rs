@@ -13,6 +13,7 @@ use super::submerged::{Discretisation, SubmergedBody};
 use crate::Result;
 use crate::adjoint::lie::Pose;
 use crate::coupling::Coupling;
+use crate::coupling::film::Extent;
 use crate::coupling::reduced::compress::CompressSettings;
 use crate::geometry::{Gap, Gaps, Other};
 use crate::scene::Scene;
@@ -82,7 +83,7 @@ pub(crate) fn prepare(
         (true, _) => FILM_EDGES,
         // What compressed bodies resolve isn't a matter of edges.
         (false, true) => 0.0,
-        (false, false) => method.resolved_edges(),
+        (false, false) => method.resolved_edges(choices.numerics.films),
     };
     let touching = fidelity.kind().solves_alone() || method.may_touch();
     clearance.may_touch = touching || scene.fluid.density <= 0.0;
@@ -105,19 +106,22 @@ pub(crate) fn prepare(
     }
     let mut tolerances = vec![0.0; scene.bodies.len()];
     for (k, (b, d)) in numbers.iter().zip(&made.bodies).enumerate() {
-        tolerances[*b] = tolerance(problem.chosen(k), d);
+        if fidelity.kind().compresses() {
+            tolerances[*b] = tolerance(problem.chosen(k), d);
+        }
     }
-    let in_scene = |(first, other, reach): &(usize, Other, f64)| {
-        let other = match other {
-            Other::Body(b) => Other::Body(numbers[*b]),
-            wall => *wall,
-        };
-        (numbers[*first], other, *reach)
+    let in_scene = |film: &Extent| Extent {
+        body: numbers[film.body],
+        other: match film.other {
+            Other::Body(b) => Other::Body(numbers[b]),
+            wall => wall,
+        },
+        ..*film
     };
     let gap_model = GapModel {
         carried: made.carried.filter(|_| scene.fluid.density > 0.0),
         tolerances,
-        reaches: made.films.iter().map(in_scene).collect(),
+        films: made.films.iter().map(in_scene).collect(),
         resolved,
     };
     let mut reasons = planned.reasons;

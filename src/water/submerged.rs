@@ -4,8 +4,9 @@ use super::gap_error::Carried;
 use super::surface::{Coarse, Surface, pose, semi_axes};
 use crate::adjoint::lie::{Mat6, Pose, Vec3};
 use crate::coupling::Coupling;
+use crate::coupling::film::Extent;
 use crate::coupling::reduced::Region;
-use crate::geometry::{Other, Refinement, Solid, TriMesh};
+use crate::geometry::{Refinement, Solid, TriMesh};
 use crate::multibody::Tree;
 use crate::scene::Scene;
 use crate::{Error, Result};
@@ -40,8 +41,8 @@ pub(crate) struct Made {
     pub warnings: Vec<String>,
     /// By what the water in gaps is carried; none where nothing is known of its error.
     pub carried: Option<Carried>,
-    /// Gaps from which on there are films, m, by the bodies' numbers in the water.
-    pub films: Vec<(usize, Other, f64)>,
+    /// Where there may be films, by the bodies' numbers in the water.
+    pub films: Vec<Extent>,
 }
 
 /// How a body is seen by the coupling, and how well.

@@ -227,7 +227,9 @@ fn run_summarises_and_writes_the_trajectory() {
                 "seconds_per_step",
                 "energy_initial",
                 "energy_final",
-                "momentum_drift",
+                "energy_gain",
+                "energy_loss",
+                "momenta_kept",
                 "min_gap",
                 "cut_steps",
                 "most_pieces",
@@ -241,6 +243,9 @@ fn run_summarises_and_writes_the_trajectory() {
         assert_eq!(list(&first["final_q"]).len(), 4);
         assert_eq!(list(&first["final_v"]).len(), 4);
         assert!(first["warnings"].is_array() && first.get("peak_memory_mb").is_some());
+        // A number where nothing outside acts in some direction, null where it does in all.
+        let kept = first["momenta_kept"].as_u64() > Some(0);
+        assert_eq!(first["momentum_drift"].is_number(), kept);
 
         let file = Path::new(&out).join("trajectory.json");
         let trajectory = std::fs::read_to_string(file).unwrap();
@@ -307,7 +312,7 @@ fn settings_reach_the_simulator() {
     let plain = json(&base);
     assert_eq!(
         (&plain["method"], &plain["integrator"]),
-        (&"panel".into(), &"rk2".into())
+        (&"panel".into(), &"rk4".into())
     );
     let direct = json(&[&base[..], &["--solver", "qr"]].concat());
     for (a, b) in list(&plain["final_q"]).iter().zip(list(&direct["final_q"])) {

@@ -226,6 +226,17 @@ fn integrators_that_cannot_do_it_say_so() {
         }
         let chosen = |scene: &Scene| Settings::default().resolve(scene).integrator;
         assert_eq!(chosen(&scene), Integrator::MomentumEuler);
+        // It says so, and only where it wasn't asked for.
+        let settings = Settings::default().fidelity(Fidelity::Isolated);
+        let made = |settings| Simulator::new(&scene, settings).unwrap();
+        let reasons = made(settings.clone()).reasons().join("; ");
+        let told = ["momentum-euler", "in place of", "midpoint"];
+        assert!(
+            told.iter().chain(words).all(|w| reasons.contains(w)),
+            "{reasons}"
+        );
+        let asked = made(settings.integrator(Integrator::MomentumEuler));
+        assert!(!asked.reasons().join("; ").contains("in place of"));
         scene.preset = Preset::Paper;
         assert_eq!(chosen(&scene), Integrator::VelocityEuler);
     }

@@ -112,7 +112,8 @@ fn energy_that_is_lost_is_told() {
     scene.bodies[0] = scene.bodies[0].clone().drag(DRAG);
     let rollout = run(&scene, isolated(), 100);
     assert!(rollout.summary().energy_loss > 0.0);
-    assert_eq!(rollout.warnings(), Vec::<String>::new());
+    let told = rollout.warnings();
+    assert!(!told.iter().any(|w| w.contains("energy")), "{told:?}");
 }
 
 /// Joints hang on the world where they do: a hinge's bodies keep what their axis lets them.

@@ -29,11 +29,23 @@ fn closing() -> Scene {
     scene
 }
 
-/// Against differences, through films on both sides of the block.
+/// Against differences, through films on both sides of the block, by compressed bodies and by panels.
 #[test]
 fn gradients_through_films() {
-    for integrator in [Integrator::MomentumEuler, Integrator::Rk2] {
+    for (integrator, fidelity) in [
+        (Integrator::MomentumEuler, Fidelity::Reduced),
+        (Integrator::Rk2, Fidelity::Reduced),
+        (Integrator::Rk2, Fidelity::Full),
+    ] {
         let scene = closing();
+        let settings = |integrator| {
+            let settings = settings(integrator).fidelity(fidelity).tolerance(1e-13);
+            if fidelity == Fidelity::Full {
+                settings.faces(80)
+            } else {
+                settings
+            }
+        };
         let mut simulator = Simulator::new(&scene, settings(integrator)).unwrap();
         let run = |settings: Settings| {
             let simulator = Simulator::new(&scene, settings).unwrap();

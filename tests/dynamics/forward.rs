@@ -1,5 +1,6 @@
 //! Forward mode of whole rollouts: its parts agree with one another, with the reverse sweep, and on any number of threads.
 
+use crate::galilean::{collision, drifting, mechanism, settings};
 use crate::support::{
     INTEGRATORS, example,
     forward::{LIMIT, OBSERVED, check_forward, displacement},
@@ -128,6 +129,25 @@ fn driven_and_held_joints() {
         let rollout = run(&simulator, 16);
         assert!(rollout.samples()[15].hold.contains(&true));
         check_forward("driven and held", &simulator, 16, LIMIT);
+    }
+}
+
+/// Joints, drag, springs, thrusters and contact, in still water and in a current that all may drift along with.
+#[test]
+fn in_still_water_and_in_a_current() {
+    for integrator in INTEGRATORS {
+        let solves_contact = integrator.solves_contact();
+        for (what, scene) in [("mechanism", mechanism()), ("collision", collision())] {
+            if scene.contact.is_some() && !solves_contact {
+                continue;
+            }
+            let moving = drifting(scene.clone());
+            for (where_, scene) in [("still", scene), ("in a current", moving)] {
+                let simulator = Simulator::new(&scene, settings(integrator)).unwrap();
+                let what = format!("{what}, {where_}, {integrator:?}");
+                check_forward(&what, &simulator, 12, LIMIT);
+            }
+        }
     }
 }
 

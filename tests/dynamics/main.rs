@@ -6,6 +6,7 @@ mod extremes;
 mod films;
 mod finite;
 mod forward;
+mod galilean;
 #[cfg(feature = "opt")]
 mod grasp;
 mod growth;
@@ -15,6 +16,7 @@ mod mechanisms;
 mod observables;
 #[cfg(feature = "opt")]
 mod optimize;
+mod random;
 mod resume;
 mod rollout_gradient;
 #[cfg(feature = "opt")]

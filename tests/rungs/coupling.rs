@@ -8,9 +8,10 @@ use hydrograd::boundary::{BodyBoundary, Method, MfsSettings, PanelBoundary};
 use hydrograd::coupling::full::{Full, FullSolver, SolveSettings};
 use hydrograd::coupling::reduced::{Cutoff, Reduced, compress};
 use hydrograd::coupling::{
-    Coupling, Direction, Exclusions, ExtrapolatedPanels, Isolated, Linearise, PanelCoupled,
+    Coupling, Direction, Exclusions, ExtrapolatedPanels, FilmedPanels, Isolated, Linearise,
+    PanelCoupled,
 };
-use hydrograd::geometry::Image;
+use hydrograd::geometry::{Image, TriMesh};
 use hydrograd::scene::{Shape, Wall, WallSurface};
 use hydrograd::shape;
 use nalgebra::{DMatrix, DVector};
@@ -34,6 +35,10 @@ pub fn rungs() -> Vec<Rung> {
         "coupling::response::ResponseLinearised::vjp" => |c| all(systems().iter().map(|s| vjp(s, c)).chain(panel_systems().iter().map(|s| vjp(s, c)))),
         "coupling::response::ResponseLinearised::hvp" => |c| all(systems().iter().map(|s| hvp(s, c)).chain(panel_systems().iter().map(|s| hvp(s, c)))),
         "coupling::panel::extrapolated::ExtrapolatedLinearised::gradient" => |c| gradient(&extrapolated_panels(), c),
+        "coupling::panel::filmed::FilmedLinearised::gradient" => |c| all(filmed_panels().iter().map(|s| gradient(s, c))),
+        "coupling::panel::filmed::FilmedLinearised::gradient_along" => |c| all(filmed_panels().iter().map(|s| gradient_along(s, c))),
+        "coupling::panel::filmed::FilmedLinearised::vjp" => |c| all(filmed_panels().iter().map(|s| vjp(s, c))),
+        "coupling::panel::filmed::FilmedLinearised::hvp" => |c| all(filmed_panels().iter().map(|s| hvp(s, c))),
         "coupling::reduced::linearised::ReducedLinearised::gradient" => |c| all(reduced_systems().iter().chain(&film_systems()).map(|s| gradient(s, c))),
         "coupling::panel::extrapolated::ExtrapolatedLinearised::gradient_along" => |c| gradient_along(&extrapolated_panels(), c),
         "coupling::reduced::linearised::ReducedLinearised::gradient_along" => |c| all(reduced_systems().iter().chain(&film_systems()).map(|s| gradient_along(s, c))),
@@ -188,16 +193,85 @@ fn reduced_systems() -> Vec<Reduced> {
     ]
 }
 
+/// Panels that come nearer than they resolve: to one another and to a wall, round ones and with edges, on one mesh and on two, by blocks and by the whole matrix.
+/// The film is there: it is what they differ by from those without.
+fn filmed_panels() -> Vec<FilmedPanels> {
+    let of = |shapes: [Shape; 2], walls: &[Wall], solver, excluded: &Exclusions, two: bool| {
+        let built = |faces| shapes.clone().map(|s| mesh(&s, faces));
+        let coupled = |faces| {
+            let bodies = built(faces).map(|m| Arc::new(PanelBoundary::new("b", &m).unwrap()));
+            coupled_panels(bodies.to_vec(), solver, walls, excluded.clone())
+        };
+        let solids = shapes
+            .clone()
+            .map(|s| shape::solid(&s, Pose::identity()).unwrap());
+        let meshes = built(80);
+        let surfaces: Vec<_> = meshes
+            .iter()
+            .zip(solids.iter().map(Option::as_ref))
+            .collect();
+        let both = |faces: [usize; 2]| {
+            let [fine, coarse] = faces.map(&coupled);
+            ExtrapolatedPanels::new(fine, coarse, 2.0).unwrap()
+        };
+        let momenta = |s: &dyn Linearise| {
+            s.evaluate(&poses(), &case().basis)
+                .unwrap()
+                .momenta()
+                .clone()
+        };
+        let (plain, filmed) = match two {
+            true => (
+                momenta(&both([80, 20])),
+                both([80, 20]).with_films(&surfaces, walls).unwrap(),
+            ),
+            false => (
+                momenta(&coupled(80)),
+                coupled(80).with_films(&surfaces, walls).unwrap(),
+            ),
+        };
+        let there = (plain - momenta(&filmed)).amax();
+        assert!(there > 1e-5, "no film: {there:e}");
+        filmed
+    };
+    let (ball, egg) = (Shape::sphere(0.57), Shape::ellipsoid([0.65, 0.45, 0.5]));
+    let round = [ball, egg.clone()];
+    let small = [Shape::sphere(0.5), Shape::ellipsoid([0.3, 0.2, 0.4])];
+    let sharp = [
+        Shape::cuboid([0.83, 0.71, 0.77]),
+        Shape::cylinder(0.42, 0.83),
+    ];
+    let (none, gmres) = (Exclusions::none(), FullSolver::Gmres);
+    vec![
+        of(round, &[], gmres, &none, true),
+        of(small.clone(), &[FLOOR], FullSolver::Qr, &none, false),
+        of(
+            small,
+            &[FLOOR, SIDE],
+            gmres,
+            &Exclusions::new([(0, 1)]),
+            false,
+        ),
+        of(sharp, &[], gmres, &none, true),
+    ]
+}
+
+/// A wall that comes near the first body.
+const FLOOR: Wall = Wall {
+    point: [0.0, 0.0, 0.45],
+    ..WALL
+};
+
+fn mesh(shape: &Shape, faces: usize) -> TriMesh {
+    shape::build(shape, Path::new("."), Some(faces)).unwrap()
+}
+
 /// Compressed bodies that come nearer than they resolve: to one another and to a wall, round ones and with edges, by formula and as meshes. The film
 /// is there: it is what they differ by from those without.
 fn film_systems() -> Vec<Reduced> {
-    const FLOOR: Wall = Wall {
-        point: [0.0, 0.0, 0.45],
-        ..WALL
-    };
     let of = |shapes: [Shape; 2], walls: &[Wall], by_formula: bool| {
         let built = shapes.map(|shape| {
-            let mesh = shape::build(&shape, Path::new("."), Some(320)).unwrap();
+            let mesh = mesh(&shape, 320);
             let b = BodyBoundary::new("b", &mesh, &MfsSettings::default()).unwrap();
             let settings = compress::CompressSettings {
                 rank: Some(20),
@@ -454,7 +528,10 @@ fn second_derivatives_commute_up_to_the_bracket() {
     let panels = panel_systems()
         .into_iter()
         .map(|s| Box::new(s) as Box<dyn Linearise>);
-    for s in full.chain(reduced).chain(panels) {
+    let filmed = filmed_panels()
+        .into_iter()
+        .map(|s| Box::new(s) as Box<dyn Linearise>);
+    for s in full.chain(reduced).chain(panels).chain(filmed) {
         let k = case();
         let other = field(1.9);
         let record = s.linearise(&poses(), &k.basis).unwrap();

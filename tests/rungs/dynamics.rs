@@ -334,7 +334,8 @@ fn force_vjp(c: f64) -> Outcome {
 
 fn momentum(c: f64) -> Outcome {
     let p = point();
-    let w = wavy(p.v.len(), 5.1, 1.0);
+    // Along 5.1 the slope of one joint is all but zero, below what differences resolve.
+    let w = wavy(p.v.len(), 5.3, 1.0);
     let b = evaluate(&p.parameters, &p.q)
         .momentum_vjp(&p.v, &w)
         .unwrap();
@@ -502,12 +503,12 @@ fn step_with(integrator: Integrator, before: &[&str], now: &[&str], c: f64) -> O
     check(false, &value, &p, &bar_of(b), c)
 }
 
-/// The same scene in still water, with no joint that is driven, and one that just presses on its limit.
+/// The same scene in a current that all may drift along with, with no joint that is driven, and one that just presses on its limit.
 pub fn still() -> &'static Simulator {
     static MADE: OnceLock<Simulator> = OnceLock::new();
     MADE.get_or_init(|| {
         let mut scene = scene();
-        scene.fluid.current = [0.0; 3];
+        scene.fluid.current = [0.2, 0.0, 0.0];
         for body in &mut scene.bodies {
             body.motion = None;
         }

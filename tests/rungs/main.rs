@@ -139,10 +139,6 @@ const THROUGH: &[(&str, &str)] = &[
     // Forces that don't depend on the velocity: nothing that 1 % could be wrong with.
     ("dynamics::force::ForceModel::jvp", FORCE_JVP),
     (
-        "dynamics::force::drag::Law::jvp",
-        "dynamics::force::drag::Drag::jvp",
-    ),
-    (
         "dynamics::balance::rigid_parameters_vjp",
         "dynamics::momentum::Linearisation::momentum_vjp",
     ),

@@ -224,4 +224,10 @@ fn what_films_do_not_do_is_said() {
     let isolated = simulator(films().films(false).fidelity(Fidelity::Isolated));
     let warnings = isolated.warnings().join("\n");
     assert!(warnings.contains("films has no effect"), "{warnings}");
+    let full = films().films(false).fidelity(Fidelity::Full);
+    for (method, told) in [(Method::MfsVertex, true), (Method::Panel, false)] {
+        let warnings = simulator(full.clone().method(method)).warnings().join("\n");
+        let found = warnings.contains("films has no effect with the method");
+        assert_eq!(found, told, "{warnings}");
+    }
 }

@@ -2,12 +2,13 @@
 
 use hydrograd::adjoint::lie::{Vec3, exp_matrix};
 use hydrograd::scene::{Body, Fluid, Joint, Scene, Shape};
-use hydrograd::simulate::{Carried, NearGap};
+use hydrograd::simulate::{Carried, Method, NearGap};
 use hydrograd::{Controls, Fidelity, Settings, Simulator};
 use nalgebra::DVector;
 use std::f64::consts::FRAC_PI_4;
 
 /// The first body over the second, or over a wall, on a rail along the gap.
+#[derive(Clone)]
 struct Case {
     name: &'static str,
     shapes: Vec<Shape>,
@@ -138,10 +139,14 @@ fn what_auto_has_is_no_worse_than_sources_alone() {
 /// Where a film takes over the added mass and its slope go on, and so does the estimate; a run says when.
 #[test]
 fn a_film_takes_over_smoothly() {
-    for case in cases() {
-        let simulator = case.simulator(&Settings::default().fidelity(Fidelity::Auto));
+    let full = Settings::default().fidelity(Fidelity::Full);
+    let full = full.method(Method::Panel);
+    let both = [Settings::default().fidelity(Fidelity::Auto), full];
+    let all = cases().into_iter();
+    for (case, settings) in all.flat_map(|case| both.clone().map(|s| (case.clone(), s))) {
+        let simulator = case.simulator(&settings);
         let [mut film, mut sources] = [1e-3, 1.0].map(|gap| gap * case.size);
-        while sources - film > 1e-6 * case.size {
+        while sources - film > 1e-7 * case.size {
             let middle = 0.5 * (film + sources);
             match case.said(&simulator, middle).carried {
                 Carried::Film => film = middle,
@@ -163,6 +168,16 @@ fn a_film_takes_over_smoothly() {
 /// A ball that comes at a wall and goes again: a film comes once and goes once, and the trajectory has an estimate at every state.
 #[test]
 fn a_run_says_when_films_come_and_go() {
+    for (fidelity, gap, without) in [
+        (Fidelity::Auto, 0.02, Carried::Sources),
+        (Fidelity::Full, 0.012, Carried::Panels),
+    ] {
+        comes_and_goes(fidelity, gap, without);
+    }
+}
+
+/// The same with a gap of contact, in which there is a film, and what carries the water elsewhere.
+fn comes_and_goes(fidelity: Fidelity, gap: f64, without: Carried) {
     let mut scene = Scene::new(Fluid::fresh_water());
     scene.add_wall([0.0; 3], [0.0, 0.0, 1.0]);
     let rail = Joint::Prismatic {
@@ -170,7 +185,7 @@ fn a_run_says_when_films_come_and_go() {
     };
     let spring = hydrograd::scene::Contact {
         stiffness: Some(2e4),
-        gap: Some(0.02),
+        gap: Some(gap),
         ..Default::default()
     };
     scene.contact = Some(spring);
@@ -178,7 +193,8 @@ fn a_run_says_when_films_come_and_go() {
     scene.add(ball.density(1000.0).at([0.0, 0.0, 0.2]).joint(rail));
     scene.initial.v = vec![-0.5];
     scene.time_step = 0.01;
-    let simulator = Simulator::new(&scene, Settings::default()).unwrap();
+    let settings = Settings::default().fidelity(fidelity);
+    let simulator = Simulator::new(&scene, settings).unwrap();
     let rollout = simulator.rollout(&Controls::zeros(&simulator, 60)).unwrap();
     let report = rollout.summary().gaps;
     println!("{report:?}");
@@ -186,10 +202,7 @@ fn a_run_says_when_films_come_and_go() {
     let [come, gone] = &report.first_changes[..] else {
         panic!("{report:?}");
     };
-    assert_eq!(
-        (come.carried, gone.carried),
-        (Carried::Film, Carried::Sources)
-    );
+    assert_eq!((come.carried, gone.carried), (Carried::Film, without));
     assert!(0.0 < come.time && come.time < gone.time);
     assert_eq!(come.bodies, ("ball".into(), None));
     let nearest = report.nearest.unwrap();

@@ -14,6 +14,7 @@ mod one_body;
 mod overlap;
 mod panel;
 mod panel_coupled;
+mod panel_films;
 mod plates;
 mod reduced;
 mod refine;

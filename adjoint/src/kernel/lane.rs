@@ -4,7 +4,7 @@ use pulp::Simd;
 use std::ops::{Add, Div, Mul, Neg, Sub};
 
 /// A number or a vector of numbers treated element by element.
-pub(super) trait Lane:
+pub(crate) trait Lane:
     Copy
     + Add<Output = Self>
     + Sub<Output = Self>
@@ -71,7 +71,7 @@ impl Lane for f64 {
 /// Everything that touches it must be inlined into the function that `pulp` compiled for the
 /// processor found at run time, hence `inline(always)` throughout and no closures.
 #[derive(Clone, Copy, Debug)]
-pub(super) struct Lanes<S: Simd> {
+pub(crate) struct Lanes<S: Simd> {
     simd: S,
     /// The register.
     pub v: S::f64s,
@@ -247,23 +247,23 @@ impl<S: Simd> Lane for Lanes<S> {
 }
 
 /// Three components.
-pub(super) type V3<T> = [T; 3];
+pub(crate) type V3<T> = [T; 3];
 
 /// `a − b`.
 #[inline(always)]
-pub(super) fn sub<T: Lane>(a: V3<T>, b: V3<T>) -> V3<T> {
+pub(crate) fn sub<T: Lane>(a: V3<T>, b: V3<T>) -> V3<T> {
     [a[0] - b[0], a[1] - b[1], a[2] - b[2]]
 }
 
 /// `a · b`.
 #[inline(always)]
-pub(super) fn dot<T: Lane>(a: V3<T>, b: V3<T>) -> T {
+pub(crate) fn dot<T: Lane>(a: V3<T>, b: V3<T>) -> T {
     a[0].mul_add(b[0], a[1].mul_add(b[1], a[2] * b[2]))
 }
 
 /// `a × b`.
 #[inline(always)]
-pub(super) fn cross<T: Lane>(a: V3<T>, b: V3<T>) -> V3<T> {
+pub(crate) fn cross<T: Lane>(a: V3<T>, b: V3<T>) -> V3<T> {
     [
         a[2].neg_mul_add(b[1], a[1] * b[2]),
         a[0].neg_mul_add(b[2], a[2] * b[0]),
@@ -273,13 +273,13 @@ pub(super) fn cross<T: Lane>(a: V3<T>, b: V3<T>) -> V3<T> {
 
 /// `c a`.
 #[inline(always)]
-pub(super) fn scale<T: Lane>(c: T, a: V3<T>) -> V3<T> {
+pub(crate) fn scale<T: Lane>(c: T, a: V3<T>) -> V3<T> {
     [c * a[0], c * a[1], c * a[2]]
 }
 
 /// `c a + b`.
 #[inline(always)]
-pub(super) fn scale_add<T: Lane>(c: T, a: V3<T>, b: V3<T>) -> V3<T> {
+pub(crate) fn scale_add<T: Lane>(c: T, a: V3<T>, b: V3<T>) -> V3<T> {
     [
         c.mul_add(a[0], b[0]),
         c.mul_add(a[1], b[1]),

@@ -50,6 +50,10 @@ mod target;
 #[cfg(test)]
 mod tests;
 
+pub(crate) use lane::{Lane, Lanes, V3, cross, dot, scale, scale_add};
+pub(crate) use source::WIDTH;
+pub(crate) use sum::dispatch;
+
 pub use double::{double_fill, double_hvp, double_jvp, double_vjp};
 pub use flux::{
     flux, flux_fill, flux_gradient, flux_hessian_product, flux_hvp, flux_jvp, flux_vjp,

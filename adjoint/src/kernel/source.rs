@@ -15,7 +15,7 @@ pub struct Sources {
 }
 
 /// Padding: the widest vector.
-pub(super) const WIDTH: usize = 8;
+pub(crate) const WIDTH: usize = 8;
 
 impl Sources {
     /// From points.

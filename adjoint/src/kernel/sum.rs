@@ -17,7 +17,7 @@ use rayon::prelude::*;
 use std::ops::Range;
 
 /// Runs `op` with the widest vectors of this processor.
-pub(super) fn dispatch(op: impl WithSimd<Output = ()>) {
+pub(crate) fn dispatch(op: impl WithSimd<Output = ()>) {
     #[cfg(test)]
     match super::tests::VECTORS.load(std::sync::atomic::Ordering::Relaxed) {
         1 => return Simd::vectorize(pulp::Scalar, op),

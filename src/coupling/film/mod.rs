@@ -21,17 +21,21 @@
 //! twice continuously differentiable as the gap opens and closes. The gradient is the reverse by hand ([`layer::Layer::reverse`]); run on dual numbers along a
 //! displacement, forward and reverse give second derivatives.
 
+mod apart;
 mod flow;
 mod jet;
 mod layer;
 mod placed;
 mod pull;
+mod set;
 mod surface;
 
+pub(crate) use apart::Apart;
 pub(crate) use placed::{MovingFilm, PlacedFilm};
+pub(crate) use set::{FilmBody, Films, MovingFilms, PlacedFilms};
 pub(crate) use surface::{Cluster, FilmSurface, clusters};
 
-use crate::geometry::{Image, Opposite};
+use crate::geometry::{Image, Opposite, Other};
 use crate::solver::SparsePattern;
 use std::sync::{Arc, Mutex};
 use surface::Element;
@@ -43,6 +47,33 @@ pub(crate) struct Width {
     pub reach: f64,
 }
 
+/// What a coupling's films are like.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Shares {
+    /// How far bodies are held apart at contact, in the gap from which on they aren't.
+    pub floor: f64,
+    /// Where the flow in a film begins to go over into that around the bodies, in sizes of the first; it has at twice that. What holds bodies apart does so to all that
+    /// isn't film as well, so this is where the rest of the added mass changes least with the gap: by spheres, capsules and an edge (docs/accuracy-coupled.md). Between flat
+    /// faces it makes no difference.
+    pub rim: f64,
+    /// The same between a body and a wall.
+    pub rim_to_wall: f64,
+    /// Whether bodies with flat faces have films at walls of which there are several: in a corner each takes the other's gap for the open.
+    pub in_corners: bool,
+}
+
+/// Where a film is.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Extent {
+    /// The body on whose faces it is solved.
+    pub body: usize,
+    pub other: Other,
+    /// The gap from which on it is there, m.
+    pub reach: f64,
+    /// Its edges over those of the body's faces.
+    pub finer: f64,
+}
+
 /// What is opposite.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(crate) enum Side {
@@ -51,13 +82,6 @@ pub(crate) enum Side {
     /// A rigid wall, by the image that it makes.
     Wall(Image),
 }
-
-/// Where the flow in a film begins to go over into that around the bodies, in sizes of the first; it has at twice that. What holds bodies apart does so to all that isn't
-/// film as well, so this is where the rest of the added mass changes least with the gap: by spheres, capsules and an edge (docs/accuracy-coupled.md). Between flat
-/// faces it makes no difference.
-const RIM: f64 = 0.43;
-/// The same between a body and a wall.
-const RIM_TO_WALL: f64 = 0.65;
 
 /// The film between a body and another, or a wall.
 #[derive(Clone)]
@@ -81,23 +105,24 @@ impl Film {
         body: usize,
         other: Side,
         (surface, opposite): (Arc<FilmSurface>, Arc<Opposite>),
-        width: Width,
+        reach: f64,
+        shares: &Shares,
     ) -> Self {
         let start = match other {
-            Side::Body(_) => RIM,
-            Side::Wall(_) => RIM_TO_WALL,
+            Side::Body(_) => shares.rim,
+            Side::Wall(_) => shares.rim_to_wall,
         };
         let rim = [start, 2.0 * start].map(|part| part * surface.size);
         // Where nothing of it is film bodies aren't held apart, or they would be by a jump as the first of it is.
-        let narrower = (rim[1] / width.reach).min(1.0);
+        let reach = rim[1].min(reach);
         Self {
             body,
             other,
             surface,
             opposite,
             width: Width {
-                floor: narrower * width.floor,
-                reach: narrower * width.reach,
+                floor: shares.floor * reach,
+                reach,
             },
             rim,
             pattern: Arc::default(),

@@ -255,10 +255,22 @@ impl<'a> PlacedFilm<'a> {
     }
 
     fn apply_world(&self, world: &Vec6, out: &mut [Vec6]) {
-        out[self.film.body] += world;
-        if let Side::Body(b) = self.film.other {
-            out[b] -= world;
+        for (body, wrench) in self.on_both(world) {
+            out[body] += wrench;
         }
+    }
+
+    /// The spatial wrenches that one in the frame of the other is on each body.
+    pub fn spread(&self, wrench: &Vec6) -> impl Iterator<Item = (usize, Vec6)> {
+        self.on_both(&self.frame.wrench_to_world(wrench))
+    }
+
+    fn on_both(&self, world: &Vec6) -> impl Iterator<Item = (usize, Vec6)> + use<> {
+        let other = match self.film.other {
+            Side::Body(b) => Some((b, -world)),
+            Side::Wall(_) => None,
+        };
+        std::iter::once((self.film.body, *world)).chain(other)
     }
 }
 

@@ -22,6 +22,8 @@ pub(crate) struct FilmSurface {
     pub faces: Vec<Element>,
     /// Of the ball of equal volume, m.
     pub size: f64,
+    /// Its edges over those of the faces that the body has elsewhere.
+    pub finer: f64,
     /// Area over that of the ball of equal volume.
     pub flatness: f64,
     /// A ball around the vertices.
@@ -103,6 +105,7 @@ impl FilmSurface {
         let ball = mesh.bounding_ball();
         let size = (0.75 * mesh.mass_properties().volume / PI).cbrt();
         Self {
+            finer: 1.0,
             flatness: mesh.surface_area() / (4.0 * PI * size.powi(2)),
             vertices: mesh.vertices().to_vec(),
             normals: mesh.vertex_normals(),

@@ -10,12 +10,16 @@
 //! E is linear in both, so are all its derivatives. With a quarter of the faces the coarse system costs a sixteenth of the fine one.
 
 use super::PanelCoupled;
+use super::filmed::{FilmedPanels, HeldApart};
 use crate::adjoint::lie::{Pose, Vec3, Vec6};
+use crate::coupling::film::PlacedFilms;
 use crate::coupling::{
     Coupling, CouplingReport, Direction, Linearise, Linearised, Momenta, Pullback, Tangent,
 };
+use crate::geometry::{Solid, TriMesh, Wall};
 use crate::{Error, Result};
 use nalgebra::{DMatrix, DVector};
+use std::sync::Arc;
 
 /// Least ratio of edge lengths from which two meshes say something.
 const RATIO: f64 = 1.2;
@@ -58,6 +62,18 @@ impl ExtrapolatedPanels {
         })
     }
 
+    /// As [`PanelCoupled::with_films`]: both meshes are held apart alike, by what the fine one doesn't resolve.
+    ///
+    /// # Errors
+    /// As there.
+    pub fn with_films(
+        self,
+        surfaces: &[(&TriMesh, Option<&Solid>)],
+        walls: &[Wall],
+    ) -> Result<FilmedPanels> {
+        FilmedPanels::new(Box::new(self), surfaces, walls)
+    }
+
     fn report(&self, fine: &CouplingReport, coarse: &CouplingReport) -> CouplingReport {
         CouplingReport {
             iterations: fine.iterations.max(coarse.iterations),
@@ -97,12 +113,7 @@ impl Coupling for ExtrapolatedPanels {
     }
 
     fn evaluate(&self, poses: &[Pose], basis: &DMatrix<f64>) -> Result<Momenta> {
-        let fine = self.fine.evaluate(poses, basis)?;
-        let coarse = self.coarse.evaluate(poses, basis)?;
-        Ok(Momenta::new(
-            matrix(self.factor, fine.momenta(), coarse.momenta()),
-            self.report(fine.report(), coarse.report()),
-        ))
+        self.evaluate_held(poses, basis, &Arc::default())
     }
 
     fn differentiable(&self) -> Option<&dyn Linearise> {
@@ -125,8 +136,37 @@ impl Coupling for ExtrapolatedPanels {
 
 impl Linearise for ExtrapolatedPanels {
     fn linearise(&self, poses: &[Pose], basis: &DMatrix<f64>) -> Result<Box<dyn Linearised + '_>> {
-        let fine = self.fine.linearise(poses, basis)?;
-        let coarse = self.coarse.linearise(poses, basis)?;
+        self.linearise_held(poses, basis, &Arc::default())
+    }
+}
+
+impl HeldApart for ExtrapolatedPanels {
+    fn panels(&self) -> &PanelCoupled {
+        &self.fine
+    }
+
+    fn evaluate_held(
+        &self,
+        poses: &[Pose],
+        basis: &DMatrix<f64>,
+        films: &Arc<PlacedFilms>,
+    ) -> Result<Momenta> {
+        let fine = self.fine.evaluate_held(poses, basis, films)?;
+        let coarse = self.coarse.evaluate_held(poses, basis, films)?;
+        Ok(Momenta::new(
+            matrix(self.factor, fine.momenta(), coarse.momenta()),
+            self.report(fine.report(), coarse.report()),
+        ))
+    }
+
+    fn linearise_held<'a>(
+        &'a self,
+        poses: &[Pose],
+        basis: &DMatrix<f64>,
+        films: &Arc<PlacedFilms<'a>>,
+    ) -> Result<Box<dyn Linearised + 'a>> {
+        let fine = self.fine.linearise_held(poses, basis, films)?;
+        let coarse = self.coarse.linearise_held(poses, basis, films)?;
         Ok(Box::new(ExtrapolatedLinearised {
             factor: self.factor,
             momenta: matrix(self.factor, fine.momenta(), coarse.momenta()),

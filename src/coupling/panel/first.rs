@@ -1,7 +1,7 @@
 //! First derivatives with the bodies' displacement.
 
 use super::placed::{PanelSolution, PlacedPanels};
-use crate::adjoint::lie::point_wrench;
+use crate::adjoint::lie::{Vec3, point_wrench};
 use crate::coupling::PairTensor;
 use crate::coupling::pair::{Pair, vector};
 use crate::solver::{Columns, transposed_product};
@@ -13,6 +13,15 @@ impl PlacedPanels<'_> {
         for (pair, fields) in self.pairs.iter().zip(solution.fields()) {
             let tensor = self.pair_tensor(pair, fields, solution);
             out.add_pair(pair, &self.poses[pair.target], &tensor);
+            if let Some((apart, film)) = pair.film(&self.films) {
+                for (x, y) in (0..tensor.columns).flat_map(|x| (0..=x).map(move |y| (x, y))) {
+                    let of = |x: usize, y: usize, c: usize| 0.5 * tensor.at(6 * x + c, y);
+                    let force = Vec3::from_fn(|c, _| of(x, y, c) + of(y, x, c));
+                    for (body, wrench) in film.spread(&apart.wrench(film, &force)) {
+                        out.add(body, (x, y), &wrench);
+                    }
+                }
+            }
         }
         out
     }

@@ -19,9 +19,11 @@
 //! E is symmetrised, and its derivatives are exactly those of the symmetrised E. They cost no further solve on the basis; the tangent
 //! takes two, `A δφ = δS q − δA φ` and `Aᵀ δμ = −δAᵀ μ`. A body's own block of A doesn't change with the poses: its inverse, made
 //! once, and the blocks by which bodies act on later ones precondition the iteration (block Gauss–Seidel). All other entries depend on the position of a panel's centroid in the frame of another
-//! body alone; seen from afar they are multipoles ([`double`](mod@crate::adjoint::kernel::double)). Bodies and images that come closer than about half an edge length lose accuracy.
+//! body alone; seen from afar they are multipoles ([`double`](mod@crate::adjoint::kernel::double)). Bodies and images that come closer than about half an edge length lose accuracy,
+//! but for what films in such gaps carry ([`PanelCoupled::with_films`]).
 
 mod extrapolated;
+mod filmed;
 mod first;
 mod model;
 mod placed;
@@ -30,15 +32,18 @@ mod sweep;
 mod system;
 
 pub use extrapolated::ExtrapolatedPanels;
+pub use filmed::FilmedPanels;
 pub use model::PanelModel;
 
+use super::film::PlacedFilms;
 use super::full::{SolveSettings, SystemBackend};
 use super::response::{CoupledResponse, Solved};
 use super::{Coupling, Exclusions, Linearise, Linearised, Momenta};
 use crate::adjoint::lie::{Mat6, Pose, Vec3};
 use crate::boundary::PanelBoundary;
-use crate::geometry::Wall;
+use crate::geometry::{Solid, TriMesh, Wall};
 use crate::{Error, Result};
+use filmed::HeldApart;
 use nalgebra::{DMatrix, DVector};
 use placed::{PanelSolution, PlacedPanels};
 use std::sync::Arc;
@@ -86,35 +91,50 @@ impl PanelCoupled {
         }
     }
 
+    /// With films in the gaps between bodies, and to rigid walls, that panels don't resolve: from the surface of each body in its own frame, and its shape
+    /// by formula where it has one.
+    ///
+    /// # Errors
+    /// [`Error::Input`] if there isn't one surface for each body, or for a wall without normal.
+    pub fn with_films(
+        self,
+        surfaces: &[(&TriMesh, Option<&Solid>)],
+        walls: &[Wall],
+    ) -> Result<FilmedPanels> {
+        FilmedPanels::new(Box::new(self), surfaces, walls)
+    }
+
     /// What the system consists of.
     pub fn model(&self) -> &Arc<PanelModel> {
         &self.model
     }
 
-    /// The solution, and the condition number of a dense matrix.
-    fn respond(
-        &self,
+    /// The solution, and the condition number of a dense matrix. Bodies that are held apart are solved on the CPU.
+    fn respond<'a>(
+        &'a self,
         poses: &[Pose],
         basis: &DMatrix<f64>,
-    ) -> Result<(Box<dyn CoupledResponse + '_>, f64)> {
-        if let Some(backend) = &self.backend {
+        films: &Arc<PlacedFilms<'a>>,
+    ) -> Result<(Box<dyn CoupledResponse + 'a>, f64)> {
+        if let Some(backend) = self.backend.as_ref().filter(|_| !films.any()) {
             self.model.check_walls(poses)?;
             return Ok((backend.respond(poses, basis)?, 0.0));
         }
-        let placed = Arc::new(PlacedPanels::new(&self.model, poses, basis)?);
+        let placed = Arc::new(PlacedPanels::new(&self.model, poses, films, basis)?);
         let condition = placed.system.condition();
         let solution = PanelSolution::new(placed, basis.clone())?;
         Ok((Box::new(solution), condition))
     }
 
-    fn solved(
-        &self,
+    fn solved<'a>(
+        &'a self,
         poses: &[Pose],
         basis: &DMatrix<f64>,
-    ) -> Result<Solved<dyn CoupledResponse + '_>> {
+        films: &Arc<PlacedFilms<'a>>,
+    ) -> Result<Solved<dyn CoupledResponse + 'a>> {
         let model = self.model();
         model.check_input(poses, basis)?;
-        let (response, condition) = self.respond(poses, basis)?;
+        let (response, condition) = self.respond(poses, basis, films)?;
         let volume = |b: usize| model.bodies[b].faces.volume();
         let solved = Solved::new(response, basis, volume, condition)?;
         if solved.value.momenta().iter().any(|x| !x.is_finite()) {
@@ -147,7 +167,7 @@ impl Coupling for PanelCoupled {
     /// A solve that misses its tolerance, bodies that overlap or reach through a wall. Overlap is
     /// noticed where a panel's centroid is inside another body.
     fn evaluate(&self, poses: &[Pose], basis: &DMatrix<f64>) -> Result<Momenta> {
-        Ok(self.solved(poses, basis)?.value)
+        self.evaluate_held(poses, basis, &Arc::default())
     }
 
     fn differentiable(&self) -> Option<&dyn Linearise> {
@@ -164,7 +184,7 @@ impl Coupling for PanelCoupled {
     ) -> Result<Vec<Vec3>> {
         let model = self.model();
         let column = DMatrix::from_column_slice(twists.len(), 1, twists.as_slice());
-        let placed = PlacedPanels::new(model, poses, &column)?;
+        let placed = PlacedPanels::new(model, poses, &Arc::default(), &column)?;
         let phi = placed.potentials(&column)?;
         let mut out = vec![Vec3::zeros(); points.len()];
         for (b, body) in model.bodies.iter().enumerate() {
@@ -186,6 +206,30 @@ impl Coupling for PanelCoupled {
 
 impl Linearise for PanelCoupled {
     fn linearise(&self, poses: &[Pose], basis: &DMatrix<f64>) -> Result<Box<dyn Linearised + '_>> {
-        Ok(Box::new(self.solved(poses, basis)?.linearise()?))
+        self.linearise_held(poses, basis, &Arc::default())
+    }
+}
+
+impl HeldApart for PanelCoupled {
+    fn panels(&self) -> &PanelCoupled {
+        self
+    }
+
+    fn evaluate_held(
+        &self,
+        poses: &[Pose],
+        basis: &DMatrix<f64>,
+        films: &Arc<PlacedFilms>,
+    ) -> Result<Momenta> {
+        Ok(self.solved(poses, basis, films)?.value)
+    }
+
+    fn linearise_held<'a>(
+        &'a self,
+        poses: &[Pose],
+        basis: &DMatrix<f64>,
+        films: &Arc<PlacedFilms<'a>>,
+    ) -> Result<Box<dyn Linearised + 'a>> {
+        Ok(Box::new(self.solved(poses, basis, films)?.linearise()?))
     }
 }

@@ -4,6 +4,7 @@ use super::PanelModel;
 use super::system::System;
 use crate::adjoint::kernel::{double_vjp, single_sum, single_vjp};
 use crate::adjoint::lie::{Pose, Vec6};
+use crate::coupling::film::PlacedFilms;
 use crate::coupling::pair::Pair;
 use crate::coupling::response::{self, body_twists, moves};
 use crate::coupling::{CoupledResponse, Direction, PairTensor, Reached, Tangent};
@@ -19,6 +20,8 @@ pub(super) struct PlacedPanels<'a> {
     pub poses: Vec<Pose>,
     /// Panels of the target, points of the source: all whose relative placement changes.
     pub pairs: Vec<Pair>,
+    /// What holds some of them apart.
+    pub films: Arc<PlacedFilms<'a>>,
     pub system: System<'a>,
     /// S F of the unit twists of each body that the first twists move, at all points.
     readout: Vec<Option<Columns>>,
@@ -42,10 +45,16 @@ impl<'a> PlacedPanels<'a> {
     ///
     /// # Errors
     /// Bodies inside each other, or behind a wall.
-    pub fn new(coupled: &'a PanelModel, poses: &[Pose], twists: &DMatrix<f64>) -> Result<Self> {
-        let system = System::new(coupled, poses)?;
-        let pairs = pairs(coupled, poses);
+    pub fn new(
+        coupled: &'a PanelModel,
+        poses: &[Pose],
+        films: &Arc<PlacedFilms<'a>>,
+        twists: &DMatrix<f64>,
+    ) -> Result<Self> {
+        let system = System::new(coupled, poses, films)?;
+        let pairs = pairs(coupled, poses, films);
         Ok(Self {
+            films: films.clone(),
             coupled,
             poses: poses.to_vec(),
             readout: readouts(coupled, &pairs, twists),
@@ -297,7 +306,7 @@ pub(super) fn scaled(factor: f64, x: &[f64]) -> Vec<f64> {
 }
 
 /// All but each body with its own points and with those of bodies that it doesn't feel; images count always.
-fn pairs(coupled: &PanelModel, poses: &[Pose]) -> Vec<Pair> {
+fn pairs(coupled: &PanelModel, poses: &[Pose], films: &PlacedFilms) -> Vec<Pair> {
     let mut out = Vec::new();
     for target in 0..coupled.bodies.len() {
         for image in &coupled.images {
@@ -308,7 +317,7 @@ fn pairs(coupled: &PanelModel, poses: &[Pose]) -> Vec<Pair> {
                 }
                 let points = &coupled.bodies[source].faces.centres;
                 let (at, from) = ((target, &poses[target]), (source, &poses[source]));
-                out.push(Pair::new(at, from, image, points));
+                out.push(Pair::new(at, from, image, points).held_off(films));
             }
         }
     }

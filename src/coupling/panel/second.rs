@@ -3,7 +3,7 @@
 use super::placed::{PanelSolution, PlacedPanels, scaled};
 use crate::Result;
 use crate::adjoint::kernel::{double_hvp, double_jvp, double_vjp, single_hvp, single_jvp};
-use crate::adjoint::lie::{Vec3, Vec6, point_wrench, six};
+use crate::adjoint::lie::{Vec3, Vec6, linear, point_wrench, six};
 use crate::coupling::Tangent;
 use crate::coupling::pair::{Pair, vector};
 use crate::coupling::response::symmetrised;
@@ -14,6 +14,14 @@ use nalgebra::DVector;
 struct Moved {
     phi: Columns,
     mu: Columns,
+}
+
+/// Of a pair's points, in the frame of the panels.
+struct Displacements {
+    /// As the panels see them.
+    points: Vec<Vec3>,
+    /// Where they aren't held off.
+    arms: Vec<Vec3>,
 }
 
 impl PlacedPanels<'_> {
@@ -29,13 +37,32 @@ impl PlacedPanels<'_> {
         let mut transposed = Columns::zeros(self.coupled.rows(), n);
         // δSᵀ μ
         let mut back = Columns::zeros(self.coupled.rows(), n);
-        let displacement = |pair: &Pair| pair.displacements(&self.poses[pair.target], z);
-        let displacements: Vec<Vec<Vec3>> = self.pairs.iter().map(displacement).collect();
+        let films = self.films.along(z);
+        let displacement = |pair: &Pair| {
+            let arms = pair.displacements(&self.poses[pair.target], z);
+            let held = pair.moving(&films);
+            let shift = held.map_or(Vec3::zeros(), |(apart, film)| apart.rate(film));
+            Displacements {
+                points: arms.iter().map(|d| d + shift).collect(),
+                arms,
+            }
+        };
+        let displacements: Vec<Displacements> = self.pairs.iter().map(displacement).collect();
         let pairs = || {
             let given = solution.fields().iter().zip(&displacements);
             self.pairs.iter().zip(given)
         };
-        for (pair, (fields, displacement)) in pairs() {
+        for (
+            pair,
+            (
+                fields,
+                Displacements {
+                    points: displacement,
+                    ..
+                },
+            ),
+        ) in pairs()
+        {
             let (panels, points) = self.ranges(pair);
             for (i, d) in displacement.iter().enumerate() {
                 for k in 0..n {
@@ -77,6 +104,11 @@ impl PlacedPanels<'_> {
             let pose = &self.poses[pair.target];
             pair.apply(pose, &w, &mut gradient);
             pair.apply_jvp(pose, &w, &dw, &z[pair.target], &mut wrench);
+            if let Some((apart, film)) = pair.moving(&films) {
+                let (w, dw) = apart.wrench_and_rate(film, [&linear(&w), &linear(&dw)]);
+                film.placed.apply(&w, &mut gradient);
+                film.apply_rate((&w, &dw), z, &mut wrench);
+            }
         }
         Ok(Tangent {
             momentum_x: momentum(0),
@@ -90,11 +122,11 @@ impl PlacedPanels<'_> {
     fn pair_tangent(
         &self,
         pair: &Pair,
-        (fields, d): (&Vec<f64>, &Vec<Vec3>),
+        (fields, moving): (&Vec<f64>, &Displacements),
         solution: &PanelSolution,
         moved: &Moved,
     ) -> (Vec6, Vec6) {
-        let n = solution.twists.ncols();
+        let (n, d) = (solution.twists.ncols(), &moving.points);
         let (panels, points) = self.ranges(pair);
         let triangles = self.coupled.bodies[pair.target].panels().triangles();
         let sign = pair.image.sign;
@@ -117,7 +149,7 @@ impl PlacedPanels<'_> {
                 df += weight * (moved.mu.at(at, x) * field + solution.mu.at(at, x) * dfield);
             }
             w += point_wrench(s, &f);
-            dw += six(&df, &(d[i].cross(&f) + s.cross(&df)));
+            dw += six(&df, &(moving.arms[i].cross(&f) + s.cross(&df)));
         }
         (w, dw)
     }

@@ -6,7 +6,9 @@ use crate::adjoint::kernel::{Sources, Write, double_fill};
 use crate::adjoint::lie::{Pose, Vec3};
 use crate::adjoint::solve::Columnwise;
 use crate::coupling::Reached;
+use crate::coupling::film::PlacedFilms;
 use crate::coupling::full::FullSolver;
+use crate::coupling::pair::Pair;
 use crate::coupling::settings::converged;
 use crate::geometry::Image;
 use crate::solver::{Columns, Lu, gmres};
@@ -26,6 +28,7 @@ const GROUP: usize = 128;
 struct Placed<'a> {
     coupled: &'a PanelModel,
     poses: &'a [Pose],
+    films: &'a PlacedFilms<'a>,
 }
 
 /// A = ½I + Ω/4π at given poses.
@@ -55,8 +58,12 @@ impl<'a> System<'a> {
     ///
     /// # Errors
     /// Bodies inside each other, or behind a wall.
-    pub fn new(coupled: &'a PanelModel, poses: &[Pose]) -> Result<Self> {
-        let placed = Placed { coupled, poses };
+    pub fn new(coupled: &'a PanelModel, poses: &[Pose], films: &PlacedFilms) -> Result<Self> {
+        let placed = Placed {
+            coupled,
+            poses,
+            films,
+        };
         coupled.check_walls(poses)?;
         let matrix = match coupled.settings.solver {
             FullSolver::Qr => Matrix::Factored(placed.dense()?),
@@ -110,13 +117,13 @@ impl<'a> System<'a> {
 }
 
 impl Placed<'_> {
-    /// Centroids of body `target` in the frame of body `source`, mirrored.
-    pub fn seen_from(&self, image: &Image, source: usize, target: usize) -> Vec<Vec3> {
-        let (turn, shift) = image.placement(&self.poses[source]);
-        let centres = self.coupled.bodies[target].faces.centres.iter();
-        centres
-            .map(|c| turn.tr_mul(&(self.poses[target].apply(c) - shift)))
-            .collect()
+    /// Centroids of body `target` in the frame of body `source`, mirrored, as far off as they are held.
+    pub fn seen_from(&self, image: &Image, source: usize, target: usize) -> Sources {
+        let centres = &self.coupled.bodies[target].faces.centres;
+        let at = |b: usize| (b, &self.poses[b]);
+        Pair::new(at(source), at(target), image, centres)
+            .held_off(self.films)
+            .points
     }
 
     /// Images of body `source` that body `target` feels; of its own all but itself.
@@ -216,7 +223,7 @@ impl Placed<'_> {
             if write == Write::Add {
                 signed(out);
             }
-            double_fill(triangles, &Sources::new(&seen), write, out, stride, column);
+            double_fill(triangles, &seen, write, out, stride, column);
             signed(out);
         }
         let sums = out.par_chunks(stride * GROUP).map(|rows| {
@@ -316,6 +323,12 @@ impl PanelModel {
     /// As there.
     pub fn check_apart(&self, poses: &[Pose]) -> Result<()> {
         let coupled = self;
-        Placed { coupled, poses }.blocks().map(|_| ())
+        let films = &PlacedFilms::default();
+        let placed = Placed {
+            coupled,
+            poses,
+            films,
+        };
+        placed.blocks().map(|_| ())
     }
 }

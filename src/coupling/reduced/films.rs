@@ -2,11 +2,10 @@
 
 use super::{Reduced, compress};
 use crate::adjoint::lie::Pose;
-use crate::coupling::film::{Film, FilmSurface, PlacedFilm, Side, Width};
-use crate::geometry::{Image, Opposite, Other, Solid, TriMesh, Wall, WallSurface};
+use crate::coupling::film::{Extent, FilmBody, Films, PlacedFilms, Shares};
+use crate::geometry::{Solid, TriMesh, Wall};
 use crate::{Error, Result};
 use nalgebra::DMatrix;
-use rayon::prelude::*;
 use std::sync::Arc;
 
 /// The gap below which compressed sources are held apart, in the least that they resolve, times the area of a body over that of the ball of equal volume: flat bodies
@@ -14,8 +13,12 @@ use std::sync::Arc;
 const REACH: f64 = 1.4;
 /// Power of the compression's tolerance by which gaps narrow in which its sources are right.
 const FINER: f64 = 0.6;
-/// How far they are held apart at contact, in that.
-const FLOOR: f64 = 0.25;
+const SHARES: Shares = Shares {
+    floor: 0.25,
+    rim: 0.43,
+    rim_to_wall: 0.65,
+    in_corners: true,
+};
 
 impl Reduced {
     /// The same with films in the gaps between bodies, and to rigid walls, that the sources don't resolve: from the surface of each body in its own frame, and its
@@ -39,72 +42,28 @@ impl Reduced {
                 return Err(Error::input(what, given, expected));
             }
         }
-        let mut sides: Vec<(Arc<FilmSurface>, Arc<Opposite>)> = Vec::with_capacity(count);
-        for (b, (mesh, solid)) in surfaces.iter().enumerate() {
-            let shared = |a: &usize| Arc::ptr_eq(&self.bodies[*a], &self.bodies[b]);
-            sides.push(match (0..b).find(shared) {
-                Some(a) => sides[a].clone(),
-                None => {
-                    let opposite = Opposite::of_body(*solid, mesh);
-                    (
-                        Arc::new(FilmSurface::new(mesh, solid.is_some())),
-                        Arc::new(opposite),
-                    )
-                }
-            });
-        }
+        let same = |a: usize, b: usize| Arc::ptr_eq(&self.bodies[a], &self.bodies[b]);
+        let bodies = FilmBody::all(surfaces, 0, same);
         let reach = |b: usize| {
             let fit = &self.bodies[b].parts().fit;
             // Sources of a smaller tolerance are right in narrower gaps, and more than films are.
             let finer = (tolerances[b] / compress::CompressSettings::default().tolerance).min(1.0);
-            REACH * sides[b].0.flatness * fit.finest() * finer.powf(FINER)
+            REACH * bodies[b].surface.flatness * fit.finest() * finer.powf(FINER)
         };
-        let film = |body: usize, other, opposite: &Arc<Opposite>, reach: f64| {
-            let floor = FLOOR * reach;
-            let between = (sides[body].0.clone(), opposite.clone());
-            Film::new(body, other, between, Width { floor, reach })
-        };
-        let mut films = Vec::new();
-        for (w, wall) in walls.iter().enumerate() {
-            if wall.surface == WallSurface::Rigid {
-                let image = Image::of_walls(std::slice::from_ref(wall))?[1];
-                let plane = Arc::new(Opposite::of_wall(wall.half_space(w)?));
-                films.extend((0..count).map(|b| film(b, Side::Wall(image), &plane, reach(b))));
-            }
-        }
-        for a in 0..count {
-            for b in a + 1..count {
-                // The smaller one's faces lie within the gap.
-                let larger = sides[b].0.size < sides[a].0.size;
-                let (own, other) = if larger { (b, a) } else { (a, b) };
-                let reach = reach(a).max(reach(b));
-                films.push(film(own, Side::Body(other), &sides[other].1, reach));
-            }
-        }
-        self.films = films;
+        let reaches: Vec<f64> = (0..count).map(reach).collect();
+        self.films = Films::new(&bodies, &reaches, &SHARES, walls)?;
         Ok(self)
     }
 
-    /// The gap from which on each pair has a film, m: a body's number, and another's or a wall's.
+    /// Where there may be films.
     ///
     /// # Errors
     /// A wall without normal.
-    pub(crate) fn film_reaches(&self, walls: &[Wall]) -> Result<Vec<(usize, Other, f64)>> {
-        let mut images = Vec::with_capacity(walls.len());
-        for wall in walls {
-            images.push(Image::of_walls(std::slice::from_ref(wall))?[1]);
-        }
-        let reach = |film: &Film| {
-            let other = match film.other {
-                Side::Body(b) => Other::Body(b),
-                Side::Wall(image) => Other::Wall(images.iter().position(|i| *i == image)?),
-            };
-            Some((film.body, other, film.width.reach))
-        };
-        Ok(self.films.iter().filter_map(reach).collect())
+    pub(crate) fn film_extents(&self, walls: &[Wall]) -> Result<Vec<Extent>> {
+        self.films.extents(walls)
     }
 
-    /// The films at the poses, for a basis of body-frame twists; none of gaps that are wide.
+    /// The films at the poses, for a basis of body-frame twists.
     ///
     /// # Errors
     /// Bodies that touch.
@@ -112,27 +71,8 @@ impl Reduced {
         &self,
         poses: &[Pose],
         basis: &DMatrix<f64>,
-    ) -> Result<Vec<Option<PlacedFilm<'_>>>> {
-        let place = |film| {
-            let placed = PlacedFilm::new(film, poses, basis);
-            placed.map_err(|distance| self.touching(film, distance))
-        };
-        self.films.par_iter().map(place).collect()
-    }
-
-    /// What films add to the impulses of body-frame twists, 6·bodies × columns, at density 1.
-    ///
-    /// # Errors
-    /// Bodies that touch.
-    pub(crate) fn film_momenta(
-        &self,
-        poses: &[Pose],
-        twists: &DMatrix<f64>,
-    ) -> Result<DMatrix<f64>> {
-        let mut out = DMatrix::zeros(twists.nrows(), twists.ncols());
-        let films = self.placed_films(poses, twists)?;
-        (films.iter().flatten()).for_each(|film| film.add_impulses(twists, &mut out));
-        Ok(out)
+    ) -> Result<PlacedFilms<'_>> {
+        self.films.place(poses, basis, &self.names)
     }
 
     /// Whether there are films at the poses.
@@ -142,21 +82,6 @@ impl Reduced {
     #[cfg(feature = "gpu")]
     pub(crate) fn narrow(&self, poses: &[Pose]) -> Result<bool> {
         let none = DMatrix::zeros(6 * self.bodies.len(), 0);
-        let films = self.placed_films(poses, &none)?;
-        Ok(films.iter().any(Option::is_some))
-    }
-
-    fn touching(&self, film: &Film, value: f64) -> Error {
-        let own = format!("body {:?}", self.names[film.body]);
-        Error::Unresolved {
-            place: match film.other {
-                Side::Body(b) => format!("{own} and body {:?}", self.names[b]),
-                Side::Wall(_) => format!("{own} and a wall"),
-            },
-            quantity: "gap in m".into(),
-            value,
-            limit: 0.0,
-            remedy: "the water has no flow between surfaces that touch: hold them apart by contact with a gap, or end the run before".into(),
-        }
+        Ok(self.placed_films(poses, &none)?.any())
     }
 }

@@ -1,12 +1,12 @@
 //! One evaluation of the reduced coupling: value and first derivative. What a value costs is all that the derivatives need.
 
 use super::Reduced;
-use super::link::{Apart, Link, PlacedSkeletons};
+use super::link::{Link, PlacedSkeletons};
 use super::views::{FLUX, interleave, view, view_mut};
 use crate::Result;
 use crate::adjoint::kernel::{Points, potential_sum, potential_vjp};
 use crate::adjoint::lie::{Pose, Vec3, Vec6, linear, point_wrench};
-use crate::coupling::film::{MovingFilm, PlacedFilm};
+use crate::coupling::film::PlacedFilms;
 use crate::coupling::pair::{vector, wrench};
 use crate::coupling::{
     Coupling, CouplingReport, Direction, Linearise, Linearised, Momenta, Pullback, Tangent,
@@ -16,7 +16,6 @@ use faer::linalg::matmul::matmul;
 use faer::reborrow::ReborrowMut;
 use faer::{Accum, Mat, MatRef, Par};
 use nalgebra::{DMatrix, DVector};
-use rayon::prelude::*;
 use std::sync::OnceLock;
 
 /// Work of [`ReducedLinearised::new`] per pair of points, relative to that of its derivatives.
@@ -29,8 +28,8 @@ pub(super) struct ReducedLinearised<'a> {
     pub reduced: &'a Reduced,
     pub poses: Vec<Pose>,
     pub placed: Vec<PlacedSkeletons<'a>>,
-    /// Of the gaps; none of those that are wide.
-    films: Vec<Option<PlacedFilm<'a>>>,
+    /// Of the gaps.
+    pub films: PlacedFilms<'a>,
     /// Of I − LᵀGL.
     pub factor: Cholesky,
     /// LᵀGŪ, modes × 6 bodies.
@@ -144,8 +143,7 @@ impl<'a> ReducedLinearised<'a> {
             let mut rows = out.rows_mut(6 * b, 6);
             rows += body.parts().added_mass * twists.rows(6 * b, 6);
         }
-        let films = self.films.iter().flatten();
-        films.for_each(|film| film.add_impulses(twists, &mut out));
+        self.films.add_impulses(twists, &mut out);
         out
     }
 
@@ -196,32 +194,12 @@ impl<'a> ReducedLinearised<'a> {
         (alpha, FLUX * (direct + self.solution.tr_mul(&a)))
     }
 
-    /// Films that are there.
-    pub fn films(&self) -> impl Iterator<Item = &PlacedFilm<'a>> {
-        self.films.iter().flatten()
-    }
-
-    /// The films along displacements.
-    pub fn moving_films(&self, z: &[Vec6]) -> Vec<Option<MovingFilm<'_>>> {
-        let all = self.films.par_iter();
-        all.map(|film| film.as_ref()?.along(z)).collect()
-    }
-
-    /// What holds a link apart, if anything does.
-    pub fn apart<'p>(
-        &'p self,
-        placed: &'p PlacedSkeletons,
-    ) -> Option<(&'p Apart, &'p PlacedFilm<'a>)> {
-        let apart = placed.apart.as_ref()?;
-        Some((apart, self.films[apart.film].as_ref()?))
-    }
-
     /// Adds the wrench of a link and of what holds it apart, of which the first part of the wrench is by forces on the points.
     pub fn apply(&self, placed: &PlacedSkeletons, wrench: &Vec6, force: &Vec3, out: &mut [Vec6]) {
         placed
             .pair
             .apply(&self.poses[placed.link.target], wrench, out);
-        if let Some((apart, film)) = self.apart(placed) {
+        if let Some((apart, film)) = placed.pair.film(&self.films) {
             film.apply(&apart.wrench(film, force), out);
         }
     }
@@ -262,20 +240,6 @@ impl<'a> ReducedLinearised<'a> {
             self.apply(placed, wrench, force, &mut out);
         }
         out
-    }
-
-    pub fn pull_back_films(&self, x: &DVector<f64>, y: &DVector<f64>, out: &mut [Vec6]) {
-        for (film, wrench) in self.each_film(|film| film.wrench(x, y)) {
-            film.apply(&wrench, out);
-        }
-    }
-
-    fn each_film<T: Send>(
-        &self,
-        of: impl Fn(&PlacedFilm<'a>) -> T + Sync,
-    ) -> Vec<(&PlacedFilm<'a>, T)> {
-        let films: Vec<_> = self.films().collect();
-        films.into_par_iter().map(|film| (film, of(film))).collect()
     }
 
     fn fields(&self) -> &[Fields] {
@@ -330,11 +294,7 @@ impl<'a> ReducedLinearised<'a> {
                 self.apply(placed, &total, &pushed, out);
             }
         }
-        for (film, wrenches) in self.each_film(|film| film.column_wrenches(x)) {
-            for (column, wrench) in &wrenches {
-                film.apply(wrench, &mut out[*column]);
-            }
-        }
+        self.films.add_column_wrenches(x, &mut out);
         out
     }
 
@@ -406,9 +366,7 @@ impl Linearised for ReducedLinearised<'_> {
     fn gradient(&self, x: &DVector<f64>, y: &DVector<f64>) -> Result<Vec<Vec6>> {
         let (a, b) = (&self.alpha * x, &self.alpha * y);
         let mut out = self.pull_back(a.as_slice(), b.as_slice());
-        for (film, wrench) in self.each_film(|film| film.basis_wrench(&self.basis, [x, y])) {
-            film.apply(&wrench, &mut out);
-        }
+        self.films.add_basis_wrenches(&self.basis, [x, y], &mut out);
         Ok(out)
     }
 
@@ -418,20 +376,17 @@ impl Linearised for ReducedLinearised<'_> {
 
     fn gradient_along(&self, y: &DVector<f64>, z: &[Vec6]) -> Result<DVector<f64>> {
         let charges = &self.alpha * y;
-        let films = self.moving_films(z);
+        let films = self.films.along(z);
         let (psi, _) = self.tangent_potentials(&[charges.as_slice()], z, &films);
         let mut rate = DVector::zeros(self.basis.nrows());
-        let twists = &self.basis * y;
-        for film in films.iter().flatten() {
-            film.add_impulse_rate(&film.flow(&twists), &mut rate);
-        }
+        films.add_impulse_rate(&(&self.basis * y), &mut rate);
         Ok(FLUX * self.alpha.tr_mul(&psi.column(0)) + self.basis.tr_mul(&rate))
     }
 
     fn vjp(&self, x: Direction, y: Direction) -> Result<Pullback> {
         let (x, y) = (self.respond(x), self.respond(y));
         let mut wrench = self.pull_back(x.alpha.as_slice(), y.alpha.as_slice());
-        self.pull_back_films(&x.twists, &y.twists, &mut wrench);
+        self.films.add_wrenches(&x.twists, &y.twists, &mut wrench);
         Ok(Pullback {
             momentum_x: self.impulse(&x),
             momentum_y: self.impulse(&y),
@@ -483,6 +438,10 @@ impl Coupling for Reduced {
 
     fn evaluate(&self, poses: &[Pose], basis: &DMatrix<f64>) -> Result<Momenta> {
         Ok(ReducedLinearised::new(self, poses, basis)?.value())
+    }
+
+    fn film_momenta(&self, poses: &[Pose], twists: &DMatrix<f64>) -> Result<Option<DMatrix<f64>>> {
+        Ok(Some(self.films.momenta(poses, twists, &self.names)?))
     }
 
     fn differentiable(&self) -> Option<&dyn Linearise> {

@@ -2,8 +2,8 @@
 
 use super::ReducedBody;
 use crate::adjoint::kernel::{Write, potential_fill};
-use crate::adjoint::lie::{Pose, Vec3, Vec6};
-use crate::coupling::film::{MovingFilm, PlacedFilm, Side};
+use crate::adjoint::lie::{Pose, Vec3};
+use crate::coupling::film::PlacedFilms;
 use crate::coupling::pair::Pair;
 use crate::geometry::Image;
 use std::sync::Arc;
@@ -65,59 +65,6 @@ pub(super) struct PlacedSkeletons<'a> {
     pub centre: Vec3,
     /// Weight at the present distance, with two derivatives.
     pub weight: [f64; 3],
-    /// By how much the source's points are held off.
-    pub apart: Option<Apart>,
-}
-
-/// A link whose source is held off from its target, for the gap is narrower than the points resolve.
-pub(super) struct Apart {
-    /// Number of the film.
-    pub film: usize,
-    /// Which of the film's shifts it goes by: 0 in the frame of its first body, 1 in that of the other.
-    at: usize,
-    /// −1 where the film's first body is the source; twice for an image.
-    sign: f64,
-}
-
-impl Apart {
-    /// What holds the link apart, of the films at the poses.
-    fn find(link: &Link, films: &[Option<PlacedFilm>]) -> Option<Self> {
-        let of = |(film, placed): (usize, &Option<PlacedFilm>)| {
-            let here = placed.as_ref()?.film;
-            let (at, sign) = match here.other {
-                Side::Wall(w) => {
-                    let own = here.body == link.target && link.target == link.source;
-                    (own && link.image == w).then_some((0, 2.0))
-                }
-                Side::Body(_) if !link.image.is_identity() => None,
-                Side::Body(b) if (here.body, b) == (link.target, link.source) => Some((0, 1.0)),
-                Side::Body(b) if (b, here.body) == (link.target, link.source) => Some((1, -1.0)),
-                Side::Body(_) => None,
-            }?;
-            Some(Self { film, at, sign })
-        };
-        films.iter().enumerate().find_map(of)
-    }
-
-    /// In the target's frame.
-    pub fn shift(&self, film: &PlacedFilm) -> Vec3 {
-        self.sign * film.shift[self.at]
-    }
-
-    /// Its rate.
-    pub fn rate(&self, film: &MovingFilm) -> Vec3 {
-        self.sign * film.shift_rate(self.at)
-    }
-
-    /// What a force on all points together, target's frame, exerts by way of the shift, in the film's frame.
-    pub fn wrench(&self, film: &PlacedFilm, force: &Vec3) -> Vec6 {
-        film.shift_wrench(self.at, &(self.sign * force))
-    }
-
-    /// The same and its rate, of a force that changes.
-    pub fn wrench_and_rate(&self, film: &MovingFilm, [force, dforce]: [&Vec3; 2]) -> (Vec6, Vec6) {
-        film.shift_wrench(self.at, &(self.sign * force), &(self.sign * dforce))
-    }
 }
 
 impl Link {
@@ -179,28 +126,17 @@ impl Link {
         &self,
         bodies: &[Arc<ReducedBody>],
         poses: &[Pose],
-        films: &[Option<PlacedFilm>],
+        films: &PlacedFilms,
     ) -> Option<PlacedSkeletons<'_>> {
         let (t, s) = (self.target, self.source);
         let (centre, between, weight) = self.reach(bodies, poses);
         let points = &bodies[s].parts().points;
-        (weight[0] > 0.0).then(|| {
-            let mut pair = Pair::new((t, &poses[t]), (s, &poses[s]), &self.image, points);
-            let apart = Apart::find(self, films);
-            if let Some((apart, film)) = apart
-                .as_ref()
-                .and_then(|a| Some((a, films[a.film].as_ref()?)))
-            {
-                pair.hold_off(&apart.shift(film));
-            }
-            PlacedSkeletons {
-                link: self,
-                pair,
-                between,
-                centre,
-                weight,
-                apart,
-            }
+        (weight[0] > 0.0).then(|| PlacedSkeletons {
+            link: self,
+            pair: Pair::new((t, &poses[t]), (s, &poses[s]), &self.image, points).held_off(films),
+            between,
+            centre,
+            weight,
         })
     }
 }

@@ -7,7 +7,7 @@ use super::views::{FLUX, view_mut};
 use crate::adjoint::kernel::{potential_hvp, potential_jvp, potential_vjp};
 use crate::adjoint::lie::{Vec3, Vec6, angular, linear, point_wrench};
 use crate::coupling::Tangent;
-use crate::coupling::film::MovingFilm;
+use crate::coupling::film::MovingFilms;
 use crate::coupling::pair::{vector, wrench};
 use nalgebra::{DMatrix, DVector};
 
@@ -40,7 +40,7 @@ impl ReducedLinearised<'_> {
         let mut wrenches = self.pull_back_pairs(&charges, &(&self.alpha * x));
         let other = &self.basis * x;
         for (twist, out) in twists.column_iter().zip(&mut wrenches) {
-            self.pull_back_films(&twist.into_owned(), &other, out);
+            self.films.add_wrenches(&twist.into_owned(), &other, out);
         }
         (self.impulses(twists, &a), wrenches)
     }
@@ -96,7 +96,7 @@ impl ReducedLinearised<'_> {
     /// summed up once; bodies being rigid, a displacement combines it.
     pub(super) fn second_many(&self, x: &DVector<f64>, z: &[Vec<Vec6>]) -> Vec<Tangent> {
         let (alpha, twists) = (&self.alpha * x, &self.basis * x);
-        let films: Vec<_> = z.iter().map(|z| self.moving_films(z)).collect();
+        let films: Vec<_> = z.iter().map(|z| self.films.along(z)).collect();
         let one = |placed: &PlacedSkeletons| self.bend(placed, &alpha, z, &films);
         let bent = self.reduced.over(&self.placed, TANGENT, one);
         let mut psi = DMatrix::zeros(alpha.len(), z.len());
@@ -130,7 +130,7 @@ impl ReducedLinearised<'_> {
         placed: &PlacedSkeletons,
         alpha: &DVector<f64>,
         z: &[Vec<Vec6>],
-        films: &[Vec<Option<MovingFilm>>],
+        films: &[MovingFilms],
     ) -> Bent {
         let link = placed.link;
         let (t, s) = (self.range(link.target), self.range(link.source));

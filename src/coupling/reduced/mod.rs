@@ -36,7 +36,7 @@ pub use link::{Cutoff, Link};
 pub use region::Region;
 
 use super::Exclusions;
-use super::film::{Film, Side};
+use super::film::Films;
 use super::settings::{end, ranges};
 use crate::Result;
 use crate::geometry::{Image, Wall};
@@ -55,7 +55,7 @@ pub struct Reduced {
     names: Vec<String>,
     links: Vec<Link>,
     /// Of gaps that the sources don't resolve.
-    films: Vec<Film>,
+    films: Films,
     points: Vec<Range<usize>>,
     modes: Vec<Range<usize>>,
 }
@@ -77,7 +77,7 @@ impl Reduced {
             points: ranges(bodies.iter().map(|b| b.points())),
             modes: ranges(bodies.iter().map(|b| b.modes())),
             links,
-            films: Vec::new(),
+            films: Films::default(),
             names: bodies.iter().map(|b| b.parts().name.clone()).collect(),
             bodies,
         })
@@ -91,10 +91,7 @@ impl Reduced {
         pairs.check(self.bodies.len())?;
         let apart = |l: &Link| !l.image.is_identity() || !pairs.contains(l.target, l.source);
         self.links.retain(apart);
-        self.films.retain(|film| match film.other {
-            Side::Body(b) => !pairs.contains(film.body, b),
-            Side::Wall(_) => true,
-        });
+        self.films.exclude(pairs);
         Ok(self)
     }
 

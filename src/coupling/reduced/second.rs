@@ -1,11 +1,11 @@
 //! Second derivatives along one displacement: the tangent of the first.
 
 use super::linearised::{ReducedLinearised, ReducedResponse};
-use super::link::{Apart, PlacedSkeletons};
+use super::link::PlacedSkeletons;
 use super::views::{FLUX, interleave};
 use crate::adjoint::kernel::{potential_hvp, potential_jvp, potential_vjp};
 use crate::adjoint::lie::{Vec3, Vec6, linear, point_velocity, point_wrench, six};
-use crate::coupling::film::MovingFilm;
+use crate::coupling::film::MovingFilms;
 use crate::coupling::pair::vector;
 use crate::coupling::{Direction, Tangent};
 use nalgebra::{DMatrix, DVector};
@@ -29,22 +29,8 @@ pub(super) struct Moved {
     pub shifted: Vec3,
 }
 
-/// What holds a link apart, if anything does.
-fn moving<'p>(
-    placed: &'p PlacedSkeletons,
-    films: &'p [Option<MovingFilm<'p>>],
-) -> Option<(&'p Apart, &'p MovingFilm<'p>)> {
-    let apart = placed.apart.as_ref()?;
-    Some((apart, films[apart.film].as_ref()?))
-}
-
 impl ReducedLinearised<'_> {
-    pub(super) fn moved(
-        &self,
-        placed: &PlacedSkeletons,
-        z: &[Vec6],
-        films: &[Option<MovingFilm>],
-    ) -> Moved {
+    pub(super) fn moved(&self, placed: &PlacedSkeletons, z: &[Vec6], films: &MovingFilms) -> Moved {
         let pose = &self.poses[placed.link.target];
         let relative = placed.pair.image.twist(&z[placed.link.source]) - z[placed.link.target];
         let local = pose.twist_to_body(&relative);
@@ -55,7 +41,7 @@ impl ReducedLinearised<'_> {
             0.0
         };
         let arms = placed.pair.displacements(pose, z);
-        let held = moving(placed, films);
+        let held = placed.pair.moving(films);
         let shift = held.map_or(Vec3::zeros(), |(apart, film)| apart.rate(film));
         Moved {
             points: arms.iter().map(|d| d + shift).collect(),
@@ -73,7 +59,7 @@ impl ReducedLinearised<'_> {
         &self,
         alpha: &[&[f64]],
         z: &[Vec6],
-        films: &[Option<MovingFilm>],
+        films: &MovingFilms,
     ) -> (DMatrix<f64>, Vec<(Moved, Vec<f64>)>) {
         let k = alpha.len();
         let one = |placed: &PlacedSkeletons| {
@@ -138,7 +124,7 @@ impl ReducedLinearised<'_> {
         let responses: Vec<_> = directions.into_iter().map(|x| self.respond(x)).collect();
         let n = responses.len();
         let alpha: Vec<&[f64]> = responses.iter().map(|r| r.alpha.as_slice()).collect();
-        let films = self.moving_films(z);
+        let films = self.films.along(z);
         let (psi, seen) = self.tangent_potentials(&alpha, z, &films);
         let (dalpha, dmomenta) = self.tangent_solution(&psi);
         let links: Vec<_> = self.placed.iter().zip(&seen).collect();
@@ -155,7 +141,7 @@ impl ReducedLinearised<'_> {
     pub(super) fn gathered(
         &self,
         z: &[Vec6],
-        films: &[Option<MovingFilm>],
+        films: &MovingFilms,
         links: &[([Vec6; 2], [Vec3; 2])],
         twists: &[&DVector<f64>],
         mut momenta: Vec<DVector<f64>>,
@@ -168,20 +154,12 @@ impl ReducedLinearised<'_> {
             let pose = &self.poses[t];
             self.apply(placed, w, f, &mut gradient);
             placed.pair.apply_jvp(pose, w, dw, &z[t], &mut wrench);
-            if let Some((apart, film)) = moving(placed, films) {
+            if let Some((apart, film)) = placed.pair.moving(films) {
                 let (w, dw) = apart.wrench_and_rate(film, [f, df]);
                 film.apply_rate((&w, &dw), z, &mut wrench);
             }
         }
-        for film in films.iter().flatten() {
-            let flows: Vec<_> = twists.iter().map(|x| film.flow(x)).collect();
-            let (w, dw) = film.wrench(&flows[0], &flows[n - 1]);
-            film.placed.apply(&w, &mut gradient);
-            film.apply_rate((&w, &dw), z, &mut wrench);
-            for (momentum, flow) in momenta.iter_mut().zip(&flows) {
-                film.add_impulse_rate(flow, momentum);
-            }
-        }
+        films.add_tangent(twists, z, (&mut gradient, &mut wrench), &mut momenta);
         Tangent {
             momentum_x: momenta[0].clone(),
             momentum_y: momenta.swap_remove(n - 1),

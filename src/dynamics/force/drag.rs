@@ -2,9 +2,7 @@
 //! −½ ρ c Σ ΔA |w| w.
 
 use super::{ForceModel, ForceParts, LoadBars, Loads, Moving, Outside, Together, Velocity};
-use crate::adjoint::drag::{
-    Element, Part, quadratic_drag, quadratic_drag_derivative, quadratic_drag_jvp, resistance,
-};
+use crate::adjoint::drag::{Part, Surface, quadratic_drag, quadratic_drag_derivative, resistance};
 use crate::adjoint::lie::{Mat6, Pose, Vec6, cross_force};
 use crate::dynamics::Parameters;
 use crate::dynamics::parameters::{DENSITY, Declarations, Declared, Owner, Parameter, Range};
@@ -35,7 +33,7 @@ struct Dragged {
 enum Law {
     Linear(Box<Mat6>),
     /// At unit density.
-    Quadratic(Vec<Element>, Part),
+    Quadratic(Surface),
 }
 
 pub(super) fn linear(
@@ -75,7 +73,7 @@ pub(super) fn quadratic(
             Some(given) if !surface.is_empty() => bodies.push(Dragged {
                 body,
                 coefficient: parameters.declare(owner, QUADRATIC, given.quadratic),
-                law: Law::Quadratic(surface.clone(), part(given.quadratic_part)),
+                law: Law::Quadratic(Surface::new(surface, part(given.quadratic_part))),
             }),
             _ => {
                 parameters.declare(owner, NONE, 0.0);
@@ -102,22 +100,18 @@ impl Law {
     fn wrench(&self, nu: &Vec6) -> Vec6 {
         match self {
             Self::Linear(resistance) => -(**resistance * nu),
-            Self::Quadratic(surface, part) => quadratic_drag(surface, *part, nu),
+            Self::Quadratic(surface) => quadratic_drag(surface, nu),
         }
     }
 
-    fn jvp(&self, nu: &Vec6, dnu: &Vec6) -> Vec6 {
+    /// The derivative of the wrench, symmetric, and the wrench, at the cost of the first.
+    fn slope(&self, nu: &Vec6) -> (Mat6, Vec6) {
         match self {
-            Self::Linear(resistance) => -(**resistance * dnu),
-            Self::Quadratic(surface, part) => quadratic_drag_jvp(surface, *part, nu, dnu),
-        }
-    }
-
-    /// Derivative of [`Law::wrench`].
-    fn slope(&self, nu: &Vec6) -> Mat6 {
-        match self {
-            Self::Linear(resistance) => -**resistance,
-            Self::Quadratic(surface, part) => quadratic_drag_derivative(surface, *part, nu),
+            Self::Linear(resistance) => (-**resistance, self.wrench(nu)),
+            Self::Quadratic(surface) => {
+                let slope = quadratic_drag_derivative(surface, nu);
+                (slope, 0.5 * slope * nu)
+            }
         }
     }
 }
@@ -127,27 +121,23 @@ impl Dragged {
     fn scale(&self, parameters: &Parameters) -> f64 {
         match self.law {
             Law::Linear(_) => parameters[self.coefficient],
-            Law::Quadratic(..) => parameters.density() * parameters[self.coefficient],
+            Law::Quadratic(_) => parameters.density() * parameters[self.coefficient],
         }
     }
 }
 
 impl Drag {
-    /// Adds a wrench at unit coefficient, body frame, on each body, from its pose and its velocity through the water.
-    fn spread(
-        &self,
-        at: &Moving,
-        out: &mut Loads,
-        wrench: impl Fn(&Dragged, &Pose, &Vec6) -> Vec6,
-    ) {
-        for d in &self.bodies {
-            let scale = d.scale(at.place.parameters);
-            if scale != 0.0 {
-                let pose = &at.place.poses[d.body];
-                let nu = pose.twist_to_body(&at.relative(d.body));
-                out.wrenches[d.body] += pose.wrench_to_world(&(scale * wrench(d, pose, &nu)));
-            }
-        }
+    /// What drags at all: with its scale, its body's pose and twist through the water, body frame.
+    fn acting<'d>(
+        &'d self,
+        at: &'d Moving,
+    ) -> impl Iterator<Item = (&'d Dragged, f64, &'d Pose, Vec6)> {
+        let each = self.bodies.iter();
+        let each = each.map(|d| (d, d.scale(at.place.parameters)));
+        each.filter(|(_, scale)| *scale != 0.0).map(|(d, scale)| {
+            let pose = &at.place.poses[d.body];
+            (d, scale, pose, pose.twist_to_body(&at.relative(d.body)))
+        })
     }
 }
 
@@ -157,13 +147,23 @@ impl ForceModel for Drag {
     }
 
     fn add(&self, at: &Moving, out: &mut Loads) {
-        self.spread(at, out, |d, _, nu| d.law.wrench(nu));
+        for (d, scale, pose, nu) in self.acting(at) {
+            out.wrenches[d.body] += pose.wrench_to_world(&(scale * d.law.wrench(&nu)));
+        }
     }
 
     fn jvp(&self, at: &Moving, change: &Velocity, out: &mut Loads) {
-        self.spread(at, out, |d, pose, nu| {
-            d.law.jvp(nu, &pose.twist_to_body(&change.twists[d.body]))
-        });
+        self.jvps(at, std::slice::from_ref(change), std::slice::from_mut(out));
+    }
+
+    fn jvps(&self, at: &Moving, changes: &[Velocity], out: &mut [Loads]) {
+        for (d, scale, pose, nu) in self.acting(at) {
+            let slope = scale * d.law.slope(&nu).0;
+            for (change, out) in changes.iter().zip(out.iter_mut()) {
+                let dnu = pose.twist_to_body(&change.twists[d.body]);
+                out.wrenches[d.body] += pose.wrench_to_world(&(slope * dnu));
+            }
+        }
     }
 
     fn vjp(&self, at: &Moving, z: &Velocity, bar: &mut LoadBars) {
@@ -181,21 +181,20 @@ impl ForceModel for Drag {
             }
             let relative = at.relative(b);
             let nu = pose.twist_to_body(&relative);
-            let unit = d.law.wrench(&nu);
             // The sums over the surface, once for all.
-            let slope = (scale != 0.0).then(|| d.law.slope(&nu));
+            let (slope, unit) = d.law.slope(&nu);
             for (z, bar) in z.iter().zip(bars.iter_mut()) {
                 let virt = &z.twists[b];
                 let zeta = pose.twist_to_body(virt);
                 let power = zeta.dot(&unit);
                 match d.law {
                     Law::Linear(_) => bar.parameters[d.coefficient] += power,
-                    Law::Quadratic(..) => {
+                    Law::Quadratic(_) => {
                         bar.parameters[d.coefficient] += parameters.density() * power;
                         bar.parameters[DENSITY] += parameters[d.coefficient] * power;
                     }
                 }
-                if let Some(slope) = &slope {
+                if scale != 0.0 {
                     // The rotation of the frame acts on both twists.
                     let wrench = pose.wrench_to_world(&(scale * unit));
                     let nu_bar = pose.wrench_to_world(&(scale * slope.tr_mul(&zeta)));

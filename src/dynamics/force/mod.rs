@@ -194,6 +194,13 @@ pub trait ForceModel: Send + Sync {
     /// Adds the tangent of [`ForceModel::add`] along a change of the velocity; nothing where it doesn't depend on it.
     fn jvp(&self, _at: &Moving, _change: &Velocity, _out: &mut Loads) {}
 
+    /// The same along several changes, each with what it adds to; for a force whose derivative is dear and the same for all of them.
+    fn jvps(&self, at: &Moving, changes: &[Velocity], out: &mut [Loads]) {
+        for (change, out) in changes.iter().zip(out) {
+            self.jvp(at, change, out);
+        }
+    }
+
     /// Adds the transpose of [`ForceModel::add`] in all its arguments: the gradient of its power on the velocity `z`.
     fn vjp(&self, at: &Moving, z: &Velocity, bar: &mut LoadBars);
 

@@ -15,6 +15,7 @@ use super::stages::{ContactVelocities, Stages};
 use super::start::Start;
 use super::{State, StateBar, StateTangents, StepBar, StepTangents};
 use crate::adjoint::solve::Definite;
+use crate::dynamics::slopes::columns;
 use crate::dynamics::{Dual, Evaluation};
 use crate::{Error, Result};
 use nalgebra::{DMatrix, DVector};
@@ -142,7 +143,11 @@ pub(super) fn apply(
 pub(super) fn reached(start: &Start, velocities: &ContactVelocities, hat: DVector<f64>) -> State {
     let ContactVelocities { before, after } = velocities;
     let hat = match start.near.contact_acts(before) {
-        true => hat + start.stepper.dt * start.near.contact_force(after, Dual::Frame),
+        true => {
+            // Where the momenta are taken drifts on during the step.
+            let (dt, drift) = (start.stepper.dt, &start.stepper.system.drift);
+            hat + drift.carry(dt, dt * start.near.contact_force(after, Dual::Frame))
+        }
         false => hat,
     };
     start.next_state(start.advance(after), hat)
@@ -218,7 +223,9 @@ impl<'s> Adjoint<'s> {
             let pressed = start
                 .near
                 .contact_force_slopes(velocity, Dual::Frame, entries);
-            hat += start.stepper.dt * pressed.along(along.q, Some(&after), along.inputs);
+            let pressed = pressed.along(along.q, Some(&after), along.inputs);
+            let (dt, drift) = (start.stepper.dt, &start.stepper.system.drift);
+            hat += columns(&pressed, |g| drift.carry(dt, dt * g));
         }
         let next = StateTangents {
             q: start.advance_jvp(velocity, along.q, &after),
@@ -288,7 +295,8 @@ impl<'s> Adjoint<'s> {
         if matches!(self.acting, Acting::No) {
             return Ok((after_bar, hat_bar));
         }
-        let pressed = start.near.contact_force_vjp(after, &hat_bar, Dual::Frame);
+        let impulse_bar = start.stepper.system.drift.carry_back(dt, hat_bar.clone());
+        let pressed = (start.near).contact_force_vjp(after, &impulse_bar, Dual::Frame);
         bar.add(dt, &pressed);
         let before_bar = self.solve_vjp(start, &(after_bar + dt * &pressed.v), bar)?;
         Ok((before_bar, hat_bar))

@@ -7,7 +7,7 @@
 //! δ = ½ v*ᵀ M(q⁺) v* − ½ v₀ᵀ M(q) v₀ − ½ Δt F(q, v)ᵀ (v₀ + v*) − ½ Δt g(q, v_s)ᵀ (v + v_s)
 //! ```
 //!
-//! F being all forces but the water's inertia, g those of contact. It is zero where the inertia stays what it is, whatever acts. It is taken out of e = v* − B ω, the motion
+//! F being all forces but the water's inertia, g those of contact; all velocities relative to the drift where there is a current ([`crate::dynamics::Drift`]). It is zero where the inertia stays what it is, whatever acts. It is taken out of e = v* − B ω, the motion
 //! but for the rigid one B ω of all bodies together that nothing in the water or the joints stands against ([`System::symmetric`](crate::dynamics::System)), which holds
 //! the momentum along B:
 //!
@@ -43,20 +43,40 @@ fn bounded(x: f64) -> (f64, f64) {
     (x.signum() * (WHOLE + WHOLE * over), 1.0 - over * over)
 }
 
-/// Whether a step is one that can be closed: in still water, of joints that nothing drives, and with some motion beside that of all bodies together.
+/// Whether a step is one that can be closed: in still water or where all may drift with it, of joints that nothing drives, and with some motion beside that of all bodies together.
 fn closes(start: &Start) -> bool {
     let (s, split) = (start.stepper, start.split);
-    let driven = split.is_driven.iter().zip(split.driven.iter());
-    !s.system.has_current()
+    let drift = &s.system.drift;
+    let still = &split.driven - drift.velocity();
+    let mut driven = split.is_driven.iter().zip(still.iter());
+    drift.is_whole()
         && s.system.symmetric.ncols() < split.free.len()
         && !split.moved.contains(&true)
-        && driven.clone().all(|(_, v)| *v == 0.0)
+        && driven.all(|(driven, v)| !driven || *v == 0.0)
         && s.split_at(start.state).is_driven == split.is_driven
+}
+
+/// Velocities of a step relative to the drift.
+struct Drifting {
+    start: DVector<f64>,
+    before: DVector<f64>,
+    after: DVector<f64>,
+}
+
+impl Drifting {
+    fn new(start: &Start, velocities: &ContactVelocities) -> Self {
+        let w = start.stepper.system.drift.velocity();
+        Self {
+            start: start.v - w,
+            before: &velocities.before - w,
+            after: &velocities.after - w,
+        }
+    }
 }
 
 /// All that the correction consists of.
 struct Parts {
-    /// Velocity at the end, before the correction.
+    /// Velocity at the end, before the correction, relative to the drift.
     v: DVector<f64>,
     /// Motion of all bodies together, user's coordinates.
     together: DVector<f64>,
@@ -87,8 +107,9 @@ impl Parts {
         hat: &DVector<f64>,
     ) -> Result<Option<Self>> {
         let (s, e, near, split) = (start.stepper, start.e, start.near, start.split);
-        let ContactVelocities { before, after } = velocities;
-        let v = readout::solve(end, split, hat)?;
+        let drifting = Drifting::new(start, velocities);
+        let (before, after) = (&drifting.before, &drifting.after);
+        let v = readout::solve(end, split, hat)? - s.system.drift.velocity();
         let energy = |m: &DMatrix<f64>, v: &DVector<f64>| 0.5 * v.dot(&(m * v));
         let basis = &s.system.symmetric;
         let (mut together, mut common, mut direction) =
@@ -117,12 +138,13 @@ impl Parts {
         if room.is_nan() || room <= 1e-9 * kinetic {
             return Ok(None);
         }
-        let loads = e.user_loads(before, &start.input.control);
+        let loads = e.user_loads(&velocities.before, &start.input.control);
+        let first = &drifting.start;
         let mut defect =
-            kinetic - energy(&e.mass_matrix, start.v) - 0.5 * s.dt * loads.dot(&(start.v + &v));
+            kinetic - energy(&e.mass_matrix, first) - 0.5 * s.dt * loads.dot(&(first + &v));
         let contact = near
-            .contact_acts(before)
-            .then(|| near.contact_force(after, Dual::User));
+            .contact_acts(&velocities.before)
+            .then(|| near.contact_force(&velocities.after, Dual::User));
         let speed = energy(&e.mass_matrix, before);
         let mut taken = 0.0;
         if let Some(g) = &contact {
@@ -250,7 +272,8 @@ impl<'a> Closure<'a> {
         bar: &mut StepBar,
     ) -> Result<ClosureBar> {
         let (s, e, near, parts) = (start.stepper, start.e, start.near, &self.parts);
-        let ContactVelocities { before, after } = velocities;
+        let drifting = Drifting::new(start, velocities);
+        let (first, before, after) = (&drifting.start, &drifting.before, &drifting.after);
         let end = &self.end;
         let m = &e.mass_matrix;
         let nv = before.len();
@@ -296,19 +319,27 @@ impl<'a> Closure<'a> {
         // The work of the forces.
         let half = 0.5 * s.dt;
         let v_bar = -defect_bar * half * &parts.loads;
-        readout::solve_vjp(end, start.split, &self.hat, &parts.v, &v_bar, &mut at_end)?;
+        let end_velocity = &parts.v + s.system.drift.velocity();
+        readout::solve_vjp(
+            end,
+            start.split,
+            &self.hat,
+            &end_velocity,
+            &v_bar,
+            &mut at_end,
+        )?;
         hat_star_bar += &at_end.state.y;
-        let along = half * (start.v + &parts.v);
-        let work = e.user_loads_vjp(before, &start.input.control, &along);
+        let along = half * (first + &parts.v);
+        let work = e.user_loads_vjp(&velocities.before, &start.input.control, &along);
         bar.add(-defect_bar, &work);
         out.velocities[0] -= defect_bar * &work.v;
         bar.v -= defect_bar * half * &parts.loads;
         // The energy at the start.
-        bar.v -= defect_bar * (m * start.v);
-        bar.add(-0.5 * defect_bar, &e.mass_vjp(start.v, start.v)?);
+        bar.v -= defect_bar * (m * first);
+        bar.add(-0.5 * defect_bar, &e.mass_vjp(first, first)?);
         if let Some(g) = &parts.contact {
             let along = half * (before + after);
-            let work = near.contact_force_vjp(after, &along, Dual::User);
+            let work = near.contact_force_vjp(&velocities.after, &along, Dual::User);
             bar.add(-defect_bar, &work);
             out.velocities[0] -= defect_bar * half * g;
             out.velocities[1] -= defect_bar * (half * g + &work.v);

@@ -14,12 +14,13 @@
 use super::contact;
 use super::energy::{self, Closure};
 use super::plan::{Halt, MOST};
+use super::quasi::{self, Trial};
 use super::split::{Split, share};
 use super::stages::{ContactVelocities, Stages, StepDerivatives};
 use super::start::Start;
 use super::{Integrator, State, StateBar, StateTangents, StepBar, StepTangents, Stepper};
 use crate::adjoint::lie::angular;
-use crate::dynamics::Linearisation;
+use crate::dynamics::{Drift, Linearisation};
 use crate::{Error, Result};
 use nalgebra::{DMatrix, DVector, Dyn, LU};
 
@@ -40,13 +41,46 @@ pub(super) struct ImplicitStage {
     pub force: DVector<f64>,
 }
 
-/// An implicit stage: `M v + p_rest = J(ξ)ᵀ X(q ⊕ ξ)ᵀ (p̂ + h f(q, v, u))` with ξ = reach v.
+impl From<Trial> for ImplicitStage {
+    fn from(trial: Trial) -> Self {
+        let Trial { v, force, .. } = trial;
+        Self { v, force }
+    }
+}
+
+/// An implicit stage: `M v + p_rest = J(ξ)ᵀ X(q ⊕ ξ)ᵀ (p̂ + h f(q, v, u))` with ξ = reach v; h (1 − h D) for h where the stage has a configuration of its own,
+/// before which bodies have drifted for the time h ([`crate::dynamics::Drift`]).
 #[derive(Clone, Copy)]
 pub(super) struct Rule {
     /// Time over which the force acts, s.
     pub h: f64,
     /// Time over which the chart reaches out, s: the step's for Euler; zero where q is the stage's own.
     pub reach: f64,
+}
+
+impl Rule {
+    /// What a force adds to the momentum.
+    pub fn impulse(&self, e: &Linearisation, force: &DVector<f64>) -> DVector<f64> {
+        self.drifted(e, force, |drift, x| drift.carry(-self.h, x))
+    }
+
+    /// Transpose of [`Rule::impulse`].
+    pub fn impulse_back(&self, e: &Linearisation, bar: &DVector<f64>) -> DVector<f64> {
+        self.drifted(e, bar, |drift, x| drift.carry_back(-self.h, x))
+    }
+
+    fn drifted(
+        &self,
+        e: &Linearisation,
+        x: &DVector<f64>,
+        carry: impl Fn(&Drift, DVector<f64>) -> DVector<f64>,
+    ) -> DVector<f64> {
+        let x = self.h * x;
+        match self.reach == 0.0 {
+            true => carry(&e.system.drift, x),
+            false => x,
+        }
+    }
 }
 
 /// Matrix of the stage on the free rows, from ∂f/∂v and the momentum p̂ + h f.
@@ -62,9 +96,9 @@ fn stage_matrix(
     let xi = rule.reach * v;
     let mut m = e.mass_matrix.clone();
     for k in 0..v.len() {
-        let column = tree.chart_momentum(&e.q, &xi, &rates.column(k).into_owned());
+        let impulse = rule.impulse(e, &rates.column(k).into_owned());
         let mut target = m.column_mut(k);
-        target -= rule.h * column;
+        target -= tree.chart_momentum(&e.q, &xi, &impulse);
         if rule.reach != 0.0 {
             let unit = DVector::from_fn(v.len(), |i, _| f64::from(i == k));
             let [_, along, _] = tree.chart_momentum_vjp(&e.q, &xi, reached, &unit);
@@ -78,7 +112,7 @@ fn stage_matrix(
 /// How many times too long a step is for its implicit stage; none where it isn't.
 ///
 /// With W = h ∂f/∂v on the free rows, the stage's matrix is M − W but for what turning adds, and κ the largest eigenvalue of
-/// M^-½ ½(W + Wᵀ) M^-½: the part by which the inertia M changes in the time h of what moves, less what damps. In one coordinate it is
+/// M^-½ ½(W + Wᵀ) M^-½: the part by which the inertia M changes in the time h of what moves relative to the water, less what damps. In one coordinate it is
 /// h v M′/M, and there is no solution from κ = ½ on. Up to ¼ a factor of ¼ M − ½(W + Wᵀ) is all that it takes, n³/3 operations.
 fn excess(
     e: &Linearisation,
@@ -91,13 +125,14 @@ fn excess(
         return None;
     }
     let xi = rule.reach * v;
+    let (tree, drift) = (&e.system.tree, &e.system.drift);
     let mut grown = rates.clone();
-    for mut column in grown.column_iter_mut() {
-        let here = e
-            .system
-            .tree
-            .chart_momentum(&e.q, &xi, &column.clone_owned());
-        column.copy_from(&(rule.h * here));
+    for (k, mut column) in grown.column_iter_mut().enumerate() {
+        let mut own = rule.impulse(e, &column.clone_owned());
+        if !drift.is_none() {
+            own -= rule.h * drift.turn(&e.frame_dual(&e.mass_matrix.column(k).into_owned()));
+        }
+        column.copy_from(&tree.chart_momentum(&e.q, &xi, &own));
     }
     let grown = split.block(&grown);
     let grown = 0.5 * (&grown + grown.transpose());
@@ -117,41 +152,55 @@ fn excess(
     Some((change / CHANGE).ceil().clamp(2.0, MOST as f64) as usize)
 }
 
-/// A velocity that a stage may have, with what is left of its equation.
-struct Trial {
-    v: DVector<f64>,
-    force: DVector<f64>,
-    /// p̂ + h f.
-    reached: DVector<f64>,
-    defect: DVector<f64>,
-    /// The defect's size.
-    merit: f64,
-    /// The same relative to what is balanced.
-    residual: f64,
+/// The equation of a stage at `e`, from the momentum at the step's start.
+pub(super) struct Equation<'s, 'a> {
+    start: Start<'s, 'a>,
+    e: &'s Linearisation<'a>,
+    hat: &'s DVector<f64>,
+    rule: Rule,
+    /// Σ |M| |v| is what the sum M v is measured by, so that a total momentum of zero is no target for relative errors.
+    summands: DMatrix<f64>,
+    /// By which momenta are weighed, and the least size of what is balanced.
+    scale: DVector<f64>,
+    least: f64,
 }
 
-/// Solves a stage of a step at `e` on the free rows, from the momentum at the step's start and a guess of its velocity: Newton's
-/// method, whose steps are halved until the defect falls.
-pub(super) fn solve_stage(
-    start: &Start,
-    e: &Linearisation,
-    hat: &DVector<f64>,
-    rule: Rule,
-    guess: &DVector<f64>,
-) -> std::result::Result<ImplicitStage, Halt> {
-    let (split, control) = (start.split, &start.input.control);
-    let tree = &e.system.tree;
-    let sized = split.sizes(&e.mass_matrix);
-    // Against the sum of what M v adds up, so that a total momentum of zero is no target for relative errors.
-    let summands = e.mass_matrix.abs();
-    let least = sized(&e.user_momentum(hat)).max(sized(&e.rest_momentum));
-    let at = |v: DVector<f64>| -> Result<Trial> {
-        let force = e.force(&v, control)?;
-        let reached = hat + rule.h * &force;
-        let target = tree.chart_momentum(&e.q, &(rule.reach * &v), &reached);
+impl<'s, 'a> Equation<'s, 'a> {
+    pub fn new(
+        start: &Start<'s, 'a>,
+        e: &'s Linearisation<'a>,
+        hat: &'s DVector<f64>,
+        rule: Rule,
+    ) -> Self {
+        let mut out = Self {
+            start: *start,
+            e,
+            hat,
+            rule,
+            summands: e.mass_matrix.abs(),
+            scale: start.split.scale(&e.mass_matrix),
+            least: 0.0,
+        };
+        let rest = out.sized(&e.rest_momentum);
+        out.least = out.sized(&e.user_momentum(hat)).max(rest);
+        out
+    }
+
+    fn sized(&self, p: &DVector<f64>) -> f64 {
+        self.start.split.take(p).component_mul(&self.scale).norm()
+    }
+
+    /// What the velocity `v` leaves of it.
+    pub fn at(&self, v: DVector<f64>) -> Result<Trial> {
+        let (e, rule) = (self.e, self.rule);
+        let force = e.force(&v, &self.start.input.control)?;
+        let reached = self.hat + rule.impulse(e, &force);
+        let xi = rule.reach * &v;
+        let target = e.system.tree.chart_momentum(&e.q, &xi, &reached);
         let defect = e.momentum(&v) - &target;
-        let size = sized(&(&summands * v.abs())).max(sized(&target)).max(least);
-        let merit = sized(&defect);
+        let size = self.sized(&(&self.summands * v.abs()));
+        let size = size.max(self.sized(&target)).max(self.least);
+        let merit = self.sized(&defect);
         let residual = share(merit, size);
         Ok(Trial {
             v,
@@ -161,42 +210,74 @@ pub(super) fn solve_stage(
             merit,
             residual,
         })
-    };
-    let mut now = at(split.complete(guess))?;
+    }
+
+    /// The factor of its matrix at a trial.
+    fn factor(&self, now: &Trial, rates: &DMatrix<f64>) -> LU<f64, Dyn, Dyn> {
+        let Trial { v, reached, .. } = now;
+        stage_matrix(self.e, self.start.split, v, rates, reached, self.rule).lu()
+    }
+
+    /// The same at the first trial of a step, if the step isn't too long.
+    pub fn first_factor(&self, now: &Trial) -> std::result::Result<LU<f64, Dyn, Dyn>, Halt> {
+        let (e, start) = (self.e, &self.start);
+        let rates = e.force_velocity_jacobian(&now.v, &start.input.control)?;
+        if start.plan.may_cut()
+            && let Some(times) = excess(e, start.split, &now.v, &rates, self.rule)
+        {
+            return Err(Halt::TooLong(times));
+        }
+        Ok(self.factor(now, &rates))
+    }
+}
+
+/// Solves a stage of a step at `e` on the free rows, from the momentum at the step's start and a guess of its velocity: by [`quasi`], and where that doesn't get there by
+/// Newton's method, whose steps are halved until the defect falls.
+pub(super) fn solve_stage<'a>(
+    start: &Start<'_, 'a>,
+    e: &Linearisation<'a>,
+    hat: &DVector<f64>,
+    rule: Rule,
+    guess: &DVector<f64>,
+) -> std::result::Result<ImplicitStage, Halt> {
+    let (split, control) = (start.split, &start.input.control);
+    let tree = &e.system.tree;
+    let equation = Equation::new(start, e, hat, rule);
+    let mut now = equation.at(split.complete(guess))?;
     let mut previous = f64::INFINITY;
     'newton: for iteration in 0..ITERATIONS {
         let residual = now.residual;
         // Stop where rounding ends the quadratic convergence.
-        let converged = residual == 0.0 || (residual <= 1e-13 && residual >= 0.25 * previous);
         let at_last = iteration + 1 == ITERATIONS && residual <= ENOUGH;
-        if converged || at_last {
-            let Trial { v, force, .. } = now;
-            return Ok(ImplicitStage { v, force });
+        if now.converged(previous) || at_last {
+            return Ok(now.into());
         }
         if !residual.is_finite() || iteration + 1 == ITERATIONS {
             break;
         }
         previous = residual;
-        let rates = e.force_velocity_jacobian(&now.v, control)?;
-        if iteration == 0
-            && start.plan.may_cut()
-            && let Some(times) = excess(e, split, &now.v, &rates, rule)
-        {
-            return Err(Halt::TooLong(times));
-        }
-        let matrix = stage_matrix(e, split, &now.v, &rates, &now.reached, rule);
-        let Some(step) = matrix.lu().solve(&split.take(&now.defect)) else {
+        let factor = if iteration == 0 {
+            let factor = equation.first_factor(&now)?;
+            let at = |v| equation.at(v);
+            if let Some(found) = quasi::descend(split, &e.mass_matrix, &factor, &now, 0.0, at) {
+                return Ok(found.into());
+            }
+            factor
+        } else {
+            equation.factor(&now, &e.force_velocity_jacobian(&now.v, control)?)
+        };
+        let Some(step) = factor.solve(&split.take(&now.defect)) else {
             break;
         };
         let step = split.put(&step);
-        let mut next = at(&now.v - &step)?;
+        let mut next = equation.at(&now.v - &step)?;
         let mut length = 1.0;
         while !(next.merit < now.merit || next.residual <= ENOUGH) {
             length *= 0.5;
             if length < SHORTEST {
                 break 'newton;
             }
-            next = at(&now.v - length * &step)?;
+            next = equation.at(&now.v - length * &step)?;
         }
         now = next;
     }

@@ -1,8 +1,10 @@
 //! Implicit midpoint in (q, p̂): second order and symmetric in time.
 //!
 //! q_m = q ⊕ ½Δt v, M(q_m) v + p_rest = Xᵀ(q_m) (p̂ + ½Δt f(q_m, v, u)), q⁺ = q ⊕ Δt v,
-//! p̂⁺ = p̂ + Δt f. The velocity is found by Newton at fixed q_m (cheap) inside a fixed point in
-//! q_m (one evaluation each); the adjoint iterates the transpose of the same splitting, the tangent solves for all
+//! p̂⁺ = p̂ + Δt f. In a current ½Δt f − ¼Δt² D f stands for ½Δt f: momenta in the middle are taken about a point that
+//! has drifted by then ([`crate::dynamics::Drift`]). The velocity is found by [`quasi::descend`] in v and q_m(v) at once, one evaluation a step; where that doesn't get there, by Newton at
+//! fixed q_m (cheap) inside a fixed point in
+//! q_m (one evaluation each); the adjoint iterates the transpose of that splitting, the tangent solves for all
 //! directions at once.
 //!
 //! With contact, q⁺ = q ⊕ Δt v_s and p̂⁺ = p̂ + Δt f + Δt g(q, v_s), where v_s follows from v by
@@ -12,13 +14,15 @@
 //! contact hasn't stopped: bodies about to touch may overlap there by half of what they approach in a step.
 
 use super::contact;
-use super::euler::{AdjointStage, Rule, solve_columns, solve_stage};
+use super::euler::{AdjointStage, Equation, Rule, solve_columns, solve_stage};
 use super::plan::Halt;
+use super::quasi;
 use super::split::share;
 use super::stages::{ContactVelocities, Stages, StepDerivatives};
 use super::start::Start;
 use super::{State, StateBar, StateTangents, StepBar, StepTangents, Stepper};
 use crate::dynamics::Linearisation;
+use crate::dynamics::slopes::columns;
 use crate::{Error, Result};
 use nalgebra::{DMatrix, DVector};
 
@@ -59,6 +63,10 @@ pub(super) fn step(start: &Start) -> std::result::Result<(State, Stages), Halt> 
     let (s, split) = (start.stepper, start.split);
     let p = start.momentum();
     let mut stage = split.complete(start.v);
+    if let Some(found) = at_once(start, &p, &stage)? {
+        let y = &p + s.dt * found.force;
+        return Ok(contact::apply(start, found.v, y)?);
+    }
     let mut previous = f64::INFINITY;
     for _ in 0..ITERATIONS {
         let m = middle(start, &stage)?;
@@ -85,6 +93,35 @@ pub(super) fn step(start: &Start) -> std::result::Result<(State, Stages), Halt> 
     .into())
 }
 
+/// The stage from the guess `v`, if it gets there in v and q_m(v) at once.
+fn at_once(
+    start: &Start,
+    p: &DVector<f64>,
+    v: &DVector<f64>,
+) -> std::result::Result<Option<quasi::Trial>, Halt> {
+    let (split, rule) = (start.split, rule(start.stepper));
+    let m = middle(start, v)?;
+    let equation = Equation::new(start, &m, p, rule);
+    let first = equation.at(v.clone())?;
+    if first.converged(f64::INFINITY) {
+        return Ok(Some(first));
+    }
+    let factor = equation.first_factor(&first)?;
+    let at = |v: DVector<f64>| {
+        let m = middle(start, &v)?;
+        Equation::new(start, &m, p, rule).at(v)
+    };
+    let mass_matrix = &m.mass_matrix;
+    Ok(quasi::descend(
+        split,
+        mass_matrix,
+        &factor,
+        &first,
+        noise(&m),
+        at,
+    ))
+}
+
 /// What the derivatives of a step need.
 pub(super) struct Adjoint<'s, 'a> {
     contact: contact::Adjoint<'s>,
@@ -99,7 +136,8 @@ impl<'s, 'a> Adjoint<'s, 'a> {
     pub fn new(start: &Start<'_, 'a>, velocities: &'s ContactVelocities) -> Result<Self> {
         let (s, before) = (start.stepper, &velocities.before);
         let middle = middle(start, before)?;
-        let reached = start.momentum() + 0.5 * s.dt * middle.force(before, &start.input.control)?;
+        let force = middle.force(before, &start.input.control)?;
+        let reached = start.momentum() + rule(s).impulse(&middle, &force);
         Ok(Self {
             contact: contact::Adjoint::new(start, velocities)?,
             stage: AdjointStage::new(start, &middle, before, &reached, rule(s))?,
@@ -130,14 +168,15 @@ impl<'a> StepDerivatives<'a> for Adjoint<'_, 'a> {
         };
         let (one, none) = (DMatrix::identity(nv, nv), DMatrix::zeros(nv, nv));
         let by_v = advance(&none, &one);
+        let impulse = |f: &DMatrix<f64>| columns(f, |f| rule(s).impulse(m, f));
         let middle = advance(q, &DMatrix::zeros(nv, q.ncols()));
         let frame = m.frame_matrix();
         // Derivative of Xᵀ(p̂ + h f) − M v − p_rest over q_m, which moves with v as well.
         let bent =
-            frame.tr_mul(&(h * &force.q)) + m.frame_momentum_slope(&self.reached) - &momentum.q;
+            frame.tr_mul(&impulse(&force.q)) + m.frame_momentum_slope(&self.reached) - &momentum.q;
         let matrix = &self.stage.matrix - split.block(&(bent * &by_v));
         let p = start.momentum_jvp(along)?;
-        let held = &p + h * force.along(&middle, None, inputs);
+        let held = &p + impulse(&force.along(&middle, None, inputs));
         let right = frame.tr_mul(&held) + m.frame_momentum_slope(&self.reached) * &middle
             - momentum.along(&middle, None, inputs);
         let v = solve_columns(matrix, split, &right)?;
@@ -159,7 +198,7 @@ impl<'a> StepDerivatives<'a> for Adjoint<'_, 'a> {
         let mut previous = f64::INFINITY;
         for _ in 0..ITERATIONS {
             let w = self.stage.solve(split, &v_bar)?;
-            let z_total = s.dt * &z + h * m.frame_velocity(&w);
+            let z_total = s.dt * &z + rule(s).impulse_back(m, &m.frame_velocity(&w));
             // Gradient over q_m of −wᵀ{M v + p_rest − Xᵀ(p̂ + h f)} + zᵀ Δt f, and the rest of the cotangents.
             let mut inner = StepBar::zeros(m);
             let control = &start.input.control;

@@ -140,12 +140,13 @@ impl Stepper<'_> {
         solve_vjp(e, &split, &state.y, v, v_bar, bar)
     }
 
-    /// Velocity that belongs to the generalised momentum `p` (user coordinates) at `e`, at t = 0.
+    /// Velocity that belongs to the generalised momentum `p` (user coordinates, that of drifting bodies in the world) at `e`, at t = 0.
     ///
     /// # Errors
     /// A mass matrix that isn't positive definite.
     pub fn velocity_of_momentum(&self, e: &Evaluation, p: &DVector<f64>) -> Result<DVector<f64>> {
-        solve(e, &self.split(&[], When::At(0.0)), &e.frame_dual(p))
+        let drifting = p - e.drift_momentum();
+        solve(e, &self.split(&[], When::At(0.0)), &e.frame_dual(&drifting))
     }
 
     /// The conserved variable y that belongs to velocity `v` at `e`.

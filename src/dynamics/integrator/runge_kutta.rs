@@ -3,6 +3,9 @@
 //!
 //! Rotations are integrated in a rotation-vector chart around the start of the step, whose rate is
 //! the inverse left Jacobian times the angular velocity, so the order isn't lost on the group.
+//!
+//! Momenta are summed as they are about a point that drifts with the water ([`crate::dynamics::Drift`]) from the start of the step on: π = (1 − τ D) p̂, whose rate is
+//! φ = (1 − τ D) f − D p̂. A step in a current is then the step that the same bodies make in still water.
 
 use super::readout;
 use super::split::{Split, When};
@@ -11,6 +14,7 @@ use super::start::Start;
 use super::{State, StateBar, StateTangents, StepBar, StepTangents};
 use crate::Result;
 use crate::dynamics::Linearisation;
+use crate::dynamics::slopes::columns;
 use nalgebra::{DMatrix, DVector};
 
 /// The explicit midpoint rule.
@@ -31,11 +35,15 @@ struct RungeKuttaStage<'a> {
     split: Split,
     xi: DVector<f64>,
     p: DVector<f64>,
+    /// Time since the start of the step, s.
+    after: f64,
     v: DVector<f64>,
     /// Whether v is the velocity read out at the state.
     read_out: bool,
     chart_rate: DVector<f64>,
     force: DVector<f64>,
+    /// φ.
+    drifting: DVector<f64>,
 }
 
 impl<'a> RungeKuttaStage<'a> {
@@ -58,10 +66,12 @@ fn stages<'a>(
     for (i, node) in tableau.nodes.iter().enumerate() {
         let t = s.time(state) + node * s.dt;
         let split = s.split(&start.input.hold, When::At(t));
+        let drift = &s.system.drift;
+        let after = node * s.dt;
         let (xi, p) = match out.last() {
             Some(last) => (
-                node * s.dt * &last.chart_rate,
-                momentum + node * s.dt * &last.force,
+                after * &last.chart_rate,
+                drift.carry(after, momentum + after * &last.drifting),
             ),
             None => (DVector::zeros(nv), momentum.clone()),
         };
@@ -82,15 +92,18 @@ fn stages<'a>(
         };
         let chart_rate = tree.chart_rate(&xi, &v);
         let force = force(i, at, &v)?;
+        let drifting = drift.carry(-after, force.clone()) - drift.turn(&p);
         out.push(RungeKuttaStage {
             own,
             split,
             xi,
             p,
+            after,
             v,
             read_out,
             chart_rate,
             force,
+            drifting,
         });
     }
     Ok(out)
@@ -103,7 +116,8 @@ pub(super) fn step(start: &Start, tableau: &'static Tableau) -> Result<(State, S
     let stages = stages(start, tableau, &momentum, |_, e, v| e.force(v, control))?;
     let zero = DVector::zeros(start.v.len());
     let xi = tableau.sum(dt, zero, stages.iter().map(|s| &s.chart_rate));
-    let y = tableau.sum(dt, momentum, stages.iter().map(|s| &s.force));
+    let y = tableau.sum(dt, momentum, stages.iter().map(|s| &s.drifting));
+    let y = start.stepper.system.drift.carry(dt, y);
     let next = start.next_state(start.arrive(&xi), y);
     let mut all: Vec<DVector<f64>> = stages.into_iter().map(|stage| stage.force).collect();
     all.pop();
@@ -140,6 +154,7 @@ impl<'a> StepDerivatives<'a> for Adjoint<'a> {
     fn jvp(&self, start: &Start<'_, 'a>, along: &StepTangents) -> Result<StateTangents> {
         let (tree, dt) = (&start.stepper.system.tree, start.stepper.dt);
         let (inputs, control) = (along.inputs, &start.input.control);
+        let drift = &start.stepper.system.drift;
         let mut momentum = start.momentum_jvp(along)?;
         start.split.forget_driven_rows(&mut momentum);
         let mut xi = DMatrix::zeros(momentum.nrows(), momentum.ncols());
@@ -147,9 +162,12 @@ impl<'a> StepDerivatives<'a> for Adjoint<'a> {
         let mut last: Option<[DMatrix<f64>; 2]> = None;
         for (i, stage) in self.stages.iter().enumerate() {
             let e = stage.at(start);
-            let h = self.tableau.nodes[i] * dt;
+            let h = stage.after;
             let (stage_xi, p) = match &last {
-                Some([rate, force]) => (h * rate, &momentum + h * force),
+                Some([rate, drifting]) => (
+                    h * rate,
+                    columns(&(&momentum + h * drifting), |p| drift.carry(h, p.clone())),
+                ),
                 None => (xi.clone(), momentum.clone()),
             };
             let mut q = tree.integrate_jvp(&stage.xi, along.q, &stage_xi);
@@ -171,14 +189,16 @@ impl<'a> StepDerivatives<'a> for Adjoint<'a> {
                 inputs.has_parameters(),
             )?;
             let force = force.along(&at.q, Some(&v), inputs);
+            let drifting =
+                columns(&force, |f| drift.carry(-h, f.clone())) - columns(&at.y, |p| drift.turn(p));
             let weight = self.tableau.weights[i] * dt;
             xi += weight * &rate;
-            y += weight * &force;
-            last = Some([rate, force]);
+            y += weight * &drifting;
+            last = Some([rate, drifting]);
         }
         Ok(StateTangents {
             q: start.arrive_jvp(&self.xi, along.q, &xi),
-            y: start.next_momenta(y),
+            y: start.next_momenta(columns(&y, |y| drift.carry(dt, y.clone()))),
         })
     }
 
@@ -187,7 +207,8 @@ impl<'a> StepDerivatives<'a> for Adjoint<'a> {
         let mut bar = StepBar::zeros(start.e);
         let (q_direct, xi_bar) = start.arrive_vjp(&self.xi, &next_bar.q);
         bar.state.q += q_direct;
-        let y_bar = start.next_momentum_bar(next_bar);
+        let drift = &start.stepper.system.drift;
+        let y_bar = drift.carry_back(dt, start.next_momentum_bar(next_bar));
         let mut start_bar = y_bar.clone();
         let spread = |bar: &DVector<f64>| -> Vec<DVector<f64>> {
             (self.tableau.weights.iter())
@@ -200,7 +221,8 @@ impl<'a> StepDerivatives<'a> for Adjoint<'a> {
             let mut own = StepBar::zeros(e);
             let (mut stage_xi_bar, mut v_bar) =
                 tree.chart_rate_vjp(&stage.xi, &stage.v, &rate_bar[i]);
-            let force = e.force_vjp(&stage.v, &start.input.control, &force_bar[i])?;
+            let own_bar = drift.carry_back(-stage.after, force_bar[i].clone());
+            let force = e.force_vjp(&stage.v, &start.input.control, &own_bar)?;
             own.add(1.0, &force);
             v_bar += &force.v;
             if stage.read_out {
@@ -214,11 +236,12 @@ impl<'a> StepDerivatives<'a> for Adjoint<'a> {
             stage_xi_bar += xi_bar;
             bar.control += own.control;
             bar.parameters.add(&own.parameters);
-            start_bar += &own.state.y;
+            let p_bar = &own.state.y - drift.turn_back(&force_bar[i]);
+            let p_bar = drift.carry_back(stage.after, p_bar);
+            start_bar += &p_bar;
             if i > 0 {
-                let h = self.tableau.nodes[i] * dt;
-                rate_bar[i - 1] += h * stage_xi_bar;
-                force_bar[i - 1] += h * &own.state.y;
+                rate_bar[i - 1] += stage.after * stage_xi_bar;
+                force_bar[i - 1] += stage.after * &p_bar;
             }
         }
         start.split.forget_driven(&mut start_bar);

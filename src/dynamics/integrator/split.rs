@@ -80,9 +80,15 @@ impl Split {
 
     /// Sizes of free momenta, each weighed by the square root of its inertia.
     pub fn sizes(&self, mass_matrix: &DMatrix<f64>) -> impl Fn(&DVector<f64>) -> f64 {
-        let inertia = self.block(mass_matrix).diagonal();
-        let scale = inertia.map(|d| 1.0 / d.max(f64::MIN_POSITIVE).sqrt());
+        let scale = self.scale(mass_matrix);
         move |p| self.take(p).component_mul(&scale).norm()
+    }
+
+    /// Those weights.
+    pub fn scale(&self, mass_matrix: &DMatrix<f64>) -> DVector<f64> {
+        let inertia = self.free.iter().map(|&i| mass_matrix[(i, i)]);
+        let scale = inertia.map(|d| 1.0 / d.max(f64::MIN_POSITIVE).sqrt());
+        DVector::from_iterator(self.free.len(), scale)
     }
 }
 

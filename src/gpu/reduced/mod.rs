@@ -98,6 +98,10 @@ impl Coupling for GpuReduced {
         Ok(Solved::new(placed, self.tolerance, basis)?.value())
     }
 
+    fn film_momenta(&self, poses: &[Pose], twists: &DMatrix<f64>) -> Result<Option<DMatrix<f64>>> {
+        self.reduced().film_momenta(poses, twists)
+    }
+
     fn differentiable(&self) -> Option<&dyn Linearise> {
         Some(self)
     }

@@ -55,8 +55,8 @@ pub(crate) struct Case<'a> {
     pub surfaces: Vec<Option<Surface>>,
     /// What compressed bodies are off from their own methods' answers.
     correction: Option<DMatrix<f64>>,
-    /// What films in narrow gaps add to the matrix.
-    films: DMatrix<f64>,
+    /// What films in narrow gaps add to the matrix, where there may be any.
+    films: Option<DMatrix<f64>>,
     pub report: CouplingReport,
 }
 
@@ -88,6 +88,7 @@ impl<'a> Case<'a> {
         let surfaces = surfaces(scene, choices)?;
         let turn = world_axes(&poses);
         let (matrix, report) = evaluate(water.coupling.as_ref(), &poses, &turn)?;
+        let films = water.coupling.film_momenta(&poses, &turn)?;
         let diagonal = (0..matrix.nrows())
             .map(|i| {
                 let surface = surfaces[bodies[i / 6]].as_ref();
@@ -101,18 +102,15 @@ impl<'a> Case<'a> {
             fidelity: water.fidelity,
             bodies,
             poses,
-            turn,
             matrix,
             diagonal,
             surfaces,
             correction: None,
-            films: DMatrix::zeros(0, 0),
+            films: films.map(|momenta| symmetric(&turn.tr_mul(&momenta))),
+            turn,
             report,
         };
         if out.fidelity.kind().compresses() {
-            if choices.numerics.films {
-                out.films = out.films(&out.submerged(&out.surfaces))?;
-            }
             out.correction = Some(out.correction(&out.submerged(&out.surfaces))?);
         }
         Ok(out)
@@ -206,21 +204,16 @@ impl<'a> Case<'a> {
         coupling.correction(&self.poses, &self.turn, &responses)
     }
 
-    fn films(&self, bodies: &[SubmergedBody]) -> Result<DMatrix<f64>> {
-        let coupling = compressed_all(&self.problem(bodies))?;
-        let momenta = coupling.film_momenta(&self.poses, &self.turn)?;
-        Ok(symmetric(&self.turn.tr_mul(&momenta)))
-    }
-
     /// What is left at check points, and what films may be off.
     pub fn residual(&self) -> Result<Option<f64>> {
+        let films = self.films.as_ref().map(|films| FILM * self.size(films));
         if let Some(own) = &self.correction {
-            let films = FILM * self.size(&self.films);
-            return Ok(Some(self.size(own) * self.narrowness() + films));
+            let left = self.size(own) * self.narrowness();
+            return Ok(Some(left + films.unwrap_or(0.0)));
         }
         let coupling = &self.subject.water.coupling;
         let found = coupling.residual(&self.poses, &self.turn)?;
-        Ok(found.map(|d| self.size(&d)))
+        Ok(found.map(|d| self.size(&d)).or(films))
     }
 
     /// Where a gap is narrower than its compressed bodies resolve, their charges aren't what the first

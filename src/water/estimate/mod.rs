@@ -43,8 +43,8 @@ pub struct ErrorEstimate {
     /// velocities left between the collocation points change in the energy, at four points a face.
     /// `Reduced`: what the bodies' own methods, asked for their answers to one another at this
     /// configuration, change in M_f to first order, pairs that fade out included; where a gap is narrower
-    /// than they resolve, times the root of resolved over actual gap. `None` for the coupled panel method
-    /// and for `Isolated`.
+    /// than they resolve, times the root of resolved over actual gap. Of both, with films, also a fifth of
+    /// what these add: all that there is of coupled panels, for which it is `None` without films, as for `Isolated`.
     pub residual: Option<f64>,
     /// What other meshes of the same bodies change, extrapolated to infinitely fine ones. 0 where every
     /// body is solved by formula; `None` where it couldn't be had.

@@ -18,7 +18,7 @@ pub(super) struct Full;
 
 impl FidelityKind for Full {
     fn knobs(&self) -> &'static [Knob] {
-        &[Knob::Tolerance]
+        &[Knob::Tolerance, Knob::Films]
     }
 
     fn solves_alone(&self) -> bool {

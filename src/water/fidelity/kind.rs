@@ -15,7 +15,7 @@ pub enum Knob {
     Rank,
     /// Smallest gap that compressed bodies resolve.
     ResolvedGap,
-    /// Whether gaps that compressed bodies don't resolve have films.
+    /// Whether gaps that aren't resolved have films.
     Films,
     /// The error aimed at.
     Accuracy,

@@ -50,7 +50,7 @@ impl FidelityKind for Reduced {
                 ..Discretisation::default()
             });
         }
-        let films = coupling.film_reaches(problem.walls)?;
+        let films = coupling.film_extents(problem.walls)?;
         device.films = !films.is_empty();
         Ok(Made {
             carried: Some(Carried::Sources),

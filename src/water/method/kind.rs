@@ -62,9 +62,14 @@ pub(crate) trait BodyMethod: Send + Sync {
         false
     }
 
-    /// The narrowest gap that all bodies solved together resolve, in edges.
-    fn resolved_edges(&self) -> f64 {
+    /// The narrowest gap that all bodies solved together resolve, in edges, with films in gaps or without.
+    fn resolved_edges(&self, _films: bool) -> f64 {
         RESOLVED
+    }
+
+    /// Whether gaps that all bodies solved together don't resolve may have films.
+    fn has_films(&self) -> bool {
+        false
     }
 
     /// Whether all bodies solved together are made of sources inside them.

@@ -5,7 +5,7 @@ use crate::Result;
 use crate::boundary::PanelBoundary;
 use crate::boundary::panel::{Extrapolated, Richardson};
 use crate::coupling::full::SolveSettings;
-use crate::coupling::{Coupling, ExtrapolatedPanels, PanelCoupled};
+use crate::coupling::{Coupling, ExtrapolatedPanels, FilmedPanels, PanelCoupled};
 use crate::water::device::Device;
 use crate::water::gap_error::Carried;
 use crate::water::numerics::Numerics;
@@ -17,6 +17,8 @@ use std::sync::Arc;
 const MOST_ITERATIONS: usize = 500;
 /// Part of an edge from which panels resolve a gap: a disc flat over a wall, which is hard, has 7 % too much added mass there.
 const RESOLVED: f64 = 0.1;
+/// The same with films in narrower gaps than half an edge, which are right further down than any gap that they were held against.
+const RESOLVED_BY_FILMS: f64 = 0.007;
 
 /// Panels, of two meshes extrapolated where there are two.
 pub(super) struct Panel;
@@ -42,6 +44,33 @@ impl Meshes {
             coarse,
             known,
         })
+    }
+}
+
+/// All bodies' panels, coupled.
+enum Panels {
+    Alone(PanelCoupled),
+    Extrapolated(ExtrapolatedPanels),
+}
+
+impl Panels {
+    fn boxed(self) -> Box<dyn Coupling> {
+        match self {
+            Self::Alone(panels) => Box::new(panels),
+            Self::Extrapolated(panels) => Box::new(panels),
+        }
+    }
+
+    fn filmed(self, problem: &Problem) -> Result<FilmedPanels> {
+        let mut surfaces = Vec::with_capacity(problem.bodies.len());
+        for body in problem.bodies {
+            surfaces.push((body.surface("full")?, body.solid));
+        }
+        let filmed = match self {
+            Self::Alone(panels) => panels.with_films(&surfaces, problem.walls),
+            Self::Extrapolated(panels) => panels.with_films(&surfaces, problem.walls),
+        };
+        Ok(filmed?.named(problem.bodies.iter().map(|b| b.name.to_string())))
     }
 }
 
@@ -93,16 +122,25 @@ impl BodyMethod for Panel {
         // Bodies with different ratios: the largest takes least away.
         let ratios = made.iter().filter_map(|m| Some(m.known?.ratio));
         let ratio = ratios.fold(0.0, f64::max);
-        let coupling: Box<dyn Coupling> = if ratio > 0.0 {
+        let panels = if ratio > 0.0 {
             let meshes = made.iter().map(|m| m.coarse.as_ref().unwrap_or(&m.fine));
             let coarse = coupled(meshes.cloned().collect())?;
-            Box::new(ExtrapolatedPanels::new(fine, coarse, ratio)?)
+            Panels::Extrapolated(ExtrapolatedPanels::new(fine, coarse, ratio)?)
         } else {
-            Box::new(fine)
+            Panels::Alone(fine)
+        };
+        let (coupling, films): (Box<dyn Coupling>, _) = match problem.numerics.films {
+            false => (panels.boxed(), Vec::new()),
+            true => {
+                let filmed = panels.filmed(problem)?;
+                let films = filmed.film_extents(problem.walls)?;
+                device.films = !films.is_empty();
+                (Box::new(filmed), films)
+            }
         };
         Ok(Made {
             carried: Some(Carried::Panels),
-            films: Vec::new(),
+            films,
             warnings: once(&made, |m| &m.fine.warnings),
             bodies: problem.named(made.iter().map(|m| Discretisation {
                 method: self.label(),
@@ -116,8 +154,12 @@ impl BodyMethod for Panel {
         })
     }
 
-    fn resolved_edges(&self) -> f64 {
-        RESOLVED
+    fn resolved_edges(&self, films: bool) -> f64 {
+        if films { RESOLVED_BY_FILMS } else { RESOLVED }
+    }
+
+    fn has_films(&self) -> bool {
+        true
     }
 
     // Faces that lie in one another have no side to be seen from.

@@ -1,0 +1,251 @@
+//! Coupled panels, and films in the gaps that they don't resolve.
+//!
+//! As in [`crate::coupling::film`]: a pair nearer than its film reaches is held apart in all panels' layers on each other, and the film's own added mass is
+//! added, once, whether the panels are of one mesh or extrapolated from two.
+
+use super::PanelCoupled;
+use crate::adjoint::lie::{Pose, Vec3, Vec6};
+use crate::boundary::PanelBoundary;
+use crate::coupling::film::{Extent, FilmBody, Films, PlacedFilms, Shares};
+use crate::coupling::{
+    Coupling, CouplingReport, Direction, Linearise, Linearised, Momenta, Pullback, Tangent,
+};
+use crate::geometry::{Solid, TriMesh, Wall};
+use crate::{Error, Result};
+use nalgebra::{DMatrix, DVector};
+use std::sync::Arc;
+
+/// The gap below which panels are held apart, in their edges.
+const REACH: f64 = 0.5;
+const SHARES: Shares = Shares {
+    floor: 0.25,
+    rim: 0.37,
+    rim_to_wall: 0.55,
+    // Panels are no worse there.
+    in_corners: false,
+};
+/// How often faces are split for films at most.
+const SPLITS: usize = 2;
+
+/// Coupled panels that may be held apart.
+pub(super) trait HeldApart: Coupling {
+    /// Bodies' panels.
+    fn panels(&self) -> &PanelCoupled;
+
+    /// As [`Coupling::evaluate`], of bodies as far apart as the films hold them.
+    ///
+    /// # Errors
+    /// As there.
+    fn evaluate_held(
+        &self,
+        poses: &[Pose],
+        basis: &DMatrix<f64>,
+        films: &Arc<PlacedFilms>,
+    ) -> Result<Momenta>;
+
+    /// As [`Linearise::linearise`], of those.
+    ///
+    /// # Errors
+    /// As there.
+    fn linearise_held<'a>(
+        &'a self,
+        poses: &[Pose],
+        basis: &DMatrix<f64>,
+        films: &Arc<PlacedFilms<'a>>,
+    ) -> Result<Box<dyn Linearised + 'a>>;
+}
+
+/// Coupled panels with films in narrow gaps, between bodies that feel each other and to rigid walls.
+pub struct FilmedPanels {
+    panels: Box<dyn HeldApart>,
+    films: Films,
+    names: Vec<String>,
+}
+
+impl FilmedPanels {
+    /// From the surface of each body in its own frame, and its shape by formula where it has one; bodies that share their panels share these.
+    ///
+    /// # Errors
+    /// [`Error::Input`] if there isn't one surface for each body, or for a wall without normal.
+    pub(super) fn new(
+        panels: Box<dyn HeldApart>,
+        surfaces: &[(&TriMesh, Option<&Solid>)],
+        walls: &[Wall],
+    ) -> Result<Self> {
+        let model = panels.panels().model();
+        let (count, given) = (model.bodies.len(), surfaces.len());
+        if given != count {
+            let expected = format!("give one for each of {count} bodies");
+            return Err(Error::input("films: surfaces", given, expected));
+        }
+        let same = |a: usize, b: usize| Arc::ptr_eq(&model.bodies[a], &model.bodies[b]);
+        let bodies = FilmBody::all(surfaces, SPLITS, same);
+        let reach = |body: &Arc<PanelBoundary>| REACH * edge(body);
+        let reaches: Vec<f64> = model.bodies.iter().map(reach).collect();
+        let mut films = Films::new(&bodies, &reaches, &SHARES, walls)?;
+        films.exclude(&model.excluded);
+        Ok(Self {
+            names: model.bodies.iter().map(|b| b.name.clone()).collect(),
+            panels,
+            films,
+        })
+    }
+
+    /// The same with names of the bodies, for messages; those beyond the bodies are dropped.
+    pub fn named(mut self, names: impl IntoIterator<Item = String>) -> Self {
+        let given = self.names.iter_mut().zip(names);
+        given.for_each(|(own, name)| *own = name);
+        self
+    }
+
+    /// Where there may be films.
+    ///
+    /// # Errors
+    /// A wall without normal.
+    pub(crate) fn film_extents(&self, walls: &[Wall]) -> Result<Vec<Extent>> {
+        self.films.extents(walls)
+    }
+
+    fn placed(&self, poses: &[Pose], basis: &DMatrix<f64>) -> Result<Arc<PlacedFilms<'_>>> {
+        self.panels.panels().model().check_input(poses, basis)?;
+        Ok(Arc::new(self.films.place(poses, basis, &self.names)?))
+    }
+}
+
+/// Length of a panel's edges where they are shortest, m: of the twentieth part of them that is smaller than the rest.
+fn edge(body: &PanelBoundary) -> f64 {
+    let mut areas = body.faces.areas.clone();
+    areas.sort_by(f64::total_cmp);
+    let area = areas.get(areas.len() / 20).copied().unwrap_or(0.0);
+    // Of an equilateral triangle.
+    (4.0 * area / f64::sqrt(3.0)).sqrt()
+}
+
+impl Coupling for FilmedPanels {
+    fn name(&self) -> &'static str {
+        self.panels.name()
+    }
+
+    fn bodies(&self) -> usize {
+        self.panels.bodies()
+    }
+
+    fn unknowns(&self) -> usize {
+        self.panels.unknowns()
+    }
+
+    fn evaluate(&self, poses: &[Pose], basis: &DMatrix<f64>) -> Result<Momenta> {
+        let films = self.placed(poses, basis)?;
+        let held = self.panels.evaluate_held(poses, basis, &films)?;
+        let mut momenta = held.momenta().clone();
+        films.add_impulses(basis, &mut momenta);
+        Ok(Momenta::new(momenta, held.report().clone()))
+    }
+
+    fn differentiable(&self) -> Option<&dyn Linearise> {
+        Some(self)
+    }
+
+    fn film_momenta(&self, poses: &[Pose], twists: &DMatrix<f64>) -> Result<Option<DMatrix<f64>>> {
+        Ok(Some(self.films.momenta(poses, twists, &self.names)?))
+    }
+
+    /// By the panels where they are.
+    fn velocity(
+        &self,
+        poses: &[Pose],
+        twists: &DVector<f64>,
+        points: &[Vec3],
+    ) -> Result<Vec<Vec3>> {
+        self.panels.velocity(poses, twists, points)
+    }
+}
+
+impl Linearise for FilmedPanels {
+    fn linearise(&self, poses: &[Pose], basis: &DMatrix<f64>) -> Result<Box<dyn Linearised + '_>> {
+        let films = self.placed(poses, basis)?;
+        let held = self.panels.linearise_held(poses, basis, &films)?;
+        if !films.any() {
+            return Ok(held);
+        }
+        let mut momenta = held.momenta().clone();
+        films.add_impulses(basis, &mut momenta);
+        Ok(Box::new(FilmedLinearised {
+            basis: basis.clone(),
+            momenta,
+            films,
+            held,
+        }))
+    }
+}
+
+/// [`FilmedPanels`] at given poses.
+struct FilmedLinearised<'a> {
+    held: Box<dyn Linearised + 'a>,
+    films: Arc<PlacedFilms<'a>>,
+    basis: DMatrix<f64>,
+    momenta: DMatrix<f64>,
+}
+
+impl FilmedLinearised<'_> {
+    fn twists(&self, x: Direction) -> DVector<f64> {
+        match x {
+            Direction::Basis(c) => &self.basis * c,
+            Direction::Twist(x) => x.clone(),
+        }
+    }
+}
+
+impl Linearised for FilmedLinearised<'_> {
+    fn momenta(&self) -> &DMatrix<f64> {
+        &self.momenta
+    }
+
+    fn gradient(&self, x: &DVector<f64>, y: &DVector<f64>) -> Result<Vec<Vec6>> {
+        let mut out = self.held.gradient(x, y)?;
+        self.films.add_basis_wrenches(&self.basis, [x, y], &mut out);
+        Ok(out)
+    }
+
+    fn gradient_columns(&self, x: &DVector<f64>) -> Result<Vec<Vec<Vec6>>> {
+        let mut out = self.held.gradient_columns(x)?;
+        self.films.add_column_wrenches(x, &mut out);
+        Ok(out)
+    }
+
+    fn gradient_along(&self, y: &DVector<f64>, z: &[Vec6]) -> Result<DVector<f64>> {
+        let mut rate = DVector::zeros(self.basis.nrows());
+        let films = self.films.along(z);
+        films.add_impulse_rate(&(&self.basis * y), &mut rate);
+        Ok(self.held.gradient_along(y, z)? + self.basis.tr_mul(&rate))
+    }
+
+    fn vjp(&self, x: Direction, y: Direction) -> Result<Pullback> {
+        let mut out = self.held.vjp(x, y)?;
+        let (x, y) = (self.twists(x), self.twists(y));
+        self.films.add_wrenches(&x, &y, &mut out.wrench);
+        for (twists, momentum) in [(x, &mut out.momentum_x), (y, &mut out.momentum_y)] {
+            let column = DMatrix::from_column_slice(twists.len(), 1, twists.as_slice());
+            let mut added = DMatrix::zeros(twists.len(), 1);
+            self.films.add_impulses(&column, &mut added);
+            *momentum += added.column(0);
+        }
+        Ok(out)
+    }
+
+    fn hvp(&self, x: Direction, y: Direction, z: &[Vec6]) -> Result<Tangent> {
+        let mut out = self.held.hvp(x, y, z)?;
+        let (x, y) = (self.twists(x), self.twists(y));
+        let mut rates = [out.momentum_x, out.momentum_y];
+        let into = (&mut out.gradient[..], &mut out.wrench[..]);
+        self.films
+            .along(z)
+            .add_tangent(&[&x, &y], z, into, &mut rates);
+        [out.momentum_x, out.momentum_y] = rates;
+        Ok(out)
+    }
+
+    fn report(&self) -> &CouplingReport {
+        self.held.report()
+    }
+}

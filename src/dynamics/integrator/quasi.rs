@@ -1,0 +1,84 @@
+//! A stage solved with one factor of its matrix, which each step improves (Broyden's "good" update): as few evaluations as Newton's method takes, or two more, but one
+//! Jacobian, which costs as much as several of them. It ends at the same solution, or gives up where it doesn't get there fast.
+//!
+//! # References
+//! C. T. Kelley, "Solving Nonlinear Equations with Newton's Method", 2003, chapter 4.
+
+use super::split::Split;
+use nalgebra::{DMatrix, DVector, Dyn, LU};
+
+/// Most steps.
+const STEPS: usize = 12;
+/// Part of the residual that a step may leave.
+const LEFT: f64 = 0.3;
+/// Residual that is rounding.
+const ROUNDING: f64 = 1e-15;
+
+/// A velocity that a stage may have, with what is left of its equation.
+pub(super) struct Trial {
+    pub v: DVector<f64>,
+    /// f(q, v, u) there.
+    pub force: DVector<f64>,
+    /// p̂ + h f.
+    pub reached: DVector<f64>,
+    pub defect: DVector<f64>,
+    /// The defect's size.
+    pub merit: f64,
+    /// The same relative to what is balanced.
+    pub residual: f64,
+}
+
+impl Trial {
+    /// Whether rounding is all that is left, by the residual of the trial before it.
+    pub fn converged(&self, previous: f64) -> bool {
+        let residual = self.residual;
+        residual <= ROUNDING || (residual <= 1e-13 && residual >= 0.25 * previous)
+    }
+}
+
+/// The solution from `first` on, `factor` being that of the stage's matrix about there; none where each step doesn't come much nearer, but for residuals under `noise`, of which
+/// nothing more can be told.
+pub(super) fn descend(
+    split: &Split,
+    mass_matrix: &DMatrix<f64>,
+    factor: &LU<f64, Dyn, Dyn>,
+    first: &Trial,
+    noise: f64,
+    at: impl Fn(DVector<f64>) -> crate::Result<Trial>,
+) -> Option<Trial> {
+    // Steps made, each with its dual by the inertia.
+    let mut made: Vec<[DVector<f64>; 2]> = Vec::new();
+    let mut improved: Vec<DVector<f64>> = Vec::new();
+    let weight = split.block(mass_matrix).diagonal();
+    let mut back = factor.solve(&split.take(&first.defect))?;
+    let (mut v, mut previous) = (first.v.clone(), first.residual);
+    for _ in 0..STEPS {
+        let step = -&back;
+        let now = at(&v + split.put(&step)).ok()?;
+        let stalled = now.residual > 0.5 * previous;
+        if now.converged(previous) || (stalled && now.residual <= noise) {
+            return Some(now);
+        }
+        let nearer = now.residual <= LEFT * previous;
+        if !nearer {
+            return None;
+        }
+        let dual = step.component_mul(&weight);
+        back = factor.solve(&split.take(&now.defect))?;
+        for ([_, dual], u) in made.iter().zip(&improved) {
+            let part = dual.dot(&back);
+            back += part * u;
+        }
+        // (I + u sᵀ) with u = −z / sᵀ(z + s), by which the new inverse brings z = H F to z sᵀs / sᵀ(z + s).
+        let (size, ahead) = (dual.dot(&step), dual.dot(&step) + dual.dot(&back));
+        let sound = ahead > LEFT * size;
+        if !sound {
+            return None;
+        }
+        improved.push(-&back / ahead);
+        back *= size / ahead;
+        made.push([step, dual]);
+        (v, previous) = (now.v, now.residual);
+    }
+    None
+}

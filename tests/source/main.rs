@@ -1,6 +1,7 @@
 //! Tests that read the source: what imports what, and shaders without a device.
 
 mod circles;
+mod docs;
 mod graph;
 mod layers;
 mod shaders;

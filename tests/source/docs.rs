@@ -1,0 +1,102 @@
+//! Documents: their links lead somewhere, and the book has all pages.
+
+use std::path::{Path, PathBuf};
+
+fn root() -> &'static Path {
+    Path::new(env!("CARGO_MANIFEST_DIR"))
+}
+
+/// Documents at the top, and the book's pages.
+fn documents() -> Vec<PathBuf> {
+    let top = ["README.md", "CHANGELOG.md", "adjoint/README.md"].map(|name| root().join(name));
+    let pages = std::fs::read_dir(root().join("docs")).unwrap();
+    let pages = pages.map(|entry| entry.unwrap().path());
+    let pages = pages.filter(|path| path.extension().is_some_and(|e| e == "md"));
+    let mut out: Vec<PathBuf> = top.into_iter().chain(pages).collect();
+    out.sort();
+    out
+}
+
+/// Targets of a document's links, outside of its listings.
+fn links(text: &str) -> Vec<String> {
+    let mut out = Vec::new();
+    let mut listing = false;
+    for line in text.lines() {
+        if line.trim_start().starts_with("```") {
+            listing = !listing;
+        }
+        if listing {
+            continue;
+        }
+        for part in line.split("](").skip(1) {
+            if let Some((target, _)) = part.split_once(')') {
+                out.push(target.to_string());
+            }
+        }
+    }
+    out
+}
+
+/// Headings as links name them.
+fn anchors(text: &str) -> Vec<String> {
+    let headings = text.lines().filter(|line| line.starts_with('#'));
+    let anchor = |line: &str| -> String {
+        let title = line.trim_start_matches('#').trim().to_lowercase();
+        let kept = title
+            .chars()
+            .filter(|c| c.is_alphanumeric() || " -_".contains(*c));
+        kept.map(|c| if c == ' ' { '-' } else { c }).collect()
+    };
+    headings.map(anchor).collect()
+}
+
+#[test]
+fn links_lead_somewhere() {
+    let mut dead = Vec::new();
+    let mut count = 0;
+    for document in documents() {
+        let text = std::fs::read_to_string(&document).unwrap();
+        for link in links(&text).iter().filter(|link| !link.contains("://")) {
+            count += 1;
+            let (file, anchor) = link.split_once('#').unwrap_or((link, ""));
+            let target = match file {
+                "" => document.clone(),
+                file => document.parent().unwrap().join(file),
+            };
+            let found = target.exists()
+                && (anchor.is_empty()
+                    || anchors(&std::fs::read_to_string(&target).unwrap_or_default())
+                        .iter()
+                        .any(|a| a == anchor));
+            if !found {
+                dead.push(format!("{}: {link}", document.display()));
+            }
+        }
+    }
+    assert!(count > 100, "{count}");
+    assert!(dead.is_empty(), "{dead:#?}");
+}
+
+#[test]
+fn the_book_has_all_pages() {
+    let summary = std::fs::read_to_string(root().join("docs/SUMMARY.md")).unwrap();
+    let listed = links(&summary);
+    for page in documents() {
+        let name = page.file_name().unwrap().to_str().unwrap().to_string();
+        let in_book = page.parent() == Some(&root().join("docs")) && name != "SUMMARY.md";
+        assert!(
+            !in_book || listed.contains(&name),
+            "{name} isn't in docs/SUMMARY.md"
+        );
+    }
+}
+
+/// What a newcomer reads first is short.
+#[test]
+fn the_readme_is_short() {
+    let lines = std::fs::read_to_string(root().join("README.md"))
+        .unwrap()
+        .lines()
+        .count();
+    assert!(lines <= 120, "{lines} lines");
+}

@@ -77,13 +77,14 @@ fn closed_forms_do_not_see_the_mesh() {
 
 #[test]
 fn a_refined_gap_is_one_that_full_resolves() {
-    let warning = |regions| {
+    let warning = |regions, films| {
         let scene = coin_over_box(regions, [300, 320]);
-        let full = Settings::default().fidelity(Fidelity::Full);
+        let full = Settings::default().fidelity(Fidelity::Full).films(films);
         Simulator::new(&scene, full).unwrap().start_gap_warning()
     };
-    let said = warning(None).unwrap();
+    let said = warning(None, false).unwrap();
     assert!(said.contains("by panels, may be off by"), "{said}");
     assert!(said.contains("`refine`"), "{said}");
-    assert_eq!(warning(Some((0.03, 2.0 * COIN_GAP))), None);
+    assert_eq!(warning(Some((0.03, 2.0 * COIN_GAP)), false), None);
+    assert_eq!(warning(None, true), None);
 }

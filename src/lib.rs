@@ -29,6 +29,11 @@ mod special;
 pub mod tradeoff;
 mod water;
 
+/// The book's programs are tested.
+#[cfg(doctest)]
+#[doc = include_str!("../docs/gradients.md")]
+mod book {}
+
 pub use error::{Error, Result};
 pub use geometry::{MassProperties, MeshReport, TriMesh};
 pub use hydrograd_adjoint as adjoint;

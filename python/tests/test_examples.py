@@ -142,6 +142,17 @@ def test_replay(tmp_path):
     assert "4 states" in done.stdout and page.stat().st_size > 500_000
 
 
+def test_cookbook(tmp_path, monkeypatch):
+    """The programs in docs/cookbook.md run, one after the other, and hold what they assert."""
+    blocks = re.findall(r"^```python\n(.*?)^```", (ROOT / "docs/cookbook.md").read_text(), re.MULTILINE | re.DOTALL)
+    assert len(blocks) > 9
+    monkeypatch.chdir(tmp_path)
+    names = {}
+    for block in blocks:
+        exec(block, names)
+    assert (tmp_path / "run.html").stat().st_size > 500_000
+
+
 def test_what_is_shown_of_replays(tmp_path, monkeypatch):
     """The programs in docs/viewer.md run."""
     blocks = re.findall(r"^```python\n(.*?)^```", (ROOT / "docs/viewer.md").read_text(), re.MULTILINE | re.DOTALL)

@@ -91,6 +91,26 @@ fn the_book_has_all_pages() {
     }
 }
 
+/// mdBook itself builds it, each page under its title.
+#[test]
+fn the_book_builds() {
+    let folder = tempfile::tempdir().unwrap();
+    let mut book = mdbook_driver::MDBook::load(root().join("docs")).unwrap();
+    book.config.build.build_dir = folder.path().to_path_buf();
+    book.build().unwrap();
+    for page in documents() {
+        let name = page.file_stem().unwrap().to_str().unwrap();
+        if page.parent() != Some(&root().join("docs")) || name == "SUMMARY" {
+            continue;
+        }
+        let text = std::fs::read_to_string(&page).unwrap();
+        let title = text.lines().next().unwrap().trim_start_matches("# ");
+        let built =
+            std::fs::read_to_string(folder.path().join(name).with_extension("html")).unwrap();
+        assert!(built.contains(&format!(">{title}</a></h1>")), "{name}");
+    }
+}
+
 /// What a newcomer reads first is short.
 #[test]
 fn the_readme_is_short() {

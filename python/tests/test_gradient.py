@@ -298,7 +298,7 @@ def test_pieces_and_torsional_friction():
 
 def test_objectives_are_added_subtracted_and_named(sim, controls):
     rollout = sim.rollout(controls)
-    name = sim.names[1]
+    name = sim.body_names[1]
     by_number = hg.objective.final_position(1, (0.1, 0.0, 0.0))
     by_name = hg.objective.final_position(name, (0.1, 0.0, 0.0))
     value = rollout.value(by_number)

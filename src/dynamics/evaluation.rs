@@ -8,6 +8,9 @@ use crate::multibody::Kinematics;
 use crate::{Error, Result};
 use nalgebra::{DMatrix, DVector};
 
+/// Where coordinates left floating point: before the step's end, at a stage of it.
+pub(crate) const WITHIN: &str = "within the step";
+
 /// The system at one configuration: values alone. What has derivatives too is a [`Linearisation`](super::Linearisation).
 #[derive(Clone)]
 pub struct Evaluation<'a> {
@@ -82,11 +85,13 @@ impl System {
 
     pub(super) fn kinematics(&self, q: &DVector<f64>) -> Result<Kinematics> {
         if let Some(bad) = q.iter().position(|x| !x.is_finite()) {
-            return Err(Error::input(
-                format!("coordinate q[{bad}]"),
-                q[bad],
-                "coordinates must be finite: the step is too long or a force too large",
-            ));
+            return Err(Error::Unresolved {
+                place: WITHIN.into(),
+                quantity: format!("coordinate q[{bad}]"),
+                value: q[bad],
+                limit: f64::MAX,
+                remedy: "the simulation left what floating point holds: the step is too long or a force too large".into(),
+            });
         }
         Ok(self.tree.kinematics(q))
     }

@@ -25,6 +25,7 @@ pub use contact::{ContactForce, ContactGap, ContactModel, Dual, PairContact};
 pub use cotangents::ForceCotangents;
 pub use drift::Drift;
 pub use evaluation::Evaluation;
+pub(crate) use evaluation::WITHIN;
 pub use integrator::{
     ContactVelocities, Input, Integrator, LinearisedStep, State, StateBar, StateTangents, StepBar,
     StepRecord, Stepper, Stops,

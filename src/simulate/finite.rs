@@ -1,7 +1,7 @@
 //! What leaves floating point is an error that names its step and its coordinate.
 
 use super::Sample;
-use crate::dynamics::{Parameters, State, StateBar};
+use crate::dynamics::{Parameters, State, StateBar, WITHIN};
 use crate::scene::Scene;
 use crate::{Error, Result};
 use nalgebra::{DMatrix, DVector};
@@ -136,11 +136,15 @@ pub(super) fn tangents(
     Ok(())
 }
 
-/// A mass matrix of which rounding is all that is left: the run has blown up.
-pub(super) fn blown_up(scene: &Scene, state: &State, error: Error) -> Error {
-    let Error::Unresolved { place, value, .. } = &error else {
+/// A mass matrix of which rounding is all that is left, or coordinates that aren't numbers: the run has blown up.
+pub(super) fn blown_up(scene: &Scene, state: &State, mut error: Error) -> Error {
+    let Error::Unresolved { place, value, .. } = &mut error else {
         return error;
     };
+    if place == WITHIN {
+        *place = format!("step {}, {WITHIN}", state.step);
+        return error;
+    }
     // Scaled to a diagonal of one, none is below this.
     let least = -(state.y.len() as f64);
     if !place.starts_with("mass matrix") || *value >= least {

@@ -24,7 +24,7 @@ pub struct Sample {
     pub momentum: Vec6,
     /// Largest absolute entry of any single body's momentum.
     pub largest_momentum: Vec6,
-    /// Generalised momentum along each motion in which nothing outside acts ([`System::kept`](crate::dynamics::System::kept)).
+    /// Generalised momentum along each motion in which nothing outside acts ([`Simulator::kept`](crate::Simulator::kept)).
     pub kept_momentum: DVector<f64>,
     /// Total controls during the step that starts here; empty at the last state.
     pub control: DVector<f64>,

@@ -5,17 +5,36 @@ use crate::error::{exception, input};
 use hydrograd::simulate::{Action, ActionBar, Observation, Policy};
 use nalgebra::DVector;
 use pyo3::prelude::*;
-use pyo3::types::PyTuple;
+use pyo3::types::{PyTuple, PyWeakrefMethods, PyWeakrefReference};
 
 /// A controller written in Python: an object with `act`, and, to be differentiated, `act_vjp`.
+///
+/// What holds the simulator in Python holds the object as well, where the garbage collector sees it: from here it is only pointed at, so that an
+/// object which holds its simulator can be collected together with it.
 pub struct Controller {
-    object: Py<PyAny>,
+    object: Pointer,
     controls: usize,
     velocities: usize,
     gains: Vec<f64>,
 }
 
+enum Pointer {
+    Weak(Py<PyWeakrefReference>),
+    /// Of an object that can't be pointed at (one with `__slots__`, say).
+    Strong(Py<PyAny>),
+}
+
 impl Controller {
+    /// The object.
+    fn object<'py>(&self, py: Python<'py>) -> Bound<'py, PyAny> {
+        match &self.object {
+            Pointer::Weak(at) => {
+                (at.bind(py).upgrade()).unwrap_or_else(|| py.None().into_bound(py))
+            }
+            Pointer::Strong(object) => object.bind(py).clone(),
+        }
+    }
+
     /// A controller of a system with so many controls and velocities.
     pub fn new(
         object: &Bound<'_, PyAny>,
@@ -33,7 +52,10 @@ impl Controller {
             _ => Vec::new(),
         };
         Ok(Self {
-            object: object.clone().unbind(),
+            object: match PyWeakrefReference::new(object) {
+                Ok(at) => Pointer::Weak(at.unbind()),
+                Err(_) => Pointer::Strong(object.clone().unbind()),
+            },
             controls,
             velocities,
             gains,
@@ -49,7 +71,9 @@ impl Controller {
     }
 
     fn try_act(&self, py: Python<'_>, seen: &Observation) -> PyResult<Vec<f64>> {
-        let given = (self.object.bind(py)).call_method1("act", (Self::observation(py, seen)?,))?;
+        let given = self
+            .object(py)
+            .call_method1("act", (Self::observation(py, seen)?,))?;
         let shape = [Dim::Is(self.controls)];
         Ok(array::array("policy: act", &given, &shape)?.values)
     }
@@ -60,7 +84,7 @@ impl Controller {
         seen: &Observation,
         control_bar: &DVector<f64>,
     ) -> PyResult<ActionBar> {
-        let object = self.object.bind(py);
+        let object = self.object(py);
         let Some(method) = object.getattr_opt("act_vjp")? else {
             return Err(exception(hydrograd::Error::Unsupported {
                 what: "a gradient through this controller".into(),

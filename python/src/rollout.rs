@@ -14,6 +14,7 @@ use hydrograd::simulate::{
 };
 use nalgebra::DMatrix;
 use numpy::{PyArray1, PyArrayDyn};
+use pyo3::gc::{PyTraverseError, PyVisit};
 use pyo3::prelude::*;
 use pyo3::types::{PyDict, PyTuple};
 use std::sync::Arc;
@@ -55,6 +56,10 @@ impl Rollout {
 
 #[pymethods]
 impl Rollout {
+    fn __traverse__(&self, visit: PyVisit<'_>) -> Result<(), PyTraverseError> {
+        visit.call(&self.simulator)
+    }
+
     /// The simulator that made it.
     #[getter]
     fn simulator(&self, py: Python<'_>) -> Py<Simulator> {

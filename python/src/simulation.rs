@@ -16,6 +16,7 @@ use hydrograd::simulate::Halted;
 use hydrograd::{Controls, dynamics};
 use nalgebra::{DMatrix, DVector};
 use numpy::PyArrayDyn;
+use pyo3::gc::{PyTraverseError, PyVisit};
 use pyo3::prelude::*;
 use pyo3::types::PyDict;
 use rayon::prelude::*;
@@ -116,6 +117,10 @@ fn gathered(
 
 #[pymethods]
 impl Simulator {
+    fn __traverse__(&self, visit: PyVisit<'_>) -> Result<(), PyTraverseError> {
+        visit.call(&self.policy)
+    }
+
     #[new]
     #[pyo3(signature = (
         scene, dt=None, *, fidelity=None, method=None, tolerance=None, integrator=None, faces=None, accuracy=None,
@@ -303,7 +308,7 @@ impl Simulator {
             state,
             velocity: record.rollout().samples()[1].v.clone(),
         };
-        Ok((next, Record(Arc::new(record))))
+        Ok((next, Record(Arc::new(record), slf.clone().unbind())))
     }
 
     /// Added mass of the bodies in the water at the start, (6 n, 6 n), world axes: per body three rows of force per acceleration of

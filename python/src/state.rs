@@ -8,6 +8,7 @@ use crate::tangents::{self, Along};
 use hydrograd::dynamics;
 use nalgebra::{DMatrix, DVector};
 use numpy::{PyArray1, PyArrayDyn};
+use pyo3::gc::{PyTraverseError, PyVisit};
 use pyo3::prelude::*;
 use pyo3::types::{PyDict, PyTuple};
 use std::sync::Arc;
@@ -62,6 +63,10 @@ impl State {
 
 #[pymethods]
 impl State {
+    fn __traverse__(&self, visit: PyVisit<'_>) -> Result<(), PyTraverseError> {
+        visit.call(&self.simulator)
+    }
+
     /// Number of steps made.
     #[getter]
     fn step(&self) -> usize {
@@ -150,10 +155,14 @@ impl State {
 
 /// What one step leaves behind: the key to its derivatives.
 #[pyclass(frozen, module = "hydrograd")]
-pub struct Record(pub Arc<hydrograd::simulate::Record>);
+pub struct Record(pub Arc<hydrograd::simulate::Record>, pub Py<Simulator>);
 
 #[pymethods]
 impl Record {
+    fn __traverse__(&self, visit: PyVisit<'_>) -> Result<(), PyTraverseError> {
+        visit.call(&self.1)
+    }
+
     /// Transpose of the step: derivatives of `q·δq + v·δv + positions·δx + rotations·δθ` of the state after it, with `q` (v_size,) in
     /// the tangent space of the coordinates, `v` (v_size,), and `positions` and `rotations` (δR = δθ × R, world axes) (bodies, 3);
     /// what is None is zero.

@@ -87,7 +87,7 @@ def test_scenes():
         hg.Simulator(scene)
     with pytest.raises(hg.InputError, match="parent"):
         scene.add(hg.Body(mass=1.0, parent=7))
-    with pytest.raises(hg.InputError, match='"body 1"'):
+    with pytest.raises(hg.InputError, match='"body 0"'):
         scene.index("coin")
     with pytest.raises(hg.FileError, match="no such file"):
         hg.Scene.load("nowhere.toml")

@@ -1,11 +1,13 @@
 """Controllers written in Python: they act, are differentiated, and what they raise comes out."""
 
+import gc
 import os
 import pathlib
 import pickle
 import subprocess
 import sys
 import threading
+import weakref
 
 import numpy as np
 import pytest
@@ -48,6 +50,51 @@ class Spring:
 @pytest.fixture(scope="module")
 def planar():
     return hg.Simulator(scene(), 0.02, fidelity="full", faces=80, tolerance=1e-12)
+
+
+def test_a_policy_that_holds_its_simulator_is_collected():
+    class Holds:
+        def act(self, observation):
+            return np.zeros(6)
+
+    scene = hg.Scene()
+    scene.add(hg.Body(hg.sphere(0.1), density=1000.0, actuated=True))
+    bare = hg.Simulator(scene, fidelity="isolated")
+
+    def cycle():
+        policy = Holds()
+        policy.sim = bare.with_policy(policy)
+        policy.rollout = policy.sim.rollout(steps=2)
+        policy.state, policy.record = policy.sim.step(policy.sim.state())
+        return weakref.ref(policy)
+
+    gone = [cycle() for _ in range(3)]
+    gc.collect()
+    assert [at() for at in gone] == [None] * 3
+    # It lives on in whatever still needs it.
+    policy = Holds()
+    record = bare.with_policy(policy).step(bare.state())[1]
+    rollout = bare.with_policy(policy).rollout(steps=2)
+    del policy
+    gc.collect()
+    assert rollout.simulator.policy is not None
+    with pytest.raises(hg.UnsupportedError, match="act_vjp"):
+        rollout.vjp(v=np.zeros((3, 6)))
+    with pytest.raises(hg.UnsupportedError, match="act_vjp"):
+        record.vjp(v=np.zeros(6))
+
+
+def test_a_policy_that_cannot_be_pointed_at():
+    class Slots:
+        __slots__ = ()
+
+        def act(self, observation):
+            return np.full(6, 0.1)
+
+    scene = hg.Scene()
+    scene.add(hg.Body(hg.sphere(0.1), density=1000.0, actuated=True))
+    sim = hg.Simulator(scene, fidelity="isolated").with_policy(Slots())
+    assert sim.rollout(steps=2).v[-1, 0] > 0.0
 
 
 def test_it_acts_as_the_same_controls_would(planar):

@@ -6,7 +6,7 @@
 //! let mut scene = Scene::new(Fluid::fresh_water());
 //! scene.add(Body::new(Shape::sphere(0.05)).density(998.0).at([-0.1, 0.0, 0.0]).actuated());
 //! let coin = scene.add(Body::new(Shape::ellipsoid([0.04, 0.04, 0.01])).density(998.0));
-//! assert_eq!(scene.bodies[coin.0].name, "body 2");
+//! assert_eq!(scene.bodies[coin.0].name, "body 1");
 //! scene.validate()?;
 //! # Ok::<(), hydrograd::Error>(())
 //! ```
@@ -54,9 +54,9 @@ impl Scene {
         }
     }
 
-    /// Adds a body, named `body 1`, `body 2`, … by its place if it has no name.
+    /// Adds a body, named `body 0`, `body 1`, … by its [`BodyId`] if it has no name.
     pub fn add(&mut self, mut body: Body) -> BodyId {
-        let mut number = self.bodies.len() + 1;
+        let mut number = self.bodies.len();
         while body.name.is_empty() {
             let name = format!("body {number}");
             if self.body(&name).is_none() {

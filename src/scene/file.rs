@@ -319,7 +319,7 @@ fn place(path: &[Step], values: &Value) -> String {
             let name = body.and_then(|b| b.get("name")).and_then(|n| n.as_str());
             let head = match name {
                 Some(name) => format!("body \"{name}\""),
-                None => format!("body number {} (unnamed)", i + 1),
+                None => format!("bodies[{i}] (unnamed)"),
             };
             (Some(head), rest)
         }

@@ -148,7 +148,7 @@ fn a_ball_lands_through_a_film() {
             // Panels with a film do resolve a hundredth of the radius.
             Fidelity::Full => assert_eq!(told, ""),
             // Compressed bodies don't, to a percent.
-            _ => says(told, &["body 1", "1.000e-3 m", "faces' edges", "check_gap"]),
+            _ => says(told, &["body 0", "1.000e-3 m", "faces' edges", "check_gap"]),
         }
     }
     let mut simulator = with(Fidelity::Reduced);
@@ -193,7 +193,7 @@ fn gaps_of_contact_are_told() {
     says(
         told.unwrap(),
         &[
-            "body \"body 1\"",
+            "body \"body 0\"",
             "a wall",
             "resolves no less",
             "contact.gap",

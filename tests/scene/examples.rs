@@ -142,7 +142,7 @@ fn built_scenes_are_as_documented() {
     scene.add(
         Body::new(Shape::cuboid([1.0, 1.0, 0.1]))
             .fixed()
-            .named("body 3"),
+            .named("body 2"),
     );
     let capsule = scene.add(
         Body::new(Shape::capsule(0.1, 0.4))
@@ -150,17 +150,17 @@ fn built_scenes_are_as_documented() {
             .at([0.0, 0.0, 2.0])
             .rotated([0.1, 0.0, 0.0])
             .joint(Joint::Spherical)
-            .child_of("body 1")
+            .child_of("body 0")
             .actuated(),
     );
-    assert_eq!(scene.bodies[ball.0].name, "body 1");
-    assert_eq!(scene.bodies[capsule.0].name, "body 4", "body 3 is taken");
+    assert_eq!(scene.bodies[ball.0].name, "body 0");
+    assert_eq!(scene.bodies[capsule.0].name, "body 3", "body 2 is taken");
     assert_eq!(
         (scene.coordinates(), scene.velocities(), scene.controls()),
         (11, 9, 9)
     );
-    assert_eq!(scene.coordinate_labels()[10], "body 4.qz");
-    assert_eq!(scene.velocity_labels()[8], "body 4.wz");
+    assert_eq!(scene.coordinate_labels()[10], "body 3.qz");
+    assert_eq!(scene.velocity_labels()[8], "body 3.wz");
     scene.validate().unwrap();
     scene.set_faces(80);
     assert_eq!(scene.bodies[0].shape, Some(Shape::sphere(0.1).faces(80)));
@@ -270,7 +270,7 @@ fn everything_survives_a_round_trip() {
             damping: vec![3.0],
         },
         Controller::PushThenLock {
-            body: "body 2".into(),
+            body: "body 1".into(),
             force: -1.0,
             stop_at: 0.5,
         },

@@ -173,7 +173,7 @@ fn missing_keys_are_named() {
     );
     unread(
         "time_step = 1\nsteps = 1\n[fluid]\ndensity = 1\n[[bodies]]\nmass = 1\n",
-        &["line 5", "body number 1 (unnamed)", "`name`"],
+        &["line 5", "bodies[0] (unnamed)", "`name`"],
     );
     unread(
         &text("[[bodies.motion]]\nkind = \"sine\"\namplitude = 1", ""),

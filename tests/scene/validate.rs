@@ -80,11 +80,11 @@ fn world_is_checked() {
 fn names_and_parents_are_checked() {
     refused(
         |s| s.bodies[1].name = " ".into(),
-        &["body number 2: name", "name"],
+        &["bodies[1]: name", "name"],
     );
     refused(
         |s| s.bodies[1].name = "ball".into(),
-        &["body number 2: name", "body number 1"],
+        &["bodies[1]: name", "bodies[0]"],
     );
     refused(
         |s| s.bodies[1].parent = Some("bal".into()),

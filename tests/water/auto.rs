@@ -49,7 +49,7 @@ fn gaps_that_compression_does_not_resolve() {
         let said = without.start_gap_warning();
         assert_eq!(said.is_some(), gap < resolved, "gap {gap}: {said:?}");
         if let Some(said) = said {
-            says(said, &["compressed sources resolve", "body 1", "body 2"]);
+            says(said, &["compressed sources resolve", "body 0", "body 1"]);
         }
     }
 }

@@ -425,7 +425,7 @@ fn what_is_missing_is_said() {
     let found = found.unwrap();
     assert_eq!(found.total, None);
     assert!(
-        found.missing[0].contains("given for body \"body 1\""),
+        found.missing[0].contains("given for body \"body 0\""),
         "{found:?}"
     );
     // Without a shape the coupling can't be had either.

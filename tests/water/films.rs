@@ -220,7 +220,7 @@ fn what_films_do_not_do_is_said() {
     let simulator = |settings| Simulator::new(&scene, settings).unwrap();
     let said = simulator(films()).start_gap_warning().unwrap();
     assert!(said.contains("by a film, may be off by"), "{said}");
-    assert!(said.contains("body 2") && said.contains("edges"), "{said}");
+    assert!(said.contains("body 1") && said.contains("edges"), "{said}");
     let isolated = simulator(films().films(false).fidelity(Fidelity::Isolated));
     let warnings = isolated.warnings().join("\n");
     assert!(warnings.contains("films has no effect"), "{warnings}");

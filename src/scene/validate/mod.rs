@@ -132,18 +132,17 @@ impl Scene {
         for (i, body) in self.bodies.iter().enumerate() {
             if body.name.trim().is_empty() {
                 return Err(Error::input(
-                    format!("body number {}: name", i + 1),
+                    format!("bodies[{i}]: name"),
                     format!("{:?}", body.name),
                     "give every body a name",
                 ));
             }
             if let Some(first) = seen.insert(body.name.as_str(), i) {
                 return Err(Error::input(
-                    format!("body number {}: name", i + 1),
+                    format!("bodies[{i}]: name"),
                     format!("{:?}", body.name),
                     format!(
-                        "body number {} has that name already; give each its own",
-                        first + 1
+                        "bodies[{first}] has that name already (counted from 0); give each its own"
                     ),
                 ));
             }

@@ -4,6 +4,7 @@
 //! with its name, its bounds and the size of a change that says something. Values and cotangents are rows with a shared
 //! table; packing, names, checks and gradient checks read the table.
 
+use crate::adjoint::rigid::impossible_inertia;
 use crate::{Error, Result};
 use std::fmt;
 use std::ops::{Index, IndexMut};
@@ -414,6 +415,15 @@ impl Parameters {
             };
             let place = format!("parameter {}", entry.name);
             return Err(Error::input(place, value, refused));
+        }
+        for b in 0..self.table.bodies {
+            // To a thousandth, so that differences about a thin plate can be taken.
+            if let Some(why) = impossible_inertia(&self.inertia(b), 1e-3) {
+                let first = self.table.places[inertia(b)[0].0];
+                let of = &self.table.entries[first].name;
+                let place = format!("parameters {}", of.replace(".xx", ""));
+                return Err(Error::input(place, format!("{:?}", self.inertia(b)), why));
+            }
         }
         Ok(())
     }

@@ -186,6 +186,14 @@ fn parameters_and_starts_that_can_not_be_are_refused() {
             .to_string()
             .contains("inertia.xx")
     );
+    let mut impossible = good.clone();
+    let moments = ["xx", "yy", "zz"].map(|m| good.get(&format!("ellipsoid.inertia.{m}")).unwrap());
+    let sum = moments.iter().sum::<f64>();
+    impossible.set("ellipsoid.inertia.xx", sum).unwrap();
+    let message = s.set_parameters(impossible).unwrap_err().to_string();
+    for part in ["parameters ellipsoid.inertia", "sum of the other two"] {
+        assert!(message.contains(part), "{message}");
+    }
     let mut quadratic = good.clone();
     quadratic.set("ellipsoid.drag.quadratic", 1.0).unwrap();
     assert!(

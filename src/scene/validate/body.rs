@@ -1,8 +1,9 @@
 //! One body: shape, mass, joint, drag.
 
-use nalgebra::{Matrix3, Matrix6};
+use nalgebra::Matrix6;
 
 use super::{bounded, finite, limits, list, place};
+use crate::adjoint::rigid::impossible_inertia;
 use crate::scene::{Body, Motion, Scene, Shape};
 use crate::{Error, Result};
 
@@ -164,29 +165,9 @@ fn check_inertia(body: &Body, inertia: &[f64]) -> Result<()> {
             ));
         }
     };
-    let (xx, yy, zz) = (inertia[0], inertia[1], inertia[2]);
-    let mut moments = Matrix3::new(xx, xy, xz, xy, yy, yz, xz, yz, zz).symmetric_eigenvalues();
-    moments.as_mut_slice().sort_by(f64::total_cmp);
-    let slack = 1e-9 * moments.amax();
-    let principal = format!("principal moments {:?} kg m²", moments.as_slice());
-    if moments[0] < -slack {
-        return Err(Error::input(
-            place,
-            list(inertia),
-            format!("an inertia has no negative principal moment; this one has the {principal}"),
-        ));
-    }
-    if moments[0] + moments[1] < moments[2] - slack {
-        return Err(Error::input(
-            place,
-            list(inertia),
-            format!(
-                "no distribution of mass has a principal moment above the sum of the other two; \
-                 this one has the {principal}. Moments are taken about the centre of mass"
-            ),
-        ));
-    }
-    Ok(())
+    let six = [inertia[0], inertia[1], inertia[2], xy, xz, yz];
+    let wrong = impossible_inertia(&six, 1e-9);
+    wrong.map_or(Ok(()), |why| Err(Error::input(place, list(inertia), why)))
 }
 
 fn check_added_mass(body: &Body, rows: &[Vec<f64>]) -> Result<()> {

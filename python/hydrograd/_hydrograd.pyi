@@ -143,12 +143,12 @@ class Body:
         drag: Drag | None = None,
         shape_position: ArrayLike | None = None,
         shape_rotation: ArrayLike | None = None,
-        refine: Sequence[tuple[ArrayLike, float, float]] = ...,
+        refine: Sequence[tuple[ArrayLike, float, float]] | None = None,
         added_mass: ArrayLike | None = None,
         overlaps_parent: bool = False,
         collision: Sequence[
             Shape | tuple[Shape, ArrayLike] | tuple[Shape, ArrayLike, ArrayLike]
-        ] = (),
+        ] | None = None,
     ) -> Body: ...
     @property
     def name(self) -> str: ...
@@ -178,7 +178,7 @@ class Scene:
     @staticmethod
     def load(path: _Path) -> Scene: ...
     @staticmethod
-    def from_toml(text: str, folder: _Path = "") -> Scene: ...
+    def from_toml(text: str, folder: _Path | None = None) -> Scene: ...
     def to_toml(self) -> str: ...
     def add(self, body: Body) -> int: ...
     def add_wall(
@@ -191,9 +191,9 @@ class Scene:
         *,
         body: str,
         stiffness: float,
-        at: ArrayLike = ...,
+        at: ArrayLike = (0.0, 0.0, 0.0),
         to: str | None = None,
-        to_at: ArrayLike = ...,
+        to_at: ArrayLike = (0.0, 0.0, 0.0),
         rest_length: float = 0.0,
         damping: float = 0.0,
         name: str | None = None,
@@ -205,7 +205,7 @@ class Scene:
         *,
         roughness: float,
         viscosity: float = 1.0016e-3,
-        bodies: Sequence[str] = ...,
+        bodies: Sequence[str] = (),
         reach: float | None = None,
         name: str | None = None,
     ) -> None: ...
@@ -414,11 +414,11 @@ class Rollout:
         v: ArrayLike | None = None,
         parameters: Mapping[str, ArrayLike] | None = None,
         gains: ArrayLike | None = None,
-        observables: Sequence[str] = ...,
+        observables: Sequence[str] | None = None,
     ) -> Tangents: ...
     def jacobian(
         self,
-        parameters: Sequence[str] = ...,
+        parameters: Sequence[str] | None = None,
         *,
         q: bool = False,
         v: bool = False,

@@ -103,10 +103,10 @@ impl Piece<'_> {
 impl Body {
     #[new]
     #[pyo3(signature = (
-        shape=None, *, name=String::new(), density=None, mass=None, inertia=None, center_of_mass=None, position=None,
+        shape=None, *, name="", density=None, mass=None, inertia=None, center_of_mass=None, position=None,
         rotation=None, joint=None, parent=None, actuated=false, thruster=false, locked=false, motion=None, limits=None,
-        limit_stiffness=None, drag=None, shape_position=None, shape_rotation=None, refine=Vec::new(), added_mass=None,
-        overlaps_parent=false, collision=Vec::new()
+        limit_stiffness=None, drag=None, shape_position=None, shape_rotation=None, refine=None, added_mass=None,
+        overlaps_parent=false, collision=None
     ))]
     #[expect(
         clippy::too_many_arguments,
@@ -114,7 +114,7 @@ impl Body {
     )]
     fn new(
         shape: Option<PyRef<'_, Shape>>,
-        name: String,
+        name: &str,
         density: Option<f64>,
         mass: Option<f64>,
         inertia: Option<&Bound<'_, PyAny>>,
@@ -132,10 +132,10 @@ impl Body {
         drag: Option<PyRef<'_, Drag>>,
         shape_position: Option<&Bound<'_, PyAny>>,
         shape_rotation: Option<&Bound<'_, PyAny>>,
-        refine: Vec<Ball<'_>>,
+        refine: Option<Vec<Ball<'_>>>,
         added_mass: Option<&Bound<'_, PyAny>>,
         overlaps_parent: bool,
-        collision: Vec<Piece<'_>>,
+        collision: Option<Vec<Piece<'_>>>,
     ) -> PyResult<Self> {
         let at = |field: &str| {
             if name.is_empty() {
@@ -155,14 +155,14 @@ impl Body {
             let rows = array::array(&at("added_mass"), given, &[Dim::Is(6), Dim::Is(6)])?;
             PyResult::Ok(rows.values.chunks(6).map(<[f64]>::to_vec).collect())
         });
-        let refine = refine.iter().map(|Ball(center, radius, edge)| {
+        let refine = refine.iter().flatten().map(|Ball(center, radius, edge)| {
             Ok(Refinement {
                 center: fixed(&at("refine: center"), center)?,
                 radius: *radius,
                 edge: *edge,
             })
         });
-        let collision = collision.iter().enumerate();
+        let collision = collision.iter().flatten().enumerate();
         let collision = collision.map(|(k, piece)| piece.made(&at(&format!("collision[{k}]"))));
         let optional = |field: &str, given: Option<&Bound<'_, PyAny>>| {
             given.map(|g| fixed(&at(field), g)).transpose()
@@ -203,7 +203,7 @@ impl Body {
             actuated,
             thruster,
             drag: drag.map(|d| d.0),
-            name: name.clone(),
+            name: name.to_string(),
         };
         Ok(Self {
             body,

@@ -209,7 +209,7 @@ impl Rollout {
     }
 
     /// The state after `step` steps, from which a run may go on; negative numbers count from the end.
-    #[pyo3(signature = (step=-1))]
+    #[pyo3(signature = (step=-1), text_signature = "($self, step=-1)")]
     fn state(&self, py: Python<'_>, step: isize) -> PyResult<State> {
         let at = array::numbered(step, self.inner.states().len(), "state")?;
         Ok(State {
@@ -372,7 +372,7 @@ impl Rollout {
     /// Tangents of the trajectory, the counterpart of `vjp`: how the states change along `controls` (N, control_size), `q` (v_size,) in the tangent space of the
     /// initial coordinates, the initial `v` (v_size,), `parameters` by name, and `gains`; what is None stays. Each may have one more index before its own, for many
     /// directions at once, which cost little more than one. `observables` names others whose tangents are wanted. A `Tangents`. Ctrl-C ends it.
-    #[pyo3(signature = (*, controls=None, q=None, v=None, parameters=None, gains=None, observables=vec![]))]
+    #[pyo3(signature = (*, controls=None, q=None, v=None, parameters=None, gains=None, observables=None))]
     #[expect(clippy::too_many_arguments, reason = "one per keyword")]
     fn jvp<'py>(
         &self,
@@ -382,7 +382,7 @@ impl Rollout {
         v: Option<&Bound<'py, PyAny>>,
         parameters: Option<&Bound<'py, PyDict>>,
         gains: Option<&Bound<'py, PyAny>>,
-        observables: Vec<String>,
+        observables: Option<Vec<String>>,
     ) -> PyResult<Bound<'py, PyAny>> {
         let along = Along {
             controls,
@@ -391,18 +391,18 @@ impl Rollout {
             parameters,
             gains,
         };
-        tangents::jvp(py, &self.inner, &along, observables)
+        tangents::jvp(py, &self.inner, &along, observables.unwrap_or_default())
     }
 
     /// Jacobians of the observables `of` ("q" in the tangent space of the coordinates, "rotations" as δθ) at `states` (all where None; negative numbers count from the end)
     /// with respect to the `parameters` named, and where True the initial `q` (in its tangent space) and `v`, the `gains`, and the `controls` of all steps: by name an array
     /// (states, …, columns) whose columns come in that order. It costs a few runs, whatever the number of columns. Ctrl-C ends it.
-    #[pyo3(signature = (parameters=vec![], *, q=false, v=false, gains=false, controls=false, of=None, states=None))]
+    #[pyo3(signature = (parameters=None, *, q=false, v=false, gains=false, controls=false, of=None, states=None))]
     #[expect(clippy::too_many_arguments, reason = "one per keyword")]
     fn jacobian<'py>(
         &self,
         py: Python<'py>,
-        parameters: Vec<String>,
+        parameters: Option<Vec<String>>,
         q: bool,
         v: bool,
         gains: bool,
@@ -411,7 +411,7 @@ impl Rollout {
         states: Option<Vec<isize>>,
     ) -> PyResult<Bound<'py, PyDict>> {
         let variables = Variables {
-            parameters,
+            parameters: parameters.unwrap_or_default(),
             initial_q: q,
             initial_v: v,
             gains,

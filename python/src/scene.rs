@@ -29,10 +29,10 @@ pub struct Scene(pub hydrograd::Scene);
 #[pymethods]
 impl Scene {
     #[new]
-    #[pyo3(signature = (fluid=None, *, name=String::new(), gravity=None, contact=None, time_step=0.01, steps=100))]
+    #[pyo3(signature = (fluid=None, *, name="", gravity=None, contact=None, time_step=0.01, steps=100))]
     fn new(
         fluid: Option<PyRef<'_, Fluid>>,
-        name: String,
+        name: &str,
         gravity: Option<&Bound<'_, PyAny>>,
         contact: Option<PyRef<'_, Contact>>,
         time_step: f64,
@@ -40,7 +40,7 @@ impl Scene {
     ) -> PyResult<Self> {
         let fluid = fluid.map_or_else(hydrograd::Fluid::fresh_water, |f| f.0);
         let mut scene = hydrograd::Scene::new(fluid);
-        scene.name = name;
+        scene.name = name.to_string();
         scene.gravity = or_zeros("scene: gravity", gravity)?;
         scene.contact = contact.map(|c| c.0);
         scene.time_step = time_step;
@@ -56,9 +56,9 @@ impl Scene {
 
     /// A scene from TOML text; paths of meshes are relative to `folder`.
     #[staticmethod]
-    #[pyo3(signature = (text, folder=PathBuf::new()))]
-    fn from_toml(text: &str, folder: PathBuf) -> PyResult<Self> {
-        hydrograd::Scene::from_toml(text, folder)
+    #[pyo3(signature = (text, folder=None))]
+    fn from_toml(text: &str, folder: Option<PathBuf>) -> PyResult<Self> {
+        hydrograd::Scene::from_toml(text, folder.unwrap_or_default())
             .or_raise()
             .map(Self)
     }

@@ -125,6 +125,20 @@ def test_version_is_that_of_the_crate():
     assert STUBS.with_name("py.typed").exists()
 
 
+def test_docstrings_stand_in_the_stubs():
+    check = subprocess.run([sys.executable, ROOT / ".ci/stubs", "--check"], capture_output=True, text=True, check=False)
+    assert check.returncode == 0, check.stderr
+
+
+def test_signatures_are_readable():
+    for name in hg.__all__:
+        value = getattr(hg, name)
+        members = [value] + ([getattr(value, m) for m in public(vars(value))] if inspect.isclass(value) else [])
+        for member in members:
+            if callable(member) and not (inspect.isclass(member) and issubclass(member, Exception)):
+                assert "Ellipsis" not in str(inspect.signature(member)), f"{name}: {member}"
+
+
 def test_readme():
     """The example of the README runs and cuts the miss tenfold."""
     blocks = re.findall(r"^```python\n(.*?)^```", (ROOT / "README.md").read_text(), re.MULTILINE | re.DOTALL)

@@ -29,30 +29,47 @@ class _Mesh(Protocol):
     @property
     def faces(self) -> ArrayLike: ...
 
-class Error(Exception): ...
-class InputError(Error, ValueError): ...
-class MeshError(Error): ...
-class FileError(Error, OSError): ...
-class SolverError(Error): ...
-class UnresolvedError(Error): ...
-class UnsupportedError(Error): ...
-class DeviceError(Error): ...
+class Error(Exception):
+    """Base of all errors of hydrograd."""
+class InputError(Error, ValueError):
+    """A value that can't be used: the message names the place, the value and what would be right."""
+class MeshError(Error):
+    """A surface mesh that doesn't bound a volume, or bounds it badly."""
+class FileError(Error, OSError):
+    """A file that can't be read, written or understood."""
+class SolverError(Error):
+    """A linear or nonlinear solve that didn't reach its tolerance."""
+class UnresolvedError(Error):
+    """The physics left what the discretisation or the time step resolves."""
+class UnsupportedError(Error):
+    """A combination of settings that has no meaning or isn't offered."""
+class DeviceError(Error):
+    """A GPU that isn't there, can't do what is needed, or failed."""
 class BatchError(Error):
+    """Members of a batch that failed. `errors` has each one's error by its number, counted from 0, with its `step` and `time` (s) where they are known; `members` has all of the batch: what ran, of a rollout that failed as far as it came, and None where there is nothing."""
     errors: dict[int, Error]
     members: list[Any]
 
-class InternalError(Error): ...
+class InternalError(Error):
+    """A fault of hydrograd itself; please report it with its message."""
 
 @final
 class Fluid:
+    """The fluid around the bodies: `density` in kg/m³ (default 998, fresh water at 20 °C; 0 is no fluid) and a uniform
+    `current` in m/s, world axes."""
     def __new__(cls, density: float = 998.0, current: ArrayLike | None = None) -> Fluid: ...
     @property
-    def density(self) -> float: ...
+    def density(self) -> float:
+        """Density, kg/m³."""
     @property
-    def current(self) -> tuple[float, float, float]: ...
+    def current(self) -> tuple[float, float, float]:
+        """Uniform steady current, m/s, world axes."""
 
 @final
 class Contact:
+    """Contact between convex bodies and with walls: `stiffness` in N/m, `dissipation` in s/m, the coefficient of `friction`,
+    `torsional_friction` against spinning and `rolling_friction` (torque over normal force, m), the `gap` at which surfaces touch and half the `width` over which the force sets in, in m, and the `stiction_speed`
+    in m/s. What is None is chosen for the scene."""
     def __new__(
         cls,
         *,
@@ -68,48 +85,79 @@ class Contact:
 
 @final
 class Shape:
+    """A closed surface: made by `sphere`, `ellipsoid`, `box`, `cylinder`, `capsule`, `prism` or `mesh`."""
     @property
-    def kind(self) -> str: ...
+    def kind(self) -> str:
+        """The shape's name in a scene file."""
     @property
-    def volume(self) -> float: ...
-    def triangles(self) -> tuple[_Array, NDArray[np.int64]]: ...
+    def volume(self) -> float:
+        """Volume of the triangles, m³."""
+    def triangles(self) -> tuple[_Array, NDArray[np.int64]]:
+        """Its triangles: vertices (n, 3) in m and faces (m, 3), vertex numbers counted from 0."""
 
-def sphere(radius: float, *, faces: int | None = None) -> Shape: ...
-def ellipsoid(a: float, b: float, c: float, *, faces: int | None = None) -> Shape: ...
-def box(x: float, y: float, z: float, *, faces: int | None = None) -> Shape: ...
-def cylinder(radius: float, length: float, *, faces: int | None = None) -> Shape: ...
-def capsule(radius: float, length: float, *, faces: int | None = None) -> Shape: ...
-def prism(profile: ArrayLike, length: float, *, faces: int | None = None) -> Shape: ...
+def sphere(radius: float, *, faces: int | None = None) -> Shape:
+    """A sphere: radius in m. `faces` is the number of triangles wanted (default 1280), here and for the other shapes."""
+def ellipsoid(a: float, b: float, c: float, *, faces: int | None = None) -> Shape:
+    """An ellipsoid with the semi-axes a, b and c along x, y and z, in m."""
+def box(x: float, y: float, z: float, *, faces: int | None = None) -> Shape:
+    """A box with the edges x, y and z, in m."""
+def cylinder(radius: float, length: float, *, faces: int | None = None) -> Shape:
+    """A cylinder along z: radius and length in m."""
+def capsule(radius: float, length: float, *, faces: int | None = None) -> Shape:
+    """A capsule along z: radius, and length without its round ends, in m."""
+def prism(profile: ArrayLike, length: float, *, faces: int | None = None) -> Shape:
+    """A prism along x: corners (n, 2) of its convex profile in the y-z plane, and its length, in m."""
 def mesh(
     vertices: ArrayLike | _Mesh | _Path, faces: ArrayLike | None = None, *, scale: float = 1.0
-) -> Shape: ...
+) -> Shape:
+    """A closed triangle mesh: from arrays `vertices` (n, 3) and `faces` (m, 3) of vertex numbers counted from 0,
+    counter-clockwise seen from outside; from anything that has them as attributes, such as a mesh of trimesh; or from
+    the path of an OBJ, STL or PLY file. `scale` is the factor from its unit to m."""
 
 @final
 class Joint:
+    """How a body moves against its parent: made by `free`, `fixed`, `prismatic`, `revolute`, `screw`, `planar` or `spherical`."""
     @property
-    def kind(self) -> str: ...
+    def kind(self) -> str:
+        """The joint's name in a scene file."""
     @property
-    def q_size(self) -> int: ...
+    def q_size(self) -> int:
+        """Number of coordinates q."""
     @property
-    def v_size(self) -> int: ...
+    def v_size(self) -> int:
+        """Number of generalised velocities v."""
 
 @final
 class Motion:
+    """A given motion of one joint coordinate, q(t): made by `Motion.linear` or `Motion.sine`."""
     @staticmethod
-    def linear(rate: float, offset: float = 0.0) -> Motion: ...
+    def linear(rate: float, offset: float = 0.0) -> Motion:
+        """`offset + rate·t`: offset in m or rad, rate in m/s or rad/s."""
     @staticmethod
-    def sine(amplitude: float, frequency: float, phase: float = 0.0, offset: float = 0.0) -> Motion: ...
+    def sine(amplitude: float, frequency: float, phase: float = 0.0, offset: float = 0.0) -> Motion:
+        """`offset + amplitude·sin(frequency·t + phase)`: amplitude and offset in m or rad, frequency in rad/s, phase in rad."""
 
-def free() -> Joint: ...
-def fixed() -> Joint: ...
-def prismatic(axis: ArrayLike) -> Joint: ...
-def revolute(axis: ArrayLike) -> Joint: ...
-def screw(axis: ArrayLike, pitch: float) -> Joint: ...
-def planar(plane: Literal["xy", "yz", "zx"]) -> Joint: ...
-def spherical() -> Joint: ...
+def free() -> Joint:
+    """A joint that lets a body move freely: q = position (m) and unit quaternion (w, x, y, z), v = velocity of the body's
+    origin (m/s) and angular velocity (rad/s), in the parent's frame."""
+def fixed() -> Joint:
+    """A joint that doesn't move."""
+def prismatic(axis: ArrayLike) -> Joint:
+    """A joint along `axis` (three numbers, joint's frame): q in m, v in m/s."""
+def revolute(axis: ArrayLike) -> Joint:
+    """A joint about `axis` (three numbers, joint's frame): q in rad, v in rad/s."""
+def screw(axis: ArrayLike, pitch: float) -> Joint:
+    """A joint about `axis` (three numbers, joint's frame) that advances along it by `pitch` (m) in one revolution; a negative
+    pitch is a left-handed thread. q in rad, v in rad/s."""
+def planar(plane: Literal["xy", "yz", "zx"]) -> Joint:
+    """A joint in a plane, "xy", "yz" or "zx": q = two translations in that order (m) and the angle about the normal (rad)."""
+def spherical() -> Joint:
+    """A joint about a point: q a unit quaternion (w, x, y, z), v the angular velocity in the parent's frame, rad/s."""
 
 @final
 class Drag:
+    """Drag per area of a body's surface: `linear` in kg/(m² s), `quadratic` dimensionless (½ρc|w|w); the parts of the local
+    velocity that drag are "tangential", "normal" or "total"."""
     def __new__(
         cls,
         *,
@@ -121,6 +169,16 @@ class Drag:
 
 @final
 class Body:
+    """A rigid body with the joint that carries it.
+
+    `shape` is what the water sees; without one the body is dry. Give `density` (kg/m³) or `mass` (kg); `inertia` about
+    the centre of mass (xx, yy, zz or also xy, xz, yz; kg m²) and `center_of_mass` (m) follow from the shape if left out.
+    `position` (m) and `rotation` (axis times angle, rad) place the joint's frame in the frame of `parent`, a body's name or
+    number, or the world. `actuated` makes the joint's forces controls (N, N m; a free joint has six), `thruster` a wrench on
+    the body in world axes. `locked` holds the joint, `motion` (one per coordinate) drives it, `limits` (m or rad) stop it.
+    `shape_position` and `shape_rotation` place the shape in the body; `refine` lists balls (center, radius, edge), m,
+    where its faces are made smaller. `collision` lists the convex pieces that the body is for contact instead of its shape, each
+    a shape, (shape, position) or (shape, position, rotation) in the body's frame. `added_mass` (6, 6) replaces the body's own at unit density, with `isolated`."""
     def __new__(
         cls,
         shape: Shape | None = None,
@@ -151,20 +209,30 @@ class Body:
         ] | None = None,
     ) -> Body: ...
     @property
-    def name(self) -> str: ...
+    def name(self) -> str:
+        """Its name; empty until it is added to a scene if it was given none."""
     @property
-    def shape(self) -> Shape | None: ...
+    def shape(self) -> Shape | None:
+        """Its shape."""
     @property
-    def joint(self) -> Joint: ...
+    def joint(self) -> Joint:
+        """Its joint."""
     @property
-    def density(self) -> float | None: ...
+    def density(self) -> float | None:
+        """Its density, kg/m³, if that was given."""
     @property
-    def mass(self) -> float | None: ...
+    def mass(self) -> float | None:
+        """Its mass, kg, if that was given."""
     @property
-    def position(self) -> tuple[float, float, float]: ...
+    def position(self) -> tuple[float, float, float]:
+        """Position of its joint in the parent's frame, m."""
 
 @final
 class Scene:
+    """What a simulation starts from: the fluid, walls, and bodies with their joints.
+
+    `gravity` is in m/s², world axes; `time_step` (s) and `steps` are what a run takes unless told otherwise. Without a
+    `contact`, surfaces may not touch. Bodies are numbered in the order in which they are added."""
     def __new__(
         cls,
         fluid: Fluid | None = None,
@@ -176,14 +244,20 @@ class Scene:
         steps: int = 100,
     ) -> Scene: ...
     @staticmethod
-    def load(path: _Path) -> Scene: ...
+    def load(path: _Path) -> Scene:
+        """Reads a scene file (TOML); paths of meshes are relative to it."""
     @staticmethod
-    def from_toml(text: str, folder: _Path | None = None) -> Scene: ...
-    def to_toml(self) -> str: ...
-    def add(self, body: Body) -> int: ...
+    def from_toml(text: str, folder: _Path | None = None) -> Scene:
+        """A scene from TOML text; paths of meshes are relative to `folder`."""
+    def to_toml(self) -> str:
+        """The scene as TOML text, from which `from_toml` makes an equal one."""
+    def add(self, body: Body) -> int:
+        """Adds a body and gives its number, by which `positions[step, number]` and objectives know it."""
     def add_wall(
         self, point: ArrayLike, normal: ArrayLike, surface: Literal["rigid", "free"] = "rigid"
-    ) -> None: ...
+    ) -> None:
+        """Adds a plane wall through `point` (m) with `normal` into the fluid. `surface` is "rigid", or "free" for a flat free
+        surface without waves (fidelity "reduced" only)."""
     @overload
     def add_force(
         self,
@@ -211,27 +285,46 @@ class Scene:
     ) -> None: ...
     def set_initial(
         self, q: ArrayLike | None = None, v: ArrayLike | None = None, *, momentum: ArrayLike | None = None
-    ) -> None: ...
-    def validate(self) -> None: ...
-    def index(self, name: str) -> int: ...
+    ) -> None:
+        """Where the scene starts: joint coordinates `q` (q_size), generalised velocity `v` (v_size) or, instead of it, generalised
+        momentum M(q)v. What is None starts at the origin and at rest."""
+    def validate(self) -> None:
+        """Says what is wrong with the scene, if anything is."""
+    def index(self, name: str) -> int:
+        """Number of the body with this name."""
     @property
-    def body_names(self) -> list[str]: ...
+    def body_names(self) -> list[str]:
+        """Names of the bodies, in order."""
     @property
-    def name(self) -> str: ...
+    def name(self) -> str:
+        """Name of the scene."""
     @property
-    def walls(self) -> list[tuple[list[float], list[float], Literal["rigid", "free"]]]: ...
+    def walls(self) -> list[tuple[list[float], list[float], Literal["rigid", "free"]]]:
+        """The walls: a point (m) and the normal into the fluid, as they were given, and "rigid" or "free"."""
     @property
-    def fluid(self) -> Fluid: ...
+    def fluid(self) -> Fluid:
+        """The fluid."""
     @property
-    def gravity(self) -> tuple[float, float, float]: ...
+    def gravity(self) -> tuple[float, float, float]:
+        """Gravity, m/s², world axes."""
     @property
-    def time_step(self) -> float: ...
+    def time_step(self) -> float:
+        """Time step that a run takes unless told otherwise, s."""
     @property
-    def steps(self) -> int: ...
+    def steps(self) -> int:
+        """Steps that a run takes unless told otherwise."""
     def __len__(self) -> int: ...
 
 @final
 class Simulator:
+    """A scene made ready: shapes discretised, bodies joined, coupling prepared. It doesn't change.
+
+    `dt` is the time step, s (default: the scene's). `fidelity` says how much of the coupling through the water is
+    computed: "isolated", "reduced", "auto" (the default) or "full"; `method` how each body alone is solved: "auto", "exact", "panel",
+    "mfs-vertex" or "mfs-face". `integrator`: "momentum-euler", "energy-euler", "midpoint", "rk2", "rk4" or "velocity-euler". `tolerance` is the
+    relative residual at which iterative solves stop ("full"), `faces` the number of triangles of shapes by formula.
+    `accuracy` (relative), `rank` (points a body) and `resolved_gap` (m) belong to "reduced" and "auto", `films` (False: the water in gaps that aren't
+    resolved isn't added as films) to them and to "full" by panels, and `cache` is a folder that keeps compressed bodies. `backend`: "cpu" (the default), or "gpu" in a build with the feature of that name."""
     def __new__(
         cls,
         scene: Scene,
@@ -257,10 +350,15 @@ class Simulator:
         state: State | None = None,
         q: ArrayLike | None = None,
         v: ArrayLike | None = None,
-    ) -> Rollout: ...
+    ) -> Rollout:
+        """Runs the scene, with its own controller if it has one, and `controls` (steps, control_size) added to it: generalised
+        forces of actuated joints and wrenches of thrusters, N and N m. Without them, `steps` (default: the scene's) without
+        control. It begins where the simulator does unless given a `state`, or `q` (q_size,) and `v` (v_size,). Ctrl-C ends it."""
     def rollout_batch(
         self, controls: ArrayLike, *, q: ArrayLike | None = None, v: ArrayLike | None = None
-    ) -> list[Rollout]: ...
+    ) -> list[Rollout]:
+        """Runs many controls, (batch, steps, control_size), on all cores: the same rollouts, to the bit, as one after the other.
+        `q` (batch, q_size) and `v` (batch, v_size) are where each begins, if given. Where some fail, the `BatchError` has what ran and each one's error."""
     def state(
         self,
         q: ArrayLike | None = None,
@@ -269,75 +367,129 @@ class Simulator:
         step: int = 0,
         mode: int = 0,
         held: Sequence[bool] | None = None,
-    ) -> State: ...
-    def step(self, state: State, u: ArrayLike | None = None) -> tuple[State, Record]: ...
-    def added_mass(self) -> _Array: ...
-    def meshes(self) -> list[tuple[_Array, NDArray[np.int64]] | None]: ...
-    def with_parameters(self, changes: Mapping[str, float]) -> Simulator: ...
-    def with_start(self, q: ArrayLike | None = None, v: ArrayLike | None = None) -> Simulator: ...
-    def with_gains(self, gains: ArrayLike) -> Simulator: ...
-    def with_policy(self, policy: Policy) -> Simulator: ...
-    def with_soft_contact(self, factor: float) -> Simulator: ...
+    ) -> State:
+        """The state at coordinates `q` (q_size,) and generalised velocity `v` (v_size,) after `step` steps; what is None is
+        where the simulator starts. `mode` is what the scene's controller remembers, `held` (bodies,) whose joints it held in the
+        step that led here, by default none."""
+    def step(self, state: State, u: ArrayLike | None = None) -> tuple[State, Record]:
+        """One step from a state with the controls `u` (control_size,), N and N m: the next state, and the record that has the
+        step's derivatives. The steps of a rollout, to the bit."""
+    def gradcheck(self, steps: int | None = None, *, directions: int = 4, seed: int = 0) -> dict[str, Any]:
+        """Holds the gradient of a rollout of `steps` steps (the scene's number by default) against central differences, along so many random `directions` in each group (controls,
+        initial state, parameters, gains), and says by how much the trajectory magnifies small changes. A dictionary: "max_rel_error", the largest over all directions of the smallest
+        error over the "step_sizes"; "rel_error_controls", "rel_error_initial", "rel_error_parameters"; "directions", each with its numbers; "growth", and "advice" where that is
+        large. How small an error can be seen goes with the simulator's `tolerance`: with "full" use 1e-12. Ctrl-C ends it."""
+    def added_mass(self) -> _Array:
+        """Added mass of the bodies in the water at the start, (6 n, 6 n), world axes: per body three rows of force per acceleration of
+        its origin, then three of torque per angular acceleration; kg, kg m, kg m²."""
+    def meshes(self) -> list[tuple[_Array, NDArray[np.int64]] | None]:
+        """The bodies' surfaces, as gaps are measured between them, each in its body's frame: vertices (n, 3) in m and faces (m, 3)
+        of vertex numbers; None for a body without a shape."""
+    def with_parameters(self, changes: Mapping[str, float]) -> Simulator:
+        """The same with other physical parameters, by name as in `parameters`; what isn't named stays. It shares what was
+        prepared, so it costs next to nothing."""
+    def with_start(self, q: ArrayLike | None = None, v: ArrayLike | None = None) -> Simulator:
+        """The same with another start: coordinates `q` (q_size,) and generalised velocity `v` (v_size,). Bodies must be apart there, as at any start; of a
+        joint that a motion drives both are what the motion says: 0, or that."""
+    def with_gains(self, gains: ArrayLike) -> Simulator:
+        """The same with other gains of its controller, (gains,)."""
+    def with_policy(self, policy: Policy) -> Simulator:
+        """The same with a controller of your own in place of the scene's: an object with `act(observation)`, which gives the controls
+        (control_size,), and, for gradients, `act_vjp`: see `hydrograd.Policy`. It is called once a step, and once a step of the
+        reverse sweep, with the interpreter's lock."""
+    def with_soft_contact(self, factor: float) -> Simulator:
+        """The same with contact that sets in over `factor` times its width, with a stiffness `factor` times smaller: what a descent starts on and
+        hardens (`hydrograd.optimize.continuation`). Nothing changes where nothing touches."""
     @property
-    def policy(self) -> Policy | None: ...
+    def policy(self) -> Policy | None:
+        """Its controller, if that is written in Python."""
     @property
-    def gains(self) -> _Array: ...
+    def gains(self) -> _Array:
+        """Gains of its controller, (gains,); none without one."""
     @property
-    def parameters(self) -> dict[str, float]: ...
+    def parameters(self) -> dict[str, float]:
+        """The physical parameters by name: density, masses, inertias, drag and contact, SI units."""
     @property
-    def initial_q(self) -> _Array: ...
+    def initial_q(self) -> _Array:
+        """Coordinates at the start, (q_size,)."""
     @property
-    def initial_v(self) -> _Array: ...
+    def initial_v(self) -> _Array:
+        """Generalised velocity at the start, (v_size,)."""
     @property
-    def scene(self) -> Scene: ...
+    def scene(self) -> Scene:
+        """The scene that it was made from."""
     @property
-    def dt(self) -> float: ...
+    def dt(self) -> float:
+        """Time step, s."""
     @property
-    def control_size(self) -> int: ...
+    def control_size(self) -> int:
+        """Number of controls a step."""
     @property
-    def q_size(self) -> int: ...
+    def q_size(self) -> int:
+        """Number of joint coordinates q."""
     @property
-    def v_size(self) -> int: ...
+    def v_size(self) -> int:
+        """Number of generalised velocities v."""
     @property
-    def body_names(self) -> list[str]: ...
+    def body_names(self) -> list[str]:
+        """Names of the bodies, in order."""
     @property
-    def q_names(self) -> list[str]: ...
+    def q_names(self) -> list[str]:
+        """Names of the entries of q."""
     @property
-    def v_names(self) -> list[str]: ...
+    def v_names(self) -> list[str]:
+        """Names of the entries of v."""
     @property
-    def fidelity(self) -> str: ...
+    def fidelity(self) -> str:
+        """The fidelity in use: what was asked for, or what "auto" chose."""
     @property
-    def backend(self) -> str: ...
+    def backend(self) -> str:
+        """What computes the coupling: "cpu" or "gpu"."""
     @property
-    def integrator(self) -> str: ...
+    def integrator(self) -> str:
+        """The integrator."""
     @property
-    def contact_gaps(self) -> dict[tuple[str, str | None], float]: ...
+    def contact_gaps(self) -> dict[tuple[str, str | None], float]:
+        """The gaps at which surfaces are taken to touch, m, by pair of names: of two bodies, or of one and None for a wall. Empty where the scene
+        has no contact."""
     @property
-    def reasons(self) -> list[str]: ...
+    def reasons(self) -> list[str]:
+        """What was chosen, and why: by "auto", and of an integrator that stands in for the default, which doesn't solve contact."""
     @property
-    def warnings(self) -> list[str]: ...
+    def warnings(self) -> list[str]:
+        """What should be known about the scene and its start, with names and numbers."""
 
 @final
 class State:
+    """A state between two steps: made by `Simulator.state`, `Simulator.step` or `Rollout.state`."""
     @property
-    def step(self) -> int: ...
+    def step(self) -> int:
+        """Number of steps made."""
     @property
-    def time(self) -> float: ...
+    def time(self) -> float:
+        """Time, s."""
     @property
-    def q(self) -> _Array: ...
+    def q(self) -> _Array:
+        """Joint coordinates, (q_size,)."""
     @property
-    def v(self) -> _Array: ...
+    def v(self) -> _Array:
+        """Generalised velocity, (v_size,)."""
     @property
-    def mode(self) -> int: ...
+    def mode(self) -> int:
+        """What the scene's controller remembers; 0 without one."""
     @property
-    def held(self) -> NDArray[np.bool_]: ...
+    def held(self) -> NDArray[np.bool_]:
+        """Bodies whose joints the scene's controller held in the step that led here, (bodies,)."""
     @property
-    def positions(self) -> _Array: ...
+    def positions(self) -> _Array:
+        """Positions of the bodies' origins, (bodies, 3), m, world axes."""
     @property
-    def rotations(self) -> _Array: ...
+    def rotations(self) -> _Array:
+        """Rotation matrices of the bodies, body to world, (bodies, 3, 3)."""
 
 @final
 class Record:
+    """What one step leaves behind: the key to its derivatives."""
     def vjp(
         self,
         *,
@@ -345,8 +497,13 @@ class Record:
         v: ArrayLike | None = None,
         positions: ArrayLike | None = None,
         rotations: ArrayLike | None = None,
-    ) -> StepGradient: ...
-    def jacobians(self, parameters: Sequence[str] | None = None) -> tuple[_Array, ...]: ...
+    ) -> StepGradient:
+        """Transpose of the step: derivatives of `q·δq + v·δv + positions·δx + rotations·δθ` of the state after it, with `q` (v_size,) in
+        the tangent space of the coordinates, `v` (v_size,), and `positions` and `rotations` (δR = δθ × R, world axes) (bodies, 3);
+        what is None is zero."""
+    def jacobians(self, parameters: Sequence[str] | None = None) -> tuple[_Array, ...]:
+        """The linearisation x₁ ≈ A x₀ + B u of the step in x = (q, v), coordinates in their tangent space: A (2 v_size, 2 v_size)
+        and B (2 v_size, control_size); with `parameters` also the derivatives with respect to those named (2 v_size, parameters)."""
     def jvp(
         self,
         *,
@@ -355,47 +512,84 @@ class Record:
         u: ArrayLike | None = None,
         parameters: Mapping[str, ArrayLike] | None = None,
         gains: ArrayLike | None = None,
-    ) -> tuple[_Array, _Array]: ...
+    ) -> tuple[_Array, _Array]:
+        """Tangent of the step: the changes (δq, δv) (v_size,) each of the state after it along `q` (v_size,) in the tangent space of the
+        coordinates and `v` (v_size,) of the state before it, `u` (control_size,) of its controls, `parameters` by name, and `gains`; what is None
+        is zero. Each may have one more index before its own, and so has the tangent then: many directions cost little more than one."""
 
 @final
 class Rollout:
+    """A trajectory of states 0 … N: the forward pass, and the only key to its gradient. Each access to an array makes a new one."""
     @property
-    def simulator(self) -> Simulator: ...
+    def simulator(self) -> Simulator:
+        """The simulator that made it."""
     @property
-    def steps(self) -> int: ...
+    def steps(self) -> int:
+        """Number of steps N."""
     @property
-    def time(self) -> _Array: ...
+    def time(self) -> _Array:
+        """Time, (N + 1,), s."""
     @property
-    def q(self) -> _Array: ...
+    def q(self) -> _Array:
+        """Joint coordinates, (N + 1, q_size), m, rad and unit quaternions (w, x, y, z)."""
     @property
-    def v(self) -> _Array: ...
+    def v(self) -> _Array:
+        """Generalised velocities, (N + 1, v_size), m/s and rad/s."""
     @property
-    def controls(self) -> _Array: ...
+    def controls(self) -> _Array:
+        """The open-loop controls, (N, control_size), N and N m."""
     @property
-    def positions(self) -> _Array: ...
+    def positions(self) -> _Array:
+        """Positions of the bodies' origins, (N + 1, bodies, 3), m, world axes."""
     @property
-    def rotations(self) -> _Array: ...
+    def rotations(self) -> _Array:
+        """Rotation matrices of the bodies, body to world, (N + 1, bodies, 3, 3)."""
     @property
-    def velocities(self) -> _Array: ...
+    def velocities(self) -> _Array:
+        """Velocities of the bodies, (N + 1, bodies, 6), world axes: of the origin, m/s, and angular, rad/s."""
     @property
-    def kinetic_energy(self) -> _Array: ...
+    def kinetic_energy(self) -> _Array:
+        """Kinetic energy of bodies and fluid, (N + 1,), J."""
     @property
-    def potential_energy(self) -> _Array: ...
+    def potential_energy(self) -> _Array:
+        """Potential energy of weight and buoyancy, (N + 1,), J."""
     @property
-    def momentum(self) -> _Array: ...
+    def momentum(self) -> _Array:
+        """Total momentum of bodies and fluid, (N + 1, 6): linear, kg m/s, then angular about the world's origin, kg m²/s."""
     @property
-    def min_gap(self) -> _Array: ...
+    def min_gap(self) -> _Array:
+        """Smallest gap between bodies or to a wall, (N + 1,), m; NaN where there is nothing to meet."""
     @property
-    def warnings(self) -> list[str]: ...
-    def check_gap(self) -> dict[str, Any] | None: ...
-    def gap_flow(self) -> dict[str, Any] | None: ...
-    def state(self, step: int = -1) -> State: ...
-    def contacts(self, step: int, slack: float = 0.0) -> ContactForces: ...
-    def flow(self, state: int, points: ArrayLike) -> _Array: ...
-    def flow_resolved(self, state: int, points: ArrayLike) -> NDArray[np.bool_]: ...
-    def observe(self, name: str) -> _Array: ...
-    def value(self, objective: Objective) -> float: ...
-    def gradient(self, objective: Objective) -> Gradient: ...
+    def warnings(self) -> list[str]:
+        """What should be known about this trajectory, with names and numbers."""
+    def check_gap(self) -> dict[str, Any] | None:
+        """The water across the smallest gap of the trajectory, beside that of coupled panels: a dictionary with `time` (s), `gap` (m), `bodies` (names; of
+        the second None for a wall), `added_mass` (along the gap, by this rollout and by panels, kg), `slope` (the same of its slope, kg/m),
+        `added_mass_error` and `force_error` (relative) and `faces` (of the panels). None where there is no gap, no water, and where the rollout is by coupled
+        panels already. It takes their setup and a solve."""
+    def gap_flow(self) -> dict[str, Any] | None:
+        """Which of inertia and viscosity rules the water in the smallest gap of the trajectory, whether or not viscous water acts there: a dictionary with `time`
+        (s), `gap` (m), `bodies` (names; of the second None for a wall), `speed` (the fastest that it closes or opens near its smallest, m/s), `viscosity` (kinematic,
+        m²/s), `film_reynolds` (h |ḣ|/ν), `viscous_over_inertial` (24 over that), `stokes` (inertia of the bodies over the viscous force, None where there is no
+        film) and `lubricated`. None where there is no gap, no water, and where surfaces overlap."""
+    def state(self, step: int = -1) -> State:
+        """The state after `step` steps, from which a run may go on; negative numbers count from the end."""
+    def contacts(self, step: int, slack: float = 0.0) -> ContactForces:
+        """Contacts during the step from state `step` to the next, at the pose of that state: where surfaces are no more than `slack` (m)
+        farther apart than the gap at which they touch, and what presses there. None where the scene has no contact. Negative
+        numbers count from the end: -1 is the last step."""
+    def flow(self, state: int, points: ArrayLike) -> _Array:
+        """The water's velocity at `points` (n, 3), m, at state `state`: (n, 3), m/s, world axes, the current included. It takes a
+        solve, and a simulator with the fidelity "full". Points within a body, behind a wall, or nearer to a surface than half an
+        edge of its mesh are refused: `flow_resolved` tells them apart. Negative numbers count states from the end."""
+    def flow_resolved(self, state: int, points: ArrayLike) -> NDArray[np.bool_]:
+        """Whether `flow` knows the velocity at each of `points` (n, 3), m, at state `state`: (n,)."""
+    def observe(self, name: str) -> _Array:
+        """An observable at the states 0 … N by its name, (N + 1, …): "positions", "energy", "momentum", …; an unknown name's error has the list."""
+    def value(self, objective: Objective) -> float:
+        """Value of an objective."""
+    def gradient(self, objective: Objective) -> Gradient:
+        """Gradient of an objective, in one reverse sweep. Ctrl-C ends it."""
     def vjp(
         self,
         *,
@@ -405,7 +599,11 @@ class Rollout:
         v: ArrayLike | None = None,
         controls: ArrayLike | None = None,
         observables: Mapping[str, ArrayLike] | None = None,
-    ) -> Gradient: ...
+    ) -> Gradient:
+        """Transpose of the rollout: the gradient of Σ cotangent · δ(observation), for any loss of your own. `q` in the tangent
+        space of the coordinates and `v` are (N + 1, v_size), `positions` and `rotations` (δR = δθ × R, world axes)
+        (N + 1, bodies, 3), `controls`, what the loss has of them directly, (N, control_size); `observables` has
+        cotangents of others by name, each in the shape that `observe` gives. What is None is zero. Ctrl-C ends it."""
     def jvp(
         self,
         *,
@@ -415,7 +613,10 @@ class Rollout:
         parameters: Mapping[str, ArrayLike] | None = None,
         gains: ArrayLike | None = None,
         observables: Sequence[str] | None = None,
-    ) -> Tangents: ...
+    ) -> Tangents:
+        """Tangents of the trajectory, the counterpart of `vjp`: how the states change along `controls` (N, control_size), `q` (v_size,) in the tangent space of the
+        initial coordinates, the initial `v` (v_size,), `parameters` by name, and `gains`; what is None stays. Each may have one more index before its own, for many
+        directions at once, which cost little more than one. `observables` names others whose tangents are wanted. A `Tangents`. Ctrl-C ends it."""
     def jacobian(
         self,
         parameters: Sequence[str] | None = None,
@@ -426,14 +627,25 @@ class Rollout:
         controls: bool = False,
         of: Sequence[str] | None = None,
         states: Sequence[int] | None = None,
-    ) -> dict[str, _Array]: ...
-    def step_jacobians(self, parameters: Sequence[str] | None = None) -> tuple[_Array, ...]: ...
-    def to_dict(self) -> dict[str, _Array]: ...
-    def summary(self) -> dict[str, Any]: ...
+    ) -> dict[str, _Array]:
+        """Jacobians of the observables `of` ("q" in the tangent space of the coordinates, "rotations" as δθ) at `states` (all where None; negative numbers count from the end)
+        with respect to the `parameters` named, and where True the initial `q` (in its tangent space) and `v`, the `gains`, and the `controls` of all steps: by name an array
+        (states, …, columns) whose columns come in that order. It costs a few runs, whatever the number of columns. Ctrl-C ends it."""
+    def step_jacobians(self, parameters: Sequence[str] | None = None) -> tuple[_Array, ...]:
+        """Linearisations x_{n+1} ≈ A_n x_n + B_n u_n of all steps in x = (q, v), coordinates in their tangent space, the scene's controller included: A (N, 2 v_size, 2 v_size)
+        and B (N, 2 v_size, control_size); with `parameters` also the derivatives with respect to those named (N, 2 v_size, parameters). Steps are taken on all cores."""
+    def to_dict(self) -> dict[str, _Array]:
+        """Columns by name, one row a state: time, each coordinate and velocity, energy, momentum and smallest gap, SI units;
+        `pandas.DataFrame(rollout.to_dict())` is a table."""
+    def summary(self) -> dict[str, Any]:
+        """Figures of the whole trajectory: energies (J), drift of momentum (relative), iterations, smallest gap (m), by what the water
+        across gaps is carried and how far off it is estimated to be (`gaps`), the largest gap
+        at which surfaces are taken to touch (m), steps that were cut into pieces, and the most pieces of one."""
     def __len__(self) -> int: ...
 
 @final
 class Objective:
+    """A scalar of a rollout: made by the functions of `hydrograd.objective`, added with `+`, `-` and `sum`, and weighted with `*` and `/`."""
     def __add__(self, other: Objective) -> Objective: ...
     def __radd__(self, other: Literal[0]) -> Objective: ...
     def __sub__(self, other: Objective) -> Objective: ...
@@ -442,12 +654,19 @@ class Objective:
     def __mul__(self, factor: float) -> Objective: ...
     def __rmul__(self, factor: float) -> Objective: ...
 
-def final_position(body: int | str, target: ArrayLike) -> Objective: ...
-def mean_position(body: int | str, target: ArrayLike) -> Objective: ...
-def final_coordinate(index: int, target: float, weight: float = 1.0) -> Objective: ...
-def final_velocity(index: int, target: float, weight: float = 1.0) -> Objective: ...
-def final_observable(name: str, entry: int, target: float, weight: float = 1.0) -> Objective: ...
-def effort(weight: float) -> Objective: ...
+def final_position(body: int | str, target: ArrayLike) -> Objective:
+    """Squared distance (m²) of the origin of `body`, its number or its name, from `target` (m, world axes) at the end."""
+def mean_position(body: int | str, target: ArrayLike) -> Objective:
+    """Mean squared distance (m²) of the origin of `body`, its number or its name, from `target` (m, world axes) over all states."""
+def final_coordinate(index: int, target: float, weight: float = 1.0) -> Objective:
+    """`weight · (q[index] − target)²` at the end, for a coordinate of a prismatic, revolute or planar joint (m or rad)."""
+def final_velocity(index: int, target: float, weight: float = 1.0) -> Objective:
+    """`weight · (v[index] − target)²` at the end (m/s or rad/s)."""
+def final_observable(name: str, entry: int, target: float, weight: float = 1.0) -> Objective:
+    """`weight · (x − target)²` at the end, x entry number `entry` (last index fastest) of the observable `name` as `Rollout.observe` gives
+    it; the observable must have a transpose."""
+def effort(weight: float) -> Objective:
+    """`weight` times the sum of the squared open-loop controls (N², N² m²)."""
 
 def minimise(
     function: Callable[[_Array], _Evaluated],
@@ -461,7 +680,14 @@ def minimise(
     cost_tolerance: float = 1e-9,
     target: float | None = None,
     clip: float | None = None,
-) -> Optimum: ...
+) -> Optimum:
+    """Lowers a function from `start` (n,), by L-BFGS that takes failures and jumps: an `Optimum`. `function(x)` gives the cost and its gradient (n,). Where it
+    raises an `hg.Error` (a rollout that fails) the search is turned back; any other exception ends it, and so does Ctrl-C.
+
+    `iterations` and `evaluations` are the most that are made, `memory` the pairs that are remembered, `first_step` the length of the first trial
+    step in units of x (None: from the cost and its gradient). It ends once the gradient is shorter than `gradient_tolerance` of the first one, the cost falls
+    by less than `cost_tolerance` of itself, or the cost is at most `target`. With `clip` gradients longer than that many times the first are shortened to it: where a
+    trajectory is about to jump they are huge and say little."""
 def continuation(
     function: Callable[[float, _Array], _Evaluated],
     stages: ArrayLike,
@@ -475,7 +701,10 @@ def continuation(
     cost_tolerance: float = 1e-9,
     target: float | None = None,
     clip: float | None = None,
-) -> Optimum: ...
+) -> Optimum:
+    """Descends `function(stage, x)`, as `minimise` does, for each of `stages` in turn, each from where the one before ended: softnesses of contact
+    (`Simulator.with_soft_contact`), say, that end in 1. The `Optimum` is that of the last stage, with the iterations, evaluations and failures of all; a stage
+    whose start fails is passed over, unless it is the last. Keywords are those of `minimise`, for each stage."""
 def smoothed(
     function: Callable[[_Array], _Evaluated],
     x: ArrayLike,
@@ -483,7 +712,11 @@ def smoothed(
     spread: float = 0.05,
     directions: int = 16,
     seed: int = 1,
-) -> Smoothed: ...
+) -> Smoothed:
+    """A function's cost and gradient averaged over a neighbourhood of `x` (n,): a `Smoothed`. `function(x)` gives the cost and its gradient (n,), at
+    `directions` normal displacements of standard deviation `spread` and their opposites, the same ones (`seed`) at every x, so that
+    what is averaged can be descended. Where it raises an `hg.Error` the direction is left out; any other exception ends it, and so does Ctrl-C. It is called from
+    several threads: rollouts in it run side by side."""
 def grasp(
     simulator: Simulator | Scene,
     *,
@@ -500,7 +733,18 @@ def grasp(
     target: float | None = None,
     search: int | None = None,
     seed: int = 1,
-) -> Grasp: ...
+) -> Grasp:
+    """Finds controls with which a gripper catches an object and holds it to the end of the run: a `Grasp`. One recipe with one set of settings: evenly
+    spread pushes, descents from the best of them, CMA-ES where nothing is caught.
+
+    `simulator` may be a scene, which is then simulated as its defaults say; it needs contact, and runs open-loop, whatever its own controller. `object` is the body
+    that is to be held and `fingers` those that hold it, each with the point (3,) of it that should press, m, body frame; bodies are given by name or number.
+    `closing` (controls,) has the sign that closes the gripper, and what part of the limit does; 0: it doesn't. `limits` are the largest absolute
+    values of the controls, N or N m, one or (controls,). `hold`: for how long it must be held at the end, s.
+
+    `knots` of each control, `pushes` that are tried, `starts`: the best of them from which is descended, `evaluations` with gradients of each part of a descent,
+    `softness` of contact over which is descended, in turn, `target`: a cost that is good enough, `search`: simulations of CMA-ES, `seed` of it.
+    Ctrl-C ends it."""
 
 def tradeoff(
     scene: Scene,
@@ -517,4 +761,13 @@ def tradeoff(
     steps: int | None = None,
     reference_faces: int | None = None,
     budget: float = 120.0,
-) -> Tradeoff: ...
+) -> Tradeoff:
+    """Measures a scene's time per step against its error, over everything that can be chosen: a `Tradeoff`.
+
+    Each fidelity, method for a body alone, number of faces, of points (`ranks`) and accuracy of compressed bodies, tolerance,
+    integrator and time step (s) is varied around the scene's own choice, or around the first value of a list that is given;
+    with `full_product` every combination is measured. Errors are against coupled panels on finer and finer meshes (added
+    mass) and against compressed bodies of high accuracy with a quarter of the time step (accelerations, and end states
+    after `steps` steps). Configurations are timed one after another on this machine, so leave it alone meanwhile. `budget` is
+    the time for all this, s; what it has no time for is in `left_out`. With `reference_faces` faces a body the reference
+    takes the time it needs. Ctrl-C ends it."""

@@ -5,6 +5,7 @@ mod body;
 mod contact;
 mod error;
 mod fluid;
+mod gradcheck;
 mod gradient;
 mod interrupt;
 mod joint;

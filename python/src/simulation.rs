@@ -311,6 +311,27 @@ impl Simulator {
         Ok((next, Record(Arc::new(record), slf.clone().unbind())))
     }
 
+    /// Holds the gradient of a rollout of `steps` steps (the scene's number by default) against central differences, along so many random `directions` in each group (controls,
+    /// initial state, parameters, gains), and says by how much the trajectory magnifies small changes. A dictionary: "max_rel_error", the largest over all directions of the smallest
+    /// error over the "step_sizes"; "rel_error_controls", "rel_error_initial", "rel_error_parameters"; "directions", each with its numbers; "growth", and "advice" where that is
+    /// large. How small an error can be seen goes with the simulator's `tolerance`: with "full" use 1e-12. Ctrl-C ends it.
+    #[pyo3(signature = (steps=None, *, directions=4, seed=0))]
+    fn gradcheck<'py>(
+        &self,
+        py: Python<'py>,
+        steps: Option<usize>,
+        directions: usize,
+        seed: u64,
+    ) -> PyResult<Bound<'py, PyAny>> {
+        crate::gradcheck::check(
+            py,
+            self,
+            steps.unwrap_or(self.scene.steps),
+            directions,
+            seed,
+        )
+    }
+
     /// Added mass of the bodies in the water at the start, (6 n, 6 n), world axes: per body three rows of force per acceleration of
     /// its origin, then three of torque per angular acceleration; kg, kg m, kg m².
     fn added_mass<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyArrayDyn<f64>>> {

@@ -76,5 +76,5 @@ def test_starts_are_checked(sim):
 
 
 def test_a_blow_up_names_its_step(sim):
-    with pytest.raises(hg.UnresolvedError, match=r"step \d+ at t = .*left"):
+    with pytest.raises(hg.UnresolvedError, match=r"step \d+, within the step at t = .*q\[3\] of body \"left\""):
         sim.rollout(np.full((3, 12), 1e300))

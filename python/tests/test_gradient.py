@@ -314,6 +314,19 @@ def test_objectives_are_added_subtracted_and_named(sim, controls):
         1 + by_name
 
 
+def test_gradcheck():
+    scene = hg.Scene()
+    scene.add(hg.Body(hg.sphere(0.05), name="ball", density=1100.0, actuated=True))
+    scene.add(hg.Body(hg.ellipsoid(0.01, 0.04, 0.04), density=998.0, position=(0.1, 0.01, 0)))
+    found = hg.Simulator(scene, fidelity="reduced").gradcheck(10, directions=2, seed=3)
+    assert found["max_rel_error"] < 1e-7 and len(found["directions"]) == 6
+    assert found["growth"]["total"] > 1.0 and found["advice"] is None
+    with pytest.raises(hg.InputError, match="at least 1"):
+        hg.Simulator(scene, fidelity="isolated").gradcheck(0)
+    with pytest.raises(hg.InputError, match="steps"):
+        hg.Simulator(scene, fidelity="isolated").gradcheck(-1)
+
+
 def test_contact_says_how_it_is_made():
     given = hg.Contact(gap=1e-3, friction=0.3)
     assert eval(repr(given), {"Contact": hg.Contact}) == given

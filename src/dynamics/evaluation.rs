@@ -87,13 +87,20 @@ impl System {
         if let Some(bad) = q.iter().position(|x| !x.is_finite()) {
             return Err(Error::Unresolved {
                 place: WITHIN.into(),
-                quantity: format!("coordinate q[{bad}]"),
+                quantity: format!("coordinate q[{bad}] of body {:?}", self.carried(bad)),
                 value: q[bad],
                 limit: f64::MAX,
                 remedy: "the simulation left what floating point holds: the step is too long or a force too large".into(),
             });
         }
         Ok(self.tree.kinematics(q))
+    }
+
+    /// Name of the body whose joint has coordinate `i`.
+    fn carried(&self, i: usize) -> &str {
+        let links = self.tree.links().iter().zip(&self.bodies);
+        let mut named = links.filter(|(link, _)| link.q.contains(&i));
+        named.next().map_or("", |(_, body)| body.name.as_str())
     }
 
     /// Columns of the basis.

@@ -145,6 +145,8 @@ def test_readme():
     assert blocks
     names = {}
     exec(blocks[0], names)
+    shown = re.search(r"print\(.*# (\S+) after", blocks[0])[1]
+    assert names["best"].fun == pytest.approx(float(shown), rel=0.5)
     start, _ = names["cost_and_gradient"](0 * names["best"].x)
     # The squared miss: a tenfold cut of the miss is a hundredfold one of the cost.
     assert names["best"].fun < start / 100

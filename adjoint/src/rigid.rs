@@ -7,26 +7,6 @@ pub fn inertia_matrix(i: &[f64; 6]) -> Mat3 {
     Mat3::new(i[0], i[3], i[4], i[3], i[1], i[5], i[4], i[5], i[2])
 }
 
-/// Why no distribution of mass has this inertia about its centre of mass (xx, yy, zz, xy, xz, yz, kg m²); `slack` is what may be missing, of the largest principal
-/// moment. `None` where one has.
-pub fn impossible_inertia(i: &[f64; 6], slack: f64) -> Option<String> {
-    let mut moments = inertia_matrix(i).symmetric_eigenvalues();
-    moments.as_mut_slice().sort_by(f64::total_cmp);
-    let slack = slack * moments.amax();
-    let principal = format!("principal moments {:?} kg m²", moments.as_slice());
-    if moments[0] < -slack {
-        return Some(format!(
-            "an inertia has no negative principal moment; this one has the {principal}"
-        ));
-    }
-    (moments[0] + moments[1] < moments[2] - slack).then(|| {
-        format!(
-            "no distribution of mass has a principal moment above the sum of the other two; \
-             this one has the {principal}. Moments are taken about the centre of mass"
-        )
-    })
-}
-
 /// 6 × 6 inertia about the body's origin, body axes, linear part first:
 /// `[m 1, −m [c]×; m [c]×, I − m [c]×²]` (Eq. 6 when the centre of mass c is the origin).
 pub fn spatial_inertia(mass: f64, center: &Vec3, inertia: &[f64; 6]) -> Mat6 {

@@ -4,7 +4,7 @@
 //! with its name, its bounds and the size of a change that says something. Values and cotangents are rows with a shared
 //! table; packing, names, checks and gradient checks read the table.
 
-use crate::adjoint::rigid::impossible_inertia;
+use crate::scene::impossible_inertia;
 use crate::{Error, Result};
 use std::fmt;
 use std::ops::{Index, IndexMut};

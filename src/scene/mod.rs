@@ -19,6 +19,7 @@ pub use crate::shape::Shape;
 pub use build::BodyId;
 pub use contact::{CollisionPiece, Contact};
 pub use force::{Force, Lubrication, Spring, WATER_VISCOSITY};
+pub(crate) use validate::impossible_inertia;
 
 use serde::{Deserialize, Serialize};
 

@@ -111,6 +111,62 @@ fn the_book_builds() {
     }
 }
 
+/// Every key of a scene file stands in the page on scenes, and its example runs.
+#[test]
+fn the_page_on_scenes_has_every_key() {
+    let page = std::fs::read_to_string(root().join("docs/scenes.md")).unwrap();
+    let sources = [
+        "scene/mod.rs",
+        "scene/contact.rs",
+        "scene/force/spring.rs",
+        "scene/force/lubrication.rs",
+        "shape/description.rs",
+        "geometry/wall.rs",
+        "geometry/refine/mod.rs",
+    ];
+    let mut keys = 0;
+    for source in sources {
+        let text = std::fs::read_to_string(root().join("src").join(source)).unwrap();
+        let mut serde = false;
+        for line in text.lines() {
+            if line.starts_with("#[derive") {
+                serde = line.contains("Deserialize");
+            }
+            if line.starts_with('}') {
+                serde = false;
+            }
+            let field = line.trim_start().trim_start_matches("pub ");
+            let Some((key, _)) = field.split_once(": ") else {
+                continue;
+            };
+            let is_key = key.chars().all(|c| c.is_ascii_lowercase() || c == '_');
+            let indented = line.starts_with("    ") && line.trim_end().ends_with(',');
+            if !(serde && is_key && indented) {
+                continue;
+            }
+            keys += 1;
+            let word = |c: char| !(c.is_alphanumeric() || c == '_');
+            assert!(
+                page.split(word).any(|w| w == key),
+                "{source}: `{key}` isn't in docs/scenes.md"
+            );
+        }
+    }
+    assert!(keys > 60, "{keys}");
+
+    let example = page.split("```toml\n").nth(1).unwrap();
+    let example = example.split("```").next().unwrap();
+    let scene = hydrograd::Scene::from_toml(example, ".").unwrap();
+    scene.validate().unwrap();
+    let settings = hydrograd::Settings::default().fidelity(hydrograd::Fidelity::Reduced);
+    let simulator = hydrograd::Simulator::new(&scene, settings).unwrap();
+    let rollout = simulator.rollout(&hydrograd::Controls::zeros(&simulator, 5));
+    assert_eq!(rollout.unwrap().steps(), 5);
+    for name in ["stone.mass", "lid.drag.linear", "spring 1.stiffness"] {
+        assert!(simulator.parameters().get(name).is_ok(), "{name}");
+    }
+}
+
 /// What a newcomer reads first is short.
 #[test]
 fn the_readme_is_short() {

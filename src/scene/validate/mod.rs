@@ -10,6 +10,8 @@ mod controller;
 mod limits;
 mod start;
 
+pub(crate) use body::impossible_inertia;
+
 use std::collections::HashMap;
 
 use super::file::nearest;

@@ -94,13 +94,22 @@ impl Rollout {
             ),
             false => "though nothing does work".into(),
         };
+        // What presses from the start may give what was spent on pressing it together.
+        let pressed = self.contacts(0, 0.0).is_ok_and(|found| !found.is_empty());
+        let cause = match pressed {
+            true => {
+                "surfaces start pressed together, nearer than the gap of contact: start them apart"
+                    .into()
+            }
+            false => format!(
+                "the time step of {} s is too long for these velocities or this drag; take a smaller one, or the integrator midpoint",
+                self.simulator.time_step()
+            ),
+        };
         Some(format!(
-            "the energy grows by {gained:.3e} J, {:.1} % of the largest kinetic energy, by \
-             t = {} s, {work}: the time step of {} s is too long for these velocities or \
-             this drag; take a smaller one, or the integrator midpoint",
+            "the energy grows by {gained:.3e} J, {:.1} % of the largest kinetic energy, by t = {} s, {work}: {cause}",
             100.0 * gained / kinetic,
             worst.0.time,
-            self.simulator.time_step()
         ))
     }
 

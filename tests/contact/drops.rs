@@ -4,7 +4,7 @@ use super::tools::{above_floor, contact, touching};
 use crate::support::falling::drops;
 use crate::support::{self, check_gradient, run, says};
 use hydrograd::dynamics::Integrator;
-use hydrograd::scene::{Body, Joint, Plane, Scene, Shape};
+use hydrograd::scene::{Body, Fluid, Joint, Plane, Scene, Shape};
 use hydrograd::{Controls, Fidelity, Settings, Simulator};
 use rayon::prelude::*;
 
@@ -373,4 +373,31 @@ fn a_thousand_random_drops() {
 #[test]
 fn random_drops_at_a_long_step() {
     all_hold(&drops(300, 0.01, false), 1.0, 1.5e-2, true);
+}
+
+/// Balls that start in one another are told so, and that contact is what parts them; energy that comes from there isn't put down to the time step.
+#[test]
+fn balls_that_start_in_one_another_are_told_what_is_so() {
+    let mut scene = Scene::new(Fluid::fresh_water());
+    (scene.time_step, scene.contact) = (0.01, Some(Default::default()));
+    for z in [0.1, 0.3 - 1e-6] {
+        scene.add(
+            Body::new(Shape::sphere(0.1))
+                .density(2000.0)
+                .at([0.0, 0.0, z]),
+        );
+    }
+    let simulator =
+        Simulator::new(&scene, Settings::default().fidelity(Fidelity::Isolated)).unwrap();
+    let rollout = simulator.rollout(&Controls::zeros(&simulator, 20)).unwrap();
+    let told = rollout.warnings().join("\n");
+    says(
+        &told,
+        &[
+            "1.000e-6 m",
+            "nothing but contact keeps them apart",
+            "start pressed together",
+        ],
+    );
+    assert!(!told.contains("time step"), "{told}");
 }

@@ -67,7 +67,7 @@ impl FidelityKind for Isolated {
         let mut warnings = Vec::new();
         if !problem.walls.is_empty() {
             warnings.push(format!(
-                "{} wall(s) have no effect with the fidelity isolated; use reduced or full to feel them",
+                "{} wall(s) have no effect on the water with the fidelity isolated, and only a section [contact] makes them solid; use reduced or full to feel them",
                 problem.walls.len()
             ));
         }
@@ -102,8 +102,8 @@ impl FidelityKind for Isolated {
     ) -> Option<String> {
         overlaps(gap).then(|| {
             format!(
-                "{place} overlap, most at t = {time} s by {:.3e} m; nothing keeps them apart \
-                 without the coupled water{hint}",
+                "{place} overlap, most at t = {time} s by {:.3e} m; with the fidelity isolated nothing but contact \
+                 keeps them apart{hint}",
                 -gap.distance
             )
         })

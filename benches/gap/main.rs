@@ -2,7 +2,7 @@
 //!
 //! `cargo bench --bench gap [-- CASE …] [--quick] [--plot]`: the cases whose names contain one of the words, or all. `--quick` with fewer gaps;
 //! `--references` finds the references again; `--plot` writes the errors to docs/gap.svg as well; `--faces=320` with other faces a body than 1280. `--estimates` holds what runs estimate their errors to be against
-//! them, on these cases and on others; `--accuracy` varies that for a sphere over a wall; `--time` has what films cost: evaluations and steps with them beside the same
+//! them, on these cases and on others; `--accuracy` varies that for a sphere over a wall, or the cases named; `--time` has what films cost: evaluations and steps with them beside the same
 //! without, and far apart. Gaps are in units of a radius or half a side; masses over the water's
 //! density, m³, slopes m².
 
@@ -258,26 +258,45 @@ fn estimates(cases: &[Case], gaps: &[f64]) -> Result<()> {
 }
 
 /// A sphere over a wall with `reduced` and `auto` at several accuracies: errors of M and of its slope, and what a run estimates that of the slope to be.
-fn accuracies() -> Result<()> {
-    println!("| gap | accuracy | reduced | auto |\n|---|---|---|---|");
-    let all = cases();
-    let Some(case) = all.iter().find(|case| case.name == "sphere-wall") else {
-        return Ok(());
+fn accuracies(words: &[String]) -> Result<()> {
+    println!(
+        "| case | gap | accuracy | reduced | auto | time of the force, over the default's |\n|---|---|---|---|---|---|"
+    );
+    let named = |case: &Case| match words {
+        [] => case.name == "sphere-wall",
+        words => words.iter().any(|w| case.name.contains(w.as_str())),
     };
-    for gap in [0.1, 0.05, 0.01] {
-        let (exact, _) = case.converged(gap)?;
-        for accuracy in [None, Some(1e-3), Some(1e-4)] {
-            let given = accuracy.map_or("default".into(), |a| format!("{a:.0e}"));
-            let mut line = format!("| {gap} | {given} |");
-            for fidelity in [Fidelity::Reduced, Fidelity::Auto] {
-                let mut settings = Settings::default().fidelity(fidelity).faces(faces());
-                settings.accuracy = accuracy;
-                let found = case.along(gap, &settings)?;
-                let said = case.estimate(gap, &settings)?.map_or(f64::NAN, |e| e[1]);
-                let off = [0, 1].map(|k| 100.0 * (found[k] / exact[k] - 1.0));
-                line += &format!(" {:+.2}, {:+.1} ({:.1}) |", off[0], off[1], 100.0 * said);
+    for case in cases().iter().filter(|case| named(case)) {
+        for gap in [0.1, 0.05, 0.01, 0.001] {
+            let (exact, _) = case.converged(gap)?;
+            let mut first = None;
+            for accuracy in [None, Some(1e-3), Some(1e-4)] {
+                let given = accuracy.map_or("default".into(), |a| format!("{a:.0e}"));
+                let mut line = format!("| {} | {gap} | {given} |", case.name);
+                let mut times = [0.0; 2];
+                for (k, fidelity) in [Fidelity::Reduced, Fidelity::Auto].into_iter().enumerate() {
+                    let mut settings = Settings::default().fidelity(fidelity).faces(faces());
+                    settings.accuracy = accuracy;
+                    let gap = gap * case.size;
+                    let found = case.along(gap, &settings)?;
+                    let said = case.estimate(gap, &settings)?.map_or(f64::NAN, |e| e[1]);
+                    let off = [0, 1].map(|k| 100.0 * (found[k] / exact[k] - 1.0));
+                    line += &format!(" {:+.2}, {:+.1} ({:.1}) |", off[0], off[1], 100.0 * said);
+                    let simulator = Simulator::new(&case.scene(gap), settings)?;
+                    let speed = DVector::from_element(1, 1.0);
+                    let mut call = || {
+                        let found = simulator.stepper().linearise(simulator.start().0)?;
+                        found.inertial_force(&speed, &DVector::zeros(0))
+                    };
+                    times[k] = least(30, &mut [&mut call])?[0];
+                }
+                let first = *first.get_or_insert(times);
+                println!(
+                    "{line} {:.1}, {:.1} |",
+                    times[0] / first[0],
+                    times[1] / first[1]
+                );
             }
-            println!("{line}");
         }
     }
     Ok(())
@@ -408,7 +427,7 @@ fn main() -> std::result::Result<(), Box<dyn std::error::Error>> {
         return Ok(());
     }
     if has("--accuracy") {
-        return Ok(accuracies()?);
+        return Ok(accuracies(&words)?);
     }
     let picked = || {
         cases()

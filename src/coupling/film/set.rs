@@ -28,10 +28,10 @@ pub(crate) struct FilmBody {
 
 impl FilmBody {
     /// Of each body, from its surface in its own frame, and its shape by formula where it has one; the `same` ones share theirs. Where faces are few for
-    /// a film they are split into four up to so many times.
+    /// a film they are split into four up to as many times as `splits` says of a body.
     pub fn all(
         surfaces: &[(&TriMesh, Option<&Solid>)],
-        splits: usize,
+        splits: impl Fn(usize) -> usize,
         same: impl Fn(usize, usize) -> bool,
     ) -> Vec<Self> {
         let mut out: Vec<Self> = Vec::with_capacity(surfaces.len());
@@ -39,7 +39,7 @@ impl FilmBody {
             out.push(match (0..b).find(|a| same(*a, b)) {
                 Some(a) => out[a].clone(),
                 None => {
-                    let (mesh, finer) = split(mesh, *solid, splits);
+                    let (mesh, finer) = split(mesh, *solid, splits(b));
                     Self {
                         surface: Arc::new(FilmSurface {
                             finer,

@@ -79,7 +79,7 @@ impl FilmedPanels {
             return Err(Error::input("films: surfaces", given, expected));
         }
         let same = |a: usize, b: usize| Arc::ptr_eq(&model.bodies[a], &model.bodies[b]);
-        let bodies = FilmBody::all(surfaces, SPLITS, same);
+        let bodies = FilmBody::all(surfaces, |_| SPLITS, same);
         let reach = |body: &Arc<PanelBoundary>| REACH * edge(body);
         let reaches: Vec<f64> = model.bodies.iter().map(reach).collect();
         let mut films = Films::new(&bodies, &reaches, &SHARES, walls)?;

@@ -13,6 +13,8 @@ use std::sync::Arc;
 const REACH: f64 = 1.4;
 /// Power of the compression's tolerance by which gaps narrow in which its sources are right.
 const FINER: f64 = 0.6;
+/// How often faces are split for films at most: once for each third of the default tolerance.
+const SPLITS: usize = 2;
 const SHARES: Shares = Shares {
     floor: 0.25,
     rim: 0.43,
@@ -43,11 +45,18 @@ impl Reduced {
             }
         }
         let same = |a: usize, b: usize| Arc::ptr_eq(&self.bodies[a], &self.bodies[b]);
-        let bodies = FilmBody::all(surfaces, 0, same);
+        let finer =
+            |b: usize| (tolerances[b] / compress::CompressSettings::default().tolerance).min(1.0);
+        // A film between round bodies is as good as its faces are small against the gap.
+        let splits = |b: usize| {
+            let third = |splits: &usize| finer(b) < 1.01 / 3f64.powi(*splits as i32);
+            (1..=SPLITS).take_while(third).count()
+        };
+        let bodies = FilmBody::all(surfaces, splits, same);
         let reach = |b: usize| {
             let fit = &self.bodies[b].parts().fit;
             // Sources of a smaller tolerance are right in narrower gaps, and more than films are.
-            let finer = (tolerances[b] / compress::CompressSettings::default().tolerance).min(1.0);
+            let finer = finer(b);
             REACH * bodies[b].surface.flatness * fit.finest() * finer.powf(FINER)
         };
         let reaches: Vec<f64> = (0..count).map(reach).collect();

@@ -167,6 +167,89 @@ fn the_page_on_scenes_has_every_key() {
     }
 }
 
+/// What documents tell a reader to run is there: examples, benches, tests, scripts, subcommands, and their options.
+#[test]
+fn commands_name_what_is_there() {
+    let exists = |kind: &str, name: &str| {
+        match kind {
+            "--example" => ["examples", ""],
+            "--bench" => ["benches", "adjoint/benches"],
+            _ => ["tests", ""],
+        }
+        .iter()
+        .filter(|folder| !folder.is_empty())
+        .any(|folder| {
+            let at = root().join(folder).join(name);
+            at.with_extension("rs").exists() || at.join("main.rs").exists()
+        })
+    };
+    let manual = |arguments: &[&str]| {
+        // Without the feature `cli` there is no program to ask.
+        let program = option_env!("CARGO_BIN_EXE_hydrograd")?;
+        let help = std::process::Command::new(program)
+            .args(arguments)
+            .arg("--help")
+            .output()
+            .unwrap();
+        help.status
+            .success()
+            .then(|| String::from_utf8(help.stdout).unwrap())
+    };
+    let mut wrong = Vec::new();
+    let mut count = 0;
+    for document in documents() {
+        if document.ends_with("CHANGELOG.md") {
+            continue;
+        }
+        let text = std::fs::read_to_string(&document).unwrap();
+        let marked = text
+            .split('`')
+            .chain(text.lines())
+            .filter(|c| !c.contains('`') && !c.contains('…') && !c.trim().contains('\n'));
+        for command in marked {
+            let words: Vec<&str> = command.split_whitespace().collect();
+            let mut bad = |what: String| wrong.push(format!("{}: {what}", document.display()));
+            match words[..] {
+                ["cargo", "run" | "bench" | "test", ..] => {
+                    for pair in words.windows(2) {
+                        if ["--example", "--bench", "--test"].contains(&pair[0]) {
+                            count += 1;
+                            let name = pair[1].trim_end_matches([':', ',', ')']);
+                            if !exists(pair[0], name) {
+                                bad(format!("{} {name}", pair[0]));
+                            }
+                        }
+                    }
+                }
+                ["python", script, ..] if script.ends_with(".py") => {
+                    count += 1;
+                    if !root().join(script).exists() {
+                        bad(script.to_string());
+                    }
+                }
+                ["hydrograd", subcommand, ..]
+                    if !subcommand.starts_with('-') && cfg!(feature = "cli") =>
+                {
+                    count += 1;
+                    let Some(help) = manual(&[subcommand]) else {
+                        bad(format!("hydrograd {subcommand}"));
+                        continue;
+                    };
+                    for option in words.iter().filter(|w| w.starts_with("--")) {
+                        let option = option.split('=').next().unwrap();
+                        if !help.contains(option) {
+                            bad(format!("hydrograd {subcommand} {option}"));
+                        }
+                    }
+                }
+                _ => {}
+            }
+        }
+    }
+    assert!(count > 60, "{count}");
+    assert!(wrong.is_empty(), "{wrong:#?}");
+}
+
 /// What a newcomer reads first is short.
 #[test]
 fn the_readme_is_short() {

@@ -198,7 +198,7 @@ fn commands_name_what_is_there() {
     let mut wrong = Vec::new();
     let mut count = 0;
     for document in documents() {
-        if document.ends_with("CHANGELOG.md") {
+        if document.ends_with("CHANGELOG.md") || document.ends_with("cli.md") {
             continue;
         }
         let text = std::fs::read_to_string(&document).unwrap();

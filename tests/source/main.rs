@@ -4,4 +4,5 @@ mod circles;
 mod docs;
 mod graph;
 mod layers;
+mod manual;
 mod shaders;

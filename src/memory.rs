@@ -8,6 +8,10 @@ const PART: f64 = 0.9;
 /// What is never worth a question, bytes.
 const SMALL: f64 = 64e6;
 
+/// Addresses that the allocator takes for a thread before it is asked, bytes.
+#[cfg(unix)]
+const ARENA: f64 = 64e6;
+
 /// Bytes of so many numbers in double precision.
 pub(crate) fn numbers(count: f64) -> f64 {
     8.0 * count
@@ -62,7 +66,7 @@ fn own_limit(system: &mut System) -> f64 {
     let memory = ProcessRefreshKind::nothing().with_memory();
     system.refresh_processes_specifics(ProcessesToUpdate::Some(&[own]), false, memory);
     let used = system.process(own).map_or(0, |p| p.virtual_memory());
-    (limit - used as f64).max(0.0)
+    (limit - used as f64 - ARENA).max(0.0)
 }
 
 #[cfg(not(unix))]

@@ -188,7 +188,7 @@ pub mod counts {
             })*
         };
     }
-    keywords!(required: step, mode; optional: faces, rank, steps);
+    keywords!(required: step, mode, directions; optional: faces, rank, steps);
 }
 
 /// An `InternalError`: what a panic said.

@@ -319,8 +319,8 @@ impl Simulator {
     fn gradcheck<'py>(
         &self,
         py: Python<'py>,
-        steps: Option<usize>,
-        directions: usize,
+        #[pyo3(from_py_with = counts::steps)] steps: Option<usize>,
+        #[pyo3(from_py_with = counts::directions)] directions: usize,
         seed: u64,
     ) -> PyResult<Bound<'py, PyAny>> {
         crate::gradcheck::check(

@@ -681,6 +681,48 @@ fn a_run_says_what_auto_chose() {
     );
 }
 
+/// Under a limit of its memory the program does what it was asked or says what doesn't fit: it isn't ended by the system.
+#[cfg(target_os = "linux")]
+#[test]
+fn ceilings_of_memory_are_respected() {
+    let coins = crate::support::command::scene("coins");
+    let ball = crate::support::command::scene("falling_ball");
+    let commands = [
+        "added-mass --shape box:1,1,0.5 --faces 5000".to_string(),
+        "added-mass --shape cylinder:1,1 --faces 4000 --method mfs-vertex".into(),
+        format!("added-mass {coins} --fidelity full --faces 2000"),
+        format!("run {ball} --fidelity reduced --faces 1280 --steps 3"),
+        format!("run {coins} --steps 100000000"),
+    ];
+    let (mut done, mut refused) = (0, 0);
+    for megabytes in [200, 300, 450, 1000] {
+        for command in &commands {
+            let program = env!("CARGO_BIN_EXE_hydrograd");
+            let limited = format!("ulimit -v {}; exec {program} {command}", 1000 * megabytes);
+            let out = std::process::Command::new("sh")
+                .args(["-c", &limited])
+                .output()
+                .unwrap();
+            let said = text(&out.stderr);
+            match out.status.code() {
+                Some(0) => done += 1,
+                Some(1) => {
+                    crate::support::says(&said, &["hydrograd: "]);
+                    assert!(
+                        ["bytes of memory", "run in parts"]
+                            .iter()
+                            .any(|s| said.contains(s)),
+                        "{said}"
+                    );
+                    refused += 1;
+                }
+                code => panic!("{megabytes} MB: {command}: {code:?}: {said}"),
+            }
+        }
+    }
+    assert!(done >= 6 && refused >= 10, "{done} done, {refused} refused");
+}
+
 /// What can't be printed is no success.
 #[cfg(target_os = "linux")]
 #[test]

@@ -204,6 +204,7 @@ impl Body {
             thruster,
             drag: drag.map(|d| d.0),
             name: name.to_string(),
+            origin: Default::default(),
         };
         Ok(Self {
             body,

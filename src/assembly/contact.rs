@@ -218,7 +218,7 @@ fn contact_shape(body: &Body, shape: &Shape, surface: &Surface) -> Result<Contac
         _ => ContactShape::of_shape(shape, pose(&body.shape_at), Path::new("")),
     };
     made.map_err(|e| Error::Unsupported {
-        what: format!("contact of body {:?}", body.name),
+        what: format!("{}contact of body {:?}", body.origin.surface(None), body.name),
         why: e.to_string(),
         instead: "give it a convex shape, or convex pieces for contact: `collision = [{ shape = …, at = … }, …]`"
             .into(),
@@ -236,7 +236,7 @@ fn pieces(body: &Body, surface: &Surface) -> Result<Vec<ContactShape>> {
         let place = format!("body {:?}: collision[{k}]", body.name);
         let made = ContactShape::of_shape(&piece.shape, pose(&piece.at), Path::new(""));
         let made = made.map_err(|e| Error::Unsupported {
-            what: place.clone(),
+            what: format!("{}{place}", body.origin.surface(Some(k))),
             why: e.to_string(),
             instead: "give a convex shape, or several".into(),
         })?;

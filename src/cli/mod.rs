@@ -11,6 +11,7 @@ mod gpu_info;
 mod gradcheck;
 mod options;
 mod output;
+mod patience;
 mod run;
 mod tradeoff;
 

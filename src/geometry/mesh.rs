@@ -1,6 +1,6 @@
 //! The closed triangle mesh and the geometry of its faces.
 
-use super::check::{Kind, MeshReport, check_parts};
+use super::check::{Kind, MeshReport, check_parts, check_rounded};
 use super::points::{Ball, area_vector, bounds, vertex_normal_sums};
 use super::topology;
 use crate::error::{Error, Result};
@@ -32,7 +32,7 @@ impl TriMesh {
     /// [`Error::Mesh`] with the first problem that [`check_parts`] calls an error: the mesh is empty, has
     /// an index out of range, a vertex that isn't finite, a face without area or given twice, an
     /// edge without exactly two faces, a face oriented against its neighbours, a vertex whose faces fold back
-    /// on each other, an inward orientation, or several separate pieces.
+    /// on each other, an inward orientation, faces that cross, or a piece inside another.
     pub fn new(
         name: impl Into<String>,
         vertices: Vec<Vec3>,
@@ -184,6 +184,16 @@ impl TriMesh {
             vertices: self.vertices.iter().map(|x| pose.apply(x)).collect(),
             faces: self.faces.clone(),
         }
+    }
+
+    /// The same surface with rounded coordinates.
+    ///
+    /// # Errors
+    /// [`Error::Mesh`] if faces lose their areas by it, or all its volume.
+    pub(crate) fn rounded(&self, round: impl Fn(f64) -> f64) -> Result<Self> {
+        let vertices: Vec<Vec3> = self.vertices.iter().map(|x| x.map(&round)).collect();
+        check_rounded(&self.name, &vertices, &self.faces).into_result()?;
+        Ok(Self::with_parts(&self.name, vertices, self.faces.clone()))
     }
 
     /// The same surface, larger by `factor` about the origin.

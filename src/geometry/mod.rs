@@ -14,8 +14,10 @@
 //!   tangent balls and winding numbers of one mesh.
 //! - [`Wall`], [`HalfSpace`], [`Image`]: plane walls and the mirror images that they make.
 
+mod boxes;
 mod check;
 pub(crate) mod convex;
+mod exact;
 mod faces;
 mod gap;
 mod image;

@@ -1,33 +1,12 @@
 //! One mesh, ready to be asked for closest points: its faces in a tree of boxes, and its normals.
 
+use super::boxes::{Node, tree};
 use super::mesh::TriMesh;
-use super::points::{Ball, bounds, winding_number};
+use super::points::{Ball, winding_number};
+use super::topology;
 use super::triangle::{Feature, Triangle};
 use super::wall::HalfSpace;
 use hydrograd_adjoint::lie::{Pose, Vec3};
-
-/// Faces in a leaf, at most.
-const LEAF: usize = 2;
-
-/// A box of the tree, body frame. Its first child follows it in the list.
-#[derive(Clone, Debug)]
-pub(super) struct Node {
-    pub center: Vec3,
-    pub half: Vec3,
-    /// Its faces, in the order of the tree.
-    pub faces: std::ops::Range<usize>,
-    /// Its second child; none in a leaf.
-    pub second: Option<usize>,
-}
-
-impl Node {
-    /// Square of the distance of a point to the box.
-    #[inline]
-    fn distance_squared(&self, p: &Vec3) -> f64 {
-        let out = (p - self.center).abs() - self.half;
-        out.map(|x| x.max(0.0)).norm_squared()
-    }
-}
 
 /// A mesh in its body frame.
 #[derive(Clone, Debug)]
@@ -43,6 +22,8 @@ pub(super) struct MeshTree {
     vertex_normals: Vec<Vec3>,
     /// Mean edge length around each vertex, m.
     edge_at_vertex: Vec<f64>,
+    /// A vertex of each piece.
+    pub pieces: Vec<usize>,
     /// A ball around all.
     pub ball: Ball,
     /// Largest distance of a vertex from the body's origin.
@@ -55,16 +36,14 @@ impl MeshTree {
             .map(|f| Triangle::new(mesh.corners(f)))
             .collect();
         let edge_normals = edge_normals(mesh, &all);
-        let centroids: Vec<Vec3> = (0..all.len()).map(|f| mesh.centroid(f)).collect();
-        let mut order: Vec<usize> = (0..all.len()).collect();
-        let mut nodes = Vec::with_capacity(2 * all.len());
-        grow(&mut nodes, &mut order, 0, &centroids, &all);
+        let (nodes, order) = tree(&all, |f| mesh.centroid(f));
         Self {
             triangles: order.iter().map(|&f| all[f]).collect(),
             corners: order.iter().map(|&f| mesh.faces()[f]).collect(),
             edge_normals: order.iter().map(|&f| edge_normals[f]).collect(),
             vertex_normals: mesh.vertex_normals(),
             edge_at_vertex: edge_lengths(mesh),
+            pieces: pieces(mesh),
             ball: mesh.bounding_ball(),
             reach: mesh.vertices().iter().map(|x| x.norm()).fold(0.0, f64::max),
             nodes,
@@ -280,39 +259,13 @@ fn segment_meets(from: &Vec3, along: &Vec3, node: &Node) -> bool {
         })
 }
 
-/// Builds the tree over `order`, whose first element is number `start`, and returns its root.
-fn grow(
-    nodes: &mut Vec<Node>,
-    order: &mut [usize],
-    start: usize,
-    centroids: &[Vec3],
-    triangles: &[Triangle],
-) -> usize {
-    let [low, high] = bounds(order.iter().flat_map(|&f| triangles[f].corners.iter()));
-    let root = nodes.len();
-    let center = low + (high - low) * 0.5;
-    nodes.push(Node {
-        center,
-        // No corner may stick out by rounding.
-        half: (high - center).sup(&(center - low)),
-        faces: start..start + order.len(),
-        second: None,
-    });
-    if order.len() > LEAF {
-        let [low, high] = bounds(order.iter().map(|&f| &centroids[f]));
-        let axis = (high - low).imax();
-        let half = order.len() / 2;
-        order.select_nth_unstable_by(half, |&f, &g| {
-            centroids[f][axis]
-                .total_cmp(&centroids[g][axis])
-                .then(f.cmp(&g))
-        });
-        let (left, right) = order.split_at_mut(half);
-        grow(nodes, left, start, centroids, triangles);
-        let second = grow(nodes, right, start + half, centroids, triangles);
-        nodes[root].second = Some(second);
-    }
-    root
+/// The smallest number of a vertex of each piece.
+fn pieces(mesh: &TriMesh) -> Vec<usize> {
+    let edges = topology::edges(mesh.faces().iter().copied().enumerate());
+    let found = topology::components(mesh.faces().len(), 0..mesh.faces().len(), &edges);
+    let least = |f: &usize| mesh.faces()[*f].into_iter().min();
+    let least = |piece: &topology::Component| piece.faces.iter().filter_map(least).min();
+    found.iter().filter_map(least).collect()
 }
 
 /// Of each face the sum of the unit normals at each of its edges.

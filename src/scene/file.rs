@@ -11,8 +11,11 @@ use toml::de::{DeTable, DeValue};
 use toml::{Spanned, Value};
 
 use super::problem::{Problem, Reader};
-use super::{Scene, Shape};
+use super::{Body, Origin, Scene, Shape};
 use crate::{Error, Result};
+
+/// Stands for the file of a scene that is read from text.
+const TEXT: &str = "scene text";
 
 impl Scene {
     /// Reads a scene file. Paths of meshes are taken relative to the file's folder.
@@ -22,12 +25,13 @@ impl Scene {
         let path = path.as_ref();
         let text = read_text(path)?;
         let folder = path.parent().unwrap_or(Path::new(""));
-        parse(&text, folder).map_err(|message| parse_error(path, message))
+        parse(&text, folder, path).map_err(|message| parse_error(path, message))
     }
 
     /// A scene from TOML text. Paths of meshes are taken relative to `folder`.
     pub fn from_toml(text: &str, folder: impl AsRef<Path>) -> Result<Self> {
-        parse(text, folder.as_ref()).map_err(|message| parse_error("scene text".as_ref(), message))
+        let name = Path::new(TEXT);
+        parse(text, folder.as_ref(), name).map_err(|message| parse_error(name, message))
     }
 
     /// The scene as TOML text; what stands at its default is left out. [`Scene::from_toml`] reads
@@ -113,7 +117,7 @@ pub(crate) fn nearest<'a>(
         .map(|(_, name)| name)
 }
 
-fn parse(text: &str, folder: &Path) -> std::result::Result<Scene, String> {
+fn parse(text: &str, folder: &Path, file: &Path) -> std::result::Result<Scene, String> {
     let blank = |line: &str| {
         let line = line.trim_start_matches('\u{feff}').trim();
         line.is_empty() || line.starts_with('#')
@@ -135,7 +139,9 @@ fn parse(text: &str, folder: &Path) -> std::result::Result<Scene, String> {
         Ok(document) => explain(document.get_ref(), &values, path, &problem, line),
         Err(error) => broken(error),
     })?;
-    for body in &mut scene.bodies {
+    let document = DeTable::parse(text).map_err(broken)?;
+    for (b, body) in scene.bodies.iter_mut().enumerate() {
+        body.origin = origin(document.get_ref(), (b, body), file, line);
         let pieces = body.collision.iter_mut().map(|piece| &mut piece.shape);
         for shape in body.shape.iter_mut().chain(pieces) {
             if let Shape::Mesh { path, .. } = shape {
@@ -144,6 +150,23 @@ fn parse(text: &str, folder: &Path) -> std::result::Result<Scene, String> {
         }
     }
     Ok(scene)
+}
+
+/// Where the surfaces of a body, by its number, stand.
+fn origin(
+    document: &DeTable<'_>,
+    (b, body): (usize, &Body),
+    file: &Path,
+    line: impl Fn(usize) -> usize,
+) -> Origin {
+    let key = |name: &str| Step::Key(name.into());
+    let at = |shape: &[Step]| {
+        let path = [&[key("bodies"), Step::Index(b)], shape, &[key("path")]].concat();
+        line(start(document, &path))
+    };
+    let piece = |k: usize| at(&[key("collision"), Step::Index(k), key("shape")]);
+    let pieces = (0..body.collision.len()).map(piece).collect();
+    Origin::new(file.into(), at(&[key("shape")]), pieces)
 }
 
 /// One step from a table to what it holds.

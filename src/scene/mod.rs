@@ -10,6 +10,7 @@ mod file;
 mod force;
 mod joint;
 mod motion;
+mod origin;
 mod problem;
 mod validate;
 
@@ -19,6 +20,7 @@ pub use crate::shape::Shape;
 pub use build::BodyId;
 pub use contact::{CollisionPiece, Contact};
 pub use force::{Force, Lubrication, Spring, WATER_VISCOSITY};
+pub use origin::Origin;
 pub(crate) use validate::impossible_inertia;
 
 use serde::{Deserialize, Serialize};
@@ -158,6 +160,9 @@ pub struct Body {
     pub thruster: bool,
     /// Drag on the body's surface.
     pub drag: Option<Drag>,
+    /// Where a scene file gives it.
+    #[serde(skip)]
+    pub origin: Origin,
 }
 
 fn is_default<T: Default + PartialEq>(value: &T) -> bool {

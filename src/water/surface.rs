@@ -80,10 +80,12 @@ pub(crate) fn surface(body: &Body, meshing: Meshing, edges: f64) -> Result<Optio
     let at = pose(&body.shape_at);
     let even = |faces: Option<usize>| {
         let made = shape::build(shape, Path::new(""), faces);
-        made.map_err(|e| match shape.is_mesh() {
-            true => e.of(&format!("body {:?}: shape", body.name)),
-            false => e,
-        })
+        let key = match shape {
+            Shape::Mesh { .. } => "shape.path",
+            _ => "shape",
+        };
+        let place = || format!("{}body {:?}: {key}", body.origin.surface(None), body.name);
+        made.map_err(|e| e.of(&place()))
     };
     let refined = |base: &TriMesh, edges: f64| -> Result<TriMesh> {
         let regions = body.refine.iter().map(|r| Refinement {

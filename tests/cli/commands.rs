@@ -179,6 +179,21 @@ fn bad_mesh_fails_the_check_and_keeps_its_report() {
     assert!(value["error"].as_str().unwrap().contains("open.obj"));
     assert!(!value["findings"].as_array().unwrap().is_empty());
     fails(&["check-mesh", "nowhere.stl"], 1, &["nowhere.stl"]);
+    // A second one through the first.
+    let second = "v 0.1 0.1 0.1\nv 1.1 0.1 0.1\nv 0.1 1.1 0.1\nv 0.1 0.1 1.1\nf 5 7 6\nf 5 6 8\nf 5 8 7\nf 6 7 8\n";
+    let crossing = file(&folder, "crossing.obj", &[TETRAHEDRON, second].concat());
+    let words = [
+        "crossing.obj",
+        "pass through each other",
+        "3 with 4",
+        "hull",
+    ];
+    for command in ["check-mesh", "added-mass"] {
+        let done = hydrograd(&[command, &crossing]);
+        assert_eq!(done.status.code(), Some(1));
+        let said = text(&done.stderr);
+        assert!(words.iter().all(|w| said.contains(w)), "{said}");
+    }
 }
 
 /// All these keys hold finite numbers.

@@ -288,3 +288,36 @@ fn a_hundred_thousand_steps() {
         simulator.set_start(q, v).unwrap();
     }
 }
+
+/// Sizes at which products of lengths still fit, bodies that are far too slender: a result or a message with the number, and not for minutes.
+#[test]
+fn sizes_far_out_end_soon() {
+    for (shape, said) in [
+        (Shape::cuboid([9e18; 3]), None),
+        (Shape::cuboid([1e15; 3]), None),
+        (Shape::cuboid([9e18, 1.0, 1.0]), Some("no area")),
+        (Shape::capsule(0.1, 1e3), None),
+        (Shape::capsule(0.1, 1e6), Some("size over thickness")),
+        (Shape::cylinder(0.1, 1e8), Some("size over thickness")),
+    ] {
+        let mut scene = Scene::new(Fluid::fresh_water());
+        scene.add(Body::new(shape.clone()).density(998.0).named("large"));
+        let start = std::time::Instant::now();
+        let made = Simulator::new(&scene, Settings::default());
+        let seconds = start.elapsed().as_secs_f64();
+        println!("{shape:?}: {seconds:.1} s");
+        match (made, said) {
+            (Ok(simulator), None) => {
+                let m = simulator.added_mass().unwrap().matrix;
+                assert!(finite(&m) && m[(0, 0)] > 0.0);
+            }
+            (Err(e), Some(said)) => {
+                let e = e.to_string();
+                assert!(e.contains(said) && e.contains("body \"large\""), "{e}");
+            }
+            (Ok(_), Some(said)) => panic!("{shape:?} isn't refused: {said}"),
+            (Err(e), None) => panic!("{shape:?}: {e}"),
+        }
+        assert!(seconds < 60.0);
+    }
+}

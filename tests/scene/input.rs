@@ -351,3 +351,50 @@ fn a_mesh_that_cannot_be_read_is_told_with_its_body() {
         says(error, &["body \"coin\"", "shape", name]);
     }
 }
+
+/// Whatever is wrong with a mesh, the message has the scene's file, the line, the body and the key.
+#[test]
+#[cfg(feature = "meshio")]
+fn meshes_are_named_by_file_line_body_and_key() {
+    let folder = tempfile::tempdir().unwrap();
+    let put = |name: &str, text: &str| std::fs::write(folder.path().join(name), text).unwrap();
+    put("empty.obj", "");
+    put("garbage.ply", "this is no mesh");
+    put("open.obj", "v 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 3\n");
+    // Two tetrahedra in one another.
+    let tetrahedron = |x: f64, n: usize| {
+        let corners = [[0., 0., 0.], [1., 0., 0.], [0., 1., 0.], [0., 0., 1.]];
+        let vertices = corners.map(|[a, b, c]| format!("v {} {} {}\n", a + x, b + x, c + x));
+        let faces = [[1, 3, 2], [1, 2, 4], [1, 4, 3], [2, 3, 4]];
+        let faces = faces.map(|[a, b, c]| format!("f {} {} {}\n", a + n, b + n, c + n));
+        [vertices.concat(), faces.concat()].concat()
+    };
+    put(
+        "crossing.obj",
+        &[tetrahedron(0.0, 0), tetrahedron(0.1, 4)].concat(),
+    );
+    for (path, said) in [
+        (".", "this is a folder"),
+        ("nowhere.obj", "No such file"),
+        ("empty.obj", "empty"),
+        ("garbage.ply", "garbage.ply"),
+        ("mesh.xyz", "unknown extension"),
+        ("open.obj", "3 edges with one face only"),
+        ("crossing.obj", "pass through each other"),
+    ] {
+        let inline = format!("density = 1.0\nshape = {{ kind = \"mesh\", path = \"{path}\" }}");
+        let table = format!("density = 1.0\n\n[bodies.shape]\nkind = \"mesh\"\npath = \"{path}\"");
+        for (body, line) in [(inline, 10), (table, 13)] {
+            let file = folder.path().join("scene.toml");
+            std::fs::write(&file, text(&body, "")).unwrap();
+            let scene = Scene::load(&file).unwrap();
+            let error = Simulator::new(&scene, Settings::default()).err().unwrap();
+            let place = format!("scene.toml, line {line}: body \"ball\": shape.path");
+            says(error, &[said, &place]);
+        }
+    }
+    // What a scene is doesn't depend on where it stands.
+    let scene = Scene::load(folder.path().join("scene.toml")).unwrap();
+    let again = Scene::from_toml(&scene.to_toml().unwrap(), "").unwrap();
+    assert_eq!(scene, again);
+}

@@ -377,6 +377,18 @@ fn joints_are_checked() {
         },
         &["body \"ball\": motion[0].frequency", "finite"],
     );
+    refused(
+        |s| {
+            s.bodies[0].actuated = false;
+            s.bodies[0].motion = Some(vec![Motion::Sine {
+                offset: 0.0,
+                amplitude: 1.0,
+                frequency: 1.0,
+                phase: -1e300,
+            }]);
+        },
+        &["body \"ball\": motion[0].phase", "-1", "±2π"],
+    );
 }
 
 #[test]

@@ -560,3 +560,44 @@ fn a_shape_from_a_file_is_found_beside_the_scene() {
     let mesh = build(&shape, dir.path(), None).unwrap();
     assert_same(&mesh, &body().scaled(1e-3).unwrap(), 0.0);
 }
+
+/// A vertex that no face uses changes nothing, wherever it is and whatever the format.
+#[test]
+fn loose_vertices_change_nothing() {
+    let dir = TempDir::new().unwrap();
+    let mesh = body();
+    let places = [[0.1, 0.0, 0.0], [1e3, 0.0, 0.0], [1e70, -1e300, 0.0]];
+    for (k, [x, y, z]) in places.into_iter().enumerate() {
+        let mut v = mesh.vertices().to_vec();
+        v.push(Vec3::new(x, y, z));
+        let mut ply = ply_header("ascii", "double", v.len(), mesh.faces().len());
+        let mut off = String::new();
+        for p in &v {
+            writeln!(ply, "{:e} {:e} {:e}", p.x, p.y, p.z).unwrap();
+            writeln!(off, "v {:e} {:e} {:e}", p.x, p.y, p.z).unwrap();
+        }
+        for [a, b, c] in mesh.faces() {
+            writeln!(ply, "3 {a} {b} {c}").unwrap();
+            writeln!(off, "f {} {} {}", a + 1, b + 1, c + 1).unwrap();
+        }
+        for (name, text) in [(format!("{k}.ply"), ply), (format!("{k}.obj"), off)] {
+            let path = put(&dir, &name, text);
+            let report = read_unchecked(&path, 1.0).unwrap().check();
+            assert!(report.is_ok(), "{report}");
+            assert_same(&read(&path, 1.0).unwrap(), &mesh, 0.0);
+        }
+    }
+}
+
+#[test]
+fn a_folder_is_told_from_a_file() {
+    let dir = TempDir::new().unwrap();
+    let folder = dir.path().join("meshes.obj");
+    std::fs::create_dir(&folder).unwrap();
+    for path in [dir.path(), &folder] {
+        let error = read(path, 1.0).unwrap_err();
+        assert!(matches!(error, Error::File { .. }));
+        let said = error.to_string();
+        assert!(said.contains("this is a folder"), "{said}");
+    }
+}

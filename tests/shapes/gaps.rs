@@ -2,7 +2,9 @@
 
 use hydrograd::adjoint::lie::{Pose, Vec3, exp_matrix};
 use hydrograd::adjoint::sample::Samples;
-use hydrograd::geometry::{Edge, Gap, Gaps, Kind, Other, Share, Wall, check_parts, overlap_error};
+use hydrograd::geometry::{
+    Edge, Gap, Gaps, Kind, Other, Severity, Share, Wall, check_parts, overlap_error,
+};
 use hydrograd::shape::build;
 use hydrograd::{Shape, TriMesh};
 use std::path::Path;
@@ -211,7 +213,7 @@ fn inside_a_hollow_is_not_overlap() {
 }
 
 #[test]
-fn a_mesh_is_in_one_piece() {
+fn each_piece_of_a_mesh_is_seen() {
     let (far, near) = (sphere(0.1, 80), sphere(0.1, 80));
     let count = far.vertices().len();
     let moved = near.transformed(&at(3.0, 0.0, 0.0));
@@ -219,12 +221,21 @@ fn a_mesh_is_in_one_piece() {
     let second = near.faces().iter().map(|f| f.map(|v| v + count));
     let faces: Vec<_> = far.faces().iter().copied().chain(second).collect();
     let report = check_parts("two", &vertices, &faces);
-    assert!(report.find(Kind::Components).is_some());
-    assert!(TriMesh::new("two", vertices, faces).is_err());
-    // Each piece alone inside another body overlaps it.
+    assert_eq!(
+        report.find(Kind::Components).unwrap().severity,
+        Severity::Warning
+    );
+    let two = TriMesh::new("two", vertices, faces).unwrap();
+    // Either piece inside another body overlaps it, as it does alone.
     let outer = sphere(1.0, 320);
-    let found = gap(&outer, at(3.0, 0.0, 0.0), &moved, at(0.0, 0.0, 0.0));
-    assert!(found < -0.9, "{found}");
+    let alone = gap(&outer, at(3.0, 0.0, 0.0), &moved, at(0.0, 0.0, 0.0));
+    assert!(alone < -0.9, "{alone}");
+    for x in [0.0, 3.0] {
+        let found = gap(&outer, at(x, 0.0, 0.0), &two, at(0.0, 0.0, 0.0));
+        assert!((found - alone).abs() < 0.02, "{found}, alone {alone}");
+    }
+    let between = gap(&outer, at(1.5, 0.0, 0.0), &two, at(0.0, 0.0, 0.0));
+    assert!((0.4 - 1e-12..0.45).contains(&between), "{between}");
 }
 
 #[test]

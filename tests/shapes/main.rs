@@ -1,5 +1,6 @@
 //! Bodies' surfaces: primitives, prisms, files, refinement, and the gaps between them.
 
+mod crossing;
 mod exact;
 #[cfg(feature = "meshio")]
 mod files;

@@ -434,14 +434,14 @@ fn broken() -> Vec<(&'static str, Parts, Kind, usize)> {
             1,
         ),
         (
-            "two pieces",
+            "a piece in another",
             with(&|(v, f)| {
                 let n = v.len();
-                v.extend(v.clone().iter().map(|p| p + Vec3::new(5.0, 0.0, 0.0)));
+                v.extend(v.clone().iter().map(|p| p * 0.5));
                 f.extend(f.clone().iter().map(|t| t.map(|i| i + n)));
             }),
-            Kind::Components,
-            2,
+            Kind::Nested,
+            1,
         ),
         (
             "a cavity",
@@ -522,7 +522,7 @@ fn the_place_is_the_right_one() {
     assert_eq!(at("duplicate").face, Some(80));
     assert_eq!(at("zero area").face, Some(81));
     assert_eq!(at("out of range").face, Some(12));
-    assert_eq!(at("two pieces").face, Some(80));
+    assert_eq!(at("a piece in another").face, Some(80));
     // The hole's first edge lies on the hole.
     let hole = Vec3::from(at("open").position.unwrap());
     let [a, b, c] = good.corners(17);

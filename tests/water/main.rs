@@ -18,6 +18,7 @@ mod panel_films;
 mod plates;
 mod reduced;
 mod refine;
+mod several_pieces;
 
 #[path = "../support/mod.rs"]
 mod support;

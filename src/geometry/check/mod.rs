@@ -1,12 +1,13 @@
 //! What is wrong with a mesh, where, and what to do about it.
 //!
 //! All thresholds are relative to the mesh itself, so a verdict doesn't depend on the unit of
-//! length. Self-intersection (a face that passes through another) is *not* looked for: it
-//! needs a spatial search and exact predicates, and a mesh tool is the place for it.
+//! length. Whether faces cross is looked for where all else is right, by exact predicates.
 
+mod crossing;
 mod scan;
 
 pub use scan::check_parts;
+pub(super) use scan::check_rounded;
 
 use crate::error::{Error, Result};
 use serde::Serialize;
@@ -51,6 +52,12 @@ pub enum Kind {
     NoVolume,
     /// A closed piece with its normals pointing inward.
     Inward,
+    /// Faces that pass through each other, or share an area.
+    Crossing,
+    /// A piece inside another, where the surface winds twice.
+    Nested,
+    /// Faces so long that not all that come near each other were looked at for crossings.
+    Unsearched,
     /// Several pieces that share no edge.
     Components,
     /// Long thin faces.
@@ -64,7 +71,7 @@ pub enum Kind {
 impl Kind {
     /// How bad it is: warnings are declared last.
     fn severity(self) -> Severity {
-        match self < Self::Aspect {
+        match self < Self::Unsearched {
             true => Severity::Error,
             false => Severity::Warning,
         }

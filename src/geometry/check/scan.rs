@@ -1,5 +1,6 @@
 //! The passes over a mesh that fill a report.
 
+use super::crossing::{self, MANY, MOST};
 use super::{Finding, Kind, MeshReport, Severity, counted, number};
 use crate::geometry::points::{area_vector, bounds, signed_volume, vertex_normal_sums};
 use crate::geometry::topology::{self, Component, Edges};
@@ -26,12 +27,28 @@ const LONG_FACE: f64 = 30.0;
 /// Checks the parts of a mesh, which may be anything: `vertices` in m, `faces` counted from 0. See [`Kind`]
 /// for what is looked for.
 pub fn check_parts(name: &str, vertices: &[Vec3], faces: &[[usize; 3]]) -> MeshReport {
+    check(name, vertices, faces, true)
+}
+
+/// The same of a surface that doesn't cross itself, but where rounding has made it: that isn't looked for.
+pub(in crate::geometry) fn check_rounded(
+    name: &str,
+    vertices: &[Vec3],
+    faces: &[[usize; 3]],
+) -> MeshReport {
+    check(name, vertices, faces, false)
+}
+
+fn check(name: &str, vertices: &[Vec3], faces: &[[usize; 3]], crossings: bool) -> MeshReport {
     let mut checker = Checker::new(vertices, faces);
     checker.indices_and_numbers();
     checker.duplicate_faces();
     checker.shapes();
-    let components = checker.connections();
+    let (edges, pieces) = checker.connections();
     checker.folds();
+    if crossings {
+        checker.crossings(&edges, &pieces);
+    }
     checker.vertices_alone();
 
     let mut findings = checker.findings;
@@ -43,7 +60,7 @@ pub fn check_parts(name: &str, vertices: &[Vec3], faces: &[[usize; 3]]) -> MeshR
         name: name.to_owned(),
         vertices: vertices.len(),
         faces: faces.len(),
-        components,
+        components: pieces.len(),
         bounds: checker.bounds.map(Into::into),
         volume: usable.then(|| signed_volume(&all)),
         // An empty sum is −0.
@@ -153,8 +170,10 @@ impl<'a> Checker<'a> {
             let remedy = "count vertices from 0, or add the missing vertices";
             self.report_faces(Kind::IndexOutOfRange, &wrong, problem, remedy);
         }
+        // A loose vertex has no effect, wherever it is.
+        let used = self.used();
         let bad: Vec<usize> = (0..count)
-            .filter(|&v| !is_usable(&self.vertices[v]))
+            .filter(|&v| used[v] && !is_usable(&self.vertices[v]))
             .collect();
         if let Some(&first) = bad.first() {
             let n = counted(bad.len(), "vertex has", "vertices have");
@@ -244,8 +263,8 @@ impl<'a> Checker<'a> {
         }
     }
 
-    /// Edges, orientations and pieces; returns the number of pieces.
-    fn connections(&mut self) -> usize {
+    /// Edges, orientations and pieces.
+    fn connections(&mut self) -> (Edges, Vec<Component>) {
         let edges = topology::edges(self.connected.iter().map(|&f| (f, self.faces[f])));
         let complete = self.indexed.len() == self.faces.len();
         if complete {
@@ -262,11 +281,11 @@ impl<'a> Checker<'a> {
                 "{} separate pieces that share no edge; the second begins here",
                 pieces.len()
             );
-            let remedy = "give each piece a body of its own (joint = fixed holds them together), join the \
-                          pieces into one surface, or delete what is inside; merge vertices if they touch";
+            let remedy = "they are one body, and narrow gaps between them aren't watched as those between bodies are; \
+                          merge vertices if they should be one surface";
             self.report(Kind::Components, found, problem, remedy);
         }
-        pieces.len()
+        (edges, pieces)
     }
 
     fn edges_with(&mut self, edges: &Edges, kind: Kind) {
@@ -357,9 +376,13 @@ impl<'a> Checker<'a> {
         self.report_faces(Kind::Inward, &inward, problem, remedy);
     }
 
+    fn has_errors(&self) -> bool {
+        self.findings.iter().any(|f| f.severity == Severity::Error)
+    }
+
     /// Vertices without a normal; looked for only where all else is right.
     fn folds(&mut self) {
-        if self.findings.iter().any(|f| f.severity == Severity::Error) {
+        if self.has_errors() {
             return;
         }
         let sums = vertex_normal_sums(self.vertices, self.faces);
@@ -373,6 +396,53 @@ impl<'a> Checker<'a> {
             let remedy = "mend the surface there, or split what touches in a point only";
             self.report(Kind::FoldedVertex, self.at_vertex(&folded), problem, remedy);
         }
+    }
+
+    /// Faces that cross, and pieces inside others; looked for only where all else is right.
+    fn crossings(&mut self, edges: &Edges, pieces: &[Component]) {
+        if self.has_errors() {
+            return;
+        }
+        let found = crossing::crossings(self.vertices, self.faces, edges);
+        if let Some([first, _]) = found.pairs.first() {
+            let shown = found.pairs.iter().take(5);
+            let shown: Vec<_> = shown.map(|[f, g]| format!("{f} with {g}")).collect();
+            let most = match found.pairs.len() > MANY {
+                true => format!("more than {MANY} pairs"),
+                false => counted(found.pairs.len(), "pair", "pairs"),
+            };
+            let more = match found.pairs.len() > shown.len() {
+                true => ", …",
+                false => "",
+            };
+            let problem = format!(
+                "{most} of faces pass through each other or share an area: {}{more}",
+                shown.join(", ")
+            );
+            let remedy = "unite in a mesh tool what crosses (boolean union, remesh), or take the convex hull of its \
+                          vertices";
+            let found = (found.pairs.len(), Some(*first), self.centroid(*first));
+            self.report(Kind::Crossing, found, problem, remedy);
+            return;
+        }
+        if found.searched < self.faces.len() {
+            let rest = self.faces.len() - found.searched;
+            let problem = format!(
+                "crossings were looked for from {} of {} faces only: more than {MOST:.0e} pairs come near each other",
+                found.searched,
+                self.faces.len()
+            );
+            let remedy = "remesh with faces nearer to equilateral";
+            self.report(Kind::Unsearched, (rest, None, None), problem, remedy);
+        }
+        if pieces.len() < 2 {
+            return;
+        }
+        let inner = crossing::nested(self.vertices, self.faces, pieces);
+        let n = counted(inner.len(), "piece lies", "pieces lie");
+        let problem = format!("{n} inside another, where the surface winds twice");
+        let remedy = "delete what is inside: the body is solid there";
+        self.report_faces(Kind::Nested, &inner, problem, remedy);
     }
 
     /// Whether a face uses each vertex.

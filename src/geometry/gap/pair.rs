@@ -1,6 +1,7 @@
 //! Two placed surfaces: how far apart, or how deep in one another.
 
-use crate::geometry::tree::{MeshTree, Node};
+use crate::geometry::boxes::Node;
+use crate::geometry::tree::MeshTree;
 use crate::geometry::triangle::Triangle;
 use hydrograd_adjoint::lie::{Mat3, Pose, Vec3};
 
@@ -236,10 +237,11 @@ impl<'a> Pair<'a> {
         }
     }
 
-    /// Whether one is inside the other; surfaces that don't cross.
+    /// Whether a piece of one is inside the other; surfaces that don't cross.
     fn contained(&self) -> bool {
         let inside = |outer: &MeshTree, inner: &MeshTree, place: &dyn Fn(&Vec3) -> Vec3| {
-            outer.depth_above(&place(&inner.vertices[0]), 0.0).is_some()
+            let mut pieces = inner.pieces.iter().map(|v| place(&inner.vertices[*v]));
+            pieces.any(|x| outer.depth_above(&x, 0.0).is_some())
         };
         inside(self.a, self.b, &|x| self.pose.apply(x))
             || inside(self.b, self.a, &|x| self.pose.apply_inverse(x))

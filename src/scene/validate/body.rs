@@ -278,6 +278,9 @@ fn check_joint(body: &Body) -> Result<()> {
     Ok(())
 }
 
+/// Largest phase, rad: rounding is 10⁻⁷ there.
+const MOST_PHASE: f64 = 1e9;
+
 fn check_motion(body: &Body, motion: &[Motion]) -> Result<()> {
     let joint = &body.joint;
     if body.locked {
@@ -322,7 +325,17 @@ fn check_motion(body: &Body, motion: &[Motion]) -> Result<()> {
             ],
         };
         for (field, value) in numbers {
-            finite(&place(body, &format!("motion[{i}].{field}")), &[*value])?;
+            let place = place(body, &format!("motion[{i}].{field}"));
+            finite(&place, &[*value])?;
+            if *field == "phase" && value.abs() > MOST_PHASE {
+                return Err(Error::input(
+                    place,
+                    value,
+                    format!(
+                        "give a phase within ±2π; past {MOST_PHASE:.0e} rad rounding moves the angle, and the joint's rate isn't that of its place"
+                    ),
+                ));
+            }
         }
     }
     Ok(())

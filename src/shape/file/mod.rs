@@ -14,6 +14,7 @@ use crate::error::{Error, Result};
 use crate::geometry::{MeshReport, TriMesh, check_parts, check_scale};
 use hydrograd_adjoint::lie::Vec3;
 use serde::Serialize;
+use std::io;
 use std::panic::{AssertUnwindSafe, catch_unwind};
 use std::path::Path;
 
@@ -63,6 +64,14 @@ pub fn read(path: &Path, scale: f64) -> Result<TriMesh> {
 pub fn read_unchecked(path: &Path, scale: f64) -> Result<FileMesh> {
     let name = path.display().to_string();
     check_scale(&name, scale)?;
+    if path.is_dir() {
+        let why = "this is a folder; give the mesh file itself, e.g. hull.obj";
+        return Err(Error::File {
+            path: path.to_owned(),
+            action: "read",
+            source: io::Error::new(io::ErrorKind::IsADirectory, why),
+        });
+    }
     let wrong = |message: String| Error::Parse {
         path: path.to_owned(),
         message,

@@ -218,6 +218,26 @@ const ASIDE: f64 = 1e-6;
 /// Steps of the grid, relative to the body's size, on which lengths are compared.
 const GRID: f64 = (1u64 << 30) as f64;
 
+/// Size over thickness from which on a body isn't compressed: rounding to the grid would bend it, and points as far apart as it is thick would be
+/// too many.
+const SLENDER: f64 = 1e5;
+
+/// Refuses a body of this size (m) that is too thin for it.
+fn refuse_slender(name: &str, mesh: &TriMesh, size: f64) -> Result<()> {
+    let thickness = 2.0 * mesh.mass_properties().volume / mesh.surface_area();
+    let slender = size / thickness;
+    if slender <= SLENDER {
+        return Ok(());
+    }
+    Err(Error::Unresolved {
+        place: format!("body {name:?}"),
+        quantity: "size over thickness (radius of the ball around it over 2 volume/area)".into(),
+        value: slender,
+        limit: SLENDER,
+        remedy: "a body so slender isn't compressed: use the fidelity full or isolated, or make it thicker".into(),
+    })
+}
+
 /// The body compressed, from the cache if it is there.
 ///
 /// It is computed in units of its own size, with lengths rounded to [`GRID`]: bodies of the same
@@ -232,9 +252,10 @@ fn compressed_body(
     let mesh = method.layout(body)?;
     let size = mesh.bounding_ball().radius;
     let round = |x: f64| (x / size * GRID).round() / GRID;
+    refuse_slender(body.name, &mesh, size)?;
     let unit = |mesh: &TriMesh| {
-        let vertices = mesh.vertices().iter().map(|v| v.map(round)).collect();
-        TriMesh::new(mesh.name(), vertices, mesh.faces().to_vec())
+        let rounded = mesh.rounded(round);
+        rounded.map_err(|e| e.of(&format!("body {:?}, in units of its size", body.name)))
     };
     let mesh = unit(&mesh)?;
     let coarse = body.coarse.map(|c| {

@@ -119,7 +119,7 @@ pub(super) fn thin<T>(
     spacing: f64,
     place: impl Fn(&T) -> Vec3,
 ) -> Vec<T> {
-    let cell = |p: &Vec3| [0, 1, 2].map(|k| (p[k] / spacing).floor() as i64);
+    let cell = |p: &Vec3| cell(p, spacing);
     let mut grid: HashMap<[i64; 3], Vec<Vec3>> = HashMap::new();
     let mut out = Vec::new();
     for item in items {
@@ -136,6 +136,37 @@ pub(super) fn thin<T>(
         }
     }
     out
+}
+
+/// Points in cubic cells.
+struct Grid<'a> {
+    edge: f64,
+    cells: HashMap<[i64; 3], Vec<&'a Vec3>>,
+}
+
+impl<'a> Grid<'a> {
+    fn new(points: &'a [Vec3], edge: f64) -> Self {
+        let mut cells: HashMap<_, Vec<_>> = HashMap::new();
+        for p in points {
+            cells.entry(cell(p, edge)).or_default().push(p);
+        }
+        Self { edge, cells }
+    }
+
+    /// The points in the cell of `p` and in those around it: all that are within the cells' edge of it.
+    fn beside(&self, p: &Vec3) -> impl Iterator<Item = &'a Vec3> {
+        let at = cell(p, self.edge);
+        let cells = (0..27).filter_map(move |n: usize| {
+            let beside = [n / 9, n / 3 % 3, n % 3].map(|i| i as i64 - 1);
+            self.cells.get(&[0, 1, 2].map(|k| at[k] + beside[k]))
+        });
+        cells.flatten().copied()
+    }
+}
+
+/// The cubic cell that holds a point.
+fn cell(p: &Vec3, edge: f64) -> [i64; 3] {
+    [0, 1, 2].map(|k| (p[k] / edge).floor() as i64)
 }
 
 /// Area of the surface within a ball, m².
@@ -171,9 +202,11 @@ pub(super) fn around(
     let moved = moved.filter(within);
     let points = thin(moved, spacing, |p| *p);
     // Where the surface is hollow, a point along the normal can come near another part of it.
+    let places: Vec<Vec3> = samples.iter().map(|s| s.point).collect();
+    let grid = Grid::new(&places, offset);
     let free = |p: &Vec3| {
-        let near = |s: &Sample| (p - s.point).norm_squared() < (0.8 * offset).powi(2);
-        !samples.iter().any(near) && surface.winding(p) < 0.5
+        let near = |q: &Vec3| (p - q).norm_squared() < (0.8 * offset).powi(2);
+        !grid.beside(p).any(near) && surface.winding(p) < 0.5
     };
     points.into_par_iter().filter(free).collect()
 }

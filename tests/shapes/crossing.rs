@@ -52,11 +52,15 @@ fn winding((v, f): &Parts, x: &Vec3) -> f64 {
 /// Whether the winding number is anything but 0 and 1 at one of many points, near the faces and between vertices.
 fn winds_wrongly(parts: &Parts, dice: &mut Samples) -> bool {
     let (v, f) = parts;
-    (0..2000).any(|_| {
+    (0..4000).any(|n| {
         let (i, j) = (dice.below(v.len()), dice.below(f.len()));
         let middle: Vec3 = f[j].iter().map(|k| v[*k] / 3.0).sum();
-        let near = 0.5 * (dice.number() + 1.0);
-        let x = middle + (v[i] - middle) * near.powi(3);
+        let part = dice.between(0.0, 1.0);
+        let x = match n % 2 {
+            0 => middle + (v[i] - middle) * part.powi(3),
+            // Not in a face.
+            _ => v[i] + (v[dice.below(v.len())] - v[i]) * part + vector(dice) * 1e-3,
+        };
         let w = winding(parts, &x);
         let whole = w.round();
         (w - whole).abs() < 1e-3 && whole != 0.0 && whole != 1.0
@@ -218,20 +222,20 @@ fn crossing() -> Vec<(String, Parts)> {
             k += 1;
         }
     }
-    for k in 0..15 {
-        let parts = torus(dice.between(0.3, 0.9), 1.0);
-        add(format!("spindle torus {k}"), placed(&mut dice, parts));
-    }
     // One vertex drawn out at the other side.
     for k in 0..20 {
         let mut parts = made(["sphere:1", "box:1,1,1"][k % 2], 320);
         let i = (7 * k + 3) % parts.0.len();
         let v = parts.0[i];
         parts.0[i] = -v * dice.between(1.3, 3.0);
+        // In the spike outside, for which there are too few points.
+        let tip = parts.0[i];
+        let w = winding(&parts, &(tip + (v - tip) * 0.02)).round();
+        assert!(w != 0.0 && w != 1.0, "{k}: {w}");
         add(format!("drawn through {k}"), placed(&mut dice, parts));
     }
     // The curve of the tube meets itself.
-    for k in 0..10 {
+    for k in 0..25 {
         let r = dice.between(0.1, 0.25);
         let parts = tube(8, 64, |a, b| {
             let along = Vec3::new(a.cos(), (2.0 * a).cos(), 0.0).normalize();
@@ -302,8 +306,8 @@ fn harmless() -> Vec<(String, Parts)> {
             [1., 0.],
             [1., 2.],
             [gap, 2.],
-            [gap, 0.5],
-            [-gap, 0.5],
+            [0.3, 0.5],
+            [-0.3, 0.5],
             [-gap, 2.],
             [-1., 2.],
         ];
@@ -324,7 +328,7 @@ fn harmless() -> Vec<(String, Parts)> {
             .collect();
         // Around a middle point.
         let star = [vec![[0.0, 0.0]], star].concat();
-        let mut parts = extruded(&star[1..], &[], 0.5, 0.3, 8);
+        let mut parts = extruded(&star[1..], &[], 0.5, if n == 16 { 0.3 } else { 0.0 }, 8);
         for (z, first, up) in [(0.0, 0, false), (0.5, 8 * n, true)] {
             parts.0.push(Vec3::new(0.0, 0.0, z));
             let middle = parts.0.len() - 1;
@@ -413,7 +417,12 @@ fn what_crosses_is_refused() {
     let mut dice = Samples::new(5);
     let (mut missed, mut named) = (Vec::new(), 0);
     for (name, parts) in &all {
-        assert!(winds_wrongly(parts, &mut dice), "{name} doesn't cross");
+        // Of the others this was asked when they were made.
+        let asked = ["waves", "twisted", "drawn"]
+            .iter()
+            .any(|n| name.starts_with(n));
+        let crosses = asked || winds_wrongly(parts, &mut dice);
+        assert!(crosses, "{name} doesn't cross");
         let report = check_parts(name, &parts.0, &parts.1);
         if report.is_ok() {
             missed.push(name);
@@ -445,8 +454,8 @@ fn what_does_not_cross_is_taken() {
     assert!(all.len() >= 60, "{}", all.len());
     let mut dice = Samples::new(6);
     for (name, parts) in &all {
-        assert!(!winds_wrongly(parts, &mut dice), "{name} crosses");
         let report = check_parts(name, &parts.0, &parts.1);
+        assert!(!winds_wrongly(parts, &mut dice), "{name} crosses: {report}");
         assert!(report.find(Kind::Crossing).is_none(), "{report}");
         assert!(report.is_ok(), "{report}");
     }

@@ -19,7 +19,9 @@ fn scene(bodies: &[Body]) -> Scene {
         density: 1.0,
         current: [0.0; 3],
     });
-    bodies.iter().for_each(|b| drop(scene.add(b.clone())));
+    for body in bodies {
+        scene.add(body.clone());
+    }
     scene
 }
 

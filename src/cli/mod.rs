@@ -11,7 +11,6 @@ mod gpu_info;
 mod gradcheck;
 mod options;
 mod output;
-mod patience;
 mod run;
 mod tradeoff;
 

@@ -6,7 +6,6 @@ use std::path::{Path, PathBuf};
 use std::str::FromStr;
 use strum::{EnumMessage, VariantArray};
 
-use super::patience::Patience;
 use crate::Result;
 use crate::boundary::{Depth, RowScaling};
 use crate::coupling::full::{FullSolver, Preconditioner};
@@ -159,8 +158,6 @@ impl Water {
 
     /// A simulator of the scene, with the cache that was asked for.
     pub fn simulator(&self, scene: &Scene, settings: Settings) -> Result<Simulator> {
-        let bodies = scene.bodies.iter().filter(|b| b.shape.is_some()).count();
-        let _patience = Patience::with(format!("preparing the water of {bodies} bodies"));
         match &self.cache {
             Some(folder) => Simulator::cached(scene, settings, folder),
             None => Simulator::new(scene, settings),

@@ -492,3 +492,18 @@ def test_in_a_sandbox(rollout, tmp_path):
     shown = hg.view(rollout, colors=COLORS, height=500)._repr_html_()
     file.write_text(f"<!DOCTYPE html><body style='margin: 0'>{shown}</body>", encoding="utf-8")
     blob(stage(browser.picture(file, clock=8000)), 0)
+
+
+def test_no_name_leaves_its_place():
+    """Whatever bodies and titles are called, they are text of the page and nothing else."""
+    from hydrograd._viewer.page import page
+
+    rng = np.random.default_rng(1)
+    parts = ["</script>", "<script>", "<!--", "-->", "]]>", "{{data}}", "{{scripts}}", "\\u003c", "\\", '"', "'", "&lt;", "&", "<", ">"]
+    parts += ["\u2028", "\u2029", "\x00", "\r", "\n", "</title>", "<style>", "\U0001f41f", "\ufffe", "`${1}`", "javascript:", "a", " "]
+    plain = len(Parts(page("", "", {"name": ""})).scripts)
+    for _ in range(300):
+        name = "".join(rng.choice(parts, size=rng.integers(1, 12)))
+        found = Parts(page(name, name, {"name": name, "of": [{name: 1.5}]}))
+        assert json.loads(found.scripts[0]) == {"name": name, "of": [{name: 1.5}]}
+        assert len(found.scripts) == plain

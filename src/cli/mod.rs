@@ -9,6 +9,7 @@ mod check_mesh;
 mod exit;
 mod gpu_info;
 mod gradcheck;
+mod interrupt;
 mod options;
 mod output;
 mod run;
@@ -66,10 +67,14 @@ pub fn run(arguments: Vec<OsString>) -> Exit {
         Ok(cli) => cli,
         Err(error) => {
             // Help and version come this way too; they belong on standard output.
-            let wrong = error.use_stderr();
-            if error.print().is_err() || !wrong {
-                return if wrong { Exit::Usage } else { Exit::Done };
+            if !error.use_stderr() {
+                output::print_text(&error.render().to_string());
+                return match output::lost() {
+                    true => Exit::Failed,
+                    false => Exit::Done,
+                };
             }
+            let _ = error.print();
             if asked_json {
                 output::print_error_object(error.to_string().trim());
             }

@@ -7,7 +7,6 @@ use std::sync::atomic::{AtomicBool, Ordering};
 use indicatif::{ProgressBar, ProgressFinish, ProgressStyle};
 use serde::Serialize;
 
-use crate::Error;
 use crate::simulate::{BackendReport, Simulator};
 
 /// Where results go.
@@ -28,7 +27,7 @@ impl Output {
     }
 
     /// Prints what went wrong: for people on standard error, for programs on standard output.
-    pub fn error(&self, error: &Error) {
+    pub fn error(&self, error: &impl Display) {
         self.error_for_people(error);
         if self.json {
             print_error_object(&error.to_string());
@@ -36,9 +35,14 @@ impl Output {
     }
 
     /// Prints what went wrong on standard error only.
-    pub fn error_for_people(&self, error: &Error) {
-        let _ = writeln!(std::io::stderr(), "hydrograd: {error}");
+    pub fn error_for_people(&self, error: &impl Display) {
+        note(error);
     }
+}
+
+/// Prints a line on standard error.
+pub(super) fn note(message: impl Display) {
+    let _ = writeln!(std::io::stderr(), "hydrograd: {message}");
 }
 
 /// `{"error": message}` on standard output.
@@ -58,6 +62,11 @@ pub(super) fn lost() -> bool {
     LOST.load(Ordering::Relaxed)
 }
 
+/// Prints text that ends with its own line, help say.
+pub(super) fn print_text(text: &str) {
+    print_line(text.trim_end_matches('\n'));
+}
+
 /// A reader that has gone away (`hydrograd … | head`) is no error.
 fn print_line(text: &str) {
     let mut out = std::io::stdout().lock();
@@ -65,10 +74,7 @@ fn print_line(text: &str) {
         && error.kind() != ErrorKind::BrokenPipe
     {
         LOST.store(true, Ordering::Relaxed);
-        let _ = writeln!(
-            std::io::stderr(),
-            "hydrograd: standard output: write failed: {error}"
-        );
+        note(format_args!("standard output: write failed: {error}"));
     }
 }
 

@@ -1,6 +1,7 @@
 //! `hydrograd run`: a scene's trajectory.
 
 use std::fmt;
+use std::io;
 use std::path::PathBuf;
 use std::time::Instant;
 
@@ -8,23 +9,30 @@ use clap::Args;
 use serde::Serialize;
 
 use super::exit::Exit;
+use super::interrupt;
 use super::options::Simulation;
 use super::output::{
     ChoicesReport, Output, or_dash, peak_memory_mb, progress_bar, set_progress, write_warnings,
 };
-use crate::Result;
 use crate::error::readable;
 use crate::scene::Scene;
-use crate::simulate::{Controls, GapCheck, GapFlow, GapReport as GapEstimates, NearGap, Recording};
+use crate::simulate::{
+    Controls, Earlier, GapCheck, GapFlow, GapReport as GapEstimates, NearGap, Recording,
+};
+use crate::{Error, Result};
 
 #[derive(Debug, Args)]
 pub(super) struct Arguments {
     #[command(flatten)]
     simulation: Simulation,
     /// Folder for trajectory.csv and trajectory.json: time, q, v, energy, momentum, smallest gap
-    /// [default: none are written].
+    /// [default: none are written]. Of a run that is interrupted (Ctrl-C) or fails in a step they hold what ran.
     #[arg(long, value_name = "DIR")]
     out: Option<PathBuf>,
+    /// Go on from where the run that wrote this trajectory.json ended, to the bit, up to the number of steps counted from the scene's start. The scene
+    /// and settings must be the same; trajectories written hold all steps from the start, the summary those made now.
+    #[arg(long, value_name = "FILE")]
+    resume: Option<PathBuf>,
     /// Compare the water across the smallest gap of the run with that of coupled panels: the error of the added mass and of the force there. Takes
     /// their setup and a solve.
     #[arg(long)]
@@ -108,31 +116,114 @@ pub(super) fn main(arguments: &Arguments, output: Output) -> Result<Exit> {
     if let Some(folder) = &arguments.out {
         Recording::prepare(folder)?;
     }
+    let earlier = arguments.resume.as_deref().map(Earlier::read).transpose()?;
+    interrupt::listen();
     let progress = progress_bar("steps", scene.steps);
     let done = |done| set_progress(&progress, done, scene.steps);
-    let (mut report, recording) = simulate(&scene, arguments, done)?;
+    let Made {
+        mut report,
+        mut recording,
+        halted,
+    } = simulate(&scene, arguments, earlier.as_ref(), done)?;
     drop(progress);
-    if let Some(folder) = &arguments.out {
-        report.files = recording.write(folder)?.into();
+    if let Some(earlier) = &earlier {
+        earlier.put_before(&mut recording)?;
     }
-    output.result(&report);
-    Ok(Exit::Done)
+    let mut kept = None;
+    if let Some(folder) = &arguments.out {
+        let files = recording
+            .write(folder)
+            .or_else(|e| rescued(&recording, e))?;
+        kept = Some(files[1].clone());
+        report.files = files.into();
+    }
+    let Some(halted) = halted else {
+        output.result(&report);
+        return Ok(Exit::Done);
+    };
+    let steps = recording.time.len() - 1;
+    let kept = kept.map_or("nothing is kept without --out".into(), |file: PathBuf| {
+        format!(
+            "the {steps} steps before are kept in {0}; go on with --resume {0}",
+            file.display()
+        )
+    });
+    output.error(&format_args!("{halted}; {kept}"));
+    Ok(Exit::Failed)
 }
 
-/// Makes the scene ready, runs `scene.steps` steps, and gathers report and trajectory.
+/// Writes what can't be written where it was asked for into a new folder for files for the time being, and says so.
+fn rescued(recording: &Recording, error: Error) -> Result<[PathBuf; 2]> {
+    let folder = tempfile::Builder::new().prefix("hydrograd-").tempdir();
+    let Ok(folder) = folder else {
+        return Err(error);
+    };
+    let Ok(files) = recording.write(folder.path()) else {
+        return Err(error);
+    };
+    let folder = folder.keep();
+    let Error::File { path, source, .. } = error else {
+        return Err(error);
+    };
+    let said = format!("{source}; the run is kept in {} instead", folder.display());
+    let _ = files;
+    Err(Error::File {
+        path,
+        action: "write",
+        source: io::Error::new(source.kind(), said),
+    })
+}
+
+/// What came of a run.
+struct Made {
+    report: RunReport,
+    recording: Recording,
+    /// Why it ended before its time, if it did.
+    halted: Option<Error>,
+}
+
+/// Makes the scene ready, runs up to `scene.steps` steps, and gathers report and trajectory.
 fn simulate(
     scene: &Scene,
     arguments: &Arguments,
-    done: impl FnMut(usize) + Send,
-) -> Result<(RunReport, Recording)> {
+    earlier: Option<&Earlier>,
+    mut done: impl FnMut(usize) + Send,
+) -> Result<Made> {
     let start = Instant::now();
     let Simulation { water, .. } = &arguments.simulation;
     let simulator = water.simulator(scene, arguments.simulation.settings())?;
     let setup_seconds = start.elapsed().as_secs_f64();
-    let controls = Controls::zeros(&simulator, scene.steps);
-    let rollout = simulator.rollout_with(&controls, done)?;
+    let state = match earlier {
+        Some(e) => simulator.resume(e.state(), &e.path().display().to_string())?,
+        None => simulator.initial().map_err(|e| e.at_time(0.0))?,
+    };
+    let before = state.step;
+    let Some(steps) = scene.steps.checked_sub(before) else {
+        return Err(Error::input(
+            "--resume: steps made",
+            before,
+            format!(
+                "must be at most the {} of the run; give more --steps",
+                scene.steps
+            ),
+        ));
+    };
+    let controls = Controls::zeros(&simulator, steps);
+    let ran = interrupt::while_running(|go_on| {
+        simulator.rollout_as_far(&state, &controls, |made| {
+            done(before + made);
+            go_on()
+        })
+    });
+    let (rollout, halted) = match ran {
+        Ok(rollout) => (rollout, None),
+        Err(halted) => match halted.rollout {
+            Some(rollout) => (rollout, Some(halted.error)),
+            None => return Err(halted.error),
+        },
+    };
     let seconds = start.elapsed().as_secs_f64();
-    let gap_check = match arguments.check_gap {
+    let gap_check = match arguments.check_gap && halted.is_none() {
         true => rollout.check_gap()?.map(GapReport::from),
         false => None,
     };
@@ -148,7 +239,7 @@ fn simulate(
         dt: simulator.time_step(),
         seconds,
         setup_seconds,
-        seconds_per_step: (seconds - setup_seconds) / scene.steps.max(1) as f64,
+        seconds_per_step: (seconds - setup_seconds) / summary.steps.max(1) as f64,
         peak_memory_mb: peak_memory_mb(),
         energy_initial: summary.energy_initial,
         energy_final: summary.energy_final,
@@ -168,7 +259,11 @@ fn simulate(
         warnings: [simulator.warnings(), &rollout.warnings()].concat(),
         files: Vec::new(),
     };
-    Ok((report, Recording::of(scene, &rollout)?))
+    Ok(Made {
+        report,
+        recording: Recording::of(scene, &rollout)?,
+        halted,
+    })
 }
 
 /// A gap's estimated errors in words.

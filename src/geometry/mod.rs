@@ -52,6 +52,7 @@ pub(crate) use mesh::check_scale;
 pub use mesh::{Edge, TriMesh};
 pub(crate) use opposite::Opposite;
 pub use points::Ball;
+#[cfg(feature = "meshio")]
 pub(crate) use points::bounds;
 pub use refine::{ExactSurface, MAX_ADDED_FACES, Refinement, refine, validate_refinements};
 pub use wall::{HalfSpace, Wall, WallSurface};

@@ -55,8 +55,17 @@ pub fn validate(shape: &Shape, place: &str) -> Result<()> {
             length("length", *l)?;
         }
         Shape::Mesh { scale, .. } => check_scale(place, *scale)?,
-        // What is wrong with it, its mesh tells.
-        Shape::Triangles { .. } => {}
+        // What else is wrong with it, its mesh tells.
+        Shape::Triangles { vertices, .. } => {
+            let finite = |v: &[f64; 3]| v.iter().all(|x| x.is_finite());
+            if let Some(v) = vertices.iter().position(|v| !finite(v)) {
+                return Err(Error::input(
+                    format!("{place}: vertices[{v}]"),
+                    format!("{:?}", vertices[v]),
+                    "give finite coordinates in metres",
+                ));
+            }
+        }
     }
     let asked = shape.asked_faces();
     asked.map_or(Ok(()), |faces| check_faces(place, faces))

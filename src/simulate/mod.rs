@@ -1,5 +1,6 @@
 //! Simulations: settings, controllers, rollouts and their gradients.
 
+mod checkpoint;
 mod controls;
 mod finite;
 mod flow;
@@ -16,6 +17,7 @@ pub mod objective;
 pub mod observable;
 mod record;
 mod recording;
+mod recording_file;
 mod rollout;
 mod run;
 mod sample;
@@ -28,6 +30,7 @@ mod summary;
 mod tangents;
 mod trajectory;
 
+pub use checkpoint::Checkpoint;
 pub use controls::Controls;
 pub use flow::FLOW_EDGES;
 pub use gap_check::GapCheck;
@@ -39,6 +42,7 @@ pub use knots::Knots;
 pub use objective::Objective;
 pub use record::Record;
 pub use recording::{Recorded, Recording};
+pub use recording_file::Earlier;
 pub use rollout::Rollout;
 pub use run::Halted;
 pub use sample::Sample;

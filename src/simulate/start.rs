@@ -41,7 +41,7 @@ impl Simulator {
     }
 
     /// Checks coordinates and velocity after `step` steps; gives them with what motions say of driven joints.
-    fn check_start(
+    pub(super) fn check_start(
         &self,
         step: usize,
         q: &DVector<f64>,

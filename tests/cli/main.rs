@@ -1,6 +1,8 @@
 //! The command line as a person or a script meets it.
 
+mod cache;
 mod commands;
+mod interrupted;
 mod tradeoff;
 
 #[path = "../support/mod.rs"]

@@ -21,6 +21,7 @@ mod resume;
 mod rollout_gradient;
 #[cfg(feature = "opt")]
 mod smoothing;
+mod soak;
 mod trees;
 
 #[path = "../support/mod.rs"]

@@ -40,6 +40,8 @@ use samples::{Candidate, Layer};
 use serde::{Deserialize, Serialize};
 use sources::Sources;
 
+/// Largest radius of a body over the gap that it resolves: a needle's proxies are as many as its length asks for.
+const MOST_ALONG: f64 = 1e4;
 /// Most proxies at the smallest distance; a smaller gap isn't resolved on so large a body.
 const MOST_PROXIES: f64 = 900.0;
 /// Largest gap that is asked to be resolved, in radii of the body.
@@ -136,7 +138,7 @@ pub fn compress(
     let Ball { center, radius } = mesh.bounding_ball();
     let area = surface.faces.area();
     let warnings = response.warnings().to_vec();
-    let finest = finest_gap(area);
+    let finest = finest_gap(area).max(radius / MOST_ALONG);
     let asked = settings.resolved_gap;
     if let Some(far) = asked.filter(|g| *g > FARTHEST * radius) {
         return Err(Error::input(

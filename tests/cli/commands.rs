@@ -710,7 +710,7 @@ fn ceilings_of_memory_are_respected() {
         format!("run {coins} --steps 100000000"),
     ];
     let (mut done, mut refused) = (0, 0);
-    for megabytes in [200, 300, 450, 1000] {
+    for megabytes in [300, 400, 600, 1000] {
         for command in &commands {
             let program = env!("CARGO_BIN_EXE_hydrograd");
             let limited = format!("ulimit -v {}; exec {program} {command}", 1000 * megabytes);

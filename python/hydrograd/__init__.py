@@ -8,6 +8,7 @@ as their first index.
 from hydrograd import objective, optimize
 from hydrograd._added_mass import added_mass
 from hydrograd._contacts import ContactForces
+from hydrograd._export import plot, to_pandas, to_xarray
 from hydrograd._gradient import Gradient, StepGradient, Tangents
 from hydrograd._hydrograd import (
     BatchError,
@@ -99,12 +100,15 @@ __all__ = [
     "objective",
     "optimize",
     "planar",
+    "plot",
     "prism",
     "prismatic",
     "revolute",
     "screw",
     "sphere",
     "spherical",
+    "to_pandas",
+    "to_xarray",
     "tradeoff",
     "view",
 ]

@@ -157,6 +157,11 @@ def test_the_same_page_twice(rollout):
     assert hg.view(rollout).html == hg.view(again).html
 
 
+def test_a_simulator_is_seen_at_its_start(rollout):
+    sim = rollout.simulator
+    assert hg.view(sim).html == hg.view(sim.rollout(steps=0)).html
+
+
 def test_long_rollouts_are_thinned():
     long = hg.Simulator(scene(), 0.001, fidelity="isolated").rollout(steps=997)
     view = hg.view(long, max_frames=100)

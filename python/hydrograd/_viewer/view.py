@@ -15,7 +15,7 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from hydrograd._hydrograd import FileError, InputError, Rollout
+from hydrograd._hydrograd import FileError, InputError, Rollout, Simulator
 from hydrograd._viewer.data import Look, colors, page_data
 from hydrograd._viewer.frames import Frames
 from hydrograd._viewer.page import page
@@ -149,7 +149,7 @@ def _noted(frames: Frames, states: int) -> str:
 
 
 def view(
-    rollout: Rollout,
+    rollout: Rollout | Simulator,
     file: str | os.PathLike[str] | None = None,
     *,
     open: bool = False,
@@ -164,7 +164,7 @@ def view(
     view_from: ArrayLike | None = None,
     height: int = 520,
 ) -> View:
-    """Makes a replay of a rollout in 3-D: one page of HTML with everything in it, that any browser with WebGL shows.
+    """Makes a replay of a rollout in 3-D: one page of HTML with everything in it, that any browser with WebGL shows. Of a simulator it shows the start, before a run.
 
     It is written to `file` if one is given. With `open`, it is shown in a browser, where there is one; without a browser a
     warning tells where the page is. In a notebook, the result shows itself, `height` pixels high.
@@ -178,8 +178,10 @@ def view(
     "#rrggbb" by the names of bodies, `up` is the direction that stays upright and `view_from` the one from the scene to where it
     is seen from at first, world axes. `title` is the scene's name unless given.
     """
+    if isinstance(rollout, Simulator):
+        rollout = rollout.rollout(steps=0)
     if not isinstance(rollout, Rollout):
-        raise InputError(f"view: rollout: got a value of type {type(rollout).__name__}; must be a Rollout")
+        raise InputError(f"view: rollout: got a value of type {type(rollout).__name__}; must be a Rollout or a Simulator")
     simulator = rollout.simulator
     upward = _direction("up", up)
     look = Look(

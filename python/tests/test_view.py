@@ -468,6 +468,57 @@ def test_buttons(page):
     assert np.isclose(found["turn"], 0.125 * np.pi, atol=1e-5)
 
 
+PROBE = """
+    const found = { wide: document.documentElement.scrollWidth, window: window.innerWidth, open: document.querySelector("aside details").open };
+    found.ink = hydrograd.color("--ink");
+    const box = (e) => e.getBoundingClientRect();
+    found.inside = [...document.querySelectorAll("aside, footer, footer button, footer #scrub, h1")].every((e) => box(e).left >= 0 && box(e).right <= window.innerWidth);
+    found.touch = Math.min(...[...document.querySelectorAll("#play, #speed, summary")].map((e) => box(e).height));
+    const picture = hydrograd.stage.picture();
+    found.size = [picture.width, picture.height];
+    found.png = picture.toDataURL("image/png");
+    document.querySelector("aside details").open = true;
+    const aside = box(document.querySelector("aside"));
+    found.panel = aside.left >= 0 && aside.right <= window.innerWidth && aside.bottom <= box(document.querySelector("footer")).top;
+    parent.postMessage(JSON.stringify(found), "*");
+"""
+
+
+def probed(page: pathlib.Path, name: str, *more: str, size: tuple[int, int] = (1000, 700)) -> dict:
+    """What a script in the page finds, where it is so many pixels large: in a frame, since no window is narrower than 500."""
+    inner = page.with_name(f"{name}.inner.html")
+    text = page.read_text(encoding="utf-8")
+    inner.write_text(text.replace("</body>", f"<script>{PROBE}</script></body>"), encoding="utf-8")
+    file = page.with_name(f"{name}.html")
+    frame = f'<iframe src="{inner.name}" style="width:{size[0]}px;height:{size[1]}px;border:0"></iframe>'
+    listen = "<script>onmessage = (event) => { document.title = event.data; };</script>"
+    file.write_text(f'<html><body data-status="">{listen}{frame}</body></html>', encoding="utf-8")
+    return json.loads(Parts(browser.body(file, "", *more)[1]).title)
+
+
+def test_on_a_phone_and_in_the_dark(page):
+    """At 390 × 844 pixels nothing lies outside, the panel is folded and what is touched is large; the colours go with the system's scheme."""
+    light = probed(page, "light")
+    phone = probed(page, "phone", "--force-dark-mode", size=(390, 844))
+    assert light["open"] and not phone["open"]
+    assert phone["wide"] <= phone["window"] == 390
+    for found in (light, phone):
+        assert found["inside"] and found["panel"]
+    assert phone["touch"] >= 36
+    assert light["ink"] == "#24343f" and phone["ink"] == "#dbe6ec"
+
+
+def test_a_picture_is_kept(page):
+    """The PNG of a frame has the size of what is seen, with the bodies on their background."""
+    found = probed(page, "kept")
+    image = browser.pixels(base64.b64decode(found["png"].split(",")[1]))
+    assert list(image.shape[:2]) == found["size"][::-1]
+    red = (image[..., 0] > 150) & (image[..., 1] < 90) & (image[..., 2] < 90)
+    blue = (image[..., 2] > 150) & (image[..., 0] < 90) & (image[..., 1] < 90)
+    assert red.sum() > 200 and blue.sum() > 200
+    assert np.abs(image[5, 5].astype(int) - [238, 244, 247]).max() < 12
+
+
 def test_a_browser_draws_forces_and_flow(stirring, tmp_path):
     """In their colours, and not where they are switched off."""
     file = tmp_path / "arrows.html"

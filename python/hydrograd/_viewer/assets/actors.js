@@ -132,7 +132,7 @@ hydrograd.addWalls = (data, stage) => {
     const floor = !free && normal.dot(stage.up) > 0.7;
     // Seen from behind, a wall isn't drawn: it would hide what it encloses.
     const material = new THREE.MeshLambertMaterial({
-      color: free ? 0x9fd0e8 : floor ? 0xd9d2c0 : 0xc9d3da,
+      color: hydrograd.color(free ? "--water" : floor ? "--floor" : "--wall"),
       side: free ? THREE.DoubleSide : THREE.FrontSide,
       transparent: !floor,
       opacity: floor ? 1 : free ? 0.25 : 0.45,

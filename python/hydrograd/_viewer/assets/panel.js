@@ -12,6 +12,12 @@ hydrograd.Panel = class {
     this.legend();
     this.curves();
     this.keys();
+    // On a narrow page the picture comes first.
+    if (window.innerWidth <= 560) document.querySelector("aside details").open = false;
+    window.matchMedia("(prefers-color-scheme: dark)").addEventListener("change", () => {
+      stage.ask();
+      this.plot.draw(player.time);
+    });
     player.listen(() => this.show());
   }
 
@@ -34,10 +40,22 @@ hydrograd.Panel = class {
     this.on("speed", "change", (event) => (player.speed = Number(event.target.value)));
     this.on("loop", "change", (event) => (player.loop = event.target.checked));
     this.on("reset", "click", () => this.reset());
+    this.on("save", "click", () => this.save());
     for (const [id, axis] of [["look-x", [1, 0, 0]], ["look-y", [0, -1, 0]], ["look-z", [0, 0, 1]]]) {
       this.on(id, "click", () => this.reset(new THREE.Vector3(...axis)));
     }
     this.on("follow", "change", (event) => player.follow(Number(event.target.value)));
+  }
+
+  /** The picture as a file, called after the scene and the time. */
+  save() {
+    this.stage.picture().toBlob((blob) => {
+      const link = document.createElement("a");
+      link.href = URL.createObjectURL(blob);
+      link.download = `${document.title || "replay"} ${this.player.time.toFixed(3)} s.png`;
+      link.click();
+      setTimeout(() => URL.revokeObjectURL(link.href), 1000);
+    });
   }
 
   reset(direction = this.stage.direction) {
@@ -112,6 +130,7 @@ hydrograd.Panel = class {
       Home: () => player.seek(player.frames.first),
       End: () => player.seek(player.frames.last),
       r: () => this.reset(),
+      p: () => this.save(),
     };
     window.addEventListener("keydown", (event) => {
       // What has the focus takes its own keys: lists and sliders all of these, buttons and boxes the space bar.

@@ -37,7 +37,7 @@ hydrograd.Plot = class {
     const span = this.high - this.low || Math.abs(this.high) || 1;
     const x = (t) => 6 + ((width - 12) * (t - first)) / (last - first || 1);
     const y = (v) => height - 8 - ((height - 30) * (v - this.low)) / span;
-    pen.strokeStyle = "#2d5fa8";
+    pen.strokeStyle = hydrograd.color("--curve");
     pen.lineWidth = 1.5;
     pen.beginPath();
     let open = false;
@@ -56,7 +56,7 @@ hydrograd.Plot = class {
     pen.moveTo(x(time), 18);
     pen.lineTo(x(time), height - 4);
     pen.stroke();
-    pen.fillStyle = "#24343f";
+    pen.fillStyle = hydrograd.color("--ink");
     pen.font = "11px system-ui, sans-serif";
     pen.textBaseline = "top";
     const range = Number.isFinite(this.low) ? `${hydrograd.figure(this.low)} … ${hydrograd.figure(this.high)} ${this.unit}` : "none";

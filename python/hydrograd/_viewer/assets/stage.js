@@ -101,12 +101,29 @@ hydrograd.Stage = class {
     this.scale(pen, 100, height - 22, height);
   }
 
+  /** What is seen now, on a canvas of its own: background, picture, axes and scale. */
+  picture() {
+    this.draw();
+    const out = document.createElement("canvas");
+    [out.width, out.height] = [this.canvas.width, this.canvas.height];
+    const pen = out.getContext("2d");
+    const sky = pen.createLinearGradient(0, 0, 0, out.height);
+    sky.addColorStop(0, hydrograd.color("--high"));
+    sky.addColorStop(1, hydrograd.color("--low"));
+    pen.fillStyle = sky;
+    pen.fillRect(0, 0, out.width, out.height);
+    // In the same task as it was drawn: the browser empties it afterwards.
+    pen.drawImage(this.canvas, 0, 0);
+    pen.drawImage(this.overlay, 0, 0);
+    return out;
+  }
+
   axes(pen, x, y) {
     const turn = this.camera.quaternion.clone().invert();
     const axes = [
-      ["x", "#b8403a", 1, 0, 0],
-      ["y", "#2f7d4f", 0, 1, 0],
-      ["z", "#2d5fa8", 0, 0, 1],
+      ["x", hydrograd.color("--x"), 1, 0, 0],
+      ["y", hydrograd.color("--y"), 0, 1, 0],
+      ["z", hydrograd.color("--z"), 0, 0, 1],
     ].map(([name, color, ...to]) => ({ name, color, to: new THREE.Vector3(...to).applyQuaternion(turn) }));
     axes.sort((a, b) => a.to.z - b.to.z); // what points away first
     pen.lineWidth = 2;
@@ -127,7 +144,7 @@ hydrograd.Stage = class {
     const distance = this.camera.position.distanceTo(this.controls.target);
     const metres = (2 * Math.tan((this.camera.fov * Math.PI) / 360) * distance * this.size) / height; // a pixel
     const length = hydrograd.round(110 * metres);
-    pen.strokeStyle = pen.fillStyle = "#24343f";
+    pen.strokeStyle = pen.fillStyle = hydrograd.color("--ink");
     pen.lineWidth = 2;
     pen.beginPath();
     const end = x + length / metres;
@@ -138,6 +155,9 @@ hydrograd.Stage = class {
     pen.fillText(hydrograd.metres(length), x + 5, y - 4);
   }
 };
+
+/** A colour of the page's style, which goes with the system's scheme. */
+hydrograd.color = (name) => getComputedStyle(document.documentElement).getPropertyValue(name).trim();
 
 /** The largest of 1, 2 and 5 times a power of ten that isn't above a number. */
 hydrograd.round = (number) => {

@@ -1,5 +1,6 @@
 #![doc = include_str!("../README.md")]
 
+mod blocks;
 pub mod check;
 pub mod contact;
 #[doc(hidden)]

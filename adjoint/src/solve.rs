@@ -9,32 +9,55 @@
 //! A depends on. Of a least-squares problem the solution and the solution of the transposed one are taken together
 //! ([`Fitted`]), so that both are columns of one solve and have one tangent.
 
-use nalgebra::{Cholesky, DMatrix, DVector, Dyn};
+use crate::blocks::{Blocks, blocks};
+use nalgebra::{Cholesky, DMatrix, DVector, Dyn, LU};
 
-/// A symmetric positive definite matrix, by its Cholesky factor.
+/// A symmetric positive definite matrix, by its Cholesky factor: of each block, where it falls apart ([`blocks`]).
 #[derive(Clone, Debug)]
-pub struct Definite(Cholesky<f64, Dyn>);
+pub struct Definite(Blocks<Cholesky<f64, Dyn>>);
 
 impl Definite {
-    /// Factors a symmetric matrix, of which the lower triangle is read. `None` if it isn't positive definite to
-    /// round-off.
+    /// Factors a symmetric matrix. `None` if it isn't positive definite to round-off.
     pub fn new(a: DMatrix<f64>) -> Option<Self> {
-        a.cholesky().map(Self)
+        Blocks::new(a, DMatrix::cholesky).all().map(Self)
     }
 
     /// `x = A⁻¹ b`.
     pub fn solve(&self, b: &DVector<f64>) -> DVector<f64> {
-        self.0.solve(b)
+        let found = self.0.solve_one(b, |factor, b| Some(factor.solve(b)));
+        found.unwrap_or_else(|| DVector::zeros(b.len()))
     }
 
     /// The same for several columns.
     pub fn solve_columns(&self, b: &DMatrix<f64>) -> DMatrix<f64> {
-        self.0.solve(b)
+        let found = self.0.solve(b, |factor, b| Some(factor.solve(b)));
+        found.unwrap_or_else(|| DMatrix::zeros(b.nrows(), b.ncols()))
     }
 
     /// Cotangent `w = A⁻¹ x̄` of `b`; that of A is `−w xᵀ`.
     pub fn solve_vjp(&self, x_bar: &DVector<f64>) -> DVector<f64> {
-        self.0.solve(x_bar)
+        self.solve(x_bar)
+    }
+}
+
+/// Any square matrix, by its LU factors: of each block, where it falls apart ([`blocks`]).
+#[derive(Clone, Debug)]
+pub struct General(Blocks<LU<f64, Dyn, Dyn>>);
+
+impl General {
+    /// Factors a matrix.
+    pub fn new(a: DMatrix<f64>) -> Self {
+        Self(Blocks::new(a, DMatrix::lu))
+    }
+
+    /// `x = A⁻¹ b`; `None` of a singular matrix.
+    pub fn solve(&self, b: &DVector<f64>) -> Option<DVector<f64>> {
+        self.0.solve_one(b, |factor, b| factor.solve(b))
+    }
+
+    /// The same for several columns.
+    pub fn solve_columns(&self, b: &DMatrix<f64>) -> Option<DMatrix<f64>> {
+        self.0.solve(b, |factor, b| factor.solve(b))
     }
 }
 
@@ -49,7 +72,12 @@ pub fn smallest_scaled_eigenvalue(a: &DMatrix<f64>) -> f64 {
         .map(|d| if d > 0.0 { 1.0 / d.sqrt() } else { 0.0 });
     let scaled = DMatrix::from_fn(a.nrows(), a.ncols(), |i, j| scale[i] * a[(i, j)] * scale[j]);
     if scaled.iter().all(|x| x.is_finite()) {
-        scaled.symmetric_eigenvalues().min()
+        let of = |rows: Vec<usize>| {
+            let block = scaled.select_rows(&rows).select_columns(&rows);
+            block.symmetric_eigenvalues().min()
+        };
+        let each = blocks(&scaled).into_iter().map(of);
+        each.fold(f64::INFINITY, f64::min)
     } else {
         f64::NAN
     }

@@ -127,7 +127,7 @@ pub fn added_mass(simulator: &Simulator) -> hydrograd::Result<DMatrix<f64>> {
     *dry.density_mut() = 0.0;
     let submerged = system.evaluate(simulator.parameters(), &q)?;
     let dry = system.evaluate(&dry, &q)?;
-    Ok(&submerged.mass_matrix - &dry.mass_matrix)
+    Ok(submerged.mass_matrix() - dry.mass_matrix())
 }
 
 fn measure(

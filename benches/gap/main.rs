@@ -106,7 +106,7 @@ impl Case {
         // M v̇ = −½ (dM/dq) v² along the one coordinate.
         let force = found.inertial_force(&speed, &DVector::zeros(0))?;
         let dry = simulator.parameters().mass(0);
-        Ok([found.mass_matrix[(0, 0)] - dry, -2.0 * force[0]])
+        Ok([found.mass_matrix()[(0, 0)] - dry, -2.0 * force[0]])
     }
 
     /// What a run with these settings says of the gap: the estimated errors of both.
@@ -344,7 +344,7 @@ fn case_times(cases: &[Case], narrow: f64, settings: &Settings, rounds: usize) -
                         let found = simulator.stepper().linearise(simulator.start().0)?;
                         match force {
                             true => found.inertial_force(speed, none),
-                            false => Ok(found.mass_matrix.column(0).into_owned()),
+                            false => Ok(found.mass_matrix().column(0).into_owned()),
                         }
                     }
                 })

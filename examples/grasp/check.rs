@@ -61,5 +61,5 @@ fn added_mass(simulator: &Simulator, q: &DVector<f64>) -> Result<DMatrix<f64>> {
     let mut dry = simulator.parameters().clone();
     *dry.density_mut() = 0.0;
     let submerged = system.evaluate(simulator.parameters(), q)?;
-    Ok(&submerged.mass_matrix - &system.evaluate(&dry, q)?.mass_matrix)
+    Ok(submerged.mass_matrix() - system.evaluate(&dry, q)?.mass_matrix())
 }

@@ -78,15 +78,13 @@ pub(super) fn assemble(
             _ => Vec::new(),
         });
     }
-    let neighbours = |a: usize, b: usize| {
-        scene.submerged_parent(a) == Some(b) || scene.submerged_parent(b) == Some(a)
-    };
+    let carriers = scene.carriers();
     let pairs: Vec<ContactPair> = (water.clearance.moving.pairs().iter())
-        .filter(|(a, other)| !matches!(other, Other::Body(b) if neighbours(*a, *b)))
+        .filter(|(a, other)| !matches!(other, Other::Body(b) if carriers.are_neighbours(*a, *b)))
         .map(|&(first, second)| ContactPair { first, second })
         .collect();
     let shapes = Contacts::new(shapes, &scene.walls, &pairs)?;
-    let moving = |b: &usize| !scene.is_static(*b);
+    let moving = |b: &usize| !carriers.is_static(*b);
     let bodies = || (0..scene.bodies.len()).filter(moving);
     let size = bodies()
         .filter_map(|b| shapes.radius(b))

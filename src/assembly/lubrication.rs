@@ -81,10 +81,11 @@ pub(super) fn lubricated(
 ) -> Result<Vec<Lubricated>> {
     let mut out = Vec::new();
     let mut sides = Sides::new(scene, surfaces)?;
+    let carriers = scene.carriers();
     for (force, lubrication) in scene.lubrications() {
         for &(a, other) in clearance.moving.pairs() {
             if let Other::Body(b) = other
-                && (scene.submerged_parent(a) == Some(b) || scene.submerged_parent(b) == Some(a))
+                && carriers.are_neighbours(a, b)
             {
                 continue;
             }

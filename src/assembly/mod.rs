@@ -111,14 +111,14 @@ pub(crate) fn assemble(
         ));
     }
     contact::check_integrator(scene, choices.integrator)?;
-    let index = |name: &String| Some(scene.body(name)?.0);
-    let tree = Tree::new(scene.bodies.iter().map(|b| {
-        (
-            b.parent.as_ref().and_then(index),
-            pose(&b.placement),
-            b.joint.model(),
-        )
-    }));
+    let carriers = scene.carriers();
+    let tree = Tree::new(
+        scene
+            .bodies
+            .iter()
+            .enumerate()
+            .map(|(i, b)| (carriers.parent(i), pose(&b.placement), b.joint.model())),
+    );
     let (bodies, velocities) = (scene.bodies.len() as f64, tree.velocities() as f64);
     // The mass matrix with its factor and that of the water, and what each velocity moves.
     memory::fits(

@@ -53,6 +53,10 @@ impl Coupling for Isolated {
     fn differentiable(&self) -> Option<&dyn Linearise> {
         Some(self)
     }
+
+    fn apart(&self) -> Option<&[Mat6]> {
+        Some(&self.added_mass)
+    }
 }
 
 impl Linearise for Isolated {

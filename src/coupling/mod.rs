@@ -34,7 +34,7 @@ pub use panel::{ExtrapolatedPanels, FilmedPanels, PanelCoupled, PanelModel};
 pub use response::{CoupledResponse, Reached};
 pub use tensor::PairTensor;
 
-use crate::adjoint::lie::{Pose, Vec3, Vec6};
+use crate::adjoint::lie::{Mat6, Pose, Vec3, Vec6};
 use crate::{Error, Result};
 use nalgebra::{DMatrix, DVector};
 use serde::Serialize;
@@ -58,6 +58,12 @@ pub trait Coupling: Send + Sync {
 
     /// The same fidelity with its derivatives, if it has any.
     fn differentiable(&self) -> Option<&dyn Linearise> {
+        None
+    }
+
+    /// The added mass of each body at unit density (body frame, about its origin) where none feels another: M̄_f is block diagonal and no pose changes it, so that
+    /// nobody need ask for its products with a basis. `None` where bodies feel each other or a wall.
+    fn apart(&self) -> Option<&[Mat6]> {
         None
     }
 

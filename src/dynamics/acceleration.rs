@@ -46,7 +46,10 @@ impl Linearisation<'_> {
         let fluid = self.fluid_momenta(&direction);
         let pose_force = self.pose_force(&direction)?;
         let fluid_bias = self.fluid_bias(&fields);
-        let mut out = DVector::zeros(v.len());
+        let carried = self
+            .fluid
+            .transposed(self.system, &self.kinematics, &fluid_bias);
+        let mut out = -rho * carried;
         let Loads {
             mut wrenches,
             joints,
@@ -57,7 +60,6 @@ impl Linearisation<'_> {
             let relative = self.relative(twist);
             let water = pose_force[b] - cross_force(&relative, &fluid[b]);
             wrenches[b] += rho * water - rigid;
-            out -= rho * self.fluid_columns(b).tr_mul(&fluid_bias[b]);
         }
         if let Some(water) = self.acting() {
             let twist = self.submerged_field(&fields.twist);
@@ -152,8 +154,8 @@ impl Linearisation<'_> {
             Direction::Basis(&direction),
             Direction::Basis(&virtual_direction),
         );
-        let momenta = water.momenta(&direction);
-        let momenta_virtual = water.momenta(&virtual_direction);
+        let momenta = self.momenta_in(water, &direction);
+        let momenta_virtual = self.momenta_in(water, &virtual_direction);
         let current = self.current_twist();
         let relative: Vec<Vec6> = fields.twist.iter().map(|t| self.relative(t)).collect();
         let carried: Vec<Vec6> = (0..n)

@@ -14,6 +14,7 @@
 //! For a joint to the world the second term vanishes, and with no external force the sum of momenta is
 //! kept to round-off by any integrator that is linear in f.
 
+use super::fluid::{self, FluidMomenta};
 use super::force::{LoadBars, Loads, Moving, Place, Velocity};
 use super::linearisation::Water;
 use super::slopes::unit;
@@ -258,10 +259,14 @@ impl Linearisation<'_> {
         field: &[Vec6],
         other: Direction,
     ) -> Result<(Vec<Vec6>, Vec<Vec6>)> {
+        let none = || vec![Vec6::zeros(); field.len()];
+        if let FluidMomenta::Apart(added) = water.fluid {
+            let momenta = fluid::apart(added, self.system, &self.kinematics, field);
+            return Ok((momenta, none()));
+        }
         let submerged = self.submerged_twists(field);
         if submerged.iter().all(|x| *x == 0.0) {
-            let zero = vec![Vec6::zeros(); field.len()];
-            return Ok((zero.clone(), zero));
+            return Ok((none(), none()));
         }
         let pullback = (water.linearised).vjp(Direction::Twist(&submerged), other)?;
         Ok((
@@ -294,7 +299,7 @@ impl Linearisation<'_> {
     }
 
     /// Tangents of [`Linearisation::force`] along `changes` of v at fixed q and u, each with the change of the fluid's pose force on the
-    /// submerged bodies.
+    /// submerged bodies, if there is any.
     fn force_jvp(
         &self,
         v: &DVector<f64>,
@@ -325,9 +330,9 @@ impl Linearisation<'_> {
         let each = changes.iter().zip(&along).zip(dloads).zip(dpose_forces);
         each.map(|(((dv, dtwists), mut dloads), dpose_force)| {
             let dfluid = self.fluid_momenta(&self.virtual_direction(dv));
-            let dpose_force = match self.acting() {
-                Some(_) => self.from_submerged(dpose_force),
-                None => none.clone(),
+            let dpose_force = match dpose_force.is_empty() {
+                false => self.from_submerged(dpose_force),
+                true => none.clone(),
             };
             for (b, drate) in dloads.wrenches.iter_mut().enumerate() {
                 *drate += rho * (dpose_force[b] + cross_force(&current, &dfluid[b]));
@@ -353,22 +358,16 @@ impl Linearisation<'_> {
         v: &DVector<f64>,
         control: &DVector<f64>,
     ) -> Result<DMatrix<f64>> {
-        let n = v.len();
-        let changed = match self.acting() {
-            Some(water) => water.linearised.gradient_columns(&self.through_water(v))?,
-            None => vec![Vec::new(); n],
+        let islands = self.islands();
+        let changes = islands.changes();
+        let changed = match (self.acting(), &self.fluid) {
+            (Some(water), FluidMomenta::Coupled(_)) => {
+                (water.linearised).gradient_columns(&self.through_water(v))?
+            }
+            _ => vec![Vec::new(); changes.len()],
         };
-        let unit = |k: usize| DVector::from_fn(n, |i, _| f64::from(i == k));
-        let units: Vec<DVector<f64>> = (0..n).map(unit).collect();
-        let mut out = DMatrix::zeros(n, n);
-        for (k, column) in self
-            .force_jvp(v, control, &units, &changed)
-            .iter()
-            .enumerate()
-        {
-            out.set_column(k, column);
-        }
-        Ok(out)
+        let found = self.force_jvp(v, control, &changes, &changed);
+        Ok(islands.matrix(&found))
     }
 
     /// Transpose of [`Linearisation::force`] in all its arguments: the gradient of `ẑᵀ f(q, v, u)`.
@@ -494,7 +493,7 @@ impl Linearisation<'_> {
         };
         let rho = self.parameters.density();
         let direction = self.through_water(v);
-        let momenta = water.momenta(&direction);
+        let momenta = self.momenta_in(water, &direction);
         let current = self.current_twist();
         // (D − U × Z) · h_f: one bilinear form with the direction D' = D − U × Z.
         let carried = |fields: &Fields| -> Vec<Vec6> {

@@ -1,12 +1,13 @@
 //! Everything that depends on the configuration alone: kinematics, momenta per unit velocity, mass matrix.
 
+use super::fluid::FluidMomenta;
 use super::{JointLimit, PairContact, Parameters, System};
 use crate::adjoint::lie::{Mat6, Pose, Vec3, Vec6, six};
-use crate::adjoint::rigid;
 use crate::coupling::CouplingReport;
 use crate::multibody::Kinematics;
 use crate::{Error, Result};
 use nalgebra::{DMatrix, DVector};
+use std::sync::OnceLock;
 
 /// Where coordinates left floating point: before the step's end, at a stage of it.
 pub(crate) const WITHIN: &str = "within the step";
@@ -28,10 +29,10 @@ pub struct Evaluation<'a> {
     pub contact_points: Vec<PairContact>,
     /// Limits of joints, with the laws of their stops.
     pub limits: Vec<JointLimit>,
-    /// Spatial fluid momentum of each body at unit density per basis column (6 × k each).
-    fluid_momenta: Vec<DMatrix<f64>>,
-    /// M(q) = M_r + Jᵀ M_f J, user coordinates.
-    pub mass_matrix: DMatrix<f64>,
+    /// Spatial momenta of the water.
+    pub(super) fluid: FluidMomenta<'a>,
+    /// M(q), once it has been asked for ([`Evaluation::mass_matrix`]).
+    pub(super) mass_matrix: OnceLock<DMatrix<f64>>,
     /// Generalised momentum at v = 0, from the current: of the water, and of the bodies relative to what may drift.
     pub rest_momentum: DVector<f64>,
     report: CouplingReport,
@@ -66,15 +67,17 @@ impl System {
         q: &DVector<f64>,
     ) -> Result<Evaluation<'a>> {
         let kinematics = self.kinematics(q)?;
-        let basis = self.basis(&kinematics);
-        let solved = match self.in_water(parameters) {
-            true => Some(self.coupling.evaluate(&basis.poses, &basis.twists)?),
-            false => None,
+        let (fluid, report) = match self.fluid_apart(self.in_water(parameters)) {
+            Some(fluid) => (fluid, CouplingReport::default()),
+            None => {
+                let basis = self.basis(&kinematics);
+                let solved = self.coupling.evaluate(&basis.poses, &basis.twists)?;
+                let fluid = self.fluid_coupled(&kinematics, solved.momenta());
+                (fluid, solved.report().clone())
+            }
         };
-        let momenta = self.spatial_momenta(&kinematics, solved.as_ref().map(|s| s.momenta()));
-        let report = solved.map_or_else(CouplingReport::default, |s| s.report().clone());
         Ok(Evaluation::new(
-            self, parameters, q, kinematics, momenta, report,
+            self, parameters, q, kinematics, fluid, report,
         ))
     }
 
@@ -103,13 +106,9 @@ impl System {
         named.next().map_or("", |(_, body)| body.name.as_str())
     }
 
-    /// Columns of the basis.
-    fn columns(&self) -> usize {
-        self.tree.velocities() + usize::from(self.has_current())
-    }
-
     pub(super) fn basis(&self, kinematics: &Kinematics) -> Basis {
-        let (nv, columns) = (self.tree.velocities(), self.columns());
+        let nv = self.tree.velocities();
+        let columns = nv + usize::from(self.has_current());
         let jacobian = self.tree.jacobian(kinematics);
         let mut twists = DMatrix::zeros(6 * self.coupling.bodies(), columns);
         let mut poses = Vec::with_capacity(self.coupling.bodies());
@@ -140,88 +139,36 @@ impl System {
         }
         out
     }
-
-    /// Spatial momenta of all bodies from the body-frame impulses of those in the water; zeros without water.
-    pub(super) fn spatial_momenta(
-        &self,
-        kinematics: &Kinematics,
-        impulses: Option<&DMatrix<f64>>,
-    ) -> Vec<DMatrix<f64>> {
-        let columns = self.columns();
-        let mut out = vec![DMatrix::zeros(6, columns); self.len()];
-        let Some(impulses) = impulses else { return out };
-        for (b, w) in self.submerged() {
-            for k in 0..columns {
-                let h = impulses.fixed_view::<6, 1>(6 * w, k).into_owned();
-                out[b].set_column(k, &kinematics.poses[b].wrench_to_world(&h));
-            }
-        }
-        out
-    }
-}
-
-/// Spatial momenta of the bodies for coefficients on the basis, from those of its columns.
-pub(super) fn combined(columns: &[DMatrix<f64>], direction: &DVector<f64>) -> Vec<Vec6> {
-    (columns.iter())
-        .map(|m| (m * direction).fixed_rows::<6>(0).into_owned())
-        .collect()
 }
 
 impl<'a> Evaluation<'a> {
-    /// From the spatial fluid momenta per basis column; without places where surfaces are near.
+    /// From the water's momenta; without places where surfaces are near.
     pub(super) fn new(
         system: &'a System,
         parameters: &'a Parameters,
         q: &DVector<f64>,
         kinematics: Kinematics,
-        fluid_momenta: Vec<DMatrix<f64>>,
+        fluid: FluidMomenta<'a>,
         report: CouplingReport,
     ) -> Self {
-        let rigid: Vec<Mat6> = (0..system.len())
-            .map(|b| {
-                rigid::spatial_inertia(
-                    parameters.mass(b),
-                    &system.bodies[b].center_of_mass,
-                    &parameters.inertia(b),
-                )
-            })
-            .collect();
-        let jacobian = system.tree.jacobian(&kinematics);
-        let nv = system.tree.velocities();
-        let mut mass_matrix = DMatrix::zeros(nv, nv);
-        let mut rest_momentum = DVector::zeros(nv);
-        for b in 0..system.len() {
-            let j = jacobian.rows(6 * b, 6);
-            let mut momenta = parameters.density() * fluid_momenta[b].columns(0, nv).into_owned();
-            let pose = &kinematics.poses[b];
-            for k in 0..nv {
-                let twist = pose.twist_to_body(&j.column(k).fixed_rows::<6>(0).into_owned());
-                if twist != Vec6::zeros() {
-                    let mut c = momenta.column_mut(k);
-                    c += pose.wrench_to_world(&(rigid[b] * twist));
-                }
-            }
-            mass_matrix += j.tr_mul(&momenta);
-            if system.has_current() {
-                rest_momentum += parameters.density() * j.tr_mul(&fluid_momenta[b].column(nv));
-                let drift = pose.twist_to_body(system.drift.of(b));
-                rest_momentum -= j.tr_mul(&pose.wrench_to_world(&(rigid[b] * drift)));
-            }
-        }
-        let mass_matrix = 0.5 * (&mass_matrix + mass_matrix.transpose());
-        Self {
+        let mut out = Self {
             system,
             parameters,
             q: q.clone(),
             contact_points: Vec::new(),
             limits: system.limits.clone(),
             kinematics,
-            rigid,
-            fluid_momenta,
-            mass_matrix,
-            rest_momentum,
+            rigid: system.rigid_inertias(parameters),
+            fluid,
+            mass_matrix: OnceLock::new(),
+            rest_momentum: DVector::zeros(system.tree.velocities()),
             report,
+        };
+        if system.has_current() {
+            let wrenches = out.rest_wrenches();
+            out.rest_momentum = system.tree.project(&out.kinematics.columns, wrenches);
         }
+        out
     }
 
     /// Coefficients on the fluid's basis of the velocity `v` through the water.
@@ -249,13 +196,7 @@ impl<'a> Evaluation<'a> {
 
     /// Spatial fluid momenta of the bodies at unit density for coefficients on the basis.
     pub fn fluid_momenta(&self, direction: &DVector<f64>) -> Vec<Vec6> {
-        combined(&self.fluid_momenta, direction)
-    }
-
-    /// Spatial fluid momenta of body `b` at unit density per generalised velocity (6 × nv).
-    pub(super) fn fluid_columns(&self, b: usize) -> DMatrix<f64> {
-        let nv = self.system.tree.velocities();
-        self.fluid_momenta[b].columns(0, nv).into_owned()
+        (self.fluid).along(self.system, &self.kinematics, direction)
     }
 
     /// Spatial rigid momentum of body `b` moving with the spatial twist `v`.

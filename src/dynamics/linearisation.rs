@@ -1,6 +1,6 @@
 //! The system at one configuration with the derivatives of the water's energy there: what forces and transposes need.
 
-use super::evaluation::combined;
+use super::fluid::FluidMomenta;
 use super::{Evaluation, Parameters, System};
 use crate::adjoint::lie::Vec6;
 use crate::coupling::{Linearise, Linearised};
@@ -20,21 +20,8 @@ pub struct Linearisation<'a> {
 /// The water at unit density.
 pub(super) struct Water<'a> {
     pub linearised: Box<dyn Linearised + 'a>,
-    /// Spatial momentum of each body per basis column (6 × k each).
-    columns: Vec<DMatrix<f64>>,
-}
-
-impl Water<'_> {
-    /// Spatial momenta of the bodies for coefficients on the basis.
-    pub fn momenta(&self, direction: &DVector<f64>) -> Vec<Vec6> {
-        combined(&self.columns, direction)
-    }
-
-    /// Those of column `k` of the basis.
-    pub fn column(&self, k: usize) -> Vec<Vec6> {
-        let of = |m: &DMatrix<f64>| m.fixed_view::<6, 1>(0, k).into_owned();
-        self.columns.iter().map(of).collect()
-    }
+    /// The bodies' momenta.
+    pub fluid: FluidMomenta<'a>,
 }
 
 impl<'a> Deref for Linearisation<'a> {
@@ -73,23 +60,28 @@ impl System {
             true => Some(self.water(&kinematics)?),
             false => None,
         };
-        let momenta = match &water {
-            Some(water) => water.columns.clone(),
-            None => self.spatial_momenta(&kinematics, None),
-        };
+        let fluid = (water.as_ref()).map_or(FluidMomenta::Still, |w| w.fluid.clone());
         let report =
             (water.as_ref()).map_or_else(Default::default, |w| w.linearised.report().clone());
         Ok(Linearisation {
-            evaluation: Evaluation::new(self, parameters, q, kinematics, momenta, report),
+            evaluation: Evaluation::new(self, parameters, q, kinematics, fluid, report),
             water: water.map_or_else(OnceLock::new, OnceLock::from),
         })
     }
 
     fn water(&self, kinematics: &Kinematics) -> Result<Water<'_>> {
+        let coupling = self.differentiable()?;
+        if let Some(fluid) = self.fluid_apart(true) {
+            // No pose changes it: nobody asks for its derivatives on a basis.
+            let poses: Vec<_> = self.submerged().map(|(b, _)| kinematics.poses[b]).collect();
+            let none = DMatrix::zeros(6 * poses.len(), 0);
+            let linearised = coupling.linearise(&poses, &none)?;
+            return Ok(Water { linearised, fluid });
+        }
         let basis = self.basis(kinematics);
-        let linearised = (self.differentiable()?).linearise(&basis.poses, &basis.twists)?;
+        let linearised = coupling.linearise(&basis.poses, &basis.twists)?;
         Ok(Water {
-            columns: self.spatial_momenta(kinematics, Some(linearised.momenta())),
+            fluid: self.fluid_coupled(kinematics, linearised.momenta()),
             linearised,
         })
     }
@@ -108,6 +100,11 @@ impl System {
 }
 
 impl<'a> Linearisation<'a> {
+    /// Spatial momenta of the bodies at unit density, of water that acts or not, for coefficients on the basis.
+    pub(super) fn momenta_in(&self, water: &Water, direction: &DVector<f64>) -> Vec<Vec6> {
+        (water.fluid).along(self.system, &self.kinematics, direction)
+    }
+
     /// The water at unit density, where any acts.
     pub fn fluid(&self) -> Option<&dyn Linearised> {
         self.acting().map(|water| water.linearised.as_ref())

@@ -9,8 +9,11 @@ mod cotangents;
 mod damping;
 mod drift;
 mod evaluation;
+mod fluid;
 pub mod force;
+mod inertia;
 mod integrator;
+mod islands;
 mod limit;
 mod linearisation;
 mod momentum;
@@ -26,6 +29,7 @@ pub use cotangents::ForceCotangents;
 pub use drift::Drift;
 pub use evaluation::Evaluation;
 pub(crate) use evaluation::WITHIN;
+pub use inertia::Inertia;
 pub use integrator::{
     ContactVelocities, Input, Integrator, LinearisedStep, State, StateBar, StateTangents, StepBar,
     StepRecord, Stepper, Stops,

@@ -29,7 +29,7 @@ impl Evaluation<'_> {
     /// Generalised momentum at velocity `v`, user coordinates (kg m/s, kg m²/s); of what may drift with the water that relative to its drift
     /// ([`Drift`](super::Drift)).
     pub fn momentum(&self, v: &DVector<f64>) -> DVector<f64> {
-        &self.mass_matrix * v + &self.rest_momentum
+        self.mass_times(v) + &self.rest_momentum
     }
 
     /// What it lacks where bodies may drift: Σ Jᵀ I W, the momentum of the bodies' own masses that drift.
@@ -136,11 +136,12 @@ impl Linearisation<'_> {
         let rows: Vec<ForceCotangents> = match self.water()? {
             Some(water) => {
                 let direction = self.direction(v, current);
-                let momenta = water.momenta(&direction);
+                let momenta = self.momenta_in(water, &direction);
                 // The first columns of the basis are the generalised velocities'.
                 let pairs = water.linearised.gradient_columns(&direction)?;
                 let row = |i: &usize| {
-                    let momenta_virtual = water.column(*i);
+                    let (system, kinematics) = (self.system, &self.kinematics);
+                    let momenta_virtual = water.fluid.column(system, kinematics, *i);
                     let carried = [&momenta, &momenta_virtual, &self.from_submerged(&pairs[*i])];
                     self.bilinear_row(&at(*i), current, Some(carried.map(Vec::as_slice)))
                 };
@@ -179,8 +180,8 @@ impl Linearisation<'_> {
         };
         let (direction, virtual_direction) =
             (self.direction(v, current), self.virtual_direction(w));
-        let (momenta, momenta_virtual) =
-            (water.momenta(&direction), water.momenta(&virtual_direction));
+        let momenta = self.momenta_in(water, &direction);
+        let momenta_virtual = self.momenta_in(water, &virtual_direction);
         let pair = water.linearised.gradient(&virtual_direction, &direction)?;
         let carried = [&momenta, &momenta_virtual, &self.from_submerged(&pair)];
         Ok(self.bilinear_row(&at, current, Some(carried.map(Vec::as_slice))))

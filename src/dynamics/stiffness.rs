@@ -3,6 +3,7 @@
 //! With D = ∂g/∂v, g being the forces in the user's coordinates without the water's inertia, the rates are the eigenvalues of M^-½ ½(−D − Dᵀ) M^-½ on the coordinates
 //! that nothing drives.
 
+use super::fluid::FluidMomenta;
 use super::force::{Loads, Velocity};
 use super::{Drive, Evaluation, Parameters, System};
 use crate::Result;
@@ -31,79 +32,108 @@ impl System {
         enough: f64,
     ) -> Result<Option<Damping>> {
         let kinematics = self.kinematics(q)?;
-        let momenta = self.spatial_momenta(&kinematics, None);
-        let report = Default::default();
-        let dry = Evaluation::new(self, parameters, q, kinematics, momenta, report);
-        let slowed = -dry.load_rates(v, control);
-        let slowed = 0.5 * (&slowed + slowed.transpose());
-        if slowed.iter().all(|x| *x == 0.0) {
-            return Ok(None);
-        }
-        let fast = |m: &DMatrix<f64>| self.fastest(m, &slowed).filter(|d| d.rate > enough);
+        let (still, report) = (FluidMomenta::Still, Default::default());
+        let dry = Evaluation::new(self, parameters, q, kinematics, still, report);
         // The water only adds to the inertia.
-        let alone = self.fastest(&dry.mass_matrix, &slowed);
-        if alone.is_some_and(|d| d.rate <= enough) {
-            return Ok(None);
+        let fast = |d: &Damping| d.rate > enough;
+        let alone = dry.fastest(v, control);
+        let is_slow = matches!(&alone, Ok(found) if found.is_none_or(|d| !fast(&d)));
+        if is_slow || !self.in_water(parameters) {
+            return Ok(alone.ok().flatten().filter(fast));
         }
-        if !self.in_water(parameters) {
-            return Ok(fast(&dry.mass_matrix));
-        }
-        Ok(fast(&self.evaluate_apart(parameters, q)?.mass_matrix))
-    }
-
-    /// None where the inertia isn't positive definite.
-    fn fastest(&self, mass_matrix: &DMatrix<f64>, slowed: &DMatrix<f64>) -> Option<Damping> {
-        let each = self.drives.iter().zip(self.tree.links()).enumerate();
-        let free: Vec<(usize, usize)> = each
-            .filter(|(_, (drive, _))| **drive == Drive::Free)
-            .flat_map(|(b, (_, link))| link.v.clone().map(move |i| (b, i)))
-            .collect();
-        let block = |m: &DMatrix<f64>| {
-            DMatrix::from_fn(free.len(), free.len(), |i, j| m[(free[i].1, free[j].1)])
-        };
-        if free.is_empty() {
-            return None;
-        }
-        let lower = block(mass_matrix).cholesky()?.unpack();
-        let half = lower.solve_lower_triangular(&block(slowed))?;
-        let scaled = lower.solve_lower_triangular(&half.transpose())?;
-        if !scaled.iter().all(|x| x.is_finite()) {
-            return None;
-        }
-        let found = (0.5 * (&scaled + scaled.transpose())).symmetric_eigen();
-        let k = found.eigenvalues.imax();
-        Some(Damping {
-            rate: found.eigenvalues[k],
-            body: free[found.eigenvectors.column(k).iamax()].0,
-        })
+        let wet = self.evaluate_apart(parameters, q)?;
+        Ok(wet.fastest(v, control).ok().flatten().filter(fast))
     }
 }
 
+/// An inertia that isn't positive definite.
+struct Indefinite;
+
 impl Evaluation<'_> {
-    /// ∂g/∂v of the forces that act in the course of a step, user coordinates.
-    fn load_rates(&self, v: &DVector<f64>, control: &DVector<f64>) -> DMatrix<f64> {
+    /// None where nothing is slowed.
+    fn fastest(
+        &self,
+        v: &DVector<f64>,
+        control: &DVector<f64>,
+    ) -> std::result::Result<Option<Damping>, Indefinite> {
+        let system = self.system;
+        let mut free = vec![None; v.len()];
+        for (b, (drive, link)) in system.drives.iter().zip(system.tree.links()).enumerate() {
+            if *drive == Drive::Free {
+                link.v.clone().for_each(|i| free[i] = Some(b));
+            }
+        }
+        let islands = self.islands();
+        let changes = islands.changes();
+        let slowed = self.load_rates(v, control, &changes);
+        if slowed.iter().all(|column| column.iter().all(|x| *x == 0.0)) {
+            return Ok(None);
+        }
+        let inertia: Vec<_> = changes.iter().map(|v| self.mass_times(v)).collect();
+        let mut found: Option<Damping> = None;
+        for ((island, slowed), (_, inertia)) in
+            islands.blocks(&slowed).zip(islands.blocks(&inertia))
+        {
+            let own: Vec<usize> = (0..island.len())
+                .filter(|k| free[island[*k]].is_some())
+                .collect();
+            let block = |m: &DMatrix<f64>| {
+                let m = m.select_rows(&own).select_columns(&own);
+                0.5 * (&m + m.transpose())
+            };
+            let (slowed, inertia) = (-block(&slowed), block(&inertia));
+            if slowed.iter().all(|x| *x == 0.0) {
+                continue;
+            }
+            let (rate, at) = largest(inertia, &slowed).ok_or(Indefinite)?;
+            if found.is_none_or(|d| rate > d.rate) {
+                let body = free[island[own[at]]];
+                found = body.map(|body| Damping { rate, body });
+            }
+        }
+        Ok(found)
+    }
+
+    /// ∂g/∂v of the forces that act in the course of a step, times `changes`; user coordinates.
+    fn load_rates(
+        &self,
+        v: &DVector<f64>,
+        control: &DVector<f64>,
+        changes: &[DVector<f64>],
+    ) -> Vec<DVector<f64>> {
         let tree = &self.system.tree;
-        let n = v.len();
-        let units: Vec<DVector<f64>> = (0..n)
-            .map(|k| DVector::from_fn(n, |i, _| f64::from(i == k)))
-            .collect();
-        let along: Vec<_> = (units.iter())
+        let along: Vec<_> = (changes.iter())
             .map(|dv| tree.twists(&self.kinematics, dv))
             .collect();
-        let changes: Vec<Velocity> = (units.iter().zip(&along))
+        let velocities: Vec<Velocity> = (changes.iter().zip(&along))
             .map(|(v, twists)| Velocity { twists, v })
             .collect();
-        let mut out: Vec<Loads> = (0..n).map(|_| Loads::zeros(self.system.len(), n)).collect();
+        let mut out: Vec<Loads> = (changes.iter())
+            .map(|_| Loads::zeros(self.system.len(), v.len()))
+            .collect();
         let twists = tree.twists(&self.kinematics, v);
         let at = self.moving(&twists, v, control);
         for force in self.system.smooth_forces() {
-            force.jvps(&at, &changes, &mut out);
+            force.jvps(&at, &velocities, &mut out);
         }
-        let mut rates = DMatrix::zeros(n, n);
-        for (k, Loads { wrenches, joints }) in out.into_iter().enumerate() {
-            let column = tree.project(&self.kinematics.columns, wrenches) + joints;
-            rates.set_column(k, &column);
-        }
-        rates
+        let columns = out.into_iter();
+        columns
+            .map(|Loads { wrenches, joints }| {
+                tree.project(&self.kinematics.columns, wrenches) + joints
+            })
+            .collect()
     }
+}
+
+/// The largest eigenvalue of M^-½ S M^-½, and the coordinate that is most of its direction; none where M isn't positive definite.
+fn largest(m: DMatrix<f64>, slowed: &DMatrix<f64>) -> Option<(f64, usize)> {
+    let lower = m.cholesky()?.unpack();
+    let half = lower.solve_lower_triangular(slowed)?;
+    let scaled = lower.solve_lower_triangular(&half.transpose())?;
+    if !scaled.iter().all(|x| x.is_finite()) {
+        return None;
+    }
+    let found = (0.5 * (&scaled + scaled.transpose())).symmetric_eigen();
+    let k = found.eigenvalues.imax();
+    Some((found.eigenvalues[k], found.eigenvectors.column(k).iamax()))
 }

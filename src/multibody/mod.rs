@@ -10,10 +10,13 @@
 //! ```
 //!
 //! and [`Tree::reverse`] is the transpose of all four at once, to coordinates and velocities. No
-//! engine that assumes inertia to be (mass, 3 × 3) is used: added mass is a full 6 × 6 and couples bodies.
+//! engine that assumes inertia to be (mass, 3 × 3) is used: added mass is a full 6 × 6 and couples bodies. Where none feels another,
+//! [`Articulated`] solves for accelerations at a cost linear in the bodies.
 
+mod articulated;
 mod joint;
 mod tree;
 
+pub use articulated::{Articulated, Indefinite};
 pub use joint::{Joint, JointModel, JointMotion, Plane, Refused};
 pub use tree::{Cotangents, Fields, Kinematics, Link, Tree, Virtual};

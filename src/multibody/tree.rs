@@ -151,7 +151,12 @@ impl Tree {
 
     /// Whether body `b` moves when the joint of body `a` does.
     pub fn carries(&self, a: usize, b: usize) -> bool {
-        std::iter::successors(Some(b), |&x| self.links[x].parent).any(|x| x == a)
+        self.carrying(b).any(|x| x == a)
+    }
+
+    /// Body `b` and those that carry it, up to the world.
+    fn carrying(&self, b: usize) -> impl Iterator<Item = usize> {
+        std::iter::successors(Some(b), |&x| self.links[x].parent)
     }
 
     /// Vectors from the parts that each joint has in them.
@@ -310,6 +315,17 @@ impl Tree {
         out
     }
 
+    /// Product of a matrix with a block for each joint on the diagonal ([`Tree::blocks`]) and another.
+    pub fn blocks_times(&self, blocks: &DMatrix<f64>, m: &DMatrix<f64>) -> DMatrix<f64> {
+        let mut out = m.clone();
+        for l in self.links.iter().filter(|l| !l.v.is_empty()) {
+            let (start, n) = (l.v.start, l.v.len());
+            let own = blocks.view((start, start), (n, n)) * m.rows(start, n);
+            out.rows_mut(start, n).copy_from(&own);
+        }
+        out
+    }
+
     /// Momentum conjugate to the chart coordinates `xi` around `q`, from frame momentum.
     pub fn chart_momentum(
         &self,
@@ -422,21 +438,23 @@ impl Tree {
     /// velocities, on the frame columns those dual to frame velocities.
     pub fn project(&self, columns: &[Vec6], wrenches: Vec<Vec6>) -> DVector<f64> {
         let composite = self.composite(wrenches);
-        let of = |(l, f): (&Link, &Vec6)| l.v.clone().map(|k| columns[k].dot(f)).collect();
-        let parts: Vec<Vec<f64>> = self.links.iter().zip(&composite).map(of).collect();
-        DVector::from_vec(parts.concat())
+        let mut out = DVector::zeros(columns.len());
+        for (l, f) in self.links.iter().zip(&composite) {
+            for k in l.v.clone() {
+                out[k] = columns[k].dot(f);
+            }
+        }
+        out
     }
 
     /// Spatial twists of all bodies as columns of a 6B × nv matrix.
     pub fn jacobian(&self, kinematics: &Kinematics) -> DMatrix<f64> {
         let mut out = DMatrix::zeros(6 * self.links.len(), self.velocities());
-        for (a, l) in self.links.iter().enumerate() {
-            for b in a..self.links.len() {
-                if self.carries(a, b) {
-                    for k in l.v.clone() {
-                        out.fixed_view_mut::<6, 1>(6 * b, k)
-                            .copy_from(&kinematics.columns[k]);
-                    }
+        for b in 0..self.links.len() {
+            for a in self.carrying(b) {
+                for k in self.links[a].v.clone() {
+                    out.fixed_view_mut::<6, 1>(6 * b, k)
+                        .copy_from(&kinematics.columns[k]);
                 }
             }
         }

@@ -5,6 +5,7 @@
 
 #[macro_use]
 mod build;
+mod carriers;
 mod contact;
 mod file;
 mod force;
@@ -18,6 +19,7 @@ pub use crate::geometry::{Refinement, Wall, WallSurface};
 pub use crate::multibody::{Joint, Plane};
 pub use crate::shape::Shape;
 pub use build::BodyId;
+pub(crate) use carriers::Carriers;
 pub use contact::{CollisionPiece, Contact};
 pub use force::{Force, Lubrication, Spring, WATER_VISCOSITY};
 pub use origin::Origin;

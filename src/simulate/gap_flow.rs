@@ -8,7 +8,7 @@ use crate::coupling::lubrication::PlacedBearing;
 use crate::dynamics::Drive;
 use crate::geometry::{Gap, Other};
 use crate::scene::WATER_VISCOSITY;
-use nalgebra::{Cholesky, DVector, Dyn, Vector3};
+use nalgebra::{DVector, Vector3};
 use serde::Serialize;
 
 /// Of the smallest gap, how far above it steps count whose speed is taken.
@@ -178,12 +178,10 @@ impl Film {
             .filter(|(drive, _)| **drive == Drive::Free)
             .flat_map(|(_, link)| link.v.clone())
             .collect();
-        let force = DVector::from_iterator(free.len(), free.iter().map(|i| all[*i]));
-        let m = e.mass_matrix.select_rows(&free).select_columns(&free);
-        let Some(factor) = Cholesky::<f64, Dyn>::new(m) else {
+        let Ok(factor) = e.factored(&free) else {
             return Ok(None);
         };
-        let yielding = force.dot(&factor.solve(&force));
+        let yielding = all.dot(&factor.solve(&all));
         Ok((yielding > 0.0).then(|| (damping * damping / yielding, damping)))
     }
 }

@@ -188,14 +188,14 @@ fn scales(simulator: &Simulator, rollout: &Rollout, steps: usize) -> Result<Scal
     for (body, link) in system.bodies.iter().zip(system.tree.links()) {
         if body.joint_control.is_some() {
             for i in link.v.clone() {
-                force.push(e.mass_matrix[(i, i)] * velocity[i] / duration);
+                force.push(e.mass_matrix()[(i, i)] * velocity[i] / duration);
             }
         }
         if body.thruster.is_some() {
             let mass = link
                 .v
                 .clone()
-                .map(|i| e.mass_matrix[(i, i)])
+                .map(|i| e.mass_matrix()[(i, i)])
                 .fold(0.0, f64::max);
             force.extend([mass * length / duration; 6]);
         }

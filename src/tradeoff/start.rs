@@ -25,13 +25,13 @@ impl Start {
         let (q, _) = simulator.start();
         let mut dry = parameters.clone();
         *dry.density_mut() = 0.0;
-        let rigid = system.evaluate(&dry, q)?.mass_matrix;
-        let all = system.evaluate(parameters, q)?.mass_matrix;
+        let (dry, wet) = (system.evaluate(&dry, q)?, system.evaluate(parameters, q)?);
+        let (rigid, all) = (dry.mass_matrix(), wet.mass_matrix());
         let free = free(simulator)?;
         let block = |m: &DMatrix<f64>| m.select_rows(&free).select_columns(&free);
         Ok(Self {
-            added_mass: block(&(&all - rigid)),
-            mass: block(&all),
+            added_mass: block(&(all - rigid)),
+            mass: block(all),
             force: DVector::zeros(free.len()),
         })
     }
@@ -41,7 +41,7 @@ impl Start {
         let (q, v) = simulator.start();
         let system = simulator.system();
         let e = system.linearise(simulator.parameters(), q)?;
-        let given = &e.mass_matrix * given_accelerations(simulator);
+        let given = e.mass_times(&given_accelerations(simulator));
         let force = e.inertial_force(v, &first_action(simulator)?.0)? - given;
         Ok(Self {
             force: force.select_rows(&free(simulator)?),

@@ -71,7 +71,8 @@ impl Clearance {
             (0..bodies).filter(carry).collect()
         };
         let of: Vec<Vec<usize>> = (0..bodies).map(movers).collect();
-        let declared = scene.overlapping();
+        let carriers = scene.carriers();
+        let declared = carriers.overlapping();
         let (mut moving, mut rigid, mut shares) = (Vec::new(), Vec::new(), Vec::new());
         for a in 0..bodies {
             for b in a + 1..bodies {
@@ -93,7 +94,7 @@ impl Clearance {
             rigid: rigid_gaps.by_formula(solids.clone())?,
             moving: moving_gaps.by_formula(solids)?,
             declared: shares,
-            parents: (0..bodies).map(|b| scene.submerged_parent(b)).collect(),
+            parents: (0..bodies).map(|b| carriers.submerged_parent(b)).collect(),
             names: scene.bodies.iter().map(|b| b.name.clone()).collect(),
             contact: scene.contact.is_some(),
             volumes: surfaces

@@ -11,6 +11,7 @@ mod galilean;
 mod grasp;
 mod growth;
 mod invariants;
+mod islands;
 mod lubrication;
 mod mechanisms;
 mod observables;

@@ -58,7 +58,7 @@ fn links(tree: usize) -> Vec<(Option<usize>, Joint, Moved)> {
     }
 }
 
-const TREES: std::ops::Range<usize> = 0..4;
+pub(super) const TREES: std::ops::Range<usize> = 0..4;
 
 /// A random scene on the tree; its bodies may meet.
 fn attempt(tree: usize, random: &mut Samples) -> Scene {
@@ -144,7 +144,7 @@ fn attempt(tree: usize, random: &mut Samples) -> Scene {
 }
 
 /// A random scene on the tree whose bodies keep apart.
-fn scene(tree: usize) -> Scene {
+pub(super) fn scene(tree: usize) -> Scene {
     let mut random = Samples::new(17 + tree as u64);
     for _ in 0..100 {
         let scene = attempt(tree, &mut random);
@@ -217,8 +217,8 @@ fn velocity_form(
         let mut q = system.tree.integrate(q, xi);
         stepper.place_motions(&mut q, t);
         let e = stepper.linearise(&q).unwrap();
-        let right = e.inertial_force(&v_all, control).unwrap() - &e.mass_matrix * &a_driven;
-        let m = e.mass_matrix.select_rows(&free).select_columns(&free);
+        let right = e.inertial_force(&v_all, control).unwrap() - e.mass_matrix() * &a_driven;
+        let m = e.mass_matrix().select_rows(&free).select_columns(&free);
         let a = m.cholesky().unwrap().solve(&right.select_rows(&free));
         let mut out = a_driven;
         for (k, &i) in free.iter().enumerate() {

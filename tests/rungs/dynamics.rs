@@ -353,7 +353,7 @@ fn mass(c: f64) -> Outcome {
     let p = point();
     let w = wavy(p.v.len(), 5.1, 1.0);
     let b = evaluate(&p.parameters, &p.q).mass_vjp(&p.v, &w).unwrap();
-    let value = |p: &Point| w.dot(&(&evaluate(&p.parameters, &p.q).mass_matrix * &p.v));
+    let value = |p: &Point| w.dot(&evaluate(&p.parameters, &p.q).mass_times(&p.v));
     let bar = Bar {
         q: b.q,
         v: b.v,

@@ -90,7 +90,7 @@ impl Case {
         let speed = DVector::from_element(1, 1.0);
         let force = found.inertial_force(&speed, &DVector::zeros(0)).unwrap();
         let dry = simulator.parameters().mass(0);
-        [found.mass_matrix[(0, 0)] - dry, -2.0 * force[0]]
+        [found.mass_matrix()[(0, 0)] - dry, -2.0 * force[0]]
     }
 }
 

@@ -36,6 +36,10 @@ impl ForceModel for Actuation {
         }
     }
 
+    fn ties(&self) -> Option<Vec<[usize; 2]>> {
+        Some(Vec::new())
+    }
+
     fn outside(&self, group: &Together, _: &Parameters) -> Outside {
         let mut joints = self.0.iter().flat_map(|(v, _)| v.clone());
         match joints.any(|i| group.hangs_on(i)) {

@@ -205,6 +205,10 @@ impl ForceModel for Drag {
         }
     }
 
+    fn ties(&self) -> Option<Vec<[usize; 2]>> {
+        Some(Vec::new())
+    }
+
     fn outside(&self, group: &Together, parameters: &Parameters) -> Outside {
         let acts = |d: &Dragged| group.holds(d.body) && parameters[d.coefficient] != 0.0;
         match self.bodies.iter().any(acts) {

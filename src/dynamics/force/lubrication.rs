@@ -171,6 +171,14 @@ impl ForceModel for Lubrication {
         }
     }
 
+    fn ties(&self) -> Option<Vec<[usize; 2]>> {
+        Some(
+            (self.0.iter())
+                .filter_map(|gap| Some([gap.first, gap.second?]))
+                .collect(),
+        )
+    }
+
     fn outside(&self, group: &Together, _: &Parameters) -> Outside {
         let mut each = self.0.iter();
         let across = |g: &Gap| group.across(Some(g.first), g.second);

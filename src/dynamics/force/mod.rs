@@ -227,6 +227,11 @@ pub trait ForceModel: Send + Sync {
         Outside::All
     }
 
+    /// Pairs of bodies of which it makes one feel how the other moves or where it is; `None` where it may be any.
+    fn ties(&self) -> Option<Vec<[usize; 2]>> {
+        None
+    }
+
     /// Whether it changes no energy but its own potential one, at these parameters and where nothing is controlled.
     fn conservative(&self, _parameters: &Parameters) -> bool {
         false

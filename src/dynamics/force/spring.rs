@@ -182,6 +182,11 @@ impl ForceModel for Springs {
         }
     }
 
+    fn ties(&self) -> Option<Vec<[usize; 2]>> {
+        let both = |s: &Spring| Some([s.ends[0].body?, s.ends[1].body?]);
+        Some(self.0.iter().filter_map(both).collect())
+    }
+
     fn outside(&self, group: &Together, _: &Parameters) -> Outside {
         let mut each = self.0.iter();
         let across = |s: &Spring| group.across(s.ends[0].body, s.ends[1].body);

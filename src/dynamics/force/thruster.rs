@@ -41,6 +41,10 @@ impl ForceModel for Thrusters {
         }
     }
 
+    fn ties(&self) -> Option<Vec<[usize; 2]>> {
+        Some(Vec::new())
+    }
+
     fn outside(&self, group: &Together, _: &Parameters) -> Outside {
         match self.0.iter().any(|(b, _)| group.holds(*b)) {
             true => Outside::All,

@@ -89,6 +89,10 @@ impl ForceModel for Weight {
         }
     }
 
+    fn ties(&self) -> Option<Vec<[usize; 2]>> {
+        Some(Vec::new())
+    }
+
     fn outside(&self, group: &Together, _: &Parameters) -> Outside {
         match self.parcels.iter().any(|p| group.holds(p.body)) {
             true => Outside::Along(self.acceleration),

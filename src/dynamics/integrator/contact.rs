@@ -40,7 +40,7 @@ struct Trial {
 
 /// The Hessian M + Δt Jᵀ G J on the free rows, factored.
 fn hessian(e: &Evaluation, split: &Split, v: &DVector<f64>, dt: f64) -> Result<Definite> {
-    let m = &e.mass_matrix - dt * e.contact_jacobian(v);
+    let m = e.mass_matrix() - dt * e.contact_jacobian(v);
     let m: DMatrix<f64> = 0.5 * (&m + m.transpose());
     Definite::new(split.block(&m)).ok_or_else(|| Error::Solver {
         what: "contact".into(),
@@ -58,11 +58,11 @@ pub(super) fn solve(start: &Start, before: &DVector<f64>) -> Result<DVector<f64>
     if split.free.is_empty() || !e.contact_acts(before) {
         return Ok(before.clone());
     }
-    let sized = split.sizes(&e.mass_matrix);
-    let summands = e.mass_matrix.abs();
+    let sized = split.sizes(e.mass_matrix());
+    let summands = e.mass_matrix().abs();
     let least = sized(&(&summands * before.abs()));
     let at = |v: DVector<f64>| {
-        let imbalance = &e.mass_matrix * (&v - before) - dt * e.contact_force(&v, Dual::User);
+        let imbalance = e.mass_times(&(&v - before)) - dt * e.contact_force(&v, Dual::User);
         let size = sized(&(&summands * v.abs())).max(least);
         let size = size.max(dt * sized(&e.contact_effort(&v)));
         let residual = share(sized(&imbalance), size);
@@ -197,7 +197,7 @@ impl<'s> Adjoint<'s> {
         let change = &velocities.after - &velocities.before;
         let pressed = near.contact_force_slopes(&velocities.after, Dual::User, &split.free);
         let inertia = e.mass_slopes(&change, &split.free, along.inputs.has_parameters())?;
-        let moved = &e.mass_matrix * before;
+        let moved = columns(before, |v| e.mass_times(v));
         let right = moved + start.stepper.dt * pressed.along(along.q, None, along.inputs)
             - inertia.along(along.q, None, along.inputs);
         let mut after = before.clone();
@@ -269,7 +269,7 @@ impl<'s> Adjoint<'s> {
         bar.add(-1.0, &e.mass_vjp(&(after - before), &w)?);
         // Driven velocities are what they are.
         let mut before_bar = after_bar.clone();
-        let moved = &e.mass_matrix * &w;
+        let moved = e.mass_times(&w);
         for &i in &split.free {
             before_bar[i] = moved[i];
         }

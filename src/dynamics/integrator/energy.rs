@@ -110,13 +110,12 @@ impl Parts {
         let drifting = Drifting::new(start, velocities);
         let (before, after) = (&drifting.before, &drifting.after);
         let v = readout::solve(end, split, hat)? - s.system.drift.velocity();
-        let energy = |m: &DMatrix<f64>, v: &DVector<f64>| 0.5 * v.dot(&(m * v));
         let basis = &s.system.symmetric;
         let (mut together, mut common, mut direction) =
             (DVector::zeros(v.len()), None, hat.clone());
         if basis.ncols() > 0 {
             let user = columns(basis, |b| end.frame_velocity_inverse(b));
-            let momenta = &end.mass_matrix * &user;
+            let momenta = columns(&user, |v| end.mass_times(v));
             let matrix = user.tr_mul(&momenta);
             let matrix = Definite::new(0.5 * (&matrix + matrix.transpose())).ok_or_else(|| {
                 Error::Solver {
@@ -133,23 +132,22 @@ impl Parts {
             direction -= end.frame_dual(&(momenta * omega));
             common = Some(matrix);
         }
-        let room = energy(&end.mass_matrix, &(&v - &together));
-        let kinetic = energy(&end.mass_matrix, &v);
+        let room = end.mass_energy(&(&v - &together));
+        let kinetic = end.mass_energy(&v);
         if room.is_nan() || room <= 1e-9 * kinetic {
             return Ok(None);
         }
         let loads = e.user_loads(&velocities.before, &start.input.control);
         let first = &drifting.start;
-        let mut defect =
-            kinetic - energy(&e.mass_matrix, first) - 0.5 * s.dt * loads.dot(&(first + &v));
+        let mut defect = kinetic - e.mass_energy(first) - 0.5 * s.dt * loads.dot(&(first + &v));
         let contact = near
             .contact_acts(&velocities.before)
             .then(|| near.contact_force(&velocities.after, Dual::User));
-        let speed = energy(&e.mass_matrix, before);
+        let speed = e.mass_energy(before);
         let mut taken = 0.0;
         if let Some(g) = &contact {
             defect -= 0.5 * s.dt * g.dot(&(before + after));
-            let lost = energy(&e.mass_matrix, &(after - before));
+            let lost = e.mass_energy(&(after - before));
             taken = if lost > 0.0 {
                 lost / (FADE * speed)
             } else {
@@ -275,7 +273,6 @@ impl<'a> Closure<'a> {
         let drifting = Drifting::new(start, velocities);
         let (first, before, after) = (&drifting.start, &drifting.before, &drifting.after);
         let end = &self.end;
-        let m = &e.mass_matrix;
         let nv = before.len();
         let mut out = ClosureBar {
             next: next_bar.clone(),
@@ -306,7 +303,7 @@ impl<'a> Closure<'a> {
         )?;
         if let Some(common) = &parts.common {
             let basis = &s.system.symmetric;
-            let moved = end.frame_dual(&(&end.mass_matrix * &across));
+            let moved = end.frame_dual(&end.mass_times(&across));
             let eta = common.solve(&basis.tr_mul(&moved));
             let carried = basis * eta;
             hat_star_bar -= &carried;
@@ -335,7 +332,7 @@ impl<'a> Closure<'a> {
         out.velocities[0] -= defect_bar * &work.v;
         bar.v -= defect_bar * half * &parts.loads;
         // The energy at the start.
-        bar.v -= defect_bar * (m * first);
+        bar.v -= defect_bar * e.mass_times(first);
         bar.add(-0.5 * defect_bar, &e.mass_vjp(first, first)?);
         if let Some(g) = &parts.contact {
             let along = half * (before + after);
@@ -348,8 +345,8 @@ impl<'a> Closure<'a> {
                 let lost = after - before;
                 let lost_bar = taken_bar / (FADE * parts.before);
                 let before_bar = -parts.taken * taken_bar / parts.before;
-                let moved = lost_bar * (m * &lost);
-                out.velocities[0] += before_bar * (m * before) - &moved;
+                let moved = lost_bar * e.mass_times(&lost);
+                out.velocities[0] += before_bar * e.mass_times(before) - &moved;
                 out.velocities[1] += moved;
                 bar.add(0.5 * lost_bar, &e.mass_vjp(&lost, &lost)?);
                 bar.add(0.5 * before_bar, &e.mass_vjp(before, before)?);
@@ -372,7 +369,7 @@ impl<'a> Closure<'a> {
         let end = &self.end;
         out.add(scale, &end.mass_vjp(y, x)?);
         for (a, b) in [(x, y), (y, x)] {
-            let momentum = end.frame_dual(&(&end.mass_matrix * b));
+            let momentum = end.frame_dual(&end.mass_times(b));
             out.state.q -= scale * end.frame_velocity_vjp(a, &momentum);
         }
         Ok(())

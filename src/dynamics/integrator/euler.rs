@@ -20,9 +20,11 @@ use super::stages::{ContactVelocities, Stages, StepDerivatives};
 use super::start::Start;
 use super::{Integrator, State, StateBar, StateTangents, StepBar, StepTangents, Stepper};
 use crate::adjoint::lie::angular;
+use crate::adjoint::solve::{Definite, General};
+use crate::dynamics::slopes::columns;
 use crate::dynamics::{Drift, Linearisation};
 use crate::{Error, Result};
-use nalgebra::{DMatrix, DVector, Dyn, LU};
+use nalgebra::{DMatrix, DVector};
 
 /// Most Newton iterations of a stage; quadratic convergence needs four or five.
 const ITERATIONS: usize = 40;
@@ -94,17 +96,11 @@ fn stage_matrix(
 ) -> DMatrix<f64> {
     let tree = &e.system.tree;
     let xi = rule.reach * v;
-    let mut m = e.mass_matrix.clone();
-    for k in 0..v.len() {
-        let impulse = rule.impulse(e, &rates.column(k).into_owned());
-        let mut target = m.column_mut(k);
-        target -= tree.chart_momentum(&e.q, &xi, &impulse);
-        if rule.reach != 0.0 {
-            let unit = DVector::from_fn(v.len(), |i, _| f64::from(i == k));
-            let [_, along, _] = tree.chart_momentum_vjp(&e.q, &xi, reached, &unit);
-            let mut target = m.row_mut(k);
-            target -= rule.reach * along.transpose();
-        }
+    let [_, by_xi, by_hat] = tree.chart_momentum_slopes(&e.q, &xi, reached);
+    let impulses = columns(rates, |rate| rule.impulse(e, rate));
+    let mut m = e.mass_matrix() - tree.blocks_times(&by_hat, &impulses);
+    if rule.reach != 0.0 {
+        m -= rule.reach * by_xi;
     }
     split.block(&m)
 }
@@ -126,18 +122,16 @@ fn excess(
     }
     let xi = rule.reach * v;
     let (tree, drift) = (&e.system.tree, &e.system.drift);
-    let mut grown = rates.clone();
-    for (k, mut column) in grown.column_iter_mut().enumerate() {
-        let mut own = rule.impulse(e, &column.clone_owned());
-        if !drift.is_none() {
-            own -= rule.h * drift.turn(&e.frame_dual(&e.mass_matrix.column(k).into_owned()));
-        }
-        column.copy_from(&tree.chart_momentum(&e.q, &xi, &own));
+    let [_, _, by_hat] = tree.chart_momentum_slopes(&e.q, &xi, &DVector::zeros(v.len()));
+    let mut grown = columns(rates, |rate| rule.impulse(e, rate));
+    if !drift.is_none() {
+        grown -= columns(e.mass_matrix(), |m| rule.h * drift.turn(&e.frame_dual(m)));
     }
+    let grown = tree.blocks_times(&by_hat, &grown);
     let grown = split.block(&grown);
     let grown = 0.5 * (&grown + grown.transpose());
-    let m = split.block(&e.mass_matrix);
-    if grown.is_empty() || (CHANGE * &m - &grown).cholesky().is_some() {
+    let m = split.block(e.mass_matrix());
+    if grown.is_empty() || Definite::new(CHANGE * &m - &grown).is_some() {
         return None;
     }
     let lower = m.cholesky()?.unpack();
@@ -177,8 +171,8 @@ impl<'s, 'a> Equation<'s, 'a> {
             e,
             hat,
             rule,
-            summands: e.mass_matrix.abs(),
-            scale: start.split.scale(&e.mass_matrix),
+            summands: e.mass_matrix().abs(),
+            scale: start.split.scale(e.mass_matrix()),
             least: 0.0,
         };
         let rest = out.sized(&e.rest_momentum);
@@ -213,13 +207,20 @@ impl<'s, 'a> Equation<'s, 'a> {
     }
 
     /// The factor of its matrix at a trial.
-    fn factor(&self, now: &Trial, rates: &DMatrix<f64>) -> LU<f64, Dyn, Dyn> {
+    fn factor(&self, now: &Trial, rates: &DMatrix<f64>) -> General {
         let Trial { v, reached, .. } = now;
-        stage_matrix(self.e, self.start.split, v, rates, reached, self.rule).lu()
+        General::new(stage_matrix(
+            self.e,
+            self.start.split,
+            v,
+            rates,
+            reached,
+            self.rule,
+        ))
     }
 
     /// The same at the first trial of a step, if the step isn't too long.
-    pub fn first_factor(&self, now: &Trial) -> std::result::Result<LU<f64, Dyn, Dyn>, Halt> {
+    pub fn first_factor(&self, now: &Trial) -> std::result::Result<General, Halt> {
         let (e, start) = (self.e, &self.start);
         let rates = e.force_velocity_jacobian(&now.v, &start.input.control)?;
         if start.plan.may_cut()
@@ -259,7 +260,7 @@ pub(super) fn solve_stage<'a>(
         let factor = if iteration == 0 {
             let factor = equation.first_factor(&now)?;
             let at = |v| equation.at(v);
-            if let Some(found) = quasi::descend(split, &e.mass_matrix, &factor, &now, 0.0, at) {
+            if let Some(found) = quasi::descend(split, e.mass_matrix(), &factor, &now, 0.0, at) {
                 return Ok(found.into());
             }
             factor
@@ -418,7 +419,7 @@ pub(super) struct AdjointStage {
     /// The stage matrix.
     pub matrix: DMatrix<f64>,
     /// Factor of the transposed stage matrix.
-    factor: LU<f64, Dyn, Dyn>,
+    factor: General,
 }
 
 impl AdjointStage {
@@ -432,7 +433,7 @@ impl AdjointStage {
     ) -> Result<Self> {
         let rates = e.force_velocity_jacobian(v, &start.input.control)?;
         let matrix = stage_matrix(e, start.split, v, &rates, reached, rule);
-        let factor = matrix.transpose().lu();
+        let factor = General::new(matrix.transpose());
         Ok(Self {
             rates,
             matrix,
@@ -464,7 +465,7 @@ pub(super) fn solve_columns(
     if split.free.is_empty() {
         return Ok(DMatrix::zeros(right.nrows(), right.ncols()));
     }
-    let solution = matrix.lu().solve(&split.take_rows(right));
+    let solution = General::new(matrix).solve_columns(&split.take_rows(right));
     Ok(split.put_rows(&solution.ok_or_else(|| singular("tangent"))?))
 }
 

@@ -53,7 +53,7 @@ fn noise(e: &Linearisation) -> f64 {
 
 /// Relative change between two velocities, each joint coordinate weighed by its inertia.
 fn change(e: &Linearisation, a: &DVector<f64>, b: &DVector<f64>) -> f64 {
-    let weight = e.mass_matrix.diagonal().map(|m| m.max(0.0).sqrt());
+    let weight = e.mass_matrix().diagonal().map(|m| m.max(0.0).sqrt());
     let size = b.component_mul(&weight).norm();
     let step = (a - b).component_mul(&weight).norm();
     if step == 0.0 { 0.0 } else { step / size }
@@ -111,7 +111,7 @@ fn at_once(
         let m = middle(start, &v)?;
         Equation::new(start, &m, p, rule).at(v)
     };
-    let mass_matrix = &m.mass_matrix;
+    let mass_matrix = m.mass_matrix();
     Ok(quasi::descend(
         split,
         mass_matrix,

@@ -5,7 +5,8 @@
 //! C. T. Kelley, "Solving Nonlinear Equations with Newton's Method", 2003, chapter 4.
 
 use super::split::Split;
-use nalgebra::{DMatrix, DVector, Dyn, LU};
+use crate::adjoint::solve::General;
+use nalgebra::{DMatrix, DVector};
 
 /// Most steps.
 const STEPS: usize = 12;
@@ -41,7 +42,7 @@ impl Trial {
 pub(super) fn descend(
     split: &Split,
     mass_matrix: &DMatrix<f64>,
-    factor: &LU<f64, Dyn, Dyn>,
+    factor: &General,
     first: &Trial,
     noise: f64,
     at: impl Fn(DVector<f64>) -> crate::Result<Trial>,

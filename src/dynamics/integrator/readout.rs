@@ -2,38 +2,19 @@
 
 use super::split::{Split, When};
 use super::{State, StateTangents, StepBar, Stepper};
-use crate::adjoint::solve::{Definite, smallest_scaled_eigenvalue};
+use crate::Result;
 use crate::dynamics::slopes::columns;
 use crate::dynamics::{Evaluation, InputTangents, Linearisation, Slopes};
-use crate::{Error, Result};
 use nalgebra::{DMatrix, DVector};
-
-/// The free block of the mass matrix, factored.
-pub(super) fn factor(e: &Evaluation, split: &Split) -> Result<Definite> {
-    let block = split.block(&e.mass_matrix);
-    let smallest = smallest_scaled_eigenvalue(&block);
-    let unresolved = |remedy: &str| Error::Unresolved {
-        place: "mass matrix M(q)".into(),
-        quantity: "smallest eigenvalue, diagonal scaled to one".into(),
-        value: smallest,
-        limit: 1e-13,
-        remedy: remedy.into(),
-    };
-    if smallest.is_nan() || smallest <= 1e-13 {
-        return Err(unresolved(
-            "M must be positive definite. At the start: give massless bodies mass, inertia or added \
-             mass, or refine the meshes where a gap isn't resolved. Later: the run may have blown up, \
-             take a smaller time step or the integrator midpoint",
-        ));
-    }
-    Definite::new(block).ok_or_else(|| unresolved("M must be positive definite"))
-}
 
 /// v with driven entries given and free ones from momentum p̂.
 pub(super) fn solve(e: &Evaluation, split: &Split, hat: &DVector<f64>) -> Result<DVector<f64>> {
-    let factor = factor(e, split)?;
-    let right = e.user_momentum(hat) - &e.rest_momentum - &e.mass_matrix * &split.driven;
-    Ok(&split.driven + split.put(&factor.solve(&split.take(&right))))
+    let factor = e.factored(&split.free)?;
+    let mut right = e.user_momentum(hat) - &e.rest_momentum;
+    if split.driven.iter().any(|x| *x != 0.0) {
+        right -= e.mass_times(&split.driven);
+    }
+    Ok(&split.driven + factor.solve(&right))
 }
 
 /// Tangents of [`solve`] along those of q, p̂ and the parameters, from the derivatives of M v + p_rest: M dv = Xᵀ dp̂ + d(Xᵀ) p̂ − d(M v + p_rest).
@@ -47,8 +28,7 @@ pub(super) fn solve_jvp(
 ) -> Result<DMatrix<f64>> {
     let right = e.frame_matrix().tr_mul(&at.y) + e.frame_momentum_slope(hat) * &at.q
         - momentum.along(&at.q, None, inputs);
-    let free = factor(e, split)?.solve_columns(&split.take_rows(&right));
-    Ok(split.put_rows(&free))
+    Ok(e.factored(&split.free)?.solve_columns(&right))
 }
 
 /// Transpose of [`solve`], added to `bar` (y is p̂ here).
@@ -60,7 +40,7 @@ pub(super) fn solve_vjp(
     v_bar: &DVector<f64>,
     bar: &mut StepBar,
 ) -> Result<()> {
-    let w = split.put(&factor(e, split)?.solve_vjp(&split.take(v_bar)));
+    let w = e.factored(&split.free)?.solve_vjp(v_bar);
     bar.add(-1.0, &e.momentum_vjp(v, &w)?);
     bar.state.q += e.frame_velocity_vjp(&w, hat);
     bar.state.y += e.frame_velocity(&w);

@@ -5,23 +5,23 @@
 use super::contact;
 use super::stages::{ContactVelocities, Stages, StepDerivatives};
 use super::start::Start;
-use super::{State, StateBar, StateTangents, StepBar, StepTangents, readout};
+use super::{State, StateBar, StateTangents, StepBar, StepTangents};
 use crate::Result;
-use crate::adjoint::solve::Definite;
+use crate::dynamics::Inertia;
+use crate::dynamics::slopes::columns;
 use nalgebra::DVector;
 
 /// Acceleration, with the factored mass matrix of free velocities: driven joints reach their new velocity within the step, the
 /// others follow Eq. 3.
-fn acceleration(start: &Start) -> Result<(DVector<f64>, Definite)> {
+fn acceleration(start: &Start) -> Result<(DVector<f64>, Inertia)> {
     let (s, e, split, v) = (start.stepper, start.e, start.split, start.v);
     let mut driven = (&split.driven - v) / s.dt;
     for &i in &split.free {
         driven[i] = 0.0;
     }
-    let right = e.inertial_force(v, &start.input.control)? - &e.mass_matrix * &driven;
-    let factor = readout::factor(e, split)?;
-    let free = factor.solve(&split.take(&right));
-    Ok((driven + split.put(&free), factor))
+    let right = e.inertial_force(v, &start.input.control)? - e.mass_times(&driven);
+    let factor = e.factored(&split.free)?;
+    Ok((driven + factor.solve(&right), factor))
 }
 
 pub(super) fn step(start: &Start) -> Result<(State, Stages)> {
@@ -39,7 +39,7 @@ pub(super) struct Adjoint<'s> {
     contact: contact::Adjoint<'s>,
     acceleration: DVector<f64>,
     /// Of the mass matrix of free velocities.
-    factor: Definite,
+    factor: Inertia,
 }
 
 impl<'s> Adjoint<'s> {
@@ -66,11 +66,11 @@ impl<'a> StepDerivatives<'a> for Adjoint<'_> {
         }
         let right = force.along(q, Some(along.v), inputs)
             - inertia.along(q, None, inputs)
-            - &e.mass_matrix * driven;
-        let gained = self.factor.solve_columns(&split.take_rows(&right));
-        let before = split.take_rows(along.v) + s.dt * gained;
-        self.contact
-            .velocity_jvp(start, along, &split.put_rows(&before))
+            - columns(&driven, |v| e.mass_times(v));
+        let mut before = along.v.clone();
+        split.forget_driven_rows(&mut before);
+        before += s.dt * self.factor.solve_columns(&right);
+        self.contact.velocity_jvp(start, along, &before)
     }
 
     fn vjp(&self, start: &Start<'_, 'a>, next_bar: &StateBar) -> Result<StepBar> {
@@ -84,12 +84,12 @@ impl<'a> StepDerivatives<'a> for Adjoint<'_> {
         split.forget_driven(&mut v_bar);
         bar.v += &v_bar;
         // Free rows of M a = G − M_fd a_d, a_d = (v_d − v)/Δt.
-        let w = split.put(&self.factor.solve_vjp(&split.take(&(s.dt * &v_bar))));
+        let w = self.factor.solve_vjp(&(s.dt * &v_bar));
         let force = e.inertial_force_vjp(start.v, &start.input.control, &w)?;
         bar.v += &force.v;
         bar.add(1.0, &force);
         bar.add(-1.0, &e.mass_vjp(&self.acceleration, &w)?);
-        let through_driven = &e.mass_matrix * &w / s.dt;
+        let through_driven = e.mass_times(&w) / s.dt;
         for (i, driven) in split.is_driven.iter().enumerate() {
             if *driven {
                 bar.v[i] += through_driven[i];

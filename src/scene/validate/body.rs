@@ -3,10 +3,10 @@
 use nalgebra::{Matrix3, Matrix6};
 
 use super::{bounded, finite, limits, list, place};
-use crate::scene::{Body, Motion, Scene, Shape};
+use crate::scene::{Body, Carriers, Motion, Scene, Shape};
 use crate::{Error, Result};
 
-pub(super) fn check(scene: &Scene, index: usize) -> Result<()> {
+pub(super) fn check(scene: &Scene, carriers: &Carriers, index: usize) -> Result<()> {
     let body = &scene.bodies[index];
     for (field, placement) in [("shape_at", &body.shape_at), ("placement", &body.placement)] {
         finite(
@@ -20,23 +20,23 @@ pub(super) fn check(scene: &Scene, index: usize) -> Result<()> {
     }
     check_shape(body)?;
     check_collision(body)?;
-    check_mass(body, scene.is_static(index))?;
+    check_mass(body, carriers.is_static(index))?;
     if let Some(rows) = &body.added_mass {
         check_added_mass(body, rows)?;
     }
     check_joint(body)?;
-    if body.thruster && scene.is_static(index) {
+    if body.thruster && carriers.is_static(index) {
         return Err(Error::input(
             place(body, "thruster"),
             true,
             "the body can't move, so a thruster does nothing; give it a joint or take it away",
         ));
     }
-    check_overlap(scene, index)?;
+    check_overlap(scene, carriers, index)?;
     check_drag(body)
 }
 
-fn check_overlap(scene: &Scene, index: usize) -> Result<()> {
+fn check_overlap(scene: &Scene, carriers: &Carriers, index: usize) -> Result<()> {
     let body = &scene.bodies[index];
     if !body.overlaps_parent {
         return Ok(());
@@ -53,7 +53,7 @@ fn check_overlap(scene: &Scene, index: usize) -> Result<()> {
         (_, None) => refused(
             "the body has no shape that could overlap: take `overlaps_parent` away, or give it one",
         ),
-        _ if scene.submerged_parent(index).is_none() => refused(
+        _ if carriers.submerged_parent(index).is_none() => refused(
             "none of the bodies that carry this one has a shape to overlap: take `overlaps_parent` \
              away",
         ),

@@ -25,41 +25,14 @@ impl Scene {
         self.check_world()?;
         self.check_names()?;
         self.check_tree()?;
+        let carriers = self.carriers();
         for index in 0..self.bodies.len() {
-            body::check(self, index)?;
+            body::check(self, &carriers, index)?;
         }
         self.check_forces()?;
         start::check(self)?;
         contact::check(self)?;
         self.check_controller()
-    }
-
-    /// Whether this body can't move at all: fixed or locked joints all the way to the world.
-    /// The tree must have been checked.
-    pub(crate) fn is_static(&self, index: usize) -> bool {
-        let body = &self.bodies[index];
-        let held = body.joint.velocities() == 0 || body.locked;
-        let parent = body.parent.as_ref().and_then(|name| self.body(name));
-        held && parent.is_none_or(|parent| self.is_static(parent.0))
-    }
-
-    /// The nearest body with a shape among those that carry this one: what `overlaps_parent` speaks
-    /// of. The tree must have been checked.
-    pub(crate) fn submerged_parent(&self, index: usize) -> Option<usize> {
-        let parent = self.bodies[index].parent.as_ref()?;
-        let parent = self.body(parent)?.0;
-        match self.bodies[parent].shape {
-            Some(_) => Some(parent),
-            None => self.submerged_parent(parent),
-        }
-    }
-
-    /// Pairs of bodies declared to overlap, the carrying one first. The scene must have been checked.
-    pub(crate) fn overlapping(&self) -> Vec<(usize, usize)> {
-        let declared = (0..self.bodies.len()).filter(|&b| self.bodies[b].overlaps_parent);
-        declared
-            .filter_map(|b| Some((self.submerged_parent(b)?, b)))
-            .collect()
     }
 
     fn check_world(&self) -> Result<()> {
@@ -152,12 +125,13 @@ impl Scene {
         Ok(())
     }
 
-    fn parent(&self, body: &Body) -> Result<Option<usize>> {
+    /// The number of a body's parent, found among those that there are.
+    fn parent(&self, body: &Body, found: Option<usize>) -> Result<Option<usize>> {
         let Some(name) = &body.parent else {
             return Ok(None);
         };
-        if let Some(parent) = self.body(name) {
-            return Ok(Some(parent.0));
+        if found.is_some() {
+            return Ok(found);
         }
         let names = || self.bodies.iter().map(|b| b.name.as_str());
         let remedy = match nearest(name, names()) {
@@ -176,7 +150,9 @@ impl Scene {
 
     /// Parents exist, stand before their children, and no body carries itself.
     fn check_tree(&self) -> Result<()> {
-        let each = self.bodies.iter().map(|body| self.parent(body));
+        let carriers = self.carriers();
+        let each = self.bodies.iter().enumerate();
+        let each = each.map(|(b, body)| self.parent(body, carriers.parent(b)));
         let parents = each.collect::<Result<Vec<_>>>()?;
         for (i, body) in self.bodies.iter().enumerate() {
             if let Some(cycle) = chain(i, &parents) {

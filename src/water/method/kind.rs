@@ -107,7 +107,7 @@ impl<'a> Problem<'a> {
         numerics: &'a Numerics,
     ) -> Self {
         let number = |b: usize| numbers.iter().position(|w| *w == b);
-        let declared = scene.overlapping().into_iter();
+        let declared = scene.carriers().overlapping().into_iter();
         let pairs = declared.filter_map(|(a, b)| Some((number(a)?, number(b)?)));
         Self {
             bodies,

@@ -76,7 +76,7 @@ fn exchanges(simulator: &Simulator, steps: usize) -> Vec<Exchange> {
     for (state, sample) in rollout.states().iter().zip(rollout.samples()).take(steps) {
         let e = stepper.linearise(&state.q).unwrap();
         let [before, after] = velocities(&stepper, &e, state, &sample.v);
-        let kinetic = |v: &DVector<f64>| 0.5 * v.dot(&(&e.mass_matrix * v));
+        let kinetic = |v: &DVector<f64>| 0.5 * v.dot(&(e.mass_matrix() * v));
         out.push(Exchange {
             gained: kinetic(&after) - kinetic(&before),
             released: released(&e, &after),

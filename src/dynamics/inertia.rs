@@ -1,0 +1,194 @@
+//! The mass matrix M(q) = M_r + ρ Jᵀ M̄_f J: its products, itself, and its factor.
+
+use super::fluid::FluidMomenta;
+use super::{Evaluation, Parameters, System};
+use crate::adjoint::lie::{Mat6, Vec6};
+use crate::adjoint::rigid;
+use crate::adjoint::solve::{Definite, smallest_scaled_eigenvalue};
+use crate::multibody::Articulated;
+use crate::{Error, Result};
+use nalgebra::{DMatrix, DVector};
+
+/// Smallest eigenvalue, the diagonal scaled to one, from which on an inertia counts as positive definite.
+const LEAST: f64 = 1e-13;
+
+/// The rows and columns of the mass matrix that forces decide, factored. Right-hand sides and solutions have an entry per velocity; those of driven ones aren't read,
+/// and zero.
+pub enum Inertia {
+    /// The matrix, and the velocities that are free.
+    Dense(Definite, Vec<usize>),
+    /// Where no body feels another.
+    Articulated(Articulated),
+}
+
+impl Evaluation<'_> {
+    /// M(q) v, user coordinates.
+    pub fn mass_times(&self, v: &DVector<f64>) -> DVector<f64> {
+        if let FluidMomenta::Coupled(_) = self.fluid {
+            return self.mass_matrix() * v;
+        }
+        let tree = &self.system.tree;
+        let twists = tree.twists(&self.kinematics, v);
+        let fluid = self.fluid_momenta(&self.virtual_direction(v));
+        let momenta = self.with_rigid(&twists, &fluid);
+        tree.project(&self.kinematics.columns, momenta)
+    }
+
+    /// ½ vᵀ M(q) v, J.
+    pub(super) fn mass_energy(&self, v: &DVector<f64>) -> f64 {
+        0.5 * v.dot(&self.mass_times(v))
+    }
+
+    /// M(q), user coordinates, nv × nv: made when it is first asked for. Its products and solves don't ask for it where no body feels another.
+    pub fn mass_matrix(&self) -> &DMatrix<f64> {
+        self.mass_matrix.get_or_init(|| {
+            let made = match self.fluid {
+                FluidMomenta::Coupled(_) => self.rigid_and_coupled(),
+                FluidMomenta::Apart(_) | FluidMomenta::Still => {
+                    let islands = self.islands();
+                    let changes = islands.changes();
+                    let products: Vec<_> = changes.iter().map(|v| self.mass_times(v)).collect();
+                    islands.matrix(&products)
+                }
+            };
+            0.5 * (&made + made.transpose())
+        })
+    }
+
+    fn rigid_and_coupled(&self) -> DMatrix<f64> {
+        let (tree, rho) = (&self.system.tree, self.parameters.density());
+        let nv = tree.velocities();
+        let mut out = DMatrix::zeros(nv, nv);
+        let mut is_behind = vec![false; self.system.len()];
+        for (a, link) in tree.links().iter().enumerate() {
+            for (b, other) in tree.links().iter().enumerate() {
+                is_behind[b] = b == a || other.parent.is_some_and(|p| is_behind[p]);
+            }
+            for k in link.v.clone() {
+                let mut momenta = self.fluid.column(self.system, &self.kinematics, k);
+                for (b, momentum) in momenta.iter_mut().enumerate() {
+                    *momentum *= rho;
+                    if is_behind[b] {
+                        *momentum += self.rigid_momentum(b, &self.kinematics.columns[k]);
+                    }
+                }
+                out.set_column(k, &tree.project(&self.kinematics.columns, momenta));
+            }
+        }
+        out
+    }
+
+    /// Factors the rows and columns of M(q) of the velocities `free`.
+    ///
+    /// # Errors
+    /// A mass matrix that isn't positive definite.
+    pub fn factored(&self, free: &[usize]) -> Result<Inertia> {
+        let added = match self.fluid {
+            FluidMomenta::Coupled(_) => return self.factored_dense(free),
+            FluidMomenta::Apart(added) => Some(added),
+            FluidMomenta::Still => None,
+        };
+        let mut inertias = self.rigid.clone();
+        if let Some(added) = added {
+            for (b, w) in self.system.submerged() {
+                inertias[b] += self.parameters.density() * added[w];
+            }
+        }
+        let mut is_free = vec![false; self.system.tree.velocities()];
+        free.iter().for_each(|i| is_free[*i] = true);
+        let (tree, kinematics) = (&self.system.tree, &self.kinematics);
+        Articulated::new(tree, kinematics, &inertias, |i| is_free[i], LEAST)
+            .map(Inertia::Articulated)
+            .map_err(|found| {
+                let name = &self.system.bodies[found.body].name;
+                let place = format!("mass matrix M(q), at the joint of body {name:?}");
+                unresolved(place, found.smallest)
+            })
+    }
+
+    fn factored_dense(&self, free: &[usize]) -> Result<Inertia> {
+        let block = self.mass_matrix().select_rows(free).select_columns(free);
+        let smallest = smallest_scaled_eigenvalue(&block);
+        let place = || "mass matrix M(q)".to_string();
+        if smallest.is_nan() || smallest <= LEAST {
+            return Err(unresolved(place(), smallest));
+        }
+        let factor = Definite::new(block).ok_or_else(|| unresolved(place(), smallest))?;
+        Ok(Inertia::Dense(factor, free.to_vec()))
+    }
+
+    /// Wrenches, spatial, that change the momentum at v = 0: that of the water as the current moves it, and that of the bodies relative to what may drift.
+    pub(super) fn rest_wrenches(&self) -> Vec<Vec6> {
+        let (system, rho) = (self.system, self.parameters.density());
+        let still = DVector::zeros(system.tree.velocities());
+        let mut out = self.fluid_momenta(&self.through_water(&still));
+        for (b, wrench) in out.iter_mut().enumerate() {
+            *wrench = rho * *wrench - self.rigid_momentum(b, system.drift.of(b));
+        }
+        out
+    }
+}
+
+fn unresolved(place: String, smallest: f64) -> Error {
+    Error::Unresolved {
+        place,
+        quantity: "smallest eigenvalue, diagonal scaled to one".into(),
+        value: smallest,
+        limit: LEAST,
+        remedy: "M must be positive definite. At the start: give massless bodies mass, inertia or added \
+                 mass, or refine the meshes where a gap isn't resolved. Later: the run may have blown up, \
+                 take a smaller time step or the integrator midpoint"
+            .into(),
+    }
+}
+
+impl Inertia {
+    /// v with M v = `right` on the free rows.
+    pub fn solve(&self, right: &DVector<f64>) -> DVector<f64> {
+        match self {
+            Self::Articulated(tree) => tree.solve(right),
+            Self::Dense(factor, free) => {
+                let found = factor.solve(&right.select_rows(free));
+                let mut out = DVector::zeros(right.len());
+                for (x, i) in found.iter().zip(free) {
+                    out[*i] = *x;
+                }
+                out
+            }
+        }
+    }
+
+    /// The same of every column.
+    pub fn solve_columns(&self, right: &DMatrix<f64>) -> DMatrix<f64> {
+        match self {
+            Self::Articulated(tree) => tree.solve_columns(right),
+            Self::Dense(factor, free) => {
+                let found = factor.solve_columns(&right.select_rows(free));
+                let mut out = DMatrix::zeros(right.nrows(), right.ncols());
+                for (x, i) in found.row_iter().zip(free) {
+                    out.row_mut(*i).copy_from(&x);
+                }
+                out
+            }
+        }
+    }
+
+    /// Cotangent of the right-hand side from that of the solution: M is symmetric.
+    pub fn solve_vjp(&self, v_bar: &DVector<f64>) -> DVector<f64> {
+        self.solve(v_bar)
+    }
+}
+
+impl System {
+    /// Rigid inertias of the bodies, body frames.
+    pub(super) fn rigid_inertias(&self, parameters: &Parameters) -> Vec<Mat6> {
+        let of = |b: usize| {
+            rigid::spatial_inertia(
+                parameters.mass(b),
+                &self.bodies[b].center_of_mass,
+                &parameters.inertia(b),
+            )
+        };
+        (0..self.len()).map(of).collect()
+    }
+}

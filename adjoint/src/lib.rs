@@ -10,6 +10,7 @@ mod draw;
 pub mod kernel;
 pub mod lie;
 mod registry;
+pub mod revolve;
 pub mod rigid;
 pub mod sample;
 pub mod solve;

@@ -183,17 +183,38 @@ pub fn reverse<S: Step>(
     step: &S,
     tape: &TapeOf<S>,
     seeds: &[S::Seed],
-    mut progress: impl FnMut(usize) -> Result<(), S::Error>,
+    progress: impl FnMut(usize) -> Result<(), S::Error>,
 ) -> Result<Swept<S>, S::Error> {
     assert_eq!(seeds.len(), tape.states.len(), "one seed per state");
     let last = tape.records.len();
-    let (mut bar, partial) = step.last_vjp(
+    let (bar, partial) = step.last_vjp(
         last,
         &tape.states[last],
         &tape.observations[last],
         &seeds[last],
     )?;
-    let mut partials = vec![partial];
+    let (bar, mut partials) = reverse_from(step, tape, bar, seeds, progress)?;
+    partials.push(partial);
+    Ok((bar, partials))
+}
+
+/// As [`reverse`], from the cotangent of the last state, of which no seed is read.
+///
+/// # Errors
+/// As there.
+///
+/// # Panics
+/// If there isn't one seed per state but the last.
+pub fn reverse_from<S: Step>(
+    step: &S,
+    tape: &TapeOf<S>,
+    mut bar: S::Cotangent,
+    seeds: &[S::Seed],
+    mut progress: impl FnMut(usize) -> Result<(), S::Error>,
+) -> Result<Swept<S>, S::Error> {
+    let last = tape.records.len();
+    assert!(seeds.len() >= last, "one seed per state but the last");
+    let mut partials = Vec::with_capacity(last + 1);
     for (n, record) in tape.records.iter().enumerate().rev() {
         let (previous, partial) = step.step_vjp(n, record, &bar, &seeds[n])?;
         bar = previous;

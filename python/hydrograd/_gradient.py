@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
 import numpy as np
 from numpy.typing import NDArray
@@ -26,6 +26,8 @@ class Gradient:
     """Of the physical parameters, by name."""
     gains: NDArray[np.float64]
     """Of the gains of the scene's controller, (gains,)."""
+    warnings: list[str] = field(default_factory=list)
+    """What one should know of it: that it grew out of all proportion."""
 
 
 @dataclass(frozen=True, eq=False)

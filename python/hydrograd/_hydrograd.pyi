@@ -283,6 +283,11 @@ class Scene:
         reach: float | None = None,
         name: str | None = None,
     ) -> None: ...
+    def add_site(
+        self, name: str, body: _Body, position: ArrayLike | None = None, rotation: ArrayLike | None = None
+    ) -> int: ...
+    @property
+    def site_names(self) -> list[str]: ...
     def set_initial(
         self, q: ArrayLike | None = None, v: ArrayLike | None = None, *, momentum: ArrayLike | None = None
     ) -> None:
@@ -359,6 +364,14 @@ class Simulator:
     ) -> list[Rollout]:
         """Runs many controls, (batch, steps, control_size), on all cores: the same rollouts, to the bit, as one after the other.
         `q` (batch, q_size) and `v` (batch, v_size) are where each begins, if given. Where some fail, the `BatchError` has what ran and each one's error."""
+    def gradient_in_parts(
+        self,
+        objective: Objective,
+        controls: ArrayLike | None = None,
+        *,
+        steps: int | None = None,
+        memory: float = 1e8,
+    ) -> tuple[float, Gradient]: ...
     def state(
         self,
         q: ArrayLike | None = None,
@@ -374,6 +387,12 @@ class Simulator:
     def step(self, state: State, u: ArrayLike | None = None) -> tuple[State, Record]:
         """One step from a state with the controls `u` (control_size,), N and N m: the next state, and the record that has the
         step's derivatives. The steps of a rollout, to the bit."""
+    def equations(self, q: ArrayLike | None = None) -> Equations: ...
+    def integrate(self, q: ArrayLike, xi: ArrayLike) -> _Array: ...
+    def difference(self, start: ArrayLike, end: ArrayLike) -> _Array: ...
+    def linearise(
+        self, q: ArrayLike | None = None, v: ArrayLike | None = None, u: ArrayLike | None = None
+    ) -> tuple[_Array, _Array]: ...
     def gradcheck(self, steps: int | None = None, *, directions: int = 4, seed: int = 0) -> dict[str, Any]:
         """Holds the gradient of a rollout of `steps` steps (the scene's number by default) against central differences, along so many random `directions` in each group (controls,
         initial state, parameters, gains), and says by how much the trajectory magnifies small changes. A dictionary: "max_rel_error", the largest over all directions of the smallest
@@ -458,6 +477,41 @@ class Simulator:
     @property
     def warnings(self) -> list[str]:
         """What should be known about the scene and its start, with names and numbers."""
+
+@final
+class Equations:
+    @property
+    def q(self) -> _Array: ...
+    @property
+    def positions(self) -> _Array: ...
+    @property
+    def rotations(self) -> _Array: ...
+    @property
+    def center_of_mass(self) -> _Array: ...
+    @property
+    def center_of_buoyancy(self) -> _Array: ...
+    @property
+    def potential_energy(self) -> _Array: ...
+    def mass_matrix(self, part: Literal["total", "rigid", "fluid"] = "total") -> _Array: ...
+    def bias_force(self, v: ArrayLike | None = None, u: ArrayLike | None = None) -> _Array: ...
+    def forward_dynamics(
+        self,
+        v: ArrayLike | None = None,
+        u: ArrayLike | None = None,
+        *,
+        force: ArrayLike | None = None,
+        driven: ArrayLike | None = None,
+    ) -> _Array: ...
+    def inverse_dynamics(
+        self, acceleration: ArrayLike, v: ArrayLike | None = None, u: ArrayLike | None = None
+    ) -> _Array: ...
+    def jacobian(self, body: _Body, point: ArrayLike | None = None) -> _Array: ...
+    def velocity(self, body: _Body, v: ArrayLike, point: ArrayLike | None = None) -> _Array: ...
+    def acceleration(
+        self, body: _Body, v: ArrayLike, acceleration: ArrayLike, point: ArrayLike | None = None
+    ) -> _Array: ...
+    def kinetic_energy(self, v: ArrayLike) -> _Array: ...
+    def momentum(self, v: ArrayLike) -> _Array: ...
 
 @final
 class State:

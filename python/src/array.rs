@@ -1,7 +1,7 @@
 //! Numbers from Python and arrays to Python, with errors that name what was given.
 
 use crate::error::input;
-use nalgebra::{DMatrix, Vector3};
+use nalgebra::{DMatrix, DVector, Vector3};
 use numpy::{
     PyArray1, PyArrayDyn, PyArrayMethods, PyReadonlyArrayDyn, PyUntypedArray, PyUntypedArrayMethods,
 };
@@ -137,6 +137,67 @@ pub fn or_zeros<const N: usize>(
     given: Option<&Bound<'_, PyAny>>,
 ) -> PyResult<[f64; N]> {
     given.map_or(Ok([0.0; N]), |given| fixed(place, given))
+}
+
+/// One row of numbers, or many.
+#[derive(Clone)]
+pub struct Rows {
+    /// The rows.
+    pub values: Vec<DVector<f64>>,
+    /// Whether they have an index of their own.
+    pub is_many: bool,
+}
+
+impl Rows {
+    /// One.
+    pub fn one(row: DVector<f64>) -> Self {
+        Self {
+            values: vec![row],
+            is_many: false,
+        }
+    }
+
+    /// Those given, or this one.
+    pub fn or(
+        place: &str,
+        given: Option<&Bound<'_, PyAny>>,
+        default: &DVector<f64>,
+    ) -> PyResult<Self> {
+        match given {
+            Some(given) => rows(place, given, default.len()),
+            None => Ok(Self::one(default.clone())),
+        }
+    }
+
+    /// Row `i`, or the one for all.
+    pub fn row(&self, i: usize) -> &DVector<f64> {
+        &self.values[if self.is_many { i } else { 0 }]
+    }
+
+    /// As an array.
+    pub fn to_python<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyArrayDyn<f64>>> {
+        let n = self.values.first().map_or(0, DVector::len);
+        let all = self.values.iter().flat_map(|row| row.as_slice().to_vec());
+        match self.is_many {
+            true => to_python(py, all.collect(), &[self.values.len(), n]),
+            false => to_python(py, all.collect(), &[n]),
+        }
+    }
+}
+
+/// Rows of `n` finite numbers: (n,) is one, (N, n) are many.
+pub fn rows(place: &str, given: &Bound<'_, PyAny>, n: usize) -> PyResult<Rows> {
+    let is_many = numbers(place, given)?.shape().len() == 2;
+    let found = match is_many {
+        true => array(place, given, &[Dim::Any("N"), Dim::Is(n)])?,
+        false => array(place, given, &[Dim::Is(n)])?,
+    };
+    let count = if is_many { found.shape[0] } else { 1 };
+    let values = (0..count).map(|i| DVector::from_column_slice(&found.values[i * n..(i + 1) * n]));
+    Ok(Rows {
+        values: values.collect(),
+        is_many,
+    })
 }
 
 /// Any number of finite numbers in a row.

@@ -36,6 +36,7 @@ pub fn of_rollout<'py>(
         vector(py, &gradient.initial.v)?,
         by_name(py, &gradient.parameters)?,
         array::to_python(py, gradient.gains.clone(), &[gradient.gains.len()])?,
+        gradient.warnings.clone(),
     );
     class(py, "Gradient")?.call1(parts)
 }

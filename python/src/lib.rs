@@ -3,6 +3,7 @@
 mod array;
 mod body;
 mod contact;
+mod equations;
 mod error;
 mod fluid;
 mod gradcheck;
@@ -96,6 +97,7 @@ fn _hydrograd(m: &Bound<'_, PyModule>) -> PyResult<()> {
     m.add_class::<joint::Motion>()?;
     m.add_class::<scene::Scene>()?;
     m.add_class::<simulator::Simulator>()?;
+    m.add_class::<equations::Equations>()?;
     m.add_class::<state::State>()?;
     m.add_class::<state::Record>()?;
     m.add_class::<rollout::Rollout>()?;

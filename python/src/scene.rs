@@ -4,7 +4,7 @@ use crate::array::{fixed, or_zeros, row};
 use crate::body::Body;
 use crate::error::{OrRaise, input};
 use crate::fluid::{Contact, Fluid};
-use hydrograd::scene::{Wall, WallSurface};
+use hydrograd::scene::{Site, Wall, WallSurface};
 use pyo3::prelude::*;
 use pyo3::types::PyDict;
 use std::path::PathBuf;
@@ -141,6 +141,44 @@ impl Scene {
         let force = serde_json::from_str(&text).map_err(|e| not_a_force(kind, e))?;
         self.0.add_force(force);
         Ok(())
+    }
+
+    /// Adds a named frame on a `body` (number or name), at `position` (m) and `rotation` (rotation vector, rad) in its frame, and gives its number: rollouts tell
+    /// "site_positions", "site_rotations" and "site_velocities".
+    #[pyo3(signature = (name, body, position=None, rotation=None))]
+    fn add_site(
+        &mut self,
+        name: &str,
+        body: &Bound<'_, PyAny>,
+        position: Option<&Bound<'_, PyAny>>,
+        rotation: Option<&Bound<'_, PyAny>>,
+    ) -> PyResult<usize> {
+        let named = match body.extract::<usize>() {
+            Ok(number) => self.0.bodies.get(number).map(|b| b.name.clone()),
+            Err(_) => body.extract::<String>().ok(),
+        };
+        let named = named
+            .filter(|name| self.0.body(name).is_some())
+            .ok_or_else(|| {
+                input(
+                    "site: body",
+                    body.to_string(),
+                    format!(
+                        "must be the number or name of a body: {:?}",
+                        self.body_names()
+                    ),
+                )
+            })?;
+        let site = Site::new(name, named)
+            .at(or_zeros("site: position", position)?)
+            .rotated(or_zeros("site: rotation", rotation)?);
+        Ok(self.0.add_site(site))
+    }
+
+    /// Names of the sites, in order.
+    #[getter]
+    fn site_names(&self) -> Vec<String> {
+        self.0.sites.iter().map(|s| s.name.clone()).collect()
     }
 
     /// Where the scene starts: joint coordinates `q` (q_size), generalised velocity `v` (v_size) or, instead of it, generalised

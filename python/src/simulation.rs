@@ -1,10 +1,12 @@
 //! What simulators do: the methods of their class.
 
 use crate::array::{self, Dim, array};
+use crate::equations::Equations;
 use crate::error::{OrRaise, batch, counts, exception, input, own};
-use crate::gradient::by_name;
+use crate::gradient::{self, by_name};
 use crate::interrupt::{long, short};
 use crate::mesh::{Triangles, triangles};
+use crate::objective::Objective;
 use crate::policy::Controller;
 use crate::prepare::{Parts, Start, build, set_gains};
 use crate::rollout::Rollout;
@@ -12,13 +14,13 @@ use crate::scene::Scene;
 use crate::settings::{Keywords, row_or};
 use crate::simulator::Simulator;
 use crate::state::{Record, State};
-use hydrograd::simulate::Halted;
+use hydrograd::simulate::{Checkpoints, Halted};
 use hydrograd::{Controls, dynamics};
 use nalgebra::{DMatrix, DVector};
 use numpy::PyArrayDyn;
 use pyo3::gc::{PyTraverseError, PyVisit};
 use pyo3::prelude::*;
-use pyo3::types::PyDict;
+use pyo3::types::{PyDict, PyTuple};
 use rayon::prelude::*;
 use std::collections::HashMap;
 use std::path::PathBuf;
@@ -254,6 +256,35 @@ impl Simulator {
         gathered(slf, made)
     }
 
+    /// Value and gradient of an `objective` of a run with `controls` (steps, control_size), or of `steps` steps, from where the simulator starts, within `memory` (bytes) for what is
+    /// kept of the run: a rollout keeps some kilobytes a step, which is too much for 10⁵ steps and more. Parts of it run again, so it takes longer; the gradient is that of the
+    /// rollout, to the bit. Ctrl-C ends it.
+    #[pyo3(signature = (objective, controls=None, *, steps=None, memory=1e8))]
+    fn gradient_in_parts<'py>(
+        &self,
+        py: Python<'py>,
+        objective: PyRef<'_, Objective>,
+        controls: Option<&Bound<'_, PyAny>>,
+        #[pyo3(from_py_with = counts::steps)] steps: Option<usize>,
+        memory: f64,
+    ) -> PyResult<(f64, Bound<'py, PyAny>)> {
+        if !(memory > 0.0 && memory.is_finite()) {
+            return Err(input(
+                "gradient_in_parts: memory",
+                memory,
+                "must be a number of bytes above zero",
+            ));
+        }
+        let matrix = self.matrix("gradient_in_parts: controls", controls, steps)?;
+        let (inner, objective) = (self.inner.clone(), objective.0.clone());
+        let made = long(py, move |interrupt| {
+            let controls = Controls::from_matrix(&inner, matrix)?;
+            let kept = Checkpoints::within(&inner, controls.steps(), memory);
+            inner.gradient_in_parts(&controls, &objective, kept, |_, _| interrupt.check())
+        })?;
+        Ok((made.value, gradient::of_rollout(py, &made.gradient)?))
+    }
+
     /// The state at coordinates `q` (q_size,) and generalised velocity `v` (v_size,) after `step` steps; what is None is
     /// where the simulator starts. `mode` is what the scene's controller remembers, `held` (bodies,) whose joints it held in the
     /// step that led here, by default none.
@@ -309,6 +340,43 @@ impl Simulator {
             velocity: record.rollout().samples()[1].v.clone(),
         };
         Ok((next, Record(Arc::new(record), slf.clone().unbind())))
+    }
+
+    /// The equations of motion at the coordinates `q` (q_size,), or at many (N, q_size); default: where the simulator starts.
+    #[pyo3(signature = (q=None))]
+    fn equations(slf: &Bound<'_, Self>, q: Option<&Bound<'_, PyAny>>) -> PyResult<Equations> {
+        Equations::new(slf, q)
+    }
+
+    /// q ⊕ ξ: the configurations that `q` (…, q_size) become by the tangents `xi` (…, v_size); of rotations a rotation vector, rad, in the joint's frame.
+    fn integrate<'py>(
+        &self,
+        q: &Bound<'py, PyAny>,
+        xi: &Bound<'py, PyAny>,
+    ) -> PyResult<Bound<'py, PyArrayDyn<f64>>> {
+        self.integrated(q, xi)
+    }
+
+    /// The tangents (…, v_size) by which `integrate` gets from the configurations `start` (…, q_size) to `end`; of rotations the shorter way.
+    fn difference<'py>(
+        &self,
+        start: &Bound<'py, PyAny>,
+        end: &Bound<'py, PyAny>,
+    ) -> PyResult<Bound<'py, PyArrayDyn<f64>>> {
+        self.differing(start, end)
+    }
+
+    /// The linearisation x₁ ≈ A x₀ + B u of one step in x = (q, v), coordinates in their tangent space, from the states `q` (…, q_size), `v` (…, v_size) and controls
+    /// `u` (…, control_size): A (…, 2 v_size, 2 v_size) and B (…, 2 v_size, control_size), on all cores. What is None is where the simulator starts, and no control.
+    #[pyo3(signature = (q=None, v=None, u=None))]
+    fn linearise<'py>(
+        &self,
+        py: Python<'py>,
+        q: Option<&Bound<'_, PyAny>>,
+        v: Option<&Bound<'_, PyAny>>,
+        u: Option<&Bound<'_, PyAny>>,
+    ) -> PyResult<Bound<'py, PyTuple>> {
+        self.linearised(py, [q, v, u])
     }
 
     /// Holds the gradient of a rollout of `steps` steps (the scene's number by default) against central differences, along so many random `directions` in each group (controls,

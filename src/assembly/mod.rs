@@ -11,13 +11,13 @@ use crate::adjoint::drag::Element;
 use crate::adjoint::lie::Vec3;
 use crate::coupling::Isolated;
 use crate::dynamics::{
-    BodyData, Declarations, Drift, Drive, FreeMotions, Parameters, Stepper, System, force,
+    BodyData, Declarations, Drift, Drive, FreeMotions, Parameters, SiteData, Stepper, System, force,
 };
 use crate::geometry::TriMesh;
 use crate::memory;
 use crate::multibody::Tree;
 use crate::policy::Policy;
-use crate::scene::{Body, Scene};
+use crate::scene::{Body, Scene, Site};
 use crate::water::{self, Clearance, Prepared, Surface, pose};
 use crate::{Error, Result};
 use nalgebra::{DMatrix, DVector};
@@ -173,8 +173,16 @@ pub(crate) fn assemble(
     let forces = force::assemble(&parts, &mut declared);
     let mut parameters = declared.finish();
     let current = Vec3::from(scene.fluid.current);
+    let site = |site: &Site| {
+        Some(SiteData {
+            name: site.name.clone(),
+            body: scene.site_body(site)?.0,
+            pose: pose(&site.placement),
+        })
+    };
     let mut system = System {
         bodies,
+        sites: scene.sites.iter().filter_map(site).collect(),
         drift: Drift::new(&tree, |b| drives[b] == Drive::Free, &current),
         drives,
         forces,

@@ -21,6 +21,9 @@ pub(super) struct Arguments {
         allow_negative_numbers = true
     )]
     scale: f64,
+    /// Writes the mesh's convex hull, which can be simulated whatever is wrong with the mesh: .obj or .stl, in m.
+    #[arg(long, value_name = "FILE")]
+    hull: Option<PathBuf>,
 }
 
 /// Prints the report, good or bad; a bad mesh is a failure of the command as well.
@@ -29,10 +32,25 @@ pub(super) fn main(arguments: &Arguments, output: Output) -> Result<Exit> {
     let mesh = crate::shape::file::read_unchecked(&arguments.file, arguments.scale)?;
     let report = mesh.check();
     let error = report.clone().into_result().err();
+    let hull = match &arguments.hull {
+        None => None,
+        Some(path) => {
+            let hull = mesh.hull()?;
+            crate::shape::file::write(&hull, path)?;
+            let volume = hull.mass_properties().volume;
+            let (faces, path) = (hull.faces().len(), path.display().to_string());
+            Some(report::HullReport {
+                path,
+                faces,
+                volume,
+            })
+        }
+    };
     output.result(&report::MeshFileReport {
         ok: error.is_none(),
         error: error.as_ref().map(ToString::to_string),
         repairs: mesh.repairs,
+        hull,
         mesh: report,
     });
     let Some(error) = error else {
@@ -70,8 +88,20 @@ mod report {
         pub error: Option<String>,
         /// What reading it mended.
         pub repairs: Repairs,
+        /// The hull that was written.
+        #[serde(skip_serializing_if = "Option::is_none")]
+        pub hull: Option<HullReport>,
         #[serde(flatten)]
         pub mesh: MeshReport,
+    }
+
+    /// A convex hull in a file.
+    #[derive(Debug, Serialize)]
+    pub struct HullReport {
+        pub path: String,
+        pub faces: usize,
+        /// m³.
+        pub volume: f64,
     }
 
     impl fmt::Display for MeshFileReport {
@@ -90,7 +120,15 @@ mod report {
             mended(polygons_split, "polygons split into triangles")?;
             mended(merged_same, "vertices merged with one at the same place")?;
             mended(merged_near, "vertices merged with one very near")?;
-            mended(collapsed, "faces without area left out after merging")
+            mended(collapsed, "faces without area left out after merging")?;
+            match &self.hull {
+                None => Ok(()),
+                Some(hull) => write!(
+                    f,
+                    "\n  its convex hull, {} faces, {:.6e} m³, is in {}",
+                    hull.faces, hull.volume, hull.path
+                ),
+            }
         }
     }
 }

@@ -1,6 +1,17 @@
 //! Constants of one body.
 
-use crate::adjoint::lie::Vec3;
+use crate::adjoint::lie::{Pose, Vec3};
+
+/// A frame fixed to a body.
+#[derive(Clone, Debug)]
+pub struct SiteData {
+    /// Name.
+    pub name: String,
+    /// The body.
+    pub body: usize,
+    /// Its pose in the body's frame.
+    pub pose: Pose,
+}
 
 /// Constants of one body.
 #[derive(Clone, Debug)]

@@ -23,7 +23,7 @@ mod stiffness;
 mod symmetry;
 mod system;
 
-pub use body::BodyData;
+pub use body::{BodyData, SiteData};
 pub use contact::{ContactForce, ContactGap, ContactModel, Dual, PairContact};
 pub use cotangents::ForceCotangents;
 pub use drift::Drift;

@@ -1,7 +1,7 @@
 //! A system: the tree, its bodies' constants, and the coupling through the water.
 
 use super::force::ForceModel;
-use super::{BodyData, ContactModel, Drift, JointLimit};
+use super::{BodyData, ContactModel, Drift, JointLimit, SiteData};
 use crate::adjoint::lie::Vec3;
 use crate::coupling::Coupling;
 use crate::multibody::Tree;
@@ -27,6 +27,8 @@ pub struct System {
     pub tree: Tree,
     /// Constants of the bodies, in the tree's order.
     pub bodies: Vec<BodyData>,
+    /// Named frames on bodies.
+    pub sites: Vec<SiteData>,
     /// What moves each joint.
     pub drives: Vec<Drive>,
     /// Forces that don't come from the water's kinetic energy; clones share them.

@@ -155,7 +155,7 @@ impl Tree {
     }
 
     /// Body `b` and those that carry it, up to the world.
-    fn carrying(&self, b: usize) -> impl Iterator<Item = usize> {
+    pub fn carrying(&self, b: usize) -> impl Iterator<Item = usize> {
         std::iter::successors(Some(b), |&x| self.links[x].parent)
     }
 
@@ -202,6 +202,12 @@ impl Tree {
     /// `q ⊕ xi` for all joints.
     pub fn integrate(&self, q: &DVector<f64>, xi: &DVector<f64>) -> DVector<f64> {
         self.per_joint(q, xi, |j, q, x| j.integrate(q, x))
+    }
+
+    /// The `xi` with which [`Tree::integrate`] gets from one configuration to the other; of rotations the shorter way.
+    pub fn difference(&self, from: &DVector<f64>, to: &DVector<f64>) -> DVector<f64> {
+        let [out] = self.joints(|l| [l.joint.difference(l.of_q(from), l.of_q(to))]);
+        out
     }
 
     /// Tangent cotangents of `(q, xi)` of [`Tree::integrate`].

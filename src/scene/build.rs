@@ -49,6 +49,7 @@ impl Scene {
             contact: None,
             bodies: Vec::new(),
             forces: Vec::new(),
+            sites: Vec::new(),
             initial: Initial::default(),
             controller: None,
         }

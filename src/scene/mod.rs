@@ -13,6 +13,7 @@ mod joint;
 mod motion;
 mod origin;
 mod problem;
+mod site;
 mod validate;
 
 pub use crate::geometry::{Refinement, Wall, WallSurface};
@@ -23,6 +24,7 @@ pub(crate) use carriers::Carriers;
 pub use contact::{CollisionPiece, Contact};
 pub use force::{Force, Lubrication, Spring, WATER_VISCOSITY};
 pub use origin::Origin;
+pub use site::Site;
 pub(crate) use validate::impossible_inertia;
 
 use serde::{Deserialize, Serialize};
@@ -56,6 +58,9 @@ pub struct Scene {
     /// Forces between bodies, beside those that bodies have of their own.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub forces: Vec<Force>,
+    /// Named frames on bodies.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub sites: Vec<Site>,
     /// Where the scene starts.
     #[serde(default, skip_serializing_if = "is_default")]
     pub initial: Initial,

@@ -1,6 +1,10 @@
 //! Cotangents that seed a reverse sweep, and the gradient that it yields.
 
-use crate::dynamics::Parameters;
+use super::Simulator;
+use super::grown::Grown;
+use super::trajectory::Partial;
+use crate::Result;
+use crate::dynamics::{Parameters, State, StateBar, StepBar};
 use nalgebra::{DMatrix, DVector};
 use std::collections::BTreeMap;
 
@@ -56,4 +60,68 @@ pub struct Gradient {
     pub parameters: Parameters,
     /// The controller's gains.
     pub gains: Vec<f64>,
+    /// What the user should know of it: that it grew out of all proportion.
+    pub warnings: Vec<String>,
+}
+
+/// A gradient as it is summed, from the last step to the first.
+pub(super) struct Sums {
+    pub gradient: Gradient,
+    grown: Grown,
+}
+
+impl Sums {
+    /// All zero, with controls of this shape.
+    pub fn new(simulator: &Simulator, (controls, steps): (usize, usize)) -> Self {
+        let nv = simulator.system().tree.velocities();
+        Self {
+            gradient: Gradient {
+                controls: DMatrix::zeros(controls, steps),
+                initial: Initial {
+                    q: DVector::zeros(nv),
+                    v: DVector::zeros(nv),
+                },
+                parameters: simulator.parameters().zeros(),
+                gains: vec![0.0; simulator.policy().gains().len()],
+                warnings: Vec::new(),
+            },
+            grown: Grown::default(),
+        }
+    }
+
+    /// Adds what step `n` yields, or the last state; the objective has added cotangents of up to `seed` there.
+    pub fn add(&mut self, n: usize, partial: &Partial, seed: f64) {
+        self.grown.add(n, partial.size, seed);
+        let out = &mut self.gradient;
+        if n < out.controls.ncols() {
+            let mut column = out.controls.column_mut(n);
+            column += &partial.control;
+        }
+        out.parameters.add(&partial.parameters);
+        for (g, x) in out.gains.iter_mut().zip(&partial.gains) {
+            *g += x;
+        }
+    }
+
+    /// Carries the cotangent of the first state on to where the run starts, at the velocity `v`.
+    pub fn start(
+        &mut self,
+        simulator: &Simulator,
+        state: &State,
+        v: &DVector<f64>,
+        bar: &StateBar,
+    ) -> Result<()> {
+        // y₀ = y(q₀, v₀).
+        let stepper = simulator.stepper();
+        let e = stepper.linearise(&state.q)?;
+        let mut out = StepBar::zeros(&e);
+        out.state.q = bar.q.clone();
+        stepper.conserved_vjp(&e, v, &bar.y, &mut out)?;
+        self.gradient.parameters.add(&out.parameters);
+        simulator.forget_driven(&mut out.state.q, &mut out.v);
+        self.gradient.initial.q = out.state.q;
+        self.gradient.initial.v = out.v;
+        self.gradient.warnings.extend(self.grown.warning(simulator));
+        Ok(())
+    }
 }

@@ -2,6 +2,7 @@
 
 mod checkpoint;
 mod controls;
+mod equations;
 mod finite;
 mod flow;
 mod gap_check;
@@ -10,11 +11,13 @@ mod gap_report;
 mod gaps;
 pub mod gradcheck;
 mod gradient;
+mod grown;
 pub mod growth;
 mod jacobians;
 mod knots;
 pub mod objective;
 pub mod observable;
+mod parts;
 mod record;
 mod recording;
 mod recording_file;
@@ -32,6 +35,7 @@ mod trajectory;
 
 pub use checkpoint::Checkpoint;
 pub use controls::Controls;
+pub use equations::Equations;
 pub use flow::FLOW_EDGES;
 pub use gap_check::GapCheck;
 pub use gap_flow::GapFlow;
@@ -40,6 +44,7 @@ pub use gradient::{Cotangents, Gradient, Initial};
 pub use jacobians::Jacobians;
 pub use knots::Knots;
 pub use objective::Objective;
+pub use parts::{Checkpoints, InParts, Part, Partwise};
 pub use record::Record;
 pub use recording::{Recorded, Recording};
 pub use recording_file::Earlier;

@@ -1,7 +1,7 @@
 //! Scalars of a trajectory and their derivatives with respect to what is observed.
 
 use super::observable::{differentiable, observable};
-use super::{Cotangents, Gradient, Rollout};
+use super::{Cotangents, Gradient, Part, Rollout};
 use crate::scene::BodyId;
 use crate::{Error, Result};
 use nalgebra::DMatrix;
@@ -65,6 +65,8 @@ struct Term {
     target: Vec<f64>,
     weight: f64,
     last_only: bool,
+    /// Of how many states, the first ones, and over how many the mean is; all where it doesn't say.
+    own: Option<(usize, usize)>,
 }
 
 /// A body of the scene, by its number or its name.
@@ -151,6 +153,7 @@ fn at_end(of: Of, target: &[f64], weight: f64) -> Sum {
         target: target.into(),
         weight,
         last_only: true,
+        own: None,
     }])
 }
 
@@ -196,6 +199,19 @@ impl Sum {
     }
 }
 
+impl Sum {
+    /// Its terms as far as a part of a run has them, to be taken of the part alone.
+    pub(super) fn of_part(&self, part: &Part) -> Self {
+        let here =
+            |term: &&Term| matches!(term.of, Of::Controls) || !term.last_only || part.is_last();
+        let terms = self.0.iter().filter(here).map(|term| Term {
+            own: Some((part.states().len(), part.steps + 1)),
+            ..term.clone()
+        });
+        Self(terms.collect())
+    }
+}
+
 /// Tangent index of coordinate `q[index]`, if its joint has plain coordinates.
 fn tangent_of(rollout: &Rollout, index: usize) -> Option<usize> {
     let links = rollout.simulator().system().tree.links();
@@ -207,7 +223,21 @@ impl Term {
     /// States at which it is taken.
     fn states(&self, rollout: &Rollout) -> Range<usize> {
         let end = rollout.states().len();
-        if self.last_only { end - 1..end } else { 0..end }
+        match (self.last_only, self.own) {
+            (true, _) => end - 1..end,
+            (false, Some((own, _))) => 0..own,
+            (false, None) => 0..end,
+        }
+    }
+
+    /// Number of states over which it is a mean.
+    fn count(&self, rollout: &Rollout) -> f64 {
+        let here = self.states(rollout).len();
+        let count = match self.last_only {
+            true => here,
+            false => self.own.map_or(here, |(_, all)| all),
+        };
+        count as f64
     }
 
     /// What its numbers miss the target by at state `n`; a name that no observable has was refused before.
@@ -300,7 +330,7 @@ impl Objective for Sum {
                 return term.weight * rollout.controls().norm_squared();
             }
             let states = term.states(rollout);
-            let count = states.len() as f64;
+            let count = term.count(rollout);
             let squares = |n| term.misses(rollout, n).iter().map(|x| x * x).sum::<f64>();
             term.weight * states.map(squares).sum::<f64>() / count
         };
@@ -334,7 +364,7 @@ impl Objective for Sum {
                 }
             };
             let states = term.states(rollout);
-            let scale = term.weight / states.len() as f64;
+            let scale = term.weight / term.count(rollout);
             for n in states {
                 for (k, miss) in term.misses(rollout, n).into_iter().enumerate() {
                     bars[(from + k, n)] += 2.0 * scale * miss;

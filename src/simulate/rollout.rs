@@ -1,10 +1,11 @@
 //! A trajectory, and its gradient.
 
+use super::gradient::Sums;
 use super::observable::{Reading, differentiable, observable, velocity};
 use super::trajectory::Seed;
-use super::{Cotangents, GapReport, Gradient, Initial, Sample, Simulator};
+use super::{Cotangents, GapReport, Gradient, Sample, Simulator};
 use crate::adjoint::step::{self, Tape};
-use crate::dynamics::{ContactForce, State, StepBar, StepRecord};
+use crate::dynamics::{ContactForce, State, StateBar, StepRecord};
 use crate::error::readable;
 use crate::geometry::Gap;
 use crate::{Error, Result};
@@ -226,49 +227,46 @@ impl Rollout {
         cotangents: &Cotangents,
         mut progress: impl FnMut(usize) -> ControlFlow<()> + Send,
     ) -> Result<Gradient> {
-        self.check(cotangents)?;
         let ended = |done| match progress(done) {
             ControlFlow::Continue(()) => Ok(()),
             ControlFlow::Break(()) => Err(Error::Stopped {
                 what: format!("the gradient, {done} of {} steps back", self.steps()),
             }),
         };
-        let simulator = &self.simulator;
-        let trajectory = simulator.trajectory(&self.controls);
+        let mut sums = Sums::new(&self.simulator, self.controls.shape());
+        let bar = self.back(None, cotangents, 0, &mut sums, ended)?;
+        let first = &self.states()[0];
+        sums.start(&self.simulator, first, &self.initial_velocity, &bar)?;
+        Ok(sums.gradient)
+    }
+
+    /// Cotangent of the first state, from that of the last one or the cotangents there, which aren't read otherwise; what the steps yield is added to `sums`, step 0 being number
+    /// `first` there.
+    ///
+    /// # Errors
+    /// As [`Rollout::vjp`], and that of `progress`, which is called with the number of steps gone back.
+    pub(super) fn back(
+        &self,
+        end: Option<StateBar>,
+        cotangents: &Cotangents,
+        first: usize,
+        sums: &mut Sums,
+        progress: impl FnMut(usize) -> Result<()> + Send,
+    ) -> Result<StateBar> {
+        self.check(cotangents)?;
+        let trajectory = self.simulator.trajectory(&self.controls);
         let seeds = self.seeds(cotangents)?;
-        let (state_bar, partials) =
-            rayon::scope(|_| step::reverse(&trajectory, &self.tape, &seeds, ended))?;
-        let mut controls = cotangents.controls.clone();
-        let mut parameters = simulator.parameters().zeros();
-        let mut gains = vec![0.0; simulator.policy().gains().len()];
-        for (n, partial) in partials.iter().enumerate() {
-            if n < self.steps() {
-                let mut column = controls.column_mut(n);
-                column += &partial.control;
-            }
-            parameters.add(&partial.parameters);
-            for (g, x) in gains.iter_mut().zip(&partial.gains) {
-                *g += x;
-            }
+        let (bar, partials) = rayon::scope(|_| match end {
+            None => step::reverse(&trajectory, &self.tape, &seeds, progress),
+            Some(bar) => step::reverse_from(&trajectory, &self.tape, bar, &seeds, progress),
+        })?;
+        let steps = self.steps();
+        let mut direct = sums.gradient.controls.columns_mut(first, steps);
+        direct += &cotangents.controls;
+        for (n, partial) in partials.iter().enumerate().rev() {
+            sums.add(first + n, partial, seeds[n].size());
         }
-        // y₀ = y(q₀, v₀).
-        let e = trajectory.stepper.linearise(&self.states()[0].q)?;
-        let mut bar = StepBar::zeros(&e);
-        bar.state.q = state_bar.q;
-        trajectory
-            .stepper
-            .conserved_vjp(&e, &self.initial_velocity, &state_bar.y, &mut bar)?;
-        parameters.add(&bar.parameters);
-        simulator.forget_driven(&mut bar.state.q, &mut bar.v);
-        Ok(Gradient {
-            controls,
-            initial: Initial {
-                q: bar.state.q,
-                v: bar.v,
-            },
-            parameters,
-            gains,
-        })
+        Ok(bar)
     }
 
     /// The seeds of a reverse sweep, one a state: without the observables that have none there.

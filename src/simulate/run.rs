@@ -128,6 +128,14 @@ impl Simulator {
         Ok((rollout.states()[1].clone(), Record::new(rollout)))
     }
 
+    /// What a rollout keeps of a step, bytes.
+    pub(super) fn step_bytes(&self) -> f64 {
+        let system = self.system();
+        STEP_BYTES
+            + BODY_BYTES * system.len() as f64
+            + memory::numbers(8.0 * system.tree.velocities() as f64)
+    }
+
     fn check_sizes(&self, state: &State) -> Result<()> {
         let tree = &self.system().tree;
         let sizes = [state.q.len(), state.y.len()];
@@ -160,14 +168,10 @@ impl Simulator {
                 format!("must be at most {MOST_STEPS}: every state is kept; run in parts"),
             ));
         }
-        let system = self.system();
-        let size = STEP_BYTES
-            + BODY_BYTES * system.len() as f64
-            + memory::numbers(8.0 * system.tree.velocities() as f64);
         memory::fits(
             &format!("a rollout of {steps} steps"),
-            size * steps as f64,
-            "run in parts, each from the state in which the last one ended",
+            self.step_bytes() * steps as f64,
+            "run in parts, each from the state in which the last one ended, or take the gradient in parts (gradient_in_parts)",
         )?;
         Ok(steps)
     }

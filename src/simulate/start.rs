@@ -40,22 +40,16 @@ impl Simulator {
         clearance.refuse_film(&poses)
     }
 
-    /// Checks coordinates and velocity after `step` steps; gives them with what motions say of driven joints.
-    pub(super) fn check_start(
-        &self,
-        step: usize,
-        q: &DVector<f64>,
-        v: &DVector<f64>,
-    ) -> Result<(DVector<f64>, DVector<f64>)> {
+    /// Checks the numbers of a configuration.
+    pub(super) fn check_configuration(&self, place: &str, q: &DVector<f64>) -> Result<()> {
         let tree = &self.system().tree;
-        for (name, x, n) in [("q", q, tree.coordinates()), ("v", v, tree.velocities())] {
-            if x.len() != n || x.iter().any(|x| !x.is_finite()) {
-                return Err(Error::input(
-                    format!("initial {name}"),
-                    format!("{:?}", x.as_slice()),
-                    format!("must be {n} finite numbers"),
-                ));
-            }
+        let n = tree.coordinates();
+        if q.len() != n || q.iter().any(|x| !x.is_finite()) {
+            return Err(Error::input(
+                place,
+                format!("{:?}", q.as_slice()),
+                format!("must be {n} finite numbers"),
+            ));
         }
         for (body, link) in self.system().bodies.iter().zip(tree.links()) {
             let Some(w) = link.joint.quaternion_at() else {
@@ -64,14 +58,30 @@ impl Simulator {
             let norm = link.of_q(q)[w..].iter().map(|x| x * x).sum::<f64>().sqrt();
             if (norm - 1.0).abs() > 1e-6 {
                 return Err(Error::input(
-                    format!(
-                        "initial q of body \"{}\": quaternion (w, x, y, z)",
-                        body.name
-                    ),
+                    format!("{place} of body \"{}\": quaternion (w, x, y, z)", body.name),
                     format!("length {norm}"),
                     "must have length 1",
                 ));
             }
+        }
+        Ok(())
+    }
+
+    /// Checks coordinates and velocity after `step` steps; gives them with what motions say of driven joints.
+    pub(super) fn check_start(
+        &self,
+        step: usize,
+        q: &DVector<f64>,
+        v: &DVector<f64>,
+    ) -> Result<(DVector<f64>, DVector<f64>)> {
+        self.check_configuration("initial q", q)?;
+        let n = self.system().tree.velocities();
+        if v.len() != n || v.iter().any(|x| !x.is_finite()) {
+            return Err(Error::input(
+                "initial v",
+                format!("{:?}", v.as_slice()),
+                format!("must be {n} finite numbers"),
+            ));
         }
         let time = step as f64 * self.choices.time_step;
         let (driven_q, driven_v) = self.driven(q, v, time);

@@ -1,5 +1,6 @@
 //! A rollout as steps with transposes: controller, integrator and observations together.
 
+use super::grown::Size;
 use super::observable::{Differentiable, Observed, ObservedBars};
 use super::{Observation, Sample, Simulator, finite};
 use crate::adjoint::lie::Vec6;
@@ -28,11 +29,22 @@ pub(super) struct Seed {
     pub observables: Vec<(&'static dyn Differentiable, DVector<f64>)>,
 }
 
+impl Seed {
+    /// Its largest number.
+    pub fn size(&self) -> f64 {
+        let others = self.observables.iter().flat_map(|(_, x)| x.iter());
+        let all = self.q.iter().chain(self.v.iter()).chain(others);
+        all.fold(0.0, |most, x| most.max(x.abs()))
+    }
+}
+
 /// What the transpose of one step yields beside the state's cotangent.
 pub(super) struct Partial {
     pub control: DVector<f64>,
     pub parameters: Parameters,
     pub gains: Vec<f64>,
+    /// Of the state's cotangent.
+    pub size: Size,
 }
 
 impl Simulator {
@@ -135,11 +147,13 @@ impl<'a> Trajectory<'a> {
             control: bar.control,
             parameters: bar.parameters,
             gains,
+            size: Size::new(&bar.state),
         };
         let Partial {
             control,
             parameters,
             gains,
+            size: _,
         } = &partial;
         let scene = &self.simulator.scene;
         finite::bars(scene, state.step, &bar.state, control, parameters, gains)?;

@@ -196,6 +196,35 @@ fn bad_mesh_fails_the_check_and_keeps_its_report() {
     }
 }
 
+#[test]
+fn the_hull_of_a_bad_mesh_can_be_simulated() {
+    let folder = tempfile::tempdir().unwrap();
+    let open = file(&folder, "open.obj", &TETRAHEDRON.replace("f 2 3 4\n", ""));
+    let hull = folder.path().join("hull.stl").display().to_string();
+    let done = hydrograd(&["--json", "check-mesh", &open, "--hull", &hull]);
+    assert_eq!(done.status.code(), Some(1));
+    let value: serde_json::Value = serde_json::from_slice(&done.stdout).unwrap();
+    assert_eq!(value["hull"]["faces"].as_u64(), Some(4));
+    assert!((value["hull"]["volume"].as_f64().unwrap() - 1.0 / 6.0).abs() < 1e-15);
+    for hull in [hull.clone(), hull.replace(".stl", ".obj")] {
+        hydrograd(&["check-mesh", &open, "--hull", &hull]);
+        let again = hydrograd(&["check-mesh", &hull]);
+        assert!(again.status.success(), "{}", text(&again.stderr));
+    }
+    let flat = "v 0 0 0\nv 1 0 0\nv 0 1 0\nv 1 1 0\nf 1 2 3\nf 2 4 3\n";
+    let flat = file(&folder, "flat.obj", flat);
+    fails(
+        &["check-mesh", &flat, "--hull", &hull],
+        1,
+        &["flat.obj", "plane"],
+    );
+    fails(
+        &["check-mesh", &open, "--hull", "hull.off"],
+        1,
+        &["hull.off", ".stl"],
+    );
+}
+
 /// All these keys hold finite numbers.
 fn numbers(value: &serde_json::Value, keys: &[&str]) {
     for key in keys {

@@ -17,6 +17,7 @@ mod mechanisms;
 mod observables;
 #[cfg(feature = "opt")]
 mod optimize;
+mod parts;
 mod random;
 mod resume;
 mod rollout_gradient;

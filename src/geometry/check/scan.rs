@@ -420,7 +420,7 @@ impl<'a> Checker<'a> {
                 shown.join(", ")
             );
             let remedy = "unite in a mesh tool what crosses (boolean union, remesh), or take the convex hull of its \
-                          vertices";
+                          vertices (hydrograd check-mesh FILE --hull hull.obj)";
             let found = (found.pairs.len(), Some(*first), self.centroid(*first));
             self.report(Kind::Crossing, found, problem, remedy);
             return;

@@ -80,6 +80,17 @@ impl JointModel {
         out
     }
 
+    /// The displacement with which [`JointModel::integrate`] gets `from` one to the other; of rotations the shorter way.
+    pub fn difference(&self, from: &[f64], to: &[f64]) -> Vec<f64> {
+        let plain = self.quaternion_at().unwrap_or(from.len());
+        let mut out: Vec<f64> = from[..plain].iter().zip(to).map(|(a, b)| b - a).collect();
+        if let Some(at) = self.quaternion_at() {
+            let turned = quaternion(&to[at..]) * quaternion(&from[at..]).inverse();
+            out.extend(turned.scaled_axis().iter());
+        }
+        out
+    }
+
     /// Cotangents of `(q, xi)` from the tangent cotangent of [`JointModel::integrate`]'s result.
     pub fn integrate_vjp(&self, xi: &[f64], out_bar: &[f64]) -> (Vec<f64>, Vec<f64>) {
         let (mut q_bar, mut xi_bar) = (out_bar.to_vec(), out_bar.to_vec());

@@ -69,7 +69,7 @@ impl Scene {
     }
 
     /// The body that a force names.
-    fn named_body(&self, name: &str, place: String) -> Result<BodyId> {
+    pub(super) fn named_body(&self, name: &str, place: String) -> Result<BodyId> {
         self.body(name).ok_or_else(|| {
             let names: Vec<&str> = self.bodies.iter().map(|b| b.name.as_str()).collect();
             let remedy = format!("no body has that name; the bodies are {}", names.join(", "));

@@ -30,6 +30,7 @@ impl Scene {
             body::check(self, &carriers, index)?;
         }
         self.check_forces()?;
+        self.check_sites()?;
         start::check(self)?;
         contact::check(self)?;
         self.check_controller()
@@ -210,7 +211,7 @@ fn place(body: &Body, field: &str) -> String {
 }
 
 /// Refuses NaN and infinities.
-fn finite(place: &str, values: &[f64]) -> Result<()> {
+pub(super) fn finite(place: &str, values: &[f64]) -> Result<()> {
     match values.iter().find(|x| !x.is_finite()) {
         None => Ok(()),
         Some(bad) if values.len() == 1 => Err(Error::input(place, bad, "give a finite number")),

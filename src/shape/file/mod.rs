@@ -2,6 +2,7 @@
 //!
 //! Whatever is in the file, the answer is a mesh or an error with the path, never a panic.
 
+mod hull;
 mod obj;
 mod ply;
 mod polygon;
@@ -113,6 +114,27 @@ pub fn read_unchecked(path: &Path, scale: f64) -> Result<FileMesh> {
         faces: mesh.faces,
         repairs: mesh.repairs,
     })
+}
+
+/// Writes a mesh to a file, by its extension: .obj with all digits, .stl (binary) in single precision; m.
+///
+/// # Errors
+/// [`Error::Input`] for another extension, [`Error::File`] if it can't be written.
+pub fn write(mesh: &TriMesh, path: &Path) -> Result<()> {
+    let extension = path.extension().unwrap_or_default().to_string_lossy();
+    match extension.to_ascii_lowercase().as_str() {
+        "obj" => write_obj(path, mesh),
+        "stl" => stl::write(mesh, path).map_err(|source| Error::File {
+            path: path.to_owned(),
+            action: "write",
+            source,
+        }),
+        _ => Err(Error::input(
+            path.display().to_string(),
+            format!("extension {extension:?}"),
+            "meshes are written as .obj or .stl",
+        )),
+    }
 }
 
 /// What was done to a file's contents.

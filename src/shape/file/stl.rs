@@ -2,8 +2,11 @@
 //! own: they are merged afterwards.
 
 use super::{Parsed, Raw, brief};
+use crate::geometry::TriMesh;
 use hydrograd_adjoint::lie::Vec3;
-use std::io::Cursor;
+use std::fs::File;
+use std::io::{self, BufWriter, Cursor, Write};
+use std::path::Path;
 
 /// Header, count; then so many bytes a face.
 const PREFIX: usize = 84;
@@ -77,4 +80,20 @@ fn one_solid(text: &str) -> std::result::Result<String, String> {
     }
     body.push_str("endsolid\n");
     Ok(body)
+}
+
+/// Writes a mesh as binary STL, in single precision.
+///
+/// # Errors
+/// A file that can't be written.
+pub(super) fn write(mesh: &TriMesh, path: &Path) -> io::Result<()> {
+    let single = |x: &Vec3| stl_io::Vector::new([x.x as f32, x.y as f32, x.z as f32]);
+    let triangle = |f: usize| stl_io::Triangle {
+        normal: single(&mesh.normal(f)),
+        vertices: mesh.faces()[f].map(|v| single(&mesh.vertices()[v])),
+    };
+    let triangles: Vec<stl_io::Triangle> = (0..mesh.faces().len()).map(triangle).collect();
+    let mut out = BufWriter::new(File::create(path)?);
+    stl_io::write_stl(&mut out, triangles.iter())?;
+    out.flush()
 }

@@ -7,6 +7,7 @@ mod angular_momentum;
 mod contact;
 mod energy;
 mod entry;
+mod frames;
 mod gap;
 mod joint;
 mod momentum;
@@ -16,14 +17,18 @@ pub(super) mod velocity;
 pub use entry::{Differentiable, Observable, Observed, ObservedBars, ObservedTangents, Reading};
 
 use crate::{Error, Result};
+use frames::Of;
 
 /// All of them.
 pub const OBSERVABLES: &[&dyn Observable] = &[
     &joint::Coordinates,
     &joint::Velocities,
-    &pose::Positions,
-    &pose::Rotations,
-    &velocity::Velocities,
+    &pose::Positions(Of::Bodies),
+    &pose::Rotations(Of::Bodies),
+    &velocity::Velocities(Of::Bodies),
+    &pose::Positions(Of::Sites),
+    &pose::Rotations(Of::Sites),
+    &velocity::Velocities(Of::Sites),
     &energy::Kinetic,
     &energy::Potential,
     &energy::Total,

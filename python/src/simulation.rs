@@ -173,7 +173,6 @@ impl Simulator {
     /// `progress(done, total)` is called with the steps made, at most twenty times a second and once at the end. What it raises ends the run and comes out,
     /// with the rollout of the steps that were made as its `rollout`.
     #[pyo3(signature = (controls=None, *, steps=None, state=None, q=None, v=None, progress=None))]
-    #[expect(clippy::too_many_arguments, reason = "one per keyword")]
     fn rollout(
         slf: &Bound<'_, Self>,
         controls: Option<&Bound<'_, PyAny>>,

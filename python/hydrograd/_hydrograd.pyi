@@ -16,6 +16,7 @@ __version__: str
 _Array = NDArray[np.float64]
 _Path = str | os.PathLike[str]
 _Body = int | str
+_Progress = Callable[[int, int], object]
 _Evaluated = tuple[float, ArrayLike]
 _Part = Literal["tangential", "normal", "total"]
 _Backend = Literal["cpu", "gpu"]
@@ -355,15 +356,27 @@ class Simulator:
         state: State | None = None,
         q: ArrayLike | None = None,
         v: ArrayLike | None = None,
+        progress: _Progress | None = None,
     ) -> Rollout:
         """Runs the scene, with its own controller if it has one, and `controls` (steps, control_size) added to it: generalised
         forces of actuated joints and wrenches of thrusters, N and N m. Without them, `steps` (default: the scene's) without
-        control. It begins where the simulator does unless given a `state`, or `q` (q_size,) and `v` (v_size,). Ctrl-C ends it."""
+        control. It begins where the simulator does unless given a `state`, or `q` (q_size,) and `v` (v_size,). Ctrl-C ends it.
+
+        `progress(done, total)` is called with the steps made, at most twenty times a second and once at the end. What it raises ends the run and comes out,
+        with the rollout of the steps that were made as its `rollout`."""
     def rollout_batch(
-        self, controls: ArrayLike, *, q: ArrayLike | None = None, v: ArrayLike | None = None
+        self,
+        controls: ArrayLike,
+        *,
+        q: ArrayLike | None = None,
+        v: ArrayLike | None = None,
+        progress: _Progress | None = None,
     ) -> list[Rollout]:
         """Runs many controls, (batch, steps, control_size), on all cores: the same rollouts, to the bit, as one after the other.
-        `q` (batch, q_size) and `v` (batch, v_size) are where each begins, if given. Where some fail, the `BatchError` has what ran and each one's error."""
+        `q` (batch, q_size) and `v` (batch, v_size) are where each begins, if given. Where some fail, the `BatchError` has what ran and each one's error.
+
+        `progress(done, total)` is called with the steps made by all members together, as in `rollout`; what it raises comes out with all of the batch,
+        each member as far as it came, as its `members`."""
     def gradient_in_parts(
         self,
         objective: Objective,
@@ -642,8 +655,8 @@ class Rollout:
         """An observable at the states 0 … N by its name, (N + 1, …): "positions", "energy", "momentum", …; an unknown name's error has the list."""
     def value(self, objective: Objective) -> float:
         """Value of an objective."""
-    def gradient(self, objective: Objective) -> Gradient:
-        """Gradient of an objective, in one reverse sweep. Ctrl-C ends it."""
+    def gradient(self, objective: Objective, *, progress: _Progress | None = None) -> Gradient:
+        """Gradient of an objective, in one reverse sweep. `progress(done, total)` is told the steps gone back, as in `Simulator.rollout`; what it raises ends the sweep and comes out. Ctrl-C ends it."""
     def vjp(
         self,
         *,
@@ -653,11 +666,12 @@ class Rollout:
         v: ArrayLike | None = None,
         controls: ArrayLike | None = None,
         observables: Mapping[str, ArrayLike] | None = None,
+        progress: _Progress | None = None,
     ) -> Gradient:
         """Transpose of the rollout: the gradient of Σ cotangent · δ(observation), for any loss of your own. `q` in the tangent
         space of the coordinates and `v` are (N + 1, v_size), `positions` and `rotations` (δR = δθ × R, world axes)
         (N + 1, bodies, 3), `controls`, what the loss has of them directly, (N, control_size); `observables` has
-        cotangents of others by name, each in the shape that `observe` gives. What is None is zero. Ctrl-C ends it."""
+        cotangents of others by name, each in the shape that `observe` gives. What is None is zero. `progress` is that of `gradient`. Ctrl-C ends it."""
     def jvp(
         self,
         *,

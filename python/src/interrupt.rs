@@ -1,21 +1,22 @@
-//! Long work without the interpreter's lock, which Ctrl-C ends.
+//! Long work without the interpreter's lock, which Ctrl-C ends and a callback can follow.
 
-use crate::error::{OrRaise, exception, internal};
+use crate::error::{OrRaise, exception, input, internal};
 use pyo3::prelude::*;
 use std::ops::ControlFlow;
 use std::panic::{AssertUnwindSafe, catch_unwind};
-use std::sync::atomic::{AtomicBool, Ordering};
+use std::sync::atomic::{AtomicBool, AtomicUsize, Ordering};
 use std::sync::mpsc::{RecvTimeoutError, sync_channel};
 use std::sync::{Arc, OnceLock};
 use std::time::Duration;
 
-/// How often signals are looked at.
+/// How often signals are looked at, and progress is told.
 const PATIENCE: Duration = Duration::from_millis(50);
 
 /// Whether work should go on.
 #[derive(Clone, Default)]
 pub struct Interrupt {
     stop: Arc<AtomicBool>,
+    done: Arc<AtomicUsize>,
 }
 
 impl Interrupt {
@@ -25,6 +26,60 @@ impl Interrupt {
             true => ControlFlow::Break(()),
             false => ControlFlow::Continue(()),
         }
+    }
+
+    /// The same, where `done` parts of the work are.
+    pub fn at(&self, done: usize) -> ControlFlow<()> {
+        self.done.store(done, Ordering::Relaxed);
+        self.check()
+    }
+
+    /// The same, where one part more is done, by whatever thread.
+    pub fn one_more(&self) -> ControlFlow<()> {
+        self.done.fetch_add(1, Ordering::Relaxed);
+        self.check()
+    }
+}
+
+/// A callback of Python, `f(done, total)`, and the exception that it ended the work with.
+pub struct Progress {
+    call: Py<PyAny>,
+    total: usize,
+    told: Option<usize>,
+    /// What it raised.
+    pub raised: Option<PyErr>,
+}
+
+impl Progress {
+    /// Of a callback, if there is one.
+    pub fn new(
+        place: &str,
+        call: Option<&Bound<'_, PyAny>>,
+        total: usize,
+    ) -> PyResult<Option<Self>> {
+        let Some(call) = call else {
+            return Ok(None);
+        };
+        if !call.is_callable() {
+            let what = call.get_type().name()?.to_string();
+            let remedy = "must be a function of two numbers: progress(done, total)";
+            return Err(input(place, format!("a value of type {what}"), remedy));
+        }
+        Ok(Some(Self {
+            call: call.clone().unbind(),
+            total,
+            told: None,
+            raised: None,
+        }))
+    }
+
+    /// Tells how far it is, if that has changed; whether to go on.
+    fn tell(&mut self, py: Python<'_>, done: usize) -> bool {
+        if self.raised.is_none() && self.told != Some(done) {
+            self.told = Some(done);
+            self.raised = self.call.call1(py, (done, self.total)).err();
+        }
+        self.raised.is_none()
     }
 }
 
@@ -59,6 +114,16 @@ pub fn long<T: Send + 'static>(
     py: Python<'_>,
     work: impl FnOnce(&Interrupt) -> hydrograd::Result<T> + Send + 'static,
 ) -> PyResult<T> {
+    followed(py, None, work)
+}
+
+/// The same, with a callback that is told how far it is every so often, on this thread. After an exception of the callback the work is
+/// asked to stop and waited for: what it gives then comes back, and the exception stands in `progress`.
+pub fn followed<T: Send + 'static>(
+    py: Python<'_>,
+    mut progress: Option<&mut Progress>,
+    work: impl FnOnce(&Interrupt) -> hydrograd::Result<T> + Send + 'static,
+) -> PyResult<T> {
     not_forked()?;
     let interrupt = Interrupt::default();
     // A controller that simulates is called by a thread that the simulation waits for: it can't wait for another.
@@ -84,12 +149,24 @@ pub fn long<T: Send + 'static>(
         });
         receive = back;
         match received {
-            Ok(Ok(done)) => return done.or_raise(),
+            Ok(Ok(done)) => {
+                if let Some(progress) = &mut progress
+                    && done.is_ok()
+                {
+                    progress.tell(py, interrupt.done.load(Ordering::Relaxed));
+                }
+                return done.or_raise();
+            }
             Ok(Err(panic)) => return Err(internal(said(panic.as_ref()))),
             Err(RecvTimeoutError::Timeout) => {
                 if let Err(stop) = py.check_signals() {
                     interrupt.stop.store(true, Ordering::Relaxed);
                     return Err(stop);
+                }
+                if let Some(progress) = &mut progress
+                    && !progress.tell(py, interrupt.done.load(Ordering::Relaxed))
+                {
+                    interrupt.stop.store(true, Ordering::Relaxed);
                 }
             }
             Err(RecvTimeoutError::Disconnected) => return Err(internal("its thread ended")),

@@ -10,6 +10,7 @@ mod gradcheck;
 mod gradient;
 mod interrupt;
 mod joint;
+mod log;
 mod mesh;
 mod objective;
 mod optimize;

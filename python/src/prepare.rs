@@ -2,6 +2,7 @@
 
 use crate::error::{OrRaise, input};
 use crate::interrupt::long;
+use crate::log;
 use crate::simulator::Simulator;
 use hydrograd::dynamics;
 use hydrograd::simulate::Choices;
@@ -9,6 +10,7 @@ use nalgebra::DVector;
 use pyo3::prelude::*;
 use std::path::PathBuf;
 use std::sync::Arc;
+use std::time::Instant;
 
 /// A simulator of a scene; Ctrl-C gives it up.
 pub fn build(
@@ -18,9 +20,16 @@ pub fn build(
     cache: Option<PathBuf>,
 ) -> PyResult<Simulator> {
     let (of, folder) = (scene.clone(), cache.clone());
+    let bodies = scene.bodies.len();
+    let started = Instant::now();
+    log::info(py, || format!("simulator: preparing {bodies} bodies"))?;
     let made = long(py, move |_| {
         hydrograd::Simulator::with_choices(&of, choices, folder.as_deref())
     })?;
+    log::done(py, started, || {
+        format!("simulator: prepared {bodies} bodies")
+    })?;
+    log::warnings(py, "simulator", || warnings(&made))?;
     Ok(Simulator {
         inner: Arc::new(made),
         scene,
@@ -28,6 +37,13 @@ pub fn build(
         policy: None,
         softness: 1.0,
     })
+}
+
+/// What should be known before a run.
+pub fn warnings(of: &hydrograd::Simulator) -> Vec<String> {
+    let start = of.start_gap_warning().into_iter();
+    let start = start.chain(of.start_stiffness_warning());
+    of.warnings().iter().cloned().chain(start).collect()
 }
 
 /// Scene, choices, folder, parameters, initial q, v and gains, the controller if it is written in Python, and the softness of contact.

@@ -4,7 +4,7 @@ use crate::array::{self, Dim};
 use crate::contact;
 use crate::error::{OrRaise, input};
 use crate::gradient;
-use crate::interrupt::{long, short};
+use crate::interrupt::{Progress, followed, long, short};
 use crate::objective::Objective;
 use crate::simulator::Simulator;
 use crate::state::State;
@@ -51,6 +51,14 @@ impl Rollout {
 
     fn bodies(&self) -> usize {
         self.inner.simulator().system().len()
+    }
+}
+
+/// What was made, unless its callback raised an exception.
+fn ended<T>(progress: Option<Progress>, made: PyResult<T>) -> PyResult<T> {
+    match progress.and_then(|progress| progress.raised) {
+        Some(raised) => Err(raised),
+        None => made,
     }
 }
 
@@ -281,27 +289,31 @@ impl Rollout {
         short(py, || self.inner.value(&objective))
     }
 
-    /// Gradient of an objective, in one reverse sweep. Ctrl-C ends it.
+    /// Gradient of an objective, in one reverse sweep. `progress(done, total)` is told the steps gone back, as in `Simulator.rollout`; what it raises ends the sweep and comes out. Ctrl-C ends it.
+    #[pyo3(signature = (objective, *, progress=None))]
     fn gradient<'py>(
         &self,
         py: Python<'py>,
         objective: PyRef<'py, Objective>,
+        progress: Option<&Bound<'py, PyAny>>,
     ) -> PyResult<Bound<'py, PyAny>> {
         use hydrograd::simulate::Objective as _;
         let objective = objective.0.clone();
         let rollout = self.inner.clone();
-        let made = long(py, move |interrupt| {
+        let mut progress = Progress::new("gradient: progress", progress, self.steps())?;
+        let made = followed(py, progress.as_mut(), move |interrupt| {
             objective.check(&rollout)?;
-            rollout.vjp_with(&objective.cotangents(&rollout), |_| interrupt.check())
-        })?;
+            rollout.vjp_with(&objective.cotangents(&rollout), |done| interrupt.at(done))
+        });
+        let made = ended(progress, made)?;
         gradient::of_rollout(py, &made)
     }
 
     /// Transpose of the rollout: the gradient of Σ cotangent · δ(observation), for any loss of your own. `q` in the tangent
     /// space of the coordinates and `v` are (N + 1, v_size), `positions` and `rotations` (δR = δθ × R, world axes)
     /// (N + 1, bodies, 3), `controls`, what the loss has of them directly, (N, control_size); `observables` has
-    /// cotangents of others by name, each in the shape that `observe` gives. What is None is zero. Ctrl-C ends it.
-    #[pyo3(signature = (*, positions=None, rotations=None, q=None, v=None, controls=None, observables=None))]
+    /// cotangents of others by name, each in the shape that `observe` gives. What is None is zero. `progress` is that of `gradient`. Ctrl-C ends it.
+    #[pyo3(signature = (*, positions=None, rotations=None, q=None, v=None, controls=None, observables=None, progress=None))]
     #[expect(clippy::too_many_arguments, reason = "one per keyword")]
     fn vjp<'py>(
         &self,
@@ -312,6 +324,7 @@ impl Rollout {
         v: Option<&Bound<'py, PyAny>>,
         controls: Option<&Bound<'py, PyAny>>,
         observables: Option<&Bound<'py, PyDict>>,
+        progress: Option<&Bound<'py, PyAny>>,
     ) -> PyResult<Bound<'py, PyAny>> {
         let mut seed: Cotangents = self.inner.zero_cotangents();
         let (states, steps) = (self.steps() + 1, self.steps());
@@ -363,9 +376,11 @@ impl Rollout {
             seed.observables.insert(name, columns);
         }
         let rollout = self.inner.clone();
-        let made = long(py, move |interrupt| {
-            rollout.vjp_with(&seed, |_| interrupt.check())
-        })?;
+        let mut progress = Progress::new("vjp: progress", progress, self.steps())?;
+        let made = followed(py, progress.as_mut(), move |interrupt| {
+            rollout.vjp_with(&seed, |done| interrupt.at(done))
+        });
+        let made = ended(progress, made)?;
         gradient::of_rollout(py, &made)
     }
 

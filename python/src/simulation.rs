@@ -4,11 +4,12 @@ use crate::array::{self, Dim, array};
 use crate::equations::Equations;
 use crate::error::{OrRaise, batch, counts, exception, input, own};
 use crate::gradient::{self, by_name};
-use crate::interrupt::{long, short};
+use crate::interrupt::{Progress, followed, long, short};
+use crate::log;
 use crate::mesh::{Triangles, triangles};
 use crate::objective::Objective;
 use crate::policy::Controller;
-use crate::prepare::{Parts, Start, build, set_gains};
+use crate::prepare::{Parts, Start, build, set_gains, warnings};
 use crate::rollout::Rollout;
 use crate::scene::Scene;
 use crate::settings::{Keywords, row_or};
@@ -25,6 +26,7 @@ use rayon::prelude::*;
 use std::collections::HashMap;
 use std::path::PathBuf;
 use std::sync::Arc;
+use std::time::Instant;
 
 impl Simulator {
     fn matrix(
@@ -169,7 +171,10 @@ impl Simulator {
     /// Runs the scene, with its own controller if it has one, and `controls` (steps, control_size) added to it: generalised
     /// forces of actuated joints and wrenches of thrusters, N and N m. Without them, `steps` (default: the scene's) without
     /// control. It begins where the simulator does unless given a `state`, or `q` (q_size,) and `v` (v_size,). Ctrl-C ends it.
-    #[pyo3(signature = (controls=None, *, steps=None, state=None, q=None, v=None))]
+    ///
+    /// `progress(done, total)` is called with the steps made, at most twenty times a second and once at the end. What it raises ends the run and comes out,
+    /// with the rollout of the steps that were made as its `rollout`.
+    #[pyo3(signature = (controls=None, *, steps=None, state=None, q=None, v=None, progress=None))]
     fn rollout(
         slf: &Bound<'_, Self>,
         controls: Option<&Bound<'_, PyAny>>,
@@ -177,26 +182,50 @@ impl Simulator {
         state: Option<&Bound<'_, State>>,
         q: Option<&Bound<'_, PyAny>>,
         v: Option<&Bound<'_, PyAny>>,
+        progress: Option<&Bound<'_, PyAny>>,
     ) -> PyResult<Rollout> {
         let me = slf.get();
         let start = me.begin(state, q, v)?;
         let matrix = me.matrix("rollout: controls", controls, steps)?;
+        let (py, steps) = (slf.py(), matrix.ncols());
+        let mut progress = Progress::new("rollout: progress", progress, steps)?;
         let inner = me.inner.clone();
-        let made = long(slf.py(), move |interrupt| {
+        let started = Instant::now();
+        let made = followed(py, progress.as_mut(), move |interrupt| {
             let controls = Controls::from_matrix(&inner, matrix)?;
-            inner.rollout_from(&start.state(&inner)?, &controls, |_| interrupt.check())
+            let state = start.state(&inner)?;
+            Ok(inner.rollout_as_far(&state, &controls, |done| interrupt.at(done)))
         })?;
+        if let Some(raised) = progress.and_then(|progress| progress.raised) {
+            let partial = match made {
+                Ok(rollout) => Some(rollout),
+                Err(halted) => halted.rollout,
+            };
+            if let Some(partial) = partial {
+                // Where an exception takes no attributes it comes out without.
+                let partial = Bound::new(py, Rollout::new(slf, partial))?;
+                let _ = raised.value(py).setattr("rollout", partial);
+            }
+            return Err(raised);
+        }
+        let made = made.map_err(|halted| halted.error).or_raise()?;
+        log::done(py, started, || format!("rollout: {steps} steps"))?;
+        log::warnings(py, "rollout", || made.warnings())?;
         Ok(Rollout::new(slf, made))
     }
 
     /// Runs many controls, (batch, steps, control_size), on all cores: the same rollouts, to the bit, as one after the other.
     /// `q` (batch, q_size) and `v` (batch, v_size) are where each begins, if given. Where some fail, the `BatchError` has what ran and each one's error.
-    #[pyo3(signature = (controls, *, q=None, v=None))]
+    ///
+    /// `progress(done, total)` is called with the steps made by all members together, as in `rollout`; what it raises comes out with all of the batch,
+    /// each member as far as it came, as its `members`.
+    #[pyo3(signature = (controls, *, q=None, v=None, progress=None))]
     fn rollout_batch(
         slf: &Bound<'_, Self>,
         controls: &Bound<'_, PyAny>,
         q: Option<&Bound<'_, PyAny>>,
         v: Option<&Bound<'_, PyAny>>,
+        progress: Option<&Bound<'_, PyAny>>,
     ) -> PyResult<Vec<Rollout>> {
         let me = slf.get();
         let n = me.controls_size();
@@ -237,7 +266,10 @@ impl Simulator {
             })
             .collect();
         let inner = me.inner.clone();
-        let made = long(slf.py(), move |interrupt| {
+        let py = slf.py();
+        let mut progress = Progress::new("rollout_batch: progress", progress, batch * steps)?;
+        let started = Instant::now();
+        let made = followed(py, progress.as_mut(), move |interrupt| {
             let one = |(start, matrix): (Start, DMatrix<f64>)| {
                 let unmade = |error| {
                     Box::new(Halted {
@@ -249,10 +281,32 @@ impl Simulator {
                 };
                 let controls = Controls::from_matrix(&inner, matrix).map_err(unmade)?;
                 let state = start.state(&inner).map_err(unmade)?;
-                inner.rollout_as_far(&state, &controls, |_| interrupt.check())
+                inner.rollout_as_far(&state, &controls, |_| interrupt.one_more())
             };
             Ok(runs.into_par_iter().map(one).collect::<Vec<_>>())
         })?;
+        if let Some(raised) = progress.and_then(|progress| progress.raised) {
+            let ran = made
+                .into_iter()
+                .map(|one| one.map_or_else(|halted| halted.rollout, Some))
+                .map(|one| {
+                    one.map(|one| Bound::new(py, Rollout::new(slf, one)))
+                        .transpose()
+                })
+                .collect::<PyResult<Vec<_>>>()?;
+            let _ = raised.value(py).setattr("members", ran);
+            return Err(raised);
+        }
+        log::done(py, started, || {
+            format!("rollout_batch: {batch} members of {steps} steps")
+        })?;
+        for (member, one) in made.iter().enumerate() {
+            if let Ok(one) = one {
+                log::warnings(py, &format!("rollout_batch: member {member}"), || {
+                    one.warnings()
+                })?;
+            }
+        }
         gathered(slf, made)
     }
 
@@ -611,11 +665,7 @@ impl Simulator {
     /// What should be known about the scene and its start, with names and numbers.
     #[getter]
     fn warnings(&self) -> Vec<String> {
-        let start = self.inner.start_gap_warning();
-        let start = start
-            .into_iter()
-            .chain(self.inner.start_stiffness_warning());
-        self.inner.warnings().iter().cloned().chain(start).collect()
+        warnings(&self.inner)
     }
 
     fn __repr__(&self) -> String {

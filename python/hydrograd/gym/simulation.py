@@ -72,6 +72,7 @@ class SimulationEnv(gymnasium.Env[_Array, NDArray[np.float32]]):
         self._given = simulator is not None
         self._fidelity = fidelity
         self.frame_skip = int(frame_skip)
+        """Steps of the simulator in one of the environment."""
         self.dt = time_step * self.frame_skip
         """Time of a step of the environment, s."""
         self.render_mode = render_mode

@@ -51,6 +51,7 @@ class ThreadVectorEnv(gymnasium.vector.VectorEnv[_Array, _Array, NDArray[Any]]):
                 raise hg.InputError(f"{name}: got {value!r}; must be a whole number of at least 1")
         self.num_envs = int(num_envs)
         self.envs = [make() for _ in range(self.num_envs)]
+        """The environments, in the order of the batch."""
         first = self.envs[0]
         self.metadata = {**first.metadata, "autoreset_mode": AutoresetMode.NEXT_STEP}
         self.render_mode = first.render_mode

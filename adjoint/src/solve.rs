@@ -12,7 +12,7 @@
 use crate::blocks::{Blocks, blocks};
 use nalgebra::{Cholesky, DMatrix, DVector, Dyn, LU};
 
-/// A symmetric positive definite matrix, by its Cholesky factor: of each block, where it falls apart ([`blocks`]).
+/// A symmetric positive definite matrix, by its Cholesky factor: of each block, where it falls apart.
 #[derive(Clone, Debug)]
 pub struct Definite(Blocks<Cholesky<f64, Dyn>>);
 
@@ -40,7 +40,7 @@ impl Definite {
     }
 }
 
-/// Any square matrix, by its LU factors: of each block, where it falls apart ([`blocks`]).
+/// Any square matrix, by its LU factors: of each block, where it falls apart.
 #[derive(Clone, Debug)]
 pub struct General(Blocks<LU<f64, Dyn, Dyn>>);
 

@@ -49,12 +49,12 @@ pub(super) struct Grown {
 impl Grown {
     /// Takes note of the cotangent of state `n`, to which the objective has added numbers of up to `seed`.
     pub fn add(&mut self, n: usize, size: Size, seed: f64) {
-        for k in 0..2 {
-            let (last, now) = (self.last[k], size.of[k]);
-            let (since, from) = self.since[k];
-            let grown = since * now / last;
-            let counts = last > 0.0 && seed <= SEEN[k] * now && grown > 1.0;
-            self.since[k] = if counts { (grown, from) } else { (1.0, n) };
+        let sizes = self.last.into_iter().zip(size.of).zip(SEEN);
+        for (since, ((last, now), seen)) in self.since.iter_mut().zip(sizes) {
+            let (factor, from) = *since;
+            let grown = factor * now / last;
+            let counts = last > 0.0 && seed <= seen * now && grown > 1.0;
+            *since = if counts { (grown, from) } else { (1.0, n) };
             if counts && grown > self.most.map_or(LARGE, |(factor, ..)| factor) {
                 self.most = Some((grown, from, size, n));
             }

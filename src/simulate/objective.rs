@@ -1,7 +1,8 @@
 //! Scalars of a trajectory and their derivatives with respect to what is observed.
 
 use super::observable::{differentiable, observable};
-use super::{Cotangents, Gradient, Part, Rollout};
+use super::part::{Part, Partwise};
+use super::{Cotangents, Gradient, Rollout};
 use crate::scene::BodyId;
 use crate::{Error, Result};
 use nalgebra::DMatrix;
@@ -201,7 +202,7 @@ impl Sum {
 
 impl Sum {
     /// Its terms as far as a part of a run has them, to be taken of the part alone.
-    pub(super) fn of_part(&self, part: &Part) -> Self {
+    fn of_part(&self, part: &Part) -> Self {
         let here =
             |term: &&Term| matches!(term.of, Of::Controls) || !term.last_only || part.is_last();
         let terms = self.0.iter().filter(here).map(|term| Term {
@@ -209,6 +210,13 @@ impl Sum {
             ..term.clone()
         });
         Self(terms.collect())
+    }
+}
+
+impl Partwise for Sum {
+    fn part(&self, part: &Part) -> Result<(f64, Cotangents)> {
+        let own = self.of_part(part);
+        Ok((part.rollout.value(&own)?, own.cotangents(part.rollout)))
     }
 }
 

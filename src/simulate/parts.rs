@@ -5,12 +5,12 @@
 //! is that of the whole [`Rollout`], to the bit.
 
 use super::gradient::Sums;
-use super::objective::{Objective, Sum};
-use super::{Controls, Cotangents, Gradient, Rollout, Simulator};
+use super::part::{Part, Partwise};
+use super::{Controls, Gradient, Rollout, Simulator};
 use crate::adjoint::revolve::{advances, revolve};
 use crate::dynamics::{State, StateBar};
 use crate::{Error, Result};
-use std::ops::{ControlFlow, Range};
+use std::ops::ControlFlow;
 
 /// What is kept of a long run at a time.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -42,56 +42,6 @@ impl Checkpoints {
             part,
             states: count(200.0 + 8.0 * numbers as f64).min(parts),
         }
-    }
-}
-
-/// A part of a long run.
-pub struct Part<'r> {
-    /// The part as a rollout of its own: its first state is number `first` of the run.
-    pub rollout: &'r Rollout,
-    /// Number of its first step in the run.
-    pub first: usize,
-    /// Steps of the whole run.
-    pub steps: usize,
-}
-
-impl Part<'_> {
-    /// Whether the run ends with it.
-    pub fn is_last(&self) -> bool {
-        self.first + self.rollout.steps() == self.steps
-    }
-
-    /// States of its rollout that are its own: all but the last one, which belongs to the next part.
-    pub fn states(&self) -> Range<usize> {
-        0..self.rollout.steps() + usize::from(self.is_last())
-    }
-}
-
-/// A scalar of a run that is a sum over its parts.
-pub trait Partwise {
-    /// What a part adds to its value, and its derivatives with respect to what is observed in the part. Cotangents of a state that isn't the part's own
-    /// ([`Part::states`]) aren't read.
-    ///
-    /// # Errors
-    /// What doesn't fit the scene, and what would.
-    fn part(&self, part: &Part) -> Result<(f64, Cotangents)>;
-}
-
-impl Partwise for Sum {
-    fn part(&self, part: &Part) -> Result<(f64, Cotangents)> {
-        self.check(part.rollout)?;
-        let own = self.of_part(part);
-        let value = own.value(part.rollout);
-        if !value.is_finite() {
-            return Err(Error::Unresolved {
-                place: "objective".into(),
-                quantity: "value".into(),
-                value,
-                limit: f64::MAX,
-                remedy: "it left what floating point holds: take smaller weights or targets".into(),
-            });
-        }
-        Ok((value, own.cotangents(part.rollout)))
     }
 }
 

@@ -118,6 +118,7 @@ fn the_page_on_scenes_has_every_key() {
     let sources = [
         "scene/mod.rs",
         "scene/contact.rs",
+        "scene/site.rs",
         "scene/force/spring.rs",
         "scene/force/lubrication.rs",
         "shape/description.rs",

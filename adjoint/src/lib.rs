@@ -15,5 +15,6 @@ pub mod rigid;
 pub mod sample;
 pub mod solve;
 pub mod step;
+pub mod waterline;
 
 pub use registry::rungs;

@@ -11,6 +11,7 @@ use crate::lie::{
 };
 use crate::rigid::{spatial_inertia, spatial_inertia_vjp};
 use crate::solve::{Definite, Fitted, Moved, least_squares, least_squares_jvp};
+use crate::waterline::{Below, Hull};
 use nalgebra::{DMatrix, DVector};
 
 /// Largest accepted relative error.
@@ -43,6 +44,14 @@ pub fn rungs() -> Vec<Rung> {
         Rung {
             name: "drag::quadratic_drag_vjp",
             check: quadratic_drag_vjp_check,
+        },
+        Rung {
+            name: "waterline::Below::jvp",
+            check: below_jvp_check,
+        },
+        Rung {
+            name: "waterline::Below::vjp",
+            check: below_vjp_check,
         },
         Rung {
             name: "contact::contact_force_jvp",
@@ -214,6 +223,51 @@ fn quadratic_drag_vjp_check(corruption: f64) -> Outcome {
             corruption,
         )
     }))
+}
+
+/// Normal and height of a plane through the tetrahedron of [`below`].
+const PLANE: [f64; 4] = [0.48, -0.64, 0.6, 0.05];
+
+/// Of a tetrahedron below a plane, whose normal need not be a unit vector.
+fn below(plane: &[f64]) -> Below {
+    let vertices = vec![
+        Vec3::new(0.3, -0.2, -0.4),
+        Vec3::new(-0.5, 0.1, 0.2),
+        Vec3::new(0.2, 0.6, 0.1),
+        Vec3::new(0.1, -0.3, 0.7),
+    ];
+    let faces = vec![[0, 2, 3], [1, 3, 2], [0, 3, 1], [0, 1, 2]];
+    let normal = Vec3::from_column_slice(&plane[..3]);
+    let size = normal.norm();
+    Below::new(&Hull { vertices, faces }, &(normal / size), plane[3] / size)
+}
+
+fn volume_and_moment(plane: &[f64]) -> Vec<f64> {
+    let found = below(plane);
+    let moment = found.moment;
+    vec![found.volume, moment.x, moment.y, moment.z]
+}
+
+fn below_jvp_check(corruption: f64) -> Outcome {
+    all((60..68).map(|seed| {
+        let along: [f64; 4] = array(seed, 0.1);
+        let tilt = Vec3::from_column_slice(&along[..3]);
+        let (volume, moment) = below(&PLANE).jvp(along[3], &tilt);
+        let jvp = [volume, moment.x, moment.y, moment.z].map(|x| corruption * x);
+        outcome(volume_and_moment, &PLANE, &along, &jvp, TOLERANCE)
+    }))
+}
+
+fn below_vjp_check(corruption: f64) -> Outcome {
+    transposed::<4>(
+        volume_and_moment,
+        &PLANE,
+        |bar| {
+            let (rate, tilt) = below(&PLANE).vjp(bar[0], &Vec3::from_column_slice(&bar[1..]));
+            vec![tilt.x, tilt.y, tilt.z, rate]
+        },
+        corruption,
+    )
 }
 
 /// Gap, weight, normal, velocity, stiffness, dissipation and friction in one row: setting in, pressed, sticking,

@@ -169,6 +169,27 @@ class Drag:
     ) -> Drag: ...
 
 @final
+class Passive:
+    def __new__(
+        cls,
+        *,
+        stiffness: float = 0.0,
+        rest: float = 0.0,
+        damping: float = 0.0,
+        friction: float = 0.0,
+        friction_speed: float = 0.02,
+        armature: float = 0.0,
+    ) -> Passive: ...
+
+@final
+class Mimic:
+    def __new__(cls, body: str, *, ratio: float = 1.0, offset: float = 0.0) -> Mimic: ...
+
+@final
+class Servo:
+    def __new__(cls, stiffness: float, damping: float = 0.0) -> Servo: ...
+
+@final
 class Body:
     """A rigid body with the joint that carries it.
 
@@ -208,6 +229,9 @@ class Body:
         collision: Sequence[
             Shape | tuple[Shape, ArrayLike] | tuple[Shape, ArrayLike, ArrayLike]
         ] | None = None,
+        passive: Passive | None = None,
+        mimic: Mimic | None = None,
+        servo: Servo | None = None,
     ) -> Body: ...
     @property
     def name(self) -> str:
@@ -243,6 +267,7 @@ class Scene:
         contact: Contact | None = None,
         time_step: float = 0.01,
         steps: int = 100,
+        waterline: float | None = None,
     ) -> Scene: ...
     @staticmethod
     def load(path: _Path) -> Scene:
@@ -384,6 +409,7 @@ class Simulator:
         *,
         steps: int | None = None,
         memory: float = 1e8,
+        progress: _Progress | None = None,
     ) -> tuple[float, Gradient]: ...
     def state(
         self,

@@ -44,13 +44,84 @@ impl Drag {
     }
 }
 
+/// What a joint with one coordinate does by itself: a spring of `stiffness` (N/m or N m/rad) with its `rest` coordinate (m or rad), viscous `damping` (N s/m or
+/// N m s/rad), Coulomb `friction` (N or N m) that sets in over `friction_speed` (m/s or rad/s), and the inertia `armature` (kg or kg m²) of its drive.
+#[pyclass(frozen, eq, module = "hydrograd")]
+#[derive(Clone, PartialEq)]
+pub struct Passive(pub scene::Passive);
+
+#[pymethods]
+impl Passive {
+    #[new]
+    #[pyo3(signature = (*, stiffness=0.0, rest=0.0, damping=0.0, friction=0.0, friction_speed=0.02, armature=0.0))]
+    fn new(
+        stiffness: f64,
+        rest: f64,
+        damping: f64,
+        friction: f64,
+        friction_speed: f64,
+        armature: f64,
+    ) -> Self {
+        Self(scene::Passive {
+            stiffness,
+            rest,
+            damping,
+            friction,
+            friction_speed,
+            armature,
+        })
+    }
+
+    fn __repr__(&self) -> String {
+        format!("{:?}", self.0)
+    }
+}
+
+/// Lets a joint with one coordinate follow that of the body named `body`: q = `ratio` · q(leader) + `offset` (m or rad).
+#[pyclass(frozen, eq, module = "hydrograd")]
+#[derive(Clone, PartialEq)]
+pub struct Mimic(pub scene::Mimic);
+
+#[pymethods]
+impl Mimic {
+    #[new]
+    #[pyo3(signature = (body, *, ratio=1.0, offset=0.0))]
+    fn new(body: &str, ratio: f64, offset: f64) -> Self {
+        Self(scene::Mimic::new(body).ratio(ratio).offset(offset))
+    }
+
+    fn __repr__(&self) -> String {
+        format!("{:?}", self.0)
+    }
+}
+
+/// Makes the control of an actuated joint with one coordinate its target (m or rad): a drive of `stiffness` (N/m or N m/rad) and `damping` (N s/m or N m s/rad), implicit, and so
+/// stable however stiff, with the integrators "momentum-euler", "energy-euler" and "midpoint".
+#[pyclass(frozen, eq, module = "hydrograd")]
+#[derive(Clone, PartialEq)]
+pub struct Servo(pub scene::Servo);
+
+#[pymethods]
+impl Servo {
+    #[new]
+    #[pyo3(signature = (stiffness, damping=0.0))]
+    fn new(stiffness: f64, damping: f64) -> Self {
+        Self(scene::Servo::new(stiffness, damping))
+    }
+
+    fn __repr__(&self) -> String {
+        format!("{:?}", self.0)
+    }
+}
+
 /// A rigid body with the joint that carries it.
 ///
 /// `shape` is what the water sees; without one the body is dry. Give `density` (kg/m³) or `mass` (kg); `inertia` about
 /// the centre of mass (xx, yy, zz or also xy, xz, yz; kg m²) and `center_of_mass` (m) follow from the shape if left out.
 /// `position` (m) and `rotation` (axis times angle, rad) place the joint's frame in the frame of `parent`, a body's name or
 /// number, or the world. `actuated` makes the joint's forces controls (N, N m; a free joint has six), `thruster` a wrench on
-/// the body in world axes. `locked` holds the joint, `motion` (one per coordinate) drives it, `limits` (m or rad) stop it.
+/// the body in world axes. `locked` holds the joint, `motion` (one per coordinate) drives it, `limits` (m or rad) stop it; `passive` gives it spring, damping,
+/// friction and armature, `mimic` lets it follow another, `servo` makes its control a target.
 /// `shape_position` and `shape_rotation` place the shape in the body; `refine` lists balls (center, radius, edge), m,
 /// where its faces are made smaller. `collision` lists the convex pieces that the body is for contact instead of its shape, each
 /// a shape, (shape, position) or (shape, position, rotation) in the body's frame. `added_mass` (6, 6) replaces the body's own at unit density, with `isolated`.
@@ -106,7 +177,7 @@ impl Body {
         shape=None, *, name="", density=None, mass=None, inertia=None, center_of_mass=None, position=None,
         rotation=None, joint=None, parent=None, actuated=false, thruster=false, locked=false, motion=None, limits=None,
         limit_stiffness=None, drag=None, shape_position=None, shape_rotation=None, refine=None, added_mass=None,
-        overlaps_parent=false, collision=None
+        overlaps_parent=false, collision=None, passive=None, mimic=None, servo=None
     ))]
     #[expect(
         clippy::too_many_arguments,
@@ -136,6 +207,9 @@ impl Body {
         added_mass: Option<&Bound<'_, PyAny>>,
         overlaps_parent: bool,
         collision: Option<Vec<Piece<'_>>>,
+        passive: Option<PyRef<'_, Passive>>,
+        mimic: Option<PyRef<'_, Mimic>>,
+        servo: Option<PyRef<'_, Servo>>,
     ) -> PyResult<Self> {
         let at = |field: &str| {
             if name.is_empty() {
@@ -200,7 +274,10 @@ impl Body {
                 .map(|given| fixed(&at("limits"), given))
                 .transpose()?,
             limit_stiffness,
+            passive: passive.map(|p| p.0),
+            mimic: mimic.map(|m| m.0.clone()),
             actuated,
+            servo: servo.map(|s| s.0),
             thruster,
             drag: drag.map(|d| d.0),
             name: name.to_string(),

@@ -83,6 +83,14 @@ impl Progress {
     }
 }
 
+/// What was made, unless its callback raised an exception.
+pub fn ended<T>(progress: Option<Progress>, made: PyResult<T>) -> PyResult<T> {
+    match progress.and_then(|progress| progress.raised) {
+        Some(raised) => Err(raised),
+        None => made,
+    }
+}
+
 /// The process whose threads do the work.
 static PROCESS: OnceLock<u32> = OnceLock::new();
 

@@ -93,6 +93,9 @@ fn _hydrograd(m: &Bound<'_, PyModule>) -> PyResult<()> {
     m.add_class::<fluid::Contact>()?;
     m.add_class::<body::Body>()?;
     m.add_class::<body::Drag>()?;
+    m.add_class::<body::Mimic>()?;
+    m.add_class::<body::Passive>()?;
+    m.add_class::<body::Servo>()?;
     m.add_class::<shape::Shape>()?;
     m.add_class::<joint::Joint>()?;
     m.add_class::<joint::Motion>()?;

@@ -4,7 +4,7 @@ use crate::array::{self, Dim};
 use crate::contact;
 use crate::error::{OrRaise, input};
 use crate::gradient;
-use crate::interrupt::{Progress, followed, long, short};
+use crate::interrupt::{Progress, ended, followed, long, short};
 use crate::objective::Objective;
 use crate::simulator::Simulator;
 use crate::state::State;
@@ -51,14 +51,6 @@ impl Rollout {
 
     fn bodies(&self) -> usize {
         self.inner.simulator().system().len()
-    }
-}
-
-/// What was made, unless its callback raised an exception.
-fn ended<T>(progress: Option<Progress>, made: PyResult<T>) -> PyResult<T> {
-    match progress.and_then(|progress| progress.raised) {
-        Some(raised) => Err(raised),
-        None => made,
     }
 }
 

@@ -21,7 +21,8 @@ fn not_a_force(kind: &str, why: impl std::fmt::Display) -> PyErr {
 /// What a simulation starts from: the fluid, walls, and bodies with their joints.
 ///
 /// `gravity` is in m/s², world axes; `time_step` (s) and `steps` are what a run takes unless told otherwise. Without a
-/// `contact`, surfaces may not touch. Bodies are numbered in the order in which they are added.
+/// `contact`, surfaces may not touch. Bodies are numbered in the order in which they are added. `waterline` is the height (m, against gravity) above which there is no
+/// water to displace and to drag.
 #[pyclass(eq, module = "hydrograd")]
 #[derive(Clone, PartialEq)]
 pub struct Scene(pub hydrograd::Scene);
@@ -29,7 +30,11 @@ pub struct Scene(pub hydrograd::Scene);
 #[pymethods]
 impl Scene {
     #[new]
-    #[pyo3(signature = (fluid=None, *, name="", gravity=None, contact=None, time_step=0.01, steps=100))]
+    #[pyo3(signature = (fluid=None, *, name="", gravity=None, contact=None, time_step=0.01, steps=100, waterline=None))]
+    #[expect(
+        clippy::too_many_arguments,
+        reason = "one per keyword of the constructor"
+    )]
     fn new(
         fluid: Option<PyRef<'_, Fluid>>,
         name: &str,
@@ -37,6 +42,7 @@ impl Scene {
         contact: Option<PyRef<'_, Contact>>,
         time_step: f64,
         steps: usize,
+        waterline: Option<f64>,
     ) -> PyResult<Self> {
         let fluid = fluid.map_or_else(hydrograd::Fluid::fresh_water, |f| f.0);
         let mut scene = hydrograd::Scene::new(fluid);
@@ -45,6 +51,7 @@ impl Scene {
         scene.contact = contact.map(|c| c.0);
         scene.time_step = time_step;
         scene.steps = steps;
+        scene.waterline = waterline;
         Ok(Self(scene))
     }
 

@@ -4,7 +4,7 @@ use crate::array::{self, Dim, array};
 use crate::equations::Equations;
 use crate::error::{OrRaise, batch, counts, exception, input, own};
 use crate::gradient::{self, by_name};
-use crate::interrupt::{Progress, followed, long, short};
+use crate::interrupt::{Progress, ended, followed, long, short};
 use crate::log;
 use crate::mesh::{Triangles, triangles};
 use crate::objective::Objective;
@@ -312,8 +312,8 @@ impl Simulator {
 
     /// Value and gradient of an `objective` of a run with `controls` (steps, control_size), or of `steps` steps, from where the simulator starts, within `memory` (bytes) for what is
     /// kept of the run: a rollout keeps some kilobytes a step, which is too much for 10⁵ steps and more. Parts of it run again, so it takes longer; the gradient is that of the
-    /// rollout, to the bit. Ctrl-C ends it.
-    #[pyo3(signature = (objective, controls=None, *, steps=None, memory=1e8))]
+    /// rollout, to the bit. `progress(done, total)` is called with the parts done, as in `rollout`; what it raises ends the work and comes out. Ctrl-C ends it.
+    #[pyo3(signature = (objective, controls=None, *, steps=None, memory=1e8, progress=None))]
     fn gradient_in_parts<'py>(
         &self,
         py: Python<'py>,
@@ -321,6 +321,7 @@ impl Simulator {
         controls: Option<&Bound<'_, PyAny>>,
         #[pyo3(from_py_with = counts::steps)] steps: Option<usize>,
         memory: f64,
+        progress: Option<&Bound<'_, PyAny>>,
     ) -> PyResult<(f64, Bound<'py, PyAny>)> {
         if !(memory > 0.0 && memory.is_finite()) {
             return Err(input(
@@ -331,11 +332,14 @@ impl Simulator {
         }
         let matrix = self.matrix("gradient_in_parts: controls", controls, steps)?;
         let (inner, objective) = (self.inner.clone(), objective.0.clone());
-        let made = long(py, move |interrupt| {
+        let kept = Checkpoints::within(&inner, matrix.ncols(), memory);
+        let total = kept.work(matrix.ncols());
+        let mut progress = Progress::new("gradient_in_parts: progress", progress, total)?;
+        let made = followed(py, progress.as_mut(), move |interrupt| {
             let controls = Controls::from_matrix(&inner, matrix)?;
-            let kept = Checkpoints::within(&inner, controls.steps(), memory);
-            inner.gradient_in_parts(&controls, &objective, kept, |_, _| interrupt.check())
-        })?;
+            inner.gradient_in_parts(&controls, &objective, kept, |done| interrupt.at(done))
+        });
+        let made = ended(progress, made)?;
         Ok((made.value, gradient::of_rollout(py, &made.gradient)?))
     }
 

@@ -233,3 +233,22 @@ def test_what_does_not_fit_is_told(wet):
         scene.validate()
     with pytest.raises(hg.InputError, match="number or name"):
         scene.add_site("toe", "foot")
+
+
+def test_joints_that_follow_others_and_passive_joints():
+    """F = (m₁ + armature + r² m₂) a, less what the spring pulls."""
+    scene = hg.Scene(fluid=hg.Fluid(density=0.0))
+    rail = hg.prismatic((1.0, 0.0, 0.0))
+    spring = hg.Passive(stiffness=3.0, rest=0.1, armature=0.4)
+    scene.add(hg.Body(name="left", mass=2.0, inertia=(0.1, 0.1, 0.1), joint=rail, actuated=True, passive=spring))
+    scene.add(hg.Body(name="right", mass=3.0, inertia=(0.1, 0.1, 0.1), joint=rail, mimic=hg.Mimic("left", ratio=-0.5)))
+    sim = hg.Simulator(scene, 0.01)
+    assert (sim.q_size, sim.control_size) == (1, 1)
+    equations = sim.equations([0.3])
+    mass = 2.0 + 0.4 + 0.25 * 3.0
+    assert equations.mass_matrix() == pytest.approx(np.array([[mass]]), rel=1e-14)
+    assert equations.forward_dynamics([0.0], u=[1.0]) == pytest.approx(np.array([(1.0 - 3.0 * 0.2) / mass]), rel=1e-12)
+    assert "left.joint.armature" in sim.parameters
+    with pytest.raises(hg.InputError, match="product of both ratios"):
+        scene.add(hg.Body(name="third", mass=3.0, inertia=(0.1, 0.1, 0.1), joint=rail, mimic=hg.Mimic("right")))
+        hg.Simulator(scene, 0.01)

@@ -102,6 +102,21 @@ def test_sweeps_back_are_followed(long_run):
         rollout.vjp(positions=seed, progress=stop)
 
 
+def test_gradients_in_parts_are_followed(long_run):
+    sim, controls = long_run
+    goal = hg.objective.final_position(1, (0.0, 0.0, 0.0))
+    (value, gradient), calls = followed(lambda f: sim.gradient_in_parts(goal, controls, memory=1e6, progress=f))
+    assert calls[-1][1] == calls[-1][2] > 2
+    assert np.array_equal(gradient.controls, sim.rollout(controls).gradient(goal).controls)
+
+    def stop(done, total):
+        if done > total // 4:
+            raise Enough
+
+    with pytest.raises(Enough):
+        sim.gradient_in_parts(goal, controls, memory=1e6, progress=stop)
+
+
 def test_failures_of_the_run_come_first_hand(sim, controls):
     with pytest.raises(hg.InputError, match="rollout: progress: got a value of type int"):
         sim.rollout(controls, progress=3)

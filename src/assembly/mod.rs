@@ -9,9 +9,12 @@ mod symmetry;
 
 use crate::adjoint::drag::Element;
 use crate::adjoint::lie::Vec3;
+use crate::adjoint::waterline::Hull;
 use crate::coupling::Isolated;
+use crate::dynamics::force::Waterline;
 use crate::dynamics::{
-    BodyData, Declarations, Drift, Drive, FreeMotions, Parameters, SiteData, Stepper, System, force,
+    Armature, BodyData, Declarations, Drift, Drive, FreeMotions, Parameters, SiteData, Stepper,
+    System, force,
 };
 use crate::geometry::TriMesh;
 use crate::memory;
@@ -119,6 +122,14 @@ pub(crate) fn assemble(
             .enumerate()
             .map(|(i, b)| (carriers.parent(i), pose(&b.placement), b.joint.model())),
     );
+    let leader = |b: &Body| {
+        let mimic = b.mimic.as_ref()?;
+        Some((scene.body(&mimic.body)?.0, mimic.ratio, mimic.offset))
+    };
+    let tree = match scene.bodies.iter().any(|b| b.mimic.is_some()) {
+        true => tree.following(&scene.bodies.iter().map(leader).collect::<Vec<_>>()),
+        false => tree,
+    };
     let (bodies, velocities) = (scene.bodies.len() as f64, tree.velocities() as f64);
     // The mass matrix with its factor and that of the water, and what each velocity moves.
     memory::fits(
@@ -162,15 +173,32 @@ pub(crate) fn assemble(
         })
         .collect();
     let clearance = Clearance::new(scene, &surfaces, &tree)?;
+    let hull = |mesh: &TriMesh| Hull {
+        vertices: mesh.vertices().to_vec(),
+        faces: mesh.faces().to_vec(),
+    };
+    let hulls: Vec<Option<Hull>> = match scene.waterline {
+        Some(_) => (surfaces.iter())
+            .map(|s| Some(hull(&s.as_ref()?.mesh)))
+            .collect(),
+        None => Vec::new(),
+    };
+    let gravity = Vec3::from(scene.gravity);
     let parts = force::ForceParts {
         scene,
+        time_step: dt,
         tree: &tree,
         bodies: &bodies,
         surfaces: &faces,
+        hulls: &hulls,
+        waterline: scene
+            .waterline
+            .map(|height| Waterline::new(&gravity, height)),
         lubricated: lubrication::lubricated(scene, &surfaces, &clearance)?,
     };
     let mut declared = Declarations::new(scene.fluid.density, inertias);
     let forces = force::assemble(&parts, &mut declared);
+    let armature = Armature::new(scene, &tree, &mut declared);
     let mut parameters = declared.finish();
     let current = Vec3::from(scene.fluid.current);
     let site = |site: &Site| {
@@ -185,6 +213,7 @@ pub(crate) fn assemble(
         sites: scene.sites.iter().filter_map(site).collect(),
         drift: Drift::new(&tree, |b| drives[b] == Drive::Free, &current),
         drives,
+        armature,
         forces,
         current,
         controls,

@@ -218,8 +218,8 @@ impl Evaluation<'_> {
             let carried = link
                 .parent
                 .map_or(Vec6::zeros(), |p| cross_force(&twists[p], &momenta[b]));
-            for k in link.v.clone() {
-                out[k] = self.kinematics.frame_columns[k].dot(&(rates[b] - carried));
+            for (column, k) in link.terms() {
+                out[k] += self.kinematics.frame_columns[column].dot(&(rates[b] - carried));
             }
         }
         out

@@ -46,7 +46,7 @@ impl Drift {
                 out.twists[b] = out.twists[parent];
                 continue;
             }
-            let along = match is_free(b) {
+            let along = match is_free(b) && tree.is_single(b) {
                 true => along(link, current),
                 false => None,
             };

@@ -289,6 +289,9 @@ impl<'a> Evaluation<'a> {
             twice += twist.dot(&self.rigid_momentum(b, twist));
             twice += self.parameters.density() * self.relative(twist).dot(&fluid[b]);
         }
+        for (i, own) in self.system.armature.entries(self.parameters) {
+            twice += own * v[i] * v[i];
+        }
         0.5 * twice
     }
 

@@ -31,7 +31,9 @@ impl Evaluation<'_> {
         let twists = tree.twists(&self.kinematics, v);
         let fluid = self.fluid_momenta(&self.virtual_direction(v));
         let momenta = self.with_rigid(&twists, &fluid);
-        tree.project(&self.kinematics.columns, momenta)
+        let mut out = tree.project(&self.kinematics.columns, momenta);
+        (self.system.armature).add(self.parameters, v, &mut out);
+        out
     }
 
     /// ½ vᵀ M(q) v, J.
@@ -59,21 +61,22 @@ impl Evaluation<'_> {
         let (tree, rho) = (&self.system.tree, self.parameters.density());
         let nv = tree.velocities();
         let mut out = DMatrix::zeros(nv, nv);
-        let mut is_behind = vec![false; self.system.len()];
-        for (a, link) in tree.links().iter().enumerate() {
-            for (b, other) in tree.links().iter().enumerate() {
-                is_behind[b] = b == a || other.parent.is_some_and(|p| is_behind[p]);
-            }
-            for k in link.v.clone() {
-                let mut momenta = self.fluid.column(self.system, &self.kinematics, k);
-                for (b, momentum) in momenta.iter_mut().enumerate() {
-                    *momentum *= rho;
-                    if is_behind[b] {
-                        *momentum += self.rigid_momentum(b, &self.kinematics.columns[k]);
-                    }
+        let mut unit = DVector::zeros(nv);
+        for k in 0..nv {
+            unit[k] = 1.0;
+            let mut momenta = self.fluid.column(self.system, &self.kinematics, k);
+            let twists = tree.twists(&self.kinematics, &unit);
+            for (b, (momentum, twist)) in momenta.iter_mut().zip(&twists).enumerate() {
+                *momentum *= rho;
+                if *twist != Vec6::zeros() {
+                    *momentum += self.rigid_momentum(b, twist);
                 }
-                out.set_column(k, &tree.project(&self.kinematics.columns, momenta));
             }
+            out.set_column(k, &tree.project(&self.kinematics.columns, momenta));
+            unit[k] = 0.0;
+        }
+        for (i, own) in self.system.armature.entries(self.parameters) {
+            out[(i, i)] += own;
         }
         out
     }
@@ -88,6 +91,10 @@ impl Evaluation<'_> {
             FluidMomenta::Apart(added) => Some(added),
             FluidMomenta::Still => None,
         };
+        // Closed by a transmission, a tree isn't one any more.
+        if self.system.tree.has_followers() {
+            return self.factored_dense(free);
+        }
         let mut inertias = self.rigid.clone();
         if let Some(added) = added {
             for (b, w) in self.system.submerged() {
@@ -97,7 +104,12 @@ impl Evaluation<'_> {
         let mut is_free = vec![false; self.system.tree.velocities()];
         free.iter().for_each(|i| is_free[*i] = true);
         let (tree, kinematics) = (&self.system.tree, &self.kinematics);
-        Articulated::new(tree, kinematics, &inertias, |i| is_free[i], LEAST)
+        let mut added = vec![0.0; is_free.len()];
+        for (i, own) in self.system.armature.entries(self.parameters) {
+            added[i] = own;
+        }
+        let free = |i: usize| is_free[i].then_some(added[i]);
+        Articulated::new(tree, kinematics, &inertias, free, LEAST)
             .map(Inertia::Articulated)
             .map_err(|found| {
                 let name = &self.system.bodies[found.body].name;

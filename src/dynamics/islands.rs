@@ -28,7 +28,9 @@ impl Evaluation<'_> {
         let mut tied: Vec<usize> = (0..links.len()).collect();
         let joints = links.iter().enumerate();
         let joints = joints.filter_map(|(b, link)| Some([link.parent?, b]));
-        for [a, b] in joints.chain(ties.into_iter().flatten()) {
+        let led = links.iter().enumerate();
+        let led = led.filter_map(|(b, link)| Some([link.follows?.leader, b]));
+        for [a, b] in joints.chain(led).chain(ties.into_iter().flatten()) {
             let (a, b) = (first(&tied, a), first(&tied, b));
             tied[a.max(b)] = a.min(b);
         }

@@ -1,6 +1,7 @@
 //! Equations of motion: forces, the coupled mass matrix, integrators, and their adjoints.
 
 mod acceleration;
+mod armature;
 mod balance;
 mod body;
 mod contact;
@@ -23,6 +24,7 @@ mod stiffness;
 mod symmetry;
 mod system;
 
+pub use armature::Armature;
 pub use body::{BodyData, SiteData};
 pub use contact::{ContactForce, ContactGap, ContactModel, Dual, PairContact};
 pub use cotangents::ForceCotangents;

@@ -242,6 +242,8 @@ impl Linearisation<'_> {
         let (q_bar, v_bar) = tree.reverse(&self.kinematics, v, Virtual::User(w), &fields, bar);
         out.q += q_bar;
         out.v += v_bar;
+        let (v_bar, bar) = (&mut out.v, &mut out.parameters);
+        (self.system.armature).add_vjp(self.parameters, v, w, v_bar, bar);
         out
     }
 }

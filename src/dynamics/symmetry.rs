@@ -98,7 +98,8 @@ fn allowed(root: &Link) -> DMatrix<f64> {
 pub fn free_motions(tree: &Tree, drives: &[Drive], groups: &[Group]) -> FreeMotions {
     let (mut columns, mut twists): (Vec<Vec<f64>>, Vec<Vec6>) = Default::default();
     for Group { roots, refused } in groups {
-        if roots.is_empty() || roots.iter().any(|b| drives[*b] != Drive::Free) {
+        let free = |b: &usize| drives[*b] == Drive::Free && tree.is_single(*b);
+        if roots.is_empty() || !roots.iter().all(free) {
             continue;
         }
         let roots: Vec<&Link> = roots.iter().map(|b| &tree.links()[*b]).collect();

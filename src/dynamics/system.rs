@@ -1,7 +1,7 @@
 //! A system: the tree, its bodies' constants, and the coupling through the water.
 
 use super::force::ForceModel;
-use super::{BodyData, ContactModel, Drift, JointLimit, SiteData};
+use super::{Armature, BodyData, ContactModel, Drift, JointLimit, SiteData};
 use crate::adjoint::lie::Vec3;
 use crate::coupling::Coupling;
 use crate::multibody::Tree;
@@ -31,6 +31,8 @@ pub struct System {
     pub sites: Vec<SiteData>,
     /// What moves each joint.
     pub drives: Vec<Drive>,
+    /// What drives add to the inertia of their joints.
+    pub armature: Armature,
     /// Forces that don't come from the water's kinetic energy; clones share them.
     pub forces: Arc<[Box<dyn ForceModel>]>,
     /// Uniform current, m/s.

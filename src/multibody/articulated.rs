@@ -50,7 +50,10 @@ pub struct Indefinite {
 }
 
 impl Articulated {
-    /// From the bodies' spatial inertias (body frames, about their origins: kg, kg m, kg m²) and which velocities are free.
+    /// From the bodies' spatial inertias (body frames, about their origins: kg, kg m, kg m²), and of each velocity that is free what its joint's drive adds to the inertia (kg or
+    /// kg m²).
+    ///
+    /// No joint may follow another.
     ///
     /// # Errors
     /// The first joint (leaves first) of which less than `least` is left.
@@ -58,7 +61,7 @@ impl Articulated {
         tree: &Tree,
         kinematics: &Kinematics,
         inertias: &[Mat6],
-        is_free: impl Fn(usize) -> bool,
+        added: impl Fn(usize) -> Option<f64>,
         least: f64,
     ) -> Result<Self, Indefinite> {
         // Of the subtrees: with all joints free, and with all of them rigid.
@@ -72,13 +75,16 @@ impl Articulated {
             };
             let mut columns = Mat6::zeros();
             let mut free = [false; 6];
-            for (k, i) in link.v.clone().enumerate().filter(|(_, i)| is_free(*i)) {
-                columns.set_column(k, &own.twist_to_body(&kinematics.columns[i]));
+            let mut drive = Mat6::zeros();
+            for (k, (column, i)) in link.terms().enumerate() {
+                let Some(more) = added(i) else { continue };
+                columns.set_column(k, &own.twist_to_body(&kinematics.columns[column]));
+                drive[(k, k)] = more;
                 free[k] = true;
             }
             let inertia = articulated[body] * columns;
-            let mut left = columns.tr_mul(&inertia);
-            let whole = columns.tr_mul(&(composite[body] * columns));
+            let mut left = columns.tr_mul(&inertia) + drive;
+            let whole = columns.tr_mul(&(composite[body] * columns)) + drive;
             for k in (0..6).filter(|k| !free[*k]) {
                 left[(k, k)] = 1.0;
             }

@@ -21,6 +21,23 @@ pub struct Link {
     pub q: Range<usize>,
     /// Place of the joint's velocities in v.
     pub v: Range<usize>,
+    /// Place of the joint's columns in [`Kinematics`].
+    pub columns: Range<usize>,
+    /// The joint that moves this one, which then has no place in q and v.
+    pub follows: Option<Follows>,
+}
+
+/// How a joint with one coordinate follows another: `q = ratio · q[leader] + offset`.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Follows {
+    /// The body whose joint it follows.
+    pub leader: usize,
+    /// Of its motion and the leader's.
+    pub ratio: f64,
+    /// m or rad.
+    pub offset: f64,
+    q: usize,
+    v: usize,
 }
 
 impl Link {
@@ -32,6 +49,15 @@ impl Link {
     /// Its part of a vector with an entry per velocity.
     pub fn of_v<'x>(&self, x: &'x DVector<f64>) -> &'x [f64] {
         &x.as_slice()[self.v.clone()]
+    }
+
+    /// Each of its columns with the velocity that it goes with.
+    pub fn terms(&self) -> impl Iterator<Item = (usize, usize)> + use<> {
+        let v = match &self.follows {
+            Some(follows) => follows.v..follows.v + 1,
+            None => self.v.clone(),
+        };
+        self.columns.clone().zip(v)
     }
 }
 
@@ -46,9 +72,9 @@ pub struct Tree {
 pub struct Kinematics {
     /// Poses of the bodies in the world.
     pub poses: Vec<Pose>,
-    /// Frame columns Ŝ, one per velocity: spatial twists of the joint's constant basis.
+    /// Frame columns Ŝ of all joints ([`Link::terms`]): spatial twists of the joint's constant basis; of one that follows another at the leader's unit rate.
     pub frame_columns: Vec<Vec6>,
-    /// User columns S = Ŝ X, one per velocity.
+    /// User columns S = Ŝ X of the same.
     pub columns: Vec<Vec6>,
 }
 
@@ -123,10 +149,54 @@ impl Tree {
                 placement,
                 joint,
                 q,
+                columns: v.clone(),
                 v,
+                follows: None,
             });
         }
         Self { links }
+    }
+
+    /// With joints of one coordinate that follow others: for each body the leader's number, the ratio and the offset (m or rad). A leader follows none.
+    pub fn following(mut self, leaders: &[Option<(usize, f64, f64)>]) -> Self {
+        let (mut nq, mut nv) = (0, 0);
+        for (link, leader) in self.links.iter_mut().zip(leaders) {
+            let (q, v) = match leader {
+                None => (link.q.len(), link.v.len()),
+                Some(_) => (0, 0),
+            };
+            (link.q, link.v) = (nq..nq + q, nv..nv + v);
+            (nq, nv) = (link.q.end, link.v.end);
+        }
+        for (b, leader) in leaders.iter().enumerate() {
+            let Some((leader, ratio, offset)) = *leader else {
+                continue;
+            };
+            self.links[b].follows = Some(Follows {
+                leader,
+                ratio,
+                offset,
+                q: self.links[leader].q.start,
+                v: self.links[leader].v.start,
+            });
+        }
+        self
+    }
+
+    /// Whether a joint follows another.
+    pub fn has_followers(&self) -> bool {
+        self.links.iter().any(|l| l.follows.is_some())
+    }
+
+    /// Whether the joint of body `b` moves by itself, and no other with it.
+    pub fn is_single(&self, b: usize) -> bool {
+        let follows = |l: &Link| l.follows.is_some_and(|f| f.leader == b);
+        self.links[b].follows.is_none() && !self.links.iter().any(follows)
+    }
+
+    /// The joints with coordinates of their own.
+    fn own(&self) -> impl Iterator<Item = &Link> {
+        self.links.iter().filter(|l| l.follows.is_none())
     }
 
     /// The bodies with their joints.
@@ -146,7 +216,7 @@ impl Tree {
 
     /// Coordinates with every joint at its origin.
     pub fn origin(&self) -> DVector<f64> {
-        DVector::from_vec(self.links.iter().flat_map(|l| l.joint.origin()).collect())
+        DVector::from_vec(self.own().flat_map(|l| l.joint.origin()).collect())
     }
 
     /// Whether body `b` moves when the joint of body `a` does.
@@ -165,7 +235,7 @@ impl Tree {
         part: impl Fn(&Link) -> [Vec<f64>; N],
     ) -> [DVector<f64>; N] {
         let mut out = [const { Vec::new() }; N];
-        for l in &self.links {
+        for l in self.own() {
             for (out, part) in out.iter_mut().zip(part(l)) {
                 out.extend(part);
             }
@@ -306,7 +376,7 @@ impl Tree {
     ) -> [DMatrix<f64>; N] {
         let n = self.velocities();
         let mut out: [DMatrix<f64>; N] = std::array::from_fn(|_| DMatrix::zeros(n, n));
-        for l in &self.links {
+        for l in self.own() {
             let mut unit = vec![0.0; l.v.len()];
             for k in 0..l.v.len() {
                 unit[k] = 1.0;
@@ -361,16 +431,23 @@ impl Tree {
     /// Poses and columns at `q`.
     pub fn kinematics(&self, q: &DVector<f64>) -> Kinematics {
         let mut poses: Vec<Pose> = Vec::with_capacity(self.links.len());
-        let mut frame_columns = Vec::with_capacity(self.velocities());
-        let mut columns = Vec::with_capacity(self.velocities());
+        let count = self.links.last().map_or(0, |l| l.columns.end);
+        let mut frame_columns = Vec::with_capacity(count);
+        let mut columns = Vec::with_capacity(count);
         for l in &self.links {
             let frame = match l.parent {
                 Some(p) => poses[p].compose(&l.placement),
                 None => l.placement,
             };
-            let qj = l.of_q(q);
+            let led = l.follows.map(|f| (f.ratio, [f.ratio * q[f.q] + f.offset]));
+            let (ratio, qj) = match &led {
+                Some((ratio, own)) => (*ratio, own.as_slice()),
+                None => (1.0, l.of_q(q)),
+            };
             let basis = l.joint.basis();
-            let own: Vec<Vec6> = basis.iter().map(|b| frame.twist_to_world(b)).collect();
+            let own: Vec<Vec6> = (basis.iter())
+                .map(|b| ratio * frame.twist_to_world(b))
+                .collect();
             for k in 0..own.len() {
                 let mut unit = vec![0.0; own.len()];
                 unit[k] = 1.0;
@@ -415,11 +492,11 @@ impl Tree {
             // dX v, entry by entry from the transpose.
             let mut bent = Vec6::zeros();
             let mut unit = vec![0.0; l.v.len()];
-            for (k, i) in l.v.clone().enumerate() {
+            for k in 0..l.v.len() {
                 unit[k] = 1.0;
                 let entry = l.joint.frame_velocity_vjp(l.of_v(v), &unit);
                 let along: f64 = entry.iter().zip(l.of_v(dq)).map(|(a, b)| a * b).sum();
-                bent += kinematics.frame_columns[i] * along;
+                bent += kinematics.frame_columns[l.columns.start + k] * along;
                 unit[k] = 0.0;
             }
             // The columns move with the parent.
@@ -444,10 +521,10 @@ impl Tree {
     /// velocities, on the frame columns those dual to frame velocities.
     pub fn project(&self, columns: &[Vec6], wrenches: Vec<Vec6>) -> DVector<f64> {
         let composite = self.composite(wrenches);
-        let mut out = DVector::zeros(columns.len());
+        let mut out = DVector::zeros(self.velocities());
         for (l, f) in self.links.iter().zip(&composite) {
-            for k in l.v.clone() {
-                out[k] = columns[k].dot(f);
+            for (column, k) in l.terms() {
+                out[k] += columns[column].dot(f);
             }
         }
         out
@@ -458,9 +535,9 @@ impl Tree {
         let mut out = DMatrix::zeros(6 * self.links.len(), self.velocities());
         for b in 0..self.links.len() {
             for a in self.carrying(b) {
-                for k in self.links[a].v.clone() {
-                    out.fixed_view_mut::<6, 1>(6 * b, k)
-                        .copy_from(&kinematics.columns[k]);
+                for (column, k) in self.links[a].terms() {
+                    let mut entry = out.fixed_view_mut::<6, 1>(6 * b, k);
+                    entry += kinematics.columns[column];
                 }
             }
         }
@@ -559,13 +636,13 @@ impl Tree {
             let sv_bar = twist - cross_force(&parent_twist, &bias);
             let sz_bar = virt - cross_force(&parent_twist, &turning);
             // X is its own q's; S = Ŝ X already holds it.
-            for i in l.v.clone() {
-                q_bar[i] = kinematics.columns[i].dot(&bar.pose[b]);
-                v_bar[i] = kinematics.columns[i].dot(&sv_bar);
+            for (column, i) in l.terms() {
+                q_bar[i] += kinematics.columns[column].dot(&bar.pose[b]);
+                v_bar[i] += kinematics.columns[column].dot(&sv_bar);
             }
             if l.joint.has_frame_map() {
                 let dot = |f: &Vec6| -> Vec<f64> {
-                    let columns = l.v.clone().map(|k| kinematics.frame_columns[k].dot(f));
+                    let columns = (l.columns.clone()).map(|k| kinematics.frame_columns[k].dot(f));
                     columns.collect()
                 };
                 let (hat_v, hat_z, hat_b) = (dot(&sv_bar), dot(&sz_bar), dot(&bias));
@@ -600,7 +677,7 @@ impl Tree {
 
 /// Sum of a body's joint columns with the given coefficients.
 fn combine(columns: &[Vec6], link: &Link, x: &DVector<f64>) -> Vec6 {
-    link.v.clone().map(|k| columns[k] * x[k]).sum()
+    link.terms().map(|(column, k)| columns[column] * x[k]).sum()
 }
 
 /// The joint's own contributions `Ŝ v̂`, `Ŝ ẑ`, `Ŝ (Ẋ v)`.

@@ -42,6 +42,7 @@ impl Scene {
             name: String::new(),
             fluid,
             gravity: [0.0; 3],
+            waterline: None,
             time_step: 0.01,
             steps: 100,
             preset: Preset::Default,

@@ -19,15 +19,33 @@ impl Body {
     }
 }
 
+impl Body {
+    /// Number of joint coordinates of its own: none where it follows another's.
+    pub fn coordinates(&self) -> usize {
+        match self.mimic {
+            Some(_) => 0,
+            None => self.joint.coordinates(),
+        }
+    }
+
+    /// Number of generalised velocities of its own.
+    pub fn velocities(&self) -> usize {
+        match self.mimic {
+            Some(_) => 0,
+            None => self.joint.velocities(),
+        }
+    }
+}
+
 impl Scene {
     /// Number of joint coordinates q of all bodies, those of driven and locked joints included.
     pub fn coordinates(&self) -> usize {
-        self.bodies.iter().map(|b| b.joint.coordinates()).sum()
+        self.bodies.iter().map(Body::coordinates).sum()
     }
 
     /// Number of generalised velocities v of all bodies, those of driven and locked joints included.
     pub fn velocities(&self) -> usize {
-        self.bodies.iter().map(|b| b.joint.velocities()).sum()
+        self.bodies.iter().map(Body::velocities).sum()
     }
 
     /// Number of controls a step takes.
@@ -46,7 +64,7 @@ impl Scene {
     }
 
     fn labels(&self, of: impl Fn(&Joint) -> &'static [&'static str]) -> Vec<String> {
-        let each = self.bodies.iter();
+        let each = self.bodies.iter().filter(|body| body.mimic.is_none());
         each.flat_map(|body| {
             let labels = of(&body.joint).iter();
             labels.map(move |label| format!("{}.{label}", body.name))

@@ -10,9 +10,12 @@ mod contact;
 mod file;
 mod force;
 mod joint;
+mod mimic;
 mod motion;
 mod origin;
+mod passive;
 mod problem;
+mod servo;
 mod site;
 mod validate;
 
@@ -23,7 +26,10 @@ pub use build::BodyId;
 pub(crate) use carriers::Carriers;
 pub use contact::{CollisionPiece, Contact};
 pub use force::{Force, Lubrication, Spring, WATER_VISCOSITY};
+pub use mimic::Mimic;
 pub use origin::Origin;
+pub use passive::Passive;
+pub use servo::Servo;
 pub use site::Site;
 pub(crate) use validate::impossible_inertia;
 
@@ -41,6 +47,9 @@ pub struct Scene {
     /// Gravity, m/s², world frame.
     #[serde(default, skip_serializing_if = "is_default")]
     pub gravity: [f64; 3],
+    /// Height of the surface of still water, m: how far from the world's origin it is against gravity. Above there is no water: what is there of a body has no buoyancy and no
+    /// drag. None: the water has no end. Its inertia isn't told of it (`docs/water.md`).
+    pub waterline: Option<f64>,
     /// Time step, s.
     pub time_step: f64,
     /// Number of steps of a run.
@@ -146,6 +155,8 @@ pub struct Body {
     /// How the body moves against its parent.
     #[serde(default)]
     pub joint: Joint,
+    /// Another joint that moves this one, by a transmission.
+    pub mimic: Option<Mimic>,
     /// A given motion of the joint's coordinates, one per coordinate; the joint is then driven.
     pub motion: Option<Vec<Motion>>,
     /// Holds the joint where it starts.
@@ -159,9 +170,13 @@ pub struct Body {
     /// start, the water's and that of all bodies it carries included, over the square of the time step, which is near rigid at that
     /// step. The force sets in over ± a thousandth of the range around a limit.
     pub limit_stiffness: Option<f64>,
+    /// Spring, damping, friction and rotor of a joint with one coordinate.
+    pub passive: Option<Passive>,
     /// Whether the joint's generalised forces are controls.
     #[serde(default, skip_serializing_if = "is_default")]
     pub actuated: bool,
+    /// A drive whose target is the joint's control, in place of its force.
+    pub servo: Option<Servo>,
     /// Whether a wrench on the body (world axes, about its origin) is a control.
     #[serde(default, skip_serializing_if = "is_default")]
     pub thruster: bool,

@@ -194,10 +194,11 @@ impl Equations<'_> {
         let tree = &self.at.system.tree;
         let mut out = DMatrix::zeros(6, tree.velocities());
         for link in tree.carrying(body).map(|b| &tree.links()[b]) {
-            for k in link.v.clone() {
-                let column = &self.at.kinematics.columns[k];
+            for (column, k) in link.terms() {
+                let column = &self.at.kinematics.columns[column];
                 let moved = six(&point_velocity(column, &x), &angular(column));
-                out.set_column(k, &moved);
+                let mut entry = out.column_mut(k);
+                entry += moved;
             }
         }
         Ok(out)

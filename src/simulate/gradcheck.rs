@@ -185,8 +185,11 @@ fn scales(simulator: &Simulator, rollout: &Rollout, steps: usize) -> Result<Scal
         velocity = velocity.sup(&s.v.abs());
     }
     let mut force = Vec::new();
-    for (body, link) in system.bodies.iter().zip(system.tree.links()) {
-        if body.joint_control.is_some() {
+    let bodies = system.bodies.iter().zip(&simulator.scene.bodies);
+    for ((body, given), link) in bodies.zip(system.tree.links()) {
+        if given.servo.is_some() {
+            force.push(0.1 * displacement[link.v.start]);
+        } else if body.joint_control.is_some() {
             for i in link.v.clone() {
                 force.push(e.mass_matrix()[(i, i)] * velocity[i] / duration);
             }

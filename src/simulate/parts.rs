@@ -43,6 +43,17 @@ impl Checkpoints {
             states: count(200.0 + 8.0 * numbers as f64).min(parts),
         }
     }
+
+    /// Parts of a run of `steps` steps, the last one perhaps shorter.
+    fn parts(&self, steps: usize) -> usize {
+        steps.div_ceil(self.part.max(1)).max(1)
+    }
+
+    /// Work of a gradient of `steps` steps, as its progress counts it: parts run, and parts gone back through, twice each.
+    pub fn work(&self, steps: usize) -> usize {
+        let parts = self.parts(steps);
+        advances(parts, self.states.max(1)) + 2 * parts
+    }
 }
 
 /// The gradient of a long run.
@@ -57,8 +68,8 @@ pub struct InParts {
 }
 
 impl Simulator {
-    /// Value and gradient of an objective of a run, with no more of it kept at a time than `kept` says. `progress` is called with the number of parts that have run or have
-    /// been gone back through, of so many, and may end the work.
+    /// Value and gradient of an objective of a run, with no more of it kept at a time than `kept` says. `progress` is called with how much of [`Checkpoints::work`] is done, and
+    /// may end it.
     ///
     /// # Errors
     /// As [`Simulator::rollout`] and [`Rollout::gradient`], parts of no steps, and [`Error::Stopped`] if `progress` breaks.
@@ -67,7 +78,7 @@ impl Simulator {
         controls: &Controls,
         objective: &dyn Partwise,
         kept: Checkpoints,
-        mut progress: impl FnMut(usize, usize) -> ControlFlow<()>,
+        mut progress: impl FnMut(usize) -> ControlFlow<()>,
     ) -> Result<InParts> {
         if kept.part == 0 || kept.states == 0 {
             return Err(Error::input(
@@ -77,17 +88,16 @@ impl Simulator {
             ));
         }
         let steps = controls.steps();
-        let parts = steps.div_ceil(kept.part).max(1);
+        let (parts, all) = (kept.parts(steps), kept.work(steps));
         let run = Run {
             simulator: self,
             controls,
             part: kept.part,
         };
-        let all = advances(parts, kept.states) + 2 * parts;
         let mut done = 0;
         let mut on = |by: usize| {
             done += by;
-            match progress(done, all) {
+            match progress(done) {
                 ControlFlow::Continue(()) => Ok(()),
                 ControlFlow::Break(()) => Err(Error::Stopped {
                     what: format!("the gradient, after {done} of {all} parts"),

@@ -1,7 +1,7 @@
 //! The simulator: a scene made ready to run.
 
 use super::{BackendReport, Discretisation, ErrorEstimate, Fidelity, Policy, Settings};
-use crate::adjoint::lie::Pose;
+use crate::adjoint::lie::{Mat3, Mat6, Pose};
 use crate::assembly::{self, Assembled, Choices};
 use crate::coupling::CouplingReport;
 use crate::dynamics::{ContactGap, ContactModel, FreeMotions, Parameters, Stepper, System};
@@ -29,8 +29,24 @@ pub struct AddedMass {
     pub bodies: Vec<String>,
     /// 6B × 6B, world frame, per body linear then angular about its origin: kg, kg m, kg m².
     pub matrix: DMatrix<f64>,
+    /// Rotations of the bodies, body to world axes.
+    pub rotations: Vec<Mat3>,
     /// What the coupling reports.
     pub report: CouplingReport,
+}
+
+impl AddedMass {
+    /// The block of body number `k` of these alone, in its own axes about its origin: what a simulator without coupling needs of it.
+    pub fn own(&self, k: usize) -> Mat6 {
+        let r = &self.rotations[k];
+        let block = self.matrix.fixed_view::<6, 6>(6 * k, 6 * k);
+        let mut out = Mat6::zeros();
+        for (i, j) in [(0, 0), (0, 3), (3, 0), (3, 3)] {
+            let turned = r.transpose() * block.fixed_view::<3, 3>(i, j) * r;
+            out.fixed_view_mut::<3, 3>(i, j).copy_from(&turned);
+        }
+        0.5 * (out + out.transpose())
+    }
 }
 
 impl Simulator {
@@ -314,6 +330,7 @@ impl Simulator {
         Ok(AddedMass {
             bodies: in_water().map(|b| system.bodies[b].name.clone()).collect(),
             matrix: 0.5 * (&m + m.transpose()),
+            rotations: poses.iter().map(|pose| pose.rotation).collect(),
             report: record.report().clone(),
         })
     }

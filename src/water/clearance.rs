@@ -66,7 +66,7 @@ impl Clearance {
         let movers = |b: usize| -> Vec<usize> {
             let carry = |a: &usize| {
                 let held = scene.bodies[*a].locked && scene.bodies[*a].motion.is_none();
-                tree.carries(*a, b) && !tree.links()[*a].v.is_empty() && !held
+                tree.carries(*a, b) && !tree.links()[*a].columns.is_empty() && !held
             };
             (0..bodies).filter(carry).collect()
         };

@@ -135,7 +135,7 @@ fn region(refined: &Refinement) -> Region {
 
 /// Whether anything moves body `b`.
 fn moves(scene: &Scene, tree: &Tree, b: usize) -> bool {
-    (0..scene.bodies.len()).any(|a| tree.carries(a, b) && !tree.links()[a].v.is_empty())
+    (0..scene.bodies.len()).any(|a| tree.carries(a, b) && !tree.links()[a].columns.is_empty())
 }
 
 /// One value per body; bodies with equal surfaces share one.

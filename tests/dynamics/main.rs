@@ -18,6 +18,7 @@ mod observables;
 #[cfg(feature = "opt")]
 mod optimize;
 mod parts;
+mod passive;
 mod random;
 mod resume;
 mod rollout_gradient;
@@ -25,6 +26,7 @@ mod rollout_gradient;
 mod smoothing;
 mod soak;
 mod trees;
+mod waterline;
 
 #[path = "../support/mod.rs"]
 mod support;

@@ -38,8 +38,12 @@ fn compare(simulator: &Simulator, steps: usize, what: &str) {
     let value = rollout.value(&goal()).unwrap();
     for (part, states) in [(1, 2), (3, 100), (5, 1), (7, 3), (1000, 1)] {
         let kept = Checkpoints { part, states };
-        let found =
-            simulator.gradient_in_parts(&controls, &goal(), kept, |_, _| ControlFlow::Continue(()));
+        let mut told = 0;
+        let found = simulator.gradient_in_parts(&controls, &goal(), kept, |done| {
+            told = done;
+            ControlFlow::Continue(())
+        });
+        assert_eq!(told, kept.work(steps), "{what}");
         let found = found.unwrap();
         same(&found.gradient, &whole);
         assert!((found.value - value).abs() <= 1e-14 * value.abs(), "{what}");
@@ -88,11 +92,12 @@ fn checkpoints_fit_what_they_are_given() {
     );
     let none = Checkpoints { part: 0, states: 1 };
     let controls = Controls::zeros(&simulator, 3);
-    let go_on = |_, _| ControlFlow::Continue(());
+    let go_on = |_| ControlFlow::Continue(());
     let error = simulator.gradient_in_parts(&controls, &goal(), none, go_on);
     assert!(matches!(error, Err(Error::Input { .. })));
     let kept = Checkpoints { part: 1, states: 2 };
-    let stop = |done, all| match 2 * done > all {
+    let all = kept.work(3);
+    let stop = |done| match 2 * done > all {
         true => ControlFlow::Break(()),
         false => ControlFlow::Continue(()),
     };
@@ -132,7 +137,7 @@ fn long_gradient() {
     let gradient = match in_parts {
         true => {
             let kept = Checkpoints::new(steps);
-            let go_on = |_, _| ControlFlow::Continue(());
+            let go_on = |_| ControlFlow::Continue(());
             let found = simulator
                 .gradient_in_parts(&controls, &goal, kept, go_on)
                 .unwrap();
@@ -256,7 +261,7 @@ fn objectives_that_do_not_fit_are_refused_in_parts_too() {
         &objective::final_position("nobody", [0.0; 3]),
     ];
     for goal in goals {
-        let found = simulator.gradient_in_parts(&controls, goal, Checkpoints::new(4), |_, _| {
+        let found = simulator.gradient_in_parts(&controls, goal, Checkpoints::new(4), |_| {
             ControlFlow::Continue(())
         });
         assert!(matches!(found, Err(Error::Input { .. })));

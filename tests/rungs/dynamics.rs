@@ -8,7 +8,9 @@ use hydrograd::dynamics::{
     Drive, Input, Integrator, Linearisation, Owner, Parameters, Range, State, StateBar, StepBar,
     Stepper, System,
 };
-use hydrograd::scene::{Body, Drag, DragPart, Fluid, Joint, Motion, Plane, Scene, Shape, Spring};
+use hydrograd::scene::{
+    Body, Drag, DragPart, Fluid, Joint, Mimic, Motion, Passive, Plane, Scene, Servo, Shape, Spring,
+};
 use hydrograd::simulate::{Pd, PdAxis};
 use hydrograd::{Controls, Rollout, Settings, Simulator};
 use nalgebra::{DMatrix, DVector};
@@ -77,7 +79,27 @@ pub fn scene() -> Scene {
             .at([0.55, 0.0, 0.05])
             .joint(Joint::Revolute { axis })
             .actuated()
+            .passive(Passive {
+                stiffness: 4.0,
+                rest: 0.2,
+                damping: 0.8,
+                friction: 0.6,
+                friction_speed: 0.4,
+                armature: 0.05,
+            })
             .drag(drag(DragPart::Total, DragPart::Total)),
+    );
+    scene.add(
+        Body::new(oval(0.08, 0.05, 0.05))
+            .named("claw")
+            .child_of("arm")
+            .density(1500.0)
+            .at([0.4, 0.0, 0.05])
+            .joint(Joint::Screw {
+                axis: [0.1, 0.9, 0.3],
+                pitch: 0.2,
+            })
+            .mimic(Mimic::new("arm").ratio(-0.7).offset(0.3)),
     );
     scene.add(
         Body::new(oval(0.1, 0.07, 0.08))
@@ -104,7 +126,10 @@ pub fn scene() -> Scene {
             .mass(0.7)
             .inertia([0.01, 0.02, 0.015])
             .center_of_mass([0.0, 0.05, 0.0])
-            .joint(Joint::Prismatic { axis }),
+            .joint(Joint::Prismatic { axis })
+            .passive(Passive::default().stiffness(3.0).armature(0.2))
+            .actuated()
+            .servo(Servo::new(20.0, 2.0)),
     );
     scene.add(
         Body::dry()
@@ -206,6 +231,11 @@ pub fn directions(at: &Parameters) -> Vec<(&'static str, DVector<f64>)> {
         ("drag.linear", 1.0),
         ("drag.quadratic", 0.1),
         ("rest_length", 0.1),
+        ("joint.stiffness", 1.0),
+        ("joint.rest", 0.1),
+        ("joint.damping", 0.1),
+        ("joint.friction", 0.1),
+        ("joint.armature", 0.01),
     ];
     let kind = |name: &'static str| name.split_once("inertia").map_or(name, |_| "inertia");
     let mut out: Vec<(&'static str, DVector<f64>)> = Vec::new();

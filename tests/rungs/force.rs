@@ -7,7 +7,10 @@ use hydrograd::adjoint::check::{Outcome, Rung};
 use hydrograd::adjoint::lie::{Pose, Vec6, angular, exp_matrix, linear};
 use hydrograd::dynamics::force::{ForceModel, LoadBars, Loads, Moving, Place, Velocity};
 use hydrograd::dynamics::{Parameters, System};
+use hydrograd::scene::{Body, Drag, DragPart, Fluid, Scene, Shape};
+use hydrograd::{Fidelity, Settings, Simulator};
 use nalgebra::DVector;
+use std::sync::OnceLock;
 
 pub fn rungs() -> Vec<Rung> {
     macro_rules! rungs {
@@ -20,10 +23,18 @@ pub fn rungs() -> Vec<Rung> {
         "dynamics::force::weight::Weight::vjp" => |c| vjp("buoyancy", c),
         "dynamics::force::drag::Drag::jvp" => |c| jvp("linear drag", c),
         "dynamics::force::drag::Drag::vjp" => |c| vjp("linear drag", c),
+        "dynamics::force::waterline::Floating::vjp" => |c| vjp("buoyancy at the surface", c),
+        "dynamics::force::waterline::wrench_vjp" => |c| vjp("buoyancy at the surface", c),
+        "dynamics::force::drag::Dragged::cut_vjp" => |c| vjp("linear drag at the surface", c),
+        "dynamics::force::drag::Dragged::cut_vjp" => |c| vjp("quadratic drag at the surface", c),
         "dynamics::force::drag::Drag::jvp" => |c| jvp("quadratic drag", c),
         "dynamics::force::drag::Drag::vjp" => |c| vjp("quadratic drag", c),
         "dynamics::force::thruster::Thrusters::vjp" => |c| vjp("thruster", c),
         "dynamics::force::actuation::Actuation::vjp" => |c| vjp("actuation", c),
+        "dynamics::force::passive::Passives::jvp" => |c| jvp("passive joint", c),
+        "dynamics::force::passive::Passives::vjp" => |c| vjp("passive joint", c),
+        "dynamics::force::servo::Servos::jvp" => |c| jvp("servo", c),
+        "dynamics::force::servo::Servos::vjp" => |c| vjp("servo", c),
         "dynamics::force::spring::Springs::jvp" => |c| jvp("spring", c),
         "dynamics::force::spring::Springs::vjp" => |c| vjp("spring", c),
         "dynamics::force::lubrication::Lubrication::jvp" => |c| jvp("lubrication", c),
@@ -49,6 +60,13 @@ impl At {
         if name == "lubrication" {
             let (p, control) = (contact::point(), DVector::zeros(0));
             return Self::placed(contact::system(), p.q, p.v, control, p.parameters);
+        }
+        if name.ends_with(SURFACE) {
+            let sim = surface();
+            let (system, q) = (sim.system(), sim.start().0.clone());
+            let v = wavy(system.tree.velocities(), 0.8, 0.5);
+            let control = DVector::zeros(0);
+            return Self::placed(system, q, v, control, sim.parameters().clone());
         }
         let p = dynamics::point();
         Self::placed(dynamics::system(), p.q, p.v, p.u, p.parameters)
@@ -94,7 +112,36 @@ impl At {
     }
 }
 
+/// What a force in water with a surface is called by here.
+const SURFACE: &str = " at the surface";
+
+/// Bodies that reach through the surface of the water, aslant.
+fn surface() -> &'static Simulator {
+    static MADE: OnceLock<Simulator> = OnceLock::new();
+    MADE.get_or_init(|| {
+        let mut scene = Scene::new(Fluid {
+            density: 998.0,
+            current: [0.2, -0.1, 0.0],
+        });
+        scene.gravity = [1.0, -2.0, -9.0];
+        scene.waterline = Some(0.05);
+        for (name, x) in [("ship", 0.0), ("buoy", 1.0)] {
+            let body = Body::new(Shape::ellipsoid([0.3, 0.2, 0.25]).faces(80)).named(name);
+            let body = body.density(700.0).at([x, 0.3 * x, 0.05]);
+            scene.add(body.rotated([0.3, 0.2, 0.1 + x]).drag(Drag {
+                part: DragPart::Total,
+                linear: 15.0,
+                quadratic_part: DragPart::Normal,
+                quadratic: 0.8,
+            }));
+        }
+        let settings = Settings::default().fidelity(Fidelity::Isolated);
+        Simulator::new(&scene, settings).expect("the scene is right")
+    })
+}
+
 fn force(at: &At, name: &str) -> &'static dyn ForceModel {
+    let name = name.strip_suffix(SURFACE).unwrap_or(name);
     let mut all = at.system.forces.iter();
     all.find(|f| f.name() == name)
         .expect("the scene has every force")

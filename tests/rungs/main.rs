@@ -189,6 +189,14 @@ const THROUGH: &[(&str, &str)] = &[
         "dynamics::integrator::euler::Adjoint::jvp",
     ),
     (
+        "dynamics::armature::Armature::add_vjp",
+        "dynamics::momentum::Linearisation::mass_vjp",
+    ),
+    (
+        "dynamics::inertia::Inertia::solve_vjp",
+        "dynamics::integrator::readout::Stepper::velocity_vjp",
+    ),
+    (
         "dynamics::integrator::start::Start::arrive_jvp",
         "dynamics::integrator::euler::Adjoint::jvp",
     ),

@@ -9,8 +9,10 @@ struct Actuation(Vec<(Range<usize>, usize)>);
 
 pub(super) fn assemble(parts: &ForceParts, _: &mut Declarations) -> Option<Box<dyn ForceModel>> {
     let each = parts.bodies.iter().zip(parts.tree.links());
+    let each = each.zip(&parts.scene.bodies);
     let joints: Vec<_> = each
-        .filter_map(|(body, link)| Some((link.v.clone(), body.joint_control?)))
+        .filter(|(_, given)| given.servo.is_none())
+        .filter_map(|((body, link), _)| Some((link.v.clone(), body.joint_control?)))
         .collect();
     (!joints.is_empty()).then(|| Box::new(Actuation(joints)) as Box<dyn ForceModel>)
 }

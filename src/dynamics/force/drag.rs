@@ -1,12 +1,17 @@
 //! Drag by the velocity through the water, summed over a body's surface: linear, −c R ν in the body's frame (Eq. 22), and quadratic,
 //! −½ ρ c Σ ΔA |w| w.
 
-use super::{ForceModel, ForceParts, LoadBars, Loads, Moving, Outside, Together, Velocity};
-use crate::adjoint::drag::{Part, Surface, quadratic_drag, quadratic_drag_derivative, resistance};
-use crate::adjoint::lie::{Mat6, Pose, Vec6, cross_force};
+use super::{
+    ForceModel, ForceParts, LoadBars, Loads, Moving, Outside, Together, Velocity, Waterline,
+};
+use crate::adjoint::drag::{
+    Element, Part, Surface, quadratic_drag, quadratic_drag_derivative, resistance,
+};
+use crate::adjoint::lie::{Mat6, Pose, Vec6, cross_force, point_wrench};
 use crate::dynamics::Parameters;
 use crate::dynamics::parameters::{DENSITY, Declarations, Declared, Owner, Parameter, Range};
 use crate::scene::DragPart;
+use std::borrow::Cow;
 
 /// Of νρ of Eq. 22; at zero a change is measured by the water's momentum through a thousandth of the surface.
 const LINEAR: Declared = Declared::new("drag.linear", "kg/(m² s)")
@@ -21,19 +26,40 @@ const NONE: Declared = QUADRATIC.range(Range::Zero(
 struct Drag {
     name: &'static str,
     bodies: Vec<Dragged>,
+    waterline: Option<Waterline>,
 }
 
 struct Dragged {
     body: usize,
     coefficient: Parameter,
+    kind: Kind,
+    /// Of the whole surface.
     law: Law,
+    surface: Vec<Element>,
 }
 
 /// What drags at unit coefficient, body frame.
+#[derive(Clone)]
 enum Law {
     Linear(Box<Mat6>),
     /// At unit density.
     Quadratic(Surface),
+}
+
+/// Which law, and of which part of the velocity.
+#[derive(Clone, Copy, PartialEq)]
+enum Kind {
+    Linear(Part),
+    Quadratic(Part),
+}
+
+impl Kind {
+    fn of(self, surface: &[Element]) -> Law {
+        match self {
+            Self::Linear(part) => Law::Linear(Box::new(resistance(surface, part))),
+            Self::Quadratic(part) => Law::Quadratic(Surface::new(surface, part)),
+        }
+    }
 }
 
 pub(super) fn linear(
@@ -51,15 +77,11 @@ pub(super) fn linear(
         let coefficient = parameters.declare(Owner::Body(body), LINEAR, value);
         // Also at zero coefficient: the derivative with respect to it isn't zero.
         if !surface.is_empty() {
-            let law = Law::Linear(Box::new(resistance(surface, part(given.part))));
-            bodies.push(Dragged {
-                body,
-                coefficient,
-                law,
-            });
+            let kind = Kind::Linear(part(given.part));
+            bodies.push(Dragged::new(body, coefficient, kind, surface));
         }
     }
-    assemble("linear drag", bodies)
+    assemble("linear drag", bodies, parts)
 }
 
 pub(super) fn quadratic(
@@ -70,21 +92,32 @@ pub(super) fn quadratic(
     for (body, surface) in parts.surfaces.iter().enumerate() {
         let owner = Owner::Body(body);
         match parts.scene.bodies[body].drag {
-            Some(given) if !surface.is_empty() => bodies.push(Dragged {
-                body,
-                coefficient: parameters.declare(owner, QUADRATIC, given.quadratic),
-                law: Law::Quadratic(Surface::new(surface, part(given.quadratic_part))),
-            }),
+            Some(given) if !surface.is_empty() => {
+                let coefficient = parameters.declare(owner, QUADRATIC, given.quadratic);
+                let kind = Kind::Quadratic(part(given.quadratic_part));
+                bodies.push(Dragged::new(body, coefficient, kind, surface));
+            }
             _ => {
                 parameters.declare(owner, NONE, 0.0);
             }
         }
     }
-    assemble("quadratic drag", bodies)
+    assemble("quadratic drag", bodies, parts)
 }
 
-fn assemble(name: &'static str, bodies: Vec<Dragged>) -> Option<Box<dyn ForceModel>> {
-    (!bodies.is_empty()).then(|| Box::new(Drag { name, bodies }) as Box<dyn ForceModel>)
+fn assemble(
+    name: &'static str,
+    bodies: Vec<Dragged>,
+    parts: &ForceParts,
+) -> Option<Box<dyn ForceModel>> {
+    let waterline = parts.waterline;
+    (!bodies.is_empty()).then(|| {
+        Box::new(Drag {
+            name,
+            bodies,
+            waterline,
+        }) as Box<dyn ForceModel>
+    })
 }
 
 /// A scene's name for which part of a surface's velocity drags.
@@ -116,7 +149,52 @@ impl Law {
     }
 }
 
+/// How much of a piece of surface is wet, whose centre is this deep: it sets in over the piece's size, on both sides of the surface; and the slope, 1/m.
+fn wet(depth: f64, area: f64) -> (f64, f64) {
+    let size = area.sqrt();
+    let x = (0.5 + 0.5 * depth / size).clamp(0.0, 1.0);
+    (x * x * (3.0 - 2.0 * x), 3.0 * x * (1.0 - x) / size)
+}
+
 impl Dragged {
+    fn new(body: usize, coefficient: Parameter, kind: Kind, surface: &[Element]) -> Self {
+        Self {
+            body,
+            coefficient,
+            kind,
+            law: kind.of(surface),
+            surface: surface.to_vec(),
+        }
+    }
+
+    /// The law of what is below the surface of the water: none where it is the whole.
+    fn cut(&self, waterline: Option<&Waterline>, pose: &Pose) -> Option<Law> {
+        let waterline = waterline?;
+        let share = |e: &Element| wet(waterline.depth(&pose.apply(&e.center)), e.area).0;
+        let shares: Vec<f64> = self.surface.iter().map(share).collect();
+        if shares.iter().all(|share| *share == 1.0) {
+            return None;
+        }
+        let each = self.surface.iter().zip(shares).filter(|(_, s)| *s > 0.0);
+        let pieces = each.map(|(e, share)| Element {
+            area: share * e.area,
+            ..*e
+        });
+        Some(self.kind.of(&pieces.collect::<Vec<_>>()))
+    }
+
+    /// Adds the cotangent of the pose through what is below the surface, for a power on the body-frame velocity `zeta`.
+    fn cut_vjp(&self, waterline: &Waterline, pose: &Pose, nu: &Vec6, zeta: &Vec6, bar: &mut Vec6) {
+        for e in &self.surface {
+            let x = pose.apply(&e.center);
+            let (_, slope) = wet(waterline.depth(&x), e.area);
+            if slope > 0.0 {
+                let power = self.kind.of(std::slice::from_ref(e)).wrench(nu).dot(zeta);
+                *bar -= slope * power * point_wrench(&x, &waterline.up);
+            }
+        }
+    }
+
     /// What multiplies the law.
     fn scale(&self, parameters: &Parameters) -> f64 {
         match self.law {
@@ -127,16 +205,23 @@ impl Dragged {
 }
 
 impl Drag {
+    /// The law of what is in the water.
+    fn law<'d>(&self, d: &'d Dragged, pose: &Pose) -> Cow<'d, Law> {
+        let cut = d.cut(self.waterline.as_ref(), pose);
+        cut.map_or(Cow::Borrowed(&d.law), Cow::Owned)
+    }
+
     /// What drags at all: with its scale, its body's pose and twist through the water, body frame.
     fn acting<'d>(
         &'d self,
         at: &'d Moving,
-    ) -> impl Iterator<Item = (&'d Dragged, f64, &'d Pose, Vec6)> {
+    ) -> impl Iterator<Item = (usize, Cow<'d, Law>, f64, &'d Pose, Vec6)> {
         let each = self.bodies.iter();
         let each = each.map(|d| (d, d.scale(at.place.parameters)));
         each.filter(|(_, scale)| *scale != 0.0).map(|(d, scale)| {
             let pose = &at.place.poses[d.body];
-            (d, scale, pose, pose.twist_to_body(&at.relative(d.body)))
+            let nu = pose.twist_to_body(&at.relative(d.body));
+            (d.body, self.law(d, pose), scale, pose, nu)
         })
     }
 }
@@ -147,8 +232,8 @@ impl ForceModel for Drag {
     }
 
     fn add(&self, at: &Moving, out: &mut Loads) {
-        for (d, scale, pose, nu) in self.acting(at) {
-            out.wrenches[d.body] += pose.wrench_to_world(&(scale * d.law.wrench(&nu)));
+        for (b, law, scale, pose, nu) in self.acting(at) {
+            out.wrenches[b] += pose.wrench_to_world(&(scale * law.wrench(&nu)));
         }
     }
 
@@ -157,11 +242,11 @@ impl ForceModel for Drag {
     }
 
     fn jvps(&self, at: &Moving, changes: &[Velocity], out: &mut [Loads]) {
-        for (d, scale, pose, nu) in self.acting(at) {
-            let slope = scale * d.law.slope(&nu).0;
+        for (b, law, scale, pose, nu) in self.acting(at) {
+            let slope = scale * law.slope(&nu).0;
             for (change, out) in changes.iter().zip(out.iter_mut()) {
-                let dnu = pose.twist_to_body(&change.twists[d.body]);
-                out.wrenches[d.body] += pose.wrench_to_world(&(slope * dnu));
+                let dnu = pose.twist_to_body(&change.twists[b]);
+                out.wrenches[b] += pose.wrench_to_world(&(slope * dnu));
             }
         }
     }
@@ -182,7 +267,7 @@ impl ForceModel for Drag {
             let relative = at.relative(b);
             let nu = pose.twist_to_body(&relative);
             // The sums over the surface, once for all.
-            let (slope, unit) = d.law.slope(&nu);
+            let (slope, unit) = self.law(d, pose).slope(&nu);
             for (z, bar) in z.iter().zip(bars.iter_mut()) {
                 let virt = &z.twists[b];
                 let zeta = pose.twist_to_body(virt);
@@ -200,6 +285,11 @@ impl ForceModel for Drag {
                     let nu_bar = pose.wrench_to_world(&(scale * slope.tr_mul(&zeta)));
                     bar.twist[b] += nu_bar;
                     bar.pose[b] -= cross_force(&relative, &nu_bar) + cross_force(virt, &wrench);
+                    if let Some(waterline) = &self.waterline {
+                        let mut cut = Vec6::zeros();
+                        d.cut_vjp(waterline, pose, &nu, &zeta, &mut cut);
+                        bar.pose[b] += scale * cut;
+                    }
                 }
             }
         }

@@ -7,19 +7,24 @@
 mod actuation;
 mod drag;
 mod lubrication;
+mod passive;
+mod servo;
 mod spring;
 mod thruster;
+mod waterline;
 mod weight;
 
 use super::{BodyData, Declarations, Parameters};
 use crate::adjoint::drag::Element;
 use crate::adjoint::lie::{Pose, Vec3, Vec6, six};
+use crate::adjoint::waterline::Hull;
 use crate::coupling::lubrication::Bearing;
 use crate::multibody::Tree;
 use crate::scene::Scene;
 use nalgebra::DVector;
 use std::ops::Range;
 use std::sync::Arc;
+pub use waterline::Waterline;
 
 /// Makes a force from a scene, and declares its parameters; `None` where a scene has none of its kind.
 type Assemble = fn(&ForceParts, &mut Declarations) -> Option<Box<dyn ForceModel>>;
@@ -28,10 +33,13 @@ type Assemble = fn(&ForceParts, &mut Declarations) -> Option<Box<dyn ForceModel>
 const FORCES: &[Assemble] = &[
     weight::gravity,
     weight::buoyancy,
+    waterline::buoyancy,
     drag::linear,
     drag::quadratic,
     thruster::assemble,
     actuation::assemble,
+    passive::assemble,
+    servo::assemble,
     spring::assemble,
     lubrication::assemble,
 ];
@@ -40,12 +48,18 @@ const FORCES: &[Assemble] = &[
 pub struct ForceParts<'a> {
     /// The scene.
     pub scene: &'a Scene,
+    /// Time step, s.
+    pub time_step: f64,
     /// Its joints.
     pub tree: &'a Tree,
     /// Constants of its bodies.
     pub bodies: &'a [BodyData],
     /// Surface of each body that has one.
     pub surfaces: &'a [Vec<Element>],
+    /// The same as closed meshes, where the water has a surface.
+    pub hulls: &'a [Option<Hull>],
+    /// Above which there is no water.
+    pub waterline: Option<Waterline>,
     /// Gaps that forces of viscous water act in.
     pub lubricated: Vec<Lubricated>,
 }

@@ -32,7 +32,11 @@ pub(super) fn gravity(parts: &ForceParts, _: &mut Declarations) -> Option<Box<dy
     assemble("gravity", parts.scene.gravity.into(), parcels.collect())
 }
 
+/// Where the water has no end.
 pub(super) fn buoyancy(parts: &ForceParts, _: &mut Declarations) -> Option<Box<dyn ForceModel>> {
+    if parts.waterline.is_some() {
+        return None;
+    }
     let each = parts.bodies.iter().enumerate();
     let parcels = each
         .filter(|(_, b)| b.volume > 0.0)

@@ -2,7 +2,7 @@
 
 use nalgebra::{Matrix3, Matrix6};
 
-use super::{bounded, finite, limits, list, place};
+use super::{bounded, finite, limits, list, mimic, passive, place, servo};
 use crate::scene::{Body, Carriers, Motion, Scene, Shape};
 use crate::{Error, Result};
 
@@ -25,6 +25,7 @@ pub(super) fn check(scene: &Scene, carriers: &Carriers, index: usize) -> Result<
         check_added_mass(body, rows)?;
     }
     check_joint(body)?;
+    mimic::check(scene, body)?;
     if body.thruster && carriers.is_static(index) {
         return Err(Error::input(
             place(body, "thruster"),
@@ -258,6 +259,8 @@ fn check_joint(body: &Body) -> Result<()> {
         check_motion(body, motion)?;
     }
     limits::check(body)?;
+    passive::check(body)?;
+    servo::check(body)?;
     if body.actuated && joint.velocities() == 0 {
         return Err(Error::input(
             place(body, "actuated"),

@@ -8,6 +8,9 @@ mod body;
 mod contact;
 mod controller;
 mod limits;
+mod mimic;
+mod passive;
+mod servo;
 mod start;
 
 pub(crate) use body::impossible_inertia;
@@ -48,6 +51,16 @@ impl Scene {
                 fluid.density,
                 "give a density in kg/m³, zero for no water or above (fresh water: 998)",
             ));
+        }
+        if let Some(height) = self.waterline {
+            finite("waterline", &[height])?;
+            if norm(self.gravity) == 0.0 {
+                return Err(Error::input(
+                    "waterline",
+                    height,
+                    "water at rest has a surface across gravity: give the scene `gravity`, or take `waterline` away",
+                ));
+            }
         }
         if self.time_step <= 0.0 {
             return Err(Error::input(

@@ -1,7 +1,7 @@
 //! Where the scene starts: lengths against the joints, unit quaternions, prescribed joints.
 
 use super::{finite, limits, place};
-use crate::scene::{Body, Joint, Motion, Scene};
+use crate::scene::{Body, Motion, Scene};
 use crate::{Error, Result};
 
 pub(super) fn check(scene: &Scene) -> Result<()> {
@@ -13,13 +13,13 @@ pub(super) fn check(scene: &Scene) -> Result<()> {
             "give either v or momentum; the other follows from it",
         ));
     }
-    check_length(scene, "q", &initial.q, Joint::coordinates)?;
-    check_length(scene, "v", &initial.v, Joint::velocities)?;
-    check_length(scene, "momentum", &initial.momentum, Joint::velocities)?;
+    check_length(scene, "q", &initial.q, Body::coordinates)?;
+    check_length(scene, "v", &initial.v, Body::velocities)?;
+    check_length(scene, "momentum", &initial.momentum, Body::velocities)?;
 
     let (mut nq, mut nv) = (0, 0);
     for body in &scene.bodies {
-        let (dq, dv) = (body.joint.coordinates(), body.joint.velocities());
+        let (dq, dv) = (body.coordinates(), body.velocities());
         limits::check_start(body, nq, initial.q.get(nq).copied())?;
         if !initial.q.is_empty() {
             check_quaternion(body, nq, &initial.q[nq..nq + dq])?;
@@ -43,17 +43,17 @@ fn check_length(
     scene: &Scene,
     field: &str,
     values: &[f64],
-    size: impl Fn(&Joint) -> usize,
+    size: impl Fn(&Body) -> usize,
 ) -> Result<()> {
     let place = format!("initial.{field}");
     finite(&place, values)?;
-    let expected: usize = scene.bodies.iter().map(|b| size(&b.joint)).sum();
+    let expected: usize = scene.bodies.iter().map(&size).sum();
     if values.is_empty() || values.len() == expected {
         return Ok(());
     }
-    let parts = scene.bodies.iter().filter(|b| size(&b.joint) > 0);
+    let parts = scene.bodies.iter().filter(|b| size(b) > 0);
     let parts: Vec<_> = parts
-        .map(|b| format!("{:?} {} {}", b.name, b.joint.kind(), size(&b.joint)))
+        .map(|b| format!("{:?} {} {}", b.name, b.joint.kind(), size(b)))
         .collect();
     Err(Error::input(
         place,

@@ -7,12 +7,15 @@ use std::time::Instant;
 use clap::Args;
 use serde::Serialize;
 
+mod format;
+
 use super::exit::Exit;
 use super::options::Water;
-use super::output::{ChoicesReport, Output, write_warnings};
+use super::output::{ChoicesReport, Output, note, print_text, write_warnings};
 use crate::scene::{Body, Fluid, Scene, Shape};
 use crate::simulate::ErrorEstimate;
 use crate::{Error, Result};
+use format::{Format, Own};
 
 #[derive(Debug, Args)]
 pub(super) struct Arguments {
@@ -24,8 +27,11 @@ pub(super) struct Arguments {
     density: Option<f64>,
     /// Estimate the error of the result, from the same bodies on other meshes and from what is left at
     /// check points; takes a few times as long.
-    #[arg(long)]
+    #[arg(long, conflicts_with = "format")]
     estimate: bool,
+    /// Write each body's own 6 × 6, in its own axes about its origin, as other simulators read it; what bodies do to each other is left out.
+    #[arg(long, value_enum, value_name = "FORMAT", conflicts_with = "json")]
+    format: Option<Format>,
     #[command(flatten)]
     water: Water,
 }
@@ -114,7 +120,28 @@ pub(super) struct AddedMassReport {
 
 pub(super) fn main(arguments: &Arguments, output: Output) -> Result<Exit> {
     let scene = arguments.source.scene(arguments.density)?;
+    if let Some(format) = arguments.format {
+        return written(&scene, arguments, format);
+    }
     output.result(&added_mass(&scene, arguments)?);
+    Ok(Exit::Done)
+}
+
+/// Each body's own part in a format of others.
+fn written(scene: &Scene, arguments: &Arguments, format: Format) -> Result<Exit> {
+    let settings = arguments.water.settings();
+    let simulator = arguments.water.simulator(scene, settings)?;
+    let found = simulator.added_mass()?;
+    for warning in simulator.warnings() {
+        note(format_args!("warning: {warning}"));
+    }
+    let names = found.bodies.iter().enumerate();
+    let own = names.map(|(k, name)| Own {
+        name,
+        matrix: found.own(k),
+    });
+    let bodies: Vec<Own> = own.collect();
+    print_text(&format.write(&bodies, simulator.parameters().density()));
     Ok(Exit::Done)
 }
 

@@ -1,0 +1,145 @@
+//! Buoyancy of bodies that reach through the surface of still water: ρ |g| V upward at the centroid of the volume V below it.
+//!
+//! With N = ∫ x dV over that volume and h the surface's height, the wrench is ρ |g| (V e, N × e), e upward, and the energy ρ |g| (h V − e·N), whose slope it is.
+
+use super::{ForceModel, ForceParts, LoadBars, Loads, Moving, Outside, Place, Together, Velocity};
+use crate::adjoint::lie::{Pose, Vec3, Vec6, angular, linear, six};
+use crate::adjoint::waterline::{Below, Hull};
+use crate::dynamics::parameters::{DENSITY, Declarations, Parameters};
+
+/// The surface of still water.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Waterline {
+    /// Against gravity, a unit vector.
+    pub up: Vec3,
+    /// Its height along `up`, m.
+    pub height: f64,
+}
+
+impl Waterline {
+    /// Across the gravity `gravity`, m/s², which isn't zero.
+    pub fn new(gravity: &Vec3, height: f64) -> Self {
+        let up = -gravity.normalize();
+        Self { up, height }
+    }
+
+    /// How far a point of the world is below it, m.
+    pub fn depth(&self, x: &Vec3) -> f64 {
+        self.height - self.up.dot(x)
+    }
+}
+
+struct Floating {
+    surface: Waterline,
+    /// m/s².
+    gravity: f64,
+    hulls: Vec<Floater>,
+}
+
+struct Floater {
+    body: usize,
+    hull: Hull,
+    /// The body's volume over that of its mesh.
+    fill: f64,
+}
+
+pub(super) fn buoyancy(parts: &ForceParts, _: &mut Declarations) -> Option<Box<dyn ForceModel>> {
+    let surface = parts.waterline?;
+    let floater = |(body, hull): (usize, &Option<Hull>)| {
+        let hull = hull.clone()?;
+        let whole = Below::new(&hull, &Vec3::z(), f64::INFINITY);
+        let fill = parts.bodies[body].volume / whole.volume;
+        fill.is_finite().then_some(Floater { body, hull, fill })
+    };
+    let hulls: Vec<_> = (parts.hulls.iter().enumerate())
+        .filter_map(floater)
+        .collect();
+    let gravity = Vec3::from(parts.scene.gravity).norm();
+    (!hulls.is_empty()).then(|| {
+        Box::new(Floating {
+            surface,
+            gravity,
+            hulls,
+        }) as Box<dyn ForceModel>
+    })
+}
+
+impl Floater {
+    /// What it displaces, in the world.
+    fn displaced(&self, surface: &Waterline, pose: &Pose) -> Below {
+        let normal = pose.rotation.tr_mul(&surface.up);
+        let height = surface.depth(&pose.translation);
+        let own = Below::new(&self.hull, &normal, height);
+        own.scaled(self.fill).moved(pose)
+    }
+}
+
+/// Wrench of unit weight of the water that is displaced.
+fn wrench(below: &Below, up: &Vec3) -> Vec6 {
+    six(&(below.volume * up), &below.moment.cross(up))
+}
+
+/// Cotangent of the pose for the power of [`wrench`] on the twist `z`.
+fn wrench_vjp(below: &Below, up: &Vec3, z: &Vec6) -> Vec6 {
+    // The power is c V + y·N. A displacement takes the volume along, and raises the body by η·e against the surface.
+    let (c, y) = (up.dot(&linear(z)), up.cross(&angular(z)));
+    let (risen, tilted) = below.vjp(c, &y);
+    six(
+        &(below.volume * y - risen * up),
+        &(below.moment.cross(&y) + tilted.cross(up)),
+    )
+}
+
+impl Floating {
+    /// |g| ρ.
+    fn weight(&self, parameters: &Parameters) -> f64 {
+        self.gravity * parameters[DENSITY]
+    }
+}
+
+impl ForceModel for Floating {
+    fn name(&self) -> &'static str {
+        "buoyancy"
+    }
+
+    fn add(&self, at: &Moving, out: &mut Loads) {
+        let weight = self.weight(at.place.parameters);
+        for hull in &self.hulls {
+            let displaced = hull.displaced(&self.surface, &at.place.poses[hull.body]);
+            out.wrenches[hull.body] += weight * wrench(&displaced, &self.surface.up);
+        }
+    }
+
+    fn vjp(&self, at: &Moving, z: &Velocity, bar: &mut LoadBars) {
+        let weight = self.weight(at.place.parameters);
+        for hull in &self.hulls {
+            let (up, virt) = (&self.surface.up, &z.twists[hull.body]);
+            let displaced = hull.displaced(&self.surface, &at.place.poses[hull.body]);
+            bar.pose[hull.body] += weight * wrench_vjp(&displaced, up, virt);
+            bar.parameters[DENSITY] += self.gravity * wrench(&displaced, up).dot(virt);
+        }
+    }
+
+    fn ties(&self) -> Option<Vec<[usize; 2]>> {
+        Some(Vec::new())
+    }
+
+    fn outside(&self, group: &Together, _: &Parameters) -> Outside {
+        match self.hulls.iter().any(|hull| group.holds(hull.body)) {
+            true => Outside::Along(self.surface.up),
+            false => Outside::Nothing,
+        }
+    }
+
+    fn conservative(&self, _: &Parameters) -> bool {
+        true
+    }
+
+    fn potential_energy(&self, place: &Place) -> f64 {
+        let of = |hull: &Floater| {
+            let below = hull.displaced(&self.surface, &place.poses[hull.body]);
+            self.surface.height * below.volume - self.surface.up.dot(&below.moment)
+        };
+        self.weight(place.parameters) * self.hulls.iter().map(of).sum::<f64>()
+    }
+}

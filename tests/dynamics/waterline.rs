@@ -1,0 +1,207 @@
+//! Bodies at the surface of the water: displaced volume, stiffness, energy, drag, gradients.
+
+use hydrograd::dynamics::Integrator;
+use hydrograd::scene::{Body, Drag, DragPart, Fluid, Scene, Shape};
+use hydrograd::simulate::gradcheck::{GradcheckSettings, gradcheck};
+use hydrograd::{Controls, Fidelity, Settings, Simulator};
+use nalgebra::DVector;
+use std::f64::consts::{PI, TAU};
+
+const GRAVITY: f64 = 9.81;
+const DENSITY: f64 = 998.0;
+const HEIGHT: f64 = 0.7;
+
+/// An upright prism of so many sides about a cylinder along z.
+fn prism(sides: usize, radius: f64, length: f64) -> Shape {
+    let ring = |z: f64| {
+        (0..sides).map(move |k| {
+            let (sin, cos) = (TAU * k as f64 / sides as f64).sin_cos();
+            [radius * cos, radius * sin, z]
+        })
+    };
+    let ends = [-0.5 * length, 0.5 * length];
+    let mut vertices: Vec<[f64; 3]> = ends.into_iter().flat_map(ring).collect();
+    vertices.extend(ends.map(|z| [0.0, 0.0, z]));
+    let faces = (0..sides).flat_map(|k| {
+        let (a, b) = (k, (k + 1) % sides);
+        let (c, d) = (sides + a, sides + b);
+        let [low, high] = [2 * sides, 2 * sides + 1];
+        [[a, b, d], [a, d, c], [low, b, a], [high, c, d]]
+    });
+    Shape::triangles(vertices, faces.collect::<Vec<_>>())
+}
+
+/// A body of half the water's density, its centre at the surface.
+fn floating(shape: Shape) -> Scene {
+    let mut scene = Scene::new(Fluid::fresh_water());
+    scene.gravity = [0.0, 0.0, -GRAVITY];
+    scene.waterline = Some(HEIGHT);
+    let body = Body::new(shape).density(0.5 * DENSITY);
+    scene.add(body.at([0.2, -0.1, HEIGHT]));
+    scene
+}
+
+fn simulator(scene: &Scene, fidelity: Fidelity, integrator: Integrator) -> Simulator {
+    let settings = Settings::default().fidelity(fidelity);
+    Simulator::new(scene, settings.integrator(integrator)).unwrap()
+}
+
+/// Generalised force at rest where the body is moved by `xi`.
+fn force(sim: &Simulator, xi: [f64; 6]) -> DVector<f64> {
+    let q = sim.start().0;
+    let q = sim.integrate(q, &DVector::from_row_slice(&xi)).unwrap();
+    let still = DVector::zeros(6);
+    let e = sim.equations(&q).unwrap();
+    -e.bias_force(&still, &DVector::zeros(0)).unwrap()
+}
+
+/// −∂F/∂ξ along one coordinate.
+fn stiffness(sim: &Simulator, k: usize) -> f64 {
+    let h = 1e-4;
+    let at = |h: f64| {
+        let mut xi = [0.0; 6];
+        xi[k] = h;
+        force(sim, xi)[k]
+    };
+    -(at(h) - at(-h)) / (2.0 * h)
+}
+
+/// Heave: ρ g A. Roll and pitch: ρ g (I − V · distance of the centroid below the centre of mass), I the second moment of the waterplane.
+#[test]
+fn hydrostatic_stiffness_is_the_waterplanes() {
+    let [a, b, c] = [0.6, 0.4, 0.2];
+    let (radius, length) = (0.3, 0.25);
+    let disc = PI * radius * radius;
+    let cases = [
+        (
+            Shape::cuboid([a, b, c]),
+            a * b,
+            [a * b.powi(3) / 12.0, b * a.powi(3) / 12.0],
+            c,
+        ),
+        (
+            // A thousandth of the disc's area is missing from meshes of a cylinder with a thousand faces.
+            prism(4000, radius, length),
+            disc,
+            [0.25 * disc * radius * radius; 2],
+            length,
+        ),
+    ];
+    for (shape, area, moments, height) in cases {
+        let mut scene = floating(shape);
+        // The inertia of the water has no part in this.
+        let mut added = [[0.0; 6]; 6];
+        (0..6).for_each(|k| added[k][k] = 0.1);
+        scene.bodies[0] = scene.bodies[0].clone().added_mass(added);
+        let sim = simulator(&scene, Fidelity::Isolated, Integrator::Rk4);
+        let rest = force(&sim, [0.0; 6]);
+        let weight = 0.5 * DENSITY * GRAVITY * area * height;
+        assert!(rest.amax() < 1e-12 * weight, "{rest}");
+        let heave = stiffness(&sim, 2) / (DENSITY * GRAVITY * area) - 1.0;
+        assert!(heave.abs() < 1e-6, "heave {heave:.1e}");
+        for (k, moment) in [(3, moments[0]), (4, moments[1])] {
+            let volume = 0.5 * area * height;
+            let exact = DENSITY * GRAVITY * (moment - volume * 0.25 * height);
+            let error = stiffness(&sim, k) / exact - 1.0;
+            assert!(error.abs() < 2e-6, "tilt {k}: {error:.1e}");
+        }
+    }
+}
+
+/// Far below the surface it is as if there were none, and above there is no force but weight.
+#[test]
+fn deep_water_has_no_surface_and_air_no_water() {
+    let mut scene = floating(Shape::ellipsoid([0.2, 0.15, 0.1]).faces(320));
+    scene.bodies[0].drag = Some(Drag {
+        linear: 3.0,
+        quadratic: 0.4,
+        ..Drag::default()
+    });
+    scene.bodies[0].placement.position[2] = HEIGHT - 5.0;
+    scene.initial.v = vec![0.1, 0.2, -0.3, 0.4, -0.5, 0.6];
+    let bias = |scene: &Scene| {
+        let sim = simulator(scene, Fidelity::Isolated, Integrator::Rk4);
+        let e = sim.equations(sim.start().0).unwrap();
+        e.bias_force(
+            &DVector::from_vec(scene.initial.v.clone()),
+            &DVector::zeros(0),
+        )
+        .unwrap()
+    };
+    let deep = bias(&scene);
+    scene.waterline = None;
+    let endless = bias(&scene);
+    assert!((&deep - &endless).amax() < 1e-12 * endless.amax());
+    scene.waterline = Some(HEIGHT);
+    scene.bodies[0].placement.position[2] = HEIGHT + 0.2;
+    let sim = simulator(&scene, Fidelity::Isolated, Integrator::Rk4);
+    let e = sim.equations(sim.start().0).unwrap();
+    let v = DVector::zeros(6);
+    let air = e.bias_force(&v, &DVector::zeros(0)).unwrap();
+    let weight = sim.parameters().mass(0) * GRAVITY;
+    assert!((air[2] / weight - 1.0).abs() < 1e-12);
+}
+
+/// A box bobs and rolls through the surface: what gravity and water give and take is their energy.
+#[test]
+fn bobbing_keeps_energy() {
+    for shape in [
+        Shape::cuboid([0.5, 0.3, 0.2]),
+        Shape::ellipsoid([0.3, 0.2, 0.15]).faces(320),
+    ] {
+        let mut scene = floating(shape);
+        scene.bodies[0].placement.position[2] += 0.18;
+        scene.initial.v = vec![0.0, 0.0, 0.0, 0.6, 0.3, 0.1];
+        scene.time_step = 2e-3;
+        let sim = simulator(&scene, Fidelity::Isolated, Integrator::Rk4);
+        let rollout = sim.rollout(&Controls::zeros(&sim, 1000)).unwrap();
+        let samples = rollout.samples();
+        let kinetic = samples.iter().map(|s| s.kinetic_energy);
+        let (scale, first) = (kinetic.fold(0.0, f64::max), samples[0].energy());
+        for s in samples {
+            let error = (s.energy() - first) / scale;
+            assert!(error.abs() < 2e-5, "{error:.1e} at {} s", s.time);
+        }
+    }
+}
+
+/// Rollouts through the surface have gradients, with both drags on what is wet.
+#[test]
+fn rollouts_through_the_surface_have_gradients() {
+    let mut scene = floating(Shape::cuboid([0.5, 0.3, 0.2]).faces(80));
+    scene.bodies[0].drag = Some(Drag {
+        part: DragPart::Total,
+        linear: 20.0,
+        quadratic_part: DragPart::Normal,
+        quadratic: 1.1,
+    });
+    scene.bodies[0].placement.rotation = [0.3, 0.2, 0.1];
+    scene.initial.v = vec![0.2, -0.1, 0.4, 0.5, -0.3, 0.2];
+    for integrator in [
+        Integrator::Rk4,
+        Integrator::MomentumEuler,
+        Integrator::Midpoint,
+    ] {
+        let mut sim = simulator(&scene, Fidelity::Auto, integrator);
+        let settings = GradcheckSettings {
+            steps: 30,
+            directions: 3,
+            seed: 5,
+            timings: 0,
+        };
+        let report = gradcheck(&mut sim, &settings).unwrap();
+        assert!(report.max_rel_error < 1e-6, "{integrator:?}: {report:?}");
+    }
+}
+
+/// A surface needs gravity.
+#[test]
+fn a_surface_without_gravity_is_refused() {
+    let mut scene = floating(Shape::sphere(0.1));
+    scene.gravity = [0.0; 3];
+    let told = scene.validate().unwrap_err().to_string();
+    assert!(
+        told.contains("waterline") && told.contains("gravity"),
+        "{told}"
+    );
+}

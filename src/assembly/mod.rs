@@ -195,7 +195,7 @@ pub(crate) fn assemble(
         tree,
     };
     let mut q = match scene.initial.q.is_empty() {
-        true => system.tree.origin(),
+        true => start(scene),
         false => DVector::from_vec(scene.initial.q.clone()),
     };
     stepper(choices, &system, &parameters).place_motions(&mut q, 0.0);
@@ -236,6 +236,15 @@ fn stepper<'a>(choices: &Choices, system: &'a System, parameters: &'a Parameters
         integrator: Default::default(),
         dt: choices.time_step,
     }
+}
+
+/// Where joints start by themselves.
+fn start(scene: &Scene) -> DVector<f64> {
+    let of = |body: &crate::scene::Body| match body.start.is_empty() {
+        true => body.joint.origin(),
+        false => body.start.clone(),
+    };
+    DVector::from_vec(scene.bodies.iter().flat_map(of).collect())
 }
 
 /// Initial velocity; a given momentum is turned into velocity.

@@ -21,11 +21,6 @@ pub(super) struct Inertial {
 }
 
 impl Inertial {
-    pub const NONE: Self = Self {
-        mass: 0.0,
-        center: Vector3::new(0.0, 0.0, 0.0),
-        inertia: Matrix3::new(0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0),
-    };
 
     /// Whether it has neither mass nor inertia.
     pub fn is_none(&self) -> bool {

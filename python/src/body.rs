@@ -53,7 +53,8 @@ impl Drag {
 /// the body in world axes. `locked` holds the joint, `motion` (one per coordinate) drives it, `limits` (m or rad) stop it.
 /// `shape_position` and `shape_rotation` place the shape in the body; `refine` lists balls (center, radius, edge), m,
 /// where its faces are made smaller. `collision` lists the convex pieces that the body is for contact instead of its shape, each
-/// a shape, (shape, position) or (shape, position, rotation) in the body's frame. `added_mass` (6, 6) replaces the body's own at unit density, with `isolated`.
+/// a shape, (shape, position) or (shape, position, rotation) in the body's frame. `start` are the joint's coordinates at the start, unless the
+/// scene is given all by `set_initial`. `added_mass` (6, 6) replaces the body's own at unit density, with `isolated`.
 #[pyclass(frozen, eq, module = "hydrograd")]
 #[derive(Clone, PartialEq)]
 pub struct Body {
@@ -106,7 +107,7 @@ impl Body {
         shape=None, *, name="", density=None, mass=None, inertia=None, center_of_mass=None, position=None,
         rotation=None, joint=None, parent=None, actuated=false, thruster=false, locked=false, motion=None, limits=None,
         limit_stiffness=None, drag=None, shape_position=None, shape_rotation=None, refine=None, added_mass=None,
-        overlaps_parent=false, collision=None
+        overlaps_parent=false, collision=None, start=None
     ))]
     #[expect(
         clippy::too_many_arguments,
@@ -136,6 +137,7 @@ impl Body {
         added_mass: Option<&Bound<'_, PyAny>>,
         overlaps_parent: bool,
         collision: Option<Vec<Piece<'_>>>,
+        start: Option<&Bound<'_, PyAny>>,
     ) -> PyResult<Self> {
         let at = |field: &str| {
             if name.is_empty() {
@@ -194,6 +196,8 @@ impl Body {
                 or_zeros(&at("rotation"), rotation)?,
             ),
             joint: joint.map_or_else(Default::default, |j| j.0),
+            start: start
+                .map_or(Ok(Vec::new()), |given| row(&at("start"), given))?,
             motion: motion.map(|list| list.iter().map(|m| m.0).collect()),
             locked,
             limits: limits

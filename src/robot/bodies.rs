@@ -6,7 +6,7 @@ use super::options::{Base, Options};
 use super::overlap::{declare, untangle};
 use super::pieces::Meshes;
 use super::read::{File, read};
-use super::report::{BodyReport, Report};
+use super::report::{BodyReport, FoldedReport, Report};
 use super::surface::{Surface, Wet, pose};
 use super::tree::{Group, groups, joint_place, link_place};
 use crate::geometry::MassProperties;
@@ -132,7 +132,13 @@ pub(crate) fn import(path: &Path, options: &Options) -> Result<Imported> {
             at: part.at,
         })
         .collect();
-    report.sites = folded.iter().map(|f| f.name.clone()).collect();
+    let site = |f: &Folded| FoldedReport {
+        link: f.name.clone(),
+        body: names[f.body].clone(),
+        position: f.at.translation.vector.into(),
+        rotation: f.at.rotation.scaled_axis().into(),
+    };
+    report.sites = folded.iter().map(site).collect();
     Ok(Imported {
         base,
         bodies: made,

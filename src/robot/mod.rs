@@ -20,4 +20,4 @@ pub(crate) use bodies::{Imported, RobotBody, import};
 pub(crate) use joints::Dynamics;
 pub(crate) use options::{LinkChoice, Options};
 pub use options::{BadMeshes, Base, Followers, Wet};
-pub use report::{BodyReport, MeshUse, Report, Unused};
+pub use report::{BodyReport, FoldedReport, MeshUse, Report, Unused};

@@ -58,6 +58,19 @@ pub struct MeshUse {
     pub used_as: String,
 }
 
+/// A link that folded into a body, and is a site now.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct FoldedReport {
+    /// The link.
+    pub link: String,
+    /// The body.
+    pub body: String,
+    /// Its origin in the body's frame, m.
+    pub position: [f64; 3],
+    /// Its rotation vector there, rad.
+    pub rotation: [f64; 3],
+}
+
 /// What a robot came to, SI units.
 #[derive(Clone, Debug, Default, PartialEq, Serialize)]
 pub struct Report {
@@ -85,8 +98,8 @@ pub struct Report {
     pub center_of_mass: [f64; 3],
     /// Of all, at the start, m, in the root's frame; none of a dry robot.
     pub center_of_buoyancy: Option<[f64; 3]>,
-    /// Links that folded into others, which are sites now.
-    pub sites: Vec<String>,
+    /// Links that folded into others.
+    pub sites: Vec<FoldedReport>,
     /// Its meshes.
     pub meshes: Vec<MeshUse>,
     /// Inertias that fit no body of the size that the link has.

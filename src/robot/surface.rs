@@ -226,6 +226,9 @@ impl Wet {
 
     /// Gives hulls the faces that the water needs.
     pub fn finish(&mut self, options: &Options) {
+        if let (Some(Surface::Formula { shape, .. }), Some(faces)) = (&mut self.surface, options.faces) {
+            shape.set_faces(faces);
+        }
         if let Some(Surface::Mesh { mesh, convex: true }) = &mut self.surface {
             *mesh = even(mesh, options.faces.unwrap_or(FACES));
             self.said = format!("{}, {} faces", self.said, mesh.faces().len());

@@ -29,7 +29,8 @@ pub use force::{Force, Lubrication, Spring, WATER_VISCOSITY};
 pub use origin::Origin;
 #[cfg(feature = "urdf")]
 pub use robot::{
-    Added, BadMeshes, Base, BodyReport, Followers, MeshUse, Robot, RobotLink, RobotReport, Unused, Wet,
+    Added, BadMeshes, Base, BodyReport, FoldedReport, Followers, MeshUse, Robot, RobotLink,
+    RobotReport, Unused, Wet,
 };
 pub use site::Site;
 

@@ -3,7 +3,7 @@
 use super::{Body, BodyId, CollisionPiece, Drag, Fluid, Placement, Scene, Site, is_default};
 use crate::robot::{Imported, LinkChoice, Options, RobotBody, import};
 pub use crate::robot::{
-    BadMeshes, Base, BodyReport, Followers, MeshUse, Report as RobotReport, Unused, Wet,
+    BadMeshes, Base, BodyReport, FoldedReport, Followers, MeshUse, Report as RobotReport, Unused, Wet,
 };
 use crate::{Error, Joint, Result};
 use nalgebra::Isometry3;
@@ -57,7 +57,7 @@ pub struct Robot {
     /// What is done about meshes that aren't closed surfaces.
     #[serde(skip_serializing_if = "is_default")]
     pub bad_meshes: BadMeshes,
-    /// Faces of hulls, and of meshes that have more than twice as many; default 320.
+    /// Faces of hulls, and of meshes that have more than twice as many; default 320. Of shapes by formula too, whose default is their own.
     pub faces: Option<usize>,
     /// What is done about joints that follow others.
     #[serde(skip_serializing_if = "is_default")]

@@ -119,6 +119,7 @@ fn the_page_on_scenes_has_every_key() {
         "scene/mod.rs",
         "scene/contact.rs",
         "scene/site.rs",
+        "scene/robot.rs",
         "scene/force/spring.rs",
         "scene/force/lubrication.rs",
         "shape/description.rs",

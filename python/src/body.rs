@@ -196,8 +196,7 @@ impl Body {
                 or_zeros(&at("rotation"), rotation)?,
             ),
             joint: joint.map_or_else(Default::default, |j| j.0),
-            start: start
-                .map_or(Ok(Vec::new()), |given| row(&at("start"), given))?,
+            start: start.map_or(Ok(Vec::new()), |given| row(&at("start"), given))?,
             motion: motion.map(|list| list.iter().map(|m| m.0).collect()),
             locked,
             limits: limits

@@ -19,10 +19,7 @@ fn not_a_choice(why: impl std::fmt::Display) -> PyErr {
 }
 
 /// The choices as a scene file has them.
-fn choices(
-    py: Python<'_>,
-    given: Option<&Bound<'_, PyDict>>,
-) -> PyResult<hydrograd::scene::Robot> {
+fn choices(py: Python<'_>, given: Option<&Bound<'_, PyDict>>) -> PyResult<hydrograd::scene::Robot> {
     let plain = PyDict::new(py);
     let mut drag = None;
     if let Some(given) = given {

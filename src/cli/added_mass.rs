@@ -115,7 +115,9 @@ pub(super) struct AddedMassReport {
 }
 
 pub(super) fn main(arguments: &Arguments, output: Output) -> Result<Exit> {
-    let scene = arguments.source.scene(arguments.density, &arguments.robot)?;
+    let scene = arguments
+        .source
+        .scene(arguments.density, &arguments.robot)?;
     output.result(&added_mass(&scene, arguments)?);
     Ok(Exit::Done)
 }

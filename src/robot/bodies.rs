@@ -91,7 +91,9 @@ pub(crate) fn import(path: &Path, options: &Options) -> Result<Imported> {
             report.note(mended);
         }
     }
-    let inertials: Vec<Inertial> = (groups.iter()).map(|g| of_group(g, |link| own[link])).collect();
+    let inertials: Vec<Inertial> = (groups.iter())
+        .map(|g| of_group(g, |link| own[link]))
+        .collect();
     let base = base(&file, &groups, &inertials, options, &mut report);
     let bodies = Bodies {
         file: &file,
@@ -122,9 +124,8 @@ pub(crate) fn import(path: &Path, options: &Options) -> Result<Imported> {
     bodies.tell_overlaps(&overlaps, &names, &mut report);
     let made = bodies.made(&wets, &overlaps)?;
     bodies.tell(&made, &wets, &poses, base, &mut report)?;
-    let folded = (groups.iter().enumerate()).flat_map(|(body, group)| {
-        group.parts[1..].iter().map(move |part| (body, part))
-    });
+    let folded = (groups.iter().enumerate())
+        .flat_map(|(body, group)| group.parts[1..].iter().map(move |part| (body, part)));
     let folded: Vec<Folded> = folded
         .map(|(body, part)| Folded {
             name: file.robot.links[part.link].name.clone(),
@@ -210,7 +211,9 @@ fn base(
         (_, true) => "its root has no mass",
         _ => return Base::Free,
     };
-    report.note(format!("the base is fixed to the world, since {why}; `base` (--base) chooses"));
+    report.note(format!(
+        "the base is fixed to the world, since {why}; `base` (--base) chooses"
+    ));
     Base::Fixed
 }
 
@@ -243,9 +246,7 @@ impl Bodies<'_> {
 
     /// Whether a joint moves it that it alone doesn't give any inertia to.
     fn is_massless(&self, g: usize) -> bool {
-        self.joint(g).velocities() > 0
-            && self.inertials[g].is_none()
-            && self.density(g).is_none()
+        self.joint(g).velocities() > 0 && self.inertials[g].is_none() && self.density(g).is_none()
     }
 
     /// Refuses what moves and has no inertia.
@@ -276,7 +277,10 @@ impl Bodies<'_> {
                 }
             }
             if self.is_point(g) {
-                let what = format!("turns link {:?}, whose inertia about it is zero", self.name(g));
+                let what = format!(
+                    "turns link {:?}, whose inertia about it is zero",
+                    self.name(g)
+                );
                 return refused(g, what, remedy);
             }
         }
@@ -355,7 +359,11 @@ impl Bodies<'_> {
                     return Err(Error::input(place, density, remedy));
                 }
                 if !(density > 0.0 && density.is_finite()) {
-                    return Err(Error::input(place, density, "give a density above zero, kg/m³"));
+                    return Err(Error::input(
+                        place,
+                        density,
+                        "give a density above zero, kg/m³",
+                    ));
                 }
             }
             made.push(RobotBody {
@@ -406,7 +414,9 @@ impl Bodies<'_> {
                 parent: body.parent.map(|p| self.name(p).to_owned()),
                 joint: body.moves.as_ref().map(|m| m.name.clone()),
                 kind: self.joint(g).kind().into(),
-                links: links.map(|part| self.file.robot.links[part.link].name.clone()).collect(),
+                links: links
+                    .map(|part| self.file.robot.links[part.link].name.clone())
+                    .collect(),
                 mass: own,
                 volume: seen.as_ref().map_or(0.0, |s| s.volume),
                 weight: 0.0,
@@ -427,7 +437,10 @@ impl Bodies<'_> {
     /// What of a body's inertia fits nothing of its size.
     fn implausible(&self, g: usize, wet: &Wet, seen: &MassProperties) -> Result<Option<String>> {
         let own = &self.inertials[g];
-        let Some(surface) = wet.surface.as_ref().filter(|_| own.mass > 0.0 && self.density(g).is_none())
+        let Some(surface) = wet
+            .surface
+            .as_ref()
+            .filter(|_| own.mass > 0.0 && self.density(g).is_none())
         else {
             return Ok(None);
         };
@@ -440,11 +453,18 @@ impl Bodies<'_> {
         let [a, b, c] = own.moments();
         let name = self.name(g);
         let said = if c > most {
-            Some(format!("its largest moment, {c:.3e} kg m², is more than if all its mass were at its farthest point ({most:.3e})"))
+            Some(format!(
+                "its largest moment, {c:.3e} kg m², is more than if all its mass were at its farthest point ({most:.3e})"
+            ))
         } else if a.min(b) < THIN * most {
-            Some(format!("its smallest moment, {a:.3e} kg m², is next to nothing for its size (at most {most:.3e})"))
+            Some(format!(
+                "its smallest moment, {a:.3e} kg m², is next to nothing for its size (at most {most:.3e})"
+            ))
         } else if outside {
-            Some(format!("its centre of mass {:?} m is outside of its surface's bounds", own.center.as_slice()))
+            Some(format!(
+                "its centre of mass {:?} m is outside of its surface's bounds",
+                own.center.as_slice()
+            ))
         } else {
             None
         };

@@ -21,7 +21,6 @@ pub(super) struct Inertial {
 }
 
 impl Inertial {
-
     /// Whether it has neither mass nor inertia.
     pub fn is_none(&self) -> bool {
         self.mass == 0.0 && self.inertia == Matrix3::zeros()

@@ -128,7 +128,10 @@ fn follows(
                 true => "itself".to_string(),
                 false => format!("joint {:?}, which follows this one", mimic.joint),
             };
-            return wrong(given, "a joint follows another one, which has a coordinate of its own");
+            return wrong(
+                given,
+                "a joint follows another one, which has a coordinate of its own",
+            );
         }
         let Some(of) = file.robot.joints.iter().find(|j| j.name == leader) else {
             return wrong(format!("joint {leader:?}"), "there is no such joint");
@@ -181,7 +184,10 @@ fn limits(file: &File, number: usize, report: &mut Report) -> Result<Option<[f64
             true => "its <limit> gives no range",
             false => "it has no <limit>",
         };
-        report.note(format!("joint {:?} turns or slides without limits: {why}", given.name));
+        report.note(format!(
+            "joint {:?} turns or slides without limits: {why}",
+            given.name
+        ));
         return Ok(None);
     }
     if lower > upper || lower.is_nan() || upper.is_nan() {
@@ -232,7 +238,11 @@ fn start(
         return Ok(None);
     };
     let room = INSIDE * (upper - lower);
-    let q = if lower > 0.0 { lower + room } else { upper - room };
+    let q = if lower > 0.0 {
+        lower + room
+    } else {
+        upper - room
+    };
     report.note(format!(
         "joint {name:?} starts at {q:.6}, since zero is outside its limits, {lower} to {upper}"
     ));

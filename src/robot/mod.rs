@@ -18,6 +18,6 @@ mod tree;
 
 pub(crate) use bodies::{Imported, RobotBody, import};
 pub(crate) use joints::Dynamics;
-pub(crate) use options::{LinkChoice, Options};
 pub use options::{BadMeshes, Base, Followers, Wet};
+pub(crate) use options::{LinkChoice, Options};
 pub use report::{BodyReport, FoldedReport, MeshUse, Report, Unused};

@@ -123,7 +123,8 @@ pub(super) fn declare(
         for (a, b, distance) in standing.gaps(poses)? {
             if carriers[b] == Some(a) {
                 declared[b] = distance < NEAR * standing.size(a, b);
-                if declared[b] && distance < 0.0 && standing.share(a, b, poses) > MOST_SHARED + 0.1 {
+                if declared[b] && distance < 0.0 && standing.share(a, b, poses) > MOST_SHARED + 0.1
+                {
                     bad = Some((a, b));
                 }
             } else if distance <= 0.0 {
@@ -133,12 +134,22 @@ pub(super) fn declare(
         let Some((a, b)) = bad else {
             return Ok(declared);
         };
-        let small = if standing.volume(a) < standing.volume(b) { a } else { b };
+        let small = if standing.volume(a) < standing.volume(b) {
+            a
+        } else {
+            b
+        };
         dry(wets, names, (a, b), small, report);
     }
 }
 
-fn dry(wets: &mut [Wet], names: &[String], (a, b): (usize, usize), small: usize, report: &mut Report) {
+fn dry(
+    wets: &mut [Wet],
+    names: &[String],
+    (a, b): (usize, usize),
+    small: usize,
+    report: &mut Report,
+) {
     let other = if small == a { b } else { a };
     report.note(format!(
         "body {:?} is dry: it lies in body {:?}, and no plane parts the two without taking half of one",
@@ -171,11 +182,17 @@ impl Bodies<'_> {
                 false => self.part(wets, &standing, (a, b), joined)?,
             };
             if !parted {
-                let small = if standing.volume(a) < standing.volume(b) { a } else { b };
+                let small = if standing.volume(a) < standing.volume(b) {
+                    a
+                } else {
+                    b
+                };
                 dry(wets, self.names, (a, b), small, report);
             }
             for body in [a, b] {
-                standing.meshes[body] = (wets[body].surface.as_ref()).map(Surface::mesh).transpose()?;
+                standing.meshes[body] = (wets[body].surface.as_ref())
+                    .map(Surface::mesh)
+                    .transpose()?;
             }
         }
         Ok(any)
@@ -210,7 +227,11 @@ impl Bodies<'_> {
             }
             true => {
                 // Of the smaller one, as little as will do.
-                let small = if standing.volume(a) < standing.volume(b) { a } else { b };
+                let small = if standing.volume(a) < standing.volume(b) {
+                    a
+                } else {
+                    b
+                };
                 let steps = [0.25, 0.5, 0.75, 1.0];
                 let cut = |part: f64| match small == b {
                     true => (b, -normal, -(level - depth * (1.0 - part))),

@@ -94,7 +94,10 @@ impl<'f> Meshes<'f> {
         let (mut pieces, mut hulled) = (Vec::new(), false);
         for part in &group.parts {
             let link = &self.file.robot.links[part.link];
-            let chosen = options.links.get(&link.name).and_then(|choice| choice.shape);
+            let chosen = options
+                .links
+                .get(&link.name)
+                .and_then(|choice| choice.shape);
             let wet = chosen.unwrap_or(options.shape);
             let first = match wet {
                 Wet::None => continue,
@@ -181,7 +184,11 @@ impl<'f> Meshes<'f> {
             // A mirrored surface is turned inside out.
             mesh.faces.iter_mut().for_each(|face| face.swap(1, 2));
         }
-        if let Some(bad) = mesh.vertices.iter().find(|x| !x.iter().all(|x| x.is_finite())) {
+        if let Some(bad) = mesh
+            .vertices
+            .iter()
+            .find(|x| !x.iter().all(|x| x.is_finite()))
+        {
             return Err(Error::input(
                 format!("{place}: mesh {}", path.display()),
                 format!("a vertex at {:?}", bad.as_slice()),
@@ -189,7 +196,10 @@ impl<'f> Meshes<'f> {
             ));
         }
         let used = mesh.faces.iter().flatten();
-        let points: Vec<Vec3> = used.filter_map(|v| mesh.vertices.get(*v)).copied().collect();
+        let points: Vec<Vec3> = used
+            .filter_map(|v| mesh.vertices.get(*v))
+            .copied()
+            .collect();
         let hull = hull(&format!("convex hull of {}", path.display()), &points).ok();
         let loaded = Rc::new(Loaded { path, mesh, hull });
         self.loaded.insert(key, loaded.clone());

@@ -66,8 +66,8 @@ fn parse_error(path: &Path, message: impl Into<String>) -> Error {
 }
 
 fn parse(path: &Path, text: &str) -> Result<File> {
-    let document =
-        Document::parse(text).map_err(|e| parse_error(path, format!("{e}; this is not XML yet")))?;
+    let document = Document::parse(text)
+        .map_err(|e| parse_error(path, format!("{e}; this is not XML yet")))?;
     let mut look = Look {
         path,
         document: &document,
@@ -210,7 +210,8 @@ impl Look<'_, '_> {
         let named = node.ancestors().find(|a| {
             a.is_element()
                 && matches!(a.tag_name().name(), "link" | "joint")
-                && a.parent_element().is_some_and(|p| p.parent_element().is_none())
+                && a.parent_element()
+                    .is_some_and(|p| p.parent_element().is_none())
         });
         match named {
             Some(of) => format!(
@@ -339,7 +340,9 @@ impl Look<'_, '_> {
             let what = format!("type {kind:?} is unknown; known are {}", JOINTS.join(", "));
             return Err(self.wrong(node, what));
         }
-        inner.into_iter().try_for_each(|child| self.element(child, tag))
+        inner
+            .into_iter()
+            .try_for_each(|child| self.element(child, tag))
     }
 
     fn check_numbers(&self, node: &Node, name: &str, value: &str) -> Result<()> {

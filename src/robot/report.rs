@@ -227,7 +227,10 @@ impl fmt::Display for Report {
             )?;
         }
         for Unused { what, count, line } in &self.unused {
-            write!(f, "\nnot used: {what} ({count} times, first in line {line})")?;
+            write!(
+                f,
+                "\nnot used: {what} ({count} times, first in line {line})"
+            )?;
         }
         Ok(())
     }

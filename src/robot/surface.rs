@@ -129,8 +129,11 @@ impl Wet {
         };
         let why = match meshes.surface(piece.link, loaded, options)? {
             Ok(mesh) => {
-                let vertices: Vec<Vec3> =
-                    mesh.vertices().iter().map(|x| moved(&piece.at, x)).collect();
+                let vertices: Vec<Vec3> = mesh
+                    .vertices()
+                    .iter()
+                    .map(|x| moved(&piece.at, x))
+                    .collect();
                 let placed = TriMesh::new(mesh.name(), vertices, mesh.faces().to_vec())?;
                 let most = options.faces.unwrap_or(FACES);
                 let fewer = match placed.faces().len() > 2 * most {
@@ -140,13 +143,15 @@ impl Wet {
                 match fewer {
                     Ok(mesh) => {
                         meshes.tell(piece, "closed: used itself", report);
-                        let pieces = piece.hull()?.map(|mesh| Surface::Mesh { mesh, convex: true });
+                        let hull = piece.hull()?;
+                        let own = mesh.mass_properties().volume;
+                        let convex = hull
+                            .as_ref()
+                            .is_some_and(|h| h.mass_properties().volume < (1.0 + 1e-6) * own);
+                        let pieces = hull.map(|mesh| Surface::Mesh { mesh, convex: true });
                         return Ok(Self {
-                            said: format!("mesh of {} faces", mesh.faces().len()),
-                            surface: Some(Surface::Mesh {
-                                mesh,
-                                convex: false,
-                            }),
+                            said: "closed mesh".into(),
+                            surface: Some(Surface::Mesh { mesh, convex }),
                             pieces: pieces.into_iter().collect(),
                         });
                     }
@@ -226,11 +231,17 @@ impl Wet {
 
     /// Gives hulls the faces that the water needs.
     pub fn finish(&mut self, options: &Options) {
-        if let (Some(Surface::Formula { shape, .. }), Some(faces)) = (&mut self.surface, options.faces) {
+        if let (Some(Surface::Formula { shape, .. }), Some(faces)) =
+            (&mut self.surface, options.faces)
+        {
             shape.set_faces(faces);
         }
-        if let Some(Surface::Mesh { mesh, convex: true }) = &mut self.surface {
-            *mesh = even(mesh, options.faces.unwrap_or(FACES));
+        let wanted = options.faces.unwrap_or(FACES);
+        if let Some(Surface::Mesh { mesh, convex }) = &mut self.surface {
+            // A mesh with as many faces as that stays what it is.
+            if *convex || 2 * mesh.faces().len() < wanted {
+                *mesh = even(mesh, wanted);
+            }
             self.said = format!("{}, {} faces", self.said, mesh.faces().len());
         }
     }

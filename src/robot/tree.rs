@@ -174,15 +174,21 @@ fn carried(file: &File) -> Result<Vec<Option<(usize, usize)>>> {
 
 /// The one link that no joint carries.
 fn root(file: &File, carried: &[Option<(usize, usize)>]) -> Result<usize> {
-    let roots: Vec<usize> = (0..carried.len()).filter(|l| carried[*l].is_none()).collect();
+    let roots: Vec<usize> = (0..carried.len())
+        .filter(|l| carried[*l].is_none())
+        .collect();
     match roots[..] {
         [root] => Ok(root),
         [] => Err(looped(file, carried)),
         [_, second, ..] => {
-            let names: Vec<&str> = (roots.iter().map(|r| file.robot.links[*r].name.as_str())).collect();
+            let names: Vec<&str> =
+                (roots.iter().map(|r| file.robot.links[*r].name.as_str())).collect();
             Err(Error::input(
                 link_place(file, second),
-                format!("no joint that it is the child of, as {} links: {names:?}", roots.len()),
+                format!(
+                    "no joint that it is the child of, as {} links: {names:?}",
+                    roots.len()
+                ),
                 "a robot is one tree: join all but one of them to the rest by a joint, or give each tree a file of its own",
             ))
         }
@@ -200,7 +206,9 @@ fn looped(file: &File, carried: &[Option<(usize, usize)>]) -> Error {
         }
         at
     };
-    let within = (0..carried.len()).find_map(|link| endless(&link)).unwrap_or(0);
+    let within = (0..carried.len())
+        .find_map(|link| endless(&link))
+        .unwrap_or(0);
     let mut names = vec![file.robot.links[within].name.as_str()];
     let mut at = up(within);
     while let Some(link) = at.filter(|link| *link != within) {

@@ -1,10 +1,11 @@
 //! Robots of a scene: what is written of them, and the bodies and sites that they become.
 
 use super::{Body, BodyId, CollisionPiece, Drag, Fluid, Placement, Scene, Site, is_default};
-use crate::robot::{Imported, LinkChoice, Options, RobotBody, import};
 pub use crate::robot::{
-    BadMeshes, Base, BodyReport, FoldedReport, Followers, MeshUse, Report as RobotReport, Unused, Wet,
+    BadMeshes, Base, BodyReport, FoldedReport, Followers, MeshUse, Report as RobotReport, Unused,
+    Wet,
 };
+use crate::robot::{Imported, LinkChoice, Options, RobotBody, import};
 use crate::{Error, Joint, Result};
 use nalgebra::Isometry3;
 use serde::{Deserialize, Serialize};
@@ -166,7 +167,10 @@ impl Robot {
 const STANDARD_GRAVITY: f64 = 9.81;
 
 fn placement(at: &Isometry3<f64>) -> Placement {
-    Placement::new(at.translation.vector.into(), at.rotation.scaled_axis().into())
+    Placement::new(
+        at.translation.vector.into(),
+        at.rotation.scaled_axis().into(),
+    )
 }
 
 /// Where the damping and friction of `<dynamics>` are taken over, once bodies have such. Until then the report lists them as not used.
@@ -221,7 +225,11 @@ impl Scene {
             });
         }
         let gravity = nalgebra::Vector3::from(self.gravity).norm();
-        let gravity = if gravity > 0.0 { gravity } else { STANDARD_GRAVITY };
+        let gravity = if gravity > 0.0 {
+            gravity
+        } else {
+            STANDARD_GRAVITY
+        };
         report.weigh(self.fluid.density, gravity);
         Ok(Added {
             bodies: (first..self.bodies.len()).map(BodyId).collect(),

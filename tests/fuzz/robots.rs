@@ -39,11 +39,9 @@ fn made(path: &Path, input: &[u8], options: &Robot) -> Answer {
         Err(error) => return Answer::Refused(error.to_string()),
     };
     match Scene::from_toml(&text, "") {
-        Ok(again) if again == scene => Answer::Taken(format!(
-            "{} {}",
-            scene.bodies.len(),
-            report.notes.concat()
-        )),
+        Ok(again) if again == scene => {
+            Answer::Taken(format!("{} {}", scene.bodies.len(), report.notes.concat()))
+        }
         Ok(_) => Answer::Wrong("a robot reads back as another".into()),
         Err(error) => Answer::Wrong(format!("a robot doesn't read back: {error}")),
     }

@@ -62,7 +62,9 @@ pub(super) fn parse(bytes: &[u8]) -> Parsed {
     let mut raw = Raw::default();
     for (id, at) in &placed {
         let Some(mesh) = meshes.get(id) else {
-            return Err(format!("a node shows geometry {id:?}, which isn't there; export it again"));
+            return Err(format!(
+                "a node shows geometry {id:?}, which isn't there; export it again"
+            ));
         };
         add(mesh, at, &mut raw)?;
     }
@@ -88,7 +90,8 @@ fn meshes(text: &str, root: &Node) -> Result<HashMap<String, Mesh>, String> {
 }
 
 fn child<'a, 'd>(node: &Node<'a, 'd>, name: &str) -> Option<Node<'a, 'd>> {
-    node.children().find(|c| c.is_element() && c.tag_name().name() == name)
+    node.children()
+        .find(|c| c.is_element() && c.tag_name().name() == name)
 }
 
 /// The element with this id that a link `#id` names.
@@ -123,8 +126,15 @@ fn place(
         let mut below = Vec::new();
         for inner in node.children().filter(Node::is_element) {
             let link = |kind: &str| {
-                let found = inner.attribute("url").and_then(|url| named(root, kind, url));
-                found.ok_or_else(|| format!("<{}> leads nowhere; export it again", inner.tag_name().name()))
+                let found = inner
+                    .attribute("url")
+                    .and_then(|url| named(root, kind, url));
+                found.ok_or_else(|| {
+                    format!(
+                        "<{}> leads nowhere; export it again",
+                        inner.tag_name().name()
+                    )
+                })
             };
             match inner.tag_name().name() {
                 "node" => below.push(inner),
@@ -160,7 +170,9 @@ fn matrix(name: &str, element: &Node) -> Result<Matrix4<f64>, String> {
     let read: Option<Vec<f64>> = words.map(|w| w.parse().ok()).collect();
     let read = read.filter(|x| x.len() == count && x.iter().all(|x| x.is_finite()));
     let Some(x) = read else {
-        return Err(format!("<{name}> needs {count} finite numbers; export it again"));
+        return Err(format!(
+            "<{name}> needs {count} finite numbers; export it again"
+        ));
     };
     Ok(match name {
         "matrix" => Matrix4::from_row_slice(&x),

@@ -21,6 +21,8 @@ pub mod notation;
 #[cfg(feature = "opt")]
 pub mod optimize;
 mod policy;
+#[cfg(feature = "urdf")]
+mod robot;
 pub mod scene;
 pub mod shape;
 pub mod simulate;

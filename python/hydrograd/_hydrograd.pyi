@@ -200,7 +200,8 @@ class Body:
     the body in world axes. `locked` holds the joint, `motion` (one per coordinate) drives it, `limits` (m or rad) stop it.
     `shape_position` and `shape_rotation` place the shape in the body; `refine` lists balls (center, radius, edge), m,
     where its faces are made smaller. `collision` lists the convex pieces that the body is for contact instead of its shape, each
-    a shape, (shape, position) or (shape, position, rotation) in the body's frame. `added_mass` (6, 6) replaces the body's own at unit density, with `isolated`."""
+    a shape, (shape, position) or (shape, position, rotation) in the body's frame. `start` are the joint's coordinates at the start, unless the
+    scene is given all by `set_initial`. `added_mass` (6, 6) replaces the body's own at unit density, with `isolated`."""
     def __new__(
         cls,
         shape: Shape | None = None,
@@ -232,6 +233,7 @@ class Body:
         passive: Passive | None = None,
         mimic: Mimic | None = None,
         servo: Servo | None = None,
+        start: ArrayLike | None = None,
     ) -> Body: ...
     @property
     def name(self) -> str:
@@ -253,6 +255,38 @@ class Body:
         """Position of its joint in the parent's frame, m."""
 
 @final
+class Robot:
+    """A robot that was added to a scene: its bodies and joints by name, as the numbers of their bodies, and what it came to."""
+    @property
+    def bodies(self) -> dict[str, int]: ...
+    @property
+    def joints(self) -> dict[str, int]: ...
+    @property
+    def report(self) -> dict[str, Any]:
+        """What it came to, as `inspect_robot` gives it."""
+
+def inspect_robot(
+    path: _Path,
+    *,
+    density: float = 998.0,
+    base: Literal["free", "fixed"] | None = None,
+    position: ArrayLike | None = None,
+    rotation: ArrayLike | None = None,
+    prefix: str | None = None,
+    package_path: Sequence[_Path] | None = None,
+    shape: Literal["collision", "visual", "hull", "none"] | None = None,
+    bad_meshes: Literal["hull", "refuse"] | None = None,
+    faces: int | None = None,
+    mimic: Literal["follow", "independent"] | None = None,
+    actuated: bool | None = None,
+    limits: bool | None = None,
+    drag: Drag | None = None,
+    start: dict[str, float] | None = None,
+    links: dict[str, dict[str, Any]] | None = None,
+) -> dict[str, Any]:
+    """What a robot in a URDF file comes to in water of `density` (kg/m³): tree, masses, weight against buoyancy, meshes that were replaced, and what of the file wasn't
+    used. Choices are those of `Scene.add_robot`."""
+
 class Scene:
     """What a simulation starts from: the fluid, walls, and bodies with their joints.
 
@@ -275,6 +309,49 @@ class Scene:
     @staticmethod
     def from_toml(text: str, folder: _Path | None = None) -> Scene:
         """A scene from TOML text; paths of meshes are relative to `folder`."""
+    @staticmethod
+    def from_urdf(
+        path: _Path,
+        *,
+        base: Literal["free", "fixed"] | None = None,
+        position: ArrayLike | None = None,
+        rotation: ArrayLike | None = None,
+        prefix: str | None = None,
+        package_path: Sequence[_Path] | None = None,
+        shape: Literal["collision", "visual", "hull", "none"] | None = None,
+        bad_meshes: Literal["hull", "refuse"] | None = None,
+        faces: int | None = None,
+        mimic: Literal["follow", "independent"] | None = None,
+        actuated: bool | None = None,
+        limits: bool | None = None,
+        drag: Drag | None = None,
+        start: dict[str, float] | None = None,
+        links: dict[str, dict[str, Any]] | None = None,
+    ) -> Scene:
+        """A scene of the robot in a URDF file, in still fresh water, gravity along -z. Choices are those of `add_robot`."""
+    def add_robot(
+        self,
+        path: _Path,
+        *,
+        base: Literal["free", "fixed"] | None = None,
+        position: ArrayLike | None = None,
+        rotation: ArrayLike | None = None,
+        prefix: str | None = None,
+        package_path: Sequence[_Path] | None = None,
+        shape: Literal["collision", "visual", "hull", "none"] | None = None,
+        bad_meshes: Literal["hull", "refuse"] | None = None,
+        faces: int | None = None,
+        mimic: Literal["follow", "independent"] | None = None,
+        actuated: bool | None = None,
+        limits: bool | None = None,
+        drag: Drag | None = None,
+        start: dict[str, float] | None = None,
+        links: dict[str, dict[str, Any]] | None = None,
+    ) -> Robot:
+        """Adds the robot of a URDF file: a body for each link that moves, a site for each that doesn't. Choices are the keys of a scene file's [[robot]]: `base` "free"
+        or "fixed", `position` (m) and `rotation` (rad) of the root, `prefix` of all names, `package_path` (folders), `shape` "collision", "visual", "hull" or "none",
+        `bad_meshes` "hull" or "refuse", `faces` of hulls, `mimic` "follow" or "independent", `actuated`, `limits`, `drag`, `start` (joint to coordinate), `links` (link to
+        its `shape`, `mass`, `density`, `keep`)."""
     def to_toml(self) -> str:
         """The scene as TOML text, from which `from_toml` makes an equal one."""
     def add(self, body: Body) -> int:

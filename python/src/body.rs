@@ -124,7 +124,8 @@ impl Servo {
 /// friction and armature, `mimic` lets it follow another, `servo` makes its control a target.
 /// `shape_position` and `shape_rotation` place the shape in the body; `refine` lists balls (center, radius, edge), m,
 /// where its faces are made smaller. `collision` lists the convex pieces that the body is for contact instead of its shape, each
-/// a shape, (shape, position) or (shape, position, rotation) in the body's frame. `added_mass` (6, 6) replaces the body's own at unit density, with `isolated`.
+/// a shape, (shape, position) or (shape, position, rotation) in the body's frame. `start` are the joint's coordinates at the start, unless the
+/// scene is given all by `set_initial`. `added_mass` (6, 6) replaces the body's own at unit density, with `isolated`.
 #[pyclass(frozen, eq, module = "hydrograd")]
 #[derive(Clone, PartialEq)]
 pub struct Body {
@@ -177,7 +178,7 @@ impl Body {
         shape=None, *, name="", density=None, mass=None, inertia=None, center_of_mass=None, position=None,
         rotation=None, joint=None, parent=None, actuated=false, thruster=false, locked=false, motion=None, limits=None,
         limit_stiffness=None, drag=None, shape_position=None, shape_rotation=None, refine=None, added_mass=None,
-        overlaps_parent=false, collision=None, passive=None, mimic=None, servo=None
+        overlaps_parent=false, collision=None, passive=None, mimic=None, servo=None, start=None
     ))]
     #[expect(
         clippy::too_many_arguments,
@@ -210,6 +211,7 @@ impl Body {
         passive: Option<PyRef<'_, Passive>>,
         mimic: Option<PyRef<'_, Mimic>>,
         servo: Option<PyRef<'_, Servo>>,
+        start: Option<&Bound<'_, PyAny>>,
     ) -> PyResult<Self> {
         let at = |field: &str| {
             if name.is_empty() {
@@ -268,6 +270,7 @@ impl Body {
                 or_zeros(&at("rotation"), rotation)?,
             ),
             joint: joint.map_or_else(Default::default, |j| j.0),
+            start: start.map_or(Ok(Vec::new()), |given| row(&at("start"), given))?,
             motion: motion.map(|list| list.iter().map(|m| m.0).collect()),
             locked,
             limits: limits

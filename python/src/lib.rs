@@ -16,6 +16,7 @@ mod objective;
 mod optimize;
 mod policy;
 mod prepare;
+mod robot;
 mod rollout;
 mod scene;
 mod settings;
@@ -100,6 +101,7 @@ fn _hydrograd(m: &Bound<'_, PyModule>) -> PyResult<()> {
     m.add_class::<joint::Joint>()?;
     m.add_class::<joint::Motion>()?;
     m.add_class::<scene::Scene>()?;
+    m.add_class::<robot::Robot>()?;
     m.add_class::<simulator::Simulator>()?;
     m.add_class::<equations::Equations>()?;
     m.add_class::<state::State>()?;
@@ -113,6 +115,7 @@ fn _hydrograd(m: &Bound<'_, PyModule>) -> PyResult<()> {
     m.add_function(wrap_pyfunction!(_rollout, m)?)?;
     m.add_function(wrap_pyfunction!(tradeoff::tradeoff, m)?)?;
     m.add_function(wrap_pyfunction!(_command, m)?)?;
+    m.add_function(wrap_pyfunction!(robot::inspect_robot, m)?)?;
     optimize::register(m)?;
     objective::register(m)
 }

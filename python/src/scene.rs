@@ -4,6 +4,7 @@ use crate::array::{fixed, or_zeros, row};
 use crate::body::Body;
 use crate::error::{OrRaise, input};
 use crate::fluid::{Contact, Fluid};
+use crate::robot::{self, Robot};
 use hydrograd::scene::{Site, Wall, WallSurface};
 use pyo3::prelude::*;
 use pyo3::types::PyDict;
@@ -68,6 +69,31 @@ impl Scene {
         hydrograd::Scene::from_toml(text, folder.unwrap_or_default())
             .or_raise()
             .map(Self)
+    }
+
+    /// A scene of the robot in a URDF file, in still fresh water, gravity along -z. Choices are those of `add_robot`.
+    #[staticmethod]
+    #[pyo3(signature = (path, **choices))]
+    fn from_urdf(
+        py: Python<'_>,
+        path: PathBuf,
+        choices: Option<&Bound<'_, PyDict>>,
+    ) -> PyResult<Self> {
+        robot::scene_of(py, path, choices).map(Self)
+    }
+
+    /// Adds the robot of a URDF file: a body for each link that moves, a site for each that doesn't. Choices are the keys of a scene file's [[robot]]: `base` "free"
+    /// or "fixed", `position` (m) and `rotation` (rad) of the root, `prefix` of all names, `package_path` (folders), `shape` "collision", "visual", "hull" or "none",
+    /// `bad_meshes` "hull" or "refuse", `faces` of hulls, `mimic` "follow" or "independent", `actuated`, `limits`, `drag`, `start` (joint to coordinate), `links` (link to
+    /// its `shape`, `mass`, `density`, `keep`).
+    #[pyo3(signature = (path, **choices))]
+    fn add_robot(
+        &mut self,
+        py: Python<'_>,
+        path: PathBuf,
+        choices: Option<&Bound<'_, PyDict>>,
+    ) -> PyResult<Robot> {
+        robot::add(py, &mut self.0, path, choices)
     }
 
     /// The scene as TOML text, from which `from_toml` makes an equal one.

@@ -224,7 +224,7 @@ pub(crate) fn assemble(
         tree,
     };
     let mut q = match scene.initial.q.is_empty() {
-        true => system.tree.origin(),
+        true => start(scene),
         false => DVector::from_vec(scene.initial.q.clone()),
     };
     stepper(choices, &system, &parameters).place_motions(&mut q, 0.0);
@@ -265,6 +265,16 @@ fn stepper<'a>(choices: &Choices, system: &'a System, parameters: &'a Parameters
         integrator: Default::default(),
         dt: choices.time_step,
     }
+}
+
+/// Where joints start by themselves.
+fn start(scene: &Scene) -> DVector<f64> {
+    let of = |body: &Body| match (&body.mimic, body.start.is_empty()) {
+        (Some(_), _) => Vec::new(),
+        (None, true) => body.joint.origin(),
+        (None, false) => body.start.clone(),
+    };
+    DVector::from_vec(scene.bodies.iter().flat_map(of).collect())
 }
 
 /// Initial velocity; a given momentum is turned into velocity.

@@ -1,4 +1,4 @@
-//! The command line: `hydrograd run | added-mass | gradcheck | tradeoff | check-mesh | gpu-info`.
+//! The command line: `hydrograd run | added-mass | gradcheck | tradeoff | inspect | check-mesh | gpu-info`.
 //!
 //! Results go to standard output, everything else (progress, warnings, errors) to standard error.
 //! With `--json` standard output holds one JSON object and nothing else: the result, or
@@ -9,6 +9,7 @@ mod check_mesh;
 mod exit;
 mod gpu_info;
 mod gradcheck;
+mod inspect;
 mod interrupt;
 mod options;
 mod output;
@@ -49,6 +50,8 @@ enum Command {
     Gradcheck(gradcheck::Arguments),
     /// Measure time against error over fidelities, methods, resolutions, integrators and time steps.
     Tradeoff(tradeoff::Arguments),
+    /// Say what a robot in a URDF file comes to: its tree, weight against buoyancy, meshes that were replaced, and what wasn't used.
+    Inspect(inspect::Arguments),
     /// Say whether a mesh can be simulated: what is wrong, where, and how to mend it.
     CheckMesh(check_mesh::Arguments),
     /// List the GPUs of this machine, and which one `--backend gpu` would use.
@@ -87,6 +90,7 @@ pub fn run(arguments: Vec<OsString>) -> Exit {
         Command::AddedMass(arguments) => added_mass::main(&arguments, output),
         Command::Gradcheck(arguments) => gradcheck::main(&arguments, output),
         Command::Tradeoff(arguments) => tradeoff::main(&arguments, output),
+        Command::Inspect(arguments) => inspect::main(&arguments, output),
         Command::CheckMesh(arguments) => check_mesh::main(&arguments, output),
         Command::GpuInfo(arguments) => gpu_info::main(&arguments, output),
     };

@@ -6,14 +6,14 @@ use std::path::{Path, PathBuf};
 use std::str::FromStr;
 use strum::{EnumMessage, VariantArray};
 
-use crate::Result;
 use crate::boundary::{Depth, RowScaling};
 use crate::coupling::full::{FullSolver, Preconditioner};
 use crate::dynamics::Integrator;
-use crate::scene::{Preset, Scene};
+use crate::scene::{BadMeshes, Base, Followers, Preset, Robot, Scene, Wet};
 use crate::simulate::{
     AdapterName, Arithmetic, Backend, Fidelity, GpuSettings, Method, Settings, Simulator,
 };
+use crate::{Error, Result};
 
 /// What the water is solved with; whatever isn't given follows the preset.
 #[derive(Clone, Debug, Args)]
@@ -95,14 +95,76 @@ impl Adapter {
     }
 }
 
+/// How a URDF file is read; a scene file says this in its [[robot]].
+#[derive(Clone, Debug, Default, Args)]
+#[command(next_help_heading = "Of a URDF file")]
+pub(super) struct RobotArguments {
+    /// Folder that holds packages of meshes; may be given several times. Those of ROS_PACKAGE_PATH, the file's own and all above it come after.
+    #[arg(long, value_name = "FOLDER")]
+    package_path: Vec<PathBuf>,
+    /// Whether the robot floats [default: free; fixed if its root is called world or has no mass].
+    #[arg(long, value_parser = choice::<Base>())]
+    base: Option<Base>,
+    /// What the water sees of links [default: collision].
+    #[arg(long, value_parser = choice::<Wet>())]
+    wet: Option<Wet>,
+    /// What is done about joints that follow others [default: refuse].
+    #[arg(long, value_parser = choice::<Followers>())]
+    mimic: Option<Followers>,
+    /// What is done about meshes that aren't closed or cross themselves [default: hull].
+    #[arg(long, value_parser = choice::<BadMeshes>())]
+    bad_meshes: Option<BadMeshes>,
+    /// Let joints pass their limits.
+    #[arg(long)]
+    no_limits: bool,
+}
+
+impl RobotArguments {
+    /// The choices.
+    pub fn robot(&self) -> Robot {
+        Robot {
+            base: self.base,
+            package_path: self.package_path.clone(),
+            shape: self.wet.unwrap_or_default(),
+            mimic: self.mimic.unwrap_or_default(),
+            bad_meshes: self.bad_meshes.unwrap_or_default(),
+            limits: self.no_limits.then_some(false),
+            ..Robot::default()
+        }
+    }
+
+    /// The scene of a file: a scene file, or a robot alone in still fresh water.
+    pub fn scene(&self, path: &Path) -> Result<Scene> {
+        if is_urdf(path) {
+            return Scene::from_urdf(path, &self.robot());
+        }
+        if self.robot() != Robot::default() {
+            return Err(Error::input(
+                path.display().to_string(),
+                "choices for a URDF file",
+                "a scene file says them in its [[robot]] (`package_path`, `base`, `shape`, `mimic`, `bad_meshes`, `limits`)",
+            ));
+        }
+        Scene::load(path)
+    }
+}
+
+/// Whether a file is a robot, by its name.
+fn is_urdf(path: &Path) -> bool {
+    let extension = path.extension().unwrap_or_default();
+    extension.eq_ignore_ascii_case("urdf")
+}
+
 /// A scene, and how it is simulated.
 #[derive(Debug, Args)]
 pub(super) struct Simulation {
-    /// The scene file.
-    #[arg(value_name = "SCENE.toml")]
+    /// The scene file, or a robot, which is then alone in still fresh water.
+    #[arg(value_name = "SCENE.toml|ROBOT.urdf")]
     scene: PathBuf,
     #[command(flatten)]
     pub water: Water,
+    #[command(flatten)]
+    robot: RobotArguments,
     /// Number of steps [default: the scene's own].
     #[arg(long, value_name = "N", allow_negative_numbers = true)]
     steps: Option<usize>,
@@ -117,7 +179,7 @@ pub(super) struct Simulation {
 impl Simulation {
     /// The scene, with so many steps if that is asked for, checked.
     pub fn scene(&self) -> Result<Scene> {
-        let mut scene = load(&self.scene)?;
+        let mut scene = load(&self.scene, &self.robot)?;
         scene.steps = self.steps.unwrap_or(scene.steps);
         scene.validate()?;
         Ok(scene)
@@ -166,8 +228,8 @@ impl Water {
 }
 
 /// The scene of a file; one without a name is called as the file.
-pub(super) fn load(path: &Path) -> Result<Scene> {
-    let mut scene = Scene::load(path)?;
+pub(super) fn load(path: &Path, robot: &RobotArguments) -> Result<Scene> {
+    let mut scene = robot.scene(path)?;
     if scene.name.is_empty() {
         let stem = path.file_stem().unwrap_or_default();
         scene.name = stem.to_string_lossy().into_owned();

@@ -9,7 +9,7 @@ use std::path::PathBuf;
 use clap::Args;
 
 use super::exit::Exit;
-use super::options::{choice, load, positive, seconds, tolerance};
+use super::options::{RobotArguments, choice, load, positive, seconds, tolerance};
 use super::output::{Output, progress_bar, set_progress};
 use crate::Result;
 use crate::dynamics::Integrator;
@@ -25,9 +25,11 @@ use table::TradeoffReport;
                   another. Of each list that is given, the first value is what all else is varied around."
 )]
 pub(super) struct Arguments {
-    /// The scene file.
-    #[arg(value_name = "SCENE.toml")]
+    /// The scene file, or a robot, which is then alone in still fresh water.
+    #[arg(value_name = "SCENE.toml|ROBOT.urdf")]
     scene: PathBuf,
+    #[command(flatten)]
+    robot: RobotArguments,
     /// Fidelities, with commas between [default: isolated,reduced,auto,full].
     #[arg(long, value_parser = choice::<Fidelity>(), value_delimiter = ',', value_name = "LIST")]
     fidelities: Vec<Fidelity>,
@@ -94,7 +96,7 @@ impl Arguments {
 }
 
 pub(super) fn main(arguments: &Arguments, output: Output) -> Result<Exit> {
-    let scene = load(&arguments.scene)?;
+    let scene = load(&arguments.scene, &arguments.robot)?;
     scene.validate()?;
     if let Some(file) = &arguments.plot {
         plot::prepare(file)?;

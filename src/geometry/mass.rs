@@ -13,6 +13,7 @@
 use super::mesh::TriMesh;
 use super::points::area_vector;
 use hydrograd_adjoint::lie::{Mat3, Pose, Vec3};
+use nalgebra::Matrix3;
 
 /// What a body filled evenly at unit density has.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -76,4 +77,25 @@ impl TriMesh {
     pub fn mass_properties(&self) -> MassProperties {
         MassProperties::of(self)
     }
+}
+
+/// Why no distribution of mass has this inertia about its centre of mass (xx, yy, zz, xy, xz, yz, kg m²); `slack` is what may be missing, of the largest principal
+/// moment. `None` where one has.
+pub(crate) fn impossible_inertia(i: &[f64; 6], slack: f64) -> Option<String> {
+    let mut moments =
+        Matrix3::new(i[0], i[3], i[4], i[3], i[1], i[5], i[4], i[5], i[2]).symmetric_eigenvalues();
+    moments.as_mut_slice().sort_by(f64::total_cmp);
+    let slack = slack * moments.amax();
+    let principal = format!("principal moments {:?} kg m²", moments.as_slice());
+    if moments[0] < -slack {
+        return Some(format!(
+            "an inertia has no negative principal moment; this one has the {principal}"
+        ));
+    }
+    (moments[0] + moments[1] < moments[2] - slack).then(|| {
+        format!(
+            "no distribution of mass has a principal moment above the sum of the other two; \
+             this one has the {principal}. Moments are taken about the centre of mass"
+        )
+    })
 }

@@ -48,6 +48,7 @@ pub use gap::{Distance, Gap, Gaps, Other, Share, overlap_error};
 pub use image::Image;
 pub(crate) use interior::Interior;
 pub use mass::MassProperties;
+pub(crate) use mass::impossible_inertia;
 pub(crate) use mesh::check_scale;
 pub use mesh::{Edge, TriMesh};
 pub(crate) use opposite::Opposite;

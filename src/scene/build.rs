@@ -49,6 +49,8 @@ impl Scene {
             walls: Vec::new(),
             contact: None,
             bodies: Vec::new(),
+            #[cfg(feature = "urdf")]
+            robots: Vec::new(),
             forces: Vec::new(),
             sites: Vec::new(),
             initial: Initial::default(),
@@ -182,6 +184,8 @@ setters! { Body {
     /// Lets the surface touch or overlap that of the body that carries it; the two then don't feel
     /// each other through the water.
     overlaps_parent() => overlaps_parent = true;
+    /// Coordinates of the joint where the scene starts, unless the scene's `initial.q` says.
+    start(q: impl Into<Vec<f64>>) => start = q.into();
     /// Drives the joint by a given motion, one per coordinate.
     driven(motion: impl Into<Vec<Motion>>) => motion = Some(motion.into());
     /// Holds the joint where it starts.

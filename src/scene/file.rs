@@ -25,13 +25,16 @@ impl Scene {
         let path = path.as_ref();
         let text = read_text(path)?;
         let folder = path.parent().unwrap_or(Path::new(""));
-        parse(&text, folder, path).map_err(|message| parse_error(path, message))
+        let scene = parse(&text, folder, path).map_err(|message| parse_error(path, message))?;
+        with_robots(scene, folder)
     }
 
     /// A scene from TOML text. Paths of meshes are taken relative to `folder`.
     pub fn from_toml(text: &str, folder: impl AsRef<Path>) -> Result<Self> {
         let name = Path::new(TEXT);
-        parse(text, folder.as_ref(), name).map_err(|message| parse_error(name, message))
+        let folder = folder.as_ref();
+        let scene = parse(text, folder, name).map_err(|message| parse_error(name, message))?;
+        with_robots(scene, folder)
     }
 
     /// The scene as TOML text; what stands at its default is left out. [`Scene::from_toml`] reads
@@ -45,6 +48,18 @@ impl Scene {
             )
         })
     }
+}
+
+/// The scene with the bodies of its robots.
+#[cfg(feature = "urdf")]
+fn with_robots(mut scene: Scene, folder: &Path) -> Result<Scene> {
+    scene.expand_robots(folder)?;
+    Ok(scene)
+}
+
+#[cfg(not(feature = "urdf"))]
+fn with_robots(scene: Scene, _folder: &Path) -> Result<Scene> {
+    Ok(scene)
 }
 
 fn parse_error(path: &Path, message: String) -> Error {

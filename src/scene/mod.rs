@@ -15,10 +15,13 @@ mod motion;
 mod origin;
 mod passive;
 mod problem;
+#[cfg(feature = "urdf")]
+mod robot;
 mod servo;
 mod site;
 mod validate;
 
+pub(crate) use crate::geometry::impossible_inertia;
 pub use crate::geometry::{Refinement, Wall, WallSurface};
 pub use crate::multibody::{Joint, Plane};
 pub use crate::shape::Shape;
@@ -29,9 +32,13 @@ pub use force::{Force, Lubrication, Spring, WATER_VISCOSITY};
 pub use mimic::Mimic;
 pub use origin::Origin;
 pub use passive::Passive;
+#[cfg(feature = "urdf")]
+pub use robot::{
+    Added, BadMeshes, Base, BodyReport, FoldedReport, Followers, MeshUse, Robot, RobotLink,
+    RobotReport, Unused, Wet,
+};
 pub use servo::Servo;
 pub use site::Site;
-pub(crate) use validate::impossible_inertia;
 
 use serde::{Deserialize, Serialize};
 
@@ -63,7 +70,12 @@ pub struct Scene {
     /// How surfaces touch; without it bodies may not.
     pub contact: Option<Contact>,
     /// The bodies, parents before children.
+    #[serde(default)]
     pub bodies: Vec<Body>,
+    /// Robots that a scene file asks for; reading it turns them into bodies, and leaves none here.
+    #[cfg(feature = "urdf")]
+    #[serde(default, rename = "robot", skip_serializing_if = "Vec::is_empty")]
+    pub robots: Vec<Robot>,
     /// Forces between bodies, beside those that bodies have of their own.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub forces: Vec<Force>,
@@ -157,6 +169,9 @@ pub struct Body {
     pub joint: Joint,
     /// Another joint that moves this one, by a transmission.
     pub mimic: Option<Mimic>,
+    /// Coordinates of the joint where the scene starts, unless [`Initial::q`] is given; empty: its origin.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub start: Vec<f64>,
     /// A given motion of the joint's coordinates, one per coordinate; the joint is then driven.
     pub motion: Option<Vec<Motion>>,
     /// Holds the joint where it starts.

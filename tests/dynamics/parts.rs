@@ -225,9 +225,7 @@ fn gradients_that_grow_without_bound_are_told() {
 
 #[test]
 fn gradients_of_the_examples_are_not_told() {
-    let folder = crate::support::root().join("examples/scenes");
-    for entry in std::fs::read_dir(folder).unwrap() {
-        let path = entry.unwrap().path();
+    for path in crate::support::example_scenes() {
         let scene = Scene::load(&path).unwrap();
         let settings = Settings::default().fidelity(Fidelity::Isolated).faces(80);
         let Ok(simulator) = Simulator::new(&scene, settings) else {

@@ -14,6 +14,8 @@ mod limits;
 mod meshes;
 mod mutate;
 mod resumed;
+#[cfg(feature = "urdf")]
+mod robots;
 mod scenes;
 mod words;
 

@@ -67,3 +67,9 @@ fn stl_files_hold() {
 fn ply_files_hold() {
     hold("ply", "ply");
 }
+
+#[cfg(feature = "urdf")]
+#[test]
+fn dae_files_hold() {
+    hold("dae", "dae");
+}

@@ -1,6 +1,6 @@
 //! Every scene of `examples/scenes`, and scenes written in Rust.
 
-use crate::support::{example, root};
+use crate::support::{example, example_scenes, root};
 use std::path::Path;
 
 use hydrograd::{Controls, Fidelity, Settings, Simulator};
@@ -12,11 +12,7 @@ use hydrograd::scene::{
 #[test]
 fn every_example_scene_loads_validates_and_survives_a_round_trip() {
     let mut found = Vec::new();
-    for entry in std::fs::read_dir(root().join("examples/scenes")).unwrap() {
-        let path = entry.unwrap().path();
-        if path.extension().is_none_or(|e| e != "toml") {
-            continue;
-        }
+    for path in example_scenes() {
         let scene = Scene::load(&path).unwrap_or_else(|e| panic!("{e}"));
         scene
             .validate()
@@ -296,8 +292,7 @@ fn mesh_paths_are_relative_to_the_scene_file() {
 
 #[test]
 fn every_example_scene_runs_at_every_fidelity() {
-    for entry in std::fs::read_dir(root().join("examples/scenes")).unwrap() {
-        let path = entry.unwrap().path();
+    for path in example_scenes() {
         let scene = Scene::load(&path).unwrap();
         for fidelity in [
             Fidelity::Isolated,

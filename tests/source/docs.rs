@@ -122,6 +122,7 @@ fn the_page_on_scenes_has_every_key() {
         "scene/passive.rs",
         "scene/servo.rs",
         "scene/mimic.rs",
+        "scene/robot.rs",
         "scene/force/spring.rs",
         "scene/force/lubrication.rs",
         "shape/description.rs",

@@ -8,7 +8,7 @@ use std::path::Path;
 /// `Error` and `Result` alone.
 ///
 /// `adjoint::lie` gives vectors and poses to everyone; the modules marked `adjoint` use the ladder too.
-const LAYERS: [(&str, &[&str]); 22] = [
+const LAYERS: [(&str, &[&str]); 23] = [
     ("error", &[]),
     // What enums that users choose from can do.
     ("choices", &[]),
@@ -19,7 +19,9 @@ const LAYERS: [(&str, &[&str]); 22] = [
     ("geometry", &["adjoint"]),
     ("shape", &["adjoint", "geometry", "special"]),
     ("multibody", &["adjoint"]),
-    ("scene", &["geometry", "multibody", "shape"]),
+    // Robots from files.
+    ("robot", &["adjoint", "geometry", "multibody", "shape"]),
+    ("scene", &["geometry", "multibody", "robot", "shape"]),
     ("solver", &["adjoint"]),
     (
         "boundary",
@@ -114,10 +116,11 @@ const LAYERS: [(&str, &[&str]); 22] = [
 ];
 
 /// Modules of which only the named parts may be used.
-const ONLY: [(&str, &str, &[&str]); 4] = [
+const ONLY: [(&str, &str, &[&str]); 5] = [
     ("shape", "adjoint", &["lie"]),
     ("contact", "adjoint", &["lie"]),
     ("multibody", "adjoint", &["lie"]),
+    ("robot", "adjoint", &["lie"]),
     ("optimize", "adjoint", &["lie", "sample"]),
 ];
 

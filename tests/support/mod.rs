@@ -149,3 +149,15 @@ pub fn directions(count: usize) -> Vec<Vec3> {
     };
     (0..count).map(direction).collect()
 }
+
+/// Files of example scenes; those with robots where such can be read.
+pub fn example_scenes() -> Vec<std::path::PathBuf> {
+    let listed = std::fs::read_dir(root().join("examples/scenes")).unwrap();
+    let paths = listed.map(|entry| entry.unwrap().path());
+    let scenes = paths.filter(|path| path.extension().is_some_and(|e| e == "toml"));
+    let read = |path: &std::path::PathBuf| {
+        let text = std::fs::read_to_string(path).unwrap();
+        cfg!(feature = "urdf") || !text.contains("[[robot]]")
+    };
+    scenes.filter(read).collect()
+}

@@ -10,7 +10,7 @@ use serde::Serialize;
 mod format;
 
 use super::exit::Exit;
-use super::options::Water;
+use super::options::{RobotArguments, Water};
 use super::output::{ChoicesReport, Output, note, print_text, write_warnings};
 use crate::scene::{Body, Fluid, Scene, Shape};
 use crate::simulate::ErrorEstimate;
@@ -34,14 +34,16 @@ pub(super) struct Arguments {
     format: Option<Format>,
     #[command(flatten)]
     water: Water,
+    #[command(flatten)]
+    robot: RobotArguments,
 }
 
 /// One of them must be given.
 #[derive(Debug, Args)]
 #[group(required = true, multiple = false)]
 struct Source {
-    /// A scene (.toml), at its start, or a mesh (.obj, .stl, .ply; metres).
-    #[arg(value_name = "SCENE.toml|MESH")]
+    /// A scene (.toml) or robot (.urdf), at its start, or a mesh (.obj, .stl, .ply; metres).
+    #[arg(value_name = "SCENE.toml|ROBOT.urdf|MESH")]
     file: Option<PathBuf>,
     /// A shape by formula, lengths in m: sphere:RADIUS, ellipsoid:A,B,C (semi-axes), box:A,B,C
     /// (edges), cylinder:RADIUS,LENGTH, capsule:RADIUS,LENGTH (without its ends), both along z,
@@ -52,7 +54,7 @@ struct Source {
 
 impl Source {
     /// What is asked about, as a scene; `density` replaces the water's.
-    fn scene(&self, density: Option<f64>) -> Result<Scene> {
+    fn scene(&self, density: Option<f64>, robot: &RobotArguments) -> Result<Scene> {
         let alone = |shape: Shape, name: &str| {
             let mut scene = Scene::new(Fluid::fresh_water());
             let density = scene.fluid.density;
@@ -68,13 +70,13 @@ impl Source {
             let extension = path.extension().unwrap_or_default().to_string_lossy();
             let stem = path.file_stem().unwrap_or_default().to_string_lossy();
             match extension.to_ascii_lowercase().as_str() {
-                "toml" => Scene::load(path)?,
+                "toml" | "urdf" => robot.scene(path)?,
                 "obj" | "stl" | "ply" => alone(Shape::mesh(path), &stem),
                 _ => {
                     return Err(Error::input(
                         path.display().to_string(),
                         format!("a name that ends in {extension:?}"),
-                        "give a scene (.toml), a mesh (.obj, .stl, .ply), or a shape by --shape, \
+                        "give a scene (.toml), a robot (.urdf), a mesh (.obj, .stl, .ply), or a shape by --shape, \
                      e.g. --shape sphere:0.5",
                     ));
                 }
@@ -119,7 +121,9 @@ pub(super) struct AddedMassReport {
 }
 
 pub(super) fn main(arguments: &Arguments, output: Output) -> Result<Exit> {
-    let scene = arguments.source.scene(arguments.density)?;
+    let scene = arguments
+        .source
+        .scene(arguments.density, &arguments.robot)?;
     if let Some(format) = arguments.format {
         return written(&scene, arguments, format);
     }

@@ -1,8 +1,9 @@
 //! One body: shape, mass, joint, drag.
 
-use nalgebra::{Matrix3, Matrix6};
+use nalgebra::Matrix6;
 
 use super::{bounded, finite, limits, list, mimic, passive, place, servo};
+use crate::geometry::impossible_inertia;
 use crate::scene::{Body, Carriers, Motion, Scene, Shape};
 use crate::{Error, Result};
 
@@ -148,27 +149,6 @@ fn check_mass(body: &Body, is_static: bool) -> Result<()> {
         }
         _ => Ok(()),
     }
-}
-
-/// Why no distribution of mass has this inertia about its centre of mass (xx, yy, zz, xy, xz, yz, kg m²); `slack` is what may be missing, of the largest principal
-/// moment. `None` where one has.
-pub(crate) fn impossible_inertia(i: &[f64; 6], slack: f64) -> Option<String> {
-    let mut moments =
-        Matrix3::new(i[0], i[3], i[4], i[3], i[1], i[5], i[4], i[5], i[2]).symmetric_eigenvalues();
-    moments.as_mut_slice().sort_by(f64::total_cmp);
-    let slack = slack * moments.amax();
-    let principal = format!("principal moments {:?} kg m²", moments.as_slice());
-    if moments[0] < -slack {
-        return Some(format!(
-            "an inertia has no negative principal moment; this one has the {principal}"
-        ));
-    }
-    (moments[0] + moments[1] < moments[2] - slack).then(|| {
-        format!(
-            "no distribution of mass has a principal moment above the sum of the other two; \
-             this one has the {principal}. Moments are taken about the centre of mass"
-        )
-    })
 }
 
 /// Symmetric positive semi-definite, with principal moments that a mass distribution can have.

@@ -54,20 +54,29 @@ pub(super) fn prescribed(body: &Body) -> Option<(&'static str, &'static str)> {
     })
 }
 
-/// A joint must start within its limits; `given` is its coordinate, number `first` of all, if the scene says.
-pub(super) fn check_start(body: &Body, first: usize, given: Option<f64>) -> Result<()> {
-    let (Some([lower, upper]), q) = (body.limits, given.unwrap_or(0.0)) else {
+/// A joint must start within its limits; `given` is its coordinate, number `first` of all, if the scene says, `own` what the body says.
+pub(super) fn check_start(
+    body: &Body,
+    first: usize,
+    given: Option<f64>,
+    own: Option<f64>,
+) -> Result<()> {
+    let (Some([lower, upper]), q) = (body.limits, given.or(own).unwrap_or(0.0)) else {
         return Ok(());
     };
     if (lower..=upper).contains(&q) {
         return Ok(());
     }
-    let start = match given {
+    let start = match given.or(own) {
         Some(_) => "",
         None => " (no initial.q is given)",
     };
+    let field = match own {
+        Some(_) => "start".into(),
+        None => format!("initial.q[{first}]"),
+    };
     Err(Error::input(
-        place(body, &format!("initial.q[{first}]")),
+        place(body, &field),
         format!("{q}{start}"),
         format!("the joint must start within its limits, from {lower} to {upper}"),
     ))

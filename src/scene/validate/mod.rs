@@ -13,8 +13,6 @@ mod passive;
 mod servo;
 mod start;
 
-pub(crate) use body::impossible_inertia;
-
 use std::collections::HashMap;
 
 use super::file::nearest;
@@ -26,6 +24,14 @@ impl Scene {
     /// walls, the start, and the controller.
     pub fn validate(&self) -> Result<()> {
         self.check_world()?;
+        #[cfg(feature = "urdf")]
+        if let Some(robot) = self.robots.first() {
+            return Err(Error::input(
+                "robots",
+                robot.urdf.display(),
+                "only files have robots that aren't bodies yet: add it by `add_robot`",
+            ));
+        }
         self.check_names()?;
         self.check_tree()?;
         let carriers = self.carriers();

@@ -20,9 +20,12 @@ pub(super) fn check(scene: &Scene) -> Result<()> {
     let (mut nq, mut nv) = (0, 0);
     for body in &scene.bodies {
         let (dq, dv) = (body.coordinates(), body.velocities());
-        limits::check_start(body, nq, initial.q.get(nq).copied())?;
+        check_own(body)?;
+        let given = initial.q.get(nq).copied();
+        let own = body.start.first().copied().filter(|_| initial.q.is_empty());
+        limits::check_start(body, nq, given, own)?;
         if !initial.q.is_empty() {
-            check_quaternion(body, nq, &initial.q[nq..nq + dq])?;
+            check_quaternion(body, "initial.q", nq, &initial.q[nq..nq + dq])?;
             check_driven(body, nq, "q", &initial.q[nq..nq + dq], |m| m.value(0.0))?;
         }
         for (field, values) in [("v", &initial.v), ("momentum", &initial.momentum)] {
@@ -37,6 +40,34 @@ pub(super) fn check(scene: &Scene) -> Result<()> {
         nv += dv;
     }
     Ok(())
+}
+
+/// Where the body's joint starts by itself.
+fn check_own(body: &Body) -> Result<()> {
+    if body.start.is_empty() {
+        return Ok(());
+    }
+    let place = place(body, "start");
+    finite(&place, &body.start)?;
+    let needed = body.coordinates();
+    if body.start.len() != needed {
+        return Err(Error::input(
+            place,
+            format!("{} numbers", body.start.len()),
+            format!(
+                "a {} joint needs {needed}, or none for its origin",
+                body.joint.kind()
+            ),
+        ));
+    }
+    if body.motion.is_some() {
+        return Err(Error::input(
+            place,
+            format!("{:?}", body.start),
+            "the joint is driven, and starts where its `motion` says: take one of the two away",
+        ));
+    }
+    check_quaternion(body, "start", 0, &body.start)
 }
 
 fn check_length(
@@ -70,7 +101,7 @@ fn check_length(
     ))
 }
 
-fn check_quaternion(body: &Body, first: usize, q: &[f64]) -> Result<()> {
+fn check_quaternion(body: &Body, field: &str, first: usize, q: &[f64]) -> Result<()> {
     let Some(w) = body.joint.model().quaternion_at() else {
         return Ok(());
     };
@@ -87,7 +118,7 @@ fn check_quaternion(body: &Body, first: usize, q: &[f64]) -> Result<()> {
         format!("give a unit quaternion (w, x, y, z); of the same direction: {unit:?}")
     };
     Err(Error::input(
-        place(body, &format!("initial.q[{at}..{}]", at + 4)),
+        place(body, &format!("{field}[{at}..{}]", at + 4)),
         format!("{quaternion:?} of length {norm}"),
         remedy,
     ))

@@ -1,7 +1,9 @@
-//! Mesh files: OBJ, STL (text and binary) and PLY (text and binary), told apart by extension.
+//! Mesh files: OBJ, STL (text and binary), PLY (text and binary) and, with the feature `urdf`, DAE (COLLADA), told apart by extension.
 //!
 //! Whatever is in the file, the answer is a mesh or an error with the path, never a panic.
 
+#[cfg(feature = "urdf")]
+mod dae;
 mod hull;
 mod obj;
 mod ply;
@@ -83,8 +85,13 @@ pub fn read_unchecked(path: &Path, scale: f64) -> Result<FileMesh> {
         "obj" => obj::parse,
         "stl" => stl::parse,
         "ply" => ply::parse,
+        #[cfg(feature = "urdf")]
+        "dae" => dae::parse,
         _ => {
-            let known = "known are .obj, .stl and .ply";
+            let known = match cfg!(feature = "urdf") {
+                true => "known are .obj, .stl, .ply and .dae",
+                false => "known are .obj, .stl and .ply",
+            };
             return Err(wrong(format!("unknown extension {extension:?}; {known}")));
         }
     };
@@ -104,7 +111,7 @@ pub fn read_unchecked(path: &Path, scale: f64) -> Result<FileMesh> {
         let message = "no faces found; export the surface as polygons or triangles";
         return Err(wrong(message.into()));
     }
-    let mut mesh = repair::mend(raw, extension == "stl");
+    let mut mesh = repair::mend(raw, extension == "stl" || extension == "dae");
     for v in &mut mesh.vertices {
         *v *= scale;
     }

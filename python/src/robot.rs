@@ -1,0 +1,133 @@
+//! Robots in URDF files.
+
+use crate::body::Drag;
+use crate::error::{OrRaise, input};
+use hydrograd::Fluid;
+use hydrograd::scene::{Added, RobotReport};
+use pyo3::prelude::*;
+use pyo3::types::PyDict;
+use std::collections::BTreeMap;
+use std::path::PathBuf;
+
+/// Choices of a robot that don't fit.
+fn not_a_choice(why: impl std::fmt::Display) -> PyErr {
+    input(
+        "robot",
+        why,
+        "must be choices that a scene file's [[robot]] has, with such values",
+    )
+}
+
+/// The choices as a scene file has them.
+fn choices(py: Python<'_>, given: Option<&Bound<'_, PyDict>>) -> PyResult<hydrograd::scene::Robot> {
+    let plain = PyDict::new(py);
+    let mut drag = None;
+    if let Some(given) = given {
+        for (key, value) in given {
+            if value.is_none() {
+                continue;
+            }
+            match value.cast::<Drag>() {
+                Ok(found) => drag = Some(found.get().0),
+                Err(_) => plain.set_item(key, value)?,
+            }
+        }
+    }
+    // Arrays as lists, paths as text.
+    let code = c"lambda x: x.tolist() if hasattr(x, 'tolist') else str(x)";
+    let options = PyDict::new(py);
+    options.set_item("default", py.eval(code, None, None)?)?;
+    let json = py
+        .import("json")?
+        .call_method("dumps", (plain,), Some(&options));
+    let text: String = json.map_err(not_a_choice)?.extract()?;
+    let mut robot: hydrograd::scene::Robot = serde_json::from_str(&text).map_err(not_a_choice)?;
+    robot.drag = drag.or(robot.drag);
+    Ok(robot)
+}
+
+fn to_dict<'py>(py: Python<'py>, report: &RobotReport) -> PyResult<Bound<'py, PyAny>> {
+    let text = serde_json::to_string(report).map_err(not_a_choice)?;
+    py.import("json")?.call_method1("loads", (text,))
+}
+
+/// A robot that was added to a scene: its bodies and joints by name, as the numbers of their bodies, and what it came to.
+#[pyclass(frozen, module = "hydrograd")]
+pub struct Robot {
+    #[pyo3(get)]
+    bodies: BTreeMap<String, usize>,
+    #[pyo3(get)]
+    joints: BTreeMap<String, usize>,
+    report: RobotReport,
+}
+
+#[pymethods]
+impl Robot {
+    /// What it came to, as `inspect_robot` gives it.
+    #[getter]
+    fn report<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyAny>> {
+        to_dict(py, &self.report)
+    }
+
+    fn __repr__(&self) -> String {
+        let names: Vec<&String> = self.bodies.keys().collect();
+        format!("Robot({:?}, bodies={names:?})", self.report.robot)
+    }
+
+    fn __str__(&self) -> String {
+        self.report.to_string()
+    }
+}
+
+impl Robot {
+    fn new(scene: &hydrograd::Scene, added: Added) -> Self {
+        let named = |id: &hydrograd::BodyId| (scene.bodies[id.0].name.clone(), id.0);
+        Self {
+            bodies: added.bodies.iter().map(named).collect(),
+            joints: added.joints.into_iter().map(|(j, id)| (j, id.0)).collect(),
+            report: added.report,
+        }
+    }
+}
+
+/// `Scene.from_urdf`.
+pub fn scene_of(
+    py: Python<'_>,
+    path: PathBuf,
+    given: Option<&Bound<'_, PyDict>>,
+) -> PyResult<hydrograd::Scene> {
+    let robot = choices(py, given)?;
+    py.detach(|| hydrograd::Scene::from_urdf(path, &robot))
+        .or_raise()
+}
+
+/// `Scene.add_robot`.
+pub fn add(
+    py: Python<'_>,
+    scene: &mut hydrograd::Scene,
+    path: PathBuf,
+    given: Option<&Bound<'_, PyDict>>,
+) -> PyResult<Robot> {
+    let robot = choices(py, given)?;
+    let added = py.detach(|| scene.add_robot(path, &robot)).or_raise()?;
+    Ok(Robot::new(scene, added))
+}
+
+/// What a robot in a URDF file comes to in water of `density` (kg/m³): tree, masses, weight against buoyancy, meshes that were replaced, and what of the file wasn't
+/// used. Choices are those of `Scene.add_robot`.
+#[pyfunction]
+#[pyo3(signature = (path, *, density=998.0, **choices))]
+pub fn inspect_robot<'py>(
+    py: Python<'py>,
+    path: PathBuf,
+    density: f64,
+    choices: Option<&Bound<'py, PyDict>>,
+) -> PyResult<Bound<'py, PyAny>> {
+    let robot = self::choices(py, choices)?;
+    let fluid = Fluid {
+        density,
+        ..Fluid::fresh_water()
+    };
+    let report = py.detach(|| robot.inspect(path, &fluid)).or_raise()?;
+    to_dict(py, &report)
+}

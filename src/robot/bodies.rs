@@ -1,0 +1,480 @@
+//! From a file to bodies.
+
+use super::followers::follow;
+use super::inertia::{Inertial, of_group, of_link};
+use super::joints::{Moves, moves};
+use super::options::{Base, Followers, Options};
+use super::overlap::{declare, untangle};
+use super::pieces::Meshes;
+use super::read::{File, read};
+use super::report::{BodyReport, FoldedReport, Report};
+use super::surface::{Surface, Wet, pose};
+use super::tree::{Group, groups, joint_place, link_place};
+use crate::geometry::MassProperties;
+use crate::multibody::Joint;
+use crate::shape::Shape;
+use crate::{Error, Result};
+use hydrograd_adjoint::lie::{Pose, Vec3};
+use nalgebra::Isometry3;
+use std::path::Path;
+
+/// A moment of inertia, in that of a point mass at the edge of what the link is, under which it is implausible.
+const THIN: f64 = 1e-4;
+
+/// A body of a robot, in the frame of its first link.
+#[derive(Clone, Debug)]
+pub(crate) struct RobotBody {
+    pub name: String,
+    /// Number of the body that carries it.
+    pub parent: Option<usize>,
+    /// The joint's frame in the parent's.
+    pub placement: Isometry3<f64>,
+    /// None of the root.
+    pub moves: Option<Moves>,
+    /// kg; none where a density is chosen.
+    pub mass: Option<f64>,
+    /// kg/m³, where it is chosen.
+    pub density: Option<f64>,
+    /// m.
+    pub center: [f64; 3],
+    /// xx, yy, zz, xy, xz, yz, kg m².
+    pub inertia: [f64; 6],
+    /// The surface and its pose.
+    pub shape: Option<(Shape, Isometry3<f64>)>,
+    /// Convex pieces for contact.
+    pub pieces: Vec<(Shape, Isometry3<f64>)>,
+    pub overlaps_parent: bool,
+}
+
+/// A link that folded into a body.
+#[derive(Clone, Debug)]
+pub(crate) struct Folded {
+    pub name: String,
+    /// Number of the body.
+    pub body: usize,
+    pub at: Isometry3<f64>,
+}
+
+/// A robot.
+#[derive(Clone, Debug)]
+pub(crate) struct Imported {
+    pub base: Base,
+    /// Parents before children.
+    pub bodies: Vec<RobotBody>,
+    pub folded: Vec<Folded>,
+    pub report: Report,
+}
+
+/// Reads a robot.
+pub(crate) fn import(path: &Path, options: &Options) -> Result<Imported> {
+    let file = read(path)?;
+    let mut report = Report {
+        robot: file.robot.name.clone(),
+        file: path.display().to_string(),
+        unused: file.unused.clone(),
+        ..Report::default()
+    };
+    check_names(&file, options)?;
+    let groups = groups(&file, options)?;
+    let mut all = Vec::with_capacity(groups.len());
+    for group in &groups {
+        let motion = match group.joint {
+            Some(joint) => Some(moves(&file, joint, options, &mut report)?),
+            None => None,
+        };
+        all.push(motion);
+    }
+    if options.followers == Followers::Follow {
+        let joints: Vec<_> = groups.iter().map(|g| g.joint).collect();
+        follow(&file, &joints, &mut all, &mut report)?;
+    }
+    let mut own = Vec::with_capacity(file.robot.links.len());
+    for link in 0..file.robot.links.len() {
+        let (inertial, mended) = of_link(&file, link)?;
+        own.push(chosen_mass(&file, link, inertial, options)?);
+        if let Some(mended) = mended {
+            report.note(mended);
+        }
+    }
+    let inertials: Vec<Inertial> = (groups.iter())
+        .map(|g| of_group(g, |link| own[link]))
+        .collect();
+    let base = base(&file, &groups, &inertials, options, &mut report);
+    let bodies = Bodies {
+        file: &file,
+        options,
+        groups: &groups,
+        moves: &all,
+        inertials: &inertials,
+        fixed: base == Base::Fixed,
+    };
+    bodies.check_massless()?;
+    let names: Vec<String> = (groups.iter())
+        .map(|g| file.robot.links[g.top()].name.clone())
+        .collect();
+    let parents: Vec<Option<usize>> = groups.iter().map(|g| g.parent).collect();
+    let poses = bodies.start();
+
+    let mut meshes = Meshes::new(&file, options);
+    let mut wets = Vec::with_capacity(groups.len());
+    for (g, group) in groups.iter().enumerate() {
+        let wet = Wet::of_group(&mut meshes, group, &names[g], options, &mut report)?;
+        wets.push(bodies.dry_if_massless(g, wet, &mut report));
+    }
+    untangle(&mut wets, &names, &parents, &poses, &mut report)?;
+    for wet in &mut wets {
+        wet.finish(options);
+    }
+    let overlaps = declare(&mut wets, &names, &parents, &poses, &mut report)?;
+    bodies.tell_overlaps(&overlaps, &names, &mut report);
+    let made = bodies.made(&wets, &overlaps)?;
+    bodies.tell(&made, &wets, &poses, base, &mut report)?;
+    let folded = (groups.iter().enumerate())
+        .flat_map(|(body, group)| group.parts[1..].iter().map(move |part| (body, part)));
+    let folded: Vec<Folded> = folded
+        .map(|(body, part)| Folded {
+            name: file.robot.links[part.link].name.clone(),
+            body,
+            at: part.at,
+        })
+        .collect();
+    let site = |f: &Folded| FoldedReport {
+        link: f.name.clone(),
+        body: names[f.body].clone(),
+        position: f.at.translation.vector.into(),
+        rotation: f.at.rotation.scaled_axis().into(),
+    };
+    report.sites = folded.iter().map(site).collect();
+    Ok(Imported {
+        base,
+        bodies: made,
+        folded,
+        report,
+    })
+}
+
+/// Choices by name must be of links and joints that are there.
+fn check_names(file: &File, options: &Options) -> Result<()> {
+    let links: Vec<&str> = file.robot.links.iter().map(|l| l.name.as_str()).collect();
+    let joints: Vec<&str> = file.robot.joints.iter().map(|j| j.name.as_str()).collect();
+    let all = [
+        ("links", &links, options.links.keys().collect::<Vec<_>>()),
+        ("start", &joints, options.start.keys().collect()),
+    ];
+    for (key, known, given) in all {
+        if let Some(bad) = given.iter().find(|name| !known.contains(&name.as_str())) {
+            return Err(Error::input(
+                format!("{}: {key}", file.path.display()),
+                format!("{bad:?}"),
+                format!("the file has no such name; it has {known:?}"),
+            ));
+        }
+    }
+    Ok(())
+}
+
+/// A link's own inertia with the mass that is chosen for it: the inertia grows with it.
+fn chosen_mass(
+    file: &File,
+    link: usize,
+    inertial: Inertial,
+    options: &Options,
+) -> Result<Inertial> {
+    let name = &file.robot.links[link].name;
+    let Some(mass) = options.links.get(name).and_then(|choice| choice.mass) else {
+        return Ok(inertial);
+    };
+    if !(mass >= 0.0 && mass.is_finite()) {
+        let place = format!("{}: mass, as chosen", link_place(file, link));
+        return Err(Error::input(place, mass, "give zero or more, in kg"));
+    }
+    let factor = match inertial.mass > 0.0 {
+        true => mass / inertial.mass,
+        false => 1.0,
+    };
+    Ok(Inertial {
+        mass,
+        inertia: inertial.inertia * factor,
+        ..inertial
+    })
+}
+
+/// Whether the root hangs on the world: as chosen, else if it is called so or has no mass.
+fn base(
+    file: &File,
+    groups: &[Group],
+    inertials: &[Inertial],
+    options: &Options,
+    report: &mut Report,
+) -> Base {
+    if let Some(chosen) = options.base {
+        return chosen;
+    }
+    let root = &file.robot.links[groups[0].top()].name;
+    let why = match (root.as_str(), inertials[0].is_none()) {
+        ("world", _) => "its root is called so",
+        (_, true) => "its root has no mass",
+        _ => return Base::Free,
+    };
+    report.note(format!(
+        "the base is fixed to the world, since {why}; `base` (--base) chooses"
+    ));
+    Base::Fixed
+}
+
+/// The bodies of a file, as far as they are known.
+struct Bodies<'b> {
+    file: &'b File,
+    options: &'b Options,
+    groups: &'b [Group],
+    moves: &'b [Option<Moves>],
+    inertials: &'b [Inertial],
+    fixed: bool,
+}
+
+impl Bodies<'_> {
+    fn name(&self, g: usize) -> &str {
+        &self.file.robot.links[self.groups[g].top()].name
+    }
+
+    fn joint(&self, g: usize) -> Joint {
+        match (&self.moves[g], self.fixed) {
+            (Some(moves), _) => moves.joint,
+            (None, true) => Joint::Fixed,
+            (None, false) => Joint::Free,
+        }
+    }
+
+    fn density(&self, g: usize) -> Option<f64> {
+        self.options.links.get(self.name(g))?.density
+    }
+
+    /// Whether a joint moves it that it alone doesn't give any inertia to.
+    fn is_massless(&self, g: usize) -> bool {
+        self.joint(g).velocities() > 0 && self.inertials[g].is_none() && self.density(g).is_none()
+    }
+
+    /// Refuses what moves and has no inertia.
+    fn check_massless(&self) -> Result<()> {
+        let refused = |g: usize, what: String, remedy: &str| {
+            let place = match self.groups[g].joint {
+                Some(joint) => joint_place(self.file, joint),
+                None => link_place(self.file, self.groups[g].top()),
+            };
+            Err(Error::input(place, what, remedy))
+        };
+        let remedy = "give it a mass and an inertia (<inertial>, or `density` for the link), or make its joint fixed";
+        for g in 0..self.groups.len() {
+            if self.is_massless(g) {
+                let what = format!("moves link {:?} without mass", self.name(g));
+                let carried = |b: usize| {
+                    let mut up = std::iter::successors(Some(b), |b| self.groups[*b].parent);
+                    b != g && up.any(|b| b == g)
+                };
+                let mut above = (0..self.groups.len()).filter(|b| carried(*b));
+                if !above.any(|b| !self.inertials[b].is_none() || self.density(b).is_some()) {
+                    return refused(g, what, remedy);
+                }
+                if self.groups[g].parent.is_some_and(|p| self.is_massless(p)) {
+                    let parent = self.groups[g].parent.map_or("", |p| self.name(p));
+                    let chain = format!("{what}, on link {parent:?} without mass");
+                    return refused(g, chain, remedy);
+                }
+            }
+            if self.is_point(g) {
+                let what = format!(
+                    "turns link {:?}, whose inertia about it is zero",
+                    self.name(g)
+                );
+                return refused(g, what, remedy);
+            }
+        }
+        Ok(())
+    }
+
+    /// Whether it has mass, and no inertia about an axis that its joint turns it about, nor anything on it.
+    fn is_point(&self, g: usize) -> bool {
+        let own = &self.inertials[g];
+        if own.mass == 0.0 || own.inertia.norm() > 0.0 || self.density(g).is_some() {
+            return false;
+        }
+        if self.groups.iter().any(|other| other.parent == Some(g)) {
+            return false;
+        }
+        match self.joint(g) {
+            Joint::Fixed | Joint::Prismatic { .. } => false,
+            Joint::Revolute { axis } => {
+                let axis = Vec3::from(axis);
+                axis.cross(&own.center).norm() <= 1e-12 * axis.norm() * own.center.norm()
+            }
+            _ => true,
+        }
+    }
+
+    /// The water sees no body that moves without mass.
+    fn dry_if_massless(&self, g: usize, wet: Wet, report: &mut Report) -> Wet {
+        if wet.surface.is_none() || !self.is_massless(g) {
+            return wet;
+        }
+        report.note(format!(
+            "body {:?} is dry: it moves and has no mass; give it one to put it in the water",
+            self.name(g)
+        ));
+        Wet::dry("it has no mass")
+    }
+
+    /// Where all bodies are at the start, in the root's frame.
+    fn start(&self) -> Vec<Pose> {
+        let mut poses: Vec<Pose> = Vec::with_capacity(self.groups.len());
+        for (g, group) in self.groups.iter().enumerate() {
+            let Some(parent) = group.parent else {
+                poses.push(Pose::identity());
+                continue;
+            };
+            let model = self.joint(g).model();
+            let mut q = model.origin();
+            if let (Some(at), [q]) = (self.moves[g].as_ref().and_then(|m| m.start), &mut q[..]) {
+                *q = at;
+            }
+            let placed = poses[parent].compose(&pose(&group.placement));
+            poses.push(placed.compose(&model.pose(&q)));
+        }
+        poses
+    }
+
+    fn tell_overlaps(&self, overlaps: &[bool], names: &[String], report: &mut Report) {
+        let declared = (0..overlaps.len()).filter(|b| overlaps[*b]);
+        let declared: Vec<String> = declared.map(|b| format!("{:?}", names[b])).collect();
+        if !declared.is_empty() {
+            report.note(format!(
+                "these touch or overlap the body that carries them, or nearly so, and don't feel it through the water (`overlaps_parent`): {}",
+                declared.join(", ")
+            ));
+        }
+    }
+
+    fn made(&self, wets: &[Wet], overlaps: &[bool]) -> Result<Vec<RobotBody>> {
+        let mut made = Vec::with_capacity(self.groups.len());
+        for (g, (group, wet)) in self.groups.iter().zip(wets).enumerate() {
+            let density = self.density(g);
+            if let Some(density) = density {
+                let place = format!("{}: density, as chosen", link_place(self.file, group.top()));
+                if wet.surface.is_none() {
+                    let remedy = "the link is dry, and has no volume that would make it a mass";
+                    return Err(Error::input(place, density, remedy));
+                }
+                if !(density > 0.0 && density.is_finite()) {
+                    return Err(Error::input(
+                        place,
+                        density,
+                        "give a density above zero, kg/m³",
+                    ));
+                }
+            }
+            made.push(RobotBody {
+                name: self.name(g).to_owned(),
+                parent: group.parent,
+                placement: group.placement,
+                moves: self.moves[g].clone(),
+                mass: density.is_none().then_some(self.inertials[g].mass),
+                density,
+                center: self.inertials[g].center.into(),
+                inertia: self.inertials[g].six(),
+                shape: wet.surface.as_ref().map(Surface::shape),
+                pieces: wet.pieces.iter().map(Surface::shape).collect(),
+                overlaps_parent: overlaps[g],
+            });
+        }
+        Ok(made)
+    }
+
+    /// Fills the report.
+    fn tell(
+        &self,
+        made: &[RobotBody],
+        wets: &[Wet],
+        poses: &[Pose],
+        base: Base,
+        report: &mut Report,
+    ) -> Result<()> {
+        report.base = <&str>::from(base).into();
+        let (mut mass, mut volume) = (0.0, 0.0);
+        let (mut of_mass, mut of_volume) = (Vec3::zeros(), Vec3::zeros());
+        for (g, (body, wet)) in made.iter().zip(wets).enumerate() {
+            let seen = wet.surface.as_ref().map(Surface::properties).transpose()?;
+            let (own, center) = match (body.density, &seen) {
+                (Some(density), Some(seen)) => (density * seen.volume, seen.centroid),
+                _ => (self.inertials[g].mass, self.inertials[g].center),
+            };
+            mass += own;
+            of_mass += own * poses[g].apply(&center);
+            if let Some(seen) = &seen {
+                volume += seen.volume;
+                of_volume += seen.volume * poses[g].apply(&seen.centroid);
+                report.implausible.extend(self.implausible(g, wet, seen)?);
+            }
+            let links = self.groups[g].parts.iter();
+            report.bodies.push(BodyReport {
+                body: body.name.clone(),
+                parent: body.parent.map(|p| self.name(p).to_owned()),
+                joint: body.moves.as_ref().map(|m| m.name.clone()),
+                kind: self.joint(g).kind().into(),
+                links: links
+                    .map(|part| self.file.robot.links[part.link].name.clone())
+                    .collect(),
+                mass: own,
+                volume: seen.as_ref().map_or(0.0, |s| s.volume),
+                weight: 0.0,
+                buoyancy: 0.0,
+                center_of_mass: center.into(),
+                center_of_buoyancy: seen.map(|s| s.centroid.into()),
+                shape: wet.said.clone(),
+                pieces: wet.pieces.len(),
+            });
+        }
+        if mass > 0.0 {
+            report.center_of_mass = (of_mass / mass).into();
+        }
+        report.center_of_buoyancy = (volume > 0.0).then(|| (of_volume / volume).into());
+        Ok(())
+    }
+
+    /// What of a body's inertia fits nothing of its size.
+    fn implausible(&self, g: usize, wet: &Wet, seen: &MassProperties) -> Result<Option<String>> {
+        let own = &self.inertials[g];
+        let Some(surface) = wet
+            .surface
+            .as_ref()
+            .filter(|_| own.mass > 0.0 && self.density(g).is_none())
+        else {
+            return Ok(None);
+        };
+        let mesh = surface.mesh()?;
+        let vertices = mesh.vertices().iter();
+        let far = vertices.fold(0.0, |far: f64, x| far.max((x - own.center).norm()));
+        let [low, high] = mesh.bounds();
+        let outside = (0..3).any(|k| own.center[k] < low[k] || own.center[k] > high[k]);
+        let most = own.mass * far * far;
+        let [a, b, c] = own.moments();
+        let name = self.name(g);
+        let said = if c > most {
+            Some(format!(
+                "its largest moment, {c:.3e} kg m², is more than if all its mass were at its farthest point ({most:.3e})"
+            ))
+        } else if a.min(b) < THIN * most {
+            Some(format!(
+                "its smallest moment, {a:.3e} kg m², is next to nothing for its size (at most {most:.3e})"
+            ))
+        } else if outside {
+            Some(format!(
+                "its centre of mass {:?} m is outside of its surface's bounds",
+                own.center.as_slice()
+            ))
+        } else {
+            None
+        };
+        let density = own.mass / seen.volume;
+        let density = format!("; its mean density is {density:.0} kg/m³");
+        Ok(said.map(|said| format!("body {name:?}: {said}{density}")))
+    }
+}

@@ -1,0 +1,124 @@
+//! Joints that follow others: by how much, and what their leaders have of their limits and losses.
+
+use super::joints::{Dynamics, INSIDE, Moves};
+use super::read::File;
+use super::report::Report;
+use super::tree::joint_place;
+use crate::{Error, Result};
+
+/// How a joint follows another.
+#[derive(Clone, Debug, PartialEq)]
+pub(crate) struct Led {
+    /// The other's name; it has a coordinate of its own.
+    pub joint: String,
+    /// Motion per motion of the other.
+    pub ratio: f64,
+    /// Coordinate where the other's is zero, m or rad.
+    pub offset: f64,
+}
+
+/// Of joint number `number`, whose circles have been refused: through all that it follows.
+fn led(file: &File, number: usize) -> Result<Option<Led>> {
+    let joints = &file.robot.joints;
+    let Some(first) = &joints[number].mimic else {
+        return Ok(None);
+    };
+    let (mut ratio, mut offset) = (1.0, 0.0);
+    let (mut mimic, mut leader) = (first, first.joint.as_str());
+    loop {
+        // q = m (m' q' + o') + o.
+        offset += ratio * mimic.offset.unwrap_or(0.0);
+        ratio *= mimic.multiplier.unwrap_or(1.0);
+        let next = joints.iter().find(|j| j.name == leader);
+        match next.and_then(|j| j.mimic.as_ref()) {
+            Some(more) => (mimic, leader) = (more, more.joint.as_str()),
+            None => break,
+        }
+    }
+    if !(ratio.is_finite() && offset.is_finite()) {
+        return Err(Error::input(
+            format!("{}: mimic", joint_place(file, number)),
+            format!("multiplier {ratio}, offset {offset}"),
+            "give finite numbers",
+        ));
+    }
+    let joint = leader.to_owned();
+    Ok(Some(Led {
+        joint,
+        ratio,
+        offset,
+    }))
+}
+
+/// Lets joints follow; `joints` has the number of each body's joint.
+pub(super) fn follow(
+    file: &File,
+    joints: &[Option<usize>],
+    all: &mut [Option<Moves>],
+    report: &mut Report,
+) -> Result<()> {
+    for (b, number) in joints.iter().enumerate() {
+        let Some(number) = *number else { continue };
+        let Some(led) = led(file, number)? else {
+            continue;
+        };
+        let leader = all.iter().position(|m| {
+            (m.as_ref()).is_some_and(|m| m.name == led.joint && m.joint.coordinates() == 1)
+        });
+        let own = all[b].as_ref().is_some_and(|m| m.joint.coordinates() == 1);
+        let Some(leader) = leader.filter(|_| own) else {
+            return Err(Error::input(
+                format!("{}: mimic", joint_place(file, number)),
+                format!("joint {:?}", led.joint),
+                "both joints must have one coordinate (revolute, continuous or prismatic): take <mimic> away",
+            ));
+        };
+        give(b, leader, led, all, report);
+    }
+    Ok(())
+}
+
+/// Gives the leader what its follower has of limits and losses.
+fn give(b: usize, leader: usize, led: Led, all: &mut [Option<Moves>], report: &mut Report) {
+    let Some(follower) = all[b].as_mut() else {
+        return;
+    };
+    let (limits, dynamics) = (follower.limits.take(), follower.dynamics);
+    follower.dynamics = Dynamics::default();
+    let (name, ratio, offset) = (follower.name.clone(), led.ratio, led.offset);
+    report.note(format!(
+        "joint {name:?} follows {:?}: {ratio} times its coordinate and {offset}; its limits, damping and friction are the leader's",
+        led.joint
+    ));
+    follower.mimic = Some(led);
+    let Some(of) = all[leader].as_mut() else {
+        return;
+    };
+    of.dynamics.damping += ratio * ratio * dynamics.damping;
+    of.dynamics.friction += ratio.abs() * dynamics.friction;
+    if let Some([lower, upper]) = limits.filter(|_| ratio != 0.0) {
+        let ends = [(lower - offset) / ratio, (upper - offset) / ratio];
+        let own = of.limits.unwrap_or([f64::NEG_INFINITY, f64::INFINITY]);
+        let both = [
+            own[0].max(ends[0].min(ends[1])),
+            own[1].min(ends[0].max(ends[1])),
+        ];
+        match both[0] < both[1] {
+            true => of.limits = Some(both),
+            false => report.note(format!(
+                "the limits of joint {name:?} and of the one that it follows have nothing in common: its own aren't used"
+            )),
+        }
+    }
+    if let Some([lower, upper]) = of.limits {
+        let room = INSIDE * (upper - lower);
+        let q = of.start.unwrap_or(0.0);
+        if !(lower..=upper).contains(&q) {
+            of.start = Some(q.clamp(lower + room, upper - room));
+        }
+    }
+    let start = ratio * of.start.unwrap_or(0.0) + offset;
+    if let Some(follower) = all[b].as_mut() {
+        follower.start = (start != 0.0).then_some(start);
+    }
+}

@@ -1,0 +1,122 @@
+//! Convex meshes: hulls with few faces, halves of them, and the same surface with even faces.
+
+use crate::Result;
+use crate::geometry::TriMesh;
+use crate::shape::file::{FileMesh, Repairs};
+use hydrograd_adjoint::lie::Vec3;
+use std::collections::HashSet;
+
+/// Most faces of a hull that things are cut from and touched by.
+pub(super) const MOST_FACES: usize = 96;
+/// Of the extent, the grids that points are put on before their hull is sought: the first merges what is the same, the others are tried where the
+/// first has none, since points that are nearly in one plane may have no hull to rounding.
+const GRIDS: [f64; 3] = [1e-7, 1e-5, 1e-3];
+
+/// The convex hull of points, with at most [`MOST_FACES`] faces.
+///
+/// # Errors
+/// As [`FileMesh::hull`].
+pub(super) fn hull(name: &str, points: &[Vec3]) -> Result<TriMesh> {
+    let whole = whole_hull(name, points)?;
+    if whole.faces().len() <= MOST_FACES {
+        return Ok(whole);
+    }
+    // Vertices that are left move a little off the hull: the hull of these has no more faces than they.
+    match whole.coarsened(MOST_FACES) {
+        Ok(fewer) => whole_hull(name, fewer.vertices()),
+        Err(_) => Ok(whole),
+    }
+}
+
+fn whole_hull(name: &str, points: &[Vec3]) -> Result<TriMesh> {
+    let mut last = None;
+    for grid in GRIDS {
+        match on_grid(name, points, grid).hull() {
+            Ok(hull) => return Ok(hull),
+            Err(error) => last = Some(error),
+        }
+    }
+    match last {
+        Some(error) => Err(error),
+        None => on_grid(name, points, 0.0).hull(),
+    }
+}
+
+/// The points as faces, those of one place once.
+fn on_grid(name: &str, points: &[Vec3], grid: f64) -> FileMesh {
+    let finite = points.iter().filter(|x| x.iter().all(|x| x.is_finite()));
+    let start = [Vec3::repeat(f64::INFINITY), Vec3::repeat(f64::NEG_INFINITY)];
+    let [low, high] = finite.fold(start, |[low, high], x| [low.inf(x), high.sup(x)]);
+    let cell = (grid * (high - low).norm()).max(f64::MIN_POSITIVE);
+    let mut seen = HashSet::new();
+    let mut vertices: Vec<Vec3> = Vec::new();
+    for x in points {
+        let key = ((x - low) / cell).map(|x| x.round() as i64);
+        if seen.insert([key.x, key.y, key.z]) {
+            vertices.push(*x);
+        }
+    }
+    let n = vertices.len();
+    let face = |i: usize| [i, (i + 1).min(n - 1), (i + 2).min(n - 1)];
+    FileMesh {
+        name: name.to_owned(),
+        faces: (0..n).step_by(3).map(face).collect(),
+        vertices,
+        repairs: Repairs::default(),
+    }
+}
+
+/// The part of a convex mesh where `normal`·x ≤ `level`; none if nothing with a volume is left.
+pub(super) fn half(mesh: &TriMesh, normal: &Vec3, level: f64) -> Option<TriMesh> {
+    let height = |v: usize| normal.dot(&mesh.vertices()[v]) - level;
+    let all = mesh.vertices().iter();
+    let mut points: Vec<Vec3> = all.filter(|x| normal.dot(x) <= level).copied().collect();
+    if points.len() == mesh.vertices().len() {
+        return Some(mesh.clone());
+    }
+    for edge in mesh.edges() {
+        let [a, b] = edge.vertices;
+        let (from, to) = (height(a), height(b));
+        if (from < 0.0) != (to < 0.0) {
+            let (x, y) = (mesh.vertices()[a], mesh.vertices()[b]);
+            points.push(x + (y - x) * (from / (from - to)));
+        }
+    }
+    if points.len() < 4 {
+        return None;
+    }
+    hull(mesh.name(), &points).ok()
+}
+
+/// The same surface with about so many faces, as even as they get; the surface itself where that doesn't keep its volume.
+pub(super) fn even(mesh: &TriMesh, faces: usize) -> TriMesh {
+    let mut fine = mesh.clone();
+    // Four times as many let the collapse choose.
+    while fine.faces().len() < 4 * faces {
+        fine = fine.split();
+    }
+    let volume = mesh.mass_properties().volume;
+    let kept = |m: &TriMesh| (m.mass_properties().volume / volume - 1.0).abs() < 0.02;
+    match fine.coarsened(faces) {
+        Ok(even) if kept(&even) => even,
+        _ => mesh.clone(),
+    }
+}
+
+/// The direction from convex body `a` to `b` along which they lie least in each other, the level that `a` reaches along it, and how deep that is past `b`'s beginning: the
+/// normals of both bodies' faces are tried.
+pub(super) fn least_overlap(a: &TriMesh, b: &TriMesh) -> Option<(Vec3, f64, f64)> {
+    let reach = |m: &TriMesh, n: &Vec3| {
+        let heights = m.vertices().iter().map(|x| n.dot(x));
+        heights.fold(f64::NEG_INFINITY, f64::max)
+    };
+    let of_a = (0..a.faces().len()).map(|f| a.normal(f));
+    let of_b = (0..b.faces().len()).map(|f| -b.normal(f));
+    let overlaps = of_a.chain(of_b).map(|n| {
+        let level = reach(a, &n);
+        (n, level, level + reach(b, &-n))
+    });
+    overlaps
+        .filter(|(_, _, depth)| depth.is_finite())
+        .min_by(|x, y| x.2.total_cmp(&y.2))
+}

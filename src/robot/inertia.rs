@@ -1,0 +1,126 @@
+//! Masses of links, and of what moves together.
+
+use super::read::File;
+use super::tree::{Group, link_place, placed};
+use crate::geometry::impossible_inertia;
+use crate::{Error, Result};
+use nalgebra::{Isometry3, Matrix3, Vector3};
+
+/// Of the largest principal moment, what may be missing: files round to two digits and more.
+const SLACK: f64 = 0.02;
+
+/// Mass, centre of mass and inertia about it, in the axes of some frame.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(super) struct Inertial {
+    /// kg.
+    pub mass: f64,
+    /// m.
+    pub center: Vector3<f64>,
+    /// kg m², about the centre of mass.
+    pub inertia: Matrix3<f64>,
+}
+
+impl Inertial {
+    /// Whether it has neither mass nor inertia.
+    pub fn is_none(&self) -> bool {
+        self.mass == 0.0 && self.inertia == Matrix3::zeros()
+    }
+
+    fn moved(&self, at: &Isometry3<f64>) -> Self {
+        let turn = at.rotation.to_rotation_matrix();
+        Self {
+            mass: self.mass,
+            center: (at * nalgebra::Point3::from(self.center)).coords,
+            inertia: turn * self.inertia * turn.inverse(),
+        }
+    }
+
+    /// Inertia about another point than the centre of mass.
+    fn about(&self, point: &Vector3<f64>) -> Matrix3<f64> {
+        let d = self.center - point;
+        let outer = d * d.transpose();
+        self.inertia + self.mass * (Matrix3::identity() * d.norm_squared() - outer)
+    }
+
+    /// xx, yy, zz, xy, xz, yz.
+    pub fn six(&self) -> [f64; 6] {
+        let i = &self.inertia;
+        [
+            i[(0, 0)],
+            i[(1, 1)],
+            i[(2, 2)],
+            i[(0, 1)],
+            i[(0, 2)],
+            i[(1, 2)],
+        ]
+    }
+
+    /// The principal moments, smallest first.
+    pub fn moments(&self) -> [f64; 3] {
+        let mut moments = self.inertia.symmetric_eigenvalues();
+        moments.as_mut_slice().sort_by(f64::total_cmp);
+        moments.into()
+    }
+}
+
+/// Of a link, in its frame, and what was mended in it.
+pub(super) fn of_link(file: &File, link: usize) -> Result<(Inertial, Option<String>)> {
+    let given = &file.robot.links[link].inertial;
+    let mass = given.mass.value;
+    let i = &given.inertia;
+    let six = [i.ixx, i.iyy, i.izz, i.ixy, i.ixz, i.iyz];
+    if mass < 0.0 {
+        return Err(Error::input(
+            format!("{}: mass", link_place(file, link)),
+            mass,
+            "give zero (a massless link) or more, in kg",
+        ));
+    }
+    if let Some(why) = impossible_inertia(&six, SLACK) {
+        return Err(Error::input(
+            format!("{}: inertia", link_place(file, link)),
+            format!("{six:?} (xx, yy, zz, xy, xz, yz)"),
+            format!("{why}; correct it, or give the link a `density`, from which it follows"),
+        ));
+    }
+    let mut own = Inertial {
+        mass,
+        center: Vector3::zeros(),
+        inertia: Matrix3::new(
+            i.ixx, i.ixy, i.ixz, i.ixy, i.iyy, i.iyz, i.ixz, i.iyz, i.izz,
+        ),
+    };
+    let mended = impossible_inertia(&six, 1e-9).map(|_| {
+        // As much on all moments: then the largest is the sum of the others.
+        let [a, b, c] = own.moments();
+        let missing = (c - a - b).max(-a);
+        own.inertia += Matrix3::identity() * missing;
+        format!(
+            "link {:?}: its inertia has the principal moments {a:?}, {b:?}, {c:?} kg m², which no distribution of mass has, by what rounding may do: {missing:.3e} was added to each",
+            file.robot.links[link].name
+        )
+    });
+    Ok((own.moved(&placed(&given.origin)), mended))
+}
+
+/// Of all links of a group, in its frame; `of` gives each link's own.
+pub(super) fn of_group(group: &Group, of: impl Fn(usize) -> Inertial) -> Inertial {
+    let parts: Vec<Inertial> = (group.parts.iter())
+        .map(|part| of(part.link).moved(&part.at))
+        .collect();
+    // One link alone is as the file gives it, to the bit.
+    if let [one] = parts[..] {
+        return one;
+    }
+    let mass: f64 = parts.iter().map(|p| p.mass).sum();
+    let first: Vector3<f64> = parts.iter().map(|p| p.mass * p.center).sum();
+    let center = match mass > 0.0 {
+        true => first / mass,
+        false => Vector3::zeros(),
+    };
+    Inertial {
+        mass,
+        center,
+        inertia: parts.iter().map(|p| p.about(&center)).sum(),
+    }
+}

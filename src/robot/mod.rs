@@ -1,0 +1,25 @@
+//! Robots in URDF files as bodies: links at fixed joints fold into what carries them, geometry becomes closed surfaces, and what was chosen, replaced or not used is
+//! reported.
+//!
+//! What a scene makes of it is in `scene::robot`.
+
+mod bodies;
+mod followers;
+mod hull;
+mod inertia;
+mod joints;
+mod options;
+mod overlap;
+mod paths;
+mod pieces;
+mod read;
+mod report;
+mod surface;
+mod tree;
+
+pub(crate) use bodies::{Imported, RobotBody, import};
+pub(crate) use followers::Led;
+pub(crate) use joints::Dynamics;
+pub use options::{BadMeshes, Base, Followers, Wet};
+pub(crate) use options::{LinkChoice, Options};
+pub use report::{BodyReport, FoldedReport, MeshUse, Report, Unused};

@@ -1,0 +1,371 @@
+//! The file: its text as XML, what of it is read, and its typed form.
+//!
+//! `urdf-rs` gives the typed form. It passes over what it doesn't know and says neither where an error is nor what was left out, so the text
+//! is first looked through as XML: what can't be is refused there with line and name, and what isn't used is listed.
+
+use super::report::Unused;
+use crate::{Error, Result};
+use roxmltree::{Document, Node};
+use std::collections::BTreeMap;
+use std::io;
+use std::panic::{AssertUnwindSafe, catch_unwind};
+use std::path::{Path, PathBuf};
+
+/// Deepest nesting of elements; URDF needs six.
+const DEEPEST: usize = 32;
+/// Largest number that is taken: squares and products of such stay finite.
+const LARGEST: f64 = 1e30;
+
+/// A URDF file.
+pub(super) struct File {
+    pub path: PathBuf,
+    pub robot: urdf_rs::Robot,
+    /// What the typed form doesn't tell of each joint.
+    pub joints: Vec<JointText>,
+    /// What isn't read.
+    pub unused: Vec<Unused>,
+}
+
+/// What stands at a joint.
+pub(super) struct JointText {
+    pub line: u32,
+    /// Whether its `<limit>` gives a range.
+    pub has_range: bool,
+    /// Whether it has a `<limit>`.
+    pub has_limit: bool,
+}
+
+/// Reads a file.
+pub(super) fn read(path: &Path) -> Result<File> {
+    let failed = |source| Error::File {
+        path: path.to_owned(),
+        action: "read",
+        source,
+    };
+    if path.is_dir() {
+        let why = "this is a folder; give the URDF file itself, e.g. robot.urdf";
+        return Err(failed(io::Error::new(io::ErrorKind::IsADirectory, why)));
+    }
+    let bytes = std::fs::read(path).map_err(failed)?;
+    let text = String::from_utf8(bytes).map_err(|e| {
+        let good = e.utf8_error().valid_up_to();
+        let line = 1 + e.as_bytes()[..good].iter().filter(|b| **b == b'\n').count();
+        let message = format!(
+            "line {line}: byte {good} is not UTF-8 text; a URDF file is XML saved as UTF-8"
+        );
+        parse_error(path, message)
+    })?;
+    parse(path, &text)
+}
+
+fn parse_error(path: &Path, message: impl Into<String>) -> Error {
+    Error::Parse {
+        path: path.to_owned(),
+        message: message.into(),
+    }
+}
+
+fn parse(path: &Path, text: &str) -> Result<File> {
+    let document = Document::parse(text)
+        .map_err(|e| parse_error(path, format!("{e}; this is not XML yet")))?;
+    let mut look = Look {
+        path,
+        document: &document,
+        unused: BTreeMap::new(),
+    };
+    look.root()?;
+    let joints = elements(&document.root_element(), "joint").map(|joint| {
+        let limit = elements(&joint, "limit").next();
+        let gives = |name: &str| limit.is_some_and(|l| l.has_attribute(name));
+        JointText {
+            line: look.line(&joint),
+            has_range: gives("lower") || gives("upper"),
+            has_limit: limit.is_some(),
+        }
+    });
+    let joints = joints.collect();
+    // The parser of others may panic on what no exporter writes; here that is an error.
+    let robot = catch_unwind(AssertUnwindSafe(|| urdf_rs::read_from_string(text)));
+    let robot = match robot {
+        Ok(Ok(robot)) => robot,
+        Ok(Err(error)) => {
+            let why = error.to_string();
+            let why = why.split_whitespace().collect::<Vec<_>>().join(" ");
+            let message = format!("{why}; this is not a URDF file yet");
+            return Err(parse_error(path, message));
+        }
+        Err(_) => {
+            let message = "the contents can't be understood; export it again";
+            return Err(parse_error(path, message));
+        }
+    };
+    let unused = look.unused.into_iter();
+    Ok(File {
+        path: path.to_owned(),
+        robot,
+        joints,
+        unused: unused
+            .map(|(what, (count, line))| Unused { what, count, line })
+            .collect(),
+    })
+}
+
+fn elements<'a, 'd>(
+    node: &Node<'a, 'd>,
+    name: &'static str,
+) -> impl Iterator<Item = Node<'a, 'd>> + use<'a, 'd> {
+    node.children()
+        .filter(move |child| child.is_element() && child.tag_name().name() == name)
+}
+
+/// The attributes that are read of an element, by its parent's name and its own; none if the element isn't read.
+fn read_attributes(parent: &str, tag: &str) -> Option<&'static [&'static str]> {
+    Some(match (parent, tag) {
+        ("", "robot") => &["name", "version"],
+        ("robot", "link") => &["name"],
+        ("robot", "joint") => &["name", "type"],
+        ("link", "inertial" | "visual" | "collision") => &["name"],
+        ("inertial" | "visual" | "collision" | "joint", "origin") => &["xyz", "rpy", "quat_xyzw"],
+        ("inertial", "mass") => &["value"],
+        ("inertial", "inertia") => &["ixx", "ixy", "ixz", "iyy", "iyz", "izz"],
+        ("visual" | "collision", "geometry") => &[],
+        ("geometry", "box") => &["size"],
+        ("geometry", "sphere") => &["radius"],
+        ("geometry", "cylinder" | "capsule") => &["radius", "length"],
+        ("geometry", "mesh") => &["filename", "scale"],
+        ("joint", "parent" | "child") => &["link"],
+        ("joint", "axis") => &["xyz"],
+        ("joint", "limit") => &["lower", "upper"],
+        ("joint", "dynamics") => &["damping", "friction"],
+        ("joint", "mimic") => &["joint", "multiplier", "offset"],
+        _ => return None,
+    })
+}
+
+/// The attributes that an element must have.
+fn needed_attributes(tag: &str) -> &'static [&'static str] {
+    match tag {
+        "link" => &["name"],
+        "joint" => &["name", "type"],
+        "mass" => &["value"],
+        "inertia" => &["ixx", "ixy", "ixz", "iyy", "iyz", "izz"],
+        "box" => &["size"],
+        "sphere" => &["radius"],
+        "cylinder" | "capsule" => &["radius", "length"],
+        "mesh" => &["filename"],
+        "parent" | "child" => &["link"],
+        "axis" => &["xyz"],
+        "limit" => &["velocity"],
+        "mimic" => &["joint"],
+        _ => &[],
+    }
+}
+
+/// The elements of which an element must have one each.
+fn needed_elements(tag: &str) -> &'static [&'static str] {
+    match tag {
+        "inertial" => &["mass", "inertia"],
+        "visual" | "collision" => &["geometry"],
+        "joint" => &["parent", "child"],
+        _ => &[],
+    }
+}
+
+/// How many numbers an attribute has; none if it is a word.
+fn numbers(tag: &str, attribute: &str) -> Option<usize> {
+    match (tag, attribute) {
+        (_, "name" | "type" | "link" | "filename" | "joint" | "version") => None,
+        ("limit", "effort") => Some(1),
+        (_, "quat_xyzw") => Some(4),
+        (_, "xyz" | "rpy" | "size" | "scale") => Some(3),
+        _ => Some(1),
+    }
+}
+
+const JOINTS: [&str; 6] = [
+    "fixed",
+    "revolute",
+    "continuous",
+    "prismatic",
+    "planar",
+    "floating",
+];
+
+/// A walk through the file.
+struct Look<'a, 'd> {
+    path: &'a Path,
+    document: &'a Document<'d>,
+    /// What isn't read: how often it stands there, and where first.
+    unused: BTreeMap<String, (usize, u32)>,
+}
+
+impl Look<'_, '_> {
+    fn line(&self, node: &Node) -> u32 {
+        self.document.text_pos_at(node.range().start).row
+    }
+
+    /// The link or joint that an element is in, or is.
+    fn place(&self, node: &Node) -> String {
+        let line = self.line(node);
+        let named = node.ancestors().find(|a| {
+            a.is_element()
+                && matches!(a.tag_name().name(), "link" | "joint")
+                && a.parent_element()
+                    .is_some_and(|p| p.parent_element().is_none())
+        });
+        match named {
+            Some(of) => format!(
+                "line {line}: {} {:?}",
+                of.tag_name().name(),
+                of.attribute("name").unwrap_or("")
+            ),
+            None => format!("line {line}"),
+        }
+    }
+
+    fn wrong(&self, node: &Node, what: String) -> Error {
+        parse_error(self.path, format!("{}: {what}", self.place(node)))
+    }
+
+    fn root(&mut self) -> Result<()> {
+        let root = self.document.root_element();
+        let instead = match root.tag_name().name() {
+            "robot" => None,
+            "sdf" | "model" => Some("this is SDF, which isn't read: convert it to URDF"),
+            "mujoco" => Some("this is MJCF, which isn't read: convert it to URDF"),
+            _ => Some("give a URDF file, whose outermost element is <robot>"),
+        };
+        if let Some(instead) = instead {
+            let what = format!("<{}>: {instead}", root.tag_name().name());
+            return Err(self.wrong(&root, what));
+        }
+        let mut depth = vec![(root, 1)];
+        while let Some((node, level)) = depth.pop() {
+            if level > DEEPEST {
+                let what = format!("elements are nested {level} deep; URDF needs no more than 6");
+                return Err(self.wrong(&node, what));
+            }
+            let inner = node.children().filter(Node::is_element);
+            depth.extend(inner.map(|child| (child, level + 1)));
+        }
+        let macros = root.descendants().find(|node| {
+            let namespace = node.tag_name().namespace().unwrap_or_default();
+            namespace.contains("xacro") && node.is_element()
+        });
+        if let Some(node) = macros {
+            let name = node.tag_name().name();
+            let what = format!(
+                "<xacro:{name}>: macros must be expanded first: `xacro FILE.xacro > robot.urdf`"
+            );
+            return Err(self.wrong(&node, what));
+        }
+        self.element(root, "")?;
+        if elements(&root, "link").next().is_none() {
+            return Err(self.wrong(&root, "no <link>: a robot needs one or more".into()));
+        }
+        Ok(())
+    }
+
+    fn note(&mut self, what: String, node: &Node) {
+        let line = self.line(node);
+        self.unused.entry(what).or_insert((0, line)).0 += 1;
+    }
+
+    /// Checks an element and what is in it; the depth is known to be small.
+    fn element(&mut self, node: Node, parent: &str) -> Result<()> {
+        let tag = node.tag_name().name();
+        let read = match node.tag_name().namespace() {
+            Some(_) => None,
+            None => read_attributes(parent, tag),
+        };
+        let Some(attributes) = read else {
+            let what = match parent {
+                "geometry" => {
+                    let known = "known are box, cylinder, sphere, capsule and mesh";
+                    return Err(self.wrong(&node, format!("<{tag}> is no geometry; {known}")));
+                }
+                "robot" => format!("<{tag}>"),
+                _ => format!("<{tag}> of <{parent}>"),
+            };
+            self.note(what, &node);
+            return Ok(());
+        };
+        for name in needed_attributes(tag) {
+            if node.attribute(*name).is_none_or(|v| v.trim().is_empty()) {
+                return Err(self.wrong(&node, format!("<{tag}> needs the attribute {name}")));
+            }
+        }
+        for attribute in node.attributes() {
+            let name = attribute.name();
+            if attributes.contains(&name) || needed_attributes(tag).contains(&name) {
+                self.check_numbers(&node, name, attribute.value())?;
+            }
+            if !attributes.contains(&name) {
+                self.note(format!("{name} of <{tag}>"), &node);
+            }
+        }
+        self.children(&node)
+    }
+
+    fn children(&mut self, node: &Node) -> Result<()> {
+        let tag = node.tag_name().name();
+        for name in needed_elements(tag) {
+            if elements(node, name).next().is_none() {
+                return Err(self.wrong(node, format!("<{tag}> needs an element <{name}>")));
+            }
+        }
+        let once = |name: &str| match tag {
+            "robot" => false,
+            "link" => name == "inertial",
+            _ => true,
+        };
+        let inner: Vec<Node> = node.children().filter(Node::is_element).collect();
+        for (i, child) in inner.iter().enumerate() {
+            let name = child.tag_name().name();
+            let again = inner[..i].iter().any(|c| c.tag_name().name() == name);
+            let known = read_attributes(tag, name).is_some();
+            if (again && once(name) && known) || (tag == "geometry" && i > 0) {
+                let what = format!("<{name}> is one too many in <{tag}>; leave one");
+                return Err(self.wrong(child, what));
+            }
+        }
+        if tag == "geometry" && inner.is_empty() {
+            let what = "<geometry> is empty; give a box, cylinder, sphere, capsule or mesh";
+            return Err(self.wrong(node, what.into()));
+        }
+        if tag == "joint"
+            && let Some(kind) = node.attribute("type")
+            && !JOINTS.contains(&kind)
+        {
+            let what = format!("type {kind:?} is unknown; known are {}", JOINTS.join(", "));
+            return Err(self.wrong(node, what));
+        }
+        inner
+            .into_iter()
+            .try_for_each(|child| self.element(child, tag))
+    }
+
+    fn check_numbers(&self, node: &Node, name: &str, value: &str) -> Result<()> {
+        let tag = node.tag_name().name();
+        let Some(count) = numbers(tag, name) else {
+            return Ok(());
+        };
+        let found: Vec<Option<f64>> = (value.split_whitespace())
+            .map(|word| word.parse::<f64>().ok())
+            .collect();
+        // A limit at infinity is none.
+        let may = |x: &f64| x.abs() <= LARGEST || (tag == "limit" && x.is_infinite());
+        let right = found.len() == count && found.iter().all(|x| x.as_ref().is_some_and(may));
+        match right {
+            true => Ok(()),
+            false => {
+                let numbers = match count {
+                    1 => "one finite number".into(),
+                    _ => format!("{count} finite numbers between blanks"),
+                };
+                let what = format!("<{tag}>: {name} = {value:?} must be {numbers}");
+                Err(self.wrong(node, what))
+            }
+        }
+    }
+}

@@ -1,0 +1,248 @@
+//! What the water sees of a body, and what it touches with.
+
+use super::hull::{even, hull};
+use super::options::Options;
+use super::pieces::{Form, Meshes, Piece, moved};
+use super::report::Report;
+use super::tree::Group;
+use crate::Result;
+use crate::geometry::{MassProperties, Solid, TriMesh};
+use crate::shape::{Shape, build, solid};
+use hydrograd_adjoint::lie::{Pose, Vec3};
+use nalgebra::Isometry3;
+use std::path::Path;
+
+/// Faces of hulls and meshes for the water, unless chosen.
+pub(super) const FACES: usize = 320;
+
+/// A closed surface, in the body's frame.
+#[derive(Clone)]
+pub(super) enum Surface {
+    Formula { shape: Shape, at: Isometry3<f64> },
+    Mesh { mesh: TriMesh, convex: bool },
+}
+
+/// What a body is in water and for contact.
+pub(super) struct Wet {
+    /// None of a dry body.
+    pub surface: Option<Surface>,
+    /// Convex pieces for contact; none where the surface itself will do.
+    pub pieces: Vec<Surface>,
+    /// What the surface is, in words.
+    pub said: String,
+}
+
+pub(super) fn pose(at: &Isometry3<f64>) -> Pose {
+    Pose::new(
+        at.rotation.to_rotation_matrix().into_inner(),
+        at.translation.vector,
+    )
+}
+
+impl Surface {
+    /// Its mesh in the body's frame.
+    pub fn mesh(&self) -> Result<TriMesh> {
+        match self {
+            Self::Formula { shape, at } => {
+                let mesh = build(shape, Path::new(""), Some(FACES))?;
+                Ok(mesh.transformed(&pose(at)))
+            }
+            Self::Mesh { mesh, .. } => Ok(mesh.clone()),
+        }
+    }
+
+    /// Its exact form in the body's frame, if it has one.
+    pub fn solid(&self) -> Result<Option<Solid>> {
+        match self {
+            Self::Formula { shape, at } => solid(shape, pose(at)),
+            Self::Mesh { .. } => Ok(None),
+        }
+    }
+
+    pub fn properties(&self) -> Result<MassProperties> {
+        if let Self::Formula { shape, at } = self
+            && let Some(found) = MassProperties::by_formula(shape)?
+        {
+            return Ok(found.transformed(&pose(at)));
+        }
+        Ok(self.mesh()?.mass_properties())
+    }
+
+    /// As a scene has it: a shape and its pose.
+    pub fn shape(&self) -> (Shape, Isometry3<f64>) {
+        match self {
+            Self::Formula { shape, at } => (shape.clone(), *at),
+            Self::Mesh { mesh, .. } => {
+                let vertices: Vec<[f64; 3]> = mesh.vertices().iter().map(|x| (*x).into()).collect();
+                let shape = Shape::triangles(vertices, mesh.faces().to_vec());
+                (shape, Isometry3::identity())
+            }
+        }
+    }
+}
+
+impl Wet {
+    pub fn dry(said: impl Into<String>) -> Self {
+        Self {
+            surface: None,
+            pieces: Vec::new(),
+            said: format!("dry: {}", said.into()),
+        }
+    }
+
+    /// Of a group of links; meshes as many faces as they are for now.
+    pub fn of_group(
+        meshes: &mut Meshes,
+        group: &Group,
+        name: &str,
+        options: &Options,
+        report: &mut Report,
+    ) -> Result<Self> {
+        let (pieces, hulled) = meshes.of_group(group, options, report)?;
+        match &pieces[..] {
+            [] => Ok(Self::dry("no geometry")),
+            [one] if !hulled => Self::of_piece(meshes, one, name, options, report),
+            _ => Self::of_pieces(meshes, &pieces, name, options, report),
+        }
+    }
+
+    /// A single piece as it is, if it can be.
+    fn of_piece(
+        meshes: &Meshes,
+        piece: &Piece,
+        name: &str,
+        options: &Options,
+        report: &mut Report,
+    ) -> Result<Self> {
+        let loaded = match &piece.form {
+            Form::Primitive(shape) => {
+                return Ok(Self {
+                    said: shape.kind().to_string(),
+                    surface: Some(Surface::Formula {
+                        shape: shape.clone(),
+                        at: piece.at,
+                    }),
+                    pieces: Vec::new(),
+                });
+            }
+            Form::Mesh(loaded) => loaded,
+        };
+        let why = match meshes.surface(piece.link, loaded, options)? {
+            Ok(mesh) => {
+                let vertices: Vec<Vec3> = mesh
+                    .vertices()
+                    .iter()
+                    .map(|x| moved(&piece.at, x))
+                    .collect();
+                let placed = TriMesh::new(mesh.name(), vertices, mesh.faces().to_vec())?;
+                let most = options.faces.unwrap_or(FACES);
+                let fewer = match placed.faces().len() > 2 * most {
+                    true => placed.coarsened(most),
+                    false => Ok(placed),
+                };
+                match fewer {
+                    Ok(mesh) => {
+                        meshes.tell(piece, "closed: used itself", report);
+                        let hull = piece.hull()?;
+                        let own = mesh.mass_properties().volume;
+                        let convex = hull
+                            .as_ref()
+                            .is_some_and(|h| h.mass_properties().volume < (1.0 + 1e-6) * own);
+                        let pieces = hull.map(|mesh| Surface::Mesh { mesh, convex: true });
+                        return Ok(Self {
+                            said: "closed mesh".into(),
+                            surface: Some(Surface::Mesh { mesh, convex }),
+                            pieces: pieces.into_iter().collect(),
+                        });
+                    }
+                    Err(_) => format!("it can't be told by {most} faces"),
+                }
+            }
+            Err(why) => why,
+        };
+        let made = Self::of_pieces(meshes, std::slice::from_ref(piece), name, options, report)?;
+        if made.surface.is_some() {
+            report.note(format!(
+                "body {name:?}: the convex hull of its mesh stands for it, since that isn't a closed surface: {why}"
+            ));
+        }
+        Ok(made)
+    }
+
+    /// The convex hull of pieces, each of which is for contact.
+    fn of_pieces(
+        meshes: &Meshes,
+        pieces: &[Piece],
+        name: &str,
+        options: &Options,
+        report: &mut Report,
+    ) -> Result<Self> {
+        let mut hulls = Vec::with_capacity(pieces.len());
+        for piece in pieces {
+            if let Form::Mesh(loaded) = &piece.form
+                && options.bad_meshes == super::options::BadMeshes::Refuse
+            {
+                meshes.surface(piece.link, loaded, options)?.ok();
+            }
+            let hull = piece.hull()?;
+            let used_as = match (&hull, pieces.len()) {
+                (None, _) => "left out: it has no volume",
+                (_, 1) => "its convex hull",
+                _ => "part of a convex hull",
+            };
+            meshes.tell(piece, used_as, report);
+            hulls.extend(hull.map(|hull| (piece, hull)));
+        }
+        let whole = match &hulls[..] {
+            [] => None,
+            [(_, one)] => Some(one.clone()),
+            _ => {
+                let points = hulls.iter().flat_map(|(_, hull)| hull.vertices());
+                let points: Vec<Vec3> = points.copied().collect();
+                hull(&format!("convex hull of body {name:?}"), &points).ok()
+            }
+        };
+        let Some(whole) = whole else {
+            report.note(format!(
+                "body {name:?} is dry: its geometry has no volume, not even its convex hull"
+            ));
+            return Ok(Self::dry("its geometry has no volume"));
+        };
+        let said = match hulls.len() {
+            1 => "convex hull".to_string(),
+            n => format!("convex hull of {n} pieces"),
+        };
+        let contact = hulls.into_iter().map(|(piece, mesh)| match &piece.form {
+            Form::Primitive(shape) => Surface::Formula {
+                shape: shape.clone(),
+                at: piece.at,
+            },
+            Form::Mesh(_) => Surface::Mesh { mesh, convex: true },
+        });
+        Ok(Self {
+            pieces: contact.collect(),
+            said,
+            surface: Some(Surface::Mesh {
+                mesh: whole,
+                convex: true,
+            }),
+        })
+    }
+
+    /// Gives hulls the faces that the water needs.
+    pub fn finish(&mut self, options: &Options) {
+        if let (Some(Surface::Formula { shape, .. }), Some(faces)) =
+            (&mut self.surface, options.faces)
+        {
+            shape.set_faces(faces);
+        }
+        let wanted = options.faces.unwrap_or(FACES);
+        if let Some(Surface::Mesh { mesh, convex }) = &mut self.surface {
+            // A mesh with as many faces as that stays what it is.
+            if *convex || 2 * mesh.faces().len() < wanted {
+                *mesh = even(mesh, wanted);
+            }
+            self.said = format!("{}, {} faces", self.said, mesh.faces().len());
+        }
+    }
+}

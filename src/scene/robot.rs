@@ -1,0 +1,341 @@
+//! Robots of a scene: what is written of them, and the bodies and sites that they become.
+
+use super::{
+    Body, BodyId, CollisionPiece, Drag, Fluid, Mimic, Passive, Placement, Scene, Site, is_default,
+};
+pub use crate::robot::{
+    BadMeshes, Base, BodyReport, FoldedReport, Followers, MeshUse, Report as RobotReport, Unused,
+    Wet,
+};
+use crate::robot::{Imported, Led, LinkChoice, Options, RobotBody, import};
+use crate::{Error, Joint, Result};
+use nalgebra::Isometry3;
+use serde::{Deserialize, Serialize};
+use std::collections::BTreeMap;
+use std::path::{Path, PathBuf};
+
+/// What is chosen for a link of a robot.
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields, default)]
+pub struct RobotLink {
+    /// What the water sees of it; default: the robot's `shape`.
+    #[serde(skip_serializing_if = "is_default")]
+    pub shape: Option<Wet>,
+    /// Mass instead of the file's, kg; the inertia grows with it.
+    #[serde(skip_serializing_if = "is_default")]
+    pub mass: Option<f64>,
+    /// Density of the body that the link's frame and name are of, kg/m³: mass, centre and inertia are those of its surface filled evenly.
+    #[serde(skip_serializing_if = "is_default")]
+    pub density: Option<f64>,
+    /// Whether it stays a body of its own at a fixed joint, instead of folding into what carries it.
+    #[serde(skip_serializing_if = "is_default")]
+    pub keep: bool,
+}
+
+/// A robot in a URDF file: `[[robot]]` of a scene file, which reading it turns into bodies and sites.
+///
+/// Links at fixed joints fold into what carries them and are sites of their names; other links are bodies of their names.
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields, default)]
+pub struct Robot {
+    /// The file; relative to the scene file. [`Scene::from_urdf`] and [`Scene::add_robot`] are given it beside.
+    pub urdf: PathBuf,
+    /// Whether it floats; default: it does, unless its root is called `world` or has no mass.
+    pub base: Option<Base>,
+    /// Where its root is, m, in the world; a floating one starts there.
+    #[serde(skip_serializing_if = "is_default")]
+    pub position: [f64; 3],
+    /// Rotation vector of its root (axis times angle), rad.
+    #[serde(skip_serializing_if = "is_default")]
+    pub rotation: [f64; 3],
+    /// Begins the names of its bodies and sites, so that several of a kind fit in one scene.
+    #[serde(skip_serializing_if = "is_default")]
+    pub prefix: String,
+    /// Folders that hold packages of meshes, before those of `ROS_PACKAGE_PATH`, the file's own and all above it.
+    #[serde(skip_serializing_if = "is_default")]
+    pub package_path: Vec<PathBuf>,
+    /// What the water sees of links, unless `links` says otherwise.
+    #[serde(skip_serializing_if = "is_default")]
+    pub shape: Wet,
+    /// What is done about meshes that aren't closed surfaces.
+    #[serde(skip_serializing_if = "is_default")]
+    pub bad_meshes: BadMeshes,
+    /// Faces of hulls, and of meshes that have more than twice as many; default 320. Of shapes by formula too, whose default is their own.
+    pub faces: Option<usize>,
+    /// What is done about joints that follow others.
+    #[serde(skip_serializing_if = "is_default")]
+    pub mimic: Followers,
+    /// Whether its joints are controls: all that have one coordinate. Default: they are.
+    pub actuated: Option<bool>,
+    /// Whether joints stop at their limits. Default: they do.
+    pub limits: Option<bool>,
+    /// Drag on the surfaces of all its wet bodies.
+    pub drag: Option<Drag>,
+    /// Coordinates at which joints start, m or rad, by the joints' names; default: zero, or just inside the limits.
+    #[serde(skip_serializing_if = "is_default")]
+    pub start: BTreeMap<String, f64>,
+    /// What is chosen for single links, by their names in the file.
+    #[serde(skip_serializing_if = "is_default")]
+    pub links: BTreeMap<String, RobotLink>,
+}
+
+/// A robot that was added to a scene.
+#[derive(Clone, Debug)]
+pub struct Added {
+    /// Its bodies, parents before children.
+    pub bodies: Vec<BodyId>,
+    /// The joints of the file that move, each with the body that it moves.
+    pub joints: Vec<(String, BodyId)>,
+    /// What it came to.
+    pub report: RobotReport,
+}
+
+setters! { Robot {
+    /// Whether it floats.
+    base(base: Base) => base = Some(base);
+    /// Where its root is, m.
+    at(position: [f64; 3]) => position = position;
+    /// Rotation vector of its root, rad.
+    rotated(rotation: [f64; 3]) => rotation = rotation;
+    /// Begins the names of its bodies and sites.
+    prefix(prefix: impl Into<String>) => prefix = prefix.into();
+    /// Folders that hold packages of meshes.
+    package_path(folders: impl Into<Vec<PathBuf>>) => package_path = folders.into();
+    /// What the water sees of links.
+    shape(wet: Wet) => shape = wet;
+    /// What is done about joints that follow others.
+    mimic(mimic: Followers) => mimic = mimic;
+    /// Drag on the surfaces of all its wet bodies.
+    drag(drag: Drag) => drag = Some(drag);
+} }
+
+impl Robot {
+    /// With other choices for a link, by its name in the file.
+    pub fn link(mut self, name: impl Into<String>, link: RobotLink) -> Self {
+        self.links.insert(name.into(), link);
+        self
+    }
+
+    fn options(&self) -> Options {
+        let link = |link: &RobotLink| LinkChoice {
+            shape: link.shape,
+            mass: link.mass,
+            density: link.density,
+            keep: link.keep,
+        };
+        Options {
+            base: self.base,
+            package_path: self.package_path.clone(),
+            shape: self.shape,
+            bad_meshes: self.bad_meshes,
+            faces: self.faces,
+            followers: self.mimic,
+            without_limits: self.limits == Some(false),
+            start: self.start.clone(),
+            links: (self.links.iter())
+                .map(|(name, of)| (name.clone(), link(of)))
+                .collect(),
+        }
+    }
+
+    fn import(&self, path: &Path) -> Result<Imported> {
+        let given = |field: &str, values: &[f64]| {
+            super::validate::finite(&format!("{}: {field}", path.display()), values)
+        };
+        given("position", &self.position)?;
+        given("rotation", &self.rotation)?;
+        if let Some(faces) = self.faces.filter(|faces| !(20..=20_000).contains(faces)) {
+            return Err(Error::input(
+                format!("{}: faces", path.display()),
+                faces,
+                "ask for 20 to 20000 faces of a hull (default 320)",
+            ));
+        }
+        import(path, &self.options())
+    }
+
+    /// What a robot would come to in such water: [`Scene::add_robot`] without the scene.
+    ///
+    /// # Errors
+    /// As there.
+    pub fn inspect(&self, path: impl AsRef<Path>, fluid: &Fluid) -> Result<RobotReport> {
+        let mut report = self.import(path.as_ref())?.report;
+        report.weigh(fluid.density, STANDARD_GRAVITY);
+        Ok(report)
+    }
+}
+
+/// m/s².
+const STANDARD_GRAVITY: f64 = 9.81;
+
+fn placement(at: &Isometry3<f64>) -> Placement {
+    Placement::new(
+        at.translation.vector.into(),
+        at.rotation.scaled_axis().into(),
+    )
+}
+
+/// Damping and friction of `<dynamics>`.
+fn passive(dynamics: &crate::robot::Dynamics) -> Option<Passive> {
+    let made = Passive::default().damping(dynamics.damping);
+    let made = made.friction(dynamics.friction);
+    (made != Passive::default()).then_some(made)
+}
+
+impl Scene {
+    /// A scene of one robot in still fresh water, gravity along −z.
+    ///
+    /// # Errors
+    /// As [`Scene::add_robot`].
+    pub fn from_urdf(path: impl AsRef<Path>, options: &Robot) -> Result<Self> {
+        let mut scene = Self::new(Fluid::fresh_water());
+        scene.gravity = [0.0, 0.0, -STANDARD_GRAVITY];
+        let added = scene.add_robot(path, options)?;
+        scene.name = added.report.robot;
+        Ok(scene)
+    }
+
+    /// Adds the robot of a URDF file: a body for each link that moves, a site for each that doesn't.
+    ///
+    /// # Errors
+    /// [`Error::File`] and [`Error::Parse`] of a file that can't be read, and otherwise [`Error::Input`], with the link or joint: a tree that has loops or several roots, a
+    /// negative mass, an inertia that can't be, links that move without inertia, negative damping, joints that follow themselves, limits that can't be, meshes that aren't
+    /// there, choices for links and joints that aren't there, and names that the scene has already.
+    pub fn add_robot(&mut self, path: impl AsRef<Path>, options: &Robot) -> Result<Added> {
+        let path = path.as_ref();
+        let Imported {
+            base,
+            bodies,
+            folded,
+            mut report,
+        } = options.import(path)?;
+        let called = |name: &str| format!("{}{name}", options.prefix);
+        self.check_new(path, bodies.iter().map(|b| called(&b.name)))?;
+        self.check_new(path, folded.iter().map(|f| called(&f.name)))?;
+        let first = self.bodies.len();
+        let mut joints = Vec::new();
+        for (b, body) in bodies.iter().enumerate() {
+            let mut made = options.body(body, base);
+            made.parent = body.parent.map(|p| called(&bodies[p].name));
+            if let Some(moves) = body.moves.as_ref().filter(|m| m.joint.velocities() > 0) {
+                let of = |led: &Led| {
+                    let leads = |b: &RobotBody| {
+                        let moves = b.moves.as_ref();
+                        moves.is_some_and(|m| m.name == led.joint)
+                    };
+                    let leader = bodies.iter().find(|b| leads(b))?;
+                    let mimic = Mimic::new(called(&leader.name));
+                    Some(mimic.ratio(led.ratio).offset(led.offset))
+                };
+                made.mimic = moves.mimic.as_ref().and_then(of);
+                if made.mimic.is_none() {
+                    joints.push((moves.name.clone(), BodyId(first + b)));
+                }
+            }
+            self.add(made);
+        }
+        for link in &folded {
+            self.add_site(Site {
+                name: called(&link.name),
+                body: called(&bodies[link.body].name),
+                placement: placement(&link.at),
+            });
+        }
+        let gravity = nalgebra::Vector3::from(self.gravity).norm();
+        let gravity = if gravity > 0.0 {
+            gravity
+        } else {
+            STANDARD_GRAVITY
+        };
+        report.weigh(self.fluid.density, gravity);
+        Ok(Added {
+            bodies: (first..self.bodies.len()).map(BodyId).collect(),
+            joints,
+            report,
+        })
+    }
+
+    /// Refuses names that bodies or sites have already.
+    fn check_new(&self, path: &Path, names: impl Iterator<Item = String>) -> Result<()> {
+        for name in names {
+            if self.body(&name).is_some() || self.sites.iter().any(|s| s.name == name) {
+                return Err(Error::input(
+                    format!("{}: link", path.display()),
+                    format!("{name:?}"),
+                    "the scene has a body or site of this name: give the robot a `prefix`",
+                ));
+            }
+        }
+        Ok(())
+    }
+
+    /// Turns the robots that a file asks for into bodies; `folder` is that of the file.
+    pub(super) fn expand_robots(&mut self, folder: &Path) -> Result<()> {
+        for (i, mut robot) in std::mem::take(&mut self.robots).into_iter().enumerate() {
+            if robot.urdf.as_os_str().is_empty() {
+                return Err(Error::input(
+                    format!("robot[{i}]: urdf"),
+                    "nothing",
+                    "give the path of a URDF file",
+                ));
+            }
+            for path in &mut robot.package_path {
+                *path = folder.join(&*path);
+            }
+            self.add_robot(folder.join(&robot.urdf), &robot)?;
+        }
+        Ok(())
+    }
+}
+
+impl Robot {
+    /// A body of it, but for who carries it.
+    fn body(&self, body: &RobotBody, base: Base) -> Body {
+        let mut made = Body::dry().named(format!("{}{}", self.prefix, body.name));
+        made.placement = placement(&body.placement);
+        match &body.moves {
+            Some(moves) => {
+                made.joint = moves.joint;
+                made.limits = moves.limits;
+                made.start = moves.start.into_iter().collect();
+                let one = moves.joint.coordinates() == 1;
+                made.actuated = one && self.actuated != Some(false);
+                if one {
+                    made.passive = passive(&moves.dynamics);
+                }
+                if moves.mimic.is_some() {
+                    (made.actuated, made.start) = (false, Vec::new());
+                }
+            }
+            None => {
+                made.placement = Placement::new(self.position, self.rotation);
+                made.joint = match base {
+                    Base::Free => Joint::Free,
+                    Base::Fixed => Joint::Fixed,
+                };
+            }
+        }
+        if let Some((shape, at)) = &body.shape {
+            made.shape = Some(shape.clone());
+            made.shape_at = placement(at);
+            made.drag = self.drag;
+            let pieces = body.pieces.iter();
+            made.collision = pieces
+                .map(|(shape, at)| CollisionPiece {
+                    shape: shape.clone(),
+                    at: placement(at),
+                })
+                .collect();
+        }
+        made.overlaps_parent = body.overlaps_parent;
+        match body.density {
+            Some(density) => made.density = Some(density),
+            None => {
+                made.mass = body.mass;
+                made.center_of_mass = Some(body.center);
+                made.inertia = Some(body.inertia.to_vec());
+            }
+        }
+        made
+    }
+}

@@ -1,0 +1,988 @@
+//! Robots in URDF files: what they become, what is said of them, and what is refused.
+
+use crate::support::says;
+use hydrograd::scene::{
+    BadMeshes, Base, Followers, Joint, Plane, Robot, RobotLink, Scene, Shape, Wet,
+};
+use hydrograd::{Controls, Fidelity, Fluid, Settings, Simulator};
+use nalgebra::{DVector, Isometry3, Translation3, UnitQuaternion, Vector3};
+use std::path::{Path, PathBuf};
+use tempfile::TempDir;
+
+const INERTIAL: &str = r#"<inertial><mass value="2"/><inertia ixx="0.02" ixy="0" ixz="0" iyy="0.03" iyz="0" izz="0.04"/></inertial>"#;
+
+fn root() -> &'static Path {
+    Path::new(env!("CARGO_MANIFEST_DIR"))
+}
+
+/// A file in a folder of its own.
+fn file(text: &str) -> (TempDir, PathBuf) {
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("robot.urdf");
+    std::fs::write(&path, text).unwrap();
+    (folder, path)
+}
+
+fn robot(inner: &str) -> String {
+    format!("<robot name=\"r\">\n{inner}\n</robot>\n")
+}
+
+fn link(name: &str, inner: &str) -> String {
+    format!("<link name=\"{name}\">{INERTIAL}{inner}</link>\n")
+}
+
+fn joint(name: &str, kind: &str, parent: &str, child: &str, inner: &str) -> String {
+    format!(
+        "<joint name=\"{name}\" type=\"{kind}\"><parent link=\"{parent}\"/><child link=\"{child}\"/>{inner}</joint>\n"
+    )
+}
+
+fn collision(geometry: &str, origin: &str) -> String {
+    format!("<collision>{origin}<geometry>{geometry}</geometry></collision>")
+}
+
+fn read(text: &str, options: &Robot) -> hydrograd::Result<Scene> {
+    let (_folder, path) = file(text);
+    let scene = Scene::from_urdf(path, options)?;
+    scene.validate().map(|()| scene)
+}
+
+/// Two links at a joint.
+fn pair(kind: &str, inner: &str) -> String {
+    robot(
+        &[
+            link("a", ""),
+            link("b", ""),
+            joint("j", kind, "a", "b", inner),
+        ]
+        .concat(),
+    )
+}
+
+#[track_caller]
+fn refused(text: &str, words: &[&str]) {
+    refused_with(text, &Robot::default(), words);
+}
+
+#[track_caller]
+fn refused_with(text: &str, options: &Robot, words: &[&str]) {
+    let error = read(text, options).unwrap_err().to_string();
+    says(error, &[&["robot.urdf"], words].concat());
+}
+
+#[test]
+fn joints_become_joints() {
+    let axis = "<axis xyz=\"0 0 2\"/>";
+    let limit = "<limit lower=\"-1\" upper=\"2\" effort=\"1\" velocity=\"1\"/>";
+    let both = format!("{axis}{limit}");
+    let kinds = [
+        (
+            "revolute",
+            both.as_str(),
+            Joint::Revolute {
+                axis: [0.0, 0.0, 2.0],
+            },
+            Some([-1.0, 2.0]),
+        ),
+        (
+            "continuous",
+            both.as_str(),
+            Joint::Revolute {
+                axis: [0.0, 0.0, 2.0],
+            },
+            None,
+        ),
+        (
+            "prismatic",
+            both.as_str(),
+            Joint::Prismatic {
+                axis: [0.0, 0.0, 2.0],
+            },
+            Some([-1.0, 2.0]),
+        ),
+        (
+            "revolute",
+            "",
+            Joint::Revolute {
+                axis: [1.0, 0.0, 0.0],
+            },
+            None,
+        ),
+        ("planar", axis, Joint::Planar { plane: Plane::Xy }, None),
+        (
+            "planar",
+            "<axis xyz=\"0 -1 0\"/>",
+            Joint::Planar { plane: Plane::Zx },
+            None,
+        ),
+        ("floating", "", Joint::Free, None),
+    ];
+    for (kind, inner, becomes, limits) in kinds {
+        let scene = read(&pair(kind, inner), &Robot::default()).unwrap();
+        let body = &scene.bodies[1];
+        assert_eq!(
+            (body.name.as_str(), body.parent.as_deref()),
+            ("b", Some("a")),
+            "{kind}"
+        );
+        assert_eq!((body.joint, body.limits), (becomes, limits), "{kind}");
+        assert_eq!(body.actuated, becomes.coordinates() == 1, "{kind}");
+        assert_eq!(scene.bodies[0].joint, Joint::Free);
+        assert_eq!(scene.gravity, [0.0, 0.0, -9.81]);
+    }
+    let fixed = read(
+        &pair("revolute", limit),
+        &Robot::default().base(Base::Fixed),
+    )
+    .unwrap();
+    assert_eq!(fixed.bodies[0].joint, Joint::Fixed);
+    let loose = Robot {
+        limits: Some(false),
+        actuated: Some(false),
+        ..Robot::default()
+    };
+    let body = &read(&pair("revolute", limit), &loose).unwrap().bodies[1];
+    assert_eq!((body.limits, body.actuated), (None, false));
+}
+
+/// What is folded has the mass, centre and inertia of its links; those are sites.
+#[test]
+fn fixed_links_fold() {
+    let turned = "<origin xyz=\"0.1 0.2 0.3\" rpy=\"0.4 -0.5 0.6\"/>";
+    let tip = "<origin xyz=\"0 0 0.5\" rpy=\"0 1.2 0\"/>";
+    let text = robot(
+        &[
+            link("a", ""),
+            link("b", ""),
+            "<link name=\"tip\"/>".into(),
+            joint("ab", "fixed", "a", "b", turned),
+            joint("bt", "fixed", "b", "tip", tip),
+        ]
+        .concat(),
+    );
+    let scene = read(&text, &Robot::default()).unwrap();
+    assert_eq!(scene.bodies.len(), 1);
+    let names: Vec<&str> = scene.sites.iter().map(|s| s.name.as_str()).collect();
+    assert_eq!(names, ["b", "tip"]);
+    let at = |x: [f64; 3], rpy: [f64; 3]| {
+        let turn = UnitQuaternion::from_euler_angles(rpy[0], rpy[1], rpy[2]);
+        Isometry3::from_parts(Translation3::from(x), turn)
+    };
+    let first = at([0.1, 0.2, 0.3], [0.4, -0.5, 0.6]);
+    let second = first * at([0.0, 0.0, 0.5], [0.0, 1.2, 0.0]);
+    for (site, right) in scene.sites.iter().zip([first, second]) {
+        let place = &site.placement;
+        assert!((Vector3::from(place.position) - right.translation.vector).norm() < 1e-15);
+        assert!((Vector3::from(place.rotation) - right.rotation.scaled_axis()).norm() < 1e-15);
+    }
+    // Two equal masses: the centre lies midway, and each adds its offset.
+    let body = &scene.bodies[0];
+    assert_eq!(body.mass, Some(4.0));
+    let center = Vector3::from(body.center_of_mass.unwrap());
+    let offset = first.translation.vector / 2.0;
+    assert!((center - offset).norm() < 1e-15);
+    let own = nalgebra::Matrix3::from_diagonal(&Vector3::new(0.02, 0.03, 0.04));
+    let turn = first.rotation.to_rotation_matrix().into_inner();
+    let away = nalgebra::Matrix3::identity() * offset.norm_squared() - offset * offset.transpose();
+    let right = own + turn * own * turn.transpose() + 4.0 * away;
+    let found = body.inertia.clone().unwrap();
+    for (k, (i, j)) in [(0, 0), (1, 1), (2, 2), (0, 1), (0, 2), (1, 2)]
+        .into_iter()
+        .enumerate()
+    {
+        assert!((found[k] - right[(i, j)]).abs() < 1e-15);
+    }
+    // A link that is kept is a body at a fixed joint.
+    let kept = RobotLink {
+        keep: true,
+        ..RobotLink::default()
+    };
+    let scene = read(&text, &Robot::default().link("b", kept)).unwrap();
+    let kinds: Vec<_> = scene
+        .bodies
+        .iter()
+        .map(|b| (b.name.as_str(), b.joint))
+        .collect();
+    assert_eq!(kinds, [("a", Joint::Free), ("b", Joint::Fixed)]);
+    assert_eq!(scene.sites[0].body, "b");
+}
+
+#[test]
+fn primitives_stay_what_they_are() {
+    let at = "<origin xyz=\"0 0 1\" rpy=\"1.5 0 0\"/>";
+    let kinds = [
+        ("<box size=\"1 2 3\"/>", Shape::cuboid([1.0, 2.0, 3.0])),
+        ("<sphere radius=\"0.5\"/>", Shape::sphere(0.5)),
+        (
+            "<cylinder radius=\"0.5\" length=\"2\"/>",
+            Shape::cylinder(0.5, 2.0),
+        ),
+        (
+            "<capsule radius=\"0.5\" length=\"2\"/>",
+            Shape::capsule(0.5, 2.0),
+        ),
+    ];
+    for (geometry, shape) in kinds {
+        let text = robot(&link("a", &collision(geometry, at)));
+        let body = &read(&text, &Robot::default()).unwrap().bodies[0];
+        assert_eq!(body.shape, Some(shape), "{geometry}");
+        assert!((Vector3::from(body.shape_at.rotation) - Vector3::x() * 1.5).norm() < 1e-15);
+        assert_eq!(body.shape_at.position, [0.0, 0.0, 1.0]);
+        assert!(body.collision.is_empty());
+    }
+}
+
+fn volume(shape: &Shape) -> f64 {
+    let mesh = hydrograd::shape::build(shape, Path::new(""), None).unwrap();
+    mesh.mass_properties().volume
+}
+
+/// Several pieces: their hull for the water, each of them for contact.
+#[test]
+fn several_pieces_become_their_hull() {
+    let piece = |x: f64| {
+        let origin = format!("<origin xyz=\"{x} 0 0\"/>");
+        collision("<box size=\"0.2 0.2 0.2\"/>", &origin)
+    };
+    let text = robot(&link("a", &[piece(-0.4), piece(0.4)].concat()));
+    let (_folder, path) = file(&text);
+    let mut scene = Scene::new(Fluid::fresh_water());
+    let added = scene.add_robot(&path, &Robot::default()).unwrap();
+    let body = &scene.bodies[0];
+    let shape = body.shape.as_ref().unwrap();
+    assert!(
+        (volume(shape) / 0.04 - 1.0).abs() < 1e-6,
+        "{}",
+        volume(shape)
+    );
+    assert!(matches!(shape, Shape::Triangles { faces, .. } if (200..=400).contains(&faces.len())));
+    let pieces: Vec<&Shape> = body.collision.iter().map(|p| &p.shape).collect();
+    assert_eq!(pieces, [&Shape::cuboid([0.2; 3]); 2]);
+    assert!(added.report.bodies[0].shape.contains("hull of 2 pieces"));
+    assert!((added.report.volume / 0.04 - 1.0).abs() < 1e-6);
+
+    // Wet as chosen: nothing, for one link.
+    let dry = RobotLink {
+        shape: Some(Wet::None),
+        ..RobotLink::default()
+    };
+    let scene = read(&text, &Robot::default().link("a", dry)).unwrap();
+    assert_eq!(scene.bodies[0].shape, None);
+}
+
+/// A cube of edge 1 as OBJ and as DAE: nodes within nodes, each with a matrix, and a unit; the same cube twice.
+const CUBE: &str = include_str!("../fuzz/corpus/mesh/cube.obj");
+
+fn dae(scene: &str, unit: f64) -> String {
+    format!(
+        r##"<?xml version="1.0"?>
+<COLLADA xmlns="http://www.collada.org/2005/11/COLLADASchema" version="1.4.1">
+<asset><unit meter="{unit}"/><up_axis>Z_UP</up_axis></asset>
+<library_geometries><geometry id="tetra"><mesh>
+<source id="p"><float_array id="pa" count="12">0 0 0 1 0 0 0 1 0 0 0 1</float_array>
+<technique_common><accessor source="#pa" count="4" stride="3"><param name="X" type="float"/><param name="Y" type="float"/><param name="Z" type="float"/></accessor></technique_common></source>
+<vertices id="v"><input semantic="POSITION" source="#p"/></vertices>
+<triangles count="4"><input semantic="VERTEX" source="#v" offset="0"/><p>0 2 1 0 1 3 0 3 2 1 2 3</p></triangles>
+</mesh></geometry></library_geometries>
+<library_visual_scenes><visual_scene id="s">{scene}</visual_scene></library_visual_scenes>
+<scene><instance_visual_scene url="#s"/></scene></COLLADA>"##
+    )
+}
+
+#[test]
+fn nodes_of_collada_are_placed() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("tetra.dae");
+    let read = |scene: &str, unit: f64| {
+        std::fs::write(&path, dae(scene, unit)).unwrap();
+        hydrograd::shape::file::read_unchecked(&path, 1.0)
+    };
+    let shown = r##"<instance_geometry url="#tetra"/>"##;
+    // Moved, then turned by a quarter about z, then twice as large: in that order from outside.
+    let inner = format!(
+        "<node><translate>10 0 0</translate><node><rotate>0 0 1 90</rotate><node><scale>2 2 2</scale>{shown}</node></node></node>"
+    );
+    let mesh = read(&inner, 0.1).unwrap().into_mesh().unwrap();
+    let [low, high] = mesh.bounds();
+    assert!((low - Vector3::new(0.8, 0.0, 0.0)).norm() < 1e-6, "{low}");
+    assert!((high - Vector3::new(1.0, 0.2, 0.2)).norm() < 1e-6, "{high}");
+    // A mirrored one is turned outward again, and one geometry may be shown twice.
+    let twice = format!(
+        "<node>{shown}</node><node><matrix>-1 0 0 -3 0 1 0 0 0 0 1 0 0 0 0 1</matrix>{shown}</node>"
+    );
+    let mesh = read(&twice, 1.0).unwrap().into_mesh().unwrap();
+    assert_eq!(mesh.faces().len(), 8);
+    assert!((mesh.mass_properties().volume - 1.0 / 3.0).abs() < 1e-6);
+    for (bad, words) in [
+        (
+            "<node><instance_geometry url=\"#no\"/></node>",
+            "leads nowhere",
+        ),
+        ("<node><matrix>1 2 3</matrix></node>", "16 finite numbers"),
+        ("<node><skew>1 2 3 4 5 6 7</skew></node>", "isn't read"),
+    ] {
+        says(
+            read(bad, 1.0).unwrap_err().to_string(),
+            &["tetra.dae", words],
+        );
+    }
+}
+
+#[test]
+fn meshes_are_found_scaled_and_replaced() {
+    let (folder, path) = file("");
+    let mesh = |name: &str, scale: &str| {
+        let geometry = format!("<mesh filename=\"{name}\"{scale}/>");
+        robot(&link("a", &collision(&geometry, "")))
+    };
+    let set = |text: &str| std::fs::write(&path, text).unwrap();
+    let meshes = folder.path().join("pack/meshes");
+    std::fs::create_dir_all(&meshes).unwrap();
+    std::fs::write(meshes.join("cube.obj"), CUBE).unwrap();
+    let made = |options: &Robot| Scene::from_urdf(&path, options).map(|s| s.bodies[0].clone());
+
+    let one = volume(&Shape::mesh(meshes.join("cube.obj")));
+    let beside = Robot::default();
+    for name in [
+        "package://pack/meshes/cube.obj",
+        "model://pack/meshes/cube.obj",
+        "pack/meshes/cube.obj",
+        &format!("file://{}", meshes.join("cube.obj").display()),
+    ] {
+        set(&mesh(name, " scale=\"1 2 -0.5\""));
+        let body = made(&beside).unwrap();
+        let found = volume(body.shape.as_ref().unwrap());
+        assert!((found / one - 1.0).abs() < 1e-9, "{name}: {found} {one}");
+    }
+
+    // Elsewhere: the folder that holds the package is given.
+    let (_other, away) = file(&mesh("package://pack/meshes/cube.obj", ""));
+    let lost = Scene::from_urdf(&away, &beside).unwrap_err().to_string();
+    says(
+        lost,
+        &[
+            "link \"a\"",
+            "pack/meshes/cube.obj",
+            "tried",
+            "package_path",
+        ],
+    );
+    let given = Robot::default().package_path([folder.path().to_path_buf()]);
+    Scene::from_urdf(&away, &given).unwrap();
+    // The folder may be the package itself.
+    let given = Robot::default().package_path([folder.path().join("pack")]);
+    Scene::from_urdf(&away, &given).unwrap();
+
+    // Without its last face a cube isn't closed: its hull stands for it, and says so, or it is refused.
+    let open: String = {
+        let lines: Vec<&str> = CUBE.trim_end().lines().collect();
+        lines[..lines.len() - 1].join("\n")
+    };
+    std::fs::write(meshes.join("cube.obj"), open).unwrap();
+    set(&mesh("pack/meshes/cube.obj", ""));
+    let mut scene = Scene::new(Fluid::fresh_water());
+    let report = scene.add_robot(&path, &beside).unwrap().report;
+    let found = volume(scene.bodies[0].shape.as_ref().unwrap());
+    assert!((found / one - 1.0).abs() < 1e-6, "{found} {one}");
+    says(
+        report.to_string(),
+        &["body \"a\"", "convex hull", "closed surface"],
+    );
+    let strict = Robot {
+        bad_meshes: BadMeshes::Refuse,
+        ..Robot::default()
+    };
+    says(
+        made(&strict).unwrap_err().to_string(),
+        &["link \"a\"", "cube.obj"],
+    );
+    set(&mesh("pack/meshes/cube.obj", " scale=\"1 0 1\""));
+    says(
+        made(&beside).unwrap_err().to_string(),
+        &["link \"a\"", "scale", "0.001"],
+    );
+    set(&mesh("pack/meshes/none.obj", ""));
+    says(
+        made(&beside).unwrap_err().to_string(),
+        &["link \"a\"", "none.obj", "tried"],
+    );
+    set(&mesh("http://pack/none.obj", ""));
+    says(
+        made(&beside).unwrap_err().to_string(),
+        &["link \"a\"", "package://"],
+    );
+}
+
+/// Bodies that overlap beyond the rule are parted at the start, and the scene runs.
+#[test]
+fn what_overlaps_is_parted_and_said() {
+    // The grandchild lies in the root by a third of its own.
+    let cube = |x: f64| {
+        let origin = format!("<origin xyz=\"{x} 0 0\"/>");
+        collision("<box size=\"0.2 0.2 0.2\"/>", &origin)
+    };
+    let limit = "<axis xyz=\"0 0 1\"/>";
+    let text = robot(
+        &[
+            link("root", &cube(0.0)),
+            link(
+                "middle",
+                &collision("<sphere radius=\"0.06\"/>", "<origin xyz=\"0 0.14 0\"/>"),
+            ),
+            link("last", &cube(0.13)),
+            joint("one", "revolute", "root", "middle", limit),
+            joint("two", "revolute", "middle", "last", limit),
+        ]
+        .concat(),
+    );
+    let (_folder, path) = file(&text);
+    let mut scene = Scene::new(Fluid::fresh_water());
+    let report = scene.add_robot(&path, &Robot::default()).unwrap().report;
+    let said = report.to_string();
+    says(
+        said,
+        &[
+            "body \"root\"",
+            "body \"last\"",
+            "cut off by a plane",
+            "overlaps_parent",
+        ],
+    );
+    assert!(scene.bodies[1].overlaps_parent);
+    let wet = |b: usize| volume(scene.bodies[b].shape.as_ref().unwrap());
+    // 0.07 of 0.2 lie in each other: each loses half of that and a little.
+    for b in [0, 2] {
+        let left = wet(b) / 0.008;
+        assert!((0.75..0.83).contains(&left), "{left}");
+    }
+    let settings = Settings::default().fidelity(Fidelity::Reduced).faces(80);
+    let simulator = Simulator::new(&scene, settings).unwrap();
+    let rollout = simulator.rollout(&Controls::zeros(&simulator, 2)).unwrap();
+    assert!(rollout.samples()[2].kinetic_energy.is_finite());
+
+    // One within the other: no plane will do.
+    let text = robot(
+        &[
+            link("root", &cube(0.0)),
+            link("middle", ""),
+            link("last", &collision("<sphere radius=\"0.03\"/>", "")),
+            joint("one", "revolute", "root", "middle", limit),
+            joint("two", "revolute", "middle", "last", limit),
+        ]
+        .concat(),
+    );
+    let (_folder, path) = file(&text);
+    let mut scene = Scene::new(Fluid::fresh_water());
+    let report = scene.add_robot(&path, &Robot::default()).unwrap().report;
+    says(report.to_string(), &["\"last\" is dry", "\"root\""]);
+    assert_eq!(scene.bodies[2].shape, None);
+}
+
+#[test]
+fn what_is_not_used_is_said() {
+    let text = robot(
+        &[
+            link("a", "<contact><friction value=\"1\"/></contact>"),
+            link("b", ""),
+            joint(
+                "j",
+                "revolute",
+                "a",
+                "b",
+                "<limit lower=\"1\" upper=\"2\" effort=\"3\" velocity=\"4\"/><dynamics damping=\"0.5\" friction=\"0.1\" K=\"7\"/>",
+            ),
+            "<gazebo reference=\"a\"/><gazebo reference=\"b\"/>".into(),
+        ]
+        .concat(),
+    );
+    let (_folder, path) = file(&text);
+    let report = Robot::default()
+        .inspect(&path, &Fluid::fresh_water())
+        .unwrap();
+    let unused: Vec<(&str, usize)> = report
+        .unused
+        .iter()
+        .map(|u| (u.what.as_str(), u.count))
+        .collect();
+    let right = [
+        ("<contact> of <link>", 1),
+        ("<gazebo>", 2),
+        ("K of <dynamics>", 1),
+        ("effort of <limit>", 1),
+        ("velocity of <limit>", 1),
+    ];
+    assert_eq!(unused, right);
+    // Where zero is outside of its limits a joint starts just inside them.
+    says(report.to_string(), &["joint \"j\" starts at 1.01"]);
+    let start = Robot {
+        start: [("j".to_string(), 1.5)].into(),
+        ..Robot::default()
+    };
+    assert_eq!(read(&text, &start).unwrap().bodies[1].start, [1.5]);
+    let start = Robot {
+        start: [("j".to_string(), 0.5)].into(),
+        ..Robot::default()
+    };
+    refused_with(&text, &start, &["joint \"j\"", "start", "from 1 to 2"]);
+}
+
+#[test]
+fn files_that_are_no_robots_are_refused() {
+    refused("", &["this is not XML yet"]);
+    refused("<robot", &["this is not XML yet"]);
+    refused("<sdf/>", &["line 1", "SDF", "URDF"]);
+    refused("<mujoco/>", &["MJCF", "URDF"]);
+    refused("<house/>", &["<robot>"]);
+    refused("<robot name=\"r\"/>", &["no <link>"]);
+    let macros = "<robot xmlns:xacro=\"http://ros.org/wiki/xacro\"><xacro:arm/></robot>";
+    refused(macros, &["<xacro:arm>", "expanded"]);
+    let deep = format!("<robot>{}{}</robot>", "<a>".repeat(400), "</a>".repeat(400));
+    refused(&deep, &["nested", "6"]);
+    let missing = Scene::from_urdf("no/such.urdf", &Robot::default()).unwrap_err();
+    says(missing.to_string(), &["no/such.urdf", "read failed"]);
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("r.urdf");
+    std::fs::write(&path, [0xff, 0xfe, 0x00]).unwrap();
+    let bytes = Scene::from_urdf(&path, &Robot::default()).unwrap_err();
+    says(bytes.to_string(), &["line 1", "UTF-8"]);
+}
+
+#[test]
+fn elements_that_can_not_be_are_refused() {
+    let inertial = |text: &str| {
+        robot(&format!(
+            "<link name=\"a\"><inertial>{text}</inertial></link>"
+        ))
+    };
+    refused(
+        &inertial("<mass value=\"1\"/>"),
+        &["line 2", "link \"a\"", "<inertia>"],
+    );
+    refused(
+        &inertial("<mass/>"),
+        &["link \"a\"", "<inertial> needs an element <inertia>"],
+    );
+    let half =
+        "<mass value=\"x\"/><inertia ixx=\"1\" ixy=\"0\" ixz=\"0\" iyy=\"1\" iyz=\"0\" izz=\"1\"/>";
+    refused(
+        &inertial(half),
+        &["link \"a\"", "<mass>", "\"x\"", "one finite number"],
+    );
+    let nan = half.replace('x', "nan");
+    refused(&inertial(&nan.replace("inan", "ix")), &["link \"a\""]);
+    let geometry = |text: &str| robot(&link("a", &collision(text, "")));
+    refused(&geometry(""), &["link \"a\"", "<geometry> is empty"]);
+    refused(&geometry("<cone/>"), &["<cone> is no geometry", "capsule"]);
+    refused(&geometry("<box/>"), &["<box> needs the attribute size"]);
+    refused(
+        &geometry("<box size=\"1 2\"/>"),
+        &["size", "3 finite numbers"],
+    );
+    refused(
+        &geometry("<box size=\"1 2 -3\"/>"),
+        &["link \"a\"", "size[2]", "positive"],
+    );
+    refused(
+        &geometry("<sphere radius=\"1\"/><sphere radius=\"1\"/>"),
+        &["one too many"],
+    );
+    refused(
+        &robot("<link/>"),
+        &["line 2", "<link> needs the attribute name"],
+    );
+    refused(
+        &pair("helical", ""),
+        &["joint \"j\"", "\"helical\"", "known are fixed, revolute"],
+    );
+    refused(
+        &pair("revolute", "<axis xyz=\"0 0 0\"/>"),
+        &["joint \"j\"", "axis", "direction"],
+    );
+    refused(
+        &pair("revolute", "<limit lower=\"1\" upper=\"2\" effort=\"1\"/>"),
+        &["joint \"j\"", "velocity"],
+    );
+    refused(
+        &pair(
+            "revolute",
+            "<limit lower=\"2\" upper=\"1\" effort=\"1\" velocity=\"1\"/>",
+        ),
+        &["joint \"j\"", "limit", "above"],
+    );
+    refused(
+        &pair("planar", "<axis xyz=\"1 1 0\"/>"),
+        &["joint \"j\"", "normal"],
+    );
+    refused(
+        &pair("revolute", "<dynamics damping=\"-1\"/>"),
+        &["joint \"j\"", "damping", "-1"],
+    );
+    refused(
+        &pair("revolute", "<dynamics friction=\"-2\"/>"),
+        &["joint \"j\"", "friction", "-2"],
+    );
+}
+
+#[test]
+fn trees_that_can_not_be_are_refused() {
+    let links = |names: &[&str]| -> String { names.iter().map(|n| link(n, "")).collect() };
+    let tree = |names: &[&str], joints: &[(&str, &str)]| {
+        let made = joints.iter().enumerate();
+        let made = made.map(|(k, (p, c))| joint(&format!("j{k}"), "revolute", p, c, ""));
+        robot(&(links(names) + &made.collect::<String>()))
+    };
+    refused(
+        &tree(&["a", "b"], &[]),
+        &["2 links", "[\"a\", \"b\"]", "one tree"],
+    );
+    refused(
+        &tree(&["a", "b"], &[("a", "b"), ("b", "a")]),
+        &["loop", "\"a\"", "\"b\""],
+    );
+    let side = tree(&["a", "b", "c"], &[("b", "c"), ("c", "b")]);
+    refused(&side, &["loop", "\"b\"", "\"c\""]);
+    refused(
+        &tree(&["a"], &[("a", "a")]),
+        &["joint \"j0\"", "parent and child"],
+    );
+    let two = tree(&["a", "b", "c"], &[("a", "b"), ("a", "c"), ("b", "c")]);
+    refused(&two, &["joint \"j2\"", "\"c\"", "\"j1\"", "no loops"]);
+    refused(
+        &tree(&["arm", "b"], &[("arn", "b")]),
+        &["joint \"j0\"", "\"arn\"", "did you mean \"arm\"?"],
+    );
+    refused(&robot(&links(&["a", "a"])), &["link \"a\"", "two links"]);
+    let twice = robot(
+        &[
+            links(&["a", "b", "c"]),
+            joint("j", "revolute", "a", "b", ""),
+            joint("j", "revolute", "a", "c", ""),
+        ]
+        .concat(),
+    );
+    refused(&twice, &["joint \"j\"", "two joints"]);
+}
+
+#[test]
+fn inertias_that_can_not_be_are_refused() {
+    let with = |mass: f64, moments: [f64; 3]| {
+        let [x, y, z] = moments;
+        format!(
+            "<inertial><mass value=\"{mass}\"/><inertia ixx=\"{x}\" ixy=\"0\" ixz=\"0\" iyy=\"{y}\" iyz=\"0\" izz=\"{z}\"/></inertial>"
+        )
+    };
+    let one = |inertial: String| robot(&format!("<link name=\"a\">{inertial}</link>"));
+    refused(&one(with(-1.0, [1.0; 3])), &["link \"a\"", "mass", "-1"]);
+    refused(
+        &one(with(1.0, [-1.0, 1.0, 1.0])),
+        &[
+            "link \"a\"",
+            "inertia",
+            "negative principal moment",
+            "density",
+        ],
+    );
+    refused(
+        &one(with(1.0, [1.0, 1.0, 3.0])),
+        &["link \"a\"", "sum of the other two"],
+    );
+    let free = Robot::default().base(Base::Free);
+    refused_with(
+        &one(with(1.0, [0.0; 3])),
+        &free,
+        &["link \"a\"", "inertia", "zero"],
+    );
+    refused_with(
+        &robot("<link name=\"a\"/>"),
+        &free,
+        &["link \"a\"", "without mass"],
+    );
+    // What rounding does is mended, and said.
+    let (_folder, path) = file(&one(with(1.0, [1.0, 1.0, 2.01])));
+    let mut scene = Scene::new(Fluid::fresh_water());
+    let report = scene.add_robot(&path, &free).unwrap().report;
+    scene.validate().unwrap();
+    says(report.to_string(), &["link \"a\"", "was added"]);
+
+    // Links without mass: one on the way to a mass may move, two in a row and one at the end may not.
+    let chain = |massless: &[&str], names: &[&str]| {
+        let mut text = String::new();
+        for (k, name) in names.iter().enumerate() {
+            text += &match massless.contains(name) {
+                true => format!("<link name=\"{name}\"/>"),
+                false => link(name, ""),
+            };
+            if k > 0 {
+                text += &joint(&format!("to_{name}"), "revolute", names[k - 1], name, "");
+            }
+        }
+        robot(&text)
+    };
+    read(&chain(&["b"], &["a", "b", "c"]), &Robot::default()).unwrap();
+    refused(
+        &chain(&["c"], &["a", "b", "c"]),
+        &["joint \"to_c\"", "\"c\" without mass"],
+    );
+    refused(
+        &chain(&["b", "c"], &["a", "b", "c", "d"]),
+        &["joint \"to_c\"", "\"b\" without mass"],
+    );
+    // A density makes up for it.
+    let ball = robot(&format!(
+        "<link name=\"a\">{}</link>",
+        collision("<sphere radius=\"0.1\"/>", "")
+    ));
+    let dense = RobotLink {
+        density: Some(500.0),
+        ..RobotLink::default()
+    };
+    let scene = read(&ball, &free.clone().link("a", dense)).unwrap();
+    assert_eq!(
+        (scene.bodies[0].density, scene.bodies[0].mass),
+        (Some(500.0), None)
+    );
+    let heavy = RobotLink {
+        mass: Some(6.0),
+        ..RobotLink::default()
+    };
+    let scene = read(&one(with(2.0, [1.0; 3])), &free.link("a", heavy)).unwrap();
+    assert_eq!(scene.bodies[0].mass, Some(6.0));
+    assert_eq!(scene.bodies[0].inertia.as_ref().unwrap()[0], 3.0);
+}
+
+#[test]
+fn joints_that_follow_have_their_leaders_coordinate_or_their_own() {
+    let mimics = |of: &str, other: &str| {
+        robot(
+            &[
+                link("a", ""),
+                link("b", ""),
+                link("c", ""),
+                joint("one", "revolute", "a", "b", other),
+                joint(
+                    "two",
+                    "revolute",
+                    "a",
+                    "c",
+                    &format!("<mimic joint=\"{of}\"/>"),
+                ),
+            ]
+            .concat(),
+        )
+    };
+    let own = Robot::default().mimic(Followers::Independent);
+    let led = read(&mimics("one", ""), &Robot::default()).unwrap();
+    assert_eq!((led.coordinates(), led.controls()), (8, 1));
+    let mimic = led.bodies[2].mimic.as_ref().unwrap();
+    assert_eq!(
+        (mimic.body.as_str(), mimic.ratio, mimic.offset),
+        ("b", 1.0, 0.0)
+    );
+    assert_eq!(read(&mimics("one", ""), &own).unwrap().coordinates(), 9);
+    for options in [Robot::default(), own] {
+        refused_with(&mimics("two", ""), &options, &["joint \"two\"", "itself"]);
+        refused_with(
+            &mimics("six", ""),
+            &options,
+            &["joint \"two\"", "no such joint"],
+        );
+        let circle = mimics("one", "<mimic joint=\"two\"/>");
+        refused_with(&circle, &options, &["mimic", "follows this one"]);
+    }
+}
+
+#[test]
+fn choices_of_what_is_not_there_are_refused() {
+    let text = pair("revolute", "");
+    let options = Robot::default().link("z", RobotLink::default());
+    refused_with(&text, &options, &["links", "\"z\"", "\"b\""]);
+    let options = Robot {
+        start: [("z".to_string(), 0.0)].into(),
+        ..Robot::default()
+    };
+    refused_with(&text, &options, &["start", "\"z\"", "\"j\""]);
+    let options = Robot::default().at([f64::NAN, 0.0, 0.0]);
+    refused_with(&text, &options, &["position", "finite"]);
+    let options = Robot {
+        faces: Some(3),
+        ..Robot::default()
+    };
+    refused_with(&text, &options, &["faces", "320"]);
+    let (_folder, path) = file(&text);
+    let mut scene = Scene::from_urdf(&path, &Robot::default()).unwrap();
+    let again = scene.add_robot(&path, &Robot::default()).unwrap_err();
+    says(again.to_string(), &["\"a\"", "prefix"]);
+    scene
+        .add_robot(
+            &path,
+            &Robot::default().prefix("second_").at([1.0, 0.0, 0.0]),
+        )
+        .unwrap();
+    scene.validate().unwrap();
+    assert_eq!(scene.bodies[3].name, "second_b");
+    assert_eq!(scene.bodies[2].placement.position, [1.0, 0.0, 0.0]);
+}
+
+/// Robots of a scene file mix with bodies, and what is read is written as bodies.
+#[test]
+fn scene_files_have_robots() {
+    let (folder, _) = file(&pair(
+        "prismatic",
+        "<limit lower=\"1\" upper=\"2\" effort=\"1\" velocity=\"1\"/>",
+    ));
+    let text = r#"
+        time_step = 0.01
+        steps = 2
+        [fluid]
+        density = 998.0
+        [[bodies]]
+        name = "ball"
+        shape = { kind = "sphere", radius = 0.1 }
+        density = 500.0
+        [[robot]]
+        urdf = "robot.urdf"
+        base = "fixed"
+        position = [0.0, 1.0, 0.0]
+        prefix = "r/"
+        start = { j = 1.25 }
+        links = { b = { mass = 3.0 } }
+        [[sites]]
+        name = "eye"
+        body = "r/b"
+    "#;
+    let scene = Scene::from_toml(text, folder.path()).unwrap();
+    scene.validate().unwrap();
+    let names: Vec<&str> = scene.bodies.iter().map(|b| b.name.as_str()).collect();
+    assert_eq!(names, ["ball", "r/a", "r/b"]);
+    assert_eq!(scene.bodies[2].mass, Some(3.0));
+    let again = Scene::from_toml(&scene.to_toml().unwrap(), ".").unwrap();
+    assert_eq!(again, scene);
+    let simulator =
+        Simulator::new(&scene, Settings::default().fidelity(Fidelity::Isolated)).unwrap();
+    assert_eq!(simulator.start().0[7], 1.25);
+
+    let wrong = |from: &str, to: &str, words: &[&str]| {
+        let scene = Scene::from_toml(&text.replace(from, to), folder.path());
+        says(scene.unwrap_err().to_string(), words);
+    };
+    wrong(
+        "prefix",
+        "prefox",
+        &["line 14", "robot", "prefox", "prefix"],
+    );
+    wrong("\"fixed\"", "\"tied\"", &["base", "tied", "free"]);
+    wrong("urdf = \"robot.urdf\"", "", &["robot[0]", "urdf"]);
+    wrong("robot.urdf", "rabat.urdf", &["rabat.urdf", "read failed"]);
+    let mut unread = Scene::new(Fluid::fresh_water());
+    unread.robots.push(Robot::default());
+    says(
+        unread.validate().unwrap_err().to_string(),
+        &["robots", "add_robot"],
+    );
+}
+
+#[test]
+fn bodies_start_where_they_say() {
+    let mut scene = read(&pair("revolute", ""), &Robot::default()).unwrap();
+    scene.bodies[1].start = vec![0.5];
+    scene.bodies[0].start = vec![1.0, 2.0, 3.0, 0.0, 1.0, 0.0, 0.0];
+    let start = |scene: &Scene| {
+        let settings = Settings::default().fidelity(Fidelity::Isolated);
+        let simulator = Simulator::new(scene, settings).unwrap();
+        simulator.start().0.clone()
+    };
+    let right = [1.0, 2.0, 3.0, 0.0, 1.0, 0.0, 0.0, 0.5];
+    assert_eq!(start(&scene), DVector::from_row_slice(&right));
+    // `initial.q` is for all.
+    scene.initial.q = vec![0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 0.25];
+    assert_eq!(start(&scene)[7], 0.25);
+    scene.initial.q.clear();
+    let refused = |change: &dyn Fn(&mut Scene), words: &[&str]| {
+        let mut scene = scene.clone();
+        change(&mut scene);
+        says(scene.validate().unwrap_err().to_string(), words);
+    };
+    refused(
+        &|s| s.bodies[1].start.push(1.0),
+        &["body \"b\": start", "needs 1"],
+    );
+    refused(
+        &|s| s.bodies[1].start[0] = f64::NAN,
+        &["body \"b\": start", "finite"],
+    );
+    refused(
+        &|s| s.bodies[0].start[4] = 2.0,
+        &["body \"a\": start", "unit quaternion"],
+    );
+    refused(
+        &|s| s.bodies[1].limits = Some([0.6, 1.0]),
+        &["body \"b\": start", "from 0.6 to 1"],
+    );
+}
+
+/// The example: neutral to a tenth of a newton, its sites in place, and its gradient right.
+#[test]
+fn the_example_is_nearly_neutral() {
+    let path = root().join("examples/rov.urdf");
+    let report = Robot::default()
+        .inspect(&path, &Fluid::fresh_water())
+        .unwrap();
+    assert_eq!(report.bodies.len(), 5);
+    assert!((report.buoyancy - report.weight).abs() < 0.2, "{report}");
+    assert_eq!(report.sites.len(), 9);
+    assert!(report.implausible.is_empty(), "{report}");
+    assert!(report.meshes.is_empty());
+    let shapes: Vec<&str> = report.bodies.iter().map(|b| b.shape.as_str()).collect();
+    assert_eq!(shapes, ["box", "cylinder", "capsule", "capsule", "box"]);
+}
+
+/// Through a chain: q = −2 (3 q' + 0.1) + 0.5; what followers lose and may not pass, their leader does.
+#[test]
+fn chains_of_followers_lead_to_one_joint() {
+    let range = |lower: f64, upper: f64, more: &str| {
+        format!("<limit lower=\"{lower}\" upper=\"{upper}\" effort=\"1\" velocity=\"1\"/>{more}")
+    };
+    let damped = "<dynamics damping=\"0.5\" friction=\"0.1\"/>";
+    let text = robot(
+        &[
+            link("a", ""),
+            link("b", ""),
+            link("c", ""),
+            link("d", ""),
+            joint(
+                "last",
+                "revolute",
+                "a",
+                "d",
+                &range(
+                    -1.0,
+                    1.0,
+                    &format!("<mimic joint=\"middle\" multiplier=\"-2\" offset=\"0.5\"/>{damped}"),
+                ),
+            ),
+            joint(
+                "middle",
+                "revolute",
+                "a",
+                "c",
+                &range(
+                    -9.0,
+                    9.0,
+                    "<mimic joint=\"first\" multiplier=\"3\" offset=\"0.1\"/>",
+                ),
+            ),
+            joint("first", "revolute", "a", "b", &range(-0.3, 2.0, damped)),
+        ]
+        .concat(),
+    );
+    let scene = read(&text, &Robot::default()).unwrap();
+    let body = |name: &str| &scene.bodies[scene.body(name).unwrap().0];
+    let mimic = body("d").mimic.as_ref().unwrap();
+    assert_eq!(mimic.body, "b");
+    assert!((mimic.ratio + 6.0).abs() < 1e-12 && (mimic.offset - 0.3).abs() < 1e-12);
+    let passive = body("b").passive.unwrap();
+    assert!((passive.damping - 0.5 * 37.0).abs() < 1e-12);
+    assert!((passive.friction - 0.7).abs() < 1e-12);
+    let [lower, upper] = body("b").limits.unwrap();
+    assert!((lower + 0.7 / 6.0).abs() < 1e-12 && (upper - 1.3 / 6.0).abs() < 1e-12);
+}

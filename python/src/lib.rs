@@ -3,6 +3,8 @@
 mod array;
 mod body;
 mod contact;
+mod control;
+mod cost;
 mod equations;
 mod error;
 mod fluid;
@@ -110,6 +112,7 @@ fn _hydrograd(m: &Bound<'_, PyModule>) -> PyResult<()> {
     m.add_function(wrap_pyfunction!(_rollout, m)?)?;
     m.add_function(wrap_pyfunction!(tradeoff::tradeoff, m)?)?;
     m.add_function(wrap_pyfunction!(_command, m)?)?;
+    control::register(m)?;
     optimize::register(m)?;
     objective::register(m)
 }

@@ -36,15 +36,25 @@ fn vehicle(links: usize, current: [f64; 3]) -> Scene {
         ..Drag::default()
     };
     let hull = Body::new(Shape::ellipsoid([0.35, 0.25, 0.2]).faces(320));
-    scene.add(hull.named("hull").density(1000.0).thruster().drag(drag(20.0)));
+    scene.add(
+        hull.named("hull")
+            .density(1000.0)
+            .thruster()
+            .drag(drag(20.0)),
+    );
     let half = 0.6 / links as f64;
     let mut parent = ("hull".to_string(), 0.37);
     for k in 0..links {
         let axis = [[0.0, 1.0, 0.0], [0.0, 0.0, 1.0]][k % 2];
         let shape = Shape::ellipsoid([half, 0.035, 0.035]).faces(160);
         let link = Body::new(shape).shape_at([half + 0.01, 0.0, 0.0], [0.0; 3]);
-        let link = link.named(format!("link {k}")).density(1050.0).child_of(parent.0);
-        let link = link.at([parent.1, 0.0, 0.0]).joint(Joint::Revolute { axis });
+        let link = link
+            .named(format!("link {k}"))
+            .density(1050.0)
+            .child_of(parent.0);
+        let link = link
+            .at([parent.1, 0.0, 0.0])
+            .joint(Joint::Revolute { axis });
         scene.add(link.actuated().drag(drag(5.0)));
         parent = (format!("link {k}"), 2.0 * half + 0.02);
     }
@@ -57,8 +67,16 @@ fn vehicle(links: usize, current: [f64; 3]) -> Scene {
     scene
 }
 
-fn simulator(scene: &Scene, fidelity: Fidelity, integrator: Integrator, dt: f64) -> hydrograd::Result<Simulator> {
-    let settings = Settings::default().fidelity(fidelity).integrator(integrator).time_step(dt);
+fn simulator(
+    scene: &Scene,
+    fidelity: Fidelity,
+    integrator: Integrator,
+    dt: f64,
+) -> hydrograd::Result<Simulator> {
+    let settings = Settings::default()
+        .fidelity(fidelity)
+        .integrator(integrator)
+        .time_step(dt);
     let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("target/cache");
     Simulator::cached(scene, settings, &folder)
 }
@@ -72,12 +90,21 @@ fn hand(simulator: &Simulator) -> hydrograd::Result<[f64; 3]> {
 
 /// Iterations a second over 50 knots, and where they go.
 fn speed() -> hydrograd::Result<()> {
-    println!("ten bodies, 15 velocities, 15 controls, 50 knots of one step of 20 ms; medians over iterations with a whole step");
-    println!("| fidelity | integrator | unknowns | iterations/s | rollout ms | derivatives ms | sweep ms | iterations | cost from | to | ended |");
+    println!(
+        "ten bodies, 15 velocities, 15 controls, 50 knots of one step of 20 ms; medians over iterations with a whole step"
+    );
+    println!(
+        "| fidelity | integrator | unknowns | iterations/s | rollout ms | derivatives ms | sweep ms | iterations | cost from | to | ended |"
+    );
     println!("|---|---|---|---|---|---|---|---|---|---|---|");
     let scene = vehicle(9, [0.1, 0.05, 0.0]);
     for fidelity in [Fidelity::Isolated, Fidelity::Auto, Fidelity::Reduced] {
-        for integrator in [Integrator::MomentumEuler, Integrator::VelocityEuler, Integrator::Rk2, Integrator::Rk4] {
+        for integrator in [
+            Integrator::MomentumEuler,
+            Integrator::VelocityEuler,
+            Integrator::Rk2,
+            Integrator::Rk4,
+        ] {
             let simulator = simulator(&scene, fidelity, integrator, 0.02)?;
             let mut goal = hand(&simulator)?;
             goal[1] += 0.3;
@@ -145,7 +172,8 @@ fn closed(
     plants: &[Simulator],
     cost: &Cost,
     goal: [f64; 3],
-    mut act: impl FnMut(usize, f64, &DVector<f64>, &DVector<f64>) -> hydrograd::Result<DVector<f64>> + Send,
+    mut act: impl FnMut(usize, f64, &DVector<f64>, &DVector<f64>) -> hydrograd::Result<DVector<f64>>
+    + Send,
 ) -> hydrograd::Result<(f64, f64)> {
     let (mut total, mut off) = (0.0, 0.0);
     let (q, v) = plants[0].start();
@@ -156,7 +184,12 @@ fn closed(
         let problem = Problem::new(PART, cost.clone());
         total += rollout.value(&problem.objective(plant)?)?;
         let places = rollout.observe("site_positions")?;
-        let miss = |n: usize| (0..3).map(|k| (places[(k, n)] - goal[k]).powi(2)).sum::<f64>().sqrt();
+        let miss = |n: usize| {
+            (0..3)
+                .map(|k| (places[(k, n)] - goal[k]).powi(2))
+                .sum::<f64>()
+                .sqrt()
+        };
         off += (0..PART).map(miss).sum::<f64>();
         let last = &rollout.samples()[PART];
         (q, v) = (last.q.clone(), last.v.clone());
@@ -165,10 +198,23 @@ fn closed(
 }
 
 /// A PID of every coordinate against where it starts: stiffness, damping and integral gain of the hull's place, of its attitude, and of the joints.
-fn pid(plants: &[Simulator], cost: &Cost, goal: [f64; 3], gains: &[f64]) -> hydrograd::Result<(f64, f64)> {
+fn pid(
+    plants: &[Simulator],
+    cost: &Cost,
+    goal: [f64; 3],
+    gains: &[f64],
+) -> hydrograd::Result<(f64, f64)> {
     let model = &plants[0];
     let rest = model.start().0.clone();
-    let group = |i: usize| if i < 3 { 0 } else if i < 6 { 1 } else { 2 };
+    let group = |i: usize| {
+        if i < 3 {
+            0
+        } else if i < 6 {
+            1
+        } else {
+            2
+        }
+    };
     let mut sum = DVector::zeros(model.system().tree.velocities());
     closed(plants, cost, goal, |_, _, q, v| {
         let off = model.difference(&rest, q)?;
@@ -182,7 +228,12 @@ fn pid(plants: &[Simulator], cost: &Cost, goal: [f64; 3], gains: &[f64]) -> hydr
 }
 
 /// Gains tuned by descent of the run's cost in their logarithms; slopes by differences, side by side.
-fn tuned(plants: &[Simulator], cost: &Cost, goal: [f64; 3], integral: bool) -> hydrograd::Result<Vec<f64>> {
+fn tuned(
+    plants: &[Simulator],
+    cost: &Cost,
+    goal: [f64; 3],
+    integral: bool,
+) -> hydrograd::Result<Vec<f64>> {
     let first = [300.0, 100.0, 100.0, 100.0, 30.0, 30.0, 30.0, 5.0, 10.0_f64];
     let open: Vec<usize> = (0..9).filter(|k| integral || k % 3 != 2).collect();
     let gains = |x: &[f64]| {
@@ -218,7 +269,8 @@ fn tuned(plants: &[Simulator], cost: &Cost, goal: [f64; 3], integral: bool) -> h
 /// A hand on a point while the current turns.
 fn hold() -> hydrograd::Result<()> {
     let at = |current: [f64; 3]| vehicle(3, current);
-    let plants = (0..PARTS).map(|part| simulator(&at(current(part)), Fidelity::Auto, Integrator::Rk2, DT));
+    let plants =
+        (0..PARTS).map(|part| simulator(&at(current(part)), Fidelity::Auto, Integrator::Rk2, DT));
     let plants = plants.collect::<hydrograd::Result<Vec<_>>>()?;
     let goal = hand(&plants[0])?;
     let nv = plants[0].system().tree.velocities();
@@ -238,9 +290,14 @@ fn hold() -> hydrograd::Result<()> {
         let gains = tuned(&plants, &cost, goal, integral)?;
         let (total, off) = pid(&plants, &cost, goal, &gains)?;
         println!("| {name} | {total:.4} | {:.2} | – | – | – |", 1e3 * off);
-        eprintln!("{name}: gains {gains:.1?}, tuned in {:.0} s", clock.elapsed().as_secs_f64());
+        eprintln!(
+            "{name}: gains {gains:.1?}, tuned in {:.0} s",
+            clock.elapsed().as_secs_f64()
+        );
     }
-    let problem = Problem::new(15, cost.clone()).hold(2).limits([-LIMIT], [LIMIT]);
+    let problem = Problem::new(15, cost.clone())
+        .hold(2)
+        .limits([-LIMIT], [LIMIT]);
     let settings = MpcSettings {
         every: 1,
         iterations: 1,
@@ -256,7 +313,9 @@ fn hold() -> hydrograd::Result<()> {
             let current = if told { current(part) } else { [0.0; 3] };
             simulator(&at(current), fidelity, Integrator::Rk2, 2.0 * DT)
         };
-        let models = (0..PARTS).map(model).collect::<hydrograd::Result<Vec<_>>>()?;
+        let models = (0..PARTS)
+            .map(model)
+            .collect::<hydrograd::Result<Vec<_>>>()?;
         let mut mpc = Mpc::new(&models[0], &problem, settings)?;
         let mut now = 0;
         let (total, off) = closed(&plants, &cost, goal, |part, time, q, v| {
@@ -269,7 +328,11 @@ fn hold() -> hydrograd::Result<()> {
         let times: Vec<f64> = mpc.replans()[1..].iter().map(|r| 1e3 * r.seconds).collect();
         let longest = times.iter().copied().fold(0.0, f64::max);
         let count = mpc.replans().len();
-        println!("| {name} | {total:.4} | {:.2} | {:.1} | {longest:.1} | {count} |", 1e3 * off, median(times));
+        println!(
+            "| {name} | {total:.4} | {:.2} | {:.1} | {longest:.1} | {count} |",
+            1e3 * off,
+            median(times)
+        );
     }
     Ok(())
 }

@@ -109,14 +109,19 @@ fn limits(place: &str, given: Option<&Bound<'_, PyAny>>) -> PyResult<Vec<f64>> {
         return Ok(Vec::new());
     };
     let expected = "must be a number, or one for each control";
-    let refuse = |_| input(place, given.repr().map_or("?".into(), |r| r.to_string()), expected);
+    let refuse = |_| {
+        input(
+            place,
+            given.repr().map_or("?".into(), |r| r.to_string()),
+            expected,
+        )
+    };
     match given.extract::<f64>() {
         Ok(all) => Ok(vec![all]),
         Err(_) => given.extract::<Vec<f64>>().map_err(refuse),
     }
 }
 
-#[expect(clippy::too_many_arguments, reason = "one per keyword")]
 fn problem(
     cost: Vec<PyRef<'_, CostTerm>>,
     knots: usize,
@@ -187,7 +192,14 @@ impl Told {
             return ControlFlow::Continue(());
         };
         let told = Python::attach(|py| -> PyResult<bool> {
-            let parts = (p.iteration, p.cost, p.expected, p.part, p.regularisation, p.gradient);
+            let parts = (
+                p.iteration,
+                p.cost,
+                p.expected,
+                p.part,
+                p.regularisation,
+                p.gradient,
+            );
             let progress = class(py, "IlqrProgress")?.call1(parts)?;
             call.bind(py).call1((progress,))?.is_truthy()
         });
@@ -247,7 +259,10 @@ fn planned<'py>(simulator: &Bound<'py, Simulator>, plan: Plan) -> PyResult<Bound
     fields.set_item("stop", stopped(plan.stop))?;
     fields.set_item("seconds", seconds)?;
     fields.set_item("tracking", Bound::new(py, tracking)?)?;
-    fields.set_item("rollout", Bound::new(py, Rollout::new(simulator, plan.rollout))?)?;
+    fields.set_item(
+        "rollout",
+        Bound::new(py, Rollout::new(simulator, plan.rollout))?,
+    )?;
     class(py, "Plan")?.call((), Some(&fields))
 }
 

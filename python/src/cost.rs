@@ -21,7 +21,11 @@ pub struct CostTerm {
     pub last: bool,
 }
 
-fn target(place: &str, given: &Bound<'_, PyAny>, times: Option<&Bound<'_, PyAny>>) -> PyResult<Target> {
+fn target(
+    place: &str,
+    given: &Bound<'_, PyAny>,
+    times: Option<&Bound<'_, PyAny>>,
+) -> PyResult<Target> {
     use crate::error::OrRaise;
     let place = format!("{place}: target");
     let Some(times) = times else {
@@ -172,8 +176,17 @@ impl Custom {
         let sample = at.sample();
         let vector = |x: &DVector<f64>| array::to_python(py, x.as_slice().to_vec(), &[x.len()]);
         let control = at.control.map(vector).transpose()?;
-        let parts = (at.knot, sample.time, vector(&sample.q)?, vector(&sample.v)?, control);
-        let point = py.import("hydrograd._optimize")?.getattr("Point")?.call1(parts)?;
+        let parts = (
+            at.knot,
+            sample.time,
+            vector(&sample.q)?,
+            vector(&sample.v)?,
+            control,
+        );
+        let point = py
+            .import("hydrograd._optimize")?
+            .getattr("Point")?
+            .call1(parts)?;
         let given = self.0.bind(py).call1((point,))?;
         match given.cast::<PyTuple>() {
             Ok(parts) if [3, 6].contains(&parts.len()) => Ok(parts.iter().collect()),

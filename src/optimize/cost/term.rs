@@ -193,8 +193,10 @@ impl Term {
                         .integrate(&q, &DVector::zeros(nv))
                         .map_err(|e| match e {
                             Error::Input {
-                                value, expected, ..
-                            } => Error::input(format!("{place}: target"), value, expected),
+                                place: what,
+                                value,
+                                expected,
+                            } => Error::input(format!("{place}: target: {what}"), value, expected),
                             other => other,
                         })?;
                 }

@@ -74,6 +74,8 @@ pub struct Mpc {
     /// Time step of the model at which controls were last decided, and those.
     held: Option<(i64, DVector<f64>)>,
     replans: Vec<Replan>,
+    /// Controls before the first plan, as the problem has them.
+    previous: Option<DVector<f64>>,
     /// Time of the first call, s.
     start: f64,
 }
@@ -126,6 +128,7 @@ impl Mpc {
         }
         Ok(Self {
             model: model.clone(),
+            previous: ready.previous.clone(),
             ready,
             settings,
             plan: None,
@@ -138,6 +141,7 @@ impl Mpc {
     /// Forgets plans, so that the next call starts anew.
     pub fn reset(&mut self) {
         (self.plan, self.held) = (None, None);
+        self.ready.previous = self.previous.clone();
         self.replans.clear();
     }
 
@@ -159,6 +163,7 @@ impl Mpc {
                 ),
             ));
         }
+        self.previous = ready.previous.clone();
         (self.ready, self.model) = (ready, model.clone());
         Ok(())
     }

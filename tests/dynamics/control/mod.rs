@@ -73,26 +73,26 @@ fn vehicle(current: [f64; 3]) -> Scene {
         quadratic: 1.0,
         ..Drag::default()
     };
-    let hull = Body::new(Shape::ellipsoid([0.4, 0.25, 0.2]).faces(160));
+    let hull = Body::new(Shape::ellipsoid([0.2, 0.12, 0.1]).faces(160));
     scene.add(
         hull.named("hull")
             .density(998.0)
             .thruster()
             .drag(drag.clone()),
     );
-    let mut parent = ("hull", 0.42);
+    let mut parent = ("hull", 0.22);
     for (name, axis) in [("upper", [0.0, 1.0, 0.0]), ("lower", [0.0, 0.0, 1.0])] {
-        let link = Body::new(Shape::ellipsoid([0.15, 0.04, 0.04]).faces(80));
+        let link = Body::new(Shape::ellipsoid([0.1, 0.03, 0.03]).faces(80));
         let link = link
             .named(name)
             .density(1100.0)
-            .shape_at([0.17, 0.0, 0.0], [0.0; 3]);
+            .shape_at([0.11, 0.0, 0.0], [0.0; 3]);
         let link = link.child_of(parent.0).at([parent.1, 0.0, 0.0]);
         let joint = Joint::Revolute { axis };
         scene.add(link.joint(joint).actuated().drag(drag.clone()));
-        parent = (name, 0.34);
+        parent = (name, 0.22);
     }
-    scene.add_site(Site::new("hand", "lower").at([0.34, 0.0, 0.0]));
+    scene.add_site(Site::new("hand", "lower").at([0.22, 0.0, 0.0]));
     scene
 }
 

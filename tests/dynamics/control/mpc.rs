@@ -17,7 +17,7 @@ fn simulator(current: [f64; 3], fidelity: Fidelity, time_step: f64) -> Simulator
     Simulator::cached(&scene, settings, &root().join("target/cache")).unwrap()
 }
 
-const POINT: [f64; 3] = [1.1, 0.0, 0.0];
+const POINT: [f64; 3] = [0.66, 0.0, 0.0];
 
 fn problem() -> Problem {
     let cost = Cost::default()
@@ -26,7 +26,7 @@ fn problem() -> Problem {
         .running(terms::velocity([0.0; 8], 1.0))
         .running(terms::effort(1e-3))
         .running(terms::control_change(1e-2));
-    Problem::new(15, cost).hold(4).limits([-40.0], [40.0])
+    Problem::new(15, cost).hold(4).limits([-20.0], [20.0])
 }
 
 /// Mean distance of the hand from the point over a part of a run, m.

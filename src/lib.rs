@@ -34,7 +34,12 @@ mod water;
 /// The book's programs are tested.
 #[cfg(doctest)]
 #[doc = include_str!("../docs/gradients.md")]
-mod book {}
+mod gradients {}
+
+/// The same of a page whose programs need the feature.
+#[cfg(all(doctest, feature = "opt"))]
+#[doc = include_str!("../docs/control.md")]
+mod control {}
 
 pub use error::{Error, Result};
 pub use geometry::{MassProperties, MeshReport, TriMesh};

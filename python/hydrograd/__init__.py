@@ -5,7 +5,7 @@ scalar of itself with respect to controls, initial state and physical parameters
 as their first index.
 """
 
-from hydrograd import objective, optimize
+from hydrograd import cost, objective, optimize
 from hydrograd._added_mass import added_mass
 from hydrograd._contacts import ContactForces
 from hydrograd._export import plot, to_pandas, to_xarray
@@ -103,6 +103,7 @@ __all__ = [
     "added_mass",
     "box",
     "capsule",
+    "cost",
     "cylinder",
     "ellipsoid",
     "fixed",

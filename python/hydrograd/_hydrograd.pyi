@@ -7,8 +7,8 @@ from numpy.typing import ArrayLike, NDArray
 
 from hydrograd._contacts import ContactForces
 from hydrograd._gradient import Gradient, StepGradient, Tangents
-from hydrograd._optimize import Grasp, Optimum, Smoothed
-from hydrograd._policy import Policy
+from hydrograd._optimize import Grasp, IlqrProgress, MpcRun, Optimum, Plan, Point, Replan, Smoothed
+from hydrograd._policy import Observation, Policy
 from hydrograd._tradeoff import Tradeoff
 
 __version__: str
@@ -528,7 +528,7 @@ class Simulator:
         joint that a motion drives both are what the motion says: 0, or that."""
     def with_gains(self, gains: ArrayLike) -> Simulator:
         """The same with other gains of its controller, (gains,)."""
-    def with_policy(self, policy: Policy) -> Simulator:
+    def with_policy(self, policy: Policy | Tracking) -> Simulator:
         """The same with a controller of your own in place of the scene's: an object with `act(observation)`, which gives the controls
         (control_size,), and, for gradients, `act_vjp`: see `hydrograd.Policy`. It is called once a step, and once a step of the
         reverse sweep, with the interpreter's lock."""
@@ -536,7 +536,7 @@ class Simulator:
         """The same with contact that sets in over `factor` times its width, with a stiffness `factor` times smaller: what a descent starts on and
         hardens (`hydrograd.optimize.continuation`). Nothing changes where nothing touches."""
     @property
-    def policy(self) -> Policy | None:
+    def policy(self) -> Policy | Tracking | None:
         """Its controller, if that is written in Python."""
     @property
     def gains(self) -> _Array:
@@ -839,6 +839,110 @@ def final_observable(name: str, entry: int, target: float, weight: float = 1.0) 
 def effort(weight: float) -> Objective:
     """`weight` times the sum of the squared open-loop controls (N², N² m²)."""
 
+_Derivative = ArrayLike | None
+
+@final
+class CostTerm:
+    @staticmethod
+    def configuration(target: ArrayLike, weights: ArrayLike, *, times: ArrayLike | None = None, last: bool = False) -> CostTerm: ...
+    @staticmethod
+    def velocity(target: ArrayLike, weights: ArrayLike, *, times: ArrayLike | None = None, last: bool = False) -> CostTerm: ...
+    @staticmethod
+    def effort(weights: ArrayLike, *, target: ArrayLike | None = None, times: ArrayLike | None = None) -> CostTerm: ...
+    @staticmethod
+    def control_change(weights: ArrayLike) -> CostTerm: ...
+    @staticmethod
+    def position(
+        frame: str,
+        target: ArrayLike,
+        weights: ArrayLike,
+        *,
+        point: ArrayLike | None = None,
+        times: ArrayLike | None = None,
+        last: bool = False,
+    ) -> CostTerm: ...
+    @staticmethod
+    def orientation(frame: str, target: ArrayLike, weights: ArrayLike, *, times: ArrayLike | None = None, last: bool = False) -> CostTerm: ...
+    @staticmethod
+    def observable(
+        name: str,
+        entries: Sequence[int],
+        target: ArrayLike,
+        weights: ArrayLike,
+        *,
+        times: ArrayLike | None = None,
+        last: bool = False,
+    ) -> CostTerm: ...
+    @staticmethod
+    def custom(
+        function: Callable[
+            [Point],
+            tuple[float, _Derivative, _Derivative] | tuple[float, _Derivative, _Derivative, _Derivative, _Derivative, _Derivative],
+        ],
+        *,
+        last: bool = False,
+    ) -> CostTerm: ...
+
+@final
+class Tracking:
+    def act(self, observation: Observation, /) -> _Array: ...
+    def act_vjp(self, observation: Observation, control_bar: ArrayLike, /) -> tuple[_Array, _Array]: ...
+
+@final
+class Mpc:
+    def __new__(
+        cls,
+        model: Simulator,
+        cost: Sequence[CostTerm],
+        *,
+        knots: int,
+        hold: int = 1,
+        lower: ArrayLike | None = None,
+        upper: ArrayLike | None = None,
+        previous: ArrayLike | None = None,
+        every: int = 1,
+        iterations: int = 3,
+        first_iterations: int = 50,
+        feedback: bool = True,
+        tolerance: float = 1e-6,
+        trials: int = 10,
+    ) -> Mpc: ...
+    @property
+    def model(self) -> Simulator: ...
+    @property
+    def replans(self) -> list[Replan]: ...
+    def set_model(self, model: Simulator) -> None: ...
+    def reset(self) -> None: ...
+    def control(self, time: float, q: ArrayLike, v: ArrayLike) -> _Array: ...
+    def run(
+        self,
+        plant: Simulator,
+        steps: int,
+        *,
+        state: State | None = None,
+        cost: Sequence[CostTerm] | None = None,
+        progress: _Progress | None = None,
+    ) -> MpcRun: ...
+
+def ilqr(
+    simulator: Simulator,
+    cost: Sequence[CostTerm],
+    *,
+    knots: int,
+    hold: int = 1,
+    lower: ArrayLike | None = None,
+    upper: ArrayLike | None = None,
+    previous: ArrayLike | None = None,
+    state: State | None = None,
+    guess: ArrayLike | Plan | Tracking | None = None,
+    shift: int = 0,
+    iterations: int = 100,
+    tolerance: float = 1e-9,
+    target: float | None = None,
+    regularisation: float = 0.0,
+    trials: int = 10,
+    progress: Callable[[IlqrProgress], object] | None = None,
+) -> Plan: ...
 def minimise(
     function: Callable[[_Array], _Evaluated],
     start: ArrayLike,

@@ -1,4 +1,4 @@
-"""What descents and the recipe for grasps come to."""
+"""What descents, optimal control and the recipe for grasps come to."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 if TYPE_CHECKING:
-    from hydrograd._hydrograd import Rollout
+    from hydrograd._hydrograd import Rollout, Tracking
 
 
 @dataclass(frozen=True, eq=False)
@@ -79,3 +79,106 @@ class Grasp:
     """Gradients."""
     failures: int
     """Simulations that failed."""
+
+
+@dataclass(frozen=True, eq=False)
+class Point:
+    """A knot of a trajectory, as a cost of your own sees it."""
+
+    knot: int
+    """Number of the knot."""
+    time: float
+    """Time, s."""
+    q: NDArray[np.float64]
+    """Joint coordinates, (q_size,)."""
+    v: NDArray[np.float64]
+    """Generalised velocity, (v_size,)."""
+    control: NDArray[np.float64] | None
+    """Open-loop controls from there to the next knot, (control_size,); None at the end."""
+
+
+@dataclass(frozen=True)
+class IlqrProgress:
+    """State of iLQR after an iteration."""
+
+    iteration: int
+    """Iterations made."""
+    cost: float
+    """Cost."""
+    expected: float
+    """Fall of the cost that the model of the iteration expected."""
+    part: float
+    """Part of the step that was taken; 0: none, the regularisation grew instead."""
+    regularisation: float
+    """Regularisation of the iteration."""
+    gradient: float
+    """Largest entry of the gradient by the controls, where no limit holds them, at the start of the iteration."""
+
+
+@dataclass(frozen=True, eq=False)
+class Plan:
+    """Controls over a horizon, the trajectory that they make, and the feedback about it."""
+
+    controls: NDArray[np.float64]
+    """The controls, (knots, control_size), N and N m."""
+    rollout: Rollout
+    """The trajectory."""
+    gains: NDArray[np.float64]
+    """How each knot's controls best answer to a change of its state, (knots, control_size, 2 v_size): coordinates in their tangent space, then velocity. Rows of controls that a
+    limit holds are zero."""
+    steps: NDArray[np.float64]
+    """The step by which the last model would change the controls, (knots, control_size)."""
+    tracking: Tracking
+    """The feedback that holds a robot to it: a policy, for `Simulator.with_policy`."""
+    cost: float
+    """Cost of the trajectory."""
+    costs: NDArray[np.float64]
+    """Cost of the start and after every iteration, (iterations + 1,)."""
+    gradient: float
+    """Largest entry of the gradient by the controls, where no limit holds them."""
+    regularisation: float
+    """Regularisation of the last model."""
+    iterations: int
+    """Iterations made."""
+    stop: Literal["stationary", "cost", "target", "stuck", "budget", "asked"]
+    """Why it ended: nothing is to be gained by the model, a whole step lowered the cost by too little, the target was reached, no step lowered the cost, the iterations were used
+    up, or `progress` asked for it."""
+    seconds: dict[str, float]
+    """Where the time went, s: "rollouts", "derivatives", "sweeps", and in "total"."""
+
+    @property
+    def rate(self) -> float:
+        """Iterations a second."""
+        return self.iterations / self.seconds["total"]
+
+
+@dataclass(frozen=True)
+class Replan:
+    """One plan of model-predictive control."""
+
+    time: float
+    """Time of the plant, s."""
+    iterations: int
+    """Iterations made."""
+    cost: float
+    """Cost of the plan by the model; that of the plan before where this one failed."""
+    stop: str | None
+    """Why it ended, as in `Plan`; None where it failed."""
+    seconds: float
+    """Time that it took, s."""
+    failure: str | None
+    """Why it failed; the plan before then goes on."""
+
+
+@dataclass(frozen=True, eq=False)
+class MpcRun:
+    """What became of a plant under model-predictive control."""
+
+    rollout: Rollout
+    """Its trajectory; the controls are those that were applied."""
+    rates: NDArray[np.float64]
+    """The running cost at each of its states but the last, (steps,), 1/s."""
+    cost: float
+    """Their integral over time, with the last terms at the end."""
+    replans: list[Replan]
+    """The plans that were made for it."""

@@ -3,6 +3,8 @@
 mod array;
 mod body;
 mod contact;
+mod control;
+mod cost;
 mod equations;
 mod error;
 mod fluid;
@@ -116,6 +118,7 @@ fn _hydrograd(m: &Bound<'_, PyModule>) -> PyResult<()> {
     m.add_function(wrap_pyfunction!(tradeoff::tradeoff, m)?)?;
     m.add_function(wrap_pyfunction!(_command, m)?)?;
     m.add_function(wrap_pyfunction!(robot::inspect_robot, m)?)?;
+    control::register(m)?;
     optimize::register(m)?;
     objective::register(m)
 }

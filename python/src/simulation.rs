@@ -1,6 +1,7 @@
 //! What simulators do: the methods of their class.
 
 use crate::array::{self, Dim, array};
+use crate::control::Tracking;
 use crate::equations::Equations;
 use crate::error::{OrRaise, batch, counts, exception, input, own};
 use crate::gradient::{self, by_name};
@@ -15,7 +16,7 @@ use crate::scene::Scene;
 use crate::settings::{Keywords, row_or};
 use crate::simulator::Simulator;
 use crate::state::{Record, State};
-use hydrograd::simulate::{Checkpoints, Halted};
+use hydrograd::simulate::{Checkpoints, Halted, Policy};
 use hydrograd::{Controls, dynamics};
 use nalgebra::{DMatrix, DVector};
 use numpy::PyArrayDyn;
@@ -499,9 +500,13 @@ impl Simulator {
     /// reverse sweep, with the interpreter's lock.
     pub fn with_policy(&self, policy: &Bound<'_, PyAny>) -> PyResult<Self> {
         let sizes = (self.controls_size(), self.v_size());
-        let controller = Controller::new(policy, sizes)?;
+        let controller: Box<dyn Policy> = match policy.cast::<Tracking>() {
+            // Without a detour over Python.
+            Ok(tracking) => Box::new(tracking.get().inner.clone()),
+            Err(_) => Box::new(Controller::new(policy, sizes)?),
+        };
         let mut out = self.changed(|inner| {
-            inner.set_policy(Box::new(controller));
+            inner.set_policy(controller);
             Ok(())
         })?;
         out.policy = Some(policy.clone().unbind());

@@ -153,6 +153,12 @@ def test_cookbook(tmp_path, monkeypatch):
     assert (tmp_path / "run.html").stat().st_size > 500_000
 
 
+def test_what_is_shown_of_control():
+    """The program in docs/control.md runs, and holds what it asserts."""
+    (block,) = re.findall(r"^```python\n(.*?)^```", (ROOT / "docs/control.md").read_text(), re.MULTILINE | re.DOTALL)
+    exec(block, {})
+
+
 def test_what_is_shown_of_replays(tmp_path, monkeypatch):
     """The programs in docs/viewer.md run."""
     blocks = re.findall(r"^```python\n(.*?)^```", (ROOT / "docs/viewer.md").read_text(), re.MULTILINE | re.DOTALL)

@@ -2,8 +2,8 @@
 
 use super::JointModel;
 use crate::adjoint::lie::{
-    Mat3, Pose, Vec3, Vec6, cross_force, cross_motion, exp_jacobian, exp_jacobian_inverse,
-    exp_jacobian_inverse_jvp, exp_matrix,
+    Mat3, Pose, Vec3, Vec6, angular, cross_force, cross_motion, exp_jacobian, exp_jacobian_inverse,
+    exp_jacobian_inverse_jvp, exp_matrix, point_velocity, six,
 };
 use nalgebra::{DMatrix, DVector};
 use std::ops::Range;
@@ -539,6 +539,20 @@ impl Tree {
                     let mut entry = out.fixed_view_mut::<6, 1>(6 * b, k);
                     entry += kinematics.columns[column];
                 }
+            }
+        }
+        out
+    }
+
+    /// Velocity of the point of body `b` that is at `x` (m, world) and the body's angular velocity, world axes, per generalised velocity: 6 × nv.
+    pub fn point_jacobian(&self, kinematics: &Kinematics, b: usize, x: &Vec3) -> DMatrix<f64> {
+        let mut out = DMatrix::zeros(6, self.velocities());
+        for a in self.carrying(b) {
+            for (column, k) in self.links[a].terms() {
+                let column = &kinematics.columns[column];
+                let moved = six(&point_velocity(column, x), &angular(column));
+                let mut entry = out.column_mut(k);
+                entry += moved;
             }
         }
         out

@@ -10,18 +10,29 @@
 //! Through contact a trajectory's own gradient may say little: [`smoothed`] averages it over a neighbourhood, [`continuation`] descends softer contact first, and
 //! [`grasp()`] is a recipe of these, pushes and an evolution strategy with which a gripper catches what it hasn't seen.
 //!
+//! Where steps' Jacobians say enough, [`ilqr()`] finds controls in tens of iterations, within limits and with the feedback that holds a robot to them; [`Mpc`] does so again and
+//! again from where a plant has got to.
+//!
 //! # References
 //! J. Nocedal, "Updating Quasi-Newton Matrices with Limited Storage", 1980; J. Moré and D. Thuente, "Line Search Algorithms with
 //! Guaranteed Sufficient Decrease", 1994.
 
 mod continuation;
+mod cost;
 mod descent;
 mod grasp;
+mod ilqr;
+mod mpc;
 mod smoothed;
 
 pub use continuation::continuation;
+pub use cost::{Cost, CostPoint, CustomCost, Quadratic, Target, Term, Weights, terms};
 pub use descent::minimise;
 pub use grasp::{Finger, Grasp, GraspCost, GraspSettings, GraspStage, GraspTask, grasp};
+pub use ilqr::{
+    Guess, IlqrProgress, IlqrSettings, IlqrStop, IlqrTimes, Plan, Problem, Tracking, ilqr,
+};
+pub use mpc::{Mpc, MpcProgress, MpcRun, MpcSettings, Replan};
 pub use smoothed::{Estimate, Smoothed, Smoothing, smoothed};
 
 use crate::simulate::{Controls, Objective, Simulator};

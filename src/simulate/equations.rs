@@ -192,16 +192,7 @@ impl Equations<'_> {
     pub fn point_jacobian(&self, body: usize, point: &Vec3) -> Result<DMatrix<f64>> {
         let x = self.body(body)?.apply(point);
         let tree = &self.at.system.tree;
-        let mut out = DMatrix::zeros(6, tree.velocities());
-        for link in tree.carrying(body).map(|b| &tree.links()[b]) {
-            for (column, k) in link.terms() {
-                let column = &self.at.kinematics.columns[column];
-                let moved = six(&point_velocity(column, &x), &angular(column));
-                let mut entry = out.column_mut(k);
-                entry += moved;
-            }
-        }
-        Ok(out)
+        Ok(tree.point_jacobian(&self.at.kinematics, body, &x))
     }
 
     /// Velocity of that point and the body's angular velocity at `v`, world axes: m/s, rad/s.

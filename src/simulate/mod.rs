@@ -2,6 +2,7 @@
 
 mod checkpoint;
 mod controls;
+mod deciding;
 mod equations;
 mod finite;
 mod flow;
@@ -59,6 +60,7 @@ pub use summary::Summary;
 pub use tangents::{Displacement, Tangents, Variables};
 
 pub use crate::assembly::Choices;
+pub use crate::dynamics::State;
 pub use crate::policy::{
     Action, ActionBar, Constant, Observation, OpenLoop, Pd, PdAxis, Playback, Policy, PushThenLock,
     SpeedStage, SpeedStages,

@@ -80,6 +80,21 @@ impl Rollout {
         Ok(DMatrix::from_iterator(rows, states, values.concat()))
     }
 
+    /// An observable at state `n` alone, last index fastest.
+    ///
+    /// # Errors
+    /// As [`Rollout::observe`], and a state that there isn't.
+    pub fn observable_value(&self, name: &str, n: usize) -> Result<Vec<f64>> {
+        if n >= self.states().len() {
+            return Err(Error::input(
+                "observable: state",
+                n,
+                format!("must be at most {}, the last state", self.steps()),
+            ));
+        }
+        observable(name)?.value(&self.reading(n))
+    }
+
     /// State `n`, as observables read it.
     pub(super) fn reading(&self, n: usize) -> Reading<'_> {
         Reading {

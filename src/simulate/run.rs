@@ -1,7 +1,8 @@
 //! Running a simulator: rollouts and single steps.
 
 use super::controls::MOST_STEPS;
-use super::{Controls, Record, Rollout, Simulator};
+use super::deciding::Deciding;
+use super::{Controls, Record, Rollout, Sample, Simulator};
 use crate::adjoint::step;
 use crate::dynamics::State;
 use crate::memory;
@@ -116,6 +117,36 @@ impl Simulator {
         }
     }
 
+    /// As [`Simulator::rollout_from`], with open-loop controls that are decided as it goes: `decide` gives those of a step, by its number from 0, from what is observed
+    /// before it. They become the rollout's [`Rollout::controls`], so that its derivatives are those of a rollout with these controls, given beforehand.
+    ///
+    /// # Errors
+    /// A state of other sizes, more steps than a rollout takes, the first step that fails, with its time, and whatever `decide` reports.
+    pub fn rollout_deciding(
+        &self,
+        state: &State,
+        steps: usize,
+        decide: impl FnMut(usize, &Sample) -> Result<DVector<f64>> + Send,
+    ) -> Result<Rollout> {
+        self.check_sizes(state)?;
+        self.check_steps(steps)?;
+        let none = DMatrix::zeros(self.system().controls, 0);
+        let trajectory = self.trajectory(&none);
+        let (tape, made) = rayon::scope(|_| {
+            let deciding = Deciding::new(trajectory, decide);
+            let tape = step::forward(&deciding, state.clone(), steps, |_| Ok(()))?;
+            Ok::<_, Error>((tape, deciding.made()))
+        })?;
+        Ok(Rollout {
+            simulator: self.clone(),
+            initial_velocity: tape.observations()[0].v.clone(),
+            tape,
+            gaps: Default::default(),
+            report: Default::default(),
+            controls: made,
+        })
+    }
+
     /// One step from a state with the controls `control`, to which the scene's own controller adds: the next state, and the record
     /// that has the step's derivatives. The steps of a rollout, to the bit.
     ///
@@ -160,7 +191,11 @@ impl Simulator {
                 format!("must have {} rows, one per control", self.system().controls),
             ));
         }
-        let steps = matrix.ncols();
+        self.check_steps(matrix.ncols())
+    }
+
+    /// Refuses too many steps; gives their number.
+    fn check_steps(&self, steps: usize) -> Result<usize> {
         if steps > MOST_STEPS {
             return Err(Error::input(
                 "steps",

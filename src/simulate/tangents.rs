@@ -322,6 +322,32 @@ impl Rollout {
         out
     }
 
+    /// An observable at state `n` and its derivatives with respect to that state's (q, v), q in its tangent space: the value, last index fastest, and tangents × 2nv.
+    ///
+    /// # Errors
+    /// A name that no observable with derivatives has, a state that there isn't, a value that can't be found.
+    pub fn observable_jacobian(&self, name: &str, n: usize) -> Result<(Vec<f64>, DMatrix<f64>)> {
+        let value = self.observable_value(name, n)?;
+        let nv = self.simulator.system().tree.velocities();
+        let half =
+            |from: usize| DMatrix::from_fn(nv, 2 * nv, |i, k| f64::from(u8::from(k == from + i)));
+        let none = DMatrix::zeros(0, 2 * nv);
+        let units = Directions {
+            q: half(0),
+            v: half(nv),
+            parameters: none.clone(),
+            places: Vec::new(),
+            gains: none.clone(),
+            controls: Box::new(move |_| none.clone()),
+        };
+        let at = Moved {
+            state: n,
+            q: &units.q,
+            v: &units.v,
+        };
+        Ok((value, self.observed(differentiable(name)?, &units, &at)))
+    }
+
     /// Displacements side by side, without the parameters that none displacements.
     fn directions_of<'a>(&self, displacements: &'a [Displacement]) -> Directions<'a> {
         let count = displacements.len();

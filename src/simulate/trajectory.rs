@@ -91,13 +91,18 @@ impl<'a> Trajectory<'a> {
         Ok(sample)
     }
 
-    /// What acts during a step, and the controller's next mode.
-    fn input(&self, index: usize, state: &State, sample: &Sample) -> Result<(Input, usize)> {
+    /// What acts during a step beside the open-loop controls `control`, and the controller's next mode.
+    fn input(
+        &self,
+        mut control: DVector<f64>,
+        index: usize,
+        state: &State,
+        sample: &Sample,
+    ) -> Result<(Input, usize)> {
         let seen = observation(state, &sample.v, sample.time);
         let action = self.simulator.policy().act(&seen)?;
         let mode = action.mode;
         expect_length("hold", action.hold.len(), self.stepper.system.len(), "body")?;
-        let mut control = self.controls.column(index).into_owned();
         if !action.control.is_empty() {
             if action.control.len() != control.len() {
                 return Err(Error::input(
@@ -163,6 +168,30 @@ impl<'a> Trajectory<'a> {
     /// The system with its derivatives at a configuration of the trajectory; an error has the time.
     pub fn at(&self, q: &DVector<f64>, time: f64) -> Result<Linearisation<'a>> {
         self.stepper.linearise(q).map_err(|e| e.at_time(time))
+    }
+
+    /// A step whose open-loop controls `decide` gives from what is observed before it.
+    pub(super) fn advance(
+        &self,
+        index: usize,
+        state: &State,
+        decide: impl FnOnce(&Sample) -> Result<DVector<f64>>,
+    ) -> Result<(State, Sample, StepRecord)> {
+        let run = || {
+            let gap = self.gap(state)?;
+            let e = self.stepper.linearise(&state.q)?;
+            let mut sample = self.observe(&e, state, gap)?;
+            let control = decide(&sample)?;
+            let (input, mode) = self.input(control, index, state, &sample)?;
+            let step = self.stepper.step(&e, state, &sample.v, &input);
+            let clearance = self.simulator.clearance();
+            let (mut next, record) = step.map_err(|e| clearance.explain(e))?;
+            next.mode = mode;
+            sample.control = input.control;
+            sample.hold = input.hold;
+            Ok((next, sample, record))
+        };
+        run().map_err(|e: Error| self.explain(e, state))
     }
 
     /// An error of a step at a state, with the time, and with what it comes from.
@@ -313,20 +342,9 @@ impl Step for Trajectory<'_> {
     type Error = Error;
 
     fn step(&self, index: usize, state: &State) -> Result<(State, Sample, StepRecord)> {
-        let run = || {
-            let gap = self.gap(state)?;
-            let e = self.stepper.linearise(&state.q)?;
-            let mut sample = self.observe(&e, state, gap)?;
-            let (input, mode) = self.input(index, state, &sample)?;
-            let step = self.stepper.step(&e, state, &sample.v, &input);
-            let clearance = self.simulator.clearance();
-            let (mut next, record) = step.map_err(|e| clearance.explain(e))?;
-            next.mode = mode;
-            sample.control = input.control;
-            sample.hold = input.hold;
-            Ok((next, sample, record))
-        };
-        run().map_err(|e: Error| self.explain(e, state))
+        self.advance(index, state, |_| {
+            Ok(self.controls.column(index).into_owned())
+        })
     }
 
     fn last(&self, _index: usize, state: &State) -> Result<Sample> {

@@ -1,6 +1,8 @@
 //! Motion: what it conserves, its gradients, how runs are resumed and ended, and descent on them.
 
 mod balance;
+#[cfg(feature = "opt")]
+mod control;
 mod driven;
 mod extremes;
 mod films;

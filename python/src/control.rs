@@ -1,0 +1,501 @@
+//! Optimal control: iLQR, the feedback about a plan, and model-predictive control.
+
+use crate::array::{self, Dim, array};
+use crate::cost::CostTerm;
+use crate::error::{OrRaise, input, internal};
+use crate::interrupt::{Interrupt, Progress, followed, long};
+use crate::rollout::Rollout;
+use crate::simulator::Simulator;
+use crate::state::State;
+use hydrograd::optimize::{
+    self, Cost, Guess, IlqrProgress, IlqrSettings, IlqrStop, MpcSettings, Plan, Problem, Replan,
+};
+use hydrograd::simulate::{Action, Observation, Policy};
+use nalgebra::{DMatrix, DVector};
+use numpy::PyArrayDyn;
+use pyo3::gc::{PyTraverseError, PyVisit};
+use pyo3::prelude::*;
+use pyo3::types::{PyDict, PyList};
+use std::ops::ControlFlow;
+use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
+
+fn class<'py>(py: Python<'py>, name: &str) -> PyResult<Bound<'py, PyAny>> {
+    py.import("hydrograd._optimize")?.getattr(name)
+}
+
+fn stopped(stop: IlqrStop) -> String {
+    let stop = serde_json::to_value(stop).unwrap_or_default();
+    stop.as_str().unwrap_or_default().to_string()
+}
+
+/// The feedback that holds a robot to a plan, `u = ū + K (x ⊖ x̄)` within the plan's limits: a policy, for `Simulator.with_policy`. Before the plan starts and after it has ended
+/// the nearest controls are held, without feedback.
+#[pyclass(frozen, module = "hydrograd")]
+pub struct Tracking {
+    /// The Rust side's.
+    pub inner: optimize::Tracking,
+}
+
+struct Seen {
+    time: f64,
+    q: DVector<f64>,
+    v: DVector<f64>,
+}
+
+impl Seen {
+    fn of(observation: &Bound<'_, PyAny>) -> PyResult<Self> {
+        let row = |name: &str| -> PyResult<DVector<f64>> {
+            let given = observation.getattr(name)?;
+            Ok(array::row(&format!("tracking: {name}"), &given)?.into())
+        };
+        Ok(Self {
+            time: observation.getattr("time")?.extract()?,
+            q: row("q")?,
+            v: row("v")?,
+        })
+    }
+
+    fn observation(&self) -> Observation<'_> {
+        Observation {
+            step: 0,
+            time: self.time,
+            q: &self.q,
+            v: &self.v,
+            mode: 0,
+        }
+    }
+}
+
+#[pymethods]
+impl Tracking {
+    /// The controls, (control_size,), at an observation: its `time`, `q` and `v`.
+    fn act<'py>(&self, observation: &Bound<'py, PyAny>) -> PyResult<Bound<'py, PyArrayDyn<f64>>> {
+        let seen = Seen::of(observation)?;
+        let Action { control, .. } = self.inner.act(&seen.observation()).or_raise()?;
+        let n = control.len();
+        array::to_python(observation.py(), control, &[n])
+    }
+
+    /// Transpose of `act`: cotangents (q_bar, v_bar) from that of the controls.
+    fn act_vjp<'py>(
+        &self,
+        observation: &Bound<'py, PyAny>,
+        control_bar: &Bound<'py, PyAny>,
+    ) -> PyResult<(Bound<'py, PyArrayDyn<f64>>, Bound<'py, PyArrayDyn<f64>>)> {
+        let seen = Seen::of(observation)?;
+        let bar = DVector::from_vec(array::row("tracking: control_bar", control_bar)?);
+        let found = self.inner.act_vjp(&seen.observation(), &bar).or_raise()?;
+        let n = seen.v.len();
+        let full = |x: Vec<f64>| match x.is_empty() {
+            true => array::to_python(observation.py(), vec![0.0; n], &[n]),
+            false => array::to_python(observation.py(), x, &[n]),
+        };
+        Ok((full(found.q)?, full(found.v)?))
+    }
+}
+
+/// A sum of terms.
+fn summed(terms: Vec<PyRef<'_, CostTerm>>) -> Cost {
+    let add = |cost: Cost, term: PyRef<'_, CostTerm>| match term.last {
+        true => cost.last(term.term.clone()),
+        false => cost.running(term.term.clone()),
+    };
+    terms.into_iter().fold(Cost::default(), add)
+}
+
+/// Limits of controls: none, one for all, or one each; infinite ones are allowed.
+fn limits(place: &str, given: Option<&Bound<'_, PyAny>>) -> PyResult<Vec<f64>> {
+    let Some(given) = given else {
+        return Ok(Vec::new());
+    };
+    let expected = "must be a number, or one for each control";
+    let refuse = |_| {
+        input(
+            place,
+            given.repr().map_or("?".into(), |r| r.to_string()),
+            expected,
+        )
+    };
+    match given.extract::<f64>() {
+        Ok(all) => Ok(vec![all]),
+        Err(_) => given.extract::<Vec<f64>>().map_err(refuse),
+    }
+}
+
+fn problem(
+    cost: Vec<PyRef<'_, CostTerm>>,
+    knots: usize,
+    hold: usize,
+    lower: Option<&Bound<'_, PyAny>>,
+    upper: Option<&Bound<'_, PyAny>>,
+    previous: Option<&Bound<'_, PyAny>>,
+) -> PyResult<Problem> {
+    let previous = previous.map(|given| array::row("ilqr: previous", given));
+    Ok(Problem {
+        knots,
+        hold,
+        cost: summed(cost),
+        lower: limits("limits: lower", lower)?,
+        upper: limits("limits: upper", upper)?,
+        previous: previous.transpose()?,
+    })
+}
+
+/// Where iLQR starts.
+enum Start {
+    Zero,
+    Controls(DMatrix<f64>),
+    Plan(optimize::Tracking, usize),
+}
+
+impl Start {
+    fn of(given: Option<&Bound<'_, PyAny>>, shift: usize, controls: usize) -> PyResult<Self> {
+        let Some(given) = given else {
+            return Ok(Self::Zero);
+        };
+        let tracking = match given.cast::<Tracking>() {
+            Ok(_) => Some(given.clone()),
+            Err(_) => given.getattr_opt("tracking")?,
+        };
+        if let Some(tracking) = tracking {
+            let tracking = tracking.cast_into::<Tracking>()?;
+            return Ok(Self::Plan(tracking.get().inner.clone(), shift));
+        }
+        let shape = [Dim::Any("knots"), Dim::Is(controls)];
+        Ok(Self::Controls(
+            array("ilqr: guess", given, &shape)?.columns(controls),
+        ))
+    }
+
+    fn guess(&self) -> Guess<'_> {
+        match self {
+            Self::Zero => Guess::Zero,
+            Self::Controls(matrix) => Guess::Controls(matrix),
+            Self::Plan(plan, shift) => Guess::Plan {
+                plan,
+                shift: *shift,
+            },
+        }
+    }
+}
+
+/// A callback that is told of every iteration, and ends the work by giving True or by raising.
+struct Told {
+    call: Option<Py<PyAny>>,
+    raised: Arc<Mutex<Option<PyErr>>>,
+}
+
+impl Told {
+    fn tell(&self, interrupt: &Interrupt, p: &IlqrProgress) -> ControlFlow<()> {
+        interrupt.check()?;
+        let Some(call) = &self.call else {
+            return ControlFlow::Continue(());
+        };
+        let told = Python::attach(|py| -> PyResult<bool> {
+            let parts = (
+                p.iteration,
+                p.cost,
+                p.expected,
+                p.part,
+                p.regularisation,
+                p.gradient,
+            );
+            let progress = class(py, "IlqrProgress")?.call1(parts)?;
+            call.bind(py).call1((progress,))?.is_truthy()
+        });
+        match told {
+            Ok(false) => ControlFlow::Continue(()),
+            Ok(true) => ControlFlow::Break(()),
+            Err(raised) => {
+                *lock(&self.raised) = Some(raised);
+                ControlFlow::Break(())
+            }
+        }
+    }
+}
+
+fn lock<T>(of: &Mutex<T>) -> MutexGuard<'_, T> {
+    of.lock().unwrap_or_else(PoisonError::into_inner)
+}
+
+fn columns<'py>(py: Python<'py>, each: &[DVector<f64>]) -> PyResult<Bound<'py, PyArrayDyn<f64>>> {
+    let n = each.first().map_or(0, DVector::len);
+    let all = each.iter().flat_map(|x| x.iter().copied()).collect();
+    array::to_python(py, all, &[each.len(), n])
+}
+
+fn matrices<'py>(py: Python<'py>, each: &[DMatrix<f64>]) -> PyResult<Bound<'py, PyArrayDyn<f64>>> {
+    let (rows, cols) = each.first().map_or((0, 0), |m| m.shape());
+    let all = each.iter().flat_map(|m| m.transpose().as_slice().to_vec());
+    array::to_python(py, all.collect(), &[each.len(), rows, cols])
+}
+
+fn planned<'py>(simulator: &Bound<'py, Simulator>, plan: Plan) -> PyResult<Bound<'py, PyAny>> {
+    let py = simulator.py();
+    let tracking = Tracking {
+        inner: plan.tracking(),
+    };
+    let seconds = PyDict::new(py);
+    for (name, time) in [
+        ("rollouts", plan.times.rollouts),
+        ("derivatives", plan.times.derivatives),
+        ("sweeps", plan.times.sweeps),
+        ("total", plan.times.total),
+    ] {
+        seconds.set_item(name, time)?;
+    }
+    let costs = plan.costs.clone();
+    let count = costs.len();
+    let fields = PyDict::new(py);
+    let nu = plan.controls.nrows();
+    fields.set_item("controls", array::transposed(py, &plan.controls, &[nu])?)?;
+    fields.set_item("gains", matrices(py, &plan.gains)?)?;
+    fields.set_item("steps", columns(py, &plan.steps)?)?;
+    fields.set_item("cost", plan.cost())?;
+    fields.set_item("costs", array::to_python(py, costs, &[count])?)?;
+    fields.set_item("gradient", plan.gradient)?;
+    fields.set_item("regularisation", plan.regularisation)?;
+    fields.set_item("iterations", plan.iterations)?;
+    fields.set_item("stop", stopped(plan.stop))?;
+    fields.set_item("seconds", seconds)?;
+    fields.set_item("tracking", Bound::new(py, tracking)?)?;
+    fields.set_item(
+        "rollout",
+        Bound::new(py, Rollout::new(simulator, plan.rollout))?,
+    )?;
+    class(py, "Plan")?.call((), Some(&fields))
+}
+
+/// Controls over a horizon that lower a cost from a state on, within limits, by iterated linear–quadratic regulation on the simulator's own Jacobians: a `Plan`, with the feedback about
+/// it. `cost` is a list of terms (`hydrograd.cost`).
+///
+/// There are `knots` of controls, each held over `hold` time steps; `lower` and `upper` are the least and largest open-loop controls (N, N m), one for all or (control_size,); None: none. `previous`
+/// (control_size,): the controls before the first knot, from which `cost.control_change` counts. It starts at the `state`, or where the simulator does, from `guess`: controls (knots, control_size), or
+/// a `Plan` that was made before, of which `shift` time steps have passed, with its feedback; None: no control.
+///
+/// It makes `iterations` at most, and ends once one lowers the cost, or expects to, by less than `tolerance` of it, or the cost is at most `target`. `regularisation` is the part by which each control's
+/// curvature is made larger at first, `trials` the most lengths of a step that are tried. `progress(p)` is called after every iteration with an `IlqrProgress`; where it gives True the plan so far is
+/// what is found. Ctrl-C ends it.
+#[pyfunction]
+#[pyo3(signature = (
+    simulator, cost, *, knots, hold=1, lower=None, upper=None, previous=None, state=None, guess=None, shift=0, iterations=100, tolerance=1e-9, target=None, regularisation=0.0,
+    trials=10, progress=None
+))]
+#[expect(clippy::too_many_arguments, reason = "one per keyword")]
+pub fn ilqr<'py>(
+    py: Python<'py>,
+    simulator: &Bound<'py, Simulator>,
+    cost: Vec<PyRef<'py, CostTerm>>,
+    knots: usize,
+    hold: usize,
+    lower: Option<&Bound<'py, PyAny>>,
+    upper: Option<&Bound<'py, PyAny>>,
+    previous: Option<&Bound<'py, PyAny>>,
+    state: Option<&Bound<'py, State>>,
+    guess: Option<&Bound<'py, PyAny>>,
+    shift: usize,
+    iterations: usize,
+    tolerance: f64,
+    target: Option<f64>,
+    regularisation: f64,
+    trials: usize,
+    progress: Option<Bound<'py, PyAny>>,
+) -> PyResult<Bound<'py, PyAny>> {
+    let me = simulator.get();
+    let problem = problem(cost, knots, hold, lower, upper, previous)?;
+    let start = Start::of(guess, shift, me.controls_size())?;
+    let state = state.map(|state| state.get().state.clone());
+    let settings = IlqrSettings {
+        iterations,
+        tolerance,
+        target,
+        regularisation,
+        trials,
+        ..IlqrSettings::default()
+    };
+    let raised = Arc::new(Mutex::new(None));
+    let told = Told {
+        call: progress.map(Bound::unbind),
+        raised: raised.clone(),
+    };
+    let inner = me.inner.clone();
+    let made = long(py, move |interrupt| {
+        let state = state.map_or_else(|| inner.initial(), Ok)?;
+        optimize::ilqr(&inner, &state, &problem, start.guess(), &settings, |p| {
+            told.tell(interrupt, p)
+        })
+    });
+    if let Some(raised) = lock(&raised).take() {
+        return Err(raised);
+    }
+    planned(simulator, made?)
+}
+
+/// Model-predictive control: a plan over `knots` of `hold` time steps of the simulator `model`, made again by `iterations` of iLQR every `every` of its time steps from where the plant is, from the plan
+/// before, moved on; the first one by `first_iterations`. Between plans the plan's `feedback` acts, or its controls alone. Other keywords are those of `ilqr`.
+///
+/// The plant may be a robot, which asks for controls step by step (`control`), or a simulator (`run`): the model itself, or one of another fidelity, current, parameters or time step.
+#[pyclass(module = "hydrograd")]
+pub struct Mpc {
+    inner: Arc<Mutex<optimize::Mpc>>,
+    problem: Problem,
+    model: Py<Simulator>,
+}
+
+fn replanned<'py>(py: Python<'py>, each: &[Replan]) -> PyResult<Bound<'py, PyList>> {
+    let class = class(py, "Replan")?;
+    let one = |r: &Replan| {
+        class.call1((
+            r.time,
+            r.iterations,
+            r.cost,
+            r.stop.map(stopped),
+            r.seconds,
+            r.failure.clone(),
+        ))
+    };
+    PyList::new(py, each.iter().map(one).collect::<PyResult<Vec<_>>>()?)
+}
+
+#[pymethods]
+impl Mpc {
+    fn __traverse__(&self, visit: PyVisit<'_>) -> Result<(), PyTraverseError> {
+        visit.call(&self.model)
+    }
+
+    #[new]
+    #[pyo3(signature = (
+        model, cost, *, knots, hold=1, lower=None, upper=None, previous=None, every=1, iterations=3, first_iterations=50, feedback=true, tolerance=1e-6, trials=10
+    ))]
+    #[expect(clippy::too_many_arguments, reason = "one per keyword")]
+    fn new(
+        model: &Bound<'_, Simulator>,
+        cost: Vec<PyRef<'_, CostTerm>>,
+        knots: usize,
+        hold: usize,
+        lower: Option<&Bound<'_, PyAny>>,
+        upper: Option<&Bound<'_, PyAny>>,
+        previous: Option<&Bound<'_, PyAny>>,
+        every: usize,
+        iterations: usize,
+        first_iterations: usize,
+        feedback: bool,
+        tolerance: f64,
+        trials: usize,
+    ) -> PyResult<Self> {
+        let problem = problem(cost, knots, hold, lower, upper, previous)?;
+        let base = MpcSettings::default();
+        let settings = MpcSettings {
+            every,
+            iterations,
+            first_iterations,
+            feedback,
+            ilqr: IlqrSettings {
+                tolerance,
+                trials,
+                ..base.ilqr
+            },
+        };
+        let inner = optimize::Mpc::new(&model.get().inner, &problem, settings).or_raise()?;
+        Ok(Self {
+            inner: Arc::new(Mutex::new(inner)),
+            problem,
+            model: model.clone().unbind(),
+        })
+    }
+
+    /// The simulator that plans.
+    #[getter]
+    fn model(&self, py: Python<'_>) -> Py<Simulator> {
+        self.model.clone_ref(py)
+    }
+
+    /// Plans with another simulator from now on: one that has learnt the current, say. It must have the sizes and the time step of the one before.
+    fn set_model(&mut self, model: &Bound<'_, Simulator>) -> PyResult<()> {
+        lock(&self.inner)
+            .set_model(&model.get().inner, &self.problem)
+            .or_raise()?;
+        self.model = model.clone().unbind();
+        Ok(())
+    }
+
+    /// Forgets plans, so that the next call starts anew.
+    fn reset(&self) {
+        lock(&self.inner).reset();
+    }
+
+    /// All plans so far: a list of `Replan`.
+    #[getter]
+    fn replans<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyList>> {
+        replanned(py, lock(&self.inner).replans())
+    }
+
+    /// The controls, (control_size,), at a time, s, from where the plant is: `q` (q_size,), `v` (v_size,). Plans again when that is due. Times must not go back; the first one starts the clock.
+    fn control<'py>(
+        &self,
+        py: Python<'py>,
+        time: f64,
+        q: &Bound<'py, PyAny>,
+        v: &Bound<'py, PyAny>,
+    ) -> PyResult<Bound<'py, PyArrayDyn<f64>>> {
+        let system = self.model.get().inner.system();
+        let sizes = [system.tree.coordinates(), system.tree.velocities()];
+        let row = |name: &str, given: &Bound<'_, PyAny>, n: usize| -> PyResult<DVector<f64>> {
+            let found = array(&format!("control: {name}"), given, &[Dim::Is(n)])?;
+            Ok(found.values.into())
+        };
+        let (q, v) = (row("q", q, sizes[0])?, row("v", v, sizes[1])?);
+        let inner = self.inner.clone();
+        let made = long(py, move |interrupt| {
+            lock(&inner).control_with(time, &q, &v, &mut |_| interrupt.check())
+        })?;
+        array::to_python(py, made.as_slice().to_vec(), &[made.len()])
+    }
+
+    /// Runs a simulated plant for `steps` of its time steps from `state`, or from where it starts: an `MpcRun`; on from the plans so far unless they are of a later time. Its cost is that of `cost`, or of the terms that are planned with.
+    /// `progress(done, total)` is called every so often with the steps of the plant; what it raises ends the run, and so does Ctrl-C.
+    #[pyo3(signature = (plant, steps, *, state=None, cost=None, progress=None))]
+    fn run<'py>(
+        &self,
+        plant: &Bound<'py, Simulator>,
+        steps: usize,
+        state: Option<&Bound<'py, State>>,
+        cost: Option<Vec<PyRef<'py, CostTerm>>>,
+        progress: Option<&Bound<'py, PyAny>>,
+    ) -> PyResult<Bound<'py, PyAny>> {
+        let py = plant.py();
+        let theirs = plant.get().inner.clone();
+        let cost = cost.map_or_else(|| self.problem.cost.clone(), summed);
+        let state = state.map(|state| state.get().state.clone());
+        let mut progress = Progress::new("run: progress", progress, steps)?;
+        let inner = self.inner.clone();
+        let made = followed(py, progress.as_mut(), move |interrupt| {
+            let state = state.map_or_else(|| theirs.initial(), Ok)?;
+            let made = lock(&inner).run(&theirs, &state, steps, &cost, |p| interrupt.at(p.step))?;
+            let _ = interrupt.at(steps);
+            Ok(made)
+        });
+        if let Some(raised) = progress.and_then(|progress| progress.raised) {
+            return Err(raised);
+        }
+        let made = made?;
+        if made.rates.len() != steps {
+            return Err(internal("a run of another length"));
+        }
+        let parts = (
+            Bound::new(py, Rollout::new(plant, made.rollout))?,
+            array::to_python(py, made.rates, &[steps])?,
+            made.cost,
+            replanned(py, &made.replans)?,
+        );
+        class(py, "MpcRun")?.call1(parts)
+    }
+}
+
+/// Adds the classes and the function to the module.
+pub fn register(m: &Bound<'_, PyModule>) -> PyResult<()> {
+    m.add_class::<CostTerm>()?;
+    m.add_class::<Tracking>()?;
+    m.add_class::<Mpc>()?;
+    m.add_function(wrap_pyfunction!(ilqr, m)?)
+}

@@ -1,0 +1,264 @@
+//! Controls over a horizon by iterated linear–quadratic regulation.
+//!
+//! A trajectory is linearised knot by knot (the simulator's own Jacobians of steps, [`Rollout::step_jacobians`], chained over the steps of a knot; the cost by Gauss and Newton), a
+//! sweep from the last knot to the first finds the controls that are best by that model, within their limits (a projected Newton step at each knot), and how they answer to changes
+//! of the state; the simulator then runs with them. A step that doesn't lower the cost as it should is halved; where none does, the model is regularised. Derivatives of second
+//! order of the dynamics are left out. States are compared on their manifold (`x ⊖ x̄`): free bodies turn as they like.
+//!
+//! A scene's own controller acts as always; the controls here are the open-loop ones, to which it adds. The numbers don't depend on the number of threads.
+//!
+//! No crate fits: `optimization_engine` descends gradients alone and yields no feedback, `lqr` takes constant gains as given, and neither takes steps' Jacobians or states
+//! with rotations.
+//!
+//! # References
+//! Y. Tassa, N. Mansard, E. Todorov, "Control-limited differential dynamic programming", ICRA 2014; W. Li, E. Todorov, "Iterative linear quadratic regulator design for nonlinear
+//! biological movement systems", ICINCO 2004; D. Marquardt, "An algorithm for least-squares estimation of nonlinear parameters", 1963.
+
+mod backward;
+mod box_qp;
+mod plan;
+mod problem;
+mod settings;
+mod tracking;
+
+pub use plan::{Guess, Plan};
+pub use problem::Problem;
+pub use settings::{IlqrProgress, IlqrSettings, IlqrStop, IlqrTimes};
+pub use tracking::Tracking;
+
+pub(super) use problem::Ready;
+
+use crate::Result;
+use crate::simulate::{Simulator, State};
+use backward::{Answer, Backward, KnotModel, backward, gradient};
+use nalgebra::DVector;
+use problem::Run;
+use rayon::prelude::*;
+use std::ops::ControlFlow;
+use std::time::Instant;
+
+/// Part of the expected fall of the cost that a step must bring.
+const ARMIJO: f64 = 1e-4;
+/// Trials that are made side by side once a whole step is refused. Fixed, so that what is found doesn't depend on the number of threads.
+const BESIDE: usize = 3;
+/// The regularisation that follows on none, and its growth.
+const LEAST: f64 = 1e-6;
+const GROWTH: f64 = 10.0;
+/// Part of the cost below which a fall is rounding.
+const ROUNDING: f64 = 1e-14;
+
+/// Seconds since the last call.
+struct Watch(Instant);
+
+impl Watch {
+    fn lap(&mut self, into: &mut f64) {
+        let now = Instant::now();
+        *into += (now - self.0).as_secs_f64();
+        self.0 = now;
+    }
+}
+
+/// A trajectory, linearised.
+struct Model {
+    knots: Vec<KnotModel>,
+    last: super::cost::Quadratic,
+    gradient: f64,
+}
+
+impl Model {
+    fn of(ready: &Ready, run: &Run) -> Result<Self> {
+        let (knots, last) = ready.models(run)?;
+        let gradient = gradient(&knots, &last);
+        // What no limit holds.
+        let open = |(knot, g): (&KnotModel, &DVector<f64>)| {
+            let entry = |i: usize| {
+                let held =
+                    (knot.lower[i] >= 0.0 && g[i] > 0.0) || (knot.upper[i] <= 0.0 && g[i] < 0.0);
+                if held { 0.0 } else { g[i].abs() }
+            };
+            (0..g.len()).map(entry).fold(0.0, f64::max)
+        };
+        let gradient = knots.iter().zip(&gradient).map(open).fold(0.0, f64::max);
+        Ok(Self {
+            knots,
+            last,
+            gradient,
+        })
+    }
+}
+
+/// The longest step that lowers the cost as it should.
+fn search(
+    ready: &Ready,
+    simulator: &Simulator,
+    start: &State,
+    run: &Run,
+    sweep: &Backward,
+    trials: usize,
+) -> Option<(f64, Run)> {
+    let try_out = |k: usize| {
+        let part = 0.5_f64.powi(k as i32);
+        let found = ready.trial(simulator, start, run, &sweep.answers, part);
+        let expected = part * (sweep.expected[0] + part * sweep.expected[1]);
+        let falls = |found: &Run| {
+            found.cost - run.cost <= ARMIJO * expected.min(0.0) && found.cost < run.cost
+        };
+        found.ok().filter(falls).map(|found| (part, found))
+    };
+    // A whole step is what most iterations take.
+    if let Some(found) = try_out(0) {
+        return Some(found);
+    }
+    let rest: Vec<usize> = (1..trials).collect();
+    let mut each = rest.chunks(BESIDE);
+    each.find_map(|few| {
+        let tried: Vec<_> = few.par_iter().map(|k| try_out(*k)).collect();
+        tried.into_iter().flatten().next()
+    })
+}
+
+/// Controls that lower a problem's cost from a state on, from a guess. `progress` is called after every iteration and may end it; the plan so far is then what is found.
+///
+/// # Errors
+/// A problem or settings that don't fit the simulator (limits the wrong way round, lists of wrong lengths, numbers that aren't finite, names that there aren't), a guess that can't be
+/// simulated or whose cost isn't finite, and derivatives that can't be found. Trials that fail are shortened instead.
+pub fn ilqr(
+    simulator: &Simulator,
+    start: &State,
+    problem: &Problem,
+    guess: Guess,
+    settings: &IlqrSettings,
+    mut progress: impl FnMut(&IlqrProgress) -> ControlFlow<()>,
+) -> Result<Plan> {
+    settings.validate()?;
+    let ready = Ready::new(problem, simulator)?;
+    solve(simulator, start, &ready, guess, settings, &mut progress)
+}
+
+/// The same with a problem that is ready.
+pub(super) fn solve(
+    simulator: &Simulator,
+    start: &State,
+    ready: &Ready,
+    guess: Guess,
+    settings: &IlqrSettings,
+    progress: &mut dyn FnMut(&IlqrProgress) -> ControlFlow<()>,
+) -> Result<Plan> {
+    let (begun, mut times) = (Instant::now(), IlqrTimes::default());
+    let mut watch = Watch(begun);
+    let mut run = guess.run(ready, simulator, start)?;
+    watch.lap(&mut times.rollouts);
+    let mut model = Model::of(ready, &run)?;
+    watch.lap(&mut times.derivatives);
+    let mut regularisation = settings.regularisation;
+    let mut costs = vec![run.cost];
+    let (mut iterations, mut fresh) = (0, true);
+    let grow = |mu: f64| (mu * GROWTH).max(LEAST);
+    let mut answers;
+    let stop = loop {
+        if !fresh {
+            model = Model::of(ready, &run)?;
+            fresh = true;
+            watch.lap(&mut times.derivatives);
+        }
+        let sweep = loop {
+            let made = backward(&model.knots, &model.last, regularisation);
+            if made.is_some() || regularisation > settings.most_regularisation {
+                break made;
+            }
+            regularisation = grow(regularisation);
+        };
+        watch.lap(&mut times.sweeps);
+        let Some(sweep) = sweep else {
+            answers = still(ready);
+            break IlqrStop::Stuck;
+        };
+        answers = sweep.answers.clone();
+        let expected = -(sweep.expected[0] + sweep.expected[1]);
+        let size = run.cost.abs();
+        if expected <= settings.tolerance.max(ROUNDING) * size {
+            break IlqrStop::Stationary;
+        }
+        if settings.target.is_some_and(|t| run.cost <= t) {
+            break IlqrStop::Target;
+        }
+        if iterations == settings.iterations {
+            break IlqrStop::Budget;
+        }
+        iterations += 1;
+        let used = regularisation;
+        let found = search(ready, simulator, start, &run, &sweep, settings.trials);
+        watch.lap(&mut times.rollouts);
+        let (part, fell) = match found {
+            Some((part, next)) => {
+                let fell = run.cost - next.cost;
+                (run, fresh) = (next, false);
+                regularisation /= GROWTH;
+                if regularisation < LEAST {
+                    regularisation = 0.0;
+                }
+                (part, fell)
+            }
+            None => {
+                regularisation = grow(regularisation);
+                (0.0, f64::INFINITY)
+            }
+        };
+        costs.push(run.cost);
+        let told = IlqrProgress {
+            iteration: iterations,
+            cost: run.cost,
+            expected,
+            part,
+            regularisation: used,
+            gradient: model.gradient,
+        };
+        if progress(&told).is_break() {
+            break IlqrStop::Asked;
+        }
+        if part == 1.0 && used == 0.0 && fell <= settings.tolerance * size {
+            break IlqrStop::Cost;
+        }
+        if regularisation > settings.most_regularisation {
+            break IlqrStop::Stuck;
+        }
+        if iterations == settings.iterations && !settings.last_gains {
+            break IlqrStop::Budget;
+        }
+    };
+    if !fresh && settings.last_gains {
+        watch.lap(&mut times.rollouts);
+        model = Model::of(ready, &run)?;
+        watch.lap(&mut times.derivatives);
+        if let Some(sweep) = backward(&model.knots, &model.last, regularisation) {
+            answers = sweep.answers;
+        }
+        watch.lap(&mut times.sweeps);
+    }
+    times.total = begun.elapsed().as_secs_f64();
+    Ok(Plan {
+        tracking: plan::track(simulator, ready, &run, &answers),
+        controls: run.controls,
+        rollout: run.rollout,
+        gains: answers.iter().map(|a| a.gain.clone()).collect(),
+        steps: answers.into_iter().map(|a| a.step).collect(),
+        costs,
+        gradient: model.gradient,
+        regularisation,
+        iterations,
+        stop,
+        times,
+    })
+}
+
+/// No step and no feedback.
+fn still(ready: &Ready) -> Vec<Answer> {
+    let (nu, nx) = (ready.cost.sizes.controls, ready.cost.sizes.states());
+    let one = Answer {
+        step: DVector::zeros(nu),
+        gain: nalgebra::DMatrix::zeros(nu, nx),
+        of_previous: None,
+        held: vec![false; nu],
+    };
+    vec![one; ready.knots]
+}

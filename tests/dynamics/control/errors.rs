@@ -1,0 +1,269 @@
+//! What can't be is refused, with its place and what would be right.
+
+use super::vehicle;
+use crate::support::says;
+use hydrograd::optimize::{
+    Cost, CostPoint, CustomCost, Guess, IlqrSettings, Mpc, MpcSettings, Problem, Quadratic, Target,
+    Term, ilqr, terms,
+};
+use hydrograd::scene::{Body, Fluid, Scene, Shape};
+use hydrograd::{Error, Fidelity, Result, Settings, Simulator};
+use nalgebra::DMatrix;
+use std::ops::ControlFlow;
+
+fn simulator() -> Simulator {
+    let settings = Settings::default().fidelity(Fidelity::Isolated);
+    Simulator::new(&vehicle([0.0; 3]), settings).unwrap()
+}
+
+#[track_caller]
+fn refused(simulator: &Simulator, problem: &Problem, guess: Guess, words: &[&str]) {
+    let start = simulator.initial().unwrap();
+    let settings = IlqrSettings {
+        iterations: 1,
+        ..IlqrSettings::default()
+    };
+    let made = ilqr(simulator, &start, problem, guess, &settings, |_| {
+        ControlFlow::Continue(())
+    });
+    says(made.err().expect("an error"), words);
+}
+
+#[test]
+fn problems_that_cannot_be() {
+    let sim = simulator();
+    let effort = || Cost::default().running(terms::effort(1.0));
+    let with = |term: Term| Problem::new(5, effort().running(term));
+    let last = |term: Term| Problem::new(5, effort().last(term));
+    let zero = || vec![0.0; 8];
+    let cases: Vec<(Problem, Vec<&str>)> = vec![
+        (Problem::new(0, effort()), vec!["knots", "at least 1"]),
+        (
+            Problem::new(5, effort()).hold(0),
+            vec!["hold", "at least 1"],
+        ),
+        (
+            Problem::new(5, effort()).limits([1.0], [-1.0]),
+            vec![
+                "limits of control 0",
+                "lower 1 and upper -1",
+                "wrong way round",
+            ],
+        ),
+        (
+            Problem::new(5, effort()).limits([f64::NAN], []),
+            vec!["lower", "NaN"],
+        ),
+        (
+            Problem::new(5, effort()).limits([], [1.0, 2.0]),
+            vec!["upper", "2 numbers", "8"],
+        ),
+        (
+            Problem {
+                previous: Some(vec![1.0]),
+                ..Problem::new(5, effort())
+            },
+            vec!["previous", "8 finite"],
+        ),
+        (
+            with(terms::position("foot", [0.0; 3], 1.0)),
+            vec!["running term 1", "\"foot\"", "hand", "lower"],
+        ),
+        (
+            with(terms::position("hand", [0.0; 2], 1.0)),
+            vec!["target", "3 finite"],
+        ),
+        (
+            with(terms::position("hand", [0.0, f64::NAN, 0.0], 1.0)),
+            vec!["target", "NaN"],
+        ),
+        (
+            with(terms::position("hand", [0.0; 3], -1.0)),
+            vec!["weights", "not negative"],
+        ),
+        (
+            with(terms::point(
+                "hand",
+                [f64::INFINITY, 0.0, 0.0],
+                [0.0; 3],
+                1.0,
+            )),
+            vec!["point", "inf"],
+        ),
+        (
+            with(terms::velocity(zero(), [1.0, 2.0])),
+            vec!["velocity", "weights", "8"],
+        ),
+        (
+            with(terms::velocity([0.0; 3], 1.0)),
+            vec!["velocity", "8 finite"],
+        ),
+        (
+            with(terms::configuration(vec![0.0; 9], 1.0)),
+            vec!["configuration", "quaternion"],
+        ),
+        (
+            with(terms::observable("warmth", [0], 0.0, 1.0)),
+            vec!["warmth", "momentum"],
+        ),
+        (
+            with(terms::observable("rotations", [0], 0.0, 1.0)),
+            vec!["rotations", "orientation"],
+        ),
+        (
+            with(terms::observable("momentum", [9], 0.0, 1.0)),
+            vec!["entries", "under 6"],
+        ),
+        (last(terms::effort(1.0)), vec!["last term 0", "running"]),
+        (
+            last(terms::control_change(1.0)),
+            vec!["last term 0", "running"],
+        ),
+    ];
+    for (problem, words) in cases {
+        refused(&sim, &problem, Guess::Zero, &words);
+    }
+    let problem = Problem::new(5, effort());
+    refused(
+        &sim,
+        &problem,
+        Guess::Controls(&DMatrix::zeros(8, 4)),
+        &["guess", "8 × 5"],
+    );
+    let bad = DMatrix::from_element(8, 5, f64::NAN);
+    refused(&sim, &problem, Guess::Controls(&bad), &["guess", "finite"]);
+    let mut scene = Scene::new(Fluid::none());
+    scene.add(Body::dry().mass(1.0).inertia([1.0; 3]));
+    let alone = Simulator::new(&scene, Settings::default()).unwrap();
+    refused(&alone, &problem, Guess::Zero, &["controlled", "actuated"]);
+    says(
+        Target::table(vec![], vec![]).unwrap_err(),
+        &["at least one row"],
+    );
+    says(
+        Target::table(vec![1.0, 0.0], vec![vec![], vec![]]).unwrap_err(),
+        &["grow"],
+    );
+}
+
+#[test]
+fn settings_that_cannot_be() {
+    let sim = simulator();
+    let start = sim.initial().unwrap();
+    let problem = Problem::new(5, Cost::default().running(terms::effort(1.0)));
+    let base = IlqrSettings::default();
+    for (settings, word) in [
+        (
+            IlqrSettings {
+                iterations: 0,
+                ..base
+            },
+            "iterations",
+        ),
+        (IlqrSettings { trials: 0, ..base }, "trials"),
+        (
+            IlqrSettings {
+                tolerance: -1.0,
+                ..base
+            },
+            "tolerance",
+        ),
+        (
+            IlqrSettings {
+                regularisation: f64::NAN,
+                ..base
+            },
+            "regularisation",
+        ),
+        (
+            IlqrSettings {
+                target: Some(f64::NAN),
+                ..base
+            },
+            "target",
+        ),
+    ] {
+        let made = ilqr(&sim, &start, &problem, Guess::Zero, &settings, |_| {
+            ControlFlow::Continue(())
+        });
+        says(made.err().expect("an error"), &["ilqr settings", word]);
+    }
+    let base = MpcSettings::default();
+    for (settings, word) in [
+        (MpcSettings { every: 0, ..base }, "every"),
+        (MpcSettings { every: 6, ..base }, "at most 5"),
+        (
+            MpcSettings {
+                iterations: 0,
+                ..base
+            },
+            "iterations",
+        ),
+    ] {
+        says(
+            Mpc::new(&sim, &problem, settings).err().expect("an error"),
+            &["mpc settings", word],
+        );
+    }
+    let mut mpc = Mpc::new(&sim, &problem, base).unwrap();
+    let (q, v) = sim.start();
+    let late = mpc.control(1.0, q, v).unwrap();
+    assert_eq!(late.len(), 8);
+    says(
+        mpc.control(0.5, q, v).unwrap_err(),
+        &["mpc: time", "0.5", "reset"],
+    );
+    says(
+        mpc.control(f64::NAN, q, v).unwrap_err(),
+        &["mpc: time", "NaN"],
+    );
+    let mut other = Scene::new(Fluid::fresh_water());
+    other.add(Body::new(Shape::sphere(0.1)).density(998.0).thruster());
+    let other = Simulator::new(&other, Settings::default()).unwrap();
+    let at = other.initial().unwrap();
+    let run = mpc.run(&other, &at, 3, &problem.cost, |_| ControlFlow::Continue(()));
+    says(
+        run.err().expect("an error"),
+        &["mpc: plant", "controls: 6", "controls: 8"],
+    );
+}
+
+struct Wrong(&'static str);
+
+impl CustomCost for Wrong {
+    fn value(&self, _: &CostPoint) -> Result<f64> {
+        match self.0 {
+            "fails" => Err(Error::input("my cost", 1, "must be something else")),
+            "nan" => Ok(f64::NAN),
+            _ => Ok(1.0),
+        }
+    }
+
+    fn quadratic(&self, at: &CostPoint) -> Result<Quadratic> {
+        let mut out = Quadratic::zeros(16, if self.0 == "shape" { 3 } else { 8 });
+        out.value = self.value(at)?;
+        out.x[0] = if self.0 == "slope" {
+            f64::INFINITY
+        } else {
+            0.0
+        };
+        Ok(out)
+    }
+}
+
+#[test]
+fn costs_of_ones_own_that_cannot_be() {
+    let sim = simulator();
+    for (name, words) in [
+        ("fails", vec!["my cost", "something else"]),
+        ("nan", vec!["cost at knot 0", "value", "NaN"]),
+        (
+            "shape",
+            vec!["custom cost at knot 0", "gradient by u", "(8, 1)"],
+        ),
+        ("slope", vec!["cost at knot 0", "gradient by x", "inf"]),
+    ] {
+        let cost = Cost::default().running(terms::custom(Wrong(name)));
+        refused(&sim, &Problem::new(5, cost), Guess::Zero, &words);
+    }
+}

@@ -1,6 +1,7 @@
 //! Motion: what it conserves, its gradients, how runs are resumed and ended, and descent on them.
 
 mod balance;
+mod ballast;
 mod driven;
 mod extremes;
 mod films;
@@ -25,6 +26,7 @@ mod rollout_gradient;
 mod smoothing;
 mod soak;
 mod trees;
+mod vehicle;
 
 #[path = "../support/mod.rs"]
 mod support;

@@ -45,7 +45,7 @@
 //! | q | `q`: joint coordinates | n_q; m, rad, unit quaternions |
 //! | v | `v`: generalised velocity | n_v; m/s, rad/s |
 //! | p, p̂ | `momentum`, `frame_momentum` (`y` of a state) | n_v; kg m/s, kg m²/s |
-//! | u | `control`: joint forces and thruster wrenches | controls; N, N m |
+//! | u | `control`: joint forces, wrenches on bodies, commands of thrusters | controls; N, N m, any |
 //! | J, S, Ŝ | [`Tree::jacobian`](crate::multibody::Tree::jacobian), `columns`, `frame_columns` | 6B × n_v, spatial |
 //! | V, Z, D, C | `twist`, `virtual_twist`, `turning`, `bias` of [`Fields`](crate::multibody::Fields) | 6 a body, spatial |
 //! | M(q) | `mass_matrix` | n_v × n_v |

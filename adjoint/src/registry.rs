@@ -143,7 +143,7 @@ fn exp_jacobian_inverse_check(corruption: f64) -> Outcome {
     }))
 }
 
-/// Mass and inertia, in which the value is linear, about several centres.
+/// Mass and inertia, in which the value is linear, about several centres, and the centres.
 fn spatial_inertia_check(corruption: f64) -> Outcome {
     let inertia = [0.7, 0.9, 1.1, 0.1, -0.05, 0.02];
     all([50, 51, 52].map(|seed| {
@@ -153,20 +153,30 @@ fn spatial_inertia_check(corruption: f64) -> Outcome {
                 .as_slice()
                 .to_vec()
         };
-        let bars = |bar: &[f64]| spatial_inertia_vjp(&center, &Mat6::from_column_slice(bar));
+        let bars = |bar: &[f64]| spatial_inertia_vjp(2.5, &center, &Mat6::from_column_slice(bar));
         let mass = transposed::<1>(
             |x| of(x[0], &inertia),
             &[2.5],
-            |bar| vec![bars(bar).0],
+            |bar| vec![bars(bar).mass],
             corruption,
         );
         let rotational = transposed::<6>(
             |x| of(2.5, x),
             &inertia,
-            |bar| bars(bar).1.to_vec(),
+            |bar| bars(bar).inertia.to_vec(),
             corruption,
         );
-        mass.worst(rotational)
+        let about = transposed::<3>(
+            |x| {
+                spatial_inertia(2.5, &Vec3::from_column_slice(x), &inertia)
+                    .as_slice()
+                    .to_vec()
+            },
+            &center.into(),
+            |bar| bars(bar).center.as_slice().to_vec(),
+            corruption,
+        );
+        mass.worst(rotational).worst(about)
     }))
 }
 

@@ -21,13 +21,32 @@ pub fn spatial_inertia(mass: f64, center: &Vec3, inertia: &[f64; 6]) -> Mat6 {
     out
 }
 
-/// Cotangents of `(mass, inertia)` from the cotangent of [`spatial_inertia`], in which both are linear.
-pub fn spatial_inertia_vjp(center: &Vec3, bar: &Mat6) -> (f64, [f64; 6]) {
+/// Cotangents of a [`spatial_inertia`]'s arguments.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct InertiaBar {
+    /// Of the mass.
+    pub mass: f64,
+    /// Of the centre of mass.
+    pub center: Vec3,
+    /// Of xx, yy, zz, xy, xz, yz.
+    pub inertia: [f64; 6],
+}
+
+/// Transpose of [`spatial_inertia`], which is linear in mass and inertia and quadratic in the centre: `∂/∂c_k` of its blocks is `−m [e_k]×`, `m [e_k]×` and
+/// `−m ([e_k]× [c]× + [c]× [e_k]×)`.
+pub fn spatial_inertia_vjp(mass: f64, center: &Vec3, bar: &Mat6) -> InertiaBar {
     let unit = spatial_inertia(1.0, center, &[0.0; 6]);
-    let a = bar.fixed_view::<3, 3>(3, 3);
-    (
-        bar.dot(&unit),
-        [
+    let block = |i: usize, j: usize| bar.fixed_view::<3, 3>(3 * i, 3 * j).into_owned();
+    let (across, back, a) = (block(0, 1), block(1, 0), block(1, 1));
+    let c = skew(center);
+    let slope = |k: usize| {
+        let e = skew(&Vec3::ith(k, 1.0));
+        mass * ((back - across).dot(&e) - a.dot(&(e * c + c * e)))
+    };
+    InertiaBar {
+        mass: bar.dot(&unit),
+        center: Vec3::new(slope(0), slope(1), slope(2)),
+        inertia: [
             a[(0, 0)],
             a[(1, 1)],
             a[(2, 2)],
@@ -35,5 +54,5 @@ pub fn spatial_inertia_vjp(center: &Vec3, bar: &Mat6) -> (f64, [f64; 6]) {
             a[(0, 2)] + a[(2, 0)],
             a[(1, 2)] + a[(2, 1)],
         ],
-    )
+    }
 }

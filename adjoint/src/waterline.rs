@@ -101,16 +101,6 @@ impl Below {
         self.about(&pose.translation)
     }
 
-    /// Times a number.
-    pub fn scaled(mut self, factor: f64) -> Self {
-        self.volume *= factor;
-        self.moment *= factor;
-        self.area *= factor;
-        self.area_moment *= factor;
-        self.area_second *= factor;
-        self
-    }
-
     /// Derivatives of volume and moment as the plane's height grows by `rate` and its normal by `tilt`: it rises by `rate` − `tilt`·x at x, m.
     pub fn jvp(&self, rate: f64, tilt: &Vec3) -> (f64, Vec3) {
         (

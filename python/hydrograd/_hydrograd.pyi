@@ -202,6 +202,8 @@ class Body:
     where its faces are made smaller. `collision` lists the convex pieces that the body is for contact instead of its shape, each
     a shape, (shape, position) or (shape, position, rotation) in the body's frame. `start` are the joint's coordinates at the start, unless the
     scene is given all by `set_initial`. `added_mass` (6, 6) replaces the body's own at unit density, with `isolated`."""
+    a shape, (shape, position) or (shape, position, rotation) in the body's frame. `added_mass` (6, 6) replaces the body's own at unit density, with `isolated`.
+    `volume` (m³) and `center_of_buoyancy` (m) are what it is buoyant by and where, instead of the shape's volume at its centroid."""
     def __new__(
         cls,
         shape: Shape | None = None,
@@ -234,6 +236,8 @@ class Body:
         mimic: Mimic | None = None,
         servo: Servo | None = None,
         start: ArrayLike | None = None,
+        volume: float | None = None,
+        center_of_buoyancy: ArrayLike | None = None,
     ) -> Body: ...
     @property
     def name(self) -> str:
@@ -386,6 +390,63 @@ class Scene:
         reach: float | None = None,
         name: str | None = None,
     ) -> None: ...
+    @overload
+    def add_force(
+        self,
+        kind: Literal["damping"],
+        *,
+        body: str,
+        at: ArrayLike = (0.0, 0.0, 0.0),
+        linear: ArrayLike | None = None,
+        quadratic: ArrayLike | None = None,
+        name: str | None = None,
+    ) -> None: ...
+    @overload
+    def add_force(
+        self,
+        kind: Literal["thruster"],
+        *,
+        body: str,
+        direction: ArrayLike,
+        at: ArrayLike = (0.0, 0.0, 0.0),
+        polynomial: ArrayLike = (),
+        table: ArrayLike = (),
+        dead_band: float = 0.0,
+        torque: float = 0.0,
+        loss: float = 0.0,
+        rotor: str | None = None,
+        time_constant: float | None = None,
+        smoothing: float = 0.01,
+        name: str | None = None,
+    ) -> None: ...
+    @overload
+    def add_force(
+        self,
+        kind: Literal["fin"],
+        *,
+        body: str,
+        chord: ArrayLike,
+        normal: ArrayLike,
+        area: float,
+        lift_slope: float,
+        at: ArrayLike = (0.0, 0.0, 0.0),
+        length: float = 0.0,
+        drag: float = 0.0,
+        induced_drag: float = 0.0,
+        smoothing: float = 0.01,
+        name: str | None = None,
+    ) -> None: ...
+    @overload
+    def add_force(
+        self,
+        kind: Literal["float"],
+        *,
+        body: str,
+        at: ArrayLike = (0.0, 0.0, 0.0),
+        volume: float = 0.0,
+        mass: float = 0.0,
+        name: str | None = None,
+    ) -> None: ...
     def add_site(
         self, name: str, body: _Body, position: ArrayLike | None = None, rotation: ArrayLike | None = None
     ) -> int: ...
@@ -461,7 +522,7 @@ class Simulator:
         progress: _Progress | None = None,
     ) -> Rollout:
         """Runs the scene, with its own controller if it has one, and `controls` (steps, control_size) added to it: generalised
-        forces of actuated joints and wrenches of thrusters, N and N m. Without them, `steps` (default: the scene's) without
+        forces of actuated joints and wrenches on bodies, N and N m, and commands of thrusters. Without them, `steps` (default: the scene's) without
         control. It begins where the simulator does unless given a `state`, or `q` (q_size,) and `v` (v_size,). Ctrl-C ends it.
 
         `progress(done, total)` is called with the steps made, at most twenty times a second and once at the end. What it raises ends the run and comes out,
@@ -559,6 +620,10 @@ class Simulator:
     @property
     def control_size(self) -> int:
         """Number of controls a step."""
+    @property
+    def control_names(self) -> list[str]: ...
+    def allocation(self, body: _Body) -> _Array: ...
+    def thruster_controls(self, body: _Body) -> list[int]: ...
     @property
     def q_size(self) -> int:
         """Number of joint coordinates q."""

@@ -126,6 +126,7 @@ impl Servo {
 /// where its faces are made smaller. `collision` lists the convex pieces that the body is for contact instead of its shape, each
 /// a shape, (shape, position) or (shape, position, rotation) in the body's frame. `start` are the joint's coordinates at the start, unless the
 /// scene is given all by `set_initial`. `added_mass` (6, 6) replaces the body's own at unit density, with `isolated`.
+/// `volume` (m³) and `center_of_buoyancy` (m) are what it is buoyant by and where, instead of the shape's volume at its centroid.
 #[pyclass(frozen, eq, module = "hydrograd")]
 #[derive(Clone, PartialEq)]
 pub struct Body {
@@ -178,7 +179,7 @@ impl Body {
         shape=None, *, name="", density=None, mass=None, inertia=None, center_of_mass=None, position=None,
         rotation=None, joint=None, parent=None, actuated=false, thruster=false, locked=false, motion=None, limits=None,
         limit_stiffness=None, drag=None, shape_position=None, shape_rotation=None, refine=None, added_mass=None,
-        overlaps_parent=false, collision=None, passive=None, mimic=None, servo=None, start=None
+        overlaps_parent=false, collision=None, passive=None, mimic=None, servo=None, start=None, volume=None, center_of_buoyancy=None
     ))]
     #[expect(
         clippy::too_many_arguments,
@@ -212,6 +213,8 @@ impl Body {
         mimic: Option<PyRef<'_, Mimic>>,
         servo: Option<PyRef<'_, Servo>>,
         start: Option<&Bound<'_, PyAny>>,
+        volume: Option<f64>,
+        center_of_buoyancy: Option<&Bound<'_, PyAny>>,
     ) -> PyResult<Self> {
         let at = |field: &str| {
             if name.is_empty() {
@@ -220,7 +223,7 @@ impl Body {
                 format!("body {name:?}: {field}")
             }
         };
-        for (field, value) in [("density", density), ("mass", mass)] {
+        for (field, value) in [("density", density), ("mass", mass), ("volume", volume)] {
             if let Some(value) = value
                 && !(value >= 0.0 && value.is_finite())
             {
@@ -259,6 +262,8 @@ impl Body {
             mass,
             density,
             center_of_mass: optional("center_of_mass", center_of_mass)?,
+            volume,
+            center_of_buoyancy: optional("center_of_buoyancy", center_of_buoyancy)?,
             inertia: inertia
                 .map(|given| row(&at("inertia"), given))
                 .transpose()?,

@@ -145,10 +145,19 @@ impl Scene {
         Ok(())
     }
 
-    /// Adds a force between bodies, by its kind and the keys that it has in a scene file, bodies by name. A "spring", with a damper
-    /// beside it, joins the point `at` (m, body's frame) of `body` and `to_at` of the body `to` (default: of the world): `stiffness`
+    /// Adds a force by its kind and the keys that it has in a scene file, bodies by name; places and directions are in the body's frame. A "spring", with a damper
+    /// beside it, joins the point `at` (m) of `body` and `to_at` of the body `to` (default: of the world): `stiffness`
     /// in N/m, `rest_length` in m, `damping` in N s/m. "lubrication" is what viscous water does in thin gaps, between all surfaces or in the gaps of `bodies` (names):
     /// their `roughness` in m, the `viscosity` in Pa s, and `reach` in m, the distance at which the pressure has fallen to that in the open.
+    ///
+    /// "damping" of a `body` about the point `at`: −(D_L ν + D_Q |ν| ν), ν its twist through the water; `linear` and `quadratic` are (6,), along x, y, z and about
+    /// x, y, z, or (6, 6). A "thruster" pushes a `body` at the point `at` along `direction` by a command, which is a control: its thrust in N is Σ c_k |u|^(k−1) u with
+    /// the coefficients `polynomial`, or a smooth curve through the points (command, thrust) of `table` (n, 2), or the command; `dead_band` is a command, `torque` (m) the
+    /// moment about the direction per newton, `loss` (N s/m) what is lost per command and speed, above the command `smoothing`. With a `rotor`, a body on
+    /// a joint of one velocity, that velocity is the command, and the control is the one that it is driven to with the `time_constant` (s). A "fin" lifts and drags a `body` at `at`,
+    /// the middle of its chord: directions `chord` (toward the leading edge) and `normal`, `length` of the chord (m), `area` (m²), `lift_slope` (1/rad), `drag`
+    /// along the chord and `induced_drag` across it, smoothed below `smoothing` (m/s). A "float" at the point `at` of a `body` has a `volume` (m³) and a `mass` (kg),
+    /// which is made part of the body's.
     #[pyo3(signature = (kind, **fields))]
     fn add_force(
         &mut self,

@@ -120,6 +120,31 @@ fn gathered(
     Err(batch(py, message, members.into_pyobject(py)?, errors))
 }
 
+impl Simulator {
+    /// The thrusters on a body, given by number or name.
+    fn thrusters_of(&self, body: &Bound<'_, PyAny>) -> PyResult<hydrograd::simulate::Allocation> {
+        let names = self.inner.names();
+        let number = match body.extract::<usize>() {
+            Ok(number) => (number < names.len()).then_some(number),
+            Err(_) => {
+                let name = body.extract::<String>().ok();
+                name.and_then(|name| names.iter().position(|n| *n == name))
+            }
+        };
+        let number = number.ok_or_else(|| {
+            input(
+                "allocation: body",
+                body.to_string(),
+                format!(
+                    "must be a number under {}, or one of {names:?}",
+                    names.len()
+                ),
+            )
+        })?;
+        self.inner.allocation(number).or_raise()
+    }
+}
+
 #[pymethods]
 impl Simulator {
     fn __traverse__(&self, visit: PyVisit<'_>) -> Result<(), PyTraverseError> {
@@ -170,7 +195,7 @@ impl Simulator {
     }
 
     /// Runs the scene, with its own controller if it has one, and `controls` (steps, control_size) added to it: generalised
-    /// forces of actuated joints and wrenches of thrusters, N and N m. Without them, `steps` (default: the scene's) without
+    /// forces of actuated joints and wrenches on bodies, N and N m, and commands of thrusters. Without them, `steps` (default: the scene's) without
     /// control. It begins where the simulator does unless given a `state`, or `q` (q_size,) and `v` (v_size,). Ctrl-C ends it.
     ///
     /// `progress(done, total)` is called with the steps made, at most twenty times a second and once at the end. What it raises ends the run and comes out,
@@ -586,6 +611,30 @@ impl Simulator {
     #[getter]
     fn control_size(&self) -> usize {
         self.controls_size()
+    }
+
+    /// Names of the controls, in order: "arm.force.rate" does work on the velocity "arm.rate", "hull.wrench.fx", … "hull.wrench.mz" are a body's wrench, and a thruster's
+    /// command has the thruster's name.
+    #[getter]
+    fn control_names(&self) -> Vec<String> {
+        self.inner.control_names()
+    }
+
+    /// The allocation matrix (6, n) of the thrusters on a `body` (number or name), in the order in which they were added: the wrench of a newton of thrust on the body,
+    /// its frame, about its origin, linear part first (1, m).
+    fn allocation<'py>(
+        &self,
+        py: Python<'py>,
+        body: &Bound<'_, PyAny>,
+    ) -> PyResult<Bound<'py, PyArrayDyn<f64>>> {
+        let found = self.thrusters_of(body)?;
+        let rows = found.matrix.transpose();
+        array::to_python(py, rows.as_slice().to_vec(), &[6, found.controls.len()])
+    }
+
+    /// The controls (numbers) of the thrusters on a `body` (number or name), in the order of the columns of `allocation`.
+    fn thruster_controls(&self, body: &Bound<'_, PyAny>) -> PyResult<Vec<usize>> {
+        Ok(self.thrusters_of(body)?.controls)
     }
 
     /// Number of joint coordinates q.

@@ -8,13 +8,13 @@ mod lubrication;
 mod symmetry;
 
 use crate::adjoint::drag::Element;
-use crate::adjoint::lie::Vec3;
+use crate::adjoint::lie::{Mat3, Vec3};
 use crate::adjoint::waterline::Hull;
 use crate::coupling::Isolated;
 use crate::dynamics::force::Waterline;
 use crate::dynamics::{
-    Armature, BodyData, Declarations, Drift, Drive, FreeMotions, Parameters, SiteData, Stepper,
-    System, force,
+    Armature, BodyData, BodyValues, Declarations, Drift, Drive, FreeMotions, Parameters, SiteData,
+    Stepper, System, force,
 };
 use crate::geometry::TriMesh;
 use crate::memory;
@@ -89,6 +89,29 @@ fn inertia(body: &Body, surface: Option<&Surface>) -> (f64, Vec3, [f64; 6]) {
     (mass, center, six)
 }
 
+/// The same with a mass at a point: by the theorem of Steiner and Huygens for both about their common centre.
+fn with_point_mass(
+    (mass, center, inertia): (f64, Vec3, [f64; 6]),
+    point_mass: f64,
+    point: &Vec3,
+) -> (f64, Vec3, [f64; 6]) {
+    let total = mass + point_mass;
+    if point_mass == 0.0 || total == 0.0 {
+        return (mass, center, inertia);
+    }
+    let apart = point - center;
+    let reduced = mass * (point_mass / total);
+    let added = reduced * (Mat3::identity() * apart.norm_squared() - apart * apart.transpose());
+    let mut six = inertia;
+    for (x, at) in six
+        .iter_mut()
+        .zip([(0, 0), (1, 1), (2, 2), (0, 1), (0, 2), (1, 2)])
+    {
+        *x += added[at];
+    }
+    (total, center + apart * (point_mass / total), six)
+}
+
 fn elements(mesh: &TriMesh) -> Vec<Element> {
     (0..mesh.faces().len())
         .map(|f| Element {
@@ -141,12 +164,25 @@ pub(crate) fn assemble(
     let in_water = water::in_water(scene, &surfaces, &tree, choices.water.fidelity.coupled());
     let mut bodies = Vec::with_capacity(scene.bodies.len());
     let mut faces = Vec::with_capacity(scene.bodies.len());
-    let mut inertias = Vec::with_capacity(scene.bodies.len());
+    let mut values = Vec::with_capacity(scene.bodies.len());
     let mut controls = 0;
     for (b, body) in scene.bodies.iter().enumerate() {
         let surface = surfaces[b].as_ref();
-        let (mass, center, inertia) = inertia(body, surface);
-        inertias.push((body.name.clone(), mass, inertia));
+        let own = inertia(body, surface);
+        let floats = scene.floats().filter(|float| float.body == body.name);
+        let (mass, center_of_mass, inertia) = floats.fold(own, |all, float| {
+            with_point_mass(all, float.mass, &float.at.into())
+        });
+        let volume = surface.map(|s| s.properties.volume);
+        let centroid = surface.map_or(own.1, |s| s.properties.centroid);
+        values.push(BodyValues {
+            name: body.name.clone(),
+            mass,
+            inertia,
+            center_of_mass,
+            volume: body.volume.or(volume),
+            center_of_buoyancy: body.center_of_buoyancy.map_or(centroid, Vec3::from),
+        });
         faces.push(surface.map_or(Vec::new(), |s| elements(&s.mesh)));
         let mut first = |taken: bool, count: usize| {
             let at = controls;
@@ -155,9 +191,7 @@ pub(crate) fn assemble(
         };
         bodies.push(BodyData {
             name: body.name.clone(),
-            center_of_mass: center,
-            volume: surface.map_or(0.0, |s| s.properties.volume),
-            centroid: surface.map_or(center, |s| s.properties.centroid),
+            volume: volume.unwrap_or(0.0),
             submerged: in_water.0.iter().position(|w| *w == b),
             joint_control: first(body.actuated, tree.links()[b].v.len()),
             thruster: first(body.thruster, 6),
@@ -189,6 +223,7 @@ pub(crate) fn assemble(
         time_step: dt,
         tree: &tree,
         bodies: &bodies,
+        values: &values,
         surfaces: &faces,
         hulls: &hulls,
         waterline: scene
@@ -196,7 +231,7 @@ pub(crate) fn assemble(
             .map(|height| Waterline::new(&gravity, height)),
         lubricated: lubrication::lubricated(scene, &surfaces, &clearance)?,
     };
-    let mut declared = Declarations::new(scene.fluid.density, inertias);
+    let mut declared = Declarations::new(scene.fluid.density, &values);
     let forces = force::assemble(&parts, &mut declared);
     let armature = Armature::new(scene, &tree, &mut declared);
     let mut parameters = declared.finish();
@@ -216,7 +251,7 @@ pub(crate) fn assemble(
         armature,
         forces,
         current,
-        controls,
+        controls: scene.controls(),
         coupling: Arc::new(Isolated::new(Vec::new())),
         contact: None,
         limits: Vec::new(),

@@ -54,7 +54,7 @@ impl Rows {
     }
 }
 
-/// Adds the cotangent of mass and inertia of body `b` for a term `x̄ᵀ M̄_r ȳ` (body-frame twists).
+/// Adds the cotangent of mass, inertia and centre of mass of body `b` for a term `x̄ᵀ M̄_r ȳ` (body-frame twists).
 pub(super) fn rigid_parameters_vjp(
     e: &Evaluation,
     b: usize,
@@ -64,9 +64,11 @@ pub(super) fn rigid_parameters_vjp(
 ) {
     let pose = &e.kinematics.poses[b];
     let outer: Matrix6<f64> = pose.twist_to_body(x) * pose.twist_to_body(y).transpose();
-    let (mass, inertia) = rigid::spatial_inertia_vjp(&e.system.bodies[b].center_of_mass, &outer);
-    *bar.mass_mut(b) += mass;
-    bar.add_inertia(b, &inertia);
+    let (mass, center) = (e.parameters.mass(b), e.parameters.center_of_mass(b));
+    let found = rigid::spatial_inertia_vjp(mass, &center, &outer);
+    *bar.mass_mut(b) += found.mass;
+    bar.add_inertia(b, &found.inertia);
+    bar.add_center_of_mass(b, &found.center);
 }
 
 impl Evaluation<'_> {

@@ -1,6 +1,6 @@
 //! Constants of one body.
 
-use crate::adjoint::lie::{Pose, Vec3};
+use crate::adjoint::lie::Pose;
 
 /// A frame fixed to a body.
 #[derive(Clone, Debug)]
@@ -18,12 +18,8 @@ pub struct SiteData {
 pub struct BodyData {
     /// Name, for messages.
     pub name: String,
-    /// Centre of mass in the body's frame, m.
-    pub center_of_mass: Vec3,
-    /// Displaced volume, m³.
+    /// Volume within its surface, m³; what it is buoyant by is a parameter.
     pub volume: f64,
-    /// Its centroid in the body's frame, m.
-    pub centroid: Vec3,
     /// Index among the bodies that the coupling knows.
     pub submerged: Option<usize>,
     /// First control of the joint's generalised forces.

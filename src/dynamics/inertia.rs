@@ -197,7 +197,7 @@ impl System {
         let of = |b: usize| {
             rigid::spatial_inertia(
                 parameters.mass(b),
-                &self.bodies[b].center_of_mass,
+                &parameters.center_of_mass(b),
                 &parameters.inertia(b),
             )
         };

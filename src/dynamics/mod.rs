@@ -4,10 +4,12 @@ mod acceleration;
 mod armature;
 mod balance;
 mod body;
+mod body_parameters;
 mod contact;
 mod contact_force;
 mod cotangents;
 mod damping;
+mod declared;
 mod drift;
 mod evaluation;
 mod fluid;
@@ -38,7 +40,9 @@ pub use integrator::{
 };
 pub use limit::JointLimit;
 pub use linearisation::Linearisation;
-pub use parameters::{Declarations, Declared, Entry, Owner, Parameter, Parameters, Range, Typical};
+pub use parameters::{
+    BodyValues, Declarations, Declared, Entry, Owner, Parameter, Parameters, Range, Typical,
+};
 pub use slopes::{InputTangents, Slopes};
 pub use stiffness::Damping;
 pub use symmetry::FreeMotions;

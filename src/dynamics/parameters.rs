@@ -4,100 +4,20 @@
 //! with its name, its bounds and the size of a change that says something. Values and cotangents are rows with a shared
 //! table; packing, names, checks and gradient checks read the table.
 
+use super::body_parameters::{
+    BUOYANCY, CENTER, CONTACT, FLUID, INERTIA, MASS, NO_VOLUME, VOLUME, contact, inertia,
+};
+use crate::adjoint::lie::Vec3;
 use crate::scene::impossible_inertia;
 use crate::{Error, Result};
 use std::fmt;
 use std::ops::{Index, IndexMut};
 use std::sync::Arc;
 
-/// What a parameter belongs to: the first part of its name, and its place in the order of all of them.
-#[derive(Clone, Debug, PartialEq, Eq)]
-pub enum Owner {
-    /// The fluid.
-    Fluid,
-    /// A body, by its number.
-    Body(usize),
-    /// Anything else, by its name; in the order of declaration, after the bodies.
-    Named(String),
-}
-
-/// Values that a parameter may have.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Range {
-    /// Any finite number.
-    Finite,
-    /// Zero and above.
-    NotNegative,
-    /// Above zero.
-    Positive,
-    /// Zero alone; what would have to be done to change that.
-    Zero(&'static str),
-}
-
-/// Sizes of a system's motion, which sizes of changes follow from.
-#[derive(Clone, Copy, Debug)]
-pub struct Typical {
-    /// Density of the fluid, kg/m³.
-    pub density: f64,
-    /// Largest velocity of a joint, m/s or rad/s.
-    pub speed: f64,
-    /// Size of the largest body, m.
-    pub length: f64,
-    /// Largest moment of inertia of the body that the parameter belongs to, kg m²; zero if to none.
-    pub moment: f64,
-}
-
-/// Declaration of a parameter.
-#[derive(Clone, Copy, Debug)]
-pub struct Declared {
-    /// Name, without its owner's.
-    pub name: &'static str,
-    /// Unit.
-    pub unit: &'static str,
-    /// Values that it may have.
-    pub range: Range,
-    /// Size of a change that says something, from its value.
-    pub size: fn(f64, &Typical) -> f64,
-}
-
-impl Declared {
-    /// A parameter that isn't negative, whose changes are measured by its value.
-    pub const fn new(name: &'static str, unit: &'static str) -> Self {
-        Self {
-            name,
-            unit,
-            range: Range::NotNegative,
-            size: |value, _| value,
-        }
-    }
-
-    /// With other values allowed.
-    pub const fn range(mut self, range: Range) -> Self {
-        self.range = range;
-        self
-    }
-
-    /// With another size of a change.
-    pub const fn size(mut self, size: fn(f64, &Typical) -> f64) -> Self {
-        self.size = size;
-        self
-    }
-}
-
-/// Where the value of a declared parameter stands: its index in [`Parameters`].
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub struct Parameter(usize);
-
-/// One line of the table.
-#[derive(Clone, Debug)]
-pub struct Entry {
-    /// Full name: its owner's, a dot, its own.
-    pub name: String,
-    /// What it belongs to.
-    pub owner: Owner,
-    /// How it was declared.
-    pub declared: Declared,
-}
+pub use super::body_parameters::{
+    BodyValues, DENSITY, center_of_buoyancy, center_of_mass, mass, volume,
+};
+pub use super::declared::{Declared, Entry, Owner, Parameter, Range, Typical};
 
 /// All parameters of a system.
 #[derive(Clone, Debug)]
@@ -117,61 +37,25 @@ pub struct Declarations {
     made: Vec<(Entry, f64)>,
 }
 
-/// The fluid's density: declared before all others.
-pub(super) const DENSITY: Parameter = Parameter(0);
-
-/// Mass of body `b`: after the density come the bodies, each with its mass and its inertia.
-pub(super) fn mass(b: usize) -> Parameter {
-    Parameter(1 + (1 + INERTIA.len()) * b)
-}
-
-fn inertia(b: usize) -> [Parameter; 6] {
-    std::array::from_fn(|k| Parameter(mass(b).0 + 1 + k))
-}
-
-/// Parameters of contact of so many bodies: after theirs.
-fn contact(bodies: usize) -> [Parameter; CONTACT.len()] {
-    std::array::from_fn(|k| Parameter(mass(bodies).0 + k))
-}
-
-const FLUID: Declared = Declared::new("density", "kg/m³");
-const MASS: Declared = Declared::new("mass", "kg");
-const CONTACT: [Declared; 5] = [
-    Declared::new("stiffness", "N/m"),
-    Declared::new("dissipation", "s/m"),
-    Declared::new("friction", "1"),
-    Declared::new("torsional_friction", "m"),
-    Declared::new("rolling_friction", "m"),
-];
-
-/// Moments, then products.
-const INERTIA: [Declared; 6] = {
-    const fn product(name: &'static str) -> Declared {
-        Declared::new(name, "kg m²")
-            .range(Range::Finite)
-            .size(|_, typical| 0.1 * typical.moment)
-    }
-    [
-        Declared::new("inertia.xx", "kg m²"),
-        Declared::new("inertia.yy", "kg m²"),
-        Declared::new("inertia.zz", "kg m²"),
-        product("inertia.xy"),
-        product("inertia.xz"),
-        product("inertia.yz"),
-    ]
-};
-
 impl Declarations {
-    /// Density (kg/m³) and bodies: name, mass (kg), inertia (xx, yy, zz, xy, xz, yz, kg m²); those of contact are zero.
-    pub fn new(density: f64, bodies: Vec<(String, f64, [f64; 6])>) -> Self {
+    /// Density (kg/m³) and bodies; those of contact are zero.
+    pub fn new(density: f64, bodies: &[BodyValues]) -> Self {
         let mut out = Self {
-            bodies: bodies.iter().map(|b| b.0.clone()).collect(),
+            bodies: bodies.iter().map(|b| b.name.clone()).collect(),
             made: Vec::new(),
         };
         out.declare(Owner::Fluid, FLUID, density);
-        for (b, (_, mass, inertia)) in bodies.into_iter().enumerate() {
-            out.declare(Owner::Body(b), MASS, mass);
-            for (declared, value) in INERTIA.into_iter().zip(inertia) {
+        for (b, body) in bodies.iter().enumerate() {
+            let volume = match body.volume {
+                Some(volume) => (VOLUME, volume),
+                None => (NO_VOLUME, 0.0),
+            };
+            let inertia = INERTIA.into_iter().zip(body.inertia);
+            let center = CENTER.into_iter().zip(body.center_of_mass.iter().copied());
+            let buoyancy = BUOYANCY.into_iter();
+            let buoyancy = buoyancy.zip(body.center_of_buoyancy.iter().copied());
+            let all = std::iter::once((MASS, body.mass)).chain(inertia);
+            for (declared, value) in all.chain(center).chain([volume]).chain(buoyancy) {
                 out.declare(Owner::Body(b), declared, value);
             }
         }
@@ -183,13 +67,34 @@ impl Declarations {
 
     /// Adds a parameter with its value.
     pub fn declare(&mut self, owner: Owner, declared: Declared, value: f64) -> Parameter {
+        self.declare_named(owner, declared, declared.name, value)
+    }
+
+    /// Adds one of several parameters that are declared alike: its name ends in a dot and `part`.
+    pub fn declare_part(
+        &mut self,
+        owner: Owner,
+        declared: Declared,
+        part: &str,
+        value: f64,
+    ) -> Parameter {
+        self.declare_named(owner, declared, &format!("{}.{part}", declared.name), value)
+    }
+
+    fn declare_named(
+        &mut self,
+        owner: Owner,
+        declared: Declared,
+        name: &str,
+        value: f64,
+    ) -> Parameter {
         let of = match &owner {
             Owner::Fluid => "fluid",
             Owner::Body(b) => &self.bodies[*b],
             Owner::Named(name) => name,
         };
         let entry = Entry {
-            name: format!("{of}.{}", declared.name),
+            name: format!("{of}.{name}"),
             owner,
             declared,
         };
@@ -263,8 +168,8 @@ impl Parameters {
         &self.table.entries
     }
 
-    /// Names, in the order of [`Parameters::to_vec`]: the fluid's density; per body mass, inertia and what its forces
-    /// declare; contact; what belongs to other things.
+    /// Names, in the order of [`Parameters::to_vec`]: the fluid's density; per body mass, inertia, centre of mass, volume, centre of
+    /// buoyancy and what its forces declare; contact; what belongs to other things.
     pub fn names(&self) -> impl Iterator<Item = &str> {
         self.table.entries.iter().map(|e| e.name.as_str())
     }
@@ -356,6 +261,36 @@ impl Parameters {
     /// Adds to the inertia of body `b`.
     pub fn add_inertia(&mut self, b: usize, more: &[f64; 6]) {
         for (i, x) in inertia(b).into_iter().zip(more) {
+            self[i] += x;
+        }
+    }
+
+    /// Centre of mass of body `b` in its frame, m.
+    pub fn center_of_mass(&self, b: usize) -> Vec3 {
+        self.point(center_of_mass(b))
+    }
+
+    /// Adds to the centre of mass of body `b`.
+    pub fn add_center_of_mass(&mut self, b: usize, more: &Vec3) {
+        self.add_point(center_of_mass(b), more);
+    }
+
+    /// Volume by which body `b` is buoyant, m³.
+    pub fn volume(&self, b: usize) -> f64 {
+        self[volume(b)]
+    }
+
+    /// Centre of buoyancy of body `b` in its frame, m.
+    pub fn center_of_buoyancy(&self, b: usize) -> Vec3 {
+        self.point(center_of_buoyancy(b))
+    }
+
+    pub(super) fn point(&self, of: [Parameter; 3]) -> Vec3 {
+        Vec3::from(of.map(|i| self[i]))
+    }
+
+    pub(super) fn add_point(&mut self, of: [Parameter; 3], more: &Vec3) {
+        for (i, x) in of.into_iter().zip(more.iter()) {
             self[i] += x;
         }
     }

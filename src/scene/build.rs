@@ -169,6 +169,10 @@ setters! { Body {
     inertia(inertia: impl Into<Vec<f64>>) => inertia = Some(inertia.into());
     /// Centre of mass in the body's frame, m.
     center_of_mass(center: [f64; 3]) => center_of_mass = Some(center);
+    /// Volume by which the body is buoyant, m³, instead of its shape's.
+    volume(volume: f64) => volume = Some(volume);
+    /// Where buoyancy acts in the body's frame, m, instead of the shape's centroid.
+    center_of_buoyancy(center: [f64; 3]) => center_of_buoyancy = Some(center);
     /// The body's own added mass at unit density of the fluid, about its origin, body axes.
     added_mass(rows: [[f64; 6]; 6]) => added_mass = Some(rows.iter().map(|row| row.to_vec()).collect());
     /// Position of the joint's frame in the parent's frame, m: where the body is at q = 0.

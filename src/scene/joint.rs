@@ -48,9 +48,28 @@ impl Scene {
         self.bodies.iter().map(Body::velocities).sum()
     }
 
-    /// Number of controls a step takes.
+    /// Number of controls a step takes: those of bodies, then those of thrusters among the forces.
     pub fn controls(&self) -> usize {
-        self.bodies.iter().map(Body::controls).sum()
+        let of_bodies: usize = self.bodies.iter().map(Body::controls).sum();
+        of_bodies + self.thrusters().count()
+    }
+
+    /// Names of the controls, in order: `arm.force.rate` does work on the velocity `arm.rate`, `hull.wrench.fx`, …, `hull.wrench.mz` are a body's wrench, and a
+    /// thruster's command has the thruster's name.
+    pub fn control_labels(&self) -> Vec<String> {
+        let mut out = Vec::with_capacity(self.controls());
+        for body in &self.bodies {
+            if body.actuated {
+                let labels = body.joint.velocity_labels().iter();
+                out.extend(labels.map(|label| format!("{}.force.{label}", body.name)));
+            }
+            if body.thruster {
+                let labels = ["fx", "fy", "fz", "mx", "my", "mz"];
+                out.extend(labels.map(|label| format!("{}.wrench.{label}", body.name)));
+            }
+        }
+        out.extend(self.thrusters().map(|(i, _, _)| self.force_name(i)));
+        out
     }
 
     /// Names of the entries of q: `coin.y`, `coin.z`, `coin.angle`, …

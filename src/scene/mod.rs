@@ -28,7 +28,10 @@ pub use crate::shape::Shape;
 pub use build::BodyId;
 pub(crate) use carriers::Carriers;
 pub use contact::{CollisionPiece, Contact};
-pub use force::{Force, Lubrication, Spring, WATER_VISCOSITY};
+pub(crate) use force::{AXES, least_damping};
+pub use force::{
+    Coefficients, Damping, Fin, Float, Force, Lubrication, Spring, Thruster, WATER_VISCOSITY,
+};
 pub use mimic::Mimic;
 pub use origin::Origin;
 pub use passive::Passive;
@@ -148,6 +151,10 @@ pub struct Body {
     pub density: Option<f64>,
     /// Centre of mass in the body's frame, m; default: the shape's centroid.
     pub center_of_mass: Option<[f64; 3]>,
+    /// Volume by which the body is buoyant, m³; default: its shape's. It changes nothing else of what the water does.
+    pub volume: Option<f64>,
+    /// Where buoyancy acts in the body's frame, m; default: the shape's centroid, or the centre of mass.
+    pub center_of_buoyancy: Option<[f64; 3]>,
     /// Inertia about the centre of mass, body axes, kg m²: xx, yy, zz or xx, yy, zz, xy, xz, yz.
     /// Default: that of the shape filled evenly with `mass`.
     pub inertia: Option<Vec<f64>>,
@@ -289,13 +296,13 @@ pub enum Controller {
         /// One per control, N or N m.
         control: Vec<f64>,
     },
-    /// Proportional–derivative control of each actuated joint coordinate.
+    /// Proportional–derivative control of each actuated joint coordinate; thrusters among the forces get nothing from it.
     Pd {
-        /// Target coordinates, one per control, m or rad.
+        /// Target coordinates, one per actuated one, m or rad.
         target: Vec<f64>,
-        /// Stiffness, one per control, N/m or N m/rad.
+        /// Stiffness of each, N/m or N m/rad.
         stiffness: Vec<f64>,
-        /// Damping, one per control, N s/m or N m s/rad.
+        /// Damping of each, N s/m or N m s/rad.
         damping: Vec<f64>,
     },
     /// Pushes one joint with a constant force until its coordinate passes a value, then stops it

@@ -8,7 +8,8 @@ use nalgebra::DMatrix;
 pub(super) const MOST_STEPS: usize = 5_000_000;
 
 /// One row per control, one column per step: generalised forces of actuated joints (N, N m) and wrenches of
-/// thrusters (N, N m; world axes, about the body's origin), in the order of the bodies.
+/// bodies (N, N m; world axes, about the body's origin), in the order of the bodies, then commands of thrusters in the order of the forces
+/// ([`crate::Scene::control_labels`]).
 #[derive(Clone, Debug, PartialEq)]
 pub struct Controls(DMatrix<f64>);
 

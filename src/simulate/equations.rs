@@ -230,18 +230,22 @@ impl Equations<'_> {
 
     /// Total mass, kg, and centre of mass of the bodies in the world, m; none where there is no mass.
     pub fn center_of_mass(&self) -> Option<(f64, Vec3)> {
-        let bodies = self.at.system.bodies.iter().enumerate();
-        self.center(bodies.map(|(b, body)| (b, self.at.parameters.mass(b), body.center_of_mass)))
+        let parameters = self.at.parameters;
+        let of = |b: usize| (b, parameters.mass(b), parameters.center_of_mass(b));
+        self.center((0..self.at.system.len()).map(of))
     }
 
-    /// Volume of the bodies in the water, m³, and its centre, at which their buoyancy acts together, in the world, m; none where nothing is in the water.
+    /// Volume of the bodies in the water and of what floats them, m³, and its centre, at which their buoyancy acts together, in the world, m; none where nothing is in
+    /// the water.
     pub fn center_of_buoyancy(&self) -> Option<(f64, Vec3)> {
-        let system = self.at.system;
-        let submerged = system.submerged().map(|(b, _)| {
-            let body = &system.bodies[b];
-            (b, body.volume, body.centroid)
-        });
-        self.center(submerged)
+        let (system, parameters) = (self.at.system, self.at.parameters);
+        let wet = |b: &usize| system.bodies[*b].submerged.is_some();
+        // What has a volume and no surface.
+        let given = |b: &usize| system.bodies[*b].volume == 0.0 && parameters.volume(*b) > 0.0;
+        let bodies = (0..system.len()).filter(|b| wet(b) || given(b));
+        let own = bodies.map(|b| (b, parameters.volume(b), parameters.center_of_buoyancy(b)));
+        let floats = system.forces.iter().flat_map(|f| f.displaced(parameters));
+        self.center(own.chain(floats))
     }
 
     fn center(&self, parts: impl Iterator<Item = (usize, f64, Vec3)>) -> Option<(f64, Vec3)> {

@@ -3,6 +3,7 @@
 use super::{Controls, Cotangents, Rollout, Sample, Simulator};
 use crate::adjoint::lie::Vec3;
 use crate::adjoint::sample::Samples;
+use crate::dynamics::force::ForceModel;
 use crate::{Error, Result};
 use nalgebra::{DMatrix, DVector};
 use serde::Serialize;
@@ -89,6 +90,16 @@ struct Scales {
     velocity: DVector<f64>,
     displacement: DVector<f64>,
     force: Vec<f64>,
+    /// The controls that are checked about.
+    about: DVector<f64>,
+}
+
+impl Scales {
+    /// The controls that are checked about, at every step.
+    fn controls(&self, simulator: &Simulator, steps: usize) -> Result<Controls> {
+        let columns = DMatrix::from_fn(self.about.len(), steps, |i, _| self.about[i]);
+        Controls::from_matrix(simulator, columns)
+    }
 }
 
 /// A random functional of the trajectory: markers on the bodies and velocities, at the middle and the end.
@@ -203,11 +214,21 @@ fn scales(simulator: &Simulator, rollout: &Rollout, steps: usize) -> Result<Scal
             force.extend([mass * length / duration; 6]);
         }
     }
+    // Commands that give forces of that size; about one half of them, since a curve may be as |u| u is at zero, without a second derivative.
+    let mut about = DVector::zeros(system.controls);
+    let commanded = |f: &Box<dyn ForceModel>| f.commanded(simulator.parameters());
+    for c in system.forces.iter().flat_map(commanded) {
+        let mass = simulator.parameters().mass(c.body);
+        let share = mass * length / duration / c.thrust.abs();
+        force.push(c.command * if share < 1.0 { share } else { 1.0 });
+        about[c.control] = 0.5 * force[c.control];
+    }
     Ok(Scales {
         length,
         velocity,
         displacement,
         force,
+        about,
     })
 }
 
@@ -228,6 +249,7 @@ pub fn timings(simulator: &Simulator, steps: usize, repetitions: usize) -> Resul
     let vector = |n: usize| DVector::from_fn(n, |_, _| random.number());
     let zero = Controls::zeros(simulator, steps);
     let scale = scales(simulator, &simulator.rollout(&zero)?, steps)?;
+    let zero = scale.controls(simulator, steps)?;
     let probe = Probe::new(simulator, &scale, steps, vector);
     time(simulator, &zero, &probe, repetitions)
 }
@@ -261,8 +283,9 @@ pub fn gradcheck_with(
     }
     let steps = settings.steps;
     let zero = Controls::zeros(simulator, steps);
-    let rollout = simulator.rollout(&zero)?;
-    let scale = scales(simulator, &rollout, steps)?;
+    let scale = scales(simulator, &simulator.rollout(&zero)?, steps)?;
+    let about = scale.controls(simulator, steps)?;
+    let rollout = simulator.rollout(&about)?;
     let mut random = Samples::new(settings.seed);
     let mut vector = |n: usize| DVector::from_fn(n, |_, _| random.number());
     let nv = simulator.system().tree.velocities();
@@ -289,7 +312,7 @@ pub fn gradcheck_with(
         progress(directions.len(), all);
         Ok(())
     };
-    let value = |simulator: &Simulator| Ok(probe.value(&simulator.rollout(&zero)?));
+    let value = |simulator: &Simulator| Ok(probe.value(&simulator.rollout(&about)?));
     for _ in 0..settings.directions {
         let controls = simulator.system().controls;
         if controls > 0 {
@@ -299,7 +322,7 @@ pub fn gradcheck_with(
                 row *= *f;
             }
             add("controls", gradient.controls.dot(&d), &mut |h| {
-                let c = Controls::from_matrix(simulator, h * &d)?;
+                let c = Controls::from_matrix(simulator, about.matrix() + h * &d)?;
                 Ok(probe.value(&simulator.rollout(&c)?))
             })?;
         }
@@ -350,7 +373,7 @@ pub fn gradcheck_with(
     }
     let times = match settings.timings {
         0 => Times::default(),
-        n => time(simulator, &zero, &probe, n)?,
+        n => time(simulator, &about, &probe, n)?,
     };
     let worst = |names: &[&str]| {
         let group: Vec<&Direction> = directions

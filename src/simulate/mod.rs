@@ -1,5 +1,6 @@
 //! Simulations: settings, controllers, rollouts and their gradients.
 
+mod allocation;
 mod checkpoint;
 mod controls;
 mod deciding;
@@ -35,6 +36,7 @@ mod summary;
 mod tangents;
 mod trajectory;
 
+pub use allocation::Allocation;
 pub use checkpoint::Checkpoint;
 pub use controls::Controls;
 pub use equations::Equations;

@@ -191,6 +191,8 @@ impl Simulator {
             ));
         }
         parameters.check()?;
+        let mut forces = self.system().forces.iter();
+        forces.try_for_each(|force| force.check(&parameters))?;
         if parameters.density() > 0.0 && self.parameters().density() <= 0.0 {
             // Without water bodies may have been in one another.
             self.check_apart(self.start().0, parameters.density())?;

@@ -6,6 +6,7 @@
 
 use super::{Rollout, Sample, Simulator};
 use crate::adjoint::lie::{Vec6, angular, point_velocity};
+use crate::dynamics::force::{Moving, Place};
 use crate::dynamics::{Drive, System};
 use crate::error::readable;
 use nalgebra::DVector;
@@ -121,15 +122,35 @@ impl Rollout {
             return vec![0.0; samples.len()];
         }
         let rates: Vec<DVector<f64>> = samples.iter().map(|s| control_rates(system, s)).collect();
+        let driven = |n: usize, of: &Sample| self.driven_power(&samples[n], &of.control).abs();
         let mut out = vec![0.0];
         let mut so_far = 0.0;
         for (n, s) in samples.iter().enumerate().take(samples.len() - 1) {
             for (i, u) in s.control.iter().enumerate() {
                 so_far += dt * u.abs() * rates[n][i].abs().max(rates[n + 1][i].abs());
             }
+            so_far += dt * driven(n, s).max(driven(n + 1, s));
             out.push(so_far);
         }
         out
+    }
+
+    /// Power that these controls put in at a state other than as forces of their own, W.
+    fn driven_power(&self, s: &Sample, control: &DVector<f64>) -> f64 {
+        let (system, parameters) = (self.simulator.system(), self.simulator.parameters());
+        let twists = system.tree.twists(&system.tree.kinematics(&s.q), &s.v);
+        let at = Moving {
+            place: Place {
+                poses: &s.poses,
+                q: &s.q,
+                parameters,
+            },
+            twists: &twists,
+            v: &s.v,
+            current: &system.current,
+            control,
+        };
+        system.forces.iter().map(|f| f.driven_power(&at)).sum()
     }
 
     /// Kinetic energy far beyond what motions and the current could give.

@@ -1,6 +1,7 @@
 //! Motion: what it conserves, its gradients, how runs are resumed and ended, and descent on them.
 
 mod balance;
+mod ballast;
 #[cfg(feature = "opt")]
 mod control;
 mod driven;
@@ -28,6 +29,7 @@ mod rollout_gradient;
 mod smoothing;
 mod soak;
 mod trees;
+mod vehicle;
 mod waterline;
 
 #[path = "../support/mod.rs"]

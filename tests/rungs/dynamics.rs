@@ -9,7 +9,8 @@ use hydrograd::dynamics::{
     Stepper, System,
 };
 use hydrograd::scene::{
-    Body, Drag, DragPart, Fluid, Joint, Mimic, Motion, Passive, Plane, Scene, Servo, Shape, Spring,
+    Body, Damping, Drag, DragPart, Fin, Float, Fluid, Joint, Mimic, Motion, Passive, Plane, Scene,
+    Servo, Shape, Spring, Thruster,
 };
 use hydrograd::simulate::{Pd, PdAxis};
 use hydrograd::{Controls, Rollout, Settings, Simulator};
@@ -126,6 +127,8 @@ pub fn scene() -> Scene {
             .mass(0.7)
             .inertia([0.01, 0.02, 0.015])
             .center_of_mass([0.0, 0.05, 0.0])
+            .volume(5e-4)
+            .center_of_buoyancy([0.02, 0.0, 0.03])
             .joint(Joint::Prismatic { axis })
             .passive(Passive::default().stiffness(3.0).armature(0.2))
             .actuated()
@@ -159,7 +162,65 @@ pub fn scene() -> Scene {
     scene.add_force(spring.rest_length(0.3).damping(6.0).into());
     let tether = Spring::new("tail").at([0.0, 0.05, 0.02]).damping(3.0);
     scene.add_force(tether.anchored([-0.5, 0.4, 0.7]).stiffness(15.0).into());
+    scene.add_force(damping().into());
+    let about = Damping::new("tail").at([-0.05, 0.02, 0.03]);
+    scene.add_force(about.quadratic([3.0, 5.0, 6.0, 0.1, 0.2, 0.15]).into());
+    let jet = Thruster::new("hull").at([-0.2, 0.1, -0.05]);
+    let jet = jet.direction([0.9, 0.1, 0.3]).polynomial([0.8, 0.3, 0.05]);
+    scene.add_force(
+        jet.dead_band(0.4)
+            .torque(-0.03)
+            .loss(1.5)
+            .smoothing(0.5)
+            .into(),
+    );
+    let points = [
+        [-4.0, -9.0],
+        [-1.0, -2.0],
+        [0.5, 0.4],
+        [2.0, 3.0],
+        [4.0, 11.0],
+    ];
+    let side = Thruster::new("tail").at([0.0, 0.03, 0.02]);
+    let side = side.direction([0.1, -0.4, 0.8]).table(points);
+    scene.add_force(side.torque(0.02).loss(0.7).dead_band(0.3).into());
+    scene.add(
+        Body::dry()
+            .named("propeller")
+            .child_of("hull")
+            .mass(0.2)
+            .inertia([0.02, 0.03, 0.04])
+            .center_of_mass([0.01, 0.0, 0.02])
+            .at([-0.2, -0.1, 0.1])
+            .joint(Joint::Revolute { axis }),
+    );
+    let driven = Thruster::new("hull").at([-0.2, -0.1, 0.1]);
+    let driven = driven.direction([0.8, -0.3, 0.1]).polynomial([2.0, 0.9]);
+    let driven = driven.rotor("propeller", 0.3).torque(0.04);
+    scene.add_force(driven.loss(0.4).dead_band(0.2).into());
+    let foam = Float::new("arm").at([0.03, 0.02, 0.06]);
+    scene.add_force(foam.volume(8e-4).mass(0.2).into());
+    let wing = Fin::new("hull")
+        .at([0.1, 0.15, 0.02])
+        .chord([1.0, 0.2, 0.1], 0.2);
+    let wing = wing.normal([-0.1, 0.0, 1.0]).area(0.03).lift_slope(4.0);
+    scene.add_force(wing.drag(0.02).induced_drag(1.1).into());
     scene
+}
+
+/// Of every entry, those across the diagonal unlike.
+fn damping() -> Damping {
+    let sizes = [5.0, 7.0, 6.0, 0.6, 0.5, 0.7_f64];
+    let rows = |phase: f64| -> [[f64; 6]; 6] {
+        std::array::from_fn(|i| {
+            std::array::from_fn(|j| match i == j {
+                true => sizes[i],
+                false => 0.15 * (phase + (6 * i + j) as f64).sin() * (sizes[i] * sizes[j]).sqrt(),
+            })
+        })
+    };
+    let damping = Damping::new("hull").at([0.1, -0.05, 0.07]);
+    damping.linear(rows(0.3)).quadratic(rows(1.4))
 }
 
 pub fn simulator() -> &'static Simulator {
@@ -236,8 +297,17 @@ pub fn directions(at: &Parameters) -> Vec<(&'static str, DVector<f64>)> {
         ("joint.damping", 0.1),
         ("joint.friction", 0.1),
         ("joint.armature", 0.01),
+        ("center_of_mass", 0.05),
+        ("center_of_buoyancy", 0.05),
+        ("linear", 0.1),
+        ("quadratic", 0.1),
+        ("drag", 0.1),
     ];
-    let kind = |name: &'static str| name.split_once("inertia").map_or(name, |_| "inertia");
+    let kinds = ["inertia", "center_of_mass", "center_of_buoyancy"];
+    let kind = |name: &'static str| {
+        let mut kinds = kinds.into_iter();
+        kinds.find(|k| name.starts_with(k)).unwrap_or(name)
+    };
     let mut out: Vec<(&'static str, DVector<f64>)> = Vec::new();
     for (i, (entry, value)) in at.table().iter().zip(at.to_vec()).enumerate() {
         if entry.owner == Owner::Named("contact".into()) {

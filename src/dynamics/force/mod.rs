@@ -5,16 +5,23 @@
 //! To add one: a file with the type, its declared parameters and its `assemble`, and its line in `FORCES`.
 
 mod actuation;
+mod curve;
+mod damping;
 mod drag;
+mod fin;
+mod local;
 mod lubrication;
 mod passive;
+mod rotor;
 mod servo;
 mod spring;
+mod thrust;
 mod thruster;
 mod waterline;
 mod weight;
 
-use super::{BodyData, Declarations, Parameters};
+use super::{BodyData, BodyValues, Declarations, Parameters};
+use crate::Result;
 use crate::adjoint::drag::Element;
 use crate::adjoint::lie::{Pose, Vec3, Vec6, six};
 use crate::adjoint::waterline::Hull;
@@ -34,6 +41,7 @@ const FORCES: &[Assemble] = &[
     weight::gravity,
     weight::buoyancy,
     waterline::buoyancy,
+    weight::floats,
     drag::linear,
     drag::quadratic,
     thruster::assemble,
@@ -42,6 +50,10 @@ const FORCES: &[Assemble] = &[
     servo::assemble,
     spring::assemble,
     lubrication::assemble,
+    damping::assemble,
+    thrust::assemble,
+    rotor::assemble,
+    fin::assemble,
 ];
 
 /// What forces are made from.
@@ -54,6 +66,8 @@ pub struct ForceParts<'a> {
     pub tree: &'a Tree,
     /// Constants of its bodies.
     pub bodies: &'a [BodyData],
+    /// What their parameters start from.
+    pub values: &'a [BodyValues],
     /// Surface of each body that has one.
     pub surfaces: &'a [Vec<Element>],
     /// The same as closed meshes, where the water has a surface.
@@ -197,6 +211,21 @@ pub enum Outside {
     All,
 }
 
+/// A force along a fixed line of a body, by a command which is a control.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Commanded {
+    /// The control.
+    pub control: usize,
+    /// The body.
+    pub body: usize,
+    /// Wrench of a newton of thrust, body's frame, about its origin: 1, m.
+    pub wrench: Vec6,
+    /// A command as large as they come.
+    pub command: f64,
+    /// The thrust that it gives in water at rest, N.
+    pub thrust: f64,
+}
+
 /// A force, on any bodies and joints. It is a pure function of where they are, how they move, controls and parameters.
 pub trait ForceModel: Send + Sync {
     /// Its name, for messages and checks.
@@ -249,6 +278,29 @@ pub trait ForceModel: Send + Sync {
     /// Whether it changes no energy but its own potential one, at these parameters and where nothing is controlled.
     fn conservative(&self, _parameters: &Parameters) -> bool {
         false
+    }
+
+    /// Power that controls put in beyond that of joint forces and wrenches which are controls themselves, W; for warnings of energy from nowhere.
+    fn driven_power(&self, _at: &Moving) -> f64 {
+        0.0
+    }
+
+    /// Forces along fixed lines of bodies that controls command, at these parameters.
+    fn commanded(&self, _parameters: &Parameters) -> Vec<Commanded> {
+        Vec::new()
+    }
+
+    /// What it displaces beside the volumes of the bodies, at these parameters: body, volume (m³) and where that is in the body's frame, m.
+    fn displaced(&self, _parameters: &Parameters) -> Vec<(usize, f64, Vec3)> {
+        Vec::new()
+    }
+
+    /// Refuses parameters that no single one's range does.
+    ///
+    /// # Errors
+    /// Those that the force can't have together.
+    fn check(&self, _parameters: &Parameters) -> Result<()> {
+        Ok(())
     }
 
     /// Potential energy, J, of a force that has one.

@@ -5,7 +5,7 @@
 use super::{ForceModel, ForceParts, LoadBars, Loads, Moving, Outside, Place, Together, Velocity};
 use crate::adjoint::lie::{Pose, Vec3, Vec6, angular, linear, six};
 use crate::adjoint::waterline::{Below, Hull};
-use crate::dynamics::parameters::{DENSITY, Declarations, Parameters};
+use crate::dynamics::parameters::{DENSITY, Declarations, Parameter, Parameters, volume};
 
 /// The surface of still water.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -39,17 +39,23 @@ struct Floating {
 struct Floater {
     body: usize,
     hull: Hull,
-    /// The body's volume over that of its mesh.
-    fill: f64,
+    /// What the body displaces deep down, m³.
+    volume: Parameter,
+    /// That of its mesh, m³.
+    mesh_volume: f64,
 }
 
 pub(super) fn buoyancy(parts: &ForceParts, _: &mut Declarations) -> Option<Box<dyn ForceModel>> {
     let surface = parts.waterline?;
     let floater = |(body, hull): (usize, &Option<Hull>)| {
         let hull = hull.clone()?;
-        let whole = Below::new(&hull, &Vec3::z(), f64::INFINITY);
-        let fill = parts.bodies[body].volume / whole.volume;
-        fill.is_finite().then_some(Floater { body, hull, fill })
+        let mesh_volume = Below::new(&hull, &Vec3::z(), f64::INFINITY).volume;
+        (mesh_volume > 0.0).then_some(Floater {
+            body,
+            hull,
+            volume: volume(body),
+            mesh_volume,
+        })
     };
     let hulls: Vec<_> = (parts.hulls.iter().enumerate())
         .filter_map(floater)
@@ -65,12 +71,17 @@ pub(super) fn buoyancy(parts: &ForceParts, _: &mut Declarations) -> Option<Box<d
 }
 
 impl Floater {
-    /// What it displaces, in the world.
+    /// What its mesh displaces, in the world.
     fn displaced(&self, surface: &Waterline, pose: &Pose) -> Below {
         let normal = pose.rotation.tr_mul(&surface.up);
         let height = surface.depth(&pose.translation);
         let own = Below::new(&self.hull, &normal, height);
-        own.scaled(self.fill).moved(pose)
+        own.moved(pose)
+    }
+
+    /// The body's volume over that of its mesh.
+    fn fill(&self, parameters: &Parameters) -> f64 {
+        parameters[self.volume] / self.mesh_volume
     }
 }
 
@@ -106,6 +117,7 @@ impl ForceModel for Floating {
         let weight = self.weight(at.place.parameters);
         for hull in &self.hulls {
             let displaced = hull.displaced(&self.surface, &at.place.poses[hull.body]);
+            let weight = weight * hull.fill(at.place.parameters);
             out.wrenches[hull.body] += weight * wrench(&displaced, &self.surface.up);
         }
     }
@@ -115,8 +127,11 @@ impl ForceModel for Floating {
         for hull in &self.hulls {
             let (up, virt) = (&self.surface.up, &z.twists[hull.body]);
             let displaced = hull.displaced(&self.surface, &at.place.poses[hull.body]);
-            bar.pose[hull.body] += weight * wrench_vjp(&displaced, up, virt);
-            bar.parameters[DENSITY] += self.gravity * wrench(&displaced, up).dot(virt);
+            let fill = hull.fill(at.place.parameters);
+            bar.pose[hull.body] += weight * fill * wrench_vjp(&displaced, up, virt);
+            let power = wrench(&displaced, up).dot(virt);
+            bar.parameters[DENSITY] += self.gravity * fill * power;
+            bar.parameters[hull.volume] += weight / hull.mesh_volume * power;
         }
     }
 
@@ -138,7 +153,8 @@ impl ForceModel for Floating {
     fn potential_energy(&self, place: &Place) -> f64 {
         let of = |hull: &Floater| {
             let below = hull.displaced(&self.surface, &place.poses[hull.body]);
-            self.surface.height * below.volume - self.surface.up.dot(&below.moment)
+            let unit = self.surface.height * below.volume - self.surface.up.dot(&below.moment);
+            hull.fill(place.parameters) * unit
         };
         self.weight(place.parameters) * self.hulls.iter().map(of).sum::<f64>()
     }

@@ -1,8 +1,15 @@
-//! Forces at points of bodies by gravity: weight, m g at the centre of mass, and buoyancy, −ρ V g at the centroid of the displaced volume.
+//! Forces at points of bodies by gravity: weight, m g at the centre of mass, and buoyancy, −ρ V g at the centre of buoyancy, of bodies and of floats.
 
 use super::{ForceModel, ForceParts, LoadBars, Loads, Moving, Outside, Place, Together, Velocity};
 use crate::adjoint::lie::{Vec3, angular, point_velocity, point_wrench};
-use crate::dynamics::parameters::{DENSITY, Declarations, Parameter, Parameters, mass};
+use crate::dynamics::parameters::{
+    DENSITY, Declarations, Declared, Owner, Parameter, Parameters, center_of_buoyancy,
+    center_of_mass, mass, volume,
+};
+use crate::scene::Force;
+
+/// Of a float.
+const VOLUME: Declared = Declared::new("volume", "m³");
 
 struct Weight {
     name: &'static str,
@@ -14,22 +21,29 @@ struct Weight {
 /// What is accelerated at a point of a body.
 struct Parcel {
     body: usize,
-    /// In the body's frame, m.
-    point: Vec3,
+    point: Point,
     /// Its mass, or the density of what is displaced.
     of: Parameter,
-    /// m³, of what is displaced; 1 where `of` is the mass itself.
-    volume: f64,
+    /// The volume of what is displaced.
+    volume: Option<Parameter>,
+}
+
+/// In a body's frame, m.
+enum Point {
+    Free([Parameter; 3]),
+    Fixed(Vec3),
 }
 
 pub(super) fn gravity(parts: &ForceParts, _: &mut Declarations) -> Option<Box<dyn ForceModel>> {
-    let parcels = parts.bodies.iter().enumerate().map(|(body, b)| Parcel {
+    let parcels = (0..parts.bodies.len()).map(|body| Parcel {
         body,
-        point: b.center_of_mass,
+        point: Point::Free(center_of_mass(body)),
         of: mass(body),
-        volume: 1.0,
+        volume: None,
     });
-    assemble("gravity", parts.scene.gravity.into(), parcels.collect())
+    let acceleration = Vec3::from(parts.scene.gravity);
+    let acts = acceleration != Vec3::zeros();
+    acts.then(|| assemble("gravity", acceleration, parcels.collect()))?
 }
 
 /// Where the water has no end.
@@ -37,17 +51,38 @@ pub(super) fn buoyancy(parts: &ForceParts, _: &mut Declarations) -> Option<Box<d
     if parts.waterline.is_some() {
         return None;
     }
-    let each = parts.bodies.iter().enumerate();
-    let parcels = each
-        .filter(|(_, b)| b.volume > 0.0)
-        .map(|(body, b)| Parcel {
-            body,
-            point: b.centroid,
-            of: DENSITY,
-            volume: b.volume,
-        });
+    let bodies = parts.bodies.iter().zip(&parts.scene.bodies).enumerate();
+    let displacing = bodies.filter(|(_, (b, given))| b.volume > 0.0 || given.volume.is_some());
+    let parcels = displacing.map(|(body, _)| Parcel {
+        body,
+        point: Point::Free(center_of_buoyancy(body)),
+        of: DENSITY,
+        volume: Some(volume(body)),
+    });
     let acceleration = -Vec3::from(parts.scene.gravity);
-    assemble("buoyancy", acceleration, parcels.collect())
+    let acts = acceleration != Vec3::zeros();
+    acts.then(|| assemble("buoyancy", acceleration, parcels.collect()))?
+}
+
+/// Of floats, the volumes; what they weigh is part of their bodies.
+pub(super) fn floats(
+    parts: &ForceParts,
+    parameters: &mut Declarations,
+) -> Option<Box<dyn ForceModel>> {
+    let scene = parts.scene;
+    let mut parcels = Vec::new();
+    for (i, force) in scene.forces.iter().enumerate() {
+        let Force::Float(given) = force else { continue };
+        let owner = Owner::Named(scene.force_name(i));
+        parcels.push(Parcel {
+            body: scene.body(&given.body).map_or(0, |b| b.0),
+            point: Point::Fixed(given.at.into()),
+            of: DENSITY,
+            volume: Some(parameters.declare(owner, VOLUME, given.volume)),
+        });
+    }
+    // Without gravity, too: their volumes are parameters, and tell where the centre of buoyancy is.
+    assemble("float", -Vec3::from(scene.gravity), parcels)
 }
 
 fn assemble(
@@ -55,7 +90,7 @@ fn assemble(
     acceleration: Vec3,
     parcels: Vec<Parcel>,
 ) -> Option<Box<dyn ForceModel>> {
-    (acceleration != Vec3::zeros() && !parcels.is_empty()).then(|| {
+    (!parcels.is_empty()).then(|| {
         Box::new(Weight {
             name,
             acceleration,
@@ -64,11 +99,25 @@ fn assemble(
     })
 }
 
+impl Parcel {
+    fn point(&self, parameters: &Parameters) -> Vec3 {
+        match &self.point {
+            Point::Free(at) => parameters.point(*at),
+            Point::Fixed(at) => *at,
+        }
+    }
+
+    /// What of it the acceleration acts on, kg.
+    fn mass(&self, parameters: &Parameters) -> f64 {
+        parameters[self.of] * self.volume.map_or(1.0, |v| parameters[v])
+    }
+}
+
 impl Weight {
     /// Where a parcel is, and the force on it.
     fn at(&self, p: &Parcel, place: &Place) -> (Vec3, Vec3) {
-        let force = place.parameters[p.of] * p.volume * self.acceleration;
-        (place.poses[p.body].apply(&p.point), force)
+        let force = p.mass(place.parameters) * self.acceleration;
+        (place.poses[p.body].apply(&p.point(place.parameters)), force)
     }
 }
 
@@ -88,8 +137,20 @@ impl ForceModel for Weight {
         for p in &self.parcels {
             let (x, force) = self.at(p, &at.place);
             let virt = &z.twists[p.body];
-            bar.pose[p.body] += point_wrench(&x, &force.cross(&angular(virt)));
-            bar.parameters[p.of] += p.volume * self.acceleration.dot(&point_velocity(virt, &x));
+            let x_bar = force.cross(&angular(virt));
+            bar.pose[p.body] += point_wrench(&x, &x_bar);
+            let along = self.acceleration.dot(&point_velocity(virt, &x));
+            match p.volume {
+                None => bar.parameters[p.of] += along,
+                Some(volume) => {
+                    bar.parameters[p.of] += at.place.parameters[volume] * along;
+                    bar.parameters[volume] += at.place.parameters[p.of] * along;
+                }
+            }
+            if let Point::Free(point) = p.point {
+                let turned = at.place.poses[p.body].rotation.tr_mul(&x_bar);
+                bar.parameters.add_point(point, &turned);
+            }
         }
     }
 
@@ -98,7 +159,8 @@ impl ForceModel for Weight {
     }
 
     fn outside(&self, group: &Together, _: &Parameters) -> Outside {
-        match self.parcels.iter().any(|p| group.holds(p.body)) {
+        let held = self.parcels.iter().any(|p| group.holds(p.body));
+        match held && self.acceleration != Vec3::zeros() {
             true => Outside::Along(self.acceleration),
             false => Outside::Nothing,
         }
@@ -108,10 +170,21 @@ impl ForceModel for Weight {
         true
     }
 
+    fn displaced(&self, parameters: &Parameters) -> Vec<(usize, f64, Vec3)> {
+        let floats = self
+            .parcels
+            .iter()
+            .filter_map(|p| match (&p.point, p.volume) {
+                (Point::Fixed(at), Some(volume)) => Some((p.body, parameters[volume], *at)),
+                _ => None,
+            });
+        floats.collect()
+    }
+
     fn potential_energy(&self, place: &Place) -> f64 {
         let of = |p: &Parcel| {
             let (x, _) = self.at(p, place);
-            -place.parameters[p.of] * p.volume * self.acceleration.dot(&x)
+            -p.mass(place.parameters) * self.acceleration.dot(&x)
         };
         self.parcels.iter().map(of).sum()
     }

@@ -1,10 +1,19 @@
 //! Forces between bodies as a scene gives them, one file each.
 
+mod damping;
+mod fin;
+mod float;
 mod lubrication;
 mod spring;
+mod thruster;
 
+pub(crate) use damping::{AXES, least_damping};
+pub use damping::{Coefficients, Damping};
+pub use fin::Fin;
+pub use float::Float;
 pub use lubrication::{Lubrication, WATER_VISCOSITY};
 pub use spring::Spring;
+pub use thruster::Thruster;
 
 use super::{BodyId, Scene};
 use crate::{Error, Result};
@@ -18,6 +27,14 @@ pub enum Force {
     Spring(Spring),
     /// Viscous water in thin gaps.
     Lubrication(Lubrication),
+    /// Of a body, by matrices.
+    Damping(Damping),
+    /// Of a thruster of a body.
+    Thruster(Thruster),
+    /// Lift and drag of a fin.
+    Fin(Fin),
+    /// Of foam or ballast at a point.
+    Float(Float),
 }
 
 impl Scene {
@@ -31,6 +48,10 @@ impl Scene {
         let (kind, name) = match &self.forces[index] {
             Force::Spring(spring) => ("spring", &spring.name),
             Force::Lubrication(lubrication) => ("lubrication", &lubrication.name),
+            Force::Damping(damping) => ("damping", &damping.name),
+            Force::Thruster(thruster) => ("thruster", &thruster.name),
+            Force::Fin(fin) => ("fin", &fin.name),
+            Force::Float(float) => ("float", &float.name),
         };
         let counted = || format!("{kind} {}", index + 1);
         name.clone().unwrap_or_else(counted)
@@ -41,7 +62,7 @@ impl Scene {
         let each = self.forces.iter().enumerate();
         each.filter_map(|(i, force)| match force {
             Force::Lubrication(lubrication) => Some((i, lubrication)),
-            Force::Spring(_) => None,
+            _ => None,
         })
     }
 
@@ -63,6 +84,17 @@ impl Scene {
             match force {
                 Force::Spring(spring) => spring.check(self, &place)?,
                 Force::Lubrication(lubrication) => lubrication.check(self, &place)?,
+                Force::Damping(damping) => damping.check(self, &place)?,
+                Force::Thruster(thruster) => thruster.check(self, &place)?,
+                Force::Fin(fin) => fin.check(self, &place)?,
+                Force::Float(float) if self.waterline.is_some() && float.volume > 0.0 => {
+                    return Err(Error::input(
+                        place("volume"),
+                        float.volume,
+                        "a float is buoyant at any height: in water with a `waterline` give a body a shape instead",
+                    ));
+                }
+                Force::Float(float) => float.check(self, &place)?,
             }
         }
         Ok(())
@@ -84,4 +116,24 @@ fn number(place: String, value: f64, negative: bool, remedy: &str) -> Result<()>
         true => Ok(()),
         false => Err(Error::input(place, value, remedy)),
     }
+}
+
+/// Refuses what isn't a direction.
+fn direction(place: String, given: [f64; 3]) -> Result<()> {
+    match given.iter().all(|x| x.is_finite()) && given != [0.0; 3] {
+        true => Ok(()),
+        false => Err(Error::input(
+            place,
+            format!("{given:?}"),
+            "give a direction: finite numbers, not all zero",
+        )),
+    }
+}
+
+/// A direction of length one.
+fn unit(direction: [f64; 3]) -> [f64; 3] {
+    let largest = direction.iter().fold(0.0, |m: f64, x| m.max(x.abs()));
+    let scaled = direction.map(|x| x / largest);
+    let length = scaled.iter().map(|x| x * x).sum::<f64>().sqrt();
+    scaled.map(|x| x / length)
 }

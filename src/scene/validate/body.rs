@@ -22,6 +22,7 @@ pub(super) fn check(scene: &Scene, carriers: &Carriers, index: usize) -> Result<
     check_shape(body)?;
     check_collision(body)?;
     check_mass(body, carriers.is_static(index))?;
+    check_buoyancy(body)?;
     if let Some(rows) = &body.added_mass {
         check_added_mass(body, rows)?;
     }
@@ -148,6 +149,26 @@ fn check_mass(body: &Body, is_static: bool) -> Result<()> {
             ))
         }
         _ => Ok(()),
+    }
+}
+
+fn check_buoyancy(body: &Body) -> Result<()> {
+    if let Some(volume) = body.volume {
+        let remedy = "give zero or more, in m³: what the body is buoyant by";
+        bounded(&place(body, "volume"), volume, true, remedy)?;
+    }
+    let Some(center) = &body.center_of_buoyancy else {
+        return Ok(());
+    };
+    let place = place(body, "center_of_buoyancy");
+    finite(&place, center)?;
+    match body.shape.is_some() || body.volume.is_some() {
+        true => Ok(()),
+        false => Err(Error::input(
+            place,
+            list(center),
+            "nothing is buoyant there: give the body a shape or a `volume`",
+        )),
     }
 }
 

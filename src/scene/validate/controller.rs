@@ -6,16 +6,20 @@ use crate::{Error, Result};
 
 impl Scene {
     pub(super) fn check_controller(&self) -> Result<()> {
-        let controls = self.controls();
-        let count = |field: &str, values: &[f64]| {
+        let thrusters = self.thrusters().count();
+        let counted = |field: &str, values: &[f64], thrusters: usize| {
+            let controls = self.controls() - self.thrusters().count() + thrusters;
             finite(&format!("controller.{field}"), values)?;
             if values.len() == controls {
                 return Ok(());
             }
             let parts = self.bodies.iter().filter(|b| b.controls() > 0);
-            let parts: Vec<_> = parts
+            let mut parts: Vec<_> = parts
                 .map(|b| format!("{:?} {}", b.name, b.controls()))
                 .collect();
+            if thrusters > 0 {
+                parts.push(format!("thrusters {thrusters}"));
+            }
             Err(Error::input(
                 format!("controller.{field}"),
                 format!("{} numbers", values.len()),
@@ -29,6 +33,7 @@ impl Scene {
                 ),
             ))
         };
+        let count = |field: &str, values: &[f64]| counted(field, values, thrusters);
         match &self.controller {
             None => Ok(()),
             Some(Controller::Constant { control }) => count("control", control),
@@ -54,9 +59,10 @@ impl Scene {
                         ),
                     ));
                 }
-                count("target", target)?;
-                count("stiffness", stiffness)?;
-                count("damping", damping)
+                // Thrusters among the forces get nothing from it.
+                counted("target", target, 0)?;
+                counted("stiffness", stiffness, 0)?;
+                counted("damping", damping, 0)
             }
             Some(Controller::PushThenLock {
                 body: name,

@@ -1,0 +1,66 @@
+"""Forces that vehicles need, as scenes in Python give them."""
+
+import numpy as np
+import pytest
+
+import hydrograd as hg
+
+
+def vehicle():
+    scene = hg.Scene(gravity=(0, 0, -9.81), time_step=0.01)
+    scene.add(hg.Body(hg.ellipsoid(0.2, 0.1, 0.08, faces=80), name="rov", density=998.0, volume=0.0068, center_of_buoyancy=(0, 0, 0.02)))
+    scene.add(
+        hg.Body(name="rotor", mass=0.1, inertia=(1e-3, 1e-3, 1e-3), joint=hg.revolute((1, 0, 0)), parent="rov", position=(-0.2, 0, 0))
+    )
+    scene.add_force("damping", body="rov", name="hull", linear=np.diag([2.0, 3, 3, 0.1, 0.1, 0.1]), quadratic=[9, 12, 14, 0.1, 0.1, 0.2])
+    for name, side in (("port", 1), ("starboard", -1)):
+        scene.add_force("thruster", body="rov", name=name, at=(-0.1, 0.1 * side, 0), direction=(1, 0, 0), polynomial=(0, 20), torque=0.02 * side)
+    table = [(-1, -20), (-0.1, 0), (0.1, 0), (1, 30)]
+    scene.add_force("thruster", body="rov", name="lift", direction=(0, 0, 1), table=table, loss=2.0, dead_band=0.01)
+    scene.add_force("thruster", body="rov", name="screw", at=(-0.2, 0, 0), direction=(1, 0, 0), polynomial=(0, 1e-3), rotor="rotor", time_constant=0.1)
+    scene.add_force("fin", body="rov", name="tail", at=(-0.2, 0, 0), chord=(1, 0, 0), normal=(0, 1, 0), length=0.1, area=0.01, lift_slope=4, drag=0.02)
+    scene.add_force("float", body="rov", name="foam", at=(0, 0, 0.05), volume=1e-4, mass=0.01)
+    return scene
+
+
+def test_controls_have_names_and_an_allocation():
+    sim = hg.Simulator(vehicle(), fidelity="isolated")
+    assert sim.control_names == ["port", "starboard", "lift", "screw"]
+    matrix = sim.allocation("rov")
+    assert matrix.shape == (6, 4) and sim.thruster_controls(0) == [0, 1, 2, 3]
+    assert np.allclose(matrix[:, 0], [1, 0, 0, 0.02, 0, -0.1])
+    assert np.allclose(matrix[:, 1], [1, 0, 0, -0.02, 0, 0.1])
+    assert sim.allocation(1).shape == (6, 0)
+    with pytest.raises(hg.InputError, match="allocation: body.*'hull'"):
+        sim.allocation("hull")
+
+
+def test_parameters_of_vehicles_have_gradients():
+    sim = hg.Simulator(vehicle(), fidelity="isolated")
+    u = np.tile([0.6, 0.4, 0.5, 40.0], (30, 1))
+    weights = np.random.default_rng(1).normal(size=(31, 2, 3))
+
+    def loss(changes):
+        changed = sim.with_parameters({**sim.parameters, **changes}) if changes else sim
+        return float((weights * changed.rollout(u).positions).sum())
+
+    gradient = sim.rollout(u).vjp(positions=weights).parameters
+    for name in (
+        "hull.linear.x.x", "hull.quadratic.x", "port.coefficient.2", "starboard.torque", "lift.thrust.3", "lift.loss", "lift.dead_band",
+        "screw.time_constant", "tail.area", "tail.lift_slope", "tail.drag", "foam.volume", "rov.volume", "rov.center_of_buoyancy.z",
+        "rov.center_of_mass.x", "fluid.density",
+    ):
+        value = sim.parameters[name]
+        step = 1e-4 * max(abs(value), 0.01)
+        difference = (loss({name: value + step}) - loss({name: value - step})) / (2 * step)
+        assert np.isclose(gradient[name], difference, rtol=2e-5, atol=1e-9), (name, gradient[name], difference)
+
+
+def test_wrong_keys_are_told():
+    scene = vehicle()
+    with pytest.raises(hg.InputError, match="polynom"):
+        scene.add_force("thruster", body="rov", direction=(1, 0, 0), polynom=(1,))
+    scene.add_force("damping", body="rov", linear=(1, 1, 1, 1, 1, -1))
+    with pytest.raises(hg.InputError, match=r"linear\[5\]"):
+        scene.validate()
+    assert hg.Scene.from_toml(vehicle().to_toml()) == vehicle()

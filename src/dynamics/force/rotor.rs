@@ -1,0 +1,101 @@
+//! Rotors of thrusters: a joint of one velocity n that is driven to a control u by the force (J/T)(u − n).
+//!
+//! J is the inertia that the rotor alone has along its joint with the scene's parameters, so that ṅ = (u − n)/T where what carries it doesn't turn and the water doesn't
+//! hold it: the first-order lag of a speed-controlled motor, whose state is the rotor's velocity.
+
+use super::{ForceModel, ForceParts, LoadBars, Loads, Moving, Outside, Together, Velocity};
+use crate::adjoint::rigid::spatial_inertia;
+use crate::dynamics::parameters::{Declarations, Declared, Owner, Parameter, Parameters, Range};
+
+const TIME_CONSTANT: Declared = Declared::new("time_constant", "s").range(Range::Positive);
+
+struct Rotors(Vec<Rotor>);
+
+struct Rotor {
+    /// Number of its joint's velocity.
+    rate: usize,
+    control: usize,
+    /// J, kg m² or kg.
+    inertia: f64,
+    time_constant: Parameter,
+}
+
+pub(super) fn assemble(
+    parts: &ForceParts,
+    parameters: &mut Declarations,
+) -> Option<Box<dyn ForceModel>> {
+    let scene = parts.scene;
+    let mut rotors = Vec::new();
+    for (i, control, given) in scene.thrusters() {
+        let rotor = given.rotor.as_ref().and_then(|name| scene.body(name));
+        let (Some(body), Some(time)) = (rotor, given.time_constant) else {
+            continue;
+        };
+        let (values, link) = (&parts.values[body.0], &parts.tree.links()[body.0]);
+        let matrix = spatial_inertia(values.mass, &values.center_of_mass, &values.inertia);
+        let along = link.joint.basis()[0];
+        let owner = Owner::Named(scene.force_name(i));
+        rotors.push(Rotor {
+            rate: link.v.start,
+            control,
+            inertia: along.dot(&(matrix * along)),
+            time_constant: parameters.declare(owner, TIME_CONSTANT, time),
+        });
+    }
+    (!rotors.is_empty()).then(|| Box::new(Rotors(rotors)) as Box<dyn ForceModel>)
+}
+
+impl Rotor {
+    /// J/T.
+    fn gain(&self, parameters: &Parameters) -> f64 {
+        self.inertia / parameters[self.time_constant]
+    }
+
+    fn force(&self, at: &Moving) -> f64 {
+        self.gain(at.place.parameters) * (at.control[self.control] - at.v[self.rate])
+    }
+}
+
+impl ForceModel for Rotors {
+    fn name(&self) -> &'static str {
+        "rotor"
+    }
+
+    fn add(&self, at: &Moving, out: &mut Loads) {
+        for r in &self.0 {
+            out.joints[r.rate] += r.force(at);
+        }
+    }
+
+    fn jvp(&self, at: &Moving, change: &Velocity, out: &mut Loads) {
+        for r in &self.0 {
+            out.joints[r.rate] -= r.gain(at.place.parameters) * change.v[r.rate];
+        }
+    }
+
+    fn vjp(&self, at: &Moving, z: &Velocity, bar: &mut LoadBars) {
+        let parameters = at.place.parameters;
+        for r in &self.0 {
+            let (z, gain) = (z.v[r.rate], r.gain(parameters));
+            bar.v[r.rate] -= gain * z;
+            bar.control[r.control] += gain * z;
+            bar.parameters[r.time_constant] -= z * r.force(at) / parameters[r.time_constant];
+        }
+    }
+
+    fn ties(&self) -> Option<Vec<[usize; 2]>> {
+        Some(Vec::new())
+    }
+
+    fn outside(&self, group: &Together, _: &Parameters) -> Outside {
+        match self.0.iter().any(|r| group.hangs_on(r.rate)) {
+            true => Outside::All,
+            false => Outside::Nothing,
+        }
+    }
+
+    fn driven_power(&self, at: &Moving) -> f64 {
+        let power = |r: &Rotor| r.force(at) * at.v[r.rate];
+        self.0.iter().map(power).sum()
+    }
+}

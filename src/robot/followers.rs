@@ -1,21 +1,10 @@
 //! Joints that follow others: by how much, and what their leaders have of their limits and losses.
 
-use super::joints::{Dynamics, INSIDE, Moves};
+use super::joints::{Dynamics, INSIDE, Led, Moves};
 use super::read::File;
 use super::report::Report;
 use super::tree::joint_place;
 use crate::{Error, Result};
-
-/// How a joint follows another.
-#[derive(Clone, Debug, PartialEq)]
-pub(crate) struct Led {
-    /// The other's name; it has a coordinate of its own.
-    pub joint: String,
-    /// Motion per motion of the other.
-    pub ratio: f64,
-    /// Coordinate where the other's is zero, m or rad.
-    pub offset: f64,
-}
 
 /// Of joint number `number`, whose circles have been refused: through all that it follows.
 fn led(file: &File, number: usize) -> Result<Option<Led>> {

@@ -1,6 +1,5 @@
 //! Joints of the file as joints here.
 
-use super::followers::Led;
 use super::options::{Followers, Options};
 use super::read::File;
 use super::report::Report;
@@ -38,6 +37,17 @@ pub(crate) struct Dynamics {
     pub damping: f64,
     /// Coulomb's, N or N m.
     pub friction: f64,
+}
+
+/// How a joint follows another.
+#[derive(Clone, Debug, PartialEq)]
+pub(crate) struct Led {
+    /// The other's name; it has a coordinate of its own.
+    pub joint: String,
+    /// Motion per motion of the other.
+    pub ratio: f64,
+    /// Coordinate where the other's is zero, m or rad.
+    pub offset: f64,
 }
 
 /// Of joint number `number`; what isn't taken as it stands is told to the report.

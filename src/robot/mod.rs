@@ -18,8 +18,7 @@ mod surface;
 mod tree;
 
 pub(crate) use bodies::{Imported, RobotBody, import};
-pub(crate) use followers::Led;
-pub(crate) use joints::Dynamics;
+pub(crate) use joints::{Dynamics, Led};
 pub use options::{BadMeshes, Base, Followers, Wet};
 pub(crate) use options::{LinkChoice, Options};
 pub use report::{BodyReport, FoldedReport, MeshUse, Report, Unused};

@@ -3,12 +3,13 @@
 use super::{
     Body, BodyId, CollisionPiece, Drag, Fluid, Mimic, Passive, Placement, Scene, Site, is_default,
 };
+use crate::multibody::Joint;
 pub use crate::robot::{
     BadMeshes, Base, BodyReport, FoldedReport, Followers, MeshUse, Report as RobotReport, Unused,
     Wet,
 };
 use crate::robot::{Imported, Led, LinkChoice, Options, RobotBody, import};
-use crate::{Error, Joint, Result};
+use crate::{Error, Result};
 use nalgebra::Isometry3;
 use serde::{Deserialize, Serialize};
 use std::collections::BTreeMap;

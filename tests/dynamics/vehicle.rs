@@ -424,7 +424,7 @@ fn controllers_and_thrusters_share_the_controls() {
     let rollout = sim.rollout(&Controls::from_matrix(&sim, controls).unwrap());
     let sample = rollout.unwrap().samples()[0].clone();
     assert_eq!((sample.control[1], sample.control[2]), (0.7, 0.0));
-    assert!((sample.control[0] - (3.0 * 0.2 - 0.4 * 0.8)).abs() < 1e-15);
+    assert!((sample.control[0] - (3.0 * 0.2 - 0.4 * 0.8)).abs() < 1e-12);
     scene.controller = Some(pd(3));
     says(
         scene.validate().unwrap_err(),
@@ -484,9 +484,9 @@ fn a_fin_lifts_and_drags() {
     let (chord, normal) = (Vector3::new(0.8, 0.6, 0.0), Vector3::new(-0.6, 0.8, 0.0));
     let fin = Fin::new("rov")
         .at(place.into())
-        .chord((2.0 * chord).into(), length);
+        .chord((chord * 2.0).into(), length);
     let fin = fin
-        .normal((3.0 * normal).into())
+        .normal((normal * 3.0).into())
         .area(area)
         .lift_slope(slope);
     let fin = fin.drag(drag).induced_drag(across).smoothing(1e-9);

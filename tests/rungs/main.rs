@@ -188,6 +188,24 @@ const THROUGH: &[(&str, &str)] = &[
         "dynamics::integrator::start::Start::advance_jvp",
         "dynamics::integrator::euler::Adjoint::jvp",
     ),
+    // Whole solutions against sweeps and Riccati's, in tests/dynamics/control.
+    (
+        "optimize::ilqr::backward::gradient",
+        "simulate::rollout::Rollout::vjp",
+    ),
+    (
+        "optimize::ilqr::tracking::Tracking::act_vjp",
+        "simulate::rollout::Rollout::vjp",
+    ),
+    // The steps of a trajectory, handed on.
+    (
+        "simulate::deciding::Deciding::step_vjp",
+        "simulate::rollout::Rollout::vjp",
+    ),
+    (
+        "simulate::deciding::Deciding::last_vjp",
+        "simulate::rollout::Rollout::vjp",
+    ),
     (
         "dynamics::armature::Armature::add_vjp",
         "dynamics::momentum::Linearisation::mass_vjp",

@@ -250,8 +250,9 @@ fn several_pieces_become_their_hull() {
     let added = scene.add_robot(&path, &Robot::default()).unwrap();
     let body = &scene.bodies[0];
     let shape = body.shape.as_ref().unwrap();
+    // Few faces are made more and even, which takes a little off the edges.
     assert!(
-        (volume(shape) / 0.04 - 1.0).abs() < 1e-6,
+        (volume(shape) / 0.04 - 1.0).abs() < 1e-4,
         "{}",
         volume(shape)
     );
@@ -259,7 +260,7 @@ fn several_pieces_become_their_hull() {
     let pieces: Vec<&Shape> = body.collision.iter().map(|p| &p.shape).collect();
     assert_eq!(pieces, [&Shape::cuboid([0.2; 3]); 2]);
     assert!(added.report.bodies[0].shape.contains("hull of 2 pieces"));
-    assert!((added.report.volume / 0.04 - 1.0).abs() < 1e-6);
+    assert!((added.report.volume / 0.04 - 1.0).abs() < 1e-4);
 
     // Wet as chosen: nothing, for one link.
     let dry = RobotLink {
@@ -352,7 +353,7 @@ fn meshes_are_found_scaled_and_replaced() {
         set(&mesh(name, " scale=\"1 2 -0.5\""));
         let body = made(&beside).unwrap();
         let found = volume(body.shape.as_ref().unwrap());
-        assert!((found / one - 1.0).abs() < 1e-9, "{name}: {found} {one}");
+        assert!((found / one - 1.0).abs() < 1e-4, "{name}: {found} {one}");
     }
 
     // Elsewhere: the folder that holds the package is given.
@@ -383,7 +384,7 @@ fn meshes_are_found_scaled_and_replaced() {
     let mut scene = Scene::new(Fluid::fresh_water());
     let report = scene.add_robot(&path, &beside).unwrap().report;
     let found = volume(scene.bodies[0].shape.as_ref().unwrap());
-    assert!((found / one - 1.0).abs() < 1e-6, "{found} {one}");
+    assert!((found / one - 1.0).abs() < 1e-4, "{found} {one}");
     says(
         report.to_string(),
         &["body \"a\"", "convex hull", "closed surface"],

@@ -4,7 +4,7 @@ use std::fmt::Write as _;
 
 use clap::ValueEnum;
 
-use crate::adjoint::lie::Mat6;
+use nalgebra::Matrix6;
 
 /// How they are written.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
@@ -24,7 +24,7 @@ pub(super) struct Own<'a> {
     /// The body's name.
     pub name: &'a str,
     /// Linear, then angular: kg, kg m, kg m².
-    pub matrix: Mat6,
+    pub matrix: Matrix6<f64>,
 }
 
 /// Axes and degrees of freedom as SDFormat names them.
@@ -111,7 +111,7 @@ fn csv(bodies: &[Own]) -> String {
 }
 
 fn json(bodies: &[Own], density: f64) -> String {
-    let rows = |m: &Mat6| -> Vec<Vec<f64>> {
+    let rows = |m: &Matrix6<f64>| -> Vec<Vec<f64>> {
         m.row_iter()
             .map(|row| row.iter().copied().collect())
             .collect()

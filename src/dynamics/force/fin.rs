@@ -86,7 +86,7 @@ fn foil(u: f64, v: f64, smoothing: f64, [lift, drag, induced]: [f64; 3]) -> Foil
     // Cosines: all below is homogeneous of second degree in u, v, w₀.
     let (a, b) = (u / w, v / w);
     let shares = [
-        [a * b * v, -a * b * u],
+        [a * v * v, -a * u * v],
         [-w * u, -w * v],
         [-b * b * w * u, -b * b * w * v],
     ];

@@ -23,7 +23,6 @@ impl Scene {
     /// Checks all that doesn't need the meshes: numbers, names, the tree of bodies, masses, joints,
     /// walls, the start, and the controller.
     pub fn validate(&self) -> Result<()> {
-        self.check_world()?;
         #[cfg(feature = "urdf")]
         if let Some(robot) = self.robots.first() {
             return Err(Error::input(
@@ -32,6 +31,7 @@ impl Scene {
                 "only files have robots that aren't bodies yet: add it by `add_robot`",
             ));
         }
+        self.check_world()?;
         self.check_names()?;
         self.check_tree()?;
         let carriers = self.carriers();

@@ -111,8 +111,8 @@ fn problems_that_cannot_be() {
             vec!["rotations", "orientation"],
         ),
         (
-            with(terms::observable("momentum", [9], 0.0, 1.0)),
-            vec!["entries", "under 6"],
+            with(terms::observable("angular_momentum", [999], 0.0, 1.0)),
+            vec!["entries", "under"],
         ),
         (last(terms::effort(1.0)), vec!["last term 0", "running"]),
         (

@@ -242,7 +242,7 @@ fn knots_of_several_steps_and_changes_of_controls() {
 #[test]
 fn limits_hold_exactly() {
     let simulator = masses();
-    for limit in [0.3, 1.0] {
+    for limit in [0.3, 0.4] {
         let mut problem = Problem::new(40, cost()).hold(2);
         let free = solve(&simulator, &problem, &tight());
         problem = problem.limits([-limit], [limit]);

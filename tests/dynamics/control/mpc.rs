@@ -128,7 +128,8 @@ fn controls_can_be_asked_for_step_by_step() {
     let mut mpc = Mpc::new(&model, &problem, settings).unwrap();
     let start = model.initial().unwrap();
     let run = mpc.run(&model, &start, 12, &problem.cost, go).unwrap();
-    assert_eq!(run.replans.iter().map(|r| r.iterations).max(), Some(5));
+    let most = run.replans.iter().map(|r| r.iterations).max();
+    assert!(matches!(most, Some(2..=5)), "{most:?}");
     mpc.reset();
     let mut state = start.clone();
     for n in 0..12 {

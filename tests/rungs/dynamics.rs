@@ -10,7 +10,7 @@ use hydrograd::dynamics::{
 };
 use hydrograd::scene::{
     Body, Damping, Drag, DragPart, Fin, Float, Fluid, Joint, Mimic, Motion, Passive, Plane, Scene,
-    Servo, Shape, Spring, Thruster,
+    Shape, Spring, Thruster,
 };
 use hydrograd::simulate::{Pd, PdAxis};
 use hydrograd::{Controls, Rollout, Settings, Simulator};
@@ -130,9 +130,7 @@ pub fn scene() -> Scene {
             .volume(5e-4)
             .center_of_buoyancy([0.02, 0.0, 0.03])
             .joint(Joint::Prismatic { axis })
-            .passive(Passive::default().stiffness(3.0).armature(0.2))
-            .actuated()
-            .servo(Servo::new(20.0, 2.0)),
+            .passive(Passive::default().stiffness(3.0).armature(0.2)),
     );
     scene.add(
         Body::dry()

@@ -7,7 +7,7 @@ use hydrograd::adjoint::check::{Outcome, Rung};
 use hydrograd::adjoint::lie::{Pose, Vec6, angular, exp_matrix, linear};
 use hydrograd::dynamics::force::{ForceModel, LoadBars, Loads, Moving, Place, Velocity};
 use hydrograd::dynamics::{Parameters, System};
-use hydrograd::scene::{Body, Drag, DragPart, Fluid, Scene, Shape};
+use hydrograd::scene::{Body, Drag, DragPart, Fluid, Joint, Scene, Servo, Shape};
 use hydrograd::{Fidelity, Settings, Simulator};
 use nalgebra::DVector;
 use std::sync::OnceLock;
@@ -73,6 +73,11 @@ impl At {
             let (p, control) = (contact::point(), DVector::zeros(0));
             return Self::placed(contact::system(), p.q, p.v, control, p.parameters);
         }
+        if name == "servo" {
+            let (sim, q) = (servo(), DVector::from_vec(vec![0.2, -0.4]));
+            let (v, control) = (wavy(2, 0.8, 0.5), DVector::from_vec(vec![0.3, 0.1]));
+            return Self::placed(sim.system(), q, v, control, sim.parameters().clone());
+        }
         if name.ends_with(SURFACE) {
             let sim = surface();
             let (system, q) = (sim.system(), sim.start().0.clone());
@@ -126,6 +131,24 @@ impl At {
 
 /// What a force in water with a surface is called by here.
 const SURFACE: &str = " at the surface";
+
+/// Two driven joints.
+fn servo() -> &'static Simulator {
+    static MADE: OnceLock<Simulator> = OnceLock::new();
+    MADE.get_or_init(|| {
+        let mut scene = Scene::new(Fluid::none());
+        let link = |name: &str, joint| {
+            let link = Body::dry().named(name).mass(1.0).joint(joint);
+            link.inertia([0.1, 0.2, 0.15]).actuated()
+        };
+        let axis = [0.3, 0.8, -0.2];
+        let slide = link("slide", Joint::Prismatic { axis });
+        scene.add(slide.servo(Servo::new(20.0, 2.0)));
+        let turn = link("turn", Joint::Revolute { axis }).child_of("slide");
+        scene.add(turn.servo(Servo::new(8.0, 0.7)));
+        Simulator::new(&scene, Settings::default()).expect("the scene is right")
+    })
+}
 
 /// Bodies that reach through the surface of the water, aslant.
 fn surface() -> &'static Simulator {

@@ -47,6 +47,11 @@ fn reach(knots: usize) -> Problem {
         ))
         .running(terms::control_change(1e-3))
         .running(terms::orientation("hull", [0.0, 0.0, 0.3], 0.3))
+        // A folded arm would be in itself.
+        .running(terms::configuration(
+            [0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 0.0, 0.0],
+            [0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 3.0, 3.0],
+        ))
         .last(terms::position("hand", [0.75, 0.2, 0.12], 3e3))
         .last(terms::orientation("hand", [0.0, -0.6, 0.9], 300.0))
         .last(terms::velocity([0.0; 8], 20.0));

@@ -170,6 +170,8 @@ class Drag:
 
 @final
 class Passive:
+    """What a joint with one coordinate does by itself: a spring of `stiffness` (N/m or N m/rad) with its `rest` coordinate (m or rad), viscous `damping` (N s/m or
+    N m s/rad), Coulomb `friction` (N or N m) that sets in over `friction_speed` (m/s or rad/s), and the inertia `armature` (kg or kg m²) of its drive."""
     def __new__(
         cls,
         *,
@@ -183,10 +185,13 @@ class Passive:
 
 @final
 class Mimic:
+    """Lets a joint with one coordinate follow that of the body named `body`: q = `ratio` · q(leader) + `offset` (m or rad)."""
     def __new__(cls, body: str, *, ratio: float = 1.0, offset: float = 0.0) -> Mimic: ...
 
 @final
 class Servo:
+    """Makes the control of an actuated joint with one coordinate its target (m or rad): a drive of `stiffness` (N/m or N m/rad) and `damping` (N s/m or N m s/rad), implicit, and so
+    stable however stiff, with the integrators "momentum-euler", "energy-euler" and "midpoint"."""
     def __new__(cls, stiffness: float, damping: float = 0.0) -> Servo: ...
 
 @final
@@ -197,12 +202,12 @@ class Body:
     the centre of mass (xx, yy, zz or also xy, xz, yz; kg m²) and `center_of_mass` (m) follow from the shape if left out.
     `position` (m) and `rotation` (axis times angle, rad) place the joint's frame in the frame of `parent`, a body's name or
     number, or the world. `actuated` makes the joint's forces controls (N, N m; a free joint has six), `thruster` a wrench on
-    the body in world axes. `locked` holds the joint, `motion` (one per coordinate) drives it, `limits` (m or rad) stop it.
+    the body in world axes. `locked` holds the joint, `motion` (one per coordinate) drives it, `limits` (m or rad) stop it; `passive` gives it spring, damping,
+    friction and armature, `mimic` lets it follow another, `servo` makes its control a target.
     `shape_position` and `shape_rotation` place the shape in the body; `refine` lists balls (center, radius, edge), m,
     where its faces are made smaller. `collision` lists the convex pieces that the body is for contact instead of its shape, each
     a shape, (shape, position) or (shape, position, rotation) in the body's frame. `start` are the joint's coordinates at the start, unless the
-    scene is given all by `set_initial`. `added_mass` (6, 6) replaces the body's own at unit density, with `isolated`."""
-    a shape, (shape, position) or (shape, position, rotation) in the body's frame. `added_mass` (6, 6) replaces the body's own at unit density, with `isolated`.
+    scene is given all by `set_initial`. `added_mass` (6, 6) replaces the body's own at unit density, with `isolated`.
     `volume` (m³) and `center_of_buoyancy` (m) are what it is buoyant by and where, instead of the shape's volume at its centroid."""
     def __new__(
         cls,
@@ -295,7 +300,8 @@ class Scene:
     """What a simulation starts from: the fluid, walls, and bodies with their joints.
 
     `gravity` is in m/s², world axes; `time_step` (s) and `steps` are what a run takes unless told otherwise. Without a
-    `contact`, surfaces may not touch. Bodies are numbered in the order in which they are added."""
+    `contact`, surfaces may not touch. Bodies are numbered in the order in which they are added. `waterline` is the height (m, against gravity) above which there is no
+    water to displace and to drag."""
     def __new__(
         cls,
         fluid: Fluid | None = None,
@@ -449,9 +455,12 @@ class Scene:
     ) -> None: ...
     def add_site(
         self, name: str, body: _Body, position: ArrayLike | None = None, rotation: ArrayLike | None = None
-    ) -> int: ...
+    ) -> int:
+        """Adds a named frame on a `body` (number or name), at `position` (m) and `rotation` (rotation vector, rad) in its frame, and gives its number: rollouts tell
+        "site_positions", "site_rotations" and "site_velocities"."""
     @property
-    def site_names(self) -> list[str]: ...
+    def site_names(self) -> list[str]:
+        """Names of the sites, in order."""
     def set_initial(
         self, q: ArrayLike | None = None, v: ArrayLike | None = None, *, momentum: ArrayLike | None = None
     ) -> None:
@@ -548,7 +557,10 @@ class Simulator:
         steps: int | None = None,
         memory: float = 1e8,
         progress: _Progress | None = None,
-    ) -> tuple[float, Gradient]: ...
+    ) -> tuple[float, Gradient]:
+        """Value and gradient of an `objective` of a run with `controls` (steps, control_size), or of `steps` steps, from where the simulator starts, within `memory` (bytes) for what is
+        kept of the run: a rollout keeps some kilobytes a step, which is too much for 10⁵ steps and more. Parts of it run again, so it takes longer; the gradient is that of the
+        rollout, to the bit. `progress(done, total)` is called with the parts done, as in `rollout`; what it raises ends the work and comes out. Ctrl-C ends it."""
     def state(
         self,
         q: ArrayLike | None = None,
@@ -564,12 +576,17 @@ class Simulator:
     def step(self, state: State, u: ArrayLike | None = None) -> tuple[State, Record]:
         """One step from a state with the controls `u` (control_size,), N and N m: the next state, and the record that has the
         step's derivatives. The steps of a rollout, to the bit."""
-    def equations(self, q: ArrayLike | None = None) -> Equations: ...
-    def integrate(self, q: ArrayLike, xi: ArrayLike) -> _Array: ...
-    def difference(self, start: ArrayLike, end: ArrayLike) -> _Array: ...
+    def equations(self, q: ArrayLike | None = None) -> Equations:
+        """The equations of motion at the coordinates `q` (q_size,), or at many (N, q_size); default: where the simulator starts."""
+    def integrate(self, q: ArrayLike, xi: ArrayLike) -> _Array:
+        """q ⊕ ξ: the configurations that `q` (…, q_size) become by the tangents `xi` (…, v_size); of rotations a rotation vector, rad, in the joint's frame."""
+    def difference(self, start: ArrayLike, end: ArrayLike) -> _Array:
+        """The tangents (…, v_size) by which `integrate` gets from the configurations `start` (…, q_size) to `end`; of rotations the shorter way."""
     def linearise(
         self, q: ArrayLike | None = None, v: ArrayLike | None = None, u: ArrayLike | None = None
-    ) -> tuple[_Array, _Array]: ...
+    ) -> tuple[_Array, _Array]:
+        """The linearisation x₁ ≈ A x₀ + B u of one step in x = (q, v), coordinates in their tangent space, from the states `q` (…, q_size), `v` (…, v_size) and controls
+        `u` (…, control_size): A (…, 2 v_size, 2 v_size) and B (…, 2 v_size, control_size), on all cores. What is None is where the simulator starts, and no control."""
     def gradcheck(self, steps: int | None = None, *, directions: int = 4, seed: int = 0) -> dict[str, Any]:
         """Holds the gradient of a rollout of `steps` steps (the scene's number by default) against central differences, along so many random `directions` in each group (controls,
         initial state, parameters, gains), and says by how much the trajectory magnifies small changes. A dictionary: "max_rel_error", the largest over all directions of the smallest
@@ -621,9 +638,14 @@ class Simulator:
     def control_size(self) -> int:
         """Number of controls a step."""
     @property
-    def control_names(self) -> list[str]: ...
-    def allocation(self, body: _Body) -> _Array: ...
-    def thruster_controls(self, body: _Body) -> list[int]: ...
+    def control_names(self) -> list[str]:
+        """Names of the controls, in order: "arm.force.rate" does work on the velocity "arm.rate", "hull.wrench.fx", … "hull.wrench.mz" are a body's wrench, and a thruster's
+        command has the thruster's name."""
+    def allocation(self, body: _Body) -> _Array:
+        """The allocation matrix (6, n) of the thrusters on a `body` (number or name), in the order in which they were added: the wrench of a newton of thrust on the body,
+        its frame, about its origin, linear part first (1, m)."""
+    def thruster_controls(self, body: _Body) -> list[int]:
+        """The controls (numbers) of the thrusters on a `body` (number or name), in the order of the columns of `allocation`."""
     @property
     def q_size(self) -> int:
         """Number of joint coordinates q."""
@@ -661,20 +683,33 @@ class Simulator:
 
 @final
 class Equations:
+    """The equations of motion M(q) v̇ + h(q, v, u) = τ at a configuration, or at many: made by `Simulator.equations`.
+
+    M holds the water's part; h is what is left: Coriolis and centrifugal terms of bodies and water, gravity, buoyancy, drag and springs, less the controls u.
+    Contact and the stops of joints, which a step solves, aren't in it. Where `q` was (N, q_size), all that is given may be (N, …), or one for all, and all
+    that comes back has N in front; the work is spread over all cores. Each call asks the water anew."""
     @property
-    def q(self) -> _Array: ...
+    def q(self) -> _Array:
+        """The configurations, (…, q_size)."""
     @property
-    def positions(self) -> _Array: ...
+    def positions(self) -> _Array:
+        """Positions of the bodies' origins, m, world axes, (…, bodies, 3)."""
     @property
-    def rotations(self) -> _Array: ...
+    def rotations(self) -> _Array:
+        """Rotation matrices of the bodies, body to world, (…, bodies, 3, 3)."""
     @property
-    def center_of_mass(self) -> _Array: ...
+    def center_of_mass(self) -> _Array:
+        """Centre of mass of all bodies in the world, m, (…, 3); NaN where there is no mass."""
     @property
-    def center_of_buoyancy(self) -> _Array: ...
+    def center_of_buoyancy(self) -> _Array:
+        """Centre of the volume of all bodies in the water, at which their buoyancy acts, in the world, m, (…, 3); NaN where nothing is in the water."""
     @property
-    def potential_energy(self) -> _Array: ...
-    def mass_matrix(self, part: Literal["total", "rigid", "fluid"] = "total") -> _Array: ...
-    def bias_force(self, v: ArrayLike | None = None, u: ArrayLike | None = None) -> _Array: ...
+    def potential_energy(self) -> _Array:
+        """Potential energy, J, (…)."""
+    def mass_matrix(self, part: Literal["total", "rigid", "fluid"] = "total") -> _Array:
+        """M(q) (…, v_size, v_size), of `part` "total", of the bodies alone ("rigid"), or of the water alone ("fluid"); kg, kg m, kg m²."""
+    def bias_force(self, v: ArrayLike | None = None, u: ArrayLike | None = None) -> _Array:
+        """h(q, v, u) (…, v_size), N and N m: the generalised forces without acceleration. `v` (…, v_size) and `u` (…, control_size) are zero unless given."""
     def forward_dynamics(
         self,
         v: ArrayLike | None = None,
@@ -682,17 +717,26 @@ class Equations:
         *,
         force: ArrayLike | None = None,
         driven: ArrayLike | None = None,
-    ) -> _Array: ...
+    ) -> _Array:
+        """Accelerations v̇ (…, v_size) at the velocities `v`, the controls `u` and further generalised forces `force` (…, v_size), N and N m. Joints that a motion drives, or
+        that are locked, have the accelerations that `driven` (…, v_size) gives them."""
     def inverse_dynamics(
         self, acceleration: ArrayLike, v: ArrayLike | None = None, u: ArrayLike | None = None
-    ) -> _Array: ...
-    def jacobian(self, body: _Body, point: ArrayLike | None = None) -> _Array: ...
-    def velocity(self, body: _Body, v: ArrayLike, point: ArrayLike | None = None) -> _Array: ...
+    ) -> _Array:
+        """Generalised forces (…, v_size), N and N m, at which the accelerations are `acceleration` (…, v_size), beside the controls `u`; of driven joints what drives them."""
+    def jacobian(self, body: _Body, point: ArrayLike | None = None) -> _Array:
+        """Velocity of a `point` (m, its frame; default: its origin) of a `body` (number or name) and the body's angular velocity, world axes, per generalised velocity:
+        (…, 6, v_size)."""
+    def velocity(self, body: _Body, v: ArrayLike, point: ArrayLike | None = None) -> _Array:
+        """Velocity of that point (m/s) and angular velocity of the body (rad/s) at `v`, world axes: (…, 6)."""
     def acceleration(
         self, body: _Body, v: ArrayLike, acceleration: ArrayLike, point: ArrayLike | None = None
-    ) -> _Array: ...
-    def kinetic_energy(self, v: ArrayLike) -> _Array: ...
-    def momentum(self, v: ArrayLike) -> _Array: ...
+    ) -> _Array:
+        """Acceleration of that point (m/s²) and angular acceleration of the body (rad/s²) at `v` and the generalised `acceleration`, world axes: (…, 6)."""
+    def kinetic_energy(self, v: ArrayLike) -> _Array:
+        """Kinetic energy of bodies and water at `v`, J, (…); the water's in the frame that moves with the current."""
+    def momentum(self, v: ArrayLike) -> _Array:
+        """Momentum (kg m/s) and angular momentum about the world's origin (kg m²/s) of bodies and water at `v`, (…, 6)."""
 
 @final
 class State:
@@ -908,14 +952,22 @@ _Derivative = ArrayLike | None
 
 @final
 class CostTerm:
+    """A term of the cost that `hydrograd.optimize.ilqr` lowers: made by its static methods, which are the functions of `hydrograd.cost`.
+
+    It is the sum of `weights` times squared entries: one weight for all, or one each. A running term is integrated over time: at every knot but the last it counts its value times
+    the knot's duration. With `last=True` it counts once, at the end. Targets stand, or move: with `times` (n,), s, of the simulation's clock, `target` has a row for each, and goes straight from row to row."""
     @staticmethod
-    def configuration(target: ArrayLike, weights: ArrayLike, *, times: ArrayLike | None = None, last: bool = False) -> CostTerm: ...
+    def configuration(target: ArrayLike, weights: ArrayLike, *, times: ArrayLike | None = None, last: bool = False) -> CostTerm:
+        """Distance of all coordinates from `target` (q_size,), in their tangent space: `weights` one or (v_size,)."""
     @staticmethod
-    def velocity(target: ArrayLike, weights: ArrayLike, *, times: ArrayLike | None = None, last: bool = False) -> CostTerm: ...
+    def velocity(target: ArrayLike, weights: ArrayLike, *, times: ArrayLike | None = None, last: bool = False) -> CostTerm:
+        """Distance of the generalised velocity from `target` (v_size,), m/s, rad/s."""
     @staticmethod
-    def effort(weights: ArrayLike, *, target: ArrayLike | None = None, times: ArrayLike | None = None) -> CostTerm: ...
+    def effort(weights: ArrayLike, *, target: ArrayLike | None = None, times: ArrayLike | None = None) -> CostTerm:
+        """The open-loop controls, N and N m; or their distance from `target` (control_size,), where one is given."""
     @staticmethod
-    def control_change(weights: ArrayLike) -> CostTerm: ...
+    def control_change(weights: ArrayLike) -> CostTerm:
+        """Changes of the open-loop controls from one knot to the next."""
     @staticmethod
     def position(
         frame: str,
@@ -925,9 +977,11 @@ class CostTerm:
         point: ArrayLike | None = None,
         times: ArrayLike | None = None,
         last: bool = False,
-    ) -> CostTerm: ...
+    ) -> CostTerm:
+        """Distance of a point of the body or site named `frame` from `target` (3,), m, world axes: that of its origin, or of `point` (3,), m, its frame."""
     @staticmethod
-    def orientation(frame: str, target: ArrayLike, weights: ArrayLike, *, times: ArrayLike | None = None, last: bool = False) -> CostTerm: ...
+    def orientation(frame: str, target: ArrayLike, weights: ArrayLike, *, times: ArrayLike | None = None, last: bool = False) -> CostTerm:
+        """Rotation vector, rad, world axes, that takes the axes of the body or site named `frame` from `target`, a rotation vector (3,) from the world's axes, to where they are."""
     @staticmethod
     def observable(
         name: str,
@@ -937,7 +991,8 @@ class CostTerm:
         *,
         times: ArrayLike | None = None,
         last: bool = False,
-    ) -> CostTerm: ...
+    ) -> CostTerm:
+        """Distance of some `entries` (n,) (last index fastest) of the observable `name` from `target` (n,); the observable must have a transpose."""
     @staticmethod
     def custom(
         function: Callable[
@@ -946,15 +1001,26 @@ class CostTerm:
         ],
         *,
         last: bool = False,
-    ) -> CostTerm: ...
+    ) -> CostTerm:
+        """A cost of your own. `function(point)` is given a `hydrograd.cost.Point` and gives a tuple (cost, x, u) or (cost, x, u, xx, uu, ux): the cost (a running one per second), its gradient by the state,
+        (2 v_size,) (coordinates in their tangent space, then velocity), by the controls, (control_size,), and their second derivatives, ux (control_size, 2 v_size). None is zero. It is
+        called from several threads."""
 
 @final
 class Tracking:
-    def act(self, observation: Observation, /) -> _Array: ...
-    def act_vjp(self, observation: Observation, control_bar: ArrayLike, /) -> tuple[_Array, _Array]: ...
+    """The feedback that holds a robot to a plan, `u = ū + K (x ⊖ x̄)` within the plan's limits: a policy, for `Simulator.with_policy`. Before the plan starts and after it has ended
+    the nearest controls are held, without feedback."""
+    def act(self, observation: Observation, /) -> _Array:
+        """The controls, (control_size,), at an observation: its `time`, `q` and `v`."""
+    def act_vjp(self, observation: Observation, control_bar: ArrayLike, /) -> tuple[_Array, _Array]:
+        """Transpose of `act`: cotangents (q_bar, v_bar) from that of the controls."""
 
 @final
 class Mpc:
+    """Model-predictive control: a plan over `knots` of `hold` time steps of the simulator `model`, made again by `iterations` of iLQR every `every` of its time steps from where the plant is, from the plan
+    before, moved on; the first one by `first_iterations`. Between plans the plan's `feedback` acts, or its controls alone. Other keywords are those of `ilqr`.
+
+    The plant may be a robot, which asks for controls step by step (`control`), or a simulator (`run`): the model itself, or one of another fidelity, current, parameters or time step."""
     def __new__(
         cls,
         model: Simulator,
@@ -973,12 +1039,17 @@ class Mpc:
         trials: int = 10,
     ) -> Mpc: ...
     @property
-    def model(self) -> Simulator: ...
+    def model(self) -> Simulator:
+        """The simulator that plans."""
     @property
-    def replans(self) -> list[Replan]: ...
-    def set_model(self, model: Simulator) -> None: ...
-    def reset(self) -> None: ...
-    def control(self, time: float, q: ArrayLike, v: ArrayLike) -> _Array: ...
+    def replans(self) -> list[Replan]:
+        """All plans so far: a list of `Replan`."""
+    def set_model(self, model: Simulator) -> None:
+        """Plans with another simulator from now on: one that has learnt the current, say. It must have the sizes and the time step of the one before."""
+    def reset(self) -> None:
+        """Forgets plans, so that the next call starts anew."""
+    def control(self, time: float, q: ArrayLike, v: ArrayLike) -> _Array:
+        """The controls, (control_size,), at a time, s, from where the plant is: `q` (q_size,), `v` (v_size,). Plans again when that is due. Times must not go back; the first one starts the clock."""
     def run(
         self,
         plant: Simulator,
@@ -987,7 +1058,9 @@ class Mpc:
         state: State | None = None,
         cost: Sequence[CostTerm] | None = None,
         progress: _Progress | None = None,
-    ) -> MpcRun: ...
+    ) -> MpcRun:
+        """Runs a simulated plant for `steps` of its time steps from `state`, or from where it starts: an `MpcRun`; on from the plans so far unless they are of a later time. Its cost is that of `cost`, or of the terms that are planned with.
+        `progress(done, total)` is called every so often with the steps of the plant; what it raises ends the run, and so does Ctrl-C."""
 
 def ilqr(
     simulator: Simulator,
@@ -1007,7 +1080,17 @@ def ilqr(
     regularisation: float = 0.0,
     trials: int = 10,
     progress: Callable[[IlqrProgress], object] | None = None,
-) -> Plan: ...
+) -> Plan:
+    """Controls over a horizon that lower a cost from a state on, within limits, by iterated linear–quadratic regulation on the simulator's own Jacobians: a `Plan`, with the feedback about
+    it. `cost` is a list of terms (`hydrograd.cost`).
+
+    There are `knots` of controls, each held over `hold` time steps; `lower` and `upper` are the least and largest open-loop controls (N, N m), one for all or (control_size,); None: none. `previous`
+    (control_size,): the controls before the first knot, from which `cost.control_change` counts. It starts at the `state`, or where the simulator does, from `guess`: controls (knots, control_size), or
+    a `Plan` that was made before, of which `shift` time steps have passed, with its feedback; None: no control.
+
+    It makes `iterations` at most, and ends once one lowers the cost, or expects to, by less than `tolerance` of it, or the cost is at most `target`. `regularisation` is the part by which each control's
+    curvature is made larger at first, `trials` the most lengths of a step that are tried. `progress(p)` is called after every iteration with an `IlqrProgress`; where it gives True the plan so far is
+    what is found. Ctrl-C ends it."""
 def minimise(
     function: Callable[[_Array], _Evaluated],
     start: ArrayLike,

@@ -181,7 +181,13 @@ pub fn scene() -> Scene {
     ];
     let side = Thruster::new("tail").at([0.0, 0.03, 0.02]);
     let side = side.direction([0.1, -0.4, 0.8]).table(points);
-    scene.add_force(side.torque(0.02).loss(0.7).dead_band(0.3).into());
+    scene.add_force(
+        side.torque(0.02)
+            .loss(0.7)
+            .dead_band(0.3)
+            .smoothing(0.5)
+            .into(),
+    );
     scene.add(
         Body::dry()
             .named("propeller")
@@ -195,13 +201,17 @@ pub fn scene() -> Scene {
     let driven = Thruster::new("hull").at([-0.2, -0.1, 0.1]);
     let driven = driven.direction([0.8, -0.3, 0.1]).polynomial([2.0, 0.9]);
     let driven = driven.rotor("propeller", 0.3).torque(0.04);
-    scene.add_force(driven.loss(0.4).dead_band(0.2).into());
+    scene.add_force(driven.loss(0.4).dead_band(0.2).smoothing(0.5).into());
     let foam = Float::new("arm").at([0.03, 0.02, 0.06]);
     scene.add_force(foam.volume(8e-4).mass(0.2).into());
     let wing = Fin::new("hull")
         .at([0.1, 0.15, 0.02])
         .chord([1.0, 0.2, 0.1], 0.2);
-    let wing = wing.normal([-0.1, 0.0, 1.0]).area(0.03).lift_slope(4.0);
+    let wing = wing
+        .normal([-0.1, 0.0, 1.0])
+        .area(0.03)
+        .lift_slope(4.0)
+        .smoothing(0.3);
     scene.add_force(wing.drag(0.02).induced_drag(1.1).into());
     scene
 }
@@ -661,7 +671,7 @@ fn closed(c: f64) -> Outcome {
     let pressed = (&velocities.after - &velocities.before).norm();
     assert!(moved > 1e-6 && pressed > 1e-3, "{moved:.1e}, {pressed:.1e}");
     // Only what the correction adds, which is small beside the step.
-    let y_bar = wavy(n, 6.1, 1.0);
+    let y_bar = wavy(n, 6.2, 1.0);
     let value = |p: &Point| {
         let [closed, open] =
             [Integrator::EnergyEuler, Integrator::MomentumEuler].map(|i| make(p, i).0.y);

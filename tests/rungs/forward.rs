@@ -377,7 +377,9 @@ fn rollout(integrator: Integrator, observables: &[&str], c: f64) -> Outcome {
         }
     }
     along.parameters = changed;
-    along.gains = wavy(along.gains.len(), 5.1, 0.2).as_slice().to_vec();
+    // No vectors in space: of a length that isn't theirs.
+    let gains = along.gains.len();
+    along.gains = wavy(3 * gains + 1, 5.1, 0.2).as_slice()[..gains].to_vec();
     let found = base.jvp(std::slice::from_ref(&along), observables).unwrap();
     let mut tangent: Vec<f64> = found[0].q.iter().chain(&found[0].v).copied().collect();
     if observables.len() == 1 {

@@ -19,6 +19,8 @@ use pyo3::types::{PyDict, PyList};
 use std::ops::ControlFlow;
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 
+type Numbers<'py> = Bound<'py, PyArrayDyn<f64>>;
+
 fn class<'py>(py: Python<'py>, name: &str) -> PyResult<Bound<'py, PyAny>> {
     py.import("hydrograd._optimize")?.getattr(name)
 }
@@ -81,7 +83,7 @@ impl Tracking {
         &self,
         observation: &Bound<'py, PyAny>,
         control_bar: &Bound<'py, PyAny>,
-    ) -> PyResult<(Bound<'py, PyArrayDyn<f64>>, Bound<'py, PyArrayDyn<f64>>)> {
+    ) -> PyResult<(Numbers<'py>, Numbers<'py>)> {
         let seen = Seen::of(observation)?;
         let bar = DVector::from_vec(array::row("tracking: control_bar", control_bar)?);
         let found = self.inner.act_vjp(&seen.observation(), &bar).or_raise()?;

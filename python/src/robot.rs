@@ -54,15 +54,25 @@ fn to_dict<'py>(py: Python<'py>, report: &RobotReport) -> PyResult<Bound<'py, Py
 /// A robot that was added to a scene: its bodies and joints by name, as the numbers of their bodies, and what it came to.
 #[pyclass(frozen, module = "hydrograd")]
 pub struct Robot {
-    #[pyo3(get)]
     bodies: BTreeMap<String, usize>,
-    #[pyo3(get)]
     joints: BTreeMap<String, usize>,
     report: RobotReport,
 }
 
 #[pymethods]
 impl Robot {
+    /// Numbers of its bodies in the scene, by their links' names.
+    #[getter]
+    fn bodies(&self) -> BTreeMap<String, usize> {
+        self.bodies.clone()
+    }
+
+    /// Numbers of the bodies that its joints move, by the joints' names; those that follow others have no coordinate and aren't listed.
+    #[getter]
+    fn joints(&self) -> BTreeMap<String, usize> {
+        self.joints.clone()
+    }
+
     /// What it came to, as `inspect_robot` gives it.
     #[getter]
     fn report<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyAny>> {

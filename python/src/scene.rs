@@ -32,10 +32,6 @@ pub struct Scene(pub hydrograd::Scene);
 impl Scene {
     #[new]
     #[pyo3(signature = (fluid=None, *, name="", gravity=None, contact=None, time_step=0.01, steps=100, waterline=None))]
-    #[expect(
-        clippy::too_many_arguments,
-        reason = "one per keyword of the constructor"
-    )]
     fn new(
         fluid: Option<PyRef<'_, Fluid>>,
         name: &str,

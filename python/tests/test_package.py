@@ -100,8 +100,10 @@ def test_keywords_are_those_of_the_stubs():
                 assert found == stub, f"{node.name}.{item.name}"
     for name, node in stubbed().items():
         if isinstance(node, ast.FunctionDef):
-            found = list(inspect.signature(getattr(_hydrograd, name)).parameters)
-            assert found == keywords(node), name
+            parameters = inspect.signature(getattr(_hydrograd, name)).parameters.values()
+            found = [p.name for p in parameters if p.kind is not p.VAR_KEYWORD]
+            open_ended = len(found) < len(parameters)
+            assert found == (keywords(node)[: len(found)] if open_ended else keywords(node)), name
 
 
 def test_everything_is_documented():

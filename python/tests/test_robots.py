@@ -192,9 +192,10 @@ def test_a_joint_without_limits_is_read_and_said():
 
 @pytest.mark.parametrize("name", ROBOTS)
 def test_published_robots_run_in_water(name):
-    """With default settings."""
+    """With default settings; fingers that start closed lie in each other's faces, and start open here."""
     path = published(name)
-    scene = hg.Scene.from_urdf(path)
+    start = {"panda_finger_joint1": 0.03} if "panda" in name else {}
+    scene = hg.Scene.from_urdf(path, start=start)
     report = hg.inspect_robot(path)
     wet = [b for b in report["bodies"] if b["volume"] > 0]
     assert len(wet) > len(report["bodies"]) / 2, [b["shape"] for b in report["bodies"]]

@@ -52,6 +52,9 @@ pub(super) fn link_place(file: &File, link: usize) -> String {
     format!("{}: link {name:?}", file.path.display())
 }
 
+/// A group, and a place there.
+type Within = (usize, Isometry3<f64>);
+
 /// The bodies of a file, parents before children, in the file's order where it leaves a choice.
 pub(super) fn groups(file: &File, options: &Options) -> Result<Vec<Group>> {
     let robot = &file.robot;
@@ -70,7 +73,7 @@ pub(super) fn groups(file: &File, options: &Options) -> Result<Vec<Group>> {
     let mut groups: Vec<Group> = Vec::new();
     let mut seen = 0;
     // Link, the group that its parent is in, and that parent's place there.
-    let mut open: Vec<(usize, Option<(usize, Isometry3<f64>)>)> = vec![(root, None)];
+    let mut open: Vec<(usize, Option<Within>)> = vec![(root, None)];
     while let Some((link, above)) = open.pop() {
         seen += 1;
         let joint = carried[link].map(|(joint, _)| joint);

@@ -1,6 +1,6 @@
 //! What a joint does by itself: spring, damping, friction, and the inertia of its rotor.
 
-use super::Body;
+use super::{Body, Scene};
 use serde::{Deserialize, Serialize};
 
 /// Passive forces of a joint with one coordinate q (m or rad), and the inertia of what turns with it in its drive:
@@ -67,6 +67,15 @@ setters! { Passive {
     /// Inertia that the drive adds to the joint, kg or kg m².
     armature(armature: f64) => armature = armature;
 } }
+
+impl Scene {
+    /// A body whose joint resists its motion: by damping, friction or a servo.
+    pub(crate) fn resisting(&self) -> Option<&Body> {
+        let slows = |p: &Passive| p.damping > 0.0 || p.friction > 0.0;
+        let resists = |b: &&Body| b.servo.is_some() || b.passive.as_ref().is_some_and(slows);
+        self.bodies.iter().find(resists)
+    }
+}
 
 setters! { Body {
     /// Spring, damping, friction and rotor of the joint.

@@ -3,7 +3,6 @@
 use super::{Controls, Cotangents, Rollout, Sample, Simulator};
 use crate::adjoint::lie::Vec3;
 use crate::adjoint::sample::Samples;
-use crate::dynamics::force::ForceModel;
 use crate::{Error, Result};
 use nalgebra::{DMatrix, DVector};
 use serde::Serialize;
@@ -216,8 +215,8 @@ fn scales(simulator: &Simulator, rollout: &Rollout, steps: usize) -> Result<Scal
     }
     // Commands that give forces of that size; about one half of them, since a curve may be as |u| u is at zero, without a second derivative.
     let mut about = DVector::zeros(system.controls);
-    let commanded = |f: &Box<dyn ForceModel>| f.commanded(simulator.parameters());
-    for c in system.forces.iter().flat_map(commanded) {
+    let forces = system.forces.iter();
+    for c in forces.flat_map(|f| f.commanded(simulator.parameters())) {
         let mass = simulator.parameters().mass(c.body);
         let share = mass * length / duration / c.thrust.abs();
         force.push(c.command * if share < 1.0 { share } else { 1.0 });

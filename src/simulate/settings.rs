@@ -105,13 +105,14 @@ impl Settings {
 
     /// What these settings and a scene decide together.
     ///
-    /// Contact is solved in the velocity that a step moves by: a scene with contact gets
+    /// Contact is solved in the velocity that a step moves by, and what joints resist with may be far too stiff for a velocity from before: a scene with either gets
     /// [`Integrator::MomentumEuler`] where nobody chose an integrator and the preset's can't do that, which
     /// [`Simulator::reasons`](super::Simulator::reasons) says.
     pub fn resolve(&self, scene: &Scene) -> Choices {
         let preset = self.preset.unwrap_or(scene.preset);
         let mut base = Choices::preset(preset, scene.time_step);
-        if scene.has_contact() && !base.integrator.solves_contact() && self.integrator.is_none() {
+        let asked = scene.has_contact() || scene.resisting().is_some();
+        if asked && !base.integrator.solves_contact() && self.integrator.is_none() {
             base.in_place_of = Some(base.integrator);
             base.integrator = Integrator::MomentumEuler;
         }

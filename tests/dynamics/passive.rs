@@ -234,6 +234,24 @@ fn stiff_servos_hold_their_target() {
     }
 }
 
+/// Joints that resist aren't left to an integrator that takes them explicitly, unless it is asked for.
+#[test]
+fn resisting_joints_get_an_integrator_that_stands_it() {
+    let mut scene = Scene::new(Fluid::none());
+    scene.add(dry("slide", 2.0).passive(Passive::default().damping(1e6)));
+    scene.initial.v = vec![1.0];
+    let sim = Simulator::new(&scene, Settings::default()).unwrap();
+    let reasons = sim.reasons().join("; ");
+    assert!(
+        reasons.contains("\"slide\"") && reasons.contains("momentum-euler"),
+        "{reasons}"
+    );
+    let rollout = sim.rollout(&Controls::zeros(&sim, 20)).unwrap();
+    assert!(rollout.samples()[20].v[0].abs() < 1e-12);
+    let explicit = simulator(&scene, Fidelity::Isolated, Integrator::Rk4);
+    assert!(explicit.warnings().iter().any(|w| w.contains("slide")));
+}
+
 /// What can't be is refused with its name.
 #[test]
 fn wrong_transmissions_are_refused() {

@@ -234,7 +234,13 @@ fn damping() -> Damping {
 pub fn simulator() -> &'static Simulator {
     static MADE: OnceLock<Simulator> = OnceLock::new();
     MADE.get_or_init(|| {
-        Simulator::new(&scene(), Settings::default().tolerance(1e-13)).expect("the scene is right")
+        Simulator::new(
+            &scene(),
+            Settings::default()
+                .tolerance(1e-13)
+                .integrator(Integrator::default()),
+        )
+        .expect("the scene is right")
     })
 }
 
@@ -625,7 +631,9 @@ pub fn still() -> &'static Simulator {
         let arm = arm.expect("an arm");
         arm.limits = Some([at + 1e-3, at + 1.0]);
         arm.limit_stiffness = Some(4.0);
-        let settings = Settings::default().tolerance(1e-13);
+        let settings = Settings::default()
+            .tolerance(1e-13)
+            .integrator(Integrator::default());
         let settings = settings.integrator(Integrator::EnergyEuler);
         Simulator::new(&scene, settings).expect("the scene is right")
     })

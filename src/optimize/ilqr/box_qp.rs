@@ -20,6 +20,9 @@ pub(super) struct BoxQp {
     pub factor: Option<Cholesky<f64, Dyn>>,
 }
 
+/// What is free, and the factor of H there.
+type Factored = (Vec<usize>, Option<Cholesky<f64, Dyn>>);
+
 /// Least point of ½ xᵀHx + gᵀx with lower ≤ x ≤ upper, which holds 0. None where H isn't positive definite in what is free.
 ///
 /// M. Tassa, N. Mansard, E. Todorov, "Control-limited differential dynamic programming", ICRA 2014, section III; D. Bertsekas, "Projected Newton methods for optimization
@@ -34,7 +37,7 @@ pub(super) fn box_qp(
     let project = |x: DVector<f64>| x.zip_zip_map(lower, upper, |x, a, b| x.clamp(a, b));
     let value = |x: &DVector<f64>, hx: &DVector<f64>| 0.5 * x.dot(hx) + g.dot(x);
     let mut x = project(DVector::zeros(n));
-    let mut factored: Option<(Vec<usize>, Option<Cholesky<f64, Dyn>>)> = None;
+    let mut factored: Option<Factored> = None;
     let mut first = None;
     for _ in 0..STEPS {
         let hx = h * &x;

@@ -54,7 +54,7 @@ pub enum Coefficients {
     /// One for each axis, along x, y, z and about x, y, z.
     Axes([f64; 6]),
     /// Rows of a matrix.
-    Rows([[f64; 6]; 6]),
+    Rows(Box<[[f64; 6]; 6]>),
 }
 
 impl From<[f64; 6]> for Coefficients {
@@ -65,7 +65,7 @@ impl From<[f64; 6]> for Coefficients {
 
 impl From<[[f64; 6]; 6]> for Coefficients {
     fn from(rows: [[f64; 6]; 6]) -> Self {
-        Self::Rows(rows)
+        Self::Rows(Box::new(rows))
     }
 }
 

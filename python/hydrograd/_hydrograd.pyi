@@ -267,9 +267,11 @@ class Body:
 class Robot:
     """A robot that was added to a scene: its bodies and joints by name, as the numbers of their bodies, and what it came to."""
     @property
-    def bodies(self) -> dict[str, int]: ...
+    def bodies(self) -> dict[str, int]:
+        """Numbers of its bodies in the scene, by their links' names."""
     @property
-    def joints(self) -> dict[str, int]: ...
+    def joints(self) -> dict[str, int]:
+        """Numbers of the bodies that its joints move, by the joints' names; those that follow others have no coordinate and aren't listed."""
     @property
     def report(self) -> dict[str, Any]:
         """What it came to, as `inspect_robot` gives it."""

@@ -260,7 +260,8 @@ fn wrong_transmissions_are_refused() {
         change(&mut scene);
         scene.validate().unwrap_err().to_string()
     };
-    let cases: [(&dyn Fn(&mut Scene), &[&str]); 6] = [
+    type Case<'c> = (&'c dyn Fn(&mut Scene), &'c [&'c str]);
+    let cases: [Case; 6] = [
         (
             &|s| s.bodies[2].mimic = Some(Mimic::new("claw")),
             &["claw", "follow itself"],

@@ -74,12 +74,7 @@ fn vehicle(current: [f64; 3]) -> Scene {
         ..Drag::default()
     };
     let hull = Body::new(Shape::ellipsoid([0.2, 0.12, 0.1]).faces(160));
-    scene.add(
-        hull.named("hull")
-            .density(998.0)
-            .thruster()
-            .drag(drag.clone()),
-    );
+    scene.add(hull.named("hull").density(998.0).thruster().drag(drag));
     let mut parent = ("hull", 0.22);
     for (name, axis) in [("upper", [0.0, 1.0, 0.0]), ("lower", [0.0, 0.0, 1.0])] {
         let link = Body::new(Shape::ellipsoid([0.1, 0.03, 0.03]).faces(80));
@@ -89,7 +84,7 @@ fn vehicle(current: [f64; 3]) -> Scene {
             .shape_at([0.11, 0.0, 0.0], [0.0; 3]);
         let link = link.child_of(parent.0).at([parent.1, 0.0, 0.0]);
         let joint = Joint::Revolute { axis };
-        scene.add(link.joint(joint).actuated().drag(drag.clone()));
+        scene.add(link.joint(joint).actuated().drag(drag));
         parent = (name, 0.22);
     }
     scene.add_site(Site::new("hand", "lower").at([0.22, 0.0, 0.0]));

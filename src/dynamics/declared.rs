@@ -74,7 +74,7 @@ impl Declared {
     }
 }
 
-/// Where the value of a declared parameter stands: its index in [`Parameters`].
+/// Where the value of a declared parameter stands: its index in [`Parameters`](super::Parameters).
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Parameter(pub(super) usize);
 

@@ -248,8 +248,6 @@ fn resisting_joints_get_an_integrator_that_stands_it() {
     );
     let rollout = sim.rollout(&Controls::zeros(&sim, 20)).unwrap();
     assert!(rollout.samples()[20].v[0].abs() < 1e-12);
-    let explicit = simulator(&scene, Fidelity::Isolated, Integrator::Rk4);
-    assert!(explicit.warnings().iter().any(|w| w.contains("slide")));
 }
 
 /// What can't be is refused with its name.

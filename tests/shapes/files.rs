@@ -329,12 +329,8 @@ fn broken_files_are_refused_with_path_and_remedy() {
         ("empty.obj", vec![], &["empty", "export"]),
         ("empty.stl", vec![], &["empty", "export"]),
         ("empty.ply", b" \n ".to_vec(), &["empty", "export"]),
-        (
-            "mesh.step",
-            b"x".to_vec(),
-            &["\"step\"", ".obj, .stl and .ply"],
-        ),
-        ("mesh", b"x".to_vec(), &["extension", ".obj, .stl and .ply"]),
+        ("mesh.step", b"x".to_vec(), &["\"step\"", ".obj, .stl"]),
+        ("mesh", b"x".to_vec(), &["extension", ".obj, .stl"]),
         ("binary.obj", vec![0xff; 500], &["no faces"]),
         (
             "text.stl",

@@ -70,7 +70,7 @@ fn polynomial(coefficients: &[Parameter], g: f64, parameters: &Parameters) -> At
 
 /// Slope at a point between lines of the slopes `a` and `b`, with its derivatives by them.
 fn between(a: f64, b: f64) -> (f64, f64, f64) {
-    if a * b <= 0.0 {
+    if a == 0.0 || b == 0.0 || (a > 0.0) != (b > 0.0) {
         return (0.0, 0.0, 0.0);
     }
     let (p, q) = (a / (a + b), b / (a + b));

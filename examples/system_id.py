@@ -5,11 +5,8 @@ same at every frame). From this recording alone the coin's mass and its drag coe
 inertia, the water, and the place and time at which it was let go are known. The recording is made by the simulator
 itself with known values, so that what is found can be held against the truth.
 
-The misfit, half the sum of squared deviations over the variance of the noise, falls by L-BFGS-B with the exact
-gradient of the rollout, over the logarithms of both values: neither can become negative, and a step is a part of the
-value. Where it is least its curvature is JᵀJ (Gauss and Newton), with J the positions' change with the two logarithms
-over the noise's deviation; the inverse of that is their covariance, and its diagonal the squared standard errors. One
-recording either is within two standard errors or isn't, so the fit is repeated for many, of other noise: some 95 % of
+`hg.optimize.identify` finds both, over their logarithms (neither can become negative, and a step is a part of the value), by Levenberg and Marquardt on exact Jacobians of the rollout,
+and gives standard errors. One recording either is within two standard errors or isn't, so the fit is repeated for many, of other noise: some 95 % of
 the values should be within two, and the square of their deviations over the standard errors should be 1 on the mean.
 
     python examples/system_id.py [--noise METRES] [--seed N] [--recordings N] [--out FILE] [--json]
@@ -23,14 +20,12 @@ import sys
 import time
 
 import numpy as np
-from scipy.optimize import minimize
 
 import hydrograd as hg
 
 MASS, DRAG = 0.030, 0.4  # the truth: kg; per area
-GUESS = np.log([1.5, 0.4])  # logarithms of what is guessed at the start, in parts of the truth
+GUESS = (1.5, 0.4)  # what is guessed at the start, in parts of the truth
 STEPS = 100  # a camera of 100 frames a second for one second
-DIFFERENCE = 1e-4  # of central differences in the logarithms
 NAMES = ("coin.mass", "coin.drag.quadratic")
 
 
@@ -46,68 +41,37 @@ def simulator():
     return hg.Simulator(scene, fidelity="reduced")
 
 
-def simulate(sim, x):
-    """The coin's fall with mass and drag from their logarithms over the truth's."""
-    values = np.array([MASS, DRAG]) * np.exp(x)
-    return sim.with_parameters(dict(zip(NAMES, values.tolist()))).rollout(steps=STEPS)
-
-
-def seen(rollout):
-    """What a camera sees: y and z of the coin, (STEPS, 2), m."""
-    return rollout.positions[1:, 0, 1:]
-
-
-def misfit(sim, recording, noise, x):
-    """With its gradient over x."""
-    rollout = simulate(sim, x)
-    off = (seen(rollout) - recording) / noise
-    seed = np.zeros_like(rollout.positions)
-    seed[1:, 0, 1:] = off / noise
-    gradient = rollout.vjp(positions=seed).parameters
-    # Over logarithms.
-    values = rollout.simulator.parameters
-    return 0.5 * np.sum(off**2), np.array([gradient[name] * values[name] for name in NAMES])
-
-
-def covariance(sim, noise, x):
-    """Of x, where the misfit is least."""
-    columns = []
-    for step in DIFFERENCE * np.eye(2):
-        change = seen(simulate(sim, x + step)) - seen(simulate(sim, x - step))
-        columns.append(change.ravel() / (2.0 * DIFFERENCE * noise))
-    jacobian = np.stack(columns, axis=1)
-    return np.linalg.inv(jacobian.T @ jacobian)
-
-
 def fit(sim, exact, noise, seed, say=None):
     """Mass and drag from a recording with the noise of a seed."""
     recording = exact + np.random.default_rng(seed).normal(scale=noise, size=exact.shape)
+    run = hg.optimize.Experiment("fall", sim, steps=STEPS)
+    for k, axis in enumerate("yz"):
+        run.saw("positions", f"coin.position_{axis}", recording[:, k], deviation=noise, states=list(range(1, STEPS + 1)))
+    unknowns = [
+        hg.optimize.Unknown(name, positive=True, start=part * truth)
+        for name, part, truth in zip(NAMES, GUESS, (MASS, DRAG))
+    ]
 
-    def told(intermediate_result):
+    def told(p):
         if say:
-            say(f"misfit {intermediate_result.fun:12.4f}")
+            say(f"misfit {p.cost:12.4f}")
 
-    found = minimize(
-        lambda x: misfit(sim, recording, noise, x),
-        GUESS,
-        jac=True,
-        method="L-BFGS-B",
-        callback=told,
-        options={"gtol": 1e-3, "ftol": 1e-13},
-    )
-    spread = covariance(sim, noise, found.x)
-    errors = np.sqrt(np.diag(spread))
-    mass, drag = np.array([MASS, DRAG]) * np.exp(found.x)
+    found = hg.optimize.identify([run], unknowns, progress=told, profiles=0)
+    mass, drag = found.unknowns
     return {
-        "mass": mass,  # kg
-        "mass_standard_error": mass * errors[0],
-        "drag": drag,
-        "drag_standard_error": drag * errors[1],
-        "correlation": spread[0, 1] / (errors[0] * errors[1]),
-        "deviations": (found.x / errors).tolist(),  # of the logarithms from the truth, in standard errors
-        "chi_squared": 2.0 * found.fun / (exact.size - 2),  # 1 for noise as large as it is said to be
-        "evaluations": found.nfev,
-        "stop": found.message,
+        "mass": mass.value,  # kg
+        "mass_standard_error": mass.standard_error,
+        "drag": drag.value,
+        "drag_standard_error": drag.standard_error,
+        "correlation": float(found.correlations[0, 1]),
+        # Of the logarithms from the truth, in standard errors.
+        "deviations": [
+            math.log(u.value / truth) * u.value / u.standard_error for u, truth in ((mass, MASS), (drag, DRAG))
+        ],
+        "chi_squared": found.chi_squared,  # 1 for noise as large as it is said to be
+        "simulations": found.simulations,
+        "jacobians": found.jacobians,
+        "stop": found.stop,
     }
 
 
@@ -148,7 +112,7 @@ def main():
         parser.error("--noise must be positive, --recordings at least 1, --seed not negative")
     begun = time.perf_counter()
     sim = simulator()
-    exact = seen(sim.rollout(steps=STEPS))
+    exact = sim.rollout(steps=STEPS).positions[1:, 0, 1:]
 
     def say(line):
         print(line, file=sys.stderr)
@@ -192,7 +156,7 @@ def main():
     )
     print(
         f"misfit per degree of freedom {shown['chi_squared']:.2f}; "
-        f"{shown['evaluations']} rollouts with gradient, {shown['stop']}"
+        f"{shown['simulations']} rollouts, {shown['jacobians']} Jacobians, ended by {shown['stop']}"
     )
     print(
         f"{len(fits)} recordings: {100.0 * report['part_within_two']:.0f} % of the values within two standard errors, "

@@ -5,12 +5,9 @@
 //! at which it was let go are known. The recording is made by the simulator itself with known values, so that what is found can be
 //! held against the truth.
 //!
-//! The misfit, half the sum of squared deviations over the variance of the noise, falls by L-BFGS (`optimize::minimise`) with the exact gradient
-//! of the rollout, over the logarithms of both values: neither can become negative, and a step is a part of the value.
-//! Where the misfit is least its curvature is JᵀJ (Gauss and Newton), with J the positions' change with the two logarithms over the noise's
-//! deviation; the inverse of that is their covariance, and its diagonal the squared standard errors. One recording either is
-//! within two standard errors or isn't, so the fit is repeated for many recordings, of other noise: some 95 % of the values should be within two,
-//! and the square of their deviations over the standard errors should be 1 on the mean.
+//! `optimize::identify` finds both, over their logarithms (neither can become negative, and a step is a part of the value), by Levenberg and Marquardt on exact Jacobians
+//! of the rollout, and gives standard errors. One recording either is within two standard errors or isn't, so the fit is repeated for many recordings, of other noise:
+//! some 95 % of the values should be within two, and the square of their deviations over the standard errors should be 1 on the mean.
 //!
 //! The inertia is known like the shape. Measured, on two cores: mass 29.86 ± 0.14 g (true 30.00) and drag 0.391 ± 0.009 (true 0.400), both
 //! 1.0 standard errors off (they are correlated, 0.98: a heavier coin with more drag sinks alike); of 20 recordings all values within two standard
@@ -20,10 +17,12 @@
 //! cargo run --release --example system_id -- [--noise METRES] [--seed N] [--recordings N] [--out FILE.svg] [--json]
 //! ```
 
-use hydrograd::optimize::{self, OptimizeSettings, minimise};
+use hydrograd::optimize::{
+    Experiment, Fitted, IdentifySettings, IdentifyStop, Recorded, Unknown, identify,
+};
 use hydrograd::scene::{Drag, DragPart, Plane, Wall};
 use hydrograd::{Body, Controls, Fidelity, Fluid, Joint, Scene, Settings, Shape, Simulator};
-use nalgebra::{DMatrix, DVector, Matrix2, Vector2};
+use nalgebra::DVector;
 use plotters::prelude::*;
 use rand_chacha::ChaCha8Rng;
 use rand_chacha::rand_core::SeedableRng;
@@ -31,6 +30,7 @@ use rand_distr::{Distribution, Normal};
 use rayon::prelude::*;
 use serde::Serialize;
 use std::error::Error;
+use std::ops::ControlFlow;
 use std::path::{Path, PathBuf};
 use std::time::Instant;
 
@@ -42,8 +42,8 @@ const GUESS: [f64; 2] = [1.5, 0.4];
 /// A camera of 100 frames a second for one second.
 const TIME_STEP: f64 = 0.01;
 const STEPS: usize = 100;
-/// Step of central differences in the logarithms.
-const DIFFERENCE: f64 = 1e-4;
+/// The parameters.
+const NAMES: [&str; 2] = ["coin.mass", "coin.drag.quadratic"];
 
 /// The only body.
 const COIN: usize = 0;
@@ -78,63 +78,6 @@ fn positions(simulator: &Simulator) -> hydrograd::Result<DVector<f64>> {
     Ok(DVector::from_iterator(2 * STEPS, numbers))
 }
 
-/// Sets mass and drag from their logarithms over the truth's.
-fn set(simulator: &mut Simulator, x: &[f64]) -> hydrograd::Result<()> {
-    let mut parameters = simulator.parameters().clone();
-    parameters.set("coin.mass", MASS * x[0].exp())?;
-    parameters.set("coin.drag.quadratic", DRAG * x[1].exp())?;
-    simulator.set_parameters(parameters)
-}
-
-/// Misfit and its gradient over x.
-fn misfit(
-    simulator: &mut Simulator,
-    recording: &DVector<f64>,
-    noise: f64,
-    x: &[f64],
-) -> hydrograd::Result<(f64, Vec<f64>)> {
-    set(simulator, x)?;
-    let rollout = simulator.rollout(&Controls::zeros(simulator, STEPS))?;
-    let mut bar = rollout.zero_cotangents();
-    let mut sum = 0.0;
-    for n in 1..=STEPS {
-        let at = rollout.samples()[n].poses[COIN].translation;
-        for (k, seen) in [at.y, at.z].into_iter().enumerate() {
-            let off = (seen - recording[2 * (n - 1) + k]) / noise;
-            sum += 0.5 * off * off;
-            bar.positions[(3 * COIN + 1 + k, n)] = off / noise;
-        }
-    }
-    let gradient = rollout.vjp(&bar)?.parameters;
-    let p = simulator.parameters();
-    // Over logarithms.
-    let slope = ["coin.mass", "coin.drag.quadratic"].map(|x| Ok(gradient.get(x)? * p.get(x)?));
-    Ok((sum, slope.into_iter().collect::<hydrograd::Result<_>>()?))
-}
-
-/// Covariance of x where the misfit is least, by Gauss and Newton; J by central differences, two rollouts a column.
-fn covariance(
-    simulator: &mut Simulator,
-    noise: f64,
-    x: &[f64],
-) -> Result<Matrix2<f64>, Box<dyn Error + Send + Sync>> {
-    let mut columns = Vec::with_capacity(x.len());
-    for i in 0..x.len() {
-        let mut shifted = |h: f64| {
-            let mut x = x.to_vec();
-            x[i] += h;
-            set(simulator, &x)?;
-            positions(simulator)
-        };
-        let change = shifted(DIFFERENCE)? - shifted(-DIFFERENCE)?;
-        columns.push(change / (2.0 * DIFFERENCE * noise));
-    }
-    let j = DMatrix::from_columns(&columns);
-    let information: Matrix2<f64> = (j.transpose() * j).fixed_view::<2, 2>(0, 0).into_owned();
-    let inverse = information.try_inverse();
-    inverse.ok_or_else(|| "the recording says nothing about mass and drag apart".into())
-}
-
 /// What was found from one recording.
 #[derive(Clone, Serialize)]
 struct Fit {
@@ -149,8 +92,9 @@ struct Fit {
     deviations: [f64; 2],
     /// Twice the misfit over the degrees of freedom: 1 for noise as large as it is said to be.
     chi_squared: f64,
-    evaluations: usize,
-    stop: optimize::Stop,
+    simulations: usize,
+    jacobians: usize,
+    stop: IdentifyStop,
 }
 
 fn fit(
@@ -160,41 +104,46 @@ fn fit(
     seed: u64,
     loud: bool,
 ) -> Result<Fit, Box<dyn Error + Send + Sync>> {
-    let mut simulator = simulator(scene)?;
+    let simulator = simulator(scene)?;
     let mut random = ChaCha8Rng::seed_from_u64(seed);
     let normal = Normal::new(0.0, noise)?;
     let recording = exact.map(|x| x + normal.sample(&mut random));
-    let settings = OptimizeSettings {
-        first_step: Some(0.1),
-        gradient_tolerance: 1e-8,
-        ..OptimizeSettings::default()
+    let controls = Controls::zeros(&simulator, STEPS);
+    let mut run = Experiment::new("fall", simulator, controls);
+    for k in 0..2 {
+        run = run.saw(Recorded {
+            observable: "positions".into(),
+            entry: 3 * COIN + 1 + k,
+            states: (1..=STEPS).collect(),
+            values: (0..STEPS).map(|n| recording[2 * n + k]).collect(),
+            deviation: noise,
+        });
+    }
+    let truth = [MASS, DRAG];
+    let unknown = |k: usize| Unknown::new(NAMES[k]).positive().start(GUESS[k] * truth[k]);
+    let settings = IdentifySettings {
+        profiles: 0,
+        ..IdentifySettings::default()
     };
-    let start = GUESS.map(f64::ln);
-    let found = minimise(
-        |x| misfit(&mut simulator, &recording, noise, x),
-        &start,
-        &settings,
-        |p| {
-            if loud {
-                eprintln!(
-                    "iteration {:2}: misfit {:12.4}, |gradient| {:9.3e}",
-                    p.iteration, p.cost, p.gradient
-                );
-            }
-        },
-    )?;
-    let covariance = covariance(&mut simulator, noise, &found.x)?;
-    let errors = Vector2::new(covariance[(0, 0)].sqrt(), covariance[(1, 1)].sqrt());
-    let (mass, drag) = (MASS * found.x[0].exp(), DRAG * found.x[1].exp());
+    let found = identify(&[run], &[unknown(0), unknown(1)], &settings, |p| {
+        if loud {
+            eprintln!("iteration {:2}: misfit {:12.4}", p.iteration, p.cost);
+        }
+        ControlFlow::Continue(())
+    })?;
+    let [mass, drag] = [0, 1].map(|k| &found.unknowns[k]);
+    // Of the logarithm, in standard errors.
+    let off = |u: &Fitted, truth: f64| (u.value / truth).ln() * u.value / u.standard_error;
     Ok(Fit {
-        mass,
-        mass_standard_error: mass * errors[0],
-        drag,
-        drag_standard_error: drag * errors[1],
-        correlation: covariance[(0, 1)] / (errors[0] * errors[1]),
-        deviations: [found.x[0] / errors[0], found.x[1] / errors[1]],
-        chi_squared: 2.0 * found.cost / (exact.len() - 2) as f64,
-        evaluations: found.evaluations,
+        mass: mass.value,
+        mass_standard_error: mass.standard_error,
+        drag: drag.value,
+        drag_standard_error: drag.standard_error,
+        correlation: found.correlations[0][1],
+        deviations: [off(mass, MASS), off(drag, DRAG)],
+        chi_squared: found.chi_squared,
+        simulations: found.simulations,
+        jacobians: found.jacobians,
         stop: found.stop,
     })
 }
@@ -281,8 +230,8 @@ fn main() -> Result<(), Box<dyn Error>> {
         f.drag, f.drag_standard_error, DRAG, f.deviations[1]
     );
     println!(
-        "misfit per degree of freedom {:.2}; {} rollouts with gradient, {:?}",
-        f.chi_squared, f.evaluations, f.stop
+        "misfit per degree of freedom {:.2}; {} rollouts, {} Jacobians, ended by {:?}",
+        f.chi_squared, f.simulations, f.jacobians, f.stop
     );
     println!(
         "{} recordings: {:.0} % of the values within two standard errors, mean square {:.2}; {:.0} s",

@@ -179,4 +179,12 @@ impl Error {
         }
         self
     }
+
+    /// The same, said of one of several things that are done side by side.
+    pub(crate) fn within(mut self, what: &str) -> Self {
+        if let Self::Input { place, .. } | Self::Unresolved { place, .. } = &mut self {
+            *place = format!("{what}: {place}");
+        }
+        self
+    }
 }

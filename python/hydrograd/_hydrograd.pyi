@@ -7,7 +7,18 @@ from numpy.typing import ArrayLike, NDArray
 
 from hydrograd._contacts import ContactForces
 from hydrograd._gradient import Gradient, StepGradient, Tangents
-from hydrograd._optimize import Grasp, IlqrProgress, MpcRun, Optimum, Plan, Point, Replan, Smoothed
+from hydrograd._optimize import (
+    Grasp,
+    Identified,
+    IdentifyProgress,
+    IlqrProgress,
+    MpcRun,
+    Optimum,
+    Plan,
+    Point,
+    Replan,
+    Smoothed,
+)
 from hydrograd._policy import Observation, Policy
 from hydrograd._tradeoff import Tradeoff
 
@@ -130,13 +141,17 @@ class Joint:
 
 @final
 class Motion:
-    """A given motion of one joint coordinate, q(t): made by `Motion.linear` or `Motion.sine`."""
+    """A given motion of one joint coordinate, q(t): made by `Motion.linear`, `Motion.sine` or `Motion.spline`."""
     @staticmethod
     def linear(rate: float, offset: float = 0.0) -> Motion:
         """`offset + rate·t`: offset in m or rad, rate in m/s or rad/s."""
     @staticmethod
     def sine(amplitude: float, frequency: float, phase: float = 0.0, offset: float = 0.0) -> Motion:
         """`offset + amplitude·sin(frequency·t + phase)`: amplitude and offset in m or rad, frequency in rad/s, phase in rad."""
+    @staticmethod
+    def spline(times: ArrayLike, values: ArrayLike) -> Motion:
+        """Through `values` (m or rad) at `times` (s, ascending), by the natural cubic spline: C², straight before the first and after the last. Give points as far apart as the motion is
+        smooth: a recording's noise would be the joint's acceleration."""
 
 def free() -> Joint:
     """A joint that lets a body move freely: q = position (m) and unit quaternion (w, x, y, z), v = velocity of the body's
@@ -293,6 +308,8 @@ def inspect_robot(
     limits: bool | None = None,
     drag: Drag | None = None,
     start: dict[str, float] | None = None,
+    motions: dict[str, Motion | Sequence[Motion]] | None = None,
+    zeros: dict[str, float] | None = None,
     links: dict[str, dict[str, Any]] | None = None,
 ) -> dict[str, Any]:
     """What a robot in a URDF file comes to in water of `density` (kg/m³): tree, masses, weight against buoyancy, meshes that were replaced, and what of the file wasn't
@@ -338,6 +355,8 @@ class Scene:
         limits: bool | None = None,
         drag: Drag | None = None,
         start: dict[str, float] | None = None,
+        motions: dict[str, Motion | Sequence[Motion]] | None = None,
+        zeros: dict[str, float] | None = None,
         links: dict[str, dict[str, Any]] | None = None,
     ) -> Scene:
         """A scene of the robot in a URDF file, in still fresh water, gravity along -z. Choices are those of `add_robot`."""
@@ -358,6 +377,8 @@ class Scene:
         limits: bool | None = None,
         drag: Drag | None = None,
         start: dict[str, float] | None = None,
+        motions: dict[str, Motion | Sequence[Motion]] | None = None,
+        zeros: dict[str, float] | None = None,
         links: dict[str, dict[str, Any]] | None = None,
     ) -> Robot:
         """Adds the robot of a URDF file: a body for each link that moves, a site for each that doesn't. Choices are the keys of a scene file's [[robot]]: `base` "free"
@@ -441,6 +462,20 @@ class Scene:
         length: float = 0.0,
         drag: float = 0.0,
         induced_drag: float = 0.0,
+        smoothing: float = 0.01,
+        name: str | None = None,
+    ) -> None: ...
+    @overload
+    def add_force(
+        self,
+        kind: Literal["edge"],
+        *,
+        body: str,
+        span: float,
+        at: ArrayLike = (0.0, 0.0, 0.0),
+        forward: ArrayLike = (1.0, 0.0, 0.0),
+        normal: ArrayLike = (0.0, 1.0, 0.0),
+        factor: float = 1.0,
         smoothing: float = 0.01,
         name: str | None = None,
     ) -> None: ...
@@ -643,6 +678,12 @@ class Simulator:
     def control_names(self) -> list[str]:
         """Names of the controls, in order: "arm.force.rate" does work on the velocity "arm.rate", "hull.wrench.fx", … "hull.wrench.mz" are a body's wrench, and a thruster's
         command has the thruster's name."""
+    @property
+    def coordinate_names(self) -> list[str]:
+        """Names of the joint coordinates, in order: "coin.y", "arm.angle", …"""
+    @property
+    def velocity_names(self) -> list[str]:
+        """Names of the generalised velocities, in order: "coin.vy", "arm.rate", …"""
     def allocation(self, body: _Body) -> _Array:
         """The allocation matrix (6, n) of the thrusters on a `body` (number or name), in the order in which they were added: the wrench of a newton of thrust on the body,
         its frame, about its origin, linear part first (1, m)."""
@@ -1064,6 +1105,63 @@ class Mpc:
         """Runs a simulated plant for `steps` of its time steps from `state`, or from where it starts: an `MpcRun`; on from the plans so far unless they are of a later time. Its cost is that of `cost`, or of the terms that are planned with.
         `progress(done, total)` is called every so often with the steps of the plant; what it raises ends the run, and so does Ctrl-C."""
 
+@final
+class Unknown:
+    """."""
+    def __new__(
+        cls,
+        name: str,
+        *,
+        sets: Mapping[str, float] | None = None,
+        sets_start: Mapping[str, float] | None = None,
+        start: float | None = None,
+        prior: tuple[float, float] | None = None,
+        within: tuple[float, float] | None = None,
+        positive: bool = False,
+    ) -> Unknown: ...
+    @property
+    def name(self) -> str:
+        """Its name."""
+
+@final
+class Experiment:
+    """."""
+    def __new__(
+        cls,
+        name: str,
+        simulator: Simulator,
+        *,
+        steps: int | None = None,
+        controls: ArrayLike | None = None,
+        start_within: tuple[float, float] | None = None,
+    ) -> Experiment: ...
+    def saw(
+        self,
+        observable: str,
+        entry: int | str,
+        values: ArrayLike,
+        *,
+        deviation: float,
+        states: Sequence[int] | None = None,
+    ) -> None:
+        """."""
+    @property
+    def name(self) -> str:
+        """Its name."""
+
+def identify(
+    experiments: Sequence[Experiment],
+    unknowns: Sequence[Unknown],
+    *,
+    loss: tuple[Literal["huber", "cauchy"], float] | None = None,
+    iterations: int = 50,
+    damping: float = 1e-3,
+    cost_tolerance: float = 1e-8,
+    step_tolerance: float = 1e-3,
+    profiles: int = 1,
+    progress: Callable[[IdentifyProgress], object] | None = None,
+) -> Identified:
+    """."""
 def ilqr(
     simulator: Simulator,
     cost: Sequence[CostTerm],

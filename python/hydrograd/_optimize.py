@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import json
+import math
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Literal
 
@@ -182,3 +184,144 @@ class MpcRun:
     """Their integral over time, with the last terms at the end."""
     replans: list[Replan]
     """The plans that were made for it."""
+
+
+@dataclass(frozen=True)
+class IdentifyProgress:
+    """State of `identify` after an iteration."""
+
+    iteration: int
+    """Iterations made."""
+    cost: float
+    """Misfit."""
+    taken: bool
+    """Whether the step was taken."""
+    step: float
+    """Largest change of an unknown, in its standard errors."""
+    simulations: int
+    """Simulations so far, those of all experiments."""
+
+
+@dataclass(frozen=True)
+class Fitted:
+    """One unknown."""
+
+    name: str
+    """Its name."""
+    value: float
+    """Its value, in its unit."""
+    standard_error: float
+    """Its standard error by the deviations that were given, in its unit; infinite where nothing tells it, zero at a bound."""
+    start: float
+    """Where the search began."""
+    at_bound: bool
+    """Whether a bound holds it; what is said of the others then takes it as known."""
+    of_prior: float | None
+    """Its standard error in parts of what was known beforehand; about 1: the recordings tell nothing of it."""
+    sets: dict[str, float]
+    """The parameters that it sets, and what each is of it."""
+    starts: dict[str, float]
+    """The coordinates of the start that it sets, and what each is of it."""
+
+
+@dataclass(frozen=True)
+class SeriesFit:
+    """How one entry of an experiment was met."""
+
+    experiment: str
+    """The experiment."""
+    observable: str
+    """The observable."""
+    label: str
+    """The entry's label."""
+    rms: float
+    """Root mean square of simulated less recorded, in the observable's unit."""
+    autocorrelation: float
+    """Correlation of one residual with the next: noise has none, what the model lacks has."""
+
+
+@dataclass(frozen=True)
+class Profile:
+    """The misfit at a point along a direction."""
+
+    deviations: float
+    """How far from the best point, in standard deviations along the direction."""
+    rise: float | None
+    """How much the misfit rises; None where the simulation fails."""
+    expected: float
+    """How much it would if it were a parabola."""
+
+
+@dataclass(frozen=True)
+class WeakDirection:
+    """A direction in which the unknowns are told least."""
+
+    change: list[float]
+    """Change of each unknown by one standard deviation along it, in its unit."""
+    deviation: float
+    """The standard deviation along it, in parts of the unknowns' sizes; infinite where nothing tells it."""
+    profile: list[Profile]
+    """The misfit along it; empty where the deviation is infinite."""
+
+
+@dataclass(frozen=True, eq=False)
+class Identified:
+    """What `identify` found."""
+
+    unknowns: list[Fitted]
+    """The unknowns, in order."""
+    correlations: NDArray[np.float64]
+    """Correlations of their errors, (n, n)."""
+    starts: list[tuple[NDArray[np.float64], NDArray[np.float64]]]
+    """Initial coordinates and velocity of each experiment."""
+    series: list[SeriesFit]
+    """How each series was met."""
+    cost: float
+    """The misfit."""
+    chi_squared: float
+    """Sum of squared residuals over the degrees of freedom: 1 for noise as large as it is said to be."""
+    inflation: float
+    """What standard errors are to be multiplied by where residuals aren't that noise."""
+    weak: list[WeakDirection]
+    """The directions that are told least, the least one first."""
+    iterations: int
+    """Iterations made."""
+    simulations: int
+    """Simulations, those of all experiments, profiles included."""
+    jacobians: int
+    """Jacobians of all experiments."""
+    failures: int
+    """Trials whose simulation failed."""
+    stop: Literal["cost", "step", "stuck", "budget", "asked"]
+    """Why it ended: the misfit fell by too little, the unknowns moved by too little, no step lowered it, the iterations were used up, or `progress` asked for it."""
+
+    @property
+    def values(self) -> dict[str, float]:
+        """Values by name."""
+        return {u.name: u.value for u in self.unknowns}
+
+    @property
+    def parameters(self) -> dict[str, float]:
+        """Parameters that the unknowns set, for `Simulator.with_parameters`."""
+        return {name: factor * u.value for u in self.unknowns for name, factor in u.sets.items()}
+
+
+def _identified(text: str) -> Identified:
+    """From the JSON of the Rust side, which has no infinity."""
+    found = json.loads(text)
+
+    def or_infinite(x: float | None) -> float:
+        return math.inf if x is None else x
+
+    for u in found["unknowns"]:
+        u["standard_error"] = or_infinite(u["standard_error"])
+        u["sets"], u["starts"] = dict(u["sets"]), dict(u["starts"])
+    for w in found["weak"]:
+        w["deviation"] = or_infinite(w["deviation"])
+        w["profile"] = [Profile(**p) for p in w["profile"]]
+    found["unknowns"] = [Fitted(**u) for u in found["unknowns"]]
+    found["series"] = [SeriesFit(**s) for s in found["series"]]
+    found["weak"] = [WeakDirection(**w) for w in found["weak"]]
+    found["correlations"] = np.array(found["correlations"], dtype=float)
+    found["starts"] = [(np.array(q), np.array(v)) for q, v in found["starts"]]
+    return Identified(**found)

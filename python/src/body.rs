@@ -276,7 +276,7 @@ impl Body {
             ),
             joint: joint.map_or_else(Default::default, |j| j.0),
             start: start.map_or(Ok(Vec::new()), |given| row(&at("start"), given))?,
-            motion: motion.map(|list| list.iter().map(|m| m.0).collect()),
+            motion: motion.map(|list| list.iter().map(|m| m.0.clone()).collect()),
             locked,
             limits: limits
                 .map(|given| fixed(&at("limits"), given))

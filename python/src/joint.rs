@@ -1,7 +1,7 @@
 //! Joints, and given motions of their coordinates.
 
-use crate::array::fixed;
-use crate::error::input;
+use crate::array::{self, fixed};
+use crate::error::{exception, input};
 use hydrograd::scene::{self, Plane};
 use pyo3::prelude::*;
 
@@ -52,7 +52,7 @@ fn shown(value: &serde_json::Value) -> String {
     }
 }
 
-/// A given motion of one joint coordinate, q(t): made by `Motion.linear` or `Motion.sine`.
+/// A given motion of one joint coordinate, q(t): made by `Motion.linear`, `Motion.sine` or `Motion.spline`.
 #[pyclass(frozen, eq, module = "hydrograd")]
 #[derive(Clone, PartialEq)]
 pub struct Motion(pub scene::Motion);
@@ -78,8 +78,31 @@ impl Motion {
         })
     }
 
+    /// Through `values` (m or rad) at `times` (s, ascending), by the natural cubic spline: C², straight before the first and after the last. Give points as far apart as the motion is
+    /// smooth: a recording's noise would be the joint's acceleration.
+    #[staticmethod]
+    fn spline(times: &Bound<'_, PyAny>, values: &Bound<'_, PyAny>) -> PyResult<Self> {
+        let times = array::row("Motion.spline: times", times)?;
+        let values = array::row("Motion.spline: values", values)?;
+        Ok(Self(
+            scene::Motion::through(times, values).map_err(exception)?,
+        ))
+    }
+
     fn __repr__(&self) -> String {
-        match self.0 {
+        match &self.0 {
+            scene::Motion::Spline(spline) => {
+                let (times, values) = (spline.times(), spline.values());
+                let n = times.len() - 1;
+                format!(
+                    "Motion.spline({} points from {:?} at t = {:?} to {:?} at t = {:?})",
+                    n + 1,
+                    values[0],
+                    times[0],
+                    values[n],
+                    times[n]
+                )
+            }
             scene::Motion::Linear { offset, rate } => {
                 format!("Motion.linear(rate={rate:?}, offset={offset:?})")
             }

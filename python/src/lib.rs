@@ -10,6 +10,7 @@ mod error;
 mod fluid;
 mod gradcheck;
 mod gradient;
+mod identify;
 mod interrupt;
 mod joint;
 mod log;
@@ -119,6 +120,7 @@ fn _hydrograd(m: &Bound<'_, PyModule>) -> PyResult<()> {
     m.add_function(wrap_pyfunction!(_command, m)?)?;
     m.add_function(wrap_pyfunction!(robot::inspect_robot, m)?)?;
     control::register(m)?;
+    identify::register(m)?;
     optimize::register(m)?;
     objective::register(m)
 }

@@ -2,6 +2,7 @@
 
 use crate::body::Drag;
 use crate::error::{OrRaise, input};
+use crate::joint::Motion;
 use hydrograd::Fluid;
 use hydrograd::scene::{Added, RobotReport};
 use pyo3::prelude::*;
@@ -22,9 +23,21 @@ fn not_a_choice(why: impl std::fmt::Display) -> PyErr {
 fn choices(py: Python<'_>, given: Option<&Bound<'_, PyDict>>) -> PyResult<hydrograd::scene::Robot> {
     let plain = PyDict::new(py);
     let mut drag = None;
+    let mut motions: BTreeMap<String, Vec<hydrograd::scene::Motion>> = BTreeMap::new();
     if let Some(given) = given {
         for (key, value) in given {
             if value.is_none() {
+                continue;
+            }
+            if key.eq("motions")? {
+                let given: BTreeMap<String, Bound<'_, PyAny>> = value.extract()?;
+                for (joint, each) in given {
+                    let each: Vec<PyRef<'_, Motion>> = match each.extract::<PyRef<'_, Motion>>() {
+                        Ok(one) => vec![one],
+                        Err(_) => each.extract()?,
+                    };
+                    motions.insert(joint, each.iter().map(|m| m.0.clone()).collect());
+                }
                 continue;
             }
             match value.cast::<Drag>() {
@@ -43,6 +56,7 @@ fn choices(py: Python<'_>, given: Option<&Bound<'_, PyDict>>) -> PyResult<hydrog
     let text: String = json.map_err(not_a_choice)?.extract()?;
     let mut robot: hydrograd::scene::Robot = serde_json::from_str(&text).map_err(not_a_choice)?;
     robot.drag = drag.or(robot.drag);
+    robot.motions = motions;
     Ok(robot)
 }
 

@@ -80,8 +80,9 @@ impl Scene {
 
     /// Adds the robot of a URDF file: a body for each link that moves, a site for each that doesn't. Choices are the keys of a scene file's [[robot]]: `base` "free"
     /// or "fixed", `position` (m) and `rotation` (rad) of the root, `prefix` of all names, `package_path` (folders), `shape` "collision", "visual", "hull" or "none",
-    /// `bad_meshes` "hull" or "refuse", `faces` of hulls, `mimic` "follow" or "independent", `actuated`, `limits`, `drag`, `start` (joint to coordinate), `links` (link to
-    /// its `shape`, `mass`, `density`, `keep`).
+    /// `bad_meshes` "hull" or "refuse", `faces` of hulls, `mimic` "follow" or "independent", `actuated`, `limits`, `drag`, `start` (joint to coordinate), `motions`
+    /// (joint to the `Motion` that drives it), `zeros` (joint whose zero isn't sure to its offset, the coordinate of a body "JOINT zero" before it), `links` (link to its `shape`, `mass`, `density`, `keep`, and what `Body` takes: `center_of_mass`, `inertia`, `volume`, `center_of_buoyancy`,
+    /// `added_mass`).
     #[pyo3(signature = (path, **choices))]
     fn add_robot(
         &mut self,
@@ -153,7 +154,8 @@ impl Scene {
     /// a joint of one velocity, that velocity is the command, and the control is the one that it is driven to with the `time_constant` (s). A "fin" lifts and drags a `body` at `at`,
     /// the middle of its chord: directions `chord` (toward the leading edge) and `normal`, `length` of the chord (m), `area` (m²), `lift_slope` (1/rad), `drag`
     /// along the chord and `induced_drag` across it, smoothed below `smoothing` (m/s). A "float" at the point `at` of a `body` has a `volume` (m³) and a `mass` (kg),
-    /// which is made part of the body's.
+    /// which is made part of the body's. An "edge" is a trailing edge of a `body` with its middle `at`, and a `span` in m: directions `forward` (to the head) and `normal`, `factor` the part of
+    /// the theory's force, which fades below a speed `smoothing` forward (m/s).
     #[pyo3(signature = (kind, **fields))]
     fn add_force(
         &mut self,
@@ -182,7 +184,7 @@ impl Scene {
     }
 
     /// Adds a named frame on a `body` (number or name), at `position` (m) and `rotation` (rotation vector, rad) in its frame, and gives its number: rollouts tell
-    /// "site_positions", "site_rotations" and "site_velocities".
+    /// "site_positions", "site_rotations", "site_attitudes" (roll, pitch, yaw), "site_velocities" and "site_gyros" (rates in own axes).
     #[pyo3(signature = (name, body, position=None, rotation=None))]
     fn add_site(
         &mut self,

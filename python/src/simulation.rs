@@ -620,6 +620,18 @@ impl Simulator {
         self.inner.control_names()
     }
 
+    /// Names of the joint coordinates, in order: "coin.y", "arm.angle", …
+    #[getter]
+    fn coordinate_names(&self) -> Vec<String> {
+        self.inner.scene().coordinate_labels()
+    }
+
+    /// Names of the generalised velocities, in order: "coin.vy", "arm.rate", …
+    #[getter]
+    fn velocity_names(&self) -> Vec<String> {
+        self.inner.scene().velocity_labels()
+    }
+
     /// The allocation matrix (6, n) of the thrusters on a `body` (number or name), in the order in which they were added: the wrench of a newton of thrust on the body,
     /// its frame, about its origin, linear part first (1, m).
     fn allocation<'py>(

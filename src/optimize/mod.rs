@@ -10,6 +10,8 @@
 //! Through contact a trajectory's own gradient may say little: [`smoothed`] averages it over a neighbourhood, [`continuation`] descends softer contact first, and
 //! [`grasp()`] is a recipe of these, pushes and an evolution strategy with which a gripper catches what it hasn't seen.
 //!
+//! [`identify()`] finds parameters from recordings, by exact Jacobians of rollouts, and says how well they are known.
+//!
 //! Where steps' Jacobians say enough, [`ilqr()`] finds controls in tens of iterations, within limits and with the feedback that holds a robot to them; [`Mpc`] does so again and
 //! again from where a plant has got to.
 //!
@@ -21,6 +23,7 @@ mod continuation;
 mod cost;
 mod descent;
 mod grasp;
+mod identify;
 mod ilqr;
 mod mpc;
 mod smoothed;
@@ -29,6 +32,10 @@ pub use continuation::continuation;
 pub use cost::{Cost, CostPoint, CustomCost, Quadratic, Target, Term, Weights, terms};
 pub use descent::minimise;
 pub use grasp::{Finger, Grasp, GraspCost, GraspSettings, GraspStage, GraspTask, grasp};
+pub use identify::{
+    Experiment, Fitted, Identified, IdentifyProgress, IdentifySettings, IdentifyStop, Loss, Prior,
+    Profile, Recorded, SeriesFit, Unknown, WeakDirection, identify,
+};
 pub use ilqr::{
     Guess, IlqrProgress, IlqrSettings, IlqrStop, IlqrTimes, Plan, Problem, Tracking, ilqr,
 };

@@ -160,6 +160,7 @@ fn check_names(file: &File, options: &Options) -> Result<()> {
     let all = [
         ("links", &links, options.links.keys().collect::<Vec<_>>()),
         ("start", &joints, options.start.keys().collect()),
+        ("motions", &joints, options.driven.iter().collect()),
     ];
     for (key, known, given) in all {
         if let Some(bad) = given.iter().find(|name| !known.contains(&name.as_str())) {

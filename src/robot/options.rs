@@ -71,5 +71,7 @@ pub(crate) struct Options {
     pub followers: Followers,
     pub without_limits: bool,
     pub start: BTreeMap<String, f64>,
+    /// Joints that motions drive.
+    pub driven: Vec<String>,
     pub links: BTreeMap<String, LinkChoice>,
 }

@@ -19,6 +19,7 @@ mod problem;
 mod robot;
 mod servo;
 mod site;
+mod spline;
 mod validate;
 
 pub(crate) use crate::geometry::impossible_inertia;
@@ -30,7 +31,7 @@ pub(crate) use carriers::Carriers;
 pub use contact::{CollisionPiece, Contact};
 pub(crate) use force::{AXES, least_damping};
 pub use force::{
-    Coefficients, Damping, Fin, Float, Force, Lubrication, Spring, Thruster, WATER_VISCOSITY,
+    Coefficients, Damping, Edge, Fin, Float, Force, Lubrication, Spring, Thruster, WATER_VISCOSITY,
 };
 pub use mimic::Mimic;
 pub use origin::Origin;
@@ -42,6 +43,7 @@ pub use robot::{
 };
 pub use servo::Servo;
 pub use site::Site;
+pub use spline::Spline;
 
 use serde::{Deserialize, Serialize};
 
@@ -214,7 +216,7 @@ fn is_default<T: Default + PartialEq>(value: &T) -> bool {
 }
 
 /// A given motion of one joint coordinate, q(t).
-#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(tag = "kind", rename_all = "kebab-case", deny_unknown_fields)]
 pub enum Motion {
     /// `offset + rate·t`.
@@ -237,6 +239,8 @@ pub enum Motion {
         #[serde(default)]
         phase: f64,
     },
+    /// Through given points, twice continuously differentiable: see [`Spline`].
+    Spline(Spline),
 }
 
 /// Drag on a body's surface, summed over its faces (Eq. 22 and its companions). The coefficients

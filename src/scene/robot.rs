@@ -1,7 +1,8 @@
 //! Robots of a scene: what is written of them, and the bodies and sites that they become.
 
 use super::{
-    Body, BodyId, CollisionPiece, Drag, Fluid, Mimic, Passive, Placement, Scene, Site, is_default,
+    Body, BodyId, CollisionPiece, Drag, Fluid, Mimic, Motion, Passive, Placement, Scene, Site,
+    is_default,
 };
 use crate::multibody::Joint;
 pub use crate::robot::{
@@ -31,6 +32,36 @@ pub struct RobotLink {
     /// Whether it stays a body of its own at a fixed joint, instead of folding into what carries it.
     #[serde(skip_serializing_if = "is_default")]
     pub keep: bool,
+    /// Centre of mass of the body that the link's frame and name are of, instead of the file's, m. This and what follows are as those of [`Body`].
+    #[serde(skip_serializing_if = "is_default")]
+    pub center_of_mass: Option<[f64; 3]>,
+    /// Its inertia about the centre of mass, kg m²: xx, yy, zz or xx, yy, zz, xy, xz, yz.
+    #[serde(skip_serializing_if = "is_default")]
+    pub inertia: Option<Vec<f64>>,
+    /// Volume by which it is buoyant, m³.
+    #[serde(skip_serializing_if = "is_default")]
+    pub volume: Option<f64>,
+    /// Where buoyancy acts, m.
+    #[serde(skip_serializing_if = "is_default")]
+    pub center_of_buoyancy: Option<[f64; 3]>,
+    /// Its own added mass at unit density about the link's origin, 6 × 6, for `isolated`.
+    #[serde(skip_serializing_if = "is_default")]
+    pub added_mass: Option<Vec<Vec<f64>>>,
+}
+
+impl RobotLink {
+    /// Puts what is chosen in place of what the file says.
+    fn apply(&self, body: &mut Body) {
+        body.center_of_mass = self.center_of_mass.or(body.center_of_mass);
+        body.volume = self.volume.or(body.volume);
+        body.center_of_buoyancy = self.center_of_buoyancy.or(body.center_of_buoyancy);
+        if self.inertia.is_some() {
+            body.inertia.clone_from(&self.inertia);
+        }
+        if self.added_mass.is_some() {
+            body.added_mass.clone_from(&self.added_mass);
+        }
+    }
 }
 
 /// A robot in a URDF file: `[[robot]]` of a scene file, which reading it turns into bodies and sites.
@@ -75,6 +106,13 @@ pub struct Robot {
     /// Coordinates at which joints start, m or rad, by the joints' names; default: zero, or just inside the limits.
     #[serde(skip_serializing_if = "is_default")]
     pub start: BTreeMap<String, f64>,
+    /// Joints whose zero isn't sure, and where it starts, m or rad. Each gets a massless body more, `JOINT zero`, on a locked joint of the same kind before it, whose coordinate
+    /// is the offset: it can be set at the start, differentiated by, and identified ([`Unknown::sets_start`](crate::optimize::Unknown::sets_start)).
+    #[serde(skip_serializing_if = "is_default")]
+    pub zeros: BTreeMap<String, f64>,
+    /// Motions that drive joints, one per coordinate, by the joints' names; they are then no controls.
+    #[serde(skip_serializing_if = "is_default")]
+    pub motions: BTreeMap<String, Vec<Motion>>,
     /// What is chosen for single links, by their names in the file.
     #[serde(skip_serializing_if = "is_default")]
     pub links: BTreeMap<String, RobotLink>,
@@ -117,6 +155,12 @@ impl Robot {
         self
     }
 
+    /// Drives a joint, by its name in the file.
+    pub fn driven(mut self, joint: impl Into<String>, motion: impl Into<Vec<Motion>>) -> Self {
+        self.motions.insert(joint.into(), motion.into());
+        self
+    }
+
     fn options(&self) -> Options {
         let link = |link: &RobotLink| LinkChoice {
             shape: link.shape,
@@ -133,6 +177,12 @@ impl Robot {
             followers: self.mimic,
             without_limits: self.limits == Some(false),
             start: self.start.clone(),
+            driven: self
+                .motions
+                .keys()
+                .chain(self.zeros.keys())
+                .cloned()
+                .collect(),
             links: (self.links.iter())
                 .map(|(name, of)| (name.clone(), link(of)))
                 .collect(),
@@ -213,11 +263,16 @@ impl Scene {
         let called = |name: &str| format!("{}{name}", options.prefix);
         self.check_new(path, bodies.iter().map(|b| called(&b.name)))?;
         self.check_new(path, folded.iter().map(|f| called(&f.name)))?;
-        let first = self.bodies.len();
         let mut joints = Vec::new();
-        for (b, body) in bodies.iter().enumerate() {
+        let mut added = Vec::new();
+        for body in &bodies {
             let mut made = options.body(body, base);
             made.parent = body.parent.map(|p| called(&bodies[p].name));
+            if let Some(zero) = options.zero(body, &made)? {
+                made.parent = Some(zero.name.clone());
+                made.placement = Placement::default();
+                added.push(self.add(zero));
+            }
             if let Some(moves) = body.moves.as_ref().filter(|m| m.joint.velocities() > 0) {
                 let of = |led: &Led| {
                     let leads = |b: &RobotBody| {
@@ -230,10 +285,10 @@ impl Scene {
                 };
                 made.mimic = moves.mimic.as_ref().and_then(of);
                 if made.mimic.is_none() {
-                    joints.push((moves.name.clone(), BodyId(first + b)));
+                    joints.push((moves.name.clone(), BodyId(self.bodies.len())));
                 }
             }
-            self.add(made);
+            added.push(self.add(made));
         }
         for link in &folded {
             self.add_site(Site {
@@ -250,7 +305,7 @@ impl Scene {
         };
         report.weigh(self.fluid.density, gravity);
         Ok(Added {
-            bodies: (first..self.bodies.len()).map(BodyId).collect(),
+            bodies: added,
             joints,
             report,
         })
@@ -290,6 +345,31 @@ impl Scene {
 }
 
 impl Robot {
+    /// What carries a body whose joint's zero isn't sure.
+    fn zero(&self, body: &RobotBody, made: &Body) -> Result<Option<Body>> {
+        let moves = body.moves.as_ref();
+        let Some((moves, offset)) = moves.and_then(|m| Some((m, self.zeros.get(&m.name)?))) else {
+            return Ok(None);
+        };
+        let place = || format!("joint {:?}: zeros", moves.name);
+        if made.mimic.is_some() || moves.joint.coordinates() != 1 {
+            let what = format!("the zero of a {} joint", moves.joint.kind());
+            let remedy = "only joints with one coordinate of their own have one";
+            return Err(Error::input(place(), what, remedy));
+        }
+        super::validate::finite(&place(), &[*offset])?;
+        let zero = Body::dry().named(format!("{}{} zero", self.prefix, moves.name));
+        Ok(Some(Body {
+            mass: Some(0.0),
+            parent: made.parent.clone(),
+            placement: made.placement,
+            joint: moves.joint,
+            start: vec![*offset],
+            locked: true,
+            ..zero
+        }))
+    }
+
     /// A body of it, but for who carries it.
     fn body(&self, body: &RobotBody, base: Base) -> Body {
         let mut made = Body::dry().named(format!("{}{}", self.prefix, body.name));
@@ -328,6 +408,12 @@ impl Robot {
                 })
                 .collect();
         }
+        let motion = (body.moves.as_ref()).and_then(|moves| self.motions.get(&moves.name));
+        if let Some(motion) = motion.filter(|_| made.mimic.is_none()) {
+            made.motion = Some(motion.clone());
+            (made.actuated, made.passive, made.limits) = (false, None, None);
+            made.start.clear();
+        }
         made.overlaps_parent = body.overlaps_parent;
         match body.density {
             Some(density) => made.density = Some(density),
@@ -336,6 +422,9 @@ impl Robot {
                 made.center_of_mass = Some(body.center);
                 made.inertia = Some(body.inertia.to_vec());
             }
+        }
+        if let Some(link) = self.links.get(&body.name) {
+            link.apply(&mut made);
         }
         made
     }

@@ -85,6 +85,11 @@ impl Simulator {
         Ok(out)
     }
 
+    /// The scene that it was made from.
+    pub fn scene(&self) -> &Scene {
+        &self.scene
+    }
+
     /// The mechanical system.
     pub fn system(&self) -> &System {
         &self.assembled.system

@@ -13,6 +13,7 @@ mod galilean;
 #[cfg(feature = "opt")]
 mod grasp;
 mod growth;
+mod identify;
 mod invariants;
 mod islands;
 mod lubrication;

@@ -166,19 +166,6 @@ fn settings(fidelity: Fidelity) -> Settings {
     Settings::default().fidelity(fidelity).tolerance(1e-13)
 }
 
-/// Rate of the driven velocities.
-fn driven_acceleration(m: &Motion, t: f64) -> f64 {
-    match *m {
-        Motion::Linear { .. } => 0.0,
-        Motion::Sine {
-            amplitude,
-            frequency,
-            phase,
-            ..
-        } => -amplitude * frequency * frequency * (frequency * t + phase).sin(),
-    }
-}
-
 /// Free indices; driven velocities and accelerations at time t.
 fn driven(system: &System, t: f64) -> (Vec<usize>, DVector<f64>, DVector<f64>) {
     let nv = system.tree.velocities();
@@ -190,7 +177,7 @@ fn driven(system: &System, t: f64) -> (Vec<usize>, DVector<f64>, DVector<f64>) {
                 Drive::Locked => {}
                 Drive::Motion(m) => {
                     v[i] = m[k].rate(t);
-                    a[i] = driven_acceleration(&m[k], t);
+                    a[i] = m[k].acceleration(t);
                 }
             }
         }

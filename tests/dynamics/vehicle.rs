@@ -1,9 +1,9 @@
-//! Forces that vehicles need, against what they do on paper: damping matrices, thrusters, fins.
+//! Forces that vehicles and swimmers need, against what they do on paper: damping matrices, thrusters, fins, trailing edges.
 
 use crate::support::says;
 use hydrograd::dynamics::Integrator;
 use hydrograd::scene::{
-    Body, Controller, Damping, Fin, Fluid, Force, Joint, Scene, Shape, Spring, Thruster,
+    Body, Controller, Damping, Edge, Fin, Fluid, Force, Joint, Scene, Shape, Spring, Thruster,
 };
 use hydrograd::simulate::Sample;
 use hydrograd::simulate::gradcheck::{self, gradcheck};
@@ -633,4 +633,58 @@ fn fins_that_can_not_be_are_refused() {
         scene.validate().unwrap_err(),
         &["forces[1].name", "\"fin 1\""],
     );
+}
+
+/// At small amplitude a trailing edge's force along the way is Lighthill's ½ m (ḣ² − U² h_x²), to 1e-3 of its larger term; it takes energy away, and nothing is left of it backwards.
+#[test]
+fn a_trailing_edge_is_lighthills() {
+    let (span, speed) = (0.1, 1.0);
+    let water = 0.25 * std::f64::consts::PI * DENSITY * span * span;
+    let edge = |smoothing: f64| Edge::new("rov").span(span).smoothing(smoothing);
+    let still = [0.0; 3];
+    for (across, slope) in [(0.015, 0.005), (0.01, -0.01), (-0.005, 0.015), (0.01, 0.01)] {
+        // The fin's slope over the way toward the tail is that of a turn the other way.
+        let turn = Vector3::new(0.0, 0.0, -slope);
+        let v = Vector6::new(speed, across, 0.0, 0.0, 0.0, 0.0);
+        let scene = with(edge(0.01), Joint::Free, still);
+        let found = wrench(&scene, turn, v, &[]);
+        let [first, second] = [across * across, (speed * slope).powi(2)];
+        let theory = 0.5 * water * (first - second);
+        let size = 0.5 * water * f64::max(first, second);
+        assert!(
+            (found[0] - theory).abs() < 1e-3 * size,
+            "{} {theory}",
+            found[0]
+        );
+        let w = across + speed * slope;
+        let power = found[0] * speed + found[1] * across;
+        let taken = 0.5 * water * speed * w * w;
+        assert!(
+            (power + taken).abs() < 3e-3 * size * speed,
+            "{power} {taken}"
+        );
+        let back = wrench(&scene, turn, -v, &[]);
+        assert!(back.norm() < 1e-4 * found.norm());
+        // Without smoothing the law is a polynomial: the same both ways but for the push across.
+        let scene = with(edge(0.0), Joint::Free, still);
+        let (there, back) = (wrench(&scene, turn, v, &[]), wrench(&scene, turn, -v, &[]));
+        assert!((there - back).norm() < 1e-12 * there.norm());
+    }
+}
+
+#[test]
+fn bad_edges_are_refused() {
+    let refused = |edge: Edge, said: &[&str]| {
+        let scene = with(edge, Joint::Free, [0.0; 3]);
+        says(scene.validate().unwrap_err(), said);
+    };
+    let edge = || Edge::new("rov").span(0.1);
+    refused(Edge::new("rov"), &["forces[0].span", "above zero"]);
+    refused(edge().span(-0.1), &["forces[0].span", "-0.1"]);
+    refused(edge().span(f64::NAN), &["forces[0].span", "NaN"]);
+    refused(Edge::new("fish").span(0.1), &["fish", "rov"]);
+    refused(edge().normal([1.0, 1.0, 0.0]), &["normal", "right angle"]);
+    refused(edge().forward([0.0; 3]), &["forward", "direction"]);
+    refused(edge().factor(-1.0), &["factor"]);
+    refused(edge().smoothing(-1.0), &["smoothing"]);
 }

@@ -9,8 +9,8 @@ use hydrograd::dynamics::{
     Stepper, System,
 };
 use hydrograd::scene::{
-    Body, Damping, Drag, DragPart, Fin, Float, Fluid, Joint, Mimic, Motion, Passive, Plane, Scene,
-    Shape, Spring, Thruster,
+    Body, Damping, Drag, DragPart, Edge, Fin, Float, Fluid, Joint, Mimic, Motion, Passive, Plane,
+    Scene, Shape, Spring, Thruster,
 };
 use hydrograd::simulate::{Pd, PdAxis};
 use hydrograd::{Controls, Rollout, Settings, Simulator};
@@ -40,7 +40,9 @@ pub fn rungs() -> Vec<Rung> {
             |c| step(Integrator::Rk4, c).worst(step(Integrator::Rk2, c)),
         "dynamics::integrator::velocity_euler::Adjoint::vjp" => |c| step(Integrator::VelocityEuler, c),
         "simulate::record::Record::jvp" => record_jvp,
+        "simulate::observable::attitude::Attitudes::vjp" => |c| observed("attitudes", c),
         "simulate::observable::angular_momentum::AngularMomentum::vjp" => |c| observed("angular_momentum", c),
+        "simulate::observable::velocity::Gyros::vjp" => |c| observed("gyros", c),
         "simulate::observable::velocity::Velocities::vjp" => |c| observed("velocities", c),
     ]
 }
@@ -213,6 +215,9 @@ pub fn scene() -> Scene {
         .lift_slope(4.0)
         .smoothing(0.3);
     scene.add_force(wing.drag(0.02).induced_drag(1.1).into());
+    let edge = Edge::new("tail").at([-0.15, 0.02, 0.01]).span(0.2);
+    let edge = edge.forward([1.0, 0.1, -0.2]).normal([0.2, 0.0, 1.0]);
+    scene.add_force(edge.factor(0.8).smoothing(0.3).into());
     scene
 }
 

@@ -49,6 +49,9 @@ pub fn rungs() -> Vec<Rung> {
         "dynamics::force::local::Local::jvp" => |c| jvp("fin", c),
         "dynamics::force::local::Local::vjp" => |c| vjp("fin", c),
         "dynamics::force::fin::Fin::inputs_vjp" => |c| vjp("fin", c),
+        "dynamics::force::local::Local::jvp" => |c| jvp("edge", c),
+        "dynamics::force::local::Local::vjp" => |c| vjp("edge", c),
+        "dynamics::force::edge::Edge::inputs_vjp" => |c| vjp("edge", c),
         "dynamics::force::lubrication::Lubrication::jvp" => |c| jvp("lubrication", c),
         "dynamics::force::lubrication::Lubrication::vjp" => |c| vjp("lubrication", c),
     ]

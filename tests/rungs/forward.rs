@@ -39,6 +39,8 @@ pub fn rungs() -> Vec<Rung> {
         "simulate::tangents::Rollout::jvp" => |c| all(INTEGRATORS.map(|i| rollout(i, &["positions", "rotations"], c))),
         "simulate::observable::pose::Positions::jvp" => |c| rollout(Integrator::Rk2, &["positions"], c),
         "simulate::observable::pose::Rotations::jvp" => |c| rollout(Integrator::Rk2, &["rotations"], c),
+        "simulate::observable::attitude::Attitudes::jvp" => |c| rollout(Integrator::Rk2, &["attitudes"], c),
+        "simulate::observable::velocity::Gyros::jvp" => |c| rollout(Integrator::Rk2, &["gyros"], c),
         "simulate::observable::velocity::Velocities::jvp" => |c| rollout(Integrator::Rk2, &["velocities"], c),
         "simulate::observable::angular_momentum::AngularMomentum::jvp" =>
             |c| rollout(Integrator::Rk2, &["angular_momentum"], c),

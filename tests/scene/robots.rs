@@ -2,7 +2,7 @@
 
 use crate::support::says;
 use hydrograd::scene::{
-    BadMeshes, Base, Followers, Joint, Plane, Robot, RobotLink, Scene, Shape, Wet,
+    BadMeshes, Base, Followers, Joint, Motion, Plane, Robot, RobotLink, Scene, Shape, Wet,
 };
 use hydrograd::{Controls, Fidelity, Fluid, Settings, Simulator};
 use nalgebra::{DVector, Isometry3, Translation3, UnitQuaternion, Vector3};
@@ -986,4 +986,56 @@ fn chains_of_followers_lead_to_one_joint() {
     assert!((passive.friction - 0.7).abs() < 1e-12);
     let [lower, upper] = body("b").limits.unwrap();
     assert!((lower + 0.7 / 6.0).abs() < 1e-12 && (upper - 1.3 / 6.0).abs() < 1e-12);
+}
+
+/// Joints that motions drive are no controls, and stop nowhere; what is known of a link's body takes the place of what the file and its surface say.
+#[test]
+fn joints_are_driven_and_bodies_are_as_they_are_weighed() {
+    let limits = r#"<axis xyz="0 1 0"/><limit lower="-1" upper="1" effort="1" velocity="1"/><dynamics damping="0.2"/>"#;
+    let text = pair("revolute", limits);
+    let motion = Motion::through(vec![0.0, 1.0, 2.0], vec![0.1, 0.5, 0.2]).unwrap();
+    let added: Vec<Vec<f64>> = (0..6)
+        .map(|i| (0..6).map(|j| f64::from(u8::from(i == j)) * 0.01).collect())
+        .collect();
+    let weighed = RobotLink {
+        mass: Some(3.0),
+        center_of_mass: Some([0.0, 0.0, -0.1]),
+        inertia: Some(vec![0.1, 0.2, 0.2]),
+        volume: Some(2.5e-3),
+        center_of_buoyancy: Some([0.0, 0.01, 0.0]),
+        added_mass: Some(added.clone()),
+        ..RobotLink::default()
+    };
+    let options = Robot::default().driven("j", [motion.clone()]);
+    let options = options.link("a", weighed);
+    let scene = read(&text, &options).unwrap();
+    let [a, b] = [&scene.bodies[0], &scene.bodies[1]];
+    assert_eq!(b.motion, Some(vec![motion]));
+    assert!(!b.actuated && b.limits.is_none() && b.passive.is_none());
+    assert_eq!(
+        (a.mass, a.center_of_mass),
+        (Some(3.0), Some([0.0, 0.0, -0.1]))
+    );
+    assert_eq!(a.inertia, Some(vec![0.1, 0.2, 0.2]));
+    assert_eq!(
+        (a.volume, a.center_of_buoyancy),
+        (Some(2.5e-3), Some([0.0, 0.01, 0.0]))
+    );
+    assert_eq!(a.added_mass, Some(added));
+    let settings = Settings::default()
+        .fidelity(Fidelity::Isolated)
+        .time_step(0.01);
+    let simulator = Simulator::new(&scene, settings).unwrap();
+    let rollout = simulator
+        .rollout(&Controls::zeros(&simulator, 100))
+        .unwrap();
+    assert!((rollout.q()[(7, 100)] - 0.5).abs() < 1e-12);
+    let wrong = Robot::default().driven(
+        "k",
+        [Motion::Linear {
+            offset: 0.0,
+            rate: 1.0,
+        }],
+    );
+    says(read(&text, &wrong).unwrap_err(), &["motions", "k", "j"]);
 }

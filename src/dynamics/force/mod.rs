@@ -8,6 +8,7 @@ mod actuation;
 mod curve;
 mod damping;
 mod drag;
+mod edge;
 mod fin;
 mod local;
 mod lubrication;
@@ -54,6 +55,7 @@ const FORCES: &[Assemble] = &[
     thrust::assemble,
     rotor::assemble,
     fin::assemble,
+    edge::assemble,
 ];
 
 /// What forces are made from.

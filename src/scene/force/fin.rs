@@ -1,12 +1,9 @@
 //! Fins of a body.
 
 use super::super::is_default;
-use super::{Force, Scene, direction, number, unit};
+use super::{Force, Scene, direction, number, square};
 use crate::{Error, Result};
 use serde::{Deserialize, Serialize};
-
-/// Largest cosine of the angle between chord and normal.
-const SQUARE: f64 = 1e-6;
 
 /// A fin or foil on a body, by quasi-steady lift and drag in the plane of its chord and its normal; flow along the span has no effect. For a rudder that is
 /// deflected, give it to a body on a revolute joint.
@@ -94,15 +91,8 @@ impl Fin {
 
     /// Directions of length one along the chord and across it.
     pub(crate) fn axes(&self) -> ([f64; 3], [f64; 3]) {
-        let (chord, normal) = (unit(self.chord), unit(self.normal));
-        let along = cosine(chord, normal);
-        let across = std::array::from_fn(|k| normal[k] - along * chord[k]);
-        (chord, unit(across))
+        square(self.chord, self.normal)
     }
-}
-
-fn cosine(a: [f64; 3], b: [f64; 3]) -> f64 {
-    a.iter().zip(&b).map(|(x, y)| x * y).sum()
 }
 
 setters! { Fin {
@@ -158,17 +148,7 @@ impl Fin {
         }
         direction(place("chord"), self.chord)?;
         direction(place("normal"), self.normal)?;
-        let cosine = cosine(unit(self.chord), unit(self.normal));
-        if cosine.abs() > SQUARE {
-            return Err(Error::input(
-                place("normal"),
-                format!(
-                    "{:?}, whose angle with the chord has the cosine {cosine:.3e}",
-                    self.normal
-                ),
-                "give a direction at a right angle to the chord",
-            ));
-        }
+        super::across(place("normal"), self.chord, self.normal, "the chord")?;
         let numbers = [
             ("length", self.length, "m"),
             ("area", self.area, "m²"),

@@ -1,6 +1,7 @@
 //! Forces between bodies as a scene gives them, one file each.
 
 mod damping;
+mod edge;
 mod fin;
 mod float;
 mod lubrication;
@@ -9,6 +10,7 @@ mod thruster;
 
 pub(crate) use damping::{AXES, least_damping};
 pub use damping::{Coefficients, Damping};
+pub use edge::Edge;
 pub use fin::Fin;
 pub use float::Float;
 pub use lubrication::{Lubrication, WATER_VISCOSITY};
@@ -35,6 +37,8 @@ pub enum Force {
     Fin(Fin),
     /// Of foam or ballast at a point.
     Float(Float),
+    /// Of a trailing edge.
+    Edge(Edge),
 }
 
 impl Scene {
@@ -52,6 +56,7 @@ impl Scene {
             Force::Thruster(thruster) => ("thruster", &thruster.name),
             Force::Fin(fin) => ("fin", &fin.name),
             Force::Float(float) => ("float", &float.name),
+            Force::Edge(edge) => ("edge", &edge.name),
         };
         let counted = || format!("{kind} {}", index + 1);
         name.clone().unwrap_or_else(counted)
@@ -95,6 +100,7 @@ impl Scene {
                     ));
                 }
                 Force::Float(float) => float.check(self, &place)?,
+                Force::Edge(edge) => edge.check(self, &place)?,
             }
         }
         Ok(())
@@ -136,4 +142,32 @@ fn unit(direction: [f64; 3]) -> [f64; 3] {
     let scaled = direction.map(|x| x / largest);
     let length = scaled.iter().map(|x| x * x).sum::<f64>().sqrt();
     scaled.map(|x| x / length)
+}
+
+/// Largest cosine of an angle that counts as right.
+const SQUARE: f64 = 1e-6;
+
+fn cosine(a: [f64; 3], b: [f64; 3]) -> f64 {
+    a.iter().zip(&b).map(|(x, y)| x * y).sum()
+}
+
+/// Directions of length one, the second at a right angle to the first.
+fn square(first: [f64; 3], second: [f64; 3]) -> ([f64; 3], [f64; 3]) {
+    let (first, second) = (unit(first), unit(second));
+    let along = cosine(first, second);
+    let across = std::array::from_fn(|k| second[k] - along * first[k]);
+    (first, unit(across))
+}
+
+/// Refuses a direction that isn't at a right angle to another, of which `name` tells.
+fn across(place: String, first: [f64; 3], second: [f64; 3], name: &str) -> Result<()> {
+    let cosine = cosine(unit(first), unit(second));
+    match cosine.abs() <= SQUARE {
+        true => Ok(()),
+        false => Err(Error::input(
+            place,
+            format!("{second:?}, whose angle with {name} has the cosine {cosine:.3e}"),
+            format!("give a direction at a right angle to {name}"),
+        )),
+    }
 }

@@ -4,6 +4,7 @@
 //! its line in [`OBSERVABLES`].
 
 mod angular_momentum;
+mod attitude;
 mod contact;
 mod energy;
 mod entry;
@@ -25,10 +26,14 @@ pub const OBSERVABLES: &[&dyn Observable] = &[
     &joint::Velocities,
     &pose::Positions(Of::Bodies),
     &pose::Rotations(Of::Bodies),
+    &attitude::Attitudes(Of::Bodies),
     &velocity::Velocities(Of::Bodies),
+    &velocity::Gyros(Of::Bodies),
     &pose::Positions(Of::Sites),
     &pose::Rotations(Of::Sites),
+    &attitude::Attitudes(Of::Sites),
     &velocity::Velocities(Of::Sites),
+    &velocity::Gyros(Of::Sites),
     &energy::Kinetic,
     &energy::Potential,
     &energy::Total,

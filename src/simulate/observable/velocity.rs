@@ -73,6 +73,68 @@ impl Differentiable for Velocities {
     }
 }
 
+/// Angular velocities in own axes, as a gyroscope tells them.
+pub(super) struct Gyros(pub Of);
+
+impl Observable for Gyros {
+    fn name(&self) -> &'static str {
+        self.0.named("gyros", "site_gyros")
+    }
+
+    fn unit(&self) -> &'static str {
+        self.0.named(
+            "rad/s, angular velocity in the body's own axes",
+            "rad/s, angular velocity in the site's own axes",
+        )
+    }
+
+    fn shape(&self, system: &System) -> Vec<usize> {
+        vec![self.0.count(system), 3]
+    }
+
+    fn labels(&self, scene: &Scene) -> Vec<String> {
+        self.0.labels(scene, &["gyro_x", "gyro_y", "gyro_z"])
+    }
+
+    fn value(&self, at: &Reading) -> Result<Vec<f64>> {
+        let (tree, sample) = (&at.system.tree, at.sample);
+        let twists = tree.twists(&tree.kinematics(&sample.q), &sample.v);
+        let frames = self.0.frames(at.system, &sample.poses);
+        Ok(frames
+            .flat_map(|(b, pose)| <[f64; 3]>::from(pose.rotation.tr_mul(&angular(&twists[b]))))
+            .collect())
+    }
+
+    fn differentiable(&self) -> Option<&dyn Differentiable> {
+        Some(self)
+    }
+}
+
+impl Differentiable for Gyros {
+    fn tangents(&self, system: &System) -> usize {
+        3 * self.0.count(system)
+    }
+
+    fn jvp(&self, at: &Observed, along: &ObservedTangents) -> Vec<f64> {
+        let of = |(b, pose): (usize, Pose)| {
+            let turned = angular(&along.displacement[b]).cross(&angular(&at.twists[b]));
+            let rate = angular(&along.twist[b]) - turned;
+            <[f64; 3]>::from(pose.rotation.tr_mul(&rate))
+        };
+        let frames = self.0.frames(at.system, &at.kinematics.poses);
+        frames.flat_map(of).collect()
+    }
+
+    fn vjp(&self, at: &Observed, bar: &[f64], out: &mut ObservedBars) {
+        let frames = self.0.frames(at.system, &at.kinematics.poses);
+        for ((b, pose), bar) in frames.zip(bar.chunks_exact(3)) {
+            let bar = pose.rotation * Vec3::from_column_slice(bar);
+            out.twist[b] += six(&Vec3::zeros(), &bar);
+            out.pose[b] -= six(&Vec3::zeros(), &angular(&at.twists[b]).cross(&bar));
+        }
+    }
+}
+
 /// Of each body's origin, and angular.
 pub(in crate::simulate) fn velocities(at: &Reading) -> Vec<f64> {
     Of::Bodies.velocities(at)

@@ -1,0 +1,267 @@
+//! Parameters from recordings.
+
+use crate::array::{Dim, array};
+use crate::error::{OrRaise, input};
+use crate::interrupt::long;
+use crate::simulator::Simulator;
+use hydrograd::optimize::{self, IdentifyProgress, IdentifySettings, Loss, Recorded};
+use hydrograd::simulate::observable::observable;
+use hydrograd::{Controls, Error};
+use pyo3::prelude::*;
+use std::collections::BTreeMap;
+use std::ops::ControlFlow;
+use std::sync::{Arc, Mutex, PoisonError};
+
+fn class<'py>(py: Python<'py>, name: &str) -> PyResult<Bound<'py, PyAny>> {
+    py.import("hydrograd._optimize")?.getattr(name)
+}
+
+/// A number to be found by `identify`: the parameter `name`, or several, `sets` = {parameter: factor}; `sets_start` = {coordinate: factor} sets coordinates of
+/// the initial state by their labels ("arm.angle"), in every experiment. The search begins at `start` (default: the prior's mean, or the first experiment's
+/// value) and stays `within` (least, largest); `prior` = (mean, deviation) is what was known beforehand. `positive` searches over the logarithm: the prior's deviation is then that of the logarithm.
+#[pyclass(frozen, module = "hydrograd.optimize")]
+#[derive(Clone)]
+pub struct Unknown {
+    inner: optimize::Unknown,
+}
+
+#[pymethods]
+impl Unknown {
+    #[new]
+    #[pyo3(signature = (name, *, sets=None, sets_start=None, start=None, prior=None, within=None, positive=false))]
+    fn new(
+        name: &str,
+        sets: Option<BTreeMap<String, f64>>,
+        sets_start: Option<BTreeMap<String, f64>>,
+        start: Option<f64>,
+        prior: Option<(f64, f64)>,
+        within: Option<(f64, f64)>,
+        positive: bool,
+    ) -> Self {
+        let mut inner = optimize::Unknown::new(name);
+        for (parameter, factor) in sets.into_iter().flatten() {
+            inner = inner.sets(parameter, factor);
+        }
+        for (coordinate, factor) in sets_start.into_iter().flatten() {
+            inner = inner.sets_start(coordinate, factor);
+        }
+        if let Some(start) = start {
+            inner = inner.start(start);
+        }
+        if let Some((mean, deviation)) = prior {
+            inner = inner.prior(mean, deviation);
+        }
+        if let Some((least, largest)) = within {
+            inner = inner.within(least, largest);
+        }
+        if positive {
+            inner = inner.positive();
+        }
+        Self { inner }
+    }
+
+    /// Its name.
+    #[getter]
+    fn name(&self) -> &str {
+        self.inner.name()
+    }
+}
+
+/// A recording for `identify`: a `simulator` that starts as it did, and what was done, `controls` (steps, control_size) or none for so many `steps`. With `start_within` = (q, v) the initial
+/// state is unknown, and known beforehand to these deviations (m or rad, m/s or rad/s; 0: exactly). `saw` adds what was seen.
+#[pyclass(frozen, module = "hydrograd.optimize")]
+pub struct Experiment {
+    inner: Mutex<optimize::Experiment>,
+    steps: usize,
+}
+
+#[pymethods]
+impl Experiment {
+    #[new]
+    #[pyo3(signature = (name, simulator, *, steps=None, controls=None, start_within=None))]
+    fn new(
+        name: &str,
+        simulator: &Bound<'_, Simulator>,
+        steps: Option<usize>,
+        controls: Option<&Bound<'_, PyAny>>,
+        start_within: Option<(f64, f64)>,
+    ) -> PyResult<Self> {
+        let me = simulator.get();
+        let controls = match (controls, steps) {
+            (Some(given), None) => {
+                let n = me.controls_size();
+                let shape = [Dim::Any("steps"), Dim::Is(n)];
+                let matrix = array("experiment: controls", given, &shape)?.columns(n);
+                Controls::from_matrix(&me.inner, matrix).or_raise()?
+            }
+            (None, steps) => Controls::zeros(&me.inner, steps.unwrap_or_else(|| me.inner.steps())),
+            (Some(_), Some(_)) => {
+                let remedy = "give one of the two: controls have a row for each step";
+                return Err(input("experiment: steps", "beside controls", remedy));
+            }
+        };
+        let steps = controls.steps();
+        let mut inner = optimize::Experiment::new(name, (*me.inner).clone(), controls);
+        if let Some((q, v)) = start_within {
+            inner = inner.start_within(q, v);
+        }
+        Ok(Self {
+            inner: Mutex::new(inner),
+            steps,
+        })
+    }
+
+    /// Adds what was seen of one `entry` of an `observable`, by its number or its label ("hull.pitch"): `values` at `states` (default: at all, the start among them), and the standard
+    /// `deviation` of the noise. NaN says that nothing was seen.
+    #[pyo3(signature = (observable, entry, values, *, deviation, states=None))]
+    fn saw(
+        &self,
+        observable: &str,
+        entry: &Bound<'_, PyAny>,
+        values: &Bound<'_, PyAny>,
+        deviation: f64,
+        states: Option<Vec<usize>>,
+    ) -> PyResult<()> {
+        let mut inner = self.inner.lock().unwrap_or_else(PoisonError::into_inner);
+        let entry = entry_of(inner.simulator(), observable, entry)?;
+        let values = floats(values)?;
+        let states = states.unwrap_or_else(|| (0..=self.steps).collect());
+        if states.len() != values.len() {
+            return Err(input(
+                "experiment: values",
+                format!("{} of them", values.len()),
+                format!("must be as many as states, {}", states.len()),
+            ));
+        }
+        let seen = states.into_iter().zip(values).filter(|(_, x)| !x.is_nan());
+        let (states, values) = seen.unzip();
+        *inner = inner.clone().saw(Recorded {
+            observable: observable.into(),
+            entry,
+            states,
+            values,
+            deviation,
+        });
+        Ok(())
+    }
+
+    /// Its name.
+    #[getter]
+    fn name(&self) -> String {
+        let inner = self.inner.lock().unwrap_or_else(PoisonError::into_inner);
+        inner.name().into()
+    }
+}
+
+/// Numbers, NaN among them.
+fn floats(values: &Bound<'_, PyAny>) -> PyResult<Vec<f64>> {
+    let numpy = values.py().import("numpy")?;
+    let flat = numpy
+        .call_method1("asarray", (values, "float64"))?
+        .call_method0("ravel")?;
+    flat.call_method0("tolist")?.extract()
+}
+
+/// An entry by its number or its label.
+fn entry_of(
+    simulator: &hydrograd::Simulator,
+    name: &str,
+    entry: &Bound<'_, PyAny>,
+) -> PyResult<usize> {
+    if let Ok(number) = entry.extract::<usize>() {
+        return Ok(number);
+    }
+    let label: String = entry.extract()?;
+    let labels = observable(name).or_raise()?.labels(simulator.scene());
+    labels.iter().position(|l| *l == label).ok_or_else(|| {
+        input(
+            format!("experiment: entry of {name:?}"),
+            format!("{label:?}"),
+            format!("must be a number or one of {labels:?}"),
+        )
+    })
+}
+
+fn loss(given: Option<(String, f64)>) -> PyResult<Loss> {
+    match given {
+        None => Ok(Loss::Squared),
+        Some((name, k)) if name == "huber" => Ok(Loss::Huber(k)),
+        Some((name, k)) if name == "cauchy" => Ok(Loss::Cauchy(k)),
+        Some((name, _)) => Err(input(
+            "identify: loss",
+            format!("{name:?}"),
+            "must be None, (\"huber\", k) or (\"cauchy\", k)",
+        )),
+    }
+}
+
+/// The unknowns that fit the recordings best, by Levenberg and Marquardt on exact Jacobians of rollouts, and how well they are known: an `Identified`.
+///
+/// `loss`: ("huber", k) or ("cauchy", k) forgives what lies more than k deviations off. It makes `iterations` at most, and ends once one lowers the misfit by less than
+/// `cost_tolerance` of itself, or moves no unknown by more than `step_tolerance` standard errors; `damping` is that of the first. Of the `profiles` directions that are known least the
+/// misfit is simulated. `progress(p)` is called after every iteration with an `IdentifyProgress`; where it gives True the best so far is what is found. Ctrl-C ends it.
+#[pyfunction]
+#[pyo3(signature = (
+    experiments, unknowns, *, loss=None, iterations=50, damping=1e-3, cost_tolerance=1e-8, step_tolerance=1e-3, profiles=1, progress=None
+))]
+#[expect(clippy::too_many_arguments, reason = "one per keyword")]
+fn identify<'py>(
+    py: Python<'py>,
+    experiments: Vec<PyRef<'py, Experiment>>,
+    unknowns: Vec<PyRef<'py, Unknown>>,
+    loss: Option<(String, f64)>,
+    iterations: usize,
+    damping: f64,
+    cost_tolerance: f64,
+    step_tolerance: f64,
+    profiles: usize,
+    progress: Option<Bound<'py, PyAny>>,
+) -> PyResult<Bound<'py, PyAny>> {
+    let settings = IdentifySettings {
+        iterations,
+        loss: self::loss(loss)?,
+        damping,
+        cost_tolerance,
+        step_tolerance,
+        profiles,
+    };
+    let experiments: Vec<optimize::Experiment> = (experiments.iter())
+        .map(|e| (*e.inner.lock().unwrap_or_else(PoisonError::into_inner)).clone())
+        .collect();
+    let unknowns: Vec<_> = unknowns.iter().map(|u| u.inner.clone()).collect();
+    let raised = Arc::new(Mutex::new(None));
+    let (theirs, call) = (raised.clone(), progress.map(Bound::unbind));
+    let made = long(py, move |interrupt| {
+        let told = |p: &IdentifyProgress| {
+            interrupt.check()?;
+            let Some(call) = &call else {
+                return ControlFlow::Continue(());
+            };
+            let answer = Python::attach(|py| -> PyResult<bool> {
+                let parts = (p.iteration, p.cost, p.taken, p.step, p.simulations);
+                let told = class(py, "IdentifyProgress")?.call1(parts)?;
+                call.bind(py).call1((told,))?.is_truthy()
+            });
+            match answer {
+                Ok(false) => ControlFlow::Continue(()),
+                Ok(true) => ControlFlow::Break(()),
+                Err(error) => {
+                    *theirs.lock().unwrap_or_else(PoisonError::into_inner) = Some(error);
+                    ControlFlow::Break(())
+                }
+            }
+        };
+        let found = optimize::identify(&experiments, &unknowns, &settings, told)?;
+        serde_json::to_string(&found).map_err(|e| Error::input("identify", e, "must be numbers"))
+    });
+    if let Some(error) = raised.lock().unwrap_or_else(PoisonError::into_inner).take() {
+        return Err(error);
+    }
+    class(py, "_identified")?.call1((made?,))
+}
+
+pub fn register(m: &Bound<'_, PyModule>) -> PyResult<()> {
+    m.add_class::<Unknown>()?;
+    m.add_class::<Experiment>()?;
+    m.add_function(wrap_pyfunction!(identify, m)?)
+}

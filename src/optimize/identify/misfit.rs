@@ -1,0 +1,464 @@
+//! The misfit of all experiments, with its residuals and their Jacobian.
+
+use super::unknown::{Prior, Searched, Target};
+use super::{Experiment, Loss, Unknown};
+use crate::dynamics::Drive;
+use crate::simulate::{Rollout, Simulator, Variables};
+use crate::{Error, Result};
+use nalgebra::{DMatrix, DVector};
+use rayon::prelude::*;
+use std::collections::BTreeSet;
+
+/// The unknown initial state of an experiment.
+struct Start {
+    /// Where its coordinates begin among those of the search.
+    from: usize,
+    /// Generalised velocities that nothing drives.
+    free: Vec<usize>,
+    /// Deviations of coordinates and velocities; zero: known exactly.
+    deviations: [f64; 2],
+}
+
+impl Start {
+    fn parts(&self) -> impl Iterator<Item = (usize, usize, f64)> + '_ {
+        let known = self.deviations.iter().enumerate();
+        let parts = known.filter(|(_, d)| **d > 0.0);
+        parts
+            .enumerate()
+            .map(|(i, (part, d))| (self.from + i * self.free.len(), part, *d))
+    }
+
+    fn len(&self) -> usize {
+        self.parts().count() * self.free.len()
+    }
+}
+
+/// A misfit: a function of the coordinates of the search, the unknowns' and then those of initial states.
+pub(super) struct Misfit<'a> {
+    pub experiments: &'a [Experiment],
+    pub unknowns: Vec<Searched>,
+    starts: Vec<Option<Start>>,
+    loss: Loss,
+    coordinates: usize,
+}
+
+/// The misfit at a point.
+pub(super) struct Evaluated {
+    pub x: DVector<f64>,
+    pub cost: f64,
+    /// Of each experiment, in deviations.
+    pub differences: Vec<DVector<f64>>,
+    rollouts: Vec<Rollout>,
+}
+
+/// Residuals, those of priors after the experiments', weighted by the loss; half their square's gradient is the misfit's.
+pub(super) struct Linear {
+    pub residuals: DVector<f64>,
+    pub jacobian: DMatrix<f64>,
+}
+
+impl<'a> Misfit<'a> {
+    pub fn new(experiments: &'a [Experiment], unknowns: &[Unknown], loss: Loss) -> Result<Self> {
+        let Some(first) = experiments.first() else {
+            let remedy = "give at least one";
+            return Err(Error::input("identify: experiments", "none", remedy));
+        };
+        let unknowns = unknowns.iter().map(|u| Searched::new(u, &first.simulator));
+        let unknowns = unknowns.collect::<Result<Vec<_>>>()?;
+        let mut taken = BTreeSet::new();
+        let all = || {
+            unknowns
+                .iter()
+                .flat_map(|u| u.sets.iter().map(|s| (&u.name, &s.0)))
+        };
+        for (name, set) in all() {
+            if !taken.insert(set.name()) {
+                let place = format!("unknown {name:?}: parameter");
+                let remedy = "another unknown sets it already";
+                return Err(Error::input(place, format!("{:?}", set.name()), remedy));
+            }
+        }
+        let mut coordinates = unknowns.len();
+        let mut starts = Vec::new();
+        for experiment in experiments {
+            experiment.check()?;
+            for (_, target) in all() {
+                let known = match target {
+                    Target::Parameter(name) => {
+                        experiment.simulator.parameters().get(name).map(|_| ())
+                    }
+                    Target::Start(_) => target.coordinate(&experiment.simulator).map(|_| ()),
+                };
+                known.map_err(|e| e.within(&format!("experiment {:?}", experiment.name)))?;
+            }
+            let start = experiment.start.map(|deviations| Start {
+                from: coordinates,
+                free: free(&experiment.simulator),
+                deviations,
+            });
+            coordinates += start.as_ref().map_or(0, Start::len);
+            starts.push(start);
+        }
+        if coordinates == 0 {
+            let remedy = "give an unknown, or an experiment whose start is one";
+            return Err(Error::input("identify: unknowns", "none", remedy));
+        }
+        Ok(Self {
+            experiments,
+            unknowns,
+            starts,
+            loss,
+            coordinates,
+        })
+    }
+
+    /// Where the search begins.
+    pub fn start(&self) -> DVector<f64> {
+        let known = self.unknowns.iter().map(|u| u.start);
+        let zeros = std::iter::repeat_n(0.0, self.coordinates - self.unknowns.len());
+        DVector::from_iterator(self.coordinates, known.chain(zeros))
+    }
+
+    /// Least and largest value of a coordinate.
+    pub fn bounds(&self, i: usize) -> [f64; 2] {
+        let none = [f64::NEG_INFINITY, f64::INFINITY];
+        self.unknowns.get(i).map_or(none, |u| u.bounds)
+    }
+
+    /// Coordinates of which something was known beforehand.
+    fn priors(&self) -> Vec<(usize, Prior)> {
+        let known = self.unknowns.iter().enumerate();
+        let mut out: Vec<_> = known.filter_map(|(i, u)| Some((i, u.prior?))).collect();
+        for start in self.starts.iter().flatten() {
+            for (from, _, deviation) in start.parts() {
+                let prior = |i| {
+                    (
+                        i,
+                        Prior {
+                            mean: 0.0,
+                            deviation,
+                        },
+                    )
+                };
+                out.extend((from..from + start.free.len()).map(prior));
+            }
+        }
+        out
+    }
+
+    /// An experiment's initial coordinates and velocity.
+    pub fn initial(&self, k: usize, x: &DVector<f64>) -> (DVector<f64>, DVector<f64>) {
+        let simulator = &self.experiments[k].simulator;
+        let (q, v) = simulator.start();
+        let mut q = q.clone();
+        for (unknown, x) in self.unknowns.iter().zip(x.iter()) {
+            for (target, factor) in &unknown.sets {
+                // Checked at the start.
+                if let Ok(Some((i, _))) = target.coordinate(simulator) {
+                    q[i] = factor * unknown.value(*x);
+                }
+            }
+        }
+        let Some([xi, dv]) = self.displaced(k, x) else {
+            return (q, v.clone());
+        };
+        (simulator.system().tree.integrate(&q, &xi), v + dv)
+    }
+
+    /// Whether unknowns set coordinates of the start.
+    fn sets_start(&self) -> bool {
+        let mut all = self.unknowns.iter().flat_map(|u| &u.sets);
+        all.any(|(target, _)| matches!(target, Target::Start(_)))
+    }
+
+    /// How far its initial coordinates (tangent) and velocity are from those given.
+    fn displaced(&self, k: usize, x: &DVector<f64>) -> Option<[DVector<f64>; 2]> {
+        let start = self.starts[k].as_ref()?;
+        let n = self.experiments[k].simulator.start().1.len();
+        let mut out = [DVector::zeros(n), DVector::zeros(n)];
+        for (from, part, _) in start.parts() {
+            for (i, v) in start.free.iter().enumerate() {
+                out[part][*v] = x[from + i];
+            }
+        }
+        Some(out)
+    }
+
+    fn place(&self, k: usize) -> String {
+        format!("experiment {:?}", self.experiments[k].name)
+    }
+
+    /// The simulator of an experiment at a point.
+    fn simulator(&self, k: usize, x: &DVector<f64>) -> Result<Simulator> {
+        let mut simulator = self.experiments[k].simulator.clone();
+        let mut parameters = simulator.parameters().clone();
+        for (unknown, x) in self.unknowns.iter().zip(x.iter()) {
+            for (target, factor) in &unknown.sets {
+                if let Target::Parameter(name) = target {
+                    parameters.set(name, factor * unknown.value(*x))?;
+                }
+            }
+        }
+        simulator.set_parameters(parameters)?;
+        if self.starts[k].is_some() || self.sets_start() {
+            let (q, v) = self.initial(k, x);
+            simulator.set_start(q, v)?;
+        }
+        Ok(simulator)
+    }
+
+    /// # Errors
+    /// The first experiment whose simulation fails, by name.
+    pub fn evaluate(&self, x: &DVector<f64>) -> Result<Evaluated> {
+        let one = |k: usize| {
+            let run = || {
+                let simulator = self.simulator(k, x)?;
+                let rollout = simulator.rollout(&self.experiments[k].controls)?;
+                let differences = self.experiments[k].differences(&rollout)?;
+                Ok((differences, rollout))
+            };
+            run().map_err(|e: Error| e.within(&self.place(k)))
+        };
+        let each: Vec<_> = (0..self.experiments.len())
+            .into_par_iter()
+            .map(one)
+            .collect();
+        let each = each.into_iter().collect::<Result<Vec<_>>>()?;
+        let (differences, rollouts): (Vec<DVector<f64>>, Vec<_>) = each.into_iter().unzip();
+        let data: f64 = (differences.iter().flat_map(|r| r.iter()))
+            .map(|r| self.loss.of(*r).0)
+            .sum();
+        let known: f64 = (self.priors().iter())
+            .map(|(i, p)| ((x[*i] - p.mean) / p.deviation).powi(2))
+            .sum();
+        Ok(Evaluated {
+            x: x.clone(),
+            cost: 0.5 * (data + known),
+            differences,
+            rollouts,
+        })
+    }
+
+    /// # Errors
+    /// Derivatives that can't be found.
+    pub fn linearise(&self, at: &Evaluated) -> Result<Linear> {
+        let each: Vec<_> = (0..self.experiments.len())
+            .into_par_iter()
+            .map(|k| self.experiment_jacobian(k, at))
+            .collect();
+        let priors = self.priors();
+        let data: usize = at.differences.iter().map(DVector::len).sum();
+        let mut residuals = DVector::zeros(data + priors.len());
+        let mut jacobian = DMatrix::zeros(data + priors.len(), self.coordinates);
+        let mut row = 0;
+        for (k, made) in each.into_iter().enumerate() {
+            let made = made.map_err(|e| e.within(&self.place(k)))?;
+            for (i, r) in at.differences[k].iter().enumerate() {
+                let weight = self.loss.of(*r).1.sqrt();
+                residuals[row] = weight * r;
+                jacobian.row_mut(row).copy_from(&(weight * made.row(i)));
+                row += 1;
+            }
+        }
+        for (i, prior) in priors {
+            residuals[row] = (at.x[i] - prior.mean) / prior.deviation;
+            jacobian[(row, i)] = 1.0 / prior.deviation;
+            row += 1;
+        }
+        Ok(Linear {
+            residuals,
+            jacobian,
+        })
+    }
+
+    /// Jacobian of an experiment's differences by all coordinates.
+    fn experiment_jacobian(&self, k: usize, at: &Evaluated) -> Result<DMatrix<f64>> {
+        let targets = || {
+            self.unknowns
+                .iter()
+                .flat_map(|u| u.sets.iter().map(|s| &s.0))
+        };
+        let parameters: Vec<&str> = targets()
+            .filter(|t| matches!(t, Target::Parameter(_)))
+            .map(Target::name)
+            .collect();
+        let simulator = &self.experiments[k].simulator;
+        let n = simulator.start().1.len();
+        let start = self.starts[k].as_ref();
+        let unsure = start.is_some_and(|s| s.deviations[0] > 0.0);
+        let variables = Variables {
+            parameters: parameters.iter().map(|name| (*name).to_string()).collect(),
+            initial_q: unsure || self.sets_start(),
+            initial_v: start.is_some_and(|s| s.deviations[1] > 0.0),
+            ..Variables::default()
+        };
+        let made = match self.experiments[k].residuals() < self.coordinates {
+            true => self.by_reverse(k, &at.rollouts[k], &variables)?,
+            false => self.by_forward(k, &at.rollouts[k], &variables)?,
+        };
+        let mut out = DMatrix::zeros(made.nrows(), self.coordinates);
+        for (i, unknown) in self.unknowns.iter().enumerate() {
+            for (target, factor) in &unknown.sets {
+                let by = factor * unknown.slope(at.x[i]);
+                let column = match target.coordinate(simulator)? {
+                    Some((_, v)) => parameters.len() + v,
+                    None => {
+                        let mut named = parameters.iter();
+                        named.position(|name| *name == target.name()).unwrap_or(0)
+                    }
+                };
+                out.column_mut(i).axpy(by, &made.column(column), 1.0);
+            }
+        }
+        let Some(start) = start else {
+            return Ok(out);
+        };
+        let velocities = parameters.len() + if variables.initial_q { n } else { 0 };
+        for (to, part, _) in start.parts() {
+            let from = if part == 0 {
+                parameters.len()
+            } else {
+                velocities
+            };
+            let columns = made.columns(from, n);
+            let by = match (part, self.displaced(k, &at.x)) {
+                (0, Some([xi, _])) => {
+                    let tree = &simulator.system().tree;
+                    let still = DMatrix::zeros(n, n);
+                    columns * tree.integrate_jvp(&xi, &still, &DMatrix::identity(n, n))
+                }
+                _ => columns.into_owned(),
+            };
+            for (i, v) in start.free.iter().enumerate() {
+                out.set_column(to + i, &by.column(*v));
+            }
+        }
+        Ok(out)
+    }
+
+    /// By `variables`, a run for all of them.
+    fn by_forward(&self, k: usize, rollout: &Rollout, by: &Variables) -> Result<DMatrix<f64>> {
+        let recorded = &self.experiments[k].recorded;
+        let states: BTreeSet<usize> = recorded.iter().flat_map(|r| &r.states).copied().collect();
+        let states: Vec<usize> = states.into_iter().collect();
+        let names: BTreeSet<&str> = recorded.iter().map(|r| r.observable.as_str()).collect();
+        let names: Vec<&str> = names.into_iter().collect();
+        let made = rollout.jacobian(by, &names, &states)?;
+        let columns = made.first().map_or(0, DMatrix::ncols);
+        let mut out = DMatrix::zeros(self.experiments[k].residuals(), columns);
+        let mut row = 0;
+        for r in recorded {
+            let of = names.binary_search(&r.observable.as_str()).unwrap_or(0);
+            let entries = made[of].nrows() / states.len();
+            for n in &r.states {
+                let place = states.binary_search(n).unwrap_or(0);
+                let found = made[of].row(place * entries + r.entry) / r.deviation;
+                out.row_mut(row).copy_from(&found);
+                row += 1;
+            }
+        }
+        Ok(out)
+    }
+
+    /// The same, a reverse sweep for each residual.
+    fn by_reverse(&self, k: usize, rollout: &Rollout, by: &Variables) -> Result<DMatrix<f64>> {
+        let system = rollout.simulator().system();
+        let n = system.tree.velocities();
+        let mut rows = Vec::new();
+        for r in &self.experiments[k].recorded {
+            let entries = crate::simulate::observable::differentiable(&r.observable)?;
+            for state in &r.states {
+                let mut bar = rollout.zero_cotangents();
+                let mut seed = DMatrix::zeros(entries.tangents(system), rollout.steps() + 1);
+                seed[(r.entry, *state)] = 1.0 / r.deviation;
+                bar.observables.insert(r.observable.clone(), seed);
+                let found = rollout.vjp(&bar)?;
+                let mut row = Vec::new();
+                for name in &by.parameters {
+                    row.push(found.parameters.get(name)?);
+                }
+                if by.initial_q {
+                    row.extend(found.initial.q.iter().take(n));
+                }
+                if by.initial_v {
+                    row.extend(found.initial.v.iter().take(n));
+                }
+                rows.push(DVector::from_vec(row).transpose());
+            }
+        }
+        Ok(DMatrix::from_rows(&rows))
+    }
+}
+
+/// Generalised velocities that nothing drives.
+fn free(simulator: &Simulator) -> Vec<usize> {
+    let system = simulator.system();
+    let links = system.drives.iter().zip(system.tree.links());
+    let free = links.filter(|(drive, _)| **drive == Drive::Free);
+    free.flat_map(|(_, link)| link.v.clone()).collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::optimize::Recorded;
+    use crate::scene::{Body, Fluid, Scene, Shape};
+    use crate::{Controls, Fidelity, Settings};
+
+    /// Rows of forward mode and of the reverse sweep, to rounding.
+    #[test]
+    fn both_modes_agree() -> Result<()> {
+        let mut scene = Scene::new(Fluid::fresh_water());
+        scene.gravity = [0.0, 0.0, -9.81];
+        let shape = Shape::ellipsoid([0.1, 0.05, 0.04]).faces(80);
+        scene.add(Body::new(shape).named("hull").density(1100.0));
+        scene.initial.v = vec![0.1, 0.2, 0.0, 0.3, -0.2, 0.5];
+        let settings = Settings::default().fidelity(Fidelity::Isolated);
+        let simulator = Simulator::new(&scene, settings)?;
+        let controls = Controls::zeros(&simulator, 30);
+        let seen = |observable: &str, entry, states: &[usize]| Recorded {
+            observable: observable.into(),
+            entry,
+            states: states.to_vec(),
+            values: vec![0.1; states.len()],
+            deviation: 0.5,
+        };
+        let experiment = Experiment::new("sinking", simulator, controls)
+            .saw(seen("attitudes", 1, &[30, 7]))
+            .saw(seen("positions", 2, &[12]))
+            .start_within(0.1, 0.2);
+        let experiments = [experiment];
+        let unknowns = [
+            Unknown::new("hull.mass").positive(),
+            Unknown::new("hull.center_of_mass.z"),
+        ];
+        let misfit = Misfit::new(&experiments, &unknowns, Loss::Squared)?;
+        let mut x = misfit.start();
+        x.rows_mut(2, 12).fill(0.05);
+        let at = misfit.evaluate(&x)?;
+        let variables = Variables {
+            parameters: vec!["hull.mass".into(), "hull.center_of_mass.z".into()],
+            initial_q: true,
+            initial_v: true,
+            ..Variables::default()
+        };
+        let forward = misfit.by_forward(0, &at.rollouts[0], &variables)?;
+        let reverse = misfit.by_reverse(0, &at.rollouts[0], &variables)?;
+        assert!((&forward - &reverse).amax() < 1e-11 * forward.amax());
+        // All columns against differences.
+        let linear = misfit.linearise(&at)?;
+        let h = 1e-5;
+        for i in 0..x.len() {
+            let moved = |h: f64| {
+                let mut x = x.clone();
+                x[i] += h;
+                Ok::<_, Error>(misfit.evaluate(&x)?.differences.remove(0))
+            };
+            let difference = (moved(h)? - moved(-h)?) / (2.0 * h);
+            let found = linear.jacobian.column(i).rows(0, 3).into_owned();
+            let scale = linear.jacobian.amax();
+            assert!((difference - found).amax() < 1e-7 * scale, "column {i}");
+        }
+        Ok(())
+    }
+}

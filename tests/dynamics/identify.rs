@@ -1,0 +1,321 @@
+//! Parameters recovered from recordings that the simulator makes itself, with noise and known truth.
+
+use crate::support::says;
+use hydrograd::adjoint::sample::Samples;
+use hydrograd::optimize::{
+    Experiment, Identified, IdentifySettings, IdentifyStop, Loss, Recorded, Unknown, identify,
+};
+use hydrograd::scene::{Body, Damping, Fluid, Motion, Scene, Shape};
+use hydrograd::{Controls, Fidelity, Joint, Settings, Simulator};
+use nalgebra::DVector;
+use std::ops::ControlFlow;
+
+const STEPS: usize = 150;
+/// Noise of an attitude, rad.
+const NOISE: f64 = 2e-3;
+/// Moments per rate, roll, pitch and yaw: the truth.
+const DAMPING: [f64; 3] = [0.05, 0.08, 0.06];
+
+/// Zero of the arm's joint, rad: the coordinate of a locked one before it.
+const ZERO: f64 = 0.06;
+
+/// A neutrally buoyant vehicle that an arm, driven through a recording, tips.
+fn vehicle(amplitude: f64) -> Simulator {
+    let mut scene = Scene::new(Fluid::fresh_water());
+    scene.gravity = [0.0, 0.0, -9.81];
+    scene.time_step = 0.02;
+    let hull = Shape::ellipsoid([0.2, 0.15, 0.12]).faces(80);
+    scene.add(
+        Body::new(hull)
+            .named("hull")
+            .density(998.0)
+            .center_of_mass([0.0, 0.0, -0.01]),
+    );
+    let times: Vec<f64> = (0..8).map(|i| 0.5 * f64::from(i)).collect();
+    let angles = times.iter().map(|t| amplitude * (1.3 * t).sin()).collect();
+    let axis = [0.3, 1.0, 0.0];
+    let mount = Body::dry().named("mount").child_of("hull").mass(0.0);
+    let mut mount = mount.at([0.35, 0.05, 0.0]).joint(Joint::Revolute { axis });
+    mount.locked = true;
+    mount.start = vec![ZERO];
+    scene.add(mount);
+    scene.add(
+        Body::new(Shape::ellipsoid([0.12, 0.02, 0.02]).faces(80))
+            .named("arm")
+            .child_of("mount")
+            .density(1400.0)
+            .joint(Joint::Revolute { axis })
+            .driven([Motion::through(times, angles).unwrap()]),
+    );
+    let [roll, pitch, yaw] = DAMPING;
+    let damping = Damping::new("hull").named("water");
+    scene.add_force(damping.linear([0.5, 0.5, 0.5, roll, pitch, yaw]).into());
+    let settings = Settings::default().fidelity(Fidelity::Isolated);
+    Simulator::new(&scene, settings).unwrap()
+}
+
+/// What is seen of the attitude with noise of its own, a run each.
+fn experiments(noise: f64, seed: u64) -> Vec<Experiment> {
+    let mut random = Samples::new(seed);
+    [0.4, -0.7]
+        .map(|amplitude| {
+            let simulator = vehicle(amplitude);
+            let controls = Controls::zeros(&simulator, STEPS);
+            let rollout = simulator.rollout(&controls).unwrap();
+            let attitudes = rollout.observe("attitudes").unwrap();
+            let mut out = Experiment::new(format!("arm {amplitude}"), simulator, controls);
+            for entry in [0, 1] {
+                let states: Vec<usize> = (1..=STEPS).collect();
+                let values = states
+                    .iter()
+                    .map(|n| attitudes[(entry, *n)] + noise * random.normal());
+                out = out.saw(Recorded {
+                    observable: "attitudes".into(),
+                    entry,
+                    values: values.collect(),
+                    states,
+                    deviation: NOISE,
+                });
+            }
+            out
+        })
+        .into()
+}
+
+const NAMES: [&str; 4] = [
+    "hull.center_of_mass.z",
+    "hull.center_of_mass.y",
+    "water.linear.wx",
+    "water.linear.wy",
+];
+
+fn truth() -> [f64; 4] {
+    [-0.01, 0.0, DAMPING[0], DAMPING[1]]
+}
+
+fn unknowns() -> Vec<Unknown> {
+    vec![
+        Unknown::new(NAMES[0]).start(-0.02).within(-0.05, 0.0),
+        Unknown::new(NAMES[1]).start(0.004).prior(0.0, 0.01),
+        Unknown::new(NAMES[2]).positive().start(0.2),
+        Unknown::new(NAMES[3]).positive().start(0.02),
+    ]
+}
+
+fn found(experiments: &[Experiment], settings: &IdentifySettings) -> Identified {
+    identify(experiments, &unknowns(), settings, |_| {
+        ControlFlow::Continue(())
+    })
+    .unwrap()
+}
+
+/// Without noise the truth to 1e-6; with it within four standard errors, whose size a misfit of 1 confirms.
+#[test]
+fn a_vehicle_is_recovered() {
+    let exact = found(&experiments(0.0, 1), &IdentifySettings::default());
+    for (u, truth) in exact.unknowns.iter().zip(truth()) {
+        let off = (u.value - truth).abs();
+        assert!(
+            off < 1e-6 * truth.abs().max(1e-2),
+            "{}: {}",
+            u.name,
+            u.value
+        );
+    }
+    let noisy = found(&experiments(NOISE, 2), &IdentifySettings::default());
+    for (u, truth) in noisy.unknowns.iter().zip(truth()) {
+        let off = (u.value - truth).abs() / u.standard_error;
+        assert!(off < 4.0, "{}: {} ± {}", u.name, u.value, u.standard_error);
+        assert!(!u.at_bound);
+    }
+    assert!(
+        (0.8..1.2).contains(&noisy.chi_squared),
+        "{}",
+        noisy.chi_squared
+    );
+    assert!(noisy.inflation < 1.2);
+    assert!(noisy.simulations <= 2 * 20 + 2 * 4);
+    assert_eq!(noisy.series.len(), 4);
+    assert!(
+        noisy
+            .series
+            .iter()
+            .all(|s| (s.rms / NOISE - 1.0).abs() < 0.2)
+    );
+    // About the best point the misfit is the parabola that its curvature says, to what is known of a logarithm's.
+    for p in &noisy.weak[0].profile {
+        let rise = p.rise.expect("it can be simulated");
+        assert!((rise / p.expected - 1.0).abs() < 0.3, "{p:?}");
+    }
+    let named = noisy.value("water.linear.wx").unwrap();
+    let parameters = noisy.parameters(&vehicle(0.1)).unwrap();
+    assert_eq!(parameters.get("water.linear.wx").unwrap(), named);
+}
+
+/// The zero of a joint, a coordinate of the start that all runs share, to 1e-6; the parameter beside it as before.
+#[test]
+fn a_joints_zero_is_recovered() {
+    let zero = Unknown::new("zero")
+        .sets_start("mount.angle", 1.0)
+        .start(-0.1);
+    let both = [zero, Unknown::new(NAMES[3]).positive().start(0.3)];
+    let settings = IdentifySettings::default();
+    let go = |_: &_| ControlFlow::Continue(());
+    let made = identify(&experiments(0.0, 7), &both, &settings, go).unwrap();
+    assert!(
+        (made.unknowns[0].value - ZERO).abs() < 1e-6,
+        "{:?}",
+        made.unknowns[0]
+    );
+    assert!((made.unknowns[1].value - DAMPING[1]).abs() < 1e-6);
+    assert_eq!(made.unknowns[0].starts, [("mount.angle".to_string(), 1.0)]);
+    let driven = [Unknown::new("arm").sets_start("arm.angle", 1.0)];
+    let error = identify(&experiments(0.0, 7), &driven, &settings, go).unwrap_err();
+    says(error, &["arm.angle", "driven by a motion"]);
+}
+
+/// Where nothing of what is recorded depends on an unknown, it stays where it was, its error is infinite or the prior's, and the direction says so.
+#[test]
+fn what_nothing_tells_is_said() {
+    let yaw = "water.linear.wz";
+    let experiments = &experiments(NOISE, 3)[..1];
+    // Yaw is all but unseen in roll and pitch: without recordings of it only the prior knows it.
+    let known = [Unknown::new(NAMES[0]), Unknown::new(yaw).prior(0.06, 0.03)];
+    let settings = IdentifySettings::default();
+    let go = |_: &_| ControlFlow::Continue(());
+    let made = identify(experiments, &known, &settings, go).unwrap();
+    assert!(
+        made.unknowns[1].of_prior.is_some_and(|part| part > 0.5),
+        "{made:?}"
+    );
+    // A parameter that acts on nothing.
+    let nothing = [
+        Unknown::new(NAMES[0]),
+        Unknown::new("contact.friction").start(0.3),
+    ];
+    let made = identify(experiments, &nothing, &settings, go).unwrap();
+    assert!((made.unknowns[1].value - 0.3).abs() < 1e-9);
+    assert!(made.unknowns[1].standard_error.is_infinite());
+    assert!(made.unknowns[0].standard_error < 1e-3);
+    assert!(made.weak[0].deviation.is_infinite() && made.weak[0].profile.is_empty());
+}
+
+/// An initial velocity that isn't what was said, found with the rest; values far off that a loss forgives.
+#[test]
+fn starts_and_outliers() {
+    let mut runs = experiments(NOISE, 4);
+    let truth = vehicle(0.4);
+    let mut off = truth.clone();
+    let (q, v) = truth.start();
+    let mut moved = v.clone();
+    moved[3] += 0.1;
+    off.set_start(q.clone(), moved).unwrap();
+    let controls = Controls::zeros(&off, STEPS);
+    let rollout = truth.rollout(&controls).unwrap();
+    let attitudes = rollout.observe("attitudes").unwrap();
+    let mut run = Experiment::new("pushed", off, controls).start_within(0.0, 0.2);
+    for entry in [0, 1, 2] {
+        let states: Vec<usize> = (1..=STEPS).collect();
+        // Every fifteenth reading of the pitch is nonsense.
+        let wrong = |n: usize| f64::from(u8::from(entry == 1 && n % 15 == 0));
+        run = run.saw(Recorded {
+            observable: "attitudes".into(),
+            entry,
+            values: states
+                .iter()
+                .map(|n| attitudes[(entry, *n)] + wrong(*n))
+                .collect(),
+            states,
+            deviation: NOISE,
+        });
+    }
+    runs.push(run);
+    let settings = IdentifySettings {
+        loss: Loss::Cauchy(3.0),
+        ..IdentifySettings::default()
+    };
+    let robust = found(&runs, &settings);
+    let v = DVector::from_vec(robust.starts[2].1.clone());
+    let truth_v = truth.start().1;
+    assert!((v.rows(3, 3) - truth_v.rows(3, 3)).norm() < 5e-3, "{v}");
+    for (u, truth) in robust.unknowns.iter().zip(self::truth()) {
+        let error = u.standard_error;
+        assert!(
+            (u.value - truth).abs() < 5.0 * error,
+            "{} {} {error}",
+            u.name,
+            u.value
+        );
+    }
+}
+
+/// A bound that is in the way holds; the search can be ended, and says why it ended.
+#[test]
+fn bounds_and_ends() {
+    let runs = experiments(0.0, 5);
+    let held = [Unknown::new(NAMES[2]).start(0.2).within(0.1, 0.3)];
+    let settings = IdentifySettings::default();
+    let made = identify(&runs, &held, &settings, |_| ControlFlow::Continue(())).unwrap();
+    assert!(made.unknowns[0].at_bound && made.unknowns[0].value == 0.1);
+    assert_eq!(made.unknowns[0].standard_error, 0.0);
+    let made = identify(&runs, &unknowns(), &settings, |p| match p.iteration {
+        1 => ControlFlow::Break(()),
+        _ => ControlFlow::Continue(()),
+    });
+    let made = made.unwrap();
+    assert_eq!((made.stop, made.iterations), (IdentifyStop::Asked, 1));
+}
+
+#[test]
+fn bad_input_is_named() {
+    let runs = experiments(0.0, 6);
+    let settings = IdentifySettings::default();
+    let go = |_: &_| ControlFlow::Continue(());
+    let refused = |runs: &[Experiment], unknowns: &[Unknown], said: &[&str]| {
+        says(identify(runs, unknowns, &settings, go).unwrap_err(), said);
+    };
+    let good = [Unknown::new(NAMES[0])];
+    refused(&[], &good, &["experiments", "none"]);
+    refused(&runs, &[], &["unknowns", "none"]);
+    refused(&runs, &[Unknown::new("hull.colour")], &["hull.colour"]);
+    let twice = [
+        Unknown::new(NAMES[0]),
+        Unknown::new("z").sets(NAMES[0], 2.0),
+    ];
+    refused(&runs, &twice, &["another unknown"]);
+    let below = [Unknown::new(NAMES[2]).positive().start(-1.0)];
+    refused(&runs, &below, &["water.linear.wx", "positive"]);
+    let outside = [Unknown::new(NAMES[0]).start(1.0).within(-1.0, 0.5)];
+    refused(&runs, &outside, &["bounds"]);
+    let sure = [Unknown::new(NAMES[0]).prior(0.0, 0.0)];
+    refused(&runs, &sure, &["deviation"]);
+    let simulator = vehicle(0.2);
+    let controls = Controls::zeros(&simulator, STEPS);
+    let bare = Experiment::new("bare", simulator, controls);
+    refused(std::slice::from_ref(&bare), &good, &["bare", "saw"]);
+    let seen = |observable: &str, entry, state, value, deviation| Recorded {
+        observable: observable.into(),
+        entry,
+        states: vec![state],
+        values: vec![value],
+        deviation,
+    };
+    for (recorded, said) in [
+        (seen("colour", 0, 1, 0.0, 1.0), "colour"),
+        (seen("rotations", 0, 1, 0.0, 1.0), "attitudes"),
+        (seen("attitudes", 9, 1, 0.0, 1.0), "under 9"),
+        (seen("attitudes", 1, 151, 0.0, 1.0), "at most 150"),
+        (seen("attitudes", 1, 1, f64::NAN, 1.0), "finite"),
+        (seen("attitudes", 1, 1, 0.0, 0.0), "deviation"),
+    ] {
+        refused(&[bare.clone().saw(recorded)], &good, &[said]);
+    }
+    let settings = IdentifySettings {
+        loss: Loss::Huber(-1.0),
+        ..settings
+    };
+    says(
+        identify(&runs, &good, &settings, go).unwrap_err(),
+        &["loss"],
+    );
+}

@@ -1145,6 +1145,16 @@ class Experiment:
         states: Sequence[int] | None = None,
     ) -> None:
         """."""
+    def saw_function(
+        self,
+        observables: Sequence[str],
+        function: Callable[[dict[str, _Array]], ArrayLike],
+        *,
+        states: Sequence[int] | None = None,
+    ) -> None:
+        """."""
+    def scaled(self, parameter: str, factor: float) -> None:
+        """."""
     @property
     def name(self) -> str:
         """Its name."""

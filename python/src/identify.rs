@@ -7,7 +7,9 @@ use crate::simulator::Simulator;
 use hydrograd::optimize::{self, IdentifyProgress, IdentifySettings, Loss, Recorded};
 use hydrograd::simulate::observable::observable;
 use hydrograd::{Controls, Error};
+use nalgebra::{DMatrix, DVector};
 use pyo3::prelude::*;
+use pyo3::types::PyDict;
 use std::collections::BTreeMap;
 use std::ops::ControlFlow;
 use std::sync::{Arc, Mutex, PoisonError};
@@ -143,6 +145,50 @@ impl Experiment {
             deviation,
         });
         Ok(())
+    }
+
+    /// Adds residuals that are a function of whole `observables` at `states` (default: all), such as amplitudes, phases and mean speeds: `function` gets them as arrays
+    /// (states, …) by name in a dict, and gives differences from what was measured over their deviations, (n,). It must be differentiable, and is differentiated by differences of its own
+    /// along exact tangents of the observables, without a simulation.
+    #[pyo3(signature = (observables, function, *, states=None))]
+    fn saw_function(
+        &self,
+        observables: Vec<String>,
+        function: &Bound<'_, PyAny>,
+        states: Option<Vec<usize>>,
+    ) -> PyResult<()> {
+        let mut inner = self.inner.lock().unwrap_or_else(PoisonError::into_inner);
+        let system = inner.simulator().system();
+        let shapes = observables.iter();
+        let shapes = shapes.map(|name| Ok(observable(name).or_raise()?.shape(system)));
+        let shapes = shapes.collect::<PyResult<Vec<Vec<usize>>>>()?;
+        let states = states.unwrap_or_else(|| (0..=self.steps).collect());
+        let function = function.clone().unbind();
+        let names = observables.clone();
+        let call = move |seen: &[DMatrix<f64>]| {
+            Python::attach(|py| -> PyResult<Vec<f64>> {
+                let given = PyDict::new(py);
+                for ((name, shape), values) in names.iter().zip(&shapes).zip(seen) {
+                    let dims = [&[values.ncols()], &shape[..]].concat();
+                    let values = values.as_slice().to_vec();
+                    given.set_item(name, crate::array::to_python(py, values, &dims)?)?;
+                }
+                floats(&function.bind(py).call1((given,))?)
+            })
+            .map(DVector::from_vec)
+            .map_err(|raised| Error::Controller {
+                source: Box::new(raised),
+            })
+        };
+        let names: Vec<&str> = observables.iter().map(String::as_str).collect();
+        *inner = inner.clone().saw_function(&names, states, call);
+        Ok(())
+    }
+
+    /// Makes a parameter `factor` times what an unknown sets it to, in this experiment: where a law says how it depends on what was done.
+    fn scaled(&self, parameter: &str, factor: f64) {
+        let mut inner = self.inner.lock().unwrap_or_else(PoisonError::into_inner);
+        *inner = inner.clone().scaled(parameter, factor);
     }
 
     /// Its name.

@@ -7,7 +7,7 @@ use hydrograd::optimize::{
 };
 use hydrograd::scene::{Body, Damping, Fluid, Motion, Scene, Shape};
 use hydrograd::{Controls, Fidelity, Joint, Settings, Simulator};
-use nalgebra::DVector;
+use nalgebra::{DMatrix, DVector};
 use std::ops::ControlFlow;
 
 const STEPS: usize = 150;
@@ -172,6 +172,48 @@ fn a_joints_zero_is_recovered() {
     let driven = [Unknown::new("arm").sets_start("arm.angle", 1.0)];
     let error = identify(&experiments(0.0, 7), &driven, &settings, go).unwrap_err();
     says(error, &["arm.angle", "driven by a motion"]);
+}
+
+/// Residuals of a function of observables, and a law of how a parameter depends on the run: recovered as the numbers themselves.
+#[test]
+fn functions_and_scales() {
+    let unknown = Unknown::new("damping")
+        .sets(NAMES[2], 1.0)
+        .positive()
+        .start(0.4);
+    let settings = IdentifySettings::default();
+    let go = |_: &_| ControlFlow::Continue(());
+    let made = [(0.4, 1.0), (-0.7, 3.0)].map(|(amplitude, scale)| {
+        let mut truth = vehicle(amplitude);
+        let mut parameters = truth.parameters().clone();
+        parameters.set(NAMES[2], scale * DAMPING[0]).unwrap();
+        truth.set_parameters(parameters).unwrap();
+        let controls = Controls::zeros(&truth, STEPS);
+        let attitudes = truth
+            .rollout(&controls)
+            .unwrap()
+            .observe("attitudes")
+            .unwrap();
+        // The energy of roll over the run, and its largest value as a smooth mean.
+        let of = |a: &DMatrix<f64>| {
+            let roll = a.row(0).into_owned();
+            let power: f64 = roll.iter().map(|x| x.powi(8)).sum();
+            DVector::from_vec(vec![roll.norm(), power.powf(0.125)])
+        };
+        let seen = of(&attitudes);
+        let experiment = Experiment::new("run", vehicle(amplitude), controls);
+        let states = (0..=STEPS).collect();
+        experiment
+            .scaled(NAMES[2], scale)
+            .saw_function(&["attitudes"], states, move |a| {
+                Ok((of(&a[0]) - &seen) / NOISE)
+            })
+    });
+    let found = identify(&made, &[unknown], &settings, go).unwrap();
+    assert!(
+        (found.unknowns[0].value / DAMPING[0] - 1.0).abs() < 1e-6,
+        "{found:?}"
+    );
 }
 
 /// Where nothing of what is recorded depends on an unknown, it stays where it was, its error is infinite or the prior's, and the direction says so.

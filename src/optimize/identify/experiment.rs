@@ -3,8 +3,10 @@
 use crate::simulate::observable::{differentiable, observable};
 use crate::simulate::{Controls, Rollout, Simulator};
 use crate::{Error, Result};
-use nalgebra::DVector;
+use nalgebra::{DMatrix, DVector};
+use std::collections::BTreeMap;
 use std::f64::consts::TAU;
+use std::sync::Arc;
 
 /// Observables that are angles: differences of theirs are taken the shorter way.
 const ANGLES: [&str; 2] = ["attitudes", "site_attitudes"];
@@ -24,6 +26,39 @@ pub struct Recorded {
     pub deviation: f64,
 }
 
+/// Residuals as a function of observables, entries × states each: differences over deviations.
+type Function = dyn Fn(&[DMatrix<f64>]) -> Result<DVector<f64>> + Send + Sync;
+
+/// Residuals that aren't entries of observables themselves.
+#[derive(Clone)]
+pub(super) struct Derived {
+    pub observables: Vec<String>,
+    pub states: Vec<usize>,
+    pub function: Arc<Function>,
+}
+
+impl Derived {
+    /// What the function sees of a rollout.
+    pub fn seen(&self, rollout: &Rollout) -> Result<Vec<DMatrix<f64>>> {
+        let each = self.observables.iter();
+        each.map(|name| Ok(rollout.observe(name)?.select_columns(&self.states)))
+            .collect()
+    }
+
+    /// Residuals.
+    pub fn value(&self, seen: &[DMatrix<f64>]) -> Result<DVector<f64>> {
+        let found = (self.function)(seen)?;
+        match found.iter().position(|x| !x.is_finite()) {
+            None => Ok(found),
+            Some(i) => Err(Error::input(
+                format!("residual {i} of a function of {:?}", self.observables),
+                found[i],
+                "must be finite",
+            )),
+        }
+    }
+}
+
 /// A recording: what was done, and what was seen.
 #[derive(Clone)]
 pub struct Experiment {
@@ -33,6 +68,9 @@ pub struct Experiment {
     pub(super) recorded: Vec<Recorded>,
     /// Deviations of the initial coordinates and velocity, where they are unknown.
     pub(super) start: Option<[f64; 2]>,
+    pub(super) derived: Vec<Derived>,
+    /// What parameters are here of what unknowns set them to.
+    pub(super) scales: BTreeMap<String, f64>,
 }
 
 impl Experiment {
@@ -44,12 +82,36 @@ impl Experiment {
             controls,
             recorded: Vec::new(),
             start: None,
+            derived: Vec::new(),
+            scales: BTreeMap::new(),
         }
     }
 
     /// Adds what was seen.
     pub fn saw(mut self, recorded: Recorded) -> Self {
         self.recorded.push(recorded);
+        self
+    }
+
+    /// Adds residuals that are a function of whole observables at some states (amplitudes, phases, mean speeds): `function` gets each as entries × states, in the order of the names, and gives
+    /// differences from what was measured, over their deviations. It must be differentiable: it is differentiated by differences of its own, along exact tangents of the observables.
+    pub fn saw_function(
+        mut self,
+        observables: &[&str],
+        states: Vec<usize>,
+        function: impl Fn(&[DMatrix<f64>]) -> Result<DVector<f64>> + Send + Sync + 'static,
+    ) -> Self {
+        self.derived.push(Derived {
+            observables: observables.iter().map(|name| (*name).to_string()).collect(),
+            states,
+            function: Arc::new(function),
+        });
+        self
+    }
+
+    /// Makes a parameter `factor` times what an unknown sets it to, in this experiment: where a law says how it depends on what was done.
+    pub fn scaled(mut self, parameter: impl Into<String>, factor: f64) -> Self {
+        self.scales.insert(parameter.into(), factor);
         self
     }
 
@@ -69,7 +131,7 @@ impl Experiment {
         &self.simulator
     }
 
-    /// Number of residuals.
+    /// Number of residuals that are entries of observables.
     pub(super) fn residuals(&self) -> usize {
         self.recorded.iter().map(|r| r.states.len()).sum()
     }
@@ -77,7 +139,7 @@ impl Experiment {
     /// Refuses what doesn't fit.
     pub(super) fn check(&self) -> Result<()> {
         let place = |of: &str| format!("experiment {:?}: {of}", self.name);
-        if self.residuals() == 0 {
+        if self.residuals() == 0 && self.derived.is_empty() {
             let remedy = "add what was seen (`saw`)";
             return Err(Error::input(place("recorded"), "nothing", remedy));
         }
@@ -88,6 +150,39 @@ impl Experiment {
             }
         }
         let steps = self.controls.steps();
+        for (name, factor) in &self.scales {
+            self.simulator.parameters().get(name)?;
+            if !factor.is_finite() {
+                return Err(Error::input(
+                    place(&format!("scale of {name:?}")),
+                    factor,
+                    "must be finite",
+                ));
+            }
+        }
+        for of in &self.derived {
+            let place = |field: &str| place(&format!("function of {:?}: {field}", of.observables));
+            for name in &of.observables {
+                let entries = differentiable(name)?.tangents(self.simulator.system());
+                let values = observable(name)?.shape(self.simulator.system());
+                if values.iter().product::<usize>() != entries {
+                    let remedy = "its entries have no tangents of their own: take \"positions\" and \"attitudes\"";
+                    return Err(Error::input(
+                        place("observable"),
+                        format!("{name:?}"),
+                        remedy,
+                    ));
+                }
+            }
+            if let Some(n) = of.states.iter().find(|n| **n > steps) {
+                let remedy = format!("must be at most {steps}, the last state");
+                return Err(Error::input(place("states"), n, remedy));
+            }
+            if of.states.is_empty() || of.observables.is_empty() {
+                let remedy = "give at least one state and one observable";
+                return Err(Error::input(place("states"), "none", remedy));
+            }
+        }
         for r in &self.recorded {
             let place = |field: &str| place(&format!("{:?}: {field}", r.observable));
             let system = self.simulator.system();
@@ -139,6 +234,9 @@ impl Experiment {
                 }
                 out.push(off / r.deviation);
             }
+        }
+        for of in &self.derived {
+            out.extend(of.value(&of.seen(rollout)?)?.iter());
         }
         Ok(out.into())
     }

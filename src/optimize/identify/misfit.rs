@@ -184,6 +184,14 @@ impl<'a> Misfit<'a> {
         Some(out)
     }
 
+    /// What a parameter is in an experiment of what an unknown sets it to.
+    fn scale(&self, k: usize, target: &Target) -> f64 {
+        match target {
+            Target::Parameter(name) => *self.experiments[k].scales.get(name).unwrap_or(&1.0),
+            Target::Start(_) => 1.0,
+        }
+    }
+
     fn place(&self, k: usize) -> String {
         format!("experiment {:?}", self.experiments[k].name)
     }
@@ -195,7 +203,8 @@ impl<'a> Misfit<'a> {
         for (unknown, x) in self.unknowns.iter().zip(x.iter()) {
             for (target, factor) in &unknown.sets {
                 if let Target::Parameter(name) = target {
-                    parameters.set(name, factor * unknown.value(*x))?;
+                    let own = self.scale(k, target);
+                    parameters.set(name, own * factor * unknown.value(*x))?;
                 }
             }
         }
@@ -292,14 +301,16 @@ impl<'a> Misfit<'a> {
             initial_v: start.is_some_and(|s| s.deviations[1] > 0.0),
             ..Variables::default()
         };
-        let made = match self.experiments[k].residuals() < self.coordinates {
+        let few = self.experiments[k].derived.is_empty()
+            && self.experiments[k].residuals() < self.coordinates;
+        let made = match few {
             true => self.by_reverse(k, &at.rollouts[k], &variables)?,
             false => self.by_forward(k, &at.rollouts[k], &variables)?,
         };
         let mut out = DMatrix::zeros(made.nrows(), self.coordinates);
         for (i, unknown) in self.unknowns.iter().enumerate() {
             for (target, factor) in &unknown.sets {
-                let by = factor * unknown.slope(at.x[i]);
+                let by = self.scale(k, target) * factor * unknown.slope(at.x[i]);
                 let column = match target.coordinate(simulator)? {
                     Some((_, v)) => parameters.len() + v,
                     None => {
@@ -338,14 +349,48 @@ impl<'a> Misfit<'a> {
 
     /// By `variables`, a run for all of them.
     fn by_forward(&self, k: usize, rollout: &Rollout, by: &Variables) -> Result<DMatrix<f64>> {
-        let recorded = &self.experiments[k].recorded;
-        let states: BTreeSet<usize> = recorded.iter().flat_map(|r| &r.states).copied().collect();
+        let Experiment {
+            recorded, derived, ..
+        } = &self.experiments[k];
+        let of_derived = derived.iter().flat_map(|d| &d.states);
+        let states: BTreeSet<usize> = (recorded.iter().flat_map(|r| &r.states))
+            .chain(of_derived)
+            .copied()
+            .collect();
         let states: Vec<usize> = states.into_iter().collect();
-        let names: BTreeSet<&str> = recorded.iter().map(|r| r.observable.as_str()).collect();
+        let of_derived = derived.iter().flat_map(|d| &d.observables);
+        let names: BTreeSet<&str> = (recorded.iter().map(|r| &r.observable))
+            .chain(of_derived)
+            .map(String::as_str)
+            .collect();
         let names: Vec<&str> = names.into_iter().collect();
         let made = rollout.jacobian(by, &names, &states)?;
         let columns = made.first().map_or(0, DMatrix::ncols);
-        let mut out = DMatrix::zeros(self.experiments[k].residuals(), columns);
+        let mut rows = Vec::new();
+        for of in derived {
+            let seen = of.seen(rollout)?;
+            let along = |column: usize| -> Vec<DMatrix<f64>> {
+                let tangent = |name: &String| {
+                    let made = &made[names.binary_search(&name.as_str()).unwrap_or(0)];
+                    let entries = made.nrows() / states.len();
+                    DMatrix::from_fn(entries, of.states.len(), |i, n| {
+                        let place = states.binary_search(&of.states[n]).unwrap_or(0);
+                        made[(place * entries + i, column)]
+                    })
+                };
+                of.observables.iter().map(tangent).collect()
+            };
+            let columns = (0..columns).map(|c| derivative(of, &seen, &along(c)));
+            let columns = columns.collect::<Result<Vec<_>>>()?;
+            rows.push(DMatrix::from_columns(&columns));
+        }
+        let more: usize = rows.iter().map(DMatrix::nrows).sum();
+        let mut out = DMatrix::zeros(self.experiments[k].residuals() + more, columns);
+        let mut row = self.experiments[k].residuals();
+        for found in rows {
+            out.rows_mut(row, found.nrows()).copy_from(&found);
+            row += found.nrows();
+        }
         let mut row = 0;
         for r in recorded {
             let of = names.binary_search(&r.observable.as_str()).unwrap_or(0);
@@ -388,6 +433,28 @@ impl<'a> Misfit<'a> {
         }
         Ok(DMatrix::from_rows(&rows))
     }
+}
+
+/// Size of the differences by which functions of observables are differentiated, relative: their error is its square.
+const DIFFERENCE: f64 = 1e-5;
+
+/// Derivative of residuals along tangents of what they are a function of.
+fn derivative(
+    of: &super::experiment::Derived,
+    seen: &[DMatrix<f64>],
+    along: &[DMatrix<f64>],
+) -> Result<DVector<f64>> {
+    let size = |all: &[DMatrix<f64>]| all.iter().map(DMatrix::amax).fold(0.0, f64::max);
+    let (at, tangent) = (size(seen), size(along));
+    if tangent == 0.0 {
+        return Ok(DVector::zeros(of.value(seen)?.len()));
+    }
+    let h = DIFFERENCE * at.max(1e-3) / tangent;
+    let moved = |h: f64| {
+        let each: Vec<_> = seen.iter().zip(along).map(|(x, d)| x + h * d).collect();
+        of.value(&each)
+    };
+    Ok((moved(h)? - moved(-h)?) / (2.0 * h))
 }
 
 /// Generalised velocities that nothing drives.

@@ -321,6 +321,23 @@ pub(super) fn report(
                 autocorrelation: own,
             });
         }
+        if !experiment.derived.is_empty() {
+            let r = &r.as_slice()[from..];
+            let square: f64 = r.iter().map(|x| x * x).sum();
+            squares += square;
+            count += r.len();
+            let names = experiment
+                .derived
+                .iter()
+                .flat_map(|d| d.observables.clone());
+            series.push(SeriesFit {
+                experiment: experiment.name.clone(),
+                observable: names.collect::<Vec<_>>().join(", "),
+                label: "function".into(),
+                rms: (square / r.len().max(1) as f64).sqrt(),
+                autocorrelation: 0.0,
+            });
+        }
     }
     let freedom = count
         .saturating_sub(held.iter().filter(|h| !**h).count())

@@ -38,6 +38,8 @@ JOINTS = ("joint5", "joint4", "joint3", "joint2")  # base to wrist
 COLUMNS = ("t", "x", "y", "z", "yaw", "mocap_ok", "imu_roll", "imu_pitch", "gyro_x", "gyro_y", "gyro_z", *JOINTS, "free")
 MAY_LACK = ("x", "y", "z", "yaw")  # where motion capture lost the vehicle
 DEG = math.degrees(1.0)
+ZEROS = ("joint5", "joint4")  # joints whose zero isn't sure
+KNOTS = 0.2  # s between points of a joint's motion
 VEHICLE = "vehicle_frame"
 
 # What is documented of the setup; kg, L, m, N s²/m² along the link's axes.
@@ -74,7 +76,10 @@ def unknowns():
         hg.optimize.Unknown(f"{place}.x", prior=(CENTER[0], 1.0 / lift)),
         hg.optimize.Unknown(f"{place}.y", prior=(CENTER[1], 1.0 / lift)),
         hg.optimize.Unknown(f"{place}.z", prior=(CENTER[2], 2.0 / lift)),
-        hg.optimize.Unknown("zero of joint5", sets_start={"r5m_joint5 zero.angle": 1.0}, prior=(0.0, 0.05)),
+        *(
+            hg.optimize.Unknown(f"zero of {joint}", sets_start={f"r5m_{joint} zero.angle": 1.0}, prior=(0.0, 0.05))
+            for joint in ZEROS
+        ),
         hg.optimize.Unknown(f"{VEHICLE}.inertia.xx", prior=(INERTIA[0], 0.2), within=(0.05, 3.0)),
         hg.optimize.Unknown(f"{VEHICLE}.inertia.yy", prior=(INERTIA[1], 0.2), within=(0.05, 3.0)),
         hg.optimize.Unknown("water.linear.wx", prior=(LINEAR[3], 0.2), within=(0.0, 5.0)),
@@ -195,10 +200,20 @@ def quaternion(r):
     return np.array([w, *(np.array([r[2, 1] - r[1, 2], r[0, 2] - r[2, 0], r[1, 0] - r[0, 1]]) / (4.0 * w))])
 
 
+def motion(run, joint):
+    """A joint's motion through points that parabolas through 0.4 s of the recording say: its own noise would be acceleration."""
+    t, x = run.columns["t"] - run.columns["t"][0], run.columns[joint]
+    times = np.linspace(0.0, t[-1], max(2, round(t[-1] / KNOTS) + 1))
+    values = []
+    for at in times:
+        near = np.abs(t - at) < 1.01 * KNOTS
+        values.append(np.polynomial.Polynomial.fit(t[near] - at, x[near], min(2, near.sum() - 1))(0.0))
+    return hg.Motion.spline(times, values)
+
+
 def scene_of(run, urdf, fluid=None, box=False):
     """The vehicle with the joints driven as they were. With `box` the vehicle is the box of its outer sizes, whose water is computed, and feels the arm's."""
-    start = run.columns["t"][0]
-    motions = {f"r5m_{name}": hg.Motion.spline(run.columns["t"] - start, run.columns[name]) for name in JOINTS}
+    motions = {f"r5m_{name}": motion(run, name) for name in JOINTS}
     scene = hg.Scene(fluid or hg.Fluid(density=DENSITY), gravity=(0.0, 0.0, -GRAVITY), time_step=STEP, steps=run.steps)
     added = np.zeros((6, 6))
     added[:3, :3] = np.diag(ADDED) / DENSITY
@@ -233,7 +248,7 @@ def scene_of(run, urdf, fluid=None, box=False):
         limits=False,
         actuated=False,
         motions=motions,
-        zeros={"r5m_joint5": 0.0},
+        zeros={f"r5m_{joint}": 0.0 for joint in ZEROS},
         links=links,
     )
     for name, (*_, drag) in LINKS.items():
@@ -400,6 +415,7 @@ TRUTH = {  # in the order of the unknowns
     f"{VEHICLE}.center_of_buoyancy.y": -0.004,
     f"{VEHICLE}.center_of_buoyancy.z": 0.027,
     "zero of joint5": 0.05,
+    "zero of joint4": -0.03,
     f"{VEHICLE}.inertia.xx": 0.55,
     f"{VEHICLE}.inertia.yy": 0.75,
     "water.linear.wx": 0.3,
@@ -448,10 +464,11 @@ def make(path, names, seconds, seed=1):
 
 def truth_of(sim):
     """A simulator with the constants that recordings of our own are made with."""
-    parameters = {name: value for name, value in TRUTH.items() if name != "zero of joint5"}
+    parameters = {name: value for name, value in TRUTH.items() if not name.startswith("zero of ")}
     made = sim.with_parameters(parameters)
     q = np.array(made.initial_q)
-    q[made.coordinate_names.index("r5m_joint5 zero.angle")] = TRUTH["zero of joint5"]
+    for joint in ZEROS:
+        q[made.coordinate_names.index(f"r5m_{joint} zero.angle")] = TRUTH[f"zero of {joint}"]
     return made.with_start(q, made.initial_v)
 
 

@@ -482,6 +482,17 @@ class Scene:
     @overload
     def add_force(
         self,
+        kind: Literal["tendon"],
+        *,
+        arms: Mapping[str, float],
+        stiffness: float,
+        damping: float = 0.0,
+        gain: float = 1.0,
+        name: str | None = None,
+    ) -> None: ...
+    @overload
+    def add_force(
+        self,
         kind: Literal["float"],
         *,
         body: str,

@@ -155,7 +155,8 @@ impl Scene {
     /// the middle of its chord: directions `chord` (toward the leading edge) and `normal`, `length` of the chord (m), `area` (m²), `lift_slope` (1/rad), `drag`
     /// along the chord and `induced_drag` across it, smoothed below `smoothing` (m/s). A "float" at the point `at` of a `body` has a `volume` (m³) and a `mass` (kg),
     /// which is made part of the body's. An "edge" is a trailing edge of a `body` with its middle `at`, and a `span` in m: directions `forward` (to the head) and `normal`, `factor` the part of
-    /// the theory's force, which fades below a speed `smoothing` forward (m/s).
+    /// the theory's force, which fades below a speed `smoothing` forward (m/s). A "tendon" runs over
+    /// the joints of bodies at lever arms, `arms` = {body: m}: on each its arm times the tension k (g u - Σ r q) - c Σ r q̇, with a control u, `stiffness` k (N/m), `damping` c (N s/m) and `gain` g (m).
     #[pyo3(signature = (kind, **fields))]
     fn add_force(
         &mut self,

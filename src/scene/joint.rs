@@ -48,10 +48,15 @@ impl Scene {
         self.bodies.iter().map(Body::velocities).sum()
     }
 
-    /// Number of controls a step takes: those of bodies, then those of thrusters among the forces.
+    /// Number of controls a step takes: those of bodies, then those of thrusters among the forces, then those of tendons.
     pub fn controls(&self) -> usize {
         let of_bodies: usize = self.bodies.iter().map(Body::controls).sum();
-        of_bodies + self.thrusters().count()
+        of_bodies + self.commands()
+    }
+
+    /// How many of these are commands of thrusters and tendons.
+    pub(crate) fn commands(&self) -> usize {
+        self.thrusters().count() + self.tendons().count()
     }
 
     /// Names of the controls, in order: `arm.force.rate` does work on the velocity `arm.rate`, `hull.wrench.fx`, …, `hull.wrench.mz` are a body's wrench, and a
@@ -69,6 +74,7 @@ impl Scene {
             }
         }
         out.extend(self.thrusters().map(|(i, _, _)| self.force_name(i)));
+        out.extend(self.tendons().map(|(i, _, _)| self.force_name(i)));
         out
     }
 

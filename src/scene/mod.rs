@@ -31,7 +31,8 @@ pub(crate) use carriers::Carriers;
 pub use contact::{CollisionPiece, Contact};
 pub(crate) use force::{AXES, least_damping};
 pub use force::{
-    Coefficients, Damping, Edge, Fin, Float, Force, Lubrication, Spring, Thruster, WATER_VISCOSITY,
+    Coefficients, Damping, Edge, Fin, Float, Force, Lubrication, Spring, Tendon, Thruster,
+    WATER_VISCOSITY,
 };
 pub use mimic::Mimic;
 pub use origin::Origin;

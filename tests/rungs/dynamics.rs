@@ -10,7 +10,7 @@ use hydrograd::dynamics::{
 };
 use hydrograd::scene::{
     Body, Damping, Drag, DragPart, Edge, Fin, Float, Fluid, Joint, Mimic, Motion, Passive, Plane,
-    Scene, Shape, Spring, Thruster,
+    Scene, Shape, Spring, Tendon, Thruster,
 };
 use hydrograd::simulate::{Pd, PdAxis};
 use hydrograd::{Controls, Rollout, Settings, Simulator};
@@ -218,6 +218,8 @@ pub fn scene() -> Scene {
     let edge = Edge::new("tail").at([-0.15, 0.02, 0.01]).span(0.2);
     let edge = edge.forward([1.0, 0.1, -0.2]).normal([0.2, 0.0, 1.0]);
     scene.add_force(edge.factor(0.8).smoothing(0.3).into());
+    let tendon = Tendon::new([("weight", 0.3), ("propeller", -0.1)]).stiffness(40.0);
+    scene.add_force(tendon.damping(2.0).gain(0.2).into());
     scene
 }
 

@@ -52,6 +52,8 @@ pub fn rungs() -> Vec<Rung> {
         "dynamics::force::local::Local::jvp" => |c| jvp("edge", c),
         "dynamics::force::local::Local::vjp" => |c| vjp("edge", c),
         "dynamics::force::edge::Edge::inputs_vjp" => |c| vjp("edge", c),
+        "dynamics::force::tendon::Tendons::jvp" => |c| jvp("tendon", c),
+        "dynamics::force::tendon::Tendons::vjp" => |c| vjp("tendon", c),
         "dynamics::force::lubrication::Lubrication::jvp" => |c| jvp("lubrication", c),
         "dynamics::force::lubrication::Lubrication::vjp" => |c| vjp("lubrication", c),
     ]

@@ -16,6 +16,7 @@ mod passive;
 mod rotor;
 mod servo;
 mod spring;
+mod tendon;
 mod thrust;
 mod thruster;
 mod waterline;
@@ -56,6 +57,7 @@ const FORCES: &[Assemble] = &[
     rotor::assemble,
     fin::assemble,
     edge::assemble,
+    tendon::assemble,
 ];
 
 /// What forces are made from.

@@ -6,6 +6,7 @@ mod fin;
 mod float;
 mod lubrication;
 mod spring;
+mod tendon;
 mod thruster;
 
 pub(crate) use damping::{AXES, least_damping};
@@ -15,6 +16,7 @@ pub use fin::Fin;
 pub use float::Float;
 pub use lubrication::{Lubrication, WATER_VISCOSITY};
 pub use spring::Spring;
+pub use tendon::Tendon;
 pub use thruster::Thruster;
 
 use super::{BodyId, Scene};
@@ -39,6 +41,8 @@ pub enum Force {
     Float(Float),
     /// Of a trailing edge.
     Edge(Edge),
+    /// Of a tendon over joints.
+    Tendon(Tendon),
 }
 
 impl Scene {
@@ -57,6 +61,7 @@ impl Scene {
             Force::Fin(fin) => ("fin", &fin.name),
             Force::Float(float) => ("float", &float.name),
             Force::Edge(edge) => ("edge", &edge.name),
+            Force::Tendon(tendon) => ("tendon", &tendon.name),
         };
         let counted = || format!("{kind} {}", index + 1);
         name.clone().unwrap_or_else(counted)
@@ -101,6 +106,7 @@ impl Scene {
                 }
                 Force::Float(float) => float.check(self, &place)?,
                 Force::Edge(edge) => edge.check(self, &place)?,
+                Force::Tendon(tendon) => tendon.check(self, &place)?,
             }
         }
         Ok(())

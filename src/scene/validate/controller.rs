@@ -6,9 +6,9 @@ use crate::{Error, Result};
 
 impl Scene {
     pub(super) fn check_controller(&self) -> Result<()> {
-        let thrusters = self.thrusters().count();
-        let counted = |field: &str, values: &[f64], thrusters: usize| {
-            let controls = self.controls() - self.thrusters().count() + thrusters;
+        let commands = self.commands();
+        let counted = |field: &str, values: &[f64], commands: usize| {
+            let controls = self.controls() - self.commands() + commands;
             finite(&format!("controller.{field}"), values)?;
             if values.len() == controls {
                 return Ok(());
@@ -17,8 +17,13 @@ impl Scene {
             let mut parts: Vec<_> = parts
                 .map(|b| format!("{:?} {}", b.name, b.controls()))
                 .collect();
-            if thrusters > 0 {
-                parts.push(format!("thrusters {thrusters}"));
+            if commands > 0 {
+                let of = [
+                    ("thrusters", self.thrusters().count()),
+                    ("tendons", self.tendons().count()),
+                ];
+                let some = of.iter().filter(|(_, n)| *n > 0);
+                parts.extend(some.map(|(what, n)| format!("{what} {n}")));
             }
             Err(Error::input(
                 format!("controller.{field}"),
@@ -33,7 +38,7 @@ impl Scene {
                 ),
             ))
         };
-        let count = |field: &str, values: &[f64]| counted(field, values, thrusters);
+        let count = |field: &str, values: &[f64]| counted(field, values, commands);
         match &self.controller {
             None => Ok(()),
             Some(Controller::Constant { control }) => count("control", control),

@@ -1,17 +1,21 @@
 """A vehicle with an arm holds its place and its hand before a wall, in a current that nobody told it.
 
-The vehicle of examples/rov.urdf, of a BlueROV2's size, faces a rigid wall half a metre before it. Eight thrusters drive
-it, four level ones at 45° and four upright ones, by up to 40 N each, and three motors the arm. It starts 0.3 m away from
-its station and turned by 0.4 rad, comes there, and keeps its place and heading, and its fingertip 0.1 m from the wall. A
-current runs along the wall and turns halfway. Vehicle, arm and wall feel each other through the water (`reduced`).
+The vehicle of examples/rov.urdf, of a BlueROV2's size, faces a rigid wall 0.6 m before its middle. Eight thrusters
+drive it, four level ones at 45° and four upright ones, by up to 40 N each, which lags 0.15 s behind the commands; three
+motors move the arm. It starts 0.3 m away from its station and turned by 0.4 rad, comes there, and keeps its place and
+heading, and its fingertip 0.11 m from the wall. A current runs along the wall, and is another one from the middle of
+the run on, all at once. Vehicle, arm and wall feel each other through the water (`reduced`), in the plans too.
 
-Three controllers, each at 50 Hz, do the same task, by the same measurements of the whole state, which have no noise:
+Three controllers do it, each at 50 Hz. All are told the whole state, without noise:
 
-- pid: PIDs of place and attitude, allotted to the thrusters by the pseudo-inverse of `sim.allocation`, cut off at 40 N,
-  PIDs of the joints, and a PI of the fingertip by the transpose of the arm's Jacobian. Its gains were tuned on this run;
-- mpc: model-predictive control (`hg.optimize.Mpc`) of thrusters and arm at once, with the limits in the plan. Its model
-  is in still water, drags less and has a longer time step than the plant;
-- mpc, learning: the same, which every half a second fits the current of its model to how the vehicle has moved.
+- pid: PIDs of place and attitude, allotted to the thrusters by the pseudo-inverse of `sim.allocation` and cut off at
+  40 N; PIDs of the joints, and one of the fingertip by the transpose of the arm's Jacobian. Their gains were tuned by
+  a search on this very run, for the cost of the plans and for what is off while holding;
+- mpc: model-predictive control (`hg.optimize.Mpc`) of thrusters and arm at once, with the limits in the plan. It
+  plans 1.2 s ahead, ten times a second, with a model in still water that drags less and makes longer time steps;
+- mpc, learning: the same, which every tenth of a second fits the current of its model to how the vehicle has moved.
+
+MEASURED
 
     python examples/rov.py [--seconds S] [--out FILE] [--json] [--quick]
 """
@@ -34,14 +38,16 @@ from hydrograd import cost
 
 URDF = pathlib.Path(__file__).parent / "rov.urdf"
 # Time steps of plant and model, s; the plant's steps in a piece, after which one learns.
-STEP, MODEL_STEP, PIECE = 0.02, 0.1, 10
-# The wall's distance from the station, m, and the currents before and after half of the run, m/s.
+STEP, MODEL_STEP, PIECE = 0.02, 0.05, 5
+# The wall's distance from the station, m, the currents before and after half of the run, m/s, and coefficients of drag.
 WALL = 0.6
 CURRENTS = (0.0, 0.25, 0.0), (0.0, -0.2, 0.1)
 DRAG, MODEL_DRAG = 1.2, 1.0
 # Place (m), heading (rad) and posture (shoulder and elbow, rad) of the start; the station is at the origin.
 START, HEADING, POSTURE = (-0.25, 0.15, 0.1), 0.4, (0.9, -0.9)
 THRUST, TORQUE, LAG = 40.0, 9.0, 0.15  # N, N m, s
+# kg m². A rotor on the world is a lag whatever its inertia; a large one leaves steps in one piece.
+ROTOR = (30.0, 30.0, 30.0)
 # Where thrusters push, m, and whither.
 DIAGONAL = math.sqrt(0.5)
 THRUSTERS = [((0.156 * x, 0.111 * y, 0.0), (DIAGONAL * x, -DIAGONAL * y, 0.0)) for x in (1, -1) for y in (-1, 1)]
@@ -49,19 +55,20 @@ THRUSTERS += [((0.12 * x, 0.218 * y, 0.0), (0.0, 0.0, 1.0)) for x in (1, -1) for
 TIP = np.array([0.06, 0.0, 0.0])  # in the hand's frame, m
 # What damps the vehicle beside the drag of its surface: along and about its axes.
 LINEAR, QUADRATIC = (4.0, 6.2, 5.2, 0.07, 0.07, 0.07), (9.0, 11.0, 18.0, 1.5, 1.5, 1.5)
-REACH = 0.05  # m
+REACH = 0.05  # m: what the PID of the fingertip sees of an error
 # Stiffness, damping and integral gain of the PIDs, for 1 m or 1 rad.
-GAINS = (250.0, 160.0, 200.0), (6.0, 3.0, 5.0), (3.0, 0.3, 3.0), (20.0, 0.0, 20.0)
+GAINS = (950.0, 240.0, 640.0), (120.0, 14.4, 0.1), (0.0, 0.04, 20.0), (476.0, 16.0, 2500.0)
 # Weights of the plans, per second; what counts once at a plan's end is END times that.
-WEIGHTS = {"place": 300.0, "attitude": 30.0, "hand": 600.0, "speed": 3.0, "posture": 1.0, "thrust": 5e-4, "torque": 5e-3}
+WEIGHTS = {"place": 300.0, "attitude": 30.0, "hand": 600.0, "speed": 0.3, "posture": 1.0, "thrust": 0.8, "torque": 5e-3}
 END = 1.0
-HORIZON = {"knots": 12, "hold": 1, "every": 1, "iterations": 1, "first_iterations": 10}
-PROBE = 0.02  # m/s
+HORIZON = {"knots": 24, "every": 2, "iterations": 1, "first_iterations": 10}
+# By how much the learner's models differ in their current, and what change of it is worth a new model, m/s.
+PROBE, WORTH = 0.02, 2e-3
 SETTLED = 2.5  # s: by then it should be there
 
 
 def scene_of(current, drag):
-    """The vehicle before the wall in a current, m/s, with a coefficient of drag."""
+    """The vehicle before the wall in a current, m/s, with a coefficient of drag; the wrist doesn't turn."""
     scene = hg.Scene(hg.Fluid(current=current), gravity=(0.0, 0.0, -9.81))
     scene.add_wall((WALL, 0.0, 0.0), (-1.0, 0.0, 0.0))
     scene.add_robot(
@@ -75,12 +82,20 @@ def scene_of(current, drag):
         # The arm's base sits in a corner of the vehicle and moves no water of its own.
         links={"arm_base": {"shape": "none", "volume": 1.6965e-4, "center_of_buoyancy": (0.0, 0.0, -0.03)}},
     )
-    # What turns with a rotor's speed is the thrust, which lags behind its command; a rotor on the world is that lag alone.
+    # Commands are parts of the full thrust, which lags behind them; a rotor on the world is that lag alone.
     for i, (at, direction) in enumerate(THRUSTERS):
         rotor = f"rotor {i + 1}"
-        scene.add(hg.Body(name=rotor, mass=0.01, inertia=(1e-4, 1e-4, 1e-4), joint=hg.revolute((1.0, 0.0, 0.0))))
-        thruster = {"body": "vehicle", "at": at, "direction": direction, "polynomial": (1.0,), "name": f"thruster {i + 1}"}
-        scene.add_force("thruster", **thruster, rotor=rotor, time_constant=LAG)
+        scene.add(hg.Body(name=rotor, mass=1.0, inertia=ROTOR, joint=hg.revolute((1.0, 0.0, 0.0))))
+        scene.add_force(
+            "thruster",
+            body="vehicle",
+            at=at,
+            direction=direction,
+            polynomial=(THRUST,),
+            rotor=rotor,
+            time_constant=LAG,
+            name=f"thruster {i + 1}",
+        )
     scene.add_force("damping", body="vehicle", linear=LINEAR, quadratic=QUADRATIC)
     return scene
 
@@ -95,11 +110,11 @@ class Robot:
 
     def __init__(self, sim):
         self.sim = sim
-        self.hand = sim.body_names.index("hand")
+        self.vehicle, self.hand = (sim.body_names.index(name) for name in ("vehicle", "hand"))
         self.thrusters = sim.thruster_controls("vehicle")
         self.motors = [i for i in range(sim.control_size) if i not in self.thrusters]
         self.joints = [sim.velocity_names.index(sim.control_names[i].replace(".force", "")) for i in self.motors]
-        self.limits = np.full(sim.control_size, THRUST)
+        self.limits = np.ones(sim.control_size)
         self.limits[self.motors] = TORQUE
         self.goal = self.tips(sim.rollout(steps=0))[0]
 
@@ -143,14 +158,14 @@ class Pid:
         off = robot.sim.difference(seen.q, robot.sim.initial_q)
         equations = robot.sim.equations(seen.q)
         lever = equations.jacobian("hand", TIP)[:3, robot.joints]
-        turn = equations.rotations[0]
+        turn = equations.rotations[robot.vehicle]
         tip = equations.positions[robot.hand] + equations.rotations[robot.hand] @ TIP
         force = self.place.answer(off[:3], seen.v[:3])
         torque = self.attitude.answer(off[3:6], seen.v[3:6])
         # The arm doesn't reach out for a goal that is far away.
         pull = self.reach.answer(np.clip(robot.goal - tip, -REACH, REACH), equations.velocity("hand", seen.v, TIP)[:3])
         wanted = np.empty(robot.sim.control_size)
-        wanted[robot.thrusters] = self.allot @ np.concatenate([turn.T @ force, turn.T @ torque])
+        wanted[robot.thrusters] = self.allot @ np.concatenate([turn.T @ force, turn.T @ torque]) / THRUST
         wanted[robot.motors] = self.posture.answer(off[robot.joints], seen.v[robot.joints]) + lever.T @ pull
         control = np.clip(wanted, -robot.limits, robot.limits)
         if np.array_equal(control, wanted):  # else the integrals would wind up
@@ -167,12 +182,11 @@ class Predictive:
     """Model-predictive control; with `learning` it fits its model's current to every piece of the run."""
 
     def __init__(self, robot, model, learning):
-        self.robot, self.model, self.learning = robot, model, learning
-        self.current = np.zeros(2)  # along the wall: y and z, m/s
-        self.learnt = []
+        self.model, self.learning = model, learning
         limits = {"lower": -robot.limits, "upper": robot.limits}
         self.mpc = hg.optimize.Mpc(model((0.0, 0.0, 0.0), MODEL_STEP), terms(robot), **HORIZON, **limits)
-        self.applied = []
+        self.applied, self.learnt, self.learning_seconds = [], [], []
+        self.assume(np.zeros(2))
 
     @property
     def replans(self):
@@ -183,24 +197,32 @@ class Predictive:
         self.applied.append(control)
         return control
 
+    def assume(self, current):
+        """Takes a current along the wall, y and z, m/s, to be true, and makes models to look beside it."""
+        self.current = current
+        if self.learning:
+            beside = (current, *(current + PROBE * np.eye(2)))
+            self.models = [self.model((0.0, *c), STEP) for c in beside]
+            self.mpc.set_model(self.model((0.0, *current), MODEL_STEP))
+
     def learn(self, rollout, controls):
-        """A step of Gauss and Newton on the velocities that the model, in a current, foresees from each state to the next."""
+        """A step of Gauss and Newton on the velocities that the model foresees from each state to the next."""
         if not self.learning:
             return
-
-        def foreseen(current):
-            sim = self.model((0.0, *current), STEP)
-            states = [sim.state(q, v) for q, v in zip(rollout.q, rollout.v)]
-            return np.concatenate([sim.step(x, u)[0].v[:3] for x, u in zip(states, controls)])
-
-        here = foreseen(self.current)
-        slopes = [(foreseen(self.current + d) - here) / PROBE for d in PROBE * np.eye(2)]
-        residual = rollout.v[1:, :3].ravel() - here
-        change = np.linalg.lstsq(np.array(slopes).T, residual, rcond=None)[0]
-        if np.abs(change).max() > 2e-3:
-            self.current = np.clip(self.current + change, -0.5, 0.5)
-            self.mpc.set_model(self.model((0.0, *self.current), MODEL_STEP))
+        begun = time.perf_counter()
+        here, *beside = (foreseen(model, rollout, controls) for model in self.models)
+        slopes = np.stack([(there - here) / PROBE for there in beside], axis=1)
+        change = np.linalg.lstsq(slopes, rollout.v[1:, :3].ravel() - here, rcond=None)[0]
+        if np.abs(change).max() > WORTH:
+            self.assume(np.clip(self.current + change, -0.5, 0.5))
         self.learnt.append(self.current.tolist())
+        self.learning_seconds.append(time.perf_counter() - begun)
+
+
+def foreseen(model, rollout, controls):
+    """The vehicle's velocities, m/s, that a model foresees one step after each state of a run."""
+    states = [model.state(q, v) for q, v in zip(rollout.q, rollout.v)]
+    return np.concatenate([model.step(state, u)[0].v[:3] for state, u in zip(states, controls)])
 
 
 def terms(robot):
@@ -209,7 +231,8 @@ def terms(robot):
     speeds[:6] = speeds[robot.joints] = WEIGHTS["speed"]
     rest = np.zeros(robot.sim.v_size)
     rest[robot.joints] = WEIGHTS["posture"]
-    efforts = np.where(robot.limits == THRUST, WEIGHTS["thrust"], WEIGHTS["torque"])
+    efforts = np.full(robot.sim.control_size, WEIGHTS["torque"])
+    efforts[robot.thrusters] = WEIGHTS["thrust"]
     goals = []
     for last, factor in ((False, 1.0), (True, END)):
         goals += [
@@ -271,7 +294,7 @@ def measured(controller, robot, history):
     found = {"cost": score(robot, history), "arrived_s": float(t[away[-1] + 1])}
     for name, error in errors.items():
         found[name] = {"rms": float(np.sqrt(np.mean(error[held] ** 2))), "worst": float(error[held].max())}
-    thrusts = np.abs(u[:, robot.thrusters])
+    thrusts = THRUST * np.abs(u[:, robot.thrusters])
     found |= {
         "thrust_rms_N": float(np.sqrt(np.mean(thrusts**2))),
         "thrust_held_rms_N": float(np.sqrt(np.mean(thrusts[held[:-1]] ** 2))),
@@ -291,5 +314,129 @@ def measured(controller, robot, history):
             "planning_Hz": float(1.0 / np.median(seconds)),
         }
     if getattr(controller, "learnt", None):
-        found["currents_learnt"] = controller.learnt
+        half = len(controller.learnt) // 2
+        found |= {
+            "currents_learnt": [controller.learnt[half - 1], controller.learnt[-1]],
+            "learning_ms": float(1e3 * np.median(controller.learning_seconds)),
+            "learning_longest_ms": float(1e3 * np.max(controller.learning_seconds)),
+        }
     return found
+
+
+def compare(pieces, cache, say):
+    """The task by all three: measures and histories."""
+    begun = time.perf_counter()
+    plants = [simulator(current, STEP, DRAG, cache) for current in CURRENTS]
+
+    def model(current, step):
+        return simulator(current, step, MODEL_DRAG, cache)
+
+    robot = Robot(model((0.0, 0.0, 0.0), STEP))
+    say(f"ready after {time.perf_counter() - begun:.1f} s")
+    report, histories = {}, {}
+    for name, make in {
+        "pid": lambda: Pid(robot, GAINS),
+        "mpc": lambda: Predictive(robot, model, False),
+        "mpc, learning": lambda: Predictive(robot, model, True),
+    }.items():
+        begun = time.perf_counter()
+        report[name], histories[name] = run(make(), robot, plants, pieces)
+        report[name]["seconds"] = time.perf_counter() - begun
+        say(f"{name}: {report[name]['seconds']:.1f} s")
+    return report, histories, robot
+
+
+def draw(file, histories, robot):
+    """How far off they are, and how hard thrusters push."""
+    try:
+        from matplotlib.figure import Figure
+    except ImportError:
+        print("no picture: matplotlib isn't installed (pip install matplotlib)", file=sys.stderr)
+        return
+    figure = Figure(figsize=(9, 7), layout="constrained")
+    axes = figure.subplots(4, 1, sharex=True)
+    for name, history in histories.items():
+        t = history["time"]
+        curves = (
+            1e3 * np.linalg.norm(history["off"][:, :3], axis=1),
+            np.degrees(np.abs(history["off"][:, 5])),
+            1e3 * np.linalg.norm(history["tip"] - robot.goal, axis=1),
+        )
+        for axis, curve in zip(axes, curves):
+            axis.semilogy(t, np.maximum(curve, 1e-2), lw=1.0, label=name)
+        axes[3].plot(t[:-1], THRUST * np.abs(history["controls"][:, robot.thrusters]).max(axis=1), lw=1.0)
+    labels = "vehicle off by, mm", "heading off by, °", "fingertip off by, mm", "largest thrust, N"
+    for axis, label in zip(axes, labels):
+        axis.set_ylabel(label)
+        axis.axvline(0.5 * t[-1], color="grey", lw=0.6, ls="--")
+    axes[0].legend(fontsize=8)
+    axes[3].set_xlabel("t, s")
+    figure.savefig(file)
+    print(f"wrote {file}", file=sys.stderr)
+
+
+def tell(report):
+    """For people."""
+    print(f"from {SETTLED} s on, RMS / worst; the current turns in the middle of the run")
+    print(f"{'':40}" + "".join(f"{name:>18}" for name in report))
+    rows = {
+        "vehicle off by, mm": "place_mm",
+        "heading off by, °": "heading_deg",
+        "roll and pitch off by, °": "tilt_deg",
+        "fingertip off by, mm": "hand_mm",
+    }
+    for label, key in rows.items():
+        cells = (f"{r[key]['rms']:.2f} / {r[key]['worst']:.2f}" for r in report.values())
+        print(f"{label:40}" + "".join(f"{cell:>18}" for cell in cells))
+    rows = {
+        "cost of the whole run": "cost",
+        "within 2 cm and 2° after, s": "arrived_s",
+        "thrust, RMS of all commands, N": "thrust_rms_N",
+        "the same while holding, N": "thrust_held_rms_N",
+        "largest thrust commanded, N": "thrust_most_N",
+        "largest torque of the arm, N m": "torque_most_Nm",
+        "fingertip to the wall, least, mm": "hand_to_wall_least_mm",
+        "smallest gap of surfaces, mm": "gap_least_mm",
+        "time for a plan, median, ms": "plan_ms",
+        "the longest, ms": "plan_longest_ms",
+        "plans that could be made a second": "planning_Hz",
+        "time to learn, median, ms": "learning_ms",
+        "the longest to learn, ms": "learning_longest_ms",
+    }
+    for label, key in rows.items():
+        cells = (f"{r[key]:.2f}" if key in r else "–" for r in report.values())
+        print(f"{label:40}" + "".join(f"{cell:>18}" for cell in cells))
+    for current, learnt in zip(CURRENTS, report["mpc, learning"]["currents_learnt"]):
+        said = ", ".join(f"{c:.3f}" for c in learnt)
+        print(f"current along the wall {current[1:]} m/s, learnt with too little drag: ({said})")
+
+
+def main():
+    parser = argparse.ArgumentParser(description=__doc__.split("\n")[0])
+    parser.add_argument("--seconds", type=float, default=12.0, help="length of the run, 5 or more; default: %(default)s")
+    parser.add_argument("--out", default="rov.png", help="picture; default: %(default)s")
+    parser.add_argument("--json", action="store_true", help="one JSON object on standard output")
+    parser.add_argument("--quick", action="store_true", help="5 s")
+    options = parser.parse_args()
+    seconds = 5.0 if options.quick else options.seconds
+    if not 5.0 <= seconds < 1e4:
+        parser.error(f"--seconds: {seconds:g}; at least 5 are wanted")
+
+    def say(line):
+        print(line, file=sys.stderr)
+
+    try:
+        with tempfile.TemporaryDirectory() as cache:
+            report, histories, robot = compare(round(seconds / (STEP * PIECE)), cache, say)
+    except hg.Error as error:
+        print(f"error: {error}", file=sys.stderr)
+        sys.exit(1)
+    draw(options.out, histories, robot)
+    if options.json:
+        print(json.dumps(report))
+    else:
+        tell(report)
+
+
+if __name__ == "__main__":
+    main()

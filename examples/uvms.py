@@ -11,7 +11,8 @@ square of roll and pitch against the inertial unit's:
 
 DATA is a folder of recordings in the form that docs/tank.md describes: `runs/NAME.csv`, a URDF and its meshes. Without one, recordings are made here, with noise, and the truth is known.
 
-    python examples/uvms.py [--data FOLDER] [--train NAME ...] [--json] [--out FILE] [--coupling] [--quick]
+    python examples/uvms.py [--data FOLDER] [--train NAME ...] [--only NAME ...] [--json]
+        [--out FILE] [--coupling] [--quick]
     python examples/uvms.py --make FOLDER
 """
 
@@ -170,10 +171,15 @@ def initial(run):
     }
 
 
-def folder(path):
-    """All recordings of a folder, and its URDF."""
+def folder(path, only=None):
+    """The recordings of a folder, and its URDF."""
     path = pathlib.Path(path)
     files = sorted((path / "runs").glob("*.csv"))
+    if only:
+        missing = sorted(set(only) - {file.stem for file in files})
+        if missing:
+            raise Wrong(f"{path / 'runs'}: no recordings {', '.join(missing)}")
+        files = [file for file in files if file.stem in only]
     if not files:
         raise Wrong(f"{path / 'runs'}: no recordings (*.csv)")
     urdf = path / "blue_rov_hardware_fixedjaw.urdf"
@@ -232,6 +238,8 @@ def scene_of(run, urdf, fluid=None, box=False):
             "volume": volume * 1e-3,
             "center_of_buoyancy": buoyancy,
             "keep": True,
+            # What hides behind the box, or nearly touches others, feels nothing of them.
+            **({"shape": "none"} if box and name in ("r5m_base_link", "r5m_shoulder_link", "r5m_forearm_link") else {}),
         }
     text = pathlib.Path(urdf).read_text()
     for name in ("vehicle_ballast", "vehicle_cans"):
@@ -498,9 +506,9 @@ def draw(file, runs, models):
         run = runs[name]
         t = run.columns["t"] - run.columns["t"][0]
         for k, (panel, angle) in enumerate(zip(row, ("roll", "pitch"))):
-            panel.plot(t, DEG * run.angles()[:, k], color="black", lw=1.2, label="measured")
-            panel.plot(t, DEG * models[name]["dynamic"][:, k], color="tab:red", lw=1.0, label="dynamic")
-            panel.plot(t, DEG * models[name]["equilibrium"][:, k], color="tab:blue", lw=0.8, ls="--", label="equilibrium")
+            panel.plot(t[::5], DEG * run.angles()[::5, k], color="black", lw=1.2, label="measured")
+            panel.plot(t[::5], DEG * models[name]["dynamic"][::5, k], color="tab:red", lw=1.0, label="dynamic")
+            panel.plot(t[::5], DEG * models[name]["equilibrium"][::5, k], color="tab:blue", lw=0.8, ls="--", label="equilibrium")
             panel.set_ylabel(f"{name}: {angle}, °")
     axes[0, 0].legend(fontsize=7)
     for panel in axes[-1]:
@@ -509,10 +517,10 @@ def draw(file, runs, models):
     print(f"wrote {file}", file=sys.stderr)
 
 
-def evaluate(path, train, with_coupling, say, made_here):
+def evaluate(path, train, only, with_coupling, say, made_here):
     """Everything, of one folder."""
     begun = time.perf_counter()
-    runs, urdf = folder(path)
+    runs, urdf = folder(path, only)
     training = [name for name in train if name in runs]
     if not training:
         raise Wrong(f"{path}: none of the training runs is there ({', '.join(train)}); name others by --train")
@@ -567,8 +575,12 @@ def evaluate(path, train, with_coupling, say, made_here):
         "seconds": identified - begun,
     }
     if with_coupling:
-        name = (others or training)[0]
-        report["coupling"] = {"run": name, **coupling(runs[name], urdf, found)}
+        for name in [*others, *training]:
+            try:
+                report["coupling"] = {"run": name, **coupling(runs[name], urdf, found)}
+                break
+            except hg.Error as error:
+                say(f"coupling in {name}: {error}")
     report["seconds"] = time.perf_counter() - begun
     return report, runs, models
 
@@ -613,6 +625,7 @@ def main():
     parser = argparse.ArgumentParser(description=__doc__.split("\n")[0])
     parser.add_argument("--data", type=pathlib.Path, help=f"folder of recordings; default: {DEFAULT.parent.name}/{DEFAULT.name} where that is, else recordings made here")
     parser.add_argument("--train", nargs="+", default=TRAIN, metavar="NAME", help="training runs (%(default)s)")
+    parser.add_argument("--only", nargs="+", metavar="NAME", help="read these runs alone")
     parser.add_argument("--make", type=pathlib.Path, metavar="FOLDER", help="only write recordings made here to a folder")
     parser.add_argument("--coupling", action="store_true", help="say what the coupling of arm and vehicle changes")
     parser.add_argument("--quick", action="store_true", help="short recordings, where they are made here")
@@ -631,13 +644,13 @@ def main():
             return
         path = options.data or (DEFAULT if DEFAULT.is_dir() and not options.quick else None)
         if path:
-            report, runs, models = evaluate(path, options.train, options.coupling, say, False)
+            report, runs, models = evaluate(path, options.train, options.only, options.coupling, say, False)
         else:
             import tempfile
 
             say("no recordings given: made here, with noise")
             with tempfile.TemporaryDirectory() as made:
-                report, runs, models = evaluate(make(made, names, seconds), options.train, options.coupling, say, True)
+                report, runs, models = evaluate(make(made, names, seconds), options.train, options.only, options.coupling, say, True)
     except (Wrong, hg.Error) as error:
         print(f"error: {error}", file=sys.stderr)
         sys.exit(1)

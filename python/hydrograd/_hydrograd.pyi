@@ -383,8 +383,9 @@ class Scene:
     ) -> Robot:
         """Adds the robot of a URDF file: a body for each link that moves, a site for each that doesn't. Choices are the keys of a scene file's [[robot]]: `base` "free"
         or "fixed", `position` (m) and `rotation` (rad) of the root, `prefix` of all names, `package_path` (folders), `shape` "collision", "visual", "hull" or "none",
-        `bad_meshes` "hull" or "refuse", `faces` of hulls, `mimic` "follow" or "independent", `actuated`, `limits`, `drag`, `start` (joint to coordinate), `links` (link to
-        its `shape`, `mass`, `density`, `keep`)."""
+        `bad_meshes` "hull" or "refuse", `faces` of hulls, `mimic` "follow" or "independent", `actuated`, `limits`, `drag`, `start` (joint to coordinate), `motions`
+        (joint to the `Motion` that drives it), `zeros` (joint whose zero isn't sure to its offset, the coordinate of a body "JOINT zero" before it), `links` (link to its `shape`, `mass`, `density`, `keep`, and what `Body` takes: `center_of_mass`, `inertia`, `volume`, `center_of_buoyancy`,
+        `added_mass`)."""
     def to_toml(self) -> str:
         """The scene as TOML text, from which `from_toml` makes an equal one."""
     def add(self, body: Body) -> int:
@@ -505,7 +506,7 @@ class Scene:
         self, name: str, body: _Body, position: ArrayLike | None = None, rotation: ArrayLike | None = None
     ) -> int:
         """Adds a named frame on a `body` (number or name), at `position` (m) and `rotation` (rotation vector, rad) in its frame, and gives its number: rollouts tell
-        "site_positions", "site_rotations" and "site_velocities"."""
+        "site_positions", "site_rotations", "site_attitudes" (roll, pitch, yaw), "site_velocities" and "site_gyros" (rates in own axes)."""
     @property
     def site_names(self) -> list[str]:
         """Names of the sites, in order."""
@@ -1118,7 +1119,9 @@ class Mpc:
 
 @final
 class Unknown:
-    """."""
+    """A number to be found by `identify`: the parameter `name`, or several, `sets` = {parameter: factor}; `sets_start` = {coordinate: factor} sets coordinates of
+    the initial state by their labels ("arm.angle"), in every experiment. The search begins at `start` (default: the prior's mean, or the first experiment's
+    value) and stays `within` (least, largest); `prior` = (mean, deviation) is what was known beforehand. `positive` searches over the logarithm: the prior's deviation is then that of the logarithm."""
     def __new__(
         cls,
         name: str,
@@ -1136,7 +1139,8 @@ class Unknown:
 
 @final
 class Experiment:
-    """."""
+    """A recording for `identify`: a `simulator` that starts as it did, and what was done, `controls` (steps, control_size) or none for so many `steps`. With `start_within` = (q, v) the initial
+    state is unknown, and known beforehand to these deviations (m or rad, m/s or rad/s; 0: exactly). `saw` adds what was seen."""
     def __new__(
         cls,
         name: str,
@@ -1155,7 +1159,8 @@ class Experiment:
         deviation: float,
         states: Sequence[int] | None = None,
     ) -> None:
-        """."""
+        """Adds what was seen of one `entry` of an `observable`, by its number or its label ("hull.pitch"): `values` at `states` (default: at all, the start among them), and the standard
+        `deviation` of the noise. NaN says that nothing was seen."""
     def saw_function(
         self,
         observables: Sequence[str],
@@ -1163,9 +1168,11 @@ class Experiment:
         *,
         states: Sequence[int] | None = None,
     ) -> None:
-        """."""
+        """Adds residuals that are a function of whole `observables` at `states` (default: all), such as amplitudes, phases and mean speeds: `function` gets them as arrays
+        (states, …) by name in a dict, and gives differences from what was measured over their deviations, (n,). It must be differentiable, and is differentiated by differences of its own
+        along exact tangents of the observables, without a simulation."""
     def scaled(self, parameter: str, factor: float) -> None:
-        """."""
+        """Makes a parameter `factor` times what an unknown sets it to, in this experiment: where a law says how it depends on what was done."""
     @property
     def name(self) -> str:
         """Its name."""
@@ -1182,7 +1189,11 @@ def identify(
     profiles: int = 1,
     progress: Callable[[IdentifyProgress], object] | None = None,
 ) -> Identified:
-    """."""
+    """The unknowns that fit the recordings best, by Levenberg and Marquardt on exact Jacobians of rollouts, and how well they are known: an `Identified`.
+
+    `loss`: ("huber", k) or ("cauchy", k) forgives what lies more than k deviations off. It makes `iterations` at most, and ends once one lowers the misfit by less than
+    `cost_tolerance` of itself, or moves no unknown by more than `step_tolerance` standard errors; `damping` is that of the first. Of the `profiles` directions that are known least the
+    misfit is simulated. `progress(p)` is called after every iteration with an `IdentifyProgress`; where it gives True the best so far is what is found. Ctrl-C ends it."""
 def ilqr(
     simulator: Simulator,
     cost: Sequence[CostTerm],

@@ -1,5 +1,6 @@
 """The examples run, small, and show what they say."""
 
+import importlib.util
 import json
 import math
 import pathlib
@@ -89,7 +90,6 @@ def test_the_grasps_cost():
 
 
 def test_system_id(tmp_path):
-    pytest.importorskip("scipy")
     found = json.loads(run("system_id", tmp_path, "--recordings", 1, "--json"))
     fit = found["fit"]
     assert (
@@ -97,9 +97,134 @@ def test_system_id(tmp_path):
         and fit["mass"] == pytest.approx(0.030, rel=0.02)
         and fit["drag"] == pytest.approx(0.4, rel=0.1)
     )
+    assert fit["simulations"] < 20
     assert fit["mass_standard_error"] == pytest.approx(0.143e-3, rel=0.02)
     assert fit["drag_standard_error"] == pytest.approx(0.0093, rel=0.03)
     assert 0.7 < fit["chi_squared"] < 1.3 and fit["correlation"] == pytest.approx(0.98, abs=0.01)
+
+
+TANKS = ROOT.parent / "shared/data"
+
+
+def refused(name, *options):
+    """What an example says of what it can't use."""
+    command = [sys.executable, ROOT / f"examples/{name}.py", *options]
+    done = subprocess.run(list(map(str, command)), capture_output=True, text=True)
+    assert done.returncode == 1
+    return last_line(done.stderr)
+
+
+def test_uvms_on_recordings_of_our_own(tmp_path):
+    found = json.loads(run("uvms", tmp_path, "--quick", "--json"))
+    for u in found["unknowns"]:
+        assert abs(u["value"] - u["truth"]) < 4.0 * u["standard_error"], u
+    dynamic, still, documented = (found[m]["unseen"] for m in ("dynamic", "equilibrium", "documented"))
+    for angle in ("roll", "pitch"):
+        assert dynamic[angle] < 0.1 and dynamic[angle] < 0.7 * still[angle] < documented[angle]
+    assert found["identification"]["simulations"] <= 60
+
+
+def test_uvms_reads_any_folder_of_that_form(tmp_path):
+    command = [sys.executable, ROOT / "examples/uvms.py", "--make", tmp_path / "tank", "--quick"]
+    subprocess.run(list(map(str, command)), check=True, capture_output=True)
+    tank = tmp_path / "tank"
+    assert "made-3" in refused("uvms", "--data", tank, "--only", "made-3")
+    file = tank / "runs/made-1.csv"
+    text = file.read_text()
+    file.write_text(text.replace("imu_roll", "imu_rol", 1))
+    said = refused("uvms", "--data", tank)
+    assert "made-1.csv" in said and "'imu_roll'" in said
+    lines = text.split("\n")
+    lines[7] = lines[7].replace(",", ",x", 1)
+    file.write_text("\n".join(lines))
+    assert "column" in (said := refused("uvms", "--data", tank)) and "line 8" in said
+    file.write_text("\n".join(text.split("\n")[:40]))
+    assert "'free'" in refused("uvms", "--data", tank)
+    file.write_text(text)
+    (tank / "blue_rov_hardware_fixedjaw.urdf").unlink()
+    assert "urdf" in refused("uvms", "--data", tank)
+
+
+@pytest.mark.skipif(not (TANKS / "uvms").is_dir(), reason="the recordings aren't here")
+def test_uvms_in_its_tank(tmp_path):
+    runs = ["006-1", "014-1", "020-0"]
+    found = json.loads(run("uvms", tmp_path, "--data", TANKS / "uvms", "--only", *runs, "--train", *runs[:2], "--json"))
+    dynamic, still = found["dynamic"]["runs"], found["equilibrium"]["runs"]
+    assert dynamic["014-1"]["pitch"] < 0.5 * still["014-1"]["pitch"]
+    assert dynamic["020-0"]["roll"] < 0.6 and dynamic["020-0"]["pitch"] < 0.6
+
+
+def example(name):
+    """An example as a module."""
+    spec = importlib.util.spec_from_file_location(name, ROOT / f"examples/{name}.py")
+    module = importlib.util.module_from_spec(spec)
+    sys.modules[name] = module
+    spec.loader.exec_module(module)
+    return module
+
+
+def slopes(sim, names, observed, h=1e-5):
+    """Derivatives of what is observed by parameters, by central differences, each in parts of the parameter's size."""
+    columns = []
+    for name in names:
+        at = sim.parameters[name]
+        step = h * max(abs(at), 1e-3)
+        ends = [observed(sim.with_parameters({name: at + s * step})) for s in (1.0, -1.0)]
+        columns.append((ends[0] - ends[1]) / (2.0 * step))
+    return np.stack(columns, axis=-1)
+
+
+def test_jacobians_of_both_tanks(tmp_path):
+    """Exact ones against differences, 1e-6 of the largest in each column."""
+    uvms = example("uvms")
+    recordings, urdf = uvms.folder(uvms.make(tmp_path, ["014-1"], 4.0))
+    sim = uvms.truth_of(uvms.prepare(recordings["014-1"], urdf))
+    names = [f"{uvms.VEHICLE}.center_of_buoyancy.y", f"{uvms.VEHICLE}.inertia.yy", "water.linear.wx"]
+    steps = recordings["014-1"].steps
+    rollout = sim.rollout(steps=steps)
+    exact = rollout.jacobian(of=["attitudes"], parameters=names, states=[steps])["attitudes"][0, 0]
+    found = slopes(sim, names, lambda s: s.rollout(steps=steps).observe("attitudes")[-1, 0])
+    assert np.all(np.abs(exact - found) < 1e-6 * np.abs(found).max(axis=0))
+    fish = example("fish_tank")
+    for drive, names in (("angles", ["along.linear.x", "edge.factor"]), ("tendons", ["tendons.gain", "body 3.quadratic.y"])):
+        swim = fish.Swim(drive, 0.75)
+        short = {"controls": swim.controls[:150]} if drive == "tendons" else {"steps": 150}
+        rollout = swim.sim.rollout(**short)
+        exact = rollout.jacobian(of=["site_positions"], parameters=names, states=[150])["site_positions"][0, 8]
+        found = slopes(swim.sim, names, lambda s: s.rollout(**short).observe("site_positions")[-1, 8])
+        assert np.all(np.abs(exact - found) < 1e-6 * np.abs(found).max(axis=0)), (drive, exact, found)
+
+
+def test_fish_on_tracks_of_our_own(tmp_path):
+    found = json.loads(run("fish_tank", tmp_path, "--quick", "--drive", "angles", "--json"))
+    drive = found["drives"]["angles"]
+    # The tail's own drag and edge are those that the tracks were made with, and so are the others to a few standard errors.
+    for c in drive["coefficients"]:
+        assert abs(c["value"] - c["truth"]) < 4.0 * c["standard_error"], c
+    errors = drive["errors"]
+    assert errors["speed"] < 0.002 and errors["tip"] < 0.05 and errors["yaw"] < 0.5 and errors["sway"] < 0.003
+
+
+def test_fish_tells_what_is_wrong_with_tracks(tmp_path):
+    command = [sys.executable, ROOT / "examples/fish_tank.py", "--make", tmp_path, "--quick"]
+    subprocess.run(list(map(str, command)), check=True, capture_output=True)
+    file = tmp_path / "tracks/f1_50.csv"
+    text = file.read_text()
+    file.write_text(text.replace("y8", "z8", 1))
+    said = refused("fish_tank", "--data", tmp_path)
+    assert "f1_50.csv" in said and "'y8'" in said
+    file.write_text(text)
+    assert "f0_75" in refused("fish_tank", "--data", tmp_path, "--train", "f0_75", "f1_50")
+    file.rename(file.with_name("fast.csv"))
+    assert "fast.csv" in refused("fish_tank", "--data", tmp_path)
+
+
+@pytest.mark.skipif(not (TANKS / "fish").is_dir(), reason="the tracks aren't here")
+def test_fish_in_its_tank(tmp_path):
+    found = json.loads(run("fish_tank", tmp_path, "--data", TANKS / "fish", "--drive", "angles", "--json"))
+    errors = found["drives"]["angles"]["errors"]
+    assert errors["speed"] < 0.010 and errors["tip"] < 0.1 and errors["yaw"] < 1.5
+    assert found["drives"]["angles"]["seconds"] < 60.0
 
 
 def study(tmp_path, *options):

@@ -11,8 +11,8 @@ square of roll and pitch against the inertial unit's:
 
 DATA is a folder of recordings in the form that docs/tank.md describes: `runs/NAME.csv`, a URDF and its meshes. Without one, recordings are made here, with noise, and the truth is known.
 
-    python examples/uvms.py [--data FOLDER] [--train NAME ...] [--only NAME ...] [--json]
-        [--out FILE] [--coupling] [--quick]
+    python examples/uvms.py [--data FOLDER] [--train NAME ...] [--only NAME ...] [--constants FILE]
+        [--json] [--out FILE] [--coupling] [--quick]
     python examples/uvms.py --make FOLDER
 """
 
@@ -66,6 +66,18 @@ MASS, LIFT, CENTER = 13.17, 13.082, (0.0074, 0.0, 0.02)  # the vehicle: kg, kg o
 ADDED = (5.5, 12.7, 14.57)  # kg
 LINEAR, QUADRATIC = (4.03, 6.22, 5.18, 0.07, 0.07, 0.07), (18.18, 21.66, 36.99, 1.55, 1.55, 1.55)
 INERTIA = (0.45, 0.60, 0.60)  # kg m², the water's included: nobody knows
+# What was found from the five training runs: for folders that lack them.
+FOUND = {
+    f"{VEHICLE}.center_of_buoyancy.x": 0.007544,
+    f"{VEHICLE}.center_of_buoyancy.y": 0.000332,
+    f"{VEHICLE}.center_of_buoyancy.z": 0.0244,
+    "zero of joint5": -0.02623,
+    "zero of joint4": 0.02108,
+    f"{VEHICLE}.inertia.xx": 0.59,
+    f"{VEHICLE}.inertia.yy": 0.5271,
+    "water.linear.wx": 0.2222,
+    "water.linear.wy": 0.182,
+}
 
 
 def unknowns():
@@ -313,14 +325,12 @@ def identify(runs, sims, say):
     return hg.optimize.identify(experiments, unknowns(), progress=told, cost_tolerance=1e-5)
 
 
-def with_found(sim, found):
-    """A simulator with what was found."""
-    made = sim.with_parameters(found.parameters)
+def with_values(sim, values):
+    """A simulator with the constants `values`, by the names of the unknowns."""
+    made = sim.with_parameters({name: value for name, value in values.items() if not name.startswith("zero of ")})
     q = np.array(made.initial_q)
-    labels = made.coordinate_names
-    for unknown in found.unknowns:
-        for label, factor in unknown.starts.items():
-            q[labels.index(label)] = factor * unknown.value
+    for joint in ZEROS:
+        q[made.coordinate_names.index(f"r5m_{joint} zero.angle")] = values[f"zero of {joint}"]
     return made.with_start(q, made.initial_v)
 
 
@@ -396,7 +406,7 @@ def ringing(run, made):
 
 def mean(scores, names, key):
     chosen = [scores[name][key] for name in names if name in scores]
-    return float(np.mean(chosen)) if chosen else math.nan
+    return float(np.mean(chosen)) if chosen else None
 
 
 # A vehicle and an arm of our own making, for recordings of our own: the links' names and places, and boxes and cylinders.
@@ -472,20 +482,15 @@ def make(path, names, seconds, seed=1):
 
 def truth_of(sim):
     """A simulator with the constants that recordings of our own are made with."""
-    parameters = {name: value for name, value in TRUTH.items() if not name.startswith("zero of ")}
-    made = sim.with_parameters(parameters)
-    q = np.array(made.initial_q)
-    for joint in ZEROS:
-        q[made.coordinate_names.index(f"r5m_{joint} zero.angle")] = TRUTH[f"zero of {joint}"]
-    return made.with_start(q, made.initial_v)
+    return with_values(sim, TRUTH)
 
 
-def coupling(run, urdf, found):
+def coupling(run, urdf, values):
     """How much the attitude changes, °, where the vehicle is a box that feels the arm through the water, and where it is the same box without that."""
     made = []
     for fidelity in ("isolated", "reduced"):
         scene, q, v = scene_of(run, urdf, box=True)
-        sim = with_found(hg.Simulator(scene, fidelity=fidelity, integrator="rk4"), found)
+        sim = with_values(hg.Simulator(scene, fidelity=fidelity, integrator="rk4"), values)
         start_q, start_v = np.array(sim.initial_q), np.array(sim.initial_v)
         start_q[:7], start_v[:6] = q, v
         made.append(simulated(sim.with_start(start_q, start_v), run)[0])
@@ -517,39 +522,41 @@ def draw(file, runs, models):
     print(f"wrote {file}", file=sys.stderr)
 
 
-def evaluate(path, train, only, with_coupling, say, made_here):
+def evaluate(path, train, only, given, with_coupling, say, made_here):
     """Everything, of one folder."""
     begun = time.perf_counter()
     runs, urdf = folder(path, only)
-    training = [name for name in train if name in runs]
-    if not training:
-        raise Wrong(f"{path}: none of the training runs is there ({', '.join(train)}); name others by --train")
-    others = [name for name in runs if name not in train and not name.startswith("baseline")]
+    training = [] if given else [name for name in train if name in runs]
+    others = [name for name in runs if name not in training and not name.startswith("baseline")]
     sims = {name: prepare(runs[name], urdf) for name in [*training, *others]}
     say(f"{len(sims)} simulators in {time.perf_counter() - begun:.1f} s")
-    found = identify([runs[n] for n in training], [sims[n] for n in training], say)
+    found, values = None, given or FOUND
+    if training:
+        found = identify([runs[n] for n in training], [sims[n] for n in training], say)
+        values = found.values
+    else:
+        say("constants as given" if given else f"none of the training runs is there ({', '.join(train)}): constants as found from the five of the tank")
     identified = time.perf_counter()
     models, scores, swings = {}, {}, []
     for name, sim in sims.items():
         run = runs[name]
-        own = with_found(sim, found)
+        own = with_values(sim, values)
         dynamic, rollout = simulated(own, run)
         still = equilibrium(own, run, rollout)
         documented, _ = simulated(sim, run)
         models[name] = {"dynamic": dynamic, "equilibrium": still, "documented": documented}
         scores[name] = {model: score(run, made) for model, made in models[name].items()}
         swings += ringing(run, dynamic)
-    report = {"training": training, "unseen": others}
+    report = {"training": training, "unseen": others, "constants": values}
     for model in ("dynamic", "equilibrium", "documented"):
         own = {name: s[model] for name, s in scores.items()}
         report[model] = {
             "training": {key: mean(own, training, key) for key in ("roll", "pitch")},
             "unseen": {key: mean(own, others, key) for key in ("roll", "pitch")},
-            "worst": {key: max((own[n][key] for n in others), default=math.nan) for key in ("roll", "pitch")},
+            "worst": {key: max((own[n][key] for n in others), default=None) for key in ("roll", "pitch")},
             "lively_rates": {key: mean(own, LIVELY, key) for key in ("roll_rate", "pitch_rate")},
             "runs": own,
         }
-    inflation = found.inflation
     report["unknowns"] = [
         {
             "name": u.name,
@@ -559,25 +566,26 @@ def evaluate(path, train, only, with_coupling, say, made_here):
             "start": u.start,
             **({"truth": TRUTH[u.name]} if made_here else {}),
         }
-        for u in found.unknowns
+        for u in (found.unknowns if found else [])
     ]
     report["swings"] = swings
     report["swing_error"] = max((abs(s["simulated"] / s["measured"] - 1.0) for s in swings), default=None)
     report["floor"] = {"attitude_noise": 0.015, "same_posture": 0.22}  # °: within 1.5 s, and between runs
-    report["identification"] = {
-        "cost": found.cost,
-        "iterations": found.iterations,
-        "simulations": found.simulations,
-        "jacobians": found.jacobians,
-        "inflation": inflation,
-        "stop": found.stop,
-        "weakest": dict(zip((u.name for u in found.unknowns), found.weak[0].change)) if found.weak else None,
-        "seconds": identified - begun,
-    }
+    if found:
+        report["identification"] = {
+            "cost": found.cost,
+            "iterations": found.iterations,
+            "simulations": found.simulations,
+            "jacobians": found.jacobians,
+            "inflation": found.inflation,
+            "stop": found.stop,
+            "weakest": dict(zip((u.name for u in found.unknowns), found.weak[0].change)) if found.weak else None,
+            "seconds": identified - begun,
+        }
     if with_coupling:
         for name in [*others, *training]:
             try:
-                report["coupling"] = {"run": name, **coupling(runs[name], urdf, found)}
+                report["coupling"] = {"run": name, **coupling(runs[name], urdf, values)}
                 break
             except hg.Error as error:
                 say(f"coupling in {name}: {error}")
@@ -595,6 +603,8 @@ def tell(report):
             cells.append(f"{own['roll']:6.2f} / {own['pitch']:5.2f}")
         print(f"{name:12} {'  '.join(f'{c:>15}' for c in cells)}" + ("   (training)" if name in report["training"] else ""))
     for part in ("training", "unseen", "worst"):
+        if report["dynamic"][part]["roll"] is None:
+            continue
         cells = [f"{report[m][part]['roll']:6.3f} / {report[m][part]['pitch']:5.3f}" for m in ("dynamic", "equilibrium", "documented")]
         print(f"{part:12} {'  '.join(f'{c:>15}' for c in cells)}")
     for u in report["unknowns"]:
@@ -602,12 +612,12 @@ def tell(report):
         of = f", {100 * u['of_prior']:.0f} % of what was known before" if u["of_prior"] is not None else ""
         print(f"{u['name']}: {u['value']:.4g} ± {u['standard_error']:.2g} (start {u['start']:.4g}{of}){truth}")
     rates = [report[m]["lively_rates"] for m in ("dynamic", "equilibrium")]
-    if not math.isnan(rates[0]["roll_rate"]):
+    if rates[0]["roll_rate"] is not None:
         print("rates of lively runs, °/s, dynamic and equilibrium: " + ", ".join(f"{r['roll_rate']:.3f} / {r['pitch_rate']:.3f}" for r in rates))
     for s in report["swings"]:
         print(f"swing of {s['run']}, {s['angle']}: {s['measured']:.3f} s measured, {s['simulated']:.3f} s simulated")
     d, e = report["dynamic"]["unseen"], report["equilibrium"]["unseen"]
-    if d["roll"] >= e["roll"] or d["pitch"] >= e["pitch"]:
+    if d["roll"] is not None and (d["roll"] >= e["roll"] or d["pitch"] >= e["pitch"]):
         print("the dynamic model does NOT beat the equilibrium in both angles")
     if "coupling" in report:
         c = report["coupling"]
@@ -617,14 +627,25 @@ def tell(report):
             if max(c["roll"], c["pitch"]) < 0.2
             else f"coupling changes {c['run']} by {c['roll']:.3f} / {c['pitch']:.3f} ° (RMS)"
         )
-    i = report["identification"]
-    print(f"{i['simulations']} simulations, {i['jacobians']} Jacobians, {i['seconds']:.1f} s to identify, {report['seconds']:.1f} s in all")
+    if i := report.get("identification"):
+        print(f"{i['simulations']} simulations, {i['jacobians']} Jacobians, {i['seconds']:.1f} s to identify")
+    print(f"{report['seconds']:.1f} s in all")
+
+
+def constants(path):
+    """Of an earlier run's JSON."""
+    try:
+        values = json.loads(path.read_text())["constants"]
+        return {name: float(values[name]) for name in FOUND}
+    except (OSError, ValueError, KeyError, TypeError) as error:
+        raise Wrong(f"{path}: not what --json writes: {error!r}") from None
 
 
 def main():
     parser = argparse.ArgumentParser(description=__doc__.split("\n")[0])
     parser.add_argument("--data", type=pathlib.Path, help=f"folder of recordings; default: {DEFAULT.parent.name}/{DEFAULT.name} where that is, else recordings made here")
     parser.add_argument("--train", nargs="+", default=TRAIN, metavar="NAME", help="training runs (%(default)s)")
+    parser.add_argument("--constants", type=pathlib.Path, metavar="FILE", help="take them from an earlier --json instead of identifying them")
     parser.add_argument("--only", nargs="+", metavar="NAME", help="read these runs alone")
     parser.add_argument("--make", type=pathlib.Path, metavar="FOLDER", help="only write recordings made here to a folder")
     parser.add_argument("--coupling", action="store_true", help="say what the coupling of arm and vehicle changes")
@@ -642,15 +663,17 @@ def main():
         if options.make:
             make(options.make, names, seconds)
             return
+        given = constants(options.constants) if options.constants else None
         path = options.data or (DEFAULT if DEFAULT.is_dir() and not options.quick else None)
         if path:
-            report, runs, models = evaluate(path, options.train, options.only, options.coupling, say, False)
+            report, runs, models = evaluate(path, options.train, options.only, given, options.coupling, say, False)
         else:
             import tempfile
 
             say("no recordings given: made here, with noise")
             with tempfile.TemporaryDirectory() as made:
-                report, runs, models = evaluate(make(made, names, seconds), options.train, options.only, options.coupling, say, True)
+                folder_made = make(made, names, seconds)
+                report, runs, models = evaluate(folder_made, options.train, options.only, given, options.coupling, say, True)
     except (Wrong, hg.Error) as error:
         print(f"error: {error}", file=sys.stderr)
         sys.exit(1)

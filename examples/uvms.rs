@@ -29,7 +29,7 @@ use std::error::Error;
 use std::ops::ControlFlow;
 use std::path::PathBuf;
 use std::time::Instant;
-use vehicle::{TRUTH, VEHICLE, ZEROS, prepare};
+use vehicle::{FOUND, TRUTH, VEHICLE, ZEROS, prepare};
 
 const TRAIN: [&str; 5] = ["004-0", "006-1", "014-1", "030-1", "alt-001-2"];
 /// How much of a run counts as independent, and how far off the model may be: rad, rad/s.
@@ -160,7 +160,8 @@ struct Run {
 #[derive(Serialize)]
 struct Report {
     runs: Vec<Run>,
-    identified: Identified,
+    /// None where the training runs aren't there.
+    identified: Option<Identified>,
     /// Known where the recordings are made here.
     truth: Option<Vec<f64>>,
     /// Simulations that CMA-ES made, and the misfit that it got to.
@@ -228,35 +229,10 @@ fn rival(
     Ok((runs.len() * evaluated.get(), best.get()))
 }
 
-fn main() -> Result<(), Box<dyn Error>> {
-    let (mut data, mut most, mut json) = (None::<PathBuf>, 0, false);
-    let mut arguments = std::env::args().skip(1);
-    while let Some(name) = arguments.next() {
-        let mut value = || arguments.next().ok_or(format!("{name} needs a value"));
-        match name.as_str() {
-            "--data" => data = Some(value()?.into()),
-            "--rival" => most = value()?.parse()?,
-            "--json" => json = true,
-            _ => return Err(format!("{name}: expected --data, --rival or --json").into()),
-        }
-    }
+/// All that is done with a folder of recordings; `most` simulations for CMA-ES, if any.
+fn study(folder: &std::path::Path, most: usize, made_here: bool) -> Result<Report, Box<dyn Error>> {
     let began = Instant::now();
-    let own = std::path::Path::new(env!("CARGO_MANIFEST_DIR")).join("../shared/data/uvms");
-    let data = data.or(own.is_dir().then_some(own));
-    let made = match &data {
-        Some(_) => None,
-        None => Some(tempfile::tempdir()?),
-    };
-    let folder = match (&data, &made) {
-        (Some(folder), _) => folder.clone(),
-        (None, Some(made)) => {
-            eprintln!("no recordings given: made here, with noise");
-            vehicle::make(made.path(), &[&TRAIN[..3], &["made-1", "made-2"]].concat())?;
-            made.path().into()
-        }
-        (None, None) => return Err("no recordings".into()),
-    };
-    let (runs, urdf) = recording::folder(&folder)?;
+    let (runs, urdf) = recording::folder(folder)?;
     let simulators: Vec<Simulator> = (runs.par_iter())
         .map(|run| prepare(run, &urdf).map_err(|e| e.to_string()))
         .collect::<Result<_, _>>()?;
@@ -264,22 +240,32 @@ fn main() -> Result<(), Box<dyn Error>> {
     let training: Vec<_> = (runs.iter().zip(&simulators))
         .filter(|(run, _)| is_training(run))
         .collect();
-    if training.is_empty() {
-        return Err(format!("{}: none of the runs {TRAIN:?}", folder.display()).into());
-    }
-    let experiments: Vec<_> = training.iter().map(|(r, s)| experiment(r, s)).collect();
-    let settings = IdentifySettings {
-        cost_tolerance: 1e-5,
-        ..IdentifySettings::default()
+    let found = match training.is_empty() {
+        true => {
+            eprintln!(
+                "none of the runs {TRAIN:?} is there: constants as found from those of the tank"
+            );
+            None
+        }
+        false => {
+            let experiments: Vec<_> = training.iter().map(|(r, s)| experiment(r, s)).collect();
+            let settings = IdentifySettings {
+                cost_tolerance: 1e-5,
+                ..IdentifySettings::default()
+            };
+            Some(identify(&experiments, &unknowns(), &settings, |p| {
+                eprintln!(
+                    "iteration {}: misfit {:.3}, {} simulations",
+                    p.iteration, p.cost, p.simulations
+                );
+                ControlFlow::Continue(())
+            })?)
+        }
     };
-    let found = identify(&experiments, &unknowns(), &settings, |p| {
-        eprintln!(
-            "iteration {}: misfit {:.3}, {} simulations",
-            p.iteration, p.cost, p.simulations
-        );
-        ControlFlow::Continue(())
-    })?;
-    let values: Vec<f64> = found.unknowns.iter().map(|u| u.value).collect();
+    let values: Vec<f64> = match &found {
+        Some(found) => found.unknowns.iter().map(|u| u.value).collect(),
+        None => FOUND.to_vec(),
+    };
     let shown: Vec<_> = (runs.iter().zip(&simulators))
         .filter(|(run, _)| !run.name.starts_with("baseline"))
         .collect();
@@ -296,20 +282,50 @@ fn main() -> Result<(), Box<dyn Error>> {
             })
         })
         .collect::<hydrograd::Result<_>>()?;
-    let rival = match most {
-        0 => None,
-        most => {
+    let rival = match &found {
+        Some(found) if most > 0 => {
             let (runs, simulators): (Vec<_>, Vec<_>) = training.iter().copied().unzip();
             Some(rival(&runs, &simulators, 1.001 * found.cost, most)?)
         }
+        _ => None,
     };
-    let report = Report {
+    Ok(Report {
         runs: scores,
         identified: found,
-        truth: data.is_none().then(|| TRUTH.to_vec()),
+        truth: made_here.then(|| TRUTH.to_vec()),
         rival,
         seconds: began.elapsed().as_secs_f64(),
+    })
+}
+
+fn main() -> Result<(), Box<dyn Error>> {
+    let (mut data, mut most, mut json) = (None::<PathBuf>, 0, false);
+    let mut arguments = std::env::args().skip(1);
+    while let Some(name) = arguments.next() {
+        let mut value = || arguments.next().ok_or(format!("{name} needs a value"));
+        match name.as_str() {
+            "--data" => data = Some(value()?.into()),
+            "--rival" => most = value()?.parse()?,
+            "--json" => json = true,
+            _ => return Err(format!("{name}: expected --data, --rival or --json").into()),
+        }
+    }
+    let own = std::path::Path::new(env!("CARGO_MANIFEST_DIR")).join("../shared/data/uvms");
+    let data = data.or(own.is_dir().then_some(own));
+    let made = match &data {
+        Some(_) => None,
+        None => Some(tempfile::tempdir()?),
     };
+    let folder = match (&data, &made) {
+        (Some(folder), _) => folder.clone(),
+        (None, Some(made)) => {
+            eprintln!("no recordings given: made here, with noise");
+            vehicle::make(made.path(), &[&TRAIN[..3], &["made-1", "made-2"]].concat())?;
+            made.path().into()
+        }
+        (None, None) => return Err("no recordings".into()),
+    };
+    let report = study(&folder, most, data.is_none())?;
     if json {
         println!("{}", serde_json::to_string(&report)?);
     } else {
@@ -349,22 +365,51 @@ fn tell(report: &Report) {
             println!("{part:12} {}", models.join(" "));
         }
     }
-    for (i, u) in report.identified.unknowns.iter().enumerate() {
-        let truth = report
-            .truth
-            .as_ref()
-            .map_or(String::new(), |t| format!(", true {}", t[i]));
+    if let Some(found) = &report.identified {
+        for (i, u) in found.unknowns.iter().enumerate() {
+            let truth = report.truth.as_ref();
+            let truth = truth.map_or(String::new(), |t| format!(", true {}", t[i]));
+            println!(
+                "{}: {:.4} ± {:.2e}{truth}",
+                u.name, u.value, u.standard_error
+            );
+        }
         println!(
-            "{}: {:.4} ± {:.2e}{truth}",
-            u.name, u.value, u.standard_error
+            "misfit {:.2} by {} simulations and {} Jacobians",
+            found.cost, found.simulations, found.jacobians
         );
     }
-    let i = &report.identified;
-    println!(
-        "misfit {:.2} by {} simulations and {} Jacobians; {:.1} s in all",
-        i.cost, i.simulations, i.jacobians, report.seconds
-    );
+    println!("{:.1} s in all", report.seconds);
     if let Some((simulations, cost)) = report.rival {
         println!("CMA-ES: misfit {cost:.2} after {simulations} simulations");
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// Within four standard errors, and the runs that weren't used are met better than by an equilibrium.
+    #[test]
+    fn recordings_of_our_own_say_what_made_them() -> Result<(), Box<dyn Error>> {
+        let folder = tempfile::tempdir()?;
+        vehicle::make(folder.path(), &["004-0", "006-1", "014-1", "made-1"])?;
+        let report = study(folder.path(), 0, true)?;
+        let found = report.identified.ok_or("the training runs are there")?;
+        for (u, truth) in found.unknowns.iter().zip(TRUTH) {
+            let off = (u.value - truth).abs();
+            assert!(
+                off < 4.0 * u.standard_error,
+                "{}: {} for {truth}",
+                u.name,
+                u.value
+            );
+        }
+        for run in report.runs.iter().filter(|r| !r.training) {
+            for k in 0..2 {
+                assert!(run.dynamic[k] < 0.1 && run.dynamic[k] < run.equilibrium[k]);
+            }
+        }
+        Ok(())
     }
 }

@@ -103,6 +103,26 @@ def test_system_id(tmp_path):
     assert 0.7 < fit["chi_squared"] < 1.3 and fit["correlation"] == pytest.approx(0.98, abs=0.01)
 
 
+def test_rov(tmp_path):
+    """Once it has learnt the current, MPC holds the vehicle as well as tuned PIDs and arrives sooner; without, it stays off."""
+    found = json.loads(run("rov", tmp_path, "--quick", "--json"))
+    pid, mpc, learning = (found[name] for name in ("pid", "mpc", "mpc, learning"))
+    for own in found.values():
+        # Limits are reached on the way there, and not exceeded.
+        assert 39.0 < own["thrust_most_N"] <= 40.0 + 1e-9 and own["torque_most_Nm"] <= 9.0 + 1e-9
+        assert own["gap_least_mm"] > 40.0 and own["hand_to_wall_least_mm"] > 85.0
+    assert learning["place_mm"]["rms"] < 5.0 and learning["place_mm"]["worst"] < 14.0
+    assert learning["heading_deg"]["worst"] < 0.5 and learning["hand_mm"]["rms"] < 2.0
+    assert learning["place_mm"]["rms"] < 1.1 * pid["place_mm"]["rms"] and pid["place_mm"]["rms"] < 0.6 * mpc["place_mm"]["rms"]
+    assert learning["cost"] < 0.98 * pid["cost"] and learning["arrived_s"] < pid["arrived_s"]
+    # What it isn't better at: the fingertip, which a stiff PID of the arm keeps.
+    assert pid["hand_mm"]["rms"] < learning["hand_mm"]["rms"] < mpc["hand_mm"]["rms"]
+    # It takes the plant's drag, a fifth larger than the model's, for some more current.
+    for learnt, (y, z) in zip(learning["currents_learnt"], ((0.25, 0.0), (-0.2, 0.1))):
+        assert abs(learnt[0] - y) < 0.03 and abs(learnt[1] - z) < 0.02
+    assert mpc["plans"] == learning["plans"] == 50 and mpc["plans_failed"] == learning["plans_failed"] == 0
+
+
 TANKS = ROOT.parent / "shared/data"
 
 
@@ -141,6 +161,13 @@ def test_uvms_reads_any_folder_of_that_form(tmp_path):
     file.write_text("\n".join(text.split("\n")[:40]))
     assert "'free'" in refused("uvms", "--data", tank)
     file.write_text(text)
+    # Without training runs it predicts with what was found in the tank; with constants, with those.
+    other = json.loads(run("uvms", tmp_path, "--data", tank, "--only", "made-1", "--json"))
+    assert other["training"] == [] and other["unseen"] == ["made-1"]
+    other["constants"]["zero of joint5"] = 0.3
+    (tmp_path / "constants.json").write_text(json.dumps(other))
+    given = json.loads(run("uvms", tmp_path, "--data", tank, "--only", "made-1", "--constants", tmp_path / "constants.json", "--json"))
+    assert given["dynamic"]["runs"]["made-1"]["roll"] != other["dynamic"]["runs"]["made-1"]["roll"]
     (tank / "blue_rov_hardware_fixedjaw.urdf").unlink()
     assert "urdf" in refused("uvms", "--data", tank)
 
@@ -198,7 +225,6 @@ def test_jacobians_of_both_tanks(tmp_path):
 def test_fish_on_tracks_of_our_own(tmp_path):
     found = json.loads(run("fish_tank", tmp_path, "--quick", "--drive", "angles", "--json"))
     drive = found["drives"]["angles"]
-    # The tail's own drag and edge are those that the tracks were made with, and so are the others to a few standard errors.
     for c in drive["coefficients"]:
         assert abs(c["value"] - c["truth"]) < 4.0 * c["standard_error"], c
     errors = drive["errors"]
@@ -214,7 +240,9 @@ def test_fish_tells_what_is_wrong_with_tracks(tmp_path):
     said = refused("fish_tank", "--data", tmp_path)
     assert "f1_50.csv" in said and "'y8'" in said
     file.write_text(text)
-    assert "f0_75" in refused("fish_tank", "--data", tmp_path, "--train", "f0_75", "f1_50")
+    # Without training films it predicts with what was found in the tank.
+    other = json.loads(run("fish_tank", tmp_path, "--data", tmp_path, "--train", "f0_75", "f1_50", "--drive", "angles", "--json"))
+    assert other["training"] == [] and len(other["drives"]["angles"]["made"]) == 3
     file.rename(file.with_name("fast.csv"))
     assert "fast.csv" in refused("fish_tank", "--data", tmp_path)
 

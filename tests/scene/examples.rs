@@ -246,7 +246,7 @@ fn everything_survives_a_round_trip() {
                     offset: 0.0,
                     rate: 1.0,
                 },
-                sine,
+                sine.clone(),
             ])
             .actuated()
             .locked()

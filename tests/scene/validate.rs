@@ -306,7 +306,7 @@ fn shapes_and_drag_are_checked() {
 
 #[test]
 fn joints_are_checked() {
-    let linear = Motion::Linear {
+    let linear = || Motion::Linear {
         offset: 0.0,
         rate: 1.0,
     };
@@ -325,7 +325,7 @@ fn joints_are_checked() {
         &["body \"ball\": joint.pitch", "inf", "one revolution"],
     );
     refused(
-        |s| s.bodies[1].motion = Some(vec![linear]),
+        |s| s.bodies[1].motion = Some(vec![linear()]),
         &[
             "body \"coin\": motion",
             "free joint",
@@ -335,19 +335,19 @@ fn joints_are_checked() {
     refused(
         |s| {
             s.bodies[1].joint = Joint::Planar { plane: Plane::Xy };
-            s.bodies[1].motion = Some(vec![linear]);
+            s.bodies[1].motion = Some(vec![linear()]);
         },
         &["body \"coin\": motion", "1 motions", "needs 3"],
     );
     refused(
         |s| {
-            s.bodies[0].motion = Some(vec![linear]);
+            s.bodies[0].motion = Some(vec![linear()]);
             s.bodies[0].locked = true;
         },
         &["body \"ball\": locked", "motion"],
     );
     refused(
-        |s| s.bodies[0].motion = Some(vec![linear]),
+        |s| s.bodies[0].motion = Some(vec![linear()]),
         &["body \"ball\": actuated", "driven", "`motion`"],
     );
     refused(

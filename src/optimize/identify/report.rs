@@ -177,7 +177,8 @@ impl Known {
                 for j in 0..n {
                     let part = direction[i] * direction[j];
                     // Nothing times infinity is nothing here.
-                    if part.abs() > SINGULAR.sqrt() * sizes[i] * sizes[j] {
+                    let seen = part.abs() > SINGULAR.sqrt() * sizes[i] * sizes[j];
+                    if deviation.is_finite() || seen {
                         covariance[(i, j)] += deviation * deviation * part;
                     }
                 }

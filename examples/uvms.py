@@ -12,7 +12,7 @@ square of roll and pitch against the inertial unit's:
 DATA is a folder of recordings in the form that docs/tank.md describes: `runs/NAME.csv`, a URDF and its meshes. Without one, recordings are made here, with noise, and the truth is known.
 
     python examples/uvms.py [--data FOLDER] [--train NAME ...] [--only NAME ...] [--constants FILE]
-        [--json] [--out FILE] [--coupling] [--quick]
+        [--json] [--out FILE] [--no-coupling] [--quick]
     python examples/uvms.py --make FOLDER
 """
 
@@ -616,6 +616,8 @@ def tell(report):
         print("rates of lively runs, °/s, dynamic and equilibrium: " + ", ".join(f"{r['roll_rate']:.3f} / {r['pitch_rate']:.3f}" for r in rates))
     for s in report["swings"]:
         print(f"swing of {s['run']}, {s['angle']}: {s['measured']:.3f} s measured, {s['simulated']:.3f} s simulated")
+    floor = report["floor"]
+    print(f"floor of the measurement: {floor['attitude_noise']} ° of noise; the same posture scatters by {floor['same_posture']} ° between runs")
     d, e = report["dynamic"]["unseen"], report["equilibrium"]["unseen"]
     if d["roll"] is not None and (d["roll"] >= e["roll"] or d["pitch"] >= e["pitch"]):
         print("the dynamic model does NOT beat the equilibrium in both angles")
@@ -648,7 +650,7 @@ def main():
     parser.add_argument("--constants", type=pathlib.Path, metavar="FILE", help="take them from an earlier --json instead of identifying them")
     parser.add_argument("--only", nargs="+", metavar="NAME", help="read these runs alone")
     parser.add_argument("--make", type=pathlib.Path, metavar="FOLDER", help="only write recordings made here to a folder")
-    parser.add_argument("--coupling", action="store_true", help="say what the coupling of arm and vehicle changes")
+    parser.add_argument("--no-coupling", action="store_true", help="don't say what the coupling of arm and vehicle changes")
     parser.add_argument("--quick", action="store_true", help="short recordings, where they are made here")
     parser.add_argument("--out", default="uvms.png", help="picture; default: %(default)s")
     parser.add_argument("--json", action="store_true", help="one JSON object on standard output")
@@ -664,16 +666,17 @@ def main():
             make(options.make, names, seconds)
             return
         given = constants(options.constants) if options.constants else None
+        with_coupling = not (options.no_coupling or options.quick or options.only)
         path = options.data or (DEFAULT if DEFAULT.is_dir() and not options.quick else None)
         if path:
-            report, runs, models = evaluate(path, options.train, options.only, given, options.coupling, say, False)
+            report, runs, models = evaluate(path, options.train, options.only, given, with_coupling, say, False)
         else:
             import tempfile
 
             say("no recordings given: made here, with noise")
             with tempfile.TemporaryDirectory() as made:
                 folder_made = make(made, names, seconds)
-                report, runs, models = evaluate(folder_made, options.train, options.only, given, options.coupling, say, True)
+                report, runs, models = evaluate(folder_made, options.train, options.only, given, with_coupling, say, True)
     except (Wrong, hg.Error) as error:
         print(f"error: {error}", file=sys.stderr)
         sys.exit(1)

@@ -306,9 +306,10 @@ def test_cookbook(tmp_path, monkeypatch):
     assert (tmp_path / "run.html").stat().st_size > 500_000
 
 
-def test_what_is_shown_of_control():
-    """The program in docs/control.md runs, and holds what it asserts."""
-    (block,) = re.findall(r"^```python\n(.*?)^```", (ROOT / "docs/control.md").read_text(), re.MULTILINE | re.DOTALL)
+@pytest.mark.parametrize("page", ["control", "identification"])
+def test_what_is_shown_on_pages(page):
+    """Their programs run, and hold what they assert."""
+    (block,) = re.findall(r"^```python\n(.*?)^```", (ROOT / f"docs/{page}.md").read_text(), re.MULTILINE | re.DOTALL)
     exec(block, {})
 
 

@@ -17,6 +17,9 @@ const MOST_PLACED: usize = 10_000;
 /// Most faces of all together.
 const MOST_FACES: usize = 20_000_000;
 
+/// Attributes that say how much there is.
+const COUNTS: [&str; 4] = ["count", "stride", "offset", "set"];
+
 /// What isn't read and may be left out of what the crate is given.
 const LEFT_OUT: [&str; 12] = [
     "library_visual_scenes",
@@ -83,6 +86,22 @@ fn meshes(text: &str, root: &Node) -> Result<HashMap<String, Mesh>, String> {
         }
     }
     rest.push_str(&text[at..]);
+    // The crate makes room for what these say before it looks at what is there.
+    for node in root.descendants().filter(Node::is_element) {
+        for name in COUNTS {
+            let Some(given) = node.attribute(name) else {
+                continue;
+            };
+            let fits = |n: u64| n <= text.len() as u64;
+            if given.trim().parse().is_ok_and(|n: u64| !fits(n)) {
+                return Err(format!(
+                    "<{}> has {name}=\"{given}\" in a file of {} bytes; export it again",
+                    node.tag_name().name(),
+                    text.len()
+                ));
+            }
+        }
+    }
     let read = Loader::default().load_collada_from_slice(rest.as_bytes(), "mesh.dae");
     let read = read.map_err(|e| format!("{e}; export it again"))?;
     let meshes = read.meshes.into_iter();

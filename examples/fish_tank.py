@@ -216,17 +216,15 @@ class Swim:
         return rollout.observe("site_positions")[self.seen]
 
 
-def harmonics(t, y, beat, weights=None):
+def harmonics(t, y, beat):
     """Fundamental of a signal by least squares with drift and three harmonics: amplitude and phase as a complex number."""
     phase = 2.0 * math.pi * beat * t
     columns = [np.ones_like(t), t - t.mean(), *(f(k * phase) for k in (1, 2, 3) for f in (np.cos, np.sin))]
-    a = np.stack(columns, axis=1)
-    chosen = slice(None) if weights is None else weights
-    c, *_ = np.linalg.lstsq(a[chosen], y[chosen], rcond=None)
+    c, *_ = np.linalg.lstsq(np.stack(columns, axis=1), y, rcond=None)
     return complex(c[2], -c[3])
 
 
-def features(t, p, beat, ok=None):
+def features(t, p, beat):
     """Speed (m/s) as the slope of the way along the head's axis, twice the tip's amplitude and its range across that (m), the head's yaw (rad) and the nose's sway across the mean path (m) as amplitudes, and the phases (rad) of yaw before the
     tip's displacement in the tank."""
     head = p[:, 0] - p[:, 1]
@@ -262,18 +260,19 @@ def differences(made, seen):
 
 
 def read(path):
-    """Times, markers (n, 9, 2) and which are where they should be."""
+    """Times and markers (n, 9, 2)."""
     names = ["t", *(f"{axis}{i}" for i in range(9) for axis in "xy")]
-    checks = [f"ok{i}" for i in range(3, 8)]
     try:
-        with open(path, newline="") as file:
-            rows = list(csv.reader(file))
+        with open(path, newline="", encoding="utf-8-sig") as file:
+            rows = list(csv.reader(file, skipinitialspace=True))
     except (OSError, UnicodeDecodeError, csv.Error) as error:
         raise Wrong(f"{path}: can't be read: {error}") from None
+    while rows and not any(rows[-1]):
+        rows.pop()
     if len(rows) < 60:
         raise Wrong(f"{path}: {len(rows)} lines; a header and a second of frames at least are wanted")
     columns = {}
-    for name in [*names, *checks]:
+    for name in names:
         if name not in rows[0]:
             raise Wrong(f"{path}: column {name!r} is missing; the file has {', '.join(rows[0])}")
         k = rows[0].index(name)
@@ -294,7 +293,7 @@ def read(path):
     return columns["t"], markers
 
 
-def beat_of(t, markers, nominal):
+def beat_of(file, t, markers, nominal):
     """The tail's beat, Hz: where a fundamental with harmonics leaves least of the tip's motion."""
     head = markers[:, 0] - markers[:, 1]
     yaw = np.unwrap(np.arctan2(head[:, 1], head[:, 0]))
@@ -309,7 +308,10 @@ def beat_of(t, markers, nominal):
     at = BEAT * nominal
     for width in (0.08, 0.01, 0.001):
         tried = at * (1.0 + np.linspace(-width, width, 33))
-        at = float(tried[np.argmin([left(f) for f in tried])])
+        k = int(np.argmin([left(f) for f in tried]))
+        if width == 0.08 and k in (0, 32):
+            raise Wrong(f"{file}: no beat of the tail near {at:.3f} Hz, three quarters of the nominal {nominal} Hz of its name")
+        at = float(tried[k])
     return at
 
 
@@ -325,7 +327,7 @@ def folder(path):
             raise Wrong(f"{file}: its name must be fA_BB.csv, with the motor's nominal speed A.BB Hz")
         t, markers = read(file)
         nominal = float(f"{named[1]}.{named[2]}")
-        beat = beat_of(t, markers, nominal)
+        beat = beat_of(file, t, markers, nominal)
         films[file.stem] = {"nominal": nominal, "beat": beat, **features(t, markers, beat)}
     return films
 
@@ -454,10 +456,10 @@ def make(path, quick, seed=1):
         frames = np.arange(t[first], t[-1], 1.0 / 60.0)
         with open(path / "tracks" / f"f{nominal:.2f}.csv".replace(".", "_", 1), "w", newline="") as file:
             writer = csv.writer(file)
-            writer.writerow(["t", *(f"{axis}{i}" for i in range(9) for axis in "xy"), *(f"ok{i}" for i in range(3, 8))])
+            writer.writerow(["t", *(f"{axis}{i}" for i in range(9) for axis in "xy")])
             for at in frames:
                 seen = [np.interp(at, t, markers[:, i, k]) + 2e-4 * random.normal() for i in range(9) for k in range(2)]
-                writer.writerow([f"{at - frames[0]:.5f}", *(f"{x:.6f}" for x in seen), *[1] * 5])
+                writer.writerow([f"{at - frames[0]:.5f}", *(f"{x:.6f}" for x in seen)])
     return path
 
 
@@ -492,7 +494,7 @@ def evaluate(path, train, drives, say, made_here):
         say(f"not both training films are there ({', '.join(train)}): coefficients as found from those of the tank")
         training = []
     straight = line(films, training) if training else None
-    others = [n for n in films if n not in training]
+    others = [n for n in films if n not in train]
     off = [abs(straight[n] - films[n]["speed"]) for n in others] if straight else []
     report = {
         "training": training,
@@ -511,7 +513,7 @@ def evaluate(path, train, drives, say, made_here):
         made = predict(films, values, drive, bend)
         report["drives"][drive] = {
             "made": made,
-            "errors": judge(films, made, training),
+            "errors": judge(films, made, train),
             "bend": bend,
             "values": values,
             "coefficients": [

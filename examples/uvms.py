@@ -129,10 +129,12 @@ class Recording:
 def read(path):
     """A recording from its file."""
     try:
-        with open(path, newline="") as file:
-            rows = list(csv.reader(file))
+        with open(path, newline="", encoding="utf-8-sig") as file:
+            rows = list(csv.reader(file, skipinitialspace=True))
     except (OSError, UnicodeDecodeError, csv.Error) as error:
         raise Wrong(f"{path}: can't be read: {error}") from None
+    while rows and not any(rows[-1]):
+        rows.pop()
     if len(rows) < 3:
         raise Wrong(f"{path}: {len(rows)} lines; a header and a line per sample are wanted")
     header = rows[0]
@@ -156,6 +158,13 @@ def read(path):
     off = np.flatnonzero(np.abs(between - STEP) > 1e-3)
     if off.size:
         raise Wrong(f"{path}: column 't', line {off[0] + 3}: {between[off[0]]:.4g} s after the line before; samples {STEP} s apart are wanted")
+    late = np.flatnonzero(np.abs(columns["t"] - columns["t"][0] - STEP * np.arange(len(columns["t"]))) > 0.5 * STEP)
+    if late.size:
+        raise Wrong(f"{path}: column 't', line {late[0] + 2}: half a sample off; samples {STEP} s apart throughout are wanted")
+    for name in ("imu_roll", "imu_pitch"):
+        far = np.flatnonzero(np.abs(columns[name]) > math.pi)
+        if far.size:
+            raise Wrong(f"{path}: column {name!r}, line {far[0] + 2}: {columns[name][far[0]]} isn't an angle in rad")
     free = columns["free"] > 0.5
     if free.sum() < 100:
         raise Wrong(f"{path}: column 'free': {free.sum()} samples float freely; 100 at least are wanted")
@@ -372,6 +381,7 @@ def ringing(run, made):
     try:
         from scipy.optimize import least_squares
     except ImportError:
+        print("no swings: scipy isn't installed (pip install scipy)", file=sys.stderr)
         return []
     speed = np.max([np.abs(np.gradient(run.columns[j], STEP)) for j in JOINTS], axis=0)
     speed = np.convolve(speed, np.ones(11) / 11.0, "same")
@@ -527,10 +537,15 @@ def evaluate(path, train, only, given, with_coupling, say, made_here):
     begun = time.perf_counter()
     runs, urdf = folder(path, only)
     training = [] if given else [name for name in train if name in runs]
-    others = [name for name in runs if name not in training and not name.startswith("baseline")]
+    known = given["training"] if given else train
+    others = [name for name in runs if name not in known and not name.startswith("baseline")]
+    if not training and not others:
+        raise Wrong(f"{pathlib.Path(path) / 'runs'}: nothing to predict: baselines and training runs alone")
+    if training and len(training) < len(train):
+        say(f"training runs that aren't there: {', '.join(name for name in train if name not in runs)}")
     sims = {name: prepare(runs[name], urdf) for name in [*training, *others]}
     say(f"{len(sims)} simulators in {time.perf_counter() - begun:.1f} s")
-    found, values = None, given or FOUND
+    found, values = None, given["constants"] if given else FOUND
     if training:
         found = identify([runs[n] for n in training], [sims[n] for n in training], say)
         values = found.values
@@ -577,7 +592,6 @@ def evaluate(path, train, only, given, with_coupling, say, made_here):
             "iterations": found.iterations,
             "simulations": found.simulations,
             "jacobians": found.jacobians,
-            "inflation": found.inflation,
             "stop": found.stop,
             "weakest": dict(zip((u.name for u in found.unknowns), found.weak[0].change)) if found.weak else None,
             "seconds": identified - begun,
@@ -609,6 +623,9 @@ def tell(report):
         print(f"{part:12} {'  '.join(f'{c:>15}' for c in cells)}")
     for u in report["unknowns"]:
         truth = f", true {u['truth']:.4g}" if "truth" in u else ""
+        if u["standard_error"] == 0.0:
+            print(f"{u['name']}: {u['value']:.4g}, at its bound{truth}")
+            continue
         of = f", {100 * u['of_prior']:.0f} % of what was known before" if u["of_prior"] is not None else ""
         print(f"{u['name']}: {u['value']:.4g} ± {u['standard_error']:.2g} (start {u['start']:.4g}{of}){truth}")
     rates = [report[m]["lively_rates"] for m in ("dynamic", "equilibrium")]
@@ -625,7 +642,7 @@ def tell(report):
         c = report["coupling"]
         print(
             f"what arm and vehicle do to each other through the water changes {c['run']} by {c['roll']:.3f} / {c['pitch']:.3f} ° (RMS): "
-            "below what can be measured (0.2 ° between runs)"
+            "below what can be measured (0.2 ° between runs). The vehicle is a box there, and the arm its upper arm and wrist"
             if max(c["roll"], c["pitch"]) < 0.2
             else f"coupling changes {c['run']} by {c['roll']:.3f} / {c['pitch']:.3f} ° (RMS)"
         )
@@ -637,8 +654,9 @@ def tell(report):
 def constants(path):
     """Of an earlier run's JSON."""
     try:
-        values = json.loads(path.read_text())["constants"]
-        return {name: float(values[name]) for name in FOUND}
+        made = json.loads(path.read_text())
+        values = {name: float(made["constants"][name]) for name in FOUND}
+        return {"constants": values, "training": [str(name) for name in made["training"]]}
     except (OSError, ValueError, KeyError, TypeError) as error:
         raise Wrong(f"{path}: not what --json writes: {error!r}") from None
 

@@ -126,6 +126,21 @@ fn read(path: &Path) -> Result<Recording, Box<dyn Error>> {
         )
         .into());
     }
+    let late = |i: &usize| (t[*i] - t[0] - STEP * *i as f64).abs() > 0.5 * STEP;
+    if let Some(i) = (0..t.len()).find(late) {
+        return Err(format!("{shown}: column \"t\", line {}: half a sample off", i + 2).into());
+    }
+    for name in ["imu_roll", "imu_pitch"] {
+        let of = columns.get(name).map_or(&[][..], Vec::as_slice);
+        if let Some(i) = of.iter().position(|x| x.abs() > std::f64::consts::PI) {
+            return Err(format!(
+                "{shown}: column {name:?}, line {}: {} isn't an angle in rad",
+                i + 2,
+                of[i]
+            )
+            .into());
+        }
+    }
     let free: Vec<bool> = columns
         .get("free")
         .map_or(Vec::new(), |c| c.iter().map(|x| *x > 0.5).collect());

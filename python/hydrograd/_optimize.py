@@ -217,7 +217,7 @@ class Fitted:
     at_bound: bool
     """Whether a bound holds it; what is said of the others then takes it as known."""
     of_prior: float | None
-    """Its standard error in parts of what was known beforehand; about 1: the recordings tell nothing of it."""
+    """Its standard error in parts of what was known beforehand; about 1: the recordings tell nothing of it. None at a bound, and where nothing was known."""
     sets: dict[str, float]
     """The parameters that it sets, and what each is of it."""
     starts: dict[str, float]
@@ -279,7 +279,7 @@ class Identified:
     cost: float
     """The misfit."""
     chi_squared: float
-    """Sum of squared residuals over the degrees of freedom: 1 for noise as large as it is said to be."""
+    """Sum of squared residuals, weighed by the loss, over the degrees of freedom that the recordings have left: 1 for noise as large as it is said to be."""
     inflation: float
     """What standard errors are to be multiplied by where residuals aren't that noise."""
     weak: list[WeakDirection]
@@ -302,7 +302,7 @@ class Identified:
 
     @property
     def parameters(self) -> dict[str, float]:
-        """Parameters that the unknowns set, for `Simulator.with_parameters`."""
+        """Parameters that the unknowns set, for `Simulator.with_parameters`; an experiment's own scales aren't in them."""
         return {name: factor * u.value for u in self.unknowns for name, factor in u.sets.items()}
 
 

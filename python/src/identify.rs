@@ -12,7 +12,7 @@ use pyo3::prelude::*;
 use pyo3::types::PyDict;
 use std::collections::BTreeMap;
 use std::ops::ControlFlow;
-use std::sync::{Arc, Mutex, PoisonError};
+use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 
 fn class<'py>(py: Python<'py>, name: &str) -> PyResult<Bound<'py, PyAny>> {
     py.import("hydrograd._optimize")?.getattr(name)
@@ -122,12 +122,16 @@ impl Experiment {
         entry: &Bound<'_, PyAny>,
         values: &Bound<'_, PyAny>,
         deviation: f64,
-        states: Option<Vec<usize>>,
+        states: Option<&Bound<'_, PyAny>>,
     ) -> PyResult<()> {
-        let mut inner = self.inner.lock().unwrap_or_else(PoisonError::into_inner);
-        let entry = entry_of(inner.simulator(), observable, entry)?;
+        // What may call Python comes first: nothing is held while it runs.
         let values = floats(values)?;
-        let states = states.unwrap_or_else(|| (0..=self.steps).collect());
+        let simulator = self.lock().simulator().clone();
+        let entry = entry_of(&simulator, observable, entry)?;
+        let states = match states {
+            Some(given) => numbers(given)?,
+            None => (0..=self.steps).collect(),
+        };
         if states.len() != values.len() {
             return Err(input(
                 "experiment: values",
@@ -137,6 +141,7 @@ impl Experiment {
         }
         let seen = states.into_iter().zip(values).filter(|(_, x)| !x.is_nan());
         let (states, values) = seen.unzip();
+        let mut inner = self.lock();
         *inner = inner.clone().saw(Recorded {
             observable: observable.into(),
             entry,
@@ -155,14 +160,17 @@ impl Experiment {
         &self,
         observables: Vec<String>,
         function: &Bound<'_, PyAny>,
-        states: Option<Vec<usize>>,
+        states: Option<&Bound<'_, PyAny>>,
     ) -> PyResult<()> {
-        let mut inner = self.inner.lock().unwrap_or_else(PoisonError::into_inner);
-        let system = inner.simulator().system();
+        let simulator = self.lock().simulator().clone();
+        let system = simulator.system();
         let shapes = observables.iter();
         let shapes = shapes.map(|name| Ok(observable(name).or_raise()?.shape(system)));
         let shapes = shapes.collect::<PyResult<Vec<Vec<usize>>>>()?;
-        let states = states.unwrap_or_else(|| (0..=self.steps).collect());
+        let states = match states {
+            Some(given) => numbers(given)?,
+            None => (0..=self.steps).collect(),
+        };
         let function = function.clone().unbind();
         let names = observables.clone();
         let call = move |seen: &[DMatrix<f64>]| {
@@ -181,22 +189,36 @@ impl Experiment {
             })
         };
         let names: Vec<&str> = observables.iter().map(String::as_str).collect();
+        let mut inner = self.lock();
         *inner = inner.clone().saw_function(&names, states, call);
         Ok(())
     }
 
     /// Makes a parameter `factor` times what an unknown sets it to, in this experiment: where a law says how it depends on what was done.
     fn scaled(&self, parameter: &str, factor: f64) {
-        let mut inner = self.inner.lock().unwrap_or_else(PoisonError::into_inner);
+        let mut inner = self.lock();
         *inner = inner.clone().scaled(parameter, factor);
     }
 
     /// Its name.
     #[getter]
     fn name(&self) -> String {
-        let inner = self.inner.lock().unwrap_or_else(PoisonError::into_inner);
-        inner.name().into()
+        self.lock().name().into()
     }
+}
+
+impl Experiment {
+    fn lock(&self) -> MutexGuard<'_, optimize::Experiment> {
+        self.inner.lock().unwrap_or_else(PoisonError::into_inner)
+    }
+}
+
+/// Numbers of states.
+fn numbers(given: &Bound<'_, PyAny>) -> PyResult<Vec<usize>> {
+    given.extract().map_err(|_| {
+        let said = given.repr().map_or("?".into(), |r| r.to_string());
+        input("experiment: states", said, "must be whole numbers from 0")
+    })
 }
 
 /// Numbers, NaN among them.
@@ -214,10 +236,17 @@ fn entry_of(
     name: &str,
     entry: &Bound<'_, PyAny>,
 ) -> PyResult<usize> {
+    observable(name).or_raise()?;
     if let Ok(number) = entry.extract::<usize>() {
         return Ok(number);
     }
-    let label: String = entry.extract()?;
+    let Ok(label) = entry.extract::<String>() else {
+        return Err(input(
+            format!("experiment: entry of {name:?}"),
+            entry.repr()?.to_string(),
+            "must be a number from 0, or a label",
+        ));
+    };
     let labels = observable(name).or_raise()?.labels(simulator.scene());
     labels.iter().position(|l| *l == label).ok_or_else(|| {
         input(
@@ -271,9 +300,8 @@ fn identify<'py>(
         step_tolerance,
         profiles,
     };
-    let experiments: Vec<optimize::Experiment> = (experiments.iter())
-        .map(|e| (*e.inner.lock().unwrap_or_else(PoisonError::into_inner)).clone())
-        .collect();
+    let experiments: Vec<optimize::Experiment> =
+        (experiments.iter()).map(|e| e.lock().clone()).collect();
     let unknowns: Vec<_> = unknowns.iter().map(|u| u.inner.clone()).collect();
     let raised = Arc::new(Mutex::new(None));
     let (theirs, call) = (raised.clone(), progress.map(Bound::unbind));

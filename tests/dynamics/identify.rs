@@ -361,3 +361,115 @@ fn bad_input_is_named() {
         &["loss"],
     );
 }
+
+/// A bound that correlated unknowns lean on: the least misfit within it, from wherever the search begins, and however it is damped.
+#[test]
+fn bounds_are_no_ends() {
+    let runs = experiments(NOISE, 8);
+    let settings = IdentifySettings {
+        profiles: 0,
+        ..IdentifySettings::default()
+    };
+    let go = |_: &_| ControlFlow::Continue(());
+    let costs = [
+        (0.2, 0.3, 1e-3),
+        (0.09, 0.02, 1e-3),
+        (0.15, 1.0, 1e-3),
+        (0.2, 0.3, 1e6),
+    ]
+    .map(|(roll, pitch, damping)| {
+        let unknowns = [
+            Unknown::new(NAMES[0]).start(-0.03).within(-0.05, -0.015),
+            Unknown::new(NAMES[2]).start(roll).within(0.08, 0.3),
+            Unknown::new(NAMES[3]).start(pitch).within(0.01, 2.0),
+        ];
+        let settings = IdentifySettings {
+            damping,
+            ..settings
+        };
+        let found = identify(&runs, &unknowns, &settings, go).unwrap();
+        assert!(found.unknowns[0].at_bound && found.unknowns[0].of_prior.is_none());
+        assert!(
+            matches!(found.stop, IdentifyStop::Cost | IdentifyStop::Step),
+            "{:?}",
+            found.stop
+        );
+        found.cost
+    });
+    for cost in costs {
+        assert!((cost / costs[0] - 1.0).abs() < 1e-6, "{costs:?}");
+    }
+}
+
+/// A value of zero is known as well as any other, and a loss that forgives outliers says that the rest is noise.
+#[test]
+fn errors_have_no_scale() {
+    let runs = experiments(NOISE, 9);
+    let settings = IdentifySettings::default();
+    let go = |_: &_| ControlFlow::Continue(());
+    let unknowns = [Unknown::new(NAMES[1]).start(1e-9), Unknown::new(NAMES[0])];
+    let found = identify(&runs, &unknowns, &settings, go).unwrap();
+    let [zero, other] = [&found.unknowns[0], &found.unknowns[1]];
+    assert!(zero.standard_error < 1e-3 && zero.value.abs() < 4.0 * zero.standard_error);
+    assert!(other.standard_error < 1e-3);
+    let mut wrong = runs.clone();
+    let simulator = vehicle(0.4);
+    let controls = Controls::zeros(&simulator, STEPS);
+    let attitudes = simulator
+        .rollout(&controls)
+        .unwrap()
+        .observe("attitudes")
+        .unwrap();
+    let states: Vec<usize> = (1..=STEPS).collect();
+    let off = |n: &usize| attitudes[(0, *n)] + f64::from(u8::from(n % 10 == 0)) * 0.5;
+    wrong.push(
+        Experiment::new("outliers", simulator, controls).saw(Recorded {
+            observable: "attitudes".into(),
+            entry: 0,
+            values: states.iter().map(off).collect(),
+            states,
+            deviation: NOISE,
+        }),
+    );
+    let robust = IdentifySettings {
+        loss: Loss::Cauchy(3.0),
+        ..settings
+    };
+    let found = identify(&wrong, &unknowns, &robust, go).unwrap();
+    assert!(
+        found.chi_squared < 2.0 && found.inflation < 2.0,
+        "{found:?}"
+    );
+}
+
+/// Functions must give as many residuals as before, and may fail for good.
+#[test]
+fn functions_are_held_to_their_word() {
+    let run = |count: fn(f64) -> usize| {
+        let simulator = vehicle(0.4);
+        let controls = Controls::zeros(&simulator, STEPS);
+        let of =
+            move |a: &[DMatrix<f64>]| Ok(DVector::from_element(count(a[0][(0, 0)]), a[0][(0, 0)]));
+        Experiment::new("run", simulator, controls).saw_function(&["attitudes"], vec![STEPS], of)
+    };
+    let settings = IdentifySettings::default();
+    let go = |_: &_| ControlFlow::Continue(());
+    let unknowns = [Unknown::new(NAMES[0])];
+    let error = identify(&[run(|_| 0)], &unknowns, &settings, go).unwrap_err();
+    says(error, &["attitudes", "at least one"]);
+    // Differences of the function see it.
+    let error = identify(
+        &[run(|x| 1 + (x.to_bits() % 2) as usize)],
+        &unknowns,
+        &settings,
+        go,
+    );
+    if let Err(error) = error {
+        says(error, &["as many as before"]);
+    }
+    let scaled = experiments(0.0, 10).swap_remove(0).scaled("hull.mass", 2.0);
+    says(
+        identify(&[scaled], &unknowns, &settings, go).unwrap_err(),
+        &["hull.mass", "no unknown"],
+    );
+}

@@ -83,3 +83,44 @@ fn crates_are_as_the_rules_say() {
     let unused: Vec<_> = allowed.iter().filter(|l| !used.contains(*l)).collect();
     assert!(unused.is_empty(), "{unused:?}");
 }
+
+/// Crates with their features, as one build has them.
+fn built(arguments: &[&str]) -> BTreeSet<String> {
+    let mut cargo = std::process::Command::new(env!("CARGO"));
+    let form = [
+        "tree", "--locked", "--prefix", "none", "--format", "{p} {f}",
+    ];
+    let made = cargo.current_dir(root()).args(form).args(arguments);
+    let made = made.output().unwrap();
+    let said = String::from_utf8_lossy(&made.stderr);
+    assert!(made.status.success(), "{said}");
+    let lines = String::from_utf8(made.stdout).unwrap();
+    lines
+        .lines()
+        .map(|line| line.trim_end_matches(" (*)").to_string())
+        .collect()
+}
+
+/// The Python package is built from what the tests are, but for crates of its own: otherwise the library is compiled once more for it.
+#[test]
+fn python_and_the_tests_share_what_is_compiled() {
+    const OWN: [&str; 8] = [
+        "hydrograd-python",
+        "ndarray",
+        "numpy",
+        "pyo3",
+        "pyo3-build-config",
+        "pyo3-ffi",
+        "rustc-hash",
+        "target-lexicon",
+    ];
+    let tests = built(&["--features", "cli,gpu", "--edges", "normal,build,dev"]);
+    let python = ["--manifest-path", "python/Cargo.toml", "--edges"];
+    let python = built(&[&python[..], &["normal,build"]].concat());
+    let own = |line: &&String| OWN.iter().any(|own| line.starts_with(&format!("{own} ")));
+    let unlike: Vec<&String> = python.difference(&tests).filter(|l| !own(l)).collect();
+    assert!(
+        unlike.is_empty(),
+        "ask for the features of these in python/Cargo.toml, or among the tests' dependencies: {unlike:#?}"
+    );
+}

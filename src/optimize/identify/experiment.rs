@@ -6,7 +6,7 @@ use crate::{Error, Result};
 use nalgebra::{DMatrix, DVector};
 use std::collections::BTreeMap;
 use std::f64::consts::TAU;
-use std::sync::Arc;
+use std::sync::{Arc, OnceLock};
 
 /// Observables that are angles: differences of theirs are taken the shorter way.
 const ANGLES: [&str; 2] = ["attitudes", "site_attitudes"];
@@ -35,6 +35,8 @@ pub(super) struct Derived {
     pub observables: Vec<String>,
     pub states: Vec<usize>,
     pub function: Arc<Function>,
+    /// Number of residuals, once it is known.
+    count: Arc<OnceLock<usize>>,
 }
 
 impl Derived {
@@ -48,6 +50,17 @@ impl Derived {
     /// Residuals.
     pub fn value(&self, seen: &[DMatrix<f64>]) -> Result<DVector<f64>> {
         let found = (self.function)(seen)?;
+        let count = *self.count.get_or_init(|| found.len());
+        if found.len() != count || count == 0 {
+            return Err(Error::input(
+                format!("function of {:?}", self.observables),
+                format!("{} residuals", found.len()),
+                match count {
+                    0 => "must give at least one".to_string(),
+                    count => format!("must give as many as before, {count}"),
+                },
+            ));
+        }
         match found.iter().position(|x| !x.is_finite()) {
             None => Ok(found),
             Some(i) => Err(Error::input(
@@ -105,6 +118,7 @@ impl Experiment {
             observables: observables.iter().map(|name| (*name).to_string()).collect(),
             states,
             function: Arc::new(function),
+            count: Arc::default(),
         });
         self
     }

@@ -8,6 +8,8 @@ use std::ops::ControlFlow;
 
 /// Part of the expected fall that a step must bring.
 const ENOUGH: f64 = 1e-4;
+/// Damping up to which a step is nearly that of Gauss and Newton.
+const LIGHT: f64 = 1.0;
 /// Damping at which no step is left.
 const MOST_DAMPING: f64 = 1e14;
 
@@ -69,7 +71,7 @@ impl<'m, 'a> Marquardt<'m, 'a> {
         let mut at = self.evaluate(&self.misfit.start())?;
         let mut linear = self.misfit.linearise(&at)?;
         let (mut jacobians, mut iterations) = (1, 0);
-        let (mut damping, mut growth) = (self.settings.damping, 2.0);
+        let (mut damping, mut growth, mut refused) = (self.settings.damping, 2.0, 0);
         let stop = loop {
             if iterations == self.settings.iterations {
                 break IdentifyStop::Budget;
@@ -79,12 +81,24 @@ impl<'m, 'a> Marquardt<'m, 'a> {
             }
             iterations += 1;
             let step = self.step(&at.x, &linear, damping);
-            if step.expected <= self.settings.cost_tolerance * at.cost {
+            // Heavy damping makes any step small: that is no end.
+            let is_near = step.expected.abs() <= self.settings.cost_tolerance * at.cost;
+            if is_near && refused > 0 {
+                break IdentifyStop::Stuck;
+            }
+            if is_near && damping <= LIGHT {
                 break IdentifyStop::Cost;
+            }
+            if step.expected <= 0.0 {
+                damping *= growth;
+                growth *= 2.0;
+                refused += 1;
+                continue;
             }
             let trial = match self.evaluate(&step.to) {
                 Ok(trial) => Some(trial),
-                Err(stop @ Error::Stopped { .. }) => return Err(stop),
+                // The caller's own reasons, and what its function of observables raised.
+                Err(stop @ (Error::Stopped { .. } | Error::Controller { .. })) => return Err(stop),
                 Err(_) => {
                     self.failures += 1;
                     None
@@ -101,9 +115,11 @@ impl<'m, 'a> Marquardt<'m, 'a> {
                 // Nielsen's rule: no jumps as the model gets better.
                 damping *= f64::max(1.0 / 3.0, 1.0 - (2.0 * ratio - 1.0).powi(3));
                 growth = 2.0;
+                refused = 0;
             } else {
                 damping *= growth;
                 growth *= 2.0;
+                refused += 1;
             }
             let told = IdentifyProgress {
                 iteration: iterations,
@@ -115,10 +131,10 @@ impl<'m, 'a> Marquardt<'m, 'a> {
             if progress(&told).is_break() {
                 break IdentifyStop::Asked;
             }
-            if is_taken && fell <= self.settings.cost_tolerance * at.cost {
+            if is_taken && damping <= LIGHT && fell <= self.settings.cost_tolerance * at.cost {
                 break IdentifyStop::Cost;
             }
-            if is_taken && step.size <= self.settings.step_tolerance {
+            if is_taken && damping <= LIGHT && step.size <= self.settings.step_tolerance {
                 break IdentifyStop::Step;
             }
         };
@@ -133,35 +149,72 @@ impl<'m, 'a> Marquardt<'m, 'a> {
         })
     }
 
-    /// The damped step, within the bounds.
+    /// The damped step, within the bounds: what would leave them stays there, and the others are found anew.
     fn step(&mut self, x: &DVector<f64>, linear: &Linear, damping: f64) -> Step {
         let Linear {
             residuals,
             jacobian,
         } = linear;
         let gradient = jacobian.tr_mul(residuals);
-        let free: Vec<usize> = (0..x.len())
+        for i in 0..x.len() {
+            self.scale[i] = self.scale[i].max(jacobian.column(i).norm());
+        }
+        let mut delta = DVector::zeros(x.len());
+        let mut free: Vec<usize> = (0..x.len())
             .filter(|&i| {
                 let [least, largest] = self.misfit.bounds(i);
                 !(x[i] <= least && gradient[i] > 0.0 || x[i] >= largest && gradient[i] < 0.0)
             })
             .collect();
-        for i in 0..x.len() {
-            self.scale[i] = self.scale[i].max(jacobian.column(i).norm());
+        let mut size = 0.0;
+        while !free.is_empty() {
+            free.iter().for_each(|i| delta[*i] = 0.0);
+            let right = residuals + jacobian * &delta;
+            let (found, errors) = self.damped(&free, jacobian, &right, damping);
+            let mut kept = Vec::new();
+            for (k, &i) in free.iter().enumerate() {
+                let [least, largest] = self.misfit.bounds(i);
+                let to = x[i] + found[k];
+                match (least..=largest).contains(&to) {
+                    true => kept.push(i),
+                    false => delta[i] = to.clamp(least, largest) - x[i],
+                }
+            }
+            if kept.len() == free.len() {
+                size = 0.0;
+                for (k, &i) in free.iter().enumerate() {
+                    delta[i] = found[k];
+                    size = f64::max(size, found[k].abs() / errors[k].max(f64::MIN_POSITIVE));
+                }
+                break;
+            }
+            free = kept;
         }
+        let after = residuals + jacobian * &delta;
+        let mut to = x + &delta;
+        for i in 0..to.len() {
+            let [least, largest] = self.misfit.bounds(i);
+            to[i] = to[i].clamp(least, largest);
+        }
+        Step {
+            expected: 0.5 * (residuals.norm_squared() - after.norm_squared()),
+            to,
+            size,
+        }
+    }
+
+    /// The step of the coordinates `free` that answers to `residuals`, [R; √λ D] δ = [−Qᵀr; 0], and what it is measured by: the roots of the diagonal of the damped information's inverse.
+    fn damped(
+        &self,
+        free: &[usize],
+        jacobian: &DMatrix<f64>,
+        residuals: &DVector<f64>,
+        damping: f64,
+    ) -> (DVector<f64>, DVector<f64>) {
         let n = free.len();
-        if n == 0 {
-            return Step {
-                to: x.clone(),
-                expected: 0.0,
-                size: 0.0,
-            };
-        }
-        let chosen = jacobian.select_columns(&free);
-        let factored = chosen.qr();
+        let factored = jacobian.select_columns(free).qr();
         let (q, r) = (factored.q(), factored.r());
         let rows = r.nrows();
-        // [R; √λ D] δ = [−Qᵀr; 0].
         let mut system = DMatrix::zeros(rows + n, n);
         system.rows_mut(0, rows).copy_from(&r);
         for (k, i) in free.iter().enumerate() {
@@ -174,38 +227,14 @@ impl<'m, 'a> Marquardt<'m, 'a> {
         let mut right = DVector::zeros(rows + n);
         right.rows_mut(0, rows).copy_from(&-q.tr_mul(residuals));
         let damped = system.qr();
-        let right = damped.q().tr_mul(&right);
         let triangle = damped.r();
-        let mut delta = DVector::zeros(x.len());
-        if let Some(found) = triangle.solve_upper_triangular(&right) {
-            for (k, i) in free.iter().enumerate() {
-                delta[*i] = found[k];
-            }
-        }
-        let mut to = x + &delta;
-        for i in 0..to.len() {
-            let [least, largest] = self.misfit.bounds(i);
-            to[i] = to[i].clamp(least, largest);
-        }
-        let delta = &to - x;
-        let after = residuals + jacobian * &delta;
-        // 1/√ of the damped information's diagonal of inverses.
+        let right = damped.q().tr_mul(&right);
+        let step = triangle.solve_upper_triangular(&right);
         let inverse = triangle.solve_upper_triangular(&DMatrix::identity(n, n));
-        let size = inverse.map_or(f64::INFINITY, |inverse| {
-            let part = |(k, i): (usize, &usize)| {
-                let error = inverse.row(k).norm();
-                if error > 0.0 {
-                    delta[*i].abs() / error
-                } else {
-                    0.0
-                }
-            };
-            free.iter().enumerate().map(part).fold(0.0, f64::max)
-        });
-        Step {
-            expected: 0.5 * (residuals.norm_squared() - after.norm_squared()),
-            to,
-            size,
-        }
+        let errors = |inverse: DMatrix<f64>| DVector::from_fn(n, |k, _| inverse.row(k).norm());
+        (
+            step.unwrap_or_else(|| DVector::zeros(n)),
+            inverse.map_or_else(|| DVector::zeros(n), errors),
+        )
     }
 }

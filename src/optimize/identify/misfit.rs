@@ -38,7 +38,7 @@ pub(super) struct Misfit<'a> {
     pub experiments: &'a [Experiment],
     pub unknowns: Vec<Searched>,
     starts: Vec<Option<Start>>,
-    loss: Loss,
+    pub loss: Loss,
     coordinates: usize,
 }
 
@@ -80,8 +80,29 @@ impl<'a> Misfit<'a> {
         }
         let mut coordinates = unknowns.len();
         let mut starts = Vec::new();
+        for unknown in &unknowns {
+            if unknowns.iter().filter(|u| u.name == unknown.name).count() > 1 {
+                let remedy = "another unknown has this name";
+                return Err(Error::input(
+                    "unknown",
+                    format!("{:?}", unknown.name),
+                    remedy,
+                ));
+            }
+        }
         for experiment in experiments {
             experiment.check()?;
+            if let Some(name) = experiment
+                .scales
+                .keys()
+                .find(|name| !taken.contains(name.as_str()))
+            {
+                return Err(Error::input(
+                    format!("experiment {:?}: scale", experiment.name),
+                    format!("{name:?}"),
+                    "no unknown sets this parameter: give the simulator the value itself",
+                ));
+            }
             for (_, target) in all() {
                 let known = match target {
                     Target::Parameter(name) => {
@@ -126,7 +147,7 @@ impl<'a> Misfit<'a> {
     }
 
     /// Coordinates of which something was known beforehand.
-    fn priors(&self) -> Vec<(usize, Prior)> {
+    pub fn priors(&self) -> Vec<(usize, Prior)> {
         let known = self.unknowns.iter().enumerate();
         let mut out: Vec<_> = known.filter_map(|(i, u)| Some((i, u.prior?))).collect();
         for start in self.starts.iter().flatten() {
@@ -301,8 +322,12 @@ impl<'a> Misfit<'a> {
             initial_v: start.is_some_and(|s| s.deviations[1] > 0.0),
             ..Variables::default()
         };
-        let few = self.experiments[k].derived.is_empty()
-            && self.experiments[k].residuals() < self.coordinates;
+        let own = parameters.len()
+            + n * (usize::from(variables.initial_q) + usize::from(variables.initial_v));
+        if own == 0 {
+            return Ok(DMatrix::zeros(at.differences[k].len(), self.coordinates));
+        }
+        let few = self.experiments[k].derived.is_empty() && self.experiments[k].residuals() < own;
         let made = match few {
             true => self.by_reverse(k, &at.rollouts[k], &variables)?,
             false => self.by_forward(k, &at.rollouts[k], &variables)?,

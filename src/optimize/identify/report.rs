@@ -29,7 +29,7 @@ pub struct Fitted {
     pub start: f64,
     /// Whether a bound holds it; what is said of the others then takes it as known.
     pub at_bound: bool,
-    /// Its standard error in parts of what was known beforehand; about 1: the recordings tell nothing of it.
+    /// Its standard error in parts of what was known beforehand; about 1: the recordings tell nothing of it. None at a bound, and where nothing was known.
     pub of_prior: Option<f64>,
     /// The parameters that it sets, and what each is of it.
     pub sets: Vec<(String, f64)>,
@@ -87,7 +87,7 @@ pub struct Identified {
     pub series: Vec<SeriesFit>,
     /// The misfit.
     pub cost: f64,
-    /// Sum of squared residuals over the degrees of freedom: 1 for noise as large as it is said to be.
+    /// Sum of squared residuals, weighed by the loss, over the degrees of freedom that the recordings have left: 1 for noise as large as it is said to be.
     pub chi_squared: f64,
     /// What standard errors are to be multiplied by where residuals aren't that noise: √(χ² (1 + ρ)/(1 − ρ)), at least 1, ρ being the mean autocorrelation.
     pub inflation: f64,
@@ -122,7 +122,7 @@ impl Identified {
         })
     }
 
-    /// A simulator's parameters with what was found.
+    /// A simulator's parameters with what was found; an experiment's own scales aren't in them.
     ///
     /// # Errors
     /// A simulator that lacks one of them.
@@ -140,50 +140,53 @@ impl Identified {
 /// Inverse of the information, of coordinates that no bound holds, and the directions that it tells least of.
 struct Known {
     covariance: DMatrix<f64>,
-    /// Direction (a deviation along it, in coordinates of the search) and deviation in parts of sizes.
+    /// Change of the coordinates of the search by one standard deviation along a direction, and its largest in parts of sizes; of what nothing tells any change, and infinity.
     directions: Vec<(DVector<f64>, f64)>,
 }
 
 impl Known {
     fn new(information: &DMatrix<f64>, held: &[bool], sizes: &DVector<f64>) -> Self {
         let n = sizes.len();
-        let free: Vec<usize> = (0..n).filter(|i| !held[*i]).collect();
-        if free.is_empty() {
-            return Self {
-                covariance: DMatrix::zeros(n, n),
-                directions: Vec::new(),
-            };
-        }
-        let scaled = DMatrix::from_fn(free.len(), free.len(), |i, j| {
-            let (a, b) = (free[i], free[j]);
-            sizes[a] * information[(a, b)] * sizes[b]
-        });
-        let decomposed = scaled.symmetric_eigen();
-        let top = decomposed.eigenvalues.iter().copied().fold(0.0, f64::max);
         let mut covariance = DMatrix::zeros(n, n);
         let mut directions = Vec::new();
-        for (value, vector) in
-            (decomposed.eigenvalues.iter()).zip(decomposed.eigenvectors.column_iter())
-        {
-            let deviation = match *value > SINGULAR * top {
-                true => 1.0 / value.sqrt(),
-                false => f64::INFINITY,
-            };
-            let mut direction = DVector::zeros(n);
-            for (k, i) in free.iter().enumerate() {
-                direction[*i] = sizes[*i] * vector[k];
-            }
-            for i in 0..n {
-                for j in 0..n {
-                    let part = direction[i] * direction[j];
-                    // Nothing times infinity is nothing here.
-                    let seen = part.abs() > SINGULAR.sqrt() * sizes[i] * sizes[j];
-                    if deviation.is_finite() || seen {
-                        covariance[(i, j)] += deviation * deviation * part;
+        let (told, untold): (Vec<usize>, Vec<usize>) = (0..n)
+            .filter(|i| !held[*i])
+            .partition(|i| information[(*i, *i)] > 0.0);
+        for i in untold {
+            covariance[(i, i)] = f64::INFINITY;
+            let change = DVector::from_fn(n, |k, _| if k == i { sizes[i] } else { 0.0 });
+            directions.push((change, f64::INFINITY));
+        }
+        if !told.is_empty() {
+            // Each in what alone would be its standard error: units play no part.
+            let scale = |k: usize| 1.0 / information[(told[k], told[k])].sqrt();
+            let scaled = DMatrix::from_fn(told.len(), told.len(), |i, j| {
+                scale(i) * information[(told[i], told[j])] * scale(j)
+            });
+            let decomposed = scaled.symmetric_eigen();
+            let pairs = decomposed.eigenvalues.iter();
+            for (value, vector) in pairs.zip(decomposed.eigenvectors.column_iter()) {
+                let is_told = *value > SINGULAR * told.len() as f64;
+                let by = if is_told { 1.0 / value.sqrt() } else { 1.0 };
+                let mut change = DVector::zeros(n);
+                for (k, i) in told.iter().enumerate() {
+                    change[*i] = by * scale(k) * vector[k];
+                }
+                // What takes no part in it isn't untold by it.
+                let part = |k: usize| vector[k].abs() > SINGULAR.sqrt();
+                for (a, &i) in told.iter().enumerate() {
+                    for (b, &j) in told.iter().enumerate() {
+                        let product = change[i] * change[j];
+                        covariance[(i, j)] += match (is_told, part(a) && part(b)) {
+                            (true, _) => product,
+                            (false, true) => product.signum() * f64::INFINITY,
+                            (false, false) => 0.0,
+                        };
                     }
                 }
+                let deviation = change.component_div(sizes).amax();
+                directions.push((change, if is_told { deviation } else { f64::INFINITY }));
             }
-            directions.push((direction, deviation));
         }
         directions.sort_by(|a, b| b.1.total_cmp(&a.1));
         Self {
@@ -248,27 +251,31 @@ pub(super) fn report(
         let mut profile = Vec::new();
         if deviation.is_finite() {
             for k in PROFILE {
-                let mut to = x + k * *deviation * direction;
+                let mut to = x + k * direction;
                 for i in 0..to.len() {
                     let [least, largest] = misfit.bounds(i);
                     to[i] = to[i].clamp(least, largest);
                 }
                 simulations += misfit.experiments.len();
-                let rise = misfit.evaluate(&to).ok().map(|e| e.cost - best.cost);
+                let rise = match misfit.evaluate(&to) {
+                    Ok(found) => Some(found.cost - best.cost),
+                    Err(stop @ (Error::Stopped { .. } | Error::Controller { .. })) => {
+                        return Err(stop);
+                    }
+                    Err(_) => None,
+                };
+                // Bounds may be nearer.
+                let moved = &to - x;
+                let expected = 0.5 * (&linear.jacobian * &moved).norm_squared();
                 profile.push(Profile {
                     deviations: k,
                     rise: rise.filter(|x| x.is_finite()),
-                    expected: 0.5 * k * k,
+                    expected,
                 });
             }
         }
-        let by = if deviation.is_finite() {
-            *deviation
-        } else {
-            1.0
-        };
         let change = (misfit.unknowns.iter().enumerate())
-            .map(|(i, u)| by * direction[i] * u.slope(x[i]))
+            .map(|(i, u)| direction[i] * u.slope(x[i]))
             .collect();
         weak.push(WeakDirection {
             change,
@@ -291,7 +298,7 @@ pub(super) fn report(
             standard_error: error * u.slope(x[i]),
             start: u.value(u.start),
             at_bound: held[i],
-            of_prior: u.prior.map(|prior| error / prior.deviation),
+            of_prior: (u.prior.filter(|_| !held[i])).map(|prior| error / prior.deviation),
             sets: named(sets),
             starts: named(starts),
         }
@@ -302,17 +309,24 @@ pub(super) fn report(
         (q.as_slice().to_vec(), v.as_slice().to_vec())
     });
     let mut series = Vec::new();
-    let (mut squares, mut count, mut correlated) = (0.0, 0, 0.0);
+    // What a loss forgives counts as little here.
+    let weigh = |r: &[f64]| -> (Vec<f64>, f64) {
+        let weights: Vec<f64> = r.iter().map(|r| misfit.loss.of(*r).1).collect();
+        let weighed = r.iter().zip(&weights).map(|(r, w)| w.sqrt() * r);
+        (weighed.collect(), weights.iter().sum())
+    };
+    let (mut squares, mut count, mut correlated) = (0.0, 0.0, 0.0);
     for (experiment, r) in misfit.experiments.iter().zip(&best.differences) {
         let mut from = 0;
         for seen in &experiment.recorded {
             let r = &r.as_slice()[from..from + seen.states.len()];
             from += seen.states.len();
             let square: f64 = r.iter().map(|x| x * x).sum();
-            let own = autocorrelation(r);
-            squares += square;
-            count += r.len();
-            correlated += own * r.len() as f64;
+            let (weighed, weight) = weigh(r);
+            let own = autocorrelation(&weighed);
+            squares += weighed.iter().map(|x| x * x).sum::<f64>();
+            count += weight;
+            correlated += own * weight;
             let labels = observable(&seen.observable)?.labels(experiment.simulator.scene());
             series.push(SeriesFit {
                 experiment: experiment.name.clone(),
@@ -325,8 +339,9 @@ pub(super) fn report(
         if !experiment.derived.is_empty() {
             let r = &r.as_slice()[from..];
             let square: f64 = r.iter().map(|x| x * x).sum();
-            squares += square;
-            count += r.len();
+            let (weighed, weight) = weigh(r);
+            squares += weighed.iter().map(|x| x * x).sum::<f64>();
+            count += weight;
             let names = experiment
                 .derived
                 .iter()
@@ -340,11 +355,14 @@ pub(super) fn report(
             });
         }
     }
-    let freedom = count
-        .saturating_sub(held.iter().filter(|h| !**h).count())
-        .max(1);
-    let chi_squared = squares / freedom as f64;
-    let rho = (correlated / count.max(1) as f64).clamp(0.0, 0.999);
+    // What priors know already isn't taken from the data.
+    let mut used: Vec<f64> = held.iter().map(|h| if *h { 0.0 } else { 1.0 }).collect();
+    for (i, prior) in misfit.priors() {
+        used[i] *= (1.0 - (known.error(i) / prior.deviation).powi(2)).clamp(0.0, 1.0);
+    }
+    let freedom = (count - used.iter().sum::<f64>()).max(1.0);
+    let chi_squared = squares / freedom;
+    let rho = (correlated / count.max(1.0)).clamp(0.0, 0.999);
     Ok(Identified {
         unknowns: unknowns.collect(),
         correlations: correlations.collect(),

@@ -203,8 +203,15 @@ impl Searched {
             false => coordinate("within", least)?,
         };
         let bounds = [least, coordinate("within", largest)?];
+        if bounds[0] >= bounds[1] {
+            return Err(Error::input(
+                place("within"),
+                format!("{} to {}", unknown.bounds[0], unknown.bounds[1]),
+                "give the least value first, below the largest",
+            ));
+        }
         let start = coordinate("start", start)?;
-        if !start.is_finite() || bounds[0] >= bounds[1] || start < bounds[0] || start > bounds[1] {
+        if !start.is_finite() || start < bounds[0] || start > bounds[1] {
             return Err(Error::input(
                 place("start"),
                 match by_logarithm {
@@ -212,7 +219,7 @@ impl Searched {
                     false => start,
                 },
                 format!(
-                    "give a finite number within its bounds, {} to {}, the least first",
+                    "give a finite number within its bounds, {} to {}",
                     unknown.bounds[0], unknown.bounds[1]
                 ),
             ));

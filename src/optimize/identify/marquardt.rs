@@ -166,7 +166,7 @@ impl<'m, 'a> Marquardt<'m, 'a> {
                 !(x[i] <= least && gradient[i] > 0.0 || x[i] >= largest && gradient[i] < 0.0)
             })
             .collect();
-        let mut size = 0.0;
+        let (mut size, mut at_bound) = (0.0, false);
         while !free.is_empty() {
             free.iter().for_each(|i| delta[*i] = 0.0);
             let right = residuals + jacobian * &delta;
@@ -177,7 +177,11 @@ impl<'m, 'a> Marquardt<'m, 'a> {
                 let to = x[i] + found[k];
                 match (least..=largest).contains(&to) {
                     true => kept.push(i),
-                    false => delta[i] = to.clamp(least, largest) - x[i],
+                    false => {
+                        delta[i] = to.clamp(least, largest) - x[i];
+                        // However short: the others go on from there.
+                        at_bound = true;
+                    }
                 }
             }
             if kept.len() == free.len() {
@@ -199,7 +203,7 @@ impl<'m, 'a> Marquardt<'m, 'a> {
         Step {
             expected: 0.5 * (residuals.norm_squared() - after.norm_squared()),
             to,
-            size,
+            size: if at_bound { f64::INFINITY } else { size },
         }
     }
 

@@ -259,7 +259,7 @@ fn starts_and_outliers() {
     for entry in [0, 1, 2] {
         let states: Vec<usize> = (1..=STEPS).collect();
         // Every fifteenth reading of the pitch is nonsense.
-        let wrong = |n: usize| f64::from(u8::from(entry == 1 && n % 15 == 0));
+        let wrong = |n: usize| f64::from(u8::from(entry == 1 && n.is_multiple_of(15)));
         run = run.saw(Recorded {
             observable: "attitudes".into(),
             entry,
@@ -420,7 +420,7 @@ fn errors_have_no_scale() {
         .observe("attitudes")
         .unwrap();
     let states: Vec<usize> = (1..=STEPS).collect();
-    let off = |n: &usize| attitudes[(0, *n)] + f64::from(u8::from(n % 10 == 0)) * 0.5;
+    let off = |n: &usize| attitudes[(0, *n)] + f64::from(u8::from(n.is_multiple_of(10))) * 0.5;
     wrong.push(
         Experiment::new("outliers", simulator, controls).saw(Recorded {
             observable: "attitudes".into(),

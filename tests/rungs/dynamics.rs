@@ -219,7 +219,7 @@ pub fn scene() -> Scene {
     let edge = edge.forward([1.0, 0.1, -0.2]).normal([0.2, 0.0, 1.0]);
     scene.add_force(edge.factor(0.8).smoothing(0.3).into());
     let tendon = Tendon::new([("weight", 0.3), ("propeller", -0.1)]).stiffness(40.0);
-    scene.add_force(tendon.damping(2.0).gain(0.2).into());
+    scene.add_force(tendon.damping(2.0).gain(2.0).into());
     scene
 }
 

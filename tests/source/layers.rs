@@ -99,8 +99,8 @@ const LAYERS: [(&str, &[&str]); 23] = [
             "adjoint", "geometry", "boundary", "coupling", "dynamics", "scene", "shape", "simulate",
         ],
     ),
-    // Descent stands on what a user sees.
-    ("optimize", &["adjoint", "simulate"]),
+    // Descent stands on what a user sees: parameters are what is identified.
+    ("optimize", &["adjoint", "dynamics", "simulate"]),
     // The facade names what it shows; the command line stands on the facade.
     (
         "lib",
@@ -116,12 +116,13 @@ const LAYERS: [(&str, &[&str]); 23] = [
 ];
 
 /// Modules of which only the named parts may be used.
-const ONLY: [(&str, &str, &[&str]); 5] = [
+const ONLY: [(&str, &str, &[&str]); 6] = [
     ("shape", "adjoint", &["lie"]),
     ("contact", "adjoint", &["lie"]),
     ("multibody", "adjoint", &["lie"]),
     ("robot", "adjoint", &["lie"]),
     ("optimize", "adjoint", &["lie", "sample"]),
+    ("optimize", "dynamics", &["Drive", "Parameters"]),
 ];
 
 /// Paths `from::a::b` in the text, as the segments after `from`; a group `from::{a::c, b}` gives one

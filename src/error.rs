@@ -181,6 +181,7 @@ impl Error {
     }
 
     /// The same, said of one of several things that are done side by side.
+    #[cfg(feature = "opt")]
     pub(crate) fn within(mut self, what: &str) -> Self {
         if let Self::Input { place, .. } | Self::Unresolved { place, .. } = &mut self {
             *place = format!("{what}: {place}");

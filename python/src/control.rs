@@ -3,7 +3,8 @@
 use crate::array::{self, Dim, array};
 use crate::cost::CostTerm;
 use crate::error::{OrRaise, input, internal};
-use crate::interrupt::{Interrupt, Progress, followed, long};
+use crate::interrupt::{Progress, Told, followed, long};
+use crate::optimize::class;
 use crate::rollout::Rollout;
 use crate::simulator::Simulator;
 use crate::state::State;
@@ -20,10 +21,6 @@ use std::ops::ControlFlow;
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 
 type Numbers<'py> = Bound<'py, PyArrayDyn<f64>>;
-
-fn class<'py>(py: Python<'py>, name: &str) -> PyResult<Bound<'py, PyAny>> {
-    py.import("hydrograd._optimize")?.getattr(name)
-}
 
 fn stopped(stop: IlqrStop) -> String {
     let stop = serde_json::to_value(stop).unwrap_or_default();
@@ -181,39 +178,17 @@ impl Start {
     }
 }
 
-/// A callback that is told of every iteration, and ends the work by giving True or by raising.
-struct Told {
-    call: Option<Py<PyAny>>,
-    raised: Arc<Mutex<Option<PyErr>>>,
-}
-
-impl Told {
-    fn tell(&self, interrupt: &Interrupt, p: &IlqrProgress) -> ControlFlow<()> {
-        interrupt.check()?;
-        let Some(call) = &self.call else {
-            return ControlFlow::Continue(());
-        };
-        let told = Python::attach(|py| -> PyResult<bool> {
-            let parts = (
-                p.iteration,
-                p.cost,
-                p.expected,
-                p.part,
-                p.regularisation,
-                p.gradient,
-            );
-            let progress = class(py, "IlqrProgress")?.call1(parts)?;
-            call.bind(py).call1((progress,))?.is_truthy()
-        });
-        match told {
-            Ok(false) => ControlFlow::Continue(()),
-            Ok(true) => ControlFlow::Break(()),
-            Err(raised) => {
-                *lock(&self.raised) = Some(raised);
-                ControlFlow::Break(())
-            }
-        }
-    }
+/// An iteration, as a callback is told of it.
+fn iteration<'py>(py: Python<'py>, p: &IlqrProgress) -> PyResult<Bound<'py, PyAny>> {
+    let parts = (
+        p.iteration,
+        p.cost,
+        p.expected,
+        p.part,
+        p.regularisation,
+        p.gradient,
+    );
+    class(py, "IlqrProgress")?.call1(parts)
 }
 
 fn lock<T>(of: &Mutex<T>) -> MutexGuard<'_, T> {
@@ -315,22 +290,15 @@ pub fn ilqr<'py>(
         trials,
         ..IlqrSettings::default()
     };
-    let raised = Arc::new(Mutex::new(None));
-    let told = Told {
-        call: progress.map(Bound::unbind),
-        raised: raised.clone(),
-    };
+    let (told, raised) = Told::new(progress);
     let inner = me.inner.clone();
     let made = long(py, move |interrupt| {
         let state = state.map_or_else(|| inner.initial(), Ok)?;
         optimize::ilqr(&inner, &state, &problem, start.guess(), &settings, |p| {
-            told.tell(interrupt, p)
+            told.tell(interrupt, |py| iteration(py, p))
         })
     });
-    if let Some(raised) = lock(&raised).take() {
-        return Err(raised);
-    }
-    planned(simulator, made?)
+    planned(simulator, raised.or(made)?)
 }
 
 /// Model-predictive control: a plan over `knots` of `hold` time steps of the simulator `model`, made again by `iterations` of iLQR every `every` of its time steps from where the plant is, from the plan

@@ -1,8 +1,9 @@
 //! Parameters from recordings.
 
-use crate::array::{Dim, array};
-use crate::error::{OrRaise, input};
-use crate::interrupt::long;
+use crate::array::{self, Dim, array};
+use crate::error::{OrRaise, counts, input};
+use crate::interrupt::{Told, long};
+use crate::optimize::class;
 use crate::simulator::Simulator;
 use hydrograd::optimize::{self, IdentifyProgress, IdentifySettings, Loss, Recorded};
 use hydrograd::simulate::observable::observable;
@@ -11,12 +12,7 @@ use nalgebra::{DMatrix, DVector};
 use pyo3::prelude::*;
 use pyo3::types::PyDict;
 use std::collections::BTreeMap;
-use std::ops::ControlFlow;
-use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
-
-fn class<'py>(py: Python<'py>, name: &str) -> PyResult<Bound<'py, PyAny>> {
-    py.import("hydrograd._optimize")?.getattr(name)
-}
+use std::sync::{Mutex, MutexGuard, PoisonError};
 
 /// A number to be found by `identify`: the parameter `name`, or several, `sets` = {parameter: factor}; `sets_start` = {coordinate: factor} sets coordinates of
 /// the initial state by their labels ("arm.angle"), in every experiment. The search begins at `start` (default: the prior's mean, or the first experiment's
@@ -84,7 +80,7 @@ impl Experiment {
     fn new(
         name: &str,
         simulator: &Bound<'_, Simulator>,
-        steps: Option<usize>,
+        #[pyo3(from_py_with = counts::steps)] steps: Option<usize>,
         controls: Option<&Bound<'_, PyAny>>,
         start_within: Option<(f64, f64)>,
     ) -> PyResult<Self> {
@@ -128,10 +124,7 @@ impl Experiment {
         let values = floats(values)?;
         let simulator = self.lock().simulator().clone();
         let entry = entry_of(&simulator, observable, entry)?;
-        let states = match states {
-            Some(given) => numbers(given)?,
-            None => (0..=self.steps).collect(),
-        };
+        let states = self.states(states)?;
         if states.len() != values.len() {
             return Err(input(
                 "experiment: values",
@@ -167,10 +160,7 @@ impl Experiment {
         let shapes = observables.iter();
         let shapes = shapes.map(|name| Ok(observable(name).or_raise()?.shape(system)));
         let shapes = shapes.collect::<PyResult<Vec<Vec<usize>>>>()?;
-        let states = match states {
-            Some(given) => numbers(given)?,
-            None => (0..=self.steps).collect(),
-        };
+        let states = self.states(states)?;
         let function = function.clone().unbind();
         let names = observables.clone();
         let call = move |seen: &[DMatrix<f64>]| {
@@ -179,7 +169,7 @@ impl Experiment {
                 for ((name, shape), values) in names.iter().zip(&shapes).zip(seen) {
                     let dims = [&[values.ncols()], &shape[..]].concat();
                     let values = values.as_slice().to_vec();
-                    given.set_item(name, crate::array::to_python(py, values, &dims)?)?;
+                    given.set_item(name, array::to_python(py, values, &dims)?)?;
                 }
                 floats(&function.bind(py).call1((given,))?)
             })
@@ -211,14 +201,17 @@ impl Experiment {
     fn lock(&self) -> MutexGuard<'_, optimize::Experiment> {
         self.inner.lock().unwrap_or_else(PoisonError::into_inner)
     }
-}
 
-/// Numbers of states.
-fn numbers(given: &Bound<'_, PyAny>) -> PyResult<Vec<usize>> {
-    given.extract().map_err(|_| {
-        let said = given.repr().map_or("?".into(), |r| r.to_string());
-        input("experiment: states", said, "must be whole numbers from 0")
-    })
+    /// Numbers of states; all where none are given.
+    fn states(&self, given: Option<&Bound<'_, PyAny>>) -> PyResult<Vec<usize>> {
+        let Some(given) = given else {
+            return Ok((0..=self.steps).collect());
+        };
+        given.extract().map_err(|_| {
+            let said = given.repr().map_or("?".into(), |r| r.to_string());
+            input("experiment: states", said, "must be whole numbers from 0")
+        })
+    }
 }
 
 /// Numbers, NaN among them.
@@ -236,7 +229,7 @@ fn entry_of(
     name: &str,
     entry: &Bound<'_, PyAny>,
 ) -> PyResult<usize> {
-    observable(name).or_raise()?;
+    let named = observable(name).or_raise()?;
     if let Ok(number) = entry.extract::<usize>() {
         return Ok(number);
     }
@@ -247,7 +240,7 @@ fn entry_of(
             "must be a number from 0, or a label",
         ));
     };
-    let labels = observable(name).or_raise()?.labels(simulator.scene());
+    let labels = named.labels(simulator.scene());
     labels.iter().position(|l| *l == label).ok_or_else(|| {
         input(
             format!("experiment: entry of {name:?}"),
@@ -303,35 +296,16 @@ fn identify<'py>(
     let experiments: Vec<optimize::Experiment> =
         (experiments.iter()).map(|e| e.lock().clone()).collect();
     let unknowns: Vec<_> = unknowns.iter().map(|u| u.inner.clone()).collect();
-    let raised = Arc::new(Mutex::new(None));
-    let (theirs, call) = (raised.clone(), progress.map(Bound::unbind));
+    let (told, raised) = Told::new(progress);
     let made = long(py, move |interrupt| {
-        let told = |p: &IdentifyProgress| {
-            interrupt.check()?;
-            let Some(call) = &call else {
-                return ControlFlow::Continue(());
-            };
-            let answer = Python::attach(|py| -> PyResult<bool> {
-                let parts = (p.iteration, p.cost, p.taken, p.step, p.simulations);
-                let told = class(py, "IdentifyProgress")?.call1(parts)?;
-                call.bind(py).call1((told,))?.is_truthy()
-            });
-            match answer {
-                Ok(false) => ControlFlow::Continue(()),
-                Ok(true) => ControlFlow::Break(()),
-                Err(error) => {
-                    *theirs.lock().unwrap_or_else(PoisonError::into_inner) = Some(error);
-                    ControlFlow::Break(())
-                }
-            }
+        let tell = |p: &IdentifyProgress| {
+            let parts = (p.iteration, p.cost, p.taken, p.step, p.simulations);
+            told.tell(interrupt, |py| class(py, "IdentifyProgress")?.call1(parts))
         };
-        let found = optimize::identify(&experiments, &unknowns, &settings, told)?;
+        let found = optimize::identify(&experiments, &unknowns, &settings, tell)?;
         serde_json::to_string(&found).map_err(|e| Error::input("identify", e, "must be numbers"))
     });
-    if let Some(error) = raised.lock().unwrap_or_else(PoisonError::into_inner).take() {
-        return Err(error);
-    }
-    class(py, "_identified")?.call1((made?,))
+    class(py, "_identified")?.call1((raised.or(made)?,))
 }
 
 pub fn register(m: &Bound<'_, PyModule>) -> PyResult<()> {

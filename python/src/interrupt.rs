@@ -6,7 +6,7 @@ use std::ops::ControlFlow;
 use std::panic::{AssertUnwindSafe, catch_unwind};
 use std::sync::atomic::{AtomicBool, AtomicUsize, Ordering};
 use std::sync::mpsc::{RecvTimeoutError, sync_channel};
-use std::sync::{Arc, OnceLock};
+use std::sync::{Arc, Mutex, OnceLock, PoisonError};
 use std::time::Duration;
 
 /// How often signals are looked at, and progress is told.
@@ -80,6 +80,57 @@ impl Progress {
             self.raised = self.call.call1(py, (done, self.total)).err();
         }
         self.raised.is_none()
+    }
+}
+
+/// A callback of Python that is told of every iteration of a search, and ends it by giving True or by raising.
+pub struct Told {
+    call: Option<Py<PyAny>>,
+    raised: Raised,
+}
+
+/// The exception that a [`Told`] raised.
+#[derive(Clone, Default)]
+pub struct Raised(Arc<Mutex<Option<PyErr>>>);
+
+impl Raised {
+    /// What was made, unless there was one.
+    pub fn or<T>(&self, made: PyResult<T>) -> PyResult<T> {
+        let mut raised = self.0.lock().unwrap_or_else(PoisonError::into_inner);
+        raised.take().map_or(made, Err)
+    }
+}
+
+impl Told {
+    /// Of a callback, if there is one, and what it raises.
+    pub fn new(call: Option<Bound<'_, PyAny>>) -> (Self, Raised) {
+        let raised = Raised::default();
+        let told = Self {
+            call: call.map(Bound::unbind),
+            raised: raised.clone(),
+        };
+        (told, raised)
+    }
+
+    /// Tells it what `progress` makes.
+    pub fn tell(
+        &self,
+        interrupt: &Interrupt,
+        progress: impl for<'py> FnOnce(Python<'py>) -> PyResult<Bound<'py, PyAny>>,
+    ) -> ControlFlow<()> {
+        interrupt.check()?;
+        let Some(call) = &self.call else {
+            return ControlFlow::Continue(());
+        };
+        let answer = Python::attach(|py| call.bind(py).call1((progress(py)?,))?.is_truthy());
+        match answer {
+            Ok(false) => ControlFlow::Continue(()),
+            Ok(true) => ControlFlow::Break(()),
+            Err(error) => {
+                *self.raised.0.lock().unwrap_or_else(PoisonError::into_inner) = Some(error);
+                ControlFlow::Break(())
+            }
+        }
     }
 }
 

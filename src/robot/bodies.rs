@@ -17,6 +17,7 @@ use crate::{Error, Result};
 use hydrograd_adjoint::lie::{Pose, Vec3};
 use nalgebra::Isometry3;
 use std::path::Path;
+use urdf_rs::JointType;
 
 /// A moment of inertia, in that of a point mass at the edge of what the link is, under which it is implausible.
 const THIN: f64 = 1e-4;
@@ -157,17 +158,20 @@ pub(crate) fn import(path: &Path, options: &Options) -> Result<Imported> {
 fn check_names(file: &File, options: &Options) -> Result<()> {
     let links: Vec<&str> = file.robot.links.iter().map(|l| l.name.as_str()).collect();
     let joints: Vec<&str> = file.robot.joints.iter().map(|j| j.name.as_str()).collect();
+    let moving = (file.robot.joints.iter()).filter(|j| j.joint_type != JointType::Fixed);
+    let moving: Vec<&str> = moving.map(|j| j.name.as_str()).collect();
     let all = [
         ("links", &links, options.links.keys().collect::<Vec<_>>()),
         ("start", &joints, options.start.keys().collect()),
-        ("motions", &joints, options.driven.iter().collect()),
+        ("motions", &moving, options.driven.iter().collect()),
+        ("zeros", &moving, options.zeroed.iter().collect()),
     ];
     for (key, known, given) in all {
         if let Some(bad) = given.iter().find(|name| !known.contains(&name.as_str())) {
             return Err(Error::input(
                 format!("{}: {key}", file.path.display()),
                 format!("{bad:?}"),
-                format!("the file has no such name; it has {known:?}"),
+                format!("the file has no such name there; it has {known:?}"),
             ));
         }
     }

@@ -73,5 +73,7 @@ pub(crate) struct Options {
     pub start: BTreeMap<String, f64>,
     /// Joints that motions drive.
     pub driven: Vec<String>,
+    /// Joints that get an offset.
+    pub zeroed: Vec<String>,
     pub links: BTreeMap<String, LinkChoice>,
 }

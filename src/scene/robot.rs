@@ -177,12 +177,8 @@ impl Robot {
             followers: self.mimic,
             without_limits: self.limits == Some(false),
             start: self.start.clone(),
-            driven: self
-                .motions
-                .keys()
-                .chain(self.zeros.keys())
-                .cloned()
-                .collect(),
+            driven: self.motions.keys().cloned().collect(),
+            zeroed: self.zeros.keys().cloned().collect(),
             links: (self.links.iter())
                 .map(|(name, of)| (name.clone(), link(of)))
                 .collect(),
@@ -268,7 +264,8 @@ impl Scene {
         for body in &bodies {
             let mut made = options.body(body, base);
             made.parent = body.parent.map(|p| called(&bodies[p].name));
-            if let Some(zero) = options.zero(body, &made)? {
+            options.check_driven(path, body)?;
+            if let Some(zero) = options.zero(path, body, &made)? {
                 made.parent = Some(zero.name.clone());
                 made.placement = Placement::default();
                 added.push(self.add(zero));
@@ -345,15 +342,32 @@ impl Scene {
 }
 
 impl Robot {
+    /// Refuses motions of joints that can't have them.
+    fn check_driven(&self, path: &Path, body: &RobotBody) -> Result<()> {
+        let moves = body.moves.as_ref();
+        let driven = moves.filter(|m| self.motions.contains_key(&m.name));
+        match driven {
+            Some(moves) if moves.mimic.is_some() => Err(Error::input(
+                format!("{}: motions", path.display()),
+                format!("{:?}", moves.name),
+                "the joint follows another: drive that one, or make it `mimic = \"independent\"`",
+            )),
+            _ => Ok(()),
+        }
+    }
+
     /// What carries a body whose joint's zero isn't sure.
-    fn zero(&self, body: &RobotBody, made: &Body) -> Result<Option<Body>> {
+    fn zero(&self, path: &Path, body: &RobotBody, made: &Body) -> Result<Option<Body>> {
         let moves = body.moves.as_ref();
         let Some((moves, offset)) = moves.and_then(|m| Some((m, self.zeros.get(&m.name)?))) else {
             return Ok(None);
         };
-        let place = || format!("joint {:?}: zeros", moves.name);
-        if made.mimic.is_some() || moves.joint.coordinates() != 1 {
-            let what = format!("the zero of a {} joint", moves.joint.kind());
+        let place = || format!("{}: zeros of joint {:?}", path.display(), moves.name);
+        if moves.mimic.is_some() || moves.joint.coordinates() != 1 {
+            let what = match moves.mimic {
+                Some(_) => "the zero of a joint that follows another".to_string(),
+                None => format!("the zero of a {} joint", moves.joint.kind()),
+            };
             let remedy = "only joints with one coordinate of their own have one";
             return Err(Error::input(place(), what, remedy));
         }
@@ -409,7 +423,7 @@ impl Robot {
                 .collect();
         }
         let motion = (body.moves.as_ref()).and_then(|moves| self.motions.get(&moves.name));
-        if let Some(motion) = motion.filter(|_| made.mimic.is_none()) {
+        if let Some(motion) = motion {
             made.motion = Some(motion.clone());
             (made.actuated, made.passive, made.limits) = (false, None, None);
             made.start.clear();

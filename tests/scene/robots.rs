@@ -1038,4 +1038,37 @@ fn joints_are_driven_and_bodies_are_as_they_are_weighed() {
         }],
     );
     says(read(&text, &wrong).unwrap_err(), &["motions", "k", "j"]);
+    let zeros = |joint: &str| Robot {
+        zeros: [(joint.to_string(), 0.1)].into(),
+        ..Robot::default()
+    };
+    says(read(&text, &zeros("k")).unwrap_err(), &["zeros", "k", "j"]);
+    // Joints that don't move, or follow others, can't be driven: nothing is passed over.
+    let still = pair("fixed", "");
+    let linear = || Motion::Linear {
+        offset: 0.0,
+        rate: 1.0,
+    };
+    let driven = |joint: &str| Robot::default().driven(joint, [linear()]);
+    says(read(&still, &driven("j")).unwrap_err(), &["motions", "j"]);
+    says(read(&still, &zeros("j")).unwrap_err(), &["zeros", "j"]);
+    let axis = r#"<axis xyz="0 1 0"/><limit lower="-1" upper="1" effort="1" velocity="1"/>"#;
+    let follower = format!(r#"{axis}<mimic joint="j"/>"#);
+    let chain = [
+        link("a", ""),
+        link("b", ""),
+        link("c", ""),
+        joint("j", "revolute", "a", "b", axis),
+        joint("k", "revolute", "b", "c", &follower),
+    ];
+    let chain = robot(&chain.concat());
+    says(
+        read(&chain, &driven("k")).unwrap_err(),
+        &["motions", "k", "follows another"],
+    );
+    says(
+        read(&chain, &zeros("k")).unwrap_err(),
+        &["zeros", "k", "follows another"],
+    );
+    assert!(read(&chain, &driven("j")).is_ok());
 }

@@ -12,9 +12,9 @@
 //! # References
 //! M. J. Lighthill, "Large-amplitude elongated-body theory of fish locomotion", Proc. R. Soc. Lond. B 179 (1971) 125–138, eq. 6 and 7.
 
-use super::local::{Law, Local};
+use super::local::{Law, Local, component};
 use super::{ForceModel, ForceParts, LoadBars, Moving};
-use crate::adjoint::lie::{Mat6, Vec3, Vec6, six};
+use crate::adjoint::lie::{Mat6, Vec6};
 use crate::dynamics::parameters::{DENSITY, Declarations, Declared, Owner, Parameter, Parameters};
 use std::f64::consts::FRAC_PI_4;
 
@@ -41,11 +41,11 @@ pub(super) fn assemble(
     for (i, given) in scene.edges() {
         let owner = Owner::Named(scene.force_name(i));
         let (forward, normal) = given.axes();
-        let (at, forward, normal) = (Vec3::from(given.at), Vec3::from(forward), normal.into());
+        let at = given.at.into();
         laws.push(Edge {
             body: scene.body(&given.body).map_or(0, |b| b.0),
-            along: six(&forward, &at.cross(&forward)),
-            across: six(&normal, &at.cross(&normal)),
+            along: component(&forward.into(), &at),
+            across: component(&normal.into(), &at),
             smoothing: given.smoothing,
             span: parameters.declare(owner.clone(), SPAN, given.span),
             factor: parameters.declare(owner, FACTOR, given.factor),

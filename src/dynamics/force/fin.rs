@@ -17,7 +17,7 @@
 //! L. Prandtl's thin foils: J. Katz, A. Plotkin, *Low-Speed Aerodynamics*, 2nd ed., Cambridge 2001, section 5.4 (lift slope 2π, centre of pressure at a quarter of the
 //! chord) and 8.1 (lift slope and induced drag of finite wings).
 
-use super::local::{Law, Local};
+use super::local::{Law, Local, component};
 use super::{ForceModel, ForceParts, LoadBars, Moving};
 use crate::adjoint::lie::{Mat6, Vec3, Vec6, six};
 use crate::dynamics::parameters::{DENSITY, Declarations, Declared, Owner, Parameter, Parameters};
@@ -66,8 +66,8 @@ pub(super) fn assemble(
         let (middle, chord, normal) = (Vec3::from(given.at), Vec3::from(chord), normal.into());
         laws.push(Fin {
             body: scene.body(&given.body).map_or(0, |b| b.0),
-            along: six(&chord, &middle.cross(&chord)),
-            across: six(&normal, &middle.cross(&normal)),
+            along: component(&chord, &middle),
+            across: component(&normal, &middle),
             turning: six(&Vec3::zeros(), &chord.cross(&normal)),
             quarter: 0.25 * given.length,
             smoothing: given.smoothing,

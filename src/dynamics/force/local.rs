@@ -5,7 +5,7 @@
 
 use super::{Commanded, ForceModel, LoadBars, Loads, Moving, Outside, Together, Velocity};
 use crate::Result;
-use crate::adjoint::lie::{Mat6, Vec3, Vec6, cross_force, skew};
+use crate::adjoint::lie::{Mat6, Vec3, Vec6, cross_force, six, skew};
 use crate::dynamics::Parameters;
 
 /// A law of one body. Six-vectors are in the body's frame, about its origin.
@@ -69,6 +69,11 @@ impl<L: Law + 'static> Local<L> {
     pub fn assemble(name: &'static str, laws: Vec<L>) -> Option<Box<dyn ForceModel>> {
         (!laws.is_empty()).then(|| Box::new(Self { name, laws }) as Box<dyn ForceModel>)
     }
+}
+
+/// What the velocity of the point `at` along `direction` is of a twist about the body's origin; times a force that acts there along it, the force's wrench.
+pub(super) fn component(direction: &Vec3, at: &Vec3) -> Vec6 {
+    six(direction, &at.cross(direction))
 }
 
 /// What makes of a twist about the body's origin that about the point `p`, `[1, −[p]×; 0, 1]`; its transpose brings a wrench back.

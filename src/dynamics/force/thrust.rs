@@ -17,7 +17,7 @@
 //! T. I. Fossen, *Handbook of Marine Craft Hydrodynamics and Motion Control*, 2nd ed., Wiley 2021, section 9.3 (propeller thrust at an advance speed).
 
 use super::curve::Curve;
-use super::local::{Law, Local};
+use super::local::{Law, Local, component};
 use super::{Commanded, ForceModel, ForceParts, LoadBars, Moving};
 use crate::adjoint::lie::{Mat6, Vec3, Vec6, six};
 use crate::dynamics::parameters::{Declarations, Declared, Owner, Parameter, Parameters, Range};
@@ -104,7 +104,7 @@ pub(super) fn assemble(
                 let b = scene.body(name)?.0;
                 Some((b, parts.tree.links()[b].v.start))
             }),
-            lever: six(&direction, &point.cross(&direction)),
+            lever: component(&direction, &point),
             about: six(&Vec3::zeros(), &direction),
             curve,
             dead_band,

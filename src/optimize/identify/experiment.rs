@@ -4,7 +4,8 @@ use crate::simulate::observable::{differentiable, observable};
 use crate::simulate::{Controls, Rollout, Simulator};
 use crate::{Error, Result};
 use nalgebra::{DMatrix, DVector};
-use std::collections::BTreeMap;
+use std::collections::hash_map::Entry;
+use std::collections::{BTreeMap, BTreeSet, HashMap};
 use std::f64::consts::TAU;
 use std::sync::{Arc, OnceLock};
 
@@ -45,6 +46,11 @@ impl Derived {
         let each = self.observables.iter();
         each.map(|name| Ok(rollout.observe(name)?.select_columns(&self.states)))
             .collect()
+    }
+
+    /// Number of residuals, once they have been asked for.
+    pub fn residuals(&self) -> usize {
+        self.count.get().copied().unwrap_or(0)
     }
 
     /// Residuals.
@@ -150,9 +156,14 @@ impl Experiment {
         self.recorded.iter().map(|r| r.states.len()).sum()
     }
 
-    /// Refuses what doesn't fit.
-    pub(super) fn check(&self) -> Result<()> {
-        let place = |of: &str| format!("experiment {:?}: {of}", self.name);
+    /// What messages call it.
+    pub(super) fn place(&self) -> String {
+        format!("experiment {:?}", self.name)
+    }
+
+    /// Refuses what doesn't fit; `set` are the names of what unknowns set.
+    pub(super) fn check(&self, set: &BTreeSet<&str>) -> Result<()> {
+        let place = |of: &str| format!("{}: {of}", self.place());
         if self.residuals() == 0 && self.derived.is_empty() {
             let remedy = "add what was seen (`saw`)";
             return Err(Error::input(place("recorded"), "nothing", remedy));
@@ -165,33 +176,22 @@ impl Experiment {
         }
         let steps = self.controls.steps();
         for (name, factor) in &self.scales {
-            self.simulator.parameters().get(name)?;
+            if !set.contains(name.as_str()) {
+                let remedy = "no unknown sets this parameter: give the simulator the value itself";
+                return Err(Error::input(place("scale"), format!("{name:?}"), remedy));
+            }
             if !factor.is_finite() {
-                return Err(Error::input(
-                    place(&format!("scale of {name:?}")),
-                    factor,
-                    "must be finite",
-                ));
+                let place = place(&format!("scale of {name:?}"));
+                return Err(Error::input(place, factor, "must be finite"));
             }
         }
         for of in &self.derived {
             let place = |field: &str| place(&format!("function of {:?}: {field}", of.observables));
             for name in &of.observables {
-                let entries = differentiable(name)?.tangents(self.simulator.system());
-                let values = observable(name)?.shape(self.simulator.system());
-                if values.iter().product::<usize>() != entries {
-                    let remedy = "its entries have no tangents of their own: take \"positions\" and \"attitudes\"";
-                    return Err(Error::input(
-                        place("observable"),
-                        format!("{name:?}"),
-                        remedy,
-                    ));
-                }
+                self.entries(name)
+                    .map_err(|e| e.within(&place("observable")))?;
             }
-            if let Some(n) = of.states.iter().find(|n| **n > steps) {
-                let remedy = format!("must be at most {steps}, the last state");
-                return Err(Error::input(place("states"), n, remedy));
-            }
+            check_states(&of.states, steps, &place)?;
             if of.states.is_empty() || of.observables.is_empty() {
                 let remedy = "give at least one state and one observable";
                 return Err(Error::input(place("states"), "none", remedy));
@@ -199,16 +199,8 @@ impl Experiment {
         }
         for r in &self.recorded {
             let place = |field: &str| place(&format!("{:?}: {field}", r.observable));
-            let system = self.simulator.system();
-            let entries = differentiable(&r.observable)?.tangents(system);
-            let values: usize = observable(&r.observable)?.shape(system).iter().product();
-            if values != entries {
-                return Err(Error::input(
-                    place("observable"),
-                    format!("{values} entries that move in {entries} directions"),
-                    "its entries can't be compared one by one: take \"positions\" and \"attitudes\"",
-                ));
-            }
+            let entries = self.entries(&r.observable);
+            let entries = entries.map_err(|e| e.within(&place("observable")))?;
             if r.entry >= entries {
                 let remedy = format!("must be under {entries}, counted from 0");
                 return Err(Error::input(place("entry"), r.entry, remedy));
@@ -220,10 +212,7 @@ impl Experiment {
                     format!("must be as many as states, {}", r.states.len()),
                 ));
             }
-            if let Some(n) = r.states.iter().find(|n| **n > steps) {
-                let remedy = format!("must be at most {steps}, the last state");
-                return Err(Error::input(place("states"), n, remedy));
-            }
+            check_states(&r.states, steps, &place)?;
             if let Some(x) = r.values.iter().find(|x| !x.is_finite()) {
                 let remedy = "must be finite: leave states out at which nothing was seen";
                 return Err(Error::input(place("values"), x, remedy));
@@ -236,14 +225,35 @@ impl Experiment {
         Ok(())
     }
 
+    /// Number of entries of an observable, each of which moves by a tangent of its own.
+    fn entries(&self, name: &str) -> Result<usize> {
+        let system = self.simulator.system();
+        let entries = differentiable(name)?.tangents(system);
+        let values: usize = observable(name)?.shape(system).iter().product();
+        match values == entries {
+            true => Ok(entries),
+            false => Err(Error::input(
+                format!("{name:?}"),
+                format!("{values} entries that move in {entries} directions"),
+                "its entries can't be compared one by one: take \"positions\" and \"attitudes\"",
+            )),
+        }
+    }
+
     /// Simulated less recorded, in deviations.
     pub(super) fn differences(&self, rollout: &Rollout) -> Result<DVector<f64>> {
         let mut out = Vec::with_capacity(self.residuals());
+        // Entries of one observable are mostly seen at the same states.
+        let mut found: HashMap<(&str, usize), Vec<f64>> = HashMap::new();
         for r in &self.recorded {
+            let name = r.observable.as_str();
             for (n, seen) in r.states.iter().zip(&r.values) {
-                let simulated = rollout.observable_value(&r.observable, *n)?[r.entry];
-                let mut off = simulated - seen;
-                if ANGLES.contains(&r.observable.as_str()) {
+                let values = match found.entry((name, *n)) {
+                    Entry::Occupied(held) => held.into_mut(),
+                    Entry::Vacant(free) => free.insert(rollout.observable_value(name, *n)?),
+                };
+                let mut off = values[r.entry] - seen;
+                if ANGLES.contains(&name) {
                     off -= TAU * (off / TAU).round();
                 }
                 out.push(off / r.deviation);
@@ -253,5 +263,15 @@ impl Experiment {
             out.extend(of.value(&of.seen(rollout)?)?.iter());
         }
         Ok(out.into())
+    }
+}
+
+fn check_states(states: &[usize], steps: usize, place: &dyn Fn(&str) -> String) -> Result<()> {
+    match states.iter().find(|n| **n > steps) {
+        None => Ok(()),
+        Some(n) => {
+            let remedy = format!("must be at most {steps}, the last state");
+            Err(Error::input(place("states"), n, remedy))
+        }
     }
 }

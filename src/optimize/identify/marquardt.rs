@@ -62,6 +62,19 @@ impl<'m, 'a> Marquardt<'m, 'a> {
         Err(Error::input("identify: misfit", made.cost, remedy))
     }
 
+    /// The misfit at a trial; none where its simulation fails.
+    fn try_out(&mut self, x: &DVector<f64>) -> Result<Option<Evaluated>> {
+        match self.evaluate(x) {
+            Ok(trial) => Ok(Some(trial)),
+            // The caller's own reasons, and what its function of observables raised.
+            Err(stop @ (Error::Stopped { .. } | Error::Controller { .. })) => Err(stop),
+            Err(_) => {
+                self.failures += 1;
+                Ok(None)
+            }
+        }
+    }
+
     /// # Errors
     /// The start's simulation, and derivatives that can't be found.
     pub fn solve(
@@ -89,22 +102,12 @@ impl<'m, 'a> Marquardt<'m, 'a> {
             if is_near && damping <= LIGHT {
                 break IdentifyStop::Cost;
             }
-            if step.expected <= 0.0 {
-                damping *= growth;
-                growth *= 2.0;
-                refused += 1;
-                continue;
-            }
-            let trial = match self.evaluate(&step.to) {
-                Ok(trial) => Some(trial),
-                // The caller's own reasons, and what its function of observables raised.
-                Err(stop @ (Error::Stopped { .. } | Error::Controller { .. })) => return Err(stop),
-                Err(_) => {
-                    self.failures += 1;
-                    None
-                }
+            // A step that leads uphill in the model, cut by bounds, isn't tried.
+            let trial = match step.expected > 0.0 {
+                true => self.try_out(&step.to)?,
+                false => None,
             };
-            let fell = trial.as_ref().map_or(-1.0, |t| at.cost - t.cost);
+            let fell = trial.as_ref().map_or(0.0, |t| at.cost - t.cost);
             let ratio = fell / step.expected;
             let taken = trial.filter(|_| ratio > ENOUGH);
             let is_taken = taken.is_some();
@@ -195,14 +198,9 @@ impl<'m, 'a> Marquardt<'m, 'a> {
             free = kept;
         }
         let after = residuals + jacobian * &delta;
-        let mut to = x + &delta;
-        for i in 0..to.len() {
-            let [least, largest] = self.misfit.bounds(i);
-            to[i] = to[i].clamp(least, largest);
-        }
         Step {
             expected: 0.5 * (residuals.norm_squared() - after.norm_squared()),
-            to,
+            to: self.misfit.within(x + &delta),
             size: if at_bound { f64::INFINITY } else { size },
         }
     }

@@ -1,8 +1,10 @@
 //! The misfit of all experiments, with its residuals and their Jacobian.
 
-use super::unknown::{Prior, Searched, Target};
+use super::experiment::Derived;
+use super::unknown::{Prior, Searched};
 use super::{Experiment, Loss, Unknown};
 use crate::dynamics::Drive;
+use crate::simulate::observable::differentiable;
 use crate::simulate::{Rollout, Simulator, Variables};
 use crate::{Error, Result};
 use nalgebra::{DMatrix, DVector};
@@ -33,10 +35,28 @@ impl Start {
     }
 }
 
+/// What an unknown sets in an experiment.
+struct Setting {
+    /// The unknown.
+    unknown: usize,
+    /// What is set, over the unknown.
+    factor: f64,
+    place: Place,
+}
+
+enum Place {
+    /// A parameter, by its name.
+    Parameter(String),
+    /// A coordinate of the start, and the velocity that is its rate.
+    Start { q: usize, v: usize },
+}
+
 /// A misfit: a function of the coordinates of the search, the unknowns' and then those of initial states.
 pub(super) struct Misfit<'a> {
     pub experiments: &'a [Experiment],
     pub unknowns: Vec<Searched>,
+    /// Of each experiment.
+    settings: Vec<Vec<Setting>>,
     starts: Vec<Option<Start>>,
     pub loss: Loss,
     coordinates: usize,
@@ -65,53 +85,27 @@ impl<'a> Misfit<'a> {
         };
         let unknowns = unknowns.iter().map(|u| Searched::new(u, &first.simulator));
         let unknowns = unknowns.collect::<Result<Vec<_>>>()?;
-        let mut taken = BTreeSet::new();
-        let all = || {
-            unknowns
-                .iter()
-                .flat_map(|u| u.sets.iter().map(|s| (&u.name, &s.0)))
-        };
-        for (name, set) in all() {
-            if !taken.insert(set.name()) {
-                let place = format!("unknown {name:?}: parameter");
-                let remedy = "another unknown sets it already";
-                return Err(Error::input(place, format!("{:?}", set.name()), remedy));
+        let (mut names, mut taken) = (BTreeSet::new(), BTreeSet::new());
+        for unknown in &unknowns {
+            if !names.insert(&unknown.name) {
+                let remedy = "another unknown has this name";
+                let name = format!("{:?}", unknown.name);
+                return Err(Error::input("unknown", name, remedy));
+            }
+            for (target, _) in &unknown.sets {
+                if !taken.insert(target.name()) {
+                    let place = format!("unknown {:?}: parameter", unknown.name);
+                    let remedy = "another unknown sets it already";
+                    return Err(Error::input(place, format!("{:?}", target.name()), remedy));
+                }
             }
         }
         let mut coordinates = unknowns.len();
-        let mut starts = Vec::new();
-        for unknown in &unknowns {
-            if unknowns.iter().filter(|u| u.name == unknown.name).count() > 1 {
-                let remedy = "another unknown has this name";
-                return Err(Error::input(
-                    "unknown",
-                    format!("{:?}", unknown.name),
-                    remedy,
-                ));
-            }
-        }
+        let (mut settings, mut starts) = (Vec::new(), Vec::new());
         for experiment in experiments {
-            experiment.check()?;
-            if let Some(name) = experiment
-                .scales
-                .keys()
-                .find(|name| !taken.contains(name.as_str()))
-            {
-                return Err(Error::input(
-                    format!("experiment {:?}: scale", experiment.name),
-                    format!("{name:?}"),
-                    "no unknown sets this parameter: give the simulator the value itself",
-                ));
-            }
-            for (_, target) in all() {
-                let known = match target {
-                    Target::Parameter(name) => {
-                        experiment.simulator.parameters().get(name).map(|_| ())
-                    }
-                    Target::Start(_) => target.coordinate(&experiment.simulator).map(|_| ()),
-                };
-                known.map_err(|e| e.within(&format!("experiment {:?}", experiment.name)))?;
-            }
+            experiment.check(&taken)?;
+            let own = settings_of(&unknowns, experiment);
+            settings.push(own.map_err(|e| e.within(&experiment.place()))?);
             let start = experiment.start.map(|deviations| Start {
                 from: coordinates,
                 free: free(&experiment.simulator),
@@ -127,6 +121,7 @@ impl<'a> Misfit<'a> {
         Ok(Self {
             experiments,
             unknowns,
+            settings,
             starts,
             loss,
             coordinates,
@@ -144,6 +139,15 @@ impl<'a> Misfit<'a> {
     pub fn bounds(&self, i: usize) -> [f64; 2] {
         let none = [f64::NEG_INFINITY, f64::INFINITY];
         self.unknowns.get(i).map_or(none, |u| u.bounds)
+    }
+
+    /// The nearest point within the bounds.
+    pub fn within(&self, mut x: DVector<f64>) -> DVector<f64> {
+        for i in 0..x.len() {
+            let [least, largest] = self.bounds(i);
+            x[i] = x[i].clamp(least, largest);
+        }
+        x
     }
 
     /// Coordinates of which something was known beforehand.
@@ -172,12 +176,9 @@ impl<'a> Misfit<'a> {
         let simulator = &self.experiments[k].simulator;
         let (q, v) = simulator.start();
         let mut q = q.clone();
-        for (unknown, x) in self.unknowns.iter().zip(x.iter()) {
-            for (target, factor) in &unknown.sets {
-                // Checked at the start.
-                if let Ok(Some((i, _))) = target.coordinate(simulator) {
-                    q[i] = factor * unknown.value(*x);
-                }
+        for setting in &self.settings[k] {
+            if let Place::Start { q: i, .. } = setting.place {
+                q[i] = self.value(setting, x);
             }
         }
         let Some([xi, dv]) = self.displaced(k, x) else {
@@ -186,10 +187,16 @@ impl<'a> Misfit<'a> {
         (simulator.system().tree.integrate(&q, &xi), v + dv)
     }
 
+    /// What a setting is set to.
+    fn value(&self, setting: &Setting, x: &DVector<f64>) -> f64 {
+        let i = setting.unknown;
+        setting.factor * self.unknowns[i].value(x[i])
+    }
+
     /// Whether unknowns set coordinates of the start.
-    fn sets_start(&self) -> bool {
-        let mut all = self.unknowns.iter().flat_map(|u| &u.sets);
-        all.any(|(target, _)| matches!(target, Target::Start(_)))
+    fn sets_start(&self, k: usize) -> bool {
+        let mut all = self.settings[k].iter();
+        all.any(|s| matches!(s.place, Place::Start { .. }))
     }
 
     /// How far its initial coordinates (tangent) and velocity are from those given.
@@ -205,32 +212,17 @@ impl<'a> Misfit<'a> {
         Some(out)
     }
 
-    /// What a parameter is in an experiment of what an unknown sets it to.
-    fn scale(&self, k: usize, target: &Target) -> f64 {
-        match target {
-            Target::Parameter(name) => *self.experiments[k].scales.get(name).unwrap_or(&1.0),
-            Target::Start(_) => 1.0,
-        }
-    }
-
-    fn place(&self, k: usize) -> String {
-        format!("experiment {:?}", self.experiments[k].name)
-    }
-
     /// The simulator of an experiment at a point.
     fn simulator(&self, k: usize, x: &DVector<f64>) -> Result<Simulator> {
         let mut simulator = self.experiments[k].simulator.clone();
         let mut parameters = simulator.parameters().clone();
-        for (unknown, x) in self.unknowns.iter().zip(x.iter()) {
-            for (target, factor) in &unknown.sets {
-                if let Target::Parameter(name) = target {
-                    let own = self.scale(k, target);
-                    parameters.set(name, own * factor * unknown.value(*x))?;
-                }
+        for setting in &self.settings[k] {
+            if let Place::Parameter(name) = &setting.place {
+                parameters.set(name, self.value(setting, x))?;
             }
         }
         simulator.set_parameters(parameters)?;
-        if self.starts[k].is_some() || self.sets_start() {
+        if self.starts[k].is_some() || self.sets_start(k) {
             let (q, v) = self.initial(k, x);
             simulator.set_start(q, v)?;
         }
@@ -247,7 +239,7 @@ impl<'a> Misfit<'a> {
                 let differences = self.experiments[k].differences(&rollout)?;
                 Ok((differences, rollout))
             };
-            run().map_err(|e: Error| e.within(&self.place(k)))
+            run().map_err(|e: Error| e.within(&self.experiments[k].place()))
         };
         let each: Vec<_> = (0..self.experiments.len())
             .into_par_iter()
@@ -282,7 +274,7 @@ impl<'a> Misfit<'a> {
         let mut jacobian = DMatrix::zeros(data + priors.len(), self.coordinates);
         let mut row = 0;
         for (k, made) in each.into_iter().enumerate() {
-            let made = made.map_err(|e| e.within(&self.place(k)))?;
+            let made = made.map_err(|e| e.within(&self.experiments[k].place()))?;
             for (i, r) in at.differences[k].iter().enumerate() {
                 let weight = self.loss.of(*r).1.sqrt();
                 residuals[row] = weight * r;
@@ -303,27 +295,23 @@ impl<'a> Misfit<'a> {
 
     /// Jacobian of an experiment's differences by all coordinates.
     fn experiment_jacobian(&self, k: usize, at: &Evaluated) -> Result<DMatrix<f64>> {
-        let targets = || {
-            self.unknowns
-                .iter()
-                .flat_map(|u| u.sets.iter().map(|s| &s.0))
+        let named = |s: &Setting| match &s.place {
+            Place::Parameter(name) => Some(name.clone()),
+            Place::Start { .. } => None,
         };
-        let parameters: Vec<&str> = targets()
-            .filter(|t| matches!(t, Target::Parameter(_)))
-            .map(Target::name)
-            .collect();
+        let parameters: Vec<String> = self.settings[k].iter().filter_map(named).collect();
+        let count = parameters.len();
         let simulator = &self.experiments[k].simulator;
         let n = simulator.start().1.len();
         let start = self.starts[k].as_ref();
         let unsure = start.is_some_and(|s| s.deviations[0] > 0.0);
         let variables = Variables {
-            parameters: parameters.iter().map(|name| (*name).to_string()).collect(),
-            initial_q: unsure || self.sets_start(),
+            parameters,
+            initial_q: unsure || self.sets_start(k),
             initial_v: start.is_some_and(|s| s.deviations[1] > 0.0),
             ..Variables::default()
         };
-        let own = parameters.len()
-            + n * (usize::from(variables.initial_q) + usize::from(variables.initial_v));
+        let own = count + n * (usize::from(variables.initial_q) + usize::from(variables.initial_v));
         if own == 0 {
             return Ok(DMatrix::zeros(at.differences[k].len(), self.coordinates));
         }
@@ -333,29 +321,23 @@ impl<'a> Misfit<'a> {
             false => self.by_forward(k, &at.rollouts[k], &variables)?,
         };
         let mut out = DMatrix::zeros(made.nrows(), self.coordinates);
-        for (i, unknown) in self.unknowns.iter().enumerate() {
-            for (target, factor) in &unknown.sets {
-                let by = self.scale(k, target) * factor * unknown.slope(at.x[i]);
-                let column = match target.coordinate(simulator)? {
-                    Some((_, v)) => parameters.len() + v,
-                    None => {
-                        let mut named = parameters.iter();
-                        named.position(|name| *name == target.name()).unwrap_or(0)
-                    }
-                };
-                out.column_mut(i).axpy(by, &made.column(column), 1.0);
-            }
+        let mut parameter = 0..count;
+        for setting in &self.settings[k] {
+            let i = setting.unknown;
+            let column = match setting.place {
+                Place::Start { v, .. } => count + v,
+                // They come in this order.
+                Place::Parameter(_) => parameter.next().unwrap_or(0),
+            };
+            let by = setting.factor * self.unknowns[i].slope(at.x[i]);
+            out.column_mut(i).axpy(by, &made.column(column), 1.0);
         }
         let Some(start) = start else {
             return Ok(out);
         };
-        let velocities = parameters.len() + if variables.initial_q { n } else { 0 };
+        let velocities = count + if variables.initial_q { n } else { 0 };
         for (to, part, _) in start.parts() {
-            let from = if part == 0 {
-                parameters.len()
-            } else {
-                velocities
-            };
+            let from = if part == 0 { count } else { velocities };
             let columns = made.columns(from, n);
             let by = match (part, self.displaced(k, &at.x)) {
                 (0, Some([xi, _])) => {
@@ -436,7 +418,7 @@ impl<'a> Misfit<'a> {
         let n = system.tree.velocities();
         let mut rows = Vec::new();
         for r in &self.experiments[k].recorded {
-            let entries = crate::simulate::observable::differentiable(&r.observable)?;
+            let entries = differentiable(&r.observable)?;
             for state in &r.states {
                 let mut bar = rollout.zero_cotangents();
                 let mut seed = DMatrix::zeros(entries.tangents(system), rollout.steps() + 1);
@@ -460,19 +442,39 @@ impl<'a> Misfit<'a> {
     }
 }
 
+/// What unknowns set in an experiment: names that it must have.
+fn settings_of(unknowns: &[Searched], experiment: &Experiment) -> Result<Vec<Setting>> {
+    let mut out = Vec::new();
+    for (i, unknown) in unknowns.iter().enumerate() {
+        for (target, factor) in &unknown.sets {
+            let (place, scale) = match target.coordinate(&experiment.simulator)? {
+                Some((q, v)) => (Place::Start { q, v }, 1.0),
+                None => {
+                    let name = target.name();
+                    experiment.simulator.parameters().get(name)?;
+                    let scale = experiment.scales.get(name).copied().unwrap_or(1.0);
+                    (Place::Parameter(name.into()), scale)
+                }
+            };
+            out.push(Setting {
+                unknown: i,
+                factor: scale * factor,
+                place,
+            });
+        }
+    }
+    Ok(out)
+}
+
 /// Size of the differences by which functions of observables are differentiated, relative: their error is its square.
 const DIFFERENCE: f64 = 1e-5;
 
 /// Derivative of residuals along tangents of what they are a function of.
-fn derivative(
-    of: &super::experiment::Derived,
-    seen: &[DMatrix<f64>],
-    along: &[DMatrix<f64>],
-) -> Result<DVector<f64>> {
+fn derivative(of: &Derived, seen: &[DMatrix<f64>], along: &[DMatrix<f64>]) -> Result<DVector<f64>> {
     let size = |all: &[DMatrix<f64>]| all.iter().map(DMatrix::amax).fold(0.0, f64::max);
     let (at, tangent) = (size(seen), size(along));
     if tangent == 0.0 {
-        return Ok(DVector::zeros(of.value(seen)?.len()));
+        return Ok(DVector::zeros(of.residuals()));
     }
     let h = DIFFERENCE * at.max(1e-3) / tangent;
     let moved = |h: f64| {

@@ -3,7 +3,7 @@
 use super::marquardt::Found;
 use super::misfit::Misfit;
 use super::unknown::Target;
-use super::{IdentifySettings, IdentifyStop};
+use super::{Experiment, IdentifySettings, IdentifyStop, Loss};
 use crate::dynamics::Parameters;
 use crate::simulate::Simulator;
 use crate::simulate::observable::observable;
@@ -221,16 +221,7 @@ pub(super) fn report(
     found: Found,
     settings: &IdentifySettings,
 ) -> Result<Identified> {
-    let Found {
-        best,
-        linear,
-        iterations,
-        mut simulations,
-        jacobians,
-        failures,
-        stop,
-    } = found;
-    let x = &best.x;
+    let x = &found.best.x;
     let n = misfit.unknowns.len();
     let held: Vec<bool> = (0..x.len())
         .map(|i| misfit.bounds(i).contains(&x[i]))
@@ -244,45 +235,23 @@ pub(super) fn report(
         },
         _ => 1.0,
     });
-    let information = linear.jacobian.tr_mul(&linear.jacobian);
+    let information = found.linear.jacobian.tr_mul(&found.linear.jacobian);
     let known = Known::new(&information, &held, &sizes);
-    let mut weak = Vec::new();
-    for (direction, deviation) in known.directions.iter().take(settings.profiles) {
-        let mut profile = Vec::new();
-        if deviation.is_finite() {
-            for k in PROFILE {
-                let mut to = x + k * direction;
-                for i in 0..to.len() {
-                    let [least, largest] = misfit.bounds(i);
-                    to[i] = to[i].clamp(least, largest);
-                }
-                simulations += misfit.experiments.len();
-                let rise = match misfit.evaluate(&to) {
-                    Ok(found) => Some(found.cost - best.cost),
-                    Err(stop @ (Error::Stopped { .. } | Error::Controller { .. })) => {
-                        return Err(stop);
-                    }
-                    Err(_) => None,
-                };
-                // Bounds may be nearer.
-                let moved = &to - x;
-                let expected = 0.5 * (&linear.jacobian * &moved).norm_squared();
-                profile.push(Profile {
-                    deviations: k,
-                    rise: rise.filter(|x| x.is_finite()),
-                    expected,
-                });
-            }
-        }
-        let change = (misfit.unknowns.iter().enumerate())
-            .map(|(i, u)| direction[i] * u.slope(x[i]))
-            .collect();
-        weak.push(WeakDirection {
-            change,
+    let least = known.directions.iter().take(settings.profiles);
+    let weak = least.map(|(change, deviation)| {
+        let profile = match deviation.is_finite() {
+            true => profile(misfit, &found, change)?,
+            false => Vec::new(),
+        };
+        let each = misfit.unknowns.iter().enumerate();
+        Ok(WeakDirection {
+            change: each.map(|(i, u)| change[i] * u.slope(x[i])).collect(),
             deviation: *deviation,
             profile,
-        });
-    }
+        })
+    });
+    let weak = weak.collect::<Result<Vec<_>>>()?;
+    let profiled: usize = weak.iter().map(|w| w.profile.len()).sum();
     let unknowns = misfit.unknowns.iter().enumerate().map(|(i, u)| {
         let error = known.error(i);
         let (starts, sets): (Vec<_>, Vec<_>) =
@@ -308,74 +277,113 @@ pub(super) fn report(
         let (q, v) = misfit.initial(k, x);
         (q.as_slice().to_vec(), v.as_slice().to_vec())
     });
-    let mut series = Vec::new();
-    // What a loss forgives counts as little here.
-    let weigh = |r: &[f64]| -> (Vec<f64>, f64) {
-        let weights: Vec<f64> = r.iter().map(|r| misfit.loss.of(*r).1).collect();
-        let weighed = r.iter().zip(&weights).map(|(r, w)| w.sqrt() * r);
-        (weighed.collect(), weights.iter().sum())
-    };
-    let (mut squares, mut count, mut correlated) = (0.0, 0.0, 0.0);
-    for (experiment, r) in misfit.experiments.iter().zip(&best.differences) {
-        let mut from = 0;
-        for seen in &experiment.recorded {
-            let r = &r.as_slice()[from..from + seen.states.len()];
-            from += seen.states.len();
-            let square: f64 = r.iter().map(|x| x * x).sum();
-            let (weighed, weight) = weigh(r);
-            let own = autocorrelation(&weighed);
-            squares += weighed.iter().map(|x| x * x).sum::<f64>();
-            count += weight;
-            correlated += own * weight;
-            let labels = observable(&seen.observable)?.labels(experiment.simulator.scene());
-            series.push(SeriesFit {
-                experiment: experiment.name.clone(),
-                observable: seen.observable.clone(),
-                label: labels.get(seen.entry).cloned().unwrap_or_default(),
-                rms: seen.deviation * (square / r.len().max(1) as f64).sqrt(),
-                autocorrelation: own,
-            });
-        }
-        if !experiment.derived.is_empty() {
-            let r = &r.as_slice()[from..];
-            let square: f64 = r.iter().map(|x| x * x).sum();
-            let (weighed, weight) = weigh(r);
-            squares += weighed.iter().map(|x| x * x).sum::<f64>();
-            count += weight;
-            let names = experiment
-                .derived
-                .iter()
-                .flat_map(|d| d.observables.clone());
-            series.push(SeriesFit {
-                experiment: experiment.name.clone(),
-                observable: names.collect::<Vec<_>>().join(", "),
-                label: "function".into(),
-                rms: (square / r.len().max(1) as f64).sqrt(),
-                autocorrelation: 0.0,
-            });
-        }
+    let mut met = Met::default();
+    for (experiment, r) in misfit.experiments.iter().zip(&found.best.differences) {
+        met.add(experiment, r.as_slice(), misfit.loss)?;
     }
     // What priors know already isn't taken from the data.
     let mut used: Vec<f64> = held.iter().map(|h| if *h { 0.0 } else { 1.0 }).collect();
     for (i, prior) in misfit.priors() {
         used[i] *= (1.0 - (known.error(i) / prior.deviation).powi(2)).clamp(0.0, 1.0);
     }
-    let freedom = (count - used.iter().sum::<f64>()).max(1.0);
-    let chi_squared = squares / freedom;
-    let rho = (correlated / count.max(1.0)).clamp(0.0, 0.999);
+    let freedom = (met.count - used.iter().sum::<f64>()).max(1.0);
+    let chi_squared = met.squares / freedom;
+    let rho = (met.correlated / met.count.max(1.0)).clamp(0.0, 0.999);
     Ok(Identified {
         unknowns: unknowns.collect(),
         correlations: correlations.collect(),
         starts: starts.collect(),
-        series,
-        cost: best.cost,
+        series: met.series,
+        cost: found.best.cost,
         chi_squared,
         inflation: (chi_squared * (1.0 + rho) / (1.0 - rho)).sqrt().max(1.0),
         weak,
-        iterations,
-        simulations,
-        jacobians,
-        failures,
-        stop,
+        iterations: found.iterations,
+        simulations: found.simulations + profiled * misfit.experiments.len(),
+        jacobians: found.jacobians,
+        failures: found.failures,
+        stop: found.stop,
     })
+}
+
+/// The misfit along a change of one deviation.
+fn profile(misfit: &Misfit, found: &Found, change: &DVector<f64>) -> Result<Vec<Profile>> {
+    let Found { best, linear, .. } = found;
+    let at = |k: f64| {
+        let to = misfit.within(&best.x + k * change);
+        // Bounds may be nearer.
+        let expected = 0.5 * (&linear.jacobian * (&to - &best.x)).norm_squared();
+        let rise = match misfit.evaluate(&to) {
+            Ok(found) => Some(found.cost - best.cost),
+            Err(stop @ (Error::Stopped { .. } | Error::Controller { .. })) => return Err(stop),
+            Err(_) => None,
+        };
+        Ok(Profile {
+            deviations: k,
+            rise: rise.filter(|x| x.is_finite()),
+            expected,
+        })
+    };
+    PROFILE.into_iter().map(at).collect()
+}
+
+/// How the recordings are met; what a loss forgives counts as little in its sums.
+#[derive(Default)]
+struct Met {
+    series: Vec<SeriesFit>,
+    squares: f64,
+    count: f64,
+    correlated: f64,
+}
+
+impl Met {
+    /// With the residuals of an experiment.
+    fn add(&mut self, experiment: &Experiment, r: &[f64], loss: Loss) -> Result<()> {
+        let mut from = 0;
+        for seen in &experiment.recorded {
+            let own = &r[from..from + seen.states.len()];
+            from += own.len();
+            let autocorrelation = self.weigh(own, loss);
+            let labels = observable(&seen.observable)?.labels(experiment.simulator.scene());
+            self.series.push(SeriesFit {
+                experiment: experiment.name.clone(),
+                observable: seen.observable.clone(),
+                label: labels.get(seen.entry).cloned().unwrap_or_default(),
+                rms: seen.deviation * rms(own),
+                autocorrelation,
+            });
+        }
+        for of in &experiment.derived {
+            let own = &r[from..from + of.residuals()];
+            from += own.len();
+            self.weigh(own, loss);
+            self.series.push(SeriesFit {
+                experiment: experiment.name.clone(),
+                observable: of.observables.join(", "),
+                label: "function".into(),
+                rms: rms(own),
+                autocorrelation: 0.0,
+            });
+        }
+        Ok(())
+    }
+
+    /// Adds residuals, each by the loss; their autocorrelation.
+    fn weigh(&mut self, r: &[f64], loss: Loss) -> f64 {
+        let weights: Vec<f64> = r.iter().map(|r| loss.of(*r).1).collect();
+        let weighed: Vec<f64> = (r.iter().zip(&weights))
+            .map(|(r, w)| w.sqrt() * r)
+            .collect();
+        let weight: f64 = weights.iter().sum();
+        let own = autocorrelation(&weighed);
+        self.squares += weighed.iter().map(|x| x * x).sum::<f64>();
+        self.count += weight;
+        self.correlated += own * weight;
+        own
+    }
+}
+
+fn rms(r: &[f64]) -> f64 {
+    let square: f64 = r.iter().map(|x| x * x).sum();
+    (square / r.len().max(1) as f64).sqrt()
 }

@@ -28,6 +28,7 @@ import time
 import numpy as np
 
 import hydrograd as hg
+import tables
 
 DEFAULT = pathlib.Path(__file__).parents[2] / "shared/data/fish"
 TRAIN = ["f1_00", "f1_75"]
@@ -64,10 +65,6 @@ FIN, FIN_SPAN, FIN_CHORD, FIN_AT = 0.0075, 0.203, 0.042, 0.053  # m², m, m, its
 EDGE = 0.074  # of the last segment, m
 BOX, BODY = 0.07, 0.12  # where the box ends and the body's drag begins, m
 SETTLE = 9.0  # s until the swimming is steady
-
-
-class Wrong(Exception):
-    """What can't be used, and what would be right."""
 
 
 def height(x):
@@ -216,24 +213,34 @@ class Swim:
         return rollout.observe("site_positions")[self.seen]
 
 
-def harmonics(t, y, beat):
-    """Fundamental of a signal by least squares with drift and three harmonics: amplitude and phase as a complex number."""
+def basis(t, beat):
+    """A constant, drift and three harmonics, (n, 8)."""
     phase = 2.0 * math.pi * beat * t
     columns = [np.ones_like(t), t - t.mean(), *(f(k * phase) for k in (1, 2, 3) for f in (np.cos, np.sin))]
-    c, *_ = np.linalg.lstsq(np.stack(columns, axis=1), y, rcond=None)
+    return np.stack(columns, axis=1)
+
+
+def harmonics(t, y, beat):
+    """Fundamental of a signal by least squares: amplitude and phase as a complex number."""
+    c, *_ = np.linalg.lstsq(basis(t, beat), y, rcond=None)
     return complex(c[2], -c[3])
+
+
+def head_and_tip(p):
+    """The head's yaw, rad, and the tip's displacement across its axis, m."""
+    head = p[:, 0] - p[:, 1]
+    yaw = np.unwrap(np.arctan2(head[:, 1], head[:, 0]))
+    side = np.stack([-np.sin(yaw), np.cos(yaw)], axis=1)
+    return yaw, np.sum((p[:, 8] - p[:, 0]) * side, axis=1)
 
 
 def features(t, p, beat):
     """Speed (m/s) as the slope of the way along the head's axis, twice the tip's amplitude and its range across that (m), the head's yaw (rad) and the nose's sway across the mean path (m) as amplitudes, and the phases (rad) of yaw before the
     tip's displacement in the tank."""
-    head = p[:, 0] - p[:, 1]
-    yaw = np.unwrap(np.arctan2(head[:, 1], head[:, 0]))
+    yaw, tip = head_and_tip(p)
     axis = np.stack([np.cos(yaw), np.sin(yaw)], axis=1)
     way = np.concatenate([[0.0], np.cumsum(np.sum(np.diff(p[:, 1], axis=0) * axis[:-1], axis=1))])
     speed = np.polyfit(t, way, 1)[0]
-    side = np.stack([-np.sin(yaw), np.cos(yaw)], axis=1)
-    tip = np.sum((p[:, 8] - p[:, 0]) * side, axis=1)
     mean = np.array([-math.sin(yaw.mean()), math.cos(yaw.mean())])
     turning, lab, nose = (harmonics(t, y, beat) for y in (yaw, p[:, 8] @ mean, p[:, 0] @ mean))
     out = {
@@ -261,56 +268,27 @@ def differences(made, seen):
 
 def read(path):
     """Times and markers (n, 9, 2)."""
-    names = ["t", *(f"{axis}{i}" for i in range(9) for axis in "xy")]
-    try:
-        with open(path, newline="", encoding="utf-8-sig") as file:
-            rows = list(csv.reader(file, skipinitialspace=True))
-    except (OSError, UnicodeDecodeError, csv.Error) as error:
-        raise Wrong(f"{path}: can't be read: {error}") from None
-    while rows and not any(rows[-1]):
-        rows.pop()
-    if len(rows) < 60:
-        raise Wrong(f"{path}: {len(rows)} lines; a header and a second of frames at least are wanted")
-    columns = {}
-    for name in names:
-        if name not in rows[0]:
-            raise Wrong(f"{path}: column {name!r} is missing; the file has {', '.join(rows[0])}")
-        k = rows[0].index(name)
-        values = np.empty(len(rows) - 1)
-        for i, row in enumerate(rows[1:]):
-            try:
-                values[i] = float(row[k])
-            except (ValueError, IndexError):
-                raise Wrong(f"{path}: column {name!r}, line {i + 2}: {row[k] if k < len(row) else ''!r} isn't a number") from None
-        bad = np.flatnonzero(~np.isfinite(values))
-        if bad.size:
-            raise Wrong(f"{path}: column {name!r}, line {bad[0] + 2}: {values[bad[0]]} isn't finite")
-        columns[name] = values
+    columns = tables.read(path, ["t", *(f"{axis}{i}" for i in range(9) for axis in "xy")], least=60)
     if np.any(np.diff(columns["t"]) <= 0.0):
         line = int(np.flatnonzero(np.diff(columns["t"]) <= 0.0)[0]) + 3
-        raise Wrong(f"{path}: column 't', line {line}: times must ascend")
+        raise tables.Wrong(f"{path}: column 't', line {line}: times must ascend")
     markers = np.stack([np.stack([columns[f"x{i}"], columns[f"y{i}"]], axis=1) for i in range(9)], axis=1)
     return columns["t"], markers
 
 
 def beat_of(file, t, markers, nominal):
     """The tail's beat, Hz: where a fundamental with harmonics leaves least of the tip's motion."""
-    head = markers[:, 0] - markers[:, 1]
-    yaw = np.unwrap(np.arctan2(head[:, 1], head[:, 0]))
-    side = np.stack([-np.sin(yaw), np.cos(yaw)], axis=1)
-    tip = np.sum((markers[:, 8] - markers[:, 0]) * side, axis=1)
+    _, tip = head_and_tip(markers)
 
     def left(beat):
-        phase = 2.0 * math.pi * beat * t
-        columns = [np.ones_like(t), t - t.mean(), *(f(k * phase) for k in (1, 2, 3) for f in (np.cos, np.sin))]
-        return float(np.linalg.lstsq(np.stack(columns, axis=1), tip, rcond=None)[1].sum())
+        return float(np.linalg.lstsq(basis(t, beat), tip, rcond=None)[1].sum())
 
     at = BEAT * nominal
     for width in (0.08, 0.01, 0.001):
         tried = at * (1.0 + np.linspace(-width, width, 33))
         k = int(np.argmin([left(f) for f in tried]))
         if width == 0.08 and k in (0, 32):
-            raise Wrong(f"{file}: no beat of the tail near {at:.3f} Hz, three quarters of the nominal {nominal} Hz of its name")
+            raise tables.Wrong(f"{file}: no beat of the tail near {at:.3f} Hz, three quarters of the nominal {nominal} Hz of its name")
         at = float(tried[k])
     return at
 
@@ -319,12 +297,12 @@ def folder(path):
     """Films by name: beat and what was seen."""
     files = sorted((pathlib.Path(path) / "tracks").glob("*.csv"))
     if not files:
-        raise Wrong(f"{pathlib.Path(path) / 'tracks'}: no tracks (*.csv)")
+        raise tables.Wrong(f"{pathlib.Path(path) / 'tracks'}: no tracks (*.csv)")
     films = {}
     for file in files:
         named = re.fullmatch(r"f(\d+)_(\d+)", file.stem)
         if not named:
-            raise Wrong(f"{file}: its name must be fA_BB.csv, with the motor's nominal speed A.BB Hz")
+            raise tables.Wrong(f"{file}: its name must be fA_BB.csv, with the motor's nominal speed A.BB Hz")
         t, markers = read(file)
         nominal = float(f"{named[1]}.{named[2]}")
         beat = beat_of(file, t, markers, nominal)
@@ -482,7 +460,7 @@ def draw(file, films, results):
         panel.set(xlabel="beat, Hz", ylabel=label)
     panels[0].legend(fontsize=7)
     panels[5].axis("off")
-    figure.savefig(file)
+    figure.savefig(file, metadata={"Date": None} if str(file).endswith(".svg") else None)
     print(f"wrote {file}", file=sys.stderr)
 
 
@@ -589,7 +567,7 @@ def main():
             say("no tracks given: made here, with noise")
             with tempfile.TemporaryDirectory() as made:
                 report = evaluate(make(made, options.quick), options.train, drives, say, True)
-    except (Wrong, hg.Error) as error:
+    except (tables.Wrong, hg.Error) as error:
         print(f"error: {error}", file=sys.stderr)
         sys.exit(1)
     draw(options.out, report["measured"], report["drives"])

@@ -28,6 +28,7 @@ from dataclasses import dataclass, field
 import numpy as np
 
 import hydrograd as hg
+import tables
 
 DEFAULT = pathlib.Path(__file__).parents[2] / "shared/data/uvms"
 TRAIN = ["004-0", "006-1", "014-1", "030-1", "alt-001-2"]
@@ -100,10 +101,6 @@ def unknowns():
     ]
 
 
-class Wrong(Exception):
-    """What can't be used, and what would be right."""
-
-
 @dataclass
 class Recording:
     """A run, from its first free sample to its last."""
@@ -128,46 +125,21 @@ class Recording:
 
 def read(path):
     """A recording from its file."""
-    try:
-        with open(path, newline="", encoding="utf-8-sig") as file:
-            rows = list(csv.reader(file, skipinitialspace=True))
-    except (OSError, UnicodeDecodeError, csv.Error) as error:
-        raise Wrong(f"{path}: can't be read: {error}") from None
-    while rows and not any(rows[-1]):
-        rows.pop()
-    if len(rows) < 3:
-        raise Wrong(f"{path}: {len(rows)} lines; a header and a line per sample are wanted")
-    header = rows[0]
-    columns = {}
-    for name in COLUMNS:
-        if name not in header:
-            raise Wrong(f"{path}: column {name!r} is missing; the file has {', '.join(header)}")
-        k = header.index(name)
-        values = np.empty(len(rows) - 1)
-        for i, row in enumerate(rows[1:]):
-            text = row[k] if k < len(row) else ""
-            try:
-                values[i] = math.nan if text == "" and name in MAY_LACK else float(text)
-            except ValueError:
-                raise Wrong(f"{path}: column {name!r}, line {i + 2}: {text!r} isn't a number") from None
-        bad = np.flatnonzero(~np.isfinite(values))
-        if name not in MAY_LACK and bad.size:
-            raise Wrong(f"{path}: column {name!r}, line {bad[0] + 2}: {values[bad[0]]} isn't finite")
-        columns[name] = values
+    columns = tables.read(path, COLUMNS, least=2, may_lack=MAY_LACK)
     between = np.diff(columns["t"])
     off = np.flatnonzero(np.abs(between - STEP) > 1e-3)
     if off.size:
-        raise Wrong(f"{path}: column 't', line {off[0] + 3}: {between[off[0]]:.4g} s after the line before; samples {STEP} s apart are wanted")
+        raise tables.Wrong(f"{path}: column 't', line {off[0] + 3}: {between[off[0]]:.4g} s after the line before; samples {STEP} s apart are wanted")
     late = np.flatnonzero(np.abs(columns["t"] - columns["t"][0] - STEP * np.arange(len(columns["t"]))) > 0.5 * STEP)
     if late.size:
-        raise Wrong(f"{path}: column 't', line {late[0] + 2}: half a sample off; samples {STEP} s apart throughout are wanted")
+        raise tables.Wrong(f"{path}: column 't', line {late[0] + 2}: half a sample off; samples {STEP} s apart throughout are wanted")
     for name in ("imu_roll", "imu_pitch"):
         far = np.flatnonzero(np.abs(columns[name]) > math.pi)
         if far.size:
-            raise Wrong(f"{path}: column {name!r}, line {far[0] + 2}: {columns[name][far[0]]} isn't an angle in rad")
+            raise tables.Wrong(f"{path}: column {name!r}, line {far[0] + 2}: {columns[name][far[0]]} isn't an angle in rad")
     free = columns["free"] > 0.5
     if free.sum() < 100:
-        raise Wrong(f"{path}: column 'free': {free.sum()} samples float freely; 100 at least are wanted")
+        raise tables.Wrong(f"{path}: column 'free': {free.sum()} samples float freely; 100 at least are wanted")
     first, last = np.flatnonzero(free)[[0, -1]]
     columns = {name: values[first : last + 1] for name, values in columns.items()}
     run = Recording(pathlib.Path(path).stem, columns, free[first : last + 1])
@@ -199,32 +171,22 @@ def folder(path, only=None):
     if only:
         missing = sorted(set(only) - {file.stem for file in files})
         if missing:
-            raise Wrong(f"{path / 'runs'}: no recordings {', '.join(missing)}")
+            raise tables.Wrong(f"{path / 'runs'}: no recordings {', '.join(missing)}")
         files = [file for file in files if file.stem in only]
     if not files:
-        raise Wrong(f"{path / 'runs'}: no recordings (*.csv)")
+        raise tables.Wrong(f"{path / 'runs'}: no recordings (*.csv)")
     urdf = path / "blue_rov_hardware_fixedjaw.urdf"
     if not urdf.is_file():
-        raise Wrong(f"{urdf}: no such file; the vehicle's URDF is wanted beside the folder of runs")
+        raise tables.Wrong(f"{urdf}: no such file; the vehicle's URDF is wanted beside the folder of runs")
     return {file.stem: read(file) for file in files}, urdf
 
 
-def rotation(roll, pitch, yaw=0.0):
-    """Of roll, pitch and yaw, body to world."""
-    (sr, cr), (sp, cp), (sy, cy) = ((math.sin(a), math.cos(a)) for a in (roll, pitch, yaw))
-    return np.array(
-        [
-            [cy * cp, cy * sp * sr - sy * cr, cy * sp * cr + sy * sr],
-            [sy * cp, sy * sp * sr + cy * cr, sy * sp * cr - cy * sr],
-            [-sp, cp * sr, cp * cr],
-        ]
-    )
-
-
-def quaternion(r):
-    """Of a rotation whose angle isn't near π, (w, x, y, z)."""
-    w = 0.5 * math.sqrt(1.0 + np.trace(r))
-    return np.array([w, *(np.array([r[2, 1] - r[1, 2], r[0, 2] - r[2, 0], r[1, 0] - r[0, 1]]) / (4.0 * w))])
+def attitude(roll, pitch):
+    """A rotation without heading: matrix, body to world, and quaternion (w, x, y, z)."""
+    (sr, cr), (sp, cp) = ((math.sin(a), math.cos(a)) for a in (roll, pitch))
+    matrix = np.array([[cp, sp * sr, sp * cr], [0.0, cr, -sr], [-sp, cp * sr, cp * cr]])
+    (sr, cr), (sp, cp) = ((math.sin(0.5 * a), math.cos(0.5 * a)) for a in (roll, pitch))
+    return matrix, np.array([cr * cp, sr * cp, cr * sp, -sr * sp])
 
 
 def motion(run, joint):
@@ -238,10 +200,10 @@ def motion(run, joint):
     return hg.Motion.spline(times, values)
 
 
-def scene_of(run, urdf, fluid=None, box=False):
+def scene_of(run, urdf, box):
     """The vehicle with the joints driven as they were. With `box` the vehicle is the box of its outer sizes, whose water is computed, and feels the arm's."""
     motions = {f"r5m_{name}": motion(run, name) for name in JOINTS}
-    scene = hg.Scene(fluid or hg.Fluid(density=DENSITY), gravity=(0.0, 0.0, -GRAVITY), time_step=STEP, steps=run.steps)
+    scene = hg.Scene(hg.Fluid(density=DENSITY), gravity=(0.0, 0.0, -GRAVITY), time_step=STEP, steps=run.steps)
     added = np.zeros((6, 6))
     added[:3, :3] = np.diag(ADDED) / DENSITY
     vehicle = {
@@ -288,21 +250,17 @@ def scene_of(run, urdf, fluid=None, box=False):
         mass, volume = max(-force, 0.0) / GRAVITY, max(force, 0.0) / (DENSITY * GRAVITY)
         scene.add_force("float", body=VEHICLE, at=at, mass=mass, volume=volume, name=f"item {i + 1}")
     scene.add_force("damping", body=VEHICLE, linear=LINEAR, quadratic=QUADRATIC, name="water")
-    q, v = np.zeros(7), np.zeros(6)
-    turn = rotation(*run.start["attitude"])
-    q[3:] = quaternion(turn)
-    v[:3], v[3:] = run.start["velocity"], turn @ run.start["rates"]
-    return scene, q, v
+    return scene
 
 
-def prepare(run, urdf, **choices):
-    """A simulator that starts as the recording does."""
-    scene, q, v = scene_of(run, urdf)
-    choices = {"fidelity": "isolated", "integrator": "rk4", **choices}
-    sim = hg.Simulator(scene, **choices)
-    start_q, start_v = np.array(sim.initial_q), np.array(sim.initial_v)
-    start_q[:7], start_v[:6] = q, v
-    return sim.with_start(start_q, start_v)
+def prepare(run, urdf, fidelity="isolated", box=False):
+    """A simulator that starts as the recording does; with `box` as there."""
+    sim = hg.Simulator(scene_of(run, urdf, box), fidelity=fidelity, integrator="rk4")
+    turn, quaternion = attitude(*run.start["attitude"])
+    q, v = np.array(sim.initial_q), np.array(sim.initial_v)
+    q[:3], q[3:7] = 0.0, quaternion
+    v[:3], v[3:6] = run.start["velocity"], turn @ run.start["rates"]
+    return sim.with_start(q, v)
 
 
 # What is seen: how much of a run's samples count as independent, and how far off the model may be, roll and pitch (rad) and rates (rad/s).
@@ -497,13 +455,9 @@ def truth_of(sim):
 
 def coupling(run, urdf, values):
     """How much the attitude changes, °, where the vehicle is a box that feels the arm through the water, and where it is the same box without that."""
-    made = []
-    for fidelity in ("isolated", "reduced"):
-        scene, q, v = scene_of(run, urdf, box=True)
-        sim = with_values(hg.Simulator(scene, fidelity=fidelity, integrator="rk4"), values)
-        start_q, start_v = np.array(sim.initial_q), np.array(sim.initial_v)
-        start_q[:7], start_v[:6] = q, v
-        made.append(simulated(sim.with_start(start_q, start_v), run)[0])
+    made = [
+        simulated(with_values(prepare(run, urdf, fidelity, box=True), values), run)[0] for fidelity in ("isolated", "reduced")
+    ]
     return {"roll": DEG * rms(made[0][:, 0] - made[1][:, 0]), "pitch": DEG * rms(made[0][:, 1] - made[1][:, 1])}
 
 
@@ -528,7 +482,7 @@ def draw(file, runs, models):
     axes[0, 0].legend(fontsize=7)
     for panel in axes[-1]:
         panel.set_xlabel("t, s")
-    figure.savefig(file)
+    figure.savefig(file, metadata={"Date": None} if str(file).endswith(".svg") else None)
     print(f"wrote {file}", file=sys.stderr)
 
 
@@ -540,7 +494,7 @@ def evaluate(path, train, only, given, with_coupling, say, made_here):
     known = given["training"] if given else train
     others = [name for name in runs if name not in known and not name.startswith("baseline")]
     if not training and not others:
-        raise Wrong(f"{pathlib.Path(path) / 'runs'}: nothing to predict: baselines and training runs alone")
+        raise tables.Wrong(f"{pathlib.Path(path) / 'runs'}: nothing to predict: baselines and training runs alone")
     if training and len(training) < len(train):
         say(f"training runs that aren't there: {', '.join(name for name in train if name not in runs)}")
     sims = {name: prepare(runs[name], urdf) for name in [*training, *others]}
@@ -658,7 +612,7 @@ def constants(path):
         values = {name: float(made["constants"][name]) for name in FOUND}
         return {"constants": values, "training": [str(name) for name in made["training"]]}
     except (OSError, ValueError, KeyError, TypeError) as error:
-        raise Wrong(f"{path}: not what --json writes: {error!r}") from None
+        raise tables.Wrong(f"{path}: not what --json writes: {error!r}") from None
 
 
 def main():
@@ -695,7 +649,7 @@ def main():
             with tempfile.TemporaryDirectory() as made:
                 folder_made = make(made, names, seconds)
                 report, runs, models = evaluate(folder_made, options.train, options.only, given, with_coupling, say, True)
-    except (Wrong, hg.Error) as error:
+    except (tables.Wrong, hg.Error) as error:
         print(f"error: {error}", file=sys.stderr)
         sys.exit(1)
     draw(options.out, runs, {n: models[n] for n in [*report["unseen"], *report["training"]]})

@@ -79,27 +79,29 @@ fn unknowns() -> Vec<Unknown> {
     each.collect()
 }
 
+/// What is compared of a run: roll and pitch of the vehicle, which is the first body, and its rates about x and y.
+fn recorded(run: &Recording) -> Vec<Recorded> {
+    let all = (0..=run.steps()).step_by(EVERY);
+    let states: Vec<usize> = all.filter(|n| run.free[*n]).collect();
+    let weight = (states.len() as f64 / INDEPENDENT).sqrt();
+    let each = OFF.iter().flat_map(|off| [0, 1].map(|k| (off, k)));
+    each.map(|((name, deviation), entry)| {
+        let column = run.seen(name, entry);
+        Recorded {
+            observable: (*name).into(),
+            entry,
+            values: states.iter().map(|n| column[*n]).collect(),
+            states: states.clone(),
+            deviation: weight * deviation,
+        }
+    })
+    .collect()
+}
+
 fn experiment(run: &Recording, simulator: &Simulator) -> Experiment {
     let controls = Controls::zeros(simulator, run.steps());
-    let mut made = Experiment::new(&run.name, simulator.clone(), controls);
-    let states: Vec<usize> = (0..=run.steps())
-        .step_by(EVERY)
-        .filter(|n| run.free[*n])
-        .collect();
-    let weight = (states.len() as f64 / INDEPENDENT).sqrt();
-    for (name, deviation) in OFF {
-        for k in 0..2 {
-            let column = run.seen(name, k);
-            made = made.saw(Recorded {
-                observable: name.into(),
-                entry: k,
-                values: states.iter().map(|n| column[*n]).collect(),
-                states: states.clone(),
-                deviation: weight * deviation,
-            });
-        }
-    }
-    made
+    let made = Experiment::new(&run.name, simulator.clone(), controls);
+    recorded(run).into_iter().fold(made, Experiment::saw)
 }
 
 /// A simulator with other values of the unknowns.
@@ -174,19 +176,12 @@ fn misfit(runs: &[&Recording], simulators: &[&Simulator], values: &[f64]) -> f64
     let of_run = |(run, simulator): (&&Recording, &&Simulator)| -> hydrograd::Result<f64> {
         let simulator = with_values(simulator, values)?;
         let rollout = simulator.rollout(&Controls::zeros(&simulator, run.steps()))?;
-        let states: Vec<usize> = (0..=run.steps())
-            .step_by(EVERY)
-            .filter(|n| run.free[*n])
-            .collect();
-        let weight = (states.len() as f64 / INDEPENDENT).sqrt();
         let mut sum = 0.0;
-        for (name, deviation) in OFF {
-            let made = rollout.observe(name)?;
-            for k in 0..2 {
-                let seen = run.seen(name, k);
-                let off = |n: &usize| ((made[(k, *n)] - seen[*n]) / (weight * deviation)).powi(2);
-                sum += states.iter().map(off).sum::<f64>();
-            }
+        for r in recorded(run) {
+            let made = rollout.observe(&r.observable)?;
+            let off =
+                |(n, seen): (&usize, &f64)| ((made[(r.entry, *n)] - seen) / r.deviation).powi(2);
+            sum += r.states.iter().zip(&r.values).map(off).sum::<f64>();
         }
         Ok(sum)
     };

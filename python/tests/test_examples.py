@@ -1,6 +1,6 @@
 """The examples run, small, and show what they say."""
 
-import importlib.util
+import importlib
 import json
 import math
 import pathlib
@@ -181,15 +181,6 @@ def test_uvms_in_its_tank(tmp_path):
     assert dynamic["020-0"]["roll"] < 0.6 and dynamic["020-0"]["pitch"] < 0.6
 
 
-def example(name):
-    """An example as a module."""
-    spec = importlib.util.spec_from_file_location(name, ROOT / f"examples/{name}.py")
-    module = importlib.util.module_from_spec(spec)
-    sys.modules[name] = module
-    spec.loader.exec_module(module)
-    return module
-
-
 def slopes(sim, names, observed, h=1e-5):
     """Derivatives of what is observed by parameters, by central differences, each in parts of the parameter's size."""
     columns = []
@@ -201,9 +192,10 @@ def slopes(sim, names, observed, h=1e-5):
     return np.stack(columns, axis=-1)
 
 
-def test_jacobians_of_both_tanks(tmp_path):
+def test_jacobians_of_both_tanks(tmp_path, monkeypatch):
     """Exact ones against differences, 1e-6 of the largest in each column."""
-    uvms = example("uvms")
+    monkeypatch.syspath_prepend(ROOT / "examples")
+    uvms, fish = (importlib.import_module(name) for name in ("uvms", "fish_tank"))
     recordings, urdf = uvms.folder(uvms.make(tmp_path, ["014-1"], 4.0))
     sim = uvms.truth_of(uvms.prepare(recordings["014-1"], urdf))
     names = [f"{uvms.VEHICLE}.center_of_buoyancy.y", f"{uvms.VEHICLE}.inertia.yy", "water.linear.wx"]
@@ -212,7 +204,6 @@ def test_jacobians_of_both_tanks(tmp_path):
     exact = rollout.jacobian(of=["attitudes"], parameters=names, states=[steps])["attitudes"][0, 0]
     found = slopes(sim, names, lambda s: s.rollout(steps=steps).observe("attitudes")[-1, 0])
     assert np.all(np.abs(exact - found) < 1e-6 * np.abs(found).max(axis=0))
-    fish = example("fish_tank")
     for drive, names in (("angles", ["along.linear.x", "edge.factor"]), ("tendons", ["tendons.gain", "body 3.quadratic.y"])):
         swim = fish.Swim(drive, 0.75)
         short = {"controls": swim.controls[:150]} if drive == "tendons" else {"steps": 150}

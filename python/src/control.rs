@@ -17,7 +17,6 @@ use numpy::PyArrayDyn;
 use pyo3::gc::{PyTraverseError, PyVisit};
 use pyo3::prelude::*;
 use pyo3::types::{PyDict, PyList};
-use std::ops::ControlFlow;
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 
 type Numbers<'py> = Bound<'py, PyArrayDyn<f64>>;

@@ -50,13 +50,17 @@ impl Scene {
 
     /// Number of controls a step takes: those of bodies, then those of thrusters among the forces, then those of tendons.
     pub fn controls(&self) -> usize {
-        let of_bodies: usize = self.bodies.iter().map(Body::controls).sum();
-        of_bodies + self.commands()
+        self.body_controls() + self.commands()
+    }
+
+    /// How many of these are those of bodies.
+    pub(crate) fn body_controls(&self) -> usize {
+        self.bodies.iter().map(Body::controls).sum()
     }
 
     /// How many of these are commands of thrusters and tendons.
     pub(crate) fn commands(&self) -> usize {
-        self.thrusters().count() + self.tendons().count()
+        self.all_thrusters().count() + self.all_tendons().count()
     }
 
     /// Names of the controls, in order: `arm.force.rate` does work on the velocity `arm.rate`, `hull.wrench.fx`, …, `hull.wrench.mz` are a body's wrench, and a

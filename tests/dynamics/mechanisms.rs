@@ -2,10 +2,11 @@
 
 use crate::support::says;
 use hydrograd::dynamics::Integrator;
-use hydrograd::scene::{Body, Fluid, Joint, Scene, Shape, Spring};
+use hydrograd::scene::{Body, Fluid, Joint, Mimic, Scene, Shape, Spring, Tendon};
 use hydrograd::simulate::Sample;
 use hydrograd::simulate::gradcheck::{self, gradcheck};
 use hydrograd::{Controls, Fidelity, Settings, Simulator};
+use nalgebra::DMatrix;
 use std::f64::consts::TAU;
 
 const GRAVITY: f64 = 9.81;
@@ -178,4 +179,81 @@ fn springs_that_can_not_be_are_refused() {
                 [[forces]]\nkind = \"spring\"\nbody = \"a\"\nstiffness = 1\nlenght = 2\n";
     let error = Scene::from_toml(text, "").unwrap_err().to_string();
     says(&error, &["lenght", "rest_length"]);
+}
+
+/// Two wheels on a tendon.
+fn wheels(tendon: Tendon) -> Scene {
+    let mut scene = Scene::new(Fluid::none());
+    scene.time_step = 0.002;
+    let axis = [0.0, 0.0, 1.0];
+    for name in ["a", "b"] {
+        scene.add(dry(name, Joint::Revolute { axis }));
+    }
+    scene.add_force(tendon.into());
+    scene
+}
+
+/// Pulled all at once, two wheels swing about where the tendon is pulled to, each by its arm: Σ r q = g u (1 − cos ωt), ω² = k Σ r²/I. Left alone they keep their energy, and a damper
+/// takes it.
+#[test]
+fn wheels_on_a_tendon_swing_with_their_period() {
+    let (arms, stiffness, gain, pulled) = ([0.3, -0.2], 400.0, 0.05, 2.0);
+    let tendon = || Tendon::new([("a", arms[0]), ("b", arms[1])]).stiffness(stiffness);
+    let sim = simulator(&wheels(tendon().gain(gain)), Integrator::Rk4);
+    let controls = DMatrix::from_element(1, 200, pulled);
+    let controls = Controls::from_matrix(&sim, controls).unwrap();
+    let rollout = sim.rollout(&controls).unwrap();
+    let square = arms[0] * arms[0] + arms[1] * arms[1];
+    let rate = (stiffness * square / 0.3_f64).sqrt();
+    for s in rollout.samples() {
+        let length = gain * pulled * (1.0 - (rate * s.time).cos());
+        for (k, arm) in arms.iter().enumerate() {
+            let exact = arm / square * length;
+            assert!((s.q[k] - exact).abs() < 1e-6, "{} {exact}", s.q[k]);
+        }
+    }
+    let mut alone = wheels(tendon());
+    alone.initial.v = vec![0.4, -0.25];
+    let energies = |scene: &Scene| -> Vec<f64> {
+        let sim = simulator(scene, Integrator::Rk4);
+        let rollout = sim.rollout(&Controls::zeros(&sim, 200)).unwrap();
+        assert!(rollout.warnings().is_empty(), "{:?}", rollout.warnings());
+        rollout.samples().iter().map(Sample::energy).collect()
+    };
+    let kept = energies(&alone);
+    assert!(kept.iter().all(|e| (e / kept[0] - 1.0).abs() < 1e-6));
+    let mut damped = wheels(tendon().damping(5.0));
+    damped.initial.v = alone.initial.v.clone();
+    let lost = energies(&damped);
+    assert!(lost.windows(2).all(|e| e[1] <= e[0] + 1e-12) && lost[200] < 0.7 * lost[0]);
+    gradients(&damped, Integrator::Rk4);
+    gradients(&damped, Integrator::Midpoint);
+}
+
+#[test]
+fn tendons_that_can_not_be_are_refused() {
+    let refused = |tendon: Tendon, words: &[&str]| {
+        says(wheels(tendon).validate().unwrap_err(), words);
+    };
+    let good = || Tendon::new([("a", 0.3)]).stiffness(40.0);
+    refused(
+        Tendon::new([("c", 0.3)]).stiffness(1.0),
+        &["arms.c", "a, b"],
+    );
+    let none: [(&str, f64); 0] = [];
+    refused(Tendon::new(none).stiffness(1.0), &["arms", "none"]);
+    let unlike = Tendon::new([("a", f64::NAN)]).stiffness(1.0);
+    refused(unlike, &["arms.a", "NaN", "lever arm"]);
+    refused(good().stiffness(0.0), &["stiffness", "above zero"]);
+    refused(good().damping(-1.0), &["damping", "-1"]);
+    refused(good().gain(f64::INFINITY), &["gain", "inf"]);
+    let mut scene = wheels(good());
+    scene.bodies[0].joint = Joint::Free;
+    says(
+        scene.validate().unwrap_err(),
+        &["arms.a", "free joint", "revolute"],
+    );
+    let mut scene = wheels(good());
+    scene.bodies[0].mimic = Some(Mimic::new("b"));
+    says(scene.validate().unwrap_err(), &["arms.a", "of their own"]);
 }

@@ -6,7 +6,8 @@ use std::path::Path;
 use hydrograd::{Controls, Fidelity, Settings, Simulator};
 
 use hydrograd::scene::{
-    Body, Controller, Drag, DragPart, Fluid, Joint, Motion, Placement, Plane, Preset, Scene, Shape,
+    Body, Controller, Drag, DragPart, Edge, Fluid, Joint, Motion, Placement, Plane, Preset, Scene,
+    Shape, Tendon,
 };
 
 #[test]
@@ -247,6 +248,7 @@ fn everything_survives_a_round_trip() {
                     rate: 1.0,
                 },
                 sine.clone(),
+                Motion::through(vec![0.0, 0.1, 1.0 / 3.0], vec![0.2, 1e-9, -1.0]).unwrap(),
             ])
             .actuated()
             .locked()
@@ -258,6 +260,12 @@ fn everything_survives_a_round_trip() {
     scene.initial.q = vec![0.1, 1e-300];
     scene.initial.v = vec![-1.0];
     scene.initial.momentum = vec![f64::MIN_POSITIVE];
+    let edge = Edge::new("body 1").named("rim").at([0.1, 0.2, 1e-9]);
+    let edge = edge.forward([1.0, 0.0, 0.5]).normal([0.0, 1.0, 0.0]);
+    scene.add_force(edge.span(1.0 / 3.0).factor(0.3).smoothing(0.0).into());
+    let tendon = Tendon::new([("body 1", 0.1), ("body 2", -1.0 / 3.0)]);
+    let tendon = tendon.named("crank").stiffness(4e3).damping(2.0);
+    scene.add_force(tendon.gain(0.03).into());
     let controllers = [
         Controller::Constant { control: vec![1.0] },
         Controller::Pd {

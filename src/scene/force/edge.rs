@@ -118,17 +118,6 @@ impl From<Edge> for Force {
     }
 }
 
-impl Scene {
-    /// The trailing edges among the forces, each with its number among all.
-    pub(crate) fn edges(&self) -> impl Iterator<Item = (usize, &Edge)> {
-        let each = self.forces.iter().enumerate();
-        each.filter_map(|(i, force)| match force {
-            Force::Edge(edge) => Some((i, edge)),
-            _ => None,
-        })
-    }
-}
-
 impl Edge {
     /// Checks all that doesn't need the meshes; `place` names a field.
     pub(super) fn check(&self, scene: &Scene, place: &dyn Fn(&str) -> String) -> Result<()> {

@@ -128,17 +128,6 @@ impl From<Fin> for Force {
     }
 }
 
-impl Scene {
-    /// The fins among the forces, each with its number among all.
-    pub(crate) fn fins(&self) -> impl Iterator<Item = (usize, &Fin)> {
-        let each = self.forces.iter().enumerate();
-        each.filter_map(|(i, force)| match force {
-            Force::Fin(fin) => Some((i, fin)),
-            _ => None,
-        })
-    }
-}
-
 impl Fin {
     /// Checks all that doesn't need the meshes; `place` names a field.
     pub(super) fn check(&self, scene: &Scene, place: &dyn Fn(&str) -> String) -> Result<()> {

@@ -45,7 +45,43 @@ pub enum Force {
     Tendon(Tendon),
 }
 
+/// The forces of a kind, each with its number among all.
+macro_rules! kinds {
+    ($($name:ident: $kind:ident),*) => {
+        impl Scene {
+            $(pub(crate) fn $name(&self) -> impl Iterator<Item = (usize, &$kind)> {
+                let each = self.forces.iter().enumerate();
+                each.filter_map(|(i, force)| match force {
+                    Force::$kind(of) => Some((i, of)),
+                    _ => None,
+                })
+            })*
+        }
+    };
+}
+kinds!(edges: Edge, fins: Fin, lubrications: Lubrication, all_tendons: Tendon, all_thrusters: Thruster);
+
+/// Forces with controls, which are numbered on from `first`: their numbers, their controls, and themselves.
+fn numbered<'a, F: 'a>(
+    first: usize,
+    each: impl Iterator<Item = (usize, &'a F)>,
+) -> impl Iterator<Item = (usize, usize, &'a F)> {
+    each.enumerate()
+        .map(move |(k, (i, force))| (i, first + k, force))
+}
+
 impl Scene {
+    /// The thrusters, each with its number among all forces and its control: they come after those of bodies.
+    pub(crate) fn thrusters(&self) -> impl Iterator<Item = (usize, usize, &Thruster)> {
+        numbered(self.body_controls(), self.all_thrusters())
+    }
+
+    /// The tendons, each with its number among all forces and its control: they come after those of thrusters.
+    pub(crate) fn tendons(&self) -> impl Iterator<Item = (usize, usize, &Tendon)> {
+        let first = self.body_controls() + self.all_thrusters().count();
+        numbered(first, self.all_tendons())
+    }
+
     /// Adds a force between bodies.
     pub fn add_force(&mut self, force: Force) {
         self.forces.push(force);
@@ -65,15 +101,6 @@ impl Scene {
         };
         let counted = || format!("{kind} {}", index + 1);
         name.clone().unwrap_or_else(counted)
-    }
-
-    /// The forces of viscous water, each with its number among all.
-    pub(crate) fn lubrications(&self) -> impl Iterator<Item = (usize, &Lubrication)> {
-        let each = self.forces.iter().enumerate();
-        each.filter_map(|(i, force)| match force {
-            Force::Lubrication(lubrication) => Some((i, lubrication)),
-            _ => None,
-        })
     }
 
     /// Checks the forces, once the bodies are known to be right.

@@ -78,22 +78,6 @@ impl From<Tendon> for Force {
     }
 }
 
-impl Scene {
-    /// The tendons among the forces, each with its number among all and its control: they come after those of thrusters.
-    pub(crate) fn tendons(&self) -> impl Iterator<Item = (usize, usize, &Tendon)> {
-        let of_bodies: usize = self.bodies.iter().map(super::super::Body::controls).sum();
-        let first = of_bodies + self.thrusters().count();
-        let each = self.forces.iter().enumerate();
-        let tendons = each.filter_map(|(i, force)| match force {
-            Force::Tendon(tendon) => Some((i, tendon)),
-            _ => None,
-        });
-        tendons
-            .enumerate()
-            .map(move |(k, (i, tendon))| (i, first + k, tendon))
-    }
-}
-
 impl Tendon {
     /// Checks all that doesn't need the meshes; `place` names a field.
     pub(super) fn check(&self, scene: &Scene, place: &dyn Fn(&str) -> String) -> Result<()> {

@@ -143,20 +143,6 @@ impl From<Thruster> for Force {
     }
 }
 
-impl Scene {
-    /// The thrusters among the forces, each with its number among all and its control: they come after those of bodies.
-    pub(crate) fn thrusters(&self) -> impl Iterator<Item = (usize, usize, &Thruster)> {
-        let first: usize = self.bodies.iter().map(super::super::Body::controls).sum();
-        let each = self.forces.iter().enumerate();
-        let found = each.filter_map(|(i, force)| match force {
-            Force::Thruster(thruster) => Some((i, thruster)),
-            _ => None,
-        });
-        let counted = found.enumerate();
-        counted.map(move |(k, (i, thruster))| (i, first + k, thruster))
-    }
-}
-
 impl Thruster {
     /// Checks all that doesn't need the meshes; `place` names a field.
     pub(super) fn check(&self, scene: &Scene, place: &dyn Fn(&str) -> String) -> Result<()> {

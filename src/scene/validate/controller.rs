@@ -8,7 +8,7 @@ impl Scene {
     pub(super) fn check_controller(&self) -> Result<()> {
         let commands = self.commands();
         let counted = |field: &str, values: &[f64], commands: usize| {
-            let controls = self.controls() - self.commands() + commands;
+            let controls = self.body_controls() + commands;
             finite(&format!("controller.{field}"), values)?;
             if values.len() == controls {
                 return Ok(());
@@ -19,8 +19,8 @@ impl Scene {
                 .collect();
             if commands > 0 {
                 let of = [
-                    ("thrusters", self.thrusters().count()),
-                    ("tendons", self.tendons().count()),
+                    ("thrusters", self.all_thrusters().count()),
+                    ("tendons", self.all_tendons().count()),
                 ];
                 let some = of.iter().filter(|(_, n)| *n > 0);
                 parts.extend(some.map(|(what, n)| format!("{what} {n}")));
@@ -64,7 +64,7 @@ impl Scene {
                         ),
                     ));
                 }
-                // Thrusters among the forces get nothing from it.
+                // Thrusters and tendons among the forces get nothing from it.
                 counted("target", target, 0)?;
                 counted("stiffness", stiffness, 0)?;
                 counted("damping", damping, 0)

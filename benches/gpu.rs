@@ -3,7 +3,7 @@
 //! `cargo bench --features gpu --bench gpu [-- --minutes M] [--peak TFLOPS]`, on whatever adapter there is. First the four scenes
 //! of the paper's size with the fidelity `full`: seconds a step (momentum Euler: one evaluation with its derivatives) and seconds
 //! a step with its gradient, on both. Then rows of spheres, one of which moves: one evaluation with its derivatives and one
-//! second derivative, by fundamental solutions and by coupled panels. Last, products with K alone: pairs of a face and a source a second, and what share that is of the card's
+//! second derivative, by fundamental solutions and by coupled panels; between them falling spheres of the fidelity `reduced`. Last, products with K alone: pairs of a face and a source a second, and what share that is of the card's
 //! single-precision peak (`--peak`, or of a card known here). What wouldn't end within the minutes given (default 9), or
 //! not fit into memory, is left out, with the reason.
 
@@ -15,7 +15,7 @@ use hydrograd::dynamics::Integrator;
 use hydrograd::gpu::full::{Gpu, Probe};
 use hydrograd::gpu::panel::GpuPanels;
 use hydrograd::gpu::{Arithmetic, Context, Options};
-use hydrograd::scene::Scene;
+use hydrograd::scene::{Body, Fluid, Scene};
 use hydrograd::shape;
 use hydrograd::simulate::Backend;
 use hydrograd::{Controls, Fidelity, Settings, Shape, Simulator, objective};
@@ -37,6 +37,9 @@ const ROWS: [usize; 3] = [16, 78, 156];
 /// Spheres of this many panels, and numbers of them: 640 to 19,840 panels.
 const PANEL_FACES: usize = 320;
 const PANEL_ROWS: [usize; 4] = [2, 8, 27, 62];
+/// Numbers of falling spheres, compressed, and the most of which the CPU's factor is timed.
+const COMPRESSED_ROWS: [usize; 6] = [2, 8, 27, 64, 125, 216];
+const COMPRESSED_CPU: usize = 64;
 /// Operations of a pair, square roots and divisions counted once: solid angle, and two a column.
 const OPERATIONS: f64 = 105.0;
 /// Columns of the products that are timed alone.
@@ -255,6 +258,60 @@ fn panels(context: &Arc<Context>, budget: &Budget) -> hydrograd::Result<()> {
     Ok(())
 }
 
+/// Compressed spheres (`reduced`) that fall from a lattice: milliseconds a step.
+fn compressed(left: &dyn Fn() -> f64) -> hydrograd::Result<()> {
+    println!(
+        "\n| spheres, `reduced` | CPU, ms/step | with gradient | GPU, ms/step | with gradient | CPU/GPU | device, MB |"
+    );
+    println!("|---|---|---|---|---|---|---|");
+    // A step with its gradient on the CPU and on the GPU, and of how many spheres.
+    let (mut cpu_before, mut gpu_before) = ((0.0, 1), (0.0, 1));
+    let expected = |(seconds, spheres): (f64, usize), count: usize, power| {
+        3.0 * seconds * (count as f64 / spheres as f64).powi(power)
+    };
+    for count in COMPRESSED_ROWS {
+        if expected(gpu_before, count, 2) > left() {
+            println!("| {count} | left out |");
+            continue;
+        }
+        let mut scene = Scene::new(Fluid::fresh_water());
+        scene.gravity = [0.0, 0.0, -9.81];
+        for pose in lattice_poses(count) {
+            let ball = Body::new(Shape::sphere(0.5).faces(PANEL_FACES)).density(1100.0);
+            scene.add(ball.at(pose.translation.into()));
+        }
+        let settings = Settings::default()
+            .fidelity(Fidelity::Reduced)
+            .integrator(Integrator::MomentumEuler);
+        let gpu = Simulator::new(&scene, settings.clone().backend(Backend::Gpu))?;
+        let on_gpu = step(&gpu)?;
+        let memory = (gpu.backend().device).map_or(0.0, |d| d.peak_memory as f64 / 1e6);
+        gpu_before = (on_gpu.1, count);
+        let cpu = match count <= COMPRESSED_CPU && expected(cpu_before, count, 3) < left() {
+            true => {
+                let on_cpu = step(&Simulator::new(&scene, settings)?)?;
+                cpu_before = (on_cpu.1, count);
+                Some(on_cpu)
+            }
+            false => None,
+        };
+        let [forward, whole, ratio] = match cpu {
+            Some(c) => [
+                format!("{:.1}", 1e3 * c.0),
+                format!("{:.1}", 1e3 * c.1),
+                format!("{:.2}", c.1 / on_gpu.1),
+            ],
+            None => ["–", "–", "–"].map(String::from),
+        };
+        println!(
+            "| {count} | {forward} | {whole} | {:.1} | {:.1} | {ratio} | {memory:.1} |",
+            1e3 * on_gpu.0,
+            1e3 * on_gpu.1
+        );
+    }
+    Ok(())
+}
+
 /// Pairs a second of products with K.
 fn rate(
     context: &Arc<Context>,
@@ -326,6 +383,7 @@ fn main() -> hydrograd::Result<()> {
     };
     products(&context, &budget)?;
     scenes(&budget)?;
+    compressed(&left)?;
     panels(&context, &budget)?;
     rows(&context, &budget)?;
     println!("\n{:.0} s in all", start.elapsed().as_secs_f64());

@@ -155,9 +155,11 @@ fn floor(quick: bool) -> hydrograd::Result<()> {
             let mut q = simulator.start().0.clone();
             simulator.stepper().place_motions(&mut q, 0.0);
             let (system, parameters) = (simulator.system(), simulator.parameters());
-            system.linearise(parameters, &q)?;
+            system.linearise(parameters, &q, 0.0)?;
             let whole = time(quick, || {
-                system.linearise(parameters, &q).map(|e| e.report().clone())
+                system
+                    .linearise(parameters, &q, 0.0)
+                    .map(|e| e.report().clone())
             });
             let links = links(&scene, &simulator);
             let parts = bare(quick, &links, simulator.unknowns());
@@ -358,9 +360,11 @@ fn grown(quick: bool, scene: &Scene, settings: Settings) -> hydrograd::Result<St
     let v = DVector::from_fn(simulator.start().1.len(), |_, _| 0.01 * random.number());
     simulator.set_start(q.clone(), v.clone())?;
     let (system, parameters) = (simulator.system(), simulator.parameters());
-    let evaluation = system.linearise(parameters, &q)?;
+    let evaluation = system.linearise(parameters, &q, 0.0)?;
     let evaluate = time(quick, || {
-        system.linearise(parameters, &q).map(|e| e.report().clone())
+        system
+            .linearise(parameters, &q, 0.0)
+            .map(|e| e.report().clone())
     });
     let [mut gradient, mut hvp] = [0.0; 2];
     if let Some(fluid) = evaluation.fluid() {

@@ -15,6 +15,7 @@ pub mod rigid;
 pub mod sample;
 pub mod solve;
 pub mod step;
+pub mod stream;
 pub mod waterline;
 
 pub use registry::rungs;

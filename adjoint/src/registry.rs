@@ -11,6 +11,7 @@ use crate::lie::{
 };
 use crate::rigid::{spatial_inertia, spatial_inertia_vjp};
 use crate::solve::{Definite, Fitted, Moved, least_squares, least_squares_jvp};
+use crate::stream::{Stream, stream_wrench, stream_wrench_jvp, stream_wrench_vjp};
 use crate::waterline::{Below, Hull};
 use nalgebra::{DMatrix, DVector};
 
@@ -44,6 +45,14 @@ pub fn rungs() -> Vec<Rung> {
         Rung {
             name: "drag::quadratic_drag_vjp",
             check: quadratic_drag_vjp_check,
+        },
+        Rung {
+            name: "stream::stream_wrench_jvp",
+            check: stream_wrench_jvp_check,
+        },
+        Rung {
+            name: "stream::stream_wrench_vjp",
+            check: stream_wrench_vjp_check,
         },
         Rung {
             name: "waterline::Below::jvp",
@@ -233,6 +242,62 @@ fn quadratic_drag_vjp_check(corruption: f64) -> Outcome {
             corruption,
         )
     }))
+}
+
+/// A twist, a stream and its acceleration.
+const STREAMED: [f64; 12] = [
+    0.9, -0.8, 0.5, 0.4, 0.3, -0.2, 0.7, 0.2, -0.6, -0.3, 0.5, 0.1,
+];
+
+/// An added mass, as symmetric as they are.
+fn added_mass() -> Mat6 {
+    let half = Mat6::from_column_slice(&array::<36>(70, 1.0));
+    half * half.transpose()
+}
+
+fn streamed(x: &[f64]) -> (Vec6, Stream) {
+    let stream = Stream {
+        velocity: Vec3::from_column_slice(&x[6..9]),
+        acceleration: Vec3::from_column_slice(&x[9..12]),
+    };
+    (Vec6::from_column_slice(&x[..6]), stream)
+}
+
+fn stream_wrench_of(x: &[f64]) -> Vec<f64> {
+    let (nu, stream) = streamed(x);
+    stream_wrench(&added_mass(), &nu, &stream).as_slice().into()
+}
+
+fn stream_wrench_jvp_check(corruption: f64) -> Outcome {
+    let (nu, stream) = streamed(&STREAMED);
+    all((80..95).map(|seed| {
+        let along: [f64; 12] = array(seed, 0.1);
+        let (dnu, dstream) = streamed(&along);
+        let jvp = corruption * stream_wrench_jvp(&added_mass(), &nu, &stream, &dnu, &dstream);
+        outcome(
+            stream_wrench_of,
+            &STREAMED,
+            &along,
+            jvp.as_slice(),
+            TOLERANCE,
+        )
+    }))
+}
+
+fn stream_wrench_vjp_check(corruption: f64) -> Outcome {
+    let (nu, stream) = streamed(&STREAMED);
+    transposed::<12>(
+        stream_wrench_of,
+        &STREAMED,
+        |bar| {
+            let bar = Vec6::from_column_slice(bar);
+            let found = stream_wrench_vjp(&added_mass(), &nu, &stream, &bar);
+            let parts = [found.stream.velocity, found.stream.acceleration];
+            let parts = parts.iter().flat_map(|x| x.iter().copied());
+            found.nu.iter().copied().chain(parts).collect()
+        },
+        corruption,
+    )
 }
 
 /// Normal and height of a plane through the tetrahedron of [`below`].

@@ -125,8 +125,8 @@ pub fn added_mass(simulator: &Simulator) -> hydrograd::Result<DMatrix<f64>> {
     let system = simulator.system();
     let mut dry = simulator.parameters().clone();
     *dry.density_mut() = 0.0;
-    let submerged = system.evaluate(simulator.parameters(), &q)?;
-    let dry = system.evaluate(&dry, &q)?;
+    let submerged = system.evaluate(simulator.parameters(), &q, 0.0)?;
+    let dry = system.evaluate(&dry, &q, 0.0)?;
     Ok(submerged.mass_matrix() - dry.mass_matrix())
 }
 

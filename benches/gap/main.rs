@@ -102,7 +102,7 @@ impl Case {
     fn along(&self, gap: f64, settings: &Settings) -> Result<[f64; 2]> {
         let simulator = Simulator::new(&self.scene(gap), settings.clone())?;
         let (stepper, speed) = (simulator.stepper(), DVector::from_element(1, 1.0));
-        let found = stepper.linearise(simulator.start().0)?;
+        let found = stepper.linearise(simulator.start().0, 0.0)?;
         // M v̇ = −½ (dM/dq) v² along the one coordinate.
         let force = found.inertial_force(&speed, &DVector::zeros(0))?;
         let dry = simulator.parameters().mass(0);
@@ -285,7 +285,7 @@ fn accuracies(words: &[String]) -> Result<()> {
                     let simulator = Simulator::new(&case.scene(gap), settings)?;
                     let speed = DVector::from_element(1, 1.0);
                     let mut call = || {
-                        let found = simulator.stepper().linearise(simulator.start().0)?;
+                        let found = simulator.stepper().linearise(simulator.start().0, 0.0)?;
                         found.inertial_force(&speed, &DVector::zeros(0))
                     };
                     times[k] = least(30, &mut [&mut call])?[0];
@@ -341,7 +341,7 @@ fn case_times(cases: &[Case], narrow: f64, settings: &Settings, rounds: usize) -
                 .map(|simulator| {
                     let (speed, none) = (&speed, &none);
                     move || {
-                        let found = simulator.stepper().linearise(simulator.start().0)?;
+                        let found = simulator.stepper().linearise(simulator.start().0, 0.0)?;
                         match force {
                             true => found.inertial_force(speed, none),
                             false => Ok(found.mass_matrix().column(0).into_owned()),

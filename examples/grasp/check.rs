@@ -60,6 +60,6 @@ fn added_mass(simulator: &Simulator, q: &DVector<f64>) -> Result<DMatrix<f64>> {
     let system = simulator.system();
     let mut dry = simulator.parameters().clone();
     *dry.density_mut() = 0.0;
-    let submerged = system.evaluate(simulator.parameters(), q)?;
-    Ok(submerged.mass_matrix() - system.evaluate(&dry, q)?.mass_matrix())
+    let submerged = system.evaluate(simulator.parameters(), q, 0.0)?;
+    Ok(submerged.mass_matrix() - system.evaluate(&dry, q, 0.0)?.mass_matrix())
 }

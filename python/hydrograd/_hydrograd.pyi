@@ -625,7 +625,7 @@ class Simulator:
     def step(self, state: State, u: ArrayLike | None = None) -> tuple[State, Record]:
         """One step from a state with the controls `u` (control_size,), N and N m: the next state, and the record that has the
         step's derivatives. The steps of a rollout, to the bit."""
-    def equations(self, q: ArrayLike | None = None) -> Equations:
+    def equations(self, q: ArrayLike | None = None, *, time: float = 0.0) -> Equations:
         """The equations of motion at the coordinates `q` (q_size,), or at many (N, q_size); default: where the simulator starts."""
     def integrate(self, q: ArrayLike, xi: ArrayLike) -> _Array:
         """q ⊕ ξ: the configurations that `q` (…, q_size) become by the tangents `xi` (…, v_size); of rotations a rotation vector, rad, in the joint's frame."""

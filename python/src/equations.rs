@@ -23,6 +23,7 @@ type Array<'py> = Bound<'py, PyArrayDyn<f64>>;
 pub struct Equations {
     simulator: Py<Simulator>,
     q: Rows,
+    time: f64,
 }
 
 /// Something of one configuration, with its number.
@@ -38,8 +39,12 @@ fn listed(m: &DMatrix<f64>) -> Vec<f64> {
 }
 
 impl Equations {
-    /// At these configurations; where the simulator starts if none are given.
-    pub fn new(simulator: &Bound<'_, Simulator>, q: Option<&Bound<'_, PyAny>>) -> PyResult<Self> {
+    /// At these configurations and the time `time`, s; where the simulator starts if none are given.
+    pub fn new(
+        simulator: &Bound<'_, Simulator>,
+        q: Option<&Bound<'_, PyAny>>,
+        time: f64,
+    ) -> PyResult<Self> {
         let inner = &simulator.get().inner;
         let q = Rows::or("equations: q", q, inner.start().0)?;
         // Refuses what is no configuration at once.
@@ -49,6 +54,7 @@ impl Equations {
         Ok(Self {
             q,
             simulator: simulator.clone().unbind(),
+            time,
         })
     }
 
@@ -88,8 +94,9 @@ impl Equations {
         part: impl Part + 'static,
     ) -> PyResult<Array<'py>> {
         let (inner, q) = (self.simulator.get().inner.clone(), self.q.values.clone());
+        let time = self.time;
         let made: Vec<Vec<f64>> = long(py, move |_| {
-            let one = |(i, q): (usize, &DVector<f64>)| part(&inner.equations(q)?, i);
+            let one = |(i, q): (usize, &DVector<f64>)| part(&inner.equations_at(q, time)?, i);
             q.par_iter().enumerate().map(one).collect()
         })?;
         let lead: &[usize] = match self.q.is_many {

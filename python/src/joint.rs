@@ -57,6 +57,14 @@ fn shown(value: &serde_json::Value) -> String {
 #[derive(Clone, PartialEq)]
 pub struct Motion(pub scene::Motion);
 
+impl Motion {
+    /// As a scene file gives it.
+    pub fn keys<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyAny>> {
+        let text = serde_json::to_string(&self.0).map_err(|e| input("motion", e, "must be one"))?;
+        py.import("json")?.call_method1("loads", (text,))
+    }
+}
+
 #[pymethods]
 impl Motion {
     /// `offset + rate·t`: offset in m or rad, rate in m/s or rad/s.

@@ -4,6 +4,7 @@ use crate::array::{fixed, or_zeros, row};
 use crate::body::Body;
 use crate::error::{OrRaise, input};
 use crate::fluid::{Contact, Fluid};
+use crate::joint::Motion;
 use crate::robot::{self, Robot};
 use hydrograd::scene::{Site, Wall, WallSurface};
 use pyo3::prelude::*;
@@ -157,6 +158,8 @@ impl Scene {
     /// which is made part of the body's. An "edge" is a trailing edge of a `body` with its middle `at`, and a `span` in m: directions `forward` (to the head) and `normal`, `factor` the part of
     /// the theory's force, which fades below a speed `smoothing` forward (m/s). A "tendon" runs over
     /// the joints of bodies at lever arms, `arms` = {body: m}: on each its arm times the tension k (g u - Σ r q) - c Σ r q̇, with a control u, `stiffness` k (N/m), `damping` c (N s/m) and `gain` g (m).
+    /// A "current" beside the fluid's: a `velocity` (m/s, world axes) times the share by depth of a smooth curve through the points (depth in m, share) of `profile` (n, 2) and the
+    /// factor `over_time`, a `Motion`; all bodies in the water feel it.
     #[pyo3(signature = (kind, **fields))]
     fn add_force(
         &mut self,
@@ -165,8 +168,11 @@ impl Scene {
         py: Python<'_>,
     ) -> PyResult<()> {
         let given = PyDict::new(py);
-        if let Some(fields) = fields {
-            given.update(fields.as_mapping())?;
+        for (key, value) in fields.into_iter().flatten() {
+            match value.extract::<PyRef<'_, Motion>>() {
+                Ok(motion) => given.set_item(key, motion.keys(py)?)?,
+                Err(_) => given.set_item(key, value)?,
+            }
         }
         given.set_item("kind", kind)?;
         // Arrays as lists.

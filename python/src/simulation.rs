@@ -426,10 +426,14 @@ impl Simulator {
         Ok((next, Record(Arc::new(record), slf.clone().unbind())))
     }
 
-    /// The equations of motion at the coordinates `q` (q_size,), or at many (N, q_size); default: where the simulator starts.
-    #[pyo3(signature = (q=None))]
-    fn equations(slf: &Bound<'_, Self>, q: Option<&Bound<'_, PyAny>>) -> PyResult<Equations> {
-        Equations::new(slf, q)
+    /// The equations of motion at the coordinates `q` (q_size,), or at many (N, q_size); default: where the simulator starts. Currents are as they are at `time` (s).
+    #[pyo3(signature = (q=None, *, time=0.0))]
+    fn equations(
+        slf: &Bound<'_, Self>,
+        q: Option<&Bound<'_, PyAny>>,
+        time: f64,
+    ) -> PyResult<Equations> {
+        Equations::new(slf, q, time)
     }
 
     /// q ⊕ ξ: the configurations that `q` (…, q_size) become by the tangents `xi` (…, v_size); of rotations a rotation vector, rad, in the joint's frame.

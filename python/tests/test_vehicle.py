@@ -64,3 +64,35 @@ def test_wrong_keys_are_told():
     with pytest.raises(hg.InputError, match=r"linear\[5\]"):
         scene.validate()
     assert hg.Scene.from_toml(vehicle().to_toml()) == vehicle()
+
+
+def test_currents():
+    """By depth and time: a ball that is as heavy as the water goes with it, and its way is differentiated by what the current is."""
+    scene = hg.Scene(time_step=0.02)
+    for name, z in (("high", -1.0), ("deep", -6.0)):
+        scene.add(hg.Body(hg.sphere(0.1, faces=80), name=name, density=998.0, position=(0, 0, z)))
+    tide = hg.Motion.sine(amplitude=1.0, frequency=2.0)
+    profile = np.array([[2.0, 1.0], [4.0, 0.5], [5.0, 0.25]])
+    scene.add_force("current", name="tide", velocity=(0.5, 0.1, 0), profile=profile, over_time=tide)
+    assert hg.Scene.from_toml(scene.to_toml()) == scene
+    sim = hg.Simulator(scene, fidelity="isolated", integrator="rk4")
+    rollout = sim.rollout(np.zeros((50, 0)))
+    share = np.array([1.0, 0.25])
+    along = np.array([0.5, 0.1, 0.0])
+    flow = np.sin(2.0 * rollout.times)[:, None, None] * share[:, None] * along
+    assert np.allclose(rollout.v.reshape(51, 2, 6)[:, :, :3], flow, atol=1e-7)
+
+    weights = np.zeros((51, 2, 3))
+    weights[-1, 1, 0] = 1.0
+    gradient = rollout.vjp(positions=weights).parameters
+    # ∫ sin 2t dt over a second, by the current's velocity and by its share there.
+    way = 0.5 * (1 - np.cos(2.0))
+    assert np.isclose(gradient["tide.velocity.x"], 0.25 * way, rtol=1e-6)
+    assert np.isclose(gradient["tide.share.2"], 0.5 * way, rtol=1e-6)
+    assert gradient["tide.share.0"] == 0.0
+
+    accelerations = [sim.equations(time=t).forward_dynamics(np.zeros(12))[:3] for t in (0.0, 0.3)]
+    assert np.allclose(accelerations, np.outer(2.0 * np.cos([0.0, 0.6]), along), rtol=1e-9)
+    scene.add_force("current", velocity=(0.1, 0, 0), profile=[[1.0, 1.0], [1.0, 0.5]])
+    with pytest.raises(hg.InputError, match=r"forces\[1\]\.profile"):
+        scene.validate()

@@ -21,7 +21,10 @@ pub(super) fn assemble(
     let asked = |b: usize| scene.bodies[b].limit_stiffness;
     // The water's part of the inertia may take a solve.
     let inertia = match scene.limited().any(|(b, _)| asked(b).is_none()) {
-        true => system.evaluate(parameters, q)?.mass_matrix().diagonal(),
+        true => system
+            .evaluate(parameters, q, 0.0)?
+            .mass_matrix()
+            .diagonal(),
         false => DVector::zeros(system.tree.velocities()),
     };
     let mut out = Vec::new();

@@ -11,7 +11,7 @@ use crate::adjoint::drag::Element;
 use crate::adjoint::lie::{Mat3, Vec3};
 use crate::adjoint::waterline::Hull;
 use crate::coupling::Isolated;
-use crate::dynamics::force::Waterline;
+use crate::dynamics::force::{Streams, Waterline};
 use crate::dynamics::{
     Armature, BodyData, BodyValues, Declarations, Drift, Drive, FreeMotions, Parameters, SiteData,
     Stepper, System, force,
@@ -218,6 +218,16 @@ pub(crate) fn assemble(
         None => Vec::new(),
     };
     let gravity = Vec3::from(scene.gravity);
+    let mut declared = Declarations::new(scene.fluid.density, &values);
+    let points = (faces.iter().zip(&surfaces).zip(&values)).map(|((_, s), v)| {
+        s.as_ref()
+            .map_or(v.center_of_mass, |s| s.properties.centroid)
+    });
+    let streams = Arc::new(Streams::new(scene, points.collect(), &mut declared));
+    let added_mass = match streams.is_empty() || scene.fluid.density <= 0.0 {
+        true => Vec::new(),
+        false => water::own_added_mass(scene, &choices.water, &in_water)?,
+    };
     let parts = force::ForceParts {
         scene,
         time_step: dt,
@@ -230,8 +240,9 @@ pub(crate) fn assemble(
             .waterline
             .map(|height| Waterline::new(&gravity, height)),
         lubricated: lubrication::lubricated(scene, &surfaces, &clearance)?,
+        streams: streams.clone(),
+        added_mass,
     };
-    let mut declared = Declarations::new(scene.fluid.density, &values);
     let forces = force::assemble(&parts, &mut declared);
     let armature = Armature::new(scene, &tree, &mut declared);
     let mut parameters = declared.finish();
@@ -251,6 +262,7 @@ pub(crate) fn assemble(
         armature,
         forces,
         current,
+        streams,
         controls: scene.controls(),
         coupling: Arc::new(Isolated::new(Vec::new())),
         contact: None,
@@ -334,7 +346,7 @@ fn start_velocity(
     }
     if !scene.initial.momentum.is_empty() {
         let stepper = stepper(choices, system, parameters);
-        let e = system.evaluate(parameters, q)?;
+        let e = system.evaluate(parameters, q, 0.0)?;
         let p = DVector::from_vec(scene.initial.momentum.clone());
         v = stepper.velocity_of_momentum(&e, &p)?;
     }

@@ -94,6 +94,7 @@ impl Evaluation<'_> {
             twists,
             v,
             current: &self.system.current,
+            streams: &self.system.streams,
             control,
         }
     }
@@ -103,6 +104,7 @@ impl Evaluation<'_> {
         Place {
             poses: &self.kinematics.poses,
             q: &self.q,
+            time: self.time,
             parameters: self.parameters,
         }
     }

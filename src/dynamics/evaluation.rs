@@ -21,6 +21,8 @@ pub struct Evaluation<'a> {
     pub parameters: &'a Parameters,
     /// The configuration.
     pub q: DVector<f64>,
+    /// When it is there, s: what changes with time by itself is as it is then.
+    pub time: f64,
     /// Poses and joint columns.
     pub kinematics: Kinematics,
     /// Rigid inertias, body frames.
@@ -46,7 +48,7 @@ pub(super) struct Basis {
 }
 
 impl System {
-    /// Evaluates the system at `q`.
+    /// Evaluates the system at `q` and the time `time`, s.
     ///
     /// # Errors
     /// Whatever the coupling reports, or a configuration that isn't finite.
@@ -54,8 +56,9 @@ impl System {
         &'a self,
         parameters: &'a Parameters,
         q: &DVector<f64>,
+        time: f64,
     ) -> Result<Evaluation<'a>> {
-        let mut e = self.evaluate_apart(parameters, q)?;
+        let mut e = self.evaluate_apart(parameters, q, time)?;
         e.contact_points = self.contact_points(parameters, &e.kinematics.poses)?;
         Ok(e)
     }
@@ -65,6 +68,7 @@ impl System {
         &'a self,
         parameters: &'a Parameters,
         q: &DVector<f64>,
+        time: f64,
     ) -> Result<Evaluation<'a>> {
         let kinematics = self.kinematics(q)?;
         let (fluid, report) = match self.fluid_apart(self.in_water(parameters)) {
@@ -77,7 +81,7 @@ impl System {
             }
         };
         Ok(Evaluation::new(
-            self, parameters, q, kinematics, fluid, report,
+            self, parameters, q, time, kinematics, fluid, report,
         ))
     }
 
@@ -147,6 +151,7 @@ impl<'a> Evaluation<'a> {
         system: &'a System,
         parameters: &'a Parameters,
         q: &DVector<f64>,
+        time: f64,
         kinematics: Kinematics,
         fluid: FluidMomenta<'a>,
         report: CouplingReport,
@@ -155,6 +160,7 @@ impl<'a> Evaluation<'a> {
             system,
             parameters,
             q: q.clone(),
+            time,
             contact_points: Vec::new(),
             limits: system.limits.clone(),
             kinematics,

@@ -33,7 +33,7 @@ impl<'a> Deref for Linearisation<'a> {
 }
 
 impl System {
-    /// Evaluates the system at `q` with its derivatives.
+    /// Evaluates the system at `q` and the time `time` (s) with its derivatives.
     ///
     /// # Errors
     /// As [`System::evaluate`], and a coupling that has values only.
@@ -41,8 +41,9 @@ impl System {
         &'a self,
         parameters: &'a Parameters,
         q: &DVector<f64>,
+        time: f64,
     ) -> Result<Linearisation<'a>> {
-        let mut out = self.linearise_apart(parameters, q)?;
+        let mut out = self.linearise_apart(parameters, q, time)?;
         let poses = &out.evaluation.kinematics.poses;
         out.evaluation.contact_points = self.contact_points(parameters, poses)?;
         Ok(out)
@@ -53,6 +54,7 @@ impl System {
         &'a self,
         parameters: &'a Parameters,
         q: &DVector<f64>,
+        time: f64,
     ) -> Result<Linearisation<'a>> {
         let kinematics = self.kinematics(q)?;
         self.differentiable()?;
@@ -64,7 +66,7 @@ impl System {
         let report =
             (water.as_ref()).map_or_else(Default::default, |w| w.linearised.report().clone());
         Ok(Linearisation {
-            evaluation: Evaluation::new(self, parameters, q, kinematics, fluid, report),
+            evaluation: Evaluation::new(self, parameters, q, time, kinematics, fluid, report),
             water: water.map_or_else(OnceLock::new, OnceLock::from),
         })
     }

@@ -19,7 +19,7 @@ pub struct Damping {
 }
 
 impl System {
-    /// The fastest rate at which forces slow what moves, if it is above `enough` (1/s). Water is asked for its inertia only where the bodies' own is too small.
+    /// The fastest rate at which forces slow what moves at `time` (s), if it is above `enough` (1/s). Water is asked for its inertia only where the bodies' own is too small.
     ///
     /// # Errors
     /// As [`System::evaluate`].
@@ -29,11 +29,12 @@ impl System {
         q: &DVector<f64>,
         v: &DVector<f64>,
         control: &DVector<f64>,
+        time: f64,
         enough: f64,
     ) -> Result<Option<Damping>> {
         let kinematics = self.kinematics(q)?;
         let (still, report) = (FluidMomenta::Still, Default::default());
-        let dry = Evaluation::new(self, parameters, q, kinematics, still, report);
+        let dry = Evaluation::new(self, parameters, q, time, kinematics, still, report);
         // The water only adds to the inertia.
         let fast = |d: &Damping| d.rate > enough;
         let alone = dry.fastest(v, control);
@@ -41,7 +42,7 @@ impl System {
         if is_slow || !self.in_water(parameters) {
             return Ok(alone.ok().flatten().filter(fast));
         }
-        let wet = self.evaluate_apart(parameters, q)?;
+        let wet = self.evaluate_apart(parameters, q, time)?;
         Ok(wet.fastest(v, control).ok().flatten().filter(fast))
     }
 }

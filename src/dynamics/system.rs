@@ -1,6 +1,6 @@
 //! A system: the tree, its bodies' constants, and the coupling through the water.
 
-use super::force::ForceModel;
+use super::force::{ForceModel, Streams};
 use super::{Armature, BodyData, ContactModel, Drift, JointLimit, SiteData};
 use crate::adjoint::lie::Vec3;
 use crate::coupling::Coupling;
@@ -35,9 +35,11 @@ pub struct System {
     pub armature: Armature,
     /// Forces that don't come from the water's kinetic energy; clones share them.
     pub forces: Arc<[Box<dyn ForceModel>]>,
-    /// Uniform current, m/s.
+    /// Uniform steady current, m/s.
     pub current: Vec3,
-    /// What it may carry along.
+    /// Currents by depth and time; clones share them.
+    pub streams: Arc<Streams>,
+    /// What the uniform one may carry along.
     pub drift: Drift,
     /// Number of controls.
     pub controls: usize,

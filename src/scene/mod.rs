@@ -31,7 +31,7 @@ pub(crate) use carriers::Carriers;
 pub use contact::{CollisionPiece, Contact};
 pub(crate) use force::{AXES, least_damping};
 pub use force::{
-    Coefficients, Damping, Edge, Fin, Float, Force, Lubrication, Spring, Tendon, Thruster,
+    Coefficients, Current, Damping, Edge, Fin, Float, Force, Lubrication, Spring, Tendon, Thruster,
     WATER_VISCOSITY,
 };
 pub use mimic::Mimic;

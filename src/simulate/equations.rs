@@ -36,15 +36,26 @@ pub struct Equations<'s> {
 }
 
 impl Simulator {
-    /// The equations of motion at the coordinates `q`, of driven joints too.
+    /// The equations of motion at the coordinates `q`, of driven joints too, at the time 0: [`Simulator::equations_at`].
     ///
     /// # Errors
-    /// A wrong length, values that aren't finite, quaternions not of length 1; bodies in one another or in a wall, and gaps that aren't resolved; whatever the coupling
-    /// reports, or one that has values only.
+    /// As there.
     pub fn equations(&self, q: &DVector<f64>) -> Result<Equations<'_>> {
+        self.equations_at(q, 0.0)
+    }
+
+    /// The equations of motion at the coordinates `q`, of driven joints too; currents are as they are at `time`, s.
+    ///
+    /// # Errors
+    /// A wrong length, values that aren't finite (the time's too), quaternions not of length 1; bodies in one another or in a wall, and gaps that aren't resolved; whatever the coupling
+    /// reports, or one that has values only.
+    pub fn equations_at(&self, q: &DVector<f64>, time: f64) -> Result<Equations<'_>> {
         self.check_configuration("q", q)?;
+        if !time.is_finite() {
+            return Err(Error::input("time", time, "must be finite, in s"));
+        }
         self.check_apart(q, self.parameters().density())?;
-        let at = self.system().linearise(self.parameters(), q)?;
+        let at = self.system().linearise(self.parameters(), q, time)?;
         Ok(Equations { at })
     }
 
@@ -99,7 +110,7 @@ impl Equations<'_> {
     pub fn rigid_mass_matrix(&self) -> Result<DMatrix<f64>> {
         let mut dry = self.at.parameters.clone();
         *dry.density_mut() = 0.0;
-        let dry = self.at.system.evaluate(&dry, &self.at.q)?;
+        let dry = self.at.system.evaluate(&dry, &self.at.q, self.at.time)?;
         Ok(dry.mass_matrix().clone())
     }
 

@@ -2,17 +2,18 @@
 
 use super::{Rollout, Sample, Simulator};
 use crate::adjoint::lie::{Pose, Vec3, Vec6, six};
+use crate::dynamics::force::Place;
 use crate::geometry::{Distance, Other};
 use crate::{Error, Result};
-use nalgebra::DVector;
 
 /// Distance from a surface, in edges of its mesh, from which on the flow is shown. Sources lie within the bodies, one under each
 /// vertex; nearer than this the flow between the places that were fitted isn't what it should be.
 pub const FLOW_EDGES: f64 = 0.5;
 
 impl Simulator {
-    fn flow(&self, q: &DVector<f64>, v: &DVector<f64>, points: &[Vec3]) -> Result<Vec<Vec3>> {
-        let system = self.system();
+    fn flow(&self, sample: &Sample, points: &[Vec3]) -> Result<Vec<Vec3>> {
+        let (q, v) = (&sample.q, &sample.v);
+        let (system, parameters) = (self.system(), self.parameters());
         let kinematics = system.tree.kinematics(q);
         for (i, point) in points.iter().enumerate() {
             if let Some(bad) = point.iter().find(|x| !x.is_finite()) {
@@ -26,13 +27,27 @@ impl Simulator {
                 return Err(self.too_near(i, point, &obstacle));
             }
         }
-        let still = six(&system.current, &Vec3::zeros());
+        let place = Place {
+            poses: &kinematics.poses,
+            q,
+            time: sample.time,
+            parameters,
+        };
+        let past = |(b, twist): (usize, Vec6)| {
+            let water = system.current + system.streams.at_body(b, &place).velocity;
+            twist - six(&water, &Vec3::zeros())
+        };
         let twists = system.tree.twists(&kinematics, v);
-        let through: Vec<Vec6> = twists.iter().map(|t| t - still).collect();
+        let through: Vec<Vec6> = twists.into_iter().enumerate().map(past).collect();
         let through = system.submerged_twists(&kinematics, &through);
         let poses: Vec<Pose> = (system.submerged().map(|(b, _)| kinematics.poses[b])).collect();
         let made = system.coupling.velocity(&poses, &through, points)?;
-        Ok(made.into_iter().map(|u| u + system.current).collect())
+        let undisturbed = |x: &Vec3| {
+            let stream = system.streams.at(x, sample.time, parameters);
+            system.current + stream.velocity
+        };
+        let each = made.into_iter().zip(points);
+        Ok(each.map(|(u, x)| u + undisturbed(x)).collect())
     }
 
     /// What is too near to a point.
@@ -60,7 +75,7 @@ impl Simulator {
 }
 
 impl Rollout {
-    /// The water's velocity at points (m, world frame) at state `n`: m/s, world axes, the current included. It takes a solve. It is
+    /// The water's velocity at points (m, world frame) at state `n`: m/s, world axes, currents included (those by depth and time as each body feels them alone). It takes a solve. It is
     /// there to be looked at: nothing of a step depends on it, and it has no transpose.
     ///
     /// # Errors
@@ -68,7 +83,7 @@ impl Rollout {
     /// [`FLOW_EDGES`] of its edges; another fidelity than `Full`, and whatever its solve reports.
     pub fn flow(&self, n: usize, points: &[Vec3]) -> Result<Vec<Vec3>> {
         let sample = self.sample(n)?;
-        self.simulator().flow(&sample.q, &sample.v, points)
+        self.simulator().flow(sample, points)
     }
 
     /// Whether [`Rollout::flow`] knows the velocity at each of these points at state `n`: one that is finite, in the water, and far

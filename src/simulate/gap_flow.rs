@@ -171,7 +171,7 @@ impl Film {
         if let Some(b) = self.second {
             wrenches[b] -= wrench;
         }
-        let e = system.evaluate(simulator.parameters(), q)?;
+        let e = system.evaluate(simulator.parameters(), q, 0.0)?;
         let all = system.tree.project(&e.kinematics.columns, wrenches);
         let drives = system.drives.iter().zip(system.tree.links());
         let free: Vec<usize> = drives

@@ -189,7 +189,7 @@ fn scales(simulator: &Simulator, rollout: &Rollout, steps: usize) -> Result<Scal
     let duration = simulator.time_step() * steps as f64;
     let (displacement, length) = unit_displacements(simulator);
     let stepper = simulator.stepper();
-    let e = stepper.evaluate(simulator.start().0)?;
+    let e = stepper.evaluate(simulator.start().0, 0.0)?;
     let mut velocity = &displacement / duration.max(1.0);
     for s in rollout.samples() {
         velocity = velocity.sup(&s.v.abs());

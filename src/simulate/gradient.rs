@@ -113,7 +113,7 @@ impl Sums {
     ) -> Result<()> {
         // y₀ = y(q₀, v₀).
         let stepper = simulator.stepper();
-        let e = stepper.linearise(&state.q)?;
+        let e = stepper.linearise(&state.q, stepper.time(state))?;
         let mut out = StepBar::zeros(&e);
         out.state.q = bar.q.clone();
         stepper.conserved_vjp(&e, v, &bar.y, &mut out)?;

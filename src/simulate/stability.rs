@@ -36,7 +36,7 @@ impl Simulator {
         let stepper = self.stepper();
         let (limit, dt) = (stepper.integrator.damping_limit()?, self.time_step());
         let system = self.system();
-        let found = system.damping(self.parameters(), q, v, control, limit / dt);
+        let found = system.damping(self.parameters(), q, v, control, time, limit / dt);
         // What fails here fails in the run, with its error.
         let damping = found.ok().flatten()?;
         let name = &system.bodies[damping.body].name;
@@ -78,7 +78,7 @@ impl Rollout {
         let kinetic = samples.iter().map(|s| s.kinetic_energy).fold(0.0, f64::max);
         let worked = self.worked();
         let given = system.drives.iter().any(|d| matches!(d, Drive::Motion(_)));
-        if given || system.has_current() {
+        if given || system.has_current() || !system.streams.is_empty() {
             return self.runaway(&worked);
         }
         let beyond = |(s, worked): (&Sample, &f64)| s.energy() - first - worked;
@@ -143,11 +143,13 @@ impl Rollout {
             place: Place {
                 poses: &s.poses,
                 q: &s.q,
+                time: s.time,
                 parameters,
             },
             twists: &twists,
             v: &s.v,
             current: &system.current,
+            streams: &system.streams,
             control,
         };
         system.forces.iter().map(|f| f.driven_power(&at)).sum()
@@ -192,7 +194,14 @@ impl Rollout {
             let mass = parameters.mass(b) + parameters.density() * body.volume;
             let speed = point_velocity(twist, &s.poses[b].translation).norm();
             let turning = body.volume.cbrt() * angular(twist).norm();
-            let square = speed.powi(2) + turning.powi(2) + system.current.norm_squared();
+            let place = Place {
+                poses: &s.poses,
+                q: &s.q,
+                time: s.time,
+                parameters,
+            };
+            let water = system.current + system.streams.at_body(b, &place).velocity;
+            let square = speed.powi(2) + turning.powi(2) + water.norm_squared();
             0.5 * mass * square
         };
         twists.iter().enumerate().map(of).sum()

@@ -161,7 +161,8 @@ impl Simulator {
         finite::coordinates(&self.scene, step, &q)?;
         finite::velocities(&self.scene, step, v)?;
         let run = || {
-            let e = self.system().evaluate(self.parameters(), &q)?;
+            let time = step as f64 * self.choices.time_step;
+            let e = self.system().evaluate(self.parameters(), &q, time)?;
             let state = State {
                 step,
                 y: stepper.conserved(&e, v),

@@ -145,6 +145,7 @@ impl Rollout {
         let parameters = self.simulator.parameters();
         let samples = self.samples();
         let taken = system.has_current()
+            || !system.streams.is_empty()
             || system.contact.is_some()
             || !system.limits.is_empty()
             || system.forces.iter().any(|f| !f.conservative(parameters))

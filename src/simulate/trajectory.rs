@@ -167,7 +167,8 @@ impl<'a> Trajectory<'a> {
 
     /// The system with its derivatives at a configuration of the trajectory; an error has the time.
     pub fn at(&self, q: &DVector<f64>, time: f64) -> Result<Linearisation<'a>> {
-        self.stepper.linearise(q).map_err(|e| e.at_time(time))
+        let made = self.stepper.linearise(q, time);
+        made.map_err(|e| e.at_time(time))
     }
 
     /// A step whose open-loop controls `decide` gives from what is observed before it.
@@ -179,7 +180,7 @@ impl<'a> Trajectory<'a> {
     ) -> Result<(State, Sample, StepRecord)> {
         let run = || {
             let gap = self.gap(state)?;
-            let e = self.stepper.linearise(&state.q)?;
+            let e = self.stepper.linearise(&state.q, self.stepper.time(state))?;
             let mut sample = self.observe(&e, state, gap)?;
             let control = decide(&sample)?;
             let (input, mode) = self.input(control, index, state, &sample)?;
@@ -350,7 +351,7 @@ impl Step for Trajectory<'_> {
     fn last(&self, _index: usize, state: &State) -> Result<Sample> {
         let run = || {
             let gap = self.gap(state)?;
-            let e = self.stepper.evaluate(&state.q)?;
+            let e = self.stepper.evaluate(&state.q, self.stepper.time(state))?;
             self.observe(&e, state, gap)
         };
         run().map_err(|e: Error| self.explain(e, state))

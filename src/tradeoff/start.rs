@@ -25,7 +25,10 @@ impl Start {
         let (q, _) = simulator.start();
         let mut dry = parameters.clone();
         *dry.density_mut() = 0.0;
-        let (dry, wet) = (system.evaluate(&dry, q)?, system.evaluate(parameters, q)?);
+        let (dry, wet) = (
+            system.evaluate(&dry, q, 0.0)?,
+            system.evaluate(parameters, q, 0.0)?,
+        );
         let (rigid, all) = (dry.mass_matrix(), wet.mass_matrix());
         let free = free(simulator)?;
         let block = |m: &DMatrix<f64>| m.select_rows(&free).select_columns(&free);
@@ -40,7 +43,7 @@ impl Start {
     pub fn with_forces(self, simulator: &Simulator) -> Result<Self> {
         let (q, v) = simulator.start();
         let system = simulator.system();
-        let e = system.linearise(simulator.parameters(), q)?;
+        let e = system.linearise(simulator.parameters(), q, 0.0)?;
         let given = e.mass_times(&given_accelerations(simulator));
         let force = e.inertial_force(v, &first_action(simulator)?.0)? - given;
         Ok(Self {

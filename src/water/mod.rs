@@ -64,6 +64,6 @@ pub use submerged::Discretisation;
 
 pub(crate) use clearance::Clearance;
 pub(crate) use estimate::Subject;
-pub(crate) use prepared::{Prepared, prepare, world_axes};
+pub(crate) use prepared::{Prepared, own_added_mass, prepare, world_axes};
 pub(crate) use submerged::in_water;
 pub(crate) use surface::{Surface, pose};

@@ -3,15 +3,15 @@
 use super::choices::WaterChoices;
 use super::clearance::Clearance;
 use super::device::Device;
-use super::fidelity::Fidelity;
 use super::fidelity::kind::{Planned, StartGap};
+use super::fidelity::{self, Fidelity};
 use super::gap_model::GapModel;
 use super::method::kind::{BodyMethod, Problem};
 use super::numerics::Plan;
 use super::resolved::Resolved;
 use super::submerged::{Discretisation, SubmergedBody};
 use crate::Result;
-use crate::adjoint::lie::Pose;
+use crate::adjoint::lie::{Mat6, Pose};
 use crate::coupling::Coupling;
 use crate::coupling::film::Extent;
 use crate::coupling::reduced::compress::CompressSettings;
@@ -147,6 +147,21 @@ pub(crate) fn prepare(
         warnings,
         folder: folder.map(Path::to_path_buf),
     })
+}
+
+/// The own added mass of each body in the water, by its number in the scene: at unit density, body's frame, about its origin.
+///
+/// # Errors
+/// Bodies that the method can't take, or whatever the discretisation reports.
+pub(crate) fn own_added_mass(
+    scene: &Scene,
+    choices: &WaterChoices,
+    (numbers, submerged): &(Vec<usize>, Vec<SubmergedBody>),
+) -> Result<Vec<(usize, Mat6)>> {
+    let method = choices.method_used().kind();
+    let problem = Problem::new(scene, numbers, submerged, method, &choices.numerics);
+    let made = fidelity::own_added_mass(&problem)?;
+    Ok(numbers.iter().copied().zip(made).collect())
 }
 
 /// The error of compression: what was aimed at, or by what is left where the number of points was given.

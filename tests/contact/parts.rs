@@ -166,7 +166,7 @@ fn the_water_sees_the_shape() {
         scene.add(body);
         let simulator = made(&scene);
         let (q, _) = simulator.start();
-        let e = simulator.system().evaluate(simulator.parameters(), q);
+        let e = simulator.system().evaluate(simulator.parameters(), q, 0.0);
         e.unwrap().mass_matrix().clone()
     });
     assert_eq!(masses[0], masses[1]);

@@ -130,7 +130,7 @@ fn tangent_and_transpose_of_a_step_in_pieces() {
             let mut at = state.clone();
             at.q = tree.integrate(&at.q, &(h * &dq));
             at.y += h * &dy;
-            let e = stepper.linearise(&at.q).unwrap();
+            let e = stepper.linearise(&at.q, 0.0).unwrap();
             let v = stepper.velocity(&e, &at).unwrap();
             let input = Input {
                 control: &input.control + h * &du,

@@ -65,7 +65,7 @@ fn momentum_is_kept_to_rounding() {
         // The same from each body's impulse on the water, which the integrator doesn't carry.
         let stepper = simulator.stepper();
         let total = |s: &Sample| -> Vec6 {
-            let e = stepper.evaluate(&s.q).unwrap();
+            let e = stepper.evaluate(&s.q, 0.0).unwrap();
             e.momenta(&s.v).iter().sum()
         };
         let start = total(&rollout.samples()[0]);
@@ -262,7 +262,7 @@ fn neutrally_buoyant_bodies_at_rest_have_no_acceleration() {
         let simulator = simulator(&scene, fidelity, Integrator::default());
         let (q, v) = simulator.start();
         let stepper = simulator.stepper();
-        let e = stepper.linearise(q).unwrap();
+        let e = stepper.linearise(q, 0.0).unwrap();
         let none = DVector::zeros(0);
         assert!(
             e.inertial_force(v, &none)
@@ -303,7 +303,7 @@ fn bodies_at_rest_stay_at_rest() {
 fn one_step(simulator: &Simulator) -> (State, DVector<f64>) {
     let stepper = simulator.stepper();
     let state = simulator.initial().unwrap();
-    let e = stepper.linearise(&state.q).unwrap();
+    let e = stepper.linearise(&state.q, 0.0).unwrap();
     let v = stepper.velocity(&e, &state).unwrap();
     let input = Input {
         control: DVector::from_element(simulator.system().controls, 0.1),

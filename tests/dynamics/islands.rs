@@ -82,7 +82,7 @@ fn products_and_solves_are_those_of_the_dense_mass_matrix() {
     let (q, _) = simulator.start();
     let e = simulator
         .system()
-        .evaluate(simulator.parameters(), q)
+        .evaluate(simulator.parameters(), q, 0.0)
         .unwrap();
     let dense = mass_matrix(&e);
     let nv = dense.nrows();
@@ -112,7 +112,7 @@ fn how_forces_change_with_the_velocity_is_told_by_islands() {
     let (q, v) = simulator.start();
     let e = simulator
         .system()
-        .linearise(simulator.parameters(), q)
+        .linearise(simulator.parameters(), q, 0.0)
         .unwrap();
     let control = DVector::from_element(simulator.system().controls, 0.2);
     let found = e.force_velocity_jacobian(v, &control).unwrap();

@@ -4,6 +4,7 @@ mod balance;
 mod ballast;
 #[cfg(feature = "opt")]
 mod control;
+mod currents;
 mod driven;
 mod extremes;
 mod films;

@@ -203,7 +203,7 @@ fn velocity_form(
         }
         let mut q = system.tree.integrate(q, xi);
         stepper.place_motions(&mut q, t);
-        let e = stepper.linearise(&q).unwrap();
+        let e = stepper.linearise(&q, 0.0).unwrap();
         let right = e.inertial_force(&v_all, control).unwrap() - e.mass_matrix() * &a_driven;
         let m = e.mass_matrix().select_rows(&free).select_columns(&free);
         let a = m.cholesky().unwrap().solve(&right.select_rows(&free));

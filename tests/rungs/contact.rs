@@ -197,7 +197,7 @@ pub fn point() -> Point {
 }
 
 pub fn evaluate<'a>(parameters: &'a Parameters, q: &DVector<f64>) -> Linearisation<'a> {
-    system().linearise(parameters, q).unwrap()
+    system().linearise(parameters, q, 0.0).unwrap()
 }
 
 /// A scalar against its cotangents: every body's displacement and velocity, and every parameter of contact and of what is solved with it, apart.
@@ -330,13 +330,13 @@ fn step_vjp(integrator: Integrator, c: f64) -> Outcome {
         mode: 0,
     };
     let s = stepper(&p.parameters, integrator);
-    let (start, e) = (state(&p), s.linearise(&p.q).unwrap());
+    let (start, e) = (state(&p), s.linearise(&p.q, 0.0).unwrap());
     let v = s.velocity(&e, &start).unwrap();
     let (next, record) = s.step(&e, &start, &v, &input).unwrap();
     let end = next.q.clone();
     let value = |p: &Point| {
         let s = stepper(&p.parameters, integrator);
-        let (start, e) = (state(p), s.linearise(&p.q).unwrap());
+        let (start, e) = (state(p), s.linearise(&p.q, 0.0).unwrap());
         let v = s.velocity(&e, &start).unwrap();
         let next = s.step(&e, &start, &v, &input).unwrap().0;
         q_bar.dot(&super::multibody::tree_displacement(

@@ -9,8 +9,8 @@ use hydrograd::dynamics::{
     Stepper, System,
 };
 use hydrograd::scene::{
-    Body, Damping, Drag, DragPart, Edge, Fin, Float, Fluid, Joint, Mimic, Motion, Passive, Plane,
-    Scene, Shape, Spring, Tendon, Thruster,
+    Body, Current, Damping, Drag, DragPart, Edge, Fin, Float, Fluid, Joint, Mimic, Motion, Passive,
+    Plane, Scene, Shape, Spring, Tendon, Thruster,
 };
 use hydrograd::simulate::{Pd, PdAxis};
 use hydrograd::{Controls, Rollout, Settings, Simulator};
@@ -220,6 +220,16 @@ pub fn scene() -> Scene {
     scene.add_force(edge.factor(0.8).smoothing(0.3).into());
     let tendon = Tendon::new([("weight", 0.3), ("propeller", -0.1)]).stiffness(40.0);
     scene.add_force(tendon.damping(2.0).gain(2.0).into());
+    let profile = vec![[-0.8, 0.3], [-0.1, 0.9], [0.4, 1.2], [0.9, 0.5]];
+    let tide = Motion::Sine {
+        offset: 0.4,
+        amplitude: 1.1,
+        frequency: 2.0,
+        phase: 0.6,
+    };
+    let deep = Current::new([0.12, -0.36, 0.0]).profile(profile);
+    scene.add_force(deep.over_time(tide.clone()).into());
+    scene.add_force(Current::new([0.1, 0.2, 0.0]).over_time(tide).into());
     scene
 }
 
@@ -289,7 +299,8 @@ pub fn point() -> Point {
 /// Length and number of the step in the checks.
 pub const DT: f64 = 0.02;
 pub const STEP: usize = 3;
-const TIME: f64 = DT * STEP as f64;
+/// When that is, s.
+pub const TIME: f64 = STEP as f64 * DT;
 
 pub fn stepper(parameters: &Parameters, integrator: Integrator) -> Stepper<'_> {
     Stepper {
@@ -301,7 +312,7 @@ pub fn stepper(parameters: &Parameters, integrator: Integrator) -> Stepper<'_> {
 }
 
 pub fn evaluate<'a>(parameters: &'a Parameters, q: &DVector<f64>) -> Linearisation<'a> {
-    system().linearise(parameters, q).unwrap()
+    system().linearise(parameters, q, TIME).unwrap()
 }
 
 /// Directions of the parameters, one for each kind of them; contact, which this scene has none of, is checked apart.
@@ -668,10 +679,10 @@ fn closed(c: f64) -> Outcome {
         mode: 0,
     };
     p.v = at(&p.parameters, Integrator::EnergyEuler)
-        .conserved(&system.linearise(&p.parameters, &p.q).unwrap(), &p.v);
+        .conserved(&system.linearise(&p.parameters, &p.q, TIME).unwrap(), &p.v);
     let make = |p: &Point, integrator| {
         let s = at(&p.parameters, integrator);
-        let e = system.linearise(&p.parameters, &p.q).unwrap();
+        let e = system.linearise(&p.parameters, &p.q, TIME).unwrap();
         let v = s.velocity(&e, &state(p)).unwrap();
         let input = Input {
             control: p.u.clone(),

@@ -54,6 +54,10 @@ pub fn rungs() -> Vec<Rung> {
         "dynamics::force::edge::Edge::inputs_vjp" => |c| vjp("edge", c),
         "dynamics::force::tendon::Tendons::jvp" => |c| jvp("tendon", c),
         "dynamics::force::tendon::Tendons::vjp" => |c| vjp("tendon", c),
+        "dynamics::force::current::Carried::jvp" => |c| jvp("current", c),
+        "dynamics::force::current::Carried::vjp" => |c| vjp("current", c),
+        "dynamics::force::stream::Streams::at_body_vjp" => |c| vjp("current", c),
+        "dynamics::force::Moving::relative_vjp" => |c| vjp("fin", c),
         "dynamics::force::lubrication::Lubrication::jvp" => |c| jvp("lubrication", c),
         "dynamics::force::lubrication::Lubrication::vjp" => |c| vjp("lubrication", c),
     ]
@@ -118,11 +122,13 @@ impl At {
             place: Place {
                 poses: &self.poses,
                 q: &self.q,
+                time: dynamics::TIME,
                 parameters: &self.parameters,
             },
             twists: &self.twists,
             v: &self.v,
             current: &self.system.current,
+            streams: &self.system.streams,
             control: &self.control,
         }
     }

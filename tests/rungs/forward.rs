@@ -262,10 +262,17 @@ fn closed(c: f64) -> Outcome {
     let mut p = dynamics::point();
     p.parameters = still().parameters().clone();
     let s = at(&p.parameters, Integrator::EnergyEuler);
-    p.v = s.conserved(&system.linearise(&p.parameters, &p.q).unwrap(), &p.v);
+    p.v = s.conserved(
+        &system
+            .linearise(&p.parameters, &p.q, dynamics::TIME)
+            .unwrap(),
+        &p.v,
+    );
     let make = |p: &Point, integrator| {
         let s = at(&p.parameters, integrator);
-        let e = system.linearise(&p.parameters, &p.q).unwrap();
+        let e = system
+            .linearise(&p.parameters, &p.q, dynamics::TIME)
+            .unwrap();
         let state = state(p, &[]);
         let v = s.velocity(&e, &state).unwrap();
         let input = Input {
@@ -297,7 +304,7 @@ fn pressed(integrator: Integrator, c: f64) -> Outcome {
     p.v = contact::stepper(&p.parameters, integrator).conserved(&e, &p.v);
     let make = |p: &contact::Point| {
         let s = contact::stepper(&p.parameters, integrator);
-        let e = s.linearise(&p.q).unwrap();
+        let e = s.linearise(&p.q, 0.0).unwrap();
         let at = state(
             &Point {
                 q: p.q.clone(),

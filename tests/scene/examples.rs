@@ -6,8 +6,8 @@ use std::path::Path;
 use hydrograd::{Controls, Fidelity, Settings, Simulator};
 
 use hydrograd::scene::{
-    Body, Controller, Drag, DragPart, Edge, Fluid, Joint, Motion, Placement, Plane, Preset, Scene,
-    Shape, Tendon,
+    Body, Controller, Current, Drag, DragPart, Edge, Fluid, Joint, Motion, Placement, Plane,
+    Preset, Scene, Shape, Tendon,
 };
 
 #[test]
@@ -266,6 +266,9 @@ fn everything_survives_a_round_trip() {
     let tendon = Tendon::new([("body 1", 0.1), ("body 2", -1.0 / 3.0)]);
     let tendon = tendon.named("crank").stiffness(4e3).damping(2.0);
     scene.add_force(tendon.gain(0.03).into());
+    let tide = Motion::through(vec![0.0, 1.0 / 3.0, 2.0], vec![0.1, -0.2, 1e-9]).unwrap();
+    let stream = Current::new([0.1, 0.0, 0.0]).profile(vec![[-0.1, 1.0], [7.0, 1.0 / 3.0]]);
+    scene.add_force(stream.over_time(tide).into());
     let controllers = [
         Controller::Constant { control: vec![1.0] },
         Controller::Pd {

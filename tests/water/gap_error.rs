@@ -86,7 +86,7 @@ impl Case {
     fn along(&self, simulator: &Simulator, gap: f64) -> [f64; 2] {
         let q = DVector::from_element(1, gap - START * self.size);
         let stepper = simulator.stepper();
-        let found = stepper.linearise(&q).unwrap();
+        let found = stepper.linearise(&q, 0.0).unwrap();
         let speed = DVector::from_element(1, 1.0);
         let force = found.inertial_force(&speed, &DVector::zeros(0)).unwrap();
         let dry = simulator.parameters().mass(0);

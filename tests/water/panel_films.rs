@@ -41,7 +41,10 @@ fn on_a_rail(shape: &Shape, turn: [f64; 3], height: f64) -> Body {
 /// Added mass along the gap and its slope, of the first body on a rail.
 fn along(scene: &Scene, settings: Settings) -> [f64; 2] {
     let simulator = Simulator::new(scene, settings).unwrap();
-    let found = simulator.stepper().linearise(simulator.start().0).unwrap();
+    let found = simulator
+        .stepper()
+        .linearise(simulator.start().0, 0.0)
+        .unwrap();
     let force = found.inertial_force(&DVector::from_element(1, 1.0), &DVector::zeros(0));
     let mass = found.mass_matrix()[(0, 0)] - simulator.parameters().mass(0);
     [mass, -2.0 * force.unwrap()[0]]

@@ -1,4 +1,4 @@
-//! Thrust by command, C¹ in the command and in the parameters that the curve is made of.
+//! Curves of one argument, C¹ in it and in the parameters that they are made of: thrust by command, the share of a current by depth.
 //!
 //! A polynomial is odd: Σ c_k |g|^(k−1) g, k = 1, 2, …: a linear one, one of |g| g and so on. A table is a cubic Hermite curve through points, straight beyond the
 //! first and the last. With a and b the slopes of the lines on both sides of a point, the curve's slope there is 8 a² b² / (a + b)³ where they have one sign and zero
@@ -12,18 +12,18 @@ use crate::dynamics::parameters::{Parameter, Parameters};
 pub(super) enum Curve {
     /// c₁, c₂, …
     Polynomial(Vec<Parameter>),
-    /// Commands, which rise, and the thrust at each, N.
+    /// Arguments, which rise, and the value at each.
     Table {
-        commands: Vec<f64>,
-        thrusts: Vec<Parameter>,
+        arguments: Vec<f64>,
+        values: Vec<Parameter>,
     },
 }
 
-/// A curve at a command.
+/// A curve at an argument.
 pub(super) struct At {
-    /// N.
+    /// The value.
     pub value: f64,
-    /// N per unit of the command.
+    /// Its derivative.
     pub slope: f64,
     /// Derivatives of the value with respect to parameters.
     pub by: Vec<(Parameter, f64)>,
@@ -33,20 +33,23 @@ impl Curve {
     pub fn at(&self, g: f64, parameters: &Parameters) -> At {
         match self {
             Self::Polynomial(coefficients) => polynomial(coefficients, g, parameters),
-            Self::Table { commands, thrusts } => {
-                let values: Vec<f64> = thrusts.iter().map(|t| parameters[*t]).collect();
-                let (value, slope, by) = table(commands, &values, g);
-                let by = by.into_iter().map(|(i, x)| (thrusts[i], x)).collect();
+            Self::Table {
+                arguments,
+                values: given,
+            } => {
+                let values: Vec<f64> = given.iter().map(|t| parameters[*t]).collect();
+                let (value, slope, by) = table(arguments, &values, g);
+                let by = by.into_iter().map(|(i, x)| (given[i], x)).collect();
                 At { value, slope, by }
             }
         }
     }
 
-    /// A command as large as they come: a table's farthest from zero, or one.
+    /// An argument as large as they come: a table's farthest from zero, or one.
     pub fn large(&self) -> f64 {
         match self {
             Self::Polynomial(_) => 1.0,
-            Self::Table { commands, .. } => commands.iter().fold(0.0, |m, u| m.max(u.abs())),
+            Self::Table { arguments, .. } => arguments.iter().fold(0.0, |m, u| m.max(u.abs())),
         }
     }
 }

@@ -283,7 +283,7 @@ impl ForceModel for Drag {
                     // The rotation of the frame acts on both twists.
                     let wrench = pose.wrench_to_world(&(scale * unit));
                     let nu_bar = pose.wrench_to_world(&(scale * slope.tr_mul(&zeta)));
-                    bar.twist[b] += nu_bar;
+                    at.relative_vjp(b, &nu_bar, bar);
                     bar.pose[b] -= cross_force(&relative, &nu_bar) + cross_force(virt, &wrench);
                     if let Some(waterline) = &self.waterline {
                         let mut cut = Vec6::zeros();

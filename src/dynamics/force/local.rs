@@ -142,7 +142,7 @@ impl<L: Law> ForceModel for Local<L> {
                     bar.v[*rate] += zeta.dot(by);
                 }
                 let nu_bar = pose.wrench_to_world(&slope.tr_mul(&zeta));
-                bar.twist[b] += nu_bar;
+                at.relative_vjp(b, &nu_bar, bar);
                 // The rotation of the frame acts on both twists.
                 bar.pose[b] -= cross_force(&relative, &nu_bar) + cross_force(virt, &wrench);
             }

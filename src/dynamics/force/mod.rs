@@ -5,6 +5,7 @@
 //! To add one: a file with the type, its declared parameters and its `assemble`, and its line in `FORCES`.
 
 mod actuation;
+mod current;
 mod curve;
 mod damping;
 mod drag;
@@ -16,6 +17,7 @@ mod passive;
 mod rotor;
 mod servo;
 mod spring;
+mod stream;
 mod tendon;
 mod thrust;
 mod thruster;
@@ -25,7 +27,7 @@ mod weight;
 use super::{BodyData, BodyValues, Declarations, Parameters};
 use crate::Result;
 use crate::adjoint::drag::Element;
-use crate::adjoint::lie::{Pose, Vec3, Vec6, six};
+use crate::adjoint::lie::{Mat6, Pose, Vec3, Vec6, linear, six};
 use crate::adjoint::waterline::Hull;
 use crate::coupling::lubrication::Bearing;
 use crate::multibody::Tree;
@@ -33,6 +35,7 @@ use crate::scene::Scene;
 use nalgebra::DVector;
 use std::ops::Range;
 use std::sync::Arc;
+pub use stream::{Streams, Undisturbed};
 pub use waterline::Waterline;
 
 /// Makes a force from a scene, and declares its parameters; `None` where a scene has none of its kind.
@@ -58,6 +61,7 @@ const FORCES: &[Assemble] = &[
     fin::assemble,
     edge::assemble,
     tendon::assemble,
+    current::assemble,
 ];
 
 /// What forces are made from.
@@ -80,6 +84,10 @@ pub struct ForceParts<'a> {
     pub waterline: Option<Waterline>,
     /// Gaps that forces of viscous water act in.
     pub lubricated: Vec<Lubricated>,
+    /// Currents by depth and time.
+    pub streams: Arc<Streams>,
+    /// The own added mass of each body that they act on, at unit density, body's frame.
+    pub added_mass: Vec<(usize, Mat6)>,
 }
 
 /// A gap that a force of viscous water acts in.
@@ -107,6 +115,8 @@ pub struct Place<'a> {
     pub poses: &'a [Pose],
     /// Joint coordinates.
     pub q: &'a DVector<f64>,
+    /// When they are there, s.
+    pub time: f64,
     /// The parameters.
     pub parameters: &'a Parameters,
 }
@@ -120,8 +130,10 @@ pub struct Moving<'a> {
     pub twists: &'a [Vec6],
     /// Generalised velocity.
     pub v: &'a DVector<f64>,
-    /// Velocity of the undisturbed water, m/s.
+    /// Velocity of the undisturbed water that is the same everywhere and always, m/s.
     pub current: &'a Vec3,
+    /// What is added to it by depth and time.
+    pub streams: &'a Streams,
     /// Controls.
     pub control: &'a DVector<f64>,
 }
@@ -129,7 +141,18 @@ pub struct Moving<'a> {
 impl Moving<'_> {
     /// Twist of body `b` through the water.
     pub fn relative(&self, b: usize) -> Vec6 {
-        self.twists[b] - six(self.current, &Vec3::zeros())
+        let water = self.current + self.streams.at_body(b, &self.place).velocity;
+        self.twists[b] - six(&water, &Vec3::zeros())
+    }
+
+    /// Transpose of [`Moving::relative`] at a fixed frame of the body: added to the cotangents of the twist and of what the water's velocity there follows from.
+    fn relative_vjp(&self, b: usize, relative_bar: &Vec6, bar: &mut LoadBars) {
+        bar.twist[b] += relative_bar;
+        let water_bar = Undisturbed {
+            velocity: -linear(relative_bar),
+            acceleration: Vec3::zeros(),
+        };
+        (self.streams).at_body_vjp(b, &self.place, &water_bar, bar);
     }
 }
 

@@ -88,8 +88,8 @@ pub(super) fn assemble(
         let curve = match given.table.is_empty() {
             true => Curve::Polynomial(parted(COEFFICIENT, 1, given.coefficients())),
             false => Curve::Table {
-                commands: given.table.iter().map(|point| point[0]).collect(),
-                thrusts: parted(
+                arguments: given.table.iter().map(|point| point[0]).collect(),
+                values: parted(
                     THRUST,
                     0,
                     given.table.iter().map(|point| point[1]).collect(),

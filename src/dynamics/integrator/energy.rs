@@ -186,7 +186,9 @@ pub(super) fn close(
         return Ok(next);
     }
     let s = start.stepper;
-    let end = s.system.evaluate_apart(s.parameters, &next.q)?;
+    let end = s
+        .system
+        .evaluate_apart(s.parameters, &next.q, s.time(&next))?;
     if let Some(parts) = Parts::new(start, velocities, &end, &next.y)? {
         let mut change = parts.change() * &parts.direction;
         start.split.forget_driven(&mut change);
@@ -221,7 +223,9 @@ impl<'a> Closure<'a> {
             return Ok(None);
         }
         let s = start.stepper;
-        let end = s.system.linearise_apart(s.parameters, &next.q)?;
+        let end = s
+            .system
+            .linearise_apart(s.parameters, &next.q, s.time(next))?;
         let parts = Parts::new(start, velocities, &end, &next.y)?;
         Ok(parts.map(|parts| Self {
             end,

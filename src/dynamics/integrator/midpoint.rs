@@ -42,8 +42,9 @@ fn rule(s: &Stepper) -> Rule {
 fn middle<'a>(start: &Start<'_, 'a>, v: &DVector<f64>) -> Result<Linearisation<'a>> {
     let (s, state) = (start.stepper, start.state);
     let mut q = s.system.tree.integrate(&state.q, &(0.5 * s.dt * v));
-    s.place_motions(&mut q, s.time(state) + 0.5 * s.dt);
-    s.system.linearise_apart(s.parameters, &q)
+    let t = s.time(state) + 0.5 * s.dt;
+    s.place_motions(&mut q, t);
+    s.system.linearise_apart(s.parameters, &q, t)
 }
 
 /// Relative change of the velocity that says nothing: rounding, or what the coupled solve leaves open.

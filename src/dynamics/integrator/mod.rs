@@ -173,20 +173,20 @@ impl<'a> Stepper<'a> {
         }
     }
 
-    /// [`System::evaluate`] at a state's configuration: what its readout needs.
+    /// [`System::evaluate`] at a state's configuration and time (s): what its readout needs.
     ///
     /// # Errors
     /// As there.
-    pub fn evaluate(&self, q: &DVector<f64>) -> Result<Evaluation<'a>> {
-        self.system.evaluate(self.parameters, q)
+    pub fn evaluate(&self, q: &DVector<f64>, time: f64) -> Result<Evaluation<'a>> {
+        self.system.evaluate(self.parameters, q, time)
     }
 
-    /// [`System::linearise`] at a state's configuration, shared by its readout, its step and their transposes.
+    /// [`System::linearise`] at a state's configuration and time (s), shared by its readout, its step and their transposes.
     ///
     /// # Errors
     /// As there.
-    pub fn linearise(&self, q: &DVector<f64>) -> Result<Linearisation<'a>> {
-        self.system.linearise(self.parameters, q)
+    pub fn linearise(&self, q: &DVector<f64>, time: f64) -> Result<Linearisation<'a>> {
+        self.system.linearise(self.parameters, q, time)
     }
 }
 

@@ -82,7 +82,7 @@ impl<'a> Stepper<'a> {
         let mut later = Vec::with_capacity(n - 1);
         // What was passed is made again in more pieces, if there may be more.
         while later.len() + 1 < n && (passed.is_empty() || !plan.may_cut()) {
-            let e = stepper.linearise(&next.q)?;
+            let e = stepper.linearise(&next.q, stepper.time(&next))?;
             let v = stepper.velocity(&e, &next)?;
             let piece = stepper.piece(&e, &next, &v, input, plan)?;
             passed.add(&piece.passed);

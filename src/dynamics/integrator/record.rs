@@ -120,7 +120,7 @@ impl<'a> Stepper<'a> {
     {
         let stepper = self.of_pieces(record);
         let part = |(state, v, stages): (State, &'s DVector<f64>, &'s Stages)| {
-            let e = stepper.linearise(&state.q)?;
+            let e = stepper.linearise(&state.q, stepper.time(&state))?;
             let split = stepper.split_of_step(&state, &record.input);
             let near = stepper.near(&e, &split.complete(v), &record.plan)?;
             let start = Start {

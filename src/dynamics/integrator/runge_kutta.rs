@@ -80,7 +80,7 @@ fn stages<'a>(
         } else {
             let mut q = tree.integrate(&state.q, &xi);
             s.place_motions(&mut q, t);
-            Some(s.system.linearise(s.parameters, &q)?)
+            Some(s.system.linearise(s.parameters, &q, t)?)
         };
         let at = own.as_ref().unwrap_or(start.e);
         // The readout's, unless a joint is newly held or released.

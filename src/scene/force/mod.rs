@@ -1,5 +1,6 @@
 //! Forces between bodies as a scene gives them, one file each.
 
+mod current;
 mod damping;
 mod edge;
 mod fin;
@@ -9,6 +10,7 @@ mod spring;
 mod tendon;
 mod thruster;
 
+pub use current::Current;
 pub(crate) use damping::{AXES, least_damping};
 pub use damping::{Coefficients, Damping};
 pub use edge::Edge;
@@ -43,6 +45,8 @@ pub enum Force {
     Edge(Edge),
     /// Of a tendon over joints.
     Tendon(Tendon),
+    /// Of water that streams past, by depth and time.
+    Current(Current),
 }
 
 /// The forces of a kind, each with its number among all.
@@ -59,7 +63,7 @@ macro_rules! kinds {
         }
     };
 }
-kinds!(edges: Edge, fins: Fin, lubrications: Lubrication, all_tendons: Tendon, all_thrusters: Thruster);
+kinds!(currents: Current, edges: Edge, fins: Fin, lubrications: Lubrication, all_tendons: Tendon, all_thrusters: Thruster);
 
 /// Forces with controls, which are numbered on from `first`: their numbers, their controls, and themselves.
 fn numbered<'a, F: 'a>(
@@ -82,6 +86,14 @@ impl Scene {
         numbered(first, self.all_tendons())
     }
 
+    /// Against gravity, or along z where there is none: a unit vector.
+    pub(crate) fn up(&self) -> [f64; 3] {
+        match self.gravity {
+            [0.0, 0.0, 0.0] => [0.0, 0.0, 1.0],
+            gravity => unit(gravity.map(|g| -g)),
+        }
+    }
+
     /// Adds a force between bodies.
     pub fn add_force(&mut self, force: Force) {
         self.forces.push(force);
@@ -98,6 +110,7 @@ impl Scene {
             Force::Float(float) => ("float", &float.name),
             Force::Edge(edge) => ("edge", &edge.name),
             Force::Tendon(tendon) => ("tendon", &tendon.name),
+            Force::Current(current) => ("current", &current.name),
         };
         let counted = || format!("{kind} {}", index + 1);
         name.clone().unwrap_or_else(counted)
@@ -134,6 +147,7 @@ impl Scene {
                 Force::Float(float) => float.check(self, &place)?,
                 Force::Edge(edge) => edge.check(self, &place)?,
                 Force::Tendon(tendon) => tendon.check(self, &place)?,
+                Force::Current(current) => current.check(self, &place)?,
             }
         }
         Ok(())

@@ -282,9 +282,6 @@ fn check_joint(body: &Body) -> Result<()> {
     Ok(())
 }
 
-/// Largest phase, rad: rounding is 10⁻⁷ there.
-const MOST_PHASE: f64 = 1e9;
-
 fn check_motion(body: &Body, motion: &[Motion]) -> Result<()> {
     let joint = &body.joint;
     if body.locked {
@@ -314,35 +311,7 @@ fn check_motion(body: &Body, motion: &[Motion]) -> Result<()> {
         ));
     }
     for (i, motion) in motion.iter().enumerate() {
-        let numbers: &[(&str, f64)] = match motion {
-            // Checked where it is made.
-            Motion::Spline(_) => &[],
-            &Motion::Linear { offset, rate } => &[("offset", offset), ("rate", rate)],
-            &Motion::Sine {
-                offset,
-                amplitude,
-                frequency,
-                phase,
-            } => &[
-                ("offset", offset),
-                ("amplitude", amplitude),
-                ("frequency", frequency),
-                ("phase", phase),
-            ],
-        };
-        for (field, value) in numbers {
-            let place = place(body, &format!("motion[{i}].{field}"));
-            finite(&place, &[*value])?;
-            if *field == "phase" && value.abs() > MOST_PHASE {
-                return Err(Error::input(
-                    place,
-                    value,
-                    format!(
-                        "give a phase within ±2π; past {MOST_PHASE:.0e} rad rounding moves the angle, and the joint's rate isn't that of its place"
-                    ),
-                ));
-            }
-        }
+        motion.check(&place(body, &format!("motion[{i}]")))?;
     }
     Ok(())
 }

@@ -9,6 +9,7 @@ mod contact;
 mod controller;
 mod limits;
 mod mimic;
+mod motion;
 mod passive;
 mod servo;
 mod start;
@@ -93,18 +94,6 @@ impl Scene {
                     "give the direction from the wall into the water; it can't be zero",
                 ));
             }
-            let across = cosine(fluid.current, wall.normal);
-            if across.abs() > PARALLEL {
-                return Err(Error::input(
-                    "fluid.current",
-                    list(&fluid.current),
-                    format!(
-                        "water can't flow through walls[{i}], whose normal is {}: make the current \
-                         parallel to it",
-                        list(&wall.normal)
-                    ),
-                ));
-            }
             for (j, other) in self.walls[..i].iter().enumerate() {
                 if cosine(wall.normal, other.normal).abs() > PARALLEL {
                     return Err(Error::input(
@@ -117,6 +106,24 @@ impl Scene {
                         ),
                     ));
                 }
+            }
+        }
+        self.check_through_walls("fluid.current", fluid.current)
+    }
+
+    /// Refuses water that flows through a wall.
+    pub(super) fn check_through_walls(&self, place: &str, velocity: [f64; 3]) -> Result<()> {
+        for (i, wall) in self.walls.iter().enumerate() {
+            if cosine(velocity, wall.normal).abs() > PARALLEL {
+                return Err(Error::input(
+                    place,
+                    list(&velocity),
+                    format!(
+                        "water can't flow through walls[{i}], whose normal is {}: make the current \
+                         parallel to it",
+                        list(&wall.normal)
+                    ),
+                ));
             }
         }
         Ok(())

@@ -54,6 +54,12 @@ impl Own {
     }
 }
 
+/// Each body's own added mass at unit density, body's frame, about its origin.
+pub(in crate::water) fn own_added_mass(problem: &Problem) -> Result<Vec<Mat6>> {
+    let made = shared(problem.bodies, |b| Own::new(problem, b))?;
+    Ok(made.iter().map(|m| m.added_mass).collect())
+}
+
 impl FidelityKind for Isolated {
     fn knobs(&self) -> &'static [Knob] {
         &[]

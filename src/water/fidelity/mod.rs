@@ -10,6 +10,7 @@ mod reduced;
 
 use kind::FidelityKind;
 
+pub(super) use isolated::own_added_mass;
 pub use kind::Knob;
 pub(super) use reduced::{compressed_all, responses};
 

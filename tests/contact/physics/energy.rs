@@ -74,7 +74,7 @@ fn exchanges(simulator: &Simulator, steps: usize) -> Vec<Exchange> {
     let rollout = run(simulator, steps);
     let mut out = Vec::new();
     for (state, sample) in rollout.states().iter().zip(rollout.samples()).take(steps) {
-        let e = stepper.linearise(&state.q).unwrap();
+        let e = stepper.linearise(&state.q, 0.0).unwrap();
         let [before, after] = velocities(&stepper, &e, state, &sample.v);
         let kinetic = |v: &DVector<f64>| 0.5 * v.dot(&(e.mass_matrix() * v));
         out.push(Exchange {
@@ -144,7 +144,7 @@ fn energy_of_balls_never_grows() {
         let samples = rollout.samples();
         let held: Vec<f64> = samples
             .iter()
-            .map(|s| elastic(&stepper.evaluate(&s.q).unwrap()))
+            .map(|s| elastic(&stepper.evaluate(&s.q, 0.0).unwrap()))
             .collect();
         let scale = samples[0].energy();
         for n in 0..200 {
@@ -188,7 +188,7 @@ fn energy_of_other_shapes_rises_by_the_steps_error_alone() {
             let rollout = run(&simulator, (0.8 / dt) as usize);
             let energies = rollout.states().iter().zip(rollout.samples());
             let energies = energies.map(|(state, sample)| {
-                sample.energy() + elastic(&stepper.evaluate(&state.q).unwrap())
+                sample.energy() + elastic(&stepper.evaluate(&state.q, 0.0).unwrap())
             });
             let (mut lowest, mut first, mut rise) = (f64::INFINITY, None, 0.0_f64);
             for energy in energies {

@@ -14,7 +14,7 @@ fn loaded(simulator: &Simulator, steps: usize) -> Vec<bool> {
     states
         .take(steps)
         .map(|(state, sample)| {
-            let e = stepper.linearise(&state.q).unwrap();
+            let e = stepper.linearise(&state.q, 0.0).unwrap();
             let [_, after] = velocities(&stepper, &e, state, &sample.v);
             e.contact_force(&after, Dual::User).norm() > 0.0
         })

@@ -626,7 +626,7 @@ class Simulator:
         """One step from a state with the controls `u` (control_size,), N and N m: the next state, and the record that has the
         step's derivatives. The steps of a rollout, to the bit."""
     def equations(self, q: ArrayLike | None = None, *, time: float = 0.0) -> Equations:
-        """The equations of motion at the coordinates `q` (q_size,), or at many (N, q_size); default: where the simulator starts."""
+        """The equations of motion at the coordinates `q` (q_size,), or at many (N, q_size); default: where the simulator starts. Currents are as they are at `time` (s)."""
     def integrate(self, q: ArrayLike, xi: ArrayLike) -> _Array:
         """q ⊕ ξ: the configurations that `q` (…, q_size) become by the tangents `xi` (…, v_size); of rotations a rotation vector, rad, in the joint's frame."""
     def difference(self, start: ArrayLike, end: ArrayLike) -> _Array:
@@ -794,6 +794,25 @@ class Equations:
         """Momentum (kg m/s) and angular momentum about the world's origin (kg m²/s) of bodies and water at `v`, (…, 6)."""
 
 @final
+class Loads:
+    """Wrenches on all bodies at one state, kind by kind, and across their joints: made by `Rollout.loads`. Rows are force (N) and moment about the body's origin (N m), world axes. With
+    the wrench across its own joint and the opposite ones of what it carries, they are the rate of a body's own momentum."""
+    @property
+    def kinds(self) -> list[str]:
+        """What acts: the scene's forces as they are called ("gravity", "buoyancy", "linear drag", …), "water" (added mass), "contact"."""
+    def wrenches(self, kind: str) -> _Array:
+        """What one kind does to each body (bodies, 6)."""
+    @property
+    def joints(self) -> _Array:
+        """What each body gets from what carries it, across its joint (bodies, 6); of its drive and stops as well."""
+    @property
+    def joint_forces(self) -> _Array:
+        """Those along the axes of the joints (v_size,), N or N m: what a sensor in the drive reads."""
+    @property
+    def acceleration(self) -> _Array:
+        """The generalised acceleration that all of it gives (v_size,)."""
+
+@final
 class State:
     """A state between two steps: made by `Simulator.state`, `Simulator.step` or `Rollout.state`."""
     @property
@@ -912,6 +931,11 @@ class Rollout:
         """Contacts during the step from state `step` to the next, at the pose of that state: where surfaces are no more than `slack` (m)
         farther apart than the gap at which they touch, and what presses there. None where the scene has no contact. Negative
         numbers count from the end: -1 is the last step."""
+    def loads(self, state: int) -> Loads:
+        """What acts on every body and across every joint at state `state`, as the step there starts: gravity, buoyancy, drag, thrust, the inertia of the water, contact. Negative
+        numbers count from the end."""
+    def imu(self, site: str) -> _Array:
+        """What an inertial measurement unit at the site of this name reads at every state (n, 6): acceleration less gravity (m/s²) and rates (rad/s), in the site's axes."""
     def flow(self, state: int, points: ArrayLike) -> _Array:
         """The water's velocity at `points` (n, 3), m, at state `state`: (n, 3), m/s, world axes, the current included. It takes a
         solve, and a simulator with the fidelity "full". Points within a body, behind a wall, or nearer to a surface than half an

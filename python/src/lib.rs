@@ -13,6 +13,7 @@ mod gradient;
 mod identify;
 mod interrupt;
 mod joint;
+mod loads;
 mod log;
 mod mesh;
 mod objective;
@@ -110,6 +111,7 @@ fn _hydrograd(m: &Bound<'_, PyModule>) -> PyResult<()> {
     m.add_class::<state::State>()?;
     m.add_class::<state::Record>()?;
     m.add_class::<rollout::Rollout>()?;
+    m.add_class::<loads::Loads>()?;
     m.add_class::<objective::Objective>()?;
     shape::register(m)?;
     joint::register(m)?;

@@ -5,6 +5,7 @@ use crate::contact;
 use crate::error::{OrRaise, input};
 use crate::gradient;
 use crate::interrupt::{Progress, ended, followed, long, short};
+use crate::loads::Loads;
 use crate::objective::Objective;
 use crate::simulator::Simulator;
 use crate::state::State;
@@ -239,6 +240,26 @@ impl Rollout {
         let at = array::numbered(step, self.steps(), "step")?;
         let found = short(py, || self.inner.contacts(at, slack))?;
         contact::of_step(py, &found)
+    }
+
+    /// What acts on every body and across every joint at state `state`, as the step there starts: gravity, buoyancy, drag, thrust, the inertia of the water, contact. Negative
+    /// numbers count from the end.
+    fn loads(&self, py: Python<'_>, state: isize) -> PyResult<Loads> {
+        let at = array::numbered(state, self.inner.states().len(), "state")?;
+        short(py, || self.inner.loads(at)).map(Loads)
+    }
+
+    /// What an inertial measurement unit at the site of this name reads at every state (n, 6): acceleration less gravity (m/s²) and rates (rad/s), in the site's axes.
+    fn imu<'py>(&self, py: Python<'py>, site: &str) -> Numbers<'py> {
+        let n = self.inner.states().len();
+        let read = short(py, || {
+            (0..n)
+                .map(|k| self.inner.imu(site, k))
+                .collect::<hydrograd::Result<Vec<_>>>()
+        })?;
+        let values = read.iter().flat_map(|r| [r.specific_force, r.rates]);
+        let values = values.flat_map(|x| [x.x, x.y, x.z]).collect();
+        array::to_python(py, values, &[n, 6])
     }
 
     /// The water's velocity at `points` (n, 3), m, at state `state`: (n, 3), m/s, world axes, the current included. It takes a

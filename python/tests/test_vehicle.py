@@ -79,7 +79,7 @@ def test_currents():
     rollout = sim.rollout(np.zeros((50, 0)))
     share = np.array([1.0, 0.25])
     along = np.array([0.5, 0.1, 0.0])
-    flow = np.sin(2.0 * rollout.times)[:, None, None] * share[:, None] * along
+    flow = np.sin(2.0 * 0.02 * np.arange(51))[:, None, None] * share[:, None] * along
     assert np.allclose(rollout.v.reshape(51, 2, 6)[:, :, :3], flow, atol=1e-7)
 
     weights = np.zeros((51, 2, 3))
@@ -96,3 +96,26 @@ def test_currents():
     scene.add_force("current", velocity=(0.1, 0, 0), profile=[[1.0, 1.0], [1.0, 0.5]])
     with pytest.raises(hg.InputError, match=r"forces\[1\]\.profile"):
         scene.validate()
+
+
+def test_loads_and_sensors():
+    """An arm that is held level in the air weighs on its joint, and its sensor reads gravity; in water the free hull carries nothing across its joint."""
+    scene = hg.Scene(hg.Fluid(0.0), gravity=(0, 0, -9.81))
+    arm = {"mass": 2.0, "inertia": (0.1, 0.1, 0.1), "center_of_mass": (0.4, 0, 0), "joint": hg.revolute((0, 1, 0))}
+    scene.add(hg.Body(name="arm", locked=True, **arm))
+    scene.add_site("tip", "arm", position=(0.8, 0, 0))
+    rollout = hg.Simulator(scene).rollout(np.zeros((3, 0)))
+    loads = rollout.loads(-1)
+    assert np.allclose(loads.joints, [[0, 0, 2 * 9.81, 0, -0.4 * 2 * 9.81, 0]], atol=1e-12)
+    assert np.allclose(loads.joint_forces, [-0.4 * 2 * 9.81]) and np.array_equal(loads.acceleration, [0.0])
+    assert np.allclose(rollout.imu("tip"), np.tile([0, 0, 9.81, 0, 0, 0], (4, 1)), atol=1e-12)
+
+    rollout = hg.Simulator(vehicle(), fidelity="isolated").rollout(np.tile([0.6, 0.4, 0.5, 40.0], (10, 1)))
+    loads = rollout.loads(5)
+    assert {"gravity", "buoyancy", "damping", "thrust", "fin", "water"} <= set(loads.kinds)
+    assert loads.wrenches("thrust").shape == (2, 6) and abs(loads.wrenches("thrust")[0, 0]) > 1
+    assert np.abs(loads.joints[0]).max() < 1e-9 * np.abs(loads.wrenches("gravity")[0]).max()
+    with pytest.raises(hg.InputError, match="loads: kind"):
+        loads.wrenches("magic")
+    with pytest.raises(hg.InputError, match="imu: site"):
+        rollout.imu("nose")

@@ -135,7 +135,7 @@ impl Linearisation<'_> {
 
     /// The fluid's part: gradient of
     /// `ρ { E(V'×W, V') − E(W, C') + ½ D E(v,v)[W] − D E(w,v)[V] }`, C' = C − U × V.
-    fn fluid_inertial_vjp(
+    pub(super) fn fluid_inertial_vjp(
         &self,
         v: &DVector<f64>,
         w: &DVector<f64>,

@@ -4,6 +4,7 @@ mod acceleration;
 mod armature;
 mod balance;
 mod body;
+mod body_loads;
 mod body_parameters;
 mod contact;
 mod contact_force;
@@ -35,8 +36,8 @@ pub use evaluation::Evaluation;
 pub(crate) use evaluation::WITHIN;
 pub use inertia::Inertia;
 pub use integrator::{
-    ContactVelocities, Input, Integrator, LinearisedStep, State, StateBar, StateTangents, StepBar,
-    StepRecord, Stepper, Stops,
+    ContactVelocities, Input, Integrator, LinearisedStep, Solved, State, StateBar, StateTangents,
+    StepBar, StepRecord, Stepper, Stops,
 };
 pub use limit::JointLimit;
 pub use linearisation::Linearisation;

@@ -32,7 +32,7 @@ use nalgebra::{DMatrix, DVector};
 /// # Ok::<(), hydrograd::Error>(())
 /// ```
 pub struct Equations<'s> {
-    at: Linearisation<'s>,
+    pub(super) at: Linearisation<'s>,
 }
 
 impl Simulator {
@@ -86,7 +86,7 @@ impl Simulator {
     }
 }
 
-fn check_numbers(place: &str, x: &DVector<f64>, n: usize) -> Result<()> {
+pub(super) fn check_numbers(place: &str, x: &DVector<f64>, n: usize) -> Result<()> {
     match x.len() == n && x.iter().all(|x| x.is_finite()) {
         true => Ok(()),
         false => Err(Error::input(
@@ -148,13 +148,25 @@ impl Equations<'_> {
         force: &DVector<f64>,
         driven: &DVector<f64>,
     ) -> Result<DVector<f64>> {
+        self.acceleration_holding(v, control, force, driven, &[])
+    }
+
+    /// The same where the joints of bodies in `hold` are held; an empty one holds none.
+    pub(super) fn acceleration_holding(
+        &self,
+        v: &DVector<f64>,
+        control: &DVector<f64>,
+        force: &DVector<f64>,
+        driven: &DVector<f64>,
+        hold: &[bool],
+    ) -> Result<DVector<f64>> {
         let system = self.at.system;
         let n = system.tree.velocities();
         check_numbers("generalised force", force, n)?;
         check_numbers("acceleration of driven joints", driven, n)?;
         let (mut free, mut given) = (Vec::new(), driven.clone());
-        for (drive, link) in system.drives.iter().zip(system.tree.links()) {
-            if *drive == Drive::Free {
+        for (b, (drive, link)) in system.drives.iter().zip(system.tree.links()).enumerate() {
+            if *drive == Drive::Free && !hold.get(b).copied().unwrap_or(false) {
                 free.extend(link.v.clone());
                 link.v.clone().for_each(|i| given[i] = 0.0);
             }

@@ -17,6 +17,7 @@ mod growth;
 mod identify;
 mod invariants;
 mod islands;
+mod loads;
 mod lubrication;
 mod mechanisms;
 mod observables;

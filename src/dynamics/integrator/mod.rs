@@ -25,6 +25,7 @@ mod quasi;
 mod readout;
 mod record;
 mod runge_kutta;
+mod solved;
 mod split;
 mod stages;
 mod start;
@@ -32,6 +33,7 @@ mod velocity_euler;
 
 pub use plan::Stops;
 pub use record::{LinearisedStep, StepRecord};
+pub use solved::Solved;
 pub use stages::ContactVelocities;
 
 use super::{Drive, Evaluation, ForceCotangents, InputTangents, Linearisation, Parameters, System};

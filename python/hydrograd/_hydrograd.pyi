@@ -359,7 +359,7 @@ class Scene:
         zeros: dict[str, float] | None = None,
         links: dict[str, dict[str, Any]] | None = None,
     ) -> Scene:
-        """A scene of the robot in a URDF file, in still fresh water, gravity along -z. Choices are those of `add_robot`."""
+        """A scene of the robot in a URDF or MJCF file, in still fresh water, gravity along -z. Choices are those of `add_robot`."""
     def add_robot(
         self,
         path: _Path,
@@ -381,7 +381,7 @@ class Scene:
         zeros: dict[str, float] | None = None,
         links: dict[str, dict[str, Any]] | None = None,
     ) -> Robot:
-        """Adds the robot of a URDF file: a body for each link that moves, a site for each that doesn't. Choices are the keys of a scene file's [[robot]]: `base` "free"
+        """Adds the robot of a URDF or MJCF file: a body for each link that moves, a site for each that doesn't. Choices are the keys of a scene file's [[robot]]: `base` "free"
         or "fixed", `position` (m) and `rotation` (rad) of the root, `prefix` of all names, `package_path` (folders), `shape` "collision", "visual", "hull" or "none",
         `bad_meshes` "hull" or "refuse", `faces` of hulls, `mimic` "follow" or "independent", `actuated`, `limits`, `drag`, `start` (joint to coordinate), `motions`
         (joint to the `Motion` that drives it), `zeros` (joint whose zero isn't sure to its offset, the coordinate of a body "JOINT zero" before it), `links` (link to its `shape`, `mass`, `density`, `keep`, and what `Body` takes: `center_of_mass`, `inertia`, `volume`, `center_of_buoyancy`,

@@ -68,7 +68,7 @@ impl Scene {
             .map(Self)
     }
 
-    /// A scene of the robot in a URDF file, in still fresh water, gravity along -z. Choices are those of `add_robot`.
+    /// A scene of the robot in a URDF or MJCF file, in still fresh water, gravity along -z. Choices are those of `add_robot`.
     #[staticmethod]
     #[pyo3(signature = (path, **choices))]
     fn from_urdf(
@@ -79,7 +79,7 @@ impl Scene {
         robot::scene_of(py, path, choices).map(Self)
     }
 
-    /// Adds the robot of a URDF file: a body for each link that moves, a site for each that doesn't. Choices are the keys of a scene file's [[robot]]: `base` "free"
+    /// Adds the robot of a URDF or MJCF file: a body for each link that moves, a site for each that doesn't. Choices are the keys of a scene file's [[robot]]: `base` "free"
     /// or "fixed", `position` (m) and `rotation` (rad) of the root, `prefix` of all names, `package_path` (folders), `shape` "collision", "visual", "hull" or "none",
     /// `bad_meshes` "hull" or "refuse", `faces` of hulls, `mimic` "follow" or "independent", `actuated`, `limits`, `drag`, `start` (joint to coordinate), `motions`
     /// (joint to the `Motion` that drives it), `zeros` (joint whose zero isn't sure to its offset, the coordinate of a body "JOINT zero" before it), `links` (link to its `shape`, `mass`, `density`, `keep`, and what `Body` takes: `center_of_mass`, `inertia`, `volume`, `center_of_buoyancy`,

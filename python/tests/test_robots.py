@@ -285,3 +285,67 @@ def test_choices_that_can_not_be_are_refused():
     assert "rov" in str(first) and "rov" in repr(first)
     scene.add_robot(path, prefix="b/", base="fixed")
     scene.validate()
+
+
+MJCF = """<mujoco model="sampler">
+  <compiler angle="degree" eulerseq="xyz"/>
+  <default>
+    <joint damping="0" armature="0.02"/>
+    <geom density="900"/>
+    <default class="thin"><geom type="capsule" size="0.03"/><joint range="-100 100"/></default>
+  </default>
+  <worldbody>
+    <light pos="0 0 3"/>
+    <body name="base">
+      <geom type="box" size="0.2 0.1 0.05"/>
+      <body name="shoulder" pos="0 0 0.1" quat="0.8 0.2 -0.4 0.4">
+        <joint name="yaw" type="hinge" axis="0 0 1" range="-170 170"/>
+        <joint name="pitch" type="hinge" axis="0.2 1 0" pos="0.01 0.02 0.03" armature="0"/>
+        <geom class="thin" fromto="0 0 0 0.3 0.1 0.05"/>
+        <geom type="ellipsoid" size="0.05 0.04 0.03" pos="0.3 0 0" mass="0.4"/>
+        <site name="elbow mark" pos="0.3 0 0"/>
+        <body name="slider" pos="0.3 0.1 0.05" axisangle="0.6 0.8 0 35">
+          <inertial pos="0.02 0.01 0" mass="1.3" fullinertia="0.02 0.03 0.025 0.001 -0.002 0.0015"/>
+          <joint name="out" type="slide" axis="1 0 0.5" range="-0.2 0.3"/>
+          <geom type="cylinder" size="0.02 0.1" contype="0" conaffinity="0"/>
+          <body name="hand" pos="0.2 0 0" xyaxes="0 1 0 -1 0 0">
+            <joint name="wrist" axis="0 1 0" pos="-0.05 0 0.02" class="thin"/>
+            <geom type="sphere" size="0.06"/>
+            <body name="palm" pos="0.05 0 0"><geom type="box" size="0.02 0.04 0.01" euler="10 20 30"/></body>
+          </body>
+        </body>
+      </body>
+    </body>
+  </worldbody>
+  <actuator><motor joint="yaw"/></actuator>
+</mujoco>
+"""
+
+
+def test_an_mjcf_file_is_pinocchios(tmp_path):
+    """M and h of a file with degrees, defaults, several joints of a body, joints away from origins, and inertia from geometry."""
+    import pinocchio as pin
+
+    path = tmp_path / "sampler.xml"
+    path.write_text(MJCF)
+    scene = hg.Scene(hg.Fluid(0.0), gravity=GRAVITY)
+    robot = scene.add_robot(path)
+    sim = hg.Simulator(scene)
+    assert any("<motor> of <actuator>" in unused["what"] for unused in robot.report["unused"])
+    model = pin.buildModelFromMJCF(str(path))
+    model.gravity.linear = GRAVITY
+    data = model.createData()
+    # It makes one joint of several of a body, in their order.
+    moving = sorted(robot.joints.items(), key=lambda item: item[1])
+    assert model.nv == sim.v_size == 4 and [name for name, _ in moving] == ["yaw", "pitch", "out", "wrist"]
+    at = range(4)
+    random = np.random.default_rng(2)
+    for _ in range(100):
+        q, v = random.uniform(-0.2, 0.2, 4), random.normal(size=4)
+        there, rate = np.zeros(4), np.zeros(4)
+        there[at], rate[at] = q, v
+        equations = sim.equations(q)
+        full = pin.crba(model, data, there)
+        full = np.triu(full) + np.triu(full, 1).T
+        close(equations.mass_matrix(), full[np.ix_(at, at)])
+        close(equations.bias_force(v), pin.rnea(model, data, there, rate, np.zeros(4))[at])

@@ -152,7 +152,9 @@ impl RobotArguments {
 /// Whether a file is a robot, by its name.
 fn is_urdf(path: &Path) -> bool {
     let extension = path.extension().unwrap_or_default();
-    extension.eq_ignore_ascii_case("urdf")
+    ["urdf", "mjcf", "xml"]
+        .iter()
+        .any(|known| extension.eq_ignore_ascii_case(known))
 }
 
 /// A scene, and how it is simulated.

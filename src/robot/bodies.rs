@@ -21,6 +21,8 @@ use urdf_rs::JointType;
 
 /// A moment of inertia, in that of a point mass at the edge of what the link is, under which it is implausible.
 const THIN: f64 = 1e-4;
+/// Sine of the angle under which two axes are one.
+const ALIKE: f64 = 1e-3;
 
 /// A body of a robot, in the frame of its first link.
 #[derive(Clone, Debug)]
@@ -75,6 +77,9 @@ pub(crate) fn import(path: &Path, options: &Options) -> Result<Imported> {
         unused: file.unused.clone(),
         ..Report::default()
     };
+    for note in &file.notes {
+        report.note(note.clone());
+    }
     check_names(&file, options)?;
     let groups = groups(&file, options)?;
     let mut all = Vec::with_capacity(groups.len());
@@ -280,9 +285,11 @@ impl Bodies<'_> {
                 if !above.any(|b| !self.inertials[b].is_none() || self.density(b).is_some()) {
                     return refused(g, what, remedy);
                 }
-                if self.groups[g].parent.is_some_and(|p| self.is_massless(p)) {
-                    let parent = self.groups[g].parent.map_or("", |p| self.name(p));
-                    let chain = format!("{what}, on link {parent:?} without mass");
+                if let Some(parent) = self.massless_alike(g) {
+                    let parent = self.name(parent);
+                    let chain = format!(
+                        "{what}, as does the joint of link {parent:?} without mass along or about the same axis"
+                    );
                     return refused(g, chain, remedy);
                 }
             }
@@ -295,6 +302,36 @@ impl Bodies<'_> {
             }
         }
         Ok(())
+    }
+
+    /// Of massless links in a row, of which it is one: another whose joint moves along or about the same axis, or any that has not one coordinate. What both carry
+    /// doesn't tell their motions apart.
+    fn massless_alike(&self, g: usize) -> Option<usize> {
+        let axis = |joint: &Joint| match joint {
+            Joint::Revolute { axis } => Some((true, Vec3::from(*axis))),
+            Joint::Prismatic { axis } => Some((false, Vec3::from(*axis))),
+            _ => None,
+        };
+        let own = axis(&self.joint(g));
+        // From the frame of the link's joint to that of the one above.
+        let mut turn = self.groups[g].placement.rotation;
+        let mut at = self.groups[g].parent;
+        while let Some(p) = at.filter(|p| self.is_massless(*p)) {
+            let other = axis(&self.joint(p));
+            let apart = match (own, other) {
+                (Some((turns, a)), Some((others, b))) => {
+                    let a = turn * a;
+                    turns != others || a.cross(&b).norm() > ALIKE * a.norm() * b.norm()
+                }
+                _ => false,
+            };
+            if !apart {
+                return Some(p);
+            }
+            turn = self.groups[p].placement.rotation * turn;
+            at = self.groups[p].parent;
+        }
+        None
     }
 
     /// Whether it has mass, and no inertia about an axis that its joint turns it about, nor anything on it.

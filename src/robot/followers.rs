@@ -76,7 +76,7 @@ fn give(b: usize, leader: usize, led: Led, all: &mut [Option<Moves>], report: &m
     follower.dynamics = Dynamics::default();
     let (name, ratio, offset) = (follower.name.clone(), led.ratio, led.offset);
     report.note(format!(
-        "joint {name:?} follows {:?}: {ratio} times its coordinate and {offset}; its limits, damping and friction are the leader's",
+        "joint {name:?} follows {:?}: {ratio} times its coordinate and {offset}; its limits, damping, friction, spring and armature are the leader's",
         led.joint
     ));
     follower.mimic = Some(led);
@@ -85,6 +85,15 @@ fn give(b: usize, leader: usize, led: Led, all: &mut [Option<Moves>], report: &m
     };
     of.dynamics.damping += ratio * ratio * dynamics.damping;
     of.dynamics.friction += ratio.abs() * dynamics.friction;
+    of.dynamics.armature += ratio * ratio * dynamics.armature;
+    // ½ k (r q + o − q₀)² has its least at (q₀ − o)/r.
+    let stiffness = ratio * ratio * dynamics.stiffness;
+    if stiffness > 0.0 {
+        let rest = (dynamics.rest - offset) / ratio;
+        let (own, all) = (of.dynamics.stiffness, of.dynamics.stiffness + stiffness);
+        of.dynamics.rest = (own * of.dynamics.rest + stiffness * rest) / all;
+        of.dynamics.stiffness = all;
+    }
     if let Some([lower, upper]) = limits.filter(|_| ratio != 0.0) {
         let ends = [(lower - offset) / ratio, (upper - offset) / ratio];
         let own = of.limits.unwrap_or([f64::NEG_INFINITY, f64::INFINITY]);

@@ -26,7 +26,7 @@ impl Inertial {
         self.mass == 0.0 && self.inertia == Matrix3::zeros()
     }
 
-    fn moved(&self, at: &Isometry3<f64>) -> Self {
+    pub fn moved(&self, at: &Isometry3<f64>) -> Self {
         let turn = at.rotation.to_rotation_matrix();
         Self {
             mass: self.mass,
@@ -40,6 +40,21 @@ impl Inertial {
         let d = self.center - point;
         let outer = d * d.transpose();
         self.inertia + self.mass * (Matrix3::identity() * d.norm_squared() - outer)
+    }
+
+    /// Of several in the axes of one frame.
+    pub fn together(parts: &[Self]) -> Self {
+        let mass: f64 = parts.iter().map(|p| p.mass).sum();
+        let first: Vector3<f64> = parts.iter().map(|p| p.mass * p.center).sum();
+        let center = match mass > 0.0 {
+            true => first / mass,
+            false => Vector3::zeros(),
+        };
+        Self {
+            mass,
+            center,
+            inertia: parts.iter().map(|p| p.about(&center)).sum(),
+        }
     }
 
     /// xx, yy, zz, xy, xz, yz.
@@ -109,18 +124,8 @@ pub(super) fn of_group(group: &Group, of: impl Fn(usize) -> Inertial) -> Inertia
         .map(|part| of(part.link).moved(&part.at))
         .collect();
     // One link alone is as the file gives it, to the bit.
-    if let [one] = parts[..] {
-        return one;
-    }
-    let mass: f64 = parts.iter().map(|p| p.mass).sum();
-    let first: Vector3<f64> = parts.iter().map(|p| p.mass * p.center).sum();
-    let center = match mass > 0.0 {
-        true => first / mass,
-        false => Vector3::zeros(),
-    };
-    Inertial {
-        mass,
-        center,
-        inertia: parts.iter().map(|p| p.about(&center)).sum(),
+    match parts[..] {
+        [one] => one,
+        _ => Inertial::together(&parts),
     }
 }

@@ -37,6 +37,11 @@ pub(crate) struct Dynamics {
     pub damping: f64,
     /// Coulomb's, N or N m.
     pub friction: f64,
+    /// N/m or N m/rad, and the coordinate at which it doesn't push.
+    pub stiffness: f64,
+    pub rest: f64,
+    /// kg or kg m².
+    pub armature: f64,
 }
 
 /// How a joint follows another.
@@ -177,9 +182,14 @@ fn dynamics(file: &File, number: usize) -> Result<Dynamics> {
             ));
         }
     }
+    let joint = &file.robot.joints[number].name;
+    let extra = file.extras.get(joint).copied().unwrap_or_default();
     Ok(Dynamics {
         damping: given.damping,
         friction: given.friction,
+        stiffness: extra.stiffness,
+        rest: extra.rest,
+        armature: extra.armature,
     })
 }
 

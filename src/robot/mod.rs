@@ -1,4 +1,4 @@
-//! Robots in URDF files as bodies: links at fixed joints fold into what carries them, geometry becomes closed surfaces, and what was chosen, replaced or not used is
+//! Robots in URDF and MJCF files as bodies: links at fixed joints fold into what carries them, geometry becomes closed surfaces, and what was chosen, replaced or not used is
 //! reported.
 //!
 //! What a scene makes of it is in `scene::robot`.
@@ -8,6 +8,8 @@ mod followers;
 mod hull;
 mod inertia;
 mod joints;
+mod mjcf;
+mod mjcf_geometry;
 mod options;
 mod overlap;
 mod paths;

@@ -153,12 +153,18 @@ impl<'f> Meshes<'f> {
             Geometry::Capsule { radius, length } if *length == 0.0 => Shape::sphere(*radius),
             Geometry::Capsule { radius, length } => Shape::capsule(*radius, *length),
             Geometry::Sphere { radius } => Shape::sphere(*radius),
+            Geometry::Mesh { filename, .. } if self.file.shapes.contains_key(filename) => {
+                self.file.shapes[filename].clone()
+            }
             Geometry::Mesh { filename, scale } => {
                 let scale = scale.map_or([1.0; 3], |s| *s);
                 return self.mesh(filename, scale, link).map(Form::Mesh);
             }
         };
-        validate(&shape, &link_place(self.file, link))?;
+        let place = link_place(self.file, link);
+        validate(&shape, &place)?;
+        // What no mesh can be of, as it is too thin, is an error of the file.
+        build(&shape, Path::new(""), Some(FACES)).map_err(|e| e.of(&place))?;
         Ok(Form::Primitive(shape))
     }
 

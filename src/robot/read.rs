@@ -1,20 +1,22 @@
-//! The file: its text as XML, what of it is read, and its typed form.
+//! The file: its text as XML, what of it is read, and its typed form, which for MJCF is that of URDF as well ([`mjcf`]).
 //!
 //! `urdf-rs` gives the typed form. It passes over what it doesn't know and says neither where an error is nor what was left out, so the text
 //! is first looked through as XML: what can't be is refused there with line and name, and what isn't used is listed.
 
+use super::mjcf;
 use super::report::Unused;
+use crate::shape::Shape;
 use crate::{Error, Result};
 use roxmltree::{Document, Node};
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, HashMap};
 use std::io;
 use std::panic::{AssertUnwindSafe, catch_unwind};
 use std::path::{Path, PathBuf};
 
-/// Deepest nesting of elements; URDF needs six.
-const DEEPEST: usize = 32;
+/// Deepest nesting of elements; URDF needs six, MJCF one a body in a chain.
+const DEEPEST: usize = 128;
 /// Largest number that is taken: squares and products of such stay finite.
-const LARGEST: f64 = 1e30;
+pub(super) const LARGEST: f64 = 1e30;
 
 /// A URDF file.
 pub(super) struct File {
@@ -24,11 +26,28 @@ pub(super) struct File {
     pub joints: Vec<JointText>,
     /// What isn't read.
     pub unused: Vec<Unused>,
+    /// What joints have beside what URDF says of them, by name.
+    pub extras: HashMap<String, Extra>,
+    /// Shapes that URDF lacks, by the name that stands in a mesh's place.
+    pub shapes: HashMap<String, Shape>,
+    /// What is to be told.
+    pub notes: Vec<String>,
+}
+
+/// What drives and springs add to a joint.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub(super) struct Extra {
+    /// N/m or N m/rad.
+    pub stiffness: f64,
+    /// Coordinate at which the spring doesn't push.
+    pub rest: f64,
+    /// kg or kg m².
+    pub armature: f64,
 }
 
 /// What stands at a joint.
 pub(super) struct JointText {
-    pub line: u32,
+    pub line: Option<u32>,
     /// Whether its `<limit>` gives a range.
     pub has_range: bool,
     /// Whether it has a `<limit>`.
@@ -58,7 +77,7 @@ pub(super) fn read(path: &Path) -> Result<File> {
     parse(path, &text)
 }
 
-fn parse_error(path: &Path, message: impl Into<String>) -> Error {
+pub(super) fn parse_error(path: &Path, message: impl Into<String>) -> Error {
     Error::Parse {
         path: path.to_owned(),
         message: message.into(),
@@ -68,6 +87,10 @@ fn parse_error(path: &Path, message: impl Into<String>) -> Error {
 fn parse(path: &Path, text: &str) -> Result<File> {
     let document = Document::parse(text)
         .map_err(|e| parse_error(path, format!("{e}; this is not XML yet")))?;
+    check_depth(path, &document)?;
+    if document.root_element().tag_name().name() == "mujoco" {
+        return mjcf::parse(path, &document);
+    }
     let mut look = Look {
         path,
         document: &document,
@@ -78,7 +101,7 @@ fn parse(path: &Path, text: &str) -> Result<File> {
         let limit = elements(&joint, "limit").next();
         let gives = |name: &str| limit.is_some_and(|l| l.has_attribute(name));
         JointText {
-            line: look.line(&joint),
+            line: Some(look.line(&joint)),
             has_range: gives("lower") || gives("upper"),
             has_limit: limit.is_some(),
         }
@@ -107,7 +130,26 @@ fn parse(path: &Path, text: &str) -> Result<File> {
         unused: unused
             .map(|(what, (count, line))| Unused { what, count, line })
             .collect(),
+        extras: HashMap::new(),
+        shapes: HashMap::new(),
+        notes: Vec::new(),
     })
+}
+
+/// Refuses elements within elements without end.
+fn check_depth(path: &Path, document: &Document) -> Result<()> {
+    let mut open = vec![(document.root_element(), 1)];
+    while let Some((node, level)) = open.pop() {
+        if level > DEEPEST {
+            let line = document.text_pos_at(node.range().start).row;
+            let name = node.tag_name().name();
+            let message = format!("line {line}: <{name}>: elements are nested over {DEEPEST} deep");
+            return Err(parse_error(path, message));
+        }
+        let inner = node.children().filter(Node::is_element);
+        open.extend(inner.map(|child| (child, level + 1)));
+    }
+    Ok(())
 }
 
 fn elements<'a, 'd>(
@@ -232,21 +274,11 @@ impl Look<'_, '_> {
         let instead = match root.tag_name().name() {
             "robot" => None,
             "sdf" | "model" => Some("this is SDF, which isn't read: convert it to URDF"),
-            "mujoco" => Some("this is MJCF, which isn't read: convert it to URDF"),
             _ => Some("give a URDF file, whose outermost element is <robot>"),
         };
         if let Some(instead) = instead {
             let what = format!("<{}>: {instead}", root.tag_name().name());
             return Err(self.wrong(&root, what));
-        }
-        let mut depth = vec![(root, 1)];
-        while let Some((node, level)) = depth.pop() {
-            if level > DEEPEST {
-                let what = format!("elements are nested {level} deep; URDF needs no more than 6");
-                return Err(self.wrong(&node, what));
-            }
-            let inner = node.children().filter(Node::is_element);
-            depth.extend(inner.map(|child| (child, level + 1)));
         }
         let macros = root.descendants().find(|node| {
             let namespace = node.tag_name().namespace().unwrap_or_default();

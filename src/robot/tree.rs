@@ -40,10 +40,26 @@ pub(super) fn placed(pose: &Pose) -> Isometry3<f64> {
     Isometry3::from_parts(Translation3::from(*pose.xyz), turn)
 }
 
+/// The pose that [`placed`] makes this of.
+pub(super) fn unplaced(at: &Isometry3<f64>) -> Pose {
+    let r = at.rotation.to_rotation_matrix();
+    // Where the pitch is a right angle, roll and yaw turn about one axis: yaw makes up for what roll took.
+    let roll = r[(2, 1)].atan2(r[(2, 2)]);
+    let (sine, cosine) = roll.sin_cos();
+    let yaw = (sine * r[(0, 2)] - cosine * r[(0, 1)]).atan2(cosine * r[(1, 1)] - sine * r[(1, 2)]);
+    let pitch = (-r[(2, 0)]).atan2(r[(0, 0)].hypot(r[(1, 0)]));
+    Pose {
+        xyz: urdf_rs::Vec3(at.translation.vector.into()),
+        rpy: urdf_rs::Vec3([roll, pitch, yaw]),
+    }
+}
+
 /// The message's beginning for a joint.
 pub(super) fn joint_place(file: &File, joint: usize) -> String {
-    let (name, line) = (&file.robot.joints[joint].name, file.joints[joint].line);
-    format!("{}, line {line}: joint {name:?}", file.path.display())
+    let name = &file.robot.joints[joint].name;
+    let line = file.joints[joint].line;
+    let line = line.map_or(String::new(), |line| format!(", line {line}"));
+    format!("{}{line}: joint {name:?}", file.path.display())
 }
 
 /// The message's beginning for a link.

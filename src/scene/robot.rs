@@ -64,7 +64,7 @@ impl RobotLink {
     }
 }
 
-/// A robot in a URDF file: `[[robot]]` of a scene file, which reading it turns into bodies and sites.
+/// A robot in a URDF or MJCF file: `[[robot]]` of a scene file, which reading it turns into bodies and sites.
 ///
 /// Links at fixed joints fold into what carries them and are sites of their names; other links are bodies of their names.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
@@ -222,10 +222,14 @@ fn placement(at: &Isometry3<f64>) -> Placement {
     )
 }
 
-/// Damping and friction of `<dynamics>`.
+/// What the file says of a joint's own resistance.
 fn passive(dynamics: &crate::robot::Dynamics) -> Option<Passive> {
     let made = Passive::default().damping(dynamics.damping);
-    let made = made.friction(dynamics.friction);
+    let made = made.friction(dynamics.friction).armature(dynamics.armature);
+    let made = match dynamics.stiffness > 0.0 {
+        true => made.stiffness(dynamics.stiffness).rest(dynamics.rest),
+        false => made,
+    };
     (made != Passive::default()).then_some(made)
 }
 
@@ -242,7 +246,7 @@ impl Scene {
         Ok(scene)
     }
 
-    /// Adds the robot of a URDF file: a body for each link that moves, a site for each that doesn't.
+    /// Adds the robot of a URDF or MJCF file: a body for each link that moves, a site for each that doesn't.
     ///
     /// # Errors
     /// [`Error::File`] and [`Error::Parse`] of a file that can't be read, and otherwise [`Error::Input`], with the link or joint: a tree that has loops or several roots, a

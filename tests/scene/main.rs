@@ -4,6 +4,8 @@ mod api_input;
 mod examples;
 mod input;
 #[cfg(feature = "urdf")]
+mod mjcf;
+#[cfg(feature = "urdf")]
 mod robots;
 mod tradeoff;
 mod validate;

@@ -1,0 +1,546 @@
+//! Robots in MJCF files, as what a URDF file would say of them.
+//!
+//! The tree of bodies becomes links and joints under a massless link `world`; a body with several joints a chain of massless links, and sites links at fixed joints. As a link's frame is
+//! its joint's, that of a body whose joint isn't at its origin is at the joint. `mjcf-rs` reads the file: includes, defaults, angles and frames are resolved there.
+
+use super::inertia::Inertial;
+use super::mjcf_geometry::{Geometries, mass_properties};
+use super::read::{Extra, File, JointText, LARGEST, parse_error};
+use super::report::Unused;
+use super::tree::unplaced;
+use crate::{Error, Result};
+use mjcf_rs::body::{Body, InertiaSpec, Inertial as Given, Joint, JointType};
+use mjcf_rs::compiler::InertiaFromGeom;
+use mjcf_rs::equality::Equality;
+use mjcf_rs::{BodyId, Model};
+use nalgebra::{Isometry3, Matrix3, Quaternion, Translation3, UnitQuaternion, Vector3};
+use roxmltree::Document;
+use std::collections::{BTreeMap, HashMap, HashSet};
+use std::panic::{AssertUnwindSafe, catch_unwind};
+use std::path::Path;
+
+/// Sections that are read, and their elements that are.
+const READ: [&str; 6] = [
+    "compiler",
+    "default",
+    "asset",
+    "worldbody",
+    "include",
+    "option",
+];
+/// Elements of bodies that are.
+const OF_BODIES: [&str; 9] = [
+    "body",
+    "inertial",
+    "joint",
+    "freejoint",
+    "geom",
+    "site",
+    "frame",
+    "replicate",
+    "attach",
+];
+
+/// A file whose outermost element is `mujoco`.
+pub(super) fn parse(path: &Path, document: &Document) -> Result<File> {
+    let model = catch_unwind(AssertUnwindSafe(|| Model::from_file(path)));
+    let model = match model {
+        Ok(Ok(model)) => model,
+        Ok(Err(error)) => {
+            let message = format!("{error}; this is not an MJCF file yet");
+            return Err(parse_error(path, message));
+        }
+        Err(_) => {
+            let message = "the contents can't be understood; export it again";
+            return Err(parse_error(path, message));
+        }
+    };
+    let mut made = Made {
+        path,
+        model: &model,
+        file: File {
+            path: path.to_owned(),
+            robot: urdf_rs::Robot {
+                name: model.name.clone().unwrap_or_else(|| "robot".into()),
+                version: None,
+                links: Vec::new(),
+                joints: Vec::new(),
+                materials: Vec::new(),
+            },
+            joints: Vec::new(),
+            unused: Vec::new(),
+            extras: HashMap::new(),
+            shapes: HashMap::new(),
+            notes: Vec::new(),
+        },
+        taken: HashSet::new(),
+        frames: Vec::new(),
+    };
+    made.world()?;
+    for (id, _) in model.bodies_iter() {
+        made.body(id)?;
+    }
+    made.equalities();
+    made.total_mass();
+    made.file.unused.extend(unused(document));
+    Ok(made.file)
+}
+
+struct Made<'m> {
+    path: &'m Path,
+    model: &'m Model,
+    file: File,
+    /// Names of links.
+    taken: HashSet<String>,
+    /// Of each body, its link's name and the body's frame in the link's.
+    frames: Vec<(String, Isometry3<f64>)>,
+}
+
+/// A pose of theirs.
+pub(super) fn isometry(pose: &mjcf_rs::Pose) -> Isometry3<f64> {
+    let (p, q) = (pose.translation, pose.rotation);
+    let turn = UnitQuaternion::from_quaternion(Quaternion::new(q.w, q.x, q.y, q.z));
+    Isometry3::from_parts(Translation3::new(p.x, p.y, p.z), turn)
+}
+
+fn link(name: &str) -> urdf_rs::Link {
+    urdf_rs::Link {
+        name: name.into(),
+        inertial: urdf_rs::Inertial::default(),
+        visual: Vec::new(),
+        collision: Vec::new(),
+    }
+}
+
+impl Made<'_> {
+    fn wrong(&self, of: &str, value: impl std::fmt::Display, remedy: &str) -> Error {
+        Error::input(format!("{}: {of}", self.path.display()), value, remedy)
+    }
+
+    /// Refuses numbers that nothing here has.
+    fn check(&self, of: &str, what: &str, numbers: &[f64]) -> Result<()> {
+        match numbers.iter().find(|x| x.is_nan() || x.abs() > LARGEST) {
+            Some(bad) => Err(self.wrong(&format!("{of}: {what}"), bad, "give finite numbers")),
+            None => Ok(()),
+        }
+    }
+
+    fn checked(&self, of: &str, pose: &mjcf_rs::Pose) -> Result<Isometry3<f64>> {
+        let (p, q) = (pose.translation, pose.rotation);
+        self.check(of, "pose", &[p.x, p.y, p.z, q.x, q.y, q.z, q.w])?;
+        let out = isometry(pose);
+        match (out.rotation.norm() - 1.0).abs() < 1e-6 {
+            true => Ok(out),
+            false => Err(self.wrong(
+                &format!("{of}: pose"),
+                format!("{:?}", out.rotation.coords.as_slice()),
+                "a rotation's quaternion or axis can't be zero",
+            )),
+        }
+    }
+
+    /// A name that no link has yet.
+    fn name(&mut self, given: Option<&str>, or: String) -> Result<String> {
+        let name = given.map_or(or, String::from);
+        match self.taken.insert(name.clone()) {
+            true => Ok(name),
+            false => {
+                let what = format!("body {name:?}");
+                Err(self.wrong(&what, "two of this name", "give each body and site its own"))
+            }
+        }
+    }
+
+    /// A joint from one link to another.
+    fn join(
+        &mut self,
+        name: String,
+        joint_type: urdf_rs::JointType,
+        [parent, child]: [&str; 2],
+        origin: &Isometry3<f64>,
+    ) -> &mut urdf_rs::Joint {
+        let named = |name: &str| urdf_rs::LinkName { link: name.into() };
+        self.file.robot.joints.push(urdf_rs::Joint {
+            name,
+            joint_type,
+            origin: unplaced(origin),
+            parent: named(parent),
+            child: named(child),
+            axis: urdf_rs::Axis::default(),
+            limit: urdf_rs::JointLimit::default(),
+            calibration: None,
+            dynamics: None,
+            mimic: None,
+            safety_controller: None,
+        });
+        self.file.joints.push(JointText {
+            line: None,
+            has_range: false,
+            has_limit: false,
+        });
+        let last = self.file.robot.joints.len() - 1;
+        &mut self.file.robot.joints[last]
+    }
+
+    fn world(&mut self) -> Result<()> {
+        let name = self.name(None, "world".into())?;
+        self.file.robot.links.push(link(&name));
+        self.frames.push((name, Isometry3::identity()));
+        let world = &self.model.bodies[0].body;
+        if !world.geoms.is_empty() {
+            self.file.notes.push(format!(
+                "{} <geom> of the world aren't read: give the scene walls and fixed bodies",
+                world.geoms.len()
+            ));
+        }
+        Ok(())
+    }
+
+    fn body(&mut self, id: BodyId) -> Result<()> {
+        let entry = &self.model.bodies[id];
+        let body = &entry.body;
+        let name = self.name(body.name.as_deref(), format!("body {id}"))?;
+        let of = format!("body {name:?}");
+        let above = entry.parent.filter(|p| *p < self.frames.len()).unwrap_or(0);
+        let (mut parent, at_parent) = self.frames[above].clone();
+        let mut at = at_parent * self.checked(&of, &body.pose)?;
+        if body.gravcomp != 0.0 || body.mocap {
+            let what = if body.mocap { "mocap" } else { "gravcomp" };
+            self.file.notes.push(format!("{of}: {what} isn't read"));
+        }
+        // Where the body's frame is in the link of the last joint.
+        let mut own = Isometry3::identity();
+        let count = body.joints.len();
+        for (k, joint) in body.joints.iter().enumerate() {
+            let last = k + 1 == count;
+            let child = match last {
+                true => name.clone(),
+                false => self.name(None, format!("{name} (joint {})", k + 1))?,
+            };
+            let anchor = Isometry3::translation(joint.pos[0], joint.pos[1], joint.pos[2]);
+            self.joint(joint, &of, k, [&parent, &child], &(at * anchor))?;
+            at = anchor.inverse();
+            own = at;
+            if !last {
+                self.file.robot.links.push(link(&child));
+                parent = child;
+            }
+        }
+        if count == 0 {
+            let joint = format!("{name} (fixed)");
+            self.join(joint, urdf_rs::JointType::Fixed, [&parent, &name], &at);
+        } else if own != Isometry3::identity() {
+            self.file.notes.push(format!(
+                "{of}: its frame is at its joint, {:?} m from where the file has it",
+                body.joints[count - 1].pos
+            ));
+        }
+        let mut made = link(&name);
+        self.fill(&mut made, body, &of, &own)?;
+        self.file.robot.links.push(made);
+        for (k, site) in body.sites.iter().enumerate() {
+            let site_name = self.name(site.name.as_deref(), format!("{name} site {}", k + 1))?;
+            let pose = own * self.checked(&format!("site {site_name:?}"), &site.pose)?;
+            self.file.robot.links.push(link(&site_name));
+            let joint = format!("{site_name} (fixed)");
+            self.join(joint, urdf_rs::JointType::Fixed, [&name, &site_name], &pose);
+        }
+        self.frames.push((name, own));
+        Ok(())
+    }
+
+    fn joint(
+        &mut self,
+        given: &Joint,
+        of: &str,
+        number: usize,
+        links: [&str; 2],
+        origin: &Isometry3<f64>,
+    ) -> Result<()> {
+        let name =
+            (given.name.clone()).unwrap_or_else(|| format!("{} joint {}", links[1], number + 1));
+        let place = format!("joint {name:?}");
+        let numbers = [
+            given.stiffness,
+            given.springref,
+            given.damping,
+            given.armature,
+            given.frictionloss,
+            given.ref_,
+        ];
+        self.check(&place, "its numbers", &numbers)?;
+        self.check(&place, "pos and axis", &[given.pos, given.axis].concat())?;
+        for (field, value) in [("stiffness", given.stiffness), ("armature", given.armature)] {
+            if value < 0.0 {
+                return Err(self.wrong(&format!("{place}: {field}"), value, "give zero or more"));
+            }
+        }
+        let axis = Vector3::from(given.axis);
+        let back = match given.type_ {
+            JointType::Hinge if axis.norm() > 0.0 => {
+                Isometry3::rotation(-given.ref_ * axis.normalize())
+            }
+            JointType::Slide if axis.norm() > 0.0 => {
+                let along = -given.ref_ * axis.normalize();
+                Isometry3::from(Translation3::from(along))
+            }
+            _ => Isometry3::identity(),
+        };
+        let (kind, one) = match given.type_ {
+            JointType::Hinge => (urdf_rs::JointType::Revolute, true),
+            JointType::Slide => (urdf_rs::JointType::Prismatic, true),
+            JointType::Ball => (urdf_rs::JointType::Spherical, false),
+            JointType::Free => (urdf_rs::JointType::Floating, false),
+        };
+        let limited = given
+            .limited
+            .resolve(self.model.compiler.autolimits, given.range.is_some());
+        let range = given.range.filter(|_| limited && one);
+        let passive = given.stiffness != 0.0
+            || given.damping != 0.0
+            || given.frictionloss != 0.0
+            || given.armature != 0.0;
+        if passive && !one {
+            self.file.notes.push(format!(
+                "{of}: springs, damping, friction and armature of its ball or free joint aren't read"
+            ));
+        }
+        if given.springdamper.is_some() {
+            self.file
+                .notes
+                .push(format!("{place}: springdamper isn't read"));
+        }
+        let joint = self.join(name.clone(), kind, links, &(origin * back));
+        joint.axis.xyz = urdf_rs::Vec3(given.axis);
+        if one {
+            joint.dynamics = Some(urdf_rs::Dynamics {
+                damping: given.damping,
+                friction: given.frictionloss,
+            });
+        }
+        if let Some([lower, upper]) = range {
+            (joint.limit.lower, joint.limit.upper) = (lower, upper);
+        }
+        if range.is_none() && one && given.type_ == JointType::Hinge {
+            joint.joint_type = urdf_rs::JointType::Continuous;
+        }
+        if let Some(text) = self.file.joints.last_mut() {
+            // A slide without a range is no mistake here.
+            (text.has_range, text.has_limit) = (true, true);
+        }
+        if range.is_none() && given.type_ == JointType::Slide {
+            let limit = &mut self.join_last().limit;
+            (limit.lower, limit.upper) = (f64::NEG_INFINITY, f64::INFINITY);
+        }
+        if one {
+            let extra = Extra {
+                stiffness: given.stiffness,
+                rest: given.springref,
+                armature: given.armature,
+            };
+            self.file.extras.insert(name, extra);
+        }
+        Ok(())
+    }
+
+    fn join_last(&mut self) -> &mut urdf_rs::Joint {
+        let last = self.file.robot.joints.len() - 1;
+        &mut self.file.robot.joints[last]
+    }
+
+    /// Mass and geometry of a body; `own` is its frame in the link's.
+    fn fill(
+        &mut self,
+        link: &mut urdf_rs::Link,
+        body: &Body,
+        of: &str,
+        own: &Isometry3<f64>,
+    ) -> Result<()> {
+        let geometries = Geometries::new(self.path, self.model, of);
+        for geom in &body.geoms {
+            self.check(of, "size of a geom", &geom.size)?;
+            if let Some(ends) = &geom.fromto {
+                self.check(of, "fromto of a geom", ends)?;
+            }
+            let pose = self.checked(&format!("{of}: geom"), &geom.pose)?;
+            match geometries.read(geom, &pose)? {
+                Ok((geometry, shape, at)) => {
+                    if let Some(shape) = shape {
+                        let urdf_rs::Geometry::Mesh { filename, .. } = &geometry else {
+                            continue;
+                        };
+                        self.file.shapes.insert(filename.clone(), shape);
+                    }
+                    let origin = unplaced(&(own * at));
+                    let touches = geom.contype != 0 || geom.conaffinity != 0;
+                    match touches {
+                        true => link.collision.push(urdf_rs::Collision {
+                            name: geom.name.clone(),
+                            origin,
+                            geometry,
+                        }),
+                        false => link.visual.push(urdf_rs::Visual {
+                            name: geom.name.clone(),
+                            origin,
+                            geometry,
+                            material: None,
+                        }),
+                    }
+                }
+                Err(why) => self.file.notes.push(format!("{of}: {why}")),
+            }
+        }
+        let from_geoms = match (self.model.compiler.inertia_from_geom, &body.inertial) {
+            (InertiaFromGeom::True, _) | (InertiaFromGeom::Auto, None) => true,
+            (InertiaFromGeom::False, _) | (InertiaFromGeom::Auto, Some(_)) => false,
+        };
+        let found = match (&body.inertial, from_geoms) {
+            (Some(given), false) => Some(self.inertial(of, given)?),
+            (_, true) => mass_properties(&geometries, body, self.model.compiler.inertia_density)?,
+            (None, false) => None,
+        };
+        if let Some(found) = found {
+            let compiler = &self.model.compiler;
+            // Bounds of zero are none: what is negative is refused.
+            let least = |x: f64, bound: f64| if bound > 0.0 { x.max(bound) } else { x };
+            let mass = least(found.mass, compiler.bound_mass);
+            let moment = |k: usize| least(found.inertia[(k, k)], compiler.bound_inertia);
+            let at = own * Isometry3::from(Translation3::from(found.center));
+            let i = found.inertia;
+            link.inertial = urdf_rs::Inertial {
+                origin: unplaced(&at),
+                mass: urdf_rs::Mass { value: mass },
+                inertia: urdf_rs::Inertia {
+                    ixx: moment(0),
+                    iyy: moment(1),
+                    izz: moment(2),
+                    ixy: i[(0, 1)],
+                    ixz: i[(0, 2)],
+                    iyz: i[(1, 2)],
+                },
+            };
+        }
+        Ok(())
+    }
+
+    /// As given, in the body's axes.
+    fn inertial(&self, of: &str, given: &Given) -> Result<Inertial> {
+        let at = self.checked(&format!("{of}: inertial"), &given.pose)?;
+        let six = match given.inertia {
+            InertiaSpec::Diagonal([x, y, z]) => [x, y, z, 0.0, 0.0, 0.0],
+            InertiaSpec::Full(six) => six,
+        };
+        self.check(of, "mass", &[given.mass])?;
+        if given.mass < 0.0 {
+            let remedy = "give zero (a massless link) or more, in kg";
+            return Err(self.wrong(&format!("{of}: mass"), given.mass, remedy));
+        }
+        self.check(of, "inertia", &six)?;
+        let [xx, yy, zz, xy, xz, yz] = six;
+        let inertia = Matrix3::new(xx, xy, xz, xy, yy, yz, xz, yz, zz);
+        let turn = at.rotation.to_rotation_matrix();
+        Ok(Inertial {
+            mass: given.mass,
+            center: at.translation.vector,
+            inertia: turn * inertia * turn.inverse(),
+        })
+    }
+
+    /// Joints that follow others, and what isn't read.
+    fn equalities(&mut self) {
+        for equality in &self.model.equality {
+            let what = match equality {
+                Equality::Connect(_) => "connect",
+                Equality::Weld(_) => "weld",
+                Equality::Tendon(_) => "tendon",
+                Equality::Joint(joint) => {
+                    let curve = joint.polycoef;
+                    let straight = curve[2..].iter().all(|c| *c == 0.0);
+                    let named =
+                        |name: &str| self.file.robot.joints.iter().position(|j| j.name == name);
+                    let follower = named(&joint.joint1);
+                    let leader = joint.joint2.as_deref().filter(|name| named(name).is_some());
+                    match (follower, leader, straight) {
+                        (Some(follower), Some(leader), true) => {
+                            // y − y₀ = a₀ + a₁ (x − x₀), y that of the first joint.
+                            let zero = |name: &str| {
+                                let found = self.model.joint_by_name(name);
+                                found.map_or(0.0, |(b, j)| self.model.bodies[b].body.joints[j].ref_)
+                            };
+                            let offset = zero(&joint.joint1) + curve[0] - curve[1] * zero(leader);
+                            self.file.robot.joints[follower].mimic = Some(urdf_rs::Mimic {
+                                joint: leader.into(),
+                                multiplier: Some(curve[1]),
+                                offset: Some(offset),
+                            });
+                            continue;
+                        }
+                        _ => "joint, but one that follows another in a straight line",
+                    }
+                }
+            };
+            let note = format!("an <equality> of the kind {what} isn't read");
+            if !self.file.notes.contains(&note) {
+                self.file.notes.push(note);
+            }
+        }
+    }
+
+    /// Masses in the ratio that makes their sum what is asked for.
+    fn total_mass(&mut self) {
+        let asked = self.model.compiler.set_total_mass;
+        let links = &mut self.file.robot.links;
+        let sum: f64 = links.iter().map(|l| l.inertial.mass.value).sum();
+        if !(asked > 0.0 && sum > 0.0) {
+            return;
+        }
+        let factor = asked / sum;
+        for link in links {
+            link.inertial.mass.value *= factor;
+            let all = &mut link.inertial.inertia;
+            for x in [
+                &mut all.ixx,
+                &mut all.iyy,
+                &mut all.izz,
+                &mut all.ixy,
+                &mut all.ixz,
+                &mut all.iyz,
+            ] {
+                *x *= factor;
+            }
+        }
+    }
+}
+
+/// Elements that aren't read, and where the first stands.
+fn unused(document: &Document) -> Vec<Unused> {
+    let mut found: BTreeMap<String, (usize, u32)> = BTreeMap::new();
+    let mut note = |what: String, node: &roxmltree::Node| {
+        let line = document.text_pos_at(node.range().start).row;
+        found.entry(what).or_insert((0, line)).0 += 1;
+    };
+    for section in document
+        .root_element()
+        .children()
+        .filter(|n| n.is_element())
+    {
+        let name = section.tag_name().name();
+        if name == "worldbody" {
+            for node in section.descendants().skip(1).filter(|n| n.is_element()) {
+                let tag = node.tag_name().name();
+                if !OF_BODIES.contains(&tag) {
+                    note(format!("<{tag}> of bodies"), &node);
+                }
+            }
+        } else if name == "equality" {
+            continue;
+        } else if !READ.contains(&name) {
+            for node in section.children().filter(|n| n.is_element()) {
+                note(format!("<{}> of <{name}>", node.tag_name().name()), &node);
+            }
+        }
+    }
+    let each = found.into_iter();
+    each.map(|(what, (count, line))| Unused { what, count, line })
+        .collect()
+}

@@ -1,9 +1,16 @@
 //! One error type: every variant names the place, the value and what would be right.
 
+use rayon::iter::ParallelIterator;
 use std::path::PathBuf;
 
 /// Result of every fallible call of this crate.
 pub type Result<T> = std::result::Result<T, Error>;
+
+/// All results of work spread over threads, or the first error in their order, whichever thread came first.
+pub(crate) fn in_order<T: Send>(each: impl ParallelIterator<Item = Result<T>>) -> Result<Vec<T>> {
+    let all: Vec<Result<T>> = each.collect();
+    all.into_iter().collect()
+}
 
 /// What went wrong, where, with which number, and what to do about it.
 #[derive(Debug, thiserror::Error)]

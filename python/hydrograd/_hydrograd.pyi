@@ -494,6 +494,16 @@ class Scene:
     @overload
     def add_force(
         self,
+        kind: Literal["current"],
+        *,
+        velocity: ArrayLike,
+        profile: ArrayLike = (),
+        over_time: Motion | None = None,
+        name: str | None = None,
+    ) -> None: ...
+    @overload
+    def add_force(
+        self,
         kind: Literal["float"],
         *,
         body: str,
@@ -632,10 +642,11 @@ class Simulator:
     def difference(self, start: ArrayLike, end: ArrayLike) -> _Array:
         """The tangents (…, v_size) by which `integrate` gets from the configurations `start` (…, q_size) to `end`; of rotations the shorter way."""
     def linearise(
-        self, q: ArrayLike | None = None, v: ArrayLike | None = None, u: ArrayLike | None = None
+        self, q: ArrayLike | None = None, v: ArrayLike | None = None, u: ArrayLike | None = None, *, step: int = 0
     ) -> tuple[_Array, _Array]:
         """The linearisation x₁ ≈ A x₀ + B u of one step in x = (q, v), coordinates in their tangent space, from the states `q` (…, q_size), `v` (…, v_size) and controls
-        `u` (…, control_size): A (…, 2 v_size, 2 v_size) and B (…, 2 v_size, control_size), on all cores. What is None is where the simulator starts, and no control."""
+        `u` (…, control_size): A (…, 2 v_size, 2 v_size) and B (…, 2 v_size, control_size), on all cores. What is None is where the simulator starts, and no control.
+        `step` is the number of the step, and so the time, of motions and currents."""
     def gradcheck(self, steps: int | None = None, *, directions: int = 4, seed: int = 0) -> dict[str, Any]:
         """Holds the gradient of a rollout of `steps` steps (the scene's number by default) against central differences, along so many random `directions` in each group (controls,
         initial state, parameters, gains), and says by how much the trajectory magnifies small changes. A dictionary: "max_rel_error", the largest over all directions of the smallest
@@ -799,7 +810,7 @@ class Loads:
     the wrench across its own joint and the opposite ones of what it carries, they are the rate of a body's own momentum."""
     @property
     def kinds(self) -> list[str]:
-        """What acts: the scene's forces as they are called ("gravity", "buoyancy", "linear drag", …), "water" (added mass), "contact"."""
+        """What acts: the scene's forces as they are called ("gravity", "buoyancy", "linear drag", …), "water" (added mass; with "isolated" none on bodies that can't move), "contact"."""
     def wrenches(self, kind: str) -> _Array:
         """What one kind does to each body (bodies, 6)."""
     @property
@@ -1157,6 +1168,10 @@ class Unknown:
         within: tuple[float, float] | None = None,
         positive: bool = False,
     ) -> Unknown: ...
+    @staticmethod
+    def inertia(body: str) -> list[Unknown]:
+        """The inertia of a body about its centre of mass, as six unknowns that make a physical one whatever they are: entries xx, yy, zz (by their logarithms), xy, xz, yz of the upper
+        triangular root L (√kg m) of its second moments of mass, I = tr(L Lᵀ) 1 - L Lᵀ, by the names "BODY.inertia.root.xx" and so on."""
     @property
     def name(self) -> str:
         """Its name."""

@@ -270,6 +270,8 @@ class Identified:
 
     unknowns: list[Fitted]
     """The unknowns, in order."""
+    inertias: dict[str, float]
+    """Inertias whose roots were unknown (`Unknown.inertia`), as parameters, in the first experiment."""
     correlations: NDArray[np.float64]
     """Correlations of their errors, (n, n)."""
     starts: list[tuple[NDArray[np.float64], NDArray[np.float64]]]
@@ -303,7 +305,7 @@ class Identified:
     @property
     def parameters(self) -> dict[str, float]:
         """Parameters that the unknowns set, for `Simulator.with_parameters`; an experiment's own scales aren't in them."""
-        return {name: factor * u.value for u in self.unknowns for name, factor in u.sets.items()}
+        return {name: factor * u.value for u in self.unknowns for name, factor in u.sets.items()} | self.inertias
 
 
 def _identified(text: str) -> Identified:
@@ -319,6 +321,7 @@ def _identified(text: str) -> Identified:
     for w in found["weak"]:
         w["deviation"] = or_infinite(w["deviation"])
         w["profile"] = [Profile(**p) for p in w["profile"]]
+    found["inertias"] = dict(found["inertias"])
     found["unknowns"] = [Fitted(**u) for u in found["unknowns"]]
     found["series"] = [SeriesFit(**s) for s in found["series"]]
     found["weak"] = [WeakDirection(**w) for w in found["weak"]]

@@ -1,7 +1,7 @@
 //! The equations of motion at configurations, one or many.
 
 use crate::array::{Rows, fixed, rows, to_python};
-use crate::error::{OrRaise, input};
+use crate::error::{OrRaise, in_order, input};
 use crate::interrupt::long;
 use crate::simulator::Simulator;
 use hydrograd::simulate;
@@ -97,7 +97,7 @@ impl Equations {
         let time = self.time;
         let made: Vec<Vec<f64>> = long(py, move |_| {
             let one = |(i, q): (usize, &DVector<f64>)| part(&inner.equations_at(q, time)?, i);
-            q.par_iter().enumerate().map(one).collect()
+            in_order(q.par_iter().enumerate().map(one))
         })?;
         let lead: &[usize] = match self.q.is_many {
             true => &[made.len()],
@@ -392,6 +392,7 @@ impl Simulator {
         &self,
         py: Python<'py>,
         [q, v, u]: [Option<&Bound<'_, PyAny>>; 3],
+        step: usize,
     ) -> PyResult<Bound<'py, PyTuple>> {
         let (q0, v0) = self.inner.start();
         let (nv, nu) = (v0.len(), self.controls_size());
@@ -415,12 +416,12 @@ impl Simulator {
         let made: Vec<[Vec<f64>; 2]> = long(py, move |_| {
             let [q, v, u] = &parts;
             let one = |i: usize| {
-                let state = inner.state(0, q.row(i), v.row(i))?;
+                let state = inner.state(step, q.row(i), v.row(i))?;
                 let (_, record) = inner.step(&state, u.row(i))?;
                 let found = record.rollout().jacobians()?;
                 Ok([listed(&found.state), listed(&found.controls)])
             };
-            (0..count).into_par_iter().map(one).collect()
+            in_order((0..count).into_par_iter().map(one))
         })?;
         let part = |k: usize, columns: usize| {
             let values = made.iter().flat_map(|m| m[k].iter().copied()).collect();

@@ -220,3 +220,11 @@ pub fn register(m: &Bound<'_, PyModule>) -> PyResult<()> {
     }
     Ok(())
 }
+
+/// All results of work spread over threads, or the first error in their order, whichever thread came first.
+pub fn in_order<T: Send>(
+    each: impl rayon::iter::ParallelIterator<Item = hydrograd::Result<T>>,
+) -> hydrograd::Result<Vec<T>> {
+    let all: Vec<hydrograd::Result<T>> = each.collect();
+    all.into_iter().collect()
+}

@@ -58,6 +58,14 @@ impl Unknown {
         Self { inner }
     }
 
+    /// The inertia of a body about its centre of mass, as six unknowns that make a physical one whatever they are: entries xx, yy, zz (by their logarithms), xy, xz, yz of the upper
+    /// triangular root L (√kg m) of its second moments of mass, I = tr(L Lᵀ) 1 - L Lᵀ, by the names "BODY.inertia.root.xx" and so on.
+    #[staticmethod]
+    fn inertia(body: &str) -> Vec<Self> {
+        let all = optimize::Unknown::inertia(body).into_iter();
+        all.map(|inner| Self { inner }).collect()
+    }
+
     /// Its name.
     #[getter]
     fn name(&self) -> &str {

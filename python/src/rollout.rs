@@ -2,7 +2,7 @@
 
 use crate::array::{self, Dim};
 use crate::contact;
-use crate::error::{OrRaise, input};
+use crate::error::{OrRaise, in_order, input};
 use crate::gradient;
 use crate::interrupt::{Progress, ended, followed, long, short};
 use crate::loads::Loads;
@@ -18,6 +18,7 @@ use numpy::{PyArray1, PyArrayDyn};
 use pyo3::gc::{PyTraverseError, PyVisit};
 use pyo3::prelude::*;
 use pyo3::types::{PyDict, PyTuple};
+use rayon::prelude::*;
 use std::sync::Arc;
 
 /// A trajectory of states 0 … N: the forward pass, and the only key to its gradient. Each access to an array makes a new one.
@@ -252,10 +253,9 @@ impl Rollout {
     /// What an inertial measurement unit at the site of this name reads at every state (n, 6): acceleration less gravity (m/s²) and rates (rad/s), in the site's axes.
     fn imu<'py>(&self, py: Python<'py>, site: &str) -> Numbers<'py> {
         let n = self.inner.states().len();
-        let read = short(py, || {
-            (0..n)
-                .map(|k| self.inner.imu(site, k))
-                .collect::<hydrograd::Result<Vec<_>>>()
+        let (inner, site) = (self.inner.clone(), site.to_string());
+        let read = long(py, move |_| {
+            in_order((0..n).into_par_iter().map(|k| inner.imu(&site, k)))
         })?;
         let values = read.iter().flat_map(|r| [r.specific_force, r.rates]);
         let values = values.flat_map(|x| [x.x, x.y, x.z]).collect();

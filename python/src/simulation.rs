@@ -456,15 +456,17 @@ impl Simulator {
 
     /// The linearisation x₁ ≈ A x₀ + B u of one step in x = (q, v), coordinates in their tangent space, from the states `q` (…, q_size), `v` (…, v_size) and controls
     /// `u` (…, control_size): A (…, 2 v_size, 2 v_size) and B (…, 2 v_size, control_size), on all cores. What is None is where the simulator starts, and no control.
-    #[pyo3(signature = (q=None, v=None, u=None))]
+    /// `step` is the number of the step, and so the time, of motions and currents.
+    #[pyo3(signature = (q=None, v=None, u=None, *, step=0))]
     fn linearise<'py>(
         &self,
         py: Python<'py>,
         q: Option<&Bound<'_, PyAny>>,
         v: Option<&Bound<'_, PyAny>>,
         u: Option<&Bound<'_, PyAny>>,
+        step: usize,
     ) -> PyResult<Bound<'py, PyTuple>> {
-        self.linearised(py, [q, v, u])
+        self.linearised(py, [q, v, u], step)
     }
 
     /// Holds the gradient of a rollout of `steps` steps (the scene's number by default) against central differences, along so many random `directions` in each group (controls,

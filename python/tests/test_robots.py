@@ -324,7 +324,7 @@ MJCF = """<mujoco model="sampler">
 
 def test_an_mjcf_file_is_pinocchios(tmp_path):
     """M and h of a file with degrees, defaults, several joints of a body, joints away from origins, and inertia from geometry."""
-    import pinocchio as pin
+    pin = pytest.importorskip("pinocchio")
 
     path = tmp_path / "sampler.xml"
     path.write_text(MJCF)

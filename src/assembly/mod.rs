@@ -219,7 +219,7 @@ pub(crate) fn assemble(
     };
     let gravity = Vec3::from(scene.gravity);
     let mut declared = Declarations::new(scene.fluid.density, &values);
-    let points = (faces.iter().zip(&surfaces).zip(&values)).map(|((_, s), v)| {
+    let points = surfaces.iter().zip(&values).map(|(s, v)| {
         s.as_ref()
             .map_or(v.center_of_mass, |s| s.properties.centroid)
     });

@@ -16,6 +16,7 @@ use super::{Evaluation, ForceCotangents, Linearisation, Slopes};
 use crate::Result;
 use crate::adjoint::lie::{Vec6, cross_force, cross_motion};
 use crate::coupling::Direction;
+use crate::error::in_order;
 use crate::multibody::{Cotangents, Fields, Virtual};
 use nalgebra::DVector;
 use rayon::prelude::*;
@@ -128,7 +129,7 @@ impl Linearisation<'_> {
         entries: &[usize],
     ) -> Result<Slopes> {
         let row = |i: &usize| self.inertial_force_vjp(v, control, &unit(v.len(), *i));
-        let rows = entries.par_iter().map(row).collect::<Result<Vec<_>>>()?;
+        let rows = in_order(entries.par_iter().map(row))?;
         let zero = ForceCotangents::zeros(self);
         Ok(Slopes::from_rows(v.len(), entries, &rows, &zero))
     }

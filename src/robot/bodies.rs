@@ -1,12 +1,13 @@
 //! From a file to bodies.
 
+use super::file::File;
 use super::followers::follow;
 use super::inertia::{Inertial, of_group, of_link};
 use super::joints::{Moves, moves};
 use super::options::{Base, Followers, Options};
 use super::overlap::{declare, untangle};
 use super::pieces::Meshes;
-use super::read::{File, read};
+use super::read::read;
 use super::report::{BodyReport, FoldedReport, Report};
 use super::surface::{Surface, Wet, pose};
 use super::tree::{Group, groups, joint_place, link_place};

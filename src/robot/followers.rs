@@ -1,7 +1,7 @@
 //! Joints that follow others: by how much, and what their leaders have of their limits and losses.
 
+use super::file::File;
 use super::joints::{Dynamics, INSIDE, Led, Moves};
-use super::read::File;
 use super::report::Report;
 use super::tree::joint_place;
 use crate::{Error, Result};

@@ -1,6 +1,6 @@
 //! Masses of links, and of what moves together.
 
-use super::read::File;
+use super::file::File;
 use super::tree::{Group, link_place, placed};
 use crate::geometry::impossible_inertia;
 use crate::{Error, Result};

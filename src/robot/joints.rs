@@ -1,7 +1,7 @@
 //! Joints of the file as joints here.
 
+use super::file::File;
 use super::options::{Followers, Options};
-use super::read::File;
 use super::report::Report;
 use super::tree::joint_place;
 use crate::multibody::{Joint, Plane};
@@ -251,18 +251,19 @@ fn start(
         }
         return Ok(Some(q));
     }
-    let Some([lower, upper]) = limits.filter(|[lower, upper]| !(*lower..=*upper).contains(&0.0))
+    let own = file.extras.get(name).map_or(0.0, |extra| extra.start);
+    let Some([lower, upper]) = limits.filter(|[lower, upper]| !(*lower..=*upper).contains(&own))
     else {
-        return Ok(None);
+        return Ok((own != 0.0).then_some(own));
     };
     let room = INSIDE * (upper - lower);
-    let q = if lower > 0.0 {
+    let q = if lower > own {
         lower + room
     } else {
         upper - room
     };
     report.note(format!(
-        "joint {name:?} starts at {q:.6}, since zero is outside its limits, {lower} to {upper}"
+        "joint {name:?} starts at {q:.6}, since {own} is outside its limits, {lower} to {upper}"
     ));
     Ok(Some(q))
 }

@@ -3,46 +3,26 @@
 //! The tree of bodies becomes links and joints under a massless link `world`; a body with several joints a chain of massless links, and sites links at fixed joints. As a link's frame is
 //! its joint's, that of a body whose joint isn't at its origin is at the joint. `mjcf-rs` reads the file: includes, defaults, angles and frames are resolved there.
 
+use super::file::{Extra, File, JointText, LARGEST, parse_error};
 use super::inertia::Inertial;
-use super::mjcf_geometry::{Geometries, mass_properties};
-use super::read::{Extra, File, JointText, LARGEST, parse_error};
-use super::report::Unused;
+use super::mjcf_geometry::{Geometries, isometry, mass_properties};
+use super::mjcf_left_out::LeftOut;
 use super::tree::unplaced;
 use crate::{Error, Result};
 use mjcf_rs::body::{Body, InertiaSpec, Inertial as Given, Joint, JointType};
 use mjcf_rs::compiler::InertiaFromGeom;
 use mjcf_rs::equality::Equality;
 use mjcf_rs::{BodyId, Model};
-use nalgebra::{Isometry3, Matrix3, Quaternion, Translation3, UnitQuaternion, Vector3};
+use nalgebra::{Isometry3, Matrix3, Translation3, Vector3};
 use roxmltree::Document;
-use std::collections::{BTreeMap, HashMap, HashSet};
+use std::collections::{HashMap, HashSet};
 use std::panic::{AssertUnwindSafe, catch_unwind};
 use std::path::Path;
 
-/// Sections that are read, and their elements that are.
-const READ: [&str; 6] = [
-    "compiler",
-    "default",
-    "asset",
-    "worldbody",
-    "include",
-    "option",
-];
-/// Elements of bodies that are.
-const OF_BODIES: [&str; 9] = [
-    "body",
-    "inertial",
-    "joint",
-    "freejoint",
-    "geom",
-    "site",
-    "frame",
-    "replicate",
-    "attach",
-];
-
 /// A file whose outermost element is `mujoco`.
 pub(super) fn parse(path: &Path, document: &Document) -> Result<File> {
+    let mut left_out = LeftOut::default();
+    left_out.look(path, document)?;
     let model = catch_unwind(AssertUnwindSafe(|| Model::from_file(path)));
     let model = match model {
         Ok(Ok(model)) => model,
@@ -82,7 +62,7 @@ pub(super) fn parse(path: &Path, document: &Document) -> Result<File> {
     }
     made.equalities();
     made.total_mass();
-    made.file.unused.extend(unused(document));
+    made.file.unused.extend(left_out.unused());
     Ok(made.file)
 }
 
@@ -94,13 +74,6 @@ struct Made<'m> {
     taken: HashSet<String>,
     /// Of each body, its link's name and the body's frame in the link's.
     frames: Vec<(String, Isometry3<f64>)>,
-}
-
-/// A pose of theirs.
-pub(super) fn isometry(pose: &mjcf_rs::Pose) -> Isometry3<f64> {
-    let (p, q) = (pose.translation, pose.rotation);
-    let turn = UnitQuaternion::from_quaternion(Quaternion::new(q.w, q.x, q.y, q.z));
-    Isometry3::from_parts(Translation3::new(p.x, p.y, p.z), turn)
 }
 
 fn link(name: &str) -> urdf_rs::Link {
@@ -151,6 +124,25 @@ impl Made<'_> {
         }
     }
 
+    /// A site's name: its own, or where a body or another site has it, that and its body's.
+    fn site_name(&mut self, given: Option<&str>, body: &str, number: usize) -> String {
+        let own = given.map_or(format!("{body} site {number}"), String::from);
+        let others = (1..).map(|k| match k {
+            1 => format!("{own} of {body}"),
+            k => format!("{own} of {body} ({k})"),
+        });
+        let mut names = std::iter::once(own.clone()).chain(others);
+        let free = names.find(|name| !self.taken.contains(name));
+        let free = free.unwrap_or_else(|| own.clone());
+        if free != own {
+            self.file.notes.push(format!(
+                "site {own:?} of body {body:?} is called {free:?}, as another body or site has its name"
+            ));
+        }
+        self.taken.insert(free.clone());
+        free
+    }
+
     /// A joint from one link to another.
     fn join(
         &mut self,
@@ -187,11 +179,12 @@ impl Made<'_> {
         self.file.robot.links.push(link(&name));
         self.frames.push((name, Isometry3::identity()));
         let world = &self.model.bodies[0].body;
-        if !world.geoms.is_empty() {
-            self.file.notes.push(format!(
-                "{} <geom> of the world aren't read: give the scene walls and fixed bodies",
-                world.geoms.len()
-            ));
+        for (count, what) in [(world.geoms.len(), "geom"), (world.sites.len(), "site")] {
+            if count > 0 {
+                self.file.notes.push(format!(
+                    "{count} <{what}> of the world not read: give the scene walls and fixed bodies"
+                ));
+            }
         }
         Ok(())
     }
@@ -239,7 +232,7 @@ impl Made<'_> {
         self.fill(&mut made, body, &of, &own)?;
         self.file.robot.links.push(made);
         for (k, site) in body.sites.iter().enumerate() {
-            let site_name = self.name(site.name.as_deref(), format!("{name} site {}", k + 1))?;
+            let site_name = self.site_name(site.name.as_deref(), &name, k + 1);
             let pose = own * self.checked(&format!("site {site_name:?}"), &site.pose)?;
             self.file.robot.links.push(link(&site_name));
             let joint = format!("{site_name} (fixed)");
@@ -292,9 +285,12 @@ impl Made<'_> {
             JointType::Ball => (urdf_rs::JointType::Spherical, false),
             JointType::Free => (urdf_rs::JointType::Floating, false),
         };
-        let limited = given
-            .limited
-            .resolve(self.model.compiler.autolimits, given.range.is_some());
+        let rises = given.range.is_some_and(|[lower, upper]| lower < upper);
+        let limited = (given.limited).resolve(self.model.compiler.autolimits, rises);
+        if limited && !one {
+            let note = format!("{place}: the range of a ball joint isn't read");
+            self.file.notes.push(note);
+        }
         let range = given.range.filter(|_| limited && one);
         let passive = given.stiffness != 0.0
             || given.damping != 0.0
@@ -337,6 +333,7 @@ impl Made<'_> {
                 stiffness: given.stiffness,
                 rest: given.springref,
                 armature: given.armature,
+                start: given.ref_,
             };
             self.file.extras.insert(name, extra);
         }
@@ -453,6 +450,7 @@ impl Made<'_> {
                 Equality::Connect(_) => "connect",
                 Equality::Weld(_) => "weld",
                 Equality::Tendon(_) => "tendon",
+                Equality::Joint(joint) if !joint.common.active => "joint that isn't active",
                 Equality::Joint(joint) => {
                     let curve = joint.polycoef;
                     let straight = curve[2..].iter().all(|c| *c == 0.0);
@@ -460,7 +458,11 @@ impl Made<'_> {
                         |name: &str| self.file.robot.joints.iter().position(|j| j.name == name);
                     let follower = named(&joint.joint1);
                     let leader = joint.joint2.as_deref().filter(|name| named(name).is_some());
+                    let led = |follower: usize| self.file.robot.joints[follower].mimic.is_some();
                     match (follower, leader, straight) {
+                        (Some(follower), _, _) if led(follower) => {
+                            "joint that follows a second one"
+                        }
                         (Some(follower), Some(leader), true) => {
                             // y − y₀ = a₀ + a₁ (x − x₀), y that of the first joint.
                             let zero = |name: &str| {
@@ -510,37 +512,4 @@ impl Made<'_> {
             }
         }
     }
-}
-
-/// Elements that aren't read, and where the first stands.
-fn unused(document: &Document) -> Vec<Unused> {
-    let mut found: BTreeMap<String, (usize, u32)> = BTreeMap::new();
-    let mut note = |what: String, node: &roxmltree::Node| {
-        let line = document.text_pos_at(node.range().start).row;
-        found.entry(what).or_insert((0, line)).0 += 1;
-    };
-    for section in document
-        .root_element()
-        .children()
-        .filter(|n| n.is_element())
-    {
-        let name = section.tag_name().name();
-        if name == "worldbody" {
-            for node in section.descendants().skip(1).filter(|n| n.is_element()) {
-                let tag = node.tag_name().name();
-                if !OF_BODIES.contains(&tag) {
-                    note(format!("<{tag}> of bodies"), &node);
-                }
-            }
-        } else if name == "equality" {
-            continue;
-        } else if !READ.contains(&name) {
-            for node in section.children().filter(|n| n.is_element()) {
-                note(format!("<{}> of <{name}>", node.tag_name().name()), &node);
-            }
-        }
-    }
-    let each = found.into_iter();
-    each.map(|(what, (count, line))| Unused { what, count, line })
-        .collect()
 }

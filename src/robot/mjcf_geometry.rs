@@ -9,12 +9,21 @@ use crate::{Error, Result};
 use hydrograd_adjoint::lie::Vec3;
 use mjcf_rs::Model;
 use mjcf_rs::body::{Body, Geom, GeomType};
-use nalgebra::{Isometry3, Matrix3, Rotation3, Translation3, UnitQuaternion, Vector3};
+use nalgebra::{
+    Isometry3, Matrix3, Point3, Quaternion, Rotation3, Translation3, UnitQuaternion, Vector3,
+};
 use std::f64::consts::PI;
 use std::path::{Path, PathBuf};
 
 /// A shape as URDF has it, one that URDF lacks under the name that stands in a mesh's place, and its pose in the body's frame.
 type Read = (urdf_rs::Geometry, Option<Shape>, Isometry3<f64>);
+
+/// A pose of theirs.
+pub(super) fn isometry(pose: &mjcf_rs::Pose) -> Isometry3<f64> {
+    let (p, q) = (pose.translation, pose.rotation);
+    let turn = UnitQuaternion::from_quaternion(Quaternion::new(q.w, q.x, q.y, q.z));
+    Isometry3::from_parts(Translation3::new(p.x, p.y, p.z), turn)
+}
 
 /// The geometry of one body.
 pub(super) struct Geometries<'m> {
@@ -166,8 +175,9 @@ fn placed(geom: &Geom, pose: &Isometry3<f64>) -> (Isometry3<f64>, [f64; 3]) {
     let Some([ax, ay, az, bx, by, bz]) = geom.fromto else {
         return (*pose, geom.size);
     };
-    let (a, b) = (Vector3::new(ax, ay, az), Vector3::new(bx, by, bz));
-    let along = b - a;
+    // The pose is that of frames around it. Axes point from the second end to the first.
+    let [a, b] = [[ax, ay, az], [bx, by, bz]].map(|x| (pose * Point3::from(x)).coords);
+    let along = a - b;
     let turn = Rotation3::rotation_between(&Vector3::z(), &along)
         .unwrap_or_else(|| Rotation3::from_axis_angle(&Vector3::x_axis(), PI));
     let turn = UnitQuaternion::from_rotation_matrix(&turn);
@@ -188,9 +198,19 @@ pub(super) fn mass_properties(
 ) -> Result<Option<Inertial>> {
     let mut parts: Vec<Inertial> = Vec::new();
     for geom in &body.geoms {
-        let pose = super::mjcf::isometry(&geom.pose);
+        let pose = isometry(&geom.pose);
         let (at, sizes) = placed(geom, &pose);
         let Some(unit) = geometries.unit(geom, sizes)? else {
+            if let Some(mass) = geom.mass.filter(|m| *m != 0.0) {
+                let place = format!(
+                    "{}: {}: mass of a geom",
+                    geometries.path.display(),
+                    geometries.of
+                );
+                let remedy =
+                    "it has no volume to spread the mass over: give the body an <inertial>";
+                return Err(Error::input(place, mass, remedy));
+            }
             continue;
         };
         let density = match geom.mass {
@@ -198,8 +218,13 @@ pub(super) fn mass_properties(
             _ => geom.density.unwrap_or(density),
         };
         if density < 0.0 || !density.is_finite() {
+            let place = format!(
+                "{}: {}: density of a geom",
+                geometries.path.display(),
+                geometries.of
+            );
             let remedy = "give a mass and a density of zero or more";
-            return Err(geometries.wrong(density.to_string(), remedy));
+            return Err(Error::input(place, density, remedy));
         }
         let own = Inertial {
             mass: density * unit.mass,

@@ -4,12 +4,14 @@
 //! What a scene makes of it is in `scene::robot`.
 
 mod bodies;
+mod file;
 mod followers;
 mod hull;
 mod inertia;
 mod joints;
 mod mjcf;
 mod mjcf_geometry;
+mod mjcf_left_out;
 mod options;
 mod overlap;
 mod paths;

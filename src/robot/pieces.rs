@@ -1,9 +1,9 @@
 //! The pieces of geometry that links are made of.
 
+use super::file::File;
 use super::hull::hull;
 use super::options::{BadMeshes, Options, Wet};
 use super::paths::Folders;
-use super::read::File;
 use super::report::{MeshUse, Report};
 use super::tree::{Group, link_place, placed};
 use crate::geometry::TriMesh;

@@ -1,7 +1,7 @@
 //! The tree of links, and what moves together: links at fixed joints fold into what carries them.
 
+use super::file::File;
 use super::options::Options;
-use super::read::File;
 use crate::{Error, Result};
 use nalgebra::{Isometry3, Translation3, UnitQuaternion};
 use std::collections::HashMap;

@@ -10,7 +10,7 @@ use nalgebra::DVector;
 /// Wrenches on all bodies at one state, kind by kind, and across their joints: forces (N) and moments about each body's origin (N m), world axes.
 ///
 /// Kinds are the scene's forces by what they are called ("gravity", "buoyancy", "linear drag", "thrust", "fin", …), "water" (what the inertia of the water does: added mass), and
-/// of a step "contact" and the dampers solved with it. With the wrench across its own joint and the opposite ones across the joints of what it carries, they are the rate of a body's own momentum.
+/// of a step "contact" and the dampers solved with it. With the fidelity `isolated` the water's inertia does nothing to bodies that can't move. With the wrench across its own joint and the opposite ones across the joints of what it carries, they are the rate of a body's own momentum.
 #[derive(Clone, Debug)]
 pub struct Loads {
     acceleration: DVector<f64>,
@@ -141,8 +141,11 @@ impl Rollout {
     /// # Errors
     /// A state that there isn't, and whatever the equations of motion report.
     pub fn loads(&self, n: usize) -> Result<Loads> {
-        let simulator = self.simulator();
-        let (equations, sample) = (self.equations_at_state(n)?, &self.samples()[n]);
+        self.loads_by(&self.equations_at_state(n)?, n)
+    }
+
+    fn loads_by(&self, equations: &Equations, n: usize) -> Result<Loads> {
+        let (simulator, sample) = (self.simulator(), &self.samples()[n]);
         let system = simulator.system();
         let nv = system.tree.velocities();
         let control = match sample.control.len() == system.controls {
@@ -188,8 +191,8 @@ impl Rollout {
             let expected = format!("no site has that name; the sites are {names:?}");
             return Err(Error::input("imu: site", format!("{site:?}"), expected));
         };
-        let acceleration = self.loads(n)?.acceleration;
         let equations = self.equations_at_state(n)?;
+        let acceleration = self.loads_by(&equations, n)?.acceleration;
         let (v, at) = (&self.samples()[n].v, &site.pose.translation);
         let moves = equations.point_velocity(v, site.body, at)?;
         let gains = equations.point_acceleration(v, &acceleration, site.body, at)?;

@@ -4,6 +4,7 @@ use super::Rollout;
 use super::trajectory::{ControlledStep, Trajectory, expect_length, observation};
 use crate::Result;
 use crate::dynamics::{InputTangents, Linearisation, State, StateTangents};
+use crate::error::in_order;
 use nalgebra::{DMatrix, DVector};
 use rayon::prelude::*;
 use std::ops::Range;
@@ -144,7 +145,7 @@ impl Rollout {
     ) -> Result<Vec<StepMap>> {
         let records = &self.tape.records()[steps];
         let map = |record| trajectory.linearise(record)?.map(columns);
-        records.par_iter().map(map).collect()
+        in_order(records.par_iter().map(map))
     }
 }
 

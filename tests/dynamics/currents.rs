@@ -330,6 +330,14 @@ fn what_can_not_be_is_refused() {
         open.validate().unwrap_err(),
         &["forces[2].velocity", "level"],
     );
+    let mut beside = swimmer([0.0; 3]);
+    beside.walls.clear();
+    beside.add_force(level().profile(vec![[0.0, 1.0], [2.0, 0.5]]).into());
+    beside.add_force(Current::new([0.0, 0.0, 0.1]).into());
+    says(
+        beside.validate().unwrap_err(),
+        &["forces[2].profile", "0.1", "rise or sink"],
+    );
     let sim = simulator(&swimmer([0.0; 3]), Fidelity::Isolated, Integrator::Rk4);
     says(
         sim.equations_at(sim.start().0, f64::NAN)

@@ -156,6 +156,35 @@ fn geometry_gives_shapes_and_masses() {
     assert!(scene.validate().is_ok());
 }
 
+/// Frames move pieces between two points, sites may have names of bodies, joints start at their references, and equalities that aren't active couple nothing.
+#[test]
+fn the_finer_print_is_read() {
+    let text = r#"<mujoco><compiler angle="radian"/><worldbody>
+        <body name="a"><freejoint/><geom size="0.1"/><site name="a" pos="0 0 1"/>
+          <body name="b" pos="1 0 0"><joint name="j" axis="0 1 0" ref="0.5"/>
+            <frame pos="0 0 2"><geom type="capsule" fromto="0 0 0 0 0 1" size="0.1"/></frame></body>
+          <body name="c" pos="2 0 0"><joint name="k" axis="0 1 0"/><geom size="0.1"/></body>
+        </body></worldbody><equality><joint joint1="k" joint2="j" active="false"/></equality>
+        <option gravity="0 0 -1"/></mujoco>"#;
+    let (_folder, path) = folder(|_| text.into());
+    let mut scene = Scene::new(Fluid::none());
+    let added = scene.add_robot(&path, &Robot::default()).unwrap();
+    let body = |name: &str| &scene.bodies[scene.body(name).unwrap().0];
+    assert_eq!(body("b").center_of_mass, Some([0.0, 0.0, 2.5]));
+    assert_eq!(body("b").start, vec![0.5]);
+    assert_eq!(body("c").mimic, None);
+    assert_eq!(scene.sites[0].name, "a of a");
+    says(
+        added.report.to_string(),
+        &["isn't active", "\"a of a\"", "<option>"],
+    );
+    let sim = Simulator::new(&scene, Settings::default().fidelity(Fidelity::Isolated)).unwrap();
+    // At its reference a joint is as the file draws it.
+    let poses = sim.equations(sim.start().0).unwrap();
+    let off = poses.poses()[scene.body("b").unwrap().0].rotation - nalgebra::Matrix3::identity();
+    assert!(off.norm() < 1e-15);
+}
+
 /// A hip of three hinges is three joints; two of them about one axis are refused, as nothing tells them apart.
 #[test]
 fn a_body_may_have_three_hinges() {
@@ -233,4 +262,28 @@ fn what_can_not_be_is_refused() {
         &["gone.xml"],
     );
     refused("</mujoco>", "", &["XML"]);
+    // What would silently lack bodies or joints, and files without end.
+    let shoulder = "<body name=\"shoulder\"";
+    let before = |element: &str| format!("{element}{shoulder}");
+    let copies = "<replicate count=\"2\"><body><geom size=\"0.1\"/></body></replicate>";
+    refused(
+        shoulder,
+        &before(copies),
+        &["<replicate>", "line", "missing"],
+    );
+    refused(
+        shoulder,
+        &before("<include file=\"sampler.xml\"/>"),
+        &["<include>", "within bodies"],
+    );
+    refused(
+        "<freejoint/>",
+        "<frame><freejoint/></frame>",
+        &["<freejoint>", "<frame>"],
+    );
+    refused(
+        "<asset>",
+        "<asset><model name=\"m\" file=\"sampler.xml\"/>",
+        &["<model>", "models within models"],
+    );
 }

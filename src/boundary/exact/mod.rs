@@ -10,6 +10,7 @@ pub mod lamb;
 
 use crate::adjoint::lie::{Mat6, Pose, Vec3, skew};
 use crate::boundary::Response;
+use crate::error::in_order;
 use crate::{Error, Result};
 use confocal::{Confocal, Place};
 use faer::Mat;
@@ -154,24 +155,19 @@ impl Response for ExactBoundary {
 
     fn radiated(&self, points: &[Vec3]) -> Result<Mat<f64>> {
         let move_in = twist_in_shape(&self.pose);
-        let rows = self
-            .inside_shape(points)
-            .par_iter()
-            .map(|x| {
-                let place = self.confocal.locate(&self.name, x)?;
-                let own = self.lamb.potentials(&self.confocal, x, place.level);
-                Ok(move_in.tr_mul(&own))
-            })
-            .collect::<Result<Vec<_>>>()?;
+        let row = |x: &Vec3| {
+            let place = self.confocal.locate(&self.name, x)?;
+            let own = self.lamb.potentials(&self.confocal, x, place.level);
+            Ok(move_in.tr_mul(&own))
+        };
+        let rows = in_order(self.inside_shape(points).par_iter().map(row))?;
         Ok(Mat::from_fn(points.len(), 6, |i, j| rows[i][j]))
     }
 
     fn scattered(&self, sources: &[Vec3], points: &[Vec3]) -> Result<Mat<f64>> {
         let (sources, points) = (self.inside_shape(sources), self.inside_shape(points));
         let places = |list: &[Vec3]| -> Result<Vec<Place>> {
-            list.par_iter()
-                .map(|x| self.confocal.locate(&self.name, x))
-                .collect()
+            in_order(list.par_iter().map(|x| self.confocal.locate(&self.name, x)))
         };
         let (from, to) = (places(&sources)?, places(&points)?);
         if let Some(harmonics) = &self.harmonics {

@@ -5,6 +5,7 @@ use super::surface::FilmSurface;
 use super::{Apart, Extent, Film, Shares, Side};
 use crate::adjoint::lie::{Pose, Vec6};
 use crate::coupling::Exclusions;
+use crate::error::in_order;
 use crate::geometry::{Image, Opposite, Other, Solid, TriMesh, Wall, WallSurface};
 use crate::{Error, Result};
 use nalgebra::{DMatrix, DVector};
@@ -166,8 +167,7 @@ impl Films {
             let placed = PlacedFilm::new(film, poses, basis);
             placed.map_err(|distance| touching(film, distance, names))
         };
-        let all: Result<Vec<_>> = self.0.par_iter().map(place).collect();
-        Ok(PlacedFilms(all?))
+        Ok(PlacedFilms(in_order(self.0.par_iter().map(place))?))
     }
 
     /// What films add to the impulses of body-frame twists, 6·bodies × columns, at density 1.

@@ -25,6 +25,7 @@ use super::{State, StateBar, StateTangents, StepBar, StepTangents, readout};
 use crate::adjoint::solve::Definite;
 use crate::dynamics::slopes::columns;
 use crate::dynamics::{Dual, Evaluation, Linearisation};
+use crate::error::in_order;
 use crate::{Error, Result};
 use nalgebra::{DMatrix, DVector};
 use rayon::prelude::*;
@@ -257,7 +258,7 @@ impl<'a> Closure<'a> {
                 + after.tr_mul(after_bar))
         };
         let rows = start.split.free.par_iter().map(row);
-        let rows = rows.collect::<Result<Vec<_>>>()?;
+        let rows = in_order(rows)?;
         let mut out = DMatrix::zeros(nv, next.y.ncols());
         for (i, row) in start.split.free.iter().zip(rows) {
             out.row_mut(*i).tr_copy_from(&row);

@@ -4,8 +4,7 @@ use super::{StepRecord, Stepper};
 use crate::Result;
 use crate::adjoint::lie::{Vec3, Vec6, point_wrench, six};
 use crate::dynamics::ContactForce;
-use crate::dynamics::contact_force::contact_forces;
-use crate::dynamics::force::Loads;
+use crate::dynamics::force::{Loads, Moving, Place};
 use nalgebra::DVector;
 
 /// What a step solved with its velocities; in a step of several pieces their mean.
@@ -34,23 +33,33 @@ impl Stepper<'_> {
             contact: vec![Vec6::zeros(); n],
             stops: DVector::zeros(nv),
         };
+        for contact in self.contact_forces(record, 0.0)? {
+            add(&contact, &mut out.contact);
+        }
         for (state, v, stages) in record.parts() {
-            let e = stepper.evaluate(&state.q, stepper.time(&state))?;
-            let path = stepper.split_of_step(&state, &record.input).complete(v);
-            let near = stepper.near(&e, &path, &record.plan)?;
-            let near = near.as_ref().unwrap_or(&e);
             let acting = stages.contact_velocities().map_or(v, |v| &v.after);
-            let twists = system.tree.twists(&e.kinematics, acting);
-            for force in contact_forces(&near.contact_points, &twists, 0.0) {
-                add(&force, share, &mut out.contact);
-            }
             if self.integrator.solves_contact() {
-                for limit in &near.limits {
+                for (k, limit) in system.limits.iter().enumerate() {
+                    let limit = limit.sharpened(record.plan.of_limit(k));
                     let pushed = limit.forces(state.q[limit.q], acting[limit.v]);
                     out.stops[limit.v] += share * (pushed[0] + pushed[1]);
                 }
             }
-            let at = e.moving(&twists, acting, &record.input.control);
+            let kinematics = system.tree.kinematics(&state.q);
+            let place = Place {
+                poses: &kinematics.poses,
+                q: &state.q,
+                time: stepper.time(&state),
+                parameters: self.parameters,
+            };
+            let at = Moving {
+                place,
+                twists: &system.tree.twists(&kinematics, acting),
+                v: acting,
+                current: &system.current,
+                streams: &system.streams,
+                control: &record.input.control,
+            };
             for (force, (_, sum)) in system.dampers().zip(&mut out.dampers) {
                 let mut loads = Loads::zeros(n, nv);
                 force.add(&at, &mut loads);
@@ -64,9 +73,9 @@ impl Stepper<'_> {
 }
 
 /// Adds a contact's wrench to that on its bodies.
-fn add(contact: &ContactForce, share: f64, wrenches: &mut [Vec6]) {
+fn add(contact: &ContactForce, wrenches: &mut [Vec6]) {
     let torque = six(&Vec3::zeros(), &Vec3::from(contact.torque));
-    let wrench = share * (point_wrench(&contact.position.into(), &contact.force.into()) + torque);
+    let wrench = point_wrench(&contact.position.into(), &contact.force.into()) + torque;
     wrenches[contact.first] += wrench;
     if let Some(b) = contact.second {
         wrenches[b] -= wrench;

@@ -1,15 +1,17 @@
 //! The misfit of all experiments, with its residuals and their Jacobian.
 
 use super::experiment::Derived;
-use super::unknown::{Prior, Searched};
+use super::root;
+use super::unknown::{Prior, Searched, Target};
 use super::{Experiment, Loss, Unknown};
 use crate::dynamics::Drive;
+use crate::error::in_order;
 use crate::simulate::observable::differentiable;
 use crate::simulate::{Rollout, Simulator, Variables};
 use crate::{Error, Result};
 use nalgebra::{DMatrix, DVector};
 use rayon::prelude::*;
-use std::collections::BTreeSet;
+use std::collections::{BTreeMap, BTreeSet};
 
 /// The unknown initial state of an experiment.
 struct Start {
@@ -49,6 +51,8 @@ enum Place {
     Parameter(String),
     /// A coordinate of the start, and the velocity that is its rate.
     Start { q: usize, v: usize },
+    /// An entry of the root of a body's inertia.
+    Root { body: String, entry: usize },
 }
 
 /// A misfit: a function of the coordinates of the search, the unknowns' and then those of initial states.
@@ -97,6 +101,18 @@ impl<'a> Misfit<'a> {
                     let place = format!("unknown {:?}: parameter", unknown.name);
                     let remedy = "another unknown sets it already";
                     return Err(Error::input(place, format!("{:?}", target.name()), remedy));
+                }
+            }
+        }
+        for unknown in &unknowns {
+            for (target, _) in &unknown.sets {
+                if let Target::Root { body, .. } = target {
+                    let direct = root::parameters(body);
+                    if let Some(name) = direct.iter().find(|n| taken.contains(n.as_str())) {
+                        let place = format!("unknown {:?}: parameter", unknown.name);
+                        let remedy = "another unknown sets it already, beside the root of the inertia: leave one of them out";
+                        return Err(Error::input(place, format!("{name:?}"), remedy));
+                    }
                 }
             }
         }
@@ -193,6 +209,25 @@ impl<'a> Misfit<'a> {
         setting.factor * self.unknowns[i].value(x[i])
     }
 
+    /// Roots of the inertias that unknowns set in an experiment, by body.
+    pub fn roots(&self, k: usize, x: &DVector<f64>) -> Result<BTreeMap<String, [f64; 6]>> {
+        let mut out = BTreeMap::new();
+        for setting in &self.settings[k] {
+            if let Place::Root { body, entry } = &setting.place {
+                if !out.contains_key(body) {
+                    out.insert(
+                        body.clone(),
+                        root::of(&self.experiments[k].simulator, body)?,
+                    );
+                }
+                if let Some(root) = out.get_mut(body) {
+                    root[*entry] = self.value(setting, x);
+                }
+            }
+        }
+        Ok(out)
+    }
+
     /// Whether unknowns set coordinates of the start.
     fn sets_start(&self, k: usize) -> bool {
         let mut all = self.settings[k].iter();
@@ -221,6 +256,11 @@ impl<'a> Misfit<'a> {
                 parameters.set(name, self.value(setting, x))?;
             }
         }
+        for (body, root) in self.roots(k, x)? {
+            for (name, value) in root::parameters(&body).iter().zip(root::inertia(&root)) {
+                parameters.set(name, value)?;
+            }
+        }
         simulator.set_parameters(parameters)?;
         if self.starts[k].is_some() || self.sets_start(k) {
             let (q, v) = self.initial(k, x);
@@ -241,11 +281,7 @@ impl<'a> Misfit<'a> {
             };
             run().map_err(|e: Error| e.within(&self.experiments[k].place()))
         };
-        let each: Vec<_> = (0..self.experiments.len())
-            .into_par_iter()
-            .map(one)
-            .collect();
-        let each = each.into_iter().collect::<Result<Vec<_>>>()?;
+        let each = in_order((0..self.experiments.len()).into_par_iter().map(one))?;
         let (differences, rollouts): (Vec<DVector<f64>>, Vec<_>) = each.into_iter().unzip();
         let data: f64 = (differences.iter().flat_map(|r| r.iter()))
             .map(|r| self.loss.of(*r).0)
@@ -297,9 +333,13 @@ impl<'a> Misfit<'a> {
     fn experiment_jacobian(&self, k: usize, at: &Evaluated) -> Result<DMatrix<f64>> {
         let named = |s: &Setting| match &s.place {
             Place::Parameter(name) => Some(name.clone()),
-            Place::Start { .. } => None,
+            Place::Start { .. } | Place::Root { .. } => None,
         };
-        let parameters: Vec<String> = self.settings[k].iter().filter_map(named).collect();
+        let mut parameters: Vec<String> = self.settings[k].iter().filter_map(named).collect();
+        let roots = self.roots(k, &at.x)?;
+        // Of each body with a root its inertia, after what is set itself.
+        let first_root = parameters.len();
+        parameters.extend(roots.keys().flat_map(|body| root::parameters(body)));
         let count = parameters.len();
         let simulator = &self.experiments[k].simulator;
         let n = simulator.start().1.len();
@@ -321,13 +361,21 @@ impl<'a> Misfit<'a> {
             false => self.by_forward(k, &at.rollouts[k], &variables)?,
         };
         let mut out = DMatrix::zeros(made.nrows(), self.coordinates);
-        let mut parameter = 0..count;
+        let mut parameter = 0..first_root;
         for setting in &self.settings[k] {
             let i = setting.unknown;
+            if let Place::Root { body, entry } = &setting.place {
+                let number = roots.keys().position(|b| b == body).unwrap_or(0);
+                let by = root::slope(&roots[body]).column(*entry) * self.unknowns[i].slope(at.x[i]);
+                let columns = made.columns(first_root + 6 * number, 6);
+                let mut column = out.column_mut(i);
+                column += columns * by;
+                continue;
+            }
             let column = match setting.place {
                 Place::Start { v, .. } => count + v,
                 // They come in this order.
-                Place::Parameter(_) => parameter.next().unwrap_or(0),
+                Place::Parameter(_) | Place::Root { .. } => parameter.next().unwrap_or(0),
             };
             let by = setting.factor * self.unknowns[i].slope(at.x[i]);
             out.column_mut(i).axpy(by, &made.column(column), 1.0);
@@ -447,9 +495,14 @@ fn settings_of(unknowns: &[Searched], experiment: &Experiment) -> Result<Vec<Set
     let mut out = Vec::new();
     for (i, unknown) in unknowns.iter().enumerate() {
         for (target, factor) in &unknown.sets {
-            let (place, scale) = match target.coordinate(&experiment.simulator)? {
-                Some((q, v)) => (Place::Start { q, v }, 1.0),
-                None => {
+            let (place, scale) = match (target, target.coordinate(&experiment.simulator)?) {
+                (_, Some((q, v))) => (Place::Start { q, v }, 1.0),
+                (Target::Root { body, entry, .. }, None) => {
+                    root::of(&experiment.simulator, body)?;
+                    let (body, entry) = (body.clone(), *entry);
+                    (Place::Root { body, entry }, 1.0)
+                }
+                (_, None) => {
                     let name = target.name();
                     experiment.simulator.parameters().get(name)?;
                     let scale = experiment.scales.get(name).copied().unwrap_or(1.0);

@@ -19,6 +19,7 @@ mod experiment;
 mod marquardt;
 mod misfit;
 mod report;
+mod root;
 mod settings;
 mod unknown;
 

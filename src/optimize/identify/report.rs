@@ -2,6 +2,7 @@
 
 use super::marquardt::Found;
 use super::misfit::Misfit;
+use super::root;
 use super::unknown::Target;
 use super::{Experiment, IdentifySettings, IdentifyStop, Loss};
 use crate::dynamics::Parameters;
@@ -79,6 +80,8 @@ pub struct WeakDirection {
 pub struct Identified {
     /// The unknowns, in order.
     pub unknowns: Vec<Fitted>,
+    /// Inertias whose roots were unknown, as parameters, in the first experiment.
+    pub inertias: Vec<(String, f64)>,
     /// Correlations of their errors.
     pub correlations: Vec<Vec<f64>>,
     /// Initial coordinates and velocity of each experiment.
@@ -132,6 +135,9 @@ impl Identified {
             for (name, factor) in &unknown.sets {
                 out.set(name, factor * unknown.value)?;
             }
+        }
+        for (name, value) in &self.inertias {
+            out.set(name, *value)?;
         }
         Ok(out)
     }
@@ -258,7 +264,8 @@ pub(super) fn report(
             (u.sets.iter()).partition(|(target, _)| matches!(target, Target::Start(_)));
         let named = |sets: Vec<&(Target, f64)>| {
             let each = sets.into_iter();
-            each.map(|(target, factor)| (target.name().to_string(), *factor))
+            each.filter(|(target, _)| !matches!(target, Target::Root { .. }))
+                .map(|(target, factor)| (target.name().to_string(), *factor))
                 .collect()
         };
         Fitted {
@@ -277,6 +284,11 @@ pub(super) fn report(
         let (q, v) = misfit.initial(k, x);
         (q.as_slice().to_vec(), v.as_slice().to_vec())
     });
+    let inertias = misfit.roots(0, x)?.into_iter().flat_map(|(body, found)| {
+        root::parameters(&body)
+            .into_iter()
+            .zip(root::inertia(&found))
+    });
     let mut met = Met::default();
     for (experiment, r) in misfit.experiments.iter().zip(&found.best.differences) {
         met.add(experiment, r.as_slice(), misfit.loss)?;
@@ -291,6 +303,7 @@ pub(super) fn report(
     let rho = (met.correlated / met.count.max(1.0)).clamp(0.0, 0.999);
     Ok(Identified {
         unknowns: unknowns.collect(),
+        inertias: inertias.collect(),
         correlations: correlations.collect(),
         starts: starts.collect(),
         series: met.series,

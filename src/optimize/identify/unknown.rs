@@ -1,5 +1,6 @@
 //! What is to be found.
 
+use super::root;
 use crate::dynamics::Drive;
 use crate::simulate::Simulator;
 use crate::{Error, Result};
@@ -20,12 +21,18 @@ pub(super) enum Target {
     Parameter(String),
     /// A coordinate of the initial state, by its label.
     Start(String),
+    /// An entry of the root of a body's inertia, with the name that it goes by.
+    Root {
+        body: String,
+        entry: usize,
+        name: String,
+    },
 }
 
 impl Target {
     pub fn name(&self) -> &str {
         match self {
-            Self::Parameter(name) | Self::Start(name) => name,
+            Self::Parameter(name) | Self::Start(name) | Self::Root { name, .. } => name,
         }
     }
 
@@ -66,6 +73,7 @@ impl Target {
     fn value(&self, simulator: &Simulator) -> Result<f64> {
         match (self, self.coordinate(simulator)?) {
             (_, Some((i, _))) => Ok(simulator.start().0[i]),
+            (Self::Root { body, entry, .. }, _) => Ok(root::of(simulator, body)?[*entry]),
             _ => simulator.parameters().get(self.name()),
         }
     }
@@ -103,6 +111,26 @@ impl Unknown {
             bounds: [f64::NEG_INFINITY, f64::INFINITY],
             by_logarithm: false,
         }
+    }
+
+    /// The inertia of a body about its centre of mass, as six unknowns that make a physical one whatever they are: entries xx, yy, zz (by their logarithms), xy, xz, yz of the upper
+    /// triangular root L (√kg m) of its second moments of mass, I = tr(L Lᵀ) 1 − L Lᵀ. Their names are `BODY.inertia.root.xx` and so on. What isn't given to
+    /// [`identify`](super::identify) of the six stays as the simulator has it.
+    pub fn inertia(body: &str) -> [Self; 6] {
+        std::array::from_fn(|entry| {
+            let name = format!("{body}.inertia.root.{}", root::ENTRIES[entry]);
+            let target = Target::Root {
+                body: body.into(),
+                entry,
+                name: name.clone(),
+            };
+            let mut out = Self::new(name);
+            out.sets.push((target, 1.0));
+            match entry < 3 {
+                true => out.positive(),
+                false => out,
+            }
+        })
     }
 
     /// Makes the parameter `parameter` `factor` times the unknown; may be given several times.

@@ -1,6 +1,7 @@
 //! What is to be found, and trajectories through it.
 
 use super::backward::{Answer, KnotModel};
+use crate::error::in_order;
 use crate::optimize::cost::{Bound, Cost, CostPoint, Quadratic};
 use crate::simulate::{Cotangents, Objective, Rollout, Simulator};
 use crate::{Error, Result};
@@ -226,7 +227,7 @@ impl Ready {
                 previous,
             })
         };
-        (0..=self.knots).into_par_iter().map(one).collect()
+        in_order((0..=self.knots).into_par_iter().map(one))
     }
 
     fn cost_of(&self, rollout: &Rollout, controls: &DMatrix<f64>) -> Result<f64> {

@@ -97,15 +97,31 @@ impl Current {
                 ));
             }
         }
-        let up = scene.up();
-        let along: f64 = up.iter().zip(&self.velocity).map(|(u, v)| u * v).sum();
-        let size = self.velocity.iter().fold(0.0, |m: f64, x| m.max(x.abs()));
-        if !self.profile.is_empty() && along.abs() > LEVEL * size {
-            return Err(Error::input(
-                place("velocity"),
-                format!("{:?}", self.velocity),
-                "must be level, as water that changes with depth can't flow along it: take the part along gravity away, or the profile",
-            ));
+        if !self.profile.is_empty() {
+            let up = scene.up();
+            let level = |velocity: [f64; 3]| {
+                let along: f64 = up.iter().zip(&velocity).map(|(u, v)| u * v).sum();
+                let size = velocity.iter().fold(0.0, |m: f64, x| m.max(x.abs()));
+                along.abs() <= LEVEL * size
+            };
+            let refuse = |place: String, velocity: [f64; 3], remedy: &str| {
+                Err(Error::input(place, format!("{velocity:?}"), remedy))
+            };
+            if !level(self.velocity) {
+                return refuse(
+                    place("velocity"),
+                    self.velocity,
+                    "must be level, as water that changes with depth can't flow along it: take the part along gravity away, or the profile",
+                );
+            }
+            let others = scene.currents().map(|(_, other)| other.velocity);
+            if let Some(rising) = others.chain([scene.fluid.current]).find(|v| !level(*v)) {
+                return refuse(
+                    place("profile"),
+                    rising,
+                    "no other current may rise or sink through water that changes with depth: take its part along gravity away, or the profile",
+                );
+            }
         }
         match &self.over_time {
             Some(motion) => motion.check(&place("over_time")),

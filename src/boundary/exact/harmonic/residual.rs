@@ -4,6 +4,7 @@
 use super::{Harmonics, Probe, Weight};
 use crate::Result;
 use crate::adjoint::lie::Vec3;
+use crate::error::in_order;
 use faer::Mat;
 use rayon::prelude::*;
 use std::f64::consts::{FRAC_PI_2, PI, TAU};
@@ -48,10 +49,8 @@ impl Harmonics {
     /// case of the sources tried at the resolved gap. `name` of the body for messages.
     pub fn residual(&self, name: &str) -> Result<f64> {
         let gap = self.resolved_gap / self.scale;
-        let parts = TRIED
-            .par_iter()
-            .map(|d| self.residual_of(name, &Vec3::from(*d).normalize(), gap))
-            .collect::<Result<Vec<_>>>()?;
+        let of = |d: &[f64; 3]| self.residual_of(name, &Vec3::from(*d).normalize(), gap);
+        let parts = in_order(TRIED.par_iter().map(of))?;
         Ok(parts.into_iter().fold(0.0, f64::max))
     }
 

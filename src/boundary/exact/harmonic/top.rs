@@ -17,6 +17,7 @@
 
 use super::tridiagonal;
 use crate::adjoint::lie::Vec3;
+use crate::error::in_order;
 use crate::{Error, Result};
 use faer::Mat;
 use rayon::prelude::*;
@@ -76,11 +77,8 @@ impl Top {
     /// The four classes of degree n (fewer for n < 2).
     pub fn classes(&self, n: usize) -> Result<Vec<Class>> {
         let kinds = [(false, 0), (false, 1), (true, 2), (true, 1)];
-        kinds
-            .into_par_iter()
-            .filter(|&(_, first)| first <= n)
-            .map(|(sine, first)| self.class(n, sine, (first..=n).step_by(2).collect()))
-            .collect()
+        let each = kinds.into_par_iter().filter(|&(_, first)| first <= n);
+        in_order(each.map(|(sine, first)| self.class(n, sine, (first..=n).step_by(2).collect())))
     }
 
     fn class(&self, n: usize, sine: bool, orders: Vec<usize>) -> Result<Class> {

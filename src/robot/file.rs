@@ -1,0 +1,75 @@
+//! What a file says of a robot, in the form of URDF.
+
+use super::report::Unused;
+use crate::shape::Shape;
+use crate::{Error, Result};
+use roxmltree::{Document, Node};
+use std::collections::HashMap;
+use std::path::{Path, PathBuf};
+
+/// Deepest nesting of elements; URDF needs six, MJCF one a body in a chain.
+const DEEPEST: usize = 128;
+/// Largest number that is taken: squares and products of such stay finite.
+pub(super) const LARGEST: f64 = 1e30;
+
+/// A robot's file.
+pub(super) struct File {
+    pub path: PathBuf,
+    pub robot: urdf_rs::Robot,
+    /// What the typed form doesn't tell of each joint.
+    pub joints: Vec<JointText>,
+    /// What isn't read.
+    pub unused: Vec<Unused>,
+    /// What joints have beside what URDF says of them, by name.
+    pub extras: HashMap<String, Extra>,
+    /// Shapes that URDF lacks, by the name that stands in a mesh's place.
+    pub shapes: HashMap<String, Shape>,
+    /// What is to be told.
+    pub notes: Vec<String>,
+}
+
+/// What drives and springs add to a joint.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub(super) struct Extra {
+    /// N/m or N m/rad.
+    pub stiffness: f64,
+    /// Coordinate at which the spring doesn't push.
+    pub rest: f64,
+    /// kg or kg m².
+    pub armature: f64,
+    /// Coordinate at which it starts unless told otherwise.
+    pub start: f64,
+}
+
+/// What stands at a joint.
+pub(super) struct JointText {
+    pub line: Option<u32>,
+    /// Whether its `<limit>` gives a range.
+    pub has_range: bool,
+    /// Whether it has a `<limit>`.
+    pub has_limit: bool,
+}
+
+/// An error of a file's contents.
+pub(super) fn parse_error(path: &Path, message: impl Into<String>) -> Error {
+    Error::Parse {
+        path: path.to_owned(),
+        message: message.into(),
+    }
+}
+
+/// Refuses elements within elements without end.
+pub(super) fn check_depth(path: &Path, document: &Document) -> Result<()> {
+    let mut open = vec![(document.root_element(), 1)];
+    while let Some((node, level)) = open.pop() {
+        if level > DEEPEST {
+            let line = document.text_pos_at(node.range().start).row;
+            let name = node.tag_name().name();
+            let message = format!("line {line}: <{name}>: elements are nested over {DEEPEST} deep");
+            return Err(parse_error(path, message));
+        }
+        let inner = node.children().filter(Node::is_element);
+        open.extend(inner.map(|child| (child, level + 1)));
+    }
+    Ok(())
+}

@@ -42,6 +42,8 @@ use sources::Sources;
 
 /// Largest radius of a body over the gap that it resolves: a needle's proxies are as many as its length asks for.
 const MOST_ALONG: f64 = 1e4;
+/// Radius of the largest body that is compressed, over its volume by its area: 1.5 · 10⁴ thicknesses of a rod.
+const MOST_SLENDER: f64 = 3e4;
 /// Most proxies at the smallest distance; a smaller gap isn't resolved on so large a body.
 const MOST_PROXIES: f64 = 900.0;
 /// Largest gap that is asked to be resolved, in radii of the body.
@@ -138,6 +140,16 @@ pub fn compress(
     let Ball { center, radius } = mesh.bounding_ball();
     let area = surface.faces.area();
     let warnings = response.warnings().to_vec();
+    let slenderness = radius * area / surface.faces.volume();
+    if slenderness > MOST_SLENDER {
+        return Err(Error::Unresolved {
+            place: format!("body {name:?}"),
+            quantity: "radius over volume by area".into(),
+            value: slenderness,
+            limit: MOST_SLENDER,
+            remedy: "so slender a body isn't compressed: its places would take minutes and gigabytes; use the fidelity full or isolated, or several bodies in a row".into(),
+        });
+    }
     let finest = finest_gap(area).max(radius / MOST_ALONG);
     let asked = settings.resolved_gap;
     if let Some(far) = asked.filter(|g| *g > FARTHEST * radius) {

@@ -9,8 +9,8 @@ use hydrograd::dynamics::{
     Stepper, System,
 };
 use hydrograd::scene::{
-    Body, Current, Damping, Drag, DragPart, Edge, Fin, Float, Fluid, Joint, Mimic, Motion, Passive,
-    Plane, Scene, Shape, Spring, Tendon, Thruster,
+    Body, Current, Damping, Drag, DragPart, Edge, Fin, Float, Fluid, Force, Joint, Mimic, Motion,
+    Passive, Plane, Scene, Shape, Spring, Tendon, Thruster,
 };
 use hydrograd::simulate::{Pd, PdAxis};
 use hydrograd::{Controls, Rollout, Settings, Simulator};
@@ -51,7 +51,7 @@ pub fn rungs() -> Vec<Rung> {
 pub fn scene() -> Scene {
     let mut scene = Scene::new(Fluid {
         density: 998.0,
-        current: [0.2, -0.1, 0.0],
+        current: [0.1, -0.3, 0.0],
     });
     scene.gravity = [0.3, 0.1, -2.0];
     scene.add_wall([0.0, 0.0, -0.6], [0.0, 0.0, 1.0]);
@@ -229,7 +229,7 @@ pub fn scene() -> Scene {
     };
     let deep = Current::new([0.12, -0.36, 0.0]).profile(profile);
     scene.add_force(deep.over_time(tide.clone()).into());
-    scene.add_force(Current::new([0.1, 0.2, 0.0]).over_time(tide).into());
+    scene.add_force(Current::new([-0.07, 0.21, 0.0]).over_time(tide).into());
     scene
 }
 
@@ -641,6 +641,12 @@ pub fn still() -> &'static Simulator {
     MADE.get_or_init(|| {
         let mut scene = scene();
         scene.fluid.current = [0.2, 0.0, 0.0];
+        // It isn't level, so it flows through no water that changes with depth.
+        for force in &mut scene.forces {
+            if let Force::Current(current) = force {
+                current.profile.clear();
+            }
+        }
         for body in &mut scene.bodies {
             body.motion = None;
         }

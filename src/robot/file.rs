@@ -5,6 +5,7 @@ use crate::shape::Shape;
 use crate::{Error, Result};
 use roxmltree::{Document, Node};
 use std::collections::HashMap;
+use std::panic::{AssertUnwindSafe, catch_unwind};
 use std::path::{Path, PathBuf};
 
 /// Deepest nesting of elements; URDF needs six, MJCF one a body in a chain.
@@ -26,6 +27,21 @@ pub(super) struct File {
     pub shapes: HashMap<String, Shape>,
     /// What is to be told.
     pub notes: Vec<String>,
+}
+
+impl File {
+    /// Of a robot of which nothing more is known.
+    pub fn new(path: &Path, robot: urdf_rs::Robot) -> Self {
+        Self {
+            path: path.to_owned(),
+            robot,
+            joints: Vec::new(),
+            unused: Vec::new(),
+            extras: HashMap::new(),
+            shapes: HashMap::new(),
+            notes: Vec::new(),
+        }
+    }
 }
 
 /// What drives and springs add to a joint.
@@ -56,6 +72,24 @@ pub(super) fn parse_error(path: &Path, message: impl Into<String>) -> Error {
         path: path.to_owned(),
         message: message.into(),
     }
+}
+
+/// What another's parser makes of a file, which may panic on what no exporter writes: here that is an error. `kind` is what the file isn't yet.
+pub(super) fn guarded<T, E: std::fmt::Display>(
+    path: &Path,
+    kind: &str,
+    read: impl FnOnce() -> std::result::Result<T, E>,
+) -> Result<T> {
+    let why = match catch_unwind(AssertUnwindSafe(read)) {
+        Ok(Ok(made)) => return Ok(made),
+        Ok(Err(error)) => {
+            let why = error.to_string();
+            let why = why.split_whitespace().collect::<Vec<_>>().join(" ");
+            format!("{why}; this is not {kind} yet")
+        }
+        Err(_) => "the contents can't be understood; export it again".into(),
+    };
+    Err(parse_error(path, why))
 }
 
 /// Refuses elements within elements without end.

@@ -3,9 +3,9 @@
 //! The tree of bodies becomes links and joints under a massless link `world`; a body with several joints a chain of massless links, and sites links at fixed joints. As a link's frame is
 //! its joint's, that of a body whose joint isn't at its origin is at the joint. `mjcf-rs` reads the file: includes, defaults, angles and frames are resolved there.
 
-use super::file::{Extra, File, JointText, LARGEST, parse_error};
+use super::file::{Extra, File, JointText, LARGEST, guarded};
 use super::inertia::Inertial;
-use super::mjcf_geometry::{Geometries, isometry, mass_properties};
+use super::mjcf_geometry::{Geometries, Solid, isometry};
 use super::mjcf_left_out::LeftOut;
 use super::tree::unplaced;
 use crate::{Error, Result};
@@ -15,44 +15,27 @@ use mjcf_rs::equality::Equality;
 use mjcf_rs::{BodyId, Model};
 use nalgebra::{Isometry3, Matrix3, Translation3, Vector3};
 use roxmltree::Document;
-use std::collections::{HashMap, HashSet};
-use std::panic::{AssertUnwindSafe, catch_unwind};
+use std::collections::HashSet;
 use std::path::Path;
 
 /// A file whose outermost element is `mujoco`.
 pub(super) fn parse(path: &Path, document: &Document) -> Result<File> {
     let mut left_out = LeftOut::default();
     left_out.look(path, document)?;
-    let model = catch_unwind(AssertUnwindSafe(|| Model::from_file(path)));
-    let model = match model {
-        Ok(Ok(model)) => model,
-        Ok(Err(error)) => {
-            let message = format!("{error}; this is not an MJCF file yet");
-            return Err(parse_error(path, message));
-        }
-        Err(_) => {
-            let message = "the contents can't be understood; export it again";
-            return Err(parse_error(path, message));
-        }
-    };
+    let model = guarded(path, "an MJCF file", || Model::from_file(path))?;
     let mut made = Made {
         path,
         model: &model,
-        file: File {
-            path: path.to_owned(),
-            robot: urdf_rs::Robot {
+        file: File::new(
+            path,
+            urdf_rs::Robot {
                 name: model.name.clone().unwrap_or_else(|| "robot".into()),
                 version: None,
                 links: Vec::new(),
                 joints: Vec::new(),
                 materials: Vec::new(),
             },
-            joints: Vec::new(),
-            unused: Vec::new(),
-            extras: HashMap::new(),
-            shapes: HashMap::new(),
-            notes: Vec::new(),
-        },
+        ),
         taken: HashSet::new(),
         frames: Vec::new(),
     };
@@ -101,15 +84,11 @@ impl Made<'_> {
     fn checked(&self, of: &str, pose: &mjcf_rs::Pose) -> Result<Isometry3<f64>> {
         let (p, q) = (pose.translation, pose.rotation);
         self.check(of, "pose", &[p.x, p.y, p.z, q.x, q.y, q.z, q.w])?;
-        let out = isometry(pose);
-        match (out.rotation.norm() - 1.0).abs() < 1e-6 {
-            true => Ok(out),
-            false => Err(self.wrong(
-                &format!("{of}: pose"),
-                format!("{:?}", out.rotation.coords.as_slice()),
-                "a rotation's quaternion or axis can't be zero",
-            )),
+        if q.length() == 0.0 {
+            let remedy = "a rotation's quaternion can't be zero";
+            return Err(self.wrong(&format!("{of}: pose"), "0 0 0 0", remedy));
         }
+        Ok(isometry(pose))
     }
 
     /// A name that no link has yet.
@@ -165,10 +144,11 @@ impl Made<'_> {
             mimic: None,
             safety_controller: None,
         });
+        // Here a joint without a range is no mistake.
         self.file.joints.push(JointText {
             line: None,
-            has_range: false,
-            has_limit: false,
+            has_range: true,
+            has_limit: true,
         });
         let last = self.file.robot.joints.len() - 1;
         &mut self.file.robot.joints[last]
@@ -314,20 +294,8 @@ impl Made<'_> {
                 friction: given.frictionloss,
             });
         }
-        if let Some([lower, upper]) = range {
-            (joint.limit.lower, joint.limit.upper) = (lower, upper);
-        }
-        if range.is_none() && one && given.type_ == JointType::Hinge {
-            joint.joint_type = urdf_rs::JointType::Continuous;
-        }
-        if let Some(text) = self.file.joints.last_mut() {
-            // A slide without a range is no mistake here.
-            (text.has_range, text.has_limit) = (true, true);
-        }
-        if range.is_none() && given.type_ == JointType::Slide {
-            let limit = &mut self.join_last().limit;
-            (limit.lower, limit.upper) = (f64::NEG_INFINITY, f64::INFINITY);
-        }
+        let [lower, upper] = range.unwrap_or([f64::NEG_INFINITY, f64::INFINITY]);
+        (joint.limit.lower, joint.limit.upper) = (lower, upper);
         if one {
             let extra = Extra {
                 stiffness: given.stiffness,
@@ -340,9 +308,17 @@ impl Made<'_> {
         Ok(())
     }
 
-    fn join_last(&mut self) -> &mut urdf_rs::Joint {
-        let last = self.file.robot.joints.len() - 1;
-        &mut self.file.robot.joints[last]
+    /// A piece as URDF has it: a shape stands under a name in a mesh's place.
+    fn geometry(&mut self, solid: &Solid) -> urdf_rs::Geometry {
+        let (filename, scale) = match solid {
+            Solid::Shape(shape) => {
+                let name = format!("{shape:?}");
+                self.file.shapes.insert(name.clone(), shape.clone());
+                (name, None)
+            }
+            Solid::Mesh(file, scale) => (file.display().to_string(), Some(urdf_rs::Vec3(*scale))),
+        };
+        urdf_rs::Geometry::Mesh { filename, scale }
     }
 
     /// Mass and geometry of a body; `own` is its frame in the link's.
@@ -354,46 +330,50 @@ impl Made<'_> {
         own: &Isometry3<f64>,
     ) -> Result<()> {
         let geometries = Geometries::new(self.path, self.model, of);
+        let mut solids = Vec::new();
         for geom in &body.geoms {
             self.check(of, "size of a geom", &geom.size)?;
             if let Some(ends) = &geom.fromto {
                 self.check(of, "fromto of a geom", ends)?;
             }
             let pose = self.checked(&format!("{of}: geom"), &geom.pose)?;
-            match geometries.read(geom, &pose)? {
-                Ok((geometry, shape, at)) => {
-                    if let Some(shape) = shape {
-                        let urdf_rs::Geometry::Mesh { filename, .. } = &geometry else {
-                            continue;
-                        };
-                        self.file.shapes.insert(filename.clone(), shape);
-                    }
-                    let origin = unplaced(&(own * at));
-                    let touches = geom.contype != 0 || geom.conaffinity != 0;
-                    match touches {
-                        true => link.collision.push(urdf_rs::Collision {
-                            name: geom.name.clone(),
-                            origin,
-                            geometry,
-                        }),
-                        false => link.visual.push(urdf_rs::Visual {
-                            name: geom.name.clone(),
-                            origin,
-                            geometry,
-                            material: None,
-                        }),
-                    }
-                }
-                Err(why) => self.file.notes.push(format!("{of}: {why}")),
+            let Some((solid, at)) = geometries.read(geom, &pose)? else {
+                let note = format!("{of}: a geom of the kind {:?} isn't read", geom.type_);
+                self.file.notes.push(note);
+                continue;
+            };
+            let (name, origin) = (geom.name.clone(), unplaced(&(own * at)));
+            let geometry = self.geometry(&solid);
+            match geom.contype != 0 || geom.conaffinity != 0 {
+                true => link.collision.push(urdf_rs::Collision {
+                    name,
+                    origin,
+                    geometry,
+                }),
+                false => link.visual.push(urdf_rs::Visual {
+                    name,
+                    origin,
+                    geometry,
+                    material: None,
+                }),
             }
+            solids.push((geom, (solid, at)));
         }
         let from_geoms = match (self.model.compiler.inertia_from_geom, &body.inertial) {
             (InertiaFromGeom::True, _) | (InertiaFromGeom::Auto, None) => true,
             (InertiaFromGeom::False, _) | (InertiaFromGeom::Auto, Some(_)) => false,
         };
+        let density = self.model.compiler.inertia_density;
         let found = match (&body.inertial, from_geoms) {
             (Some(given), false) => Some(self.inertial(of, given)?),
-            (_, true) => mass_properties(&geometries, body, self.model.compiler.inertia_density)?,
+            (_, true) => {
+                let each = solids.iter();
+                let parts = each.map(|(geom, solid)| geometries.inertial(geom, solid, density));
+                let parts = parts
+                    .filter_map(Result::transpose)
+                    .collect::<Result<Vec<_>>>()?;
+                Some(Inertial::together(&parts)).filter(|whole| whole.mass > 0.0)
+            }
             (None, false) => None,
         };
         if let Some(found) = found {

@@ -42,6 +42,48 @@ pub(super) struct Loaded {
     pub hull: Option<TriMesh>,
 }
 
+impl Loaded {
+    /// The mesh in a file with its coordinates times `scale`; `place` begins messages.
+    ///
+    /// # Errors
+    /// A scale that can't be, a file that can't be read, and vertices that aren't finite.
+    pub fn new(path: PathBuf, scale: [f64; 3], place: &str) -> Result<Self> {
+        if scale.iter().any(|s| !(1e-9..=1e9).contains(&s.abs())) {
+            return Err(Error::input(
+                format!("{place}: scale of mesh {}", path.display()),
+                format!("{scale:?}"),
+                "give factors that aren't zero, e.g. 0.001 0.001 0.001 for a file in millimetres",
+            ));
+        }
+        let mut mesh = read_unchecked(&path, 1.0).map_err(|e| e.of(place))?;
+        for x in &mut mesh.vertices {
+            x.component_mul_assign(&Vec3::from(scale));
+        }
+        if scale.iter().product::<f64>() < 0.0 {
+            // A mirrored surface is turned inside out.
+            mesh.faces.iter_mut().for_each(|face| face.swap(1, 2));
+        }
+        if let Some(bad) = mesh
+            .vertices
+            .iter()
+            .find(|x| !x.iter().all(|x| x.is_finite()))
+        {
+            return Err(Error::input(
+                format!("{place}: mesh {}", path.display()),
+                format!("a vertex at {:?}", bad.as_slice()),
+                "must be finite: export the mesh again",
+            ));
+        }
+        let used = mesh.faces.iter().flatten();
+        let points: Vec<Vec3> = used
+            .filter_map(|v| mesh.vertices.get(*v))
+            .copied()
+            .collect();
+        let hull = hull(&format!("convex hull of {}", path.display()), &points).ok();
+        Ok(Self { path, mesh, hull })
+    }
+}
+
 pub(super) fn moved(at: &Isometry3<f64>, x: &Vec3) -> Vec3 {
     (at * Point3::from(*x)).coords
 }
@@ -170,44 +212,12 @@ impl<'f> Meshes<'f> {
 
     fn mesh(&mut self, name: &str, scale: [f64; 3], link: usize) -> Result<Rc<Loaded>> {
         let place = link_place(self.file, link);
-        if scale.iter().any(|s| !(1e-9..=1e9).contains(&s.abs())) {
-            return Err(Error::input(
-                format!("{place}: scale of mesh {name:?}"),
-                format!("{scale:?}"),
-                "give factors that aren't zero, e.g. 0.001 0.001 0.001 for a file in millimetres",
-            ));
-        }
         let path = self.folders.find(name, &place)?;
         let key = (path.clone(), scale.map(f64::to_bits));
         if let Some(known) = self.loaded.get(&key) {
             return Ok(known.clone());
         }
-        let mut mesh = read_unchecked(&path, 1.0).map_err(|e| e.of(&place))?;
-        for x in &mut mesh.vertices {
-            x.component_mul_assign(&Vec3::from(scale));
-        }
-        if scale.iter().product::<f64>() < 0.0 {
-            // A mirrored surface is turned inside out.
-            mesh.faces.iter_mut().for_each(|face| face.swap(1, 2));
-        }
-        if let Some(bad) = mesh
-            .vertices
-            .iter()
-            .find(|x| !x.iter().all(|x| x.is_finite()))
-        {
-            return Err(Error::input(
-                format!("{place}: mesh {}", path.display()),
-                format!("a vertex at {:?}", bad.as_slice()),
-                "must be finite: export the mesh again",
-            ));
-        }
-        let used = mesh.faces.iter().flatten();
-        let points: Vec<Vec3> = used
-            .filter_map(|v| mesh.vertices.get(*v))
-            .copied()
-            .collect();
-        let hull = hull(&format!("convex hull of {}", path.display()), &points).ok();
-        let loaded = Rc::new(Loaded { path, mesh, hull });
+        let loaded = Rc::new(Loaded::new(path, scale, &place)?);
         self.loaded.insert(key, loaded.clone());
         Ok(loaded)
     }

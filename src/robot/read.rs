@@ -3,14 +3,13 @@
 //! `urdf-rs` gives the typed form. It passes over what it doesn't know and says neither where an error is nor what was left out, so the text
 //! is first looked through as XML: what can't be is refused there with line and name, and what isn't used is listed.
 
-use super::file::{File, JointText, LARGEST, check_depth, parse_error};
+use super::file::{File, JointText, LARGEST, check_depth, guarded, parse_error};
 use super::mjcf;
 use super::report::Unused;
 use crate::{Error, Result};
 use roxmltree::{Document, Node};
-use std::collections::{BTreeMap, HashMap};
+use std::collections::BTreeMap;
 use std::io;
-use std::panic::{AssertUnwindSafe, catch_unwind};
 use std::path::Path;
 
 /// Reads a file.
@@ -59,32 +58,14 @@ fn parse(path: &Path, text: &str) -> Result<File> {
         }
     });
     let joints = joints.collect();
-    // The parser of others may panic on what no exporter writes; here that is an error.
-    let robot = catch_unwind(AssertUnwindSafe(|| urdf_rs::read_from_string(text)));
-    let robot = match robot {
-        Ok(Ok(robot)) => robot,
-        Ok(Err(error)) => {
-            let why = error.to_string();
-            let why = why.split_whitespace().collect::<Vec<_>>().join(" ");
-            let message = format!("{why}; this is not a URDF file yet");
-            return Err(parse_error(path, message));
-        }
-        Err(_) => {
-            let message = "the contents can't be understood; export it again";
-            return Err(parse_error(path, message));
-        }
-    };
+    let robot = guarded(path, "a URDF file", || urdf_rs::read_from_string(text))?;
     let unused = look.unused.into_iter();
     Ok(File {
-        path: path.to_owned(),
-        robot,
         joints,
         unused: unused
             .map(|(what, (count, line))| Unused { what, count, line })
             .collect(),
-        extras: HashMap::new(),
-        shapes: HashMap::new(),
-        notes: Vec::new(),
+        ..File::new(path, robot)
     })
 }
 

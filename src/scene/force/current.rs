@@ -1,7 +1,7 @@
 //! Currents that change with depth and time.
 
 use super::super::Motion;
-use super::{Force, Scene, number};
+use super::{Force, Scene, dot, number};
 use crate::{Error, Result};
 use serde::{Deserialize, Serialize};
 
@@ -100,9 +100,8 @@ impl Current {
         if !self.profile.is_empty() {
             let up = scene.up();
             let level = |velocity: [f64; 3]| {
-                let along: f64 = up.iter().zip(&velocity).map(|(u, v)| u * v).sum();
                 let size = velocity.iter().fold(0.0, |m: f64, x| m.max(x.abs()));
-                along.abs() <= LEVEL * size
+                dot(up, velocity).abs() <= LEVEL * size
             };
             let refuse = |place: String, velocity: [f64; 3], remedy: &str| {
                 Err(Error::input(place, format!("{velocity:?}"), remedy))

@@ -194,21 +194,21 @@ fn unit(direction: [f64; 3]) -> [f64; 3] {
 /// Largest cosine of an angle that counts as right.
 const SQUARE: f64 = 1e-6;
 
-fn cosine(a: [f64; 3], b: [f64; 3]) -> f64 {
+fn dot(a: [f64; 3], b: [f64; 3]) -> f64 {
     a.iter().zip(&b).map(|(x, y)| x * y).sum()
 }
 
 /// Directions of length one, the second at a right angle to the first.
 fn square(first: [f64; 3], second: [f64; 3]) -> ([f64; 3], [f64; 3]) {
     let (first, second) = (unit(first), unit(second));
-    let along = cosine(first, second);
+    let along = dot(first, second);
     let across = std::array::from_fn(|k| second[k] - along * first[k]);
     (first, unit(across))
 }
 
 /// Refuses a direction that isn't at a right angle to another, of which `name` tells.
 fn across(place: String, first: [f64; 3], second: [f64; 3], name: &str) -> Result<()> {
-    let cosine = cosine(unit(first), unit(second));
+    let cosine = dot(unit(first), unit(second));
     match cosine.abs() <= SQUARE {
         true => Ok(()),
         false => Err(Error::input(

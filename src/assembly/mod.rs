@@ -11,7 +11,7 @@ use crate::adjoint::drag::Element;
 use crate::adjoint::lie::{Mat3, Vec3};
 use crate::adjoint::waterline::Hull;
 use crate::coupling::Isolated;
-use crate::dynamics::force::{Streams, Waterline};
+use crate::dynamics::force::Streams;
 use crate::dynamics::{
     Armature, BodyData, BodyValues, Declarations, Drift, Drive, FreeMotions, Parameters, SiteData,
     Stepper, System, force,
@@ -217,7 +217,6 @@ pub(crate) fn assemble(
             .collect(),
         None => Vec::new(),
     };
-    let gravity = Vec3::from(scene.gravity);
     let mut declared = Declarations::new(scene.fluid.density, &values);
     let points = surfaces.iter().zip(&values).map(|(s, v)| {
         s.as_ref()
@@ -236,9 +235,7 @@ pub(crate) fn assemble(
         values: &values,
         surfaces: &faces,
         hulls: &hulls,
-        waterline: scene
-            .waterline
-            .map(|height| Waterline::new(&gravity, height)),
+        waterline: scene.waterline.map(|_| streams.surface()),
         lubricated: lubrication::lubricated(scene, &surfaces, &clearance)?,
         streams: streams.clone(),
         added_mass,

@@ -89,14 +89,7 @@ impl Evaluation<'_> {
         v: &'b DVector<f64>,
         control: &'b DVector<f64>,
     ) -> Moving<'b> {
-        Moving {
-            place: self.place(),
-            twists,
-            v,
-            current: &self.system.current,
-            streams: &self.system.streams,
-            control,
-        }
+        self.system.moving(self.place(), twists, v, control)
     }
 
     /// The same without motion.

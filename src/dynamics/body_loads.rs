@@ -60,11 +60,4 @@ impl Linearisation<'_> {
         };
         self.system.smooth_forces().map(of).collect()
     }
-
-    /// The wrench on each body from what carries it, by its joint, the drive's part of it included: what its momentum and those of all that it carries gain beyond `given`, the
-    /// sum of all other wrenches.
-    pub fn joint_wrenches(&self, rates: &[Vec6], given: &[Vec6]) -> Vec<Vec6> {
-        let missing = rates.iter().zip(given).map(|(rate, given)| rate - given);
-        self.system.tree.composite(missing.collect())
-    }
 }

@@ -1,12 +1,12 @@
 //! A system: the tree, its bodies' constants, and the coupling through the water.
 
-use super::force::{ForceModel, Streams};
-use super::{Armature, BodyData, ContactModel, Drift, JointLimit, SiteData};
-use crate::adjoint::lie::Vec3;
+use super::force::{ForceModel, Moving, Place, Streams};
+use super::{Armature, BodyData, ContactModel, Drift, JointLimit, Parameters, SiteData};
+use crate::adjoint::lie::{Vec3, Vec6};
 use crate::coupling::Coupling;
 use crate::multibody::Tree;
 use crate::scene::Motion;
-use nalgebra::DMatrix;
+use nalgebra::{DMatrix, DVector};
 use std::sync::Arc;
 
 /// What moves a joint.
@@ -81,6 +81,29 @@ impl System {
     pub(super) fn dampers(&self) -> impl Iterator<Item = &dyn ForceModel> {
         let all = self.forces.iter().map(AsRef::as_ref);
         all.filter(|f: &&dyn ForceModel| f.solved_with_contact())
+    }
+
+    /// Bodies and joints as forces see them: spatial `twists`, velocity and controls at a place.
+    pub fn moving<'m>(
+        &'m self,
+        place: Place<'m>,
+        twists: &'m [Vec6],
+        v: &'m DVector<f64>,
+        control: &'m DVector<f64>,
+    ) -> Moving<'m> {
+        Moving {
+            place,
+            twists,
+            v,
+            current: &self.current,
+            streams: &self.streams,
+            control,
+        }
+    }
+
+    /// Velocity of the undisturbed water at the point `x` of the world at the time `t` (s): m/s.
+    pub fn water_velocity(&self, x: &Vec3, t: f64, parameters: &Parameters) -> Vec3 {
+        self.current + self.streams.at(x, t, parameters).velocity
     }
 
     /// Whether the water moves past bodies at rest.

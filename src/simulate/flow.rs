@@ -1,8 +1,7 @@
 //! The water's velocity around the bodies.
 
 use super::{Rollout, Sample, Simulator};
-use crate::adjoint::lie::{Pose, Vec3, Vec6, six};
-use crate::dynamics::force::Place;
+use crate::adjoint::lie::{Pose, Vec3, Vec6};
 use crate::geometry::{Distance, Other};
 use crate::{Error, Result};
 
@@ -27,27 +26,16 @@ impl Simulator {
                 return Err(self.too_near(i, point, &obstacle));
             }
         }
-        let place = Place {
-            poses: &kinematics.poses,
-            q,
-            time: sample.time,
-            parameters,
-        };
-        let past = |(b, twist): (usize, Vec6)| {
-            let water = system.current + system.streams.at_body(b, &place).velocity;
-            twist - six(&water, &Vec3::zeros())
-        };
         let twists = system.tree.twists(&kinematics, v);
-        let through: Vec<Vec6> = twists.into_iter().enumerate().map(past).collect();
+        let at = system.moving(sample.place(parameters), &twists, v, &sample.control);
+        let through: Vec<Vec6> = (0..twists.len()).map(|b| at.relative(b)).collect();
         let through = system.submerged_twists(&kinematics, &through);
         let poses: Vec<Pose> = (system.submerged().map(|(b, _)| kinematics.poses[b])).collect();
         let made = system.coupling.velocity(&poses, &through, points)?;
-        let undisturbed = |x: &Vec3| {
-            let stream = system.streams.at(x, sample.time, parameters);
-            system.current + stream.velocity
-        };
         let each = made.into_iter().zip(points);
-        Ok(each.map(|(u, x)| u + undisturbed(x)).collect())
+        Ok(each
+            .map(|(u, x)| u + system.water_velocity(x, sample.time, parameters))
+            .collect())
     }
 
     /// What is too near to a point.

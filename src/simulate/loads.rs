@@ -108,28 +108,19 @@ impl Equations<'_> {
         for (name, wrenches) in further {
             add(&mut kinds, name, wrenches);
         }
-        let mut given = vec![Vec6::zeros(); system.len()];
+        // What a body's momentum gains beyond all this comes across joints: from what carries it, less what it hands on.
+        let mut missing = e.rigid_rates(v, acceleration);
         for (_, wrenches) in &kinds {
-            given
-                .iter_mut()
-                .zip(wrenches)
-                .for_each(|(sum, w)| *sum += w);
+            let each = missing.iter_mut().zip(wrenches);
+            each.for_each(|(left, w)| *left -= w);
         }
-        let across = e.joint_wrenches(&e.rigid_rates(v, acceleration), &given);
-        let columns = &e.kinematics.columns;
-        let mut joint_forces = DVector::zeros(n);
-        for (link, wrench) in system.tree.links().iter().zip(&across) {
-            for (column, k) in link.terms() {
-                joint_forces[k] += columns[column].dot(wrench);
-            }
-        }
-        let poses = self.poses();
+        let (tree, poses) = (&system.tree, self.poses());
         let kinds = kinds.into_iter();
         Ok(Loads {
             acceleration: acceleration.clone(),
             kinds: kinds.map(|(name, w)| (name, about(poses, w))).collect(),
-            joints: about(poses, across),
-            joint_forces,
+            joint_forces: tree.project(&e.kinematics.columns, missing.clone()),
+            joints: about(poses, tree.composite(missing)),
         })
     }
 }

@@ -2,6 +2,8 @@
 
 use crate::adjoint::lie::{Pose, Vec6};
 use crate::coupling::CouplingReport;
+use crate::dynamics::Parameters;
+use crate::dynamics::force::Place;
 use crate::geometry::Gap;
 use nalgebra::DVector;
 
@@ -37,6 +39,16 @@ pub struct Sample {
 }
 
 impl Sample {
+    /// Where bodies and joints are, as forces see them.
+    pub(super) fn place<'s>(&'s self, parameters: &'s Parameters) -> Place<'s> {
+        Place {
+            poses: &self.poses,
+            q: &self.q,
+            time: self.time,
+            parameters,
+        }
+    }
+
     /// Kinetic and potential energy, J.
     pub fn energy(&self) -> f64 {
         self.kinetic_energy + self.potential_energy

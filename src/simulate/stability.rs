@@ -6,7 +6,6 @@
 
 use super::{Rollout, Sample, Simulator};
 use crate::adjoint::lie::{Vec6, angular, point_velocity};
-use crate::dynamics::force::{Moving, Place};
 use crate::dynamics::{Drive, System};
 use crate::error::readable;
 use nalgebra::DVector;
@@ -139,19 +138,7 @@ impl Rollout {
     fn driven_power(&self, s: &Sample, control: &DVector<f64>) -> f64 {
         let (system, parameters) = (self.simulator.system(), self.simulator.parameters());
         let twists = system.tree.twists(&system.tree.kinematics(&s.q), &s.v);
-        let at = Moving {
-            place: Place {
-                poses: &s.poses,
-                q: &s.q,
-                time: s.time,
-                parameters,
-            },
-            twists: &twists,
-            v: &s.v,
-            current: &system.current,
-            streams: &system.streams,
-            control,
-        };
+        let at = system.moving(s.place(parameters), &twists, &s.v, control);
         system.forces.iter().map(|f| f.driven_power(&at)).sum()
     }
 
@@ -194,13 +181,7 @@ impl Rollout {
             let mass = parameters.mass(b) + parameters.density() * body.volume;
             let speed = point_velocity(twist, &s.poses[b].translation).norm();
             let turning = body.volume.cbrt() * angular(twist).norm();
-            let place = Place {
-                poses: &s.poses,
-                q: &s.q,
-                time: s.time,
-                parameters,
-            };
-            let water = system.current + system.streams.at_body(b, &place).velocity;
+            let water = system.water_velocity(&s.poses[b].translation, s.time, parameters);
             let square = speed.powi(2) + turning.powi(2) + water.norm_squared();
             0.5 * mass * square
         };

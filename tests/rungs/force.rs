@@ -118,19 +118,13 @@ impl At {
     }
 
     fn moving(&self) -> Moving<'_> {
-        Moving {
-            place: Place {
-                poses: &self.poses,
-                q: &self.q,
-                time: dynamics::TIME,
-                parameters: &self.parameters,
-            },
-            twists: &self.twists,
-            v: &self.v,
-            current: &self.system.current,
-            streams: &self.system.streams,
-            control: &self.control,
-        }
+        let place = Place {
+            poses: &self.poses,
+            q: &self.q,
+            time: dynamics::TIME,
+            parameters: &self.parameters,
+        };
+        (self.system).moving(place, &self.twists, &self.v, &self.control)
     }
 
     fn loads(&self, force: &dyn ForceModel) -> Loads {

@@ -4,6 +4,7 @@
 //! acceleration is V f(d) ġ(t): moving with itself it stays at its depth.
 
 use super::curve::Curve;
+use super::waterline::Waterline;
 use super::{LoadBars, Place};
 use crate::adjoint::lie::{Vec3, point_wrench};
 use crate::dynamics::Parameters;
@@ -18,13 +19,10 @@ const SHARE: Declared = Declared::new("share", "1")
     .size(|value, _| value.abs().max(1e-3));
 
 /// Currents of a scene.
-#[derive(Default)]
 pub struct Streams {
     currents: Vec<Law>,
-    /// Against gravity, a unit vector.
-    up: Vec3,
-    /// Where depth is zero, m along `up`.
-    surface: f64,
+    /// Where depth is zero.
+    surface: Waterline,
     /// Where a body feels them, by body: in its frame, m.
     points: Vec<Vec3>,
 }
@@ -67,10 +65,17 @@ impl Streams {
         };
         Self {
             currents: scene.currents().map(&mut law).collect(),
-            up: scene.up().into(),
-            surface: scene.waterline.unwrap_or(0.0),
+            surface: Waterline {
+                up: scene.up().into(),
+                height: scene.waterline.unwrap_or(0.0),
+            },
             points,
         }
+    }
+
+    /// Where depths are counted from: the water's surface, if it has one.
+    pub fn surface(&self) -> Waterline {
+        self.surface
     }
 
     /// Whether there is none.
@@ -87,7 +92,7 @@ impl Streams {
     /// The water at the point `x` of the world at the time `t`, s.
     pub fn at(&self, x: &Vec3, t: f64, parameters: &Parameters) -> Undisturbed {
         let mut out = Undisturbed::default();
-        let depth = self.depth(x);
+        let depth = self.surface.depth(x);
         for law in &self.currents {
             let ([factor, rate], share) = (law.factor(t), law.share(depth, parameters).0);
             let velocity = parameters.point(law.velocity);
@@ -117,7 +122,7 @@ impl Streams {
             return;
         }
         let (x, parameters) = (self.point(b, place), place.parameters);
-        let depth = self.depth(&x);
+        let depth = self.surface.depth(&x);
         let mut depth_bar = 0.0;
         for law in &self.currents {
             let [factor, rate] = law.factor(place.time);
@@ -130,15 +135,11 @@ impl Streams {
                 bar.parameters[parameter] += by * share_bar;
             }
         }
-        bar.pose[b] += point_wrench(&x, &(-depth_bar * self.up));
+        bar.pose[b] += point_wrench(&x, &(-depth_bar * self.surface.up));
     }
 
     fn point(&self, b: usize, place: &Place) -> Vec3 {
         place.poses[b].apply(&self.points[b])
-    }
-
-    fn depth(&self, x: &Vec3) -> f64 {
-        self.surface - self.up.dot(x)
     }
 }
 

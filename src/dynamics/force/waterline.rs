@@ -7,7 +7,7 @@ use crate::adjoint::lie::{Pose, Vec3, Vec6, angular, linear, six};
 use crate::adjoint::waterline::{Below, Hull};
 use crate::dynamics::parameters::{DENSITY, Declarations, Parameter, Parameters, volume};
 
-/// The surface of still water.
+/// The surface of still water, or where depths are counted from.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Waterline {
     /// Against gravity, a unit vector.
@@ -17,12 +17,6 @@ pub struct Waterline {
 }
 
 impl Waterline {
-    /// Across the gravity `gravity`, m/s², which isn't zero.
-    pub fn new(gravity: &Vec3, height: f64) -> Self {
-        let up = -gravity.normalize();
-        Self { up, height }
-    }
-
     /// How far a point of the world is below it, m.
     pub fn depth(&self, x: &Vec3) -> f64 {
         self.height - self.up.dot(x)

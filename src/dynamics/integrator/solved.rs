@@ -4,7 +4,7 @@ use super::{StepRecord, Stepper};
 use crate::Result;
 use crate::adjoint::lie::{Vec3, Vec6, point_wrench, six};
 use crate::dynamics::ContactForce;
-use crate::dynamics::force::{Loads, Moving, Place};
+use crate::dynamics::force::{Loads, Place};
 use nalgebra::DVector;
 
 /// What a step solved with its velocities; in a step of several pieces their mean.
@@ -52,14 +52,8 @@ impl Stepper<'_> {
                 time: stepper.time(&state),
                 parameters: self.parameters,
             };
-            let at = Moving {
-                place,
-                twists: &system.tree.twists(&kinematics, acting),
-                v: acting,
-                current: &system.current,
-                streams: &system.streams,
-                control: &record.input.control,
-            };
+            let twists = system.tree.twists(&kinematics, acting);
+            let at = system.moving(place, &twists, acting, &record.input.control);
             for (force, (_, sum)) in system.dampers().zip(&mut out.dampers) {
                 let mut loads = Loads::zeros(n, nv);
                 force.add(&at, &mut loads);

@@ -22,21 +22,38 @@ pub(crate) fn fits(what: &str, bytes: f64, instead: &str) -> Result<()> {
     if bytes < SMALL {
         return Ok(());
     }
-    within(what, bytes, PART * free(), instead)
+    within(what, bytes, PART * free(), instead)?;
+    match given(bytes) {
+        true => Ok(()),
+        false => Err(refused(what, bytes, "the allocator gives less", instead)),
+    }
 }
 
 fn within(what: &str, bytes: f64, free: f64, instead: &str) -> Result<()> {
-    if bytes <= free {
-        return Ok(());
+    match bytes <= free {
+        true => Ok(()),
+        false => {
+            let less = format!("{free:.3e} may be used here");
+            Err(refused(what, bytes, &less, instead))
+        }
     }
-    Err(Error::Unsupported {
+}
+
+fn refused(what: &str, bytes: f64, less: &str, instead: &str) -> Error {
+    Error::Unsupported {
         what: what.into(),
-        why: format!(
-            "it would take {:.3e} bytes of memory, and {free:.3e} may be used here",
-            bytes
-        ),
+        why: format!("it would take {bytes:.3e} bytes of memory, and {less}"),
         instead: instead.into(),
-    })
+    }
+}
+
+/// Whether the allocator gives so many at once; they are given back untouched.
+fn given(bytes: f64) -> bool {
+    let mut asked: Vec<u8> = Vec::new();
+    let given = asked.try_reserve_exact(bytes as usize).is_ok();
+    // Nobody reads it: without this the compiler may leave the question out.
+    std::hint::black_box(&asked);
+    given
 }
 
 /// Bytes that this process can still have: of the machine, of the group that it runs in, and by its own limit; infinite where the system doesn't tell.

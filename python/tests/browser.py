@@ -49,9 +49,9 @@ def _run(file: pathlib.Path, after: str, *more: str, clock: int = 3000) -> str:
     return done.stdout
 
 
-def body(file: pathlib.Path, after: str = "", *more: str) -> tuple[dict[str, str], str]:
-    """What the page says on its body (`data-…`), and all of the page after its scripts ran for three seconds."""
-    page = _run(file, after, "--dump-dom", *more)
+def body(file: pathlib.Path, after: str = "", *more: str, clock: int = 3000) -> tuple[dict[str, str], str]:
+    """What the page says on its body (`data-…`), and all of the page after its scripts ran for so many ms of its own clock."""
+    page = _run(file, after, "--dump-dom", *more, clock=clock)
     found = re.search(r"<body([^>]*)>", page)
     assert found
     return dict(re.findall(r'data-(\w+)="([^"]*)"', found[1])), page

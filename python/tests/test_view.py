@@ -311,6 +311,7 @@ def test_walls():
         ({"flow": "x"}, "flow"),
         ({"flow": [[0, 0, np.inf]]}, "finite"),
         ({"flow_scale": 0}, "flow_scale"),
+        ({"title": ["a", "b"]}, "title: got 2 of them; must be one for each of 1"),
     ],
 )
 def test_wrong_input(rollout, given, says):
@@ -321,6 +322,10 @@ def test_wrong_input(rollout, given, says):
 def test_wrong_rollouts_and_files(rollout, tmp_path):
     with pytest.raises(hg.InputError, match="type ndarray; must be a Rollout"):
         hg.view(rollout.positions)
+    with pytest.raises(hg.InputError, match="got none"):
+        hg.view([])
+    with pytest.raises(hg.InputError, match="type int; must be a Rollout"):
+        hg.view([rollout, 3])
     with pytest.raises(hg.FileError, match="nowhere"):
         hg.view(rollout, tmp_path / "nowhere" / "a.html")
 
@@ -534,6 +539,87 @@ def test_a_browser_draws_forces_and_flow(stirring, tmp_path):
             seen.append(like(stage(browser.picture(file, "#t=1"))).sum())
         assert seen[0] > 150 + seen[1], (switch, seen)
         assert seen[1] < 50
+
+
+BESIDE = """
+    const found = {};
+    const pictures = async (n) => { for (let i = 0; i < n; i++) await new Promise(requestAnimationFrame); };
+    const until = async (holds) => { for (let i = 0; i < 300 && !holds(); i++) await pictures(1); };
+    const { player, stage } = hydrograd;
+    (async () => {
+      await pictures(5);
+      found.range = [player.first, player.last];
+      MINE
+      found.time = player.time;
+      found.playing = player.playing;
+      found.led = player.led;
+      found.frame = player.frame;
+      found.camera = stage.camera.position.toArray();
+      found.speed = document.getElementById("speed").value;
+      document.title = found.title = JSON.stringify(found);
+      window.parent.postMessage({ found }, "*");
+    })();
+"""
+ACTS = """
+    player.seek(0.3); stage.look(new THREE.Vector3(1, 0, 0));
+    const speed = document.getElementById("speed");
+    speed.value = "0.1"; speed.dispatchEvent(new Event("change"));
+    document.getElementById("play").click();
+    await until(() => !player.playing);
+"""
+STOPS = """
+    await until(() => player.playing && player.time > 0.3);
+    found.before = player.time;
+    found.went = player.playing && player.led;
+    document.getElementById("play").click();
+    await pictures(5);
+"""
+
+
+def test_two_beside_each_other(rollout, tmp_path):
+    """What is done to one is done to the other: moment, camera, speed, play in the first, pause in the second; each shows its own rollout."""
+    longer = hg.Simulator(scene(), fidelity="isolated").rollout(steps=40)
+    view = hg.view([rollout, longer], title=["short <one>", "long"], colors=COLORS, view_from=(0, -1, 0))
+    assert view.title == "short <one>, long"
+    pages = [html.unescape(part.split('"></iframe>')[0]) for part in view.html.split('srcdoc="')[1:]]
+    first, second = (json.loads(Parts(page).scripts[0]) for page in pages)
+    assert first["range"] == second["range"] == [0.0, 2.0] and first["center"] == second["center"] and first["size"] == second["size"]
+    assert first["linked"] and unpacked(first["time"])[-1] == 1.0 and unpacked(second["time"])[-1] == 2.0
+    # Each tells what it finds after one or the other was pressed.
+    text = view.html
+    for page, mine in zip(pages, (ACTS, STOPS), strict=True):
+        script = "<script>" + BESIDE.replace("MINE", mine) + "</script></body>"
+        # A browser without a screen hardly asks frames in a sandbox for pictures: a timer does.
+        timer = "<head><script>window.requestAnimationFrame = (f) => setTimeout(() => f(performance.now()), 16);</script>"
+        changed = page.replace("</body>", script).replace("<head>", timer, 1)
+        text = text.replace(html.escape(page), html.escape(changed))
+    collect = """const all = []; window.addEventListener("message", ({ source, data }) => {
+      if (!data.found) return;
+      all[[...document.querySelectorAll("iframe")].findIndex((f) => f.contentWindow === source)] = data.found;
+      document.title = JSON.stringify(all);
+    });"""
+    file = tmp_path / "beside.html"
+    file.write_text(text.replace("<script>", f"<script>{collect}</script><script>", 1), encoding="utf-8")
+    says, after = browser.body(file, "", clock=12000)
+    assert says["status"] == "drawn"
+    left, right = json.loads(Parts(after).title)
+    assert left["range"] == right["range"] == [0.0, 2.0]
+    assert right["went"] and right["before"] >= 0.3
+    assert not left["playing"] and not right["playing"]
+    assert left["time"] == right["time"] >= right["before"]
+    assert np.allclose(left["camera"], right["camera"], atol=1e-12) and left["camera"][0] > 1.0
+    assert left["speed"] == right["speed"] == "0.1"
+
+
+def test_beside_each_other_at_a_moment(rollout, tmp_path):
+    """The address of the page around gives the moment to both; the red ball is where it is then in both halves."""
+    file = tmp_path / "moment.html"
+    hg.view((rollout, rollout), file, colors=COLORS, view_from=(0, -1, 0))
+    picture = browser.picture(file, "#t=1", clock=8000)
+    width = browser.WIDTH // 2
+    halves = [picture[40:420, at : at + width - 250].astype(int) for at in (0, width)]
+    reds = [blob(half, 0)[0] - blob(half, 2)[0] for half in halves]
+    assert np.allclose(reds[0], reds[1], atol=2.0) and reds[0][0] < -20
 
 
 def test_without_webgl_it_says_so(page):

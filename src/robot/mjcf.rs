@@ -45,6 +45,7 @@ pub(super) fn parse(path: &Path, document: &Document) -> Result<File> {
     }
     made.equalities();
     made.total_mass();
+    made.check_masses()?;
     made.file.unused.extend(left_out.unused());
     Ok(made.file)
 }
@@ -466,6 +467,20 @@ impl Made<'_> {
                 self.file.notes.push(note);
             }
         }
+    }
+
+    /// Masses that volumes, densities and factors make have the bounds of those that are written.
+    fn check_masses(&self) -> Result<()> {
+        for link in &self.file.robot.links {
+            let (mass, i) = (link.inertial.mass.value, &link.inertial.inertia);
+            let numbers = [mass, i.ixx, i.iyy, i.izz, i.ixy, i.ixz, i.iyz];
+            self.check(
+                &format!("body {:?}", link.name),
+                "mass and inertia",
+                &numbers,
+            )?;
+        }
+        Ok(())
     }
 
     /// Masses in the ratio that makes their sum what is asked for.

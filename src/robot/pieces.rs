@@ -19,6 +19,8 @@ use urdf_rs::Geometry;
 
 /// Faces of a primitive where a mesh stands for it.
 const FACES: usize = 80;
+/// Fewest faces that may be asked for.
+const FEWEST: usize = 1;
 
 /// A piece of a body, in the body's frame.
 pub(super) struct Piece {
@@ -205,8 +207,8 @@ impl<'f> Meshes<'f> {
         };
         let place = link_place(self.file, link);
         validate(&shape, &place)?;
-        // What no mesh can be of, as it is too thin, is an error of the file.
-        build(&shape, Path::new(""), Some(FACES)).map_err(|e| e.of(&place))?;
+        // What no mesh can be of, as it is too thin, is an error of the file: thinnest are the faces of the coarsest mesh.
+        build(&shape, Path::new(""), Some(FEWEST)).map_err(|e| e.of(&place))?;
         Ok(Form::Primitive(shape))
     }
 

@@ -7,7 +7,7 @@ use super::observable::{Differentiable, Observed, ObservedTangents, differentiab
 use super::step_map::{BESIDE, Columns};
 use super::{Initial, Rollout, finite};
 use crate::dynamics::Parameters;
-use crate::{Error, Result};
+use crate::{Error, Result, memory};
 use nalgebra::{DMatrix, DVector};
 use std::collections::BTreeMap;
 use std::ops::ControlFlow;
@@ -184,6 +184,15 @@ impl Rollout {
         let named = self.named(observables)?;
         let directions = self.directions_to(variables)?;
         let count = directions.q.ncols();
+        let entries: usize = named.iter().map(|(_, _, rows)| rows * states.len()).sum();
+        memory::fits(
+            &format!(
+                "Jacobians of {} states with respect to {count} variables",
+                states.len()
+            ),
+            memory::numbers(entries as f64 * count as f64),
+            "ask for fewer states or variables at a time",
+        )?;
         let zero = |rows: &usize| DMatrix::zeros(rows * states.len(), count);
         let mut out: Vec<_> = named.iter().map(|(_, _, rows)| zero(rows)).collect();
         let write = |at: &Moved| {

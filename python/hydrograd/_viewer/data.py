@@ -30,8 +30,8 @@ class Look:
     """Unit vector, (3,)."""
     view_from: Array
     """Direction from the scene to where it is seen from, unit vector, (3,)."""
-    colors: Sequence[str]
-    """One a body, #rrggbb."""
+    colors: Mapping[str, str]
+    """Given ones, #rrggbb, by the names of bodies."""
     contacts: bool
     """Whether contacts are there."""
     force_scale: float | None
@@ -95,7 +95,7 @@ def wall_data(rollout: Rollout, center: Array) -> list[dict[str, Any]]:
 def body_data(names: Sequence[str], frames: Frames, look: Look) -> list[dict[str, Any]]:
     """The bodies: names, colours, and surfaces in their own frames."""
     out = []
-    for name, color, surface in zip(names, look.colors, frames.surfaces, strict=True):
+    for name, color, surface in zip(names, colors(names, look.colors), frames.surfaces, strict=True):
         body: dict[str, Any] = {"name": name, "color": color, "middle": [0.0, 0.0, 0.0], "vertices": None}
         if surface is not None:
             body["middle"] = surface.middle.tolist()
@@ -105,9 +105,34 @@ def body_data(names: Sequence[str], frames: Frames, look: Look) -> list[dict[str
     return out
 
 
-def page_data(rollout: Rollout, frames: Frames, look: Look) -> dict[str, Any]:
+@dataclass(frozen=True)
+class Room:
+    """What all pages beside each other show: where and when."""
+
+    low: Array
+    """Corner of a box around all bodies at all times, (3,), m."""
+    high: Array
+    """The other corner."""
+    range: tuple[float, float]
+    """First and last time, s."""
+    linked: bool
+    """Whether there are several pages."""
+
+    @staticmethod
+    def of(all_frames: Sequence[Frames]) -> Room:
+        """Room for all of them."""
+        boxes = [frames.box() for frames in all_frames]
+        return Room(
+            low=np.min([low for low, _ in boxes], axis=0),
+            high=np.max([high for _, high in boxes], axis=0),
+            range=(min(float(f.time[0]) for f in all_frames), max(float(f.time[-1]) for f in all_frames)),
+            linked=len(all_frames) > 1,
+        )
+
+
+def page_data(rollout: Rollout, frames: Frames, room: Room, look: Look) -> dict[str, Any]:
     """All of it. Positions are counted from the middle of the scene, so that single precision does."""
-    low, high = frames.box()
+    low, high = room.low, room.high
     center = 0.5 * (low + high)
     size = float(np.linalg.norm(high - low)) or 1.0
     flow = None
@@ -120,6 +145,8 @@ def page_data(rollout: Rollout, frames: Frames, look: Look) -> dict[str, Any]:
         "center": center.tolist(),
         "size": size,
         "lowest": -float(0.5 * (high - low) @ np.abs(look.up)),
+        "range": list(room.range),
+        "linked": room.linked,
         "time": packed(frames.time, "f8"),
         "steps": packed(frames.steps, "i4"),
         "positions": packed(frames.positions - center, "f4"),

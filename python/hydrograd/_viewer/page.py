@@ -6,7 +6,7 @@ import base64
 import html
 import json
 import re
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from functools import lru_cache
 from importlib import resources
 from typing import Any
@@ -15,7 +15,8 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 # In the order in which they need each other.
-SCRIPTS = ("frames.js", "stage.js", "actors.js", "arrows.js", "plot.js", "player.js", "panel.js", "main.js")
+SCRIPTS = ("moment.js", "frames.js", "stage.js", "actors.js", "arrows.js", "plot.js", "player.js", "panel.js", "link.js", "main.js")
+SCRIPTS_BESIDE = ("moment.js", "beside.js")
 
 
 @lru_cache
@@ -44,7 +45,26 @@ def page(title: str, note: str, data: Mapping[str, Any]) -> str:
         "note": html.escape(note),
         "data": text,
         "library": asset("three.bundle.js"),
-        "scripts": "\n".join(asset(name) for name in SCRIPTS),
+        "scripts": joined(SCRIPTS),
     }
-    # In one pass: nothing within a part is taken for a place.
-    return re.sub(r"\{\{(\w+)\}\}", lambda found: parts[found[1]], asset("page.html"))
+    return filled("page.html", parts)
+
+
+def beside(title: str, titles: Sequence[str], pages: Sequence[str]) -> str:
+    """Pages beside each other in one, which does to all what is done to one; `titles` are theirs."""
+    # In a sandbox, as in a notebook: they reach each other by messages alone.
+    frames = [
+        f'<iframe sandbox="allow-scripts allow-downloads" title="{html.escape(of)}" srcdoc="{html.escape(text)}"></iframe>'
+        for of, text in zip(titles, pages, strict=True)
+    ]
+    return filled("beside.html", {"title": html.escape(title), "frames": "\n".join(frames), "scripts": joined(SCRIPTS_BESIDE)})
+
+
+def joined(scripts: Sequence[str]) -> str:
+    """Their texts in one."""
+    return "\n".join(asset(name) for name in scripts)
+
+
+def filled(name: str, parts: Mapping[str, str]) -> str:
+    """A page of the viewer with its places filled, in one pass: nothing within a part is taken for a place."""
+    return re.sub(r"\{\{(\w+)\}\}", lambda found: parts[found[1]], asset(name))

@@ -9,16 +9,16 @@ import sys
 import tempfile
 import warnings
 import webbrowser
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from hydrograd._hydrograd import FileError, InputError, Rollout, Simulator
-from hydrograd._viewer.data import Look, colors, page_data
+from hydrograd._viewer.data import Look, Room, page_data
 from hydrograd._viewer.frames import Frames
-from hydrograd._viewer.page import page
+from hydrograd._viewer.page import beside, page
 
 Array = NDArray[np.float64]
 
@@ -100,15 +100,37 @@ def _beside(up: Array) -> Array:
     return _direction("view_from", right - 1.6 * np.cross(up, right) + 0.9 * up)
 
 
-def _colors(names: list[str], given: Mapping[str, str] | None) -> list[str]:
-    """A colour for each body."""
+def _colors(names: Sequence[str], given: Mapping[str, str] | None) -> dict[str, str]:
+    """The colours given, by the names of bodies."""
     wanted = dict(given or {})
     for name, color in wanted.items():
         if name not in names:
             raise InputError(f"view: colors: got a body {name!r}; must be one of {names!r}")
         if not isinstance(color, str) or not re.fullmatch(r"#[0-9a-fA-F]{6}", color):
             raise InputError(f'view: colors[{name!r}]: got {color!r}; must be written "#rrggbb"')
-    return colors(names, wanted)
+    return wanted
+
+
+def _rollouts(given: Rollout | Simulator | Sequence[Rollout | Simulator]) -> list[Rollout]:
+    """Those that are shown beside each other, one at least."""
+    some = list(given) if isinstance(given, (list, tuple)) else [given]
+    if not some:
+        raise InputError("view: rollout: got none; must be a Rollout or a Simulator, or several in a list")
+    for one in some:
+        if not isinstance(one, (Rollout, Simulator)):
+            kind = type(one).__name__
+            raise InputError(f"view: rollout: got a value of type {kind}; must be a Rollout or a Simulator, or several in a list")
+    return [one.rollout(steps=0) if isinstance(one, Simulator) else one for one in some]
+
+
+def _titles(rollouts: Sequence[Rollout], given: str | Sequence[str] | None) -> list[str]:
+    """A title for each."""
+    if given is None:
+        return [rollout.simulator.scene.name or "rollout" for rollout in rollouts]
+    titles = [str(given)] * len(rollouts) if not isinstance(given, (list, tuple)) else [str(title) for title in given]
+    if len(titles) != len(rollouts):
+        raise InputError(f"view: title: got {len(titles)} of them; must be one for each of {len(rollouts)} rollouts")
+    return titles
 
 
 def _whole(place: str, given: int, least: int) -> int:
@@ -149,11 +171,11 @@ def _noted(frames: Frames, states: int) -> str:
 
 
 def view(
-    rollout: Rollout | Simulator,
+    rollout: Rollout | Simulator | Sequence[Rollout | Simulator],
     file: str | os.PathLike[str] | None = None,
     *,
     open: bool = False,
-    title: str | None = None,
+    title: str | Sequence[str] | None = None,
     max_frames: int = 1000,
     contacts: bool = True,
     force_scale: float | None = None,
@@ -165,6 +187,7 @@ def view(
     height: int = 520,
 ) -> View:
     """Makes a replay of a rollout in 3-D: one page of HTML with everything in it, that any browser with WebGL shows. Of a simulator it shows the start, before a run.
+    Several in a list are shown beside each other, seen from the same place at the same moment: what is done to one is done to all.
 
     It is written to `file` if one is given. With `open`, it is shown in a browser, where there is one; without a browser a
     warning tells where the page is. In a notebook, the result shows itself, `height` pixels high.
@@ -176,27 +199,32 @@ def view(
     `flow_scale` (m per m/s) long, at the price of a solve a frame; it takes a simulator with the fidelity "full"
     (`Rollout.flow`). `colors` are
     "#rrggbb" by the names of bodies, `up` is the direction that stays upright and `view_from` the one from the scene to where it
-    is seen from at first, world axes. `title` is the scene's name unless given.
+    is seen from at first, world axes. `title` is the scene's name unless given; of several rollouts one for each.
     """
-    if isinstance(rollout, Simulator):
-        rollout = rollout.rollout(steps=0)
-    if not isinstance(rollout, Rollout):
-        raise InputError(f"view: rollout: got a value of type {type(rollout).__name__}; must be a Rollout or a Simulator")
-    simulator = rollout.simulator
+    rollouts = _rollouts(rollout)
+    titles = _titles(rollouts, title)
+    names = [name for one in rollouts for name in one.simulator.body_names]
+    wanted = _colors(list(dict.fromkeys(names)), colors)
     upward = _direction("up", up)
     look = Look(
         up=upward,
         view_from=_beside(upward) if view_from is None else _direction("view_from", view_from),
-        colors=_colors(simulator.body_names, colors),
+        colors=wanted,
         contacts=contacts,
         force_scale=_scale("force_scale", force_scale, "m/N"),
         flow=None if flow is None else _points(flow),
         flow_scale=_scale("flow_scale", flow_scale, "m per m/s"),
     )
-    frames = Frames.of(rollout, _whole("max_frames", max_frames, 2))
-    heading = (simulator.scene.name or "rollout") if title is None else str(title)
-    text = page(heading, _noted(frames, len(rollout)), page_data(rollout, frames, look))
-    out = View(text, heading, _whole("height", height, 1))
+    most = _whole("max_frames", max_frames, 2)
+    height = _whole("height", height, 1)
+    frames = [Frames.of(one, most) for one in rollouts]
+    room = Room.of(frames)
+    pages = [
+        page(of, _noted(its, len(one)), page_data(one, its, room, look))
+        for of, one, its in zip(titles, rollouts, frames, strict=True)
+    ]
+    heading = ", ".join(dict.fromkeys(titles))
+    out = View(pages[0] if len(pages) == 1 else beside(heading, titles, pages), heading, height)
     if file is not None:
         out.save(file)
     if open and not out.open():

@@ -1,8 +1,6 @@
 // The recorded frames: arrays out of the page's data, and poses between frames.
 "use strict";
 
-const hydrograd = {};
-
 /** A typed array from its parts: type, and numbers as base64, little end first. */
 hydrograd.decode = ({ type, data }) => {
   const bytes = Uint8Array.from(atob(data), (letter) => letter.charCodeAt(0));

@@ -9,10 +9,14 @@
     const note = document.getElementById("note");
     note.textContent = `The replay can't be shown: ${(error && error.message) || error}`;
     note.hidden = false;
+    tell();
   };
+  // The page around several waits for each.
+  let data = {};
+  const tell = () => data.linked && window.parent.postMessage({ status: state.status }, "*");
   window.addEventListener("error", (event) => fail(event.error || event.message));
   try {
-    const data = JSON.parse(document.getElementById("data").textContent);
+    data = JSON.parse(document.getElementById("data").textContent);
     const stage = new hydrograd.Stage(document.getElementById("stage"), data);
     const player = new hydrograd.Player(data, stage);
     const panel = new hydrograd.Panel(player, stage, data);
@@ -20,17 +24,11 @@
     document.getElementById("grid").textContent = `grid ${hydrograd.metres(player.cell)}`;
 
     // `#t=1.5` shows that moment (s), `#t=1.5&play` goes on from there; now, or whenever the address changes.
-    const jump = () => {
-      const found = /[#&]t=([-+.\deE]+)/.exec(window.location.hash);
-      if (found) {
-        player.pause();
-        player.seek(Number(found[1]));
-      }
-      if (/[#&]play\b/.test(window.location.hash)) player.play();
-    };
+    const jump = () => player.jump(hydrograd.moment(window.location.hash));
     window.addEventListener("hashchange", jump);
     jump();
 
+    const link = data.linked ? new hydrograd.Link(player, stage) : null;
     let drawn = 0;
     const tick = (now) => {
       player.tick(now);
@@ -39,7 +37,9 @@
         state.meshes = player.bodies.meshes;
         state.triangles = stage.renderer.info.render.triangles;
         state.status = state.status || "drawn";
+        tell();
       }
+      if (link) link.tell();
       state.time = player.time;
       requestAnimationFrame(tick);
     };

@@ -28,12 +28,12 @@ hydrograd.Panel = class {
   buttons() {
     const { player, stage } = this;
     const scrub = this.get("scrub");
-    scrub.max = player.frames.last - player.frames.first;
+    scrub.max = player.last - player.first;
     this.on("play", "click", () => (player.playing ? player.pause() : player.play()));
     this.on("back", "click", () => player.step(-1));
     this.on("on", "click", () => player.step(1));
     this.on("scrub", "input", () => {
-      const time = player.frames.first + Number(scrub.value); // before pausing writes to it
+      const time = player.first + Number(scrub.value); // before pausing writes to it
       player.pause();
       player.seek(time);
     });
@@ -127,8 +127,8 @@ hydrograd.Panel = class {
       " ": () => (player.playing ? player.pause() : player.play()),
       ArrowLeft: () => player.step(-1),
       ArrowRight: () => player.step(1),
-      Home: () => player.seek(player.frames.first),
-      End: () => player.seek(player.frames.last),
+      Home: () => player.seek(player.first),
+      End: () => player.seek(player.last),
       r: () => this.reset(),
       p: () => this.save(),
     };
@@ -146,7 +146,7 @@ hydrograd.Panel = class {
     const { player } = this;
     this.get("play").textContent = player.playing ? "❚❚" : "▶";
     this.get("play").title = player.playing ? "pause (space)" : "play (space)";
-    this.get("scrub").value = player.time - player.frames.first;
+    this.get("scrub").value = player.time - player.first;
     this.get("time").textContent = `${player.time.toFixed(3)} s, step ${player.frames.steps[player.frame]}`;
     const facts = this.series.map(({ name, unit, values }) => {
       const value = values[player.frame];

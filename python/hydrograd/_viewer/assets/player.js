@@ -12,8 +12,11 @@ hydrograd.Player = class {
     this.flow = data.flow ? new hydrograd.Flow(data, stage) : null;
     this.followed = -1;
     this.speed = 1;
+    this.loop = false;
     this.playing = false;
-    this.time = this.frames.first;
+    this.led = false; // by the clock of another replay
+    [this.first, this.last] = data.range; // s
+    this.time = this.first;
     this.listeners = [];
     this.seek(this.time);
   }
@@ -25,7 +28,7 @@ hydrograd.Player = class {
   }
 
   seek(time) {
-    const { first, last } = this.frames;
+    const { first, last } = this;
     this.time = Math.min(Math.max(Number.isFinite(time) ? time : first, first), last);
     const before = this.followed < 0 ? null : this.bodies.middle(this.followed);
     const at = this.frames.locate(this.time);
@@ -51,26 +54,36 @@ hydrograd.Player = class {
   }
 
   play() {
-    if (this.time >= this.frames.last) this.seek(this.frames.first);
-    this.playing = this.frames.last > this.frames.first;
+    if (this.time >= this.last) this.seek(this.first);
+    this.playing = this.last > this.first;
+    this.led = false;
     this.clock = null;
     this.listeners.forEach((listener) => listener(this));
   }
 
+  /** To a moment (s), if one is given, and on from there or not. */
+  jump({ time, play }) {
+    if (time !== undefined) {
+      this.pause();
+      this.seek(time);
+    }
+    if (play) this.play();
+  }
+
   pause() {
-    this.playing = false;
+    this.playing = this.led = false;
     this.listeners.forEach((listener) => listener(this));
   }
 
   /** Called for every picture of the browser, with its time in ms. */
   tick(now) {
-    if (this.playing) {
+    if (this.playing && !this.led) {
       const passed = this.clock === null ? 0 : (now - this.clock) / 1000;
       this.clock = now;
       const next = this.time + this.speed * passed;
       this.seek(next);
-      if (next >= this.frames.last) {
-        if (this.loop) this.seek(this.frames.first);
+      if (next >= this.last) {
+        if (this.loop) this.seek(this.first);
         else this.pause();
       }
     }

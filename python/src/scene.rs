@@ -191,7 +191,7 @@ impl Scene {
     }
 
     /// Adds a named frame on a `body` (number or name), at `position` (m) and `rotation` (rotation vector, rad) in its frame, and gives its number: rollouts tell
-    /// "site_positions", "site_rotations", "site_attitudes" (roll, pitch, yaw), "site_velocities" and "site_gyros" (rates in own axes).
+    /// "site_positions", "site_rotations", "site_attitudes" (roll, pitch, yaw), "site_velocities", "site_gyros" (rates in own axes) and "site_accelerations".
     #[pyo3(signature = (name, body, position=None, rotation=None))]
     fn add_site(
         &mut self,

@@ -4,7 +4,7 @@ use super::{BodyId, Placement, Scene};
 use crate::{Error, Result};
 use serde::{Deserialize, Serialize};
 
-/// A named frame on a body, of which rollouts tell position, orientation and velocity (`site_positions`, `site_rotations`, `site_attitudes`, `site_velocities`, `site_gyros`).
+/// A named frame on a body, of which rollouts tell position, orientation and velocity (`site_positions`, `site_rotations`, `site_attitudes`, `site_velocities`, `site_gyros`, `site_accelerations`).
 ///
 /// ```
 /// use hydrograd::scene::{Body, Fluid, Scene, Shape, Site};

@@ -7,6 +7,7 @@ mod deciding;
 mod equations;
 mod finite;
 mod flow;
+mod gains;
 mod gap_check;
 mod gap_flow;
 mod gap_report;

@@ -185,6 +185,13 @@ pub fn final_observable(name: impl Into<String>, entry: usize, target: f64, weig
     at_end(Of::Observable(name.into(), entry), &[target], weight)
 }
 
+/// The mean of `weight · (x − target)²` over all states, x as in [`final_observable`].
+pub fn mean_observable(name: impl Into<String>, entry: usize, target: f64, weight: f64) -> Sum {
+    let mut out = final_observable(name, entry, target, weight);
+    out.0[0].last_only = false;
+    out
+}
+
 /// `weight` times the sum of squared open-loop controls.
 pub fn effort(weight: f64) -> Sum {
     at_end(Of::Controls, &[], weight)

@@ -101,6 +101,8 @@ impl Rollout {
             system: self.simulator.system(),
             parameters: self.simulator.parameters(),
             sample: &self.samples()[n],
+            step: self.step_around(n),
+            time_step: self.simulator.time_step(),
             gap: Box::new(move || self.gaps()[n]),
             gap_error: Box::new(move || {
                 let gap = self.gaps()[n]?;
@@ -269,6 +271,10 @@ impl Rollout {
         progress: impl FnMut(usize) -> Result<()> + Send,
     ) -> Result<StateBar> {
         self.check(cotangents)?;
+        if end.is_some() {
+            // What is read from the part's last state would be lost.
+            self.refuse_gains(cotangents.observables.keys())?;
+        }
         let trajectory = self.simulator.trajectory(&self.controls);
         let seeds = self.seeds(cotangents)?;
         let (bar, partials) = rayon::scope(|_| match end {
@@ -290,7 +296,8 @@ impl Rollout {
         let given = c.observables.iter().map(|(name, x)| (name.as_str(), x));
         let mut parts = Vec::new();
         for (name, x) in poses.into_iter().chain(given) {
-            parts.push((differentiable(name)?, x));
+            let observable = differentiable(name)?;
+            parts.push((observable, self.reads(name, observable)?.apply_vjp(x)));
         }
         let seed = |n: usize| {
             let columns = parts.iter().map(|(o, x)| (*o, x.column(n)));

@@ -3,6 +3,7 @@
 //! Every step is made a matrix ([`StepMap`](super::step_map::StepMap)), many steps side by side on all cores; then a direction costs a product with it.
 //! It is the derivative that [`Rollout::vjp`] is the transpose of.
 
+use super::gains::Reads;
 use super::observable::{Differentiable, Observed, ObservedTangents, differentiable};
 use super::step_map::{BESIDE, Columns};
 use super::{Initial, Rollout, finite};
@@ -50,6 +51,9 @@ pub struct Variables {
     /// The open-loop controls: those of the first step, then those of the second, …
     pub controls: bool,
 }
+
+/// An observable by its name, with the number of its tangents and the states that it is read from.
+type Named = (String, &'static dyn Differentiable, usize, Reads);
 
 /// Directions side by side, K of them.
 struct Directions<'a> {
@@ -117,7 +121,7 @@ impl Rollout {
         let zero = |rows| DMatrix::zeros(rows, states);
         let each = named
             .iter()
-            .map(|(name, _, rows)| (name.clone(), zero(*rows)));
+            .map(|(name, _, rows, _)| (name.clone(), zero(*rows)));
         let empty = Tangents {
             q: zero(nv),
             v: zero(nv),
@@ -130,7 +134,7 @@ impl Rollout {
                 out.q.set_column(at.state, &at.q.column(k));
                 out.v.set_column(at.state, &at.v.column(k));
             }
-            for (name, observable, _) in &named {
+            for (name, observable, _, _) in &named {
                 let seen = self.observed(*observable, &directions, at);
                 for (k, out) in out.iter_mut().enumerate() {
                     if let Some(to) = out.observables.get_mut(name) {
@@ -141,6 +145,13 @@ impl Rollout {
             Ok(())
         };
         self.sweep(&directions, write, progress)?;
+        for out in &mut out {
+            for (name, _, _, reads) in &named {
+                if let Some(read) = out.observables.get_mut(name) {
+                    *read = reads.apply(std::mem::take(read));
+                }
+            }
+        }
         Ok(out)
     }
 
@@ -184,7 +195,10 @@ impl Rollout {
         let named = self.named(observables)?;
         let directions = self.directions_to(variables)?;
         let count = directions.q.ncols();
-        let entries: usize = named.iter().map(|(_, _, rows)| rows * states.len()).sum();
+        let entries: usize = named
+            .iter()
+            .map(|(_, _, rows, _)| rows * states.len())
+            .sum();
         memory::fits(
             &format!(
                 "Jacobians of {} states with respect to {count} variables",
@@ -194,15 +208,21 @@ impl Rollout {
             "ask for fewer states or variables at a time",
         )?;
         let zero = |rows: &usize| DMatrix::zeros(rows * states.len(), count);
-        let mut out: Vec<_> = named.iter().map(|(_, _, rows)| zero(rows)).collect();
+        let mut out: Vec<_> = named.iter().map(|(_, _, rows, _)| zero(rows)).collect();
         let write = |at: &Moved| {
-            let here = states.iter().enumerate().filter(|(_, n)| **n == at.state);
-            let places: Vec<usize> = here.map(|(place, _)| place).collect();
-            for ((_, observable, rows), out) in named.iter().zip(&mut out) {
-                if !places.is_empty() {
+            for ((_, observable, rows, reads), out) in named.iter().zip(&mut out) {
+                let all = states.iter().enumerate();
+                let read = all.flat_map(|(place, n)| {
+                    let from = reads.at(*n).into_iter();
+                    let here = from.filter(|(state, _)| *state == at.state);
+                    here.map(move |(_, weight)| (place, weight))
+                });
+                let read: Vec<(usize, f64)> = read.collect();
+                if !read.is_empty() {
                     let seen = self.observed(*observable, &directions, at);
-                    for place in &places {
-                        out.rows_mut(place * rows, *rows).copy_from(&seen);
+                    for (place, weight) in read {
+                        let mut out = out.rows_mut(place * rows, *rows);
+                        out += weight * &seen;
                     }
                 }
             }
@@ -212,12 +232,12 @@ impl Rollout {
         Ok(out)
     }
 
-    /// Observables with derivatives, each with the number of its tangents.
-    fn named(&self, names: &[&str]) -> Result<Vec<(String, &'static dyn Differentiable, usize)>> {
+    /// Observables with derivatives.
+    fn named(&self, names: &[&str]) -> Result<Vec<Named>> {
         let of = |name: &&str| {
             let found = differentiable(name)?;
             let rows = found.tangents(self.simulator.system());
-            Ok(((*name).to_string(), found, rows))
+            Ok(((*name).to_string(), found, rows, self.reads(name, found)?))
         };
         names.iter().map(of).collect()
     }
@@ -337,6 +357,14 @@ impl Rollout {
     /// A name that no observable with derivatives has, a state that there isn't, a value that can't be found.
     pub fn observable_jacobian(&self, name: &str, n: usize) -> Result<(Vec<f64>, DMatrix<f64>)> {
         let value = self.observable_value(name, n)?;
+        let observable = differentiable(name)?;
+        if observable.is_gain() {
+            return Err(Error::Unsupported {
+                what: format!("the derivative of {name:?} with respect to one state"),
+                why: "it is the mean over a step, read from two states".into(),
+                instead: "take Rollout::jacobian or Rollout::vjp".into(),
+            });
+        }
         let nv = self.simulator.system().tree.velocities();
         let half =
             |from: usize| DMatrix::from_fn(nv, 2 * nv, |i, k| f64::from(u8::from(k == from + i)));
@@ -354,7 +382,7 @@ impl Rollout {
             q: &units.q,
             v: &units.v,
         };
-        Ok((value, self.observed(differentiable(name)?, &units, &at)))
+        Ok((value, self.observed(observable, &units, &at)))
     }
 
     /// Displacements side by side, without the parameters that none displacements.

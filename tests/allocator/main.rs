@@ -67,8 +67,10 @@ fn by_fundamental_solutions(fidelity: Fidelity, faces: usize) -> Result<()> {
     Simulator::new(&blocks(2, faces), settings.method(Method::MfsFace)).map(drop)
 }
 
+type Work = Box<dyn Fn() -> Result<()>>;
+
 /// What takes more than 64 MB at once, by name.
-fn hungry() -> Vec<(&'static str, Box<dyn Fn() -> Result<()>>)> {
+fn hungry() -> Vec<(&'static str, Work)> {
     vec![
         (
             "a body by panels",

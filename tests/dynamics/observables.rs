@@ -1,11 +1,12 @@
 //! Observables by name: what they read, what they seed, and what is refused.
 
 use crate::support::says;
-use hydrograd::scene::{Body, BodyId, Fluid, Scene};
+use hydrograd::scene::{Body, BodyId, Contact, Fluid, Scene, Site};
 use hydrograd::simulate::observable::OBSERVABLES;
-use hydrograd::simulate::{Recording, Rollout};
+use hydrograd::simulate::{Checkpoints, Partwise, Recording, Rollout};
 use hydrograd::{Controls, Fidelity, Settings, Simulator, objective};
 use nalgebra::DMatrix;
+use std::ops::ControlFlow;
 
 /// A dry body that tumbles without any force.
 fn tumbling() -> (Scene, Rollout) {
@@ -124,4 +125,124 @@ fn what_has_no_derivatives_or_no_name_is_refused() {
     );
     let goal = objective::final_observable("angular_momentum", 3, 0.0, 1.0);
     says(rollout.value(&goal).unwrap_err(), &["entry", "under 3"]);
+}
+
+/// What a body with a site on it does that falls, is pushed and lands.
+fn landing() -> Rollout {
+    let mut scene = Scene::new(Fluid::fresh_water());
+    scene.gravity = [0.0, 0.0, -9.81];
+    scene.add_wall([0.0; 3], [0.0, 0.0, 1.0]);
+    scene.contact = Some(Contact::default());
+    let body = Body::new(hydrograd::Shape::cuboid([0.2, 0.15, 0.1]).faces(80));
+    let body = body.named("block").density(2500.0).thruster();
+    scene.add(body.at([0.0, 0.0, 0.07]).rotated([0.2, 0.1, 0.3]));
+    scene.add_site(Site::new("nose", "block").at([0.1, 0.02, -0.03]));
+    let settings = Settings::default().fidelity(Fidelity::Isolated);
+    let simulator = Simulator::new(&scene, settings.time_step(2e-3)).unwrap();
+    let controls = DMatrix::from_fn(6, 40, |i, n| (0.3 * (i + n) as f64).sin());
+    let controls = Controls::from_matrix(&simulator, controls).unwrap();
+    simulator.rollout(&controls).unwrap()
+}
+
+#[test]
+fn accelerations_are_what_velocities_gain_contact_and_all() {
+    let rollout = landing();
+    let dt = rollout.simulator().time_step();
+    for (gain, of) in [
+        ("accelerations", "velocities"),
+        ("site_accelerations", "site_velocities"),
+    ] {
+        let (a, v) = (rollout.observe(gain).unwrap(), rollout.observe(of).unwrap());
+        for n in 0..=40 {
+            let first = n.min(39);
+            let mean = (v.column(first + 1) - v.column(first)) / dt;
+            assert!((a.column(n) - &mean).norm() <= 1e-12 * mean.norm());
+        }
+        // The floor pushes back harder than anything else does.
+        assert!(a.row(2).max() > 20.0, "{gain}: {}", a.row(2).max());
+    }
+}
+
+/// Against the accelerations that the equations of motion give: the mean over a step is that in its middle, to second order.
+#[test]
+fn accelerations_are_those_of_the_equations_of_motion() {
+    let (_, rollout) = tumbling();
+    let means = rollout.observe("accelerations").unwrap();
+    let none = nalgebra::DVector::zeros(6);
+    let exact = |n: usize| {
+        let sample = &rollout.samples()[n];
+        let equations = rollout.simulator().equations(&sample.q).unwrap();
+        let control = nalgebra::DVector::zeros(0);
+        let rates = equations.acceleration(&sample.v, &control, &none, &none);
+        let origin = nalgebra::Vector3::zeros();
+        equations
+            .point_acceleration(&sample.v, &rates.unwrap(), 0, &origin)
+            .unwrap()
+    };
+    for n in [0, 60, 150] {
+        let middle = 0.5 * (exact(n) + exact(n + 1));
+        let off = (means.column(n) - middle).norm() / middle.norm();
+        assert!(off < 1e-5, "{off}");
+    }
+}
+
+/// Both derivatives of both kinds, through contact; and what reads one state alone refuses them.
+#[test]
+fn accelerations_have_derivatives() {
+    let rollout = landing();
+    for name in ["accelerations", "site_accelerations"] {
+        let mut bars = rollout.zero_cotangents();
+        let bar = DMatrix::from_fn(6, 41, |i, n| (0.7 * i as f64 + 0.31 * n as f64).cos());
+        bars.observables.insert(name.into(), bar.clone());
+        let gradient = rollout.vjp(&bars).unwrap();
+        let mut along = rollout.zero_displacement();
+        along.controls.fill(0.4);
+        along.initial.v.fill(0.2);
+        along.initial.q.fill(0.1);
+        let tangents = &rollout.jvp(&[along.clone()], &[name]).unwrap()[0];
+        let forward = tangents.observables[name].dot(&bar);
+        let reverse = gradient.controls.dot(&along.controls)
+            + gradient.initial.v.dot(&along.initial.v)
+            + gradient.initial.q.dot(&along.initial.q);
+        assert!((forward - reverse).abs() < 1e-9 * forward.abs());
+
+        let variables = hydrograd::simulate::Variables {
+            initial_v: true,
+            ..Default::default()
+        };
+        let states = [3, 39, 40];
+        let jacobian = &rollout.jacobian(&variables, &[name], &states).unwrap()[0];
+        let mut along = rollout.zero_displacement();
+        along.initial.v.fill(1.0);
+        let tangents = &rollout.jvp(&[along], &[name]).unwrap()[0].observables[name];
+        for (k, n) in states.into_iter().enumerate() {
+            let sums = jacobian.rows(6 * k, 6).column_sum();
+            assert!((sums - tangents.column(n)).norm() < 1e-9 * tangents.norm());
+        }
+        says(
+            rollout.observable_jacobian(name, 3).unwrap_err(),
+            &[name, "two states", "Rollout::jacobian"],
+        );
+        let simulator = rollout.simulator();
+        let still = simulator.rollout(&Controls::zeros(simulator, 0)).unwrap();
+        says(still.observe(name).unwrap_err(), &[name, "without steps"]);
+        let goal = objective::final_observable(name, 2, 0.0, 1.0);
+        assert!(rollout.gradient(&goal).unwrap().controls.norm() > 0.0);
+        let controls = Controls::zeros(simulator, 40);
+        let in_parts = |goal: &dyn Partwise| {
+            let go_on = |_| ControlFlow::Continue(());
+            simulator.gradient_in_parts(&controls, goal, Checkpoints::new(40), go_on)
+        };
+        let whole = simulator.rollout(&controls).unwrap();
+        let whole = whole.gradient(&goal).unwrap().controls;
+        let parts = in_parts(&goal).unwrap().gradient.controls;
+        assert!((parts - &whole).norm() < 1e-12 * whole.norm());
+        let always = objective::mean_observable(name, 2, 0.0, 1.0);
+        let mean = rollout.observe(name).unwrap().row(2).norm_squared() / 41.0;
+        assert!((rollout.value(&always).unwrap() - mean).abs() < 1e-12 * mean);
+        says(
+            in_parts(&always).map(drop).unwrap_err(),
+            &[name, "in parts", "whole rollout"],
+        );
+    }
 }

@@ -42,6 +42,8 @@ pub fn rungs() -> Vec<Rung> {
         "simulate::record::Record::jvp" => record_jvp,
         "simulate::observable::attitude::Attitudes::vjp" => |c| observed("attitudes", c),
         "simulate::observable::angular_momentum::AngularMomentum::vjp" => |c| observed("angular_momentum", c),
+        "simulate::observable::acceleration::Accelerations::vjp" => |c| observed_over("accelerations", 1, c),
+        "simulate::gains::Reads::apply_vjp" => |c| observed_over("accelerations", 1, c),
         "simulate::observable::velocity::Gyros::vjp" => |c| observed("gyros", c),
         "simulate::observable::velocity::Velocities::vjp" => |c| observed("velocities", c),
     ]
@@ -805,13 +807,19 @@ pub fn observed_point() -> Point {
 
 /// An observable, read at a state by itself: through its momentum, which the state carries, and directly.
 fn observed(name: &str, c: f64) -> Outcome {
-    let run = |p: &Point| run(simulator().clone(), p, &DMatrix::zeros(p.u.len(), 0));
+    observed_over(name, 0, c)
+}
+
+/// The same of a rollout of so many steps.
+fn observed_over(name: &str, steps: usize, c: f64) -> Outcome {
+    let run = |p: &Point| run(simulator().clone(), p, &DMatrix::zeros(p.u.len(), steps));
     let p = observed_point();
     let base = run(&p);
     let bar = wavy(base.observe(name).unwrap().nrows(), 5.1, 1.0);
     let mut seed = base.zero_cotangents();
-    let column = DMatrix::from_column_slice(bar.len(), 1, bar.as_slice());
-    seed.observables.insert(name.into(), column);
+    let mut columns = DMatrix::zeros(bar.len(), steps + 1);
+    columns.set_column(0, &bar);
+    seed.observables.insert(name.into(), columns);
     let g = base.vjp(&seed).unwrap();
     let value = |p: &Point| run(p).observe(name).unwrap().column(0).dot(&bar);
     let bar = Bar {

@@ -40,6 +40,7 @@ pub fn rungs() -> Vec<Rung> {
         "simulate::observable::pose::Positions::jvp" => |c| rollout(Integrator::Rk2, &["positions"], c),
         "simulate::observable::pose::Rotations::jvp" => |c| rollout(Integrator::Rk2, &["rotations"], c),
         "simulate::observable::attitude::Attitudes::jvp" => |c| rollout(Integrator::Rk2, &["attitudes"], c),
+        "simulate::observable::acceleration::Accelerations::jvp" => |c| rollout(Integrator::Rk2, &["accelerations"], c),
         "simulate::observable::velocity::Gyros::jvp" => |c| rollout(Integrator::Rk2, &["gyros"], c),
         "simulate::observable::velocity::Velocities::jvp" => |c| rollout(Integrator::Rk2, &["velocities"], c),
         "simulate::observable::angular_momentum::AngularMomentum::jvp" =>

@@ -40,6 +40,11 @@ pub trait Differentiable: Sync {
     /// Number of entries of its tangents and cotangents: those of its tangent space.
     fn tangents(&self, system: &System) -> usize;
 
+    /// Whether it is what something gains over a step, by the step's length: that something is what [`Differentiable::jvp`] and [`Differentiable::vjp`] are of.
+    fn is_gain(&self) -> bool {
+        false
+    }
+
     /// Its tangent as the state moves.
     fn jvp(&self, at: &Observed, along: &ObservedTangents) -> Vec<f64>;
 
@@ -55,6 +60,10 @@ pub struct Reading<'a> {
     pub parameters: &'a Parameters,
     /// What is kept of the state.
     pub sample: &'a Sample,
+    /// What is kept of the ends of the step that starts there, at the last state of the one that ends there; none of a rollout without steps.
+    pub step: Option<[&'a Sample; 2]>,
+    /// Length of a step, s.
+    pub time_step: f64,
     /// Gives the smallest gap, if there is anything to meet; it may have to be measured.
     pub gap: Box<dyn Fn() -> Option<Gap> + 'a>,
     /// Estimates the error of the water across it, where one is known.

@@ -3,6 +3,7 @@
 //! To add one: a file with its type, its [`Observable`], and, if it has derivatives, its [`Differentiable`]; and
 //! its line in [`OBSERVABLES`].
 
+mod acceleration;
 mod angular_momentum;
 mod attitude;
 mod contact;
@@ -17,6 +18,8 @@ pub(super) mod velocity;
 
 pub use entry::{Differentiable, Observable, Observed, ObservedBars, ObservedTangents, Reading};
 
+pub(super) use acceleration::without_steps;
+
 use crate::{Error, Result};
 use frames::Of;
 
@@ -29,11 +32,13 @@ pub const OBSERVABLES: &[&dyn Observable] = &[
     &attitude::Attitudes(Of::Bodies),
     &velocity::Velocities(Of::Bodies),
     &velocity::Gyros(Of::Bodies),
+    &acceleration::Accelerations(Of::Bodies),
     &pose::Positions(Of::Sites),
     &pose::Rotations(Of::Sites),
     &attitude::Attitudes(Of::Sites),
     &velocity::Velocities(Of::Sites),
     &velocity::Gyros(Of::Sites),
+    &acceleration::Accelerations(Of::Sites),
     &energy::Kinetic,
     &energy::Potential,
     &energy::Total,

@@ -6,6 +6,7 @@ use crate::Result;
 use crate::adjoint::lie::{Pose, Vec3, angular, point_velocity, point_wrench, six};
 use crate::dynamics::System;
 use crate::scene::Scene;
+use crate::simulate::Sample;
 
 /// See [`velocities`].
 pub(super) struct Velocities(pub Of);
@@ -33,7 +34,7 @@ impl Observable for Velocities {
     }
 
     fn value(&self, at: &Reading) -> Result<Vec<f64>> {
-        Ok(self.0.velocities(at))
+        Ok(self.0.velocities(at.system, at.sample))
     }
 
     fn differentiable(&self) -> Option<&dyn Differentiable> {
@@ -137,14 +138,14 @@ impl Differentiable for Gyros {
 
 /// Of each body's origin, and angular.
 pub(in crate::simulate) fn velocities(at: &Reading) -> Vec<f64> {
-    Of::Bodies.velocities(at)
+    Of::Bodies.velocities(at.system, at.sample)
 }
 
 impl Of {
-    fn velocities(self, at: &Reading) -> Vec<f64> {
-        let (tree, sample) = (&at.system.tree, at.sample);
+    pub(super) fn velocities(self, system: &System, sample: &Sample) -> Vec<f64> {
+        let tree = &system.tree;
         let twists = tree.twists(&tree.kinematics(&sample.q), &sample.v);
-        let frames = self.frames(at.system, &sample.poses);
+        let frames = self.frames(system, &sample.poses);
         frames
             .flat_map(|(b, pose)| {
                 let origin: [f64; 3] = point_velocity(&twists[b], &pose.translation).into();

@@ -516,7 +516,7 @@ class Scene:
         self, name: str, body: _Body, position: ArrayLike | None = None, rotation: ArrayLike | None = None
     ) -> int:
         """Adds a named frame on a `body` (number or name), at `position` (m) and `rotation` (rotation vector, rad) in its frame, and gives its number: rollouts tell
-        "site_positions", "site_rotations", "site_attitudes" (roll, pitch, yaw), "site_velocities" and "site_gyros" (rates in own axes)."""
+        "site_positions", "site_rotations", "site_attitudes" (roll, pitch, yaw), "site_velocities", "site_gyros" (rates in own axes) and "site_accelerations"."""
     @property
     def site_names(self) -> list[str]:
         """Names of the sites, in order."""

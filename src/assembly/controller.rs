@@ -2,7 +2,8 @@
 
 use crate::dynamics::System;
 use crate::policy::{
-    Constant, OpenLoop, Pd, PdAxis, Playback, Policy, PushThenLock, SpeedStage, SpeedStages,
+    Constant, OpenLoop, Pd, PdAxis, Playback, Policy, PushThenLock, SpeedStage, SpeedStages, Wave,
+    WaveJoint,
 };
 use crate::scene::{Controller, Scene};
 
@@ -65,6 +66,40 @@ pub(super) fn policy(scene: &Scene, system: &System) -> Box<dyn Policy> {
                         control: s.control,
                     })
                     .collect(),
+            })
+        }
+        Some(Controller::Wave {
+            bodies,
+            places,
+            amplitude,
+            frequency,
+            length,
+            bias,
+            stiffness,
+            damping,
+            rise,
+        }) => {
+            let joint = |(k, name): (usize, &String)| {
+                let (b, count) = (body(name), bodies.len() as f64);
+                let link = &system.tree.links()[b];
+                WaveJoint {
+                    control: system.bodies[b].joint_control.unwrap_or_default(),
+                    q: link.q.start,
+                    v: link.v.start,
+                    place: (places.get(k).copied()).unwrap_or((k + 1) as f64 / count),
+                }
+            };
+            Box::new(Wave {
+                controls,
+                velocities: system.tree.velocities(),
+                joints: bodies.iter().enumerate().map(joint).collect(),
+                amplitude,
+                frequency,
+                length,
+                bias,
+                stiffness,
+                damping,
+                rise,
             })
         }
         Some(Controller::Playback { control }) => Box::new(Playback {

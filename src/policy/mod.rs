@@ -4,11 +4,13 @@ mod pd;
 mod playback;
 mod push;
 mod stages;
+mod wave;
 
 pub use pd::{Pd, PdAxis};
 pub use playback::Playback;
 pub use push::PushThenLock;
 pub use stages::{SpeedStage, SpeedStages};
+pub use wave::{Wave, WaveJoint};
 
 use crate::{Error, Result};
 use nalgebra::DVector;

@@ -334,6 +334,30 @@ pub enum Controller {
         /// In their order.
         stages: Vec<SpeedStage>,
     },
+    /// A wave of joint angles that travels from head to tail, held by torques ([`Wave`](crate::simulate::Wave)): a swimming fish. Gains: all numbers but `places` and `rise`.
+    Wave {
+        /// Bodies whose actuated revolute joints bend, from head to tail.
+        bodies: Vec<String>,
+        /// Where each is along the body, 0 at the head, 1 at the tail; default: evenly, the last at 1.
+        #[serde(default, skip_serializing_if = "Vec::is_empty")]
+        places: Vec<f64>,
+        /// Amplitude's coefficients of 1, s and s², s the place, rad.
+        amplitude: [f64; 3],
+        /// Angular frequency, rad/s.
+        frequency: f64,
+        /// Length of the wave by that of the body; it travels to the tail where it is positive.
+        length: f64,
+        /// Added to all angles, rad: a turn.
+        #[serde(default, skip_serializing_if = "is_default")]
+        bias: f64,
+        /// N m/rad.
+        stiffness: f64,
+        /// N m s/rad.
+        damping: f64,
+        /// Time in which the wave rises from nothing, s.
+        #[serde(default, skip_serializing_if = "is_default")]
+        rise: f64,
+    },
 }
 
 /// Controls until a speed is reached.

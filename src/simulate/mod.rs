@@ -68,7 +68,7 @@ pub use crate::assembly::Choices;
 pub use crate::dynamics::State;
 pub use crate::policy::{
     Action, ActionBar, Constant, Observation, OpenLoop, Pd, PdAxis, Playback, Policy, PushThenLock,
-    SpeedStage, SpeedStages,
+    SpeedStage, SpeedStages, Wave, WaveJoint,
 };
 pub use crate::water::{
     AdapterName, Arithmetic, Backend, BackendReport, Carried, DeviceReport, Discretisation,

@@ -31,6 +31,7 @@ mod rollout_gradient;
 #[cfg(feature = "opt")]
 mod smoothing;
 mod soak;
+mod swimmer;
 mod trees;
 mod vehicle;
 mod waterline;

@@ -5,7 +5,7 @@ use hydrograd::adjoint::check::{Outcome, Rung};
 use hydrograd::scene::{Body, Controller, Fluid, Joint, Scene, Shape};
 use hydrograd::simulate::{
     Constant, Knots, Observation, OpenLoop, Pd, PdAxis, Playback, Policy, PushThenLock, SpeedStage,
-    SpeedStages,
+    SpeedStages, Wave, WaveJoint,
 };
 use hydrograd::{Controls, Fidelity, Settings, Simulator};
 use nalgebra::{DMatrix, DVector};
@@ -23,6 +23,7 @@ pub fn rungs() -> Vec<Rung> {
         "policy::push::PushThenLock::act_vjp" => push_then_lock,
         "policy::stages::SpeedStages::act_vjp" => speed_stages,
         "policy::playback::Playback::act_vjp" => |c| act(&playback(), c),
+        "policy::wave::Wave::act_vjp" => |c| act(&wave(), c),
         "simulate::knots::Knots::controls_vjp" => knots,
         "simulate::rollout::Rollout::vjp" => rollout,
     ]
@@ -41,6 +42,28 @@ fn pd() -> Pd {
         controls: 2,
         velocities: 3,
         axes: vec![axis(1, 0, 0), axis(0, 2, 2)],
+    }
+}
+
+/// Two joints while the wave still rises.
+fn wave() -> Wave {
+    let joint = |control: usize, q: usize, place: f64| WaveJoint {
+        control,
+        q,
+        v: q,
+        place,
+    };
+    Wave {
+        controls: 2,
+        velocities: 3,
+        joints: vec![joint(0, 1, 0.4), joint(1, 2, 1.0)],
+        amplitude: [0.3, -0.2, 0.5],
+        frequency: 7.0,
+        length: 1.3,
+        bias: 0.2,
+        stiffness: 3.0,
+        damping: 0.4,
+        rise: 0.05,
     }
 }
 

@@ -281,6 +281,17 @@ fn everything_survives_a_round_trip() {
             force: -1.0,
             stop_at: 0.5,
         },
+        Controller::Wave {
+            bodies: vec!["body 1".into()],
+            places: vec![1.0 / 3.0],
+            amplitude: [0.1, -1.0 / 3.0, 1e-9],
+            frequency: 7.0,
+            length: -0.9,
+            bias: 0.2,
+            stiffness: 8.0,
+            damping: 0.3,
+            rise: 1.0,
+        },
     ];
     for controller in controllers {
         scene.controller = Some(controller);

@@ -525,3 +525,71 @@ fn controllers_are_checked() {
         &["controller.body", "actuated"],
     );
 }
+
+#[test]
+fn waves_that_can_not_be_are_refused() {
+    /// Its bodies, places, amplitude, length and rise.
+    type Given<'a> = (&'a [&'a str], &'a [f64], f64, f64, f64);
+    let wave = |(bodies, places, amplitude, length, rise): Given| Controller::Wave {
+        bodies: bodies.iter().map(|b| (*b).to_string()).collect(),
+        places: places.to_vec(),
+        amplitude: [amplitude, 0.0, 0.0],
+        frequency: 1.0,
+        length,
+        bias: 0.0,
+        stiffness: 1.0,
+        damping: 1.0,
+        rise,
+    };
+    let bends = |s: &mut Scene| {
+        s.bodies[0].joint = Joint::Revolute {
+            axis: [0.0, 0.0, 1.0],
+        };
+    };
+    let cases: [(Given, &[&str]); 9] = [
+        (
+            (&["bal"], &[], 0.1, 1.0, 0.0),
+            &["controller.bodies", "did you mean \"ball\"?"],
+        ),
+        (
+            (&["coin"], &[], 0.1, 1.0, 0.0),
+            &["controller.bodies", "\"coin\"", "free joint"],
+        ),
+        ((&[], &[], 0.1, 1.0, 0.0), &["controller.bodies", "none"]),
+        (
+            (&["ball"], &[0.1, 0.2], 0.1, 1.0, 0.0),
+            &["controller.places", "2 numbers"],
+        ),
+        (
+            (&["ball"], &[f64::NAN], 0.1, 1.0, 0.0),
+            &["controller.places", "finite"],
+        ),
+        (
+            (&["ball"], &[], f64::INFINITY, 1.0, 0.0),
+            &["controller.amplitude", "finite"],
+        ),
+        (
+            (&["ball"], &[], 0.1, 0.0, 0.0),
+            &["controller.length", "isn't zero"],
+        ),
+        (
+            (&["ball"], &[], 0.1, 1.0, -1.0),
+            &["controller.rise", "not negative"],
+        ),
+        (
+            (&["ball"], &[], 0.1, 1.0, f64::NAN),
+            &["controller.rise", "not negative"],
+        ),
+    ];
+    for (given, says) in cases {
+        refused(
+            |s| {
+                bends(s);
+                s.controller = Some(wave(given));
+            },
+            says,
+        );
+    }
+    let slides = |s: &mut Scene| s.controller = Some(wave((&["ball"], &[], 0.1, 1.0, 0.0)));
+    refused(slides, &["controller.bodies", "\"ball\"", "revolute"]);
+}

@@ -1,7 +1,7 @@
 //! Controllers of a scene.
 
 use super::{finite, nearest};
-use crate::scene::{Body, Controller, Scene};
+use crate::scene::{Body, Controller, Joint, Scene};
 use crate::{Error, Result};
 
 impl Scene {
@@ -92,6 +92,51 @@ impl Scene {
                 }
                 Ok(())
             }
+            Some(Controller::Wave {
+                bodies,
+                places,
+                amplitude,
+                frequency,
+                length,
+                bias,
+                stiffness,
+                damping,
+                rise,
+            }) => {
+                for name in bodies {
+                    self.wave_joint(name)?;
+                }
+                let sizes = [
+                    ("frequency", *frequency),
+                    ("bias", *bias),
+                    ("stiffness", *stiffness),
+                    ("damping", *damping),
+                ];
+                for (field, x) in sizes {
+                    finite(&format!("controller.{field}"), &[x])?;
+                }
+                finite("controller.amplitude", amplitude)?;
+                finite("controller.places", places)?;
+                let wrong = |field: &str, value: String, right: &str| {
+                    Err(Error::input(format!("controller.{field}"), value, right))
+                };
+                if bodies.is_empty() {
+                    return wrong("bodies", "none".into(), "name a body whose joint bends");
+                }
+                if !places.is_empty() && places.len() != bodies.len() {
+                    let given = format!("{} numbers", places.len());
+                    return wrong("places", given, "give one for each of `bodies`, or none");
+                }
+                if *length == 0.0 || !length.is_finite() {
+                    let right = "give a finite length that isn't zero, in lengths of the body";
+                    return wrong("length", length.to_string(), right);
+                }
+                if !(*rise >= 0.0 && rise.is_finite()) {
+                    let right = "give a time that is finite and not negative, s";
+                    return wrong("rise", rise.to_string(), right);
+                }
+                Ok(())
+            }
             Some(Controller::Playback { control }) => {
                 let mut rows = control.iter().enumerate();
                 rows.try_for_each(|(n, row)| count(&format!("control[{n}]"), row))
@@ -132,6 +177,24 @@ impl Scene {
                 Ok(())
             }
         }
+    }
+
+    /// Refuses a body whose joint no wave can bend.
+    fn wave_joint(&self, name: &str) -> Result<()> {
+        let body = self.named("controller.bodies", name)?;
+        let turns = matches!(body.joint, Joint::Revolute { .. });
+        if turns && body.actuated && body.motion.is_none() {
+            return Ok(());
+        }
+        Err(Error::input(
+            "controller.bodies",
+            format!("{name:?}"),
+            format!(
+                "wave bends actuated revolute joints, and this body has a {} joint with actuated = {}: change the body or name another",
+                body.joint.kind(),
+                body.actuated
+            ),
+        ))
     }
 
     /// The body that a controller names.

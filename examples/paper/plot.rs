@@ -1,0 +1,108 @@
+//! Curves, a panel each quantity.
+
+use plotters::coord::Shift;
+use plotters::prelude::*;
+use std::error::Error;
+use std::path::Path;
+
+/// A curve with its name.
+pub struct Curve {
+    name: String,
+    points: Vec<(f64, f64)>,
+}
+
+/// What is drawn in one panel.
+pub struct Panel {
+    title: &'static str,
+    along: &'static str,
+    curves: Vec<Curve>,
+}
+
+impl Curve {
+    pub fn new(name: impl Into<String>, along: &[f64], values: &[f64]) -> Self {
+        Self {
+            name: name.into(),
+            points: along.iter().copied().zip(values.iter().copied()).collect(),
+        }
+    }
+}
+
+impl Panel {
+    /// Against time.
+    pub fn new(title: &'static str, curves: Vec<Curve>) -> Self {
+        Self::along(title, "time, s", curves)
+    }
+
+    /// Against something else.
+    pub fn along(title: &'static str, along: &'static str, curves: Vec<Curve>) -> Self {
+        Self {
+            title,
+            along,
+            curves,
+        }
+    }
+}
+
+/// Dark on white and told apart also by most who see few colours.
+const COLORS: [RGBColor; 4] = [
+    RGBColor(45, 95, 168),
+    RGBColor(214, 110, 20),
+    RGBColor(47, 125, 79),
+    RGBColor(140, 60, 140),
+];
+
+/// Writes an SVG, two panels in a row.
+pub fn draw(file: &Path, panels: &[Panel]) -> Result<(), Box<dyn Error>> {
+    let rows = panels.len().div_ceil(2);
+    let area = SVGBackend::new(file, (820, 280 * rows as u32)).into_drawing_area();
+    area.fill(&WHITE)?;
+    for (k, (part, panel)) in area.split_evenly((rows, 2)).iter().zip(panels).enumerate() {
+        // Once for panels with the same curves.
+        let names = |p: &Panel| p.curves.iter().map(|c| c.name.clone()).collect::<Vec<_>>();
+        draw_panel(part, panel, k == 0 || names(panel) != names(&panels[0]))?;
+    }
+    area.present()?;
+    Ok(())
+}
+
+fn draw_panel(
+    area: &DrawingArea<SVGBackend, Shift>,
+    panel: &Panel,
+    legend: bool,
+) -> Result<(), Box<dyn Error>> {
+    let all = || panel.curves.iter().flat_map(|c| &c.points);
+    let start = all().map(|p| p.0).fold(f64::MAX, f64::min);
+    let end = all().map(|p| p.0).fold(f64::MIN, f64::max);
+    let low = all().map(|p| p.1).fold(f64::MAX, f64::min);
+    let high = all().map(|p| p.1).fold(f64::MIN, f64::max);
+    let margin = 0.08 * (high - low).max(1e-6);
+    let mut chart = ChartBuilder::on(area)
+        .margin(8)
+        .caption(panel.title, ("sans-serif", 15))
+        .x_label_area_size(28)
+        .y_label_area_size(48)
+        .build_cartesian_2d(start..end, low - margin..high + margin)?;
+    chart
+        .configure_mesh()
+        .x_desc(panel.along)
+        .light_line_style(TRANSPARENT)
+        .draw()?;
+    for (curve, color) in panel.curves.iter().zip(COLORS) {
+        let line = LineSeries::new(curve.points.iter().copied(), color.stroke_width(2));
+        let drawn = chart.draw_series(line)?;
+        if legend {
+            drawn.label(&curve.name).legend(move |(x, y)| {
+                PathElement::new([(x, y), (x + 18, y)], color.stroke_width(2))
+            });
+        }
+    }
+    if legend {
+        chart
+            .configure_series_labels()
+            .position(SeriesLabelPosition::UpperLeft)
+            .border_style(BLACK.mix(0.3))
+            .background_style(WHITE)
+            .draw()?;
+    }
+    Ok(())
+}

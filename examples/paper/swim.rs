@@ -1,0 +1,82 @@
+//! The swimmer, alone and beside others: what figures 8 and 9 run.
+
+use hydrograd::scene::{Body, Force, Joint, Motion, Plane, Shape};
+use hydrograd::{Controls, Fidelity, Result, Rollout, Scene, Settings, Simulator};
+use std::path::Path;
+
+/// Faces of a link where it is quick, or as the scene has it.
+const QUICK: usize = 80;
+/// Steps of a run.
+const STEPS: usize = 600;
+
+/// The scene file.
+pub fn scene() -> Result<Scene> {
+    Scene::load(Path::new(env!("CARGO_MANIFEST_DIR")).join("examples/scenes/swimmer.toml"))
+}
+
+/// Without its trailing edge.
+pub fn without_edge(mut scene: Scene) -> Scene {
+    scene
+        .forces
+        .retain(|force| !matches!(force, Force::Edge(_)));
+    scene
+}
+
+/// With a small fish ahead, off to the side, which nothing drives.
+pub fn with_small_fish(mut scene: Scene) -> Scene {
+    let shape = Shape::ellipsoid([0.1, 0.03, 0.06]).faces(500);
+    let fish = Body::new(shape).named("small fish").density(998.0);
+    scene.add(
+        fish.joint(Joint::Planar { plane: Plane::Xy })
+            .at([0.35, 0.13, 0.0]),
+    );
+    scene
+}
+
+/// With the beating tail of a large fish beside it, held at its root.
+pub fn with_large_tail(mut scene: Scene) -> Scene {
+    let shape = Shape::ellipsoid([0.4, 0.05, 0.3]).faces(1280);
+    let tail = Body::new(shape).named("large tail").density(998.0);
+    let tail = tail
+        .shape_at([-0.4, 0.0, 0.0], [0.0; 3])
+        .at([0.45, -0.45, 0.0]);
+    let beat = Motion::Sine {
+        offset: 0.0,
+        amplitude: 0.4,
+        frequency: 7.0,
+        phase: 0.0,
+    };
+    scene.add(
+        tail.joint(Joint::Revolute {
+            axis: [0.0, 0.0, 1.0],
+        })
+        .driven([beat]),
+    );
+    scene
+}
+
+/// A run of one beat after the other.
+pub fn run(scene: &Scene, fidelity: Fidelity, quick: bool) -> Result<Rollout> {
+    let settings = Settings::default().fidelity(fidelity);
+    let settings = if quick {
+        settings.faces(QUICK)
+    } else {
+        settings
+    };
+    let simulator = Simulator::new(scene, settings)?;
+    let steps = if quick { STEPS / 2 } else { STEPS };
+    simulator.rollout(&Controls::zeros(&simulator, steps))
+}
+
+/// The way of the middle of a body's frame in the plane, m.
+pub fn path(rollout: &Rollout, body: &str) -> (Vec<f64>, Vec<f64>) {
+    let b = (rollout.simulator().scene().body(body)).map_or(0, |id| id.0);
+    let places = rollout.samples().iter().map(|s| s.poses[b].translation);
+    places.map(|x| (x.x, x.y)).unzip()
+}
+
+/// Smallest gap of a run between bodies that aren't declared to overlap, m.
+pub fn smallest_gap(rollout: &Rollout) -> f64 {
+    let gaps = rollout.gaps().iter().flatten();
+    gaps.map(|gap| gap.distance).fold(f64::INFINITY, f64::min)
+}

@@ -5,7 +5,7 @@
 //! ```
 //!
 //! FIGURE is `fig3` (the falling ball, with the water coupled and without), `fig4` (the same with more and less viscosity), `fig7` (a cube that is pushed and let go), `fig8` (a swimmer that passes a small fish), `fig9` (the swimmer beside a
-//! large beating tail) or `all`. Pictures
+//! large beating tail), `steer` (its way past the tail straightened by them) or `all`. Pictures
 //! are written to FOLDER as `paper_fig4.svg` and so on; `--quick` takes coarse meshes and short runs; `--json` prints the numbers alone, one object by figure.
 
 #[path = "paper/falling.rs"]
@@ -22,6 +22,10 @@ mod fig8;
 mod fig9;
 #[path = "paper/plot.rs"]
 mod plot;
+#[path = "paper/rival.rs"]
+mod rival;
+#[path = "paper/steer.rs"]
+mod steer;
 #[path = "paper/swim.rs"]
 mod swim;
 
@@ -44,12 +48,13 @@ struct How<'a> {
 type Figure = (&'static str, fn(&How) -> Made);
 
 /// Each by its name.
-const FIGURES: [Figure; 5] = [
+const FIGURES: [Figure; 6] = [
     ("fig3", fig3::make),
     ("fig4", fig4::make),
     ("fig7", fig7::make),
     ("fig8", fig8::make),
     ("fig9", fig9::make),
+    ("steer", steer::make),
 ];
 
 /// What the command line asks for.
@@ -139,6 +144,9 @@ mod tests {
         assert!(turned("full") > 1.0 && turned("reduced") > 1.0);
         assert!((turned("full") / turned("reduced") - 1.0).abs() < 0.2);
         assert!(turned("isolated").abs() < 1e-9);
+        for name in ["full", "reduced", "isolated"] {
+            assert!(numbers[name]["sphere_arrives_s"].as_f64().unwrap() > 1.0);
+        }
     }
 
     #[test]
@@ -183,12 +191,23 @@ mod tests {
     }
 
     #[test]
+    fn gradients_find_the_way_back() {
+        let numbers = quick("steer");
+        assert!(numbers["cut_by"].as_f64().unwrap() > 10.0, "{numbers:?}");
+    }
+
+    #[test]
     fn what_is_asked_for_must_be_there() {
         let asked = |words: &[&str]| options(words.iter().map(|w| (*w).to_string()));
         let error = |words: &[&str]| asked(words).err().unwrap();
-        assert!(error(&["fig2"]).contains("fig2: expected fig3, fig4, fig7, fig8, fig9, all"));
+        assert!(
+            error(&["fig2"]).contains("fig2: expected fig3, fig4, fig7, fig8, fig9, steer, all")
+        );
         assert!(error(&[]).contains("name a figure"));
         assert!(error(&["--out"]).contains("--out needs a folder"));
-        assert_eq!(asked(&["all", "--quick"]).unwrap().figures, [0, 1, 2, 3, 4]);
+        assert_eq!(
+            asked(&["all", "--quick"]).unwrap().figures,
+            [0, 1, 2, 3, 4, 5]
+        );
     }
 }

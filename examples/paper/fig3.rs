@@ -28,12 +28,11 @@ pub fn make(how: &How) -> Made {
         let coin = Coin::of(&run(&scene, fidelity, faces, steps)?);
         let seconds = start.elapsed().as_secs_f64();
         let arrives = coin.sphere.iter().position(|gap| *gap < ARRIVED);
-        let arrives = arrives.unwrap_or(coin.time.len() - 1);
         numbers.insert(
             name.into(),
             json!({
-                "turned_when_the_sphere_arrives_deg": coin.angle[arrives],
-                "sphere_arrives_s": coin.time[arrives],
+                "turned_when_the_sphere_arrives_deg": arrives.map(|n| coin.angle[n]),
+                "sphere_arrives_s": arrives.map(|n| coin.time[n]),
                 "turned_at_most_deg": largest(&coin.angle),
                 "pushed_at_most_m": largest(&coin.pushed),
                 "seconds_a_step_with_preparation": seconds / steps as f64,

@@ -35,7 +35,9 @@ pub fn make(how: &How) -> Made {
         ("coupled", Fidelity::Auto),
         ("uncoupled", Fidelity::Isolated),
     ] {
+        let start = Instant::now();
         let rollout = run(&both, fidelity, how.quick)?;
+        let seconds = start.elapsed().as_secs_f64() / rollout.steps() as f64;
         let (x, y) = path(&rollout, "small fish");
         let away = |(x1, y1): (&f64, &f64)| (x1 - x[0]).hypot(y1 - y[0]);
         let pushed: Vec<f64> = x.iter().zip(&y).map(away).collect();
@@ -45,7 +47,8 @@ pub fn make(how: &How) -> Made {
                 "small_fish_pushed_m": pushed[pushed.len() - 1],
                 "small_fish_pushed_aside_m": y[y.len() - 1] - y[0],
                 "way_m": way(&rollout),
-                "smallest_gap_m": smallest_gap(&rollout),
+                "smallest_gap_m": smallest_gap(&rollout, "small fish"),
+                "seconds_a_step_with_preparation": seconds,
             }),
         );
         let (head_x, head_y) = path(&rollout, "head");

@@ -25,7 +25,7 @@ pub fn make(how: &How) -> Made {
                 "lateral_drift_m": y[end] - y[0],
                 "way_m": x[end] - x[0],
                 "turned_deg": rollout.samples()[end].q[2].to_degrees(),
-                "smallest_gap_m": smallest_gap(&rollout),
+                "smallest_gap_m": (name != "alone").then(|| smallest_gap(&rollout, "large tail")),
             }),
         );
         let time: Vec<f64> = rollout.samples().iter().map(|s| s.time).collect();

@@ -1,5 +1,6 @@
 //! The swimmer, alone and beside others: what figures 8 and 9 run.
 
+use hydrograd::geometry::Other;
 use hydrograd::scene::{Body, Force, Joint, Motion, Plane, Shape};
 use hydrograd::{Controls, Fidelity, Result, Rollout, Scene, Settings, Simulator};
 use std::path::Path;
@@ -39,10 +40,10 @@ pub fn with_large_tail(mut scene: Scene) -> Scene {
     let tail = Body::new(shape).named("large tail").density(998.0);
     let tail = tail
         .shape_at([-0.4, 0.0, 0.0], [0.0; 3])
-        .at([0.45, -0.45, 0.0]);
+        .at([0.45, -0.55, 0.0]);
     let beat = Motion::Sine {
         offset: 0.0,
-        amplitude: 0.4,
+        amplitude: 0.2,
         frequency: 7.0,
         phase: 0.0,
     };
@@ -55,17 +56,26 @@ pub fn with_large_tail(mut scene: Scene) -> Scene {
     scene
 }
 
-/// A run of one beat after the other.
-pub fn run(scene: &Scene, fidelity: Fidelity, quick: bool) -> Result<Rollout> {
+/// Steps of a run.
+pub fn steps(quick: bool) -> usize {
+    if quick { STEPS / 2 } else { STEPS }
+}
+
+/// With the scene's meshes, or coarse ones.
+pub fn simulator(scene: &Scene, fidelity: Fidelity, quick: bool) -> Result<Simulator> {
     let settings = Settings::default().fidelity(fidelity);
     let settings = if quick {
         settings.faces(QUICK)
     } else {
         settings
     };
-    let simulator = Simulator::new(scene, settings)?;
-    let steps = if quick { STEPS / 2 } else { STEPS };
-    simulator.rollout(&Controls::zeros(&simulator, steps))
+    Simulator::new(scene, settings)
+}
+
+/// A run, its own controller bending the swimmer.
+pub fn run(scene: &Scene, fidelity: Fidelity, quick: bool) -> Result<Rollout> {
+    let simulator = simulator(scene, fidelity, quick)?;
+    simulator.rollout(&Controls::zeros(&simulator, steps(quick)))
 }
 
 /// The way of the middle of a body's frame in the plane, m.
@@ -75,8 +85,12 @@ pub fn path(rollout: &Rollout, body: &str) -> (Vec<f64>, Vec<f64>) {
     places.map(|x| (x.x, x.y)).unzip()
 }
 
-/// Smallest gap of a run between bodies that aren't declared to overlap, m.
-pub fn smallest_gap(rollout: &Rollout) -> f64 {
-    let gaps = rollout.gaps().iter().flatten();
-    gaps.map(|gap| gap.distance).fold(f64::INFINITY, f64::min)
+/// Smallest gap of a run between the swimmer and another body, m.
+pub fn smallest_gap(rollout: &Rollout, other: &str) -> f64 {
+    let simulator = rollout.simulator();
+    let other = simulator.scene().body(other).map_or(0, |id| id.0);
+    let states = rollout.samples().iter();
+    let gaps = states.flat_map(|s| simulator.gaps().all(&s.poses));
+    let to_other = gaps.filter(|g| g.first == other || g.second == Other::Body(other));
+    to_other.map(|g| g.distance).fold(f64::INFINITY, f64::min)
 }

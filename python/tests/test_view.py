@@ -576,6 +576,12 @@ STOPS = """
 """
 
 
+def timed(text: str) -> str:
+    """A page around others in which a timer asks for pictures: a browser without a screen hardly asks frames in a sandbox."""
+    timer = "<script>window.requestAnimationFrame = (f) => setTimeout(() => f(performance.now()), 16);</script>"
+    return text.replace(html.escape("<head>"), html.escape("<head>" + timer))
+
+
 def test_two_beside_each_other(rollout, tmp_path):
     """What is done to one is done to the other: moment, camera, speed, play in the first, pause in the second; each shows its own rollout."""
     longer = hg.Simulator(scene(), fidelity="isolated").rollout(steps=40)
@@ -584,15 +590,13 @@ def test_two_beside_each_other(rollout, tmp_path):
     pages = [html.unescape(part.split('"></iframe>')[0]) for part in view.html.split('srcdoc="')[1:]]
     first, second = (json.loads(Parts(page).scripts[0]) for page in pages)
     assert first["range"] == second["range"] == [0.0, 2.0] and first["center"] == second["center"] and first["size"] == second["size"]
-    assert first["linked"] and unpacked(first["time"])[-1] == 1.0 and unpacked(second["time"])[-1] == 2.0
+    assert unpacked(first["time"])[-1] == 1.0 and unpacked(second["time"])[-1] == 2.0
     # Each tells what it finds after one or the other was pressed.
     text = view.html
     for page, mine in zip(pages, (ACTS, STOPS), strict=True):
         script = "<script>" + BESIDE.replace("MINE", mine) + "</script></body>"
-        # A browser without a screen hardly asks frames in a sandbox for pictures: a timer does.
-        timer = "<head><script>window.requestAnimationFrame = (f) => setTimeout(() => f(performance.now()), 16);</script>"
-        changed = page.replace("</body>", script).replace("<head>", timer, 1)
-        text = text.replace(html.escape(page), html.escape(changed))
+        text = text.replace(html.escape(page), html.escape(page.replace("</body>", script)))
+    text = timed(text)
     collect = """const all = []; window.addEventListener("message", ({ source, data }) => {
       if (!data.found) return;
       all[[...document.querySelectorAll("iframe")].findIndex((f) => f.contentWindow === source)] = data.found;
@@ -614,7 +618,8 @@ def test_two_beside_each_other(rollout, tmp_path):
 def test_beside_each_other_at_a_moment(rollout, tmp_path):
     """The address of the page around gives the moment to both; the red ball is where it is then in both halves."""
     file = tmp_path / "moment.html"
-    hg.view((rollout, rollout), file, colors=COLORS, view_from=(0, -1, 0))
+    view = hg.view((rollout, rollout), colors=COLORS, view_from=(0, -1, 0))
+    file.write_text(timed(view.html), encoding="utf-8")
     picture = browser.picture(file, "#t=1", clock=8000)
     width = browser.WIDTH // 2
     halves = [picture[40:420, at : at + width - 250].astype(int) for at in (0, width)]

@@ -9,7 +9,7 @@
 //! and its torque k (θ − q) + d (θ̇ − q̇). r rises smoothly (C²) from 0 to 1 while the swimmer starts.
 
 use super::{Action, ActionBar, Observation, Policy, expect};
-use crate::Result;
+use crate::{Error, Result};
 use nalgebra::DVector;
 use std::f64::consts::TAU;
 
@@ -152,6 +152,17 @@ impl Policy for Wave {
 
     fn with_gains(&self, gains: &[f64]) -> Result<Box<dyn Policy>> {
         expect(GAINS, gains)?;
+        if let Some(k) = gains.iter().position(|g| !g.is_finite()) {
+            let place = format!("controller: gains[{k}]");
+            return Err(Error::input(place, gains[k], "must be finite"));
+        }
+        if gains[4] == 0.0 {
+            return Err(Error::input(
+                "controller: gains[4]",
+                gains[4],
+                "the length of the wave can't be zero",
+            ));
+        }
         Ok(Box::new(Self {
             amplitude: [gains[0], gains[1], gains[2]],
             frequency: gains[3],

@@ -100,8 +100,9 @@ impl<'m> Geometries<'m> {
                 MassProperties::by_formula(shape).map_err(|e| e.of(&self.place()))?
             }
             Solid::Mesh(file, scale) => {
-                let Loaded { mesh, hull, .. } = Loaded::new(file.clone(), *scale, &self.place())?;
-                let whole = mesh.into_mesh().ok().or(hull);
+                let loaded = Loaded::new(file.clone(), *scale, &self.place())?;
+                let closed = loaded.mesh.clone().into_mesh().ok();
+                let whole = closed.or_else(|| loaded.hull().cloned());
                 whole.map(|mesh| mesh.mass_properties())
             }
         };

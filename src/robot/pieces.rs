@@ -12,6 +12,7 @@ use crate::shape::{Shape, build, validate};
 use crate::{Error, Result};
 use hydrograd_adjoint::lie::Vec3;
 use nalgebra::{Isometry3, Point3};
+use std::cell::OnceCell;
 use std::collections::HashMap;
 use std::path::{Path, PathBuf};
 use std::rc::Rc;
@@ -40,8 +41,8 @@ pub(super) enum Form {
 pub(super) struct Loaded {
     pub path: PathBuf,
     pub mesh: FileMesh,
-    /// Its convex hull; none if it has no volume.
-    pub hull: Option<TriMesh>,
+    /// Made when it is first asked for.
+    hull: OnceCell<Option<TriMesh>>,
 }
 
 impl Loaded {
@@ -76,13 +77,22 @@ impl Loaded {
                 "must be finite: export the mesh again",
             ));
         }
-        let used = mesh.faces.iter().flatten();
-        let points: Vec<Vec3> = used
-            .filter_map(|v| mesh.vertices.get(*v))
-            .copied()
-            .collect();
-        let hull = hull(&format!("convex hull of {}", path.display()), &points).ok();
-        Ok(Self { path, mesh, hull })
+        Ok(Self {
+            path,
+            mesh,
+            hull: OnceCell::new(),
+        })
+    }
+
+    /// Its convex hull; none if it has no volume.
+    pub fn hull(&self) -> Option<&TriMesh> {
+        let made = || {
+            let used = self.mesh.faces.iter().flatten();
+            let points = used.filter_map(|v| self.mesh.vertices.get(*v));
+            let points: Vec<Vec3> = points.copied().collect();
+            hull(&format!("convex hull of {}", self.path.display()), &points).ok()
+        };
+        self.hull.get_or_init(made).as_ref()
     }
 }
 
@@ -95,7 +105,7 @@ impl Piece {
     pub fn hull(&self) -> Result<Option<TriMesh>> {
         let own = match &self.form {
             Form::Primitive(shape) => build(shape, Path::new(""), Some(FACES))?,
-            Form::Mesh(loaded) => match &loaded.hull {
+            Form::Mesh(loaded) => match loaded.hull() {
                 Some(hull) => hull.clone(),
                 None => return Ok(None),
             },

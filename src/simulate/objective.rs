@@ -292,7 +292,9 @@ impl Objective for Sum {
                 Of::Observable(name, entry) => {
                     // Entries of the value and of its cotangent must be the same ones.
                     let rows: usize = observable(name)?.shape(system).iter().product();
-                    if differentiable(name)?.tangents(system) != rows {
+                    let found = differentiable(name)?;
+                    rollout.reads(name, found)?;
+                    if found.tangents(system) != rows {
                         return Err(Error::input(
                             "objective: observable",
                             name,

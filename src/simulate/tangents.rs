@@ -10,7 +10,7 @@ use super::{Initial, Rollout, finite};
 use crate::dynamics::Parameters;
 use crate::{Error, Result, memory};
 use nalgebra::{DMatrix, DVector};
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, HashMap, HashSet};
 use std::ops::ControlFlow;
 
 /// A direction in which what a rollout depends on changes: the counterpart of a [`Gradient`](super::Gradient).
@@ -115,9 +115,20 @@ impl Rollout {
         progress: impl FnMut(usize) -> ControlFlow<()>,
     ) -> Result<Vec<Tangents>> {
         self.check_displacements(displacements)?;
-        let named = self.named(observables)?;
+        let mut named = self.named(observables)?;
+        let mut known = HashSet::new();
+        named.retain(|(name, ..)| known.insert(name.clone()));
         let states = self.steps() + 1;
         let nv = self.simulator.system().tree.velocities();
+        let rows = 2 * nv + named.iter().map(|(_, _, rows, _)| rows).sum::<usize>();
+        memory::fits(
+            &format!(
+                "tangents of {states} states along {} displacements",
+                displacements.len()
+            ),
+            memory::numbers((rows * states) as f64 * displacements.len() as f64),
+            "take fewer displacements or observables at a time",
+        )?;
         let zero = |rows| DMatrix::zeros(rows, states);
         let each = named
             .iter()
@@ -199,6 +210,10 @@ impl Rollout {
             .iter()
             .map(|(_, _, rows, _)| rows * states.len())
             .sum();
+        // With what is carried along from state to state.
+        let inputs =
+            self.controls.nrows() + directions.parameters.nrows() + directions.gains.nrows();
+        let entries = entries + 4 * directions.q.nrows() + 2 * inputs;
         memory::fits(
             &format!(
                 "Jacobians of {} states with respect to {count} variables",
@@ -209,21 +224,21 @@ impl Rollout {
         )?;
         let zero = |rows: &usize| DMatrix::zeros(rows * states.len(), count);
         let mut out: Vec<_> = named.iter().map(|(_, _, rows, _)| zero(rows)).collect();
+        let readers: Vec<_> = named
+            .iter()
+            .map(|(.., reads)| readers(*reads, states))
+            .collect();
         let write = |at: &Moved| {
-            for ((_, observable, rows, reads), out) in named.iter().zip(&mut out) {
-                let all = states.iter().enumerate();
-                let read = all.flat_map(|(place, n)| {
-                    let from = reads.at(*n).into_iter();
-                    let here = from.filter(|(state, _)| *state == at.state);
-                    here.map(move |(_, weight)| (place, weight))
-                });
-                let read: Vec<(usize, f64)> = read.collect();
-                if !read.is_empty() {
-                    let seen = self.observed(*observable, &directions, at);
-                    for (place, weight) in read {
-                        let mut out = out.rows_mut(place * rows, *rows);
-                        out += weight * &seen;
-                    }
+            for (((_, observable, rows, _), readers), out) in
+                named.iter().zip(&readers).zip(&mut out)
+            {
+                let Some(readers) = readers.get(&at.state) else {
+                    continue;
+                };
+                let seen = self.observed(*observable, &directions, at);
+                for (place, weight) in readers {
+                    let mut out = out.rows_mut(place * rows, *rows);
+                    out += *weight * &seen;
                 }
             }
             Ok(())
@@ -495,6 +510,17 @@ impl Rollout {
         }
         Ok(())
     }
+}
+
+/// By state, which of the asked `states` are read from it, by their places, and with which weights.
+fn readers(reads: Reads, states: &[usize]) -> HashMap<usize, Vec<(usize, f64)>> {
+    let mut out: HashMap<usize, Vec<(usize, f64)>> = HashMap::new();
+    for (place, n) in states.iter().enumerate() {
+        for (state, weight) in reads.at(*n) {
+            out.entry(state).or_default().push((place, weight));
+        }
+    }
+    out
 }
 
 impl Directions<'_> {

@@ -199,7 +199,9 @@ fn accelerations_have_derivatives() {
         along.controls.fill(0.4);
         along.initial.v.fill(0.2);
         along.initial.q.fill(0.1);
+        let first = along.clone();
         let tangents = &rollout.jvp(&[along.clone()], &[name]).unwrap()[0];
+        let once = tangents.observables[name].clone();
         let forward = tangents.observables[name].dot(&bar);
         let reverse = gradient.controls.dot(&along.controls)
             + gradient.initial.v.dot(&along.initial.v)
@@ -226,6 +228,10 @@ fn accelerations_have_derivatives() {
         let simulator = rollout.simulator();
         let still = simulator.rollout(&Controls::zeros(simulator, 0)).unwrap();
         says(still.observe(name).unwrap_err(), &[name, "without steps"]);
+        let goal = objective::final_observable(name, 2, 0.0, 1.0);
+        says(still.value(&goal).unwrap_err(), &[name, "without steps"]);
+        let twice = &rollout.jvp(&[first], &[name, name]).unwrap()[0];
+        assert_eq!(twice.observables[name], once);
         let goal = objective::final_observable(name, 2, 0.0, 1.0);
         assert!(rollout.gradient(&goal).unwrap().controls.norm() > 0.0);
         let controls = Controls::zeros(simulator, 40);

@@ -1,5 +1,6 @@
 //! A fish that swims by a wave of joint angles: its gradients, and what drives it.
 
+use crate::support::says;
 use hydrograd::scene::{Body, Controller, Force, Joint, Plane, Scene, Shape};
 use hydrograd::{Controls, Fidelity, Rollout, Settings, Simulator, objective};
 use std::path::Path;
@@ -43,6 +44,19 @@ fn gains_have_gradients_through_coupled_water() {
         let difference = (value(h) - value(-h)) / (2.0 * h);
         let off = (gradient[k] - difference).abs() / difference.abs();
         assert!(off < 1e-6, "gain {k}: {} {difference}", gradient[k]);
+    }
+}
+
+#[test]
+fn gains_that_can_not_be_are_refused() {
+    let settings = Settings::default().fidelity(Fidelity::Isolated).faces(80);
+    let simulator = Simulator::new(&scene(), settings).unwrap();
+    let policy = simulator.policy();
+    for (k, bad, word) in [(4, 0.0, "length"), (3, f64::NAN, "finite")] {
+        let mut gains = policy.gains();
+        gains[k] = bad;
+        let said = policy.with_gains(&gains).err().unwrap();
+        says(said, &[&format!("gains[{k}]"), word]);
     }
 }
 

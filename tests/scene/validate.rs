@@ -1,7 +1,9 @@
 //! Scenes that can't be: each gets an error that names body, field, value and remedy.
 
 use crate::support::says;
-use hydrograd::scene::{Body, Controller, Drag, Fluid, Joint, Motion, Plane, Scene, Shape, Wall};
+use hydrograd::scene::{
+    Body, Controller, Drag, Fluid, Joint, Motion, Plane, Scene, Servo, Shape, Wall,
+};
 
 /// Two bodies that are right: a ball that slides along z, a coin that hangs on it.
 fn good() -> Scene {
@@ -590,6 +592,17 @@ fn waves_that_can_not_be_are_refused() {
             says,
         );
     }
+    let twice = |s: &mut Scene| {
+        bends(s);
+        s.controller = Some(wave((&["ball", "ball"], &[], 0.1, 1.0, 0.0)));
+    };
+    refused(twice, &["controller.bodies[1]", "\"ball\"", "once"]);
+    let served = |s: &mut Scene| {
+        bends(s);
+        s.bodies[0].servo = Some(Servo::new(2.0, 0.1));
+        s.controller = Some(wave((&["ball"], &[], 0.1, 1.0, 0.0)));
+    };
+    refused(served, &["controller.bodies", "\"ball\"", "servo"]);
     let slides = |s: &mut Scene| s.controller = Some(wave((&["ball"], &[], 0.1, 1.0, 0.0)));
     refused(slides, &["controller.bodies", "\"ball\"", "revolute"]);
 }

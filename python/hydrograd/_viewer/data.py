@@ -115,8 +115,6 @@ class Room:
     """The other corner."""
     range: tuple[float, float]
     """First and last time, s."""
-    linked: bool
-    """Whether there are several pages."""
 
     @staticmethod
     def of(all_frames: Sequence[Frames]) -> Room:
@@ -126,8 +124,19 @@ class Room:
             low=np.min([low for low, _ in boxes], axis=0),
             high=np.max([high for _, high in boxes], axis=0),
             range=(min(float(f.time[0]) for f in all_frames), max(float(f.time[-1]) for f in all_frames)),
-            linked=len(all_frames) > 1,
         )
+
+
+def share_scales(pages: Sequence[dict[str, Any]], look: Look) -> None:
+    """Arrows that are as long stand for as much on all pages, whose scales were chosen one by one."""
+    largest = max(data["contacts"]["largest"] for data in pages)
+    for data in pages:
+        data["contacts"]["largest"] = largest
+    flows = [data["flow"] for data in pages if data["flow"] is not None]
+    if look.flow_scale is None and flows:
+        moving = [flow["scale"] for flow in flows if flow["scale"] > 0.0]
+        for flow in flows:
+            flow["scale"] = min(moving, default=0.0)
 
 
 def page_data(rollout: Rollout, frames: Frames, room: Room, look: Look) -> dict[str, Any]:
@@ -146,7 +155,6 @@ def page_data(rollout: Rollout, frames: Frames, room: Room, look: Look) -> dict[
         "size": size,
         "lowest": -float(0.5 * (high - low) @ np.abs(look.up)),
         "range": list(room.range),
-        "linked": room.linked,
         "time": packed(frames.time, "f8"),
         "steps": packed(frames.steps, "i4"),
         "positions": packed(frames.positions - center, "f4"),

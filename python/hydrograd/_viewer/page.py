@@ -35,8 +35,8 @@ def packed(array: ArrayLike, kind: str) -> dict[str, Any]:
     }
 
 
-def page(title: str, note: str, data: Mapping[str, Any]) -> str:
-    """The page with this title, a note on what it shows, and its data."""
+def page(title: str, note: str, data: Mapping[str, Any], place: int | None = None) -> str:
+    """The page with this title, a note on what it shows, and its data; of several beside each other, with its place among them."""
     # A name in the data could otherwise end the element that it stands in.
     text = json.dumps(data, allow_nan=False, separators=(",", ":")).replace("<", "\\u003c")
     parts = {
@@ -44,6 +44,7 @@ def page(title: str, note: str, data: Mapping[str, Any]) -> str:
         "style": asset("style.css"),
         "note": html.escape(note),
         "data": text,
+        "place": "" if place is None else str(place),
         "library": asset("three.bundle.js"),
         "scripts": joined(SCRIPTS),
     }

@@ -16,7 +16,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from hydrograd._hydrograd import FileError, InputError, Rollout, Simulator
-from hydrograd._viewer.data import Look, Room, page_data
+from hydrograd._viewer.data import Look, Room, page_data, share_scales
 from hydrograd._viewer.frames import Frames
 from hydrograd._viewer.page import beside, page
 
@@ -219,10 +219,11 @@ def view(
     height = _whole("height", height, 1)
     frames = [Frames.of(one, most) for one in rollouts]
     room = Room.of(frames)
-    pages = [
-        page(of, _noted(its, len(one)), page_data(one, its, room, look))
-        for of, one, its in zip(titles, rollouts, frames, strict=True)
-    ]
+    data = [page_data(one, its, room, look) for one, its in zip(rollouts, frames, strict=True)]
+    share_scales(data, look)
+    notes = [_noted(its, len(one)) for one, its in zip(rollouts, frames, strict=True)]
+    places = range(len(data)) if len(data) > 1 else [None]
+    pages = [page(*of) for of in zip(titles, notes, data, places, strict=True)]
     heading = ", ".join(dict.fromkeys(titles))
     out = View(pages[0] if len(pages) == 1 else beside(heading, titles, pages), heading, height)
     if file is not None:

@@ -201,7 +201,15 @@ impl Observed {
             .shape(system)
             .iter()
             .product();
-        if observable::differentiable(&self.name)?.tangents(system) != rows {
+        let found = observable::differentiable(&self.name)?;
+        if found.is_gain() {
+            return Err(Error::input(
+                format!("{place}: name"),
+                format!("{:?}", self.name),
+                "must be read from one state, and this is the mean over a step: take `velocities`, or the controls' `change`",
+            ));
+        }
+        if found.tangents(system) != rows {
             return Err(Error::input(
                 format!("{place}: name"),
                 format!("{:?}", self.name),

@@ -103,8 +103,15 @@ impl Scene {
                 damping,
                 rise,
             }) => {
-                for name in bodies {
+                for (k, name) in bodies.iter().enumerate() {
                     self.wave_joint(name)?;
+                    if bodies[..k].contains(name) {
+                        return Err(Error::input(
+                            format!("controller.bodies[{k}]"),
+                            format!("{name:?}"),
+                            "name each body once: it has one joint to bend",
+                        ));
+                    }
                 }
                 let sizes = [
                     ("frequency", *frequency),
@@ -183,6 +190,13 @@ impl Scene {
     fn wave_joint(&self, name: &str) -> Result<()> {
         let body = self.named("controller.bodies", name)?;
         let turns = matches!(body.joint, Joint::Revolute { .. });
+        if body.servo.is_some() {
+            return Err(Error::input(
+                "controller.bodies",
+                format!("{name:?}"),
+                "wave bends joints by torques, and this one has a servo, which takes an angle: leave the servo away or name another",
+            ));
+        }
         if turns && body.actuated && body.motion.is_none() {
             return Ok(());
         }

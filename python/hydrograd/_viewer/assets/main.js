@@ -12,11 +12,11 @@
     tell();
   };
   // The page around several waits for each.
-  let data = {};
-  const tell = () => data.linked && window.parent.postMessage({ status: state.status }, "*");
+  const linked = state.place !== "";
+  const tell = () => linked && window.parent.postMessage({ status: state.status }, "*");
   window.addEventListener("error", (event) => fail(event.error || event.message));
   try {
-    data = JSON.parse(document.getElementById("data").textContent);
+    const data = JSON.parse(document.getElementById("data").textContent);
     const stage = new hydrograd.Stage(document.getElementById("stage"), data);
     const player = new hydrograd.Player(data, stage);
     const panel = new hydrograd.Panel(player, stage, data);
@@ -28,7 +28,7 @@
     window.addEventListener("hashchange", jump);
     jump();
 
-    const link = data.linked ? new hydrograd.Link(player, stage) : null;
+    const link = linked ? new hydrograd.Link(player, stage, panel, Number(state.place)) : null;
     let drawn = 0;
     const tick = (now) => {
       player.tick(now);

@@ -59,9 +59,14 @@ hydrograd.Panel = class {
   }
 
   reset(direction = this.stage.direction) {
+    this.leave();
+    this.stage.look(direction);
+  }
+
+  /** Follows nothing. */
+  leave() {
     this.get("follow").value = "-1";
     this.player.follow(-1);
-    this.stage.look(direction);
   }
 
   switches() {
@@ -105,7 +110,7 @@ hydrograd.Panel = class {
 
   curves() {
     const { player, data } = this;
-    this.plot = new hydrograd.Plot(this.get("plot"), player.frames, (time) => {
+    this.plot = new hydrograd.Plot(this.get("plot"), player, (time) => {
       player.pause();
       player.seek(time);
     });

@@ -44,8 +44,11 @@ hydrograd.Player = class {
   /** Goes some frames on, or back. */
   step(frames) {
     this.pause();
-    const to = Math.min(Math.max(this.frame + frames, 0), this.frames.count - 1);
-    this.seek(this.frames.time[to]);
+    const { frame, share } = this.frames.locate(this.time);
+    // Between two frames, and beyond the last, that before is one back already.
+    const between = share > 0 || this.time > this.frames.last;
+    const to = frame + frames + (frames < 0 && between ? 1 : 0);
+    if (to >= 0 && to < this.frames.count) this.seek(this.frames.time[to]);
   }
 
   follow(body) {

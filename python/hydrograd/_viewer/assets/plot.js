@@ -2,14 +2,15 @@
 "use strict";
 
 hydrograd.Plot = class {
-  constructor(canvas, frames, seek) {
+  /** Over the player's range. */
+  constructor(canvas, player, seek) {
     this.canvas = canvas;
-    this.frames = frames;
+    this.player = player;
     const scrub = (event) => {
       if (event.buttons !== 1) return;
       const box = canvas.getBoundingClientRect();
       const share = (event.clientX - box.left - 6) / (box.width - 12);
-      seek(frames.first + Math.min(Math.max(share, 0), 1) * (frames.last - frames.first));
+      seek(player.first + Math.min(Math.max(share, 0), 1) * (player.last - player.first));
     };
     canvas.addEventListener("pointerdown", scrub);
     canvas.addEventListener("pointermove", scrub);
@@ -33,7 +34,7 @@ hydrograd.Plot = class {
     const pen = this.canvas.getContext("2d");
     pen.setTransform(ratio, 0, 0, ratio, 0, 0);
     pen.clearRect(0, 0, width, height);
-    const { first, last } = this.frames;
+    const { first, last, frames } = this.player;
     const span = this.high - this.low || Math.abs(this.high) || 1;
     const x = (t) => 6 + ((width - 12) * (t - first)) / (last - first || 1);
     const y = (v) => height - 8 - ((height - 30) * (v - this.low)) / span;
@@ -43,9 +44,9 @@ hydrograd.Plot = class {
     let open = false;
     this.values.forEach((value, frame) => {
       if (!Number.isFinite(value)) open = false;
-      else if (open) pen.lineTo(x(this.frames.time[frame]), y(value));
+      else if (open) pen.lineTo(x(frames.time[frame]), y(value));
       else {
-        pen.moveTo(x(this.frames.time[frame]), y(value));
+        pen.moveTo(x(frames.time[frame]), y(value));
         open = true;
       }
     });

@@ -4,9 +4,9 @@
 //! cargo run --release --example paper -- FIGURE… [--quick] [--json] [--out FOLDER]
 //! ```
 //!
-//! FIGURE is `fig3` (the falling ball, with the water coupled and without), `fig4` (the same with more and less viscosity), `fig7` (a cube that is pushed and let go), `fig8` (a swimmer that passes a small fish), `fig9` (the swimmer beside a
-//! large beating tail), `steer` (its way past the tail straightened by them) or `all`. Pictures
-//! are written to FOLDER as `paper_fig4.svg` and so on; `--quick` takes coarse meshes and short runs; `--json` prints the numbers alone, one object by figure.
+//! FIGURE is `fig3` (the falling ball, with the water coupled and without), `fig4` (the same with more and less viscosity), `fig7` (a cube that is pushed and let go), `fig8` (a swimmer
+//! that passes a small fish), `fig9` (the swimmer beside a large beating tail), `steer` (its way past the tail straightened by gradients) or `all`. Pictures are written to FOLDER as
+//! `paper_fig4.svg` and so on; `--quick` takes coarse meshes and short runs; `--json` prints the numbers alone, one object by figure.
 
 #[path = "paper/falling.rs"]
 mod falling;

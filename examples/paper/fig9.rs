@@ -1,7 +1,6 @@
 //! Figure 9: the beating tail of a large fish makes the swimmer drift sideways. Beside it the same with the bodies uncoupled, and the swimmer alone.
 
-use crate::plot::{Curve, Panel, draw};
-use crate::swim::{path, run, scene, smallest_gap, with_large_tail};
+use crate::swim::{draw_drifts, path, run, scene, smallest_gap, with_large_tail};
 use crate::{How, Made, Numbers};
 use hydrograd::Fidelity;
 use serde_json::json;
@@ -10,7 +9,7 @@ pub fn make(how: &How) -> Made {
     let alone = scene()?;
     let beside = with_large_tail(alone.clone());
     let mut numbers = Numbers::new();
-    let (mut paths, mut drifts) = (Vec::new(), Vec::new());
+    let mut runs = Vec::new();
     for (name, scene, fidelity) in [
         ("coupled", &beside, Fidelity::Auto),
         ("uncoupled", &beside, Fidelity::Isolated),
@@ -28,16 +27,9 @@ pub fn make(how: &How) -> Made {
                 "smallest_gap_m": (name != "alone").then(|| smallest_gap(&rollout, "large tail")),
             }),
         );
-        let time: Vec<f64> = rollout.samples().iter().map(|s| s.time).collect();
-        drifts.push(Curve::new(name, &time, &y));
-        paths.push(Curve::new(name, &x, &y));
+        runs.push((name, rollout));
     }
-    draw(
-        how.picture,
-        &[
-            Panel::along("path of the head: y, m", "x, m", paths),
-            Panel::new("lateral drift of the head, m", drifts),
-        ],
-    )?;
+    let runs: Vec<_> = runs.iter().map(|(name, run)| (*name, run)).collect();
+    draw_drifts(how.picture, &runs)?;
     Ok(numbers)
 }

@@ -1,9 +1,8 @@
 //! Beyond figure 9: the swimmer beside the beating tail, steered back to its line. The bias of its wave is found by Newton's iteration with the gradient of its drift through the whole run; beside it
 //! an evolution strategy with as many simulations.
 
-use crate::plot::{Curve, Panel, draw};
 use crate::rival;
-use crate::swim::{path, scene, simulator, steps, with_large_tail};
+use crate::swim::{draw_drifts, scene, simulator, steps, with_large_tail};
 use crate::{How, Made, Numbers};
 use hydrograd::{Controls, Fidelity, Result, Rollout, Simulator};
 use serde_json::json;
@@ -56,49 +55,37 @@ pub fn make(how: &How) -> Made {
     };
     let before = course.run(0.0)?;
     let first = course.drift(&before);
-    let (mut bias, mut runs) = (0.0, 1);
-    let mut now = course.run(0.0)?;
-    while course.drift(&now).abs() > SMALL * first.abs() && runs < MOST {
-        let step = -course.drift(&now) / course.slope(&now)?;
+    let (mut bias, mut runs) = (0.0, vec![before]);
+    loop {
+        let now = &runs[runs.len() - 1];
+        let drift = course.drift(now);
+        if drift.abs() <= SMALL * first.abs() || runs.len() == MOST {
+            break;
+        }
+        let step = -drift / course.slope(now)?;
         bias += step.clamp(-STEP, STEP);
-        now = course.run(bias)?;
-        runs += 1;
+        runs.push(course.run(bias)?);
     }
+    let (before, now) = (&runs[0], &runs[runs.len() - 1]);
     // It searches two numbers at least: the second has no effect.
-    let (rival, simulations) = rival::search(&[0.0; 2], 1.0, 2 * runs, |x| {
+    let (rival, simulations) = rival::search(&[0.0; 2], 1.0, 2 * runs.len(), |x| {
         let drift = course.run(STEP * x[0]).map(|run| course.drift(&run).abs());
         drift.unwrap_or(FAILED)
     });
     let by_rival = course.run(STEP * rival[0])?;
     let mut numbers = Numbers::new();
     numbers.insert("drift_m".into(), json!(first));
-    numbers.insert("drift_steered_m".into(), json!(course.drift(&now)));
-    numbers.insert("cut_by".into(), json!((first / course.drift(&now)).abs()));
+    numbers.insert("drift_steered_m".into(), json!(course.drift(now)));
+    numbers.insert("cut_by".into(), json!((first / course.drift(now)).abs()));
     numbers.insert("bias_rad".into(), json!(bias));
-    numbers.insert("runs_with_gradient".into(), json!(runs));
+    numbers.insert("runs_with_gradient".into(), json!(runs.len()));
     numbers.insert("drift_cmaes_m".into(), json!(course.drift(&by_rival)));
     numbers.insert(
         "cut_by_cmaes".into(),
         json!((first / course.drift(&by_rival)).abs()),
     );
     numbers.insert("simulations_of_cmaes".into(), json!(simulations));
-    let (mut paths, mut drifts) = (Vec::new(), Vec::new());
-    for (name, rollout) in [
-        ("no bias", &before),
-        ("steered", &now),
-        ("CMA-ES", &by_rival),
-    ] {
-        let (x, y) = path(rollout, "head");
-        let time: Vec<f64> = rollout.samples().iter().map(|s| s.time).collect();
-        drifts.push(Curve::new(name, &time, &y));
-        paths.push(Curve::new(name, &x, &y));
-    }
-    draw(
-        how.picture,
-        &[
-            Panel::along("path of the head: y, m", "x, m", paths),
-            Panel::new("lateral drift of the head, m", drifts),
-        ],
-    )?;
+    let drawn = [("no bias", before), ("steered", now), ("CMA-ES", &by_rival)];
+    draw_drifts(how.picture, &drawn)?;
     Ok(numbers)
 }

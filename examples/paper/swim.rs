@@ -1,8 +1,10 @@
 //! The swimmer, alone and beside others: what figures 8 and 9 run.
 
+use crate::plot::{Curve, Panel, draw};
 use hydrograd::geometry::Other;
 use hydrograd::scene::{Body, Force, Joint, Motion, Plane, Shape};
 use hydrograd::{Controls, Fidelity, Result, Rollout, Scene, Settings, Simulator};
+use std::error::Error;
 use std::path::Path;
 
 /// Faces of a link where it is quick, or as the scene has it.
@@ -83,6 +85,27 @@ pub fn path(rollout: &Rollout, body: &str) -> (Vec<f64>, Vec<f64>) {
     let b = (rollout.simulator().scene().body(body)).map_or(0, |id| id.0);
     let places = rollout.samples().iter().map(|s| s.poses[b].translation);
     places.map(|x| (x.x, x.y)).unzip()
+}
+
+/// Draws the head's path, and its drift against time, of runs by name.
+pub fn draw_drifts(
+    picture: &Path,
+    runs: &[(&str, &Rollout)],
+) -> std::result::Result<(), Box<dyn Error>> {
+    let (mut paths, mut drifts) = (Vec::new(), Vec::new());
+    for (name, rollout) in runs {
+        let (x, y) = path(rollout, "head");
+        let time: Vec<f64> = rollout.samples().iter().map(|s| s.time).collect();
+        drifts.push(Curve::new(*name, &time, &y));
+        paths.push(Curve::new(*name, &x, &y));
+    }
+    draw(
+        picture,
+        &[
+            Panel::along("path of the head: y, m", "x, m", paths),
+            Panel::new("lateral drift of the head, m", drifts),
+        ],
+    )
 }
 
 /// Smallest gap of a run between the swimmer and another body, m.

@@ -4,6 +4,7 @@ use super::Rollout;
 use super::observable::{Differentiable, differentiable, without_steps};
 use crate::{Error, Result};
 use nalgebra::DMatrix;
+use std::borrow::Cow;
 
 /// From which states an observable is read.
 #[derive(Clone, Copy)]
@@ -88,9 +89,9 @@ impl Reads {
     }
 
     /// Transpose of [`Reads::apply`].
-    pub fn apply_vjp(self, bar: &DMatrix<f64>) -> DMatrix<f64> {
+    pub fn apply_vjp(self, bar: &DMatrix<f64>) -> Cow<'_, DMatrix<f64>> {
         match self {
-            Self::State => bar.clone(),
+            Self::State => Cow::Borrowed(bar),
             Self::Step { .. } => {
                 let mut out = DMatrix::zeros(bar.nrows(), bar.ncols());
                 for (n, column) in bar.column_iter().enumerate() {
@@ -98,7 +99,7 @@ impl Reads {
                         out.column_mut(state).axpy(weight, &column, 1.0);
                     }
                 }
-                out
+                Cow::Owned(out)
             }
         }
     }

@@ -14,12 +14,16 @@ mod falling;
 mod fig3;
 #[path = "paper/fig4.rs"]
 mod fig4;
+#[path = "paper/fig6.rs"]
+mod fig6;
 #[path = "paper/fig7.rs"]
 mod fig7;
 #[path = "paper/fig8.rs"]
 mod fig8;
 #[path = "paper/fig9.rs"]
 mod fig9;
+#[path = "paper/meshed.rs"]
+mod meshed;
 #[path = "paper/plot.rs"]
 mod plot;
 #[path = "paper/rival.rs"]
@@ -48,9 +52,10 @@ struct How<'a> {
 type Figure = (&'static str, fn(&How) -> Made);
 
 /// Each by its name.
-const FIGURES: [Figure; 6] = [
+const FIGURES: [Figure; 7] = [
     ("fig3", fig3::make),
     ("fig4", fig4::make),
+    ("fig6", fig6::make),
     ("fig7", fig7::make),
     ("fig8", fig8::make),
     ("fig9", fig9::make),
@@ -157,6 +162,21 @@ mod tests {
             numbers["settles_sooner_with_viscosity"], true,
             "{numbers:?}"
         );
+    }
+
+    #[test]
+    fn better_preconditioners_take_fewer_iterations() {
+        let numbers = quick("fig6");
+        let of = |name: &str| {
+            let reached = &numbers[name]["iterations_to_2.7e-3"];
+            reached
+                .as_u64()
+                .unwrap_or_else(|| panic!("{name}: {numbers:?}"))
+        };
+        assert!(of("CSD24, rho 3") <= 59);
+        assert!(4 * of("CSD24, rho 3") < of("Jacobi"));
+        assert!(of("CSD24, rho 3") < of("CSD24, rho 1.2"));
+        assert!(of("factors per body") < of("CSD24 per body, rho 3"));
     }
 
     #[test]

@@ -1,5 +1,5 @@
 // out = R⁻¹ x of every body, or R⁻ᵀ x: the right preconditioner. R⁻¹ lies there as a dense upper triangle, or as a square,
-// for the bodies where it fits; the others have a diagonal. A workgroup makes 64 rows of one body from
+// for the bodies where it fits; the others have a diagonal, or what sparse.wgsl gives in its place. A workgroup makes 64 rows of one body from
 // tiles of R⁻¹ in its own memory, for one share of the columns of R⁻¹; sum.wgsl adds the shares up. Twins: boundary BodyBoundary::{solve_factor,
 // solve_factor_transpose}, PanelBoundary::solve.
 
@@ -20,6 +20,7 @@ const BLOCK: u32 = 64u;
 const WIDTH: u32 = 16u;
 const DIAGONAL: u32 = 0u;
 const SQUARE: u32 = 2u;
+const SPARSE: u32 = 3u;
 
 var<workgroup> tile: array<real, 1040>;
 var<workgroup> rows: array<real, WIDTH * COLUMNS>;
@@ -36,11 +37,11 @@ fn main(
     let place = places[own.x];
     let i = own.y + lane;
     let to = (group.y * task.sources + i) * COLUMNS;
-    if place.w == DIAGONAL {
+    if place.w == DIAGONAL || place.w == SPARSE {
         if lane < own.z {
             for (var k = 0u; k < COLUMNS; k++) {
                 out[to + k] = num(0.0);
-                if group.y == 0u {
+                if place.w == DIAGONAL && group.y == 0u {
                     out[to + k] = mul(scaling[i], x[i * COLUMNS + k]);
                 }
             }

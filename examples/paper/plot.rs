@@ -1,6 +1,7 @@
 //! Curves, a panel each quantity.
 
 use plotters::coord::Shift;
+use plotters::coord::ranged1d::{Ranged, ValueFormatter};
 use plotters::prelude::*;
 use std::error::Error;
 use std::path::Path;
@@ -16,6 +17,7 @@ pub struct Panel {
     title: &'static str,
     along: &'static str,
     curves: Vec<Curve>,
+    logarithmic: bool,
 }
 
 impl Curve {
@@ -39,6 +41,15 @@ impl Panel {
             title,
             along,
             curves,
+            logarithmic: false,
+        }
+    }
+
+    /// Both axes logarithmic, points marked.
+    pub fn logarithmic(title: &'static str, along: &'static str, curves: Vec<Curve>) -> Self {
+        Self {
+            logarithmic: true,
+            ..Self::along(title, along, curves)
         }
     }
 }
@@ -66,7 +77,7 @@ pub fn draw(file: &Path, panels: &[Panel]) -> Result<(), Box<dyn Error>> {
 }
 
 fn draw_panel(
-    area: &DrawingArea<SVGBackend, Shift>,
+    area: &DrawingArea<SVGBackend<'_>, Shift>,
     panel: &Panel,
     legend: bool,
 ) -> Result<(), Box<dyn Error>> {
@@ -75,13 +86,31 @@ fn draw_panel(
     let end = all().map(|p| p.0).fold(f64::MIN, f64::max);
     let low = all().map(|p| p.1).fold(f64::MAX, f64::min);
     let high = all().map(|p| p.1).fold(f64::MIN, f64::max);
-    let margin = 0.08 * (high - low).max(1e-6);
-    let mut chart = ChartBuilder::on(area)
+    let mut chart = ChartBuilder::on(area);
+    chart
         .margin(8)
         .caption(panel.title, ("sans-serif", 15))
         .x_label_area_size(28)
-        .y_label_area_size(48)
-        .build_cartesian_2d(start..end, low - margin..high + margin)?;
+        .y_label_area_size(48);
+    if panel.logarithmic {
+        let (x, y) = (0.9 * start..1.1 * end, 0.7 * low..1.4 * high);
+        let chart = chart.build_cartesian_2d(x.log_scale(), y.log_scale())?;
+        return draw_curves(chart, panel, legend);
+    }
+    let margin = 0.08 * (high - low).max(1e-6);
+    let chart = chart.build_cartesian_2d(start..end, low - margin..high + margin)?;
+    draw_curves(chart, panel, legend)
+}
+
+fn draw_curves<'a, X, Y>(
+    mut chart: ChartContext<'a, SVGBackend<'a>, Cartesian2d<X, Y>>,
+    panel: &Panel,
+    legend: bool,
+) -> Result<(), Box<dyn Error>>
+where
+    X: Ranged<ValueType = f64> + ValueFormatter<f64>,
+    Y: Ranged<ValueType = f64> + ValueFormatter<f64>,
+{
     chart
         .configure_mesh()
         .x_desc(panel.along)
@@ -94,6 +123,10 @@ fn draw_panel(
             drawn.label(&curve.name).legend(move |(x, y)| {
                 PathElement::new([(x, y), (x + 18, y)], color.stroke_width(2))
             });
+        }
+        if panel.logarithmic {
+            let mark = |point: &(f64, f64)| Circle::new(*point, 3, color.filled());
+            chart.draw_series(curve.points.iter().map(mark))?;
         }
     }
     if legend {

@@ -64,6 +64,9 @@ pub(super) struct Water {
     /// Preconditioner of the coupled system [default: factors].
     #[arg(long, value_parser = choice::<Preconditioner>())]
     pub preconditioner: Option<Preconditioner>,
+    /// How far a source reaches others with the preconditioner csd24, in its own scales [default: 3].
+    #[arg(long, value_name = "RHO", value_parser = rho, allow_negative_numbers = true)]
+    pub csd24_rho: Option<f64>,
     /// What computes the coupling.
     #[arg(long, value_parser = choice::<Backend>(), default_value = "cpu")]
     pub backend: Backend,
@@ -208,6 +211,7 @@ impl Water {
             rows: self.rows,
             solver: self.solver,
             preconditioner: self.preconditioner,
+            csd24_rho: self.csd24_rho,
             tolerance: self.tolerance,
             rank: self.rank,
             resolved_gap: self.resolved_gap,
@@ -262,6 +266,11 @@ pub(super) fn seconds(text: &str) -> std::result::Result<f64, String> {
 
 pub(super) fn tolerance(text: &str) -> std::result::Result<f64, String> {
     number(text, 1.0, "give a number between 0 and 1, e.g. 1e-8")
+}
+
+fn rho(text: &str) -> std::result::Result<f64, String> {
+    let inside = text.parse().ok().filter(|x| (1.0..=20.0).contains(x));
+    inside.ok_or_else(|| "give a number between 1 and 20, e.g. 3".into())
 }
 
 /// Parser of a choice from a list: names and help come from the list itself.

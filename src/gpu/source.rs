@@ -83,6 +83,7 @@ shaders! {
     "reduce" => "solver/columns.rs::add_scaled",
     "refine" => "solver/cgls.rs::cgls",
     "rows" => "boundary/mfs/assemble.rs::twist_rows",
+    "sparse" => "solver/sparse_rows.rs::product",
     "sum" => "solver/columns.rs::add_scaled",
     "wrench" => "coupling/pair.rs::wrench",
 }

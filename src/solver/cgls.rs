@@ -31,6 +31,26 @@ pub fn cgls(
     tolerance: f64,
     max_iterations: usize,
 ) -> Outcome {
+    let limits = (tolerance, max_iterations);
+    cgls_watched(
+        normal,
+        precondition,
+        precondition_transpose,
+        g,
+        limits,
+        |_, _| true,
+    )
+}
+
+/// As [`cgls`] to a tolerance in at most so many iterations; `watch` sees the iteration and its x after each, and says whether to go on.
+pub fn cgls_watched(
+    normal: impl Fn(&Columns) -> Columns,
+    precondition: impl Fn(&mut Columns),
+    precondition_transpose: impl Fn(&mut Columns),
+    g: &Columns,
+    (tolerance, max_iterations): (f64, usize),
+    mut watch: impl FnMut(usize, &Columns) -> bool,
+) -> Outcome {
     CALLS.add(1);
     let n = g.columns;
     let mut x = Columns::zeros(g.rows, n);
@@ -71,6 +91,9 @@ pub fn cgls(
         for (at, (p, s)) in p.data.iter_mut().zip(&s.data).enumerate() {
             let k = at % n;
             *p = if active[k] { s + beta[k] * *p } else { 0.0 };
+        }
+        if !watch(iterations, &x) {
+            break;
         }
     }
     let relative = |k: usize| {

@@ -9,18 +9,22 @@ mod cholesky;
 mod columns;
 mod eigenvalue;
 mod gmres;
+mod inverse_cholesky;
 mod lu;
 mod product;
 mod sparse;
+mod sparse_rows;
 
-pub use cgls::{Outcome, cgls};
+pub use cgls::{Outcome, cgls, cgls_watched};
 pub use cholesky::Cholesky;
 pub use columns::Columns;
 pub(crate) use eigenvalue::{condition, largest_eigenvalue};
 pub use gmres::gmres;
+pub use inverse_cholesky::{InverseCholesky, LEAST_RHO};
 pub use lu::Lu;
 pub use product::{both_products, normal_product, product, transposed_product};
 pub use sparse::{SparseCholesky, SparsePattern, elimination_order};
+pub use sparse_rows::SparseRows;
 
 use crate::adjoint::count::Counter;
 

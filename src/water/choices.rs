@@ -7,6 +7,7 @@ use super::numerics::Numerics;
 use super::surface::{Meshing, Surface, surface};
 use crate::Result;
 use crate::boundary::{self, Depth};
+use crate::coupling::full::SolveSettings;
 use crate::scene::{Preset, Scene};
 use serde::{Deserialize, Serialize};
 
@@ -72,6 +73,19 @@ impl WaterChoices {
         let mut out = Vec::new();
         if self.backend == Backend::Cpu && self.gpu != GpuSettings::default() {
             out.push("the settings of the GPU have no effect with the backend cpu".into());
+        }
+        let solve = &self.numerics.solve;
+        let own = (solve.preconditioner, solve.csd24_rho);
+        let usual = SolveSettings::default();
+        let full = self.fidelity == Fidelity::Full;
+        if own != (usual.preconditioner, usual.csd24_rho)
+            && !(full && self.method_used().kind().by_sources())
+        {
+            out.push(format!(
+                "the setting preconditioner has no effect with the fidelity {} by {}: only full by fundamental solutions takes it",
+                self.fidelity,
+                self.method_used()
+            ));
         }
         let compress = &self.numerics.compress;
         let alone = self.fidelity.kind().solves_alone();

@@ -318,7 +318,11 @@ pub fn derivatives() {
 
 /// The refined solve of random right-hand sides, with every preconditioner.
 pub fn solves() {
-    for preconditioner in [Preconditioner::Factors, Preconditioner::Jacobi] {
+    for preconditioner in [
+        Preconditioner::Factors,
+        Preconditioner::Jacobi,
+        Preconditioner::Csd24,
+    ] {
         let mut settings = tight(preconditioner);
         settings.tolerance = 1e-10;
         let model = match preconditioner {

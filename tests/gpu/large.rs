@@ -69,6 +69,12 @@ fn bodies_with_and_without_factor_go_together() {
 }
 
 #[test]
+fn sparse_factors_stand_for_others() {
+    compare([false; 3], Preconditioner::Csd24);
+    compare([true, false, true], Preconditioner::Csd24);
+}
+
+#[test]
 fn the_cpu_refuses_a_body_without_factor() {
     let model = model([false; 3], Preconditioner::Jacobi);
     let message = Cpu::new(model).err().expect("refused").to_string();

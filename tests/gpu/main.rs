@@ -52,6 +52,7 @@ comparisons! {
     "reduce" => kernels::derivatives,
     "refine" => kernels::solves,
     "rows" => coupled::combinations,
+    "sparse" => kernels::solves,
     "sum" => kernels::products,
     "wrench" => reduced::rungs,
 }

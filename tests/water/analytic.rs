@@ -382,6 +382,7 @@ fn iterative_solvers_agree_with_dense_factorisation() {
             preconditioner,
             tolerance,
             max_iterations: 20_000,
+            ..SolveSettings::default()
         };
         matrix(&full(&bodies, &[], settings), &uneven_poses())
     };
@@ -400,7 +401,11 @@ fn iterative_solvers_agree_with_dense_factorisation() {
         // It isn't tighter than it says either.
         assert!(error > 1e-4 * tolerance, "{tolerance:e}: {error:e}");
     }
-    for preconditioner in [Preconditioner::Jacobi, Preconditioner::None] {
+    for preconditioner in [
+        Preconditioner::Csd24,
+        Preconditioner::Jacobi,
+        Preconditioner::None,
+    ] {
         let (m, report) = solve(FullSolver::Cgls, preconditioner, 1e-8);
         let error = scaled_error(&m, &reference);
         println!(
@@ -408,6 +413,26 @@ fn iterative_solvers_agree_with_dense_factorisation() {
             report.iterations
         );
         assert!(error < 3e-8, "{preconditioner:?}: {error:e}");
+    }
+}
+
+#[test]
+fn a_reach_of_csd24_under_one_is_refused() {
+    let bodies = uneven(80);
+    for csd24_rho in [0.9, -1.0, f64::NAN, f64::INFINITY, 21.0] {
+        let settings = SolveSettings {
+            preconditioner: Preconditioner::Csd24,
+            csd24_rho,
+            ..SolveSettings::default()
+        };
+        let made = Full::new(bodies.to_vec(), &[], Exclusions::none(), settings);
+        let error = made.err().expect("refused").to_string();
+        assert!(
+            error.contains("csd24_rho") && error.contains("between 1 and 20"),
+            "{error}"
+        );
+        let alone = bodies[0].sparse_factor(csd24_rho);
+        assert_eq!(alone.is_ok(), csd24_rho == 21.0);
     }
 }
 
@@ -428,12 +453,14 @@ fn solvers_of_the_square_system_agree() {
             preconditioner,
             tolerance,
             max_iterations: 20_000,
+            ..SolveSettings::default()
         };
         matrix(&full(&bodies, &[], settings), &uneven_poses())
     };
     let (reference, _) = solve(FullSolver::Qr, Preconditioner::Factors, 1e-8);
     for (solver, preconditioner, limit) in [
         (FullSolver::Gmres, Preconditioner::Factors, 3e-10),
+        (FullSolver::Gmres, Preconditioner::Csd24, 1e-9),
         (FullSolver::Gmres, Preconditioner::Jacobi, 1e-8),
         (FullSolver::Cgls, Preconditioner::Factors, 3e-10),
     ] {

@@ -21,6 +21,7 @@ pub mod depth;
 mod factor;
 pub mod readout;
 mod settings;
+mod sparse;
 
 use super::{Response, asymmetry, potentials};
 use crate::adjoint::kernel::{Points, Triangles};

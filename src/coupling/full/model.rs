@@ -1,6 +1,6 @@
 //! What the coupled system consists of.
 
-use super::SolveSettings;
+use super::{FullSolver, Preconditioner, SolveSettings};
 use crate::Result;
 use crate::adjoint::lie::Pose;
 use crate::boundary::BodyBoundary;
@@ -8,6 +8,7 @@ use crate::coupling::Exclusions;
 use crate::coupling::pair::Pair;
 use crate::coupling::settings::{end, ranges};
 use crate::geometry::{Image, Wall};
+use crate::solver::InverseCholesky;
 use std::ops::Range;
 use std::sync::Arc;
 
@@ -21,6 +22,8 @@ pub struct Model {
     pub excluded: Exclusions,
     /// How the system is solved.
     pub settings: SolveSettings,
+    /// The bodies' sparse factors, where those precondition.
+    pub sparse: Vec<Option<Arc<InverseCholesky>>>,
     /// Rows of K of each body: its faces.
     pub faces: Vec<Range<usize>>,
     /// Columns of K of each body: its sources.
@@ -47,6 +50,7 @@ impl Model {
             sources: ranges(bodies.iter().map(|b| b.sources.len())),
             images: Image::of_rigid_walls(walls, "the fidelity full")?,
             excluded,
+            sparse: sparse(&bodies, &settings)?,
             bodies,
             settings,
         })
@@ -81,4 +85,28 @@ impl Model {
         }
         out
     }
+}
+
+/// Sparse factors, one of bodies that share what they are: of all bodies where that is asked for, and in place of factors that weren't made.
+fn sparse(
+    bodies: &[Arc<BodyBoundary>],
+    settings: &SolveSettings,
+) -> Result<Vec<Option<Arc<InverseCholesky>>>> {
+    let mut out: Vec<Option<Arc<InverseCholesky>>> = Vec::with_capacity(bodies.len());
+    for (b, body) in bodies.iter().enumerate() {
+        let asked = match settings.preconditioner {
+            Preconditioner::Csd24 => settings.solver != FullSolver::Qr,
+            Preconditioner::Factors => !body.factored(),
+            Preconditioner::Jacobi | Preconditioner::None => false,
+        };
+        let twin = bodies[..b]
+            .iter()
+            .position(|other| Arc::ptr_eq(other, body));
+        out.push(match (asked, twin) {
+            (false, _) => None,
+            (true, Some(twin)) => out[twin].clone(),
+            (true, None) => Some(Arc::new(body.sparse_factor(settings.csd24_rho)?)),
+        });
+    }
+    Ok(out)
 }

@@ -16,6 +16,11 @@ use crate::gpu::surfaces::{Parts, Surfaces, scaled, shapes};
 use faer::Mat;
 use std::sync::Arc;
 
+/// What a body's factor is, as `shaders/factor.wgsl` has it.
+const DIAGONAL: u32 = 0;
+const TRIANGLE: u32 = 1;
+const SPARSE: u32 = 3;
+
 /// All that doesn't change with the poses.
 pub(super) struct Geometry {
     pub surfaces: Arc<Surfaces>,
@@ -27,6 +32,8 @@ pub(super) struct Geometry {
     pub damping_single: Buffer,
     /// Whether some body has no factor here and takes the diagonal.
     pub diagonal: bool,
+    /// Whether some body has a sparse factor.
+    pub sparse: bool,
 }
 
 /// The system at given poses.
@@ -121,6 +128,7 @@ impl Geometry {
             .flat_map(|b| b.damping.iter().map(|d| (d / weight).powi(2)))
             .collect();
         let (factors, layout, diagonal) = factors(context, model, &all, &of, weight);
+        let (reach, entries) = sparse(model, &of, &layout, weight);
         let damping_single = context.upload("damping", Arithmetic::Single, &damping)?;
         let factors = context.upload("factors", Arithmetic::Single, &factors)?;
         surfaces.table.extend([
@@ -130,12 +138,21 @@ impl Geometry {
                 "places",
                 context.upload_words("layout of the factors", &layout)?,
             ),
+            (
+                "reach",
+                context.upload_words("rows of the sparse factors", &reach)?,
+            ),
+            (
+                "entries",
+                context.upload_words("entries of the sparse factors", &entries)?,
+            ),
         ]);
         Ok(Self {
             surfaces: Arc::new(surfaces),
             damping: context.upload("damping", context.fine(), &damping)?,
             damping_single,
             diagonal,
+            sparse: !entries.is_empty(),
             model: model.clone(),
             weight,
         })
@@ -168,6 +185,39 @@ impl PlacedSystem {
     }
 }
 
+/// Of each source's row, L's and then Lᵀ's: where its entries start and end, and the first source of its body; and the entries, (source of the body, bits of the value), each shape's once.
+fn sparse(model: &Model, of: &[usize], layout: &[u32], weight: f64) -> (Vec<u32>, Vec<u32>) {
+    let mut entries: Vec<u32> = Vec::new();
+    let mut starts: Vec<Option<Vec<u32>>> = vec![None; of.iter().map(|s| s + 1).max().unwrap_or(0)];
+    let mut reach = [Vec::new(), Vec::new()];
+    for (b, body) in model.bodies.iter().enumerate() {
+        let n = body.sources.len();
+        let factor = (model.sparse[b].as_ref()).filter(|_| layout[4 * b + 3] == SPARSE);
+        let Some(factor) = factor else {
+            reach.iter_mut().for_each(|r| r.extend(vec![0; 4 * n]));
+            continue;
+        };
+        let starts = starts[of[b]].get_or_insert_with(|| {
+            let mut starts = vec![entries.len() as u32 / 2];
+            for rows in [factor.rows(), factor.transposed()] {
+                for i in 0..n {
+                    for (j, value) in rows.row(i) {
+                        entries.extend([*j as u32, ((weight * value) as f32).to_bits()]);
+                    }
+                    starts.push(entries.len() as u32 / 2);
+                }
+            }
+            starts
+        });
+        let first = model.sources[b].start as u32;
+        for (half, reach) in reach.iter_mut().enumerate() {
+            let rows = starts[half * n..(half + 1) * n + 1].windows(2);
+            reach.extend(rows.flat_map(|w| [w[0], w[1], first, 0]));
+        }
+    }
+    (reach.concat(), entries)
+}
+
 /// The factors that fit (each shape's once), where each body's lies, and whether some have none.
 fn factors(
     context: &Context,
@@ -193,11 +243,13 @@ fn factors(
     for (b, s) in of.iter().enumerate() {
         let first = model.sources[b].start as u32;
         let n = all[*s].sources.len() as u32;
+        let sparse = model.sparse[b].is_some();
         layout.extend(match at[*s] {
-            Some(at) => [at as u32, n, first, 1],
-            None => [0, n, first, 0],
+            Some(at) => [at as u32, n, first, TRIANGLE],
+            None if sparse => [0, n, first, SPARSE],
+            None => [0, n, first, DIAGONAL],
         });
-        diagonal |= at[*s].is_none();
+        diagonal |= at[*s].is_none() && !sparse;
     }
     (
         values,

@@ -5,7 +5,7 @@ use super::geometry::PlacedSystem;
 use crate::coupling::full::Preconditioner;
 use crate::gpu::buffer::Buffer;
 use crate::gpu::columns::{Base, Slice, Sum, passes};
-use crate::gpu::factor::factor;
+use crate::gpu::factor::{factor, sparse};
 use crate::gpu::kernel::Call;
 use crate::gpu::products::{Product, WIDE, once};
 use crate::gpu::refined::{Inner, Iterates, Limits, Solves};
@@ -42,7 +42,7 @@ pub(super) fn solves<'a>(
     let limits = Limits {
         tolerance: settings.tolerance,
         most: settings.max_iterations,
-        few: match factored && !placed.geometry.diagonal {
+        few: match factored && !placed.geometry.diagonal && !placed.geometry.sparse {
             true => FEW,
             false => MANY,
         },
@@ -107,8 +107,13 @@ fn cgls(placed: &PlacedSystem, g: Slice, x: Slice, columns: usize) -> Result<Inn
     again.push(residual(back)?);
     let shares = surfaces.factor_shares();
     let parts = context.reals("shares of R⁻¹ x", single, shares * n * columns)?;
-    let preconditioned =
-        |transpose, x, out, gate| factor(placed, transpose, (x, &parts, out), columns, gate);
+    let preconditioned = |transpose, x, out, gate| {
+        let mut calls = Vec::from(factor(placed, transpose, (x, &parts, out), columns, gate)?);
+        if geometry.sparse {
+            calls.push(sparse(placed, transpose, (x, out), columns, gate)?);
+        }
+        Ok::<_, Error>(calls)
+    };
     let lead = preconditioned(true, &iterates.shrunk, &iterates.s, gate)?;
     let active = &iterates.active;
     let direction = whole(&along);
@@ -116,7 +121,7 @@ fn cgls(placed: &PlacedSystem, g: Slice, x: Slice, columns: usize) -> Result<Inn
         damped: Some((&geometry.damping_single, direction)),
         ..Sum::new((n, columns), (&memory1[2], back), whole(&product))
     };
-    let mut iteration: Vec<Call> = preconditioned(false, &iterates.p, &along, active)?.into();
+    let mut iteration: Vec<Call> = preconditioned(false, &iterates.p, &along, active)?;
     iteration.extend(normal(single, &memory1, direction, active)?);
     iteration.push(damped.call(context, single, active)?);
     iteration.extend(preconditioned(true, &product, &q, active)?);
@@ -131,7 +136,7 @@ fn cgls(placed: &PlacedSystem, g: Slice, x: Slice, columns: usize) -> Result<Inn
         iteration.push(iterates.call(context, shader, &[n, 0, 0, 0], &own, groups)?);
     }
     Ok(Inner {
-        lead: lead.into(),
+        lead,
         steps: vec![iteration],
         last: Vec::new(),
         first,

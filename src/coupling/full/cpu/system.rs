@@ -9,7 +9,9 @@ use crate::boundary::{BodyBoundary, solve_upper, solve_upper_transpose};
 use crate::coupling::Reached;
 use crate::coupling::pair::Pair;
 use crate::coupling::settings::converged;
-use crate::solver::{Columns, Outcome, cgls, gmres, normal_product, product, transposed_product};
+use crate::solver::{
+    Columns, InverseCholesky, Outcome, cgls, gmres, normal_product, product, transposed_product,
+};
 use faer::linalg::solvers::Qr;
 use faer::{Mat, MatMut};
 
@@ -123,10 +125,24 @@ impl<'a> System<'a> {
         out
     }
 
-    /// Applies the preconditioner, `factor` a body's own to its rows of `x`.
-    fn precondition(&self, x: &mut Columns, factor: impl Fn(&BodyBoundary, MatMut<'_, f64>)) {
+    /// Applies the preconditioner, `factor` a body's own to its rows of `x`, `sparse` where that is a sparse one.
+    fn precondition(
+        &self,
+        x: &mut Columns,
+        factor: impl Fn(&BodyBoundary, MatMut<'_, f64>),
+        sparse: impl Fn(&BodyBoundary, &InverseCholesky, &Columns) -> Columns,
+    ) {
         let (model, n) = (&self.cpu.model, x.columns);
         match model.settings.preconditioner {
+            Preconditioner::Csd24 => {
+                let bodies = model.bodies.iter().zip(&model.sparse);
+                for ((body, made), range) in bodies.zip(&model.sources) {
+                    if let Some(made) = made {
+                        let part = sparse(body, made, &x.part(range));
+                        x.slice_mut(range).copy_from_slice(&part.data);
+                    }
+                }
+            }
             Preconditioner::Factors => {
                 for (body, range) in model.bodies.iter().zip(&model.sources) {
                     let part = x.slice_mut(range);
@@ -158,8 +174,11 @@ impl<'a> System<'a> {
         }
         let outcome = cgls(
             |x| self.normal(x),
-            |x| self.precondition(x, |b, x| b.solve_factor(x)),
-            |x| self.precondition(x, |b, x| b.solve_factor_transpose(x)),
+            |x| self.precondition(x, |b, x| b.solve_factor(x), |_, l, x| l.apply(x)),
+            |x| {
+                let transposed = |b: &BodyBoundary, x: MatMut<'_, f64>| b.solve_factor_transpose(x);
+                self.precondition(x, transposed, |_, l, x| l.apply_transpose(x));
+            },
             g,
             settings.tolerance,
             settings.max_iterations,
@@ -180,7 +199,11 @@ impl<'a> System<'a> {
         let outcome = gmres(
             |v, _| {
                 let mut z = v.clone();
-                self.precondition(&mut z, |b, x| solve_square(b, x, transpose));
+                self.precondition(
+                    &mut z,
+                    |b, x| solve_square(b, x, transpose),
+                    |b, l, x| solve_square_sparse(b, l, x, transpose),
+                );
                 let image = match transpose {
                     true => self.apply_transpose(&z),
                     false => self.apply(&z),
@@ -234,6 +257,22 @@ fn solve_square(body: &BodyBoundary, mut x: MatMut<'_, f64>, transpose: bool) {
     match transpose {
         true => x.copy_from(own * &m),
         false => x.copy_from(&m),
+    }
+}
+
+/// As [`solve_square`], (L Lᵀ) Kᵀ x and K (L Lᵀ) x.
+fn solve_square_sparse(
+    body: &BodyBoundary,
+    l: &InverseCholesky,
+    x: &Columns,
+    transpose: bool,
+) -> Columns {
+    let (rows, n) = (body.faces.len(), body.sources.len());
+    if transpose {
+        product(&body.flux_rows, rows, &l.apply(&l.apply_transpose(x)))
+    } else {
+        let x = transposed_product(&body.flux_rows, n, x);
+        l.apply(&l.apply_transpose(&x))
     }
 }
 

@@ -19,6 +19,8 @@ use hydrograd::adjoint;
 use hydrograd::adjoint::check::{Outcome, Rung};
 use std::collections::BTreeSet;
 use std::sync::LazyLock;
+use std::sync::atomic::{AtomicUsize, Ordering};
+use std::thread::available_parallelism;
 
 /// Every checked rung, named by its path; those of the kernels' crate begin with `adjoint`.
 fn registered() -> Vec<(String, Rung)> {
@@ -362,39 +364,61 @@ fn every_rung_in_the_source_is_registered() {
     }
 }
 
-/// A rung with the outcome of its check, uncorrupted, and what that drew.
+/// A rung with the outcome of its check, right and 1 % wrong, and what it drew.
 struct Checked {
     name: String,
-    rung: Rung,
     right: Outcome,
+    corrupted: Outcome,
     drawn: Vec<Vec<f64>>,
 }
 
-static CHECKED: LazyLock<Vec<Checked>> = LazyLock::new(|| {
-    let checked = |(name, rung): (String, Rung)| {
+impl Checked {
+    fn of(name: &str, rung: &Rung) -> Self {
         let (right, drawn) = tools::drawn_by(|| (rung.check)(1.0));
-        Checked {
-            name,
-            rung,
+        Self {
+            name: name.into(),
             right,
+            corrupted: (rung.check)(1.01),
             drawn,
         }
+    }
+}
+
+/// Threads of their own take the rungs in turn: what a check draws is kept by thread, and tasks of a pool may do another's work while they wait.
+static CHECKED: LazyLock<Vec<Checked>> = LazyLock::new(|| {
+    let rungs = registered();
+    let (next, threads) = (AtomicUsize::new(0), available_parallelism());
+    let work = || {
+        let turns = std::iter::repeat_with(|| next.fetch_add(1, Ordering::Relaxed));
+        let mine = turns.map_while(|k| Some((k, rungs.get(k)?)));
+        mine.map(|(k, (name, rung))| (k, Checked::of(name, rung)))
+            .collect::<Vec<_>>()
     };
-    registered().into_iter().map(checked).collect()
+    let mut all = std::thread::scope(|scope| {
+        let threads = (0..threads.map_or(1, usize::from)).map(|_| scope.spawn(work));
+        let threads = threads.collect::<Vec<_>>().into_iter();
+        threads
+            .flat_map(|thread| thread.join().expect("a check panicked"))
+            .collect::<Vec<_>>()
+    });
+    all.sort_by_key(|(k, _)| *k);
+    all.into_iter().map(|(_, checked)| checked).collect()
 });
 
 #[test]
 fn every_rung_is_right_and_fails_when_corrupted() {
     let mut wrong = Vec::new();
     for Checked {
-        name, rung, right, ..
+        name,
+        right,
+        corrupted,
+        ..
     } in CHECKED.iter()
     {
         println!("{:.1e} {:5.2} {name}", right.rel_error, right.order);
         if !right.passes() || right.tolerance > 1e-6 {
             wrong.push(format!("{name}: {right:?}"));
         }
-        let corrupted = (rung.check)(1.01);
         if corrupted.passes() {
             wrong.push(format!("{name} passes 1 % wrong: {corrupted:?}"));
         }

@@ -216,8 +216,11 @@ fn measure(faces: usize, tolerances: &[f64]) -> hydrograd::Result<()> {
 
 fn main() {
     let arguments = common::arguments();
-    let sizes: Vec<usize> = arguments.iter().filter_map(|a| a.parse().ok()).collect();
     let loose = arguments.iter().any(|a| a == "--loose");
+    let sizes = arguments.iter().filter(|a| *a != "--loose");
+    let sizes: Vec<usize> = sizes
+        .map(|a| a.parse().expect("numbers of faces, or --loose"))
+        .collect();
     let tolerances = if loose { &TOLERANCES[..1] } else { &TOLERANCES };
     print!("| faces | unknowns | preconditioner | set-up, s |");
     (tolerances.iter()).for_each(|t| print!(" iterations to {t:.1e} | s, set-up counted |"));

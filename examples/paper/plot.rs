@@ -55,11 +55,14 @@ impl Panel {
 }
 
 /// Dark on white and told apart also by most who see few colours.
-const COLORS: [RGBColor; 4] = [
+const COLORS: [RGBColor; 7] = [
     RGBColor(45, 95, 168),
     RGBColor(214, 110, 20),
     RGBColor(47, 125, 79),
     RGBColor(140, 60, 140),
+    RGBColor(120, 120, 120),
+    RGBColor(190, 40, 60),
+    RGBColor(60, 170, 190),
 ];
 
 /// Writes an SVG, two panels in a row.
@@ -93,7 +96,7 @@ fn draw_panel(
         .x_label_area_size(28)
         .y_label_area_size(48);
     if panel.logarithmic {
-        let (x, y) = (0.9 * start..1.1 * end, 0.7 * low..1.4 * high);
+        let (x, y) = (0.9 * start..1.1 * end, 0.2 * low..1.4 * high);
         let chart = chart.build_cartesian_2d(x.log_scale(), y.log_scale())?;
         return draw_curves(chart, panel, legend);
     }
@@ -111,11 +114,19 @@ where
     X: Ranged<ValueType = f64> + ValueFormatter<f64>,
     Y: Ranged<ValueType = f64> + ValueFormatter<f64>,
 {
-    chart
-        .configure_mesh()
-        .x_desc(panel.along)
-        .light_line_style(TRANSPARENT)
-        .draw()?;
+    let mut mesh = chart.configure_mesh();
+    mesh.x_desc(panel.along).light_line_style(TRANSPARENT);
+    let plain = |x: &f64| match x / 10f64.powf(x.log10().floor()) {
+        leading if [1, 2, 5].contains(&(leading.round() as u8)) => x.to_string(),
+        _ => String::new(),
+    };
+    if panel.logarithmic {
+        mesh.x_label_formatter(&plain).y_label_formatter(&plain);
+    }
+    mesh.draw()?;
+    if panel.curves.len() > COLORS.len() {
+        return Err(format!("{}: more curves than colours", panel.title).into());
+    }
     for (curve, color) in panel.curves.iter().zip(COLORS) {
         let line = LineSeries::new(curve.points.iter().copied(), color.stroke_width(2));
         let drawn = chart.draw_series(line)?;
@@ -132,7 +143,10 @@ where
     if legend {
         chart
             .configure_series_labels()
-            .position(SeriesLabelPosition::UpperLeft)
+            .position(match panel.logarithmic {
+                true => SeriesLabelPosition::LowerRight,
+                false => SeriesLabelPosition::UpperLeft,
+            })
             .border_style(BLACK.mix(0.3))
             .background_style(WHITE)
             .draw()?;

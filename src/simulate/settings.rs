@@ -67,7 +67,7 @@ settings! {
     solver: FullSolver => water.numerics.solve.solver;
     /// Its preconditioner.
     preconditioner: Preconditioner => water.numerics.solve.preconditioner;
-    /// ρ of the preconditioner `csd24`: how far, in its own scales, a source reaches others of its body; 1 or more.
+    /// ρ of the preconditioner `csd24`: how far, in its own scales, a source reaches others of its body; 1 to 20.
     csd24_rho: f64 => water.numerics.solve.csd24_rho;
     /// Relative residual at which it stops.
     tolerance: f64 => water.numerics.solve.tolerance;

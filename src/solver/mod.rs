@@ -20,6 +20,7 @@ pub use cholesky::Cholesky;
 pub use columns::Columns;
 pub(crate) use eigenvalue::{condition, largest_eigenvalue};
 pub use gmres::gmres;
+pub(crate) use inverse_cholesky::AT_ONCE;
 pub use inverse_cholesky::{InverseCholesky, LEAST_RHO};
 pub use lu::Lu;
 pub use product::{both_products, normal_product, product, transposed_product};

@@ -47,6 +47,9 @@ impl SparseRows {
     }
 
     /// Its transpose, of so many rows.
+    ///
+    /// # Panics
+    /// Where it has more columns than that.
     pub fn transposed(&self, rows: usize) -> Self {
         let mut starts = vec![0; rows + 1];
         for (j, _) in &self.entries {
@@ -67,6 +70,9 @@ impl SparseRows {
     }
 
     /// Its product with some columns.
+    ///
+    /// # Panics
+    /// Where those have fewer rows than it has columns.
     pub fn product(&self, x: &Columns) -> Columns {
         CALLS.add(1);
         let n = x.columns;

@@ -7,7 +7,7 @@ use super::numerics::Numerics;
 use super::surface::{Meshing, Surface, surface};
 use crate::Result;
 use crate::boundary::{self, Depth};
-use crate::coupling::full::SolveSettings;
+use crate::coupling::full::{FullSolver, Preconditioner, SolveSettings};
 use crate::scene::{Preset, Scene};
 use serde::{Deserialize, Serialize};
 
@@ -67,6 +67,48 @@ impl WaterChoices {
         }
     }
 
+    /// The same of the preconditioner and its ρ.
+    fn preconditioner_without_effect(&self) -> Vec<String> {
+        let (solve, usual) = (&self.numerics.solve, SolveSettings::default());
+        let method = self.method_used();
+        let by_sources = self.fidelity == Fidelity::Full && method.kind().by_sources();
+        let chosen = solve.preconditioner != usual.preconditioner;
+        let reach = solve.csd24_rho != usual.csd24_rho;
+        let mut out = Vec::new();
+        let mut told = |name: &str, with: String, who: &str| {
+            out.push(format!(
+                "the setting {name} has no effect with {with}: {who}"
+            ));
+        };
+        for (name, given) in [("preconditioner", chosen), ("csd24_rho", reach)] {
+            let who = "only full by fundamental solutions takes it";
+            if given && !by_sources {
+                told(
+                    name,
+                    format!("the fidelity {} by {method}", self.fidelity),
+                    who,
+                );
+            } else if given && solve.solver == FullSolver::Qr {
+                told(name, "the solver qr".into(), "only iterations take it");
+            }
+        }
+        let takes_reach = match solve.preconditioner {
+            Preconditioner::Csd24 => true,
+            // There large bodies have a sparse factor in place of a dense one.
+            Preconditioner::Factors => self.backend == Backend::Gpu,
+            Preconditioner::Jacobi | Preconditioner::None => false,
+        };
+        if reach && by_sources && !takes_reach {
+            let name: &str = solve.preconditioner.into();
+            told(
+                "csd24_rho",
+                format!("the preconditioner {name}"),
+                "only csd24 takes it",
+            );
+        }
+        out
+    }
+
     /// Choices that the backend or the fidelity doesn't look at.
     pub(crate) fn without_effect(&self) -> Vec<String> {
         use super::fidelity::Knob::{Films, Rank, ResolvedGap};
@@ -74,19 +116,7 @@ impl WaterChoices {
         if self.backend == Backend::Cpu && self.gpu != GpuSettings::default() {
             out.push("the settings of the GPU have no effect with the backend cpu".into());
         }
-        let solve = &self.numerics.solve;
-        let own = (solve.preconditioner, solve.csd24_rho);
-        let usual = SolveSettings::default();
-        let full = self.fidelity == Fidelity::Full;
-        if own != (usual.preconditioner, usual.csd24_rho)
-            && !(full && self.method_used().kind().by_sources())
-        {
-            out.push(format!(
-                "the setting preconditioner has no effect with the fidelity {} by {}: only full by fundamental solutions takes it",
-                self.fidelity,
-                self.method_used()
-            ));
-        }
+        out.extend(self.preconditioner_without_effect());
         let compress = &self.numerics.compress;
         let alone = self.fidelity.kind().solves_alone();
         for (name, knob, given) in [

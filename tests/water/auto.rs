@@ -1,6 +1,7 @@
 //! What the fidelity `auto` chooses, and that it says so.
 
 use crate::support::says;
+use hydrograd::coupling::full::{FullSolver, Preconditioner};
 use hydrograd::scene::{Placement, Shape};
 use hydrograd::simulate::Method;
 use hydrograd::{Body, Fidelity, Fluid, Scene, Settings, Simulator};
@@ -66,6 +67,19 @@ fn settings_out_of_place_are_told() {
     };
     let full = Settings::default().faces(80).fidelity(Fidelity::Full);
     assert!(warned(full.rank(10)).contains("rank has no effect with the fidelity full"));
+    let sparse = full.preconditioner(Preconditioner::Csd24);
+    assert!(
+        warned(sparse.clone())
+            .contains("preconditioner has no effect with the fidelity full by panel")
+    );
+    let by_sources = sparse.method(Method::MfsVertex);
+    assert_eq!(warned(by_sources.csd24_rho(2.0)), "");
+    let direct = by_sources.solver(FullSolver::Qr);
+    assert!(warned(direct).contains("preconditioner has no effect with the solver qr"));
+    let diagonal = by_sources
+        .preconditioner(Preconditioner::Jacobi)
+        .csd24_rho(2.0);
+    assert!(warned(diagonal).contains("csd24_rho has no effect with the preconditioner jacobi"));
     let reduced = full.fidelity(Fidelity::Reduced);
     assert!(warned(reduced.rank(2)).contains("compressed sources leave"));
     assert_eq!(warned(reduced.clone()), "");

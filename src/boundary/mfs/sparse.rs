@@ -2,7 +2,7 @@
 
 use super::BodyBoundary;
 use crate::adjoint::lie::Vec3;
-use crate::solver::InverseCholesky;
+use crate::solver::{AT_ONCE, InverseCholesky, LEAST_RHO};
 use crate::{Error, Result, memory};
 use faer::{Mat, MatRef};
 
@@ -15,7 +15,7 @@ impl BodyBoundary {
     /// # Errors
     /// A ρ under 1 or not finite, and more memory than there is.
     pub fn sparse_factor(&self, rho: f64) -> Result<InverseCholesky> {
-        if !(rho.is_finite() && rho >= 1.0) {
+        if !(rho.is_finite() && rho >= LEAST_RHO) {
             return Err(Error::input(
                 format!("body \"{}\": rho of the sparse factor", self.name),
                 rho,
@@ -24,7 +24,7 @@ impl BodyBoundary {
         }
         let (faces, sources) = (self.faces.len() as f64, self.sources.len() as f64);
         let rows = (ROWS * rho * rho).min(sources);
-        let blocks = rayon::current_num_threads() as f64 * (2.0 * faces + rows) * rows;
+        let blocks = AT_ONCE as f64 * (2.0 * faces + rows) * rows;
         memory::fits(
             &format!(
                 "the sparse factor of body \"{}\" with {faces} faces",
@@ -32,7 +32,7 @@ impl BodyBoundary {
             ),
             // Both L and its transpose, a number and its column each.
             memory::numbers(4.0 * rows * sources + blocks),
-            "use fewer faces, a smaller csd24_rho or the preconditioner jacobi",
+            "use fewer faces, a smaller ρ (csd24_rho) or the preconditioner jacobi",
         )?;
         Ok(InverseCholesky::new(&self.sources, rho, |among| {
             self.normal_block(among)

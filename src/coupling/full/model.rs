@@ -23,7 +23,7 @@ pub struct Model {
     /// How the system is solved.
     pub settings: SolveSettings,
     /// The bodies' sparse factors, where those precondition.
-    pub sparse: Vec<Option<Arc<InverseCholesky>>>,
+    pub sparse_factors: Vec<Option<Arc<InverseCholesky>>>,
     /// Rows of K of each body: its faces.
     pub faces: Vec<Range<usize>>,
     /// Columns of K of each body: its sources.
@@ -50,7 +50,7 @@ impl Model {
             sources: ranges(bodies.iter().map(|b| b.sources.len())),
             images: Image::of_rigid_walls(walls, "the fidelity full")?,
             excluded,
-            sparse: sparse(&bodies, &settings)?,
+            sparse_factors: sparse_factors(&bodies, &settings)?,
             bodies,
             settings,
         })
@@ -88,7 +88,7 @@ impl Model {
 }
 
 /// Sparse factors, one of bodies that share what they are: of all bodies where that is asked for, and in place of factors that weren't made.
-fn sparse(
+fn sparse_factors(
     bodies: &[Arc<BodyBoundary>],
     settings: &SolveSettings,
 ) -> Result<Vec<Option<Arc<InverseCholesky>>>> {
@@ -96,7 +96,7 @@ fn sparse(
     for (b, body) in bodies.iter().enumerate() {
         let asked = match settings.preconditioner {
             Preconditioner::Csd24 => settings.solver != FullSolver::Qr,
-            Preconditioner::Factors => !body.factored(),
+            Preconditioner::Factors => !body.factored() && settings.solver == FullSolver::Cgls,
             Preconditioner::Jacobi | Preconditioner::None => false,
         };
         let twin = bodies[..b]

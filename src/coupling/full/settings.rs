@@ -28,7 +28,7 @@ choices! {
         Factors,
         /// The diagonal (column norms).
         Jacobi,
-        /// Each body's own sparse inverse Cholesky factor, made once, for bodies that are too large to factor.
+        /// Each body's own sparse inverse Cholesky factor, made once: what bodies have on a GPU that are too large for a dense one.
         Csd24,
         /// None.
         None,
@@ -48,7 +48,7 @@ pub struct SolveSettings {
     pub tolerance: f64,
     /// Iterations after which it gives up with an error.
     pub max_iterations: usize,
-    /// ρ of [`Preconditioner::Csd24`]: how far, in its own scales, a source of a body reaches others of it.
+    /// ρ of [`Preconditioner::Csd24`], 1 to 20: how far, in its own scales, a source of a body reaches others of it.
     pub csd24_rho: f64,
 }
 

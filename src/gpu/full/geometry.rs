@@ -33,7 +33,7 @@ pub(super) struct Geometry {
     /// Whether some body has no factor here and takes the diagonal.
     pub diagonal: bool,
     /// Whether some body has a sparse factor.
-    pub sparse: bool,
+    pub has_sparse: bool,
 }
 
 /// The system at given poses.
@@ -128,7 +128,7 @@ impl Geometry {
             .flat_map(|b| b.damping.iter().map(|d| (d / weight).powi(2)))
             .collect();
         let (factors, layout, diagonal) = factors(context, model, &all, &of, weight);
-        let (reach, entries) = sparse(model, &of, &layout, weight);
+        let (reach, entries) = sparse_tables(model, &of, &layout, weight);
         let damping_single = context.upload("damping", Arithmetic::Single, &damping)?;
         let factors = context.upload("factors", Arithmetic::Single, &factors)?;
         surfaces.table.extend([
@@ -152,7 +152,7 @@ impl Geometry {
             damping: context.upload("damping", context.fine(), &damping)?,
             damping_single,
             diagonal,
-            sparse: !entries.is_empty(),
+            has_sparse: !entries.is_empty(),
             model: model.clone(),
             weight,
         })
@@ -186,13 +186,13 @@ impl PlacedSystem {
 }
 
 /// Of each source's row, L's and then Lᵀ's: where its entries start and end, and the first source of its body; and the entries, (source of the body, bits of the value), each shape's once.
-fn sparse(model: &Model, of: &[usize], layout: &[u32], weight: f64) -> (Vec<u32>, Vec<u32>) {
+fn sparse_tables(model: &Model, of: &[usize], layout: &[u32], weight: f64) -> (Vec<u32>, Vec<u32>) {
     let mut entries: Vec<u32> = Vec::new();
     let mut starts: Vec<Option<Vec<u32>>> = vec![None; of.iter().map(|s| s + 1).max().unwrap_or(0)];
     let mut reach = [Vec::new(), Vec::new()];
     for (b, body) in model.bodies.iter().enumerate() {
         let n = body.sources.len();
-        let factor = (model.sparse[b].as_ref()).filter(|_| layout[4 * b + 3] == SPARSE);
+        let factor = (model.sparse_factors[b].as_ref()).filter(|_| layout[4 * b + 3] == SPARSE);
         let Some(factor) = factor else {
             reach.iter_mut().for_each(|r| r.extend(vec![0; 4 * n]));
             continue;
@@ -218,6 +218,22 @@ fn sparse(model: &Model, of: &[usize], layout: &[u32], weight: f64) -> (Vec<u32>
     (reach.concat(), entries)
 }
 
+/// Of each shape, whether its sparse factor finds place among so many entries.
+fn sparse_that_fit(model: &Model, of: &[usize], room: usize) -> Vec<bool> {
+    let shapes = of.iter().map(|s| s + 1).max().unwrap_or(0);
+    let (mut seen, mut fits, mut taken) = (vec![false; shapes], vec![false; shapes], 0);
+    for (factor, &s) in model.sparse_factors.iter().zip(of) {
+        let Some(factor) = factor.as_ref().filter(|_| !seen[s]) else {
+            continue;
+        };
+        let needed = 2 * factor.rows().entries();
+        seen[s] = true;
+        fits[s] = taken + needed <= room;
+        taken += if fits[s] { needed } else { 0 };
+    }
+    fits
+}
+
 /// The factors that fit (each shape's once), where each body's lies, and whether some have none.
 fn factors(
     context: &Context,
@@ -238,12 +254,13 @@ fn factors(
             }
         }
     }
+    let sparse = sparse_that_fit(model, of, room / 2);
     let mut layout = Vec::new();
     let mut diagonal = false;
     for (b, s) in of.iter().enumerate() {
         let first = model.sources[b].start as u32;
         let n = all[*s].sources.len() as u32;
-        let sparse = model.sparse[b].is_some();
+        let sparse = sparse[*s] && model.sparse_factors[b].is_some();
         layout.extend(match at[*s] {
             Some(at) => [at as u32, n, first, TRIANGLE],
             None if sparse => [0, n, first, SPARSE],

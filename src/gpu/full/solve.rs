@@ -42,7 +42,7 @@ pub(super) fn solves<'a>(
     let limits = Limits {
         tolerance: settings.tolerance,
         most: settings.max_iterations,
-        few: match factored && !placed.geometry.diagonal && !placed.geometry.sparse {
+        few: match factored && !placed.geometry.diagonal && !placed.geometry.has_sparse {
             true => FEW,
             false => MANY,
         },
@@ -109,7 +109,7 @@ fn cgls(placed: &PlacedSystem, g: Slice, x: Slice, columns: usize) -> Result<Inn
     let parts = context.reals("shares of R⁻¹ x", single, shares * n * columns)?;
     let preconditioned = |transpose, x, out, gate| {
         let mut calls = Vec::from(factor(placed, transpose, (x, &parts, out), columns, gate)?);
-        if geometry.sparse {
+        if geometry.has_sparse {
             calls.push(sparse(placed, transpose, (x, out), columns, gate)?);
         }
         Ok::<_, Error>(calls)

@@ -27,6 +27,8 @@ use supernodes::{Supernode, supernodes};
 
 /// Least ρ: with less hardly any point would have a neighbour.
 pub const LEAST_RHO: f64 = 1.0;
+/// Supernodes whose blocks are held at once, however many threads there are.
+pub(crate) const AT_ONCE: usize = 16;
 
 /// The factor L.
 #[derive(Clone, Debug)]
@@ -44,8 +46,13 @@ impl InverseCholesky {
     pub fn new(points: &[Vec3], rho: f64, theta: impl Fn(&[usize]) -> Mat<f64> + Sync) -> Self {
         let order = Order::new(points, rho.max(LEAST_RHO));
         let nodes = supernodes(&order);
-        let made = nodes.par_iter().map(|node| columns(node, &order, &theta));
-        let mut columns: Vec<Column> = made.collect::<Vec<_>>().into_iter().flatten().collect();
+        let mut columns: Vec<Column> = Vec::with_capacity(points.len());
+        for nodes in nodes.chunks(AT_ONCE) {
+            let made = nodes
+                .par_iter()
+                .map(|node| columns_of(node, &order, &theta));
+            columns.extend(made.collect::<Vec<_>>().into_iter().flatten());
+        }
         columns.sort_unstable_by_key(|(at, _)| *at);
         let transposed = SparseRows::new(columns.into_iter().map(|(_, entries)| entries));
         Self {
@@ -76,7 +83,11 @@ impl InverseCholesky {
 }
 
 /// The columns of a supernode.
-fn columns(node: &Supernode, order: &Order, theta: &impl Fn(&[usize]) -> Mat<f64>) -> Vec<Column> {
+fn columns_of(
+    node: &Supernode,
+    order: &Order,
+    theta: &impl Fn(&[usize]) -> Mat<f64>,
+) -> Vec<Column> {
     let rows: Vec<usize> = node.rows.iter().map(|at| order.points[*at]).collect();
     let block = theta(&rows);
     let mut out = Mat::zeros(rows.len(), node.members.len());

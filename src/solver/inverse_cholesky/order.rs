@@ -14,6 +14,9 @@ pub(super) struct Order {
     pub near: Vec<Vec<usize>>,
 }
 
+/// Cubes from the middle of which numbers are all different.
+const FAR: f64 = 1e15;
+
 /// Points by cubes in space.
 struct Grid {
     edge: f64,
@@ -29,7 +32,8 @@ impl Grid {
     }
 
     fn cell(&self, x: &Vec3) -> [i64; 3] {
-        [x.x, x.y, x.z].map(|c| (c / self.edge).floor() as i64)
+        // Points so far apart in size share a cell: what may be near is only ever more.
+        [x.x, x.y, x.z].map(|c| (c / self.edge).floor().clamp(-FAR, FAR) as i64)
     }
 
     fn add(&mut self, k: usize, x: &Vec3) {

@@ -135,7 +135,7 @@ impl<'a> System<'a> {
         let (model, n) = (&self.cpu.model, x.columns);
         match model.settings.preconditioner {
             Preconditioner::Csd24 => {
-                let bodies = model.bodies.iter().zip(&model.sparse);
+                let bodies = model.bodies.iter().zip(&model.sparse_factors);
                 for ((body, made), range) in bodies.zip(&model.sources) {
                     if let Some(made) = made {
                         let part = sparse(body, made, &x.part(range));

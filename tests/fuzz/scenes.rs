@@ -123,5 +123,5 @@ fn run(scene: &Scene, settings: Settings) -> hydrograd::Result<Option<String>> {
 
 #[test]
 fn runs_of_scenes_hold() {
-    fuzz("run", scenes(), 1_200, simulated);
+    fuzz("run", scenes(), 500, simulated);
 }

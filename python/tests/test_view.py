@@ -544,7 +544,7 @@ def test_a_browser_draws_forces_and_flow(stirring, tmp_path):
 BESIDE = """
     const found = {};
     const pictures = async (n) => { for (let i = 0; i < n; i++) await new Promise(requestAnimationFrame); };
-    const until = async (holds) => { for (let i = 0; i < 300 && !holds(); i++) await pictures(1); };
+    const until = async (holds) => { for (let i = 0; i < 1200 && !holds(); i++) await pictures(1); };
     const { player, stage } = hydrograd;
     (async () => {
       await pictures(5);
@@ -604,7 +604,7 @@ def test_two_beside_each_other(rollout, tmp_path):
     });"""
     file = tmp_path / "beside.html"
     file.write_text(text.replace("<script>", f"<script>{collect}</script><script>", 1), encoding="utf-8")
-    says, after = browser.body(file, "", clock=12000)
+    says, after = browser.body(file, "", clock=24000)
     assert says["status"] == "drawn"
     left, right = json.loads(Parts(after).title)
     assert left["range"] == right["range"] == [0.0, 2.0]

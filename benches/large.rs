@@ -1,7 +1,7 @@
 //! One body of more faces than a factor is made for: conjugate gradients on Eq. 20 with nothing of the size of a matrix, preconditioned by its sparse factor
 //! ([CSD24]) and by the diagonal.
 //!
-//! `cargo bench --bench large [-- FACES … [--loose]]` (default 20000 50000; 100000 takes an hour on two cores, a quarter of it with `--loose`). An ellipsoid of
+//! `cargo bench --bench large [-- FACES … [--loose]]` (default 20000 50000; 100000 takes a quarter of an hour on two cores with `--loose`, hours without). An ellipsoid of
 //! 1 : 0.2 : 1 that moves in all six ways. Times are those in which the residual ‖g − KᵀK x‖/‖g‖ fell to the paper's tolerance 2.7e-3 and to 1e-6, `--loose` to the first
 //! alone, set-up counted; the diagonal is given up after twice the time that the sparse factor took.
 
@@ -116,10 +116,6 @@ fn columns(data: Vec<f64>) -> Columns {
     }
 }
 
-fn norm(x: &[f64]) -> f64 {
-    x.iter().map(|x| x * x).sum::<f64>().sqrt()
-}
-
 /// Iterations and seconds, and the residual then.
 type Seen = (usize, f64, f64);
 
@@ -140,8 +136,7 @@ fn solve(
         }
         let now = Instant::now();
         let made = k.normal(x);
-        let off: Vec<f64> = made.data.iter().zip(&g.data).map(|(a, b)| a - b).collect();
-        let residual = norm(&off) / norm(&g.data);
+        let residual = (made.as_mat() - g.as_mat()).norm_l2() / g.as_mat().norm_l2();
         seen.push((iteration, taken, residual));
         looking += now.elapsed().as_secs_f64();
         residual > tolerance && taken < longest

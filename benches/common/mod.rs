@@ -1,6 +1,7 @@
 //! What the benches share: scenes and configurations by name, and a measurement in a process of its own,
 //! so that its peak memory is its own.
 
+mod measure;
 pub mod reference;
 #[path = "../../tests/support/mod.rs"]
 pub mod support;
@@ -8,7 +9,8 @@ pub mod support;
 use hydrograd::coupling::reduced::cache;
 use hydrograd::scene::{Preset, Scene};
 use hydrograd::simulate::Method;
-use hydrograd::{Controls, Fidelity, Settings, Simulator, objective};
+use hydrograd::{Fidelity, Settings, Simulator};
+pub use measure::*;
 use nalgebra::DMatrix;
 use serde::{Deserialize, Serialize};
 use std::path::Path;
@@ -32,15 +34,6 @@ pub struct Run {
     pub memory: f64,
     /// Fluid part of the mass matrix at the start, generalised coordinates, column by column.
     pub added_mass: Vec<f64>,
-}
-
-/// How often a child measures.
-#[derive(Clone, Copy)]
-pub struct Effort {
-    /// Steps of a rollout.
-    pub steps: usize,
-    /// Rollouts that count; one more goes before them.
-    pub repeat: usize,
 }
 
 /// The arguments after the name of the program, without those that Cargo adds.
@@ -70,52 +63,6 @@ pub fn settings(configuration: &str) -> Settings {
         other => panic!("{other}: no configuration"),
     };
     Settings::default().fidelity(fidelity)
-}
-
-/// Middle of the measured times.
-pub fn median(mut x: Vec<f64>) -> f64 {
-    x.sort_by(f64::total_cmp);
-    x[x.len() / 2]
-}
-
-/// Peak resident memory of this process, MB; 0 where the system doesn't tell.
-pub fn peak_memory() -> f64 {
-    let status = std::fs::read_to_string("/proc/self/status").unwrap_or_default();
-    let line = status.lines().find(|l| l.starts_with("VmHWM"));
-    let kb = line.and_then(|l| l.split_whitespace().nth(1)?.parse::<f64>().ok());
-    kb.unwrap_or(0.0) / 1000.0
-}
-
-/// What a step takes.
-pub struct StepTimes {
-    /// Forward, s.
-    pub forward: f64,
-    /// Of a rollout with its gradient, forward pass included, s.
-    pub gradient: f64,
-    /// Most iterations of a solve.
-    pub iterations: usize,
-}
-
-pub fn step_times(simulator: &Simulator, effort: Effort) -> hydrograd::Result<StepTimes> {
-    let controls = Controls::zeros(simulator, effort.steps);
-    let goal = objective::final_velocity(0, 0.0, 1.0);
-    let (mut forward, mut whole, mut iterations) = (vec![], vec![], 0);
-    for i in 0..=effort.repeat {
-        let start = Instant::now();
-        let rollout = simulator.rollout(&controls)?;
-        let middle = start.elapsed().as_secs_f64();
-        rollout.gradient(&goal)?;
-        if i > 0 {
-            forward.push(middle / effort.steps as f64);
-            whole.push(start.elapsed().as_secs_f64() / effort.steps as f64);
-        }
-        iterations = rollout.summary().iterations;
-    }
-    Ok(StepTimes {
-        forward: median(forward),
-        gradient: median(whole),
-        iterations,
-    })
 }
 
 /// Fluid part of the mass matrix at the start: generalised coordinates, driven joints included.

@@ -116,10 +116,7 @@ impl Watched {
 }
 
 fn residual(made: &Columns, g: &Columns) -> f64 {
-    let square = |x: &Columns| x.data.iter().map(|x| x * x).sum::<f64>();
-    let mut off = g.clone();
-    off.add_scaled(made, &vec![-1.0; g.columns]);
-    (square(&off) / square(g)).sqrt()
+    (made.as_mat() - g.as_mat()).norm_l2() / g.as_mat().norm_l2()
 }
 
 /// What takes so long to be made.

@@ -4,11 +4,16 @@
 //! coupling; *backward* is what is left of a step, which is mostly ∂M_f/∂q. Ours beside that: a step of the default integrator, RK4, which evaluates four times, and one with its share of the
 //! gradient of the whole run.
 
+#[allow(dead_code)]
+#[path = "../../benches/common/measure.rs"]
+mod measure;
+
 use crate::bars::{Bars, draw};
 use crate::{How, Made, Numbers};
 use hydrograd::dynamics::Integrator;
 use hydrograd::scene::Preset;
-use hydrograd::{Body, Controls, Fidelity, Joint, Scene, Settings, Simulator, objective};
+use hydrograd::{Body, Fidelity, Joint, Scene, Settings, Simulator};
+use measure::{Effort, median, peak_memory, step_times};
 use serde::{Deserialize, Serialize};
 use serde_json::json;
 use std::error::Error;
@@ -188,18 +193,22 @@ fn measure(file: &str, configuration: &str, quick: bool) -> Result<Measured, Box
     let simulator = Simulator::new(&scene, euler)?;
     let setup_s = start.elapsed().as_secs_f64();
     let forward_s = evaluation(&simulator, steps * repeats)?;
-    let [total_s, with_gradient_s] = step(&simulator, steps, repeats)?;
+    let timed = |simulator: &Simulator, steps, repeat| {
+        let times = step_times(simulator, Effort { steps, repeat })?;
+        Ok::<_, hydrograd::Error>([times.forward, times.gradient])
+    };
+    let [total_s, with_gradient_s] = timed(&simulator, steps, repeats)?;
     let megabytes = peak_memory();
     let rk4_s = match settings.preset {
         Some(_) => None,
         None => {
             let rk4 = Simulator::new(&scene, settings.integrator(Integrator::Rk4))?;
-            Some(step(&rk4, steps, repeats.div_ceil(2))?)
+            Some(timed(&rk4, steps, repeats.div_ceil(2))?)
         }
     };
     let alone = Settings::default().fidelity(Fidelity::Isolated);
     let alone = Simulator::new(&scene, alone.integrator(Integrator::VelocityEuler))?;
-    let [others_s, _] = step(&alone, 100, repeats)?;
+    let [others_s, _] = timed(&alone, 100, repeats)?;
     Ok(Measured {
         fidelity: format!("{:?}", simulator.fidelity()).to_lowercase(),
         bodies: simulator.system().len(),
@@ -242,36 +251,4 @@ fn evaluation(simulator: &Simulator, repeats: usize) -> hydrograd::Result<f64> {
         .map(|_| once())
         .collect::<hydrograd::Result<_>>()
         .map(median)
-}
-
-/// A step, and one with its share of the gradient of the run, s.
-fn step(simulator: &Simulator, steps: usize, repeats: usize) -> hydrograd::Result<[f64; 2]> {
-    let controls = Controls::zeros(simulator, steps);
-    let goal = objective::final_velocity(0, 0.0, 1.0);
-    let (mut forward, mut whole) = (Vec::new(), Vec::new());
-    // The first warms up.
-    for repeat in 0..=repeats {
-        let start = Instant::now();
-        let rollout = simulator.rollout(&controls)?;
-        let middle = start.elapsed().as_secs_f64();
-        rollout.gradient(&goal)?;
-        if repeat > 0 {
-            forward.push(middle / steps as f64);
-            whole.push(start.elapsed().as_secs_f64() / steps as f64);
-        }
-    }
-    Ok([median(forward), median(whole)])
-}
-
-fn median(mut x: Vec<f64>) -> f64 {
-    x.sort_by(f64::total_cmp);
-    x[x.len() / 2]
-}
-
-/// Peak resident memory of this process, MB; 0 where the system doesn't tell.
-fn peak_memory() -> f64 {
-    let status = std::fs::read_to_string("/proc/self/status").unwrap_or_default();
-    let line = status.lines().find(|l| l.starts_with("VmHWM"));
-    let kb = line.and_then(|l| l.split_whitespace().nth(1)?.parse::<f64>().ok());
-    kb.unwrap_or(0.0) / 1000.0
 }

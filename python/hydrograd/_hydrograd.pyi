@@ -824,6 +824,27 @@ class Loads:
         """The generalised acceleration that all of it gives (v_size,)."""
 
 @final
+class SurfacePressure:
+    @property
+    def name(self) -> str: ...
+    @property
+    def centres(self) -> _Array: ...
+    @property
+    def normals(self) -> _Array: ...
+    @property
+    def areas(self) -> _Array: ...
+    @property
+    def velocities(self) -> _Array: ...
+    @property
+    def pressures(self) -> _Array: ...
+    @property
+    def hydrostatic(self) -> _Array: ...
+    @property
+    def wrench(self) -> _Array: ...
+    @property
+    def hydrostatic_wrench(self) -> _Array: ...
+
+@final
 class State:
     """A state between two steps: made by `Simulator.state`, `Simulator.step` or `Rollout.state`."""
     @property
@@ -942,6 +963,7 @@ class Rollout:
         """Contacts during the step from state `step` to the next, at the pose of that state: where surfaces are no more than `slack` (m)
         farther apart than the gap at which they touch, and what presses there. None where the scene has no contact. Negative
         numbers count from the end: -1 is the last step."""
+    def pressure(self, state: int) -> list[SurfacePressure]: ...
     def loads(self, state: int) -> Loads:
         """What acts on every body and across every joint at state `state`, as the step there starts: gravity, buoyancy, drag, thrust, the inertia of the water, contact. Negative
         numbers count from the end."""

@@ -20,6 +20,7 @@ mod objective;
 mod optimize;
 mod policy;
 mod prepare;
+mod pressure;
 mod robot;
 mod rollout;
 mod scene;
@@ -112,6 +113,7 @@ fn _hydrograd(m: &Bound<'_, PyModule>) -> PyResult<()> {
     m.add_class::<state::Record>()?;
     m.add_class::<rollout::Rollout>()?;
     m.add_class::<loads::Loads>()?;
+    m.add_class::<pressure::SurfacePressure>()?;
     m.add_class::<objective::Objective>()?;
     shape::register(m)?;
     joint::register(m)?;

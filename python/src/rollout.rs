@@ -7,6 +7,7 @@ use crate::gradient;
 use crate::interrupt::{Progress, ended, followed, long, short};
 use crate::loads::Loads;
 use crate::objective::Objective;
+use crate::pressure::SurfacePressure;
 use crate::simulator::Simulator;
 use crate::state::State;
 use crate::tangents::{self, Along};
@@ -250,6 +251,15 @@ impl Rollout {
         short(py, || self.inner.loads(at)).map(Loads)
     }
 
+    /// The water's pressure on the surface of every body in it at state `state`, as the step there starts: one a body. It takes solves of its own. Negative numbers count
+    /// states from the end.
+    fn pressure(&self, py: Python<'_>, state: isize) -> PyResult<Vec<SurfacePressure>> {
+        let at = array::numbered(state, self.inner.states().len(), "state")?;
+        let inner = self.inner.clone();
+        let made = long(py, move |_| inner.pressure(at))?;
+        Ok(made.into_iter().map(SurfacePressure).collect())
+    }
+
     /// What an inertial measurement unit at the site of this name reads at every state (n, 6): acceleration less gravity (m/s²) and rates (rad/s), in the site's axes.
     fn imu<'py>(&self, py: Python<'py>, site: &str) -> Numbers<'py> {
         let n = self.inner.states().len();
@@ -263,7 +273,7 @@ impl Rollout {
     }
 
     /// The water's velocity at `points` (n, 3), m, at state `state`: (n, 3), m/s, world axes, the current included. It takes a
-    /// solve, and a simulator with the fidelity "full". Points within a body, behind a wall, or nearer to a surface than half an
+    /// solve. Points within a body, behind a wall, or nearer to a surface than half an
     /// edge of its mesh are refused: `flow_resolved` tells them apart. Negative numbers count states from the end.
     fn flow<'py>(&self, py: Python<'py>, state: isize, points: &Bound<'py, PyAny>) -> Numbers<'py> {
         let at = array::numbered(state, self.inner.states().len(), "state")?;

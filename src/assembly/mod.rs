@@ -3,6 +3,7 @@
 mod choices;
 mod contact;
 mod controller;
+mod flow;
 mod limits;
 mod lubrication;
 mod symmetry;
@@ -28,6 +29,7 @@ use std::path::Path;
 use std::sync::{Arc, OnceLock};
 
 pub use choices::Choices;
+pub(crate) use flow::FlowSurface;
 pub(crate) use lubrication::bearing;
 
 /// A scene made ready.
@@ -43,6 +45,8 @@ pub(crate) struct Assembled {
     pub kept: FreeMotions,
     /// The bodies' surfaces, once someone asked for them.
     pub surfaces: Arc<OnceLock<Vec<Option<Surface>>>>,
+    /// Surfaces of the bodies in the water, once someone asked for the flow on them.
+    pub flow_surfaces: Arc<OnceLock<Vec<FlowSurface>>>,
 }
 
 impl Assembled {
@@ -299,6 +303,7 @@ pub(crate) fn assemble(
         water,
         kept,
         surfaces: Default::default(),
+        flow_surfaces: Default::default(),
     })
 }
 

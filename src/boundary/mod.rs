@@ -10,7 +10,7 @@ pub mod exact;
 pub mod mfs;
 pub mod panel;
 
-pub use exact::ExactBoundary;
+pub use exact::{EllipsoidSurface, ExactBoundary};
 pub use mfs::{BodyBoundary, Depth, Method, MfsSettings, Readout, RowScaling, depth, readout};
 pub(crate) use mfs::{solve_upper, solve_upper_transpose};
 pub use panel::PanelBoundary;

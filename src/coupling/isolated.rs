@@ -1,11 +1,15 @@
 //! Bodies that don't feel each other: each keeps its own constant added mass (Eq. 12).
 
+use super::surface::{check, on_surfaces};
 use super::{
-    Coupling, CouplingReport, Direction, Linearise, Linearised, Momenta, Pullback, Tangent,
+    Coupling, CouplingReport, Direction, Linearise, Linearised, Momenta, Motion, Pullback,
+    SurfacePotential, Tangent,
 };
 use crate::Result;
 use crate::adjoint::lie::{Mat6, Pose, Vec6};
+use crate::boundary::PanelBoundary;
 use nalgebra::{DMatrix, DVector};
+use std::sync::Arc;
 
 /// The cheapest fidelity: no interaction, no walls.
 #[derive(Clone, Debug)]
@@ -56,6 +60,15 @@ impl Coupling for Isolated {
 
     fn apart(&self) -> Option<&[Mat6]> {
         Some(&self.added_mass)
+    }
+
+    fn surface_potentials(
+        &self,
+        motion: &Motion,
+        surfaces: &[Arc<PanelBoundary>],
+    ) -> Result<Vec<SurfacePotential>> {
+        check(motion, surfaces)?;
+        Ok(on_surfaces(motion, surfaces, &[], &[]))
     }
 }
 

@@ -26,18 +26,22 @@ pub mod panel;
 pub mod reduced;
 mod response;
 mod settings;
+mod surface;
 mod tensor;
 
 pub use exclude::Exclusions;
 pub use isolated::Isolated;
 pub use panel::{ExtrapolatedPanels, FilmedPanels, PanelCoupled, PanelModel};
 pub use response::{CoupledResponse, Reached};
+pub use surface::{Motion, SurfacePotential};
 pub use tensor::PairTensor;
 
+use crate::Result;
 use crate::adjoint::lie::{Mat6, Pose, Vec3, Vec6};
-use crate::{Error, Result};
+use crate::boundary::PanelBoundary;
 use nalgebra::{DMatrix, DVector};
 use serde::Serialize;
+use std::sync::Arc;
 
 /// A fidelity: a way to get M̄_f from the bodies' poses.
 pub trait Coupling: Send + Sync {
@@ -90,22 +94,34 @@ pub trait Coupling: Send + Sync {
     }
 
     /// The water's velocity at points (m, world frame) that lie outside all bodies, per body-frame twists of the bodies
-    /// (6·bodies) in water at rest: m/s, world axes.
+    /// (6·bodies) in water at rest: m/s, world axes. `None` of a fidelity that has no flow of its own up to the surfaces; that follows from
+    /// [`Coupling::surface_potentials`].
     ///
     /// # Errors
-    /// A fidelity that doesn't compute the flow itself; as [`Coupling::evaluate`].
+    /// As [`Coupling::evaluate`].
     fn velocity(
         &self,
         _poses: &[Pose],
         _twists: &DVector<f64>,
         _points: &[Vec3],
-    ) -> Result<Vec<Vec3>> {
-        Err(Error::Unsupported {
-            what: "the water's velocity with this fidelity or method".into(),
-            why: "only all bodies' meshes, solved together, give it up to the surfaces".into(),
-            instead: "use the fidelity full".into(),
-        })
+    ) -> Result<Option<Vec<Vec3>>> {
+        Ok(None)
     }
+
+    /// The panels of each body, of a fidelity that is made of them.
+    fn surfaces(&self) -> Option<&[Arc<PanelBoundary>]> {
+        None
+    }
+
+    /// The flow's potential on all panels, and its rate. `surfaces` are [`Coupling::surfaces`], or panels of any mesh of each body where there are none.
+    ///
+    /// # Errors
+    /// As [`Coupling::evaluate`], films that hold bodies apart, and a device that doesn't tell its densities.
+    fn surface_potentials(
+        &self,
+        motion: &Motion,
+        surfaces: &[Arc<PanelBoundary>],
+    ) -> Result<Vec<SurfacePotential>>;
 }
 
 /// A fidelity with derivatives of M̄_f with respect to the poses.

@@ -2,9 +2,9 @@
 
 use super::settings::asymmetry;
 use super::{CouplingReport, Direction, Linearised, Momenta, PairTensor, Pullback, Tangent};
-use crate::Result;
 use crate::adjoint::lie::Vec6;
 use crate::solver::Columns;
+use crate::{Error, Result};
 use nalgebra::{DMatrix, DVector};
 
 /// The water's solution to k columns of twists at given poses, wherever it lies.
@@ -52,6 +52,18 @@ pub trait CoupledResponse: Send + Sync {
     /// # Errors
     /// A device that fails.
     fn densities(&self) -> Result<Columns>;
+
+    /// The rates of the densities of all columns along the displacement z, a spatial twist a body, at constant twists.
+    ///
+    /// # Errors
+    /// A solve that misses its tolerance; a device that doesn't tell them.
+    fn density_rates(&self, _z: &[Vec6]) -> Result<Columns> {
+        Err(Error::Unsupported {
+            what: "the rates of densities on the backend gpu".into(),
+            why: "only their effect on bodies is computed there".into(),
+            instead: "use the backend cpu for pressures".into(),
+        })
+    }
 }
 
 /// What solves reached.

@@ -31,7 +31,10 @@ impl Simulator {
         let through: Vec<Vec6> = (0..twists.len()).map(|b| at.relative(b)).collect();
         let through = system.submerged_twists(&kinematics, &through);
         let poses: Vec<Pose> = (system.submerged().map(|(b, _)| kinematics.poses[b])).collect();
-        let made = system.coupling.velocity(&poses, &through, points)?;
+        let made = match system.coupling.velocity(&poses, &through, points)? {
+            Some(own) => own,
+            None => self.layered_flow(sample, points)?,
+        };
         let each = made.into_iter().zip(points);
         Ok(each
             .map(|(u, x)| u + system.water_velocity(x, sample.time, parameters))

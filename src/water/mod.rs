@@ -66,4 +66,4 @@ pub(crate) use clearance::Clearance;
 pub(crate) use estimate::Subject;
 pub(crate) use prepared::{Prepared, own_added_mass, prepare, world_axes};
 pub(crate) use submerged::in_water;
-pub(crate) use surface::{Surface, pose};
+pub(crate) use surface::{Surface, pose, semi_axes};

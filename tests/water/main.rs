@@ -16,6 +16,7 @@ mod panel;
 mod panel_coupled;
 mod panel_films;
 mod plates;
+mod pressure;
 mod reduced;
 mod refine;
 mod several_pieces;

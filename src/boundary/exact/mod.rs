@@ -7,6 +7,7 @@
 mod confocal;
 mod harmonic;
 pub mod lamb;
+mod surface;
 
 use crate::adjoint::lie::{Mat6, Pose, Vec3, skew};
 use crate::boundary::Response;
@@ -17,6 +18,7 @@ use faer::Mat;
 use harmonic::Harmonics;
 use lamb::Lamb;
 use rayon::prelude::*;
+pub use surface::EllipsoidSurface;
 
 /// Residual above which a warning is given.
 const WANTED: f64 = 1e-4;

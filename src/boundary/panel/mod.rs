@@ -19,6 +19,7 @@
 //! J. L. Hess, A. M. O. Smith, Prog. Aerosp. Sci. 8 (1967) 1–138 (panels); L. Morino, C.-C. Kuo, AIAA
 //! J. 12 (1974) 191–197 (the direct form).
 
+mod gradient;
 mod layers;
 pub mod richardson;
 mod sheet;
@@ -66,6 +67,8 @@ pub struct PanelBoundary {
     lu: Lu,
     /// Inverse of ½I + Ω/4π, column-major: made when a coupled system first asks for it.
     inverse: OnceLock<Vec<f64>>,
+    /// What differences of potentials make of the surface gradient: made when first asked for.
+    slopes: OnceLock<gradient::Slopes>,
     /// q, normal velocity of each panel per unit twist, panels × 6.
     normal_velocity: Mat<f64>,
     /// φ, potential of each panel per unit twist, panels × 6.
@@ -140,6 +143,7 @@ impl PanelBoundary {
             panels,
             lu,
             inverse: OnceLock::new(),
+            slopes: OnceLock::new(),
             normal_velocity,
             potential,
             single_layer,
@@ -160,6 +164,23 @@ impl PanelBoundary {
     /// Their single layer at the centroids, panels × 6.
     pub(crate) fn single_layer(&self) -> &Mat<f64> {
         &self.single_layer
+    }
+
+    /// Potentials of the panels for a twist of the body in water at rest, m²/s.
+    pub(crate) fn own_potential(&self, twist: &Vec6) -> Vec<f64> {
+        let of = |i: usize| (0..6).map(|k| self.potential[(i, k)] * twist[k]).sum();
+        (0..self.faces.len()).map(of).collect()
+    }
+
+    /// Total potentials of the panels, m²/s, for columns of the body's twists in flows with the potentials `incident` at the centroids
+    /// (panels × columns): `(½I + Ω/4π) φ = S q + φ_incident`.
+    pub(crate) fn total_potential(&self, twists: &[Vec6], incident: &Columns) -> Columns {
+        let mut out = Mat::from_fn(incident.rows, incident.columns, |i, k| {
+            let own = (0..6).map(|c| self.single_layer[(i, c)] * twists[k][c]);
+            incident.at(i, k) + own.sum::<f64>()
+        });
+        self.lu.solve(out.as_mut());
+        Columns::from_fn(incident.rows, incident.columns, |i, k| out[(i, k)])
     }
 
     /// `(½I + Ω/4π)⁻¹`, column-major.

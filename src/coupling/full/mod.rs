@@ -37,11 +37,15 @@ pub use model::Model;
 pub use settings::{FullSolver, Preconditioner, SolveSettings};
 
 use super::response::{CoupledResponse, Solved};
-use super::{Coupling, Exclusions, Linearise, Linearised, Momenta};
+use super::surface::{self, Charges, Seen};
+use super::{
+    Coupling, Direction, Exclusions, Linearise, Linearised, Momenta, Motion, SurfacePotential,
+};
 use crate::Result;
 use crate::adjoint::lie::{Pose, Vec3};
-use crate::boundary::BodyBoundary;
+use crate::boundary::{BodyBoundary, PanelBoundary};
 use crate::geometry::Wall;
+use crate::solver::Columns;
 use nalgebra::{DMatrix, DVector};
 use rayon::prelude::*;
 use std::sync::Arc;
@@ -132,7 +136,7 @@ impl Coupling for Full {
         poses: &[Pose],
         twists: &DVector<f64>,
         points: &[Vec3],
-    ) -> Result<Vec<Vec3>> {
+    ) -> Result<Option<Vec<Vec3>>> {
         let model = self.model();
         let column = DMatrix::from_column_slice(twists.len(), 1, twists.as_slice());
         let strengths = self.backend.respond(poses, &column)?.densities()?;
@@ -152,7 +156,38 @@ impl Coupling for Full {
             };
             sources.iter().map(of).sum()
         };
-        Ok(points.par_iter().map(at).collect())
+        Ok(Some(points.par_iter().map(at).collect()))
+    }
+
+    fn surface_potentials(
+        &self,
+        motion: &Motion,
+        surfaces: &[Arc<PanelBoundary>],
+    ) -> Result<Vec<SurfacePotential>> {
+        surface::check(motion, surfaces)?;
+        let model = self.model();
+        let response = self.backend.respond(motion.poses, &motion.columns())?;
+        let strengths = response.densities()?;
+        let first = DVector::from_column_slice(&[1.0, 0.0]);
+        let moving = response.directions(&[Direction::Basis(&first)])?;
+        let displaced = moving.density_rates(motion.displacement)?;
+        let charges = (model.bodies.iter().zip(&model.sources)).map(|(body, range)| Charges {
+            points: &body.sources,
+            strengths: Columns::from_fn(range.len(), 2, |j, k| {
+                let at = range.start + j;
+                strengths.at(at, k) + if k == 1 { displaced.at(at, 0) } else { 0.0 }
+            }),
+        });
+        let charges: Vec<Charges> = charges.collect();
+        let seen: Vec<Seen> = (model.pairs(motion.poses).iter())
+            .map(|pair| Seen {
+                target: pair.target,
+                source: pair.source,
+                image: pair.image,
+                weight: [1.0, 0.0],
+            })
+            .collect();
+        Ok(surface::on_surfaces(motion, surfaces, &charges, &seen))
     }
 }
 

@@ -12,9 +12,11 @@
 use super::PanelCoupled;
 use super::filmed::{FilmedPanels, HeldApart};
 use crate::adjoint::lie::{Pose, Vec3, Vec6};
+use crate::boundary::PanelBoundary;
 use crate::coupling::film::PlacedFilms;
 use crate::coupling::{
-    Coupling, CouplingReport, Direction, Linearise, Linearised, Momenta, Pullback, Tangent,
+    Coupling, CouplingReport, Direction, Linearise, Linearised, Momenta, Motion, Pullback,
+    SurfacePotential, Tangent,
 };
 use crate::geometry::{Solid, TriMesh, Wall};
 use crate::{Error, Result};
@@ -126,11 +128,27 @@ impl Coupling for ExtrapolatedPanels {
         poses: &[Pose],
         twists: &DVector<f64>,
         points: &[Vec3],
-    ) -> Result<Vec<Vec3>> {
+    ) -> Result<Option<Vec<Vec3>>> {
         let fine = self.fine.velocity(poses, twists, points)?;
         let coarse = self.coarse.velocity(poses, twists, points)?;
-        let pairs = fine.iter().zip(&coarse);
-        Ok(pairs.map(|(f, c)| f + self.factor * (f - c)).collect())
+        let both = fine.zip(coarse);
+        Ok(both.map(|(fine, coarse)| {
+            let pairs = fine.iter().zip(&coarse);
+            pairs.map(|(f, c)| f + self.factor * (f - c)).collect()
+        }))
+    }
+
+    fn surfaces(&self) -> Option<&[Arc<PanelBoundary>]> {
+        self.fine.surfaces()
+    }
+
+    /// Of the fine faces: coarse ones are elsewhere.
+    fn surface_potentials(
+        &self,
+        motion: &Motion,
+        surfaces: &[Arc<PanelBoundary>],
+    ) -> Result<Vec<SurfacePotential>> {
+        self.fine.surface_potentials(motion, surfaces)
     }
 }
 

@@ -8,7 +8,8 @@ use crate::adjoint::lie::{Pose, Vec3, Vec6};
 use crate::boundary::PanelBoundary;
 use crate::coupling::film::{Extent, FilmBody, Films, PlacedFilms, Shares};
 use crate::coupling::{
-    Coupling, CouplingReport, Direction, Linearise, Linearised, Momenta, Pullback, Tangent,
+    Coupling, CouplingReport, Direction, Linearise, Linearised, Momenta, Motion, Pullback,
+    SurfacePotential, Tangent, surface,
 };
 use crate::geometry::{Solid, TriMesh, Wall};
 use crate::{Error, Result};
@@ -156,8 +157,26 @@ impl Coupling for FilmedPanels {
         poses: &[Pose],
         twists: &DVector<f64>,
         points: &[Vec3],
-    ) -> Result<Vec<Vec3>> {
+    ) -> Result<Option<Vec<Vec3>>> {
         self.panels.velocity(poses, twists, points)
+    }
+
+    fn surfaces(&self) -> Option<&[Arc<PanelBoundary>]> {
+        self.panels.surfaces()
+    }
+
+    /// # Errors
+    /// Films at these poses, and as without them.
+    fn surface_potentials(
+        &self,
+        motion: &Motion,
+        surfaces: &[Arc<PanelBoundary>],
+    ) -> Result<Vec<SurfacePotential>> {
+        surface::check(motion, surfaces)?;
+        if self.placed(motion.poses, &motion.columns())?.any() {
+            return Err(surface::held_apart());
+        }
+        self.panels.surface_potentials(motion, surfaces)
     }
 }
 

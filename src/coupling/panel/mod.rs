@@ -38,7 +38,8 @@ pub use model::PanelModel;
 use super::film::PlacedFilms;
 use super::full::{SolveSettings, SystemBackend};
 use super::response::{CoupledResponse, Solved};
-use super::{Coupling, Exclusions, Linearise, Linearised, Momenta};
+use super::surface;
+use super::{Coupling, Exclusions, Linearise, Linearised, Momenta, Motion, SurfacePotential};
 use crate::adjoint::lie::{Mat6, Pose, Vec3};
 use crate::boundary::PanelBoundary;
 use crate::geometry::{Solid, TriMesh, Wall};
@@ -181,7 +182,7 @@ impl Coupling for PanelCoupled {
         poses: &[Pose],
         twists: &DVector<f64>,
         points: &[Vec3],
-    ) -> Result<Vec<Vec3>> {
+    ) -> Result<Option<Vec<Vec3>>> {
         let model = self.model();
         let column = DMatrix::from_column_slice(twists.len(), 1, twists.as_slice());
         let placed = PlacedPanels::new(model, poses, &Arc::default(), &column)?;
@@ -200,7 +201,23 @@ impl Coupling for PanelCoupled {
                 out.iter_mut().zip(turned).for_each(|(o, u)| *o += u);
             }
         }
-        Ok(out)
+        Ok(Some(out))
+    }
+
+    fn surfaces(&self) -> Option<&[Arc<PanelBoundary>]> {
+        Some(&self.model.bodies)
+    }
+
+    /// On the CPU.
+    fn surface_potentials(
+        &self,
+        motion: &Motion,
+        surfaces: &[Arc<PanelBoundary>],
+    ) -> Result<Vec<SurfacePotential>> {
+        surface::check(motion, surfaces)?;
+        let (model, columns) = (self.model(), motion.columns());
+        let placed = PlacedPanels::new(model, motion.poses, &Arc::default(), &columns)?;
+        PanelSolution::new(Arc::new(placed), columns)?.surface_potentials(motion.displacement)
     }
 }
 

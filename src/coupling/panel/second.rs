@@ -4,11 +4,12 @@ use super::placed::{PanelSolution, PlacedPanels, scaled};
 use crate::Result;
 use crate::adjoint::kernel::{double_hvp, double_jvp, double_vjp, single_hvp, single_jvp};
 use crate::adjoint::lie::{Vec3, Vec6, linear, point_wrench, six};
-use crate::coupling::Tangent;
 use crate::coupling::pair::{Pair, vector};
 use crate::coupling::response::symmetrised;
+use crate::coupling::{SurfacePotential, Tangent};
 use crate::solver::Columns;
 use nalgebra::DVector;
+use std::ops::Range;
 
 /// Tangents of φ and μ.
 struct Moved {
@@ -22,6 +23,31 @@ struct Displacements {
     points: Vec<Vec3>,
     /// Where they aren't held off.
     arms: Vec<Vec3>,
+}
+
+impl PanelSolution<'_> {
+    /// Potentials of the first of two columns, and their rates where the second has the rates of the twists and bodies that no film holds apart are
+    /// displaced along z.
+    ///
+    /// # Errors
+    /// A solve that misses its tolerance.
+    pub fn surface_potentials(&self, z: &[Vec6]) -> Result<Vec<SurfacePotential>> {
+        let placed = &self.placed;
+        let mut right = Columns::zeros(self.phi.rows, self.phi.columns);
+        for (pair, fields) in placed.pairs.iter().zip(self.fields()) {
+            let displacement = pair.displacements(&placed.poses[pair.target], z);
+            placed.add_moved(pair, fields, &displacement, &mut right);
+        }
+        let none = Columns::zeros(right.rows, 0);
+        let ([displaced, _], _) = placed.system.solve(&right, &none)?;
+        let of = |faces: &Range<usize>| SurfacePotential {
+            value: faces.clone().map(|i| self.phi.at(i, 0)).collect(),
+            rate: (faces.clone())
+                .map(|i| self.phi.at(i, 1) + displaced.at(i, 0))
+                .collect(),
+        };
+        Ok(placed.coupled.faces.iter().map(of).collect())
+    }
 }
 
 impl PlacedPanels<'_> {
@@ -64,12 +90,7 @@ impl PlacedPanels<'_> {
         ) in pairs()
         {
             let (panels, points) = self.ranges(pair);
-            for (i, d) in displacement.iter().enumerate() {
-                for k in 0..n {
-                    let rate = d.dot(&vector(fields, n, i, k));
-                    right.data[(points.start + i) * n + k] += rate;
-                }
-            }
+            self.add_moved(pair, fields, displacement, &mut right);
             let triangles = self.coupled.bodies[pair.target].panels().triangles();
             let (s, d, sign) = (&pair.points, displacement, pair.image.sign);
             let mu = solution.mu.slice(&points);
@@ -116,6 +137,17 @@ impl PlacedPanels<'_> {
             gradient,
             wrench,
         })
+    }
+
+    /// Adds δS q − δA φ at the points of a pair, from its fields there.
+    fn add_moved(&self, pair: &Pair, fields: &[f64], displacement: &[Vec3], right: &mut Columns) {
+        let (_, points) = self.ranges(pair);
+        let n = right.columns;
+        for (i, d) in displacement.iter().enumerate() {
+            for k in 0..n {
+                right.data[(points.start + i) * n + k] += d.dot(&vector(fields, n, i, k));
+            }
+        }
     }
 
     /// Wrench on the points of a pair and its tangent, in the frame of the panels, from the fields and displacements there.

@@ -6,17 +6,20 @@ use super::views::{FLUX, interleave, view, view_mut};
 use crate::Result;
 use crate::adjoint::kernel::{Points, potential_sum, potential_vjp};
 use crate::adjoint::lie::{Pose, Vec3, Vec6, linear, point_wrench};
+use crate::boundary::PanelBoundary;
 use crate::coupling::film::PlacedFilms;
 use crate::coupling::pair::{vector, wrench};
+use crate::coupling::surface;
 use crate::coupling::{
-    Coupling, CouplingReport, Direction, Linearise, Linearised, Momenta, Pullback, Tangent,
+    Coupling, CouplingReport, Direction, Linearise, Linearised, Momenta, Motion, Pullback,
+    SurfacePotential, Tangent,
 };
 use crate::solver::Cholesky;
 use faer::linalg::matmul::matmul;
 use faer::reborrow::ReborrowMut;
 use faer::{Accum, Mat, MatRef, Par};
 use nalgebra::{DMatrix, DVector};
-use std::sync::OnceLock;
+use std::sync::{Arc, OnceLock};
 
 /// Work of [`ReducedLinearised::new`] per pair of points, relative to that of its derivatives.
 const FILL: usize = 8;
@@ -442,6 +445,20 @@ impl Coupling for Reduced {
 
     fn film_momenta(&self, poses: &[Pose], twists: &DMatrix<f64>) -> Result<Option<DMatrix<f64>>> {
         Ok(Some(self.films.momenta(poses, twists, &self.names)?))
+    }
+
+    fn surface_potentials(
+        &self,
+        motion: &Motion,
+        surfaces: &[Arc<PanelBoundary>],
+    ) -> Result<Vec<SurfacePotential>> {
+        surface::check(motion, surfaces)?;
+        let solved = ReducedLinearised::new(self, motion.poses, &motion.columns())?;
+        if solved.films.any() {
+            return Err(surface::held_apart());
+        }
+        let (charges, seen) = solved.charges_seen(motion.displacement);
+        Ok(surface::on_surfaces(motion, surfaces, &charges, &seen))
     }
 
     fn differentiable(&self) -> Option<&dyn Linearise> {

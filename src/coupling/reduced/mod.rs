@@ -20,6 +20,7 @@
 
 mod body;
 pub mod cache;
+mod charges;
 mod check;
 pub mod compress;
 mod films;

@@ -20,8 +20,9 @@ mod solve;
 use super::context::Context;
 use super::points::{Compressed, PlacedPoints};
 use crate::adjoint::lie::Pose;
+use crate::boundary::PanelBoundary;
 use crate::coupling::reduced::Reduced;
-use crate::coupling::{Coupling, Linearise, Linearised, Momenta};
+use crate::coupling::{Coupling, Linearise, Linearised, Momenta, Motion, SurfacePotential};
 use crate::{Error, Result};
 use linearised::Solved;
 use nalgebra::DMatrix;
@@ -104,6 +105,15 @@ impl Coupling for GpuReduced {
 
     fn differentiable(&self) -> Option<&dyn Linearise> {
         Some(self)
+    }
+
+    /// On the CPU.
+    fn surface_potentials(
+        &self,
+        motion: &Motion,
+        surfaces: &[Arc<PanelBoundary>],
+    ) -> Result<Vec<SurfacePotential>> {
+        self.reduced().surface_potentials(motion, surfaces)
     }
 }
 

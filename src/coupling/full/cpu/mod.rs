@@ -140,4 +140,8 @@ impl CoupledResponse for CoupledSolution<'_> {
     fn densities(&self) -> Result<Columns> {
         Ok(self.solution.solved.a.clone())
     }
+
+    fn density_rates(&self, z: &[Vec6]) -> Result<Columns> {
+        self.placed.strength_rates(&self.solution, z)
+    }
 }

@@ -118,6 +118,37 @@ impl PlacedBodies<'_> {
         })
     }
 
+    /// δa along z at constant twists, of all columns: `N δa = δKᵀ r − Kᵀ δK a`.
+    pub fn strength_rates(&self, solution: &Solution, z: &[Vec6]) -> Result<Columns> {
+        let n = solution.columns();
+        let Solved { a, r, .. } = &solution.solved;
+        let mut dk = Columns::zeros(self.model.rows(), n);
+        let mut dkr = Columns::zeros(a.rows, n);
+        for pair in &self.pairs {
+            let body = &self.model.bodies[pair.target];
+            let faces = &self.model.faces[pair.target];
+            let sources = &self.model.sources[pair.source];
+            let d = pair.displacements(&self.poses[pair.target], z);
+            let strengths = a.slice(sources);
+            body.jvp(&pair.points, &d, strengths, n, dk.slice_mut(faces));
+            let fields = body.vjp(&pair.points, r.slice(faces), n);
+            for (j, dj) in d.iter().enumerate() {
+                for k in 0..n {
+                    let rate = dj.dot(&vector(&fields, n, j, k));
+                    dkr.data[(sources.start + j) * n + k] += rate;
+                }
+            }
+        }
+        let none = Columns::zeros(a.rows, n);
+        let (tangent, _) = self.system.respond_jvp(&Moved {
+            a: &dk,
+            lambda: &Columns::zeros(self.model.rows(), n),
+            r: &dkr,
+            g: &none,
+        })?;
+        Ok(tangent.a)
+    }
+
     /// Wrench on the sources of a pair and its tangent, in the target's frame.
     fn pair_tangent(
         &self,

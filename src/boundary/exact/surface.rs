@@ -1,0 +1,192 @@
+//! The surface of a sphere or an ellipsoid, and the potential on it when the body moves in water at rest.
+//!
+//! On the ellipsoid itself Lamb's potentials are polynomials: along x, and about x, with the added masses M and the volume V,
+//!
+//! ```text
+//! φ = (M_11/V) x          φ = 5 M_44/(V (b² − c²)) y z
+//! ```
+//!
+//! since M = ∮ φ q dA with the normal velocities q = n_x and y n_z − z n_y.
+//!
+//! # References
+//! H. Lamb, Hydrodynamics (1932), art. 114–115.
+
+use super::{ROUND, lamb, twist_in_shape};
+use crate::Result;
+use crate::adjoint::lie::{Mat6, Pose, Vec3, Vec6};
+use crate::geometry::Faces;
+use std::f64::consts::PI;
+
+/// An ellipsoid's surface in patches over the faces of a mesh, body frame.
+#[derive(Clone, Debug)]
+pub struct EllipsoidSurface {
+    /// The patches: corners of the faces, centroids on the ellipsoid, its normals and areas there.
+    pub faces: Faces,
+    pose: Pose,
+    /// Twist about the shape's origin, in its frame, of a body's twist.
+    move_in: Mat6,
+    /// Factors of x, y, z, yz, zx, xy.
+    factors: Vec6,
+}
+
+impl EllipsoidSurface {
+    /// The ellipsoid of `semi_axes` (m), whose frame is at `pose` in the body's frame, over the faces of a mesh of it.
+    ///
+    /// # Errors
+    /// Semi-axes that aren't finite and positive.
+    pub fn new(semi_axes: [f64; 3], pose: &Pose, faces: &Faces) -> Result<Self> {
+        let axes = Vec3::from(semi_axes);
+        let mass = lamb::added_mass(semi_axes)?;
+        let volume = 4.0 / 3.0 * PI * axes.product();
+        let square = axes.component_mul(&axes);
+        let factors = Vec6::from_fn(|i, _| match i {
+            0..3 => mass[(i, i)] / volume,
+            _ => {
+                let apart = square[(i + 1) % 3] - square[(i + 2) % 3];
+                match apart.abs() > ROUND * square.max() {
+                    true => 5.0 * mass[(i, i)] / (volume * apart),
+                    false => 0.0,
+                }
+            }
+        });
+        let mut out = faces.clone();
+        for (i, corners) in faces.corners.iter().enumerate() {
+            // On the unit sphere that the ellipsoid is an image of.
+            let [a, b, c] =
+                corners.map(|x| pose.apply_inverse(&x).component_div(&axes).normalize());
+            let middle = toward_middle(&a, &b, &c);
+            let normal = middle.component_div(&axes);
+            out.areas[i] = solid_angle(&a, &b, &c) * axes.product() * normal.norm();
+            out.centres[i] = pose.apply(&middle.component_mul(&axes));
+            out.normals[i] = pose.rotation * normal.normalize();
+        }
+        Ok(Self {
+            faces: out,
+            pose: *pose,
+            move_in: twist_in_shape(pose),
+            factors,
+        })
+    }
+
+    /// φ at the centroid of each patch for a twist of the body (m/s, rad/s), its frame: m²/s.
+    pub fn potentials(&self, twist: &Vec6) -> Vec<f64> {
+        let moves = self.weighed(twist);
+        let of = |at: &Vec3| {
+            let x = self.pose.apply_inverse(at);
+            let [linear, products] = [x, Vec3::new(x.y * x.z, x.z * x.x, x.x * x.y)];
+            moves[0].dot(&linear) + moves[1].dot(&products)
+        };
+        self.faces.centres.iter().map(of).collect()
+    }
+
+    /// ∇_s φ there, body frame: m/s.
+    pub fn gradients(&self, twist: &Vec6) -> Vec<Vec3> {
+        let [linear, products] = self.weighed(twist);
+        let of = |(at, normal): (&Vec3, &Vec3)| {
+            let x = self.pose.apply_inverse(at);
+            let turned = Vec3::new(
+                products.y * x.z + products.z * x.y,
+                products.z * x.x + products.x * x.z,
+                products.x * x.y + products.y * x.x,
+            );
+            let slope = self.pose.rotation * (linear + turned);
+            slope - normal * normal.dot(&slope)
+        };
+        let places = self.faces.centres.iter().zip(&self.faces.normals);
+        places.map(of).collect()
+    }
+
+    fn weighed(&self, twist: &Vec6) -> [Vec3; 2] {
+        let moves = (self.move_in * twist).component_mul(&self.factors);
+        [0, 3].map(|at| moves.fixed_rows::<3>(at).into_owned())
+    }
+}
+
+/// Solid angle of the triangle of three unit vectors.
+fn solid_angle(a: &Vec3, b: &Vec3, c: &Vec3) -> f64 {
+    let volume = a.dot(&b.cross(c)).abs();
+    2.0 * volume.atan2(1.0 + a.dot(b) + b.dot(c) + c.dot(a))
+}
+
+/// Direction of the centroid of the spherical triangle of three unit vectors: of ½ Σ (angle) (unit normal) over its sides.
+fn toward_middle(a: &Vec3, b: &Vec3, c: &Vec3) -> Vec3 {
+    let side = |p: &Vec3, q: &Vec3| {
+        let normal = p.cross(q);
+        let sine = normal.norm();
+        match sine > 0.0 {
+            true => normal * (sine.atan2(p.dot(q)) / sine),
+            false => Vec3::zeros(),
+        }
+    };
+    let sum = side(a, b) + side(b, c) + side(c, a);
+    let along = match sum.dot(&(a + b + c)) < 0.0 {
+        true => -sum,
+        false => sum,
+    };
+    along
+        .try_normalize(0.0)
+        .unwrap_or_else(|| (a + b + c).normalize())
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::adjoint::lie::exp_matrix;
+    use crate::boundary::{ExactBoundary, Response};
+    use crate::scene::Shape;
+    use std::path::Path;
+
+    #[test]
+    fn potentials_are_those_of_the_closed_form_and_gradients_their_slopes() {
+        for axes in [[0.3, 0.3, 0.3], [0.3, 0.2, 0.1], [0.1, 0.4, 0.4]] {
+            let pose = Pose::new(
+                exp_matrix(&Vec3::new(0.3, -0.2, 0.5)),
+                Vec3::new(0.1, 0.2, -0.3),
+            );
+            let shape = Shape::ellipsoid(axes).faces(320);
+            let mesh = crate::shape::build(&shape, Path::new(""), None).unwrap();
+            let faces = Faces::of(&mesh.transformed(&pose));
+            let made = EllipsoidSurface::new(axes, &pose, &faces).unwrap();
+            let exact = ExactBoundary::new("e", axes, &pose, 0.1).unwrap();
+            let twist = Vec6::new(0.3, -0.5, 0.7, 1.1, -0.4, 0.9);
+            // Just outside, as the closed form asks for.
+            let outward = |h: f64| -> Vec<Vec3> {
+                let places = made.faces.centres.iter().zip(&made.faces.normals);
+                places.map(|(x, n)| x + h * n).collect()
+            };
+            let right = exact.radiated(&outward(1e-9)).unwrap();
+            let found = made.potentials(&twist);
+            let largest = found.iter().fold(0.0, |a: f64, x| a.max(x.abs()));
+            for (i, found) in found.iter().enumerate() {
+                let right: f64 = (0..6).map(|k| right[(i, k)] * twist[k]).sum();
+                assert!(
+                    (found - right).abs() < 1e-7 * largest,
+                    "{axes:?}: {found} {right}"
+                );
+            }
+            let h = 1e-4;
+            let slopes = made.gradients(&twist);
+            for (i, (slope, normal)) in slopes.iter().zip(&made.faces.normals).enumerate() {
+                let along = normal.cross(&Vec3::new(0.3, 0.8, 0.5)).normalize();
+                // Both are as far outside.
+                let points = [h, -h].map(|h| made.faces.centres[i] + h * along);
+                let ends = exact.radiated(&points).unwrap();
+                let right: f64 = (0..6)
+                    .map(|k| (ends[(0, k)] - ends[(1, k)]) * twist[k] / (2.0 * h))
+                    .sum();
+                assert!(
+                    (slope.dot(&along) - right).abs() < 1e-4,
+                    "{} {right}",
+                    slope.dot(&along)
+                );
+                assert!(slope.dot(normal).abs() < 1e-12);
+            }
+            // Patches cover the whole ellipsoid: its volume, by ∮ x·n dA / 3.
+            let faces = &made.faces;
+            let each = faces.centres.iter().zip(&faces.normals).zip(&faces.areas);
+            let volume: f64 = each.map(|((x, n), a)| x.dot(n) * a / 3.0).sum();
+            let right = 4.0 / 3.0 * PI * axes.iter().product::<f64>();
+            assert!((volume / right - 1.0).abs() < 2e-3, "{}", volume / right);
+        }
+    }
+}

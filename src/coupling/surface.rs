@@ -1,0 +1,157 @@
+//! The flow's potential on the bodies' surfaces, and its rate, whatever the fidelity.
+//!
+//! A body that moves in the flow of others has, as Green's identity tells ([`crate::boundary::panel`]),
+//!
+//! ```text
+//! (½ I + Ω/4π) φ = S q + ψ               ψ the potential of the others' flow at its panels' centroids
+//! (½ I + Ω/4π) φ' = S q' + ψ'            ' the rate at points that go with the body
+//! ```
+//!
+//! so that a fidelity which knows the others' flow by sources alone gives it up to the surface, by panels of the body alone. With
+//! sources of strength α at y, of which nothing but relative places matters,
+//!
+//! ```text
+//! ψ(x) = Σ α/|x − y|,   ψ' = Σ { α'/|x − y| + α ∇(1/|x − y|)·y' }       y' relative to the body
+//! ```
+
+use super::pair::Pair;
+use crate::adjoint::kernel::{Points, Sources, potential_jvp, potential_sum};
+use crate::adjoint::lie::{Pose, Vec3, Vec6};
+use crate::boundary::PanelBoundary;
+use crate::geometry::Image;
+use crate::solver::Columns;
+use crate::{Error, Result};
+use nalgebra::{DMatrix, DVector};
+use std::sync::Arc;
+
+/// How all bodies in the water move at one moment.
+#[derive(Clone, Copy)]
+pub struct Motion<'a> {
+    /// Their poses.
+    pub poses: &'a [Pose],
+    /// Body-frame twists through water at rest, 6·bodies: m/s, rad/s.
+    pub twists: &'a DVector<f64>,
+    /// The rates of these numbers: m/s², rad/s².
+    pub rates: &'a DVector<f64>,
+    /// Spatial twists with which the bodies change their places.
+    pub displacement: &'a [Vec6],
+}
+
+/// Potential of the flow (velocity −∇φ) on the panels of one body.
+#[derive(Clone, Debug)]
+pub struct SurfacePotential {
+    /// φ, m²/s.
+    pub value: Vec<f64>,
+    /// Its rate at points that go with the body, m²/s².
+    pub rate: Vec<f64>,
+}
+
+impl Motion<'_> {
+    /// Twists and their rates, two columns.
+    pub(super) fn columns(&self) -> DMatrix<f64> {
+        DMatrix::from_columns(&[self.twists.clone(), self.rates.clone()])
+    }
+}
+
+impl SurfacePotential {
+    /// From both, side by side.
+    pub(super) fn of(columns: &Columns) -> Self {
+        Self {
+            value: columns.column(0),
+            rate: columns.column(1),
+        }
+    }
+}
+
+/// Sources of one body, body frame (m), with strengths (m³/s) and their rates, two columns.
+pub(super) struct Charges<'a> {
+    pub points: &'a [Vec3],
+    pub strengths: Columns,
+}
+
+/// A body that sees the sources of another, or an image of them.
+pub(super) struct Seen {
+    pub target: usize,
+    pub source: usize,
+    pub image: Image,
+    /// What its flow counts, and the rate of that.
+    pub weight: [f64; 2],
+}
+
+/// Total potentials on all surfaces, of bodies that see each other's sources.
+pub(super) fn on_surfaces(
+    motion: &Motion,
+    surfaces: &[Arc<PanelBoundary>],
+    charges: &[Charges],
+    seen: &[Seen],
+) -> Vec<SurfacePotential> {
+    let of = |(b, surface): (usize, &Arc<PanelBoundary>)| {
+        let centres = &surface.faces.centres;
+        let mut incident = Columns::zeros(centres.len(), 2);
+        for seen in seen.iter().filter(|s| s.target == b) {
+            add(motion, centres, seen, &charges[seen.source], &mut incident);
+        }
+        let twist = |x: &DVector<f64>| x.fixed_rows::<6>(6 * b).into_owned();
+        let twists = [twist(motion.twists), twist(motion.rates)];
+        SurfacePotential::of(&surface.total_potential(&twists, &incident))
+    };
+    surfaces.iter().enumerate().map(of).collect()
+}
+
+/// Adds the potential of the sources, and its rate, at points of the body that sees them.
+fn add(motion: &Motion, centres: &[Vec3], seen: &Seen, charges: &Charges, out: &mut Columns) {
+    let place = |b: usize| (b, &motion.poses[b]);
+    let (target, source) = (place(seen.target), place(seen.source));
+    let pair = Pair::new(target, source, &seen.image, charges.points);
+    let moved = pair.displacements(target.1, motion.displacement);
+    let mut still = Columns::zeros(centres.len(), 2);
+    // The kernel is even: what sees and what is seen may be exchanged.
+    potential_sum(
+        &Points::bare(&pair.positions),
+        &Sources::new(centres),
+        &charges.strengths.data,
+        2,
+        &mut still.data,
+    );
+    let mut moving = vec![0.0; centres.len()];
+    let strengths = charges.strengths.column(0);
+    let centres = Points::bare(centres);
+    potential_jvp(&centres, &pair.points, &moved, &strengths, 1, &mut moving);
+    let [weight, rate] = seen.weight;
+    for (i, moving) in moving.iter().enumerate() {
+        let [value, change] = [still.at(i, 0), still.at(i, 1)];
+        out.data[2 * i] += weight * value;
+        out.data[2 * i + 1] += weight * (change + moving) + rate * value;
+    }
+}
+
+/// Why there is none while films hold bodies apart.
+pub(super) fn held_apart() -> Error {
+    Error::Unsupported {
+        what: "the flow on surfaces that a film holds apart".into(),
+        why: "in a gap that the faces don't resolve the water's inertia is known, but not its pressure face by face".into(),
+        instead: "use more faces there, or ask before the gap closes".into(),
+    }
+}
+
+/// Refuses surfaces that aren't the bodies'.
+pub(super) fn check(motion: &Motion, surfaces: &[Arc<PanelBoundary>]) -> Result<()> {
+    let (bodies, rows) = (motion.poses.len(), 6 * motion.poses.len());
+    let fits = surfaces.len() == bodies
+        && motion.displacement.len() == bodies
+        && motion.twists.len() == rows
+        && motion.rates.len() == rows;
+    fits.then_some(()).ok_or_else(|| {
+        Error::input(
+            "flow on surfaces: surfaces and motions",
+            format!(
+                "{} surfaces, {} displacements, {} and {} numbers of twists and rates",
+                surfaces.len(),
+                motion.displacement.len(),
+                motion.twists.len(),
+                motion.rates.len()
+            ),
+            format!("one of each, and six numbers, for each of the {bodies} bodies"),
+        )
+    })
+}

@@ -1,0 +1,106 @@
+//! The pressure of the water on the bodies' surfaces.
+
+use super::surface_flow::BodyFlow;
+use super::{Rollout, Sample, Simulator};
+use crate::adjoint::lie::{Vec3, Vec6, six};
+use crate::{Error, Result};
+use nalgebra::DVector;
+
+/// Pressure on the faces of one body at one moment, by Bernoulli's law for unsteady flow: p = −ρ (∂Φ/∂t + ½ |u|²), Φ the flow's potential, which follows
+/// from the accelerations and not from differences in time. World frame.
+///
+/// Faces are those of the mesh that the water sees, of an ellipsoid by formula those of its shape. Their pressures add up to what
+/// the dynamics do to the body, to the error of the faces: [`SurfacePressure::wrench`].
+#[derive(Clone, Debug)]
+pub struct SurfacePressure {
+    /// The body's number in the scene.
+    pub body: usize,
+    /// Its name.
+    pub name: String,
+    /// Its origin, m.
+    pub origin: Vec3,
+    /// Centroids of the faces, m.
+    pub centres: Vec<Vec3>,
+    /// Their unit normals into the water.
+    pub normals: Vec<Vec3>,
+    /// Their areas, m².
+    pub areas: Vec<f64>,
+    /// Velocity of the water at the centroids, m/s; a current is in it.
+    pub velocities: Vec<Vec3>,
+    /// Pressure of the flow at the centroids, Pa, zero far away.
+    pub pressures: Vec<f64>,
+    /// Pressure of the water at rest there, Pa, zero at the world's origin.
+    pub hydrostatic: Vec<f64>,
+}
+
+impl SurfacePressure {
+    /// −∮ p n dA of the flow's pressure, and its moment about the body's origin: N and N m, world axes. What [`Loads`](super::Loads) call
+    /// "water".
+    pub fn wrench(&self) -> Vec6 {
+        self.sum(&self.pressures)
+    }
+
+    /// The same of the water at rest: buoyancy of the closed surface.
+    pub fn hydrostatic_wrench(&self) -> Vec6 {
+        self.sum(&self.hydrostatic)
+    }
+
+    fn sum(&self, pressures: &[f64]) -> Vec6 {
+        let faces = self.centres.iter().zip(&self.normals).zip(&self.areas);
+        let each = faces.zip(pressures).map(|(((x, n), area), p)| {
+            let force = -n * (p * area);
+            six(&force, &(x - self.origin).cross(&force))
+        });
+        each.sum()
+    }
+}
+
+impl Simulator {
+    /// Pressures with the generalised accelerations `gains`.
+    fn pressure(&self, sample: &Sample, gains: &DVector<f64>) -> Result<Vec<SurfacePressure>> {
+        let density = self.parameters().density();
+        let gravity = Vec3::from(self.scene().gravity);
+        let current = self.system().current;
+        let of = |flow: BodyFlow| {
+            let (faces, pose) = (flow.faces(), &flow.pose);
+            let velocities = flow.velocities();
+            let dynamic = flow.pressures(&velocities);
+            let centres: Vec<Vec3> = faces.centres.iter().map(|x| pose.apply(x)).collect();
+            SurfacePressure {
+                body: flow.body,
+                name: self.system().bodies[flow.body].name.clone(),
+                origin: pose.translation,
+                normals: faces.normals.iter().map(|n| pose.rotation * n).collect(),
+                areas: faces.areas.clone(),
+                velocities: (velocities.iter())
+                    .map(|u| pose.rotation * u + current)
+                    .collect(),
+                pressures: dynamic.iter().map(|p| density * p).collect(),
+                hydrostatic: centres.iter().map(|x| density * gravity.dot(x)).collect(),
+                centres,
+            }
+        };
+        let flows = self.surface_flow(sample, gains)?;
+        Ok(flows.into_iter().map(of).collect())
+    }
+}
+
+impl Rollout {
+    /// The water's pressure on the surfaces of all bodies in it at state `n`, with the accelerations of [`Rollout::loads`]: it takes solves of its own. It is there to
+    /// be looked at: nothing of a step depends on it, and it has no transpose.
+    ///
+    /// # Errors
+    /// A state that there isn't; a scene without water, or with a force `current`; bodies without a surface; gaps that films carry; whatever the equations of motion or the coupling
+    /// report.
+    pub fn pressure(&self, n: usize) -> Result<Vec<SurfacePressure>> {
+        let simulator = self.simulator();
+        simulator.check_pressure()?;
+        let sample = self.samples().get(n).ok_or_else(|| {
+            let expected = format!("must be at most {}", self.steps());
+            Error::input("pressure: state", n, expected)
+        })?;
+        let loads = self.loads(n)?;
+        let made = simulator.pressure(sample, loads.acceleration());
+        made.map_err(|e| e.at_time(sample.time))
+    }
+}

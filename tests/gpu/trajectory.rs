@@ -117,6 +117,8 @@ fn so_is_one_with_a_given_added_mass() {
     };
     let rows = (0..6).map(|i| (0..6).map(|j| entry(i, j)).collect());
     coin.added_mass = Some(rows.collect());
+    let mut alone = Scene::new(falling_ball().fluid);
+    alone.add(coin.clone());
     for (how, limit) in [
         ((Fidelity::Full, Method::MfsVertex), 1e-6),
         ((Fidelity::Full, Method::Auto), 1e-7),
@@ -129,5 +131,14 @@ fn so_is_one_with_a_given_added_mass() {
             println!("{how:?}: {off:.1e}");
             assert!(off <= limit, "{how:?}: {off:e}");
         }
+        let by_itself = in_scene(&alone, how, Backend::Gpu, 1e-10);
+        let own = by_itself.added_mass().unwrap().own(0) / by_itself.parameters().density();
+        let right = DMatrix::from_fn(6, 6, entry);
+        let scale = |i: usize| right[(i, i)].sqrt();
+        let off = DMatrix::from_fn(6, 6, |i, j| {
+            (own[(i, j)] - right[(i, j)]) / (scale(i) * scale(j))
+        });
+        println!("{how:?}, alone: {:.1e}", off.amax());
+        assert!(off.amax() <= 1e-8, "{how:?}: {off}");
     }
 }

@@ -125,7 +125,7 @@ impl Servo {
 /// `shape_position` and `shape_rotation` place the shape in the body; `refine` lists balls (center, radius, edge), m,
 /// where its faces are made smaller. `collision` lists the convex pieces that the body is for contact instead of its shape, each
 /// a shape, (shape, position) or (shape, position, rotation) in the body's frame. `start` are the joint's coordinates at the start, unless the
-/// scene is given all by `set_initial`. `added_mass` (6, 6) replaces the body's own at unit density, with `isolated`.
+/// scene is given all by `set_initial`. `added_mass` (6, 6; m³, m⁴, m⁵) replaces the body's own at unit density, about its origin.
 /// `volume` (m³) and `center_of_buoyancy` (m) are what it is buoyant by and where, instead of the shape's volume at its centroid.
 #[pyclass(frozen, eq, module = "hydrograd")]
 #[derive(Clone, PartialEq)]

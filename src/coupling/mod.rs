@@ -19,6 +19,7 @@
 mod exclude;
 pub(crate) mod film;
 pub mod full;
+mod given;
 mod isolated;
 pub mod lubrication;
 mod pair;
@@ -30,6 +31,7 @@ mod surface;
 mod tensor;
 
 pub use exclude::Exclusions;
+pub use given::Given;
 pub use isolated::Isolated;
 pub use panel::{ExtrapolatedPanels, FilmedPanels, PanelCoupled, PanelModel};
 pub use response::{CoupledResponse, Reached};

@@ -121,12 +121,26 @@ impl Evaluation<'_> {
     fn factored_dense(&self, free: &[usize]) -> Result<Inertia> {
         let block = self.mass_matrix().select_rows(free).select_columns(free);
         let smallest = smallest_scaled_eigenvalue(&block);
-        let place = || "mass matrix M(q)".to_string();
+        let refused = || unresolved(self.weakest(free), smallest);
         if smallest.is_nan() || smallest <= LEAST {
-            return Err(unresolved(place(), smallest));
+            return Err(refused());
         }
-        let factor = Definite::new(block).ok_or_else(|| unresolved(place(), smallest))?;
+        let factor = Definite::new(block).ok_or_else(refused)?;
         Ok(Inertia::Dense(factor, free.to_vec()))
+    }
+
+    /// Where the velocities `free` have least inertia, in words.
+    fn weakest(&self, free: &[usize]) -> String {
+        let block = self.mass_matrix().select_rows(free).select_columns(free);
+        let least = least_direction(&block).and_then(|x| free.get(x.icamax()).copied());
+        let mut links = self.system.tree.links().iter().zip(&self.system.bodies);
+        match least.and_then(|i| links.find(|(link, _)| link.v.contains(&i))) {
+            Some((_, body)) => format!(
+                "mass matrix M(q), most at the joint of body {:?}",
+                body.name
+            ),
+            None => "mass matrix M(q)".into(),
+        }
     }
 
     /// Wrenches, spatial, that change the momentum at v = 0: that of the water as the current moves it, and that of the bodies relative to what may drift.
@@ -141,6 +155,20 @@ impl Evaluation<'_> {
     }
 }
 
+/// The eigenvector of the smallest eigenvalue of a matrix scaled to unit diagonal, rows without a positive one being zero; none where an entry isn't finite.
+fn least_direction(a: &DMatrix<f64>) -> Option<DVector<f64>> {
+    let scale = a
+        .diagonal()
+        .map(|d| if d > 0.0 { 1.0 / d.sqrt() } else { 0.0 });
+    let scaled = DMatrix::from_fn(a.nrows(), a.ncols(), |i, j| scale[i] * a[(i, j)] * scale[j]);
+    if a.is_empty() || scaled.iter().any(|x| !x.is_finite()) {
+        return None;
+    }
+    let found = scaled.symmetric_eigen();
+    let least = found.eigenvalues.imin();
+    Some(found.eigenvectors.column(least).into_owned())
+}
+
 fn unresolved(place: String, smallest: f64) -> Error {
     Error::Unresolved {
         place,
@@ -148,7 +176,8 @@ fn unresolved(place: String, smallest: f64) -> Error {
         value: smallest,
         limit: LEAST,
         remedy: "M must be positive definite. At the start: give massless bodies mass, inertia or added \
-                 mass, or refine the meshes where a gap isn't resolved. Later: the run may have blown up, \
+                 mass, refine the meshes where a gap isn't resolved, or take away a given added mass that is far \
+                 smaller than what others change of it. Later: the run may have blown up, \
                  take a smaller time step or the integrator midpoint"
             .into(),
     }

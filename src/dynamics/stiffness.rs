@@ -35,7 +35,7 @@ impl System {
         let kinematics = self.kinematics(q)?;
         let (still, report) = (FluidMomenta::Still, Default::default());
         let dry = Evaluation::new(self, parameters, q, time, kinematics, still, report);
-        // The water only adds to the inertia.
+        // The water only adds to the inertia, but where a given added mass is smaller than what others change of it.
         let fast = |d: &Damping| d.rate > enough;
         let alone = dry.fastest(v, control);
         let is_slow = matches!(&alone, Ok(found) if found.is_none_or(|d| !fast(&d)));

@@ -173,7 +173,7 @@ setters! { Body {
     volume(volume: f64) => volume = Some(volume);
     /// Where buoyancy acts in the body's frame, m, instead of the shape's centroid.
     center_of_buoyancy(center: [f64; 3]) => center_of_buoyancy = Some(center);
-    /// The body's own added mass at unit density of the fluid, about its origin, body axes.
+    /// The body's own added mass in unbounded water, at unit density, about its origin, body axes, instead of the computed one.
     added_mass(rows: [[f64; 6]; 6]) => added_mass = Some(rows.iter().map(|row| row.to_vec()).collect());
     /// Position of the joint's frame in the parent's frame, m: where the body is at q = 0.
     at(position: [f64; 3]) => placement.position = position;

@@ -162,7 +162,8 @@ pub struct Body {
     /// Default: that of the shape filled evenly with `mass`.
     pub inertia: Option<Vec<f64>>,
     /// The body's own added mass at unit density of the fluid, about its origin, body axes, 6 × 6
-    /// rows (linear, then angular; m³, m⁴, m⁵): used by `isolated` instead of computing it.
+    /// rows (linear, then angular; m³, m⁴, m⁵): instead of the computed one. With the coupled fidelities, which need a shape all the same, what
+    /// other bodies and walls change of it is as computed.
     pub added_mass: Option<Vec<Vec<f64>>>,
     /// Name of the parent body; default: the world.
     pub parent: Option<String>,

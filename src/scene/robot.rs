@@ -44,7 +44,7 @@ pub struct RobotLink {
     /// Where buoyancy acts, m.
     #[serde(skip_serializing_if = "is_default")]
     pub center_of_buoyancy: Option<[f64; 3]>,
-    /// Its own added mass at unit density about the link's origin, 6 × 6, for `isolated`.
+    /// Its own added mass at unit density about the link's origin, 6 × 6.
     #[serde(skip_serializing_if = "is_default")]
     pub added_mass: Option<Vec<Vec<f64>>>,
 }

@@ -94,7 +94,7 @@ pub(crate) fn prepare(
     let mut warnings = choices.without_effect();
     let idle = fidelity.kind().idle_gpu();
     let mut device = Device::open(choices.backend, &choices.gpu, idle)?;
-    let made = fidelity.kind().couple(&problem, &mut device)?;
+    let made = fidelity.couple(&problem, &mut device)?;
     warnings.extend(device.reason.clone());
     warnings.extend(made.warnings);
     let mut resolved = vec![Resolved::default(); scene.bodies.len()];

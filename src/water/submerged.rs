@@ -27,7 +27,7 @@ pub(crate) struct SubmergedBody<'a> {
     pub solid: Option<&'a Solid>,
     /// A coarser mesh of the shape, where it is one by formula.
     pub coarse: Option<&'a Coarse>,
-    /// Given added mass at unit density.
+    /// Given added mass at unit density, body's frame, about its origin: in the place of the body's own.
     pub added_mass: Option<Mat6>,
     /// Where smaller gaps matter than elsewhere.
     pub regions: Vec<Region>,
@@ -36,6 +36,9 @@ pub(crate) struct SubmergedBody<'a> {
 /// What was made of the bodies.
 pub(crate) struct Made {
     pub coupling: Box<dyn Coupling>,
+    /// Added mass of bodies alone in the water as the coupling has it, unit density, body's frame, about the origin: of those that have another one given
+    /// ([`Problem::own`](super::method::kind::Problem::own)).
+    pub own: Vec<Option<Mat6>>,
     /// What each body became.
     pub bodies: Vec<Discretisation>,
     pub warnings: Vec<String>,
@@ -65,7 +68,7 @@ pub struct Discretisation {
     pub resolved_regions: Vec<Region>,
     /// Asymmetry of its own added mass before symmetrising.
     pub asymmetry: f64,
-    /// Estimated error of its own added mass, where two meshes tell one.
+    /// Estimated error of its own added mass, where two meshes tell one; none where it is given.
     pub added_mass_error: Option<f64>,
     /// Error of the compressed flow of the body itself at points not fitted to, relative.
     pub radiated_error: f64,
@@ -88,15 +91,14 @@ impl<'a> SubmergedBody<'a> {
         fn parts<'b>(body: &SubmergedBody<'b>) -> Option<(&'b [Vec3], &'b [[usize; 3]])> {
             body.mesh.map(|m| (m.vertices(), m.faces()))
         }
-        self.added_mass == other.added_mass
-            && self.regions == other.regions
+        self.regions == other.regions
             && self.ellipsoid == other.ellipsoid
             && parts(self) == parts(other)
     }
 }
 
 /// The bodies that the water sees, with their numbers in the scene. Bodies that can't move matter only as boundaries of the
-/// `coupled` flow; a given added mass counts only without it.
+/// `coupled` flow.
 pub(crate) fn in_water<'a>(
     scene: &'a Scene,
     surfaces: &'a [Option<Surface>],
@@ -104,6 +106,8 @@ pub(crate) fn in_water<'a>(
     coupled: bool,
 ) -> (Vec<usize>, Vec<SubmergedBody<'a>>) {
     let seen = |b: &usize| coupled || moves(scene, tree, *b);
+    // Symmetric but for what its check lets pass.
+    let matrix = |rows: &Vec<Vec<f64>>| Mat6::from_fn(|i, j| 0.5 * (rows[i][j] + rows[j][i]));
     let submerged = |b: usize| {
         let (body, surface) = (&scene.bodies[b], surfaces[b].as_ref());
         let given = body.added_mass.as_ref();
@@ -114,9 +118,7 @@ pub(crate) fn in_water<'a>(
                 .map(|axes| (axes, pose(&body.shape_at))),
             solid: surface.and_then(|s| s.solid.as_ref()),
             coarse: surface.and_then(|s| s.coarse.as_ref()),
-            added_mass: given
-                .filter(|_| !coupled)
-                .map(|rows| Mat6::from_fn(|i, j| rows[i][j])),
+            added_mass: given.map(matrix),
             regions: body.refine.iter().map(region).collect(),
         })
     };
@@ -143,9 +145,18 @@ pub(crate) fn shared<T>(
     bodies: &[SubmergedBody],
     make: impl Fn(&SubmergedBody) -> Result<T>,
 ) -> Result<Vec<Arc<T>>> {
+    shared_by(bodies, |a, b| a.equal(b), make)
+}
+
+/// One value per body; bodies that are the `same` share one.
+pub(crate) fn shared_by<T>(
+    bodies: &[SubmergedBody],
+    same: impl Fn(&SubmergedBody, &SubmergedBody) -> bool,
+    make: impl Fn(&SubmergedBody) -> Result<T>,
+) -> Result<Vec<Arc<T>>> {
     let mut out: Vec<Arc<T>> = Vec::with_capacity(bodies.len());
     for (b, body) in bodies.iter().enumerate() {
-        out.push(match (0..b).find(|a| bodies[*a].equal(body)) {
+        out.push(match (0..b).find(|a| same(&bodies[*a], body)) {
             Some(a) => out[a].clone(),
             None => Arc::new(make(body)?),
         });

@@ -80,6 +80,35 @@ fn coins() {
     }
 }
 
+/// Two bodies near each other over a wall, in a current, one with an added mass of its own.
+#[test]
+fn a_given_added_mass() {
+    let mut scene = Scene::new(Fluid {
+        current: [0.1, -0.2, 0.0],
+        ..Fluid::fresh_water()
+    });
+    scene.add_wall([0.0, 0.0, -0.15], [0.0, 0.0, 1.0]);
+    let rows = std::array::from_fn(|i| {
+        std::array::from_fn(|j: usize| {
+            let arm = |i: usize| if i < 3 { 1.0 } else { 0.1 };
+            let aside = 0.1 * (1.0 + i.min(j) as f64 + 2.0 * i.max(j) as f64).sin();
+            let own = if i == j { 1.0 + 0.1 * i as f64 } else { aside };
+            4e-3 * own * arm(i) * arm(j)
+        })
+    });
+    let egg = Body::new(Shape::ellipsoid([0.12, 0.08, 0.1])).density(1100.0);
+    scene.add(egg.rotated([0.2, -0.4, 0.3]).added_mass(rows));
+    let brick = Body::new(Shape::cuboid([0.2, 0.15, 0.18])).density(900.0);
+    scene.add(brick.at([0.1, 0.05, 0.29]));
+    scene.initial.v = (0..12).map(|i| (1.0 + 2.0 * f64::from(i)).sin()).collect();
+    scene.time_step = 0.005;
+    for integrator in INTEGRATORS {
+        check(&scene, Fidelity::Reduced, integrator, 4, 80);
+    }
+    check(&scene, Fidelity::Auto, Integrator::MomentumEuler, 4, 80);
+    check(&scene, Fidelity::Full, Integrator::MomentumEuler, 4, 40);
+}
+
 #[test]
 fn falling_ball() {
     for integrator in INTEGRATORS {

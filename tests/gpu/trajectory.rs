@@ -19,14 +19,22 @@ pub fn simulator(backend: Backend, tolerance: f64) -> Simulator {
     of((Fidelity::Full, Method::MfsVertex), backend, tolerance)
 }
 
-fn of((fidelity, method): (Fidelity, Method), backend: Backend, tolerance: f64) -> Simulator {
-    let scene = falling_ball();
+fn of(how: (Fidelity, Method), backend: Backend, tolerance: f64) -> Simulator {
+    in_scene(&falling_ball(), how, backend, tolerance)
+}
+
+fn in_scene(
+    scene: &Scene,
+    (fidelity, method): (Fidelity, Method),
+    backend: Backend,
+    tolerance: f64,
+) -> Simulator {
     let settings = Settings::default()
         .fidelity(fidelity)
         .method(method)
         .backend(backend)
         .tolerance(tolerance);
-    Simulator::new(&scene, settings).unwrap()
+    Simulator::new(scene, settings).unwrap()
 }
 
 /// The gradient of a fixed combination of all states.
@@ -90,4 +98,47 @@ fn so_is_one_of_panels_on_two_meshes_which_is_the_default() {
 #[test]
 fn so_is_one_of_compressed_bodies() {
     holds((Fidelity::Reduced, Method::Auto), 1e-6);
+}
+
+/// An added mass of the coin's own: constant on either side.
+#[test]
+fn so_is_one_with_a_given_added_mass() {
+    let mut scene = falling_ball();
+    let coin = scene.bodies.last_mut().unwrap();
+    let volume = coin.shape.clone().map(|shape| {
+        let mesh = crate::support::mesh(&shape, 40);
+        mesh.mass_properties().volume
+    });
+    let volume = volume.unwrap();
+    let arm = |i: usize| if i < 3 { 1.0 } else { 0.3 * volume.cbrt() };
+    let entry = |i: usize, j: usize| match i == j {
+        true => 2.0 * volume * arm(i).powi(2),
+        false => 0.1 * volume * (i as f64 + j as f64).sin() * arm(i) * arm(j),
+    };
+    let rows = (0..6).map(|i| (0..6).map(|j| entry(i, j)).collect());
+    coin.added_mass = Some(rows.collect());
+    let mut alone = Scene::new(falling_ball().fluid);
+    alone.add(coin.clone());
+    for (how, limit) in [
+        ((Fidelity::Full, Method::MfsVertex), 1e-6),
+        ((Fidelity::Full, Method::Auto), 1e-7),
+        ((Fidelity::Reduced, Method::Auto), 1e-6),
+    ] {
+        let cpu = in_scene(&scene, how, Backend::Cpu, 1e-12);
+        let gpu = in_scene(&scene, how, Backend::Gpu, 1e-10);
+        for (cpu, gpu) in groups(&cpu).iter().zip(&groups(&gpu)) {
+            let off = difference(gpu, cpu);
+            println!("{how:?}: {off:.1e}");
+            assert!(off <= limit, "{how:?}: {off:e}");
+        }
+        let by_itself = in_scene(&alone, how, Backend::Gpu, 1e-10);
+        let own = by_itself.added_mass().unwrap().own(0) / by_itself.parameters().density();
+        let right = DMatrix::from_fn(6, 6, entry);
+        let scale = |i: usize| right[(i, i)].sqrt();
+        let off = DMatrix::from_fn(6, 6, |i, j| {
+            (own[(i, j)] - right[(i, j)]) / (scale(i) * scale(j))
+        });
+        println!("{how:?}, alone: {:.1e}", off.amax());
+        assert!(off.amax() <= 1e-8, "{how:?}: {off}");
+    }
 }

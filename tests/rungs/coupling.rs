@@ -8,7 +8,7 @@ use hydrograd::boundary::{BodyBoundary, Method, MfsSettings, PanelBoundary};
 use hydrograd::coupling::full::{Full, FullSolver, SolveSettings};
 use hydrograd::coupling::reduced::{Cutoff, Reduced, compress};
 use hydrograd::coupling::{
-    Coupling, Direction, Exclusions, ExtrapolatedPanels, FilmedPanels, Isolated, Linearise,
+    Coupling, Direction, Exclusions, ExtrapolatedPanels, FilmedPanels, Given, Isolated, Linearise,
     PanelCoupled,
 };
 use hydrograd::geometry::{Image, TriMesh};
@@ -30,6 +30,10 @@ pub fn rungs() -> Vec<Rung> {
         "coupling::isolated::IsolatedLinearised::gradient_along" => |c| zero_gradient(c, true),
         "coupling::isolated::IsolatedLinearised::vjp" => |c| vjp(&isolated(), c),
         "coupling::isolated::IsolatedLinearised::hvp" => isolated_hvp,
+        "coupling::given::GivenLinearised::gradient" => |c| all(given_systems().iter().map(|s| gradient(s, c))),
+        "coupling::given::GivenLinearised::gradient_along" => |c| all(given_systems().iter().map(|s| gradient_along(s, c))),
+        "coupling::given::GivenLinearised::vjp" => |c| all(given_systems().iter().map(|s| vjp(s, c))),
+        "coupling::given::GivenLinearised::hvp" => |c| all(given_systems().iter().map(|s| hvp(s, c))),
         "coupling::response::ResponseLinearised::gradient" => |c| all(systems().iter().map(|s| gradient(s, c)).chain(panel_systems().iter().map(|s| gradient(s, c)))),
         "coupling::response::ResponseLinearised::gradient_along" => |c| all(systems().iter().map(|s| gradient_along(s, c)).chain(panel_systems().iter().map(|s| gradient_along(s, c)))),
         "coupling::response::ResponseLinearised::vjp" => |c| all(systems().iter().map(|s| vjp(s, c)).chain(panel_systems().iter().map(|s| vjp(s, c)))),
@@ -326,12 +330,29 @@ fn film_systems() -> Vec<Reduced> {
     ]
 }
 
+/// A positive definite matrix without any symmetry else.
+fn definite(phase: f64) -> Mat6 {
+    let a = Mat6::from_column_slice(wavy(36, phase, 1.0).as_slice());
+    a * a.transpose()
+}
+
 fn isolated() -> Isolated {
-    let of = |phase: f64| {
-        let a = Mat6::from_column_slice(wavy(36, phase, 1.0).as_slice());
-        a * a.transpose()
+    Isolated::new(vec![definite(0.2), definite(1.4)])
+}
+
+/// Given added masses in the place of the bodies' own, of one body and of both: over fundamental solutions, compressed bodies with films, and panels.
+fn given_systems() -> Vec<Given> {
+    let of = |computed: Box<dyn Coupling>, change: [Mat6; 2]| {
+        Given::new(computed, change.to_vec()).unwrap()
     };
-    Isolated::new(vec![of(0.2), of(1.4)])
+    let one = [Mat6::zeros(), definite(2.3)];
+    let both = [definite(0.2), definite(1.4)];
+    let by_sources = full(Method::MfsVertex, FullSolver::Cgls, &[WALL]);
+    vec![
+        of(Box::new(by_sources), both),
+        of(Box::new(film_systems().swap_remove(0)), one),
+        of(Box::new(extrapolated_panels()), both),
+    ]
 }
 
 fn poses() -> [Pose; 2] {
@@ -531,7 +552,10 @@ fn second_derivatives_commute_up_to_the_bracket() {
     let filmed = filmed_panels()
         .into_iter()
         .map(|s| Box::new(s) as Box<dyn Linearise>);
-    for s in full.chain(reduced).chain(panels).chain(filmed) {
+    let given = given_systems()
+        .into_iter()
+        .map(|s| Box::new(s) as Box<dyn Linearise>);
+    for s in full.chain(reduced).chain(panels).chain(filmed).chain(given) {
         let k = case();
         let other = field(1.9);
         let record = s.linearise(&poses(), &k.basis).unwrap();
@@ -610,6 +634,9 @@ fn many_directions_are_one_by_one() {
     }
     for s in reduced_systems().iter().chain(&film_systems()) {
         check(s, &poses(), "reduced");
+    }
+    for s in &given_systems() {
+        check(s, &poses(), "given");
     }
     check(&isolated(), &poses(), "isolated");
 }

@@ -8,6 +8,7 @@ mod films;
 mod flow;
 mod gap_check;
 mod gap_error;
+mod given;
 mod methods;
 mod near;
 mod one_body;

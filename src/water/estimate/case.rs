@@ -126,18 +126,19 @@ impl<'a> Case<'a> {
         let submerged = self.submerged(&self.surfaces);
         let problem = self.problem(&submerged);
         let formula = |w| problem.method_for(w).is_ok_and(|m| m.by_formula());
+        // What is given of a body is all that there is of one that feels no other.
+        let unasked = |w: &SubmergedBody| w.added_mass.is_some() && !self.fidelity.coupled();
         let pairs = self.bodies.iter().zip(&submerged);
-        let used = pairs
-            .filter(|(_, w)| w.mesh.is_some() && w.added_mass.is_none() && !(alone && formula(w)));
+        let used = pairs.filter(|(_, w)| w.mesh.is_some() && !unasked(w) && !(alone && formula(w)));
         used.map(|(b, _)| *b).collect()
     }
 
     /// What no estimate is made of.
     pub fn unknown(&self) -> Vec<String> {
-        let own = self.subject.water.discretisation.iter();
-        let given = own.filter(|d| d.method == "given");
+        let submerged = self.submerged(&self.surfaces);
+        let given = submerged.iter().filter(|b| b.added_mass.is_some());
         let name = |body: &str| format!("the error of the added mass given for body {body:?}");
-        given.map(|d| name(&d.body)).collect()
+        given.map(|b| name(b.name)).collect()
     }
 
     /// max |D_ij| / √(M_ii M_jj); infinite where an entry isn't a number.
@@ -185,7 +186,7 @@ impl<'a> Case<'a> {
         }
         let mut device = self.subject.water.device.clone();
         let problem = self.problem(&submerged);
-        let made = self.fidelity.kind().couple(&problem, &mut device)?;
+        let made = self.fidelity.couple(&problem, &mut device)?;
         Ok(evaluate(made.coupling.as_ref(), &self.poses, &self.turn)?.0)
     }
 
@@ -201,7 +202,15 @@ impl<'a> Case<'a> {
         let made = coupling.reduced_bodies().iter();
         let gaps: Vec<f64> = made.map(|b| b.parts().fit.finest()).collect();
         let responses = responses(&self.problem(bodies), &gaps)?;
-        coupling.correction(&self.poses, &self.turn, &responses)
+        let mut out = coupling.correction(&self.poses, &self.turn, &responses)?;
+        // Of a body whose own is given, what others and walls change is all that its answers tell.
+        for (b, _) in (bodies.iter().enumerate()).filter(|(_, body)| body.added_mass.is_some()) {
+            let compressed = coupling.reduced_bodies()[b].parts();
+            let own = responses[b].added_mass() - compressed.added_mass;
+            let turn = self.turn.rows(6 * b, 6);
+            out -= turn.tr_mul(&(own * turn));
+        }
+        Ok(out)
     }
 
     /// What is left at check points, and what films may be off.
@@ -272,7 +281,11 @@ impl<'a> Case<'a> {
             };
             surfaces.push(mesh.map(Surface::of_mesh));
         }
-        let (numbers, submerged) = in_water(scene, &surfaces, self.subject.tree, true);
+        let (numbers, mut submerged) = in_water(scene, &surfaces, self.subject.tree, true);
+        // What is given for a body alone is the same in both.
+        for body in &mut submerged {
+            body.added_mass = None;
+        }
         let n = 6 * self.bodies.len();
         if submerged.len() <= 1 && scene.walls.is_empty() {
             return Ok(DMatrix::zeros(n, n));
@@ -288,7 +301,7 @@ impl<'a> Case<'a> {
         let method = Method::Panel.kind();
         let problem = Problem::new(scene, &numbers, &submerged, method, &numerics);
         let solve = |fidelity: Fidelity| -> Result<DMatrix<f64>> {
-            let made = fidelity.kind().couple(&problem, &mut Device::default())?;
+            let made = fidelity.couple(&problem, &mut Device::default())?;
             Ok(evaluate(made.coupling.as_ref(), &poses, &turn)?.0)
         };
         let difference = solve(fidelity)? - solve(Fidelity::Isolated)?;

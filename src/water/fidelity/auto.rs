@@ -2,13 +2,14 @@
 //!
 //! Two bodies a distance c apart feel each other as dipoles: relative to their own added mass the
 //! coupling is at most `2 D₁ D₂ / 4πc³` with `D = (V + M)/√M` per unit velocity, V the displaced
-//! volume and M the own added mass at unit density (3(a/c)³ for equal spheres of radius a). A pair whose
+//! volume and M the own added mass at unit density (3(a/c)³ for equal spheres of radius a); where another own one Â is given, `D = (V + M)/√Â`. A pair whose
 //! coupling is below the aim fades out. What a body must resolve follows from the smallest gap that it
 //! starts with.
 
+use super::given::LEAST;
 use super::kind::{FidelityKind, Knob, Planned, StartGap};
 use super::reduced::Reduced;
-use crate::adjoint::lie::{Pose, Vec3};
+use crate::adjoint::lie::{Mat6, Pose, Vec3};
 use crate::boundary::exact::lamb;
 use crate::coupling::reduced::{Cutoff, compress};
 use crate::geometry::{Gap, MassProperties};
@@ -107,7 +108,7 @@ fn plan(problem: &Problem, poses: &[Pose], gaps: &[StartGap]) -> Result<Planned>
         };
         let properties = mesh.mass_properties();
         strengths.push((
-            strength(&properties)?,
+            strength(&properties, body.added_mass.as_ref())?,
             poses[b].apply(&mesh.bounding_ball().center),
         ));
         let near = || gaps.iter().filter(|start| start.gap.touches(b));
@@ -161,9 +162,10 @@ fn plan(problem: &Problem, poses: &[Pose], gaps: &[StartGap]) -> Result<Planned>
     Ok(out)
 }
 
-/// Largest `(V + M)/√M` over the axes of the ellipsoid with the same volume and inertia.
-fn strength(p: &MassProperties) -> Result<f64> {
-    let moments: Vec3 = p.inertia.symmetric_eigenvalues();
+/// Largest `(V + M)/√M` over the axes of the ellipsoid with the same volume and inertia; `(V + M)/√Â` where Â is given.
+fn strength(p: &MassProperties, given: Option<&Mat6>) -> Result<f64> {
+    let principal = p.inertia.symmetric_eigen();
+    let moments: Vec3 = principal.eigenvalues;
     let trace: f64 = moments.sum();
     // I_i = V (a_j² + a_k²)/5
     let axes: [f64; 3] = std::array::from_fn(|i| {
@@ -171,6 +173,14 @@ fn strength(p: &MassProperties) -> Result<f64> {
         square.max(1e-6 * trace / p.volume).sqrt()
     });
     let m = lamb::added_mass(axes)?;
-    let of = |i: usize| (p.volume + m[(i, i)]) / m[(i, i)].sqrt();
+    let own = |i: usize| match given {
+        Some(given) => {
+            let axis = principal.eigenvectors.column(i);
+            let along = axis.dot(&(given.fixed_view::<3, 3>(0, 0) * axis));
+            along.max(LEAST * p.volume)
+        }
+        None => m[(i, i)],
+    };
+    let of = |i: usize| (p.volume + m[(i, i)]) / own(i).sqrt();
     Ok((0..3).map(of).fold(0.0, f64::max))
 }

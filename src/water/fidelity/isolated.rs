@@ -7,8 +7,9 @@ use crate::coupling;
 use crate::geometry::Gap;
 use crate::water::device::Device;
 use crate::water::method::kind::Problem;
-use crate::water::submerged::{Discretisation, Made, SubmergedBody, once, shared};
+use crate::water::submerged::{Discretisation, Made, SubmergedBody, once, shared_by};
 use crate::water::surface::overlaps;
+use std::sync::Arc;
 
 /// Each body's own constant added mass.
 pub(super) struct Isolated;
@@ -56,8 +57,14 @@ impl Own {
 
 /// Each body's own added mass at unit density, body's frame, about its origin.
 pub(in crate::water) fn own_added_mass(problem: &Problem) -> Result<Vec<Mat6>> {
-    let made = shared(problem.bodies, |b| Own::new(problem, b))?;
+    let made = owns(problem)?;
     Ok(made.iter().map(|m| m.added_mass).collect())
+}
+
+/// Of equal bodies with the same added mass given, or none, one.
+fn owns(problem: &Problem) -> Result<Vec<Arc<Own>>> {
+    let same = |a: &SubmergedBody, b: &SubmergedBody| a.added_mass == b.added_mass && a.equal(b);
+    shared_by(problem.bodies, same, |b| Own::new(problem, b))
 }
 
 impl FidelityKind for Isolated {
@@ -77,11 +84,12 @@ impl FidelityKind for Isolated {
                 problem.walls.len()
             ));
         }
-        let made = shared(problem.bodies, |b| Own::new(problem, b))?;
+        let made = owns(problem)?;
         warnings.extend(once(&made, |m| &m.warnings));
         Ok(Made {
             carried: None,
             films: Vec::new(),
+            own: vec![None; made.len()],
             bodies: problem.named(made.iter().map(|m| m.as_made.clone())),
             coupling: Box::new(coupling::Isolated::new(
                 made.iter().map(|m| m.added_mass).collect(),

@@ -4,10 +4,15 @@
 
 mod auto;
 mod full;
+mod given;
 mod isolated;
 pub(super) mod kind;
 mod reduced;
 
+use crate::Result;
+use crate::water::device::Device;
+use crate::water::method::kind::Problem;
+use crate::water::submerged::Made;
 use kind::FidelityKind;
 
 pub(super) use isolated::own_added_mass;
@@ -33,6 +38,14 @@ impl Fidelity {
     /// Whether the bodies feel each other and the walls at all.
     pub fn coupled(self) -> bool {
         self.kind().coupled()
+    }
+
+    /// The coupling of the bodies, with given added masses in the place of their own.
+    ///
+    /// # Errors
+    /// Bodies that the method or the fidelity can't take, or whatever the discretisation reports.
+    pub(super) fn couple(self, problem: &Problem, device: &mut Device) -> Result<Made> {
+        given::put(problem, self.kind().couple(problem, device)?)
     }
 
     /// The choices that it looks at, of those that not all do.

@@ -53,6 +53,7 @@ impl FidelityKind for Reduced {
         let films = coupling.film_extents(problem.walls)?;
         device.films = !films.is_empty();
         Ok(Made {
+            own: problem.own(|b| Ok(made[b].parts().added_mass))?,
             carried: Some(Carried::Sources),
             films,
             warnings: [warnings(problem, made), unkept].concat(),

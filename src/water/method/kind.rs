@@ -1,6 +1,7 @@
 //! What a body method must answer.
 
 use crate::Result;
+use crate::adjoint::lie::Mat6;
 use crate::boundary::Response;
 use crate::coupling::Exclusions;
 use crate::coupling::reduced::compress::CompressSettings;
@@ -136,6 +137,17 @@ impl<'a> Problem<'a> {
         let chosen = self.chosen(b);
         let default = CompressSettings::default().tolerance;
         chosen.rank.map_or(chosen.tolerance, |_| default)
+    }
+
+    /// Each body's added mass alone in the water, `alone` of its number, where another one is given: elsewhere nobody asks.
+    ///
+    /// # Errors
+    /// Whatever `alone` reports.
+    pub fn own(&self, mut alone: impl FnMut(usize) -> Result<Mat6>) -> Result<Vec<Option<Mat6>>> {
+        let bodies = self.bodies.iter().enumerate();
+        bodies
+            .map(|(b, body)| body.added_mass.map(|_| alone(b)).transpose())
+            .collect()
     }
 
     /// What each body became, with its name.

@@ -2,11 +2,15 @@
 
 use super::kind::{BodyMethod, Problem, Solved};
 use crate::Result;
+use crate::adjoint::lie::{Mat6, Pose};
 use crate::boundary::{self, BodyBoundary};
 use crate::coupling::full::{FullSolver, Model};
+use crate::coupling::{Coupling, Exclusions};
 use crate::water::device::Device;
 use crate::water::numerics::Numerics;
 use crate::water::submerged::{Discretisation, Made, SubmergedBody, once, shared};
+use nalgebra::DMatrix;
+use std::sync::Arc;
 
 /// Sources under vertices or faces.
 pub(super) struct Mfs(pub boundary::Method);
@@ -18,6 +22,18 @@ impl Mfs {
             ..numerics.mfs
         }
     }
+}
+
+/// A body's added mass alone in the water, symmetric; one that has no factor is solved for it.
+fn alone(body: &Arc<BodyBoundary>, problem: &Problem, device: &mut Device) -> Result<Mat6> {
+    if body.factored() {
+        return Ok(body.added_mass);
+    }
+    let (none, solve) = (Exclusions::none(), problem.numerics.solve);
+    let coupling = device.full(Model::new(vec![body.clone()], &[], none, solve)?)?;
+    let solved = coupling.evaluate(&[Pose::identity()], &DMatrix::identity(6, 6))?;
+    let m = solved.momenta();
+    Ok(Mat6::from_fn(|i, j| 0.5 * (m[(i, j)] + m[(j, i)])))
 }
 
 impl BodyMethod for Mfs {
@@ -59,7 +75,9 @@ impl BodyMethod for Mfs {
             };
             make(body.name, mesh, &settings)
         })?;
+        let own = problem.own(|b| alone(&made[b], problem, device))?;
         Ok(Made {
+            own,
             carried: None,
             films: Vec::new(),
             warnings: once(&made, |m| &m.warnings),

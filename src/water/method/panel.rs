@@ -138,7 +138,9 @@ impl BodyMethod for Panel {
                 (Box::new(filmed), films)
             }
         };
+        let alone = problem.own(|b| Ok(own[b].unwrap_or(made[b].fine.added_mass)))?;
         Ok(Made {
+            own: alone,
             carried: Some(Carried::Panels),
             films,
             warnings: once(&made, |m| &m.fine.warnings),

@@ -56,6 +56,8 @@ pub use parts::{Checkpoints, InParts};
 pub use record::Record;
 pub use recording::{Recorded, Recording};
 pub use recording_file::Earlier;
+#[cfg(feature = "output")]
+pub(crate) use recording_file::replace;
 pub use rollout::Rollout;
 pub use run::Halted;
 pub use sample::Sample;

@@ -20,7 +20,7 @@ fn frames(place: &str, per_second: Option<f64>, every: Option<isize>) -> PyResul
         // What isn't a number of states is refused as none is.
         (None, Some(every)) => Ok(Frames::Every(usize::try_from(every).unwrap_or(0))),
         (Some(_), Some(every)) => Err(input(
-            &format!("{place}: every"),
+            format!("{place}: every"),
             every.to_string(),
             "give every or frames_per_second, not both",
         )),

@@ -1,6 +1,7 @@
 //! Which states of a run are written.
 
-use crate::{Error, Result, Rollout};
+use crate::simulate::Rollout;
+use crate::{Error, Result};
 
 /// Which states of a run are written: the first, then one after each so many, and the last.
 #[derive(Clone, Copy, Debug, PartialEq)]

@@ -1,8 +1,9 @@
 //! What a run takes up: its surfaces, the box around them, and walls as far as they are drawn.
 
+use crate::Result;
 use crate::adjoint::lie::{Pose, Vec3};
 use crate::geometry::{HalfSpace, TriMesh, Wall, bounds};
-use crate::{Result, Rollout};
+use crate::simulate::Rollout;
 
 /// Half a wall's edge, in diagonals of the box around all bodies at all times.
 const REACH: f64 = 1.0;

@@ -11,9 +11,9 @@ pub use color::PALETTE;
 use super::frames::Frames;
 use super::room::Room;
 use crate::adjoint::lie::Vec3;
-use crate::geometry::{TriMesh, WallSurface};
-use crate::simulate::{Recording, replace};
-use crate::{Error, Result, Rollout};
+use crate::geometry::{TriMesh, Wall, WallSurface};
+use crate::simulate::{Recording, Rollout, replace};
+use crate::{Error, Result};
 use buffer::Buffer;
 use gltf::json::animation::{Animation, Channel, Interpolation, Property, Sampler, Target};
 use gltf::json::mesh::{Mode, Primitive, Semantic};
@@ -112,7 +112,7 @@ impl File {
     fn walls(&mut self, rollout: &Rollout, room: &Room) -> Result<Vec<Index<Node>>> {
         let squares = room.walls(rollout)?;
         let walls = rollout.simulator().scene().walls.iter();
-        let node = |(k, (square, wall)): (usize, (&[Vec3; 4], &crate::geometry::Wall))| {
+        let node = |(k, (square, wall)): (usize, (&[Vec3; 4], &Wall))| {
             let name = format!("wall {k}");
             let color = match wall.surface {
                 WallSurface::Rigid => color::RIGID,

@@ -3,7 +3,8 @@
 use super::file::{array, extent};
 use crate::adjoint::lie::Vec3;
 use crate::error::in_order;
-use crate::{Error, Result, Rollout, memory};
+use crate::simulate::Rollout;
+use crate::{Error, Result, memory};
 use rayon::prelude::*;
 use vtkio::model::{Attributes, DataSet, ImageDataPiece, Piece};
 

@@ -1,10 +1,10 @@
 //! What acts on every body, at its origin.
 
 use super::file::array;
+use crate::Result;
 use crate::adjoint::lie::Vec6;
 use crate::error::in_order;
-use crate::simulate::Loads;
-use crate::{Result, Rollout};
+use crate::simulate::{Loads, Rollout};
 use rayon::prelude::*;
 use vtkio::model::{Attributes, DataSet, PolyDataPiece, VertexNumbers};
 

@@ -1,6 +1,6 @@
 //! A run for ParaView and other programs that read VTK's XML files: surfaces, loads and the flow of the water, frame by frame.
 //!
-//! [`write`] fills a folder:
+//! [`write()`] fills a folder:
 //!
 //! | file | what it holds |
 //! |---|---|
@@ -21,8 +21,8 @@ pub use flow::{Grid, MOST_POINTS};
 use super::frames::Frames;
 use super::room::Room;
 use crate::error::in_order;
-use crate::simulate::Recording;
-use crate::{Error, Result, Rollout};
+use crate::simulate::{Recording, Rollout};
+use crate::{Error, Result};
 use file::Series;
 use rayon::prelude::*;
 use std::ops::ControlFlow;
@@ -49,10 +49,10 @@ pub fn write(rollout: &Rollout, folder: &Path, options: &Options) -> Result<Vec<
     write_with(rollout, folder, options, || ControlFlow::Continue(()))
 }
 
-/// As [`write`]; `progress` is called after each file of a series, on whatever thread wrote it, and may end the work.
+/// As [`write()`]; `progress` is called after each file of a series, on whatever thread wrote it, and may end the work.
 ///
 /// # Errors
-/// As [`write`], and [`Error::Stopped`] if `progress` breaks.
+/// As [`write()`], and [`Error::Stopped`] if `progress` breaks.
 pub fn write_with(
     rollout: &Rollout,
     folder: &Path,

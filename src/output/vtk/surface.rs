@@ -2,9 +2,10 @@
 
 use super::super::room::{Room, placed};
 use super::file::array;
+use crate::Result;
 use crate::adjoint::lie::Vec3;
 use crate::geometry::WallSurface;
-use crate::{Result, Rollout};
+use crate::simulate::Rollout;
 use nalgebra::DMatrix;
 use vtkio::model::{Attributes, DataSet, PolyDataPiece, VertexNumbers};
 

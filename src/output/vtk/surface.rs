@@ -14,7 +14,7 @@ struct Field {
     name: &'static str,
     /// Numbers a face.
     components: u32,
-    /// Of each [`Placed`], face by face.
+    /// Of each [`Placed`], face by face; one of a body without a shape.
     values: Vec<Vec<f64>>,
 }
 

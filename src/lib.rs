@@ -20,6 +20,8 @@ pub mod multibody;
 pub mod notation;
 #[cfg(feature = "opt")]
 pub mod optimize;
+#[cfg(feature = "output")]
+pub mod output;
 mod policy;
 #[cfg(feature = "urdf")]
 mod robot;

@@ -1,5 +1,6 @@
 import os
 from collections.abc import Callable, Mapping, Sequence
+from pathlib import Path
 from typing import Any, Literal, Protocol, final, overload
 
 import numpy as np
@@ -1029,6 +1030,30 @@ class Rollout:
     def to_dict(self) -> dict[str, _Array]:
         """Columns by name, one row a state: time, each coordinate and velocity, energy, momentum and smallest gap, SI units;
         `pandas.DataFrame(rollout.to_dict())` is a table."""
+    def write_vtk(
+        self,
+        folder: _Path,
+        *,
+        frames_per_second: float | None = None,
+        every: int | None = None,
+        loads: bool = False,
+        flow: tuple[ArrayLike, ArrayLike, float] | None = None,
+    ) -> list[Path]:
+        """Writes files of VTK, which ParaView opens, into a folder, which is made where there is none; the files to open are given. `bodies.pvd`: all bodies' triangles frame by frame, in the
+        world, with the `body` (number) and the `velocity` (m/s) of every face; `walls.vtp`: walls as squares; with `loads`, `loads.pvd`: at each body's origin what acts on it,
+        `gravity_force` (N), `gravity_moment` (N m), `water_force`, …, of every kind that `loads` tells; with `flow`, two corners (3,) of a box and the spacing of a grid in it, m, `flow.pvd`: the
+        water's `velocity` there, zero where it isn't `resolved`, by the fidelity "full". Frames are up to `frames_per_second` of simulated time (30 unless told otherwise), or every `every`-th
+        state, with the first and the last. Files of the same names are replaced. Ctrl-C ends it."""
+    def write_gltf(
+        self,
+        path: _Path,
+        *,
+        frames_per_second: float | None = None,
+        every: int | None = None,
+        colors: Mapping[str, str] | None = None,
+    ) -> Path:
+        """Writes an animated scene in glTF 2.0 (`.glb`), which Blender and browsers open, and gives its path: a node each body, moved between frames, and walls. Lengths are m and times s, counted from
+        the first state; the node `hydrograd` above all turns z up. `colors` are "#rrggbb" by the names of bodies; frames are those of `write_vtk`. A file that stands there is replaced."""
     def summary(self) -> dict[str, Any]:
         """Figures of the whole trajectory: energies (J), drift of momentum (relative), iterations, smallest gap (m), by what the water
         across gaps is carried and how far off it is estimated to be (`gaps`), the largest gap

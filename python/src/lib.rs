@@ -18,6 +18,7 @@ mod log;
 mod mesh;
 mod objective;
 mod optimize;
+mod output;
 mod policy;
 mod prepare;
 mod pressure;

@@ -7,6 +7,7 @@ use crate::gradient;
 use crate::interrupt::{Progress, ended, followed, long, short};
 use crate::loads::Loads;
 use crate::objective::Objective;
+use crate::output;
 use crate::pressure::SurfacePressure;
 use crate::simulator::Simulator;
 use crate::state::State;
@@ -20,6 +21,8 @@ use pyo3::gc::{PyTraverseError, PyVisit};
 use pyo3::prelude::*;
 use pyo3::types::{PyDict, PyTuple};
 use rayon::prelude::*;
+use std::collections::BTreeMap;
+use std::path::PathBuf;
 use std::sync::Arc;
 
 /// A trajectory of states 0 … N: the forward pass, and the only key to its gradient. Each access to an array makes a new one.
@@ -483,6 +486,40 @@ impl Rollout {
             out.set_item(name, column(values)?)?;
         }
         Ok(out)
+    }
+
+    /// Writes files of VTK, which ParaView opens, into a folder, which is made where there is none; the files to open are given. `bodies.pvd`: all bodies' triangles frame by frame, in the
+    /// world, with the `body` (number) and the `velocity` (m/s) of every face; `walls.vtp`: walls as squares; with `loads`, `loads.pvd`: at each body's origin what acts on it,
+    /// `gravity_force` (N), `gravity_moment` (N m), `water_force`, …, of every kind that `loads` tells; with `flow`, two corners (3,) of a box and the spacing of a grid in it, m, `flow.pvd`: the
+    /// water's `velocity` there, zero where it isn't `resolved`, by the fidelity "full". Frames are up to `frames_per_second` of simulated time (30 unless told otherwise), or every `every`-th
+    /// state, with the first and the last. Files of the same names are replaced. Ctrl-C ends it.
+    #[pyo3(signature = (folder, *, frames_per_second=None, every=None, loads=false, flow=None))]
+    fn write_vtk(
+        &self,
+        py: Python<'_>,
+        folder: PathBuf,
+        frames_per_second: Option<f64>,
+        every: Option<isize>,
+        loads: bool,
+        flow: Option<output::GridBox<'_>>,
+    ) -> PyResult<Vec<PathBuf>> {
+        let frames = (frames_per_second, every);
+        output::write_vtk(py, &self.inner, folder, frames, loads, flow)
+    }
+
+    /// Writes an animated scene in glTF 2.0 (`.glb`), which Blender and browsers open, and gives its path: a node each body, moved between frames, and walls. Lengths are m and times s, counted from
+    /// the first state; the node `hydrograd` above all turns z up. `colors` are "#rrggbb" by the names of bodies; frames are those of `write_vtk`. A file that stands there is replaced.
+    #[pyo3(signature = (path, *, frames_per_second=None, every=None, colors=None))]
+    fn write_gltf(
+        &self,
+        py: Python<'_>,
+        path: PathBuf,
+        frames_per_second: Option<f64>,
+        every: Option<isize>,
+        colors: Option<BTreeMap<String, String>>,
+    ) -> PyResult<PathBuf> {
+        let frames = (frames_per_second, every);
+        output::write_gltf(py, &self.inner, path, frames, colors.unwrap_or_default())
     }
 
     /// Figures of the whole trajectory: energies (J), drift of momentum (relative), iterations, smallest gap (m), by what the water

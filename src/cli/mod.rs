@@ -7,6 +7,7 @@
 mod added_mass;
 mod check_mesh;
 mod exit;
+mod export;
 mod gpu_info;
 mod gradcheck;
 mod inspect;

@@ -264,6 +264,11 @@ pub(super) fn seconds(text: &str) -> std::result::Result<f64, String> {
     number(text, f64::INFINITY, "give a time above zero, in s")
 }
 
+/// A number of times a second above zero.
+pub(super) fn rate(text: &str) -> std::result::Result<f64, String> {
+    number(text, f64::INFINITY, "give a number above zero, per second")
+}
+
 pub(super) fn tolerance(text: &str) -> std::result::Result<f64, String> {
     number(text, 1.0, "give a number between 0 and 1, e.g. 1e-8")
 }

@@ -9,6 +9,7 @@ use clap::Args;
 use serde::Serialize;
 
 use super::exit::Exit;
+use super::export::Export;
 use super::interrupt;
 use super::options::Simulation;
 use super::output::{
@@ -17,7 +18,7 @@ use super::output::{
 use crate::error::readable;
 use crate::scene::Scene;
 use crate::simulate::{
-    Controls, Earlier, GapCheck, GapFlow, GapReport as GapEstimates, NearGap, Recording,
+    Controls, Earlier, GapCheck, GapFlow, GapReport as GapEstimates, NearGap, Recording, Rollout,
 };
 use crate::{Error, Result};
 
@@ -37,6 +38,8 @@ pub(super) struct Arguments {
     /// their setup and a solve.
     #[arg(long)]
     check_gap: bool,
+    #[command(flatten)]
+    export: Export,
 }
 
 /// The smallest gap, by what ran and by coupled panels.
@@ -116,6 +119,7 @@ pub(super) fn main(arguments: &Arguments, output: Output) -> Result<Exit> {
     if let Some(folder) = &arguments.out {
         Recording::prepare(folder)?;
     }
+    arguments.export.prepare()?;
     let earlier = arguments.resume.as_deref().map(Earlier::read).transpose()?;
     interrupt::listen();
     let progress = progress_bar("steps", scene.steps);
@@ -123,6 +127,7 @@ pub(super) fn main(arguments: &Arguments, output: Output) -> Result<Exit> {
     let Made {
         mut report,
         mut recording,
+        rollout,
         halted,
     } = simulate(&scene, arguments, earlier.as_ref(), done)?;
     drop(progress);
@@ -136,6 +141,12 @@ pub(super) fn main(arguments: &Arguments, output: Output) -> Result<Exit> {
             .or_else(|e| rescued(&recording, e))?;
         kept = Some(files[1].clone());
         report.files = files.into();
+    }
+    match arguments.export.write(&rollout) {
+        Ok(files) => report.files.extend(files),
+        // Why the run ended is said besides.
+        Err(error) if halted.is_some() => output.error(&error),
+        Err(error) => return Err(error),
     }
     let Some(halted) = halted else {
         output.result(&report);
@@ -178,6 +189,7 @@ fn rescued(recording: &Recording, error: Error) -> Result<[PathBuf; 2]> {
 struct Made {
     report: RunReport,
     recording: Recording,
+    rollout: Rollout,
     /// Why it ended before its time, if it did.
     halted: Option<Error>,
 }
@@ -262,6 +274,7 @@ fn simulate(
     Ok(Made {
         report,
         recording: Recording::of(scene, &rollout)?,
+        rollout,
         halted,
     })
 }

@@ -9,11 +9,14 @@
 //! A body far from all others and from walls has exactly what is given. The difference is constant in the body's own frame: impulses have it, gradients don't.
 
 use super::{
-    Coupling, CouplingReport, Direction, Linearise, Linearised, Momenta, Pullback, Tangent,
+    Coupling, CouplingReport, Direction, Linearise, Linearised, Momenta, Motion, Pullback,
+    SurfacePotential, Tangent,
 };
 use crate::adjoint::lie::{Mat6, Pose, Vec3, Vec6};
+use crate::boundary::PanelBoundary;
 use crate::{Error, Result};
 use nalgebra::{DMatrix, DVector};
+use std::sync::Arc;
 
 /// A coupling with given added masses in the place of bodies' own.
 ///
@@ -101,8 +104,21 @@ impl Coupling for Given {
         poses: &[Pose],
         twists: &DVector<f64>,
         points: &[Vec3],
-    ) -> Result<Vec<Vec3>> {
+    ) -> Result<Option<Vec<Vec3>>> {
         self.computed.velocity(poses, twists, points)
+    }
+
+    fn surfaces(&self) -> Option<&[Arc<PanelBoundary>]> {
+        self.computed.surfaces()
+    }
+
+    /// As computed from the bodies' shapes, as [`Coupling::velocity`].
+    fn surface_potentials(
+        &self,
+        motion: &Motion,
+        surfaces: &[Arc<PanelBoundary>],
+    ) -> Result<Vec<SurfacePotential>> {
+        self.computed.surface_potentials(motion, surfaces)
     }
 }
 

@@ -59,6 +59,8 @@ pub use pressure::SurfacePressure;
 pub use record::Record;
 pub use recording::{Recorded, Recording};
 pub use recording_file::Earlier;
+#[cfg(feature = "output")]
+pub(crate) use recording_file::replace;
 pub use rollout::Rollout;
 pub use run::Halted;
 pub use sample::Sample;

@@ -191,7 +191,10 @@ fn not_understood(path: &Path, message: String) -> Error {
 }
 
 /// Writes beside the file and renames, so that the file is never seen half written.
-fn replace(path: &Path, write: impl FnOnce(&mut BufWriter<File>) -> io::Result<()>) -> Result<()> {
+pub(crate) fn replace(
+    path: &Path,
+    write: impl FnOnce(&mut BufWriter<File>) -> io::Result<()>,
+) -> Result<()> {
     let beside = temporary(path);
     let attempt = || {
         let file = OpenOptions::new()

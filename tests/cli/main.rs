@@ -2,6 +2,7 @@
 
 mod cache;
 mod commands;
+mod export;
 mod formats;
 mod interrupted;
 mod tradeoff;

@@ -8,7 +8,7 @@ use std::path::Path;
 /// `Error` and `Result` alone.
 ///
 /// `adjoint::lie` gives vectors and poses to everyone; the modules marked `adjoint` use the ladder too.
-const LAYERS: [(&str, &[&str]); 23] = [
+const LAYERS: [(&str, &[&str]); 24] = [
     ("error", &[]),
     // What enums that users choose from can do.
     ("choices", &[]),
@@ -101,6 +101,8 @@ const LAYERS: [(&str, &[&str]); 23] = [
     ),
     // Descent stands on what a user sees: parameters are what is identified.
     ("optimize", &["adjoint", "dynamics", "simulate"]),
+    // Runs as files of other programs.
+    ("output", &["adjoint", "geometry", "memory", "simulate"]),
     // The facade names what it shows; the command line stands on the facade.
     (
         "lib",
@@ -109,18 +111,19 @@ const LAYERS: [(&str, &[&str]); 23] = [
     (
         "cli",
         &[
-            "boundary", "coupling", "dynamics", "geometry", "gpu", "scene", "shape", "simulate",
-            "tradeoff", "water",
+            "boundary", "coupling", "dynamics", "geometry", "gpu", "output", "scene", "shape",
+            "simulate", "tradeoff", "water",
         ],
     ),
 ];
 
 /// Modules of which only the named parts may be used.
-const ONLY: [(&str, &str, &[&str]); 6] = [
+const ONLY: [(&str, &str, &[&str]); 7] = [
     ("shape", "adjoint", &["lie"]),
     ("contact", "adjoint", &["lie"]),
     ("multibody", "adjoint", &["lie"]),
     ("robot", "adjoint", &["lie"]),
+    ("output", "adjoint", &["lie"]),
     ("optimize", "adjoint", &["lie", "sample"]),
     ("optimize", "dynamics", &["Drive", "Parameters"]),
 ];

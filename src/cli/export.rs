@@ -1,0 +1,62 @@
+//! `hydrograd run --vtk --gltf`: a run as files of other programs.
+
+use clap::Args;
+use std::path::PathBuf;
+
+use super::options::rate;
+use crate::Result;
+use crate::output::{Frames, gltf, vtk};
+use crate::simulate::{Recording, Rollout};
+
+#[derive(Clone, Debug, Args)]
+pub(super) struct Export {
+    /// Folder for files of VTK, which ParaView opens: bodies.pvd with velocities of all faces, walls.vtp [default: none are written]. They hold the steps
+    /// made now, as does --gltf.
+    #[arg(long, value_name = "DIR")]
+    vtk: Option<PathBuf>,
+    /// Write loads.pvd into the folder of --vtk as well: forces and moments on every body, kind by kind. Takes a solve a frame.
+    #[arg(long, requires = "vtk")]
+    vtk_loads: bool,
+    /// File of an animated scene in glTF 2.0, which Blender and browsers open [default: none is written].
+    #[arg(long, value_name = "FILE.glb")]
+    gltf: Option<PathBuf>,
+    /// Frames in a second of simulated time, at most, of --vtk and --gltf.
+    #[arg(long, value_name = "N", value_parser = rate, default_value = "30", allow_negative_numbers = true)]
+    frames_per_second: f64,
+}
+
+impl Export {
+    /// Tries to write where files are to be, so that a long run isn't lost to a wrong path.
+    pub fn prepare(&self) -> Result<()> {
+        if let Some(folder) = &self.vtk {
+            Recording::prepare(folder)?;
+        }
+        if let Some(file) = &self.gltf {
+            gltf::prepare(file)?;
+        }
+        Ok(())
+    }
+
+    /// Writes what was asked for, and gives the files to open.
+    pub fn write(&self, rollout: &Rollout) -> Result<Vec<PathBuf>> {
+        let frames = Frames::PerSecond(self.frames_per_second);
+        let mut files = Vec::new();
+        if let Some(folder) = &self.vtk {
+            let options = vtk::Options {
+                frames,
+                loads: self.vtk_loads,
+                flow: None,
+            };
+            files.extend(vtk::write(rollout, folder, &options)?);
+        }
+        if let Some(file) = &self.gltf {
+            let options = gltf::Options {
+                frames,
+                ..gltf::Options::default()
+            };
+            gltf::write(rollout, file, &options)?;
+            files.push(file.clone());
+        }
+        Ok(files)
+    }
+}

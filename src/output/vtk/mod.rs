@@ -1,0 +1,112 @@
+//! A run for ParaView and other programs that read VTK's XML files: surfaces, loads and the flow of the water, frame by frame.
+//!
+//! [`write()`] fills a folder:
+//!
+//! | file | what it holds |
+//! |---|---|
+//! | `bodies.pvd` | the series of `bodies/bodies_00000.vtp` …: the triangles of all bodies, in the world; of each its `body` (number in the scene) and its centre's `velocity` (m/s); a body without a shape is a point |
+//! | `walls.vtp` | walls as squares around the scene, where there are any; of each its `wall` (number in the scene) and whether it is `free` (1) or rigid (0) |
+//! | `loads.pvd` | with [`Options::loads`], the series of `loads/loads_00000.vtp` …: a point at each body's origin with forces (N) and moments about it (N m), kind by kind |
+//! | `flow.pvd` | with [`Options::flow`], the series of `flow/flow_00000.vti` …: the water's `velocity` (m/s) on a grid, and where it is `resolved` |
+//!
+//! All axes are the world's. Numbers are in double precision, compressed without loss.
+
+mod file;
+mod flow;
+mod loads;
+mod surface;
+
+pub use flow::{Grid, MOST_POINTS};
+
+use super::frames::Frames;
+use super::room::Room;
+use crate::error::in_order;
+use crate::simulate::{Recording, Rollout};
+use crate::{Error, Result};
+use file::Series;
+use rayon::prelude::*;
+use std::ops::ControlFlow;
+use std::path::{Path, PathBuf};
+use vtkio::model::DataSet;
+
+/// What is written of a run.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct Options {
+    /// The states.
+    pub frames: Frames,
+    /// What acts on every body ([`Rollout::loads`]), which takes a solve a frame.
+    pub loads: bool,
+    /// The water's velocity at the points of a grid ([`Rollout::flow`]), which takes a solve a frame and the fidelity `full`.
+    pub flow: Option<Grid>,
+}
+
+/// Writes a run into a folder, which is made where there is none. The files to open are given: series, and walls. Files of the same names are replaced; others that stand there stay.
+///
+/// # Errors
+/// Frames that select nothing ([`Frames::check`]), a grid that is refused ([`Grid::counts`]); a folder or a file that can't be written, by its path; what
+/// [`Rollout::loads`] and [`Rollout::flow`] report.
+pub fn write(rollout: &Rollout, folder: &Path, options: &Options) -> Result<Vec<PathBuf>> {
+    write_with(rollout, folder, options, || ControlFlow::Continue(()))
+}
+
+/// As [`write()`]; `progress` is called after each file of a series, on whatever thread wrote it, and may end the work.
+///
+/// # Errors
+/// As [`write()`], and [`Error::Stopped`] if `progress` breaks.
+pub fn write_with(
+    rollout: &Rollout,
+    folder: &Path,
+    options: &Options,
+    progress: impl Fn() -> ControlFlow<()> + Sync,
+) -> Result<Vec<PathBuf>> {
+    let states = options.frames.states(rollout)?;
+    if let Some(grid) = &options.flow {
+        grid.counts()?;
+    }
+    Recording::prepare(folder)?;
+    let room = Room::of(rollout, &states)?;
+    let told = |made: Result<()>| {
+        made?;
+        match progress() {
+            ControlFlow::Continue(()) => Ok(()),
+            ControlFlow::Break(()) => Err(Error::Stopped {
+                what: format!("writing {}", folder.display()),
+            }),
+        }
+    };
+    let times: Vec<f64> = states.iter().map(|n| rollout.samples()[*n].time).collect();
+    let mut made = Vec::new();
+
+    let series = Series::new(folder, "bodies", "vtp", &times)?;
+    let velocities = rollout.velocities();
+    let frame = |(k, n): (usize, &usize)| {
+        let data = surface::bodies(rollout, &room, &velocities, *n);
+        told(data.and_then(|data| series.write(k, data)))
+    };
+    in_order(states.par_iter().enumerate().map(frame))?;
+    made.push(series.finish()?);
+
+    if let Some(walls) = surface::walls(rollout, &room)? {
+        let path = folder.join("walls.vtp");
+        file::write(&path, walls)?;
+        made.push(path);
+    }
+    if options.loads {
+        let series = Series::new(folder, "loads", "vtp", &times)?;
+        let frames: Vec<DataSet> = loads::frames(rollout, &states)?;
+        for (k, data) in frames.into_iter().enumerate() {
+            told(series.write(k, data))?;
+        }
+        made.push(series.finish()?);
+    }
+    if let Some(grid) = &options.flow {
+        let series = Series::new(folder, "flow", "vti", &times)?;
+        let points = grid.points()?;
+        for (k, n) in states.iter().enumerate() {
+            let data = flow::frame(rollout, grid, &points, *n);
+            told(data.and_then(|data| series.write(k, data)))?;
+        }
+        made.push(series.finish()?);
+    }
+    Ok(made)
+}

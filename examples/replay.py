@@ -38,7 +38,7 @@ def main():
     parser.add_argument("--faces", type=int)
     parser.add_argument("--steps", type=int, help="default: the scene's")
     parser.add_argument("--frames", type=int, default=1000, help="most states that are drawn")
-    parser.add_argument("--flow", choices="xyz", help="takes the fidelity full")
+    parser.add_argument("--flow", choices="xyz", help="the plane through the origin in which the flow is drawn")
     parser.add_argument("--view-from", type=float, nargs=3, metavar=("X", "Y", "Z"))
     parser.add_argument("--open", action="store_true", help="show it in a browser")
     options = parser.parse_args()

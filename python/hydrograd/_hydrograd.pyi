@@ -974,6 +974,7 @@ class Rollout:
         """The water's velocity at `points` (n, 3), m, at state `state`: (n, 3), m/s, world axes, the current included. It takes a
         solve, and a simulator with the fidelity "full". Points within a body, behind a wall, or nearer to a surface than half an
         edge of its mesh are refused: `flow_resolved` tells them apart. Negative numbers count states from the end."""
+    def flow_pressure(self, state: int, points: ArrayLike) -> _Array: ...
     def flow_resolved(self, state: int, points: ArrayLike) -> NDArray[np.bool_]:
         """Whether `flow` knows the velocity at each of `points` (n, 3), m, at state `state`: (n,)."""
     def observe(self, name: str) -> _Array:

@@ -276,14 +276,31 @@ impl Rollout {
     }
 
     /// The water's velocity at `points` (n, 3), m, at state `state`: (n, 3), m/s, world axes, the current included. It takes a
-    /// solve. Points within a body, behind a wall, or nearer to a surface than half an
-    /// edge of its mesh are refused: `flow_resolved` tells them apart. Negative numbers count states from the end.
+    /// solve. Points within a body, behind a wall, or too near to an edge or to two
+    /// surfaces at once are refused: `flow_resolved` tells them apart. Negative numbers count states from the end.
     fn flow<'py>(&self, py: Python<'py>, state: isize, points: &Bound<'py, PyAny>) -> Numbers<'py> {
         let at = array::numbered(state, self.inner.states().len(), "state")?;
         let points = array::vectors("flow: points", points)?;
-        let made = short(py, || self.inner.flow(at, &points))?;
+        let inner = self.inner.clone();
+        let count = points.len();
+        let made = long(py, move |_| inner.flow(at, &points))?;
         let values = made.iter().flat_map(|u| [u.x, u.y, u.z]).collect();
-        array::to_python(py, values, &[points.len(), 3])
+        array::to_python(py, values, &[count, 3])
+    }
+
+    /// The pressure of the flow at `points` (n, 3), m, at state `state`: (n,), Pa, zero far away, that of the water at rest left out. Points as of `flow`.
+    fn flow_pressure<'py>(
+        &self,
+        py: Python<'py>,
+        state: isize,
+        points: &Bound<'py, PyAny>,
+    ) -> Numbers<'py> {
+        let at = array::numbered(state, self.inner.states().len(), "state")?;
+        let points = array::vectors("flow_pressure: points", points)?;
+        let inner = self.inner.clone();
+        let count = points.len();
+        let made = long(py, move |_| inner.flow_pressure(at, &points))?;
+        array::to_python(py, made, &[count])
     }
 
     /// Whether `flow` knows the velocity at each of `points` (n, 3), m, at state `state`: (n,).
@@ -295,7 +312,8 @@ impl Rollout {
     ) -> PyResult<Bound<'py, PyArray1<bool>>> {
         let at = array::numbered(state, self.inner.states().len(), "state")?;
         let points = array::vectors("flow_resolved: points", points)?;
-        let made = short(py, || self.inner.flow_resolved(at, &points))?;
+        let inner = self.inner.clone();
+        let made = long(py, move |_| inner.flow_resolved(at, &points))?;
         Ok(PyArray1::from_vec(py, made))
     }
 

@@ -38,9 +38,9 @@ pub use response::{CoupledResponse, Reached};
 pub use surface::{Motion, SurfacePotential};
 pub use tensor::PairTensor;
 
-use crate::Result;
 use crate::adjoint::lie::{Mat6, Pose, Vec3, Vec6};
 use crate::boundary::PanelBoundary;
+use crate::{Error, Result};
 use nalgebra::{DMatrix, DVector};
 use serde::Serialize;
 use std::sync::Arc;
@@ -118,12 +118,18 @@ pub trait Coupling: Send + Sync {
     /// The flow's potential on all panels, and its rate. `surfaces` are [`Coupling::surfaces`], or panels of any mesh of each body where there are none.
     ///
     /// # Errors
-    /// As [`Coupling::evaluate`], films that hold bodies apart, and a device that doesn't tell its densities.
+    /// As [`Coupling::evaluate`], films that hold bodies apart, and a device that doesn't tell the rates of its densities.
     fn surface_potentials(
         &self,
-        motion: &Motion,
-        surfaces: &[Arc<PanelBoundary>],
-    ) -> Result<Vec<SurfacePotential>>;
+        _motion: &Motion,
+        _surfaces: &[Arc<PanelBoundary>],
+    ) -> Result<Vec<SurfacePotential>> {
+        Err(Error::Unsupported {
+            what: format!("the flow on surfaces with {}", self.name()),
+            why: "it tells impulses alone".into(),
+            instead: "use the fidelity reduced or full".into(),
+        })
+    }
 }
 
 /// A fidelity with derivatives of M̄_f with respect to the poses.

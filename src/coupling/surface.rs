@@ -31,8 +31,8 @@ pub struct Motion<'a> {
     pub poses: &'a [Pose],
     /// Body-frame twists through water at rest, 6·bodies: m/s, rad/s.
     pub twists: &'a DVector<f64>,
-    /// The rates of these numbers: m/s², rad/s².
-    pub rates: &'a DVector<f64>,
+    /// The rates of these numbers, m/s² and rad/s², where rates of potentials are asked for.
+    pub rates: Option<&'a DVector<f64>>,
     /// Spatial twists with which the bodies change their places.
     pub displacement: &'a [Vec6],
 }
@@ -42,14 +42,16 @@ pub struct Motion<'a> {
 pub struct SurfacePotential {
     /// φ, m²/s.
     pub value: Vec<f64>,
-    /// Its rate at points that go with the body, m²/s².
+    /// Its rate at points that go with the body, m²/s²; zeros where it wasn't asked for.
     pub rate: Vec<f64>,
 }
 
 impl Motion<'_> {
-    /// Twists and their rates, two columns.
+    /// Twists and their rates, two columns; zeros where those aren't asked for.
     pub(super) fn columns(&self) -> DMatrix<f64> {
-        DMatrix::from_columns(&[self.twists.clone(), self.rates.clone()])
+        let still = || DVector::zeros(self.twists.len());
+        let rates = self.rates.cloned().unwrap_or_else(still);
+        DMatrix::from_columns(&[self.twists.clone(), rates])
     }
 }
 
@@ -92,7 +94,10 @@ pub(super) fn on_surfaces(
             add(motion, centres, seen, &charges[seen.source], &mut incident);
         }
         let twist = |x: &DVector<f64>| x.fixed_rows::<6>(6 * b).into_owned();
-        let twists = [twist(motion.twists), twist(motion.rates)];
+        let twists = [
+            twist(motion.twists),
+            motion.rates.map_or_else(Vec6::zeros, twist),
+        ];
         SurfacePotential::of(&surface.total_potential(&twists, &incident))
     };
     surfaces.iter().enumerate().map(of).collect()
@@ -114,9 +119,11 @@ fn add(motion: &Motion, centres: &[Vec3], seen: &Seen, charges: &Charges, out: &
         &mut still.data,
     );
     let mut moving = vec![0.0; centres.len()];
-    let strengths = charges.strengths.column(0);
-    let centres = Points::bare(centres);
-    potential_jvp(&centres, &pair.points, &moved, &strengths, 1, &mut moving);
+    if motion.rates.is_some() {
+        let strengths = charges.strengths.column(0);
+        let centres = Points::bare(centres);
+        potential_jvp(&centres, &pair.points, &moved, &strengths, 1, &mut moving);
+    }
     let [weight, rate] = seen.weight;
     for (i, moving) in moving.iter().enumerate() {
         let [value, change] = [still.at(i, 0), still.at(i, 1)];
@@ -140,16 +147,16 @@ pub(super) fn check(motion: &Motion, surfaces: &[Arc<PanelBoundary>]) -> Result<
     let fits = surfaces.len() == bodies
         && motion.displacement.len() == bodies
         && motion.twists.len() == rows
-        && motion.rates.len() == rows;
+        && motion.rates.is_none_or(|rates| rates.len() == rows);
     fits.then_some(()).ok_or_else(|| {
         Error::input(
             "flow on surfaces: surfaces and motions",
             format!(
-                "{} surfaces, {} displacements, {} and {} numbers of twists and rates",
+                "{} surfaces, {} displacements, {} and {:?} numbers of twists and rates",
                 surfaces.len(),
                 motion.displacement.len(),
                 motion.twists.len(),
-                motion.rates.len()
+                motion.rates.map(|rates| rates.len())
             ),
             format!("one of each, and six numbers, for each of the {bodies} bodies"),
         )

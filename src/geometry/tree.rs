@@ -15,6 +15,8 @@ pub(super) struct MeshTree {
     /// In the order of the tree, as are `corners` and `edge_normals`.
     pub triangles: Vec<Triangle>,
     pub corners: Vec<[usize; 3]>,
+    /// Numbers of the faces in the mesh.
+    pub numbers: Vec<usize>,
     pub vertices: Vec<Vec3>,
     /// Sum of the unit normals at each edge of a face, from its corner k to the next.
     edge_normals: Vec<[Vec3; 3]>,
@@ -47,6 +49,7 @@ impl MeshTree {
             ball: mesh.bounding_ball(),
             reach: mesh.vertices().iter().map(|x| x.norm()).fold(0.0, f64::max),
             nodes,
+            numbers: order,
             vertices: mesh.vertices().to_vec(),
         }
     }

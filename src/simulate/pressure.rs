@@ -35,7 +35,7 @@ pub struct SurfacePressure {
 
 impl SurfacePressure {
     /// −∮ p n dA of the flow's pressure, and its moment about the body's origin: N and N m, world axes. What [`Loads`](super::Loads) call
-    /// "water".
+    /// "water", but of a body with an added mass of the user's own: the pressure is that of the flow that its shape makes.
     pub fn wrench(&self) -> Vec6 {
         self.sum(&self.pressures)
     }
@@ -80,7 +80,7 @@ impl Simulator {
                 centres,
             }
         };
-        let flows = self.surface_flow(sample, gains)?;
+        let flows = self.surface_flow(sample, Some(gains))?;
         Ok(flows.into_iter().map(of).collect())
     }
 }
@@ -90,8 +90,8 @@ impl Rollout {
     /// be looked at: nothing of a step depends on it, and it has no transpose.
     ///
     /// # Errors
-    /// A state that there isn't; a scene without water, or with a force `current`; bodies without a surface; gaps that films carry; whatever the equations of motion or the coupling
-    /// report.
+    /// A state that there isn't; a scene without water, or with a force `current`; any body in the water without a surface, or of more faces than panels are solved for; gaps that films carry; bodies without
+    /// a factor on a GPU; whatever the equations of motion or the coupling report.
     pub fn pressure(&self, n: usize) -> Result<Vec<SurfacePressure>> {
         let simulator = self.simulator();
         simulator.check_pressure()?;

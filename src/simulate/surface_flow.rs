@@ -9,6 +9,13 @@ use crate::multibody::Virtual;
 use crate::{Error, Result};
 use nalgebra::DVector;
 
+/// The water at one place, at unit density: the velocity that bodies give to it (m/s, world axes), and the pressure of their flow (m²/s²).
+#[derive(Clone, Copy, Debug, Default)]
+pub(super) struct Water {
+    pub velocity: Vec3,
+    pub pressure: f64,
+}
+
 /// The flow on one body's surface, body frame.
 pub(super) struct BodyFlow<'s> {
     /// Its number in the scene.
@@ -56,6 +63,49 @@ impl BodyFlow<'_> {
             .collect()
     }
 
+    /// Normal of a face, world axes, where the surface is smooth; `None` at sharp edges.
+    pub fn smooth_normal(&self, face: usize) -> Option<Vec3> {
+        let panels = &self.surface.panels;
+        let normal = panels.faces.normals.get(face)?;
+        (!panels.at_sharp_edge(face)).then(|| self.pose.rotation * normal)
+    }
+
+    /// The point of the body's surface itself over one of a face, body frame, m.
+    pub fn lifted(&self, x: &Vec3) -> Vec3 {
+        let exact = self.surface.exact.as_ref();
+        exact.map_or(*x, |exact| exact.lifted(x))
+    }
+
+    /// What is known at the centroids (velocities and pressures), continued from there along the surface to points of faces without sharp edges, body frame, m.
+    pub fn at(&self, places: &[(usize, Vec3)]) -> Vec<Water> {
+        let velocities = self.velocities();
+        let pressures = self.pressures(&velocities);
+        let panels = &self.surface.panels;
+        let continued = |values: &[f64]| -> Vec<f64> {
+            let slopes = panels.surface_gradient(values);
+            let bends = [0, 1, 2].map(|c| {
+                let component: Vec<f64> = slopes.iter().map(|s| s[c]).collect();
+                panels.surface_gradient(&component)
+            });
+            let of = |(face, x): &(usize, Vec3)| {
+                let arm = x - self.faces().centres[*face];
+                let bend = Vec3::from_fn(|c, _| bends[c][*face].dot(&arm));
+                values[*face] + slopes[*face].dot(&arm) + 0.5 * bend.dot(&arm)
+            };
+            places.iter().map(of).collect()
+        };
+        let [x, y, z] = [0, 1, 2].map(|c| {
+            let component: Vec<f64> = velocities.iter().map(|u| u[c]).collect();
+            continued(&component)
+        });
+        let pressures = continued(&pressures).into_iter().enumerate();
+        let of = |(i, pressure): (usize, f64)| Water {
+            velocity: self.pose.rotation * Vec3::new(x[i], y[i], z[i]),
+            pressure,
+        };
+        pressures.map(of).collect()
+    }
+
     /// Unsteady Bernoulli in the body's frame, at unit density, from the velocities there, m²/s²: with φ' the rate at a point that goes
     /// with the body at V, `p = φ' + V·u − ½ u²` (velocity −∇φ).
     pub fn pressures(&self, velocities: &[Vec3]) -> Vec<f64> {
@@ -77,41 +127,53 @@ impl BodyFlow<'_> {
         places.zip(velocities).zip(squares).map(of).collect()
     }
 
-    /// The velocity that the layers on its panels, and on those of its images, give to the water at points (m, world frame): m/s, world axes.
-    fn layers(&self, images: &[Image], points: &[Vec3], out: &mut [Vec3]) {
+    /// Adds the velocity that the layers on its panels, and on those of its images, give to the water at points (m, world frame), and ∂φ/∂t there in water at rest.
+    fn layers(&self, images: &[Image], points: &[Vec3], rates: bool, out: &mut [Water]) {
         let panels = &self.surface.panels;
         let faces = &panels.faces;
-        let normal: Vec<f64> = (0..faces.len())
-            .map(|i| faces.twist_flux(i).dot(&self.twist) / faces.areas[i])
-            .collect();
+        let normal = |twist: &Vec6| -> Vec<f64> {
+            let of = |i: usize| faces.twist_flux(i).dot(twist) / faces.areas[i];
+            (0..faces.len()).map(of).collect()
+        };
+        let velocity = normal(&self.twist);
+        let rate = normal(&self.twist_rate);
         for image in images {
             let (rotation, shift) = image.placement(&self.pose);
             let seen: Vec<Vec3> = (points.iter())
                 .map(|x| rotation.tr_mul(&(x - shift)))
                 .collect();
-            let made = panels.velocity(&normal, &self.potential.value, &seen);
-            let turned = made.iter().map(|u| image.sign * (rotation * u));
-            out.iter_mut().zip(turned).for_each(|(o, u)| *o += u);
+            let made = panels.velocity(&velocity, &self.potential.value, &seen);
+            for (out, u) in out.iter_mut().zip(&made) {
+                out.velocity += image.sign * (rotation * u);
+            }
+            if rates {
+                // What stands still in the water moves against the body: ∂φ/∂t = φ(q', φ') + u·V.
+                let own = panels.layers(&rate, &self.potential.rate, &seen);
+                for (((out, own), u), x) in out.iter_mut().zip(own).zip(&made).zip(&seen) {
+                    let moved = u.dot(&point_velocity(&self.twist, x));
+                    out.pressure += image.sign * (own + moved);
+                }
+            }
         }
     }
 }
 
 impl Simulator {
-    /// The flow on the surfaces of all bodies in the water, with the generalised accelerations `gains`.
+    /// The flow on the surfaces of all bodies in the water, with its rates at the generalised accelerations `gains`, where they are given.
     ///
     /// # Errors
     /// Bodies without a surface, and whatever the coupling reports.
     pub(super) fn surface_flow(
         &self,
         sample: &Sample,
-        gains: &DVector<f64>,
+        gains: Option<&DVector<f64>>,
     ) -> Result<Vec<BodyFlow<'_>>> {
         let system = self.system();
         let (tree, v) = (&system.tree, &sample.v);
         let kinematics = tree.kinematics(&sample.q);
         let none = DVector::zeros(v.len());
         let fields = tree.fields(&kinematics, &sample.q, v, Virtual::User(&none));
-        let gained = tree.twists(&kinematics, gains);
+        let gained = tree.twists(&kinematics, gains.unwrap_or(&none));
         let at = system.moving(
             sample.place(self.parameters()),
             &fields.twist,
@@ -129,11 +191,12 @@ impl Simulator {
         let displacement: Vec<Vec6> = in_water.iter().map(|b| fields.twist[*b]).collect();
         let surfaces = self.assembled.flow_surfaces(&self.scene, &self.choices)?;
         let panels: Vec<_> = surfaces.iter().map(|s| s.panels.clone()).collect();
+        let twist_rates = system.submerged_twists(&kinematics, &rates);
         let potentials = system.coupling.surface_potentials(
             &Motion {
                 poses: &poses,
                 twists: &system.submerged_twists(&kinematics, &through),
-                rates: &system.submerged_twists(&kinematics, &rates),
+                rates: gains.map(|_| &twist_rates),
                 displacement: &displacement,
             },
             &panels,
@@ -162,13 +225,23 @@ impl Simulator {
         }
     }
 
-    /// The velocity that all bodies give to the water at points (m, world frame) outside them, by the layers on their surfaces: m/s, world axes.
-    pub(super) fn layered_flow(&self, sample: &Sample, points: &[Vec3]) -> Result<Vec<Vec3>> {
-        let still = DVector::zeros(sample.v.len());
-        let mut out = vec![Vec3::zeros(); points.len()];
+    /// The water at points (m, world frame) outside all bodies, by the layers on their surfaces; the pressure only where it is asked for.
+    pub(super) fn layered(
+        &self,
+        flows: &[BodyFlow],
+        points: &[Vec3],
+        pressure: bool,
+    ) -> Result<Vec<Water>> {
         let images = self.flow_images()?;
-        for flow in self.surface_flow(sample, &still)? {
-            flow.layers(&images, points, &mut out);
+        let mut out = vec![Water::default(); points.len()];
+        for flow in flows {
+            flow.layers(&images, points, pressure, &mut out);
+        }
+        if pressure {
+            // Bernoulli: of ∂φ/∂t, with the velocity −∇φ.
+            for water in &mut out {
+                water.pressure -= 0.5 * water.velocity.norm_squared();
+            }
         }
         Ok(out)
     }

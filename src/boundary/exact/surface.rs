@@ -23,6 +23,7 @@ pub struct EllipsoidSurface {
     /// The patches: corners of the faces, centroids on the ellipsoid, its normals and areas there.
     pub faces: Faces,
     pose: Pose,
+    semi_axes: Vec3,
     /// Twist about the shape's origin, in its frame, of a body's twist.
     move_in: Mat6,
     /// Factors of x, y, z, yz, zx, xy.
@@ -63,6 +64,7 @@ impl EllipsoidSurface {
         Ok(Self {
             faces: out,
             pose: *pose,
+            semi_axes: axes,
             move_in: twist_in_shape(pose),
             factors,
         })
@@ -94,6 +96,16 @@ impl EllipsoidSurface {
         };
         let places = self.faces.centres.iter().zip(&self.faces.normals);
         places.map(of).collect()
+    }
+
+    /// The point of the ellipsoid over one near it, seen from its middle; body frame, m.
+    pub fn lifted(&self, x: &Vec3) -> Vec3 {
+        let local = self.pose.apply_inverse(x);
+        let size = local.component_div(&self.semi_axes).norm();
+        match size > 0.0 {
+            true => self.pose.apply(&(local / size)),
+            false => *x,
+        }
     }
 
     fn weighed(&self, twist: &Vec6) -> [Vec3; 2] {

@@ -40,6 +40,8 @@ pub(super) struct Slopes {
     rows: Vec<Row<Vec3>>,
     /// Panels with a side on a sharp edge, the direction across it in the panel, and κ − 1.
     edges: Vec<(usize, Vec3, f64)>,
+    /// Panels with a corner on one.
+    sharp: Vec<bool>,
 }
 
 impl PanelBoundary {
@@ -57,6 +59,11 @@ impl PanelBoundary {
             out[*face] += more * velocities[*face].dot(across).powi(2);
         }
         out
+    }
+
+    /// Whether a sharp edge ends at a corner of this panel.
+    pub(crate) fn at_sharp_edge(&self, face: usize) -> bool {
+        self.slopes().sharp.get(face).is_some_and(|sharp| *sharp)
     }
 
     fn slopes(&self) -> &Slopes {
@@ -127,17 +134,18 @@ impl<'b> Around<'b> {
     }
 
     fn slopes(self) -> Slopes {
-        let corners = self.body.panels.corners();
-        let of = |(face, corners): (usize, &[u32; 3])| {
-            let corners = corners.map(|v| v as usize);
-            match corners.iter().any(|v| self.sharp[*v]) {
-                true => self.between_corners(face, corners),
-                false => self.fitted(face, corners),
-            }
+        let corners = self.body.panels.corners().iter();
+        let corners: Vec<[usize; 3]> = corners.map(|c| c.map(|v| v as usize)).collect();
+        let touches = |corners: &[usize; 3]| corners.iter().any(|v| self.sharp[*v]);
+        let sharp: Vec<bool> = corners.iter().map(touches).collect();
+        let of = |(face, corners): (usize, &[usize; 3])| match sharp[face] {
+            true => self.between_corners(face, *corners),
+            false => self.fitted(face, *corners),
         };
         Slopes {
             rows: corners.iter().enumerate().map(of).collect(),
             edges: self.edges,
+            sharp,
         }
     }
 
@@ -172,7 +180,7 @@ impl<'b> Around<'b> {
             }
         }
         let Some(inverse) = inverse(fit) else {
-            return Row::new();
+            return self.between_corners(face, corners);
         };
         let weight = |row: usize| {
             let [x, y] = [0, 1].map(|c| inverse[(c, row)] * weights[row] / size);

@@ -172,6 +172,12 @@ impl PanelBoundary {
         (0..self.faces.len()).map(of).collect()
     }
 
+    /// Potential at points outside (body frame, m) of layers with these normal velocities `q` (m/s) and potentials `phi` (m²/s) of the panels.
+    pub(crate) fn layers(&self, q: &[f64], phi: &[f64], points: &[Vec3]) -> Vec<f64> {
+        let [q, phi] = [q, phi].map(|x| MatRef::from_column_major_slice(x, x.len(), 1));
+        self.panels.potential(points, Some(q), Some(phi))
+    }
+
     /// Total potentials of the panels, m²/s, for columns of the body's twists in flows with the potentials `incident` at the centroids
     /// (panels × columns): `(½I + Ω/4π) φ = S q + φ_incident`.
     pub(crate) fn total_potential(&self, twists: &[Vec6], incident: &Columns) -> Columns {

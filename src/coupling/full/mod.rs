@@ -137,6 +137,9 @@ impl Coupling for Full {
         twists: &DVector<f64>,
         points: &[Vec3],
     ) -> Result<Option<Vec<Vec3>>> {
+        if points.is_empty() {
+            return Ok(Some(Vec::new()));
+        }
         let model = self.model();
         let column = DMatrix::from_column_slice(twists.len(), 1, twists.as_slice());
         let strengths = self.backend.respond(poses, &column)?.densities()?;
@@ -166,11 +169,27 @@ impl Coupling for Full {
     ) -> Result<Vec<SurfacePotential>> {
         surface::check(motion, surfaces)?;
         let model = self.model();
-        let response = self.backend.respond(motion.poses, &motion.columns())?;
+        let columns = motion.columns();
+        // Other backends don't tell rates of densities.
+        let own;
+        let backend: &dyn SystemBackend =
+            match motion.rates.is_some() && model.bodies.iter().all(|b| b.factored()) {
+                true => {
+                    own = Cpu::new(self.model.clone())?;
+                    &own
+                }
+                false => self.backend.as_ref(),
+            };
+        let response = backend.respond(motion.poses, &columns)?;
         let strengths = response.densities()?;
-        let first = DVector::from_column_slice(&[1.0, 0.0]);
-        let moving = response.directions(&[Direction::Basis(&first)])?;
-        let displaced = moving.density_rates(motion.displacement)?;
+        let displaced = match motion.rates {
+            Some(_) => {
+                let first = DVector::from_column_slice(&[1.0, 0.0]);
+                let moving = response.directions(&[Direction::Basis(&first)])?;
+                moving.density_rates(motion.displacement)?
+            }
+            None => Columns::zeros(model.columns(), 1),
+        };
         let charges = (model.bodies.iter().zip(&model.sources)).map(|(body, range)| Charges {
             points: &body.sources,
             strengths: Columns::from_fn(range.len(), 2, |j, k| {

@@ -183,6 +183,9 @@ impl Coupling for PanelCoupled {
         twists: &DVector<f64>,
         points: &[Vec3],
     ) -> Result<Option<Vec<Vec3>>> {
+        if points.is_empty() {
+            return Ok(Some(Vec::new()));
+        }
         let model = self.model();
         let column = DMatrix::from_column_slice(twists.len(), 1, twists.as_slice());
         let placed = PlacedPanels::new(model, poses, &Arc::default(), &column)?;
@@ -217,7 +220,7 @@ impl Coupling for PanelCoupled {
         surface::check(motion, surfaces)?;
         let (model, columns) = (self.model(), motion.columns());
         let placed = PlacedPanels::new(model, motion.poses, &Arc::default(), &columns)?;
-        PanelSolution::new(Arc::new(placed), columns)?.surface_potentials(motion.displacement)
+        PanelSolution::new(Arc::new(placed), columns)?.surface_potentials(motion)
     }
 }
 

@@ -6,7 +6,7 @@ use crate::adjoint::kernel::{double_hvp, double_jvp, double_vjp, single_hvp, sin
 use crate::adjoint::lie::{Vec3, Vec6, linear, point_wrench, six};
 use crate::coupling::pair::{Pair, vector};
 use crate::coupling::response::symmetrised;
-use crate::coupling::{SurfacePotential, Tangent};
+use crate::coupling::{Motion, SurfacePotential, Tangent};
 use crate::solver::Columns;
 use nalgebra::DVector;
 use std::ops::Range;
@@ -26,27 +26,36 @@ struct Displacements {
 }
 
 impl PanelSolution<'_> {
-    /// Potentials of the first of two columns, and their rates where the second has the rates of the twists and bodies that no film holds apart are
-    /// displaced along z.
+    /// Potentials of the first of two columns, and their rates where the second has the rates of the twists and bodies, which no film holds apart, are
+    /// displaced as they move.
     ///
     /// # Errors
     /// A solve that misses its tolerance.
-    pub fn surface_potentials(&self, z: &[Vec6]) -> Result<Vec<SurfacePotential>> {
+    pub fn surface_potentials(&self, motion: &Motion) -> Result<Vec<SurfacePotential>> {
         let placed = &self.placed;
+        if motion.rates.is_none() {
+            let still = Columns::zeros(self.phi.rows, 1);
+            return Ok(self.on_surfaces(&still));
+        }
         let mut right = Columns::zeros(self.phi.rows, self.phi.columns);
         for (pair, fields) in placed.pairs.iter().zip(self.fields()) {
+            let z = motion.displacement;
             let displacement = pair.displacements(&placed.poses[pair.target], z);
             placed.add_moved(pair, fields, &displacement, &mut right);
         }
         let none = Columns::zeros(right.rows, 0);
         let ([displaced, _], _) = placed.system.solve(&right, &none)?;
+        Ok(self.on_surfaces(&displaced))
+    }
+
+    fn on_surfaces(&self, displaced: &Columns) -> Vec<SurfacePotential> {
         let of = |faces: &Range<usize>| SurfacePotential {
             value: faces.clone().map(|i| self.phi.at(i, 0)).collect(),
             rate: (faces.clone())
                 .map(|i| self.phi.at(i, 1) + displaced.at(i, 0))
                 .collect(),
         };
-        Ok(placed.coupled.faces.iter().map(of).collect())
+        self.placed.coupled.faces.iter().map(of).collect()
     }
 }
 

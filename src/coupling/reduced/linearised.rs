@@ -457,7 +457,7 @@ impl Coupling for Reduced {
         if solved.films.any() {
             return Err(surface::held_apart());
         }
-        let (charges, seen) = solved.charges_seen(motion.displacement);
+        let (charges, seen) = solved.charges_seen(motion);
         Ok(surface::on_surfaces(motion, surfaces, &charges, &seen))
     }
 

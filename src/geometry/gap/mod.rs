@@ -280,6 +280,13 @@ impl Gaps {
             edge: 0.0,
         }))
     }
+
+    /// The point of body `b`'s surface, at its pose, that is closest to a point of the world frame (m), and the number of its face in the mesh; `None` of a body without a surface.
+    pub(crate) fn foot(&self, b: usize, point: &Vec3, pose: &Pose) -> Option<(Vec3, usize)> {
+        let tree = self.trees.get(b)?.as_ref()?;
+        let (foot, face) = tree.closest(&pose.apply_inverse(point));
+        Some((pose.apply(&foot), tree.numbers[face]))
+    }
 }
 
 /// The error of a gap that isn't positive: names both, says how deep and how to mend it.

@@ -2,10 +2,8 @@
 
 use super::file::{array, extent};
 use crate::adjoint::lie::Vec3;
-use crate::error::in_order;
 use crate::simulate::Rollout;
 use crate::{Error, Result, memory};
-use rayon::prelude::*;
 use vtkio::model::{Attributes, DataSet, ImageDataPiece, Piece};
 
 /// Most points of a grid.
@@ -16,9 +14,6 @@ const ROUNDING: f64 = 1e-6;
 
 /// VTK's mark of a point that isn't to be shown.
 const HIDDEN: u8 = 2;
-
-/// Points that one task looks at.
-const AT_ONCE: usize = 4096;
 
 /// A number as the file has it: the crate writes corner and spacing of a grid in as many digits as single precision takes. Points are where the file says.
 fn written(x: f64) -> f64 {
@@ -103,8 +98,7 @@ impl Grid {
 
 /// The flow at the points of a grid at state `n`: zero, and marked, where it isn't resolved.
 pub(super) fn frame(rollout: &Rollout, grid: &Grid, points: &[Vec3], n: usize) -> Result<DataSet> {
-    let parts = points.par_chunks(AT_ONCE);
-    let mut resolved = in_order(parts.map(|part| rollout.flow_resolved(n, part)))?.concat();
+    let mut resolved = rollout.flow_resolved(n, points)?;
     let marked = points.iter().zip(&resolved);
     let clear: Vec<Vec3> = marked.filter(|(_, r)| **r).map(|(x, _)| *x).collect();
     let mut found = match clear.is_empty() {

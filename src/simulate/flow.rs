@@ -71,7 +71,7 @@ impl Rollout {
     ///
     /// # Errors
     /// A state that there isn't; points that aren't finite, within a body, behind a wall, or nearer to a surface than
-    /// [`FLOW_EDGES`] of its edges; another fidelity than `Full`, and whatever its solve reports.
+    /// [`FLOW_EDGES`] of its edges; bodies without a surface, and whatever the coupling reports.
     pub fn flow(&self, n: usize, points: &[Vec3]) -> Result<Vec<Vec3>> {
         let sample = self.sample(n)?;
         self.simulator().flow(sample, points)

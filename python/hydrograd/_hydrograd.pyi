@@ -826,24 +826,35 @@ class Loads:
 
 @final
 class SurfacePressure:
+    """Pressure of the water on the faces of one body at one state, by Bernoulli's law for unsteady flow, from the accelerations there: made by `Rollout.pressure`. World frame. With
+    `pressures`, −Σ p n A is what `Rollout.loads` calls "water", to the error of the faces."""
     @property
-    def name(self) -> str: ...
+    def name(self) -> str:
+        """The body's name."""
     @property
-    def centres(self) -> _Array: ...
+    def centres(self) -> _Array:
+        """Centroids of the faces (n, 3), m."""
     @property
-    def normals(self) -> _Array: ...
+    def normals(self) -> _Array:
+        """Unit normals of the faces into the water (n, 3)."""
     @property
-    def areas(self) -> _Array: ...
+    def areas(self) -> _Array:
+        """Areas of the faces (n,), m²."""
     @property
-    def velocities(self) -> _Array: ...
+    def velocities(self) -> _Array:
+        """Velocity of the water at the centroids (n, 3), m/s; a current is in it."""
     @property
-    def pressures(self) -> _Array: ...
+    def pressures(self) -> _Array:
+        """Pressure of the flow at the centroids (n,), Pa, zero far away."""
     @property
-    def hydrostatic(self) -> _Array: ...
+    def hydrostatic(self) -> _Array:
+        """Pressure of the water at rest there (n,), Pa, zero at the world's origin."""
     @property
-    def wrench(self) -> _Array: ...
+    def wrench(self) -> _Array:
+        """Force and moment about the body's origin of `pressures` (6,), N and N m, world axes."""
     @property
-    def hydrostatic_wrench(self) -> _Array: ...
+    def hydrostatic_wrench(self) -> _Array:
+        """The same of `hydrostatic`: buoyancy of the closed surface."""
 
 @final
 class State:
@@ -964,7 +975,9 @@ class Rollout:
         """Contacts during the step from state `step` to the next, at the pose of that state: where surfaces are no more than `slack` (m)
         farther apart than the gap at which they touch, and what presses there. None where the scene has no contact. Negative
         numbers count from the end: -1 is the last step."""
-    def pressure(self, state: int) -> list[SurfacePressure]: ...
+    def pressure(self, state: int) -> list[SurfacePressure]:
+        """The water's pressure on the surface of every body in it at state `state`, as the step there starts: one a body. It takes solves of its own. Negative numbers count
+        states from the end."""
     def loads(self, state: int) -> Loads:
         """What acts on every body and across every joint at state `state`, as the step there starts: gravity, buoyancy, drag, thrust, the inertia of the water, contact. Negative
         numbers count from the end."""
@@ -972,7 +985,7 @@ class Rollout:
         """What an inertial measurement unit at the site of this name reads at every state (n, 6): acceleration less gravity (m/s²) and rates (rad/s), in the site's axes."""
     def flow(self, state: int, points: ArrayLike) -> _Array:
         """The water's velocity at `points` (n, 3), m, at state `state`: (n, 3), m/s, world axes, the current included. It takes a
-        solve, and a simulator with the fidelity "full". Points within a body, behind a wall, or nearer to a surface than half an
+        solve. Points within a body, behind a wall, or nearer to a surface than half an
         edge of its mesh are refused: `flow_resolved` tells them apart. Negative numbers count states from the end."""
     def flow_pressure(self, state: int, points: ArrayLike) -> _Array: ...
     def flow_resolved(self, state: int, points: ArrayLike) -> NDArray[np.bool_]:
@@ -1038,12 +1051,14 @@ class Rollout:
         frames_per_second: float | None = None,
         every: int | None = None,
         loads: bool = False,
+        pressure: bool = False,
         flow: tuple[ArrayLike, ArrayLike, float] | None = None,
     ) -> list[Path]:
         """Writes files of VTK, which ParaView opens, into a folder, which is made where there is none; the files to open are given. `bodies.pvd`: all bodies' triangles frame by frame, in the
-        world, with the `body` (number) and the `velocity` (m/s) of every face; `walls.vtp`: walls as squares; with `loads`, `loads.pvd`: at each body's origin what acts on it,
+        world, with the `body` (number) and the `velocity` (m/s) of every face, and with `pressure`, at the price of solves of its own a frame, the `pressure` of the flow and the `hydrostatic`
+        one (Pa) and the `water_velocity` (m/s) there, as `pressure` tells them, zero where a face isn't `wetted` (1 or 0); `walls.vtp`: walls as squares; with `loads`, `loads.pvd`: at each body's origin what acts on it,
         `gravity_force` (N), `gravity_moment` (N m), `water_force`, …, of every kind that `loads` tells; with `flow`, two corners (3,) of a box and the spacing of a grid in it, m, `flow.pvd`: the
-        water's `velocity` there, zero where it isn't `resolved`, by the fidelity "full". Frames are up to `frames_per_second` of simulated time (30 unless told otherwise), or every `every`-th
+        water's `velocity` there, zero where it isn't `resolved`. Frames are up to `frames_per_second` of simulated time (30 unless told otherwise), or every `every`-th
         state, with the first and the last. Files of the same names are replaced. Ctrl-C ends it."""
     def write_gltf(
         self,

@@ -33,7 +33,7 @@ pub fn write_vtk(
     rollout: &Arc<hydrograd::Rollout>,
     folder: PathBuf,
     (per_second, every): (Option<f64>, Option<isize>),
-    loads: bool,
+    (loads, pressure): (bool, bool),
     flow: Option<GridBox<'_>>,
 ) -> PyResult<Vec<PathBuf>> {
     let grid = |(low, high, spacing): GridBox| {
@@ -46,6 +46,7 @@ pub fn write_vtk(
     let options = vtk::Options {
         frames: frames("write_vtk", per_second, every)?,
         loads,
+        pressure,
         flow: flow.map(grid).transpose()?,
     };
     let rollout = rollout.clone();

@@ -507,11 +507,13 @@ impl Rollout {
     }
 
     /// Writes files of VTK, which ParaView opens, into a folder, which is made where there is none; the files to open are given. `bodies.pvd`: all bodies' triangles frame by frame, in the
-    /// world, with the `body` (number) and the `velocity` (m/s) of every face; `walls.vtp`: walls as squares; with `loads`, `loads.pvd`: at each body's origin what acts on it,
+    /// world, with the `body` (number) and the `velocity` (m/s) of every face, and with `pressure`, at the price of solves of its own a frame, the `pressure` of the flow and the `hydrostatic`
+    /// one (Pa) and the `water_velocity` (m/s) there, as `pressure` tells them, zero where a face isn't `wetted` (1 or 0); `walls.vtp`: walls as squares; with `loads`, `loads.pvd`: at each body's origin what acts on it,
     /// `gravity_force` (N), `gravity_moment` (N m), `water_force`, …, of every kind that `loads` tells; with `flow`, two corners (3,) of a box and the spacing of a grid in it, m, `flow.pvd`: the
-    /// water's `velocity` there, zero where it isn't `resolved`, by the fidelity "full". Frames are up to `frames_per_second` of simulated time (30 unless told otherwise), or every `every`-th
+    /// water's `velocity` there, zero where it isn't `resolved`. Frames are up to `frames_per_second` of simulated time (30 unless told otherwise), or every `every`-th
     /// state, with the first and the last. Files of the same names are replaced. Ctrl-C ends it.
-    #[pyo3(signature = (folder, *, frames_per_second=None, every=None, loads=false, flow=None))]
+    #[pyo3(signature = (folder, *, frames_per_second=None, every=None, loads=false, pressure=false, flow=None))]
+    #[expect(clippy::too_many_arguments, reason = "one per keyword")]
     fn write_vtk(
         &self,
         py: Python<'_>,
@@ -519,10 +521,11 @@ impl Rollout {
         frames_per_second: Option<f64>,
         every: Option<isize>,
         loads: bool,
+        pressure: bool,
         flow: Option<output::GridBox<'_>>,
     ) -> PyResult<Vec<PathBuf>> {
         let frames = (frames_per_second, every);
-        output::write_vtk(py, &self.inner, folder, frames, loads, flow)
+        output::write_vtk(py, &self.inner, folder, frames, (loads, pressure), flow)
     }
 
     /// Writes an animated scene in glTF 2.0 (`.glb`), which Blender and browsers open, and gives its path: a node each body, moved between frames, and walls. Lengths are m and times s, counted from

@@ -54,7 +54,7 @@ def series(path):
 
 
 def test_vtk_reads_surfaces_and_loads(rollout, vtk, tmp_path):
-    made = rollout.write_vtk(tmp_path / "vtk", frames_per_second=25.0, loads=True)
+    made = rollout.write_vtk(tmp_path / "vtk", frames_per_second=25.0, loads=True, pressure=True)
     assert made == [tmp_path / "vtk" / name for name in ("bodies.pvd", "walls.vtp", "loads.pvd")]
     times, files = series(made[0])
     assert np.array_equal(times, rollout.time[STATES])
@@ -74,6 +74,12 @@ def test_vtk_reads_surfaces_and_loads(rollout, vtk, tmp_path):
         u = rollout.velocities[state][body]
         right = u[:, :3] + np.cross(u[:, 3:], centers - rollout.positions[state][body])
         assert np.abs(cells["velocity"] - right).max() < 1e-13
+        pressed = rollout.pressure(state)
+        assert [p.name for p in pressed] == rollout.simulator.body_names
+        assert np.array_equal(cells["pressure"], np.concatenate([p.pressures for p in pressed]))
+        assert np.array_equal(cells["hydrostatic"], np.concatenate([p.hydrostatic for p in pressed]))
+        assert np.array_equal(cells["water_velocity"], np.concatenate([p.velocities for p in pressed]))
+        assert cells["wetted"].all() and np.ptp(cells["pressure"]) > 1.0
 
         _, points, arrays, _ = vtk(acting)
         assert np.array_equal(points, rollout.positions[state])
@@ -105,16 +111,22 @@ def test_vtk_reads_the_flow(rollout, vtk, tmp_path):
 
 
 def test_bodies_without_a_shape_are_points(vtk, tmp_path):
-    scene = hg.Scene()
+    scene = hg.Scene(gravity=(0.0, 0.0, -9.81))
     scene.add(hg.Body(hg.sphere(0.1), density=1000.0))
     scene.add(hg.Body(None, name='a "frame" & <é>', mass=1.0, inertia=(1.0, 1.0, 1.0), position=(0.0, 2.0, 0.0)))
     rollout = hg.Simulator(scene, fidelity="isolated", faces=80).rollout(steps=0)
-    made = rollout.write_vtk(tmp_path)
+    made = rollout.write_vtk(tmp_path, pressure=True)
     _, (file,) = series(made[0])
     data, points, _, cells = vtk(file)
     assert (data.GetNumberOfVerts(), data.GetNumberOfPolys()) == (1, len(cells["body"]) - 1)
     assert cells["body"][0] == 1 and not cells["body"][1:].any()
     assert list(points[data.GetCell(0).GetPointId(0)]) == [0.0, 2.0, 0.0]
+    (ball,) = rollout.pressure(0)
+    assert cells["wetted"].tolist() == [0] + [1] * len(ball.pressures)
+    assert cells["pressure"][0] == cells["hydrostatic"][0] == 0.0 and not cells["water_velocity"][0].any()
+    assert np.array_equal(cells["hydrostatic"][1:], ball.hydrostatic) and np.ptp(ball.hydrostatic) > 1000.0
+    _, (file,) = series(rollout.write_vtk(tmp_path / "plain")[0])
+    assert set(vtk(file)[3]) == {"body", "velocity"}
     tree, _ = chunks(rollout.write_gltf(tmp_path / "run.glb"))
     assert tree["nodes"][1]["name"] == 'a "frame" & <é>' and "mesh" not in tree["nodes"][1]
 
@@ -210,6 +222,7 @@ def test_what_cannot_be_written_is_refused(rollout, tmp_path):
         rollout.write_gltf(taken / "run.glb")
     with pytest.raises(hg.FileError, match="folder"):
         rollout.write_gltf(tmp_path)
-    isolated = hg.Simulator(rollout.simulator.scene, fidelity="isolated").rollout(steps=1)
-    with pytest.raises(hg.Error, match="isolated|full"):
-        isolated.write_vtk(tmp_path / "dry", flow=(*box, 0.5))
+    dry = hg.Scene(hg.Fluid(0.0))
+    dry.add(hg.Body(hg.sphere(0.1), density=1000.0))
+    with pytest.raises(hg.UnsupportedError, match=r"pressure without water.*density"):
+        hg.Simulator(dry, faces=80).rollout(steps=0).write_vtk(tmp_path / "dry", pressure=True)

@@ -282,10 +282,89 @@ def test_flow_in_a_page(rollout, stirring):
     assert np.isclose(data["longest"], 0.15)  # one and a half of the way to the next
     assert data_of(hg.view(stirring, flow=grid(), flow_scale=2.0))["flow"]["scale"] == 2.0
     assert data_of(hg.view(stirring))["flow"] is None
-    with pytest.raises(hg.UnsupportedError, match="full"):
-        hg.view(rollout, flow=grid())
     with pytest.raises(hg.InputError, match="fewer points"):
         hg.view(stirring, flow=np.zeros((1_000_000, 3)))
+    # The flow comes with every fidelity.
+    alone = unpacked(data_of(hg.view(rollout, flow=grid(), max_frames=2))["flow"]["velocities"])
+    known = rollout.flow_resolved(-1, grid())
+    assert np.allclose(alone[1, known], rollout.flow(-1, grid()[known]), atol=1e-7)
+
+
+@pytest.mark.parametrize("hydrostatic", [False, True])
+def test_pressure_in_a_page(stirring, hydrostatic):
+    """In 254 steps of the scale, which the largest 2 % are beyond."""
+    data = data_of(hg.view(stirring, pressure="hydrostatic" if hydrostatic else True))["pressure"]
+    (ball,) = data["bodies"]
+    codes = unpacked(ball["codes"])
+    found = [stirring.pressure(state)[0] for state in range(4)]
+    right = np.array([p.pressures + hydrostatic * p.hydrostatic for p in found])
+    assert ball["body"] == 0 and codes.dtype == np.int8 and codes.shape == right.shape and data["hydrostatic"] is hydrostatic
+    scale = data["scale"]
+    assert np.isclose(scale, np.quantile(np.abs(right), 0.98), rtol=1e-5) and np.abs(right).max() > scale > 1.0
+    assert np.abs(codes * scale / 127 - np.clip(right, -scale, scale)).max() < 0.501 * scale / 127
+    assert codes.max() == 127 or codes.min() == -127
+    assert np.allclose(unpacked(data["ends"]), np.stack([right.min(axis=1), right.max(axis=1)], axis=1), rtol=1e-6)
+    assert data_of(hg.view(stirring))["pressure"] is None
+
+
+@pytest.fixture(scope="module")
+def coupled() -> hg.Rollout:
+    """With fidelities that couple bodies the fixed one is in the water, too."""
+    return hg.Simulator(scene(), fidelity="reduced").rollout()
+
+
+def test_pressure_of_several_bodies_and_rollouts(coupled, stirring):
+    """On one scale; bodies without a shape have none, and of a thinned rollout the frames that are drawn."""
+    view = hg.view([coupled, stirring], pressure=True, max_frames=3)
+    pages = [html.unescape(part.split('"></iframe>')[0]) for part in view.html.split('srcdoc="')[1:]]
+    first, second = (json.loads(Parts(page).scripts[0])["pressure"] for page in pages)
+    assert first["scale"] == second["scale"] > 0.0
+    assert [body["body"] for body in first["bodies"]] == [0, 1]
+    right = [np.array([[p.pressures for p in one.pressure(state)] for state in states]) for one, states in ((coupled, (0, 10, 20)), (stirring, (0, 2, 3)))]
+    every = np.abs(np.concatenate([of.ravel() for of in right]))
+    assert np.isclose(first["scale"], np.quantile(every, 0.98), rtol=1e-5)
+    for data, of in zip((first, second), right, strict=True):
+        for number, body in enumerate(data["bodies"]):
+            shown = unpacked(body["codes"]) * data["scale"] / 127
+            assert np.abs(shown - np.clip(of[:, number], -data["scale"], data["scale"])).max() < 0.501 * data["scale"] / 127
+
+
+def test_pressure_that_cannot_be_shown(coupled, monkeypatch):
+    dry = hg.Scene(hg.Fluid(0.0))
+    dry.add(hg.Body(hg.sphere(0.1), density=1000.0))
+    with pytest.raises(hg.UnsupportedError, match="pressure without water"):
+        hg.view(hg.Simulator(dry), pressure=True)
+    monkeypatch.setattr("hydrograd._viewer.pressure.MOST", 13439)
+    with pytest.raises(hg.InputError, match="got 640 faces at 21 frames; must be 13439 pressures at most: give fewer max_frames"):
+        hg.view(coupled, pressure=True)
+    assert data_of(hg.view(coupled, pressure=True, max_frames=20))["pressure"]["scale"] > 0.0
+
+
+def test_steps_of_pressure():
+    from hydrograd._viewer.pressure import codes, scale
+
+    values = np.array([[-3.0, -1.0, 0.0, 0.5, np.nan, np.inf, 2.0]], np.float32)
+    assert codes(values, 1.0).tolist() == [[-127, -127, 0, 64, -128, -128, 127]]
+    assert scale([values]) == pytest.approx(np.quantile([0.0, 0.5, 1.0, 2.0, 3.0], 0.98))
+    still = np.zeros((2, 100), np.float32)
+    assert scale([still]) == scale([]) == 0.0 and not codes(still, 0.0).any()
+    still[0, 7] = -4.0
+    assert scale([still]) == 4.0  # rather than the zero that nearly all are
+
+
+def test_forces_of_the_flow_in_a_page(rollout, stirring):
+    data = data_of(hg.view(stirring, forces=True))["forces"]
+    right = np.array([stirring.loads(state).wrenches("water")[:, :3] for state in range(4)])
+    assert np.allclose(unpacked(data["forces"]), right, rtol=1e-6) and np.abs(right).max() > 0.0
+    assert np.isclose(data["largest"], np.linalg.norm(right, axis=-1).max())
+    assert data_of(hg.view(stirring))["forces"] is None
+    view = hg.view([rollout, stirring], forces=True)
+    pages = [html.unescape(part.split('"></iframe>')[0]) for part in view.html.split('srcdoc="')[1:]]
+    first, second = (json.loads(Parts(page).scripts[0])["forces"] for page in pages)
+    assert first["largest"] == second["largest"] >= data["largest"]
+    dry = hg.Scene(hg.Fluid(0.0), steps=1)
+    dry.add(hg.Body(hg.sphere(0.1), density=1000.0))
+    assert data_of(hg.view(hg.Simulator(dry), forces=True))["forces"]["largest"] == 0.0
 
 
 def test_walls():
@@ -311,6 +390,8 @@ def test_walls():
         ({"flow": "x"}, "flow"),
         ({"flow": [[0, 0, np.inf]]}, "finite"),
         ({"flow_scale": 0}, "flow_scale"),
+        ({"pressure": "total"}, "pressure: got 'total'; must be True, False or \"hydrostatic\""),
+        ({"pressure": 1.5}, "pressure: got 1.5"),
         ({"title": ["a", "b"]}, "title: got 2 of them; must be one for each of 1"),
     ],
 )
@@ -539,6 +620,77 @@ def test_a_browser_draws_forces_and_flow(stirring, tmp_path):
             seen.append(like(stage(browser.picture(file, "#t=1"))).sum())
         assert seen[0] > 150 + seen[1], (switch, seen)
         assert seen[1] < 50
+
+
+PRESSED = """
+    const { player } = hydrograd;
+    const found = {};
+    const { skin } = player.bodies.groups[0].userData;
+    const legend = document.getElementById("pressures");
+    const colors = () => [...skin.geometry.getAttribute("color").array];
+    const look = () => [skin.material.vertexColors, skin.material.color.getHexString(), !legend.hidden];
+    found.corners = [...skin.geometry.getAttribute("position").array].map((x, i) => x * skin.scale.x + skin.position.getComponent(i % 3));
+    found.first = colors();
+    found.on = look();
+    found.legend = [...legend.querySelectorAll("span")].map((part) => part.textContent);
+    player.seek(player.last);
+    found.last = colors();
+    found.name = document.getElementById("pressure").parentElement.textContent;
+    found.facts = document.getElementById("facts").textContent;
+    document.getElementById("pressure").click();
+    found.off = look();
+    document.getElementById("pressure").click();
+    found.again = look();
+    found.arrows = player.forces.arrows.shafts.count;
+    document.getElementById("loads").click();
+    found.hidden = !player.forces.arrows.shafts.visible;
+    document.title = JSON.stringify(found);
+"""
+
+
+def diverging(part: np.ndarray) -> np.ndarray:
+    """Colours of pressures, -1 to 1, as light: blue, white, red."""
+    stops = np.array([[0x21, 0x66, 0xAC], [0x92, 0xC5, 0xDE], [0xF7, 0xF7, 0xF7], [0xF4, 0xA5, 0x82], [0xB2, 0x18, 0x2B]]) / 255
+    coded = np.stack([np.interp(part, np.linspace(-1, 1, 5), stops[:, k]) for k in range(3)], axis=-1)
+    return ((coded + 0.055) / 1.055) ** 2.4
+
+
+def test_a_browser_colours_faces_by_pressure(stirring, tmp_path):
+    """Each face in one colour, another at another frame; the switch and the legend."""
+    file = tmp_path / "pressed.html"
+    view = hg.view(stirring, pressure=True, forces=True, colors={"ball": "#cccccc"})
+    file.write_text(view.html.replace("</body>", f"<script>{PRESSED}</script></body>"), encoding="utf-8")
+    says, after = browser.body(file)
+    assert says["status"] == "drawn" and "errors" not in says
+    found = json.loads(Parts(after).title)
+    vertices, faces = stirring.simulator.meshes()[0]
+    assert np.allclose(np.reshape(found["corners"], (-1, 3, 3)), vertices[faces], atol=1e-6)
+    scale = data_of(view)["pressure"]["scale"]
+    for name, state in (("first", 0), ("last", 3)):
+        colors = np.reshape(found[name], (len(faces), 3, 3))
+        assert np.all(colors == colors[:, :1])
+        right = diverging(np.clip(stirring.pressure(state)[0].pressures / scale, -1, 1))
+        # To the steps of pressures and of colours.
+        assert np.abs(colors[:, 0] - right).max() < 0.03
+    assert np.abs(np.subtract(found["first"], found["last"])).max() > 0.1
+    assert found["on"] == found["again"] == [True, "dadada", True] and found["off"] == [False, "cccccc", False]
+    low, none, high = found["legend"]
+    assert none == "0" and float(low.split()[1]) == -float(high.split()[1]) == pytest.approx(-scale, rel=1e-3) and high.endswith("Pa")
+    assert found["name"] == "pressure of the flow" and "pressure" in found["facts"] and "force of the flow" in found["facts"]
+    assert found["arrows"] == 1 and found["hidden"]
+
+
+def test_a_picture_of_pressure(stirring, tmp_path):
+    """A grey ball is red in front and blue at its sides, and grey with the switch off."""
+    file = tmp_path / "coloured.html"
+    text = hg.view(stirring, pressure="hydrostatic", view_from=(0, -1, 0.2), colors={"ball": "#cccccc"}).html
+    seen = []
+    for shown in (True, False):
+        press = "" if shown else "document.getElementById('pressure').click();"
+        file.write_text(text.replace("</body>", f"<script>{press}</script></body>"), encoding="utf-8")
+        picture = stage(browser.picture(file))[:, 200:]
+        seen.append([(picture[..., a] > 40 + picture[..., b]).sum() for a, b in ((0, 2), (2, 0))])
+    assert min(seen[0]) > 100 and max(seen[1]) < 0.2 * min(seen[0]), seen
 
 
 BESIDE = """

@@ -17,6 +17,9 @@ pub(super) struct Export {
     /// Write loads.pvd into the folder of --vtk as well: forces and moments on every body, kind by kind. Takes a solve a frame.
     #[arg(long, requires = "vtk")]
     vtk_loads: bool,
+    /// Have the water's pressure and velocity on every face in the files of bodies.pvd as well. Takes solves of its own a frame.
+    #[arg(long, requires = "vtk")]
+    vtk_pressure: bool,
     /// File of an animated scene in glTF 2.0, which Blender and browsers open [default: none is written].
     #[arg(long, value_name = "FILE.glb")]
     gltf: Option<PathBuf>,
@@ -45,6 +48,7 @@ impl Export {
             let options = vtk::Options {
                 frames,
                 loads: self.vtk_loads,
+                pressure: self.vtk_pressure,
                 flow: None,
             };
             files.extend(vtk::write(rollout, folder, &options)?);

@@ -5,6 +5,7 @@ use crate::support::{example, says};
 use gltf::animation::util::ReadOutputs;
 use hydrograd::adjoint::lie::Vec3;
 use hydrograd::output::{Frames, gltf as scenes, vtk};
+use hydrograd::simulate::SurfacePressure;
 use hydrograd::{Controls, Fidelity, Rollout, Settings, Simulator};
 use nalgebra::{Quaternion, UnitQuaternion};
 use std::collections::BTreeMap;
@@ -19,6 +20,7 @@ fn run() -> &'static Rollout {
     static RUN: OnceLock<Rollout> = OnceLock::new();
     RUN.get_or_init(|| {
         let mut scene = example("falling_ball");
+        scene.gravity = [0.0, 0.0, -9.81];
         // The coin turns past half a turn, where quaternions of matrices change sign.
         scene.initial.q = vec![0.875, 0.9, -0.6, 2.8];
         scene.initial.v = vec![-0.5, 0.2, 0.1, 9.0];
@@ -70,6 +72,26 @@ fn names(attributes: &Attributes) -> Vec<&str> {
     attributes.point.iter().map(Attribute::name).collect()
 }
 
+/// Arrays of faces against [`Rollout::pressure`] at state `n`, of bodies all in the water.
+fn the_water_presses(cell: &[Attribute], rollout: &Rollout, n: usize) {
+    let pressures = rollout.pressure(n).unwrap();
+    let right = |of: fn(&SurfacePressure) -> &[f64]| -> Vec<f64> {
+        pressures.iter().flat_map(|p| of(p).to_vec()).collect()
+    };
+    let dynamic = right(|p| &p.pressures);
+    assert!(dynamic.iter().any(|p| *p > 1.0) && dynamic.iter().any(|p| *p < -1.0));
+    assert_eq!(numbers(cell, "pressure"), dynamic);
+    let hydrostatic = right(|p| &p.hydrostatic);
+    assert!(hydrostatic.iter().any(|p| p.abs() > 1e3));
+    assert_eq!(numbers(cell, "hydrostatic"), hydrostatic);
+    let velocities: Vec<Vec3> = pressures
+        .iter()
+        .flat_map(|p| p.velocities.clone())
+        .collect();
+    assert_eq!(vectors(&numbers(cell, "water_velocity")), velocities);
+    assert_eq!(numbers(cell, "wetted"), vec![1.0; dynamic.len()]);
+}
+
 #[test]
 fn surfaces_and_loads_stand_in_files_of_vtk() {
     let (rollout, folder) = (run(), tempfile::tempdir().unwrap());
@@ -77,6 +99,7 @@ fn surfaces_and_loads_stand_in_files_of_vtk() {
     let options = vtk::Options {
         frames: Frames::Every(3),
         loads: true,
+        pressure: true,
         flow: None,
     };
     for _ in 0..2 {
@@ -101,6 +124,7 @@ fn surfaces_and_loads_stand_in_files_of_vtk() {
         let (corners, ends) = read.polys.unwrap().into_xml();
         let body = numbers(&read.data.cell, "body");
         let velocity = vectors(&numbers(&read.data.cell, "velocity"));
+        the_water_presses(&read.data.cell, rollout, n);
         let (mut point, mut face) = (0, 0);
         for (b, mesh) in meshes.iter().enumerate() {
             let (mesh, pose) = (mesh.as_ref().unwrap(), &sample.poses[b]);
@@ -166,8 +190,8 @@ fn the_flow_stands_on_a_grid() {
     assert_eq!(grid.counts().unwrap(), [16; 3]);
     let options = vtk::Options {
         frames: Frames::Every(10),
-        loads: false,
         flow: Some(grid),
+        ..vtk::Options::default()
     };
     let files = vtk::write(rollout, folder.path(), &options).unwrap();
     assert_eq!(files.last().unwrap(), &folder.path().join("flow.pvd"));
@@ -415,6 +439,7 @@ fn the_program_writes_both() {
         "--gltf",
         &file,
         "--vtk-loads",
+        "--vtk-pressure",
     ];
     let report = json(&[&run[..], &asked, &["--frames-per-second", "25"]].concat());
     let files: Vec<&str> = (report["files"].as_array().unwrap().iter())
@@ -427,6 +452,11 @@ fn the_program_writes_both() {
         "run.glb",
     ];
     assert_eq!(files, right.map(of));
+    let first = surface(&folder.path().join("vtk/bodies/bodies_00000.vtp"));
+    let wetted = numbers(&first.data.cell, "wetted");
+    assert!(!wetted.is_empty() && wetted.iter().all(|w| *w == 1.0));
+    let pressure = numbers(&first.data.cell, "pressure");
+    assert!(pressure.len() == wetted.len() && pressure.iter().any(|p| *p != 0.0));
     // 0.01 s a step: every fourth state.
     let frames = fs::read_dir(folder.path().join("vtk/bodies"))
         .unwrap()

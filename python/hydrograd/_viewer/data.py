@@ -10,6 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from hydrograd._viewer.flow import flow_data
+from hydrograd._viewer.forces import force_data
 from hydrograd._viewer.frames import Frames, quaternions
 from hydrograd._viewer.page import packed
 
@@ -40,6 +41,10 @@ class Look:
     """Points where the water's velocity is drawn, (n, 3), m."""
     flow_scale: float | None
     """Length of the arrow of a speed, m per m/s; None: it is chosen."""
+    forces: bool
+    """Whether the forces of the flow are there."""
+    pressure: str | None
+    """What colours the faces of bodies: the "flow"'s pressure, "hydrostatic" with that of the water at rest, or nothing."""
 
 
 def colors(names: Sequence[str], given: Mapping[str, str]) -> list[str]:
@@ -132,6 +137,9 @@ def share_scales(pages: Sequence[dict[str, Any]], look: Look) -> None:
     largest = max(data["contacts"]["largest"] for data in pages)
     for data in pages:
         data["contacts"]["largest"] = largest
+    forces = [data["forces"] for data in pages if data["forces"] is not None]
+    for of in forces:
+        of["largest"] = max(each["largest"] for each in forces)
     flows = [data["flow"] for data in pages if data["flow"] is not None]
     if look.flow_scale is None and flows:
         moving = [flow["scale"] for flow in flows if flow["scale"] > 0.0]
@@ -149,6 +157,8 @@ def page_data(rollout: Rollout, frames: Frames, room: Room, look: Look) -> dict[
         flow = flow_data(rollout, frames, look.flow, center, size, look.flow_scale)
     return {
         "flow": flow,
+        "forces": force_data(rollout, frames) if look.forces else None,
+        "pressure": None,
         "up": look.up.tolist(),
         "view_from": look.view_from.tolist(),
         "center": center.tolist(),

@@ -15,7 +15,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 # In the order in which they need each other.
-SCRIPTS = ("moment.js", "frames.js", "stage.js", "actors.js", "arrows.js", "plot.js", "player.js", "panel.js", "link.js", "main.js")
+SCRIPTS = ("moment.js", "frames.js", "stage.js", "actors.js", "arrows.js", "pressure.js", "plot.js", "player.js", "panel.js", "link.js", "main.js")
 SCRIPTS_BESIDE = ("moment.js", "beside.js")
 
 
@@ -26,7 +26,7 @@ def asset(name: str) -> str:
 
 
 def packed(array: ArrayLike, kind: str) -> dict[str, Any]:
-    """An array for JavaScript: `kind` is "f4", "f8" or "i4"; its numbers in base64, little end first."""
+    """An array for JavaScript: `kind` is "f4", "f8", "i4" or "i1"; its numbers in base64, little end first."""
     numbers = np.ascontiguousarray(array, dtype="<" + kind)
     return {
         "type": kind,

@@ -19,6 +19,7 @@ from hydrograd._hydrograd import FileError, InputError, Rollout, Simulator
 from hydrograd._viewer.data import Look, Room, page_data, share_scales
 from hydrograd._viewer.frames import Frames
 from hydrograd._viewer.page import beside, page
+from hydrograd._viewer.pressure import pressure_data
 
 Array = NDArray[np.float64]
 
@@ -162,6 +163,15 @@ def _points(given: ArrayLike) -> Array:
     return points
 
 
+def _pressure(given: bool | str) -> str | None:
+    """Which pressure, if any."""
+    if isinstance(given, (bool, np.bool_)):
+        return "flow" if given else None
+    if not isinstance(given, str) or given != "hydrostatic":
+        raise InputError(f'view: pressure: got {given!r}; must be True, False or "hydrostatic"')
+    return given
+
+
 def _noted(frames: Frames, states: int) -> str:
     """What is said of the states that are left out."""
     shown = len(frames.steps)
@@ -181,6 +191,8 @@ def view(
     force_scale: float | None = None,
     flow: ArrayLike | None = None,
     flow_scale: float | None = None,
+    forces: bool = False,
+    pressure: bool | str = False,
     colors: Mapping[str, str] | None = None,
     up: ArrayLike = (0.0, 0.0, 1.0),
     view_from: ArrayLike | None = None,
@@ -196,8 +208,9 @@ def view(
     `max_frames` states so many, evenly spread, with the first and the last. With `contacts`, points and forces of contact
     are there too, the arrow of a newton `force_scale` (m/N) long; without one, the largest force has an arrow of a quarter of the
     scene's size, and every tenth of it one that is a quarter of that shorter. `flow` are points (n, 3), m, where arrows show the water's velocity,
-    `flow_scale` (m per m/s) long, at the price of a solve a frame; it takes a simulator with the fidelity "full"
-    (`Rollout.flow`). `colors` are
+    `flow_scale` (m per m/s) long, at the price of a solve a frame (`Rollout.flow`). With `forces`, an arrow at each body's origin shows the force of the flow on it, "water" of `Rollout.loads`, in proportion; the largest of the rollout has one of a quarter
+    of the scene's size. With `pressure`, the faces of bodies in the water have colours by the pressure of the
+    flow there, at the price of solves at every frame (`Rollout.pressure`); with "hydrostatic", by its sum with the pressure of the water at rest. `colors` are
     "#rrggbb" by the names of bodies, `up` is the direction that stays upright and `view_from` the one from the scene to where it
     is seen from at first, world axes. `title` is the scene's name unless given; of several rollouts one for each.
     """
@@ -214,6 +227,8 @@ def view(
         force_scale=_scale("force_scale", force_scale, "m/N"),
         flow=None if flow is None else _points(flow),
         flow_scale=_scale("flow_scale", flow_scale, "m per m/s"),
+        forces=bool(forces),
+        pressure=_pressure(pressure),
     )
     most = _whole("max_frames", max_frames, 2)
     height = _whole("height", height, 1)
@@ -221,6 +236,9 @@ def view(
     room = Room.of(frames)
     data = [page_data(one, its, room, look) for one, its in zip(rollouts, frames, strict=True)]
     share_scales(data, look)
+    if look.pressure is not None:
+        for its_data, pressed in zip(data, pressure_data(rollouts, frames, look.pressure == "hydrostatic"), strict=True):
+            its_data["pressure"] = pressed
     notes = [_noted(its, len(one)) for one, its in zip(rollouts, frames, strict=True)]
     places = range(len(data)) if len(data) > 1 else [None]
     pages = [page(*of) for of in zip(titles, notes, data, places, strict=True)]

@@ -4,7 +4,7 @@
 //!
 //! | file | what it holds |
 //! |---|---|
-//! | `bodies.pvd` | the series of `bodies/bodies_00000.vtp` …: the triangles of all bodies, in the world; of each its `body` (number in the scene) and its centre's `velocity` (m/s); a body without a shape is a point |
+//! | `bodies.pvd` | the series of `bodies/bodies_00000.vtp` …: the triangles of all bodies, in the world; of each its `body` (number in the scene) and its centre's `velocity` (m/s), with [`Options::pressure`] also what the water does to it; a body without a shape is a point |
 //! | `walls.vtp` | walls as squares around the scene, where there are any; of each its `wall` (number in the scene) and whether it is `free` (1) or rigid (0) |
 //! | `loads.pvd` | with [`Options::loads`], the series of `loads/loads_00000.vtp` …: a point at each body's origin with forces (N) and moments about it (N m), kind by kind |
 //! | `flow.pvd` | with [`Options::flow`], the series of `flow/flow_00000.vti` …: the water's `velocity` (m/s) on a grid, and where it is `resolved` |
@@ -14,6 +14,8 @@
 mod file;
 mod flow;
 mod loads;
+mod placed;
+mod pressure;
 mod surface;
 
 pub use flow::{Grid, MOST_POINTS};
@@ -36,7 +38,10 @@ pub struct Options {
     pub frames: Frames,
     /// What acts on every body ([`Rollout::loads`]), which takes a solve a frame.
     pub loads: bool,
-    /// The water's velocity at the points of a grid ([`Rollout::flow`]), which takes a solve a frame and the fidelity `full`.
+    /// What the water does to every face of the bodies ([`Rollout::pressure`]), which takes solves of its own a frame: `pressure` of the flow and `hydrostatic` one of the water at rest, Pa, `water_velocity`,
+    /// m/s; `wetted`, 1 where they are known. All are zero on bodies that aren't in the water or have no shape.
+    pub pressure: bool,
+    /// The water's velocity at the points of a grid ([`Rollout::flow`]), which takes a solve a frame.
     pub flow: Option<Grid>,
 }
 
@@ -44,7 +49,7 @@ pub struct Options {
 ///
 /// # Errors
 /// Frames that select nothing ([`Frames::check`]), a grid that is refused ([`Grid::counts`]); a folder or a file that can't be written, by its path; what
-/// [`Rollout::loads`] and [`Rollout::flow`] report.
+/// [`Rollout::loads`], [`Rollout::pressure`] and [`Rollout::flow`] report.
 pub fn write(rollout: &Rollout, folder: &Path, options: &Options) -> Result<Vec<PathBuf>> {
     write_with(rollout, folder, options, || ControlFlow::Continue(()))
 }
@@ -80,7 +85,7 @@ pub fn write_with(
     let series = Series::new(folder, "bodies", "vtp", &times)?;
     let velocities = rollout.velocities();
     let frame = |(k, n): (usize, &usize)| {
-        let data = surface::bodies(rollout, &room, &velocities, *n);
+        let data = surface::bodies(rollout, &room, &velocities, *n, options.pressure);
         told(data.and_then(|data| series.write(k, data)))
     };
     in_order(states.par_iter().enumerate().map(frame))?;

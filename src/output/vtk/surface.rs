@@ -2,47 +2,22 @@
 
 use super::super::room::{Room, placed};
 use super::file::array;
+use super::placed::Placed;
+use super::pressure;
 use crate::Result;
 use crate::adjoint::lie::Vec3;
 use crate::geometry::WallSurface;
 use crate::simulate::Rollout;
 use nalgebra::DMatrix;
-use vtkio::model::{Attributes, DataSet, PolyDataPiece, VertexNumbers};
+use vtkio::model::{Attribute, Attributes, DataSet, PolyDataPiece, VertexNumbers};
 
-/// What is known of every face.
-struct Field {
-    name: &'static str,
-    /// Numbers a face.
-    components: u32,
-    /// Of each [`Placed`], face by face; one of a body without a shape.
-    values: Vec<Vec<f64>>,
-}
-
-/// A body at a state: its surface, or its origin if it has no shape, which counts as its one face.
-#[derive(Clone)]
-struct Placed<'a> {
-    body: usize,
-    vertices: Vec<Vec3>,
-    faces: Option<&'a [[usize; 3]]>,
-}
-
-impl Placed<'_> {
-    /// Of the faces.
-    fn centers(&self) -> Vec<Vec3> {
-        let center = |face: &[usize; 3]| face.iter().map(|i| self.vertices[*i]).sum::<Vec3>() / 3.0;
-        match self.faces {
-            Some(faces) => faces.iter().map(center).collect(),
-            None => self.vertices.clone(),
-        }
-    }
-}
-
-/// All bodies at state `n`; `velocities` are those of their origins and their angular ones ([`Rollout::velocities`]).
+/// All bodies at state `n`; `velocities` are those of their origins and their angular ones ([`Rollout::velocities`]). With `pressed`, what the water does to their faces as well.
 pub(super) fn bodies(
     rollout: &Rollout,
     room: &Room,
     velocities: &DMatrix<f64>,
     n: usize,
+    pressed: bool,
 ) -> Result<DataSet> {
     let poses = &rollout.samples()[n].poses;
     let each = room.meshes.iter().zip(poses).enumerate();
@@ -57,8 +32,11 @@ pub(super) fn bodies(
     // The format has points before triangles.
     let (points, surfaces): (Vec<_>, Vec<_>) = each.partition(|p| p.faces.is_none());
     let all = [points, surfaces].concat();
-    // What else is known of faces goes here.
-    let fields = [velocity(rollout, velocities, &all, n)];
+    // What is known of faces, body by body; one of a body without a shape.
+    let mut fields = vec![velocity(rollout, velocities, &all, n)];
+    if pressed {
+        fields.extend(pressure::fields(rollout, &all, n)?);
+    }
 
     let (mut points, mut corners, mut body) = (Vec::new(), Vec::new(), Vec::new());
     let mut before = 0;
@@ -68,37 +46,34 @@ pub(super) fn bodies(
         if placed.faces.is_none() {
             points.push(before as u64);
         }
-        let count = placed.faces.map_or(1, <[_]>::len);
-        body.extend(std::iter::repeat_n(placed.body as i32, count));
+        body.extend(std::iter::repeat_n(placed.body as i32, placed.count()));
         before += placed.vertices.len();
     }
     let mut data = Attributes::new();
     data.cell.push(array("body", 1, body));
-    for field in fields {
-        let values = field.values.concat();
-        data.cell.push(array(field.name, field.components, values));
-    }
+    data.cell.extend(fields);
     let vertices = all.iter().flat_map(|p| &p.vertices);
     Ok(polygons(vertices, points, (corners, 3), data))
 }
 
 /// Velocities of the faces' centres, m/s, world axes.
-fn velocity(rollout: &Rollout, velocities: &DMatrix<f64>, all: &[Placed], n: usize) -> Field {
+fn velocity(rollout: &Rollout, velocities: &DMatrix<f64>, all: &[Placed], n: usize) -> Attribute {
     let of = |placed: &Placed| {
-        let rows = velocities.fixed_view::<6, 1>(6 * placed.body, n);
-        let (linear, angular) = (rows.fixed_rows::<3>(0), rows.fixed_rows::<3>(3));
+        let part = |first| {
+            velocities
+                .fixed_view::<3, 1>(6 * placed.body + first, n)
+                .into_owned()
+        };
+        let (linear, angular): (Vec3, Vec3) = (part(0), part(3));
         let origin = rollout.samples()[n].poses[placed.body].translation;
-        let faces = placed.centers().into_iter().flat_map(|center| {
+        let faces = placed.centers().into_iter();
+        faces.flat_map(move |center| {
             let u: Vec3 = linear + angular.cross(&(center - origin));
             [u.x, u.y, u.z]
-        });
-        faces.collect()
+        })
     };
-    Field {
-        name: "velocity",
-        components: 3,
-        values: all.iter().map(of).collect(),
-    }
+    let values: Vec<f64> = all.iter().flat_map(of).collect();
+    array("velocity", 3, values)
 }
 
 /// The walls; none where there are none.

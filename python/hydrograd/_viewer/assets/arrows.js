@@ -1,4 +1,4 @@
-// Arrows: forces at contacts, and the water's velocity.
+// Arrows: forces at contacts, the water's velocity, and its forces on bodies.
 "use strict";
 
 hydrograd.Arrows = class {
@@ -109,6 +109,29 @@ hydrograd.Flow = class {
     for (let i = from; i < from + 3 * this.count; i += 3) {
       largest = Math.max(largest, Math.hypot(...this.velocities.subarray(i, i + 3)));
     }
+    return largest;
+  }
+};
+
+/** The force of the flow on each body, frame by frame. */
+hydrograd.Forces = class {
+  constructor(data, groups, stage) {
+    this.groups = groups;
+    this.forces = hydrograd.decode(data.forces.forces); // (frames, bodies, 3), N
+    const { largest } = data.forces;
+    this.length = (force) => (largest > 0 ? (0.25 * data.size * force) / largest : 0);
+    const look = { thickness: 0.006 * data.size, color: 0x6a1b9a, on_top: true };
+    this.arrows = new hydrograd.Arrows(stage.world, groups.length, look);
+  }
+
+  /** Shows those of a frame where the bodies are now; gives the largest, N. */
+  place(frame) {
+    const count = this.groups.length;
+    const from = 3 * count * frame;
+    const points = this.groups.flatMap(({ position }) => position.toArray());
+    this.arrows.show(points, this.forces, count, { length: this.length, vectors_from: from });
+    let largest = 0;
+    for (let i = from; i < from + 3 * count; i += 3) largest = Math.max(largest, Math.hypot(...this.forces.subarray(i, i + 3)));
     return largest;
   }
 };

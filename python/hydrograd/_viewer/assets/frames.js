@@ -4,7 +4,7 @@
 /** A typed array from its parts: type, and numbers as base64, little end first. */
 hydrograd.decode = ({ type, data }) => {
   const bytes = Uint8Array.from(atob(data), (letter) => letter.charCodeAt(0));
-  const kinds = { f4: Float32Array, f8: Float64Array, i4: Int32Array };
+  const kinds = { f4: Float32Array, f8: Float64Array, i4: Int32Array, i1: Int8Array };
   return new kinds[type](bytes.buffer);
 };
 

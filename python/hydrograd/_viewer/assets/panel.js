@@ -89,6 +89,18 @@ hydrograd.Panel = class {
     of("glass", (seen) => player.bodies.glass(seen));
     for (const part of document.querySelectorAll(".contact")) part.hidden = !player.contacts.any;
     this.get("flow").parentElement.hidden = !player.flow;
+    of("loads", (shown) => player.forces && player.forces.arrows.visible({ arrows: shown }));
+    this.get("loads").parentElement.hidden = !player.forces;
+    const pressed = player.pressure && player.pressure.any;
+    this.get("pressure").parentElement.hidden = !pressed;
+    if (pressed) {
+      this.get("pressure").nextSibling.textContent = player.pressure.name;
+      player.pressure.legend(this.get("pressures"));
+    }
+    of("pressure", (shown) => {
+      if (player.pressure) player.pressure.show(shown);
+      this.get("pressures").hidden = !pressed || !shown;
+    });
   }
 
   /** A line for each body: shown or not, and whom the camera may follow. */
@@ -162,6 +174,8 @@ hydrograd.Panel = class {
       facts.push(count ? `contacts ${count}, up to ${hydrograd.figure(largest)} N` : "contacts 0");
     }
     if (player.flow) facts.push(`flow up to ${hydrograd.figure(player.fastest)} m/s`);
+    if (player.forces) facts.push(`force of the flow up to ${hydrograd.figure(player.strongest)} N`);
+    if (player.pressure && player.pressure.any) facts.push(`pressure ${[...player.pressed].map(hydrograd.figure).join(" … ")} Pa`);
     this.get("facts").replaceChildren(...facts.filter(Boolean).map((fact) => {
       const line = document.createElement("div");
       line.textContent = fact;

@@ -10,6 +10,8 @@ hydrograd.Player = class {
     this.bodies = new hydrograd.Bodies(data, this.frames, stage);
     this.contacts = new hydrograd.Contacts(data, stage);
     this.flow = data.flow ? new hydrograd.Flow(data, stage) : null;
+    this.forces = data.forces ? new hydrograd.Forces(data, this.bodies.groups, stage) : null;
+    this.pressure = data.pressure ? new hydrograd.Pressure(data.pressure, this.bodies.groups) : null;
     this.followed = -1;
     this.speed = 1;
     this.loop = false;
@@ -36,6 +38,8 @@ hydrograd.Player = class {
     this.bodies.place(at);
     this.touching = this.contacts.place(at.frame);
     this.fastest = this.flow ? this.flow.place(at.frame) : 0;
+    this.strongest = this.forces ? this.forces.place(at.frame) : 0;
+    this.pressed = this.pressure ? this.pressure.place(at.frame) : null;
     if (before) this.stage.shift(this.bodies.middle(this.followed).sub(before));
     this.stage.ask();
     this.listeners.forEach((listener) => listener(this));

@@ -3,7 +3,6 @@
 mod choices;
 mod contact;
 mod controller;
-mod flow;
 mod limits;
 mod lubrication;
 mod symmetry;
@@ -22,14 +21,13 @@ use crate::memory;
 use crate::multibody::Tree;
 use crate::policy::Policy;
 use crate::scene::{Body, Scene, Site};
-use crate::water::{self, Clearance, Prepared, Surface, pose};
+use crate::water::{self, Clearance, FlowSurface, Prepared, Surface, pose};
 use crate::{Error, Result};
 use nalgebra::{DMatrix, DVector};
 use std::path::Path;
 use std::sync::{Arc, OnceLock};
 
 pub use choices::Choices;
-pub(crate) use flow::FlowSurface;
 pub(crate) use lubrication::bearing;
 
 /// A scene made ready.
@@ -57,6 +55,21 @@ impl Assembled {
         }
         let made = water::surfaces(scene, &choices.water)?;
         Ok(self.surfaces.get_or_init(|| made))
+    }
+
+    /// Surfaces of the bodies in the water, on which the flow is computed; they are solved at the first call.
+    ///
+    /// # Errors
+    /// A body without a surface, or one that panels don't resolve.
+    pub fn flow_surfaces(&self, scene: &Scene, choices: &Choices) -> Result<&[FlowSurface]> {
+        if let Some(found) = self.flow_surfaces.get() {
+            return Ok(found);
+        }
+        let numbers: Vec<usize> = self.system.submerged().map(|(b, _)| b).collect();
+        let surfaces = self.surfaces(scene, choices)?;
+        let own = self.system.coupling.surfaces();
+        let made = FlowSurface::all(scene, &numbers, surfaces, own)?;
+        Ok(self.flow_surfaces.get_or_init(|| made))
     }
 
     /// Other parameters, of the same table.

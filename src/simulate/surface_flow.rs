@@ -2,10 +2,10 @@
 
 use super::{Sample, Simulator};
 use crate::adjoint::lie::{Pose, Vec3, Vec6, cross_motion, point_velocity, six};
-use crate::assembly::FlowSurface;
 use crate::coupling::{Motion, SurfacePotential};
 use crate::geometry::{Faces, Image};
 use crate::multibody::Virtual;
+use crate::water::FlowSurface;
 use crate::{Error, Result};
 use nalgebra::DVector;
 

@@ -41,6 +41,7 @@ mod estimate;
 mod fidelity;
 #[cfg(test)]
 mod film_limits;
+mod flow_surface;
 mod gap_error;
 mod gap_model;
 #[cfg(test)]
@@ -64,6 +65,7 @@ pub use submerged::Discretisation;
 
 pub(crate) use clearance::Clearance;
 pub(crate) use estimate::Subject;
+pub(crate) use flow_surface::FlowSurface;
 pub(crate) use prepared::{Prepared, own_added_mass, prepare, world_axes};
 pub(crate) use submerged::in_water;
-pub(crate) use surface::{Surface, pose, semi_axes};
+pub(crate) use surface::{Surface, pose};

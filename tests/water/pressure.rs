@@ -1,11 +1,13 @@
 //! The pressure on bodies: its sum against what the dynamics do to them.
 
-use crate::support::{example, says};
-use hydrograd::adjoint::lie::{Vec3, Vec6};
-use hydrograd::geometry::Wall;
+use crate::support::{example, mesh, says};
+use hydrograd::adjoint::lie::{Pose, Vec3, Vec6, exp_matrix};
+use hydrograd::boundary::{EllipsoidSurface, ExactBoundary, Response};
+use hydrograd::geometry::{Faces, Wall};
 use hydrograd::scene::{Body, Current, Fluid, Placement, Scene, Shape};
 use hydrograd::simulate::{Method, SurfacePressure};
 use hydrograd::{Controls, Fidelity, Rollout, Settings, Simulator};
+use std::f64::consts::PI;
 
 /// Largest difference of the wrenches of pressures and of dynamics over all bodies: of forces in parts of the largest there, of moments
 /// in parts of it at the body's farthest point.
@@ -157,7 +159,7 @@ fn a_sphere_that_moves_steadily_has_the_pressure_of_the_books() {
     }
     scene.gravity = [0.0, 0.0, -9.81];
     let made = &at_start(&scene, Settings::default()).pressure(0).unwrap()[0];
-    let lifted = 998.0 * 9.81 * 4.0 / 3.0 * std::f64::consts::PI * 0.027;
+    let lifted = 998.0 * 9.81 * 4.0 / 3.0 * PI * 0.027;
     assert!((made.hydrostatic_wrench()[2] / lifted - 1.0).abs() < 2e-3);
 }
 
@@ -181,4 +183,57 @@ fn pressures_that_are_not_known_are_refused() {
         run(&stream, Fidelity::Reduced).pressure(0).unwrap_err(),
         &["current"],
     );
+}
+
+#[test]
+fn potentials_are_those_of_the_closed_form_and_gradients_their_slopes() {
+    for axes in [[0.3, 0.3, 0.3], [0.3, 0.2, 0.1], [0.1, 0.4, 0.4]] {
+        let pose = Pose::new(
+            exp_matrix(&Vec3::new(0.3, -0.2, 0.5)),
+            Vec3::new(0.1, 0.2, -0.3),
+        );
+        let surface = mesh(&Shape::ellipsoid(axes), 320);
+        let faces = Faces::of(&surface.transformed(&pose));
+        let made = EllipsoidSurface::new(axes, &pose, &faces).unwrap();
+        let exact = ExactBoundary::new("e", axes, &pose, 0.1).unwrap();
+        let twist = Vec6::new(0.3, -0.5, 0.7, 1.1, -0.4, 0.9);
+        // Just outside, as the closed form asks for.
+        let outward = |h: f64| -> Vec<Vec3> {
+            let places = made.faces.centres.iter().zip(&made.faces.normals);
+            places.map(|(x, n)| x + h * n).collect()
+        };
+        let right = exact.radiated(&outward(1e-9)).unwrap();
+        let found = made.potentials(&twist);
+        let largest = found.iter().fold(0.0, |a: f64, x| a.max(x.abs()));
+        for (i, found) in found.iter().enumerate() {
+            let right: f64 = (0..6).map(|k| right[(i, k)] * twist[k]).sum();
+            assert!(
+                (found - right).abs() < 1e-7 * largest,
+                "{axes:?}: {found} {right}"
+            );
+        }
+        let h = 1e-4;
+        let slopes = made.gradients(&twist);
+        for (i, (slope, normal)) in slopes.iter().zip(&made.faces.normals).enumerate() {
+            let along = normal.cross(&Vec3::new(0.3, 0.8, 0.5)).normalize();
+            // Both are as far outside.
+            let points = [h, -h].map(|h| made.faces.centres[i] + h * along);
+            let ends = exact.radiated(&points).unwrap();
+            let right: f64 = (0..6)
+                .map(|k| (ends[(0, k)] - ends[(1, k)]) * twist[k] / (2.0 * h))
+                .sum();
+            assert!(
+                (slope.dot(&along) - right).abs() < 1e-4,
+                "{} {right}",
+                slope.dot(&along)
+            );
+            assert!(slope.dot(normal).abs() < 1e-12);
+        }
+        // Patches cover the whole ellipsoid: its volume, by ∮ x·n dA / 3.
+        let faces = &made.faces;
+        let each = faces.centres.iter().zip(&faces.normals).zip(&faces.areas);
+        let volume: f64 = each.map(|((x, n), a)| x.dot(n) * a / 3.0).sum();
+        let right = 4.0 / 3.0 * PI * axes.iter().product::<f64>();
+        assert!((volume / right - 1.0).abs() < 2e-3, "{}", volume / right);
+    }
 }

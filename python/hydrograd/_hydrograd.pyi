@@ -985,9 +985,10 @@ class Rollout:
         """What an inertial measurement unit at the site of this name reads at every state (n, 6): acceleration less gravity (m/s²) and rates (rad/s), in the site's axes."""
     def flow(self, state: int, points: ArrayLike) -> _Array:
         """The water's velocity at `points` (n, 3), m, at state `state`: (n, 3), m/s, world axes, the current included. It takes a
-        solve. Points within a body, behind a wall, or nearer to a surface than half an
-        edge of its mesh are refused: `flow_resolved` tells them apart. Negative numbers count states from the end."""
-    def flow_pressure(self, state: int, points: ArrayLike) -> _Array: ...
+        solve. Points within a body, behind a wall, or too near to an edge or to two
+        surfaces at once are refused: `flow_resolved` tells them apart. Negative numbers count states from the end."""
+    def flow_pressure(self, state: int, points: ArrayLike) -> _Array:
+        """The pressure of the flow at `points` (n, 3), m, at state `state`: (n,), Pa, zero far away, that of the water at rest left out. Points as of `flow`."""
     def flow_resolved(self, state: int, points: ArrayLike) -> NDArray[np.bool_]:
         """Whether `flow` knows the velocity at each of `points` (n, 3), m, at state `state`: (n,)."""
     def observe(self, name: str) -> _Array:

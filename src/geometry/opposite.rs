@@ -14,7 +14,7 @@ enum Kind {
     /// In the frame of its body.
     Solid(Box<Solid>),
     /// In the frame of its body.
-    Mesh(MeshTree),
+    Mesh(Box<MeshTree>),
     /// In the world's frame.
     Wall(HalfSpace),
 }
@@ -24,7 +24,7 @@ impl Opposite {
     pub fn of_body(solid: Option<&Solid>, mesh: &TriMesh) -> Self {
         match solid {
             Some(solid) => Self(Kind::Solid(Box::new(solid.clone()))),
-            None => Self(Kind::Mesh(MeshTree::new(mesh))),
+            None => Self(Kind::Mesh(Box::new(MeshTree::new(mesh)))),
         }
     }
 

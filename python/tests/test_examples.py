@@ -312,6 +312,21 @@ def test_what_is_shown_of_replays(tmp_path, monkeypatch):
     exec(blocks[0], {})
     scene = hg.Scene.load("examples/scenes/falling_ball.toml")
     rollout = hg.Simulator(scene, fidelity="full", faces=80).rollout(steps=2)
-    exec(blocks[1], {"np": np, "hg": hg, "rollout": rollout})
-    assert {path.name for path in tmp_path.glob("*.html")} == {"grasp.html", "ball.html"}
+    for block in blocks[1:]:
+        exec(block, {"np": np, "hg": hg, "rollout": rollout})
+        assert {path.name for path in tmp_path.glob("*.html")} == {"grasp.html", "ball.html"}
+        (tmp_path / "ball.html").unlink()
+    assert len(blocks) == 3
+
+
+def test_what_is_shown_of_pressures(capsys):
+    """The programs in docs/pressure.md run."""
+    blocks = re.findall(r"^```python\n(.*?)^```", (ROOT / "docs/pressure.md").read_text(), re.MULTILINE | re.DOTALL)
+    scene = hg.Scene.load(ROOT / "examples/scenes/falling_ball.toml")
+    rollout = hg.Simulator(scene, fidelity="reduced", faces=80).rollout(steps=2)
+    names = {"rollout": rollout, "state": 1, "points": np.array([[0.0, 1.5, 0.0], [0.0, -1.0, 0.3]])}
+    for block in blocks:
+        exec(block, names)
+    assert "coin" in capsys.readouterr().out
+    assert names["u"].shape == (2, 3) and names["p"].shape == names["known"].shape == (2,)
     assert len(blocks) == 2

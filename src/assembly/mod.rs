@@ -65,10 +65,9 @@ impl Assembled {
         if let Some(found) = self.flow_surfaces.get() {
             return Ok(found);
         }
-        let numbers: Vec<usize> = self.system.submerged().map(|(b, _)| b).collect();
-        let surfaces = self.surfaces(scene, choices)?;
-        let own = self.system.coupling.surfaces();
-        let made = FlowSurface::all(scene, &numbers, surfaces, own)?;
+        let (surfaces, tree) = (self.surfaces(scene, choices)?, &self.system.tree);
+        let (_, bodies) = water::in_water(scene, surfaces, tree, choices.water.fidelity.coupled());
+        let made = FlowSurface::all(&bodies, self.system.coupling.surfaces())?;
         Ok(self.flow_surfaces.get_or_init(|| made))
     }
 

@@ -157,8 +157,23 @@ impl Simulator {
     }
 
     fn flow(&self, sample: &Sample, points: &[Vec3]) -> Result<Vec<Vec3>> {
+        // What doesn't know the flow at all isn't asked for it.
+        if points.is_empty() {
+            return Ok(Vec::new());
+        }
         let (own, flows) = self.flows(sample, points)?;
-        let places = self.places("flow", points, &sample.poses, &flows)?;
+        self.flow_by(sample, own, &flows, points)
+    }
+
+    /// From what [`Simulator::flows`] found for these points, or for more.
+    fn flow_by(
+        &self,
+        sample: &Sample,
+        own: bool,
+        flows: &[BodyFlow],
+        points: &[Vec3],
+    ) -> Result<Vec<Vec3>> {
+        let places = self.places("flow", points, &sample.poses, flows)?;
         let found = match own {
             true => {
                 let own = self.own_flow(sample, &places.asked)?.unwrap_or_default();
@@ -168,11 +183,40 @@ impl Simulator {
                 };
                 own.into_iter().map(still).collect()
             }
-            false => self.layered(&flows, &places.asked, false)?,
+            false => self.layered(flows, &places.asked, false)?,
         };
-        let each = places.join(&flows, &found).into_iter().zip(points);
+        let each = places.join(flows, &found).into_iter().zip(points);
         let water = |x| (self.system()).water_velocity(x, sample.time, self.parameters());
         Ok(each.map(|(u, x)| u.velocity + water(x)).collect())
+    }
+
+    /// Whether the flow is known at each point, from what [`Simulator::flows`] found for them.
+    fn resolved(&self, sample: &Sample, flows: &[BodyFlow], points: &[Vec3]) -> Vec<bool> {
+        let clear = |x: &Vec3| {
+            let finite = x.iter().all(|c| c.is_finite());
+            let found = || self.approach(x, &sample.poses, flows);
+            finite && !matches!(found(), Approach::Unknown(_))
+        };
+        points.par_iter().map(clear).collect()
+    }
+
+    /// The flow where it is known, by one solve.
+    #[cfg(feature = "output")]
+    fn known_flow(&self, sample: &Sample, points: &[Vec3]) -> Result<Vec<Option<Vec3>>> {
+        let (own, flows) = match self.flows(sample, points) {
+            Err(Error::Unsupported { .. }) => return Ok(vec![None; points.len()]),
+            made => made?,
+        };
+        let resolved = self.resolved(sample, &flows, points);
+        let marked = points.iter().zip(&resolved);
+        let clear: Vec<Vec3> = marked.filter(|(_, r)| **r).map(|(x, _)| *x).collect();
+        let mut found = match clear.is_empty() {
+            true => Vec::new(),
+            false => self.flow_by(sample, own, &flows, &clear)?,
+        }
+        .into_iter();
+        let each = resolved.into_iter();
+        Ok(each.map(|r| r.then(|| found.next()).flatten()).collect())
     }
 
     /// The flow's pressure at points with the generalised accelerations `gains`, Pa.
@@ -305,6 +349,9 @@ impl Rollout {
         let sample = self.sample("flow_pressure", n)?;
         let simulator = self.simulator();
         simulator.check_pressure()?;
+        if points.is_empty() {
+            return Ok(Vec::new());
+        }
         let loads = self.loads(n)?;
         let made = simulator.flow_pressure(sample, loads.acceleration(), points);
         made.map_err(|e| e.at_time(sample.time))
@@ -318,16 +365,22 @@ impl Rollout {
     pub fn flow_resolved(&self, n: usize, points: &[Vec3]) -> Result<Vec<bool>> {
         let sample = self.sample("flow_resolved", n)?;
         let simulator = self.simulator();
-        let flows = match simulator.flows(sample, points) {
-            Err(Error::Unsupported { .. }) => return Ok(vec![false; points.len()]),
-            made => made.map_err(|e| e.at_time(sample.time))?.1,
-        };
-        let clear = |x: &Vec3| {
-            let finite = x.iter().all(|c| c.is_finite());
-            let found = || simulator.approach(x, &sample.poses, &flows);
-            finite && !matches!(found(), Approach::Unknown(_))
-        };
-        Ok(points.par_iter().map(clear).collect())
+        match simulator.flows(sample, points) {
+            Err(Error::Unsupported { .. }) => Ok(vec![false; points.len()]),
+            Err(e) => Err(e.at_time(sample.time)),
+            Ok((_, flows)) => Ok(simulator.resolved(sample, &flows, points)),
+        }
+    }
+
+    /// [`Rollout::flow`] where [`Rollout::flow_resolved`], with the solves of one.
+    ///
+    /// # Errors
+    /// As these.
+    #[cfg(feature = "output")]
+    pub(crate) fn known_flow(&self, n: usize, points: &[Vec3]) -> Result<Vec<Option<Vec3>>> {
+        let sample = self.sample("flow", n)?;
+        let made = self.simulator().known_flow(sample, points);
+        made.map_err(|e| e.at_time(sample.time))
     }
 
     fn sample(&self, what: &str, n: usize) -> Result<&Sample> {

@@ -130,13 +130,8 @@ impl BodyFlow<'_> {
     /// Adds the velocity that the layers on its panels, and on those of its images, give to the water at points (m, world frame), and ∂φ/∂t there in water at rest.
     fn layers(&self, images: &[Image], points: &[Vec3], rates: bool, out: &mut [Water]) {
         let panels = &self.surface.panels;
-        let faces = &panels.faces;
-        let normal = |twist: &Vec6| -> Vec<f64> {
-            let of = |i: usize| faces.twist_flux(i).dot(twist) / faces.areas[i];
-            (0..faces.len()).map(of).collect()
-        };
-        let velocity = normal(&self.twist);
-        let rate = normal(&self.twist_rate);
+        let velocity = panels.own_normal_velocity(&self.twist);
+        let rate = panels.own_normal_velocity(&self.twist_rate);
         for image in images {
             let (rotation, shift) = image.placement(&self.pose);
             let seen: Vec<Vec3> = (points.iter())

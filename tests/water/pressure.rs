@@ -189,6 +189,22 @@ fn pressures_that_are_not_known_are_refused() {
         run(&stream, Fidelity::Reduced).pressure(0).unwrap_err(),
         &["current"],
     );
+
+    // A film holds the boxes apart: nobody tells of points there, but for asking after none.
+    let mut boxes = Scene::new(Fluid::fresh_water());
+    for x in [0.0, 1.02] {
+        boxes.add(
+            Body::new(Shape::cuboid([1.0; 3]))
+                .density(900.0)
+                .at([x, 0.0, 0.0]),
+        );
+    }
+    let made = run(&boxes, Fidelity::Reduced);
+    says(made.pressure(0).unwrap_err(), &["film"]);
+    let far = [Vec3::new(0.0, 3.0, 0.0)];
+    says(made.flow(0, &far).unwrap_err(), &["film"]);
+    assert_eq!(made.flow_resolved(0, &far).unwrap(), [false]);
+    assert!(made.flow(0, &[]).unwrap().is_empty());
 }
 
 #[test]

@@ -14,7 +14,7 @@
 //! ```
 //!
 //! # References
-//! J. W. S. Rayleigh's corner flow: H. Lamb, Hydrodynamics (1932), art. 63.
+//! H. Lamb, Hydrodynamics (1932), art. 63 (flow around a corner).
 
 use super::{PanelBoundary, SHARP};
 use crate::adjoint::lie::Vec3;

@@ -168,8 +168,12 @@ impl PanelBoundary {
 
     /// Potentials of the panels for a twist of the body in water at rest, m²/s.
     pub(crate) fn own_potential(&self, twist: &Vec6) -> Vec<f64> {
-        let of = |i: usize| (0..6).map(|k| self.potential[(i, k)] * twist[k]).sum();
-        (0..self.faces.len()).map(of).collect()
+        combined(&self.potential, twist)
+    }
+
+    /// Their normal velocities, m/s.
+    pub(crate) fn own_normal_velocity(&self, twist: &Vec6) -> Vec<f64> {
+        combined(&self.normal_velocity, twist)
     }
 
     /// Potential at points outside (body frame, m) of layers with these normal velocities `q` (m/s) and potentials `phi` (m²/s) of the panels.
@@ -203,6 +207,12 @@ impl PanelBoundary {
             true => product(inverse, x.rows, x),
         }
     }
+}
+
+/// Rows per unit twist, of a twist.
+fn combined(rows: &Mat<f64>, twist: &Vec6) -> Vec<f64> {
+    let of = |i: usize| (0..6).map(|k| rows[(i, k)] * twist[k]).sum();
+    (0..rows.nrows()).map(of).collect()
 }
 
 /// Tells where a body is so thin for its faces that what moves along it, past its rim alone, isn't resolved.

@@ -220,7 +220,7 @@ impl Coupling for PanelCoupled {
         surface::check(motion, surfaces)?;
         let (model, columns) = (self.model(), motion.columns());
         let placed = PlacedPanels::new(model, motion.poses, &Arc::default(), &columns)?;
-        PanelSolution::new(Arc::new(placed), columns)?.surface_potentials(motion)
+        PanelSolution::of_potentials(Arc::new(placed), columns)?.surface_potentials(motion)
     }
 }
 

@@ -182,6 +182,21 @@ impl<'a> PanelSolution<'a> {
         })
     }
 
+    /// The same without adjoint densities: for potentials alone.
+    ///
+    /// # Errors
+    /// As there.
+    pub fn of_potentials(placed: Arc<PlacedPanels<'a>>, twists: DMatrix<f64>) -> Result<Self> {
+        Ok(Self {
+            phi: placed.potentials(&twists)?,
+            mu: Columns::zeros(placed.coupled.rows(), 0),
+            placed,
+            twists,
+            reached: Reached::default(),
+            fields: OnceLock::new(),
+        })
+    }
+
     /// Of every pair: ∇(S q − Ω/4π φ) of its panels at its points, `[point][column][3]`.
     pub fn fields(&self) -> &[Vec<f64>] {
         self.fields.get_or_init(|| {

@@ -98,23 +98,14 @@ impl Grid {
 
 /// The flow at the points of a grid at state `n`: zero, and marked, where it isn't resolved.
 pub(super) fn frame(rollout: &Rollout, grid: &Grid, points: &[Vec3], n: usize) -> Result<DataSet> {
-    let mut resolved = rollout.flow_resolved(n, points)?;
-    let marked = points.iter().zip(&resolved);
-    let clear: Vec<Vec3> = marked.filter(|(_, r)| **r).map(|(x, _)| *x).collect();
-    let mut found = match clear.is_empty() {
-        true => Vec::new(),
-        false => rollout.flow(n, &clear)?,
-    }
-    .into_iter();
     let mut velocity = Vec::with_capacity(3 * points.len());
-    for resolved in &mut resolved {
-        let known = resolved.then(|| found.next()).flatten();
+    let mut marks: Vec<u8> = Vec::with_capacity(points.len());
+    for known in rollout.known_flow(n, points)? {
         // Readers stumble over what isn't a number.
         let known = known.filter(|u| u.iter().all(|x| x.is_finite()));
-        *resolved = known.is_some();
+        marks.push(u8::from(known.is_some()));
         velocity.extend_from_slice(known.unwrap_or_default().as_slice());
     }
-    let marks: Vec<u8> = resolved.iter().map(|r| u8::from(*r)).collect();
     let ghosts: Vec<u8> = marks.iter().map(|m| HIDDEN * (1 - m)).collect();
     let mut data = Attributes::new();
     data.point.push(array("velocity", 3, velocity));

@@ -5,6 +5,7 @@ use hydrograd::adjoint::lie::{Pose, Vec3, Vec6, exp_matrix};
 use hydrograd::boundary::{EllipsoidSurface, ExactBoundary, Response};
 use hydrograd::geometry::{Faces, Wall};
 use hydrograd::scene::{Body, Current, Fluid, Placement, Scene, Shape};
+use hydrograd::shape::file::write_obj;
 use hydrograd::simulate::{Method, SurfacePressure};
 use hydrograd::{Controls, Fidelity, Rollout, Settings, Simulator};
 use std::f64::consts::PI;
@@ -113,6 +114,23 @@ fn pressures_add_up_to_what_the_dynamics_do_to_round_bodies() {
             );
         }
     }
+}
+
+/// A mesh has no closed form: all of it is by panels.
+#[test]
+fn pressures_add_up_on_meshes_too() {
+    let folder = tempfile::tempdir().unwrap();
+    let errors = [320, 1280].map(|faces| {
+        let path = folder.path().join(format!("{faces}.obj"));
+        write_obj(&path, &mesh(&Shape::ellipsoid([0.2, 0.1, 0.06]), faces)).unwrap();
+        let mut scene = ellipsoid_beside_a_wall();
+        scene.bodies[0].shape = Some(Shape::mesh(&path));
+        let settings = Settings::default().fidelity(Fidelity::Reduced);
+        error(&at_start(&scene, settings), 0)
+    });
+    println!("mesh: {errors:.4?}");
+    let [coarse, fine] = errors;
+    assert!(fine < 0.02 && fine < coarse / 3.0, "{coarse} {fine}");
 }
 
 #[test]

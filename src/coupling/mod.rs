@@ -27,6 +27,7 @@ pub mod panel;
 pub mod reduced;
 mod response;
 mod settings;
+mod shape;
 mod surface;
 mod tensor;
 
@@ -35,6 +36,7 @@ pub use given::Given;
 pub use isolated::Isolated;
 pub use panel::{ExtrapolatedPanels, FilmedPanels, PanelCoupled, PanelModel};
 pub use response::{CoupledResponse, Reached};
+pub use shape::{ShapeDirection, ShapeTerm};
 pub use surface::{Motion, SurfacePotential};
 pub use tensor::PairTensor;
 
@@ -71,6 +73,11 @@ pub trait Coupling: Send + Sync {
     /// nobody need ask for its products with a basis. `None` where bodies feel each other or a wall.
     fn apart(&self) -> Option<&[Mat6]> {
         None
+    }
+
+    /// Number of shape parameters that it was made with ([`ShapeDirection`]): their order is that of what [`Linearised::shape_vjp`] tells.
+    fn shape_parameters(&self) -> usize {
+        0
     }
 
     /// What normal velocities left between the collocation points are worth: the change of
@@ -293,6 +300,15 @@ pub trait Linearised: Send + Sync {
     /// # Errors
     /// A solve that misses its tolerance.
     fn hvp(&self, x: Direction, y: Direction, z: &[Vec6]) -> Result<Tangent>;
+
+    /// Derivative of the sum of `terms` with respect to each shape parameter that the coupling was made with, at constant poses and body-frame twists: exactly that
+    /// of the discrete sums.
+    ///
+    /// # Errors
+    /// A solve that misses its tolerance; a coupling that has shape parameters, but not of what acts at these poses (films).
+    fn shape_vjp(&self, _terms: &[ShapeTerm]) -> Result<DVector<f64>> {
+        Ok(DVector::zeros(0))
+    }
 
     /// What it cost.
     fn report(&self) -> &CouplingReport;

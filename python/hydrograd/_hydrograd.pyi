@@ -526,6 +526,12 @@ class Scene:
     ) -> None:
         """Where the scene starts: joint coordinates `q` (q_size), generalised velocity `v` (v_size) or, instead of it, generalised
         momentum M(q)v. What is None starts at the origin and at rest."""
+    @property
+    def shape_parameters(self) -> dict[str, float]:
+        """The parameters of all bodies' shapes with their values, m (a mesh's scale: 1): "finger.size.y", "ball.radius" …"""
+    def with_shape_parameters(self, values: dict[str, float]) -> Scene:
+        """The scene with other values of some of `shape_parameters`, or of coordinates of a mesh's vertices ("hull.vertex.17.x") that is given number by number. What would turn a
+        body inside out is refused."""
     def validate(self) -> None:
         """Says what is wrong with the scene, if anything is."""
     def index(self, name: str) -> int:
@@ -562,7 +568,8 @@ class Simulator:
     "mfs-vertex" or "mfs-face". `integrator`: "momentum-euler", "energy-euler", "midpoint", "rk2", "rk4" or "velocity-euler". `tolerance` is the
     relative residual at which iterative solves stop ("full"), `faces` the number of triangles of shapes by formula.
     `accuracy` (relative), `rank` (points a body) and `resolved_gap` (m) belong to "reduced" and "auto", `films` (False: the water in gaps that aren't
-    resolved isn't added as films) to them and to "full" by panels, and `cache` is a folder that keeps compressed bodies. `backend`: "cpu" (the default), or "gpu" in a build with the feature of that name."""
+    resolved isn't added as films) to them and to "full" by panels. `shape_parameters` are names of shape parameters ("finger.size.y"), or what these begin with ("finger"; "hull.vertex" for all
+    vertices of a mesh), or "*": gradients have entries for them. `cache` is a folder that keeps compressed bodies. `backend`: "cpu" (the default), or "gpu" in a build with the feature of that name."""
     def __new__(
         cls,
         scene: Scene,
@@ -577,6 +584,7 @@ class Simulator:
         rank: int | None = None,
         resolved_gap: float | None = None,
         films: bool | None = None,
+        shape_parameters: list[str] | None = None,
         cache: _Path | None = None,
         backend: _Backend | None = None,
     ) -> Simulator: ...

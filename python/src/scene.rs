@@ -248,6 +248,22 @@ impl Scene {
         Ok(())
     }
 
+    /// The parameters of all bodies' shapes with their values, m (a mesh's scale: 1): "finger.size.y", "ball.radius" …
+    #[getter]
+    fn shape_parameters<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyDict>> {
+        self.0.shape_parameters().into_py_dict(py)
+    }
+
+    /// The scene with other values of some of `shape_parameters`, or of coordinates of a mesh's vertices ("hull.vertex.17.x") that is given number by number. What would turn a
+    /// body inside out is refused.
+    fn with_shape_parameters(&self, values: BTreeMap<String, f64>) -> PyResult<Self> {
+        let mut out = self.0.clone();
+        for (name, value) in &values {
+            out = out.with_shape_parameter(name, *value).or_raise()?;
+        }
+        Ok(Self(out))
+    }
+
     /// Says what is wrong with the scene, if anything is.
     fn validate(&self) -> PyResult<()> {
         self.0.validate().or_raise()

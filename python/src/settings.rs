@@ -63,13 +63,15 @@ pub struct Keywords<'a> {
     pub resolved_gap: Option<f64>,
     /// Whether gaps that compressed bodies or panels don't resolve have films: unless told not to.
     pub films: Option<bool>,
+    /// Shapes with respect to which gradients are wanted.
+    pub shape_parameters: Option<Vec<String>>,
     /// What computes the coupling.
     pub backend: Option<&'a str>,
 }
 
 impl Keywords<'_> {
     /// The settings.
-    pub fn settings(&self) -> PyResult<Settings> {
+    pub fn settings(self) -> PyResult<Settings> {
         Ok(Settings {
             time_step: positive("dt", self.dt)?,
             fidelity: choice("fidelity", self.fidelity)?,
@@ -81,6 +83,7 @@ impl Keywords<'_> {
             rank: self.rank,
             resolved_gap: positive("resolved_gap", self.resolved_gap)?,
             films: self.films,
+            shape_parameters: self.shape_parameters,
             backend: choice("backend", self.backend)?,
             ..Settings::default()
         })

@@ -18,6 +18,9 @@ pub struct Choices {
     pub in_place_of: Option<Integrator>,
     /// Time step, s.
     pub time_step: f64,
+    /// Shapes that are parameters: names, or what names begin with.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub shape_parameters: Vec<String>,
 }
 
 impl Choices {
@@ -31,6 +34,7 @@ impl Choices {
             },
             in_place_of: None,
             time_step,
+            shape_parameters: Vec::new(),
         }
     }
 }

@@ -135,6 +135,7 @@ pub(super) fn assemble(
     ]);
     Ok(ContactModel {
         shapes,
+        changed: Vec::new(),
         laws,
         rigid: given.stiffness.is_none(),
         wet: scene.fluid.density > 0.0 && water.fidelity.kind().coupled(),

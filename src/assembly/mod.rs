@@ -5,6 +5,7 @@ mod contact;
 mod controller;
 mod limits;
 mod lubrication;
+mod shape;
 mod symmetry;
 
 use crate::adjoint::drag::Element;
@@ -16,12 +17,12 @@ use crate::dynamics::{
     Armature, BodyData, BodyValues, Declarations, Drift, Drive, FreeMotions, Parameters, SiteData,
     Stepper, System, force,
 };
-use crate::geometry::TriMesh;
+use crate::geometry::{MassProperties, TriMesh};
 use crate::memory;
 use crate::multibody::Tree;
 use crate::policy::Policy;
 use crate::scene::{Body, Scene, Site};
-use crate::water::{self, Clearance, FlowSurface, Prepared, Surface, pose};
+use crate::water::{self, Clearance, FlowSurface, Prepared, ShapeChange, Surface, pose};
 use crate::{Error, Result};
 use nalgebra::{DMatrix, DVector};
 use std::path::Path;
@@ -83,9 +84,26 @@ fn coupled(scene: &Scene, choices: &Choices) -> bool {
     choices.water.fidelity.coupled() && scene.fluid.density > 0.0
 }
 
+/// What a body starts from, whose shape has these properties.
+fn body_values(scene: &Scene, body: &Body, properties: Option<&MassProperties>) -> BodyValues {
+    let own = inertia(body, properties);
+    let floats = scene.floats().filter(|float| float.body == body.name);
+    let (mass, center_of_mass, inertia) = floats.fold(own, |all, float| {
+        with_point_mass(all, float.mass, &float.at.into())
+    });
+    let centroid = properties.map_or(own.1, |p| p.centroid);
+    BodyValues {
+        name: body.name.clone(),
+        mass,
+        inertia,
+        center_of_mass,
+        volume: body.volume.or(properties.map(|p| p.volume)),
+        center_of_buoyancy: body.center_of_buoyancy.map_or(centroid, Vec3::from),
+    }
+}
+
 /// Mass, centre of mass and inertia of a body.
-fn inertia(body: &Body, surface: Option<&Surface>) -> (f64, Vec3, [f64; 6]) {
-    let properties = surface.map(|s| &s.properties);
+fn inertia(body: &Body, properties: Option<&MassProperties>) -> (f64, Vec3, [f64; 6]) {
     let mass = body.mass.unwrap_or_else(|| {
         let volume = properties.map_or(0.0, |p| p.volume);
         body.density.unwrap_or(0.0) * volume
@@ -138,6 +156,13 @@ fn elements(mesh: &TriMesh) -> Vec<Element> {
         .collect()
 }
 
+fn hull(mesh: &TriMesh) -> Hull {
+    Hull {
+        vertices: mesh.vertices().to_vec(),
+        faces: mesh.faces().to_vec(),
+    }
+}
+
 /// Prepares the scene; compressed bodies are kept in `folder`.
 pub(crate) fn assemble(
     scene: &Scene,
@@ -184,21 +209,8 @@ pub(crate) fn assemble(
     let mut controls = 0;
     for (b, body) in scene.bodies.iter().enumerate() {
         let surface = surfaces[b].as_ref();
-        let own = inertia(body, surface);
-        let floats = scene.floats().filter(|float| float.body == body.name);
-        let (mass, center_of_mass, inertia) = floats.fold(own, |all, float| {
-            with_point_mass(all, float.mass, &float.at.into())
-        });
         let volume = surface.map(|s| s.properties.volume);
-        let centroid = surface.map_or(own.1, |s| s.properties.centroid);
-        values.push(BodyValues {
-            name: body.name.clone(),
-            mass,
-            inertia,
-            center_of_mass,
-            volume: body.volume.or(volume),
-            center_of_buoyancy: body.center_of_buoyancy.map_or(centroid, Vec3::from),
-        });
+        values.push(body_values(scene, body, surface.map(|s| &s.properties)));
         faces.push(surface.map_or(Vec::new(), |s| elements(&s.mesh)));
         let mut first = |taken: bool, count: usize| {
             let at = controls;
@@ -223,10 +235,6 @@ pub(crate) fn assemble(
         })
         .collect();
     let clearance = Clearance::new(scene, &surfaces, &tree)?;
-    let hull = |mesh: &TriMesh| Hull {
-        vertices: mesh.vertices().to_vec(),
-        faces: mesh.faces().to_vec(),
-    };
     let hulls: Vec<Option<Hull>> = match scene.waterline {
         Some(_) => (surfaces.iter())
             .map(|s| Some(hull(&s.as_ref()?.mesh)))
@@ -238,11 +246,17 @@ pub(crate) fn assemble(
         s.as_ref()
             .map_or(v.center_of_mass, |s| s.properties.centroid)
     });
+    let changes = ShapeChange::wanted(scene, &surfaces, &choices.shape_parameters)?;
+    let shapes = shape::declare(scene, &changes, &in_water.0, &surfaces, &mut declared)?;
     let streams = Arc::new(Streams::new(scene, points.collect(), &mut declared));
     let added_mass = match streams.is_empty() || scene.fluid.density <= 0.0 {
         true => Vec::new(),
         false => water::own_added_mass(scene, &choices.water, &in_water)?,
     };
+    let lubricated = lubrication::lubricated(scene, &surfaces, &clearance)?;
+    shape::refuse(scene, &changes, &lubricated, !streams.is_empty())?;
+    let floating = scene.waterline.is_some();
+    let changed = shape::changed_surfaces(&changes, &shapes, &surfaces, floating);
     let parts = force::ForceParts {
         scene,
         time_step: dt,
@@ -252,7 +266,8 @@ pub(crate) fn assemble(
         surfaces: &faces,
         hulls: &hulls,
         waterline: scene.waterline.map(|_| streams.surface()),
-        lubricated: lubrication::lubricated(scene, &surfaces, &clearance)?,
+        lubricated,
+        changed: &changed,
         streams: streams.clone(),
         added_mass,
     };
@@ -278,6 +293,7 @@ pub(crate) fn assemble(
         streams,
         controls: scene.controls(),
         coupling: Arc::new(Isolated::new(Vec::new())),
+        shapes,
         contact: None,
         limits: Vec::new(),
         symmetric: DMatrix::zeros(0, 0),
@@ -292,11 +308,22 @@ pub(crate) fn assemble(
     if choices.water.fidelity.coupled() && scene.fluid.density > 0.0 {
         clearance.refuse_start(&poses)?;
     }
-    let mut water = water::prepare(scene, &choices.water, in_water, &poses, clearance, folder)?;
+    let mut water = water::prepare(
+        scene,
+        &choices.water,
+        in_water,
+        &poses,
+        clearance,
+        &changes,
+        folder,
+    )?;
     system.coupling = water.coupling.clone();
     water.reasons.extend(contact::stand_in(scene, choices));
     if let Some(given) = &scene.contact {
-        let made = contact::assemble(scene, given, dt, &water, &surfaces, &mut parameters)?;
+        let mut made = contact::assemble(scene, given, dt, &water, &surfaces, &mut parameters)?;
+        let contacts = &made.shapes;
+        made.changed =
+            shape::changed_contacts(scene, &changes, &system.shapes, &surfaces, contacts)?;
         let told = contact::warnings(scene, given, &water, &surfaces, &made);
         water.warnings.extend(told);
         system.contact = Some(made);

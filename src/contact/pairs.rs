@@ -67,6 +67,13 @@ impl Contacts {
         })
     }
 
+    /// The same with another shape of a body that is one piece.
+    pub fn with_piece(&self, b: usize, shape: ContactShape) -> Self {
+        let mut out = self.clone();
+        out.shapes[b] = vec![shape];
+        out
+    }
+
     /// The pairs that may come in contact: of bodies in pieces each piece by itself, and so the same bodies several times.
     pub fn pairs(&self) -> &[ContactPair] {
         &self.pairs

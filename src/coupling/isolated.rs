@@ -3,11 +3,11 @@
 use super::surface::{check, on_surfaces};
 use super::{
     Coupling, CouplingReport, Direction, Linearise, Linearised, Momenta, Motion, Pullback,
-    SurfacePotential, Tangent,
+    ShapeTerm, SurfacePotential, Tangent,
 };
-use crate::Result;
 use crate::adjoint::lie::{Mat6, Pose, Vec6};
 use crate::boundary::PanelBoundary;
+use crate::{Error, Result};
 use nalgebra::{DMatrix, DVector};
 use std::sync::Arc;
 
@@ -15,12 +15,31 @@ use std::sync::Arc;
 #[derive(Clone, Debug)]
 pub struct Isolated {
     added_mass: Vec<Mat6>,
+    /// A body with the derivative of its added mass, one a shape parameter.
+    shapes: Vec<(usize, Mat6)>,
 }
 
 impl Isolated {
     /// From each body's own added mass at unit density, body frame, about the body's origin.
     pub fn new(added_mass: Vec<Mat6>) -> Self {
-        Self { added_mass }
+        Self {
+            added_mass,
+            shapes: Vec::new(),
+        }
+    }
+
+    /// The same with shape parameters: each a body, by its number in the water, and the derivative of its added mass (unit density, body frame, about its origin).
+    ///
+    /// # Errors
+    /// [`Error::Input`] for a body that isn't there.
+    pub fn with_shapes(mut self, shapes: Vec<(usize, Mat6)>) -> Result<Self> {
+        let bodies = self.added_mass.len();
+        if let Some((b, _)) = shapes.iter().find(|(b, _)| *b >= bodies) {
+            let right = format!("must be below the number of bodies, {bodies}");
+            return Err(Error::input("shape parameter: body", b, right));
+        }
+        self.shapes = shapes;
+        Ok(self)
     }
 
     /// Impulses of columns of twists.
@@ -62,6 +81,10 @@ impl Coupling for Isolated {
         Some(&self.added_mass)
     }
 
+    fn shape_parameters(&self) -> usize {
+        self.shapes.len()
+    }
+
     fn surface_potentials(
         &self,
         motion: &Motion,
@@ -77,6 +100,7 @@ impl Linearise for Isolated {
         Ok(Box::new(IsolatedLinearised {
             coupling: self,
             value: self.evaluate(poses, basis)?,
+            basis: basis.clone(),
         }))
     }
 }
@@ -84,6 +108,7 @@ impl Linearise for Isolated {
 struct IsolatedLinearised<'a> {
     coupling: &'a Isolated,
     value: Momenta,
+    basis: DMatrix<f64>,
 }
 
 impl IsolatedLinearised<'_> {
@@ -136,6 +161,27 @@ impl Linearised for IsolatedLinearised<'_> {
             gradient: vec![Vec6::zeros(); z.len()],
             wrench: vec![Vec6::zeros(); z.len()],
         })
+    }
+
+    /// Σ weight x̄ᵀ dM̄ ȳ; no pose changes it, so that slopes have none.
+    fn shape_vjp(&self, terms: &[ShapeTerm]) -> Result<DVector<f64>> {
+        let twists = |x: Direction| match x {
+            Direction::Basis(c) => &self.basis * c,
+            Direction::Twist(x) => x.clone(),
+        };
+        let still = terms.iter().filter(|t| t.along.is_none());
+        let pairs: Vec<_> = still.map(|t| (t.weight, twists(t.x), twists(t.y))).collect();
+        let of = |(b, slope): &(usize, Mat6)| {
+            let each = pairs.iter().map(|(weight, x, y)| {
+                let (x, y) = (x.fixed_rows::<6>(6 * b), y.fixed_rows::<6>(6 * b));
+                weight * x.dot(&(slope * y))
+            });
+            each.sum::<f64>()
+        };
+        Ok(DVector::from_iterator(
+            self.coupling.shapes.len(),
+            self.coupling.shapes.iter().map(of),
+        ))
     }
 
     fn report(&self) -> &CouplingReport {

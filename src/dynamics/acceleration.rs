@@ -11,6 +11,7 @@
 
 use super::balance::rigid_parameters_vjp;
 use super::force::{Loads, Velocity};
+use super::shape::Bilinear;
 use super::slopes::unit;
 use super::{Evaluation, ForceCotangents, Linearisation, Slopes};
 use crate::Result;
@@ -171,6 +172,21 @@ impl Linearisation<'_> {
             &self.submerged_field(&fields.virtual_twist),
         )?;
         let along_twist = fluid.hvp(virt, through, &self.submerged_field(&fields.twist))?;
+        let by_v = (Some(&direction), relative.as_slice());
+        let by_w = (Some(&virtual_direction), fields.virtual_twist.as_slice());
+        let term = |weight, x, y, along| Bilinear {
+            weight,
+            x,
+            y,
+            along,
+        };
+        let terms = [
+            term(1.0, (None, carried.as_slice()), by_v, None),
+            term(-1.0, by_w, (None, bias.as_slice()), None),
+            term(0.5, by_v, by_v, Some(fields.virtual_twist.as_slice())),
+            term(-1.0, by_w, by_v, Some(fields.twist.as_slice())),
+        ];
+        self.add_shape_vjp(water, &terms, &mut out.parameters)?;
         let impulse_virtual = self.submerged_impulses(&along_virtual.momentum_x);
         let wrench_virtual = self.from_submerged(&along_virtual.wrench);
         let impulse_w = self.submerged_impulses(&along_twist.momentum_x);

@@ -17,6 +17,7 @@
 use super::fluid::{self, FluidMomenta};
 use super::force::{LoadBars, Loads, Moving, Place, Velocity};
 use super::linearisation::Water;
+use super::shape::Bilinear;
 use super::slopes::unit;
 use super::{Evaluation, ForceCotangents, Linearisation, Parameters, Slopes};
 use crate::Result;
@@ -506,6 +507,24 @@ impl Linearisation<'_> {
             .iter()
             .map(|f| self.submerged_field(&f.virtual_twist));
         let tangents = (water.linearised).displaced(&direction, &virt.collect::<Vec<_>>())?;
+        if rows.by_parameters() {
+            let relative: Vec<Vec6> = fields[0].twist.iter().map(|t| self.relative(t)).collect();
+            let through = (Some(&direction), relative.as_slice());
+            for ((fields, carried), out) in fields.iter().zip(&carried).zip(out.iter_mut()) {
+                let (half, virt) = (0.5, fields.virtual_twist.as_slice());
+                let terms = [
+                    (1.0, (None, carried.as_slice()), None),
+                    (half, through, Some(virt)),
+                ];
+                let terms = terms.map(|(weight, x, along)| Bilinear {
+                    weight,
+                    x,
+                    y: through,
+                    along,
+                });
+                self.add_shape_vjp(water, &terms, &mut out.parameters)?;
+            }
+        }
         for (k, tangent) in tangents.iter().enumerate() {
             let (fields, carried, bar) = (&fields[k], &carried[k], &mut bars[k]);
             for (b, w) in self.system.submerged() {

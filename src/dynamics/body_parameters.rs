@@ -31,6 +31,11 @@ pub fn center_of_buoyancy(b: usize) -> [Parameter; 3] {
     std::array::from_fn(|k| Parameter(volume(b).0 + 1 + k))
 }
 
+/// All parameters of body `b`: mass, inertia, centre of mass, volume and the centre of that.
+pub fn body_places(b: usize) -> [Parameter; 14] {
+    std::array::from_fn(|k| Parameter(mass(b).0 + k))
+}
+
 /// Parameters of contact of so many bodies: after theirs.
 pub fn contact(bodies: usize) -> [Parameter; CONTACT.len()] {
     std::array::from_fn(|k| Parameter(mass(bodies).0 + k))

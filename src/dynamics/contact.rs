@@ -1,6 +1,6 @@
 //! Contact among bodies and with walls: which surfaces may touch, by which law, and where they are near.
 
-use super::Parameters;
+use super::{Parameter, Parameters};
 use crate::adjoint::contact::{ContactBar, Law, PointState, Rates, positive};
 use crate::adjoint::lie::{Vec3, Vec6, angular, point_velocity, point_wrench, six};
 use crate::contact::{ContactPair, ContactPoint, Contacts};
@@ -11,12 +11,27 @@ use serde::Serialize;
 pub struct ContactModel {
     /// Their shapes.
     pub shapes: Contacts,
+    /// Shapes with a parameter of theirs changed.
+    pub changed: Vec<ChangedShape>,
     /// Law of each pair, in the order of [`Contacts::pairs`]; stiffness, dissipation and frictions are parameters and stand there.
     pub laws: Vec<Law>,
     /// Whether the stiffness is near rigid at the time step, so that it rises where a step is cut; one that was given stays what it is.
     pub rigid: bool,
     /// Whether there is water between the surfaces, which has no flow where they meet.
     pub wet: bool,
+}
+
+/// All shapes with a shape parameter of one body a little larger, and a little smaller.
+#[derive(Clone)]
+pub struct ChangedShape {
+    /// The body.
+    pub body: usize,
+    /// Its parameter.
+    pub parameter: Parameter,
+    /// The change of it, m.
+    pub step: f64,
+    /// The shapes.
+    pub shapes: [Contacts; 2],
 }
 
 /// Gap at which the surfaces of a pair are taken to touch.
@@ -35,6 +50,8 @@ pub struct ContactGap {
 /// A place where two surfaces are near at a configuration.
 #[derive(Clone, Debug)]
 pub struct PairContact {
+    /// The pair, by its number in [`Contacts::pairs`].
+    pub pair: usize,
     /// Body to which the normal points.
     pub first: usize,
     /// The other body; none for a wall.

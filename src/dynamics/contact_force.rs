@@ -78,6 +78,7 @@ impl System {
         let reach = onset + model.shapes.ahead(k).max(travel);
         let found = model.shapes.points_within(k, poses, reach)?;
         let place = |point: ContactPoint| PairContact {
+            pair: k,
             first: pair.first,
             second: pair.second_body(),
             law: sharpened(law, sharpness),
@@ -214,6 +215,8 @@ impl Evaluation<'_> {
             let position = rates.velocity.cross(&point_state.rates.spin)
                 + push.force.cross(&virtual_push.torque);
             t.displacement_vjp(&own, &position, &mut bar.pose);
+            let poses = &self.kinematics.poses;
+            self.system.add_contact_shape_vjp(t, poses, (&own, &position), &mut out.parameters);
             out.parameters.add_contact([
                 t.scale * own.stiffness,
                 own.dissipation,

@@ -12,7 +12,7 @@ pub enum Owner {
 }
 
 /// Values that a parameter may have.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Range {
     /// Any finite number.
     Finite,
@@ -22,6 +22,8 @@ pub enum Range {
     Positive,
     /// Zero alone; what would have to be done to change that.
     Zero(&'static str),
+    /// This one alone, with which the scene was built: what follows from another one is made with the scene.
+    Built(f64),
 }
 
 /// Sizes of a system's motion, which sizes of changes follow from.

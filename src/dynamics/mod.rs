@@ -8,6 +8,7 @@ mod body_loads;
 mod body_parameters;
 mod contact;
 mod contact_force;
+mod contact_shape;
 mod cotangents;
 mod damping;
 mod declared;
@@ -22,14 +23,16 @@ mod limit;
 mod linearisation;
 mod momentum;
 mod parameters;
+mod shape;
 mod slopes;
 mod stiffness;
 mod symmetry;
 mod system;
 
 pub use armature::Armature;
+pub(crate) use body_parameters::body_places;
 pub use body::{BodyData, SiteData};
-pub use contact::{ContactForce, ContactGap, ContactModel, Dual, PairContact};
+pub use contact::{ChangedShape, ContactForce, ContactGap, ContactModel, Dual, PairContact};
 pub use cotangents::ForceCotangents;
 pub use drift::Drift;
 pub use evaluation::Evaluation;
@@ -44,6 +47,7 @@ pub use linearisation::Linearisation;
 pub use parameters::{
     BodyValues, Declarations, Declared, Entry, Owner, Parameter, Parameters, Range, Typical,
 };
+pub use shape::{Follows, Shapes};
 pub use slopes::{InputTangents, Slopes};
 pub use stiffness::Damping;
 pub use symmetry::FreeMotions;

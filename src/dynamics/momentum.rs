@@ -1,6 +1,8 @@
 //! Generalised momentum p = M(q) v + p_rest(q) and its transpose.
 
 use super::balance::rigid_parameters_vjp;
+use super::linearisation::Water;
+use super::shape::Bilinear;
 use super::slopes::unit;
 use super::{Evaluation, ForceCotangents, Linearisation, Slopes};
 use crate::Result;
@@ -143,9 +145,12 @@ impl Linearisation<'_> {
                     let (system, kinematics) = (self.system, &self.kinematics);
                     let momenta_virtual = water.fluid.column(system, kinematics, *i);
                     let carried = [&momenta, &momenta_virtual, &self.from_submerged(&pairs[*i])];
-                    self.bilinear_row(&at(*i), current, Some(carried.map(Vec::as_slice)))
+                    let at = at(*i);
+                    let mut out = self.bilinear_row(&at, current, Some(carried.map(Vec::as_slice)));
+                    self.add_bilinear_shape(water, &at, &direction, current, &mut out)?;
+                    Ok(out)
                 };
-                entries.iter().map(row).collect()
+                entries.iter().map(row).collect::<Result<_>>()?
             }
             None => (entries.iter())
                 .map(|i| self.bilinear_row(&at(*i), current, None))
@@ -184,7 +189,34 @@ impl Linearisation<'_> {
         let momenta_virtual = self.momenta_in(water, &virtual_direction);
         let pair = water.linearised.gradient(&virtual_direction, &direction)?;
         let carried = [&momenta, &momenta_virtual, &self.from_submerged(&pair)];
-        Ok(self.bilinear_row(&at, current, Some(carried.map(Vec::as_slice))))
+        let mut out = self.bilinear_row(&at, current, Some(carried.map(Vec::as_slice)));
+        self.add_bilinear_shape(water, &at, &direction, current, &mut out)?;
+        Ok(out)
+    }
+
+    /// Adds the cotangents of the shapes for `ρ E(w, v)` to a row.
+    fn add_bilinear_shape(
+        &self,
+        water: &Water,
+        at: &Pair,
+        direction: &DVector<f64>,
+        current: Option<Vec6>,
+        out: &mut ForceCotangents,
+    ) -> Result<()> {
+        if self.system.shapes.water.is_empty() || !at.by_parameters {
+            return Ok(());
+        }
+        let current = current.unwrap_or_else(Vec6::zeros);
+        let relative: Vec<Vec6> = at.fields.twist.iter().map(|t| t - current).collect();
+        let virt = self.system.tree.twists(&self.kinematics, &at.w);
+        let virtual_direction = self.virtual_direction(&at.w);
+        let term = Bilinear {
+            weight: 1.0,
+            x: (Some(&virtual_direction), virt.as_slice()),
+            y: (Some(direction), relative.as_slice()),
+            along: None,
+        };
+        self.add_shape_vjp(water, &[term], &mut out.parameters)
     }
 
     /// Fields at the velocity `v`, without a virtual one.

@@ -19,6 +19,9 @@ pub use super::body_parameters::{
 };
 pub use super::declared::{Declared, Entry, Owner, Parameter, Range, Typical};
 
+/// What is told of a shape's parameter that is set.
+const BUILT: &str = "a shape's water is solved when the scene is built: change the shape in the scene (with_shape_parameter) and simulate that";
+
 /// All parameters of a system.
 #[derive(Clone, Debug)]
 pub struct ParameterTable {
@@ -233,6 +236,11 @@ impl Parameters {
         })
     }
 
+    /// Where the value of a declared parameter stands in [`Parameters::to_vec`].
+    pub fn place_of(&self, parameter: Parameter) -> usize {
+        self.table.places[parameter.0]
+    }
+
     /// Density of the fluid, kg/m³.
     pub fn density(&self) -> f64 {
         self[DENSITY]
@@ -339,6 +347,7 @@ impl Parameters {
         for (entry, value) in self.table.entries.iter().zip(&self.values) {
             let refused = match entry.declared.range {
                 Range::Zero(remedy) if *value != 0.0 => remedy,
+                Range::Built(built) if *value != built => BUILT,
                 Range::NotNegative if !(*value >= 0.0 && value.is_finite()) => {
                     "must be finite and not negative"
                 }

@@ -1,7 +1,9 @@
 //! A system: the tree, its bodies' constants, and the coupling through the water.
 
 use super::force::{ForceModel, Moving, Place, Streams};
-use super::{Armature, BodyData, ContactModel, Drift, JointLimit, Parameters, SiteData};
+use super::{
+    Armature, BodyData, ContactModel, Drift, JointLimit, Parameters, Shapes, SiteData,
+};
 use crate::adjoint::lie::{Vec3, Vec6};
 use crate::coupling::Coupling;
 use crate::multibody::Tree;
@@ -45,6 +47,8 @@ pub struct System {
     pub controls: usize,
     /// The coupling; its bodies are those with `submerged` set, in order.
     pub coupling: Arc<dyn Coupling>,
+    /// Shapes that are parameters.
+    pub shapes: Shapes,
     /// Contact; none where bodies pass through each other.
     pub contact: Option<ContactModel>,
     /// Limits of joints.

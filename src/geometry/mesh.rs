@@ -78,6 +78,17 @@ impl TriMesh {
         }
     }
 
+    /// The mesh with its vertices moved along `velocities` (m, one a vertex) by `t`, its faces as they are and unchecked: for small changes, along which derivatives
+    /// are taken.
+    pub(crate) fn displaced(&self, velocities: &[Vec3], t: f64) -> Self {
+        let moved = self.vertices.iter().zip(velocities);
+        Self {
+            name: self.name.clone(),
+            vertices: moved.map(|(x, v)| x + t * v).collect(),
+            faces: self.faces.clone(),
+        }
+    }
+
     /// File or shape name, for messages.
     pub fn name(&self) -> &str {
         &self.name

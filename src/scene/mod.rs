@@ -18,6 +18,7 @@ mod problem;
 #[cfg(feature = "urdf")]
 mod robot;
 mod servo;
+mod shape;
 mod site;
 mod spline;
 mod validate;

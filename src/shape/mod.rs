@@ -8,6 +8,7 @@ mod description;
 #[cfg(feature = "meshio")]
 pub mod file;
 mod mass;
+mod parameters;
 mod primitive;
 mod refine;
 mod solid;

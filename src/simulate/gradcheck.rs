@@ -3,6 +3,7 @@
 use super::{Controls, Cotangents, Rollout, Sample, Simulator};
 use crate::adjoint::lie::Vec3;
 use crate::adjoint::sample::Samples;
+use crate::dynamics::Range;
 use crate::{Error, Result};
 use nalgebra::{DMatrix, DVector};
 use serde::Serialize;
@@ -343,7 +344,13 @@ pub fn gradcheck_with(
         }
         // A part of each value, or a size of its own where the value is zero.
         let sizes = DVector::from_vec(parameters.sizes(scale.velocity.max(), scale.length));
-        let d = (0.3 * &sizes).component_mul(&vector(sizes.len()));
+        let mut d = (0.3 * &sizes).component_mul(&vector(sizes.len()));
+        // Shapes change with the scene, not with the parameters of one.
+        for (x, entry) in d.iter_mut().zip(parameters.table()) {
+            if matches!(entry.declared.range, Range::Built(_)) {
+                *x = 0.0;
+            }
+        }
         let base = DVector::from_vec(parameters.to_vec());
         let adjoint = dot(&gradient.parameters.to_vec(), d.as_slice());
         add("parameters", adjoint, &mut |h| {

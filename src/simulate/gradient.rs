@@ -118,6 +118,7 @@ impl Sums {
         out.state.q = bar.q.clone();
         stepper.conserved_vjp(&e, v, &bar.y, &mut out)?;
         self.gradient.parameters.add(&out.parameters);
+        (simulator.system().shapes).follow_vjp(&mut self.gradient.parameters);
         simulator.forget_driven(&mut out.state.q, &mut out.v);
         self.gradient.initial.q = out.state.q;
         self.gradient.initial.v = out.v;

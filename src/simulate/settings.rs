@@ -90,6 +90,9 @@ settings! {
     time_step: f64 => time_step;
     /// Faces per body of shapes by formula; `None`: what each shape says.
     faces: usize => water.faces;
+    /// Shapes with respect to which gradients are wanted: names of shape parameters (`finger.size.y`), or what these begin with (`finger`; `hull.vertex` for all vertices of a mesh), or
+    /// `*` for those of all bodies.
+    shape_parameters: Vec<String> => shape_parameters;
     /// What computes the coupling.
     backend: Backend => water.backend;
     /// Choices of [`Backend::Gpu`].

@@ -21,6 +21,8 @@ pub(super) struct Columns {
     all_parameters: usize,
     /// Places of the chosen parameters.
     pub parameters: Vec<usize>,
+    /// Where the chosen parameters have an effect beside their own, with its slope: each a column among them, and a parameter's place.
+    follows: Vec<(usize, usize, f64)>,
 }
 
 /// Derivatives of what a step makes; columns as in [`Columns`].
@@ -43,6 +45,7 @@ impl Columns {
             controls: system.controls,
             gains: simulator.policy().gains().len(),
             all_parameters: simulator.parameters().as_slice().len(),
+            follows: system.shapes.followers(simulator.parameters(), &parameters),
             parameters,
         }
     }
@@ -82,7 +85,12 @@ impl Columns {
         };
         let mut parameters = DMatrix::zeros(rows, chosen.ncols());
         for (row, place) in chosen.row_iter().zip(&self.parameters) {
-            parameters.row_mut(*place).copy_from(&row);
+            let mut own = parameters.row_mut(*place);
+            own += row;
+        }
+        for (from, to, slope) in &self.follows {
+            let mut follower = parameters.row_mut(*to);
+            follower += *slope * chosen.row(*from);
         }
         InputTangents {
             control,

@@ -50,6 +50,7 @@ mod method;
 mod numerics;
 mod prepared;
 mod resolved;
+mod shape;
 mod submerged;
 mod surface;
 
@@ -67,5 +68,6 @@ pub(crate) use clearance::Clearance;
 pub(crate) use estimate::Subject;
 pub(crate) use flow_surface::FlowSurface;
 pub(crate) use prepared::{Prepared, own_added_mass, prepare, world_axes};
+pub(crate) use shape::ShapeChange;
 pub(crate) use submerged::in_water;
 pub(crate) use surface::{Surface, pose};

@@ -9,14 +9,15 @@ use super::gap_model::GapModel;
 use super::method::kind::{BodyMethod, Problem};
 use super::numerics::Plan;
 use super::resolved::Resolved;
+use super::shape::ShapeChange;
 use super::submerged::{Discretisation, SubmergedBody};
-use crate::Result;
 use crate::adjoint::lie::{Mat6, Pose};
 use crate::coupling::Coupling;
 use crate::coupling::film::Extent;
 use crate::coupling::reduced::compress::CompressSettings;
 use crate::geometry::{Gap, Gaps, Other};
 use crate::scene::Scene;
+use crate::{Error, Result};
 use nalgebra::DMatrix;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
@@ -64,6 +65,7 @@ pub(crate) fn prepare(
     (numbers, submerged): (Vec<usize>, Vec<SubmergedBody>),
     poses: &[Pose],
     mut clearance: Clearance,
+    changes: &[ShapeChange],
     folder: Option<&Path>,
 ) -> Result<Prepared> {
     let method = choices.method_used().kind();
@@ -77,6 +79,10 @@ pub(crate) fn prepare(
         &numbers,
     )?;
     (problem.plan, problem.folder) = (&planned.plan, folder);
+    let number = |b: usize| numbers.iter().position(|w| *w == b);
+    let changes = changes.iter().filter_map(|c| Some((number(c.body)?, c)));
+    let changes: Vec<_> = changes.collect();
+    problem.changes = &changes;
     clearance.by_sources = !fidelity.kind().solves_alone() && method.by_sources();
     clearance.films = choices.numerics.films && fidelity.kind().compresses();
     clearance.resolved_edges = match (clearance.films, fidelity.kind().compresses()) {
@@ -97,6 +103,14 @@ pub(crate) fn prepare(
     let made = fidelity.couple(&problem, &mut device)?;
     warnings.extend(device.reason.clone());
     warnings.extend(made.warnings);
+    let shapes = made.coupling.shape_parameters();
+    if shapes != changes.len() {
+        return Err(Error::Unsupported {
+            what: format!("{} shape parameters with {}", changes.len(), made.coupling.name()),
+            why: format!("it has derivatives with respect to {shapes} of them"),
+            instead: "use the fidelity isolated, reduced, or full by panels on the backend cpu".into(),
+        });
+    }
     let mut resolved = vec![Resolved::default(); scene.bodies.len()];
     for (b, d) in numbers.iter().zip(&made.bodies) {
         resolved[*b] = Resolved {

@@ -21,6 +21,8 @@ pub(crate) struct Surface {
     /// A mesh of about a quarter of the faces, of a shape by formula.
     pub coarse: Option<Coarse>,
     pub properties: MassProperties,
+    /// Whether these are the formula's, not the mesh's.
+    pub by_formula: bool,
     /// The exact surface, of a shape by formula.
     pub solid: Option<Solid>,
 }
@@ -44,6 +46,7 @@ impl Surface {
     pub fn of_mesh(mesh: TriMesh) -> Self {
         Self {
             properties: mesh.mass_properties(),
+            by_formula: false,
             base: mesh.faces().len(),
             coarse: None,
             solid: None,
@@ -121,9 +124,11 @@ pub(crate) fn surface(body: &Body, meshing: Meshing, edges: f64) -> Result<Optio
         true => MassProperties::by_formula(shape)?,
         false => None,
     };
+    let by_formula = formula.is_some();
     let properties = formula.map_or_else(|| mesh.mass_properties(), |p| p.transformed(&at));
     Ok(Some(Surface {
         properties,
+        by_formula,
         mesh,
         base,
         coarse,

@@ -30,6 +30,7 @@ mod resume;
 mod rollout_gradient;
 #[cfg(feature = "opt")]
 mod smoothing;
+mod shapes;
 mod soak;
 mod swimmer;
 mod trees;

@@ -12,7 +12,7 @@ use crate::coupling::pair::{vector, wrench};
 use crate::coupling::surface;
 use crate::coupling::{
     Coupling, CouplingReport, Direction, Linearise, Linearised, Momenta, Motion, Pullback,
-    SurfacePotential, Tangent,
+    ShapeTerm, SurfacePotential, Tangent,
 };
 use crate::solver::Cholesky;
 use faer::linalg::matmul::matmul;
@@ -421,6 +421,10 @@ impl Linearised for ReducedLinearised<'_> {
         Ok(self.second(x, y, z))
     }
 
+    fn shape_vjp(&self, terms: &[ShapeTerm]) -> Result<DVector<f64>> {
+        self.shapes(terms)
+    }
+
     fn report(&self) -> &CouplingReport {
         &self.report
     }
@@ -437,6 +441,10 @@ impl Coupling for Reduced {
 
     fn unknowns(&self) -> usize {
         self.mode_count()
+    }
+
+    fn shape_parameters(&self) -> usize {
+        self.shapes.len()
     }
 
     fn evaluate(&self, poses: &[Pose], basis: &DMatrix<f64>) -> Result<Momenta> {

@@ -30,17 +30,19 @@ mod many;
 mod region;
 mod resolved;
 mod second;
+mod shape;
 mod views;
 
 pub use body::{CompressedParts, Fit, ReducedBody};
 pub use link::{Cutoff, Link};
 pub use region::Region;
+pub use shape::ShapeSlope;
 
 use super::Exclusions;
 use super::film::Films;
 use super::settings::{end, ranges};
-use crate::Result;
 use crate::geometry::{Image, Wall};
+use crate::{Error, Result};
 use rayon::prelude::*;
 use std::ops::Range;
 use std::sync::Arc;
@@ -59,6 +61,8 @@ pub struct Reduced {
     films: Films,
     points: Vec<Range<usize>>,
     modes: Vec<Range<usize>>,
+    /// A body with its slope, one a shape parameter.
+    shapes: Vec<(usize, ShapeSlope)>,
 }
 
 impl Reduced {
@@ -78,6 +82,7 @@ impl Reduced {
             points: ranges(bodies.iter().map(|b| b.points())),
             modes: ranges(bodies.iter().map(|b| b.modes())),
             links,
+            shapes: Vec::new(),
             films: Films::default(),
             names: bodies.iter().map(|b| b.parts().name.clone()).collect(),
             bodies,
@@ -93,6 +98,24 @@ impl Reduced {
         let apart = |l: &Link| !l.image.is_identity() || !pairs.contains(l.target, l.source);
         self.links.retain(apart);
         self.films.exclude(pairs);
+        Ok(self)
+    }
+
+    /// The same with shape parameters: each a body, by its number, and how it changes.
+    ///
+    /// # Errors
+    /// [`Error::Input`] for a body that isn't there, or a slope of another number of points.
+    pub fn with_shapes(mut self, shapes: Vec<(usize, ShapeSlope)>) -> Result<Self> {
+        for (b, slope) in &shapes {
+            let points = self.bodies.get(*b).map_or(0, |body| body.points());
+            let sizes = [slope.points.len(), slope.strengths.nrows(), slope.solution.nrows()];
+            if points == 0 || sizes != [points; 3] {
+                let right = format!("must be a body with as many points: it has {points}");
+                let value = format!("body {b} with {sizes:?} points");
+                return Err(Error::input("shape parameter", value, right));
+            }
+        }
+        self.shapes = shapes;
         Ok(self)
     }
 

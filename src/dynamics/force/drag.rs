@@ -2,7 +2,7 @@
 //! −½ ρ c Σ ΔA |w| w.
 
 use super::{
-    ForceModel, ForceParts, LoadBars, Loads, Moving, Outside, Together, Velocity, Waterline,
+    ChangedSurface, ForceModel, ForceParts, LoadBars, Loads, Moving, Outside, Together, Velocity, Waterline,
 };
 use crate::adjoint::drag::{
     Element, Part, Surface, quadratic_drag, quadratic_drag_derivative, resistance,
@@ -36,6 +36,8 @@ struct Dragged {
     /// Of the whole surface.
     law: Law,
     surface: Vec<Element>,
+    /// With shape parameters a little larger and smaller by the step.
+    changed: Vec<(Parameter, f64, [Box<Dragged>; 2])>,
 }
 
 /// What drags at unit coefficient, body frame.
@@ -78,7 +80,7 @@ pub(super) fn linear(
         // Also at zero coefficient: the derivative with respect to it isn't zero.
         if !surface.is_empty() {
             let kind = Kind::Linear(part(given.part));
-            bodies.push(Dragged::new(body, coefficient, kind, surface));
+            bodies.push(Dragged::new(body, coefficient, kind, surface, parts.changed));
         }
     }
     assemble("linear drag", bodies, parts)
@@ -95,7 +97,7 @@ pub(super) fn quadratic(
             Some(given) if !surface.is_empty() => {
                 let coefficient = parameters.declare(owner, QUADRATIC, given.quadratic);
                 let kind = Kind::Quadratic(part(given.quadratic_part));
-                bodies.push(Dragged::new(body, coefficient, kind, surface));
+                bodies.push(Dragged::new(body, coefficient, kind, surface, parts.changed));
             }
             _ => {
                 parameters.declare(owner, NONE, 0.0);
@@ -157,8 +159,21 @@ fn wet(depth: f64, area: f64) -> (f64, f64) {
 }
 
 impl Dragged {
-    fn new(body: usize, coefficient: Parameter, kind: Kind, surface: &[Element]) -> Self {
+    fn new(
+        body: usize,
+        coefficient: Parameter,
+        kind: Kind,
+        surface: &[Element],
+        changed: &[ChangedSurface],
+    ) -> Self {
+        let of = |surface: &[Element]| Self::new(body, coefficient, kind, surface, &[]);
+        let own = changed.iter().filter(|c| c.body == body);
+        let changed = own.map(|c| {
+            let both = c.surfaces.each_ref().map(|s| Box::new(of(s)));
+            (c.parameter, c.step, both)
+        });
         Self {
+            changed: changed.collect(),
             body,
             coefficient,
             kind,
@@ -277,6 +292,14 @@ impl ForceModel for Drag {
                     Law::Quadratic(_) => {
                         bar.parameters[d.coefficient] += parameters.density() * power;
                         bar.parameters[DENSITY] += parameters[d.coefficient] * power;
+                    }
+                }
+                if scale != 0.0 && by_parameters {
+                    for (parameter, step, both) in &d.changed {
+                        let [more, less] = both
+                            .each_ref()
+                            .map(|d| self.law(d, pose).wrench(&nu).dot(&zeta));
+                        bar.parameters[*parameter] += scale * (more - less) / (2.0 * step);
                     }
                 }
                 if scale != 0.0 {

@@ -24,7 +24,7 @@ mod thruster;
 mod waterline;
 mod weight;
 
-use super::{BodyData, BodyValues, Declarations, Parameters};
+use super::{BodyData, BodyValues, Declarations, Parameter, Parameters};
 use crate::Result;
 use crate::adjoint::drag::Element;
 use crate::adjoint::lie::{Mat6, Pose, Vec3, Vec6, linear, six};
@@ -86,8 +86,24 @@ pub struct ForceParts<'a> {
     pub lubricated: Vec<Lubricated>,
     /// Currents by depth and time.
     pub streams: Arc<Streams>,
+    /// Surfaces of bodies whose shapes are parameters, changed.
+    pub changed: &'a [ChangedSurface],
     /// The own added mass of each body that they act on, at unit density, body's frame.
     pub added_mass: Vec<(usize, Mat6)>,
+}
+
+/// A body's surface with a shape parameter a little larger, and a little smaller: what forces take the derivative from that follow from the surface.
+pub struct ChangedSurface {
+    /// The body.
+    pub body: usize,
+    /// Its parameter.
+    pub parameter: Parameter,
+    /// The change of it, m.
+    pub step: f64,
+    /// The pieces of the surface.
+    pub surfaces: [Vec<Element>; 2],
+    /// The same as closed meshes, where the water has a surface.
+    pub hulls: Option<[Hull; 2]>,
 }
 
 /// A gap that a force of viscous water acts in.

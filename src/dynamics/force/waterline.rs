@@ -37,19 +37,21 @@ struct Floater {
     volume: Parameter,
     /// That of its mesh, m³.
     mesh_volume: f64,
+    /// With shape parameters a little larger and smaller by the step.
+    changed: Vec<(Parameter, f64, [Box<Floater>; 2])>,
 }
 
 pub(super) fn buoyancy(parts: &ForceParts, _: &mut Declarations) -> Option<Box<dyn ForceModel>> {
     let surface = parts.waterline?;
     let floater = |(body, hull): (usize, &Option<Hull>)| {
-        let hull = hull.clone()?;
-        let mesh_volume = Below::new(&hull, &Vec3::z(), f64::INFINITY).volume;
-        (mesh_volume > 0.0).then_some(Floater {
-            body,
-            hull,
-            volume: volume(body),
-            mesh_volume,
-        })
+        let mut out = Floater::new(body, hull.clone()?)?;
+        for changed in parts.changed.iter().filter(|c| c.body == body) {
+            let [more, less] = changed.hulls.clone()?;
+            let both = [Floater::new(body, more)?, Floater::new(body, less)?];
+            let both = both.map(Box::new);
+            out.changed.push((changed.parameter, changed.step, both));
+        }
+        Some(out)
     };
     let hulls: Vec<_> = (parts.hulls.iter().enumerate())
         .filter_map(floater)
@@ -65,6 +67,17 @@ pub(super) fn buoyancy(parts: &ForceParts, _: &mut Declarations) -> Option<Box<d
 }
 
 impl Floater {
+    fn new(body: usize, hull: Hull) -> Option<Self> {
+        let mesh_volume = Below::new(&hull, &Vec3::z(), f64::INFINITY).volume;
+        (mesh_volume > 0.0).then_some(Self {
+            body,
+            hull,
+            volume: volume(body),
+            mesh_volume,
+            changed: Vec::new(),
+        })
+    }
+
     /// What its mesh displaces, in the world.
     fn displaced(&self, surface: &Waterline, pose: &Pose) -> Below {
         let normal = pose.rotation.tr_mul(&surface.up);
@@ -126,6 +139,14 @@ impl ForceModel for Floating {
             let power = wrench(&displaced, up).dot(virt);
             bar.parameters[DENSITY] += self.gravity * fill * power;
             bar.parameters[hull.volume] += weight / hull.mesh_volume * power;
+            for (parameter, step, both) in &hull.changed {
+                // At a given volume: that follows by itself.
+                let [more, less] = both.each_ref().map(|changed| {
+                    let displaced = changed.displaced(&self.surface, &at.place.poses[hull.body]);
+                    changed.fill(at.place.parameters) * wrench(&displaced, up).dot(virt)
+                });
+                bar.parameters[*parameter] += weight * (more - less) / (2.0 * step);
+            }
         }
     }
 

@@ -6,7 +6,8 @@ use crate::adjoint::lie::Mat6;
 use crate::coupling;
 use crate::geometry::Gap;
 use crate::water::device::Device;
-use crate::water::method::kind::Problem;
+use crate::water::method::kind::{Problem, far};
+use crate::water::shape::ShapeChange;
 use crate::water::submerged::{Discretisation, Made, SubmergedBody, once, shared_by};
 use crate::water::surface::overlaps;
 use std::sync::Arc;
@@ -38,9 +39,7 @@ impl Own {
             true => 0,
             false => body.surface("isolated")?.faces().len(),
         };
-        // Nothing is near: the flow around it isn't asked for.
-        let far = body.mesh.map_or(1.0, |m| m.surface_area().sqrt());
-        let response = method.response(body, problem.numerics, far)?;
+        let response = method.response(body, problem.numerics, far(body))?;
         Ok(Self {
             added_mass: response.added_mass(),
             as_made: Discretisation {
@@ -59,6 +58,22 @@ impl Own {
 pub(in crate::water) fn own_added_mass(problem: &Problem) -> Result<Vec<Mat6>> {
     let made = owns(problem)?;
     Ok(made.iter().map(|m| m.added_mass).collect())
+}
+
+/// Derivatives of the bodies' own added mass with respect to the shape parameters, each with its body; zero of one that is given.
+pub(in crate::water) fn own_slopes(problem: &Problem) -> Result<Vec<(usize, Mat6)>> {
+    let slope = |&(b, change): &(usize, &ShapeChange)| {
+        let body = &problem.bodies[b];
+        let slope = match body.added_mass {
+            Some(_) => Mat6::zeros(),
+            None => {
+                let method = problem.method_for(body)?;
+                method.added_mass_slope(body, problem.numerics, change)?
+            }
+        };
+        Ok((b, slope))
+    };
+    problem.changes.iter().map(slope).collect()
 }
 
 /// Of equal bodies with the same added mass given, or none, one.
@@ -86,14 +101,14 @@ impl FidelityKind for Isolated {
         }
         let made = owns(problem)?;
         warnings.extend(once(&made, |m| &m.warnings));
+        let added = made.iter().map(|m| m.added_mass).collect();
+        let coupling = coupling::Isolated::new(added).with_shapes(own_slopes(problem)?)?;
         Ok(Made {
             carried: None,
             films: Vec::new(),
             own: vec![None; made.len()],
             bodies: problem.named(made.iter().map(|m| m.as_made.clone())),
-            coupling: Box::new(coupling::Isolated::new(
-                made.iter().map(|m| m.added_mass).collect(),
-            )),
+            coupling: Box::new(coupling),
             warnings,
         })
     }

@@ -1,14 +1,16 @@
 //! All bodies coupled, each compressed to a few sources.
 
+use super::isolated::own_slopes;
 use super::kind::{FidelityKind, Knob};
-use crate::adjoint::lie::Pose;
+use crate::adjoint::lie::{Pose, Vec3};
 use crate::boundary::Response;
-use crate::coupling::reduced::{self, ReducedBody, Region, cache, compress};
+use crate::coupling::reduced::{self, ReducedBody, Region, ShapeSlope, cache, compress};
 use crate::geometry::{Gap, TriMesh};
 use crate::water::device::Device;
 use crate::water::gap_error::Carried;
 use crate::water::method::kind::{BodyMethod, Problem};
 use crate::water::numerics::Numerics;
+use crate::water::shape::ShapeChange;
 use crate::water::submerged::{Discretisation, Made, SubmergedBody};
 use crate::water::surface::Coarse;
 use crate::{Error, Result};
@@ -50,6 +52,11 @@ impl FidelityKind for Reduced {
                 ..Discretisation::default()
             });
         }
+        let coupling = match problem.changes.is_empty() {
+            true => coupling,
+            false => coupling.with_shapes(shape_slopes(problem)?)?,
+        };
+        let made = coupling.reduced_bodies();
         let films = coupling.film_extents(problem.walls)?;
         device.films = !films.is_empty();
         Ok(Made {
@@ -239,67 +246,180 @@ fn refuse_slender(name: &str, mesh: &TriMesh, size: f64) -> Result<()> {
     })
 }
 
+/// A body in units of its own size, with lengths rounded to [`GRID`]: bodies of the same shape are then equal whatever their size, to the last bit.
+struct InUnits<'a> {
+    name: &'a str,
+    /// m.
+    size: f64,
+    mesh: TriMesh,
+    coarse: Option<Coarse>,
+    ellipsoid: Option<([f64; 3], Pose)>,
+    regions: Vec<Region>,
+    settings: compress::CompressSettings,
+    /// The smallest gap that it resolves anywhere.
+    finest: f64,
+}
+
+impl<'a> InUnits<'a> {
+    fn new(
+        body: &SubmergedBody<'a>,
+        method: &'static dyn BodyMethod,
+        chosen: &compress::CompressSettings,
+    ) -> Result<Self> {
+        chosen.validate()?;
+        let mesh = method.layout(body)?;
+        let size = mesh.bounding_ball().radius;
+        let round = |x: f64| (x / size * GRID).round() / GRID;
+        refuse_slender(body.name, &mesh, size)?;
+        let unit = |mesh: &TriMesh| {
+            let rounded = mesh.rounded(round);
+            rounded.map_err(|e| e.of(&format!("body {:?}, in units of its size", body.name)))
+        };
+        let mesh = unit(&mesh)?;
+        let coarse = body.coarse.map(|c| {
+            let mesh = unit(&c.mesh)?;
+            Ok::<_, Error>(Coarse { mesh, ..*c })
+        });
+        let coarse = coarse.transpose()?;
+        let ellipsoid = body.ellipsoid.map(|(axes, pose)| {
+            let at = Pose::new(pose.rotation, pose.translation.map(round));
+            (axes.map(round), at)
+        });
+        let gap = chosen.resolved_gap.map(round);
+        let gap = gap.unwrap_or_else(|| {
+            compress::default_gap(mesh.mass_properties().volume, mesh.surface_area())
+        });
+        let regions: Vec<Region> = (body.regions.iter())
+            .map(|r| Region {
+                center: r.center.map(round),
+                radius: round(r.radius),
+                gap: round(r.gap),
+            })
+            .collect();
+        let everywhere = gap.max(compress::finest_gap(mesh.surface_area()));
+        Ok(Self {
+            name: body.name,
+            size,
+            finest: regions.iter().map(|r| r.gap).fold(everywhere, f64::min),
+            mesh,
+            coarse,
+            ellipsoid,
+            regions,
+            settings: compress::CompressSettings {
+                resolved_gap: Some(gap),
+                ..*chosen
+            },
+        })
+    }
+
+    fn body(&self) -> SubmergedBody<'_> {
+        SubmergedBody {
+            name: self.name,
+            mesh: Some(&self.mesh),
+            ellipsoid: self.ellipsoid,
+            solid: None,
+            coarse: self.coarse.as_ref(),
+            added_mass: None,
+            regions: Vec::new(),
+        }
+    }
+
+    /// With a shape parameter changed by `t`, m; the faces stay.
+    fn changed(&self, change: &ShapeChange, t: f64) -> Self {
+        let moved = |mesh: &TriMesh| {
+            let velocities: Vec<Vec3> = (mesh.vertices().iter())
+                .map(|p| units_velocity(change, self.size, p))
+                .collect();
+            mesh.displaced(&velocities, t)
+        };
+        let ellipsoid = self.ellipsoid.map(|(axes, pose)| {
+            let axes = change.semi_axes(t).map(|axes| axes.map(|x| x / self.size)).unwrap_or(axes);
+            (axes, pose)
+        });
+        Self {
+            mesh: moved(&self.mesh),
+            coarse: self.coarse.as_ref().map(|c| Coarse {
+                mesh: moved(&c.mesh),
+                ..*c
+            }),
+            ellipsoid,
+            regions: self.regions.clone(),
+            ..*self
+        }
+    }
+
+}
+
 /// The body compressed, from the cache if it is there.
-///
-/// It is computed in units of its own size, with lengths rounded to [`GRID`]: bodies of the same
-/// shape share it whatever their size, to the last bit.
 fn compressed_body(
     problem: &Problem,
     body: &SubmergedBody,
     method: &'static dyn BodyMethod,
     chosen: &compress::CompressSettings,
 ) -> Result<cache::Fetched> {
-    chosen.validate()?;
-    let mesh = method.layout(body)?;
-    let size = mesh.bounding_ball().radius;
-    let round = |x: f64| (x / size * GRID).round() / GRID;
-    refuse_slender(body.name, &mesh, size)?;
-    let unit = |mesh: &TriMesh| {
-        let rounded = mesh.rounded(round);
-        rounded.map_err(|e| e.of(&format!("body {:?}, in units of its size", body.name)))
-    };
-    let mesh = unit(&mesh)?;
-    let coarse = body.coarse.map(|c| {
-        let mesh = unit(&c.mesh)?;
-        Ok::<_, Error>(Coarse { mesh, ..*c })
-    });
-    let coarse = coarse.transpose()?;
-    let ellipsoid = body.ellipsoid.map(|(axes, pose)| {
-        let at = Pose::new(pose.rotation, pose.translation.map(round));
-        (axes.map(round), at)
-    });
-    let own = SubmergedBody {
-        name: body.name,
-        mesh: Some(&mesh),
-        ellipsoid,
-        solid: None,
-        coarse: coarse.as_ref(),
-        added_mass: None,
-        regions: Vec::new(),
-    };
-    let gap = chosen.resolved_gap.map(round);
-    let gap = gap.unwrap_or_else(|| {
-        compress::default_gap(mesh.mass_properties().volume, mesh.surface_area())
-    });
-    let chosen = compress::CompressSettings {
-        resolved_gap: Some(gap),
-        ..*chosen
-    };
-    let made_from = method.made_from(&own, problem.numerics);
-    let regions: Vec<Region> = (body.regions.iter())
-        .map(|r| Region {
-            center: r.center.map(round),
-            radius: round(r.radius),
-            gap: round(r.gap),
-        })
-        .collect();
-    let key = cache::Key::new(&mesh, &made_from, &chosen, &regions);
+    let own = InUnits::new(body, method, chosen)?;
+    let made_from = method.made_from(&own.body(), problem.numerics);
+    let key = cache::Key::new(&own.mesh, &made_from, &own.settings, &own.regions);
     let found = cache::fetch(key, problem.folder, || {
-        let everywhere = gap.max(compress::finest_gap(mesh.surface_area()));
-        let finest = regions.iter().map(|r| r.gap).fold(everywhere, f64::min);
-        let response = method.response(&own, problem.numerics, finest)?;
-        compress::compress(body.name, &mesh, response.as_ref(), &chosen, &regions)
+        let response = method.response(&own.body(), problem.numerics, own.finest)?;
+        let (settings, regions) = (&own.settings, &own.regions);
+        compress::compress(body.name, &own.mesh, response.as_ref(), settings, regions)
     });
-    let (found, warning) = found.map_err(|e| e.in_units_of(size))?;
-    Ok((Arc::new(found.scaled(size)?), warning))
+    let (found, warning) = found.map_err(|e| e.in_units_of(own.size))?;
+    Ok((Arc::new(found.scaled(own.size)?), warning))
+}
+
+/// Part of a length by which a shape is changed to see how its compression changes: the differences err by its square.
+const STEP: f64 = 1e-3;
+
+/// How the compressed bodies change with the shape parameters, each with its body.
+///
+/// # Errors
+/// Vertices of a mesh, along which nothing but the mesh is known to move.
+fn shape_slopes(problem: &Problem) -> Result<Vec<(usize, ShapeSlope)>> {
+    let own = own_slopes(problem)?;
+    let mut out = Vec::with_capacity(own.len());
+    for group in problem.changes.chunk_by(|a, b| a.0 == b.0) {
+        let b = group[0].0;
+        let body = &problem.bodies[b];
+        let method = problem.method_for(body)?;
+        let units = InUnits::new(body, method, problem.chosen(b))?;
+        let size = units.size;
+        let moving: Vec<_> = group
+            .iter()
+            .map(|(_, change)| move |p: &Vec3| units_velocity(change, size, p))
+            .collect();
+        let mut steps = Vec::with_capacity(group.len());
+        for ((_, change), velocity) in group.iter().zip(&moving) {
+            if change.velocity(&Vec3::zeros()).is_none() {
+                return Err(Error::Unsupported {
+                    what: format!("shape parameter {:?} of body {:?} with the fidelity reduced", change.name, body.name),
+                    why: "a compressed body follows shapes by formula and the scale of meshes; of a single vertex it isn't known how the sources inside move".into(),
+                    instead: "use the fidelity isolated, or full by panels".into(),
+                });
+            }
+            let step = STEP * change.size;
+            let at = |t: f64| {
+                let changed = units.changed(change, t);
+                method.response(&changed.body(), problem.numerics, units.finest)
+            };
+            steps.push(compress::ShapeStep {
+                step,
+                velocity,
+                responses: [at(step)?, at(-step)?],
+                added_mass: own[out.len() + steps.len()].1,
+            });
+        }
+        let response = method.response(&units.body(), problem.numerics, units.finest)?;
+        let (settings, regions) = (&units.settings, &units.regions);
+        let made = compress::slopes(body.name, &units.mesh, response.as_ref(), settings, regions, &steps);
+        let made = made.map_err(|e| e.in_units_of(size))?;
+        out.extend(made.into_iter().map(|slope| (b, slope.scaled(size))));
+    }
+    Ok(out)
+}
+
+/// Velocity of a point in units of a body's size, per unit of the parameter.
+fn units_velocity(change: &ShapeChange, size: f64, p: &Vec3) -> Vec3 {
+    change.velocity(&(p * size)).unwrap_or_else(Vec3::zeros) / size
 }

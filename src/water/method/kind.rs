@@ -9,6 +9,7 @@ use crate::geometry::{TriMesh, Wall};
 use crate::scene::Scene;
 use crate::water::device::Device;
 use crate::water::numerics::{Numerics, Plan};
+use crate::water::shape::ShapeChange;
 use crate::water::submerged::{Discretisation, Made, SubmergedBody};
 use std::borrow::Cow;
 use std::path::Path;
@@ -17,6 +18,11 @@ use std::path::Path;
 /// adds 1 % to the error of its added mass with 320 faces (0.1 % with 5120), and the force along
 /// the gap is 7 % too small between 0.3 and 0.8 edges (320), 3 % between 0.2 and 0.7 (1280).
 const RESOLVED: f64 = 0.5;
+
+/// A distance at which nothing is near: for a body whose flow isn't asked for, m.
+pub(in crate::water) fn far(body: &SubmergedBody) -> f64 {
+    body.mesh.map_or(1.0, |m| m.surface_area().sqrt())
+}
 
 /// A body alone, solved.
 pub(crate) type Solved = Result<Box<dyn Response>>;
@@ -51,6 +57,23 @@ pub(crate) trait BodyMethod: Send + Sync {
 
     /// The body alone, resolved for sources as near as `gap`, m.
     fn response(&self, body: &SubmergedBody, numerics: &Numerics, gap: f64) -> Solved;
+
+    /// Derivative of the added mass of the body alone with respect to one of its shape parameters: of the method's own value on the mesh that there is.
+    fn added_mass_slope(
+        &self,
+        body: &SubmergedBody,
+        numerics: &Numerics,
+        change: &ShapeChange,
+    ) -> Result<Mat6> {
+        let far = far(body);
+        let slope = change.slope(|t| {
+            let changed = change.changed(body, t);
+            let found = self.response(&changed.body(), numerics, far)?.added_mass();
+            let entries: [f64; 36] = std::array::from_fn(|n| found[(n / 6, n % 6)]);
+            Ok(entries)
+        })?;
+        Ok(Mat6::from_row_slice(&slope))
+    }
 
     /// All bodies solved together (fidelity full).
     ///
@@ -96,6 +119,8 @@ pub(crate) struct Problem<'a> {
     pub plan: &'a Plan,
     /// Where compressed bodies are kept.
     pub folder: Option<&'a Path>,
+    /// Shape parameters, each of a body by its number in the water.
+    pub changes: &'a [(usize, &'a ShapeChange)],
 }
 
 impl<'a> Problem<'a> {
@@ -118,6 +143,7 @@ impl<'a> Problem<'a> {
             numerics,
             plan: &NO_PLAN,
             folder: None,
+            changes: &[],
         }
     }
 

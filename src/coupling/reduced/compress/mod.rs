@@ -26,6 +26,7 @@ mod proxies;
 mod pursuit;
 mod region;
 mod samples;
+mod slope;
 mod sources;
 
 use super::views::dense;
@@ -38,6 +39,7 @@ use faer::Mat;
 use proxies::{CANDIDATES, DEPTH, Proxies, SPACING, TANGENT};
 use samples::{Candidate, Layer};
 use serde::{Deserialize, Serialize};
+pub use slope::{ShapeStep, slopes};
 use sources::Sources;
 
 /// Largest radius of a body over the gap that it resolves: a needle's proxies are as many as its length asks for.
@@ -121,25 +123,43 @@ impl CompressSettings {
     }
 }
 
-/// Compresses the body `name` with a mesh in its frame, whose flow `response` knows.
-///
-/// A resolved gap below [`finest_gap`] is raised to it: see [`Fit::resolved_gap`]. Within `regions` smaller gaps are resolved; one
-/// for which that would take too many proxies has its gap raised: see [`Fit::regions`].
-///
-/// # Errors
-/// Settings out of range, and what the one-body method doesn't resolve.
-pub fn compress(
+/// What a body is compressed to, and what it is fitted to.
+struct Chosen {
+    /// Ball around the body.
+    ball: Ball,
+    volume: f64,
+    gap: f64,
+    regions: Vec<Region>,
+    fitted: Proxies,
+    checked: Proxies,
+    /// Weighted potentials of the chosen combinations of sources at the proxies.
+    field: Mat<f64>,
+    /// The sources, and the strength of each in each combination.
+    points: Vec<Vec3>,
+    spread: Mat<f64>,
+    /// Modes of the solution that are kept, and the body's own flow, weighted at the proxies.
+    modes: Mat<f64>,
+    own: Mat<f64>,
+    /// Of the scattered flow, before symmetrising.
+    asymmetry: f64,
+    /// Largest mode of the wrong sign, relative to the largest.
+    wrong_sign: f64,
+    /// The longest rest of what is fitted.
+    left: f64,
+}
+
+/// Lays out proxies and candidates, and chooses among the latter.
+fn choose(
     name: &str,
     mesh: &TriMesh,
     response: &dyn Response,
     settings: &CompressSettings,
     regions: &[Region],
-) -> Result<ReducedBody> {
+) -> Result<Chosen> {
     settings.validate()?;
     let surface = Interior::new(mesh);
     let Ball { center, radius } = mesh.bounding_ball();
     let area = surface.faces.area();
-    let warnings = response.warnings().to_vec();
     let slenderness = radius * area / surface.faces.volume();
     if slenderness > MOST_SLENDER {
         return Err(Error::Unresolved {
@@ -229,15 +249,48 @@ pub fn compress(
     let most = most.min(fitted.points.len() / FITTED);
     let (columns, left) = pursuit::pursuit(&field, &targets, rest, most);
     let field = Mat::from_fn(field.nrows(), columns.len(), |i, k| field[(i, columns[k])]);
-    // No more modes than columns.
-    let modes = modes.get(.., ..m.min(columns.len())).to_owned();
-    let modes = pursuit::least_squares(&field, &modes);
-    let strengths = pursuit::least_squares(&field, &own);
-    let (chosen, spread) = sources.chosen(&columns);
-    let (modes, strengths) = (&spread * modes, &spread * strengths);
+    let (points, spread) = sources.chosen(&columns);
+    Ok(Chosen {
+        ball: Ball { center, radius },
+        volume: surface.faces.volume(),
+        gap,
+        regions,
+        fitted,
+        checked,
+        // No more modes than columns.
+        modes: modes.get(.., ..m.min(columns.len())).to_owned(),
+        field,
+        points,
+        spread,
+        own,
+        asymmetry,
+        wrong_sign,
+        left,
+    })
+}
+
+/// Compresses the body `name` with a mesh in its frame, whose flow `response` knows.
+///
+/// A resolved gap below [`finest_gap`] is raised to it: see [`Fit::resolved_gap`]. Within `regions` smaller gaps are resolved; one
+/// for which that would take too many proxies has its gap raised: see [`Fit::regions`].
+///
+/// # Errors
+/// Settings out of range, and what the one-body method doesn't resolve.
+pub fn compress(
+    name: &str,
+    mesh: &TriMesh,
+    response: &dyn Response,
+    settings: &CompressSettings,
+    regions: &[Region],
+) -> Result<ReducedBody> {
+    let chosen = choose(name, mesh, response, settings, regions)?;
+    let modes = pursuit::least_squares(&chosen.field, &chosen.modes);
+    let strengths = pursuit::least_squares(&chosen.field, &chosen.own);
+    let (modes, strengths) = (&chosen.spread * modes, &chosen.spread * strengths);
 
     // What the compressed body says at points that it was not fitted to.
-    let there = potentials_weighted(&checked, &chosen);
+    let checked = &chosen.checked;
+    let there = potentials_weighted(checked, &chosen.points);
     let radiated = relative(&(&there * &strengths), &checked.radiated(response)?);
     let scattered = checked.scattered(response)?;
     let solution = &there * &modes;
@@ -247,23 +300,23 @@ pub fn compress(
         modes: dense(&modes),
         strengths: dense(&strengths),
         added_mass: response.added_mass(),
-        centre: center,
-        radius,
-        volume: surface.faces.volume(),
+        centre: chosen.ball.center,
+        radius: chosen.ball.radius,
+        volume: chosen.volume,
         fit: Fit {
-            resolved_gap: gap,
-            regions,
-            proxies: fitted.points.len(),
-            reached: (left / REST).powi(2),
-            asymmetry,
+            resolved_gap: chosen.gap,
+            regions: chosen.regions,
+            proxies: chosen.fitted.points.len(),
+            reached: (chosen.left / REST).powi(2),
+            asymmetry: chosen.asymmetry,
             radiated,
             scattered,
-            wrong_sign,
+            wrong_sign: chosen.wrong_sign,
             body_asymmetry: response.asymmetry(),
             body_error: response.error(),
-            warnings,
+            warnings: response.warnings().to_vec(),
         },
-        points: chosen,
+        points: chosen.points,
     })
 }
 

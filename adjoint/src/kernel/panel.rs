@@ -40,14 +40,15 @@ pub(super) struct Panel {
     /// m_ab of the edges times the weight.
     pub outward: [Vec3; 3],
     /// Centroid, m.
-    centre: Vec3,
-    area: f64,
+    pub centre: Vec3,
+    /// m².
+    pub area: f64,
     /// Vectors p and q with C = p pᵀ + q qᵀ, m.
     spread: [Vec3; 2],
     /// Trace of C, m².
     trace: f64,
     /// a² and b², m².
-    reach: [f64; 2],
+    pub reach: [f64; 2],
 }
 
 impl Panel {
@@ -111,7 +112,7 @@ impl Panel {
     }
 
     #[inline(always)]
-    fn multipoles<T: Lane>(&self, r: V3<T>, squared: T) -> Multipoles<T> {
+    pub fn multipoles<T: Lane>(&self, r: V3<T>, squared: T) -> Multipoles<T> {
         let [p, q] = &self.spread;
         let (p, q) = (constant(squared, p), constant(squared, q));
         let (along_p, along_q) = (dot(p, r), dot(q, r));
@@ -137,9 +138,9 @@ pub(super) fn constant<T: Lane>(x: T, v: &Vec3) -> V3<T> {
 /// f and its derivatives: two terms of the potential of a unit charge spread over a triangle.
 #[derive(Clone, Copy)]
 pub(super) struct Multipoles<T> {
-    r: V3<T>,
+    pub r: V3<T>,
     /// 1/r².
-    u: T,
+    pub u: T,
     /// 1/r.
     i: T,
     spread: [V3<T>; 2],
@@ -168,6 +169,24 @@ impl<T: Lane> Multipoles<T> {
     #[inline(always)]
     pub fn value(&self) -> T {
         self.i * self.series(1.0, -0.5, 1.5)
+    }
+
+    /// ∂f/∂C x: C moves as the second moments do.
+    #[inline(always)]
+    pub fn value_spread(&self, x: V3<T>) -> V3<T> {
+        let like = |x| self.u.like(x);
+        let along = like(1.5) * self.u * dot(self.r, x);
+        let out = scale_add(along, self.r, scale(like(-0.5), x));
+        scale(self.i * self.u, out)
+    }
+
+    /// ∂α/∂C x.
+    #[inline(always)]
+    pub fn alpha_spread(&self, x: V3<T>) -> V3<T> {
+        let like = |x| self.u.like(x);
+        let along = like(-7.5) * self.u * dot(self.r, x);
+        let out = scale_add(along, self.r, scale(like(1.5), x));
+        scale(self.fifth(), out)
     }
 
     /// α of ∇f = α r + 3 i⁵ C r.
@@ -240,15 +259,15 @@ impl<T: Lane> Multipoles<T> {
 
 /// w and its first two derivatives by |r|².
 #[derive(Clone, Copy)]
-struct Weight<T> {
-    value: T,
-    slope: T,
+pub(super) struct Weight<T> {
+    pub value: T,
+    pub slope: T,
     curvature: T,
 }
 
 impl<T: Lane> Weight<T> {
     #[inline(always)]
-    fn new(squared: T, [near, far]: [f64; 2]) -> Self {
+    pub fn new(squared: T, [near, far]: [f64; 2]) -> Self {
         let like = |x| squared.like(x);
         let rate = 1.0 / (far - near);
         let t = ((squared - like(near)) * like(rate)).clamp_unit();

@@ -63,7 +63,11 @@ fn main() {
         let (made, b) = timed(rounds, || body(&mesh));
         let (slopes, _) = timed(rounds, || b.added_mass_slopes());
         let ratio = slopes / made;
-        println!("| {faces} | {:.1} | {:.1} | {ratio:.2} |", 1e3 * made, 1e3 * slopes);
+        println!(
+            "| {faces} | {:.1} | {:.1} | {ratio:.2} |",
+            1e3 * made,
+            1e3 * slopes
+        );
     }
     println!("\n| shape, parameter | faces | discrete, % | by the flow, % |\n|---|---|---|---|");
     let shapes = [[0.5; 3], [0.6, 0.3, 0.4], [1.0, 0.25, 1.0]];
@@ -82,11 +86,17 @@ fn main() {
             }
         }
     }
-    println!("\n| box 0.5 × 0.4 × 0.6, length along x | by the flow against the discrete sums, % |\n|---|---|");
+    println!(
+        "\n| box 0.5 × 0.4 × 0.6, length along x | by the flow against the discrete sums, % |\n|---|---|"
+    );
     for faces in FACES {
         let mesh = mesh(&Shape::cuboid([0.5, 0.4, 0.6]), faces);
         let b = body(&mesh);
-        let grow: Vec<Vec3> = mesh.vertices().iter().map(|x| Vec3::x() * x.x / 0.5).collect();
+        let grow: Vec<Vec3> = mesh
+            .vertices()
+            .iter()
+            .map(|x| Vec3::x() * x.x / 0.5)
+            .collect();
         let right = b.added_mass_slopes().along(&grow);
         let diagonal = std::array::from_fn(|i| right[(i, i)]);
         let off = percent(&b.added_mass_along_by_flow(&grow), &diagonal);

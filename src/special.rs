@@ -79,8 +79,8 @@ pub(crate) fn r_d_difference<D: Number>(mut x: D, mut y: D, mut z: D) -> D {
         }
         let [p, q, r] = [x.sqrt(), y.sqrt(), z.sqrt()];
         let shift = p * q + q * r + r * p;
-        sum += (y + q * r + z + shift) * (3.0 * scale)
-            / (q * r * (q + r) * (y + shift) * (z + shift));
+        sum +=
+            (y + q * r + z + shift) * (3.0 * scale) / (q * r * (q + r) * (y + shift) * (z + shift));
         scale /= 16.0;
         [x, y, z] = [x, y, z].map(|v| (v + shift) / 4.0);
     }
@@ -130,8 +130,8 @@ mod tests {
     #[test]
     fn known_values() {
         // DLMF 19.20.18, and R_D(0, 2, 1) of Carlson's table.
-        assert!((r_d(4.0, 4.0, 4.0) - 0.125).abs() < 1e-16);
-        assert!((r_d(0.0, 2.0, 1.0) - 1.797_210_352_103_388_3).abs() < 1e-15);
-        assert!((r_d(2.0, 3.0, 4.0) - 0.165_105_272_942_610_53).abs() < 1e-16);
+        assert!((r_d(4.0_f64, 4.0, 4.0) - 0.125).abs() < 1e-16);
+        assert!((r_d(0.0_f64, 2.0, 1.0) - 1.797_210_352_103_388_3).abs() < 1e-15);
+        assert!((r_d(2.0_f64, 3.0, 4.0) - 0.165_105_272_942_610_53).abs() < 1e-16);
     }
 }

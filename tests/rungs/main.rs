@@ -95,8 +95,14 @@ const THROUGH: &[(&str, &str)] = &[
     // Of those that have none, and of those that hand it on.
     ("coupling::Linearised::shape_vjp", SHAPE_VJP),
     ("coupling::response::CoupledResponse::shape_vjp", SHAPE_VJP),
-    ("coupling::panel::placed::PanelSolution::shape_vjp", SHAPE_VJP),
-    ("coupling::panel::filmed::FilmedLinearised::shape_vjp", SHAPE_VJP),
+    (
+        "coupling::panel::placed::PanelSolution::shape_vjp",
+        SHAPE_VJP,
+    ),
+    (
+        "coupling::panel::filmed::FilmedLinearised::shape_vjp",
+        SHAPE_VJP,
+    ),
     ("coupling::panel::placed::PanelSolution::gradient", FULL_VJP),
     (
         "adjoint::kernel::panel::Multipoles::gradient",

@@ -111,21 +111,22 @@ fn pose(translation: [f64; 3], turn: [f64; 3]) -> Pose {
 
 /// Two spheres; a box near a box, flat on flat; an ellipsoid near a wall with what is known better of it; and bodies that feel each other's images in a free surface alone.
 fn alone() -> Vec<System> {
-    let of = |shapes: [Shape; 2], poses, walls: Vec<Wall>, solver, excluded: Exclusions, known: bool| {
-        let bodies = Bodies::new(&shapes, 80);
-        let mass = Mat6::from_diagonal(&Vec6::new(1.0, 1.1, 0.9, 0.1, 0.2, 0.3));
-        let couple = move |h: [f64; 2]| -> Box<dyn Linearise> {
-            let given = [known.then(|| (1.0 + 0.4 * h[0]) * mass), None];
-            let rates = [known.then(|| 0.4 * mass), None];
-            let made = coupled(bodies.at(h), solver, &walls, &excluded);
-            let made = made.with_added_mass(&given);
-            Box::new(made.with_shapes(bodies.directions(rates)).unwrap())
+    let of =
+        |shapes: [Shape; 2], poses, walls: Vec<Wall>, solver, excluded: Exclusions, known: bool| {
+            let bodies = Bodies::new(&shapes, 80);
+            let mass = Mat6::from_diagonal(&Vec6::new(1.0, 1.1, 0.9, 0.1, 0.2, 0.3));
+            let couple = move |h: [f64; 2]| -> Box<dyn Linearise> {
+                let given = [known.then(|| (1.0 + 0.4 * h[0]) * mass), None];
+                let rates = [known.then(|| 0.4 * mass), None];
+                let made = coupled(bodies.at(h), solver, &walls, &excluded);
+                let made = made.with_added_mass(&given);
+                Box::new(made.with_shapes(bodies.directions(rates)).unwrap())
+            };
+            System {
+                couple: Box::new(couple),
+                poses,
+            }
         };
-        System {
-            couple: Box::new(couple),
-            poses,
-        }
-    };
     let apart = [
         pose([0.0; 3], [0.1, 0.2, 0.3]),
         pose([1.3, 0.1, 0.0], [0.3, -0.2, 0.1]),
@@ -139,10 +140,38 @@ fn alone() -> Vec<System> {
     };
     let (none, gmres) = (Exclusions::none, FullSolver::Gmres);
     vec![
-        of([ball.clone(), ball.clone()], apart, Vec::new(), gmres, none(), false),
-        of([block.clone(), block], near, Vec::new(), FullSolver::Qr, none(), false),
-        of([egg.clone(), ball.clone()], apart, vec![WALL], gmres, none(), true),
-        of([egg, ball], apart, vec![free], gmres, Exclusions::new([(0, 1)]), false),
+        of(
+            [ball.clone(), ball.clone()],
+            apart,
+            Vec::new(),
+            gmres,
+            none(),
+            false,
+        ),
+        of(
+            [block.clone(), block],
+            near,
+            Vec::new(),
+            FullSolver::Qr,
+            none(),
+            false,
+        ),
+        of(
+            [egg.clone(), ball.clone()],
+            apart,
+            vec![WALL],
+            gmres,
+            none(),
+            true,
+        ),
+        of(
+            [egg, ball],
+            apart,
+            vec![free],
+            gmres,
+            Exclusions::new([(0, 1)]),
+            false,
+        ),
     ]
 }
 
@@ -152,7 +181,12 @@ fn extrapolated() -> System {
     let [fine, coarse] = [80, 20].map(|faces| Bodies::new(&shapes, faces));
     let couple = move |h: [f64; 2]| -> Box<dyn Linearise> {
         let of = |bodies: &Bodies| {
-            coupled(bodies.at(h), FullSolver::Gmres, &[WALL], &Exclusions::none())
+            coupled(
+                bodies.at(h),
+                FullSolver::Gmres,
+                &[WALL],
+                &Exclusions::none(),
+            )
         };
         let ratio = 2.0 + 0.3 * h[0] - 0.2 * h[1];
         let made = ExtrapolatedPanels::new(of(&fine), of(&coarse), ratio).unwrap();
@@ -183,7 +217,10 @@ fn given() -> System {
     };
     System {
         couple: Box::new(couple),
-        poses: [pose([0.0; 3], [0.1, 0.2, 0.3]), pose([1.0, 0.1, 0.0], [0.0; 3])],
+        poses: [
+            pose([0.0; 3], [0.1, 0.2, 0.3]),
+            pose([1.0, 0.1, 0.0], [0.0; 3]),
+        ],
     }
 }
 

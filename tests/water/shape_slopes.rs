@@ -128,7 +128,10 @@ fn slopes_of_closed_forms() {
         let slopes = added_mass_slopes(semi_axes).unwrap();
         for (axis, slope) in slopes.iter().enumerate() {
             let right = lamb_slope(semi_axes, axis);
-            let largest = right[..3].iter().chain(&right[3..]).fold(0.0f64, |m, x| m.max(x.abs()));
+            let largest = right[..3]
+                .iter()
+                .chain(&right[3..])
+                .fold(0.0f64, |m, x| m.max(x.abs()));
             for (i, right) in right.iter().enumerate() {
                 let error = (slope[(i, i)] - right).abs() / largest;
                 assert!(error < 2e-7, "{semi_axes:?} {axis} {i}: {error:e}");
@@ -142,12 +145,26 @@ fn slopes_of_closed_forms() {
             assert!((grown - degree * mass[i]).abs() < 1e-11 * mass[i].max(1e-3));
         }
     }
-    assert!((added_mass_slopes([1.0; 3]).unwrap().iter().map(|m| m[(0, 0)]).sum::<f64>() - 2.0 * PI).abs() < 1e-12);
+    assert!(
+        (added_mass_slopes([1.0; 3])
+            .unwrap()
+            .iter()
+            .map(|m| m[(0, 0)])
+            .sum::<f64>()
+            - 2.0 * PI)
+            .abs()
+            < 1e-12
+    );
     // About the body's origin, elsewhere.
-    let pose = Pose::new(exp_matrix(&Vec3::new(0.3, -0.4, 0.9)), Vec3::new(0.2, 0.1, -0.3));
+    let pose = Pose::new(
+        exp_matrix(&Vec3::new(0.3, -0.4, 0.9)),
+        Vec3::new(0.2, 0.1, -0.3),
+    );
     let at = |h: f64| {
         let axes = [0.6, 0.3 + h, 0.4];
-        ExactBoundary::new("b", axes, &pose, 0.1).unwrap().added_mass()
+        ExactBoundary::new("b", axes, &pose, 0.1)
+            .unwrap()
+            .added_mass()
     };
     let slope = ExactBoundary::new("b", [0.6, 0.3, 0.4], &pose, 0.1).unwrap();
     let error = off(&slope.added_mass_slopes()[1], at);
@@ -166,9 +183,8 @@ fn both_formulas_converge_to_closed_forms() {
             let grow = |x: &Vec3| Vec3::ith(axis, x[axis] / semi_axes[axis]);
             let grow: Vec<Vec3> = mesh.vertices().iter().map(grow).collect();
             let exact = lamb_slope(semi_axes, axis);
-            let largest = |at: std::ops::Range<usize>| {
-                exact[at].iter().fold(0.0f64, |m, x| m.max(x.abs()))
-            };
+            let largest =
+                |at: std::ops::Range<usize>| exact[at].iter().fold(0.0f64, |m, x| m.max(x.abs()));
             let found = [
                 b.added_mass_slopes().along(&grow),
                 b.added_mass_along_by_flow(&grow),
@@ -204,7 +220,9 @@ fn wrong_shape_parameters_are_errors_by_name() {
         added_mass: None,
     };
     let n = mesh.vertices().len();
-    let told = |made: PanelCoupled, d: ShapeDirection| made.with_shapes(vec![d]).err().unwrap().to_string();
+    let told = |made: PanelCoupled, d: ShapeDirection| {
+        made.with_shapes(vec![d]).err().unwrap().to_string()
+    };
     assert!(told(made(None), direction(1, n)).contains("shape parameter 0: body"));
     assert!(told(made(None), direction(0, 3)).contains("velocities"));
     assert!(told(made(Some(Mat6::identity())), direction(0, n)).contains("added mass"));

@@ -64,6 +64,7 @@ pub use normal::{
     normal, normal_fill, normal_gradient, normal_hessian_product, normal_hvp, normal_jvp,
     normal_vjp,
 };
+pub use panel::radius_squared;
 pub use potential::{
     potential, potential_fill, potential_gradient, potential_hessian_product, potential_hvp,
     potential_jvp, potential_sum, potential_vjp,

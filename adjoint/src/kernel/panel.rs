@@ -8,18 +8,40 @@
 //! K = F + w(τ) (N − F),   τ = (|r|² − a²)/(b² − a²),   w = 1 − τ³ (10 − 15 τ + 6 τ²) within 0 … 1
 //! ```
 //!
-//! N the near form, F the far one, which errs by the octupole, (ρ/r)³ times a few percent, ρ the distance of the farthest
-//! corner from the centroid; a and b are [`NEAR`] and [`FAR`] times ρ. The blend has two continuous derivatives, and the
+//! N the near form, F the far one, which errs by the octupole, (ρ/r)³ times a few percent; a and b are [`NEAR`] and [`FAR`] times ρ, about the distance of the
+//! farthest corner from the centroid ([`radius_squared`]), but smooth in the corners. The blend has two continuous derivatives, and the
 //! gradient and Hessian here are those of K, not blends of theirs.
 
 use super::lane::{Lane, V3, dot, scale, scale_add, sub};
 use super::sum::length;
 use crate::lie::Vec3;
 
-/// Distances from the centroid, in circumscribed radii: below the closed form alone,
+/// Distances from the centroid, in ρ: below the closed form alone,
 pub(super) const NEAR: f64 = 5.0;
 /// and above the multipoles alone.
 pub(super) const FAR: f64 = 7.0;
+
+/// Power of the norm that stands for a maximum.
+const POWER: i32 = 8;
+
+/// ρ² of a triangle with its corners seen from its centroid, m²: the 8-norm of the squares of their distances, at least the largest one, and at most 1.15 times it, where all
+/// are equal.
+pub fn radius_squared(arms: &[Vec3; 3]) -> f64 {
+    let squares = arms.map(|a| a.norm_squared());
+    let largest = squares.into_iter().fold(0.0, f64::max);
+    let sum: f64 = squares.iter().map(|s| (s / largest).powi(POWER)).sum();
+    // The eighth root.
+    largest * sum.sqrt().sqrt().sqrt()
+}
+
+/// Its derivatives with respect to the corners, relative to it: 1/m.
+pub(super) fn radius_slopes(arms: &[Vec3; 3]) -> [Vec3; 3] {
+    let radius = radius_squared(arms);
+    let each = arms.map(|a| 2.0 * (a.norm_squared() / radius).powi(POWER - 1) / radius * a);
+    // The centroid moves with all corners.
+    let middle = (each[0] + each[1] + each[2]) / 3.0;
+    each.map(|e| e - middle)
+}
 
 /// What the layers of a triangle need of it.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -61,8 +83,7 @@ impl Panel {
         let centre = (a + b + c) / 3.0;
         // Σ (v − g)(v − g)ᵀ/12 over the corners, by sum and difference of two edges.
         let spread = [(b - a + (c - a)) / 72_f64.sqrt(), (b - c) / 24_f64.sqrt()];
-        let squares = corners.map(|v| (v - centre).norm_squared());
-        let radius = squares.into_iter().fold(0.0, f64::max);
+        let radius = radius_squared(&corners.map(|v| v - centre));
         Self {
             corners,
             double_area,

@@ -3,7 +3,7 @@
 use super::NUMBERS;
 use crate::kernel::double::Double;
 use crate::kernel::lane::{Lane, V3, cross, dot, scale, scale_add, sub};
-use crate::kernel::panel::{Layer, Multipoles, Panel, Weight, constant};
+use crate::kernel::panel::{Layer, Multipoles, Panel, Weight, constant, radius_slopes};
 use crate::lie::Vec3;
 
 /// A panel with what these derivatives need of it beside.
@@ -21,7 +21,7 @@ pub(super) struct Facet<'a> {
     areas: [Vec3; 3],
     /// v_k − g, m.
     arms: [Vec3; 3],
-    /// ∂ρ²/∂v_k of the square of the circumscribed radius, per ρ², 1/m.
+    /// ∂ρ²/∂v_k of the square of the radius that the reach is told in, per ρ², 1/m.
     radii: [Vec3; 3],
 }
 
@@ -32,9 +32,6 @@ struct Moved<T> {
     corners: [V3<T>; 3],
 }
 
-/// Relative difference of squares of distances under which corners are equally far from the centroid. Where one overtakes another the reach has a kink,
-/// in which the mean of the slopes is taken: what central differences between two make of it.
-const TIE: f64 = 1e-9;
 /// The corner after k in turn, and the edge opposite of it.
 const NEXT: [usize; 3] = [1, 2, 0];
 /// The edge that ends at corner k.
@@ -48,12 +45,6 @@ impl<'a> Facet<'a> {
         let areas = [0, 1, 2].map(|k| -0.5 * panel.lengths[NEXT[k]] * outward[NEXT[k]]);
         let shares = areas.map(|a| a / panel.area);
         let arms = panel.corners.map(|v| v - panel.centre);
-        let squares = arms.map(|a| a.norm_squared());
-        let largest = squares.into_iter().fold(0.0, f64::max);
-        let farthest = squares.map(|x| f64::from(x > (1.0 - TIE) * largest));
-        let count: f64 = farthest.iter().sum();
-        let middle: Vec3 = (0..3).map(|m| farthest[m] * arms[m]).sum::<Vec3>() / 3.0;
-        let radii = [0, 1, 2].map(|k| 2.0 * (farthest[k] * arms[k] - middle) / (count * largest));
         Self {
             panel,
             normal,
@@ -61,8 +52,8 @@ impl<'a> Facet<'a> {
             tilts: shares.map(|s| Vec3::from(outward.map(|m| s.dot(&m)))),
             shares,
             areas,
+            radii: radius_slopes(&arms),
             arms,
-            radii,
         }
     }
 

@@ -11,7 +11,7 @@
 //! ```
 //!
 //! The second is what the edges sweep as seen from s, δΩ = −∮ (r × dl)·δv/r³. Far from a triangle the two terms of its multipole series
-//! are differentiated with its area, centroid and second moments, and between both their blend, whose reach is the distance of the farthest corner.
+//! are differentiated with its area, centroid and second moments, and between both their blend, whose reach follows the corners' distances from the centroid.
 //!
 //! What moves with all corners, the triangle seen from a fixed point, moves against it: the gradient in s is −Σ_k ∂/∂v_k.
 //!

@@ -1,5 +1,5 @@
 // Single and double layer over 4π of a triangle at a point s: the closed form near it, two terms of its multipole series far from
-// it, blended between 5 and 7 circumscribed radii ρ from its centroid. With r = s − centroid, C the second moments,
+// it, blended between 5 and 7 radii ρ from its centroid. With r = s − centroid, C the second moments,
 //
 //   near: S = n·(Σ λ_ab r_a × r_b − r_0 Ω)/4π,   λ_ab = 2 artanh(e/(l_a + l_b))/e over the edges,   D = Ω/4π
 //         ∇S = (n Ω + n × Σ λ_ab e_ab)/4π,   ∇∇S d = (n (∇Ω·d) + n × Σ e_ab (∇λ_ab·d))/4π

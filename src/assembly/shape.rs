@@ -54,13 +54,16 @@ pub(super) fn declare(
             Ok(numbers(&body_values(scene, body, Some(&properties))))
         })?;
         let followers = body_places(change.body).into_iter().zip(slopes);
-        out.follows.extend(followers.filter(|(_, slope)| *slope != 0.0).map(
-            |(follower, slope)| Follows {
-                shape,
-                follower,
-                slope,
-            },
-        ));
+        out.follows
+            .extend(
+                followers
+                    .filter(|(_, slope)| *slope != 0.0)
+                    .map(|(follower, slope)| Follows {
+                        shape,
+                        follower,
+                        slope,
+                    }),
+            );
     }
     Ok(out)
 }
@@ -87,7 +90,11 @@ pub(super) fn changed_surfaces(
             hulls: floating.then(|| moved.each_ref().map(hull)),
         })
     };
-    changes.iter().zip(&shapes.all).filter_map(changed).collect()
+    changes
+        .iter()
+        .zip(&shapes.all)
+        .filter_map(changed)
+        .collect()
 }
 
 /// The contact shapes of all bodies with each parameter changed.
@@ -117,9 +124,14 @@ pub(super) fn changed_contacts(
                 _ => ContactShape::of_mesh(&change.moved(&surface.mesh, t), Pose::identity()),
             };
             let shape = shape.map_err(|e| Error::Unsupported {
-                what: format!("contact of body {:?} with its shape parameter {}", body.name, change.name),
+                what: format!(
+                    "contact of body {:?} with its shape parameter {}",
+                    body.name, change.name
+                ),
                 why: e.to_string(),
-                instead: "give it convex pieces for contact (`collision`), which stand for themselves".into(),
+                instead:
+                    "give it convex pieces for contact (`collision`), which stand for themselves"
+                        .into(),
             })?;
             Ok::<_, Error>(contacts.with_piece(change.body, shape))
         };

@@ -10,7 +10,7 @@
 
 use super::{
     Coupling, CouplingReport, Direction, Linearise, Linearised, Momenta, Motion, Pullback,
-    SurfacePotential, Tangent,
+    ShapeTerm, SurfacePotential, Tangent,
 };
 use crate::adjoint::lie::{Mat6, Pose, Vec3, Vec6};
 use crate::boundary::PanelBoundary;
@@ -25,6 +25,8 @@ pub struct Given {
     computed: Box<dyn Coupling>,
     /// Given less own, unit density, body frame, about the body's origin.
     change: Vec<Mat6>,
+    /// Of each shape parameter its body, and the rate of that body's own added mass where one is given.
+    rates: Vec<(usize, Mat6)>,
 }
 
 impl Given {
@@ -43,7 +45,29 @@ impl Given {
                 expected,
             ));
         }
-        Ok(Self { computed, change })
+        Ok(Self {
+            computed,
+            change,
+            rates: Vec::new(),
+        })
+    }
+
+    /// With the shape parameters that the coupling was made with: of each its body, and the rate of the added mass that this has alone in the water as the coupling has it
+    /// (unit density, body frame, about its origin), zero of a body that is given none. What is given stays as it is.
+    ///
+    /// # Errors
+    /// [`Error::Input`] unless there is one for each of the coupling's, of a body that exists.
+    pub fn with_shapes(self, own: Vec<(usize, Mat6)>) -> Result<Self> {
+        let (expected, bodies) = (self.computed.shape_parameters(), self.change.len());
+        if own.len() != expected || own.iter().any(|(b, _)| *b >= bodies) {
+            let found: Vec<usize> = own.iter().map(|(b, _)| *b).collect();
+            return Err(Error::input(
+                "given added mass: bodies of the shape parameters",
+                format!("{found:?}"),
+                format!("{expected} of {bodies} bodies, counted from 0"),
+            ));
+        }
+        Ok(Self { rates: own, ..self })
     }
 
     /// Adds what is given to the impulses of columns of body-frame twists.
@@ -74,6 +98,10 @@ impl Coupling for Given {
 
     fn unknowns(&self) -> usize {
         self.computed.unknowns()
+    }
+
+    fn shape_parameters(&self) -> usize {
+        self.computed.shape_parameters()
     }
 
     fn evaluate(&self, poses: &[Pose], basis: &DMatrix<f64>) -> Result<Momenta> {
@@ -154,9 +182,13 @@ struct GivenLinearised<'a> {
 
 impl GivenLinearised<'_> {
     fn add(&self, x: Direction, impulses: &mut DVector<f64>) {
+        self.given.add_to(&self.twists(x), impulses);
+    }
+
+    fn twists(&self, x: Direction) -> DVector<f64> {
         match x {
-            Direction::Basis(c) => self.given.add_to(&(&self.basis * c), impulses),
-            Direction::Twist(x) => self.given.add_to(x, impulses),
+            Direction::Basis(c) => &self.basis * c,
+            Direction::Twist(x) => x.clone(),
         }
     }
 }
@@ -201,6 +233,19 @@ impl Linearised for GivenLinearised<'_> {
 
     fn hvp(&self, x: Direction, y: Direction, z: &[Vec6]) -> Result<Tangent> {
         self.computed.hvp(x, y, z)
+    }
+
+    fn shape_vjp(&self, terms: &[ShapeTerm]) -> Result<DVector<f64>> {
+        let mut out = self.computed.shape_vjp(terms)?;
+        // Constant in the bodies' frames: a displacement doesn't change it.
+        for term in terms.iter().filter(|term| term.along.is_none()) {
+            let [x, y] = [term.x, term.y].map(|x| self.twists(x));
+            for (out, (b, rate)) in out.iter_mut().zip(&self.given.rates) {
+                let [x, y] = [&x, &y].map(|x| x.fixed_rows::<6>(6 * b).into_owned());
+                *out -= term.weight * x.dot(&(rate * y));
+            }
+        }
+        Ok(out)
     }
 
     fn report(&self) -> &CouplingReport {

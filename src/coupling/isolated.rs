@@ -170,7 +170,9 @@ impl Linearised for IsolatedLinearised<'_> {
             Direction::Twist(x) => x.clone(),
         };
         let still = terms.iter().filter(|t| t.along.is_none());
-        let pairs: Vec<_> = still.map(|t| (t.weight, twists(t.x), twists(t.y))).collect();
+        let pairs: Vec<_> = still
+            .map(|t| (t.weight, twists(t.x), twists(t.y)))
+            .collect();
         let of = |(b, slope): &(usize, Mat6)| {
             let each = pairs.iter().map(|(weight, x, y)| {
                 let (x, y) = (x.fixed_rows::<6>(6 * b), y.fixed_rows::<6>(6 * b));

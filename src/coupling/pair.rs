@@ -1,7 +1,7 @@
 //! A body and the points of another body's image, whose relative placement changes.
 
 use crate::adjoint::kernel::Sources;
-use crate::adjoint::lie::{Pose, Vec3, Vec6, cross_force, point_velocity, point_wrench};
+use crate::adjoint::lie::{Mat3, Pose, Vec3, Vec6, cross_force, point_velocity, point_wrench};
 use crate::coupling::film::{Apart, MovingFilm, MovingFilms, PlacedFilm, PlacedFilms};
 use crate::geometry::Image;
 
@@ -13,6 +13,8 @@ pub(super) struct Pair {
     pub source: usize,
     /// The image.
     pub image: Image,
+    /// From the source body's axes to the target's, mirrored as the image is.
+    pub rotation: Mat3,
     /// Source positions in the target's frame.
     pub points: Sources,
     /// The same as vectors, where they aren't held off.
@@ -37,6 +39,7 @@ impl Pair {
             target,
             source,
             image: *image,
+            rotation,
             points: Sources::new(&positions),
             positions,
             apart: None,
@@ -71,10 +74,15 @@ impl Pair {
 
     /// Displacement of each source in the target's frame, relative to the target, where they aren't held off.
     pub fn displacements(&self, pose: &Pose, z: &[Vec6]) -> Vec<Vec3> {
-        let relative = self.image.twist(&z[self.source]) - z[self.target];
-        let local = pose.twist_to_body(&relative);
+        let local = self.relative_twist(pose, z);
         let velocity = |s| point_velocity(&local, s);
         self.positions.iter().map(velocity).collect()
+    }
+
+    /// Twist of the sources in the target's frame, relative to the target.
+    pub fn relative_twist(&self, pose: &Pose, z: &[Vec6]) -> Vec6 {
+        let relative = self.image.twist(&z[self.source]) - z[self.target];
+        pose.twist_to_body(&relative)
     }
 
     /// Adds a wrench on the sources (given in the target's frame) to both bodies, as spatial wrenches.

@@ -1,7 +1,9 @@
 //! A coupled system's solution to a few columns of twists, and what it means: values and derivatives of the fluid's energy.
 
 use super::settings::asymmetry;
-use super::{CouplingReport, Direction, Linearised, Momenta, PairTensor, Pullback, Tangent};
+use super::{
+    CouplingReport, Direction, Linearised, Momenta, PairTensor, Pullback, ShapeTerm, Tangent,
+};
 use crate::adjoint::lie::Vec6;
 use crate::solver::Columns;
 use crate::{Error, Result};
@@ -46,6 +48,14 @@ pub trait CoupledResponse: Send + Sync {
     /// # Errors
     /// Neither one column nor two, a solve that misses its tolerance, or a device that fails.
     fn tangent(&self, z: &[Vec6]) -> Result<Tangent>;
+
+    /// Derivative of the sum of terms with each shape parameter that the coupling was made with; `None` where that isn't told.
+    ///
+    /// # Errors
+    /// A solve that misses its tolerance; films that hold bodies apart.
+    fn shape_vjp(&self, _terms: &[ShapeTerm]) -> Result<Option<DVector<f64>>> {
+        Ok(None)
+    }
 
     /// What the solution consists of, on the host: strengths of all sources, or potentials of all panels, × k.
     ///
@@ -123,6 +133,7 @@ impl<R: CoupledResponse + ?Sized> Solved<R> {
         Ok(ResponseLinearised {
             solved: self,
             gradient,
+            shapes: 0,
         })
     }
 }
@@ -131,6 +142,15 @@ impl<R: CoupledResponse + ?Sized> Solved<R> {
 pub(super) struct ResponseLinearised<R: ?Sized> {
     solved: Solved<R>,
     gradient: PairTensor,
+    /// Number of shape parameters.
+    shapes: usize,
+}
+
+impl<R: CoupledResponse + ?Sized> ResponseLinearised<R> {
+    /// Of a coupling that was made with so many shape parameters.
+    pub fn with_shapes(self, shapes: usize) -> Self {
+        Self { shapes, ..self }
+    }
 }
 
 impl<R: CoupledResponse + ?Sized> Linearised for ResponseLinearised<R> {
@@ -162,6 +182,18 @@ impl<R: CoupledResponse + ?Sized> Linearised for ResponseLinearised<R> {
     fn hvp(&self, x: Direction, y: Direction, z: &[Vec6]) -> Result<Tangent> {
         let directions = Direction::distinct(x, y);
         self.solved.response.directions(&directions)?.tangent(z)
+    }
+
+    fn shape_vjp(&self, terms: &[ShapeTerm]) -> Result<DVector<f64>> {
+        if self.shapes == 0 {
+            return Ok(DVector::zeros(0));
+        }
+        let told = self.solved.response.shape_vjp(terms)?;
+        told.ok_or_else(|| Error::Unsupported {
+            what: "derivatives with respect to shapes on the backend gpu".into(),
+            why: "the sums over moving corners are computed on the CPU alone".into(),
+            instead: "use the backend cpu for shape parameters".into(),
+        })
     }
 
     fn report(&self) -> &CouplingReport {

@@ -216,7 +216,8 @@ impl Evaluation<'_> {
                 + push.force.cross(&virtual_push.torque);
             t.displacement_vjp(&own, &position, &mut bar.pose);
             let poses = &self.kinematics.poses;
-            self.system.add_contact_shape_vjp(t, poses, (&own, &position), &mut out.parameters);
+            self.system
+                .add_contact_shape_vjp(t, poses, (&own, &position), &mut out.parameters);
             out.parameters.add_contact([
                 t.scale * own.stiffness,
                 own.dissipation,

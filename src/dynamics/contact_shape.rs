@@ -30,7 +30,9 @@ impl System {
             let value = |side: usize| {
                 let reach = at.point.gap + near;
                 // Where nothing is found any more nothing is known of a change.
-                let found = changed.shapes[side].points_within(at.pair, poses, reach).ok()?;
+                let found = changed.shapes[side]
+                    .points_within(at.pair, poses, reach)
+                    .ok()?;
                 let same = nearest(&found, &at.point)?;
                 let apart = (same.position - at.point.position).norm();
                 (apart <= near).then(|| product(bar, position, same))

@@ -30,8 +30,8 @@ mod symmetry;
 mod system;
 
 pub use armature::Armature;
-pub(crate) use body_parameters::body_places;
 pub use body::{BodyData, SiteData};
+pub(crate) use body_parameters::body_places;
 pub use contact::{ChangedShape, ContactForce, ContactGap, ContactModel, Dual, PairContact};
 pub use cotangents::ForceCotangents;
 pub use drift::Drift;

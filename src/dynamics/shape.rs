@@ -89,7 +89,13 @@ impl Linearisation<'_> {
         };
         let made: Vec<_> = terms
             .iter()
-            .map(|t| (twists(t.x), twists(t.y), t.along.map(|z| e.submerged_field(z))))
+            .map(|t| {
+                (
+                    twists(t.x),
+                    twists(t.y),
+                    t.along.map(|z| e.submerged_field(z)),
+                )
+            })
             .collect();
         fn direction<'d>(
             (coefficients, _): (Option<&'d DVector<f64>>, &[Vec6]),

@@ -1,9 +1,7 @@
 //! A system: the tree, its bodies' constants, and the coupling through the water.
 
 use super::force::{ForceModel, Moving, Place, Streams};
-use super::{
-    Armature, BodyData, ContactModel, Drift, JointLimit, Parameters, Shapes, SiteData,
-};
+use super::{Armature, BodyData, ContactModel, Drift, JointLimit, Parameters, Shapes, SiteData};
 use crate::adjoint::lie::{Vec3, Vec6};
 use crate::coupling::Coupling;
 use crate::multibody::Tree;

@@ -1,7 +1,7 @@
 //! The faces of a mesh, with their geometry.
 
 use super::mesh::TriMesh;
-use hydrograd_adjoint::lie::{Vec3, Vec6, six};
+use hydrograd_adjoint::lie::{Vec3, Vec6, angular, linear, six};
 
 /// Flat faces of a closed surface, body frame.
 #[derive(Clone, Debug)]
@@ -44,6 +44,44 @@ impl Faces {
     pub fn twist_flux(&self, i: usize) -> Vec6 {
         let n = self.normals[i] * self.areas[i];
         six(&n, &self.centres[i].cross(&n))
+    }
+
+    /// ∂f/∂v_k of the flux `f = ∫ n·(u + ω × x) dA` of a twist through face `i`, with its corners: m²/s per unit of the twist.
+    pub fn twist_flux_slopes(&self, i: usize, twist: &Vec6) -> [Vec3; 3] {
+        let turn = angular(twist);
+        let velocity = linear(twist) + turn.cross(&self.centres[i]);
+        // The corners move the area vector and, each by a third, the centroid.
+        let moved = (self.areas[i] / 3.0) * self.normals[i].cross(&turn);
+        self.opposite(i).map(|e| moved - 0.5 * e.cross(&velocity))
+    }
+
+    /// ∂A/∂v_k of the area of face `i` with its corners, m.
+    pub fn area_slopes(&self, i: usize) -> [Vec3; 3] {
+        self.opposite(i).map(|e| 0.5 * self.normals[i].cross(&e))
+    }
+
+    /// Rate of the area of all, m²/s, for velocities of the corners of each face, m/s.
+    pub fn area_rate(&self, velocity: impl Fn(usize, usize) -> Vec3) -> f64 {
+        let of = |i: usize| {
+            let slopes = self.area_slopes(i).into_iter().enumerate();
+            slopes.map(|(k, s)| s.dot(&velocity(i, k))).sum::<f64>()
+        };
+        (0..self.len()).map(of).sum()
+    }
+
+    /// Rate of the volume inside, m³/s, for those.
+    pub fn volume_rate(&self, velocity: impl Fn(usize, usize) -> Vec3) -> f64 {
+        let of = |i: usize| {
+            let mean = (velocity(i, 0) + velocity(i, 1) + velocity(i, 2)) / 3.0;
+            self.areas[i] * self.normals[i].dot(&mean)
+        };
+        (0..self.len()).map(of).sum()
+    }
+
+    /// Edges of face `i` opposite of its corners, from the next one to the one after.
+    fn opposite(&self, i: usize) -> [Vec3; 3] {
+        let [a, b, c] = self.corners[i];
+        [c - b, a - c, b - a]
     }
 
     /// Volume inside, m³.

@@ -21,7 +21,11 @@ impl Scene {
     /// A name that isn't there, or a value that would invert the body or that its shape can't have.
     pub fn with_shape_parameter(&self, name: &str, value: f64) -> Result<Self> {
         let refused = |right: String| Error::input("shape parameter", format!("{name:?}"), right);
-        let of = |body: &super::Body| name.strip_prefix(&body.name)?.strip_prefix('.').map(str::len);
+        let of = |body: &super::Body| {
+            name.strip_prefix(&body.name)?
+                .strip_prefix('.')
+                .map(str::len)
+        };
         // The longest name that fits, should one body's name begin with another's.
         let fitting = self.bodies.iter().enumerate();
         let fitting = fitting.filter_map(|(b, body)| Some((of(body)?, b)));

@@ -131,7 +131,10 @@ fn corner_weight(profile: &[[f64; 2]], corner: usize, p: [f64; 2]) -> f64 {
     let to = |k: usize| [profile[k % n][0] - p[0], profile[k % n][1] - p[1]];
     let cross = |a: [f64; 2], b: [f64; 2]| a[0] * b[1] - a[1] * b[0];
     let dot = |a: [f64; 2], b: [f64; 2]| a[0] * b[0] + a[1] * b[1];
-    let size = profile.iter().flatten().fold(0.0, |m: f64, x| m.max(x.abs()));
+    let size = profile
+        .iter()
+        .flatten()
+        .fold(0.0, |m: f64, x| m.max(x.abs()));
     // On a side, and at its ends, where the formula is 0/0.
     for k in 0..n {
         let (a, b) = (to(k), to(k + 1));

@@ -106,9 +106,14 @@ pub(crate) fn prepare(
     let shapes = made.coupling.shape_parameters();
     if shapes != changes.len() {
         return Err(Error::Unsupported {
-            what: format!("{} shape parameters with {}", changes.len(), made.coupling.name()),
+            what: format!(
+                "{} shape parameters with {}",
+                changes.len(),
+                made.coupling.name()
+            ),
             why: format!("it has derivatives with respect to {shapes} of them"),
-            instead: "use the fidelity isolated, reduced, or full by panels on the backend cpu".into(),
+            instead: "use the fidelity isolated, reduced, or full by panels on the backend cpu"
+                .into(),
         });
     }
     let mut resolved = vec![Resolved::default(); scene.bodies.len()];

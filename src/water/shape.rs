@@ -139,13 +139,18 @@ impl ShapeChange {
 
     /// Velocities of the vertices of a mesh of the body, its frame.
     pub fn vertices(&self, mesh: &TriMesh) -> Vec<Vec3> {
+        self.at_vertices(mesh.vertices())
+    }
+
+    /// The same from the vertices.
+    pub fn at_vertices(&self, vertices: &[Vec3]) -> Vec<Vec3> {
         let still = Vec3::zeros();
         match &self.what {
-            What::Formula(..) => (mesh.vertices().iter())
+            What::Formula(..) => (vertices.iter())
                 .map(|p| self.velocity(p).unwrap_or(still))
                 .collect(),
             What::Vertex(vertex, axis) => {
-                let mut out = vec![still; mesh.vertices().len()];
+                let mut out = vec![still; vertices.len()];
                 out[*vertex] = self.offset.rotation * Vec3::ith(*axis, 1.0);
                 out
             }
@@ -181,6 +186,12 @@ impl ShapeChange {
     /// Semi-axes of an ellipsoid by formula with the parameter changed by `t`, m.
     pub fn semi_axes(&self, t: f64) -> Option<[f64; 3]> {
         semi_axes(&self.formula(t)?)
+    }
+
+    /// Their rates: the semi-axes are linear in the parameter.
+    pub fn semi_axes_rates(&self) -> Option<[f64; 3]> {
+        let (now, larger) = (self.semi_axes(0.0)?, self.semi_axes(self.value)?);
+        Some([0, 1, 2].map(|k| (larger[k] - now[k]) / self.value))
     }
 
     /// The body in the water with the parameter changed by `t`, its meshes' faces as they are.

@@ -39,6 +39,8 @@ pub(crate) struct Made {
     /// Added mass of bodies alone in the water as the coupling has it, unit density, body's frame, about the origin: of those that have another one given
     /// ([`Problem::own`](super::method::kind::Problem::own)).
     pub own: Vec<Option<Mat6>>,
+    /// Its derivatives with respect to the shape parameters, each with its body; those of bodies without a given one are ignored.
+    pub own_rates: Vec<(usize, Mat6)>,
     /// What each body became.
     pub bodies: Vec<Discretisation>,
     pub warnings: Vec<String>,

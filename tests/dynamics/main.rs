@@ -28,9 +28,9 @@ mod passive;
 mod random;
 mod resume;
 mod rollout_gradient;
+mod shapes;
 #[cfg(feature = "opt")]
 mod smoothing;
-mod shapes;
 mod soak;
 mod swimmer;
 mod trees;

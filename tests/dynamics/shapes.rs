@@ -71,7 +71,8 @@ fn worst(scene: &Scene, settings: &Settings, part: f64) -> f64 {
     };
     let names = gradient.parameters.names();
     let known = simulator.parameters();
-    let shapes = names.filter(|n| scene.shape_parameters().iter().any(|(s, _)| s == n) || n.contains(".vertex."));
+    let shapes = names
+        .filter(|n| scene.shape_parameters().iter().any(|(s, _)| s == n) || n.contains(".vertex."));
     for name in shapes {
         let at = known.get(name).unwrap();
         let size = if at.abs() > 0.05 { at.abs() } else { 0.3 };
@@ -127,7 +128,10 @@ fn every_shape_alone_with_its_volume_mass_and_inertia() {
 
 #[test]
 fn every_integrator_with_joints() {
-    let scene = scene(&[Shape::cuboid([0.4, 0.7, 0.2]), Shape::ellipsoid([0.5, 0.2, 0.35])]);
+    let scene = scene(&[
+        Shape::cuboid([0.4, 0.7, 0.2]),
+        Shape::ellipsoid([0.5, 0.2, 0.35]),
+    ]);
     for integrator in INTEGRATORS {
         let off = worst(&scene, &settings(Fidelity::Isolated, integrator), 2e-3);
         println!("{integrator:?}: {off:.1e}");
@@ -135,20 +139,64 @@ fn every_integrator_with_joints() {
     }
 }
 
-/// Two bodies beside each other. Each rebuilt scene chooses its sources anew, so that differences have the noise of the compression, and take large steps.
-#[test]
-fn compressed_bodies_follow_their_shapes() {
-    let mut scene = scene(&[Shape::cuboid([0.4, 0.7, 0.2]), Shape::ellipsoid([0.5, 0.2, 0.35])]);
+/// Two free bodies beside each other.
+fn near() -> Scene {
+    let mut scene = scene(&[
+        Shape::cuboid([0.4, 0.7, 0.2]),
+        Shape::ellipsoid([0.5, 0.2, 0.35]),
+    ]);
     scene.bodies[1].parent = None;
     scene.bodies[1].joint = Joint::Free;
     scene.bodies[1].placement.position = [0.2, 0.8, 0.1];
-    scene.initial.v = vec![0.3, 0.4, 0.25, 0.5, 0.4, -0.6, -0.3, -0.4, 0.2, 0.3, -0.5, 0.2];
+    scene.initial.v = vec![
+        0.3, 0.4, 0.25, 0.5, 0.4, -0.6, -0.3, -0.4, 0.2, 0.3, -0.5, 0.2,
+    ];
+    scene
+}
+
+/// Each rebuilt scene chooses its sources anew, so that differences have the noise of the compression, and take large steps.
+#[test]
+fn compressed_bodies_follow_their_shapes() {
     for integrator in [Integrator::Midpoint, Integrator::VelocityEuler] {
         let settings = settings(Fidelity::Reduced, integrator).accuracy(1e-4);
-        let off = worst(&scene, &settings, 0.05);
+        let off = worst(&near(), &settings, 0.05);
         println!("{integrator:?}: {off:.1e}");
         assert!(off < 3e-3, "{integrator:?}: {off:e}");
     }
+}
+
+#[test]
+fn coupled_panels_follow_their_shapes() {
+    let mut scene = near();
+    for (integrator, wall) in [
+        (Integrator::Midpoint, false),
+        (Integrator::VelocityEuler, true),
+    ] {
+        if wall {
+            scene.add_wall([0.0, 0.0, -0.7], [0.1, 0.0, 1.0]);
+        }
+        let settings = settings(Fidelity::Full, integrator).faces(60);
+        let off = worst(&scene, &settings, 2e-3);
+        println!("{integrator:?}: {off:.1e}");
+        assert!(off < 1e-6, "{integrator:?}: {off:e}");
+    }
+}
+
+/// An added mass that is given stays what it is; what the other body changes of it follows from the shape.
+#[test]
+fn a_given_added_mass_does_not_follow() {
+    let mut scene = near();
+    let diagonal = [90.0, 60.0, 150.0, 6.0, 3.0, 5.0].map(|x: f64| 1e-3 * x);
+    let row = |i: usize| {
+        (0..6)
+            .map(|j| if i == j { diagonal[i] } else { 0.0 })
+            .collect()
+    };
+    scene.bodies[0].added_mass = Some((0..6).map(row).collect());
+    let settings = settings(Fidelity::Full, Integrator::Midpoint).faces(60);
+    let off = worst(&scene, &settings, 2e-3);
+    println!("{off:.1e}");
+    assert!(off < 1e-6, "{off:e}");
 }
 
 /// Gravity, buoyancy of a body that reaches through the surface of the water, drag by both laws.
@@ -199,7 +247,9 @@ fn contact_follows_shapes() {
         scene.bodies[1].joint = Joint::Free;
         scene.bodies[1].placement.position = [0.1, 0.4, 0.1];
         scene.bodies[0].density = Some(2500.0);
-        scene.initial.v = vec![0.3, 0.4, -2.0, 0.5, 0.4, -0.6, -0.3, -3.0, -0.5, 0.3, -0.5, 0.2];
+        scene.initial.v = vec![
+            0.3, 0.4, -2.0, 0.5, 0.4, -0.6, -0.3, -3.0, -0.5, 0.3, -0.5, 0.2,
+        ];
         let off = worst(
             &scene,
             &settings(Fidelity::Isolated, Integrator::MomentumEuler),
@@ -231,7 +281,10 @@ fn wrong_names_and_settings_are_refused() {
         Simulator::new(&scene, settings).err().unwrap().to_string()
     };
     let said = told("body0.radius");
-    assert!(said.contains("body0.radius") && said.contains("body0.size.y"), "{said}");
+    assert!(
+        said.contains("body0.radius") && said.contains("body0.size.y"),
+        "{said}"
+    );
     let said = told("body7");
     assert!(said.contains("body7"), "{said}");
     let settings = Settings::default().shape_parameters(vec!["body0.size".into()]);
@@ -239,10 +292,23 @@ fn wrong_names_and_settings_are_refused() {
     let mut parameters = simulator.parameters().clone();
     assert_eq!(parameters.get("body0.size.y").unwrap(), 0.7);
     parameters.set("body0.size.y", 0.8).unwrap();
-    let said = simulator.set_parameters(parameters).unwrap_err().to_string();
-    assert!(said.contains("body0.size.y") && said.contains("0.8"), "{said}");
-    for (name, value) in [("body0.size.y", -0.1), ("body0.size.y", f64::NAN), ("body0.depth", 1.0)] {
-        let said = scene.with_shape_parameter(name, value).unwrap_err().to_string();
+    let said = simulator
+        .set_parameters(parameters)
+        .unwrap_err()
+        .to_string();
+    assert!(
+        said.contains("body0.size.y") && said.contains("0.8"),
+        "{said}"
+    );
+    for (name, value) in [
+        ("body0.size.y", -0.1),
+        ("body0.size.y", f64::NAN),
+        ("body0.depth", 1.0),
+    ] {
+        let said = scene
+            .with_shape_parameter(name, value)
+            .unwrap_err()
+            .to_string();
         assert!(said.contains("size.y"), "{said}");
     }
 }

@@ -13,6 +13,7 @@ mod forward;
 mod multibody;
 mod policy;
 mod scan;
+mod shape;
 mod tools;
 
 use hydrograd::adjoint;
@@ -36,6 +37,7 @@ fn registered() -> Vec<(String, Rung)> {
         force::rungs(),
         forward::rungs(),
         policy::rungs(),
+        shape::rungs(),
     ] {
         out.extend(part.into_iter().map(|r| (r.name.to_string(), r)));
     }
@@ -90,6 +92,17 @@ const THROUGH: &[(&str, &str)] = &[
     ("coupling::full::cpu::system::System::respond_jvp", FULL_HVP),
     ("coupling::full::cpu::CoupledSolution::gradient", FULL_VJP),
     ("coupling::panel::first::PlacedPanels::gradient", FULL_VJP),
+    // Of those that have none, and of those that hand it on.
+    ("coupling::Linearised::shape_vjp", SHAPE_VJP),
+    ("coupling::response::CoupledResponse::shape_vjp", SHAPE_VJP),
+    (
+        "coupling::panel::placed::PanelSolution::shape_vjp",
+        SHAPE_VJP,
+    ),
+    (
+        "coupling::panel::filmed::FilmedLinearised::shape_vjp",
+        SHAPE_VJP,
+    ),
     ("coupling::panel::placed::PanelSolution::gradient", FULL_VJP),
     (
         "adjoint::kernel::panel::Multipoles::gradient",
@@ -319,6 +332,7 @@ const PASSED_ON: &[&str] = &["optimize::descent::Shared::gradient"];
 const FRAME_VELOCITY: &str = "multibody::joint::JointMotion::frame_velocity_vjp";
 const FRAME_BIAS: &str = "multibody::joint::JointMotion::frame_bias_vjp";
 const FORCE_JVP: &str = "dynamics::balance::Linearisation::force_jvp";
+const SHAPE_VJP: &str = "coupling::response::ResponseLinearised::shape_vjp";
 const FULL_VJP: &str = "coupling::response::ResponseLinearised::vjp";
 const FULL_HVP: &str = "coupling::response::ResponseLinearised::hvp";
 

@@ -21,6 +21,7 @@ mod pressure;
 mod reduced;
 mod refine;
 mod several_pieces;
+mod shape_slopes;
 mod shapes;
 
 #[path = "../support/mod.rs"]

@@ -100,7 +100,11 @@ fn slopes_of_compressed_bodies_against_differences() {
     };
     let mut next = Samples::new(11);
     let mut vector = |n: usize| DVector::from_fn(n, |_, _| next.number());
-    for (walls, cutoff) in [(vec![], None), (vec![wall], None), (vec![wall], Some(fading))] {
+    for (walls, cutoff) in [
+        (vec![], None),
+        (vec![wall], None),
+        (vec![wall], Some(fading)),
+    ] {
         for changed in 0..2 {
             let at = |h: f64| {
                 let of = |b: usize| bodies[b].at(if b == changed { h } else { 0.0 });

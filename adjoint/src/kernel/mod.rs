@@ -34,6 +34,7 @@
 //! Results do not depend on the number of threads, to the last bit. They may differ in round-off
 //! between processors of different vector width.
 
+pub mod corner;
 pub mod double;
 pub mod flux;
 mod lane;
@@ -54,6 +55,7 @@ pub(crate) use lane::{Lane, Lanes, V3, cross, dot, scale, scale_add};
 pub(crate) use source::WIDTH;
 pub(crate) use sum::dispatch;
 
+pub use corner::{CornerSums, Form, corner_hvp, corner_vjp, layers_vjp};
 pub use double::{double_fill, double_hvp, double_jvp, double_vjp};
 pub use flux::{
     flux, flux_fill, flux_gradient, flux_hessian_product, flux_hvp, flux_jvp, flux_vjp,
@@ -62,6 +64,7 @@ pub use normal::{
     normal, normal_fill, normal_gradient, normal_hessian_product, normal_hvp, normal_jvp,
     normal_vjp,
 };
+pub use panel::radius_squared;
 pub use potential::{
     potential, potential_fill, potential_gradient, potential_hessian_product, potential_hvp,
     potential_jvp, potential_sum, potential_vjp,

@@ -8,18 +8,40 @@
 //! K = F + w(τ) (N − F),   τ = (|r|² − a²)/(b² − a²),   w = 1 − τ³ (10 − 15 τ + 6 τ²) within 0 … 1
 //! ```
 //!
-//! N the near form, F the far one, which errs by the octupole, (ρ/r)³ times a few percent, ρ the distance of the farthest
-//! corner from the centroid; a and b are [`NEAR`] and [`FAR`] times ρ. The blend has two continuous derivatives, and the
+//! N the near form, F the far one, which errs by the octupole, (ρ/r)³ times a few percent; a and b are [`NEAR`] and [`FAR`] times ρ, about the distance of the
+//! farthest corner from the centroid ([`radius_squared`]), but smooth in the corners. The blend has two continuous derivatives, and the
 //! gradient and Hessian here are those of K, not blends of theirs.
 
 use super::lane::{Lane, V3, dot, scale, scale_add, sub};
 use super::sum::length;
 use crate::lie::Vec3;
 
-/// Distances from the centroid, in circumscribed radii: below the closed form alone,
+/// Distances from the centroid, in ρ: below the closed form alone,
 pub(super) const NEAR: f64 = 5.0;
 /// and above the multipoles alone.
 pub(super) const FAR: f64 = 7.0;
+
+/// Power of the norm that stands for a maximum.
+const POWER: i32 = 8;
+
+/// ρ² of a triangle with its corners seen from its centroid, m²: the 8-norm of the squares of their distances, at least the largest one, and at most 1.15 times it, where all
+/// are equal.
+pub fn radius_squared(arms: &[Vec3; 3]) -> f64 {
+    let squares = arms.map(|a| a.norm_squared());
+    let largest = squares.into_iter().fold(0.0, f64::max);
+    let sum: f64 = squares.iter().map(|s| (s / largest).powi(POWER)).sum();
+    // The eighth root.
+    largest * sum.sqrt().sqrt().sqrt()
+}
+
+/// Its derivatives with respect to the corners, relative to it: 1/m.
+pub(super) fn radius_slopes(arms: &[Vec3; 3]) -> [Vec3; 3] {
+    let radius = radius_squared(arms);
+    let each = arms.map(|a| 2.0 * (a.norm_squared() / radius).powi(POWER - 1) / radius * a);
+    // The centroid moves with all corners.
+    let middle = (each[0] + each[1] + each[2]) / 3.0;
+    each.map(|e| e - middle)
+}
 
 /// What the layers of a triangle need of it.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -40,14 +62,15 @@ pub(super) struct Panel {
     /// m_ab of the edges times the weight.
     pub outward: [Vec3; 3],
     /// Centroid, m.
-    centre: Vec3,
-    area: f64,
+    pub centre: Vec3,
+    /// m².
+    pub area: f64,
     /// Vectors p and q with C = p pᵀ + q qᵀ, m.
     spread: [Vec3; 2],
     /// Trace of C, m².
     trace: f64,
     /// a² and b², m².
-    reach: [f64; 2],
+    pub reach: [f64; 2],
 }
 
 impl Panel {
@@ -60,8 +83,7 @@ impl Panel {
         let centre = (a + b + c) / 3.0;
         // Σ (v − g)(v − g)ᵀ/12 over the corners, by sum and difference of two edges.
         let spread = [(b - a + (c - a)) / 72_f64.sqrt(), (b - c) / 24_f64.sqrt()];
-        let squares = corners.map(|v| (v - centre).norm_squared());
-        let radius = squares.into_iter().fold(0.0, f64::max);
+        let radius = radius_squared(&corners.map(|v| v - centre));
         Self {
             corners,
             double_area,
@@ -111,7 +133,7 @@ impl Panel {
     }
 
     #[inline(always)]
-    fn multipoles<T: Lane>(&self, r: V3<T>, squared: T) -> Multipoles<T> {
+    pub fn multipoles<T: Lane>(&self, r: V3<T>, squared: T) -> Multipoles<T> {
         let [p, q] = &self.spread;
         let (p, q) = (constant(squared, p), constant(squared, q));
         let (along_p, along_q) = (dot(p, r), dot(q, r));
@@ -137,9 +159,9 @@ pub(super) fn constant<T: Lane>(x: T, v: &Vec3) -> V3<T> {
 /// f and its derivatives: two terms of the potential of a unit charge spread over a triangle.
 #[derive(Clone, Copy)]
 pub(super) struct Multipoles<T> {
-    r: V3<T>,
+    pub r: V3<T>,
     /// 1/r².
-    u: T,
+    pub u: T,
     /// 1/r.
     i: T,
     spread: [V3<T>; 2],
@@ -168,6 +190,24 @@ impl<T: Lane> Multipoles<T> {
     #[inline(always)]
     pub fn value(&self) -> T {
         self.i * self.series(1.0, -0.5, 1.5)
+    }
+
+    /// ∂f/∂C x: C moves as the second moments do.
+    #[inline(always)]
+    pub fn value_spread(&self, x: V3<T>) -> V3<T> {
+        let like = |x| self.u.like(x);
+        let along = like(1.5) * self.u * dot(self.r, x);
+        let out = scale_add(along, self.r, scale(like(-0.5), x));
+        scale(self.i * self.u, out)
+    }
+
+    /// ∂α/∂C x.
+    #[inline(always)]
+    pub fn alpha_spread(&self, x: V3<T>) -> V3<T> {
+        let like = |x| self.u.like(x);
+        let along = like(-7.5) * self.u * dot(self.r, x);
+        let out = scale_add(along, self.r, scale(like(1.5), x));
+        scale(self.fifth(), out)
     }
 
     /// α of ∇f = α r + 3 i⁵ C r.
@@ -240,15 +280,15 @@ impl<T: Lane> Multipoles<T> {
 
 /// w and its first two derivatives by |r|².
 #[derive(Clone, Copy)]
-struct Weight<T> {
-    value: T,
-    slope: T,
+pub(super) struct Weight<T> {
+    pub value: T,
+    pub slope: T,
     curvature: T,
 }
 
 impl<T: Lane> Weight<T> {
     #[inline(always)]
-    fn new(squared: T, [near, far]: [f64; 2]) -> Self {
+    pub fn new(squared: T, [near, far]: [f64; 2]) -> Self {
         let like = |x| squared.like(x);
         let rate = 1.0 / (far - near);
         let t = ((squared - like(near)) * like(rate)).clamp_unit();

@@ -1,9 +1,10 @@
 //! The rungs of the kernels and their checks.
 
 use super::{
-    Points, Sources, Triangles, Write, double_fill, double_hvp, double_jvp, double_vjp, flux_fill,
-    flux_hvp, flux_jvp, flux_vjp, normal_fill, normal_hvp, normal_jvp, normal_vjp, potential_fill,
-    potential_hvp, potential_jvp, potential_vjp, single_hvp, single_jvp, single_sum, single_vjp,
+    CornerSums, Form, Points, Sources, Triangles, Write, corner_hvp, corner_vjp, double_fill,
+    double_hvp, double_jvp, double_vjp, flux, flux_fill, flux_hvp, flux_jvp, flux_vjp, layers_vjp,
+    normal_fill, normal_hvp, normal_jvp, normal_vjp, potential_fill, potential_hvp, potential_jvp,
+    potential_vjp, single, single_hvp, single_jvp, single_sum, single_vjp,
 };
 use crate::check::{Outcome, Rung, outcome};
 use crate::draw::numbers;
@@ -44,6 +45,12 @@ pub fn rungs() -> Vec<Rung> {
         "kernel::single::single_hvp" => |c| tangent(panels().len(),
             |s, bar, out| single_vjp(&panels(), s, bar, K, out),
             |d, bar, out| single_hvp(&panels(), &sources(&start()), d, bar, K, out), c),
+        "kernel::corner::corner_vjp" => |c| corners(Form::Closed, c).worst(corners(Form::Blended, c)),
+        "kernel::corner::corner_hvp" => |c| corner_tangent(Form::Closed, c).worst(corner_tangent(Form::Blended, c)),
+        "kernel::corner::layers_vjp" => |c| gradient(|s| closed_rows(&panels(), s).concat(), |bar, out| {
+            let (single, double) = bar.split_at(bar.len() / 2);
+            layers_vjp(&panels(), &sources(&start()), single, double, K, out);
+        }, c),
         "kernel::potential::potential_jvp" => |c| forward(potential_matrix, |d, a, out| potential_jvp(&points(), &sources(&start()), d, a, K, out), c),
         "kernel::potential::potential_vjp" => |c| gradient(potential_matrix, |bar, out| potential_vjp(&points(), &sources(&start()), bar, K, out), c),
         "kernel::potential::potential_hvp" => |c| tangent(points().len(),
@@ -128,6 +135,71 @@ fn tangent(
     outcome(value, &x, &dx, &out, TOLERANCE)
 }
 
+/// `Σ_jk bar[i][k] (S_ij + Ω_ij) a[j][k]` of each panel, unlike factors for S and Ω, against `corner_vjp`, along a motion of all vertices.
+fn corners(form: Form, corruption: f64) -> Outcome {
+    let (vertices, faces) = two_octahedra();
+    let x: Vec<f64> = vertices.iter().flat_map(|v| [v.x, v.y, v.z]).collect();
+    let (mut dx, a) = (numbers(3, x.len(), 0.1), numbers(4, N * K, 1.0));
+    // The small one's by as much of its size.
+    dx[..18].iter_mut().for_each(|x| *x *= 0.17);
+    let bar = [5, 6].map(|seed| numbers(seed, faces.len() * K, 1.0));
+    let points = sources(&start());
+    let value = |x: &[f64]| {
+        let triangles = panels_at(&vectors(x));
+        let matrices = match form {
+            Form::Blended => [
+                single_rows(&triangles, &points),
+                double_rows(&triangles, &points),
+            ],
+            Form::Closed => closed_rows(&triangles, &points),
+        };
+        let mut out = vec![0.0; triangles.len()];
+        for (matrix, bar) in matrices.iter().zip(&bar) {
+            for ((row, bar), out) in matrix.chunks(N).zip(bar.chunks(K)).zip(&mut out) {
+                for (entry, a) in row.iter().zip(a.chunks(K)) {
+                    *out += (0..K).map(|k| bar[k] * entry * a[k]).sum::<f64>();
+                }
+            }
+        }
+        out
+    };
+    let mut sums = vec![CornerSums::default(); faces.len() * K];
+    corner_vjp(&panels(), &points, form, &a, K, &mut sums);
+    let rates = vectors(&dx);
+    let mut slopes = vec![0.0; faces.len()];
+    for (n, sum) in sums.iter().enumerate() {
+        for (k, v) in faces[n / K].iter().enumerate() {
+            let single = bar[0][n] * sum.single_corners[k].dot(&rates[*v]);
+            slopes[n / K] +=
+                corruption * (single + bar[1][n] * sum.double_corners[k].dot(&rates[*v]));
+        }
+    }
+    outcome(value, &x, &dx, &slopes, TOLERANCE)
+}
+
+/// `corner_vjp` against `corner_hvp`.
+fn corner_tangent(form: Form, corruption: f64) -> Outcome {
+    let (x, dx, a) = (start(), numbers(3, 3 * N, 0.3), numbers(4, N * K, 1.0));
+    let panels = panels();
+    let flat = |sums: &[CornerSums]| -> Vec<f64> {
+        let of = |s: &CornerSums| {
+            let corners = s.single_corners.into_iter().chain(s.double_corners);
+            let corners: Vec<f64> = corners.flat_map(|v| [v.x, v.y, v.z]).collect();
+            std::iter::once(s.single).chain(corners)
+        };
+        sums.iter().flat_map(of).collect()
+    };
+    let value = |x: &[f64]| {
+        let mut out = vec![CornerSums::default(); panels.len() * K];
+        corner_vjp(&panels, &sources(x), form, &a, K, &mut out);
+        flat(&out)
+    };
+    let mut out = vec![CornerSums::default(); panels.len() * K];
+    corner_hvp(&panels, &sources(&x), form, &vectors(&dx), &a, K, &mut out);
+    let out: Vec<f64> = flat(&out).iter().map(|o| corruption * o).collect();
+    outcome(value, &x, &dx, &out, TOLERANCE)
+}
+
 fn flux_matrix(s: &Sources) -> Vec<f64> {
     let t = surface();
     let mut out = vec![0.0; t.len() * s.len()];
@@ -136,19 +208,36 @@ fn flux_matrix(s: &Sources) -> Vec<f64> {
 }
 
 fn double_matrix(s: &Sources) -> Vec<f64> {
-    let t = panels();
+    double_rows(&panels(), s)
+}
+
+fn double_rows(t: &Triangles, s: &Sources) -> Vec<f64> {
     let mut out = vec![0.0; t.len() * s.len()];
-    double_fill(&t, s, Write::Set, &mut out, s.len(), 0);
+    double_fill(t, s, Write::Set, &mut out, s.len(), 0);
     out
 }
 
+/// Single and double layer in closed form.
+fn closed_rows(t: &Triangles, s: &Sources) -> [Vec<f64>; 2] {
+    [single, flux].map(|f| {
+        let row = |i: usize| {
+            let of = move |j| f(&t.corners(i), t.weights()[i], &s.point(j));
+            (0..s.len()).map(of)
+        };
+        (0..t.len()).flat_map(row).collect()
+    })
+}
+
 fn single_matrix(s: &Sources) -> Vec<f64> {
-    let t = panels();
+    single_rows(&panels(), s)
+}
+
+fn single_rows(t: &Triangles, s: &Sources) -> Vec<f64> {
     let mut rows = vec![0.0; t.len() * s.len()];
     for (i, row) in rows.chunks_mut(s.len()).enumerate() {
         let mut unit = vec![0.0; t.len()];
         unit[i] = 1.0;
-        single_sum(&t, s, &unit, 1, row);
+        single_sum(t, s, &unit, 1, row);
     }
     rows
 }
@@ -176,14 +265,22 @@ fn surface() -> Triangles {
 
 /// The octahedron and a small one, which is farther in its own size: some of its faces are near, some far, some between.
 fn panels() -> Triangles {
+    panels_at(&two_octahedra().0)
+}
+
+fn panels_at(vertices: &[Vec3]) -> Triangles {
+    let weights = (0..16).map(|i| 0.8 + 0.1 * i as f64).collect();
+    Triangles::new(vertices, &two_octahedra().1, weights)
+}
+
+fn two_octahedra() -> (Vec<Vec3>, Vec<[usize; 3]>) {
     let (mut vertices, mut faces) = octahedron();
     let small = vertices
         .iter()
         .map(|v| 0.17 * v + Vec3::new(0.5, -0.7, 0.6));
     vertices = small.chain(vertices.iter().copied()).collect();
     faces.extend(faces.clone().iter().map(|f| f.map(|v| v + 6)));
-    let weights = (0..16).map(|i| 0.8 + 0.1 * i as f64).collect();
-    Triangles::new(&vertices, &faces, weights)
+    (vertices, faces)
 }
 
 fn octahedron() -> (Vec<Vec3>, Vec<[usize; 3]>) {
@@ -193,7 +290,7 @@ fn octahedron() -> (Vec<Vec3>, Vec<[usize; 3]>) {
         Vec3::new(-1.1, 0.0, 0.0),
         Vec3::new(0.1, -1.2, 0.0),
         Vec3::new(0.0, 0.0, 0.9),
-        Vec3::new(0.1, 0.0, -1.0),
+        Vec3::new(0.1, 0.05, -1.0),
     ];
     let faces = [
         [0, 1, 4],

@@ -41,7 +41,7 @@ impl Panel {
 
     /// L of edge `c`, from the distances of its ends.
     #[inline(always)]
-    fn logarithm<T: Lane>(&self, c: usize, l: V3<T>) -> T {
+    pub fn logarithm<T: Lane>(&self, c: usize, l: V3<T>) -> T {
         let t = l[0].like(self.lengths[c]) / (l[c] + l[(c + 1) % 3]);
         let half = t.artanh();
         half + half

@@ -68,7 +68,12 @@ pub(super) trait Terms<const C: usize>: Copy + Sync {
 
 /// Gives `task` the numbered chunks of `out`, on several threads where there are so many pairs that it pays
 /// to wake them.
-fn parts(out: &mut [f64], size: usize, pairs: usize, task: impl Fn(usize, &mut [f64]) + Sync) {
+pub(super) fn parts<T: Send>(
+    out: &mut [T],
+    size: usize,
+    pairs: usize,
+    task: impl Fn(usize, &mut [T]) + Sync,
+) {
     if pairs < WORTH_WAKING {
         let chunks = out.chunks_mut(size).enumerate();
         chunks.for_each(|(n, out)| task(n, out));
@@ -241,14 +246,7 @@ pub(super) fn forward(
         return;
     }
     let d = Sources::new(d);
-    // Columns apart, with zeros for the padding.
-    let padded = sources.x.len();
-    let mut by_column = vec![0.0; columns * padded];
-    for (j, a) in a.chunks_exact(columns).enumerate() {
-        for (k, a) in a.iter().enumerate() {
-            by_column[k * padded + j] = *a;
-        }
-    }
+    let by_column = by_column(a, columns, sources);
     let pairs = terms.len() * sources.len();
     PAIRS.add(pairs);
     parts(out, TILE * columns, pairs, |tile, out| {
@@ -262,6 +260,18 @@ pub(super) fn forward(
             out,
         });
     });
+}
+
+/// Columns of `a` apart, with zeros for the padding of the sources.
+pub(super) fn by_column(a: &[f64], columns: usize, sources: &Sources) -> Vec<f64> {
+    let padded = sources.x.len();
+    let mut out = vec![0.0; columns * padded];
+    for (j, a) in a.chunks_exact(columns).enumerate() {
+        for (k, a) in a.iter().enumerate() {
+            out[k * padded + j] = *a;
+        }
+    }
+    out
 }
 
 struct Forward<'a, T> {

@@ -24,8 +24,9 @@
 
 use super::confocal::Confocal;
 use crate::adjoint::lie::{Mat6, Vec3, Vec6};
-use crate::special::{r_d, r_d_difference};
+use crate::special::{Number, r_d, r_d_difference};
 use crate::{Error, Result};
+use num_dual::Dual64;
 use std::f64::consts::PI;
 
 /// Semi-axes outside these leave double precision when multiplied with each other.
@@ -40,6 +41,24 @@ const LARGEST: f64 = 1e30;
 pub fn added_mass(semi_axes: [f64; 3]) -> Result<Mat6> {
     check("ellipsoid", semi_axes)?;
     Ok(Lamb::new(semi_axes).added_mass())
+}
+
+/// ∂M of [`added_mass`] with each semi-axis: m², m⁴.
+///
+/// # Errors
+/// As there.
+pub fn added_mass_slopes(semi_axes: [f64; 3]) -> Result<[Mat6; 3]> {
+    check("ellipsoid", semi_axes)?;
+    Ok(slopes(semi_axes))
+}
+
+/// The same of semi-axes as checked by [`check`].
+pub(super) fn slopes(semi_axes: [f64; 3]) -> [Mat6; 3] {
+    [0, 1, 2].map(|k| {
+        let axes = [0, 1, 2].map(|i| Dual64::new(semi_axes[i], f64::from(i == k)));
+        let diagonal = Lamb::new(axes).diagonal().map(|m| m.eps);
+        Mat6::from_diagonal(&Vec6::from(diagonal))
+    })
 }
 
 /// Whether semi-axes can be; `place` begins the message.
@@ -59,19 +78,19 @@ pub(super) fn check(place: &str, semi_axes: [f64; 3]) -> Result<()> {
 /// The coefficients of one ellipsoid. Lengths are relative to the longest semi-axis, so that no power of
 /// them leaves double precision.
 #[derive(Clone, Copy, Debug)]
-pub(super) struct Lamb {
+pub(super) struct Lamb<D = f64> {
     /// Longest semi-axis, m.
     scale: f64,
-    semi_axes: [f64; 3],
+    semi_axes: [D; 3],
     /// α of each axis.
-    alpha: [f64; 3],
+    alpha: [D; 3],
     /// b² − c² about each axis, from the axes as given: dividing them first would lose digits of small
     /// differences.
-    difference: [f64; 3],
+    difference: [D; 3],
     /// g about each axis.
-    g: [f64; 3],
+    g: [D; 3],
     /// 2 − (b² + c²) g about each axis.
-    denominator: [f64; 3],
+    denominator: [D; 3],
 }
 
 /// The axes after axis i in cyclic order.
@@ -80,33 +99,37 @@ fn others(i: usize) -> (usize, usize) {
 }
 
 /// A number for each axis, from it and the others after it.
-fn each(f: impl Fn(usize, usize, usize) -> f64) -> [f64; 3] {
+fn each<D>(f: impl Fn(usize, usize, usize) -> D) -> [D; 3] {
     [0, 1, 2].map(|i| {
         let (j, k) = others(i);
         f(i, j, k)
     })
 }
 
-impl Lamb {
+impl<D: Number> Lamb<D> {
     /// `semi_axes` as checked by [`check`].
-    pub fn new(semi_axes: [f64; 3]) -> Self {
-        let scale = semi_axes.iter().fold(0.0f64, |m, a| m.max(*a));
+    pub fn new(semi_axes: [D; 3]) -> Self {
+        let scale = semi_axes.iter().fold(0.0f64, |m, a| m.max(a.re()));
         let axes = semi_axes.map(|a| a / scale);
         let squares = axes.map(|a| a * a);
-        let product = 2.0 / 3.0 * axes[0] * axes[1] * axes[2];
+        let product = axes[0] * (2.0 / 3.0) * axes[1] * axes[2];
         let alpha = each(|i, j, k| product * r_d(squares[j], squares[k], squares[i]));
         let difference =
             each(|_, j, k| (semi_axes[j] - semi_axes[k]) / scale * (axes[j] + axes[k]));
         let g = each(|i, j, k| product * r_d_difference(squares[i], squares[j], squares[k]));
         let denominator = each(|i, j, k| {
-            let (long, short) = if axes[j] >= axes[k] { (j, k) } else { (k, j) };
+            let (long, short) = if axes[j].re() >= axes[k].re() {
+                (j, k)
+            } else {
+                (k, j)
+            };
             let (b, c) = (squares[long], squares[short]);
-            if c > 0.5 * b {
-                2.0 - (b + c) * g[i]
+            if c.re() > 0.5 * b.re() {
+                -((b + c) * g[i]) + 2.0
             } else {
                 // The same with 2 = α + β + γ, where the other form would cancel.
                 let [alpha, beta, gamma] = [alpha[i], alpha[long], alpha[short]];
-                (b * (alpha + 2.0 * beta) - c * (alpha + 2.0 * gamma)) / (b - c)
+                (b * (alpha + beta * 2.0) - c * (alpha + gamma * 2.0)) / (b - c)
             }
         });
         Self {
@@ -119,21 +142,28 @@ impl Lamb {
         }
     }
 
-    /// About the centre, along the axes.
-    pub fn added_mass(&self) -> Mat6 {
+    /// Added mass about the centre, along the axes: its diagonal.
+    fn diagonal(&self) -> [D; 6] {
         let [a, b, c] = self.semi_axes;
-        let volume = 4.0 / 3.0 * PI * a * b * c;
+        let volume = a * (4.0 / 3.0 * PI) * b * c;
         let cube = self.scale.powi(3);
-        let mut diagonal = Vec6::zeros();
+        let mut diagonal = [D::from(0.0); 6];
         for i in 0..3 {
             let (j, k) = others(i);
             let left = self.alpha[j] + self.alpha[k];
-            diagonal[i] = cube * volume * self.alpha[i] / left;
+            diagonal[i] = volume * cube * self.alpha[i] / left;
             let difference = self.difference[i];
-            diagonal[3 + i] = cube * self.scale * self.scale * volume / 5.0
+            diagonal[3 + i] = volume * (cube * self.scale * self.scale) / 5.0
                 * (difference * difference * self.g[i] / self.denominator[i]);
         }
-        Mat6::from_diagonal(&diagonal)
+        diagonal
+    }
+}
+
+impl Lamb {
+    /// About the centre, along the axes.
+    pub fn added_mass(&self) -> Mat6 {
+        Mat6::from_diagonal(&Vec6::from(self.diagonal()))
     }
 
     /// Potentials of the six unit twists (about the centre, along the axes) at a point x (m) of the

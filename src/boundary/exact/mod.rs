@@ -101,6 +101,15 @@ impl ExactBoundary {
         })
     }
 
+    /// ∂M of the added mass at unit density (body frame, about its origin) with each semi-axis: m², m³, m⁴.
+    pub fn added_mass_slopes(&self) -> [Mat6; 3] {
+        let move_in = twist_in_shape(&self.pose);
+        lamb::slopes(self.semi_axes).map(|slope| {
+            let turned = move_in.transpose() * slope * move_in;
+            0.5 * (turned + turned.transpose())
+        })
+    }
+
     /// Number of harmonics that are kept, and their highest degree; zeros for a sphere.
     pub fn harmonics(&self) -> (usize, usize) {
         self.harmonics.as_ref().map_or((0, 0), Harmonics::size)

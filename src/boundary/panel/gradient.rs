@@ -66,6 +66,12 @@ impl PanelBoundary {
         self.slopes().sharp.get(face).is_some_and(|sharp| *sharp)
     }
 
+    /// Panels with a side on a sharp edge, the direction across it in the panel, and by how much the mean of a product of two velocities across it is larger
+    /// than that of their means, relatively.
+    pub(super) fn steep(&self) -> &[(usize, Vec3, f64)] {
+        &self.slopes().edges
+    }
+
     fn slopes(&self) -> &Slopes {
         self.slopes.get_or_init(|| Around::new(self).slopes())
     }

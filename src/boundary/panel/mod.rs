@@ -20,8 +20,11 @@
 //! J. 12 (1974) 191–197 (the direct form).
 
 mod gradient;
+mod hadamard;
 mod layers;
 pub mod richardson;
+mod richardson_slopes;
+mod shape;
 mod sheet;
 
 use super::{Response, asymmetry, potentials};
@@ -34,6 +37,8 @@ use crate::{Error, Result};
 use faer::{Mat, MatRef};
 pub(crate) use layers::Panels;
 pub use richardson::{Extrapolated, Richardson, richardson};
+pub use richardson_slopes::RichardsonSlopes;
+pub use shape::MassSlopes;
 use std::sync::OnceLock;
 
 /// Most faces of one system: its matrix takes 8·faces² bytes, 3.2 GB here.

@@ -156,7 +156,7 @@ fn positive(m: &Mat6, volume: f64, least: f64) -> Mat6 {
 }
 
 /// Inertia of the water displaced, in mass and, roughly, in rotation: units of a 6 × 6 matrix.
-fn displaced(volume: f64) -> Mat6 {
+pub(super) fn displaced(volume: f64) -> Mat6 {
     let roots = Vec6::from_fn(|i, _| {
         let power = if i < 3 { 1.0 } else { 5.0 / 3.0 };
         volume.powf(0.5 * power)

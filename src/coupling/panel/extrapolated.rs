@@ -16,7 +16,7 @@ use crate::boundary::PanelBoundary;
 use crate::coupling::film::PlacedFilms;
 use crate::coupling::{
     Coupling, CouplingReport, Direction, Linearise, Linearised, Momenta, Motion, Pullback,
-    SurfacePotential, Tangent,
+    ShapeDirection, ShapeTerm, SurfacePotential, Tangent,
 };
 use crate::geometry::{Solid, TriMesh, Wall};
 use crate::{Error, Result};
@@ -30,8 +30,10 @@ const RATIO: f64 = 1.2;
 pub struct ExtrapolatedPanels {
     fine: PanelCoupled,
     coarse: PanelCoupled,
-    /// 1/(ρ² − 1).
+    /// F = 1/(ρ² − 1).
     factor: f64,
+    /// Its change with each shape parameter.
+    factor_rates: Vec<f64>,
 }
 
 impl ExtrapolatedPanels {
@@ -61,6 +63,7 @@ impl ExtrapolatedPanels {
             fine,
             coarse,
             factor: 1.0 / (ratio * ratio - 1.0),
+            factor_rates: Vec::new(),
         })
     }
 
@@ -76,6 +79,36 @@ impl ExtrapolatedPanels {
         FilmedPanels::new(Box::new(self), surfaces, walls)
     }
 
+    /// With the shape parameters of the bodies: how the vertices of the fine and of the coarse meshes move with each, and how the ratio of the edges changes, per unit of
+    /// it; after the added masses that are known. In the water [`Linearised::shape_vjp`] then tells the derivatives of what is extrapolated.
+    ///
+    /// # Errors
+    /// As [`PanelCoupled::with_shapes`], and lists of different lengths.
+    pub fn with_shapes(
+        self,
+        fine: Vec<ShapeDirection>,
+        coarse: Vec<ShapeDirection>,
+        ratio_rates: Vec<f64>,
+    ) -> Result<Self> {
+        let (expected, found) = (fine.len(), [coarse.len(), ratio_rates.len()]);
+        if found != [expected; 2] {
+            return Err(Error::input(
+                "extrapolated panels: shape parameters of the coarse meshes, and rates of the ratio",
+                format!("{found:?}"),
+                format!("{expected} each, as of the fine meshes"),
+            ));
+        }
+        // ∂F/∂ρ = −2 ρ F²
+        let ratio = (1.0 + 1.0 / self.factor).sqrt();
+        let slope = -2.0 * ratio * self.factor * self.factor;
+        Ok(Self {
+            fine: self.fine.with_shapes(fine)?,
+            coarse: self.coarse.with_shapes(coarse)?,
+            factor_rates: ratio_rates.iter().map(|r| slope * r).collect(),
+            ..self
+        })
+    }
+
     fn report(&self, fine: &CouplingReport, coarse: &CouplingReport) -> CouplingReport {
         CouplingReport {
             iterations: fine.iterations.max(coarse.iterations),
@@ -83,6 +116,24 @@ impl ExtrapolatedPanels {
             ..fine.clone()
         }
     }
+}
+
+/// The sum of the terms themselves.
+fn summed(
+    linearised: &dyn Linearised,
+    terms: &[ShapeTerm],
+    twists: impl Fn(Direction) -> DVector<f64>,
+) -> Result<f64> {
+    let mut sum = 0.0;
+    for term in terms {
+        let found = linearised.vjp(term.x, term.y)?;
+        let value: f64 = match term.along {
+            Some(z) => found.wrench.iter().zip(z).map(|(w, z)| w.dot(z)).sum(),
+            None => found.momentum_x.dot(&twists(term.y)),
+        };
+        sum += term.weight * value;
+    }
+    Ok(sum)
 }
 
 /// `fine + factor (fine − coarse)`.
@@ -112,6 +163,10 @@ impl Coupling for ExtrapolatedPanels {
 
     fn unknowns(&self) -> usize {
         self.fine.unknowns()
+    }
+
+    fn shape_parameters(&self) -> usize {
+        self.fine.shape_parameters()
     }
 
     fn evaluate(&self, poses: &[Pose], basis: &DMatrix<f64>) -> Result<Momenta> {
@@ -187,6 +242,8 @@ impl HeldApart for ExtrapolatedPanels {
         let coarse = self.coarse.linearise_held(poses, basis, films)?;
         Ok(Box::new(ExtrapolatedLinearised {
             factor: self.factor,
+            factor_rates: &self.factor_rates,
+            basis: basis.clone(),
             momenta: matrix(self.factor, fine.momenta(), coarse.momenta()),
             report: self.report(fine.report(), coarse.report()),
             fine,
@@ -200,6 +257,8 @@ struct ExtrapolatedLinearised<'a> {
     fine: Box<dyn Linearised + 'a>,
     coarse: Box<dyn Linearised + 'a>,
     factor: f64,
+    factor_rates: &'a [f64],
+    basis: DMatrix<f64>,
     momenta: DMatrix<f64>,
     report: CouplingReport,
 }
@@ -240,6 +299,21 @@ impl Linearised for ExtrapolatedLinearised<'_> {
             gradient: wrenches(self.factor, fine.gradient, &coarse.gradient),
             wrench: wrenches(self.factor, fine.wrench, &coarse.wrench),
         })
+    }
+
+    fn shape_vjp(&self, terms: &[ShapeTerm]) -> Result<DVector<f64>> {
+        let (fine, coarse) = (self.fine.shape_vjp(terms)?, self.coarse.shape_vjp(terms)?);
+        let mut out = vector(self.factor, fine, &coarse);
+        if self.factor_rates.iter().any(|rate| *rate != 0.0) {
+            let twists = |x: Direction| match x {
+                Direction::Basis(c) => &self.basis * c,
+                Direction::Twist(x) => x.clone(),
+            };
+            let step = summed(&*self.fine, terms, twists)? - summed(&*self.coarse, terms, twists)?;
+            let rates = out.iter_mut().zip(self.factor_rates);
+            rates.for_each(|(o, rate)| *o += step * rate);
+        }
+        Ok(out)
     }
 
     fn report(&self) -> &CouplingReport {

@@ -9,7 +9,7 @@ use crate::boundary::PanelBoundary;
 use crate::coupling::film::{Extent, FilmBody, Films, PlacedFilms, Shares};
 use crate::coupling::{
     Coupling, CouplingReport, Direction, Linearise, Linearised, Momenta, Motion, Pullback,
-    SurfacePotential, Tangent, surface,
+    ShapeTerm, SurfacePotential, Tangent, surface,
 };
 use crate::geometry::{Solid, TriMesh, Wall};
 use crate::{Error, Result};
@@ -147,6 +147,10 @@ impl Coupling for FilmedPanels {
         Some(self)
     }
 
+    fn shape_parameters(&self) -> usize {
+        self.panels.shape_parameters()
+    }
+
     fn film_momenta(&self, poses: &[Pose], twists: &DMatrix<f64>) -> Result<Option<DMatrix<f64>>> {
         Ok(Some(self.films.momenta(poses, twists, &self.names)?))
     }
@@ -262,6 +266,12 @@ impl Linearised for FilmedLinearised<'_> {
             .add_tangent(&[&x, &y], z, into, &mut rates);
         [out.momentum_x, out.momentum_y] = rates;
         Ok(out)
+    }
+
+    /// # Errors
+    /// Films have no such derivatives.
+    fn shape_vjp(&self, terms: &[ShapeTerm]) -> Result<DVector<f64>> {
+        self.held.shape_vjp(terms)
     }
 
     fn report(&self) -> &CouplingReport {

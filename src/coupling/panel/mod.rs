@@ -28,6 +28,7 @@ mod first;
 mod model;
 mod placed;
 mod second;
+mod shape;
 mod sweep;
 mod system;
 
@@ -39,7 +40,9 @@ use super::film::PlacedFilms;
 use super::full::{SolveSettings, SystemBackend};
 use super::response::{CoupledResponse, Solved};
 use super::surface;
-use super::{Coupling, Exclusions, Linearise, Linearised, Momenta, Motion, SurfacePotential};
+use super::{
+    Coupling, Exclusions, Linearise, Linearised, Momenta, Motion, ShapeDirection, SurfacePotential,
+};
 use crate::adjoint::lie::{Mat6, Pose, Vec3};
 use crate::boundary::PanelBoundary;
 use crate::geometry::{Solid, TriMesh, Wall};
@@ -82,6 +85,16 @@ impl PanelCoupled {
     pub fn with_added_mass(mut self, known: &[Option<Mat6>]) -> Self {
         Arc::make_mut(&mut self.model).know(known);
         self
+    }
+
+    /// With the shape parameters of the bodies, of which [`Linearised::shape_vjp`] then tells the derivatives; after
+    /// [`PanelCoupled::with_added_mass`]. Not on a backend.
+    ///
+    /// # Errors
+    /// [`Error::Input`] for a body that doesn't exist, velocities that aren't one for each vertex, and a body whose added mass is known, but not how it changes.
+    pub fn with_shapes(mut self, shapes: Vec<ShapeDirection>) -> Result<Self> {
+        Arc::make_mut(&mut self.model).change(shapes)?;
+        Ok(self)
     }
 
     /// On a backend made for the same model; [`Coupling::velocity`] stays on the CPU.
@@ -162,6 +175,10 @@ impl Coupling for PanelCoupled {
 
     fn unknowns(&self) -> usize {
         self.model.rows()
+    }
+
+    fn shape_parameters(&self) -> usize {
+        self.model.shapes().len()
     }
 
     /// # Errors
@@ -250,6 +267,7 @@ impl HeldApart for PanelCoupled {
         basis: &DMatrix<f64>,
         films: &Arc<PlacedFilms<'a>>,
     ) -> Result<Box<dyn Linearised + 'a>> {
-        Ok(Box::new(self.solved(poses, basis, films)?.linearise()?))
+        let linearised = self.solved(poses, basis, films)?.linearise()?;
+        Ok(Box::new(linearised.with_shapes(self.shape_parameters())))
     }
 }

@@ -7,7 +7,7 @@ use crate::adjoint::lie::{Pose, Vec6};
 use crate::coupling::film::PlacedFilms;
 use crate::coupling::pair::Pair;
 use crate::coupling::response::{self, body_twists, moves};
-use crate::coupling::{CoupledResponse, Direction, PairTensor, Reached, Tangent};
+use crate::coupling::{CoupledResponse, Direction, PairTensor, Reached, ShapeTerm, Tangent};
 use crate::solver::Columns;
 use crate::{Error, Result};
 use nalgebra::{DMatrix, DVector};
@@ -140,14 +140,19 @@ impl<'a> PlacedPanels<'a> {
     /// ∇(S q − Ω/4π φ) of a pair's panels at its points, `[point][column][3]`, image's sign included: minus the velocity that they
     /// make there.
     fn fields(&self, pair: &Pair, solution: &PanelSolution) -> Vec<f64> {
-        let k = solution.twists.ncols();
+        self.fields_of(pair, &solution.twists, &solution.phi)
+    }
+
+    /// The same of columns of twists and of potentials.
+    pub fn fields_of(&self, pair: &Pair, twists: &DMatrix<f64>, phi: &Columns) -> Vec<f64> {
+        let k = phi.columns;
         let sign = pair.image.sign;
         let triangles = self.coupled.bodies[pair.target].panels().triangles();
         let mut out = vec![0.0; 3 * k * pair.positions.len()];
-        if let Some(q) = self.normal_velocity(pair.target, &solution.twists) {
+        if let Some(q) = self.normal_velocity(pair.target, twists) {
             single_vjp(triangles, &pair.points, &scaled(sign, &q), k, &mut out);
         }
-        let phi = solution.phi.slice(&self.coupled.faces[pair.target]);
+        let phi = phi.slice(&self.coupled.faces[pair.target]);
         double_vjp(triangles, &pair.points, &scaled(-sign, phi), k, &mut out);
         out
     }
@@ -293,14 +298,11 @@ impl CoupledResponse for PanelSolution<'_> {
     }
 
     fn directions(&self, directions: &[Direction]) -> Result<Box<dyn CoupledResponse + '_>> {
-        let parts = directions.iter().map(|direction| match direction {
-            Direction::Basis(c) => Ok(self.combine(c)),
-            Direction::Twist(x) => {
-                let twists = DMatrix::from_column_slice(x.len(), 1, x.as_slice());
-                Self::new(self.placed.clone(), twists)
-            }
-        });
-        Ok(Box::new(self.beside(&parts.collect::<Result<Vec<_>>>()?)))
+        Ok(Box::new(self.along(directions)?))
+    }
+
+    fn shape_vjp(&self, terms: &[ShapeTerm]) -> Result<Option<DVector<f64>>> {
+        self.shape_slopes(terms).map(Some)
     }
 
     fn tangent(&self, z: &[Vec6]) -> Result<Tangent> {
@@ -312,6 +314,23 @@ impl CoupledResponse for PanelSolution<'_> {
 
     fn densities(&self) -> Result<Columns> {
         Ok(self.phi.clone())
+    }
+}
+
+impl<'a> PanelSolution<'a> {
+    /// The solution to these directions, one column each.
+    ///
+    /// # Errors
+    /// A solve that misses its tolerance.
+    pub fn along(&self, directions: &[Direction]) -> Result<Self> {
+        let parts = directions.iter().map(|direction| match direction {
+            Direction::Basis(c) => Ok(self.combine(c)),
+            Direction::Twist(x) => {
+                let twists = DMatrix::from_column_slice(x.len(), 1, x.as_slice());
+                Self::new(self.placed.clone(), twists)
+            }
+        });
+        Ok(self.beside(&parts.collect::<Result<Vec<_>>>()?))
     }
 }
 

@@ -12,15 +12,15 @@ use nalgebra::DVector;
 use std::ops::Range;
 
 /// Tangents of φ and μ.
-struct Moved {
-    phi: Columns,
-    mu: Columns,
+pub(super) struct Moved {
+    pub phi: Columns,
+    pub mu: Columns,
 }
 
 /// Of a pair's points, in the frame of the panels.
-struct Displacements {
+pub(super) struct Displacements {
     /// As the panels see them.
-    points: Vec<Vec3>,
+    pub points: Vec<Vec3>,
     /// Where they aren't held off.
     arms: Vec<Vec3>,
 }
@@ -68,50 +68,24 @@ impl PlacedPanels<'_> {
     pub fn second(&self, solution: &PanelSolution, z: &[Vec6]) -> Result<Tangent> {
         let n = solution.twists.ncols();
         let bodies = self.coupled.bodies.len();
-        let mut right = Columns::zeros(self.coupled.rows(), n);
-        let mut transposed = Columns::zeros(self.coupled.rows(), n);
         // δSᵀ μ
         let mut back = Columns::zeros(self.coupled.rows(), n);
         let films = self.films.along(z);
-        let displacement = |pair: &Pair| {
-            let arms = pair.displacements(&self.poses[pair.target], z);
-            let held = pair.moving(&films);
-            let shift = held.map_or(Vec3::zeros(), |(apart, film)| apart.rate(film));
-            Displacements {
-                points: arms.iter().map(|d| d + shift).collect(),
-                arms,
-            }
-        };
-        let displacements: Vec<Displacements> = self.pairs.iter().map(displacement).collect();
+        let displacements = self.displacements(z);
+        let moved = self.moved(solution, &displacements)?;
         let pairs = || {
             let given = solution.fields().iter().zip(&displacements);
             self.pairs.iter().zip(given)
         };
-        for (
-            pair,
-            (
-                fields,
-                Displacements {
-                    points: displacement,
-                    ..
-                },
-            ),
-        ) in pairs()
-        {
+        for (pair, Displacements { points: d, .. }) in self.pairs.iter().zip(&displacements) {
             let (panels, points) = self.ranges(pair);
-            self.add_moved(pair, fields, displacement, &mut right);
-            let triangles = self.coupled.bodies[pair.target].panels().triangles();
-            let (s, d, sign) = (&pair.points, displacement, pair.image.sign);
-            let mu = solution.mu.slice(&points);
-            let out = transposed.slice_mut(&panels);
-            double_jvp(triangles, s, d, &scaled(-sign, mu), n, out);
             if self.reads(pair.target) {
+                let triangles = self.coupled.bodies[pair.target].panels().triangles();
+                let mu = scaled(pair.image.sign, solution.mu.slice(&points));
                 let out = back.slice_mut(&panels);
-                single_jvp(triangles, s, d, &scaled(sign, mu), n, out);
+                single_jvp(triangles, &pair.points, d, &mu, n, out);
             }
         }
-        let ([phi, mu], _) = self.system.solve(&right, &transposed)?;
-        let moved = Moved { phi, mu };
         let momentum = |k: usize| -> DVector<f64> {
             let mut h = self.impulse(&moved.phi.column(k), &moved.mu.column(k));
             for (b, body) in self.coupled.bodies.iter().enumerate() {
@@ -146,6 +120,46 @@ impl PlacedPanels<'_> {
             gradient,
             wrench,
         })
+    }
+
+    /// Of the points of all pairs as the bodies are displaced along z.
+    pub fn displacements(&self, z: &[Vec6]) -> Vec<Displacements> {
+        let films = self.films.along(z);
+        let displacement = |pair: &Pair| {
+            let arms = pair.displacements(&self.poses[pair.target], z);
+            let held = pair.moving(&films);
+            let shift = held.map_or(Vec3::zeros(), |(apart, film)| apart.rate(film));
+            Displacements {
+                points: arms.iter().map(|d| d + shift).collect(),
+                arms,
+            }
+        };
+        self.pairs.iter().map(displacement).collect()
+    }
+
+    /// Rates of φ and μ of all columns there.
+    ///
+    /// # Errors
+    /// A solve that misses its tolerance.
+    pub fn moved(
+        &self,
+        solution: &PanelSolution,
+        displacements: &[Displacements],
+    ) -> Result<Moved> {
+        let n = solution.twists.ncols();
+        let mut right = Columns::zeros(self.coupled.rows(), n);
+        let mut transposed = Columns::zeros(self.coupled.rows(), n);
+        let given = solution.fields().iter().zip(displacements);
+        for (pair, (fields, Displacements { points: d, .. })) in self.pairs.iter().zip(given) {
+            let (panels, points) = self.ranges(pair);
+            self.add_moved(pair, fields, d, &mut right);
+            let triangles = self.coupled.bodies[pair.target].panels().triangles();
+            let mu = scaled(-pair.image.sign, solution.mu.slice(&points));
+            let out = transposed.slice_mut(&panels);
+            double_jvp(triangles, &pair.points, d, &mu, n, out);
+        }
+        let ([phi, mu], _) = self.system.solve(&right, &transposed)?;
+        Ok(Moved { phi, mu })
     }
 
     /// Adds δS q − δA φ at the points of a pair, from its fields there.

@@ -108,7 +108,11 @@ impl Reduced {
     pub fn with_shapes(mut self, shapes: Vec<(usize, ShapeSlope)>) -> Result<Self> {
         for (b, slope) in &shapes {
             let points = self.bodies.get(*b).map_or(0, |body| body.points());
-            let sizes = [slope.points.len(), slope.strengths.nrows(), slope.solution.nrows()];
+            let sizes = [
+                slope.points.len(),
+                slope.strengths.nrows(),
+                slope.solution.nrows(),
+            ];
             if points == 0 || sizes != [points; 3] {
                 let right = format!("must be a body with as many points: it has {points}");
                 let value = format!("body {b} with {sizes:?} points");

@@ -94,10 +94,8 @@ impl ReducedLinearised<'_> {
         let [bx, by] = [from_x, from_y].map(|f| [part(f, 0), part(f, 1)]);
         let solved = |k: usize| &slope.solution * &by[k];
         let still = own_x.dot(&by[0]) + own_y.dot(&bx[0]) + bx[0].dot(&solved(0));
-        let rate = own_x.dot(&by[1])
-            + own_y.dot(&bx[1])
-            + bx[1].dot(&solved(0))
-            + bx[0].dot(&solved(1));
+        let rate =
+            own_x.dot(&by[1]) + own_y.dot(&bx[1]) + bx[1].dot(&solved(0)) + bx[0].dot(&solved(1));
         let mut out = [still, rate];
         for (i, d) in range.zip(&slope.points) {
             for (a, g) in [(from_x, from_y), (from_y, from_x)] {

@@ -2,7 +2,8 @@
 //! −½ ρ c Σ ΔA |w| w.
 
 use super::{
-    ChangedSurface, ForceModel, ForceParts, LoadBars, Loads, Moving, Outside, Together, Velocity, Waterline,
+    ChangedSurface, ForceModel, ForceParts, LoadBars, Loads, Moving, Outside, Together, Velocity,
+    Waterline,
 };
 use crate::adjoint::drag::{
     Element, Part, Surface, quadratic_drag, quadratic_drag_derivative, resistance,
@@ -80,7 +81,13 @@ pub(super) fn linear(
         // Also at zero coefficient: the derivative with respect to it isn't zero.
         if !surface.is_empty() {
             let kind = Kind::Linear(part(given.part));
-            bodies.push(Dragged::new(body, coefficient, kind, surface, parts.changed));
+            bodies.push(Dragged::new(
+                body,
+                coefficient,
+                kind,
+                surface,
+                parts.changed,
+            ));
         }
     }
     assemble("linear drag", bodies, parts)
@@ -97,7 +104,13 @@ pub(super) fn quadratic(
             Some(given) if !surface.is_empty() => {
                 let coefficient = parameters.declare(owner, QUADRATIC, given.quadratic);
                 let kind = Kind::Quadratic(part(given.quadratic_part));
-                bodies.push(Dragged::new(body, coefficient, kind, surface, parts.changed));
+                bodies.push(Dragged::new(
+                    body,
+                    coefficient,
+                    kind,
+                    surface,
+                    parts.changed,
+                ));
             }
             _ => {
                 parameters.declare(owner, NONE, 0.0);

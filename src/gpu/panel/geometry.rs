@@ -5,6 +5,7 @@
 //! fine arithmetic, whose entries are made where they are used.
 
 use crate::Result;
+use crate::adjoint::kernel::radius_squared;
 use crate::adjoint::lie::{Pose, Vec3, Vec6};
 use crate::boundary::PanelBoundary;
 use crate::coupling::PanelModel;
@@ -47,12 +48,11 @@ fn panel(corners: &[Vec3; 3]) -> impl Iterator<Item = f64> {
     let m = (b - a).cross(&(c - a));
     // Second moments about the centroid: Σ (v − g)(v − g)ᵀ/12 over the corners.
     let (p, q) = ((b - a + (c - a)) / 72_f64.sqrt(), (b - c) / 24_f64.sqrt());
-    let squares = corners.map(|v| (v - centre).norm_squared());
     let numbers = [
         m.norm() / (8.0 * PI),
         1.0 / m.norm(),
         p.norm_squared() + q.norm_squared(),
-        squares.into_iter().fold(0.0, f64::max),
+        radius_squared(&corners.map(|v| v - centre)),
     ];
     let vectors = [a, b, c, centre, m, p, q];
     vectors

@@ -31,7 +31,11 @@ pub(super) fn put(problem: &Problem, mut made: Made) -> Result<Made> {
         // Nothing is known of what is given.
         made.bodies[b].added_mass_error = None;
     }
-    made.coupling = Box::new(Given::new(made.coupling, change)?);
+    let given = |b: usize| problem.bodies[b].added_mass.is_some();
+    let rates = made.own_rates.iter();
+    let rates = rates.map(|&(b, rate)| (b, if given(b) { rate } else { Mat6::zeros() }));
+    let rates = rates.collect();
+    made.coupling = Box::new(Given::new(made.coupling, change)?.with_shapes(rates)?);
     Ok(made)
 }
 

@@ -62,18 +62,28 @@ pub(in crate::water) fn own_added_mass(problem: &Problem) -> Result<Vec<Mat6>> {
 
 /// Derivatives of the bodies' own added mass with respect to the shape parameters, each with its body; zero of one that is given.
 pub(in crate::water) fn own_slopes(problem: &Problem) -> Result<Vec<(usize, Mat6)>> {
-    let slope = |&(b, change): &(usize, &ShapeChange)| {
+    let mut out = Vec::with_capacity(problem.changes.len());
+    for group in problem.changes.chunk_by(|a, b| a.0 == b.0) {
+        let b = group[0].0;
         let body = &problem.bodies[b];
-        let slope = match body.added_mass {
-            Some(_) => Mat6::zeros(),
-            None => {
-                let method = problem.method_for(body)?;
-                method.added_mass_slope(body, problem.numerics, change)?
-            }
+        let slopes = match body.added_mass {
+            Some(_) => vec![Mat6::zeros(); group.len()],
+            None => alone_slopes(problem, body, group)?,
         };
-        Ok((b, slope))
-    };
-    problem.changes.iter().map(slope).collect()
+        out.extend(slopes.into_iter().map(|slope| (b, slope)));
+    }
+    Ok(out)
+}
+
+/// Those of a body as computed, whatever is given, with respect to its parameters.
+pub(in crate::water) fn alone_slopes(
+    problem: &Problem,
+    body: &SubmergedBody,
+    group: &[(usize, &ShapeChange)],
+) -> Result<Vec<Mat6>> {
+    let changes: Vec<&ShapeChange> = group.iter().map(|(_, change)| *change).collect();
+    let method = problem.method_for(body)?;
+    method.added_mass_slopes(body, problem.numerics, &changes)
 }
 
 /// Of equal bodies with the same added mass given, or none, one.
@@ -104,6 +114,7 @@ impl FidelityKind for Isolated {
         let added = made.iter().map(|m| m.added_mass).collect();
         let coupling = coupling::Isolated::new(added).with_shapes(own_slopes(problem)?)?;
         Ok(Made {
+            own_rates: Vec::new(),
             carried: None,
             films: Vec::new(),
             own: vec![None; made.len()],

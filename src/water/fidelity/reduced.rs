@@ -1,6 +1,6 @@
 //! All bodies coupled, each compressed to a few sources.
 
-use super::isolated::own_slopes;
+use super::isolated::alone_slopes;
 use super::kind::{FidelityKind, Knob};
 use crate::adjoint::lie::{Pose, Vec3};
 use crate::boundary::Response;
@@ -52,15 +52,18 @@ impl FidelityKind for Reduced {
                 ..Discretisation::default()
             });
         }
-        let coupling = match problem.changes.is_empty() {
-            true => coupling,
-            false => coupling.with_shapes(shape_slopes(problem)?)?,
-        };
+        let slopes = shape_slopes(problem)?;
+        let own_rates = slopes
+            .iter()
+            .map(|(b, slope)| (*b, slope.added_mass))
+            .collect();
+        let coupling = coupling.with_shapes(slopes)?;
         let made = coupling.reduced_bodies();
         let films = coupling.film_extents(problem.walls)?;
         device.films = !films.is_empty();
         Ok(Made {
             own: problem.own(|b| Ok(made[b].parts().added_mass))?,
+            own_rates,
             carried: Some(Carried::Sources),
             films,
             warnings: [warnings(problem, made), unkept].concat(),
@@ -333,7 +336,10 @@ impl<'a> InUnits<'a> {
             mesh.displaced(&velocities, t)
         };
         let ellipsoid = self.ellipsoid.map(|(axes, pose)| {
-            let axes = change.semi_axes(t).map(|axes| axes.map(|x| x / self.size)).unwrap_or(axes);
+            let axes = change
+                .semi_axes(t)
+                .map(|axes| axes.map(|x| x / self.size))
+                .unwrap_or(axes);
             (axes, pose)
         });
         Self {
@@ -347,7 +353,6 @@ impl<'a> InUnits<'a> {
             ..*self
         }
     }
-
 }
 
 /// The body compressed, from the cache if it is there.
@@ -377,14 +382,13 @@ const STEP: f64 = 1e-3;
 /// # Errors
 /// Vertices of a mesh, along which nothing but the mesh is known to move.
 fn shape_slopes(problem: &Problem) -> Result<Vec<(usize, ShapeSlope)>> {
-    let own = own_slopes(problem)?;
-    let mut out = Vec::with_capacity(own.len());
+    let mut out = Vec::with_capacity(problem.changes.len());
     for group in problem.changes.chunk_by(|a, b| a.0 == b.0) {
         let b = group[0].0;
         let body = &problem.bodies[b];
         let method = problem.method_for(body)?;
         let units = InUnits::new(body, method, problem.chosen(b))?;
-        let size = units.size;
+        let (size, own) = (units.size, alone_slopes(problem, body, group)?);
         let moving: Vec<_> = group
             .iter()
             .map(|(_, change)| move |p: &Vec3| units_velocity(change, size, p))
@@ -407,12 +411,19 @@ fn shape_slopes(problem: &Problem) -> Result<Vec<(usize, ShapeSlope)>> {
                 step,
                 velocity,
                 responses: [at(step)?, at(-step)?],
-                added_mass: own[out.len() + steps.len()].1,
+                added_mass: own[steps.len()],
             });
         }
         let response = method.response(&units.body(), problem.numerics, units.finest)?;
         let (settings, regions) = (&units.settings, &units.regions);
-        let made = compress::slopes(body.name, &units.mesh, response.as_ref(), settings, regions, &steps);
+        let made = compress::slopes(
+            body.name,
+            &units.mesh,
+            response.as_ref(),
+            settings,
+            regions,
+            &steps,
+        );
         let made = made.map_err(|e| e.in_units_of(size))?;
         out.extend(made.into_iter().map(|slope| (b, slope.scaled(size))));
     }

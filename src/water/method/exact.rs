@@ -1,12 +1,14 @@
 //! Closed forms of spheres and ellipsoids.
 
-use super::kind::{BodyMethod, Problem, Solved};
+use super::kind::{BodyMethod, Problem, Solved, far};
+use crate::adjoint::lie::Mat6;
 use crate::boundary::ExactBoundary;
 use crate::geometry::TriMesh;
 use crate::scene::Shape;
 use crate::shape;
 use crate::water::device::Device;
 use crate::water::numerics::Numerics;
+use crate::water::shape::ShapeChange;
 use crate::water::submerged::{Made, SubmergedBody};
 use crate::{Error, Result};
 use std::borrow::Cow;
@@ -59,6 +61,21 @@ impl BodyMethod for Exact {
     fn response(&self, body: &SubmergedBody, _: &Numerics, gap: f64) -> Solved {
         let (axes, pose) = body.ellipsoid.as_ref().ok_or_else(|| no_formula(body))?;
         Ok(Box::new(ExactBoundary::new(body.name, *axes, pose, gap)?))
+    }
+
+    fn added_mass_slopes(
+        &self,
+        body: &SubmergedBody,
+        _: &Numerics,
+        changes: &[&ShapeChange],
+    ) -> Result<Vec<Mat6>> {
+        let (axes, pose) = body.ellipsoid.as_ref().ok_or_else(|| no_formula(body))?;
+        let slopes = ExactBoundary::new(body.name, *axes, pose, far(body))?.added_mass_slopes();
+        let along = |change: &&ShapeChange| {
+            let rates = change.semi_axes_rates().unwrap_or_default();
+            slopes.iter().zip(rates).map(|(m, rate)| m * rate).sum()
+        };
+        Ok(changes.iter().map(along).collect())
     }
 
     fn couple(&self, _: &Problem, _: &mut Device) -> Result<Made> {

@@ -58,21 +58,24 @@ pub(crate) trait BodyMethod: Send + Sync {
     /// The body alone, resolved for sources as near as `gap`, m.
     fn response(&self, body: &SubmergedBody, numerics: &Numerics, gap: f64) -> Solved;
 
-    /// Derivative of the added mass of the body alone with respect to one of its shape parameters: of the method's own value on the mesh that there is.
-    fn added_mass_slope(
+    /// Derivatives of the added mass of the body alone with respect to shape parameters of it: of the method's own value on the mesh that there is.
+    fn added_mass_slopes(
         &self,
         body: &SubmergedBody,
         numerics: &Numerics,
-        change: &ShapeChange,
-    ) -> Result<Mat6> {
+        changes: &[&ShapeChange],
+    ) -> Result<Vec<Mat6>> {
         let far = far(body);
-        let slope = change.slope(|t| {
-            let changed = change.changed(body, t);
-            let found = self.response(&changed.body(), numerics, far)?.added_mass();
-            let entries: [f64; 36] = std::array::from_fn(|n| found[(n / 6, n % 6)]);
-            Ok(entries)
-        })?;
-        Ok(Mat6::from_row_slice(&slope))
+        let slope = |change: &&ShapeChange| {
+            let entries = change.slope(|t| {
+                let changed = change.changed(body, t);
+                let found = self.response(&changed.body(), numerics, far)?.added_mass();
+                let entries: [f64; 36] = std::array::from_fn(|n| found[(n / 6, n % 6)]);
+                Ok(entries)
+            });
+            Ok(Mat6::from_row_slice(&entries?))
+        };
+        changes.iter().map(slope).collect()
     }
 
     /// All bodies solved together (fidelity full).

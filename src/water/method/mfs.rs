@@ -77,6 +77,7 @@ impl BodyMethod for Mfs {
         })?;
         let own = problem.own(|b| alone(&made[b], problem, device))?;
         Ok(Made {
+            own_rates: Vec::new(),
             own,
             carried: None,
             films: Vec::new(),

@@ -2,13 +2,15 @@
 
 use super::kind::{BodyMethod, Problem, Solved};
 use crate::Result;
+use crate::adjoint::lie::{Mat6, Vec3};
 use crate::boundary::PanelBoundary;
-use crate::boundary::panel::{Extrapolated, Richardson};
+use crate::boundary::panel::{Extrapolated, MassSlopes, Richardson, RichardsonSlopes};
 use crate::coupling::full::SolveSettings;
-use crate::coupling::{Coupling, ExtrapolatedPanels, FilmedPanels, PanelCoupled};
+use crate::coupling::{Coupling, ExtrapolatedPanels, FilmedPanels, PanelCoupled, ShapeDirection};
 use crate::water::device::Device;
 use crate::water::gap_error::Carried;
 use crate::water::numerics::Numerics;
+use crate::water::shape::ShapeChange;
 use crate::water::submerged::{Discretisation, Made, SubmergedBody, once, shared};
 use crate::water::surface::Coarse;
 use std::sync::Arc;
@@ -44,6 +46,115 @@ impl Meshes {
             coarse,
             known,
         })
+    }
+}
+
+/// How a body's added mass changes with the vertices of its meshes.
+enum Slopes {
+    Single(Arc<PanelBoundary>, Box<MassSlopes>),
+    Both(
+        Arc<PanelBoundary>,
+        Arc<PanelBoundary>,
+        Box<RichardsonSlopes>,
+    ),
+}
+
+impl Slopes {
+    fn new(made: &Meshes, body: &SubmergedBody) -> Result<Self> {
+        let fine = made.fine.clone();
+        Ok(match (&made.coarse, body.coarse) {
+            (Some(coarse), Some(Coarse { ratio, .. })) => {
+                let slopes = RichardsonSlopes::new(fine.clone(), coarse.clone(), *ratio)?;
+                Self::Both(fine, coarse.clone(), Box::new(slopes))
+            }
+            _ => {
+                let slopes = fine.added_mass_slopes();
+                Self::Single(fine, Box::new(slopes))
+            }
+        })
+    }
+
+    /// Of the body alone.
+    fn alone(&self, change: &ShapeChange) -> Mat6 {
+        match self {
+            Self::Single(fine, slopes) => slopes.along(&velocities(change, fine)),
+            Self::Both(fine, coarse, slopes) => {
+                slopes.along(&velocities(change, fine), &velocities(change, coarse))
+            }
+        }
+    }
+
+    /// Of what the coupling takes for the body alone.
+    fn coupled(&self, change: &ShapeChange) -> Mat6 {
+        match self {
+            Self::Single(..) => self.alone(change),
+            Self::Both(fine, coarse, slopes) => {
+                slopes.coupled_along(&velocities(change, fine), &velocities(change, coarse))
+            }
+        }
+    }
+}
+
+/// Of the vertices of a body's panels, per unit of a shape parameter.
+fn velocities(change: &ShapeChange, body: &PanelBoundary) -> Vec<Vec3> {
+    change.at_vertices(body.panels().vertices())
+}
+
+/// The shape parameters as coupled panels take them.
+struct Directions {
+    fine: Vec<ShapeDirection>,
+    coarse: Vec<ShapeDirection>,
+    /// Of each body alone.
+    own: Vec<(usize, Mat6)>,
+    /// Rates of the ratio of the edges of each body.
+    ratios: Vec<f64>,
+}
+
+impl Directions {
+    fn new(problem: &Problem, made: &[Arc<Meshes>]) -> Result<Self> {
+        let mut out = Self {
+            fine: Vec::new(),
+            coarse: Vec::new(),
+            own: Vec::new(),
+            ratios: Vec::new(),
+        };
+        for group in problem.changes.chunk_by(|a, b| a.0 == b.0) {
+            let body = group[0].0;
+            let meshes = &made[body];
+            let slopes = Slopes::new(meshes, &problem.bodies[body])?;
+            for (_, change) in group {
+                let own = slopes.coupled(change);
+                let direction = |of: &PanelBoundary| ShapeDirection {
+                    body,
+                    vertices: velocities(change, of),
+                    added_mass: meshes.coarse.as_ref().map(|_| own),
+                };
+                let coarse = meshes.coarse.as_ref().unwrap_or(&meshes.fine);
+                out.fine.push(direction(&meshes.fine));
+                out.coarse.push(direction(coarse));
+                out.own.push((body, own));
+                out.ratios.push(match &slopes {
+                    Slopes::Single(..) => 0.0,
+                    Slopes::Both(fine, coarse, slopes) => {
+                        slopes.ratio_along(&velocities(change, fine), &velocities(change, coarse))
+                    }
+                });
+            }
+        }
+        Ok(out)
+    }
+
+    /// Rates of the ratio that all bodies are extrapolated with: that of the first body that has it.
+    fn ratio_rates(&self, made: &[Arc<Meshes>], ratio: f64) -> Vec<f64> {
+        let first = made
+            .iter()
+            .position(|m| m.known.is_some_and(|k| k.ratio == ratio));
+        let rates = self.fine.iter().zip(&self.ratios);
+        let rate = |(shape, rate): (&ShapeDirection, &f64)| match Some(shape.body) == first {
+            true => *rate,
+            false => 0.0,
+        };
+        rates.map(rate).collect()
     }
 }
 
@@ -104,8 +215,20 @@ impl BodyMethod for Panel {
         })
     }
 
+    fn added_mass_slopes(
+        &self,
+        body: &SubmergedBody,
+        _: &Numerics,
+        changes: &[&ShapeChange],
+    ) -> Result<Vec<Mat6>> {
+        let made = Meshes::new(body)?;
+        let slopes = Slopes::new(&made, body)?;
+        Ok(changes.iter().map(|change| slopes.alone(change)).collect())
+    }
+
     fn couple(&self, problem: &Problem, device: &mut Device) -> Result<Made> {
         let made = shared(problem.bodies, Meshes::new)?;
+        let shapes = Directions::new(problem, &made)?;
         let own: Vec<_> = (made.iter())
             .map(|m| Some(m.known?.coupled(m.coarse.as_ref()?)))
             .collect();
@@ -118,16 +241,19 @@ impl BodyMethod for Panel {
             let made = PanelCoupled::new(meshes, problem.walls, excluded, solve)?;
             device.panels(made.with_added_mass(&own))
         };
+        let own_rates = shapes.own.clone();
         let fine = coupled(made.iter().map(|m| m.fine.clone()).collect())?;
         // Bodies with different ratios: the largest takes least away.
         let ratios = made.iter().filter_map(|m| Some(m.known?.ratio));
         let ratio = ratios.fold(0.0, f64::max);
+        let ratio_rates = shapes.ratio_rates(&made, ratio);
         let panels = if ratio > 0.0 {
             let meshes = made.iter().map(|m| m.coarse.as_ref().unwrap_or(&m.fine));
             let coarse = coupled(meshes.cloned().collect())?;
-            Panels::Extrapolated(ExtrapolatedPanels::new(fine, coarse, ratio)?)
+            let both = ExtrapolatedPanels::new(fine, coarse, ratio)?;
+            Panels::Extrapolated(both.with_shapes(shapes.fine, shapes.coarse, ratio_rates)?)
         } else {
-            Panels::Alone(fine)
+            Panels::Alone(fine.with_shapes(shapes.fine)?)
         };
         let (coupling, films): (Box<dyn Coupling>, _) = match problem.numerics.films {
             false => (panels.boxed(), Vec::new()),
@@ -141,6 +267,7 @@ impl BodyMethod for Panel {
         let alone = problem.own(|b| Ok(own[b].unwrap_or(made[b].fine.added_mass)))?;
         Ok(Made {
             own: alone,
+            own_rates,
             carried: Some(Carried::Panels),
             films,
             warnings: once(&made, |m| &m.fine.warnings),

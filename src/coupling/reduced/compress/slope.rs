@@ -9,11 +9,11 @@
 //!
 //! S̄ is that of all modes of the solution, those too that compression leaves out: they are under its tolerance.
 
-use super::{CompressSettings, Chosen, choose, potentials_weighted, symmetrise};
 use super::super::views::dense;
 use super::super::{Region, ShapeSlope};
 use super::proxies::Proxies;
 use super::pursuit::least_squares;
+use super::{Chosen, CompressSettings, choose, potentials_weighted, symmetrise};
 use crate::Result;
 use crate::adjoint::lie::{Mat6, Vec3};
 use crate::boundary::Response;

@@ -1,5 +1,6 @@
 //! The water of a scene, ready to be evaluated.
 
+use super::backend::Backend;
 use super::choices::WaterChoices;
 use super::clearance::Clearance;
 use super::device::Device;
@@ -100,6 +101,13 @@ pub(crate) fn prepare(
     let mut warnings = choices.without_effect();
     let idle = fidelity.kind().idle_gpu();
     let mut device = Device::open(choices.backend, &choices.gpu, idle)?;
+    if !changes.is_empty() && choices.backend == Backend::Gpu && fidelity.kind().coupled() {
+        return Err(Error::Unsupported {
+            what: format!("{} shape parameters on the backend gpu", changes.len()),
+            why: "the coupling there has no derivatives with respect to shapes".into(),
+            instead: "use the backend cpu".into(),
+        });
+    }
     let made = fidelity.couple(&problem, &mut device)?;
     warnings.extend(device.reason.clone());
     warnings.extend(made.warnings);

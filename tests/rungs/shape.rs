@@ -5,13 +5,17 @@ use hydrograd::adjoint::check::{Outcome, Rung};
 use hydrograd::adjoint::lie::{Mat6, Pose, Vec3, Vec6, exp_matrix};
 use hydrograd::boundary::PanelBoundary;
 use hydrograd::coupling::full::{FullSolver, SolveSettings};
+use hydrograd::coupling::reduced::compress::{CompressSettings, compress};
+use hydrograd::coupling::reduced::{Cutoff, Reduced, ReducedBody, ShapeSlope};
 use hydrograd::coupling::{
-    Direction, Exclusions, ExtrapolatedPanels, Given, Linearise, PanelCoupled, ShapeDirection,
-    ShapeTerm,
+    Direction, Exclusions, ExtrapolatedPanels, Given, Isolated, Linearise, PanelCoupled,
+    ShapeDirection, ShapeTerm,
 };
+use hydrograd::dynamics::Integrator;
 use hydrograd::geometry::TriMesh;
-use hydrograd::scene::{Shape, Wall, WallSurface};
+use hydrograd::scene::{Body, Contact, Fluid, Joint, Scene, Shape, Wall, WallSurface};
 use hydrograd::shape;
+use hydrograd::{Controls, Fidelity, Settings, Simulator, objective};
 use nalgebra::{DMatrix, DVector};
 use std::path::Path;
 use std::sync::Arc;
@@ -23,6 +27,11 @@ pub fn rungs() -> Vec<Rung> {
         };
     }
     rungs![
+        "coupling::isolated::IsolatedLinearised::shape_vjp" => |c| check(&isolated(), c),
+        "coupling::reduced::linearised::ReducedLinearised::shape_vjp" => |c| all(reduced().iter().map(|s| check(s, c))),
+        "dynamics::shape::Linearisation::add_shape_vjp" => |c| rollouts(&[swimming()], c),
+        "dynamics::shape::Shapes::follow_vjp" => |c| rollouts(&[swimming()], c),
+        "dynamics::contact_shape::System::add_contact_shape_vjp" => |c| rollouts(&landing(), c),
         "coupling::response::ResponseLinearised::shape_vjp" => |c| all(alone().iter().map(|s| check(s, c))),
         "coupling::panel::extrapolated::ExtrapolatedLinearised::shape_vjp" => |c| check(&extrapolated(), c),
         "coupling::given::GivenLinearised::shape_vjp" => |c| check(&given(), c),
@@ -222,6 +231,176 @@ fn given() -> System {
             pose([1.0, 0.1, 0.0], [0.0; 3]),
         ],
     }
+}
+
+/// Bodies that feel nobody, each with an added mass that changes along with a parameter.
+fn isolated() -> System {
+    let couple = move |h: [f64; 2]| -> Box<dyn Linearise> {
+        let slope = |b: usize| {
+            let half = Mat6::from_vec(wavy(36, 0.3 + b as f64, 0.2).as_slice().to_vec());
+            half + half.transpose()
+        };
+        let own = |b: usize| 2.0 * Mat6::identity() + h[b] * slope(b);
+        let made = Isolated::new(vec![own(0), own(1)]);
+        Box::new(made.with_shapes(vec![(0, slope(0)), (1, slope(1))]).unwrap())
+    };
+    System {
+        couple: Box::new(couple),
+        poses: [pose([0.0; 3], [0.1, 0.2, 0.3]), pose([1.0, 0.1, 0.0], [0.0; 3])],
+    }
+}
+
+/// A compressed body, and how it changes by itself: points, modes, strengths and added mass along fixed numbers.
+struct Compressed {
+    body: ReducedBody,
+    modes: DMatrix<f64>,
+    slope: ShapeSlope,
+}
+
+impl Compressed {
+    fn new(shape: &Shape, phase: f64) -> Self {
+        let mesh = shape::build(shape, Path::new("."), Some(160)).unwrap();
+        let response = PanelBoundary::new("b", &mesh).unwrap();
+        let settings = CompressSettings {
+            rank: Some(24),
+            tolerance: 1e-2,
+            resolved_gap: Some(0.3),
+        };
+        let body = compress("b", &mesh, &response, &settings, &[]).unwrap();
+        let parts = body.parts();
+        let like = |m: &DMatrix<f64>, phase: f64| {
+            let (rows, columns) = m.shape();
+            let numbers = wavy(rows * columns, phase, 0.3 * m.amax());
+            DMatrix::from_column_slice(rows, columns, numbers.as_slice())
+        };
+        let modes = like(&parts.modes, phase);
+        let half = Mat6::from_vec(wavy(36, phase + 0.3, 0.02).as_slice().to_vec());
+        let moved = wavy(3 * parts.points.len(), phase + 0.2, 0.1);
+        let slope = ShapeSlope {
+            points: (moved.as_slice().chunks(3)).map(Vec3::from_row_slice).collect(),
+            strengths: like(&parts.strengths, phase + 0.1),
+            solution: &modes * parts.modes.transpose() + &parts.modes * modes.transpose(),
+            added_mass: half + half.transpose(),
+        };
+        Self { body, modes, slope }
+    }
+
+    fn at(&self, h: f64) -> Arc<ReducedBody> {
+        let mut parts = self.body.parts().clone();
+        for (p, d) in parts.points.iter_mut().zip(&self.slope.points) {
+            *p += h * d;
+        }
+        parts.modes += h * &self.modes;
+        parts.strengths += h * &self.slope.strengths;
+        parts.added_mass += h * self.slope.added_mass;
+        Arc::new(ReducedBody::new(parts).unwrap())
+    }
+}
+
+/// Compressed bodies without walls, with one, and where the pair is fading.
+fn reduced() -> Vec<System> {
+    let fading = Cutoff {
+        near: 0.5,
+        far: 2.0,
+    };
+    let of = |walls: Vec<Wall>, cutoff: Option<Cutoff>| {
+        let bodies = [
+            Compressed::new(&Shape::cuboid([0.5, 0.4, 0.6]), 0.5),
+            Compressed::new(&Shape::ellipsoid([0.6, 0.3, 0.4]), 0.9),
+        ];
+        let couple = move |h: [f64; 2]| -> Box<dyn Linearise> {
+            let made = vec![bodies[0].at(h[0]), bodies[1].at(h[1])];
+            let made = Reduced::new(made, &walls, |_, _| cutoff).unwrap();
+            let slopes = [0, 1].map(|b| (b, bodies[b].slope.clone()));
+            Box::new(made.with_shapes(slopes.to_vec()).unwrap())
+        };
+        System {
+            couple: Box::new(couple),
+            poses: [
+                pose([0.0; 3], [0.3, -0.2, 0.5]),
+                pose([0.2, 1.0, 0.2], [-0.4, 0.1, 0.2]),
+            ],
+        }
+    };
+    vec![
+        of(Vec::new(), None),
+        of(vec![WALL], None),
+        of(vec![WALL], Some(fading)),
+    ]
+}
+
+/// A box and an ellipsoid on a hinge, in a current.
+fn swimming() -> Scene {
+    let mut scene = Scene::new(Fluid::fresh_water());
+    scene.fluid.current = [0.1, 0.05, -0.1];
+    scene.time_step = 0.02;
+    let of = |shape: Shape| Body::new(shape).density(1100.0);
+    let mut first = of(Shape::ellipsoid([0.4, 0.7, 0.2])).named("first");
+    first.shape_at.position = [0.02, 0.01, -0.03];
+    scene.add(first);
+    let mut second = of(Shape::sphere(0.4)).named("second");
+    second.parent = Some("first".into());
+    second.placement.position = [1.6, 0.3, 0.2];
+    second.shape_at.position = [0.1, 0.05, 0.0];
+    scene.add(second.joint(Joint::Revolute {
+        axis: [0.3, 1.0, 0.2],
+    }));
+    scene.initial.v = vec![0.3, -0.2, 0.25, 0.5, 0.4, -0.6, 0.7];
+    scene
+}
+
+/// Dry bodies that slide over a wall and press on it: of every kind that contact knows.
+fn landing() -> Vec<Scene> {
+    let shapes = [
+        Shape::ellipsoid([0.4, 0.3, 0.25]),
+        Shape::cuboid([0.4, 0.7, 0.5]),
+        Shape::cylinder(0.3, 0.5),
+        Shape::capsule(0.25, 0.4),
+    ];
+    let scene = |shape: &Shape| {
+        let mut scene = Scene::new(Fluid::none());
+        scene.time_step = 0.005;
+        scene.add_wall([0.0, 0.0, -0.3], [0.1, 0.0, 1.0]);
+        scene.contact = Some(Contact {
+            stiffness: Some(3e4),
+            friction: 0.4,
+            gap: Some(0.02),
+            width: Some(0.02),
+            ..Contact::default()
+        });
+        scene.add(Body::new(shape.clone()).density(800.0).named("first"));
+        scene.initial.v = vec![0.3, 0.4, -1.0, 0.5, 0.4, -0.6];
+        scene
+    };
+    shapes.iter().map(scene).collect()
+}
+
+/// Gradients of rollouts with the shapes of scenes against scenes that are built anew.
+fn rollouts(scenes: &[Scene], corruption: f64) -> Outcome {
+    all(scenes.iter().map(|scene| {
+        let cost = |scene: &Scene, shapes: bool| {
+            let settings = Settings::default()
+                .fidelity(Fidelity::Isolated)
+                .integrator(Integrator::MomentumEuler)
+                .shape_parameters(if shapes { vec!["*".into()] } else { Vec::new() });
+            let simulator = Simulator::new(scene, settings).unwrap();
+            let rollout = simulator.rollout(&Controls::zeros(&simulator, 6)).unwrap();
+            let velocities = rollout.samples()[0].v.len();
+            let goal = (0..velocities).fold(objective::mean_position(hydrograd::scene::BodyId(0), [0.3, 0.1, -0.2]), |sum, i| {
+                sum + objective::final_velocity(i, 0.1 * i as f64, 0.3 + 0.1 * i as f64)
+            });
+            (rollout.value(&goal).unwrap(), rollout.gradient(&goal).unwrap())
+        };
+        let gradient = cost(scene, true).1.parameters;
+        all(scene.shape_parameters().into_iter().map(|(name, value)| {
+            let slope = gradient.get(&name).unwrap();
+            let at = |h: f64| {
+                let changed = scene.with_shape_parameter(&name, value * (1.0 + h)).unwrap();
+                cost(&changed, false).0
+            };
+            along(at, corruption * value * slope)
+        }))
+    }))
 }
 
 /// E and its slope along a displacement, of a direction on the basis with one outside it and with itself.

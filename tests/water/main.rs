@@ -22,7 +22,6 @@ mod reduced;
 mod refine;
 mod several_pieces;
 mod shape_slopes;
-mod shapes;
 
 #[path = "../support/mod.rs"]
 mod support;

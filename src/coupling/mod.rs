@@ -35,6 +35,7 @@ pub use given::Given;
 pub use isolated::Isolated;
 pub use panel::{ExtrapolatedPanels, FilmedPanels, PanelCoupled, PanelModel};
 pub use response::{CoupledResponse, Reached};
+pub(crate) use surface::is_held_apart;
 pub use surface::{Motion, SurfacePotential};
 pub use tensor::PairTensor;
 

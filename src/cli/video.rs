@@ -40,8 +40,8 @@ pub enum Shown {
 /// A video that is asked for of a run.
 #[derive(Clone, Debug, Args)]
 pub struct Video {
-    /// Video of the run, by its name .mp4 or .webm, or a folder of PNG frames [default: none is made]. It needs the Python package with its extra `video` (pip install
-    /// '.[video]') and Chromium or Chrome; a hydrograd that isn't that package's hands the command to `python3 -m hydrograd`, or the Python that
+    /// Video of the run, by its name .mp4 or .webm, or a folder of PNG frames [default: none is made]. It needs the Python package with its extra `video` (`pip install
+    /// '.[video]'`) and Chromium or Chrome; a hydrograd that isn't that package's hands the command to `python3 -m hydrograd`, or the Python that
     /// HYDROGRAD_PYTHON names.
     #[arg(id = "video", long = "video", value_name = "FILE.mp4|FILE.webm|FOLDER")]
     pub file: Option<PathBuf>,

@@ -60,7 +60,7 @@ from hydrograd._hydrograd import (
 )
 from hydrograd._policy import Observation, Policy
 from hydrograd._tradeoff import Tradeoff, TradeoffQuantity, TradeoffReference, TradeoffRow
-from hydrograd._viewer import View, view
+from hydrograd._viewer import View, record, view
 
 __all__ = [
     "BatchError",
@@ -120,6 +120,7 @@ __all__ = [
     "plot",
     "prism",
     "prismatic",
+    "record",
     "revolute",
     "screw",
     "sphere",

@@ -4,6 +4,7 @@ import signal
 import sys
 
 from hydrograd._hydrograd import _command
+from hydrograd._viewer.recording import Command
 
 
 def main() -> int:
@@ -11,7 +12,7 @@ def main() -> int:
     # Nothing of Python runs meanwhile that could raise KeyboardInterrupt.
     signal.signal(signal.SIGINT, signal.SIG_DFL)
     sys.stdout.flush()
-    return _command(["hydrograd", *sys.argv[1:]])
+    return _command(["hydrograd", *sys.argv[1:]], Command)
 
 
 if __name__ == "__main__":

@@ -999,6 +999,8 @@ class Rollout:
         """The pressure of the flow at `points` (n, 3), m, at state `state`: (n,), Pa, zero far away, that of the water at rest left out. Points as of `flow`."""
     def flow_resolved(self, state: int, points: ArrayLike) -> NDArray[np.bool_]:
         """Whether `flow` knows the velocity at each of `points` (n, 3), m, at state `state`: (n,)."""
+    def known_flow(self, state: int, points: ArrayLike) -> tuple[_Array, NDArray[np.bool_]]:
+        """`flow` where `flow_resolved`, with the solves of one: velocities (n, 3), m/s, zero where they aren't known, and whether they are (n,)."""
     def observe(self, name: str) -> _Array:
         """An observable at the states 0 … N by its name, (N + 1, …): "positions", "energy", "momentum", …; an unknown name's error has the list."""
     def value(self, objective: Objective) -> float:

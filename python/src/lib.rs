@@ -32,6 +32,7 @@ mod simulator;
 mod state;
 mod tangents;
 mod tradeoff;
+mod video;
 
 use numpy::PyArrayDyn;
 use pyo3::prelude::*;
@@ -85,10 +86,11 @@ fn _rollout<'py>(
     simulator.call_method("rollout", (controls,), Some(&options))
 }
 
-/// Runs the command line; its exit code. It is the process's own: Ctrl-C ends it as it does any program.
+/// Runs the command line; its exit code. It is the process's own: Ctrl-C ends it as it does any program. `videos` makes the videos that are asked for: it has `prepare` and `record`.
 #[pyfunction]
-fn _command(py: Python<'_>, arguments: Vec<std::ffi::OsString>) -> u8 {
-    py.detach(|| hydrograd::cli::run(arguments) as u8)
+fn _command(py: Python<'_>, arguments: Vec<std::ffi::OsString>, videos: Py<PyAny>) -> u8 {
+    let videos = video::Maker(videos);
+    py.detach(|| hydrograd::cli::run_with(arguments, Some(&videos)) as u8)
 }
 
 /// Rigid bodies in water, simulated and differentiated; the compiled part of `hydrograd`.

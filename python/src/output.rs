@@ -4,8 +4,10 @@ use crate::array;
 use crate::error::input;
 use crate::interrupt::long;
 use hydrograd::output::{Frames, gltf, vtk};
+use pyo3::exceptions::PyUserWarning;
 use pyo3::prelude::*;
 use std::collections::BTreeMap;
+use std::ffi::CString;
 use std::path::PathBuf;
 use std::sync::Arc;
 
@@ -50,9 +52,15 @@ pub fn write_vtk(
         flow: flow.map(grid).transpose()?,
     };
     let rollout = rollout.clone();
-    long(py, move |interrupt| {
+    let written = long(py, move |interrupt| {
         vtk::write_with(&rollout, &folder, &options, || interrupt.check())
-    })
+    })?;
+    let category = py.get_type::<PyUserWarning>();
+    for warning in written.warnings() {
+        let text = CString::new(warning)?;
+        PyErr::warn(py, &category, &text, 1)?;
+    }
+    Ok(written.files)
 }
 
 /// As glTF; the file.

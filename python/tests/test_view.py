@@ -9,11 +9,11 @@ import re
 import subprocess
 import sys
 import webbrowser
-from html.parser import HTMLParser
 
 import browser
 import numpy as np
 import pytest
+from pages import Parts, data_of, unpacked
 
 import hydrograd as hg
 
@@ -48,41 +48,6 @@ def page(rollout, tmp_path_factory) -> pathlib.Path:
     file = tmp_path_factory.mktemp("view") / "round.html"
     hg.view(rollout, file, colors=COLORS, view_from=(0, -1, 0))
     return file
-
-
-class Parts(HTMLParser):
-    """The scripts of a page, and the addresses that it names."""
-
-    def __init__(self, text: str) -> None:
-        super().__init__()
-        self.scripts: list[str] = []
-        self.addresses: list[str] = []
-        self.title = ""
-        self.inside = ""
-        self.feed(text)
-
-    def handle_starttag(self, tag, attrs):
-        self.inside = tag
-        self.addresses += [value for name, value in attrs if name in ("src", "href")]
-        if tag == "script":
-            self.scripts.append("")
-
-    def handle_endtag(self, tag):
-        self.inside = ""
-
-    def handle_data(self, data):
-        if self.inside == "script":
-            self.scripts[-1] += data
-        elif self.inside == "title":
-            self.title += data
-
-
-def data_of(view: hg.View) -> dict:
-    return json.loads(Parts(view.html).scripts[0])
-
-
-def unpacked(packed: dict) -> np.ndarray:
-    return np.frombuffer(base64.b64decode(packed["data"]), "<" + packed["type"]).reshape(packed["shape"])
 
 
 def turned(quaternions: np.ndarray, vectors: np.ndarray) -> np.ndarray:

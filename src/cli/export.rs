@@ -4,6 +4,7 @@ use clap::Args;
 use std::path::PathBuf;
 
 use super::options::rate;
+use super::output::note;
 use crate::Result;
 use crate::output::{Frames, gltf, vtk};
 use crate::simulate::{Recording, Rollout};
@@ -51,7 +52,9 @@ impl Export {
                 pressure: self.vtk_pressure,
                 flow: None,
             };
-            files.extend(vtk::write(rollout, folder, &options)?);
+            let written = vtk::write(rollout, folder, &options)?;
+            written.warnings().into_iter().for_each(note);
+            files.extend(written.files);
         }
         if let Some(file) = &self.gltf {
             let options = gltf::Options {

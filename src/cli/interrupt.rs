@@ -20,6 +20,11 @@ pub(super) fn listen() {
     });
 }
 
+/// From here on another program hears of it, whose end this one waits for.
+pub(super) fn leave_to_another() {
+    let _ = ctrlc::set_handler(|| {});
+}
+
 /// Makes steps by `run`, which asks after each whether to go on.
 pub(super) fn while_running<T>(run: impl FnOnce(fn() -> ControlFlow<()>) -> T) -> T {
     ASKED.store(false, Ordering::Relaxed);

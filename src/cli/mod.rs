@@ -16,6 +16,7 @@ mod options;
 mod output;
 mod run;
 mod tradeoff;
+mod video;
 
 use std::ffi::OsString;
 use std::process::ExitCode;
@@ -24,6 +25,7 @@ use clap::{Parser, Subcommand};
 
 pub use exit::Exit;
 use output::Output;
+pub use video::{Shown, Video, Videos};
 
 /// Rigid bodies that feel each other through the water: simulation and exact gradients.
 #[derive(Debug, Parser)]
@@ -44,7 +46,7 @@ struct Cli {
 #[derive(Debug, Subcommand)]
 enum Command {
     /// Simulate a scene; write and summarise its trajectory.
-    Run(run::Arguments),
+    Run(Box<run::Arguments>),
     /// Compute the added mass of all bodies of a scene, of a mesh, or of a shape by formula.
     AddedMass(added_mass::Arguments),
     /// Hold the gradient of a scene's trajectory against finite differences.
@@ -66,8 +68,13 @@ pub fn main() -> ExitCode {
 
 /// Runs a command line; the first argument is the program's name.
 pub fn run(arguments: Vec<OsString>) -> Exit {
+    run_with(arguments, None)
+}
+
+/// The same, with what makes videos of runs. Without it a command that asks for one is handed to the Python package's program.
+pub fn run_with(arguments: Vec<OsString>, videos: Option<&dyn Videos>) -> Exit {
     let asked_json = arguments.iter().any(|a| a == "--json");
-    let cli = match Cli::try_parse_from(arguments) {
+    let cli = match Cli::try_parse_from(&arguments) {
         Ok(cli) => cli,
         Err(error) => {
             // Help and version come this way too; they belong on standard output.
@@ -87,7 +94,10 @@ pub fn run(arguments: Vec<OsString>) -> Exit {
     };
     let output = Output { json: cli.json };
     let done = match cli.command {
-        Command::Run(arguments) => run::main(&arguments, output),
+        Command::Run(asked) if asked.asks_for_video() && videos.is_none() => {
+            video::hand_over(&arguments)
+        }
+        Command::Run(arguments) => run::main(&arguments, videos, output),
         Command::AddedMass(arguments) => added_mass::main(&arguments, output),
         Command::Gradcheck(arguments) => gradcheck::main(&arguments, output),
         Command::Tradeoff(arguments) => tradeoff::main(&arguments, output),

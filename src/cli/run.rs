@@ -15,6 +15,7 @@ use super::options::Simulation;
 use super::output::{
     ChoicesReport, Output, or_dash, peak_memory_mb, progress_bar, set_progress, write_warnings,
 };
+use super::video::{Video, Videos};
 use crate::error::readable;
 use crate::scene::Scene;
 use crate::simulate::{
@@ -40,6 +41,27 @@ pub(super) struct Arguments {
     check_gap: bool,
     #[command(flatten)]
     export: Export,
+    #[command(flatten)]
+    video: Video,
+}
+
+impl Arguments {
+    /// Whether a video is asked for.
+    pub fn asks_for_video(&self) -> bool {
+        self.video.file.is_some()
+    }
+
+    /// Makes the video, if one is asked for.
+    fn record(
+        &self,
+        videos: Option<&dyn Videos>,
+        rollout: Rollout,
+    ) -> std::result::Result<Vec<PathBuf>, String> {
+        match videos.filter(|_| self.asks_for_video()) {
+            Some(videos) => videos.record(rollout, &self.video),
+            None => Ok(Vec::new()),
+        }
+    }
 }
 
 /// The smallest gap, by what ran and by coupled panels.
@@ -114,8 +136,19 @@ pub(super) struct RunReport {
     pub files: Vec<PathBuf>,
 }
 
-pub(super) fn main(arguments: &Arguments, output: Output) -> Result<Exit> {
+pub(super) fn main(
+    arguments: &Arguments,
+    videos: Option<&dyn Videos>,
+    output: Output,
+) -> Result<Exit> {
     let scene = arguments.simulation.scene()?;
+    arguments.video.check(&scene)?;
+    if let Some(videos) = videos.filter(|_| arguments.asks_for_video())
+        && let Err(why) = videos.prepare(&arguments.video)
+    {
+        output.error(&why);
+        return Ok(Exit::Failed);
+    }
     if let Some(folder) = &arguments.out {
         Recording::prepare(folder)?;
     }
@@ -147,6 +180,14 @@ pub(super) fn main(arguments: &Arguments, output: Output) -> Result<Exit> {
         // Why the run ended is said besides.
         Err(error) if halted.is_some() => output.error(&error),
         Err(error) => return Err(error),
+    }
+    match arguments.record(videos, rollout) {
+        Ok(files) => report.files.extend(files),
+        Err(why) if halted.is_some() => output.error_for_people(&why),
+        Err(why) => {
+            output.error(&why);
+            return Ok(Exit::Failed);
+        }
     }
     let Some(halted) = halted else {
         output.result(&report);

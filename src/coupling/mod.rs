@@ -37,6 +37,7 @@ pub use isolated::Isolated;
 pub use panel::{ExtrapolatedPanels, FilmedPanels, PanelCoupled, PanelModel};
 pub use response::{CoupledResponse, Reached};
 pub use shape::{ShapeDirection, ShapeTerm};
+pub(crate) use surface::is_held_apart;
 pub use surface::{Motion, SurfacePotential};
 pub use tensor::PairTensor;
 

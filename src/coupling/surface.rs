@@ -132,10 +132,18 @@ fn add(motion: &Motion, centres: &[Vec3], seen: &Seen, charges: &Charges, out: &
     }
 }
 
+/// What isn't there while films hold bodies apart.
+const HELD_APART: &str = "the flow on surfaces that a film holds apart";
+
+/// Whether an error says that films hold bodies apart, at whatever time: the one reason for which a state of a run has no flow on surfaces while others have.
+pub(crate) fn is_held_apart(error: &Error) -> bool {
+    matches!(error, Error::Unsupported { what, .. } if what.starts_with(HELD_APART))
+}
+
 /// Why there is none while films hold bodies apart.
 pub(super) fn held_apart() -> Error {
     Error::Unsupported {
-        what: "the flow on surfaces that a film holds apart".into(),
+        what: HELD_APART.into(),
         why: "in a gap that the faces don't resolve the water's inertia is known, but not its pressure face by face".into(),
         instead: "use more faces there, or ask before the gap closes".into(),
     }

@@ -201,7 +201,6 @@ impl Simulator {
     }
 
     /// The flow where it is known, by one solve.
-    #[cfg(feature = "output")]
     fn known_flow(&self, sample: &Sample, points: &[Vec3]) -> Result<Vec<Option<Vec3>>> {
         let (own, flows) = match self.flows(sample, points) {
             Err(Error::Unsupported { .. }) => return Ok(vec![None; points.len()]),
@@ -372,12 +371,11 @@ impl Rollout {
         }
     }
 
-    /// [`Rollout::flow`] where [`Rollout::flow_resolved`], with the solves of one.
+    /// [`Rollout::flow`] where [`Rollout::flow_resolved`], `None` elsewhere, with the solves of one.
     ///
     /// # Errors
-    /// As these.
-    #[cfg(feature = "output")]
-    pub(crate) fn known_flow(&self, n: usize, points: &[Vec3]) -> Result<Vec<Option<Vec3>>> {
+    /// A state that there isn't, and a solve that misses its tolerance.
+    pub fn known_flow(&self, n: usize, points: &[Vec3]) -> Result<Vec<Option<Vec3>>> {
         let sample = self.sample("flow", n)?;
         let made = self.simulator().known_flow(sample, points);
         made.map_err(|e| e.at_time(sample.time))

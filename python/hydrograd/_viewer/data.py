@@ -13,6 +13,7 @@ from hydrograd._viewer.flow import flow_data
 from hydrograd._viewer.forces import force_data
 from hydrograd._viewer.frames import Frames, quaternions
 from hydrograd._viewer.page import packed
+from hydrograd._viewer.streamlines import Lines, streamline_data
 
 if TYPE_CHECKING:
     from hydrograd._hydrograd import Rollout
@@ -43,6 +44,8 @@ class Look:
     """Length of the arrow of a speed, m per m/s; None: it is chosen."""
     forces: bool
     """Whether the forces of the flow are there."""
+    streamlines: Lines | None
+    """Lines along the water's velocity, if they are there."""
     pressure: str | None
     """What colours the faces of bodies: the "flow"'s pressure, "hydrostatic" with that of the water at rest, or nothing."""
 
@@ -138,8 +141,11 @@ def share_scales(pages: Sequence[dict[str, Any]], look: Look) -> None:
     for data in pages:
         data["contacts"]["largest"] = largest
     forces = [data["forces"] for data in pages if data["forces"] is not None]
-    for of in forces:
-        of["largest"] = max(each["largest"] for each in forces)
+    lines = [data["streamlines"] for data in pages if data["streamlines"] is not None]
+    for some, key in ((forces, "largest"), (forces, "largest_torque"), (lines, "fastest")):
+        most = max((each[key] for each in some), default=0.0)
+        for of in some:
+            of[key] = most
     flows = [data["flow"] for data in pages if data["flow"] is not None]
     if look.flow_scale is None and flows:
         moving = [flow["scale"] for flow in flows if flow["scale"] > 0.0]
@@ -158,6 +164,7 @@ def page_data(rollout: Rollout, frames: Frames, room: Room, look: Look) -> dict[
     return {
         "flow": flow,
         "forces": force_data(rollout, frames) if look.forces else None,
+        "streamlines": None if look.streamlines is None else streamline_data(rollout, frames, look.streamlines, center, size),
         "pressure": None,
         "up": look.up.tolist(),
         "view_from": look.view_from.tolist(),

@@ -40,8 +40,7 @@ def flow_data(
         )
     velocities = np.zeros((len(frames.steps), *points.shape))
     for frame, step in enumerate(frames.steps.tolist()):
-        known = rollout.flow_resolved(step, points)
-        velocities[frame, known] = rollout.flow(step, points[known])
+        velocities[frame], _ = rollout.known_flow(step, points)
     speeds = np.linalg.norm(velocities, axis=-1)
     moving = speeds[speeds > 0.0]
     room = spacing(points) or 0.05 * size

@@ -1,4 +1,4 @@
-"""The force of the water's flow on every body."""
+"""The force and the torque of the water's flow on every body."""
 
 from __future__ import annotations
 
@@ -15,12 +15,20 @@ if TYPE_CHECKING:
 # What `Rollout.loads` calls it.
 KIND = "water"
 
+# Torques are none below this part of the forces, at half the diagonal of the largest body.
+NONE = 1e-4
+
 
 def force_data(rollout: Rollout, frames: Frames) -> dict[str, Any]:
-    """Forces at every frame, a solve each; zeros where there is no water."""
-    forces = np.zeros(frames.positions.shape)
+    """Forces, and torques about the bodies' origins, at every frame, a solve each; zeros where there is no water."""
+    wrenches = np.zeros((*frames.positions.shape[:2], 6))
     for frame, step in enumerate(frames.steps.tolist()):
         loads = rollout.loads(step)
         if KIND in loads.kinds:
-            forces[frame] = loads.wrenches(KIND)[:, :3]
-    return {"forces": packed(forces, "f4"), "largest": float(np.linalg.norm(forces, axis=-1).max(initial=0.0))}
+            wrenches[frame] = loads.wrenches(KIND)
+    forces, torques = wrenches[..., :3], wrenches[..., 3:]
+    largest = [float(np.linalg.norm(each, axis=-1).max(initial=0.0)) for each in (forces, torques)]
+    # What a mesh's error makes of none, on a ball say, isn't drawn as if it were one.
+    if largest[1] < NONE * largest[0] * max(frames.sizes, default=0.0):
+        torques, largest[1] = 0.0 * torques, 0.0
+    return {"forces": packed(forces, "f4"), "largest": largest[0], "torques": packed(torques, "f4"), "largest_torque": largest[1]}

@@ -89,6 +89,11 @@ class Frames:
             surfaces=[None if mesh is None else Surface(*mesh) for mesh in meshes],
         )
 
+    @property
+    def sizes(self) -> list[float]:
+        """Of each body with a shape: half the diagonal of the box around it, m."""
+        return [float(np.linalg.norm(surface.reach)) for surface in self.surfaces if surface is not None]
+
     def box(self) -> tuple[Array, Array]:
         """Corners of a box around all bodies at all times, (3,) each, m."""
         low, high = [self.positions.min(axis=(0, 1))], [self.positions.max(axis=(0, 1))]

@@ -15,7 +15,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 # In the order in which they need each other.
-SCRIPTS = ("moment.js", "frames.js", "stage.js", "actors.js", "arrows.js", "pressure.js", "plot.js", "player.js", "panel.js", "link.js", "main.js")
+SCRIPTS = ("moment.js", "frames.js", "stage.js", "actors.js", "arrows.js", "torques.js", "streamlines.js", "pressure.js", "plot.js", "player.js", "panel.js", "link.js", "video.js", "main.js")
 SCRIPTS_BESIDE = ("moment.js", "beside.js")
 
 

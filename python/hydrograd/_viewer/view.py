@@ -9,7 +9,7 @@ import sys
 import tempfile
 import warnings
 import webbrowser
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
 
 import numpy as np
@@ -20,6 +20,8 @@ from hydrograd._viewer.data import Look, Room, page_data, share_scales
 from hydrograd._viewer.frames import Frames
 from hydrograd._viewer.page import beside, page
 from hydrograd._viewer.pressure import pressure_data
+from hydrograd._viewer.streamlines import Lines
+from hydrograd._viewer.video import Video, shoot
 
 Array = NDArray[np.float64]
 
@@ -27,13 +29,15 @@ Array = NDArray[np.float64]
 class View:
     """A replay: shown by itself at the end of a notebook's cell, `save`d to a file, or `open`ed in a browser."""
 
-    def __init__(self, html: str, title: str, height: int) -> None:
+    def __init__(self, html: str, title: str, height: int, times: tuple[float, float] = (0.0, 0.0)) -> None:
         self.html = html
         """The page: one text of HTML that needs nothing else."""
         self.title = title
         """What it is headed."""
         self.height = height
         """Height in a notebook, pixels."""
+        self.times = times
+        """First and last moment, s."""
         self.file: Path | None = None
         """Where it was last saved, if it was."""
 
@@ -55,6 +59,22 @@ class View:
             self.save(name)
         assert self.file is not None
         return has_browser() and webbrowser.open(self.file.as_uri())
+
+    def record(
+        self,
+        file: str | os.PathLike[str],
+        *,
+        fps: float = 30.0,
+        speed: float = 1.0,
+        size: tuple[int, int] = (1280, 720),
+        panel: bool = False,
+        zoom: float = 1.0,
+        follow: str | None = None,
+        progress: Callable[[int, int], object] | None = None,
+    ) -> Path:
+        """Makes a video of the page, and gives its absolute path; all is as `hydrograd.record` has it."""
+        asked = Video.of(file, fps, speed, size, panel, zoom, follow)
+        return shoot(self.html, self.times, asked, asked.tools(), progress)
 
     def _repr_html_(self) -> str:
         # In a sandbox: the page's scripts can't reach the notebook.
@@ -112,7 +132,7 @@ def _colors(names: Sequence[str], given: Mapping[str, str] | None) -> dict[str, 
     return wanted
 
 
-def _rollouts(given: Rollout | Simulator | Sequence[Rollout | Simulator]) -> list[Rollout]:
+def rollouts_of(given: Rollout | Simulator | Sequence[Rollout | Simulator]) -> list[Rollout]:
     """Those that are shown beside each other, one at least."""
     some = list(given) if isinstance(given, (list, tuple)) else [given]
     if not some:
@@ -150,17 +170,24 @@ def _scale(place: str, given: float | None, unit: str) -> float | None:
     return float(given)
 
 
-def _points(given: ArrayLike) -> Array:
+def _points(place: str, given: ArrayLike, expected: str = "must be points (n, 3), in m") -> Array:
     """Points of space, (n, 3)."""
     try:
         points = np.asarray(given, dtype=np.float64)
     except (TypeError, ValueError):
-        raise InputError(f"view: flow: got a value of type {type(given).__name__}; must be points (n, 3), in m") from None
+        raise InputError(f"view: {place}: got a value of type {type(given).__name__}; {expected}") from None
     if points.ndim != 2 or points.shape[1] != 3 or not len(points):
-        raise InputError(f"view: flow: got an array of shape {points.shape}; must be points (n, 3), in m")
+        raise InputError(f"view: {place}: got an array of shape {points.shape}; {expected}")
     if not np.all(np.isfinite(points)):
-        raise InputError("view: flow: got numbers that aren't finite; must be points (n, 3), in m")
+        raise InputError(f"view: {place}: got numbers that aren't finite; {expected}")
     return points
+
+
+def _lines(given: bool | ArrayLike, length: float | None) -> Lines | None:
+    """Which lines along the flow, if any."""
+    if isinstance(given, (bool, np.bool_)):
+        return Lines(None, length) if given else None
+    return Lines(_points("streamlines", given, "must be True, False or points (n, 3) that they go through, in m"), length)
 
 
 def _pressure(given: bool | str) -> str | None:
@@ -191,6 +218,8 @@ def view(
     force_scale: float | None = None,
     flow: ArrayLike | None = None,
     flow_scale: float | None = None,
+    streamlines: bool | ArrayLike = False,
+    streamline_length: float | None = None,
     forces: bool = False,
     pressure: bool | str = False,
     colors: Mapping[str, str] | None = None,
@@ -208,13 +237,15 @@ def view(
     `max_frames` states so many, evenly spread, with the first and the last. With `contacts`, points and forces of contact
     are there too, the arrow of a newton `force_scale` (m/N) long; without one, the largest force has an arrow of a quarter of the
     scene's size, and every tenth of it one that is a quarter of that shorter. `flow` are points (n, 3), m, where arrows show the water's velocity,
-    `flow_scale` (m per m/s) long, at the price of a solve a frame (`Rollout.flow`). With `forces`, an arrow at each body's origin shows the force of the flow on it, "water" of `Rollout.loads`, in proportion; the largest of the rollout has one of a quarter
-    of the scene's size. With `pressure`, the faces of bodies in the water have colours by the pressure of the
+    `flow_scale` (m per m/s) long, at the price of a solve a frame (`Rollout.flow`). With `streamlines`, lines along the water's velocity at the moment go
+    through places around every body, or through the points (n, 3), m, that are given, up to `streamline_length` (m) from there each way, unless given three times the size of the largest body, half the diagonal of the box around it; they take some hundred solves a frame
+    (`Rollout.known_flow`). With `forces`, an arrow at each body's origin shows the force of the flow on it and an arc its torque about that point, "water" of `Rollout.loads`, in proportion; the largest force of the rollout has an arrow of a quarter
+    of the scene's size, the largest torque an arc about its axis with a radius of an eighth. With `pressure`, the faces of bodies in the water have colours by the pressure of the
     flow there, at the price of solves at every frame (`Rollout.pressure`); with "hydrostatic", by its sum with the pressure of the water at rest. `colors` are
     "#rrggbb" by the names of bodies, `up` is the direction that stays upright and `view_from` the one from the scene to where it
     is seen from at first, world axes. `title` is the scene's name unless given; of several rollouts one for each.
     """
-    rollouts = _rollouts(rollout)
+    rollouts = rollouts_of(rollout)
     titles = _titles(rollouts, title)
     names = [name for one in rollouts for name in one.simulator.body_names]
     wanted = _colors(list(dict.fromkeys(names)), colors)
@@ -225,8 +256,9 @@ def view(
         colors=wanted,
         contacts=contacts,
         force_scale=_scale("force_scale", force_scale, "m/N"),
-        flow=None if flow is None else _points(flow),
+        flow=None if flow is None else _points("flow", flow),
         flow_scale=_scale("flow_scale", flow_scale, "m per m/s"),
+        streamlines=_lines(streamlines, _scale("streamline_length", streamline_length, "m")),
         forces=bool(forces),
         pressure=_pressure(pressure),
     )
@@ -243,7 +275,7 @@ def view(
     places = range(len(data)) if len(data) > 1 else [None]
     pages = [page(*of) for of in zip(titles, notes, data, places, strict=True)]
     heading = ", ".join(dict.fromkeys(titles))
-    out = View(pages[0] if len(pages) == 1 else beside(heading, titles, pages), heading, height)
+    out = View(pages[0] if len(pages) == 1 else beside(heading, titles, pages), heading, height, room.range)
     if file is not None:
         out.save(file)
     if open and not out.open():

@@ -1,18 +1,21 @@
 // Arrows: forces at contacts, the water's velocity, and its forces on bodies.
 "use strict";
 
+/** Room for `most` of the same shape, which bodies don't hide if it is `on_top`. */
+hydrograd.instances = (world, most, geometry, { color, on_top }) => {
+  const material = new THREE.MeshBasicMaterial({ color, depthTest: !on_top, transparent: on_top });
+  const mesh = new THREE.InstancedMesh(geometry, material, Math.max(most, 1));
+  mesh.count = 0;
+  mesh.frustumCulled = false;
+  mesh.renderOrder = on_top ? 2 : 0;
+  world.add(mesh);
+  return mesh;
+};
+
 hydrograd.Arrows = class {
   /** Room for `most` arrows of a thickness (m). Those `on_top` aren't hidden by bodies. */
   constructor(world, most, { thickness, color, on_top, dots }) {
-    const make = (geometry) => {
-      const material = new THREE.MeshBasicMaterial({ color, depthTest: !on_top, transparent: on_top });
-      const mesh = new THREE.InstancedMesh(geometry, material, Math.max(most, 1));
-      mesh.count = 0;
-      mesh.frustumCulled = false;
-      mesh.renderOrder = on_top ? 2 : 0;
-      world.add(mesh);
-      return mesh;
-    };
+    const make = (geometry) => hydrograd.instances(world, most, geometry, { color, on_top });
     this.thickness = thickness;
     // Along y from 0 to 1, as three.js makes them.
     this.shafts = make(new THREE.CylinderGeometry(0.5, 0.5, 1, 8).translate(0, 0.5, 0));
@@ -92,6 +95,7 @@ hydrograd.Flow = class {
     const { points, velocities, scale, longest } = data.flow;
     [this.points, this.velocities] = [points, velocities].map(hydrograd.decode);
     // Where it isn't known it is written as nothing, and no arrow is drawn.
+    Object.assign(this, { scale, longest });
     this.length = (speed) => (scale * speed < 0.03 * longest ? 0 : Math.min(scale * speed, longest));
     const look = { thickness: 0.06 * longest, color: 0x0f5f8c, on_top: false };
     this.arrows = new hydrograd.Arrows(stage.world, this.count, look);
@@ -119,6 +123,7 @@ hydrograd.Forces = class {
     this.groups = groups;
     this.forces = hydrograd.decode(data.forces.forces); // (frames, bodies, 3), N
     const { largest } = data.forces;
+    this.largest = largest; // of the rollout, N
     this.length = (force) => (largest > 0 ? (0.25 * data.size * force) / largest : 0);
     const look = { thickness: 0.006 * data.size, color: 0x6a1b9a, on_top: true };
     this.arrows = new hydrograd.Arrows(stage.world, groups.length, look);

@@ -28,7 +28,7 @@
     window.addEventListener("hashchange", jump);
     jump();
 
-    const link = linked ? new hydrograd.Link(player, stage, panel, Number(state.place)) : null;
+    hydrograd.link = linked ? new hydrograd.Link(player, stage, panel, Number(state.place)) : null;
     let drawn = 0;
     const tick = (now) => {
       player.tick(now);
@@ -39,7 +39,7 @@
         state.status = state.status || "drawn";
         tell();
       }
-      if (link) link.tell();
+      if (hydrograd.link) hydrograd.link.tell();
       state.time = player.time;
       requestAnimationFrame(tick);
     };

@@ -9,6 +9,7 @@ hydrograd.Panel = class {
     this.data = data;
     this.buttons();
     this.switches();
+    this.scales();
     this.legend();
     this.curves();
     this.keys();
@@ -89,8 +90,11 @@ hydrograd.Panel = class {
     of("glass", (seen) => player.bodies.glass(seen));
     for (const part of document.querySelectorAll(".contact")) part.hidden = !player.contacts.any;
     this.get("flow").parentElement.hidden = !player.flow;
+    of("lines", (shown) => player.streamlines && player.streamlines.visible(shown));
+    this.get("lines").parentElement.hidden = !player.streamlines;
     of("loads", (shown) => player.forces && player.forces.arrows.visible({ arrows: shown }));
-    this.get("loads").parentElement.hidden = !player.forces;
+    of("torques", (shown) => player.torques && player.torques.visible(shown));
+    for (const id of ["loads", "torques"]) this.get(id).parentElement.hidden = !player.forces;
     const pressed = player.pressure && player.pressure.any;
     this.get("pressure").parentElement.hidden = !pressed;
     if (pressed) {
@@ -101,6 +105,25 @@ hydrograd.Panel = class {
       if (player.pressure) player.pressure.show(shown);
       this.get("pressures").hidden = !pressed || !shown;
     });
+  }
+
+  /** How much the largest arrows stand for, which are as long at all moments. */
+  scales() {
+    const { flow, forces, torques, streamlines } = this.player;
+    const { figure, metres } = hydrograd;
+    const lines = [];
+    if (forces && forces.largest > 0) lines.push(`longest violet arrow ${figure(forces.largest)} N`);
+    if (torques && torques.largest > 0) lines.push(`widest orange arc ${figure(torques.largest)} N m`);
+    if (flow && flow.scale > 0) lines.push(`blue arrow of ${metres(flow.longest)} ${figure(flow.longest / flow.scale)} m/s`);
+    if (streamlines && streamlines.fastest > 0) lines.push(`darkest line ${figure(streamlines.fastest)} m/s`);
+    this.lines("scales", lines);
+    const pressed = this.player.pressure && this.player.pressure.any;
+    this.get("legend").hidden = lines.length === 0 && !pressed;
+  }
+
+  /** Puts lines of text into an element. */
+  lines(id, texts) {
+    this.get(id).replaceChildren(...texts.map((textContent) => Object.assign(document.createElement("div"), { textContent })));
   }
 
   /** A line for each body: shown or not, and whom the camera may follow. */
@@ -174,13 +197,10 @@ hydrograd.Panel = class {
       facts.push(count ? `contacts ${count}, up to ${hydrograd.figure(largest)} N` : "contacts 0");
     }
     if (player.flow) facts.push(`flow up to ${hydrograd.figure(player.fastest)} m/s`);
-    if (player.forces) facts.push(`force of the flow up to ${hydrograd.figure(player.strongest)} N`);
+    if (player.streamlines) facts.push(`streamlines ${player.lines}`);
+    if (player.forces) facts.push(`force of the flow up to ${hydrograd.figure(player.strongest)} N`, `torque up to ${hydrograd.figure(player.hardest)} N m`);
     if (player.pressure && player.pressure.any) facts.push(`pressure ${[...player.pressed].map(hydrograd.figure).join(" … ")} Pa`);
-    this.get("facts").replaceChildren(...facts.filter(Boolean).map((fact) => {
-      const line = document.createElement("div");
-      line.textContent = fact;
-      return line;
-    }));
+    this.lines("facts", facts.filter(Boolean));
     this.plot.draw(player.time);
   }
 };

@@ -11,6 +11,8 @@ hydrograd.Player = class {
     this.contacts = new hydrograd.Contacts(data, stage);
     this.flow = data.flow ? new hydrograd.Flow(data, stage) : null;
     this.forces = data.forces ? new hydrograd.Forces(data, this.bodies.groups, stage) : null;
+    this.torques = data.forces ? new hydrograd.Torques(data, this.bodies.groups, stage) : null;
+    this.streamlines = data.streamlines ? new hydrograd.Streamlines(data, stage) : null;
     this.pressure = data.pressure ? new hydrograd.Pressure(data.pressure, this.bodies.groups) : null;
     this.followed = -1;
     this.speed = 1;
@@ -39,6 +41,8 @@ hydrograd.Player = class {
     this.touching = this.contacts.place(at.frame);
     this.fastest = this.flow ? this.flow.place(at.frame) : 0;
     this.strongest = this.forces ? this.forces.place(at.frame) : 0;
+    this.hardest = this.torques ? this.torques.place(at.frame) : 0;
+    this.lines = this.streamlines ? this.streamlines.place(at.frame) : 0;
     this.pressed = this.pressure ? this.pressure.place(at.frame) : null;
     if (before) this.stage.shift(this.bodies.middle(this.followed).sub(before));
     this.stage.ask();

@@ -242,11 +242,17 @@ fn isolated() -> System {
         };
         let own = |b: usize| 2.0 * Mat6::identity() + h[b] * slope(b);
         let made = Isolated::new(vec![own(0), own(1)]);
-        Box::new(made.with_shapes(vec![(0, slope(0)), (1, slope(1))]).unwrap())
+        Box::new(
+            made.with_shapes(vec![(0, slope(0)), (1, slope(1))])
+                .unwrap(),
+        )
     };
     System {
         couple: Box::new(couple),
-        poses: [pose([0.0; 3], [0.1, 0.2, 0.3]), pose([1.0, 0.1, 0.0], [0.0; 3])],
+        poses: [
+            pose([0.0; 3], [0.1, 0.2, 0.3]),
+            pose([1.0, 0.1, 0.0], [0.0; 3]),
+        ],
     }
 }
 
@@ -277,7 +283,9 @@ impl Compressed {
         let half = Mat6::from_vec(wavy(36, phase + 0.3, 0.02).as_slice().to_vec());
         let moved = wavy(3 * parts.points.len(), phase + 0.2, 0.1);
         let slope = ShapeSlope {
-            points: (moved.as_slice().chunks(3)).map(Vec3::from_row_slice).collect(),
+            points: (moved.as_slice().chunks(3))
+                .map(Vec3::from_row_slice)
+                .collect(),
             strengths: like(&parts.strengths, phase + 0.1),
             solution: &modes * parts.modes.transpose() + &parts.modes * modes.transpose(),
             added_mass: half + half.transpose(),
@@ -386,16 +394,22 @@ fn rollouts(scenes: &[Scene], corruption: f64) -> Outcome {
             let simulator = Simulator::new(scene, settings).unwrap();
             let rollout = simulator.rollout(&Controls::zeros(&simulator, 6)).unwrap();
             let velocities = rollout.samples()[0].v.len();
-            let goal = (0..velocities).fold(objective::mean_position(hydrograd::scene::BodyId(0), [0.3, 0.1, -0.2]), |sum, i| {
-                sum + objective::final_velocity(i, 0.1 * i as f64, 0.3 + 0.1 * i as f64)
-            });
-            (rollout.value(&goal).unwrap(), rollout.gradient(&goal).unwrap())
+            let goal = (0..velocities).fold(
+                objective::mean_position(hydrograd::scene::BodyId(0), [0.3, 0.1, -0.2]),
+                |sum, i| sum + objective::final_velocity(i, 0.1 * i as f64, 0.3 + 0.1 * i as f64),
+            );
+            (
+                rollout.value(&goal).unwrap(),
+                rollout.gradient(&goal).unwrap(),
+            )
         };
         let gradient = cost(scene, true).1.parameters;
         all(scene.shape_parameters().into_iter().map(|(name, value)| {
             let slope = gradient.get(&name).unwrap();
             let at = |h: f64| {
-                let changed = scene.with_shape_parameter(&name, value * (1.0 + h)).unwrap();
+                let changed = scene
+                    .with_shape_parameter(&name, value * (1.0 + h))
+                    .unwrap();
                 cost(&changed, false).0
             };
             along(at, corruption * value * slope)

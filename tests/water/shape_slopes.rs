@@ -2,14 +2,17 @@
 
 use crate::support::mesh;
 use crate::support::reference::lamb;
-use hydrograd::adjoint::lie::{Mat6, Pose, Vec3, exp_matrix};
+use hydrograd::adjoint::lie::{Mat3, Mat6, Pose, Vec3, exp_matrix};
 use hydrograd::adjoint::sample::Samples;
 use hydrograd::boundary::exact::lamb::added_mass_slopes;
-use hydrograd::boundary::panel::{Extrapolated, RichardsonSlopes};
+use hydrograd::boundary::panel::{Extrapolated, RichardsonSlopes, richardson};
 use hydrograd::boundary::{ExactBoundary, PanelBoundary, Response};
-use hydrograd::coupling::{Exclusions, PanelCoupled, ShapeDirection};
+use hydrograd::coupling::{
+    Coupling, Direction, Exclusions, Linearise, PanelCoupled, ShapeDirection, ShapeTerm,
+};
 use hydrograd::geometry::TriMesh;
 use hydrograd::scene::Shape;
+use nalgebra::{DMatrix, DVector};
 use std::f64::consts::PI;
 use std::sync::Arc;
 
@@ -97,9 +100,19 @@ fn slopes_of_extrapolated_added_masses() {
         };
         let [fine, coarse] = at(0.0).map(Arc::new);
         let slopes = RichardsonSlopes::new(fine, coarse, ratio).unwrap();
+        let ratio_given = ratio.is_some();
         let error = off(&slopes.along(&fields[0], &fields[1]), extrapolated);
         println!("{shape:?}: {error:e}");
         assert!(error < 1e-7, "{shape:?}: {error:e}");
+        let ratio = |h: f64| {
+            let [fine, coarse] = at(h);
+            richardson(&fine, &coarse).unwrap().ratio
+        };
+        let rate = match ratio_given {
+            true => 0.0,
+            false => (ratio(1e-4) - ratio(-1e-4)) / 2e-4,
+        };
+        assert!((slopes.ratio_along(&fields[0], &fields[1]) - rate).abs() < 1e-8);
     }
 }
 
@@ -203,6 +216,59 @@ fn both_formulas_converge_to_closed_forms() {
     for (coarse, fine) in coarse.iter().zip(fine) {
         assert!(fine < 0.01 && fine < 0.35 * coarse, "{coarse:e} {fine:e}");
     }
+}
+
+/// A film has no derivative with a shape: where one acts that is an error by name, elsewhere there is none.
+#[test]
+fn films_refuse_shape_parameters_where_they_act() {
+    let mesh = mesh(&Shape::sphere(0.5), 80);
+    let body = Arc::new(body(&mesh));
+    let shapes = vec![ShapeDirection {
+        body: 1,
+        vertices: mesh.vertices().to_vec(),
+        added_mass: None,
+    }];
+    let made = PanelCoupled::new(
+        vec![body.clone(), body],
+        &[],
+        Exclusions::none(),
+        Default::default(),
+    );
+    let made = made.unwrap().with_shapes(shapes).unwrap();
+    let filmed = made
+        .with_films(&[(&mesh, None), (&mesh, None)], &[])
+        .unwrap();
+    assert_eq!(filmed.shape_parameters(), 1);
+    let basis = DMatrix::identity(12, 12);
+    let told = |distance: f64| {
+        let away = Pose::new(Mat3::identity(), Vec3::new(distance, 0.0, 0.0));
+        let record = filmed.linearise(&[Pose::identity(), away], &basis).unwrap();
+        let x = DVector::from_fn(12, |i, _| f64::from(i == 6));
+        let x = Direction::Basis(&x);
+        let term = ShapeTerm {
+            weight: 1.0,
+            x,
+            y: x,
+            along: None,
+        };
+        record.shape_vjp(&[term])
+    };
+    let found = told(3.0).unwrap()[0];
+    // Little but its own: the added mass goes with the cube of the radius, here a relative change.
+    let alone = filmed.evaluate(
+        &[
+            Pose::identity(),
+            Pose::new(Mat3::identity(), Vec3::x() * 3.0),
+        ],
+        &basis,
+    );
+    let alone = alone.unwrap().momenta()[(6, 6)];
+    assert!(
+        (found / (3.0 * alone) - 1.0).abs() < 0.02,
+        "{found} {alone}"
+    );
+    let error = told(1.02).unwrap_err().to_string();
+    assert!(error.contains("a film acts"), "{error}");
 }
 
 #[test]

@@ -414,7 +414,25 @@ fn sums_against_scalars(bands: usize, count: usize, k: usize, size: f64) -> f64 
     worst = worst.max(forward(&|o| flux_jvp(&t, &s, &d, &a, k, o), &flux_g));
     worst = worst.max(forward(&|o| single_jvp(&t, &s, &d, &a, k, o), &single_g));
     worst = worst.max(forward(&|o| double_jvp(&t, &s, &d, &a, k, o), &double_g));
-    worst.max(forward(&|o| normal_jvp(&p, &s, &d, &a, k, o), &normal_g))
+    worst = worst.max(forward(&|o| normal_jvp(&p, &s, &d, &a, k, o), &normal_g));
+
+    // With all corners a panel moves as the point moves against it.
+    let mut sums = vec![CornerSums::default(); n * k];
+    corner_vjp(&t, &s, Form::Blended, &a, k, &mut sums);
+    let (mut found, mut plain) = (Vec::new(), vec![0.0; 6 * n * k]);
+    for sum in &sums {
+        for corners in [&sum.single_corners, &sum.double_corners] {
+            let all = corners[0] + corners[1] + corners[2];
+            found.extend([-all.x, -all.y, -all.z]);
+        }
+    }
+    for (i, j) in (0..n).flat_map(|i| (0..count).map(move |j| (i, j))) {
+        let g = [single_g(i, j), double_g(i, j)];
+        for m in 0..6 * k {
+            plain[6 * i * k + m] += a[j * k + m / 6] * g[m / 3 % 2][m % 3];
+        }
+    }
+    worst.max(gap(&found, &plain))
 }
 
 #[test]
@@ -499,6 +517,16 @@ fn everything() -> Vec<f64> {
         potential_fill(&p, &s, Write::Add, o, count, 0)
     });
     add(count * k, &|o| potential_sum(&p, &s, &bar, k, o));
+    let mut sums = vec![CornerSums::default(); t.len() * k];
+    for form in [Form::Closed, Form::Blended] {
+        corner_vjp(&t, &s, form, &a, k, &mut sums);
+        corner_hvp(&t, &s, form, &d, &a, k, &mut sums);
+    }
+    for sum in &sums {
+        let corners = sum.single_corners.iter().chain(&sum.double_corners);
+        all.extend(corners.flat_map(|v| [v.x, v.y, v.z]));
+        all.push(sum.single);
+    }
     all
 }
 

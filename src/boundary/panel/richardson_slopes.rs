@@ -106,7 +106,7 @@ impl RichardsonSlopes {
         )
     }
 
-    /// Rate of the ratio of the edges, 1/s.
+    /// Rate of the ratio of the edges along the same: 1/s, zero where it is given.
     ///
     /// Panics as [`RichardsonSlopes::along`].
     pub fn ratio_along(&self, fine: &[Vec3], coarse: &[Vec3]) -> f64 {
@@ -177,4 +177,82 @@ fn positive_rate(m: (&Mat6, &Mat6), volume: (f64, f64), (least, least_rate): (f6
     let y = vectors * Mat6::from_diagonal(&cut) * vectors.transpose();
     let dy = vectors * inner * vectors.transpose();
     (dy + volume.1 * powers(&y)).component_mul(&displaced(volume.0))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::adjoint::sample::Samples;
+    use crate::geometry::TriMesh;
+
+    /// An octahedron, split so often and blown up to an ellipsoid.
+    fn ellipsoid(semi_axes: &Vec3, splits: usize) -> TriMesh {
+        let mut triangles: Vec<[Vec3; 3]> = Vec::new();
+        for n in 0..8 {
+            let sign = |bit: i32| if n >> bit & 1 == 0 { 1.0 } else { -1.0 };
+            let [x, y, z] = [0, 1, 2].map(|c| sign(c as i32) * Vec3::ith(c, 1.0));
+            let outward = sign(0) * sign(1) * sign(2) > 0.0;
+            triangles.push(if outward { [x, y, z] } else { [x, z, y] });
+        }
+        for _ in 0..splits {
+            let split = |[a, b, c]: &[Vec3; 3]| {
+                let [d, e, f] = [b + c, c + a, a + b].map(|v| v.normalize());
+                [[*a, f, e], [f, *b, d], [e, d, *c], [d, e, f]]
+            };
+            triangles = triangles.iter().flat_map(split).collect();
+        }
+        let mut vertices: Vec<Vec3> = Vec::new();
+        let mut number = |v: &Vec3| {
+            let found = vertices.iter().position(|w| (v - w).norm() < 1e-9);
+            found.unwrap_or_else(|| {
+                vertices.push(*v);
+                vertices.len() - 1
+            })
+        };
+        let faces = triangles.iter().map(|t| [0, 1, 2].map(|k| number(&t[k])));
+        let faces = faces.collect();
+        let vertices = vertices.iter().map(|v| v.component_mul(semi_axes));
+        TriMesh::new("ellipsoid", vertices.collect(), faces).unwrap()
+    }
+
+    /// Energies of rotations about axes of revolution are cut off.
+    #[test]
+    fn slopes_of_coupled_added_masses() {
+        let cases = [
+            (Vec3::new(0.6, 0.3, 0.4), Some(2.0)),
+            (Vec3::new(0.6, 0.3, 0.3), None),
+            (Vec3::new(0.5, 0.5, 0.5), None),
+        ];
+        let mut cut = 0;
+        for (semi_axes, ratio) in cases {
+            let meshes = [2, 1].map(|splits| ellipsoid(&semi_axes, splits));
+            let fields = [0, 1].map(|k| -> Vec<Vec3> {
+                let mut samples = Samples::new(7 + k as u64);
+                let each = meshes[k].vertices().iter();
+                each.map(|_| 0.02 * Vec3::from(samples.array())).collect()
+            });
+            let at = |h: f64| {
+                [0, 1].map(|k| {
+                    let pairs = meshes[k].vertices().iter().zip(&fields[k]);
+                    let vertices = pairs.map(|(x, v)| x + h * v).collect();
+                    let mesh = TriMesh::new("moved", vertices, meshes[k].faces().to_vec());
+                    PanelBoundary::new("b", &mesh.unwrap()).unwrap()
+                })
+            };
+            let mut value = |h: f64| {
+                let [fine, coarse] = at(h);
+                let found = Richardson::of(&fine, &coarse, ratio).unwrap();
+                let coupled = found.coupled(&coarse);
+                cut += usize::from(coupled != found.added_mass);
+                coupled
+            };
+            let difference = (value(1e-4) - value(-1e-4)) / 2e-4;
+            let [fine, coarse] = at(0.0).map(Arc::new);
+            let slopes = RichardsonSlopes::new(fine, coarse, ratio).unwrap();
+            let found = slopes.coupled_along(&fields[0], &fields[1]);
+            let error = (found - difference).amax() / difference.amax();
+            assert!(error < 1e-7, "{semi_axes:?}: {error:e}");
+        }
+        assert!(cut > 0, "no energy is cut off");
+    }
 }

@@ -8,7 +8,8 @@ use crate::joint::Motion;
 use crate::robot::{self, Robot};
 use hydrograd::scene::{Site, Wall, WallSurface};
 use pyo3::prelude::*;
-use pyo3::types::PyDict;
+use pyo3::types::{IntoPyDict, PyDict};
+use std::collections::BTreeMap;
 use std::path::PathBuf;
 
 /// A force whose keys or values don't fit.

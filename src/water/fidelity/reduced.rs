@@ -382,10 +382,27 @@ const STEP: f64 = 1e-3;
 /// # Errors
 /// Vertices of a mesh, along which nothing but the mesh is known to move.
 fn shape_slopes(problem: &Problem) -> Result<Vec<(usize, ShapeSlope)>> {
-    let mut out = Vec::with_capacity(problem.changes.len());
-    for group in problem.changes.chunk_by(|a, b| a.0 == b.0) {
+    let mut out: Vec<(usize, ShapeSlope)> = Vec::with_capacity(problem.changes.len());
+    let groups: Vec<_> = problem.changes.chunk_by(|a, b| a.0 == b.0).collect();
+    for (n, group) in groups.iter().enumerate() {
         let b = group[0].0;
         let body = &problem.bodies[b];
+        // Equal bodies follow their shapes alike.
+        let same = |of: &&[(usize, &ShapeChange)]| {
+            let asked = |g: &[(usize, &ShapeChange)]| -> Vec<(String, f64)> {
+                g.iter().map(|(_, c)| (c.name.clone(), c.value)).collect()
+            };
+            let a = of[0].0;
+            problem.bodies[a].equal(body)
+                && problem.chosen(a) == problem.chosen(b)
+                && asked(of) == asked(group)
+        };
+        if let Some(first) = groups[..n].iter().position(|of| same(of)) {
+            let from: usize = groups[..first].iter().map(|g| g.len()).sum();
+            let known = out[from..from + group.len()].to_vec();
+            out.extend(known.into_iter().map(|(_, slope)| (b, slope)));
+            continue;
+        }
         let method = problem.method_for(body)?;
         let units = InUnits::new(body, method, problem.chosen(b))?;
         let (size, own) = (units.size, alone_slopes(problem, body, group)?);

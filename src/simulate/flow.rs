@@ -99,7 +99,7 @@ impl Simulator {
         if own && !points.par_iter().any(beside) {
             return Ok((own, Vec::new()));
         }
-        match self.surface_flow(sample, None) {
+        match self.open_surface_flow(sample, None) {
             Err(Error::Unsupported { .. }) if own => Ok((own, Vec::new())),
             made => Ok((own, made?)),
         }
@@ -226,7 +226,7 @@ impl Simulator {
         gains: &DVector<f64>,
         points: &[Vec3],
     ) -> Result<Vec<f64>> {
-        let flows = self.surface_flow(sample, Some(gains))?;
+        let flows = self.open_surface_flow(sample, Some(gains))?;
         let places = self.places("flow_pressure", points, &sample.poses, &flows)?;
         let found = self.layered(&flows, &places.asked, true)?;
         let density = self.parameters().density();

@@ -1,6 +1,6 @@
 //! The pressure of the water on the bodies' surfaces.
 
-use super::surface_flow::BodyFlow;
+use super::surface_flow::{BodyFlow, Past, Streams};
 use super::{Rollout, Sample, Simulator};
 use crate::adjoint::lie::{Vec3, Vec6, six};
 use crate::{Error, Result};
@@ -31,11 +31,13 @@ pub struct SurfacePressure {
     pub pressures: Vec<f64>,
     /// Pressure of the water at rest there, Pa, zero at the world's origin.
     pub hydrostatic: Vec<f64>,
+    /// How much of each face lies at a gap that a film carries, in parts of it: there the pressure is that of the film, which is the same across the gap.
+    pub at_films: Vec<f64>,
 }
 
 impl SurfacePressure {
     /// −∮ p n dA of the flow's pressure, and its moment about the body's origin: N and N m, world axes. What [`Loads`](super::Loads) call
-    /// "water", but of a body with an added mass of the user's own: the pressure is that of the flow that its shape makes.
+    /// "water", in a force `current` with what they call "current", but of a body with an added mass of the user's own: the pressure is that of the flow that its shape makes.
     pub fn wrench(&self) -> Vec6 {
         self.sum(&self.pressures)
     }
@@ -60,11 +62,18 @@ impl Simulator {
     fn pressure(&self, sample: &Sample, gains: &DVector<f64>) -> Result<Vec<SurfacePressure>> {
         let density = self.parameters().density();
         let gravity = Vec3::from(self.scene().gravity);
-        let current = self.system().current;
+        let (current, streams) = (self.system().current, &self.system().streams);
         let of = |flow: BodyFlow| {
             let (faces, pose) = (flow.faces(), &flow.pose);
-            let velocities = flow.velocities();
-            let dynamic = flow.pressures(&velocities);
+            let (mut velocities, mut dynamic) = flow.water();
+            if !streams.is_empty() {
+                let water = streams.at_body(flow.body, &sample.place(self.parameters()));
+                let past = Past {
+                    velocity: pose.rotation.tr_mul(&water.velocity),
+                    acceleration: pose.rotation.tr_mul(&water.acceleration),
+                };
+                flow.add_stream(&past, (&mut velocities, &mut dynamic));
+            }
             let centres: Vec<Vec3> = faces.centres.iter().map(|x| pose.apply(x)).collect();
             SurfacePressure {
                 body: flow.body,
@@ -72,6 +81,7 @@ impl Simulator {
                 origin: pose.translation,
                 normals: faces.normals.iter().map(|n| pose.rotation * n).collect(),
                 areas: faces.areas.clone(),
+                at_films: flow.at_films(),
                 velocities: (velocities.iter())
                     .map(|u| pose.rotation * u + current)
                     .collect(),
@@ -80,7 +90,7 @@ impl Simulator {
                 centres,
             }
         };
-        let flows = self.surface_flow(sample, Some(gains))?;
+        let flows = self.surface_flow(sample, Some(gains), Streams::LeftOut)?;
         Ok(flows.into_iter().map(of).collect())
     }
 }
@@ -90,11 +100,11 @@ impl Rollout {
     /// be looked at: nothing of a step depends on it, and it has no transpose.
     ///
     /// # Errors
-    /// A state that there isn't; a scene without water, or with a force `current`; any body in the water without a surface, or of more faces than panels are solved for; gaps that films carry; bodies without
+    /// A state that there isn't; a scene without water; any body in the water without a surface, or of more faces than panels are solved for; bodies without
     /// a factor on a GPU; whatever the equations of motion or the coupling report.
     pub fn pressure(&self, n: usize) -> Result<Vec<SurfacePressure>> {
         let simulator = self.simulator();
-        simulator.check_pressure()?;
+        simulator.check_water()?;
         let sample = self.samples().get(n).ok_or_else(|| {
             let expected = format!("must be at most {}", self.steps());
             Error::input("pressure: state", n, expected)

@@ -218,9 +218,7 @@ impl Coupling for PanelCoupled {
         surfaces: &[Arc<PanelBoundary>],
     ) -> Result<Vec<SurfacePotential>> {
         surface::check(motion, surfaces)?;
-        let (model, columns) = (self.model(), motion.columns());
-        let placed = PlacedPanels::new(model, motion.poses, &Arc::default(), &columns)?;
-        PanelSolution::of_potentials(Arc::new(placed), columns)?.surface_potentials(motion)
+        self.surface_potentials_held(motion, &Arc::default())
     }
 }
 
@@ -251,5 +249,15 @@ impl HeldApart for PanelCoupled {
         films: &Arc<PlacedFilms<'a>>,
     ) -> Result<Box<dyn Linearised + 'a>> {
         Ok(Box::new(self.solved(poses, basis, films)?.linearise()?))
+    }
+
+    fn surface_potentials_held(
+        &self,
+        motion: &Motion,
+        films: &Arc<PlacedFilms>,
+    ) -> Result<Vec<SurfacePotential>> {
+        let (model, columns) = (self.model(), motion.columns());
+        let placed = PlacedPanels::new(model, motion.poses, films, &columns)?;
+        PanelSolution::of_potentials(Arc::new(placed), columns)?.surface_potentials(motion)
     }
 }

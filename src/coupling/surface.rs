@@ -57,12 +57,12 @@ pub struct SurfacePotential {
 pub struct FilmLoad {
     /// Of their potential, m⁴/s.
     pub potential: Vec<f64>,
-    /// Of their pressure at unit density, m⁴/s²; zeros where rates weren't asked for.
+    /// Of its gradient along the surface, body frame, m³/s.
+    pub gradient: Vec<Vec3>,
+    /// Of their pressure at unit density, m⁴/s², where rates were asked for; beside a velocity u of bodies held apart u·`gradient` comes on top.
     pub pressure: Vec<f64>,
     /// How much of each panel lies at a film, m².
     pub area: Vec<f64>,
-    /// The same times what of −½ u² of bodies held apart doesn't count there, m².
-    pub slower: Vec<f64>,
 }
 
 impl FilmLoad {
@@ -70,8 +70,8 @@ impl FilmLoad {
         Self {
             potential: vec![0.0; panels],
             pressure: vec![0.0; panels],
+            gradient: vec![Vec3::zeros(); panels],
             area: vec![0.0; panels],
-            slower: vec![0.0; panels],
         }
     }
 }
@@ -108,7 +108,7 @@ impl Held<'_, '_> {
                     load.potential[face] += patch.area * patch.potential;
                     load.pressure[face] += patch.area * patch.pressure;
                     load.area[face] += patch.area;
-                    load.slower[face] += patch.area * patch.slower;
+                    load.gradient[face] += patch.area * patch.slopes[usize::from(!own)];
                 }
             }
         }

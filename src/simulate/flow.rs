@@ -352,8 +352,8 @@ impl Rollout {
         if points.is_empty() {
             return Ok(Vec::new());
         }
-        let loads = self.loads(n)?;
-        let made = simulator.flow_pressure(sample, loads.acceleration(), points);
+        let gains = self.acceleration(n)?;
+        let made = simulator.flow_pressure(sample, &gains, points);
         made.map_err(|e| e.at_time(sample.time))
     }
 

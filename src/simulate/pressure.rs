@@ -1,7 +1,7 @@
 //! The pressure of the water on the bodies' surfaces.
 
 use super::surface_flow::{BodyFlow, Past, Streams};
-use super::{Rollout, Sample, Simulator};
+use super::{Recorded, Rollout, Sample, Simulator};
 use crate::adjoint::lie::{Vec3, Vec6, six};
 use crate::{Error, Result};
 use nalgebra::DVector;
@@ -96,7 +96,35 @@ impl Simulator {
 }
 
 impl Rollout {
-    /// The water's pressure on the surfaces of all bodies in it at state `n`, with the accelerations of [`Rollout::loads`]: it takes solves of its own. It is there to
+    /// [`Rollout::pressure`] at all states, to be put among the [observables](super::Recording::observables) of a recording: of the name "pressure", with an entry a face, "coin.pressure_0" and on, of one body after the
+    /// other, Pa. Bodies keep their faces, so that it has as many in every row.
+    ///
+    /// # Errors
+    /// As [`Rollout::pressure`].
+    pub fn pressures(&self) -> Result<Recorded> {
+        let (mut labels, mut values) = (Vec::new(), Vec::with_capacity(self.steps() + 1));
+        for n in 0..=self.steps() {
+            let found = self.pressure(n)?;
+            if n == 0 {
+                let names = |p: &SurfacePressure| {
+                    let faces = 0..p.pressures.len();
+                    faces
+                        .map(|k| format!("{}.pressure_{k}", p.name))
+                        .collect::<Vec<_>>()
+                };
+                labels = found.iter().flat_map(names).collect();
+            }
+            values.push(found.into_iter().flat_map(|p| p.pressures).collect());
+        }
+        Ok(Recorded {
+            name: "pressure",
+            labels,
+            scalar: false,
+            values,
+        })
+    }
+
+    /// The water's pressure on the surfaces of all bodies in it at state `n`, with the accelerations of [`Rollout::loads`]: it takes solves of its own, but for those of the accelerations none of the loads. It is there to
     /// be looked at: nothing of a step depends on it, and it has no transpose.
     ///
     /// # Errors
@@ -109,8 +137,8 @@ impl Rollout {
             let expected = format!("must be at most {}", self.steps());
             Error::input("pressure: state", n, expected)
         })?;
-        let loads = self.loads(n)?;
-        let made = simulator.pressure(sample, loads.acceleration());
+        let gains = self.acceleration(n)?;
+        let made = simulator.pressure(sample, &gains);
         made.map_err(|e| e.at_time(sample.time))
     }
 }

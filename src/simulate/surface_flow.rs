@@ -82,8 +82,7 @@ impl BodyFlow<'_> {
         self.velocities_of(&potential)
     }
 
-    /// The velocity and, by Bernoulli's law, the pressure (at unit density, m²/s²) at each centroid. Of what films have and of the flow of bodies held apart each follows from its own potential, as
-    /// energies do.
+    /// The velocity and, by Bernoulli's law, the pressure (at unit density, m²/s²) at each centroid; in a film that of the sum of both flows, whose squares the film's own faces resolve.
     pub fn water(&self) -> (Vec<Vec3>, Vec<f64>) {
         let velocities = self.velocities();
         let Some(film) = &self.potential.film else {
@@ -95,8 +94,7 @@ impl BodyFlow<'_> {
         for (i, p) in pressures.iter_mut().enumerate() {
             let (normal, area) = (&faces.normals[i], faces.areas[i]);
             let along = held[i] - normal * normal.dot(&held[i]);
-            let slower = (film.slower[i] / area).min(1.0);
-            *p += film.pressure[i] / area + 0.5 * slower * along.norm_squared();
+            *p += (film.pressure[i] + along.dot(&film.gradient[i])) / area;
         }
         (velocities, pressures)
     }

@@ -60,7 +60,10 @@ impl FlowSurface {
     pub fn complete(&self, twist: &Vec6, potential: &mut [f64]) {
         if let Some(lacking) = &self.lacking {
             let more = self.panels.own_potential(&(lacking * twist));
-            potential.iter_mut().zip(more).for_each(|(p, more)| *p += more);
+            potential
+                .iter_mut()
+                .zip(more)
+                .for_each(|(p, more)| *p += more);
         }
     }
 }
@@ -71,7 +74,9 @@ fn lacking(panels: &PanelBoundary, found: &Richardson) -> Option<Mat6> {
     let roots = Vec6::from_fn(|i, _| volume.powf(if i < 3 { 0.5 } else { 5.0 / 6.0 }));
     let units = roots * roots.transpose();
     let own = panels.added_mass.component_div(&units).symmetric_eigen();
-    let inverse = own.eigenvalues.map(|x| if x > TOLD { 1.0 / x } else { 0.0 });
+    let inverse = own
+        .eigenvalues
+        .map(|x| if x > TOLD { 1.0 / x } else { 0.0 });
     let inverse = own.eigenvectors * Mat6::from_diagonal(&inverse) * own.eigenvectors.transpose();
     let more = (found.added_mass - panels.added_mass).component_div(&units);
     let back = Vec6::from_fn(|i, _| 1.0 / roots[i]);

@@ -351,7 +351,11 @@ fn pushed<D: Jet>(load: &Vec6, twist: &Screw<D>) -> D {
 }
 
 /// ∇ψ on a face, as the film is and held apart.
-pub(super) fn slopes_of<D: Jet>(cell: &Cell<D>, element: &Element, psi: &[[D; 2]]) -> [Vector<D>; 2] {
+pub(super) fn slopes_of<D: Jet>(
+    cell: &Cell<D>,
+    element: &Element,
+    psi: &[[D; 2]],
+) -> [Vector<D>; 2] {
     let mut out = [zero(); 2];
     for (k, at) in cell.corners.iter().enumerate() {
         if let Some(at) = at {

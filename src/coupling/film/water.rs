@@ -1,28 +1,27 @@
 //! The water in a film, place by place: what it adds to the flow that bodies held apart have.
 //!
-//! With the velocity −∇ψ along the gap, and as all energies of films are those of the film as it is less that held apart, Bernoulli's law adds to the pressure at a place
-//! of the surface that the potential is solved on, which moves at V,
+//! As all energies of films are those of the film as it is less that held apart, so is its potential ψ, with the velocity −∇ψ along the gap. Beside a velocity u of bodies held apart, along the
+//! surface, Bernoulli's law has at a place of the surface that the potential is solved on, which moves at V, at unit density
 //!
 //! ```text
-//! p = [ψ' − V·∇ψ − ½ |∇ψ|²] as it is, less the same held apart          at unit density; ' at a point that goes with the surface
+//! ψ' − V·∇ψ − ½ |∇ψ|² + u·∇ψ          ' at a point that goes with the surface
 //! ```
 //!
-//! since −½ |∇ψ|² is what the energy ½ ∫ H |∇ψ|² does as H gives way, and ψ' what the impulse ∫ ψ n dA does. As the gap h closes, the one h_f that is held apart does so more slowly: what
-//! energies held apart do counts dh_f/dh times, of the film and of the bodies in which it is held off. Across the film the pressure is the same: the other side has it where the arc that meets
-//! both surfaces at right angles ends. Both arms of a wedge of the angle β are as long, so that from the foot of a place at the distance d the arc ends d tan(β/2) farther out.
+//! more. Across the film the pressure is the same: the other side has it where the arc that meets both surfaces at right angles ends. Both arms of a wedge of the angle β are as long, so that from
+//! the foot of a place at the distance d the arc ends d tan(β/2) farther out.
 
+use super::Side;
 use super::flow::slopes_of;
-use super::jet::{Vector, dot};
+use super::jet::dot;
 use super::layer::Cell;
 use super::placed::{MovingFilm, PlacedFilm, Twists};
-use super::Side;
 use crate::adjoint::lie::{Vec3, point_velocity};
 use nalgebra::DVector;
 use num_dual::Dual64;
 
 /// Into how many parts the side of a face is cut: places there fall on faces of other meshes.
 const PARTS: usize = 4;
-/// Least of one and the cosine of the angle at which the sides of a film stand: it ends at its back, whose foot is taken for what is opposite.
+/// Least sum of one and the cosine of the angle at which the sides of a film stand, taken for any less: a film ends at its back.
 const LEAST: f64 = 0.3;
 
 /// A small part of a film.
@@ -33,12 +32,12 @@ pub(crate) struct Patch {
     pub other: Vec3,
     /// m².
     pub area: f64,
-    /// ψ, as the film is less that held apart, m²/s.
+    /// ψ, m²/s.
     pub potential: f64,
-    /// The pressure at unit density, likewise, m²/s².
+    /// ∇ψ in the frames of both, m/s.
+    pub slopes: [Vec3; 2],
+    /// ψ' − V·∇ψ − ½ |∇ψ|², m²/s²; without ψ' where rates weren't given.
     pub pressure: f64,
-    /// How much slower than the gap the one that is held apart closes: 1 − dh_f/dh.
-    pub slower: f64,
 }
 
 /// A film's two sides, with what is between them.
@@ -107,37 +106,28 @@ impl PlacedFilm<'_> {
         let element = &surface.faces[cell.face];
         let corners = element.corners.map(|v| surface.vertices[v]);
         let ends = cell.spots.map(|s| self.end(s, &element.normal));
-        let slopes = slopes_of(cell, element, &potentials.value).map(|s: Vector<f64>| Vec3::from(s));
-        let at = |values: &[[f64; 2]]| -> [[f64; 3]; 2] {
-            [0, 1].map(|k| cell.corners.map(|c| c.map_or(0.0, |c| values[c][k])))
+        let [near, held] = slopes_of(cell, element, &potentials.value).map(Vec3::from);
+        let slope = near - held;
+        let slopes = [slope, self.relative.rotation * slope];
+        let at = |values: &[[f64; 2]]| {
+            let apart = |c: usize| values[c][0] - values[c][1];
+            Vec3::from(cell.corners.map(|c| c.map_or(0.0, apart)))
         };
         let (values, rates) = (at(&potentials.value), at(&potentials.rate));
         let area = element.area / (PARTS * PARTS) as f64;
-        let slower = self.slower();
         let patch = |shares: Vec3| {
             let own = mixed(&corners, &shares);
             let moves = point_velocity(&x.own, &own);
-            let pressure = |k: usize, counts: f64| {
-                let (slope, rate) = (&slopes[k], Vec3::from(rates[k]));
-                shares.dot(&rate) - slope.dot(&moves) - 0.5 * counts * slope.norm_squared()
-            };
             Patch {
                 own,
                 other: mixed(&ends, &shares),
                 area,
-                potential: shares.dot(&(Vec3::from(values[0]) - Vec3::from(values[1]))),
-                pressure: pressure(0, 1.0) - pressure(1, 1.0 - slower),
-                slower,
+                potential: shares.dot(&values),
+                slopes,
+                pressure: shares.dot(&rates) - slope.dot(&moves) - 0.5 * slope.norm_squared(),
             }
         };
         parts().map(patch).collect()
-    }
-
-    /// See [`Patch::slower`].
-    fn slower(&self) -> f64 {
-        let width = &self.film.width;
-        let left = (1.0 - self.layer.gap.value / width.reach).max(0.0);
-        3.0 * width.floor / width.reach * left * left
     }
 
     /// Where the arc from a vertex, of a face with this normal, ends, in the frame of what is opposite.

@@ -497,7 +497,7 @@ impl Rollout {
     fn to_dict<'py>(&self, py: Python<'py>, pressure: bool) -> PyResult<Bound<'py, PyDict>> {
         let mut recording = Recording::of(&self.simulator.get().scene, &self.inner).or_raise()?;
         if pressure {
-            let inner = &self.inner;
+            let inner = self.inner.clone();
             let pressed = long(py, move |_| inner.pressures())?;
             recording.observables.push(pressed);
         }

@@ -56,8 +56,8 @@ def test_pressures_are_recorded_beside_the_rest(rollout):
 
 def test_pressures_in_a_gap_that_a_film_carries():
     scene = hg.Scene(fluid=hg.Fluid(density=998.0), gravity=(0, 0, -9.81))
-    for z, density in [(0.0, 900.0), (0.32, 2000.0)]:
-        scene.add(hg.Body(hg.box(1.0, 1.0, 0.3), density=density, position=(0, 0, z)))
+    for z, density in [(0.0, 900.0), (1.02, 2000.0)]:
+        scene.add(hg.Body(hg.box(1.0, 1.0, 1.0), density=density, position=(0, 0, z)))
     rollout = hg.Simulator(scene, dt=0.001, fidelity="reduced").rollout(steps=1)
     surfaces = rollout.pressure(0)
     right = rollout.loads(0).wrenches("water")

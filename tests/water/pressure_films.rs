@@ -193,8 +193,8 @@ fn pressures_in_a_closing_grasp_add_up_to_what_the_dynamics_do() {
 #[test]
 fn the_pressure_across_a_film_is_one_and_its_faces_are_told() {
     let mut scene = still();
-    for (z, density) in [(0.0, 900.0), (0.105, 2000.0)] {
-        let block = Body::new(Shape::cuboid([0.2, 0.2, 0.1])).density(density);
+    for (z, density) in [(0.0, 900.0), (0.204, 2000.0)] {
+        let block = Body::new(Shape::cuboid([0.2; 3])).density(density);
         scene.add(block.at([0.0, 0.0, z]));
     }
     scene.add(
@@ -202,7 +202,7 @@ fn the_pressure_across_a_film_is_one_and_its_faces_are_told() {
             .at([1.0, 0.0, 0.0])
             .density(900.0),
     );
-    let settings = Settings::default().fidelity(Fidelity::Reduced).faces(320);
+    let settings = Settings::default().fidelity(Fidelity::Reduced);
     let all = at_start(&scene, settings).pressure(0).unwrap();
     for p in &all {
         assert!(p.pressures.iter().all(|x| x.is_finite()));
@@ -222,8 +222,9 @@ fn the_pressure_across_a_film_is_one_and_its_faces_are_told() {
     for [area, _] in [lower, upper] {
         assert!((area / 0.04 - 1.0).abs() < 0.05, "{area}");
     }
+    // The gap is as wide as a fiftieth of the blocks, and the water in it falls as well.
     assert!(
-        (lower[1] / upper[1] - 1.0).abs() < 0.05,
+        (lower[1] / upper[1] - 1.0).abs() < 0.1,
         "{lower:?} {upper:?}"
     );
 }

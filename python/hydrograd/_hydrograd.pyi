@@ -835,7 +835,7 @@ class Loads:
 @final
 class SurfacePressure:
     """Pressure of the water on the faces of one body at one state, by Bernoulli's law for unsteady flow, from the accelerations there: made by `Rollout.pressure`. World frame. With
-    `pressures`, −Σ p n A is what `Rollout.loads` calls "water", to the error of the faces."""
+    `pressures`, −Σ p n A is what `Rollout.loads` calls "water", in a force `current` with what it calls "current", to the error of the faces."""
     @property
     def name(self) -> str:
         """The body's name."""
@@ -857,6 +857,9 @@ class SurfacePressure:
     @property
     def hydrostatic(self) -> _Array:
         """Pressure of the water at rest there (n,), Pa, zero at the world's origin."""
+    @property
+    def at_films(self) -> _Array:
+        """How much of each face lies at a gap that a film carries (n,), in parts of it."""
     @property
     def wrench(self) -> _Array:
         """Force and moment about the body's origin of `pressures` (6,), N and N m, world axes."""
@@ -1052,9 +1055,9 @@ class Rollout:
     def step_jacobians(self, parameters: Sequence[str] | None = None) -> tuple[_Array, ...]:
         """Linearisations x_{n+1} ≈ A_n x_n + B_n u_n of all steps in x = (q, v), coordinates in their tangent space, the scene's controller included: A (N, 2 v_size, 2 v_size)
         and B (N, 2 v_size, control_size); with `parameters` also the derivatives with respect to those named (N, 2 v_size, parameters). Steps are taken on all cores."""
-    def to_dict(self) -> dict[str, _Array]:
-        """Columns by name, one row a state: time, each coordinate and velocity, energy, momentum and smallest gap, SI units;
-        `pandas.DataFrame(rollout.to_dict())` is a table."""
+    def to_dict(self, *, pressure: bool = False) -> dict[str, _Array]:
+        """Columns by name, one row a state: time, each coordinate and velocity, energy, momentum and smallest gap, SI units, with `pressure` also that of the flow on every face
+        ("ball.pressure_0", …, Pa), at the price of solves of its own a state; `pandas.DataFrame(rollout.to_dict())` is a table."""
     def write_vtk(
         self,
         folder: _Path,

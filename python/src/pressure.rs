@@ -7,7 +7,7 @@ use numpy::PyArrayDyn;
 use pyo3::prelude::*;
 
 /// Pressure of the water on the faces of one body at one state, by Bernoulli's law for unsteady flow, from the accelerations there: made by `Rollout.pressure`. World frame. With
-/// `pressures`, −Σ p n A is what `Rollout.loads` calls "water", to the error of the faces.
+/// `pressures`, −Σ p n A is what `Rollout.loads` calls "water", in a force `current` with what it calls "current", to the error of the faces.
 #[pyclass(frozen, module = "hydrograd")]
 pub struct SurfacePressure(pub simulate::SurfacePressure);
 
@@ -64,6 +64,12 @@ impl SurfacePressure {
     #[getter]
     fn hydrostatic<'py>(&self, py: Python<'py>) -> Numbers<'py> {
         numbers(py, &self.0.hydrostatic)
+    }
+
+    /// How much of each face lies at a gap that a film carries (n,), in parts of it.
+    #[getter]
+    fn at_films<'py>(&self, py: Python<'py>) -> Numbers<'py> {
+        numbers(py, &self.0.at_films)
     }
 
     /// Force and moment about the body's origin of `pressures` (6,), N and N m, world axes.

@@ -510,10 +510,16 @@ impl Rollout {
         tangents::step_jacobians(py, &self.inner, parameters)
     }
 
-    /// Columns by name, one row a state: time, each coordinate and velocity, energy, momentum and smallest gap, SI units;
-    /// `pandas.DataFrame(rollout.to_dict())` is a table.
-    fn to_dict<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyDict>> {
-        let recording = Recording::of(&self.simulator.get().scene, &self.inner).or_raise()?;
+    /// Columns by name, one row a state: time, each coordinate and velocity, energy, momentum and smallest gap, SI units, with `pressure` also that of the flow on every face
+    /// ("ball.pressure_0", …, Pa), at the price of solves of its own a state; `pandas.DataFrame(rollout.to_dict())` is a table.
+    #[pyo3(signature = (*, pressure=false))]
+    fn to_dict<'py>(&self, py: Python<'py>, pressure: bool) -> PyResult<Bound<'py, PyDict>> {
+        let mut recording = Recording::of(&self.simulator.get().scene, &self.inner).or_raise()?;
+        if pressure {
+            let inner = self.inner.clone();
+            let pressed = long(py, move |_| inner.pressures())?;
+            recording.observables.push(pressed);
+        }
         let out = PyDict::new(py);
         let n = recording.time.len();
         let column = |values: Vec<f64>| array::to_python(py, values, &[n]);

@@ -45,6 +45,29 @@ def test_the_pressure_around_goes_over_into_that_on_the_body(rollout):
     assert velocities == pytest.approx(p.velocities, abs=1e-2 * np.abs(p.velocities).max())
 
 
+def test_pressures_are_recorded_beside_the_rest(rollout):
+    table = rollout.to_dict(pressure=True)
+    assert set(rollout.to_dict()) < set(table)
+    for state in (0, -1):
+        for p in rollout.pressure(state):
+            row = [table[f"{p.name}.pressure_{k}"][state] for k in range(len(p.pressures))]
+            assert np.array_equal(row, p.pressures)
+
+
+def test_pressures_in_a_gap_that_a_film_carries():
+    scene = hg.Scene(fluid=hg.Fluid(density=998.0), gravity=(0, 0, -9.81))
+    for z, density in [(0.0, 900.0), (1.02, 2000.0)]:
+        scene.add(hg.Body(hg.box(1.0, 1.0, 1.0), density=density, position=(0, 0, z)))
+    rollout = hg.Simulator(scene, dt=0.001, fidelity="reduced").rollout(steps=1)
+    surfaces = rollout.pressure(0)
+    right = rollout.loads(0).wrenches("water")
+    largest = np.abs(right[:, :3]).max()
+    for p, water in zip(surfaces, right, strict=True):
+        assert p.at_films.shape == p.pressures.shape
+        assert 0.8 < p.at_films @ p.areas < 2.0
+        assert p.wrench[:3] == pytest.approx(water[:3], abs=0.03 * largest)
+
+
 def test_what_is_not_known_is_refused(rollout):
     with pytest.raises(IndexError, match="state"):
         rollout.pressure(30)

@@ -91,7 +91,7 @@ impl Coupling for Isolated {
         surfaces: &[Arc<PanelBoundary>],
     ) -> Result<Vec<SurfacePotential>> {
         check(motion, surfaces)?;
-        Ok(on_surfaces(motion, surfaces, &[], &[]))
+        Ok(on_surfaces(motion, surfaces, &[], &[], None))
     }
 }
 

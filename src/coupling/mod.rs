@@ -37,8 +37,7 @@ pub use isolated::Isolated;
 pub use panel::{ExtrapolatedPanels, FilmedPanels, PanelCoupled, PanelModel};
 pub use response::{CoupledResponse, Reached};
 pub use shape::{ShapeDirection, ShapeTerm};
-pub(crate) use surface::is_held_apart;
-pub use surface::{Motion, SurfacePotential};
+pub use surface::{FilmLoad, Motion, SurfacePotential};
 pub use tensor::PairTensor;
 
 use crate::adjoint::lie::{Mat6, Pose, Vec3, Vec6};
@@ -126,7 +125,7 @@ pub trait Coupling: Send + Sync {
     /// The flow's potential on all panels, and its rate. `surfaces` are [`Coupling::surfaces`], or panels of any mesh of each body where there are none.
     ///
     /// # Errors
-    /// As [`Coupling::evaluate`], films that hold bodies apart, and a device that doesn't tell the rates of its densities.
+    /// As [`Coupling::evaluate`], and a device that doesn't tell the rates of its densities.
     fn surface_potentials(
         &self,
         _motion: &Motion,

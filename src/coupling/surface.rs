@@ -13,12 +13,16 @@
 //! ```text
 //! ψ(x) = Σ α/|x − y|,   ψ' = Σ { α'/|x − y| + α ∇(1/|x − y|)·y' }       y' relative to the body
 //! ```
+//!
+//! In a gap that a film carries y is as far off as the film holds it. What the film itself has, less what it would have held apart, comes on top as in the added
+//! mass ([`FilmLoad`]).
 
 use super::pair::Pair;
 use crate::adjoint::kernel::{Points, Sources, potential_jvp, potential_sum};
 use crate::adjoint::lie::{Pose, Vec3, Vec6};
 use crate::boundary::PanelBoundary;
-use crate::geometry::Image;
+use crate::coupling::film::{MovingFilms, PlacedFilms};
+use crate::geometry::{Beneath, Image};
 use crate::solver::Columns;
 use crate::{Error, Result};
 use nalgebra::{DMatrix, DVector};
@@ -44,6 +48,71 @@ pub struct SurfacePotential {
     pub value: Vec<f64>,
     /// Its rate at points that go with the body, m²/s²; zeros where it wasn't asked for.
     pub rate: Vec<f64>,
+    /// What films add to it, where there are any at the body: the rest is that of bodies held apart.
+    pub film: Option<FilmLoad>,
+}
+
+/// What films have on the panels of one body, as they are less what they would have held apart: integrals over each panel.
+#[derive(Clone, Debug)]
+pub struct FilmLoad {
+    /// Of their potential, m⁴/s.
+    pub potential: Vec<f64>,
+    /// Of its gradient along the surface, body frame, m³/s.
+    pub gradient: Vec<Vec3>,
+    /// Of their pressure at unit density, m⁴/s², where rates were asked for; beside a velocity u of bodies held apart u·`gradient` comes on top.
+    pub pressure: Vec<f64>,
+    /// How much of each panel lies at a film, m².
+    pub area: Vec<f64>,
+}
+
+impl FilmLoad {
+    fn zeros(panels: usize) -> Self {
+        Self {
+            potential: vec![0.0; panels],
+            pressure: vec![0.0; panels],
+            gradient: vec![Vec3::zeros(); panels],
+            area: vec![0.0; panels],
+        }
+    }
+}
+
+/// Bodies that films hold apart.
+#[derive(Clone, Copy)]
+pub(super) struct Held<'h, 'a> {
+    pub films: &'h PlacedFilms<'a>,
+    /// As the bodies are displaced.
+    pub moving: &'h MovingFilms<'h>,
+}
+
+impl Held<'_, '_> {
+    /// Adds what the films themselves have.
+    pub fn add_water(
+        &self,
+        motion: &Motion,
+        surfaces: &[Arc<PanelBoundary>],
+        out: &mut [SurfacePotential],
+    ) {
+        let mut beneath: Vec<Option<Beneath>> = surfaces.iter().map(|_| None).collect();
+        for film in self.moving.water(motion.twists, motion.rates) {
+            for (body, own) in [(Some(film.own), true), (film.other, false)] {
+                let Some(body) = body else { continue };
+                let panels = surfaces[body].panels();
+                let beneath = beneath[body].get_or_insert_with(|| {
+                    let corners = panels.corners().iter().map(|c| c.map(|v| v as usize));
+                    Beneath::new(panels.vertices(), corners)
+                });
+                let zeros = || FilmLoad::zeros(panels.len());
+                let load = out[body].film.get_or_insert_with(zeros);
+                for patch in &film.patches {
+                    let face = beneath.face(if own { &patch.own } else { &patch.other });
+                    load.potential[face] += patch.area * patch.potential;
+                    load.pressure[face] += patch.area * patch.pressure;
+                    load.area[face] += patch.area;
+                    load.gradient[face] += patch.area * patch.slopes[usize::from(!own)];
+                }
+            }
+        }
+    }
 }
 
 impl Motion<'_> {
@@ -61,6 +130,7 @@ impl SurfacePotential {
         Self {
             value: columns.column(0),
             rate: columns.column(1),
+            film: None,
         }
     }
 }
@@ -80,18 +150,20 @@ pub(super) struct Seen {
     pub weight: [f64; 2],
 }
 
-/// Total potentials on all surfaces, of bodies that see each other's sources.
+/// Total potentials on all surfaces, of bodies that see each other's sources, where films hold some of them apart if any do.
 pub(super) fn on_surfaces(
     motion: &Motion,
     surfaces: &[Arc<PanelBoundary>],
     charges: &[Charges],
     seen: &[Seen],
+    held: Option<Held>,
 ) -> Vec<SurfacePotential> {
     let of = |(b, surface): (usize, &Arc<PanelBoundary>)| {
         let centres = &surface.faces.centres;
         let mut incident = Columns::zeros(centres.len(), 2);
         for seen in seen.iter().filter(|s| s.target == b) {
-            add(motion, centres, seen, &charges[seen.source], &mut incident);
+            let source = &charges[seen.source];
+            add(motion, centres, (seen, source), held, &mut incident);
         }
         let twist = |x: &DVector<f64>| x.fixed_rows::<6>(6 * b).into_owned();
         let twists = [
@@ -100,19 +172,41 @@ pub(super) fn on_surfaces(
         ];
         SurfacePotential::of(&surface.total_potential(&twists, &incident))
     };
-    surfaces.iter().enumerate().map(of).collect()
+    let mut out: Vec<SurfacePotential> = surfaces.iter().enumerate().map(of).collect();
+    if let Some(held) = held {
+        held.add_water(motion, surfaces, &mut out);
+    }
+    out
 }
 
 /// Adds the potential of the sources, and its rate, at points of the body that sees them.
-fn add(motion: &Motion, centres: &[Vec3], seen: &Seen, charges: &Charges, out: &mut Columns) {
+fn add(
+    motion: &Motion,
+    centres: &[Vec3],
+    (seen, charges): (&Seen, &Charges),
+    held: Option<Held>,
+    out: &mut Columns,
+) {
     let place = |b: usize| (b, &motion.poses[b]);
     let (target, source) = (place(seen.target), place(seen.source));
-    let pair = Pair::new(target, source, &seen.image, charges.points);
-    let moved = pair.displacements(target.1, motion.displacement);
+    let mut pair = Pair::new(target, source, &seen.image, charges.points);
+    let mut moved = pair.displacements(target.1, motion.displacement);
+    let mut places = pair.positions.clone();
+    if let Some(held) = held {
+        pair = pair.held_off(held.films);
+        if let Some((apart, film)) = pair.film(held.films) {
+            let shift = apart.shift(film);
+            places.iter_mut().for_each(|x| *x += shift);
+        }
+        if let Some((apart, film)) = pair.moving(held.moving) {
+            let rate = apart.rate(film);
+            moved.iter_mut().for_each(|x| *x += rate);
+        }
+    }
     let mut still = Columns::zeros(centres.len(), 2);
     // The kernel is even: what sees and what is seen may be exchanged.
     potential_sum(
-        &Points::bare(&pair.positions),
+        &Points::bare(&places),
         &Sources::new(centres),
         &charges.strengths.data,
         2,
@@ -129,23 +223,6 @@ fn add(motion: &Motion, centres: &[Vec3], seen: &Seen, charges: &Charges, out: &
         let [value, change] = [still.at(i, 0), still.at(i, 1)];
         out.data[2 * i] += weight * value;
         out.data[2 * i + 1] += weight * (change + moving) + rate * value;
-    }
-}
-
-/// What isn't there while films hold bodies apart.
-const HELD_APART: &str = "the flow on surfaces that a film holds apart";
-
-/// Whether an error says that films hold bodies apart, at whatever time: the one reason for which a state of a run has no flow on surfaces while others have.
-pub(crate) fn is_held_apart(error: &Error) -> bool {
-    matches!(error, Error::Unsupported { what, .. } if what.starts_with(HELD_APART))
-}
-
-/// Why there is none while films hold bodies apart.
-pub(super) fn held_apart() -> Error {
-    Error::Unsupported {
-        what: HELD_APART.into(),
-        why: "in a gap that the faces don't resolve the water's inertia is known, but not its pressure face by face".into(),
-        instead: "use more faces there, or ask before the gap closes".into(),
     }
 }
 

@@ -14,6 +14,7 @@
 //!   tangent balls and winding numbers of one mesh.
 //! - [`Wall`], [`HalfSpace`], [`Image`]: plane walls and the mirror images that they make.
 
+mod beneath;
 mod boxes;
 mod check;
 pub(crate) mod convex;
@@ -39,6 +40,7 @@ mod triangle;
 mod wall;
 pub(crate) mod weld;
 
+pub(crate) use beneath::Beneath;
 pub use check::{Finding, Kind, MeshReport, Severity, check_parts};
 pub(crate) use convex::Field;
 pub use convex::Solid;

@@ -99,7 +99,7 @@ impl Simulator {
         if own && !points.par_iter().any(beside) {
             return Ok((own, Vec::new()));
         }
-        match self.surface_flow(sample, None) {
+        match self.open_surface_flow(sample, None) {
             Err(Error::Unsupported { .. }) if own => Ok((own, Vec::new())),
             made => Ok((own, made?)),
         }
@@ -225,7 +225,7 @@ impl Simulator {
         gains: &DVector<f64>,
         points: &[Vec3],
     ) -> Result<Vec<f64>> {
-        let flows = self.surface_flow(sample, Some(gains))?;
+        let flows = self.open_surface_flow(sample, Some(gains))?;
         let places = self.places("flow_pressure", points, &sample.poses, &flows)?;
         let found = self.layered(&flows, &places.asked, true)?;
         let density = self.parameters().density();
@@ -351,8 +351,8 @@ impl Rollout {
         if points.is_empty() {
             return Ok(Vec::new());
         }
-        let loads = self.loads(n)?;
-        let made = simulator.flow_pressure(sample, loads.acceleration(), points);
+        let gains = self.acceleration(n)?;
+        let made = simulator.flow_pressure(sample, &gains, points);
         made.map_err(|e| e.at_time(sample.time))
     }
 

@@ -56,6 +56,13 @@ impl Loads {
     }
 }
 
+/// What drives a state, the acceleration that follows, and what a step has solved for.
+struct Driven {
+    control: DVector<f64>,
+    acceleration: DVector<f64>,
+    further: Vec<(&'static str, Vec<Vec6>)>,
+}
+
 /// From the world's origin to those of the bodies.
 fn about(poses: &[Pose], wrenches: Vec<Vec6>) -> Vec<Vec6> {
     let moved = |(w, pose): (Vec6, &Pose)| {
@@ -135,7 +142,18 @@ impl Rollout {
         self.loads_by(&self.equations_at_state(n)?, n)
     }
 
+    /// The acceleration alone that [`Rollout::loads`] tells.
+    pub(super) fn acceleration(&self, n: usize) -> Result<DVector<f64>> {
+        Ok(self.driven(&self.equations_at_state(n)?, n)?.acceleration)
+    }
+
     fn loads_by(&self, equations: &Equations, n: usize) -> Result<Loads> {
+        let at = self.driven(equations, n)?;
+        let v = &self.samples()[n].v;
+        equations.loads_with(v, &at.control, &at.acceleration, at.further)
+    }
+
+    fn driven(&self, equations: &Equations, n: usize) -> Result<Driven> {
         let (simulator, sample) = (self.simulator(), &self.samples()[n]);
         let system = simulator.system();
         let nv = system.tree.velocities();
@@ -168,7 +186,11 @@ impl Rollout {
         let v = &sample.v;
         let acceleration =
             equations.acceleration_holding(v, &control, &force, &driven, &sample.hold)?;
-        equations.loads_with(v, &control, &acceleration, further)
+        Ok(Driven {
+            control,
+            acceleration,
+            further,
+        })
     }
 
     /// What an inertial measurement unit at the site of this name reads at state `n`, with the acceleration of [`Rollout::loads`].
@@ -183,7 +205,7 @@ impl Rollout {
             return Err(Error::input("imu: site", format!("{site:?}"), expected));
         };
         let equations = self.equations_at_state(n)?;
-        let acceleration = self.loads_by(&equations, n)?.acceleration;
+        let acceleration = self.driven(&equations, n)?.acceleration;
         let (v, at) = (&self.samples()[n].v, &site.pose.translation);
         let moves = equations.point_velocity(v, site.body, at)?;
         let gains = equations.point_acceleration(v, &acceleration, site.body, at)?;

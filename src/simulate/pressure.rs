@@ -1,7 +1,7 @@
 //! The pressure of the water on the bodies' surfaces.
 
-use super::surface_flow::BodyFlow;
-use super::{Rollout, Sample, Simulator};
+use super::surface_flow::{BodyFlow, Past, Streams};
+use super::{Recorded, Rollout, Sample, Simulator};
 use crate::adjoint::lie::{Vec3, Vec6, six};
 use crate::coupling::is_held_apart;
 use crate::{Error, Result};
@@ -32,11 +32,13 @@ pub struct SurfacePressure {
     pub pressures: Vec<f64>,
     /// Pressure of the water at rest there, Pa, zero at the world's origin.
     pub hydrostatic: Vec<f64>,
+    /// How much of each face lies at a gap that a film carries, in parts of it: there the pressure is that of the film, which is the same across the gap.
+    pub at_films: Vec<f64>,
 }
 
 impl SurfacePressure {
     /// −∮ p n dA of the flow's pressure, and its moment about the body's origin: N and N m, world axes. What [`Loads`](super::Loads) call
-    /// "water", but of a body with an added mass of the user's own: the pressure is that of the flow that its shape makes.
+    /// "water", in a force `current` with what they call "current", but of a body with an added mass of the user's own: the pressure is that of the flow that its shape makes.
     pub fn wrench(&self) -> Vec6 {
         self.sum(&self.pressures)
     }
@@ -61,11 +63,18 @@ impl Simulator {
     fn pressure(&self, sample: &Sample, gains: &DVector<f64>) -> Result<Vec<SurfacePressure>> {
         let density = self.parameters().density();
         let gravity = Vec3::from(self.scene().gravity);
-        let current = self.system().current;
+        let (current, streams) = (self.system().current, &self.system().streams);
         let of = |flow: BodyFlow| {
             let (faces, pose) = (flow.faces(), &flow.pose);
-            let velocities = flow.velocities();
-            let dynamic = flow.pressures(&velocities);
+            let (mut velocities, mut dynamic) = flow.water();
+            if !streams.is_empty() {
+                let water = streams.at_body(flow.body, &sample.place(self.parameters()));
+                let past = Past {
+                    velocity: pose.rotation.tr_mul(&water.velocity),
+                    acceleration: pose.rotation.tr_mul(&water.acceleration),
+                };
+                flow.add_stream(&past, (&mut velocities, &mut dynamic));
+            }
             let centres: Vec<Vec3> = faces.centres.iter().map(|x| pose.apply(x)).collect();
             SurfacePressure {
                 body: flow.body,
@@ -73,6 +82,7 @@ impl Simulator {
                 origin: pose.translation,
                 normals: faces.normals.iter().map(|n| pose.rotation * n).collect(),
                 areas: faces.areas.clone(),
+                at_films: flow.at_films(),
                 velocities: (velocities.iter())
                     .map(|u| pose.rotation * u + current)
                     .collect(),
@@ -81,27 +91,55 @@ impl Simulator {
                 centres,
             }
         };
-        let flows = self.surface_flow(sample, Some(gains))?;
+        let flows = self.surface_flow(sample, Some(gains), Streams::LeftOut)?;
         Ok(flows.into_iter().map(of).collect())
     }
 }
 
 impl Rollout {
-    /// The water's pressure on the surfaces of all bodies in it at state `n`, with the accelerations of [`Rollout::loads`]: it takes solves of its own. It is there to
+    /// [`Rollout::pressure`] at all states, to be put among the [observables](super::Recording::observables) of a recording: of the name "pressure", with an entry a face, "coin.pressure_0" and on, of one body after the
+    /// other, Pa. Bodies keep their faces, so that it has as many in every row.
+    ///
+    /// # Errors
+    /// As [`Rollout::pressure`].
+    pub fn pressures(&self) -> Result<Recorded> {
+        let (mut labels, mut values) = (Vec::new(), Vec::with_capacity(self.steps() + 1));
+        for n in 0..=self.steps() {
+            let found = self.pressure(n)?;
+            if n == 0 {
+                let names = |p: &SurfacePressure| {
+                    let faces = 0..p.pressures.len();
+                    faces
+                        .map(|k| format!("{}.pressure_{k}", p.name))
+                        .collect::<Vec<_>>()
+                };
+                labels = found.iter().flat_map(names).collect();
+            }
+            values.push(found.into_iter().flat_map(|p| p.pressures).collect());
+        }
+        Ok(Recorded {
+            name: "pressure",
+            labels,
+            scalar: false,
+            values,
+        })
+    }
+
+    /// The water's pressure on the surfaces of all bodies in it at state `n`, with the accelerations of [`Rollout::loads`]: it takes solves of its own, but for those of the accelerations none of the loads. It is there to
     /// be looked at: nothing of a step depends on it, and it has no transpose.
     ///
     /// # Errors
-    /// A state that there isn't; a scene without water, or with a force `current`; any body in the water without a surface, or of more faces than panels are solved for; gaps that films carry; bodies without
+    /// A state that there isn't; a scene without water; any body in the water without a surface, or of more faces than panels are solved for; bodies without
     /// a factor on a GPU; whatever the equations of motion or the coupling report.
     pub fn pressure(&self, n: usize) -> Result<Vec<SurfacePressure>> {
         let simulator = self.simulator();
-        simulator.check_pressure()?;
+        simulator.check_water()?;
         let sample = self.samples().get(n).ok_or_else(|| {
             let expected = format!("must be at most {}", self.steps());
             Error::input("pressure: state", n, expected)
         })?;
-        let loads = self.loads(n)?;
-        let made = simulator.pressure(sample, loads.acceleration());
+        let gains = self.acceleration(n)?;
+        let made = simulator.pressure(sample, &gains);
         made.map_err(|e| e.at_time(sample.time))
     }
 

@@ -1,7 +1,7 @@
 //! The flow on the bodies' surfaces at one moment: what pressure, and the flow around bodies that a fidelity knows by sources alone, follow from.
 
 use super::{Sample, Simulator};
-use crate::adjoint::lie::{Pose, Vec3, Vec6, cross_motion, point_velocity, six};
+use crate::adjoint::lie::{Pose, Vec3, Vec6, angular, cross_motion, point_velocity, six};
 use crate::coupling::{Motion, SurfacePotential};
 use crate::geometry::{Faces, Image};
 use crate::multibody::Virtual;
@@ -28,6 +28,23 @@ pub(super) struct BodyFlow<'s> {
     twist_rate: Vec6,
 }
 
+/// What becomes of streams by depth and time in the twists of bodies through the water.
+#[derive(Clone, Copy)]
+pub(super) enum Streams {
+    /// Each body moves through its own.
+    Counted,
+    /// Bodies move through the uniform current alone, as their inertia does in the equations of motion: [`BodyFlow::add_stream`] has the rest.
+    LeftOut,
+}
+
+/// The undisturbed water that streams past a body by depth and time, where the body feels it, body frame.
+pub(super) struct Past {
+    /// m/s.
+    pub velocity: Vec3,
+    /// Its own acceleration, m/s².
+    pub acceleration: Vec3,
+}
+
 impl BodyFlow<'_> {
     /// The faces where velocities and pressures are known.
     pub fn faces(&self) -> &Faces {
@@ -37,12 +54,95 @@ impl BodyFlow<'_> {
         }
     }
 
+    /// Whether films carry gaps there.
+    fn at_film(&self) -> bool {
+        self.potential.film.is_some()
+    }
+
+    /// How much of each face lies at a gap that a film carries, in parts of it.
+    pub fn at_films(&self) -> Vec<f64> {
+        let areas = self.faces().areas.iter();
+        match &self.potential.film {
+            // Faces are flat, and what lies opposite is as large as the film.
+            Some(film) => (film.area.iter().zip(areas))
+                .map(|(at, area)| (at / area).min(1.0))
+                .collect(),
+            None => vec![0.0; areas.len()],
+        }
+    }
+
     /// Velocity that the bodies give to the water at each centroid, m/s.
     pub fn velocities(&self) -> Vec<Vec3> {
+        let mut potential = self.potential.value.clone();
+        if let Some(film) = &self.potential.film {
+            let each = potential.iter_mut().zip(&film.potential);
+            let each = each.zip(&self.faces().areas);
+            each.for_each(|((all, film), area)| *all += film / area);
+        }
+        self.velocities_of(&potential)
+    }
+
+    /// The velocity and, by Bernoulli's law, the pressure (at unit density, m²/s²) at each centroid; in a film that of the sum of both flows, whose squares the film's own faces resolve.
+    pub fn water(&self) -> (Vec<Vec3>, Vec<f64>) {
+        let velocities = self.velocities();
+        let Some(film) = &self.potential.film else {
+            let pressures = self.pressures(&velocities);
+            return (velocities, pressures);
+        };
+        let (held, faces) = (self.velocities_of(&self.potential.value), self.faces());
+        let mut pressures = self.pressures(&held);
+        for (i, p) in pressures.iter_mut().enumerate() {
+            let (normal, area) = (&faces.normals[i], faces.areas[i]);
+            let along = held[i] - normal * normal.dot(&held[i]);
+            *p += (film.pressure[i] + along.dot(&film.gradient[i])) / area;
+        }
+        (velocities, pressures)
+    }
+
+    /// What a stream adds to velocities and pressures of the flow around this body, whose twist leaves the stream out: as in the force that it exerts
+    /// ([`crate::adjoint::stream`]) the body answers to it as if alone, and the pressure that accelerates the undisturbed water, zero at the body's origin, comes on top.
+    pub fn add_stream(&self, past: &Past, (velocities, pressures): (&mut [Vec3], &mut [f64])) {
+        let still = |x: &Vec3| six(x, &Vec3::zeros());
+        let turning = angular(&self.twist).cross(&past.velocity);
+        let through = self.alone(
+            self.twist - still(&past.velocity),
+            self.twist_rate - still(&(past.acceleration - turning)),
+        );
+        let [with, without] = [through, self.alone(self.twist, self.twist_rate)].map(|f| f.water());
+        for (u, (with, without)) in velocities.iter_mut().zip(with.0.iter().zip(&without.0)) {
+            *u += with - without + past.velocity;
+        }
+        let pressed = with.1.iter().zip(&without.1).zip(&self.faces().centres);
+        for (p, ((with, without), x)) in pressures.iter_mut().zip(pressed) {
+            *p += with - without - past.acceleration.dot(x);
+        }
+    }
+
+    /// The flow around this body as if alone in the water.
+    fn alone(&self, twist: Vec6, twist_rate: Vec6) -> Self {
+        let own = |twist: &Vec6| {
+            let mut potential = self.surface.panels.own_potential(twist);
+            self.surface.complete(twist, &mut potential);
+            potential
+        };
+        Self {
+            potential: SurfacePotential {
+                value: own(&twist),
+                rate: own(&twist_rate),
+                film: None,
+            },
+            twist,
+            twist_rate,
+            ..*self
+        }
+    }
+
+    /// The velocity there of a flow with this potential.
+    fn velocities_of(&self, potential: &[f64]) -> Vec<Vec3> {
         let panels = &self.surface.panels;
         let slopes = match &self.surface.exact {
             Some(exact) => {
-                let mut rest = self.potential.value.clone();
+                let mut rest = potential.to_vec();
                 let own = panels.own_potential(&self.twist);
                 rest.iter_mut().zip(own).for_each(|(all, own)| *all -= own);
                 let mut slopes = panels.surface_gradient(&rest);
@@ -53,7 +153,7 @@ impl BodyFlow<'_> {
                     .for_each(|(all, own)| *all += own);
                 slopes
             }
-            None => panels.surface_gradient(&self.potential.value),
+            None => panels.surface_gradient(potential),
         };
         let faces = self.faces();
         let places = faces.centres.iter().zip(&faces.normals).zip(slopes);
@@ -154,6 +254,29 @@ impl BodyFlow<'_> {
 }
 
 impl Simulator {
+    /// [`Simulator::surface_flow`] where no film carries a gap: around bodies the layers on surfaces held apart don't tell it.
+    ///
+    /// # Errors
+    /// Films, and as there.
+    pub(super) fn open_surface_flow(
+        &self,
+        sample: &Sample,
+        gains: Option<&DVector<f64>>,
+    ) -> Result<Vec<BodyFlow<'_>>> {
+        let flows = self.surface_flow(sample, gains, Streams::Counted)?;
+        match flows.iter().find(|flow| flow.at_film()) {
+            None => Ok(flows),
+            Some(flow) => Err(Error::Unsupported {
+                what: format!(
+                    "the flow around body {:?}, which a film holds apart",
+                    self.system().bodies[flow.body].name
+                ),
+                why: "in a gap that the faces don't resolve it is known on the surfaces alone".into(),
+                instead: "use more faces there, or ask before the gap closes; the pressure on bodies is known".into(),
+            }),
+        }
+    }
+
     /// The flow on the surfaces of all bodies in the water, with its rates at the generalised accelerations `gains`, where they are given.
     ///
     /// # Errors
@@ -162,6 +285,7 @@ impl Simulator {
         &self,
         sample: &Sample,
         gains: Option<&DVector<f64>>,
+        streams: Streams,
     ) -> Result<Vec<BodyFlow<'_>>> {
         let system = self.system();
         let (tree, v) = (&system.tree, &sample.v);
@@ -175,8 +299,12 @@ impl Simulator {
             v,
             &sample.control,
         );
-        let through: Vec<Vec6> = (0..system.len()).map(|b| at.relative(b)).collect();
         let uniform = six(&system.current, &Vec3::zeros());
+        let through = |b: usize| match streams {
+            Streams::Counted => at.relative(b),
+            Streams::LeftOut => fields.twist[b] - uniform,
+        };
+        let through: Vec<Vec6> = (0..system.len()).map(through).collect();
         // In the body's frame the current turns as the body turns: d/dt Ad⁻¹(V − C) = Ad⁻¹(V' + V × C).
         let rates: Vec<Vec6> = (0..system.len())
             .map(|b| gained[b] + fields.bias[b] + cross_motion(&fields.twist[b], &uniform))
@@ -198,15 +326,19 @@ impl Simulator {
         )?;
         let each = in_water.into_iter().zip(surfaces).zip(potentials);
         Ok(each
-            .map(|((body, surface), potential)| {
+            .map(|((body, surface), mut potential)| {
                 let pose = kinematics.poses[body];
+                let twist = pose.twist_to_body(&through[body]);
+                let twist_rate = pose.twist_to_body(&rates[body]);
+                surface.complete(&twist, &mut potential.value);
+                surface.complete(&twist_rate, &mut potential.rate);
                 BodyFlow {
                     body,
                     pose,
                     surface,
                     potential,
-                    twist: pose.twist_to_body(&through[body]),
-                    twist_rate: pose.twist_to_body(&rates[body]),
+                    twist,
+                    twist_rate,
                 }
             })
             .collect())
@@ -241,29 +373,28 @@ impl Simulator {
         Ok(out)
     }
 
-    /// Refuses what pressures aren't known with.
-    pub(super) fn check_pressure(&self) -> Result<()> {
-        let unsupported = |what: &str, why: &str, instead: &str| {
-            Err(Error::Unsupported {
-                what: what.into(),
-                why: why.into(),
-                instead: instead.into(),
+    /// Refuses pressures without water.
+    pub(super) fn check_water(&self) -> Result<()> {
+        let density = self.parameters().density();
+        (density > 0.0)
+            .then_some(())
+            .ok_or_else(|| Error::Unsupported {
+                what: "the pressure without water".into(),
+                why: format!("the fluid's density is {density}"),
+                instead: "give the fluid a density".into(),
             })
-        };
-        if self.parameters().density() <= 0.0 {
-            return unsupported(
-                "the pressure without water",
-                "the fluid's density is 0",
-                "give the fluid a density",
-            );
+    }
+
+    /// Refuses what pressures at points aren't known with.
+    pub(super) fn check_pressure(&self) -> Result<()> {
+        self.check_water()?;
+        match self.system().streams.is_empty() {
+            true => Ok(()),
+            false => Err(Error::Unsupported {
+                what: "the pressure at points in a force `current`".into(),
+                why: "bodies feel a stream that changes with depth or time each alone, and its own pressure isn't known between them".into(),
+                instead: "use a uniform `fluid.current`, or ask for the pressure on bodies".into(),
+            }),
         }
-        if !self.system().streams.is_empty() {
-            return unsupported(
-                "the pressure in a force `current`",
-                "bodies feel a stream that changes with depth or time each alone, and its own pressure isn't known beside them",
-                "use a uniform `fluid.current`",
-            );
-        }
-        Ok(())
     }
 }

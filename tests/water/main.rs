@@ -18,6 +18,7 @@ mod panel_coupled;
 mod panel_films;
 mod plates;
 mod pressure;
+mod pressure_films;
 mod reduced;
 mod refine;
 mod several_pieces;

@@ -44,7 +44,7 @@ pub(super) struct Flow<D> {
     /// Of the first, and of the other in the frame of the first.
     twists: [Screw<D>; 2],
     /// At the active vertices, as the film is and held apart.
-    potential: Vec<[D; 2]>,
+    pub potential: Vec<[D; 2]>,
     /// Their difference.
     apart: Vec<D>,
     /// Of both sides in the frame of the first, as the film is less that held apart.
@@ -351,7 +351,11 @@ fn pushed<D: Jet>(load: &Vec6, twist: &Screw<D>) -> D {
 }
 
 /// ∇ψ on a face, as the film is and held apart.
-fn slopes_of<D: Jet>(cell: &Cell<D>, element: &Element, psi: &[[D; 2]]) -> [Vector<D>; 2] {
+pub(super) fn slopes_of<D: Jet>(
+    cell: &Cell<D>,
+    element: &Element,
+    psi: &[[D; 2]],
+) -> [Vector<D>; 2] {
     let mut out = [zero(); 2];
     for (k, at) in cell.corners.iter().enumerate() {
         if let Some(at) = at {

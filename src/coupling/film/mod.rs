@@ -29,11 +29,13 @@ mod placed;
 mod pull;
 mod set;
 mod surface;
+mod water;
 
 pub(crate) use apart::Apart;
 pub(crate) use placed::{MovingFilm, PlacedFilm};
 pub(crate) use set::{FilmBody, Films, MovingFilms, PlacedFilms};
 pub(crate) use surface::{Cluster, FilmSurface, clusters};
+pub(crate) use water::Beside;
 
 use crate::geometry::{Image, Opposite, Other};
 use crate::solver::SparsePattern;

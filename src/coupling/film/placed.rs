@@ -18,13 +18,13 @@ const FEW: usize = 6;
 pub(crate) struct PlacedFilm<'a> {
     pub film: &'a Film,
     /// Pose of the first body in the frame of the other, or in that of the world.
-    relative: Pose,
+    pub(super) relative: Pose,
     /// Frame of what is opposite, to world.
     frame: Pose,
     /// How far others are to hold the two apart, in the frame of each.
     pub shift: [Vec3; 2],
     near: Near,
-    layer: Layer<f64>,
+    pub(super) layer: Layer<f64>,
     system: System,
     /// Columns of the basis that move it, with the numbers of their potentials, which equal ones share.
     columns: Vec<(usize, usize)>,
@@ -44,7 +44,7 @@ struct Solved {
 }
 
 /// The flow in a film along a displacement.
-pub(crate) struct MovingFlow(Flow<Dual64>);
+pub(crate) struct MovingFlow(pub(super) Flow<Dual64>);
 
 /// A film along a displacement.
 pub(crate) struct MovingFilm<'a> {
@@ -106,7 +106,7 @@ impl<'a> PlacedFilm<'a> {
         (self.reverse).get_or_init(|| self.layer.reverse(self.film, &self.still()))
     }
 
-    fn twists(&self, x: &DVector<f64>) -> Twists {
+    pub(super) fn twists(&self, x: &DVector<f64>) -> Twists {
         let of = |b: usize| x.fixed_rows::<6>(6 * b).into_owned();
         Twists {
             own: of(self.film.body),
@@ -132,7 +132,7 @@ impl<'a> PlacedFilm<'a> {
     }
 
     /// The potential of a column's twists, if it was solved for, or else anew.
-    fn potential(&self, x: &Twists) -> Cow<'_, [[f64; 2]]> {
+    pub(super) fn potential(&self, x: &Twists) -> Cow<'_, [[f64; 2]]> {
         let twists = self.both(x);
         let known = self.solved.iter().find(|known| known.twists == twists);
         match known {
@@ -330,8 +330,8 @@ impl MovingFilm<'_> {
 }
 
 /// Body-frame twists of the two sides.
-struct Twists {
-    own: Vec6,
+pub(super) struct Twists {
+    pub own: Vec6,
     other: Vec6,
 }
 

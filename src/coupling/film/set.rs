@@ -2,7 +2,7 @@
 
 use super::placed::{MovingFilm, PlacedFilm};
 use super::surface::FilmSurface;
-use super::{Apart, Extent, Film, Shares, Side};
+use super::{Apart, Beside, Extent, Film, Shares, Side};
 use crate::adjoint::lie::{Pose, Vec6};
 use crate::coupling::Exclusions;
 use crate::error::in_order;
@@ -277,6 +277,12 @@ impl<'a> MovingFilms<'a> {
     /// The film that holds something apart.
     pub fn of(&self, apart: &Apart) -> Option<&MovingFilm<'a>> {
         self.0[apart.film].as_ref()
+    }
+
+    /// The water in all films, for body-frame twists (6·bodies), and as these gain `rates` where that is given.
+    pub fn water(&self, twists: &DVector<f64>, rates: Option<&DVector<f64>>) -> Vec<Beside> {
+        let films = self.0.iter().flatten();
+        films.map(|film| film.water(twists, rates)).collect()
     }
 
     /// Adds the rate of the impulses of body-frame twists that stay as they are.

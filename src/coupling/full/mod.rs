@@ -206,7 +206,9 @@ impl Coupling for Full {
                 weight: [1.0, 0.0],
             })
             .collect();
-        Ok(surface::on_surfaces(motion, surfaces, &charges, &seen))
+        Ok(surface::on_surfaces(
+            motion, surfaces, &charges, &seen, None,
+        ))
     }
 }
 

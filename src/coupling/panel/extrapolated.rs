@@ -250,6 +250,14 @@ impl HeldApart for ExtrapolatedPanels {
             coarse,
         }))
     }
+
+    fn surface_potentials_held(
+        &self,
+        motion: &Motion,
+        films: &Arc<PlacedFilms>,
+    ) -> Result<Vec<SurfacePotential>> {
+        self.fine.surface_potentials_held(motion, films)
+    }
 }
 
 /// [`ExtrapolatedPanels`] at given poses.

@@ -54,6 +54,16 @@ pub(super) trait HeldApart: Coupling {
         basis: &DMatrix<f64>,
         films: &Arc<PlacedFilms<'a>>,
     ) -> Result<Box<dyn Linearised + 'a>>;
+
+    /// As [`Coupling::surface_potentials`] on the own panels, of those; what films have themselves isn't in them.
+    ///
+    /// # Errors
+    /// As there.
+    fn surface_potentials_held(
+        &self,
+        motion: &Motion,
+        films: &Arc<PlacedFilms>,
+    ) -> Result<Vec<SurfacePotential>>;
 }
 
 /// Coupled panels with films in narrow gaps, between bodies that feel each other and to rigid walls.
@@ -169,18 +179,20 @@ impl Coupling for FilmedPanels {
         self.panels.surfaces()
     }
 
-    /// # Errors
-    /// Films at these poses, and as without them.
     fn surface_potentials(
         &self,
         motion: &Motion,
         surfaces: &[Arc<PanelBoundary>],
     ) -> Result<Vec<SurfacePotential>> {
         surface::check(motion, surfaces)?;
-        if self.placed(motion.poses, &motion.columns())?.any() {
-            return Err(surface::held_apart());
+        let films = self.placed(motion.poses, &motion.columns())?;
+        let mut out = self.panels.surface_potentials_held(motion, &films)?;
+        surface::Held {
+            films: &films,
+            moving: &films.along(motion.displacement),
         }
-        self.panels.surface_potentials(motion, surfaces)
+        .add_water(motion, surfaces, &mut out);
+        Ok(out)
     }
 }
 

@@ -235,9 +235,7 @@ impl Coupling for PanelCoupled {
         surfaces: &[Arc<PanelBoundary>],
     ) -> Result<Vec<SurfacePotential>> {
         surface::check(motion, surfaces)?;
-        let (model, columns) = (self.model(), motion.columns());
-        let placed = PlacedPanels::new(model, motion.poses, &Arc::default(), &columns)?;
-        PanelSolution::of_potentials(Arc::new(placed), columns)?.surface_potentials(motion)
+        self.surface_potentials_held(motion, &Arc::default())
     }
 }
 
@@ -269,5 +267,15 @@ impl HeldApart for PanelCoupled {
     ) -> Result<Box<dyn Linearised + 'a>> {
         let linearised = self.solved(poses, basis, films)?.linearise()?;
         Ok(Box::new(linearised.with_shapes(self.shape_parameters())))
+    }
+
+    fn surface_potentials_held(
+        &self,
+        motion: &Motion,
+        films: &Arc<PlacedFilms>,
+    ) -> Result<Vec<SurfacePotential>> {
+        let (model, columns) = (self.model(), motion.columns());
+        let placed = PlacedPanels::new(model, motion.poses, films, &columns)?;
+        PanelSolution::of_potentials(Arc::new(placed), columns)?.surface_potentials(motion)
     }
 }

@@ -26,8 +26,8 @@ pub(super) struct Displacements {
 }
 
 impl PanelSolution<'_> {
-    /// Potentials of the first of two columns, and their rates where the second has the rates of the twists and bodies, which no film holds apart, are
-    /// displaced as they move.
+    /// Potentials of the first of two columns, and their rates where the second has the rates of the twists and bodies are displaced as they move; what films
+    /// have themselves isn't in them.
     ///
     /// # Errors
     /// A solve that misses its tolerance.
@@ -38,9 +38,14 @@ impl PanelSolution<'_> {
             return Ok(self.on_surfaces(&still));
         }
         let mut right = Columns::zeros(self.phi.rows, self.phi.columns);
+        let z = motion.displacement;
+        let films = placed.films.along(z);
         for (pair, fields) in placed.pairs.iter().zip(self.fields()) {
-            let z = motion.displacement;
-            let displacement = pair.displacements(&placed.poses[pair.target], z);
+            let mut displacement = pair.displacements(&placed.poses[pair.target], z);
+            if let Some((apart, film)) = pair.moving(&films) {
+                let shift = apart.rate(film);
+                displacement.iter_mut().for_each(|d| *d += shift);
+            }
             placed.add_moved(pair, fields, &displacement, &mut right);
         }
         let none = Columns::zeros(right.rows, 0);
@@ -54,6 +59,7 @@ impl PanelSolution<'_> {
             rate: (faces.clone())
                 .map(|i| self.phi.at(i, 1) + displaced.at(i, 0))
                 .collect(),
+            film: None,
         };
         self.placed.coupled.faces.iter().map(of).collect()
     }

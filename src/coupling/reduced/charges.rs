@@ -1,16 +1,20 @@
 //! What each body sees of the others: their charges, and the rates of these as all move.
 
 use super::linearised::ReducedLinearised;
+use crate::coupling::film::MovingFilms;
 use crate::coupling::surface::{Charges, Motion, Seen};
 use crate::solver::Columns;
 
 impl ReducedLinearised<'_> {
     /// The charges of the first of two columns, with their rates where the second has the rates of the twists and bodies are displaced as they move; and who
     /// sees them.
-    pub(super) fn charges_seen(&self, motion: &Motion) -> (Vec<Charges<'_>>, Vec<Seen>) {
+    pub(super) fn charges_seen(
+        &self,
+        motion: &Motion,
+        films: &MovingFilms,
+    ) -> (Vec<Charges<'_>>, Vec<Seen>) {
         let z = motion.displacement;
-        let films = self.films.along(z);
-        let (psi, kept) = self.tangent_potentials(&[self.alpha.column(0).as_slice()], z, &films);
+        let (psi, kept) = self.tangent_potentials(&[self.alpha.column(0).as_slice()], z, films);
         let (displaced, _) = self.tangent_solution(&psi);
         let charges = self.reduced.bodies.iter().enumerate().map(|(b, body)| {
             let from = self.range(b).start;

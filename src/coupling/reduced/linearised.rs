@@ -462,11 +462,15 @@ impl Coupling for Reduced {
     ) -> Result<Vec<SurfacePotential>> {
         surface::check(motion, surfaces)?;
         let solved = ReducedLinearised::new(self, motion.poses, &motion.columns())?;
-        if solved.films.any() {
-            return Err(surface::held_apart());
-        }
-        let (charges, seen) = solved.charges_seen(motion);
-        Ok(surface::on_surfaces(motion, surfaces, &charges, &seen))
+        let moving = solved.films.along(motion.displacement);
+        let (charges, seen) = solved.charges_seen(motion, &moving);
+        let held = solved.films.any().then_some(surface::Held {
+            films: &solved.films,
+            moving: &moving,
+        });
+        Ok(surface::on_surfaces(
+            motion, surfaces, &charges, &seen, held,
+        ))
     }
 
     fn differentiable(&self) -> Option<&dyn Linearise> {

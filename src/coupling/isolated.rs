@@ -1,9 +1,10 @@
 //! Bodies that don't feel each other: each keeps its own constant added mass (Eq. 12).
 
 use super::surface::{check, on_surfaces};
+use super::surface_back::{Back, onto_charges};
 use super::{
-    Coupling, CouplingReport, Direction, Linearise, Linearised, Momenta, Motion, Pullback,
-    SurfacePotential, Tangent,
+    Coupling, CouplingReport, Direction, Linearise, Linearised, Momenta, Motion, MotionBar,
+    Pullback, SurfacePotential, Tangent,
 };
 use crate::Result;
 use crate::adjoint::lie::{Mat6, Pose, Vec6};
@@ -69,6 +70,17 @@ impl Coupling for Isolated {
     ) -> Result<Vec<SurfacePotential>> {
         check(motion, surfaces)?;
         Ok(on_surfaces(motion, surfaces, &[], &[]))
+    }
+
+    fn surface_potentials_vjp(
+        &self,
+        motion: &Motion,
+        surfaces: &[Arc<PanelBoundary>],
+        bars: &[SurfacePotential],
+    ) -> Result<MotionBar> {
+        check(motion, surfaces)?;
+        let Back { bar, .. } = onto_charges(surfaces, bars)?;
+        Ok(bar)
     }
 }
 

@@ -13,7 +13,7 @@ use rayon::prelude::*;
 pub const FLOW_EDGES: f64 = 0.5;
 
 /// Distance in edges up to which the flow is continued between the surface and three places farther off: panels are flat and sources are points, and show so near.
-const NEAR: f64 = 0.75;
+pub(super) const NEAR: f64 = 0.75;
 /// Those places, in edges.
 const PLACES: [f64; 3] = [0.75, 1.25, 1.75];
 /// Part of an edge within which a point is on the surface.
@@ -141,7 +141,7 @@ impl Simulator {
             match found {
                 Approach::Unknown(obstacle) => {
                     let place = format!("{what}: points[{i}] at {:?} m", point.as_slice());
-                    return Err(self.too_near(&place, &obstacle));
+                    return Err(self.too_near(&place, &obstacle, FLOW_EDGES));
                 }
                 Approach::Far => {
                     asked.push(*point);
@@ -289,7 +289,8 @@ impl Simulator {
         near.places().iter().all(clear).then_some(near)
     }
 
-    fn too_near(&self, place: &str, obstacle: &Distance) -> Error {
+    /// Of a place nearer to something than so many edges, or in it.
+    pub(super) fn too_near(&self, place: &str, obstacle: &Distance, edges: f64) -> Error {
         let (what, remedy) = match obstacle.from {
             Other::Body(b) => (
                 format!("body {:?}", self.system().bodies[b].name),
@@ -301,7 +302,7 @@ impl Simulator {
             place: format!("{place}: {what}"),
             quantity: "distance in m".into(),
             value: obstacle.distance,
-            limit: FLOW_EDGES * obstacle.edge,
+            limit: edges * obstacle.edge,
             remedy: remedy.into(),
         }
     }

@@ -184,7 +184,7 @@ impl Simulator {
         let in_water: Vec<usize> = system.submerged().map(|(b, _)| b).collect();
         let poses: Vec<Pose> = in_water.iter().map(|b| kinematics.poses[*b]).collect();
         let displacement: Vec<Vec6> = in_water.iter().map(|b| fields.twist[*b]).collect();
-        let surfaces = self.assembled.flow_surfaces(&self.scene, &self.choices)?;
+        let surfaces = self.flow_surfaces()?;
         let panels: Vec<_> = surfaces.iter().map(|s| s.panels.clone()).collect();
         let twist_rates = system.submerged_twists(&kinematics, &rates);
         let potentials = system.coupling.surface_potentials(
@@ -212,8 +212,13 @@ impl Simulator {
             .collect())
     }
 
+    /// The surfaces of the bodies in the water.
+    pub(super) fn flow_surfaces(&self) -> Result<&[FlowSurface]> {
+        self.assembled.flow_surfaces(&self.scene, &self.choices)
+    }
+
     /// The images of the bodies that the water knows.
-    fn flow_images(&self) -> Result<Vec<Image>> {
+    pub(super) fn flow_images(&self) -> Result<Vec<Image>> {
         match self.fidelity().coupled() {
             true => Image::of_walls(&self.scene.walls),
             false => Ok(vec![Image::identity()]),

@@ -28,6 +28,7 @@ mod first;
 mod model;
 mod placed;
 mod second;
+mod surface;
 mod sweep;
 mod system;
 
@@ -38,8 +39,10 @@ pub use model::PanelModel;
 use super::film::PlacedFilms;
 use super::full::{SolveSettings, SystemBackend};
 use super::response::{CoupledResponse, Solved};
-use super::surface;
-use super::{Coupling, Exclusions, Linearise, Linearised, Momenta, Motion, SurfacePotential};
+use super::surface::{check, check_bars};
+use super::{
+    Coupling, Exclusions, Linearise, Linearised, Momenta, Motion, MotionBar, SurfacePotential,
+};
 use crate::adjoint::lie::{Mat6, Pose, Vec3};
 use crate::boundary::PanelBoundary;
 use crate::geometry::{Solid, TriMesh, Wall};
@@ -217,10 +220,26 @@ impl Coupling for PanelCoupled {
         motion: &Motion,
         surfaces: &[Arc<PanelBoundary>],
     ) -> Result<Vec<SurfacePotential>> {
-        surface::check(motion, surfaces)?;
+        check(motion, surfaces)?;
         let (model, columns) = (self.model(), motion.columns());
         let placed = PlacedPanels::new(model, motion.poses, &Arc::default(), &columns)?;
         PanelSolution::of_potentials(Arc::new(placed), columns)?.surface_potentials(motion)
+    }
+
+    /// On the CPU.
+    fn surface_potentials_vjp(
+        &self,
+        motion: &Motion,
+        surfaces: &[Arc<PanelBoundary>],
+        bars: &[SurfacePotential],
+    ) -> Result<MotionBar> {
+        check(motion, surfaces)?;
+        check_bars(surfaces, bars)?;
+        let (model, columns) = (self.model(), motion.columns());
+        // A twist of every body, so that all have what reads their impulses.
+        let all = DMatrix::from_element(columns.nrows(), 1, 1.0);
+        let placed = PlacedPanels::new(model, motion.poses, &Arc::default(), &all)?;
+        PanelSolution::of_potentials(Arc::new(placed), columns)?.potentials_vjp(motion, bars)
     }
 }
 

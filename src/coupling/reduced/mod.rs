@@ -30,6 +30,7 @@ mod many;
 mod region;
 mod resolved;
 mod second;
+mod surface;
 mod views;
 
 pub use body::{CompressedParts, Fit, ReducedBody};

@@ -9,6 +9,7 @@ mod flow;
 mod gap_check;
 mod gap_error;
 mod given;
+mod lines;
 mod methods;
 mod near;
 mod one_body;
@@ -20,6 +21,7 @@ mod plates;
 mod pressure;
 mod reduced;
 mod refine;
+mod sensors;
 mod several_pieces;
 
 #[path = "../support/mod.rs"]

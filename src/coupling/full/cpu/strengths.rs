@@ -21,7 +21,7 @@ impl Cpu {
     ///
     /// # Errors
     /// A solve that misses its tolerance.
-    pub(in crate::coupling::full) fn strengths_vjp(
+    pub(crate) fn strengths_vjp(
         &self,
         motion: &Motion,
         beta: &Columns,

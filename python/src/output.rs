@@ -4,6 +4,7 @@ use crate::array;
 use crate::error::input;
 use crate::interrupt::long;
 use hydrograd::output::{Frames, gltf, vtk};
+use hydrograd::simulate::StreamlineSettings;
 use pyo3::prelude::*;
 use std::collections::BTreeMap;
 use std::path::PathBuf;
@@ -11,6 +12,9 @@ use std::sync::Arc;
 
 /// Two corners and a spacing, m.
 pub type GridBox<'py> = (Bound<'py, PyAny>, Bound<'py, PyAny>, f64);
+
+/// Seeds of streamlines and their length, m.
+pub type Drawn<'py> = (Bound<'py, PyAny>, f64);
 
 /// Which states.
 fn frames(place: &str, per_second: Option<f64>, every: Option<isize>) -> PyResult<Frames> {
@@ -35,7 +39,15 @@ pub fn write_vtk(
     (per_second, every): (Option<f64>, Option<isize>),
     (loads, pressure): (bool, bool),
     flow: Option<GridBox<'_>>,
+    streamlines: Option<Drawn<'_>>,
 ) -> PyResult<Vec<PathBuf>> {
+    let lines = |(seeds, length): Drawn| {
+        let seeds = array::vectors("write_vtk: streamlines: seeds", &seeds)?;
+        Ok::<_, PyErr>(vtk::Streamlines {
+            seeds: seeds.into_iter().map(Into::into).collect(),
+            settings: StreamlineSettings::new(length),
+        })
+    };
     let grid = |(low, high, spacing): GridBox| {
         Ok::<_, PyErr>(vtk::Grid {
             low: array::fixed("write_vtk: flow: low", &low)?,
@@ -48,6 +60,7 @@ pub fn write_vtk(
         loads,
         pressure,
         flow: flow.map(grid).transpose()?,
+        streamlines: streamlines.map(lines).transpose()?,
     };
     let rollout = rollout.clone();
     long(py, move |interrupt| {

@@ -8,17 +8,20 @@
 //! | `walls.vtp` | walls as squares around the scene, where there are any; of each its `wall` (number in the scene) and whether it is `free` (1) or rigid (0) |
 //! | `loads.pvd` | with [`Options::loads`], the series of `loads/loads_00000.vtp` …: a point at each body's origin with forces (N) and moments about it (N m), kind by kind |
 //! | `flow.pvd` | with [`Options::flow`], the series of `flow/flow_00000.vti` …: the water's `velocity` (m/s) on a grid, and where it is `resolved` |
+//! | `streamlines.pvd` | with [`Options::streamlines`], the series of `streamlines/streamlines_00000.vtp` …: lines along the water's `velocity` (m/s), and which `seed` each goes through |
 //!
 //! All axes are the world's. Numbers are in double precision, compressed without loss.
 
 mod file;
 mod flow;
+mod lines;
 mod loads;
 mod placed;
 mod pressure;
 mod surface;
 
 pub use flow::{Grid, MOST_POINTS};
+pub use lines::Streamlines;
 
 use super::frames::Frames;
 use super::room::Room;
@@ -43,13 +46,15 @@ pub struct Options {
     pub pressure: bool,
     /// The water's velocity at the points of a grid ([`Rollout::flow`]), which takes a solve a frame.
     pub flow: Option<Grid>,
+    /// Lines along that velocity ([`Rollout::streamlines`]), which take a solve a frame.
+    pub streamlines: Option<Streamlines>,
 }
 
 /// Writes a run into a folder, which is made where there is none. The files to open are given: series, and walls. Files of the same names are replaced; others that stand there stay.
 ///
 /// # Errors
 /// Frames that select nothing ([`Frames::check`]), a grid that is refused ([`Grid::counts`]); a folder or a file that can't be written, by its path; what
-/// [`Rollout::loads`], [`Rollout::pressure`] and [`Rollout::flow`] report.
+/// [`Rollout::loads`], [`Rollout::pressure`], [`Rollout::flow`] and [`Rollout::streamlines`] report.
 pub fn write(rollout: &Rollout, folder: &Path, options: &Options) -> Result<Vec<PathBuf>> {
     write_with(rollout, folder, options, || ControlFlow::Continue(()))
 }
@@ -109,6 +114,14 @@ pub fn write_with(
         let points = grid.points()?;
         for (k, n) in states.iter().enumerate() {
             let data = flow::frame(rollout, grid, &points, *n);
+            told(data.and_then(|data| series.write(k, data)))?;
+        }
+        made.push(series.finish()?);
+    }
+    if let Some(drawn) = &options.streamlines {
+        let series = Series::new(folder, "streamlines", "vtp", &times)?;
+        for (k, n) in states.iter().enumerate() {
+            let data = lines::frame(rollout, drawn, *n);
             told(data.and_then(|data| series.write(k, data)))?;
         }
         made.push(series.finish()?);

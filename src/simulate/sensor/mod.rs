@@ -9,10 +9,9 @@ mod sensed;
 
 use super::flow::NEAR;
 use super::observable::{observable, velocity};
-use super::{Cotangents, Rollout};
+use super::which::Which;
+use super::{Cotangents, Rollout, Sample};
 use crate::adjoint::lie::Vec3;
-use crate::objective::Which;
-use crate::simulate::Sample;
 use crate::{Error, Result};
 use back::Bars;
 use nalgebra::DMatrix;

@@ -101,6 +101,7 @@ fn surfaces_and_loads_stand_in_files_of_vtk() {
         loads: true,
         pressure: true,
         flow: None,
+        streamlines: None,
     };
     for _ in 0..2 {
         let files = vtk::write(rollout, &out, &options).unwrap();

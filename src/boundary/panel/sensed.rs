@@ -86,9 +86,9 @@ impl PanelBoundary {
     }
 
     /// Ω/4π of all panels as each point sees them.
-    fn solid_angles<'p>(
+    fn solid_angles(
         &self,
-        points: &'p [Vec3],
+        points: &[Vec3],
         mut each: impl FnMut(usize, &mut dyn Iterator<Item = f64>),
     ) {
         let mut angles = Vec::new();

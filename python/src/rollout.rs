@@ -379,7 +379,7 @@ impl Rollout {
 
     /// The ways of tracers that go with the water from `seeds` (n, 3), m, at state `start` to state `stop`, a dictionary each: `points` (k, 3) at the states from the first one on, `velocities` (k, 3)
     /// there, `times` (k,), s, and why it comes to its `end`: "length" (at `stop`), "body …" or "wall …". Negative numbers count states from the end.
-    #[pyo3(signature = (seeds, start=0, stop=-1))]
+    #[pyo3(signature = (seeds, start=0, stop=-1), text_signature = "($self, seeds, start=0, stop=-1)")]
     fn path_lines<'py>(
         &self,
         py: Python<'py>,

@@ -21,7 +21,7 @@ pub(super) struct Export {
     #[arg(long, requires = "vtk")]
     vtk_pressure: bool,
     /// Write streamlines.pvd into the folder of --vtk as well: lines along the water's velocity through this point, m; give it once for each line. Takes a solve a frame.
-    #[arg(long, value_name = "X,Y,Z", requires = "vtk", value_parser = point, allow_negative_numbers = true)]
+    #[arg(long, value_name = "X,Y,Z", requires = "vtk", value_parser = point, allow_hyphen_values = true)]
     vtk_seed: Vec<[f64; 3]>,
     /// Length of these lines each way at most, m.
     #[arg(

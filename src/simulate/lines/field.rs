@@ -2,7 +2,7 @@
 
 use super::super::surface_flow::BodyFlow;
 use super::super::{Sample, Simulator};
-use super::LineEnd;
+use super::line::LineEnd;
 use crate::Result;
 use crate::adjoint::lie::Vec3;
 use crate::geometry::Other;

@@ -1,7 +1,7 @@
 //! Path lines: tracers that go with the water from state to state.
 
 use super::field::Field;
-use super::{LineEnd, PathLine};
+use super::line::{LineEnd, PathLine};
 use crate::Result;
 use crate::adjoint::lie::Vec3;
 use crate::simulate::Rollout;

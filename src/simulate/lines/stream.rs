@@ -4,7 +4,7 @@
 //! J. R. Dormand, P. J. Prince, J. Comput. Appl. Math. 6 (1980) 19–26.
 
 use super::field::Field;
-use super::{LineEnd, Streamline, StreamlineSettings, Way};
+use super::line::{LineEnd, Streamline, StreamlineSettings, Way};
 use crate::Result;
 use crate::adjoint::lie::Vec3;
 

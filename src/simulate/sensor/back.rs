@@ -9,35 +9,12 @@
 //!
 //! The total velocity has ū − p̄ u, of −½ u² in Bernoulli's law.
 
-use super::Placed;
+use super::bar::BodyBar;
+use super::place::Placed;
 use super::sensed::{Layer, Sensed};
 use crate::Result;
 use crate::adjoint::lie::{Pose, Vec3, Vec6, angular, point_wrench, six};
 use crate::coupling::{MotionBar, SurfacePotential};
-
-/// Cotangents of what is observed of one body, world axes.
-#[derive(Clone, Copy)]
-pub(super) struct BodyBar {
-    /// Of its origin.
-    pub position: Vec3,
-    /// Of its rotation, δR = δθ × R.
-    pub rotation: Vec3,
-    /// Of the velocity of its origin and its angular velocity.
-    pub velocity: Vec6,
-    /// Of the rates of these.
-    pub gain: Vec6,
-}
-
-impl BodyBar {
-    fn zero() -> Self {
-        Self {
-            position: Vec3::zeros(),
-            rotation: Vec3::zeros(),
-            velocity: Vec6::zeros(),
-            gain: Vec6::zeros(),
-        }
-    }
-}
 
 /// Cotangents at one state.
 pub(super) struct Bars {

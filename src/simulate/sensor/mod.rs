@@ -4,60 +4,25 @@
 //! is, three quarters of an edge from every surface or more.
 
 mod back;
+mod bar;
 mod moving;
+mod place;
 mod sensed;
+
+pub use place::Sensor;
 
 use super::flow::NEAR;
 use super::observable::{observable, velocity};
-use super::which::Which;
-use super::{Cotangents, Rollout, Sample};
+use super::{Cotangents, Rollout};
 use crate::adjoint::lie::Vec3;
 use crate::{Error, Result};
 use back::Bars;
 use nalgebra::DMatrix;
+use place::Placed;
 use sensed::Sensed;
 
 /// Most sensors of one reading.
 const MOST: usize = 1_000_000;
-
-/// A place in the water where its velocity, or the flow's pressure, is read: a current meter, a lateral line, a pressure tap beside a fin.
-#[derive(Clone, Debug, PartialEq)]
-pub struct Sensor {
-    /// The body that it is fixed to; none of one fixed in the world.
-    pub body: Option<Which>,
-    /// Its place, m: in the body's frame, or in the world's.
-    pub at: [f64; 3],
-}
-
-impl Sensor {
-    /// Fixed in the world, at a place in its frame, m.
-    pub fn fixed(at: [f64; 3]) -> Self {
-        Self { body: None, at }
-    }
-
-    /// Fixed to a body, at a place in its frame, m.
-    pub fn on(body: impl Into<Which>, at: [f64; 3]) -> Self {
-        Self {
-            body: Some(body.into()),
-            at,
-        }
-    }
-}
-
-/// A sensor in the scene: its body by number.
-#[derive(Clone, Copy)]
-struct Placed {
-    body: Option<usize>,
-    at: Vec3,
-}
-
-impl Placed {
-    /// Where it is, world frame, m.
-    fn point(&self, sample: &Sample) -> Vec3 {
-        self.body
-            .map_or(self.at, |b| sample.poses[b].apply(&self.at))
-    }
-}
 
 impl Rollout {
     /// The water's velocity at sensors at state `n`: m/s, world axes, a uniform current included. As [`Rollout::flow`] tells it at the same places, but that with

@@ -1,7 +1,7 @@
 //! How the bodies in the water move, as what rollouts observe of them.
 
 use super::super::Simulator;
-use super::back::BodyBar;
+use super::bar::BodyBar;
 use crate::adjoint::lie::{Pose, Vec3, Vec6, angular, cross_force, cross_motion, linear, six};
 use crate::coupling::{Motion, MotionBar};
 use nalgebra::DVector;

@@ -925,6 +925,8 @@ class Record:
         coordinates and `v` (v_size,) of the state before it, `u` (control_size,) of its controls, `parameters` by name, and `gains`; what is None
         is zero. Each may have one more index before its own, and so has the tangent then: many directions cost little more than one."""
 
+_Bodies = int | str | Sequence[int | str | None] | None
+
 @final
 class Rollout:
     """A trajectory of states 0 … N: the forward pass, and the only key to its gradient. Each access to an array makes a new one."""
@@ -1004,6 +1006,36 @@ class Rollout:
         """Whether `flow` knows the velocity at each of `points` (n, 3), m, at state `state`: (n,)."""
     def known_flow(self, state: int, points: ArrayLike) -> tuple[_Array, NDArray[np.bool_]]:
         """`flow` where `flow_resolved`, with the solves of one: velocities (n, 3), m/s, zero where they aren't known, and whether they are (n,)."""
+    def potential(self, state: int, points: ArrayLike) -> _Array:
+        """The potential φ of the flow that the bodies make at `points` (n, 3), m, at state `state`: (n,), m²/s, velocity −∇φ, zero far away, without the current. Points as of `flow`."""
+    def sensor_flow(self, points: ArrayLike, bodies: _Bodies = None) -> _Array:
+        """The water's velocity at sensors at the states 0 … N, (N + 1, n, 3), m/s, world axes: at `points` (n, 3), m, fixed in the world, or in the frames of `bodies`, one for all or one each, by number or
+        name, None of what is fixed in the world. Sensors stand at least three quarters of an edge off all surfaces. A loss of it has gradients: `sensor_vjp`."""
+    def sensor_pressure(self, points: ArrayLike, bodies: _Bodies = None) -> _Array:
+        """The flow's pressure at sensors, given as of `sensor_flow`, at the states 0 … N, (N + 1, n), Pa, zero far away, that of the water at rest left out; with the mean accelerations over
+        the step that starts there, as the observable "accelerations" has them."""
+    def sensor_vjp(
+        self, points: ArrayLike, bodies: _Bodies = None, *, flow: ArrayLike | None = None, pressure: ArrayLike | None = None
+    ) -> dict[str, Any]:
+        """Transpose of what sensors read: from cotangents `flow` (N + 1, n, 3) and `pressure` (N + 1, n) the keywords of `vjp` that they ask for, `positions`, `rotations`, `observables` and `density`:
+        `rollout.vjp(**rollout.sensor_vjp(points, flow=bar))`. States without cotangents cost nothing."""
+    def streamlines(
+        self,
+        state: int,
+        seeds: ArrayLike,
+        length: float,
+        *,
+        way: str = "both",
+        within: tuple[ArrayLike, ArrayLike] | None = None,
+        tolerance: float | None = None,
+        most_steps: int = 2000,
+    ) -> list[dict[str, Any]]:
+        """Lines along the water's velocity at state `state` through `seeds` (n, 3), m, a dictionary each: `points` (k, 3) downstream, `velocities` (k, 3) there, which of them is the `seed`, and why it `ends`
+        upstream and downstream: "length" (as long as `length`, m, each way), "box" (at the box `within`, two corners (3,)), "body …" or "wall …" (where the flow isn't known any more), "still",
+        "steps" (more than `most_steps`); None where it doesn't go, with `way` "forward" or "backward". `tolerance`, m, is the error of a step."""
+    def path_lines(self, seeds: ArrayLike, start: int = 0, stop: int = -1) -> list[dict[str, Any]]:
+        """The ways of tracers that go with the water from `seeds` (n, 3), m, at state `start` to state `stop`, a dictionary each: `points` (k, 3) at the states from the first one on, `velocities` (k, 3)
+        there, `times` (k,), s, and why it comes to its `end`: "length" (at `stop`), "body …" or "wall …". Negative numbers count states from the end."""
     def observe(self, name: str) -> _Array:
         """An observable at the states 0 … N by its name, (N + 1, …): "positions", "energy", "momentum", …; an unknown name's error has the list."""
     def value(self, objective: Objective) -> float:
@@ -1019,12 +1051,13 @@ class Rollout:
         v: ArrayLike | None = None,
         controls: ArrayLike | None = None,
         observables: Mapping[str, ArrayLike] | None = None,
+        density: float = 0.0,
         progress: _Progress | None = None,
     ) -> Gradient:
         """Transpose of the rollout: the gradient of Σ cotangent · δ(observation), for any loss of your own. `q` in the tangent
         space of the coordinates and `v` are (N + 1, v_size), `positions` and `rotations` (δR = δθ × R, world axes)
         (N + 1, bodies, 3), `controls`, what the loss has of them directly, (N, control_size); `observables` has
-        cotangents of others by name, each in the shape that `observe` gives. What is None is zero. `progress` is that of `gradient`. Ctrl-C ends it."""
+        cotangents of others by name, each in the shape that `observe` gives; `density` what the loss has of the water's density directly. What is None is zero. `progress` is that of `gradient`. Ctrl-C ends it."""
     def jvp(
         self,
         *,
@@ -1067,12 +1100,13 @@ class Rollout:
         loads: bool = False,
         pressure: bool = False,
         flow: tuple[ArrayLike, ArrayLike, float] | None = None,
+        streamlines: tuple[ArrayLike, float] | None = None,
     ) -> list[Path]:
         """Writes files of VTK, which ParaView opens, into a folder, which is made where there is none; the files to open are given. `bodies.pvd`: all bodies' triangles frame by frame, in the
         world, with the `body` (number) and the `velocity` (m/s) of every face, and with `pressure`, at the price of solves of its own a frame, the `pressure` of the flow and the `hydrostatic`
         one (Pa) and the `water_velocity` (m/s) there, as `pressure` tells them, zero where a face isn't `wetted` (1 or 0); `walls.vtp`: walls as squares; with `loads`, `loads.pvd`: at each body's origin what acts on it,
         `gravity_force` (N), `gravity_moment` (N m), `water_force`, …, of every kind that `loads` tells; with `flow`, two corners (3,) of a box and the spacing of a grid in it, m, `flow.pvd`: the
-        water's `velocity` there, zero where it isn't `resolved`. Frames are up to `frames_per_second` of simulated time (30 unless told otherwise), or every `every`-th
+        water's `velocity` there, zero where it isn't `resolved`; with `streamlines`, seeds (n, 3) and a length, m, `streamlines.pvd`: the lines of `streamlines`, of seeds where the flow is known. Frames are up to `frames_per_second` of simulated time (30 unless told otherwise), or every `every`-th
         state, with the first and the last. Files of the same names are replaced. Ctrl-C ends it."""
     def write_gltf(
         self,
@@ -1112,6 +1146,17 @@ def final_velocity(index: int, target: float, weight: float = 1.0) -> Objective:
 def final_observable(name: str, entry: int, target: float, weight: float = 1.0) -> Objective:
     """`weight · (x − target)²` at the end, x entry number `entry` (last index fastest) of the observable `name` as `Rollout.observe` gives
     it; the observable must have a transpose."""
+def mean_observable(name: str, entry: int, target: float, weight: float = 1.0) -> Objective:
+    """The mean of `weight · (x − target)²` over all states, x as in `final_observable`."""
+def final_flow(point: ArrayLike, target: ArrayLike, weight: float = 1.0, *, body: int | str | None = None) -> Objective:
+    """`weight` times the squared distance of the water's velocity from `target` (m/s, world axes) at the end, at a sensor at `point` (m), fixed in the world, or in the frame of `body`
+    (its number or its name): as `Rollout.sensor_flow` reads it."""
+def mean_flow(point: ArrayLike, target: ArrayLike, weight: float = 1.0, *, body: int | str | None = None) -> Objective:
+    """The mean of `final_flow` over all states."""
+def final_pressure(point: ArrayLike, target: float, weight: float = 1.0, *, body: int | str | None = None) -> Objective:
+    """`weight · (p − target)²` at the end, p the flow's pressure (Pa) at a sensor as of `final_flow`: as `Rollout.sensor_pressure` reads it."""
+def mean_pressure(point: ArrayLike, target: float, weight: float = 1.0, *, body: int | str | None = None) -> Objective:
+    """The mean of `final_pressure` over all states."""
 def effort(weight: float) -> Objective:
     """`weight` times the sum of the squared open-loop controls (N², N² m²)."""
 

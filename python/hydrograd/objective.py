@@ -4,18 +4,28 @@ from hydrograd._hydrograd import (
     Objective,
     effort,
     final_coordinate,
+    final_flow,
     final_observable,
     final_position,
+    final_pressure,
     final_velocity,
+    mean_flow,
+    mean_observable,
     mean_position,
+    mean_pressure,
 )
 
 __all__ = [
     "Objective",
     "effort",
     "final_coordinate",
+    "final_flow",
     "final_observable",
     "final_position",
+    "final_pressure",
     "final_velocity",
+    "mean_flow",
+    "mean_observable",
     "mean_position",
+    "mean_pressure",
 ]

@@ -1,6 +1,7 @@
 //! Numbers from Python and arrays to Python, with errors that name what was given.
 
 use crate::error::input;
+use hydrograd::simulate::FLOW_POINTS;
 use nalgebra::{DMatrix, DVector, Vector3};
 use numpy::{
     PyArray1, PyArrayDyn, PyArrayMethods, PyReadonlyArrayDyn, PyUntypedArray, PyUntypedArrayMethods,
@@ -207,6 +208,15 @@ pub fn row(place: &str, given: &Bound<'_, PyAny>) -> PyResult<Vec<f64>> {
 
 /// Points of space.
 pub fn vectors(place: &str, given: &Bound<'_, PyAny>) -> PyResult<Vec<Vector3<f64>>> {
+    // Before anything is copied.
+    let shape = given
+        .getattr("shape")
+        .and_then(|s| s.extract::<Vec<usize>>());
+    let count = shape.ok().and_then(|shape| shape.first().copied());
+    if let Some(count) = count.filter(|count| *count > FLOW_POINTS) {
+        let expected = format!("must be at most {FLOW_POINTS}: ask for them in parts");
+        return Err(input(format!("{place}: their number"), count, expected));
+    }
     let found = array(place, given, &[Dim::Any("n"), Dim::Is(3)])?;
     Ok(found
         .values

@@ -7,6 +7,7 @@ mod control;
 mod cost;
 mod equations;
 mod error;
+mod flow;
 mod fluid;
 mod gradcheck;
 mod gradient;

@@ -2,7 +2,8 @@
 
 use crate::array::fixed;
 use crate::error::input;
-use hydrograd::objective::{self, Sum, Which};
+use crate::flow::{sensor, which};
+use hydrograd::objective::{self, Sum};
 use pyo3::prelude::*;
 
 /// A scalar of a rollout: made by the functions of `hydrograd.objective`, added with `+`, `-` and `sum`, and weighted with `*` and `/`.
@@ -56,18 +57,6 @@ impl Objective {
     }
 }
 
-/// A body, by its number from 0 or by its name.
-fn which(name: &str, body: &Bound<'_, PyAny>) -> PyResult<Which> {
-    if let Ok(name) = body.extract::<String>() {
-        return Ok(Which::Named(name));
-    }
-    let number = body.extract::<usize>().map_err(|_| {
-        let expected = "must be a body's number, from 0, or its name";
-        input(format!("{name}: body"), body, expected)
-    })?;
-    Ok(Which::Number(number))
-}
-
 /// Squared distance (m²) of the origin of `body`, its number or its name, from `target` (m, world axes) at the end.
 #[pyfunction]
 fn final_position(body: &Bound<'_, PyAny>, target: &Bound<'_, PyAny>) -> PyResult<Objective> {
@@ -110,6 +99,68 @@ fn final_observable(name: &str, entry: usize, target: f64, weight: f64) -> Objec
     Objective(objective::final_observable(name, entry, target, weight))
 }
 
+/// The mean of `weight · (x − target)²` over all states, x as in `final_observable`.
+#[pyfunction]
+#[pyo3(signature = (name, entry, target, weight=1.0))]
+fn mean_observable(name: &str, entry: usize, target: f64, weight: f64) -> Objective {
+    Objective(objective::mean_observable(name, entry, target, weight))
+}
+
+/// `weight` times the squared distance of the water's velocity from `target` (m/s, world axes) at the end, at a sensor at `point` (m), fixed in the world, or in the frame of `body`
+/// (its number or its name): as `Rollout.sensor_flow` reads it.
+#[pyfunction]
+#[pyo3(signature = (point, target, weight=1.0, *, body=None))]
+fn final_flow(
+    point: &Bound<'_, PyAny>,
+    target: &Bound<'_, PyAny>,
+    weight: f64,
+    body: Option<&Bound<'_, PyAny>>,
+) -> PyResult<Objective> {
+    let target = fixed("final_flow: target", target)?;
+    let sensor = sensor("final_flow", point, body)?;
+    Ok(Objective(objective::final_flow(sensor, target, weight)))
+}
+
+/// The mean of `final_flow` over all states.
+#[pyfunction]
+#[pyo3(signature = (point, target, weight=1.0, *, body=None))]
+fn mean_flow(
+    point: &Bound<'_, PyAny>,
+    target: &Bound<'_, PyAny>,
+    weight: f64,
+    body: Option<&Bound<'_, PyAny>>,
+) -> PyResult<Objective> {
+    let target = fixed("mean_flow: target", target)?;
+    let sensor = sensor("mean_flow", point, body)?;
+    Ok(Objective(objective::mean_flow(sensor, target, weight)))
+}
+
+/// `weight · (p − target)²` at the end, p the flow's pressure (Pa) at a sensor as of `final_flow`: as `Rollout.sensor_pressure` reads it.
+#[pyfunction]
+#[pyo3(signature = (point, target, weight=1.0, *, body=None))]
+fn final_pressure(
+    point: &Bound<'_, PyAny>,
+    target: f64,
+    weight: f64,
+    body: Option<&Bound<'_, PyAny>>,
+) -> PyResult<Objective> {
+    let sensor = sensor("final_pressure", point, body)?;
+    Ok(Objective(objective::final_pressure(sensor, target, weight)))
+}
+
+/// The mean of `final_pressure` over all states.
+#[pyfunction]
+#[pyo3(signature = (point, target, weight=1.0, *, body=None))]
+fn mean_pressure(
+    point: &Bound<'_, PyAny>,
+    target: f64,
+    weight: f64,
+    body: Option<&Bound<'_, PyAny>>,
+) -> PyResult<Objective> {
+    let sensor = sensor("mean_pressure", point, body)?;
+    Ok(Objective(objective::mean_pressure(sensor, target, weight)))
+}
+
 /// `weight` times the sum of the squared open-loop controls (N², N² m²).
 #[pyfunction]
 fn effort(weight: f64) -> Objective {
@@ -123,5 +174,10 @@ pub fn register(m: &Bound<'_, PyModule>) -> PyResult<()> {
     m.add_function(wrap_pyfunction!(final_coordinate, m)?)?;
     m.add_function(wrap_pyfunction!(final_velocity, m)?)?;
     m.add_function(wrap_pyfunction!(final_observable, m)?)?;
+    m.add_function(wrap_pyfunction!(mean_observable, m)?)?;
+    m.add_function(wrap_pyfunction!(final_flow, m)?)?;
+    m.add_function(wrap_pyfunction!(mean_flow, m)?)?;
+    m.add_function(wrap_pyfunction!(final_pressure, m)?)?;
+    m.add_function(wrap_pyfunction!(mean_pressure, m)?)?;
     m.add_function(wrap_pyfunction!(effort, m)?)
 }

@@ -4,15 +4,17 @@ use crate::array;
 use crate::error::input;
 use crate::interrupt::long;
 use hydrograd::output::{Frames, gltf, vtk};
-use pyo3::exceptions::PyUserWarning;
+use hydrograd::simulate::StreamlineSettings;
 use pyo3::prelude::*;
 use std::collections::BTreeMap;
-use std::ffi::CString;
 use std::path::PathBuf;
 use std::sync::Arc;
 
 /// Two corners and a spacing, m.
 pub type GridBox<'py> = (Bound<'py, PyAny>, Bound<'py, PyAny>, f64);
+
+/// Seeds of streamlines and their length, m.
+pub type Drawn<'py> = (Bound<'py, PyAny>, f64);
 
 /// Which states.
 fn frames(place: &str, per_second: Option<f64>, every: Option<isize>) -> PyResult<Frames> {
@@ -37,7 +39,15 @@ pub fn write_vtk(
     (per_second, every): (Option<f64>, Option<isize>),
     (loads, pressure): (bool, bool),
     flow: Option<GridBox<'_>>,
+    streamlines: Option<Drawn<'_>>,
 ) -> PyResult<Vec<PathBuf>> {
+    let lines = |(seeds, length): Drawn| {
+        let seeds = array::vectors("write_vtk: streamlines: seeds", &seeds)?;
+        Ok::<_, PyErr>(vtk::Streamlines {
+            seeds: seeds.into_iter().map(Into::into).collect(),
+            settings: StreamlineSettings::new(length),
+        })
+    };
     let grid = |(low, high, spacing): GridBox| {
         Ok::<_, PyErr>(vtk::Grid {
             low: array::fixed("write_vtk: flow: low", &low)?,
@@ -50,17 +60,12 @@ pub fn write_vtk(
         loads,
         pressure,
         flow: flow.map(grid).transpose()?,
+        streamlines: streamlines.map(lines).transpose()?,
     };
     let rollout = rollout.clone();
-    let written = long(py, move |interrupt| {
+    long(py, move |interrupt| {
         vtk::write_with(&rollout, &folder, &options, || interrupt.check())
-    })?;
-    let category = py.get_type::<PyUserWarning>();
-    for warning in written.warnings() {
-        let text = CString::new(warning)?;
-        PyErr::warn(py, &category, &text, 1)?;
-    }
-    Ok(written.files)
+    })
 }
 
 /// As glTF; the file.

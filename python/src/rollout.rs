@@ -3,6 +3,7 @@
 use crate::array::{self, Dim};
 use crate::contact;
 use crate::error::{OrRaise, in_order, input};
+use crate::flow;
 use crate::gradient;
 use crate::interrupt::{Progress, ended, followed, long, short};
 use crate::loads::Loads;
@@ -279,13 +280,7 @@ impl Rollout {
     /// solve. Points within a body, behind a wall, or too near to an edge or to two
     /// surfaces at once are refused: `flow_resolved` tells them apart. Negative numbers count states from the end.
     fn flow<'py>(&self, py: Python<'py>, state: isize, points: &Bound<'py, PyAny>) -> Numbers<'py> {
-        let at = array::numbered(state, self.inner.states().len(), "state")?;
-        let points = array::vectors("flow: points", points)?;
-        let inner = self.inner.clone();
-        let count = points.len();
-        let made = long(py, move |_| inner.flow(at, &points))?;
-        let values = made.iter().flat_map(|u| [u.x, u.y, u.z]).collect();
-        array::to_python(py, values, &[count, 3])
+        flow::flow(py, &self.inner, state, points)
     }
 
     /// The pressure of the flow at `points` (n, 3), m, at state `state`: (n,), Pa, zero far away, that of the water at rest left out. Points as of `flow`.
@@ -295,12 +290,7 @@ impl Rollout {
         state: isize,
         points: &Bound<'py, PyAny>,
     ) -> Numbers<'py> {
-        let at = array::numbered(state, self.inner.states().len(), "state")?;
-        let points = array::vectors("flow_pressure: points", points)?;
-        let inner = self.inner.clone();
-        let count = points.len();
-        let made = long(py, move |_| inner.flow_pressure(at, &points))?;
-        array::to_python(py, made, &[count])
+        flow::flow_pressure(py, &self.inner, state, points)
     }
 
     /// Whether `flow` knows the velocity at each of `points` (n, 3), m, at state `state`: (n,).
@@ -310,11 +300,94 @@ impl Rollout {
         state: isize,
         points: &Bound<'py, PyAny>,
     ) -> PyResult<Bound<'py, PyArray1<bool>>> {
-        let at = array::numbered(state, self.inner.states().len(), "state")?;
-        let points = array::vectors("flow_resolved: points", points)?;
-        let inner = self.inner.clone();
-        let made = long(py, move |_| inner.flow_resolved(at, &points))?;
-        Ok(PyArray1::from_vec(py, made))
+        flow::flow_resolved(py, &self.inner, state, points)
+    }
+
+    /// The potential φ of the flow that the bodies make at `points` (n, 3), m, at state `state`: (n,), m²/s, velocity −∇φ, zero far away, without the current. Points as of `flow`.
+    fn potential<'py>(
+        &self,
+        py: Python<'py>,
+        state: isize,
+        points: &Bound<'py, PyAny>,
+    ) -> Numbers<'py> {
+        flow::potential(py, &self.inner, state, points)
+    }
+
+    /// The water's velocity at sensors at the states 0 … N, (N + 1, n, 3), m/s, world axes: at `points` (n, 3), m, fixed in the world, or in the frames of `bodies`, one for all or one each, by number or
+    /// name, None of what is fixed in the world. Sensors stand at least three quarters of an edge off all surfaces. A loss of it has gradients: `sensor_vjp`.
+    #[pyo3(signature = (points, bodies=None))]
+    fn sensor_flow<'py>(
+        &self,
+        py: Python<'py>,
+        points: &Bound<'py, PyAny>,
+        bodies: Option<&Bound<'py, PyAny>>,
+    ) -> Numbers<'py> {
+        flow::sensor_flow(py, &self.inner, points, bodies)
+    }
+
+    /// The flow's pressure at sensors, given as of `sensor_flow`, at the states 0 … N, (N + 1, n), Pa, zero far away, that of the water at rest left out; with the mean accelerations over
+    /// the step that starts there, as the observable "accelerations" has them.
+    #[pyo3(signature = (points, bodies=None))]
+    fn sensor_pressure<'py>(
+        &self,
+        py: Python<'py>,
+        points: &Bound<'py, PyAny>,
+        bodies: Option<&Bound<'py, PyAny>>,
+    ) -> Numbers<'py> {
+        flow::sensor_pressure(py, &self.inner, points, bodies)
+    }
+
+    /// Transpose of what sensors read: from cotangents `flow` (N + 1, n, 3) and `pressure` (N + 1, n) the keywords of `vjp` that they ask for, `positions`, `rotations`, `observables` and `density`:
+    /// `rollout.vjp(**rollout.sensor_vjp(points, flow=bar))`. States without cotangents cost nothing.
+    #[pyo3(signature = (points, bodies=None, *, flow=None, pressure=None))]
+    fn sensor_vjp<'py>(
+        &self,
+        py: Python<'py>,
+        points: &Bound<'py, PyAny>,
+        bodies: Option<&Bound<'py, PyAny>>,
+        flow: Option<&Bound<'py, PyAny>>,
+        pressure: Option<&Bound<'py, PyAny>>,
+    ) -> PyResult<Bound<'py, PyDict>> {
+        flow::sensor_vjp(py, &self.inner, points, bodies, flow, pressure)
+    }
+
+    /// Lines along the water's velocity at state `state` through `seeds` (n, 3), m, a dictionary each: `points` (k, 3) downstream, `velocities` (k, 3) there, which of them is the `seed`, and why it `ends`
+    /// upstream and downstream: "length" (as long as `length`, m, each way), "box" (at the box `within`, two corners (3,)), "body …" or "wall …" (where the flow isn't known any more), "still",
+    /// "steps" (more than `most_steps`); None where it doesn't go, with `way` "forward" or "backward". `tolerance`, m, is the error of a step.
+    #[pyo3(signature = (state, seeds, length, *, way="both", within=None, tolerance=None, most_steps=2000))]
+    #[expect(clippy::too_many_arguments, reason = "one per keyword")]
+    fn streamlines<'py>(
+        &self,
+        py: Python<'py>,
+        state: isize,
+        seeds: &Bound<'py, PyAny>,
+        length: f64,
+        way: &str,
+        within: Option<(Bound<'py, PyAny>, Bound<'py, PyAny>)>,
+        tolerance: Option<f64>,
+        most_steps: usize,
+    ) -> PyResult<Vec<Bound<'py, PyDict>>> {
+        let drawn = flow::Drawn {
+            length,
+            tolerance,
+            most_steps,
+            within,
+            way: way.into(),
+        };
+        flow::streamlines(py, &self.inner, state, seeds, drawn)
+    }
+
+    /// The ways of tracers that go with the water from `seeds` (n, 3), m, at state `start` to state `stop`, a dictionary each: `points` (k, 3) at the states from the first one on, `velocities` (k, 3)
+    /// there, `times` (k,), s, and why it comes to its `end`: "length" (at `stop`), "body …" or "wall …". Negative numbers count states from the end.
+    #[pyo3(signature = (seeds, start=0, stop=-1), text_signature = "($self, seeds, start=0, stop=-1)")]
+    fn path_lines<'py>(
+        &self,
+        py: Python<'py>,
+        seeds: &Bound<'py, PyAny>,
+        start: isize,
+        stop: isize,
+    ) -> PyResult<Vec<Bound<'py, PyDict>>> {
+        flow::path_lines(py, &self.inner, seeds, (start, stop))
     }
 
     /// `flow` where `flow_resolved`, with the solves of one: velocities (n, 3), m/s, zero where they aren't known, and whether they are (n,).
@@ -375,8 +448,8 @@ impl Rollout {
     /// Transpose of the rollout: the gradient of Σ cotangent · δ(observation), for any loss of your own. `q` in the tangent
     /// space of the coordinates and `v` are (N + 1, v_size), `positions` and `rotations` (δR = δθ × R, world axes)
     /// (N + 1, bodies, 3), `controls`, what the loss has of them directly, (N, control_size); `observables` has
-    /// cotangents of others by name, each in the shape that `observe` gives. What is None is zero. `progress` is that of `gradient`. Ctrl-C ends it.
-    #[pyo3(signature = (*, positions=None, rotations=None, q=None, v=None, controls=None, observables=None, progress=None))]
+    /// cotangents of others by name, each in the shape that `observe` gives; `density` what the loss has of the water's density directly. What is None is zero. `progress` is that of `gradient`. Ctrl-C ends it.
+    #[pyo3(signature = (*, positions=None, rotations=None, q=None, v=None, controls=None, observables=None, density=0.0, progress=None))]
     #[expect(clippy::too_many_arguments, reason = "one per keyword")]
     fn vjp<'py>(
         &self,
@@ -387,9 +460,11 @@ impl Rollout {
         v: Option<&Bound<'py, PyAny>>,
         controls: Option<&Bound<'py, PyAny>>,
         observables: Option<&Bound<'py, PyDict>>,
+        density: f64,
         progress: Option<&Bound<'py, PyAny>>,
     ) -> PyResult<Bound<'py, PyAny>> {
         let mut seed: Cotangents = self.inner.zero_cotangents();
+        seed.density = density;
         let (states, steps) = (self.steps() + 1, self.steps());
         let bodies = [Dim::Is(self.bodies()), Dim::Is(3)];
         let nv = [Dim::Is(seed.q.nrows())];
@@ -535,9 +610,9 @@ impl Rollout {
     /// world, with the `body` (number) and the `velocity` (m/s) of every face, and with `pressure`, at the price of solves of its own a frame, the `pressure` of the flow and the `hydrostatic`
     /// one (Pa) and the `water_velocity` (m/s) there, as `pressure` tells them, zero where a face isn't `wetted` (1 or 0); `walls.vtp`: walls as squares; with `loads`, `loads.pvd`: at each body's origin what acts on it,
     /// `gravity_force` (N), `gravity_moment` (N m), `water_force`, …, of every kind that `loads` tells; with `flow`, two corners (3,) of a box and the spacing of a grid in it, m, `flow.pvd`: the
-    /// water's `velocity` there, zero where it isn't `resolved`. Frames are up to `frames_per_second` of simulated time (30 unless told otherwise), or every `every`-th
+    /// water's `velocity` there, zero where it isn't `resolved`; with `streamlines`, seeds (n, 3) and a length, m, `streamlines.pvd`: the lines of `streamlines`, of seeds where the flow is known. Frames are up to `frames_per_second` of simulated time (30 unless told otherwise), or every `every`-th
     /// state, with the first and the last. Files of the same names are replaced. Ctrl-C ends it.
-    #[pyo3(signature = (folder, *, frames_per_second=None, every=None, loads=false, pressure=false, flow=None))]
+    #[pyo3(signature = (folder, *, frames_per_second=None, every=None, loads=false, pressure=false, flow=None, streamlines=None))]
     #[expect(clippy::too_many_arguments, reason = "one per keyword")]
     fn write_vtk(
         &self,
@@ -548,9 +623,11 @@ impl Rollout {
         loads: bool,
         pressure: bool,
         flow: Option<output::GridBox<'_>>,
+        streamlines: Option<output::Drawn<'_>>,
     ) -> PyResult<Vec<PathBuf>> {
         let frames = (frames_per_second, every);
-        output::write_vtk(py, &self.inner, folder, frames, (loads, pressure), flow)
+        let more = (loads, pressure);
+        output::write_vtk(py, &self.inner, folder, frames, more, flow, streamlines)
     }
 
     /// Writes an animated scene in glTF 2.0 (`.glb`), which Blender and browsers open, and gives its path: a node each body, moved between frames, and walls. Lengths are m and times s, counted from

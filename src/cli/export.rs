@@ -4,10 +4,9 @@ use clap::Args;
 use std::path::PathBuf;
 
 use super::options::rate;
-use super::output::note;
 use crate::Result;
 use crate::output::{Frames, gltf, vtk};
-use crate::simulate::{Recording, Rollout};
+use crate::simulate::{Recording, Rollout, StreamlineSettings};
 
 #[derive(Clone, Debug, Args)]
 pub(super) struct Export {
@@ -21,6 +20,18 @@ pub(super) struct Export {
     /// Have the water's pressure and velocity on every face in the files of bodies.pvd as well. Takes solves of its own a frame.
     #[arg(long, requires = "vtk")]
     vtk_pressure: bool,
+    /// Write streamlines.pvd into the folder of --vtk as well: lines along the water's velocity through this point, m; give it once for each line. Takes a solve a frame.
+    #[arg(long, value_name = "X,Y,Z", requires = "vtk", value_parser = point, allow_hyphen_values = true)]
+    vtk_seed: Vec<[f64; 3]>,
+    /// Length of these lines each way at most, m.
+    #[arg(
+        long,
+        value_name = "M",
+        requires = "vtk_seed",
+        default_value = "1",
+        allow_negative_numbers = true
+    )]
+    vtk_line_length: f64,
     /// File of an animated scene in glTF 2.0, which Blender and browsers open [default: none is written].
     #[arg(long, value_name = "FILE.glb")]
     gltf: Option<PathBuf>,
@@ -51,10 +62,12 @@ impl Export {
                 loads: self.vtk_loads,
                 pressure: self.vtk_pressure,
                 flow: None,
+                streamlines: (!self.vtk_seed.is_empty()).then(|| vtk::Streamlines {
+                    seeds: self.vtk_seed.clone(),
+                    settings: StreamlineSettings::new(self.vtk_line_length),
+                }),
             };
-            let written = vtk::write(rollout, folder, &options)?;
-            written.warnings().into_iter().for_each(note);
-            files.extend(written.files);
+            files.extend(vtk::write(rollout, folder, &options)?);
         }
         if let Some(file) = &self.gltf {
             let options = gltf::Options {
@@ -65,5 +78,19 @@ impl Export {
             files.push(file.clone());
         }
         Ok(files)
+    }
+}
+
+/// A point from its coordinates.
+fn point(text: &str) -> std::result::Result<[f64; 3], String> {
+    let numbers: Vec<f64> = (text.split(','))
+        .map(|x| x.trim().parse().map_err(|e| format!("{x:?}: {e}")))
+        .collect::<std::result::Result<_, String>>()?;
+    let count = numbers.len();
+    let found = <[f64; 3]>::try_from(numbers);
+    let found = found.map_err(|_| format!("{count} numbers: give three, X,Y,Z in m"))?;
+    match found.iter().all(|x| x.is_finite()) {
+        true => Ok(found),
+        false => Err("coordinates must be finite".into()),
     }
 }

@@ -9,8 +9,8 @@
 //! A body far from all others and from walls has exactly what is given. The difference is constant in the body's own frame: impulses have it, gradients don't.
 
 use super::{
-    Coupling, CouplingReport, Direction, Linearise, Linearised, Momenta, Motion, Pullback,
-    ShapeTerm, SurfacePotential, Tangent,
+    Coupling, CouplingReport, Direction, Linearise, Linearised, Momenta, Motion, MotionBar,
+    Pullback, ShapeTerm, SurfacePotential, Tangent,
 };
 use crate::adjoint::lie::{Mat6, Pose, Vec3, Vec6};
 use crate::boundary::PanelBoundary;
@@ -147,6 +147,15 @@ impl Coupling for Given {
         surfaces: &[Arc<PanelBoundary>],
     ) -> Result<Vec<SurfacePotential>> {
         self.computed.surface_potentials(motion, surfaces)
+    }
+
+    fn surface_potentials_vjp(
+        &self,
+        motion: &Motion,
+        surfaces: &[Arc<PanelBoundary>],
+        bars: &[SurfacePotential],
+    ) -> Result<MotionBar> {
+        self.computed.surface_potentials_vjp(motion, surfaces, bars)
     }
 }
 

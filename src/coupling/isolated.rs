@@ -1,9 +1,10 @@
 //! Bodies that don't feel each other: each keeps its own constant added mass (Eq. 12).
 
 use super::surface::{check, on_surfaces};
+use super::surface_back::{Back, onto_charges};
 use super::{
-    Coupling, CouplingReport, Direction, Linearise, Linearised, Momenta, Motion, Pullback,
-    ShapeTerm, SurfacePotential, Tangent,
+    Coupling, CouplingReport, Direction, Linearise, Linearised, Momenta, Motion, MotionBar,
+    Pullback, ShapeTerm, SurfacePotential, Tangent,
 };
 use crate::adjoint::lie::{Mat6, Pose, Vec6};
 use crate::boundary::PanelBoundary;
@@ -92,6 +93,17 @@ impl Coupling for Isolated {
     ) -> Result<Vec<SurfacePotential>> {
         check(motion, surfaces)?;
         Ok(on_surfaces(motion, surfaces, &[], &[], None))
+    }
+
+    fn surface_potentials_vjp(
+        &self,
+        motion: &Motion,
+        surfaces: &[Arc<PanelBoundary>],
+        bars: &[SurfacePotential],
+    ) -> Result<MotionBar> {
+        check(motion, surfaces)?;
+        let Back { bar, .. } = onto_charges(surfaces, bars)?;
+        Ok(bar)
     }
 }
 

@@ -29,6 +29,7 @@ mod response;
 mod settings;
 mod shape;
 mod surface;
+mod surface_back;
 mod tensor;
 
 pub use exclude::Exclusions;
@@ -37,7 +38,7 @@ pub use isolated::Isolated;
 pub use panel::{ExtrapolatedPanels, FilmedPanels, PanelCoupled, PanelModel};
 pub use response::{CoupledResponse, Reached};
 pub use shape::{ShapeDirection, ShapeTerm};
-pub use surface::{FilmLoad, Motion, SurfacePotential};
+pub use surface::{FilmLoad, Motion, MotionBar, SurfacePotential};
 pub use tensor::PairTensor;
 
 use crate::adjoint::lie::{Mat6, Pose, Vec3, Vec6};
@@ -135,6 +136,23 @@ pub trait Coupling: Send + Sync {
             what: format!("the flow on surfaces with {}", self.name()),
             why: "it tells impulses alone".into(),
             instead: "use the fidelity reduced or full".into(),
+        })
+    }
+
+    /// The transpose of [`Coupling::surface_potentials`] at this motion: the gradient of Σ `bars` · potentials, values and rates.
+    ///
+    /// # Errors
+    /// As there; cotangents of other numbers of faces.
+    fn surface_potentials_vjp(
+        &self,
+        _motion: &Motion,
+        _surfaces: &[Arc<PanelBoundary>],
+        _bars: &[SurfacePotential],
+    ) -> Result<MotionBar> {
+        Err(Error::Unsupported {
+            what: format!("the derivative of the flow with {}", self.name()),
+            why: "it tells impulses alone".into(),
+            instead: "use the fidelity reduced or full, on the CPU".into(),
         })
     }
 }

@@ -19,7 +19,7 @@
 
 use super::pair::Pair;
 use crate::adjoint::kernel::{Points, Sources, potential_jvp, potential_sum};
-use crate::adjoint::lie::{Pose, Vec3, Vec6};
+use crate::adjoint::lie::{Pose, Vec3, Vec6, cross_force};
 use crate::boundary::PanelBoundary;
 use crate::coupling::film::{MovingFilms, PlacedFilms};
 use crate::geometry::{Beneath, Image};
@@ -115,6 +115,57 @@ impl Held<'_, '_> {
     }
 }
 
+/// What [`Coupling::surface_potentials_vjp`](super::Coupling::surface_potentials_vjp) gives: the gradient of Σ bar · potential in what a [`Motion`] has.
+#[derive(Clone, Debug)]
+pub struct MotionBar {
+    /// Of the poses at fixed body-frame twists, their rates and spatial displacements: spatial wrenches, work on a spatial displacement of each body.
+    pub poses: Vec<Vec6>,
+    /// Of the body-frame twists, 6·bodies.
+    pub twists: DVector<f64>,
+    /// Of the rates of these numbers, 6·bodies.
+    pub rates: DVector<f64>,
+    /// Of the spatial twists with which the bodies change their places.
+    pub displacement: Vec<Vec6>,
+}
+
+impl MotionBar {
+    /// All zero.
+    pub(crate) fn zeros(bodies: usize) -> Self {
+        Self {
+            poses: vec![Vec6::zeros(); bodies],
+            twists: DVector::zeros(6 * bodies),
+            rates: DVector::zeros(6 * bodies),
+            displacement: vec![Vec6::zeros(); bodies],
+        }
+    }
+
+    /// Adds another.
+    pub(crate) fn add(&mut self, other: &Self) {
+        self.twists += &other.twists;
+        self.rates += &other.rates;
+        let wrenches = self.poses.iter_mut().chain(&mut self.displacement);
+        let more = other.poses.iter().chain(&other.displacement);
+        wrenches.zip(more).for_each(|(own, more)| *own += more);
+    }
+
+    /// With the wrenches ∇_g Λ of a function Λ of the poses, and their rates as the bodies are displaced by Z = `displacement`. For another displacement Y
+    /// the derivative of D_Z Λ, Z held, is rate·Y + ∇Λ·(Z × Y); that with Z is ∇Λ.
+    pub(super) fn add_pull(&mut self, z: &[Vec6], gradient: &[Vec6], rate: &[Vec6]) {
+        for (b, (wrench, rate)) in gradient.iter().zip(rate).enumerate() {
+            self.poses[b] += rate - cross_force(&z[b], wrench);
+            self.displacement[b] += wrench;
+        }
+    }
+
+    /// Adds to the twists of body `b`, and to their rates.
+    pub(crate) fn add_twists(&mut self, b: usize, [twist, rate]: &[Vec6; 2]) {
+        let mut rows = self.twists.fixed_rows_mut::<6>(6 * b);
+        rows += twist;
+        let mut rows = self.rates.fixed_rows_mut::<6>(6 * b);
+        rows += rate;
+    }
+}
+
 impl Motion<'_> {
     /// Twists and their rates, two columns; zeros where those aren't asked for.
     pub(super) fn columns(&self) -> DMatrix<f64> {
@@ -132,6 +183,11 @@ impl SurfacePotential {
             rate: columns.column(1),
             film: None,
         }
+    }
+
+    /// Both side by side.
+    pub(super) fn columns(&self) -> Columns {
+        Columns::from_columns(&[&self.value, &self.rate])
     }
 }
 
@@ -224,6 +280,31 @@ fn add(
         out.data[2 * i] += weight * value;
         out.data[2 * i + 1] += weight * (change + moving) + rate * value;
     }
+}
+
+/// Why there is none while films hold bodies apart.
+pub(super) fn held_apart() -> Error {
+    Error::Unsupported {
+        what: "the flow on surfaces that a film holds apart".into(),
+        why: "in a gap that the faces don't resolve the water's inertia is known, but not its pressure face by face".into(),
+        instead: "use more faces there, or ask before the gap closes".into(),
+    }
+}
+
+/// Refuses cotangents of others than these surfaces.
+pub(super) fn check_bars(surfaces: &[Arc<PanelBoundary>], bars: &[SurfacePotential]) -> Result<()> {
+    let faces = |s: &[SurfacePotential]| -> Vec<[usize; 2]> {
+        s.iter().map(|s| [s.value.len(), s.rate.len()]).collect()
+    };
+    let right: Vec<[usize; 2]> = surfaces.iter().map(|s| [s.faces.len(); 2]).collect();
+    let given = faces(bars);
+    (given == right).then_some(()).ok_or_else(|| {
+        Error::input(
+            "flow on surfaces: cotangents of values and rates",
+            format!("{given:?} numbers"),
+            format!("must be as many as the bodies have faces: {right:?}"),
+        )
+    })
 }
 
 /// Refuses surfaces that aren't the bodies'.

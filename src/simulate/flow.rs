@@ -1,6 +1,6 @@
 //! The water's velocity around the bodies.
 
-use super::surface_flow::{BodyFlow, Water};
+use super::surface_flow::{Asked, BodyFlow, Water};
 use super::{Rollout, Sample, Simulator};
 use crate::adjoint::lie::{Pose, Vec3, Vec6};
 use crate::geometry::{Distance, Other};
@@ -12,8 +12,11 @@ use rayon::prelude::*;
 /// the surface is smooth and nothing else is near.
 pub const FLOW_EDGES: f64 = 0.5;
 
+/// Most points at which the flow is asked for at once.
+pub const FLOW_POINTS: usize = 20_000_000;
+
 /// Distance in edges up to which the flow is continued between the surface and three places farther off: panels are flat and sources are points, and show so near.
-const NEAR: f64 = 0.75;
+pub(super) const NEAR: f64 = 0.75;
 /// Those places, in edges.
 const PLACES: [f64; 3] = [0.75, 1.25, 1.75];
 /// Part of an edge within which a point is on the surface.
@@ -60,21 +63,22 @@ impl Near {
                 .product();
             out.velocity += weight * water.velocity;
             out.pressure += weight * water.pressure;
+            out.potential += weight * water.potential;
         }
         out
     }
 }
 
 /// Where the flow is asked for, and how it is found there.
-struct Places {
+pub(super) struct Places {
     /// At the points, or at three places beyond those near a surface.
-    asked: Vec<Vec3>,
+    pub asked: Vec<Vec3>,
     near: Vec<Option<Near>>,
 }
 
 impl Places {
     /// The water at the points from that at the places asked for.
-    fn join(&self, flows: &[BodyFlow], found: &[Water]) -> Vec<Water> {
+    pub fn join(&self, flows: &[BodyFlow], found: &[Water]) -> Vec<Water> {
         let surfaces = at_surfaces(flows, &self.near);
         let mut next = 0;
         let each = self.near.iter().zip(&surfaces).map(|(near, surface)| {
@@ -118,13 +122,18 @@ impl Simulator {
         system.coupling.velocity(&poses, &through, points)
     }
 
-    fn places(
+    /// How the flow is found at points, `what`.
+    ///
+    /// # Errors
+    /// Points that aren't finite, or where it isn't known; more than [`FLOW_POINTS`].
+    pub(super) fn places(
         &self,
         what: &str,
         points: &[Vec3],
         poses: &[Pose],
         flows: &[BodyFlow],
     ) -> Result<Places> {
+        few(what, points.len())?;
         let found: Vec<Approach> = (points.par_iter())
             .map(|x| self.approach(x, poses, flows))
             .collect();
@@ -132,16 +141,12 @@ impl Simulator {
         let mut near: Vec<Option<Near>> = Vec::with_capacity(points.len());
         for (i, (point, found)) in points.iter().zip(found).enumerate() {
             if let Some(bad) = point.iter().find(|x| !x.is_finite()) {
-                return Err(Error::input(
-                    format!("{what}: points[{i}]"),
-                    bad,
-                    "must be finite",
-                ));
+                return Err(Error::input(format!("{what}[{i}]"), bad, "must be finite"));
             }
             match found {
                 Approach::Unknown(obstacle) => {
-                    let place = format!("{what}: points[{i}] at {:?} m", point.as_slice());
-                    return Err(self.too_near(&place, &obstacle));
+                    let place = format!("{what}[{i}] at {:?} m", point.as_slice());
+                    return Err(self.too_near(&place, &obstacle, FLOW_EDGES));
                 }
                 Approach::Far => {
                     asked.push(*point);
@@ -157,6 +162,7 @@ impl Simulator {
     }
 
     fn flow(&self, sample: &Sample, points: &[Vec3]) -> Result<Vec<Vec3>> {
+        few("flow: points", points.len())?;
         // What doesn't know the flow at all isn't asked for it.
         if points.is_empty() {
             return Ok(Vec::new());
@@ -166,24 +172,24 @@ impl Simulator {
     }
 
     /// From what [`Simulator::flows`] found for these points, or for more.
-    fn flow_by(
+    pub(super) fn flow_by(
         &self,
         sample: &Sample,
         own: bool,
         flows: &[BodyFlow],
         points: &[Vec3],
     ) -> Result<Vec<Vec3>> {
-        let places = self.places("flow", points, &sample.poses, flows)?;
+        let places = self.places("flow: points", points, &sample.poses, flows)?;
         let found = match own {
             true => {
                 let own = self.own_flow(sample, &places.asked)?.unwrap_or_default();
                 let still = |velocity| Water {
                     velocity,
-                    pressure: 0.0,
+                    ..Water::default()
                 };
                 own.into_iter().map(still).collect()
             }
-            false => self.layered(flows, &places.asked, false)?,
+            false => self.layered(flows, &places.asked, Asked::Velocity)?,
         };
         let each = places.join(flows, &found).into_iter().zip(points);
         let water = |x| (self.system()).water_velocity(x, sample.time, self.parameters());
@@ -191,7 +197,12 @@ impl Simulator {
     }
 
     /// Whether the flow is known at each point, from what [`Simulator::flows`] found for them.
-    fn resolved(&self, sample: &Sample, flows: &[BodyFlow], points: &[Vec3]) -> Vec<bool> {
+    pub(super) fn resolved(
+        &self,
+        sample: &Sample,
+        flows: &[BodyFlow],
+        points: &[Vec3],
+    ) -> Vec<bool> {
         let clear = |x: &Vec3| {
             let finite = x.iter().all(|c| c.is_finite());
             let found = || self.approach(x, &sample.poses, flows);
@@ -226,8 +237,8 @@ impl Simulator {
         points: &[Vec3],
     ) -> Result<Vec<f64>> {
         let flows = self.open_surface_flow(sample, Some(gains))?;
-        let places = self.places("flow_pressure", points, &sample.poses, &flows)?;
-        let found = self.layered(&flows, &places.asked, true)?;
+        let places = self.places("flow_pressure: points", points, &sample.poses, &flows)?;
+        let found = self.layered(&flows, &places.asked, Asked::Pressure)?;
         let density = self.parameters().density();
         let each = places.join(&flows, &found).into_iter();
         Ok(each.map(|water| density * water.pressure).collect())
@@ -288,7 +299,8 @@ impl Simulator {
         near.places().iter().all(clear).then_some(near)
     }
 
-    fn too_near(&self, place: &str, obstacle: &Distance) -> Error {
+    /// Of a place nearer to something than so many edges, or in it.
+    pub(super) fn too_near(&self, place: &str, obstacle: &Distance, edges: f64) -> Error {
         let (what, remedy) = match obstacle.from {
             Other::Body(b) => (
                 format!("body {:?}", self.system().bodies[b].name),
@@ -300,10 +312,23 @@ impl Simulator {
             place: format!("{place}: {what}"),
             quantity: "distance in m".into(),
             value: obstacle.distance,
-            limit: FLOW_EDGES * obstacle.edge,
+            limit: edges * obstacle.edge,
             remedy: remedy.into(),
         }
     }
+}
+
+/// Refuses more points than are worked on at once.
+pub(super) fn few(what: &str, count: usize) -> Result<()> {
+    if count <= FLOW_POINTS {
+        return Ok(());
+    }
+    let expected = format!("must be at most {FLOW_POINTS}: ask for them in parts");
+    Err(Error::input(
+        format!("{what}: their number"),
+        count,
+        expected,
+    ))
 }
 
 /// The water at the feet of points that are near a surface; nothing of others.
@@ -328,10 +353,10 @@ fn at_surfaces(flows: &[BodyFlow], near: &[Option<Near>]) -> Vec<Water> {
 
 impl Rollout {
     /// The water's velocity at points (m, world frame) at state `n`: m/s, world axes, currents included (those by depth and time as each body feels them alone). It takes solves of its own. It is
-    /// there to be looked at: nothing of a step depends on it, and it has no transpose.
+    /// there to be looked at: nothing of a step depends on it; that of sensors has a transpose ([`Rollout::sensor_flow`]).
     ///
     /// # Errors
-    /// A state that there isn't; points that aren't finite, within a body, behind a wall, or nearer than [`FLOW_EDGES`] of its edges to a sharp edge or where another surface is near
+    /// A state that there isn't; more than [`FLOW_POINTS`] points; points that aren't finite, within a body, behind a wall, or nearer than [`FLOW_EDGES`] of its edges to a sharp edge or where another surface is near
     /// as well; with the fidelities `reduced` and `isolated` also gaps that films carry and bodies without a surface, or of more faces than panels are solved for; whatever its solves report.
     pub fn flow(&self, n: usize, points: &[Vec3]) -> Result<Vec<Vec3>> {
         let sample = self.sample("flow", n)?;
@@ -340,7 +365,7 @@ impl Rollout {
     }
 
     /// The pressure of the flow at points (m, world frame) at state `n`, with the accelerations of [`Rollout::loads`]: Pa, zero far away; that of the water at rest isn't in it. By Bernoulli's law as
-    /// [`Rollout::pressure`], and without transpose as it is.
+    /// [`Rollout::pressure`]; that of sensors has a transpose ([`Rollout::sensor_pressure`]).
     ///
     /// # Errors
     /// As [`Rollout::flow`] of the points, and [`Rollout::pressure`].
@@ -348,6 +373,7 @@ impl Rollout {
         let sample = self.sample("flow_pressure", n)?;
         let simulator = self.simulator();
         simulator.check_pressure()?;
+        few("flow_pressure: points", points.len())?;
         if points.is_empty() {
             return Ok(Vec::new());
         }
@@ -363,6 +389,7 @@ impl Rollout {
     /// A state that there isn't, and a solve that misses its tolerance.
     pub fn flow_resolved(&self, n: usize, points: &[Vec3]) -> Result<Vec<bool>> {
         let sample = self.sample("flow_resolved", n)?;
+        few("flow_resolved: points", points.len())?;
         let simulator = self.simulator();
         match simulator.flows(sample, points) {
             Err(Error::Unsupported { .. }) => Ok(vec![false; points.len()]),
@@ -381,7 +408,7 @@ impl Rollout {
         made.map_err(|e| e.at_time(sample.time))
     }
 
-    fn sample(&self, what: &str, n: usize) -> Result<&Sample> {
+    pub(super) fn sample(&self, what: &str, n: usize) -> Result<&Sample> {
         self.samples().get(n).ok_or_else(|| {
             let expected = format!("must be at most {}", self.steps());
             Error::input(format!("{what}: state"), n, expected)

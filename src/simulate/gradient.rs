@@ -22,6 +22,8 @@ pub struct Cotangents {
     pub rotations: DMatrix<f64>,
     /// Direct dependence on the open-loop controls, controls × N.
     pub controls: DMatrix<f64>,
+    /// Direct dependence on the water's density, as the readings of pressure sensors have it.
+    pub density: f64,
     /// Of any [`super::observable`] that has a transpose, by its name: its tangents × (N + 1).
     pub observables: BTreeMap<String, DMatrix<f64>>,
 }
@@ -35,7 +37,26 @@ impl Cotangents {
             positions: DMatrix::zeros(3 * bodies, steps + 1),
             rotations: DMatrix::zeros(3 * bodies, steps + 1),
             controls: DMatrix::zeros(controls, steps),
+            density: 0.0,
             observables: BTreeMap::new(),
+        }
+    }
+
+    /// Adds those of another scalar of the same rollout.
+    pub fn add(&mut self, other: &Self) {
+        self.q += &other.q;
+        self.v += &other.v;
+        self.positions += &other.positions;
+        self.rotations += &other.rotations;
+        self.controls += &other.controls;
+        self.density += other.density;
+        for (name, bars) in &other.observables {
+            match self.observables.get_mut(name) {
+                Some(own) => *own += bars,
+                None => {
+                    self.observables.insert(name.clone(), bars.clone());
+                }
+            }
         }
     }
 }

@@ -2,11 +2,12 @@
 
 use super::observable::{differentiable, observable};
 use super::part::{Part, Partwise};
-use super::{Cotangents, Gradient, Rollout};
-use crate::scene::BodyId;
+use super::{Cotangents, Gradient, Rollout, Sensor};
 use crate::{Error, Result};
 use nalgebra::DMatrix;
 use std::ops::{Add, Neg, Range, Sub};
+
+pub use super::which::Which;
 
 /// A scalar function of a rollout.
 pub trait Objective {
@@ -70,44 +71,6 @@ struct Term {
     own: Option<(usize, usize)>,
 }
 
-/// A body of the scene, by its number or its name.
-#[derive(Clone, Debug, PartialEq)]
-pub enum Which {
-    /// Its number, from 0.
-    Number(usize),
-    /// Its name.
-    Named(String),
-}
-
-impl From<BodyId> for Which {
-    fn from(body: BodyId) -> Self {
-        Self::Number(body.0)
-    }
-}
-
-impl From<&str> for Which {
-    fn from(name: &str) -> Self {
-        Self::Named(name.into())
-    }
-}
-
-impl From<String> for Which {
-    fn from(name: String) -> Self {
-        Self::Named(name)
-    }
-}
-
-impl Which {
-    /// Its number; none where the scene has no such body.
-    fn number(&self, rollout: &Rollout) -> Option<usize> {
-        let bodies = &rollout.simulator().system().bodies;
-        match self {
-            Self::Number(body) => (*body < bodies.len()).then_some(*body),
-            Self::Named(name) => bodies.iter().position(|b| b.name == *name),
-        }
-    }
-}
-
 /// Numbers of a term, as many as its target has.
 #[derive(Clone, Debug)]
 enum Of {
@@ -119,6 +82,10 @@ enum Of {
     Coordinate(usize),
     /// Of an observable by its name.
     Observable(String, usize),
+    /// Velocity of the water at a sensor.
+    Flow(Sensor),
+    /// Pressure of the flow at a sensor.
+    Pressure(Sensor),
     /// All open-loop controls, against zero.
     Controls,
 }
@@ -188,6 +155,30 @@ pub fn final_observable(name: impl Into<String>, entry: usize, target: f64, weig
 /// The mean of `weight · (x − target)²` over all states, x as in [`final_observable`].
 pub fn mean_observable(name: impl Into<String>, entry: usize, target: f64, weight: f64) -> Sum {
     let mut out = final_observable(name, entry, target, weight);
+    out.0[0].last_only = false;
+    out
+}
+
+/// `weight` times the squared distance of the water's velocity at a sensor ([`Rollout::sensor_flow`]) from `target` (m/s, world axes) at the end.
+pub fn final_flow(sensor: Sensor, target: [f64; 3], weight: f64) -> Sum {
+    at_end(Of::Flow(sensor), &target, weight)
+}
+
+/// The mean of the same over all states.
+pub fn mean_flow(sensor: Sensor, target: [f64; 3], weight: f64) -> Sum {
+    let mut out = final_flow(sensor, target, weight);
+    out.0[0].last_only = false;
+    out
+}
+
+/// `weight · (p − target)²` at the end, p the flow's pressure at a sensor ([`Rollout::sensor_pressure`]), Pa.
+pub fn final_pressure(sensor: Sensor, target: f64, weight: f64) -> Sum {
+    at_end(Of::Pressure(sensor), &[target], weight)
+}
+
+/// The mean of the same over all states.
+pub fn mean_pressure(sensor: Sensor, target: f64, weight: f64) -> Sum {
+    let mut out = final_pressure(sensor, target, weight);
     out.0[0].last_only = false;
     out
 }
@@ -265,12 +256,53 @@ impl Term {
             Of::Velocity(index) => ("v", *index),
             Of::Coordinate(index) => ("q", *index),
             Of::Observable(name, entry) => (name.as_str(), *entry),
+            Of::Flow(_) | Of::Pressure(_) => {
+                let found = self.sensed(rollout, n);
+                let found = found.unwrap_or_else(|_| vec![f64::NAN; self.target.len()]);
+                return found
+                    .iter()
+                    .zip(&self.target)
+                    .map(|(x, goal)| x - goal)
+                    .collect();
+            }
             Of::Controls => return Vec::new(),
         };
         let value = observable(name).and_then(|o| o.value(&rollout.reading(n)));
         let miss =
             |(k, goal): (usize, &f64)| value.as_ref().map_or(f64::NAN, |x| x[from + k]) - goal;
         self.target.iter().enumerate().map(miss).collect()
+    }
+
+    /// What its sensor reads at state `n`; nothing of what has none.
+    fn sensed(&self, rollout: &Rollout, n: usize) -> Result<Vec<f64>> {
+        match &self.of {
+            Of::Flow(sensor) => {
+                let found = rollout.sensor_flow(n, std::slice::from_ref(sensor))?;
+                Ok(found.iter().flat_map(|u| [u.x, u.y, u.z]).collect())
+            }
+            Of::Pressure(sensor) => rollout.sensor_pressure(n, std::slice::from_ref(sensor)),
+            _ => Ok(Vec::new()),
+        }
+    }
+
+    /// The cotangents of what its sensor reads, one column a state; none of what has none.
+    fn sensed_cotangents(&self, rollout: &Rollout, scale: f64) -> Option<Result<Cotangents>> {
+        let (sensor, rows) = match &self.of {
+            Of::Flow(sensor) => (sensor, 3),
+            Of::Pressure(sensor) => (sensor, 1),
+            _ => return None,
+        };
+        let mut bars = DMatrix::zeros(rows, rollout.states().len());
+        for n in self.states(rollout) {
+            for (k, miss) in self.misses(rollout, n).into_iter().enumerate() {
+                bars[(k, n)] = 2.0 * scale * miss;
+            }
+        }
+        let sensors = std::slice::from_ref(sensor);
+        Some(match rows {
+            1 => rollout.sensor_vjp(sensors, None, Some(&bars)),
+            _ => rollout.sensor_vjp(sensors, Some(&bars), None),
+        })
     }
 }
 
@@ -303,16 +335,10 @@ impl Objective for Sum {
                     }
                     below("entry", *entry, rows)?;
                 }
-                Of::Body(Which::Number(body)) => below("body", *body, system.len())?,
-                Of::Body(Which::Named(name)) => {
-                    let names: Vec<&str> = system.bodies.iter().map(|b| b.name.as_str()).collect();
-                    if !names.contains(&name.as_str()) {
-                        let expected = format!("must be one of {names:?}");
-                        return Err(Error::input(
-                            "objective: body",
-                            format!("{name:?}"),
-                            expected,
-                        ));
+                Of::Body(body) => drop(body.found("objective", rollout)?),
+                Of::Flow(_) | Of::Pressure(_) => {
+                    for n in term.states(rollout) {
+                        term.sensed(rollout, n)?;
                     }
                 }
                 Of::Velocity(index) => below("velocity", *index, system.tree.velocities())?,
@@ -358,6 +384,15 @@ impl Objective for Sum {
         let mut out = rollout.zero_cotangents();
         let columns = rollout.states().len();
         for term in &self.0 {
+            let scale = term.weight / term.count(rollout);
+            if let Some(sensed) = term.sensed_cotangents(rollout, scale) {
+                match sensed {
+                    Ok(sensed) => out.add(&sensed),
+                    // What fails is told by the check before; not a number is refused by the sweep.
+                    Err(_) => out.density = f64::NAN,
+                }
+                continue;
+            }
             let (bars, from) = match &term.of {
                 Of::Body(body) => match body.number(rollout) {
                     Some(body) => (&mut out.positions, 3 * body),
@@ -379,9 +414,9 @@ impl Objective for Sum {
                     out.controls += 2.0 * term.weight * rollout.controls();
                     continue;
                 }
+                Of::Flow(_) | Of::Pressure(_) => continue,
             };
             let states = term.states(rollout);
-            let scale = term.weight / term.count(rollout);
             for n in states {
                 for (k, miss) in term.misses(rollout, n).into_iter().enumerate() {
                     bars[(from + k, n)] += 2.0 * scale * miss;

@@ -3,7 +3,6 @@
 use super::surface_flow::{BodyFlow, Past, Streams};
 use super::{Recorded, Rollout, Sample, Simulator};
 use crate::adjoint::lie::{Vec3, Vec6, six};
-use crate::coupling::is_held_apart;
 use crate::{Error, Result};
 use nalgebra::DVector;
 
@@ -141,16 +140,5 @@ impl Rollout {
         let gains = self.acceleration(n)?;
         let made = simulator.pressure(sample, &gains);
         made.map_err(|e| e.at_time(sample.time))
-    }
-
-    /// [`Rollout::pressure`], `None` at a state where films hold bodies apart.
-    ///
-    /// # Errors
-    /// As it, but for these.
-    pub fn known_pressure(&self, n: usize) -> Result<Option<Vec<SurfacePressure>>> {
-        match self.pressure(n) {
-            Err(error) if is_held_apart(&error) => Ok(None),
-            made => made.map(Some),
-        }
     }
 }

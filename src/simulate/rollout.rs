@@ -284,6 +284,7 @@ impl Rollout {
         let steps = self.steps();
         let mut direct = sums.gradient.controls.columns_mut(first, steps);
         direct += &cotangents.controls;
+        *sums.gradient.parameters.density_mut() += cotangents.density;
         for (n, partial) in partials.iter().enumerate().rev() {
             sums.add(first + n, partial, seeds[n].size());
         }
@@ -313,6 +314,13 @@ impl Rollout {
 
     fn check(&self, c: &Cotangents) -> Result<()> {
         let z = self.zero_cotangents();
+        if !c.density.is_finite() {
+            return Err(Error::input(
+                "cotangents.density",
+                c.density,
+                "must be finite",
+            ));
+        }
         let mut parts = vec![
             ("q", &c.q, z.q.shape()),
             ("v", &c.v, z.v.shape()),

@@ -9,11 +9,20 @@ use crate::water::FlowSurface;
 use crate::{Error, Result};
 use nalgebra::DVector;
 
-/// The water at one place, at unit density: the velocity that bodies give to it (m/s, world axes), and the pressure of their flow (m²/s²).
+/// The water at one place, at unit density: the velocity that bodies give to it (m/s, world axes), the pressure of their flow (m²/s²) and its potential (m²/s).
 #[derive(Clone, Copy, Debug, Default)]
 pub(super) struct Water {
     pub velocity: Vec3,
     pub pressure: f64,
+    pub potential: f64,
+}
+
+/// What of it is asked for, beside the velocity.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(super) enum Asked {
+    Velocity,
+    Pressure,
+    Potential,
 }
 
 /// The flow on one body's surface, body frame.
@@ -176,7 +185,19 @@ impl BodyFlow<'_> {
         exact.map_or(*x, |exact| exact.lifted(x))
     }
 
-    /// What is known at the centroids (velocities and pressures), continued from there along the surface to points of faces without sharp edges, body frame, m.
+    /// Potentials at the centroids, m²/s.
+    fn potentials(&self) -> Vec<f64> {
+        let mut out = self.potential.value.clone();
+        if let Some(exact) = &self.surface.exact {
+            let own = exact.potentials(&self.twist).into_iter();
+            let panels = self.surface.panels.own_potential(&self.twist);
+            let each = out.iter_mut().zip(own.zip(panels));
+            each.for_each(|(all, (own, panels))| *all += own - panels);
+        }
+        out
+    }
+
+    /// What is known at the centroids (velocities, pressures and potentials), continued from there along the surface to points of faces without sharp edges, body frame, m.
     pub fn at(&self, places: &[(usize, Vec3)]) -> Vec<Water> {
         let velocities = self.velocities();
         let pressures = self.pressures(&velocities);
@@ -198,12 +219,14 @@ impl BodyFlow<'_> {
             let component: Vec<f64> = velocities.iter().map(|u| u[c]).collect();
             continued(&component)
         });
-        let pressures = continued(&pressures).into_iter().enumerate();
-        let of = |(i, pressure): (usize, f64)| Water {
+        let pressures = continued(&pressures).into_iter();
+        let potentials = continued(&self.potentials());
+        let of = |(i, (pressure, potential)): (usize, (f64, f64))| Water {
             velocity: self.pose.rotation * Vec3::new(x[i], y[i], z[i]),
             pressure,
+            potential,
         };
-        pressures.map(of).collect()
+        pressures.zip(potentials).enumerate().map(of).collect()
     }
 
     /// Unsteady Bernoulli in the body's frame, at unit density, from the velocities there, m²/s²: with φ' the rate at a point that goes
@@ -227,8 +250,8 @@ impl BodyFlow<'_> {
         places.zip(velocities).zip(squares).map(of).collect()
     }
 
-    /// Adds the velocity that the layers on its panels, and on those of its images, give to the water at points (m, world frame), and ∂φ/∂t there in water at rest.
-    fn layers(&self, images: &[Image], points: &[Vec3], rates: bool, out: &mut [Water]) {
+    /// Adds the velocity that the layers on its panels, and on those of its images, give to the water at points (m, world frame), and what is asked for beside it: ∂φ/∂t there in water at rest, or φ.
+    fn layers(&self, images: &[Image], points: &[Vec3], asked: Asked, out: &mut [Water]) {
         let panels = &self.surface.panels;
         let velocity = panels.own_normal_velocity(&self.twist);
         let rate = panels.own_normal_velocity(&self.twist_rate);
@@ -241,7 +264,12 @@ impl BodyFlow<'_> {
             for (out, u) in out.iter_mut().zip(&made) {
                 out.velocity += image.sign * (rotation * u);
             }
-            if rates {
+            if asked == Asked::Potential {
+                let own = panels.layers(&velocity, &self.potential.value, &seen);
+                let each = out.iter_mut().zip(own);
+                each.for_each(|(out, own)| out.potential += image.sign * own);
+            }
+            if asked == Asked::Pressure {
                 // What stands still in the water moves against the body: ∂φ/∂t = φ(q', φ') + u·V.
                 let own = panels.layers(&rate, &self.potential.rate, &seen);
                 for (((out, own), u), x) in out.iter_mut().zip(own).zip(&made).zip(&seen) {
@@ -312,7 +340,7 @@ impl Simulator {
         let in_water: Vec<usize> = system.submerged().map(|(b, _)| b).collect();
         let poses: Vec<Pose> = in_water.iter().map(|b| kinematics.poses[*b]).collect();
         let displacement: Vec<Vec6> = in_water.iter().map(|b| fields.twist[*b]).collect();
-        let surfaces = self.assembled.flow_surfaces(&self.scene, &self.choices)?;
+        let surfaces = self.flow_surfaces()?;
         let panels: Vec<_> = surfaces.iter().map(|s| s.panels.clone()).collect();
         let twist_rates = system.submerged_twists(&kinematics, &rates);
         let potentials = system.coupling.surface_potentials(
@@ -344,27 +372,32 @@ impl Simulator {
             .collect())
     }
 
+    /// The surfaces of the bodies in the water.
+    pub(super) fn flow_surfaces(&self) -> Result<&[FlowSurface]> {
+        self.assembled.flow_surfaces(&self.scene, &self.choices)
+    }
+
     /// The images of the bodies that the water knows.
-    fn flow_images(&self) -> Result<Vec<Image>> {
+    pub(super) fn flow_images(&self) -> Result<Vec<Image>> {
         match self.fidelity().coupled() {
             true => Image::of_walls(&self.scene.walls),
             false => Ok(vec![Image::identity()]),
         }
     }
 
-    /// The water at points (m, world frame) outside all bodies, by the layers on their surfaces; the pressure only where it is asked for.
+    /// The water at points (m, world frame) outside all bodies, by the layers on their surfaces: the velocity, and what is asked for.
     pub(super) fn layered(
         &self,
         flows: &[BodyFlow],
         points: &[Vec3],
-        pressure: bool,
+        asked: Asked,
     ) -> Result<Vec<Water>> {
         let images = self.flow_images()?;
         let mut out = vec![Water::default(); points.len()];
         for flow in flows {
-            flow.layers(&images, points, pressure, &mut out);
+            flow.layers(&images, points, asked, &mut out);
         }
-        if pressure {
+        if asked == Asked::Pressure {
             // Bernoulli: of ∂φ/∂t, with the velocity −∇φ.
             for water in &mut out {
                 water.pressure -= 0.5 * water.velocity.norm_squared();

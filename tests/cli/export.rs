@@ -101,6 +101,7 @@ fn surfaces_and_loads_stand_in_files_of_vtk() {
         loads: true,
         pressure: true,
         flow: None,
+        streamlines: None,
     };
     for _ in 0..2 {
         let written = vtk::write(rollout, &out, &options).unwrap();
@@ -441,6 +442,12 @@ fn the_program_writes_both() {
         &file,
         "--vtk-loads",
         "--vtk-pressure",
+        "--vtk-seed",
+        "-0.9,0.8,1.2",
+        "--vtk-seed",
+        "0.9,0.8,1.2",
+        "--vtk-line-length",
+        "0.5",
     ];
     let report = json(&[&run[..], &asked, &["--frames-per-second", "25"]].concat());
     let files: Vec<&str> = (report["files"].as_array().unwrap().iter())
@@ -450,9 +457,14 @@ fn the_program_writes_both() {
         "vtk/bodies.pvd",
         "vtk/walls.vtp",
         "vtk/loads.pvd",
+        "vtk/streamlines.pvd",
         "run.glb",
     ];
     assert_eq!(files, right.map(of));
+    let drawn = surface(&folder.path().join("vtk/streamlines/streamlines_00002.vtp"));
+    assert_eq!(numbers(&drawn.data.cell, "seed"), [0.0, 1.0]);
+    let velocity = numbers(&drawn.data.point, "velocity");
+    assert!(velocity.len() > 12 && velocity.iter().all(|x| x.is_finite()));
     let first = surface(&folder.path().join("vtk/bodies/bodies_00000.vtp"));
     let wetted = numbers(&first.data.cell, "wetted");
     assert!(!wetted.is_empty() && wetted.iter().all(|w| *w == 1.0));

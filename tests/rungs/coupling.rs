@@ -96,7 +96,7 @@ fn without(excluded: Exclusions, method: Method, solver: FullSolver, walls: &[Wa
 
 /// Every method with every solver that it has, without walls, with one and with two; and two bodies
 /// that feel each other's images alone.
-fn systems() -> Vec<Full> {
+pub(super) fn systems() -> Vec<Full> {
     vec![
         full(Method::MfsVertex, FullSolver::Cgls, &[]),
         full(Method::MfsVertex, FullSolver::Qr, &[WALL, SIDE]),
@@ -111,7 +111,7 @@ fn systems() -> Vec<Full> {
     ]
 }
 
-fn panels(faces: usize) -> Vec<Arc<PanelBoundary>> {
+pub(super) fn panels(faces: usize) -> Vec<Arc<PanelBoundary>> {
     let of = |shape: Shape| {
         let mesh = shape::build(&shape, Path::new("."), Some(faces)).unwrap();
         Arc::new(PanelBoundary::new("b", &mesh).unwrap())
@@ -136,7 +136,7 @@ fn coupled_panels(
     PanelCoupled::new(bodies, walls, excluded, settings).unwrap()
 }
 
-fn extrapolated_panels() -> ExtrapolatedPanels {
+pub(super) fn extrapolated_panels() -> ExtrapolatedPanels {
     let of = |faces| {
         let (bodies, gmres) = (panels(faces), FullSolver::Gmres);
         coupled_panels(bodies, gmres, &[WALL], Exclusions::none())
@@ -146,7 +146,7 @@ fn extrapolated_panels() -> ExtrapolatedPanels {
 
 /// Panels with both solvers, without walls, with rigid ones and a free surface; and two bodies that feel each other's images
 /// alone. A box's faces are flat, and its edges sharp.
-fn panel_systems() -> Vec<PanelCoupled> {
+pub(super) fn panel_systems() -> Vec<PanelCoupled> {
     let bodies = panels(80);
     let of = |solver: FullSolver, walls: &[Wall], excluded: Exclusions| {
         coupled_panels(bodies.clone(), solver, walls, excluded)
@@ -166,7 +166,7 @@ fn panel_systems() -> Vec<PanelCoupled> {
 
 /// Compressed bodies without walls, with rigid ones and a free surface, and fading out: between the
 /// bodies, and between each and its image.
-fn reduced_systems() -> Vec<Reduced> {
+pub(super) fn reduced_systems() -> Vec<Reduced> {
     let compressed = |shape: Shape| {
         let mesh = shape::build(&shape, Path::new("."), Some(320)).unwrap();
         let b = BodyBoundary::new("b", &mesh, &MfsSettings::default()).unwrap();
@@ -199,7 +199,7 @@ fn reduced_systems() -> Vec<Reduced> {
 
 /// Panels that come nearer than they resolve: to one another and to a wall, round ones and with edges, on one mesh and on two, by blocks and by the whole matrix.
 /// The film is there: it is what they differ by from those without.
-fn filmed_panels() -> Vec<FilmedPanels> {
+pub(super) fn filmed_panels() -> Vec<FilmedPanels> {
     let of = |shapes: [Shape; 2], walls: &[Wall], solver, excluded: &Exclusions, two: bool| {
         let built = |faces| shapes.clone().map(|s| mesh(&s, faces));
         let coupled = |faces| {
@@ -336,12 +336,12 @@ fn definite(phase: f64) -> Mat6 {
     a * a.transpose()
 }
 
-fn isolated() -> Isolated {
+pub(super) fn isolated() -> Isolated {
     Isolated::new(vec![definite(0.2), definite(1.4)])
 }
 
 /// Given added masses in the place of the bodies' own, of one body and of both: over fundamental solutions, compressed bodies with films, and panels.
-fn given_systems() -> Vec<Given> {
+pub(super) fn given_systems() -> Vec<Given> {
     let of = |computed: Box<dyn Coupling>, change: [Mat6; 2]| {
         Given::new(computed, change.to_vec()).unwrap()
     };
@@ -355,7 +355,7 @@ fn given_systems() -> Vec<Given> {
     ]
 }
 
-fn poses() -> [Pose; 2] {
+pub(super) fn poses() -> [Pose; 2] {
     [
         Pose::new(
             exp_matrix(&Vec3::new(0.2, -0.4, 0.3)),
@@ -369,13 +369,13 @@ fn poses() -> [Pose; 2] {
 }
 
 /// Displaces the poses by `exp(h z)`.
-fn displaced(z: &[Vec6], h: f64) -> Vec<Pose> {
+pub(super) fn displaced(z: &[Vec6], h: f64) -> Vec<Pose> {
     let pairs = poses().into_iter().zip(z);
     pairs.map(|(p, z)| p.displace(&(h * z))).collect()
 }
 
 /// Spatial displacements small enough for the step sizes of the checks.
-fn field(phase: f64) -> Vec<Vec6> {
+pub(super) fn field(phase: f64) -> Vec<Vec6> {
     let x = wavy(12, phase, 0.3);
     x.as_slice().chunks(6).map(Vec6::from_row_slice).collect()
 }

@@ -13,7 +13,9 @@ mod forward;
 mod multibody;
 mod policy;
 mod scan;
+mod sensor;
 mod shape;
+mod surface;
 mod tools;
 
 use hydrograd::adjoint;
@@ -37,7 +39,9 @@ fn registered() -> Vec<(String, Rung)> {
         force::rungs(),
         forward::rungs(),
         policy::rungs(),
+        sensor::rungs(),
         shape::rungs(),
+        surface::rungs(),
     ] {
         out.extend(part.into_iter().map(|r| (r.name.to_string(), r)));
     }
@@ -102,6 +106,44 @@ const THROUGH: &[(&str, &str)] = &[
     (
         "coupling::panel::filmed::FilmedLinearised::shape_vjp",
         SHAPE_VJP,
+    ),
+    // What sensors see of the layers of a body.
+    (
+        "boundary::panel::sensed::PanelBoundary::potential_at_vjp",
+        "simulate::sensor::Rollout::sensor_vjp",
+    ),
+    (
+        "boundary::panel::sensed::PanelBoundary::velocity_vjp",
+        "simulate::sensor::Rollout::sensor_vjp",
+    ),
+    // Pieces of the flow on surfaces, what hands it on, and what has none.
+    (
+        "boundary::panel::PanelBoundary::total_potential_vjp",
+        "coupling::isolated::Isolated::surface_potentials_vjp",
+    ),
+    (
+        "coupling::Coupling::surface_potentials_vjp",
+        "coupling::isolated::Isolated::surface_potentials_vjp",
+    ),
+    (
+        "coupling::panel::surface::PanelSolution::potentials_vjp",
+        "coupling::panel::PanelCoupled::surface_potentials_vjp",
+    ),
+    (
+        "coupling::panel::filmed::FilmedPanels::surface_potentials_vjp",
+        "coupling::panel::PanelCoupled::surface_potentials_vjp",
+    ),
+    (
+        "coupling::reduced::surface::ReducedLinearised::potentials_vjp",
+        "coupling::reduced::linearised::Reduced::surface_potentials_vjp",
+    ),
+    (
+        "gpu::reduced::GpuReduced::surface_potentials_vjp",
+        "coupling::reduced::linearised::Reduced::surface_potentials_vjp",
+    ),
+    (
+        "coupling::full::cpu::strengths::Cpu::strengths_vjp",
+        "coupling::full::Full::surface_potentials_vjp",
     ),
     ("coupling::panel::placed::PanelSolution::gradient", FULL_VJP),
     (

@@ -9,6 +9,7 @@ mod flow;
 mod gap_check;
 mod gap_error;
 mod given;
+mod lines;
 mod methods;
 mod near;
 mod one_body;
@@ -21,6 +22,7 @@ mod pressure;
 mod pressure_films;
 mod reduced;
 mod refine;
+mod sensors;
 mod several_pieces;
 mod shape_slopes;
 

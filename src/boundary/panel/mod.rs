@@ -24,6 +24,7 @@ mod hadamard;
 mod layers;
 pub mod richardson;
 mod richardson_slopes;
+mod sensed;
 mod shape;
 mod sheet;
 
@@ -196,6 +197,18 @@ impl PanelBoundary {
         });
         self.lu.solve(out.as_mut());
         Columns::from_fn(incident.rows, incident.columns, |i, k| out[(i, k)])
+    }
+
+    /// The transpose of [`PanelBoundary::total_potential`] for two columns: cotangents of the twists and of the incident potentials.
+    pub(crate) fn total_potential_vjp(&self, bar: &Columns) -> ([Vec6; 2], Columns) {
+        let mut out = bar.as_mat().to_owned();
+        self.lu.solve_transpose(out.as_mut());
+        let twist = |k: usize| {
+            let product = |i: usize, c: usize| self.single_layer[(i, c)] * out[(i, k)];
+            Vec6::from_fn(|c, _| (0..bar.rows).map(|i| product(i, c)).sum())
+        };
+        let incident = Columns::from_fn(bar.rows, 2, |i, k| out[(i, k)]);
+        ([twist(0), twist(1)], incident)
     }
 
     /// `(½I + Ω/4π)⁻¹`, column-major.

@@ -41,7 +41,7 @@ impl PanelBoundary {
     }
 
     /// n × ∇_s φ of each panel, the potential at a vertex the mean of its panels by area: m/s.
-    fn vorticity(&self, phi: &[f64]) -> Vec<Vec3> {
+    pub(super) fn vorticity(&self, phi: &[f64]) -> Vec<Vec3> {
         let (corners, vertices) = (self.panels.corners(), self.panels.vertices());
         let mut at_vertices = vec![(0.0, 0.0); vertices.len()];
         for ((corners, area), phi) in corners.iter().zip(&self.faces.areas).zip(phi) {
@@ -60,4 +60,23 @@ impl PanelBoundary {
         };
         corners.iter().zip(&self.faces.areas).map(of).collect()
     }
+}
+
+/// The transpose of a body's vorticity: the cotangents of the potentials of the panels.
+pub(super) fn sheet_bar(body: &PanelBoundary, bar: &[Vec3]) -> Vec<f64> {
+    let (corners, vertices) = (body.panels.corners(), body.panels.vertices());
+    let mut at_vertices = vec![(0.0, 0.0); vertices.len()];
+    for ((corners, area), bar) in corners.iter().zip(&body.faces.areas).zip(bar) {
+        let [a, b, c] = corners.map(|v| vertices[v as usize]);
+        let opposite = [c - b, a - c, b - a];
+        for (v, edge) in corners.iter().zip(opposite) {
+            let (sum, weight) = &mut at_vertices[*v as usize];
+            *sum -= edge.dot(bar) / (2.0 * area);
+            *weight += area;
+        }
+    }
+    let mean = |v: &u32| at_vertices[*v as usize].0 / at_vertices[*v as usize].1;
+    let each = corners.iter().zip(&body.faces.areas);
+    each.map(|(corners, area)| area * corners.iter().map(mean).sum::<f64>())
+        .collect()
 }

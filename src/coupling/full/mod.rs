@@ -38,11 +38,13 @@ pub use settings::{FullSolver, Preconditioner, SolveSettings};
 
 use super::response::{CoupledResponse, Solved};
 use super::surface::{self, Charges, Seen};
+use super::surface_back::{Back, onto_charges, pull, wrenches};
 use super::{
-    Coupling, Direction, Exclusions, Linearise, Linearised, Momenta, Motion, SurfacePotential,
+    Coupling, Direction, Exclusions, Linearise, Linearised, Momenta, Motion, MotionBar,
+    SurfacePotential,
 };
 use crate::Result;
-use crate::adjoint::lie::{Pose, Vec3};
+use crate::adjoint::lie::{Pose, Vec3, Vec6};
 use crate::boundary::{BodyBoundary, PanelBoundary};
 use crate::geometry::Wall;
 use crate::solver::Columns;
@@ -85,6 +87,36 @@ impl Full {
     /// What computes it.
     pub fn backend(&self) -> &dyn SystemBackend {
         self.backend.as_ref()
+    }
+
+    /// Strengths of all sources, and their rates where these are asked for: two columns.
+    fn strengths(&self, motion: &Motion) -> Result<Columns> {
+        let model = self.model();
+        let columns = motion.columns();
+        // Other backends don't tell rates of densities.
+        let own;
+        let backend: &dyn SystemBackend =
+            match motion.rates.is_some() && model.bodies.iter().all(|b| b.factored()) {
+                true => {
+                    own = Cpu::new(self.model.clone())?;
+                    &own
+                }
+                false => self.backend.as_ref(),
+            };
+        let response = backend.respond(motion.poses, &columns)?;
+        let strengths = response.densities()?;
+        let displaced = match motion.rates {
+            Some(_) => {
+                let first = DVector::from_column_slice(&[1.0, 0.0]);
+                let moving = response.directions(&[Direction::Basis(&first)])?;
+                moving.density_rates(motion.displacement)?
+            }
+            None => Columns::zeros(model.columns(), 1),
+        };
+        Ok(Columns::from_fn(model.columns(), 2, |j, k| match k {
+            0 => strengths.at(j, 0),
+            _ => strengths.at(j, 1) + displaced.at(j, 0),
+        }))
     }
 
     fn solved(
@@ -169,33 +201,10 @@ impl Coupling for Full {
     ) -> Result<Vec<SurfacePotential>> {
         surface::check(motion, surfaces)?;
         let model = self.model();
-        let columns = motion.columns();
-        // Other backends don't tell rates of densities.
-        let own;
-        let backend: &dyn SystemBackend =
-            match motion.rates.is_some() && model.bodies.iter().all(|b| b.factored()) {
-                true => {
-                    own = Cpu::new(self.model.clone())?;
-                    &own
-                }
-                false => self.backend.as_ref(),
-            };
-        let response = backend.respond(motion.poses, &columns)?;
-        let strengths = response.densities()?;
-        let displaced = match motion.rates {
-            Some(_) => {
-                let first = DVector::from_column_slice(&[1.0, 0.0]);
-                let moving = response.directions(&[Direction::Basis(&first)])?;
-                moving.density_rates(motion.displacement)?
-            }
-            None => Columns::zeros(model.columns(), 1),
-        };
+        let strengths = self.strengths(motion)?;
         let charges = (model.bodies.iter().zip(&model.sources)).map(|(body, range)| Charges {
             points: &body.sources,
-            strengths: Columns::from_fn(range.len(), 2, |j, k| {
-                let at = range.start + j;
-                strengths.at(at, k) + if k == 1 { displaced.at(at, 0) } else { 0.0 }
-            }),
+            strengths: strengths.part(range),
         });
         let charges: Vec<Charges> = charges.collect();
         let seen: Vec<Seen> = (model.pairs(motion.poses).iter())
@@ -209,6 +218,40 @@ impl Coupling for Full {
         Ok(surface::on_surfaces(
             motion, surfaces, &charges, &seen, None,
         ))
+    }
+
+    /// On the CPU.
+    fn surface_potentials_vjp(
+        &self,
+        motion: &Motion,
+        surfaces: &[Arc<PanelBoundary>],
+        bars: &[SurfacePotential],
+    ) -> Result<MotionBar> {
+        surface::check(motion, surfaces)?;
+        let Back { mut bar, densities } = onto_charges(surfaces, bars)?;
+        let cpu = Cpu::new(self.model.clone())?;
+        let (model, z) = (self.model(), motion.displacement);
+        let strengths = self.strengths(motion)?;
+        let mut beta = Columns::zeros(model.columns(), 2);
+        let bodies = model.bodies.len();
+        let (mut gradient, mut wrench) = (vec![Vec6::zeros(); bodies], vec![Vec6::zeros(); bodies]);
+        for pair in model.pairs(motion.poses) {
+            let (t, s) = (pair.target, &model.sources[pair.source]);
+            let pose = &motion.poses[t];
+            let (d, sign) = (pair.displacements(pose, z), pair.image.sign);
+            let mut own = beta.part(s);
+            let seen = (surfaces[t].faces.centres.as_slice(), &densities[t]);
+            let given = strengths.part(s);
+            let pulled = pull(&pair, &d, seen, &given, [sign, 0.0], &mut own);
+            beta.slice_mut(s).copy_from_slice(&own.data);
+            let forces = pulled.iter().map(|p| [sign * p.force, sign * p.dforce]);
+            let [w, dw] = wrenches(&pair, &d, forces);
+            pair.apply(pose, &w, &mut gradient);
+            pair.apply_jvp(pose, &w, &dw, &z[t], &mut wrench);
+        }
+        bar.add_pull(z, &gradient, &wrench);
+        cpu.strengths_vjp(motion, &beta, &mut bar)?;
+        Ok(bar)
     }
 }
 

@@ -15,8 +15,8 @@ use crate::adjoint::lie::{Pose, Vec3, Vec6};
 use crate::boundary::PanelBoundary;
 use crate::coupling::film::PlacedFilms;
 use crate::coupling::{
-    Coupling, CouplingReport, Direction, Linearise, Linearised, Momenta, Motion, Pullback,
-    ShapeDirection, ShapeTerm, SurfacePotential, Tangent,
+    Coupling, CouplingReport, Direction, Linearise, Linearised, Momenta, Motion, MotionBar,
+    Pullback, ShapeDirection, ShapeTerm, SurfacePotential, Tangent,
 };
 use crate::geometry::{Solid, TriMesh, Wall};
 use crate::{Error, Result};
@@ -204,6 +204,15 @@ impl Coupling for ExtrapolatedPanels {
         surfaces: &[Arc<PanelBoundary>],
     ) -> Result<Vec<SurfacePotential>> {
         self.fine.surface_potentials(motion, surfaces)
+    }
+
+    fn surface_potentials_vjp(
+        &self,
+        motion: &Motion,
+        surfaces: &[Arc<PanelBoundary>],
+        bars: &[SurfacePotential],
+    ) -> Result<MotionBar> {
+        self.fine.surface_potentials_vjp(motion, surfaces, bars)
     }
 }
 

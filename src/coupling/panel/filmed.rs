@@ -8,8 +8,8 @@ use crate::adjoint::lie::{Pose, Vec3, Vec6};
 use crate::boundary::PanelBoundary;
 use crate::coupling::film::{Extent, FilmBody, Films, PlacedFilms, Shares};
 use crate::coupling::{
-    Coupling, CouplingReport, Direction, Linearise, Linearised, Momenta, Motion, Pullback,
-    ShapeTerm, SurfacePotential, Tangent, surface,
+    Coupling, CouplingReport, Direction, Linearise, Linearised, Momenta, Motion, MotionBar,
+    Pullback, ShapeTerm, SurfacePotential, Tangent, surface,
 };
 use crate::geometry::{Solid, TriMesh, Wall};
 use crate::{Error, Result};
@@ -193,6 +193,21 @@ impl Coupling for FilmedPanels {
         }
         .add_water(motion, surfaces, &mut out);
         Ok(out)
+    }
+
+    /// # Errors
+    /// Films at these poses, and as without them.
+    fn surface_potentials_vjp(
+        &self,
+        motion: &Motion,
+        surfaces: &[Arc<PanelBoundary>],
+        bars: &[SurfacePotential],
+    ) -> Result<MotionBar> {
+        surface::check(motion, surfaces)?;
+        if self.placed(motion.poses, &motion.columns())?.any() {
+            return Err(surface::held_apart());
+        }
+        self.panels.surface_potentials_vjp(motion, surfaces, bars)
     }
 }
 

@@ -29,6 +29,7 @@ mod model;
 mod placed;
 mod second;
 mod shape;
+mod surface;
 mod sweep;
 mod system;
 
@@ -39,9 +40,10 @@ pub use model::PanelModel;
 use super::film::PlacedFilms;
 use super::full::{SolveSettings, SystemBackend};
 use super::response::{CoupledResponse, Solved};
-use super::surface;
+use super::surface::{check, check_bars};
 use super::{
-    Coupling, Exclusions, Linearise, Linearised, Momenta, Motion, ShapeDirection, SurfacePotential,
+    Coupling, Exclusions, Linearise, Linearised, Momenta, Motion, MotionBar, ShapeDirection,
+    SurfacePotential,
 };
 use crate::adjoint::lie::{Mat6, Pose, Vec3};
 use crate::boundary::PanelBoundary;
@@ -234,8 +236,24 @@ impl Coupling for PanelCoupled {
         motion: &Motion,
         surfaces: &[Arc<PanelBoundary>],
     ) -> Result<Vec<SurfacePotential>> {
-        surface::check(motion, surfaces)?;
+        check(motion, surfaces)?;
         self.surface_potentials_held(motion, &Arc::default())
+    }
+
+    /// On the CPU.
+    fn surface_potentials_vjp(
+        &self,
+        motion: &Motion,
+        surfaces: &[Arc<PanelBoundary>],
+        bars: &[SurfacePotential],
+    ) -> Result<MotionBar> {
+        check(motion, surfaces)?;
+        check_bars(surfaces, bars)?;
+        let (model, columns) = (self.model(), motion.columns());
+        // A twist of every body, so that all have what reads their impulses.
+        let all = DMatrix::from_element(columns.nrows(), 1, 1.0);
+        let placed = PlacedPanels::new(model, motion.poses, &Arc::default(), &all)?;
+        PanelSolution::of_potentials(Arc::new(placed), columns)?.potentials_vjp(motion, bars)
     }
 }
 

@@ -137,6 +137,16 @@ impl<'a> PlacedPanels<'a> {
         out
     }
 
+    /// Fᵀ Sᵀ μ of body `b` for one column μ; zero without a readout.
+    pub fn read(&self, b: usize, mu: &[f64]) -> Vec6 {
+        let Some(readout) = &self.readout[b] else {
+            return Vec6::zeros();
+        };
+        let rows = mu.iter().enumerate();
+        rows.map(|(i, m)| Vec6::from_row_slice(readout.row(i)) * *m)
+            .sum()
+    }
+
     /// ∇(S q − Ω/4π φ) of a pair's panels at its points, `[point][column][3]`, image's sign included: minus the velocity that they
     /// make there.
     fn fields(&self, pair: &Pair, solution: &PanelSolution) -> Vec<f64> {
@@ -192,14 +202,20 @@ impl<'a> PanelSolution<'a> {
     /// # Errors
     /// As there.
     pub fn of_potentials(placed: Arc<PlacedPanels<'a>>, twists: DMatrix<f64>) -> Result<Self> {
-        Ok(Self {
-            phi: placed.potentials(&twists)?,
+        let phi = placed.potentials(&twists)?;
+        Ok(Self::known(placed, twists, phi))
+    }
+
+    /// With these potentials, and without adjoint densities.
+    pub fn known(placed: Arc<PlacedPanels<'a>>, twists: DMatrix<f64>, phi: Columns) -> Self {
+        Self {
+            phi,
             mu: Columns::zeros(placed.coupled.rows(), 0),
             placed,
             twists,
             reached: Reached::default(),
             fields: OnceLock::new(),
-        })
+        }
     }
 
     /// Of every pair: ∇(S q − Ω/4π φ) of its panels at its points, `[point][column][3]`.

@@ -4,12 +4,11 @@ use super::placed::{PanelSolution, PlacedPanels, scaled};
 use crate::Result;
 use crate::adjoint::kernel::{double_hvp, double_jvp, double_vjp, single_hvp, single_jvp};
 use crate::adjoint::lie::{Vec3, Vec6, linear, point_wrench, six};
+use crate::coupling::Tangent;
 use crate::coupling::pair::{Pair, vector};
 use crate::coupling::response::symmetrised;
-use crate::coupling::{Motion, SurfacePotential, Tangent};
 use crate::solver::Columns;
 use nalgebra::DVector;
-use std::ops::Range;
 
 /// Tangents of φ and μ.
 pub(super) struct Moved {
@@ -23,46 +22,6 @@ pub(super) struct Displacements {
     pub points: Vec<Vec3>,
     /// Where they aren't held off.
     arms: Vec<Vec3>,
-}
-
-impl PanelSolution<'_> {
-    /// Potentials of the first of two columns, and their rates where the second has the rates of the twists and bodies are displaced as they move; what films
-    /// have themselves isn't in them.
-    ///
-    /// # Errors
-    /// A solve that misses its tolerance.
-    pub fn surface_potentials(&self, motion: &Motion) -> Result<Vec<SurfacePotential>> {
-        let placed = &self.placed;
-        if motion.rates.is_none() {
-            let still = Columns::zeros(self.phi.rows, 1);
-            return Ok(self.on_surfaces(&still));
-        }
-        let mut right = Columns::zeros(self.phi.rows, self.phi.columns);
-        let z = motion.displacement;
-        let films = placed.films.along(z);
-        for (pair, fields) in placed.pairs.iter().zip(self.fields()) {
-            let mut displacement = pair.displacements(&placed.poses[pair.target], z);
-            if let Some((apart, film)) = pair.moving(&films) {
-                let shift = apart.rate(film);
-                displacement.iter_mut().for_each(|d| *d += shift);
-            }
-            placed.add_moved(pair, fields, &displacement, &mut right);
-        }
-        let none = Columns::zeros(right.rows, 0);
-        let ([displaced, _], _) = placed.system.solve(&right, &none)?;
-        Ok(self.on_surfaces(&displaced))
-    }
-
-    fn on_surfaces(&self, displaced: &Columns) -> Vec<SurfacePotential> {
-        let of = |faces: &Range<usize>| SurfacePotential {
-            value: faces.clone().map(|i| self.phi.at(i, 0)).collect(),
-            rate: (faces.clone())
-                .map(|i| self.phi.at(i, 1) + displaced.at(i, 0))
-                .collect(),
-            film: None,
-        };
-        self.placed.coupled.faces.iter().map(of).collect()
-    }
 }
 
 impl PlacedPanels<'_> {
@@ -169,7 +128,13 @@ impl PlacedPanels<'_> {
     }
 
     /// Adds δS q − δA φ at the points of a pair, from its fields there.
-    fn add_moved(&self, pair: &Pair, fields: &[f64], displacement: &[Vec3], right: &mut Columns) {
+    pub(super) fn add_moved(
+        &self,
+        pair: &Pair,
+        fields: &[f64],
+        displacement: &[Vec3],
+        right: &mut Columns,
+    ) {
         let (_, points) = self.ranges(pair);
         let n = right.columns;
         for (i, d) in displacement.iter().enumerate() {

@@ -11,8 +11,8 @@ use crate::coupling::film::PlacedFilms;
 use crate::coupling::pair::{vector, wrench};
 use crate::coupling::surface;
 use crate::coupling::{
-    Coupling, CouplingReport, Direction, Linearise, Linearised, Momenta, Motion, Pullback,
-    ShapeTerm, SurfacePotential, Tangent,
+    Coupling, CouplingReport, Direction, Linearise, Linearised, Momenta, Motion, MotionBar,
+    Pullback, ShapeTerm, SurfacePotential, Tangent,
 };
 use crate::solver::Cholesky;
 use faer::linalg::matmul::matmul;
@@ -63,6 +63,17 @@ pub(super) struct ReducedResponse {
     a: DVector<f64>,
     /// α, all points.
     pub alpha: DVector<f64>,
+}
+
+impl ReducedResponse {
+    /// Charges alone.
+    pub fn of_charges(alpha: DVector<f64>) -> Self {
+        Self {
+            twists: DVector::zeros(0),
+            a: DVector::zeros(0),
+            alpha,
+        }
+    }
 }
 
 impl<'a> ReducedLinearised<'a> {
@@ -471,6 +482,17 @@ impl Coupling for Reduced {
         Ok(surface::on_surfaces(
             motion, surfaces, &charges, &seen, held,
         ))
+    }
+
+    fn surface_potentials_vjp(
+        &self,
+        motion: &Motion,
+        surfaces: &[Arc<PanelBoundary>],
+        bars: &[SurfacePotential],
+    ) -> Result<MotionBar> {
+        surface::check(motion, surfaces)?;
+        self.solved_apart(motion)?
+            .potentials_vjp(motion, surfaces, bars)
     }
 
     fn differentiable(&self) -> Option<&dyn Linearise> {

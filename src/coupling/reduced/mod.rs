@@ -31,6 +31,7 @@ mod region;
 mod resolved;
 mod second;
 mod shape;
+mod surface;
 mod views;
 
 pub use body::{CompressedParts, Fit, ReducedBody};

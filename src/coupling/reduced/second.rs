@@ -169,7 +169,7 @@ impl ReducedLinearised<'_> {
     }
 
     /// Wrench on the sources of a link and its tangent, in the target's frame; and of the forces on its points alone.
-    fn link_tangent(
+    pub(super) fn link_tangent(
         &self,
         placed: &PlacedSkeletons,
         (moved, field): &(Moved, Vec<f64>),

@@ -22,7 +22,9 @@ use super::points::{Compressed, PlacedPoints};
 use crate::adjoint::lie::Pose;
 use crate::boundary::PanelBoundary;
 use crate::coupling::reduced::Reduced;
-use crate::coupling::{Coupling, Linearise, Linearised, Momenta, Motion, SurfacePotential};
+use crate::coupling::{
+    Coupling, Linearise, Linearised, Momenta, Motion, MotionBar, SurfacePotential,
+};
 use crate::{Error, Result};
 use linearised::Solved;
 use nalgebra::DMatrix;
@@ -114,6 +116,17 @@ impl Coupling for GpuReduced {
         surfaces: &[Arc<PanelBoundary>],
     ) -> Result<Vec<SurfacePotential>> {
         self.reduced().surface_potentials(motion, surfaces)
+    }
+
+    /// On the CPU.
+    fn surface_potentials_vjp(
+        &self,
+        motion: &Motion,
+        surfaces: &[Arc<PanelBoundary>],
+        bars: &[SurfacePotential],
+    ) -> Result<MotionBar> {
+        self.reduced()
+            .surface_potentials_vjp(motion, surfaces, bars)
     }
 }
 

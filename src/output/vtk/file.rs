@@ -51,7 +51,9 @@ fn fills_blocks(data: &DataSet) -> bool {
     let (sizes, attributes) = match data {
         DataSet::PolyData { pieces, .. } => match pieces.as_slice() {
             [Piece::Inline(piece)] => {
-                let faces = [&piece.verts, &piece.polys].into_iter().flatten();
+                let faces = [&piece.verts, &piece.lines, &piece.polys]
+                    .into_iter()
+                    .flatten();
                 // Corners and ends of faces are numbers of eight bytes.
                 let numbers = faces.flat_map(|f| [f.num_verts(), f.num_cells()]);
                 let mut sizes: Vec<usize> = numbers.map(|n| 8 * n).collect();

@@ -8,21 +8,24 @@
 //! | `walls.vtp` | walls as squares around the scene, where there are any; of each its `wall` (number in the scene) and whether it is `free` (1) or rigid (0) |
 //! | `loads.pvd` | with [`Options::loads`], the series of `loads/loads_00000.vtp` …: a point at each body's origin with forces (N) and moments about it (N m), kind by kind |
 //! | `flow.pvd` | with [`Options::flow`], the series of `flow/flow_00000.vti` …: the water's `velocity` (m/s) on a grid, and where it is `resolved` |
+//! | `streamlines.pvd` | with [`Options::streamlines`], the series of `streamlines/streamlines_00000.vtp` …: lines along the water's `velocity` (m/s), and which `seed` each goes through |
 //!
 //! All axes are the world's. Numbers are in double precision, compressed without loss.
 
 mod file;
 mod flow;
+mod lines;
 mod loads;
 mod placed;
 mod pressure;
 mod surface;
 
 pub use flow::{Grid, MOST_POINTS};
+pub use lines::Streamlines;
 
 use super::frames::Frames;
 use super::room::Room;
-use crate::error::{in_order, readable};
+use crate::error::in_order;
 use crate::simulate::{Recording, Rollout};
 use crate::{Error, Result};
 use file::Series;
@@ -39,41 +42,20 @@ pub struct Options {
     /// What acts on every body ([`Rollout::loads`]), which takes a solve a frame.
     pub loads: bool,
     /// What the water does to every face of the bodies ([`Rollout::pressure`]), which takes solves of its own a frame: `pressure` of the flow and `hydrostatic` one of the water at rest, Pa, `water_velocity`,
-    /// m/s; `wetted`, 1 where they are known. All are zero on bodies that aren't in the water or have no shape, and on all bodies in frames where films hold some apart.
+    /// m/s; `wetted`, 1 where they are known. All are zero on bodies that aren't in the water or have no shape.
     pub pressure: bool,
     /// The water's velocity at the points of a grid ([`Rollout::flow`]), which takes a solve a frame.
     pub flow: Option<Grid>,
+    /// Lines along that velocity ([`Rollout::streamlines`]), which take a solve a frame.
+    pub streamlines: Option<Streamlines>,
 }
 
-/// What was written of a run.
-#[derive(Clone, Debug, Default, PartialEq)]
-pub struct Written {
-    /// The files to open: series, and walls.
-    pub files: Vec<PathBuf>,
-    /// Times (s) of the frames without pressures, though [`Options::pressure`] asked for them: films hold bodies apart there ([`Rollout::known_pressure`]).
-    pub without_pressure: Vec<f64>,
-}
-
-impl Written {
-    /// What should be known about it, with names and numbers.
-    pub fn warnings(&self) -> Vec<String> {
-        let Some(first) = self.without_pressure.first() else {
-            return Vec::new();
-        };
-        vec![format!(
-            "vtk: pressure: unknown in {} frames, first at t = {} s, where films carry gaps that the faces don't resolve: zero there, and wetted 0; more faces resolve smaller gaps",
-            self.without_pressure.len(),
-            readable(*first)
-        )]
-    }
-}
-
-/// Writes a run into a folder, which is made where there is none. Files of the same names are replaced; others that stand there stay.
+/// Writes a run into a folder, which is made where there is none. The files to open are given: series, and walls. Files of the same names are replaced; others that stand there stay.
 ///
 /// # Errors
 /// Frames that select nothing ([`Frames::check`]), a grid that is refused ([`Grid::counts`]); a folder or a file that can't be written, by its path; what
-/// [`Rollout::loads`], [`Rollout::known_pressure`] and [`Rollout::flow`] report.
-pub fn write(rollout: &Rollout, folder: &Path, options: &Options) -> Result<Written> {
+/// [`Rollout::loads`], [`Rollout::pressure`], [`Rollout::flow`] and [`Rollout::streamlines`] report.
+pub fn write(rollout: &Rollout, folder: &Path, options: &Options) -> Result<Vec<PathBuf>> {
     write_with(rollout, folder, options, || ControlFlow::Continue(()))
 }
 
@@ -86,7 +68,7 @@ pub fn write_with(
     folder: &Path,
     options: &Options,
     progress: impl Fn() -> ControlFlow<()> + Sync,
-) -> Result<Written> {
+) -> Result<Vec<PathBuf>> {
     let states = options.frames.states(rollout)?;
     if let Some(grid) = &options.flow {
         grid.counts()?;
@@ -103,25 +85,21 @@ pub fn write_with(
         }
     };
     let times: Vec<f64> = states.iter().map(|n| rollout.samples()[*n].time).collect();
-    let mut made = Written::default();
+    let mut made = Vec::new();
 
     let series = Series::new(folder, "bodies", "vtp", &times)?;
     let velocities = rollout.velocities();
     let frame = |(k, n): (usize, &usize)| {
         let data = surface::bodies(rollout, &room, &velocities, *n, options.pressure);
-        let written = data.and_then(|(data, known)| series.write(k, data).map(|()| known));
-        let known = *written.as_ref().unwrap_or(&true);
-        told(written.map(|_| ())).map(|()| known)
+        told(data.and_then(|data| series.write(k, data)))
     };
-    let known = in_order(states.par_iter().enumerate().map(frame))?;
-    let unknown = times.iter().zip(known).filter(|(_, known)| !known);
-    made.without_pressure = unknown.map(|(time, _)| *time).collect();
-    made.files.push(series.finish()?);
+    in_order(states.par_iter().enumerate().map(frame))?;
+    made.push(series.finish()?);
 
     if let Some(walls) = surface::walls(rollout, &room)? {
         let path = folder.join("walls.vtp");
         file::write(&path, walls)?;
-        made.files.push(path);
+        made.push(path);
     }
     if options.loads {
         let series = Series::new(folder, "loads", "vtp", &times)?;
@@ -129,7 +107,7 @@ pub fn write_with(
         for (k, data) in frames.into_iter().enumerate() {
             told(series.write(k, data))?;
         }
-        made.files.push(series.finish()?);
+        made.push(series.finish()?);
     }
     if let Some(grid) = &options.flow {
         let series = Series::new(folder, "flow", "vti", &times)?;
@@ -138,7 +116,15 @@ pub fn write_with(
             let data = flow::frame(rollout, grid, &points, *n);
             told(data.and_then(|data| series.write(k, data)))?;
         }
-        made.files.push(series.finish()?);
+        made.push(series.finish()?);
+    }
+    if let Some(drawn) = &options.streamlines {
+        let series = Series::new(folder, "streamlines", "vtp", &times)?;
+        for (k, n) in states.iter().enumerate() {
+            let data = lines::frame(rollout, drawn, *n);
+            told(data.and_then(|data| series.write(k, data)))?;
+        }
+        made.push(series.finish()?);
     }
     Ok(made)
 }

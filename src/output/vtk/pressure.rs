@@ -7,15 +7,9 @@ use crate::simulate::{Rollout, SurfacePressure};
 use crate::{Error, Result};
 use vtkio::model::Attribute;
 
-/// Pressures and the water's velocity at state `n`, in the order of the faces: zero, and not `wetted`, where there is none. Whether they are known at this state.
-pub(super) fn fields(
-    rollout: &Rollout,
-    all: &[Placed],
-    n: usize,
-) -> Result<([Attribute; 4], bool)> {
-    let found = rollout.known_pressure(n)?;
-    let known = found.is_some();
-    let found = found.unwrap_or_default();
+/// Pressures and the water's velocity at state `n`, in the order of the faces: zero, and not `wetted`, where there is none.
+pub(super) fn fields(rollout: &Rollout, all: &[Placed], n: usize) -> Result<[Attribute; 4]> {
+    let found = rollout.pressure(n)?;
     let count = all.iter().map(Placed::count).sum();
     let (mut dynamic, mut hydrostatic) = (Vec::with_capacity(count), Vec::with_capacity(count));
     let (mut velocity, mut wetted) = (Vec::with_capacity(3 * count), Vec::with_capacity(count));
@@ -35,13 +29,12 @@ pub(super) fn fields(
             velocity.extend_from_slice(u.as_slice());
         }
     }
-    let fields = [
+    Ok([
         array("pressure", 1, dynamic),
         array("hydrostatic", 1, hydrostatic),
         array("water_velocity", 3, velocity),
         array("wetted", 1, wetted),
-    ];
-    Ok((fields, known))
+    ])
 }
 
 /// Refuses pressures of other faces than those that are drawn.

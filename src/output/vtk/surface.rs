@@ -11,15 +11,14 @@ use crate::simulate::Rollout;
 use nalgebra::DMatrix;
 use vtkio::model::{Attribute, Attributes, DataSet, PolyDataPiece, VertexNumbers};
 
-/// All bodies at state `n`; `velocities` are those of their origins and their angular ones ([`Rollout::velocities`]). With `pressed`, what the water does to their faces as well;
-/// false besides where films keep that from being known.
+/// All bodies at state `n`; `velocities` are those of their origins and their angular ones ([`Rollout::velocities`]). With `pressed`, what the water does to their faces as well.
 pub(super) fn bodies(
     rollout: &Rollout,
     room: &Room,
     velocities: &DMatrix<f64>,
     n: usize,
     pressed: bool,
-) -> Result<(DataSet, bool)> {
+) -> Result<DataSet> {
     let poses = &rollout.samples()[n].poses;
     let each = room.meshes.iter().zip(poses).enumerate();
     let each = each.map(|(body, (mesh, pose))| Placed {
@@ -35,11 +34,8 @@ pub(super) fn bodies(
     let all = [points, surfaces].concat();
     // What is known of faces, body by body; one of a body without a shape.
     let mut fields = vec![velocity(rollout, velocities, &all, n)];
-    let mut known = true;
     if pressed {
-        let (found, all_known) = pressure::fields(rollout, &all, n)?;
-        fields.extend(found);
-        known = all_known;
+        fields.extend(pressure::fields(rollout, &all, n)?);
     }
 
     let (mut points, mut corners, mut body) = (Vec::new(), Vec::new(), Vec::new());
@@ -57,7 +53,7 @@ pub(super) fn bodies(
     data.cell.push(array("body", 1, body));
     data.cell.extend(fields);
     let vertices = all.iter().flat_map(|p| &p.vertices);
-    Ok((polygons(vertices, points, (corners, 3), data), known))
+    Ok(polygons(vertices, points, (corners, 3), data))
 }
 
 /// Velocities of the faces' centres, m/s, world axes.

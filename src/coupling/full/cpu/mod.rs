@@ -3,6 +3,7 @@
 mod first;
 mod placed;
 mod second;
+mod strengths;
 mod system;
 
 use super::{FullSolver, Model, SystemBackend};

@@ -64,7 +64,7 @@ impl<'a> PlacedBodies<'a> {
     }
 
     /// F x̄ of columns of twists, faces × k.
-    fn face_side(&self, twists: &DMatrix<f64>) -> Columns {
+    pub fn face_side(&self, twists: &DMatrix<f64>) -> Columns {
         let mut out = Columns::zeros(self.model.rows(), twists.ncols());
         for (b, body) in self.model.bodies.iter().enumerate() {
             if moves(twists, b) {

@@ -16,13 +16,20 @@ use support::reference::lamb;
 
 const FACES: [usize; 3] = [320, 1280, 5120];
 
+/// Entries below this part of the largest one of all are none: a sphere turns without water.
+const NONE: f64 = 1e-6;
+
 /// Worst error of the diagonal, in percent of the largest entry of its kind; zero where there is none.
 fn percent(found: &Mat6, exact: &[f64; 6]) -> f64 {
+    let all = exact.iter().fold(0.0f64, |m, x| m.max(x.abs()));
     let kinds = [0..3, 3..6].map(|at| {
         let largest = exact[at.clone()].iter().fold(0.0f64, |m, x| m.max(x.abs()));
         let errors = at.map(|i| (found[(i, i)] - exact[i]).abs());
         let worst = errors.fold(0.0, f64::max);
-        if largest > 0.0 { worst / largest } else { 0.0 }
+        match largest > NONE * all {
+            true => worst / largest,
+            false => 0.0,
+        }
     });
     100.0 * kinds[0].max(kinds[1])
 }

@@ -103,10 +103,10 @@ impl<'a> Facet<'a> {
         let moved = scale(w.slope * difference * r[0].like(-2.0 / 3.0), r);
         let grown = -(w.slope * difference * squared);
         let mut corners = far.corners;
-        for k in 0..3 {
-            let out = scale_add(w.value, sub(near.corners[k], far.corners[k]), corners[k]);
+        for (k, corner) in corners.iter_mut().enumerate() {
+            let out = scale_add(w.value, sub(near.corners[k], *corner), *corner);
             let out = scale_add(grown, constant(grown, &self.radii[k]), out);
-            corners[k] = [out[0] + moved[0], out[1] + moved[1], out[2] + moved[2]];
+            *corner = [out[0] + moved[0], out[1] + moved[1], out[2] + moved[2]];
         }
         Moved {
             value: w.value.mul_add(difference, far.value),
@@ -138,14 +138,14 @@ impl<'a> Facet<'a> {
         }
         let height = dot(constant(x, &self.normal), r[0]);
         let mut corners = [normal; 3];
-        for k in 0..3 {
+        for (k, corner) in corners.iter_mut().enumerate() {
             // λ_k at the point is −∇λ_k·r of any corner where it is 0.
             let share = dot(constant(x, &self.shares[k]), r[NEXT[k]]);
             let tilt = height * dot(constant(x, &self.tilts[k]), logs);
             let out = scale(share.mul_add(angle, tilt), normal);
             let out = scale_add(starts[k], constant(x, &panel.outward[k]), out);
             let before = BEFORE[k];
-            corners[k] = scale_add(ends[before], constant(x, &panel.outward[before]), out);
+            *corner = scale_add(ends[before], constant(x, &panel.outward[before]), out);
         }
         Moved { value, corners }
     }
@@ -164,10 +164,10 @@ impl<'a> Facet<'a> {
             edges[e] = scale(below.like(1.0) / below, cross(r[e], along));
         }
         let mut corners = edges;
-        for k in 0..3 {
+        for (k, corner) in corners.iter_mut().enumerate() {
             let (a, b) = (edges[k], edges[BEFORE[k]]);
             let sum = [a[0] + b[0], a[1] + b[1], a[2] + b[2]];
-            corners[k] = scale(-(weight / l[k]), sum);
+            *corner = scale(-(weight / l[k]), sum);
         }
         Moved {
             value: weight * angle,
@@ -182,10 +182,10 @@ impl<'a> Facet<'a> {
         let charge = self.panel.charge(far);
         let moved = scale(charge * x.like(-1.0 / 3.0), far.gradient());
         let mut corners = [moved; 3];
-        for k in 0..3 {
+        for (k, corner) in corners.iter_mut().enumerate() {
             let out = scale_add(weight * value, constant(x, &self.areas[k]), moved);
             let spread = far.value_spread(constant(x, &self.arms[k]));
-            corners[k] = scale_add(charge * x.like(1.0 / 6.0), spread, out);
+            *corner = scale_add(charge * x.like(1.0 / 6.0), spread, out);
         }
         Moved {
             value: charge * value,
@@ -202,11 +202,11 @@ impl<'a> Facet<'a> {
         let moved = scale(x.like(-1.0 / 3.0), gradient);
         let mut corners = [moved; 3];
         let turned = alpha * x.like(-0.5 * self.panel.weight);
-        for k in 0..3 {
+        for (k, corner) in corners.iter_mut().enumerate() {
             let along = constant(x, &self.panel.along[NEXT[k]]);
             let out = scale_add(turned, cross(along, far.r), moved);
             let spread = far.alpha_spread(constant(x, &self.arms[k]));
-            corners[k] = scale_add(height * x.like(1.0 / 6.0), spread, out);
+            *corner = scale_add(height * x.like(1.0 / 6.0), spread, out);
         }
         Moved {
             value: height * alpha,

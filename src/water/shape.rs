@@ -162,10 +162,10 @@ impl ShapeChange {
     /// # Errors
     /// A formula whose numbers left what they may be.
     pub fn properties(&self, surface: &Surface, t: f64) -> Result<MassProperties> {
-        if let (Some(changed), true) = (self.formula(t), surface.by_formula) {
-            if let Some(found) = MassProperties::by_formula(&changed)? {
-                return Ok(found.transformed(&self.offset));
-            }
+        if let (Some(changed), true) = (self.formula(t), surface.by_formula)
+            && let Some(found) = MassProperties::by_formula(&changed)?
+        {
+            return Ok(found.transformed(&self.offset));
         }
         Ok(self.moved(&surface.mesh, t).mass_properties())
     }

@@ -397,7 +397,7 @@ fn shape_slopes(problem: &Problem) -> Result<Vec<(usize, ShapeSlope)>> {
                 && problem.chosen(a) == problem.chosen(b)
                 && asked(of) == asked(group)
         };
-        if let Some(first) = groups[..n].iter().position(|of| same(of)) {
+        if let Some(first) = groups[..n].iter().position(same) {
             let from: usize = groups[..first].iter().map(|g| g.len()).sum();
             let known = out[from..from + group.len()].to_vec();
             out.extend(known.into_iter().map(|(_, slope)| (b, slope)));

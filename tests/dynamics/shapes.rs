@@ -92,8 +92,7 @@ fn worst(scene: &Scene, settings: &Settings, part: f64) -> f64 {
     let least = 1e-3 * size.abs();
     let largest = found.iter().fold(least, |m: f64, (_, a, _)| m.max(a.abs()));
     let off = |(_, a, d): &(String, f64, f64)| (a - d).abs() / largest;
-    let worst = found.iter().map(off).fold(0.0, f64::max);
-    worst
+    found.iter().map(off).fold(0.0, f64::max)
 }
 
 fn shapes() -> [Shape; 6] {

@@ -35,6 +35,10 @@ mod water;
 
 /// The book's programs are tested.
 #[cfg(doctest)]
+#[doc = include_str!("../docs/shapes.md")]
+struct Shapes;
+
+#[cfg(doctest)]
 #[doc = include_str!("../docs/gradients.md")]
 mod gradients {}
 

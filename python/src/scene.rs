@@ -258,10 +258,8 @@ impl Scene {
     /// The scene with other values of some of `shape_parameters`, or of coordinates of a mesh's vertices ("hull.vertex.17.x") that is given number by number. What would turn a
     /// body inside out is refused.
     fn with_shape_parameters(&self, values: BTreeMap<String, f64>) -> PyResult<Self> {
-        let mut out = self.0.clone();
-        for (name, value) in &values {
-            out = out.with_shape_parameter(name, *value).or_raise()?;
-        }
+        let values = values.iter().map(|(name, value)| (name.as_str(), *value));
+        let out = self.0.with_shape_parameters(values).or_raise()?;
         Ok(Self(out))
     }
 

@@ -256,7 +256,7 @@ pub(crate) fn assemble(
     let lubricated = lubrication::lubricated(scene, &surfaces, &clearance)?;
     shape::refuse(scene, &changes, &lubricated, !streams.is_empty())?;
     let floating = scene.waterline.is_some();
-    let changed = shape::changed_surfaces(&changes, &shapes, &surfaces, floating);
+    let changed = shape::changed_surfaces(scene, &changes, &shapes, &surfaces, floating);
     let parts = force::ForceParts {
         scene,
         time_step: dt,

@@ -8,7 +8,7 @@ use crate::dynamics::{
     BodyValues, ChangedShape, Declarations, Declared, Follows, Owner, Parameter, Range, Shapes,
     body_places,
 };
-use crate::scene::Scene;
+use crate::scene::{Drag, Scene};
 use crate::water::{ShapeChange, Surface, pose};
 use crate::{Error, Result};
 use std::path::Path;
@@ -73,6 +73,7 @@ const STEP: f64 = 1e-5;
 
 /// Surfaces changed by the parameters `shapes`, for forces that follow from them; `floating` where water has a surface.
 pub(super) fn changed_surfaces(
+    scene: &Scene,
     changes: &[ShapeChange],
     shapes: &Shapes,
     surfaces: &[Option<Surface>],
@@ -80,6 +81,11 @@ pub(super) fn changed_surfaces(
 ) -> Vec<ChangedSurface> {
     let changed = |(change, parameter): (&ShapeChange, &Parameter)| {
         let mesh = &surfaces[change.body].as_ref()?.mesh;
+        // Each holds the whole surface twice: only where a force follows from it.
+        let drags = |d: Drag| d.linear != 0.0 || d.quadratic != 0.0;
+        if !floating && !scene.bodies[change.body].drag.is_some_and(drags) {
+            return None;
+        }
         let step = STEP * change.size;
         let moved = [step, -step].map(|t| change.moved(mesh, t));
         Some(ChangedSurface {
@@ -139,6 +145,7 @@ pub(super) fn changed_contacts(
             body: change.body,
             parameter: *parameter,
             step,
+            reach: step * change.reach(&surface.mesh),
             shapes: [at(step)?, at(-step)?],
         });
     }

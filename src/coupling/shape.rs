@@ -5,6 +5,7 @@
 //! ([`Linearised::shape_vjp`](super::Linearised::shape_vjp)).
 
 use super::Direction;
+use crate::Error;
 use crate::adjoint::lie::{Mat6, Vec3, Vec6};
 
 /// How a body changes with one of its shape parameters, per unit of that.
@@ -30,4 +31,13 @@ pub struct ShapeTerm<'a> {
     pub y: Direction<'a>,
     /// The displacement, if it is of the energy's slope.
     pub along: Option<&'a [Vec6]>,
+}
+
+/// Why there are no derivatives where a film acts.
+pub(super) fn filmed() -> Error {
+    Error::Unsupported {
+        what: "derivatives with respect to shapes where a film carries a gap".into(),
+        why: "how the film changes with the shape isn't told".into(),
+        instead: "keep bodies farther apart, or leave the films out (`films` = false)".into(),
+    }
 }

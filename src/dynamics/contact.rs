@@ -28,8 +28,10 @@ pub struct ChangedShape {
     pub body: usize,
     /// Its parameter.
     pub parameter: Parameter,
-    /// The change of it, m.
+    /// The change of it.
     pub step: f64,
+    /// How far any point of the surface moves by that, m.
+    pub reach: f64,
     /// The shapes.
     pub shapes: [Contacts; 2],
 }

@@ -5,8 +5,8 @@ use crate::adjoint::contact::ContactBar;
 use crate::adjoint::lie::{Pose, Vec3};
 use crate::contact::ContactPoint;
 
-/// How far beyond a place's gap the same place is looked for on a changed shape, and how far from where it was, in changes of the parameter.
-const AROUND: f64 = 100.0;
+/// How far beyond a place's gap the same place is looked for on a changed shape, and how far from where it was, in what the surface moves by: a place on a flat side moves far.
+const AROUND: f64 = 1000.0;
 
 impl System {
     /// Adds the cotangents of shapes for those of what a place consists of, the bodies resting: from the same place on shapes a little larger and smaller.
@@ -26,7 +26,7 @@ impl System {
             if changed.body != at.first && Some(changed.body) != at.second {
                 continue;
             }
-            let near = AROUND * changed.step;
+            let near = AROUND * changed.reach;
             let value = |side: usize| {
                 let reach = at.point.gap + near;
                 // Where nothing is found any more nothing is known of a change.

@@ -1,7 +1,10 @@
 //! The shapes of a scene as numbers that may be changed.
 
 use super::{Scene, Shape};
+use crate::shape;
 use crate::{Error, Result};
+use std::collections::BTreeMap;
+use std::path::Path;
 
 impl Scene {
     /// The parameters of all bodies' shapes with their values, m (a mesh's scale: 1): `body.radius`, `body.size.y` … ([`Shape::parameters`]).
@@ -20,44 +23,74 @@ impl Scene {
     /// # Errors
     /// A name that isn't there, or a value that would invert the body or that its shape can't have.
     pub fn with_shape_parameter(&self, name: &str, value: f64) -> Result<Self> {
-        let refused = |right: String| Error::input("shape parameter", format!("{name:?}"), right);
-        let of = |body: &super::Body| {
-            name.strip_prefix(&body.name)?
-                .strip_prefix('.')
-                .map(str::len)
-        };
-        // The longest name that fits, should one body's name begin with another's.
-        let fitting = self.bodies.iter().enumerate();
-        let fitting = fitting.filter_map(|(b, body)| Some((of(body)?, b)));
-        let found = fitting.min().and_then(|(rest, b)| {
-            let shape = self.bodies[b].shape.as_ref()?;
-            Some((b, shape, &name[name.len() - rest..]))
-        });
-        let Some((b, shape, own)) = found else {
-            let known = self.shape_parameters().into_iter().map(|(name, _)| name);
-            let known: Vec<String> = known.collect();
-            return Err(refused(format!("must be one of {known:?}")));
-        };
-        let changed = match (shape, vertex(own)) {
-            (Shape::Triangles { vertices, faces }, Some((v, axis))) => {
-                let mut vertices = vertices.clone();
-                let count = vertices.len();
-                let at = vertices.get_mut(v);
-                *at.map(|x| &mut x[axis])
-                    .ok_or_else(|| refused(format!("the mesh has {count} vertices")))? = value;
-                Shape::triangles(vertices, faces.clone())
-            }
-            (Shape::Mesh { .. }, Some(_)) => {
-                return Err(refused(
-                    "the vertices of a file are the file's: give the shape as triangles".into(),
-                ));
-            }
-            _ => (shape.with_parameter(own, value))
-                .map_err(|e| e.of(&format!("body {:?}", self.bodies[b].name)))?,
-        };
+        self.with_shape_parameters([(name, value)])
+    }
+
+    /// The same of several at once, which are checked together.
+    ///
+    /// # Errors
+    /// As [`Scene::with_shape_parameter`].
+    pub fn with_shape_parameters<'n>(
+        &self,
+        values: impl IntoIterator<Item = (&'n str, f64)>,
+    ) -> Result<Self> {
         let mut out = self.clone();
-        out.bodies[b].shape = Some(changed);
+        let mut changed: BTreeMap<usize, Vec<String>> = BTreeMap::new();
+        for (name, value) in values {
+            let b = out.set_shape_parameter(name, value)?;
+            changed
+                .entry(b)
+                .or_default()
+                .push(format!("{name} = {value}"));
+        }
+        for (b, told) in changed {
+            let Some(shape) = &out.bodies[b].shape else {
+                continue;
+            };
+            let place = format!("shape parameter {}", told.join(", "));
+            shape::validate(shape, &place)?;
+            if let Shape::Triangles { .. } = shape {
+                shape::build(shape, Path::new(""), None).map_err(|e| e.of(&place))?;
+            }
+        }
         Ok(out)
+    }
+
+    /// Sets one, unchecked; its body.
+    fn set_shape_parameter(&mut self, name: &str, value: f64) -> Result<usize> {
+        let refused = |right: String| Error::input("shape parameter", format!("{name:?}"), right);
+        for (b, body) in self.bodies.iter_mut().enumerate() {
+            // One body's name may begin with another's.
+            let own = name
+                .strip_prefix(&body.name)
+                .and_then(|n| n.strip_prefix('.'));
+            let (Some(own), Some(shape)) = (own, &mut body.shape) else {
+                continue;
+            };
+            let known = shape.parameters();
+            if let Some(at) = known.iter().position(|(known, _)| known == own) {
+                *shape = shape.with_nth_parameter(at, value);
+                return Ok(b);
+            }
+            match (shape, vertex(own)) {
+                (Shape::Triangles { vertices, .. }, Some((v, axis))) => {
+                    let count = vertices.len();
+                    let at = vertices.get_mut(v);
+                    *at.map(|x| &mut x[axis])
+                        .ok_or_else(|| refused(format!("the mesh has {count} vertices")))? = value;
+                    return Ok(b);
+                }
+                (Shape::Mesh { .. }, Some(_)) => {
+                    return Err(refused(
+                        "the vertices of a file are the file's: give the shape as triangles".into(),
+                    ));
+                }
+                _ => {}
+            }
+        }
+        let known = self.shape_parameters().into_iter().map(|(name, _)| name);
+        let known: Vec<String> = known.collect();
+        Err(refused(format!("must be one of {known:?}")))
     }
 }
 

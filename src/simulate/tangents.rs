@@ -63,6 +63,8 @@ struct Directions<'a> {
     /// Chosen parameters × K, with their places.
     parameters: DMatrix<f64>,
     places: Vec<usize>,
+    /// Where chosen ones have an effect beside their own: a row of `parameters`, a parameter's place, the slope.
+    follows: Vec<(usize, usize, f64)>,
     /// Gains × K.
     gains: DMatrix<f64>,
     /// Controls × K, at a step.
@@ -247,6 +249,12 @@ impl Rollout {
         Ok(out)
     }
 
+    /// What follows from the parameters at these places.
+    fn followers(&self, places: &[usize]) -> Vec<(usize, usize, f64)> {
+        let shapes = &self.simulator.system().shapes;
+        shapes.followers(self.simulator.parameters(), places)
+    }
+
     /// Observables with derivatives.
     fn named(&self, names: &[&str]) -> Result<Vec<Named>> {
         let of = |name: &&str| {
@@ -389,6 +397,7 @@ impl Rollout {
             v: half(nv),
             parameters: none.clone(),
             places: Vec::new(),
+            follows: Vec::new(),
             gains: none.clone(),
             controls: Box::new(move |_| none.clone()),
         };
@@ -425,6 +434,7 @@ impl Rollout {
             parameters: DMatrix::from_fn(places.len(), count, |i, k| {
                 displacements[k].parameters.as_slice()[places[i]]
             }),
+            follows: self.followers(&places),
             places,
             gains: DMatrix::from_fn(gains, count, |i, k| displacements[k].gains[i]),
             controls: Box::new(move |n| {
@@ -464,6 +474,7 @@ impl Rollout {
             q: by_q,
             v: by_v,
             parameters: units(places.len(), &parameters),
+            follows: self.followers(&places),
             places,
             gains: units(gains, &own_gains),
             controls: Box::new(move |n| {
@@ -533,6 +544,9 @@ impl Directions<'_> {
         let mut values = vec![0.0; at.as_slice().len()];
         for (place, x) in self.places.iter().zip(column.iter()) {
             values[*place] += x;
+        }
+        for (from, to, slope) in &self.follows {
+            values[*to] += slope * column[*from];
         }
         at.with_values(&values)
     }

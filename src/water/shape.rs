@@ -73,7 +73,7 @@ impl ShapeChange {
                     let below = full.strip_prefix(pattern.as_str());
                     let named = below.is_some_and(|rest| rest.is_empty() || rest.starts_with('.'));
                     // Thousands of vertices are meant by their own name only.
-                    let short = pattern == ALL || *pattern == body.name;
+                    let short = pattern.len() <= body.name.len();
                     (named || pattern == ALL) && !(vertex && short)
                 };
                 let mut any = false;
@@ -162,7 +162,9 @@ impl ShapeChange {
     /// # Errors
     /// A formula whose numbers left what they may be.
     pub fn properties(&self, surface: &Surface, t: f64) -> Result<MassProperties> {
+        // A prism's mesh is exact, and a larger change might bend its profile inwards.
         if let (Some(changed), true) = (self.formula(t), surface.by_formula)
+            && !matches!(changed, Shape::Prism { .. })
             && let Some(found) = MassProperties::by_formula(&changed)?
         {
             return Ok(found.transformed(&self.offset));
@@ -176,6 +178,12 @@ impl ShapeChange {
             What::Formula(shape, at) => Some(shape.with_nth_parameter(*at, self.value + t)),
             What::Vertex(..) => None,
         }
+    }
+
+    /// How far any vertex of a mesh of the body moves per unit of the parameter, m.
+    pub fn reach(&self, mesh: &TriMesh) -> f64 {
+        let speeds = self.vertices(mesh).into_iter().map(|v| v.norm());
+        speeds.fold(0.0, f64::max)
     }
 
     /// A mesh of the body with the parameter changed by `t`.
@@ -251,16 +259,16 @@ fn unknown(scene: &Scene, name: &str) -> Error {
         let own = shape.parameters().into_iter();
         known.extend(own.map(|(name, _)| format!("{}.{name}", body.name)));
         if shape.is_mesh() && body.refine.is_empty() {
-            known.push(format!("{}.{VERTEX}", body.name));
+            known.push(format!("{}.{VERTEX} (all vertices of the mesh)", body.name));
         }
     }
     Error::input(
         "settings: shape_parameters",
         format!("{name:?}"),
         match known.is_empty() {
-            true => "no body of the scene has a shape".into(),
+            true => "no body of the scene has a shape with parameters (a mesh with refined regions has none)".into(),
             false => format!(
-                "must be {ALL:?}, a body with a shape, or one of {}",
+                "must be one of {}, what such a name begins with, or {ALL:?} for all but vertices",
                 known.join(", ")
             ),
         },

@@ -1,6 +1,7 @@
 //! Shapes as parameters of rollouts: gradients against differences of scenes that are built anew.
 
 use crate::support::INTEGRATORS;
+use crate::support::forward::{self, check_forward};
 use hydrograd::dynamics::Integrator;
 use hydrograd::scene::{Body, BodyId, Contact, Drag, DragPart, Fluid, Joint, Scene};
 use hydrograd::{Controls, Fidelity, Settings, Shape, Simulator, objective};
@@ -59,7 +60,7 @@ fn value(simulator: &Simulator) -> (f64, hydrograd::simulate::Gradient) {
     (rollout.value(&goal).unwrap(), gradient)
 }
 
-/// Worst difference between the gradient and that of rebuilt scenes, relative to the largest entry (per relative change), or to a thousandth of the
+/// Worst difference between the gradient and that of rebuilt scenes, relative to it (per relative change), or to a twentieth of the largest one, or to a thousandth of the
 /// value; `part` of a length is the step of the differences.
 fn worst(scene: &Scene, settings: &Settings, part: f64) -> f64 {
     let simulator = Simulator::new(scene, settings.clone()).unwrap();
@@ -91,7 +92,7 @@ fn worst(scene: &Scene, settings: &Settings, part: f64) -> f64 {
     // A ball that nothing pushes moves the same whatever its radius.
     let least = 1e-3 * size.abs();
     let largest = found.iter().fold(least, |m: f64, (_, a, _)| m.max(a.abs()));
-    let off = |(_, a, d): &(String, f64, f64)| (a - d).abs() / largest;
+    let off = |(_, a, d): &(String, f64, f64)| (a - d).abs() / a.abs().max(0.05 * largest);
     found.iter().map(off).fold(0.0, f64::max)
 }
 
@@ -160,7 +161,7 @@ fn compressed_bodies_follow_their_shapes() {
         let settings = settings(Fidelity::Reduced, integrator).accuracy(1e-4);
         let off = worst(&near(), &settings, 0.05);
         println!("{integrator:?}: {off:.1e}");
-        assert!(off < 3e-3, "{integrator:?}: {off:e}");
+        assert!(off < 0.06, "{integrator:?}: {off:e}");
     }
 }
 
@@ -249,11 +250,14 @@ fn contact_follows_shapes() {
         scene.initial.v = vec![
             0.3, 0.4, -2.0, 0.5, 0.4, -0.6, -0.3, -3.0, -0.5, 0.3, -0.5, 0.2,
         ];
-        let off = worst(
-            &scene,
-            &settings(Fidelity::Isolated, Integrator::MomentumEuler),
-            1e-4,
-        );
+        let settings = settings(Fidelity::Isolated, Integrator::MomentumEuler);
+        let simulator = Simulator::new(&scene, settings.clone()).unwrap();
+        let rollout = simulator
+            .rollout(&Controls::zeros(&simulator, STEPS))
+            .unwrap();
+        let pressed = (0..STEPS).map(|n| rollout.contacts(n, 0.0).unwrap().len());
+        assert!(pressed.sum::<usize>() > 2, "{}", shape.kind());
+        let off = worst(&scene, &settings, 1e-4);
         println!("{}: {off:.1e}", shape.kind());
         assert!(off < 1e-5, "{}: {off:e}", shape.kind());
     }
@@ -270,6 +274,31 @@ fn every_vertex_of_a_mesh() {
     let off = worst(&scene(&[shape]), &settings, 1e-4);
     println!("{off:.1e}");
     assert!(off < 1e-6, "{off:e}");
+}
+
+/// Forward mode against the transpose: states, and an observable that has masses and inertias in it.
+#[test]
+fn forward_mode_takes_what_follows_along() {
+    let scene = near();
+    for fidelity in [Fidelity::Isolated, Fidelity::Full] {
+        let settings = settings(fidelity, Integrator::Midpoint).faces(60);
+        let simulator = Simulator::new(&scene, settings).unwrap();
+        check_forward(&format!("{fidelity:?}"), &simulator, 4, forward::LIMIT);
+    }
+}
+
+/// Thin prisms with profiles that a larger change of a corner would bend inwards.
+#[test]
+fn every_shape_of_an_example() {
+    let settings = Settings::default()
+        .fidelity(Fidelity::Isolated)
+        .faces(60)
+        .shape_parameters(vec!["*".into()]);
+    let scene = crate::support::example("grasp");
+    let simulator = Simulator::new(&scene, settings).unwrap();
+    for (name, value) in scene.shape_parameters() {
+        assert_eq!(simulator.parameters().get(&name).unwrap(), value);
+    }
 }
 
 #[test]

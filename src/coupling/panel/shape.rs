@@ -13,6 +13,7 @@
 
 use super::placed::{PanelSolution, PlacedPanels, scaled};
 use super::second::Displacements;
+use crate::Result;
 use crate::adjoint::kernel::{
     CornerSums, Form, Sources, Triangles, corner_hvp, corner_vjp, double_hvp, layers_vjp,
     single_hvp,
@@ -20,9 +21,9 @@ use crate::adjoint::kernel::{
 use crate::adjoint::lie::{Vec3, Vec6, angular};
 use crate::coupling::pair::{Pair, vector};
 use crate::coupling::response::body_twists;
+use crate::coupling::shape::filmed;
 use crate::coupling::{Direction, ShapeTerm};
 use crate::solver::Columns;
-use crate::{Error, Result};
 use nalgebra::{DMatrix, DVector};
 
 /// Products μᵀ(S q − K φ) + fᵀ φ, a column each: weights are in μ and f.
@@ -87,7 +88,7 @@ impl PanelSolution<'_> {
             return Ok(DVector::zeros(0));
         }
         if placed.films.any() {
-            return Err(held_apart());
+            return Err(filmed());
         }
         let mut bars: Vec<Option<Vec<[Vec3; 3]>>> = vec![None; model.bodies.len()];
         for shape in shapes {
@@ -338,14 +339,5 @@ impl PlacedPanels<'_> {
 fn spread(centroids: impl Iterator<Item = Vec3>, corners: &mut [[Vec3; 3]]) {
     for (force, corners) in centroids.zip(corners) {
         corners.iter_mut().for_each(|c| *c += force / 3.0);
-    }
-}
-
-/// What a film has no derivative of.
-pub(super) fn held_apart() -> Error {
-    Error::Unsupported {
-        what: "derivatives with respect to shapes where a film acts in a gap".into(),
-        why: "how the film's extent changes with the shape isn't told".into(),
-        instead: "keep bodies farther apart, use finer faces, or leave the films out".into(),
     }
 }

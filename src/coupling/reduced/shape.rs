@@ -15,7 +15,7 @@ use super::views::FLUX;
 use crate::Result;
 use crate::adjoint::lie::{Mat3, Mat6, Vec3, Vec6, angular};
 use crate::coupling::ShapeTerm;
-use crate::coupling::surface;
+use crate::coupling::shape::filmed;
 use nalgebra::{DMatrix, DVector};
 
 /// How a compressed body changes with a shape parameter, per unit of that, in its own frame.
@@ -63,7 +63,7 @@ impl ReducedLinearised<'_> {
             return Ok(out);
         }
         if self.films.any() {
-            return Err(surface::held_apart());
+            return Err(filmed());
         }
         for term in terms {
             let (x, y) = (self.respond(term.x), self.respond(term.y));

@@ -54,13 +54,21 @@ impl Rollout {
     /// They are of positions, rotations, the observables `velocities` and `accelerations`, and the density: what readings follow from.
     ///
     /// # Errors
-    /// As [`Rollout::sensor_flow`] and [`Rollout::sensor_pressure`] at states whose cotangents aren't zero; cotangents of other sizes or not finite.
+    /// As [`Rollout::sensor_flow`] and [`Rollout::sensor_pressure`] at states whose cotangents aren't zero; cotangents of other sizes or not finite; shape parameters.
     pub fn sensor_vjp(
         &self,
         sensors: &[Sensor],
         flow: Option<&DMatrix<f64>>,
         pressure: Option<&DMatrix<f64>>,
     ) -> Result<Cotangents> {
+        if !self.simulator().system().shapes.water.is_empty() {
+            return Err(Error::Unsupported {
+                what: "gradients of what sensors read with shape parameters".into(),
+                why: "how the flow at a place changes with a shape, all else at rest, isn't told"
+                    .into(),
+                instead: "leave the setting shape_parameters out, or the sensors".into(),
+            });
+        }
         let placed = self.placed(sensors)?;
         let (count, states) = (sensors.len(), self.states().len());
         for (name, given, rows) in [("flow", flow, 3 * count), ("pressure", pressure, count)] {

@@ -52,7 +52,7 @@ impl FidelityKind for Reduced {
                 ..Discretisation::default()
             });
         }
-        let slopes = shape_slopes(problem)?;
+        let slopes = shape_slopes(problem, made)?;
         let own_rates = slopes
             .iter()
             .map(|(b, slope)| (*b, slope.added_mass))
@@ -381,7 +381,7 @@ const STEP: f64 = 1e-3;
 ///
 /// # Errors
 /// Vertices of a mesh, along which nothing but the mesh is known to move.
-fn shape_slopes(problem: &Problem) -> Result<Vec<(usize, ShapeSlope)>> {
+fn shape_slopes(problem: &Problem, made: &[Arc<ReducedBody>]) -> Result<Vec<(usize, ShapeSlope)>> {
     let mut out: Vec<(usize, ShapeSlope)> = Vec::with_capacity(problem.changes.len());
     let groups: Vec<_> = problem.changes.chunk_by(|a, b| a.0 == b.0).collect();
     for (n, group) in groups.iter().enumerate() {
@@ -410,32 +410,45 @@ fn shape_slopes(problem: &Problem) -> Result<Vec<(usize, ShapeSlope)>> {
             .iter()
             .map(|(_, change)| move |p: &Vec3| units_velocity(change, size, p))
             .collect();
-        let mut steps = Vec::with_capacity(group.len());
-        for ((_, change), velocity) in group.iter().zip(&moving) {
-            if change.velocity(&Vec3::zeros()).is_none() {
-                return Err(Error::Unsupported {
-                    what: format!("shape parameter {:?} of body {:?} with the fidelity reduced", change.name, body.name),
-                    why: "a compressed body follows shapes by formula and the scale of meshes; of a single vertex it isn't known how the sources inside move".into(),
-                    instead: "use the fidelity isolated, or full by panels".into(),
-                });
-            }
-            let step = STEP * change.size;
-            let at = |t: f64| {
-                let changed = units.changed(change, t);
-                method.response(&changed.body(), problem.numerics, units.finest)
-            };
-            steps.push(compress::ShapeStep {
-                step,
-                velocity,
-                responses: [at(step)?, at(-step)?],
-                added_mass: own[steps.len()],
+        if let Some((_, change)) = group
+            .iter()
+            .find(|(_, c)| c.velocity(&Vec3::zeros()).is_none())
+        {
+            return Err(Error::Unsupported {
+                what: format!("shape parameter {:?} of body {:?} with the fidelity reduced", change.name, body.name),
+                why: "a compressed body follows shapes by formula and the scale of meshes; of a single vertex it isn't known how the sources inside move".into(),
+                instead: "use the fidelity isolated, or full by panels".into(),
             });
         }
+        let answering: Vec<_> = group
+            .iter()
+            .map(|(_, change)| {
+                let units = &units;
+                move |t: f64| {
+                    let changed = units.changed(change, t);
+                    method.response(&changed.body(), problem.numerics, units.finest)
+                }
+            })
+            .collect();
+        let each = group.iter().zip(&moving).zip(&answering).zip(own);
+        let steps: Vec<_> = each
+            .map(
+                |((((_, change), velocity), response), added_mass)| compress::ShapeStep {
+                    step: STEP * change.size,
+                    velocity,
+                    response,
+                    added_mass,
+                },
+            )
+            .collect();
         let response = method.response(&units.body(), problem.numerics, units.finest)?;
         let (settings, regions) = (&units.settings, &units.regions);
+        let points = made[b].parts().points.iter();
+        let points: Vec<Vec3> = points.map(|p| p / size).collect();
         let made = compress::slopes(
             body.name,
             &units.mesh,
+            &points,
             response.as_ref(),
             settings,
             regions,

@@ -35,12 +35,13 @@ mod water;
 
 /// The book's programs are tested.
 #[cfg(doctest)]
-#[doc = include_str!("../docs/shapes.md")]
-struct Shapes;
-
-#[cfg(doctest)]
 #[doc = include_str!("../docs/gradients.md")]
 mod gradients {}
+
+/// The same of another page.
+#[cfg(doctest)]
+#[doc = include_str!("../docs/shapes.md")]
+mod shapes {}
 
 /// The same of a page whose programs need the feature.
 #[cfg(all(doctest, feature = "opt"))]

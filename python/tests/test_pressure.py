@@ -64,7 +64,10 @@ def test_pressures_in_a_gap_that_a_film_carries():
     largest = np.abs(right[:, :3]).max()
     for p, water in zip(surfaces, right, strict=True):
         assert p.at_films.shape == p.pressures.shape
-        assert 0.8 < p.at_films @ p.areas < 2.0
+        # The sides in the gap are at it all over; it reaches around their edges, where it fades.
+        facing = (p.centres[:, 2] > 0.495) & (p.centres[:, 2] < 0.525)
+        assert p.areas[facing].sum() == pytest.approx(1.0) and p.at_films[facing].min() > 0.9
+        assert not p.at_films[np.abs(p.centres[:, 2] - 0.51) > 1.0].any()
         assert p.wrench[:3] == pytest.approx(water[:3], abs=0.03 * largest)
 
 

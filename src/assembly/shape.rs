@@ -1,6 +1,6 @@
 //! Shapes that are parameters: declared, with what of their bodies follows from them.
 
-use super::{body_values, elements, hull};
+use super::bodies::{body_values, elements, hull};
 use crate::adjoint::lie::Pose;
 use crate::contact::{ContactShape, Contacts};
 use crate::dynamics::force::{ChangedSurface, Lubricated};

@@ -25,6 +25,7 @@ mod linearisation;
 mod momentum;
 mod parameters;
 mod shape;
+mod shapes;
 mod slopes;
 mod stiffness;
 mod symmetry;
@@ -48,7 +49,7 @@ pub use linearisation::Linearisation;
 pub use parameters::{
     BodyValues, Declarations, Declared, Entry, Owner, Parameter, Parameters, Range, Typical,
 };
-pub use shape::{Follows, Shapes};
+pub use shapes::{Follows, Shapes};
 pub use slopes::{InputTangents, Slopes};
 pub use stiffness::Damping;
 pub use symmetry::FreeMotions;

@@ -31,13 +31,14 @@ mod region;
 mod resolved;
 mod second;
 mod shape;
+mod slope;
 mod surface;
 mod views;
 
 pub use body::{CompressedParts, Fit, ReducedBody};
 pub use link::{Cutoff, Link};
 pub use region::Region;
-pub use shape::ShapeSlope;
+pub use slope::ShapeSlope;
 
 use super::Exclusions;
 use super::film::Films;

@@ -4,9 +4,9 @@ A fish of three ellipsoids, as heavy as the water it displaces, hangs together b
 as far as it can. Found are the torques of both motors at each of 200 steps and, in the co-design, how high and how thick each link is. What is the same for all:
 the effort (the root of the sum of all squared torques), the time, the length of the links, the joints' springs and dampers, and the volume of the fish, so its mass too.
 
-Control alone has a hard-working rival here: it descends from four gaits (two frequencies, two phases between the joints), with at least as many rollouts in
-total as the co-design has, which starts from one. Torques live on a sphere (only their direction counts), heights and thicknesses on
-a surface of equal volume, so that L-BFGS has nothing to obey but bounds: no link gets more than half as high or thick again (a factor of exp(0.4)).
+Control alone has a hard-working rival here: it descends from four gaits (three frequencies, two phases between the joints), with more rollouts in
+total than the co-design has, which starts from one. Torques live on a sphere (only their direction counts), heights and thicknesses on
+a surface of equal volume, so that L-BFGS has nothing to obey but bounds: no link gets more than half as high or thick again (a factor of exp(0.4)), before all are thinned to the same volume.
 
 The water is `isolated`: each link has its own added mass, and they don't feel each other's flow. It is a potential flow: no wake, no stall. The drag of a real fish would cost both.
 
@@ -120,9 +120,10 @@ def descend(swim, start, shaped, iterations):
             return 1.0, np.zeros_like(x)
         return -far, -np.concatenate([by_pattern.ravel(), by_logs if shaped else []])
 
-    x = np.concatenate([start.ravel(), np.zeros(6 if shaped else 0)])
+    # Of length 1, so that the pattern turns about as fast as the logarithms grow.
+    x = np.concatenate([start.ravel() / np.linalg.norm(start), np.zeros(6 if shaped else 0)])
     bounds = [(None, None)] * size + [(-REACH, REACH)] * (len(x) - size)
-    options = {"maxiter": iterations, "maxcor": 20, "maxls": 40, "gtol": 1e-8, "ftol": 1e-6, "maxfun": 2 * iterations}
+    options = {"maxiter": iterations, "maxcor": 20, "maxls": 40, "gtol": 1e-7, "ftol": 1e-6, "maxfun": 2 * iterations}
     found = minimize(cost, x, jac=True, method="L-BFGS-B", bounds=bounds, options=options)
     return found.x[:size].reshape(start.shape), found.x[size:] if shaped else np.zeros(6)
 
